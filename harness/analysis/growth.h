@@ -1,0 +1,107 @@
+// The exponent p in "drift grows like t^p", from an ensemble of runs, with an honest spread.
+#pragma once
+
+#include <span>
+#include <string>
+#include <vector>
+
+namespace loopbench::harness {
+
+/// One run's drift: times since release in s, increasing, and drift in the unit of `length` below
+/// (signs are dropped). Samples belong to accepted steps. A value that is not finite ends the run.
+struct DriftSeries {
+  std::vector<double> t;
+  std::vector<double> value;
+};
+
+/// What is cut off and when a window is long enough. Fractions of times are of the end of the
+/// usable part of the runs.
+struct GrowthOptions {
+  /// Where the two windows start. Before the first, growth is that of the start-up: of few steps,
+  /// and of a first swing that need not be like the later ones.
+  double window_start = 0.1;
+  double late_window_start = 0.5;
+
+  /// The running maximum is read at so many times, evenly spaced in log t: an even weight per
+  /// decade, where the integrator's own samples would put nine tenths of it on the last one.
+  int points = 64;
+
+  /// Drift above this fraction of `length` is no longer small, and stops growing: cut off.
+  double saturation = 0.1;
+
+  /// Drift below this many round-offs of `length` is the evaluation's own noise: cut off.
+  double floor = 10;
+
+  /// A final drift below this many round-offs of `length` is called "round-off". A thousand is what
+  /// rounding alone gives after N = 1e4 steps: random velocity errors add up to eps v sqrt(N),
+  /// positions to eps v T sqrt(N / 3), and v T is some ten lengths. Truncation at the tightest
+  /// tolerance in use (1e-12) leaves ten thousand and more.
+  double round_off = 1e3;
+
+  /// "too-short" unless the first window's end is this many times its start (saturation and floor
+  /// may have clipped it) and every run has this many samples in the late window.
+  double shortest_ratio = 4;
+  int fewest_samples = 16;
+
+  /// Fewer members than this never resolve an exponent.
+  int fewest_members = 8;
+
+  /// Means of the two windows that differ by less than this agree even if the spread is smaller.
+  /// The running maximum of a drift with period P lags by up to P, which alone raises a slope p by
+  /// some p P / (2 t), t being the window's start: 0.04 for p = 2 and seven periods. The spread
+  /// does not show this bias, so windows should start after several periods.
+  double slope_bias = 0.05;
+
+  /// Largest standard error of either mean. Exponents that theory offers (1/2, 1, 3/2, 2) lie half
+  /// a unit apart; two standard errors must stay within half of that.
+  double largest_error = 0.125;
+};
+
+/// The answer. Exponents and spreads are NaN where they cannot be had.
+struct Growth {
+  double exponent;       ///< mean over the members, window [0.1 T, T]
+  double spread;         ///< sample standard deviation over the members; NaN for one member
+  double exponent_late;  ///< the same for the window [0.5 T, T]
+  double spread_late;
+  bool resolved;       ///< see AnalyseGrowth()
+  std::string regime;  ///< "truncation", "round-off", "saturated" or "too-short"
+  int members;         ///< number of runs
+  double t_from;       ///< start of the first window, s; later than 0.1 T if the floor clips it
+  double t_to;         ///< T, end of both windows, s; before the runs' end if drift saturates
+};
+
+/// Least-squares slope of log(running maximum) against log t, per run and window; mean and spread
+/// over the ensemble.
+///
+/// The scatter of one fit says nothing about its error, because residuals are periodic and
+/// correlated: such an interval is 3 to 12 times too narrow. So the spread comes from runs with
+/// perturbed starts (16 to 32 of them), and one run resolves nothing.
+///
+/// All members use the same windows: T is the earliest of t_end, a run's end and saturation, and
+/// the first window starts no earlier than the last member leaves the floor.
+///
+/// *Resolved* means all of:
+///  1. at least `fewest_members` members and windows that are not too short;
+///  2. |exponent - exponent_late| <= max(s, slope_bias) with s^2 the mean of the squares of the two
+///     spreads. The measure is the spread and not the standard error s / sqrt(m): the question is
+///     whether one power law holds on both windows as far as a run can tell, and that must not
+///     become harder to affirm the more runs there are;
+///  3. s / sqrt(m) <= largest_error for either spread, because with a large spread the second
+///     condition would hold for any numbers.
+///
+/// *Regime*: "round-off" if the geometric mean of the final running maxima is below `round_off`;
+/// else "too-short" if a window is; else "saturated" if some member passes saturation before t_end
+/// (the exponent then describes the time before); else "truncation". The regime is read off the
+/// size of the drift alone, so it is a label, not a diagnosis.
+///
+/// @param length  characteristic length of the mechanism (a link), in the unit of the drift.
+/// @throws std::invalid_argument if t and value differ in size or length is not positive.
+Growth AnalyseGrowth(std::span<const DriftSeries> runs, double t_end, double length,
+                     const GrowthOptions& options = {});
+
+/// The running maximum of |value| at `points` times spaced evenly in log t, from the first positive
+/// time to the last: what a log-log plot of drift shows, in little space. Empty if there is no
+/// interval or points < 2.
+DriftSeries Envelope(const DriftSeries& series, int points);
+
+}  // namespace loopbench::harness

@@ -1,0 +1,140 @@
+// An experiment: which mechanisms, columns, tolerances and horizons are run, and how each case is
+// called. Plain data; experiment_reader.h fills it.
+#pragma once
+
+#include <array>
+#include <cstddef>
+#include <cstdint>
+#include <filesystem>
+#include <optional>
+#include <string>
+#include <string_view>
+#include <vector>
+
+#include "harness/config/scene.h"
+#include "mechanism/formulation.h"
+#include "mechanism/topology.h"
+
+namespace loopbench::harness {
+
+/// The three formulations (folders odca/, lagrange/, reduction/).
+enum class FormulationKind { kOdca, kLagrange, kReduction };
+
+/// Names in files and tables, by value of the enum.
+template <class Enum>
+inline constexpr std::array<std::string_view, 0> kNames = {};
+template <>
+inline constexpr std::array<std::string_view, 3> kNames<FormulationKind> = {"odca", "lagrange",
+                                                                            "reduction"};
+template <>
+inline constexpr std::array<std::string_view, 2> kNames<Enforcement> = {"acceleration", "velocity"};
+template <>
+inline constexpr std::array<std::string_view, 2> kNames<Coordinates> = {"joint", "absolute"};
+template <>
+inline constexpr std::array<std::string_view, 2> kNames<SolverKind> = {"as-published",
+                                                                       "rank-revealing"};
+
+/// The other enums have theirs beside them, in mechanism/.
+inline std::string_view ToString(FormulationKind value) {
+  return kNames<FormulationKind>[static_cast<std::size_t>(value)];
+}
+
+/// The value with this name, or nothing.
+template <class Enum>
+std::optional<Enum> Parse(std::string_view name) {
+  for (std::size_t i = 0; i < kNames<Enum>.size(); ++i) {
+    if (kNames<Enum>[i] == name) return static_cast<Enum>(i);
+  }
+  return std::nullopt;
+}
+
+/// One way of imposing the loops: a column of the tables. For reduction the solver as published is
+/// the mechanism's fixed independent set, the rank-revealing one the automatic partition.
+struct Column {
+  FormulationKind formulation = FormulationKind::kOdca;
+  Enforcement enforcement = Enforcement::kAcceleration;
+  Coordinates coordinates = Coordinates::kJoint;
+  SolverKind solver = SolverKind::kRankRevealing;
+
+  friend bool operator==(const Column&, const Column&) = default;
+};
+
+/// "odca/acceleration/joint/as-published".
+std::string ToString(const Column& column);
+
+/// A mechanism and how long it runs.
+struct ExperimentScene {
+  std::string name;            ///< the mechanism's name unless overridden; unique
+  std::filesystem::path path;  ///< the mechanism file, resolved against the experiment's folder
+  MechanismFile mechanism;
+  std::vector<double> horizons;   ///< [s], different
+  std::vector<std::string> tags;  ///< for filters and tables
+};
+
+/// Perturbed repetitions for every case that matches all given lists; an empty list matches all.
+struct EnsembleRule {
+  int size = 16;           ///< runs per case, at least 2
+  std::uint64_t seed = 1;  ///< of the generator of perturbations
+  double perturb = 0.02;   ///< amplitude on the held coordinates [rad or m]
+  std::vector<std::string> scenes;
+  std::vector<double> horizons;
+  std::vector<double> tolerances;
+  std::vector<FormulationKind> formulations;
+  std::vector<Enforcement> enforcements;
+  std::vector<Coordinates> coordinates;
+  std::vector<SolverKind> solvers;
+};
+
+/// When a case is given up. Its row then says so.
+struct Limits {
+  double wall_s = 10.0;            ///< wall time [s]: keeps a whole suite within minutes
+  std::int64_t steps = 1'000'000;  ///< attempted steps: far more than any case that ends needs
+};
+
+/// Timing runs, separate from those that measure accuracy.
+struct Timing {
+  int repeats = 5;              ///< 0 switches timing off; 5 make a median with a spread
+  double tolerance = 1e-8;      ///< rtol = atol
+  double horizon = 0.0;         ///< [s]; 0: the shortest of each scene
+  std::vector<Column> columns;  ///< those of the experiment unless given
+};
+
+struct Experiment {
+  std::string name;
+  std::string comment;
+  std::filesystem::path path;
+  std::vector<ExperimentScene> scenes;
+  std::vector<Column> columns;
+  std::vector<double> tolerances;  ///< rtol = atol
+  std::string integrator = "ode45";
+  std::vector<EnsembleRule> ensembles;  ///< the first that matches a case counts
+  Limits limits;
+  int series_points = 200;  ///< points kept of a time series for figures
+  Timing timing;
+};
+
+/// One row of a table: everything that decides a run, except the mechanism itself.
+struct Case {
+  std::size_t scene = 0;  ///< index into Experiment::scenes
+  std::string mechanism;  ///< the scene's name
+  Column column;
+  std::string integrator;
+  double rtol = 0.0;
+  double atol = 0.0;
+  double horizon = 0.0;    ///< [s]
+  int ensemble = 1;        ///< runs; 1: the scene as it is, no perturbation
+  std::uint64_t seed = 0;  ///< of the ensemble
+  double perturb = 0.0;    ///< amplitude of the ensemble [rad or m]
+  Limits limits;
+};
+
+/// Whether the rule applies to the case (its ensemble fields do not matter).
+bool Matches(const EnsembleRule& rule, const Case& one);
+
+/// All cases for accuracy, in the order scene, horizon, column, tolerance.
+std::vector<Case> Expand(const Experiment& experiment);
+
+/// All cases for timing, in the order scene, column; empty when timing is off.
+std::vector<Case> ExpandTiming(const Experiment& experiment);
+
+}  // namespace loopbench::harness

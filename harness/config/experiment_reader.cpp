@@ -1,0 +1,80 @@
+#include "harness/config/experiment_reader.h"
+
+#include "harness/config/experiment_sections.h"
+#include "harness/integrator/options.h"
+
+namespace loopbench::harness {
+namespace {
+
+constexpr std::int64_t kMaxSteps = 1'000'000'000'000;  // no run gets there
+
+void ReadLimits(const JsonNode& root, Limits* limits) {
+  const auto node = root.Optional("limits");
+  if (!node || !node->ExpectObject({"wall_s", "steps"})) return;
+  if (const auto wall = node->Optional("wall_s")) limits->wall_s = wall->Number(kPositive);
+  if (const auto steps = node->Optional("steps")) {
+    limits->steps = steps->Integer(1, kMaxSteps);
+  }
+}
+
+void ReadTiming(const JsonNode& root, Timing* timing) {
+  const auto node = root.Optional("timing");
+  if (!node || !node->ExpectObject({"repeats", "tolerance", "horizon", "columns"})) return;
+  if (const auto repeats = node->Optional("repeats")) {
+    timing->repeats = static_cast<int>(repeats->Integer(0, kMaxCount));
+  }
+  if (const auto tolerance = node->Optional("tolerance")) {
+    timing->tolerance = tolerance->Number(kTolerances);
+  }
+  if (const auto horizon = node->Optional("horizon")) timing->horizon = horizon->Number(kPositive);
+  if (const auto columns = node->Optional("columns")) timing->columns = ReadColumns(*columns);
+}
+
+void ReadSettings(const JsonNode& root, Experiment* experiment) {
+  if (const auto name = root.Optional("integrator")) {
+    const std::vector<std::string> profiles = ProfileNames();
+    const auto index = name->Choice(profiles, "an integrator profile");
+    if (index) experiment->integrator = profiles[static_cast<std::size_t>(*index)];
+  }
+  ReadLimits(root, &experiment->limits);
+  const auto series = root.Optional("series");
+  if (series && series->ExpectObject({"points"})) {
+    if (const auto points = series->Optional("points")) {
+      experiment->series_points = static_cast<int>(points->Integer(0, kMaxCount));
+    }
+  }
+  ReadTiming(root, &experiment->timing);
+}
+
+}  // namespace
+
+Experiment ReadExperiment(const std::filesystem::path& path) {
+  return ParseExperiment(ReadTextFile(path), path);
+}
+
+Experiment ParseExperiment(std::string_view text, const std::filesystem::path& path) {
+  const Json document = ParseDocument(text, path.string());
+  ErrorList errors(path.string());
+  const JsonNode root(document, "", errors);
+  Experiment experiment;
+  experiment.path = path;
+  if (root.ExpectObject({"name", "comment", "scenes", "columns", "tolerances", "integrator",
+                         "ensembles", "limits", "series", "timing"})) {
+    if (const auto name = root.Required("name", "a name")) experiment.name = name->Text();
+    if (const auto comment = root.Optional("comment")) experiment.comment = comment->Text();
+    experiment.scenes = ReadScenes(root, path.parent_path(), &errors);
+    if (const auto columns = root.Required("columns", "an array of columns")) {
+      experiment.columns = ReadColumns(*columns);
+    }
+    if (const auto tolerances = root.Required("tolerances", "a list of numbers")) {
+      experiment.tolerances = tolerances->NumberList(kTolerances);
+    }
+    experiment.timing.columns = experiment.columns;
+    ReadSettings(root, &experiment);
+    ReadEnsembles(root, errors, &experiment);
+  }
+  errors.ThrowIfAny();
+  return experiment;
+}
+
+}  // namespace loopbench::harness

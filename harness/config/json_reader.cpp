@@ -1,0 +1,212 @@
+#include "harness/config/json_reader.h"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <cmath>
+#include <cstddef>
+
+#include "harness/config/config_error.h"
+#include "harness/config/spelling.h"
+
+namespace loopbench::harness {
+namespace {
+
+constexpr std::size_t kLongestShown = 60;  ///< characters of a value in a message
+constexpr std::size_t kMostListed = 16;    ///< names in a message
+
+/// The value as a reader finds it in the file, or its kind where it would be too long.
+std::string Shown(const Json& value) {
+  if (value.is_object()) return value.empty() ? "an empty object" : "an object";
+  if (value.is_array() && value.empty()) return "an empty array";
+  std::string text = value.dump(-1, ' ', false, Json::error_handler_t::replace);
+  if (text.size() <= kLongestShown) return text;
+  if (value.is_array()) return fmt::format("an array of {} values", value.size());
+  // A cut inside a UTF-8 character would make the message invalid: step back to its first byte.
+  std::size_t end = kLongestShown;
+  while (end > 0 && (static_cast<unsigned char>(text[end]) & 0xC0u) == 0x80u) --end;
+  return text.substr(0, end) + "...";
+}
+
+/// "a", "b", "c" without empty names.
+std::string Listed(const std::vector<std::string>& names) {
+  std::vector<std::string> quoted;
+  for (const std::string& name : names) {
+    if (name.empty()) continue;
+    if (quoted.size() == kMostListed) {
+      quoted.push_back("...");
+      break;
+    }
+    quoted.push_back('"' + name + '"');
+  }
+  return quoted.empty() ? "there is none" : fmt::format("{}", fmt::join(quoted, ", "));
+}
+
+}  // namespace
+
+void ErrorList::Add(std::string_view pointer, std::string_view found, std::string_view expected,
+                    std::string_view suggestion) {
+  std::string message = fmt::format("{}: {}: found {}, expected {}", file_,
+                                    pointer.empty() ? "(top level)" : pointer, found, expected);
+  if (!suggestion.empty()) message += fmt::format(" (did you mean \"{}\"?)", suggestion);
+  messages_.push_back(std::move(message));
+}
+
+void ErrorList::ThrowIfAny() const {
+  if (!messages_.empty()) throw ConfigError(fmt::format("{}", fmt::join(messages_, "\n")));
+}
+
+std::string Range::Text() const {
+  if (std::isfinite(min) && std::isfinite(max)) {
+    return fmt::format(" {} {} and <= {}", above_min ? ">" : ">=", min, max);
+  }
+  if (std::isfinite(min)) return fmt::format(" {} {}", above_min ? ">" : ">=", min);
+  return std::isfinite(max) ? fmt::format(" <= {}", max) : "";
+}
+
+void JsonNode::Fail(std::string_view expected, std::string_view suggestion) const {
+  FailAs(Shown(*value_), expected, suggestion);
+}
+
+void JsonNode::FailAs(std::string_view found, std::string_view expected,
+                      std::string_view suggestion) const {
+  errors_->Add(pointer_, found, expected, suggestion);
+}
+
+JsonNode JsonNode::Child(const Json& value, std::string_view token) const {
+  return JsonNode(value, pointer_ + "/" + PointerToken(token), *errors_);
+}
+
+bool JsonNode::ExpectObject(const std::vector<std::string>& known) const {
+  if (!value_->is_object()) {
+    Fail("an object with keys " + Listed(known));
+    return false;
+  }
+  for (const auto& [key, value] : value_->items()) {
+    if (std::find(known.begin(), known.end(), key) != known.end()) continue;
+    Child(value, key)
+        .FailAs(fmt::format("unknown key \"{}\"", key), "one of " + Listed(known),
+                NearestSpelling(key, known));
+  }
+  return true;
+}
+
+std::optional<JsonNode> JsonNode::Optional(const std::string& key) const {
+  if (!value_->is_object()) return std::nullopt;
+  const auto found = value_->find(key);
+  if (found == value_->end()) return std::nullopt;
+  return Child(*found, key);
+}
+
+std::optional<JsonNode> JsonNode::Required(const std::string& key,
+                                           std::string_view expected) const {
+  std::optional<JsonNode> member = Optional(key);
+  if (!member && value_->is_object()) FailAs(fmt::format("no \"{}\"", key), expected);
+  return member;
+}
+
+std::vector<std::pair<std::string, JsonNode>> JsonNode::Members() const {
+  std::vector<std::pair<std::string, JsonNode>> members;
+  if (!value_->is_object()) {
+    Fail("an object");
+    return members;
+  }
+  for (const auto& [key, value] : value_->items()) members.emplace_back(key, Child(value, key));
+  return members;
+}
+
+std::vector<JsonNode> JsonNode::Elements(std::string_view what) const {
+  std::vector<JsonNode> elements;
+  if (!value_->is_array()) {
+    Fail(fmt::format("an array of {}", what));
+    return elements;
+  }
+  for (std::size_t i = 0; i < value_->size(); ++i) {
+    elements.push_back(Child((*value_)[i], std::to_string(i)));
+  }
+  return elements;
+}
+
+std::vector<JsonNode> JsonNode::OneOrMore(std::string_view what) const {
+  if (!value_->is_array()) return {*this};
+  if (value_->empty()) Fail(fmt::format("at least one of {}", what));
+  return Elements(what);
+}
+
+double JsonNode::Number(const Range& range) const {
+  if (value_->is_number() && range.Contains(value_->get<double>())) return value_->get<double>();
+  Fail("a number" + range.Text());
+  return 0.0;
+}
+
+std::int64_t JsonNode::Integer(std::int64_t min, std::int64_t max) const {
+  // Through double for the comparison: get<int64_t> would cut 2.7 and wrap values beyond 2^63.
+  if (value_->is_number()) {
+    const double number = value_->get<double>();
+    const bool inside = number >= static_cast<double>(min) && number <= static_cast<double>(max);
+    if (inside && number == std::floor(number)) return value_->get<std::int64_t>();
+  }
+  Fail(fmt::format("an integer from {} to {}", min, max));
+  return min;
+}
+
+bool JsonNode::Bool() const {
+  if (value_->is_boolean()) return value_->get<bool>();
+  Fail("true or false");
+  return false;
+}
+
+std::string JsonNode::Text() const {
+  if (value_->is_string() && !value_->get_ref<const std::string&>().empty()) {
+    return value_->get<std::string>();
+  }
+  Fail("a string that is not empty");
+  return "";
+}
+
+Eigen::Vector3d JsonNode::Vector() const {
+  Eigen::Vector3d vector = Eigen::Vector3d::Zero();
+  if (!value_->is_array() || value_->size() < 2 || value_->size() > 3) {
+    Fail("an array of 2 or 3 numbers");
+    return vector;
+  }
+  const std::vector<double> numbers = Numbers(value_->size());
+  for (std::size_t i = 0; i < numbers.size(); ++i) vector[static_cast<int>(i)] = numbers[i];
+  return vector;
+}
+
+std::vector<double> JsonNode::Numbers(std::size_t count) const {
+  std::vector<double> numbers;
+  if (!value_->is_array() || value_->size() != count) {
+    Fail(fmt::format("an array of {} number{}", count, count == 1 ? "" : "s"));
+    return std::vector<double>(count, 0.0);
+  }
+  for (const JsonNode& element : Elements("numbers")) numbers.push_back(element.Number());
+  return numbers;
+}
+
+std::vector<double> JsonNode::NumberList(const Range& range) const {
+  std::vector<double> numbers;
+  for (const JsonNode& element : OneOrMore("numbers")) {
+    const double number = element.Number(range);
+    const bool again = std::find(numbers.begin(), numbers.end(), number) != numbers.end();
+    if (again && range.Contains(number)) element.Fail("each value once");
+    numbers.push_back(number);
+  }
+  return numbers;
+}
+
+std::optional<int> JsonNode::Choice(const std::vector<std::string>& known,
+                                    std::string_view what) const {
+  if (!value_->is_string()) {
+    Fail(fmt::format("{}: {}", what, Listed(known)));
+    return std::nullopt;
+  }
+  const auto& text = value_->get_ref<const std::string&>();
+  const auto found = std::find(known.begin(), known.end(), text);
+  if (found != known.end() && !text.empty()) return static_cast<int>(found - known.begin());
+  Fail(fmt::format("{}: {}", what, Listed(known)), NearestSpelling(text, known));
+  return std::nullopt;
+}
+
+}  // namespace loopbench::harness

@@ -1,0 +1,77 @@
+// "ground" and "bodies" of a mechanism file.
+#include <Eigen/Cholesky>
+
+#include "harness/config/mechanism_sections.h"
+
+namespace loopbench::harness {
+namespace {
+
+void ReadPoints(const JsonNode& owner, SpaceKind space, BodyDescription* body) {
+  const auto points = owner.Optional("points");
+  if (!points) return;
+  for (const auto& [name, position] : points->Members()) {
+    if (name.empty()) position.FailAs("a point without a name", "a name that is not empty");
+    body->points[name] = ReadVector(position, space);
+  }
+}
+
+/// One number I becomes diag(I, I, I): in the plane only Izz matters, in space it is isotropic.
+/// Six numbers are the elements [Ixx, Iyy, Izz, Ixy, Ixz, Iyz] of the matrix as it stands.
+Eigen::Matrix3d ReadInertia(const JsonNode& node) {
+  Eigen::Matrix3d inertia = Eigen::Matrix3d::Identity();
+  if (node.value().is_number()) return inertia * node.Number(kPositive);
+  const bool known_size =
+      node.value().is_array() && (node.value().size() == 3 || node.value().size() == 6);
+  if (!known_size) {
+    node.Fail("a number > 0, [Ixx, Iyy, Izz] or [Ixx, Iyy, Izz, Ixy, Ixz, Iyz]");
+    return inertia;
+  }
+  const std::vector<double> values = node.Numbers(node.value().size());
+  inertia.diagonal() << values[0], values[1], values[2];
+  if (values.size() == 6) {
+    inertia(0, 1) = inertia(1, 0) = values[3];
+    inertia(0, 2) = inertia(2, 0) = values[4];
+    inertia(1, 2) = inertia(2, 1) = values[5];
+  }
+  // Not the factorisation alone: a matrix of huge elements may factorise by round-off.
+  const bool positive = inertia.diagonal().minCoeff() > 0.0 &&
+                        Eigen::LLT<Eigen::Matrix3d>(inertia).info() == Eigen::Success;
+  if (!positive) node.Fail("a positive definite inertia");
+  return inertia;
+}
+
+BodyDescription ReadBody(const JsonNode& node, const std::vector<std::string>& taken,
+                         SpaceKind space) {
+  BodyDescription body;
+  if (!node.ExpectObject({"name", "mass", "inertia", "com", "points"})) return body;
+  body.name = ReadNewName(node, taken);
+  if (const auto mass = node.Required("mass", "a number > 0 [kg]")) {
+    body.mass = mass->Number(kPositive);
+  }
+  if (const auto inertia = node.Required("inertia", "the inertia about the centre of mass")) {
+    body.inertia = ReadInertia(*inertia);
+  }
+  if (const auto com = node.Optional("com")) body.com = ReadVector(*com, space);
+  ReadPoints(node, space, &body);
+  return body;
+}
+
+}  // namespace
+
+void ReadBodies(const JsonNode& root, MechanismDescription* description) {
+  const SpaceKind space = description->space;
+  description->bodies[kGround].name = "ground";
+  const auto ground = root.Optional("ground");
+  if (ground && ground->ExpectObject({"points"})) {
+    ReadPoints(*ground, space, &description->bodies[kGround]);
+  }
+  const auto bodies = root.Required("bodies", "an array of bodies");
+  if (!bodies) return;
+  const std::vector<JsonNode> elements = bodies->Elements("bodies");
+  if (bodies->value().is_array() && elements.empty()) bodies->Fail("at least one body");
+  for (const JsonNode& element : elements) {
+    description->bodies.push_back(ReadBody(element, BodyNames(*description), space));
+  }
+}
+
+}  // namespace loopbench::harness

@@ -1,0 +1,183 @@
+// "joints" and "forces" of a mechanism file.
+#include <fmt/format.h>
+
+#include "harness/config/mechanism_sections.h"
+#include "mechanism/joint.h"
+
+namespace loopbench::harness {
+namespace {
+
+/// A number (about z) or a rotation vector of three numbers.
+Eigen::Vector3d ReadRotation(const JsonNode& node, SpaceKind space) {
+  if (node.value().is_number()) return {0.0, 0.0, node.Number()};
+  if (!node.value().is_array() || node.value().size() != 3) {
+    node.Fail("a number (rotation about z) or an array of 3 numbers [rad]");
+    return Eigen::Vector3d::Zero();
+  }
+  const Eigen::Vector3d rotation = node.Vector();
+  const bool about_z = rotation.x() == 0.0 && rotation.y() == 0.0;
+  if (space == SpaceKind::kPlanar && !about_z)
+    node.Fail("a rotation about z in a planar mechanism");
+  return rotation;
+}
+
+JointSide ReadSide(const JsonNode& joint, const char* key,
+                   const MechanismDescription& description) {
+  JointSide side;
+  side.body = -1;  // not known: matches no other side
+  const auto node = joint.Required(key, "an object with keys \"body\", \"at\", \"rotation\"");
+  if (!node || !node->ExpectObject({"body", "at", "rotation"})) return side;
+  if (const auto body = node->Required("body", "the name of a body or \"ground\"")) {
+    side.body = ReadBodyName(*body, description).value_or(-1);
+  }
+  if (const auto at = node->Optional("at"); at && side.body >= 0) {
+    side.position = ReadPoint(*at, description.bodies[side.body], description.space);
+  }
+  if (const auto rotation = node->Optional("rotation")) {
+    side.rotation = ReadRotation(*rotation, description.space);
+  }
+  return side;
+}
+
+Eigen::Vector3d ReadAxis(const JsonNode& node, JointType type, SpaceKind space) {
+  const Eigen::Vector3d axis = node.Vector();
+  if (type == JointType::kWeld || type == JointType::kFree) {
+    node.Fail("no axis on a weld or free joint");
+  } else if (axis.isZero()) {
+    if (node.value().is_array()) node.Fail("an axis that is not zero");
+  } else if (space == SpaceKind::kPlanar) {
+    const bool along_z = axis.x() == 0.0 && axis.y() == 0.0 && axis.z() > 0.0;
+    if (type == JointType::kRevolute && !along_z) {
+      node.Fail("an axis along +z in a planar mechanism");
+    }
+    if (type == JointType::kPrismatic && axis.z() != 0.0) {
+      node.Fail("an axis with z = 0 in a planar mechanism");
+    }
+  }
+  return axis;
+}
+
+JointDescription ReadJoint(const JsonNode& node, const MechanismDescription& description) {
+  JointDescription joint;
+  if (!node.ExpectObject({"name", "type", "from", "to", "axis", "cut"})) return joint;
+  joint.name = ReadNewName(node, JointNames(description));
+  if (const auto type = node.Required("type", "a joint type")) {
+    joint.type = static_cast<JointType>(type->Choice(JointTypeNames(), "a joint type").value_or(0));
+  }
+  joint.from = ReadSide(node, "from", description);
+  joint.to = ReadSide(node, "to", description);
+  if (joint.from.body >= 0 && joint.from.body == joint.to.body) {
+    node.FailAs(
+        fmt::format("a joint of \"{}\" with itself", description.bodies[joint.from.body].name),
+        "two different bodies");
+  }
+  if (const auto axis = node.Optional("axis")) {
+    joint.axis = ReadAxis(*axis, joint.type, description.space);
+  }
+  if (const auto cut = node.Optional("cut")) joint.cut = cut->Bool();
+  return joint;
+}
+
+/// The joint of a joint force; joints that carry no single coordinate have no room for one.
+int ReadForceJoint(const JsonNode& force, const MechanismDescription& description) {
+  const auto node = force.Required("joint", "the name of a joint");
+  if (!node) return 0;
+  const auto joint = ReadJointName(*node, description);
+  if (!joint) return 0;
+  const JointDescription& found = description.joints[*joint];
+  if (SpeedCount(found.type, description.space) != 1) {
+    node->FailAs(fmt::format("\"{}\" ({})", found.name, ToString(found.type)),
+                 "a joint with one coordinate (revolute or prismatic)");
+  }
+  return *joint;
+}
+
+double ReadRequiredNumber(const JsonNode& owner, const std::string& key, const Range& range = {}) {
+  const auto node = owner.Required(key, "a number" + range.Text());
+  return node ? node->Number(range) : 0.0;
+}
+
+ForceDescription ReadPointForce(const JsonNode& node, const MechanismDescription& description) {
+  PointForce force;
+  if (!node.ExpectObject({"type", "body", "at", "force", "axes"})) return force;
+  std::optional<int> body;
+  if (const auto name = node.Required("body", "the name of a body")) {
+    body = ReadBodyName(*name, description);
+    if (body == kGround) name->Fail("a body that can move");
+  }
+  force.body = body.value_or(kGround);
+  if (const auto at = node.Optional("at"); at && body) {
+    force.at = ReadPoint(*at, description.bodies[*body], description.space);
+  }
+  if (const auto vector = node.Required("force", "an array of 2 or 3 numbers [N]")) {
+    force.force = ReadVector(*vector, description.space);
+  }
+  if (const auto axes = node.Optional("axes")) {
+    force.in_body_axes = axes->Choice({"ground", "body"}, "the axes of the force") == 1;
+  }
+  return force;
+}
+
+ForceDescription ReadForce(const JsonNode& node, const MechanismDescription& description) {
+  static const std::vector<std::string> kTypes = {"joint_torque", "joint_spring", "joint_damper",
+                                                  "point_force"};
+  std::optional<int> type;
+  if (!node.value().is_object()) {
+    node.Fail("an object that describes a force");
+  } else if (const auto name = node.Required("type", "a force type")) {
+    type = name->Choice(kTypes, "a force type");
+  }
+  if (type == 0 && node.ExpectObject({"type", "joint", "value"})) {
+    return JointTorque{.joint = ReadForceJoint(node, description),
+                       .value = ReadRequiredNumber(node, "value")};
+  }
+  if (type == 1 && node.ExpectObject({"type", "joint", "stiffness", "rest"})) {
+    const auto rest = node.Optional("rest");
+    return JointSpring{.joint = ReadForceJoint(node, description),
+                       .stiffness = ReadRequiredNumber(node, "stiffness", kNotNegative),
+                       .rest = rest ? rest->Number() : 0.0};
+  }
+  if (type == 2 && node.ExpectObject({"type", "joint", "damping"})) {
+    return JointDamper{.joint = ReadForceJoint(node, description),
+                       .damping = ReadRequiredNumber(node, "damping", kNotNegative)};
+  }
+  if (type == 3) return ReadPointForce(node, description);
+  return JointTorque{};
+}
+
+}  // namespace
+
+const std::vector<std::string>& JointTypeNames() {
+  static const std::vector<std::string> kNames = {
+      std::string(ToString(JointType::kRevolute)), std::string(ToString(JointType::kPrismatic)),
+      std::string(ToString(JointType::kWeld)), std::string(ToString(JointType::kFree))};
+  return kNames;
+}
+
+int CoordinateCount(JointType type, SpaceKind space) {
+  return space == SpaceKind::kPlanar ? KindOf<Planar, double>(type).num_q
+                                     : KindOf<Spatial, double>(type).num_q;
+}
+
+int SpeedCount(JointType type, SpaceKind space) {
+  return space == SpaceKind::kPlanar ? KindOf<Planar, double>(type).num_u
+                                     : KindOf<Spatial, double>(type).num_u;
+}
+
+void ReadJoints(const JsonNode& root, MechanismDescription* description) {
+  const auto joints = root.Required("joints", "an array of joints");
+  if (!joints) return;
+  for (const JsonNode& element : joints->Elements("joints")) {
+    description->joints.push_back(ReadJoint(element, *description));
+  }
+}
+
+void ReadForces(const JsonNode& root, MechanismDescription* description) {
+  const auto forces = root.Optional("forces");
+  if (!forces) return;
+  for (const JsonNode& element : forces->Elements("forces")) {
+    description->forces.push_back(ReadForce(element, *description));
+  }
+}
+
+}  // namespace loopbench::harness

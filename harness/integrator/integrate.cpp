@@ -1,0 +1,115 @@
+#include <algorithm>
+#include <cmath>
+#include <exception>
+#include <limits>
+#include <span>
+#include <stdexcept>
+#include <string>
+#include <vector>
+
+#include "harness/integrator/arkode.h"
+#include "harness/integrator/guarded_ode.h"
+#include "harness/integrator/stepper.h"
+
+namespace loopbench::harness {
+namespace {
+
+constexpr double kEpsilon = std::numeric_limits<double>::epsilon();
+
+std::string At(double t) { return " at t = " + std::to_string(t) + " s"; }
+
+// Ends the run with what the derivative, the clock or ARKODE reported in the step after t_reached.
+bool Fails(const GuardedOde& ode, const Stepper& stepper, int code, IntegratorResult& result) {
+  if (ode.exception()) {
+    std::rethrow_exception(ode.exception());
+  }
+  if (ode.failure() != Outcome::kFinished) {
+    result.outcome = ode.failure();
+    result.message = std::string(ToString(result.outcome)) + " in the step" + At(result.t_reached);
+  } else {
+    result.outcome = OutcomeOfReturnCode(code);
+    result.message = result.outcome == Outcome::kFinished ? "" : stepper.message();
+  }
+  return result.outcome != Outcome::kFinished;
+}
+
+// True if the run must end after an accepted step that is not its last.
+bool Exhausted(GuardedOde& ode, IntegratorResult& result) {
+  if (ode.OutOfTime()) {
+    result.outcome = Outcome::kTimeLimit;
+  } else if (result.steps >= ode.options().step_limit) {
+    result.outcome = Outcome::kStepLimit;
+  } else if (result.last_step <= 16 * kEpsilon * std::abs(result.t_reached)) {
+    result.outcome = Outcome::kStepTooSmall;  // MATLAB's shortest step
+  } else {
+    return false;
+  }
+  result.message = std::string(ToString(result.outcome)) + At(result.t_reached);
+  return true;
+}
+
+// The loop over accepted steps, from a start point that has been observed.
+void Advance(GuardedOde& ode, Stepper& stepper, double t_end, std::vector<double>& y,
+             const StepObserver& observe, IntegratorResult& result) {
+  for (double t = result.t_reached;;) {
+    if (Fails(ode, stepper, stepper.Step(t), result)) {
+      return;
+    }
+    const std::span<const double> accepted = stepper.y();
+    std::copy(accepted.begin(), accepted.end(), y.begin());
+    result.t_reached = t;
+    result.last_step = stepper.last_step();
+    ++result.steps;
+    const StepAction action = observe ? observe(t, y) : StepAction::kContinue;
+    if (t >= t_end) {
+      return;
+    }
+    if (action == StepAction::kStop) {
+      result.message = "stopped by the observer" + At(t);
+      return;
+    }
+    if (Exhausted(ode, result)) {
+      return;
+    }
+    if (action == StepAction::kRestart) {
+      stepper.Restart(t, y);
+      ++result.restarts;
+    }
+  }
+}
+
+}  // namespace
+
+IntegratorResult Integrate(Ode& ode, double t0, double t_end, std::vector<double>& y,
+                           const IntegratorOptions& options, const StepObserver& observe) {
+  std::string fault = Validate(options);
+  if (fault.empty() && y.empty()) {
+    fault = "the state is empty";
+  }
+  if (fault.empty() && std::ssize(y) != ode.size()) {
+    fault = "the state has " + std::to_string(y.size()) + " components, the problem " +
+            std::to_string(ode.size());
+  }
+  if (fault.empty() && !(t_end >= t0)) {
+    fault = "t_end is " + std::to_string(t_end) + "; it must not lie before t0";
+  }
+  if (!fault.empty()) {
+    throw std::invalid_argument(fault);
+  }
+  GuardedOde guarded(ode, options);
+  IntegratorResult result;
+  result.t_reached = t0;
+  const StepAction action = observe ? observe(t0, y) : StepAction::kContinue;
+  if (action == StepAction::kStop) {
+    result.message = "stopped by the observer" + At(t0);
+  } else if (t0 < t_end) {
+    Stepper stepper(guarded, t0, t_end, y);
+    Advance(guarded, stepper, t_end, y, observe, result);
+    result.rejected = stepper.rejected();
+  }
+  result.rhs_evaluations = guarded.calls();
+  result.wall_s = guarded.wall_s();
+  return result;
+}
+
+}  // namespace loopbench::harness

@@ -1,0 +1,41 @@
+// What the integrator needs to know of a problem, and what it tells an observer. No SUNDIALS here.
+#pragma once
+
+#include <functional>
+#include <span>
+
+#include "mechanism/outcome.h"
+
+namespace loopbench::harness {
+
+/// A system of first-order ordinary differential equations y' = f(t, y), t in seconds.
+///
+/// The object may keep scratch memory, so `Derivative` is not const; it must nevertheless be a
+/// function of (t, y) alone between two restarts, because the integrator rejects steps and
+/// evaluates stages out of order.
+class Ode {
+ public:
+  virtual ~Ode() = default;
+
+  /// Number of components of y; constant during a run.
+  virtual int size() const = 0;
+
+  /// Writes f(t, y) to `ydot`. Returns kFinished, or the failure that ends the run (kSingular,
+  /// ...). The integrator checks for NaN and infinity itself, so no implementation need do so.
+  virtual Outcome Derivative(double t, std::span<const double> y, std::span<double> ydot) = 0;
+};
+
+/// What the run does after an observation.
+enum class StepAction {
+  kContinue,  ///< go on; changes made to y are ignored
+  kRestart,   ///< y, or the meaning of its components, has changed: forget f(t, y), keep the step
+              ///< size
+  kStop,      ///< end the run here, successfully
+};
+
+/// Called with the start point and then with every accepted step, in order of time. The state is
+/// the integrator's own solution there, never an interpolated one: sampling drift at interpolated
+/// points changes it by up to five orders of magnitude. An empty function observes nothing.
+using StepObserver = std::function<StepAction(double t, std::span<double> y)>;
+
+}  // namespace loopbench::harness

@@ -1,0 +1,88 @@
+// Integrator profiles and options: what may be asked of the integrator. No SUNDIALS here.
+#pragma once
+
+#include <cstdint>
+#include <string>
+#include <string_view>
+#include <vector>
+
+namespace loopbench::harness {
+
+/// How to integrate. A profile is a Runge-Kutta pair together with an error norm, a step-size
+/// controller and a first-step rule: all of them change drift (by factors of two to four), so a
+/// comparison must name its profile.
+///
+/// | profile          | pair                  | order | norm, controller                         |
+/// |------------------|-----------------------|-------|------------------------------------------|
+/// | ode45            | Dormand-Prince 5(4)   | 5     | MATLAB: max norm, I controller           |
+/// | dormand-prince   | the same pair         | 5     | ARKODE: weighted RMS norm, PI controller |
+/// | bogacki-shampine | Bogacki-Shampine 3(2) | 3     | as dormand-prince                        |
+/// | cash-karp        | Cash-Karp 5(4)        | 5     | as dormand-prince                        |
+/// | fehlberg         | Fehlberg 5(4)         | 5     | as dormand-prince                        |
+/// | verner           | Verner 6(5)           | 6     | as dormand-prince                        |
+/// | fehlberg-78      | Fehlberg 8(7)         | 8     | as dormand-prince                        |
+///
+/// "ode45" follows MATLAB's function of that name (L. Shampine, M. Reichelt, The MATLAB ODE suite,
+/// 1997): step counts agree with it within about 1 %. The list is closed because ARKODE 6.4.1 loses
+/// the order of many of its own tables (LLNL/sundials issue 311); each profile here has a
+/// convergence-order test.
+struct IntegratorOptions {
+  std::string profile = "ode45";
+
+  /// Relative and absolute tolerance of one step's error estimate. ode45 accepts if
+  /// max_i |e_i| / max(rtol |y_i|, atol) <= 1, the others if rms_i |e_i| / (rtol |y_i| + atol)
+  /// <= 1.
+  double rtol = 1e-8;
+  double atol = 1e-8;
+
+  /// Accepted steps before the run ends with kStepLimit.
+  std::int64_t step_limit = 10'000'000;
+
+  /// Wall time in seconds before the run ends with kTimeLimit. Checked after every accepted step
+  /// and on every 16th derivative, so one derivative that hangs is not interrupted.
+  double time_limit_s = 600;
+
+  /// Longest step in seconds; 0 is the profile's own (ode45: a tenth of the interval; else none).
+  double max_step = 0;
+
+  /// When positive: every step has this length (the last is clipped) and no error test is made.
+  double fixed_step = 0;
+};
+
+/// "" if the options can be used, else one sentence with the option, its value and what is allowed.
+std::string Validate(const IntegratorOptions& options);
+
+/// The accepted values of `IntegratorOptions::profile`, in the order of the table above.
+std::vector<std::string> ProfileNames();
+
+/// ARKODE's step-size controller. Every value is set by the profile, because ARKODE's own defaults
+/// change between versions. Factors are of the step size, per step.
+struct Controller {
+  bool proportional;        ///< PI (0.8, 0.31) instead of I (1)
+  bool uses_method_order;   ///< exponent 1/q of the solution instead of 1/p of the embedding
+  double safety;            ///< multiplies the step that would just be accepted
+  double bias;              ///< multiplies the error estimate before the controller sees it
+  double growth;            ///< greatest factor between steps
+  double first_growth;      ///< the same after the first step
+  double reduction;         ///< least factor after a failed attempt
+  double repeated_failure;  ///< greatest factor from the second failure of one step on
+  double keep_below;        ///< the step is kept if it would grow by less than this factor
+};
+
+/// One row of the table above, as arkode.cpp needs it.
+struct Profile {
+  std::string_view name;
+  const char* table;  ///< ARKODE's name of the Runge-Kutta pair
+  Controller controller;
+  bool is_ode45;  ///< MATLAB's norm, weights, first step and longest step
+
+  /// ERKStep 6.4.1 takes every table whose last abscissa is 1 for first-same-as-last and so loses
+  /// order with tables that are not; a post-step hook, even an empty one, makes it evaluate the
+  /// derivative at the new solution (LLNL/sundials issue 311, fixed in 6.7).
+  bool needs_fresh_derivative;
+};
+
+/// The profile of that name, or nullptr.
+const Profile* FindProfile(std::string_view name);
+
+}  // namespace loopbench::harness

@@ -1,0 +1,44 @@
+// One case's result as named values: what the store keeps and what tables, plots and claims read.
+#pragma once
+
+#include <cstdint>
+#include <string>
+#include <string_view>
+#include <utility>
+#include <variant>
+#include <vector>
+
+namespace loopbench::harness {
+
+/// A value of a record. `monostate` is "not measured"; it prints as an empty cell, never as zero.
+using Value = std::variant<std::monostate, bool, std::int64_t, double, std::string,
+                           std::vector<double>>;
+
+/// Ordered (key, value) pairs. Keys are the column names of docs/design.md section 6, with dots for
+/// nested values such as "series.t". Order of first insertion is the order of writing.
+class Record {
+ public:
+  /// Sets or replaces the value of `key`.
+  void Set(std::string_view key, Value value);
+
+  /// The value, or nullptr when the record has no such key.
+  const Value* Find(std::string_view key) const;
+
+  /// The value as text: strings as they are, numbers in shortest round-trip form, "" when absent.
+  std::string Text(std::string_view key) const;
+
+  /// The value as a number (integers and bools converted), or NaN when absent or not a number.
+  double Number(std::string_view key) const;
+
+  /// The value as a series, or an empty one.
+  const std::vector<double>& Numbers(std::string_view key) const;
+
+  const std::vector<std::pair<std::string, Value>>& items() const { return items_; }
+
+  friend bool operator==(const Record&, const Record&) = default;
+
+ private:
+  std::vector<std::pair<std::string, Value>> items_;
+};
+
+}  // namespace loopbench::harness

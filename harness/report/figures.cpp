@@ -1,0 +1,233 @@
+#include "harness/report/figures.h"
+
+#include <fmt/format.h>
+#include <sys/wait.h>
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <cstddef>
+#include <cstdio>
+#include <cstdlib>
+#include <limits>
+#include <stdexcept>
+#include <string_view>
+#include <utility>
+
+#include "harness/store/files.h"
+
+namespace loopbench::harness {
+namespace {
+
+using Point = std::pair<double, double>;
+
+// A gnuplot string in single quotes: nothing is special inside but the quote itself.
+std::string Quote(std::string_view text) {
+  std::string quoted = "'";
+  for (const char c : text) {
+    if (c == '\'') quoted += '\'';
+    quoted += static_cast<unsigned char>(c) < ' ' ? ' ' : c;
+  }
+  return quoted + '\'';
+}
+
+bool CanBeDrawn(double value, bool logarithmic) {
+  return std::isfinite(value) && (!logarithmic || value > 0.0);
+}
+
+double OnAxis(double value, bool logarithmic) { return logarithmic ? std::log(value) : value; }
+
+// Extent of all that is drawn, on the axes.
+struct Extent {
+  double low = std::numeric_limits<double>::infinity();
+  double high = -std::numeric_limits<double>::infinity();
+
+  void Include(double value) {
+    low = std::min(low, value);
+    high = std::max(high, value);
+  }
+  double Size() const { return high > low ? high - low : 1.0; }
+};
+
+std::vector<Point> Drawable(const Figure& figure, const Curve& curve) {
+  std::vector<Point> points;
+  for (std::size_t i = 0; i < std::min(curve.x.size(), curve.y.size()); ++i) {
+    if (CanBeDrawn(curve.x[i], figure.log_x) && CanBeDrawn(curve.y[i], figure.log_y)) {
+      points.emplace_back(curve.x[i], curve.y[i]);
+    }
+  }
+  return points;
+}
+
+// Leaves out points nearer than a pixel to the last one kept. The last point always stays.
+std::vector<Point> Thin(const Figure& figure, const std::vector<Point>& points, const Extent& x,
+                        const Extent& y) {
+  constexpr double kPixelsX = 860.0;
+  constexpr double kPixelsY = 400.0;
+  std::vector<Point> kept;
+  for (std::size_t i = 0; i < points.size(); ++i) {
+    if (!kept.empty() && i + 1 < points.size()) {
+      const double dx =
+          OnAxis(points[i].first, figure.log_x) - OnAxis(kept.back().first, figure.log_x);
+      const double dy =
+          OnAxis(points[i].second, figure.log_y) - OnAxis(kept.back().second, figure.log_y);
+      if (std::hypot(dx / x.Size() * kPixelsX, dy / y.Size() * kPixelsY) < 1.0) continue;
+    }
+    kept.push_back(points[i]);
+  }
+  return kept;
+}
+
+std::string DataBlock(std::string_view name, const std::vector<Point>& points) {
+  std::string block = fmt::format("${} << EOD\n", name);
+  for (const auto& [x, y] : points) block += fmt::format("{:.6g} {:.6g}\n", x, y);
+  return block + "EOD\n";
+}
+
+// Dash types in pixels, solid and empty lengths in turn. gnuplot's SVG terminal multiplies them by
+// half the line's width, so they are divided by it: curves of any width have the same dashes.
+std::string DashType(const CurveStyle& style) {
+  static const std::array<std::vector<double>, 4> kPixels = {
+      {{}, {9.0, 6.0}, {2.5, 4.0}, {9.0, 4.0, 2.5, 4.0}}};
+  const std::vector<double>& pixels = kPixels.at(static_cast<std::size_t>(style.dash - 1));
+  std::string lengths;
+  for (const double length : pixels) {
+    lengths += fmt::format("{}{:.3g}", lengths.empty() ? "" : ",", 2.0 * length / style.width);
+  }
+  return pixels.empty() ? "solid" : fmt::format("({})", lengths);
+}
+
+// The plot elements of curve `index`; its data block is named c<index>.
+std::vector<std::string> Elements(const Figure& figure, const Curve& curve, std::size_t index,
+                                  const std::vector<Point>& points) {
+  const std::string line = fmt::format("lc rgb '{}' dt {} lw {:.3g}", curve.style.color,
+                                       DashType(curve.style), curve.style.width);
+  if (points.empty()) {
+    return {fmt::format("NaN with lines {} title {}", line, Quote(curve.label))};
+  }
+  std::vector<std::string> elements = {
+      fmt::format("$c{} with lines {} title {}", index, line, Quote(curve.label))};
+  const auto [x_last, y_last] = points.back();
+  if (curve.slope && figure.log_x && figure.log_y) {
+    // Lifted a little, so that it does not hide what it describes.
+    constexpr double kLift = 1.8;
+    elements.push_back(fmt::format(
+        "[{:.6g}:{:.6g}] {:.6g}*(x/{:.6g})**({:.4g}) with lines lc rgb '#606060' lw 1 notitle",
+        x_last / 10.0, x_last, kLift * y_last, x_last, *curve.slope));
+  }
+  if (curve.ends_early) {
+    elements.push_back(
+        fmt::format("'+' every ::::0 using ({:.6g}):({:.6g}) with points pt 2 ps 1.2 lw 2 "
+                    "lc rgb '{}' notitle",
+                    x_last, y_last, curve.style.color));
+  }
+  return elements;
+}
+
+// Rows of the legend, whose blank title keeps it clear of the axis label. It lies below the plot in
+// as many columns as its longest label permits.
+std::size_t LegendRows(const Figure& figure) {
+  constexpr std::size_t kCharacters = 130;
+  constexpr std::size_t kSample = 8;
+  std::size_t longest = 1;
+  for (const Curve& curve : figure.curves) longest = std::max(longest, curve.label.size());
+  const std::size_t columns = std::max<std::size_t>(1, kCharacters / (longest + kSample));
+  return (figure.curves.size() + columns - 1) / columns;
+}
+
+struct ProgramResult {
+  int status = 0;
+  std::string output;
+};
+
+ProgramResult RunProgram(const std::string& command) {
+  ProgramResult result;
+  std::FILE* pipe = ::popen(command.c_str(), "r");
+  if (pipe == nullptr) return {-1, "no process could be started"};
+  std::array<char, 4096> buffer{};
+  for (std::size_t n = 0; (n = std::fread(buffer.data(), 1, buffer.size(), pipe)) > 0;) {
+    result.output.append(buffer.data(), n);
+  }
+  const int status = ::pclose(pipe);
+  result.status = WIFEXITED(status) ? WEXITSTATUS(status) : -1;
+  return result;
+}
+
+// A folder of its own in the system's temporary folder, removed at the end of the scope.
+class TemporaryFolder {
+ public:
+  TemporaryFolder() {
+    std::string name = (std::filesystem::temp_directory_path() / "loopbench-XXXXXX").string();
+    if (::mkdtemp(name.data()) == nullptr) throw std::runtime_error("cannot make " + name);
+    path_ = name;
+  }
+  ~TemporaryFolder() {
+    std::error_code ignored;
+    std::filesystem::remove_all(path_, ignored);
+  }
+  TemporaryFolder(const TemporaryFolder&) = delete;
+  TemporaryFolder& operator=(const TemporaryFolder&) = delete;
+
+  const std::filesystem::path& path() const { return path_; }
+
+ private:
+  std::filesystem::path path_;
+};
+
+}  // namespace
+
+std::string GnuplotScript(const Figure& figure) {
+  std::vector<std::vector<Point>> points;
+  Extent x;
+  Extent y;
+  for (const Curve& curve : figure.curves) {
+    points.push_back(Drawable(figure, curve));
+    for (const Point& point : points.back()) {
+      x.Include(OnAxis(point.first, figure.log_x));
+      y.Include(OnAxis(point.second, figure.log_y));
+    }
+  }
+  std::string script = fmt::format(
+      "set encoding utf8\nset title {}\nset xlabel {} offset 0,0.5\nset ylabel {}\n"
+      "set grid lc rgb '#cccccc' lw 0.5\n"
+      "set key bmargin center vertical maxrows {} Left reverse samplen 4 title ' '\n",
+      Quote(figure.title), Quote(figure.x_label), Quote(figure.y_label), LegendRows(figure));
+  if (figure.log_x) script += "set logscale x\n";
+  if (figure.log_y) script += "set logscale y\nset format y '%.0e'\n";
+  std::string plot;
+  for (std::size_t i = 0; i < figure.curves.size(); ++i) {
+    points[i] = Thin(figure, points[i], x, y);
+    if (!points[i].empty()) script += DataBlock(fmt::format("c{}", i), points[i]);
+    for (const std::string& element : Elements(figure, figure.curves[i], i, points[i])) {
+      plot += fmt::format("{}{}", plot.empty() ? "plot " : ", \\\n  ", element);
+    }
+  }
+  return script + plot + '\n';
+}
+
+std::optional<std::string> WriteSvg(const std::filesystem::path& path, const Figure& figure,
+                                    const std::string& gnuplot) {
+  const bool anything = std::ranges::any_of(
+      figure.curves, [&](const Curve& curve) { return !Drawable(figure, curve).empty(); });
+  if (!anything) return fmt::format("{}: no curve has a point to draw", path.string());
+  const TemporaryFolder folder;
+  const std::filesystem::path script = folder.path() / "figure.gp";
+  const std::filesystem::path drawing = folder.path() / "figure.svg";
+  WriteFileAtomically(
+      script,
+      fmt::format("set terminal svg noenhanced size 960,{} font 'sans-serif,13' "
+                  "background '#ffffff'\nset output {}\n{}",
+                  500 + 20 * LegendRows(figure), Quote(drawing.string()), GnuplotScript(figure)));
+  const ProgramResult run = RunProgram(fmt::format("{} '{}' 2>&1", gnuplot, script.string()));
+  constexpr int kNotFound = 127;
+  if (run.status == kNotFound) {
+    return fmt::format("{}: '{}' not found; install gnuplot-nox", path.string(), gnuplot);
+  }
+  if (run.status != 0 || !std::filesystem::exists(drawing)) {
+    return fmt::format("{}: gnuplot failed: {}", path.string(), run.output);
+  }
+  WriteFileAtomically(path, ReadFile(drawing));
+  return std::nullopt;
+}
+
+}  // namespace loopbench::harness

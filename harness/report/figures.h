@@ -1,0 +1,54 @@
+// Figures as SVG, drawn by gnuplot.
+#pragma once
+
+#include <filesystem>
+#include <optional>
+#include <string>
+#include <vector>
+
+namespace loopbench::harness {
+
+/// How a curve looks. The defaults are a thin black line.
+struct CurveStyle {
+  std::string color = "#000000";
+  int dash = 1;        ///< gnuplot dash type: 1 solid, 2 dashed, 3 dotted, 4 dash-dot
+  double width = 2.0;  ///< [px]
+};
+
+/// Points joined by a line. `x` and `y` have the same length; points that are not finite, and on a
+/// logarithmic axis those that are not positive, are left out. A curve without points keeps its
+/// place in the legend.
+struct Curve {
+  std::string label;
+  std::vector<double> x;
+  std::vector<double> y;
+  CurveStyle style;
+  /// Draws y ~ x^slope as a grey line above the last decade of the curve. Logarithmic axes only.
+  std::optional<double> slope;
+  /// Marks the last point with a cross: the run failed there.
+  bool ends_early = false;
+};
+
+/// What is drawn. Labels are plain text (no markup) and carry their units: "time [s]".
+struct Figure {
+  std::string title;
+  std::string x_label;
+  std::string y_label;
+  bool log_x = false;
+  bool log_y = false;
+  std::vector<Curve> curves;  ///< later ones lie on top
+};
+
+/// The gnuplot commands and data of a figure, without terminal and output, so that any terminal can
+/// draw it. Points nearer to their predecessor than the eye can tell are thinned out, which keeps
+/// files of long runs small.
+std::string GnuplotScript(const Figure& figure);
+
+/// Draws `figure` into `path`. Returns nothing on success, else the reason: gnuplot missing (and
+/// the package that has it), gnuplot's own message, or nothing to draw. The file is complete or
+/// absent, and the same figure gives the same bytes. `gnuplot` is the program to call.
+[[nodiscard]] std::optional<std::string> WriteSvg(const std::filesystem::path& path,
+                                                  const Figure& figure,
+                                                  const std::string& gnuplot = "gnuplot");
+
+}  // namespace loopbench::harness

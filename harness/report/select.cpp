@@ -1,0 +1,91 @@
+#include "harness/report/select.h"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <charconv>
+#include <cmath>
+#include <cstdint>
+#include <iterator>
+#include <optional>
+#include <system_error>
+
+#include "harness/config/config_error.h"
+
+namespace loopbench::harness {
+namespace {
+
+std::optional<double> ParseNumber(std::string_view text) {
+  double number = 0.0;
+  const auto [end, error] = std::from_chars(text.data(), text.data() + text.size(), number);
+  if (error != std::errc{} || end != text.data() + text.size()) return std::nullopt;
+  return number;
+}
+
+bool Holds(const Record& record, const Condition& condition) {
+  const Value* value = record.Find(condition.key);
+  if (value == nullptr || std::holds_alternative<std::monostate>(*value)) return false;
+  const bool numeric =
+      std::holds_alternative<double>(*value) || std::holds_alternative<std::int64_t>(*value);
+  return std::ranges::any_of(condition.values, [&](const std::string& wanted) {
+    return numeric ? ParseNumber(wanted) == record.Number(condition.key)
+                   : record.Text(condition.key) == wanted;
+  });
+}
+
+// -1, 0 or 1; NaN is larger than every number, so that the order is total.
+int Compare(double a, double b) {
+  if (std::isnan(a) || std::isnan(b)) return int{std::isnan(a)} - int{std::isnan(b)};
+  return int{a > b} - int{a < b};
+}
+
+bool ComesBefore(const Record& a, const Record& b) {
+  if (const int order = a.Text("mechanism").compare(b.Text("mechanism"))) return order < 0;
+  if (const int order = Compare(a.Number("horizon"), b.Number("horizon"))) return order < 0;
+  for (const char* key : {"formulation", "coordinates", "solver"}) {
+    if (const int order = a.Text(key).compare(b.Text(key))) return order < 0;
+  }
+  return Compare(-a.Number("rtol"), -b.Number("rtol")) < 0;
+}
+
+}  // namespace
+
+Condition ParseCondition(std::string_view text) {
+  const std::size_t equals = text.find('=');
+  if (equals == std::string_view::npos || equals == 0 || equals + 1 == text.size()) {
+    throw ConfigError(fmt::format("filter '{}': expected key=value or key=value,value", text));
+  }
+  Condition condition{std::string(text.substr(0, equals)), {}};
+  std::string_view rest = text.substr(equals + 1);
+  for (;;) {
+    const std::size_t comma = rest.find(',');
+    condition.values.emplace_back(rest.substr(0, comma));
+    if (comma == std::string_view::npos) return condition;
+    rest.remove_prefix(comma + 1);
+  }
+}
+
+bool Matches(const Record& record, const Selection& selection) {
+  return std::ranges::all_of(selection,
+                             [&](const Condition& condition) { return Holds(record, condition); });
+}
+
+std::vector<Record> Filter(std::span<const Record> records, const Selection& selection) {
+  std::vector<Record> matching;
+  std::ranges::copy_if(records, std::back_inserter(matching),
+                       [&](const Record& record) { return Matches(record, selection); });
+  return matching;
+}
+
+std::string ToText(const Selection& selection) {
+  std::string text;
+  for (const auto& [key, values] : selection) {
+    text += fmt::format("{}{}", text.empty() ? "" : " ", key);
+    for (std::size_t i = 0; i < values.size(); ++i) text += (i == 0 ? "=" : ",") + values[i];
+  }
+  return text;
+}
+
+void SortRows(std::vector<Record>* records) { std::ranges::stable_sort(*records, ComesBefore); }
+
+}  // namespace loopbench::harness

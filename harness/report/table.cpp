@@ -1,0 +1,173 @@
+#include "harness/report/table.h"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <cmath>
+#include <cstdint>
+#include <string_view>
+
+namespace loopbench::harness {
+namespace {
+
+std::string FormatNumber(double number, Format format) {
+  if (std::isnan(number)) return "";
+  switch (format) {
+    case Format::kInteger:
+      return fmt::format("{:.0f}", number);
+    case Format::kScientific:
+      return fmt::format("{:.2e}", number);
+    case Format::kExponent:
+      return fmt::format("{:.2f}", number);
+    case Format::kFixed:
+      return fmt::format("{:.1f}", number);
+    case Format::kSeconds:
+      return fmt::format("{:.4g}", number);
+    case Format::kText:
+    case Format::kShortest:
+      break;
+  }
+  return fmt::format("{}", number);
+}
+
+// Every digit, for CSV: absent and NaN values are empty as in the other writers.
+std::string FullPrecision(const Record& row, const std::string& key) {
+  const Value* value = row.Find(key);
+  if (value == nullptr) return "";
+  if (const auto* series = std::get_if<std::vector<double>>(value)) {
+    std::string joined;
+    for (const double number : *series) {
+      joined += fmt::format("{}{}", joined.empty() ? "" : ";", number);
+    }
+    return joined;
+  }
+  if (const auto* number = std::get_if<double>(value); number != nullptr && std::isnan(*number)) {
+    return "";
+  }
+  return row.Text(key);
+}
+
+std::string QuoteCsv(const std::string& text) {
+  if (text.find_first_of(",\"\r\n") == std::string::npos) return text;
+  std::string quoted = "\"";
+  for (const char c : text) {
+    if (c == '"') quoted += '"';
+    quoted += c;
+  }
+  return quoted + '"';
+}
+
+std::string EscapeMarkdown(const std::string& text) {
+  std::string escaped;
+  for (const char c : text) {
+    if (c == '|') escaped += '\\';
+    escaped += c == '\n' ? ' ' : c;
+  }
+  return escaped;
+}
+
+// Characters, not bytes: UTF-8 continuation bytes are 10xxxxxx.
+std::size_t Width(std::string_view text) {
+  return static_cast<std::size_t>(std::ranges::count_if(
+      text, [](char c) { return (static_cast<unsigned char>(c) & 0xC0u) != 0x80u; }));
+}
+
+// `text` padded to `width`, on the left for numbers. The last column of text stays unpadded.
+std::string Pad(const std::string& text, std::size_t width, Format format) {
+  const std::string padding(width - std::min(width, Width(text)), ' ');
+  return format == Format::kText ? text + padding : padding + text;
+}
+
+void AppendTrimmed(std::string* out, std::string line) {
+  line.erase(line.find_last_not_of(' ') + 1);
+  *out += line + '\n';
+}
+
+}  // namespace
+
+std::string Cell(const Record& row, const Column& column) {
+  const Value* value = row.Find(column.key);
+  if (value == nullptr) return "";
+  if (const auto* number = std::get_if<double>(value)) return FormatNumber(*number, column.format);
+  if (std::holds_alternative<std::vector<double>>(*value)) return FullPrecision(row, column.key);
+  const std::string text = row.Text(column.key);
+  const auto it =
+      std::ranges::find(column.abbreviations, text, &std::pair<std::string, std::string>::first);
+  return it == column.abbreviations.end() ? text : it->second;
+}
+
+std::string ToText(const Table& table) {
+  std::vector<std::vector<std::string>> cells;
+  std::vector<std::size_t> widths;
+  for (const Column& column : table.columns) widths.push_back(Width(column.header));
+  for (const Record& row : table.rows) {
+    std::vector<std::string>& line = cells.emplace_back();
+    for (std::size_t c = 0; c < table.columns.size(); ++c) {
+      line.push_back(Cell(row, table.columns[c]));
+      widths[c] = std::max(widths[c], Width(line.back()));
+    }
+  }
+  std::string heading;
+  std::string rule;
+  for (std::size_t c = 0; c < table.columns.size(); ++c) {
+    const std::string gap = c == 0 ? "" : "  ";
+    heading += gap + Pad(table.columns[c].header, widths[c], table.columns[c].format);
+    rule += gap + std::string(widths[c], '-');
+  }
+  std::string out = table.title.empty() ? "" : table.title + "\n\n";
+  AppendTrimmed(&out, heading);
+  AppendTrimmed(&out, rule);
+  for (const std::vector<std::string>& line : cells) {
+    std::string text;
+    for (std::size_t c = 0; c < line.size(); ++c) {
+      text += (c == 0 ? "" : "  ") + Pad(line[c], widths[c], table.columns[c].format);
+    }
+    AppendTrimmed(&out, text);
+  }
+  if (!table.notes.empty()) out += '\n';
+  for (const std::string& note : table.notes) out += note + '\n';
+  return out;
+}
+
+std::string ToCsv(const Table& table) {
+  std::string out;
+  const auto append = [&out](std::string_view separator, const std::string& text) {
+    out += separator;
+    out += QuoteCsv(text);
+  };
+  for (std::size_t c = 0; c < table.columns.size(); ++c) {
+    append(c == 0 ? "" : ",", table.columns[c].key);
+  }
+  out += '\n';
+  for (const Record& row : table.rows) {
+    for (std::size_t c = 0; c < table.columns.size(); ++c) {
+      append(c == 0 ? "" : ",", FullPrecision(row, table.columns[c].key));
+    }
+    out += '\n';
+  }
+  return out;
+}
+
+std::string ToMarkdown(const Table& table) {
+  std::string out = table.title.empty() ? "" : fmt::format("## {}\n\n", table.title);
+  std::string rule = "|";
+  out += '|';
+  for (const Column& column : table.columns) {
+    out += fmt::format(" {} |", EscapeMarkdown(column.header));
+    rule += column.format == Format::kText ? " --- |" : " ---: |";
+  }
+  out += '\n' + rule + '\n';
+  for (const Record& row : table.rows) {
+    out += '|';
+    for (const Column& column : table.columns) {
+      const std::string cell = EscapeMarkdown(Cell(row, column));
+      out += cell.empty() ? "  |" : fmt::format(" {} |", cell);
+    }
+    out += '\n';
+  }
+  // Each note is its own paragraph; a list would be read as part of the table by some renderers.
+  for (const std::string& note : table.notes) out += fmt::format("\n{}\n", note);
+  return out;
+}
+
+}  // namespace loopbench::harness

@@ -1,0 +1,49 @@
+// The append-only store of results: one JSON object per line.
+#pragma once
+
+#include <filesystem>
+#include <mutex>
+#include <string>
+#include <vector>
+
+#include "harness/record.h"
+#include "harness/store/record_json.h"
+
+namespace loopbench::harness {
+
+/// Appends records to a file of JSON Lines. Lines are never changed, so a crash loses at most the
+/// line that was being written, files merge by concatenation, and versions compare line by line.
+///
+/// Append may be called from several threads, and several processes may append to one file: each
+/// record is one write(2) with O_APPEND.
+class ResultStore {
+ public:
+  /// Opens `path` for appending and makes missing folders. A path that ends in ".jsonl" is the file
+  /// itself; any other path is a folder that holds "results.jsonl". A torn last line, left behind
+  /// by a crash, is removed first: the next record would otherwise continue it. Throws
+  /// std::runtime_error that names the file.
+  explicit ResultStore(const std::filesystem::path& path);
+  ~ResultStore();
+
+  ResultStore(const ResultStore&) = delete;
+  ResultStore& operator=(const ResultStore&) = delete;
+
+  /// Writes one line. Throws std::runtime_error when the line could not be written in full.
+  void Append(const Record& record);
+
+  const std::filesystem::path& file() const { return file_; }
+
+ private:
+  std::filesystem::path file_;
+  int descriptor_ = -1;
+  std::mutex mutex_;
+};
+
+/// All records of a store, `path` as for ResultStore, in the order of the file. Empty lines are
+/// passed over. A bad line throws std::runtime_error: file, line number, what was found. A bad last
+/// line without a line end is what a crash leaves; it is skipped and reported in `warnings` (when
+/// given).
+std::vector<Record> ReadRecords(const std::filesystem::path& path,
+                                std::vector<std::string>* warnings = nullptr);
+
+}  // namespace loopbench::harness

@@ -1,0 +1,161 @@
+#include "lagrange/lagrange.h"
+
+#include <limits>
+
+namespace loopbench::lagrange {
+
+namespace {
+
+template <class Space, class S>
+std::vector<int> RowsOfConstraints(const Mechanism<Space, S>& mechanism) {
+  std::vector<int> rows;
+  for (int index : mechanism.constraints()) {
+    rows.push_back(mechanism.joints()[index].kind->num_constraints());
+  }
+  return rows;
+}
+
+}  // namespace
+
+template <class Space, class S>
+Lagrange<Space, S>::Lagrange(const Mechanism<Space, S>& mechanism, FormulationOptions options)
+    : Base(mechanism, options),
+      dynamics_(mechanism),
+      M_(MatrixX<S>::Zero(mechanism.num_u(), mechanism.num_u())),
+      J_(MatrixX<S>::Zero(mechanism.num_rows(), mechanism.num_u())),
+      h_(VectorX<S>::Zero(mechanism.num_u())),
+      gamma_(VectorX<S>::Zero(mechanism.num_rows())),
+      lambda_(gamma_),
+      force_(h_),
+      target_(gamma_),
+      change_(h_),
+      loop_(RowsOfConstraints(mechanism)) {
+  const int n = mechanism.num_u(), m = mechanism.num_rows();
+  if (options.solver == SolverKind::kAsPublished) {
+    augmented_.setZero(n + m, n + m);
+    rhs_.setZero(n + m);
+    solution_.setZero(n + m);
+    lu_ = Eigen::PartialPivLU<MatrixX<S>>(n + m);
+  } else {
+    W_.setZero(n, m);
+    response_.setZero(m, m);
+    mass_factor_ = Eigen::LLT<MatrixX<S>>(n);
+  }
+}
+
+template <class Space, class S>
+Outcome Lagrange<Space, S>::FactorOnce() {
+  if (factored_version_ == kinematics_.position_version()) return Outcome::kFinished;
+  dynamics_.Jacobian(kinematics_, J_);
+  const bool plain = Base::options_.solver == SolverKind::kAsPublished;
+  const Outcome outcome = plain ? FactorAugmented() : FactorResponse();
+  factored_version_ = outcome == Outcome::kFinished ? kinematics_.position_version() : -1;
+  return outcome;
+}
+
+template <class Space, class S>
+Outcome Lagrange<Space, S>::FactorAugmented() {
+  const int n = mechanism_.num_u(), m = mechanism_.num_rows();
+  dynamics_.MassMatrix(kinematics_, mechanism_.bodies(), M_);
+  augmented_.topLeftCorner(n, n) = M_;
+  augmented_.topRightCorner(n, m) = J_.transpose();
+  augmented_.bottomLeftCorner(m, n) = J_;
+  augmented_.bottomRightCorner(m, m).setZero();
+  lu_.compute(augmented_);
+  // Eigen's estimate is meaningless behind an exactly zero pivot
+  const bool lost_pivot = (lu_.matrixLU().diagonal().array() == S(0)).any();
+  const S rcond = lost_pivot ? S(0) : lu_.rcond();
+  diagnostics_.rank = Base::LoopRank(0);
+  diagnostics_.rcond = static_cast<double>(rcond);
+  // below a few eps the matrix cannot be told from a singular one
+  return rcond > S(16) * std::numeric_limits<S>::epsilon() ? Outcome::kFinished
+                                                           : Outcome::kSingular;
+}
+
+template <class Space, class S>
+void Lagrange<Space, S>::FormResponse(const std::vector<Inertia<Space, S>>& inertias) {
+  dynamics_.MassMatrix(kinematics_, inertias, M_);
+  mass_factor_.compute(M_);
+  W_ = J_.transpose();
+  mass_factor_.matrixL().solveInPlace(W_);
+  response_.noalias() = W_.transpose() * W_;
+}
+
+template <class Space, class S>
+void Lagrange<Space, S>::SetScales(const std::vector<Inertia<Space, S>>& inertias) {
+  for (int j = 0; j < static_cast<int>(mechanism_.constraints().size()); ++j) {
+    loop_.SetScale(j, FreeResponse(kinematics_, inertias, mechanism_.constraints()[j]));
+  }
+}
+
+template <class Space, class S>
+Outcome Lagrange<Space, S>::FactorResponse() {
+  diagnostics_.rank = Base::LoopRank(0);
+  diagnostics_.smallest_weight = 1.0;
+  FormResponse(mechanism_.bodies());
+  if (mass_factor_.info() != Eigen::Success) return Outcome::kNonFinite;
+  if (loop_.size() == 0) return Outcome::kFinished;
+  SetScales(mechanism_.bodies());
+  if (!loop_.FactorScaled(response_)) {
+    SetScales(mechanism_.geometric_bodies());
+    FormResponse(mechanism_.geometric_bodies());
+    if (!response_.allFinite()) return Outcome::kNonFinite;
+    loop_.FactorGeometric(response_);
+    FormResponse(mechanism_.bodies());
+    loop_.FactorSoftened(response_);
+    diagnostics_.rank = Base::LoopRank(loop_.size() - loop_.rank());
+    diagnostics_.smallest_weight = static_cast<double>(loop_.smallest_weight());
+  }
+  diagnostics_.rcond = static_cast<double>(loop_.rcond());
+  return Outcome::kFinished;
+}
+
+template <class Space, class S>
+void Lagrange<Space, S>::SolveConstrained(const VectorX<S>& force, const VectorX<S>& target,
+                                          VectorX<S>& x) {
+  const int n = mechanism_.num_u(), m = mechanism_.num_rows();
+  if (Base::options_.solver == SolverKind::kAsPublished) {
+    rhs_.head(n) = force;
+    rhs_.tail(m) = target;
+    solution_ = lu_.solve(rhs_);
+    x = solution_.head(n);
+    lambda_ = -solution_.tail(m);
+    return;
+  }
+  // x = M^-1 (force + J^T lambda) with S lambda = target - J M^-1 force
+  x = force;
+  mass_factor_.matrixL().solveInPlace(x);
+  if (m > 0) {
+    lambda_ = target;
+    lambda_.noalias() -= W_.transpose() * x;
+    loop_.Apply(lambda_);
+    loop_.ApplyTransposed(lambda_);
+    x.noalias() += W_ * lambda_;
+  }
+  mass_factor_.matrixU().solveInPlace(x);
+}
+
+template <class Space, class S>
+Outcome Lagrange<Space, S>::CompleteSpeeds() {
+  if (const Outcome outcome = FactorOnce(); outcome != Outcome::kFinished) return outcome;
+  force_.setZero();
+  target_.noalias() = -J_ * u_;
+  SolveConstrained(force_, target_, change_);
+  u_ += change_;
+  return u_.allFinite() ? Outcome::kFinished : Outcome::kNonFinite;
+}
+
+template <class Space, class S>
+Outcome Lagrange<Space, S>::Accelerations() {
+  if (const Outcome outcome = FactorOnce(); outcome != Outcome::kFinished) return outcome;
+  dynamics_.Bias(kinematics_, h_);
+  dynamics_.JacobianBias(kinematics_, gamma_);
+  force_ = -h_;
+  SolveConstrained(force_, gamma_, udot_);
+  return udot_.allFinite() ? Outcome::kFinished : Outcome::kNonFinite;
+}
+
+template class Lagrange<Planar, double>;
+template class Lagrange<Spatial, double>;
+
+}  // namespace loopbench::lagrange

@@ -1,0 +1,277 @@
+#include "mechanism/assembly.h"
+
+#include <Eigen/QR>
+#include <algorithm>
+#include <limits>
+#include <random>
+
+#include "mechanism/tree_dynamics.h"
+
+namespace loopbench {
+
+namespace {
+
+constexpr int kMaxIterations = 200;
+
+/// The assembly problem of one mechanism in joint coordinates.
+template <class Space>
+class Assembler {
+ public:
+  Assembler(const MechanismDescription& description, const Mechanism<Space, double>& mechanism)
+      : description_(description),
+        mechanism_(mechanism),
+        kinematics_(mechanism),
+        dynamics_(mechanism),
+        held_q_(mechanism.num_u(), false),
+        given_u_(mechanism.num_u(), false) {
+    start_.q.setZero(mechanism.num_q());
+    start_.u.setZero(mechanism.num_u());
+    ReadInitialData();
+  }
+
+  Start<double> Run() {
+    if (start_.outcome == Outcome::kFinished) ClosePositions();
+    if (start_.outcome == Outcome::kFinished) CloseSpeeds();
+    return start_;
+  }
+
+ private:
+  void ReadInitialData() {
+    for (const TreeStep& step : mechanism_.tree()) {
+      const Joint<Space, double>& joint = mechanism_.joints()[step.joint];
+      if (joint.kind->num_q == 7) start_.q[joint.q_offset] = 1.0;  // the unit quaternion
+    }
+    const auto is_held = [&](int joint) {
+      return std::ranges::find(description_.initial.held, joint) != description_.initial.held.end();
+    };
+    for (const JointValues& values : description_.initial.coordinates) {
+      const Joint<Space, double>& joint = mechanism_.joints()[values.joint];
+      if (joint.in_tree()) {
+        for (int i = 0; i < joint.kind->num_q; ++i) {
+          start_.q[joint.q_offset + i] = values.values[i];
+        }
+      } else if (is_held(values.joint) && joint.kind->num_u == 1) {
+        held_cut_.push_back({values.joint, values.values[0]});
+      } else {
+        Fail("joint \"" + joint.name +
+             "\" closes a loop and carries only a guess: hold it, or mark "
+             "another joint of the loop with \"cut\"");
+      }
+    }
+    for (int index : description_.initial.held) {
+      const Joint<Space, double>& joint = mechanism_.joints()[index];
+      for (int i = 0; joint.in_tree() && i < joint.kind->num_u; ++i) {
+        held_q_[joint.u_offset + i] = true;
+      }
+    }
+    for (const JointValues& values : description_.initial.speeds) {
+      const Joint<Space, double>& joint = mechanism_.joints()[values.joint];
+      for (int i = 0; i < joint.kind->num_u; ++i) {
+        if (!joint.in_tree()) {
+          given_cut_.push_back({values.joint, i, values.values[i]});
+          continue;
+        }
+        start_.u[joint.u_offset + i] = values.values[i];
+        given_u_[joint.u_offset + i] = true;
+      }
+    }
+  }
+
+  void Fail(const std::string& message) {
+    if (start_.outcome != Outcome::kFinished) return;
+    start_.outcome = Outcome::kInconsistentStart;
+    start_.message = mechanism_.name() + ": " + message;
+  }
+
+  /// e and J over the free coordinates, with a row per held cut joint.
+  VectorX<double> Residual(const VectorX<double>& q) {
+    kinematics_.UpdatePosition(q);
+    VectorX<double> e(mechanism_.num_rows() + static_cast<int>(held_cut_.size()));
+    for (int index : mechanism_.constraints()) {
+      const Joint<Space, double>& joint = mechanism_.joints()[index];
+      e.segment(joint.row, joint.kind->num_constraints()) =
+          kinematics_.joints()[index].D.transpose() * kinematics_.ConstraintMismatch(index);
+    }
+    for (std::size_t k = 0; k < held_cut_.size(); ++k) {
+      const auto& [joint, value] = held_cut_[k];
+      e[mechanism_.num_rows() + static_cast<int>(k)] = kinematics_.JointCoordinate(joint) - value;
+    }
+    return e;
+  }
+
+  /// Row of H^T (V_Q - V_P): how fast the coordinate `component` of a cut joint changes.
+  Eigen::RowVectorXd CutJointRow(int index, int component) {
+    Eigen::RowVectorXd row(mechanism_.num_u());
+    VectorX<double> unit = VectorX<double>::Zero(mechanism_.num_u());
+    for (int i = 0; i < mechanism_.num_u(); ++i) {
+      unit[i] = 1.0;
+      kinematics_.UpdateVelocity(unit);
+      const JointState<Space, double>& state = kinematics_.joints()[index];
+      row[i] = state.H.col(component).dot(state.V_rel);
+      unit[i] = 0.0;
+    }
+    return row;
+  }
+
+  void ClosePositions() {
+    VectorX<double> e = Residual(start_.q);
+    if (e.size() == 0) return;
+    double damping = 1e-3;
+    // what rounding leaves of a closure that passes through every body
+    const double goal = 16 * std::numeric_limits<double>::epsilon() * Extent();
+    for (int i = 0; i < kMaxIterations && e.template lpNorm<Eigen::Infinity>() > goal; ++i) {
+      kinematics_.UpdatePosition(start_.q);
+      MatrixX<double> J;
+      dynamics_.Jacobian(kinematics_, J);
+      J.conservativeResize(e.size(), Eigen::NoChange);
+      for (std::size_t k = 0; k < held_cut_.size(); ++k) {
+        J.row(mechanism_.num_rows() + static_cast<int>(k)) = CutJointRow(held_cut_[k].first, 0);
+      }
+      for (int c = 0; c < mechanism_.num_u(); ++c) {
+        if (held_q_[c]) J.col(c).setZero();
+      }
+      bool improved = false;
+      for (; damping < 1e8 && !improved; damping *= 10) {
+        const VectorX<double> trial = Move(start_.q, DampedStep(J, e, damping));
+        const VectorX<double> e_trial = Residual(trial);
+        if (!(e_trial.norm() < e.norm())) continue;
+        improved = true;
+        start_.q = trial;
+        e = e_trial;
+        damping *= 1e-3;  // the loop's own step multiplies by ten
+      }
+      if (!improved) break;
+      damping = std::max(damping, 1e-16);
+    }
+    start_.position_residual = e.template lpNorm<Eigen::Infinity>();
+    // a thousand times the goal: round-off of a long chain, far below any drift worth measuring
+    if (!(start_.position_residual <= 1e3 * goal)) NameWorstLoop(e, "does not close", "m or rad");
+  }
+
+  /// argmin |J d + e|^2 + damping^2 |d|^2.
+  static VectorX<double> DampedStep(const MatrixX<double>& J, const VectorX<double>& e,
+                                    double damping) {
+    const Eigen::Index m = J.rows(), n = J.cols();
+    MatrixX<double> A = MatrixX<double>::Zero(m + n, n);
+    A.topRows(m) = J;
+    A.bottomRows(n).diagonal().setConstant(damping);
+    VectorX<double> rhs = VectorX<double>::Zero(m + n);
+    rhs.head(m) = -e;
+    return A.householderQr().solve(rhs);
+  }
+
+  /// q moved by the speeds d for unit time (quaternions renormalised).
+  VectorX<double> Move(const VectorX<double>& q, const VectorX<double>& d) const {
+    VectorX<double> step(q.size());
+    mechanism_.Rates(q, d, step);
+    VectorX<double> moved = q + step;
+    for (const TreeStep& tree_step : mechanism_.tree()) {
+      const Joint<Space, double>& joint = mechanism_.joints()[tree_step.joint];
+      if (joint.kind->num_q == 7) moved.segment<4>(joint.q_offset).normalize();
+    }
+    return moved;
+  }
+
+  void CloseSpeeds() {
+    kinematics_.UpdatePosition(start_.q);
+    const int rows = mechanism_.num_rows(), extra = static_cast<int>(given_cut_.size());
+    MatrixX<double> J;
+    dynamics_.Jacobian(kinematics_, J);
+    J.conservativeResize(rows + extra, Eigen::NoChange);
+    VectorX<double> target = VectorX<double>::Zero(rows + extra);
+    for (int k = 0; k < extra; ++k) {
+      J.row(rows + k) = CutJointRow(given_cut_[k].joint, given_cut_[k].component);
+      target[rows + k] = given_cut_[k].value;
+    }
+    if (J.rows() == 0) return;
+    MatrixX<double> J_free = J;
+    for (int c = 0; c < mechanism_.num_u(); ++c) {
+      if (given_u_[c]) J_free.col(c).setZero();
+    }
+    const VectorX<double> miss = target - J * start_.u;
+    const double size = 1.0 + start_.u.norm() * Extent();
+    if (miss.norm() > 64 * std::numeric_limits<double>::epsilon() * size) {
+      Eigen::CompleteOrthogonalDecomposition<MatrixX<double>> solver(J_free);
+      start_.u += solver.solve(miss);
+    }
+    const VectorX<double> left = target - J * start_.u;
+    start_.speed_residual = left.template lpNorm<Eigen::Infinity>();
+    if (!(start_.speed_residual <= 1e-10 * size)) {
+      NameWorstLoop(left, "has no speeds that fit the given ones", "m/s or rad/s");
+    }
+  }
+
+  void NameWorstLoop(const VectorX<double>& e, const std::string& what, const std::string& unit) {
+    Eigen::Index worst = 0;
+    e.cwiseAbs().maxCoeff(&worst);
+    std::string name = "of the held cut joint";
+    for (int index : mechanism_.constraints()) {
+      const Joint<Space, double>& joint = mechanism_.joints()[index];
+      if (worst >= joint.row && worst < joint.row + joint.kind->num_constraints()) {
+        name = "closed by joint \"" + joint.name + "\"";
+      }
+    }
+    char residual[32];
+    std::snprintf(residual, sizeof residual, "%.3g", e.template lpNorm<Eigen::Infinity>());
+    Fail("the loop " + name + " " + what + ": residual " + residual + " " + unit);
+  }
+
+  /// A length that no position exceeds much: sum of all arms.
+  double Extent() const {
+    return mechanism_.length() * static_cast<double>(mechanism_.joints().size() + 1);
+  }
+
+  struct GivenSpeed {
+    int joint, component;
+    double value;
+  };
+  const MechanismDescription& description_;
+  const Mechanism<Space, double>& mechanism_;
+  Kinematics<Space, double> kinematics_;
+  TreeDynamics<Space, double> dynamics_;
+  Start<double> start_;
+  std::vector<bool> held_q_, given_u_;
+  std::vector<std::pair<int, double>> held_cut_;
+  std::vector<GivenSpeed> given_cut_;
+};
+
+}  // namespace
+
+template <class Space>
+Start<double> Assemble(const MechanismDescription& description,
+                       const Mechanism<Space, double>& mechanism) {
+  if (mechanism.coordinates() == Coordinates::kJoint) {
+    return Assembler<Space>(description, mechanism).Run();
+  }
+  const Mechanism<Space, double> joints(description, Coordinates::kJoint);
+  Start<double> start = Assembler<Space>(description, joints).Run();
+  if (start.outcome != Outcome::kFinished) return start;
+  Kinematics<Space, double> from(joints), to(mechanism);
+  from.UpdatePosition(start.q);
+  from.UpdateVelocity(start.u);
+  start.q = from.CoordinatesIn(mechanism);
+  to.UpdatePosition(start.q);
+  start.u = from.SpeedsIn(to);
+  return start;
+}
+
+MechanismDescription Perturb(MechanismDescription description, double amplitude, std::uint64_t seed,
+                             int member) {
+  std::seed_seq sequence{seed, static_cast<std::uint64_t>(member)};
+  std::mt19937_64 generator(sequence);
+  for (JointValues& values : description.initial.coordinates) {
+    const std::vector<int>& held = description.initial.held;
+    if (std::ranges::find(held, values.joint) == held.end()) continue;
+    for (double& value : values.values) {
+      // 53 random bits: the same number with every standard library
+      const double unit = static_cast<double>(generator() >> 11) * 0x1p-53;
+      value += amplitude * (2.0 * unit - 1.0);
+    }
+  }
+  return description;
+}
+
+template Start<double> Assemble(const MechanismDescription&, const Mechanism<Planar, double>&);
+template Start<double> Assemble(const MechanismDescription&, const Mechanism<Spatial, double>&);
+
+}  // namespace loopbench

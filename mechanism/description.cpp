@@ -1,0 +1,143 @@
+#include "mechanism/description.h"
+
+#include <Eigen/Cholesky>
+#include <cmath>
+
+namespace loopbench {
+
+namespace {
+
+std::string Quote(const std::string& name) { return "\"" + name + "\""; }
+
+std::string CheckBody(const BodyDescription& body) {
+  if (!(body.mass > 0.0) || !std::isfinite(body.mass)) {
+    return "body " + Quote(body.name) + ": mass is " + std::to_string(body.mass) +
+           ", expected a finite number > 0";
+  }
+  if (!body.com.allFinite() || !body.inertia.allFinite()) {
+    return "body " + Quote(body.name) + ": com and inertia must be finite";
+  }
+  if (!body.inertia.isApprox(body.inertia.transpose()) ||
+      Eigen::LLT<Eigen::Matrix3d>(body.inertia).info() != Eigen::Success) {
+    return "body " + Quote(body.name) + ": inertia must be symmetric and positive definite";
+  }
+  return "";
+}
+
+/// A planar scene turns about z only: anything that tips or leaves the plane is refused.
+std::string CheckPlanarJoint(const JointDescription& joint) {
+  const auto flat = [](const Eigen::Vector3d& v) { return v.z() == 0.0; };
+  const auto about_z = [](const Eigen::Vector3d& v) { return v.x() == 0.0 && v.y() == 0.0; };
+  if (!flat(joint.from.position) || !flat(joint.to.position)) {
+    return "joint " + Quote(joint.name) + ": lies out of the plane";
+  }
+  if (!about_z(joint.from.rotation) || !about_z(joint.to.rotation)) {
+    return "joint " + Quote(joint.name) + ": its frames may turn about z only in a planar scene";
+  }
+  if (joint.axis.isZero()) return "";
+  const bool fits = joint.type == JointType::kPrismatic ? flat(joint.axis)
+                                                        : about_z(joint.axis) && joint.axis.z() > 0;
+  if (!fits) return "joint " + Quote(joint.name) + ": its axis does not belong to the plane";
+  return "";
+}
+
+std::string CheckJoint(const MechanismDescription& description, const JointDescription& joint) {
+  const int num_bodies = static_cast<int>(description.bodies.size());
+  for (int body : {joint.from.body, joint.to.body}) {
+    if (body < 0 || body >= num_bodies) {
+      return "joint " + Quote(joint.name) + ": body index " + std::to_string(body) +
+             " does not exist";
+    }
+  }
+  if (joint.from.body == joint.to.body) {
+    return "joint " + Quote(joint.name) + ": joins body " +
+           Quote(description.bodies[joint.from.body].name) + " with itself";
+  }
+  if (!joint.from.position.allFinite() || !joint.to.position.allFinite() ||
+      !joint.from.rotation.allFinite() || !joint.to.rotation.allFinite() ||
+      !joint.axis.allFinite()) {
+    return "joint " + Quote(joint.name) + ": positions, rotations and axis must be finite";
+  }
+  return description.space == SpaceKind::kPlanar ? CheckPlanarJoint(joint) : "";
+}
+
+bool HasOneCoordinate(JointType type) {
+  return type == JointType::kRevolute || type == JointType::kPrismatic;
+}
+
+std::string CheckForce(const MechanismDescription& description, const ForceDescription& force) {
+  return std::visit(
+      [&](const auto& f) -> std::string {
+        if constexpr (requires { f.joint; }) {
+          if (f.joint < 0 || f.joint >= static_cast<int>(description.joints.size())) {
+            return "force on joint index " + std::to_string(f.joint) + ", which does not exist";
+          }
+          const JointDescription& joint = description.joints[f.joint];
+          if (!HasOneCoordinate(joint.type)) {
+            return "force on joint " + Quote(joint.name) +
+                   ": only joints with one coordinate carry a joint force";
+          }
+        } else {
+          if (f.body <= kGround || f.body >= static_cast<int>(description.bodies.size())) {
+            return "point force on body index " + std::to_string(f.body) +
+                   ", expected a moving body";
+          }
+          if (!f.at.allFinite() || !f.force.allFinite()) return "point force must be finite";
+        }
+        return "";
+      },
+      force);
+}
+
+/// Numbers that a joint of this type takes as coordinates (or speeds).
+std::size_t NumValues(JointType type, SpaceKind space, bool speeds) {
+  if (type == JointType::kFree) return space == SpaceKind::kPlanar ? 3 : speeds ? 6 : 7;
+  return HasOneCoordinate(type) ? 1 : 0;
+}
+
+std::string CheckValues(const MechanismDescription& description,
+                        const std::vector<JointValues>& list, bool speeds) {
+  for (const JointValues& values : list) {
+    if (values.joint < 0 || values.joint >= static_cast<int>(description.joints.size())) {
+      return "initial value of joint index " + std::to_string(values.joint) +
+             ", which does not exist";
+    }
+    const JointDescription& joint = description.joints[values.joint];
+    const std::size_t expected = NumValues(joint.type, description.space, speeds);
+    if (values.values.size() != expected) {
+      return "initial values of joint " + Quote(joint.name) + ": " +
+             std::to_string(values.values.size()) + " given, expected " + std::to_string(expected);
+    }
+    for (double value : values.values) {
+      if (!std::isfinite(value)) {
+        return "initial values of joint " + Quote(joint.name) + " must be finite";
+      }
+    }
+  }
+  return "";
+}
+
+}  // namespace
+
+std::string Validate(const MechanismDescription& description) {
+  if (description.bodies.size() < 2) return "a mechanism needs at least one body besides ground";
+  if (!description.gravity.allFinite()) return "gravity must be finite";
+  if (description.space == SpaceKind::kPlanar && description.gravity.z() != 0.0) {
+    return "gravity leaves the plane";
+  }
+  std::string error;
+  for (std::size_t i = 1; i < description.bodies.size() && error.empty(); ++i) {
+    error = CheckBody(description.bodies[i]);
+  }
+  for (std::size_t i = 0; i < description.joints.size() && error.empty(); ++i) {
+    error = CheckJoint(description, description.joints[i]);
+  }
+  for (std::size_t i = 0; i < description.forces.size() && error.empty(); ++i) {
+    error = CheckForce(description, description.forces[i]);
+  }
+  if (error.empty()) error = CheckValues(description, description.initial.coordinates, false);
+  if (error.empty()) error = CheckValues(description, description.initial.speeds, true);
+  return error.empty() ? "" : description.name + ": " + error;
+}
+
+}  // namespace loopbench

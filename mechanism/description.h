@@ -1,0 +1,117 @@
+// What a user says about a mechanism: plain data, SI units, angles in rad, no algorithm.
+//
+// A planar scene is described with the same 3-vectors as a spatial one (z = 0, rotation about z),
+// so that one description can be compiled into either space (mechanism.h). Index 0 of `bodies` is
+// always Ground.
+#pragma once
+
+#include <Eigen/Core>
+#include <map>
+#include <string>
+#include <string_view>
+#include <variant>
+#include <vector>
+
+namespace loopbench {
+
+/// Index of Ground in every list of bodies.
+inline constexpr int kGround = 0;
+
+enum class SpaceKind { kPlanar, kSpatial };
+
+/// What a joint leaves free. The coordinates and directions of each are defined in joint.h.
+enum class JointType { kRevolute, kPrismatic, kWeld, kFree };
+
+std::string_view ToString(JointType type);
+std::string_view ToString(SpaceKind space);
+
+/// A rigid body. All vectors in body axes from the body's origin.
+struct BodyDescription {
+  std::string name;
+  double mass = 0.0;                                  ///< [kg], > 0 except for Ground
+  Eigen::Vector3d com = Eigen::Vector3d::Zero();      ///< centre of mass [m]
+  Eigen::Matrix3d inertia = Eigen::Matrix3d::Zero();  ///< about the centre of mass [kg m^2]
+  std::map<std::string, Eigen::Vector3d> points;      ///< named points [m]
+};
+
+/// One side of a joint: a frame fixed on a body.
+struct JointSide {
+  int body = kGround;
+  Eigen::Vector3d position = Eigen::Vector3d::Zero();  ///< origin of the frame in body axes [m]
+  Eigen::Vector3d rotation = Eigen::Vector3d::Zero();  ///< rotation vector body -> frame [rad]
+};
+
+/// A joint from P to Q. Its frame F is fixed on P, its frame M on Q; coordinates describe M in F.
+struct JointDescription {
+  std::string name;
+  JointType type = JointType::kRevolute;
+  JointSide from;  ///< P and F
+  JointSide to;    ///< Q and M
+  /// Joint axis in the axes of both frames before alignment: z of a revolute, x of a prismatic
+  /// joint is turned onto it. Zero means the default (revolute about z, prismatic along x).
+  Eigen::Vector3d axis = Eigen::Vector3d::Zero();
+  bool cut = false;  ///< never part of the spanning tree (if the graph allows)
+};
+
+/// Constant moment (revolute) [N m] or force (prismatic) [N] on `to`, its opposite on `from`.
+struct JointTorque {
+  int joint = 0;
+  double value = 0.0;
+};
+
+/// Linear spring on the joint's coordinate: -stiffness * (q - rest).
+struct JointSpring {
+  int joint = 0;
+  double stiffness = 0.0;  ///< [N m/rad] or [N/m], >= 0
+  double rest = 0.0;       ///< coordinate without force [rad] or [m]
+};
+
+/// Linear damper on the joint's speed: -damping * u.
+struct JointDamper {
+  int joint = 0;
+  double damping = 0.0;  ///< [N m s/rad] or [N s/m], >= 0
+};
+
+/// Constant force at a material point of a body.
+struct PointForce {
+  int body = kGround;
+  Eigen::Vector3d at = Eigen::Vector3d::Zero();     ///< in body axes from the body's origin [m]
+  Eigen::Vector3d force = Eigen::Vector3d::Zero();  ///< [N]
+  bool in_body_axes = false;                        ///< force turns with the body
+};
+
+using ForceDescription = std::variant<JointTorque, JointSpring, JointDamper, PointForce>;
+
+/// Initial values of one joint's coordinates or speeds (one number; free joints: see joint.h).
+struct JointValues {
+  int joint = 0;
+  std::vector<double> values;
+};
+
+/// Partial initial data; the rest is assembled (assembly.h).
+struct InitialDescription {
+  std::vector<JointValues> coordinates;  ///< guesses, or exact where the joint is held
+  std::vector<JointValues> speeds;       ///< all of them are held
+  std::vector<int> held;                 ///< joints whose coordinates the assembly must not move
+};
+
+struct MechanismDescription {
+  std::string name;
+  SpaceKind space = SpaceKind::kPlanar;
+  Eigen::Vector3d gravity = Eigen::Vector3d::Zero();                      ///< [m/s^2], ground axes
+  std::vector<BodyDescription> bodies = std::vector<BodyDescription>(1);  ///< [0] is Ground
+  std::vector<JointDescription> joints;
+  std::vector<ForceDescription> forces;
+  InitialDescription initial;
+  /// Names of speeds that a fixed coordinate reduction takes as independent: joint names for joint
+  /// coordinates ("OA"), "<body>.angle", "<body>.x", ... for absolute ones. Those that do not
+  /// belong to the coordinate set in use are skipped; none at all means: chosen at the start.
+  std::vector<std::string> independent;
+};
+
+/// First thing that makes the description unusable, as text ("" when it is usable): masses and
+/// inertias not positive, joints of a body with itself, forces or values on joints of another size,
+/// a planar scene with parts out of plane, non-finite numbers.
+std::string Validate(const MechanismDescription& description);
+
+}  // namespace loopbench

@@ -1,0 +1,100 @@
+#include "mechanism/formulation.h"
+
+namespace loopbench {
+
+std::string_view ToString(Enforcement enforcement) {
+  return enforcement == Enforcement::kAcceleration ? "acceleration" : "velocity";
+}
+std::string_view ToString(SolverKind solver) {
+  return solver == SolverKind::kAsPublished ? "as-published" : "rank-revealing";
+}
+
+template <class Space, class S>
+Formulation<Space, S>::Formulation(const Mechanism<Space, S>& mechanism, FormulationOptions options)
+    : mechanism_(mechanism),
+      options_(options),
+      kinematics_(mechanism),
+      q_(VectorX<S>::Zero(mechanism.num_q())),
+      u_(VectorX<S>::Zero(mechanism.num_u())),
+      udot_(VectorX<S>::Zero(mechanism.num_u())) {}
+
+template <class Space, class S>
+Outcome Formulation<Space, S>::Start(const VectorX<S>& q, const VectorX<S>& u) {
+  q_ = q;
+  u_ = u;
+  kinematics_.UpdatePosition(q_);
+  kinematics_.UpdateVelocity(u_);
+  kinematics_.AcceptStep();
+  return Outcome::kFinished;
+}
+
+template <class Space, class S>
+void Formulation<Space, S>::ToState(const VectorX<S>& q, const VectorX<S>& u,
+                                    std::span<S> y) const {
+  const int num_q = mechanism_.num_q();
+  for (int i = 0; i < num_q; ++i) y[i] = q[i];
+  for (int i = 0; i < num_state_speeds(); ++i) y[num_q + i] = u[state_speed(i)];
+}
+
+template <class Space, class S>
+Outcome Formulation<Space, S>::FromState(std::span<const S> y) {
+  const int num_q = mechanism_.num_q();
+  for (int i = 0; i < num_q; ++i) q_[i] = y[i];
+  for (int i = 0; i < num_state_speeds(); ++i) u_[state_speed(i)] = y[num_q + i];
+  kinematics_.UpdatePosition(q_);
+  Outcome outcome = Outcome::kFinished;
+  if (options_.enforcement == Enforcement::kVelocity) outcome = CompleteSpeeds();
+  kinematics_.UpdateVelocity(u_);
+  return outcome;
+}
+
+template <class Space, class S>
+Outcome Formulation<Space, S>::Derivative(S, std::span<const S> y, std::span<S> ydot) {
+  Outcome outcome = FromState(y);
+  if (outcome == Outcome::kFinished) outcome = Accelerations();
+  diagnostics_.outcome = outcome;
+  if (outcome != Outcome::kFinished) return outcome;
+  const int num_q = mechanism_.num_q();
+  mechanism_.Rates(q_, u_, Eigen::Map<VectorX<S>>(ydot.data(), num_q));
+  for (int i = 0; i < num_state_speeds(); ++i) ydot[num_q + i] = udot_[state_speed(i)];
+  return outcome;
+}
+
+template <class Space, class S>
+Outcome Formulation<Space, S>::Evaluate(S, const VectorX<S>& q, const VectorX<S>& u,
+                                        VectorX<S>& udot) {
+  q_ = q;
+  u_ = u;
+  kinematics_.UpdatePosition(q_);
+  kinematics_.UpdateVelocity(u_);
+  diagnostics_.outcome = Accelerations();
+  udot = udot_;
+  return diagnostics_.outcome;
+}
+
+template <class Space, class S>
+bool Formulation<Space, S>::BeginStep(std::span<S> y) {
+  if (FromState(y) != Outcome::kFinished) return false;  // the next evaluation will say why
+  kinematics_.AcceptStep();
+  if (!ChangeMode()) return false;
+  ToState(q_, u_, y);
+  return true;
+}
+
+template <class Space, class S>
+int Formulation<Space, S>::LoopRank(int dependent_rows) const {
+  int user_tree_rows = 0;
+  if (mechanism_.coordinates() == Coordinates::kAbsolute) {
+    // every user joint is a constraint here; those of a spanning forest never depend on each other,
+    // and they are what turns the speeds of free bodies into joint speeds
+    user_tree_rows = mechanism_.num_u() - mechanism_.num_joint_speeds();
+  }
+  return mechanism_.num_rows() - user_tree_rows - dependent_rows;
+}
+
+template class Formulation<Planar, double>;
+template class Formulation<Spatial, double>;
+template class Formulation<Planar, long double>;
+template class Formulation<Spatial, long double>;
+
+}  // namespace loopbench

@@ -1,0 +1,111 @@
+// What the three formulations share: a mechanism's state vector and its derivative.
+//
+// A formulation answers "which accelerations satisfy the joints", and, at velocity level, "which
+// speeds do". It is used through
+//   Derivative(t, y)   the right-hand side for an integrator, y = (q, speeds of the state),
+//   Evaluate(t, q, u)  accelerations alone, for given q and all speeds u,
+//   BeginStep(y)       at accepted steps, the only call that may change the mode (an independent
+//   set,
+//                      unwrapped angles). Everything else is a pure function of (t, q, u, mode):
+//                      calling it in any order gives the same bits.
+// After construction none of them allocates, except where a formulation says so.
+#pragma once
+
+#include <memory>
+#include <string_view>
+
+#include "mechanism/kinematics.h"
+#include "mechanism/outcome.h"
+
+namespace loopbench {
+
+/// At which level the constraints hold in the right-hand side (docs/design.md D3).
+enum class Enforcement {
+  kAcceleration,  ///< accelerations satisfy the constraints, speeds are integrated as they come
+  kVelocity,      ///< speeds used in the right-hand side satisfy them too
+};
+
+enum class SolverKind {
+  kAsPublished,    ///< plain factorisations; a lost pivot ends the run as `singular`
+  kRankRevealing,  ///< rank from geometry, degenerating directions softened (loop_solver.h);
+                   ///< for reduction: the independent set is chosen, and chosen again when it ages
+};
+
+std::string_view ToString(Enforcement enforcement);
+std::string_view ToString(SolverKind solver);
+
+struct FormulationOptions {
+  Enforcement enforcement = Enforcement::kAcceleration;
+  SolverKind solver = SolverKind::kRankRevealing;
+};
+
+/// What the last evaluation met.
+struct Diagnostics {
+  Outcome outcome = Outcome::kFinished;
+  int rank = 0;        ///< independent loop constraints: rank of J in joint coordinates
+  double rcond = 1.0;  ///< smallest scaled pivot met, each formulation in its own matrices
+  double smallest_weight = 1.0;  ///< below 1: some direction was softened
+  int worst_joint = -1;          ///< index of the joint behind rcond, -1 when not attributable
+};
+
+template <class Space, class S>
+class Formulation {
+ public:
+  /// `mechanism` must outlive the formulation.
+  Formulation(const Mechanism<Space, S>& mechanism, FormulationOptions options);
+  virtual ~Formulation() = default;
+  Formulation(const Formulation&) = delete;
+  Formulation& operator=(const Formulation&) = delete;
+
+  const Mechanism<Space, S>& mechanism() const { return mechanism_; }
+  const FormulationOptions& options() const { return options_; }
+
+  /// Called once with a consistent start, before anything else.
+  virtual Outcome Start(const VectorX<S>& q, const VectorX<S>& u);
+
+  int state_size() const { return mechanism_.num_q() + num_state_speeds(); }
+  void ToState(const VectorX<S>& q, const VectorX<S>& u, std::span<S> y) const;
+
+  /// dy/dt. On failure `ydot` is unspecified.
+  Outcome Derivative(S t, std::span<const S> y, std::span<S> ydot);
+
+  /// udot for given positions and speeds.
+  Outcome Evaluate(S t, const VectorX<S>& q, const VectorX<S>& u, VectorX<S>& udot);
+
+  /// Positions and all speeds of a state; kinematics() is current afterwards.
+  Outcome FromState(std::span<const S> y);
+  const VectorX<S>& q() const { return q_; }
+  const VectorX<S>& u() const { return u_; }
+  const VectorX<S>& udot() const { return udot_; }
+
+  /// Accepts the step that ended in `y`. True when the mode changed: then the state's meaning may
+  /// have changed too, `y` is rewritten and the integrator must restart.
+  bool BeginStep(std::span<S> y);
+
+  const Kinematics<Space, S>& kinematics() const { return kinematics_; }
+  const Diagnostics& diagnostics() const { return diagnostics_; }
+
+ protected:
+  /// Speeds that the state carries: all, unless a formulation integrates fewer.
+  virtual int num_state_speeds() const { return mechanism_.num_u(); }
+  /// Index into u of the i-th speed of the state.
+  virtual int state_speed(int i) const { return i; }
+
+  /// Makes u_ satisfy the constraints (positions current, velocity level only).
+  virtual Outcome CompleteSpeeds() = 0;
+  /// udot_ from current positions and speeds; sets diagnostics_.
+  virtual Outcome Accelerations() = 0;
+  /// Chance to change the mode at an accepted state.
+  virtual bool ChangeMode() { return false; }
+
+  /// rank of J in joint coordinates, given how many of this set's constraint rows are dependent.
+  int LoopRank(int dependent_rows) const;
+
+  const Mechanism<Space, S>& mechanism_;
+  FormulationOptions options_;
+  Kinematics<Space, S> kinematics_;
+  VectorX<S> q_, u_, udot_;
+  Diagnostics diagnostics_;
+};
+
+}  // namespace loopbench

@@ -1,0 +1,231 @@
+#include "mechanism/joint.h"
+
+#include <cmath>
+#include <numbers>
+
+namespace loopbench {
+
+std::string_view ToString(JointType type) {
+  switch (type) {
+    case JointType::kRevolute:
+      return "revolute";
+    case JointType::kPrismatic:
+      return "prismatic";
+    case JointType::kWeld:
+      return "weld";
+    case JointType::kFree:
+      return "free";
+  }
+  return "unknown";
+}
+
+std::string_view ToString(SpaceKind space) {
+  return space == SpaceKind::kPlanar ? "planar" : "spatial";
+}
+
+namespace {
+
+/// qdot = u, for kinds whose speeds are the rates of their coordinates.
+template <class S, int n>
+void SameRates(const S*, const S* u, S* qdot) {
+  for (int i = 0; i < n; ++i) qdot[i] = u[i];
+}
+
+template <class S>
+struct PlanarKinds {
+  using P = Pose<Planar, S>;
+
+  static JointKind<Planar, S> Revolute() {
+    return {.num_q = 1,
+            .num_u = 1,
+            .free_axes = {0},
+            .constrained_axes = {1, 2},
+            .isotropic = true,
+            .transform =
+                [](const S* q, P& X) {
+                  X.SetAngle(q[0]);
+                  X.p.setZero();
+                },
+            .coordinates = [](const P& X, S* q) { q[0] = X.angle; },
+            .rates = SameRates<S, 1>};
+  }
+  static JointKind<Planar, S> Prismatic() {
+    return {.num_q = 1,
+            .num_u = 1,
+            .free_axes = {1},
+            .constrained_axes = {0, 2},
+            .isotropic = false,
+            .transform =
+                [](const S* q, P& X) {
+                  X.SetAngle(S(0));
+                  X.p << q[0], S(0);
+                },
+            .coordinates = [](const P& X, S* q) { q[0] = X.p[0]; },
+            .rates = SameRates<S, 1>};
+  }
+  static JointKind<Planar, S> Weld() {
+    return {.num_q = 0,
+            .num_u = 0,
+            .free_axes = {},
+            .constrained_axes = {0, 1, 2},
+            .isotropic = true,
+            .transform = [](const S*, P& X) { X = P(); },
+            .coordinates = [](const P&, S*) {},
+            .rates = SameRates<S, 0>};
+  }
+  static JointKind<Planar, S> Free() {
+    return {.num_q = 3,
+            .num_u = 3,
+            .free_axes = {0, 1, 2},
+            .constrained_axes = {},
+            .isotropic = false,
+            .transform =
+                [](const S* q, P& X) {
+                  X.SetAngle(q[0]);
+                  X.p << q[1], q[2];
+                },
+            .coordinates =
+                [](const P& X, S* q) {
+                  q[0] = X.angle;
+                  q[1] = X.p[0];
+                  q[2] = X.p[1];
+                },
+            .rates = SameRates<S, 3>};
+  }
+};
+
+template <class S>
+struct SpatialKinds {
+  using P = Pose<Spatial, S>;
+
+  static JointKind<Spatial, S> Revolute() {
+    return {.num_q = 1,
+            .num_u = 1,
+            .free_axes = {2},
+            .constrained_axes = {0, 1, 3, 4, 5},
+            .isotropic = false,
+            .transform =
+                [](const S* q, P& X) {
+                  using std::cos;
+                  using std::sin;
+                  const S c = cos(q[0]), s = sin(q[0]);
+                  X.R << c, -s, S(0), s, c, S(0), S(0), S(0), S(1);
+                  X.p.setZero();
+                },
+            .coordinates =
+                [](const P& X, S* q) {
+                  using std::atan2;
+                  q[0] = atan2(X.R(1, 0) - X.R(0, 1), X.R(0, 0) + X.R(1, 1));
+                },
+            .rates = SameRates<S, 1>};
+  }
+  static JointKind<Spatial, S> Prismatic() {
+    return {.num_q = 1,
+            .num_u = 1,
+            .free_axes = {3},
+            .constrained_axes = {0, 1, 2, 4, 5},
+            .isotropic = false,
+            .transform =
+                [](const S* q, P& X) {
+                  X.R.setIdentity();
+                  X.p << q[0], S(0), S(0);
+                },
+            .coordinates = [](const P& X, S* q) { q[0] = X.p[0]; },
+            .rates = SameRates<S, 1>};
+  }
+  static JointKind<Spatial, S> Weld() {
+    return {.num_q = 0,
+            .num_u = 0,
+            .free_axes = {},
+            .constrained_axes = {0, 1, 2, 3, 4, 5},
+            .isotropic = true,
+            .transform = [](const S*, P& X) { X = P(); },
+            .coordinates = [](const P&, S*) {},
+            .rates = SameRates<S, 0>};
+  }
+  static JointKind<Spatial, S> Free() {
+    return {.num_q = 7,
+            .num_u = 6,
+            .free_axes = {0, 1, 2, 3, 4, 5},
+            .constrained_axes = {},
+            .isotropic = false,
+            .transform =
+                [](const S* q, P& X) {
+                  X.R =
+                      Eigen::Quaternion<S>(q[0], q[1], q[2], q[3]).normalized().toRotationMatrix();
+                  X.p << q[4], q[5], q[6];
+                },
+            .coordinates =
+                [](const P& X, S* q) {
+                  const Eigen::Quaternion<S> e(X.R);
+                  q[0] = e.w();
+                  q[1] = e.x();
+                  q[2] = e.y();
+                  q[3] = e.z();
+                  for (int i = 0; i < 3; ++i) q[4 + i] = X.p[i];
+                },
+            // The angular velocity is in F axes, hence the product from the left: e' = w e / 2.
+            .rates =
+                [](const S* q, const S* u, S* qdot) {
+                  const S half = S(1) / S(2);
+                  qdot[0] = half * (-u[0] * q[1] - u[1] * q[2] - u[2] * q[3]);
+                  qdot[1] = half * (u[0] * q[0] + u[1] * q[3] - u[2] * q[2]);
+                  qdot[2] = half * (-u[0] * q[3] + u[1] * q[0] + u[2] * q[1]);
+                  qdot[3] = half * (u[0] * q[2] - u[1] * q[1] + u[2] * q[0]);
+                  for (int i = 0; i < 3; ++i) qdot[4 + i] = u[3 + i];
+                }};
+  }
+};
+
+template <class Kinds, class Kind>
+const Kind& Lookup(JointType type) {
+  static const Kind kKinds[] = {Kinds::Revolute(), Kinds::Prismatic(), Kinds::Weld(),
+                                Kinds::Free()};
+  return kKinds[static_cast<int>(type)];
+}
+
+}  // namespace
+
+template <>
+const JointKind<Planar, double>& KindOf(JointType type) {
+  return Lookup<PlanarKinds<double>, JointKind<Planar, double>>(type);
+}
+template <>
+const JointKind<Planar, long double>& KindOf(JointType type) {
+  return Lookup<PlanarKinds<long double>, JointKind<Planar, long double>>(type);
+}
+template <>
+const JointKind<Spatial, double>& KindOf(JointType type) {
+  return Lookup<SpatialKinds<double>, JointKind<Spatial, double>>(type);
+}
+template <>
+const JointKind<Spatial, long double>& KindOf(JointType type) {
+  return Lookup<SpatialKinds<long double>, JointKind<Spatial, long double>>(type);
+}
+
+template <class Space, class S>
+Motion<Space, S> Mismatch(const JointKind<Space, S>& kind, const Pose<Space, S>& X_FM) {
+  S q[7];
+  Pose<Space, S> nearest;
+  kind.coordinates(X_FM, q);
+  kind.transform(q, nearest);
+  Pose<Space, S> rest = Compose(X_FM, Inverse(nearest));
+  Motion<Space, S> mismatch;
+  mismatch << RotationVector(rest), X_FM.p - nearest.p;
+  // A loop may wind: planar angles along it then differ by whole turns that are no mismatch.
+  if constexpr (Space::kRot == 1) {
+    mismatch[0] = std::remainder(mismatch[0], 2 * std::numbers::pi_v<S>);
+  }
+  return mismatch;
+}
+
+template Motion<Planar, double> Mismatch(const JointKind<Planar, double>&,
+                                         const Pose<Planar, double>&);
+template Motion<Spatial, double> Mismatch(const JointKind<Spatial, double>&,
+                                          const Pose<Spatial, double>&);
+template Motion<Planar, long double> Mismatch(const JointKind<Planar, long double>&,
+                                              const Pose<Planar, long double>&);
+template Motion<Spatial, long double> Mismatch(const JointKind<Spatial, long double>&,
+                                               const Pose<Spatial, long double>&);
+
+}  // namespace loopbench

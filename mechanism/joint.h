@@ -1,0 +1,54 @@
+// A joint kind: one small piece of code that says how frame M of body Q moves in frame F of body P.
+//
+// With q the coordinates and u the speeds of the joint (paper, table 1 and eq. 7-9):
+//   X_FM(q)        pose of M in F,
+//   H_F(q)         motion map: [w_FM; v_FMo] = H_F u, in F axes; columns are orthonormal,
+//   D_F(q)         its orthogonal complement, D_F^T H_F = 0: the directions of constraint forces,
+//   qdot = N(q) u  kinematic rates,
+//   q*(X_FM)       the coordinates that a measured pose of M in F comes closest to; what is left of
+//                  the pose is the joint's mismatch (position drift).
+// The constraint of a joint is imposed at one point, the point of P that now coincides with Mo:
+//   A_Q - A_P = H udot + g,   g = Hdot u + [w_P x w_rel; 2 w_P x v_rel],                  (7)
+// w_rel, v_rel being the measured relative motion seen in F. With that g, "D^T (A_Q - A_P - g) = 0"
+// says that the mismatch, written in F axes, has no second derivative.
+//
+// Coordinates: revolute [angle about z], prismatic [shift along x], weld none,
+// free: plane [angle, x, y], space [quaternion w x y z, x, y, z] with speeds [w; v] in F axes. The
+// quaternion is normalised where it is used, so its length carries no information.
+#pragma once
+
+#include <array>
+
+#include "mechanism/description.h"
+#include "mechanism/space.h"
+
+namespace loopbench {
+
+template <class Space, class S>
+struct JointKind {
+  int num_q = 0;
+  int num_u = 0;
+  /// Every direction of H and D is a coordinate axis of F and constant: H, D are selections. The
+  /// two lists below name the axes (components of a motion).
+  std::array<int, Space::kDim> free_axes{};
+  std::array<int, Space::kDim> constrained_axes{};
+  /// The span of D is the same in all axes (a planar pin): then ground axes serve for F axes.
+  bool isotropic = false;
+
+  void (*transform)(const S* q, Pose<Space, S>& X_FM) = nullptr;
+  void (*coordinates)(const Pose<Space, S>& X_FM, S* q) = nullptr;
+  void (*rates)(const S* q, const S* u, S* qdot) = nullptr;
+
+  int num_constraints() const { return Space::kDim - num_u; }
+};
+
+/// The kind's data and functions. Lives forever.
+template <class Space, class S>
+const JointKind<Space, S>& KindOf(JointType type);
+
+/// What keeps M from its nearest admissible pose, in F axes: [rotation vector; shift]. Its
+/// components along D are the joint's mismatch [rad; m].
+template <class Space, class S>
+Motion<Space, S> Mismatch(const JointKind<Space, S>& kind, const Pose<Space, S>& X_FM);
+
+}  // namespace loopbench

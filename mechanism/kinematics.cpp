@@ -1,0 +1,237 @@
+#include "mechanism/kinematics.h"
+
+#include <cmath>
+#include <numbers>
+
+namespace loopbench {
+
+namespace {
+
+/// A planar pose accumulates its matrix by products; one sine and cosine bring it back to its
+/// angle.
+template <class S>
+void Refresh(Pose<Planar, S>& X) {
+  X.SetAngle(X.angle);
+}
+template <class S>
+void Refresh(Pose<Spatial, S>&) {}
+
+template <class Space, class S>
+void RotateDirections(const Directions<Space, S>& in_F, const Rotation<Space, S>& R,
+                      Directions<Space, S>& out) {
+  if constexpr (Space::kRot == 1) {
+    out.template topRows<1>() = in_F.template topRows<1>();
+  } else {
+    out.template topRows<3>().noalias() = R * in_F.template topRows<3>();
+  }
+  out.template bottomRows<Space::kLin>().noalias() = R * in_F.template bottomRows<Space::kLin>();
+}
+
+/// Ground axes serve for H and D when their spans do not depend on axes, or when F is fixed.
+template <class Space, class S>
+bool TurnsWithBody(const Joint<Space, S>& joint) {
+  return !joint.kind->isotropic && joint.from != kGround;
+}
+
+}  // namespace
+
+template <class Space, class S>
+Kinematics<Space, S>::Kinematics(const Mechanism<Space, S>& mechanism)
+    : mechanism_(&mechanism),
+      poses_(mechanism.num_bodies()),
+      motions_(mechanism.num_bodies(), Motion<Space, S>::Zero()),
+      joints_(mechanism.joints().size()),
+      accepted_(joints_.size(), S(0)),
+      q_(VectorX<S>::Zero(mechanism.num_q())),
+      u_(VectorX<S>::Zero(mechanism.num_u())) {
+  for (std::size_t j = 0; j < joints_.size(); ++j) {
+    const Joint<Space, S>& joint = mechanism.joints()[j];
+    JointState<Space, S>& state = joints_[j];
+    state.R_F.setIdentity();
+    if (!joint.kind->isotropic) state.R_F = joint.X_PF.R;
+    state.H = joint.H_F;
+    state.D = joint.D_F;
+    RotateDirections<Space, S>(joint.H_F, state.R_F, state.H);
+    RotateDirections<Space, S>(joint.D_F, state.R_F, state.D);
+    state.V_rel.setZero();
+    state.g.setZero();
+  }
+}
+
+template <class Space, class S>
+void Kinematics<Space, S>::UpdatePosition(const VectorX<S>& q) {
+  q_ = q;
+  ++position_version_;
+  Pose<Space, S> X_WF, X_WM;
+  const auto finish = [&](int index, const Joint<Space, S>& joint) {
+    JointState<Space, S>& state = joints_[index];
+    state.p = X_WM.p;
+    state.r_P = X_WM.p - poses_[joint.from].p;
+    state.r_Q = X_WM.p - poses_[joint.to].p;
+    if (!TurnsWithBody(joint)) return;
+    state.R_F = X_WF.R;
+    RotateDirections<Space, S>(joint.H_F, state.R_F, state.H);
+    RotateDirections<Space, S>(joint.D_F, state.R_F, state.D);
+  };
+  for (const TreeStep& step : mechanism_->tree()) {
+    const Joint<Space, S>& joint = mechanism_->joints()[step.joint];
+    Pose<Space, S>& X_FM = joints_[step.joint].X_FM;
+    joint.kind->transform(q.data() + joint.q_offset, X_FM);
+    if (step.sign > 0) {
+      X_WF = Compose(poses_[step.parent], joint.X_PF);
+      X_WM = Compose(X_WF, X_FM);
+      poses_[step.child] = Compose(X_WM, joint.X_MQ);
+    } else {
+      X_WM = Compose(poses_[step.parent], joint.X_QM);
+      X_WF = Compose(X_WM, Inverse(X_FM));
+      poses_[step.child] = Compose(X_WF, Inverse(joint.X_PF));
+    }
+    Refresh(poses_[step.child]);
+    finish(step.joint, joint);
+  }
+  for (int index : mechanism_->constraints()) {
+    const Joint<Space, S>& joint = mechanism_->joints()[index];
+    X_WF = Compose(poses_[joint.from], joint.X_PF);
+    X_WM = Compose(poses_[joint.to], joint.X_QM);
+    joints_[index].X_FM = Compose(Inverse(X_WF), X_WM);
+    finish(index, joint);
+  }
+}
+
+template <class Space, class S>
+void Kinematics<Space, S>::UpdateVelocity(const VectorX<S>& u) {
+  u_ = u;
+  const auto finish = [&](const Joint<Space, S>& joint, JointState<Space, S>& state) {
+    const Angular<Space, S> w_P = motions_[joint.from].template head<Space::kRot>();
+    const Angular<Space, S> w_rel = state.V_rel.template head<Space::kRot>();
+    const Linear<Space, S> v_rel = state.V_rel.template tail<Space::kLin>();
+    state.g << CrossAngular<S>(w_P, w_rel), S(2) * Cross<S>(w_P, v_rel);
+  };
+  for (const TreeStep& step : mechanism_->tree()) {
+    const Joint<Space, S>& joint = mechanism_->joints()[step.joint];
+    JointState<Space, S>& state = joints_[step.joint];
+    state.V_rel.setZero();
+    for (int i = 0; i < joint.kind->num_u; ++i) {
+      state.V_rel += state.H.col(i) * u[joint.u_offset + i];
+    }
+    const bool forward = step.sign > 0;
+    const Linear<Space, S>& r_parent = forward ? state.r_P : state.r_Q;
+    const Linear<Space, S> to_child = forward ? -state.r_Q : -state.r_P;
+    Motion<Space, S> V = ShiftMotion<Space, S>(motions_[step.parent], r_parent);
+    V += S(step.sign) * state.V_rel;
+    motions_[step.child] = ShiftMotion<Space, S>(V, to_child);
+    finish(joint, state);
+  }
+  for (int index : mechanism_->constraints()) {
+    const Joint<Space, S>& joint = mechanism_->joints()[index];
+    JointState<Space, S>& state = joints_[index];
+    state.V_rel = ShiftMotion<Space, S>(motions_[joint.to], state.r_Q) -
+                  ShiftMotion<Space, S>(motions_[joint.from], state.r_P);
+    finish(joint, state);
+  }
+}
+
+template <class Space, class S>
+Motion<Space, S> Kinematics<Space, S>::Centripetal(int body, const Linear<Space, S>& r) const {
+  const Angular<Space, S> w = motions_[body].template head<Space::kRot>();
+  Motion<Space, S> A = Motion<Space, S>::Zero();
+  A.template tail<Space::kLin>() = Cross<S>(w, Linear<Space, S>(Cross<S>(w, r)));
+  return A;
+}
+
+template <class Space, class S>
+typename Inertia<Space, S>::Matrix Kinematics<Space, S>::RotationalInertia(
+    const Inertia<Space, S>& inertia, int body) const {
+  if constexpr (Space::kRot == 1) {
+    return inertia.rotational;
+  } else {
+    return poses_[body].R * inertia.rotational * poses_[body].R.transpose();
+  }
+}
+
+template <class Space, class S>
+typename Inertia<Space, S>::Matrix Kinematics<Space, S>::RotationalInverse(
+    const Inertia<Space, S>& inertia, int body) const {
+  if constexpr (Space::kRot == 1) {
+    return inertia.rotational_inverse;
+  } else {
+    return poses_[body].R * inertia.rotational_inverse * poses_[body].R.transpose();
+  }
+}
+
+template <class Space, class S>
+Motion<Space, S> Kinematics<Space, S>::ConstraintMismatch(int index) const {
+  const Joint<Space, S>& joint = mechanism_->joints()[index];
+  const Motion<Space, S> in_F = Mismatch(*joint.kind, joints_[index].X_FM);
+  const Rotation<Space, S> R_WF = poses_[joint.from].R * joint.X_PF.R;
+  Motion<Space, S> mismatch = in_F;
+  mismatch.template tail<Space::kLin>().noalias() = R_WF * in_F.template tail<Space::kLin>();
+  if constexpr (Space::kRot == 3) {
+    mismatch.template head<3>().noalias() = R_WF * in_F.template head<3>();
+  }
+  return mismatch;
+}
+
+template <class Space, class S>
+S Kinematics<Space, S>::JointCoordinate(int index) const {
+  const Joint<Space, S>& joint = mechanism_->joints()[index];
+  if (joint.in_tree()) return q_[joint.q_offset];
+  S q;
+  joint.kind->coordinates(joints_[index].X_FM, &q);
+  // Space measures an angle modulo a turn; take the one next to the last accepted.
+  if (Space::kRot == 3 && joint.kind->free_axes[0] < 3) {
+    const S turn = 2 * std::numbers::pi_v<S>;
+    q = accepted_[index] + std::remainder(q - accepted_[index], turn);
+  }
+  return q;
+}
+
+template <class Space, class S>
+S Kinematics<Space, S>::JointSpeed(int index) const {
+  const Joint<Space, S>& joint = mechanism_->joints()[index];
+  if (joint.in_tree()) return u_[joint.u_offset];
+  return joints_[index].H.col(0).dot(joints_[index].V_rel);
+}
+
+template <class Space, class S>
+void Kinematics<Space, S>::AcceptStep() {
+  for (const JointForce<S>& force : mechanism_->joint_forces()) {
+    accepted_[force.joint] = JointCoordinate(force.joint);
+  }
+}
+
+template <class Space, class S>
+Pose<Space, S> Kinematics<Space, S>::MeasuredPose(const Joint<Space, S>& joint) const {
+  return Compose(Inverse(Compose(poses_[joint.from], joint.X_PF)),
+                 Compose(poses_[joint.to], joint.X_QM));
+}
+
+template <class Space, class S>
+VectorX<S> Kinematics<Space, S>::CoordinatesIn(const Mechanism<Space, S>& other) const {
+  VectorX<S> q(other.num_q());
+  for (const TreeStep& step : other.tree()) {
+    const Joint<Space, S>& joint = other.joints()[step.joint];
+    joint.kind->coordinates(MeasuredPose(joint), q.data() + joint.q_offset);
+  }
+  return q;
+}
+
+template <class Space, class S>
+VectorX<S> Kinematics<Space, S>::SpeedsIn(const Kinematics& other) const {
+  VectorX<S> u(other.mechanism().num_u());
+  for (const TreeStep& step : other.mechanism().tree()) {
+    const Joint<Space, S>& joint = other.mechanism().joints()[step.joint];
+    const JointState<Space, S>& state = other.joints()[step.joint];
+    const Motion<Space, S> V_rel = ShiftMotion<Space, S>(motions_[joint.to], state.r_Q) -
+                                   ShiftMotion<Space, S>(motions_[joint.from], state.r_P);
+    u.segment(joint.u_offset, joint.kind->num_u) = state.H.transpose() * V_rel;
+  }
+  return u;
+}
+
+template class Kinematics<Planar, double>;
+template class Kinematics<Spatial, double>;
+template class Kinematics<Planar, long double>;
+template class Kinematics<Spatial, long double>;
+
+}  // namespace loopbench

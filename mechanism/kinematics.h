@@ -1,0 +1,101 @@
+// Poses, motions and joint frames of a mechanism at one (q, u): the workspace all formulations
+// share.
+//
+// Everything is in ground axes. Bodies are represented at their centre of mass, joints at Mo, the
+// origin of the frame fixed on Q (see joint.h).
+#pragma once
+
+#include <span>
+#include <vector>
+
+#include "mechanism/mechanism.h"
+
+namespace loopbench {
+
+/// A joint at the current position and speed.
+template <class Space, class S>
+struct JointState {
+  Linear<Space, S> p;         ///< Mo from the ground origin
+  Linear<Space, S> r_P, r_Q;  ///< Mo from the centres of mass of P and Q
+  Directions<Space, S> H, D;  ///< motion map and constrained directions
+  Pose<Space, S> X_FM;        ///< measured for constraints, from q for tree joints
+  Rotation<Space, S> R_F;     ///< axes of H, D; identity where any axes serve
+  Motion<Space, S> V_rel;     ///< [w_Q - w_P; v_Q - v_P] at Mo
+  Motion<Space, S> g;         ///< A_Q - A_P = H udot + g                            (7)
+};
+
+template <class Space, class S>
+class Kinematics {
+ public:
+  explicit Kinematics(const Mechanism<Space, S>& mechanism);
+
+  /// Poses, joint points and directions from q.
+  void UpdatePosition(const VectorX<S>& q);
+  /// Motions and g from u; positions must be current.
+  void UpdateVelocity(const VectorX<S>& u);
+
+  /// Counts UpdatePosition() calls: what was computed from positions is good while it stands.
+  long position_version() const { return position_version_; }
+
+  const Mechanism<Space, S>& mechanism() const { return *mechanism_; }
+  const std::vector<Pose<Space, S>>& poses() const { return poses_; }        ///< at the com
+  const std::vector<Motion<Space, S>>& motions() const { return motions_; }  ///< at the com
+  const std::vector<JointState<Space, S>>& joints() const { return joints_; }
+
+  /// Classical acceleration of the point of `body` at r from its centre of mass minus that of the
+  /// centre of mass, for zero angular acceleration: [0; w x (w x r)].
+  Motion<Space, S> Centripetal(int body, const Linear<Space, S>& r) const;
+
+  /// Rotational inertia of a body in ground axes, and its inverse.
+  typename Inertia<Space, S>::Matrix RotationalInertia(const Inertia<Space, S>& inertia,
+                                                       int body) const;
+  typename Inertia<Space, S>::Matrix RotationalInverse(const Inertia<Space, S>& inertia,
+                                                       int body) const;
+
+  /// Mismatch of a constraint in ground axes: [rotation; shift], see joint.h. D^T of it is the
+  /// constraint function whose Jacobian is tree_dynamics.h's J.
+  Motion<Space, S> ConstraintMismatch(int joint) const;
+
+  /// Measured coordinate and speed of a joint with one coordinate (q, u for tree joints).
+  S JointCoordinate(int joint) const;
+  S JointSpeed(int joint) const;
+
+  /// Remembers the angles of cut joints, so that the next ones are unwrapped from here. Called at
+  /// accepted steps only (the one memory of this class, part of the mode).
+  void AcceptStep();
+
+  /// q of a mechanism with the same bodies, from body poses here (other coordinate set).
+  VectorX<S> CoordinatesIn(const Mechanism<Space, S>& other) const;
+  /// u likewise.
+  VectorX<S> SpeedsIn(const Kinematics& other) const;
+
+ private:
+  Pose<Space, S> MeasuredPose(const Joint<Space, S>& joint) const;
+
+  const Mechanism<Space, S>* mechanism_;
+  std::vector<Pose<Space, S>> poses_;
+  std::vector<Motion<Space, S>> motions_;
+  std::vector<JointState<Space, S>> joints_;
+  std::vector<S> accepted_;  ///< last accepted coordinate of each joint
+  VectorX<S> q_, u_;
+  long position_version_ = 0;
+};
+
+/// Wrench of applied forces at each body's centre of mass: gravity, forces at points, joint forces
+/// (H tau on Q, the opposite on P). `wrenches` has one entry per body.
+template <class Space, class S>
+void AppliedForces(const Kinematics<Space, S>& kinematics, std::span<Motion<Space, S>> wrenches);
+
+/// Energies [J] at the current position and speed; potential is zero for centres of mass in the
+/// ground origin and springs at rest. Constant forces on points (ground axes) and joints count as
+/// potentials; forces that turn with a body and dampers do not.
+template <class S>
+struct Energy {
+  S kinetic = S(0);
+  S potential = S(0);
+  S total() const { return kinetic + potential; }
+};
+template <class Space, class S>
+Energy<S> ComputeEnergy(const Kinematics<Space, S>& kinematics);
+
+}  // namespace loopbench

@@ -1,0 +1,77 @@
+#include "mechanism/library.h"
+
+#include <cmath>
+#include <numbers>
+
+namespace loopbench {
+
+BodyDescription Bar(const std::string& name, double length, double mass, double inertia) {
+  BodyDescription bar;
+  bar.name = name;
+  bar.mass = mass;
+  bar.com = {length / 2, 0.0, 0.0};
+  bar.inertia = inertia * Eigen::Matrix3d::Identity();
+  bar.points = {{"A", {0.0, 0.0, 0.0}}, {"B", {length, 0.0, 0.0}}};
+  return bar;
+}
+
+JointDescription Revolute(const std::string& name, int from, const Eigen::Vector3d& at_from, int to,
+                          const Eigen::Vector3d& at_to) {
+  JointDescription joint;
+  joint.name = name;
+  joint.type = JointType::kRevolute;
+  joint.from = {from, at_from, Eigen::Vector3d::Zero()};
+  joint.to = {to, at_to, Eigen::Vector3d::Zero()};
+  return joint;
+}
+
+MechanismDescription Chain(int num_bars) {
+  const int n = num_bars;
+  const Eigen::Vector3d tip = Eigen::Vector3d::UnitX();
+  MechanismDescription chain;
+  chain.name = "chain-" + std::to_string(n);
+  chain.gravity = {0.0, -9.81, 0.0};
+  // The bars and the ground are the sides of a regular polygon with n + 1 corners, below y = 0.
+  const double turn = 2.0 * std::numbers::pi / (n + 1);
+  for (int i = 1; i <= n; ++i) {
+    chain.bodies.push_back(Bar("bar" + std::to_string(i), 1.0, 1.0, 1.0));
+    chain.joints.push_back(Revolute("J" + std::to_string(i), i - 1, i == 1 ? 0.0 * tip : tip, i,
+                                    Eigen::Vector3d::Zero()));
+    const double angle = i == 1 ? -std::numbers::pi + turn : turn;
+    chain.initial.coordinates.push_back({i - 1, {angle}});
+  }
+  chain.joints.push_back(Revolute("J" + std::to_string(n + 1), n, tip, kGround, tip));
+  return chain;
+}
+
+MechanismDescription Ladder(int num_windows, double angle, double speed) {
+  const Eigen::Vector3d origin = Eigen::Vector3d::Zero(), tip = Eigen::Vector3d::UnitX();
+  MechanismDescription ladder;
+  ladder.name = "ladder-" + std::to_string(num_windows);
+  ladder.gravity = {0.0, -9.81, 0.0};
+  const auto add = [&](const JointDescription& joint, double q, double u) {
+    const int index = static_cast<int>(ladder.joints.size());
+    ladder.joints.push_back(joint);
+    ladder.initial.coordinates.push_back({index, {q}});
+    ladder.initial.speeds.push_back({index, {u}});
+  };
+  // bodies: crank 0, then per window a coupler and the next crank
+  for (int i = 0; i <= num_windows; ++i) {
+    const std::string number = std::to_string(i);
+    if (i > 0) {
+      ladder.bodies.push_back(Bar("coupler" + number, 1.0, 1.0, 1.0 / 12.0));
+      const int coupler = static_cast<int>(ladder.bodies.size()) - 1;
+      add(Revolute("C" + number, coupler - 1, tip, coupler, origin), -angle, -speed);
+    }
+    ladder.bodies.push_back(Bar("crank" + number, 1.0, 1.0, 1.0 / 12.0));
+    const int crank = static_cast<int>(ladder.bodies.size()) - 1;
+    add(Revolute("O" + number, kGround, Eigen::Vector3d(i, 0.0, 0.0), crank, origin), angle, speed);
+  }
+  for (int i = 1; i <= num_windows; ++i) {
+    const int coupler = 2 * i, crank = 2 * i + 1;
+    ladder.joints.push_back(Revolute("T" + std::to_string(i), coupler, tip, crank, tip));
+  }
+  return ladder;
+}
+
+}  // namespace loopbench

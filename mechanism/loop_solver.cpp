@@ -1,0 +1,158 @@
+#include "mechanism/loop_solver.h"
+
+#include <algorithm>
+#include <cmath>
+
+namespace loopbench {
+
+template <class S>
+LoopSolver<S>::LoopSolver(std::span<const int> rows) {
+  offsets_.push_back(0);
+  for (int r : rows) {
+    offsets_.push_back(offsets_.back() + r);
+    inverse_scales_.push_back(JointMatrix<S>::Identity(r, r));
+  }
+  size_ = offsets_.back();
+  scaled_.setZero(size_, size_);
+  work_.setZero(size_, size_);
+  rotated_.setIdentity(size_, size_);
+  cholesky_ = Eigen::LLT<MatrixX<S>>(size_);
+  eigen_ = Eigen::SelfAdjointEigenSolver<MatrixX<S>>(size_);
+  weights_.setOnes(size_);
+  inverse_norms_.setOnes(size_);
+  vector_.setZero(size_);
+  rank_ = size_;
+}
+
+template <class S>
+void LoopSolver<S>::SetScale(int joint, const JointMatrix<S>& free_response) {
+  JointMatrix<S>& inverse = inverse_scales_[joint];
+  const Eigen::LLT<JointMatrix<S>> K(free_response);
+  inverse.setIdentity();
+  K.matrixL().solveInPlace(inverse);
+}
+
+template <class S>
+void LoopSolver<S>::ScaleRows(Eigen::Ref<MatrixX<S>> B) const {
+  for (std::size_t j = 0; j < inverse_scales_.size(); ++j) {
+    const JointMatrix<S>& K = inverse_scales_[j];
+    // K^-1 is lower triangular: work from the last row up, in place.
+    for (Eigen::Index r = K.rows() - 1; r >= 0; --r) {
+      const Eigen::Index row = offsets_[j] + r;
+      B.row(row) *= K(r, r);
+      for (Eigen::Index c = 0; c < r; ++c) B.row(row) += K(r, c) * B.row(offsets_[j] + c);
+    }
+  }
+}
+
+template <class S>
+void LoopSolver<S>::ScaleInto(const MatrixX<S>& X) {
+  scaled_ = X;
+  ScaleRows(scaled_);
+  work_ = scaled_.transpose();
+  ScaleRows(work_);
+  scaled_ = work_;
+}
+
+template <class S>
+bool LoopSolver<S>::FactorPlain(const MatrixX<S>& X, S tolerance) {
+  form_ = Form::kPlain;
+  rank_ = size_;
+  smallest_weight_ = S(1);
+  cholesky_.compute(X);
+  // A pivot is what is left of its diagonal entry after the elimination of those before it.
+  rcond_ = S(1);
+  for (int i = 0; i < size_; ++i) {
+    const S l = cholesky_.matrixLLT()(i, i);
+    rcond_ = std::min(rcond_, l * l / X(i, i));
+  }
+  return cholesky_.info() == Eigen::Success && rcond_ > tolerance;
+}
+
+template <class S>
+bool LoopSolver<S>::FactorScaled(const MatrixX<S>& X) {
+  form_ = Form::kScaled;
+  rank_ = size_;
+  smallest_weight_ = S(1);
+  ScaleInto(X);
+  cholesky_.compute(scaled_);
+  if (cholesky_.info() != Eigen::Success) return false;
+  const S smallest = cholesky_.matrixLLT().diagonal().minCoeff();
+  rcond_ = smallest * smallest;
+  return rcond_ >= S(kSuspicious);
+}
+
+template <class S>
+void LoopSolver<S>::FactorGeometric(const MatrixX<S>& X_geometric) {
+  using std::exp;
+  form_ = Form::kGeometric;
+  ScaleInto(X_geometric);
+  eigen_.compute(scaled_);
+  const S largest = eigen_.eigenvalues()[size_ - 1];
+  const S theta = S(kTheta) * largest;
+  rank_ = 0;
+  for (int i = 0; i < size_; ++i) {
+    const S lambda = std::max(eigen_.eigenvalues()[i], S(0));
+    const S ratio = lambda / theta;
+    // expm1 keeps the weight's relative accuracy where it is small
+    weights_[i] = -std::expm1(-ratio * ratio);
+    if (weights_[i] >= S(1) / S(2)) ++rank_;
+    inverse_norms_[i] = weights_[i] < S(1e-16) ? S(0) : S(std::sqrt(weights_[i] / lambda));
+  }
+  smallest_weight_ = weights_.minCoeff();
+  rcond_ = std::max(eigen_.eigenvalues()[0], S(0)) / largest;
+}
+
+template <class S>
+void LoopSolver<S>::FactorSoftened(const MatrixX<S>& X) {
+  form_ = Form::kSoftened;
+  ScaleInto(X);
+  work_.noalias() = scaled_ * eigen_.eigenvectors();
+  rotated_.noalias() = eigen_.eigenvectors().transpose() * work_;
+  for (int i = 0; i < size_; ++i) {
+    const bool kept = weights_[i] >= S(1e-16) && rotated_(i, i) > S(0);
+    inverse_norms_[i] = kept ? S(std::sqrt(weights_[i] / rotated_(i, i))) : S(0);
+  }
+  // unit diagonal before factoring; directions left out become rows of the identity
+  for (int j = 0; j < size_; ++j) {
+    for (int i = 0; i < size_; ++i) {
+      rotated_(i, j) = i == j ? S(1) : rotated_(i, j) * inverse_norms_[i] * inverse_norms_[j];
+    }
+  }
+  cholesky_.compute(rotated_);
+}
+
+template <class S>
+void LoopSolver<S>::Apply(Eigen::Ref<MatrixX<S>> B) {
+  if (form_ != Form::kPlain) ScaleRows(B);
+  if (form_ == Form::kGeometric || form_ == Form::kSoftened) {
+    for (Eigen::Index c = 0; c < B.cols(); ++c) {
+      vector_.noalias() = eigen_.eigenvectors().transpose() * B.col(c);
+      B.col(c) = inverse_norms_.cwiseProduct(vector_);
+    }
+  }
+  if (form_ != Form::kGeometric) cholesky_.matrixL().solveInPlace(B);
+}
+
+template <class S>
+void LoopSolver<S>::ApplyTransposed(Eigen::Ref<VectorX<S>> v) {
+  if (form_ != Form::kGeometric) cholesky_.matrixU().solveInPlace(v);
+  if (form_ == Form::kGeometric || form_ == Form::kSoftened) {
+    vector_ = inverse_norms_.cwiseProduct(v);
+    v.noalias() = eigen_.eigenvectors() * vector_;
+  }
+  if (form_ == Form::kPlain) return;
+  for (std::size_t j = 0; j < inverse_scales_.size(); ++j) {
+    const JointMatrix<S>& K = inverse_scales_[j];
+    for (Eigen::Index c = 0; c < K.cols(); ++c) {
+      S sum = S(0);
+      for (Eigen::Index r = c; r < K.rows(); ++r) sum += K(r, c) * v[offsets_[j] + r];
+      v[offsets_[j] + c] = sum;
+    }
+  }
+}
+
+template class LoopSolver<double>;
+template class LoopSolver<long double>;
+
+}  // namespace loopbench

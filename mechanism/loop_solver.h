@@ -1,0 +1,91 @@
+// The one place where loop closures are solved and their rank is decided (docs/design.md D5).
+//
+// A loop closure is X phi = rhs, X = C Z C^T symmetric positive semidefinite: the response of the
+// mechanism, seen across one or several joints, to forces in those joints. X loses rank exactly
+// when a self-stress exists, at a singular position or through redundant constraints. Every solve
+// has the form X^+ = T^T T, and T is what is applied; the ways to T:
+//
+//   plain       X = L L^T, T = L^-1: the factorisation of the paper's time. Fails when a pivot is
+//               lost in round-off.
+//   scaled      joints' own scale first: X_free = K K^T, the response across each joint of its two
+//               bodies alone; K^-1 X K^-T has eigenvalues in [0, number of joints]. Cholesky of
+//               that; refused when a pivot is below kSuspicious, then:
+//   geometric   X of the same mechanism with unit masses: K_g^-1 X_g K_g^-T = U diag(lambda) U^T,
+//               weights w_i = 1 - exp(-(lambda_i / theta)^2), theta = (1e-4)^2 lambda_max. Solving
+//               with it: T = diag(sqrt(w / lambda)) U^T K_g^-1.
+//   softened    the physical X with the geometric directions: Y = U^T K_g^-1 X K_g^-T U,
+//               Y + diag(Y_ii (1 / w_i - 1)) = N L L^T N with N^2 the diagonal, and
+//               T = L^-1 N^-1 U^T K_g^-1. A degenerating direction grows soft; directions with
+//               w < 1e-16 are left out.
+//
+// So rank depends on geometry alone, while stiffness stays physical.
+#pragma once
+
+#include <Eigen/Cholesky>
+#include <Eigen/Eigenvalues>
+#include <span>
+#include <vector>
+
+#include "mechanism/space.h"
+
+namespace loopbench {
+
+/// Square matrix of one joint's rows; never on the heap.
+template <class S>
+using JointMatrix = Eigen::Matrix<S, Eigen::Dynamic, Eigen::Dynamic, Eigen::ColMajor, 6, 6>;
+
+template <class S>
+class LoopSolver {
+ public:
+  /// Scaled pivots below this send the decision to the geometry.
+  static constexpr double kSuspicious = 1e-4;
+  /// Softening threshold relative to the largest geometric eigenvalue: (1e-4)^2.
+  static constexpr double kTheta = 1e-8;
+
+  /// Joints contribute `rows[k]` rows each, in order.
+  explicit LoopSolver(std::span<const int> rows);
+
+  int size() const { return size_; }
+
+  /// The K of each joint, from its free response; `which` as used by the next factorisation.
+  void SetScale(int joint, const JointMatrix<S>& free_response);
+
+  /// Plain Cholesky. False when a pivot falls below `tolerance` times its diagonal entry.
+  bool FactorPlain(const MatrixX<S>& X, S tolerance);
+  /// Scaled Cholesky. False when suspicious; nothing can be applied then.
+  bool FactorScaled(const MatrixX<S>& X);
+  /// Eigen-decomposition of the geometric response; sets rank and weights.
+  void FactorGeometric(const MatrixX<S>& X_geometric);
+  /// After FactorGeometric with the same scale.
+  void FactorSoftened(const MatrixX<S>& X);
+
+  /// B := T B, in place.
+  void Apply(Eigen::Ref<MatrixX<S>> B);
+  /// v := T^T v, in place.
+  void ApplyTransposed(Eigen::Ref<VectorX<S>> v);
+
+  /// Directions enforced with a weight of at least one half; size() unless geometric.
+  int rank() const { return rank_; }
+  /// Smallest weight; 1 unless geometric or softened.
+  S smallest_weight() const { return smallest_weight_; }
+  /// Smallest scaled pivot, or the ratio of extreme geometric eigenvalues.
+  S rcond() const { return rcond_; }
+
+ private:
+  enum class Form { kNone, kPlain, kScaled, kGeometric, kSoftened };
+  void ScaleInto(const MatrixX<S>& X);
+  void ScaleRows(Eigen::Ref<MatrixX<S>> B) const;
+
+  int size_ = 0;
+  std::vector<int> offsets_;                    ///< first row of each joint, and size_ at the end
+  std::vector<JointMatrix<S>> inverse_scales_;  ///< K^-1 of each joint
+  Form form_ = Form::kNone;
+  MatrixX<S> scaled_, work_, rotated_;
+  Eigen::LLT<MatrixX<S>> cholesky_;
+  Eigen::SelfAdjointEigenSolver<MatrixX<S>> eigen_;
+  VectorX<S> weights_, inverse_norms_, vector_;
+  int rank_ = 0;
+  S smallest_weight_ = S(1), rcond_ = S(1);
+};
+
+}  // namespace loopbench

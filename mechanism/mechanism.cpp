@@ -1,0 +1,243 @@
+#include "mechanism/mechanism.h"
+
+#include <Eigen/LU>
+#include <algorithm>
+#include <stdexcept>
+
+namespace loopbench {
+
+namespace {
+
+template <class Space, class S>
+Linear<Space, S> ToLinear(const Eigen::Vector3d& v) {
+  return v.head<Space::kLin>().template cast<S>();
+}
+
+/// The frame at `position` turned by `rotation`, in the user's body axes.
+Pose<Planar, double> MakePose(const Eigen::Vector3d& position, const Eigen::Matrix3d& rotation,
+                              double angle, Planar) {
+  (void)rotation;
+  Pose<Planar, double> X;
+  X.SetAngle(angle);
+  X.p = position.head<2>();
+  return X;
+}
+Pose<Spatial, double> MakePose(const Eigen::Vector3d& position, const Eigen::Matrix3d& rotation,
+                               double, Spatial) {
+  return {rotation, position};
+}
+
+template <class S>
+Pose<Planar, S> Cast(const Pose<Planar, double>& X) {
+  Pose<Planar, S> Y;
+  Y.SetAngle(S(X.angle));
+  Y.p = X.p.template cast<S>();
+  return Y;
+}
+template <class S>
+Pose<Spatial, S> Cast(const Pose<Spatial, double>& X) {
+  return {X.R.template cast<S>(), X.p.template cast<S>()};
+}
+
+/// Turns z (revolute) or x (prismatic) onto the joint's axis.
+Eigen::Matrix3d Alignment(const JointDescription& joint) {
+  if (joint.axis.isZero()) return Eigen::Matrix3d::Identity();
+  const Eigen::Vector3d own =
+      joint.type == JointType::kPrismatic ? Eigen::Vector3d::UnitX() : Eigen::Vector3d::UnitZ();
+  return Eigen::Quaterniond::FromTwoVectors(own, joint.axis).toRotationMatrix();
+}
+
+template <class Space, class S>
+Pose<Space, S> SidePose(const JointSide& side, const JointDescription& joint,
+                        const Eigen::Vector3d& com) {
+  const double turn = side.rotation.norm();
+  Eigen::Matrix3d R = Alignment(joint);
+  if (turn > 0.0) R = Eigen::AngleAxisd(turn, side.rotation / turn).toRotationMatrix() * R;
+  double angle = side.rotation.z();
+  if (joint.type == JointType::kPrismatic && !joint.axis.isZero()) {
+    angle += std::atan2(joint.axis.y(), joint.axis.x());
+  }
+  return Cast<S>(MakePose(side.position - com, R, angle, Space{}));
+}
+
+template <class Space, class S>
+void SetDirections(Joint<Space, S>& joint) {
+  const JointKind<Space, S>& kind = *joint.kind;
+  joint.H_F.setZero(Space::kDim, kind.num_u);
+  joint.D_F.setZero(Space::kDim, kind.num_constraints());
+  for (int i = 0; i < kind.num_u; ++i) joint.H_F(kind.free_axes[i], i) = S(1);
+  for (int i = 0; i < kind.num_constraints(); ++i) joint.D_F(kind.constrained_axes[i], i) = S(1);
+}
+
+/// Names of the speeds of a joint with several.
+template <class Space>
+std::vector<std::string> ComponentNames() {
+  if constexpr (Space::kRot == 1) return {"angle", "x", "y"};
+  return {"wx", "wy", "wz", "x", "y", "z"};
+}
+
+}  // namespace
+
+template <class Space, class S>
+Mechanism<Space, S>::Mechanism(const MechanismDescription& description, Coordinates coordinates)
+    : name_(description.name), coordinates_(coordinates) {
+  MechanismDescription checked = description;
+  if (Space::kRot == 3) checked.space = SpaceKind::kSpatial;
+  if (const std::string error = Validate(checked); !error.empty()) {
+    throw std::invalid_argument(error);
+  }
+  if (Space::kRot == 1 && description.space == SpaceKind::kSpatial) {
+    throw std::invalid_argument(name_ + ": a spatial mechanism cannot be compiled for the plane");
+  }
+  gravity_ = ToLinear<Space, S>(description.gravity);
+  const Topology joint_topology = BuildTopology(description, Coordinates::kJoint);
+  num_loops_ = static_cast<int>(joint_topology.constraints.size());
+  for (const TreeEdge& edge : joint_topology.edges) {
+    const JointType type = edge.joint < 0 ? JointType::kFree : description.joints[edge.joint].type;
+    num_joint_speeds_ += KindOf<Space, S>(type).num_u;
+  }
+  AddBodies(description);
+  AddJoints(description, BuildTopology(description, coordinates));
+  AddForces(description);
+  AddLength();
+  NameSpeeds(description);
+}
+
+template <class Space, class S>
+void Mechanism<Space, S>::AddBodies(const MechanismDescription& description) {
+  for (const BodyDescription& body : description.bodies) {
+    body_names_.push_back(body.name);
+    Inertia<Space, S> inertia;
+    if (body_names_.size() > 1) {
+      inertia.mass = S(body.mass);
+      if constexpr (Space::kRot == 1) {
+        inertia.rotational(0, 0) = S(body.inertia(2, 2));
+        inertia.rotational_inverse(0, 0) = S(1) / inertia.rotational(0, 0);
+      } else {
+        inertia.rotational = body.inertia.template cast<S>();
+        inertia.rotational_inverse = inertia.rotational.inverse();
+      }
+    }
+    bodies_.push_back(inertia);
+  }
+}
+
+template <class Space, class S>
+void Mechanism<Space, S>::AddJoints(const MechanismDescription& description,
+                                    const Topology& topology) {
+  for (std::size_t j = 0; j < description.joints.size(); ++j) {
+    const JointDescription& user = description.joints[j];
+    Joint<Space, S> joint;
+    joint.name = user.name;
+    joint.kind = &KindOf<Space, S>(user.type);
+    joint.from = user.from.body;
+    joint.to = user.to.body;
+    joint.X_PF = SidePose<Space, S>(user.from, user, description.bodies[joint.from].com);
+    joint.X_QM = SidePose<Space, S>(user.to, user, description.bodies[joint.to].com);
+    joint.X_MQ = Inverse(joint.X_QM);
+    joint.description = static_cast<int>(j);
+    joints_.push_back(joint);
+  }
+  step_of_body_.assign(bodies_.size(), -1);
+  for (const TreeEdge& edge : topology.edges) {
+    int index = edge.joint;
+    if (index < 0) {
+      index = static_cast<int>(joints_.size());
+      Joint<Space, S> joint;
+      joint.name = body_names_[edge.child];
+      joint.kind = &KindOf<Space, S>(JointType::kFree);
+      joint.to = edge.child;
+      joints_.push_back(joint);
+    }
+    Joint<Space, S>& joint = joints_[index];
+    joint.q_offset = num_q_;
+    joint.u_offset = num_u_;
+    num_q_ += joint.kind->num_q;
+    num_u_ += joint.kind->num_u;
+    step_of_body_[edge.child] = static_cast<int>(tree_.size());
+    tree_.push_back({index, edge.parent, edge.child, joint.to == edge.child ? 1 : -1});
+  }
+  for (int index : topology.constraints) {
+    joints_[index].row = num_rows_;
+    num_rows_ += joints_[index].kind->num_constraints();
+    constraints_.push_back(index);
+  }
+  for (Joint<Space, S>& joint : joints_) SetDirections(joint);
+}
+
+template <class Space, class S>
+void Mechanism<Space, S>::AddForces(const MechanismDescription& description) {
+  for (const ForceDescription& force : description.forces) {
+    if (const auto* torque = std::get_if<JointTorque>(&force)) {
+      joint_forces_.push_back({.joint = torque->joint, .value = S(torque->value)});
+    } else if (const auto* spring = std::get_if<JointSpring>(&force)) {
+      joint_forces_.push_back(
+          {.joint = spring->joint, .stiffness = S(spring->stiffness), .rest = S(spring->rest)});
+    } else if (const auto* damper = std::get_if<JointDamper>(&force)) {
+      joint_forces_.push_back({.joint = damper->joint, .damping = S(damper->damping)});
+    } else if (const auto* point = std::get_if<PointForce>(&force)) {
+      const Eigen::Vector3d from_com = point->at - description.bodies[point->body].com;
+      body_forces_.push_back({point->body, ToLinear<Space, S>(from_com),
+                              ToLinear<Space, S>(point->force), point->in_body_axes});
+    }
+  }
+}
+
+template <class Space, class S>
+void Mechanism<Space, S>::AddLength() {
+  S sum = S(0);
+  int count = 0;
+  for (const Joint<Space, S>& joint : joints_) {
+    if (joint.description < 0) continue;
+    for (const auto& [body, p] : {std::pair{joint.from, joint.X_PF.p}, {joint.to, joint.X_QM.p}}) {
+      if (body == kGround) continue;
+      sum += p.squaredNorm();
+      ++count;
+    }
+  }
+  using std::sqrt;
+  length_ = sum > S(0) ? sqrt(sum / S(count)) : S(1);
+  Inertia<Space, S> unit;
+  unit.mass = S(1);
+  unit.rotational.setIdentity();
+  unit.rotational *= length_ * length_;
+  unit.rotational_inverse.setIdentity();
+  unit.rotational_inverse /= length_ * length_;
+  geometric_bodies_.assign(bodies_.size(), unit);
+  geometric_bodies_[kGround] = {};
+}
+
+template <class Space, class S>
+void Mechanism<Space, S>::NameSpeeds(const MechanismDescription& description) {
+  const std::vector<std::string> components = ComponentNames<Space>();
+  for (const TreeStep& step : tree_) {
+    const Joint<Space, S>& joint = joints_[step.joint];
+    for (int i = 0; i < joint.kind->num_u; ++i) {
+      speed_names_.push_back(joint.kind->num_u == 1 ? joint.name
+                                                    : joint.name + "." + components[i]);
+    }
+  }
+  for (const std::string& name : description.independent) {
+    const auto it = std::ranges::find(speed_names_, name);
+    if (it != speed_names_.end()) {
+      independent_.push_back(static_cast<int>(it - speed_names_.begin()));
+    }
+  }
+}
+
+template <class Space, class S>
+void Mechanism<Space, S>::Rates(const VectorX<S>& q, const VectorX<S>& u,
+                                Eigen::Ref<VectorX<S>> qdot) const {
+  for (const TreeStep& step : tree_) {
+    const Joint<Space, S>& joint = joints_[step.joint];
+    joint.kind->rates(q.data() + joint.q_offset, u.data() + joint.u_offset,
+                      qdot.data() + joint.q_offset);
+  }
+}
+
+template class Mechanism<Planar, double>;
+template class Mechanism<Spatial, double>;
+template class Mechanism<Planar, long double>;
+template class Mechanism<Spatial, long double>;
+
+}  // namespace loopbench

@@ -1,0 +1,128 @@
+// A mechanism compiled for one space, one scalar and one coordinate set: immutable, shared by all
+// formulations. Every frame of a body is re-expressed from the body's centre of mass.
+#pragma once
+
+#include <string>
+#include <vector>
+
+#include "mechanism/joint.h"
+#include "mechanism/topology.h"
+
+namespace loopbench {
+
+/// Mass properties about the centre of mass, in body axes.
+template <class Space, class S>
+struct Inertia {
+  using Matrix = Eigen::Matrix<S, Space::kRot, Space::kRot>;
+  S mass = S(0);
+  Matrix rotational = Matrix::Zero();
+  Matrix rotational_inverse = Matrix::Zero();
+};
+
+template <class Space, class S>
+struct Joint {
+  std::string name;
+  const JointKind<Space, S>* kind = nullptr;
+  int from = kGround, to = kGround;  ///< bodies P and Q
+  Pose<Space, S> X_PF, X_QM, X_MQ;   ///< from the centres of mass of P and Q
+  Directions<Space, S> H_F, D_F;     ///< motion map and its complement in F axes
+  int q_offset = -1, u_offset = -1;  ///< place in q and u; -1 for a constraint
+  int row = -1;                      ///< first constraint row; -1 for a tree joint
+  int description = -1;              ///< index of the user's joint, -1 for a virtual free joint
+
+  bool in_tree() const { return q_offset >= 0; }
+};
+
+/// A tree joint seen from its root side. `sign` is +1 when the child is the joint's Q, else -1.
+struct TreeStep {
+  int joint = 0;
+  int parent = kGround;
+  int child = kGround;
+  int sign = 1;
+};
+
+/// Spring, damper and constant force along the coordinate of a joint:
+/// tau = value - stiffness (q - rest) - damping u.
+template <class S>
+struct JointForce {
+  int joint = 0;
+  S value = S(0), stiffness = S(0), rest = S(0), damping = S(0);
+};
+
+template <class Space, class S>
+struct BodyForce {
+  int body = 0;
+  Linear<Space, S> at;  ///< from the centre of mass, body axes
+  Linear<Space, S> force;
+  bool in_body_axes = false;
+};
+
+template <class Space, class S>
+class Mechanism {
+ public:
+  /// Throws std::invalid_argument with the text of Validate() when the description is unusable, or
+  /// when the space cannot hold it.
+  Mechanism(const MechanismDescription& description, Coordinates coordinates);
+
+  const std::string& name() const { return name_; }
+  Coordinates coordinates() const { return coordinates_; }
+  int num_bodies() const { return static_cast<int>(bodies_.size()); }  ///< with Ground
+  int num_q() const { return num_q_; }
+  int num_u() const { return num_u_; }
+  int num_rows() const { return num_rows_; }  ///< scalar constraints of all cut joints
+  /// Independent loops of the user's graph, the same number in both coordinate sets.
+  int num_loops() const { return num_loops_; }
+  /// Speeds of the user's spanning forest: num_u() in joint coordinates.
+  int num_joint_speeds() const { return num_joint_speeds_; }
+
+  const std::vector<Inertia<Space, S>>& bodies() const { return bodies_; }
+  const std::vector<std::string>& body_names() const { return body_names_; }
+  const std::vector<Joint<Space, S>>& joints() const { return joints_; }
+  const std::vector<TreeStep>& tree() const { return tree_; }
+  const std::vector<int>& constraints() const { return constraints_; }  ///< joint indices
+  const std::vector<JointForce<S>>& joint_forces() const { return joint_forces_; }
+  const std::vector<BodyForce<Space, S>>& body_forces() const { return body_forces_; }
+  const Linear<Space, S>& gravity() const { return gravity_; }
+
+  /// Tree step that carries a body (index into tree()), -1 for Ground.
+  int step_of_body(int body) const { return step_of_body_[body]; }
+
+  /// Root mean square distance from centres of mass to joints [m]; 1 when all are zero. The radius
+  /// of gyration of the bodies that decide rank (docs/design.md D5).
+  S length() const { return length_; }
+
+  /// Mass properties with unit mass and radius of gyration length(): geometry without physics.
+  const std::vector<Inertia<Space, S>>& geometric_bodies() const { return geometric_bodies_; }
+
+  /// Names of the speeds: "<joint>" or "<joint>.<component>"; virtual joints carry the body's name.
+  const std::vector<std::string>& speed_names() const { return speed_names_; }
+  /// Indices of the user's independent speeds that exist in this coordinate set.
+  const std::vector<int>& independent() const { return independent_; }
+
+  /// qdot = N(q) u.
+  void Rates(const VectorX<S>& q, const VectorX<S>& u, Eigen::Ref<VectorX<S>> qdot) const;
+
+ private:
+  void AddBodies(const MechanismDescription& description);
+  void AddJoints(const MechanismDescription& description, const Topology& topology);
+  void AddForces(const MechanismDescription& description);
+  void AddLength();
+  void NameSpeeds(const MechanismDescription& description);
+
+  std::string name_;
+  Coordinates coordinates_;
+  int num_q_ = 0, num_u_ = 0, num_rows_ = 0, num_loops_ = 0, num_joint_speeds_ = 0;
+  std::vector<Inertia<Space, S>> bodies_, geometric_bodies_;
+  std::vector<std::string> body_names_;
+  std::vector<Joint<Space, S>> joints_;
+  std::vector<TreeStep> tree_;
+  std::vector<int> constraints_, step_of_body_;
+  std::vector<JointForce<S>> joint_forces_;
+  std::vector<BodyForce<Space, S>> body_forces_;
+  Linear<Space, S> gravity_;
+  S length_ = S(1);
+  std::vector<std::string> speed_names_;
+  std::vector<int> independent_;
+};
+
+}  // namespace loopbench

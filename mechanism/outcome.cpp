@@ -1,0 +1,27 @@
+#include "mechanism/outcome.h"
+
+namespace loopbench {
+
+std::string_view ToString(Outcome outcome) {
+  switch (outcome) {
+    case Outcome::kFinished:
+      return "finished";
+    case Outcome::kSingular:
+      return "singular";
+    case Outcome::kStepTooSmall:
+      return "step-too-small";
+    case Outcome::kNonFinite:
+      return "non-finite";
+    case Outcome::kStepLimit:
+      return "step-limit";
+    case Outcome::kTimeLimit:
+      return "time-limit";
+    case Outcome::kInconsistentStart:
+      return "inconsistent-start";
+    case Outcome::kIntegratorError:
+      return "integrator-error";
+  }
+  return "unknown";
+}
+
+}  // namespace loopbench

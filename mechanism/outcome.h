@@ -1,0 +1,23 @@
+// How an evaluation or a run ended. A numerical failure is a result with a name, not an exception.
+#pragma once
+
+#include <string_view>
+
+namespace loopbench {
+
+/// Ending of one evaluation or of one run. `kFinished` is the only success.
+enum class Outcome {
+  kFinished,           ///< reached its end
+  kSingular,           ///< a matrix that must be regular was not (as-published solvers)
+  kStepTooSmall,       ///< the error test failed too often or the step fell below round-off
+  kNonFinite,          ///< a derivative was NaN or infinite
+  kStepLimit,          ///< more steps than allowed
+  kTimeLimit,          ///< more wall time than allowed
+  kInconsistentStart,  ///< positions or speeds that satisfy the loops were not found
+  kIntegratorError,    ///< any other error return of the integrator
+};
+
+/// The name used in tables and files, e.g. "step-too-small".
+std::string_view ToString(Outcome outcome);
+
+}  // namespace loopbench

@@ -1,0 +1,58 @@
+// Equations of the spanning forest in its own coordinates, with the cut joints as constraints:
+//
+//   M(q) udot + h(q, u) = J^T lambda,      J(q) udot = gamma(q, u),      J u = 0.
+//
+// M by the composite-rigid-body method, h by one outward and one inward pass (Featherstone, Rigid
+// Body Dynamics Algorithms, ch. 5 and 6), J row by row from D^T (V_Q - V_P) at the joint's point.
+// M is dense: O(n depth) to fill, which the dense baselines pay anyway.
+#pragma once
+
+#include <span>
+#include <vector>
+
+#include "mechanism/kinematics.h"
+#include "mechanism/loop_solver.h"
+
+namespace loopbench {
+
+template <class Space, class S>
+class TreeDynamics {
+ public:
+  explicit TreeDynamics(const Mechanism<Space, S>& mechanism);
+
+  /// Mass matrix of the forest with the given body inertias (num_u x num_u, both triangles).
+  void MassMatrix(const Kinematics<Space, S>& kinematics,
+                  const std::vector<Inertia<Space, S>>& inertias, MatrixX<S>& M);
+
+  /// h: what the speeds alone cost, minus applied forces. Leaves the accelerations for udot = 0 in
+  /// place for JacobianBias().
+  void Bias(const Kinematics<Space, S>& kinematics, VectorX<S>& h);
+
+  /// J (num_rows x num_u).
+  void Jacobian(const Kinematics<Space, S>& kinematics, MatrixX<S>& J) const;
+
+  /// gamma, after Bias().
+  void JacobianBias(const Kinematics<Space, S>& kinematics, VectorX<S>& gamma) const;
+
+  /// Accelerations of the centres of mass for given udot.
+  void BodyAccelerations(const Kinematics<Space, S>& kinematics, const VectorX<S>& udot,
+                         std::span<Motion<Space, S>> A) const;
+
+ private:
+  std::vector<Motion<Space, S>> A_bias_, F_;
+  std::vector<Block<Space, S>> composite_;
+};
+
+/// D^T (A_Q - A_P - g) of one joint from the accelerations of all centres of mass: zero when the
+/// joint is satisfied at acceleration level. At most Space::kDim numbers.
+template <class Space, class S>
+Motion<Space, S> JointAcceleration(const Kinematics<Space, S>& kinematics, int joint,
+                                   std::span<const Motion<Space, S>> A);
+
+/// Response D^T (S M^-1 S^T) D of the two bodies of a joint when nothing else holds them, the scale
+/// against which the response of the assembled mechanism is judged (docs/design.md D5).
+template <class Space, class S>
+JointMatrix<S> FreeResponse(const Kinematics<Space, S>& kinematics,
+                            const std::vector<Inertia<Space, S>>& inertias, int joint);
+
+}  // namespace loopbench

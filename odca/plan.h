@@ -1,0 +1,92 @@
+// The symbolic half of O-DCA: in which order bodies are joined into assemblies (docs/design.md D4).
+//
+// The assembly tree stands over the graph of bodies and joints. Its leaves are the bodies. An inner
+// node joins two assemblies, or one assembly with itself or with Ground, through a list of joints,
+// and keeps as boundary only the bodies that a joint still to come will touch. Ground is an
+// assembly with zero response and has no handle.
+//
+// The tree is grown from below: in each round, neighbouring assemblies are paired, pairs with the
+// smallest boundary first, so a chain or ladder of n bodies gives depth O(log n) and boundaries of
+// one to four bodies, and a two-dimensional grid boundaries of O(sqrt n).
+//
+// Properties: each body is a leaf of exactly one tree, each joint with constraints is in exactly
+// one node; children come before parents; the order is depth-first, so a node's children are recent
+// in memory; the plan is a function of the graph alone. A part that floats free has its own root.
+#pragma once
+
+#include <span>
+#include <string>
+#include <vector>
+
+namespace loopbench::odca {
+
+/// One joint with constraints, for the planner. Body 0 is Ground.
+struct PlanJoint {
+  int index = 0;  ///< name of the joint for the caller
+  int from = 0, to = 0;
+  int rows = 0;  ///< constrained directions
+};
+
+/// When joints to Ground are closed.
+enum class Grounding {
+  kEager,   ///< as soon as a body is a leaf: smallest boundaries, every loop closed where it closes
+  kAtRoot,  ///< last, both ends at once, as the paper does for a loop to Ground (31-42); joints to
+            ///< Ground beyond two of one part are still closed at leaves, or the root would grow
+};
+
+/// How many joints a node may close at once.
+enum class Closing {
+  kTogether,  ///< all joints between two assemblies in one node (paper, eq. 64-72)
+  kOneByOne,  ///< the first joins, each further one is a self-join: smallest matrices
+};
+
+struct PlanOptions {
+  Grounding grounding = Grounding::kEager;
+  Closing closing = Closing::kTogether;
+};
+
+/// A body of a node's boundary: which child brings it (0 or 1), and where it stands there.
+struct Handle {
+  int body = 0;
+  int child = 0;
+  int place = 0;  ///< index into the child's kept handles
+  bool kept = false;
+};
+
+struct NodeJoint {
+  int index = 0;
+  int rows = 0;
+  int from = -1, to = -1;  ///< index into the node's handles, -1 for Ground
+};
+
+/// A join. Nodes 0 .. bodies-2 of a plan are leaves (body i+1 is node i) and have no PlanNode.
+struct PlanNode {
+  int children[2] = {-1, -1};     ///< node numbers; the second is -1 for a self-join or Ground
+  std::vector<Handle> handles;    ///< boundary of the children before the join, child 0 first
+  std::vector<int> kept;          ///< indices into handles: the boundary afterwards, in order
+  std::vector<NodeJoint> joints;  ///< closed here
+  int rows = 0;                   ///< size of X
+  bool closes_loop = false;       ///< X may lose rank: both sides reach Ground, or several joints
+};
+
+class Plan {
+ public:
+  /// `num_bodies` counts Ground.
+  Plan(int num_bodies, std::span<const PlanJoint> joints, const PlanOptions& options = {});
+
+  int num_leaves() const { return num_leaves_; }
+  int num_nodes() const { return num_leaves_ + static_cast<int>(nodes_.size()); }
+  /// Inner nodes in order of execution; node number = num_leaves() + position.
+  const std::vector<PlanNode>& nodes() const { return nodes_; }
+
+  int depth() const;         ///< longest path from a leaf to a root, in joins
+  int largest_join() const;  ///< rows of the largest X
+  int most_handles() const;  ///< largest number of bodies of any node before its join
+  int loop_joins() const;    ///< nodes that close loops
+
+ private:
+  int num_leaves_;
+  std::vector<PlanNode> nodes_;
+};
+
+}  // namespace loopbench::odca

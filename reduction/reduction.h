@@ -1,0 +1,76 @@
+// Coordinate reduction: the speeds are split into independent u_I and dependent u_D,
+//
+//   J_D u_D = -J_I u_I,        J_D udot_D = gamma - J_I udot_I,                   (1)
+//   u = B u_I,  udot = B udot_I + c,  B = [1; -J_D^-1 J_I],  c = [0; J_D^-1 gamma],  (2)
+//   (B^T M B) udot_I = -B^T (h + M c).                                            (3)
+//
+// Velocity level (the paper's): the state carries q and u_I, u_D follows from (1). Acceleration
+// level: the state carries q and all speeds, only accelerations follow from (1).
+//
+// As published: the independent set is fixed (the mechanism's, or chosen at the start) and all rows
+// of J are used; it ends as `singular` when J_D does, also where redundant constraints leave more
+// rows than dependent speeds. Automatic ("rank-revealing"): at the start the rank is taken from the
+// geometric response of loop_solver.h, dependent speeds and as many rows from QR of J with
+// pivoting; at each accepted step a partition whose conditioning has fallen below a tenth of the
+// best one's is replaced, which changes the state and restarts the integrator. The rank stays that
+// of the start. J_D is factored by LU either way. Start() and BeginStep() may allocate.
+#pragma once
+
+#include <Eigen/Cholesky>
+#include <Eigen/LU>
+
+#include "mechanism/formulation.h"
+#include "mechanism/tree_dynamics.h"
+
+namespace loopbench::reduction {
+
+template <class Space, class S>
+class Reduction final : public Formulation<Space, S> {
+ public:
+  /// An automatic set is replaced when its reciprocal condition is below this part of the best.
+  static constexpr double kReplaceBelow = 0.1;
+
+  Reduction(const Mechanism<Space, S>& mechanism, FormulationOptions options);
+
+  Outcome Start(const VectorX<S>& q, const VectorX<S>& u) override;
+
+  /// Indices into u, ascending.
+  const std::vector<int>& independent() const { return independent_; }
+
+ private:
+  int num_state_speeds() const override;
+  int state_speed(int i) const override;
+  Outcome CompleteSpeeds() override;
+  Outcome Accelerations() override;
+  bool ChangeMode() override;
+
+  /// Which speeds follow from which rows of J.
+  struct Partition {
+    std::vector<int> dependent, rows;
+    S rcond = S(1);
+  };
+
+  Outcome FactorOnce();
+  /// Rank of J at the current positions, from geometry.
+  int GeometricRank();
+  /// The best conditioned partition of that many dependent speeds.
+  Partition BestPartition(int rank) const;
+  void SetPartition(const Partition& partition);
+
+  using Base = Formulation<Space, S>;
+  using Base::diagnostics_;
+  using Base::kinematics_;
+  using Base::mechanism_;
+  using Base::u_;
+  using Base::udot_;
+
+  TreeDynamics<Space, S> dynamics_;
+  std::vector<int> independent_, dependent_, rows_;
+  long factored_version_ = -1;
+  MatrixX<S> M_, J_, J_D_, J_I_, solved_, B_, MB_, reduced_;
+  VectorX<S> h_, gamma_, c_, residual_, rows_rhs_, dependent_speeds_, independent_speeds_;
+  Eigen::PartialPivLU<MatrixX<S>> lu_;
+  Eigen::LLT<MatrixX<S>> reduced_factor_;
+};
+
+}  // namespace loopbench::reduction

@@ -1,0 +1,259 @@
+#include "tests/contract/oracle.h"
+
+#include <Eigen/Dense>
+
+namespace loopbench::testing {
+
+namespace {
+
+Real33 ValueOf(const JetMatrix& R, Real Jet::*part) {
+  Real33 A;
+  for (int i = 0; i < 3; ++i) {
+    for (int j = 0; j < 3; ++j) A(i, j) = R(i, j).*part;
+  }
+  return A;
+}
+Real3 ValueOf(const JetVector& p, Real Jet::*part) { return {p[0].*part, p[1].*part, p[2].*part}; }
+
+/// [w; v] from first derivatives, [alpha; a] from second ones: R' R^T = [w]x, R'' R^T = [alpha]x +
+/// a symmetric matrix.
+Real6 MotionOf(const JetPose& pose, Real Jet::*part) {
+  const Real33 A = ValueOf(pose.R, part) * ValueOf(pose.R, &Jet::f).transpose();
+  Real6 V;
+  V << A(2, 1) - A(1, 2), A(0, 2) - A(2, 0), A(1, 0) - A(0, 1), ValueOf(pose.p, part);
+  V.head<3>() /= 2;
+  return V;
+}
+
+Real6 AtCom(const Real6& wrench, const Real3& r) {
+  Real6 shifted = wrench;
+  shifted.head<3>() += r.cross(wrench.tail<3>());
+  return shifted;
+}
+
+}  // namespace
+
+Real33 Oracle::InertiaInGround(int body, const JetPose& pose) const {
+  Real33 I = description_.bodies[body].inertia.cast<Real>();
+  if (!layout_.spatial) {
+    // moments out of the plane are the plane's own business
+    I = Real33(Real3(1, 1, I(2, 2)).asDiagonal());
+  }
+  const Real33 R = ValueOf(pose.R, &Jet::f);
+  return R * I * R.transpose();
+}
+
+std::vector<Real6> Oracle::Applied(const std::vector<JetPose>& poses) const {
+  std::vector<Real6> F(poses.size(), Real6::Zero());
+  for (std::size_t b = 1; b < poses.size(); ++b) {
+    F[b].tail<3>() = description_.bodies[b].mass * description_.gravity.cast<Real>();
+  }
+  const auto joint_force = [&](int index, const auto& tau_of) {
+    const JointDescription& joint = description_.joints[index];
+    const bool slides = joint.type == JointType::kPrismatic;
+    const JetPose X_WF = poses[joint.from.body] * frames_[index].X_PF;
+    const JetPose X_WM = poses[joint.to.body] * frames_[index].X_QM;
+    const JetPose X_FM = JointPose(index, poses);
+    const Jet &c = X_FM.R(0, 0), &s = X_FM.R(1, 0);
+    const Real value = slides ? X_FM.p[0].f : std::atan2(s.f, c.f);
+    const Real speed = slides ? X_FM.p[0].d : (c * Jet(s.d) - s * Jet(c.d)).f;
+    Real6 H = Real6::Zero();
+    for (int i = 0; i < 3; ++i) H[slides ? 3 + i : i] = X_WF.R(i, slides ? 0 : 2).f;
+    const Real3 p = ValueOf(X_WM.p, &Jet::f);
+    const Real6 wrench = H * tau_of(value, speed);
+    F[joint.to.body] += AtCom(wrench, p - ValueOf(poses[joint.to.body].p, &Jet::f));
+    F[joint.from.body] -= AtCom(wrench, p - ValueOf(poses[joint.from.body].p, &Jet::f));
+  };
+  for (const ForceDescription& force : description_.forces) {
+    if (const auto* torque = std::get_if<JointTorque>(&force)) {
+      joint_force(torque->joint, [&](Real, Real) { return Real(torque->value); });
+    } else if (const auto* spring = std::get_if<JointSpring>(&force)) {
+      joint_force(spring->joint,
+                  [&](Real q, Real) { return Real(spring->stiffness) * (spring->rest - q); });
+    } else if (const auto* damper = std::get_if<JointDamper>(&force)) {
+      joint_force(damper->joint, [&](Real, Real u) { return -Real(damper->damping) * u; });
+    } else if (const auto* point = std::get_if<PointForce>(&force)) {
+      const Real33 R = ValueOf(poses[point->body].R, &Jet::f);
+      const Real3 f = point->force.cast<Real>();
+      const Real3 r = (point->at - description_.bodies[point->body].com).cast<Real>();
+      Real6 wrench = Real6::Zero();
+      wrench.tail<3>() = point->in_body_axes ? Real3(R * f) : f;
+      F[point->body] += AtCom(wrench, R * r);
+    }
+  }
+  return F;
+}
+
+Equations Oracle::Form(const RealVector& q, const RealVector& u) {
+  const int bodies = static_cast<int>(description_.bodies.size());
+  poses_ = PosesAlong(Curve(q, u));
+  const std::vector<Jet> along = Closures(poses_);
+  const int rows = static_cast<int>(along.size());
+  Equations e;
+  e.gamma.resize(rows);
+  for (int r = 0; r < rows; ++r) e.gamma[r] = -along[r].dd;
+  e.J.resize(rows, layout_.num_u);
+  G_.resize(6 * bodies, layout_.num_u);
+  for (int i = 0; i < layout_.num_u; ++i) {
+    const std::vector<JetPose> moved = PosesAlong(Curve(q, RealVector::Unit(layout_.num_u, i)));
+    for (int b = 0; b < bodies; ++b) G_.col(i).segment<6>(6 * b) = MotionOf(moved[b], &Jet::d);
+    const std::vector<Jet> c = Closures(moved);
+    for (int r = 0; r < rows; ++r) e.J(r, i) = c[r].d;
+  }
+  const std::vector<Real6> applied = Applied(poses_);
+  bias_.assign(bodies, Real6::Zero());
+  needed_.assign(bodies, Real6::Zero());
+  e.M.setZero(layout_.num_u, layout_.num_u);
+  e.h.setZero(layout_.num_u);
+  for (int b = 1; b < bodies; ++b) {
+    const Real33 I = InertiaInGround(b, poses_[b]);
+    const Real m = description_.bodies[b].mass;
+    const Real3 w = MotionOf(poses_[b], &Jet::d).head<3>();
+    bias_[b] = MotionOf(poses_[b], &Jet::dd);
+    needed_[b] << I * bias_[b].head<3>() + w.cross(I * w), m * bias_[b].tail<3>();
+    needed_[b] -= applied[b];
+    const auto G = G_.middleRows<6>(6 * b);
+    RealMatrix IG(6, layout_.num_u);
+    IG << I * G.topRows<3>(), m * G.bottomRows<3>();
+    e.M.noalias() += G.transpose() * IG;
+    e.h.noalias() += G.transpose() * needed_[b];
+  }
+  return e;
+}
+
+Answer Oracle::Solve(const RealVector& q, const RealVector& u) {
+  const Equations e = Form(q, u);
+  const int n = layout_.num_u, m = static_cast<int>(e.J.rows());
+  Answer answer;
+  Rank(e, answer);
+  const RealVector scale = e.M.diagonal().cwiseSqrt().cwiseInverse();
+  RealMatrix A = RealMatrix::Zero(n + m, n + m);
+  A.topLeftCorner(n, n) = scale.asDiagonal() * e.M * scale.asDiagonal();
+  A.bottomLeftCorner(m, n) = e.J * scale.asDiagonal();
+  RealVector row_scale = A.bottomLeftCorner(m, n).rowwise().norm().cwiseInverse();
+  A.bottomLeftCorner(m, n) = row_scale.asDiagonal() * A.bottomLeftCorner(m, n);
+  A.topRightCorner(n, m) = A.bottomLeftCorner(m, n).transpose();
+  RealVector rhs(n + m);
+  rhs << -(scale.cwiseProduct(e.h)), row_scale.cwiseProduct(e.gamma);
+  RealVector x;
+  if (answer.full_rank()) {
+    x = Eigen::FullPivLU<RealMatrix>(A).solve(rhs);
+  } else {
+    // The state is rounded to double: what is zero on paper is 1e-16 here.
+    Eigen::CompleteOrthogonalDecomposition<RealMatrix> decomposition;
+    decomposition.setThreshold(Real(1e-12));
+    decomposition.compute(A);
+    x = decomposition.solve(rhs);
+  }
+  answer.udot = scale.cwiseProduct(x.head(n));
+  for (std::size_t b = 0; b < poses_.size(); ++b) {
+    answer.accelerations.push_back(bias_[b] + G_.middleRows<6>(6 * b) * answer.udot);
+  }
+  JointForces(-row_scale.cwiseProduct(x.tail(m)), answer);
+  return answer;
+}
+
+void Oracle::Rank(const Equations& e, Answer& answer) const {
+  answer.rows = answer.rank = static_cast<int>(e.J.rows());
+  if (answer.rows == 0) return;
+  RealMatrix K_inverse = RealMatrix::Zero(answer.rows, answer.rows);
+  const std::vector<Row> rows = Rows(poses_);
+  for (int first = 0, last = 0; first < answer.rows; first = last) {
+    while (last < answer.rows && rows[last].joint == rows[first].joint) ++last;
+    const JointDescription& joint = description_.joints[rows[first].joint];
+    const JetPose X_WM = poses_[joint.to.body] * frames_[rows[first].joint].X_QM;
+    RealMatrix X = RealMatrix::Zero(last - first, last - first);
+    for (int body : {joint.from.body, joint.to.body}) {
+      if (body == kGround) continue;
+      RealMatrix F(6, last - first);
+      const Real3 r = ValueOf(X_WM.p, &Jet::f) - ValueOf(poses_[body].p, &Jet::f);
+      for (int i = first; i < last; ++i) F.col(i - first) = AtCom(rows[i].wrench, r);
+      RealMatrix A(6, last - first);
+      A << InertiaInGround(body, poses_[body]).inverse() * F.topRows<3>(),
+          F.bottomRows<3>() / Real(description_.bodies[body].mass);
+      X += F.transpose() * A;
+    }
+    const RealMatrix K = X.llt().matrixL();
+    K_inverse.block(first, first, last - first, last - first) = K.inverse();
+  }
+  const RealMatrix W = e.M.llt().matrixL().solve((K_inverse * e.J).transpose());
+  const RealVector lambda =
+      Eigen::SelfAdjointEigenSolver<RealMatrix>(W.transpose() * W, Eigen::EigenvaluesOnly)
+          .eigenvalues();
+  // squares of lengths: rounding the state to double leaves 1e-32, forming the product 1e-19
+  const Real zero = Real(1e-14) * lambda[answer.rows - 1];
+  int first = 0;
+  while (lambda[first] < zero) ++first;
+  answer.rank = answer.rows - first;
+  answer.rcond = static_cast<double>(lambda[first] / lambda[answer.rows - 1]);
+}
+
+/// Forces of the cut joints are the multipliers; a tree joint carries what its branch needs beyond.
+void Oracle::JointForces(const RealVector& lambda, Answer& answer) const {
+  answer.forces.assign(description_.joints.size(), Real6::Zero());
+  std::vector<Real6> needed(poses_.size(), Real6::Zero());
+  for (std::size_t b = 1; b < poses_.size(); ++b) {
+    const Real6 A = answer.accelerations[b] - bias_[b];
+    needed[b] = needed_[b];
+    needed[b].head<3>() += InertiaInGround(static_cast<int>(b), poses_[b]) * A.head<3>();
+    needed[b].tail<3>() += Real(description_.bodies[b].mass) * A.tail<3>();
+  }
+  const auto give = [&](int index, const Real6& force, Real sign) {
+    const JointDescription& joint = description_.joints[index];
+    const JetPose X_WM = poses_[joint.to.body] * frames_[index].X_QM;
+    const int body = sign > 0 ? joint.to.body : joint.from.body;
+    const Real3 r = ValueOf(X_WM.p, &Jet::f) - ValueOf(poses_[body].p, &Jet::f);
+    needed[body] -= sign * AtCom(force, r);
+  };
+  const std::vector<Row> rows = Rows(poses_);
+  for (std::size_t r = 0; r < rows.size(); ++r) {
+    answer.forces[rows[r].joint] += rows[r].wrench * lambda[r];
+  }
+  for (int index : layout_.constraints) {
+    give(index, answer.forces[index], 1);
+    give(index, answer.forces[index], -1);
+  }
+  for (auto step = layout_.steps.rbegin(); step != layout_.steps.rend(); ++step) {
+    if (step->joint < 0) continue;
+    const JointDescription& joint = description_.joints[step->joint];
+    const bool forward = joint.to.body == step->child;
+    const JetPose X_WM = poses_[joint.to.body] * frames_[step->joint].X_QM;
+    const Real3 r = ValueOf(poses_[step->child].p, &Jet::f) - ValueOf(X_WM.p, &Jet::f);
+    answer.forces[step->joint] = (forward ? 1 : -1) * AtCom(needed[step->child], r);
+    give(step->joint, answer.forces[step->joint], forward ? -1 : 1);
+  }
+}
+
+RealMatrix Oracle::Jacobian(const RealVector& q) const {
+  RealMatrix J;
+  for (int i = 0; i < layout_.num_u; ++i) {
+    const std::vector<Jet> c = Closures(PosesAlong(Curve(q, RealVector::Unit(layout_.num_u, i))));
+    if (i == 0) J.resize(static_cast<int>(c.size()), layout_.num_u);
+    for (std::size_t r = 0; r < c.size(); ++r) J(r, i) = c[r].d;
+  }
+  return J;
+}
+
+RealVector Oracle::Consistent(const RealVector& q, const RealVector& u) const {
+  const RealMatrix J = Jacobian(q);
+  if (J.rows() == 0) return u;
+  Eigen::CompleteOrthogonalDecomposition<RealMatrix> decomposition;
+  decomposition.setThreshold(Real(1e-12));
+  decomposition.compute(J);
+  return u - decomposition.solve(J * u);
+}
+
+Real Oracle::TotalEnergy(const RealVector& q, const RealVector& u) const {
+  const std::vector<JetPose> poses = PosesAlong(Curve(q, u));
+  Real energy = 0;
+  for (std::size_t b = 1; b < poses.size(); ++b) {
+    const Real6 V = MotionOf(poses[b], &Jet::d);
+    const Real m = description_.bodies[b].mass;
+    energy += V.head<3>().dot(InertiaInGround(static_cast<int>(b), poses[b]) * V.head<3>()) / 2 +
+              m * V.tail<3>().squaredNorm() / 2 -
+              m * description_.gravity.cast<Real>().dot(ValueOf(poses[b].p, &Jet::f));
+  }
+  return energy;
+}
+
+}  // namespace loopbench::testing

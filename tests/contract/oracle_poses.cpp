@@ -1,0 +1,200 @@
+// Poses and constraint functions of the oracle, along curves.
+#include "tests/contract/oracle.h"
+
+namespace loopbench::testing {
+
+namespace {
+
+Real33 Skew(const Real3& v) {
+  Real33 A;
+  A << 0, -v[2], v[1], v[2], 0, -v[0], -v[1], v[0], 0;
+  return A;
+}
+
+/// Rotation about the unit axis by an angle (Rodrigues).
+Real33 Turn(const Real3& axis, Real angle) {
+  const Real33 K = Skew(axis);
+  return Real33::Identity() + std::sin(angle) * K + (1 - std::cos(angle)) * K * K;
+}
+
+/// Shortest rotation that takes the joint's own axis to the described one.
+Real33 Alignment(const JointDescription& joint) {
+  if (joint.axis.isZero()) return Real33::Identity();
+  const bool slides = joint.type == JointType::kPrismatic;
+  const Real3 own = slides ? Real3::UnitX() : Real3::UnitZ();
+  const Real3 axis = joint.axis.cast<Real>().normalized();
+  const Real33 K = Skew(own.cross(axis));
+  return Real33::Identity() + K + K * K / (1 + own.dot(axis));
+}
+
+JetPose FramePose(const JointSide& side, const JointDescription& joint, const Real3& com) {
+  Real33 R = Alignment(joint);
+  const Real3 turn = side.rotation.cast<Real>();
+  if (turn.norm() > 0) R = Turn(turn.normalized(), turn.norm()) * R;
+  JetPose X;
+  for (int i = 0; i < 3; ++i) {
+    for (int j = 0; j < 3; ++j) X.R(i, j) = Jet(R(i, j));
+    X.p[i] = Jet(static_cast<Real>(side.position[i]) - com[i]);
+  }
+  return X;
+}
+
+JetMatrix AboutZ(const Jet& angle) {
+  JetMatrix R = JetIdentity();
+  R(0, 0) = R(1, 1) = Cos(angle);
+  R(1, 0) = Sin(angle);
+  R(0, 1) = -R(1, 0);
+  return R;
+}
+
+/// Of a quaternion of any length.
+JetMatrix FromQuaternion(const Jet* e) {
+  const Jet &w = e[0], &x = e[1], &y = e[2], &z = e[3];
+  const Jet s = Reciprocal(w * w + x * x + y * y + z * z), two(2);
+  const std::array<Jet, 9> m = {w * w + x * x - y * y - z * z, two * (x * y - w * z),
+                                two * (x * z + w * y),         two * (x * y + w * z),
+                                w * w - x * x + y * y - z * z, two * (y * z - w * x),
+                                two * (x * z - w * y),         two * (y * z + w * x),
+                                w * w - x * x - y * y + z * z};
+  JetMatrix R;
+  for (int i = 0; i < 9; ++i) R.m[i] = s * m[i];
+  return R;
+}
+
+struct Sizes {
+  int q, u;
+};
+Sizes SizesOf(JointType type, bool spatial) {
+  if (type == JointType::kWeld) return {0, 0};
+  if (type != JointType::kFree) return {1, 1};
+  return spatial ? Sizes{7, 6} : Sizes{3, 3};
+}
+
+/// Vector of a rotation matrix near the identity: half its skew part.
+JetVector SmallTurn(const JetMatrix& R) {
+  const Jet half(Real(1) / 2);
+  return {half * (R(2, 1) - R(1, 2)), half * (R(0, 2) - R(2, 0)), half * (R(1, 0) - R(0, 1))};
+}
+
+/// Mismatch of a joint and, for each number, the axis of F ([w; v]) along which it grows.
+std::vector<std::pair<int, Jet>> Mismatches(JointType type, bool spatial, const JetPose& X) {
+  std::vector<std::pair<int, Jet>> c;
+  const JetVector turn = SmallTurn(X.R);
+  if (spatial && type == JointType::kRevolute) {
+    // the tip of M's z axis moves with [wy, -wx]
+    c = {{0, -X.R(1, 2)}, {1, X.R(0, 2)}, {5, X.p[2]}};
+  } else if (spatial) {
+    c = {{0, turn[0]}, {1, turn[1]}, {2, turn[2]}, {5, X.p[2]}};
+  } else if (type != JointType::kRevolute) {
+    c = {{2, turn[2]}};
+  }
+  if (type != JointType::kPrismatic) c.push_back({3, X.p[0]});
+  c.push_back({4, X.p[1]});
+  return c;
+}
+
+}  // namespace
+
+JetPose Transform(JointType type, bool spatial, const Jet* q) {
+  JetPose X;
+  if (type == JointType::kRevolute) X.R = AboutZ(q[0]);
+  if (type == JointType::kPrismatic) X.p[0] = q[0];
+  if (type == JointType::kFree && spatial) {
+    X.R = FromQuaternion(q);
+    X.p = {q[4], q[5], q[6]};
+  } else if (type == JointType::kFree) {
+    X.R = AboutZ(q[0]);
+    X.p = {q[1], q[2], Jet(0)};
+  }
+  return X;
+}
+
+Oracle::Oracle(const MechanismDescription& description, Layout layout)
+    : description_(description), layout_(std::move(layout)) {
+  for (const JointDescription& joint : description_.joints) {
+    const auto com = [&](int body) -> Real3 {
+      return description_.bodies[body].com.cast<Real>();
+    };
+    frames_.push_back({FramePose(joint.from, joint, com(joint.from.body)),
+                       FramePose(joint.to, joint, com(joint.to.body))});
+  }
+}
+
+std::vector<Jet> Oracle::Curve(const RealVector& q, const RealVector& u) const {
+  std::vector<Jet> curve(layout_.num_q);
+  for (const Layout::Step& step : layout_.steps) {
+    const JointType type = step.joint < 0 ? JointType::kFree : description_.joints[step.joint].type;
+    const Sizes sizes = SizesOf(type, layout_.spatial);
+    const int turned = sizes.q - sizes.u;  // a quaternion has one number more than its speed
+    if (turned > 0) {
+      // e' = w e / 2 and, w being constant, e'' = -|w|^2 e / 4 (quaternion product from the left)
+      const Real *e = &q[step.q], *w = &u[step.u];
+      const Real rate[4] = {-w[0] * e[1] - w[1] * e[2] - w[2] * e[3],
+                            w[0] * e[0] + w[1] * e[3] - w[2] * e[2],
+                            w[1] * e[0] + w[2] * e[1] - w[0] * e[3],
+                            w[2] * e[0] + w[0] * e[2] - w[1] * e[1]};
+      const Real ww = w[0] * w[0] + w[1] * w[1] + w[2] * w[2];
+      for (int i = 0; i < 4; ++i) curve[step.q + i] = Jet(e[i], rate[i] / 2, -ww * e[i] / 4);
+    }
+    for (int i = turned > 0 ? 3 : 0; i < sizes.u; ++i) {
+      curve[step.q + turned + i] = Jet(q[step.q + turned + i], u[step.u + i]);
+    }
+  }
+  return curve;
+}
+
+std::vector<JetPose> Oracle::PosesAlong(const std::vector<Jet>& q) const {
+  std::vector<JetPose> poses(description_.bodies.size());
+  for (const Layout::Step& step : layout_.steps) {
+    if (step.joint < 0) {
+      poses[step.child] = Transform(JointType::kFree, layout_.spatial, &q[step.q]);
+      continue;
+    }
+    const JointDescription& joint = description_.joints[step.joint];
+    const Frames& X = frames_[step.joint];
+    const JetPose X_PQ =
+        X.X_PF * Transform(joint.type, layout_.spatial, q.data() + step.q) * Inverted(X.X_QM);
+    poses[step.child] = poses[step.parent] * (joint.to.body == step.child ? X_PQ : Inverted(X_PQ));
+  }
+  return poses;
+}
+
+std::vector<JetPose> Oracle::Poses(const RealVector& q) const {
+  return PosesAlong(Curve(q, RealVector::Zero(layout_.num_u)));
+}
+
+JetPose Oracle::JointPose(int index, const std::vector<JetPose>& poses) const {
+  const JointDescription& joint = description_.joints[index];
+  return Inverted(poses[joint.from.body] * frames_[index].X_PF) *
+         (poses[joint.to.body] * frames_[index].X_QM);
+}
+
+std::vector<Jet> Oracle::Closures(const std::vector<JetPose>& poses) const {
+  std::vector<Jet> c;
+  for (int index : layout_.constraints) {
+    const JointType type = description_.joints[index].type;
+    if (type == JointType::kFree) continue;
+    for (const auto& [axis, value] : Mismatches(type, layout_.spatial, JointPose(index, poses))) {
+      c.push_back(value);
+    }
+  }
+  return c;
+}
+
+std::vector<Oracle::Row> Oracle::Rows(const std::vector<JetPose>& poses) const {
+  std::vector<Row> rows;
+  for (int index : layout_.constraints) {
+    const JointDescription& joint = description_.joints[index];
+    if (joint.type == JointType::kFree) continue;
+    const JetPose X_WF = poses[joint.from.body] * frames_[index].X_PF;
+    for (const auto& [axis, value] :
+         Mismatches(joint.type, layout_.spatial, JointPose(index, poses))) {
+      Row row{index, Real6::Zero()};
+      for (int i = 0; i < 3; ++i) row.wrench[axis / 3 * 3 + i] = X_WF.R(i, axis % 3).f;
+      rows.push_back(row);
+    }
+  }
+  return rows;
+}
+
+}  // namespace loopbench::testing

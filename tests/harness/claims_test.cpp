@@ -1,0 +1,257 @@
+// Planted data turn each verdict, and the committed rules are readable and answer to planted data.
+#include "harness/report/claims.h"
+
+#include <gtest/gtest.h>
+
+#include <algorithm>
+#include <filesystem>
+#include <limits>
+#include <string>
+#include <vector>
+
+#include "harness/config/claims_reader.h"
+#include "harness/config/config_error.h"
+#include "harness/report/claims_report.h"
+
+namespace loopbench::harness {
+namespace {
+
+const std::filesystem::path kClaimsFile =
+    std::filesystem::path(LOOPBENCH_SOURCE_DIR) / "configs/experiments/paper/claims.json";
+
+testing::AssertionResult Contains(const std::string& text, const std::string& part) {
+  return testing::IsSubstring("part", "text", part, text);
+}
+
+Record RunOf(const std::string& mechanism, const std::string& measure, double value,
+             const std::string& outcome = "finished") {
+  Record record;
+  record.Set("mechanism", mechanism);
+  record.Set("outcome", outcome);
+  record.Set(measure, value);
+  return record;
+}
+
+Check DriftCheck(const std::string& mechanism) {
+  Check check;
+  check.label = mechanism + " scene";
+  check.select = {{"mechanism", {mechanism}}};
+  check.measure = "drift";
+  check.statistic = Statistic::kMax;
+  check.compare = Comparison::kAtMost;
+  check.threshold = 1e-12;
+  return check;
+}
+
+ClaimRule TwoScenes() {
+  ClaimRule rule;
+  rule.id = "two";
+  rule.claim = "Drift is small.";
+  rule.where = "section 4.1";
+  rule.checks = {DriftCheck("square"), DriftCheck("general")};
+  rule.wording.reproduced = "Everywhere.";
+  return rule;
+}
+
+TEST(Claims, TheVerdictTurnsWithTheData) {
+  const ClaimRule rule = TwoScenes();
+  const auto verdict = [&](double square, double general) {
+    return Evaluate(rule, std::vector<Record>{RunOf("square", "drift", square),
+                                              RunOf("general", "drift", general)})
+        .text;
+  };
+  EXPECT_EQ(verdict(1e-14, 1e-13), "reproduced. Everywhere.");
+  EXPECT_EQ(verdict(1e-6, 1e-7), "not reproduced");
+  EXPECT_EQ(verdict(1e-14, 1e-7), "only under: square scene. Not under: general scene");
+  EXPECT_EQ(Evaluate(rule, {}).text, "not measured");
+}
+
+TEST(Claims, AMissingConditionIsNeverSilentlyTrue) {
+  const ClaimRule rule = TwoScenes();
+  const ClaimResult half = Evaluate(rule, std::vector<Record>{RunOf("square", "drift", 1e-14)});
+  EXPECT_EQ(half.verdict, Verdict::kOnlyUnder);
+  EXPECT_EQ(half.text, "only under: square scene. Not measured: general scene");
+  EXPECT_TRUE(Contains(half.checks[1].reason, "no record of mechanism=general"));
+  const ClaimResult bad = Evaluate(rule, std::vector<Record>{RunOf("square", "drift", 1.0)});
+  EXPECT_EQ(bad.text, "not reproduced. Not measured: general scene");
+}
+
+TEST(Claims, AFailedRunOrAValueThatIsNotFiniteFailsTheCheck) {
+  const Check check = DriftCheck("square");
+  std::vector<Record> records = {RunOf("square", "drift", 1e-14), RunOf("square", "drift", 1e-14)};
+  EXPECT_EQ(Evaluate(check, records).state, CheckState::kHolds);
+  records[1].Set("outcome", std::string("step-too-small"));
+  CheckResult result = Evaluate(check, records);
+  EXPECT_EQ(result.state, CheckState::kFails);
+  EXPECT_EQ(result.reason, "1 of 2 runs did not finish");
+  records[1] = RunOf("square", "drift", std::numeric_limits<double>::quiet_NaN());
+  result = Evaluate(check, records);
+  EXPECT_EQ(result.state, CheckState::kFails);
+  EXPECT_EQ(result.reason, "1 of 2 values missing or not finite");
+}
+
+TEST(Claims, ARunThatFailedBeforeItsFirstMeasureStillFailsTheCheck) {
+  Record crashed;
+  crashed.Set("mechanism", std::string("square"));
+  crashed.Set("outcome", std::string("inconsistent-start"));
+  EXPECT_EQ(Evaluate(DriftCheck("square"), std::vector<Record>{crashed}).state, CheckState::kFails);
+}
+
+TEST(Claims, RecordsOfAnotherKindDoNotCount) {
+  const std::vector<Record> records = {RunOf("square", "rhs_ns_median", 100.0)};
+  EXPECT_EQ(Evaluate(DriftCheck("square"), records).state, CheckState::kNotMeasured);
+}
+
+TEST(Claims, OutcomesAreExaminedWhereTheCheckAsksForThem) {
+  Check check = DriftCheck("square");
+  check.measure = "outcome";
+  check.statistic = Statistic::kAll;
+  check.compare = Comparison::kIsNot;
+  check.word = "singular";
+  std::vector<Record> records = {RunOf("square", "drift", 1.0),
+                                 RunOf("square", "drift", 1.0, "time-limit")};
+  CheckResult result = Evaluate(check, records);
+  EXPECT_EQ(result.state, CheckState::kHolds);
+  EXPECT_EQ(result.measured, "finished (1), time-limit (1)");
+  records[0].Set("outcome", std::string("singular"));
+  EXPECT_EQ(Evaluate(check, records).state, CheckState::kFails);
+  check.statistic = Statistic::kAny;
+  EXPECT_EQ(Evaluate(check, records).state, CheckState::kHolds);
+}
+
+TEST(Claims, AnExpectedFailureHoldsForFailedRunsAndForBadNumbers) {
+  Check check = DriftCheck("square");
+  check.statistic = Statistic::kAll;
+  check.compare = Comparison::kAtLeast;
+  check.threshold = 0.1;
+  check.failed_runs_hold = true;
+  std::vector<Record> records = {RunOf("square", "drift", 0.0, "singular")};
+  EXPECT_EQ(Evaluate(check, records).state, CheckState::kHolds);
+  records.push_back(RunOf("square", "drift", 0.7));
+  EXPECT_EQ(Evaluate(check, records).state, CheckState::kHolds);
+  EXPECT_EQ(Evaluate(check, records).measured, "0.7 .. 0.7, 1 of 2 did not finish");
+  records.push_back(RunOf("square", "drift", 1e-9));
+  EXPECT_EQ(Evaluate(check, records).state, CheckState::kFails);
+}
+
+TEST(Claims, AMeanWithinItsToleranceMustAlsoBeResolved) {
+  Check check = DriftCheck("square");
+  check.statistic = Statistic::kMean;
+  check.compare = Comparison::kWithin;
+  check.threshold = 2.0;
+  check.tolerance = 0.15;
+  check.require = {{"growth_resolved", {"true"}}};
+  std::vector<Record> records = {RunOf("square", "drift", 1.8), RunOf("square", "drift", 2.1)};
+  for (Record& record : records) record.Set("growth_resolved", true);
+  CheckResult result = Evaluate(check, records);
+  EXPECT_EQ(result.state, CheckState::kHolds);
+  EXPECT_EQ(result.measured, "1.95 (1.8 .. 2.1)");
+  EXPECT_EQ(result.expected, "mean drift = 2 +- 0.15");
+  EXPECT_EQ(result.rows, 2u);
+  records[0].Set("growth_resolved", false);
+  result = Evaluate(check, records);
+  EXPECT_EQ(result.state, CheckState::kFails);
+  EXPECT_EQ(result.reason, "1 of 2 rows without growth_resolved=true");
+}
+
+TEST(Claims, ARatioComparesTwoSelections) {
+  Check check = DriftCheck("chain-1000");
+  check.relative_to = {{"mechanism", {"chain-100"}}};
+  check.threshold = 12.0;
+  std::vector<Record> records = {RunOf("chain-100", "drift", 3000.0),
+                                 RunOf("chain-1000", "drift", 33000.0)};
+  CheckResult result = Evaluate(check, records);
+  EXPECT_EQ(result.state, CheckState::kHolds);
+  EXPECT_EQ(result.measured, "11 (3.3e+04 / 3e+03)");
+  EXPECT_EQ(result.rows, 2u);
+  records[1] = RunOf("chain-1000", "drift", 3e5);
+  EXPECT_EQ(Evaluate(check, records).state, CheckState::kFails);
+  records[0] = RunOf("chain-100", "drift", 0.0);
+  EXPECT_EQ(Evaluate(check, records).state, CheckState::kFails);
+  records.erase(records.begin());
+  EXPECT_EQ(Evaluate(check, records).state, CheckState::kNotMeasured);
+}
+
+TEST(ClaimsReport, EveryCheckShowsNumbersThresholdAndRows) {
+  const std::vector<ClaimResult> results = {
+      Evaluate(TwoScenes(), std::vector<Record>{RunOf("square", "drift", 1e-14)})};
+  const std::string markdown = ClaimsMarkdown(results, {"command: loopbench run"});
+  EXPECT_TRUE(Contains(markdown, "| two | section 4.1 | Drift is small. | only under |"));
+  EXPECT_TRUE(Contains(markdown,
+                       "| square scene | holds | 1e-14 (1e-14 .. 1e-14) | max drift <= 1e-12 "
+                       "| 1 |  |"));
+  EXPECT_TRUE(Contains(markdown, "| general scene | not measured |  | max drift <= 1e-12 | 0 | "));
+  EXPECT_TRUE(Contains(markdown, "\n\ncommand: loopbench run\n"));
+  const std::string text = ClaimsText(results, {"command: loopbench run"});
+  EXPECT_TRUE(Contains(text, "verdict: only under: square scene. Not measured: general scene"));
+  EXPECT_TRUE(Contains(text, "\ncommand: loopbench run\n"));
+}
+
+TEST(ClaimsReader, MistakesAreReportedTogetherWithTheirPlaces) {
+  const std::string text = R"({"claims": [{"id": "a", "claim": "c", "where": "w", "checks": [
+    {"label": "x", "select": {"rtol": [1e-6, {}]}, "measure": "m", "statistic": "maximum",
+     "compare": "<=", "threshold": "small", "tolerance": 1},
+    {"label": "x", "select": {}, "measure": "m", "statistic": "max", "compare": "is",
+     "word": "finished", "treshold": 1}]}]})";
+  std::string message;
+  try {
+    ParseClaims(text, "rules.json");
+  } catch (const ConfigError& error) {
+    message = error.what();
+  }
+  EXPECT_TRUE(Contains(message, "rules.json: /claims/0/checks/0/select/rtol/1: found"));
+  EXPECT_TRUE(Contains(message, "/checks/0/statistic: found \"maximum\""));
+  EXPECT_TRUE(Contains(message, "/checks/0/threshold: found \"small\", expected a number"));
+  EXPECT_TRUE(Contains(message, "/checks/0/tolerance: found 1, expected no \"tolerance\""));
+  EXPECT_TRUE(Contains(message, "/checks/1/treshold: found unknown key"));
+  EXPECT_TRUE(Contains(message, "/checks/1/statistic: found \"max\", expected \"all\" or \"any\""));
+  EXPECT_TRUE(Contains(message, "/checks/1/label: found \"x\", expected each name once"));
+}
+
+TEST(ClaimsReader, TheSelectionOfARuleJoinsThatOfEveryCheck) {
+  const std::vector<ClaimRule> rules = ParseClaims(
+      R"({"claims": [{"id": "a", "claim": "c", "where": "w", "select": {"horizon": 10},
+          "checks": [{"label": "x", "select": {"rtol": [1e-6, 1e-8]}, "measure": "m",
+                      "statistic": "mean", "compare": "within", "threshold": 2, "tolerance": 0.1,
+                      "require": {"growth_resolved": true}}]}]})",
+      "rules.json");
+  ASSERT_EQ(rules.size(), 1u);
+  const Check& check = rules[0].checks[0];
+  EXPECT_EQ(check.select, (Selection{{"horizon", {"10"}}, {"rtol", {"1e-06", "1e-08"}}}));
+  EXPECT_EQ(check.require, (Selection{{"growth_resolved", {"true"}}}));
+  EXPECT_EQ(check.compare, Comparison::kWithin);
+}
+
+// A record that the check selects, with the same value everywhere.
+Record Planted(const Selection& selection, const Check& check, double value) {
+  Record record;
+  record.Set("outcome", std::string("finished"));
+  record.Set("growth_resolved", true);
+  for (const auto& [key, values] : selection) record.Set(key, values.front());
+  if (check.measure != "outcome") record.Set(check.measure, value);
+  return record;
+}
+
+TEST(PaperClaims, EachTurnsFromReproducedToNotReproducedWithPlantedData) {
+  const std::vector<ClaimRule> rules = ReadClaims(kClaimsFile);
+  EXPECT_GE(rules.size(), 9u);
+  for (const ClaimRule& rule : rules) {
+    EXPECT_EQ(Evaluate(rule, {}).verdict, Verdict::kNotMeasured) << rule.id;
+    for (const Check& check : rule.checks) {
+      const bool word = check.compare == Comparison::kIs || check.compare == Comparison::kIsNot;
+      const bool at_most = check.compare == Comparison::kAtMost;
+      const double good = check.threshold;
+      const double bad = at_most ? good * 2.0 : good * 0.5;
+      std::vector<Record> records;
+      if (!check.relative_to.empty()) records.push_back(Planted(check.relative_to, check, 1.0));
+      records.push_back(Planted(check.select, check, good));
+      EXPECT_EQ(Evaluate(check, records).state, CheckState::kHolds) << rule.id << check.label;
+      records.back() = Planted(check.select, check, bad);
+      if (word) records.back().Set("outcome", std::string("singular"));
+      EXPECT_EQ(Evaluate(check, records).state, CheckState::kFails) << rule.id << check.label;
+    }
+  }
+}
+
+}  // namespace
+}  // namespace loopbench::harness

@@ -1,0 +1,208 @@
+// What the readers of harness/config accept: the shipped files and the values they carry.
+#include <gtest/gtest.h>
+
+#include <algorithm>
+#include <cmath>
+#include <filesystem>
+#include <set>
+#include <string>
+#include <vector>
+
+#include "harness/config/experiment_reader.h"
+#include "harness/config/mechanism_reader.h"
+
+namespace loopbench::harness {
+namespace {
+
+namespace fs = std::filesystem;
+
+const fs::path kConfigs = fs::path(LOOPBENCH_SOURCE_DIR) / "configs";
+
+std::vector<fs::path> JsonFilesIn(const fs::path& folder) {
+  std::vector<fs::path> files;
+  for (const auto& entry : fs::recursive_directory_iterator(folder)) {
+    if (entry.path().extension() == ".json") files.push_back(entry.path());
+  }
+  std::sort(files.begin(), files.end());
+  return files;
+}
+
+MechanismFile Shipped(const std::string& name) {
+  return ReadMechanism(kConfigs / "mechanisms" / (name + ".json"));
+}
+
+TEST(ShippedMechanisms, AllReadAndBearTheNamesOfTheirFiles) {
+  const std::vector<fs::path> files = JsonFilesIn(kConfigs / "mechanisms");
+  EXPECT_GE(files.size(), 11u);
+  for (const fs::path& file : files) {
+    const MechanismFile mechanism = ReadMechanism(file);
+    EXPECT_EQ(mechanism.description.name, file.stem().string());
+    EXPECT_EQ(Validate(mechanism.description), "") << file;
+    EXPECT_EQ(mechanism.description.gravity, Eigen::Vector3d(0.0, -9.81, 0.0)) << file;
+  }
+}
+
+TEST(ShippedMechanisms, HoldAsManyJointsAsTheyHaveDegreesOfFreedom) {
+  for (const fs::path& file : JsonFilesIn(kConfigs / "mechanisms")) {
+    const MechanismDescription mechanism = ReadMechanism(file).description;
+    // Grueebler's count for planar revolute joints; it holds for all of these scenes.
+    const auto bodies = static_cast<int>(mechanism.bodies.size()) - 1;
+    const int freedom = 3 * bodies - 2 * static_cast<int>(mechanism.joints.size());
+    EXPECT_EQ(static_cast<int>(mechanism.initial.held.size()), freedom) << file;
+    // One name for joint coordinates and one for absolute ones.
+    EXPECT_EQ(static_cast<int>(mechanism.independent.size()), 2 * freedom) << file;
+  }
+}
+
+TEST(ShippedMechanisms, CutEachLoopOnceAtTheJointListedLast) {
+  const MechanismDescription four_bar = Shipped("four-bar").description;
+  ASSERT_EQ(four_bar.joints.size(), 4u);
+  EXPECT_TRUE(four_bar.joints[3].cut);
+  EXPECT_EQ(four_bar.joints[3].name, "OC");
+  const MechanismDescription seven_bar = Shipped("seven-bar").description;
+  ASSERT_EQ(seven_bar.joints.size(), 8u);
+  EXPECT_TRUE(seven_bar.joints[6].cut && seven_bar.joints[7].cut);
+}
+
+TEST(MechanismReader, FillsEveryFieldOfASpatialMechanism) {
+  const MechanismFile file = ParseMechanism(R"({
+    "name": "m", "comment": "all kinds", "space": "spatial", "gravity": [0, 0, -9.81],
+    "ground": {"points": {"O": [1, 2, 3]}},
+    "bodies": [
+      {"name": "a", "mass": 2, "inertia": [3, 4, 5, 0.1, 0.2, 0.3], "com": [0, 0, 1],
+       "points": {"P": [1, 0]}},
+      {"name": "b", "mass": 1, "inertia": 1}],
+    "joints": [
+      {"name": "J", "type": "prismatic", "from": {"body": "ground", "at": "O"},
+       "to": {"body": "a", "at": [0, 1, 0], "rotation": [0.1, 0, 0]}, "axis": [0, 1, 0]},
+      {"name": "F", "type": "free", "from": {"body": "a", "rotation": 0.5}, "to": {"body": "b"}}],
+    "forces": [
+      {"type": "joint_spring", "joint": "J", "stiffness": 7, "rest": 0.25},
+      {"type": "joint_damper", "joint": "J", "damping": 8},
+      {"type": "joint_torque", "joint": "J", "value": -9},
+      {"type": "point_force", "body": "a", "at": "P", "force": [0, 1, 0], "axes": "body"}],
+    "initial": {"coordinates": {"J": 0.5, "F": [1, 0, 0, 0, 1, 2, 3]},
+                "speeds": {"F": [1, 2, 3, 4, 5, 6]}, "held": ["J"]},
+    "independent": ["J", "F.wz", "a.x"]})",
+                                            "m.json");
+  const MechanismDescription& m = file.description;
+  EXPECT_EQ(m.space, SpaceKind::kSpatial);
+  ASSERT_EQ(m.bodies.size(), 3u);
+  EXPECT_EQ(m.bodies[kGround].points.at("O"), Eigen::Vector3d(1, 2, 3));
+  EXPECT_EQ(m.bodies[1].inertia(2, 1), 0.3);
+  EXPECT_EQ(m.bodies[1].com, Eigen::Vector3d(0, 0, 1));
+  EXPECT_EQ(m.bodies[2].inertia, Eigen::Matrix3d::Identity());
+  EXPECT_EQ(m.joints[0].type, JointType::kPrismatic);
+  EXPECT_EQ(m.joints[0].from.position, Eigen::Vector3d(1, 2, 3));
+  EXPECT_EQ(m.joints[0].to.rotation, Eigen::Vector3d(0.1, 0, 0));
+  EXPECT_EQ(m.joints[0].axis, Eigen::Vector3d(0, 1, 0));
+  EXPECT_EQ(m.joints[1].from.rotation, Eigen::Vector3d(0, 0, 0.5));
+  EXPECT_EQ(std::get<JointSpring>(m.forces[0]).rest, 0.25);
+  EXPECT_EQ(std::get<JointDamper>(m.forces[1]).damping, 8.0);
+  EXPECT_EQ(std::get<JointTorque>(m.forces[2]).value, -9.0);
+  EXPECT_TRUE(std::get<PointForce>(m.forces[3]).in_body_axes);
+  EXPECT_EQ(std::get<PointForce>(m.forces[3]).at, Eigen::Vector3d(1, 0, 0));
+  EXPECT_EQ(m.initial.coordinates[1].values.size(), 7u);
+  EXPECT_EQ(m.initial.speeds[0].joint, 1);
+  EXPECT_EQ(m.initial.held, std::vector<int>{0});
+  EXPECT_EQ(file.observe.length, 1.0);
+}
+
+TEST(MechanismReader, ReadsWhatObserversCompareWith) {
+  const SceneObservation toggle = Shipped("toggle").observe;
+  ASSERT_EQ(toggle.branch_invariants.size(), 2u);
+  EXPECT_EQ(toggle.branch_invariants[0], (AngleCombination{{"bar1", 1.0}, {"bar2", -1.0}}));
+  ASSERT_TRUE(toggle.closed_form.has_value());
+  EXPECT_DOUBLE_EQ(toggle.closed_form->frequency_squared, 9.81 / 2.5);
+  const SceneObservation parallelogram = Shipped("parallelogram").observe;
+  EXPECT_EQ(parallelogram.closed_form->body, "bar1");
+  EXPECT_DOUBLE_EQ(parallelogram.closed_form->frequency_squared, 2.0 * 9.81 / 3.5);
+  EXPECT_DOUBLE_EQ(parallelogram.closed_form->down_angle, -std::acos(0.0));
+  EXPECT_FALSE(Shipped("four-bar").observe.closed_form.has_value());
+}
+
+TEST(ShippedExperiments, AllReadAndExpand) {
+  int count = 0;
+  for (const fs::path& file : JsonFilesIn(kConfigs / "experiments")) {
+    if (file.stem() == "claims") continue;
+    const Experiment experiment = ReadExperiment(file);
+    EXPECT_EQ(experiment.name, file.stem().string());
+    EXPECT_FALSE(Expand(experiment).empty()) << file;
+    ++count;
+  }
+  EXPECT_GE(count, 3);
+}
+
+TEST(ShippedExperiments, PaperRunsEverySceneColumnToleranceAndHorizon) {
+  const Experiment paper = ReadExperiment(kConfigs / "experiments/paper/paper.json");
+  const std::vector<Case> cases = Expand(paper);
+  // Five scenes with two horizons and five with one; 12 columns; 4 tolerances.
+  EXPECT_EQ(paper.columns.size(), 12u);
+  EXPECT_EQ(cases.size(), (5u * 2u + 5u) * 12u * 4u);
+  const auto ensembles =
+      std::count_if(cases.begin(), cases.end(), [](const Case& one) { return one.ensemble == 16; });
+  // Long runs of five scenes; the 6 as-published columns; 3 tolerances.
+  EXPECT_EQ(ensembles, 5 * 6 * 3);
+  EXPECT_EQ(ExpandTiming(paper).size(), 10u * 12u);
+}
+
+TEST(ShippedExperiments, LevelsCrossesEveryFactorOnce) {
+  const Experiment levels = ReadExperiment(kConfigs / "experiments/paper/levels.json");
+  std::set<std::string> columns;
+  for (const Column& column : levels.columns) columns.insert(ToString(column));
+  EXPECT_EQ(columns.size(), 3u * 2u * 2u);
+  EXPECT_EQ(Expand(levels).size(), 4u * 2u * 12u);
+  EXPECT_TRUE(ExpandTiming(levels).empty());
+}
+
+TEST(Expand, KeepsTheOrderSceneHorizonColumnTolerance) {
+  const Experiment paper = ReadExperiment(kConfigs / "experiments/paper/paper.json");
+  const std::vector<Case> cases = Expand(paper);
+  EXPECT_EQ(cases[0].mechanism, "square-four-bar");
+  EXPECT_EQ(ToString(cases[0].column), "odca/acceleration/joint/as-published");
+  EXPECT_EQ(cases[1].rtol, 1e-8);
+  EXPECT_EQ(ToString(cases[4].column), "odca/acceleration/joint/rank-revealing");
+  EXPECT_EQ(cases[12 * 4].horizon, 100.0);
+  EXPECT_EQ(cases[2 * 12 * 4].scene, 1u);
+  for (const Case& one : cases) {
+    EXPECT_EQ(one.rtol, one.atol);
+    EXPECT_EQ(one.limits.wall_s, 10.0);
+    EXPECT_EQ(one.integrator, "ode45");
+  }
+}
+
+TEST(ExperimentReader, DefaultsAreTheRecommendedOnes) {
+  const Experiment experiment = ParseExperiment(R"({
+    "name": "small", "tolerances": 1e-8,
+    "scenes": [{"mechanism": "mechanisms/pendulum.json", "horizon": 10, "name": "p"}],
+    "columns": {"formulation": "odca", "enforcement": "velocity"}})",
+                                                kConfigs / "small.json");
+  ASSERT_EQ(experiment.columns.size(), 1u);
+  EXPECT_EQ(ToString(experiment.columns[0]), "odca/velocity/joint/rank-revealing");
+  EXPECT_EQ(experiment.integrator, "ode45");
+  EXPECT_EQ(experiment.series_points, 200);
+  EXPECT_EQ(experiment.scenes[0].name, "p");
+  EXPECT_EQ(experiment.timing.columns, experiment.columns);
+  EXPECT_EQ(Expand(experiment)[0].ensemble, 1);
+}
+
+TEST(EnumNames, ParseReturnsWhatToStringWrote) {
+  for (const auto value :
+       {FormulationKind::kOdca, FormulationKind::kLagrange, FormulationKind::kReduction}) {
+    EXPECT_EQ(Parse<FormulationKind>(ToString(value)), value);
+  }
+  // The names of the reader and those of mechanism/ are written in two places.
+  for (const auto value : {Coordinates::kJoint, Coordinates::kAbsolute}) {
+    EXPECT_EQ(Parse<Coordinates>(ToString(value)), value);
+  }
+  for (const auto value : {Enforcement::kAcceleration, Enforcement::kVelocity}) {
+    EXPECT_EQ(Parse<Enforcement>(ToString(value)), value);
+  }
+  for (const auto value : {SolverKind::kAsPublished, SolverKind::kRankRevealing}) {
+    EXPECT_EQ(Parse<SolverKind>(ToString(value)), value);
+  }
+  EXPECT_EQ(Parse<SolverKind>("As-Published"), std::nullopt);
+}
+
+}  // namespace
+}  // namespace loopbench::harness

@@ -1,0 +1,182 @@
+// The store keeps every value exactly, survives a crash, and names what it cannot read.
+#include <gtest/gtest.h>
+
+#include <cmath>
+#include <filesystem>
+#include <limits>
+#include <string>
+#include <thread>
+#include <vector>
+
+#include "harness/store/files.h"
+#include "harness/store/result_store.h"
+
+namespace loopbench::harness {
+namespace {
+
+testing::AssertionResult Contains(const std::string& text, const std::string& part) {
+  return testing::IsSubstring("part", "text", part, text);
+}
+
+constexpr double kNan = std::numeric_limits<double>::quiet_NaN();
+constexpr double kInf = std::numeric_limits<double>::infinity();
+
+class StoreTest : public testing::Test {
+ protected:
+  void SetUp() override {
+    folder_ =
+        std::filesystem::path(testing::TempDir()) /
+        (std::string("loopbench-") + testing::UnitTest::GetInstance()->current_test_info()->name());
+    std::filesystem::remove_all(folder_);
+  }
+  void TearDown() override { std::filesystem::remove_all(folder_); }
+
+  std::filesystem::path folder_;
+};
+
+std::string ErrorOf(const std::filesystem::path& path) {
+  try {
+    ReadRecords(path);
+  } catch (const std::runtime_error& error) {
+    return error.what();
+  }
+  return "no error";
+}
+
+Record Sample() {
+  Record record;
+  record.Set("mechanism", std::string("four-bar \"quoted\"\n\xc3\xa9"));
+  record.Set("rtol", 1e-6);
+  record.Set("third", 1.0 / 3.0);
+  record.Set("whole", 2.0);
+  record.Set("tiny", std::numeric_limits<double>::denorm_min());
+  record.Set("minus_zero", -0.0);
+  record.Set("steps", std::int64_t{9007199254740993});
+  record.Set("growth_resolved", true);
+  record.Set("branch_error_max", std::monostate{});
+  record.Set("series.t", std::vector<double>{0.0, 0.1, 1e-300});
+  record.Set("series.empty", std::vector<double>{});
+  return record;
+}
+
+TEST_F(StoreTest, EveryValueComesBackWithItsTypeOrderAndBits) {
+  {
+    ResultStore store(folder_);
+    store.Append(Sample());
+    store.Append(Record{});
+  }
+  const std::vector<Record> records = ReadRecords(folder_);
+  ASSERT_EQ(records.size(), 2u);
+  EXPECT_EQ(records[0], Sample());
+  EXPECT_TRUE(std::signbit(records[0].Number("minus_zero")));
+  EXPECT_EQ(records[1], Record{});
+}
+
+TEST(RecordJson, NonFiniteNumbersBecomeNull) {
+  Record record;
+  record.Set("drift", kNan);
+  record.Set("energy", -kInf);
+  record.Set("series.drift", std::vector<double>{1.0, kNan, kInf});
+  const std::string line = ToJsonLine(record);
+  EXPECT_EQ(line, R"({"drift":null,"energy":null,"series.drift":[1.0,null,null]})");
+  const Record back = FromJsonLine(line);
+  EXPECT_TRUE(std::holds_alternative<std::monostate>(*back.Find("drift")));
+  EXPECT_EQ(back.Numbers("series.drift")[0], 1.0);
+  EXPECT_TRUE(std::isnan(back.Numbers("series.drift")[1]));
+  EXPECT_TRUE(std::isnan(back.Numbers("series.drift")[2]));
+}
+
+TEST(RecordJson, WhatIsNotAFlatObjectIsRefusedByName) {
+  const auto message = [](std::string_view line) -> std::string {
+    try {
+      FromJsonLine(line);
+    } catch (const std::runtime_error& error) {
+      return error.what();
+    }
+    return "accepted";
+  };
+  EXPECT_TRUE(Contains(message("[1]"), "expected a JSON object, found array"));
+  EXPECT_TRUE(Contains(message(R"({"a":{"b":1}})"), "key 'a'"));
+  EXPECT_TRUE(Contains(message(R"({"a":["x"]})"), "expected an array of numbers, found \"x\""));
+  EXPECT_TRUE(Contains(message(R"({"a":18446744073709551615})"), "below 2^63"));
+}
+
+TEST(RecordJson, CaseIdDependsOnValuesAndNotOnTheOrderOfKeys) {
+  Record a;
+  a.Set("mechanism", std::string("four-bar"));
+  a.Set("rtol", 1e-6);
+  Record b;
+  b.Set("rtol", 1e-6);
+  b.Set("mechanism", std::string("four-bar"));
+  EXPECT_EQ(CaseId(a), CaseId(b));
+  b.Set("rtol", 1e-8);
+  EXPECT_NE(CaseId(a), CaseId(b));
+  // FNV-1a of "{}", so that identifiers stay the same from one version to the next.
+  EXPECT_EQ(CaseId(Record{}), "08f44b07b5901a25");
+}
+
+TEST_F(StoreTest, ABadLineIsAnErrorWithFileLineAndText) {
+  const auto file = folder_ / "broken.jsonl";
+  WriteFileAtomically(file, "{\"a\":1}\n{\"a\":oops}\n{\"a\":3}\n");
+  EXPECT_TRUE(Contains(ErrorOf(file), "broken.jsonl:2:"));
+  EXPECT_TRUE(Contains(ErrorOf(file), "{\"a\":oops}"));
+  EXPECT_TRUE(Contains(ErrorOf(folder_ / "absent.jsonl"), "No such file"));
+}
+
+TEST_F(StoreTest, ATornLastLineIsSkippedWithAWarningAndRemovedBeforeTheNextAppend) {
+  const auto file = folder_ / "torn.jsonl";
+  WriteFileAtomically(file, "{\"a\":1}\n{\"a\":2,\"b\":[1.0,");
+  std::vector<std::string> warnings;
+  EXPECT_EQ(ReadRecords(file, &warnings).size(), 1u);
+  ASSERT_EQ(warnings.size(), 1u);
+  EXPECT_TRUE(Contains(warnings[0], "torn.jsonl:2:"));
+
+  Record next;
+  next.Set("a", std::int64_t{3});
+  ResultStore(file).Append(next);
+  EXPECT_EQ(ReadFile(file), "{\"a\":1}\n{\"a\":3}\n");
+}
+
+TEST_F(StoreTest, ACompleteLastLineWithoutLineEndIsKept) {
+  const auto file = folder_ / "complete.jsonl";
+  WriteFileAtomically(file, "{\"a\":1}");
+  EXPECT_EQ(ReadRecords(file).size(), 1u);
+  ResultStore(file).Append(Record{});
+  EXPECT_EQ(ReadFile(file), "{\"a\":1}\n{}\n");
+}
+
+TEST_F(StoreTest, LinesOfSeveralThreadsDoNotMix) {
+  constexpr int kThreads = 4;
+  constexpr int kLines = 50;
+  Record record = Sample();
+  record.Set("series.long", std::vector<double>(500, 1.0 / 7.0));
+  ResultStore store(folder_);
+  {
+    std::vector<std::jthread> threads;
+    for (int i = 0; i < kThreads; ++i) {
+      threads.emplace_back([&] {
+        for (int line = 0; line < kLines; ++line) store.Append(record);
+      });
+    }
+  }
+  const std::vector<Record> records = ReadRecords(store.file());
+  ASSERT_EQ(records.size(), std::size_t{kThreads * kLines});
+  for (const Record& read : records) EXPECT_EQ(read, record);
+}
+
+TEST_F(StoreTest, AFileIsReplacedInOnePieceAndNoTemporaryStays) {
+  const auto file = folder_ / "deep" / "table.csv";
+  WriteFileAtomically(file, "old");
+  WriteFileAtomically(file, "new");
+  EXPECT_EQ(ReadFile(file), "new");
+  int files = 0;
+  for ([[maybe_unused]] const auto& entry :
+       std::filesystem::directory_iterator(file.parent_path())) {
+    ++files;
+  }
+  EXPECT_EQ(files, 1);
+  EXPECT_THROW(WriteFileAtomically("/proc/none/file", "x"), std::runtime_error);
+}
+
+}  // namespace
+}  // namespace loopbench::harness

@@ -1,0 +1,181 @@
+// Tables look as written here, character by character.
+#include "harness/report/table.h"
+
+#include <gtest/gtest.h>
+
+#include <algorithm>
+#include <limits>
+#include <string>
+#include <vector>
+
+#include "harness/config/config_error.h"
+#include "harness/report/columns.h"
+#include "harness/report/select.h"
+
+namespace loopbench::harness {
+namespace {
+
+constexpr double kNan = std::numeric_limits<double>::quiet_NaN();
+
+Record Row(const std::string& mechanism, const std::string& formulation, double rtol) {
+  Record record;
+  record.Set("mechanism", mechanism);
+  record.Set("formulation", formulation);
+  record.Set("coordinates", std::string("joint"));
+  record.Set("solver", std::string("as-published"));
+  record.Set("rtol", rtol);
+  record.Set("horizon", 10.0);
+  record.Set("outcome", std::string("finished"));
+  return record;
+}
+
+Table SmallTable() {
+  Table table;
+  table.title = "Drift";
+  table.columns = {{"mechanism", "mechanism", Format::kText, {}},
+                   {"outcome", "outcome", Format::kText, {{"finished", "ok"}}},
+                   {"drift", "drift [m]", Format::kScientific, {}},
+                   {"slope", "slope", Format::kExponent, {}},
+                   {"steps", "steps", Format::kInteger, {}}};
+  Record done = Row("four-bar", "odca", 1e-6);
+  done.Set("drift", 2.0 / 975.0);
+  done.Set("slope", 1.97);
+  done.Set("steps", std::int64_t{412});
+  Record failed = Row("a|b, \"\xc3\xa9\"", "odca", 1e-6);
+  failed.Set("outcome", std::string("singular"));
+  failed.Set("drift", kNan);
+  failed.Set("slope", std::monostate{});
+  table.rows = {done, failed};
+  table.notes = {"commit 1234"};
+  return table;
+}
+
+TEST(Table, TextIsAlignedWithNumbersOnTheRight) {
+  EXPECT_EQ(ToText(SmallTable()),
+            "Drift\n"
+            "\n"
+            "mechanism  outcome   drift [m]  slope  steps\n"
+            "---------  --------  ---------  -----  -----\n"
+            "four-bar   ok         2.05e-03   1.97    412\n"
+            "a|b, \"\xc3\xa9\"   singular\n"
+            "\n"
+            "commit 1234\n");
+}
+
+TEST(Table, CsvQuotesWhereNecessaryAndKeepsEveryDigit) {
+  EXPECT_EQ(ToCsv(SmallTable()),
+            "mechanism,outcome,drift,slope,steps\n"
+            "four-bar,finished,0.0020512820512820513,1.97,412\n"
+            "\"a|b, \"\"\xc3\xa9\"\"\",singular,,,\n");
+}
+
+TEST(Table, MarkdownEscapesBarsAndAlignsNumbers) {
+  EXPECT_EQ(ToMarkdown(SmallTable()),
+            "## Drift\n"
+            "\n"
+            "| mechanism | outcome | drift [m] | slope | steps |\n"
+            "| --- | --- | ---: | ---: | ---: |\n"
+            "| four-bar | ok | 2.05e-03 | 1.97 | 412 |\n"
+            "| a\\|b, \"\xc3\xa9\" | singular |  |  |  |\n"
+            "\n"
+            "commit 1234\n");
+}
+
+TEST(Table, EachFormatPrintsItsDigits) {
+  Record row;
+  row.Set("x", 1234.5678);
+  const auto print = [&](Format format) { return Cell(row, {"x", "x", format, {}}); };
+  EXPECT_EQ(print(Format::kInteger), "1235");
+  EXPECT_EQ(print(Format::kShortest), "1234.5678");
+  EXPECT_EQ(print(Format::kScientific), "1.23e+03");
+  EXPECT_EQ(print(Format::kExponent), "1234.57");
+  EXPECT_EQ(print(Format::kFixed), "1234.6");
+  EXPECT_EQ(print(Format::kSeconds), "1235");
+  row.Set("x", std::vector<double>{0.5, 1e-9});
+  EXPECT_EQ(print(Format::kText), "0.5;1e-09");
+}
+
+std::string Keys(const std::vector<Column>& columns) {
+  std::string keys;
+  for (const Column& column : columns) keys += column.key + " ";
+  return keys;
+}
+
+TEST(Columns, DriftTableHasThePublishedOrder) {
+  EXPECT_EQ(Keys(DriftColumns()),
+            "experiment mechanism formulation enforcement coordinates solver integrator rtol atol "
+            "horizon outcome t_reached drift_position_max drift_rotation_max drift_velocity_max "
+            "drift_acceleration_max joint_mismatch_max correction_max worst_loop energy_error_max "
+            "growth_exponent growth_spread growth_regime growth_resolved ensemble steps rejected "
+            "rhs_evaluations rank_min rcond_min state_hash restarts branch_error_max "
+            "closed_form_error_max message ");
+}
+
+TEST(Columns, TimingTableStartsWithTheSameKeys) {
+  EXPECT_EQ(Keys(TimingColumns()),
+            "experiment mechanism formulation enforcement coordinates solver integrator rtol atol "
+            "horizon outcome t_reached bodies joints loops dof rhs_ns_median rhs_ns_p10 rhs_ns_p90 "
+            "ns_per_body step_us_median wall_s_median realtime_factor repeats ");
+}
+
+TEST(Columns, CompactTablesFitAHundredCharacters) {
+  Record row = Row("general-seven-bar", "reduction", 1e-6);
+  row.Set("enforcement", std::string("acceleration"));
+  row.Set("coordinates", std::string("absolute"));
+  row.Set("outcome", std::string("step-too-small"));
+  for (const char* key : {"drift_position_max", "energy_error_max", "rhs_ns_median"}) {
+    row.Set(key, 123456.7);
+  }
+  for (const std::vector<Column>& columns : {CompactDriftColumns(), CompactTimingColumns()}) {
+    const std::string text = ToText(Table{"", columns, {row}, {}});
+    EXPECT_LE(text.find('\n'), 100u) << text;
+  }
+}
+
+TEST(Select, NumbersCompareAsNumbersAndTextAsText) {
+  const Record row = Row("four-bar", "odca", 1e-6);
+  EXPECT_TRUE(Matches(row, {ParseCondition("rtol=1e-6")}));
+  EXPECT_TRUE(Matches(row, {ParseCondition("rtol=0.000001"), ParseCondition("horizon=10")}));
+  EXPECT_TRUE(Matches(row, {ParseCondition("formulation=lagrange,odca")}));
+  EXPECT_FALSE(Matches(row, {ParseCondition("formulation=lagrange"), ParseCondition("rtol=1e-6")}));
+  EXPECT_FALSE(Matches(row, {ParseCondition("absent=1")}));
+  EXPECT_TRUE(Matches(row, {}));
+  EXPECT_EQ(ToText(Selection{ParseCondition("rtol=1e-6,1e-8"), ParseCondition("horizon=10")}),
+            "rtol=1e-6,1e-8 horizon=10");
+}
+
+TEST(Select, AFilterWithoutKeyOrValueIsRefused) {
+  for (const char* text : {"rtol", "=1", "rtol="}) {
+    EXPECT_THROW(ParseCondition(text), ConfigError) << text;
+  }
+}
+
+TEST(Select, FilterKeepsOrder) {
+  const std::vector<Record> rows = {Row("a", "odca", 1e-8), Row("b", "odca", 1e-8),
+                                    Row("a", "odca", 1e-6)};
+  const std::vector<Record> chosen = Filter(rows, {ParseCondition("mechanism=a")});
+  EXPECT_EQ(chosen, (std::vector<Record>{rows[0], rows[2]}));
+}
+
+TEST(Select, RowsAreSortedByMechanismHorizonFormulationAndFallingTolerance) {
+  Record longer = Row("four-bar", "lagrange", 1e-6);
+  longer.Set("horizon", 100.0);
+  Record unknown = Row("four-bar", "odca", kNan);
+  const std::vector<Record> sorted = {Row("four-bar", "lagrange", 1e-6),
+                                      Row("four-bar", "odca", 1e-6),
+                                      Row("four-bar", "odca", 1e-12),
+                                      unknown,
+                                      longer,
+                                      Row("toggle", "lagrange", 1e-6)};
+  std::vector<Record> rows(sorted.rbegin(), sorted.rend());
+  SortRows(&rows);
+  ASSERT_EQ(rows.size(), sorted.size());
+  for (std::size_t i = 0; i < rows.size(); ++i) {
+    EXPECT_EQ(rows[i].Text("mechanism") + rows[i].Text("formulation") + rows[i].Text("rtol"),
+              sorted[i].Text("mechanism") + sorted[i].Text("formulation") + sorted[i].Text("rtol"))
+        << i;
+  }
+}
+
+}  // namespace
+}  // namespace loopbench::harness

@@ -11,8 +11,8 @@
 namespace loopbench::harness {
 
 /// A value of a record. `monostate` is "not measured"; it prints as an empty cell, never as zero.
-using Value = std::variant<std::monostate, bool, std::int64_t, double, std::string,
-                           std::vector<double>>;
+using Value =
+    std::variant<std::monostate, bool, std::int64_t, double, std::string, std::vector<double>>;
 
 /// Ordered (key, value) pairs. Keys are the column names of docs/design.md section 6, with dots for
 /// nested values such as "series.t". Order of first insertion is the order of writing.

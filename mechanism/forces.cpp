@@ -1,3 +1,4 @@
+#include "mechanism/instantiate.h"
 #include "mechanism/kinematics.h"
 
 namespace loopbench {
@@ -70,10 +71,7 @@ Energy<S> ComputeEnergy(const Kinematics<Space, S>& kinematics) {
 #define LOOPBENCH_INSTANTIATE(Space, S)                                                  \
   template void AppliedForces(const Kinematics<Space, S>&, std::span<Motion<Space, S>>); \
   template Energy<S> ComputeEnergy(const Kinematics<Space, S>&);
-LOOPBENCH_INSTANTIATE(Planar, double)
-LOOPBENCH_INSTANTIATE(Spatial, double)
-LOOPBENCH_INSTANTIATE(Planar, long double)
-LOOPBENCH_INSTANTIATE(Spatial, long double)
+LOOPBENCH_FOR_EACH_SPACE_AND_SCALAR(LOOPBENCH_INSTANTIATE)
 #undef LOOPBENCH_INSTANTIATE
 
 }  // namespace loopbench

@@ -1,5 +1,7 @@
 #include "mechanism/formulation.h"
 
+#include "mechanism/instantiate.h"
+
 namespace loopbench {
 
 std::string_view ToString(Enforcement enforcement) {
@@ -92,9 +94,8 @@ int Formulation<Space, S>::LoopRank(int dependent_rows) const {
   return mechanism_.num_rows() - user_tree_rows - dependent_rows;
 }
 
-template class Formulation<Planar, double>;
-template class Formulation<Spatial, double>;
-template class Formulation<Planar, long double>;
-template class Formulation<Spatial, long double>;
+#define LOOPBENCH_INSTANTIATE(Space, S) template class Formulation<Space, S>;
+LOOPBENCH_FOR_EACH_SPACE_AND_SCALAR(LOOPBENCH_INSTANTIATE)
+#undef LOOPBENCH_INSTANTIATE
 
 }  // namespace loopbench

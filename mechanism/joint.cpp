@@ -2,6 +2,9 @@
 
 #include <cmath>
 #include <numbers>
+#include <type_traits>
+
+#include "mechanism/instantiate.h"
 
 namespace loopbench {
 
@@ -177,30 +180,14 @@ struct SpatialKinds {
   }
 };
 
-template <class Kinds, class Kind>
-const Kind& Lookup(JointType type) {
-  static const Kind kKinds[] = {Kinds::Revolute(), Kinds::Prismatic(), Kinds::Weld(),
-                                Kinds::Free()};
-  return kKinds[static_cast<int>(type)];
-}
-
 }  // namespace
 
-template <>
-const JointKind<Planar, double>& KindOf(JointType type) {
-  return Lookup<PlanarKinds<double>, JointKind<Planar, double>>(type);
-}
-template <>
-const JointKind<Planar, long double>& KindOf(JointType type) {
-  return Lookup<PlanarKinds<long double>, JointKind<Planar, long double>>(type);
-}
-template <>
-const JointKind<Spatial, double>& KindOf(JointType type) {
-  return Lookup<SpatialKinds<double>, JointKind<Spatial, double>>(type);
-}
-template <>
-const JointKind<Spatial, long double>& KindOf(JointType type) {
-  return Lookup<SpatialKinds<long double>, JointKind<Spatial, long double>>(type);
+template <class Space, class S>
+const JointKind<Space, S>& KindOf(JointType type) {
+  using Kinds = std::conditional_t<Space::kRot == 1, PlanarKinds<S>, SpatialKinds<S>>;
+  static const JointKind<Space, S> kKinds[] = {Kinds::Revolute(), Kinds::Prismatic(), Kinds::Weld(),
+                                               Kinds::Free()};
+  return kKinds[static_cast<int>(type)];
 }
 
 template <class Space, class S>
@@ -219,13 +206,10 @@ Motion<Space, S> Mismatch(const JointKind<Space, S>& kind, const Pose<Space, S>&
   return mismatch;
 }
 
-template Motion<Planar, double> Mismatch(const JointKind<Planar, double>&,
-                                         const Pose<Planar, double>&);
-template Motion<Spatial, double> Mismatch(const JointKind<Spatial, double>&,
-                                          const Pose<Spatial, double>&);
-template Motion<Planar, long double> Mismatch(const JointKind<Planar, long double>&,
-                                              const Pose<Planar, long double>&);
-template Motion<Spatial, long double> Mismatch(const JointKind<Spatial, long double>&,
-                                               const Pose<Spatial, long double>&);
+#define LOOPBENCH_INSTANTIATE(Space, S)                  \
+  template const JointKind<Space, S>& KindOf(JointType); \
+  template Motion<Space, S> Mismatch(const JointKind<Space, S>&, const Pose<Space, S>&);
+LOOPBENCH_FOR_EACH_SPACE_AND_SCALAR(LOOPBENCH_INSTANTIATE)
+#undef LOOPBENCH_INSTANTIATE
 
 }  // namespace loopbench

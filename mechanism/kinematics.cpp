@@ -3,6 +3,8 @@
 #include <cmath>
 #include <numbers>
 
+#include "mechanism/instantiate.h"
+
 namespace loopbench {
 
 namespace {
@@ -229,9 +231,8 @@ VectorX<S> Kinematics<Space, S>::SpeedsIn(const Kinematics& other) const {
   return u;
 }
 
-template class Kinematics<Planar, double>;
-template class Kinematics<Spatial, double>;
-template class Kinematics<Planar, long double>;
-template class Kinematics<Spatial, long double>;
+#define LOOPBENCH_INSTANTIATE(Space, S) template class Kinematics<Space, S>;
+LOOPBENCH_FOR_EACH_SPACE_AND_SCALAR(LOOPBENCH_INSTANTIATE)
+#undef LOOPBENCH_INSTANTIATE
 
 }  // namespace loopbench

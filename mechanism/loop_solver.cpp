@@ -3,6 +3,8 @@
 #include <algorithm>
 #include <cmath>
 
+#include "mechanism/instantiate.h"
+
 namespace loopbench {
 
 template <class S>
@@ -152,7 +154,8 @@ void LoopSolver<S>::ApplyTransposed(Eigen::Ref<VectorX<S>> v) {
   }
 }
 
-template class LoopSolver<double>;
-template class LoopSolver<long double>;
+#define LOOPBENCH_INSTANTIATE(S) template class LoopSolver<S>;
+LOOPBENCH_FOR_EACH_SCALAR(LOOPBENCH_INSTANTIATE)
+#undef LOOPBENCH_INSTANTIATE
 
 }  // namespace loopbench

@@ -4,6 +4,8 @@
 #include <algorithm>
 #include <stdexcept>
 
+#include "mechanism/instantiate.h"
+
 namespace loopbench {
 
 namespace {
@@ -235,9 +237,8 @@ void Mechanism<Space, S>::Rates(const VectorX<S>& q, const VectorX<S>& u,
   }
 }
 
-template class Mechanism<Planar, double>;
-template class Mechanism<Spatial, double>;
-template class Mechanism<Planar, long double>;
-template class Mechanism<Spatial, long double>;
+#define LOOPBENCH_INSTANTIATE(Space, S) template class Mechanism<Space, S>;
+LOOPBENCH_FOR_EACH_SPACE_AND_SCALAR(LOOPBENCH_INSTANTIATE)
+#undef LOOPBENCH_INSTANTIATE
 
 }  // namespace loopbench

@@ -1,5 +1,7 @@
 #include "mechanism/tree_dynamics.h"
 
+#include "mechanism/instantiate.h"
+
 namespace loopbench {
 
 namespace {
@@ -214,10 +216,7 @@ JointMatrix<S> FreeResponse(const Kinematics<Space, S>& kinematics,
                                               std::span<const Motion<Space, S>>); \
   template JointMatrix<S> FreeResponse(const Kinematics<Space, S>&,               \
                                        const std::vector<Inertia<Space, S>>&, int);
-LOOPBENCH_INSTANTIATE(Planar, double)
-LOOPBENCH_INSTANTIATE(Spatial, double)
-LOOPBENCH_INSTANTIATE(Planar, long double)
-LOOPBENCH_INSTANTIATE(Spatial, long double)
+LOOPBENCH_FOR_EACH_SPACE_AND_SCALAR(LOOPBENCH_INSTANTIATE)
 #undef LOOPBENCH_INSTANTIATE
 
 }  // namespace loopbench

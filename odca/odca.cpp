@@ -1,5 +1,7 @@
 #include "odca/odca.h"
 
+#include "mechanism/instantiate.h"
+
 namespace loopbench::odca {
 
 namespace {
@@ -117,17 +119,13 @@ Motion<Space, S> Odca<Space, S>::JointForce(int joint) const {
   return force;
 }
 
-template class Odca<Planar, double>;
-template class Odca<Spatial, double>;
-template class Odca<Planar, long double>;
-template class Odca<Spatial, long double>;
+#define LOOPBENCH_INSTANTIATE(Space, S) template class Odca<Space, S>;
+LOOPBENCH_FOR_EACH_SPACE_AND_SCALAR(LOOPBENCH_INSTANTIATE)
+#undef LOOPBENCH_INSTANTIATE
 
 #define LOOPBENCH_INSTANTIATE(Space, S) \
   template Plan MakePlan(const Mechanism<Space, S>&, const PlanOptions&);
-LOOPBENCH_INSTANTIATE(Planar, double)
-LOOPBENCH_INSTANTIATE(Spatial, double)
-LOOPBENCH_INSTANTIATE(Planar, long double)
-LOOPBENCH_INSTANTIATE(Spatial, long double)
+LOOPBENCH_FOR_EACH_SPACE_AND_SCALAR(LOOPBENCH_INSTANTIATE)
 #undef LOOPBENCH_INSTANTIATE
 
 }  // namespace loopbench::odca

@@ -4,6 +4,7 @@
 #include <cmath>
 #include <limits>
 
+#include "mechanism/instantiate.h"
 #include "mechanism/tree_dynamics.h"
 
 namespace loopbench::odca {
@@ -391,9 +392,8 @@ void Sweep<Space, S>::Down(const PlanNode& node, int n) {
   operations_ += node.rows * (2 * Space::kDim + Space::kDim * place.kept + node.rows / 2);
 }
 
-template class Sweep<Planar, double>;
-template class Sweep<Spatial, double>;
-template class Sweep<Planar, long double>;
-template class Sweep<Spatial, long double>;
+#define LOOPBENCH_INSTANTIATE(Space, S) template class Sweep<Space, S>;
+LOOPBENCH_FOR_EACH_SPACE_AND_SCALAR(LOOPBENCH_INSTANTIATE)
+#undef LOOPBENCH_INSTANTIATE
 
 }  // namespace loopbench::odca

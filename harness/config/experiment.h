@@ -91,12 +91,20 @@ struct Limits {
   std::int64_t steps = 1'000'000;  ///< attempted steps: far more than any case that ends needs
 };
 
+/// A family of mechanisms of growing size (mechanism/library.h), timed per right-hand side only.
+struct TimingFamily {
+  std::string family;      ///< "chain" or "ladder"
+  std::vector<int> sizes;  ///< bars of a chain, windows of a ladder
+  std::vector<Column> columns;
+};
+
 /// Timing runs, separate from those that measure accuracy.
 struct Timing {
   int repeats = 5;              ///< 0 switches timing off; 5 make a median with a spread
   double tolerance = 1e-8;      ///< rtol = atol
   double horizon = 0.0;         ///< [s]; 0: the shortest of each scene
   std::vector<Column> columns;  ///< those of the experiment unless given
+  std::vector<TimingFamily> families;
 };
 
 struct Experiment {

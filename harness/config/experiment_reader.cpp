@@ -17,9 +17,33 @@ void ReadLimits(const JsonNode& root, Limits* limits) {
   }
 }
 
+TimingFamily ReadFamily(const JsonNode& node) {
+  static const std::vector<std::string> kFamilies = {"chain", "ladder"};
+  constexpr int kLargest = 1'000'000;
+  TimingFamily family;
+  if (!node.ExpectObject({"family", "sizes", "columns"})) return family;
+  if (const auto name = node.Required("family", "a family")) {
+    const auto index = name->Choice(kFamilies, "a family");
+    if (index) family.family = kFamilies[static_cast<std::size_t>(*index)];
+  }
+  if (const auto sizes = node.Required("sizes", "a list of integers")) {
+    // the smallest closed chain has three bars
+    const int smallest = family.family == "chain" ? 3 : 1;
+    for (const JsonNode& size : sizes->OneOrMore("sizes")) {
+      family.sizes.push_back(static_cast<int>(size.Integer(smallest, kLargest)));
+    }
+  }
+  if (const auto columns = node.Required("columns", "an array of columns")) {
+    family.columns = ReadColumns(*columns);
+  }
+  return family;
+}
+
 void ReadTiming(const JsonNode& root, Timing* timing) {
   const auto node = root.Optional("timing");
-  if (!node || !node->ExpectObject({"repeats", "tolerance", "horizon", "columns"})) return;
+  if (!node || !node->ExpectObject({"repeats", "tolerance", "horizon", "columns", "families"})) {
+    return;
+  }
   if (const auto repeats = node->Optional("repeats")) {
     timing->repeats = static_cast<int>(repeats->Integer(0, kMaxCount));
   }
@@ -28,6 +52,11 @@ void ReadTiming(const JsonNode& root, Timing* timing) {
   }
   if (const auto horizon = node->Optional("horizon")) timing->horizon = horizon->Number(kPositive);
   if (const auto columns = node->Optional("columns")) timing->columns = ReadColumns(*columns);
+  if (const auto families = node->Optional("families")) {
+    for (const JsonNode& family : families->Elements("families")) {
+      timing->families.push_back(ReadFamily(family));
+    }
+  }
 }
 
 void ReadSettings(const JsonNode& root, Experiment* experiment) {

@@ -5,12 +5,12 @@ namespace {
 
 using enum Format;
 
-Column Make(const char* key, const char* header, Format format = kText) {
+TableColumn Make(const char* key, const char* header, Format format = kText) {
   return {.key = key, .header = header, .format = format, .abbreviations = {}};
 }
 
 // What was run and how it ended: the keys that drift.csv and timing.csv share.
-std::vector<Column> CaseColumns() {
+std::vector<TableColumn> CaseColumns() {
   return {
       Make("experiment", "experiment"),   Make("mechanism", "mechanism"),
       Make("formulation", "formulation"), Make("enforcement", "enforcement"),
@@ -22,7 +22,7 @@ std::vector<Column> CaseColumns() {
 }
 
 // The same for a terminal: words that differ in their first letters can be short.
-std::vector<Column> CompactCaseColumns() {
+std::vector<TableColumn> CompactCaseColumns() {
   return {
       Make("mechanism", "mechanism"),
       Make("formulation", "formul."),
@@ -41,21 +41,21 @@ std::vector<Column> CompactCaseColumns() {
   };
 }
 
-std::vector<Column> Join(std::vector<Column> head, const std::vector<Column>& tail) {
+std::vector<TableColumn> Join(std::vector<TableColumn> head, const std::vector<TableColumn>& tail) {
   head.insert(head.end(), tail.begin(), tail.end());
   return head;
 }
 
 }  // namespace
 
-const std::vector<Column>& DriftColumns() {
-  static const std::vector<Column> kColumns =
+const std::vector<TableColumn>& DriftColumns() {
+  static const std::vector<TableColumn> kColumns =
       Join(CaseColumns(), {
                               Make("drift_position_max", "drift, position [m]", kScientific),
                               Make("drift_rotation_max", "drift, rotation [rad]", kScientific),
                               Make("drift_velocity_max", "drift, velocity [m/s]", kScientific),
                               Make("drift_acceleration_max", "drift, accel. [m/s2]", kScientific),
-                              Make("joint_mismatch_max", "joint mismatch [m]", kScientific),
+                              Make("loop_closure_max", "loop closure [m]", kScientific),
                               Make("correction_max", "correction [m]", kScientific),
                               Make("worst_loop", "worst loop"),
                               Make("energy_error_max", "energy error [J]", kScientific),
@@ -78,8 +78,8 @@ const std::vector<Column>& DriftColumns() {
   return kColumns;
 }
 
-const std::vector<Column>& TimingColumns() {
-  static const std::vector<Column> kColumns =
+const std::vector<TableColumn>& TimingColumns() {
+  static const std::vector<TableColumn> kColumns =
       Join(CaseColumns(), {
                               Make("bodies", "bodies", kInteger),
                               Make("joints", "joints", kInteger),
@@ -97,8 +97,8 @@ const std::vector<Column>& TimingColumns() {
   return kColumns;
 }
 
-const std::vector<Column>& CompactDriftColumns() {
-  static const std::vector<Column> kColumns =
+const std::vector<TableColumn>& CompactDriftColumns() {
+  static const std::vector<TableColumn> kColumns =
       Join(CompactCaseColumns(), {
                                      Make("drift_position_max", "drift [m]", kScientific),
                                      Make("energy_error_max", "dE [J]", kScientific),
@@ -107,8 +107,8 @@ const std::vector<Column>& CompactDriftColumns() {
   return kColumns;
 }
 
-const std::vector<Column>& CompactTimingColumns() {
-  static const std::vector<Column> kColumns =
+const std::vector<TableColumn>& CompactTimingColumns() {
+  static const std::vector<TableColumn> kColumns =
       Join(CompactCaseColumns(), {
                                      Make("bodies", "bodies", kInteger),
                                      Make("rhs_ns_median", "rhs [ns]", kFixed),

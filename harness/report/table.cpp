@@ -85,7 +85,7 @@ void AppendTrimmed(std::string* out, std::string line) {
 
 }  // namespace
 
-std::string Cell(const Record& row, const Column& column) {
+std::string Cell(const Record& row, const TableColumn& column) {
   const Value* value = row.Find(column.key);
   if (value == nullptr) return "";
   if (const auto* number = std::get_if<double>(value)) return FormatNumber(*number, column.format);
@@ -99,7 +99,7 @@ std::string Cell(const Record& row, const Column& column) {
 std::string ToText(const Table& table) {
   std::vector<std::vector<std::string>> cells;
   std::vector<std::size_t> widths;
-  for (const Column& column : table.columns) widths.push_back(Width(column.header));
+  for (const TableColumn& column : table.columns) widths.push_back(Width(column.header));
   for (const Record& row : table.rows) {
     std::vector<std::string>& line = cells.emplace_back();
     for (std::size_t c = 0; c < table.columns.size(); ++c) {
@@ -152,14 +152,14 @@ std::string ToMarkdown(const Table& table) {
   std::string out = table.title.empty() ? "" : fmt::format("## {}\n\n", table.title);
   std::string rule = "|";
   out += '|';
-  for (const Column& column : table.columns) {
+  for (const TableColumn& column : table.columns) {
     out += fmt::format(" {} |", EscapeMarkdown(column.header));
     rule += column.format == Format::kText ? " --- |" : " ---: |";
   }
   out += '\n' + rule + '\n';
   for (const Record& row : table.rows) {
     out += '|';
-    for (const Column& column : table.columns) {
+    for (const TableColumn& column : table.columns) {
       const std::string cell = EscapeMarkdown(Cell(row, column));
       out += cell.empty() ? "  |" : fmt::format(" {} |", cell);
     }

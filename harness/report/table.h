@@ -21,7 +21,7 @@ enum class Format {
 };
 
 /// One column of a table.
-struct Column {
+struct TableColumn {
   std::string key;     ///< key in the record, and the column's name in CSV
   std::string header;  ///< heading for people, with the unit in brackets
   Format format = Format::kText;
@@ -33,7 +33,7 @@ struct Column {
 /// with empty cells for what it did not reach; nothing removes it.
 struct Table {
   std::string title;
-  std::vector<Column> columns;
+  std::vector<TableColumn> columns;
   std::vector<Record> rows;
   std::vector<std::string> notes;  ///< provenance and remarks, one line each, below the table
 };
@@ -41,7 +41,7 @@ struct Table {
 /// The cell as the text and Markdown writers print it. Absent and NaN values are empty, never zero;
 /// a value that is not a number is printed as it is, whatever the format; a series joins its
 /// numbers with ';'.
-std::string Cell(const Record& row, const Column& column);
+std::string Cell(const Record& row, const TableColumn& column);
 
 /// Aligned text for a terminal: title, heading, rule, rows, notes. Columns are as wide as their
 /// widest cell, two spaces apart, counted in characters rather than bytes.

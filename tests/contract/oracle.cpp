@@ -1,6 +1,7 @@
 #include "tests/contract/oracle.h"
 
-#include <Eigen/Dense>
+#include <Eigen/Geometry>
+#include <Eigen/LU>
 
 namespace loopbench::testing {
 
@@ -43,6 +44,13 @@ Real33 Oracle::InertiaInGround(int body, const JetPose& pose) const {
   return R * I * R.transpose();
 }
 
+Jet Oracle::Coordinate(int index, const std::vector<JetPose>& poses) const {
+  const JetPose X_FM = JointPose(index, poses);
+  if (description_.joints[index].type == JointType::kPrismatic) return X_FM.p[0];
+  const Jet &c = X_FM.R(0, 0), &s = X_FM.R(1, 0);
+  return {std::atan2(s.f, c.f), c.f * s.d - s.f * c.d};
+}
+
 std::vector<Real6> Oracle::Applied(const std::vector<JetPose>& poses) const {
   std::vector<Real6> F(poses.size(), Real6::Zero());
   for (std::size_t b = 1; b < poses.size(); ++b) {
@@ -53,14 +61,11 @@ std::vector<Real6> Oracle::Applied(const std::vector<JetPose>& poses) const {
     const bool slides = joint.type == JointType::kPrismatic;
     const JetPose X_WF = poses[joint.from.body] * frames_[index].X_PF;
     const JetPose X_WM = poses[joint.to.body] * frames_[index].X_QM;
-    const JetPose X_FM = JointPose(index, poses);
-    const Jet &c = X_FM.R(0, 0), &s = X_FM.R(1, 0);
-    const Real value = slides ? X_FM.p[0].f : std::atan2(s.f, c.f);
-    const Real speed = slides ? X_FM.p[0].d : (c * Jet(s.d) - s * Jet(c.d)).f;
+    const Jet q = Coordinate(index, poses);
     Real6 H = Real6::Zero();
     for (int i = 0; i < 3; ++i) H[slides ? 3 + i : i] = X_WF.R(i, slides ? 0 : 2).f;
     const Real3 p = ValueOf(X_WM.p, &Jet::f);
-    const Real6 wrench = H * tau_of(value, speed);
+    const Real6 wrench = H * tau_of(q.f, q.d);
     F[joint.to.body] += AtCom(wrench, p - ValueOf(poses[joint.to.body].p, &Jet::f));
     F[joint.from.body] -= AtCom(wrench, p - ValueOf(poses[joint.from.body].p, &Jet::f));
   };
@@ -130,26 +135,19 @@ Answer Oracle::Solve(const RealVector& q, const RealVector& u) {
   RealMatrix A = RealMatrix::Zero(n + m, n + m);
   A.topLeftCorner(n, n) = scale.asDiagonal() * e.M * scale.asDiagonal();
   A.bottomLeftCorner(m, n) = e.J * scale.asDiagonal();
-  RealVector row_scale = A.bottomLeftCorner(m, n).rowwise().norm().cwiseInverse();
-  A.bottomLeftCorner(m, n) = row_scale.asDiagonal() * A.bottomLeftCorner(m, n);
+  // one factor for all rows: redundant ones may be zero
+  const Real row_scale = m > 0 ? 1 / A.bottomLeftCorner(m, n).rowwise().norm().maxCoeff() : 1;
+  A.bottomLeftCorner(m, n) *= row_scale;
   A.topRightCorner(n, m) = A.bottomLeftCorner(m, n).transpose();
   RealVector rhs(n + m);
-  rhs << -(scale.cwiseProduct(e.h)), row_scale.cwiseProduct(e.gamma);
-  RealVector x;
-  if (answer.full_rank()) {
-    x = Eigen::FullPivLU<RealMatrix>(A).solve(rhs);
-  } else {
-    // The state is rounded to double: what is zero on paper is 1e-16 here.
-    Eigen::CompleteOrthogonalDecomposition<RealMatrix> decomposition;
-    decomposition.setThreshold(Real(1e-12));
-    decomposition.compute(A);
-    x = decomposition.solve(rhs);
-  }
+  rhs << -(scale.cwiseProduct(e.h)), row_scale * e.gamma;
+  // The state is rounded to double: entries that are zero on paper are 1e-16 here.
+  const RealVector x = SolveFullPivot(A, rhs, answer.full_rank() ? Real(0) : Real(1e-12));
   answer.udot = scale.cwiseProduct(x.head(n));
   for (std::size_t b = 0; b < poses_.size(); ++b) {
     answer.accelerations.push_back(bias_[b] + G_.middleRows<6>(6 * b) * answer.udot);
   }
-  JointForces(-row_scale.cwiseProduct(x.tail(m)), answer);
+  JointForces(-row_scale * x.tail(m), answer);
   return answer;
 }
 
@@ -173,13 +171,12 @@ void Oracle::Rank(const Equations& e, Answer& answer) const {
           F.bottomRows<3>() / Real(description_.bodies[body].mass);
       X += F.transpose() * A;
     }
-    const RealMatrix K = X.llt().matrixL();
-    K_inverse.block(first, first, last - first, last - first) = K.inverse();
+    const int size = last - first;
+    K_inverse.block(first, first, size, size) =
+        SolveLower(CholeskyFactor(X), RealMatrix::Identity(size, size));
   }
-  const RealMatrix W = e.M.llt().matrixL().solve((K_inverse * e.J).transpose());
-  const RealVector lambda =
-      Eigen::SelfAdjointEigenSolver<RealMatrix>(W.transpose() * W, Eigen::EigenvaluesOnly)
-          .eigenvalues();
+  const RealMatrix W = SolveLower(CholeskyFactor(e.M), (K_inverse * e.J).transpose());
+  const RealVector lambda = SymmetricEigenvalues(W.transpose() * W);
   // squares of lengths: rounding the state to double leaves 1e-32, forming the product 1e-19
   const Real zero = Real(1e-14) * lambda[answer.rows - 1];
   int first = 0;
@@ -237,10 +234,14 @@ RealMatrix Oracle::Jacobian(const RealVector& q) const {
 RealVector Oracle::Consistent(const RealVector& q, const RealVector& u) const {
   const RealMatrix J = Jacobian(q);
   if (J.rows() == 0) return u;
-  Eigen::CompleteOrthogonalDecomposition<RealMatrix> decomposition;
-  decomposition.setThreshold(Real(1e-12));
-  decomposition.compute(J);
-  return u - decomposition.solve(J * u);
+  const int n = layout_.num_u, m = static_cast<int>(J.rows());
+  RealMatrix A = RealMatrix::Identity(n + m, n + m);
+  A.bottomRightCorner(m, m).setZero();
+  A.bottomLeftCorner(m, n) = J;
+  A.topRightCorner(n, m) = A.bottomLeftCorner(m, n).transpose();
+  RealVector rhs = RealVector::Zero(n + m);
+  rhs.head(n) = u;
+  return SolveFullPivot(A, rhs, Real(1e-12)).head(n);
 }
 
 Real Oracle::TotalEnergy(const RealVector& q, const RealVector& u) const {
@@ -252,6 +253,19 @@ Real Oracle::TotalEnergy(const RealVector& q, const RealVector& u) const {
     energy += V.head<3>().dot(InertiaInGround(static_cast<int>(b), poses[b]) * V.head<3>()) / 2 +
               m * V.tail<3>().squaredNorm() / 2 -
               m * description_.gravity.cast<Real>().dot(ValueOf(poses[b].p, &Jet::f));
+  }
+  for (const ForceDescription& force : description_.forces) {
+    if (const auto* torque = std::get_if<JointTorque>(&force)) {
+      energy -= torque->value * Coordinate(torque->joint, poses).f;
+    } else if (const auto* spring = std::get_if<JointSpring>(&force)) {
+      const Real stretch = Coordinate(spring->joint, poses).f - spring->rest;
+      energy += spring->stiffness * stretch * stretch / 2;
+    } else if (const auto* point = std::get_if<PointForce>(&force); point && !point->in_body_axes) {
+      const Real3 r = (point->at - description_.bodies[point->body].com).cast<Real>();
+      const Real3 p = ValueOf(poses[point->body].p, &Jet::f) +
+                      ValueOf(poses[point->body].R, &Jet::f) * r;
+      energy -= point->force.cast<Real>().dot(p);
+    }
   }
   return energy;
 }

@@ -20,12 +20,11 @@
 #include <vector>
 
 #include "mechanism/mechanism.h"
+#include "tests/contract/dense.h"
 #include "tests/contract/jet.h"
 
 namespace loopbench::testing {
 
-using RealVector = Eigen::Matrix<Real, Eigen::Dynamic, 1>;
-using RealMatrix = Eigen::Matrix<Real, Eigen::Dynamic, Eigen::Dynamic>;
 using Real3 = Eigen::Matrix<Real, 3, 1>;
 using Real33 = Eigen::Matrix<Real, 3, 3>;
 /// [angular; linear] or [moment; force].
@@ -92,7 +91,7 @@ class Oracle {
   Answer Solve(const RealVector& q, const RealVector& u);
   /// The speeds nearest to u with J u = 0.
   RealVector Consistent(const RealVector& q, const RealVector& u) const;
-  /// Potential and kinetic energy, springs, gravity and constant forces [J].
+  /// Kinetic energy, gravity, springs, constant torques and forces in ground axes [J].
   Real TotalEnergy(const RealVector& q, const RealVector& u) const;
 
  private:
@@ -110,6 +109,8 @@ class Oracle {
   std::vector<Jet> Closures(const std::vector<JetPose>& poses) const;
   RealMatrix Jacobian(const RealVector& q) const;
   std::vector<Row> Rows(const std::vector<JetPose>& poses) const;
+  /// Measured coordinate of a revolute or prismatic joint, with its speed.
+  Jet Coordinate(int joint, const std::vector<JetPose>& poses) const;
   /// Applied wrenches at the centres of mass.
   std::vector<Real6> Applied(const std::vector<JetPose>& poses) const;
   void Rank(const Equations& equations, Answer& answer) const;

@@ -95,9 +95,9 @@ TEST(Table, EachFormatPrintsItsDigits) {
   EXPECT_EQ(print(Format::kText), "0.5;1e-09");
 }
 
-std::string Keys(const std::vector<Column>& columns) {
+std::string Keys(const std::vector<TableColumn>& columns) {
   std::string keys;
-  for (const Column& column : columns) keys += column.key + " ";
+  for (const TableColumn& column : columns) keys += column.key + " ";
   return keys;
 }
 
@@ -126,7 +126,7 @@ TEST(Columns, CompactTablesFitAHundredCharacters) {
   for (const char* key : {"drift_position_max", "energy_error_max", "rhs_ns_median"}) {
     row.Set(key, 123456.7);
   }
-  for (const std::vector<Column>& columns : {CompactDriftColumns(), CompactTimingColumns()}) {
+  for (const std::vector<TableColumn>& columns : {CompactDriftColumns(), CompactTimingColumns()}) {
     const std::string text = ToText(Table{"", columns, {row}, {}});
     EXPECT_LE(text.find('\n'), 100u) << text;
   }

@@ -1,0 +1,108 @@
+// loopbench: the command line.
+#include <fmt/format.h>
+
+#include <CLI/CLI.hpp>
+
+#include "harness/commands.h"
+#include "harness/config/config_error.h"
+#include "harness/provenance.h"
+
+namespace {
+
+using namespace loopbench::harness;
+
+Selection ParseSelection(const std::vector<std::string>& conditions) {
+  Selection selection;
+  for (const std::string& text : conditions) selection.push_back(ParseCondition(text));
+  return selection;
+}
+
+constexpr const char* kFooter = R"(
+Examples:
+  loopbench list configs/experiments/paper/paper.json
+  loopbench run configs/experiments/paper/paper.json --jobs 2 --filter mechanism=four-bar
+  loopbench table results/runs/paper --where mechanism=four-bar,dead-centre --where rtol=1e-8
+  loopbench plot results/runs/paper --out results/runs/paper/figures
+  loopbench verdict results/runs/paper --claims configs/experiments/paper/claims.json
+
+Conditions are key=value or key=value,value; keys are the columns of drift.csv.
+Exit codes: 0 done, 1 a gate failed, 2 could not measure or bad input.)";
+
+}  // namespace
+
+int main(int argc, char** argv) {
+  CLI::App app{
+      "Measures constraint drift and time of three formulations of closed-loop multibody dynamics.",
+      "loopbench"};
+  app.footer(kFooter);
+  app.require_subcommand(1);
+  std::vector<std::string> conditions;
+  std::vector<std::filesystem::path> files;
+
+  RunCommand run;
+  bool no_timing = false, timing_only = false;
+  CLI::App* run_app = app.add_subcommand("run", "Run experiments; write records and tables");
+  run_app->add_option("experiment", run.experiments, "Experiment files (JSON)")->required();
+  run_app->add_option("--out", run.out,
+                      "Folder for results.jsonl, drift.csv and timing.csv "
+                      "(default: results/runs/NAME)");
+  run_app->add_option("--jobs", run.suite.jobs, "Accuracy cases at once; timings run alone")
+      ->check(CLI::Range(1, 1024))
+      ->capture_default_str();
+  run_app->add_option("--filter", conditions, "Only accuracy cases with key=value[,value]");
+  CLI::Option* no = run_app->add_flag("--no-timing", no_timing, "Leave the timings out");
+  run_app->add_flag("--timing-only", timing_only, "Only the timings")->excludes(no);
+
+  CLI::App* list_app = app.add_subcommand("list", "Show the cases of experiments");
+  list_app->add_option("experiment", files, "Experiment files (JSON)")->required();
+  list_app->add_option("--filter", conditions, "Only cases with key=value[,value]");
+
+  CLI::App* check_app =
+      app.add_subcommand("check", "Read mechanism or experiment files, report errors");
+  check_app->add_option("file", files, "Files (JSON)")->required();
+
+  TableCommand table;
+  CLI::App* table_app = app.add_subcommand("table", "Print a table of stored records");
+  table_app->add_option("store", table.store, "Folder of a run, or a .jsonl file")->required();
+  table_app->add_option("--kind", table.kind, "What the rows are")
+      ->check(CLI::IsMember({"drift", "timing", "factorial"}))
+      ->capture_default_str();
+  table_app->add_option("--format", table.format, "How they are written")
+      ->check(CLI::IsMember({"text", "csv", "markdown"}))
+      ->capture_default_str();
+  table_app->add_option("--where", conditions, "Only records with key=value[,value]");
+  table_app->add_option("--out", table.out, "File (default: the terminal)");
+
+  PlotCommand plot;
+  CLI::App* plot_app = app.add_subcommand("plot", "Draw the figures of stored records (SVG)");
+  plot_app->add_option("store", plot.store, "Folder of a run, or a .jsonl file")->required();
+  plot_app->add_option("--out", plot.out, "Folder for the figures")->required();
+  plot_app->add_option("--where", conditions, "Only records with key=value[,value]");
+
+  VerdictCommand verdict;
+  CLI::App* verdict_app = app.add_subcommand("verdict", "Hold claims against stored records");
+  verdict_app->add_option("store", verdict.store, "Folder of a run, or a .jsonl file")->required();
+  verdict_app->add_option("--claims", verdict.claims, "Rules (JSON)")->required();
+  verdict_app->add_option("--out", verdict.out, "Markdown file with all numbers");
+
+  try {
+    app.parse(argc, argv);
+  } catch (const CLI::ParseError& error) {
+    return app.exit(error) == 0 ? 0 : 2;
+  }
+  try {
+    const std::string typed = CommandLine(argc, argv);
+    run.suite.filter = table.where = plot.where = ParseSelection(conditions);
+    run.suite.timing = !no_timing;
+    run.suite.accuracy = !timing_only;
+    if (*run_app) return Run(run, typed);
+    if (*list_app) return List(files, ParseSelection(conditions));
+    if (*check_app) return CheckFiles(files);
+    if (*table_app) return PrintTable(table, typed);
+    if (*plot_app) return Plot(plot);
+    return PrintVerdicts(verdict, typed);
+  } catch (const std::exception& error) {
+    fmt::print(stderr, "{}\n", error.what());
+    return 2;
+  }
+}

@@ -1,0 +1,114 @@
+#include <algorithm>
+#include <optional>
+
+#include "harness/observers/observer.h"
+#include "mechanism/tree_dynamics.h"
+
+namespace loopbench::harness {
+
+namespace {
+
+/// Largest mismatch of some joints: points and rotations apart, and whose points are worst.
+struct Largest {
+  double shift = 0.0, rotation = 0.0;
+  int joint = -1;
+
+  template <class Space>
+  void Add(const Kinematics<Space, double>& kinematics, int index) {
+    // only constrained directions count: what a joint leaves free is no mismatch
+    const Directions<Space, double>& D = kinematics.joints()[index].D;
+    const Motion<Space, double> all = kinematics.ConstraintMismatch(index);
+    const Motion<Space, double> mismatch = D * (D.transpose() * all);
+    rotation = std::max(rotation, mismatch.template head<Space::kRot>().norm());
+    const double s = mismatch.template tail<Space::kLin>().norm();
+    if (joint < 0 || !(s <= shift)) {
+      shift = s;
+      joint = index;
+    }
+  }
+};
+
+}  // namespace
+
+template <class Space>
+struct DriftObserver<Space>::Work {
+  Work(const MechanismDescription& description, const Mechanism<Space, double>& mechanism)
+      : dynamics(mechanism), A(mechanism.num_bodies()), loop_max(mechanism.joints().size(), 0.0) {
+    if (mechanism.coordinates() == Coordinates::kAbsolute) {
+      joint_mechanism.emplace(description, Coordinates::kJoint);
+      joint_kinematics.emplace(*joint_mechanism);
+    }
+    const auto& loops = joint_mechanism ? *joint_mechanism : mechanism;
+    for (int index : loops.constraints())
+      loop_names.emplace_back(index, loops.joints()[index].name);
+  }
+
+  TreeDynamics<Space, double> dynamics;
+  std::vector<Motion<Space, double>> A;
+  std::optional<Mechanism<Space, double>> joint_mechanism;
+  std::optional<Kinematics<Space, double>> joint_kinematics;
+  std::vector<std::pair<int, std::string>> loop_names;
+  std::vector<double> loop_max;
+  double shift = 0.0, rotation = 0.0, velocity = 0.0, acceleration = 0.0, closure = 0.0;
+  std::string worst_loop;
+};
+
+template <class Space>
+DriftObserver<Space>::DriftObserver(const MechanismDescription& description,
+                                    const Mechanism<Space, double>& mechanism)
+    : work_(std::make_unique<Work>(description, mechanism)) {}
+
+template <class Space>
+DriftObserver<Space>::~DriftObserver() = default;
+
+template <class Space>
+void DriftObserver<Space>::Observe(const Sample<Space>& sample) {
+  Work& work = *work_;
+  const Kinematics<Space, double>& kinematics = sample.formulation.kinematics();
+  Largest now;
+  work.dynamics.BodyAccelerations(kinematics, sample.formulation.udot(), work.A);
+  for (int index : kinematics.mechanism().constraints()) {
+    now.Add(kinematics, index);
+    const JointState<Space, double>& state = kinematics.joints()[index];
+    work.velocity = std::max(work.velocity, (state.D.transpose() * state.V_rel).norm());
+    const Motion<Space, double> rest = JointAcceleration<Space, double>(kinematics, index, work.A);
+    work.acceleration = std::max(work.acceleration, rest.norm());
+  }
+  if (now.shift > work.shift) {
+    work.worst_loop = kinematics.mechanism().joints()[now.joint].name;
+  }
+  work.shift = std::max(work.shift, now.shift);
+  work.rotation = std::max(work.rotation, now.rotation);
+  series_.t.push_back(sample.t);
+  series_.value.push_back(now.shift);
+
+  const Kinematics<Space, double>* closure = &kinematics;
+  if (work.joint_mechanism) {
+    work.joint_kinematics->UpdatePosition(kinematics.CoordinatesIn(*work.joint_mechanism));
+    closure = &*work.joint_kinematics;
+  }
+  for (const auto& [index, name] : work.loop_names) {
+    Largest loop;
+    loop.Add(*closure, index);
+    work.loop_max[index] = std::max(work.loop_max[index], loop.shift);
+    work.closure = std::max(work.closure, loop.shift);
+  }
+}
+
+template <class Space>
+void DriftObserver<Space>::Write(Record& record) const {
+  record.Set("drift_position_max", work_->shift);
+  record.Set("drift_rotation_max", work_->rotation);
+  record.Set("drift_velocity_max", work_->velocity);
+  record.Set("drift_acceleration_max", work_->acceleration);
+  record.Set("loop_closure_max", work_->closure);
+  record.Set("worst_loop", work_->worst_loop);
+  for (const auto& [index, name] : work_->loop_names) {
+    record.Set("drift.loop." + name, work_->loop_max[index]);
+  }
+}
+
+template class DriftObserver<Planar>;
+template class DriftObserver<Spatial>;
+
+}  // namespace loopbench::harness

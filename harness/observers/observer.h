@@ -1,0 +1,135 @@
+// What is watched along a run. Observers see accepted steps only; each keeps maxima and, where a
+// figure needs one, a series, and writes them into the case's record at the end.
+#pragma once
+
+#include <memory>
+#include <vector>
+
+#include "harness/config/scene.h"
+#include "harness/record.h"
+#include "mechanism/formulation.h"
+
+namespace loopbench::harness {
+
+/// An accepted step. The formulation's kinematics, speeds and accelerations are those of (t, y).
+template <class Space>
+struct Sample {
+  double t = 0.0;
+  const Formulation<Space, double>& formulation;
+};
+
+template <class Space>
+class Observer {
+ public:
+  virtual ~Observer() = default;
+  virtual void Observe(const Sample<Space>& sample) = 0;
+  virtual void Write(Record& record) const = 0;
+};
+
+/// A value sampled at accepted steps.
+struct TimeSeries {
+  std::vector<double> t, value;
+};
+
+/// Every k-th sample, k chosen so that at most `points` remain, always with the last one.
+TimeSeries Thin(const TimeSeries& series, int points);
+
+/// Drift at position, velocity and acceleration level.
+///
+/// Position drift is the largest mismatch of a constraint that the coordinate set imposes: of the
+/// cut joints in joint coordinates, of every joint in absolute coordinates; points [m] and
+/// rotations [rad] apart. Velocity drift is the largest |D^T (V_Q - V_P)|, acceleration drift the
+/// largest |D^T (A_Q - A_P - g)|, point components in m/s and m/s^2.
+///
+/// Loop closure compares the two sets: the tree of user joints is followed with the joint
+/// coordinates (in absolute coordinates: those measured between the bodies), and what a cut joint
+/// then misses is its loop's closure, which equals the sum of the mismatches around the loop. In
+/// joint coordinates it is the position drift itself; in absolute coordinates mismatches may cancel
+/// in it.
+template <class Space>
+class DriftObserver final : public Observer<Space> {
+ public:
+  DriftObserver(const MechanismDescription& description, const Mechanism<Space, double>& mechanism);
+  ~DriftObserver() override;
+  void Observe(const Sample<Space>& sample) override;
+  void Write(Record& record) const override;
+
+  /// Position drift [m] at each accepted step.
+  const TimeSeries& series() const { return series_; }
+
+ private:
+  struct Work;
+  std::unique_ptr<Work> work_;
+  TimeSeries series_;
+};
+
+/// Total energy's largest deviation from its first value [J], and its series.
+template <class Space>
+class EnergyObserver final : public Observer<Space> {
+ public:
+  explicit EnergyObserver(int points) : points_(points) {}
+  void Observe(const Sample<Space>& sample) override;
+  void Write(Record& record) const override;
+
+ private:
+  int points_;
+  bool started_ = false;
+  double first_ = 0.0, largest_ = 0.0;
+  TimeSeries series_;
+};
+
+/// Smallest rank, reciprocal condition and weight met at accepted steps, and when; how many steps
+/// were softened.
+template <class Space>
+class ConditionObserver final : public Observer<Space> {
+ public:
+  void Observe(const Sample<Space>& sample) override;
+  void Write(Record& record) const override;
+
+ private:
+  bool started_ = false;
+  int rank_min_ = 0;
+  double rcond_min_ = 1.0, rcond_t_ = 0.0;
+  std::int64_t softened_steps_ = 0;
+};
+
+/// Distance from what is known of a scene: branch invariants and closed form (scene.h).
+template <class Space>
+class ExactObserver final : public Observer<Space> {
+ public:
+  ExactObserver(const SceneObservation& scene, const Mechanism<Space, double>& mechanism);
+  void Observe(const Sample<Space>& sample) override;
+  void Write(Record& record) const override;
+
+ private:
+  double BodyAngle(const Sample<Space>& sample, int body);
+
+  SceneObservation scene_;
+  std::vector<std::vector<std::pair<int, double>>> combinations_;  ///< by body index
+  int pendulum_body_ = -1;
+  std::vector<double> first_, last_angle_;
+  double branch_error_ = 0.0, closed_form_error_ = 0.0;
+  double theta0_ = 0.0, omega0_ = 0.0;
+  bool started_ = false;
+  TimeSeries branch_;
+};
+
+/// Joint coordinates against time.
+template <class Space>
+class AngleObserver final : public Observer<Space> {
+ public:
+  explicit AngleObserver(int points) : points_(points) {}
+  void Observe(const Sample<Space>& sample) override;
+  void Write(Record& record) const override;
+
+ private:
+  int points_;
+  std::vector<std::string> names_;
+  std::vector<TimeSeries> series_;
+};
+
+/// Angle of a pendulum theta'' = -frequency_squared sin(theta) at time t from (theta, omega) at 0:
+/// Jacobi elliptic functions, swinging or turning. theta0 in [-pi, pi].
+double PendulumAngle(double frequency_squared, double theta0, double omega0, double t);
+
+}  // namespace loopbench::harness

@@ -1,0 +1,166 @@
+#include <algorithm>
+#include <cmath>
+#include <numbers>
+
+#include "harness/observers/observer.h"
+
+namespace loopbench::harness {
+
+TimeSeries Thin(const TimeSeries& series, int points) {
+  const std::size_t n = series.t.size();
+  if (n <= static_cast<std::size_t>(points)) return series;
+  TimeSeries thin;
+  for (int i = 0; i < points; ++i) {
+    // evenly spaced in samples; the last one is always the run's end
+    const std::size_t k = i * (n - 1) / static_cast<std::size_t>(points - 1);
+    thin.t.push_back(series.t[k]);
+    thin.value.push_back(series.value[k]);
+  }
+  return thin;
+}
+
+template <class Space>
+void EnergyObserver<Space>::Observe(const Sample<Space>& sample) {
+  const double energy = ComputeEnergy(sample.formulation.kinematics()).total();
+  if (!started_) first_ = energy;
+  started_ = true;
+  largest_ = std::max(largest_, std::abs(energy - first_));
+  series_.t.push_back(sample.t);
+  series_.value.push_back(energy - first_);
+}
+
+template <class Space>
+void EnergyObserver<Space>::Write(Record& record) const {
+  record.Set("energy_error_max", largest_);
+  const TimeSeries thin = Thin(series_, points_);
+  record.Set("series.energy_t", thin.t);
+  record.Set("series.energy_error", thin.value);
+}
+
+template <class Space>
+void ConditionObserver<Space>::Observe(const Sample<Space>& sample) {
+  const Diagnostics& diagnostics = sample.formulation.diagnostics();
+  rank_min_ = started_ ? std::min(rank_min_, diagnostics.rank) : diagnostics.rank;
+  if (!started_ || diagnostics.rcond < rcond_min_) {
+    rcond_min_ = diagnostics.rcond;
+    rcond_t_ = sample.t;
+  }
+  if (diagnostics.smallest_weight < 1.0) ++softened_steps_;
+  started_ = true;
+}
+
+template <class Space>
+void ConditionObserver<Space>::Write(Record& record) const {
+  record.Set("rank_min", std::int64_t{rank_min_});
+  record.Set("rcond_min", rcond_min_);
+  record.Set("rcond_min_t", rcond_t_);
+  record.Set("softened_steps", softened_steps_);
+}
+
+template <class Space>
+ExactObserver<Space>::ExactObserver(const SceneObservation& scene,
+                                    const Mechanism<Space, double>& mechanism)
+    : scene_(scene) {
+  const auto find = [&](const std::string& name) {
+    const auto it = std::ranges::find(mechanism.body_names(), name);
+    return static_cast<int>(it - mechanism.body_names().begin());
+  };
+  for (const AngleCombination& combination : scene.branch_invariants) {
+    combinations_.emplace_back();
+    for (const auto& [name, factor] : combination) {
+      combinations_.back().emplace_back(find(name), factor);
+    }
+  }
+  if (scene.closed_form) pendulum_body_ = find(scene.closed_form->body);
+  last_angle_.assign(mechanism.num_bodies(), 0.0);
+}
+
+template <class Space>
+double ExactObserver<Space>::BodyAngle(const Sample<Space>& sample, int body) {
+  const Pose<Space, double>& X = sample.formulation.kinematics().poses()[body];
+  if constexpr (Space::kRot == 1) {
+    return X.angle;
+  } else {
+    // a planar scene in space: the angle about z, continued from step to step
+    const double angle = std::atan2(X.R(1, 0), X.R(0, 0));
+    const double turn = 2 * std::numbers::pi;
+    last_angle_[body] += std::remainder(angle - last_angle_[body], turn);
+    return last_angle_[body];
+  }
+}
+
+template <class Space>
+void ExactObserver<Space>::Observe(const Sample<Space>& sample) {
+  double worst = 0.0;
+  for (std::size_t c = 0; c < combinations_.size(); ++c) {
+    double value = 0.0;
+    for (const auto& [body, factor] : combinations_[c]) value += factor * BodyAngle(sample, body);
+    if (!started_) first_.push_back(value);
+    worst = std::max(worst, std::abs(value - first_[c]));
+  }
+  branch_error_ = std::max(branch_error_, worst);
+  if (!combinations_.empty()) {
+    branch_.t.push_back(sample.t);
+    branch_.value.push_back(worst);
+  }
+  if (pendulum_body_ >= 0) {
+    const PendulumForm& form = *scene_.closed_form;
+    const double theta = BodyAngle(sample, pendulum_body_) - form.down_angle;
+    if (!started_) {
+      theta0_ = theta;
+      omega0_ = sample.formulation.kinematics().motions()[pendulum_body_][Space::kRot - 1];
+    }
+    const double exact = PendulumAngle(form.frequency_squared, theta0_, omega0_, sample.t);
+    closed_form_error_ = std::max(closed_form_error_, std::abs(theta - exact));
+  }
+  started_ = true;
+}
+
+template <class Space>
+void ExactObserver<Space>::Write(Record& record) const {
+  if (!combinations_.empty()) {
+    record.Set("branch_error_max", branch_error_);
+    const TimeSeries thin = Thin(branch_, 200);
+    record.Set("series.branch_t", thin.t);
+    record.Set("series.branch", thin.value);
+  }
+  if (pendulum_body_ >= 0) record.Set("closed_form_error_max", closed_form_error_);
+}
+
+template <class Space>
+void AngleObserver<Space>::Observe(const Sample<Space>& sample) {
+  const Kinematics<Space, double>& kinematics = sample.formulation.kinematics();
+  const auto& joints = kinematics.mechanism().joints();
+  const bool first = series_.empty();
+  std::size_t s = 0;
+  for (int j = 0; j < static_cast<int>(joints.size()); ++j) {
+    if (joints[j].description < 0 || joints[j].kind->num_u != 1) continue;
+    if (first) {
+      names_.push_back(joints[j].name);
+      series_.emplace_back();
+    }
+    series_[s].t.push_back(sample.t);
+    series_[s].value.push_back(kinematics.JointCoordinate(j));
+    ++s;
+  }
+}
+
+template <class Space>
+void AngleObserver<Space>::Write(Record& record) const {
+  for (std::size_t s = 0; s < series_.size(); ++s) {
+    const TimeSeries thin = Thin(series_[s], points_);
+    if (s == 0) record.Set("series.t", thin.t);
+    record.Set("series.angle." + names_[s], thin.value);
+  }
+}
+
+#define LOOPBENCH_INSTANTIATE(Space)       \
+  template class EnergyObserver<Space>;    \
+  template class ConditionObserver<Space>; \
+  template class ExactObserver<Space>;     \
+  template class AngleObserver<Space>;
+LOOPBENCH_INSTANTIATE(Planar)
+LOOPBENCH_INSTANTIATE(Spatial)
+#undef LOOPBENCH_INSTANTIATE
+
+}  // namespace loopbench::harness

@@ -1,0 +1,51 @@
+#include "harness/provenance.h"
+
+#include <fmt/chrono.h>
+#include <fmt/format.h>
+#include <sys/utsname.h>
+
+#include <Eigen/Core>
+#include <ctime>
+#include <filesystem>
+#include <fstream>
+#include <thread>
+
+#include "harness/build_info.h"
+
+namespace loopbench::harness {
+
+namespace {
+
+std::string CpuModel() {
+  std::ifstream file("/proc/cpuinfo");
+  for (std::string line; std::getline(file, line);) {
+    if (line.rfind("model name", 0) == 0) return line.substr(line.find(':') + 2);
+  }
+  return "unknown processor";
+}
+
+}  // namespace
+
+std::vector<std::string> Provenance(const std::string& command) {
+  utsname system{};
+  uname(&system);
+  const std::time_t now = std::time(nullptr);
+  return {
+      fmt::format("command: {}", command),
+      fmt::format("date: {:%Y-%m-%d %H:%M} UTC", fmt::gmtime(now)),
+      fmt::format("commit: {}", kBuildCommit),
+      fmt::format("machine: {}, {} logical processors, {} {}", CpuModel(),
+                  std::thread::hardware_concurrency(), system.sysname, system.release),
+      fmt::format("compiler: {} {}, flags {}", kBuildCompiler, __VERSION__, kBuildFlags),
+      fmt::format("libraries: Eigen {}.{}.{}, SUNDIALS {}, fmt {}", EIGEN_WORLD_VERSION,
+                  EIGEN_MAJOR_VERSION, EIGEN_MINOR_VERSION, kBuildSundials, FMT_VERSION),
+  };
+}
+
+std::string CommandLine(int argc, const char* const* argv) {
+  std::string line = std::filesystem::path(argv[0]).filename().string();
+  for (int i = 1; i < argc; ++i) line += std::string(" ") + argv[i];
+  return line;
+}
+
+}  // namespace loopbench::harness

@@ -1,0 +1,15 @@
+// Where numbers come from: command, machine, compiler, versions, commit. Stands below every table.
+#pragma once
+
+#include <string>
+#include <vector>
+
+namespace loopbench::harness {
+
+/// One fact per line, "command: ...". `command` is what the user typed.
+std::vector<std::string> Provenance(const std::string& command);
+
+/// The program's arguments as one shell line.
+std::string CommandLine(int argc, const char* const* argv);
+
+}  // namespace loopbench::harness

@@ -1,0 +1,213 @@
+#include "harness/run_case.h"
+
+#include <fmt/format.h>
+
+#include <cstring>
+
+#include "harness/integrator/arkode.h"
+#include "harness/observers/observer.h"
+#include "harness/store/record_json.h"
+#include "lagrange/lagrange.h"
+#include "mechanism/assembly.h"
+#include "odca/odca.h"
+#include "reduction/reduction.h"
+
+namespace loopbench::harness {
+
+template <class Space>
+std::unique_ptr<Formulation<Space, double>> MakeFormulation(
+    const Column& column, const Mechanism<Space, double>& mechanism) {
+  const FormulationOptions options{.enforcement = column.enforcement, .solver = column.solver};
+  switch (column.formulation) {
+    case FormulationKind::kOdca:
+      return std::make_unique<odca::Odca<Space, double>>(mechanism, options);
+    case FormulationKind::kLagrange:
+      return std::make_unique<lagrange::Lagrange<Space, double>>(mechanism, options);
+    case FormulationKind::kReduction:
+      return std::make_unique<reduction::Reduction<Space, double>>(mechanism, options);
+  }
+  return nullptr;
+}
+
+template std::unique_ptr<Formulation<Planar, double>> MakeFormulation(
+    const Column&, const Mechanism<Planar, double>&);
+template std::unique_ptr<Formulation<Spatial, double>> MakeFormulation(
+    const Column&, const Mechanism<Spatial, double>&);
+
+namespace {
+
+/// FNV-1a (64 bit) over the bytes of the last state: equal hashes mean equal runs.
+std::string StateHash(std::span<const double> y) {
+  std::uint64_t hash = 0xcbf29ce484222325u;
+  for (const double value : y) {
+    unsigned char bytes[sizeof value];
+    std::memcpy(bytes, &value, sizeof value);
+    for (const unsigned char byte : bytes) hash = (hash ^ byte) * 0x100000001b3u;
+  }
+  return fmt::format("{:016x}", hash);
+}
+
+/// What one run leaves behind.
+struct Run {
+  Record record;
+  DriftSeries drift;
+};
+
+template <class Space>
+class Runner {
+ public:
+  Runner(const Experiment& experiment, const Case& one, const MechanismDescription& description,
+         bool with_series)
+      : case_(one),
+        scene_(experiment.scenes[one.scene].mechanism.observe),
+        description_(description),
+        mechanism_(description, one.column.coordinates),
+        drift_(description, mechanism_),
+        energy_(experiment.series_points),
+        exact_(scene_, mechanism_),
+        angles_(experiment.series_points),
+        with_series_(with_series) {}
+
+  Run Execute() {
+    const Start<double> start = Assemble<Space>(description_, mechanism_);
+    Run run;
+    IntegratorResult result;
+    if (start.outcome != Outcome::kFinished) {
+      result.outcome = start.outcome;
+      result.message = start.message;
+    } else {
+      result = Integrate(start);
+      drift_.Write(run.record);
+      energy_.Write(run.record);
+      condition_.Write(run.record);
+      exact_.Write(run.record);
+      if (with_series_) angles_.Write(run.record);
+      run.record.Set("state_hash", StateHash(y_));
+    }
+    run.record.Set("outcome", std::string(ToString(result.outcome)));
+    run.record.Set("message", result.message);
+    run.record.Set("t_reached", result.t_reached);
+    run.record.Set("steps", result.steps);
+    run.record.Set("rejected", result.rejected);
+    run.record.Set("rhs_evaluations", result.rhs_evaluations);
+    run.record.Set("restarts", result.restarts);
+    run.record.Set("wall_s", result.wall_s);
+    run.drift = {drift_.series().t, drift_.series().value};
+    return run;
+  }
+
+ private:
+  IntegratorResult Integrate(const Start<double>& start) {
+    const auto formulation = MakeFormulation<Space>(case_.column, mechanism_);
+    IntegratorResult result;
+    result.outcome = formulation->Start(start.q, start.u);
+    if (result.outcome != Outcome::kFinished) return result;
+    y_.resize(formulation->state_size());
+    formulation->ToState(start.q, start.u, y_);
+    FormulationOde<Space> ode(*formulation);
+    IntegratorOptions options;
+    options.profile = case_.integrator;
+    options.rtol = case_.rtol;
+    options.atol = case_.atol;
+    options.step_limit = case_.limits.steps;
+    options.time_limit_s = case_.limits.wall_s;
+    std::vector<double> ydot;
+    const StepObserver observe = [&](double t, std::span<double> y) {
+      const bool restart = formulation->BeginStep(y);
+      ydot.resize(y.size());
+      // a derivative that fails here fails in the integrator's next call, with its outcome
+      if (formulation->Derivative(t, y, ydot) == Outcome::kFinished) Observe(t, *formulation);
+      return restart ? StepAction::kRestart : StepAction::kContinue;
+    };
+    return harness::Integrate(ode, 0.0, case_.horizon, y_, options, observe);
+  }
+
+  void Observe(double t, const Formulation<Space, double>& formulation) {
+    const Sample<Space> sample{t, formulation};
+    drift_.Observe(sample);
+    energy_.Observe(sample);
+    condition_.Observe(sample);
+    exact_.Observe(sample);
+    if (with_series_) angles_.Observe(sample);
+  }
+
+  const Case& case_;
+  const SceneObservation& scene_;
+  const MechanismDescription& description_;
+  Mechanism<Space, double> mechanism_;
+  DriftObserver<Space> drift_;
+  EnergyObserver<Space> energy_;
+  ConditionObserver<Space> condition_;
+  ExactObserver<Space> exact_;
+  AngleObserver<Space> angles_;
+  bool with_series_;
+  std::vector<double> y_;
+};
+
+Run RunOnce(const Experiment& experiment, const Case& one, const MechanismDescription& description,
+            bool with_series) {
+  if (description.space == SpaceKind::kPlanar) {
+    return Runner<Planar>(experiment, one, description, with_series).Execute();
+  }
+  return Runner<Spatial>(experiment, one, description, with_series).Execute();
+}
+
+void WriteGrowth(const Growth& growth, int failed, Record& record) {
+  record.Set("growth_exponent", growth.exponent);
+  record.Set("growth_spread", growth.spread);
+  record.Set("growth_exponent_late", growth.exponent_late);
+  record.Set("growth_spread_late", growth.spread_late);
+  record.Set("growth_regime", growth.regime);
+  record.Set("growth_resolved", growth.resolved && failed == 0);
+  record.Set("ensemble", std::int64_t{growth.members});
+  record.Set("ensemble_failed", std::int64_t{failed});
+}
+
+}  // namespace
+
+Record CaseKeys(const Experiment& experiment, const Case& one) {
+  Record keys;
+  keys.Set("kind", std::string("accuracy"));
+  keys.Set("experiment", experiment.name);
+  keys.Set("mechanism", one.mechanism);
+  keys.Set("formulation", std::string(ToString(one.column.formulation)));
+  keys.Set("enforcement", std::string(ToString(one.column.enforcement)));
+  keys.Set("coordinates", std::string(ToString(one.column.coordinates)));
+  keys.Set("solver", std::string(ToString(one.column.solver)));
+  keys.Set("integrator", one.integrator);
+  keys.Set("rtol", one.rtol);
+  keys.Set("atol", one.atol);
+  keys.Set("horizon", one.horizon);
+  return keys;
+}
+
+Record RunCase(const Experiment& experiment, const Case& one) {
+  const ExperimentScene& scene = experiment.scenes[one.scene];
+  Record record = CaseKeys(experiment, one);
+  record.Set("case_id", CaseId(record));
+  Run nominal = RunOnce(experiment, one, scene.mechanism.description, true);
+  for (const auto& [key, value] : nominal.record.items()) record.Set(key, value);
+
+  std::vector<DriftSeries> runs;
+  int failed = 0;
+  for (int member = 0; member < (one.ensemble > 1 ? one.ensemble : 0); ++member) {
+    Run run = RunOnce(experiment, one,
+                      Perturb(scene.mechanism.description, one.perturb, one.seed, member), false);
+    if (run.record.Text("outcome") != ToString(Outcome::kFinished)) {
+      ++failed;
+    } else {
+      runs.push_back(std::move(run.drift));
+    }
+  }
+  if (one.ensemble <= 1) runs.push_back(nominal.drift);
+  if (!runs.empty()) {
+    const double length = scene.mechanism.observe.length;
+    WriteGrowth(AnalyseGrowth(runs, one.horizon, length), failed, record);
+  }
+  const DriftSeries envelope = Envelope(nominal.drift, experiment.series_points);
+  record.Set("series.drift_t", envelope.t);
+  record.Set("series.drift", envelope.value);
+  return record;
+}
+
+}  // namespace loopbench::harness

@@ -1,0 +1,263 @@
+#include "harness/timing/time_cases.h"
+
+#include <algorithm>
+#include <chrono>
+#include <limits>
+#include <memory>
+#include <optional>
+
+#include "harness/integrator/arkode.h"
+#include "harness/run_case.h"
+#include "mechanism/assembly.h"
+#include "mechanism/library.h"
+#include "odca/odca.h"
+
+namespace loopbench::harness {
+
+namespace {
+
+constexpr int kStates = 16;             ///< states a batch goes through
+constexpr double kBatchSeconds = 1e-3;  ///< long against the clock's resolution
+constexpr int kBatches = 15;            ///< enough for a 10th and a 90th percentile
+
+using Clock = std::chrono::steady_clock;
+
+double SecondsSince(Clock::time_point begin) {
+  return std::chrono::duration<double>(Clock::now() - begin).count();
+}
+
+/// Value at a fraction of the sorted sample (nearest rank).
+double Quantile(std::vector<double> sample, double fraction) {
+  if (sample.empty()) return std::numeric_limits<double>::quiet_NaN();
+  std::ranges::sort(sample);
+  const double rank = fraction * static_cast<double>(sample.size() - 1);
+  return sample[static_cast<std::size_t>(rank + 0.5)];
+}
+
+/// One column of one mechanism, ready to be timed.
+class Subject {
+ public:
+  virtual ~Subject() = default;
+  /// Runs the simulation once, keeping states for the right-hand sides. Not timed.
+  virtual void Prepare() = 0;
+  /// One batch of right-hand sides.
+  virtual void TimeDerivative() = 0;
+  /// One whole simulation.
+  virtual void TimeSimulation() = 0;
+  virtual Record Finish(const Record& keys) const = 0;
+};
+
+template <class Space>
+class SubjectIn final : public Subject {
+ public:
+  SubjectIn(const MechanismDescription& description, const Case& one, bool simulate)
+      : case_(one),
+        simulate_(simulate),
+        mechanism_(description, one.column.coordinates),
+        start_(Assemble<Space>(description, mechanism_)) {
+    result_.outcome = start_.outcome;
+    result_.message = start_.message;
+  }
+
+  void Prepare() override {
+    if (start_.outcome != Outcome::kFinished) return;
+    Reset();
+    states_.assign(1, y_);
+    ydot_.resize(y_.size());
+    if (!simulate_) {
+      result_.outcome = formulation_->Derivative(0.0, y_, ydot_);
+      CalibrateBatch();
+      return;
+    }
+    std::vector<std::vector<double>> all;
+    result_ = Simulate([&](std::span<double> y) { all.emplace_back(y.begin(), y.end()); });
+    for (int i = 1; i < kStates && !all.empty(); ++i) {
+      // a failing run ends near its failure: its last state stays out
+      const std::size_t k = i * (all.size() - 1) / kStates;
+      if (all[k].size() == states_[0].size()) states_.push_back(all[k]);
+    }
+    CalibrateBatch();
+  }
+
+  void TimeDerivative() override {
+    if (evaluations_ == 0) return;
+    const Clock::time_point begin = Clock::now();
+    for (int i = 0; i < evaluations_; ++i) {
+      formulation_->Derivative(0.0, states_[i % states_.size()], ydot_);
+    }
+    rhs_ns_.push_back(SecondsSince(begin) * 1e9 / evaluations_);
+  }
+
+  void TimeSimulation() override {
+    if (!simulate_ || result_.outcome != Outcome::kFinished) return;
+    Reset();
+    result_ = Simulate({});
+    wall_s_.push_back(result_.wall_s);
+  }
+
+  Record Finish(const Record& keys) const override {
+    Record record = keys;
+    record.Set("outcome", std::string(ToString(result_.outcome)));
+    record.Set("message", result_.message);
+    record.Set("t_reached", simulate_ ? Value(result_.t_reached) : Value());
+    const int bodies = mechanism_.num_bodies() - 1;
+    std::int64_t joints = 0;
+    for (const auto& joint : mechanism_.joints()) joints += joint.description >= 0;
+    record.Set("bodies", std::int64_t{bodies});
+    record.Set("joints", joints);
+    record.Set("loops", std::int64_t{mechanism_.num_loops()});
+    if (formulation_) {
+      const int dof = mechanism_.num_joint_speeds() - formulation_->diagnostics().rank;
+      record.Set("dof", std::int64_t{dof});
+    }
+    const double rhs = Quantile(rhs_ns_, 0.5), wall = Quantile(wall_s_, 0.5);
+    record.Set("rhs_ns_median", rhs);
+    record.Set("rhs_ns_p10", Quantile(rhs_ns_, 0.1));
+    record.Set("rhs_ns_p90", Quantile(rhs_ns_, 0.9));
+    record.Set("ns_per_body", rhs / bodies);
+    if (!wall_s_.empty()) {
+      record.Set("step_us_median", wall * 1e6 / static_cast<double>(result_.steps));
+      record.Set("wall_s_median", wall);
+      record.Set("realtime_factor", case_.horizon / wall);
+      record.Set("steps", result_.steps);
+    }
+    record.Set("repeats", static_cast<std::int64_t>(simulate_ ? wall_s_.size() : rhs_ns_.size()));
+    if (const auto* odca = dynamic_cast<const odca::Odca<Space, double>*>(formulation_.get())) {
+      record.Set("plan_depth", std::int64_t{odca->plan().depth()});
+      record.Set("plan_largest_join", std::int64_t{odca->plan().largest_join()});
+    }
+    return record;
+  }
+
+ private:
+  void Reset() {
+    formulation_ = MakeFormulation<Space>(case_.column, mechanism_);
+    formulation_->Start(start_.q, start_.u);
+    y_.resize(formulation_->state_size());
+    formulation_->ToState(start_.q, start_.u, y_);
+  }
+
+  IntegratorResult Simulate(const std::function<void(std::span<double>)>& keep) {
+    FormulationOde<Space> ode(*formulation_);
+    IntegratorOptions options;
+    options.profile = case_.integrator;
+    options.rtol = case_.rtol;
+    options.atol = case_.atol;
+    options.step_limit = case_.limits.steps;
+    options.time_limit_s = case_.limits.wall_s;
+    return Integrate(ode, 0.0, case_.horizon, y_, options, [&](double, std::span<double> y) {
+      if (keep) keep(y);
+      return formulation_->BeginStep(y) ? StepAction::kRestart : StepAction::kContinue;
+    });
+  }
+
+  /// Evaluations per batch, from the time of a first few (which also warm up).
+  void CalibrateBatch() {
+    evaluations_ = 1;
+    for (double spent = 0.0; spent < kBatchSeconds / 4; evaluations_ *= 2) {
+      const Clock::time_point begin = Clock::now();
+      for (int i = 0; i < evaluations_; ++i) {
+        const auto& state = states_[i % states_.size()];
+        if (formulation_->Derivative(0.0, state, ydot_) != Outcome::kFinished) {
+          evaluations_ = 0;  // what fails is not timed
+          return;
+        }
+      }
+      spent = SecondsSince(begin);
+    }
+    evaluations_ *= 2;
+  }
+
+  Case case_;
+  bool simulate_;
+  Mechanism<Space, double> mechanism_;
+  Start<double> start_;
+  std::unique_ptr<Formulation<Space, double>> formulation_;
+  std::vector<double> y_, ydot_;
+  std::vector<std::vector<double>> states_;
+  int evaluations_ = 0;
+  IntegratorResult result_;
+  std::vector<double> rhs_ns_, wall_s_;
+};
+
+std::unique_ptr<Subject> MakeSubject(const MechanismDescription& description, const Case& one,
+                                     bool simulate) {
+  if (description.space == SpaceKind::kPlanar) {
+    return std::make_unique<SubjectIn<Planar>>(description, one, simulate);
+  }
+  return std::make_unique<SubjectIn<Spatial>>(description, one, simulate);
+}
+
+/// Times cases of one mechanism against each other.
+void TimeTogether(const Experiment& experiment, const MechanismDescription& description,
+                  const std::vector<Case>& cases, bool simulate,
+                  const std::function<void(const Record&)>& done, std::vector<Record>& records) {
+  std::vector<std::unique_ptr<Subject>> subjects;
+  for (const Case& one : cases) subjects.push_back(MakeSubject(description, one, simulate));
+  for (auto& subject : subjects) subject->Prepare();
+  for (int batch = 0; batch < kBatches; ++batch) {
+    for (auto& subject : subjects) subject->TimeDerivative();
+  }
+  for (int repeat = 0; repeat < experiment.timing.repeats; ++repeat) {
+    for (auto& subject : subjects) subject->TimeSimulation();
+  }
+  for (std::size_t i = 0; i < cases.size(); ++i) {
+    Record keys = CaseKeys(experiment, cases[i]);
+    keys.Set("kind", std::string("timing"));
+    if (!simulate) {
+      // a right-hand side has no tolerance and no horizon
+      for (const char* key : {"integrator", "rtol", "atol", "horizon"}) keys.Set(key, Value());
+    }
+    records.push_back(subjects[i]->Finish(keys));
+    done(records.back());
+  }
+}
+
+MechanismDescription MakeFamilyMember(const TimingFamily& family, int size) {
+  if (family.family == "ladder") return Ladder(size, 1.0, 1.0);
+  MechanismDescription chain = Chain(size);
+  chain.initial.speeds.push_back({0, {1.0}});  // a moving chain: the other speeds follow
+  return chain;
+}
+
+}  // namespace
+
+std::size_t CountTimings(const Experiment& experiment) {
+  std::size_t count = ExpandTiming(experiment).size();
+  if (experiment.timing.repeats == 0) return count;
+  for (const TimingFamily& family : experiment.timing.families) {
+    count += family.sizes.size() * family.columns.size();
+  }
+  return count;
+}
+
+std::vector<Record> TimeExperiment(const Experiment& experiment,
+                                   const std::function<void(const Record&)>& done) {
+  std::vector<Record> records;
+  const std::vector<Case> all = ExpandTiming(experiment);
+  for (std::size_t scene = 0; scene < experiment.scenes.size(); ++scene) {
+    std::vector<Case> cases;
+    std::ranges::copy_if(all, std::back_inserter(cases),
+                         [&](const Case& one) { return one.scene == scene; });
+    if (cases.empty()) continue;
+    TimeTogether(experiment, experiment.scenes[scene].mechanism.description, cases, true, done,
+                 records);
+  }
+  if (experiment.timing.repeats == 0) return records;
+  for (const TimingFamily& family : experiment.timing.families) {
+    for (const int size : family.sizes) {
+      const MechanismDescription description = MakeFamilyMember(family, size);
+      std::vector<Case> cases;
+      for (const Column& column : family.columns) {
+        Case one;
+        one.mechanism = description.name;
+        one.column = column;
+        cases.push_back(one);
+      }
+      TimeTogether(experiment, description, cases, false, done, records);
+    }
+  }
+  return records;
+}
+
+}  // namespace loopbench::harness

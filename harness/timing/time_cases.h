@@ -1,0 +1,25 @@
+// Time of right-hand sides and of whole simulations, in runs of their own.
+//
+// The columns of one mechanism are measured in turn, batch by batch, so that a change of the
+// machine's speed hits all of them; medians and the 10th and 90th percentile are reported. Every
+// right-hand side is evaluated at states from an actual run, not at one state or at zero.
+#pragma once
+
+#include <functional>
+#include <vector>
+
+#include "harness/config/experiment.h"
+#include "harness/record.h"
+
+namespace loopbench::harness {
+
+/// Times all timing cases of the experiment, scene by scene, then its families. One record per case
+/// (kind "timing"); a case whose simulation fails keeps its row with outcome and, where it got so
+/// far, its right-hand side's time. `done` is called after each case's record is complete.
+std::vector<Record> TimeExperiment(const Experiment& experiment,
+                                   const std::function<void(const Record&)>& done);
+
+/// Number of records that TimeExperiment() will make.
+std::size_t CountTimings(const Experiment& experiment);
+
+}  // namespace loopbench::harness

@@ -1,0 +1,142 @@
+#include "tests/contract/comparison.h"
+
+#include <gtest/gtest.h>
+
+#include <cmath>
+#include <cstdio>
+#include <limits>
+
+#include "odca/odca.h"
+
+namespace loopbench::testing {
+
+namespace {
+
+constexpr int kLargestAbsolute = 20;
+
+/// Components of [angular; linear] that the space has.
+template <class Space>
+Eigen::Matrix<Real, Space::kDim, 1> InSpace(const Real6& v) {
+  if constexpr (Space::kRot == 1) {
+    return v.segment<3>(2);
+  } else {
+    return v;
+  }
+}
+
+}  // namespace
+
+double RelativeError(const VectorX<double>& a, const RealVector& b) {
+  if (!a.allFinite()) return std::numeric_limits<double>::quiet_NaN();
+  if (b.size() == 0) return 0.0;
+  const Real scale = b.lpNorm<Eigen::Infinity>();
+  return static_cast<double>((ToReal(a) - b).lpNorm<Eigen::Infinity>() / scale);
+}
+
+template <class Space>
+Sample<Space>::Sample(const MechanismDescription& description, std::uint64_t seed,
+                      const std::optional<VectorX<double>>& q)
+    : description_(description),
+      joint_(description, Coordinates::kJoint),
+      absolute_(description, Coordinates::kAbsolute) {
+  joint_state_ = q ? WithRandomSpeeds(description, joint_, *q, seed)
+                   : ConsistentState(description, joint_, seed);
+  absolute_state_ = StateIn(absolute_, joint_, joint_state_);
+  joint_answer_ = Oracle(description, LayoutOf(joint_))
+                      .Solve(ToReal(joint_state_.q), ToReal(joint_state_.u));
+  if (num_bodies() <= kLargestAbsolute) {
+    absolute_answer_ = Oracle(description, LayoutOf(absolute_))
+                           .Solve(ToReal(absolute_state_.q), ToReal(absolute_state_.u));
+  }
+}
+
+template <class Space>
+RealVector Sample<Space>::udot(Coordinates coordinates) const {
+  if (coordinates == Coordinates::kJoint) return joint_answer_.udot;
+  if (absolute_answer_) return absolute_answer_->udot;
+  RealVector udot(absolute_.num_u());
+  for (const TreeStep& step : absolute_.tree()) {
+    const int offset = absolute_.joints()[step.joint].u_offset;
+    udot.segment<Space::kDim>(offset) = InSpace<Space>(joint_answer_.accelerations[step.child]);
+  }
+  return udot;
+}
+
+template <class Space>
+double Sample<Space>::Bound() const {
+  return 100 * std::numeric_limits<double>::epsilon() * num_bodies() / joint_answer_.rcond;
+}
+
+template <class Space>
+Comparison Sample<Space>::CompareOdca(Coordinates coordinates, SolverKind solver) const {
+  const Mechanism<Space, double>& mechanism = this->mechanism(coordinates);
+  const State& at = state(coordinates);
+  odca::Odca<Space, double> odca(mechanism, {.solver = solver});
+  odca.Start(at.q, at.u);
+  Comparison result;
+  VectorX<double> udot;
+  result.outcome = odca.Evaluate(0.0, at.q, at.u, udot);
+  if (result.outcome != Outcome::kFinished) return result;
+  result.rank = odca.diagnostics().rank;
+  result.error = RelativeError(udot, this->udot(coordinates));
+  const bool own = coordinates == Coordinates::kAbsolute && absolute_answer_;
+  const std::vector<Real6>& forces = own ? absolute_answer_->forces : joint_answer_.forces;
+  Real difference = 0, scale = 0;
+  for (int j = 0; j < static_cast<int>(description_.joints.size()); ++j) {
+    const auto force = InSpace<Space>(forces[j]);
+    const auto error = odca.JointForce(j).template cast<Real>() - force;
+    difference = std::max<Real>(difference, error.template lpNorm<Eigen::Infinity>());
+    scale = std::max<Real>(scale, force.template lpNorm<Eigen::Infinity>());
+  }
+  result.force_error = scale > 0 ? static_cast<double>(difference / scale) : 0.0;
+  return result;
+}
+
+template <class Space>
+void Family::Hold(const Sample<Space>& sample, bool as_published) {
+  const Answer& answer = sample.answer();
+  const bool good = answer.rcond > 1e-2;
+  ++samples_;
+  good_ += good;
+  smallest_rcond_ = std::min(smallest_rcond_, answer.rcond);
+  for (Coordinates coordinates : {Coordinates::kJoint, Coordinates::kAbsolute}) {
+    for (SolverKind solver : {SolverKind::kRankRevealing, SolverKind::kAsPublished}) {
+      if (solver == SolverKind::kAsPublished && !as_published) continue;
+      SCOPED_TRACE(sample.mechanism(coordinates).name() + ", " +
+                   std::string(ToString(coordinates)) + ", " + std::string(ToString(solver)) +
+                   ", rcond " + std::to_string(answer.rcond));
+      const Comparison result = sample.CompareOdca(coordinates, solver);
+      ASSERT_EQ(result.outcome, Outcome::kFinished);
+      EXPECT_EQ(result.rank, answer.rank);
+      EXPECT_LE(result.error, sample.Bound());
+      worst_ = std::max(worst_, result.error);
+      if (good) {
+        EXPECT_LE(result.error, share_ > 0.0 ? 1e-12 : sample.Bound());
+        worst_good_ = std::max(worst_good_, result.error);
+      }
+      worst_of_bound_ = std::max(worst_of_bound_, result.error / sample.Bound());
+      if (!answer.full_rank()) continue;
+      EXPECT_LE(result.force_error, sample.Bound());
+      worst_force_ = std::max(worst_force_, result.force_error);
+    }
+  }
+}
+
+void Family::Finish() {
+  EXPECT_GE(good_, share_ * samples_) << "too few samples of " << name_ << " have rcond above 1e-2";
+  char line[200];
+  std::snprintf(line, sizeof line,
+                "%3d samples, %3d with rcond > 1e-2 (smallest %.1e): worst error %.1e, where rcond "
+                "> 1e-2 %.1e; %.3f of its bound; forces %.1e",
+                samples_, good_, smallest_rcond_, worst_, worst_good_, worst_of_bound_,
+                worst_force_);
+  std::printf("%-28s %s\n", name_.c_str(), line);
+  ::testing::Test::RecordProperty(name_, line);
+}
+
+template class Sample<Planar>;
+template class Sample<Spatial>;
+template void Family::Hold(const Sample<Planar>&, bool);
+template void Family::Hold(const Sample<Spatial>&, bool);
+
+}  // namespace loopbench::testing

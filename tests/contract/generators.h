@@ -1,0 +1,83 @@
+// Seeded random mechanisms with consistent states, for tests that compare with the oracle.
+//
+// A sample is a description whose tree joints all carry their coordinate as initial value; its loops
+// are closed by construction: the frames of a closing joint are defined from the pose. The same
+// (family, size, seed) gives the same sample everywhere.
+#pragma once
+
+#include <cstdint>
+#include <random>
+#include <string>
+#include <vector>
+
+#include "mechanism/assembly.h"
+#include "tests/contract/oracle.h"
+
+namespace loopbench::testing {
+
+/// Uniform and normal numbers from 64 random bits: the same with every standard library.
+class Random {
+ public:
+  explicit Random(std::uint64_t seed) : generator_(seed * 0x9E3779B97F4A7C15u + 1) {}
+  double Uniform(double low, double high) {
+    return low + (high - low) * static_cast<double>(generator_() >> 11) * 0x1p-53;
+  }
+  int Below(int n) { return static_cast<int>(Uniform(0.0, n)); }
+  bool Chance(double p) { return Uniform(0.0, 1.0) < p; }
+  Eigen::Vector3d Vector(double size, bool spatial) {
+    Eigen::Vector3d v(Uniform(-size, size), Uniform(-size, size), 0.0);
+    if (spatial) v.z() = Uniform(-size, size);
+    return v;
+  }
+
+ private:
+  std::mt19937_64 generator_;
+};
+
+/// Closed chain of n >= 3 bodies between two ground points, revolute joints with random arms. In
+/// space n >= 7 has axes in all directions; fewer bodies need axes through one point to move.
+MechanismDescription RandomChain(int n, SpaceKind space, std::uint64_t seed);
+
+/// Spherical linkage: a closed chain in space whose n + 1 axes meet in one point; three of the five
+/// rows of its closure are redundant.
+MechanismDescription SphericalChain(int n, std::uint64_t seed);
+
+/// Open tree of n bodies: revolute, prismatic, weld, free joints, reversed ones among them; the last
+/// body floats.
+MechanismDescription RandomTree(int n, SpaceKind space, std::uint64_t seed);
+
+/// Ladder of n windows. Plane: cranks and couplers of random shape about the parallelogram's. Space:
+/// cranks joined by couplers of six links, axes in all directions; four joints of each may be free.
+MechanismDescription RandomLadder(int n, SpaceKind space, bool free_joints, std::uint64_t seed);
+
+/// Tree of n bodies with closing joints between random bodies; loops share bodies. A part of the
+/// tree joints is free. Closures are independent: draws that are over-constrained somewhere are
+/// drawn again.
+MechanismDescription RandomGraph(int n, int loops, SpaceKind space, double free_joints,
+                                 std::uint64_t seed);
+
+/// The same with short loops and without that care: parts are rigid or over-constrained.
+MechanismDescription RedundantGraph(int n, int loops, SpaceKind space, std::uint64_t seed);
+
+/// A state of a mechanism: (q, u) in its own coordinates, rounded to double.
+struct State {
+  VectorX<double> q, u;
+};
+
+/// The description's coordinates with random speeds that satisfy the loops; joint coordinates.
+template <class Space>
+State ConsistentState(const MechanismDescription& description,
+                      const Mechanism<Space, double>& mechanism, std::uint64_t seed);
+
+/// Random speeds that satisfy the loops at given coordinates, in any coordinate set.
+template <class Space>
+State WithRandomSpeeds(const MechanismDescription& description,
+                       const Mechanism<Space, double>& mechanism, const VectorX<double>& q,
+                       std::uint64_t seed);
+
+/// The same state in another coordinate set.
+template <class Space>
+State StateIn(const Mechanism<Space, double>& other, const Mechanism<Space, double>& mechanism,
+              const State& state);
+
+}  // namespace loopbench::testing

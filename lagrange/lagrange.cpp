@@ -62,12 +62,11 @@ Outcome Lagrange<Space, S>::FactorAugmented() {
   augmented_.bottomLeftCorner(m, n) = J_;
   augmented_.bottomRightCorner(m, m).setZero();
   lu_.compute(augmented_);
-  // Eigen's estimate is meaningless behind an exactly zero pivot
-  const bool lost_pivot = (lu_.matrixLU().diagonal().array() == S(0)).any();
-  const S rcond = lost_pivot ? S(0) : lu_.rcond();
+  const auto pivots = lu_.matrixLU().diagonal().cwiseAbs();
+  const S rcond = pivots.minCoeff() / pivots.maxCoeff();
   diagnostics_.rank = Base::LoopRank(0);
   diagnostics_.rcond = static_cast<double>(rcond);
-  // below a few eps the matrix cannot be told from a singular one
+  // a pivot below a few eps of the largest is round-off of the elimination
   return rcond > S(16) * std::numeric_limits<S>::epsilon() ? Outcome::kFinished
                                                            : Outcome::kSingular;
 }

@@ -2,6 +2,7 @@
 
 #include <Eigen/LU>
 #include <algorithm>
+#include <cmath>
 #include <stdexcept>
 
 #include "mechanism/instantiate.h"
@@ -41,12 +42,17 @@ Pose<Spatial, S> Cast(const Pose<Spatial, double>& X) {
   return {X.R.template cast<S>(), X.p.template cast<S>()};
 }
 
-/// Turns z (revolute) or x (prismatic) onto the joint's axis.
+/// Turns z (revolute) or x (prismatic) onto the joint's axis, by the shortest rotation.
 Eigen::Matrix3d Alignment(const JointDescription& joint) {
   if (joint.axis.isZero()) return Eigen::Matrix3d::Identity();
-  const Eigen::Vector3d own =
-      joint.type == JointType::kPrismatic ? Eigen::Vector3d::UnitX() : Eigen::Vector3d::UnitZ();
-  return Eigen::Quaterniond::FromTwoVectors(own, joint.axis).toRotationMatrix();
+  const bool prismatic = joint.type == JointType::kPrismatic;
+  const Eigen::Vector3d own = prismatic ? Eigen::Vector3d::UnitX() : Eigen::Vector3d::UnitZ();
+  const Eigen::Vector3d axis = joint.axis.normalized(), normal = own.cross(axis);
+  const double s = normal.norm(), c = own.dot(axis);
+  // axis parallel to its own: nothing, or half a turn about y (perpendicular to x and to z)
+  if (s == 0.0 && c > 0.0) return Eigen::Matrix3d::Identity();
+  const Eigen::Vector3d about = s == 0.0 ? Eigen::Vector3d::UnitY() : Eigen::Vector3d(normal / s);
+  return Eigen::AngleAxisd(std::atan2(s, c), about).toRotationMatrix();
 }
 
 template <class Space, class S>

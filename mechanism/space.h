@@ -24,6 +24,10 @@ struct Spatial {
   static constexpr int kDim = 6;
 };
 
+/// The small functions below run several times per body and evaluation; a call costs more than they
+/// do.
+#define LOOPBENCH_INLINE [[gnu::always_inline]] inline
+
 template <class S>
 using VectorX = Eigen::Matrix<S, Eigen::Dynamic, 1>;
 template <class S>
@@ -49,38 +53,44 @@ using Rotation = Eigen::Matrix<S, Space::kLin, Space::kLin>;
 
 /// w x r.
 template <class S>
-Eigen::Matrix<S, 2, 1> Cross(const Eigen::Matrix<S, 1, 1>& w, const Eigen::Matrix<S, 2, 1>& r) {
+LOOPBENCH_INLINE Eigen::Matrix<S, 2, 1> Cross(const Eigen::Matrix<S, 1, 1>& w,
+                                              const Eigen::Matrix<S, 2, 1>& r) {
   return {-w[0] * r[1], w[0] * r[0]};
 }
 template <class S>
-Eigen::Matrix<S, 3, 1> Cross(const Eigen::Matrix<S, 3, 1>& w, const Eigen::Matrix<S, 3, 1>& r) {
+LOOPBENCH_INLINE Eigen::Matrix<S, 3, 1> Cross(const Eigen::Matrix<S, 3, 1>& w,
+                                              const Eigen::Matrix<S, 3, 1>& r) {
   return w.cross(r);
 }
 
 /// r x f, a moment.
 template <class S>
-Eigen::Matrix<S, 1, 1> Moment(const Eigen::Matrix<S, 2, 1>& r, const Eigen::Matrix<S, 2, 1>& f) {
+LOOPBENCH_INLINE Eigen::Matrix<S, 1, 1> Moment(const Eigen::Matrix<S, 2, 1>& r,
+                                               const Eigen::Matrix<S, 2, 1>& f) {
   return Eigen::Matrix<S, 1, 1>(r[0] * f[1] - r[1] * f[0]);
 }
 template <class S>
-Eigen::Matrix<S, 3, 1> Moment(const Eigen::Matrix<S, 3, 1>& r, const Eigen::Matrix<S, 3, 1>& f) {
+LOOPBENCH_INLINE Eigen::Matrix<S, 3, 1> Moment(const Eigen::Matrix<S, 3, 1>& r,
+                                               const Eigen::Matrix<S, 3, 1>& f) {
   return r.cross(f);
 }
 
 /// a x b of two angular vectors: zero in the plane.
 template <class S>
-Eigen::Matrix<S, 1, 1> CrossAngular(const Eigen::Matrix<S, 1, 1>&, const Eigen::Matrix<S, 1, 1>&) {
+LOOPBENCH_INLINE Eigen::Matrix<S, 1, 1> CrossAngular(const Eigen::Matrix<S, 1, 1>&,
+                                                     const Eigen::Matrix<S, 1, 1>&) {
   return Eigen::Matrix<S, 1, 1>::Zero();
 }
 template <class S>
-Eigen::Matrix<S, 3, 1> CrossAngular(const Eigen::Matrix<S, 3, 1>& a,
-                                    const Eigen::Matrix<S, 3, 1>& b) {
+LOOPBENCH_INLINE Eigen::Matrix<S, 3, 1> CrossAngular(const Eigen::Matrix<S, 3, 1>& a,
+                                                     const Eigen::Matrix<S, 3, 1>& b) {
   return a.cross(b);
 }
 
 /// Motion of a body at c + r from its motion at c: [w; v + w x r].
 template <class Space, class S>
-Motion<Space, S> ShiftMotion(const Motion<Space, S>& V, const Linear<Space, S>& r) {
+LOOPBENCH_INLINE Motion<Space, S> ShiftMotion(const Motion<Space, S>& V,
+                                              const Linear<Space, S>& r) {
   Motion<Space, S> shifted = V;
   const Angular<Space, S> w = V.template head<Space::kRot>();
   shifted.template tail<Space::kLin>() += Cross<S>(w, r);
@@ -89,7 +99,7 @@ Motion<Space, S> ShiftMotion(const Motion<Space, S>& V, const Linear<Space, S>& 
 
 /// The same force at c instead of c + r: [moment + r x f; f].
 template <class Space, class S>
-Motion<Space, S> ShiftForce(const Motion<Space, S>& F, const Linear<Space, S>& r) {
+LOOPBENCH_INLINE Motion<Space, S> ShiftForce(const Motion<Space, S>& F, const Linear<Space, S>& r) {
   Motion<Space, S> shifted = F;
   const Linear<Space, S> f = F.template tail<Space::kLin>();
   shifted.template head<Space::kRot>() += Moment<S>(r, f);
@@ -125,7 +135,7 @@ struct Pose<Spatial, S> {
 /// X_AC = X_AB * X_BC. The matrix is the product of the two; `SetAngle` refreshes it from the
 /// angle.
 template <class S>
-Pose<Planar, S> Compose(const Pose<Planar, S>& X_AB, const Pose<Planar, S>& X_BC) {
+LOOPBENCH_INLINE Pose<Planar, S> Compose(const Pose<Planar, S>& X_AB, const Pose<Planar, S>& X_BC) {
   Pose<Planar, S> X;
   X.angle = X_AB.angle + X_BC.angle;
   X.R.noalias() = X_AB.R * X_BC.R;
@@ -133,13 +143,14 @@ Pose<Planar, S> Compose(const Pose<Planar, S>& X_AB, const Pose<Planar, S>& X_BC
   return X;
 }
 template <class S>
-Pose<Spatial, S> Compose(const Pose<Spatial, S>& X_AB, const Pose<Spatial, S>& X_BC) {
+LOOPBENCH_INLINE Pose<Spatial, S> Compose(const Pose<Spatial, S>& X_AB,
+                                          const Pose<Spatial, S>& X_BC) {
   return {X_AB.R * X_BC.R, X_AB.p + X_AB.R * X_BC.p};
 }
 
 /// X_BA from X_AB.
 template <class S>
-Pose<Planar, S> Inverse(const Pose<Planar, S>& X_AB) {
+LOOPBENCH_INLINE Pose<Planar, S> Inverse(const Pose<Planar, S>& X_AB) {
   Pose<Planar, S> X;
   X.angle = -X_AB.angle;
   X.R = X_AB.R.transpose();
@@ -147,7 +158,7 @@ Pose<Planar, S> Inverse(const Pose<Planar, S>& X_AB) {
   return X;
 }
 template <class S>
-Pose<Spatial, S> Inverse(const Pose<Spatial, S>& X_AB) {
+LOOPBENCH_INLINE Pose<Spatial, S> Inverse(const Pose<Spatial, S>& X_AB) {
   Pose<Spatial, S> X;
   X.R = X_AB.R.transpose();
   X.p = -(X.R * X_AB.p);

@@ -1,11 +1,8 @@
 #include "reduction/reduction.h"
 
-#include <Eigen/QR>
 #include <algorithm>
 #include <limits>
 #include <numeric>
-
-#include "mechanism/loop_solver.h"
 
 namespace loopbench::reduction {
 
@@ -17,15 +14,6 @@ std::vector<int> Complement(const std::vector<int>& chosen, int n) {
     if (std::ranges::find(chosen, i) == chosen.end()) rest.push_back(i);
   }
   return rest;
-}
-
-/// The first `rank` pivots of a column-pivoted QR, ascending.
-template <class QR>
-std::vector<int> FirstPivots(const QR& qr, int rank) {
-  std::vector<int> pivots(rank);
-  for (int i = 0; i < rank; ++i) pivots[i] = static_cast<int>(qr.colsPermutation().indices()[i]);
-  std::ranges::sort(pivots);
-  return pivots;
 }
 
 }  // namespace
@@ -48,8 +36,8 @@ Outcome Reduction<Space, S>::Start(const VectorX<S>& q, const VectorX<S>& u) {
   const int n = mechanism_.num_u(), m = mechanism_.num_rows();
   const bool fixed = Base::options_.solver == SolverKind::kAsPublished;
   // as published knows no redundancy: as many dependent speeds as constraints
-  const int rank = fixed ? std::min(m, n) : GeometricRank();
-  Partition partition = BestPartition(rank);
+  const int rank = fixed ? std::min(m, n) : GeometricRank(kinematics_, dynamics_, J_);
+  Partition<S> partition = BestPartition(J_, rank);
   if (fixed) {
     const std::vector<int>& wanted = mechanism_.independent();
     if (static_cast<int>(wanted.size()) == n - rank) partition.dependent = Complement(wanted, n);
@@ -72,40 +60,7 @@ int Reduction<Space, S>::state_speed(int i) const {
 }
 
 template <class Space, class S>
-int Reduction<Space, S>::GeometricRank() {
-  std::vector<int> rows;
-  for (int index : mechanism_.constraints()) {
-    rows.push_back(mechanism_.joints()[index].kind->num_constraints());
-  }
-  LoopSolver<S> loop(rows);
-  if (loop.size() == 0) return 0;
-  for (int j = 0; j < static_cast<int>(rows.size()); ++j) {
-    loop.SetScale(
-        j, FreeResponse(kinematics_, mechanism_.geometric_bodies(), mechanism_.constraints()[j]));
-  }
-  MatrixX<S> M;
-  dynamics_.MassMatrix(kinematics_, mechanism_.geometric_bodies(), M);
-  const MatrixX<S> response = J_ * M.llt().solve(J_.transpose());
-  loop.FactorGeometric(response);
-  return loop.rank();
-}
-
-template <class Space, class S>
-typename Reduction<Space, S>::Partition Reduction<Space, S>::BestPartition(int rank) const {
-  using std::abs;
-  Partition partition;
-  if (rank == 0) return partition;
-  partition.dependent = FirstPivots(Eigen::ColPivHouseholderQR<MatrixX<S>>(J_), rank);
-  MatrixX<S> transposed(rank, J_.rows());
-  for (int i = 0; i < rank; ++i) transposed.row(i) = J_.col(partition.dependent[i]).transpose();
-  const Eigen::ColPivHouseholderQR<MatrixX<S>> qr(transposed);
-  partition.rows = FirstPivots(qr, rank);
-  partition.rcond = abs(qr.matrixQR()(rank - 1, rank - 1)) / abs(qr.matrixQR()(0, 0));
-  return partition;
-}
-
-template <class Space, class S>
-void Reduction<Space, S>::SetPartition(const Partition& partition) {
+void Reduction<Space, S>::SetPartition(const Partition<S>& partition) {
   const int n = mechanism_.num_u();
   dependent_ = partition.dependent;
   rows_ = partition.rows;
@@ -131,7 +86,8 @@ Outcome Reduction<Space, S>::FactorOnce() {
   const int r = static_cast<int>(dependent_.size());
   diagnostics_.rank = Base::LoopRank(mechanism_.num_rows() - r);
   diagnostics_.rcond = 0.0;
-  if (static_cast<int>(rows_.size()) > r) return Outcome::kSingular;  // redundant, as published
+  // more rows than dependent speeds: redundant constraints, as published; or a rank that has grown
+  if (static_cast<int>(rows_.size()) > r || outgrown_) return Outcome::kSingular;
   dynamics_.Jacobian(kinematics_, J_);
   for (int k = 0; k < r; ++k) {
     for (int i = 0; i < r; ++i) J_D_(k, i) = J_(rows_[k], dependent_[i]);
@@ -140,12 +96,11 @@ Outcome Reduction<Space, S>::FactorOnce() {
   S rcond = S(1);
   if (r > 0) {
     lu_.compute(J_D_);
-    // Eigen's estimate is meaningless behind an exactly zero pivot
-    const bool lost_pivot = (lu_.matrixLU().diagonal().array() == S(0)).any();
-    rcond = lost_pivot ? S(0) : lu_.rcond();
+    const auto pivots = lu_.matrixLU().diagonal().cwiseAbs();
+    rcond = pivots.minCoeff() / pivots.maxCoeff();
   }
   diagnostics_.rcond = static_cast<double>(rcond);
-  // below a few eps the matrix cannot be told from a singular one
+  // a pivot below a few eps of the largest is round-off of the elimination
   if (!(rcond > S(16) * std::numeric_limits<S>::epsilon())) return Outcome::kSingular;
   if (r > 0) solved_ = lu_.solve(J_I_);
   for (int i = 0; i < J_I_.cols(); ++i) B_(independent_[i], i) = S(1);
@@ -190,18 +145,14 @@ Outcome Reduction<Space, S>::Accelerations() {
 
 template <class Space, class S>
 bool Reduction<Space, S>::ChangeMode() {
-  if (Base::options_.solver == SolverKind::kAsPublished || dependent_.empty()) return false;
+  if (Base::options_.solver == SolverKind::kAsPublished || J_.rows() == 0) return false;
   dynamics_.Jacobian(kinematics_, J_);
-  const Partition best = BestPartition(static_cast<int>(dependent_.size()));
-  MatrixX<S> current(rows_.size(), dependent_.size());
-  for (std::size_t k = 0; k < rows_.size(); ++k) {
-    for (std::size_t i = 0; i < dependent_.size(); ++i) {
-      current(k, i) = J_(rows_[k], dependent_[i]);
-    }
-  }
-  const Eigen::ColPivHouseholderQR<MatrixX<S>> qr(current);
-  const auto pivots = qr.matrixQR().diagonal().cwiseAbs();
-  if (pivots.minCoeff() >= S(kReplaceBelow) * best.rcond * pivots.maxCoeff()) return false;
+  // started at a singular position, the partition leaves constraints out that now hold again
+  outgrown_ = GeometricRank(kinematics_, dynamics_, J_) > static_cast<int>(dependent_.size());
+  if (outgrown_ || dependent_.empty()) return false;
+  const Partition<S> best = BestPartition(J_, static_cast<int>(dependent_.size()));
+  const S current = PartitionCondition(J_, {dependent_, rows_, S(1)});
+  if (current >= S(kReplaceBelow) * best.rcond) return false;
   SetPartition(best);
   return true;
 }

@@ -12,8 +12,10 @@
 // rows than dependent speeds. Automatic ("rank-revealing"): at the start the rank is taken from the
 // geometric response of loop_solver.h, dependent speeds and as many rows from QR of J with
 // pivoting; at each accepted step a partition whose conditioning has fallen below a tenth of the
-// best one's is replaced, which changes the state and restarts the integrator. The rank stays that
-// of the start. J_D is factored by LU either way. Start() and BeginStep() may allocate.
+// best one's is replaced, which changes the state and restarts the integrator. The number of
+// dependent speeds stays that of the start; where the rank has grown beyond it (a start in a
+// singular position) the run ends as `singular`. J_D is factored by LU either way. Start() and
+// BeginStep() may allocate.
 #pragma once
 
 #include <Eigen/Cholesky>
@@ -21,6 +23,7 @@
 
 #include "mechanism/formulation.h"
 #include "mechanism/tree_dynamics.h"
+#include "reduction/partition.h"
 
 namespace loopbench::reduction {
 
@@ -44,18 +47,8 @@ class Reduction final : public Formulation<Space, S> {
   Outcome Accelerations() override;
   bool ChangeMode() override;
 
-  /// Which speeds follow from which rows of J.
-  struct Partition {
-    std::vector<int> dependent, rows;
-    S rcond = S(1);
-  };
-
   Outcome FactorOnce();
-  /// Rank of J at the current positions, from geometry.
-  int GeometricRank();
-  /// The best conditioned partition of that many dependent speeds.
-  Partition BestPartition(int rank) const;
-  void SetPartition(const Partition& partition);
+  void SetPartition(const Partition<S>& partition);
 
   using Base = Formulation<Space, S>;
   using Base::diagnostics_;
@@ -67,6 +60,7 @@ class Reduction final : public Formulation<Space, S> {
   TreeDynamics<Space, S> dynamics_;
   std::vector<int> independent_, dependent_, rows_;
   long factored_version_ = -1;
+  bool outgrown_ = false;  ///< the rank exceeds the partition's
   MatrixX<S> M_, J_, J_D_, J_I_, solved_, B_, MB_, reduced_;
   VectorX<S> h_, gamma_, c_, residual_, rows_rhs_, dependent_speeds_, independent_speeds_;
   Eigen::PartialPivLU<MatrixX<S>> lu_;

@@ -108,7 +108,8 @@ TEST(AccelerationsTest, TreesAgreeWithTheOracle) {
 }
 
 TEST(AccelerationsTest, LaddersAgreeWithTheOracle) {
-  Family plane("ladders, plane", kShare), space("ladders, space", kShare), flat("planar ladders in space", kShare);
+  Family plane("ladders, plane", kShare), space("ladders, space", kShare),
+      flat("planar ladders in space", kShare);
   for (int n = 1; n <= 4; ++n) {
     for (std::uint64_t seed = 1; seed <= 5; ++seed) {
       plane.Hold(Sample<Planar>(RandomLadder(n, kPlane, false, seed), seed), true);
@@ -123,7 +124,8 @@ TEST(AccelerationsTest, LaddersAgreeWithTheOracle) {
 }
 
 TEST(AccelerationsTest, GraphsWithCoupledLoopsAgreeWithTheOracle) {
-  Family plane("graphs, plane", kShare), space("graphs, space", kShare), flat("planar graphs in space", kShare);
+  Family plane("graphs, plane", kShare), space("graphs, space", kShare),
+      flat("planar graphs in space", kShare);
   for (int loops = 1; loops <= 6; ++loops) {
     for (std::uint64_t seed = 1; seed <= 4; ++seed) {
       const int n = 8 + 8 * loops;

@@ -42,8 +42,8 @@ Sample<Space>::Sample(const MechanismDescription& description, std::uint64_t see
   joint_state_ = q ? WithRandomSpeeds(description, joint_, *q, seed)
                    : ConsistentState(description, joint_, seed);
   absolute_state_ = StateIn(absolute_, joint_, joint_state_);
-  joint_answer_ = Oracle(description, LayoutOf(joint_))
-                      .Solve(ToReal(joint_state_.q), ToReal(joint_state_.u));
+  joint_answer_ =
+      Oracle(description, LayoutOf(joint_)).Solve(ToReal(joint_state_.q), ToReal(joint_state_.u));
   if (num_bodies() <= kLargestAbsolute) {
     absolute_answer_ = Oracle(description, LayoutOf(absolute_))
                            .Solve(ToReal(absolute_state_.q), ToReal(absolute_state_.u));

@@ -61,8 +61,8 @@ class Family {
   /// At least `share` of the samples must have rcond above 1e-2, and these are held to 1e-12. A
   /// share of zero: the bound with rcond alone.
   Family(const std::string& name, double share) : name_(name), share_(share) {}
-  /// Holds both coordinate sets and the given solvers to the sample's bound, joint forces where they
-  /// are unique.
+  /// Holds both coordinate sets and the given solvers to the sample's bound, joint forces where
+  /// they are unique.
   template <class Space>
   void Hold(const Sample<Space>& sample, bool as_published);
   /// Prints and records the worst.

@@ -27,11 +27,10 @@ struct Case {
 };
 
 std::string NameOf(const ::testing::TestParamInfo<Case>& info) {
-  std::string name = std::string(info.param.formulation) + "_" +
-                     std::string(ToString(info.param.enforcement)) + "_" +
-                     std::string(ToString(info.param.solver)) + "_" +
-                     std::string(ToString(info.param.coordinates)) + "_" +
-                     std::string(ToString(info.param.space));
+  std::string name =
+      std::string(info.param.formulation) + "_" + std::string(ToString(info.param.enforcement)) +
+      "_" + std::string(ToString(info.param.solver)) + "_" +
+      std::string(ToString(info.param.coordinates)) + "_" + std::string(ToString(info.param.space));
   for (char& c : name) c = c == '-' ? '_' : c;
   return name;
 }
@@ -155,7 +154,8 @@ TEST_P(ContractTest, VelocityLevelSatisfiesTheLoops) {
     Oracle oracle(bench.sample.description(), LayoutOf(bench.mechanism));
     const RealVector u = ToReal(bench.formulation->u());
     const RealMatrix J = oracle.Form(ToReal(bench.formulation->q()), u).J;
-    const Real scale = J.cwiseAbs().rowwise().sum().maxCoeff() * u.template lpNorm<Eigen::Infinity>();
+    const Real scale =
+        J.cwiseAbs().rowwise().sum().maxCoeff() * u.template lpNorm<Eigen::Infinity>();
     EXPECT_LE((J * u).template lpNorm<Eigen::Infinity>(), bench.Bound() * scale);
   });
 }
@@ -181,8 +181,8 @@ TEST_P(ContractTest, NotANumberEndsWithANamedOutcome) {
     ASSERT_EQ(bench.Derivative(bench.y), Outcome::kFinished);
     const std::vector<double> good = bench.ydot;
     const std::size_t first_speed = bench.mechanism.num_q();
-    for (double bad : {std::numeric_limits<double>::quiet_NaN(),
-                       std::numeric_limits<double>::infinity()}) {
+    for (double bad :
+         {std::numeric_limits<double>::quiet_NaN(), std::numeric_limits<double>::infinity()}) {
       for (std::size_t i : {std::size_t{0}, first_speed - 1, first_speed, bench.y.size() - 1}) {
         std::vector<double> y = bench.y;
         y[i] = bad;

@@ -1,4 +1,5 @@
-// Dense linear algebra of the oracle in long double, in plain loops: small to compile, easy to read.
+// Dense linear algebra of the oracle in long double, in plain loops: small to compile, easy to
+// read.
 #pragma once
 
 #include <Eigen/Core>
@@ -10,8 +11,9 @@ namespace loopbench::testing {
 using RealVector = Eigen::Matrix<Real, Eigen::Dynamic, 1>;
 using RealMatrix = Eigen::Matrix<Real, Eigen::Dynamic, Eigen::Dynamic>;
 
-/// x with A x = b by elimination with full pivoting. Pivots below `zero` times the largest entry end
-/// the elimination: unknowns not reached are zero, and consistent equations left over are satisfied.
+/// x with A x = b by elimination with full pivoting. Pivots below `zero` times the largest entry
+/// end the elimination: unknowns not reached are zero, and consistent equations left over are
+/// satisfied.
 RealVector SolveFullPivot(RealMatrix A, RealVector b, Real zero);
 
 /// Lower L with A = L L^T, A symmetric positive definite.

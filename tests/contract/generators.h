@@ -1,8 +1,9 @@
 // Seeded random mechanisms with consistent states, for tests that compare with the oracle.
 //
-// A sample is a description whose tree joints all carry their coordinate as initial value; its loops
-// are closed by construction: the frames of a closing joint are defined from the pose. The same
-// (family, size, seed) gives the same sample everywhere.
+// A sample is a description whose tree joints all carry their coordinate as initial value; its
+// loops are closed by construction: the frames of a closing joint are defined from the pose. The
+// same (family, size, seed) gives the same sample with one compiler (the order in which arguments
+// are drawn is its own).
 #pragma once
 
 #include <cstdint>
@@ -15,7 +16,7 @@
 
 namespace loopbench::testing {
 
-/// Uniform and normal numbers from 64 random bits: the same with every standard library.
+/// Uniform numbers from 53 random bits: the same with every standard library.
 class Random {
  public:
   explicit Random(std::uint64_t seed) : generator_(seed * 0x9E3779B97F4A7C15u + 1) {}
@@ -42,12 +43,13 @@ MechanismDescription RandomChain(int n, SpaceKind space, std::uint64_t seed);
 /// rows of its closure are redundant.
 MechanismDescription SphericalChain(int n, std::uint64_t seed);
 
-/// Open tree of n bodies: revolute, prismatic, weld, free joints, reversed ones among them; the last
-/// body floats.
+/// Open tree of n bodies: revolute, prismatic, weld, free joints, reversed ones among them; the
+/// last body floats.
 MechanismDescription RandomTree(int n, SpaceKind space, std::uint64_t seed);
 
-/// Ladder of n windows. Plane: cranks and couplers of random shape about the parallelogram's. Space:
-/// cranks joined by couplers of six links, axes in all directions; four joints of each may be free.
+/// Ladder of n windows. Plane: cranks and couplers of random shape about the parallelogram's.
+/// Space: cranks joined by couplers of six links, axes in all directions; four joints of each may
+/// be free.
 MechanismDescription RandomLadder(int n, SpaceKind space, bool free_joints, std::uint64_t seed);
 
 /// Tree of n bodies with closing joints between random bodies; loops share bodies. A part of the

@@ -80,7 +80,9 @@ struct JetPose {
   JetMatrix R = JetIdentity();
   JetVector p{};
 };
-inline JetPose operator*(const JetPose& a, const JetPose& b) { return {a.R * b.R, a.p + a.R * b.p}; }
+inline JetPose operator*(const JetPose& a, const JetPose& b) {
+  return {a.R * b.R, a.p + a.R * b.p};
+}
 inline JetPose Inverted(const JetPose& a) {
   const JetMatrix R = Transposed(a.R);
   return {R, -(R * a.p)};

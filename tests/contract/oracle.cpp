@@ -130,14 +130,14 @@ Answer Oracle::Solve(const RealVector& q, const RealVector& u) {
   const Equations e = Form(q, u);
   const int n = layout_.num_u, m = static_cast<int>(e.J.rows());
   Answer answer;
-  Rank(e, answer);
+  // rows in units of what their joint's own bodies answer; redundant ones may be zero
+  const RealMatrix row_scale = JointScales();
+  const RealMatrix J = row_scale * e.J;
+  Rank(e.M, J, answer);
   const RealVector scale = e.M.diagonal().cwiseSqrt().cwiseInverse();
   RealMatrix A = RealMatrix::Zero(n + m, n + m);
   A.topLeftCorner(n, n) = scale.asDiagonal() * e.M * scale.asDiagonal();
-  A.bottomLeftCorner(m, n) = e.J * scale.asDiagonal();
-  // one factor for all rows: redundant ones may be zero
-  const Real row_scale = m > 0 ? 1 / A.bottomLeftCorner(m, n).rowwise().norm().maxCoeff() : 1;
-  A.bottomLeftCorner(m, n) *= row_scale;
+  A.bottomLeftCorner(m, n) = J * scale.asDiagonal();
   A.topRightCorner(n, m) = A.bottomLeftCorner(m, n).transpose();
   RealVector rhs(n + m);
   rhs << -(scale.cwiseProduct(e.h)), row_scale * e.gamma;
@@ -147,35 +147,41 @@ Answer Oracle::Solve(const RealVector& q, const RealVector& u) {
   for (std::size_t b = 0; b < poses_.size(); ++b) {
     answer.accelerations.push_back(bias_[b] + G_.middleRows<6>(6 * b) * answer.udot);
   }
-  JointForces(-row_scale * x.tail(m), answer);
+  JointForces(-row_scale.transpose() * x.tail(m), answer);
   return answer;
 }
 
-void Oracle::Rank(const Equations& e, Answer& answer) const {
-  answer.rows = answer.rank = static_cast<int>(e.J.rows());
-  if (answer.rows == 0) return;
-  RealMatrix K_inverse = RealMatrix::Zero(answer.rows, answer.rows);
+/// K^-1 of every constraint along the diagonal, K K^T the response across it of its two bodies
+/// alone.
+RealMatrix Oracle::JointScales() const {
   const std::vector<Row> rows = Rows(poses_);
-  for (int first = 0, last = 0; first < answer.rows; first = last) {
-    while (last < answer.rows && rows[last].joint == rows[first].joint) ++last;
+  const int num_rows = static_cast<int>(rows.size());
+  RealMatrix K_inverse = RealMatrix::Zero(num_rows, num_rows);
+  for (int first = 0, last = 0; first < num_rows; first = last) {
+    while (last < num_rows && rows[last].joint == rows[first].joint) ++last;
     const JointDescription& joint = description_.joints[rows[first].joint];
     const JetPose X_WM = poses_[joint.to.body] * frames_[rows[first].joint].X_QM;
-    RealMatrix X = RealMatrix::Zero(last - first, last - first);
+    const int size = last - first;
+    RealMatrix X = RealMatrix::Zero(size, size);
     for (int body : {joint.from.body, joint.to.body}) {
       if (body == kGround) continue;
-      RealMatrix F(6, last - first);
+      RealMatrix F(6, size), A(6, size);
       const Real3 r = ValueOf(X_WM.p, &Jet::f) - ValueOf(poses_[body].p, &Jet::f);
-      for (int i = first; i < last; ++i) F.col(i - first) = AtCom(rows[i].wrench, r);
-      RealMatrix A(6, last - first);
+      for (int i = 0; i < size; ++i) F.col(i) = AtCom(rows[first + i].wrench, r);
       A << InertiaInGround(body, poses_[body]).inverse() * F.topRows<3>(),
           F.bottomRows<3>() / Real(description_.bodies[body].mass);
       X += F.transpose() * A;
     }
-    const int size = last - first;
     K_inverse.block(first, first, size, size) =
         SolveLower(CholeskyFactor(X), RealMatrix::Identity(size, size));
   }
-  const RealMatrix W = SolveLower(CholeskyFactor(e.M), (K_inverse * e.J).transpose());
+  return K_inverse;
+}
+
+void Oracle::Rank(const RealMatrix& M, const RealMatrix& J, Answer& answer) const {
+  answer.rows = answer.rank = static_cast<int>(J.rows());
+  if (answer.rows == 0) return;
+  const RealMatrix W = SolveLower(CholeskyFactor(M), J.transpose());
   const RealVector lambda = SymmetricEigenvalues(W.transpose() * W);
   // squares of lengths: rounding the state to double leaves 1e-32, forming the product 1e-19
   const Real zero = Real(1e-14) * lambda[answer.rows - 1];
@@ -262,8 +268,8 @@ Real Oracle::TotalEnergy(const RealVector& q, const RealVector& u) const {
       energy += spring->stiffness * stretch * stretch / 2;
     } else if (const auto* point = std::get_if<PointForce>(&force); point && !point->in_body_axes) {
       const Real3 r = (point->at - description_.bodies[point->body].com).cast<Real>();
-      const Real3 p = ValueOf(poses[point->body].p, &Jet::f) +
-                      ValueOf(poses[point->body].R, &Jet::f) * r;
+      const Real3 p =
+          ValueOf(poses[point->body].p, &Jet::f) + ValueOf(poses[point->body].R, &Jet::f) * r;
       energy -= point->force.cast<Real>().dot(p);
     }
   }

@@ -1,8 +1,8 @@
 // An oracle for accelerations, independent of the project's kinematics.
 //
-// Body poses as functions of q come from composing joint transforms, written anew (and compared with
-// JointKind::transform in tests/mechanism/joint_test.cpp). Jacobians and velocity terms follow by
-// differentiating those functions along curves q(t) (jet.h), all in long double:
+// Body poses as functions of q come from composing joint transforms, written anew (and compared
+// with JointKind::transform in tests/mechanism/joint_test.cpp). Jacobians and velocity terms follow
+// by differentiating those functions along curves q(t) (jet.h), all in long double:
 //
 //   G_i   = d/dt of all poses along q' = N e_i             column i of the bodies' Jacobian
 //   A_0   = d2/dt2 of all poses along q' = N u, udot = 0   what the speeds alone do
@@ -113,7 +113,9 @@ class Oracle {
   Jet Coordinate(int joint, const std::vector<JetPose>& poses) const;
   /// Applied wrenches at the centres of mass.
   std::vector<Real6> Applied(const std::vector<JetPose>& poses) const;
-  void Rank(const Equations& equations, Answer& answer) const;
+  RealMatrix JointScales() const;
+  /// Rank and condition of the scaled rows J.
+  void Rank(const RealMatrix& M, const RealMatrix& J, Answer& answer) const;
   void JointForces(const RealVector& lambda, Answer& answer) const;
   Real33 InertiaInGround(int body, const JetPose& pose) const;
 
@@ -122,16 +124,16 @@ class Oracle {
   std::vector<Frames> frames_;
   // of the last Form()
   std::vector<JetPose> poses_;
-  RealMatrix G_;                     ///< six rows per body
+  RealMatrix G_;                      ///< six rows per body
   std::vector<Real6> bias_, needed_;  ///< A_0; wrench of inertia and gyroscopic terms less applied
 };
-
 
 /// X_FM of a joint kind, written anew. `q` holds its coordinates along a curve.
 JetPose Transform(JointType type, bool spatial, const Jet* q);
 
 template <class Derived>
-RealVector ToReal(const Eigen::MatrixBase<Derived>& v) {
+Eigen::Matrix<Real, Eigen::Dynamic, Derived::ColsAtCompileTime> ToReal(
+    const Eigen::MatrixBase<Derived>& v) {
   return v.template cast<Real>();
 }
 

@@ -51,11 +51,10 @@ JetMatrix AboutZ(const Jet& angle) {
 JetMatrix FromQuaternion(const Jet* e) {
   const Jet &w = e[0], &x = e[1], &y = e[2], &z = e[3];
   const Jet s = Reciprocal(w * w + x * x + y * y + z * z), two(2);
-  const std::array<Jet, 9> m = {w * w + x * x - y * y - z * z, two * (x * y - w * z),
-                                two * (x * z + w * y),         two * (x * y + w * z),
-                                w * w - x * x + y * y - z * z, two * (y * z - w * x),
-                                two * (x * z - w * y),         two * (y * z + w * x),
-                                w * w - x * x - y * y + z * z};
+  const std::array<Jet, 9> m = {
+      w * w + x * x - y * y - z * z, two * (x * y - w * z),         two * (x * z + w * y),
+      two * (x * y + w * z),         w * w - x * x + y * y - z * z, two * (y * z - w * x),
+      two * (x * z - w * y),         two * (y * z + w * x),         w * w - x * x - y * y + z * z};
   JetMatrix R;
   for (int i = 0; i < 9; ++i) R.m[i] = s * m[i];
   return R;
@@ -112,9 +111,7 @@ JetPose Transform(JointType type, bool spatial, const Jet* q) {
 Oracle::Oracle(const MechanismDescription& description, Layout layout)
     : description_(description), layout_(std::move(layout)) {
   for (const JointDescription& joint : description_.joints) {
-    const auto com = [&](int body) -> Real3 {
-      return description_.bodies[body].com.cast<Real>();
-    };
+    const auto com = [&](int body) -> Real3 { return description_.bodies[body].com.cast<Real>(); };
     frames_.push_back({FramePose(joint.from, joint, com(joint.from.body)),
                        FramePose(joint.to, joint, com(joint.to.body))});
   }
@@ -129,10 +126,9 @@ std::vector<Jet> Oracle::Curve(const RealVector& q, const RealVector& u) const {
     if (turned > 0) {
       // e' = w e / 2 and, w being constant, e'' = -|w|^2 e / 4 (quaternion product from the left)
       const Real *e = &q[step.q], *w = &u[step.u];
-      const Real rate[4] = {-w[0] * e[1] - w[1] * e[2] - w[2] * e[3],
-                            w[0] * e[0] + w[1] * e[3] - w[2] * e[2],
-                            w[1] * e[0] + w[2] * e[1] - w[0] * e[3],
-                            w[2] * e[0] + w[0] * e[2] - w[1] * e[1]};
+      const Real rate[4] = {
+          -w[0] * e[1] - w[1] * e[2] - w[2] * e[3], w[0] * e[0] + w[1] * e[3] - w[2] * e[2],
+          w[1] * e[0] + w[2] * e[1] - w[0] * e[3], w[2] * e[0] + w[0] * e[2] - w[1] * e[1]};
       const Real ww = w[0] * w[0] + w[1] * w[1] + w[2] * w[2];
       for (int i = 0; i < 4; ++i) curve[step.q + i] = Jet(e[i], rate[i] / 2, -ww * e[i] / 4);
     }

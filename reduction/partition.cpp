@@ -1,0 +1,80 @@
+#include "reduction/partition.h"
+
+#include <Eigen/Cholesky>
+#include <Eigen/QR>
+#include <algorithm>
+#include <cmath>
+
+#include "mechanism/loop_solver.h"
+
+namespace loopbench::reduction {
+
+namespace {
+
+/// The first `rank` pivots of a column-pivoted QR, ascending.
+template <class QR>
+std::vector<int> FirstPivots(const QR& qr, int rank) {
+  std::vector<int> pivots(rank);
+  for (int i = 0; i < rank; ++i) pivots[i] = static_cast<int>(qr.colsPermutation().indices()[i]);
+  std::ranges::sort(pivots);
+  return pivots;
+}
+
+}  // namespace
+
+template <class Space, class S>
+int GeometricRank(const Kinematics<Space, S>& kinematics, TreeDynamics<Space, S>& dynamics,
+                  const MatrixX<S>& J) {
+  const Mechanism<Space, S>& mechanism = kinematics.mechanism();
+  std::vector<int> rows;
+  for (int index : mechanism.constraints()) {
+    rows.push_back(mechanism.joints()[index].kind->num_constraints());
+  }
+  LoopSolver<S> loop(rows);
+  if (loop.size() == 0) return 0;
+  for (int j = 0; j < static_cast<int>(rows.size()); ++j) {
+    loop.SetScale(
+        j, FreeResponse(kinematics, mechanism.geometric_bodies(), mechanism.constraints()[j]));
+  }
+  MatrixX<S> M;
+  dynamics.MassMatrix(kinematics, mechanism.geometric_bodies(), M);
+  const MatrixX<S> response = J * M.llt().solve(J.transpose());
+  loop.FactorGeometric(response);
+  return loop.rank();
+}
+
+template <class S>
+Partition<S> BestPartition(const MatrixX<S>& J, int rank) {
+  using std::abs;
+  Partition<S> partition;
+  if (rank == 0) return partition;
+  partition.dependent = FirstPivots(Eigen::ColPivHouseholderQR<MatrixX<S>>(J), rank);
+  MatrixX<S> transposed(rank, J.rows());
+  for (int i = 0; i < rank; ++i) transposed.row(i) = J.col(partition.dependent[i]).transpose();
+  const Eigen::ColPivHouseholderQR<MatrixX<S>> qr(transposed);
+  partition.rows = FirstPivots(qr, rank);
+  partition.rcond = abs(qr.matrixQR()(rank - 1, rank - 1)) / abs(qr.matrixQR()(0, 0));
+  return partition;
+}
+
+template <class S>
+S PartitionCondition(const MatrixX<S>& J, const Partition<S>& partition) {
+  MatrixX<S> J_D(partition.rows.size(), partition.dependent.size());
+  for (std::size_t k = 0; k < partition.rows.size(); ++k) {
+    for (std::size_t i = 0; i < partition.dependent.size(); ++i) {
+      J_D(k, i) = J(partition.rows[k], partition.dependent[i]);
+    }
+  }
+  const Eigen::ColPivHouseholderQR<MatrixX<S>> qr(J_D);
+  const auto pivots = qr.matrixQR().diagonal().cwiseAbs();
+  return pivots.minCoeff() / pivots.maxCoeff();
+}
+
+template int GeometricRank(const Kinematics<Planar, double>&, TreeDynamics<Planar, double>&,
+                           const MatrixX<double>&);
+template int GeometricRank(const Kinematics<Spatial, double>&, TreeDynamics<Spatial, double>&,
+                           const MatrixX<double>&);
+template Partition<double> BestPartition(const MatrixX<double>&, int);
+template double PartitionCondition(const MatrixX<double>&, const Partition<double>&);
+
+}  // namespace loopbench::reduction

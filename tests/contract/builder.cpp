@@ -1,0 +1,95 @@
+#include "tests/contract/builder.h"
+
+namespace loopbench::testing {
+
+namespace {
+
+template <class Space>
+std::vector<JetPose> DescribedPoses(const MechanismDescription& description) {
+  const Mechanism<Space, double> mechanism(description, Coordinates::kJoint);
+  return Oracle(description, LayoutOf(mechanism))
+      .Poses(ToReal(DescribedCoordinates(description, mechanism)));
+}
+
+}  // namespace
+
+int Builder::AddJoint(JointType type, int parent, const Eigen::Vector3d& at_parent, int child,
+                      const Eigen::Vector3d& at_child, double q, bool turned) {
+  const int index = static_cast<int>(description.joints.size());
+  JointDescription joint;
+  joint.name = "j" + std::to_string(index);
+  joint.type = type;
+  joint.from = {parent, at_parent, Eigen::Vector3d::Zero()};
+  joint.to = {child, at_child, Eigen::Vector3d::Zero()};
+  if (turned) joint.from.rotation = RandomTurn(), joint.to.rotation = RandomTurn();
+  if (type == JointType::kPrismatic && random.Chance(0.5)) {
+    joint.axis = random.Vector(1.0, spatial) + 1.5 * Eigen::Vector3d::UnitX();
+  }
+  if (type == JointType::kRevolute && spatial && random.Chance(0.5)) {
+    joint.axis = random.Vector(1.0, spatial) + 1.5 * Eigen::Vector3d::UnitZ();
+  }
+  if (turned && random.Chance(0.3)) std::swap(joint.from, joint.to);
+  description.joints.push_back(joint);
+  parent_[child] = parent;
+  dof_[child] = type == JointType::kWeld ? 0 : 1;
+  if (type == JointType::kFree) dof_[child] = spatial ? 6 : 3;
+  std::vector<double> values(dof_[child], q);
+  if (type == JointType::kFree) {
+    values.resize(spatial ? 7 : 3);
+    for (double& value : values) value = random.Uniform(-1.0, 1.0);
+  }
+  if (!values.empty()) description.initial.coordinates.push_back({index, values});
+  return index;
+}
+
+void Builder::AddForces(int count) {
+  const int joints = static_cast<int>(description.joints.size());
+  for (int k = 0; k < count; ++k) {
+    const int joint = random.Below(joints);
+    const JointType type = description.joints[joint].type;
+    const bool single = type == JointType::kRevolute || type == JointType::kPrismatic;
+    const int kind = single ? random.Below(4) : 3;
+    if (kind == 0) description.forces.push_back(JointTorque{joint, random.Uniform(-5.0, 5.0)});
+    if (kind == 1) {
+      description.forces.push_back(
+          JointSpring{joint, random.Uniform(1.0, 10.0), random.Uniform(-1.0, 1.0)});
+    }
+    if (kind == 2) description.forces.push_back(JointDamper{joint, random.Uniform(0.1, 1.0)});
+    if (kind == 3) {
+      const int body = 1 + random.Below(static_cast<int>(description.bodies.size()) - 1);
+      description.forces.push_back(PointForce{body, random.Vector(1.0, spatial),
+                                              random.Vector(10.0, spatial), random.Chance(0.5)});
+    }
+  }
+}
+
+std::vector<JetPose> Builder::Poses() const {
+  return spatial ? DescribedPoses<Spatial>(description) : DescribedPoses<Planar>(description);
+}
+
+void Builder::FinishClosures() {
+  if (closures_.empty()) return;
+  const std::vector<JetPose> poses = Poses();
+  Layout layout;
+  layout.spatial = spatial;
+  MechanismDescription frames = description;  // to let the oracle place M
+  for (auto& [joint, q] : closures_) {
+    frames.joints = {joint};
+    const Jet coordinate(q);
+    // with F at the body's com, JointPose() is M seen from there
+    frames.joints[0].from.position = frames.bodies[joint.from.body].com;
+    const JetPose X_PM = Oracle(frames, layout).JointPose(0, poses);
+    const JetPose X_PF = X_PM * Inverted(Transform(joint.type, spatial, &coordinate));
+    Real33 R;
+    for (int i = 0; i < 3; ++i) {
+      joint.from.position[i] =
+          static_cast<double>(X_PF.p[i].f + Real(frames.bodies[joint.from.body].com[i]));
+      for (int j = 0; j < 3; ++j) R(i, j) = X_PF.R(i, j).f;
+    }
+    const Eigen::AngleAxis<Real> turn(R);
+    joint.from.rotation = (turn.angle() * turn.axis()).cast<double>();
+    description.joints.push_back(joint);
+  }
+}
+
+}  // namespace loopbench::testing

@@ -1,0 +1,118 @@
+// Builds random descriptions for generators.cpp: bodies, tree joints in any frames, forces, and
+// joints that close loops by construction.
+#pragma once
+
+#include <Eigen/Geometry>
+#include <cmath>
+#include <string>
+#include <utility>
+#include <vector>
+
+#include "tests/contract/generators.h"
+
+namespace loopbench::testing {
+
+/// A description under construction.
+class Builder {
+ public:
+  Builder(const std::string& name, SpaceKind space, std::uint64_t seed)
+      : random(seed), spatial(space == SpaceKind::kSpatial) {
+    description.name = name + "-" + std::to_string(seed);
+    description.space = space;
+    description.gravity = random.Vector(10.0, spatial);
+  }
+
+  int AddBody(double size) {
+    BodyDescription body;
+    body.name = "b" + std::to_string(description.bodies.size());
+    body.mass = std::exp(random.Uniform(-1.0, 1.0));
+    body.com = random.Vector(0.5 * size, spatial);
+    // radii of gyration near the paper's (1 m for bars of 1 m)
+    const Eigen::Vector3d gyration(random.Uniform(0.5, 1.0), random.Uniform(0.5, 1.0),
+                                   random.Uniform(0.5, 1.0));
+    const Eigen::Matrix3d R = TurnMatrix(RandomTurn());
+    const Eigen::Vector3d moments = body.mass * size * size * gyration.cwiseAbs2();
+    body.inertia = R * moments.asDiagonal() * R.transpose();
+    body.inertia = (0.5 * (body.inertia + body.inertia.transpose())).eval();
+    description.bodies.push_back(body);
+    parent_.push_back(0);
+    dof_.push_back(0);
+    return static_cast<int>(description.bodies.size()) - 1;
+  }
+
+  Eigen::Vector3d RandomTurn() {
+    if (!spatial) return {0.0, 0.0, random.Uniform(-3.0, 3.0)};
+    return random.Vector(1.5, true);
+  }
+
+  /// Tree joint from `parent` to `child`; `turned`: in any frames, the other way round at times.
+  int AddJoint(JointType type, int parent, const Eigen::Vector3d& at_parent, int child,
+               const Eigen::Vector3d& at_child, double q, bool turned = true);
+
+  /// A joint between bodies that already have poses: F is put where M is, less the joint's q.
+  void Close(JointType type, int from, int to, const Eigen::Vector3d& at_to, double q) {
+    JointDescription joint;
+    joint.name = "c" + std::to_string(description.joints.size());
+    joint.type = type;
+    joint.to = {to, at_to, RandomTurn()};
+    // `from` carries its frame in the ground for now; FinishClosures() turns it into body axes
+    joint.from = {from, Eigen::Vector3d::Zero(), Eigen::Vector3d::Zero()};
+    joint.cut = random.Chance(0.5);  // the others are cut for having no initial value
+    closures_.push_back({joint, q});
+  }
+
+  /// Free speeds of the tree path between two bodies.
+  int PathFreedom(int a, int b) const {
+    std::vector<int> up(parent_.size(), -1);
+    int freedom = 0;
+    for (int body = a, sum = 0; body >= 0; body = body == 0 ? -1 : parent_[body]) {
+      up[body] = sum;
+      sum += dof_[body];
+    }
+    for (int body = b; up[body] < 0; body = parent_[body]) freedom += dof_[body];
+    int meet = b;
+    while (up[meet] < 0) meet = parent_[meet];
+    return freedom + up[meet];
+  }
+
+  void AddForces(int count);
+
+  /// Forces on the tree joints, then the loops.
+  MechanismDescription Finish() {
+    AddForces(1 + static_cast<int>(description.joints.size()) / 3);
+    FinishClosures();
+    return description;
+  }
+
+  Random random;
+  bool spatial;
+  MechanismDescription description;
+
+ private:
+  static Eigen::Matrix3d TurnMatrix(const Eigen::Vector3d& turn) {
+    return Eigen::AngleAxisd(turn.norm(), turn.normalized()).toRotationMatrix();
+  }
+
+  std::vector<JetPose> Poses() const;
+  void FinishClosures();
+
+  std::vector<int> parent_ = {0}, dof_ = {0};
+  std::vector<std::pair<JointDescription, double>> closures_;
+};
+
+/// The description's own coordinates; joints without one are at rest in the ground's frame.
+template <class Space>
+VectorX<double> DescribedCoordinates(const MechanismDescription& description,
+                                     const Mechanism<Space, double>& mechanism) {
+  VectorX<double> q = VectorX<double>::Zero(mechanism.num_q());
+  for (const Joint<Space, double>& joint : mechanism.joints()) {
+    if (joint.in_tree() && joint.kind->num_q == 7) q[joint.q_offset] = 1.0;
+  }
+  for (const JointValues& values : description.initial.coordinates) {
+    const int offset = mechanism.joints()[values.joint].q_offset;
+    for (std::size_t i = 0; i < values.values.size(); ++i) q[offset + i] = values.values[i];
+  }
+  return q;
+}
+
+}  // namespace loopbench::testing

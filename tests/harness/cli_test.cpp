@@ -1,0 +1,283 @@
+// The program as its users call it: exit codes, messages, and the files it leaves.
+#include <gtest/gtest.h>
+#include <sys/wait.h>
+
+#include <algorithm>
+#include <cstdio>
+#include <filesystem>
+#include <string>
+#include <vector>
+
+#include "harness/store/files.h"
+#include "harness/store/result_store.h"
+
+namespace loopbench::harness {
+namespace {
+
+namespace fs = std::filesystem;
+
+const fs::path kConfigs = fs::path(LOOPBENCH_SOURCE_DIR) / "configs";
+
+struct Ending {
+  int code = -1;
+  std::string text;  ///< standard output and standard error together
+};
+
+constexpr const char* kExperiment = R"({
+  "name": "tiny", "comment": "two cases", "tolerances": [1e-6],
+  "scenes": [{"mechanism": "four-bar.json", "horizon": 0.5}],
+  "columns": [{"formulation": ["odca", "lagrange"], "enforcement": "acceleration"}],
+  "timing": {"repeats": 0}
+})";
+
+constexpr const char* kClaims = R"({"claims": [{
+  "id": "small", "claim": "Drift is small.", "where": "here",
+  "checks": [{"label": "all", "select": {"formulation": "odca"}, "measure": "drift_position_max", "statistic": "max",
+              "compare": "<=", "threshold": 1e-3}],
+  "wording": {"reproduced": "It is.", "not_reproduced": "It is not.", "only_under": "In part."}
+}]})";
+
+/// A folder with a mechanism, an experiment and claims; the program runs in it.
+class CommandLineTest : public testing::Test {
+ protected:
+  void SetUp() override {
+    const auto* test = testing::UnitTest::GetInstance()->current_test_info();
+    folder_ = fs::path(testing::TempDir()) / (std::string("loopbench-cli-") + test->name());
+    fs::remove_all(folder_);
+    fs::create_directories(folder_);
+    mechanism_ = ReadFile(kConfigs / "mechanisms/four-bar.json");
+    Write("four-bar.json", mechanism_);
+    Write("tiny.json", kExperiment);
+    Write("claims.json", kClaims);
+  }
+  void TearDown() override { fs::remove_all(folder_); }
+
+  void Write(const std::string& name, const std::string& text) const {
+    WriteFileAtomically(folder_ / name, text);
+  }
+
+  /// Writes four-bar.json with its first `from` replaced.
+  void EditMechanism(const std::string& from, const std::string& to) const {
+    std::string text = mechanism_;
+    const std::size_t place = text.find(from);
+    ASSERT_NE(place, std::string::npos) << from;
+    Write("four-bar.json", text.replace(place, from.size(), to));
+  }
+
+  Ending Call(const std::string& arguments, const std::string& before = "") const {
+    const std::string command = "cd '" + folder_.string() + "' && " + before +
+                                " '" LOOPBENCH_BINARY "' " + arguments + " 2>&1";
+    std::FILE* pipe = ::popen(command.c_str(), "r");
+    Ending ending;
+    if (pipe == nullptr) return ending;
+    for (int c = std::fgetc(pipe); c != EOF; c = std::fgetc(pipe)) {
+      ending.text += static_cast<char>(c);
+    }
+    const int status = ::pclose(pipe);
+    ending.code = WIFEXITED(status) ? WEXITSTATUS(status) : -1;
+    return ending;
+  }
+
+  fs::path folder_;
+  std::string mechanism_;
+};
+
+void ExpectEnding(const Ending& ending, int code, const std::vector<std::string>& words) {
+  EXPECT_EQ(ending.code, code) << ending.text;
+  for (const std::string& word : words) {
+    EXPECT_NE(ending.text.find(word), std::string::npos) << "no <" << word << "> in\n"
+                                                         << ending.text;
+  }
+}
+
+class BadInput : public CommandLineTest {
+ protected:
+  /// Run and check refuse the folder's files with the same words, and nothing is written.
+  void ExpectRefused(const std::vector<std::string>& words) const {
+    ExpectEnding(Call("run tiny.json --out out"), 2, words);
+    ExpectEnding(Call("check tiny.json"), 2, words);
+    EXPECT_FALSE(fs::exists(folder_ / "out"));
+  }
+};
+
+TEST_F(BadInput, UnknownKeyOfAMechanismNamesFilePointerAndSpelling) {
+  EditMechanism("\"inertia\"", "\"inertai\"");
+  ExpectRefused(
+      {"four-bar.json: /bodies/0/inertai: found unknown key", "did you mean \"inertia\""});
+}
+
+TEST_F(BadInput, UnknownKeyOfAnExperimentNamesFilePointerAndSpelling) {
+  Write("tiny.json", std::string(R"({"tolerance": 1e-6,)") + (kExperiment + 1));
+  ExpectRefused({"tiny.json: /tolerance: found unknown key", "did you mean \"tolerances\""});
+}
+
+TEST_F(BadInput, WrongTypeNamesValueAndExpectation) {
+  EditMechanism("\"mass\": 1.0", "\"mass\": \"heavy\"");
+  ExpectRefused({"four-bar.json: /bodies/0/mass: found \"heavy\"", "expected a number > 0"});
+}
+
+TEST_F(BadInput, MissingBodyNamesTheNearestOne) {
+  EditMechanism("\"to\": {\"body\": \"bar1\"", "\"to\": {\"body\": \"bra1\"");
+  ExpectRefused({"four-bar.json: /joints/0/to/body: found \"bra1\"", "did you mean \"bar1\""});
+}
+
+TEST_F(BadInput, NegativeMassNamesValueAndRange) {
+  EditMechanism("\"mass\": 1.0", "\"mass\": -1.0");
+  ExpectRefused({"four-bar.json: /bodies/0/mass: found -1", "expected a number > 0"});
+}
+
+TEST_F(BadInput, MissingMechanismFileNamesThePointerThatAsksForIt) {
+  fs::rename(folder_ / "four-bar.json", folder_ / "four-bars.json");
+  ExpectRefused({"tiny.json: /scenes/0/mechanism", "four-bar.json does not exist",
+                 "did you mean \"four-bars.json\""});
+}
+
+TEST_F(BadInput, AllMistakesAreReportedAtOnce) {
+  EditMechanism("\"mass\": 1.0, \"inertia\": 1.0", "\"mass\": -1.0, \"inertia\": -2.0");
+  ExpectRefused({"/bodies/0/mass: found -1", "/bodies/0/inertia: found -2"});
+}
+
+TEST_F(BadInput, MissingExperimentFileIsNamed) {
+  for (const char* command : {"run", "list", "check"}) {
+    ExpectEnding(Call(std::string(command) + " absent.json"), 2, {"absent.json"});
+  }
+}
+
+TEST_F(BadInput, UnknownSubcommandsAndOptionsAreRefused) {
+  ExpectEnding(Call("rum tiny.json"), 2, {"rum"});
+  ExpectEnding(Call(""), 2, {"subcommand"});
+  ExpectEnding(Call("run tiny.json --fliter a=b"), 2, {"--fliter"});
+  ExpectEnding(Call("run tiny.json --jobs 0"), 2, {"--jobs"});
+  ExpectEnding(Call("run"), 2, {"experiment"});
+}
+
+TEST_F(BadInput, BadFilterIsRefusedWithItsTextAndForm) {
+  for (const char* filter : {"mechanism", "=four-bar", "mechanism="}) {
+    ExpectEnding(Call(std::string("run tiny.json --filter ") + filter), 2,
+                 {std::string("filter '") + filter + "'", "key=value"});
+  }
+}
+
+TEST_F(BadInput, FilterThatLeavesNoCaseIsRefused) {
+  // a run of nothing would replace old results with an empty file
+  ExpectEnding(Call("run tiny.json --out out --filter mechanism=five-bar"), 2,
+               {"mechanism=five-bar"});
+  EXPECT_FALSE(fs::exists(folder_ / "out/results.jsonl"));
+}
+
+TEST_F(BadInput, FilterOnAnUnknownKeyIsRefused) {
+  ExpectEnding(Call("list tiny.json --filter mechanisms=four-bar"), 2, {"mechanisms"});
+}
+
+TEST_F(BadInput, EmptyStoreIsNamed) {
+  ExpectEnding(Call("table nowhere"), 2, {"nowhere"});
+  ExpectEnding(Call("plot nowhere --out figures"), 2, {"nowhere"});
+  ExpectEnding(Call("verdict nowhere --claims claims.json"), 2, {"nowhere"});
+}
+
+TEST_F(CommandLineTest, HelpEndsWithZeroAndShowsExamples) {
+  ExpectEnding(Call("--help"), 0, {"Examples:", "Exit codes: 0 done"});
+  ExpectEnding(Call("run --help"), 0, {"--filter"});
+}
+
+TEST_F(CommandLineTest, UnreachableAssemblyIsARowAndNoError) {
+  EditMechanism("\"C\": [1.5, 0.0]", "\"C\": [5.0, 0.0]");
+  ExpectEnding(Call("run tiny.json --out out"), 0, {"bad start"});
+  const std::vector<Record> records = ReadRecords(folder_ / "out");
+  ASSERT_EQ(records.size(), 2u);
+  EXPECT_EQ(records[0].Text("outcome"), "inconsistent-start");
+  EXPECT_NE(records[0].Text("message").find("\"OC\""), std::string::npos);
+}
+
+TEST_F(CommandLineTest, ListShowsEveryCase) {
+  ExpectEnding(Call("list tiny.json"), 0,
+               {"tiny: two cases", "four-bar", "odca", "lagrange", "2 cases and 0 timings"});
+  ExpectEnding(Call("list tiny.json --filter formulation=odca"), 0, {"1 cases and 0 timings"});
+}
+
+TEST_F(CommandLineTest, CheckCountsWhatSoundFilesHold) {
+  ExpectEnding(Call("check tiny.json four-bar.json"), 0, {"2 cases", "3 bodies, 4 joints"});
+}
+
+TEST_F(CommandLineTest, ResultsOfARunServeTablePlotAndVerdict) {
+  ExpectEnding(Call("run tiny.json --out out"), 0, {"results in out"});
+  const std::string csv = ReadFile(folder_ / "out/drift.csv");
+  EXPECT_NE(csv.find("drift_position_max"), std::string::npos);
+  const std::string table = ReadFile(folder_ / "out/drift.md");
+  EXPECT_NE(table.find("command: loopbench run tiny.json --out out"), std::string::npos);
+  EXPECT_EQ(ReadRecords(folder_ / "out").size(), 2u);
+  EXPECT_FALSE(fs::exists(folder_ / "out/results.partial.jsonl"));
+
+  ExpectEnding(Call("table out"), 0, {"four-bar", "odca", "lagrange"});
+  ExpectEnding(Call("table out --format csv --where formulation=odca"), 0, {"mechanism", "odca"});
+  ExpectEnding(Call("table out --where formulation=reduction"), 2, {"no drift records match"});
+  ExpectEnding(Call("verdict out --claims claims.json --out verdicts.md"), 0, {"reproduced"});
+  EXPECT_NE(ReadFile(folder_ / "verdicts.md").find("It is."), std::string::npos);
+  ExpectEnding(Call("plot out --out figures"), 0, {"figures to figures"});
+  for (const auto& entry : fs::directory_iterator(folder_ / "figures")) {
+    EXPECT_NE(ReadFile(entry.path()).find("<svg"), std::string::npos) << entry.path();
+  }
+}
+
+TEST_F(CommandLineTest, DefaultFolderIsNamedAfterTheExperiment) {
+  ExpectEnding(Call("run tiny.json"), 0, {"results in results/runs/tiny"});
+  EXPECT_TRUE(fs::exists(folder_ / "results/runs/tiny/drift.csv"));
+}
+
+TEST_F(CommandLineTest, RepeatedRunGivesTheSameHashesWithAnyNumberOfJobs) {
+  std::vector<std::vector<std::string>> hashes;
+  for (const std::string jobs : {"1", "2"}) {
+    ExpectEnding(Call("run tiny.json --out out" + jobs + " --jobs " + jobs), 0, {});
+    std::vector<std::string> found;
+    for (const Record& record : ReadRecords(folder_ / ("out" + jobs))) {
+      found.push_back(record.Text("case_id") + record.Text("state_hash"));
+    }
+    std::ranges::sort(found);
+    hashes.push_back(found);
+  }
+  EXPECT_EQ(hashes[0], hashes[1]);
+}
+
+class OldResults : public CommandLineTest {
+ protected:
+  void SetUp() override {
+    CommandLineTest::SetUp();
+    ExpectEnding(Call("run tiny.json --out out"), 0, {});
+    records_ = ReadFile(folder_ / "out/results.jsonl");
+    table_ = ReadFile(folder_ / "out/drift.csv");
+  }
+  void ExpectKept() const {
+    EXPECT_EQ(ReadFile(folder_ / "out/results.jsonl"), records_);
+    EXPECT_EQ(ReadFile(folder_ / "out/drift.csv"), table_);
+  }
+  std::string records_, table_;
+};
+
+TEST_F(OldResults, StayWhenTheSecondExperimentIsBad) {
+  Write("bad.json", "{\"name\": \"bad\"}");
+  ExpectEnding(Call("run tiny.json bad.json --out out"), 2, {"bad.json"});
+  ExpectKept();
+}
+
+TEST_F(OldResults, StayWhenARunIsKilled) {
+  std::string text = kExperiment;
+  const std::string horizon = "\"horizon\": 0.5";
+  text.replace(text.find(horizon), horizon.size(), "\"horizon\": [0.5, 10000]");
+  Write("long.json", text);
+  // timeout reports a killed child as 137, or dies of the same signal itself
+  const Ending ending = Call("run long.json --out out", "timeout -s KILL 0.5");
+  EXPECT_NE(ending.code, 0) << ending.text;
+  ExpectKept();
+  // what the killed run left does not leak into the next
+  ExpectEnding(Call("run tiny.json --out out"), 0, {});
+  EXPECT_EQ(ReadRecords(folder_ / "out").size(), 2u);
+}
+
+TEST_F(OldResults, AreReplacedByThoseOfACompleteRun) {
+  ExpectEnding(Call("run tiny.json --out out --filter formulation=odca"), 0, {});
+  EXPECT_EQ(ReadRecords(folder_ / "out").size(), 1u);
+  EXPECT_EQ(ReadFile(folder_ / "out/drift.csv").find("lagrange"), std::string::npos);
+}
+
+}  // namespace
+}  // namespace loopbench::harness

@@ -1,0 +1,137 @@
+#include "tests/harness/include_arrows.h"
+
+#include <algorithm>
+#include <array>
+#include <initializer_list>
+
+namespace loopbench::architecture {
+namespace {
+
+constexpr std::array<std::string_view, 6> kRooms = {"mechanism", "odca",    "lagrange",
+                                                    "reduction", "harness", "tests"};
+
+bool OneOf(std::string_view word, std::initializer_list<std::string_view> words) {
+  return std::ranges::find(words, word) != words.end();
+}
+
+bool StartsWithOneOf(std::string_view text, std::initializer_list<std::string_view> starts) {
+  return std::ranges::any_of(starts,
+                             [text](std::string_view start) { return text.starts_with(start); });
+}
+
+std::string_view Room(std::string_view path) { return path.substr(0, path.find('/')); }
+
+bool IsCore(std::string_view room) {
+  return OneOf(room, {"mechanism", "odca", "lagrange", "reduction"});
+}
+
+/// Whether files of `room` may include those of `other`.
+bool Reaches(std::string_view room, std::string_view other) {
+  if (room == other || room == "tests" || other == "mechanism") return true;
+  return room == "harness" && IsCore(other);
+}
+
+/// Why a file at `path` must not include the foreign `header`; "" when it may.
+std::string_view WhyNotForeign(std::string_view path, std::string_view header) {
+  if (IsCore(Room(path)) && header.find_first_of("./") != std::string_view::npos) {
+    return header.starts_with("Eigen/") ? "" : "the core knows Eigen and the standard library";
+  }
+  if (StartsWithOneOf(header, {"arkode/", "cvode/", "ida/", "kinsol/", "nvector/", "sun"})) {
+    return path == "harness/integrator/arkode.cpp"
+               ? ""
+               : "SUNDIALS is for harness/integrator/arkode.cpp";
+  }
+  if (header.starts_with("nlohmann/")) {
+    const bool allowed = StartsWithOneOf(
+        path, {"harness/config/", "harness/store/", "tests/harness/config", "tests/harness/store"});
+    return allowed ? "" : "nlohmann-json is for harness/config and harness/store";
+  }
+  if (header.starts_with("benchmark/")) {
+    return path.starts_with("harness/timing/") ? "" : "Google Benchmark is for harness/timing";
+  }
+  if (StartsWithOneOf(header, {"gtest/", "gmock/"})) {
+    return path.starts_with("tests/") ? "" : "GoogleTest is for tests";
+  }
+  if (header.starts_with("boost/")) {
+    return path == "harness/observers/pendulum.cpp" ? ""
+                                                    : "Boost is for harness/observers/pendulum.cpp";
+  }
+  return "";
+}
+
+/// The same for a header of this repository, named from its root.
+std::string_view WhyNotOwn(std::string_view path, std::string_view header) {
+  const std::string_view room = Room(header);
+  if (header.find("..") != std::string_view::npos || header.find('/') == std::string_view::npos ||
+      std::ranges::find(kRooms, room) == kRooms.end()) {
+    return "own headers are named from the root of the repository";
+  }
+  return Reaches(Room(path), room) ? "" : "the arrow points the other way";
+}
+
+/// `text` with comments blanked, line ends kept.
+std::string WithoutComments(std::string_view text) {
+  std::string kept;
+  for (std::size_t i = 0; i < text.size(); ++i) {
+    const std::string_view rest = text.substr(i);
+    if (rest.starts_with("//")) {
+      i = std::min(text.find('\n', i), text.size()) - 1;
+    } else if (rest.starts_with("/*")) {
+      const std::size_t end = std::min(text.find("*/", i + 2), text.size());
+      kept.append(static_cast<std::size_t>(std::count(&text[i], text.data() + end, '\n')), '\n');
+      i = end + 1;
+    } else if (rest.front() == '"') {
+      // a string, or the name of a header: "//" in it starts no comment
+      const std::size_t end = std::min(text.find_first_of("\"\n", i + 1), text.size() - 1);
+      kept += text.substr(i, end - i + 1);
+      i = end;
+    } else {
+      kept += text[i];
+    }
+  }
+  return kept;
+}
+
+std::string_view Trimmed(std::string_view text) {
+  const std::size_t start = text.find_first_not_of(" \t");
+  if (start == std::string_view::npos) return {};
+  return text.substr(start, text.find_last_not_of(" \t\r") - start + 1);
+}
+
+}  // namespace
+
+std::vector<std::string> Includes(std::string_view text) {
+  const std::string code = WithoutComments(text);
+  std::vector<std::string> headers;
+  for (std::size_t start = 0; start < code.size();) {
+    const std::size_t end = std::min(code.find('\n', start), code.size());
+    std::string_view line = Trimmed(std::string_view(code).substr(start, end - start));
+    start = end + 1;
+    if (!line.starts_with('#')) continue;
+    line = Trimmed(line.substr(1));
+    constexpr std::string_view kInclude = "include";
+    if (!line.starts_with(kInclude)) continue;
+    headers.emplace_back(Trimmed(line.substr(kInclude.size())));
+  }
+  return headers;
+}
+
+std::vector<std::string> Violations(std::string_view path, std::string_view text) {
+  std::vector<std::string> violations;
+  for (const std::string& header : Includes(text)) {
+    const std::string_view name = std::string_view(header).substr(1, header.size() - 2);
+    std::string_view why = "a header must be named, not computed";
+    if (header.starts_with('<')) why = WhyNotForeign(path, name);
+    if (header.starts_with('"')) why = WhyNotOwn(path, name);
+    // own headers in angle brackets, foreign ones in quotes: no way around the rules
+    if (header.starts_with('<') && std::ranges::find(kRooms, Room(name)) != kRooms.end()) {
+      why = "own headers stand in quotes";
+    }
+    if (!why.empty()) {
+      violations.push_back(std::string(path) + ": #include " + header + ": " + std::string(why));
+    }
+  }
+  return violations;
+}
+
+}  // namespace loopbench::architecture

@@ -1,0 +1,140 @@
+// The include arrows of the repository, and of planted files that break each rule.
+#include "tests/harness/include_arrows.h"
+
+#include <gtest/gtest.h>
+
+#include <filesystem>
+#include <map>
+#include <string>
+#include <vector>
+
+#include "harness/store/files.h"
+
+namespace loopbench::architecture {
+namespace {
+
+namespace fs = std::filesystem;
+
+const fs::path kRoot = LOOPBENCH_SOURCE_DIR;
+
+/// Violations of a file at `path` whose only line includes `header`.
+std::vector<std::string> Planted(const std::string& path, const std::string& header) {
+  return Violations(path, "#include " + header + "\n");
+}
+
+void ExpectAllowed(const std::string& path, const std::string& header) {
+  EXPECT_TRUE(Planted(path, header).empty()) << Planted(path, header).front();
+}
+
+void ExpectRefused(const std::string& path, const std::string& header, const std::string& why) {
+  const std::vector<std::string> violations = Planted(path, header);
+  ASSERT_EQ(violations.size(), 1u) << path << " " << header;
+  EXPECT_EQ(violations.front().find(path + ": #include " + header), 0u) << violations.front();
+  EXPECT_NE(violations.front().find(why), std::string::npos) << violations.front();
+}
+
+TEST(IncludeArrows, OfTheRepositoryAllPointTheRightWay) {
+  std::map<std::string, int> includes;
+  for (const std::string room :
+       {"mechanism", "odca", "lagrange", "reduction", "harness", "tests"}) {
+    for (const fs::directory_entry& entry : fs::recursive_directory_iterator(kRoot / room)) {
+      const std::string extension = entry.path().extension().string();
+      if (extension != ".h" && extension != ".cpp" && extension != ".in") continue;
+      const std::string text = harness::ReadFile(entry.path());
+      const std::string path = entry.path().lexically_relative(kRoot).generic_string();
+      includes[room] += static_cast<int>(Includes(text).size());
+      for (const std::string& violation : Violations(path, text)) ADD_FAILURE() << violation;
+    }
+    EXPECT_GT(includes[room], 0) << "nothing read in " << room;
+  }
+}
+
+TEST(IncludeArrows, LeadFromTestsOverHarnessAndFormulationsToMechanism) {
+  for (const std::string formulation : {"odca", "lagrange", "reduction"}) {
+    const std::string header = "\"" + formulation + "/" + formulation + ".h\"";
+    const std::string source = formulation + "/" + formulation + ".cpp";
+    ExpectAllowed(source, "\"mechanism/joint.h\"");
+    ExpectAllowed(source, header);
+    ExpectAllowed("harness/run_case.cpp", header);
+    ExpectAllowed("tests/contract/contract_test.cpp", header);
+    ExpectRefused("mechanism/joint.cpp", header, "the other way");
+    ExpectRefused(source, "\"harness/record.h\"", "the other way");
+    ExpectRefused(source, "\"tests/contract/oracle.h\"", "the other way");
+  }
+  ExpectAllowed("harness/record.cpp", "\"mechanism/outcome.h\"");
+  ExpectAllowed("tests/harness/store_test.cpp", "\"harness/store/files.h\"");
+  ExpectRefused("mechanism/joint.h", "\"harness/record.h\"", "the other way");
+  ExpectRefused("harness/record.cpp", "\"tests/contract/oracle.h\"", "the other way");
+}
+
+TEST(IncludeArrows, NeverLeadFromOneFormulationToAnother) {
+  for (const std::string from : {"odca", "lagrange", "reduction"}) {
+    for (const std::string to : {"odca", "lagrange", "reduction"}) {
+      if (from == to) continue;
+      ExpectRefused(from + "/a.cpp", "\"" + to + "/b.h\"", "the other way");
+    }
+  }
+}
+
+TEST(IncludeArrows, OfSundialsEndInOneFile) {
+  for (const std::string header :
+       {"<arkode/arkode_erkstep.h>", "<nvector/nvector_serial.h>", "<sundials/sundials_context.h>",
+        "<sunmatrix/sunmatrix_dense.h>", "<sunadaptcontroller/sunadaptcontroller_soderlind.h>"}) {
+    ExpectAllowed("harness/integrator/arkode.cpp", header);
+    for (const char* path : {"harness/integrator/arkode.h", "harness/run_case.cpp",
+                             "tests/harness/integrator_test.cpp"}) {
+      ExpectRefused(path, header, "SUNDIALS");
+    }
+    ExpectRefused("odca/sweep.cpp", header, "Eigen");
+  }
+}
+
+TEST(IncludeArrows, OfOtherLibrariesEndWhereTheyBelong) {
+  ExpectAllowed("harness/config/json_reader.h", "<nlohmann/json.hpp>");
+  ExpectAllowed("harness/store/record_json.cpp", "<nlohmann/json.hpp>");
+  ExpectAllowed("tests/harness/config_test.cpp", "<nlohmann/json.hpp>");
+  ExpectRefused("harness/report/table.cpp", "<nlohmann/json.hpp>", "nlohmann");
+  ExpectRefused("tests/contract/oracle.cpp", "<nlohmann/json.hpp>", "nlohmann");
+  ExpectAllowed("harness/timing/bench.cpp", "<benchmark/benchmark.h>");
+  ExpectRefused("harness/suite.cpp", "<benchmark/benchmark.h>", "Benchmark");
+  ExpectAllowed("tests/odca/plan_test.cpp", "<gtest/gtest.h>");
+  ExpectRefused("harness/suite.cpp", "<gtest/gtest.h>", "GoogleTest");
+  ExpectAllowed("harness/observers/pendulum.cpp", "<boost/math/special_functions/ellint_1.hpp>");
+  ExpectRefused("harness/observers/drift.cpp", "<boost/math/tools/roots.hpp>", "Boost");
+  ExpectRefused("tests/reference/pendulum_test.cpp", "<boost/math/tools/roots.hpp>", "Boost");
+}
+
+TEST(IncludeArrows, OfTheCoreReachEigenAndTheStandardLibraryOnly) {
+  for (const std::string path :
+       {"mechanism/a.h", "odca/a.cpp", "lagrange/a.cpp", "reduction/a.h"}) {
+    ExpectAllowed(path, "<Eigen/Core>");
+    ExpectAllowed(path, "<vector>");
+    for (const char* header : {"<fmt/format.h>", "<nlohmann/json.hpp>", "<unistd.h>",
+                               "<gtest/gtest.h>", "<boost/math/tools/roots.hpp>"}) {
+      ExpectRefused(path, header, "Eigen");
+    }
+  }
+}
+
+TEST(IncludeArrows, CannotBeHidden) {
+  ExpectRefused("odca/a.cpp", "\"../lagrange/lagrange.h\"", "from the root");
+  ExpectRefused("odca/a.cpp", "\"plan.h\"", "from the root");
+  ExpectRefused("odca/a.cpp", "\"odca/../harness/record.h\"", "from the root");
+  ExpectRefused("odca/a.cpp", "<lagrange/lagrange.h>", "in quotes");
+  ExpectRefused("harness/a.cpp", "\"nlohmann/json.hpp\"", "from the root");
+  ExpectRefused("odca/a.cpp", "HEADER", "named");
+  EXPECT_EQ(Violations("odca/a.cpp", "  #  include\t\"harness/record.h\"  // why\r\n").size(), 1u);
+  EXPECT_EQ(Violations("odca/a.cpp", "/* */ #include \"harness/record.h\"\n").size(), 1u);
+  EXPECT_EQ(Violations("odca/a.cpp", "const char* s = \"/*\";\n#include <fmt/core.h>").size(), 1u);
+}
+
+TEST(Includes, AreReadInOrderAndNotFromComments) {
+  EXPECT_EQ(Includes("// #include <a>\n#include <b>\n/* x\n#include <c>\n*/\n#include \"d/e.h\"\n"
+                     "#define F 1\n#include <f>"),
+            (std::vector<std::string>{"<b>", "\"d/e.h\"", "<f>"}));
+  EXPECT_TRUE(Includes("").empty());
+  EXPECT_TRUE(Includes("/* never closed\n#include <a>").empty());
+}
+
+}  // namespace
+}  // namespace loopbench::architecture

@@ -1,0 +1,250 @@
+// One case from start to record: what is in it, that it is the same every time, and how each kind
+// of failure ends in it.
+#include "harness/run_case.h"
+
+#include <gtest/gtest.h>
+
+#include <cmath>
+#include <numbers>
+#include <string>
+#include <string_view>
+#include <vector>
+
+#include "harness/report/columns.h"
+#include "harness/store/record_json.h"
+#include "mechanism/library.h"
+#include "tests/reference/cases.h"
+
+namespace loopbench::harness {
+namespace {
+
+using namespace reference;
+using enum FormulationKind;
+
+constexpr double kTolerance = 1e-8;
+const Column kOdcaJoint = Published(kOdca, Coordinates::kJoint);
+
+bool IsSet(const Record& record, std::string_view key) {
+  const Value* value = record.Find(key);
+  return value != nullptr && !std::holds_alternative<std::monostate>(*value);
+}
+
+bool IsMeasured(const Record& record, std::string_view key) {
+  return IsSet(record, key) && !std::isnan(record.Number(key));
+}
+
+/// The four-bar with its second ground pivot moved out along x.
+MechanismFile FourBarWithGround(double length) {
+  MechanismFile file = ReadMechanism(kConfigs / "mechanisms/four-bar.json");
+  for (JointDescription& joint : file.description.joints) {
+    if (joint.name != "OC") continue;
+    (joint.from.body == kGround ? joint.from : joint.to).position = {length, 0.0, 0.0};
+  }
+  return file;
+}
+
+Record RunSingle(const MechanismFile& file, const Column& column, double horizon) {
+  const Experiment experiment = Single(file);
+  return RunCase(experiment,
+                 CaseOf(experiment, file.description.name, column, kTolerance, horizon));
+}
+
+/// A bar that swings about the origin like a point mass at 1 m, released at `angle` from +x.
+MechanismFile BarAt(double angle) {
+  MechanismFile file;
+  file.description.name = "bar";
+  file.description.gravity = {0.0, -9.81, 0.0};
+  file.description.bodies.push_back(Bar("bar", 1.0, 1.0, 0.25));
+  file.description.joints.push_back(
+      Revolute("O", kGround, Eigen::Vector3d::Zero(), 1, Eigen::Vector3d::Zero()));
+  file.description.initial.coordinates.push_back({0, {angle}});
+  file.observe.closed_form = PendulumForm{"bar", -std::numbers::pi / 2, 9.81};
+  return file;
+}
+
+TEST(FinishedCase, HasAValueInEveryColumnOfTheDriftTable) {
+  // the one scene kind that has a branch and a closed form as well
+  for (const Column& column : PublishedColumns()) {
+    const Record record = RunPaper("parallelogram", column, kTolerance, 0.5);
+    ASSERT_EQ(record.Text("outcome"), "finished");
+    EXPECT_EQ(record.Number("t_reached"), 0.5);
+    for (const TableColumn& table_column : DriftColumns()) {
+      if (table_column.key == "correction_max") continue;  // nothing here corrects
+      EXPECT_TRUE(IsSet(record, table_column.key)) << table_column.key;
+    }
+  }
+}
+
+TEST(FinishedCase, MeasuresFiniteNumbers) {
+  const Record record = RunPaper("seven-bar", kOdcaJoint, kTolerance, 2.0);
+  for (const char* key : {"drift_position_max", "drift_rotation_max", "drift_velocity_max",
+                          "drift_acceleration_max", "loop_closure_max", "energy_error_max",
+                          "branch_error_max", "rcond_min", "drift.loop.OC", "drift.loop.FB"}) {
+    EXPECT_TRUE(std::isfinite(record.Number(key))) << key;
+  }
+  EXPECT_EQ(record.Number("rank_min"), 4);  // two planar pins
+  EXPECT_EQ(record.Text("message"), "");
+  EXPECT_EQ(record.Number("drift_position_max"), record.Number("loop_closure_max"));
+  EXPECT_GE(record.Number("rhs_evaluations"), 6 * record.Number("steps"));
+}
+
+TEST(FinishedCase, KeepsSeriesOfDriftEnergyAndAnglesToTheEnd) {
+  const Record record = RunPaper("four-bar", kOdcaJoint, kTolerance, 2.0);
+  EXPECT_EQ(record.Numbers("series.t").back(), 2.0);
+  EXPECT_EQ(record.Numbers("series.drift_t").back(), 2.0);
+  EXPECT_EQ(record.Numbers("series.energy_t").back(), 2.0);
+  EXPECT_EQ(record.Numbers("series.drift").back(), record.Number("drift_position_max"));
+  for (const char* joint : {"OA", "AB", "BC", "OC"}) {
+    EXPECT_EQ(record.Numbers(std::string("series.angle.") + joint).size(),
+              record.Numbers("series.t").size())
+        << joint;
+  }
+}
+
+TEST(FinishedCase, GivesTheSameBitsTwice) {
+  for (Column column : PublishedColumns()) {
+    for (const SolverKind solver : {SolverKind::kAsPublished, SolverKind::kRankRevealing}) {
+      column.solver = solver;
+      Record first = RunPaper("seven-bar", column, kTolerance, 3.0);
+      Record second = RunPaper("seven-bar", column, kTolerance, 3.0);
+      EXPECT_EQ(first.Text("state_hash"), second.Text("state_hash")) << ToString(column);
+      // wall time alone may differ; in text, where undefined exponents are equal too
+      first.Set("wall_s", 0.0);
+      second.Set("wall_s", 0.0);
+      EXPECT_EQ(ToJsonLine(first), ToJsonLine(second)) << ToString(column);
+    }
+  }
+}
+
+TEST(FinishedCase, EnsembleLeavesTheUnperturbedRunAsItIs) {
+  Case one = CaseOf(Paper(), "four-bar", kOdcaJoint, kTolerance, 3.0);
+  const Record single = RunCase(Paper(), one);
+  one.ensemble = 3;
+  one.seed = 1;
+  one.perturb = 0.02;
+  const Record several = RunCase(Paper(), one);
+  EXPECT_EQ(single.Text("state_hash"), several.Text("state_hash"));
+  EXPECT_EQ(several.Number("ensemble"), 3);
+  EXPECT_EQ(several.Number("ensemble_failed"), 0);
+  EXPECT_EQ(single.Text("growth_resolved"), "false");
+}
+
+TEST(FinishedCase, StateHashesOfDifferentRunsDiffer) {
+  const Record coarse = RunPaper("four-bar", kOdcaJoint, 1e-6, 1.0);
+  const Record fine = RunPaper("four-bar", kOdcaJoint, 1e-8, 1.0);
+  EXPECT_NE(coarse.Text("state_hash"), fine.Text("state_hash"));
+  EXPECT_NE(coarse.Text("case_id"), fine.Text("case_id"));
+}
+
+TEST(FinishedCase, ClosedFormHoldsForAnAngleGivenAWholeTurnMore) {
+  // -pi and +pi are the same position, on either side of the pendulum's range of angles; 30 steps
+  // of at most the tolerance each
+  const double bound = 30 * kTolerance;
+  for (const double angle : {-std::numbers::pi, std::numbers::pi, 3 * std::numbers::pi}) {
+    const Record record = RunSingle(BarAt(angle), kOdcaJoint, 1.0);
+    EXPECT_LE(record.Number("closed_form_error_max"), bound) << angle;
+  }
+}
+
+TEST(FinishedCase, PendulumReleasedUprightIsARowAndNoException) {
+  Record record;
+  EXPECT_NO_THROW(record = RunSingle(BarAt(std::numbers::pi / 2), kOdcaJoint, 0.5));
+  EXPECT_EQ(record.Text("outcome"), "finished");
+}
+
+class SingularStart : public testing::TestWithParam<Column> {};
+
+TEST_P(SingularStart, EndsAsSingularAtTimeZero) {
+  for (const char* scene : {"parallelogram-singular-start", "toggle-singular-start"}) {
+    const Record record = RunPaper(scene, GetParam(), kTolerance, 1.0);
+    EXPECT_EQ(record.Text("outcome"), "singular") << scene;
+    EXPECT_EQ(record.Number("t_reached"), 0.0) << scene;
+    EXPECT_NE(record.Text("message").find("singular"), std::string::npos) << scene;
+  }
+}
+
+TEST_P(SingularStart, ReportsNothingThatWasNotMeasured) {
+  const Record record = RunPaper("parallelogram-singular-start", GetParam(), kTolerance, 1.0);
+  ASSERT_EQ(record.Number("steps"), 0);
+  for (const char* key :
+       {"drift_position_max", "drift_velocity_max", "drift_acceleration_max", "loop_closure_max",
+        "energy_error_max", "rank_min", "rcond_min", "branch_error_max", "closed_form_error_max"}) {
+    EXPECT_FALSE(IsMeasured(record, key)) << key << " = " << record.Text(key);
+  }
+  EXPECT_NE(record.Text("growth_regime"), "round-off");
+}
+
+INSTANTIATE_TEST_SUITE_P(AsPublished, SingularStart, testing::ValuesIn(PublishedColumns()),
+                         [](const auto& column) { return NameOf(column.param); });
+
+TEST(UnreachableAssembly, IsARowThatNamesTheLoop) {
+  // three bars of 1 m cannot span 5 m
+  for (const Column& column : PublishedColumns()) {
+    const Record record = RunSingle(FourBarWithGround(5.0), column, 1.0);
+    EXPECT_EQ(record.Text("outcome"), "inconsistent-start");
+    EXPECT_NE(record.Text("message").find("\"OC\""), std::string::npos) << record.Text("message");
+    EXPECT_NE(record.Text("message").find("residual"), std::string::npos);
+    EXPECT_EQ(record.Number("t_reached"), 0.0);
+    EXPECT_FALSE(IsMeasured(record, "drift_position_max"));
+    EXPECT_FALSE(IsSet(record, "growth_regime")) << record.Text("growth_regime");
+  }
+}
+
+TEST(UnreachableAssembly, OfAMemberCountsAsFailedAndTheRestIsAnalysed) {
+  // bars 2 and 3 span 2 m, which the first bar's tip is from the far pivot at OA = 0.37 rad
+  MechanismFile file = FourBarWithGround(2.9);
+  file.description.initial.coordinates[0].values = {0.30};
+  const Experiment experiment = Single(file);
+  Case one = CaseOf(experiment, "four-bar", kOdcaJoint, kTolerance, 0.2);
+  one.ensemble = 16;
+  one.seed = 1;
+  one.perturb = 0.2;
+  const Record record = RunCase(experiment, one);
+  EXPECT_GT(record.Number("ensemble_failed"), 0);
+  EXPECT_LT(record.Number("ensemble_failed"), 16);
+  EXPECT_EQ(record.Number("ensemble") + record.Number("ensemble_failed"), 16);
+  EXPECT_EQ(record.Text("growth_resolved"), "false");
+}
+
+TEST(Limits, OfStepsEndTheRunWhereItStands) {
+  Case one = CaseOf(Paper(), "four-bar", kOdcaJoint, kTolerance, 10.0);
+  one.limits.steps = 20;
+  const Record record = RunCase(Paper(), one);
+  EXPECT_EQ(record.Text("outcome"), "step-limit");
+  EXPECT_EQ(record.Number("steps"), 20);
+  EXPECT_GT(record.Number("t_reached"), 0.0);
+  EXPECT_LT(record.Number("t_reached"), 10.0);
+  EXPECT_TRUE(IsMeasured(record, "drift_position_max"));
+}
+
+TEST(Limits, OfWallTimeEndTheRunWhereItStands) {
+  Case one = CaseOf(Paper(), "seven-bar", Published(kLagrange, Coordinates::kAbsolute), 1e-12, 1e4);
+  one.limits.wall_s = 0.05;
+  const Record record = RunCase(Paper(), one);
+  EXPECT_EQ(record.Text("outcome"), "time-limit");
+  EXPECT_LT(record.Number("t_reached"), 1e4);
+  // checked every step: nothing here takes a tenth of a second
+  EXPECT_LT(record.Number("wall_s"), 1.0);
+}
+
+TEST(WrittenRecord, HoldsNoNanAndNoInfinity) {
+  std::vector<Record> records;
+  records.push_back(RunPaper("four-bar", kOdcaJoint, kTolerance, 0.1));
+  records.push_back(RunPaper("parallelogram-singular-start", kOdcaJoint, kTolerance, 1.0));
+  records.push_back(RunSingle(FourBarWithGround(5.0), kOdcaJoint, 1.0));
+  for (const Record& record : records) {
+    // nan and inf are no words of JSON, nor of any other value of these records
+    const std::string line = ToJsonLine(record);
+    EXPECT_EQ(line.find("nan"), std::string::npos) << line;
+    EXPECT_EQ(line.find("inf"), std::string::npos) << line;
+    const Record back = FromJsonLine(line);
+    for (const auto& [key, value] : back.items()) {
+      if (const auto* number = std::get_if<double>(&value)) {
+        EXPECT_TRUE(std::isfinite(*number)) << key;
+      }
+    }
+  }
+}
+
+}  // namespace
+}  // namespace loopbench::harness

@@ -1,0 +1,169 @@
+// Consistent starts from partial data.
+#include "mechanism/assembly.h"
+
+#include <gtest/gtest.h>
+
+#include <cmath>
+#include <limits>
+
+#include "mechanism/library.h"
+#include "mechanism/tree_dynamics.h"
+
+namespace loopbench {
+namespace {
+
+constexpr double kEps = std::numeric_limits<double>::epsilon();
+
+/// The paper's four-bar with its pins `ground` apart; crank at -1 rad, the others guessed.
+MechanismDescription FourBar(double ground) {
+  const Eigen::Vector3d origin = Eigen::Vector3d::Zero(), tip = Eigen::Vector3d::UnitX();
+  MechanismDescription d;
+  d.name = "four-bar";
+  d.gravity = {0.0, -9.81, 0.0};
+  for (const char* name : {"bar1", "bar2", "bar3"}) d.bodies.push_back(Bar(name, 1.0, 1.0, 1.0));
+  d.joints = {Revolute("OA", 0, origin, 1, origin), Revolute("AB", 1, tip, 2, origin),
+              Revolute("BC", 2, tip, 3, origin), Revolute("OC", 3, tip, 0, ground * tip)};
+  d.initial.coordinates = {{0, {-1.0}}, {1, {0.8}}, {2, {1.7}}};
+  d.initial.held = {0};
+  return d;
+}
+
+using Joints = Mechanism<Planar, double>;
+
+double Mismatch(const Joints& mechanism, const VectorX<double>& q) {
+  Kinematics<Planar, double> kinematics(mechanism);
+  kinematics.UpdatePosition(q);
+  double worst = 0.0;
+  for (int index : mechanism.constraints()) {
+    const auto& D = kinematics.joints()[index].D;
+    worst = std::max(worst, (D.transpose() * kinematics.ConstraintMismatch(index)).norm());
+  }
+  return worst;
+}
+
+TEST(AssemblyTest, AFourBarIsAssembledFromGuesses) {
+  const MechanismDescription d = FourBar(1.5);
+  const Joints mechanism(d, Coordinates::kJoint);
+  const Start<double> start = Assemble(d, mechanism);
+  ASSERT_EQ(start.outcome, Outcome::kFinished) << start.message;
+  EXPECT_EQ(start.q[0], -1.0) << "the held coordinate is untouched";
+  EXPECT_NEAR(start.q[1], 0.841188, 1e-6);  // the scene's numbers, given to six digits
+  EXPECT_NEAR(start.q[2], 1.757330, 1e-6);
+  EXPECT_LE(Mismatch(mechanism, start.q), 64 * kEps) << "three bars, about a metre each";
+  EXPECT_LE(start.position_residual, 64 * kEps);
+  EXPECT_EQ(start.u, VectorX<double>::Zero(3));
+}
+
+TEST(AssemblyTest, ConsistentDataAreLeftAsTheyAre) {
+  for (int n : {3, 10, 50}) {
+    const MechanismDescription d = Chain(n);
+    const Joints mechanism(d, Coordinates::kJoint);
+    const Start<double> start = Assemble(d, mechanism);
+    ASSERT_EQ(start.outcome, Outcome::kFinished) << start.message;
+    for (const JointValues& values : d.initial.coordinates) {
+      EXPECT_NEAR(start.q[mechanism.joints()[values.joint].q_offset], values.values[0],
+                  16 * kEps * n);
+    }
+  }
+}
+
+TEST(AssemblyTest, ConsistentSingularStartsAreLeftAsTheyAre) {
+  MechanismDescription d = FourBar(1.0);
+  d.initial.coordinates = {{0, {0.0}}, {1, {0.0}}, {2, {-std::acos(-1.0)}}};
+  d.initial.speeds = {{0, {2.0}}, {1, {-2.0}}, {2, {2.0}}};
+  const Joints mechanism(d, Coordinates::kJoint);
+  const Start<double> start = Assemble(d, mechanism);
+  ASSERT_EQ(start.outcome, Outcome::kFinished) << start.message;
+  EXPECT_LE((start.u - Eigen::Vector3d(2.0, -2.0, 2.0)).norm(), 16 * kEps);
+  EXPECT_LE((start.q - Eigen::Vector3d(0.0, 0.0, -std::acos(-1.0))).norm(), 16 * kEps);
+}
+
+TEST(AssemblyTest, SpeedsNotGivenFollowFromThoseGiven) {
+  MechanismDescription d = FourBar(1.5);
+  d.initial.speeds = {{0, {2.0}}};
+  const Joints mechanism(d, Coordinates::kJoint);
+  const Start<double> start = Assemble(d, mechanism);
+  ASSERT_EQ(start.outcome, Outcome::kFinished) << start.message;
+  EXPECT_EQ(start.u[0], 2.0);
+  Kinematics<Planar, double> kinematics(mechanism);
+  kinematics.UpdatePosition(start.q);
+  MatrixX<double> J;
+  TreeDynamics<Planar, double>(mechanism).Jacobian(kinematics, J);
+  EXPECT_LE((J * start.u).norm(), 64 * kEps * start.u.norm());
+  EXPECT_GT(std::abs(start.u[1]), 0.1);
+}
+
+TEST(AssemblyTest, AHeldCutJointIsReached) {
+  MechanismDescription d = FourBar(1.5);
+  const Joints mechanism(d, Coordinates::kJoint);
+  Kinematics<Planar, double> kinematics(mechanism);
+  kinematics.UpdatePosition(Assemble(d, mechanism).q);
+  const double angle = kinematics.JointCoordinate(3) + 0.05;
+  d.joints[3].cut = true;
+  d.initial.coordinates.push_back({3, {angle}});
+  d.initial.held = {3};
+  const Joints with_held(d, Coordinates::kJoint);
+  const Start<double> start = Assemble(d, with_held);
+  ASSERT_EQ(start.outcome, Outcome::kFinished) << start.message;
+  Kinematics<Planar, double> assembled(with_held);
+  assembled.UpdatePosition(start.q);
+  EXPECT_NEAR(assembled.JointCoordinate(3), angle, 64 * kEps);
+  EXPECT_LE(Mismatch(with_held, start.q), 64 * kEps);
+}
+
+TEST(AssemblyTest, AnUnreachableClosureNamesItsLoopAndResidual) {
+  // the crank's tip is at (cos 1, -sin 1), two bars reach 2 m further, the pin is at 10 m:
+  // stretched
+  const MechanismDescription d = FourBar(10.0);
+  const Start<double> start = Assemble(d, Joints(d, Coordinates::kJoint));
+  EXPECT_EQ(start.outcome, Outcome::kInconsistentStart);
+  EXPECT_NE(start.message.find("\"OC\""), std::string::npos) << start.message;
+  EXPECT_NE(start.message.find("four-bar"), std::string::npos) << start.message;
+  const double gap = std::hypot(10.0 - std::cos(1.0), std::sin(1.0)) - 2.0;
+  EXPECT_GT(start.position_residual, 0.9 * gap);
+  EXPECT_LE(start.position_residual, 1.1 * gap);
+  char residual[32];
+  std::snprintf(residual, sizeof residual, "%.3g", start.position_residual);
+  EXPECT_NE(start.message.find(residual), std::string::npos) << start.message;
+}
+
+TEST(AssemblyTest, SpeedsThatTheLoopForbidsAreRefused) {
+  MechanismDescription d = FourBar(1.5);
+  d.initial.speeds = {{0, {1.0}}, {1, {1.0}}, {2, {1.0}}};
+  const Start<double> start = Assemble(d, Joints(d, Coordinates::kJoint));
+  EXPECT_EQ(start.outcome, Outcome::kInconsistentStart);
+  EXPECT_NE(start.message.find("speeds"), std::string::npos) << start.message;
+}
+
+TEST(AssemblyTest, AbsoluteCoordinatesStartFromTheSamePose) {
+  MechanismDescription d = FourBar(1.5);
+  d.initial.speeds = {{0, {2.0}}};
+  const Joints joint(d, Coordinates::kJoint), absolute(d, Coordinates::kAbsolute);
+  const Start<double> a = Assemble(d, joint), b = Assemble(d, absolute);
+  ASSERT_EQ(b.outcome, Outcome::kFinished) << b.message;
+  Kinematics<Planar, double> at_a(joint), at_b(absolute);
+  at_a.UpdatePosition(a.q);
+  at_a.UpdateVelocity(a.u);
+  at_b.UpdatePosition(b.q);
+  at_b.UpdateVelocity(b.u);
+  for (int body = 1; body <= 3; ++body) {
+    EXPECT_LE((at_a.poses()[body].p - at_b.poses()[body].p).norm(), 16 * kEps);
+    EXPECT_NEAR(at_a.poses()[body].angle, at_b.poses()[body].angle, 16 * kEps);
+    EXPECT_LE((at_a.motions()[body] - at_b.motions()[body]).norm(), 64 * kEps);
+  }
+}
+
+TEST(AssemblyTest, PerturbMovesHeldCoordinatesAndIsDeterministic) {
+  const MechanismDescription d = FourBar(1.5);
+  const MechanismDescription a = Perturb(d, 1e-3, 7, 2), b = Perturb(d, 1e-3, 7, 2);
+  const double moved = a.initial.coordinates[0].values[0];
+  EXPECT_EQ(moved, b.initial.coordinates[0].values[0]);
+  EXPECT_NE(moved, -1.0);
+  EXPECT_LE(std::abs(moved + 1.0), 1e-3);
+  EXPECT_EQ(a.initial.coordinates[1].values, d.initial.coordinates[1].values);
+  EXPECT_NE(moved, Perturb(d, 1e-3, 7, 3).initial.coordinates[0].values[0]);
+  EXPECT_NE(moved, Perturb(d, 1e-3, 8, 2).initial.coordinates[0].values[0]);
+}
+
+}  // namespace
+}  // namespace loopbench

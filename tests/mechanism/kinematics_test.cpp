@@ -1,0 +1,173 @@
+// Poses, motions and velocity terms against the oracle's differentiated poses.
+#include "mechanism/kinematics.h"
+
+#include <gtest/gtest.h>
+
+#include <limits>
+
+#include "mechanism/tree_dynamics.h"
+#include "tests/contract/generators.h"
+
+namespace loopbench {
+namespace {
+
+using testing::Oracle;
+using testing::Real;
+using testing::State;
+using testing::ToReal;
+
+constexpr double kEps = std::numeric_limits<double>::epsilon();
+
+template <class Space>
+constexpr SpaceKind kKind = Space::kRot == 1 ? SpaceKind::kPlanar : SpaceKind::kSpatial;
+
+/// Trees with every joint kind, reversed joints, a floating body; graphs with closing joints.
+template <class Space>
+std::vector<MechanismDescription> Samples() {
+  std::vector<MechanismDescription> samples;
+  for (std::uint64_t seed = 1; seed <= 5; ++seed) {
+    samples.push_back(testing::RandomTree(15, kKind<Space>, seed));
+    samples.push_back(testing::RandomGraph(20, 2, kKind<Space>, 0.4, seed));
+  }
+  return samples;
+}
+
+template <class Space>
+class KinematicsTest : public ::testing::Test {};
+using Spaces = ::testing::Types<Planar, Spatial>;
+TYPED_TEST_SUITE(KinematicsTest, Spaces);
+
+/// Calls check(description, mechanism, state, kinematics at the state) for all samples and sets.
+template <class Space, class Check>
+void ForAll(Check check) {
+  for (const MechanismDescription& d : Samples<Space>()) {
+    SCOPED_TRACE(d.name);
+    const Mechanism<Space, double> joint(d, Coordinates::kJoint);
+    const Mechanism<Space, double> absolute(d, Coordinates::kAbsolute);
+    const State state = testing::ConsistentState(d, joint, 1);
+    const State moved = testing::StateIn(absolute, joint, state);
+    for (const auto& [mechanism, at] : {std::pair{&joint, &state}, {&absolute, &moved}}) {
+      SCOPED_TRACE(ToString(mechanism->coordinates()));
+      Kinematics<Space, double> kinematics(*mechanism);
+      kinematics.UpdatePosition(at->q);
+      kinematics.UpdateVelocity(at->u);
+      check(d, *mechanism, *at, kinematics);
+    }
+  }
+}
+
+TYPED_TEST(KinematicsTest, PosesAgreeWithTheOracle) {
+  ForAll<TypeParam>(
+      [](const auto& d, const auto& mechanism, const State& at, const auto& kinematics) {
+        const auto poses = Oracle(d, testing::LayoutOf(mechanism)).Poses(ToReal(at.q));
+        for (int b = 1; b < mechanism.num_bodies(); ++b) {
+          const auto& X = kinematics.poses()[b];
+          for (int i = 0; i < TypeParam::kLin; ++i) {
+            // a path of n bodies of about a metre: n roundings of n metres at worst
+            const double scale = mechanism.num_bodies() * (1.0 + std::abs(X.p[i]));
+            EXPECT_NEAR(X.p[i], static_cast<double>(poses[b].p[i].f), 16 * kEps * scale);
+            for (int j = 0; j < TypeParam::kLin; ++j) {
+              EXPECT_NEAR(X.R(i, j), static_cast<double>(poses[b].R(i, j).f),
+                          16 * kEps * mechanism.num_bodies());
+            }
+          }
+        }
+      });
+}
+
+/// One answer of the oracle holds the speeds' accelerations: G udot + A_0, with A_0 from second
+/// derivatives of the poses. BodyAccelerations() adds up H udot and g along the tree instead.
+TYPED_TEST(KinematicsTest, AccelerationsOfBodiesAreSecondDerivativesOfTheirPoses) {
+  ForAll<TypeParam>(
+      [](const auto& d, const auto& mechanism, const State& at, const auto& kinematics) {
+        const testing::Answer answer =
+            Oracle(d, testing::LayoutOf(mechanism)).Solve(ToReal(at.q), ToReal(at.u));
+        std::vector<Motion<TypeParam, double>> A(mechanism.num_bodies());
+        const TreeDynamics<TypeParam, double> dynamics(mechanism);
+        dynamics.BodyAccelerations(kinematics, answer.udot.template cast<double>(), A);
+        double scale = 0.0;
+        for (const auto& expected : answer.accelerations) {
+          scale = std::max(scale, static_cast<double>(expected.norm()));
+        }
+        const int first = TypeParam::kRot == 1 ? 2 : 0;
+        for (int b = 1; b < mechanism.num_bodies(); ++b) {
+          for (int i = 0; i < TypeParam::kDim; ++i) {
+            EXPECT_NEAR(A[b][i], static_cast<double>(answer.accelerations[b][first + i]),
+                        32 * kEps * mechanism.num_bodies() * scale);
+          }
+        }
+      });
+}
+
+/// g by itself: D^T (A_Q - A_P - g) vanishes on the oracle's accelerations, which know no g. The
+/// joints here are cut or not, revolute, prismatic, welded, reversed.
+TYPED_TEST(KinematicsTest, JointAccelerationsVanishOnTheOraclesAnswer) {
+  ForAll<TypeParam>([](const auto& d, const auto& mechanism, const State& at,
+                       const auto& kinematics) {
+    const testing::Answer answer =
+        Oracle(d, testing::LayoutOf(mechanism)).Solve(ToReal(at.q), ToReal(at.u));
+    std::vector<Motion<TypeParam, double>> A(mechanism.num_bodies());
+    double scale = 0.0;
+    const int first = TypeParam::kRot == 1 ? 2 : 0;
+    for (int b = 0; b < mechanism.num_bodies(); ++b) {
+      A[b] =
+          answer.accelerations[b].template segment<TypeParam::kDim>(first).template cast<double>();
+      scale = std::max(scale, A[b].norm());
+    }
+    for (int j = 0; j < static_cast<int>(d.joints.size()); ++j) {
+      const auto rest = JointAcceleration<TypeParam, double>(kinematics, j, A);
+      EXPECT_LE(rest.norm(), 100 * kEps * mechanism.num_bodies() * scale) << d.joints[j].name;
+    }
+  });
+}
+
+TYPED_TEST(KinematicsTest, ConsistentSpeedsKeepEveryJointTogether) {
+  ForAll<TypeParam>(
+      [](const auto& d, const auto& mechanism, const State& at, const auto& kinematics) {
+        const double scale = mechanism.num_bodies() * (1.0 + at.u.norm());
+        for (int j = 0; j < static_cast<int>(d.joints.size()); ++j) {
+          const auto& state = kinematics.joints()[j];
+          EXPECT_LE((state.D.transpose() * state.V_rel).norm(), 100 * kEps * scale);
+          EXPECT_LE((state.D.transpose() * state.H).norm(), 8 * kEps) << "D^T H = 0";
+          EXPECT_LE((state.D.transpose() * kinematics.ConstraintMismatch(j)).norm(),
+                    100 * kEps * scale);
+        }
+      });
+}
+
+TYPED_TEST(KinematicsTest, SpeedsAreDerivativesOfPoses) {
+  ForAll<TypeParam>(
+      [](const auto&, const auto& mechanism, const State& at, const auto& kinematics) {
+        VectorX<double> qdot(mechanism.num_q());
+        mechanism.Rates(at.q, at.u, qdot);
+        const double h = 1e-5;  // truncation h^2, round-off eps / h: both about 1e-10
+        Kinematics<TypeParam, double> ahead(mechanism), behind(mechanism);
+        ahead.UpdatePosition(at.q + h * qdot);
+        behind.UpdatePosition(at.q - h * qdot);
+        for (int b = 1; b < mechanism.num_bodies(); ++b) {
+          const auto v = kinematics.motions()[b].template tail<TypeParam::kLin>();
+          const auto difference = (ahead.poses()[b].p - behind.poses()[b].p) / (2 * h);
+          const double speed = 1.0 + kinematics.motions()[b].norm();
+          EXPECT_LE((v - difference).norm(), 1e-8 * speed * speed * speed);
+        }
+      });
+}
+
+TYPED_TEST(KinematicsTest, CoordinatesMoveBetweenSetsAndBack) {
+  for (const MechanismDescription& d : Samples<TypeParam>()) {
+    const Mechanism<TypeParam, double> joint(d, Coordinates::kJoint);
+    const Mechanism<TypeParam, double> absolute(d, Coordinates::kAbsolute);
+    const State state = testing::ConsistentState(d, joint, 1);
+    const State back = testing::StateIn(joint, absolute, testing::StateIn(absolute, joint, state));
+    const double scale = joint.num_bodies() * (1.0 + state.u.norm() + state.q.norm());
+    EXPECT_LE((back.u - state.u).norm(), 100 * kEps * scale);
+    for (const TreeStep& step : joint.tree()) {
+      const Joint<TypeParam, double>& at = joint.joints()[step.joint];
+      if (at.kind->num_q == 7) continue;  // a quaternion and its opposite are one orientation
+      EXPECT_LE((back.q - state.q).segment(at.q_offset, at.kind->num_q).norm(), 100 * kEps * scale);
+    }
+  }
+}
+
+}  // namespace
+}  // namespace loopbench

@@ -1,0 +1,92 @@
+// Cases for tests that run whole simulations: the paper's scenes as its experiment file defines
+// them, and mechanisms made in code.
+#pragma once
+
+#include <algorithm>
+#include <array>
+#include <cctype>
+#include <filesystem>
+#include <stdexcept>
+#include <string>
+#include <vector>
+
+#include "harness/config/experiment_reader.h"
+#include "harness/config/mechanism_reader.h"
+#include "harness/run_case.h"
+
+namespace loopbench::harness::reference {
+
+inline const std::filesystem::path kConfigs =
+    std::filesystem::path(LOOPBENCH_SOURCE_DIR) / "configs";
+
+/// configs/experiments/paper/paper.json.
+inline const Experiment& Paper() {
+  static const Experiment kPaper = ReadExperiment(kConfigs / "experiments/paper/paper.json");
+  return kPaper;
+}
+
+/// An experiment with one scene and nothing else.
+inline Experiment Single(const MechanismFile& mechanism) {
+  Experiment experiment;
+  experiment.name = "single";
+  experiment.scenes.push_back({.name = mechanism.description.name,
+                               .path = {},
+                               .mechanism = mechanism,
+                               .horizons = {},
+                               .tags = {}});
+  return experiment;
+}
+
+/// The paper's columns as published: level and solver belong to the formulation.
+inline Column Published(FormulationKind formulation, Coordinates coordinates) {
+  return {.formulation = formulation,
+          .enforcement = formulation == FormulationKind::kReduction ? Enforcement::kVelocity
+                                                                    : Enforcement::kAcceleration,
+          .coordinates = coordinates,
+          .solver = SolverKind::kAsPublished};
+}
+
+inline const std::vector<Column>& PublishedColumns() {
+  using enum FormulationKind;
+  static const std::vector<Column> kColumns = {
+      Published(kOdca, Coordinates::kJoint),      Published(kOdca, Coordinates::kAbsolute),
+      Published(kLagrange, Coordinates::kJoint),  Published(kLagrange, Coordinates::kAbsolute),
+      Published(kReduction, Coordinates::kJoint), Published(kReduction, Coordinates::kAbsolute)};
+  return kColumns;
+}
+
+/// A column as part of a test's name: "OdcaAccelerationJointAsPublished".
+inline std::string NameOf(const Column& column) {
+  std::string name;
+  bool upper = true;
+  for (const char c : ToString(column)) {
+    const bool separator = c == '/' || c == '-';
+    if (!separator) name += upper ? static_cast<char>(std::toupper(c)) : c;
+    upper = separator;
+  }
+  return name;
+}
+
+/// One run of a scene. A minute of wall time: limits are for suites, a test must not end by one on
+/// a busy machine.
+inline Case CaseOf(const Experiment& experiment, const std::string& scene, const Column& column,
+                   double tolerance, double horizon) {
+  const auto it = std::ranges::find(experiment.scenes, scene, &ExperimentScene::name);
+  if (it == experiment.scenes.end()) throw std::invalid_argument("no scene " + scene);
+  return {.scene = static_cast<std::size_t>(it - experiment.scenes.begin()),
+          .mechanism = scene,
+          .column = column,
+          .integrator = experiment.integrator,
+          .rtol = tolerance,
+          .atol = tolerance,
+          .horizon = horizon,
+          .limits = {.wall_s = 60.0, .steps = 1'000'000}};
+}
+
+/// Runs one scene of the paper.
+inline Record RunPaper(const std::string& scene, const Column& column, double tolerance,
+                       double horizon) {
+  return RunCase(Paper(), CaseOf(Paper(), scene, column, tolerance, horizon));
+}
+
+}  // namespace loopbench::harness::reference

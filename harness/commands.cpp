@@ -77,7 +77,10 @@ std::vector<Record> Load(const std::filesystem::path& store) {
 int Run(const RunCommand& command, const std::string& typed) {
   // read everything first: a mistake in the last file must not cost the runs of the first
   std::vector<Experiment> experiments;
-  for (const auto& path : command.experiments) experiments.push_back(ReadExperiment(path));
+  for (const auto& path : command.experiments) {
+    experiments.push_back(ReadExperiment(path));
+    if (command.suite.accuracy) SelectCases(experiments.back(), command.suite.filter);
+  }
   const std::filesystem::path out =
       command.out.empty() ? std::filesystem::path("results/runs") / experiments.front().name
                           : command.out;

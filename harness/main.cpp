@@ -36,6 +36,12 @@ int main(int argc, char** argv) {
       "loopbench"};
   app.footer(kFooter);
   app.require_subcommand(1);
+  app.failure_message([](const CLI::App* failed, const CLI::Error& error) {
+    // CLI11 reports a misspelt subcommand only as a missing one: name it
+    std::string text = CLI::FailureMessage::simple(failed, error);
+    for (const std::string& word : failed->remaining()) text += "unknown: " + word + "\n";
+    return text;
+  });
   std::vector<std::string> conditions;
   std::vector<std::filesystem::path> files;
 

@@ -2,6 +2,7 @@
 
 #include <fmt/format.h>
 
+#include <algorithm>
 #include <cstring>
 
 #include "harness/integrator/arkode.h"
@@ -115,8 +116,11 @@ class Runner {
     const StepObserver observe = [&](double t, std::span<double> y) {
       const bool restart = formulation->BeginStep(y);
       ydot.resize(y.size());
-      // a derivative that fails here fails in the integrator's next call, with its outcome
-      if (formulation->Derivative(t, y, ydot) == Outcome::kFinished) Observe(t, *formulation);
+      // a derivative that fails here fails in the integrator's next call, with its outcome; only
+      // what the failing matrix looked like is worth keeping
+      const Outcome outcome = formulation->Derivative(t, y, ydot);
+      if (outcome == Outcome::kFinished) Observe(t, *formulation);
+      if (outcome == Outcome::kSingular) condition_.Observe({t, *formulation});
       return restart ? StepAction::kRestart : StepAction::kContinue;
     };
     return harness::Integrate(ode, 0.0, case_.horizon, y_, options, observe);
@@ -200,9 +204,13 @@ Record RunCase(const Experiment& experiment, const Case& one) {
     }
   }
   if (one.ensemble <= 1) runs.push_back(nominal.drift);
+  std::erase_if(runs, [](const DriftSeries& run) { return run.t.empty(); });
   if (!runs.empty()) {
     const double length = scene.mechanism.observe.length;
-    WriteGrowth(AnalyseGrowth(runs, one.horizon, length), failed, record);
+    GrowthOptions options;
+    // the bound for round-off holds for some ten lengths of path; paths grow with the horizon
+    options.round_off *= std::max(1.0, one.horizon / 10.0);
+    WriteGrowth(AnalyseGrowth(runs, one.horizon, length, options), failed, record);
   }
   const DriftSeries envelope = Envelope(nominal.drift, experiment.series_points);
   record.Set("series.drift_t", envelope.t);

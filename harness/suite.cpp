@@ -9,6 +9,7 @@
 #include <mutex>
 #include <thread>
 
+#include "harness/config/config_error.h"
 #include "harness/progress.h"
 #include "harness/run_case.h"
 #include "harness/timing/time_cases.h"
@@ -48,12 +49,27 @@ void RunAccuracy(const Experiment& experiment, std::vector<Case> cases, int jobs
   if (failure) std::rethrow_exception(failure);
 }
 
+/// A condition on a key that cases do not have would silently match nothing.
+[[noreturn]] void RejectKey(const std::string& key, const Record& keys) {
+  std::string known;
+  for (const auto& [name, value] : keys.items()) known += (known.empty() ? "" : ", ") + name;
+  throw ConfigError(fmt::format("--filter {}: no such key; cases have {}", key, known));
+}
+
 }  // namespace
 
 std::vector<Case> SelectCases(const Experiment& experiment, const Selection& filter) {
   std::vector<Case> cases;
   for (const Case& one : Expand(experiment)) {
-    if (Matches(CaseKeys(experiment, one), filter)) cases.push_back(one);
+    const Record keys = CaseKeys(experiment, one);
+    for (const Condition& condition : filter) {
+      if (keys.Find(condition.key) == nullptr) RejectKey(condition.key, keys);
+    }
+    if (Matches(keys, filter)) cases.push_back(one);
+  }
+  if (cases.empty()) {
+    throw ConfigError(
+        fmt::format("{}: no case matches {}", experiment.path.string(), ToText(filter)));
   }
   return cases;
 }

@@ -4,10 +4,9 @@
 // speeds do". It is used through
 //   Derivative(t, y)   the right-hand side for an integrator, y = (q, speeds of the state),
 //   Evaluate(t, q, u)  accelerations alone, for given q and all speeds u,
-//   BeginStep(y)       at accepted steps, the only call that may change the mode (an independent
-//   set,
-//                      unwrapped angles). Everything else is a pure function of (t, q, u, mode):
-//                      calling it in any order gives the same bits.
+//   BeginStep(y)       at accepted steps, the only call that may change the mode (an
+//                      independent set, unwrapped angles). Everything else is a pure function
+//                      of (t, q, u, mode): calling it in any order gives the same bits.
 // After construction none of them allocates, except where a formulation says so.
 #pragma once
 
@@ -43,7 +42,7 @@ struct FormulationOptions {
 struct Diagnostics {
   Outcome outcome = Outcome::kFinished;
   int rank = 0;        ///< independent loop constraints: rank of J in joint coordinates
-  double rcond = 1.0;  ///< smallest scaled pivot met, each formulation in its own matrices
+  double rcond = 1.0;  ///< ratio of extreme pivots or eigenvalues of the formulation's own matrix
   double smallest_weight = 1.0;  ///< below 1: some direction was softened
   int worst_joint = -1;          ///< index of the joint behind rcond, -1 when not attributable
 };

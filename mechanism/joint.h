@@ -10,7 +10,8 @@
 // The constraint of a joint is imposed at one point, the point of P that now coincides with Mo:
 //   A_Q - A_P = H udot + g,   g = Hdot u + [w_P x w_rel; 2 w_P x v_rel],                  (7)
 // w_rel, v_rel being the measured relative motion seen in F. With that g, "D^T (A_Q - A_P - g) = 0"
-// says that the mismatch, written in F axes, has no second derivative.
+// says that the mismatch, written in F axes, has no second derivative (to first order in a rotation
+// mismatch in space). For the kinds here H_F is constant and Hdot u = 0.
 //
 // Coordinates: revolute [angle about z], prismatic [shift along x], weld none,
 // free: plane [angle, x, y], space [quaternion w x y z, x, y, z] with speeds [w; v] in F axes. The

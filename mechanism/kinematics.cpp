@@ -197,8 +197,8 @@ S Kinematics<Space, S>::JointSpeed(int index) const {
 
 template <class Space, class S>
 void Kinematics<Space, S>::AcceptStep() {
-  for (const JointForce<S>& force : mechanism_->joint_forces()) {
-    accepted_[force.joint] = JointCoordinate(force.joint);
+  for (int index : mechanism_->constraints()) {
+    if (mechanism_->joints()[index].kind->num_u == 1) accepted_[index] = JointCoordinate(index);
   }
 }
 

@@ -12,16 +12,16 @@
 
 namespace loopbench {
 
-/// A joint at the current position and speed.
+/// A joint at the current position and speed. What only UpdatePosition() needs comes last.
 template <class Space, class S>
 struct JointState {
   Linear<Space, S> p;         ///< Mo from the ground origin
   Linear<Space, S> r_P, r_Q;  ///< Mo from the centres of mass of P and Q
-  Directions<Space, S> H, D;  ///< motion map and constrained directions
-  Pose<Space, S> X_FM;        ///< measured for constraints, from q for tree joints
-  Rotation<Space, S> R_F;     ///< axes of H, D; identity where any axes serve
   Motion<Space, S> V_rel;     ///< [w_Q - w_P; v_Q - v_P] at Mo
   Motion<Space, S> g;         ///< A_Q - A_P = H udot + g                            (7)
+  Directions<Space, S> D, H;  ///< constrained directions and motion map
+  Pose<Space, S> X_FM;        ///< measured for constraints, from q for tree joints
+  Rotation<Space, S> R_F;     ///< axes of H, D; identity where any axes serve
 };
 
 template <class Space, class S>
@@ -60,8 +60,8 @@ class Kinematics {
   S JointCoordinate(int joint) const;
   S JointSpeed(int joint) const;
 
-  /// Remembers the angles of cut joints, so that the next ones are unwrapped from here. Called at
-  /// accepted steps only (the one memory of this class, part of the mode).
+  /// Remembers the coordinates of cut joints, so that the next angles are unwrapped from here.
+  /// Called at accepted steps only (the one memory of this class, part of the mode).
   void AcceptStep();
 
   /// q of a mechanism with the same bodies, from body poses here (other coordinate set).

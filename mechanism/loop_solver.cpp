@@ -68,7 +68,9 @@ bool LoopSolver<S>::FactorPlain(const MatrixX<S>& X, S tolerance) {
     const S l = cholesky_.matrixLLT()(i, i);
     rcond_ = std::min(rcond_, l * l / X(i, i));
   }
-  return cholesky_.info() == Eigen::Success && rcond_ > tolerance;
+  // a factorisation that broke off has no smallest pivot: it met one that is not positive
+  if (cholesky_.info() != Eigen::Success) rcond_ = S(0);
+  return rcond_ > tolerance;
 }
 
 template <class S>
@@ -78,6 +80,7 @@ bool LoopSolver<S>::FactorScaled(const MatrixX<S>& X) {
   smallest_weight_ = S(1);
   ScaleInto(X);
   cholesky_.compute(scaled_);
+  rcond_ = S(0);
   if (cholesky_.info() != Eigen::Success) return false;
   const S smallest = cholesky_.matrixLLT().diagonal().minCoeff();
   rcond_ = smallest * smallest;

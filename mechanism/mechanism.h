@@ -19,16 +19,18 @@ struct Inertia {
   Matrix rotational_inverse = Matrix::Zero();
 };
 
+/// Members that every evaluation reads come first: a long chain streams them through the cache.
 template <class Space, class S>
 struct Joint {
-  std::string name;
   const JointKind<Space, S>* kind = nullptr;
   int from = kGround, to = kGround;  ///< bodies P and Q
-  Pose<Space, S> X_PF, X_QM, X_MQ;   ///< from the centres of mass of P and Q
-  Directions<Space, S> H_F, D_F;     ///< motion map and its complement in F axes
   int q_offset = -1, u_offset = -1;  ///< place in q and u; -1 for a constraint
   int row = -1;                      ///< first constraint row; -1 for a tree joint
   int description = -1;              ///< index of the user's joint, -1 for a virtual free joint
+  Pose<Space, S> X_PF, X_MQ;         ///< to and from the centres of mass of P and Q
+  Pose<Space, S> X_QM;
+  Directions<Space, S> H_F, D_F;  ///< motion map and its complement in F axes
+  std::string name;
 
   bool in_tree() const { return q_offset >= 0; }
 };

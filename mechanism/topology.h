@@ -2,11 +2,10 @@
 // rooted in Ground, and the joints left over, which become constraints.
 //
 // Coordinates decide the forest (docs/design.md D2):
-//   joint     the forest is made of the user's joints; one joint per independent loop is cut. A
-//   part
-//             that does not reach Ground hangs on a virtual free joint.
-//   absolute  every body hangs on a virtual free joint from Ground; every user joint is a
-//   constraint.
+//   joint     the forest is made of the user's joints; one joint per independent loop is cut.
+//             A part that does not reach Ground hangs on a virtual free joint.
+//   absolute  every body hangs on a virtual free joint from Ground, and every user joint is a
+//             constraint.
 // After that no algorithm asks which set is in use.
 //
 // Properties: every body but Ground is reached by exactly one edge, parents before children; edges

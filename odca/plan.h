@@ -30,8 +30,9 @@ struct PlanJoint {
 /// When joints to Ground are closed.
 enum class Grounding {
   kEager,   ///< as soon as a body is a leaf: smallest boundaries, every loop closed where it closes
-  kAtRoot,  ///< last, both ends at once, as the paper does for a loop to Ground (31-42); joints to
-            ///< Ground beyond two of one part are still closed at leaves, or the root would grow
+  kAtRoot,  ///< last, both ends at once, as the paper does for a loop to Ground (31-42); a part
+            ///< with more than two joints to Ground closes them at its leaves, or the root would
+            ///< grow
 };
 
 /// How many joints a node may close at once.
@@ -66,7 +67,8 @@ struct PlanNode {
   std::vector<int> kept;          ///< indices into handles: the boundary afterwards, in order
   std::vector<NodeJoint> joints;  ///< closed here
   int rows = 0;                   ///< size of X
-  bool closes_loop = false;       ///< X may lose rank: both sides reach Ground, or several joints
+  bool closes_loop =
+      false;  ///< X may lose rank: both sides reach Ground, several joints, self-join
 };
 
 class Plan {

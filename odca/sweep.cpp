@@ -47,8 +47,15 @@ Sweep<Space, S>::Sweep(const Mechanism<Space, S>& mechanism, const Plan& plan, S
   s_.assign(s, S(0));
   const std::size_t joints = mechanism.joints().size();
   phi_.assign(joints, Motion<Space, S>::Zero());
-  c_P_.resize(joints);
-  c_Q_.resize(joints);
+  c_offset_.assign(joints, 0);
+  int c = 0;
+  for (const PlanNode& node : plan.nodes()) {
+    for (const NodeJoint& joint : node.joints) {
+      c_offset_[joint.index] = c;
+      c += 2 * joint.rows;
+    }
+  }
+  c_.assign(c, Motion<Space, S>::Zero());
   columns_.setZero(plan.largest_join(), Space::kDim * std::max(widest, 1));
   vector_.setZero(plan.largest_join());
 }
@@ -106,14 +113,11 @@ void Sweep<Space, S>::FillJoints(const Kinematics<Space, S>& kinematics) {
   for (const PlanNode& node : plan_.nodes()) {
     for (const NodeJoint& joint : node.joints) {
       const JointState<Space, S>& state = kinematics.joints()[joint.index];
-      Directions<Space, S>& c_P = c_P_[joint.index];
-      Directions<Space, S>& c_Q = c_Q_[joint.index];
-      c_P.resize(Space::kDim, joint.rows);
-      c_Q.resize(Space::kDim, joint.rows);
+      Motion<Space, S>* c = &c_[c_offset_[joint.index]];
       for (int i = 0; i < joint.rows; ++i) {
         const Motion<Space, S> D_i = state.D.col(i);
-        c_P.col(i) = -ShiftForce<Space, S>(D_i, state.r_P);
-        c_Q.col(i) = ShiftForce<Space, S>(D_i, state.r_Q);
+        c[i] = -ShiftForce<Space, S>(D_i, state.r_P);
+        c[joint.rows + i] = ShiftForce<Space, S>(D_i, state.r_Q);
       }
     }
   }
@@ -126,8 +130,8 @@ void Sweep<Space, S>::FormResponse(const PlanNode& node, const Place& place) {
   const auto side = [&](const NodeJoint& joint, int which) {
     return which == 0 ? joint.from : joint.to;
   };
-  const auto direction = [&](const NodeJoint& joint, int which) -> const Directions<Space, S>& {
-    return which == 0 ? c_P_[joint.index] : c_Q_[joint.index];
+  const auto direction = [&](const NodeJoint& joint, int which) {
+    return which == 0 ? c_P(joint) : c_Q(joint);
   };
   for (int e = 0; e < static_cast<int>(node.handles.size()); ++e) {
     const Handle& handle = node.handles[e];
@@ -139,8 +143,8 @@ void Sweep<Space, S>::FormResponse(const PlanNode& node, const Place& place) {
         const int f = side(joint, which);
         if (f < 0 || node.handles[f].child != handle.child) continue;
         const Block<Space, S>& Z = Z_[child.z + handle.place + child.kept * node.handles[f].place];
-        const Directions<Space, S>& c = direction(joint, which);
-        for (int i = 0; i < joint.rows; ++i) W[i].noalias() += Z * c.col(i);
+        const Motion<Space, S>* c = direction(joint, which);
+        for (int i = 0; i < joint.rows; ++i) W[i].noalias() += Z * c[i];
         operations_ += joint.rows * Space::kDim * Space::kDim;
       }
       W += joint.rows;
@@ -153,7 +157,7 @@ void Sweep<Space, S>::FormResponse(const PlanNode& node, const Place& place) {
         S sum = S(0);
         for (int which = 0; which < 2; ++which) {
           const int f = side(joint, which);
-          if (f >= 0) sum += direction(joint, which).col(i).dot(W_[place.w + f * n + l]);
+          if (f >= 0) sum += direction(joint, which)[i].dot(W_[place.w + f * n + l]);
         }
         X_[place.x + row + l * n] = X_[place.x + l + row * n] = sum;
       }
@@ -324,8 +328,8 @@ void Sweep<Space, S>::Up(const PlanNode& node, int n, std::span<const Motion<Spa
   for (const NodeJoint& joint : node.joints) {
     for (int i = 0; i < joint.rows; ++i, ++row) {
       s[row] = c0[joint.index][i];
-      if (joint.from >= 0) s[row] += c_P_[joint.index].col(i).dot(b_of(joint.from));
-      if (joint.to >= 0) s[row] += c_Q_[joint.index].col(i).dot(b_of(joint.to));
+      if (joint.from >= 0) s[row] += c_P(joint)[i].dot(b_of(joint.from));
+      if (joint.to >= 0) s[row] += c_Q(joint)[i].dot(b_of(joint.to));
     }
   }
   if (node.closes_loop) {
@@ -385,8 +389,8 @@ void Sweep<Space, S>::Down(const PlanNode& node, int n) {
     out.setZero();
     for (int i = 0; i < joint.rows; ++i, ++row) {
       out[i] = phi[row];
-      if (joint.from >= 0) force_on(joint.from) += c_P_[joint.index].col(i) * phi[row];
-      if (joint.to >= 0) force_on(joint.to) += c_Q_[joint.index].col(i) * phi[row];
+      if (joint.from >= 0) force_on(joint.from) += c_P(joint)[i] * phi[row];
+      if (joint.to >= 0) force_on(joint.to) += c_Q(joint)[i] * phi[row];
     }
   }
   operations_ += node.rows * (2 * Space::kDim + Space::kDim * place.kept + node.rows / 2);

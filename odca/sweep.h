@@ -14,7 +14,7 @@
 // X^+ = T^T T (loop_solver.h), so with V = T C Z and s = T (C b + c0): Z' = Z - V^T V, b' = b - V^T
 // s, phi = -T^T (s + V F). V, T and s are what the way down needs.
 //
-// All memory is taken at construction; a sweep allocates nothing and holds no matrix larger than
+// All memory is taken at construction; a sweep allocates nothing, and holds no matrix larger than
 // the plan's largest join.
 #pragma once
 
@@ -49,7 +49,8 @@ class Sweep {
   S rcond() const { return rcond_; }
   S smallest_weight() const { return smallest_weight_; }
   int worst_joint() const { return worst_joint_; }
-  /// Multiply-adds of the last Assemble() and Solve(), counted as they were done.
+  /// Multiply-adds since the last Assemble() began, counted as they were done (an
+  /// eigen-decomposition as if it were a Cholesky factorisation).
   long operations() const { return operations_; }
   /// Entries of the largest matrix held for one join: X or one Z.
   int largest_matrix() const { return largest_matrix_; }
@@ -68,6 +69,8 @@ class Sweep {
 
   bool AssembleAll(const Kinematics<Space, S>& kinematics,
                    const std::vector<Inertia<Space, S>>& inertias, Pass pass);
+  const Motion<Space, S>* c_P(const NodeJoint& joint) const { return &c_[c_offset_[joint.index]]; }
+  const Motion<Space, S>* c_Q(const NodeJoint& joint) const { return c_P(joint) + joint.rows; }
   void FillLeaves(const Kinematics<Space, S>& kinematics,
                   const std::vector<Inertia<Space, S>>& inertias);
   void FillJoints(const Kinematics<Space, S>& kinematics);
@@ -87,7 +90,8 @@ class Sweep {
   std::vector<Place> places_;
   std::vector<Block<Space, S>> Z_;
   std::vector<Motion<Space, S>> b_, F_, W_, phi_;
-  std::vector<Directions<Space, S>> c_P_, c_Q_;
+  std::vector<Motion<Space, S>> c_;  ///< rows c_P, then c_Q of each joint
+  std::vector<int> c_offset_;        ///< of each mechanism joint in c_
   std::vector<S> X_, s_;
   std::vector<std::unique_ptr<LoopSolver<S>>> loops_;  ///< of nodes that close loops
   std::vector<MatrixX<S>> loop_X_;

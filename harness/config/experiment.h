@@ -88,7 +88,7 @@ struct EnsembleRule {
 /// When a case is given up. Its row then says so.
 struct Limits {
   double wall_s = 10.0;            ///< wall time [s]: keeps a whole suite within minutes
-  std::int64_t steps = 1'000'000;  ///< attempted steps: far more than any case that ends needs
+  std::int64_t steps = 1'000'000;  ///< accepted steps: far more than any case that ends needs
 };
 
 /// A family of mechanisms of growing size (mechanism/library.h), timed per right-hand side only.

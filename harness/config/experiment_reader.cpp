@@ -69,7 +69,7 @@ void ReadSettings(const JsonNode& root, Experiment* experiment) {
   const auto series = root.Optional("series");
   if (series && series->ExpectObject({"points"})) {
     if (const auto points = series->Optional("points")) {
-      experiment->series_points = static_cast<int>(points->Integer(0, kMaxCount));
+      experiment->series_points = static_cast<int>(points->Integer(2, kMaxCount));
     }
   }
   ReadTiming(root, &experiment->timing);

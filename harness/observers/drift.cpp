@@ -70,9 +70,13 @@ void DriftObserver<Space>::Observe(const Sample<Space>& sample) {
   for (int index : kinematics.mechanism().constraints()) {
     now.Add(kinematics, index);
     const JointState<Space, double>& state = kinematics.joints()[index];
-    work.velocity = std::max(work.velocity, (state.D.transpose() * state.V_rel).norm());
+    const auto shift_of = [&](const auto& rows) {
+      const Motion<Space, double> motion = state.D * rows;
+      return motion.template tail<Space::kLin>().norm();
+    };
+    work.velocity = std::max(work.velocity, shift_of(state.D.transpose() * state.V_rel));
     const Motion<Space, double> rest = JointAcceleration<Space, double>(kinematics, index, work.A);
-    work.acceleration = std::max(work.acceleration, rest.norm());
+    work.acceleration = std::max(work.acceleration, shift_of(rest.head(state.D.cols())));
   }
   if (now.shift > work.shift) {
     work.worst_loop = kinematics.mechanism().joints()[now.joint].name;
@@ -97,6 +101,7 @@ void DriftObserver<Space>::Observe(const Sample<Space>& sample) {
 
 template <class Space>
 void DriftObserver<Space>::Write(Record& record) const {
+  if (series_.t.empty()) return;
   record.Set("drift_position_max", work_->shift);
   record.Set("drift_rotation_max", work_->rotation);
   record.Set("drift_velocity_max", work_->velocity);

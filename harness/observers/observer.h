@@ -1,5 +1,6 @@
 // What is watched along a run. Observers see accepted steps only; each keeps maxima and, where a
-// figure needs one, a series, and writes them into the case's record at the end.
+// figure needs one, a series, and writes them into the case's record at the end. An observer that
+// saw nothing writes nothing: an empty cell is not a zero.
 #pragma once
 
 #include <memory>
@@ -38,8 +39,8 @@ TimeSeries Thin(const TimeSeries& series, int points);
 ///
 /// Position drift is the largest mismatch of a constraint that the coordinate set imposes: of the
 /// cut joints in joint coordinates, of every joint in absolute coordinates; points [m] and
-/// rotations [rad] apart. Velocity drift is the largest |D^T (V_Q - V_P)|, acceleration drift the
-/// largest |D^T (A_Q - A_P - g)|, point components in m/s and m/s^2.
+/// rotations [rad] apart. Velocity and acceleration drift are the largest V_Q - V_P and A_Q - A_P - g
+/// in the constrained directions, points only [m/s, m/s^2].
 ///
 /// Loop closure compares the two sets: the tree of user joints is followed with the joint
 /// coordinates (in absolute coordinates: those measured between the bodies), and what a cut joint

@@ -31,6 +31,7 @@ void EnergyObserver<Space>::Observe(const Sample<Space>& sample) {
 
 template <class Space>
 void EnergyObserver<Space>::Write(Record& record) const {
+  if (!started_) return;
   record.Set("energy_error_max", largest_);
   const TimeSeries thin = Thin(series_, points_);
   record.Set("series.energy_t", thin.t);
@@ -51,6 +52,7 @@ void ConditionObserver<Space>::Observe(const Sample<Space>& sample) {
 
 template <class Space>
 void ConditionObserver<Space>::Write(Record& record) const {
+  if (!started_) return;
   record.Set("rank_min", std::int64_t{rank_min_});
   record.Set("rcond_min", rcond_min_);
   record.Set("rcond_min_t", rcond_t_);
@@ -110,7 +112,10 @@ void ExactObserver<Space>::Observe(const Sample<Space>& sample) {
       theta0_ = theta;
       omega0_ = sample.formulation.kinematics().motions()[pendulum_body_][Space::kRot - 1];
     }
-    const double exact = PendulumAngle(form.frequency_squared, theta0_, omega0_, sample.t);
+    // the closed form takes an angle within half a turn; whole turns go along unchanged
+    const double within = std::remainder(theta0_, 2 * std::numbers::pi);
+    const double exact =
+        theta0_ - within + PendulumAngle(form.frequency_squared, within, omega0_, sample.t);
     closed_form_error_ = std::max(closed_form_error_, std::abs(theta - exact));
   }
   started_ = true;
@@ -118,6 +123,7 @@ void ExactObserver<Space>::Observe(const Sample<Space>& sample) {
 
 template <class Space>
 void ExactObserver<Space>::Write(Record& record) const {
+  if (!started_) return;
   if (!combinations_.empty()) {
     record.Set("branch_error_max", branch_error_);
     const TimeSeries thin = Thin(branch_, 200);

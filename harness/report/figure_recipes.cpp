@@ -137,7 +137,7 @@ Figure AnglesFigure(const Record& record) {
 Figure DriftFigure(std::span<const Record> records) {
   return {.title = TitleOf(records, "drift"),
           .x_label = "time [s]",
-          .y_label = "loop closure error, running maximum [m]",
+          .y_label = "position drift, running maximum [m]",
           .log_x = true,
           .log_y = true,
           .curves = DriftCurves(records, true)};
@@ -146,7 +146,7 @@ Figure DriftFigure(std::span<const Record> records) {
 Figure SingularFigure(std::span<const Record> records) {
   return {.title = TitleOf(records, "drift through singular positions"),
           .x_label = "time [s]",
-          .y_label = "loop closure error, running maximum [m]",
+          .y_label = "position drift, running maximum [m]",
           .log_x = false,
           .log_y = true,
           .curves = DriftCurves(records, false)};

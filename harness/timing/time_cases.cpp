@@ -125,6 +125,7 @@ class SubjectIn final : public Subject {
     if (const auto* odca = dynamic_cast<const odca::Odca<Space, double>*>(formulation_.get())) {
       record.Set("plan_depth", std::int64_t{odca->plan().depth()});
       record.Set("plan_largest_join", std::int64_t{odca->plan().largest_join()});
+      record.Set("rhs_operations", std::int64_t{odca->sweep().operations()});
     }
     return record;
   }

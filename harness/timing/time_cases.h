@@ -1,8 +1,9 @@
 // Time of right-hand sides and of whole simulations, in runs of their own.
 //
 // The columns of one mechanism are measured in turn, batch by batch, so that a change of the
-// machine's speed hits all of them; medians and the 10th and 90th percentile are reported. Every
-// right-hand side is evaluated at states from an actual run, not at one state or at zero.
+// machine's speed hits all of them; medians and the 10th and 90th percentile are reported.
+// Right-hand sides of scenes are evaluated at states from an actual run, those of families at their
+// moving start.
 #pragma once
 
 #include <functional>

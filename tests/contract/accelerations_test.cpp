@@ -111,9 +111,11 @@ TEST(AccelerationsTest, LaddersAgreeWithTheOracle) {
   Family plane("ladders, plane", kShare), space("ladders, space", kShare),
       flat("planar ladders in space", kShare);
   for (int n = 1; n <= 4; ++n) {
-    for (std::uint64_t seed = 1; seed <= 5; ++seed) {
-      plane.Hold(Sample<Planar>(RandomLadder(n, kPlane, false, seed), seed), true);
-      HoldInSpace(RandomLadder(n, kPlane, false, seed), seed, flat);
+    for (int k = 1; k <= 6; ++k) {
+      const std::uint64_t seed = 100 * n + k;  // other draws for every size
+      const MechanismDescription ladder = RandomLadder(n, kPlane, false, seed);
+      plane.Hold(Sample<Planar>(ladder, seed), true);
+      HoldInSpace(ladder, seed, flat);
       space.Hold(Sample<Spatial>(RandomLadder(n, kSpace, true, seed), seed), true);
     }
   }
@@ -123,20 +125,38 @@ TEST(AccelerationsTest, LaddersAgreeWithTheOracle) {
   flat.Finish();
 }
 
-TEST(AccelerationsTest, GraphsWithCoupledLoopsAgreeWithTheOracle) {
-  Family plane("graphs, plane", kShare), space("graphs, space", kShare),
-      flat("planar graphs in space", kShare);
+TEST(AccelerationsTest, PlanarGraphsAgreeWithTheOracle) {
+  Family family("graphs, plane", kShare);
   for (int loops = 1; loops <= 6; ++loops) {
     for (std::uint64_t seed = 1; seed <= 4; ++seed) {
-      const int n = 8 + 8 * loops;
-      plane.Hold(Sample<Planar>(RandomGraph(n, loops, kPlane, 0.2, seed), seed), true);
-      space.Hold(Sample<Spatial>(RandomGraph(n, loops, kSpace, 0.7, seed), seed), true);
-      HoldInSpace(RandomGraph(n, loops, kPlane, 0.0, seed), seed, flat);
+      family.Hold(Sample<Planar>(RandomGraph(8 + 12 * loops, loops, kPlane, 0.3, seed), seed),
+                  true);
     }
   }
-  plane.Finish();
-  space.Finish();
-  flat.Finish();
+  family.Finish();
+}
+
+TEST(AccelerationsTest, SpatialGraphsAgreeWithTheOracle) {
+  // Five closure directions meet paths of few freedoms badly: most tree joints are free ones here;
+  // IllConditionedGraphsKeepTheBound has the others.
+  Family family("graphs, space", kShare);
+  for (int loops = 1; loops <= 6; ++loops) {
+    for (std::uint64_t seed = 1; seed <= 3; ++seed) {
+      family.Hold(Sample<Spatial>(RandomGraph(8 + 8 * loops, loops, kSpace, 0.8, seed), seed),
+                  true);
+    }
+  }
+  family.Finish();
+}
+
+TEST(AccelerationsTest, PlanarGraphsInSpaceAgreeWithTheOracleWhereRankIsRevealed) {
+  Family family("planar graphs in space", kShare);
+  for (int loops = 1; loops <= 6; ++loops) {
+    for (std::uint64_t seed = 1; seed <= 3; ++seed) {
+      HoldInSpace(RandomGraph(8 + 16 * loops, loops, kPlane, 0.0, seed), seed, family);
+    }
+  }
+  family.Finish();
 }
 
 TEST(AccelerationsTest, OverconstrainedGraphsAgreeWithTheOracleWhereRankIsRevealed) {
@@ -157,7 +177,7 @@ TEST(AccelerationsTest, OverconstrainedGraphsAgreeWithTheOracleWhereRankIsReveal
 TEST(AccelerationsTest, IllConditionedGraphsKeepTheBound) {
   Family chains("one-freedom graphs, space", 0.0), ladders("one-freedom ladders, space", 0.0);
   for (std::uint64_t seed = 1; seed <= 6; ++seed) {
-    chains.Hold(Sample<Spatial>(RandomGraph(40, 3, kSpace, 0.0, seed), seed), true);
+    chains.Hold(Sample<Spatial>(RandomGraph(45, 3, kSpace, 0.0, seed), seed), true);
     ladders.Hold(Sample<Spatial>(RandomLadder(2, kSpace, false, seed), seed), true);
   }
   // five closure directions against a path of single freedoms: rcond is about 1e-3

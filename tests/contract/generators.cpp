@@ -9,16 +9,33 @@ namespace loopbench::testing {
 
 namespace {
 
+/// Where a bar of about a metre meets the next one.
+Eigen::Vector3d Tip(Builder& b) {
+  const Eigen::Vector3d along = b.random.Uniform(0.6, 1.4) * Eigen::Vector3d::UnitX();
+  return along + b.random.Vector(0.2, b.spatial);
+}
+
+/// A branch of n bars from a body; the last bar.
+int Grow(Builder& b, int root, int n) {
+  for (int i = 0; i < n; ++i) {
+    const int body = b.AddBody(1.0);
+    const JointType type = b.random.Chance(0.8) ? JointType::kRevolute : JointType::kPrismatic;
+    const Eigen::Vector3d at = Tip(b);
+    b.AddJoint(type, root, at, body, b.random.Vector(0.2, b.spatial), b.random.Uniform(-2.0, 2.0));
+    root = body;
+  }
+  return root;
+}
+
 MechanismDescription DrawGraph(int n, int loops, SpaceKind space, std::uint64_t seed,
-                               double free_joints, int least_freedom) {
+                               int least_freedom) {
   Builder b("graph-" + std::to_string(n) + "-" + std::to_string(loops), space, seed);
   for (int i = 1; i <= n; ++i) {
     const int parent = b.random.Chance(0.85) ? i - 1 : b.random.Below(i);  // long branches
     const double draw = b.random.Uniform(0.0, 1.0);
-    const JointType type = draw < free_joints ? JointType::kFree
-                           : draw < 0.75      ? JointType::kRevolute
-                           : draw < 0.95      ? JointType::kPrismatic
-                                              : JointType::kWeld;
+    const JointType type = draw < 0.65   ? JointType::kRevolute
+                           : draw < 0.95 ? JointType::kPrismatic
+                                         : JointType::kWeld;
     const Eigen::Vector3d at_parent = b.random.Vector(0.7, b.spatial);
     const int body = b.AddBody(1.0);
     b.AddJoint(type, parent, at_parent, body, b.random.Vector(0.7, b.spatial),
@@ -38,10 +55,13 @@ template <class Space>
 bool LoopsAreIndependent(const MechanismDescription& description) {
   const Mechanism<Space, double> mechanism(description, Coordinates::kJoint);
   Oracle oracle(description, LayoutOf(mechanism));
-  return oracle
-      .Solve(ToReal(DescribedCoordinates(description, mechanism)),
-             RealVector::Zero(mechanism.num_u()))
-      .full_rank();
+  const RealMatrix J = oracle
+                           .Form(ToReal(DescribedCoordinates(description, mechanism)),
+                                 RealVector::Zero(mechanism.num_u()))
+                           .J;
+  const RealVector lambda = SymmetricEigenvalues(J * J.transpose());
+  // squares of lengths; the state is rounded to double: what is zero on paper is below 1e-30 here
+  return lambda[0] > Real(1e-12) * lambda[lambda.size() - 1];
 }
 
 }  // namespace
@@ -89,12 +109,25 @@ MechanismDescription RandomTree(int n, SpaceKind space, std::uint64_t seed) {
   return b.Finish();
 }
 
-MechanismDescription RandomGraph(int n, int loops, SpaceKind space, double free_joints,
-                                 std::uint64_t seed) {
+MechanismDescription RandomGraph(int loops, SpaceKind space, std::uint64_t seed) {
+  Builder b("graph-" + std::to_string(loops), space, seed);
+  const int half = b.spatial ? 6 : 3;
+  Grow(b, 0, 2);
+  for (int i = 0; i < loops; ++i) {
+    const int bodies = static_cast<int>(b.description.bodies.size());
+    const int from = b.random.Below(bodies), to = b.random.Below(bodies);
+    const int left = Grow(b, from, half), right = Grow(b, to, half);
+    const JointType type = b.random.Chance(0.7) ? JointType::kRevolute : JointType::kPrismatic;
+    b.Close(type, left, right, Tip(b), b.random.Uniform(-1.0, 1.0));
+  }
+  Grow(b, b.random.Below(static_cast<int>(b.description.bodies.size())), 2);
+  return b.Finish();
+}
+
+MechanismDescription TightGraph(int n, int loops, SpaceKind space, std::uint64_t seed) {
   const bool spatial = space == SpaceKind::kSpatial;
   for (std::uint64_t draw = 0; draw < 100; ++draw) {
-    MechanismDescription graph =
-        DrawGraph(n, loops, space, seed + 1000 * draw, free_joints, spatial ? 12 : 7);
+    MechanismDescription graph = DrawGraph(n, loops, space, seed + 1000 * draw, spatial ? 12 : 7);
     if (static_cast<int>(graph.joints.size()) < n + loops) continue;
     if (spatial ? LoopsAreIndependent<Spatial>(graph) : LoopsAreIndependent<Planar>(graph)) {
       return graph;
@@ -104,32 +137,31 @@ MechanismDescription RandomGraph(int n, int loops, SpaceKind space, double free_
 }
 
 MechanismDescription RedundantGraph(int n, int loops, SpaceKind space, std::uint64_t seed) {
-  return DrawGraph(n, loops, space, seed, 0.0, space == SpaceKind::kSpatial ? 4 : 2);
+  return DrawGraph(n, loops, space, seed, space == SpaceKind::kSpatial ? 4 : 2);
 }
 
-MechanismDescription RandomLadder(int n, SpaceKind space, bool free_joints, std::uint64_t seed) {
+MechanismDescription RandomLadder(int n, SpaceKind space, std::uint64_t seed) {
   Builder b("ladder-" + std::to_string(n), space, seed);
   // In the plane one crank drives all others: only near the parallelogram does motion not grow from
-  // window to window. In space a coupler has six links.
+  // window to window. In space couplers are of twelve links and close in their middle.
   const double slope = b.random.Uniform(-2.0, -1.0);
   const auto angle = [&](double near, double by) { return near + b.random.Uniform(-by, by); };
   const auto tip = [&] { return Eigen::Vector3d(b.random.Uniform(0.97, 1.03), 0.0, 0.0); };
-  int crank = 0;
+  int last = 0;
   for (int i = 0; i <= n; ++i) {
-    int end = crank;
-    for (int k = 0; i > 0 && k < (b.spatial ? 6 : 1); ++k) {
-      const int link = b.AddBody(1.0);
-      const double q = b.spatial ? angle(0.0, 2.0) : angle(-slope, 0.03);
-      const JointType type = free_joints && k % 3 < 2 ? JointType::kFree
-                             : b.spatial && k == 2    ? JointType::kPrismatic
-                                                      : JointType::kRevolute;
-      b.AddJoint(type, end, tip(), link, b.random.Vector(0.02, b.spatial), q, b.spatial);
-      end = link;
-    }
-    crank = b.AddBody(1.0);
+    const int crank = b.AddBody(1.0);
     b.AddJoint(JointType::kRevolute, 0, Eigen::Vector3d(i, 0.0, 0.0), crank,
-               b.random.Vector(0.02, b.spatial), angle(slope, b.spatial ? 2.0 : 0.03), b.spatial);
-    if (i > 0) b.Close(JointType::kRevolute, crank, end, tip(), 0.0);
+               b.random.Vector(0.02, b.spatial), angle(slope, 0.03), b.spatial);
+    if (i > 0 && b.spatial) {
+      const int left = Grow(b, last, 6), right = Grow(b, crank, 6);
+      b.Close(JointType::kRevolute, left, right, Tip(b), 0.0);
+    } else if (i > 0) {
+      const int coupler = b.AddBody(1.0);
+      b.AddJoint(JointType::kRevolute, last, tip(), coupler, b.random.Vector(0.02, b.spatial),
+                 angle(-slope, 0.03), false);
+      b.Close(JointType::kRevolute, crank, coupler, tip(), 0.0);
+    }
+    last = crank;
   }
   return b.Finish();
 }

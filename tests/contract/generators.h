@@ -48,15 +48,16 @@ MechanismDescription SphericalChain(int n, std::uint64_t seed);
 MechanismDescription RandomTree(int n, SpaceKind space, std::uint64_t seed);
 
 /// Ladder of n windows. Plane: cranks and couplers of random shape about the parallelogram's.
-/// Space: cranks joined by couplers of six links, axes in all directions; four joints of each may
-/// be free.
-MechanismDescription RandomLadder(int n, SpaceKind space, bool free_joints, std::uint64_t seed);
+/// Space: cranks joined by couplers of twelve links, axes in all directions.
+MechanismDescription RandomLadder(int n, SpaceKind space, std::uint64_t seed);
 
-/// Tree of n bodies with closing joints between random bodies; loops share bodies. A part of the
-/// tree joints is free. Closures are independent: draws that are over-constrained somewhere are
-/// drawn again.
-MechanismDescription RandomGraph(int n, int loops, SpaceKind space, double free_joints,
-                                 std::uint64_t seed);
+/// Loops that share bodies: each is made of two new branches from random bodies of what there is,
+/// closed at their tips by a revolute or prismatic joint.
+MechanismDescription RandomGraph(int loops, SpaceKind space, std::uint64_t seed);
+
+/// A tree of n bodies with closing joints between random bodies: loops share most of their links.
+/// Closures are independent: draws that are over-constrained somewhere are drawn again.
+MechanismDescription TightGraph(int n, int loops, SpaceKind space, std::uint64_t seed);
 
 /// The same with short loops and without that care: parts are rigid or over-constrained.
 MechanismDescription RedundantGraph(int n, int loops, SpaceKind space, std::uint64_t seed);

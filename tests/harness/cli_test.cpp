@@ -32,8 +32,8 @@ constexpr const char* kExperiment = R"({
 
 constexpr const char* kClaims = R"({"claims": [{
   "id": "small", "claim": "Drift is small.", "where": "here",
-  "checks": [{"label": "all", "select": {"formulation": "odca"}, "measure": "drift_position_max", "statistic": "max",
-              "compare": "<=", "threshold": 1e-3}],
+  "checks": [{"label": "all", "select": {"formulation": "odca"}, "measure": "drift_position_max",
+              "statistic": "max", "compare": "<=", "threshold": 1e-3}],
   "wording": {"reproduced": "It is.", "not_reproduced": "It is not.", "only_under": "In part."}
 }]})";
 

@@ -78,7 +78,7 @@ TEST_F(FiguresTest, DriftHasUnitsCurvesAndFittedSlopes) {
                                                                RunOf("lagrange", "absolute", 2.0),
                                                                RunOf("reduction", "joint", 1.03)}));
   EXPECT_TRUE(Contains(svg, "time [s]"));
-  EXPECT_TRUE(Contains(svg, "loop closure error, running maximum [m]"));
+  EXPECT_TRUE(Contains(svg, "position drift, running maximum [m]"));
   EXPECT_TRUE(Contains(svg, "odca, acceleration, joint: t^1.97"));
   EXPECT_TRUE(Contains(svg, "lagrange, acceleration, absolute: t^2.00"));
   EXPECT_TRUE(Contains(svg, "reduction, velocity, joint: t^1.03"));

@@ -4,6 +4,7 @@
 #include <cmath>
 
 #include "mechanism/instantiate.h"
+#include "mechanism/symmetric_eigen.h"
 
 namespace loopbench {
 
@@ -19,7 +20,8 @@ LoopSolver<S>::LoopSolver(std::span<const int> rows) {
   work_.setZero(size_, size_);
   rotated_.setIdentity(size_, size_);
   cholesky_ = Eigen::LLT<MatrixX<S>>(size_);
-  eigen_ = Eigen::SelfAdjointEigenSolver<MatrixX<S>>(size_);
+  directions_.setIdentity(size_, size_);
+  eigenvalues_.setZero(size_);
   weights_.setOnes(size_);
   inverse_norms_.setOnes(size_);
   vector_.setZero(size_);
@@ -57,19 +59,16 @@ void LoopSolver<S>::ScaleInto(const MatrixX<S>& X) {
 }
 
 template <class S>
-bool LoopSolver<S>::FactorPlain(const MatrixX<S>& X, S tolerance) {
+bool LoopSolver<S>::FactorPlain(const MatrixX<S>& X, S scale, S tolerance) {
   form_ = Form::kPlain;
   rank_ = size_;
   smallest_weight_ = S(1);
+  rcond_ = S(0);
   cholesky_.compute(X);
-  // A pivot is what is left of its diagonal entry after the elimination of those before it.
-  rcond_ = S(1);
-  for (int i = 0; i < size_; ++i) {
-    const S l = cholesky_.matrixLLT()(i, i);
-    rcond_ = std::min(rcond_, l * l / X(i, i));
-  }
   // a factorisation that broke off has no smallest pivot: it met one that is not positive
-  if (cholesky_.info() != Eigen::Success) rcond_ = S(0);
+  if (cholesky_.info() != Eigen::Success) return false;
+  const S smallest = cholesky_.matrixLLT().diagonal().minCoeff();
+  rcond_ = smallest * smallest / scale;
   return rcond_ > tolerance;
 }
 
@@ -92,12 +91,12 @@ void LoopSolver<S>::FactorGeometric(const MatrixX<S>& X_geometric) {
   using std::exp;
   form_ = Form::kGeometric;
   ScaleInto(X_geometric);
-  eigen_.compute(scaled_);
-  const S largest = eigen_.eigenvalues()[size_ - 1];
+  SymmetricEigen(scaled_, directions_, eigenvalues_);
+  const S largest = eigenvalues_[size_ - 1];
   const S theta = S(kTheta) * largest;
   rank_ = 0;
   for (int i = 0; i < size_; ++i) {
-    const S lambda = std::max(eigen_.eigenvalues()[i], S(0));
+    const S lambda = std::max(eigenvalues_[i], S(0));
     const S ratio = lambda / theta;
     // expm1 keeps the weight's relative accuracy where it is small
     weights_[i] = -std::expm1(-ratio * ratio);
@@ -105,15 +104,15 @@ void LoopSolver<S>::FactorGeometric(const MatrixX<S>& X_geometric) {
     inverse_norms_[i] = weights_[i] < S(1e-16) ? S(0) : S(std::sqrt(weights_[i] / lambda));
   }
   smallest_weight_ = weights_.minCoeff();
-  rcond_ = std::max(eigen_.eigenvalues()[0], S(0)) / largest;
+  rcond_ = std::max(eigenvalues_[0], S(0)) / largest;
 }
 
 template <class S>
 void LoopSolver<S>::FactorSoftened(const MatrixX<S>& X) {
   form_ = Form::kSoftened;
   ScaleInto(X);
-  work_.noalias() = scaled_ * eigen_.eigenvectors();
-  rotated_.noalias() = eigen_.eigenvectors().transpose() * work_;
+  work_.noalias() = scaled_ * directions_;
+  rotated_.noalias() = directions_.transpose() * work_;
   for (int i = 0; i < size_; ++i) {
     const bool kept = weights_[i] >= S(1e-16) && rotated_(i, i) > S(0);
     inverse_norms_[i] = kept ? S(std::sqrt(weights_[i] / rotated_(i, i))) : S(0);
@@ -132,7 +131,7 @@ void LoopSolver<S>::Apply(Eigen::Ref<MatrixX<S>> B) {
   if (form_ != Form::kPlain) ScaleRows(B);
   if (form_ == Form::kGeometric || form_ == Form::kSoftened) {
     for (Eigen::Index c = 0; c < B.cols(); ++c) {
-      vector_.noalias() = eigen_.eigenvectors().transpose() * B.col(c);
+      vector_.noalias() = directions_.transpose() * B.col(c);
       B.col(c) = inverse_norms_.cwiseProduct(vector_);
     }
   }
@@ -144,7 +143,7 @@ void LoopSolver<S>::ApplyTransposed(Eigen::Ref<VectorX<S>> v) {
   if (form_ != Form::kGeometric) cholesky_.matrixU().solveInPlace(v);
   if (form_ == Form::kGeometric || form_ == Form::kSoftened) {
     vector_ = inverse_norms_.cwiseProduct(v);
-    v.noalias() = eigen_.eigenvectors() * vector_;
+    v.noalias() = directions_ * vector_;
   }
   if (form_ == Form::kPlain) return;
   for (std::size_t j = 0; j < inverse_scales_.size(); ++j) {

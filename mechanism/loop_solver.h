@@ -22,7 +22,6 @@
 #pragma once
 
 #include <Eigen/Cholesky>
-#include <Eigen/Eigenvalues>
 #include <span>
 #include <vector>
 
@@ -50,8 +49,9 @@ class LoopSolver {
   /// The K of each joint, from its free response; `which` as used by the next factorisation.
   void SetScale(int joint, const JointMatrix<S>& free_response);
 
-  /// Plain Cholesky. False when a pivot falls below `tolerance` times its diagonal entry.
-  bool FactorPlain(const MatrixX<S>& X, S tolerance);
+  /// Plain Cholesky. False when a pivot falls below `tolerance` times `scale`, the size that
+  /// responses have before the loop is closed: X's own entries may be all round-off.
+  bool FactorPlain(const MatrixX<S>& X, S scale, S tolerance);
   /// Scaled Cholesky. False when suspicious; nothing can be applied then.
   bool FactorScaled(const MatrixX<S>& X);
   /// Eigen-decomposition of the geometric response; sets rank and weights.
@@ -68,7 +68,7 @@ class LoopSolver {
   int rank() const { return rank_; }
   /// Smallest weight; 1 unless geometric or softened.
   S smallest_weight() const { return smallest_weight_; }
-  /// Smallest scaled pivot, or the ratio of extreme geometric eigenvalues.
+  /// Smallest pivot over the scale, or the ratio of extreme geometric eigenvalues.
   S rcond() const { return rcond_; }
 
  private:
@@ -81,9 +81,9 @@ class LoopSolver {
   std::vector<JointMatrix<S>> inverse_scales_;  ///< K^-1 of each joint
   Form form_ = Form::kNone;
   MatrixX<S> scaled_, work_, rotated_;
+  MatrixX<S> directions_;  ///< U
   Eigen::LLT<MatrixX<S>> cholesky_;
-  Eigen::SelfAdjointEigenSolver<MatrixX<S>> eigen_;
-  VectorX<S> weights_, inverse_norms_, vector_;
+  VectorX<S> eigenvalues_, weights_, inverse_norms_, vector_;
   int rank_ = 0;
   S smallest_weight_ = S(1), rcond_ = S(1);
 };

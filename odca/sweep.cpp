@@ -200,10 +200,15 @@ bool Sweep<Space, S>::FactorLoop(const Kinematics<Space, S>& kinematics, const P
   X = Eigen::Map<const MatrixX<S>>(&X_[places_[n].x], node.rows, node.rows);
   operations_ += static_cast<long>(node.rows) * node.rows * node.rows / 6 + node.rows;
   if (solver_ == SolverKind::kAsPublished) {
-    // A pivot that is all round-off is not a pivot: the sums behind X have a length of about the
-    // number of bodies, hence the factor.
+    // A pivot that is all round-off is not a pivot. The sums behind X are about as long as there
+    // are bodies, and their terms as large as the responses of the bodies alone.
+    S scale = S(0);
+    for (const NodeJoint& joint : node.joints) {
+      const auto free = FreeResponse(kinematics, inertias, joint.index);
+      scale = std::max(scale, free.diagonal().maxCoeff());
+    }
     const S eps = std::numeric_limits<S>::epsilon();
-    const bool ok = loop.FactorPlain(X, S(8) * eps * S(mechanism_.num_bodies() + 7));
+    const bool ok = loop.FactorPlain(X, scale, S(64) * eps * S(mechanism_.num_bodies()));
     NoteDiagnostics(node, n);
     return ok;
   }

@@ -96,6 +96,7 @@ template <class Space>
 void Family::Hold(const Sample<Space>& sample, bool as_published) {
   const Answer& answer = sample.answer();
   const bool good = answer.rcond > 1e-2;
+  const double bound = sample.Bound() * std::max(1.0, answer.rcond / closures_rcond_);
   ++samples_;
   good_ += good;
   smallest_rcond_ = std::min(smallest_rcond_, answer.rcond);
@@ -108,15 +109,15 @@ void Family::Hold(const Sample<Space>& sample, bool as_published) {
       const Comparison result = sample.CompareOdca(coordinates, solver);
       ASSERT_EQ(result.outcome, Outcome::kFinished);
       EXPECT_EQ(result.rank, answer.rank);
-      EXPECT_LE(result.error, sample.Bound());
+      EXPECT_LE(result.error, bound);
       worst_ = std::max(worst_, result.error);
       if (good) {
-        EXPECT_LE(result.error, share_ > 0.0 ? 1e-12 : sample.Bound());
+        EXPECT_LE(result.error, share_ > 0.0 ? 1e-12 : bound);
         worst_good_ = std::max(worst_good_, result.error);
       }
-      worst_of_bound_ = std::max(worst_of_bound_, result.error / sample.Bound());
+      worst_of_bound_ = std::max(worst_of_bound_, result.error / bound);
       if (!answer.full_rank()) continue;
-      EXPECT_LE(result.force_error, sample.Bound());
+      EXPECT_LE(result.force_error, bound);
       worst_force_ = std::max(worst_force_, result.force_error);
     }
   }

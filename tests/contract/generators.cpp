@@ -111,13 +111,16 @@ MechanismDescription RandomTree(int n, SpaceKind space, std::uint64_t seed) {
 
 MechanismDescription RandomGraph(int loops, SpaceKind space, std::uint64_t seed) {
   Builder b("graph-" + std::to_string(loops), space, seed);
-  const int half = b.spatial ? 6 : 3;
+  const int half = b.spatial ? 9 : 3;
   Grow(b, 0, 2);
   for (int i = 0; i < loops; ++i) {
     const int bodies = static_cast<int>(b.description.bodies.size());
     const int from = b.random.Below(bodies), to = b.random.Below(bodies);
     const int left = Grow(b, from, half), right = Grow(b, to, half);
-    const JointType type = b.random.Chance(0.7) ? JointType::kRevolute : JointType::kPrismatic;
+    const double draw = b.random.Uniform(0.0, 1.0);
+    const JointType type = draw < 0.7   ? JointType::kRevolute
+                           : draw < 0.9 ? JointType::kPrismatic
+                                        : JointType::kWeld;
     b.Close(type, left, right, Tip(b), b.random.Uniform(-1.0, 1.0));
   }
   Grow(b, b.random.Below(static_cast<int>(b.description.bodies.size())), 2);
@@ -143,7 +146,7 @@ MechanismDescription RedundantGraph(int n, int loops, SpaceKind space, std::uint
 MechanismDescription RandomLadder(int n, SpaceKind space, std::uint64_t seed) {
   Builder b("ladder-" + std::to_string(n), space, seed);
   // In the plane one crank drives all others: only near the parallelogram does motion not grow from
-  // window to window. In space couplers are of twelve links and close in their middle.
+  // window to window. In space couplers are of 18 links and close in their middle.
   const double slope = b.random.Uniform(-2.0, -1.0);
   const auto angle = [&](double near, double by) { return near + b.random.Uniform(-by, by); };
   const auto tip = [&] { return Eigen::Vector3d(b.random.Uniform(0.97, 1.03), 0.0, 0.0); };
@@ -153,7 +156,7 @@ MechanismDescription RandomLadder(int n, SpaceKind space, std::uint64_t seed) {
     b.AddJoint(JointType::kRevolute, 0, Eigen::Vector3d(i, 0.0, 0.0), crank,
                b.random.Vector(0.02, b.spatial), angle(slope, 0.03), b.spatial);
     if (i > 0 && b.spatial) {
-      const int left = Grow(b, last, 6), right = Grow(b, crank, 6);
+      const int left = Grow(b, last, 9), right = Grow(b, crank, 9);
       b.Close(JointType::kRevolute, left, right, Tip(b), 0.0);
     } else if (i > 0) {
       const int coupler = b.AddBody(1.0);

@@ -48,11 +48,11 @@ MechanismDescription SphericalChain(int n, std::uint64_t seed);
 MechanismDescription RandomTree(int n, SpaceKind space, std::uint64_t seed);
 
 /// Ladder of n windows. Plane: cranks and couplers of random shape about the parallelogram's.
-/// Space: cranks joined by couplers of twelve links, axes in all directions.
+/// Space: cranks joined by couplers of 18 links, axes in all directions.
 MechanismDescription RandomLadder(int n, SpaceKind space, std::uint64_t seed);
 
 /// Loops that share bodies: each is made of two new branches from random bodies of what there is,
-/// closed at their tips by a revolute or prismatic joint.
+/// closed at their tips by a revolute, prismatic or weld joint.
 MechanismDescription RandomGraph(int loops, SpaceKind space, std::uint64_t seed);
 
 /// A tree of n bodies with closing joints between random bodies: loops share most of their links.

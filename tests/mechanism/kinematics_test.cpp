@@ -27,7 +27,7 @@ std::vector<MechanismDescription> Samples() {
   std::vector<MechanismDescription> samples;
   for (std::uint64_t seed = 1; seed <= 5; ++seed) {
     samples.push_back(testing::RandomTree(15, kKind<Space>, seed));
-    samples.push_back(testing::RandomGraph(20, 2, kKind<Space>, 0.4, seed));
+    samples.push_back(testing::TightGraph(24, 2, kKind<Space>, seed));
   }
   return samples;
 }

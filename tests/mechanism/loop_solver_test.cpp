@@ -47,7 +47,7 @@ TEST(LoopSolverTest, AtFullRankEveryFormIsTheInverse) {
     const double bound = 100 * kEps * X.norm() * inverse.norm() * inverse.norm();
     LoopSolver<double> solver(kRows);
     SetScales(solver, X);
-    ASSERT_TRUE(solver.FactorPlain(X, 1e-14));
+    ASSERT_TRUE(solver.FactorPlain(X, X.diagonal().maxCoeff(), 1e-14));
     EXPECT_LE((Inverse(solver) - inverse).norm(), bound);
     ASSERT_TRUE(solver.FactorScaled(X));
     EXPECT_LE((Inverse(solver) - inverse).norm(), bound);
@@ -72,7 +72,7 @@ TEST(LoopSolverTest, ApplyTransposedIsTheTransposeOfApply) {
     solver.ApplyTransposed(v);
     EXPECT_LE((v - expected).norm(), 100 * kEps * T.norm() * 5);
   };
-  ASSERT_TRUE(solver.FactorPlain(X, 1e-14));
+  ASSERT_TRUE(solver.FactorPlain(X, X.diagonal().maxCoeff(), 1e-14));
   check();
   ASSERT_TRUE(solver.FactorScaled(X));
   check();
@@ -104,7 +104,7 @@ TEST(LoopSolverTest, ExactRedundancyLowersTheRankAndSolvesWhatIsConsistent) {
 TEST(LoopSolverTest, PlainFactorisationRefusesALostPivot) {
   const MatrixX<double> C = RandomMatrix(5, 4, 1);
   LoopSolver<double> solver(kRows);
-  EXPECT_FALSE(solver.FactorPlain(C * C.transpose(), 100 * kEps));
+  EXPECT_FALSE(solver.FactorPlain(C * C.transpose(), 1.0, 100 * kEps));
 }
 
 /// A four-bar without symmetry, of the given length, its coupler `ratio` times heavier.

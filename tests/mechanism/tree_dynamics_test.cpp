@@ -28,7 +28,7 @@ class TreeDynamicsTest : public ::testing::Test {
   void ForAll(Check check) {
     for (std::uint64_t seed = 1; seed <= 4; ++seed) {
       for (const MechanismDescription& d :
-           {testing::RandomTree(12, kKind, seed), testing::RandomGraph(20, 2, kKind, 0.4, seed)}) {
+           {testing::RandomTree(12, kKind, seed), testing::TightGraph(24, 2, kKind, seed)}) {
         SCOPED_TRACE(d.name);
         const Mechanism<Space, double> mechanism(d, Coordinates::kJoint);
         const State state = testing::ConsistentState(d, mechanism, seed);

@@ -16,8 +16,8 @@ struct SuiteOptions {
   Selection filter;  ///< accuracy cases whose keys do not match are left out
 };
 
-/// The accuracy cases that pass the filter. Throws ConfigError when none does, or when it names a key
-/// that cases do not have.
+/// The accuracy cases that pass the filter. Throws ConfigError when none does, or when it names a
+/// key that cases do not have.
 std::vector<Case> SelectCases(const Experiment& experiment, const Selection& filter);
 
 /// Runs accuracy cases, costliest first, then timings, appending each record to the store as it is

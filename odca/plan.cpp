@@ -226,7 +226,8 @@ class Planner {
           if (child >= leaves) child = leaves + new_number[child - leaves];
         }
         new_number[n] = static_cast<int>(ordered.size());
-        ordered.push_back(std::move(nodes_[n]));
+        // copied, not moved: a sweep then finds the lists of consecutive nodes side by side
+        ordered.push_back(nodes_[n]);
       }
     }
     return ordered;

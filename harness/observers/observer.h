@@ -39,8 +39,8 @@ TimeSeries Thin(const TimeSeries& series, int points);
 ///
 /// Position drift is the largest mismatch of a constraint that the coordinate set imposes: of the
 /// cut joints in joint coordinates, of every joint in absolute coordinates; points [m] and
-/// rotations [rad] apart. Velocity and acceleration drift are the largest V_Q - V_P and A_Q - A_P - g
-/// in the constrained directions, points only [m/s, m/s^2].
+/// rotations [rad] apart. Velocity and acceleration drift are the largest V_Q - V_P and A_Q - A_P -
+/// g in the constrained directions, points only [m/s, m/s^2].
 ///
 /// Loop closure compares the two sets: the tree of user joints is followed with the joint
 /// coordinates (in absolute coordinates: those measured between the bodies), and what a cut joint

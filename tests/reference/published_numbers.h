@@ -1,8 +1,9 @@
 // Published and derived numbers of benchmark problems, SI units.
 //
-// Source: /shared/reference/problems.json, which names where each was read. "Published" is the file
-// of the A Coruna MBS benchmark (IFToMM A01, A02) as printed, "derived" an independent integration
-// at 1e-12 and better, given with all digits.
+// Source: data files of the A Coruna MBS benchmark (IFToMM A01, A02; lim.ii.udc.es/mbsbenchmark),
+// as kept in github.com/Jiaqi-knight/simEngine3D and mikevignos/simEngine3D-Vignos. "Published" is
+// the file as printed, "derived" an independent integration at 1e-12 and better, given with all
+// digits.
 #pragma once
 
 #include <array>

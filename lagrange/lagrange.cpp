@@ -39,7 +39,7 @@ Lagrange<Space, S>::Lagrange(const Mechanism<Space, S>& mechanism, FormulationOp
   } else {
     W_.setZero(n, m);
     response_.setZero(m, m);
-    mass_factor_ = Eigen::LLT<MatrixX<S>>(n);
+    mass_factor_.compute(MatrixX<S>::Identity(n, n));
   }
 }
 
@@ -75,6 +75,7 @@ template <class Space, class S>
 void Lagrange<Space, S>::FormResponse(const std::vector<Inertia<Space, S>>& inertias) {
   dynamics_.MassMatrix(kinematics_, inertias, M_);
   mass_factor_.compute(M_);
+  if (loop_.size() == 0) return;  // a tree: nothing is constrained
   W_ = J_.transpose();
   mass_factor_.matrixL().solveInPlace(W_);
   response_.noalias() = W_.transpose() * W_;

@@ -19,7 +19,8 @@ LoopSolver<S>::LoopSolver(std::span<const int> rows) {
   scaled_.setZero(size_, size_);
   work_.setZero(size_, size_);
   rotated_.setIdentity(size_, size_);
-  cholesky_ = Eigen::LLT<MatrixX<S>>(size_);
+  // an LLT that has computed nothing has no valid state to copy
+  if (size_ > 0) cholesky_.compute(MatrixX<S>::Identity(size_, size_));
   directions_.setIdentity(size_, size_);
   eigenvalues_.setZero(size_);
   weights_.setOnes(size_);

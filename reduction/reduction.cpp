@@ -76,7 +76,7 @@ void Reduction<Space, S>::SetPartition(const Partition<S>& partition) {
   dependent_speeds_.setZero(r);
   independent_speeds_.setZero(f);
   lu_ = Eigen::PartialPivLU<MatrixX<S>>(r);
-  reduced_factor_ = Eigen::LLT<MatrixX<S>>(f);
+  if (f > 0) reduced_factor_.compute(MatrixX<S>::Identity(f, f));
   factored_version_ = -1;
 }
 

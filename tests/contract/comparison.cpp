@@ -83,8 +83,9 @@ Comparison Sample<Space>::CompareOdca(Coordinates coordinates, SolverKind solver
   const std::vector<Real6>& forces = own ? absolute_answer_->forces : joint_answer_.forces;
   Real difference = 0, scale = 0;
   for (int j = 0; j < static_cast<int>(description_.joints.size()); ++j) {
-    const auto force = InSpace<Space>(forces[j]);
-    const auto error = odca.JointForce(j).template cast<Real>() - force;
+    const Eigen::Matrix<Real, Space::kDim, 1> force = InSpace<Space>(forces[j]);
+    const Eigen::Matrix<Real, Space::kDim, 1> error =
+        odca.JointForce(j).template cast<Real>() - force;
     difference = std::max<Real>(difference, error.template lpNorm<Eigen::Infinity>());
     scale = std::max<Real>(scale, force.template lpNorm<Eigen::Infinity>());
   }

@@ -201,7 +201,8 @@ bool Sweep<Space, S>::FactorLoop(const Kinematics<Space, S>& kinematics, const P
   operations_ += static_cast<long>(node.rows) * node.rows * node.rows / 6 + node.rows;
   if (solver_ == SolverKind::kAsPublished) {
     // A pivot that is all round-off is not a pivot. The sums behind X are about as long as there
-    // are bodies, and their terms as large as the responses of the bodies alone.
+    // are bodies, and their terms as large as the responses of the bodies alone: 2800 random planar
+    // ladders in space, whose pivots are zero, leave at most 0.6 eps per body. 64 is a margin.
     S scale = S(0);
     for (const NodeJoint& joint : node.joints) {
       const auto free = FreeResponse(kinematics, inertias, joint.index);

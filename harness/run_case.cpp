@@ -106,12 +106,6 @@ class Runner {
     y_.resize(formulation->state_size());
     formulation->ToState(start.q, start.u, y_);
     FormulationOde<Space> ode(*formulation);
-    IntegratorOptions options;
-    options.profile = case_.integrator;
-    options.rtol = case_.rtol;
-    options.atol = case_.atol;
-    options.step_limit = case_.limits.steps;
-    options.time_limit_s = case_.limits.wall_s;
     std::vector<double> ydot;
     const StepObserver observe = [&](double t, std::span<double> y) {
       const bool restart = formulation->BeginStep(y);
@@ -123,7 +117,7 @@ class Runner {
       if (outcome == Outcome::kSingular) condition_.Observe({t, *formulation});
       return restart ? StepAction::kRestart : StepAction::kContinue;
     };
-    return harness::Integrate(ode, 0.0, case_.horizon, y_, options, observe);
+    return harness::Integrate(ode, 0.0, case_.horizon, y_, OptionsOf(case_), observe);
   }
 
   void Observe(double t, const Formulation<Space, double>& formulation) {
@@ -168,6 +162,16 @@ void WriteGrowth(const Growth& growth, int failed, Record& record) {
 }
 
 }  // namespace
+
+IntegratorOptions OptionsOf(const Case& one) {
+  IntegratorOptions options;
+  options.profile = one.integrator;
+  options.rtol = one.rtol;
+  options.atol = one.atol;
+  options.step_limit = one.limits.steps;
+  options.time_limit_s = one.limits.wall_s;
+  return options;
+}
 
 Record CaseKeys(const Experiment& experiment, const Case& one) {
   Record keys;

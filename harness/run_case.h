@@ -7,6 +7,7 @@
 #include "harness/analysis/growth.h"
 #include "harness/config/experiment.h"
 #include "harness/integrator/ode.h"
+#include "harness/integrator/options.h"
 #include "harness/record.h"
 #include "mechanism/formulation.h"
 
@@ -30,6 +31,9 @@ class FormulationOde final : public Ode {
  private:
   Formulation<Space, double>& formulation_;
 };
+
+/// Method, tolerances and limits of a case.
+IntegratorOptions OptionsOf(const Case& one);
 
 /// The keys that name a case, as they stand in every table row.
 Record CaseKeys(const Experiment& experiment, const Case& one);

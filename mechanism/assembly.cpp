@@ -53,7 +53,7 @@ class Assembler {
       } else if (is_held(values.joint) && joint.kind->num_u == 1) {
         held_cut_.push_back({values.joint, values.values[0]});
       } else {
-        Fail("joint \"" + joint.name +
+        Fail("joint \"" + mechanism_.joint_names()[&joint - mechanism_.joints().data()] +
              "\" closes a loop and carries only a guess: hold it, or mark "
              "another joint of the loop with \"cut\"");
       }
@@ -90,7 +90,7 @@ class Assembler {
     for (int index : mechanism_.constraints()) {
       const Joint<Space, double>& joint = mechanism_.joints()[index];
       e.segment(joint.row, joint.kind->num_constraints()) =
-          kinematics_.joints()[index].D.transpose() * kinematics_.ConstraintMismatch(index);
+          kinematics_.joints()[index].D().transpose() * kinematics_.ConstraintMismatch(index);
     }
     for (std::size_t k = 0; k < held_cut_.size(); ++k) {
       const auto& [joint, value] = held_cut_[k];
@@ -107,7 +107,7 @@ class Assembler {
       unit[i] = 1.0;
       kinematics_.UpdateVelocity(unit);
       const JointState<Space, double>& state = kinematics_.joints()[index];
-      row[i] = state.H.col(component).dot(state.V_rel);
+      row[i] = state.H(component).dot(state.V_rel);
       unit[i] = 0.0;
     }
     return row;
@@ -208,7 +208,7 @@ class Assembler {
     for (int index : mechanism_.constraints()) {
       const Joint<Space, double>& joint = mechanism_.joints()[index];
       if (worst >= joint.row && worst < joint.row + joint.kind->num_constraints()) {
-        name = "closed by joint \"" + joint.name + "\"";
+        name = "closed by joint \"" + mechanism_.joint_names()[index] + "\"";
       }
     }
     char residual[32];

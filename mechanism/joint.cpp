@@ -41,8 +41,7 @@ struct PlanarKinds {
   static JointKind<Planar, S> Revolute() {
     return {.num_q = 1,
             .num_u = 1,
-            .free_axes = {0},
-            .constrained_axes = {1, 2},
+            .axes = {0, 1, 2},
             .isotropic = true,
             .transform =
                 [](const S* q, P& X) {
@@ -55,8 +54,7 @@ struct PlanarKinds {
   static JointKind<Planar, S> Prismatic() {
     return {.num_q = 1,
             .num_u = 1,
-            .free_axes = {1},
-            .constrained_axes = {0, 2},
+            .axes = {1, 0, 2},
             .isotropic = false,
             .transform =
                 [](const S* q, P& X) {
@@ -69,8 +67,7 @@ struct PlanarKinds {
   static JointKind<Planar, S> Weld() {
     return {.num_q = 0,
             .num_u = 0,
-            .free_axes = {},
-            .constrained_axes = {0, 1, 2},
+            .axes = {0, 1, 2},
             .isotropic = true,
             .transform = [](const S*, P& X) { X = P(); },
             .coordinates = [](const P&, S*) {},
@@ -79,8 +76,7 @@ struct PlanarKinds {
   static JointKind<Planar, S> Free() {
     return {.num_q = 3,
             .num_u = 3,
-            .free_axes = {0, 1, 2},
-            .constrained_axes = {},
+            .axes = {0, 1, 2},
             .isotropic = false,
             .transform =
                 [](const S* q, P& X) {
@@ -104,8 +100,7 @@ struct SpatialKinds {
   static JointKind<Spatial, S> Revolute() {
     return {.num_q = 1,
             .num_u = 1,
-            .free_axes = {2},
-            .constrained_axes = {0, 1, 3, 4, 5},
+            .axes = {2, 0, 1, 3, 4, 5},
             .isotropic = false,
             .transform =
                 [](const S* q, P& X) {
@@ -125,8 +120,7 @@ struct SpatialKinds {
   static JointKind<Spatial, S> Prismatic() {
     return {.num_q = 1,
             .num_u = 1,
-            .free_axes = {3},
-            .constrained_axes = {0, 1, 2, 4, 5},
+            .axes = {3, 0, 1, 2, 4, 5},
             .isotropic = false,
             .transform =
                 [](const S* q, P& X) {
@@ -139,8 +133,7 @@ struct SpatialKinds {
   static JointKind<Spatial, S> Weld() {
     return {.num_q = 0,
             .num_u = 0,
-            .free_axes = {},
-            .constrained_axes = {0, 1, 2, 3, 4, 5},
+            .axes = {0, 1, 2, 3, 4, 5},
             .isotropic = true,
             .transform = [](const S*, P& X) { X = P(); },
             .coordinates = [](const P&, S*) {},
@@ -149,8 +142,7 @@ struct SpatialKinds {
   static JointKind<Spatial, S> Free() {
     return {.num_q = 7,
             .num_u = 6,
-            .free_axes = {0, 1, 2, 3, 4, 5},
-            .constrained_axes = {},
+            .axes = {0, 1, 2, 3, 4, 5},
             .isotropic = false,
             .transform =
                 [](const S* q, P& X) {

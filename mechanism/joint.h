@@ -29,10 +29,9 @@ template <class Space, class S>
 struct JointKind {
   int num_q = 0;
   int num_u = 0;
-  /// Every direction of H and D is a coordinate axis of F and constant: H, D are selections. The
-  /// two lists below name the axes (components of a motion).
-  std::array<int, Space::kDim> free_axes{};
-  std::array<int, Space::kDim> constrained_axes{};
+  /// Every direction of H and D is a coordinate axis of F and constant: [H D] is a permutation of
+  /// the components of a motion, the num_u free ones first.
+  std::array<int, Space::kDim> axes{};
   /// The span of D is the same in all axes (a planar pin): then ground axes serve for F axes.
   bool isotropic = false;
 

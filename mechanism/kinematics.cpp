@@ -18,15 +18,21 @@ void Refresh(Pose<Planar, S>& X) {
 template <class S>
 void Refresh(Pose<Spatial, S>&) {}
 
+/// [H D] with F axes R. A rotation has one axis in the plane.
 template <class Space, class S>
-void RotateDirections(const Directions<Space, S>& in_F, const Rotation<Space, S>& R,
-                      Directions<Space, S>& out) {
-  if constexpr (Space::kRot == 1) {
-    out.template topRows<1>() = in_F.template topRows<1>();
-  } else {
-    out.template topRows<3>().noalias() = R * in_F.template topRows<3>();
+void SetBasis(const JointKind<Space, S>& kind, const Rotation<Space, S>& R,
+              Block<Space, S>& basis) {
+  basis.setZero();
+  for (int i = 0; i < Space::kDim; ++i) {
+    const int axis = kind.axes[i];
+    if (axis >= Space::kRot) {
+      basis.col(i).template tail<Space::kLin>() = R.col(axis - Space::kRot);
+    } else if constexpr (Space::kRot == 1) {
+      basis(0, i) = S(1);
+    } else {
+      basis.col(i).template head<3>() = R.col(axis);
+    }
   }
-  out.template bottomRows<Space::kLin>().noalias() = R * in_F.template bottomRows<Space::kLin>();
 }
 
 /// Ground axes serve for H and D when their spans do not depend on axes, or when F is fixed.
@@ -43,18 +49,17 @@ Kinematics<Space, S>::Kinematics(const Mechanism<Space, S>& mechanism)
       poses_(mechanism.num_bodies()),
       motions_(mechanism.num_bodies(), Motion<Space, S>::Zero()),
       joints_(mechanism.joints().size()),
+      measured_(joints_.size()),
       accepted_(joints_.size(), S(0)),
       q_(VectorX<S>::Zero(mechanism.num_q())),
       u_(VectorX<S>::Zero(mechanism.num_u())) {
   for (std::size_t j = 0; j < joints_.size(); ++j) {
     const Joint<Space, S>& joint = mechanism.joints()[j];
     JointState<Space, S>& state = joints_[j];
-    state.R_F.setIdentity();
-    if (!joint.kind->isotropic) state.R_F = joint.X_PF.R;
-    state.H = joint.H_F;
-    state.D = joint.D_F;
-    RotateDirections<Space, S>(joint.H_F, state.R_F, state.H);
-    RotateDirections<Space, S>(joint.D_F, state.R_F, state.D);
+    state.num_u = joint.kind->num_u;
+    const bool any_axes = joint.kind->isotropic;
+    SetBasis<Space, S>(*joint.kind, any_axes ? Rotation<Space, S>::Identity() : joint.X_PF.R,
+                       state.basis);
     state.V_rel.setZero();
     state.g.setZero();
   }
@@ -64,25 +69,20 @@ template <class Space, class S>
 void Kinematics<Space, S>::UpdatePosition(const VectorX<S>& q) {
   q_ = q;
   ++position_version_;
-  Pose<Space, S> X_WF, X_WM;
+  Pose<Space, S> X_WF, X_WM, X_FM;
   const auto finish = [&](int index, const Joint<Space, S>& joint) {
     JointState<Space, S>& state = joints_[index];
-    state.p = X_WM.p;
     state.r_P = X_WM.p - poses_[joint.from].p;
     state.r_Q = X_WM.p - poses_[joint.to].p;
-    if (!TurnsWithBody(joint)) return;
-    state.R_F = X_WF.R;
-    RotateDirections<Space, S>(joint.H_F, state.R_F, state.H);
-    RotateDirections<Space, S>(joint.D_F, state.R_F, state.D);
+    if (TurnsWithBody(joint)) SetBasis<Space, S>(*joint.kind, X_WF.R, state.basis);
   };
   for (const TreeStep& step : mechanism_->tree()) {
     const Joint<Space, S>& joint = mechanism_->joints()[step.joint];
-    Pose<Space, S>& X_FM = joints_[step.joint].X_FM;
     joint.kind->transform(q.data() + joint.q_offset, X_FM);
     if (step.sign > 0) {
       X_WF = Compose(poses_[step.parent], joint.X_PF);
       X_WM = Compose(X_WF, X_FM);
-      poses_[step.child] = Compose(X_WM, joint.X_MQ);
+      poses_[step.child] = Compose(X_WM, Inverse(joint.X_QM));
     } else {
       X_WM = Compose(poses_[step.parent], joint.X_QM);
       X_WF = Compose(X_WM, Inverse(X_FM));
@@ -95,7 +95,7 @@ void Kinematics<Space, S>::UpdatePosition(const VectorX<S>& q) {
     const Joint<Space, S>& joint = mechanism_->joints()[index];
     X_WF = Compose(poses_[joint.from], joint.X_PF);
     X_WM = Compose(poses_[joint.to], joint.X_QM);
-    joints_[index].X_FM = Compose(Inverse(X_WF), X_WM);
+    measured_[index] = Compose(Inverse(X_WF), X_WM);
     finish(index, joint);
   }
 }
@@ -114,7 +114,7 @@ void Kinematics<Space, S>::UpdateVelocity(const VectorX<S>& u) {
     JointState<Space, S>& state = joints_[step.joint];
     state.V_rel.setZero();
     for (int i = 0; i < joint.kind->num_u; ++i) {
-      state.V_rel += state.H.col(i) * u[joint.u_offset + i];
+      state.V_rel += state.H(i) * u[joint.u_offset + i];
     }
     const bool forward = step.sign > 0;
     const Linear<Space, S>& r_parent = forward ? state.r_P : state.r_Q;
@@ -164,7 +164,7 @@ typename Inertia<Space, S>::Matrix Kinematics<Space, S>::RotationalInverse(
 template <class Space, class S>
 Motion<Space, S> Kinematics<Space, S>::ConstraintMismatch(int index) const {
   const Joint<Space, S>& joint = mechanism_->joints()[index];
-  const Motion<Space, S> in_F = Mismatch(*joint.kind, joints_[index].X_FM);
+  const Motion<Space, S> in_F = Mismatch(*joint.kind, measured_[index]);
   const Rotation<Space, S> R_WF = poses_[joint.from].R * joint.X_PF.R;
   Motion<Space, S> mismatch = in_F;
   mismatch.template tail<Space::kLin>().noalias() = R_WF * in_F.template tail<Space::kLin>();
@@ -179,9 +179,9 @@ S Kinematics<Space, S>::JointCoordinate(int index) const {
   const Joint<Space, S>& joint = mechanism_->joints()[index];
   if (joint.in_tree()) return q_[joint.q_offset];
   S q;
-  joint.kind->coordinates(joints_[index].X_FM, &q);
+  joint.kind->coordinates(measured_[index], &q);
   // Space measures an angle modulo a turn; take the one next to the last accepted.
-  if (Space::kRot == 3 && joint.kind->free_axes[0] < 3) {
+  if (Space::kRot == 3 && joint.kind->axes[0] < 3) {
     const S turn = 2 * std::numbers::pi_v<S>;
     q = accepted_[index] + std::remainder(q - accepted_[index], turn);
   }
@@ -192,7 +192,7 @@ template <class Space, class S>
 S Kinematics<Space, S>::JointSpeed(int index) const {
   const Joint<Space, S>& joint = mechanism_->joints()[index];
   if (joint.in_tree()) return u_[joint.u_offset];
-  return joints_[index].H.col(0).dot(joints_[index].V_rel);
+  return joints_[index].H(0).dot(joints_[index].V_rel);
 }
 
 template <class Space, class S>
@@ -226,7 +226,7 @@ VectorX<S> Kinematics<Space, S>::SpeedsIn(const Kinematics& other) const {
     const JointState<Space, S>& state = other.joints()[step.joint];
     const Motion<Space, S> V_rel = ShiftMotion<Space, S>(motions_[joint.to], state.r_Q) -
                                    ShiftMotion<Space, S>(motions_[joint.from], state.r_P);
-    u.segment(joint.u_offset, joint.kind->num_u) = state.H.transpose() * V_rel;
+    u.segment(joint.u_offset, joint.kind->num_u) = state.H().transpose() * V_rel;
   }
   return u;
 }

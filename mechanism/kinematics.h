@@ -12,16 +12,20 @@
 
 namespace loopbench {
 
-/// A joint at the current position and speed. What only UpdatePosition() needs comes last.
+/// A joint at the current position and speed.
 template <class Space, class S>
 struct JointState {
-  Linear<Space, S> p;         ///< Mo from the ground origin
   Linear<Space, S> r_P, r_Q;  ///< Mo from the centres of mass of P and Q
   Motion<Space, S> V_rel;     ///< [w_Q - w_P; v_Q - v_P] at Mo
   Motion<Space, S> g;         ///< A_Q - A_P = H udot + g                            (7)
-  Directions<Space, S> D, H;  ///< constrained directions and motion map
-  Pose<Space, S> X_FM;        ///< measured for constraints, from q for tree joints
-  Rotation<Space, S> R_F;     ///< axes of H, D; identity where any axes serve
+  Block<Space, S> basis;      ///< [H D], orthogonal
+  int num_u = 0;
+
+  auto H() const { return basis.leftCols(num_u); }                 ///< motion map
+  auto D() const { return basis.rightCols(Space::kDim - num_u); }  ///< constrained directions
+  auto H(int i) const { return basis.col(i); }
+  auto D(int i) const { return basis.col(num_u + i); }
+  int rows() const { return Space::kDim - num_u; }
 };
 
 template <class Space, class S>
@@ -52,6 +56,11 @@ class Kinematics {
   typename Inertia<Space, S>::Matrix RotationalInverse(const Inertia<Space, S>& inertia,
                                                        int body) const;
 
+  /// Mo of a joint from the ground origin.
+  Linear<Space, S> JointPoint(int joint) const {
+    return poses_[mechanism_->joints()[joint].from].p + joints_[joint].r_P;
+  }
+
   /// Mismatch of a constraint in ground axes: [rotation; shift], see joint.h. D^T of it is the
   /// constraint function whose Jacobian is tree_dynamics.h's J.
   Motion<Space, S> ConstraintMismatch(int joint) const;
@@ -76,7 +85,8 @@ class Kinematics {
   std::vector<Pose<Space, S>> poses_;
   std::vector<Motion<Space, S>> motions_;
   std::vector<JointState<Space, S>> joints_;
-  std::vector<S> accepted_;  ///< last accepted coordinate of each joint
+  std::vector<Pose<Space, S>> measured_;  ///< X_FM of constraints, by joint
+  std::vector<S> accepted_;               ///< last accepted coordinate of each joint
   VectorX<S> q_, u_;
   long position_version_ = 0;
 };

@@ -9,29 +9,35 @@
 namespace loopbench {
 
 template <class S>
-LoopSolver<S>::LoopSolver(std::span<const int> rows) {
-  offsets_.push_back(0);
+LoopSolver<S>::LoopSolver(std::span<const int> rows, std::shared_ptr<LoopScratch<S>> scratch)
+    : scratch_(std::move(scratch)) {
+  int numbers = 0;
   for (int r : rows) {
-    offsets_.push_back(offsets_.back() + r);
-    inverse_scales_.push_back(JointMatrix<S>::Identity(r, r));
+    parts_.push_back({size_, r, numbers});
+    size_ += r;
+    numbers += r * r;
   }
-  size_ = offsets_.back();
-  scaled_.setZero(size_, size_);
-  work_.setZero(size_, size_);
-  rotated_.setIdentity(size_, size_);
+  inverse_scales_.assign(numbers, S(0));
+  if (scratch_ == nullptr) scratch_ = std::make_shared<LoopScratch<S>>(size_);
   // an LLT that has computed nothing has no valid state to copy
   if (size_ > 0) cholesky_.compute(MatrixX<S>::Identity(size_, size_));
   directions_.setIdentity(size_, size_);
   eigenvalues_.setZero(size_);
   weights_.setOnes(size_);
   inverse_norms_.setOnes(size_);
-  vector_.setZero(size_);
   rank_ = size_;
 }
 
 template <class S>
+auto LoopSolver<S>::K_inverse(std::size_t joint) const {
+  const Part& part = parts_[joint];
+  return Eigen::Map<const MatrixX<S>>(&inverse_scales_[part.scale], part.rows, part.rows);
+}
+
+template <class S>
 void LoopSolver<S>::SetScale(int joint, const JointMatrix<S>& free_response) {
-  JointMatrix<S>& inverse = inverse_scales_[joint];
+  const Part& part = parts_[joint];
+  Eigen::Map<MatrixX<S>> inverse(&inverse_scales_[part.scale], part.rows, part.rows);
   const Eigen::LLT<JointMatrix<S>> K(free_response);
   inverse.setIdentity();
   K.matrixL().solveInPlace(inverse);
@@ -39,28 +45,30 @@ void LoopSolver<S>::SetScale(int joint, const JointMatrix<S>& free_response) {
 
 template <class S>
 void LoopSolver<S>::ScaleRows(Eigen::Ref<MatrixX<S>> B) const {
-  for (std::size_t j = 0; j < inverse_scales_.size(); ++j) {
-    const JointMatrix<S>& K = inverse_scales_[j];
+  for (std::size_t j = 0; j < parts_.size(); ++j) {
+    const auto K = K_inverse(j);
     // K^-1 is lower triangular: work from the last row up, in place.
     for (Eigen::Index r = K.rows() - 1; r >= 0; --r) {
-      const Eigen::Index row = offsets_[j] + r;
+      const Eigen::Index row = parts_[j].row + r;
       B.row(row) *= K(r, r);
-      for (Eigen::Index c = 0; c < r; ++c) B.row(row) += K(r, c) * B.row(offsets_[j] + c);
+      for (Eigen::Index c = 0; c < r; ++c) B.row(row) += K(r, c) * B.row(parts_[j].row + c);
     }
   }
 }
 
 template <class S>
-void LoopSolver<S>::ScaleInto(const MatrixX<S>& X) {
-  scaled_ = X;
-  ScaleRows(scaled_);
-  work_ = scaled_.transpose();
-  ScaleRows(work_);
-  scaled_ = work_;
+auto LoopSolver<S>::Scaled(const ConstRef& X) {
+  auto scaled = scratch_->scaled.topLeftCorner(size_, size_);
+  auto work = scratch_->work.topLeftCorner(size_, size_);
+  work = X;
+  ScaleRows(work);
+  scaled = work.transpose();
+  ScaleRows(scaled);
+  return scaled;
 }
 
 template <class S>
-bool LoopSolver<S>::FactorPlain(const MatrixX<S>& X, S scale, S tolerance) {
+bool LoopSolver<S>::FactorPlain(const ConstRef& X, S scale, S tolerance) {
   form_ = Form::kPlain;
   rank_ = size_;
   smallest_weight_ = S(1);
@@ -74,12 +82,11 @@ bool LoopSolver<S>::FactorPlain(const MatrixX<S>& X, S scale, S tolerance) {
 }
 
 template <class S>
-bool LoopSolver<S>::FactorScaled(const MatrixX<S>& X) {
+bool LoopSolver<S>::FactorScaled(const ConstRef& X) {
   form_ = Form::kScaled;
   rank_ = size_;
   smallest_weight_ = S(1);
-  ScaleInto(X);
-  cholesky_.compute(scaled_);
+  cholesky_.compute(Scaled(X));
   rcond_ = S(0);
   if (cholesky_.info() != Eigen::Success) return false;
   const S smallest = cholesky_.matrixLLT().diagonal().minCoeff();
@@ -88,11 +95,10 @@ bool LoopSolver<S>::FactorScaled(const MatrixX<S>& X) {
 }
 
 template <class S>
-void LoopSolver<S>::FactorGeometric(const MatrixX<S>& X_geometric) {
+void LoopSolver<S>::FactorGeometric(const ConstRef& X_geometric) {
   using std::exp;
   form_ = Form::kGeometric;
-  ScaleInto(X_geometric);
-  SymmetricEigen(scaled_, directions_, eigenvalues_);
+  SymmetricEigen<S>(Scaled(X_geometric), directions_, eigenvalues_);
   const S largest = eigenvalues_[size_ - 1];
   const S theta = S(kTheta) * largest;
   rank_ = 0;
@@ -109,50 +115,55 @@ void LoopSolver<S>::FactorGeometric(const MatrixX<S>& X_geometric) {
 }
 
 template <class S>
-void LoopSolver<S>::FactorSoftened(const MatrixX<S>& X) {
+void LoopSolver<S>::FactorSoftened(const ConstRef& X) {
   form_ = Form::kSoftened;
-  ScaleInto(X);
-  work_.noalias() = scaled_ * directions_;
-  rotated_.noalias() = directions_.transpose() * work_;
+  const auto scaled = Scaled(X);
+  auto work = scratch_->work.topLeftCorner(size_, size_);
+  auto rotated = scratch_->rotated.topLeftCorner(size_, size_);
+  work.noalias() = scaled * directions_;
+  rotated.noalias() = directions_.transpose() * work;
   for (int i = 0; i < size_; ++i) {
-    const bool kept = weights_[i] >= S(1e-16) && rotated_(i, i) > S(0);
-    inverse_norms_[i] = kept ? S(std::sqrt(weights_[i] / rotated_(i, i))) : S(0);
+    const bool kept = weights_[i] >= S(1e-16) && rotated(i, i) > S(0);
+    inverse_norms_[i] = kept ? S(std::sqrt(weights_[i] / rotated(i, i))) : S(0);
   }
   // unit diagonal before factoring; directions left out become rows of the identity
   for (int j = 0; j < size_; ++j) {
     for (int i = 0; i < size_; ++i) {
-      rotated_(i, j) = i == j ? S(1) : rotated_(i, j) * inverse_norms_[i] * inverse_norms_[j];
+      rotated(i, j) = i == j ? S(1) : rotated(i, j) * inverse_norms_[i] * inverse_norms_[j];
     }
   }
-  cholesky_.compute(rotated_);
+  cholesky_.compute(rotated);
 }
 
 template <class S>
-void LoopSolver<S>::Apply(Eigen::Ref<MatrixX<S>> B) {
+void LoopSolver<S>::Apply(Eigen::Ref<MatrixX<S>> B) const {
   if (form_ != Form::kPlain) ScaleRows(B);
   if (form_ == Form::kGeometric || form_ == Form::kSoftened) {
+    auto vector = scratch_->vector.head(size_);
     for (Eigen::Index c = 0; c < B.cols(); ++c) {
-      vector_.noalias() = directions_.transpose() * B.col(c);
-      B.col(c) = inverse_norms_.cwiseProduct(vector_);
+      vector.noalias() = directions_.transpose() * B.col(c);
+      B.col(c) = inverse_norms_.cwiseProduct(vector);
     }
   }
   if (form_ != Form::kGeometric) cholesky_.matrixL().solveInPlace(B);
 }
 
 template <class S>
-void LoopSolver<S>::ApplyTransposed(Eigen::Ref<VectorX<S>> v) {
+void LoopSolver<S>::ApplyTransposed(Eigen::Ref<VectorX<S>> v) const {
   if (form_ != Form::kGeometric) cholesky_.matrixU().solveInPlace(v);
   if (form_ == Form::kGeometric || form_ == Form::kSoftened) {
-    vector_ = inverse_norms_.cwiseProduct(v);
-    v.noalias() = directions_ * vector_;
+    auto vector = scratch_->vector.head(size_);
+    vector = inverse_norms_.cwiseProduct(v);
+    v.noalias() = directions_ * vector;
   }
   if (form_ == Form::kPlain) return;
-  for (std::size_t j = 0; j < inverse_scales_.size(); ++j) {
-    const JointMatrix<S>& K = inverse_scales_[j];
+  for (std::size_t j = 0; j < parts_.size(); ++j) {
+    const auto K = K_inverse(j);
+    const int row = parts_[j].row;
     for (Eigen::Index c = 0; c < K.cols(); ++c) {
       S sum = S(0);
-      for (Eigen::Index r = c; r < K.rows(); ++r) sum += K(r, c) * v[offsets_[j] + r];
-      v[offsets_[j] + c] = sum;
+      for (Eigen::Index r = c; r < K.rows(); ++r) sum += K(r, c) * v[row + r];
+      v[row + c] = sum;
     }
   }
 }

@@ -22,6 +22,7 @@
 #pragma once
 
 #include <Eigen/Cholesky>
+#include <memory>
 #include <span>
 #include <vector>
 
@@ -33,16 +34,30 @@ namespace loopbench {
 template <class S>
 using JointMatrix = Eigen::Matrix<S, Eigen::Dynamic, Eigen::Dynamic, Eigen::ColMajor, 6, 6>;
 
+/// Room for intermediate matrices; many solvers may share one, not at the same time.
+template <class S>
+struct LoopScratch {
+  explicit LoopScratch(int largest)
+      : scaled(MatrixX<S>::Zero(largest, largest)),
+        work(scaled),
+        rotated(scaled),
+        vector(VectorX<S>::Zero(largest)) {}
+  MatrixX<S> scaled, work, rotated;
+  VectorX<S> vector;
+};
+
 template <class S>
 class LoopSolver {
  public:
   /// Scaled pivots below this send the decision to the geometry.
   static constexpr double kSuspicious = 1e-4;
+  using ConstRef = Eigen::Ref<const MatrixX<S>>;
+
   /// Softening threshold relative to the largest geometric eigenvalue: (1e-4)^2.
   static constexpr double kTheta = 1e-8;
 
-  /// Joints contribute `rows[k]` rows each, in order.
-  explicit LoopSolver(std::span<const int> rows);
+  /// Joints contribute `rows[k]` rows each, in order. Without a scratch it has one of its own.
+  explicit LoopSolver(std::span<const int> rows, std::shared_ptr<LoopScratch<S>> scratch = nullptr);
 
   int size() const { return size_; }
 
@@ -51,18 +66,18 @@ class LoopSolver {
 
   /// Plain Cholesky. False when a pivot falls below `tolerance` times `scale`, the size that
   /// responses have before the loop is closed: X's own entries may be all round-off.
-  bool FactorPlain(const MatrixX<S>& X, S scale, S tolerance);
+  bool FactorPlain(const ConstRef& X, S scale, S tolerance);
   /// Scaled Cholesky. False when suspicious; nothing can be applied then.
-  bool FactorScaled(const MatrixX<S>& X);
+  bool FactorScaled(const ConstRef& X);
   /// Eigen-decomposition of the geometric response; sets rank and weights.
-  void FactorGeometric(const MatrixX<S>& X_geometric);
+  void FactorGeometric(const ConstRef& X_geometric);
   /// After FactorGeometric with the same scale.
-  void FactorSoftened(const MatrixX<S>& X);
+  void FactorSoftened(const ConstRef& X);
 
   /// B := T B, in place.
-  void Apply(Eigen::Ref<MatrixX<S>> B);
+  void Apply(Eigen::Ref<MatrixX<S>> B) const;
   /// v := T^T v, in place.
-  void ApplyTransposed(Eigen::Ref<VectorX<S>> v);
+  void ApplyTransposed(Eigen::Ref<VectorX<S>> v) const;
 
   /// Directions enforced with a weight of at least one half; size() unless geometric.
   int rank() const { return rank_; }
@@ -72,18 +87,24 @@ class LoopSolver {
   S rcond() const { return rcond_; }
 
  private:
+  struct Part {
+    int row = 0, rows = 0;
+    int scale = 0;  ///< first number in inverse_scales_
+  };
   enum class Form { kNone, kPlain, kScaled, kGeometric, kSoftened };
-  void ScaleInto(const MatrixX<S>& X);
+  auto K_inverse(std::size_t joint) const;
+  /// K^-1 X K^-T, in the scratch.
+  auto Scaled(const ConstRef& X);
   void ScaleRows(Eigen::Ref<MatrixX<S>> B) const;
 
   int size_ = 0;
-  std::vector<int> offsets_;                    ///< first row of each joint, and size_ at the end
-  std::vector<JointMatrix<S>> inverse_scales_;  ///< K^-1 of each joint
   Form form_ = Form::kNone;
-  MatrixX<S> scaled_, work_, rotated_;
-  MatrixX<S> directions_;  ///< U
+  std::vector<Part> parts_;        ///< the joints
+  std::vector<S> inverse_scales_;  ///< K^-1 of each joint, by columns
   Eigen::LLT<MatrixX<S>> cholesky_;
-  VectorX<S> eigenvalues_, weights_, inverse_norms_, vector_;
+  MatrixX<S> directions_;  ///< U
+  VectorX<S> eigenvalues_, weights_, inverse_norms_;
+  std::shared_ptr<LoopScratch<S>> scratch_;
   int rank_ = 0;
   S smallest_weight_ = S(1), rcond_ = S(1);
 };

@@ -68,15 +68,6 @@ Pose<Space, S> SidePose(const JointSide& side, const JointDescription& joint,
   return Cast<S>(MakePose(side.position - com, R, angle, Space{}));
 }
 
-template <class Space, class S>
-void SetDirections(Joint<Space, S>& joint) {
-  const JointKind<Space, S>& kind = *joint.kind;
-  joint.H_F.setZero(Space::kDim, kind.num_u);
-  joint.D_F.setZero(Space::kDim, kind.num_constraints());
-  for (int i = 0; i < kind.num_u; ++i) joint.H_F(kind.free_axes[i], i) = S(1);
-  for (int i = 0; i < kind.num_constraints(); ++i) joint.D_F(kind.constrained_axes[i], i) = S(1);
-}
-
 /// Names of the speeds of a joint with several.
 template <class Space>
 std::vector<std::string> ComponentNames() {
@@ -136,13 +127,12 @@ void Mechanism<Space, S>::AddJoints(const MechanismDescription& description,
   for (std::size_t j = 0; j < description.joints.size(); ++j) {
     const JointDescription& user = description.joints[j];
     Joint<Space, S> joint;
-    joint.name = user.name;
+    joint_names_.push_back(user.name);
     joint.kind = &KindOf<Space, S>(user.type);
     joint.from = user.from.body;
     joint.to = user.to.body;
     joint.X_PF = SidePose<Space, S>(user.from, user, description.bodies[joint.from].com);
     joint.X_QM = SidePose<Space, S>(user.to, user, description.bodies[joint.to].com);
-    joint.X_MQ = Inverse(joint.X_QM);
     joint.description = static_cast<int>(j);
     joints_.push_back(joint);
   }
@@ -152,7 +142,7 @@ void Mechanism<Space, S>::AddJoints(const MechanismDescription& description,
     if (index < 0) {
       index = static_cast<int>(joints_.size());
       Joint<Space, S> joint;
-      joint.name = body_names_[edge.child];
+      joint_names_.push_back(body_names_[edge.child]);
       joint.kind = &KindOf<Space, S>(JointType::kFree);
       joint.to = edge.child;
       joints_.push_back(joint);
@@ -170,7 +160,6 @@ void Mechanism<Space, S>::AddJoints(const MechanismDescription& description,
     num_rows_ += joints_[index].kind->num_constraints();
     constraints_.push_back(index);
   }
-  for (Joint<Space, S>& joint : joints_) SetDirections(joint);
 }
 
 template <class Space, class S>
@@ -219,10 +208,10 @@ template <class Space, class S>
 void Mechanism<Space, S>::NameSpeeds(const MechanismDescription& description) {
   const std::vector<std::string> components = ComponentNames<Space>();
   for (const TreeStep& step : tree_) {
-    const Joint<Space, S>& joint = joints_[step.joint];
-    for (int i = 0; i < joint.kind->num_u; ++i) {
-      speed_names_.push_back(joint.kind->num_u == 1 ? joint.name
-                                                    : joint.name + "." + components[i]);
+    const std::string& joint = joint_names_[step.joint];
+    const int num_u = joints_[step.joint].kind->num_u;
+    for (int i = 0; i < num_u; ++i) {
+      speed_names_.push_back(num_u == 1 ? joint : joint + "." + components[i]);
     }
   }
   for (const std::string& name : description.independent) {

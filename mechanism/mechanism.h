@@ -19,7 +19,7 @@ struct Inertia {
   Matrix rotational_inverse = Matrix::Zero();
 };
 
-/// Members that every evaluation reads come first: a long chain streams them through the cache.
+/// Small on purpose: a long chain streams all of it through the cache at every evaluation.
 template <class Space, class S>
 struct Joint {
   const JointKind<Space, S>* kind = nullptr;
@@ -27,10 +27,7 @@ struct Joint {
   int q_offset = -1, u_offset = -1;  ///< place in q and u; -1 for a constraint
   int row = -1;                      ///< first constraint row; -1 for a tree joint
   int description = -1;              ///< index of the user's joint, -1 for a virtual free joint
-  Pose<Space, S> X_PF, X_MQ;         ///< to and from the centres of mass of P and Q
-  Pose<Space, S> X_QM;
-  Directions<Space, S> H_F, D_F;  ///< motion map and its complement in F axes
-  std::string name;
+  Pose<Space, S> X_PF, X_QM;         ///< seen from the centres of mass of P and Q
 
   bool in_tree() const { return q_offset >= 0; }
 };
@@ -80,6 +77,8 @@ class Mechanism {
   const std::vector<Inertia<Space, S>>& bodies() const { return bodies_; }
   const std::vector<std::string>& body_names() const { return body_names_; }
   const std::vector<Joint<Space, S>>& joints() const { return joints_; }
+  /// A virtual free joint carries its body's name.
+  const std::vector<std::string>& joint_names() const { return joint_names_; }
   const std::vector<TreeStep>& tree() const { return tree_; }
   const std::vector<int>& constraints() const { return constraints_; }  ///< joint indices
   const std::vector<JointForce<S>>& joint_forces() const { return joint_forces_; }
@@ -115,7 +114,7 @@ class Mechanism {
   Coordinates coordinates_;
   int num_q_ = 0, num_u_ = 0, num_rows_ = 0, num_loops_ = 0, num_joint_speeds_ = 0;
   std::vector<Inertia<Space, S>> bodies_, geometric_bodies_;
-  std::vector<std::string> body_names_;
+  std::vector<std::string> body_names_, joint_names_;
   std::vector<Joint<Space, S>> joints_;
   std::vector<TreeStep> tree_;
   std::vector<int> constraints_, step_of_body_;

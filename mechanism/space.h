@@ -43,10 +43,6 @@ using Motion = Eigen::Matrix<S, Space::kDim, 1>;
 /// Maps motions to forces or back.
 template <class Space, class S>
 using Block = Eigen::Matrix<S, Space::kDim, Space::kDim>;
-/// Some directions of a motion as columns (H, D); never on the heap.
-template <class Space, class S>
-using Directions =
-    Eigen::Matrix<S, Space::kDim, Eigen::Dynamic, Eigen::ColMajor, Space::kDim, Space::kDim>;
 /// Orientation matrix.
 template <class Space, class S>
 using Rotation = Eigen::Matrix<S, Space::kLin, Space::kLin>;

@@ -14,7 +14,7 @@ namespace loopbench {
 /// A = U diag(lambda) U^T with lambda ascending. A is destroyed; all sizes must be set. About ten
 /// sweeps of n^2 / 2 rotations, each O(n).
 template <class S>
-void SymmetricEigen(MatrixX<S>& A, MatrixX<S>& U, VectorX<S>& lambda) {
+void SymmetricEigen(Eigen::Ref<MatrixX<S>> A, MatrixX<S>& U, VectorX<S>& lambda) {
   using std::abs;
   using std::sqrt;
   constexpr int kMaxSweeps = 50;  // convergence is quadratic: six to ten are usual

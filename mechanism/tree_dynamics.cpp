@@ -54,7 +54,7 @@ void TreeDynamics<Space, S>::MassMatrix(const Kinematics<Space, S>& kinematics,
     const Arms<Space, S> arms(*step, state);
     for (int i = 0; i < joint.kind->num_u; ++i) {
       // momentum of the subtree moving along direction i, carried rootward
-      const Motion<Space, S> h = state.H.col(i) * S(step->sign);
+      const Motion<Space, S> h = state.H(i) * S(step->sign);
       Motion<Space, S> F = composite_[step->child] * ShiftMotion<Space, S>(h, arms.child);
       for (int s = mechanism.step_of_body(step->child); s >= 0;) {
         const TreeStep& at = tree[s];
@@ -63,7 +63,7 @@ void TreeDynamics<Space, S>::MassMatrix(const Kinematics<Space, S>& kinematics,
         const Arms<Space, S> at_arms(at, at_state);
         F = ShiftForce<Space, S>(F, at_arms.child);
         for (int k = 0; k < at_joint.kind->num_u; ++k) {
-          const S value = S(at.sign) * at_state.H.col(k).dot(F);
+          const S value = S(at.sign) * at_state.H(k).dot(F);
           M(at_joint.u_offset + k, joint.u_offset + i) = value;
           M(joint.u_offset + i, at_joint.u_offset + k) = value;
         }
@@ -89,7 +89,7 @@ void TreeDynamics<Space, S>::BodyAccelerations(const Kinematics<Space, S>& kinem
     const Joint<Space, S>& joint = mechanism.joints()[step.joint];
     const Arms<Space, S> arms(step, state);
     Motion<Space, S> A_rel = state.g;
-    for (int i = 0; i < joint.kind->num_u; ++i) A_rel += state.H.col(i) * udot[joint.u_offset + i];
+    for (int i = 0; i < joint.kind->num_u; ++i) A_rel += state.H(i) * udot[joint.u_offset + i];
     const Motion<Space, S> at_joint = ShiftMotion<Space, S>(A[step.parent], arms.parent) +
                                       kinematics.Centripetal(step.parent, arms.parent) +
                                       S(step.sign) * A_rel;
@@ -121,7 +121,7 @@ void TreeDynamics<Space, S>::Bias(const Kinematics<Space, S>& kinematics, Vector
     const Arms<Space, S> arms(*step, state);
     const Motion<Space, S> at_joint = ShiftForce<Space, S>(F_[step->child], arms.child);
     for (int i = 0; i < joint.kind->num_u; ++i) {
-      h[joint.u_offset + i] = S(step->sign) * state.H.col(i).dot(at_joint);
+      h[joint.u_offset + i] = S(step->sign) * state.H(i).dot(at_joint);
     }
     F_[step->parent] += ShiftForce<Space, S>(at_joint, arms.parent);
   }
@@ -134,6 +134,7 @@ void TreeDynamics<Space, S>::Jacobian(const Kinematics<Space, S>& kinematics, Ma
   for (int index : mechanism.constraints()) {
     const Joint<Space, S>& constraint = mechanism.joints()[index];
     const JointState<Space, S>& state = kinematics.joints()[index];
+    const Linear<Space, S> p = kinematics.JointPoint(index);
     for (int side = 0; side < 2; ++side) {
       const S sign = side == 0 ? S(1) : S(-1);
       int s = mechanism.step_of_body(side == 0 ? constraint.to : constraint.from);
@@ -141,12 +142,12 @@ void TreeDynamics<Space, S>::Jacobian(const Kinematics<Space, S>& kinematics, Ma
         const TreeStep& step = mechanism.tree()[s];
         const JointState<Space, S>& moving = kinematics.joints()[step.joint];
         const Joint<Space, S>& joint = mechanism.joints()[step.joint];
-        const Linear<Space, S> arm = state.p - moving.p;
+        const Linear<Space, S> arm = p - kinematics.JointPoint(step.joint);
         for (int i = 0; i < joint.kind->num_u; ++i) {
-          const Motion<Space, S> h = moving.H.col(i) * (sign * S(step.sign));
+          const Motion<Space, S> h = moving.H(i) * (sign * S(step.sign));
           const Motion<Space, S> at_constraint = ShiftMotion<Space, S>(h, arm);
           for (int r = 0; r < constraint.kind->num_constraints(); ++r) {
-            J(constraint.row + r, joint.u_offset + i) += state.D.col(r).dot(at_constraint);
+            J(constraint.row + r, joint.u_offset + i) += state.D(r).dot(at_constraint);
           }
         }
         s = mechanism.step_of_body(step.parent);
@@ -179,7 +180,7 @@ Motion<Space, S> JointAcceleration(const Kinematics<Space, S>& kinematics, int i
                                kinematics.Centripetal(joint.from, state.r_P);
   const Motion<Space, S> rest = A_Q - A_P - state.g;
   Motion<Space, S> result = Motion<Space, S>::Zero();
-  for (int r = 0; r < joint.kind->num_constraints(); ++r) result[r] = state.D.col(r).dot(rest);
+  for (int r = 0; r < joint.kind->num_constraints(); ++r) result[r] = state.D(r).dot(rest);
   return result;
 }
 
@@ -196,13 +197,13 @@ JointMatrix<S> FreeResponse(const Kinematics<Space, S>& kinematics,
     const Linear<Space, S>& r = side == 0 ? state.r_Q : state.r_P;
     const auto inverse = kinematics.RotationalInverse(inertias[body], body);
     for (int a = 0; a < rows; ++a) {
-      const Motion<Space, S> D_a = state.D.col(a);
+      const Motion<Space, S> D_a = state.D(a);
       const Motion<Space, S> F = ShiftForce<Space, S>(D_a, r);
       Motion<Space, S> A;
       A << inverse * F.template head<Space::kRot>(),
           F.template tail<Space::kLin>() / inertias[body].mass;
       for (int b = 0; b < rows; ++b) {
-        const Motion<Space, S> D_b = state.D.col(b);
+        const Motion<Space, S> D_b = state.D(b);
         X(b, a) += ShiftForce<Space, S>(D_b, r).dot(A);
       }
     }

@@ -44,10 +44,10 @@ Outcome Odca<Space, S>::AssembleOnce() {
   if (assembled_version_ == kinematics_.position_version()) return Outcome::kFinished;
   const Outcome outcome = sweep_.Assemble(kinematics_);
   assembled_version_ = outcome == Outcome::kFinished ? kinematics_.position_version() : -1;
-  diagnostics_.rank = Base::LoopRank(sweep_.dependent_rows());
-  diagnostics_.rcond = static_cast<double>(sweep_.rcond());
-  diagnostics_.smallest_weight = static_cast<double>(sweep_.smallest_weight());
-  diagnostics_.worst_joint = sweep_.worst_joint();
+  diagnostics_.rank = Base::LoopRank(sweep_.joins().dependent_rows());
+  diagnostics_.rcond = static_cast<double>(sweep_.joins().rcond());
+  diagnostics_.smallest_weight = static_cast<double>(sweep_.joins().smallest_weight());
+  diagnostics_.worst_joint = sweep_.joins().worst_joint();
   return outcome;
 }
 
@@ -59,7 +59,7 @@ void Odca<Space, S>::TreeMotions(std::span<const Motion<Space, S>> A, VectorX<S>
     const Motion<Space, S> A_rel = ShiftMotion<Space, S>(A[joint.to], state.r_Q) -
                                    ShiftMotion<Space, S>(A[joint.from], state.r_P);
     for (int i = 0; i < joint.kind->num_u; ++i) {
-      result[joint.u_offset + i] = state.H.col(i).dot(A_rel);
+      result[joint.u_offset + i] = state.H(i).dot(A_rel);
     }
   }
 }
@@ -73,7 +73,7 @@ Outcome Odca<Space, S>::CompleteSpeeds() {
   for (Motion<Space, S>& c0 : c0_) c0.setZero();
   for (int index : mechanism_.constraints()) {
     const JointState<Space, S>& state = kinematics_.joints()[index];
-    for (int i = 0; i < state.D.cols(); ++i) c0_[index][i] = state.D.col(i).dot(state.V_rel);
+    for (int i = 0; i < state.rows(); ++i) c0_[index][i] = state.D(i).dot(state.V_rel);
   }
   sweep_.Solve(b_, c0_, A_);
   TreeMotions(A_, change_);
@@ -100,9 +100,9 @@ Outcome Odca<Space, S>::Accelerations() {
     const JointState<Space, S>& state = kinematics_.joints()[j];
     const Motion<Space, S> known = kinematics_.Centripetal(joint.to, state.r_Q) -
                                    kinematics_.Centripetal(joint.from, state.r_P) - state.g;
-    for (int i = 0; i < state.D.cols(); ++i) c0_[j][i] = state.D.col(i).dot(known);
+    for (int i = 0; i < state.rows(); ++i) c0_[j][i] = state.D(i).dot(known);
     for (int i = 0; i < (joint.in_tree() ? joint.kind->num_u : 0); ++i) {
-      change_[joint.u_offset + i] = state.H.col(i).dot(known);
+      change_[joint.u_offset + i] = state.H(i).dot(known);
     }
   }
   sweep_.Solve(b_, c0_, A_);
@@ -115,7 +115,7 @@ template <class Space, class S>
 Motion<Space, S> Odca<Space, S>::JointForce(int joint) const {
   const JointState<Space, S>& state = kinematics_.joints()[joint];
   Motion<Space, S> force = Motion<Space, S>::Zero();
-  for (int i = 0; i < state.D.cols(); ++i) force += state.D.col(i) * sweep_.multipliers()[joint][i];
+  for (int i = 0; i < state.rows(); ++i) force += state.D(i) * sweep_.multipliers()[joint][i];
   return force;
 }
 

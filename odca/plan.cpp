@@ -8,6 +8,14 @@ namespace loopbench::odca {
 
 namespace {
 
+/// A PlanNode that owns its lists.
+struct Draft {
+  PlanNode node;
+  std::vector<Handle> handles;
+  std::vector<int> kept;
+  std::vector<NodeJoint> joints;
+};
+
 /// An assembly while the tree is grown.
 struct Assembly {
   int node = 0;
@@ -40,7 +48,7 @@ class Planner {
     }
   }
 
-  std::vector<PlanNode> Run() {
+  std::vector<Draft> Run() {
     GroundLeaves();
     while (PairOnce()) {
     }
@@ -155,25 +163,26 @@ class Planner {
 
   /// Appends the node that closes `list` and turns `a` into the result.
   void AddNode(Assembly& a, Assembly* b, const std::vector<int>& list) {
-    PlanNode node;
+    Draft draft;
+    PlanNode& node = draft.node;
     node.children[0] = a.node;
     node.children[1] = b != nullptr ? b->node : -1;
     for (int child = 0; child < (b != nullptr ? 2 : 1); ++child) {
       const std::vector<int>& boundary = child == 0 ? a.boundary : b->boundary;
       for (int place = 0; place < static_cast<int>(boundary.size()); ++place) {
-        node.handles.push_back({boundary[place], child, place, false});
+        draft.handles.push_back({boundary[place], child, place, false});
       }
     }
     const auto place_of = [&](int body) {
-      const auto it = std::ranges::find(node.handles, body, &Handle::body);
-      return it == node.handles.end() ? -1 : static_cast<int>(it - node.handles.begin());
+      const auto it = std::ranges::find(draft.handles, body, &Handle::body);
+      return it == draft.handles.end() ? -1 : static_cast<int>(it - draft.handles.begin());
     };
     bool touches_ground = false;
     for (int j : list) {
       const PlanJoint& joint = joints_[j];
       --open_joints_[joint.from];
       --open_joints_[joint.to];
-      node.joints.push_back({joint.index, joint.rows, place_of(joint.from), place_of(joint.to)});
+      draft.joints.push_back({joint.index, joint.rows, place_of(joint.from), place_of(joint.to)});
       node.rows += joint.rows;
       touches_ground |= joint.from == 0 || joint.to == 0;
     }
@@ -181,11 +190,11 @@ class Planner {
     const bool self_join = b == nullptr && !touches_ground;
     node.closes_loop = list.size() > 1 || self_join || (a.reaches_ground && other_reaches);
     a.boundary.clear();
-    for (int h = 0; h < static_cast<int>(node.handles.size()); ++h) {
-      Handle& handle = node.handles[h];
+    for (int h = 0; h < static_cast<int>(draft.handles.size()); ++h) {
+      Handle& handle = draft.handles[h];
       handle.kept = open_joints_[handle.body] > 0;
       if (!handle.kept) continue;
-      node.kept.push_back(h);
+      draft.kept.push_back(h);
       a.boundary.push_back(handle.body);
     }
     a.reaches_ground |= other_reaches;
@@ -193,23 +202,23 @@ class Planner {
       a.ground_joints.insert(a.ground_joints.end(), b->ground_joints.begin(),
                              b->ground_joints.end());
     }
-    a.node = static_cast<int>(assemblies_.size() + nodes_.size());
-    nodes_.push_back(std::move(node));
+    a.node = static_cast<int>(assemblies_.size() + drafts_.size());
+    drafts_.push_back(std::move(draft));
   }
 
   /// Renumbers the nodes depth-first, so that children are executed just before their parent.
-  std::vector<PlanNode> DepthFirst() {
+  std::vector<Draft> DepthFirst() {
     const int leaves = static_cast<int>(assemblies_.size());
-    std::vector<int> new_number(nodes_.size(), -1);
-    std::vector<bool> has_parent(nodes_.size(), false);
-    for (const PlanNode& node : nodes_) {
-      for (int child : node.children) {
+    std::vector<int> new_number(drafts_.size(), -1);
+    std::vector<bool> has_parent(drafts_.size(), false);
+    for (const Draft& draft : drafts_) {
+      for (int child : draft.node.children) {
         if (child >= leaves) has_parent[child - leaves] = true;
       }
     }
-    std::vector<PlanNode> ordered;
-    ordered.reserve(nodes_.size());
-    for (int root = 0; root < static_cast<int>(nodes_.size()); ++root) {
+    std::vector<Draft> ordered;
+    ordered.reserve(drafts_.size());
+    for (int root = 0; root < static_cast<int>(drafts_.size()); ++root) {
       if (has_parent[root]) continue;
       std::vector<std::pair<int, bool>> stack = {{root, false}};
       while (!stack.empty()) {
@@ -217,17 +226,16 @@ class Planner {
         stack.pop_back();
         if (!expanded) {
           stack.push_back({n, true});
-          for (int child : {nodes_[n].children[1], nodes_[n].children[0]}) {
+          for (int child : {drafts_[n].node.children[1], drafts_[n].node.children[0]}) {
             if (child >= leaves) stack.push_back({child - leaves, false});
           }
           continue;
         }
-        for (int& child : nodes_[n].children) {
+        for (int& child : drafts_[n].node.children) {
           if (child >= leaves) child = leaves + new_number[child - leaves];
         }
         new_number[n] = static_cast<int>(ordered.size());
-        // copied, not moved: a sweep then finds the lists of consecutive nodes side by side
-        ordered.push_back(nodes_[n]);
+        ordered.push_back(std::move(drafts_[n]));
       }
     }
     return ordered;
@@ -237,13 +245,35 @@ class Planner {
   PlanOptions options_;
   std::vector<int> open_joints_;  ///< joints still to come, by body
   std::vector<Assembly> assemblies_;
-  std::vector<PlanNode> nodes_;
+  std::vector<Draft> drafts_;
 };
 
 }  // namespace
 
 Plan::Plan(int num_bodies, std::span<const PlanJoint> joints, const PlanOptions& options)
-    : num_leaves_(num_bodies - 1), nodes_(Planner(num_bodies, joints, options).Run()) {}
+    : num_leaves_(num_bodies - 1) {
+  const std::vector<Draft> drafts = Planner(num_bodies, joints, options).Run();
+  std::size_t handles = 0, kept = 0, closed = 0;
+  for (const Draft& draft : drafts) {
+    handles += draft.handles.size();
+    kept += draft.kept.size();
+    closed += draft.joints.size();
+  }
+  // spans stay good: the lists never grow beyond what is reserved
+  handles_.reserve(handles);
+  kept_.reserve(kept);
+  joints_.reserve(closed);
+  const auto append = [](auto& all, const auto& list) {
+    const auto first = all.insert(all.end(), list.begin(), list.end());
+    return std::span(first, all.end());
+  };
+  for (const Draft& draft : drafts) {
+    PlanNode& node = nodes_.emplace_back(draft.node);
+    node.handles = append(handles_, draft.handles);
+    node.kept = append(kept_, draft.kept);
+    node.joints = append(joints_, draft.joints);
+  }
+}
 
 int Plan::depth() const {
   std::vector<int> depth(num_nodes(), 0);

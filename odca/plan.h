@@ -62,19 +62,21 @@ struct NodeJoint {
 
 /// A join. Nodes 0 .. bodies-2 of a plan are leaves (body i+1 is node i) and have no PlanNode.
 struct PlanNode {
-  int children[2] = {-1, -1};     ///< node numbers; the second is -1 for a self-join or Ground
-  std::vector<Handle> handles;    ///< boundary of the children before the join, child 0 first
-  std::vector<int> kept;          ///< indices into handles: the boundary afterwards, in order
-  std::vector<NodeJoint> joints;  ///< closed here
-  int rows = 0;                   ///< size of X
-  bool closes_loop =
-      false;  ///< X may lose rank: both sides reach Ground, several joints, self-join
+  int children[2] = {-1, -1};  ///< node numbers; the second is -1 for a self-join or Ground
+  int rows = 0;                ///< size of X
+  /// X may lose rank: both sides reach Ground, several joints, self-join.
+  bool closes_loop = false;
+  std::span<const Handle> handles;    ///< boundary of the children before the join, child 0 first
+  std::span<const int> kept;          ///< indices into handles: the boundary afterwards, in order
+  std::span<const NodeJoint> joints;  ///< closed here
 };
 
 class Plan {
  public:
   /// `num_bodies` counts Ground.
   Plan(int num_bodies, std::span<const PlanJoint> joints, const PlanOptions& options = {});
+  Plan(Plan&&) = default;
+  Plan& operator=(Plan&&) = default;
 
   int num_leaves() const { return num_leaves_; }
   int num_nodes() const { return num_leaves_ + static_cast<int>(nodes_.size()); }
@@ -89,6 +91,10 @@ class Plan {
  private:
   int num_leaves_;
   std::vector<PlanNode> nodes_;
+  // the lists of all nodes, end to end in order of execution: a sweep streams them
+  std::vector<Handle> handles_;
+  std::vector<int> kept_;
+  std::vector<NodeJoint> joints_;
 };
 
 }  // namespace loopbench::odca

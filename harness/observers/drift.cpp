@@ -16,7 +16,7 @@ struct Largest {
   template <class Space>
   void Add(const Kinematics<Space, double>& kinematics, int index) {
     // only constrained directions count: what a joint leaves free is no mismatch
-    const Directions<Space, double>& D = kinematics.joints()[index].D;
+    const auto D = kinematics.joints()[index].D();
     const Motion<Space, double> all = kinematics.ConstraintMismatch(index);
     const Motion<Space, double> mismatch = D * (D.transpose() * all);
     rotation = std::max(rotation, mismatch.template head<Space::kRot>().norm());
@@ -40,7 +40,7 @@ struct DriftObserver<Space>::Work {
     }
     const auto& loops = joint_mechanism ? *joint_mechanism : mechanism;
     for (int index : loops.constraints())
-      loop_names.emplace_back(index, loops.joints()[index].name);
+      loop_names.emplace_back(index, loops.joint_names()[index]);
   }
 
   TreeDynamics<Space, double> dynamics;
@@ -71,15 +71,15 @@ void DriftObserver<Space>::Observe(const Sample<Space>& sample) {
     now.Add(kinematics, index);
     const JointState<Space, double>& state = kinematics.joints()[index];
     const auto shift_of = [&](const auto& rows) {
-      const Motion<Space, double> motion = state.D * rows;
+      const Motion<Space, double> motion = state.D() * rows;
       return motion.template tail<Space::kLin>().norm();
     };
-    work.velocity = std::max(work.velocity, shift_of(state.D.transpose() * state.V_rel));
+    work.velocity = std::max(work.velocity, shift_of(state.D().transpose() * state.V_rel));
     const Motion<Space, double> rest = JointAcceleration<Space, double>(kinematics, index, work.A);
-    work.acceleration = std::max(work.acceleration, shift_of(rest.head(state.D.cols())));
+    work.acceleration = std::max(work.acceleration, shift_of(rest.head(state.rows())));
   }
   if (now.shift > work.shift) {
-    work.worst_loop = kinematics.mechanism().joints()[now.joint].name;
+    work.worst_loop = kinematics.mechanism().joint_names()[now.joint];
   }
   work.shift = std::max(work.shift, now.shift);
   work.rotation = std::max(work.rotation, now.rotation);

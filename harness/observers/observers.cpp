@@ -142,7 +142,7 @@ void AngleObserver<Space>::Observe(const Sample<Space>& sample) {
   for (int j = 0; j < static_cast<int>(joints.size()); ++j) {
     if (joints[j].description < 0 || joints[j].kind->num_u != 1) continue;
     if (first) {
-      names_.push_back(joints[j].name);
+      names_.push_back(kinematics.mechanism().joint_names()[j]);
       series_.emplace_back();
     }
     series_[s].t.push_back(sample.t);

@@ -1,9 +1,9 @@
 // loopbench_bench: right-hand sides under Google Benchmark, with an allocation counter.
 //
-// Families: every column of the paper's experiment on its scenes, and closed chains of 3 to 1000
-// bars (the dense baselines to 100). Counters: ns_per_body, allocations per evaluation. The
-// benchmark library of Debian 12 calls itself a debug build; the context line "build" tells what
-// this one is.
+// Families: every column of the paper's experiment on its scenes, and closed chains and ladders of
+// 3 to 1000 bars (the dense baselines to 100). Counters: ns_per_body, allocations per evaluation.
+// The benchmark library of Debian 12 calls itself a debug build; the context line "build" tells
+// what this one is.
 #include <benchmark/benchmark.h>
 #include <fmt/format.h>
 
@@ -89,12 +89,15 @@ int main(int argc, char** argv) {
     }
   }
   for (const int bars : {3, 10, 30, 100, 300, 1000}) {
+    // a ladder of N windows has 2 N + 1 bars
     MechanismDescription chain = Chain(bars);
     chain.initial.speeds.push_back({0, {1.0}});
-    for (const Column& column : paper.columns) {
-      // a dense baseline of 1000 bars takes seconds for one evaluation
-      if (column.formulation != FormulationKind::kOdca && bars > 100) continue;
-      Register(chain.name, chain, column);
+    for (const MechanismDescription& family : {chain, Ladder((bars - 1) / 2, -1.0, 0.5)}) {
+      for (const Column& column : paper.columns) {
+        // a dense baseline of 1000 bars takes seconds for one evaluation
+        if (column.formulation != FormulationKind::kOdca && bars > 100) continue;
+        Register(family.name, family, column);
+      }
     }
   }
   for (const std::string& line : Provenance(CommandLine(argc, argv))) {

@@ -140,16 +140,11 @@ class SubjectIn final : public Subject {
 
   IntegratorResult Simulate(const std::function<void(std::span<double>)>& keep) {
     FormulationOde<Space> ode(*formulation_);
-    IntegratorOptions options;
-    options.profile = case_.integrator;
-    options.rtol = case_.rtol;
-    options.atol = case_.atol;
-    options.step_limit = case_.limits.steps;
-    options.time_limit_s = case_.limits.wall_s;
-    return Integrate(ode, 0.0, case_.horizon, y_, options, [&](double, std::span<double> y) {
-      if (keep) keep(y);
-      return formulation_->BeginStep(y) ? StepAction::kRestart : StepAction::kContinue;
-    });
+    return Integrate(
+        ode, 0.0, case_.horizon, y_, OptionsOf(case_), [&](double, std::span<double> y) {
+          if (keep) keep(y);
+          return formulation_->BeginStep(y) ? StepAction::kRestart : StepAction::kContinue;
+        });
   }
 
   /// Evaluations per batch, from the time of a first few (which also warm up).

@@ -97,7 +97,7 @@ template <class Space>
 void Family::Hold(const Sample<Space>& sample, bool as_published) {
   const Answer& answer = sample.answer();
   const bool good = answer.rcond > 1e-2;
-  const double bound = sample.Bound() * std::max(1.0, answer.rcond / closures_rcond_);
+  const double bound = sample.Bound();
   ++samples_;
   good_ += good;
   smallest_rcond_ = std::min(smallest_rcond_, answer.rcond);

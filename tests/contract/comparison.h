@@ -60,9 +60,7 @@ class Family {
  public:
   /// At least `share` of the samples must have rcond above 1e-2, and these are held to 1e-12. A
   /// share of zero: the bound with rcond alone.
-  /// `closures_rcond`: what a closure of its own may have where this is worse than the sample's.
-  Family(const std::string& name, double share, double closures_rcond = 1.0)
-      : name_(name), share_(share), closures_rcond_(closures_rcond) {}
+  Family(const std::string& name, double share) : name_(name), share_(share) {}
   /// Holds both coordinate sets and the given solvers to the sample's bound, joint forces where
   /// they are unique.
   template <class Space>
@@ -72,7 +70,7 @@ class Family {
 
  private:
   std::string name_;
-  double share_, closures_rcond_;
+  double share_;
   int samples_ = 0, good_ = 0;
   double worst_ = 0.0, worst_good_ = 0.0, worst_of_bound_ = 0.0, worst_force_ = 0.0;
   double smallest_rcond_ = 1.0;

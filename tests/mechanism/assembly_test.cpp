@@ -35,7 +35,7 @@ double Mismatch(const Joints& mechanism, const VectorX<double>& q) {
   kinematics.UpdatePosition(q);
   double worst = 0.0;
   for (int index : mechanism.constraints()) {
-    const auto& D = kinematics.joints()[index].D;
+    const auto D = kinematics.joints()[index].D();
     worst = std::max(worst, (D.transpose() * kinematics.ConstraintMismatch(index)).norm());
   }
   return worst;

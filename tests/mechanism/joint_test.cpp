@@ -85,7 +85,7 @@ TYPED_TEST(JointTest, MotionMapAndRatesAreTheDerivativeOfTheTransform) {
       for (int i = 0; i < kind.num_u; ++i) {
         const Motion<TypeParam, double> V =
             MotionAlong(type, kind, q, VectorX<double>::Unit(kind.num_u, i));
-        const auto H = Motion<TypeParam, double>::Unit(kind.free_axes[i]);
+        const auto H = Motion<TypeParam, double>::Unit(kind.axes[i]);
         EXPECT_LE((V - H).template lpNorm<Eigen::Infinity>(), 8 * kEps) << ToString(type);
       }
     }
@@ -96,8 +96,7 @@ TYPED_TEST(JointTest, FreeAndConstrainedAxesShareTheSpaceBetweenThem) {
   for (JointType type : kTypes) {
     const auto& kind = KindOf<TypeParam, double>(type);
     std::vector<int> seen(TypeParam::kDim, 0);
-    for (int i = 0; i < kind.num_u; ++i) ++seen[kind.free_axes[i]];
-    for (int i = 0; i < kind.num_constraints(); ++i) ++seen[kind.constrained_axes[i]];
+    for (int axis : kind.axes) ++seen[axis];
     EXPECT_EQ(seen, std::vector<int>(TypeParam::kDim, 1)) << "D^T H = 0 and both are complete";
   }
 }

@@ -127,9 +127,9 @@ TYPED_TEST(KinematicsTest, ConsistentSpeedsKeepEveryJointTogether) {
         const double scale = mechanism.num_bodies() * (1.0 + at.u.norm());
         for (int j = 0; j < static_cast<int>(d.joints.size()); ++j) {
           const auto& state = kinematics.joints()[j];
-          EXPECT_LE((state.D.transpose() * state.V_rel).norm(), 100 * kEps * scale);
-          EXPECT_LE((state.D.transpose() * state.H).norm(), 8 * kEps) << "D^T H = 0";
-          EXPECT_LE((state.D.transpose() * kinematics.ConstraintMismatch(j)).norm(),
+          EXPECT_LE((state.D().transpose() * state.V_rel).norm(), 100 * kEps * scale);
+          EXPECT_LE((state.D().transpose() * state.H()).norm(), 8 * kEps) << "D^T H = 0";
+          EXPECT_LE((state.D().transpose() * kinematics.ConstraintMismatch(j)).norm(),
                     100 * kEps * scale);
         }
       });

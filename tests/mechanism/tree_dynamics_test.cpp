@@ -106,7 +106,7 @@ TYPED_TEST(TreeDynamicsTest, JacobianIsTheDerivativeOfTheMismatch) {
       for (int index : mechanism.constraints()) {
         const auto& joint = mechanism.joints()[index];
         e.segment(joint.row, joint.kind->num_constraints()) =
-            moved.joints()[index].D.transpose() * moved.ConstraintMismatch(index);
+            moved.joints()[index].D().transpose() * moved.ConstraintMismatch(index);
       }
       return e;
     };

@@ -44,10 +44,10 @@ TEST(SweepTest, NoMatrixIsLargerThanThePlansLargestJoin) {
       kept = std::max(kept, static_cast<int>(node.kept.size()));
     }
     const int boundary = Planar::kDim * kept;
-    EXPECT_LE(odca.sweep().largest_matrix(), std::max(rows * rows, boundary * boundary));
+    EXPECT_LE(odca.sweep().joins().largest_matrix(), std::max(rows * rows, boundary * boundary));
   }
   const Mechanism<Planar, double> chain(Chain(1000), Coordinates::kJoint);
-  EXPECT_LE((Odca<Planar, double>(chain, {}).sweep().largest_matrix()), 36)
+  EXPECT_LE((Odca<Planar, double>(chain, {}).sweep().joins().largest_matrix()), 36)
       << "two handles of three directions";
 }
 

@@ -1,0 +1,336 @@
+#include "odca/joins.h"
+
+#include <algorithm>
+#include <cmath>
+#include <limits>
+
+#include "mechanism/instantiate.h"
+#include "mechanism/tree_dynamics.h"
+
+namespace loopbench::odca {
+
+template <class Space, class S>
+Joins<Space, S>::Joins(const Mechanism<Space, S>& mechanism, const Plan& plan, SolverKind solver)
+    : mechanism_(mechanism), plan_(plan), solver_(solver), places_(plan.num_nodes()) {
+  const auto scratch = std::make_shared<LoopScratch<S>>(plan.largest_join());
+  int z = 0, w = 0, x = 0, c = 0, widest = 1;
+  c_offset_.assign(mechanism.joints().size(), 0);
+  std::vector<bool> joined(plan.num_leaves(), false);
+  loops_.reserve(plan.loop_joins());
+  for (int n = 0; n < plan.num_nodes(); ++n) {
+    Place& place = places_[n];
+    place.z = z;
+    place.w = w;
+    place.x = x;
+    place.handle = num_handles_;
+    place.row = num_rows_;
+    if (n >= plan.num_leaves()) {
+      const PlanNode& node = plan.nodes()[n - plan.num_leaves()];
+      for (int child : node.children) {
+        if (child >= 0 && child < plan.num_leaves()) joined[child] = true;
+      }
+      place.kept = static_cast<int>(node.kept.size());
+      w += node.rows * static_cast<int>(node.handles.size());
+      x += node.rows * node.rows;
+      num_rows_ += node.rows;
+      widest = std::max(widest, place.kept);
+      largest_matrix_ = std::max(largest_matrix_, node.rows * node.rows);
+      std::vector<int> rows;
+      for (const NodeJoint& joint : node.joints) {
+        rows.push_back(joint.rows);
+        c_offset_[joint.index] = c;
+        c += 2 * joint.rows;
+      }
+      if (node.closes_loop) {
+        place.loop = static_cast<int>(loops_.size());
+        loops_.emplace_back(rows, scratch);
+      }
+    }
+    z += place.kept * place.kept;
+    num_handles_ += place.kept;
+    largest_matrix_ =
+        std::max(largest_matrix_, place.kept * place.kept * Space::kDim * Space::kDim);
+  }
+  for (int leaf = 0; leaf < plan.num_leaves(); ++leaf) {
+    if (!joined[leaf]) lone_leaves_.push_back(leaf);
+  }
+  Z_.assign(z, Block<Space, S>::Zero());
+  W_.assign(w, Motion<Space, S>::Zero());
+  X_.assign(x, S(0));
+  c_.assign(c, Motion<Space, S>::Zero());
+  columns_.setZero(plan.largest_join(), Space::kDim * widest);
+}
+
+template <class Space, class S>
+Outcome Joins<Space, S>::Assemble(const Kinematics<Space, S>& kinematics) {
+  operations_ = 0;
+  softened_ = false;
+  if (AssembleAll(kinematics, mechanism_.bodies(), Pass::kPhysical)) return Outcome::kFinished;
+  if (solver_ == SolverKind::kAsPublished) return Outcome::kSingular;
+  if (!std::isfinite(static_cast<double>(rcond_))) return Outcome::kNonFinite;
+  // a loop looks degenerate: let geometry say in which directions, then solve the physics
+  softened_ = true;
+  AssembleAll(kinematics, mechanism_.geometric_bodies(), Pass::kGeometric);
+  const bool ok = AssembleAll(kinematics, mechanism_.bodies(), Pass::kSoftened);
+  return ok ? Outcome::kFinished : Outcome::kNonFinite;
+}
+
+template <class Space, class S>
+bool Joins<Space, S>::AssembleAll(const Kinematics<Space, S>& kinematics,
+                                  const std::vector<Inertia<Space, S>>& inertias, Pass pass) {
+  if (pass != Pass::kSoftened) {
+    dependent_rows_ = 0;
+    worst_joint_ = -1;
+    rcond_ = smallest_weight_ = S(1);
+  }
+  for (int leaf : lone_leaves_) FillLeaf(kinematics, inertias[leaf + 1], leaf);
+  for (int n = plan_.num_leaves(); n < plan_.num_nodes(); ++n) {
+    const PlanNode& node = plan_.nodes()[n - plan_.num_leaves()];
+    const Place& place = places_[n];
+    for (int child : node.children) {
+      if (child >= 0 && child < plan_.num_leaves()) {
+        FillLeaf(kinematics, inertias[child + 1], child);
+      }
+    }
+    FillJoints(kinematics, node);
+    FormResponse(node, place);
+    const bool ok = node.closes_loop ? FactorLoop(kinematics, node, place, pass, inertias)
+                                     : FactorFloating(node, place);
+    if (!ok) return false;
+    ApplyToKept(node, place);
+    Eliminate(node, place);
+  }
+  return true;
+}
+
+template <class Space, class S>
+void Joins<Space, S>::FillLeaf(const Kinematics<Space, S>& kinematics,
+                               const Inertia<Space, S>& inertia, int n) {
+  Block<Space, S>& Z = Z_[places_[n].z];
+  Z.setZero();
+  Z.template topLeftCorner<Space::kRot, Space::kRot>() =
+      kinematics.RotationalInverse(inertia, n + 1);
+  Z.template bottomRightCorner<Space::kLin, Space::kLin>().diagonal().setConstant(S(1) /
+                                                                                  inertia.mass);
+}
+
+template <class Space, class S>
+void Joins<Space, S>::FillJoints(const Kinematics<Space, S>& kinematics, const PlanNode& node) {
+  for (const NodeJoint& joint : node.joints) {
+    const JointState<Space, S>& state = kinematics.joints()[joint.index];
+    Motion<Space, S>* c = &c_[c_offset_[joint.index]];
+    for (int i = 0; i < joint.rows; ++i) {
+      const Motion<Space, S> D_i = state.D(i);
+      c[i] = -ShiftForce<Space, S>(D_i, state.r_P);
+      c[joint.rows + i] = ShiftForce<Space, S>(D_i, state.r_Q);
+    }
+  }
+}
+
+/// W = Z C^T on every handle and X = C W.                                        (16, 66)
+template <class Space, class S>
+void Joins<Space, S>::FormResponse(const PlanNode& node, const Place& place) {
+  const int n = node.rows;
+  const auto side = [&](const NodeJoint& joint, int which) {
+    return which == 0 ? joint.from : joint.to;
+  };
+  const auto direction = [&](const NodeJoint& joint, int which) {
+    return which == 0 ? c_P(joint) : c_Q(joint);
+  };
+  for (int e = 0; e < static_cast<int>(node.handles.size()); ++e) {
+    const Handle& handle = node.handles[e];
+    const Place& child = places_[node.children[handle.child]];
+    Motion<Space, S>* W = &W_[place.w + e * n];
+    for (const NodeJoint& joint : node.joints) {
+      for (int i = 0; i < joint.rows; ++i) W[i].setZero();
+      for (int which = 0; which < 2; ++which) {
+        const int f = side(joint, which);
+        if (f < 0 || node.handles[f].child != handle.child) continue;
+        const Block<Space, S>& Z = Z_[child.z + handle.place + child.kept * node.handles[f].place];
+        const Motion<Space, S>* c = direction(joint, which);
+        for (int i = 0; i < joint.rows; ++i) W[i].noalias() += Z * c[i];
+        operations_ += joint.rows * Space::kDim * Space::kDim;
+      }
+      W += joint.rows;
+    }
+  }
+  int row = 0;
+  for (const NodeJoint& joint : node.joints) {
+    for (int i = 0; i < joint.rows; ++i, ++row) {
+      for (int l = 0; l <= row; ++l) {
+        S sum = S(0);
+        for (int which = 0; which < 2; ++which) {
+          const int f = side(joint, which);
+          if (f >= 0) sum += direction(joint, which)[i].dot(W_[place.w + f * n + l]);
+        }
+        X_[place.x + row + l * n] = X_[place.x + l + row * n] = sum;
+      }
+      operations_ += 2 * Space::kDim * (row + 1);
+    }
+  }
+}
+
+/// Cholesky in place (lower triangle of X): X is positive definite, because one side floats.
+template <class Space, class S>
+bool Joins<Space, S>::FactorFloating(const PlanNode& node, const Place& place) {
+  using std::sqrt;
+  const int n = node.rows;
+  S* X = &X_[place.x];
+  for (int j = 0; j < n; ++j) {
+    S pivot = X[j + j * n];
+    for (int k = 0; k < j; ++k) pivot -= X[j + k * n] * X[j + k * n];
+    if (!(pivot > S(0))) {
+      rcond_ = pivot;
+      return false;
+    }
+    pivot = sqrt(pivot);
+    X[j + j * n] = pivot;
+    for (int i = j + 1; i < n; ++i) {
+      S value = X[i + j * n];
+      for (int k = 0; k < j; ++k) value -= X[i + k * n] * X[j + k * n];
+      X[i + j * n] = value / pivot;
+    }
+  }
+  operations_ += static_cast<long>(n) * n * n / 6 + n;
+  return true;
+}
+
+template <class Space, class S>
+bool Joins<Space, S>::FactorLoop(const Kinematics<Space, S>& kinematics, const PlanNode& node,
+                                 const Place& place, Pass pass,
+                                 const std::vector<Inertia<Space, S>>& inertias) {
+  LoopSolver<S>& loop = loops_[place.loop];
+  const Eigen::Map<const MatrixX<S>> X(&X_[place.x], node.rows, node.rows);
+  operations_ += static_cast<long>(node.rows) * node.rows * node.rows / 6 + node.rows;
+  if (solver_ == SolverKind::kAsPublished) {
+    // A pivot that is all round-off is not a pivot. The sums behind X are about as long as there
+    // are bodies, and their terms as large as the responses of the bodies alone: 2800 random planar
+    // ladders in space, whose pivots are zero, leave at most 0.6 eps per body. 64 is a margin.
+    S scale = S(0);
+    for (const NodeJoint& joint : node.joints) {
+      const auto free = FreeResponse(kinematics, inertias, joint.index);
+      scale = std::max(scale, free.diagonal().maxCoeff());
+    }
+    const S eps = std::numeric_limits<S>::epsilon();
+    const bool ok = loop.FactorPlain(X, scale, S(64) * eps * S(mechanism_.num_bodies()));
+    NoteDiagnostics(node, loop);
+    return ok;
+  }
+  if (pass != Pass::kSoftened) {
+    for (int j = 0; j < static_cast<int>(node.joints.size()); ++j) {
+      loop.SetScale(j, FreeResponse(kinematics, inertias, node.joints[j].index));
+    }
+  }
+  if (pass == Pass::kPhysical) {
+    const bool ok = loop.FactorScaled(X);
+    NoteDiagnostics(node, loop);
+    return ok;
+  }
+  if (pass == Pass::kGeometric) {
+    loop.FactorGeometric(X);
+    dependent_rows_ += loop.size() - loop.rank();
+    NoteDiagnostics(node, loop);
+  } else {
+    loop.FactorSoftened(X);
+  }
+  return true;
+}
+
+template <class Space, class S>
+void Joins<Space, S>::NoteDiagnostics(const PlanNode& node, const LoopSolver<S>& loop) {
+  if (!(loop.rcond() >= rcond_)) {
+    rcond_ = loop.rcond();
+    worst_joint_ = node.joints.back().index;
+  }
+  smallest_weight_ = std::min(smallest_weight_, loop.smallest_weight());
+}
+
+/// V = T W^T, kept transposed in W's place, for the handles that stay.
+template <class Space, class S>
+void Joins<Space, S>::ApplyToKept(const PlanNode& node, const Place& place) {
+  const int rows = node.rows;
+  if (!node.closes_loop) {
+    const S* L = &X_[place.x];
+    for (int e : node.kept) {
+      Motion<Space, S>* W = &W_[place.w + e * rows];
+      for (int i = 0; i < rows; ++i) {
+        for (int k = 0; k < i; ++k) W[i] -= L[i + k * rows] * W[k];
+        W[i] /= L[i + i * rows];
+      }
+    }
+  } else if (!node.kept.empty()) {
+    const int width = Space::kDim * static_cast<int>(node.kept.size());
+    auto B = columns_.topLeftCorner(rows, width);
+    for (std::size_t k = 0; k < node.kept.size(); ++k) {
+      for (int i = 0; i < rows; ++i) {
+        B.row(i).template segment<Space::kDim>(Space::kDim * k) =
+            W_[place.w + node.kept[k] * rows + i].transpose();
+      }
+    }
+    loops_[place.loop].Apply(B);
+    for (std::size_t k = 0; k < node.kept.size(); ++k) {
+      for (int i = 0; i < rows; ++i) {
+        W_[place.w + node.kept[k] * rows + i] =
+            B.row(i).template segment<Space::kDim>(Space::kDim * k).transpose();
+      }
+    }
+  }
+  operations_ += Space::kDim * rows * (rows + 1) / 2 * static_cast<long>(node.kept.size());
+}
+
+/// Z' = Z - V^T V over the handles that stay.                                    (26-28, 71)
+template <class Space, class S>
+void Joins<Space, S>::Eliminate(const PlanNode& node, const Place& place) {
+  const int n = node.rows;
+  for (int f = 0; f < place.kept; ++f) {
+    const Handle& at_f = node.handles[node.kept[f]];
+    const Motion<Space, S>* V_f = &W_[place.w + node.kept[f] * n];
+    for (int e = f; e < place.kept; ++e) {
+      const Handle& at_e = node.handles[node.kept[e]];
+      const Motion<Space, S>* V_e = &W_[place.w + node.kept[e] * n];
+      Block<Space, S> Z = Block<Space, S>::Zero();
+      if (at_e.child == at_f.child) {
+        const Place& child = places_[node.children[at_e.child]];
+        Z = Z_[child.z + at_e.place + child.kept * at_f.place];
+      }
+      for (int i = 0; i < n; ++i) Z.noalias() -= V_e[i] * V_f[i].transpose();
+      Z_[place.z + e + place.kept * f] = Z;
+      if (e != f) Z_[place.z + f + place.kept * e] = Z.transpose();
+      operations_ += static_cast<long>(n) * Space::kDim * Space::kDim;
+    }
+  }
+}
+
+template <class Space, class S>
+void Joins<Space, S>::Apply(const PlanNode& node, int n, S* v) const {
+  const Place& place = places_[n];
+  if (node.closes_loop) {
+    loops_[place.loop].Apply(Eigen::Map<MatrixX<S>>(v, node.rows, 1));
+    return;
+  }
+  const S* L = &X_[place.x];
+  for (int i = 0; i < node.rows; ++i) {
+    for (int k = 0; k < i; ++k) v[i] -= L[i + k * node.rows] * v[k];
+    v[i] /= L[i + i * node.rows];
+  }
+}
+
+template <class Space, class S>
+void Joins<Space, S>::ApplyTransposed(const PlanNode& node, int n, S* v) const {
+  const Place& place = places_[n];
+  if (node.closes_loop) {
+    loops_[place.loop].ApplyTransposed(Eigen::Map<VectorX<S>>(v, node.rows));
+    return;
+  }
+  const S* L = &X_[place.x];
+  for (int i = node.rows - 1; i >= 0; --i) {
+    for (int k = i + 1; k < node.rows; ++k) v[i] -= L[k + i * node.rows] * v[k];
+    v[i] /= L[i + i * node.rows];
+  }
+}
+
+#define LOOPBENCH_INSTANTIATE(Space, S) template class Joins<Space, S>;
+LOOPBENCH_FOR_EACH_SPACE_AND_SCALAR(LOOPBENCH_INSTANTIATE)
+#undef LOOPBENCH_INSTANTIATE
+
+}  // namespace loopbench::odca

@@ -1,0 +1,115 @@
+// What O-DCA knows at one position, before any force: Z of every assembly, T and V of every join.
+//
+// For an assembly with boundary bodies 1..h, all at their centres of mass,
+//   A = Z F + b                                                             (1-2, 5-6)
+// with F the forces of what is still outside. A joint j from P to Q demands
+//   c_Q^T A_Q + c_P^T A_P + c0 = 0,   c_Q = S(r_Q)^T D,  c_P = -S(r_P)^T D,
+//   c0 = D^T (n_Q - n_P - g),         n = [0; w x (w x r)],                  (7, 12)
+// and carries D phi on Q, -D phi on P, that is c phi on the centres of mass. With C the rows c of
+// all joints of a node, on the union of its children's boundaries:
+//   X = C Z C^T                                                             (16, 66)
+//   phi = -X^+ (C b + c0 + C Z F)                                           (17, 64)
+//   Z' = Z - Z C^T X^+ C Z                                                  (26-28, 71)
+//   b' = b - Z C^T X^+ (C b + c0)                                           (29-30, 72)
+// X^+ = T^T T (loop_solver.h), so with V = T C Z and s = T (C b + c0): Z' = Z - V^T V, b' = b - V^T
+// s, phi = -T^T (s + V F). V and T are kept for the sweep of vectors (sweep.h).
+//
+// All memory is taken at construction; assembling allocates nothing, and holds no matrix larger
+// than the plan's largest join.
+#pragma once
+
+#include <memory>
+#include <vector>
+
+#include "mechanism/formulation.h"
+#include "mechanism/loop_solver.h"
+#include "odca/plan.h"
+
+namespace loopbench::odca {
+
+template <class Space, class S>
+class Joins {
+ public:
+  /// `mechanism` and `plan` must outlive this. Plan joints index the mechanism's joints.
+  Joins(const Mechanism<Space, S>& mechanism, const Plan& plan, SolverKind solver);
+
+  /// From the leaves up, at the current positions.
+  Outcome Assemble(const Kinematics<Space, S>& kinematics);
+
+  /// Kept handles of a node, 1 of a leaf; and the first of its numbers in lists with one entry per
+  /// kept handle, or one per row.
+  int kept(int n) const { return places_[n].kept; }
+  int first_handle(int n) const { return places_[n].handle; }
+  int first_row(int n) const { return places_[n].row; }
+  int num_handles() const { return num_handles_; }
+  int num_rows() const { return num_rows_; }
+
+  const Block<Space, S>& LeafZ(int n) const { return Z_[places_[n].z]; }
+  /// Rows c of a joint.
+  const Motion<Space, S>* c_P(const NodeJoint& joint) const { return &c_[c_offset_[joint.index]]; }
+  const Motion<Space, S>* c_Q(const NodeJoint& joint) const { return c_P(joint) + joint.rows; }
+  /// V^T of an inner node on one of its kept handles (index into node.handles), a motion per row.
+  const Motion<Space, S>* V(const PlanNode& node, int n, int handle) const {
+    return &W_[places_[n].w + handle * node.rows];
+  }
+  /// v := T v and v := T^T v for the rows of an inner node.
+  void Apply(const PlanNode& node, int n, S* v) const;
+  void ApplyTransposed(const PlanNode& node, int n, S* v) const;
+
+  /// Some direction was left out or softened: then a solution deserves a correction.
+  bool softened() const { return softened_; }
+  int dependent_rows() const { return dependent_rows_; }
+  S rcond() const { return rcond_; }
+  S smallest_weight() const { return smallest_weight_; }
+  int worst_joint() const { return worst_joint_; }
+  /// Multiply-adds of the last Assemble(), counted as they were done (an eigen-decomposition as if
+  /// it were a Cholesky factorisation).
+  long operations() const { return operations_; }
+  /// Entries of the largest matrix held for one join: X or one Z.
+  int largest_matrix() const { return largest_matrix_; }
+
+ private:
+  /// Where a node's numbers live. Leaves have one handle and no rows.
+  struct Place {
+    int z = 0;       ///< first block of Z (kept x kept, by columns)
+    int w = 0;       ///< first motion of W: rows per handle before the join
+    int x = 0;       ///< first number of X
+    int handle = 0;  ///< first of the kept handles
+    int kept = 1;
+    int row = 0;
+    int loop = -1;  ///< index of the loop solver
+  };
+  enum class Pass { kPhysical, kGeometric, kSoftened };
+
+  bool AssembleAll(const Kinematics<Space, S>& kinematics,
+                   const std::vector<Inertia<Space, S>>& inertias, Pass pass);
+  void FillLeaf(const Kinematics<Space, S>& kinematics, const Inertia<Space, S>& inertia, int n);
+  void FillJoints(const Kinematics<Space, S>& kinematics, const PlanNode& node);
+  void FormResponse(const PlanNode& node, const Place& place);
+  bool FactorFloating(const PlanNode& node, const Place& place);
+  bool FactorLoop(const Kinematics<Space, S>& kinematics, const PlanNode& node, const Place& place,
+                  Pass pass, const std::vector<Inertia<Space, S>>& inertias);
+  void ApplyToKept(const PlanNode& node, const Place& place);
+  void Eliminate(const PlanNode& node, const Place& place);
+  void NoteDiagnostics(const PlanNode& node, const LoopSolver<S>& loop);
+
+  const Mechanism<Space, S>& mechanism_;
+  const Plan& plan_;
+  SolverKind solver_;
+  std::vector<Place> places_;
+  std::vector<Block<Space, S>> Z_;
+  std::vector<Motion<Space, S>> W_;
+  std::vector<Motion<Space, S>> c_;  ///< rows c_P, then c_Q of each joint
+  std::vector<int> c_offset_;        ///< of each mechanism joint in c_
+  std::vector<S> X_;
+  std::vector<LoopSolver<S>> loops_;
+  MatrixX<S> columns_;
+  std::vector<int> lone_leaves_;  ///< bodies that no joint touches
+  int num_handles_ = 0, num_rows_ = 0, largest_matrix_ = 0;
+  bool softened_ = false;
+  int dependent_rows_ = 0, worst_joint_ = -1;
+  S rcond_ = S(1), smallest_weight_ = S(1);
+  long operations_ = 0;
+};
+
+}  // namespace loopbench::odca

@@ -74,4 +74,37 @@ MechanismDescription Ladder(int num_windows, double angle, double speed) {
   return ladder;
 }
 
+MechanismDescription Grid(int num_storeys, int num_windows, double angle, double speed) {
+  const Eigen::Vector3d origin = Eigen::Vector3d::Zero(), tip = Eigen::Vector3d::UnitX();
+  MechanismDescription grid;
+  grid.name = "grid-" + std::to_string(num_storeys) + "x" + std::to_string(num_windows);
+  grid.gravity = {0.0, -9.81, 0.0};
+  const auto add = [&](const std::string& kind, int storey, int column, int from,
+                       const Eigen::Vector3d& at, double q, double u) {
+    const std::string place = std::to_string(storey) + "." + std::to_string(column);
+    const int body = static_cast<int>(grid.bodies.size()), joint = body - 1;
+    grid.bodies.push_back(Bar(kind + place, 1.0, 1.0, 1.0 / 12.0));
+    grid.joints.push_back(Revolute("J" + kind + place, from, at, body, origin));
+    grid.initial.coordinates.push_back({joint, {q}});
+    grid.initial.speeds.push_back({joint, {u}});
+    return body;
+  };
+  std::vector<JointDescription> closing;
+  std::vector<int> above(num_windows + 1, kGround);
+  for (int r = 1; r <= num_storeys; ++r) {
+    const double turned = angle + 0.1 * (r - 1), turning = r * speed;
+    const double q = r == 1 ? angle : 0.1, u = speed;
+    int coupler = kGround;
+    for (int c = 0; c <= num_windows; ++c) {
+      const Eigen::Vector3d at = r == 1 ? Eigen::Vector3d(c, 0.0, 0.0) : tip;
+      const int crank = add("crank", r, c, above[c], at, q, u);
+      if (c > 0) closing.push_back(Revolute("T" + std::to_string(crank), coupler, tip, crank, tip));
+      if (c < num_windows) coupler = add("coupler", r, c + 1, crank, tip, -turned, -turning);
+      above[c] = crank;
+    }
+  }
+  grid.joints.insert(grid.joints.end(), closing.begin(), closing.end());
+  return grid;
+}
+
 }  // namespace loopbench

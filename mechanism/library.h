@@ -3,6 +3,8 @@
 //   Chain(n)      o--1--2-- .. --n--o       n equal bars between two ground pins; n >= 3
 //   Ladder(n)     o  o  o       o           n windows: n + 1 cranks on ground pins, n couplers
 //                 |--|--|-- .. -|           (reference A02, "N-four-bar")
+//   Grid(m, n)    m ladders of n windows, each hanging from the joints of the one above: loops that
+//                 share bodies in two directions, m degrees of freedom
 #pragma once
 
 #include "mechanism/description.h"
@@ -17,6 +19,10 @@ MechanismDescription Chain(int num_bars);
 /// N-four-bar of benchmark A02: cranks and couplers of 1 m, 1 kg, 1/12 kg m^2 (slender), cranks at
 /// `angle` from +x, turning at `speed` [rad/s] on the parallel branch.
 MechanismDescription Ladder(int num_windows, double angle, double speed);
+
+/// `num_storeys` rows of `num_windows` parallelograms of unit bars as in Ladder. Storey r = 1, 2, ..
+/// stands at `angle` + 0.1 (r - 1) from +x and turns at r `speed` [rad/s].
+MechanismDescription Grid(int num_storeys, int num_windows, double angle, double speed);
 
 /// A unit bar from its origin A to B = (length, 0): com in the middle.
 BodyDescription Bar(const std::string& name, double length, double mass, double inertia);

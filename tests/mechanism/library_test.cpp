@@ -1,0 +1,63 @@
+// Families of mechanisms: their loops, degrees of freedom and starts.
+#include "mechanism/library.h"
+
+#include <gtest/gtest.h>
+
+#include "mechanism/assembly.h"
+#include "odca/odca.h"
+
+namespace loopbench {
+namespace {
+
+struct Shape {
+  int loops, freedom;
+};
+
+Shape ShapeOf(const MechanismDescription& description) {
+  const Mechanism<Planar, double> mechanism(description, Coordinates::kJoint);
+  const Start<double> start = Assemble<Planar>(description, mechanism);
+  EXPECT_EQ(start.outcome, Outcome::kFinished) << description.name << ": " << start.message;
+  odca::Odca<Planar, double> formulation(mechanism, {});
+  VectorX<double> udot;
+  EXPECT_EQ(formulation.Evaluate(0.0, start.q, start.u, udot), Outcome::kFinished);
+  return {mechanism.num_loops(), mechanism.num_joint_speeds() - formulation.diagnostics().rank};
+}
+
+TEST(LibraryTest, ChainsHaveOneLoop) {
+  const Shape shape = ShapeOf(Chain(7));
+  EXPECT_EQ(shape.loops, 1);
+  EXPECT_EQ(shape.freedom, 5);
+}
+
+TEST(LibraryTest, LaddersHaveALoopPerWindowAndOneFreedom) {
+  const Shape shape = ShapeOf(Ladder(5, -1.0, 0.5));
+  EXPECT_EQ(shape.loops, 5);
+  EXPECT_EQ(shape.freedom, 1);
+}
+
+TEST(LibraryTest, GridsHaveALoopPerWindowAndAFreedomPerStorey) {
+  const Shape shape = ShapeOf(Grid(3, 4, -1.0, 0.5));
+  EXPECT_EQ(shape.loops, 12);
+  EXPECT_EQ(shape.freedom, 3);
+}
+
+TEST(LibraryTest, AGridStartsWhereItSays) {
+  const MechanismDescription grid = Grid(3, 2, -1.0, 0.5);
+  const Mechanism<Planar, double> mechanism(grid, Coordinates::kJoint);
+  const Start<double> start = Assemble<Planar>(grid, mechanism);
+  ASSERT_EQ(start.outcome, Outcome::kFinished) << start.message;
+  Kinematics<Planar, double> kinematics(mechanism);
+  kinematics.UpdatePosition(start.q);
+  kinematics.UpdateVelocity(start.u);
+  for (int body = 1; body < mechanism.num_bodies(); ++body) {
+    const std::string& name = mechanism.body_names()[body];
+    const int storey = name[name.find_first_of("123")] - '0';
+    const bool crank = name.starts_with("crank");
+    // the start is given exactly: what is left is a few sums of angles
+    EXPECT_NEAR(kinematics.poses()[body].angle, crank ? -1.0 + 0.1 * (storey - 1) : 0.0, 1e-14);
+    EXPECT_NEAR(kinematics.motions()[body][0], crank ? 0.5 * storey : 0.0, 1e-13) << name;
+  }
+}
+
+}  // namespace
+}  // namespace loopbench

@@ -157,6 +157,12 @@ void WriteGrowth(const Growth& growth, int failed, Record& record) {
   record.Set("growth_spread_late", growth.spread_late);
   record.Set("growth_regime", growth.regime);
   record.Set("growth_resolved", growth.resolved && failed == 0);
+  record.Set("growth_hypothesis", growth.hypothesis.name);
+  record.Set("growth_hypothesis_resolved", growth.hypothesis_resolved && failed == 0);
+  record.Set("growth_hypothesis_ratio", growth.hypothesis.ratio);
+  record.Set("growth_rate", growth.hypothesis.rate);
+  record.Set("growth_from", growth.t_from);
+  record.Set("growth_to", growth.t_to);
   record.Set("ensemble", std::int64_t{growth.members});
   record.Set("ensemble_failed", std::int64_t{failed});
 }

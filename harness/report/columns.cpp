@@ -63,6 +63,8 @@ const std::vector<TableColumn>& DriftColumns() {
                               Make("growth_spread", "growth spread", kExponent),
                               Make("growth_regime", "growth regime"),
                               Make("growth_resolved", "growth resolved"),
+                              Make("growth_hypothesis", "growth hypothesis"),
+                              Make("growth_hypothesis_resolved", "hypothesis resolved"),
                               Make("ensemble", "ensemble", kInteger),
                               Make("steps", "steps", kInteger),
                               Make("rejected", "rejected", kInteger),

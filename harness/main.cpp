@@ -28,6 +28,23 @@ Examples:
 Conditions are key=value or key=value,value; keys are the columns of drift.csv.
 Exit codes: 0 done, 1 a gate failed, 2 could not measure or bad input.)";
 
+constexpr const char* kTableFooter = R"(
+Examples:
+  loopbench table out --where rtol=1e-8 --group mechanism
+  loopbench table out --columns mechanism,formulation,drift_position_max --format latex
+  loopbench table out --kind timing --sort rhs_ns_median --format csv --out timing.csv
+
+Any key of the records may be a column; a wrong one is answered with the list of all.
+Every table ends with the command, machine, compiler, libraries and commit.)";
+
+constexpr const char* kPlotFooter = R"(
+Examples:
+  loopbench plot out --out out/figures
+  loopbench plot out --out work.svg --x rhs_evaluations --y drift_position_max --group formulation,coordinates
+  loopbench plot out --out cost.pdf --where kind=timing --x bodies --y ns_per_body --group formulation
+
+Without --x and --y: angles, and drift with its fitted exponents. Runs that failed are crosses.)";
+
 }  // namespace
 
 int main(int argc, char** argv) {
@@ -70,20 +87,41 @@ int main(int argc, char** argv) {
   TableCommand table;
   CLI::App* table_app = app.add_subcommand("table", "Print a table of stored records");
   table_app->add_option("store", table.store, "Folder of a run, or a .jsonl file")->required();
-  table_app->add_option("--kind", table.kind, "What the rows are")
-      ->check(CLI::IsMember({"drift", "timing", "factorial"}))
-      ->capture_default_str();
+  table_app
+      ->add_option("--kind", table.view.kind,
+                   "What the rows are (default: drift, or what the store has)")
+      ->check(CLI::IsMember({"drift", "timing", "factorial", "all"}));
   table_app->add_option("--format", table.format, "How they are written")
-      ->check(CLI::IsMember({"text", "csv", "markdown"}))
+      ->check(CLI::IsMember({"text", "csv", "markdown", "json", "latex"}))
       ->capture_default_str();
   table_app->add_option("--where", conditions, "Only records with key=value[,value]");
+  table_app->add_option("--columns", table.view.columns, "Keys of records, in this order: a,b,c")
+      ->delimiter(',');
+  table_app->add_option("--group", table.view.group, "One table per value of this key");
+  table_app->add_option("--sort", table.view.sort, "Order by this key first");
+  table_app->add_flag("--descending", table.view.descending, "Largest first")->needs("--sort");
   table_app->add_option("--out", table.out, "File (default: the terminal)");
+  table_app->footer(kTableFooter);
 
   PlotCommand plot;
-  CLI::App* plot_app = app.add_subcommand("plot", "Draw the figures of stored records (SVG)");
+  CLI::App* plot_app = app.add_subcommand(
+      "plot", "Draw the standard figures of stored records, or one value against another");
   plot_app->add_option("store", plot.store, "Folder of a run, or a .jsonl file")->required();
-  plot_app->add_option("--out", plot.out, "Folder for the figures")->required();
+  plot_app
+      ->add_option("--out", plot.out, "Folder for the figures; with --x and --y also a file's name")
+      ->required();
+  plot_app->add_option("--format", plot.format, "svg (default) or pdf")
+      ->check(CLI::IsMember({"svg", "pdf"}));
   plot_app->add_option("--where", conditions, "Only records with key=value[,value]");
+  plot_app->add_option("--x", plot.free.x, "Key of the horizontal axis");
+  plot_app->add_option("--y", plot.free.y, "Key of the vertical axis");
+  plot_app->add_option("--group", plot.free.group, "One curve per value of these keys: a,b");
+  plot_app
+      ->add_option("--log", plot.free.log,
+                   "Logarithmic axes (default: those that span two decades)")
+      ->check(CLI::IsMember({"x", "y", "xy", "none"}));
+  plot_app->add_option("--title", plot.free.title, "Title (default: what the records share)");
+  plot_app->footer(kPlotFooter);
 
   VerdictCommand verdict;
   CLI::App* verdict_app = app.add_subcommand("verdict", "Hold claims against stored records");
@@ -98,7 +136,7 @@ int main(int argc, char** argv) {
   }
   try {
     const std::string typed = CommandLine(argc, argv);
-    run.suite.filter = table.where = plot.where = ParseSelection(conditions);
+    run.suite.filter = table.view.where = plot.where = ParseSelection(conditions);
     run.suite.timing = !no_timing;
     run.suite.accuracy = !timing_only;
     if (*run_app) return Run(run, typed);

@@ -48,6 +48,23 @@ bool ComesBefore(const Record& a, const Record& b) {
   return Compare(-a.Number("rtol"), -b.Number("rtol")) < 0;
 }
 
+// A value as SortRowsBy() orders it: 0 numbers, 1 texts, 2 what is missing.
+struct SortKey {
+  int rank;
+  double number;
+  std::string text;
+};
+
+SortKey SortKeyOf(const Record& record, const std::string& key) {
+  const double number = record.Number(key);
+  if (!std::isnan(number)) return {0, number, ""};
+  const Value* value = record.Find(key);
+  if (value != nullptr && std::holds_alternative<std::string>(*value)) {
+    return {1, 0.0, record.Text(key)};
+  }
+  return {2, 0.0, ""};
+}
+
 }  // namespace
 
 Condition ParseCondition(std::string_view text) {
@@ -87,5 +104,15 @@ std::string ToText(const Selection& selection) {
 }
 
 void SortRows(std::vector<Record>* records) { std::ranges::stable_sort(*records, ComesBefore); }
+
+void SortRowsBy(std::vector<Record>* records, const std::string& key, bool descending) {
+  std::ranges::stable_sort(*records, [&](const Record& a, const Record& b) {
+    const SortKey one = SortKeyOf(a, key), other = SortKeyOf(b, key);
+    if (one.rank != other.rank) return one.rank < other.rank;
+    const int order =
+        one.rank == 0 ? Compare(one.number, other.number) : one.text.compare(other.text);
+    return descending ? order > 0 : order < 0;
+  });
+}
 
 }  // namespace loopbench::harness

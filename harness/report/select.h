@@ -39,4 +39,8 @@ std::string ToText(const Selection& selection);
 /// number comes last.
 void SortRows(std::vector<Record>* records);
 
+/// Stable order by one key: numbers by size, anything else by its text, texts after numbers.
+/// Records without the key, or with NaN, come last in both directions.
+void SortRowsBy(std::vector<Record>* records, const std::string& key, bool descending);
+
 }  // namespace loopbench::harness

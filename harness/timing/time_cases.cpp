@@ -2,12 +2,12 @@
 
 #include <algorithm>
 #include <chrono>
-#include <limits>
 #include <memory>
 #include <optional>
 
 #include "harness/integrator/arkode.h"
 #include "harness/run_case.h"
+#include "harness/timing/noise.h"
 #include "mechanism/assembly.h"
 #include "mechanism/library.h"
 #include "odca/odca.h"
@@ -26,14 +26,6 @@ double SecondsSince(Clock::time_point begin) {
   return std::chrono::duration<double>(Clock::now() - begin).count();
 }
 
-/// Value at a fraction of the sorted sample (nearest rank).
-double Quantile(std::vector<double> sample, double fraction) {
-  if (sample.empty()) return std::numeric_limits<double>::quiet_NaN();
-  std::ranges::sort(sample);
-  const double rank = fraction * static_cast<double>(sample.size() - 1);
-  return sample[static_cast<std::size_t>(rank + 0.5)];
-}
-
 /// One column of one mechanism, ready to be timed.
 class Subject {
  public:
@@ -45,6 +37,8 @@ class Subject {
   /// One whole simulation.
   virtual void TimeSimulation() = 0;
   virtual Record Finish(const Record& keys) const = 0;
+  virtual const std::vector<double>& rhs_ns() const = 0;  ///< one value per batch
+  virtual const std::vector<double>& wall_s() const = 0;  ///< one value per simulation
 };
 
 template <class Space>
@@ -112,12 +106,16 @@ class SubjectIn final : public Subject {
     }
     const double rhs = Quantile(rhs_ns_, 0.5), wall = Quantile(wall_s_, 0.5);
     record.Set("rhs_ns_median", rhs);
+    record.Set("rhs_ns_min", Quantile(rhs_ns_, 0.0));
     record.Set("rhs_ns_p10", Quantile(rhs_ns_, 0.1));
     record.Set("rhs_ns_p90", Quantile(rhs_ns_, 0.9));
     record.Set("ns_per_body", rhs / bodies);
     if (!wall_s_.empty()) {
       record.Set("step_us_median", wall * 1e6 / static_cast<double>(result_.steps));
       record.Set("wall_s_median", wall);
+      record.Set("wall_s_min", Quantile(wall_s_, 0.0));
+      record.Set("wall_s_p10", Quantile(wall_s_, 0.1));
+      record.Set("wall_s_p90", Quantile(wall_s_, 0.9));
       record.Set("realtime_factor", case_.horizon / wall);
       record.Set("steps", result_.steps);
     }
@@ -129,6 +127,9 @@ class SubjectIn final : public Subject {
     }
     return record;
   }
+
+  const std::vector<double>& rhs_ns() const override { return rhs_ns_; }
+  const std::vector<double>& wall_s() const override { return wall_s_; }
 
  private:
   void Reset() {
@@ -184,19 +185,37 @@ std::unique_ptr<Subject> MakeSubject(const MechanismDescription& description, co
   return std::make_unique<SubjectIn<Spatial>>(description, one, simulate);
 }
 
-/// Times cases of one mechanism against each other.
+/// What the A/A pair and the machine say about all times of one mechanism.
+Record NoiseKeys(const MachineState& machine, const Subject& first, const Subject& again) {
+  const double rhs = AaSpread(first.rhs_ns(), again.rhs_ns());
+  const double wall = AaSpread(first.wall_s(), again.wall_s());
+  Record keys;
+  keys.Set("aa_spread", rhs);
+  keys.Set("aa_spread_wall", wall);
+  keys.Set("load1", machine.load1);
+  keys.Set("processors", std::int64_t{machine.processors});
+  keys.Set("governor", machine.governor);
+  keys.Set("noise", NoiseReasons(machine, rhs, wall));
+  return keys;
+}
+
+/// Times cases of one mechanism against each other, and the first of them once more.
 void TimeTogether(const Experiment& experiment, const MechanismDescription& description,
                   const std::vector<Case>& cases, bool simulate,
                   const std::function<void(const Record&)>& done, std::vector<Record>& records) {
   std::vector<std::unique_ptr<Subject>> subjects;
   for (const Case& one : cases) subjects.push_back(MakeSubject(description, one, simulate));
+  // the A/A pair stands first and last, as far apart as two columns can be
+  subjects.push_back(MakeSubject(description, cases.front(), simulate));
   for (auto& subject : subjects) subject->Prepare();
+  const MachineState machine = ReadMachineState();
   for (int batch = 0; batch < kBatches; ++batch) {
     for (auto& subject : subjects) subject->TimeDerivative();
   }
   for (int repeat = 0; repeat < experiment.timing.repeats; ++repeat) {
     for (auto& subject : subjects) subject->TimeSimulation();
   }
+  const Record noise = NoiseKeys(machine, *subjects.front(), *subjects.back());
   for (std::size_t i = 0; i < cases.size(); ++i) {
     Record keys = CaseKeys(experiment, cases[i]);
     keys.Set("kind", std::string("timing"));
@@ -205,6 +224,7 @@ void TimeTogether(const Experiment& experiment, const MechanismDescription& desc
       for (const char* key : {"integrator", "rtol", "atol", "horizon"}) keys.Set(key, Value());
     }
     records.push_back(subjects[i]->Finish(keys));
+    for (const auto& [key, value] : noise.items()) records.back().Set(key, value);
     done(records.back());
   }
 }

@@ -219,6 +219,40 @@ TEST_F(CommandLineTest, ResultsOfARunServeTablePlotAndVerdict) {
   }
 }
 
+TEST_F(CommandLineTest, TablesInEveryFormatNameTheCommandAndTheCommit) {
+  ExpectEnding(Call("run tiny.json --out out"), 0, {"command: loopbench run", "commit: "});
+  for (const std::string format : {"text", "csv", "markdown", "json", "latex"}) {
+    const std::string call = "table out --group formulation --sort steps --format " + format;
+    const Ending ending = Call(call);
+    ExpectEnding(ending, 0, {"loopbench " + call, "commit", "machine", "compiler", "libraries"});
+    EXPECT_EQ(ending.text.find("\033["), std::string::npos) << "colour in a pipe";
+  }
+  ExpectEnding(Call("table out --columns formulation,stepz"), 2,
+               {"--columns: found \"stepz\"", "did you mean \"steps\"", "energy_error_max"});
+  ExpectEnding(Call("table out --descending"), 2, {"--sort"});
+  ExpectEnding(Call("table --help"), 0, {"Examples:", "loopbench table out"});
+  // the same records and command give the same bytes: no date
+  EXPECT_EQ(Call("table out --format csv").text, Call("table out --format csv").text);
+  EXPECT_EQ(ReadFile(folder_ / "out/drift.csv").find("# date"), std::string::npos);
+}
+
+TEST_F(CommandLineTest, FreeFiguresAreDrawnAndMistakesRefused) {
+  ExpectEnding(Call("run tiny.json --out out"), 0, {});
+  ExpectEnding(Call("plot out --out w.svg --x formulation --y steps"), 0, {"wrote w.svg"});
+  EXPECT_NE(ReadFile(folder_ / "w.svg").find("steps over formulation"), std::string::npos);
+  ExpectEnding(Call("plot out --out figures --x steps --y energy_error_max --format pdf"), 0,
+               {"wrote figures/energy_error_max-over-steps.pdf"});
+  ExpectEnding(Call("plot out --out figures --format pdf"), 0, {"figures to figures"});
+  EXPECT_TRUE(fs::exists(folder_ / "figures/drift-four-bar-0.5s-rtol-1e-06.pdf"));
+  ExpectEnding(Call("plot out --out w.svg --x steps"), 2, {"--x KEY and --y KEY"});
+  ExpectEnding(Call("plot out --out w.svg --x step --y steps"), 2,
+               {"--x: found \"step\"", "did you mean \"steps\""});
+  ExpectEnding(Call("plot out --out w.svg --x steps --y steps --format pdf"), 2,
+               {"--out w.svg: found the ending \".svg\", expected \".pdf\""});
+  ExpectEnding(Call("plot out --out f --where kind=timing"), 2, {"--x KEY --y KEY"});
+  ExpectEnding(Call("plot --help"), 0, {"Examples:", "--x rhs_evaluations"});
+}
+
 TEST_F(CommandLineTest, DefaultFolderIsNamedAfterTheExperiment) {
   ExpectEnding(Call("run tiny.json"), 0, {"results in results/runs/tiny"});
   EXPECT_TRUE(fs::exists(folder_ / "results/runs/tiny/drift.csv"));

@@ -123,6 +123,11 @@ int Plot(const PlotCommand& command) {
   std::vector<Record> records = LoadRecords(command.store);
   for (const Condition& condition : command.where) RequireKey("--where", condition.key, records);
   records = Filter(records, command.where);
+  if (records.empty()) {
+    fmt::print(stderr, "{}: no records match{}{}\n", command.store.string(),
+               command.where.empty() ? "" : " ", ToText(command.where));
+    return 2;
+  }
   const FreeFigure& free = command.free;
   if (!(free.x + free.y + free.group + free.log + free.title).empty()) {
     return DrawFree(records, command);

@@ -143,12 +143,17 @@ Figure AnglesFigure(const Record& record) {
 }
 
 Figure DriftFigure(std::span<const Record> records) {
+  const bool has_unresolved = std::ranges::any_of(records, [](const Record& record) {
+    return std::isfinite(record.Number("growth_exponent")) &&
+           record.Text("growth_resolved") != "true";
+  });
   return {.title = TitleOf(records, "drift"),
           .x_label = "time [s]",
           .y_label = "position drift, running maximum [m]",
           .log_x = true,
           .log_y = true,
-          .curves = DriftCurves(records, true)};
+          .curves = DriftCurves(records, true),
+          .legend_title = has_unresolved ? "?: exponent not resolved" : ""};
 }
 
 Figure SingularFigure(std::span<const Record> records) {

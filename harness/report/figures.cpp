@@ -252,7 +252,7 @@ std::string GnuplotScript(const Figure& figure) {
       "set grid lc rgb '#cccccc' lw 0.5\n"
       "set key bmargin center vertical maxrows {} Left reverse samplen 4 title {}\n",
       Quote(figure.title), Quote(figure.x_label), Quote(figure.y_label), LegendRows(figure),
-      Quote(figure.legend_title.empty() ? " " : figure.legend_title));
+      figure.legend_title.empty() ? Quote(" ") : "\"\\n\"." + Quote(figure.legend_title));
   if (figure.log_x) script += "set logscale x\n";
   if (figure.log_y) {
     // powers of ten are read most easily as such, unless all are near one
@@ -279,7 +279,8 @@ namespace {
 
 // Both 960 wide and 500 high without the legend, in pixels or hundredths of an inch.
 std::string Terminal(const Figure& figure, bool pdf) {
-  const std::size_t height = 500 + 20 * LegendRows(figure);
+  const std::size_t height =
+      500 + 20 * (LegendRows(figure) + (figure.legend_title.empty() ? 0 : 1));
   if (!pdf) {
     return fmt::format("svg noenhanced size 960,{} font 'sans-serif,13' background '#ffffff'",
                        height);

@@ -249,7 +249,9 @@ TEST_F(CommandLineTest, FreeFiguresAreDrawnAndMistakesRefused) {
                {"--x: found \"step\"", "did you mean \"steps\""});
   ExpectEnding(Call("plot out --out w.svg --x steps --y steps --format pdf"), 2,
                {"--out w.svg: found the ending \".svg\", expected \".pdf\""});
-  ExpectEnding(Call("plot out --out f --where kind=timing"), 2, {"--x KEY --y KEY"});
+  ExpectEnding(Call("plot out --out f --where kind=timing"), 2, {"no records match kind=timing"});
+  Write("bare.jsonl", "{\"kind\":\"timing\",\"bodies\":3}\n");
+  ExpectEnding(Call("plot bare.jsonl --out f"), 2, {"no accuracy records", "--x KEY --y KEY"});
   ExpectEnding(Call("plot --help"), 0, {"Examples:", "--x rhs_evaluations"});
 }
 

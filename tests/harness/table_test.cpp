@@ -273,5 +273,17 @@ TEST(Select, RowsAreSortedByMechanismHorizonFormulationAndFallingTolerance) {
   }
 }
 
+TEST(Select, NumbersWithinNamesAreOrderedByTheirSize) {
+  std::vector<Record> rows;
+  for (const char* name :
+       {"chain-10", "ladder-1", "chain-3", "chain", "chain-100", "chain-3b", "chain-03"}) {
+    rows.push_back(Row(name, "odca", 1e-6));
+  }
+  std::string order;
+  SortRows(&rows);
+  for (const Record& row : rows) order += row.Text("mechanism") + " ";
+  EXPECT_EQ(order, "chain chain-3 chain-3b chain-03 chain-10 chain-100 ladder-1 ");
+}
+
 }  // namespace
 }  // namespace loopbench::harness

@@ -8,9 +8,11 @@
 #include <ctime>
 #include <filesystem>
 #include <fstream>
+#include <iterator>
 #include <thread>
 
 #include "harness/build_info.h"
+#include "harness/hash.h"
 
 namespace loopbench::harness {
 
@@ -40,6 +42,15 @@ std::vector<std::string> Provenance(const std::string& command) {
       fmt::format("libraries: Eigen {}.{}.{}, SUNDIALS {}, fmt {}", EIGEN_WORLD_VERSION,
                   EIGEN_MAJOR_VERSION, EIGEN_MINOR_VERSION, kBuildSundials, FMT_VERSION),
   };
+}
+
+const std::string& CodeVersion() {
+  static const std::string version = [] {
+    std::ifstream file("/proc/self/exe", std::ios::binary);
+    const std::string bytes{std::istreambuf_iterator<char>(file), {}};
+    return Fnv1a(bytes);
+  }();
+  return version;
 }
 
 std::string CommandLine(int argc, const char* const* argv) {

@@ -3,8 +3,8 @@
 #include <fmt/format.h>
 
 #include <algorithm>
-#include <cstring>
 
+#include "harness/hash.h"
 #include "harness/integrator/arkode.h"
 #include "harness/observers/observer.h"
 #include "harness/store/record_json.h"
@@ -37,15 +37,9 @@ template std::unique_ptr<Formulation<Spatial, double>> MakeFormulation(
 
 namespace {
 
-/// FNV-1a (64 bit) over the bytes of the last state: equal hashes mean equal runs.
+/// Of the last state: equal hashes mean equal runs.
 std::string StateHash(std::span<const double> y) {
-  std::uint64_t hash = 0xcbf29ce484222325u;
-  for (const double value : y) {
-    unsigned char bytes[sizeof value];
-    std::memcpy(bytes, &value, sizeof value);
-    for (const unsigned char byte : bytes) hash = (hash ^ byte) * 0x100000001b3u;
-  }
-  return fmt::format("{:016x}", hash);
+  return Fnv1a({reinterpret_cast<const char*>(y.data()), y.size_bytes()});
 }
 
 /// What one run leaves behind.
@@ -193,6 +187,19 @@ Record CaseKeys(const Experiment& experiment, const Case& one) {
   keys.Set("atol", one.atol);
   keys.Set("horizon", one.horizon);
   return keys;
+}
+
+std::string CaseContent(const Experiment& experiment, const Case& one) {
+  Record content = CaseKeys(experiment, one);
+  content.Set("ensemble", std::int64_t{one.ensemble});
+  content.Set("seed", static_cast<std::int64_t>(one.seed));
+  content.Set("perturb", one.perturb);
+  content.Set("wall_s", one.limits.wall_s);
+  content.Set("steps", one.limits.steps);
+  content.Set("memory_mb", one.limits.memory_mb);
+  content.Set("series_points", std::int64_t{experiment.series_points});
+  content.Set("document", experiment.scenes[one.scene].mechanism.canonical);
+  return CaseId(content);
 }
 
 Record RunCase(const Experiment& experiment, const Case& one) {

@@ -7,6 +7,7 @@
 
 #include "harness/integrator/arkode.h"
 #include "harness/run_case.h"
+#include "harness/store/record_json.h"
 #include "harness/timing/noise.h"
 #include "mechanism/assembly.h"
 #include "mechanism/library.h"
@@ -199,36 +200,6 @@ Record NoiseKeys(const MachineState& machine, const Subject& first, const Subjec
   return keys;
 }
 
-/// Times cases of one mechanism against each other, and the first of them once more.
-void TimeTogether(const Experiment& experiment, const MechanismDescription& description,
-                  const std::vector<Case>& cases, bool simulate,
-                  const std::function<void(const Record&)>& done, std::vector<Record>& records) {
-  std::vector<std::unique_ptr<Subject>> subjects;
-  for (const Case& one : cases) subjects.push_back(MakeSubject(description, one, simulate));
-  // the A/A pair stands first and last, as far apart as two columns can be
-  subjects.push_back(MakeSubject(description, cases.front(), simulate));
-  for (auto& subject : subjects) subject->Prepare();
-  const MachineState machine = ReadMachineState();
-  for (int batch = 0; batch < kBatches; ++batch) {
-    for (auto& subject : subjects) subject->TimeDerivative();
-  }
-  for (int repeat = 0; repeat < experiment.timing.repeats; ++repeat) {
-    for (auto& subject : subjects) subject->TimeSimulation();
-  }
-  const Record noise = NoiseKeys(machine, *subjects.front(), *subjects.back());
-  for (std::size_t i = 0; i < cases.size(); ++i) {
-    Record keys = CaseKeys(experiment, cases[i]);
-    keys.Set("kind", std::string("timing"));
-    if (!simulate) {
-      // a right-hand side has no tolerance and no horizon
-      for (const char* key : {"integrator", "rtol", "atol", "horizon"}) keys.Set(key, Value());
-    }
-    records.push_back(subjects[i]->Finish(keys));
-    for (const auto& [key, value] : noise.items()) records.back().Set(key, value);
-    done(records.back());
-  }
-}
-
 MechanismDescription MakeFamilyMember(const TimingFamily& family, int size) {
   if (family.family == "ladder") return Ladder(size, 1.0, 1.0);
   MechanismDescription chain = Chain(size);
@@ -238,6 +209,66 @@ MechanismDescription MakeFamilyMember(const TimingFamily& family, int size) {
 
 }  // namespace
 
+std::vector<TimingGroup> TimingGroups(const Experiment& experiment) {
+  std::vector<TimingGroup> groups;
+  const std::vector<Case> all = ExpandTiming(experiment);
+  for (std::size_t scene = 0; scene < experiment.scenes.size(); ++scene) {
+    TimingGroup group{experiment.scenes[scene].mechanism.description, {}, true};
+    std::ranges::copy_if(all, std::back_inserter(group.cases),
+                         [&](const Case& one) { return one.scene == scene; });
+    if (!group.cases.empty()) groups.push_back(std::move(group));
+  }
+  if (experiment.timing.repeats == 0) return groups;
+  for (const TimingFamily& family : experiment.timing.families) {
+    for (const int size : family.sizes) {
+      TimingGroup group{MakeFamilyMember(family, size), {}, false};
+      for (const Column& column : family.columns) {
+        Case one;
+        one.mechanism = group.description.name;
+        one.column = column;
+        group.cases.push_back(one);
+      }
+      groups.push_back(std::move(group));
+    }
+  }
+  return groups;
+}
+
+Record TimingKeys(const Experiment& experiment, const TimingGroup& group, std::size_t index) {
+  Record keys = CaseKeys(experiment, group.cases[index]);
+  keys.Set("kind", std::string("timing"));
+  if (!group.simulate) {
+    // a right-hand side has no tolerance and no horizon
+    for (const char* key : {"integrator", "rtol", "atol", "horizon"}) keys.Set(key, Value());
+  }
+  keys.Set("case_id", CaseId(keys));
+  return keys;
+}
+
+std::vector<Record> TimeTogether(const Experiment& experiment, const TimingGroup& group) {
+  std::vector<std::unique_ptr<Subject>> subjects;
+  for (const Case& one : group.cases) {
+    subjects.push_back(MakeSubject(group.description, one, group.simulate));
+  }
+  // the A/A pair stands first and last, as far apart as two columns can be
+  subjects.push_back(MakeSubject(group.description, group.cases.front(), group.simulate));
+  for (auto& subject : subjects) subject->Prepare();
+  const MachineState machine = ReadMachineState();
+  for (int batch = 0; batch < kBatches; ++batch) {
+    for (auto& subject : subjects) subject->TimeDerivative();
+  }
+  for (int repeat = 0; repeat < experiment.timing.repeats; ++repeat) {
+    for (auto& subject : subjects) subject->TimeSimulation();
+  }
+  const Record noise = NoiseKeys(machine, *subjects.front(), *subjects.back());
+  std::vector<Record> records;
+  for (std::size_t i = 0; i < group.cases.size(); ++i) {
+    records.push_back(subjects[i]->Finish(TimingKeys(experiment, group, i)));
+    for (const auto& [key, value] : noise.items()) records.back().Set(key, value);
+  }
+  return records;
+}
+
 std::size_t CountTimings(const Experiment& experiment) {
   std::size_t count = ExpandTiming(experiment).size();
   if (experiment.timing.repeats == 0) return count;
@@ -245,35 +276,6 @@ std::size_t CountTimings(const Experiment& experiment) {
     count += family.sizes.size() * family.columns.size();
   }
   return count;
-}
-
-std::vector<Record> TimeExperiment(const Experiment& experiment,
-                                   const std::function<void(const Record&)>& done) {
-  std::vector<Record> records;
-  const std::vector<Case> all = ExpandTiming(experiment);
-  for (std::size_t scene = 0; scene < experiment.scenes.size(); ++scene) {
-    std::vector<Case> cases;
-    std::ranges::copy_if(all, std::back_inserter(cases),
-                         [&](const Case& one) { return one.scene == scene; });
-    if (cases.empty()) continue;
-    TimeTogether(experiment, experiment.scenes[scene].mechanism.description, cases, true, done,
-                 records);
-  }
-  if (experiment.timing.repeats == 0) return records;
-  for (const TimingFamily& family : experiment.timing.families) {
-    for (const int size : family.sizes) {
-      const MechanismDescription description = MakeFamilyMember(family, size);
-      std::vector<Case> cases;
-      for (const Column& column : family.columns) {
-        Case one;
-        one.mechanism = description.name;
-        one.column = column;
-        cases.push_back(one);
-      }
-      TimeTogether(experiment, description, cases, false, done, records);
-    }
-  }
-  return records;
 }
 
 }  // namespace loopbench::harness

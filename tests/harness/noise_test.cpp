@@ -80,17 +80,17 @@ TEST(Noise, TheMachineHasProcessorsAndALoad) {
 
 // No time is asserted, only what must hold on the slowest machine: order statistics are in order,
 // the A/A pair was measured, and its second half is no row of its own.
-TEST(TimeExperiment, RecordsHoldOrderedStatisticsAndTheAaPair) {
+TEST(TimeTogether, RecordsHoldOrderedStatisticsAndTheAaPair) {
   Experiment experiment =
       ReadExperiment(std::string(LOOPBENCH_SOURCE_DIR) + "/configs/experiments/paper/paper.json");
   experiment.scenes.resize(1);
   experiment.timing.horizon = 0.1;
   experiment.timing.repeats = 3;
   experiment.timing.families.clear();
-  std::size_t done = 0;
-  const std::vector<Record> records = TimeExperiment(experiment, [&](const Record&) { ++done; });
+  const std::vector<TimingGroup> groups = TimingGroups(experiment);
+  ASSERT_EQ(groups.size(), 1u);
+  const std::vector<Record> records = TimeTogether(experiment, groups[0]);
   EXPECT_EQ(records.size(), CountTimings(experiment));
-  EXPECT_EQ(done, records.size());
   for (const Record& record : records) {
     ASSERT_EQ(record.Text("outcome"), "finished") << record.Text("message");
     for (const std::string of : {"rhs_ns", "wall_s"}) {

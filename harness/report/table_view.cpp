@@ -7,6 +7,7 @@
 
 #include "harness/report/columns.h"
 #include "harness/report/factorial.h"
+#include "harness/timing/noise.h"
 
 namespace loopbench::harness {
 namespace {
@@ -133,13 +134,20 @@ std::vector<std::string> NoiseWarnings(std::span<const Record> rows) {
   }
   if (noisy == 0) return {};
   std::string line = fmt::format(
-      "warning: noisy machine in {} of {} timings (column noise says why): the same column timed "
-      "twice differed by up to {:.1f} % ({}), load up to {:.1f} on {} processors",
-      noisy, timed, 100 * spread, where_spread, load, processors);
+      "warning: noisy machine in {} of {} timings (column noise says why): load up to {:.1f} on {} "
+      "processors",
+      noisy, timed, load, processors);
+  if (spread > 0) {
+    line += fmt::format(", the same column timed twice differed by up to {:.1f} % ({})",
+                        100 * spread, where_spread);
+  }
   if (!governor.empty()) line += ", CPU governor " + governor;
+  // what a quiet machine may show at most is not to be trusted on a noisy one
+  const double least = std::fmax(spread, NoiseThresholds{}.aa_spread);
   return {line,
-          "warning: smaller differences between columns than that mean nothing; repeat on a quiet "
-          "machine"};
+          fmt::format("warning: differences between columns below {:.0f} % mean nothing here; "
+                      "repeat on a quiet machine",
+                      std::ceil(100 * least))};
 }
 
 }  // namespace loopbench::harness

@@ -240,6 +240,8 @@ FreeFigureResult MakeFreeFigure(std::span<const Record> records, const FreeFigur
   const Positions x(rows, wanted.x);
   figure.x_ticks = x.categories();
   const bool is_series = IsSeries(rows[0], wanted.x);
+  std::vector<std::string> telling(kCaseKeys.begin(), kCaseKeys.end());
+  for (const TableColumn& parameter : WithParameters({}, rows)) telling.push_back(parameter.key);
   std::set<std::string> mixed;
   for (std::size_t g = 0; g < groups.size(); ++g) {
     const auto& [label, members] = groups[g];
@@ -247,7 +249,7 @@ FreeFigureResult MakeFreeFigure(std::span<const Record> records, const FreeFigur
       figure.curves.push_back(SeriesCurve(members[i], wanted, i == 0 ? label : "", g));
     }
     if (!is_series) figure.curves.push_back(ValueCurve(members, wanted, x, label, g));
-    for (const std::string key : kCaseKeys) {
+    for (const std::string& key : telling) {
       if (key != wanted.x && key != wanted.y && Varies(members, key)) mixed.insert(key);
     }
   }

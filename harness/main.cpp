@@ -5,6 +5,7 @@
 
 #include "harness/commands.h"
 #include "harness/config/config_error.h"
+#include "harness/main_compare.h"
 #include "harness/provenance.h"
 
 namespace {
@@ -91,6 +92,8 @@ int main(int argc, char** argv) {
   verdict_app->add_option("--claims", verdict.claims, "Rules (JSON)")->required();
   verdict_app->add_option("--out", verdict.out, "Markdown file with all numbers");
 
+  ComparisonOptions comparison(app);
+
   try {
     app.parse(argc, argv);
   } catch (const CLI::ParseError& error) {
@@ -101,6 +104,7 @@ int main(int argc, char** argv) {
     run.suite.filter = table.where = plot.where = ParseSelection(conditions);
     run.suite.timing = !no_timing;
     run.suite.accuracy = !timing_only;
+    if (const auto code = comparison.Run(typed)) return *code;
     if (*run_app) return Run(run, typed);
     if (*list_app) return List(files, ParseSelection(conditions));
     if (*check_app) return CheckFiles(files);

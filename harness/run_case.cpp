@@ -7,6 +7,7 @@
 
 #include "harness/integrator/arkode.h"
 #include "harness/observers/observer.h"
+#include "harness/origin.h"
 #include "harness/store/record_json.h"
 #include "lagrange/lagrange.h"
 #include "mechanism/assembly.h"
@@ -219,6 +220,7 @@ Record RunCase(const Experiment& experiment, const Case& one) {
   const DriftSeries envelope = Envelope(nominal.drift, experiment.series_points);
   record.Set("series.drift_t", envelope.t);
   record.Set("series.drift", envelope.value);
+  Stamp(record);
   return record;
 }
 

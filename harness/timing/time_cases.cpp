@@ -7,6 +7,7 @@
 #include <optional>
 
 #include "harness/integrator/arkode.h"
+#include "harness/origin.h"
 #include "harness/run_case.h"
 #include "mechanism/assembly.h"
 #include "mechanism/library.h"
@@ -115,6 +116,8 @@ class SubjectIn final : public Subject {
     record.Set("rhs_ns_p10", Quantile(rhs_ns_, 0.1));
     record.Set("rhs_ns_p90", Quantile(rhs_ns_, 0.9));
     record.Set("ns_per_body", rhs / bodies);
+    record.Set("series.rhs_ns", rhs_ns_);  // raw, for tests of significance (harness/compare)
+    record.Set("series.wall_s", wall_s_);
     if (!wall_s_.empty()) {
       record.Set("step_us_median", wall * 1e6 / static_cast<double>(result_.steps));
       record.Set("wall_s_median", wall);
@@ -127,6 +130,7 @@ class SubjectIn final : public Subject {
       record.Set("plan_largest_join", std::int64_t{odca->plan().largest_join()});
       record.Set("rhs_operations", std::int64_t{odca->sweep().operations()});
     }
+    Stamp(record);
     return record;
   }
 

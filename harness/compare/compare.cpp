@@ -26,6 +26,7 @@ struct Pair {
 bool Has(const Record& record, const std::string& key) {
   const Value* value = record.Find(key);
   if (value == nullptr || std::holds_alternative<std::monostate>(*value)) return false;
+  if (const auto* number = std::get_if<double>(value)) return !std::isnan(*number);
   const auto* series = std::get_if<std::vector<double>>(value);
   return series == nullptr || !series->empty();
 }

@@ -2,6 +2,8 @@
 
 #include <fmt/format.h>
 
+#include <map>
+
 #include "harness/config/claims_reader.h"
 #include "harness/config/config_error.h"
 #include "harness/config/experiment_reader.h"
@@ -13,6 +15,7 @@
 #include "harness/report/figure_recipes.h"
 #include "harness/run_case.h"
 #include "harness/store/files.h"
+#include "harness/store/result_store.h"
 #include "harness/timing/time_cases.h"
 
 namespace loopbench::harness {
@@ -67,7 +70,7 @@ void Emit(const std::string& text, const std::filesystem::path& out) {
 
 std::vector<Record> Load(const std::filesystem::path& store) {
   std::vector<std::string> warnings;
-  std::vector<Record> records = ReadRecords(store, &warnings);
+  const std::vector<Record> records = LatestRecords(ReadRecords(store, &warnings));
   for (const std::string& warning : warnings) fmt::print(stderr, "warning: {}\n", warning);
   return records;
 }
@@ -84,19 +87,19 @@ int Run(const RunCommand& command, const std::string& typed) {
   const std::filesystem::path out =
       command.out.empty() ? std::filesystem::path("results/runs") / experiments.front().name
                           : command.out;
-  // results appear under their name when they are complete; an interrupted run leaves the old ones
-  const std::filesystem::path partial = out / "results.partial.jsonl";
-  std::filesystem::remove(partial);
   {
-    ResultStore store(partial);
+    ResultStore store(out);
+    const std::vector<Record> before = ReadRecords(out);
     for (const Experiment& experiment : experiments) {
       fmt::print(stderr, "{}: {} accuracy cases, {} timings\n", experiment.name,
                  command.suite.accuracy ? SelectCases(experiment, command.suite.filter).size() : 0,
                  command.suite.timing ? CountTimings(experiment) : 0);
-      RunSuite(experiment, command.suite, store);
+      const SuiteCount count = RunSuite(experiment, command.suite, before, store);
+      fmt::print(stderr, "{}: {} run now{}, {} were done before\n", experiment.name, count.run,
+                 count.failed > 0 ? fmt::format(" ({} not finished)", count.failed) : "",
+                 count.skipped);
     }
   }
-  std::filesystem::rename(partial, out / "results.jsonl");
   const std::vector<Record> records = Load(out);
   for (const std::string kind : {"drift", "timing"}) {
     Table full = MakeTable(records, kind, false, {});
@@ -107,6 +110,50 @@ int Run(const RunCommand& command, const std::string& typed) {
     fmt::print("{}\n", ToText(MakeTable(records, kind, true, {})));
   }
   fmt::print("results in {}\n", out.string());
+  return 0;
+}
+
+int Merge(const MergeCommand& command) {
+  // by id, in the order of the files: of equal cases the last that finished stays
+  std::vector<Record> merged;
+  std::map<std::string, std::size_t> place;
+  std::size_t read = 0;
+  const auto finished = [](const Record& record) {
+    return record.Text("outcome") == ToString(Outcome::kFinished);
+  };
+  for (const auto& store : command.stores) {
+    for (const Record& record : ReadRecords(store)) {
+      ++read;
+      const std::string id = record.Text("id");
+      const auto [at, is_new] = place.try_emplace(id, merged.size());
+      if (id.empty() || is_new) {
+        merged.push_back(record);
+        continue;
+      }
+      Record& other = merged[at->second];
+      if (finished(record) && finished(other) &&
+          record.Text("state_hash") != other.Text("state_hash")) {
+        throw std::runtime_error(fmt::format(
+            "{}: case {} ({} {}) ended in state {} here and in {} before; one of the stores is not "
+            "what it says",
+            store.string(), id, record.Text("mechanism"), record.Text("formulation"),
+            record.Text("state_hash"), other.Text("state_hash")));
+      }
+      if (finished(record) || !finished(other)) other = record;
+    }
+  }
+  std::string text;
+  for (const Record& record : merged) text += ToJsonLine(record) + '\n';
+  ResultStore target(command.out);  // nobody else writes there now
+  if (!ReadRecords(command.out).empty()) {
+    throw std::runtime_error(
+        fmt::format("{}: found records, expected a new store; name it among the "
+                    "stores to merge and write to another",
+                    command.out.string()));
+  }
+  WriteFileAtomically(target.file(), text);
+  fmt::print("{} records of {} stores are {} cases in {}\n", read, command.stores.size(),
+             merged.size(), target.file().string());
   return 0;
 }
 

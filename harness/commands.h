@@ -17,7 +17,15 @@ struct RunCommand {
   std::filesystem::path out;  ///< folder; default results/runs/<name of the first experiment>
   SuiteOptions suite;
 };
+/// Runs what the store does not have yet, then writes its tables.
 int Run(const RunCommand& command, const std::string& typed);
+
+struct MergeCommand {
+  std::vector<std::filesystem::path> stores;
+  std::filesystem::path out;  ///< a new store
+};
+/// Shards into one store: every case once. Throws when two stores disagree about a case.
+int Merge(const MergeCommand& command);
 
 int List(const std::vector<std::filesystem::path>& experiments, const Selection& filter);
 

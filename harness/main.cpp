@@ -22,6 +22,8 @@ constexpr const char* kFooter = R"(
 Examples:
   loopbench list configs/experiments/paper/paper.json
   loopbench run configs/experiments/paper/paper.json --jobs 2 --filter mechanism=four-bar
+  loopbench run big.json --shard 1/2 --out part1   (and 2/2 elsewhere)
+  loopbench merge part1 part2 --out whole
   loopbench table results/runs/paper --where mechanism=four-bar,dead-centre --where rtol=1e-8
   loopbench plot results/runs/paper --out results/runs/paper/figures
   loopbench verdict results/runs/paper --claims configs/experiments/paper/claims.json
@@ -48,7 +50,8 @@ int main(int argc, char** argv) {
 
   RunCommand run;
   bool no_timing = false, timing_only = false;
-  CLI::App* run_app = app.add_subcommand("run", "Run experiments; write records and tables");
+  CLI::App* run_app =
+      app.add_subcommand("run", "Run experiments, or go on with them; write records and tables");
   run_app->add_option("experiment", run.experiments, "Experiment files (JSON)")->required();
   run_app->add_option("--out", run.out,
                       "Folder for results.jsonl, drift.csv and timing.csv "
@@ -57,6 +60,14 @@ int main(int argc, char** argv) {
       ->check(CLI::Range(1, 1024))
       ->capture_default_str();
   run_app->add_option("--filter", conditions, "Only accuracy cases with key=value[,value]");
+  std::string shard = "1/1", rerun = "none";
+  run_app->add_option("--shard", shard, "k/n: the k-th of n parts, to be merged later")
+      ->capture_default_str();
+  run_app->add_option("--rerun", rerun, "Cases to run although the store has them")
+      ->check(CLI::IsMember({"none", "failed", "all"}))
+      ->capture_default_str();
+  run_app->footer(
+      "A run that was interrupted goes on where it stopped: give the same command again.");
   CLI::Option* no = run_app->add_flag("--no-timing", no_timing, "Leave the timings out");
   run_app->add_flag("--timing-only", timing_only, "Only the timings")->excludes(no);
 
@@ -67,6 +78,11 @@ int main(int argc, char** argv) {
   CLI::App* check_app =
       app.add_subcommand("check", "Read mechanism or experiment files, report errors");
   check_app->add_option("file", files, "Files (JSON)")->required();
+
+  MergeCommand merge;
+  CLI::App* merge_app = app.add_subcommand("merge", "Put the stores of shards together");
+  merge_app->add_option("store", merge.stores, "Folders of runs, or .jsonl files")->required();
+  merge_app->add_option("--out", merge.out, "Folder of the new store")->required();
 
   TableCommand table;
   CLI::App* table_app = app.add_subcommand("table", "Print a table of stored records");
@@ -104,9 +120,14 @@ int main(int argc, char** argv) {
     run.suite.filter = table.where = plot.where = ParseSelection(conditions);
     run.suite.timing = !no_timing;
     run.suite.accuracy = !timing_only;
+    run.suite.shard = ParseShard(shard);
+    run.suite.rerun = rerun == "all"      ? Rerun::kAll
+                      : rerun == "failed" ? Rerun::kFailed
+                                          : Rerun::kNone;
     if (const auto code = comparison.Run(typed)) return *code;
     if (*run_app) return Run(run, typed);
     if (*list_app) return List(files, ParseSelection(conditions));
+    if (*merge_app) return Merge(merge);
     if (*check_app) return CheckFiles(files);
     if (*table_app) return PrintTable(table, typed);
     if (*plot_app) return Plot(plot);

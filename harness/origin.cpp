@@ -3,12 +3,12 @@
 #include <fmt/format.h>
 
 #include <cmath>
-#include <cstdint>
-#include <cstring>
 #include <fstream>
 #include <thread>
+#include <vector>
 
 #include "harness/build_info.h"
+#include "harness/hash.h"
 
 namespace loopbench::harness {
 
@@ -25,21 +25,16 @@ std::string CpuModel() {
 /// Hash of the functions that simulations call, at some thousand arguments. Libraries that differ
 /// in one last bit in a hundred calls cannot get through.
 std::string LibmHash() {
-  std::uint64_t hash = 0xcbf29ce484222325u;
-  const auto add = [&hash](double value) {
-    unsigned char bytes[sizeof value];
-    std::memcpy(bytes, &value, sizeof value);
-    for (const unsigned char byte : bytes) hash = (hash ^ byte) * 0x100000001b3u;
-  };
+  std::vector<double> answers;
   volatile double scale = 0.0173;  // not known to the compiler, which would fold the calls
   for (int i = 1; i <= 1000; ++i) {
     const double x = scale * i;
     for (const double value : {std::sin(x), std::cos(x), std::atan2(x, 1.0), std::hypot(x, 2.0),
                                std::pow(x, -0.2), std::exp(-x), std::log(x)}) {
-      add(value);
+      answers.push_back(value);
     }
   }
-  return fmt::format("{:016x}", hash);
+  return Fnv1a({reinterpret_cast<const char*>(answers.data()), answers.size() * sizeof(double)});
 }
 
 }  // namespace

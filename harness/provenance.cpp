@@ -7,8 +7,11 @@
 #include <Eigen/Core>
 #include <ctime>
 #include <filesystem>
+#include <fstream>
+#include <iterator>
 
 #include "harness/build_info.h"
+#include "harness/hash.h"
 #include "harness/origin.h"
 
 namespace loopbench::harness {
@@ -26,6 +29,15 @@ std::vector<std::string> Provenance(const std::string& command) {
       fmt::format("libraries: Eigen {}.{}.{}, SUNDIALS {}, fmt {}", EIGEN_WORLD_VERSION,
                   EIGEN_MAJOR_VERSION, EIGEN_MINOR_VERSION, kBuildSundials, FMT_VERSION),
   };
+}
+
+const std::string& CodeVersion() {
+  static const std::string version = [] {
+    std::ifstream file("/proc/self/exe", std::ios::binary);
+    const std::string bytes{std::istreambuf_iterator<char>(file), {}};
+    return Fnv1a(bytes);
+  }();
+  return version;
 }
 
 std::string CommandLine(int argc, const char* const* argv) {

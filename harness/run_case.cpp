@@ -3,11 +3,10 @@
 #include <fmt/format.h>
 
 #include <algorithm>
-#include <cstring>
 
+#include "harness/hash.h"
 #include "harness/integrator/arkode.h"
 #include "harness/observers/observer.h"
-#include "harness/origin.h"
 #include "harness/store/record_json.h"
 #include "lagrange/lagrange.h"
 #include "mechanism/assembly.h"
@@ -38,15 +37,9 @@ template std::unique_ptr<Formulation<Spatial, double>> MakeFormulation(
 
 namespace {
 
-/// FNV-1a (64 bit) over the bytes of the last state: equal hashes mean equal runs.
+/// Of the last state: equal hashes mean equal runs.
 std::string StateHash(std::span<const double> y) {
-  std::uint64_t hash = 0xcbf29ce484222325u;
-  for (const double value : y) {
-    unsigned char bytes[sizeof value];
-    std::memcpy(bytes, &value, sizeof value);
-    for (const unsigned char byte : bytes) hash = (hash ^ byte) * 0x100000001b3u;
-  }
-  return fmt::format("{:016x}", hash);
+  return Fnv1a({reinterpret_cast<const char*>(y.data()), y.size_bytes()});
 }
 
 /// What one run leaves behind.
@@ -190,6 +183,19 @@ Record CaseKeys(const Experiment& experiment, const Case& one) {
   return keys;
 }
 
+std::string CaseContent(const Experiment& experiment, const Case& one) {
+  Record content = CaseKeys(experiment, one);
+  content.Set("ensemble", std::int64_t{one.ensemble});
+  content.Set("seed", static_cast<std::int64_t>(one.seed));
+  content.Set("perturb", one.perturb);
+  content.Set("wall_s", one.limits.wall_s);
+  content.Set("steps", one.limits.steps);
+  content.Set("memory_mb", one.limits.memory_mb);
+  content.Set("series_points", std::int64_t{experiment.series_points});
+  content.Set("document", experiment.scenes[one.scene].mechanism.canonical);
+  return CaseId(content);
+}
+
 Record RunCase(const Experiment& experiment, const Case& one) {
   const ExperimentScene& scene = experiment.scenes[one.scene];
   Record record = CaseKeys(experiment, one);
@@ -220,7 +226,6 @@ Record RunCase(const Experiment& experiment, const Case& one) {
   const DriftSeries envelope = Envelope(nominal.drift, experiment.series_points);
   record.Set("series.drift_t", envelope.t);
   record.Set("series.drift", envelope.value);
-  Stamp(record);
   return record;
 }
 

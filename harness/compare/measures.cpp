@@ -4,15 +4,10 @@ namespace loopbench::harness {
 
 namespace {
 
-/// Keys that name a case, and the word before the value where it needs one.
-struct CaseKey {
-  const char* key;
-  const char* before;
-};
-constexpr CaseKey kCaseKeys[] = {{"kind", ""},        {"experiment", ""},  {"benchmark", ""},
-                                 {"mechanism", ""},   {"formulation", ""}, {"enforcement", ""},
-                                 {"coordinates", ""}, {"solver", ""},      {"integrator", ""},
-                                 {"rtol", "rtol "},   {"atol", "atol "},   {"horizon", "horizon "}};
+/// Records begin with what names their case (CaseKeys); one of these ends it.
+bool EndsCase(std::string_view key) {
+  return key == "case_id" || key == "id" || key == "version" || key == "outcome";
+}
 
 }  // namespace
 
@@ -82,9 +77,13 @@ const std::vector<Measure>& Measures() {
 
 std::string CaseText(const Record& record) {
   std::string text;
-  for (const auto& [key, before] : kCaseKeys) {
-    const std::string value = record.Text(key);
-    if (!value.empty()) text += (text.empty() ? "" : " ") + (before + value);
+  for (const auto& [key, value] : record.items()) {
+    if (EndsCase(key)) break;
+    const std::string shown = record.Text(key);
+    if (shown.empty()) continue;
+    // names speak for themselves, numbers do not
+    const bool is_name = std::holds_alternative<std::string>(value);
+    text += (text.empty() ? "" : " ") + (is_name ? shown : key + " " + shown);
   }
   return text;
 }

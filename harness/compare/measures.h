@@ -37,7 +37,8 @@ struct Measure {
 /// All measures, in the order of reports.
 const std::vector<Measure>& Measures();
 
-/// The keys that tell cases of one store apart, as one line of text.
+/// What tells cases of one store apart, as one line of text: the keys that stand first in a record,
+/// before "case_id" or "outcome".
 std::string CaseText(const Record& record);
 
 }  // namespace loopbench::harness

@@ -89,6 +89,7 @@ struct EnsembleRule {
 struct Limits {
   double wall_s = 10.0;            ///< wall time [s]: keeps a whole suite within minutes
   std::int64_t steps = 1'000'000;  ///< accepted steps: far more than any case that ends needs
+  double memory_mb = 2048.0;       ///< address space of the case's process [MiB]
 };
 
 /// A family of mechanisms of growing size (mechanism/library.h), timed per right-hand side only.

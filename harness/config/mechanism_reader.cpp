@@ -60,6 +60,7 @@ MechanismFile ParseMechanism(std::string_view text, const std::string& file) {
   ErrorList errors(file);
   const JsonNode root(document, "", errors);
   MechanismFile result;
+  result.canonical = document.dump();
   MechanismDescription& description = result.description;
   if (root.ExpectObject({"name", "comment", "space", "gravity", "bodies", "ground", "joints",
                          "forces", "initial", "independent", "observe"})) {

@@ -83,22 +83,6 @@ struct Repetitions {
   }
 };
 
-/// Last record of each case, in the order of first appearance.
-std::vector<Record> KeepLast(std::vector<Record> records) {
-  std::map<std::string, std::size_t> place;
-  std::vector<Record> kept;
-  for (Record& record : records) {
-    const std::string id = record.Text("case_id");
-    const auto [at, is_new] = place.try_emplace(id, kept.size());
-    if (id.empty() || is_new) {
-      kept.push_back(std::move(record));
-    } else {
-      kept[at->second] = std::move(record);
-    }
-  }
-  return kept;
-}
-
 }  // namespace
 
 std::vector<Record> ParseBenchmarkJson(std::string_view text, const std::string& file) {
@@ -152,7 +136,7 @@ std::vector<Record> ReadMeasurements(const std::filesystem::path& path,
                                      std::vector<std::string>* warnings) {
   std::error_code error;
   if (std::filesystem::is_directory(path, error) || path.extension() == ".jsonl") {
-    return KeepLast(ReadRecords(path, warnings));
+    return LatestRecords(ReadRecords(path, warnings));
   }
   return ParseBenchmarkJson(ReadFile(path), path.string());
 }

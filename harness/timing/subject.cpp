@@ -3,10 +3,10 @@
 #include <fmt/format.h>
 
 #include <cmath>
-#include <cstring>
 #include <stdexcept>
 #include <vector>
 
+#include "harness/hash.h"
 #include "harness/integrator/arkode.h"
 #include "harness/integrator/stepper.h"
 #include "harness/run_case.h"
@@ -20,13 +20,6 @@ namespace {
 constexpr double kWarmUpStep = 0.005;  // short against any motion of unit bars
 constexpr int kWarmUpSteps = 10;
 constexpr double kNever = 1e9;  // time limit of a benchmark's integrator [s]
-
-std::string HashBytes(const void* data, std::size_t size) {
-  std::uint64_t hash = 0xcbf29ce484222325u;
-  const auto* bytes = static_cast<const unsigned char*>(data);
-  for (std::size_t i = 0; i < size; ++i) hash = (hash ^ bytes[i]) * 0x100000001b3u;
-  return fmt::format("{:016x}", hash);
-}
 
 template <class Space>
 BenchmarkState ComputeStateIn(const MechanismDescription& description, Coordinates coordinates) {
@@ -125,11 +118,12 @@ BenchmarkState ComputeState(const MechanismDescription& description, Coordinates
 std::string HashRounded(std::span<const double> numbers) {
   std::vector<std::int64_t> rounded;
   for (const double number : numbers) rounded.push_back(std::llround(number * 1e6));
-  return HashBytes(rounded.data(), rounded.size() * sizeof(std::int64_t));
+  return Fnv1a(
+      {reinterpret_cast<const char*>(rounded.data()), rounded.size() * sizeof(std::int64_t)});
 }
 
 std::string HashExact(std::span<const double> numbers) {
-  return HashBytes(numbers.data(), numbers.size_bytes());
+  return Fnv1a({reinterpret_cast<const char*>(numbers.data()), numbers.size_bytes()});
 }
 
 std::unique_ptr<BenchmarkSubject> MakeSubject(const MechanismDescription& description,

@@ -7,8 +7,8 @@
 #include <optional>
 
 #include "harness/integrator/arkode.h"
-#include "harness/origin.h"
 #include "harness/run_case.h"
+#include "harness/store/record_json.h"
 #include "mechanism/assembly.h"
 #include "mechanism/library.h"
 #include "odca/odca.h"
@@ -130,7 +130,6 @@ class SubjectIn final : public Subject {
       record.Set("plan_largest_join", std::int64_t{odca->plan().largest_join()});
       record.Set("rhs_operations", std::int64_t{odca->sweep().operations()});
     }
-    Stamp(record);
     return record;
   }
 
@@ -188,31 +187,6 @@ std::unique_ptr<Subject> MakeSubject(const MechanismDescription& description, co
   return std::make_unique<SubjectIn<Spatial>>(description, one, simulate);
 }
 
-/// Times cases of one mechanism against each other.
-void TimeTogether(const Experiment& experiment, const MechanismDescription& description,
-                  const std::vector<Case>& cases, bool simulate,
-                  const std::function<void(const Record&)>& done, std::vector<Record>& records) {
-  std::vector<std::unique_ptr<Subject>> subjects;
-  for (const Case& one : cases) subjects.push_back(MakeSubject(description, one, simulate));
-  for (auto& subject : subjects) subject->Prepare();
-  for (int batch = 0; batch < kBatches; ++batch) {
-    for (auto& subject : subjects) subject->TimeDerivative();
-  }
-  for (int repeat = 0; repeat < experiment.timing.repeats; ++repeat) {
-    for (auto& subject : subjects) subject->TimeSimulation();
-  }
-  for (std::size_t i = 0; i < cases.size(); ++i) {
-    Record keys = CaseKeys(experiment, cases[i]);
-    keys.Set("kind", std::string("timing"));
-    if (!simulate) {
-      // a right-hand side has no tolerance and no horizon
-      for (const char* key : {"integrator", "rtol", "atol", "horizon"}) keys.Set(key, Value());
-    }
-    records.push_back(subjects[i]->Finish(keys));
-    done(records.back());
-  }
-}
-
 MechanismDescription MakeFamilyMember(const TimingFamily& family, int size) {
   if (family.family == "ladder") return Ladder(size, 1.0, 1.0);
   MechanismDescription chain = Chain(size);
@@ -222,6 +196,61 @@ MechanismDescription MakeFamilyMember(const TimingFamily& family, int size) {
 
 }  // namespace
 
+std::vector<TimingGroup> TimingGroups(const Experiment& experiment) {
+  std::vector<TimingGroup> groups;
+  const std::vector<Case> all = ExpandTiming(experiment);
+  for (std::size_t scene = 0; scene < experiment.scenes.size(); ++scene) {
+    TimingGroup group{experiment.scenes[scene].mechanism.description, {}, true};
+    std::ranges::copy_if(all, std::back_inserter(group.cases),
+                         [&](const Case& one) { return one.scene == scene; });
+    if (!group.cases.empty()) groups.push_back(std::move(group));
+  }
+  if (experiment.timing.repeats == 0) return groups;
+  for (const TimingFamily& family : experiment.timing.families) {
+    for (const int size : family.sizes) {
+      TimingGroup group{MakeFamilyMember(family, size), {}, false};
+      for (const Column& column : family.columns) {
+        Case one;
+        one.mechanism = group.description.name;
+        one.column = column;
+        group.cases.push_back(one);
+      }
+      groups.push_back(std::move(group));
+    }
+  }
+  return groups;
+}
+
+Record TimingKeys(const Experiment& experiment, const TimingGroup& group, std::size_t index) {
+  Record keys = CaseKeys(experiment, group.cases[index]);
+  keys.Set("kind", std::string("timing"));
+  if (!group.simulate) {
+    // a right-hand side has no tolerance and no horizon
+    for (const char* key : {"integrator", "rtol", "atol", "horizon"}) keys.Set(key, Value());
+  }
+  keys.Set("case_id", CaseId(keys));
+  return keys;
+}
+
+std::vector<Record> TimeTogether(const Experiment& experiment, const TimingGroup& group) {
+  std::vector<std::unique_ptr<Subject>> subjects;
+  for (const Case& one : group.cases) {
+    subjects.push_back(MakeSubject(group.description, one, group.simulate));
+  }
+  for (auto& subject : subjects) subject->Prepare();
+  for (int batch = 0; batch < kBatches; ++batch) {
+    for (auto& subject : subjects) subject->TimeDerivative();
+  }
+  for (int repeat = 0; repeat < experiment.timing.repeats; ++repeat) {
+    for (auto& subject : subjects) subject->TimeSimulation();
+  }
+  std::vector<Record> records;
+  for (std::size_t i = 0; i < subjects.size(); ++i) {
+    records.push_back(subjects[i]->Finish(TimingKeys(experiment, group, i)));
+  }
+  return records;
+}
+
 std::size_t CountTimings(const Experiment& experiment) {
   std::size_t count = ExpandTiming(experiment).size();
   if (experiment.timing.repeats == 0) return count;
@@ -229,35 +258,6 @@ std::size_t CountTimings(const Experiment& experiment) {
     count += family.sizes.size() * family.columns.size();
   }
   return count;
-}
-
-std::vector<Record> TimeExperiment(const Experiment& experiment,
-                                   const std::function<void(const Record&)>& done) {
-  std::vector<Record> records;
-  const std::vector<Case> all = ExpandTiming(experiment);
-  for (std::size_t scene = 0; scene < experiment.scenes.size(); ++scene) {
-    std::vector<Case> cases;
-    std::ranges::copy_if(all, std::back_inserter(cases),
-                         [&](const Case& one) { return one.scene == scene; });
-    if (cases.empty()) continue;
-    TimeTogether(experiment, experiment.scenes[scene].mechanism.description, cases, true, done,
-                 records);
-  }
-  if (experiment.timing.repeats == 0) return records;
-  for (const TimingFamily& family : experiment.timing.families) {
-    for (const int size : family.sizes) {
-      const MechanismDescription description = MakeFamilyMember(family, size);
-      std::vector<Case> cases;
-      for (const Column& column : family.columns) {
-        Case one;
-        one.mechanism = description.name;
-        one.column = column;
-        cases.push_back(one);
-      }
-      TimeTogether(experiment, description, cases, false, done, records);
-    }
-  }
-  return records;
 }
 
 }  // namespace loopbench::harness

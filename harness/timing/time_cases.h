@@ -6,7 +6,6 @@
 // moving start.
 #pragma once
 
-#include <functional>
 #include <vector>
 
 #include "harness/config/experiment.h"
@@ -14,13 +13,24 @@
 
 namespace loopbench::harness {
 
-/// Times all timing cases of the experiment, scene by scene, then its families. One record per case
-/// (kind "timing"); a case whose simulation fails keeps its row with outcome and, where it got so
-/// far, its right-hand side's time. `done` is called after each case's record is complete.
-std::vector<Record> TimeExperiment(const Experiment& experiment,
-                                   const std::function<void(const Record&)>& done);
+/// Cases of one mechanism, timed against each other.
+struct TimingGroup {
+  MechanismDescription description;
+  std::vector<Case> cases;
+  bool simulate = true;  ///< whole simulations too; families have right-hand sides alone
+};
 
-/// Number of records that TimeExperiment() will make.
+/// The timings of an experiment: a group per scene, then one per member of a family.
+std::vector<TimingGroup> TimingGroups(const Experiment& experiment);
+
+/// The keys of one of the group's cases (kind "timing"), with its case_id.
+Record TimingKeys(const Experiment& experiment, const TimingGroup& group, std::size_t index);
+
+/// One record per case, in order. A case whose simulation fails keeps its row with outcome and,
+/// where it got so far, its right-hand side's time.
+std::vector<Record> TimeTogether(const Experiment& experiment, const TimingGroup& group);
+
+/// Number of records of all groups.
 std::size_t CountTimings(const Experiment& experiment);
 
 }  // namespace loopbench::harness

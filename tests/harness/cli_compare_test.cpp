@@ -1,83 +1,31 @@
 // compare, fit and export as their users call them, and loopbench_bench where it is built.
 #include <gtest/gtest.h>
-#include <sys/wait.h>
 
-#include <cstdio>
-#include <filesystem>
 #include <string>
 #include <vector>
 
-#include "harness/store/files.h"
 #include "harness/store/measurements.h"
-#include "harness/store/result_store.h"
+#include "tests/harness/cli_fixture.h"
 
 namespace loopbench::harness {
 namespace {
 
-namespace fs = std::filesystem;
-
-struct Ending {
-  int code = -1;
-  std::string text;  ///< standard output and standard error together
-};
-
-/// Runs the program in `folder`.
-Ending CallProgram(const fs::path& folder, const std::string& program,
-                   const std::string& arguments) {
-  const std::string command =
-      "cd '" + folder.string() + "' && '" + program + "' " + arguments + " 2>&1";
-  std::FILE* pipe = ::popen(command.c_str(), "r");
-  Ending ending;
-  if (pipe == nullptr) return ending;
-  for (int c = std::fgetc(pipe); c != EOF; c = std::fgetc(pipe))
-    ending.text += static_cast<char>(c);
-  const int status = ::pclose(pipe);
-  ending.code = WIFEXITED(status) ? WEXITSTATUS(status) : -1;
-  return ending;
-}
-
-class ComparisonCommands : public testing::Test {
+class ComparisonCommands : public CommandLineTest {
  protected:
-  void SetUp() override {
-    const auto* test = testing::UnitTest::GetInstance()->current_test_info();
-    folder_ = fs::path(testing::TempDir()) / (std::string("loopbench-compare-") + test->name());
-    fs::remove_all(folder_);
-    fs::create_directories(folder_);
-  }
-  void TearDown() override { fs::remove_all(folder_); }
-
   void Expect(const std::string& arguments, int code, const std::vector<std::string>& words) const {
-    ExpectEnding(CallProgram(folder_, LOOPBENCH_BINARY, arguments), arguments, code, words);
+    SCOPED_TRACE(arguments);
+    ExpectEnding(Call(arguments), code, words);
   }
-
-  static void ExpectEnding(const Ending& ending, const std::string& arguments, int code,
-                           const std::vector<std::string>& words) {
-    EXPECT_EQ(ending.code, code) << arguments << "\n" << ending.text;
-    for (const std::string& word : words) {
-      EXPECT_NE(ending.text.find(word), std::string::npos)
-          << arguments << ": no <" << word << "> in\n"
-          << ending.text;
-    }
-  }
-
-  fs::path folder_;
 };
 
 TEST_F(ComparisonCommands, CompareARunWithItselfAndWithAPlantedDrift) {
-  WriteFileAtomically(folder_ / "tiny.json",
-                      R"({
-    "name": "tiny", "tolerances": [1e-6], "timing": {"repeats": 0},
-    "scenes": [{"mechanism": ")" LOOPBENCH_SOURCE_DIR
-                      R"(/configs/mechanisms/four-bar.json", "horizon": 0.5}],
-    "columns": [{"formulation": ["odca", "lagrange"], "enforcement": "acceleration"}]})");
-  ASSERT_EQ(CallProgram(folder_, LOOPBENCH_BINARY, "run tiny.json --out base").code, 0);
-  ASSERT_EQ(CallProgram(folder_, LOOPBENCH_BINARY, "run tiny.json --out new").code, 0);
+  ASSERT_EQ(Call("run tiny.json --out base").code, 0);
+  ASSERT_EQ(Call("run tiny.json --out new").code, 0);
   Expect("compare base new", 0, {"outcomes", "hashes", "SAME", "BASE: commit "});
   Expect("compare base new --format csv", 0, {"judgement,case,measure", "same,"});
 
   std::vector<Record> records = ReadRecords(folder_ / "new");
   records[0].Set("drift_position_max", 3.0 * records[0].Number("drift_position_max"));
-  fs::create_directories(folder_ / "worse");
   {
     ResultStore store(folder_ / "worse");
     for (const Record& record : records) store.Append(record);
@@ -92,8 +40,8 @@ TEST_F(ComparisonCommands, CompareARunWithItselfAndWithAPlantedDrift) {
 }
 
 TEST_F(ComparisonCommands, RefuseWhatIsNotThere) {
-  WriteFileAtomically(folder_ / "b.json", R"({"benchmarks": []})");
-  WriteFileAtomically(folder_ / "text.json", "nothing");
+  Write("b.json", R"({"benchmarks": []})");
+  Write("text.json", "nothing");
   Expect("compare none.json b.json", 2, {"cannot read 'none.json'"});
   Expect("compare b.json text.json", 2, {"text.json: not JSON"});
   Expect("compare b.json b.json", 2, {"COULD NOT MEASURE"});
@@ -105,27 +53,35 @@ TEST_F(ComparisonCommands, RefuseWhatIsNotThere) {
 
 #ifdef LOOPBENCH_BENCH_BINARY
 
+class BenchmarkProgram : public ComparisonCommands {
+ protected:
+  /// The benchmark program in the test's folder: the shell that would call loopbench ends before.
+  Ending Bench(const std::string& arguments) const {
+    return Call("", "('" LOOPBENCH_BENCH_BINARY "' " + arguments + ") 2>&1; exit $?; ");
+  }
+};
+
 constexpr const char* kFamilies = R"({"name": "small", "states": "states.json", "groups": [
   {"family": "chain", "sizes": [3, 6, 12], "measure": ["rhs", "step"],
    "columns": [{"formulation": "odca", "enforcement": "acceleration"}]},
   {"mechanisms": ")" LOOPBENCH_SOURCE_DIR R"(/configs/mechanisms/toggle-singular-start.json",
    "measure": "rhs", "columns": [{"formulation": "reduction", "enforcement": "velocity"}]}]})";
 
-TEST_F(ComparisonCommands, TakeTheBenchmarkProgramsJson) {
-  WriteFileAtomically(folder_ / "families.json", kFamilies);
+TEST_F(BenchmarkProgram, WritesJsonThatTheCommandsTake) {
+  Write("families.json", kFamilies);
   const auto bench = [this](const std::string& arguments) {
-    return CallProgram(folder_, LOOPBENCH_BENCH_BINARY, "--families families.json " + arguments);
+    return Bench("--families families.json " + arguments);
   };
-  ExpectEnding(bench("--save-states"), "--save-states", 0, {"wrote 4 hashes to states.json"});
+  ExpectEnding(bench("--save-states"), 0, {"wrote 4 hashes to states.json"});
   // a saved hash that does not match is an error of its benchmarks, with both hashes
   std::string states = ReadFile(folder_ / "states.json");
   const std::size_t hash = states.find("\"chain/3/joint\": \"") + 18;
   states.replace(hash, 16, "00000000deadbeef");
-  WriteFileAtomically(folder_ / "states.json", states);
+  Write("states.json", states);
 
   // repetitions make aggregates, and the spread of allocations that are always 0 is NaN
   const std::string run = "--benchmark_min_time=0.001 --benchmark_repetitions=2 ";
-  ExpectEnding(bench(run + "--benchmark_out=out.json"), run, 0, {"saved is 00000000deadbeef"});
+  ExpectEnding(bench(run + "--benchmark_out=out.json"), 0, {"saved is 00000000deadbeef"});
   const std::string text = ReadFile(folder_ / "out.json");
   EXPECT_EQ(text.find("NaN"), std::string::npos);
   EXPECT_NE(text.find("allocations"), std::string::npos);
@@ -161,18 +117,18 @@ TEST_F(ComparisonCommands, TakeTheBenchmarkProgramsJson) {
   EXPECT_EQ(ParseBenchmarkJson(terminal.text, "terminal").size(), 7u);
 }
 
-TEST_F(ComparisonCommands, TheBenchmarkProgramRefusesBadInput) {
+TEST_F(BenchmarkProgram, RefusesBadInput) {
   const auto bench = [this](const std::string& arguments, const std::string& word) {
-    const Ending ending = CallProgram(folder_, LOOPBENCH_BENCH_BINARY, arguments);
-    ExpectEnding(ending, arguments, 2, {word});
+    SCOPED_TRACE(arguments);
+    ExpectEnding(Bench(arguments), 2, {word});
   };
-  WriteFileAtomically(folder_ / "bad.json", R"({"name": "n", "groups": [{"familiy": "chain"}]})");
+  Write("bad.json", R"({"name": "n", "groups": [{"familiy": "chain"}]})");
   bench("--families none.json", "none.json: cannot be read: no such file");
   bench("--families bad.json", "did you mean \"family\"");
   bench("--families", "expected a file");
   bench("--benchmark_filter=nothing_like_it", "");
   bench("--faimlies=bad.json", "--faimlies");
-  EXPECT_EQ(CallProgram(folder_, LOOPBENCH_BENCH_BINARY, "--help").code, 0);
+  ExpectEnding(Bench("--help"), 0, {"Examples:", "--families"});
 }
 
 #endif

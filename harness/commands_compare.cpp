@@ -7,6 +7,7 @@
 #include <set>
 
 #include "harness/compare/fit.h"
+#include "harness/compare/statistics.h"
 #include "harness/compare/track.h"
 #include "harness/origin.h"
 #include "harness/provenance.h"
@@ -138,6 +139,25 @@ void NoteOrigins(const std::string& side, const std::vector<Record>& records,
   notes.insert(notes.end(), lines.begin(), lines.end());
 }
 
+/// One run is faster or slower than another as a whole when the machine's speed has changed; no
+/// test within the runs can tell that from a change of all code.
+void NoteCommonShift(const ComparisonReport& comparison, std::vector<std::string>& notes) {
+  std::vector<double> ratios;
+  for (const Finding& finding : comparison.findings) {
+    if (finding.measure.rule == Rule::kTime && std::isfinite(finding.ratio)) {
+      ratios.push_back(finding.ratio);
+    }
+  }
+  constexpr std::size_t kMany = 5;
+  constexpr double kShift = 0.01;  // half of the smallest effect that is reported
+  const double shift = Median(ratios);
+  if (ratios.size() < kMany || !(std::abs(shift - 1.0) > kShift)) return;
+  notes.push_back(
+      fmt::format("all times: median ratio {:.3f}; unless everything changed, the machine's speed "
+                  "did: repeat the run before believing single times",
+                  shift));
+}
+
 std::string Conclusion(const ComparisonReport& comparison, int code) {
   if (code == 1) return fmt::format("WORSE: {} measures", comparison.Count(Judgement::kWorse));
   if (code == 2) return "COULD NOT MEASURE: too little in common";
@@ -157,6 +177,7 @@ int PrintComparison(const CompareCommand& command, const std::string& typed) {
   NoteCases("cases only in BASE", comparison.only_base, notes);
   NoteCases("cases only in NEW", comparison.only_fresh, notes);
   NoteCases("cases there more than once, not compared", comparison.ambiguous, notes);
+  NoteCommonShift(comparison, notes);
   NoteOrigins("BASE", base, notes);
   NoteOrigins("NEW", fresh, notes);
   Table findings = FindingTable(comparison, command.format == "csv");
@@ -195,6 +216,9 @@ int PrintFits(const FitCommand& command, const std::string& typed) {
   }
   if (command.format != "text" || !command.out.empty()) {
     NoteOrigins("measured", benchmarks, table.notes);
+    if (const double load = benchmarks.front().Number("load_average"); std::isfinite(load)) {
+      table.notes.push_back(fmt::format("load average of the minute before: {:.1f}", load));
+    }
     table.notes.push_back(fmt::format("command: {}", typed));
   }
   Deliver(RenderTable(table, command.format), command.out);

@@ -83,6 +83,20 @@ struct Repetitions {
   }
 };
 
+/// The origin, and how busy the machine was when the program started.
+void AddContext(const RunJson& context, Record& record) {
+  if (!context.is_object()) return;
+  for (const char* key : {"machine", "compiler", "flags", "libm", "commit"}) {
+    if (context.contains(key) && context[key].is_string()) {
+      record.Set(key, context[key].get<std::string>());
+    }
+  }
+  if (context.contains("load_avg") && context["load_avg"].is_array() &&
+      !context["load_avg"].empty() && context["load_avg"][0].is_number()) {
+    record.Set("load_average", context["load_avg"][0].get<double>());
+  }
+}
+
 }  // namespace
 
 std::vector<Record> ParseBenchmarkJson(std::string_view text, const std::string& file) {
@@ -117,16 +131,11 @@ std::vector<Record> ParseBenchmarkJson(std::string_view text, const std::string&
     }
     ++index;
   }
+  const RunJson context = document.value("context", RunJson::object());
   std::vector<Record> records;
   for (const Repetitions& one : all) {
     Record record = one.ToRecord();
-    for (const char* key : {"machine", "compiler", "flags", "libm", "commit"}) {
-      if (!document.contains("context") || !document["context"].is_object()) break;
-      const RunJson& context = document["context"];
-      if (context.contains(key) && context[key].is_string()) {
-        record.Set(key, context[key].get<std::string>());
-      }
-    }
+    AddContext(context, record);
     records.push_back(std::move(record));
   }
   return records;

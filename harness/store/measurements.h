@@ -19,8 +19,9 @@ std::vector<Record> ReadMeasurements(const std::filesystem::path& path,
 /// The runs in the JSON of Google Benchmark, one record per benchmark, kind "benchmark":
 /// "benchmark" (its name), "outcome" ("finished", or the message of its error), "start_hash" (its
 /// label), "series.cpu_ns" and "series.real_ns" (one per repetition), "cpu_ns" (their median), the
-/// counters (median over the repetitions) under their own names, and the origin's keys from the
-/// context. Aggregates, complexity rows among them, are left out. `file` is for messages.
+/// counters (median over the repetitions) under their own names, the origin's keys from the
+/// context, and "load_average" (of the minute before). Aggregates, complexity rows among them, are
+/// left out. `file` is for messages.
 std::vector<Record> ParseBenchmarkJson(std::string_view text, const std::string& file);
 
 }  // namespace loopbench::harness

@@ -18,7 +18,7 @@ namespace {
 using nlohmann::json;
 
 constexpr const char* kBenchmarks = R"({
-  "context": {"machine": "M", "compiler": "C", "flags": "F", "libm": "L", "commit": "c", "num_cpus": 2},
+  "context": {"machine": "M", "compiler": "C", "flags": "F", "libm": "L", "commit": "c", "load_avg": [0.5, 1, 2]},
   "benchmarks": [
     {"name": "a/3", "run_name": "a/3", "run_type": "iteration", "repetitions": 3, "repetition_index": 0,
      "threads": 1, "iterations": 10, "real_time": 1.5, "cpu_time": 1.0, "time_unit": "us",
@@ -46,6 +46,7 @@ TEST(BenchmarkJson, BecomesOneRecordPerBenchmark) {
   EXPECT_EQ(a.Number("cpu_ns"), 2000.0);
   EXPECT_EQ(a.Number("bodies"), 3.0);
   EXPECT_EQ(a.Text("machine"), "M");
+  EXPECT_EQ(a.Number("load_average"), 0.5);
   EXPECT_EQ(a.Find("iterations"), nullptr);
   const Record& b = records[1];
   EXPECT_EQ(b.Text("outcome"), "singular");

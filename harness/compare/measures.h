@@ -29,8 +29,8 @@ struct Measure {
   std::string key;  ///< in the record
   Rule rule = Rule::kEqual;
   std::string unit;  ///< of the value as compared
-  /// Depends on the last bits of floating-point numbers: comparable under one arithmetic only
-  /// (origin.h).
+  /// Depends on the last bits of floating-point numbers, or on what the compiler makes of the code
+  /// (alignment of memory): comparable under one arithmetic only (origin.h).
   bool needs_same_arithmetic = false;
 };
 

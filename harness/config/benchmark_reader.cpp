@@ -118,7 +118,8 @@ void ReportRepeatedBenchmark(const JsonNode& node, const BenchmarkGroup& group,
 StateHashes ReadStates(const std::filesystem::path& path, ErrorList* errors) {
   StateHashes states;
   try {
-    const Json document = ParseDocument(ReadTextFile(path), path.string());
+    const std::string text = ReadTextFile(path);
+    const Json document = ParseDocument(text, path.string());
     ErrorList own(path.string());
     for (const auto& [name, node] : JsonNode(document, "", own).Members()) {
       const std::string hash = node.Text();

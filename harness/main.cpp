@@ -5,6 +5,7 @@
 
 #include "harness/commands.h"
 #include "harness/config/config_error.h"
+#include "harness/main_compare.h"
 #include "harness/provenance.h"
 
 namespace {
@@ -145,6 +146,8 @@ int main(int argc, char** argv) {
   verdict_app->add_option("--claims", verdict.claims, "Rules (JSON)")->required();
   verdict_app->add_option("--out", verdict.out, "Markdown file with all numbers");
 
+  ComparisonOptions comparison(app);
+
   try {
     app.parse(argc, argv);
   } catch (const CLI::ParseError& error) {
@@ -159,6 +162,7 @@ int main(int argc, char** argv) {
     run.suite.rerun = rerun == "all"      ? Rerun::kAll
                       : rerun == "failed" ? Rerun::kFailed
                                           : Rerun::kNone;
+    if (const auto code = comparison.Run(typed)) return *code;
     if (*run_app) return Run(run, typed);
     if (*list_app) return List(files, ParseSelection(conditions));
     if (*merge_app) return Merge(merge);

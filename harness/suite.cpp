@@ -12,6 +12,7 @@
 #include "harness/hash.h"
 #include "harness/isolation/fault.h"
 #include "harness/isolation/processes.h"
+#include "harness/origin.h"
 #include "harness/progress.h"
 #include "harness/provenance.h"
 #include "harness/run_case.h"
@@ -120,6 +121,7 @@ std::vector<Record> Records(const Piece& piece, const ProcessResult& result) {
     }
     records[i].Set("id", piece.owed[i].Text("id"));
     records[i].Set("version", CodeVersion());
+    Stamp(records[i]);
   }
   return records;
 }

@@ -111,6 +111,8 @@ class SubjectIn final : public Subject {
     record.Set("rhs_ns_p10", Quantile(rhs_ns_, 0.1));
     record.Set("rhs_ns_p90", Quantile(rhs_ns_, 0.9));
     record.Set("ns_per_body", rhs / bodies);
+    record.Set("series.rhs_ns", rhs_ns_);  // raw, for tests of significance (harness/compare)
+    record.Set("series.wall_s", wall_s_);
     if (!wall_s_.empty()) {
       record.Set("step_us_median", wall * 1e6 / static_cast<double>(result_.steps));
       record.Set("wall_s_median", wall);

@@ -7,8 +7,9 @@
 //   BeginStep(y)       at accepted steps, the only call that may change the mode (an
 //                      independent set, unwrapped angles). Everything else is a pure function
 //                      of (t, q, u, mode): calling it in any order gives the same bits.
-// After construction O-DCA allocates nothing in any of them. The dense baselines take small
-// temporaries in Eigen's LU; what BeginStep() does is said by each formulation.
+// After construction O-DCA allocates nothing in any of them, the dense baselines nothing in a
+// derivative unless Eigen's workspace for one product exceeds a mebibyte (some 300 unknowns); what
+// BeginStep() does is said by each formulation.
 #pragma once
 
 #include <memory>

@@ -136,7 +136,8 @@ Outcome Reduction<Space, S>::Accelerations() {
   MB_.noalias() = M_ * B_;
   reduced_.noalias() = B_.transpose() * MB_;
   reduced_factor_.compute(reduced_);
-  independent_speeds_.noalias() = -(B_.transpose() * residual_);
+  residual_ = -residual_;
+  independent_speeds_.noalias() = B_.transpose() * residual_;
   reduced_factor_.solveInPlace(independent_speeds_);
   udot_ = c_;
   udot_.noalias() += B_ * independent_speeds_;

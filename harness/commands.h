@@ -8,6 +8,7 @@
 #include <string>
 #include <vector>
 
+#include "harness/config/experiment_reader.h"
 #include "harness/suite.h"
 
 namespace loopbench::harness {
@@ -15,13 +16,25 @@ namespace loopbench::harness {
 struct RunCommand {
   std::vector<std::filesystem::path> experiments;
   std::filesystem::path out;  ///< folder; default results/runs/<name of the first experiment>
+  std::vector<Setting> settings;
   SuiteOptions suite;
 };
 int Run(const RunCommand& command, const std::string& typed);
 
-int List(const std::vector<std::filesystem::path>& experiments, const Selection& filter);
+/// Experiment files and what is changed and chosen of them.
+struct ExperimentFiles {
+  std::vector<std::filesystem::path> paths;
+  std::vector<Setting> settings;
+  Selection filter;
+};
 
-int CheckFiles(const std::vector<std::filesystem::path>& files);
+/// The experiments of the files, each combination of a sweep one, of which at least one case passes
+/// the filter. Throws ConfigError as the reader does, and when no case of a file passes.
+std::vector<Experiment> ReadSelected(const ExperimentFiles& files);
+
+int List(const ExperimentFiles& files);
+
+int CheckFiles(const ExperimentFiles& files);
 
 struct TableCommand {
   std::filesystem::path store;

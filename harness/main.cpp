@@ -11,6 +11,18 @@ namespace {
 
 using namespace loopbench::harness;
 
+std::vector<Setting> ParseSettings(const std::vector<std::string>& texts) {
+  std::vector<Setting> settings;
+  for (const std::string& text : texts) settings.push_back(ParseSetting(text));
+  return settings;
+}
+
+/// Repeatable, one value each: a second word would be the name of a file.
+void AddSettings(CLI::App* app, std::vector<std::string>* settings) {
+  app->add_option("--set", *settings, "Set a field before reading: /json/pointer=value")
+      ->allow_extra_args(false);
+}
+
 Selection ParseSelection(const std::vector<std::string>& conditions) {
   Selection selection;
   for (const std::string& text : conditions) selection.push_back(ParseCondition(text));
@@ -42,8 +54,8 @@ int main(int argc, char** argv) {
     for (const std::string& word : failed->remaining()) text += "unknown: " + word + "\n";
     return text;
   });
-  std::vector<std::string> conditions;
-  std::vector<std::filesystem::path> files;
+  std::vector<std::string> conditions, settings;
+  ExperimentFiles files;
 
   RunCommand run;
   bool no_timing = false, timing_only = false;
@@ -56,16 +68,19 @@ int main(int argc, char** argv) {
       ->check(CLI::Range(1, 1024))
       ->capture_default_str();
   run_app->add_option("--filter", conditions, "Only accuracy cases with key=value[,value]");
+  AddSettings(run_app, &settings);
   CLI::Option* no = run_app->add_flag("--no-timing", no_timing, "Leave the timings out");
   run_app->add_flag("--timing-only", timing_only, "Only the timings")->excludes(no);
 
   CLI::App* list_app = app.add_subcommand("list", "Show the cases of experiments");
-  list_app->add_option("experiment", files, "Experiment files (JSON)")->required();
+  list_app->add_option("experiment", files.paths, "Experiment files (JSON)")->required();
   list_app->add_option("--filter", conditions, "Only cases with key=value[,value]");
+  AddSettings(list_app, &settings);
 
   CLI::App* check_app =
       app.add_subcommand("check", "Read mechanism or experiment files, report errors");
-  check_app->add_option("file", files, "Files (JSON)")->required();
+  check_app->add_option("file", files.paths, "Files (JSON)")->required();
+  AddSettings(check_app, &settings);
 
   TableCommand table;
   CLI::App* table_app = app.add_subcommand("table", "Print a table of stored records");
@@ -101,8 +116,10 @@ int main(int argc, char** argv) {
     run.suite.filter = table.where = plot.where = ParseSelection(conditions);
     run.suite.timing = !no_timing;
     run.suite.accuracy = !timing_only;
+    run.settings = files.settings = ParseSettings(settings);
+    files.filter = ParseSelection(conditions);
     if (*run_app) return Run(run, typed);
-    if (*list_app) return List(files, ParseSelection(conditions));
+    if (*list_app) return List(files);
     if (*check_app) return CheckFiles(files);
     if (*table_app) return PrintTable(table, typed);
     if (*plot_app) return Plot(plot);

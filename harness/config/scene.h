@@ -33,6 +33,7 @@ struct SceneObservation {
 struct MechanismFile {
   MechanismDescription description;
   SceneObservation observe;
+  std::string canonical;  ///< the document without spaces: equal texts are equal mechanisms
 };
 
 }  // namespace loopbench::harness

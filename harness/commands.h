@@ -36,6 +36,14 @@ int List(const ExperimentFiles& files);
 
 int CheckFiles(const ExperimentFiles& files);
 
+struct PlanCommand {
+  ExperimentFiles files;
+  std::filesystem::path from;  ///< store of earlier results; times of cases it has come from there
+};
+int PrintPlans(const PlanCommand& command);
+
+int Explain(const ExperimentFiles& files);
+
 struct TableCommand {
   std::filesystem::path store;
   std::string kind = "drift";   ///< drift, timing or factorial

@@ -32,6 +32,7 @@ Selection ParseSelection(const std::vector<std::string>& conditions) {
 constexpr const char* kFooter = R"(
 Examples:
   loopbench list configs/experiments/paper/paper.json
+  loopbench plan configs/experiments/paper/paper.json --set /limits/wall_s=5
   loopbench run configs/experiments/paper/paper.json --jobs 2 --filter mechanism=four-bar
   loopbench table results/runs/paper --where mechanism=four-bar,dead-centre --where rtol=1e-8
   loopbench plot results/runs/paper --out results/runs/paper/figures
@@ -82,6 +83,20 @@ int main(int argc, char** argv) {
   check_app->add_option("file", files.paths, "Files (JSON)")->required();
   AddSettings(check_app, &settings);
 
+  PlanCommand plan;
+  CLI::App* plan_app =
+      app.add_subcommand("plan", "Count cases and runs, estimate how long they take");
+  plan_app->add_option("experiment", files.paths, "Experiment files (JSON)")->required();
+  plan_app->add_option("--from", plan.from, "Earlier results whose times are used, not a pilot's");
+  plan_app->add_option("--filter", conditions, "Only cases with key=value[,value]");
+  AddSettings(plan_app, &settings);
+
+  CLI::App* explain_app =
+      app.add_subcommand("explain", "Say what experiments run and measure, and what words mean");
+  explain_app->add_option("experiment", files.paths, "Experiment files (JSON)")->required();
+  explain_app->add_option("--filter", conditions, "Only cases with key=value[,value]");
+  AddSettings(explain_app, &settings);
+
   TableCommand table;
   CLI::App* table_app = app.add_subcommand("table", "Print a table of stored records");
   table_app->add_option("store", table.store, "Folder of a run, or a .jsonl file")->required();
@@ -120,6 +135,9 @@ int main(int argc, char** argv) {
     files.filter = ParseSelection(conditions);
     if (*run_app) return Run(run, typed);
     if (*list_app) return List(files);
+    plan.files = files;
+    if (*plan_app) return PrintPlans(plan);
+    if (*explain_app) return Explain(files);
     if (*check_app) return CheckFiles(files);
     if (*table_app) return PrintTable(table, typed);
     if (*plot_app) return Plot(plot);

@@ -67,7 +67,7 @@ bool ExperimentFields::TakeIn(Json& node, const std::string& pointer, FieldTarge
   try {
     if (!std::filesystem::is_regular_file(path)) {
       found->fault = {fmt::format("\"{}\" at {}", node.get<std::string>(), pointer),
-                      fmt::format("a mechanism file ({} is none)", path.string()), "", ""};
+                      fmt::format("a mechanism file ({} is none)", path.string()), "", "", true};
       return false;
     }
     Json document = files_.Document(path);
@@ -75,7 +75,7 @@ bool ExperimentFields::TakeIn(Json& node, const std::string& pointer, FieldTarge
     origins_.TakeIn(pointer, path.string(), files_.Text(path));
     return true;
   } catch (const ConfigError& mistakes) {
-    found->fault = FieldFault{"", "", "", mistakes.what()};
+    found->fault = FieldFault{"", "", "", mistakes.what(), true};
     return false;
   }
 }

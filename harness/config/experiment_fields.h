@@ -17,7 +17,8 @@ namespace loopbench::harness {
 /// Why a pointer names no field: in the words of a message, or a finished text.
 struct FieldFault {
   std::string found, expected, suggestion;
-  std::string text;  ///< of a mechanism file that cannot be read; the others are empty then
+  std::string text;      ///< of a mechanism file that cannot be read; the others are empty then
+  bool of_file = false;  ///< of a mechanism file: who reads the scene will complain as well
 };
 
 /// The fields a pointer stands for, as pointers without "*".

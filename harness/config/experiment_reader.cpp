@@ -12,6 +12,10 @@ namespace {
 Experiment ReadOne(const JsonNode& root, MechanismFiles& files) {
   Experiment experiment;
   ErrorList& errors = root.errors();
+  if (root.value().is_object() && root.value().contains("bodies")) {
+    root.FailAs("a mechanism (it has \"bodies\")", "an experiment");
+    return experiment;
+  }
   if (!root.ExpectObject({"name", "comment", "scenes", "columns", "tolerances", "integrator",
                           "ensembles", "limits", "series", "timing", "sweep", "exclude"})) {
     return experiment;
@@ -72,7 +76,7 @@ class Reader {
     ErrorList errors(std::move(origins));
     const JsonNode root(document_, "", errors);
     const Sweep sweep(root, fields_, set_);
-    if (!errors.empty()) {
+    if (!sweep.sound()) {
       ErrorList all(origins_);  // with the files that the sweep has taken in
       const JsonNode again(document_, "", all);
       Sweep(again, fields_, set_);

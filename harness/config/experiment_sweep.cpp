@@ -91,11 +91,7 @@ void ReadField(const JsonNode& axis, ExperimentFields& fields, SweepAxis* result
   result->fields = fields.Find(pointer);
   if (!result->fields.fault) return;
   const FieldFault& fault = *result->fields.fault;
-  if (fault.text.empty()) {
-    node->FailAs(fault.found, fault.expected, fault.suggestion);
-  } else {
-    node->errors().AddText(fault.text);
-  }
+  if (!fault.of_file) node->FailAs(fault.found, fault.expected, fault.suggestion);
 }
 
 SweepAxis ReadAxis(const JsonNode& node, ExperimentFields& fields, std::set<std::string>* taken) {
@@ -131,7 +127,8 @@ SweepGroup ReadGroup(const JsonNode& node, ExperimentFields& fields, std::set<st
   } else if (node.ExpectObject({"zip"})) {
     const JsonNode zip = *node.Optional("zip");
     const std::vector<JsonNode> elements = zip.Elements("axes");
-    if (zip.value().is_array() && elements.size() < 2) zip.Fail("at least two axes");
+    if (zip.value().is_array() && elements.size() < 2)
+      zip.FailAs(elements.empty() ? "no axes" : "one axis", "at least two axes");
     for (const JsonNode& element : elements) {
       group.axes.push_back(ReadAxis(element, fields, taken));
       const SweepAxis& first = group.axes.front();
@@ -150,27 +147,34 @@ Sweep::Sweep(const JsonNode& root, ExperimentFields& fields,
              const std::vector<std::string>& settings) {
   const auto node = root.Optional("sweep");
   if (!node) return;
-  const std::vector<JsonNode> elements = node->Elements("axes");
-  if (elements.size() > kMaxAxes) node->Fail(fmt::format("at most {} axes", kMaxAxes));
-  if (elements.size() > kMaxAxes || node->errors().full()) return;
+  Read(*node, fields, settings);
+  sound_ = sound_ && node->errors().empty();
+}
+
+void Sweep::Read(const JsonNode& node, ExperimentFields& fields,
+                 const std::vector<std::string>& settings) {
+  const std::vector<JsonNode> elements = node.Elements("axes");
+  if (elements.size() > kMaxAxes) node.Fail(fmt::format("at most {} axes", kMaxAxes));
+  if (elements.size() > kMaxAxes || node.errors().full()) return;
   std::set<std::string> taken;
-  bool sound = true;
   for (const JsonNode& element : elements) {
     SweepGroup group = ReadGroup(element, fields, &taken);
     const bool same = !group.axes.empty() && std::ranges::all_of(group.axes, [&](const auto& axis) {
       return !axis.values.empty() && axis.values.size() == group.count();
     });
-    sound = sound && same;
+    sound_ = sound_ && same && std::ranges::none_of(group.axes, [](const auto& axis) {
+               return axis.fields.fault.has_value();
+             });
     if (same) CheckDistinct(element, group);
     if (same) groups_.push_back(std::move(group));
   }
-  if (!sound) return;
-  CheckOverlaps(*node, settings);
+  if (!sound_) return;
+  CheckOverlaps(node, settings);
   double combinations = 1.0;
   for (const SweepGroup& group : groups_) combinations *= static_cast<double>(group.count());
   if (combinations > static_cast<double>(kMaxCombinations)) {
-    node->FailAs(fmt::format("{:g} combinations", combinations),
-                 fmt::format("at most {}", kMaxCombinations));
+    node.FailAs(fmt::format("{:.0f} combinations", combinations),
+                fmt::format("at most {}", kMaxCombinations));
     return;
   }
   count_ = static_cast<std::size_t>(combinations);

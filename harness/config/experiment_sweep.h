@@ -34,6 +34,9 @@ class Sweep {
   /// fields that --set has set: a sweep over one of them would undo it.
   Sweep(const JsonNode& root, ExperimentFields& fields, const std::vector<std::string>& settings);
 
+  /// False when there are mistakes in it, or in a mechanism file that it goes through.
+  bool sound() const { return sound_; }
+
   /// Number of combinations; 1 without a sweep, which is the file as it stands.
   std::size_t count() const { return count_; }
 
@@ -47,11 +50,14 @@ class Sweep {
   void Note(Origins* origins) const;
 
  private:
+  void Read(const JsonNode& node, ExperimentFields& fields,
+            const std::vector<std::string>& settings);
   void CheckOverlaps(const JsonNode& node, const std::vector<std::string>& settings) const;
   std::vector<std::size_t> Indices(std::size_t combination) const;
 
   std::vector<SweepGroup> groups_;
   std::size_t count_ = 1;
+  bool sound_ = true;
 };
 
 /// "exclude": conditions on case keys and axis names, as selections that match excluded cases.

@@ -50,7 +50,8 @@ class Builder final : public Walker {
  protected:
   bool Key(const std::string& key) override {
     if (!keys_.back().insert(key).second) {
-      Complain(fmt::format("found key \"{}\" twice, expected each key once in an object", key));
+      Complain(fmt::format("found key \"{}\" twice, expected each key once in an object",
+                           ShortToken(key)));
     }
     return true;
   }
@@ -58,7 +59,8 @@ class Builder final : public Walker {
   bool CheckNumber(double value, const std::string& token) override {
     const std::string_view digits = std::string_view(token).substr(0, token.find_first_of("eE"));
     if (value == 0.0 && digits.find_first_of("123456789") != std::string_view::npos) {
-      Complain(fmt::format("found {}, expected 0 or a number of at least 4.9e-324", token));
+      Complain(
+          fmt::format("found {}, expected 0 or a number of at least 4.9e-324", ShortToken(token)));
     }
     return true;
   }
@@ -97,9 +99,8 @@ class Builder final : public Walker {
     if (complaints_.size() >= kMostMessages) {
       ++more_;
     } else {
-      const std::string pointer = Pointer();
-      complaints_.push_back(fmt::format("{}:{}: {}: {}", file_, line(),
-                                        pointer.empty() ? "(top level)" : pointer, what));
+      complaints_.push_back(
+          fmt::format("{}:{}: {}: {}", file_, line(), ShownPointer(Pointer()), what));
     }
   }
 
@@ -148,6 +149,20 @@ Json ParseDocument(std::string_view text, const std::string& file) {
   Builder builder(text, file);
   builder.Walk(text);
   return builder.Take();
+}
+
+std::string ShownPointer(const std::string& pointer) {
+  constexpr std::size_t kEnd = 100;
+  if (pointer.empty()) return "(top level)";
+  if (pointer.size() <= 2 * kEnd) return pointer;
+  // whole UTF-8 characters only
+  const auto inside = [&pointer](std::size_t i) {
+    return (static_cast<unsigned char>(pointer[i]) & 0xC0u) == 0x80u;
+  };
+  std::size_t head = kEnd, tail = pointer.size() - kEnd;
+  while (head > 0 && inside(head)) --head;
+  while (tail < pointer.size() && inside(tail)) ++tail;
+  return pointer.substr(0, head) + "..." + pointer.substr(tail);
 }
 
 std::string PointerToken(std::string_view key) {

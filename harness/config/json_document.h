@@ -48,6 +48,10 @@ std::map<std::string, std::size_t> LinesOf(std::string_view text,
 /// `key` as one reference token of a JSON Pointer (RFC 6901): "~" and "/" escaped.
 std::string PointerToken(std::string_view key);
 
+/// A pointer as a message shows it: "(top level)" for "", and without the middle when it is long,
+/// for keys have no limit of their own.
+std::string ShownPointer(const std::string& pointer);
+
 /// "" when the text is UTF-8 without a byte order mark and without zero bytes; else where, what was
 /// found and what was expected, as "LINE:COLUMN: found ..., expected ...".
 std::string EncodingFault(std::string_view text);

@@ -8,7 +8,7 @@
 namespace loopbench::harness {
 namespace {
 
-constexpr std::string_view kExpected = "expected UTF-8 text without a byte order mark";
+constexpr std::string_view kExpected = "expected UTF-8 text";
 
 /// A byte order mark or the zero bytes of wide characters at the start, or "".
 std::string_view WideEncoding(std::string_view text) {
@@ -53,7 +53,7 @@ std::string PlaceOf(std::string_view text, std::size_t position) {
 
 std::string EncodingFault(std::string_view text) {
   if (text.starts_with("\xEF\xBB\xBF")) {
-    return fmt::format("1:1: found a UTF-8 byte order mark (EF BB BF), {}", kExpected);
+    return fmt::format("1:1: found a UTF-8 byte order mark (EF BB BF), {} without one", kExpected);
   }
   if (const std::string_view wide = WideEncoding(text); !wide.empty()) {
     return fmt::format("1:1: found {} text, {}", wide, kExpected);

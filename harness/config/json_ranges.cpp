@@ -96,10 +96,12 @@ std::vector<std::int64_t> JsonNode::IntegerList(std::int64_t min, std::int64_t m
   if (value_->is_object()) {
     const Range range = {.min = static_cast<double>(min), .max = static_cast<double>(max)};
     for (const double number : Spaced(range)) {
-      integers.push_back(std::llround(number));
-      if (known.insert(integers.back()).second) continue;
-      FailAs(fmt::format("{} twice after rounding", integers.back()), "a smaller count");
-      break;
+      const std::int64_t integer = std::llround(number);
+      if (!known.insert(integer).second) {
+        FailAs(fmt::format("{} twice after rounding", integer), "a smaller count");
+        break;
+      }
+      integers.push_back(integer);
     }
     return integers;
   }
@@ -111,11 +113,14 @@ std::vector<std::int64_t> JsonNode::IntegerList(std::int64_t min, std::int64_t m
     return {};
   }
   for (const JsonNode& element : OneOrMore("integers")) {
-    const std::size_t before = integers.size();
-    integers.push_back(element.Integer(min, max));
+    const std::int64_t integer = element.Integer(min, max);
     const bool sound = element.value().is_number() &&
-                       element.value().get<double>() == static_cast<double>(integers[before]);
-    if (!known.insert(integers[before]).second && sound) element.Fail("each value once");
+                       element.value().get<double>() == static_cast<double>(integer);
+    if (known.insert(integer).second) {
+      integers.push_back(integer);
+    } else if (sound) {
+      element.Fail("each value once");
+    }
   }
   return integers;
 }

@@ -94,10 +94,10 @@ void ErrorList::ThrowIfAny(const std::string& ending) const {
     const Origins::Place& place = places[i];
     const auto& known = lines[place.text];
     const auto line = known.find(place.line_pointer);
-    all.push_back(fmt::format(
-        "{}{}: {}: {}{}", place.file, line == known.end() ? "" : fmt::format(":{}", line->second),
-        place.pointer.empty() ? "(top level)" : place.pointer, messages_[i].text,
-        place.note.empty() ? "" : " (" + place.note + ")"));
+    all.push_back(fmt::format("{}{}: {}: {}{}", place.file,
+                              line == known.end() ? "" : fmt::format(":{}", line->second),
+                              ShownPointer(place.pointer), messages_[i].text,
+                              place.note.empty() ? "" : " (" + place.note + ")"));
   }
   if (more_ > 0) all.push_back(fmt::format("{}: and {} more", origins_.Find("").file, more_));
   if (!ending.empty()) all.push_back(ending);
@@ -182,7 +182,7 @@ std::vector<JsonNode> JsonNode::Elements(std::string_view what) const {
 
 std::vector<JsonNode> JsonNode::OneOrMore(std::string_view what) const {
   if (!value_->is_array()) return {*this};
-  if (value_->empty()) Fail(fmt::format("at least one of {}", what));
+  if (value_->empty()) Fail("an array that is not empty");
   return Elements(what);
 }
 

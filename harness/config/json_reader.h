@@ -66,10 +66,11 @@ class NameList {
   }
   NameList(std::initializer_list<std::string> names) : NameList(std::vector<std::string>(names)) {}
 
-  /// A name with the next index. Of equal names, which are an error of the file, the first counts.
+  /// A name with the next index. Of equal names, which are an error of the file, the first counts;
+  /// the others are kept as empty ones.
   void Add(const std::string& name) {
-    indices_.emplace(name, names_.size());
-    names_.push_back(name);
+    const bool first = indices_.emplace(name, names_.size()).second;
+    names_.push_back(first ? name : "");
   }
   /// The index of a name that is not empty, or nothing.
   std::optional<int> Find(const std::string& name) const {

@@ -2,23 +2,48 @@
 
 #include <fmt/format.h>
 
+#include <algorithm>
+
 namespace loopbench::harness {
 namespace {
 
+bool IsWordCharacter(char c) {
+  return (c >= 'a' && c <= 'z') || (c >= 'A' && c <= 'Z') || (c >= '0' && c <= '9') || c == '+' ||
+         c == '-' || c == '.' || c == '_';
+}
+
+/// The number or bare word that was read last, or the last character when there is none.
+std::string_view LastWord(std::string_view text, std::size_t position) {
+  if (position == 0 || text.empty()) return "";
+  std::size_t begin = std::min(position, text.size()) - 1;
+  if (!IsWordCharacter(text[begin]) && begin > 0 && IsWordCharacter(text[begin - 1])) --begin;
+  std::size_t end = begin + 1;
+  if (!IsWordCharacter(text[begin])) return text.substr(begin, 1);
+  while (begin > 0 && IsWordCharacter(text[begin - 1])) --begin;
+  while (end < text.size() && IsWordCharacter(text[end])) ++end;
+  return text.substr(begin, end - begin);
+}
+
 /// What the characters around a syntax error suggest, as " (...)" or "".
-std::string Hint(std::string_view text, std::size_t position) {
-  if (position == 0 || position > text.size()) return "";
+std::string Hint(std::string_view text, std::size_t position, std::string_view word) {
+  if (position == 0 || position > text.size() || word.empty()) return "";
   std::size_t at = position - 1;
   const char offending = text[at];
   if (offending == '/' || offending == '#') return " (comments are not allowed)";
-  const bool not_a_number = offending == 'N' || offending == 'I' || offending == 'i';
-  if (not_a_number) return " (NaN and Infinity are not allowed)";
   if (offending == '\'') return " (strings stand in double quotes)";
-  if (offending == '+') return " (numbers have no leading +)";
-  if (offending == '.') return " (numbers have a digit before the point)";
-  const bool after_zero = offending >= '0' && offending <= '9' && at > 0 && text[at - 1] == '0';
+  const std::string_view number = word.substr(word[0] == '-' || word[0] == '+' ? 1 : 0);
+  if (number.starts_with("NaN") || number.starts_with("nan") || number.starts_with("Inf") ||
+      number.starts_with("inf")) {
+    return " (NaN and Infinity are not allowed)";
+  }
+  if (word[0] == '+') return " (numbers have no leading +)";
+  if (number.starts_with('.')) return " (numbers have a digit before the point)";
+  if (number.starts_with("0x") || number.starts_with("0X")) return " (numbers are decimal)";
+  const bool after_zero =
+      number.size() > 1 && number[0] == '0' && number[1] >= '0' && number[1] <= '9';
   if (after_zero) return " (numbers have no leading zeros)";
-  if (offending == 'T' || offending == 'F') return " (true and false are written small)";
+  if (word == "True" || word == "False") return " (true and false are written small)";
+  if (word == "None") return " (no value is written null, or left out)";
   if (offending != ']' && offending != '}') return "";
   while (at > 0 && (text[at - 1] == ' ' || text[at - 1] == '\t' || text[at - 1] == '\n' ||
                     text[at - 1] == '\r')) {
@@ -28,9 +53,23 @@ std::string Hint(std::string_view text, std::size_t position) {
   return trailing_comma ? " (remove the comma before the closing bracket)" : "";
 }
 
-void Replace(std::string* text, std::string_view from, std::string_view to) {
-  const std::size_t at = text->find(from);
-  if (at != std::string::npos) text->replace(at, from.size(), to);
+/// What follows `start` in the message, up to `end` or to its end; "" without it.
+std::string Between(const std::string& message, std::string_view start, std::string_view end) {
+  const std::size_t at = message.find(start);
+  if (at == std::string::npos) return "";
+  const std::size_t from = at + start.size();
+  const std::size_t to = end.empty() ? std::string::npos : message.find(end, from);
+  return message.substr(from, to == std::string::npos ? to : to - from);
+}
+
+/// In words for people: the parser knows no "," where it expects a closing bracket.
+std::string Expected(const std::string& parsers, bool in_key) {
+  if (parsers == "'}'") return "',' or '}'";
+  if (parsers == "']'") return "',' or ']'";
+  if (parsers == "end of input") return "the end of the file";
+  if (parsers.starts_with("digit")) return "a digit" + parsers.substr(5);
+  if (in_key || parsers == "string literal") return "a key in double quotes";
+  return parsers.starts_with("'[', '{'") || parsers.empty() ? "a value" : parsers;
 }
 
 }  // namespace
@@ -45,28 +84,33 @@ std::string ShortToken(const std::string& token) {
   return "..." + token.substr(start);
 }
 
-// The parser's message reads "... while parsing WHAT - FOUND; expected EXPECTED;
-// last read: 'TOKEN'", where only FOUND is always there.
-std::string SyntaxMessage(std::string message, std::string_view text, std::size_t position) {
+// The message reads "... while parsing WHAT - FOUND; expected EXPECTED; last read: 'TOKEN'"; only
+// FOUND is always there, the others come in any order. TOKEN may be megabytes.
+std::string SyntaxMessage(const std::string& message, std::string_view text, std::size_t position) {
   const bool in_key = message.find("parsing object key") != std::string::npos;
-  if (const std::size_t dash = message.find(" - "); dash != std::string::npos) {
-    message.erase(0, dash + 3);
+  std::string found = Between(message, " - ", "; last read");
+  if (const std::size_t at = found.find("; expected "); at != std::string::npos) found.erase(at);
+  if (found.starts_with("invalid string: ")) {
+    return fmt::format("found an invalid string ({}), expected one as JSON writes it",
+                       found.substr(16));
   }
-  std::string expected = in_key ? "a key in double quotes" : "a value", token;
-  if (const std::size_t at = message.find("; last read: "); at != std::string::npos) {
-    token = " " + ShortToken(message.substr(at + 13));
-    message.erase(at);
+  std::string tail = message.substr(std::min(message.size(), message.find(" - ")));
+  const std::size_t last = tail.rfind("; expected ");
+  const std::string expected = Expected(
+      last == std::string::npos ? "" : Between(tail.substr(last), "; expected ", "; last read"),
+      in_key);
+  const std::string_view word = LastWord(text, position);
+  if (found.starts_with("unexpected ")) found.erase(0, 11);
+  if (found == "end of input") {
+    found = "the end of the file";
+  } else if (found == "string literal") {
+    found = "a string";
+  } else if (found == "invalid literal" || found == "number literal" || found == "invalid number" ||
+             found.ends_with(" literal")) {
+    const bool letters = !word.empty() && IsWordCharacter(word.front());
+    found = letters ? ShortToken(std::string(word)) : fmt::format("'{}'", word);
   }
-  if (const std::size_t at = message.find("; expected "); at != std::string::npos) {
-    expected = message.substr(at + 11);
-    message.erase(at);
-  }
-  Replace(&message, "unexpected ", "");
-  Replace(&message, "end of input", "the end of the file");
-  Replace(&expected, "end of input", "the end of the file");
-  Replace(&expected, "'[', '{', or a literal", "a value");
-  Replace(&expected, "string literal", "a key in double quotes");
-  return fmt::format("found {}{}, expected {}{}", message, token, expected, Hint(text, position));
+  return fmt::format("found {}, expected {}{}", found, expected, Hint(text, position, word));
 }
 
 }  // namespace loopbench::harness

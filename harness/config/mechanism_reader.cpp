@@ -64,6 +64,10 @@ MechanismFile ReadMechanismObject(const JsonNode& root) {
   MechanismFile result;
   result.canonical = root.value().dump(-1, ' ', false, Json::error_handler_t::replace);
   Draft draft;
+  if (root.value().is_object() && root.value().contains("scenes")) {
+    root.FailAs("an experiment (it has \"scenes\")", "a mechanism");
+    return result;
+  }
   if (root.ExpectObject({"name", "comment", "space", "gravity", "bodies", "ground", "joints",
                          "forces", "initial", "independent", "observe"})) {
     draft.name = ReadNewName(root, {});
@@ -76,11 +80,14 @@ MechanismFile ReadMechanismObject(const JsonNode& root) {
       draft.gravity = ReadVector(*gravity, draft.space);
     }
     ReadBodies(root, &draft);
-    ReadJoints(root, &draft);
-    ReadForces(root, &draft);
-    ReadInitial(root, &draft);
-    ReadIndependent(root, &draft);
-    result.observe = ReadObservation(root, draft);
+    // without bodies everything that names one would be a mistake, and none of its own
+    if (draft.bodies.size() > 1) {
+      ReadJoints(root, &draft);
+      ReadForces(root, &draft);
+      ReadInitial(root, &draft);
+      ReadIndependent(root, &draft);
+      result.observe = ReadObservation(root, draft);
+    }
   }
   result.description = std::move(static_cast<MechanismDescription&>(draft));
   return result;

@@ -223,7 +223,7 @@ TEST(Sweep, ThatCannotBeMeantIsRefused) {
               {"/sweep: found \"a\" and \"b\" both setting /limits/wall_s"});
   ExpectWords(error(R"([{"name": "a", "field": "/limits/wall_s", "values": {"lin": [1, 2, 1000]}},
                         {"name": "b", "field": "/limits/steps", "values": {"lin": [1, 1000, 1000]}}])"),
-              {"/sweep: found 1e+06 combinations, expected at most 100000"});
+              {"/sweep: found 1000000 combinations, expected at most 100000"});
 }
 
 TEST(Sweep, NamesOfAxesAreNeverKeysOfRecords) {

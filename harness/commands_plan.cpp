@@ -17,7 +17,9 @@ namespace loopbench::harness {
 
 namespace {
 
-constexpr double kPilotFraction = 0.02;        ///< of the horizon
+constexpr double kPilotFraction = 0.02;        ///< of the horizon, at first
+constexpr double kPilotGrowth = 5.0;           ///< then longer
+constexpr double kPilotEnough = 0.003;         ///< wall time that says something [s]
 constexpr double kPilotSeconds = 0.25;         ///< wall time of one pilot run
 constexpr std::size_t kPilotCombinations = 8;  ///< of a sweep; the others take the nearest one's
 constexpr double kFamilySeconds = 0.02;        ///< batches of right-hand sides of one family member
@@ -90,12 +92,20 @@ class Pilot {
     pilot.rtol = pilot.atol =
         *std::max_element(experiment.tolerances.begin(), experiment.tolerances.end());
     const std::vector<double>& horizons = experiment.scenes[scene].horizons;
-    pilot.horizon = kPilotFraction * *std::max_element(horizons.begin(), horizons.end());
+    const double horizon = *std::max_element(horizons.begin(), horizons.end());
     pilot.limits.wall_s = std::min(kPilotSeconds, like.limits.wall_s);
-    const Record record = RunCase(experiment, pilot);
-    const double reached = record.Number("t_reached"), wall = record.Number("wall_s");
-    // a run that fails at once costs next to nothing, and so will the case
-    return reached > 0.0 && wall > 0.0 ? wall / Work(reached, pilot.rtol) : 0.0;
+    // the first steps cost more than the later ones: longer, until the run is no longer short
+    for (double fraction = kPilotFraction;; fraction = std::min(1.0, kPilotGrowth * fraction)) {
+      pilot.horizon = fraction * horizon;
+      const Record record = RunCase(experiment, pilot);
+      const double reached = record.Number("t_reached"), wall = record.Number("wall_s");
+      // a run that fails at once costs next to nothing, and so will the case
+      if (!(reached > 0.0) || !(wall > 0.0)) return 0.0;
+      const bool failed = record.Text("outcome") != ToString(Outcome::kFinished);
+      if (wall >= kPilotEnough || failed || fraction >= 1.0) {
+        return wall / Work(reached, pilot.rtol);
+      }
+    }
   }
 
   const std::vector<Experiment>& experiments_;
@@ -207,8 +217,8 @@ void PrintPlan(const std::vector<Experiment>& experiments, const Plan& plan,
   }
   if (pilot.runs() > 0) {
     source += fmt::format(
-        "{}{} pilot runs over {:g} % of the longest horizon at the loosest tolerance, scaled with "
-        "the horizon and rtol^(-1/5)",
+        "{}{} pilots over {:g} % or more of the longest horizon at the loosest tolerance, scaled "
+        "with the horizon and rtol^(-1/5)",
         source.empty() ? "" : ", the rest from ", pilot.runs(), 100.0 * kPilotFraction);
   }
   fmt::print("An estimate, from {}. Each run ends at {:g} s of wall time at the latest.\n", source,

@@ -42,8 +42,8 @@ class Builder final : public Walker {
                         "1.8e308)",
                         ShortToken(token))
                   : SyntaxMessage(error.what(), text_, position);
-    complaints_.push_back(
-        fmt::format("{}:{}:{}: {}", file_, line, std::max<std::size_t>(column, 1), what));
+    complaints_.push_back(fmt::format("{}:{}:{}: {}", file_, line, std::max<std::size_t>(column, 1),
+                                      Printable(what)));
     return false;
   }
 
@@ -99,8 +99,8 @@ class Builder final : public Walker {
     if (complaints_.size() >= kMostMessages) {
       ++more_;
     } else {
-      complaints_.push_back(
-          fmt::format("{}:{}: {}: {}", file_, line(), ShownPointer(Pointer()), what));
+      complaints_.push_back(fmt::format("{}:{}: {}: {}", file_, line(),
+                                        Printable(ShownPointer(Pointer())), Printable(what)));
     }
   }
 
@@ -163,6 +163,19 @@ std::string ShownPointer(const std::string& pointer) {
   while (head > 0 && inside(head)) --head;
   while (tail < pointer.size() && inside(tail)) ++tail;
   return pointer.substr(0, head) + "..." + pointer.substr(tail);
+}
+
+std::string Printable(const std::string& text) {
+  std::string printable;
+  for (const char c : text) {
+    const auto byte = static_cast<unsigned char>(c);
+    if (byte >= 0x20 && byte != 0x7F) {
+      printable += c;
+    } else {
+      printable += fmt::format("\\u{:04x}", byte);
+    }
+  }
+  return printable;
 }
 
 std::string PointerToken(std::string_view key) {

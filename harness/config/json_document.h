@@ -52,6 +52,9 @@ std::string PointerToken(std::string_view key);
 /// for keys have no limit of their own.
 std::string ShownPointer(const std::string& pointer);
 
+/// With control characters as JSON escapes them: names may hold any, and a message is one line.
+std::string Printable(const std::string& text);
+
 /// "" when the text is UTF-8 without a byte order mark and without zero bytes; else where, what was
 /// found and what was expected, as "LINE:COLUMN: found ..., expected ...".
 std::string EncodingFault(std::string_view text);

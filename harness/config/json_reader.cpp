@@ -62,7 +62,7 @@ void ErrorList::Add(std::string_view pointer, std::string_view found, std::strin
   }
   std::string text = fmt::format("found {}, expected {}", found, expected);
   if (!suggestion.empty()) text += fmt::format(" (did you mean \"{}\"?)", suggestion);
-  messages_.push_back({false, std::string(pointer), std::move(text)});
+  messages_.push_back({false, std::string(pointer), Printable(text)});
 }
 
 void ErrorList::AddText(const std::string& text) {
@@ -96,7 +96,7 @@ void ErrorList::ThrowIfAny(const std::string& ending) const {
     const auto line = known.find(place.line_pointer);
     all.push_back(fmt::format("{}{}: {}: {}{}", place.file,
                               line == known.end() ? "" : fmt::format(":{}", line->second),
-                              ShownPointer(place.pointer), messages_[i].text,
+                              Printable(ShownPointer(place.pointer)), messages_[i].text,
                               place.note.empty() ? "" : " (" + place.note + ")"));
   }
   if (more_ > 0) all.push_back(fmt::format("{}: and {} more", origins_.Find("").file, more_));

@@ -18,7 +18,10 @@ std::string_view LastWord(std::string_view text, std::size_t position) {
   std::size_t begin = std::min(position, text.size()) - 1;
   if (!IsWordCharacter(text[begin]) && begin > 0 && IsWordCharacter(text[begin - 1])) --begin;
   std::size_t end = begin + 1;
-  if (!IsWordCharacter(text[begin])) return text.substr(begin, 1);
+  if (!IsWordCharacter(text[begin])) {
+    while (end < text.size() && (static_cast<unsigned char>(text[end]) & 0xC0u) == 0x80u) ++end;
+    return text.substr(begin, end - begin);  // a whole character, of several bytes perhaps
+  }
   while (begin > 0 && IsWordCharacter(text[begin - 1])) --begin;
   while (end < text.size() && IsWordCharacter(text[end])) ++end;
   return text.substr(begin, end - begin);

@@ -9,9 +9,18 @@
 #include <vector>
 
 #include "harness/config/experiment_reader.h"
+#include "harness/report/free_figure.h"
+#include "harness/report/table_view.h"
 #include "harness/suite.h"
 
 namespace loopbench::harness {
+
+/// The records of a store; warnings about it go to standard error.
+std::vector<Record> LoadRecords(const std::filesystem::path& store);
+
+/// drift.csv, drift.md, timing.csv and timing.md in `out`, and their short forms on the terminal.
+void WriteTables(const std::vector<Record>& records, const std::filesystem::path& out,
+                 const std::string& typed);
 
 struct RunCommand {
   std::vector<std::filesystem::path> experiments;
@@ -19,7 +28,15 @@ struct RunCommand {
   std::vector<Setting> settings;
   SuiteOptions suite;
 };
+/// Runs what the store does not have yet, then writes its tables.
 int Run(const RunCommand& command, const std::string& typed);
+
+struct MergeCommand {
+  std::vector<std::filesystem::path> stores;
+  std::filesystem::path out;  ///< a new store
+};
+/// Shards into one store: every case once. Throws when two stores disagree about a case.
+int Merge(const MergeCommand& command);
 
 /// Experiment files and what is changed and chosen of them.
 struct ExperimentFiles {
@@ -46,16 +63,18 @@ int Explain(const ExperimentFiles& files);
 
 struct TableCommand {
   std::filesystem::path store;
-  std::string kind = "drift";   ///< drift, timing or factorial
-  std::string format = "text";  ///< text, csv or markdown
-  Selection where;
-  std::filesystem::path out;  ///< standard output when empty
+  TableView view;
+  std::string format = "text";  ///< text, csv, markdown, json or latex
+  std::filesystem::path out;    ///< standard output when empty
 };
 int PrintTable(const TableCommand& command, const std::string& typed);
 
 struct PlotCommand {
-  std::filesystem::path store, out;
+  std::filesystem::path store;
+  std::filesystem::path out;  ///< folder, or for a free figure a file
+  std::string format;         ///< svg or pdf; "" for the file's ending, else svg
   Selection where;
+  FreeFigure free;  ///< without x and y the standard figures
 };
 int Plot(const PlotCommand& command);
 

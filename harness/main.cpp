@@ -5,6 +5,7 @@
 
 #include "harness/commands.h"
 #include "harness/config/config_error.h"
+#include "harness/main_compare.h"
 #include "harness/provenance.h"
 
 namespace {
@@ -34,12 +35,31 @@ Examples:
   loopbench list configs/experiments/paper/paper.json
   loopbench plan configs/experiments/paper/paper.json --set /limits/wall_s=5
   loopbench run configs/experiments/paper/paper.json --jobs 2 --filter mechanism=four-bar
+  loopbench run big.json --shard 1/2 --out part1   (and 2/2 elsewhere)
+  loopbench merge part1 part2 --out whole
   loopbench table results/runs/paper --where mechanism=four-bar,dead-centre --where rtol=1e-8
   loopbench plot results/runs/paper --out results/runs/paper/figures
   loopbench verdict results/runs/paper --claims configs/experiments/paper/claims.json
 
 Conditions are key=value or key=value,value; keys are the columns of drift.csv.
 Exit codes: 0 done, 1 a gate failed, 2 could not measure or bad input.)";
+
+constexpr const char* kTableFooter = R"(
+Examples:
+  loopbench table out --where rtol=1e-8 --group mechanism
+  loopbench table out --columns mechanism,formulation,drift_position_max --format latex
+  loopbench table out --kind timing --sort rhs_ns_median --format csv --out timing.csv
+
+Any key of the records may be a column; a wrong one is answered with the list of all.
+Every table ends with the command, machine, compiler, libraries and commit.)";
+
+constexpr const char* kPlotFooter = R"(
+Examples:
+  loopbench plot out --out out/figures
+  loopbench plot out --out work.svg --x rhs_evaluations --y drift_position_max --group formulation,coordinates
+  loopbench plot out --out cost.pdf --where kind=timing --x bodies --y ns_per_body --group formulation
+
+Without --x and --y: angles, and drift with its fitted exponents. Runs that failed are crosses.)";
 
 }  // namespace
 
@@ -60,7 +80,8 @@ int main(int argc, char** argv) {
 
   RunCommand run;
   bool no_timing = false, timing_only = false;
-  CLI::App* run_app = app.add_subcommand("run", "Run experiments; write records and tables");
+  CLI::App* run_app =
+      app.add_subcommand("run", "Run experiments, or go on with them; write records and tables");
   run_app->add_option("experiment", run.experiments, "Experiment files (JSON)")->required();
   run_app->add_option("--out", run.out,
                       "Folder for results.jsonl, drift.csv and timing.csv "
@@ -70,6 +91,14 @@ int main(int argc, char** argv) {
       ->capture_default_str();
   run_app->add_option("--filter", conditions, "Only accuracy cases with key=value[,value]");
   AddSettings(run_app, &settings);
+  std::string shard = "1/1", rerun = "none";
+  run_app->add_option("--shard", shard, "k/n: the k-th of n parts, to be merged later")
+      ->capture_default_str();
+  run_app->add_option("--rerun", rerun, "Cases to run although the store has them")
+      ->check(CLI::IsMember({"none", "failed", "all"}))
+      ->capture_default_str();
+  run_app->footer(
+      "A run that was interrupted goes on where it stopped: give the same command again.");
   CLI::Option* no = run_app->add_flag("--no-timing", no_timing, "Leave the timings out");
   run_app->add_flag("--timing-only", timing_only, "Only the timings")->excludes(no);
 
@@ -97,29 +126,57 @@ int main(int argc, char** argv) {
   explain_app->add_option("--filter", conditions, "Only cases with key=value[,value]");
   AddSettings(explain_app, &settings);
 
+  MergeCommand merge;
+  CLI::App* merge_app = app.add_subcommand("merge", "Put the stores of shards together");
+  merge_app->add_option("store", merge.stores, "Folders of runs, or .jsonl files")->required();
+  merge_app->add_option("--out", merge.out, "Folder of the new store")->required();
+
   TableCommand table;
   CLI::App* table_app = app.add_subcommand("table", "Print a table of stored records");
   table_app->add_option("store", table.store, "Folder of a run, or a .jsonl file")->required();
-  table_app->add_option("--kind", table.kind, "What the rows are")
-      ->check(CLI::IsMember({"drift", "timing", "factorial"}))
-      ->capture_default_str();
+  table_app
+      ->add_option("--kind", table.view.kind,
+                   "What the rows are (default: drift, or what the store has)")
+      ->check(CLI::IsMember({"drift", "timing", "factorial", "all"}));
   table_app->add_option("--format", table.format, "How they are written")
-      ->check(CLI::IsMember({"text", "csv", "markdown"}))
+      ->check(CLI::IsMember({"text", "csv", "markdown", "json", "latex"}))
       ->capture_default_str();
   table_app->add_option("--where", conditions, "Only records with key=value[,value]");
+  table_app->add_option("--columns", table.view.columns, "Keys of records, in this order: a,b,c")
+      ->delimiter(',');
+  table_app->add_option("--group", table.view.group, "One table per value of this key");
+  table_app->add_option("--sort", table.view.sort, "Order by this key first");
+  table_app->add_flag("--descending", table.view.descending, "Largest first")->needs("--sort");
   table_app->add_option("--out", table.out, "File (default: the terminal)");
+  table_app->footer(kTableFooter);
 
   PlotCommand plot;
-  CLI::App* plot_app = app.add_subcommand("plot", "Draw the figures of stored records (SVG)");
+  CLI::App* plot_app = app.add_subcommand(
+      "plot", "Draw the standard figures of stored records, or one value against another");
   plot_app->add_option("store", plot.store, "Folder of a run, or a .jsonl file")->required();
-  plot_app->add_option("--out", plot.out, "Folder for the figures")->required();
+  plot_app
+      ->add_option("--out", plot.out, "Folder for the figures; with --x and --y also a file's name")
+      ->required();
+  plot_app->add_option("--format", plot.format, "svg (default) or pdf")
+      ->check(CLI::IsMember({"svg", "pdf"}));
   plot_app->add_option("--where", conditions, "Only records with key=value[,value]");
+  plot_app->add_option("--x", plot.free.x, "Key of the horizontal axis");
+  plot_app->add_option("--y", plot.free.y, "Key of the vertical axis");
+  plot_app->add_option("--group", plot.free.group, "One curve per value of these keys: a,b");
+  plot_app
+      ->add_option("--log", plot.free.log,
+                   "Logarithmic axes (default: those that span two decades)")
+      ->check(CLI::IsMember({"x", "y", "xy", "none"}));
+  plot_app->add_option("--title", plot.free.title, "Title (default: what the records share)");
+  plot_app->footer(kPlotFooter);
 
   VerdictCommand verdict;
   CLI::App* verdict_app = app.add_subcommand("verdict", "Hold claims against stored records");
   verdict_app->add_option("store", verdict.store, "Folder of a run, or a .jsonl file")->required();
   verdict_app->add_option("--claims", verdict.claims, "Rules (JSON)")->required();
   verdict_app->add_option("--out", verdict.out, "Markdown file with all numbers");
+
+  ComparisonOptions comparison(app);
 
   try {
     app.parse(argc, argv);
@@ -128,16 +185,22 @@ int main(int argc, char** argv) {
   }
   try {
     const std::string typed = CommandLine(argc, argv);
-    run.suite.filter = table.where = plot.where = ParseSelection(conditions);
+    run.suite.filter = table.view.where = plot.where = ParseSelection(conditions);
     run.suite.timing = !no_timing;
     run.suite.accuracy = !timing_only;
     run.settings = files.settings = ParseSettings(settings);
     files.filter = ParseSelection(conditions);
+    run.suite.shard = ParseShard(shard);
+    run.suite.rerun = rerun == "all"      ? Rerun::kAll
+                      : rerun == "failed" ? Rerun::kFailed
+                                          : Rerun::kNone;
+    if (const auto code = comparison.Run(typed)) return *code;
     if (*run_app) return Run(run, typed);
     if (*list_app) return List(files);
     plan.files = files;
     if (*plan_app) return PrintPlans(plan);
     if (*explain_app) return Explain(files);
+    if (*merge_app) return Merge(merge);
     if (*check_app) return CheckFiles(files);
     if (*table_app) return PrintTable(table, typed);
     if (*plot_app) return Plot(plot);

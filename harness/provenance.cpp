@@ -8,23 +8,13 @@
 #include <ctime>
 #include <filesystem>
 #include <fstream>
-#include <thread>
+#include <iterator>
 
 #include "harness/build_info.h"
+#include "harness/hash.h"
+#include "harness/origin.h"
 
 namespace loopbench::harness {
-
-namespace {
-
-std::string CpuModel() {
-  std::ifstream file("/proc/cpuinfo");
-  for (std::string line; std::getline(file, line);) {
-    if (line.rfind("model name", 0) == 0) return line.substr(line.find(':') + 2);
-  }
-  return "unknown processor";
-}
-
-}  // namespace
 
 std::vector<std::string> Provenance(const std::string& command) {
   utsname system{};
@@ -34,12 +24,20 @@ std::vector<std::string> Provenance(const std::string& command) {
       fmt::format("command: {}", command),
       fmt::format("date: {:%Y-%m-%d %H:%M} UTC", fmt::gmtime(now)),
       fmt::format("commit: {}", kBuildCommit),
-      fmt::format("machine: {}, {} logical processors, {} {}", CpuModel(),
-                  std::thread::hardware_concurrency(), system.sysname, system.release),
-      fmt::format("compiler: {} {}, flags {}", kBuildCompiler, __VERSION__, kBuildFlags),
+      fmt::format("machine: {}, {} {}", ThisOrigin().machine, system.sysname, system.release),
+      fmt::format("compiler: {}, flags {}", ThisOrigin().compiler, ThisOrigin().flags),
       fmt::format("libraries: Eigen {}.{}.{}, SUNDIALS {}, fmt {}", EIGEN_WORLD_VERSION,
                   EIGEN_MAJOR_VERSION, EIGEN_MINOR_VERSION, kBuildSundials, FMT_VERSION),
   };
+}
+
+const std::string& CodeVersion() {
+  static const std::string version = [] {
+    std::ifstream file("/proc/self/exe", std::ios::binary);
+    const std::string bytes{std::istreambuf_iterator<char>(file), {}};
+    return Fnv1a(bytes);
+  }();
+  return version;
 }
 
 std::string CommandLine(int argc, const char* const* argv) {

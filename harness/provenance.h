@@ -9,6 +9,10 @@ namespace loopbench::harness {
 /// One fact per line, "command: ...". `command` is what the user typed.
 std::vector<std::string> Provenance(const std::string& command);
 
+/// 16 hexadecimal digits that change with any byte of this program: results of different versions
+/// are different results.
+const std::string& CodeVersion();
+
 /// The program's arguments as one shell line.
 std::string CommandLine(int argc, const char* const* argv);
 

@@ -3,8 +3,8 @@
 #include <fmt/format.h>
 
 #include <algorithm>
-#include <cstring>
 
+#include "harness/hash.h"
 #include "harness/integrator/arkode.h"
 #include "harness/observers/observer.h"
 #include "harness/store/record_json.h"
@@ -37,15 +37,9 @@ template std::unique_ptr<Formulation<Spatial, double>> MakeFormulation(
 
 namespace {
 
-/// FNV-1a (64 bit) over the bytes of the last state: equal hashes mean equal runs.
+/// Of the last state: equal hashes mean equal runs.
 std::string StateHash(std::span<const double> y) {
-  std::uint64_t hash = 0xcbf29ce484222325u;
-  for (const double value : y) {
-    unsigned char bytes[sizeof value];
-    std::memcpy(bytes, &value, sizeof value);
-    for (const unsigned char byte : bytes) hash = (hash ^ byte) * 0x100000001b3u;
-  }
-  return fmt::format("{:016x}", hash);
+  return Fnv1a({reinterpret_cast<const char*>(y.data()), y.size_bytes()});
 }
 
 /// What one run leaves behind.
@@ -157,6 +151,12 @@ void WriteGrowth(const Growth& growth, int failed, Record& record) {
   record.Set("growth_spread_late", growth.spread_late);
   record.Set("growth_regime", growth.regime);
   record.Set("growth_resolved", growth.resolved && failed == 0);
+  record.Set("growth_hypothesis", growth.hypothesis.name);
+  record.Set("growth_hypothesis_resolved", growth.hypothesis_resolved && failed == 0);
+  record.Set("growth_hypothesis_ratio", growth.hypothesis.ratio);
+  record.Set("growth_rate", growth.hypothesis.rate);
+  record.Set("growth_from", growth.t_from);
+  record.Set("growth_to", growth.t_to);
   record.Set("ensemble", std::int64_t{growth.members});
   record.Set("ensemble_failed", std::int64_t{failed});
 }
@@ -171,6 +171,19 @@ IntegratorOptions OptionsOf(const Case& one) {
   options.step_limit = one.limits.steps;
   options.time_limit_s = one.limits.wall_s;
   return options;
+}
+
+std::string CaseContent(const Experiment& experiment, const Case& one) {
+  Record content = CaseKeys(experiment, one);
+  content.Set("ensemble", std::int64_t{one.ensemble});
+  content.Set("seed", static_cast<std::int64_t>(one.seed));
+  content.Set("perturb", one.perturb);
+  content.Set("wall_s", one.limits.wall_s);
+  content.Set("steps", one.limits.steps);
+  content.Set("memory_mb", one.limits.memory_mb);
+  content.Set("series_points", std::int64_t{experiment.series_points});
+  content.Set("document", experiment.scenes[one.scene].mechanism.canonical);
+  return CaseId(content);
 }
 
 Record RunCase(const Experiment& experiment, const Case& one) {

@@ -3,14 +3,18 @@
 #include <fmt/format.h>
 
 #include <algorithm>
-#include <atomic>
 #include <cmath>
-#include <exception>
-#include <mutex>
-#include <thread>
+#include <cstdio>
+#include <functional>
+#include <map>
 
 #include "harness/config/config_error.h"
+#include "harness/hash.h"
+#include "harness/isolation/fault.h"
+#include "harness/isolation/processes.h"
+#include "harness/origin.h"
 #include "harness/progress.h"
+#include "harness/provenance.h"
 #include "harness/run_case.h"
 #include "harness/timing/time_cases.h"
 
@@ -22,32 +26,154 @@ namespace {
 /// run alone at the end.
 double Cost(const Case& one) { return one.ensemble * one.horizon * std::pow(one.rtol, -0.2); }
 
-void RunAccuracy(const Experiment& experiment, std::vector<Case> cases, int jobs,
-                 ResultStore& store) {
-  std::ranges::stable_sort(cases, std::greater<>(), Cost);
-  Progress progress("accuracy", cases.size());
-  std::atomic<std::size_t> next = 0;
-  std::exception_ptr failure;
-  std::mutex failure_mutex;
-  const auto work = [&] {
-    try {
-      for (std::size_t i = next++; i < cases.size(); i = next++) {
-        store.Append(RunCase(experiment, cases[i]));
-        progress.Step(
-            fmt::format("{} {} {}", cases[i].mechanism, ToString(cases[i].column), cases[i].rtol));
-      }
-    } catch (...) {
-      const std::lock_guard lock(failure_mutex);
-      failure = std::current_exception();
-      next = cases.size();
-    }
-  };
-  {
-    std::vector<std::jthread> threads;
-    for (int j = 0; j < jobs; ++j) threads.emplace_back(work);
-  }
-  if (failure) std::rethrow_exception(failure);
+/// One process: the records it owes, known but for their results, and how to make them.
+struct Piece {
+  std::vector<Record> owed;  ///< keys, case_id, id, version
+  std::function<std::vector<Record>()> work;
+  ProcessLimits limits;
+  std::string label;
+};
+
+/// Twice the time that the runs inside may take by themselves, and a little for starting.
+constexpr double kPatience = 2.0, kGrace_s = 2.0;
+
+std::string Id(const std::string& content) { return Fnv1a(content + CodeVersion()); }
+
+Piece AccuracyPiece(const Experiment& experiment, const Case& one) {
+  Record keys = CaseKeys(experiment, one);
+  keys.Set("case_id", CaseId(keys));
+  keys.Set("id", Id(CaseContent(experiment, one)));
+  const int runs = one.ensemble > 1 ? one.ensemble + 1 : 1;
+  return {{keys},
+          [&experiment, one] { return std::vector<Record>{RunCase(experiment, one)}; },
+          {kPatience * runs * one.limits.wall_s + kGrace_s, one.limits.memory_mb},
+          fmt::format("{} {} {}", one.mechanism, ToString(one.column), one.rtol)};
 }
+
+Piece TimingPiece(const Experiment& experiment, const TimingGroup& group) {
+  Piece piece;
+  for (std::size_t i = 0; i < group.cases.size(); ++i) {
+    Record keys = TimingKeys(experiment, group, i);
+    const std::string document =
+        group.simulate ? experiment.scenes[group.cases[i].scene].mechanism.canonical : "";
+    keys.Set("id", Id(fmt::format("{} {} {}", CaseId(keys), experiment.timing.repeats, document)));
+    piece.owed.push_back(keys);
+  }
+  // the first column is timed twice (noise.h)
+  const int columns = static_cast<int>(group.cases.size()) + 1;
+  const int runs = columns * (experiment.timing.repeats + 1);
+  // right-hand sides have no limit of their own; a minute per column is far beyond any
+  constexpr double kDerivatives_s = 60.0;
+  piece.limits = {kPatience * runs * experiment.limits.wall_s + kDerivatives_s * columns,
+                  experiment.limits.memory_mb};
+  piece.work = [&experiment, &group] { return TimeTogether(experiment, group); };
+  piece.label = group.description.name;
+  return piece;
+}
+
+std::string OutcomeOf(ProcessEnding ending) {
+  switch (ending) {
+    case ProcessEnding::kOverTime:
+      return "process-time-limit";
+    case ProcessEnding::kOverMemory:
+      return "memory-limit";
+    default:
+      return "crashed";
+  }
+}
+
+/// The child's side: all records, one a line.
+std::string Answer(const Piece& piece) {
+  if (const auto garbage = PlantedFault(piece.owed.front())) return *garbage;
+  std::string text;
+  for (const Record& record : piece.work()) text += ToJsonLine(record) + '\n';
+  return text;
+}
+
+/// The parent's side: what the piece owes, filled from the answer or with the reason why not.
+std::vector<Record> Records(const Piece& piece, const ProcessResult& result) {
+  std::vector<Record> records;
+  std::string outcome = OutcomeOf(result.ending), message = result.text;
+  if (result.ending == ProcessEnding::kThrew) message = "threw: " + message;
+  if (result.ending == ProcessEnding::kAnswered) {
+    outcome = "bad-answer";
+    message = "its process answered what is not its record";
+    try {
+      for (std::size_t start = 0; start < result.text.size();) {
+        const std::size_t end = std::min(result.text.find('\n', start), result.text.size());
+        records.push_back(FromJsonLine(std::string_view(result.text).substr(start, end - start)));
+        start = end + 1;
+      }
+    } catch (const std::runtime_error&) {
+      records.clear();
+    }
+  }
+  const auto same_case = [](const Record& a, const Record& b) {
+    return a.Text("case_id") == b.Text("case_id");
+  };
+  const bool good = std::ranges::equal(records, piece.owed, same_case);
+  if (!good) records = piece.owed;
+  for (std::size_t i = 0; i < records.size(); ++i) {
+    if (!good) {
+      records[i].Set("outcome", outcome);
+      records[i].Set("message", message);
+      records[i].Set("wall_s", result.wall_s);
+    }
+    records[i].Set("id", piece.owed[i].Text("id"));
+    records[i].Set("version", CodeVersion());
+    Stamp(records[i]);
+  }
+  return records;
+}
+
+/// Runs the pieces the store does not have, or that are to be run again.
+class Runner {
+ public:
+  Runner(const SuiteOptions& options, const std::vector<Record>& records, ResultStore& store)
+      : options_(options), store_(store) {
+    for (const Record& record : records) {
+      outcomes_[record.Text("id")] = record.Text("outcome");
+    }
+  }
+
+  void Run(const std::string& what, std::vector<Piece> pieces, int jobs) {
+    std::erase_if(pieces, [this](const Piece& piece) {
+      if (!Done(piece)) return false;
+      count_.skipped += piece.owed.size();
+      return true;
+    });
+    if (pieces.empty()) return;
+    Progress progress(what, pieces.size());
+    RunInProcesses(
+        pieces.size(), jobs, [&](std::size_t i) { return Answer(pieces[i]); },
+        [&](std::size_t i) { return pieces[i].limits; },
+        [&](std::size_t i, const ProcessResult& result) {
+          for (const Record& record : Records(pieces[i], result)) {
+            store_.Append(record);
+            ++count_.run;
+            count_.failed += record.Text("outcome") != ToString(Outcome::kFinished);
+          }
+          progress.Step(pieces[i].label);
+        });
+  }
+
+  const SuiteCount& count() const { return count_; }
+
+ private:
+  bool Done(const Piece& piece) const {
+    if (options_.rerun == Rerun::kAll) return false;
+    return std::ranges::all_of(piece.owed, [this](const Record& owed) {
+      const auto at = outcomes_.find(owed.Text("id"));
+      return at != outcomes_.end() &&
+             (options_.rerun == Rerun::kNone || at->second == ToString(Outcome::kFinished));
+    });
+  }
+
+  const SuiteOptions& options_;
+  ResultStore& store_;
+  std::map<std::string, std::string> outcomes_;  ///< by id, the last one
+  SuiteCount count_;
+};
 
 /// A condition on a key that cases do not have would silently match nothing.
 [[noreturn]] void RejectKey(const std::string& key, const Record& keys) {
@@ -74,17 +200,40 @@ std::vector<Case> SelectCases(const Experiment& experiment, const Selection& fil
   return cases;
 }
 
-void RunSuite(const Experiment& experiment, const SuiteOptions& options, ResultStore& store) {
+Shard ParseShard(const std::string& text) {
+  Shard shard;
+  int length = 0;
+  const int read = std::sscanf(text.c_str(), "%d/%d%n", &shard.index, &shard.count, &length);
+  if (read != 2 || static_cast<std::size_t>(length) != text.size() || shard.index < 1 ||
+      shard.index > shard.count) {
+    throw ConfigError(fmt::format("--shard: found \"{}\", expected k/n with 1 <= k <= n", text));
+  }
+  return shard;
+}
+
+SuiteCount RunSuite(const Experiment& experiment, const SuiteOptions& options,
+                    const std::vector<Record>& records, ResultStore& store) {
+  Runner runner(options, records, store);
   if (options.accuracy) {
-    RunAccuracy(experiment, SelectCases(experiment, options.filter), options.jobs, store);
+    const std::vector<Case> all = SelectCases(experiment, options.filter);
+    std::vector<Case> cases;
+    for (std::size_t i = 0; i < all.size(); ++i) {
+      if (options.shard.Takes(i)) cases.push_back(all[i]);
+    }
+    std::ranges::stable_sort(cases, std::greater<>(), Cost);
+    std::vector<Piece> pieces;
+    for (const Case& one : cases) pieces.push_back(AccuracyPiece(experiment, one));
+    runner.Run("accuracy", std::move(pieces), options.jobs);
   }
-  if (options.timing && CountTimings(experiment) > 0) {
-    Progress progress("timing", CountTimings(experiment));
-    TimeExperiment(experiment, [&](const Record& record) {
-      store.Append(record);
-      progress.Step(record.Text("mechanism"));
-    });
+  if (options.timing) {
+    const std::vector<TimingGroup> groups = TimingGroups(experiment);
+    std::vector<Piece> pieces;
+    for (std::size_t i = 0; i < groups.size(); ++i) {
+      if (options.shard.Takes(i)) pieces.push_back(TimingPiece(experiment, groups[i]));
+    }
+    runner.Run("timing", std::move(pieces), 1);
   }
+  return runner.count();
 }
 
 }  // namespace loopbench::harness

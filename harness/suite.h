@@ -1,6 +1,8 @@
-// Runs the cases of an experiment and keeps their records.
+// Runs the cases of experiments, each in a process of its own, and keeps their records.
 #pragma once
 
+#include <set>
+#include <string>
 #include <vector>
 
 #include "harness/config/experiment.h"
@@ -9,19 +11,47 @@
 
 namespace loopbench::harness {
 
+/// One of `count` parts of a run, for as many machines: every case is in exactly one part.
+struct Shard {
+  int index = 1, count = 1;
+  bool Takes(std::size_t number) const {
+    return number % static_cast<std::size_t>(count) == static_cast<std::size_t>(index - 1);
+  }
+};
+
+/// Reads "k/n" with 1 <= k <= n. Throws ConfigError.
+Shard ParseShard(const std::string& text);
+
+/// Which of the cases that a store already has are run again.
+enum class Rerun { kNone, kFailed, kAll };
+
 struct SuiteOptions {
   int jobs = 1;  ///< accuracy cases at once; timing always runs alone
   bool accuracy = true;
   bool timing = true;
   Selection filter;  ///< accuracy cases whose keys do not match are left out
+  Shard shard;
+  Rerun rerun = Rerun::kNone;
 };
 
 /// The accuracy cases that pass the filter. Throws ConfigError when none does, or when it names a
 /// key that cases do not have.
 std::vector<Case> SelectCases(const Experiment& experiment, const Selection& filter);
 
+/// What a run did.
+struct SuiteCount {
+  std::size_t run = 0;      ///< records made now
+  std::size_t skipped = 0;  ///< cases the store had already
+  std::size_t failed = 0;   ///< of those made now: any outcome but "finished"
+};
+
 /// Runs accuracy cases, costliest first, then timings, appending each record to the store as it is
-/// complete. Shows progress.
-void RunSuite(const Experiment& experiment, const SuiteOptions& options, ResultStore& store);
+/// complete. A case is done when the store has a record with its id, which stands for everything
+/// that decides the run and for this very program; `records` is what the store has. Shows progress.
+///
+/// Whatever a case does, it gets a record: outcomes "crashed", "process-time-limit", "memory-limit"
+/// and "bad-answer" are those of its process.
+SuiteCount RunSuite(const Experiment& experiment, const SuiteOptions& options,
+                    const std::vector<Record>& records, ResultStore& store);
 
 }  // namespace loopbench::harness

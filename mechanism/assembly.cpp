@@ -39,7 +39,7 @@ class Assembler {
   void ReadInitialData() {
     for (const TreeStep& step : mechanism_.tree()) {
       const Joint<Space, double>& joint = mechanism_.joints()[step.joint];
-      if (joint.kind->num_q == 7) start_.q[joint.q_offset] = 1.0;  // the unit quaternion
+      if (joint.kind->has_quaternion()) start_.q[joint.q_offset] = 1.0;  // the unit quaternion
     }
     const auto is_held = [&](int joint) {
       return std::ranges::find(description_.initial.held, joint) != description_.initial.held.end();
@@ -167,7 +167,7 @@ class Assembler {
     VectorX<double> moved = q + step;
     for (const TreeStep& tree_step : mechanism_.tree()) {
       const Joint<Space, double>& joint = mechanism_.joints()[tree_step.joint];
-      if (joint.kind->num_q == 7) moved.segment<4>(joint.q_offset).normalize();
+      if (joint.kind->has_quaternion()) moved.segment<4>(joint.q_offset).normalize();
     }
     return moved;
   }

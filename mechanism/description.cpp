@@ -3,6 +3,8 @@
 #include <Eigen/Cholesky>
 #include <cmath>
 
+#include "mechanism/joint.h"
+
 namespace loopbench {
 
 namespace {
@@ -26,6 +28,10 @@ std::string CheckBody(const BodyDescription& body) {
 
 /// A planar scene turns about z only: anything that tips or leaves the plane is refused.
 std::string CheckPlanarJoint(const JointDescription& joint) {
+  if (!ExistsInPlane(joint.type)) {
+    return "joint " + Quote(joint.name) + ": a " + std::string(ToString(joint.type)) +
+           " joint does not exist in the plane";
+  }
   const auto flat = [](const Eigen::Vector3d& v) { return v.z() == 0.0; };
   const auto about_z = [](const Eigen::Vector3d& v) { return v.x() == 0.0 && v.y() == 0.0; };
   if (!flat(joint.from.position) || !flat(joint.to.position)) {
@@ -35,8 +41,8 @@ std::string CheckPlanarJoint(const JointDescription& joint) {
     return "joint " + Quote(joint.name) + ": its frames may turn about z only in a planar scene";
   }
   if (joint.axis.isZero()) return "";
-  const bool fits = joint.type == JointType::kPrismatic ? flat(joint.axis)
-                                                        : about_z(joint.axis) && joint.axis.z() > 0;
+  const bool fits =
+      OwnAxis(joint.type) == 'x' ? flat(joint.axis) : about_z(joint.axis) && joint.axis.z() > 0;
   if (!fits) return "joint " + Quote(joint.name) + ": its axis does not belong to the plane";
   return "";
 }
@@ -89,12 +95,6 @@ std::string CheckForce(const MechanismDescription& description, const ForceDescr
       force);
 }
 
-/// Numbers that a joint of this type takes as coordinates (or speeds).
-std::size_t NumValues(JointType type, SpaceKind space, bool speeds) {
-  if (type == JointType::kFree) return space == SpaceKind::kPlanar ? 3 : speeds ? 6 : 7;
-  return HasOneCoordinate(type) ? 1 : 0;
-}
-
 std::string CheckValues(const MechanismDescription& description,
                         const std::vector<JointValues>& list, bool speeds) {
   for (const JointValues& values : list) {
@@ -103,7 +103,8 @@ std::string CheckValues(const MechanismDescription& description,
              ", which does not exist";
     }
     const JointDescription& joint = description.joints[values.joint];
-    const std::size_t expected = NumValues(joint.type, description.space, speeds);
+    const auto expected =
+        static_cast<std::size_t>(NumValues(joint.type, description.space, speeds));
     if (values.values.size() != expected) {
       return "initial values of joint " + Quote(joint.name) + ": " +
              std::to_string(values.values.size()) + " given, expected " + std::to_string(expected);
@@ -118,6 +119,31 @@ std::string CheckValues(const MechanismDescription& description,
 }
 
 }  // namespace
+
+bool ExistsInPlane(JointType type) { return type <= JointType::kPinInSlot; }
+
+char OwnAxis(JointType type) {
+  switch (type) {
+    case JointType::kPrismatic:
+    case JointType::kPinInSlot:
+      return 'x';
+    case JointType::kRevolute:
+    case JointType::kCylindrical:
+    case JointType::kPlanar:
+      return 'z';
+    default:
+      return '-';
+  }
+}
+
+int NumValues(JointType type, SpaceKind space, bool speeds) {
+  if (space == SpaceKind::kPlanar && ExistsInPlane(type)) {
+    const auto& kind = KindOf<Planar, double>(type);
+    return speeds ? kind.num_u : kind.num_q;
+  }
+  const auto& kind = KindOf<Spatial, double>(type);
+  return speeds ? kind.num_u : kind.num_q;
+}
 
 std::string Validate(const MechanismDescription& description) {
   if (description.bodies.size() < 2) return "a mechanism needs at least one body besides ground";

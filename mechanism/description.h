@@ -19,10 +19,29 @@ inline constexpr int kGround = 0;
 
 enum class SpaceKind { kPlanar, kSpatial };
 
-/// What a joint leaves free. The coordinates and directions of each are defined in joint.h.
-enum class JointType { kRevolute, kPrismatic, kWeld, kFree };
+/// What a joint leaves free. The coordinates and directions of each are defined in joint.h. From
+/// cylindrical on they exist in space only.
+enum class JointType {
+  kRevolute,
+  kPrismatic,
+  kWeld,
+  kFree,
+  kPinInSlot,
+  kCylindrical,
+  kSpherical,
+  kPlanar,
+  kUniversal,
+};
+inline constexpr int kNumJointTypes = 9;
 
 std::string_view ToString(JointType type);
+/// Whether a planar scene may have it.
+bool ExistsInPlane(JointType type);
+/// The axis of a joint's own frames that JointDescription::axis names: 'x' (slides along it), 'z'
+/// (turns about it, or is normal to its plane), or '-' for joints without one.
+char OwnAxis(JointType type);
+/// Coordinates (or speeds) of a joint.
+int NumValues(JointType type, SpaceKind space, bool speeds);
 std::string_view ToString(SpaceKind space);
 
 /// A rigid body. All vectors in body axes from the body's origin.
@@ -47,8 +66,8 @@ struct JointDescription {
   JointType type = JointType::kRevolute;
   JointSide from;  ///< P and F
   JointSide to;    ///< Q and M
-  /// Joint axis in the axes of both frames before alignment: z of a revolute, x of a prismatic
-  /// joint is turned onto it. Zero means the default (revolute about z, prismatic along x).
+  /// Joint axis in the axes of both frames before alignment: the joint's own axis (OwnAxis()) is
+  /// turned onto it. Zero means the own axis as it is.
   Eigen::Vector3d axis = Eigen::Vector3d::Zero();
   bool cut = false;  ///< never part of the spanning tree (if the graph allows)
 };

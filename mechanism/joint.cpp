@@ -3,6 +3,7 @@
 #include <cmath>
 #include <numbers>
 #include <type_traits>
+#include <vector>
 
 #include "mechanism/instantiate.h"
 
@@ -18,6 +19,16 @@ std::string_view ToString(JointType type) {
       return "weld";
     case JointType::kFree:
       return "free";
+    case JointType::kPinInSlot:
+      return "pin-in-slot";
+    case JointType::kCylindrical:
+      return "cylindrical";
+    case JointType::kSpherical:
+      return "spherical";
+    case JointType::kPlanar:
+      return "planar";
+    case JointType::kUniversal:
+      return "universal";
   }
   return "unknown";
 }
@@ -91,11 +102,66 @@ struct PlanarKinds {
                 },
             .rates = SameRates<S, 3>};
   }
+  static JointKind<Planar, S> PinInSlot() {
+    return {.num_q = 2,
+            .num_u = 2,
+            .axes = {0, 1, 2},
+            .isotropic = false,
+            .transform =
+                [](const S* q, P& X) {
+                  X.SetAngle(q[0]);
+                  X.p << q[1], S(0);
+                },
+            .coordinates =
+                [](const P& X, S* q) {
+                  q[0] = X.angle;
+                  q[1] = X.p[0];
+                },
+            .rates = SameRates<S, 2>};
+  }
 };
 
 template <class S>
 struct SpatialKinds {
   using P = Pose<Spatial, S>;
+
+  static void TurnAboutZ(S angle, P& X) {
+    using std::cos;
+    using std::sin;
+    const S c = cos(angle), s = sin(angle);
+    X.R << c, -s, S(0), s, c, S(0), S(0), S(0), S(1);
+  }
+  static S AngleAboutZ(const P& X) {
+    using std::atan2;
+    return atan2(X.R(1, 0) - X.R(0, 1), X.R(0, 0) + X.R(1, 1));
+  }
+  static void FromQuaternion(const S* q, P& X) {
+    X.R = Eigen::Quaternion<S>(q[0], q[1], q[2], q[3]).normalized().toRotationMatrix();
+  }
+  static void ToQuaternion(const P& X, S* q) {
+    const Eigen::Quaternion<S> e(X.R);
+    q[0] = e.w();
+    q[1] = e.x();
+    q[2] = e.y();
+    q[3] = e.z();
+  }
+  /// The angular velocity is in F axes, hence the product from the left: e' = w e / 2.
+  static void QuaternionRates(const S* q, const S* u, S* qdot) {
+    const S half = S(1) / S(2);
+    qdot[0] = half * (-u[0] * q[1] - u[1] * q[2] - u[2] * q[3]);
+    qdot[1] = half * (u[0] * q[0] + u[1] * q[3] - u[2] * q[2]);
+    qdot[2] = half * (-u[0] * q[3] + u[1] * q[0] + u[2] * q[1]);
+    qdot[3] = half * (u[0] * q[2] - u[1] * q[1] + u[2] * q[0]);
+  }
+  /// The axes of a universal joint: x of F, y of M made normal to it, and the normal of both, about
+  /// which it does not turn.
+  static Rotation<Spatial, S> CrossAxes(const P& X) {
+    const Linear<Spatial, S> x = Linear<Spatial, S>::UnitX(), y_M = X.R.col(1);
+    const Linear<Spatial, S> normal = x.cross(y_M).normalized();
+    Rotation<Spatial, S> axes;
+    axes << x, normal.cross(x), normal;
+    return axes;
+  }
 
   static JointKind<Spatial, S> Revolute() {
     return {.num_q = 1,
@@ -104,17 +170,10 @@ struct SpatialKinds {
             .isotropic = false,
             .transform =
                 [](const S* q, P& X) {
-                  using std::cos;
-                  using std::sin;
-                  const S c = cos(q[0]), s = sin(q[0]);
-                  X.R << c, -s, S(0), s, c, S(0), S(0), S(0), S(1);
+                  TurnAboutZ(q[0], X);
                   X.p.setZero();
                 },
-            .coordinates =
-                [](const P& X, S* q) {
-                  using std::atan2;
-                  q[0] = atan2(X.R(1, 0) - X.R(0, 1), X.R(0, 0) + X.R(1, 1));
-                },
+            .coordinates = [](const P& X, S* q) { q[0] = AngleAboutZ(X); },
             .rates = SameRates<S, 1>};
   }
   static JointKind<Spatial, S> Prismatic() {
@@ -146,28 +205,112 @@ struct SpatialKinds {
             .isotropic = false,
             .transform =
                 [](const S* q, P& X) {
-                  X.R =
-                      Eigen::Quaternion<S>(q[0], q[1], q[2], q[3]).normalized().toRotationMatrix();
+                  FromQuaternion(q, X);
                   X.p << q[4], q[5], q[6];
                 },
             .coordinates =
                 [](const P& X, S* q) {
-                  const Eigen::Quaternion<S> e(X.R);
-                  q[0] = e.w();
-                  q[1] = e.x();
-                  q[2] = e.y();
-                  q[3] = e.z();
+                  ToQuaternion(X, q);
                   for (int i = 0; i < 3; ++i) q[4 + i] = X.p[i];
                 },
-            // The angular velocity is in F axes, hence the product from the left: e' = w e / 2.
             .rates =
                 [](const S* q, const S* u, S* qdot) {
-                  const S half = S(1) / S(2);
-                  qdot[0] = half * (-u[0] * q[1] - u[1] * q[2] - u[2] * q[3]);
-                  qdot[1] = half * (u[0] * q[0] + u[1] * q[3] - u[2] * q[2]);
-                  qdot[2] = half * (-u[0] * q[3] + u[1] * q[0] + u[2] * q[1]);
-                  qdot[3] = half * (u[0] * q[2] - u[1] * q[1] + u[2] * q[0]);
+                  QuaternionRates(q, u, qdot);
                   for (int i = 0; i < 3; ++i) qdot[4 + i] = u[3 + i];
+                }};
+  }
+  static JointKind<Spatial, S> PinInSlot() {
+    return {.num_q = 2,
+            .num_u = 2,
+            .axes = {2, 3, 0, 1, 4, 5},
+            .transform =
+                [](const S* q, P& X) {
+                  TurnAboutZ(q[0], X);
+                  X.p << q[1], S(0), S(0);
+                },
+            .coordinates =
+                [](const P& X, S* q) {
+                  q[0] = AngleAboutZ(X);
+                  q[1] = X.p[0];
+                },
+            .rates = SameRates<S, 2>};
+  }
+  static JointKind<Spatial, S> Cylindrical() {
+    return {.num_q = 2,
+            .num_u = 2,
+            .axes = {2, 5, 0, 1, 3, 4},
+            .transform =
+                [](const S* q, P& X) {
+                  TurnAboutZ(q[0], X);
+                  X.p << S(0), S(0), q[1];
+                },
+            .coordinates =
+                [](const P& X, S* q) {
+                  q[0] = AngleAboutZ(X);
+                  q[1] = X.p[2];
+                },
+            .rates = SameRates<S, 2>};
+  }
+  static JointKind<Spatial, S> Spherical() {
+    return {.num_q = 4,
+            .num_u = 3,
+            .axes = {0, 1, 2, 3, 4, 5},
+            .transform =
+                [](const S* q, P& X) {
+                  FromQuaternion(q, X);
+                  X.p.setZero();
+                },
+            .coordinates = [](const P& X, S* q) { ToQuaternion(X, q); },
+            .rates = QuaternionRates};
+  }
+  static JointKind<Spatial, S> InPlane() {
+    return {.num_q = 3,
+            .num_u = 3,
+            .axes = {2, 3, 4, 0, 1, 5},
+            .transform =
+                [](const S* q, P& X) {
+                  TurnAboutZ(q[0], X);
+                  X.p << q[1], q[2], S(0);
+                },
+            .coordinates =
+                [](const P& X, S* q) {
+                  q[0] = AngleAboutZ(X);
+                  q[1] = X.p[0];
+                  q[2] = X.p[1];
+                },
+            .rates = SameRates<S, 3>};
+  }
+  static JointKind<Spatial, S> Universal() {
+    return {.num_q = 2,
+            .num_u = 2,
+            .axes = {0, 1, 2, 3, 4, 5},
+            .transform =
+                [](const S* q, P& X) {
+                  using std::cos;
+                  using std::sin;
+                  const S c = cos(q[0]), s = sin(q[0]), cy = cos(q[1]), sy = sin(q[1]);
+                  X.R << cy, S(0), sy, s * sy, c, -s * cy, -c * sy, s, c * cy;
+                  X.p.setZero();
+                },
+            .coordinates =
+                [](const P& X, S* q) {
+                  using std::atan2;
+                  q[0] = atan2(X.R(2, 1), X.R(1, 1));
+                  q[1] = atan2(X.R(0, 2), X.R(0, 0));
+                },
+            .rates = SameRates<S, 2>,
+            .basis =
+                [](const P& X, Block<Spatial, S>& basis_F) {
+                  basis_F.setIdentity();
+                  basis_F.template topLeftCorner<3, 3>() = CrossAxes(X);
+                },
+            // the second axis turns about the first: d/dt y' = u0 (x cross y')
+            .bias =
+                [](const P& X, const Motion<Spatial, S>& V, Motion<Spatial, S>& Hdot_u) {
+                  const Rotation<Spatial, S> axes = CrossAxes(X);
+                  const Linear<Spatial, S> w = V.template head<3>();
+                  Hdot_u.setZero();
+                  Hdot_u.template head<3>() = axes.col(0).dot(w) * axes.col(1).dot(w) * axes.col(2);
                 }};
   }
 };
@@ -177,9 +320,19 @@ struct SpatialKinds {
 template <class Space, class S>
 const JointKind<Space, S>& KindOf(JointType type) {
   using Kinds = std::conditional_t<Space::kRot == 1, PlanarKinds<S>, SpatialKinds<S>>;
-  static const JointKind<Space, S> kKinds[] = {Kinds::Revolute(), Kinds::Prismatic(), Kinds::Weld(),
-                                               Kinds::Free()};
-  return kKinds[static_cast<int>(type)];
+  const auto all = [] {
+    std::vector<JointKind<Space, S>> kinds = {Kinds::Revolute(), Kinds::Prismatic(), Kinds::Weld(),
+                                              Kinds::Free(), Kinds::PinInSlot()};
+    if constexpr (Space::kRot == 3) {
+      kinds.push_back(Kinds::Cylindrical());
+      kinds.push_back(Kinds::Spherical());
+      kinds.push_back(Kinds::InPlane());
+      kinds.push_back(Kinds::Universal());
+    }
+    return kinds;
+  };
+  static const std::vector<JointKind<Space, S>> kKinds = all();
+  return kKinds.at(static_cast<std::size_t>(type));
 }
 
 template <class Space, class S>

@@ -11,11 +11,20 @@
 //   A_Q - A_P = H udot + g,   g = Hdot u + [w_P x w_rel; 2 w_P x v_rel],                  (7)
 // w_rel, v_rel being the measured relative motion seen in F. With that g, "D^T (A_Q - A_P - g) = 0"
 // says that the mismatch, written in F axes, has no second derivative (to first order in a rotation
-// mismatch in space). For the kinds here H_F is constant and Hdot u = 0.
+// mismatch in space). For most kinds H_F is constant and Hdot u = 0.
 //
-// Coordinates: revolute [angle about z], prismatic [shift along x], weld none,
-// free: plane [angle, x, y], space [quaternion w x y z, x, y, z] with speeds [w; v] in F axes. The
-// quaternion is normalised where it is used, so its length carries no information.
+// Coordinates, in F axes:
+//   revolute      angle about z
+//   prismatic     shift along x
+//   weld          none
+//   free          plane: angle, x, y; space: quaternion w x y z, then x, y, z
+//   pin-in-slot   angle about z, shift along x
+//   cylindrical   angle about z, shift along z
+//   spherical     quaternion w x y z
+//   planar        angle about z, x, y
+//   universal     angle about x, then about the turned y
+// Speeds are their rates; with a quaternion, the angular velocity. A quaternion is normalised where
+// it is used, so its length carries no information.
 #pragma once
 
 #include <array>
@@ -29,8 +38,8 @@ template <class Space, class S>
 struct JointKind {
   int num_q = 0;
   int num_u = 0;
-  /// Every direction of H and D is a coordinate axis of F and constant: [H D] is a permutation of
-  /// the components of a motion, the num_u free ones first.
+  /// Where every direction of H and D is a coordinate axis of F and constant: [H D] as a
+  /// permutation of the components of a motion, the num_u free ones first.
   std::array<int, Space::kDim> axes{};
   /// The span of D is the same in all axes (a planar pin): then ground axes serve for F axes.
   bool isotropic = false;
@@ -39,6 +48,13 @@ struct JointKind {
   void (*coordinates)(const Pose<Space, S>& X_FM, S* q) = nullptr;
   void (*rates)(const S* q, const S* u, S* qdot) = nullptr;
 
+  /// Where they are not: [H D] in F axes at a pose, orthogonal; null otherwise.
+  void (*basis)(const Pose<Space, S>& X_FM, Block<Space, S>& basis_F) = nullptr;
+  /// And Hdot u in F axes, for a relative motion V in F axes.
+  void (*bias)(const Pose<Space, S>& X_FM, const Motion<Space, S>& V,
+               Motion<Space, S>& Hdot_u) = nullptr;
+
+  bool has_quaternion() const { return num_q > num_u; }
   int num_constraints() const { return Space::kDim - num_u; }
 };
 

@@ -35,6 +35,20 @@ void SetBasis(const JointKind<Space, S>& kind, const Rotation<Space, S>& R,
   }
 }
 
+/// [H D] of a kind whose directions depend on the pose.
+template <class Space, class S>
+void SetBasisAt(const JointKind<Space, S>& kind, const Rotation<Space, S>& R,
+                const Pose<Space, S>& X_FM, Block<Space, S>& basis) {
+  Block<Space, S> in_F;
+  kind.basis(X_FM, in_F);
+  basis.template bottomRows<Space::kLin>().noalias() = R * in_F.template bottomRows<Space::kLin>();
+  if constexpr (Space::kRot == 1) {
+    basis.template topRows<1>() = in_F.template topRows<1>();
+  } else {
+    basis.template topRows<3>().noalias() = R * in_F.template topRows<3>();
+  }
+}
+
 /// Ground axes serve for H and D when their spans do not depend on axes, or when F is fixed.
 template <class Space, class S>
 bool TurnsWithBody(const Joint<Space, S>& joint) {
@@ -74,7 +88,12 @@ void Kinematics<Space, S>::UpdatePosition(const VectorX<S>& q) {
     JointState<Space, S>& state = joints_[index];
     state.r_P = X_WM.p - poses_[joint.from].p;
     state.r_Q = X_WM.p - poses_[joint.to].p;
-    if (TurnsWithBody(joint)) SetBasis<Space, S>(*joint.kind, X_WF.R, state.basis);
+    if (joint.kind->basis != nullptr) {
+      measured_[index] = X_FM;
+      SetBasisAt<Space, S>(*joint.kind, X_WF.R, X_FM, state.basis);
+    } else if (TurnsWithBody(joint)) {
+      SetBasis<Space, S>(*joint.kind, X_WF.R, state.basis);
+    }
   };
   for (const TreeStep& step : mechanism_->tree()) {
     const Joint<Space, S>& joint = mechanism_->joints()[step.joint];
@@ -95,7 +114,8 @@ void Kinematics<Space, S>::UpdatePosition(const VectorX<S>& q) {
     const Joint<Space, S>& joint = mechanism_->joints()[index];
     X_WF = Compose(poses_[joint.from], joint.X_PF);
     X_WM = Compose(poses_[joint.to], joint.X_QM);
-    measured_[index] = Compose(Inverse(X_WF), X_WM);
+    X_FM = Compose(Inverse(X_WF), X_WM);
+    measured_[index] = X_FM;
     finish(index, joint);
   }
 }
@@ -103,11 +123,13 @@ void Kinematics<Space, S>::UpdatePosition(const VectorX<S>& q) {
 template <class Space, class S>
 void Kinematics<Space, S>::UpdateVelocity(const VectorX<S>& u) {
   u_ = u;
-  const auto finish = [&](const Joint<Space, S>& joint, JointState<Space, S>& state) {
+  const auto finish = [&](int index, const Joint<Space, S>& joint) {
+    JointState<Space, S>& state = joints_[index];
     const Angular<Space, S> w_P = motions_[joint.from].template head<Space::kRot>();
     const Angular<Space, S> w_rel = state.V_rel.template head<Space::kRot>();
     const Linear<Space, S> v_rel = state.V_rel.template tail<Space::kLin>();
     state.g << CrossAngular<S>(w_P, w_rel), S(2) * Cross<S>(w_P, v_rel);
+    if (joint.kind->bias != nullptr) AddBias(index, joint, state);
   };
   for (const TreeStep& step : mechanism_->tree()) {
     const Joint<Space, S>& joint = mechanism_->joints()[step.joint];
@@ -122,14 +144,33 @@ void Kinematics<Space, S>::UpdateVelocity(const VectorX<S>& u) {
     Motion<Space, S> V = ShiftMotion<Space, S>(motions_[step.parent], r_parent);
     V += S(step.sign) * state.V_rel;
     motions_[step.child] = ShiftMotion<Space, S>(V, to_child);
-    finish(joint, state);
+    finish(step.joint, joint);
   }
   for (int index : mechanism_->constraints()) {
     const Joint<Space, S>& joint = mechanism_->joints()[index];
     JointState<Space, S>& state = joints_[index];
     state.V_rel = ShiftMotion<Space, S>(motions_[joint.to], state.r_Q) -
                   ShiftMotion<Space, S>(motions_[joint.from], state.r_P);
-    finish(joint, state);
+    finish(index, joint);
+  }
+}
+
+/// g += Hdot u, which the kind knows in F axes.
+template <class Space, class S>
+void Kinematics<Space, S>::AddBias(int index, const Joint<Space, S>& joint,
+                                   JointState<Space, S>& state) const {
+  const Rotation<Space, S> R = poses_[joint.from].R * joint.X_PF.R;
+  Motion<Space, S> in_F = state.V_rel, bias;
+  in_F.template tail<Space::kLin>() = R.transpose() * state.V_rel.template tail<Space::kLin>();
+  if constexpr (Space::kRot == 3) {
+    in_F.template head<3>() = R.transpose() * state.V_rel.template head<3>();
+  }
+  joint.kind->bias(measured_[index], in_F, bias);
+  state.g.template tail<Space::kLin>() += R * bias.template tail<Space::kLin>();
+  if constexpr (Space::kRot == 3) {
+    state.g.template head<3>() += R * bias.template head<3>();
+  } else {
+    state.g[0] += bias[0];
   }
 }
 

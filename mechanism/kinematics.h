@@ -79,13 +79,14 @@ class Kinematics {
   VectorX<S> SpeedsIn(const Kinematics& other) const;
 
  private:
+  void AddBias(int index, const Joint<Space, S>& joint, JointState<Space, S>& state) const;
   Pose<Space, S> MeasuredPose(const Joint<Space, S>& joint) const;
 
   const Mechanism<Space, S>* mechanism_;
   std::vector<Pose<Space, S>> poses_;
   std::vector<Motion<Space, S>> motions_;
   std::vector<JointState<Space, S>> joints_;
-  std::vector<Pose<Space, S>> measured_;  ///< X_FM of constraints, by joint
+  std::vector<Pose<Space, S>> measured_;  ///< X_FM of constraints and of kinds with a basis
   std::vector<S> accepted_;               ///< last accepted coordinate of each joint
   VectorX<S> q_, u_;
   long position_version_ = 0;

@@ -20,8 +20,8 @@ MechanismDescription Chain(int num_bars);
 /// `angle` from +x, turning at `speed` [rad/s] on the parallel branch.
 MechanismDescription Ladder(int num_windows, double angle, double speed);
 
-/// `num_storeys` rows of `num_windows` parallelograms of unit bars as in Ladder. Storey r = 1, 2, ..
-/// stands at `angle` + 0.1 (r - 1) from +x and turns at r `speed` [rad/s].
+/// `num_storeys` rows of `num_windows` parallelograms of unit bars as in Ladder. Storey r = 1, 2,
+/// .. stands at `angle` + 0.1 (r - 1) from +x and turns at r `speed` [rad/s].
 MechanismDescription Grid(int num_storeys, int num_windows, double angle, double speed);
 
 /// A unit bar from its origin A to B = (length, 0): com in the middle.

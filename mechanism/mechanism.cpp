@@ -42,11 +42,11 @@ Pose<Spatial, S> Cast(const Pose<Spatial, double>& X) {
   return {X.R.template cast<S>(), X.p.template cast<S>()};
 }
 
-/// Turns z (revolute) or x (prismatic) onto the joint's axis, by the shortest rotation.
+/// Turns the joint's own axis, z or x, onto the described one, by the shortest rotation.
 Eigen::Matrix3d Alignment(const JointDescription& joint) {
   if (joint.axis.isZero()) return Eigen::Matrix3d::Identity();
-  const bool prismatic = joint.type == JointType::kPrismatic;
-  const Eigen::Vector3d own = prismatic ? Eigen::Vector3d::UnitX() : Eigen::Vector3d::UnitZ();
+  const bool along_x = OwnAxis(joint.type) == 'x';
+  const Eigen::Vector3d own = along_x ? Eigen::Vector3d::UnitX() : Eigen::Vector3d::UnitZ();
   const Eigen::Vector3d axis = joint.axis.normalized(), normal = own.cross(axis);
   const double s = normal.norm(), c = own.dot(axis);
   // axis parallel to its own: nothing, or half a turn about y (perpendicular to x and to z)
@@ -62,13 +62,13 @@ Pose<Space, S> SidePose(const JointSide& side, const JointDescription& joint,
   Eigen::Matrix3d R = Alignment(joint);
   if (turn > 0.0) R = Eigen::AngleAxisd(turn, side.rotation / turn).toRotationMatrix() * R;
   double angle = side.rotation.z();
-  if (joint.type == JointType::kPrismatic && !joint.axis.isZero()) {
+  if (OwnAxis(joint.type) == 'x' && !joint.axis.isZero()) {
     angle += std::atan2(joint.axis.y(), joint.axis.x());
   }
   return Cast<S>(MakePose(side.position - com, R, angle, Space{}));
 }
 
-/// Names of the speeds of a joint with several.
+/// Names of the speeds of a joint with several, by component of a motion.
 template <class Space>
 std::vector<std::string> ComponentNames() {
   if constexpr (Space::kRot == 1) return {"angle", "x", "y"};
@@ -211,7 +211,8 @@ void Mechanism<Space, S>::NameSpeeds(const MechanismDescription& description) {
     const std::string& joint = joint_names_[step.joint];
     const int num_u = joints_[step.joint].kind->num_u;
     for (int i = 0; i < num_u; ++i) {
-      speed_names_.push_back(num_u == 1 ? joint : joint + "." + components[i]);
+      speed_names_.push_back(
+          num_u == 1 ? joint : joint + "." + components[joints_[step.joint].kind->axes[i]]);
     }
   }
   for (const std::string& name : description.independent) {

@@ -74,13 +74,21 @@ struct Statistics {
   double spread;  // sample standard deviation; NaN for one value
 };
 
-Statistics SlopesInWindow(std::span<const DriftSeries> maxima, double t_from, double t_to,
-                          int points) {
-  const auto count = static_cast<double>(maxima.size());
+std::vector<DriftSeries> Readings(std::span<const DriftSeries> maxima, double t_from, double t_to,
+                                  int points) {
+  std::vector<DriftSeries> readings;
+  for (const DriftSeries& maximum : maxima) {
+    readings.push_back(Resample(maximum, t_from, t_to, points));
+  }
+  return readings;
+}
+
+Statistics Slopes(std::span<const DriftSeries> readings) {
+  const auto count = static_cast<double>(readings.size());
   std::vector<double> slopes;
   double mean = 0;
-  for (const DriftSeries& maximum : maxima) {
-    slopes.push_back(LogLogSlope(Resample(maximum, t_from, t_to, points)));
+  for (const DriftSeries& member : readings) {
+    slopes.push_back(LogLogSlope(member));
     mean += slopes.back() / count;
   }
   double squares = 0;
@@ -147,8 +155,17 @@ Growth AnalyseGrowth(std::span<const DriftSeries> runs, double t_end, double len
   if (!(length > 0)) {
     throw std::invalid_argument("length is " + std::to_string(length) + "; it must be positive");
   }
-  Growth growth{kNaN, kNaN, kNaN, kNaN, false, "too-short", static_cast<int>(runs.size()),
-                kNaN, kNaN};
+  Growth growth{.exponent = kNaN,
+                .spread = kNaN,
+                .exponent_late = kNaN,
+                .spread_late = kNaN,
+                .resolved = false,
+                .regime = "too-short",
+                .members = static_cast<int>(runs.size()),
+                .t_from = kNaN,
+                .t_to = kNaN,
+                .hypothesis = {.ratio = kNaN, .rate = kNaN},
+                .hypothesis_resolved = false};
   std::vector<DriftSeries> maxima;
   std::transform(runs.begin(), runs.end(), std::back_inserter(maxima), RunningMaximum);
   if (maxima.empty()) {
@@ -160,8 +177,9 @@ Growth AnalyseGrowth(std::span<const DriftSeries> runs, double t_end, double len
   const bool too_short = IsTooShort(maxima, t_from, t_to, options);
   if (!too_short) {
     const double t_late = std::max(t_from, options.late_window_start * t_to);
-    const Statistics whole = SlopesInWindow(maxima, t_from, t_to, options.points);
-    const Statistics late = SlopesInWindow(maxima, t_late, t_to, options.points);
+    const std::vector<DriftSeries> readings = Readings(maxima, t_from, t_to, options.points);
+    const Statistics whole = Slopes(readings);
+    const Statistics late = Slopes(Readings(maxima, t_late, t_to, options.points));
     growth.exponent = whole.mean;
     growth.spread = whole.spread;
     growth.exponent_late = late.mean;
@@ -169,6 +187,9 @@ Growth AnalyseGrowth(std::span<const DriftSeries> runs, double t_end, double len
     growth.t_from = t_from;
     growth.t_to = t_to;
     growth.resolved = IsResolved(growth, options);
+    growth.hypothesis = CompareHypotheses(readings, whole.mean, options.hypotheses);
+    growth.hypothesis_resolved = growth.hypothesis.refutes_rivals &&
+                                 (growth.hypothesis.name == "exponential" || growth.resolved);
     growth.regime = usable.saturates ? "saturated" : "truncation";
   }
   if (usable.final_drift < options.round_off * std::numeric_limits<double>::epsilon() * length) {

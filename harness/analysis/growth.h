@@ -5,14 +5,9 @@
 #include <string>
 #include <vector>
 
-namespace loopbench::harness {
+#include "harness/analysis/hypotheses.h"
 
-/// One run's drift: times since release in s, increasing, and drift in the unit of `length` below
-/// (signs are dropped). Samples belong to accepted steps. A value that is not finite ends the run.
-struct DriftSeries {
-  std::vector<double> t;
-  std::vector<double> value;
-};
+namespace loopbench::harness {
 
 /// What is cut off and when a window is long enough. Fractions of times are of the end of the
 /// usable part of the runs.
@@ -55,6 +50,8 @@ struct GrowthOptions {
   /// Largest standard error of either mean. Exponents that theory offers (1/2, 1, 3/2, 2) lie half
   /// a unit apart; two standard errors must stay within half of that.
   double largest_error = 0.125;
+
+  HypothesisOptions hypotheses = {};
 };
 
 /// The answer. Exponents and spreads are NaN where they cannot be had.
@@ -63,11 +60,13 @@ struct Growth {
   double spread;         ///< sample standard deviation over the members; NaN for one member
   double exponent_late;  ///< the same for the window [0.5 T, T]
   double spread_late;
-  bool resolved;       ///< see AnalyseGrowth()
-  std::string regime;  ///< "truncation", "round-off", "saturated" or "too-short"
-  int members;         ///< number of runs
-  double t_from;       ///< start of the first window, s; later than 0.1 T if the floor clips it
-  double t_to;         ///< T, end of both windows, s; before the runs' end if drift saturates
+  bool resolved;          ///< see AnalyseGrowth()
+  std::string regime;     ///< "truncation", "round-off", "saturated" or "too-short"
+  int members;            ///< number of runs
+  double t_from;          ///< start of the first window, s; later than 0.1 T if the floor clips it
+  double t_to;            ///< T, end of both windows, s; before the runs' end if drift saturates
+  Hypothesis hypothesis;  ///< which law fits best in the first window
+  bool hypothesis_resolved;  ///< see AnalyseGrowth()
 };
 
 /// Least-squares slope of log(running maximum) against log t, per run and window; mean and spread
@@ -93,6 +92,10 @@ struct Growth {
 /// else "too-short" if a window is; else "saturated" if some member passes saturation before t_end
 /// (the exponent then describes the time before); else "truncation". The regime is read off the
 /// size of the drift alone, so it is a label, not a diagnosis.
+///
+/// *Hypothesis*: see CompareHypotheses(). It is resolved when it refutes its rivals and, for a
+/// power law, the exponent is resolved too; so an exponential law can be resolved while no exponent
+/// is.
 ///
 /// @param length  characteristic length of the mechanism (a link), in the unit of the drift.
 /// @throws std::invalid_argument if t and value differ in size or length is not positive.

@@ -10,20 +10,32 @@ namespace {
 
 // Keys of records other than those of a case: a run would write over a parameter of that name. A
 // test holds this list against the records of actual runs.
-constexpr std::array<std::string_view, 38> kRecordKeys = {
-    "kind",        "experiment", "mechanism",       "formulation",   "enforcement",
-    "coordinates", "solver",     "integrator",      "rtol",          "atol",
-    "horizon",     "case_id",    "content",         "document",      "outcome",
-    "message",     "t_reached",  "steps",           "rejected",      "restarts",
-    "state_hash",  "ensemble",   "ensemble_failed", "worst_loop",    "softened_steps",
-    "bodies",      "joints",     "loops",           "dof",           "repeats",
-    "seed",        "perturb",    "memory_mb",       "series_points", "realtime_factor",
-    "ns_per_body", "version",    "machine"};
+constexpr std::array<std::string_view, 59> kRecordKeys = {
+    "libm",        "kind",           "experiment",
+    "mechanism",   "formulation",    "enforcement",
+    "coordinates", "solver",         "integrator",
+    "rtol",        "atol",           "horizon",
+    "case_id",     "content",        "document",
+    "outcome",     "message",        "t_reached",
+    "steps",       "rejected",       "restarts",
+    "state_hash",  "ensemble",       "ensemble_failed",
+    "worst_loop",  "softened_steps", "bodies",
+    "joints",      "loops",          "dof",
+    "repeats",     "seed",           "perturb",
+    "memory_mb",   "series_points",  "realtime_factor",
+    "ns_per_body", "version",        "machine",
+    "id",          "noise",          "load_average",
+    "governor",    "processors",     "commit",
+    "compiler",    "flags",          "libraries",
+    "command",     "date",           "allocations",
+    "bytes",       "instructions",   "derivative_hash",
+    "start_hash",  "evaluations",    "benchmark",
+    "cpu_ns",      "real_ns"};
 
 // Measured values come in groups, and more of each kind may be added.
-constexpr std::array<std::string_view, 13> kRecordPrefixes = {
-    "drift_", "loop_", "energy_", "growth_", "rank_",        "rcond_",     "rhs_",
-    "step_",  "wall_", "plan_",   "branch_", "closed_form_", "correction_"};
+constexpr std::array<std::string_view, 14> kRecordPrefixes = {
+    "drift_", "loop_", "energy_", "growth_", "rank_",        "rcond_",      "rhs_",
+    "step_",  "wall_", "plan_",   "branch_", "closed_form_", "correction_", "aa_"};
 
 }  // namespace
 

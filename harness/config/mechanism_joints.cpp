@@ -2,7 +2,6 @@
 #include <fmt/format.h>
 
 #include "harness/config/mechanism_sections.h"
-#include "mechanism/joint.h"
 
 namespace loopbench::harness {
 namespace {
@@ -40,16 +39,16 @@ JointSide ReadSide(const JsonNode& joint, const char* key, const Draft& draft) {
 
 Eigen::Vector3d ReadAxis(const JsonNode& node, JointType type, SpaceKind space) {
   const Eigen::Vector3d axis = node.Vector();
-  if (type == JointType::kWeld || type == JointType::kFree) {
-    node.Fail("no axis on a weld or free joint");
+  if (OwnAxis(type) == '-') {
+    node.Fail(fmt::format("no axis on a {} joint", ToString(type)));
   } else if (axis.isZero()) {
     if (node.value().is_array()) node.Fail("an axis that is not zero");
   } else if (space == SpaceKind::kPlanar) {
     const bool along_z = axis.x() == 0.0 && axis.y() == 0.0 && axis.z() > 0.0;
-    if (type == JointType::kRevolute && !along_z) {
+    if (OwnAxis(type) == 'z' && !along_z) {
       node.Fail("an axis along +z in a planar mechanism");
     }
-    if (type == JointType::kPrismatic && axis.z() != 0.0) {
+    if (OwnAxis(type) == 'x' && axis.z() != 0.0) {
       node.Fail("an axis with z = 0 in a planar mechanism");
     }
   }
@@ -62,6 +61,10 @@ JointDescription ReadJoint(const JsonNode& node, const Draft& draft) {
   joint.name = ReadNewName(node, draft.joint_names);
   if (const auto type = node.Required("type", "a joint type")) {
     joint.type = static_cast<JointType>(type->Choice(JointTypeNames(), "a joint type").value_or(0));
+    if (draft.space == SpaceKind::kPlanar && !ExistsInPlane(joint.type)) {
+      type->Fail("a joint of the plane, or \"space\": \"spatial\"");
+      joint.type = JointType::kRevolute;
+    }
   }
   joint.from = ReadSide(node, "from", draft);
   joint.to = ReadSide(node, "to", draft);
@@ -145,21 +148,18 @@ ForceDescription ReadForce(const JsonNode& node, const Draft& draft) {
 }  // namespace
 
 const NameList& JointTypeNames() {
-  static const NameList kNames = {
-      std::string(ToString(JointType::kRevolute)), std::string(ToString(JointType::kPrismatic)),
-      std::string(ToString(JointType::kWeld)), std::string(ToString(JointType::kFree))};
+  static const NameList kNames = [] {
+    std::vector<std::string> names;
+    for (int i = 0; i < kNumJointTypes; ++i)
+      names.emplace_back(ToString(static_cast<JointType>(i)));
+    return names;
+  }();
   return kNames;
 }
 
-int CoordinateCount(JointType type, SpaceKind space) {
-  return space == SpaceKind::kPlanar ? KindOf<Planar, double>(type).num_q
-                                     : KindOf<Spatial, double>(type).num_q;
-}
+int CoordinateCount(JointType type, SpaceKind space) { return NumValues(type, space, false); }
 
-int SpeedCount(JointType type, SpaceKind space) {
-  return space == SpaceKind::kPlanar ? KindOf<Planar, double>(type).num_u
-                                     : KindOf<Spatial, double>(type).num_u;
-}
+int SpeedCount(JointType type, SpaceKind space) { return NumValues(type, space, true); }
 
 void ReadJoints(const JsonNode& root, Draft* draft) {
   const auto joints = root.Required("joints", "an array of joints");

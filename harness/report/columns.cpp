@@ -1,5 +1,13 @@
 #include "harness/report/columns.h"
 
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <array>
+
+#include "harness/config/config_error.h"
+#include "harness/config/spelling.h"
+
 namespace loopbench::harness {
 namespace {
 
@@ -46,7 +54,112 @@ std::vector<TableColumn> Join(std::vector<TableColumn> head, const std::vector<T
   return head;
 }
 
+// What records hold besides the columns of the tables.
+std::vector<TableColumn> OtherColumns() {
+  return {
+      Make("kind", "kind"),
+      Make("id", "id"),
+      Make("case_id", "case"),
+      Make("version", "version"),
+      Make("growth_exponent_late", "growth exponent, late", kExponent),
+      Make("growth_spread_late", "growth spread, late", kSeconds),
+      Make("growth_hypothesis_ratio", "residual ratio", kExponent),
+      Make("growth_rate", "growth rate [1/s]", kSeconds),
+      Make("growth_from", "window from [s]", kSeconds),
+      Make("growth_to", "window to [s]", kSeconds),
+      Make("ensemble_failed", "ensemble failed", kInteger),
+      Make("rcond_min_t", "at time [s]", kSeconds),
+      Make("softened_steps", "softened steps", kInteger),
+      Make("wall_s", "wall [s]", kSeconds),
+      Make("plan_depth", "plan depth", kInteger),
+      Make("plan_largest_join", "largest join", kInteger),
+      Make("rhs_operations", "rhs operations", kInteger),
+      Make("series.drift", "drift, running maximum [m]", kScientific),
+      Make("series.drift_t", "time [s]", kSeconds),
+      Make("series.energy_error", "energy error [J]", kScientific),
+      Make("series.energy_t", "time [s]", kSeconds),
+      Make("series.t", "time [s]", kSeconds),
+      Make("series.branch", "branch error [rad]", kScientific),
+      Make("series.branch_t", "time [s]", kSeconds),
+  };
+}
+
+const TableColumn* FindKnown(const std::string& key) {
+  static const std::vector<TableColumn> kOther = OtherColumns();
+  for (const auto* list : {&DriftColumns(), &TimingColumns(), &kOther}) {
+    const auto it = std::ranges::find(*list, key, &TableColumn::key);
+    if (it != list->end()) return &*it;
+  }
+  return nullptr;
+}
+
+// Keys of per-loop and per-body values, which are no parameters.
+bool IsFamily(const std::string& key) {
+  return key.starts_with("series.") || key.starts_with("drift.loop.");
+}
+
+// How a value without a column of its own is printed: by its type.
+Format FormatOf(const std::string& key, std::span<const Record> rows) {
+  for (const Record& row : rows) {
+    const Value* value = row.Find(key);
+    if (value == nullptr || std::holds_alternative<std::monostate>(*value)) continue;
+    if (std::holds_alternative<std::int64_t>(*value)) return kInteger;
+    if (std::holds_alternative<double>(*value)) return kShortest;
+    return kText;
+  }
+  return kText;
+}
+
 }  // namespace
+
+TableColumn ColumnOf(const std::string& key, std::span<const Record> rows) {
+  if (const TableColumn* known = FindKnown(key)) return *known;
+  if (key.starts_with("series.angle.")) return Make(key.c_str(), "angle [rad]", kSeconds);
+  if (key.starts_with("drift.loop.")) {
+    return Make(key.c_str(), (key.substr(11) + " [m]").c_str(), kScientific);
+  }
+  return Make(key.c_str(), key.c_str(), FormatOf(key, rows));
+}
+
+std::string UnitOf(const TableColumn& column) {
+  const std::size_t open = column.header.rfind('[');
+  if (open == std::string::npos || column.header.back() != ']') return "";
+  return column.header.substr(open + 1, column.header.size() - open - 2);
+}
+
+std::vector<std::string> KeysOf(std::span<const Record> rows) {
+  std::vector<std::string> keys;
+  for (const Record& row : rows) {
+    for (const auto& [key, value] : row.items()) {
+      if (std::ranges::find(keys, key) == keys.end()) keys.push_back(key);
+    }
+  }
+  return keys;
+}
+
+void RequireKey(const std::string& option, const std::string& key, std::span<const Record> rows) {
+  const std::vector<std::string> keys = KeysOf(rows);
+  // a column of the tables may be empty in every record
+  if (std::ranges::find(keys, key) != keys.end() || FindKnown(key) != nullptr) return;
+  std::vector<std::string> scalars;
+  std::ranges::copy_if(keys, std::back_inserter(scalars),
+                       [](const std::string& known) { return !IsFamily(known); });
+  const std::string nearest = NearestSpelling(key, keys);
+  const std::string cure = nearest.empty() ? "" : fmt::format(" (did you mean \"{}\"?)", nearest);
+  throw ConfigError(fmt::format("{}: found \"{}\", which no record has{}; expected one of {}",
+                                option, key, cure, fmt::join(scalars, ", ")));
+}
+
+std::vector<TableColumn> WithParameters(std::vector<TableColumn> columns,
+                                        std::span<const Record> rows) {
+  std::vector<TableColumn> parameters;
+  for (const std::string& key : KeysOf(rows)) {
+    if (FindKnown(key) == nullptr && !IsFamily(key)) parameters.push_back(ColumnOf(key, rows));
+  }
+  const auto outcome = std::ranges::find(columns, "outcome", &TableColumn::key);
+  columns.insert(outcome, parameters.begin(), parameters.end());
+  return columns;
+}
 
 const std::vector<TableColumn>& DriftColumns() {
   static const std::vector<TableColumn> kColumns =
@@ -60,9 +173,11 @@ const std::vector<TableColumn>& DriftColumns() {
                               Make("worst_loop", "worst loop"),
                               Make("energy_error_max", "energy error [J]", kScientific),
                               Make("growth_exponent", "growth exponent", kExponent),
-                              Make("growth_spread", "growth spread", kExponent),
+                              Make("growth_spread", "growth spread", kSeconds),
                               Make("growth_regime", "growth regime"),
                               Make("growth_resolved", "growth resolved"),
+                              Make("growth_hypothesis", "growth hypothesis"),
+                              Make("growth_hypothesis_resolved", "hypothesis resolved"),
                               Make("ensemble", "ensemble", kInteger),
                               Make("steps", "steps", kInteger),
                               Make("rejected", "rejected", kInteger),
@@ -72,7 +187,7 @@ const std::vector<TableColumn>& DriftColumns() {
                               Make("state_hash", "state hash"),
                               Make("restarts", "restarts", kInteger),
                               Make("branch_error_max", "branch error [rad]", kScientific),
-                              Make("closed_form_error_max", "closed-form error", kScientific),
+                              Make("closed_form_error_max", "closed-form error [rad]", kScientific),
                               Make("message", "message"),
                           });
   return kColumns;
@@ -93,6 +208,16 @@ const std::vector<TableColumn>& TimingColumns() {
                               Make("wall_s_median", "wall median [s]", kSeconds),
                               Make("realtime_factor", "real-time factor", kSeconds),
                               Make("repeats", "repeats", kInteger),
+                              Make("rhs_ns_min", "rhs min [ns]", kFixed),
+                              Make("wall_s_min", "wall min [s]", kSeconds),
+                              Make("wall_s_p10", "wall p10 [s]", kSeconds),
+                              Make("wall_s_p90", "wall p90 [s]", kSeconds),
+                              Make("aa_spread", "A/A spread, rhs", kSeconds),
+                              Make("aa_spread_wall", "A/A spread, wall", kSeconds),
+                              Make("load1", "load", kSeconds),
+                              Make("processors", "processors", kInteger),
+                              Make("governor", "governor"),
+                              Make("noise", "noise"),
                           });
   return kColumns;
 }

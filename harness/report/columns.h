@@ -1,6 +1,8 @@
 // Which columns the tables have, and in which order.
 #pragma once
 
+#include <span>
+#include <string>
 #include <vector>
 
 #include "harness/report/table.h"
@@ -22,5 +24,24 @@ const std::vector<TableColumn>& CompactDriftColumns();
 
 /// The part of TimingColumns() that fits a terminal of some 100 columns, with shortened words.
 const std::vector<TableColumn>& CompactTimingColumns();
+
+/// The column of any key: header, unit and format as in the tables where they have it; else the key
+/// is the header, and the type of its first value in `rows` decides the format.
+TableColumn ColumnOf(const std::string& key, std::span<const Record> rows);
+
+/// The unit in the brackets that end the header, "" without.
+std::string UnitOf(const TableColumn& column);
+
+/// All keys of the records, each once, in order of first appearance.
+std::vector<std::string> KeysOf(std::span<const Record> rows);
+
+/// Throws ConfigError, with `option`, the key, the nearest spelling and all keys, when neither a
+/// record nor a table has the key.
+void RequireKey(const std::string& option, const std::string& key, std::span<const Record> rows);
+
+/// `columns` with the keys that records have and no table knows, before "outcome": the parameters
+/// of a sweep, without which rows could not be told apart.
+std::vector<TableColumn> WithParameters(std::vector<TableColumn> columns,
+                                        std::span<const Record> rows);
 
 }  // namespace loopbench::harness

@@ -9,6 +9,8 @@
 #include <limits>
 #include <map>
 
+#include "harness/report/columns.h"
+
 namespace loopbench::harness {
 namespace {
 
@@ -32,6 +34,7 @@ void SetScene(const std::string& mechanism, const FactorialOptions& options, Key
 }
 
 std::vector<Run> Collect(std::span<const Record> records, const FactorialOptions& options) {
+  const std::vector<TableColumn> parameters = WithParameters({}, records);
   std::map<Key, Record> last;
   for (const Record& record : records) {
     if (record.Number("rtol") != options.rtol) continue;
@@ -43,6 +46,9 @@ std::vector<Run> Collect(std::span<const Record> records, const FactorialOptions
     Key key;
     for (const char* name : {"formulation", "enforcement", "coordinates", "solver", "integrator"}) {
       key[name] = record.Text(name);
+    }
+    for (const TableColumn& parameter : parameters) {
+      key["parameter " + parameter.key] = record.Text(parameter.key);
     }
     SetScene(record.Text("mechanism"), options, &key);
     last[key] = record;

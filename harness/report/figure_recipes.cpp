@@ -9,6 +9,7 @@
 #include <string_view>
 #include <tuple>
 
+#include "harness/report/columns.h"
 #include "harness/report/select.h"
 
 namespace loopbench::harness {
@@ -47,17 +48,24 @@ bool Failed(const Record& record) {
   return !outcome.empty() && outcome != "finished";
 }
 
-// "odca, joint: t^1.97 +- 0.05"; keys that are the same in all curves go into the title.
+// "odca, joint: t^1.97 +- 0.05", with a "?" if that is not resolved; keys that are the same in all
+// curves go into the title.
 std::string LabelOf(const Record& record, std::span<const Record> all, bool with_fit) {
   std::string label = record.Text("formulation");
   for (const char* key : {"enforcement", "coordinates", "solver"}) {
     if (Varies(all, key)) label += ", " + record.Text(key);
   }
+  for (const TableColumn& parameter : WithParameters({}, all)) {
+    if (Varies(all, parameter.key)) {
+      label += fmt::format(", {} {}", parameter.key, record.Text(parameter.key));
+    }
+  }
   const double exponent = record.Number("growth_exponent");
   if (with_fit && std::isfinite(exponent)) {
     label += fmt::format(": t^{:.2f}", exponent);
     const double spread = record.Number("growth_spread");
-    if (std::isfinite(spread)) label += fmt::format(" +- {:.2f}", spread);
+    if (std::isfinite(spread)) label += fmt::format(" +- {:.1g}", spread);
+    if (record.Text("growth_resolved") != "true") label += "?";
   }
   if (Failed(record)) {
     label += fmt::format(" ({} at {:.3g} s)", record.Text("outcome"), record.Number("t_reached"));
@@ -135,12 +143,17 @@ Figure AnglesFigure(const Record& record) {
 }
 
 Figure DriftFigure(std::span<const Record> records) {
+  const bool has_unresolved = std::ranges::any_of(records, [](const Record& record) {
+    return std::isfinite(record.Number("growth_exponent")) &&
+           record.Text("growth_resolved") != "true";
+  });
   return {.title = TitleOf(records, "drift"),
           .x_label = "time [s]",
           .y_label = "position drift, running maximum [m]",
           .log_x = true,
           .log_y = true,
-          .curves = DriftCurves(records, true)};
+          .curves = DriftCurves(records, true),
+          .legend_title = has_unresolved ? "?: exponent not resolved" : ""};
 }
 
 Figure SingularFigure(std::span<const Record> records) {

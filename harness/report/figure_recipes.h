@@ -20,7 +20,8 @@ struct NamedFigure {
 Figure AnglesFigure(const Record& record);
 
 /// Drift [m] of several runs of one mechanism against time on logarithmic axes: "series.drift", the
-/// running maximum, against "series.drift_t". The legend gives the fitted exponent with its spread;
+/// running maximum, against "series.drift_t". The legend gives the fitted exponent with its spread
+/// (and a '?' when it is not resolved);
 /// a grey line shows its slope. Colour tells formulation and level, dashes tell coordinates and
 /// solver. Formulations that agree to round-off hide each other; so multipliers are drawn first and
 /// wide, and the others lie on them. A run that failed ends in a cross and is named in the legend.

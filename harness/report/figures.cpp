@@ -102,11 +102,16 @@ std::vector<std::string> Elements(const Figure& figure, const Curve& curve, std:
                                   const std::vector<Point>& points) {
   const std::string line = fmt::format("lc rgb '{}' dt {} lw {:.3g}", curve.style.color,
                                        DashType(curve.style), curve.style.width);
-  if (points.empty()) {
-    return {fmt::format("NaN with lines {} title {}", line, Quote(curve.label))};
+  std::string look = "lines";
+  if (curve.points) {
+    // shape and size tell curves apart that lie on each other
+    constexpr std::array<int, 8> kShapes = {7, 5, 9, 13, 6, 4, 8, 12};
+    look = fmt::format("{} pt {} ps {:.3g}", curve.line ? "linespoints" : "points",
+                       kShapes[index % kShapes.size()], 0.3 * curve.style.width);
   }
-  std::vector<std::string> elements = {
-      fmt::format("$c{} with lines {} title {}", index, line, Quote(curve.label))};
+  const std::string title = curve.label.empty() ? "notitle" : "title " + Quote(curve.label);
+  if (points.empty()) return {fmt::format("NaN with {} {} {}", look, line, title)};
+  std::vector<std::string> elements = {fmt::format("$c{} with {} {} {}", index, look, line, title)};
   const auto [x_last, y_last] = points.back();
   if (curve.slope && figure.log_x && figure.log_y) {
     // Lifted a little, so that it does not hide what it describes.
@@ -124,15 +129,66 @@ std::vector<std::string> Elements(const Figure& figure, const Curve& curve, std:
   return elements;
 }
 
+// Failed runs as labels with a point and no text: unlike plot elements these may lie on the edge.
+std::string Crosses(const Figure& figure, const Curve& curve) {
+  std::string commands;
+  for (const auto& [x, y] : curve.crosses) {
+    if (!CanBeDrawn(x, figure.log_x)) continue;
+    const std::string place =
+        CanBeDrawn(y, figure.log_y) ? fmt::format("first {:.6g}", y) : "graph 0.02";
+    commands +=
+        fmt::format("set label '' at first {:.6g}, {} point pt 2 ps 1.2 lw 2 lc rgb '{}' front\n",
+                    x, place, curve.style.color);
+  }
+  return commands;
+}
+
+bool HasCrosses(const Figure& figure) {
+  return std::ranges::any_of(figure.curves,
+                             [](const Curve& curve) { return !curve.crosses.empty(); });
+}
+
+// Room around points and crosses (which do not widen the axes by themselves), and named ticks.
+std::string Ranges(const Figure& figure, const Extent& x, const Extent& y) {
+  const bool has_points = std::ranges::any_of(
+      figure.curves, [](const Curve& curve) { return curve.points || !curve.crosses.empty(); });
+  const auto range = [&](char axis, const Extent& extent, bool logarithmic, double margin) {
+    if (!has_points || extent.high < extent.low) return std::string();
+    const auto value = [&](double at) { return logarithmic ? std::exp(at) : at; };
+    // values that agree in their first digits still get a range that these digits can express
+    const double magnitude = std::max(std::abs(extent.low), std::abs(extent.high));
+    const double least = logarithmic ? 0.2 : magnitude > 0 ? 1e-3 * magnitude : 1.0;
+    margin *= std::max(extent.high - extent.low, least);
+    return fmt::format("set {}range [{:.6g}:{:.6g}]\n", axis, value(extent.low - margin),
+                       value(extent.high + margin));
+  };
+  std::string commands = range('y', y, figure.log_y, 0.08);
+  if (!figure.x_ticks.empty()) {
+    commands += fmt::format("set xrange [0.5:{}]\nset xtics (",
+                            static_cast<double>(figure.x_ticks.size()) + 0.5);
+    for (std::size_t i = 0; i < figure.x_ticks.size(); ++i) {
+      commands += fmt::format("{}{} {}", i == 0 ? "" : ", ", Quote(figure.x_ticks[i]), i + 1);
+    }
+    commands += ")\n";
+  } else {
+    commands += range('x', x, figure.log_x, 0.05);
+  }
+  return commands;
+}
+
 // Rows of the legend, whose blank title keeps it clear of the axis label. It lies below the plot in
 // as many columns as its longest label permits.
 std::size_t LegendRows(const Figure& figure) {
-  constexpr std::size_t kCharacters = 130;
+  constexpr std::size_t kCharacters = 110;
   constexpr std::size_t kSample = 8;
   std::size_t longest = 1;
-  for (const Curve& curve : figure.curves) longest = std::max(longest, curve.label.size());
+  std::size_t entries = HasCrosses(figure) ? 1 : 0;
+  for (const Curve& curve : figure.curves) {
+    longest = std::max(longest, curve.label.size());
+    entries += curve.label.empty() ? 0 : 1;
+  }
   const std::size_t columns = std::max<std::size_t>(1, kCharacters / (longest + kSample));
-  return (figure.curves.size() + columns - 1) / columns;
+  return std::max<std::size_t>(1, (entries + columns - 1) / columns);
 }
 
 struct ProgramResult {
@@ -186,38 +242,68 @@ std::string GnuplotScript(const Figure& figure) {
       x.Include(OnAxis(point.first, figure.log_x));
       y.Include(OnAxis(point.second, figure.log_y));
     }
+    for (const Point& cross : curve.crosses) {
+      if (CanBeDrawn(cross.first, figure.log_x)) x.Include(OnAxis(cross.first, figure.log_x));
+      if (CanBeDrawn(cross.second, figure.log_y)) y.Include(OnAxis(cross.second, figure.log_y));
+    }
   }
   std::string script = fmt::format(
       "set encoding utf8\nset title {}\nset xlabel {} offset 0,0.5\nset ylabel {}\n"
       "set grid lc rgb '#cccccc' lw 0.5\n"
-      "set key bmargin center vertical maxrows {} Left reverse samplen 4 title ' '\n",
-      Quote(figure.title), Quote(figure.x_label), Quote(figure.y_label), LegendRows(figure));
+      "set key bmargin center vertical maxrows {} Left reverse samplen 4 title {}\n",
+      Quote(figure.title), Quote(figure.x_label), Quote(figure.y_label), LegendRows(figure),
+      figure.legend_title.empty() ? Quote(" ") : "\"\\n\"." + Quote(figure.legend_title));
   if (figure.log_x) script += "set logscale x\n";
-  if (figure.log_y) script += "set logscale y\nset format y '%.0e'\n";
+  if (figure.log_y) {
+    // powers of ten are read most easily as such, unless all are near one
+    const bool near_one = y.low > std::log(1e-4) && y.high < std::log(1e6);
+    script += fmt::format("set logscale y\nset format y '{}'\n", near_one ? "%g" : "%.0e");
+  }
+  script += Ranges(figure, x, y);
   std::string plot;
   for (std::size_t i = 0; i < figure.curves.size(); ++i) {
     points[i] = Thin(figure, points[i], x, y);
     if (!points[i].empty()) script += DataBlock(fmt::format("c{}", i), points[i]);
+    script += Crosses(figure, figure.curves[i]);
     for (const std::string& element : Elements(figure, figure.curves[i], i, points[i])) {
       plot += fmt::format("{}{}", plot.empty() ? "plot " : ", \\\n  ", element);
     }
   }
+  if (HasCrosses(figure)) {
+    plot += ", \\\n  NaN with points pt 2 ps 1.2 lw 2 lc rgb '#000000' title 'failed run'";
+  }
   return script + plot + '\n';
 }
 
-std::optional<std::string> WriteSvg(const std::filesystem::path& path, const Figure& figure,
-                                    const std::string& gnuplot) {
-  const bool anything = std::ranges::any_of(
-      figure.curves, [&](const Curve& curve) { return !Drawable(figure, curve).empty(); });
+namespace {
+
+// Both 960 wide and 500 high without the legend, in pixels or hundredths of an inch.
+std::string Terminal(const Figure& figure, bool pdf) {
+  const std::size_t height =
+      500 + 20 * (LegendRows(figure) + (figure.legend_title.empty() ? 0 : 1));
+  if (!pdf) {
+    return fmt::format("svg noenhanced size 960,{} font 'sans-serif,13' background '#ffffff'",
+                       height);
+  }
+  return fmt::format("pdfcairo noenhanced size 9.6in,{:.1f}in font 'sans-serif,11'",
+                     static_cast<double>(height) / 100);
+}
+
+}  // namespace
+
+std::optional<std::string> WriteFigure(const std::filesystem::path& path, const Figure& figure,
+                                       const std::string& gnuplot) {
+  const bool anything = std::ranges::any_of(figure.curves, [&](const Curve& curve) {
+    return !Drawable(figure, curve).empty() || !curve.crosses.empty();
+  });
   if (!anything) return fmt::format("{}: no curve has a point to draw", path.string());
+  const bool pdf = path.extension() == ".pdf";
   const TemporaryFolder folder;
   const std::filesystem::path script = folder.path() / "figure.gp";
-  const std::filesystem::path drawing = folder.path() / "figure.svg";
-  WriteFileAtomically(
-      script,
-      fmt::format("set terminal svg noenhanced size 960,{} font 'sans-serif,13' "
-                  "background '#ffffff'\nset output {}\n{}",
-                  500 + 20 * LegendRows(figure), Quote(drawing.string()), GnuplotScript(figure)));
+  const std::filesystem::path drawing = folder.path() / "figure";
+  WriteFileAtomically(script,
+                      fmt::format("set terminal {}\nset output {}\n{}", Terminal(figure, pdf),
+                                  Quote(drawing.string()), GnuplotScript(figure)));
   const ProgramResult run = RunProgram(fmt::format("{} '{}' 2>&1", gnuplot, script.string()));
   constexpr int kNotFound = 127;
   if (run.status == kNotFound) {

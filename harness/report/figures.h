@@ -1,9 +1,10 @@
-// Figures as SVG, drawn by gnuplot.
+// Figures as SVG or PDF, drawn by gnuplot.
 #pragma once
 
 #include <filesystem>
 #include <optional>
 #include <string>
+#include <utility>
 #include <vector>
 
 namespace loopbench::harness {
@@ -27,6 +28,11 @@ struct Curve {
   std::optional<double> slope;
   /// Marks the last point with a cross: the run failed there.
   bool ends_early = false;
+  bool points = false;  ///< marks each point, for few of them
+  bool line = true;     ///< joins them
+  /// Runs that failed, as crosses in the curve's colour. Without a y that can be drawn (NaN) the
+  /// cross lies on the lower edge of the plot.
+  std::vector<std::pair<double, double>> crosses = {};
 };
 
 /// What is drawn. Labels are plain text (no markup) and carry their units: "time [s]".
@@ -37,6 +43,8 @@ struct Figure {
   bool log_x = false;
   bool log_y = false;
   std::vector<Curve> curves;  ///< later ones lie on top
+  std::string legend_title = "";
+  std::vector<std::string> x_ticks = {};  ///< names of x = 1, 2, ...; empty for a scale of numbers
 };
 
 /// The gnuplot commands and data of a figure, without terminal and output, so that any terminal can
@@ -44,11 +52,12 @@ struct Figure {
 /// files of long runs small.
 std::string GnuplotScript(const Figure& figure);
 
-/// Draws `figure` into `path`. Returns nothing on success, else the reason: gnuplot missing (and
-/// the package that has it), gnuplot's own message, or nothing to draw. The file is complete or
-/// absent, and the same figure gives the same bytes. `gnuplot` is the program to call.
-[[nodiscard]] std::optional<std::string> WriteSvg(const std::filesystem::path& path,
-                                                  const Figure& figure,
-                                                  const std::string& gnuplot = "gnuplot");
+/// Draws `figure` into `path`, as PDF when its extension is ".pdf", else as SVG. Returns nothing on
+/// success, else the reason: gnuplot missing (and the package that has it), gnuplot's own message,
+/// or nothing to draw. The file is complete or absent. The same figure gives the same bytes of SVG;
+/// a PDF carries its date. `gnuplot` is the program to call.
+[[nodiscard]] std::optional<std::string> WriteFigure(const std::filesystem::path& path,
+                                                     const Figure& figure,
+                                                     const std::string& gnuplot = "gnuplot");
 
 }  // namespace loopbench::harness

@@ -39,13 +39,52 @@ int Compare(double a, double b) {
   return int{a > b} - int{a < b};
 }
 
+// Texts with numbers in them as a person orders them: chain-3 before chain-10.
+int CompareNaturally(const std::string& a, const std::string& b) {
+  const auto digits = [](const std::string& text, std::size_t from) {
+    const std::size_t end = text.find_first_not_of("0123456789", from);
+    return text.substr(from, std::min(end, text.size()) - from);
+  };
+  std::size_t i = 0;
+  while (i < a.size() && i < b.size()) {
+    const std::string one = digits(a, i), other = digits(b, i);
+    if (one != other && !one.empty() && !other.empty()) {
+      // by number of digits first: any length of number, no overflow
+      if (one.size() != other.size()) return one.size() < other.size() ? -1 : 1;
+      return one.compare(other);
+    }
+    if (a[i] != b[i]) break;
+    i += std::max<std::size_t>(1, one.size());
+  }
+  return a.compare(b);
+}
+
 bool ComesBefore(const Record& a, const Record& b) {
-  if (const int order = a.Text("mechanism").compare(b.Text("mechanism"))) return order < 0;
+  if (const int order = CompareNaturally(a.Text("mechanism"), b.Text("mechanism"))) {
+    return order < 0;
+  }
   if (const int order = Compare(a.Number("horizon"), b.Number("horizon"))) return order < 0;
   for (const char* key : {"formulation", "coordinates", "solver"}) {
     if (const int order = a.Text(key).compare(b.Text(key))) return order < 0;
   }
   return Compare(-a.Number("rtol"), -b.Number("rtol")) < 0;
+}
+
+// A value as SortRowsBy() orders it: 0 numbers, 1 texts, 2 what is missing.
+struct SortKey {
+  int rank;
+  double number;
+  std::string text;
+};
+
+SortKey SortKeyOf(const Record& record, const std::string& key) {
+  const double number = record.Number(key);
+  if (!std::isnan(number)) return {0, number, ""};
+  const Value* value = record.Find(key);
+  if (value != nullptr && std::holds_alternative<std::string>(*value)) {
+    return {1, 0.0, record.Text(key)};
+  }
+  return {2, 0.0, ""};
 }
 
 }  // namespace
@@ -87,5 +126,15 @@ std::string ToText(const Selection& selection) {
 }
 
 void SortRows(std::vector<Record>* records) { std::ranges::stable_sort(*records, ComesBefore); }
+
+void SortRowsBy(std::vector<Record>* records, const std::string& key, bool descending) {
+  std::ranges::stable_sort(*records, [&](const Record& a, const Record& b) {
+    const SortKey one = SortKeyOf(a, key), other = SortKeyOf(b, key);
+    if (one.rank != other.rank) return one.rank < other.rank;
+    const int order =
+        one.rank == 0 ? Compare(one.number, other.number) : CompareNaturally(one.text, other.text);
+    return descending ? order > 0 : order < 0;
+  });
+}
 
 }  // namespace loopbench::harness

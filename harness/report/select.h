@@ -34,9 +34,13 @@ std::vector<Record> Filter(std::span<const Record> records, const Selection& sel
 /// The selection as a person would type it: "mechanism=four-bar rtol=1e-06,1e-08".
 std::string ToText(const Selection& selection);
 
-/// Order of rows in every table: by mechanism, horizon, formulation, coordinates, solver, then rtol
-/// from coarse to fine. Stable, so rows equal in all six stay in the order of the store. A missing
-/// number comes last.
+/// Order of rows in every table: by mechanism (chain-3 before chain-10), horizon, formulation,
+/// coordinates, solver, then rtol from coarse to fine. Stable, so rows equal in all six stay in the
+/// order of the store. A missing number comes last.
 void SortRows(std::vector<Record>* records);
+
+/// Stable order by one key: numbers by size, anything else by its text, texts after numbers.
+/// Records without the key, or with NaN, come last in both directions.
+void SortRowsBy(std::vector<Record>* records, const std::string& key, bool descending);
 
 }  // namespace loopbench::harness

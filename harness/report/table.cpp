@@ -48,7 +48,7 @@ std::string FullPrecision(const Record& row, const std::string& key) {
 }
 
 std::string QuoteCsv(const std::string& text) {
-  if (text.find_first_of(",\"\r\n") == std::string::npos) return text;
+  if (text.find_first_of(",\"\r\n#") == std::string::npos) return text;
   std::string quoted = "\"";
   for (const char c : text) {
     if (c == '"') quoted += '"';
@@ -96,33 +96,78 @@ std::string Cell(const Record& row, const TableColumn& column) {
   return it == column.abbreviations.end() ? text : it->second;
 }
 
-std::string ToText(const Table& table) {
-  std::vector<std::vector<std::string>> cells;
-  std::vector<std::size_t> widths;
-  for (const TableColumn& column : table.columns) widths.push_back(Width(column.header));
+std::vector<RowGroup> Groups(const Table& table) {
+  if (table.group.empty()) return {{"", table.rows}};
+  const TableColumn column{table.group, table.group, Format::kShortest, {}};
+  std::vector<RowGroup> groups;
   for (const Record& row : table.rows) {
-    std::vector<std::string>& line = cells.emplace_back();
-    for (std::size_t c = 0; c < table.columns.size(); ++c) {
-      line.push_back(Cell(row, table.columns[c]));
-      widths[c] = std::max(widths[c], Width(line.back()));
-    }
+    const std::string cell = Cell(row, column);
+    const std::string heading = fmt::format("{} = {}", table.group, cell.empty() ? "(none)" : cell);
+    auto it = std::ranges::find(groups, heading, &RowGroup::heading);
+    if (it == groups.end()) it = groups.insert(it, {heading, {}});
+    it->rows.push_back(row);
   }
+  return groups;
+}
+
+bool HasFailed(const Record& row) {
+  const std::string outcome = row.Text("outcome");
+  return !outcome.empty() && outcome != "finished";
+}
+
+namespace {
+
+// The columns under a heading: the group's key stands in the heading.
+std::vector<TableColumn> ColumnsUnderHeading(const Table& table) {
+  std::vector<TableColumn> columns = table.columns;
+  std::erase_if(columns, [&](const TableColumn& column) { return column.key == table.group; });
+  return columns;
+}
+
+std::string RowsAsText(const std::vector<TableColumn>& columns, const std::vector<Record>& rows,
+                       std::vector<std::size_t> widths, bool colour) {
   std::string heading;
   std::string rule;
-  for (std::size_t c = 0; c < table.columns.size(); ++c) {
+  for (std::size_t c = 0; c < columns.size(); ++c) {
     const std::string gap = c == 0 ? "" : "  ";
-    heading += gap + Pad(table.columns[c].header, widths[c], table.columns[c].format);
+    heading += gap + Pad(columns[c].header, widths[c], columns[c].format);
     rule += gap + std::string(widths[c], '-');
   }
-  std::string out = table.title.empty() ? "" : table.title + "\n\n";
+  std::string out;
   AppendTrimmed(&out, heading);
   AppendTrimmed(&out, rule);
-  for (const std::vector<std::string>& line : cells) {
+  for (const Record& row : rows) {
     std::string text;
-    for (std::size_t c = 0; c < line.size(); ++c) {
-      text += (c == 0 ? "" : "  ") + Pad(line[c], widths[c], table.columns[c].format);
+    for (std::size_t c = 0; c < columns.size(); ++c) {
+      std::string cell = Pad(Cell(row, columns[c]), widths[c], columns[c].format);
+      if (colour && columns[c].key == "outcome" && HasFailed(row)) {
+        cell = "\033[31m" + cell + "\033[0m";
+      }
+      text += (c == 0 ? "" : "  ") + cell;
     }
     AppendTrimmed(&out, text);
+  }
+  return out;
+}
+
+}  // namespace
+
+std::string ToText(const Table& table, bool colour) {
+  const std::vector<TableColumn> columns = ColumnsUnderHeading(table);
+  std::vector<std::size_t> widths;  // the same in all groups, so that they compare
+  for (const TableColumn& column : columns) {
+    widths.push_back(Width(column.header));
+    for (const Record& row : table.rows) {
+      widths.back() = std::max(widths.back(), Width(Cell(row, column)));
+    }
+  }
+  std::string out = table.title.empty() ? "" : table.title + "\n\n";
+  bool is_first = true;
+  for (const RowGroup& group : Groups(table)) {
+    if (!is_first) out += '\n';
+    is_first = false;
+    if (!group.heading.empty()) out += group.heading + "\n\n";
+    out += RowsAsText(columns, group.rows, widths, colour);
   }
   if (!table.notes.empty()) out += '\n';
   for (const std::string& note : table.notes) out += note + '\n';
@@ -145,25 +190,37 @@ std::string ToCsv(const Table& table) {
     }
     out += '\n';
   }
+  for (const std::string& note : table.notes) {
+    std::string line = note;
+    std::ranges::replace(line, '\n', ' ');
+    out += "# " + line + '\n';
+  }
   return out;
 }
 
 std::string ToMarkdown(const Table& table) {
   std::string out = table.title.empty() ? "" : fmt::format("## {}\n\n", table.title);
+  const std::vector<TableColumn> columns = ColumnsUnderHeading(table);
+  std::string head = "|";
   std::string rule = "|";
-  out += '|';
-  for (const TableColumn& column : table.columns) {
-    out += fmt::format(" {} |", EscapeMarkdown(column.header));
+  for (const TableColumn& column : columns) {
+    head += fmt::format(" {} |", EscapeMarkdown(column.header));
     rule += column.format == Format::kText ? " --- |" : " ---: |";
   }
-  out += '\n' + rule + '\n';
-  for (const Record& row : table.rows) {
-    out += '|';
-    for (const TableColumn& column : table.columns) {
-      const std::string cell = EscapeMarkdown(Cell(row, column));
-      out += cell.empty() ? "  |" : fmt::format(" {} |", cell);
+  bool is_first = true;
+  for (const RowGroup& group : Groups(table)) {
+    if (!is_first) out += '\n';
+    is_first = false;
+    if (!group.heading.empty()) out += fmt::format("### {}\n\n", EscapeMarkdown(group.heading));
+    out += head + '\n' + rule + '\n';
+    for (const Record& row : group.rows) {
+      out += '|';
+      for (const TableColumn& column : columns) {
+        const std::string cell = EscapeMarkdown(Cell(row, column));
+        out += cell.empty() ? "  |" : fmt::format(" {} |", cell);
+      }
+      out += '\n';
     }
-    out += '\n';
   }
   // Each note is its own paragraph; a list would be read as part of the table by some renderers.
   for (const std::string& note : table.notes) out += fmt::format("\n{}\n", note);

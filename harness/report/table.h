@@ -1,6 +1,7 @@
-// One table, three writers: terminal text, CSV and Markdown.
+// One table, five writers: terminal text, CSV, Markdown, JSON and LaTeX.
 #pragma once
 
+#include <span>
 #include <string>
 #include <utility>
 #include <vector>
@@ -36,7 +37,23 @@ struct Table {
   std::vector<TableColumn> columns;
   std::vector<Record> rows;
   std::vector<std::string> notes;  ///< provenance and remarks, one line each, below the table
+  /// Key by whose values the rows are divided ("" for one undivided table). Text, Markdown and
+  /// LaTeX write one table per value under a heading; CSV and JSON keep one list with the key as a
+  /// column.
+  std::string group = "";
 };
+
+/// Rows that share a value of the group's key, under "key = value".
+struct RowGroup {
+  std::string heading;
+  std::vector<Record> rows;
+};
+
+/// The groups in order of first appearance; one without heading when the table is undivided.
+std::vector<RowGroup> Groups(const Table& table);
+
+/// Whether a row's run ended in another way than as it should.
+bool HasFailed(const Record& row);
 
 /// The cell as the text and Markdown writers print it. Absent and NaN values are empty, never zero;
 /// a value that is not a number is printed as it is, whatever the format; a series joins its
@@ -44,15 +61,31 @@ struct Table {
 std::string Cell(const Record& row, const TableColumn& column);
 
 /// Aligned text for a terminal: title, heading, rule, rows, notes. Columns are as wide as their
-/// widest cell, two spaces apart, counted in characters rather than bytes.
-std::string ToText(const Table& table);
+/// widest cell, two spaces apart, counted in characters rather than bytes. With `colour` the
+/// outcomes of failed runs are red; the escape sequences take no place.
+std::string ToText(const Table& table, bool colour = false);
 
 /// RFC 4180: a header of the column keys, then one line per row, quoted where necessary, numbers in
-/// the shortest form that reads back to the same bits. Line ends are "\n". Title and notes stay
-/// out: the format has no comments, and a reader would take them for rows.
+/// the shortest form that reads back to the same bits. Line ends are "\n". The title stays out.
+/// Notes follow as lines that begin with "# ", which RFC 4180 does not know but readers can be told
+/// to skip (pandas: comment="#", R: comment.char="#"; gnuplot does by itself). Cells with '#' are
+/// quoted.
 std::string ToCsv(const Table& table);
 
 /// A Markdown table with title and notes; '|' in cells is escaped.
 std::string ToMarkdown(const Table& table);
+
+/// One JSON object: "title", "columns" (key, header, unit), "rows" (one object each, every digit,
+/// null for what was not measured), "provenance" (notes of the form "name: text" by name),
+/// "warnings" and "notes" (the other notes). One row per line.
+std::string ToJson(const Table& table);
+
+/// A LaTeX table (booktabs; no other package): a tabular per group, numbers in math mode, 2.05e-03
+/// as 2.05 x 10^-3, all special characters escaped, notes as comments at the end.
+std::string ToLatex(const Table& table);
+
+/// The format's name ("text", "csv", "markdown", "json" or "latex") chooses the writer.
+/// @throws std::invalid_argument for any other name.
+std::string Render(const Table& table, const std::string& format);
 
 }  // namespace loopbench::harness

@@ -11,6 +11,8 @@
 #include <utility>
 #include <vector>
 
+#include "harness/hash.h"
+
 namespace loopbench::harness {
 namespace {
 
@@ -113,15 +115,7 @@ Record FromJsonLine(std::string_view line) {
 
 std::string CaseId(const Record& canonical_keys) {
   // nlohmann::json keeps its keys sorted.
-  const std::string canonical = Dump<nlohmann::json>(canonical_keys);
-  constexpr std::uint64_t kOffsetBasis = 0xcbf29ce484222325ULL;
-  constexpr std::uint64_t kPrime = 0x100000001b3ULL;
-  std::uint64_t hash = kOffsetBasis;
-  for (const char c : canonical) {
-    hash ^= static_cast<unsigned char>(c);
-    hash *= kPrime;
-  }
-  return fmt::format("{:016x}", hash);
+  return Fnv1a(Dump<nlohmann::json>(canonical_keys));
 }
 
 }  // namespace loopbench::harness

@@ -6,6 +6,7 @@
 
 #include <cerrno>
 #include <cstring>
+#include <map>
 #include <stdexcept>
 #include <string_view>
 
@@ -23,6 +24,29 @@ std::filesystem::path FileOf(const std::filesystem::path& path) {
       fmt::format("cannot {} '{}': {}", verb, file.string(), std::strerror(errno)));
 }
 
+// Locks of POSIX belong to the process: children do not inherit them, and they end with it.
+int Lock(const std::filesystem::path& file) {
+  const std::filesystem::path path = file.string() + ".lock";
+  constexpr int kMode = 0644;
+  const int lock = ::open(path.c_str(), O_RDWR | O_CREAT | O_CLOEXEC, kMode);
+  if (lock < 0) Fail("open", path);
+  struct flock whole = {};
+  whole.l_type = F_WRLCK;
+  whole.l_whence = SEEK_SET;
+  if (::fcntl(lock, F_SETLK, &whole) == 0) return lock;
+  const int reason = errno;
+  whole.l_type = F_WRLCK;
+  const bool known = ::fcntl(lock, F_GETLK, &whole) == 0 && whole.l_type != F_UNLCK;
+  ::close(lock);
+  if (reason != EACCES && reason != EAGAIN) {
+    errno = reason;
+    Fail("lock", path);
+  }
+  throw std::runtime_error(
+      fmt::format("'{}' is in use by process {}; wait for it, or write to another --out",
+                  file.string(), known ? std::to_string(whole.l_pid) : "?"));
+}
+
 // One write(2) in the usual case; more only if the system accepted a part or was interrupted.
 void WriteAll(int descriptor, std::string_view text, const std::filesystem::path& file) {
   while (!text.empty()) {
@@ -31,6 +55,15 @@ void WriteAll(int descriptor, std::string_view text, const std::filesystem::path
     if (written < 0) Fail("append to", file);
     text.remove_prefix(static_cast<std::size_t>(written));
   }
+}
+
+// The name of a new file is on the disk when its folder is.
+void SyncFolder(const std::filesystem::path& file) {
+  const std::filesystem::path folder = file.has_parent_path() ? file.parent_path() : ".";
+  const int descriptor = ::open(folder.c_str(), O_RDONLY | O_DIRECTORY | O_CLOEXEC);
+  if (descriptor < 0) return;
+  ::fsync(descriptor);
+  ::close(descriptor);
 }
 
 bool IsRecord(std::string_view line) {
@@ -60,23 +93,52 @@ void MendLastLine(const std::filesystem::path& file, int descriptor) {
 ResultStore::ResultStore(const std::filesystem::path& path) : file_(FileOf(path)) {
   std::error_code error;
   if (file_.has_parent_path()) std::filesystem::create_directories(file_.parent_path(), error);
+  lock_ = Lock(file_);
   constexpr int kMode = 0644;
   descriptor_ = ::open(file_.c_str(), O_WRONLY | O_APPEND | O_CREAT | O_CLOEXEC, kMode);
-  if (descriptor_ < 0) Fail("open", file_);
   try {
+    if (descriptor_ < 0) Fail("open", file_);
     MendLastLine(file_, descriptor_);
+    SyncFolder(file_);
   } catch (...) {
-    ::close(descriptor_);
+    if (descriptor_ >= 0) ::close(descriptor_);
+    ::close(lock_);
     throw;
   }
 }
 
-ResultStore::~ResultStore() { ::close(descriptor_); }
+ResultStore::~ResultStore() {
+  ::close(descriptor_);
+  ::close(lock_);
+}
 
 void ResultStore::Append(const Record& record) {
   const std::string line = ToJsonLine(record) + '\n';
   const std::lock_guard lock(mutex_);
-  WriteAll(descriptor_, line, file_);
+  const off_t before = ::lseek(descriptor_, 0, SEEK_END);
+  try {
+    WriteAll(descriptor_, line, file_);
+    if (::fsync(descriptor_) != 0) Fail("write to the disk", file_);
+  } catch (...) {
+    // what cannot be kept whole is not kept: the next run finds complete records only
+    [[maybe_unused]] const int failed = ::ftruncate(descriptor_, before);
+    throw;
+  }
+}
+
+std::vector<Record> LatestRecords(const std::vector<Record>& records) {
+  std::vector<Record> latest;
+  std::map<std::string, std::size_t> place;
+  for (const Record& record : records) {
+    const std::string id = record.Text("case_id");
+    const auto [at, is_new] = place.try_emplace(id, latest.size());
+    if (id.empty() || is_new) {
+      latest.push_back(record);
+    } else {
+      latest[at->second] = record;
+    }
+  }
+  return latest;
 }
 
 std::vector<Record> ReadRecords(const std::filesystem::path& path,

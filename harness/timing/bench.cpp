@@ -1,113 +1,279 @@
-// loopbench_bench: right-hand sides under Google Benchmark, with an allocation counter.
+// loopbench_bench: right-hand sides and integrator steps under Google Benchmark.
 //
-// Families: every column of the paper's experiment on its scenes, and closed chains and ladders of
-// 3 to 1000 bars (the dense baselines to 100). Counters: ns_per_body, allocations per evaluation.
-// The benchmark library of Debian 12 calls itself a debug build; the context line "build" tells
-// what this one is.
+// What is measured stands in a JSON file and is registered at run time. The benchmark library of
+// Debian 12 calls itself a debug build; the context lines "compiler" and "flags" tell what this one
+// is. Its JSON writer prints NaN, which no reader takes: runs pass through SafeReporter first.
 #include <benchmark/benchmark.h>
 #include <fmt/format.h>
 
-#include <atomic>
+#include <cmath>
 #include <cstdlib>
+#include <ctime>
+#include <map>
+#include <optional>
 
-#include "harness/config/experiment_reader.h"
+#include "harness/config/benchmark_reader.h"
+#include "harness/origin.h"
 #include "harness/provenance.h"
-#include "harness/run_case.h"
-#include "mechanism/assembly.h"
-#include "mechanism/library.h"
-
-namespace {
-
-std::atomic<long> allocations = 0;
-
-}  // namespace
-
-// glibc's own entry point, so that every allocation of the process passes the counter.
-extern "C" void* __libc_malloc(std::size_t size);
-extern "C" void* malloc(std::size_t size) {
-  ++allocations;
-  return __libc_malloc(size);
-}
+#include "harness/store/files.h"
+#include "harness/timing/allocations.h"
+#include "harness/timing/subject.h"
 
 namespace {
 
 using namespace loopbench;
 using namespace loopbench::harness;
 
-/// One right-hand side, from the scene's own start given a little time to move.
-void TimeDerivative(benchmark::State& state, const MechanismDescription& description,
-                    const Column& column) {
-  const Mechanism<Planar, double> mechanism(description, column.coordinates);
-  const Start<double> start = Assemble<Planar>(description, mechanism);
-  const auto formulation = MakeFormulation<Planar>(column, mechanism);
-  std::vector<double> y, ydot;
-  Outcome outcome = start.outcome;
-  if (outcome == Outcome::kFinished) {
-    formulation->Start(start.q, start.u);
-    y.resize(formulation->state_size());
-    ydot = y;
-    formulation->ToState(start.q, start.u, y);
-    // a few small Euler steps: speeds that are not zero tickle the relevant paths
-    for (int i = 0; i < 10 && outcome == Outcome::kFinished; ++i) {
-      outcome = formulation->Derivative(0.0, y, ydot);
-      for (std::size_t k = 0; k < y.size(); ++k) y[k] += 1e-3 * ydot[k];
+constexpr const char* kHelp =
+    R"(loopbench_bench: time, allocations and bytes of right-hand sides and integrator steps.
+
+  --families FILE   what is measured (JSON); default configs/benchmarks/default.json
+  --save-states     compute the states of FILE and save their hashes, measure nothing
+
+All options of Google Benchmark 1.7 hold, among them
+  --benchmark_filter=REGEX --benchmark_list_tests --benchmark_min_time=0.1
+  --benchmark_repetitions=9 --benchmark_out=FILE --benchmark_format=json
+
+Examples:
+  loopbench_bench --benchmark_filter='rhs/chain/.*/odca/acceleration'
+  loopbench_bench --benchmark_repetitions=9 --benchmark_out=new.json
+  loopbench fit new.json
+  loopbench compare base.json new.json
+
+Names are MEASURE/MECHANISM[/SIZE]/FORMULATION/LEVEL/COORDINATES/SOLVER. A benchmark that cannot be
+measured is an error with its reason, without counters.
+Exit codes: 0 done, 2 bad input, or nothing could be measured.
+)";
+
+/// Leaves out what JSON cannot say, for example the spread of a counter that is always zero.
+class SafeReporter final : public benchmark::JSONReporter {
+ public:
+  void ReportRuns(const std::vector<Run>& runs) override {
+    std::vector<Run> finite = runs;
+    for (Run& run : finite) {
+      std::erase_if(run.counters,
+                    [](const auto& named) { return !std::isfinite(named.second.value); });
     }
+    JSONReporter::ReportRuns(finite);
   }
+};
+
+/// The states of a set, each computed once.
+class States {
+ public:
+  explicit States(StateHashes saved) : saved_(std::move(saved)) {}
+
+  /// Throws std::runtime_error when the state is not the saved one.
+  const BenchmarkState& Get(const BenchmarkMember& member, const MechanismDescription& description,
+                            Coordinates coordinates) {
+    const std::string name = fmt::format("{}/{}", member.name, ToString(coordinates));
+    const auto [at, is_new] = computed_.try_emplace(name);
+    if (is_new) at->second = ComputeState(description, coordinates);
+    const auto saved = saved_.find(name);
+    if (saved != saved_.end() && saved->second != at->second.hash) {
+      throw std::runtime_error(
+          fmt::format("state {} has hash {}, saved is {}", name, at->second.hash, saved->second));
+    }
+    return at->second;
+  }
+
+  StateHashes hashes() const {
+    StateHashes hashes;
+    for (const auto& [name, state] : computed_) {
+      if (!state.hash.empty()) hashes[name] = state.hash;
+    }
+    return hashes;
+  }
+
+ private:
+  StateHashes saved_;
+  std::map<std::string, BenchmarkState> computed_;
+};
+
+/// The library calls a benchmark several times; the last one's subject is kept.
+struct Prepared {
+  std::string name, hash;
+  std::unique_ptr<BenchmarkSubject> subject;
+};
+
+Prepared& Prepare(const BenchmarkSet& set, States& states, const BenchmarkMember& member,
+                  BenchmarkKind kind, const Column& column) {
+  static Prepared last;
+  const std::string name = BenchmarkName(kind, member, column);
+  if (last.name == name) return last;
+  last = {};
+  const MechanismDescription description = member.Make();
+  const BenchmarkState& state = states.Get(member, description, column.coordinates);
+  last.subject = MakeSubject(description, column, state, set.integrator, set.step);
+  last.hash = state.hash;
+  last.name = name;
+  return last;
+}
+
+/// Sets a counter, unless it is not a number.
+void Count(benchmark::State& state, const char* name, double value) {
+  if (std::isfinite(value)) state.counters[name] = value;
+}
+
+double CpuNanoseconds() {
+  timespec now{};
+  clock_gettime(CLOCK_PROCESS_CPUTIME_ID, &now);
+  return 1e9 * static_cast<double>(now.tv_sec) + static_cast<double>(now.tv_nsec);
+}
+
+void Measure(benchmark::State& state, BenchmarkSubject& subject, BenchmarkKind kind) {
+  const auto once = [&] {
+    return kind == BenchmarkKind::kRhs ? subject.Derivative() : subject.Step();
+  };
+  // the first evaluation takes memory that later ones reuse
+  Outcome outcome = once();
+  if (outcome == Outcome::kFinished) outcome = once();
   if (outcome != Outcome::kFinished) {
     state.SkipWithError(std::string(ToString(outcome)).c_str());
     return;
   }
-  const long before = allocations;
+  const Allocations before = AllocationsSoFar();
+  const double begin = CpuNanoseconds();
   for (auto _ : state) {
-    formulation->Derivative(0.0, y, ydot);
-    benchmark::DoNotOptimize(ydot.data());
+    outcome = once();
+    benchmark::DoNotOptimize(outcome);
   }
+  const double spent = CpuNanoseconds() - begin;
+  const Allocations after = AllocationsSoFar();
   const double evaluations = static_cast<double>(state.iterations());
-  state.counters["allocations"] = static_cast<double>(allocations - before) / evaluations;
-  // a time per body: the inverse of a rate of bodies
-  state.counters["per_body"] =
-      benchmark::Counter(mechanism.num_bodies() - 1, benchmark::Counter::kIsIterationInvariantRate |
-                                                         benchmark::Counter::kInvert);
+  const double bodies = subject.bodies();
+  Count(state, "bodies", bodies);
+  // not a rate of the library: it would print nanoseconds with the unit of seconds
+  Count(state, "ns_per_body", spent / evaluations / bodies);
+  Count(state, "allocations", static_cast<double>(after.count - before.count) / evaluations);
+  Count(state, "bytes", static_cast<double>(after.bytes - before.bytes) / evaluations);
+  if (kind == BenchmarkKind::kRhs && subject.operations() >= 0) {
+    Count(state, "rhs_operations", static_cast<double>(subject.operations()));
+  }
 }
 
-void Register(const std::string& name, const MechanismDescription& description,
-              const Column& column) {
-  benchmark::RegisterBenchmark(fmt::format("rhs/{}/{}", name, ToString(column)).c_str(),
-                               [description, column](benchmark::State& state) {
-                                 TimeDerivative(state, description, column);
-                               });
+void Register(const BenchmarkSet& set, States& states, const BenchmarkMember& member,
+              BenchmarkKind kind, const Column& column) {
+  const auto run = [&set, &states, &member, kind, column](benchmark::State& state) {
+    try {
+      Prepared& prepared = Prepare(set, states, member, kind, column);
+      state.SetLabel(prepared.hash);
+      Measure(state, *prepared.subject, kind);
+    } catch (const std::exception& error) {
+      state.SkipWithError(error.what());
+    }
+  };
+  benchmark::RegisterBenchmark(BenchmarkName(kind, member, column).c_str(), run);
+}
+
+int SaveStates(const BenchmarkSet& set) {
+  if (set.states_path.empty()) {
+    fmt::print(stderr, "{}: no \"states\": it does not name a file to save them in\n",
+               set.path.string());
+    return 2;
+  }
+  States states({});
+  for (const BenchmarkGroup& group : set.groups) {
+    for (const BenchmarkMember& member : group.members) {
+      const MechanismDescription description = member.Make();
+      for (const Column& column : group.columns) {
+        const BenchmarkState& state = states.Get(member, description, column.coordinates);
+        if (state.outcome == Outcome::kFinished) continue;
+        fmt::print(stderr, "{}: no state: {} {}\n", member.name, ToString(state.outcome),
+                   state.message);
+        return 2;
+      }
+    }
+  }
+  WriteFileAtomically(set.states_path, StatesToJson(states.hashes()));
+  fmt::print("wrote {} hashes to {}\n", states.hashes().size(), set.states_path.string());
+  return 0;
+}
+
+/// The value of our option `--name VALUE` or `--name=VALUE`, taken out of the arguments.
+std::optional<std::string> TakeOption(std::vector<char*>& arguments, const std::string& name) {
+  for (auto at = arguments.begin() + 1; at != arguments.end(); ++at) {
+    const std::string word = *at;
+    if (word.rfind(name + "=", 0) == 0) {
+      arguments.erase(at);
+      return word.substr(name.size() + 1);
+    }
+    if (word != name) continue;
+    if (at + 1 == arguments.end()) throw std::runtime_error(name + ": expected a file after it");
+    std::string value = *(at + 1);
+    arguments.erase(at, at + 2);
+    return value;
+  }
+  return std::nullopt;
+}
+
+bool TakeFlag(std::vector<char*>& arguments, const std::string& name) {
+  return std::erase_if(arguments, [&](const char* word) { return name == word; }) > 0;
+}
+
+/// What the library will take for one of its string options, from the arguments or the environment.
+std::string LibraryOption(const std::vector<char*>& arguments, const std::string& name,
+                          const char* variable) {
+  std::string value = std::getenv(variable) == nullptr ? "" : std::getenv(variable);
+  for (const std::string word : arguments) {
+    if (word.rfind("--" + name + "=", 0) == 0) value = word.substr(name.size() + 3);
+  }
+  return value;
+}
+
+int Main(int argc, char** argv) {
+  std::vector<char*> arguments(argv, argv + argc);
+  if (TakeFlag(arguments, "--help") || TakeFlag(arguments, "-h")) {
+    fmt::print("{}", kHelp);
+    return 0;
+  }
+  const std::string file = TakeOption(arguments, "--families")
+                               .value_or(LOOPBENCH_SOURCE_DIR "/configs/benchmarks/default.json");
+  const bool save = TakeFlag(arguments, "--save-states");
+  const std::string out_format =
+      LibraryOption(arguments, "benchmark_out_format", "BENCHMARK_OUT_FORMAT");
+  const bool json_to_file = !LibraryOption(arguments, "benchmark_out", "BENCHMARK_OUT").empty() &&
+                            (out_format.empty() || out_format == "json");
+  const bool json_to_terminal =
+      LibraryOption(arguments, "benchmark_format", "BENCHMARK_FORMAT") == "json";
+  int count = static_cast<int>(arguments.size());
+  arguments.push_back(nullptr);
+  benchmark::Initialize(&count, arguments.data());
+  if (benchmark::ReportUnrecognizedArguments(count, arguments.data())) return 2;
+
+  const BenchmarkSet set = ReadBenchmarks(file);
+  if (save) return SaveStates(set);
+  States states(set.states);
+  for (const BenchmarkGroup& group : set.groups) {
+    for (const BenchmarkMember& member : group.members) {
+      for (const BenchmarkKind kind : group.kinds) {
+        for (const Column& column : group.columns) Register(set, states, member, kind, column);
+      }
+    }
+  }
+  const Origin& origin = ThisOrigin();
+  benchmark::AddCustomContext("command", CommandLine(argc, argv));
+  benchmark::AddCustomContext("machine", origin.machine);
+  benchmark::AddCustomContext("compiler", origin.compiler);
+  benchmark::AddCustomContext("flags", origin.flags);
+  benchmark::AddCustomContext("libm", origin.libm);
+  benchmark::AddCustomContext("commit", origin.commit);
+  SafeReporter to_terminal, to_file;
+  std::unique_ptr<benchmark::BenchmarkReporter> display(
+      json_to_terminal ? nullptr : benchmark::CreateDefaultDisplayReporter());
+  const std::size_t measured = benchmark::RunSpecifiedBenchmarks(
+      json_to_terminal ? &to_terminal : display.get(), json_to_file ? &to_file : nullptr);
+  benchmark::Shutdown();
+  return measured == 0 ? 2 : 0;
 }
 
 }  // namespace
 
 int main(int argc, char** argv) {
-  const Experiment paper =
-      ReadExperiment(LOOPBENCH_SOURCE_DIR "/configs/experiments/paper/paper.json");
-  for (const ExperimentScene& scene : paper.scenes) {
-    for (const Column& column : paper.columns) {
-      Register(scene.name, scene.mechanism.description, column);
-    }
+  try {
+    return Main(argc, argv);
+  } catch (const std::exception& error) {
+    fmt::print(stderr, "{}\n", error.what());
+    return 2;
   }
-  for (const int bars : {3, 10, 30, 100, 300, 1000}) {
-    // a ladder of N windows has 2 N + 1 bars
-    MechanismDescription chain = Chain(bars);
-    chain.initial.speeds.push_back({0, {1.0}});
-    for (const MechanismDescription& family : {chain, Ladder((bars - 1) / 2, -1.0, 0.5)}) {
-      for (const Column& column : paper.columns) {
-        // a dense baseline of 1000 bars takes seconds for one evaluation
-        if (column.formulation != FormulationKind::kOdca && bars > 100) continue;
-        Register(family.name, family, column);
-      }
-    }
-  }
-  for (const std::string& line : Provenance(CommandLine(argc, argv))) {
-    const std::size_t colon = line.find(": ");
-    benchmark::AddCustomContext(line.substr(0, colon), line.substr(colon + 2));
-  }
-  benchmark::AddCustomContext("build", "Release");
-  benchmark::Initialize(&argc, argv);
-  if (benchmark::ReportUnrecognizedArguments(argc, argv)) return 2;
-  benchmark::RunSpecifiedBenchmarks();
-  benchmark::Shutdown();
-  return 0;
 }

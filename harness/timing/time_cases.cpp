@@ -2,12 +2,13 @@
 
 #include <algorithm>
 #include <chrono>
-#include <limits>
 #include <memory>
 #include <optional>
 
 #include "harness/integrator/arkode.h"
 #include "harness/run_case.h"
+#include "harness/store/record_json.h"
+#include "harness/timing/noise.h"
 #include "mechanism/assembly.h"
 #include "mechanism/library.h"
 #include "odca/odca.h"
@@ -26,14 +27,6 @@ double SecondsSince(Clock::time_point begin) {
   return std::chrono::duration<double>(Clock::now() - begin).count();
 }
 
-/// Value at a fraction of the sorted sample (nearest rank).
-double Quantile(std::vector<double> sample, double fraction) {
-  if (sample.empty()) return std::numeric_limits<double>::quiet_NaN();
-  std::ranges::sort(sample);
-  const double rank = fraction * static_cast<double>(sample.size() - 1);
-  return sample[static_cast<std::size_t>(rank + 0.5)];
-}
-
 /// One column of one mechanism, ready to be timed.
 class Subject {
  public:
@@ -45,6 +38,8 @@ class Subject {
   /// One whole simulation.
   virtual void TimeSimulation() = 0;
   virtual Record Finish(const Record& keys) const = 0;
+  virtual const std::vector<double>& rhs_ns() const = 0;  ///< one value per batch
+  virtual const std::vector<double>& wall_s() const = 0;  ///< one value per simulation
 };
 
 template <class Space>
@@ -112,12 +107,18 @@ class SubjectIn final : public Subject {
     }
     const double rhs = Quantile(rhs_ns_, 0.5), wall = Quantile(wall_s_, 0.5);
     record.Set("rhs_ns_median", rhs);
+    record.Set("rhs_ns_min", Quantile(rhs_ns_, 0.0));
     record.Set("rhs_ns_p10", Quantile(rhs_ns_, 0.1));
     record.Set("rhs_ns_p90", Quantile(rhs_ns_, 0.9));
     record.Set("ns_per_body", rhs / bodies);
+    record.Set("series.rhs_ns", rhs_ns_);  // raw, for tests of significance (harness/compare)
+    record.Set("series.wall_s", wall_s_);
     if (!wall_s_.empty()) {
       record.Set("step_us_median", wall * 1e6 / static_cast<double>(result_.steps));
       record.Set("wall_s_median", wall);
+      record.Set("wall_s_min", Quantile(wall_s_, 0.0));
+      record.Set("wall_s_p10", Quantile(wall_s_, 0.1));
+      record.Set("wall_s_p90", Quantile(wall_s_, 0.9));
       record.Set("realtime_factor", case_.horizon / wall);
       record.Set("steps", result_.steps);
     }
@@ -129,6 +130,9 @@ class SubjectIn final : public Subject {
     }
     return record;
   }
+
+  const std::vector<double>& rhs_ns() const override { return rhs_ns_; }
+  const std::vector<double>& wall_s() const override { return wall_s_; }
 
  private:
   void Reset() {
@@ -184,29 +188,18 @@ std::unique_ptr<Subject> MakeSubject(const MechanismDescription& description, co
   return std::make_unique<SubjectIn<Spatial>>(description, one, simulate);
 }
 
-/// Times cases of one mechanism against each other.
-void TimeTogether(const Experiment& experiment, const MechanismDescription& description,
-                  const std::vector<Case>& cases, bool simulate,
-                  const std::function<void(const Record&)>& done, std::vector<Record>& records) {
-  std::vector<std::unique_ptr<Subject>> subjects;
-  for (const Case& one : cases) subjects.push_back(MakeSubject(description, one, simulate));
-  for (auto& subject : subjects) subject->Prepare();
-  for (int batch = 0; batch < kBatches; ++batch) {
-    for (auto& subject : subjects) subject->TimeDerivative();
-  }
-  for (int repeat = 0; repeat < experiment.timing.repeats; ++repeat) {
-    for (auto& subject : subjects) subject->TimeSimulation();
-  }
-  for (std::size_t i = 0; i < cases.size(); ++i) {
-    Record keys = CaseKeys(experiment, cases[i]);
-    keys.Set("kind", std::string("timing"));
-    if (!simulate) {
-      // a right-hand side has no tolerance and no horizon
-      for (const char* key : {"integrator", "rtol", "atol", "horizon"}) keys.Set(key, Value());
-    }
-    records.push_back(subjects[i]->Finish(keys));
-    done(records.back());
-  }
+/// What the A/A pair and the machine say about all times of one mechanism.
+Record NoiseKeys(const MachineState& machine, const Subject& first, const Subject& again) {
+  const double rhs = AaSpread(first.rhs_ns(), again.rhs_ns());
+  const double wall = AaSpread(first.wall_s(), again.wall_s());
+  Record keys;
+  keys.Set("aa_spread", rhs);
+  keys.Set("aa_spread_wall", wall);
+  keys.Set("load1", machine.load1);
+  keys.Set("processors", std::int64_t{machine.processors});
+  keys.Set("governor", machine.governor);
+  keys.Set("noise", NoiseReasons(machine, rhs, wall));
+  return keys;
 }
 
 MechanismDescription MakeFamilyMember(const TimingFamily& family, int size) {
@@ -218,6 +211,66 @@ MechanismDescription MakeFamilyMember(const TimingFamily& family, int size) {
 
 }  // namespace
 
+std::vector<TimingGroup> TimingGroups(const Experiment& experiment) {
+  std::vector<TimingGroup> groups;
+  const std::vector<Case> all = ExpandTiming(experiment);
+  for (std::size_t scene = 0; scene < experiment.scenes.size(); ++scene) {
+    TimingGroup group{experiment.scenes[scene].mechanism.description, {}, true};
+    std::ranges::copy_if(all, std::back_inserter(group.cases),
+                         [&](const Case& one) { return one.scene == scene; });
+    if (!group.cases.empty()) groups.push_back(std::move(group));
+  }
+  if (experiment.timing.repeats == 0) return groups;
+  for (const TimingFamily& family : experiment.timing.families) {
+    for (const int size : family.sizes) {
+      TimingGroup group{MakeFamilyMember(family, size), {}, false};
+      for (const Column& column : family.columns) {
+        Case one;
+        one.mechanism = group.description.name;
+        one.column = column;
+        group.cases.push_back(one);
+      }
+      groups.push_back(std::move(group));
+    }
+  }
+  return groups;
+}
+
+Record TimingKeys(const Experiment& experiment, const TimingGroup& group, std::size_t index) {
+  Record keys = CaseKeys(experiment, group.cases[index]);
+  keys.Set("kind", std::string("timing"));
+  if (!group.simulate) {
+    // a right-hand side has no tolerance and no horizon
+    for (const char* key : {"integrator", "rtol", "atol", "horizon"}) keys.Set(key, Value());
+  }
+  keys.Set("case_id", CaseId(keys));
+  return keys;
+}
+
+std::vector<Record> TimeTogether(const Experiment& experiment, const TimingGroup& group) {
+  std::vector<std::unique_ptr<Subject>> subjects;
+  for (const Case& one : group.cases) {
+    subjects.push_back(MakeSubject(group.description, one, group.simulate));
+  }
+  // the A/A pair stands first and last, as far apart as two columns can be
+  subjects.push_back(MakeSubject(group.description, group.cases.front(), group.simulate));
+  for (auto& subject : subjects) subject->Prepare();
+  const MachineState machine = ReadMachineState();
+  for (int batch = 0; batch < kBatches; ++batch) {
+    for (auto& subject : subjects) subject->TimeDerivative();
+  }
+  for (int repeat = 0; repeat < experiment.timing.repeats; ++repeat) {
+    for (auto& subject : subjects) subject->TimeSimulation();
+  }
+  const Record noise = NoiseKeys(machine, *subjects.front(), *subjects.back());
+  std::vector<Record> records;
+  for (std::size_t i = 0; i < group.cases.size(); ++i) {
+    records.push_back(subjects[i]->Finish(TimingKeys(experiment, group, i)));
+    for (const auto& [key, value] : noise.items()) records.back().Set(key, value);
+  }
+  return records;
+}
+
 std::size_t CountTimings(const Experiment& experiment) {
   std::size_t count = ExpandTiming(experiment).size();
   if (experiment.timing.repeats == 0) return count;
@@ -225,35 +278,6 @@ std::size_t CountTimings(const Experiment& experiment) {
     count += family.sizes.size() * family.columns.size();
   }
   return count;
-}
-
-std::vector<Record> TimeExperiment(const Experiment& experiment,
-                                   const std::function<void(const Record&)>& done) {
-  std::vector<Record> records;
-  const std::vector<Case> all = ExpandTiming(experiment);
-  for (std::size_t scene = 0; scene < experiment.scenes.size(); ++scene) {
-    std::vector<Case> cases;
-    std::ranges::copy_if(all, std::back_inserter(cases),
-                         [&](const Case& one) { return one.scene == scene; });
-    if (cases.empty()) continue;
-    TimeTogether(experiment, experiment.scenes[scene].mechanism.description, cases, true, done,
-                 records);
-  }
-  if (experiment.timing.repeats == 0) return records;
-  for (const TimingFamily& family : experiment.timing.families) {
-    for (const int size : family.sizes) {
-      const MechanismDescription description = MakeFamilyMember(family, size);
-      std::vector<Case> cases;
-      for (const Column& column : family.columns) {
-        Case one;
-        one.mechanism = description.name;
-        one.column = column;
-        cases.push_back(one);
-      }
-      TimeTogether(experiment, description, cases, false, done, records);
-    }
-  }
-  return records;
 }
 
 }  // namespace loopbench::harness

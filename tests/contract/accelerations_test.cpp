@@ -150,6 +150,16 @@ TEST(AccelerationsTest, SpatialGraphsAgreeWithTheOracle) {
   family.Finish();
 }
 
+TEST(AccelerationsTest, GraphsOfEveryJointAgreeWithTheOracle) {
+  Family plane("every joint, plane", kShare), space("every joint, space", kShare);
+  for (const auto& [loops, seed] : GraphSeeds(4)) {
+    plane.Hold(Sample<Planar>(MixedGraph(loops, kPlane, seed), seed), true);
+    space.Hold(Sample<Spatial>(MixedGraph(loops, kSpace, seed), seed), true);
+  }
+  plane.Finish();
+  space.Finish();
+}
+
 TEST(AccelerationsTest, PlanarGraphsInSpaceAgreeWithTheOracleWhereRankIsRevealed) {
   Family family("planar graphs in space", kShare);
   for (const auto& [loops, seed] : GraphSeeds(3)) {

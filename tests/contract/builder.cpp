@@ -22,24 +22,27 @@ int Builder::AddJoint(JointType type, int parent, const Eigen::Vector3d& at_pare
   joint.from = {parent, at_parent, Eigen::Vector3d::Zero()};
   joint.to = {child, at_child, Eigen::Vector3d::Zero()};
   if (turned) joint.from.rotation = RandomTurn(), joint.to.rotation = RandomTurn();
-  if (type == JointType::kPrismatic && random.Chance(0.5)) {
+  if (OwnAxis(type) == 'x' && random.Chance(0.5)) {
     joint.axis = random.Vector(1.0, spatial) + 1.5 * Eigen::Vector3d::UnitX();
   }
-  if (type == JointType::kRevolute && spatial && random.Chance(0.5)) {
+  if (OwnAxis(type) == 'z' && spatial && random.Chance(0.5)) {
     joint.axis = random.Vector(1.0, spatial) + 1.5 * Eigen::Vector3d::UnitZ();
   }
   if (turned && random.Chance(0.3)) std::swap(joint.from, joint.to);
   description.joints.push_back(joint);
   parent_[child] = parent;
-  dof_[child] = type == JointType::kWeld ? 0 : 1;
-  if (type == JointType::kFree) dof_[child] = spatial ? 6 : 3;
-  std::vector<double> values(dof_[child], q);
-  if (type == JointType::kFree) {
-    values.resize(spatial ? 7 : 3);
-    for (double& value : values) value = random.Uniform(-1.0, 1.0);
-  }
+  dof_[child] = NumValues(type, description.space, true);
+  std::vector<double> values = Values(type, q);
   if (!values.empty()) description.initial.coordinates.push_back({index, values});
   return index;
+}
+
+std::vector<double> Builder::Values(JointType type, double q) {
+  std::vector<double> values(NumValues(type, description.space, false), q);
+  if (values.size() > 1) {
+    for (double& value : values) value = random.Uniform(-1.0, 1.0);
+  }
+  return values;
 }
 
 void Builder::AddForces(int count) {
@@ -75,11 +78,11 @@ void Builder::FinishClosures() {
   MechanismDescription frames = description;  // to let the oracle place M
   for (auto& [joint, q] : closures_) {
     frames.joints = {joint};
-    const Jet coordinate(q);
+    const std::vector<Jet> coordinates(q.begin(), q.end());
     // with F at the body's com, JointPose() is M seen from there
     frames.joints[0].from.position = frames.bodies[joint.from.body].com;
     const JetPose X_PM = Oracle(frames, layout).JointPose(0, poses);
-    const JetPose X_PF = X_PM * Inverted(Transform(joint.type, spatial, &coordinate));
+    const JetPose X_PF = X_PM * Inverted(Transform(joint.type, spatial, coordinates.data()));
     Real33 R;
     for (int i = 0; i < 3; ++i) {
       joint.from.position[i] =

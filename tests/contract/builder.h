@@ -58,7 +58,7 @@ class Builder {
     // `from` carries its frame in the ground for now; FinishClosures() turns it into body axes
     joint.from = {from, Eigen::Vector3d::Zero(), Eigen::Vector3d::Zero()};
     joint.cut = random.Chance(0.5);  // the others are cut for having no initial value
-    closures_.push_back({joint, q});
+    closures_.push_back({joint, Values(type, q)});
   }
 
   /// Free speeds of the tree path between two bodies.
@@ -93,11 +93,14 @@ class Builder {
     return Eigen::AngleAxisd(turn.norm(), turn.normalized()).toRotationMatrix();
   }
 
+  /// Coordinates of a joint: `q` if it has one, else random.
+  std::vector<double> Values(JointType type, double q);
+
   std::vector<JetPose> Poses() const;
   void FinishClosures();
 
   std::vector<int> parent_ = {0}, dof_ = {0};
-  std::vector<std::pair<JointDescription, double>> closures_;
+  std::vector<std::pair<JointDescription, std::vector<double>>> closures_;
 };
 
 /// The description's own coordinates; joints without one are at rest in the ground's frame.
@@ -106,7 +109,7 @@ VectorX<double> DescribedCoordinates(const MechanismDescription& description,
                                      const Mechanism<Space, double>& mechanism) {
   VectorX<double> q = VectorX<double>::Zero(mechanism.num_q());
   for (const Joint<Space, double>& joint : mechanism.joints()) {
-    if (joint.in_tree() && joint.kind->num_q == 7) q[joint.q_offset] = 1.0;
+    if (joint.in_tree() && joint.kind->has_quaternion()) q[joint.q_offset] = 1.0;
   }
   for (const JointValues& values : description.initial.coordinates) {
     const int offset = mechanism.joints()[values.joint].q_offset;

@@ -72,9 +72,11 @@ std::unique_ptr<Formulation<Space, double>> Make(const Case& c,
   return std::make_unique<reduction::Reduction<Space, double>>(mechanism, options);
 }
 
-/// Coupled loops with forces of every kind; independent closures, so that every column can run.
+/// Coupled loops with forces of every kind, every second with joints of every kind; independent
+/// closures, so that every column can run.
 MechanismDescription CoupledLoops(SpaceKind space, std::uint64_t seed) {
-  return RandomGraph(space == SpaceKind::kPlanar ? 2 : 1, space, seed);
+  const int loops = space == SpaceKind::kPlanar ? 2 : 1;
+  return seed % 2 == 0 ? MixedGraph(loops, space, seed) : RandomGraph(loops, space, seed);
 }
 
 /// A formulation on a sample, started.

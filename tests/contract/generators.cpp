@@ -127,6 +127,38 @@ MechanismDescription RandomGraph(int loops, SpaceKind space, std::uint64_t seed)
   return b.Finish();
 }
 
+MechanismDescription MixedGraph(int loops, SpaceKind space, std::uint64_t seed) {
+  Builder b("mixed-" + std::to_string(loops), space, seed);
+  const auto any = [&b] {
+    for (;;) {
+      const auto type = static_cast<JointType>(b.random.Below(kNumJointTypes));
+      if (type != JointType::kFree && (b.spatial || ExistsInPlane(type))) return type;
+    }
+  };
+  const auto grow = [&](int root, int least_freedom) {
+    for (int freedom = 0; freedom < least_freedom;) {
+      const int body = b.AddBody(1.0);
+      const JointType type = any();
+      const Eigen::Vector3d at = Tip(b);
+      b.AddJoint(type, root, at, body, b.random.Vector(0.2, b.spatial),
+                 b.random.Uniform(-2.0, 2.0));
+      freedom += NumValues(type, space, true);
+      root = body;
+    }
+    return root;
+  };
+  // either side of a loop alone has more freedom than a joint takes
+  const int enough = b.spatial ? 9 : 4;
+  grow(0, 2);
+  for (int i = 0; i < loops; ++i) {
+    const int bodies = static_cast<int>(b.description.bodies.size());
+    const int from = b.random.Below(bodies), to = b.random.Below(bodies);
+    const int left = grow(from, enough), right = grow(to, enough);
+    b.Close(any(), left, right, Tip(b), b.random.Uniform(-1.0, 1.0));
+  }
+  return b.Finish();
+}
+
 MechanismDescription TightGraph(int n, int loops, SpaceKind space, std::uint64_t seed) {
   const bool spatial = space == SpaceKind::kSpatial;
   for (std::uint64_t draw = 0; draw < 100; ++draw) {

@@ -55,6 +55,9 @@ MechanismDescription RandomLadder(int n, SpaceKind space, std::uint64_t seed);
 /// closed at their tips by a revolute, prismatic or weld joint.
 MechanismDescription RandomGraph(int loops, SpaceKind space, std::uint64_t seed);
 
+/// Every kind of joint but free ones, in the tree and as closures; loops with freedom to spare.
+MechanismDescription MixedGraph(int loops, SpaceKind space, std::uint64_t seed);
+
 /// A tree of n bodies with closing joints between random bodies: loops share most of their links.
 /// Closures are independent: draws that are over-constrained somewhere are drawn again.
 MechanismDescription TightGraph(int n, int loops, SpaceKind space, std::uint64_t seed);

@@ -20,8 +20,8 @@ Real33 Turn(const Real3& axis, Real angle) {
 /// Shortest rotation that takes the joint's own axis to the described one.
 Real33 Alignment(const JointDescription& joint) {
   if (joint.axis.isZero()) return Real33::Identity();
-  const bool slides = joint.type == JointType::kPrismatic;
-  const Real3 own = slides ? Real3::UnitX() : Real3::UnitZ();
+  const bool along_x = joint.type == JointType::kPrismatic || joint.type == JointType::kPinInSlot;
+  const Real3 own = along_x ? Real3::UnitX() : Real3::UnitZ();
   const Real3 axis = joint.axis.cast<Real>().normalized();
   const Real33 K = Skew(own.cross(axis));
   return Real33::Identity() + K + K * K / (1 + own.dot(axis));
@@ -47,6 +47,22 @@ JetMatrix AboutZ(const Jet& angle) {
   return R;
 }
 
+JetMatrix AboutX(const Jet& angle) {
+  JetMatrix R = JetIdentity();
+  R(1, 1) = R(2, 2) = Cos(angle);
+  R(2, 1) = Sin(angle);
+  R(1, 2) = -R(2, 1);
+  return R;
+}
+
+JetMatrix AboutY(const Jet& angle) {
+  JetMatrix R = JetIdentity();
+  R(0, 0) = R(2, 2) = Cos(angle);
+  R(0, 2) = Sin(angle);
+  R(2, 0) = -R(0, 2);
+  return R;
+}
+
 /// Of a quaternion of any length.
 JetMatrix FromQuaternion(const Jet* e) {
   const Jet &w = e[0], &x = e[1], &y = e[2], &z = e[3];
@@ -64,9 +80,22 @@ struct Sizes {
   int q, u;
 };
 Sizes SizesOf(JointType type, bool spatial) {
-  if (type == JointType::kWeld) return {0, 0};
-  if (type != JointType::kFree) return {1, 1};
-  return spatial ? Sizes{7, 6} : Sizes{3, 3};
+  switch (type) {
+    case JointType::kWeld:
+      return {0, 0};
+    case JointType::kFree:
+      return spatial ? Sizes{7, 6} : Sizes{3, 3};
+    case JointType::kPinInSlot:
+    case JointType::kCylindrical:
+    case JointType::kUniversal:
+      return {2, 2};
+    case JointType::kSpherical:
+      return {4, 3};
+    case JointType::kPlanar:
+      return {3, 3};
+    default:
+      return {1, 1};
+  }
 }
 
 /// Vector of a rotation matrix near the identity: half its skew part.
@@ -75,20 +104,42 @@ JetVector SmallTurn(const JetMatrix& R) {
   return {half * (R(2, 1) - R(1, 2)), half * (R(0, 2) - R(2, 0)), half * (R(1, 0) - R(0, 1))};
 }
 
-/// Mismatch of a joint and, for each number, the axis of F ([w; v]) along which it grows.
-std::vector<std::pair<int, Jet>> Mismatches(JointType type, bool spatial, const JetPose& X) {
-  std::vector<std::pair<int, Jet>> c;
+/// A number that is zero while the joint holds, and the direction [w; v] in F in which it grows.
+struct Mismatch {
+  Real6 along;
+  Jet value;
+};
+
+std::vector<Mismatch> Mismatches(JointType type, bool spatial, const JetPose& X) {
+  std::vector<Mismatch> c;
+  const auto add = [&c](int axis, const Jet& value) { c.push_back({Real6::Unit(axis), value}); };
   const JetVector turn = SmallTurn(X.R);
-  if (spatial && type == JointType::kRevolute) {
-    // the tip of M's z axis moves with [wy, -wx]
-    c = {{0, -X.R(1, 2)}, {1, X.R(0, 2)}, {5, X.p[2]}};
-  } else if (spatial) {
-    c = {{0, turn[0]}, {1, turn[1]}, {2, turn[2]}, {5, X.p[2]}};
-  } else if (type != JointType::kRevolute) {
-    c = {{2, turn[2]}};
+  const bool in_plane = type == JointType::kRevolute || type == JointType::kPinInSlot ||
+                        type == JointType::kCylindrical || type == JointType::kPlanar;
+  if (!spatial) {
+    if (!in_plane) add(2, turn[2]);
+    if (type != JointType::kPrismatic && type != JointType::kPinInSlot) add(3, X.p[0]);
+    add(4, X.p[1]);
+    return c;
   }
-  if (type != JointType::kPrismatic) c.push_back({3, X.p[0]});
-  c.push_back({4, X.p[1]});
+  if (in_plane) {
+    // the tip of M's z axis moves with [wy, -wx]
+    add(0, -X.R(1, 2));
+    add(1, X.R(0, 2));
+  } else if (type == JointType::kUniversal) {
+    // x of F stays normal to y of M: (x . y_M)' = -w . (x cross y_M)
+    Real6 normal = Real6::Zero();
+    normal[1] = -X.R(2, 1).f;
+    normal[2] = X.R(1, 1).f;
+    c.push_back({normal, -X.R(0, 1)});
+  } else if (type != JointType::kSpherical) {
+    for (int i = 0; i < 3; ++i) add(i, turn[i]);
+  }
+  const bool free_x =
+      type == JointType::kPrismatic || type == JointType::kPinInSlot || type == JointType::kPlanar;
+  if (!free_x) add(3, X.p[0]);
+  if (type != JointType::kPlanar) add(4, X.p[1]);
+  if (type != JointType::kCylindrical) add(5, X.p[2]);
   return c;
 }
 
@@ -96,14 +147,39 @@ std::vector<std::pair<int, Jet>> Mismatches(JointType type, bool spatial, const 
 
 JetPose Transform(JointType type, bool spatial, const Jet* q) {
   JetPose X;
-  if (type == JointType::kRevolute) X.R = AboutZ(q[0]);
-  if (type == JointType::kPrismatic) X.p[0] = q[0];
-  if (type == JointType::kFree && spatial) {
-    X.R = FromQuaternion(q);
-    X.p = {q[4], q[5], q[6]};
-  } else if (type == JointType::kFree) {
-    X.R = AboutZ(q[0]);
-    X.p = {q[1], q[2], Jet(0)};
+  switch (type) {
+    case JointType::kWeld:
+      break;
+    case JointType::kRevolute:
+      X.R = AboutZ(q[0]);
+      break;
+    case JointType::kPrismatic:
+      X.p[0] = q[0];
+      break;
+    case JointType::kPinInSlot:
+      X.R = AboutZ(q[0]);
+      X.p[0] = q[1];
+      break;
+    case JointType::kCylindrical:
+      X.R = AboutZ(q[0]);
+      X.p[2] = q[1];
+      break;
+    case JointType::kSpherical:
+      X.R = FromQuaternion(q);
+      break;
+    case JointType::kUniversal:
+      X.R = AboutX(q[0]) * AboutY(q[1]);
+      break;
+    case JointType::kFree:
+      if (spatial) {
+        X.R = FromQuaternion(q);
+        X.p = {q[4], q[5], q[6]};
+        break;
+      }
+      [[fallthrough]];
+    case JointType::kPlanar:
+      X.R = AboutZ(q[0]);
+      X.p = {q[1], q[2], Jet(0)};
   }
   return X;
 }
@@ -170,8 +246,8 @@ std::vector<Jet> Oracle::Closures(const std::vector<JetPose>& poses) const {
   for (int index : layout_.constraints) {
     const JointType type = description_.joints[index].type;
     if (type == JointType::kFree) continue;
-    for (const auto& [axis, value] : Mismatches(type, layout_.spatial, JointPose(index, poses))) {
-      c.push_back(value);
+    for (const Mismatch& one : Mismatches(type, layout_.spatial, JointPose(index, poses))) {
+      c.push_back(one.value);
     }
   }
   return c;
@@ -183,10 +259,11 @@ std::vector<Oracle::Row> Oracle::Rows(const std::vector<JetPose>& poses) const {
     const JointDescription& joint = description_.joints[index];
     if (joint.type == JointType::kFree) continue;
     const JetPose X_WF = poses[joint.from.body] * frames_[index].X_PF;
-    for (const auto& [axis, value] :
-         Mismatches(joint.type, layout_.spatial, JointPose(index, poses))) {
+    for (const Mismatch& one : Mismatches(joint.type, layout_.spatial, JointPose(index, poses))) {
       Row row{index, Real6::Zero()};
-      for (int i = 0; i < 3; ++i) row.wrench[axis / 3 * 3 + i] = X_WF.R(i, axis % 3).f;
+      for (int i = 0; i < 6; ++i) {
+        for (int k = 0; k < 3; ++k) row.wrench[i] += X_WF.R(i % 3, k).f * one.along[i / 3 * 3 + k];
+      }
       rows.push_back(row);
     }
   }

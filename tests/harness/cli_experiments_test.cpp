@@ -2,11 +2,13 @@
 #include <gtest/gtest.h>
 
 #include <algorithm>
+#include <set>
 #include <string>
 #include <vector>
 
-#include "harness/store/result_store.h"
-#include "tests/harness/cli.h"
+#include "harness/config/config_error.h"
+#include "harness/config/experiment_reader.h"
+#include "tests/harness/cli_fixture.h"
 
 namespace loopbench::harness {
 namespace {
@@ -42,6 +44,21 @@ TEST_F(CommandLineTest, SweptValuesAreInRecordsAndFilters) {
   EXPECT_EQ(ReadRecords(folder_ / "two").size(), 1u);
   ExpectEnding(Call("list sweep.json --filter mass=7"), 2, {"no case matches mass=7"});
   ExpectEnding(Call("table out --where mass=2"), 0, {"odca"});
+}
+
+TEST_F(CommandLineTest, KeysOfStoredRecordsAreNoNamesForAxes) {
+  ExpectEnding(Call("run tiny.json --set /timing/repeats=1 --out out"), 0, {});
+  std::set<std::string> keys;
+  for (const Record& record : ReadRecords(folder_ / "out")) {
+    for (const auto& [key, value] : record.items()) keys.insert(key);
+  }
+  EXPECT_GE(keys.size(), 30u);
+  for (const std::string& key : keys) {
+    std::string text = kExperiment;
+    text.insert(text.find("\"timing\""),
+                R"("sweep": [{"name": ")" + key + R"(", "field": "/comment", "values": ["x"]}], )");
+    EXPECT_THROW(ParseExperiments(text, folder_ / "e.json"), ConfigError) << key;
+  }
 }
 
 TEST_F(CommandLineTest, SetChangesAFieldForEveryCommandThatReads) {

@@ -1,15 +1,7 @@
 // The program as its users call it: exit codes, messages, and the files it leaves.
-#include "tests/harness/cli.h"
-
-#include <gtest/gtest.h>
-
 #include <algorithm>
-#include <filesystem>
-#include <string>
-#include <vector>
 
-#include "harness/store/files.h"
-#include "harness/store/result_store.h"
+#include "tests/harness/cli_fixture.h"
 
 namespace loopbench::harness {
 namespace {
@@ -129,7 +121,6 @@ TEST_F(CommandLineTest, ResultsOfARunServeTablePlotAndVerdict) {
   const std::string table = ReadFile(folder_ / "out/drift.md");
   EXPECT_NE(table.find("command: loopbench run tiny.json --out out"), std::string::npos);
   EXPECT_EQ(ReadRecords(folder_ / "out").size(), 2u);
-  EXPECT_FALSE(fs::exists(folder_ / "out/results.partial.jsonl"));
 
   ExpectEnding(Call("table out"), 0, {"four-bar", "odca", "lagrange"});
   ExpectEnding(Call("table out --format csv --where formulation=odca"), 0, {"mechanism", "odca"});
@@ -140,6 +131,42 @@ TEST_F(CommandLineTest, ResultsOfARunServeTablePlotAndVerdict) {
   for (const auto& entry : fs::directory_iterator(folder_ / "figures")) {
     EXPECT_NE(ReadFile(entry.path()).find("<svg"), std::string::npos) << entry.path();
   }
+}
+
+TEST_F(CommandLineTest, TablesInEveryFormatNameTheCommandAndTheCommit) {
+  ExpectEnding(Call("run tiny.json --out out"), 0, {"command: loopbench run", "commit: "});
+  for (const std::string format : {"text", "csv", "markdown", "json", "latex"}) {
+    const std::string call = "table out --group formulation --sort steps --format " + format;
+    const Ending ending = Call(call);
+    ExpectEnding(ending, 0, {"loopbench " + call, "commit", "machine", "compiler", "libraries"});
+    EXPECT_EQ(ending.text.find("\033["), std::string::npos) << "colour in a pipe";
+  }
+  ExpectEnding(Call("table out --columns formulation,stepz"), 2,
+               {"--columns: found \"stepz\"", "did you mean \"steps\"", "energy_error_max"});
+  ExpectEnding(Call("table out --descending"), 2, {"--sort"});
+  ExpectEnding(Call("table --help"), 0, {"Examples:", "loopbench table out"});
+  // the same records and command give the same bytes: no date
+  EXPECT_EQ(Call("table out --format csv").text, Call("table out --format csv").text);
+  EXPECT_EQ(ReadFile(folder_ / "out/drift.csv").find("# date"), std::string::npos);
+}
+
+TEST_F(CommandLineTest, FreeFiguresAreDrawnAndMistakesRefused) {
+  ExpectEnding(Call("run tiny.json --out out"), 0, {});
+  ExpectEnding(Call("plot out --out w.svg --x formulation --y steps"), 0, {"wrote w.svg"});
+  EXPECT_NE(ReadFile(folder_ / "w.svg").find("steps over formulation"), std::string::npos);
+  ExpectEnding(Call("plot out --out figures --x steps --y energy_error_max --format pdf"), 0,
+               {"wrote figures/energy_error_max-over-steps.pdf"});
+  ExpectEnding(Call("plot out --out figures --format pdf"), 0, {"figures to figures"});
+  EXPECT_TRUE(fs::exists(folder_ / "figures/drift-four-bar-0.5s-rtol-1e-06.pdf"));
+  ExpectEnding(Call("plot out --out w.svg --x steps"), 2, {"--x KEY and --y KEY"});
+  ExpectEnding(Call("plot out --out w.svg --x step --y steps"), 2,
+               {"--x: found \"step\"", "did you mean \"steps\""});
+  ExpectEnding(Call("plot out --out w.svg --x steps --y steps --format pdf"), 2,
+               {"--out w.svg: found the ending \".svg\", expected \".pdf\""});
+  ExpectEnding(Call("plot out --out f --where kind=timing"), 2, {"no records match kind=timing"});
+  Write("bare.jsonl", "{\"kind\":\"timing\",\"bodies\":3}\n");
+  ExpectEnding(Call("plot bare.jsonl --out f"), 2, {"no accuracy records", "--x KEY --y KEY"});
+  ExpectEnding(Call("plot --help"), 0, {"Examples:", "--x rhs_evaluations"});
 }
 
 TEST_F(CommandLineTest, DefaultFolderIsNamedAfterTheExperiment) {
@@ -190,16 +217,15 @@ TEST_F(OldResults, StayWhenARunIsKilled) {
   // timeout reports a killed child as 137, or dies of the same signal itself
   const Ending ending = Call("run long.json --out out", "timeout -s KILL 0.5");
   EXPECT_NE(ending.code, 0) << ending.text;
-  ExpectKept();
-  // what the killed run left does not leak into the next
-  ExpectEnding(Call("run tiny.json --out out"), 0, {});
-  EXPECT_EQ(ReadRecords(folder_ / "out").size(), 2u);
+  EXPECT_TRUE(ReadFile(folder_ / "out/results.jsonl").starts_with(records_));
+  EXPECT_EQ(ReadFile(folder_ / "out/drift.csv"), table_);
 }
 
-TEST_F(OldResults, AreReplacedByThoseOfACompleteRun) {
-  ExpectEnding(Call("run tiny.json --out out --filter formulation=odca"), 0, {});
-  EXPECT_EQ(ReadRecords(folder_ / "out").size(), 1u);
-  EXPECT_EQ(ReadFile(folder_ / "out/drift.csv").find("lagrange"), std::string::npos);
+TEST_F(OldResults, StayWhenARunHasPartOfTheirCases) {
+  ExpectEnding(Call("run tiny.json --out out --filter formulation=odca"), 0,
+               {"0 run now, 1 were done before"});
+  EXPECT_EQ(ReadFile(folder_ / "out/results.jsonl"), records_);
+  EXPECT_NE(ReadFile(folder_ / "out/drift.csv").find("lagrange"), std::string::npos);
 }
 
 }  // namespace

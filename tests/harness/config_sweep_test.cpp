@@ -10,7 +10,6 @@
 #include "harness/config/config_error.h"
 #include "harness/config/experiment_reader.h"
 #include "harness/run_case.h"
-#include "harness/timing/time_cases.h"
 #include "mechanism/library.h"
 
 namespace loopbench::harness {
@@ -224,21 +223,6 @@ TEST(Sweep, ThatCannotBeMeantIsRefused) {
   ExpectWords(error(R"([{"name": "a", "field": "/limits/wall_s", "values": {"lin": [1, 2, 1000]}},
                         {"name": "b", "field": "/limits/steps", "values": {"lin": [1, 1000, 1000]}}])"),
               {"/sweep: found 1000000 combinations, expected at most 100000"});
-}
-
-TEST(Sweep, NamesOfAxesAreNeverKeysOfRecords) {
-  Experiment experiment = Read(Text("")).front();
-  experiment.timing.repeats = 1;
-  std::vector<Record> records = TimeExperiment(experiment, [](const Record&) {});
-  records.push_back(RunCase(experiment, Expand(experiment).front()));
-  for (const Record& record : records) {
-    for (const auto& [key, value] : record.items()) {
-      if (key.find('.') != std::string::npos) continue;  // no name has a dot
-      const std::string axis =
-          R"([{"name": ")" + key + R"(", "field": "/comment", "values": ["x"]}])";
-      EXPECT_NE(ErrorOf(Text(", \"sweep\": " + axis)), "") << key;
-    }
-  }
 }
 
 TEST(Exclude, LeavesOutCasesThatMatchAllConditions) {

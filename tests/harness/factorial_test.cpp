@@ -130,5 +130,22 @@ TEST(Factorial, DriftBelowRoundOffCountsAsRoundOff) {
               1.0, kRoundOff);
 }
 
+// A sweep over a mass: each ratio compares runs of the same mass, whatever their order.
+TEST(Factorial, RunsOfDifferentParametersAreNoPair) {
+  std::vector<Record> records;
+  for (const double mass : {1.0, 10.0}) {
+    for (const char* coordinates : {"joint", "absolute"}) {
+      const bool joint = coordinates == std::string("joint");
+      records.push_back(
+          RunOf("toggle", "odca", "acceleration", coordinates, (joint ? 1e-8 : 3e-8) * mass, 2));
+      records.back().Set("mass", mass);
+    }
+  }
+  const Record row = RowOf(FactorialTable(records), "coordinates", "absolute", "all");
+  EXPECT_EQ(row.Number("pairs"), 2);
+  EXPECT_NEAR(row.Number("ratio_min"), 3, 1e-12);
+  EXPECT_NEAR(row.Number("ratio_max"), 3, 1e-12);
+}
+
 }  // namespace
 }  // namespace loopbench::harness

@@ -32,7 +32,7 @@ class FiguresTest : public testing::Test {
 
   // The SVG text, or the reason why there is none.
   std::string Draw(const Figure& figure) const {
-    const auto error = WriteSvg(folder_ / "figure.svg", figure);
+    const auto error = WriteFigure(folder_ / "figure.svg", figure);
     return error ? "error: " + *error : ReadFile(folder_ / "figure.svg");
   }
 
@@ -143,14 +143,14 @@ TEST_F(FiguresTest, LongSeriesAreThinnedToWhatTheEyeSees) {
 
 TEST_F(FiguresTest, AMissingGnuplotIsAReasonAndNoFile) {
   const Figure figure = AnglesFigure(RunOf("odca", "joint", 1.0));
-  const auto error = WriteSvg(folder_ / "figure.svg", figure, "no-such-gnuplot");
+  const auto error = WriteFigure(folder_ / "figure.svg", figure, "no-such-gnuplot");
   ASSERT_TRUE(error.has_value());
   EXPECT_TRUE(Contains(*error, "'no-such-gnuplot' not found; install gnuplot-nox"));
   EXPECT_FALSE(std::filesystem::exists(folder_ / "figure.svg"));
 }
 
 TEST_F(FiguresTest, AFigureWithoutPointsIsAReason) {
-  const auto error = WriteSvg(folder_ / "figure.svg", DriftFigure({}));
+  const auto error = WriteFigure(folder_ / "figure.svg", DriftFigure({}));
   ASSERT_TRUE(error.has_value());
   EXPECT_TRUE(Contains(*error, "no curve has a point to draw"));
 }

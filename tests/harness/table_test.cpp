@@ -5,6 +5,7 @@
 
 #include <algorithm>
 #include <limits>
+#include <stdexcept>
 #include <string>
 #include <vector>
 
@@ -66,7 +67,8 @@ TEST(Table, CsvQuotesWhereNecessaryAndKeepsEveryDigit) {
   EXPECT_EQ(ToCsv(SmallTable()),
             "mechanism,outcome,drift,slope,steps\n"
             "four-bar,finished,0.0020512820512820513,1.97,412\n"
-            "\"a|b, \"\"\xc3\xa9\"\"\",singular,,,\n");
+            "\"a|b, \"\"\xc3\xa9\"\"\",singular,,,\n"
+            "# commit 1234\n");
 }
 
 TEST(Table, MarkdownEscapesBarsAndAlignsNumbers) {
@@ -79,6 +81,97 @@ TEST(Table, MarkdownEscapesBarsAndAlignsNumbers) {
             "| a\\|b, \"\xc3\xa9\" | singular |  |  |  |\n"
             "\n"
             "commit 1234\n");
+}
+
+TEST(Table, CsvCellsThatLookLikeNotesAreQuoted) {
+  Table table = SmallTable();
+  table.rows[0].Set("mechanism", std::string("#1"));
+  EXPECT_NE(ToCsv(table).find("\n\"#1\",finished"), std::string::npos);
+  table.notes = {"two\nlines"};
+  EXPECT_TRUE(ToCsv(table).ends_with("# two lines\n"));
+}
+
+TEST(Table, ColourMarksTheOutcomesOfFailedRunsOnlyAndTakesNoPlace) {
+  const std::string text = ToText(SmallTable(), true);
+  EXPECT_NE(text.find("a|b, \"\xc3\xa9\"   \033[31msingular\033[0m"), std::string::npos) << text;
+  std::string plain = text;
+  for (const std::string code : {"\033[31m", "\033[0m"}) {
+    ASSERT_EQ(plain.find(code), plain.rfind(code));
+    plain.erase(plain.find(code), code.size());
+  }
+  std::string expected = ToText(SmallTable());
+  // the spaces of empty cells behind a coloured one are trimmed in both
+  EXPECT_EQ(plain, expected);
+}
+
+TEST(Table, JsonHoldsEveryDigitUnitsAndProvenance) {
+  Table table = SmallTable();
+  table.title = "a \"title\"";
+  table.notes = {"command: loopbench table out: x", "warning: noisy", "two words: a remark"};
+  EXPECT_EQ(ToJson(table),
+            "{\n\"title\": \"a \\\"title\\\"\",\n"
+            "\"columns\": [{\"key\":\"mechanism\",\"header\":\"mechanism\",\"unit\":\"\"},\n"
+            "  {\"key\":\"outcome\",\"header\":\"outcome\",\"unit\":\"\"},\n"
+            "  {\"key\":\"drift\",\"header\":\"drift [m]\",\"unit\":\"m\"},\n"
+            "  {\"key\":\"slope\",\"header\":\"slope\",\"unit\":\"\"},\n"
+            "  {\"key\":\"steps\",\"header\":\"steps\",\"unit\":\"\"}],\n"
+            "\"rows\": [{\"mechanism\":\"four-bar\",\"outcome\":\"finished\","
+            "\"drift\":0.0020512820512820513,\"slope\":1.97,\"steps\":412},\n"
+            "  {\"mechanism\":\"a|b, \\\"\xc3\xa9\\\"\",\"outcome\":\"singular\",\"drift\":null,"
+            "\"slope\":null,\"steps\":null}],\n"
+            "\"provenance\": {\"command\":\"loopbench table out: x\"},\n"
+            "\"warnings\": [\"noisy\"],\n"
+            "\"notes\": [\"two words: a remark\"]\n}\n");
+}
+
+TEST(Table, LatexIsBooktabsWithEscapesAndMathematicalNumbers) {
+  Table table = SmallTable();
+  table.rows[1].Set("mechanism", std::string("50%_of #1 & {x} ~^\\ $"));
+  table.rows[1].Set("drift", 1e-6);
+  table.rows[1].Set("slope", -0.5);
+  table.notes = {"flags 100 %\n\\end{tabular}"};
+  EXPECT_EQ(ToLatex(table),
+            "% needs \\usepackage{booktabs}\n"
+            "% Drift\n"
+            "\\begin{tabular}{llrrr}\n"
+            "\\toprule\n"
+            "mechanism & outcome & drift [m] & slope & steps \\\\\n"
+            "\\midrule\n"
+            "four-bar & ok & $2.05 \\times 10^{-3}$ & $1.97$ & $412$ \\\\\n"
+            "50\\%\\_of \\#1 \\& \\{x\\} \\textasciitilde{}\\textasciicircum{}"
+            "\\textbackslash{} \\$ & singular & $1.00 \\times 10^{-6}$ & $-0.50$ &  \\\\\n"
+            "\\bottomrule\n"
+            "\\end{tabular}\n"
+            "% flags 100 % \\end{tabular}\n");
+}
+
+TEST(Table, GroupsAreTablesUnderHeadingsAndColumnsInListsForMachines) {
+  Table table = SmallTable();
+  table.columns.resize(2);
+  table.group = "outcome";
+  EXPECT_EQ(ToText(table),
+            "Drift\n\n"
+            "outcome = finished\n\n"
+            "mechanism\n---------\nfour-bar\n\n"
+            "outcome = singular\n\n"
+            "mechanism\n---------\na|b, \"\xc3\xa9\"\n\n"
+            "commit 1234\n");
+  EXPECT_NE(ToMarkdown(table).find("### outcome = singular\n\n| mechanism |\n| --- |\n| a\\|b"),
+            std::string::npos);
+  EXPECT_NE(ToLatex(table).find("\\paragraph{outcome = singular}"), std::string::npos);
+  table.columns.resize(1);
+  EXPECT_TRUE(Render(table, "csv").starts_with("outcome,mechanism\nfinished,four-bar\n"));
+  EXPECT_NE(Render(table, "json").find("{\"outcome\":\"finished\",\"mechanism\":\"four-bar\"}"),
+            std::string::npos);
+}
+
+TEST(Table, EveryFormatEndsWithTheNotesOrHoldsThem) {
+  Table table = SmallTable();
+  table.notes = {"commit: 1234abcd"};
+  for (const char* format : {"text", "csv", "markdown", "json", "latex"}) {
+    EXPECT_NE(Render(table, format).find("1234abcd"), std::string::npos) << format;
+  }
+  EXPECT_THROW(Render(table, "html"), std::invalid_argument);
 }
 
 TEST(Table, EachFormatPrintsItsDigits) {
@@ -106,16 +199,19 @@ TEST(Columns, DriftTableHasThePublishedOrder) {
             "experiment mechanism formulation enforcement coordinates solver integrator rtol atol "
             "horizon outcome t_reached drift_position_max drift_rotation_max drift_velocity_max "
             "drift_acceleration_max loop_closure_max correction_max worst_loop energy_error_max "
-            "growth_exponent growth_spread growth_regime growth_resolved ensemble steps rejected "
-            "rhs_evaluations rank_min rcond_min state_hash restarts branch_error_max "
+            "growth_exponent growth_spread growth_regime growth_resolved growth_hypothesis "
+            "growth_hypothesis_resolved ensemble steps rejected rhs_evaluations rank_min rcond_min "
+            "state_hash restarts branch_error_max "
             "closed_form_error_max message ");
 }
 
 TEST(Columns, TimingTableStartsWithTheSameKeys) {
-  EXPECT_EQ(Keys(TimingColumns()),
-            "experiment mechanism formulation enforcement coordinates solver integrator rtol atol "
-            "horizon outcome t_reached bodies joints loops dof rhs_ns_median rhs_ns_p10 rhs_ns_p90 "
-            "ns_per_body step_us_median wall_s_median realtime_factor repeats ");
+  EXPECT_EQ(
+      Keys(TimingColumns()),
+      "experiment mechanism formulation enforcement coordinates solver integrator rtol atol "
+      "horizon outcome t_reached bodies joints loops dof rhs_ns_median rhs_ns_p10 rhs_ns_p90 "
+      "ns_per_body step_us_median wall_s_median realtime_factor repeats rhs_ns_min wall_s_min "
+      "wall_s_p10 wall_s_p90 aa_spread aa_spread_wall load1 processors governor noise ");
 }
 
 TEST(Columns, CompactTablesFitAHundredCharacters) {
@@ -175,6 +271,18 @@ TEST(Select, RowsAreSortedByMechanismHorizonFormulationAndFallingTolerance) {
               sorted[i].Text("mechanism") + sorted[i].Text("formulation") + sorted[i].Text("rtol"))
         << i;
   }
+}
+
+TEST(Select, NumbersWithinNamesAreOrderedByTheirSize) {
+  std::vector<Record> rows;
+  for (const char* name :
+       {"chain-10", "ladder-1", "chain-3", "chain", "chain-100", "chain-3b", "chain-03"}) {
+    rows.push_back(Row(name, "odca", 1e-6));
+  }
+  std::string order;
+  SortRows(&rows);
+  for (const Record& row : rows) order += row.Text("mechanism") + " ";
+  EXPECT_EQ(order, "chain chain-3 chain-3b chain-03 chain-10 chain-100 ladder-1 ");
 }
 
 }  // namespace

@@ -15,15 +15,23 @@ using testing::JetPose;
 using testing::Real;
 
 constexpr double kEps = std::numeric_limits<double>::epsilon();
-constexpr JointType kTypes[] = {JointType::kRevolute, JointType::kPrismatic, JointType::kWeld,
-                                JointType::kFree};
+
+template <class Space>
+std::vector<JointType> Types() {
+  std::vector<JointType> types;
+  for (int i = 0; i < kNumJointTypes; ++i) {
+    const auto type = static_cast<JointType>(i);
+    if (Space::kRot == 3 || ExistsInPlane(type)) types.push_back(type);
+  }
+  return types;
+}
 
 /// Coordinates of a kind; angles beyond half a turn are the mechanism's business, not the kind's.
 template <class Space>
 VectorX<double> Coordinates(const JointKind<Space, double>& kind, int seed) {
   VectorX<double> q(kind.num_q);
   for (int i = 0; i < kind.num_q; ++i) q[i] = std::sin(1.7 * (i + 1) + 0.9 * seed);
-  if (kind.num_q == 7) q.head<4>().normalize();
+  if (kind.has_quaternion()) q.head<4>().normalize();
   return q;
 }
 
@@ -51,13 +59,25 @@ Motion<Space, double> MotionAlong(JointType type, const JointKind<Space, double>
   return V;
 }
 
+/// [H D] in F axes at q.
+template <class Space>
+Block<Space, double> Basis(const JointKind<Space, double>& kind, const VectorX<double>& q) {
+  Block<Space, double> basis = Block<Space, double>::Zero();
+  for (int i = 0; i < Space::kDim; ++i) basis(kind.axes[i], i) = 1.0;
+  if (kind.basis == nullptr) return basis;
+  Pose<Space, double> X;
+  kind.transform(q.data(), X);
+  kind.basis(X, basis);
+  return basis;
+}
+
 template <class Space>
 class JointTest : public ::testing::Test {};
 using Spaces = ::testing::Types<Planar, Spatial>;
 TYPED_TEST_SUITE(JointTest, Spaces);
 
 TYPED_TEST(JointTest, TransformIsTheOracles) {
-  for (JointType type : kTypes) {
+  for (JointType type : Types<TypeParam>()) {
     const auto& kind = KindOf<TypeParam, double>(type);
     for (int seed = 0; seed < 5; ++seed) {
       const VectorX<double> q = Coordinates(kind, seed);
@@ -78,14 +98,14 @@ TYPED_TEST(JointTest, TransformIsTheOracles) {
 }
 
 TYPED_TEST(JointTest, MotionMapAndRatesAreTheDerivativeOfTheTransform) {
-  for (JointType type : kTypes) {
+  for (JointType type : Types<TypeParam>()) {
     const auto& kind = KindOf<TypeParam, double>(type);
     for (int seed = 0; seed < 5; ++seed) {
       const VectorX<double> q = Coordinates(kind, seed);
       for (int i = 0; i < kind.num_u; ++i) {
         const Motion<TypeParam, double> V =
             MotionAlong(type, kind, q, VectorX<double>::Unit(kind.num_u, i));
-        const auto H = Motion<TypeParam, double>::Unit(kind.axes[i]);
+        const Motion<TypeParam, double> H = Basis(kind, q).col(i);
         EXPECT_LE((V - H).template lpNorm<Eigen::Infinity>(), 8 * kEps) << ToString(type);
       }
     }
@@ -93,7 +113,7 @@ TYPED_TEST(JointTest, MotionMapAndRatesAreTheDerivativeOfTheTransform) {
 }
 
 TYPED_TEST(JointTest, FreeAndConstrainedAxesShareTheSpaceBetweenThem) {
-  for (JointType type : kTypes) {
+  for (JointType type : Types<TypeParam>()) {
     const auto& kind = KindOf<TypeParam, double>(type);
     std::vector<int> seen(TypeParam::kDim, 0);
     for (int axis : kind.axes) ++seen[axis];
@@ -101,8 +121,36 @@ TYPED_TEST(JointTest, FreeAndConstrainedAxesShareTheSpaceBetweenThem) {
   }
 }
 
+TYPED_TEST(JointTest, BasesAreOrthogonalAndTheirRateIsTheBias) {
+  using Space = TypeParam;
+  for (JointType type : Types<Space>()) {
+    const auto& kind = KindOf<Space, double>(type);
+    for (int seed = 0; seed < 5; ++seed) {
+      const VectorX<double> q = Coordinates(kind, seed);
+      const Block<Space, double> basis = Basis(kind, q);
+      const Block<Space, double> product = basis.transpose() * basis;
+      EXPECT_LE((product - Block<Space, double>::Identity()).norm(), 16 * kEps) << ToString(type);
+      ASSERT_EQ(kind.basis == nullptr, kind.bias == nullptr);
+      if (kind.basis == nullptr) continue;
+      VectorX<double> u(kind.num_u), qdot(kind.num_q);
+      for (int i = 0; i < kind.num_u; ++i) u[i] = std::cos(2.3 * i + seed);
+      kind.rates(q.data(), u.data(), qdot.data());
+      const double step = 1e-5;  // central: truncation 1e-10, round-off eps / step = 2e-11
+      const auto motion = [&](double t) -> Motion<Space, double> {
+        return Basis(kind, q + t * qdot).leftCols(kind.num_u) * u;
+      };
+      const Motion<Space, double> rate = (motion(step) - motion(-step)) / (2 * step);
+      Pose<Space, double> X;
+      kind.transform(q.data(), X);
+      Motion<Space, double> bias;
+      kind.bias(X, motion(0.0), bias);
+      EXPECT_LE((rate - bias).norm(), 1e-9) << ToString(type);
+    }
+  }
+}
+
 TYPED_TEST(JointTest, AdmissiblePosesHaveNoMismatchAndGiveTheirCoordinatesBack) {
-  for (JointType type : kTypes) {
+  for (JointType type : Types<TypeParam>()) {
     const auto& kind = KindOf<TypeParam, double>(type);
     for (int seed = 0; seed < 5; ++seed) {
       const VectorX<double> q = Coordinates(kind, seed);

@@ -26,6 +26,8 @@ void ExpectExponent(const Record& record, double exponent) {
   EXPECT_EQ(record.Text("growth_regime"), "truncation");
   EXPECT_EQ(record.Number("ensemble_failed"), 0);
   EXPECT_NEAR(record.Number("growth_exponent"), exponent, 0.15);
+  EXPECT_EQ(record.Text("growth_hypothesis"), exponent == 2.0 ? "t^2" : "t^1");
+  EXPECT_EQ(record.Text("growth_hypothesis_resolved"), "true");
   std::cout << record.Text("formulation") << ": t^" << record.Number("growth_exponent") << " +- "
             << record.Number("growth_spread") << ", drift " << record.Number("drift_position_max")
             << " m\n";

@@ -1,4 +1,5 @@
-// Calls the program as its users do, in a folder of its own.
+// A folder with a mechanism, an experiment and claims, and the program called in it as users call
+// it.
 #pragma once
 
 #include <gtest/gtest.h>
@@ -10,9 +11,9 @@
 #include <vector>
 
 #include "harness/store/files.h"
+#include "harness/store/result_store.h"
 
 namespace loopbench::harness {
-
 namespace fs = std::filesystem;
 
 inline const fs::path kConfigs = fs::path(LOOPBENCH_SOURCE_DIR) / "configs";

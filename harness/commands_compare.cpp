@@ -1,0 +1,240 @@
+#include "harness/commands_compare.h"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <cmath>
+#include <set>
+
+#include "harness/compare/fit.h"
+#include "harness/compare/statistics.h"
+#include "harness/compare/track.h"
+#include "harness/origin.h"
+#include "harness/provenance.h"
+#include "harness/report/table.h"
+#include "harness/store/files.h"
+#include "harness/store/measurements.h"
+
+namespace loopbench::harness {
+
+namespace {
+
+std::vector<Record> LoadMeasurements(const std::filesystem::path& path) {
+  std::vector<std::string> warnings;
+  std::vector<Record> records = ReadMeasurements(path, &warnings);
+  for (const std::string& warning : warnings) fmt::print(stderr, "warning: {}\n", warning);
+  return records;
+}
+
+std::string RenderTable(const Table& table, const std::string& format) {
+  if (format == "csv") return ToCsv(table);
+  if (format == "markdown") return ToMarkdown(table);
+  return ToText(table);
+}
+
+void Deliver(const std::string& text, const std::filesystem::path& out) {
+  if (out.empty()) {
+    fmt::print("{}", text);
+  } else {
+    WriteFileAtomically(out, text);
+    fmt::print("wrote {}\n", out.string());
+  }
+}
+
+/// One row per group of measures: how many were compared, with which judgement.
+Table SummaryTable(const ComparisonReport& comparison) {
+  Table table;
+  table.title = "Compared";
+  table.columns = {{"group", "group", Format::kText, {}},
+                   {"same", "same", Format::kInteger, {}},
+                   {"better", "better", Format::kInteger, {}},
+                   {"worse", "worse", Format::kInteger, {}},
+                   {"not_measured", "not measured", Format::kInteger, {}}};
+  for (const std::string& group : GroupNames()) {
+    Record row;
+    row.Set("group", group);
+    int all = 0;
+    for (const auto& [key, judgement] : {std::pair{"same", Judgement::kSame},
+                                         {"better", Judgement::kBetter},
+                                         {"worse", Judgement::kWorse},
+                                         {"not_measured", Judgement::kNotMeasured}}) {
+      const int count = comparison.Count(judgement, group);
+      row.Set(key, std::int64_t{count});
+      all += count;
+    }
+    if (all > 0) table.rows.push_back(row);
+  }
+  return table;
+}
+
+Table FindingTable(const ComparisonReport& comparison, bool with_same) {
+  Table table;
+  table.title = with_same ? "All measures" : "Changes";
+  table.columns = {{"judgement", "judgement", Format::kText, {}},
+                   {"case", "case", Format::kText, {}},
+                   {"measure", "measure", Format::kText, {}},
+                   {"base", "base", Format::kText, {}},
+                   {"new", "new", Format::kText, {}},
+                   {"ratio", "ratio", Format::kSeconds, {}},
+                   {"why", "why", Format::kText, {}}};
+  // regressions first: they are what the reader came for
+  for (const Judgement judgement :
+       {Judgement::kWorse, Judgement::kBetter, Judgement::kNotMeasured, Judgement::kSame}) {
+    if (!with_same && (judgement == Judgement::kNotMeasured || judgement == Judgement::kSame))
+      continue;
+    for (const Finding& finding : comparison.findings) {
+      if (finding.judgement != judgement) continue;
+      Record row;
+      row.Set("judgement", std::string(ToString(judgement)));
+      row.Set("case", finding.one);
+      row.Set("measure", finding.measure.unit.empty()
+                             ? finding.measure.key
+                             : fmt::format("{} [{}]", finding.measure.key, finding.measure.unit));
+      row.Set("base", finding.base);
+      row.Set("new", finding.fresh);
+      row.Set("ratio", std::isfinite(finding.ratio) ? Value(finding.ratio) : Value());
+      row.Set("why", finding.why);
+      table.rows.push_back(row);
+    }
+  }
+  return table;
+}
+
+/// "12 hashes not measured: another compiler, ..." for each reason.
+std::vector<std::string> ReasonNotes(const ComparisonReport& comparison) {
+  std::vector<std::pair<std::string, int>> reasons;
+  for (const Finding& finding : comparison.findings) {
+    if (finding.judgement != Judgement::kNotMeasured) continue;
+    const std::string reason =
+        fmt::format("{} not measured: {}", GroupOf(finding.measure.rule), finding.why);
+    const auto at = std::ranges::find(reasons, reason, &std::pair<std::string, int>::first);
+    if (at == reasons.end()) {
+      reasons.emplace_back(reason, 1);
+    } else {
+      ++at->second;
+    }
+  }
+  std::vector<std::string> notes;
+  for (const auto& [reason, count] : reasons) notes.push_back(fmt::format("{} {}", count, reason));
+  return notes;
+}
+
+void NoteCases(const std::string& what, const std::vector<std::string>& cases,
+               std::vector<std::string>& notes) {
+  if (cases.empty()) return;
+  notes.push_back(fmt::format("{} {}, for example: {}", cases.size(), what, cases.front()));
+}
+
+/// Where the records of one side come from; differing origins in one file are all named.
+void NoteOrigins(const std::string& side, const std::vector<Record>& records,
+                 std::vector<std::string>& notes) {
+  std::set<std::string> lines;
+  for (const Record& record : records) {
+    const Origin origin = OriginOf(record);
+    lines.insert(origin.machine.empty() && origin.compiler.empty()
+                     ? side + ": origin not recorded"
+                     : fmt::format("{}: commit {}, {}, {}, {}, libm {}", side, origin.commit,
+                                   origin.machine, origin.compiler, origin.flags, origin.libm));
+  }
+  notes.insert(notes.end(), lines.begin(), lines.end());
+}
+
+/// One run is faster or slower than another as a whole when the machine's speed has changed; no
+/// test within the runs can tell that from a change of all code.
+void NoteCommonShift(const ComparisonReport& comparison, std::vector<std::string>& notes) {
+  std::vector<double> ratios;
+  for (const Finding& finding : comparison.findings) {
+    if (finding.measure.rule == Rule::kTime && std::isfinite(finding.ratio)) {
+      ratios.push_back(finding.ratio);
+    }
+  }
+  constexpr std::size_t kMany = 5;
+  constexpr double kShift = 0.01;  // half of the smallest effect that is reported
+  const double shift = Median(ratios);
+  if (ratios.size() < kMany || !(std::abs(shift - 1.0) > kShift)) return;
+  notes.push_back(
+      fmt::format("all times: median ratio {:.3f}; unless everything changed, the machine's speed "
+                  "did: repeat the run before believing single times",
+                  shift));
+}
+
+std::string Conclusion(const ComparisonReport& comparison, int code) {
+  if (code == 1) return fmt::format("WORSE: {} measures", comparison.Count(Judgement::kWorse));
+  if (code == 2) return "COULD NOT MEASURE: too little in common";
+  const int better = comparison.Count(Judgement::kBetter);
+  return better > 0 ? fmt::format("BETTER: {} measures, none worse", better) : "SAME";
+}
+
+}  // namespace
+
+int PrintComparison(const CompareCommand& command, const std::string& typed) {
+  const std::vector<Record> base = LoadMeasurements(command.base);
+  const std::vector<Record> fresh = LoadMeasurements(command.fresh);
+  const ComparisonReport comparison = Compare(base, fresh, command.options);
+  const int code = comparison.ExitCode(command.options);
+
+  std::vector<std::string> notes = ReasonNotes(comparison);
+  NoteCases("cases only in BASE", comparison.only_base, notes);
+  NoteCases("cases only in NEW", comparison.only_fresh, notes);
+  NoteCases("cases there more than once, not compared", comparison.ambiguous, notes);
+  NoteCommonShift(comparison, notes);
+  NoteOrigins("BASE", base, notes);
+  NoteOrigins("NEW", fresh, notes);
+  Table findings = FindingTable(comparison, command.format == "csv");
+  if (command.format == "csv") {
+    fmt::print("{}", ToCsv(findings));
+    fmt::print(stderr, "{}\n", Conclusion(comparison, code));
+    return code;
+  }
+  if (command.format == "markdown") notes.push_back(fmt::format("command: {}", typed));
+  if (!findings.rows.empty()) fmt::print("{}\n", RenderTable(findings, command.format));
+  Table summary = SummaryTable(comparison);
+  summary.notes = notes;
+  fmt::print("{}\n{}\n", RenderTable(summary, command.format), Conclusion(comparison, code));
+  return code;
+}
+
+int PrintFits(const FitCommand& command, const std::string& typed) {
+  const std::vector<Record> benchmarks = LoadMeasurements(command.file);
+  Table table;
+  table.title = "Time over size: ns = c bodies^exponent";
+  table.columns = {{"family", "family", Format::kText, {}},
+                   {"sizes", "sizes", Format::kInteger, {}},
+                   {"bodies_min", "bodies from", Format::kInteger, {}},
+                   {"bodies_max", "to", Format::kInteger, {}},
+                   {"exponent", "exponent", Format::kExponent, {}},
+                   {"standard_error", "std. error", Format::kExponent, {}},
+                   {"slope_min", "local min", Format::kExponent, {}},
+                   {"slope_max", "local max", Format::kExponent, {}},
+                   {"ns_per_body", "ns per body at largest", Format::kFixed, {}},
+                   {"failed", "failed", Format::kInteger, {}}};
+  table.rows = FitFamilies(benchmarks, command.from);
+  if (table.rows.empty()) {
+    fmt::print(stderr, "{}: no family of benchmarks with two sizes or more\n",
+               command.file.string());
+    return 2;
+  }
+  if (command.format != "text" || !command.out.empty()) {
+    NoteOrigins("measured", benchmarks, table.notes);
+    if (const double load = benchmarks.front().Number("load_average"); std::isfinite(load)) {
+      table.notes.push_back(fmt::format("load average of the minute before: {:.1f}", load));
+    }
+    table.notes.push_back(fmt::format("command: {}", typed));
+  }
+  Deliver(RenderTable(table, command.format), command.out);
+  return 0;
+}
+
+int ExportMeasurements(const ExportCommand& command) {
+  const std::vector<TrackedValue> values = TrackedValues(LoadMeasurements(command.file));
+  if (values.empty()) {
+    fmt::print(stderr, "{}: nothing to export: no record that finished has a measure\n",
+               command.file.string());
+    return 2;
+  }
+  Deliver(command.format == "bmf" ? ToBencherMetricFormat(values) : ToCustomSmallerIsBetter(values),
+          command.out);
+  return 0;
+}
+
+}  // namespace loopbench::harness

@@ -1,0 +1,36 @@
+// The subcommands on finished measurements: compare, fit, export. As commands.h.
+#pragma once
+
+#include <filesystem>
+#include <string>
+
+#include "harness/compare/compare.h"
+
+namespace loopbench::harness {
+
+struct CompareCommand {
+  std::filesystem::path base, fresh;
+  std::string format = "text";  ///< text, csv or markdown
+  CompareOptions options;
+};
+/// 0 the same or better, 1 something is worse, 2 could not measure.
+int PrintComparison(const CompareCommand& command, const std::string& typed);
+
+struct FitCommand {
+  std::filesystem::path file;
+  std::string format = "text";
+  double from = 0.0;          ///< sizes below are left out
+  std::filesystem::path out;  ///< standard output when empty
+};
+/// Exponents of time over size, one row per benchmark family.
+int PrintFits(const FitCommand& command, const std::string& typed);
+
+struct ExportCommand {
+  std::filesystem::path file;
+  std::string format = "customSmallerIsBetter";  ///< or bmf
+  std::filesystem::path out;                     ///< standard output when empty
+};
+/// Measurements as the JSON that trackers of continuous benchmarking take.
+int ExportMeasurements(const ExportCommand& command);
+
+}  // namespace loopbench::harness

@@ -1,0 +1,146 @@
+// The subcommands that read a store: tables and figures of its records.
+#include <fmt/format.h>
+#include <unistd.h>
+
+#include <cstdlib>
+#include <string_view>
+
+#include "harness/commands.h"
+#include "harness/config/config_error.h"
+#include "harness/provenance.h"
+#include "harness/report/columns.h"
+#include "harness/report/figure_recipes.h"
+#include "harness/store/files.h"
+
+namespace loopbench::harness {
+
+namespace {
+
+/// Colour only where a person looks: a terminal that has it, unless https://no-color.org is obeyed.
+bool TerminalHasColour() {
+  const char* no_color = std::getenv("NO_COLOR");
+  const char* term = std::getenv("TERM");
+  return ::isatty(STDOUT_FILENO) == 1 && (no_color == nullptr || *no_color == '\0') &&
+         term != nullptr && std::string_view(term) != "dumb";
+}
+
+void AppendProvenance(Table& table, const std::string& typed) {
+  for (const std::string& note : Provenance(typed)) table.notes.push_back(note);
+}
+
+/// CSV goes without the date of printing: the same records and command give the same bytes.
+std::string RenderKept(Table table, const std::string& format) {
+  if (format == "csv") {
+    std::erase_if(table.notes, [](const std::string& note) { return note.starts_with("date: "); });
+  }
+  return Render(table, format);
+}
+
+int DrawAll(const std::vector<NamedFigure>& figures, const PlotCommand& command) {
+  const std::string extension = command.format.empty() ? "svg" : command.format;
+  for (const NamedFigure& figure : figures) {
+    const auto path = command.out / (figure.name + "." + extension);
+    if (const auto error = WriteFigure(path, figure.figure)) {
+      fmt::print(stderr, "{}\n", *error);
+      return 2;
+    }
+  }
+  fmt::print("wrote {} figure{} to {}\n", figures.size(), figures.size() == 1 ? "" : "s",
+             command.out.string());
+  return 0;
+}
+
+/// --out is a file when it ends like a figure, else a folder.
+std::filesystem::path FileOf(const PlotCommand& command) {
+  const std::filesystem::path& out = command.out;
+  const std::string ending = out.extension().string();
+  if (ending != ".svg" && ending != ".pdf") {
+    return out / fmt::format("{}-over-{}.{}", command.free.y, command.free.x,
+                             command.format.empty() ? "svg" : command.format);
+  }
+  if (command.format.empty() || ending == "." + command.format) return out;
+  throw ConfigError(
+      fmt::format("--out {}: found the ending \"{}\", expected \".{}\" as in --format",
+                  out.string(), ending, command.format));
+}
+
+int DrawFree(const std::vector<Record>& records, const PlotCommand& command) {
+  if (command.free.x.empty() || command.free.y.empty()) {
+    throw ConfigError("plot: --group, --log and --title need --x KEY and --y KEY");
+  }
+  const std::filesystem::path path = FileOf(command);
+  const FreeFigureResult result = MakeFreeFigure(records, command.free);
+  for (const std::string& remark : result.remarks) fmt::print(stderr, "note: {}\n", remark);
+  if (const auto error = WriteFigure(path, result.figure)) {
+    fmt::print(stderr, "{}\n", *error);
+    return 2;
+  }
+  fmt::print("wrote {}\n", path.string());
+  return 0;
+}
+
+}  // namespace
+
+void WriteTables(const std::vector<Record>& records, const std::filesystem::path& out,
+                 const std::string& typed) {
+  for (const std::string kind : {"drift", "timing"}) {
+    Table full = MakeTable(records, {.kind = kind});
+    if (full.rows.empty()) continue;
+    AppendProvenance(full, typed);
+    for (const auto& [format, ending] : {std::pair{"csv", ".csv"}, {"markdown", ".md"}}) {
+      WriteFileAtomically(out / (kind + ending), RenderKept(full, format));
+    }
+    const Table compact = MakeTable(records, {.kind = kind, .compact = true});
+    fmt::print("{}\n", ToText(compact, TerminalHasColour()));
+  }
+  for (const std::string& note : Provenance(typed)) fmt::print("{}\n", note);
+}
+
+int PrintTable(const TableCommand& command, const std::string& typed) {
+  TableView view = command.view;
+  const bool on_terminal = command.format == "text" && command.out.empty();
+  view.compact = on_terminal;
+  Table table = MakeTable(LoadRecords(command.store), view);
+  if (table.rows.empty()) {
+    fmt::print(stderr, "{}: no {} records match{}{}\n", command.store.string(),
+               view.kind.empty() ? "drift" : view.kind, view.where.empty() ? "" : " ",
+               ToText(view.where));
+    return 2;
+  }
+  AppendProvenance(table, typed);
+  if (on_terminal) {
+    fmt::print("{}", ToText(table, TerminalHasColour()));
+  } else if (command.out.empty()) {
+    fmt::print("{}", RenderKept(table, command.format));
+  } else {
+    WriteFileAtomically(command.out, RenderKept(table, command.format));
+    fmt::print("wrote {}\n", command.out.string());
+  }
+  return 0;
+}
+
+int Plot(const PlotCommand& command) {
+  std::vector<Record> records = LoadRecords(command.store);
+  for (const Condition& condition : command.where) RequireKey("--where", condition.key, records);
+  records = Filter(records, command.where);
+  if (records.empty()) {
+    fmt::print(stderr, "{}: no records match{}{}\n", command.store.string(),
+               command.where.empty() ? "" : " ", ToText(command.where));
+    return 2;
+  }
+  const FreeFigure& free = command.free;
+  if (!(free.x + free.y + free.group + free.log + free.title).empty()) {
+    return DrawFree(records, command);
+  }
+  const std::vector<NamedFigure> figures =
+      AllFigures(Filter(records, {Condition{"kind", {"accuracy"}}}));
+  if (figures.empty()) {
+    fmt::print(stderr,
+               "{}: no accuracy records with series match; --x KEY --y KEY draws other values\n",
+               command.store.string());
+    return 2;
+  }
+  return DrawAll(figures, command);
+}
+
+}  // namespace loopbench::harness

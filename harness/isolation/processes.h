@@ -1,0 +1,48 @@
+// Work in child processes: whatever a piece of work does, the parent gets an answer and goes on.
+//
+// Each piece runs in a fork of this program, under limits of its own, and answers with text through
+// a pipe. A crash, an overrun of time or memory, or silence is an ending with a name. The caller
+// must have a single thread: a fork copies only the thread that calls it.
+#pragma once
+
+#include <cstddef>
+#include <functional>
+#include <string>
+#include <string_view>
+
+namespace loopbench::harness {
+
+enum class ProcessEnding {
+  kAnswered,    ///< returned a text
+  kThrew,       ///< an exception left the work; the message is its text
+  kCrashed,     ///< ended by a signal, or left through exit()
+  kOverTime,    ///< killed at its time limit
+  kOverMemory,  ///< asked for more memory than allowed
+};
+
+struct ProcessLimits {
+  double wall_s = 0.0;     ///< killed after so much time [s]; 0: no limit
+  double memory_mb = 0.0;  ///< address space beyond what the parent has [MiB]; 0: no limit
+};
+
+struct ProcessResult {
+  ProcessEnding ending = ProcessEnding::kAnswered;
+  std::string text;  ///< the answer, or what is known about the failure
+  double wall_s = 0.0;
+};
+
+/// Runs work(0) .. work(count - 1), at most `jobs` at once, started in order. `done` is called here
+/// in the parent as pieces end, one at a time. No piece outlives this process. Throws
+/// std::runtime_error when a process cannot be started, and what `done` throws; pieces still under
+/// way are killed then.
+///
+/// Sanitizers reserve the whole address space, so memory limits are not set under them.
+void RunInProcesses(std::size_t count, int jobs,
+                    const std::function<std::string(std::size_t)>& work,
+                    const std::function<ProcessLimits(std::size_t)>& limits,
+                    const std::function<void(std::size_t, const ProcessResult&)>& done);
+
+/// Whether memory limits are set in this build.
+bool LimitsMemory();
+
+}  // namespace loopbench::harness

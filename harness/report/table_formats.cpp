@@ -1,0 +1,199 @@
+// The writers for programs and for papers: JSON and LaTeX.
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <stdexcept>
+#include <string_view>
+
+#include "harness/report/columns.h"
+#include "harness/report/table.h"
+#include "harness/store/record_json.h"
+
+namespace loopbench::harness {
+namespace {
+
+// A value of a record as JSON: the record's writer, without its braces and key.
+std::string JsonOf(Value value) {
+  Record one;
+  one.Set("v", std::move(value));
+  const std::string object = ToJsonLine(one);  // {"v":...}
+  return object.substr(5, object.size() - 6);
+}
+
+std::string JsonList(const std::vector<std::string>& items, std::string_view separator) {
+  return fmt::format("[{}]", fmt::join(items, separator));
+}
+
+std::string JsonStrings(const std::vector<std::string>& texts) {
+  std::vector<std::string> items;
+  for (const std::string& text : texts) items.push_back(JsonOf(text));
+  return JsonList(items, ", ");
+}
+
+// Columns of lists that machines read: the group's key comes first unless it is one of them.
+std::vector<TableColumn> FlatColumns(const Table& table) {
+  std::vector<TableColumn> columns = table.columns;
+  if (!table.group.empty() &&
+      std::ranges::find(columns, table.group, &TableColumn::key) == columns.end()) {
+    columns.insert(columns.begin(), ColumnOf(table.group, table.rows));
+  }
+  return columns;
+}
+
+// A table's notes by what they are.
+struct Notes {
+  Record provenance;
+  std::vector<std::string> warnings, others;
+};
+
+Notes Sort(const std::vector<std::string>& notes) {
+  Notes sorted;
+  for (const std::string& note : notes) {
+    const std::size_t colon = note.find(": ");
+    const std::string name = note.substr(0, colon);
+    if (name == "warning") {
+      sorted.warnings.push_back(note.substr(colon + 2));
+    } else if (colon != std::string::npos && name.find(' ') == std::string::npos) {
+      sorted.provenance.Set(name, note.substr(colon + 2));
+    } else {
+      sorted.others.push_back(note);
+    }
+  }
+  return sorted;
+}
+
+std::string EscapeLatex(std::string_view text) {
+  std::string escaped;
+  for (const char c : text) {
+    switch (c) {
+      case '\\':
+        escaped += "\\textbackslash{}";
+        break;
+      case '~':
+        escaped += "\\textasciitilde{}";
+        break;
+      case '^':
+        escaped += "\\textasciicircum{}";
+        break;
+      case '<':
+        escaped += "\\textless{}";  // not every font encoding has these three
+        break;
+      case '>':
+        escaped += "\\textgreater{}";
+        break;
+      case '|':
+        escaped += "\\textbar{}";
+        break;
+      case '&':
+      case '%':
+      case '$':
+      case '#':
+      case '_':
+      case '{':
+      case '}':
+        escaped += '\\';
+        escaped += c;
+        break;
+      case '\n':
+        escaped += ' ';
+        break;
+      default:
+        escaped += c;
+    }
+  }
+  return escaped;
+}
+
+// "2.05e-03" as $2.05 \times 10^{-3}$, "113.2" as $113.2$; a text stays a text.
+std::string LatexCell(const Record& row, const TableColumn& column) {
+  const std::string cell = Cell(row, column);
+  const Value* value = row.Find(column.key);
+  const bool is_number = value != nullptr && (std::holds_alternative<double>(*value) ||
+                                              std::holds_alternative<std::int64_t>(*value));
+  if (cell.empty() || !is_number) return EscapeLatex(cell);
+  if (cell.find("inf") != std::string::npos)
+    return "$" + cell.substr(0, cell[0] == '-') + "\\infty$";
+  const std::size_t e = cell.find('e');
+  if (e == std::string::npos) return "$" + cell + "$";
+  const std::string mantissa = cell.substr(0, e);
+  const int exponent = std::stoi(cell.substr(e + 1));
+  if (mantissa == "1") return fmt::format("$10^{{{}}}$", exponent);
+  return fmt::format("${} \\times 10^{{{}}}$", mantissa, exponent);
+}
+
+std::string LatexRow(const std::vector<std::string>& cells) {
+  return fmt::format("{} \\\\\n", fmt::join(cells, " & "));
+}
+
+}  // namespace
+
+std::string ToJson(const Table& table) {
+  const std::vector<TableColumn> columns = FlatColumns(table);
+  std::vector<std::string> heads, rows;
+  for (const TableColumn& column : columns) {
+    Record head;
+    head.Set("key", column.key);
+    head.Set("header", column.header);
+    head.Set("unit", UnitOf(column));
+    heads.push_back(ToJsonLine(head));
+  }
+  for (const Record& row : table.rows) {
+    Record cells;
+    for (const TableColumn& column : columns) {
+      const Value* value = row.Find(column.key);
+      cells.Set(column.key, value == nullptr ? Value() : *value);
+    }
+    rows.push_back(ToJsonLine(cells));
+  }
+  const Notes notes = Sort(table.notes);
+  return fmt::format(
+      "{{\n\"title\": {},\n\"columns\": {},\n\"rows\": {},\n\"provenance\": {},\n\"warnings\": "
+      "{},\n"
+      "\"notes\": {}\n}}\n",
+      JsonOf(table.title), JsonList(heads, ",\n  "), JsonList(rows, ",\n  "),
+      ToJsonLine(notes.provenance), JsonStrings(notes.warnings), JsonStrings(notes.others));
+}
+
+std::string ToLatex(const Table& table) {
+  std::vector<TableColumn> columns = table.columns;
+  std::erase_if(columns, [&](const TableColumn& column) { return column.key == table.group; });
+  std::string alignment;
+  std::vector<std::string> head;
+  for (const TableColumn& column : columns) {
+    alignment += column.format == Format::kText ? 'l' : 'r';
+    head.push_back(EscapeLatex(column.header));
+  }
+  std::string out = "% needs \\usepackage{booktabs}\n";
+  if (!table.title.empty()) out += fmt::format("% {}\n", EscapeLatex(table.title));
+  for (const RowGroup& group : Groups(table)) {
+    if (!group.heading.empty()) {
+      out += fmt::format("\n\\paragraph{{{}}}\n\n", EscapeLatex(group.heading));
+    }
+    out += fmt::format("\\begin{{tabular}}{{{}}}\n\\toprule\n{}\\midrule\n", alignment,
+                       LatexRow(head));
+    for (const Record& row : group.rows) {
+      std::vector<std::string> cells;
+      for (const TableColumn& column : columns) cells.push_back(LatexCell(row, column));
+      out += LatexRow(cells);
+    }
+    out += "\\bottomrule\n\\end{tabular}\n";
+  }
+  for (std::string note : table.notes) {
+    std::ranges::replace(note, '\n', ' ');  // a second line would be no comment
+    out += fmt::format("% {}\n", note);
+  }
+  return out;
+}
+
+std::string Render(const Table& table, const std::string& format) {
+  if (format == "text") return ToText(table);
+  if (format == "markdown") return ToMarkdown(table);
+  if (format == "json") return ToJson(table);
+  if (format == "latex") return ToLatex(table);
+  if (format != "csv") throw std::invalid_argument("no table format " + format);
+  Table flat = table;
+  flat.columns = FlatColumns(table);
+  return ToCsv(flat);
+}
+
+}  // namespace loopbench::harness

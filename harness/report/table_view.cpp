@@ -1,0 +1,153 @@
+#include "harness/report/table_view.h"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <cmath>
+
+#include "harness/report/columns.h"
+#include "harness/report/factorial.h"
+#include "harness/timing/noise.h"
+
+namespace loopbench::harness {
+namespace {
+
+bool HasKind(std::span<const Record> records, std::string_view kind) {
+  return std::ranges::any_of(records,
+                             [&](const Record& record) { return record.Text("kind") == kind; });
+}
+
+std::string KindOf(const TableView& view, std::span<const Record> records) {
+  if (!view.kind.empty()) return view.kind;
+  if (HasKind(records, "accuracy")) return "drift";
+  return HasKind(records, "timing") ? "timing" : "all";
+}
+
+// `rows` are what the table shows: records, or for the factorial table its own rows.
+void RequireKeys(const TableView& view, std::span<const Record> rows) {
+  if (!view.group.empty()) RequireKey("--group", view.group, rows);
+  if (!view.sort.empty()) RequireKey("--sort", view.sort, rows);
+  for (const std::string& key : view.columns) RequireKey("--columns", key, rows);
+}
+
+// Every key of the records but series; what is in all records comes in the records' order.
+std::vector<TableColumn> AllColumns(std::span<const Record> rows) {
+  std::vector<TableColumn> columns;
+  for (const std::string& key : KeysOf(rows)) {
+    if (!key.starts_with("series.")) columns.push_back(ColumnOf(key, rows));
+  }
+  return columns;
+}
+
+std::vector<TableColumn> DefaultColumns(const std::string& kind, bool compact,
+                                        std::span<const Record> rows) {
+  if (kind == "timing") {
+    return WithParameters(compact ? CompactTimingColumns() : TimingColumns(), rows);
+  }
+  if (kind == "drift") {
+    return WithParameters(compact ? CompactDriftColumns() : DriftColumns(), rows);
+  }
+  return AllColumns(rows);
+}
+
+std::vector<TableColumn> ChosenColumns(const TableView& view, std::span<const Record> rows) {
+  std::vector<TableColumn> columns;
+  for (const std::string& key : view.columns) columns.push_back(ColumnOf(key, rows));
+  return columns;
+}
+
+// A slope that is not resolved must not look like one that is: the short table, which has no room
+// for growth_resolved, marks it.
+void MarkUnresolved(Table& table) {
+  bool any = false;
+  for (Record& row : table.rows) {
+    const double exponent = row.Number("growth_exponent");
+    if (std::isnan(exponent)) continue;
+    const bool resolved = row.Text("growth_resolved") == "true";
+    row.Set("growth_exponent", fmt::format("{:.2f}{}", exponent, resolved ? ' ' : '?'));
+    any = any || !resolved;
+  }
+  if (any) {
+    table.notes.push_back(
+        "slope of drift over time in log-log axes; ? marks what is not resolved (single runs, "
+        "windows that disagree)");
+  }
+}
+
+Table Factorial(const std::vector<Record>& rows) {
+  FactorialOptions options;
+  if (!rows.empty()) {
+    // the table is for one tolerance and horizon: those of the first record, unless chosen
+    options.rtol = rows.front().Number("rtol");
+    options.horizon = rows.front().Number("horizon");
+  }
+  return FactorialTable(rows, options);
+}
+
+}  // namespace
+
+Table MakeTable(std::span<const Record> records, const TableView& view) {
+  for (const Condition& condition : view.where) RequireKey("--where", condition.key, records);
+  const std::string kind = KindOf(view, records);
+  Selection selection = view.where;
+  if (kind == "timing") selection.push_back({"kind", {"timing"}});
+  if (kind == "drift" || kind == "factorial") selection.push_back({"kind", {"accuracy"}});
+  std::vector<Record> rows = Filter(records, selection);
+  SortRows(&rows);
+  Table table;
+  if (kind == "factorial") {
+    table = Factorial(rows);
+    RequireKeys(view, table.rows);
+    if (!view.columns.empty()) table.columns = ChosenColumns(view, table.rows);
+  } else {
+    RequireKeys(view, records);
+    table.title = kind == "drift" ? "Drift" : kind == "timing" ? "Timing" : "Records";
+    table.columns =
+        view.columns.empty() ? DefaultColumns(kind, view.compact, rows) : ChosenColumns(view, rows);
+    table.notes = NoiseWarnings(rows);
+    table.rows = std::move(rows);
+  }
+  table.group = view.group;
+  if (!view.sort.empty()) SortRowsBy(&table.rows, view.sort, view.descending);
+  if (!view.group.empty()) SortRowsBy(&table.rows, view.group, false);
+  if (kind == "drift" && view.compact && view.columns.empty()) MarkUnresolved(table);
+  return table;
+}
+
+std::vector<std::string> NoiseWarnings(std::span<const Record> rows) {
+  std::size_t timed = 0, noisy = 0;
+  double spread = 0, load = 0;
+  std::string where_spread, processors, governor;
+  for (const Record& row : rows) {
+    if (row.Text("kind") != "timing") continue;
+    ++timed;
+    if (row.Text("noise").empty()) continue;
+    ++noisy;
+    for (const char* key : {"aa_spread", "aa_spread_wall"}) {
+      if (!(row.Number(key) > spread)) continue;
+      spread = row.Number(key);
+      where_spread = row.Text("mechanism");
+    }
+    load = std::fmax(load, row.Number("load1"));
+    processors = row.Text("processors");
+    if (row.Text("governor") != "performance") governor = row.Text("governor");
+  }
+  if (noisy == 0) return {};
+  std::string line = fmt::format(
+      "warning: noisy machine in {} of {} timings (column noise says why): load up to {:.1f} on {} "
+      "processors",
+      noisy, timed, load, processors);
+  if (spread > 0) {
+    line += fmt::format(", the same column timed twice differed by up to {:.1f} % ({})",
+                        100 * spread, where_spread);
+  }
+  if (!governor.empty()) line += ", CPU governor " + governor;
+  // what a quiet machine may show at most is not to be trusted on a noisy one
+  const double least = std::fmax(spread, NoiseThresholds{}.aa_spread);
+  return {line,
+          fmt::format("warning: differences between columns below {:.0f} % mean nothing here; "
+                      "repeat on a quiet machine",
+                      std::ceil(100 * least))};
+}
+
+}  // namespace loopbench::harness

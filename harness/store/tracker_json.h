@@ -1,0 +1,25 @@
+// Measurements in the JSON that trackers of continuous benchmarking take.
+#pragma once
+
+#include <string>
+#include <vector>
+
+namespace loopbench::harness {
+
+/// One number to be tracked; smaller is better.
+struct TrackedValue {
+  std::string benchmark, measure, unit;
+  double value = 0.0;
+  double lower = 0.0, upper = 0.0;  ///< spread; equal to value where there is none
+};
+
+/// github-action-benchmark, tool "customSmallerIsBetter":
+///   [{"name": "<benchmark> <measure>", "unit", "value", "range": "lower .. upper"}]
+/// `range` is left out without a spread, values that are not finite always.
+std::string ToCustomSmallerIsBetter(const std::vector<TrackedValue>& values);
+
+/// Bencher Metric Format: {benchmark: {measure: {"value", "lower_value", "upper_value"}}}. Units
+/// are part of the measure's name, "cpu (ns)": the format has no place for them.
+std::string ToBencherMetricFormat(const std::vector<TrackedValue>& values);
+
+}  // namespace loopbench::harness

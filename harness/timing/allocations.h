@@ -1,0 +1,15 @@
+// Counts what a program allocates. Linked into benchmark programs only: it replaces malloc.
+#pragma once
+
+#include <cstdint>
+
+namespace loopbench::harness {
+
+struct Allocations {
+  std::int64_t count = 0;  ///< calls of malloc and its relatives so far
+  std::int64_t bytes = 0;  ///< asked for so far; what is freed is not subtracted
+};
+
+Allocations AllocationsSoFar();
+
+}  // namespace loopbench::harness

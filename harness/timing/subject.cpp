@@ -1,0 +1,142 @@
+#include "harness/timing/subject.h"
+
+#include <fmt/format.h>
+
+#include <cmath>
+#include <stdexcept>
+#include <vector>
+
+#include "harness/hash.h"
+#include "harness/integrator/arkode.h"
+#include "harness/integrator/stepper.h"
+#include "harness/run_case.h"
+#include "mechanism/assembly.h"
+#include "odca/odca.h"
+
+namespace loopbench::harness {
+
+namespace {
+
+constexpr double kWarmUpStep = 0.005;  // short against any motion of unit bars
+constexpr int kWarmUpSteps = 10;
+constexpr double kNever = 1e9;  // time limit of a benchmark's integrator [s]
+
+template <class Space>
+BenchmarkState ComputeStateIn(const MechanismDescription& description, Coordinates coordinates) {
+  BenchmarkState state;
+  const Mechanism<Space, double> mechanism(description, coordinates);
+  const Start<double> start = Assemble<Space>(description, mechanism);
+  state.outcome = start.outcome;
+  state.message = start.message;
+  if (start.outcome != Outcome::kFinished) return state;
+  const Column column{FormulationKind::kOdca, Enforcement::kVelocity, coordinates,
+                      SolverKind::kRankRevealing};
+  const auto formulation = MakeFormulation<Space>(column, mechanism);
+  state.outcome = formulation->Start(start.q, start.u);
+  std::vector<double> y(formulation->state_size());
+  formulation->ToState(start.q, start.u, y);
+  IntegratorOptions options;
+  options.profile = "dormand-prince";
+  options.fixed_step = kWarmUpStep;
+  FormulationOde<Space> ode(*formulation);
+  if (state.outcome == Outcome::kFinished) {
+    const IntegratorResult result = Integrate(ode, 0.0, kWarmUpSteps * kWarmUpStep, y, options);
+    state.outcome = result.outcome;
+    state.message = result.message;
+  }
+  if (state.outcome == Outcome::kFinished) state.outcome = formulation->FromState(y);
+  if (state.outcome != Outcome::kFinished) return state;
+  state.q = formulation->q();
+  state.u = formulation->u();
+  std::vector<double> numbers(state.q.begin(), state.q.end());
+  numbers.insert(numbers.end(), state.u.begin(), state.u.end());
+  state.hash = HashRounded(numbers);
+  return state;
+}
+
+template <class Space>
+class SubjectIn final : public BenchmarkSubject {
+ public:
+  SubjectIn(const MechanismDescription& description, const Column& column,
+            const BenchmarkState& state, const std::string& integrator, double step)
+      : mechanism_(description, column.coordinates),
+        formulation_(MakeFormulation<Space>(column, mechanism_)),
+        ode_(*formulation_) {
+    const Outcome outcome = formulation_->Start(state.q, state.u);
+    if (outcome != Outcome::kFinished) {
+      throw std::invalid_argument(fmt::format("cannot start: {}", ToString(outcome)));
+    }
+    y_.resize(formulation_->state_size());
+    ydot_.resize(y_.size());
+    formulation_->ToState(state.q, state.u, y_);
+    options_.profile = integrator;
+    options_.fixed_step = step;
+    options_.time_limit_s = kNever;
+  }
+
+  Outcome Derivative() override { return formulation_->Derivative(0.0, y_, ydot_); }
+
+  Outcome Step() override {
+    if (!stepper_) {
+      guarded_ = std::make_unique<GuardedOde>(ode_, options_);
+      // the end of the interval is far, so that no step is clipped
+      stepper_ = std::make_unique<Stepper>(*guarded_, 0.0, 1e3 * options_.fixed_step, y_);
+    } else {
+      stepper_->Restart(0.0, y_);
+    }
+    double t = 0.0;
+    const Outcome outcome = OutcomeOfReturnCode(stepper_->Step(t));
+    return guarded_->failure() == Outcome::kFinished ? outcome : guarded_->failure();
+  }
+
+  std::span<const double> derivative() const override { return ydot_; }
+  int bodies() const override { return mechanism_.num_bodies() - 1; }
+  int rank() const override { return formulation_->diagnostics().rank; }
+  std::int64_t operations() const override {
+    const auto* odca = dynamic_cast<const odca::Odca<Space, double>*>(formulation_.get());
+    return odca == nullptr ? -1 : odca->sweep().operations();
+  }
+
+ private:
+  Mechanism<Space, double> mechanism_;
+  std::unique_ptr<Formulation<Space, double>> formulation_;
+  FormulationOde<Space> ode_;
+  IntegratorOptions options_;
+  std::unique_ptr<GuardedOde> guarded_;
+  std::unique_ptr<Stepper> stepper_;
+  std::vector<double> y_, ydot_;
+};
+
+}  // namespace
+
+BenchmarkState ComputeState(const MechanismDescription& description, Coordinates coordinates) {
+  return description.space == SpaceKind::kPlanar
+             ? ComputeStateIn<Planar>(description, coordinates)
+             : ComputeStateIn<Spatial>(description, coordinates);
+}
+
+std::string HashRounded(std::span<const double> numbers) {
+  std::vector<std::int64_t> rounded;
+  for (const double number : numbers) rounded.push_back(std::llround(number * 1e6));
+  return Fnv1a(
+      {reinterpret_cast<const char*>(rounded.data()), rounded.size() * sizeof(std::int64_t)});
+}
+
+std::string HashExact(std::span<const double> numbers) {
+  return Fnv1a({reinterpret_cast<const char*>(numbers.data()), numbers.size_bytes()});
+}
+
+std::unique_ptr<BenchmarkSubject> MakeSubject(const MechanismDescription& description,
+                                              const Column& column, const BenchmarkState& state,
+                                              const std::string& integrator, double step) {
+  if (state.outcome != Outcome::kFinished) {
+    throw std::invalid_argument(
+        fmt::format("no state to measure at: {} {}", ToString(state.outcome), state.message));
+  }
+  if (description.space == SpaceKind::kPlanar) {
+    return std::make_unique<SubjectIn<Planar>>(description, column, state, integrator, step);
+  }
+  return std::make_unique<SubjectIn<Spatial>>(description, column, state, integrator, step);
+}
+
+}  // namespace loopbench::harness

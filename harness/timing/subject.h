@@ -1,0 +1,58 @@
+// One benchmark's work, ready to be repeated: a right-hand side or an integrator step of one column
+// of one mechanism, always from the same state.
+//
+// States are computed, not stored: the mechanism's start, moved for a short while, so that speeds
+// and all terms of the equations are there. Their hashes are saved (configs/benchmarks/), and a
+// state that comes out differently is refused, because times of different states do not compare.
+#pragma once
+
+#include <cstdint>
+#include <memory>
+#include <span>
+#include <string>
+
+#include "harness/config/benchmarks.h"
+#include "mechanism/outcome.h"
+
+namespace loopbench::harness {
+
+/// Positions and speeds at which a mechanism is measured, the same for all columns of one
+/// coordinate set.
+struct BenchmarkState {
+  Outcome outcome = Outcome::kFinished;
+  std::string message;  ///< why there is no state
+  Eigen::VectorXd q, u;
+  std::string hash;  ///< of q and u, rounded (HashRounded)
+};
+
+/// The start of the description after 0.05 s of O-DCA at velocity level, in fixed steps.
+BenchmarkState ComputeState(const MechanismDescription& description, Coordinates coordinates);
+
+/// FNV-1a (64 bit) of the numbers rounded to 1e-6. Other flags and libraries move states by some
+/// 1e-13, so that their hashes agree, but for a chance of 1e-7 per number.
+std::string HashRounded(std::span<const double> numbers);
+
+/// FNV-1a (64 bit) of all bits.
+std::string HashExact(std::span<const double> numbers);
+
+class BenchmarkSubject {
+ public:
+  virtual ~BenchmarkSubject() = default;
+  /// One right-hand side at the state.
+  virtual Outcome Derivative() = 0;
+  /// One step of the set's integrator and length, from the state.
+  virtual Outcome Step() = 0;
+  /// dy/dt of the last Derivative().
+  virtual std::span<const double> derivative() const = 0;
+  virtual int bodies() const = 0;
+  virtual int rank() const = 0;  ///< as the last evaluation found it
+  /// Multiplications and additions of a right-hand side as O-DCA counts them; -1 for the others.
+  virtual std::int64_t operations() const = 0;
+};
+
+/// Throws std::invalid_argument when the mechanism cannot be made or the column cannot start.
+std::unique_ptr<BenchmarkSubject> MakeSubject(const MechanismDescription& description,
+                                              const Column& column, const BenchmarkState& state,
+                                              const std::string& integrator, double step);
+
+}  // namespace loopbench::harness

@@ -1,0 +1,137 @@
+// compare, fit and export as their users call them, and loopbench_bench where it is built.
+#include <gtest/gtest.h>
+
+#include <string>
+#include <vector>
+
+#include "harness/store/measurements.h"
+#include "tests/harness/cli_fixture.h"
+
+namespace loopbench::harness {
+namespace {
+
+class ComparisonCommands : public CommandLineTest {
+ protected:
+  void Expect(const std::string& arguments, int code, const std::vector<std::string>& words) const {
+    SCOPED_TRACE(arguments);
+    ExpectEnding(Call(arguments), code, words);
+  }
+};
+
+TEST_F(ComparisonCommands, CompareARunWithItselfAndWithAPlantedDrift) {
+  ASSERT_EQ(Call("run tiny.json --out base").code, 0);
+  ASSERT_EQ(Call("run tiny.json --out new").code, 0);
+  Expect("compare base new", 0, {"outcomes", "hashes", "SAME", "BASE: commit "});
+  Expect("compare base new --format csv", 0, {"judgement,case,measure", "same,"});
+
+  std::vector<Record> records = ReadRecords(folder_ / "new");
+  records[0].Set("drift_position_max", 3.0 * records[0].Number("drift_position_max"));
+  {
+    ResultStore store(folder_ / "worse");
+    for (const Record& record : records) store.Append(record);
+  }
+  Expect("compare base worse", 1, {"worse", "four-bar odca", "drift_position_max [m]", "WORSE: 1"});
+  Expect("compare worse base", 0, {"better", "BETTER: 1 measures, none worse"});
+  Expect("compare base worse --only counts --only hashes", 0, {"SAME"});
+  Expect("compare base worse --only times", 2, {"COULD NOT MEASURE"});
+  Expect("export base --format bmf", 0,
+         {"\"accuracy tiny four-bar odca", "drift_position_max (m)"});
+  Expect("export base --out b.json", 0, {"wrote b.json"});
+}
+
+TEST_F(ComparisonCommands, RefuseWhatIsNotThere) {
+  Write("b.json", R"({"benchmarks": []})");
+  Write("text.json", "nothing");
+  Expect("compare none.json b.json", 2, {"cannot read 'none.json'"});
+  Expect("compare b.json text.json", 2, {"text.json: not JSON"});
+  Expect("compare b.json b.json", 2, {"COULD NOT MEASURE"});
+  Expect("compare b.json b.json --only speed", 2, {"--only"});
+  Expect("fit b.json", 2, {"no family of benchmarks"});
+  Expect("export b.json", 2, {"nothing to export"});
+  Expect("compare --help", 0, {"Examples:", "Exit codes:"});
+}
+
+#ifdef LOOPBENCH_BENCH_BINARY
+
+class BenchmarkProgram : public ComparisonCommands {
+ protected:
+  /// The benchmark program in the test's folder: the shell that would call loopbench ends before.
+  Ending Bench(const std::string& arguments) const {
+    return Call("", "('" LOOPBENCH_BENCH_BINARY "' " + arguments + ") 2>&1; exit $?; ");
+  }
+};
+
+constexpr const char* kFamilies = R"({"name": "small", "states": "states.json", "groups": [
+  {"family": "chain", "sizes": [3, 6, 12], "measure": ["rhs", "step"],
+   "columns": [{"formulation": "odca", "enforcement": "acceleration"}]},
+  {"mechanisms": ")" LOOPBENCH_SOURCE_DIR R"(/configs/mechanisms/toggle-singular-start.json",
+   "measure": "rhs", "columns": [{"formulation": "reduction", "enforcement": "velocity"}]}]})";
+
+TEST_F(BenchmarkProgram, WritesJsonThatTheCommandsTake) {
+  Write("families.json", kFamilies);
+  const auto bench = [this](const std::string& arguments) {
+    return Bench("--families families.json " + arguments);
+  };
+  ExpectEnding(bench("--save-states"), 0, {"wrote 4 hashes to states.json"});
+  // a saved hash that does not match is an error of its benchmarks, with both hashes
+  std::string states = ReadFile(folder_ / "states.json");
+  const std::size_t hash = states.find("\"chain/3/joint\": \"") + 18;
+  states.replace(hash, 16, "00000000deadbeef");
+  Write("states.json", states);
+
+  // repetitions make aggregates, and the spread of allocations that are always 0 is NaN
+  const std::string run = "--benchmark_min_time=0.001 --benchmark_repetitions=2 ";
+  ExpectEnding(bench(run + "--benchmark_out=out.json"), 0, {"saved is 00000000deadbeef"});
+  const std::string text = ReadFile(folder_ / "out.json");
+  EXPECT_EQ(text.find("NaN"), std::string::npos);
+  EXPECT_NE(text.find("allocations"), std::string::npos);
+  const std::vector<Record> records = ReadMeasurements(folder_ / "out.json");
+  ASSERT_EQ(records.size(), 7u);
+  int failed = 0;
+  for (const Record& record : records) {
+    const std::string name = record.Text("benchmark");
+    const bool refused = name.find("chain/3/") != std::string::npos;
+    failed += refused;
+    EXPECT_EQ(record.Text("outcome") == "finished", !refused) << name << record.Text("outcome");
+    EXPECT_EQ(record.Find("ns_per_body") != nullptr, !refused) << name;
+    EXPECT_EQ(record.Find("bytes") != nullptr, !refused) << name;
+    if (refused) continue;
+    EXPECT_EQ(record.Text("start_hash").size(), 16u) << name;
+    EXPECT_EQ(record.Numbers("series.cpu_ns").size(), 2u) << name;
+    EXPECT_FALSE(record.Text("machine").empty());
+    if (name.find("odca") != std::string::npos) {
+      EXPECT_EQ(record.Number("allocations"), 0.0) << name;
+    }
+    // the temporaries of the dense baselines are counted
+    if (name.find("reduction") != std::string::npos) {
+      EXPECT_GT(record.Number("bytes"), 0.0) << name;
+    }
+  }
+  EXPECT_EQ(failed, 2);
+
+  Expect("fit out.json", 0, {"rhs/chain/N/odca/acceleration/joint/rank-revealing", "exponent"});
+  Expect("compare out.json out.json", 0, {"times not measured: too few repetitions", "SAME"});
+  Expect("export out.json", 0, {"\"unit\": \"ns\""});
+  // the same JSON on the terminal, where nothing else may stand
+  const Ending terminal = bench(run + "--benchmark_format=json 2>/dev/null");
+  EXPECT_EQ(ParseBenchmarkJson(terminal.text, "terminal").size(), 7u);
+}
+
+TEST_F(BenchmarkProgram, RefusesBadInput) {
+  const auto bench = [this](const std::string& arguments, const std::string& word) {
+    SCOPED_TRACE(arguments);
+    ExpectEnding(Bench(arguments), 2, {word});
+  };
+  Write("bad.json", R"({"name": "n", "groups": [{"familiy": "chain"}]})");
+  bench("--families none.json", "none.json: cannot be read: no such file");
+  bench("--families bad.json", "did you mean \"family\"");
+  bench("--families", "expected a file");
+  bench("--benchmark_filter=nothing_like_it", "");
+  bench("--faimlies=bad.json", "--faimlies");
+  ExpectEnding(Bench("--help"), 0, {"Examples:", "--families"});
+}
+
+#endif
+
+}  // namespace
+}  // namespace loopbench::harness

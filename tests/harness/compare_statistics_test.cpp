@@ -1,0 +1,118 @@
+// Tests of significance against enumeration and worked examples.
+#include <gtest/gtest.h>
+
+#include <algorithm>
+#include <cmath>
+#include <numeric>
+#include <random>
+#include <vector>
+
+#include "harness/compare/statistics.h"
+
+namespace loopbench::harness {
+namespace {
+
+/// Share of all ways to choose which of the values form the first sample whose u is at least that
+/// of the given samples: the definition of p, ties included.
+double EnumeratedP(const std::vector<double>& a, const std::vector<double>& b) {
+  std::vector<double> all = a;
+  all.insert(all.end(), b.begin(), b.end());
+  std::vector<bool> first(all.size(), false);
+  std::fill_n(first.begin(), a.size(), true);
+  const auto u_of = [&](const std::vector<bool>& chosen) {
+    double u = 0.0;
+    for (std::size_t i = 0; i < all.size(); ++i) {
+      for (std::size_t j = 0; j < all.size(); ++j) {
+        if (chosen[i] && !chosen[j]) u += all[i] > all[j] ? 1.0 : all[i] == all[j] ? 0.5 : 0.0;
+      }
+    }
+    return u;
+  };
+  const double found = u_of(first);
+  double count = 0.0, as_large = 0.0;
+  do {
+    count += 1.0;
+    if (u_of(first) >= found) as_large += 1.0;
+  } while (std::prev_permutation(first.begin(), first.end()));
+  return as_large / count;
+}
+
+TEST(MannWhitney, EqualsTheTabulatedValuesOfFiveAgainstFive) {
+  // The number of orders with u = 25, 24, ... is 1, 1, 2, 3, 5, ... of 252: 0.004, 0.008, 0.016,
+  // 0.028, 0.048 in the tables.
+  const std::vector<double> b = {1, 2, 3, 4, 5};
+  EXPECT_NEAR(MannWhitney(std::vector<double>{6, 7, 8, 9, 10}, b).p_greater, 1.0 / 252, 1e-15);
+  EXPECT_NEAR(MannWhitney(std::vector<double>{4.5, 7, 8, 9, 10}, b).p_greater, 2.0 / 252, 1e-15);
+  EXPECT_NEAR(MannWhitney(std::vector<double>{3.5, 7, 8, 9, 10}, b).p_greater, 4.0 / 252, 1e-15);
+  EXPECT_NEAR(MannWhitney(std::vector<double>{2.5, 7, 8, 9, 10}, b).p_greater, 7.0 / 252, 1e-15);
+  EXPECT_NEAR(MannWhitney(std::vector<double>{1.5, 7, 8, 9, 10}, b).p_greater, 12.0 / 252, 1e-15);
+}
+
+TEST(MannWhitney, EqualsEnumerationWithoutTies) {
+  std::mt19937 random(1);
+  std::uniform_real_distribution<double> uniform(0.0, 1.0);
+  for (const auto& [n, m] : {std::pair{1, 6}, {3, 4}, {4, 6}, {6, 3}}) {
+    for (int repeat = 0; repeat < 5; ++repeat) {
+      std::vector<double> a(n), b(m);
+      for (double& x : a) x = uniform(random) + 0.2;
+      for (double& x : b) x = uniform(random);
+      const MannWhitneyResult result = MannWhitney(a, b);
+      EXPECT_TRUE(result.exact);
+      EXPECT_NEAR(result.p_greater, EnumeratedP(a, b), 1e-12) << n << " " << m;
+    }
+  }
+}
+
+TEST(MannWhitney, IsNearEnumerationWithTies) {
+  // normal approximation: good to about 0.02 at these sizes
+  const std::vector<double> a = {1, 2, 2, 3, 3, 4, 5}, b = {1, 1, 2, 2, 3, 3, 4};
+  const MannWhitneyResult result = MannWhitney(a, b);
+  EXPECT_FALSE(result.exact);
+  EXPECT_NEAR(result.p_greater, EnumeratedP(a, b), 0.02);
+  EXPECT_EQ(MannWhitney(std::vector<double>{2, 2, 2}, std::vector<double>{2, 2}).p_greater, 1.0);
+}
+
+TEST(MannWhitney, NormalAndExactAgreeForLargeSamples) {
+  std::vector<double> a(40), b(40);
+  std::iota(a.begin(), a.end(), 8.5);
+  std::iota(b.begin(), b.end(), 0.0);
+  const double exact = MannWhitney(a, b).p_greater;
+  a.push_back(24.5);  // one more, and the sample is too large for the exact distribution
+  const MannWhitneyResult normal = MannWhitney(a, b);
+  EXPECT_FALSE(normal.exact);
+  EXPECT_GT(exact, 1e-3);
+  EXPECT_NEAR(normal.p_greater, exact, 0.2 * exact);
+}
+
+TEST(MannWhitney, OfNothingDecidesNothing) {
+  EXPECT_EQ(MannWhitney({}, std::vector<double>{1.0}).p_greater, 1.0);
+  EXPECT_EQ(MannWhitney(std::vector<double>{1.0}, {}).p_greater, 1.0);
+}
+
+TEST(SmallestP, IsOneOrderOfAll) {
+  EXPECT_NEAR(SmallestP(5, 5), 1.0 / 252, 1e-15);
+  EXPECT_NEAR(SmallestP(3, 4), 1.0 / 35, 1e-15);
+}
+
+TEST(Holm, AdjustsTheWorkedExample) {
+  // sorted 0.005, 0.01, 0.03, 0.04 times 4, 3, 2, 1; then never falling
+  const std::vector<double> p = {0.01, 0.04, 0.03, 0.005};
+  const std::vector<double> expected = {0.03, 0.06, 0.06, 0.02};
+  const std::vector<double> adjusted = HolmAdjusted(p);
+  ASSERT_EQ(adjusted.size(), expected.size());
+  for (std::size_t i = 0; i < p.size(); ++i) EXPECT_NEAR(adjusted[i], expected[i], 1e-15) << i;
+}
+
+TEST(Holm, NeverExceedsOne) {
+  EXPECT_EQ(HolmAdjusted(std::vector<double>{0.6, 0.9}), (std::vector<double>{1.0, 1.0}));
+  EXPECT_TRUE(HolmAdjusted({}).empty());
+}
+
+TEST(Median, TakesTheMiddle) {
+  EXPECT_EQ(Median(std::vector<double>{3, 1, 2}), 2.0);
+  EXPECT_EQ(Median(std::vector<double>{4, 1, 2, 3}), 2.5);
+  EXPECT_TRUE(std::isnan(Median({})));
+}
+
+}  // namespace
+}  // namespace loopbench::harness

@@ -1,0 +1,223 @@
+// The gate: what is planted is caught, what is unchanged passes, what cannot be compared is said.
+#include "harness/compare/compare.h"
+
+#include <gtest/gtest.h>
+
+#include <algorithm>
+#include <limits>
+#include <random>
+#include <string>
+#include <vector>
+
+#include "harness/origin.h"
+
+namespace loopbench::harness {
+namespace {
+
+/// Times around `centre` with the spread of a quiet machine, 1 %.
+std::vector<double> Times(double centre, unsigned seed, int count = 15) {
+  std::mt19937 random(seed);
+  std::normal_distribution<double> normal(centre, 0.01 * centre);
+  std::vector<double> times(count);
+  for (double& time : times) time = normal(random);
+  return times;
+}
+
+Record SoundRecord(const std::string& mechanism, unsigned seed) {
+  Record record;
+  record.Set("kind", std::string("accuracy"));
+  record.Set("mechanism", mechanism);
+  record.Set("rtol", 1e-8);
+  record.Set("outcome", std::string("finished"));
+  record.Set("steps", std::int64_t{1000});
+  record.Set("rhs_operations", std::int64_t{617});
+  record.Set("instructions", std::int64_t{100'000});
+  record.Set("state_hash", std::string("00000000000000aa"));
+  record.Set("drift_position_max", 2e-7);
+  record.Set("energy_error_max", 3e-14);
+  record.Set("series.rhs_ns", Times(500.0, seed));
+  record.Set("machine", std::string("here"));
+  record.Set("compiler", std::string("GNU 12"));
+  record.Set("flags", std::string("-O2"));
+  record.Set("libm", std::string("0123"));
+  return record;
+}
+
+std::vector<Record> Sound(unsigned seed = 1) {
+  return {SoundRecord("four-bar", seed), SoundRecord("toggle", seed + 100)};
+}
+
+/// Sound records whose first has one value changed.
+std::vector<Record> With(const std::string& key, const Value& value) {
+  std::vector<Record> records = Sound(2);
+  records[0].Set(key, value);
+  return records;
+}
+
+int Exit(const std::vector<Record>& base, const std::vector<Record>& fresh,
+         const CompareOptions& options = {}) {
+  return Compare(base, fresh, options).ExitCode(options);
+}
+
+/// The only finding with this judgement.
+Finding Only(const ComparisonReport& report, Judgement judgement) {
+  EXPECT_EQ(report.Count(judgement), 1);
+  const auto at = std::ranges::find(report.findings, judgement, &Finding::judgement);
+  return at == report.findings.end() ? Finding{} : *at;
+}
+
+void ExpectChange(const std::string& key, const Value& value, Judgement judgement) {
+  const ComparisonReport report = Compare(Sound(), With(key, value), {});
+  EXPECT_EQ(Only(report, judgement).measure.key, key);
+  EXPECT_EQ(report.ExitCode({}), judgement == Judgement::kWorse ? 1 : 0) << key;
+}
+
+TEST(Compare, PassesAnUnchangedBuildTwentyTimes) {
+  for (unsigned run = 0; run < 20; ++run) {
+    const ComparisonReport report = Compare(Sound(1000 + run), Sound(2000 + run), {});
+    EXPECT_EQ(report.Count(Judgement::kSame), static_cast<int>(report.findings.size())) << run;
+    EXPECT_EQ(report.ExitCode({}), 0) << run;
+  }
+}
+
+TEST(Compare, CatchesThreeTimesTheDrift) {
+  ExpectChange("drift_position_max", 6e-7, Judgement::kWorse);
+  ExpectChange("drift_position_max", 2e-7 * 1.051, Judgement::kWorse);
+  ExpectChange("drift_position_max", 2e-7 / 3, Judgement::kBetter);
+  EXPECT_EQ(Exit(Sound(), With("drift_position_max", 2e-7 * 1.049)), 0);
+}
+
+TEST(Compare, TakesRoundOffForEqual) {
+  EXPECT_EQ(Exit(Sound(), With("energy_error_max", 9e-12)), 0);
+  ExpectChange("energy_error_max", 2e-11, Judgement::kWorse);
+}
+
+TEST(Compare, CatchesFivePercentMoreInstructions) {
+  ExpectChange("instructions", std::int64_t{105'000}, Judgement::kWorse);
+  ExpectChange("instructions", std::int64_t{95'000}, Judgement::kBetter);
+  EXPECT_EQ(Exit(Sound(), With("instructions", std::int64_t{101'900})), 0);
+}
+
+TEST(Compare, TakesCountsHashesAndOutcomesExactly) {
+  ExpectChange("steps", std::int64_t{1001}, Judgement::kWorse);
+  ExpectChange("steps", std::int64_t{999}, Judgement::kBetter);
+  ExpectChange("rhs_operations", std::int64_t{618}, Judgement::kWorse);
+  ExpectChange("state_hash", std::string("00000000000000ab"), Judgement::kWorse);
+  ExpectChange("outcome", std::string("singular"), Judgement::kWorse);
+}
+
+TEST(Compare, ReportsARunThatNoLongerFailsAsBetter) {
+  const ComparisonReport report = Compare(With("outcome", std::string("singular")), Sound(), {});
+  EXPECT_EQ(Only(report, Judgement::kBetter).measure.key, "outcome");
+  EXPECT_EQ(report.ExitCode({}), 0);
+}
+
+TEST(Compare, CatchesAResultThatIsGone) {
+  ExpectChange("drift_position_max", Value(), Judgement::kWorse);
+  ExpectChange("drift_position_max", std::numeric_limits<double>::quiet_NaN(), Judgement::kWorse);
+}
+
+TEST(Compare, CatchesSlowerTimesBeyondTwoPercentOnly) {
+  ExpectChange("series.rhs_ns", Times(525.0, 7), Judgement::kWorse);
+  ExpectChange("series.rhs_ns", Times(475.0, 7), Judgement::kBetter);
+  // 1 % is clearly resolved by 500 values and still not worth a message
+  std::vector<Record> base = Sound(), fresh = Sound();
+  base[0].Set("series.rhs_ns", Times(500.0, 8, 500));
+  fresh[0].Set("series.rhs_ns", Times(505.0, 9, 500));
+  EXPECT_EQ(Compare(base, fresh, {}).Count(Judgement::kWorse), 0);
+}
+
+TEST(Compare, SaysWhenSamplesAreTooSmall) {
+  std::vector<Record> base = Sound(), fresh = Sound();
+  base[0].Set("series.rhs_ns", Times(500.0, 1, 3));
+  fresh[0].Set("series.rhs_ns", Times(900.0, 2, 3));
+  const Finding finding = Only(Compare(base, fresh, {}), Judgement::kNotMeasured);
+  EXPECT_EQ(finding.measure.key, "series.rhs_ns");
+  EXPECT_NE(finding.why.find("too few repetitions"), std::string::npos);
+}
+
+TEST(Compare, NeverComparesTimesOfTwoMachines) {
+  std::vector<Record> fresh = Sound();
+  for (Record& record : fresh) {
+    record.Set("machine", std::string("there"));
+    record.Set("series.rhs_ns", Times(5000.0, 3));
+  }
+  const ComparisonReport report = Compare(Sound(), fresh, {});
+  EXPECT_EQ(report.Count(Judgement::kNotMeasured, "times"), 2);
+  EXPECT_EQ(report.Count(Judgement::kSame, "hashes"), 2);  // bits do not depend on the machine
+  EXPECT_EQ(report.ExitCode({}), 0);
+  CompareOptions times;
+  times.only = {"times"};
+  EXPECT_EQ(Exit(Sound(), fresh, times), 2);  // nothing was measured
+  // not knowing the machine is as bad
+  std::vector<Record> nameless = Sound();
+  for (Record& record : nameless) record.Set("machine", Value());
+  EXPECT_EQ(Exit(nameless, nameless, times), 2);
+}
+
+TEST(Compare, HoldsWhatRoundOffMovesToOneArithmeticOnly) {
+  for (const std::string key : {"compiler", "flags", "libm"}) {
+    std::vector<Record> fresh = Sound();
+    for (Record& record : fresh) {
+      record.Set(key, std::string("other"));
+      record.Set("state_hash", std::string("00000000000000bb"));
+      record.Set("steps", std::int64_t{1003});
+      record.Set("drift_position_max", 2.6e-7);
+    }
+    ComparisonReport report = Compare(Sound(), fresh, {});
+    EXPECT_EQ(report.ExitCode({}), 0) << key;
+    EXPECT_EQ(report.Count(Judgement::kNotMeasured, "hashes"), 2) << key;
+    EXPECT_EQ(report.Count(Judgement::kSame, "errors"), 4) << key;
+    // operations do not depend on it, and a drift of three times is none of round-off
+    fresh[0].Set("rhs_operations", std::int64_t{700});
+    fresh[1].Set("drift_position_max", 6e-7);
+    report = Compare(Sound(), fresh, {});
+    EXPECT_EQ(report.Count(Judgement::kWorse), 2) << key;
+  }
+}
+
+TEST(Compare, SaysWhatIsMissing) {
+  std::vector<Record> one = {SoundRecord("four-bar", 1)};
+  const ComparisonReport report = Compare(Sound(), one, {});
+  ASSERT_EQ(report.only_base.size(), 1u);
+  EXPECT_NE(report.only_base[0].find("toggle"), std::string::npos);
+  EXPECT_EQ(report.ExitCode({}), 2);
+  CompareOptions subset;
+  subset.subset = true;
+  EXPECT_EQ(report.ExitCode(subset), 0);
+  EXPECT_EQ(Compare(one, Sound(), {}).only_fresh.size(), 1u);
+  EXPECT_EQ(Exit(one, Sound()), 0);
+  EXPECT_EQ(Exit({}, {}), 2);
+  EXPECT_EQ(Exit(one, {SoundRecord("toggle", 1)}), 2);
+}
+
+TEST(Compare, DoesNotPickOneOfTwoRecordsOfACase) {
+  std::vector<Record> twice = Sound();
+  twice.push_back(twice[0]);
+  const ComparisonReport report = Compare(Sound(), twice, {});
+  EXPECT_EQ(report.ambiguous.size(), 1u);
+  EXPECT_EQ(report.ExitCode({}), 2);
+}
+
+TEST(Compare, LooksAtChosenGroupsOnly) {
+  CompareOptions counts;
+  counts.only = {"counts", "instructions"};
+  const ComparisonReport report = Compare(Sound(), With("drift_position_max", 1.0), counts);
+  EXPECT_EQ(report.ExitCode(counts), 0);
+  EXPECT_EQ(report.findings.size(), 6u);  // steps, operations and instructions of two cases
+}
+
+TEST(Origin, OfThisProgramIsComplete) {
+  Record record;
+  Stamp(record);
+  const Origin origin = OriginOf(record);
+  EXPECT_TRUE(origin.SameArithmetic(ThisOrigin()));
+  EXPECT_TRUE(origin.SameMachine(ThisOrigin()));
+  EXPECT_EQ(origin.libm.size(), 16u);
+  EXPECT_FALSE(origin.commit.empty());
+  EXPECT_FALSE(Origin{}.SameArithmetic(Origin{}));
+  EXPECT_FALSE(Origin{}.SameMachine(Origin{}));
+}
+
+}  // namespace
+}  // namespace loopbench::harness

@@ -1,0 +1,160 @@
+// What the reader of configs/benchmarks/ takes and refuses.
+#include <gtest/gtest.h>
+
+#include <filesystem>
+#include <string>
+#include <vector>
+
+#include "harness/config/benchmark_reader.h"
+#include "harness/config/config_error.h"
+#include "harness/store/files.h"
+#include "harness/timing/subject.h"
+#include "mechanism/mechanism.h"
+
+namespace loopbench::harness {
+namespace {
+
+namespace fs = std::filesystem;
+
+const fs::path kConfigs = fs::path(LOOPBENCH_SOURCE_DIR) / "configs";
+
+constexpr std::string_view kSet = R"({
+  "name": "small", "step": 1e-4, "integrator": "ode45",
+  "groups": [
+    {"mechanisms": "mechanisms/four-bar.json", "measure": "rhs",
+     "columns": [{"formulation": "odca", "enforcement": "acceleration"}]},
+    {"family": "grid", "sizes": [1, 2], "measure": ["rhs", "step"],
+     "columns": [{"formulation": "lagrange", "enforcement": "velocity"}]}]})";
+
+BenchmarkSet ParseSet(const std::string& text) {
+  return ParseBenchmarks(text, kConfigs / "b.json");
+}
+
+TEST(BenchmarkSet, IsReadWithMembersKindsAndColumns) {
+  const BenchmarkSet set = ParseSet(std::string(kSet));
+  ASSERT_EQ(set.groups.size(), 2u);
+  EXPECT_EQ(set.groups[0].members[0].name, "four-bar");
+  EXPECT_EQ(set.groups[0].members[0].Make().bodies.size(), 4u);
+  EXPECT_EQ(set.groups[1].members[1].name, "grid/2");
+  EXPECT_EQ(set.groups[1].members[1].Make().bodies.size(), 11u);  // 2 x 5 bars and ground
+  EXPECT_EQ(set.groups[1].kinds.size(), 2u);
+  EXPECT_EQ(BenchmarkName(BenchmarkKind::kStep, set.groups[1].members[1], set.groups[1].columns[0]),
+            "step/grid/2/lagrange/velocity/joint/rank-revealing");
+}
+
+TEST(BenchmarkSet, OfTheRepositoryReachesAThousandBodies) {
+  const BenchmarkSet set = ReadBenchmarks(kConfigs / "benchmarks/default.json");
+  EXPECT_EQ(set.states.size(), 38u);
+  for (const std::string family : {"chain", "ladder", "grid"}) {
+    std::size_t odca = 0, dense = 0;
+    for (const BenchmarkGroup& group : set.groups) {
+      for (const BenchmarkMember& member : group.members) {
+        if (member.family != family) continue;
+        const bool is_odca = group.columns[0].formulation == FormulationKind::kOdca;
+        std::size_t& largest = is_odca ? odca : dense;
+        largest = std::max(largest, member.Make().bodies.size() - 1);
+      }
+    }
+    EXPECT_GE(odca, 1000u) << family;
+    EXPECT_GE(dense, 100u) << family;
+  }
+  EXPECT_FALSE(ReadBenchmarks(kConfigs / "benchmarks/counts.json").groups.empty());
+}
+
+struct Mistake {
+  std::string from, to;
+  std::vector<std::string> words;
+};
+
+TEST(BenchmarkSet, MistakesAreNamedWithPlaceValueAndCure) {
+  const std::vector<Mistake> mistakes = {
+      {"\"groups\"", "\"group\"", {"/group: found unknown key", "did you mean \"groups\""}},
+      {"\"grid\"", "\"gird\"", {"/groups/1/family: found \"gird\"", "did you mean \"grid\""}},
+      {"[1, 2]", "[1, 99]", {"/groups/1/sizes/1: found 99", "from 1 to 25"}},
+      {"[1, 2]", "[1, 1]", {"/groups/1: found benchmark \"rhs/grid/1/lagrange", "once"}},
+      {"\"family\": \"grid\", ", "", {"/groups/1: found neither \"mechanisms\" nor \"family\""}},
+      {"\"family\": \"grid\"",
+       "\"family\": \"grid\", \"mechanisms\": \"mechanisms/toggle.json\"",
+       {"/groups/1/family: found \"grid\"", "two groups"}},
+      {"\"measure\": \"rhs\"",
+       "\"measure\": \"rsh\"",
+       {"/groups/0/measure: found \"rsh\"", "did you mean \"rhs\""}},
+      {"four-bar.json",
+       "fuor-bar.json",
+       {"/groups/0/mechanisms: found", "does not exist",
+        "did you mean \"mechanisms/four-bar.json\""}},
+      {"\"step\": 1e-4", "\"step\": 0", {"/step: found 0", "> 0"}},
+      {"ode45", "ode54", {"/integrator: found \"ode54\"", "did you mean \"ode45\""}},
+      {"\"name\": \"small\"", "\"name\": \"\"", {"/name: found \"\""}},
+      {"\"acceleration\"",
+       "\"accelaration\"",
+       {"/groups/0/columns", "did you mean \"acceleration\""}},
+  };
+  for (const Mistake& mistake : mistakes) {
+    std::string text(kSet);
+    const std::size_t place = text.find(mistake.from);
+    ASSERT_NE(place, std::string::npos) << mistake.from;
+    text.replace(place, mistake.from.size(), mistake.to);
+    try {
+      ParseSet(text);
+      ADD_FAILURE() << "accepted: " << mistake.to;
+    } catch (const ConfigError& error) {
+      for (const std::string& word : mistake.words) {
+        EXPECT_NE(std::string(error.what()).find(word), std::string::npos)
+            << "no <" << word << "> in\n"
+            << error.what();
+      }
+    }
+  }
+}
+
+TEST(BenchmarkSet, StatesAreReadStrictly) {
+  const fs::path folder = fs::path(testing::TempDir()) / "loopbench-states";
+  WriteFileAtomically(folder / "s.json", R"({"grid/1/joint": "0123456789abcdef", "x": "short"})");
+  const std::string text = R"({"name": "n", "states": "s.json", "groups": [
+    {"family": "grid", "sizes": 1, "measure": "rhs",
+     "columns": [{"formulation": "odca", "enforcement": "velocity"}]}]})";
+  try {
+    ParseBenchmarks(text, folder / "b.json");
+    ADD_FAILURE() << "accepted";
+  } catch (const ConfigError& error) {
+    const std::string message = error.what();
+    EXPECT_NE(message.find("s.json"), std::string::npos) << message;
+    EXPECT_NE(message.find("/x: found \"short\", expected 16 hexadecimal"), std::string::npos)
+        << message;
+  }
+  const StateHashes states = {{"grid/1/joint", "0123456789abcdef"}};
+  WriteFileAtomically(folder / "s.json", StatesToJson(states));
+  EXPECT_EQ(ParseBenchmarks(text, folder / "b.json").states, states);
+  fs::remove_all(folder);
+}
+
+TEST(Subject, IsMeasuredAtAMovingStateThatIsTheSavedOne) {
+  const BenchmarkSet set = ReadBenchmarks(kConfigs / "benchmarks/default.json");
+  for (const BenchmarkGroup& group : set.groups) {
+    const BenchmarkMember& member = group.members.front();
+    const Column& column = group.columns.front();
+    const MechanismDescription description = member.Make();
+    const BenchmarkState state = ComputeState(description, column.coordinates);
+    ASSERT_EQ(state.outcome, Outcome::kFinished) << member.name;
+    EXPECT_GT(state.u.cwiseAbs().maxCoeff(), 0.01) << member.name;
+    EXPECT_EQ(state.hash, set.states.at(member.name + "/joint"));
+    const auto subject = MakeSubject(description, column, state, set.integrator, set.step);
+    // the same work each time: neither derivatives nor steps leave anything behind
+    ASSERT_EQ(subject->Derivative(), Outcome::kFinished) << member.name;
+    const std::string first = HashExact(subject->derivative());
+    for (int i = 0; i < 3; ++i) ASSERT_EQ(subject->Step(), Outcome::kFinished) << member.name;
+    ASSERT_EQ(subject->Derivative(), Outcome::kFinished);
+    EXPECT_EQ(HashExact(subject->derivative()), first) << member.name;
+  }
+}
+
+TEST(Subject, HashesForgiveRoundOffOrNothing) {
+  const std::vector<double> a = {1.0, -0.25}, b = {1.0 + 1e-13, -0.25}, c = {1.00001, -0.25};
+  EXPECT_EQ(HashRounded(a), HashRounded(b));
+  EXPECT_NE(HashRounded(a), HashRounded(c));
+  EXPECT_NE(HashExact(a), HashExact(b));
+}
+
+}  // namespace
+}  // namespace loopbench::harness

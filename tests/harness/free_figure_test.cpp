@@ -1,0 +1,193 @@
+// A figure of any value against any other: labels, scales, curves, and nothing dropped.
+#include "harness/report/free_figure.h"
+
+#include <gtest/gtest.h>
+
+#include <cmath>
+#include <filesystem>
+#include <limits>
+#include <string>
+#include <vector>
+
+#include "harness/config/config_error.h"
+#include "harness/store/files.h"
+
+namespace loopbench::harness {
+namespace {
+
+Record RunOf(const std::string& formulation, double rtol, double drift) {
+  Record record;
+  record.Set("kind", std::string("accuracy"));
+  record.Set("mechanism", std::string("four-bar"));
+  record.Set("formulation", formulation);
+  record.Set("rtol", rtol);
+  record.Set("horizon", 10.0);
+  record.Set("steps", std::int64_t{100});
+  record.Set("outcome", std::string("finished"));
+  record.Set("drift_position_max", drift);
+  record.Set("series.drift_t", std::vector<double>{0.0, 0.1, 10.0});
+  record.Set("series.drift", std::vector<double>{0.0, drift / 2, drift});
+  return record;
+}
+
+std::vector<Record> Runs() {
+  return {RunOf("odca", 1e-6, 1e-4), RunOf("odca", 1e-10, 1e-8), RunOf("odca", 1e-8, 1e-6),
+          RunOf("lagrange", 1e-6, 2e-4), RunOf("lagrange", 1e-8, 2e-6)};
+}
+
+FreeFigure DriftOverTolerance() {
+  return {.x = "rtol", .y = "drift_position_max", .group = "formulation", .log = "", .title = ""};
+}
+
+std::string Refusal(const std::vector<Record>& records, const FreeFigure& wanted) {
+  try {
+    MakeFreeFigure(records, wanted);
+  } catch (const ConfigError& error) {
+    return error.what();
+  }
+  return "accepted";
+}
+
+TEST(FreeFigure, HasOneCurvePerGroupInOrderOfXWithKeysAndUnits) {
+  const Figure figure = MakeFreeFigure(Runs(), DriftOverTolerance()).figure;
+  EXPECT_EQ(figure.title, "drift_position_max over rtol: four-bar, horizon 10 s");
+  EXPECT_EQ(figure.x_label, "rtol");
+  EXPECT_EQ(figure.y_label, "drift_position_max [m]");
+  EXPECT_EQ(figure.legend_title, "curves by formulation");
+  ASSERT_EQ(figure.curves.size(), 2u);
+  EXPECT_EQ(figure.curves[0].label, "lagrange");
+  EXPECT_EQ(figure.curves[1].label, "odca");
+  EXPECT_EQ(figure.curves[1].x, (std::vector<double>{1e-10, 1e-8, 1e-6}));
+  EXPECT_EQ(figure.curves[1].y, (std::vector<double>{1e-8, 1e-6, 1e-4}));
+  EXPECT_TRUE(figure.curves[1].line);
+  EXPECT_GT(figure.curves[0].style.width, figure.curves[1].style.width);
+}
+
+TEST(FreeFigure, AxesAreLogarithmicWhenTheySpanTwoDecadesOrWhenAsked) {
+  FreeFigure wanted = DriftOverTolerance();
+  EXPECT_TRUE(MakeFreeFigure(Runs(), wanted).figure.log_x);
+  EXPECT_TRUE(MakeFreeFigure(Runs(), wanted).figure.log_y);
+  const std::vector<Record> near = {RunOf("odca", 1e-6, 1.0), RunOf("odca", 2e-6, 99.0)};
+  EXPECT_FALSE(MakeFreeFigure(near, wanted).figure.log_y);
+  const std::vector<Record> signs = {RunOf("odca", 1e-6, -1.0), RunOf("odca", 2e-6, 1e6)};
+  EXPECT_FALSE(MakeFreeFigure(signs, wanted).figure.log_y);
+  wanted.log = "y";
+  EXPECT_FALSE(MakeFreeFigure(Runs(), wanted).figure.log_x);
+  EXPECT_TRUE(MakeFreeFigure(near, wanted).figure.log_y);
+  EXPECT_NE(Refusal({RunOf("odca", 1e-6, -1.0)}, wanted)
+                .find("--log y: no value of "
+                      "drift_position_max is positive"),
+            std::string::npos);
+  wanted.log = "none";
+  EXPECT_FALSE(MakeFreeFigure(Runs(), wanted).figure.log_y);
+}
+
+TEST(FreeFigure, FailedRunsAreCrossesWithOrWithoutAValue) {
+  std::vector<Record> runs = Runs();
+  runs[1].Set("outcome", std::string("singular"));  // with a drift
+  Record never = RunOf("odca", 1e-12, 0.0);
+  never.Set("outcome", std::string("inconsistent-start"));
+  never.Set("drift_position_max", Value());
+  runs.push_back(never);
+  const FreeFigureResult result = MakeFreeFigure(runs, DriftOverTolerance());
+  const Curve& odca = result.figure.curves[1];
+  EXPECT_EQ(odca.x, (std::vector<double>{1e-8, 1e-6}));
+  ASSERT_EQ(odca.crosses.size(), 2u);
+  EXPECT_EQ(odca.crosses[0].first, 1e-12);
+  EXPECT_TRUE(std::isnan(odca.crosses[0].second));
+  EXPECT_EQ(odca.crosses[1], (std::pair{1e-10, 1e-8}));
+  ASSERT_EQ(result.remarks.size(), 1u);
+  EXPECT_EQ(result.remarks[0], "2 of 6 runs failed and are drawn as crosses");
+  const std::string script = GnuplotScript(result.figure);
+  EXPECT_NE(script.find("at first 1e-12, graph 0.02 point pt 2"), std::string::npos) << script;
+  EXPECT_NE(script.find("at first 1e-10, first 1e-08 point pt 2"), std::string::npos) << script;
+  EXPECT_NE(script.find("title 'failed run'"), std::string::npos);
+}
+
+TEST(FreeFigure, PointsThatShareAnXAreNotJoinedAndTheRemarkSaysWhatIsMixed) {
+  FreeFigure wanted = DriftOverTolerance();
+  wanted.group = "";
+  const FreeFigureResult result = MakeFreeFigure(Runs(), wanted);
+  ASSERT_EQ(result.figure.curves.size(), 1u);
+  EXPECT_FALSE(result.figure.curves[0].line);
+  EXPECT_EQ(result.figure.curves[0].label, "");
+  ASSERT_EQ(result.remarks.size(), 1u);
+  EXPECT_TRUE(result.remarks[0].starts_with("curves mix values of formulation;"))
+      << result.remarks[0];
+}
+
+TEST(FreeFigure, TextsOnTheHorizontalAxisAreNamedTicks) {
+  FreeFigure wanted = DriftOverTolerance();
+  wanted.x = "formulation";
+  wanted.group = "rtol";
+  const Figure figure = MakeFreeFigure(Runs(), wanted).figure;
+  EXPECT_EQ(figure.x_ticks, (std::vector<std::string>{"lagrange", "odca"}));
+  ASSERT_EQ(figure.curves.size(), 3u);
+  EXPECT_EQ(figure.curves[0].label, "1e-10");
+  EXPECT_EQ(figure.curves[0].x, (std::vector<double>{2}));
+  EXPECT_FALSE(figure.log_x);
+  EXPECT_NE(GnuplotScript(figure).find("set xtics ('lagrange' 1, 'odca' 2)"), std::string::npos);
+}
+
+TEST(FreeFigure, TwoSeriesGiveACurvePerRecordAndALabelPerGroup) {
+  FreeFigure wanted = DriftOverTolerance();
+  wanted.x = "series.drift_t";
+  wanted.y = "series.drift";
+  const Figure figure = MakeFreeFigure(Runs(), wanted).figure;
+  EXPECT_EQ(figure.x_label, "series.drift_t [s]");
+  ASSERT_EQ(figure.curves.size(), 5u);
+  EXPECT_EQ(figure.curves[0].label, "lagrange");
+  EXPECT_EQ(figure.curves[1].label, "");
+  EXPECT_TRUE(figure.log_y);  // the drift of zero at the start does not count
+  EXPECT_EQ(figure.curves[2].y.size(), 3u);
+}
+
+TEST(FreeFigure, MistakesAreNamed) {
+  FreeFigure wanted = DriftOverTolerance();
+  wanted.y = "drift_position_mx";
+  EXPECT_TRUE(
+      Refusal(Runs(), wanted)
+          .starts_with("--y: found \"drift_position_mx\", which no record has (did you mean "
+                       "\"drift_position_max\"?)"));
+  wanted.y = "outcome";
+  EXPECT_EQ(Refusal(Runs(), wanted), "--y outcome: found \"finished\", expected numbers");
+  wanted.y = "series.drift";
+  EXPECT_NE(Refusal(Runs(), wanted).find("expected two series or two values"), std::string::npos);
+  wanted.y = "correction_max";
+  EXPECT_EQ(Refusal(Runs(), wanted), "no record has values of both rtol and correction_max");
+}
+
+TEST(FreeFigure, ValuesThatDifferByRoundOffOrNotAtAllCanBeDrawn) {
+  const auto file = std::filesystem::path(testing::TempDir()) / "loopbench-flat-figure.svg";
+  for (const double difference : {0.0, 1e-15, 1e-9}) {
+    for (const double level : {0.0, 1.0, -5e-8}) {
+      const std::vector<Record> runs = {
+          RunOf("odca", 1e-6, level),
+          RunOf("odca", 1e-6 * (1 + difference), level * (1 + difference))};
+      const Figure figure = MakeFreeFigure(runs, DriftOverTolerance()).figure;
+      EXPECT_EQ(WriteFigure(file, figure), std::nullopt) << difference << " at " << level;
+    }
+  }
+  std::filesystem::remove(file);
+}
+
+TEST(FreeFigure, SvgHasTheSameBytesEachTimeAndPdfIsOne) {
+  const auto folder = std::filesystem::path(testing::TempDir()) / "loopbench-free-figure";
+  std::filesystem::remove_all(folder);
+  std::vector<Record> runs = Runs();
+  runs[1].Set("outcome", std::string("singular"));
+  const Figure figure = MakeFreeFigure(runs, DriftOverTolerance()).figure;
+  EXPECT_EQ(WriteFigure(folder / "a.svg", figure), std::nullopt);
+  EXPECT_EQ(WriteFigure(folder / "b.svg", figure), std::nullopt);
+  const std::string svg = ReadFile(folder / "a.svg");
+  EXPECT_EQ(svg, ReadFile(folder / "b.svg"));
+  for (const char* part : {"drift_position_max [m]", "curves by formulation", "failed run"}) {
+    EXPECT_NE(svg.find(part), std::string::npos) << part;
+  }
+  EXPECT_EQ(WriteFigure(folder / "a.pdf", figure), std::nullopt);
+  EXPECT_TRUE(ReadFile(folder / "a.pdf").starts_with("%PDF-"));
+  std::filesystem::remove_all(folder);
+}
+
+}  // namespace
+}  // namespace loopbench::harness

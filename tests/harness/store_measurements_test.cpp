@@ -1,0 +1,135 @@
+// Benchmark JSON in, tracker JSON out.
+#include <gtest/gtest.h>
+
+#include <cmath>
+#include <limits>
+#include <nlohmann/json.hpp>
+#include <stdexcept>
+#include <string>
+
+#include "harness/compare/track.h"
+#include "harness/store/measurements.h"
+#include "harness/store/tracker_json.h"
+#include "harness/timing/callgrind.h"
+
+namespace loopbench::harness {
+namespace {
+
+using nlohmann::json;
+
+constexpr const char* kBenchmarks = R"({
+  "context": {"machine": "M", "compiler": "C", "flags": "F", "libm": "L", "commit": "c", "load_avg": [0.5, 1, 2]},
+  "benchmarks": [
+    {"name": "a/3", "run_name": "a/3", "run_type": "iteration", "repetitions": 3, "repetition_index": 0,
+     "threads": 1, "iterations": 10, "real_time": 1.5, "cpu_time": 1.0, "time_unit": "us",
+     "label": "00ff", "bodies": 3, "allocations": 0},
+    {"name": "a/3", "run_name": "a/3", "run_type": "iteration", "iterations": 10, "real_time": 2.5,
+     "cpu_time": 3.0, "time_unit": "us", "label": "00ff", "bodies": 3, "allocations": 0},
+    {"name": "a/3", "run_name": "a/3", "run_type": "iteration", "iterations": 10, "real_time": 2.0,
+     "cpu_time": 2.0, "time_unit": "us", "label": "00ff", "bodies": 3, "allocations": 0},
+    {"name": "a/3_mean", "run_name": "a/3", "run_type": "aggregate", "aggregate_name": "mean",
+     "real_time": 2.0, "cpu_time": 2.0, "time_unit": "us"},
+    {"name": "a_BigO", "run_name": "a", "run_type": "aggregate", "aggregate_name": "BigO",
+     "cpu_coefficient": 1.0, "real_coefficient": 1.0, "big_o": "N", "time_unit": "ns"},
+    {"name": "b", "run_name": "b", "run_type": "iteration", "error_occurred": true,
+     "error_message": "singular", "iterations": 0, "real_time": 0.0, "cpu_time": 0.0, "time_unit": "ns"}
+  ]})";
+
+TEST(BenchmarkJson, BecomesOneRecordPerBenchmark) {
+  const std::vector<Record> records = ParseBenchmarkJson(kBenchmarks, "b.json");
+  ASSERT_EQ(records.size(), 2u);
+  const Record& a = records[0];
+  EXPECT_EQ(a.Text("benchmark"), "a/3");
+  EXPECT_EQ(a.Text("outcome"), "finished");
+  EXPECT_EQ(a.Text("start_hash"), "00ff");
+  EXPECT_EQ(a.Numbers("series.cpu_ns"), (std::vector<double>{1000, 3000, 2000}));
+  EXPECT_EQ(a.Number("cpu_ns"), 2000.0);
+  EXPECT_EQ(a.Number("bodies"), 3.0);
+  EXPECT_EQ(a.Text("machine"), "M");
+  EXPECT_EQ(a.Number("load_average"), 0.5);
+  EXPECT_EQ(a.Find("iterations"), nullptr);
+  const Record& b = records[1];
+  EXPECT_EQ(b.Text("outcome"), "singular");
+  EXPECT_EQ(b.Find("series.cpu_ns"), nullptr);
+}
+
+void ExpectRefused(const std::string& text, const std::string& word) {
+  try {
+    ParseBenchmarkJson(text, "b.json");
+    ADD_FAILURE() << "accepted: " << text;
+  } catch (const std::runtime_error& error) {
+    const std::string message = error.what();
+    EXPECT_EQ(message.find("b.json: "), 0u) << message;
+    EXPECT_NE(message.find(word), std::string::npos) << message;
+  }
+}
+
+TEST(BenchmarkJson, IsRefusedWithItsPlace) {
+  ExpectRefused("", "not JSON");
+  ExpectRefused(R"({"benchmarks": [{"name": "a", "cpu_time": NaN}]})", "not JSON");
+  ExpectRefused(R"({"context": {}})", "no array \"benchmarks\"");
+  ExpectRefused(R"({"benchmarks": 3})", "no array \"benchmarks\"");
+  ExpectRefused(R"({"benchmarks": [{"name": "a"}]})", "/benchmarks/0");
+  ExpectRefused(R"({"benchmarks": [{"name": "a", "cpu_time": "x", "real_time": 1}]})",
+                "/benchmarks/0");
+  ExpectRefused(R"({"benchmarks": [7]})", "/benchmarks/0");
+}
+
+std::vector<TrackedValue> Values() {
+  return {{"case \"one\"", "time", "ns", 2.0, 1.0, 4.0},
+          {"case \"one\"", "steps", "", 10.0, 10.0, 10.0},
+          {"case two", "drift", "m", std::numeric_limits<double>::quiet_NaN(), 0.0, 0.0},
+          {"case two", "error", "J", 1e-300, 1e-300, std::numeric_limits<double>::infinity()}};
+}
+
+TEST(TrackerJson, CustomSmallerIsBetterHasNameUnitValue) {
+  const json document = json::parse(ToCustomSmallerIsBetter(Values()));
+  ASSERT_TRUE(document.is_array());
+  ASSERT_EQ(document.size(), 3u);  // the NaN is left out
+  EXPECT_EQ(
+      document[0],
+      (json{{"name", "case \"one\" time"}, {"unit", "ns"}, {"value", 2.0}, {"range", "1 .. 4"}}));
+  EXPECT_EQ(document[1], (json{{"name", "case \"one\" steps"}, {"unit", "1"}, {"value", 10.0}}));
+  EXPECT_FALSE(document[2].contains("range"));
+}
+
+TEST(TrackerJson, BencherMetricFormatNestsMeasures) {
+  const json document = json::parse(ToBencherMetricFormat(Values()));
+  EXPECT_EQ(document, json::parse(R"json({
+    "case \"one\"": {"time (ns)": {"value": 2.0, "lower_value": 1.0, "upper_value": 4.0},
+                     "steps": {"value": 10.0}},
+    "case two": {"error (J)": {"value": 1e-300}}
+  })json"));
+}
+
+TEST(TrackedValues, AreNumbersOfRunsThatFinished) {
+  std::vector<Record> records = ParseBenchmarkJson(kBenchmarks, "b.json");
+  records[0].Set("drift_position_max", 1e-9);
+  const std::vector<TrackedValue> values = TrackedValues(records);
+  ASSERT_EQ(values.size(), 3u);
+  EXPECT_EQ(values[0].measure, "allocations");
+  EXPECT_EQ(values[1].measure, "drift_position_max");
+  EXPECT_EQ(values[1].unit, "m");
+  EXPECT_EQ(values[2].measure, "cpu_ns");
+  EXPECT_EQ(values[2].value, 2000.0);
+  EXPECT_EQ(values[2].lower, 1000.0);
+  EXPECT_EQ(values[2].upper, 3000.0);
+}
+
+TEST(Callgrind, GivesTheTotal) {
+  EXPECT_EQ(CallgrindInstructions("# callgrind format\nevents: Ir\nsummary: 9\n\ntotals: 291772\n",
+                                  "cg.1"),
+            291772);
+  for (const char* text :
+       {"", "events: Ir\n", "events: Dr\ntotals: 5\n", "events: Ir\ntotals: x"}) {
+    try {
+      CallgrindInstructions(text, "cg.1");
+      ADD_FAILURE() << text;
+    } catch (const std::runtime_error& error) {
+      EXPECT_EQ(std::string(error.what()).find("cg.1: "), 0u);
+    }
+  }
+}
+
+}  // namespace
+}  // namespace loopbench::harness

@@ -8,6 +8,7 @@
 #include <string>
 #include <vector>
 
+#include "harness/config/experiment_reader.h"
 #include "harness/report/free_figure.h"
 #include "harness/report/table_view.h"
 #include "harness/suite.h"
@@ -24,6 +25,7 @@ void WriteTables(const std::vector<Record>& records, const std::filesystem::path
 struct RunCommand {
   std::vector<std::filesystem::path> experiments;
   std::filesystem::path out;  ///< folder; default results/runs/<name of the first experiment>
+  std::vector<Setting> settings;
   SuiteOptions suite;
 };
 /// Runs what the store does not have yet, then writes its tables.
@@ -36,9 +38,28 @@ struct MergeCommand {
 /// Shards into one store: every case once. Throws when two stores disagree about a case.
 int Merge(const MergeCommand& command);
 
-int List(const std::vector<std::filesystem::path>& experiments, const Selection& filter);
+/// Experiment files and what is changed and chosen of them.
+struct ExperimentFiles {
+  std::vector<std::filesystem::path> paths;
+  std::vector<Setting> settings;
+  Selection filter;
+};
 
-int CheckFiles(const std::vector<std::filesystem::path>& files);
+/// The experiments of the files, each combination of a sweep one, of which at least one case passes
+/// the filter. Throws ConfigError as the reader does, and when no case of a file passes.
+std::vector<Experiment> ReadSelected(const ExperimentFiles& files);
+
+int List(const ExperimentFiles& files);
+
+int CheckFiles(const ExperimentFiles& files);
+
+struct PlanCommand {
+  ExperimentFiles files;
+  std::filesystem::path from;  ///< store of earlier results; times of cases it has come from there
+};
+int PrintPlans(const PlanCommand& command);
+
+int Explain(const ExperimentFiles& files);
 
 struct TableCommand {
   std::filesystem::path store;

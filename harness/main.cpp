@@ -12,6 +12,18 @@ namespace {
 
 using namespace loopbench::harness;
 
+std::vector<Setting> ParseSettings(const std::vector<std::string>& texts) {
+  std::vector<Setting> settings;
+  for (const std::string& text : texts) settings.push_back(ParseSetting(text));
+  return settings;
+}
+
+/// Repeatable, one value each: a second word would be the name of a file.
+void AddSettings(CLI::App* app, std::vector<std::string>* settings) {
+  app->add_option("--set", *settings, "Set a field before reading: /json/pointer=value")
+      ->allow_extra_args(false);
+}
+
 Selection ParseSelection(const std::vector<std::string>& conditions) {
   Selection selection;
   for (const std::string& text : conditions) selection.push_back(ParseCondition(text));
@@ -21,6 +33,7 @@ Selection ParseSelection(const std::vector<std::string>& conditions) {
 constexpr const char* kFooter = R"(
 Examples:
   loopbench list configs/experiments/paper/paper.json
+  loopbench plan configs/experiments/paper/paper.json --set /limits/wall_s=5
   loopbench run configs/experiments/paper/paper.json --jobs 2 --filter mechanism=four-bar
   loopbench run big.json --shard 1/2 --out part1   (and 2/2 elsewhere)
   loopbench merge part1 part2 --out whole
@@ -62,8 +75,8 @@ int main(int argc, char** argv) {
     for (const std::string& word : failed->remaining()) text += "unknown: " + word + "\n";
     return text;
   });
-  std::vector<std::string> conditions;
-  std::vector<std::filesystem::path> files;
+  std::vector<std::string> conditions, settings;
+  ExperimentFiles files;
 
   RunCommand run;
   bool no_timing = false, timing_only = false;
@@ -77,6 +90,7 @@ int main(int argc, char** argv) {
       ->check(CLI::Range(1, 1024))
       ->capture_default_str();
   run_app->add_option("--filter", conditions, "Only accuracy cases with key=value[,value]");
+  AddSettings(run_app, &settings);
   std::string shard = "1/1", rerun = "none";
   run_app->add_option("--shard", shard, "k/n: the k-th of n parts, to be merged later")
       ->capture_default_str();
@@ -89,12 +103,28 @@ int main(int argc, char** argv) {
   run_app->add_flag("--timing-only", timing_only, "Only the timings")->excludes(no);
 
   CLI::App* list_app = app.add_subcommand("list", "Show the cases of experiments");
-  list_app->add_option("experiment", files, "Experiment files (JSON)")->required();
+  list_app->add_option("experiment", files.paths, "Experiment files (JSON)")->required();
   list_app->add_option("--filter", conditions, "Only cases with key=value[,value]");
+  AddSettings(list_app, &settings);
 
   CLI::App* check_app =
       app.add_subcommand("check", "Read mechanism or experiment files, report errors");
-  check_app->add_option("file", files, "Files (JSON)")->required();
+  check_app->add_option("file", files.paths, "Files (JSON)")->required();
+  AddSettings(check_app, &settings);
+
+  PlanCommand plan;
+  CLI::App* plan_app =
+      app.add_subcommand("plan", "Count cases and runs, estimate how long they take");
+  plan_app->add_option("experiment", files.paths, "Experiment files (JSON)")->required();
+  plan_app->add_option("--from", plan.from, "Earlier results whose times are used, not a pilot's");
+  plan_app->add_option("--filter", conditions, "Only cases with key=value[,value]");
+  AddSettings(plan_app, &settings);
+
+  CLI::App* explain_app =
+      app.add_subcommand("explain", "Say what experiments run and measure, and what words mean");
+  explain_app->add_option("experiment", files.paths, "Experiment files (JSON)")->required();
+  explain_app->add_option("--filter", conditions, "Only cases with key=value[,value]");
+  AddSettings(explain_app, &settings);
 
   MergeCommand merge;
   CLI::App* merge_app = app.add_subcommand("merge", "Put the stores of shards together");
@@ -158,13 +188,18 @@ int main(int argc, char** argv) {
     run.suite.filter = table.view.where = plot.where = ParseSelection(conditions);
     run.suite.timing = !no_timing;
     run.suite.accuracy = !timing_only;
+    run.settings = files.settings = ParseSettings(settings);
+    files.filter = ParseSelection(conditions);
     run.suite.shard = ParseShard(shard);
     run.suite.rerun = rerun == "all"      ? Rerun::kAll
                       : rerun == "failed" ? Rerun::kFailed
                                           : Rerun::kNone;
     if (const auto code = comparison.Run(typed)) return *code;
     if (*run_app) return Run(run, typed);
-    if (*list_app) return List(files, ParseSelection(conditions));
+    if (*list_app) return List(files);
+    plan.files = files;
+    if (*plan_app) return PrintPlans(plan);
+    if (*explain_app) return Explain(files);
     if (*merge_app) return Merge(merge);
     if (*check_app) return CheckFiles(files);
     if (*table_app) return PrintTable(table, typed);

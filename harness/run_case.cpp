@@ -173,22 +173,6 @@ IntegratorOptions OptionsOf(const Case& one) {
   return options;
 }
 
-Record CaseKeys(const Experiment& experiment, const Case& one) {
-  Record keys;
-  keys.Set("kind", std::string("accuracy"));
-  keys.Set("experiment", experiment.name);
-  keys.Set("mechanism", one.mechanism);
-  keys.Set("formulation", std::string(ToString(one.column.formulation)));
-  keys.Set("enforcement", std::string(ToString(one.column.enforcement)));
-  keys.Set("coordinates", std::string(ToString(one.column.coordinates)));
-  keys.Set("solver", std::string(ToString(one.column.solver)));
-  keys.Set("integrator", one.integrator);
-  keys.Set("rtol", one.rtol);
-  keys.Set("atol", one.atol);
-  keys.Set("horizon", one.horizon);
-  return keys;
-}
-
 std::string CaseContent(const Experiment& experiment, const Case& one) {
   Record content = CaseKeys(experiment, one);
   content.Set("ensemble", std::int64_t{one.ensemble});

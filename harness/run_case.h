@@ -35,9 +35,6 @@ class FormulationOde final : public Ode {
 /// Method, tolerances and limits of a case.
 IntegratorOptions OptionsOf(const Case& one);
 
-/// The keys that name a case, as they stand in every table row.
-Record CaseKeys(const Experiment& experiment, const Case& one);
-
 /// Names all that decides the run: keys, ensemble, limits, and the mechanism itself.
 std::string CaseContent(const Experiment& experiment, const Case& one);
 

@@ -120,7 +120,7 @@ StateHashes ReadStates(const std::filesystem::path& path, ErrorList* errors) {
   try {
     const std::string text = ReadTextFile(path);
     const Json document = ParseDocument(text, path.string());
-    ErrorList own(path.string());
+    ErrorList own(path.string(), text);
     for (const auto& [name, node] : JsonNode(document, "", own).Members()) {
       const std::string hash = node.Text();
       const bool is_hash =
@@ -143,7 +143,7 @@ BenchmarkSet ReadBenchmarks(const std::filesystem::path& path) {
 
 BenchmarkSet ParseBenchmarks(std::string_view text, const std::filesystem::path& path) {
   const Json document = ParseDocument(text, path.string());
-  ErrorList errors(path.string());
+  ErrorList errors(path.string(), text);
   const JsonNode root(document, "", errors);
   const std::filesystem::path folder = path.parent_path();
   BenchmarkSet set;

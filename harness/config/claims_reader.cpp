@@ -169,7 +169,7 @@ std::vector<ClaimRule> ReadClaims(const std::filesystem::path& path) {
 
 std::vector<ClaimRule> ParseClaims(std::string_view text, const std::string& file) {
   const Json document = ParseDocument(text, file);
-  ErrorList errors(file);
+  ErrorList errors(file, text);
   const JsonNode root(document, "", errors);
   std::vector<ClaimRule> rules;
   std::vector<std::string> ids;

@@ -24,11 +24,37 @@ Case MakeCase(const Experiment& experiment, std::size_t scene, const Column& col
           .limits = experiment.limits};
 }
 
+void DropExcluded(const Experiment& experiment, std::vector<Case>* cases) {
+  if (experiment.exclusions.empty()) return;
+  std::erase_if(*cases, [&experiment](const Case& one) {
+    const Record keys = CaseKeys(experiment, one);
+    return std::any_of(experiment.exclusions.begin(), experiment.exclusions.end(),
+                       [&keys](const Selection& exclusion) { return Matches(keys, exclusion); });
+  });
+}
+
 }  // namespace
 
 std::string ToString(const Column& column) {
   return fmt::format("{}/{}/{}/{}", ToString(column.formulation), ToString(column.enforcement),
                      ToString(column.coordinates), ToString(column.solver));
+}
+
+Record CaseKeys(const Experiment& experiment, const Case& one) {
+  Record keys;
+  keys.Set("kind", std::string("accuracy"));
+  keys.Set("experiment", experiment.name);
+  keys.Set("mechanism", one.mechanism);
+  keys.Set("formulation", std::string(ToString(one.column.formulation)));
+  keys.Set("enforcement", std::string(ToString(one.column.enforcement)));
+  keys.Set("coordinates", std::string(ToString(one.column.coordinates)));
+  keys.Set("solver", std::string(ToString(one.column.solver)));
+  keys.Set("integrator", one.integrator);
+  keys.Set("rtol", one.rtol);
+  keys.Set("atol", one.atol);
+  keys.Set("horizon", one.horizon);
+  for (const auto& [name, value] : experiment.parameters.items()) keys.Set(name, value);
+  return keys;
 }
 
 bool Matches(const EnsembleRule& rule, const Case& one) {
@@ -52,6 +78,7 @@ std::vector<Case> Expand(const Experiment& experiment) {
       }
     }
   }
+  DropExcluded(experiment, &cases);
   for (Case& one : cases) {
     const auto rule =
         std::find_if(experiment.ensembles.begin(), experiment.ensembles.end(),
@@ -77,6 +104,7 @@ std::vector<Case> ExpandTiming(const Experiment& experiment) {
       cases.push_back(MakeCase(experiment, scene, column, timing.tolerance, horizon));
     }
   }
+  DropExcluded(experiment, &cases);
   return cases;
 }
 

@@ -12,6 +12,8 @@
 #include <vector>
 
 #include "harness/config/scene.h"
+#include "harness/record.h"
+#include "harness/report/select.h"
 #include "mechanism/formulation.h"
 #include "mechanism/topology.h"
 
@@ -64,8 +66,10 @@ std::string ToString(const Column& column);
 
 /// A mechanism and how long it runs.
 struct ExperimentScene {
-  std::string name;            ///< the mechanism's name unless overridden; unique
-  std::filesystem::path path;  ///< the mechanism file, resolved against the experiment's folder
+  std::string name;  ///< the mechanism's name unless overridden; unique
+  /// The mechanism file, resolved against the experiment's folder; empty for one that stands in the
+  /// experiment itself or is a member of a family.
+  std::filesystem::path path;
   MechanismFile mechanism;
   std::vector<double> horizons;   ///< [s], different
   std::vector<std::string> tags;  ///< for filters and tables
@@ -120,6 +124,10 @@ struct Experiment {
   Limits limits;
   int series_points = 200;  ///< points kept of a time series for figures
   Timing timing;
+  /// Of a sweep: this combination's value on each axis, by the axis's name. The values are in every
+  /// record, so that filters and tables can use them. Empty without a sweep.
+  Record parameters;
+  std::vector<Selection> exclusions;  ///< cases that match one of them are left out
 };
 
 /// One row of a table: everything that decides a run, except the mechanism itself.
@@ -140,10 +148,15 @@ struct Case {
 /// Whether the rule applies to the case (its ensemble fields do not matter).
 bool Matches(const EnsembleRule& rule, const Case& one);
 
-/// All cases for accuracy, in the order scene, horizon, column, tolerance.
+/// The keys that name a case, as they stand in every table row: those of docs/design.md section 6,
+/// then the experiment's parameters.
+Record CaseKeys(const Experiment& experiment, const Case& one);
+
+/// All cases for accuracy, in the order scene, horizon, column, tolerance, without excluded ones.
 std::vector<Case> Expand(const Experiment& experiment);
 
-/// All cases for timing, in the order scene, column; empty when timing is off.
+/// All cases for timing, in the order scene, column, without excluded ones; empty when timing is
+/// off.
 std::vector<Case> ExpandTiming(const Experiment& experiment);
 
 }  // namespace loopbench::harness

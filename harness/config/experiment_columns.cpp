@@ -39,8 +39,11 @@ std::vector<Column> ReadColumns(const JsonNode& node) {
   for (const JsonNode& element : node.OneOrMore("columns")) {
     for (const Column& column : ReadColumnEntry(element)) {
       const bool again = std::find(columns.begin(), columns.end(), column) != columns.end();
-      if (again) element.FailAs(ToString(column) + " again", "each column once");
-      columns.push_back(column);
+      if (again) {
+        element.FailAs(ToString(column) + " again", "each column once");
+      } else {
+        columns.push_back(column);
+      }
     }
   }
   return columns;

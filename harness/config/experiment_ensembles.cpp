@@ -1,8 +1,11 @@
 // "ensembles" of an experiment file.
 #include <fmt/format.h>
 
+#include <algorithm>
 #include <limits>
+#include <set>
 
+#include "harness/config/experiment_reader.h"
 #include "harness/config/experiment_sections.h"
 
 namespace loopbench::harness {
@@ -16,31 +19,32 @@ std::vector<double> ReadUsedNumbers(const JsonNode& rule, const std::string& key
   const std::vector<double> numbers = node->NumberList(kPositive);
   for (const double number : numbers) {
     if (std::find(used.begin(), used.end(), number) != used.end()) continue;
-    node->Fail(fmt::format("values among those of this experiment: {}", fmt::join(used, ", ")));
+    constexpr std::size_t kMostShown = 16;
+    const auto end = used.begin() + static_cast<int>(std::min(used.size(), kMostShown));
+    node->Fail(fmt::format("values among those of this experiment: {}{}",
+                           fmt::join(used.begin(), end, ", "), end == used.end() ? "" : ", ..."));
     break;
   }
   return numbers;
 }
 
 std::vector<double> AllHorizons(const Experiment& experiment) {
-  std::vector<double> horizons;
+  std::set<double> horizons;
   for (const ExperimentScene& scene : experiment.scenes) {
-    for (const double horizon : scene.horizons) {
-      const bool known = std::find(horizons.begin(), horizons.end(), horizon) != horizons.end();
-      if (!known) horizons.push_back(horizon);
-    }
+    horizons.insert(scene.horizons.begin(), scene.horizons.end());
   }
-  return horizons;
+  return {horizons.begin(), horizons.end()};
 }
 
 std::vector<std::string> ReadSceneNames(const JsonNode& rule, const Experiment& experiment) {
-  std::vector<std::string> chosen, known;
-  for (const ExperimentScene& scene : experiment.scenes) known.push_back(scene.name);
+  std::vector<std::string> chosen;
+  NameList known;
+  for (const ExperimentScene& scene : experiment.scenes) known.Add(scene.name);
   const auto node = rule.Optional("scenes");
   if (!node) return chosen;
   for (const JsonNode& element : node->OneOrMore("scene names")) {
     const auto scene = element.Choice(known, "a scene");
-    if (scene) chosen.push_back(known[static_cast<std::size_t>(*scene)]);
+    if (scene) chosen.push_back(known.all()[static_cast<std::size_t>(*scene)]);
   }
   return chosen;
 }
@@ -76,8 +80,14 @@ EnsembleRule ReadEnsemble(const JsonNode& node, const Experiment& experiment) {
 void ReadEnsembles(const JsonNode& root, const ErrorList& errors, Experiment* experiment) {
   const auto node = root.Optional("ensembles");
   if (!node) return;
+  const std::vector<JsonNode> elements = node->Elements("ensemble rules");
+  if (elements.size() > kMaxRules) {
+    node->Fail(fmt::format("at most {} ensemble rules", kMaxRules));
+    return;
+  }
+  if (CountCases(*experiment) > kMaxCases) return;  // reported where it is counted
   const std::vector<Case> cases = Expand(*experiment);
-  for (const JsonNode& element : node->Elements("ensemble rules")) {
+  for (const JsonNode& element : elements) {
     const EnsembleRule rule = ReadEnsemble(element, *experiment);
     const bool used = std::any_of(cases.begin(), cases.end(),
                                   [&rule](const Case& one) { return Matches(rule, one); });

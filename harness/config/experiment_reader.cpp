@@ -1,109 +1,237 @@
 #include "harness/config/experiment_reader.h"
 
-#include "harness/config/experiment_sections.h"
-#include "harness/integrator/options.h"
+#include <fmt/format.h>
+
+#include "harness/config/config_error.h"
+#include "harness/config/experiment_sweep.h"
 
 namespace loopbench::harness {
 namespace {
 
-constexpr std::int64_t kMaxSteps = 1'000'000'000'000;  // no run gets there
-
-void ReadLimits(const JsonNode& root, Limits* limits) {
-  const auto node = root.Optional("limits");
-  if (!node || !node->ExpectObject({"wall_s", "steps"})) return;
-  if (const auto wall = node->Optional("wall_s")) limits->wall_s = wall->Number(kPositive);
-  if (const auto steps = node->Optional("steps")) {
-    limits->steps = steps->Integer(1, kMaxSteps);
+/// One combination, or all there is. Mistakes go to the root's errors.
+Experiment ReadOne(const JsonNode& root, MechanismFiles& files) {
+  Experiment experiment;
+  ErrorList& errors = root.errors();
+  if (root.value().is_object() && root.value().contains("bodies")) {
+    root.FailAs("a mechanism (it has \"bodies\")", "an experiment");
+    return experiment;
   }
+  if (!root.ExpectObject({"name", "comment", "scenes", "columns", "tolerances", "integrator",
+                          "ensembles", "limits", "series", "timing", "sweep", "exclude"})) {
+    return experiment;
+  }
+  if (const auto name = root.Required("name", "a name")) experiment.name = name->Text();
+  if (const auto comment = root.Optional("comment")) experiment.comment = comment->Text();
+  experiment.scenes = ReadScenes(root, files, &errors);
+  if (const auto columns = root.Required("columns", "an array of columns")) {
+    experiment.columns = ReadColumns(*columns);
+  }
+  if (const auto tolerances = root.Required("tolerances", "a list of numbers")) {
+    experiment.tolerances = tolerances->NumberList(kTolerances);
+  }
+  experiment.timing.columns = experiment.columns;
+  ReadSettings(root, &experiment);
+  ReadEnsembles(root, errors, &experiment);
+  return experiment;
 }
 
-TimingFamily ReadFamily(const JsonNode& node) {
-  static const std::vector<std::string> kFamilies = {"chain", "ladder"};
-  constexpr int kLargest = 1'000'000;
-  TimingFamily family;
-  if (!node.ExpectObject({"family", "sizes", "columns"})) return family;
-  if (const auto name = node.Required("family", "a family")) {
-    const auto index = name->Choice(kFamilies, "a family");
-    if (index) family.family = kFamilies[static_cast<std::size_t>(*index)];
+/// "mass = 1, damping = 0.5".
+std::string Described(const Record& parameters) {
+  std::string text;
+  for (const auto& [name, value] : parameters.items()) {
+    text += fmt::format("{}{} = {}", text.empty() ? "" : ", ", name, parameters.Text(name));
   }
-  if (const auto sizes = node.Required("sizes", "a list of integers")) {
-    // the smallest closed chain has three bars
-    const int smallest = family.family == "chain" ? 3 : 1;
-    for (const JsonNode& size : sizes->OneOrMore("sizes")) {
-      family.sizes.push_back(static_cast<int>(size.Integer(smallest, kLargest)));
+  return text;
+}
+
+/// Everything from one file.
+class Reader {
+ public:
+  Reader(std::string_view text, const std::filesystem::path& path)
+      : path_(path),
+        document_(ParseDocument(text, path.string())),
+        origins_(path.string(), text),
+        files_(path.parent_path()),
+        fields_(document_, origins_, files_) {}
+
+  void Apply(const std::vector<Setting>& settings) {
+    std::string mistakes;
+    for (const Setting& setting : settings) {
+      const FieldTargets found = fields_.Find(setting.pointer);
+      if (found.fault) {
+        mistakes += (mistakes.empty() ? "" : "\n") + Explained(setting, *found.fault);
+        continue;
+      }
+      const Json value = Parsed(setting);
+      for (const std::string& pointer : found.pointers) fields_.Set(pointer, value);
+      for (const std::string& made : found.made) origins_.Note(made, "from --set", "");
+      set_.insert(set_.end(), found.pointers.begin(), found.pointers.end());
     }
+    if (!mistakes.empty()) throw ConfigError(mistakes);
   }
-  if (const auto columns = node.Required("columns", "an array of columns")) {
-    family.columns = ReadColumns(*columns);
-  }
-  return family;
-}
 
-void ReadTiming(const JsonNode& root, Timing* timing) {
-  const auto node = root.Optional("timing");
-  if (!node || !node->ExpectObject({"repeats", "tolerance", "horizon", "columns", "families"})) {
-    return;
-  }
-  if (const auto repeats = node->Optional("repeats")) {
-    timing->repeats = static_cast<int>(repeats->Integer(0, kMaxCount));
-  }
-  if (const auto tolerance = node->Optional("tolerance")) {
-    timing->tolerance = tolerance->Number(kTolerances);
-  }
-  if (const auto horizon = node->Optional("horizon")) timing->horizon = horizon->Number(kPositive);
-  if (const auto columns = node->Optional("columns")) timing->columns = ReadColumns(*columns);
-  if (const auto families = node->Optional("families")) {
-    for (const JsonNode& family : families->Elements("families")) {
-      timing->families.push_back(ReadFamily(family));
+  std::vector<Experiment> Read() {
+    // Mistakes of the sweep itself come with those of the file as it stands.
+    Origins origins = origins_;
+    ErrorList errors(std::move(origins));
+    const JsonNode root(document_, "", errors);
+    const Sweep sweep(root, fields_, set_);
+    if (!sweep.sound()) {
+      ErrorList all(origins_);  // with the files that the sweep has taken in
+      const JsonNode again(document_, "", all);
+      Sweep(again, fields_, set_);
+      ReadOne(again, files_);
+      all.ThrowIfAny();
     }
+    sweep.Note(&origins_);
+    std::vector<Experiment> experiments;
+    for (std::size_t i = 0; i < sweep.count(); ++i) {
+      sweep.Apply(i, fields_);
+      experiments.push_back(ReadCombination(sweep, i));
+      CountOne(experiments.back());
+    }
+    return WithoutExcluded(std::move(experiments));
   }
-}
 
-void ReadSettings(const JsonNode& root, Experiment* experiment) {
-  if (const auto name = root.Optional("integrator")) {
-    const std::vector<std::string> profiles = ProfileNames();
-    const auto index = name->Choice(profiles, "an integrator profile");
-    if (index) experiment->integrator = profiles[static_cast<std::size_t>(*index)];
+ private:
+  std::string Explained(const Setting& setting, const FieldFault& fault) const {
+    if (!fault.text.empty()) return fault.text;
+    return fmt::format(
+        "{}: --set {}: found {}, expected {}{}", path_.string(), setting.pointer, fault.found,
+        fault.expected,
+        fault.suggestion.empty() ? "" : fmt::format(" (did you mean \"{}\"?)", fault.suggestion));
   }
-  ReadLimits(root, &experiment->limits);
-  const auto series = root.Optional("series");
-  if (series && series->ExpectObject({"points"})) {
-    if (const auto points = series->Optional("points")) {
-      experiment->series_points = static_cast<int>(points->Integer(2, kMaxCount));
+
+  /// JSON where it is some, else a string: names need no quotes on the command line.
+  static Json Parsed(const Setting& setting) {
+    const std::string where = "--set " + setting.pointer;
+    if (const std::string fault = EncodingFault(setting.value); !fault.empty()) {
+      throw ConfigError(fmt::format("{}: {}", where, fault));
     }
+    if (Json::accept(setting.value)) return ParseDocument(setting.value, where);
+    return setting.value;
   }
-  ReadTiming(root, &experiment->timing);
-}
+
+  Experiment ReadCombination(const Sweep& sweep, std::size_t index) {
+    ErrorList errors(origins_);
+    const JsonNode root(document_, "", errors);
+    Experiment experiment = ReadOne(root, files_);
+    experiment.path = path_;
+    experiment.parameters = sweep.Parameters(index);
+    experiment.exclusions = ReadExclusions(root, CaseKeys(experiment, Case()));
+    errors.ThrowIfAny(index == 0 ? ""
+                                 : fmt::format("{}: the above in combination {} of {}: {}",
+                                               path_.string(), index + 1, sweep.count(),
+                                               Described(experiment.parameters)));
+    return experiment;
+  }
+
+  /// Limits on the whole, while it grows.
+  void CountOne(const Experiment& experiment) {
+    cases_ += CountCases(experiment);
+    for (const ExperimentScene& scene : experiment.scenes) {
+      bodies_ += scene.mechanism.description.bodies.size();
+    }
+    ErrorList errors(origins_);
+    if (cases_ > kMaxCases) {
+      errors.Add("", fmt::format("{} cases so far", cases_),
+                 fmt::format("at most {} in one file", kMaxCases));
+    }
+    constexpr std::size_t kMaxAllBodies = 2'000'000;  // about 1 GB
+    if (bodies_ > kMaxAllBodies) {
+      errors.Add("", fmt::format("mechanisms with {} bodies so far", bodies_),
+                 fmt::format("at most {} in all combinations", kMaxAllBodies));
+    }
+    errors.ThrowIfAny();
+  }
+
+  /// A rule that excludes nothing is a mistake, as is a set of rules that excludes everything.
+  std::vector<Experiment> WithoutExcluded(std::vector<Experiment> experiments) {
+    const std::vector<Selection> rules = experiments.front().exclusions;
+    if (rules.empty()) return experiments;
+    std::vector<bool> used(rules.size());
+    std::vector<Experiment> left;
+    for (Experiment& experiment : experiments) {
+      std::vector<Selection> own;
+      own.swap(experiment.exclusions);
+      bool any = false;
+      for (const Case& one : Expand(experiment)) {
+        const Record keys = CaseKeys(experiment, one);
+        bool excluded = false;
+        for (std::size_t i = 0; i < rules.size(); ++i) {
+          if (!Matches(keys, rules[i])) continue;
+          used[i] = true;
+          excluded = true;
+        }
+        any = any || !excluded;
+      }
+      own.swap(experiment.exclusions);
+      if (any) left.push_back(std::move(experiment));
+    }
+    ErrorList errors(origins_);
+    for (std::size_t i = 0; i < rules.size(); ++i) {
+      if (used[i]) continue;
+      errors.Add(fmt::format("/exclude/{}", i), "a rule that matches no case",
+                 "conditions that match at least one case");
+    }
+    if (left.empty()) errors.Add("/exclude", "rules that match every case", "at least one case");
+    errors.ThrowIfAny();
+    return left;
+  }
+
+  std::filesystem::path path_;
+  Json document_;
+  Origins origins_;
+  MechanismFiles files_;
+  ExperimentFields fields_;
+  std::vector<std::string> set_;
+  std::size_t cases_ = 0, bodies_ = 0;
+};
 
 }  // namespace
+
+std::size_t CountCases(const Experiment& experiment) {
+  std::size_t horizons = 0;
+  for (const ExperimentScene& scene : experiment.scenes) horizons += scene.horizons.size();
+  return horizons * experiment.columns.size() * experiment.tolerances.size();
+}
+
+Setting ParseSetting(std::string_view text) {
+  const std::size_t equals = text.find('=');
+  if (equals == std::string_view::npos || text.front() != '/') {
+    throw ConfigError(fmt::format(
+        "--set: found \"{}\", expected /json/pointer=value, such as /scenes/0/horizon=20", text));
+  }
+  return {std::string(text.substr(0, equals)), std::string(text.substr(equals + 1))};
+}
+
+std::vector<Experiment> ReadExperiments(const std::filesystem::path& path,
+                                        const std::vector<Setting>& settings) {
+  return ParseExperiments(ReadTextFile(path), path, settings);
+}
+
+std::vector<Experiment> ParseExperiments(std::string_view text, const std::filesystem::path& path,
+                                         const std::vector<Setting>& settings) {
+  Reader reader(text, path);
+  reader.Apply(settings);
+  return reader.Read();
+}
+
+bool HoldsExperiment(const std::filesystem::path& path) {
+  return ReadTextFile(path).find("\"scenes\"") != std::string::npos;
+}
 
 Experiment ReadExperiment(const std::filesystem::path& path) {
   return ParseExperiment(ReadTextFile(path), path);
 }
 
 Experiment ParseExperiment(std::string_view text, const std::filesystem::path& path) {
-  const Json document = ParseDocument(text, path.string());
-  ErrorList errors(path.string());
-  const JsonNode root(document, "", errors);
-  Experiment experiment;
-  experiment.path = path;
-  if (root.ExpectObject({"name", "comment", "scenes", "columns", "tolerances", "integrator",
-                         "ensembles", "limits", "series", "timing"})) {
-    if (const auto name = root.Required("name", "a name")) experiment.name = name->Text();
-    if (const auto comment = root.Optional("comment")) experiment.comment = comment->Text();
-    experiment.scenes = ReadScenes(root, path.parent_path(), &errors);
-    if (const auto columns = root.Required("columns", "an array of columns")) {
-      experiment.columns = ReadColumns(*columns);
-    }
-    if (const auto tolerances = root.Required("tolerances", "a list of numbers")) {
-      experiment.tolerances = tolerances->NumberList(kTolerances);
-    }
-    experiment.timing.columns = experiment.columns;
-    ReadSettings(root, &experiment);
-    ReadEnsembles(root, errors, &experiment);
+  std::vector<Experiment> experiments = ParseExperiments(text, path);
+  if (experiments.size() > 1) {
+    throw ConfigError(fmt::format("{}: /sweep: found {} combinations, expected one experiment",
+                                  path.string(), experiments.size()));
   }
-  errors.ThrowIfAny();
-  return experiment;
+  return std::move(experiments.front());
 }
 
 }  // namespace loopbench::harness

@@ -5,6 +5,7 @@
 
 #include <algorithm>
 #include <filesystem>
+#include <map>
 #include <string>
 #include <string_view>
 #include <utility>
@@ -17,27 +18,70 @@ namespace loopbench::harness {
 
 inline constexpr Range kTolerances = {.min = 0.0, .max = 0.1, .above_min = true};
 inline constexpr int kMaxCount = 1'000'000;  ///< of anything: beyond it a number is a typing error
+inline constexpr std::size_t kMaxRules = 1000;      ///< ensembles, exclusions
+inline constexpr std::size_t kMaxBodies = 200'000;  ///< of all scenes of one combination
 
-/// "scenes" with the mechanisms they name; `folder` is the experiment's.
-std::vector<ExperimentScene> ReadScenes(const JsonNode& root, const std::filesystem::path& folder,
+/// The mechanism files of an experiment, each read once however many scenes and combinations use
+/// it.
+class MechanismFiles {
+ public:
+  /// `folder` is the experiment's.
+  explicit MechanismFiles(std::filesystem::path folder) : folder_(std::move(folder)) {}
+
+  /// A path as the experiment writes it, seen from here.
+  std::filesystem::path Resolve(const std::string& named) const {
+    return (folder_ / named).lexically_normal();
+  }
+  /// A file's text, and the document in it. Throw ConfigError.
+  const std::string& Text(const std::filesystem::path& path);
+  Json Document(const std::filesystem::path& path);
+  /// The mechanism in a file; throws ConfigError with all its mistakes, each time it is asked for.
+  const MechanismFile& Mechanism(const std::filesystem::path& path);
+
+ private:
+  struct File {
+    MechanismFile mechanism;
+    std::string mistakes;
+  };
+  std::filesystem::path folder_;
+  std::map<std::filesystem::path, std::string> texts_;
+  std::map<std::filesystem::path, File> files_;
+};
+
+/// "scenes" with the mechanisms they name; a family with several counts makes several scenes.
+std::vector<ExperimentScene> ReadScenes(const JsonNode& root, MechanismFiles& files,
                                         ErrorList* errors);
+/// A member of a family that stands where a mechanism may, and what its counts are.
+struct FamilyMember {
+  MechanismFile mechanism;
+  std::string counts;  ///< "10", "3x4"
+};
+/// All members that {"family": ...} names; `room` is how many bodies there may be.
+std::vector<FamilyMember> ReadFamilyMembers(const JsonNode& node, std::size_t room);
 /// A list of columns, each entry expanded.
 std::vector<Column> ReadColumns(const JsonNode& node);
+/// "integrator", "limits", "series" and "timing".
+void ReadSettings(const JsonNode& root, Experiment* experiment);
 /// "ensembles", after everything that they select from.
 void ReadEnsembles(const JsonNode& root, const ErrorList& errors, Experiment* experiment);
+/// Number of cases before exclusion.
+std::size_t CountCases(const Experiment& experiment);
 
 /// One name or a list of different names of an enum's values.
 template <class Enum>
 std::vector<Enum> ReadEnums(const JsonNode& node, std::string_view what) {
-  const std::vector<std::string> names(kNames<Enum>.begin(), kNames<Enum>.end());
+  static const NameList kKnown(std::vector<std::string>(kNames<Enum>.begin(), kNames<Enum>.end()));
   std::vector<Enum> values;
   for (const JsonNode& element : node.OneOrMore("names")) {
-    const auto index = element.Choice(names, what);
+    const auto index = element.Choice(kKnown, what);
     if (!index) continue;
     const auto value = static_cast<Enum>(*index);
     const bool again = std::find(values.begin(), values.end(), value) != values.end();
-    if (again) element.Fail("each value once");
-    values.push_back(value);
+    if (again) {
+      element.Fail("each value once");
+    } else {
+      values.push_back(value);
+    }
   }
   return values;
 }

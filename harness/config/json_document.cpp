@@ -4,133 +4,113 @@
 
 #include <algorithm>
 #include <fstream>
-#include <iterator>
-#include <set>
 #include <system_error>
+#include <unordered_set>
 #include <vector>
 
 #include "harness/config/config_error.h"
+#include "harness/config/json_syntax.h"
+#include "harness/config/json_walker.h"
 
 namespace loopbench::harness {
 namespace {
 
-/// What the characters around a syntax error suggest, as " (...)" or "". `position` is the number
-/// of characters read, so that the offending token ends just before it.
-std::string Hint(std::string_view text, std::size_t position) {
-  if (position == 0 || position > text.size()) return "";
-  std::size_t at = position - 1;
-  const char offending = text[at];
-  if (offending == '/' || offending == '#') return " (comments are not allowed)";
-  const bool not_a_number = offending == 'N' || offending == 'I' || offending == 'i';
-  if (not_a_number) return " (NaN and Infinity are not allowed)";
-  if (offending == '\'') return " (strings stand in double quotes)";
-  if (offending != ']' && offending != '}') return "";
-  while (at > 0 && (text[at - 1] == ' ' || text[at - 1] == '\t' || text[at - 1] == '\n' ||
-                    text[at - 1] == '\r')) {
-    --at;
-  }
-  const bool trailing_comma = at > 0 && text[at - 1] == ',';
-  return trailing_comma ? " (remove the comma before the closing bracket)" : "";
-}
-
-/// The library's message without its bracketed identifier and its "parse error at".
-std::string Stripped(std::string message) {
-  const std::size_t bracket = message.find("] ");
-  if (bracket != std::string::npos) message.erase(0, bracket + 2);
-  constexpr std::string_view kPrefix = "parse error at ";
-  if (message.rfind(kPrefix, 0) == 0) message.erase(0, kPrefix.size());
-  return message;
-}
-
-/// "line L, column C" of the character before `position`.
-std::string LineAndColumn(std::string_view text, std::size_t position) {
-  const std::string_view read = text.substr(0, std::min(position, text.size()));
-  const auto lines = std::count(read.begin(), read.end(), '\n');
-  const std::size_t line_start = read.rfind('\n');
-  const std::size_t column =
-      line_start == std::string_view::npos ? read.size() : read.size() - line_start - 1;
-  return fmt::format("line {}, column {}", lines + 1, column);
-}
-
-/// Walks through the document once, before it is built, and notes what the builder would forgive.
-class Scanner final : public nlohmann::json_sax<Json> {
+/// Builds the document and notes what the parser would forgive.
+class Builder final : public Walker {
  public:
-  Scanner(std::string_view text, const std::string& file) : text_(text), file_(file) {}
+  Builder(std::string_view text, const std::string& file) : text_(text), file_(file) {}
 
-  /// All complaints, one per line; "" when the document is sound.
-  std::string Complaints() const { return fmt::format("{}", fmt::join(complaints_, "\n")); }
+  /// The document; throws ConfigError with all complaints when there are any.
+  Json Take() {
+    if (complaints_.empty()) return std::move(root_);
+    if (more_ > 0) complaints_.push_back(fmt::format("{}: and {} more", file_, more_));
+    throw ConfigError(fmt::format("{}", fmt::join(complaints_, "\n")));
+  }
 
-  bool null() override { return Count(); }
-  bool boolean(bool) override { return Count(); }
-  bool number_integer(number_integer_t) override { return Count(); }
-  bool number_unsigned(number_unsigned_t) override { return Count(); }
-  bool number_float(number_float_t, const string_t&) override { return Count(); }
-  bool string(string_t&) override { return Count(); }
-  bool binary(binary_t&) override { return Count(); }
-  bool start_object(std::size_t) override { return Open(false); }
-  bool start_array(std::size_t) override { return Open(true); }
-  bool end_object() override { return Close(); }
-  bool end_array() override { return Close(); }
+  bool parse_error(std::size_t position, const std::string& token,
+                   const nlohmann::detail::exception& error) override {
+    const std::string_view read = text_.substr(0, std::min(position, text_.size()));
+    const auto line = std::count(read.begin(), read.end(), '\n') + 1;
+    const std::size_t start = read.rfind('\n');
+    const std::size_t column =
+        start == std::string_view::npos ? read.size() : read.size() - start - 1;
+    // a number too large is reported where it ends, and the parser's words have no "parsing"
+    const bool too_large = dynamic_cast<const Json::out_of_range*>(&error) != nullptr;
+    const std::string what =
+        too_large ? fmt::format(
+                        "found the number {}, expected one that fits a double (at most "
+                        "1.8e308)",
+                        ShortToken(token))
+                  : SyntaxMessage(error.what(), text_, position);
+    complaints_.push_back(fmt::format("{}:{}:{}: {}", file_, line, std::max<std::size_t>(column, 1),
+                                      Printable(what)));
+    return false;
+  }
 
-  bool key(string_t& key) override {
-    Level& level = levels_.back();
-    level.key = key;
-    if (!level.keys.insert(key).second) {
-      complaints_.push_back(
-          fmt::format("{}: {}: found key \"{}\" twice, expected each key once in an object", file_,
-                      Pointer(), key));
+ protected:
+  bool Key(const std::string& key) override {
+    if (!keys_.back().insert(key).second) {
+      Complain(fmt::format("found key \"{}\" twice, expected each key once in an object",
+                           ShortToken(key)));
     }
     return true;
   }
 
-  bool parse_error(std::size_t position, const std::string&,
-                   const nlohmann::detail::exception& error) override {
-    // Numbers out of range come without a place of their own.
-    const std::string what = Stripped(error.what());
-    const std::string place =
-        what.rfind("line ", 0) == 0 ? "" : LineAndColumn(text_, position) + ": ";
-    complaints_.push_back(fmt::format("{}: {}{}{}", file_, place, what, Hint(text_, position)));
-    return false;
+  bool CheckNumber(double value, const std::string& token) override {
+    const std::string_view digits = std::string_view(token).substr(0, token.find_first_of("eE"));
+    if (value == 0.0 && digits.find_first_of("123456789") != std::string_view::npos) {
+      Complain(
+          fmt::format("found {}, expected 0 or a number of at least 4.9e-324", ShortToken(token)));
+    }
+    return true;
+  }
+
+  bool Put(Json value) override {
+    const bool container = value.is_structured();
+    Json* placed = &root_;
+    if (open_.empty()) {
+      root_ = std::move(value);
+    } else if (open_.back()->is_array()) {
+      auto& array = open_.back()->get_ref<Json::array_t&>();
+      placed = &array.emplace_back(std::move(value));
+    } else {
+      // Past the map's own emplace, which looks through all keys each time: Key() has done that.
+      auto& object = open_.back()->get_ref<Json::object_t&>();
+      placed = &object.emplace_back(current_key(), std::move(value)).second;
+    }
+    if (!container) return true;
+    if (depth() >= kMaxConfigDepth) {
+      Complain(fmt::format("found nesting deeper than {} levels, expected at most {}",
+                           kMaxConfigDepth, kMaxConfigDepth));
+      return false;
+    }
+    open_.push_back(placed);
+    keys_.emplace_back();
+    return true;
+  }
+
+  void Finish() override {
+    open_.pop_back();
+    keys_.pop_back();
   }
 
  private:
-  struct Level {
-    bool is_array = false;
-    std::size_t index = 0;
-    std::string key;
-    std::set<std::string> keys;
-  };
-
-  bool Count() {
-    if (!levels_.empty() && levels_.back().is_array) ++levels_.back().index;
-    return true;
-  }
-
-  bool Open(bool is_array) {
-    levels_.push_back({.is_array = is_array, .index = 0, .key = {}, .keys = {}});
-    if (levels_.size() <= kMaxConfigDepth) return true;
-    complaints_.push_back(fmt::format("{}: {}: found nesting deeper than {} levels", file_,
-                                      Pointer(), kMaxConfigDepth));
-    return false;
-  }
-
-  bool Close() {
-    levels_.pop_back();
-    return Count();
-  }
-
-  std::string Pointer() const {
-    std::string pointer;
-    for (const Level& level : levels_) {
-      pointer += "/" + (level.is_array ? std::to_string(level.index) : PointerToken(level.key));
+  void Complain(const std::string& what) {
+    if (complaints_.size() >= kMostMessages) {
+      ++more_;
+    } else {
+      complaints_.push_back(fmt::format("{}:{}: {}: {}", file_, line(),
+                                        Printable(ShownPointer(Pointer())), Printable(what)));
     }
-    return pointer;
   }
 
   std::string_view text_;
   const std::string& file_;
-  std::vector<Level> levels_;
+  Json root_;
+  std::vector<Json*> open_;  ///< containers not yet complete; only the last one grows
+  std::vector<std::unordered_set<std::string>> keys_;
   std::vector<std::string> complaints_;
+  std::size_t more_ = 0;
 };
 
 }  // namespace
@@ -145,11 +125,14 @@ std::string ReadTextFile(const std::filesystem::path& path) {
   if (std::filesystem::is_directory(status)) fail("it is a folder");
   std::ifstream stream(path, std::ios::binary);
   if (!stream) fail("it cannot be opened");
-  // One byte more than allowed tells a file that is too large, whatever its size says (a pipe).
-  std::string text(kMaxConfigBytes + 1, '\0');
-  stream.read(text.data(), static_cast<std::streamsize>(text.size()));
+  // Piece by piece up to the limit: a pipe does not tell its size.
+  std::string text;
+  std::vector<char> piece(std::size_t{1} << 16);
+  while (stream && text.size() <= kMaxConfigBytes) {
+    stream.read(piece.data(), static_cast<std::streamsize>(piece.size()));
+    text.append(piece.data(), static_cast<std::size_t>(stream.gcount()));
+  }
   if (stream.bad()) fail("reading it failed");
-  text.resize(static_cast<std::size_t>(stream.gcount()));
   if (text.size() > kMaxConfigBytes) {
     fail(fmt::format("it is larger than {} MiB", kMaxConfigBytes >> 20));
   }
@@ -157,12 +140,42 @@ std::string ReadTextFile(const std::filesystem::path& path) {
 }
 
 Json ParseDocument(std::string_view text, const std::string& file) {
-  Scanner scanner(text, file);
-  Json::sax_parse(text.begin(), text.end(), &scanner);
-  if (std::string complaints = scanner.Complaints(); !complaints.empty()) {
-    throw ConfigError(complaints);
+  if (const std::string fault = EncodingFault(text); !fault.empty()) {
+    throw ConfigError(fmt::format("{}:{}", file, fault));
   }
-  return Json::parse(text.begin(), text.end());
+  if (text.find_first_not_of(" \t\r\n") == std::string_view::npos) {
+    throw ConfigError(fmt::format("{}:1:1: found an empty file, expected a JSON object", file));
+  }
+  Builder builder(text, file);
+  builder.Walk(text);
+  return builder.Take();
+}
+
+std::string ShownPointer(const std::string& pointer) {
+  constexpr std::size_t kEnd = 100;
+  if (pointer.empty()) return "(top level)";
+  if (pointer.size() <= 2 * kEnd) return pointer;
+  // whole UTF-8 characters only
+  const auto inside = [&pointer](std::size_t i) {
+    return (static_cast<unsigned char>(pointer[i]) & 0xC0u) == 0x80u;
+  };
+  std::size_t head = kEnd, tail = pointer.size() - kEnd;
+  while (head > 0 && inside(head)) --head;
+  while (tail < pointer.size() && inside(tail)) ++tail;
+  return pointer.substr(0, head) + "..." + pointer.substr(tail);
+}
+
+std::string Printable(const std::string& text) {
+  std::string printable;
+  for (const char c : text) {
+    const auto byte = static_cast<unsigned char>(c);
+    if (byte >= 0x20 && byte != 0x7F) {
+      printable += c;
+    } else {
+      printable += fmt::format("\\u{:04x}", byte);
+    }
+  }
+  return printable;
 }
 
 std::string PointerToken(std::string_view key) {

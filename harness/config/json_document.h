@@ -6,9 +6,11 @@
 
 #include <cstddef>
 #include <filesystem>
+#include <map>
 #include <nlohmann/json.hpp>
 #include <string>
 #include <string_view>
+#include <vector>
 
 namespace loopbench::harness {
 
@@ -21,19 +23,40 @@ inline constexpr std::size_t kMaxConfigBytes = 16u << 20;
 /// Deeper nesting is refused, so that no later recursion over the document can exhaust the stack.
 inline constexpr std::size_t kMaxConfigDepth = 64;
 
+/// Messages beyond this number are only counted: nobody reads more, and a file of nothing but
+/// mistakes must not cost more than a sound one.
+inline constexpr std::size_t kMostMessages = 100;
+
 /// The whole text of a file. Throws ConfigError naming the file and the reason (missing, a folder,
 /// not readable, larger than kMaxConfigBytes).
 std::string ReadTextFile(const std::filesystem::path& path);
 
-/// Parses RFC 8259 JSON; `file` is the name used in messages.
+/// Parses RFC 8259 JSON in UTF-8; `file` is the name used in messages.
 ///
-/// Throws ConfigError with line and column for syntax errors, comments, trailing commas, NaN,
-/// Infinity, numbers outside the range of a double, text after the document and nesting deeper than
-/// kMaxConfigDepth; with JSON Pointers, all at once, for keys that occur twice in one object (the
-/// parser would keep one of them without a word).
+/// Throws ConfigError. "FILE:LINE:COLUMN: found ..., expected ..." for other encodings, syntax
+/// errors, comments, trailing commas, NaN, Infinity and text after the document; "FILE:LINE:
+/// /pointer: ..." for nesting deeper than kMaxConfigDepth and, all at once, for keys that occur
+/// twice in one object (the parser would keep one of them without a word) and numbers that are not
+/// zero but too small for a double. Linear in the size of the text.
 Json ParseDocument(std::string_view text, const std::string& file);
+
+/// Line of each value that one of `pointers` names, from 1; for a value of several lines the first.
+/// Pointers that name nothing are left out. `text` is a document that ParseDocument accepts.
+std::map<std::string, std::size_t> LinesOf(std::string_view text,
+                                           const std::vector<std::string>& pointers);
 
 /// `key` as one reference token of a JSON Pointer (RFC 6901): "~" and "/" escaped.
 std::string PointerToken(std::string_view key);
+
+/// A pointer as a message shows it: "(top level)" for "", and without the middle when it is long,
+/// for keys have no limit of their own.
+std::string ShownPointer(const std::string& pointer);
+
+/// With control characters as JSON escapes them: names may hold any, and a message is one line.
+std::string Printable(const std::string& text);
+
+/// "" when the text is UTF-8 without a byte order mark and without zero bytes; else where, what was
+/// found and what was expected, as "LINE:COLUMN: found ..., expected ...".
+std::string EncodingFault(std::string_view text);
 
 }  // namespace loopbench::harness

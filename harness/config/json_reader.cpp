@@ -5,6 +5,7 @@
 #include <algorithm>
 #include <cmath>
 #include <cstddef>
+#include <map>
 
 #include "harness/config/config_error.h"
 #include "harness/config/spelling.h"
@@ -15,6 +16,13 @@ namespace {
 constexpr std::size_t kLongestShown = 60;  ///< characters of a value in a message
 constexpr std::size_t kMostListed = 16;    ///< names in a message
 
+/// The first letters; a cut inside a UTF-8 character would make the message invalid.
+std::string Cut(const std::string& text) {
+  std::size_t end = kLongestShown;
+  while (end > 0 && (static_cast<unsigned char>(text[end]) & 0xC0u) == 0x80u) --end;
+  return text.substr(0, end);
+}
+
 /// The value as a reader finds it in the file, or its kind where it would be too long.
 std::string Shown(const Json& value) {
   if (value.is_object()) return value.empty() ? "an empty object" : "an object";
@@ -22,10 +30,12 @@ std::string Shown(const Json& value) {
   std::string text = value.dump(-1, ' ', false, Json::error_handler_t::replace);
   if (text.size() <= kLongestShown) return text;
   if (value.is_array()) return fmt::format("an array of {} values", value.size());
-  // A cut inside a UTF-8 character would make the message invalid: step back to its first byte.
-  std::size_t end = kLongestShown;
-  while (end > 0 && (static_cast<unsigned char>(text[end]) & 0xC0u) == 0x80u) --end;
-  return text.substr(0, end) + "...";
+  return Cut(text) + "...";
+}
+
+/// A key as a message shows it: keys have no limit of their own.
+std::string ShortName(const std::string& name) {
+  return name.size() <= kLongestShown ? name : Cut(name) + "...";
 }
 
 /// "a", "b", "c" without empty names.
@@ -37,7 +47,7 @@ std::string Listed(const std::vector<std::string>& names) {
       quoted.push_back("...");
       break;
     }
-    quoted.push_back('"' + name + '"');
+    quoted.push_back('"' + ShortName(name) + '"');
   }
   return quoted.empty() ? "there is none" : fmt::format("{}", fmt::join(quoted, ", "));
 }
@@ -46,14 +56,52 @@ std::string Listed(const std::vector<std::string>& names) {
 
 void ErrorList::Add(std::string_view pointer, std::string_view found, std::string_view expected,
                     std::string_view suggestion) {
-  std::string message = fmt::format("{}: {}: found {}, expected {}", file_,
-                                    pointer.empty() ? "(top level)" : pointer, found, expected);
-  if (!suggestion.empty()) message += fmt::format(" (did you mean \"{}\"?)", suggestion);
-  messages_.push_back(std::move(message));
+  if (full()) {
+    ++more_;
+    return;
+  }
+  std::string text = fmt::format("found {}, expected {}", found, expected);
+  if (!suggestion.empty()) text += fmt::format(" (did you mean \"{}\"?)", suggestion);
+  messages_.push_back({false, std::string(pointer), Printable(text)});
 }
 
-void ErrorList::ThrowIfAny() const {
-  if (!messages_.empty()) throw ConfigError(fmt::format("{}", fmt::join(messages_, "\n")));
+void ErrorList::AddText(const std::string& text) {
+  const bool again = std::any_of(messages_.begin(), messages_.end(), [&text](const Message& known) {
+    return known.finished && known.text == text;
+  });
+  if (!again) messages_.push_back({true, "", text});
+}
+
+void ErrorList::ThrowIfAny(const std::string& ending) const {
+  if (messages_.empty()) return;
+  // one pass through each text for all its lines
+  std::map<std::string_view, std::vector<std::string>> wanted;
+  std::vector<Origins::Place> places;
+  for (const Message& message : messages_) {
+    places.push_back(origins_.Find(message.pointer));
+    if (!message.finished) wanted[places.back().text].push_back(places.back().line_pointer);
+  }
+  std::map<std::string_view, std::map<std::string, std::size_t>> lines;
+  for (const auto& [text, pointers] : wanted) {
+    if (!text.empty()) lines[text] = LinesOf(text, pointers);
+  }
+  std::vector<std::string> all;
+  for (std::size_t i = 0; i < messages_.size(); ++i) {
+    if (messages_[i].finished) {
+      all.push_back(messages_[i].text);
+      continue;
+    }
+    const Origins::Place& place = places[i];
+    const auto& known = lines[place.text];
+    const auto line = known.find(place.line_pointer);
+    all.push_back(fmt::format("{}{}: {}: {}{}", place.file,
+                              line == known.end() ? "" : fmt::format(":{}", line->second),
+                              Printable(ShownPointer(place.pointer)), messages_[i].text,
+                              place.note.empty() ? "" : " (" + place.note + ")"));
+  }
+  if (more_ > 0) all.push_back(fmt::format("{}: and {} more", origins_.Find("").file, more_));
+  if (!ending.empty()) all.push_back(ending);
+  throw ConfigError(fmt::format("{}", fmt::join(all, "\n")));
 }
 
 std::string Range::Text() const {
@@ -65,7 +113,7 @@ std::string Range::Text() const {
 }
 
 void JsonNode::Fail(std::string_view expected, std::string_view suggestion) const {
-  FailAs(Shown(*value_), expected, suggestion);
+  FailAs(errors_->full() ? "" : Shown(*value_), expected, suggestion);
 }
 
 void JsonNode::FailAs(std::string_view found, std::string_view expected,
@@ -77,16 +125,21 @@ JsonNode JsonNode::Child(const Json& value, std::string_view token) const {
   return JsonNode(value, pointer_ + "/" + PointerToken(token), *errors_);
 }
 
-bool JsonNode::ExpectObject(const std::vector<std::string>& known) const {
+bool JsonNode::ExpectObject(const NameList& known) const {
   if (!value_->is_object()) {
-    Fail("an object with keys " + Listed(known));
+    Fail("an object with keys " + Listed(known.all()));
     return false;
   }
   for (const auto& [key, value] : value_->items()) {
-    if (std::find(known.begin(), known.end(), key) != known.end()) continue;
+    if (known.Find(key)) continue;
+    // past the limit of messages, spellings would only cost time
+    if (errors_->full()) {
+      Child(value, key).FailAs("", "");
+      continue;
+    }
     Child(value, key)
-        .FailAs(fmt::format("unknown key \"{}\"", key), "one of " + Listed(known),
-                NearestSpelling(key, known));
+        .FailAs(fmt::format("unknown key \"{}\"", ShortName(key)), "one of " + Listed(known.all()),
+                NearestSpelling(key, known.all()));
   }
   return true;
 }
@@ -129,7 +182,7 @@ std::vector<JsonNode> JsonNode::Elements(std::string_view what) const {
 
 std::vector<JsonNode> JsonNode::OneOrMore(std::string_view what) const {
   if (!value_->is_array()) return {*this};
-  if (value_->empty()) Fail(fmt::format("at least one of {}", what));
+  if (value_->empty()) Fail("an array that is not empty");
   return Elements(what);
 }
 
@@ -185,27 +238,17 @@ std::vector<double> JsonNode::Numbers(std::size_t count) const {
   return numbers;
 }
 
-std::vector<double> JsonNode::NumberList(const Range& range) const {
-  std::vector<double> numbers;
-  for (const JsonNode& element : OneOrMore("numbers")) {
-    const double number = element.Number(range);
-    const bool again = std::find(numbers.begin(), numbers.end(), number) != numbers.end();
-    if (again && range.Contains(number)) element.Fail("each value once");
-    numbers.push_back(number);
+std::optional<int> JsonNode::Choice(const NameList& known, std::string_view what) const {
+  if (value_->is_string()) {
+    if (const auto found = known.Find(value_->get_ref<const std::string&>())) return found;
   }
-  return numbers;
-}
-
-std::optional<int> JsonNode::Choice(const std::vector<std::string>& known,
-                                    std::string_view what) const {
-  if (!value_->is_string()) {
-    Fail(fmt::format("{}: {}", what, Listed(known)));
+  if (errors_->full()) {
+    FailAs("", "");
     return std::nullopt;
   }
-  const auto& text = value_->get_ref<const std::string&>();
-  const auto found = std::find(known.begin(), known.end(), text);
-  if (found != known.end() && !text.empty()) return static_cast<int>(found - known.begin());
-  Fail(fmt::format("{}: {}", what, Listed(known)), NearestSpelling(text, known));
+  Fail(fmt::format("{}: {}", what, Listed(known.all())),
+       value_->is_string() ? NearestSpelling(value_->get_ref<const std::string&>(), known.all())
+                           : "");
   return std::nullopt;
 }
 

@@ -1,44 +1,88 @@
 // A cursor over a JSON document whose getters report what they do not accept.
 //
 // Reading goes on after an error with a stand-in value, so that one run shows all errors of a file:
-//   FILE: /json/pointer: found VALUE, expected WHAT (did you mean "x"?)
+//   FILE:LINE: /json/pointer: found VALUE, expected WHAT (did you mean "x"?)
 // The caller ends with ErrorList::ThrowIfAny(); what was read before is not used when it throws.
 // Internal to harness/config (see json_document.h).
 #pragma once
 
 #include <Eigen/Core>
 #include <cstdint>
+#include <initializer_list>
 #include <limits>
 #include <optional>
 #include <string>
 #include <string_view>
+#include <unordered_map>
 #include <utility>
 #include <vector>
 
 #include "harness/config/json_document.h"
+#include "harness/config/json_origins.h"
 
 namespace loopbench::harness {
 
-/// All complaints about one file, in the order they were found.
+/// All complaints about one file, in the order they were found. Of more than kMostMessages the rest
+/// is counted.
 class ErrorList {
  public:
-  explicit ErrorList(std::string file) : file_(std::move(file)) {}
+  /// `text` is the file's, for line numbers; it must outlive the list.
+  ErrorList(std::string file, std::string_view text) : origins_(std::move(file), text) {}
+  explicit ErrorList(Origins origins) : origins_(std::move(origins)) {}
 
   /// Adds one complaint; `suggestion` is the nearest valid spelling or "".
   void Add(std::string_view pointer, std::string_view found, std::string_view expected,
            std::string_view suggestion = "");
 
-  /// Adds finished messages, such as those of a file that this file refers to.
-  void AddText(std::string text) { messages_.push_back(std::move(text)); }
+  /// Adds finished messages, such as those of a file that this file refers to; the same text twice
+  /// (two scenes with one broken mechanism) once.
+  void AddText(const std::string& text);
 
   bool empty() const { return messages_.empty(); }
+  /// Further complaints are only counted: their words need not be found.
+  bool full() const { return messages_.size() >= kMostMessages; }
 
-  /// Throws ConfigError with all messages, one per line, unless there are none.
-  void ThrowIfAny() const;
+  /// Throws ConfigError with all messages, one per line, unless there are none. `ending` is one
+  /// more line.
+  void ThrowIfAny(const std::string& ending = "") const;
 
  private:
-  std::string file_;
-  std::vector<std::string> messages_;
+  struct Message {
+    bool finished;        ///< text is all of it
+    std::string pointer;  ///< else: in front of it come file, line and pointer
+    std::string text;
+  };
+  Origins origins_;
+  std::vector<Message> messages_;
+  std::size_t more_ = 0;
+};
+
+/// Names in use and the index of each, found without a search.
+class NameList {
+ public:
+  NameList() = default;
+  NameList(const std::vector<std::string>& names) {  // NOLINT: a list is a NameList
+    for (const std::string& name : names) Add(name);
+  }
+  NameList(std::initializer_list<std::string> names) : NameList(std::vector<std::string>(names)) {}
+
+  /// A name with the next index. Of equal names, which are an error of the file, the first counts;
+  /// the others are kept as empty ones.
+  void Add(const std::string& name) {
+    const bool first = indices_.emplace(name, names_.size()).second;
+    names_.push_back(first ? name : "");
+  }
+  /// The index of a name that is not empty, or nothing.
+  std::optional<int> Find(const std::string& name) const {
+    const auto found = indices_.find(name);
+    if (name.empty() || found == indices_.end()) return std::nullopt;
+    return static_cast<int>(found->second);
+  }
+  const std::vector<std::string>& all() const { return names_; }
+
+ private:
+  std::vector<std::string> names_;
+  std::unordered_map<std::string, std::size_t> indices_;
 };
 
 /// The numbers a getter accepts.
@@ -53,6 +97,8 @@ struct Range {
   /// "", " > 0", " >= 0", " from 0 to 1".
   std::string Text() const;
 };
+
+inline constexpr int kMostInRange = 10000;  ///< numbers that one lin or log stands for
 
 inline constexpr Range kPositive = {.min = 0.0, .above_min = true};
 inline constexpr Range kNotNegative = {.min = 0.0};
@@ -73,7 +119,7 @@ class JsonNode {
               std::string_view suggestion = "") const;
 
   /// True for an object. Reports anything else, and every key that is not in `known`.
-  bool ExpectObject(const std::vector<std::string>& known) const;
+  bool ExpectObject(const NameList& known) const;
   /// The member, or nothing when it is absent or this is no object.
   std::optional<JsonNode> Optional(const std::string& key) const;
   /// The member; reports when it is absent. `expected` says what it would be.
@@ -98,12 +144,21 @@ class JsonNode {
   Eigen::Vector3d Vector() const;
   /// Exactly `count` numbers.
   std::vector<double> Numbers(std::size_t count) const;
-  /// One number or a list of different numbers, all in the range.
+  /// One number, a list of different numbers, or {"lin": [from, to, count]} or {"log": [from, to,
+  /// count]}, all in the range.
   std::vector<double> NumberList(const Range& range = {}) const;
+  /// The same for integers in [min, max]; values of lin and log are rounded.
+  std::vector<std::int64_t> IntegerList(std::int64_t min, std::int64_t max) const;
+  /// The numbers that {"lin": [from, to, count]} or {"log": [from, to, count]} stands for: evenly
+  /// spaced, in themselves or in their logarithms, both ends exact; 2 to kMostInRange of them.
+  std::vector<double> Spaced(const Range& range = {}) const;
 
   /// Index of this string in `known`; reports anything else with the nearest spelling. `what` names
   /// the thing ("a body"). An enum is a choice among its names.
-  std::optional<int> Choice(const std::vector<std::string>& known, std::string_view what) const;
+  std::optional<int> Choice(const NameList& known, std::string_view what) const;
+
+  const std::string& pointer() const { return pointer_; }
+  ErrorList& errors() const { return *errors_; }
 
  private:
   JsonNode Child(const Json& value, std::string_view token) const;

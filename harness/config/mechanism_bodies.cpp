@@ -40,8 +40,7 @@ Eigen::Matrix3d ReadInertia(const JsonNode& node) {
   return inertia;
 }
 
-BodyDescription ReadBody(const JsonNode& node, const std::vector<std::string>& taken,
-                         SpaceKind space) {
+BodyDescription ReadBody(const JsonNode& node, const NameList& taken, SpaceKind space) {
   BodyDescription body;
   if (!node.ExpectObject({"name", "mass", "inertia", "com", "points"})) return body;
   body.name = ReadNewName(node, taken);
@@ -58,19 +57,21 @@ BodyDescription ReadBody(const JsonNode& node, const std::vector<std::string>& t
 
 }  // namespace
 
-void ReadBodies(const JsonNode& root, MechanismDescription* description) {
-  const SpaceKind space = description->space;
-  description->bodies[kGround].name = "ground";
+void ReadBodies(const JsonNode& root, Draft* draft) {
+  const SpaceKind space = draft->space;
+  draft->bodies[kGround].name = "ground";
+  draft->body_names.Add("ground");
   const auto ground = root.Optional("ground");
   if (ground && ground->ExpectObject({"points"})) {
-    ReadPoints(*ground, space, &description->bodies[kGround]);
+    ReadPoints(*ground, space, &draft->bodies[kGround]);
   }
   const auto bodies = root.Required("bodies", "an array of bodies");
   if (!bodies) return;
   const std::vector<JsonNode> elements = bodies->Elements("bodies");
   if (bodies->value().is_array() && elements.empty()) bodies->Fail("at least one body");
   for (const JsonNode& element : elements) {
-    description->bodies.push_back(ReadBody(element, BodyNames(*description), space));
+    draft->bodies.push_back(ReadBody(element, draft->body_names, space));
+    draft->body_names.Add(draft->bodies.back().name);
   }
 }
 

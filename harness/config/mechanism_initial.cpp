@@ -1,8 +1,7 @@
 // "initial", "independent" and "observe" of a mechanism file.
 #include <fmt/format.h>
 
-#include <algorithm>
-#include <iterator>
+#include <set>
 
 #include "harness/config/mechanism_sections.h"
 #include "harness/config/spelling.h"
@@ -38,71 +37,73 @@ void CheckQuaternion(const JsonNode& node, const std::vector<double>& values) {
 
 template <class Count>
 std::vector<JointValues> ReadJointValues(const JsonNode& initial, const std::string& key,
-                                         const MechanismDescription& description, Count count) {
+                                         const Draft& draft, Count count) {
   std::vector<JointValues> result;
   const auto section = initial.Optional(key);
   if (!section) return result;
-  const std::vector<std::string> names = JointNames(description);
-  section->ExpectObject(names);
+  if (!section->ExpectObject(draft.joint_names)) return result;
   for (const auto& [name, node] : section->Members()) {
-    const auto found = std::find(names.begin(), names.end(), name);
-    if (found == names.end()) continue;
-    const auto joint = std::distance(names.begin(), found);
-    const JointDescription& described = description.joints[static_cast<std::size_t>(joint)];
-    const int expected = count(described.type, description.space);
-    result.push_back({static_cast<int>(joint), ReadJointNumbers(node, described, expected)});
+    const auto joint = draft.joint_names.Find(name);
+    if (!joint) continue;
+    const JointDescription& described = draft.joints[static_cast<std::size_t>(*joint)];
+    const int expected = count(described.type, draft.space);
+    result.push_back({*joint, ReadJointNumbers(node, described, expected)});
     if (key == "coordinates") CheckQuaternion(node, result.back().values);
   }
   return result;
 }
 
-/// Owners of several speeds, named "<owner>.<component>": bodies in absolute coordinates, and free
-/// joints.
-std::vector<std::string> OwnersOfSpeeds(const MechanismDescription& description) {
-  std::vector<std::string> owners = BodyNames(description);
-  owners.erase(owners.begin() + kGround);
-  for (const JointDescription& joint : description.joints) {
-    if (SpeedCount(joint.type, description.space) > 1) owners.push_back(joint.name);
+/// What bears speeds: joints with one, which has the joint's name, and owners of several, named
+/// "<owner>.<component>": bodies in absolute coordinates, and free joints.
+struct SpeedNames {
+  NameList joints, owners;
+};
+
+SpeedNames NamesOfSpeeds(const Draft& draft) {
+  SpeedNames names;
+  for (std::size_t i = kGround + 1; i < draft.bodies.size(); ++i) {
+    names.owners.Add(draft.bodies[i].name);
   }
-  return owners;
+  for (const JointDescription& joint : draft.joints) {
+    const int count = SpeedCount(joint.type, draft.space);
+    if (count == 1) names.joints.Add(joint.name);
+    if (count > 1) names.owners.Add(joint.name);
+  }
+  return names;
 }
 
-void CheckIndependentName(const JsonNode& node, const std::string& name,
-                          const MechanismDescription& description) {
+void CheckIndependentName(const JsonNode& node, const std::string& name, const SpeedNames& names) {
   // Those of the plane and of space: a planar file may be run in either.
-  static const std::vector<std::string> kComponents = {"angle", "x", "y", "z", "wx", "wy", "wz"};
-  std::vector<std::string> joints;  // with one speed, which bears the joint's name
-  for (const JointDescription& joint : description.joints) {
-    if (SpeedCount(joint.type, description.space) == 1) joints.push_back(joint.name);
-  }
-  if (std::find(joints.begin(), joints.end(), name) != joints.end()) return;
+  static const NameList kComponents = {"angle", "x", "y", "z", "wx", "wy", "wz"};
+  if (names.joints.Find(name)) return;
   const std::size_t dot = name.rfind('.');
-  if (dot == std::string::npos) {
+  const std::string owner = name.substr(0, dot);
+  const std::string component = dot == std::string::npos ? "" : name.substr(dot + 1);
+  if (names.owners.Find(owner) && kComponents.Find(component)) return;
+  if (node.errors().full()) {
+    node.FailAs("", "");
+  } else if (dot == std::string::npos) {
     node.Fail("a joint with one speed or a body's speed such as \"bar1.angle\"",
-              NearestSpelling(name, joints));
-    return;
-  }
-  const std::string owner = name.substr(0, dot), component = name.substr(dot + 1);
-  const std::vector<std::string> owners = OwnersOfSpeeds(description);
-  if (std::find(owners.begin(), owners.end(), owner) == owners.end()) {
-    const std::string nearest = NearestSpelling(owner, owners);
+              NearestSpelling(name, names.joints.all()));
+  } else if (!names.owners.Find(owner)) {
+    const std::string nearest = NearestSpelling(owner, names.owners.all());
     node.Fail("a speed of a body or free joint", nearest.empty() ? "" : nearest + "." + component);
-  } else if (std::find(kComponents.begin(), kComponents.end(), component) == kComponents.end()) {
-    const std::string nearest = NearestSpelling(component, kComponents);
-    node.Fail(fmt::format("one of the components {}", fmt::join(kComponents, ", ")),
+  } else {
+    const std::string nearest = NearestSpelling(component, kComponents.all());
+    node.Fail(fmt::format("one of the components {}", fmt::join(kComponents.all(), ", ")),
               nearest.empty() ? "" : owner + "." + nearest);
   }
 }
 
-PendulumForm ReadPendulum(const JsonNode& node, const MechanismDescription& description) {
+PendulumForm ReadPendulum(const JsonNode& node, const Draft& draft) {
   PendulumForm form;
   if (!node.ExpectObject({"type", "body", "down_angle", "frequency_squared"})) return form;
   if (const auto type = node.Required("type", "\"pendulum\"")) {
     type->Choice({"pendulum"}, "a closed form");
   }
   if (const auto body = node.Required("body", "the name of a body")) {
-    const auto index = ReadBodyName(*body, description);
-    if (index) form.body = description.bodies[*index].name;
+    const auto index = ReadBodyName(*body, draft);
+    if (index) form.body = draft.bodies[*index].name;
   }
   if (const auto angle = node.Required("down_angle", "a number [rad]")) {
     form.down_angle = angle->Number();
@@ -113,9 +114,9 @@ PendulumForm ReadPendulum(const JsonNode& node, const MechanismDescription& desc
   return form;
 }
 
-AngleCombination ReadCombination(const JsonNode& node, const MechanismDescription& description) {
+AngleCombination ReadCombination(const JsonNode& node, const Draft& draft) {
   AngleCombination combination;
-  if (!node.ExpectObject(BodyNames(description))) return combination;
+  if (!node.ExpectObject(draft.body_names)) return combination;
   for (const auto& [body, coefficient] : node.Members()) {
     combination.emplace_back(body, coefficient.Number());
   }
@@ -125,52 +126,50 @@ AngleCombination ReadCombination(const JsonNode& node, const MechanismDescriptio
 
 }  // namespace
 
-void ReadInitial(const JsonNode& root, MechanismDescription* description) {
+void ReadInitial(const JsonNode& root, Draft* draft) {
   const auto node = root.Optional("initial");
   if (!node || !node->ExpectObject({"coordinates", "speeds", "held"})) return;
-  InitialDescription& initial = description->initial;
-  initial.coordinates = ReadJointValues(*node, "coordinates", *description, CoordinateCount);
-  initial.speeds = ReadJointValues(*node, "speeds", *description, SpeedCount);
+  InitialDescription& initial = draft->initial;
+  initial.coordinates = ReadJointValues(*node, "coordinates", *draft, CoordinateCount);
+  initial.speeds = ReadJointValues(*node, "speeds", *draft, SpeedCount);
   const auto held = node->Optional("held");
   if (!held) return;
+  std::set<int> given, known;
+  for (const JointValues& values : initial.coordinates) given.insert(values.joint);
   for (const JsonNode& element : held->Elements("joint names")) {
-    const auto joint = ReadJointName(element, *description);
+    const auto joint = ReadJointName(element, *draft);
     if (!joint) continue;
-    const bool given =
-        std::any_of(initial.coordinates.begin(), initial.coordinates.end(),
-                    [&joint](const JointValues& values) { return values.joint == *joint; });
-    if (!given) element.Fail("a joint with a value in /initial/coordinates");
-    const bool again = std::count(initial.held.begin(), initial.held.end(), *joint) > 0;
-    if (again) element.Fail("each joint once");
+    if (!given.contains(*joint)) element.Fail("a joint with a value in /initial/coordinates");
+    if (!known.insert(*joint).second) element.Fail("each joint once");
     initial.held.push_back(*joint);
   }
 }
 
-void ReadIndependent(const JsonNode& root, MechanismDescription* description) {
+void ReadIndependent(const JsonNode& root, Draft* draft) {
   const auto independent = root.Optional("independent");
   if (!independent) return;
+  const SpeedNames names = NamesOfSpeeds(*draft);
+  std::set<std::string> known;
   for (const JsonNode& element : independent->Elements("names")) {
     const std::string name = element.Text();
     if (name.empty()) continue;
-    CheckIndependentName(element, name, *description);
-    const auto& names = description->independent;
-    const bool again = std::find(names.begin(), names.end(), name) != names.end();
-    if (again) element.Fail("each name once");
-    description->independent.push_back(name);
+    CheckIndependentName(element, name, names);
+    if (!known.insert(name).second) element.Fail("each name once");
+    draft->independent.push_back(name);
   }
 }
 
-SceneObservation ReadObservation(const JsonNode& root, const MechanismDescription& description) {
+SceneObservation ReadObservation(const JsonNode& root, const Draft& draft) {
   SceneObservation observation;
   const auto node = root.Optional("observe");
   if (!node || !node->ExpectObject({"branch", "closed_form", "length"})) return observation;
   if (const auto branch = node->Optional("branch")) {
     for (const JsonNode& element : branch->Elements("combinations of body angles")) {
-      observation.branch_invariants.push_back(ReadCombination(element, description));
+      observation.branch_invariants.push_back(ReadCombination(element, draft));
     }
   }
   if (const auto form = node->Optional("closed_form")) {
-    observation.closed_form = ReadPendulum(*form, description);
+    observation.closed_form = ReadPendulum(*form, draft);
   }
   if (const auto length = node->Optional("length")) {
     observation.length = length->Number(kPositive);

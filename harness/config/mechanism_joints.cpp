@@ -20,20 +20,19 @@ Eigen::Vector3d ReadRotation(const JsonNode& node, SpaceKind space) {
   return rotation;
 }
 
-JointSide ReadSide(const JsonNode& joint, const char* key,
-                   const MechanismDescription& description) {
+JointSide ReadSide(const JsonNode& joint, const char* key, const Draft& draft) {
   JointSide side;
   side.body = -1;  // not known: matches no other side
   const auto node = joint.Required(key, "an object with keys \"body\", \"at\", \"rotation\"");
   if (!node || !node->ExpectObject({"body", "at", "rotation"})) return side;
   if (const auto body = node->Required("body", "the name of a body or \"ground\"")) {
-    side.body = ReadBodyName(*body, description).value_or(-1);
+    side.body = ReadBodyName(*body, draft).value_or(-1);
   }
   if (const auto at = node->Optional("at"); at && side.body >= 0) {
-    side.position = ReadPoint(*at, description.bodies[side.body], description.space);
+    side.position = ReadPoint(*at, draft.bodies[side.body], draft.space);
   }
   if (const auto rotation = node->Optional("rotation")) {
-    side.rotation = ReadRotation(*rotation, description.space);
+    side.rotation = ReadRotation(*rotation, draft.space);
   }
   return side;
 }
@@ -56,39 +55,38 @@ Eigen::Vector3d ReadAxis(const JsonNode& node, JointType type, SpaceKind space) 
   return axis;
 }
 
-JointDescription ReadJoint(const JsonNode& node, const MechanismDescription& description) {
+JointDescription ReadJoint(const JsonNode& node, const Draft& draft) {
   JointDescription joint;
   if (!node.ExpectObject({"name", "type", "from", "to", "axis", "cut"})) return joint;
-  joint.name = ReadNewName(node, JointNames(description));
+  joint.name = ReadNewName(node, draft.joint_names);
   if (const auto type = node.Required("type", "a joint type")) {
     joint.type = static_cast<JointType>(type->Choice(JointTypeNames(), "a joint type").value_or(0));
-    if (description.space == SpaceKind::kPlanar && !ExistsInPlane(joint.type)) {
+    if (draft.space == SpaceKind::kPlanar && !ExistsInPlane(joint.type)) {
       type->Fail("a joint of the plane, or \"space\": \"spatial\"");
       joint.type = JointType::kRevolute;
     }
   }
-  joint.from = ReadSide(node, "from", description);
-  joint.to = ReadSide(node, "to", description);
+  joint.from = ReadSide(node, "from", draft);
+  joint.to = ReadSide(node, "to", draft);
   if (joint.from.body >= 0 && joint.from.body == joint.to.body) {
-    node.FailAs(
-        fmt::format("a joint of \"{}\" with itself", description.bodies[joint.from.body].name),
-        "two different bodies");
+    node.FailAs(fmt::format("a joint of \"{}\" with itself", draft.bodies[joint.from.body].name),
+                "two different bodies");
   }
   if (const auto axis = node.Optional("axis")) {
-    joint.axis = ReadAxis(*axis, joint.type, description.space);
+    joint.axis = ReadAxis(*axis, joint.type, draft.space);
   }
   if (const auto cut = node.Optional("cut")) joint.cut = cut->Bool();
   return joint;
 }
 
 /// The joint of a joint force; joints that carry no single coordinate have no room for one.
-int ReadForceJoint(const JsonNode& force, const MechanismDescription& description) {
+int ReadForceJoint(const JsonNode& force, const Draft& draft) {
   const auto node = force.Required("joint", "the name of a joint");
   if (!node) return 0;
-  const auto joint = ReadJointName(*node, description);
+  const auto joint = ReadJointName(*node, draft);
   if (!joint) return 0;
-  const JointDescription& found = description.joints[*joint];
-  if (SpeedCount(found.type, description.space) != 1) {
+  const JointDescription& found = draft.joints[*joint];
+  if (SpeedCount(found.type, draft.space) != 1) {
     node->FailAs(fmt::format("\"{}\" ({})", found.name, ToString(found.type)),
                  "a joint with one coordinate (revolute or prismatic)");
   }
@@ -100,20 +98,20 @@ double ReadRequiredNumber(const JsonNode& owner, const std::string& key, const R
   return node ? node->Number(range) : 0.0;
 }
 
-ForceDescription ReadPointForce(const JsonNode& node, const MechanismDescription& description) {
+ForceDescription ReadPointForce(const JsonNode& node, const Draft& draft) {
   PointForce force;
   if (!node.ExpectObject({"type", "body", "at", "force", "axes"})) return force;
   std::optional<int> body;
   if (const auto name = node.Required("body", "the name of a body")) {
-    body = ReadBodyName(*name, description);
+    body = ReadBodyName(*name, draft);
     if (body == kGround) name->Fail("a body that can move");
   }
   force.body = body.value_or(kGround);
   if (const auto at = node.Optional("at"); at && body) {
-    force.at = ReadPoint(*at, description.bodies[*body], description.space);
+    force.at = ReadPoint(*at, draft.bodies[*body], draft.space);
   }
   if (const auto vector = node.Required("force", "an array of 2 or 3 numbers [N]")) {
-    force.force = ReadVector(*vector, description.space);
+    force.force = ReadVector(*vector, draft.space);
   }
   if (const auto axes = node.Optional("axes")) {
     force.in_body_axes = axes->Choice({"ground", "body"}, "the axes of the force") == 1;
@@ -121,9 +119,8 @@ ForceDescription ReadPointForce(const JsonNode& node, const MechanismDescription
   return force;
 }
 
-ForceDescription ReadForce(const JsonNode& node, const MechanismDescription& description) {
-  static const std::vector<std::string> kTypes = {"joint_torque", "joint_spring", "joint_damper",
-                                                  "point_force"};
+ForceDescription ReadForce(const JsonNode& node, const Draft& draft) {
+  static const NameList kTypes = {"joint_torque", "joint_spring", "joint_damper", "point_force"};
   std::optional<int> type;
   if (!node.value().is_object()) {
     node.Fail("an object that describes a force");
@@ -131,27 +128,27 @@ ForceDescription ReadForce(const JsonNode& node, const MechanismDescription& des
     type = name->Choice(kTypes, "a force type");
   }
   if (type == 0 && node.ExpectObject({"type", "joint", "value"})) {
-    return JointTorque{.joint = ReadForceJoint(node, description),
+    return JointTorque{.joint = ReadForceJoint(node, draft),
                        .value = ReadRequiredNumber(node, "value")};
   }
   if (type == 1 && node.ExpectObject({"type", "joint", "stiffness", "rest"})) {
     const auto rest = node.Optional("rest");
-    return JointSpring{.joint = ReadForceJoint(node, description),
+    return JointSpring{.joint = ReadForceJoint(node, draft),
                        .stiffness = ReadRequiredNumber(node, "stiffness", kNotNegative),
                        .rest = rest ? rest->Number() : 0.0};
   }
   if (type == 2 && node.ExpectObject({"type", "joint", "damping"})) {
-    return JointDamper{.joint = ReadForceJoint(node, description),
+    return JointDamper{.joint = ReadForceJoint(node, draft),
                        .damping = ReadRequiredNumber(node, "damping", kNotNegative)};
   }
-  if (type == 3) return ReadPointForce(node, description);
+  if (type == 3) return ReadPointForce(node, draft);
   return JointTorque{};
 }
 
 }  // namespace
 
-const std::vector<std::string>& JointTypeNames() {
-  static const std::vector<std::string> kNames = [] {
+const NameList& JointTypeNames() {
+  static const NameList kNames = [] {
     std::vector<std::string> names;
     for (int i = 0; i < kNumJointTypes; ++i)
       names.emplace_back(ToString(static_cast<JointType>(i)));
@@ -164,19 +161,20 @@ int CoordinateCount(JointType type, SpaceKind space) { return NumValues(type, sp
 
 int SpeedCount(JointType type, SpaceKind space) { return NumValues(type, space, true); }
 
-void ReadJoints(const JsonNode& root, MechanismDescription* description) {
+void ReadJoints(const JsonNode& root, Draft* draft) {
   const auto joints = root.Required("joints", "an array of joints");
   if (!joints) return;
   for (const JsonNode& element : joints->Elements("joints")) {
-    description->joints.push_back(ReadJoint(element, *description));
+    draft->joints.push_back(ReadJoint(element, *draft));
+    draft->joint_names.Add(draft->joints.back().name);
   }
 }
 
-void ReadForces(const JsonNode& root, MechanismDescription* description) {
+void ReadForces(const JsonNode& root, Draft* draft) {
   const auto forces = root.Optional("forces");
   if (!forces) return;
   for (const JsonNode& element : forces->Elements("forces")) {
-    description->forces.push_back(ReadForce(element, *description));
+    draft->forces.push_back(ReadForce(element, *draft));
   }
 }
 

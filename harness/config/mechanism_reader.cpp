@@ -2,7 +2,7 @@
 
 #include <fmt/format.h>
 
-#include <algorithm>
+#include <utility>
 
 #include "harness/config/mechanism_sections.h"
 
@@ -16,39 +16,36 @@ Eigen::Vector3d ReadVector(const JsonNode& node, SpaceKind space) {
 
 Eigen::Vector3d ReadPoint(const JsonNode& node, const BodyDescription& body, SpaceKind space) {
   if (node.value().is_array()) return ReadVector(node, space);
-  std::vector<std::string> names;
-  for (const auto& [name, position] : body.points) names.push_back(name);
-  const auto point = node.Choice(names, fmt::format("coordinates or a point of \"{}\"", body.name));
-  return point ? body.points.at(names[static_cast<std::size_t>(*point)]) : Eigen::Vector3d::Zero();
+  if (node.value().is_string()) {
+    const auto point = body.points.find(node.value().get_ref<const std::string&>());
+    if (point != body.points.end()) return point->second;
+  }
+  NameList names;
+  for (const auto& [name, position] : body.points) {
+    if (!node.errors().full()) names.Add(name);
+  }
+  if (names.all().empty()) {
+    node.Fail(fmt::format("coordinates: \"{}\" has no points", body.name));
+  } else {
+    node.Choice(names, fmt::format("coordinates or a point of \"{}\"", body.name));
+  }
+  return Eigen::Vector3d::Zero();
 }
 
-std::optional<int> ReadBodyName(const JsonNode& node, const MechanismDescription& description) {
-  return node.Choice(BodyNames(description), "a body");
+std::optional<int> ReadBodyName(const JsonNode& node, const Draft& draft) {
+  return node.Choice(draft.body_names, "a body");
 }
 
-std::optional<int> ReadJointName(const JsonNode& node, const MechanismDescription& description) {
-  return node.Choice(JointNames(description), "a joint");
+std::optional<int> ReadJointName(const JsonNode& node, const Draft& draft) {
+  return node.Choice(draft.joint_names, "a joint");
 }
 
-std::string ReadNewName(const JsonNode& owner, const std::vector<std::string>& taken) {
+std::string ReadNewName(const JsonNode& owner, const NameList& taken) {
   const auto node = owner.Required("name", "a name");
   if (!node) return "";
   std::string name = node->Text();
-  const bool again = std::find(taken.begin(), taken.end(), name) != taken.end();
-  if (again && !name.empty()) node->Fail("a name that is not in use yet");
+  if (taken.Find(name)) node->Fail("a name that is not in use yet");
   return name;
-}
-
-std::vector<std::string> BodyNames(const MechanismDescription& description) {
-  std::vector<std::string> names;
-  for (const BodyDescription& body : description.bodies) names.push_back(body.name);
-  return names;
-}
-
-std::vector<std::string> JointNames(const MechanismDescription& description) {
-  std::vector<std::string> names;
-  for (const JointDescription& joint : description.joints) names.push_back(joint.name);
-  return names;
 }
 
 MechanismFile ReadMechanism(const std::filesystem::path& path) {
@@ -57,30 +54,42 @@ MechanismFile ReadMechanism(const std::filesystem::path& path) {
 
 MechanismFile ParseMechanism(std::string_view text, const std::string& file) {
   const Json document = ParseDocument(text, file);
-  ErrorList errors(file);
-  const JsonNode root(document, "", errors);
+  ErrorList errors(file, text);
+  MechanismFile result = ReadMechanismObject(JsonNode(document, "", errors));
+  errors.ThrowIfAny();
+  return result;
+}
+
+MechanismFile ReadMechanismObject(const JsonNode& root) {
   MechanismFile result;
-  result.canonical = document.dump();
-  MechanismDescription& description = result.description;
+  result.canonical = root.value().dump(-1, ' ', false, Json::error_handler_t::replace);
+  Draft draft;
+  if (root.value().is_object() && root.value().contains("scenes")) {
+    root.FailAs("an experiment (it has \"scenes\")", "a mechanism");
+    return result;
+  }
   if (root.ExpectObject({"name", "comment", "space", "gravity", "bodies", "ground", "joints",
                          "forces", "initial", "independent", "observe"})) {
-    description.name = ReadNewName(root, {});
+    draft.name = ReadNewName(root, {});
     if (const auto comment = root.Optional("comment")) comment->Text();
     if (const auto space = root.Optional("space")) {
       const auto chosen = space->Choice({"planar", "spatial"}, "a space");
-      if (chosen == 1) description.space = SpaceKind::kSpatial;
+      if (chosen == 1) draft.space = SpaceKind::kSpatial;
     }
     if (const auto gravity = root.Required("gravity", "an array of 2 or 3 numbers [m/s^2]")) {
-      description.gravity = ReadVector(*gravity, description.space);
+      draft.gravity = ReadVector(*gravity, draft.space);
     }
-    ReadBodies(root, &description);
-    ReadJoints(root, &description);
-    ReadForces(root, &description);
-    ReadInitial(root, &description);
-    ReadIndependent(root, &description);
-    result.observe = ReadObservation(root, description);
+    ReadBodies(root, &draft);
+    // without bodies everything that names one would be a mistake, and none of its own
+    if (draft.bodies.size() > 1) {
+      ReadJoints(root, &draft);
+      ReadForces(root, &draft);
+      ReadInitial(root, &draft);
+      ReadIndependent(root, &draft);
+      result.observe = ReadObservation(root, draft);
+    }
   }
-  errors.ThrowIfAny();
+  result.description = std::move(static_cast<MechanismDescription&>(draft));
   return result;
 }
 

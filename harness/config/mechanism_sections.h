@@ -16,35 +16,42 @@
 
 namespace loopbench::harness {
 
+/// A description being read, with its names in the order of its lists: references are looked up
+/// without a search, so that reading is linear in the size of the file.
+struct Draft : MechanismDescription {
+  NameList body_names;  ///< ground first
+  NameList joint_names;
+};
+
+/// The whole of a mechanism; `root` may be a file's top level or a value inside an experiment.
+MechanismFile ReadMechanismObject(const JsonNode& root);
+
 /// "ground" and "bodies".
-void ReadBodies(const JsonNode& root, MechanismDescription* description);
+void ReadBodies(const JsonNode& root, Draft* draft);
 /// "joints".
-void ReadJoints(const JsonNode& root, MechanismDescription* description);
+void ReadJoints(const JsonNode& root, Draft* draft);
 /// "forces".
-void ReadForces(const JsonNode& root, MechanismDescription* description);
+void ReadForces(const JsonNode& root, Draft* draft);
 /// "initial".
-void ReadInitial(const JsonNode& root, MechanismDescription* description);
+void ReadInitial(const JsonNode& root, Draft* draft);
 /// "independent".
-void ReadIndependent(const JsonNode& root, MechanismDescription* description);
+void ReadIndependent(const JsonNode& root, Draft* draft);
 /// "observe".
-SceneObservation ReadObservation(const JsonNode& root, const MechanismDescription& description);
+SceneObservation ReadObservation(const JsonNode& root, const Draft& draft);
 
 /// Two or three numbers; reports a third one that is not zero in the plane.
 Eigen::Vector3d ReadVector(const JsonNode& node, SpaceKind space);
 /// The point that a name of the body's points or a vector denotes.
 Eigen::Vector3d ReadPoint(const JsonNode& node, const BodyDescription& body, SpaceKind space);
 /// Index of the body with this name ("ground" is one of them).
-std::optional<int> ReadBodyName(const JsonNode& node, const MechanismDescription& description);
+std::optional<int> ReadBodyName(const JsonNode& node, const Draft& draft);
 /// Index of the joint with this name.
-std::optional<int> ReadJointName(const JsonNode& node, const MechanismDescription& description);
+std::optional<int> ReadJointName(const JsonNode& node, const Draft& draft);
 /// A name that is not empty and not yet in `taken`.
-std::string ReadNewName(const JsonNode& owner, const std::vector<std::string>& taken);
-
-std::vector<std::string> BodyNames(const MechanismDescription& description);
-std::vector<std::string> JointNames(const MechanismDescription& description);
+std::string ReadNewName(const JsonNode& owner, const NameList& taken);
 
 /// Names of joint types in files, by value of JointType.
-const std::vector<std::string>& JointTypeNames();
+const NameList& JointTypeNames();
 /// Numbers of coordinates and speeds of a joint (mechanism/joint.h): revolute and prismatic 1, weld
 /// 0, free 3 and 3 in the plane [angle, x, y], 7 and 6 in space [qw, qx, qy, qz, x, y, z].
 int CoordinateCount(JointType type, SpaceKind space);

@@ -48,7 +48,16 @@ std::string NearestSpelling(std::string_view given, const std::vector<std::strin
     nearest = word;
     allowed = distance - 1;
   }
-  return nearest;
+  if (!nearest.empty()) return nearest;
+  // a word cut short, or one too long: "wall" for "wall_s"
+  constexpr std::size_t kShortestStart = 3;
+  for (const std::string& word : known) {
+    const std::string whole = Lowered(word);
+    const std::string_view shorter = whole.size() < lowered.size() ? whole : lowered;
+    if (shorter.size() < kShortestStart) continue;
+    if (whole.starts_with(shorter) && lowered.starts_with(shorter)) return word;
+  }
+  return "";
 }
 
 }  // namespace loopbench::harness

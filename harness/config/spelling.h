@@ -13,7 +13,8 @@ int EditDistance(std::string_view a, std::string_view b);
 
 /// The word of `known` nearest to `given`, upper and lower case taken as the same, or "" when none
 /// is near enough to be what was meant: more than a third of the letters of `given` (at least
-/// one), or all letters of the word, would have to change. The first of equally near words wins.
+/// one), or all letters of the word, would have to change, and neither is the start of the other.
+/// The first of equally near words wins.
 std::string NearestSpelling(std::string_view given, const std::vector<std::string>& known);
 
 }  // namespace loopbench::harness

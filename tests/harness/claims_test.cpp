@@ -199,7 +199,7 @@ TEST(ClaimsReader, MistakesAreReportedTogetherWithTheirPlaces) {
   } catch (const ConfigError& error) {
     message = error.what();
   }
-  EXPECT_TRUE(Contains(message, "rules.json: /claims/0/checks/0/select/rtol/1: found"));
+  EXPECT_TRUE(Contains(message, "/claims/0/checks/0/select/rtol/1: found"));
   EXPECT_TRUE(Contains(message, "/checks/0/statistic: found \"maximum\""));
   EXPECT_TRUE(Contains(message, "/checks/0/threshold: found \"small\", expected a number"));
   EXPECT_TRUE(Contains(message, "/checks/0/tolerance: found 1, expected no \"tolerance\""));

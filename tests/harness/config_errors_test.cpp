@@ -86,7 +86,7 @@ class MechanismMistake : public testing::TestWithParam<Mistake> {};
 
 TEST_P(MechanismMistake, IsRefusedOnceAndExplained) {
   const std::string error = MechanismError(Edited(kMechanism, GetParam()));
-  EXPECT_EQ(error.rfind("m.json: ", 0), 0u) << error;
+  EXPECT_EQ(error.rfind("m.json:", 0), 0u) << error;
   EXPECT_EQ(std::count(error.begin(), error.end(), '\n'), 0) << error;
   ExpectWords(error, GetParam().words);
 }
@@ -97,14 +97,14 @@ INSTANTIATE_TEST_SUITE_P(
         Mistake{"trailing comma",
                 R"("bar1.angle"])",
                 R"("bar1.angle",])",
-                {"line 11, column ", "remove the comma before the closing bracket"}},
-        Mistake{"comment", "\"joints\"", "// no\n\"joints\"", {"line 6", "comments are not"}},
-        Mistake{"NaN", "-9.81", "NaN", {"line 2", "NaN and Infinity are not allowed"}},
-        Mistake{"overflow", "-9.81", "1e999", {"line 2", "1e999"}},
+                {"m.json:11:", "found ']'", "remove the comma before the closing bracket"}},
+        Mistake{"comment", "\"joints\"", "// no\n\"joints\"", {"m.json:6:", "comments are not"}},
+        Mistake{"NaN", "-9.81", "NaN", {"m.json:2:", "NaN and Infinity are not allowed"}},
+        Mistake{"overflow", "-9.81", "1e999", {"m.json:2:", "1e999"}},
         Mistake{"duplicate key",
                 R"("mass": 1)",
                 R"("mass": 1, "mass": 2)",
-                {"/bodies/0/mass: found key \"mass\" twice"}},
+                {"m.json:4: /bodies/0/mass: found key \"mass\" twice"}},
         Mistake{"single quotes", "\"two bars\"", "'two bars'", {"double quotes"}}));
 
 INSTANTIATE_TEST_SUITE_P(
@@ -117,7 +117,7 @@ INSTANTIATE_TEST_SUITE_P(
                     Mistake{"missing key",
                             R"("mass": 1, )",
                             "",
-                            {"/bodies/0: found no \"mass\", expected a number > 0"}},
+                            {"m.json:4: /bodies/0: found no \"mass\", expected a number > 0"}},
                     Mistake{"wrong type",
                             R"("mass": 1)",
                             R"("mass": "heavy")",
@@ -145,7 +145,7 @@ INSTANTIATE_TEST_SUITE_P(
                     Mistake{"negative damping",
                             R"("damping": 1)",
                             R"("damping": -1)",
-                            {"/forces/0/damping: found -1, expected a number >= 0"}},
+                            {"m.json:9: /forces/0/damping: found -1, expected a number >= 0"}},
                     Mistake{"number of values",
                             R"("OA": 0.5})",
                             R"("OA": [0.5, 1]})",
@@ -206,7 +206,7 @@ TEST(MechanismErrors, SoundFileHasNone) {
 }
 
 TEST(MechanismErrors, EmptyAndForeignDocumentsAreRefused) {
-  ExpectWords(MechanismError(""), {"m.json: line 1"});
+  ExpectWords(MechanismError(""), {"m.json:1:1: found an empty file"});
   ExpectWords(MechanismError("[]"), {"(top level): found an empty array, expected an object"});
   ExpectWords(MechanismError(std::string(100, '[')), {"nesting deeper than 64"});
   ExpectWords(MechanismError(R"({"name": "m", "gravity": [0, 0], "bodies": [], "joints": []})"),
@@ -273,7 +273,7 @@ TEST(ExperimentErrors, TheSameTwiceIsRefused) {
 TEST(ExperimentErrors, IncludeThoseInsideTheMechanismFile) {
   const std::string error = ExperimentError(
       Edited(kExperiment, {"", "mechanisms/pendulum.json", "schema/mechanism.schema.json", {}}));
-  ExpectWords(error, {"mechanism.schema.json: (top level): found no \"gravity\""});
+  ExpectWords(error, {"mechanism.schema.json:1: (top level): found no \"gravity\""});
 }
 
 TEST(NearestSpelling, FindsTypingErrorsAndNothingFar) {

@@ -1,0 +1,120 @@
+// list, check: what experiment and mechanism files hold.
+#include <fmt/format.h>
+
+#include <algorithm>
+
+#include "harness/commands.h"
+#include "harness/config/config_error.h"
+#include "harness/config/mechanism_reader.h"
+#include "harness/report/table.h"
+#include "harness/run_case.h"
+#include "harness/timing/time_cases.h"
+
+namespace loopbench::harness {
+
+namespace {
+
+/// Whether some case of the experiment passes; throws when the filter names a key it does not have.
+bool Passes(const Experiment& experiment, const Selection& filter) {
+  const std::vector<Case> cases = Expand(experiment);
+  if (cases.empty() || filter.empty()) return !cases.empty();
+  const Record keys = CaseKeys(experiment, cases.front());
+  for (const Condition& condition : filter) {
+    if (keys.Find(condition.key) == nullptr) return !SelectCases(experiment, filter).empty();
+  }
+  return std::ranges::any_of(
+      cases, [&](const Case& one) { return Matches(CaseKeys(experiment, one), filter); });
+}
+
+Table CaseTable(const std::vector<Experiment>& experiments, const Selection& filter) {
+  Table table;
+  table.title = experiments.front().name;
+  if (!experiments.front().comment.empty()) table.title += ": " + experiments.front().comment;
+  for (const char* key : {"mechanism", "formulation", "enforcement", "coordinates", "solver"}) {
+    table.columns.push_back({key, key, Format::kText, {}});
+  }
+  for (const auto& [name, value] : experiments.front().parameters.items()) {
+    Format format = Format::kText;
+    if (std::holds_alternative<double>(value)) format = Format::kShortest;
+    if (std::holds_alternative<std::int64_t>(value)) format = Format::kInteger;
+    table.columns.push_back({name, name, format, {}});
+  }
+  table.columns.push_back({"rtol", "rtol", Format::kShortest, {}});
+  table.columns.push_back({"horizon", "horizon [s]", Format::kShortest, {}});
+  table.columns.push_back({"ensemble", "runs", Format::kInteger, {}});
+  std::size_t timings = 0;
+  for (const Experiment& experiment : experiments) {
+    for (const Case& one : SelectCases(experiment, filter)) {
+      Record row = CaseKeys(experiment, one);
+      // an ensemble comes on top of the unperturbed run
+      row.Set("ensemble", std::int64_t{one.ensemble > 1 ? one.ensemble + 1 : 1});
+      table.rows.push_back(row);
+    }
+    timings += CountTimings(experiment);
+  }
+  table.notes = {fmt::format("{} cases and {} timings", table.rows.size(), timings)};
+  if (experiments.size() > 1) {
+    table.notes.front() += fmt::format(" in {} combinations", experiments.size());
+  }
+  return table;
+}
+
+void CheckExperiment(const std::filesystem::path& path, const std::vector<Setting>& settings) {
+  const std::vector<Experiment> experiments = ReadExperiments(path, settings);
+  std::size_t cases = 0;
+  for (const Experiment& experiment : experiments) cases += Expand(experiment).size();
+  fmt::print("{}: experiment \"{}\", {} cases{}\n", path.string(), experiments.front().name, cases,
+             experiments.size() > 1 ? fmt::format(" in {} combinations", experiments.size()) : "");
+}
+
+void CheckMechanism(const std::filesystem::path& path, const std::vector<Setting>& settings) {
+  if (!settings.empty()) {
+    throw ConfigError(fmt::format("{}: --set is for experiments, and this is none", path.string()));
+  }
+  const MechanismFile file = ReadMechanism(path);
+  fmt::print("{}: mechanism \"{}\", {} bodies, {} joints\n", path.string(), file.description.name,
+             file.description.bodies.size() - 1, file.description.joints.size());
+}
+
+}  // namespace
+
+std::vector<Experiment> ReadSelected(const ExperimentFiles& files) {
+  std::vector<Experiment> selected;
+  for (const auto& path : files.paths) {
+    const std::size_t before = selected.size();
+    for (Experiment& experiment : ReadExperiments(path, files.settings)) {
+      if (Passes(experiment, files.filter)) selected.push_back(std::move(experiment));
+    }
+    if (selected.size() > before) continue;
+    throw ConfigError(fmt::format("{}: no case matches {}", path.string(), ToText(files.filter)));
+  }
+  return selected;
+}
+
+int List(const ExperimentFiles& files) {
+  for (const auto& path : files.paths) {
+    const std::vector<Experiment> experiments =
+        ReadSelected({{path}, files.settings, files.filter});
+    fmt::print("{}\n", ToText(CaseTable(experiments, files.filter)));
+  }
+  return 0;
+}
+
+int CheckFiles(const ExperimentFiles& files) {
+  int exit_code = 0;
+  for (const auto& path : files.paths) {
+    try {
+      if (HoldsExperiment(path)) {
+        CheckExperiment(path, files.settings);
+      } else {
+        CheckMechanism(path, files.settings);
+      }
+    } catch (const ConfigError& error) {
+      fmt::print(stderr, "{}\n", error.what());
+      exit_code = 2;
+    }
+  }
+  return exit_code;
+}
+
+}  // namespace loopbench::harness

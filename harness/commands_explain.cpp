@@ -1,0 +1,212 @@
+// explain: what an experiment runs and measures, in sentences.
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <set>
+
+#include "harness/commands.h"
+#include "harness/timing/time_cases.h"
+
+namespace loopbench::harness {
+
+namespace {
+
+/// "a, b and c".
+std::string Listed(const std::vector<std::string>& words) {
+  std::string text;
+  for (std::size_t i = 0; i < words.size(); ++i) {
+    text += (i == 0 ? "" : i + 1 == words.size() ? " and " : ", ") + words[i];
+  }
+  return text;
+}
+
+std::string Numbers(const std::vector<double>& numbers) {
+  std::vector<std::string> words;
+  for (const double number : numbers) words.push_back(fmt::format("{}", number));
+  return Listed(words);
+}
+
+std::string Plural(std::size_t count, const std::string& word) {
+  return fmt::format("{} {}{}", count, word, count == 1 ? "" : "s");
+}
+
+/// Whether some column passes.
+template <class Is>
+bool Any(const Experiment& experiment, Is is) {
+  return std::any_of(experiment.columns.begin(), experiment.columns.end(), is);
+}
+
+void ExplainScenes(const Experiment& experiment) {
+  fmt::print("\nMechanisms\n");
+  for (const ExperimentScene& scene : experiment.scenes) {
+    const MechanismDescription& description = scene.mechanism.description;
+    fmt::print("  {} is {} mechanism of {} and {}{}. It is simulated for {} s of its own time.\n",
+               scene.name, description.space == SpaceKind::kPlanar ? "a planar" : "a spatial",
+               description.bodies.size() == 2
+                   ? "1 body"
+                   : fmt::format("{} bodies", description.bodies.size() - 1),
+               Plural(description.joints.size(), "joint"),
+               scene.path.empty() ? "" : " (" + scene.path.string() + ")", Numbers(scene.horizons));
+  }
+}
+
+void ExplainFormulations(const Experiment& experiment) {
+  const auto uses = [&](FormulationKind kind) {
+    return Any(experiment, [kind](const Column& one) { return one.formulation == kind; });
+  };
+  fmt::print("\nColumns: {} ways of keeping the loops closed\n", experiment.columns.size());
+  for (const Column& column : experiment.columns) fmt::print("  {}\n", ToString(column));
+  fmt::print("  The words stand for formulation/enforcement/coordinates/solver.\n");
+  if (uses(FormulationKind::kOdca)) {
+    fmt::print(
+        "  odca: orthogonal complement divide and conquer. Bodies are joined pair by pair; "
+        "the loops' forces are found on the way.\n");
+  }
+  if (uses(FormulationKind::kLagrange)) {
+    fmt::print("  lagrange: one multiplier per constraint, all solved at once.\n");
+  }
+  if (uses(FormulationKind::kReduction)) {
+    fmt::print("  reduction: independent speeds only; the others follow from the loops.\n");
+  }
+}
+
+void ExplainChoices(const Experiment& experiment) {
+  const auto any = [&](auto is) { return Any(experiment, is); };
+  if (any([](const Column& c) { return c.enforcement == Enforcement::kAcceleration; })) {
+    fmt::print(
+        "  acceleration: the loops' accelerations are imposed. Speeds and positions follow "
+        "by integration, and errors in them stay.\n");
+  }
+  if (any([](const Column& c) { return c.enforcement == Enforcement::kVelocity; })) {
+    fmt::print("  velocity: the speeds satisfy the loops too; positions follow by integration.\n");
+  }
+  if (any([](const Column& c) { return c.coordinates == Coordinates::kJoint; })) {
+    fmt::print(
+        "  joint: the coordinates are those of the joints, but for one cut joint per loop, "
+        "where drift shows.\n");
+  }
+  if (any([](const Column& c) { return c.coordinates == Coordinates::kAbsolute; })) {
+    fmt::print(
+        "  absolute: the coordinates are every body's position and angle; drift may show "
+        "at every joint.\n");
+  }
+  if (any([](const Column& c) { return c.solver == SolverKind::kAsPublished; })) {
+    fmt::print(
+        "  as-published: plain factorisations (for reduction: the mechanism's fixed "
+        "independent speeds), which fail or go wrong where the loops lose rank.\n");
+  }
+  if (any([](const Column& c) { return c.solver == SolverKind::kRankRevealing; })) {
+    fmt::print(
+        "  rank-revealing: solvers that notice lost rank (for reduction: independent speeds "
+        "chosen anew).\n");
+  }
+}
+
+void ExplainRuns(const Experiment& experiment) {
+  fmt::print(
+      "\nRuns\n  The integrator is {}; its relative and absolute tolerances are equal: {}. "
+      "Smaller is more accurate.\n",
+      experiment.integrator, Numbers(experiment.tolerances));
+  if (experiment.ensembles.empty()) {
+    fmt::print(
+        "  Each case runs once. One run resolves no exponent of growth with confidence; "
+        "\"ensembles\" would.\n");
+  }
+  for (const EnsembleRule& rule : experiment.ensembles) {
+    const std::vector<Case> cases = Expand(experiment);
+    const auto count = static_cast<std::size_t>(std::count_if(
+        cases.begin(), cases.end(), [&rule](const Case& one) { return Matches(rule, one); }));
+    fmt::print(
+        "  {} also run{} {} times from perturbed starts: each held coordinate moved by up to "
+        "{:g} (rad or m), drawn from seed {}. The spread of the results says how far a "
+        "single run can be trusted.\n",
+        Plural(count, "case"), count == 1 ? "s" : "", rule.size, rule.perturb, rule.seed);
+  }
+  const Limits& limits = experiment.limits;
+  fmt::print(
+      "  A run is given up after {:g} s of wall time, {} accepted steps, or {:g} MiB of "
+      "memory; its row then says so.\n",
+      limits.wall_s, limits.steps, limits.memory_mb);
+}
+
+void ExplainMeasures(const Experiment& experiment) {
+  fmt::print(
+      "\nMeasured at every accepted step\n"
+      "  drift [m, rad]: how far the joints that ought to hold have come apart, and the "
+      "power of time it grows with;\n"
+      "  energy error [J]; rank and conditioning of the loops; how the run ended.\n"
+      "  Series keep {} points for figures.\n",
+      experiment.series_points);
+  const std::size_t timings = CountTimings(experiment);
+  if (timings == 0) {
+    fmt::print("  There are no timings.\n");
+    return;
+  }
+  fmt::print(
+      "  {}, in runs of their own and never two at once: time of one right-hand side [ns] "
+      "and of whole simulations, {} repeats at tolerance {}.\n",
+      Plural(timings, "timing"), experiment.timing.repeats, experiment.timing.tolerance);
+}
+
+void ExplainSweep(const std::vector<Experiment>& experiments) {
+  const Experiment& first = experiments.front();
+  if (!first.parameters.items().empty()) {
+    fmt::print("\nSweep: {} of values; what follows is the first\n",
+               Plural(experiments.size(), "combination"));
+    for (const auto& [name, value] : first.parameters.items()) {
+      std::vector<std::string> values;
+      std::set<std::string> known;
+      for (const Experiment& one : experiments) {
+        if (known.insert(one.parameters.Text(name)).second)
+          values.push_back(one.parameters.Text(name));
+      }
+      constexpr std::size_t kMostShown = 12;
+      const std::size_t count = values.size();
+      if (count > kMostShown) {
+        const std::string last = values.back();
+        values.resize(kMostShown - 2);
+        values.push_back("...");
+        values.push_back(last);
+      }
+      fmt::print("  {}: {}\n", name, fmt::join(values, ", "));
+    }
+    fmt::print("  Every record carries these values, for --filter {}=...\n",
+               first.parameters.items().front().first);
+  }
+  if (!first.exclusions.empty()) {
+    fmt::print("\nLeft out are cases with");
+    for (const Selection& rule : first.exclusions) fmt::print(" [{}]", ToText(rule));
+    fmt::print("\n");
+  }
+}
+
+}  // namespace
+
+int Explain(const ExperimentFiles& files) {
+  for (const auto& path : files.paths) {
+    const std::vector<Experiment> experiments =
+        ReadSelected({{path}, files.settings, files.filter});
+    const Experiment& first = experiments.front();
+    std::size_t cases = 0;
+    for (const Experiment& one : experiments) cases += SelectCases(one, files.filter).size();
+    fmt::print("{} ({})\n", first.name, path.string());
+    if (!first.comment.empty()) fmt::print("  {}\n", first.comment);
+    fmt::print(
+        "  {}: each is one mechanism, column, tolerance and horizon. Units are SI, angles "
+        "in rad.\n",
+        Plural(cases, "case"));
+    ExplainSweep(experiments);
+    ExplainScenes(first);
+    ExplainFormulations(first);
+    ExplainChoices(first);
+    ExplainRuns(first);
+    ExplainMeasures(first);
+    fmt::print(
+        "\nloopbench list {0} shows every case, loopbench plan {0} the time they will "
+        "take.\n",
+        path.string());
+  }
+  return 0;
+}
+
+}  // namespace loopbench::harness

@@ -1,0 +1,241 @@
+// plan: what a run would be, and about how long it would take.
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <cmath>
+#include <map>
+#include <set>
+
+#include "harness/commands.h"
+#include "harness/progress.h"
+#include "harness/report/table.h"
+#include "harness/run_case.h"
+#include "harness/store/result_store.h"
+#include "harness/timing/time_cases.h"
+
+namespace loopbench::harness {
+
+namespace {
+
+constexpr double kPilotFraction = 0.02;        ///< of the horizon, at first
+constexpr double kPilotGrowth = 5.0;           ///< then longer
+constexpr double kPilotEnough = 0.003;         ///< wall time that says something [s]
+constexpr double kPilotSeconds = 0.25;         ///< wall time of one pilot run
+constexpr std::size_t kPilotCombinations = 8;  ///< of a sweep; the others take the nearest one's
+constexpr double kFamilySeconds = 0.02;        ///< batches of right-hand sides of one family member
+
+/// Everything that names a case but the experiment's name: results of another file with the same
+/// cases serve as well.
+std::string KeyText(const Record& keys) {
+  std::string text;
+  for (const auto& [key, value] : keys.items()) {
+    if (key != "experiment") text += key + "=" + keys.Text(key) + "\n";
+  }
+  return text;
+}
+
+/// Wall time of the unperturbed run by case, from an earlier store.
+std::map<std::string, double> EarlierTimes(const std::filesystem::path& store,
+                                           const Record& example) {
+  std::map<std::string, double> times;
+  if (store.empty()) return times;
+  for (const Record& record : ReadRecords(store)) {
+    if (record.Text("kind") != "accuracy" || std::isnan(record.Number("wall_s"))) continue;
+    Record keys;
+    for (const auto& [key, value] : example.items()) {
+      const Value* found = record.Find(key);
+      keys.Set(key, found == nullptr ? Value() : *found);
+    }
+    times[KeyText(keys)] = record.Number("wall_s");
+  }
+  return times;
+}
+
+/// Steps, and with them the time, grow with the horizon and with rtol^(-1/5) (order 5).
+double Work(double horizon, double rtol) { return horizon * std::pow(rtol, -0.2); }
+
+/// Wall time per unit of work of a scene and a column, from short runs.
+class Pilot {
+ public:
+  explicit Pilot(const std::vector<Experiment>& experiments) : experiments_(experiments) {}
+
+  /// Estimated wall time of one run of the case [s].
+  double Seconds(std::size_t experiment, const Case& one) {
+    const std::size_t piloted = Nearest(experiment);
+    const Experiment& like = experiments_[piloted];
+    // another combination of a sweep may have other scenes
+    const std::size_t scene = std::min(one.scene, like.scenes.size() - 1);
+    const std::string key =
+        fmt::format("{}/{}/{}/{}", piloted, scene, ToString(one.column), one.integrator);
+    const auto known = rates_.find(key);
+    const double rate = known != rates_.end()
+                            ? known->second
+                            : rates_.emplace(key, Measure(like, scene, one)).first->second;
+    return std::min(rate * Work(one.horizon, one.rtol), one.limits.wall_s);
+  }
+
+  std::size_t runs() const { return rates_.size(); }
+
+ private:
+  std::size_t Nearest(std::size_t experiment) const {
+    const std::size_t count = experiments_.size();
+    if (count <= kPilotCombinations) return experiment;
+    const double step = static_cast<double>(count - 1) / (kPilotCombinations - 1);
+    return static_cast<std::size_t>(
+        std::round(std::round(static_cast<double>(experiment) / step) * step));
+  }
+
+  static double Measure(const Experiment& experiment, std::size_t scene, const Case& like) {
+    Case pilot = like;
+    pilot.scene = scene;
+    pilot.ensemble = 1;
+    pilot.rtol = pilot.atol =
+        *std::max_element(experiment.tolerances.begin(), experiment.tolerances.end());
+    const std::vector<double>& horizons = experiment.scenes[scene].horizons;
+    const double horizon = *std::max_element(horizons.begin(), horizons.end());
+    pilot.limits.wall_s = std::min(kPilotSeconds, like.limits.wall_s);
+    // the first steps cost more than the later ones: longer, until the run is no longer short
+    for (double fraction = kPilotFraction;; fraction = std::min(1.0, kPilotGrowth * fraction)) {
+      pilot.horizon = fraction * horizon;
+      const Record record = RunCase(experiment, pilot);
+      const double reached = record.Number("t_reached"), wall = record.Number("wall_s");
+      // a run that fails at once costs next to nothing, and so will the case
+      if (!(reached > 0.0) || !(wall > 0.0)) return 0.0;
+      const bool failed = record.Text("outcome") != ToString(Outcome::kFinished);
+      if (wall >= kPilotEnough || failed || fraction >= 1.0) {
+        return wall / Work(reached, pilot.rtol);
+      }
+    }
+  }
+
+  const std::vector<Experiment>& experiments_;
+  std::map<std::string, double> rates_;
+};
+
+/// "1.5 s", "12 min", "3.4 h".
+std::string Duration(double seconds) {
+  if (seconds < 0.1) return "less than 0.1 s";
+  if (seconds < 100.0) return fmt::format("{:.2g} s", seconds);
+  if (seconds < 6000.0) return fmt::format("{:.0f} min", seconds / 60.0);
+  return fmt::format("{:.1f} h", seconds / 3600.0);
+}
+
+/// One line of the plan: the cases of a scene and column, over all combinations.
+struct Line {
+  std::string mechanism, column;
+  std::size_t cases = 0, runs = 0;
+  double seconds = 0.0;
+};
+
+struct Plan {
+  std::vector<Line> lines;
+  std::size_t cases = 0, runs = 0, timings = 0, known = 0;
+  double seconds = 0.0, timing_seconds = 0.0;
+};
+
+void Add(const Case& one, double seconds, Plan* plan, std::map<std::string, std::size_t>* places) {
+  const std::string column = ToString(one.column);
+  const auto [place, fresh] = places->emplace(one.mechanism + "\n" + column, plan->lines.size());
+  if (fresh) plan->lines.push_back({one.mechanism, column, 0, 0, 0.0});
+  Line& line = plan->lines[place->second];
+  const std::size_t runs = one.ensemble > 1 ? static_cast<std::size_t>(one.ensemble) + 1 : 1;
+  ++line.cases;
+  line.runs += runs;
+  line.seconds += static_cast<double>(runs) * seconds;
+  ++plan->cases;
+  plan->runs += runs;
+  plan->seconds += static_cast<double>(runs) * seconds;
+}
+
+Plan MakePlan(const std::vector<Experiment>& experiments, const PlanCommand& command,
+              Pilot* pilot) {
+  Plan plan;
+  std::map<std::string, std::size_t> places;
+  const Record example = CaseKeys(experiments.front(), Expand(experiments.front()).front());
+  const std::map<std::string, double> earlier = EarlierTimes(command.from, example);
+  Progress progress("plan", experiments.size());
+  for (std::size_t i = 0; i < experiments.size(); ++i) {
+    const Experiment& experiment = experiments[i];
+    for (const Case& one : SelectCases(experiment, command.files.filter)) {
+      const auto known = earlier.find(KeyText(CaseKeys(experiment, one)));
+      plan.known += known != earlier.end() ? 1 : 0;
+      Add(one, known != earlier.end() ? known->second : pilot->Seconds(i, one), &plan, &places);
+    }
+    // the first simulation of a timing warms up and is not counted by its repeats
+    const std::vector<Case> timings = ExpandTiming(experiment);
+    for (const Case& one : timings) {
+      plan.timing_seconds += (experiment.timing.repeats + 1) * pilot->Seconds(i, one);
+    }
+    const std::size_t members = CountTimings(experiment) - timings.size();
+    plan.timing_seconds += kFamilySeconds * static_cast<double>(members);
+    plan.timings += CountTimings(experiment);
+    progress.Step(experiment.name);
+  }
+  return plan;
+}
+
+void PrintAxes(const std::vector<Experiment>& experiments) {
+  if (experiments.front().parameters.items().empty()) return;
+  for (const auto& [name, value] : experiments.front().parameters.items()) {
+    std::set<std::string> values;
+    for (const Experiment& one : experiments) values.insert(one.parameters.Text(name));
+    fmt::print("  axis {}: {} values\n", name, values.size());
+  }
+  fmt::print("  {} combinations\n", experiments.size());
+}
+
+void PrintPlan(const std::vector<Experiment>& experiments, const Plan& plan,
+               const PlanCommand& command, const Pilot& pilot) {
+  const Experiment& first = experiments.front();
+  fmt::print("{}{}{}\n", first.name, first.comment.empty() ? "" : ": ", first.comment);
+  PrintAxes(experiments);
+  fmt::print("  {} scenes, {} columns, {} tolerances\n\n", first.scenes.size(),
+             first.columns.size(), first.tolerances.size());
+  Table table;
+  table.columns = {{"mechanism", "mechanism", Format::kText, {}},
+                   {"column", "column", Format::kText, {}},
+                   {"cases", "cases", Format::kInteger, {}},
+                   {"runs", "runs", Format::kInteger, {}},
+                   {"seconds", "estimate [s]", Format::kShortest, {}}};
+  for (const Line& line : plan.lines) {
+    Record row;
+    row.Set("mechanism", line.mechanism);
+    row.Set("column", line.column);
+    row.Set("cases", static_cast<std::int64_t>(line.cases));
+    row.Set("runs", static_cast<std::int64_t>(line.runs));
+    row.Set("seconds", std::round(line.seconds * 100.0) / 100.0);
+    table.rows.push_back(row);
+  }
+  fmt::print("{}\n", ToText(table));
+  fmt::print("{} cases, {} runs (an ensemble comes on top of the unperturbed run), {} timings\n",
+             plan.cases, plan.runs, plan.timings);
+  fmt::print("estimated time: accuracy {} with one job, timings {}\n", Duration(plan.seconds),
+             Duration(plan.timing_seconds));
+  std::string source;
+  if (!command.from.empty()) {
+    source = fmt::format("{} of {} cases from {}", plan.known, plan.cases, command.from.string());
+  }
+  if (pilot.runs() > 0) {
+    source += fmt::format(
+        "{}{} pilots over {:g} % or more of the longest horizon at the loosest tolerance, scaled "
+        "with the horizon and rtol^(-1/5)",
+        source.empty() ? "" : ", the rest from ", pilot.runs(), 100.0 * kPilotFraction);
+  }
+  fmt::print("An estimate, from {}. Each run ends at {:g} s of wall time at the latest.\n", source,
+             first.limits.wall_s);
+}
+
+}  // namespace
+
+int PrintPlans(const PlanCommand& command) {
+  for (const auto& path : command.files.paths) {
+    const std::vector<Experiment> experiments =
+        ReadSelected({{path}, command.files.settings, command.files.filter});
+    Pilot pilot(experiments);
+    const Plan plan = MakePlan(experiments, command, &pilot);
+    PrintPlan(experiments, plan, command, pilot);
+  }
+  return 0;
+}
+
+}  // namespace loopbench::harness

@@ -1,0 +1,82 @@
+// "integrator", "limits", "series" and "timing" of an experiment file.
+#include "harness/config/experiment_sections.h"
+#include "harness/integrator/options.h"
+
+namespace loopbench::harness {
+namespace {
+
+constexpr std::int64_t kMaxSteps = 1'000'000'000'000;  // no run gets there
+
+void ReadLimits(const JsonNode& root, Limits* limits) {
+  const auto node = root.Optional("limits");
+  if (!node || !node->ExpectObject({"wall_s", "steps", "memory_mb"})) return;
+  if (const auto wall = node->Optional("wall_s")) limits->wall_s = wall->Number(kPositive);
+  if (const auto steps = node->Optional("steps")) {
+    limits->steps = steps->Integer(1, kMaxSteps);
+  }
+  if (const auto memory = node->Optional("memory_mb")) {
+    limits->memory_mb = memory->Number(kPositive);
+  }
+}
+
+TimingFamily ReadFamily(const JsonNode& node) {
+  static const NameList kFamilies = {"chain", "ladder"};
+  constexpr int kLargest = 1'000'000;
+  TimingFamily family;
+  if (!node.ExpectObject({"family", "sizes", "columns"})) return family;
+  if (const auto name = node.Required("family", "a family")) {
+    const auto index = name->Choice(kFamilies, "a family");
+    if (index) family.family = kFamilies.all()[static_cast<std::size_t>(*index)];
+  }
+  if (const auto sizes = node.Required("sizes", "a list of integers")) {
+    // the smallest closed chain has three bars
+    const int smallest = family.family == "chain" ? 3 : 1;
+    for (const std::int64_t size : sizes->IntegerList(smallest, kLargest)) {
+      family.sizes.push_back(static_cast<int>(size));
+    }
+  }
+  if (const auto columns = node.Required("columns", "an array of columns")) {
+    family.columns = ReadColumns(*columns);
+  }
+  return family;
+}
+
+void ReadTiming(const JsonNode& root, Timing* timing) {
+  const auto node = root.Optional("timing");
+  if (!node || !node->ExpectObject({"repeats", "tolerance", "horizon", "columns", "families"})) {
+    return;
+  }
+  if (const auto repeats = node->Optional("repeats")) {
+    timing->repeats = static_cast<int>(repeats->Integer(0, kMaxCount));
+  }
+  if (const auto tolerance = node->Optional("tolerance")) {
+    timing->tolerance = tolerance->Number(kTolerances);
+  }
+  if (const auto horizon = node->Optional("horizon")) timing->horizon = horizon->Number(kPositive);
+  if (const auto columns = node->Optional("columns")) timing->columns = ReadColumns(*columns);
+  if (const auto families = node->Optional("families")) {
+    for (const JsonNode& family : families->Elements("families")) {
+      timing->families.push_back(ReadFamily(family));
+    }
+  }
+}
+
+}  // namespace
+
+void ReadSettings(const JsonNode& root, Experiment* experiment) {
+  if (const auto name = root.Optional("integrator")) {
+    const std::vector<std::string> profiles = ProfileNames();
+    const auto index = name->Choice(profiles, "an integrator profile");
+    if (index) experiment->integrator = profiles[static_cast<std::size_t>(*index)];
+  }
+  ReadLimits(root, &experiment->limits);
+  const auto series = root.Optional("series");
+  if (series && series->ExpectObject({"points"})) {
+    if (const auto points = series->Optional("points")) {
+      experiment->series_points = static_cast<int>(points->Integer(2, kMaxCount));
+    }
+  }
+  ReadTiming(root, &experiment->timing);
+}
+
+}  // namespace loopbench::harness

@@ -1,0 +1,257 @@
+#include "harness/config/experiment_sweep.h"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <cmath>
+#include <set>
+
+#include "harness/config/experiment_reader.h"
+
+namespace loopbench::harness {
+namespace {
+
+constexpr std::size_t kMaxAxes = 100;
+
+/// Letters, digits, "_" and "-", a letter first: a name can stand in --filter key=value. Dots are
+/// for the nested values of records.
+bool IsName(const std::string& text) {
+  const auto letter = [](char c) { return (c >= 'a' && c <= 'z') || (c >= 'A' && c <= 'Z'); };
+  return !text.empty() && letter(text.front()) && std::ranges::all_of(text, [&](char c) {
+    return letter(c) || (c >= '0' && c <= '9') || c == '_' || c == '-';
+  });
+}
+
+std::string Compact(const Json& value) {
+  return value.dump(-1, ' ', false, Json::error_handler_t::replace);
+}
+
+/// Integers only where all values are: a column of a table has one type.
+std::vector<Value> AsParameters(const std::vector<Json>& values) {
+  constexpr double kLargestExact = 9007199254740992.0;  // 2^53
+  const bool integers = std::ranges::all_of(values, [](const Json& value) {
+    return value.is_number() && std::trunc(value.get<double>()) == value.get<double>() &&
+           std::abs(value.get<double>()) <= kLargestExact;
+  });
+  std::vector<Value> parameters;
+  for (const Json& value : values) {
+    if (integers) {
+      parameters.emplace_back(static_cast<std::int64_t>(value.get<double>()));
+    } else if (value.is_number()) {
+      parameters.emplace_back(value.get<double>());
+    } else if (value.is_boolean()) {
+      parameters.emplace_back(value.get<bool>());
+    } else {
+      parameters.emplace_back(value.is_string() ? value.get<std::string>() : Compact(value));
+    }
+  }
+  return parameters;
+}
+
+std::vector<Json> ReadValues(const JsonNode& node) {
+  std::vector<Json> values;
+  if (node.value().is_object()) {
+    for (const double number : node.Spaced()) values.emplace_back(number);
+    return values;
+  }
+  if (!node.value().is_array() || node.value().empty()) {
+    node.Fail("an array of values or a range: {\"lin\" or \"log\": [from, to, count]}");
+    return values;
+  }
+  return {node.value().begin(), node.value().end()};
+}
+
+/// The name of an axis, which becomes a key of records.
+std::string ReadAxisName(const JsonNode& axis, std::set<std::string>* taken) {
+  const auto node = axis.Required("name", "a name for tables and filters");
+  if (!node) return "";
+  const std::string name = node->Text();
+  if (name.empty()) return name;
+  if (!IsName(name)) {
+    node->Fail("a name of letters, digits, \"_\" and \"-\" that begins with a letter");
+  } else if (IsRecordKey(name)) {
+    node->Fail("a name that records do not use already");
+  } else if (!taken->insert(name).second) {
+    node->Fail("a name that no other axis has");
+  }
+  return name;
+}
+
+void ReadField(const JsonNode& axis, ExperimentFields& fields, SweepAxis* result) {
+  const auto node = axis.Required("field", "a JSON Pointer such as /scenes/0/horizon");
+  if (!node) return;
+  const std::string pointer = node->Text();
+  if (pointer.empty()) return;
+  for (const char* own : {"/sweep", "/exclude"}) {
+    if (pointer == own || pointer.starts_with(std::string(own) + "/")) {
+      node->Fail("a field outside of \"sweep\" and \"exclude\"");
+      return;
+    }
+  }
+  result->fields = fields.Find(pointer);
+  if (!result->fields.fault) return;
+  const FieldFault& fault = *result->fields.fault;
+  if (!fault.of_file) node->FailAs(fault.found, fault.expected, fault.suggestion);
+}
+
+SweepAxis ReadAxis(const JsonNode& node, ExperimentFields& fields, std::set<std::string>* taken) {
+  SweepAxis axis;
+  axis.source = node.pointer();
+  if (!node.ExpectObject({"name", "field", "values"})) return axis;
+  axis.name = ReadAxisName(node, taken);
+  ReadField(node, fields, &axis);
+  if (const auto values = node.Required("values", "an array of values or a range")) {
+    axis.values = ReadValues(*values);
+    axis.parameters = AsParameters(axis.values);
+  }
+  return axis;
+}
+
+/// The same combination twice would be the same cases twice.
+void CheckDistinct(const JsonNode& node, const SweepGroup& group) {
+  std::set<std::string> known;
+  for (std::size_t i = 0; i < group.count(); ++i) {
+    std::string all;
+    for (const SweepAxis& axis : group.axes) all += Compact(Json(Compact(axis.values[i])));
+    if (known.insert(all).second) continue;
+    const std::string values = group.axes.size() == 1 ? Compact(group.axes.front().values[i])
+                                                      : fmt::format("the values number {}", i);
+    node.FailAs(values.substr(0, 60) + " again", "each value once");
+  }
+}
+
+SweepGroup ReadGroup(const JsonNode& node, ExperimentFields& fields, std::set<std::string>* taken) {
+  SweepGroup group;
+  if (!node.value().is_object() || !node.value().contains("zip")) {
+    group.axes.push_back(ReadAxis(node, fields, taken));
+  } else if (node.ExpectObject({"zip"})) {
+    const JsonNode zip = *node.Optional("zip");
+    const std::vector<JsonNode> elements = zip.Elements("axes");
+    if (zip.value().is_array() && elements.size() < 2)
+      zip.FailAs(elements.empty() ? "no axes" : "one axis", "at least two axes");
+    for (const JsonNode& element : elements) {
+      group.axes.push_back(ReadAxis(element, fields, taken));
+      const SweepAxis& first = group.axes.front();
+      const std::size_t count = group.axes.back().values.size();
+      if (count == 0 || first.values.empty() || count == first.values.size()) continue;
+      element.FailAs(fmt::format("{} values", count),
+                     fmt::format("{}, as many as \"{}\" has", first.values.size(), first.name));
+    }
+  }
+  return group;
+}
+
+}  // namespace
+
+Sweep::Sweep(const JsonNode& root, ExperimentFields& fields,
+             const std::vector<std::string>& settings) {
+  const auto node = root.Optional("sweep");
+  if (!node) return;
+  Read(*node, fields, settings);
+  sound_ = sound_ && node->errors().empty();
+}
+
+void Sweep::Read(const JsonNode& node, ExperimentFields& fields,
+                 const std::vector<std::string>& settings) {
+  const std::vector<JsonNode> elements = node.Elements("axes");
+  if (elements.size() > kMaxAxes) node.Fail(fmt::format("at most {} axes", kMaxAxes));
+  if (elements.size() > kMaxAxes || node.errors().full()) return;
+  std::set<std::string> taken;
+  for (const JsonNode& element : elements) {
+    SweepGroup group = ReadGroup(element, fields, &taken);
+    const bool same = !group.axes.empty() && std::ranges::all_of(group.axes, [&](const auto& axis) {
+      return !axis.values.empty() && axis.values.size() == group.count();
+    });
+    sound_ = sound_ && same && std::ranges::none_of(group.axes, [](const auto& axis) {
+               return axis.fields.fault.has_value();
+             });
+    if (same) CheckDistinct(element, group);
+    if (same) groups_.push_back(std::move(group));
+  }
+  if (!sound_) return;
+  CheckOverlaps(node, settings);
+  double combinations = 1.0;
+  for (const SweepGroup& group : groups_) combinations *= static_cast<double>(group.count());
+  if (combinations > static_cast<double>(kMaxCombinations)) {
+    node.FailAs(fmt::format("{:.0f} combinations", combinations),
+                fmt::format("at most {}", kMaxCombinations));
+    return;
+  }
+  count_ = static_cast<std::size_t>(combinations);
+}
+
+void Sweep::CheckOverlaps(const JsonNode& node, const std::vector<std::string>& settings) const {
+  // with a "/" at the end a pointer sorts directly before those inside it
+  std::vector<std::pair<std::string, std::string>> set, given;
+  for (const SweepGroup& group : groups_) {
+    for (const SweepAxis& axis : group.axes) {
+      for (const std::string& pointer : axis.fields.pointers)
+        set.emplace_back(pointer + "/", axis.name);
+    }
+  }
+  std::ranges::sort(set);
+  for (std::size_t i = 1; i < set.size(); ++i) {
+    const auto& [outer, first] = set[i - 1];
+    const auto& [inner, second] = set[i];
+    if (!inner.starts_with(outer)) continue;
+    node.FailAs(fmt::format("\"{}\" and \"{}\" both setting {}", first, second,
+                            inner.substr(0, inner.size() - 1)),
+                "each field on one axis");
+    return;
+  }
+  for (const std::string& setting : settings) {
+    const std::string pointer = setting + "/";
+    for (const auto& [field, name] : set) {
+      if (!pointer.starts_with(field)) continue;
+      node.FailAs(fmt::format("--set {}, which axis \"{}\" sets again", setting, name),
+                  "--set for fields that are not swept (or for the values of the axis)");
+      return;
+    }
+  }
+}
+
+std::vector<std::size_t> Sweep::Indices(std::size_t combination) const {
+  std::vector<std::size_t> indices(groups_.size());
+  for (std::size_t i = groups_.size(); i-- > 0;) {
+    indices[i] = combination % groups_[i].count();
+    combination /= groups_[i].count();
+  }
+  return indices;
+}
+
+void Sweep::Apply(std::size_t combination, ExperimentFields& fields) const {
+  const std::vector<std::size_t> indices = Indices(combination);
+  for (std::size_t i = 0; i < groups_.size(); ++i) {
+    for (const SweepAxis& axis : groups_[i].axes) {
+      for (const std::string& pointer : axis.fields.pointers) {
+        fields.Set(pointer, axis.values[indices[i]]);
+      }
+    }
+  }
+}
+
+Record Sweep::Parameters(std::size_t combination) const {
+  Record parameters;
+  const std::vector<std::size_t> indices = Indices(combination);
+  for (std::size_t i = 0; i < groups_.size(); ++i) {
+    for (const SweepAxis& axis : groups_[i].axes) {
+      parameters.Set(axis.name, axis.parameters[indices[i]]);
+    }
+  }
+  return parameters;
+}
+
+void Sweep::Note(Origins* origins) const {
+  // two axes may have made one object: each field's own note comes after those of what holds it
+  for (const bool whole : {true, false}) {
+    for (const SweepGroup& group : groups_) {
+      for (const SweepAxis& axis : group.axes) {
+        for (const std::string& pointer : whole ? axis.fields.made : axis.fields.pointers) {
+          origins->Note(pointer, fmt::format("a value of axis \"{}\"", axis.name), axis.source);
+        }
+      }
+    }
+  }
+}
+
+}  // namespace loopbench::harness

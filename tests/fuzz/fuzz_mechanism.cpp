@@ -1,0 +1,10 @@
+// libFuzzer target of the mechanism reader (tests/fuzz/README.md).
+#include <cstddef>
+#include <cstdint>
+
+#include "tests/fuzz/readers.h"
+
+extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size) {
+  loopbench::fuzz::CallMechanismReader({reinterpret_cast<const char*>(data), size});
+  return 0;
+}

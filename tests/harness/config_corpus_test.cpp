@@ -1,0 +1,179 @@
+// Every broken file of tests/broken against the exact message beside it (tests/broken/README.md).
+#include <gtest/gtest.h>
+
+#include <algorithm>
+#include <chrono>
+#include <cstdlib>
+#include <filesystem>
+#include <fstream>
+#include <sstream>
+#include <string>
+#include <vector>
+
+#include "harness/config/config_error.h"
+#include "harness/config/experiment_reader.h"
+#include "harness/config/mechanism_reader.h"
+
+namespace loopbench::harness {
+namespace {
+
+namespace fs = std::filesystem;
+
+const fs::path kRoot = LOOPBENCH_SOURCE_DIR;
+const fs::path kBroken = kRoot / "tests/broken";
+
+std::vector<fs::path> BrokenFiles(const std::string& kind) {
+  std::vector<fs::path> files;
+  for (const auto& entry : fs::directory_iterator(kBroken / kind)) {
+    if (entry.path().extension() == ".json") files.push_back(entry.path());
+  }
+  std::sort(files.begin(), files.end());
+  return files;
+}
+
+std::string ReadAll(const fs::path& path) {
+  std::ifstream stream(path, std::ios::binary);
+  std::ostringstream text;
+  text << stream.rdbuf();
+  return text.str();
+}
+
+/// The reader's message, file names as seen from tests/broken; "" when the file is accepted.
+template <class Read>
+std::string MessageOf(Read read) {
+  std::string message;
+  try {
+    read();
+  } catch (const ConfigError& error) {
+    message = error.what();
+  }
+  for (const std::string& folder : {kBroken.string() + "/", kRoot.string() + "/"}) {
+    for (std::size_t at = message.find(folder); at != std::string::npos;
+         at = message.find(folder, at)) {
+      message.erase(at, folder.size());
+    }
+  }
+  return message;
+}
+
+std::string MessageOf(const fs::path& path) {
+  return MessageOf([&path] {
+    if (path.parent_path().filename() == "mechanisms") {
+      ReadMechanism(path);
+    } else {
+      ReadExperiments(path);
+    }
+  });
+}
+
+class Corpus : public testing::TestWithParam<std::string> {};
+
+TEST_P(Corpus, IsRefusedWithTheExpectedMessages) {
+  const std::vector<fs::path> files = BrokenFiles(GetParam());
+  // with LOOPBENCH_RENEW_EXPECTED set the messages are written, to be read before they are
+  // committed
+  const bool renew = std::getenv("LOOPBENCH_RENEW_EXPECTED") != nullptr;
+  for (const fs::path& file : files) {
+    const std::string message = MessageOf(file);
+    EXPECT_NE(message, "") << file << " is accepted";
+    fs::path beside = file;
+    beside.replace_extension(".expected");
+    if (renew && !message.empty()) std::ofstream(beside, std::ios::binary) << message << '\n';
+    EXPECT_EQ(message + '\n', ReadAll(beside)) << file;
+  }
+}
+
+INSTANTIATE_TEST_SUITE_P(Kinds, Corpus, testing::Values("mechanisms", "experiments"),
+                         [](const auto& kind) { return kind.param; });
+
+TEST(CorpusSize, IsAtLeastAHundredFilesAndNoMessageIsLeftOver) {
+  std::size_t json = 0;
+  for (const char* kind : {"mechanisms", "experiments"}) {
+    json += BrokenFiles(kind).size();
+    for (const auto& entry : fs::directory_iterator(kBroken / kind)) {
+      fs::path file = entry.path();
+      EXPECT_TRUE(fs::exists(file.replace_extension(".json"))) << entry.path();
+    }
+  }
+  EXPECT_GE(json, 100u);
+}
+
+std::string MechanismMessage(const std::string& text) {
+  return MessageOf([&text] { ParseMechanism(text, "m.json"); });
+}
+
+std::string Repeated(const std::string& piece, std::size_t count) {
+  std::string text;
+  text.reserve(piece.size() * count);
+  for (std::size_t i = 0; i < count; ++i) text += piece;
+  return text;
+}
+
+TEST(HugeInput, HundredMegabytesAreRefusedBeforeTheyAreRead) {
+  const fs::path path = fs::path(testing::TempDir()) / "loopbench-huge.json";
+  std::ofstream(path, std::ios::binary).put(' ');
+  fs::resize_file(path, 100u << 20);  // sparse: takes no room
+  EXPECT_EQ(MessageOf([&path] { ReadMechanism(path); }),
+            path.string() + ": cannot be read: it is larger than 16 MiB");
+  EXPECT_EQ(MessageOf([&path] { ReadExperiments(path); }),
+            path.string() + ": cannot be read: it is larger than 16 MiB");
+  fs::remove(path);
+}
+
+TEST(HugeInput, DeepNestingIsRefusedWhereItBecomesTooDeep) {
+  const std::string arrays = MechanismMessage(Repeated("[", 10'000'000));
+  EXPECT_EQ(arrays, "m.json:1: " + Repeated("/0", 64) +
+                        ": found nesting deeper than 64 levels, expected at most 64");
+  const std::string objects = MechanismMessage(Repeated("{\"a\":\n", 1'000'000));
+  EXPECT_EQ(objects, "m.json:65: " + Repeated("/a", 64) +
+                         ": found nesting deeper than 64 levels, expected at most 64");
+}
+
+// Work that grows with the square of the size would take hours on these; the time limit of the test
+// is what fails then.
+TEST(HugeInput, ManyMistakesAreCountedAndNotSearched) {
+  std::string keys = "{";
+  for (int i = 0; i < 400'000; ++i) keys += "\"key" + std::to_string(i) + "\": 0,\n";
+  const std::string message = MechanismMessage(keys + "\"name\": \"m\"}");
+  EXPECT_EQ(std::count(message.begin(), message.end(), '\n'), 100);
+  EXPECT_NE(message.find("m.json:1: /key0: found unknown key"), std::string::npos);
+  EXPECT_NE(message.find("\nm.json: and 3999"), std::string::npos)
+      << message.substr(message.size() - 80);
+  const std::string twice = MechanismMessage("{" + Repeated("\"a\": 0,\n", 400'000) + "\"a\": 0}");
+  EXPECT_NE(twice.find("m.json:2: /a: found key \"a\" twice"), std::string::npos);
+  EXPECT_NE(twice.find("and 399900 more"), std::string::npos);
+}
+
+TEST(HugeInput, ManyBodiesAndJointsAreReadInLinearTime) {
+  std::string bodies, joints, coordinates, held, independent;
+  constexpr int kCount = 40'000;
+  for (int i = 0; i < kCount; ++i) {
+    const std::string number = std::to_string(i), comma = i + 1 < kCount ? ",\n" : "";
+    bodies += R"({"name":"b)" + number + R"(","mass":1,"inertia":1})" + comma;
+    joints += R"({"name":"j)" + number +
+              R"(","type":"revolute","from":{"body":"ground"},"to":{"body":"b)" + number +
+              R"("}})" + comma;
+    coordinates += "\"j" + number + "\":0" + comma;
+    held += "\"j" + number + "\"" + comma;
+    independent += "\"b" + number + ".angle\"" + comma;
+  }
+  const std::string text = R"({"name": "m", "gravity": [0, 0], "bodies": [)" + bodies +
+                           R"(], "joints": [)" + joints + R"(], "initial": {"coordinates": {)" +
+                           coordinates + R"(}, "held": [)" + held + R"(]}, "independent": [)" +
+                           independent + "]}";
+  EXPECT_EQ(ParseMechanism(text, "m.json").description.initial.held.size(), std::size_t{kCount});
+}
+
+TEST(HugeInput, LongTokensAreCutInMessages) {
+  const std::string digits = MechanismMessage("{\"name\": 1" + Repeated("0", 1'000'000) + "}");
+  EXPECT_LT(digits.size(), 200u) << digits.substr(0, 200);
+  const std::string key = MechanismMessage("{\"" + Repeated("k", 1'000'000) + "\": 0}");
+  for (std::size_t at = 0; at < key.size();) {  // each line short, the pointer too
+    const std::size_t end = std::min(key.find('\n', at), key.size());
+    EXPECT_LT(end - at, 600u);
+    at = end + 1;
+  }
+}
+
+}  // namespace
+}  // namespace loopbench::harness

@@ -1,0 +1,150 @@
+// The JSON schemas (configs/schema, for editors) against the readers: the same verdict on every
+// shipped file and on every broken one whose fault a schema can see.
+#include <gtest/gtest.h>
+
+#include <algorithm>
+#include <cstdio>
+#include <filesystem>
+#include <map>
+#include <set>
+#include <sstream>
+#include <string>
+#include <vector>
+
+#include "harness/config/config_error.h"
+#include "harness/config/experiment_reader.h"
+#include "harness/config/mechanism_reader.h"
+
+namespace loopbench::harness {
+namespace {
+
+namespace fs = std::filesystem;
+
+const fs::path kRoot = LOOPBENCH_SOURCE_DIR;
+
+/// Broken files that the schemas accept, by the reason why a schema cannot see the fault.
+const std::map<std::string, std::set<std::string>> kBeyondSchemas = {
+    {"names are compared with names elsewhere in the file",
+     {"mechanisms/body-name-twice", "mechanisms/body-named-ground", "mechanisms/body-unknown",
+      "mechanisms/joint-name-twice", "mechanisms/joint-with-itself", "mechanisms/point-unknown",
+      "mechanisms/point-of-body-without", "mechanisms/observe-unknown-body",
+      "mechanisms/initial-unknown-joint", "mechanisms/held-without-value",
+      "mechanisms/independent-component", "mechanisms/independent-owner",
+      "mechanisms/point-force-on-ground", "experiments/ensemble-unknown-scene",
+      "experiments/ensemble-unused-tolerance", "experiments/scene-twice",
+      "experiments/exclude-unknown-key", "experiments/sweep-same-name"}},
+    {"what is right depends on the type of a joint or on the space",
+     {"mechanisms/axis-in-plane", "mechanisms/axis-on-weld", "mechanisms/force-on-weld",
+      "mechanisms/gravity-out-of-plane", "mechanisms/decimal-comma", "mechanisms/initial-of-weld",
+      "mechanisms/initial-two-values", "mechanisms/rotation-out-of-plane"}},
+    {"arithmetic over several numbers",
+     {"mechanisms/axis-zero", "mechanisms/inertia-indefinite", "experiments/range-ends-equal",
+      "experiments/range-log-signs", "experiments/family-range-rounded-twice",
+      "experiments/family-too-large", "experiments/cases-too-many", "experiments/sweep-too-many"}},
+    {"equal after expansion, or without effect",
+     {"experiments/column-twice", "experiments/ensemble-matches-nothing",
+      "experiments/exclude-everything", "experiments/exclude-matches-nothing",
+      "experiments/sweep-value-again", "experiments/sweep-same-field",
+      "experiments/sweep-zip-lengths"}},
+    {"names of record keys", {"experiments/sweep-name-taken"}},
+    {"a field is looked up, and its values are read, in the whole document",
+     {"experiments/sweep-field-into-number", "experiments/sweep-field-misspelt",
+      "experiments/sweep-field-unknown", "experiments/sweep-new-key", "experiments/sweep-new-point",
+      "experiments/sweep-value-refused"}},
+    {"the fault is in another file, or in its absence",
+     {"experiments/mechanism-broken", "experiments/mechanism-folder",
+      "experiments/mechanism-is-an-experiment", "experiments/mechanism-missing-file",
+      "experiments/mechanism-no-json", "experiments/repeated-broken-mechanism"}},
+    {"a number or character that the validator's own parser takes",
+     {"mechanisms/mass-huge", "mechanisms/number-overflow", "mechanisms/number-underflow",
+      "mechanisms/lone-surrogate"}}};
+
+std::vector<fs::path> JsonFilesIn(const fs::path& folder) {
+  std::vector<fs::path> files;
+  for (const auto& entry : fs::recursive_directory_iterator(folder)) {
+    if (entry.path().extension() == ".json" && entry.path().stem() != "claims") {
+      files.push_back(entry.path());
+    }
+  }
+  std::sort(files.begin(), files.end());
+  return files;
+}
+
+/// "valid", "invalid" or "no JSON" for each file.
+std::vector<std::string> SchemaVerdicts(const std::string& schema,
+                                        const std::vector<fs::path>& files) {
+  // Debian's interpreter: another one in the path need not have the module
+  std::string command = "/usr/bin/python3 -W ignore '" +
+                        (kRoot / "tests/harness/schema_verdicts.py").string() + "' '" +
+                        (kRoot / "configs/schema" / (schema + ".schema.json")).string() + "'";
+  for (const fs::path& file : files) command += " '" + file.string() + "'";
+  std::string output;
+  std::FILE* pipe = ::popen((command + " 2>&1").c_str(), "r");
+  if (pipe == nullptr) return {};
+  for (int c = std::fgetc(pipe); c != EOF; c = std::fgetc(pipe)) output += static_cast<char>(c);
+  EXPECT_EQ(::pclose(pipe), 0) << output;
+  std::vector<std::string> verdicts;
+  std::istringstream lines(output);
+  for (std::string line; std::getline(lines, line);) verdicts.push_back(line);
+  EXPECT_EQ(verdicts.size(), files.size()) << output;
+  verdicts.resize(files.size());
+  return verdicts;
+}
+
+bool ReaderAccepts(const std::string& schema, const fs::path& file) {
+  try {
+    if (schema == "mechanism") {
+      ReadMechanism(file);
+    } else {
+      ReadExperiments(file);
+    }
+    return true;
+  } catch (const ConfigError&) {
+    return false;
+  }
+}
+
+class Schema : public testing::TestWithParam<std::string> {};
+
+TEST_P(Schema, AcceptsWhatIsShippedAsTheReaderDoes) {
+  const std::vector<fs::path> files = JsonFilesIn(kRoot / "configs" / (GetParam() + "s"));
+  EXPECT_GE(files.size(), 4u);
+  const std::vector<std::string> verdicts = SchemaVerdicts(GetParam(), files);
+  for (std::size_t i = 0; i < files.size(); ++i) {
+    EXPECT_EQ(verdicts[i], "valid") << files[i];
+    EXPECT_TRUE(ReaderAccepts(GetParam(), files[i])) << files[i];
+  }
+}
+
+TEST_P(Schema, RefusesWhatTheReaderRefusesWhereItCanSeeTheFault) {
+  const std::vector<fs::path> files = JsonFilesIn(kRoot / "tests/broken" / (GetParam() + "s"));
+  const std::vector<std::string> verdicts = SchemaVerdicts(GetParam(), files);
+  std::size_t refused = 0;
+  for (std::size_t i = 0; i < files.size(); ++i) {
+    EXPECT_FALSE(ReaderAccepts(GetParam(), files[i])) << files[i];
+    const std::string name = GetParam() + "s/" + files[i].stem().string();
+    const bool beyond = std::any_of(kBeyondSchemas.begin(), kBeyondSchemas.end(),
+                                    [&name](const auto& one) { return one.second.contains(name); });
+    if (beyond) {
+      EXPECT_EQ(verdicts[i], "valid") << name << " need not be in the list of exceptions";
+    } else {
+      EXPECT_NE(verdicts[i], "valid") << name << " is accepted by the schema";
+    }
+    refused += verdicts[i] == "invalid" ? 1 : 0;
+  }
+  EXPECT_GE(refused, 30u);
+}
+
+INSTANTIATE_TEST_SUITE_P(Kinds, Schema, testing::Values("mechanism", "experiment"),
+                         [](const auto& kind) { return kind.param; });
+
+TEST(SchemaExceptions, AreFilesThatExist) {
+  for (const auto& [reason, names] : kBeyondSchemas) {
+    for (const std::string& name : names) {
+      EXPECT_TRUE(fs::exists(kRoot / "tests/broken" / (name + ".json"))) << name;
+    }
+  }
+}
+
+}  // namespace
+}  // namespace loopbench::harness

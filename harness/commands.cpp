@@ -32,15 +32,10 @@ int Run(const RunCommand& command, const std::string& typed) {
   {
     ResultStore store(out);
     const std::vector<Record> before = ReadRecords(out);
-    for (const Experiment& experiment : experiments) {
-      fmt::print(stderr, "{}: {} accuracy cases, {} timings\n", experiment.name,
-                 command.suite.accuracy ? SelectCases(experiment, command.suite.filter).size() : 0,
-                 command.suite.timing ? CountTimings(experiment) : 0);
-      const SuiteCount count = RunSuite(experiment, command.suite, before, store);
-      fmt::print(stderr, "{}: {} run now{}, {} were done before\n", experiment.name, count.run,
-                 count.failed > 0 ? fmt::format(" ({} not finished)", count.failed) : "",
-                 count.skipped);
-    }
+    const SuiteCount count = RunSuite(experiments, command.suite, before, store);
+    fmt::print(stderr, "{} run now{}, {} were done before\n", count.run,
+               count.failed > 0 ? fmt::format(" ({} not finished)", count.failed) : "",
+               count.skipped);
   }
   WriteTables(LoadRecords(out), out, typed);
   fmt::print("results in {}\n", out.string());

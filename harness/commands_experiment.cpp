@@ -4,7 +4,10 @@
 #include <algorithm>
 
 #include "harness/commands.h"
+#include "harness/config/benchmark_reader.h"
+#include "harness/config/claims_reader.h"
 #include "harness/config/config_error.h"
+#include "harness/config/file_kind.h"
 #include "harness/config/mechanism_reader.h"
 #include "harness/report/table.h"
 #include "harness/run_case.h"
@@ -104,10 +107,19 @@ int CheckFiles(const ExperimentFiles& files) {
   int exit_code = 0;
   for (const auto& path : files.paths) {
     try {
-      if (HoldsExperiment(path)) {
-        CheckExperiment(path, files.settings);
-      } else {
-        CheckMechanism(path, files.settings);
+      switch (KindOfFile(path)) {
+        case FileKind::kExperiment:
+          CheckExperiment(path, files.settings);
+          break;
+        case FileKind::kMechanism:
+          CheckMechanism(path, files.settings);
+          break;
+        case FileKind::kClaims:
+          fmt::print("{}: {} claims\n", path.string(), ReadClaims(path).size());
+          break;
+        case FileKind::kBenchmarks:
+          fmt::print("{}: {} groups of benchmarks\n", path.string(),
+                     ReadBenchmarks(path).groups.size());
       }
     } catch (const ConfigError& error) {
       fmt::print(stderr, "{}\n", error.what());

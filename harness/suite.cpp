@@ -32,6 +32,7 @@ struct Piece {
   std::function<std::vector<Record>()> work;
   ProcessLimits limits;
   std::string label;
+  double cost = 0.0;
 };
 
 /// Twice the time that the runs inside may take by themselves, and a little for starting.
@@ -47,7 +48,8 @@ Piece AccuracyPiece(const Experiment& experiment, const Case& one) {
   return {{keys},
           [&experiment, one] { return std::vector<Record>{RunCase(experiment, one)}; },
           {kPatience * runs * one.limits.wall_s + kGrace_s, one.limits.memory_mb},
-          fmt::format("{} {} {}", one.mechanism, ToString(one.column), one.rtol)};
+          fmt::format("{} {} {}", one.mechanism, ToString(one.column), one.rtol),
+          Cost(one)};
 }
 
 Piece TimingPiece(const Experiment& experiment, const TimingGroup& group) {
@@ -211,25 +213,29 @@ Shard ParseShard(const std::string& text) {
   return shard;
 }
 
-SuiteCount RunSuite(const Experiment& experiment, const SuiteOptions& options,
+SuiteCount RunSuite(const std::vector<Experiment>& experiments, const SuiteOptions& options,
                     const std::vector<Record>& records, ResultStore& store) {
   Runner runner(options, records, store);
   if (options.accuracy) {
-    const std::vector<Case> all = SelectCases(experiment, options.filter);
-    std::vector<Case> cases;
-    for (std::size_t i = 0; i < all.size(); ++i) {
-      if (options.shard.Takes(i)) cases.push_back(all[i]);
-    }
-    std::ranges::stable_sort(cases, std::greater<>(), Cost);
     std::vector<Piece> pieces;
-    for (const Case& one : cases) pieces.push_back(AccuracyPiece(experiment, one));
+    std::size_t number = 0;
+    for (const Experiment& experiment : experiments) {
+      for (const Case& one : SelectCases(experiment, options.filter)) {
+        if (options.shard.Takes(number++)) pieces.push_back(AccuracyPiece(experiment, one));
+      }
+    }
+    std::ranges::stable_sort(pieces, std::greater<>(), &Piece::cost);
     runner.Run("accuracy", std::move(pieces), options.jobs);
   }
   if (options.timing) {
-    const std::vector<TimingGroup> groups = TimingGroups(experiment);
+    std::vector<std::vector<TimingGroup>> groups;  // pieces refer to them
+    for (const Experiment& experiment : experiments) groups.push_back(TimingGroups(experiment));
     std::vector<Piece> pieces;
-    for (std::size_t i = 0; i < groups.size(); ++i) {
-      if (options.shard.Takes(i)) pieces.push_back(TimingPiece(experiment, groups[i]));
+    std::size_t number = 0;
+    for (std::size_t e = 0; e < experiments.size(); ++e) {
+      for (const TimingGroup& group : groups[e]) {
+        if (options.shard.Takes(number++)) pieces.push_back(TimingPiece(experiments[e], group));
+      }
     }
     runner.Run("timing", std::move(pieces), 1);
   }

@@ -217,10 +217,6 @@ std::vector<Experiment> ParseExperiments(std::string_view text, const std::files
   return reader.Read();
 }
 
-bool HoldsExperiment(const std::filesystem::path& path) {
-  return ReadTextFile(path).find("\"scenes\"") != std::string::npos;
-}
-
 Experiment ReadExperiment(const std::filesystem::path& path) {
   return ParseExperiment(ReadTextFile(path), path);
 }

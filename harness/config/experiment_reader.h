@@ -43,10 +43,6 @@ std::vector<Experiment> ReadExperiments(const std::filesystem::path& path,
 std::vector<Experiment> ParseExperiments(std::string_view text, const std::filesystem::path& path,
                                          const std::vector<Setting>& settings = {});
 
-/// Whether a file is about an experiment, as far as its text tells: an experiment has "scenes", a
-/// mechanism has not. Throws ConfigError when it cannot be read.
-bool HoldsExperiment(const std::filesystem::path& path);
-
 /// The experiment of a file without a sweep. Throws ConfigError for a sweep of several
 /// combinations.
 Experiment ReadExperiment(const std::filesystem::path& path);

@@ -152,9 +152,17 @@ void RequireKey(const std::string& option, const std::string& key, std::span<con
 
 std::vector<TableColumn> WithParameters(std::vector<TableColumn> columns,
                                         std::span<const Record> rows) {
+  std::vector<std::string> keys;
+  for (const Record& row : rows) {
+    // the keys of a case end at its id; what follows is its result
+    for (const auto& [key, value] : row.items()) {
+      if (key == "case_id" || key == "outcome") break;
+      if (std::ranges::find(keys, key) == keys.end()) keys.push_back(key);
+    }
+  }
   std::vector<TableColumn> parameters;
-  for (const std::string& key : KeysOf(rows)) {
-    if (FindKnown(key) == nullptr && !IsFamily(key)) parameters.push_back(ColumnOf(key, rows));
+  for (const std::string& key : keys) {
+    if (FindKnown(key) == nullptr) parameters.push_back(ColumnOf(key, rows));
   }
   const auto outcome = std::ranges::find(columns, "outcome", &TableColumn::key);
   columns.insert(outcome, parameters.begin(), parameters.end());

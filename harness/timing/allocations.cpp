@@ -2,6 +2,8 @@
 
 #include <atomic>
 #include <cstddef>
+#include <cstdlib>
+#include <stdexcept>
 
 namespace {
 
@@ -42,5 +44,17 @@ void* aligned_alloc(std::size_t alignment, std::size_t size) noexcept {
 namespace loopbench::harness {
 
 Allocations AllocationsSoFar() { return {count.load(), bytes.load()}; }
+
+void CheckAllocationsAreCounted() {
+  constexpr std::int64_t kBytes = 12'345;
+  const Allocations before = AllocationsSoFar();
+  delete[] new char[kBytes];
+  void* volatile kept = std::malloc(kBytes);  // nor may the compiler leave it out
+  std::free(kept);
+  const Allocations after = AllocationsSoFar();
+  if (after.count - before.count < 1 || after.bytes - before.bytes < kBytes) {
+    throw std::runtime_error("allocations are not counted in this build");
+  }
+}
 
 }  // namespace loopbench::harness

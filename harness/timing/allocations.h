@@ -12,4 +12,8 @@ struct Allocations {
 
 Allocations AllocationsSoFar();
 
+/// Allocates and looks whether it is counted: throws std::runtime_error when another malloc has
+/// taken the place of the counting one. A counter that sees nothing would report zero for ever.
+void CheckAllocationsAreCounted();
+
 }  // namespace loopbench::harness

@@ -271,6 +271,7 @@ int Main(int argc, char** argv) {
 
 int main(int argc, char** argv) {
   try {
+    CheckAllocationsAreCounted();
     return Main(argc, argv);
   } catch (const std::exception& error) {
     fmt::print(stderr, "{}\n", error.what());

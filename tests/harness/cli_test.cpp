@@ -112,6 +112,7 @@ TEST_F(CommandLineTest, ListShowsEveryCase) {
 
 TEST_F(CommandLineTest, CheckCountsWhatSoundFilesHold) {
   ExpectEnding(Call("check tiny.json four-bar.json"), 0, {"2 cases", "3 bodies, 4 joints"});
+  ExpectEnding(Call("check claims.json"), 0, {"claims.json: 1 claims"});
 }
 
 TEST_F(CommandLineTest, ResultsOfARunServeTablePlotAndVerdict) {

@@ -136,9 +136,14 @@ TEST(Factorial, RunsOfDifferentParametersAreNoPair) {
   for (const double mass : {1.0, 10.0}) {
     for (const char* coordinates : {"joint", "absolute"}) {
       const bool joint = coordinates == std::string("joint");
-      records.push_back(
-          RunOf("toggle", "odca", "acceleration", coordinates, (joint ? 1e-8 : 3e-8) * mass, 2));
-      records.back().Set("mass", mass);
+      Record record;
+      record.Set("mass", mass);  // keys of a case stand before its results
+      for (const auto& [key, value] :
+           RunOf("toggle", "odca", "acceleration", coordinates, (joint ? 1e-8 : 3e-8) * mass, 2)
+               .items()) {
+        record.Set(key, value);
+      }
+      records.push_back(record);
     }
   }
   const Record row = RowOf(FactorialTable(records), "coordinates", "absolute", "all");

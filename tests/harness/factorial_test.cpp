@@ -138,11 +138,9 @@ TEST(Factorial, RunsOfDifferentParametersAreNoPair) {
       const bool joint = coordinates == std::string("joint");
       Record record;
       record.Set("mass", mass);  // keys of a case stand before its results
-      for (const auto& [key, value] :
-           RunOf("toggle", "odca", "acceleration", coordinates, (joint ? 1e-8 : 3e-8) * mass, 2)
-               .items()) {
-        record.Set(key, value);
-      }
+      const Record run =
+          RunOf("toggle", "odca", "acceleration", coordinates, (joint ? 1e-8 : 3e-8) * mass, 2);
+      for (const auto& [key, value] : run.items()) record.Set(key, value);
       records.push_back(record);
     }
   }

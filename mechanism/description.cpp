@@ -120,6 +120,34 @@ std::string CheckValues(const MechanismDescription& description,
 
 }  // namespace
 
+std::string_view ToString(JointType type) {
+  switch (type) {
+    case JointType::kRevolute:
+      return "revolute";
+    case JointType::kPrismatic:
+      return "prismatic";
+    case JointType::kWeld:
+      return "weld";
+    case JointType::kFree:
+      return "free";
+    case JointType::kPinInSlot:
+      return "pin-in-slot";
+    case JointType::kCylindrical:
+      return "cylindrical";
+    case JointType::kSpherical:
+      return "spherical";
+    case JointType::kPlanar:
+      return "planar";
+    case JointType::kUniversal:
+      return "universal";
+  }
+  return "unknown";
+}
+
+std::string_view ToString(SpaceKind space) {
+  return space == SpaceKind::kPlanar ? "planar" : "spatial";
+}
+
 bool ExistsInPlane(JointType type) { return type <= JointType::kPinInSlot; }
 
 char OwnAxis(JointType type) {

@@ -17,10 +17,6 @@ namespace {
 
 constexpr std::string_view kAnglePrefix = "series.angle.";
 
-// Okabe and Ito's palette: told apart with any colour vision.
-constexpr std::array<const char*, 8> kPalette = {"#0072B2", "#D55E00", "#009E73", "#CC79A7",
-                                                 "#E69F00", "#56B4E9", "#000000", "#999933"};
-
 // Formulation and level share a colour family: the level of the paper in the strong colour.
 std::string ColorOf(const Record& record) {
   const bool velocity = record.Text("enforcement") == "velocity";
@@ -134,8 +130,7 @@ Figure AnglesFigure(const Record& record) {
     curve.label = key.substr(kAnglePrefix.size());
     curve.x = record.Numbers("series.t");
     curve.y = record.Numbers(key);
-    curve.style = {kPalette[index % kPalette.size()],
-                   1 + static_cast<int>(index / kPalette.size()) % 4, 2.0};
+    curve.style = DistinctStyle(index);
     curve.ends_early = Failed(record);
     figure.curves.push_back(std::move(curve));
   }

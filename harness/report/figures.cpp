@@ -232,6 +232,15 @@ class TemporaryFolder {
 
 }  // namespace
 
+CurveStyle DistinctStyle(std::size_t index) {
+  // Okabe and Ito's palette, and a green
+  constexpr std::array<const char*, 8> kPalette = {"#0072B2", "#D55E00", "#009E73", "#CC79A7",
+                                                   "#E69F00", "#56B4E9", "#000000", "#999933"};
+  constexpr int kDashes = 4;
+  const int round = static_cast<int>(index / kPalette.size());
+  return {kPalette[index % kPalette.size()], 1 + round % kDashes, 2.0};
+}
+
 std::string GnuplotScript(const Figure& figure) {
   std::vector<std::vector<Point>> points;
   Extent x;

@@ -16,6 +16,10 @@ struct CurveStyle {
   double width = 2.0;  ///< [px]
 };
 
+/// The style of the index-th curve of a figure: colours that colour-blind readers tell apart, then
+/// the same with other dashes.
+CurveStyle DistinctStyle(std::size_t index);
+
 /// Points joined by a line. `x` and `y` have the same length; points that are not finite, and on a
 /// logarithmic axis those that are not positive, are left out. A curve without points keeps its
 /// place in the legend.

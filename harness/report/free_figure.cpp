@@ -17,9 +17,6 @@
 namespace loopbench::harness {
 namespace {
 
-constexpr std::array<const char*, 7> kPalette = {"#0072B2", "#D55E00", "#009E73", "#CC79A7",
-                                                 "#E69F00", "#56B4E9", "#000000"};
-
 // What names a case, in the order of titles.
 constexpr std::array<const char*, 7> kCaseKeys = {
     "mechanism", "formulation", "enforcement", "coordinates", "solver", "rtol", "horizon"};
@@ -124,8 +121,7 @@ class Positions {
 Curve NewCurve(const std::string& label, std::size_t index) {
   Curve curve;
   curve.label = label;
-  curve.style = {kPalette[index % kPalette.size()],
-                 1 + static_cast<int>(index / kPalette.size()) % 4, 2.0};
+  curve.style = DistinctStyle(index);
   return curve;
 }
 

@@ -12,6 +12,9 @@ namespace loopbench::harness {
 /// parent folders are made. Throws std::runtime_error that names the path and the system's reason.
 void WriteFileAtomically(const std::filesystem::path& path, std::string_view text);
 
+/// Throws std::runtime_error: "cannot VERB 'PATH': " and what errno says.
+[[noreturn]] void FailOn(std::string_view verb, const std::filesystem::path& path);
+
 /// The bytes of `path`. Throws std::runtime_error that names the path and the system's reason.
 std::string ReadFile(const std::filesystem::path& path);
 

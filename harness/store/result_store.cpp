@@ -19,17 +19,12 @@ std::filesystem::path FileOf(const std::filesystem::path& path) {
   return path.extension() == ".jsonl" ? path : path / "results.jsonl";
 }
 
-[[noreturn]] void Fail(std::string_view verb, const std::filesystem::path& file) {
-  throw std::runtime_error(
-      fmt::format("cannot {} '{}': {}", verb, file.string(), std::strerror(errno)));
-}
-
 // Locks of POSIX belong to the process: children do not inherit them, and they end with it.
 int Lock(const std::filesystem::path& file) {
   const std::filesystem::path path = file.string() + ".lock";
   constexpr int kMode = 0644;
   const int lock = ::open(path.c_str(), O_RDWR | O_CREAT | O_CLOEXEC, kMode);
-  if (lock < 0) Fail("open", path);
+  if (lock < 0) FailOn("open", path);
   struct flock whole = {};
   whole.l_type = F_WRLCK;
   whole.l_whence = SEEK_SET;
@@ -40,7 +35,7 @@ int Lock(const std::filesystem::path& file) {
   ::close(lock);
   if (reason != EACCES && reason != EAGAIN) {
     errno = reason;
-    Fail("lock", path);
+    FailOn("lock", path);
   }
   throw std::runtime_error(
       fmt::format("'{}' is in use by process {}; wait for it, or write to another --out",
@@ -52,7 +47,7 @@ void WriteAll(int descriptor, std::string_view text, const std::filesystem::path
   while (!text.empty()) {
     const ssize_t written = ::write(descriptor, text.data(), text.size());
     if (written < 0 && errno == EINTR) continue;
-    if (written < 0) Fail("append to", file);
+    if (written < 0) FailOn("append to", file);
     text.remove_prefix(static_cast<std::size_t>(written));
   }
 }
@@ -84,7 +79,7 @@ void MendLastLine(const std::filesystem::path& file, int descriptor) {
   if (IsRecord(std::string_view(text).substr(start))) {
     WriteAll(descriptor, "\n", file);
   } else if (::ftruncate(descriptor, static_cast<off_t>(start)) != 0) {
-    Fail("mend the last line of", file);
+    FailOn("mend the last line of", file);
   }
 }
 
@@ -97,7 +92,7 @@ ResultStore::ResultStore(const std::filesystem::path& path) : file_(FileOf(path)
   constexpr int kMode = 0644;
   descriptor_ = ::open(file_.c_str(), O_WRONLY | O_APPEND | O_CREAT | O_CLOEXEC, kMode);
   try {
-    if (descriptor_ < 0) Fail("open", file_);
+    if (descriptor_ < 0) FailOn("open", file_);
     MendLastLine(file_, descriptor_);
     SyncFolder(file_);
   } catch (...) {
@@ -118,7 +113,7 @@ void ResultStore::Append(const Record& record) {
   const off_t before = ::lseek(descriptor_, 0, SEEK_END);
   try {
     WriteAll(descriptor_, line, file_);
-    if (::fsync(descriptor_) != 0) Fail("write to the disk", file_);
+    if (::fsync(descriptor_) != 0) FailOn("write to the disk", file_);
   } catch (...) {
     // what cannot be kept whole is not kept: the next run finds complete records only
     [[maybe_unused]] const int failed = ::ftruncate(descriptor_, before);

@@ -45,9 +45,10 @@ struct SuiteCount {
   std::size_t failed = 0;   ///< of those made now: any outcome but "finished"
 };
 
-/// Runs the accuracy cases of all experiments, costliest first, then their timings, appending each record to the store as it is
-/// complete. A case is done when the store has a record with its id, which stands for everything
-/// that decides the run and for this very program; `records` is what the store has. Shows progress.
+/// Runs the accuracy cases of all experiments, costliest first, then their timings, appending each
+/// record to the store as it is complete. A case is done when the store has a record with its id,
+/// which stands for everything that decides the run and for this very program; `records` is what
+/// the store has. Shows progress.
 ///
 /// Whatever a case does, it gets a record: outcomes "crashed", "process-time-limit", "memory-limit"
 /// and "bad-answer" are those of its process.

@@ -67,10 +67,6 @@ std::string CheckJoint(const MechanismDescription& description, const JointDescr
   return description.space == SpaceKind::kPlanar ? CheckPlanarJoint(joint) : "";
 }
 
-bool HasOneCoordinate(JointType type) {
-  return type == JointType::kRevolute || type == JointType::kPrismatic;
-}
-
 std::string CheckForce(const MechanismDescription& description, const ForceDescription& force) {
   return std::visit(
       [&](const auto& f) -> std::string {
@@ -79,7 +75,7 @@ std::string CheckForce(const MechanismDescription& description, const ForceDescr
             return "force on joint index " + std::to_string(f.joint) + ", which does not exist";
           }
           const JointDescription& joint = description.joints[f.joint];
-          if (!HasOneCoordinate(joint.type)) {
+          if (NumValues(joint.type, description.space, true) != 1) {
             return "force on joint " + Quote(joint.name) +
                    ": only joints with one coordinate carry a joint force";
           }

@@ -1,6 +1,7 @@
 // "initial", "independent" and "observe" of a mechanism file.
 #include <fmt/format.h>
 
+#include <algorithm>
 #include <set>
 
 #include "harness/config/mechanism_sections.h"
@@ -29,15 +30,12 @@ std::vector<double> ReadJointNumbers(const JsonNode& node, const JointDescriptio
 
 /// Quaternions are normalised where they are used, so their length is free, but not zero.
 void CheckQuaternion(const JsonNode& node, const std::vector<double>& values) {
-  constexpr std::size_t kSpatialFree = 7;
-  const bool zero = values.size() == kSpatialFree && values[0] == 0.0 && values[1] == 0.0 &&
-                    values[2] == 0.0 && values[3] == 0.0;
-  if (zero) node.Fail("a quaternion qw, qx, qy, qz that is not zero");
+  const auto zeros = std::count(values.begin(), std::min(values.begin() + 4, values.end()), 0.0);
+  if (zeros == 4) node.Fail("a quaternion qw, qx, qy, qz that is not zero");
 }
 
-template <class Count>
 std::vector<JointValues> ReadJointValues(const JsonNode& initial, const std::string& key,
-                                         const Draft& draft, Count count) {
+                                         const Draft& draft, bool speeds) {
   std::vector<JointValues> result;
   const auto section = initial.Optional(key);
   if (!section) return result;
@@ -46,9 +44,10 @@ std::vector<JointValues> ReadJointValues(const JsonNode& initial, const std::str
     const auto joint = draft.joint_names.Find(name);
     if (!joint) continue;
     const JointDescription& described = draft.joints[static_cast<std::size_t>(*joint)];
-    const int expected = count(described.type, draft.space);
+    const int expected = NumValues(described.type, draft.space, speeds);
     result.push_back({*joint, ReadJointNumbers(node, described, expected)});
-    if (key == "coordinates") CheckQuaternion(node, result.back().values);
+    const bool quaternion = expected > NumValues(described.type, draft.space, true);
+    if (quaternion) CheckQuaternion(node, result.back().values);
   }
   return result;
 }
@@ -65,7 +64,7 @@ SpeedNames NamesOfSpeeds(const Draft& draft) {
     names.owners.Add(draft.bodies[i].name);
   }
   for (const JointDescription& joint : draft.joints) {
-    const int count = SpeedCount(joint.type, draft.space);
+    const int count = NumValues(joint.type, draft.space, true);
     if (count == 1) names.joints.Add(joint.name);
     if (count > 1) names.owners.Add(joint.name);
   }
@@ -87,7 +86,7 @@ void CheckIndependentName(const JsonNode& node, const std::string& name, const S
               NearestSpelling(name, names.joints.all()));
   } else if (!names.owners.Find(owner)) {
     const std::string nearest = NearestSpelling(owner, names.owners.all());
-    node.Fail("a speed of a body or free joint", nearest.empty() ? "" : nearest + "." + component);
+    node.Fail("a speed of a body or of a joint with several", nearest.empty() ? "" : nearest + "." + component);
   } else {
     const std::string nearest = NearestSpelling(component, kComponents.all());
     node.Fail(fmt::format("one of the components {}", fmt::join(kComponents.all(), ", ")),
@@ -130,8 +129,8 @@ void ReadInitial(const JsonNode& root, Draft* draft) {
   const auto node = root.Optional("initial");
   if (!node || !node->ExpectObject({"coordinates", "speeds", "held"})) return;
   InitialDescription& initial = draft->initial;
-  initial.coordinates = ReadJointValues(*node, "coordinates", *draft, CoordinateCount);
-  initial.speeds = ReadJointValues(*node, "speeds", *draft, SpeedCount);
+  initial.coordinates = ReadJointValues(*node, "coordinates", *draft, false);
+  initial.speeds = ReadJointValues(*node, "speeds", *draft, true);
   const auto held = node->Optional("held");
   if (!held) return;
   std::set<int> given, known;

@@ -86,7 +86,7 @@ int ReadForceJoint(const JsonNode& force, const Draft& draft) {
   const auto joint = ReadJointName(*node, draft);
   if (!joint) return 0;
   const JointDescription& found = draft.joints[*joint];
-  if (SpeedCount(found.type, draft.space) != 1) {
+  if (NumValues(found.type, draft.space, true) != 1) {
     node->FailAs(fmt::format("\"{}\" ({})", found.name, ToString(found.type)),
                  "a joint with one coordinate (revolute or prismatic)");
   }
@@ -156,10 +156,6 @@ const NameList& JointTypeNames() {
   }();
   return kNames;
 }
-
-int CoordinateCount(JointType type, SpaceKind space) { return NumValues(type, space, false); }
-
-int SpeedCount(JointType type, SpaceKind space) { return NumValues(type, space, true); }
 
 void ReadJoints(const JsonNode& root, Draft* draft) {
   const auto joints = root.Required("joints", "an array of joints");

@@ -52,9 +52,5 @@ std::string ReadNewName(const JsonNode& owner, const NameList& taken);
 
 /// Names of joint types in files, by value of JointType.
 const NameList& JointTypeNames();
-/// Numbers of coordinates and speeds of a joint (mechanism/joint.h): revolute and prismatic 1, weld
-/// 0, free 3 and 3 in the plane [angle, x, y], 7 and 6 in space [qw, qx, qy, qz, x, y, z].
-int CoordinateCount(JointType type, SpaceKind space);
-int SpeedCount(JointType type, SpaceKind space);
 
 }  // namespace loopbench::harness

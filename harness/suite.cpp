@@ -58,7 +58,9 @@ Piece TimingPiece(const Experiment& experiment, const TimingGroup& group) {
     Record keys = TimingKeys(experiment, group, i);
     const std::string document =
         group.simulate ? experiment.scenes[group.cases[i].scene].mechanism.canonical : "";
-    keys.Set("id", Id(fmt::format("{} {} {}", CaseId(keys), experiment.timing.repeats, document)));
+    const Limits& limits = experiment.limits;
+    keys.Set("id", Id(fmt::format("{} {} {} {} {} {}", CaseId(keys), experiment.timing.repeats,
+                                  limits.wall_s, limits.steps, limits.memory_mb, document)));
     piece.owed.push_back(keys);
   }
   // the first column is timed twice (noise.h)

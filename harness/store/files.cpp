@@ -1,5 +1,6 @@
 #include "harness/store/files.h"
 
+#include <fcntl.h>
 #include <fmt/format.h>
 #include <unistd.h>
 
@@ -32,20 +33,41 @@ void WriteFileAtomically(const std::filesystem::path& path, std::string_view tex
   std::error_code error;
   if (path.has_parent_path()) std::filesystem::create_directories(path.parent_path(), error);
   const std::filesystem::path temporary = TemporaryBeside(path);
-  errno = 0;
-  std::ofstream out(temporary, std::ios::binary | std::ios::trunc);
-  if (!out) FailOn("write", path);
-  out.write(text.data(), static_cast<std::streamsize>(text.size()));
-  out.close();
-  if (!out) {
+  constexpr int kMode = 0644;
+  const int descriptor = ::open(temporary.c_str(), O_WRONLY | O_CREAT | O_TRUNC | O_CLOEXEC, kMode);
+  if (descriptor < 0) FailOn("write", path);
+  try {
+    WriteAll(descriptor, text, path);
+    if (::fsync(descriptor) != 0) FailOn("write", path);
+  } catch (...) {
+    ::close(descriptor);
     std::filesystem::remove(temporary, error);
-    FailOn("write", path);
+    throw;
   }
+  ::close(descriptor);
   std::filesystem::rename(temporary, path, error);
   if (error) {
     errno = error.value();
     std::filesystem::remove(temporary, error);
     FailOn("write", path);
+  }
+  SyncFolderOf(path);
+}
+
+void SyncFolderOf(const std::filesystem::path& path) {
+  const std::filesystem::path folder = path.has_parent_path() ? path.parent_path() : ".";
+  const int descriptor = ::open(folder.c_str(), O_RDONLY | O_DIRECTORY | O_CLOEXEC);
+  if (descriptor < 0) return;
+  ::fsync(descriptor);
+  ::close(descriptor);
+}
+
+void WriteAll(int descriptor, std::string_view text, const std::filesystem::path& path) {
+  while (!text.empty()) {
+    const ssize_t written = ::write(descriptor, text.data(), text.size());
+    if (written < 0 && errno == EINTR) continue;
+    if (written < 0) FailOn("write", path);
+    text.remove_prefix(static_cast<std::size_t>(written));
   }
 }
 

@@ -42,25 +42,6 @@ int Lock(const std::filesystem::path& file) {
                   file.string(), known ? std::to_string(whole.l_pid) : "?"));
 }
 
-// One write(2) in the usual case; more only if the system accepted a part or was interrupted.
-void WriteAll(int descriptor, std::string_view text, const std::filesystem::path& file) {
-  while (!text.empty()) {
-    const ssize_t written = ::write(descriptor, text.data(), text.size());
-    if (written < 0 && errno == EINTR) continue;
-    if (written < 0) FailOn("append to", file);
-    text.remove_prefix(static_cast<std::size_t>(written));
-  }
-}
-
-// The name of a new file is on the disk when its folder is.
-void SyncFolder(const std::filesystem::path& file) {
-  const std::filesystem::path folder = file.has_parent_path() ? file.parent_path() : ".";
-  const int descriptor = ::open(folder.c_str(), O_RDONLY | O_DIRECTORY | O_CLOEXEC);
-  if (descriptor < 0) return;
-  ::fsync(descriptor);
-  ::close(descriptor);
-}
-
 bool IsRecord(std::string_view line) {
   try {
     FromJsonLine(line);
@@ -94,7 +75,7 @@ ResultStore::ResultStore(const std::filesystem::path& path) : file_(FileOf(path)
   try {
     if (descriptor_ < 0) FailOn("open", file_);
     MendLastLine(file_, descriptor_);
-    SyncFolder(file_);
+    SyncFolderOf(file_);
   } catch (...) {
     if (descriptor_ >= 0) ::close(descriptor_);
     ::close(lock_);

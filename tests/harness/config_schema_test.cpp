@@ -11,9 +11,11 @@
 #include <string>
 #include <vector>
 
+#include "harness/config/benchmark_reader.h"
 #include "harness/config/config_error.h"
 #include "harness/config/experiment_reader.h"
 #include "harness/config/mechanism_reader.h"
+#include "harness/store/files.h"
 
 namespace loopbench::harness {
 namespace {
@@ -36,7 +38,9 @@ const std::map<std::string, std::set<std::string>> kBeyondSchemas = {
     {"what is right depends on the type of a joint or on the space",
      {"mechanisms/axis-in-plane", "mechanisms/axis-on-weld", "mechanisms/force-on-weld",
       "mechanisms/gravity-out-of-plane", "mechanisms/decimal-comma", "mechanisms/initial-of-weld",
-      "mechanisms/initial-two-values", "mechanisms/rotation-out-of-plane"}},
+      "mechanisms/spherical-in-plane", "mechanisms/spherical-quaternion-zero",
+      "mechanisms/spherical-three-angles", "mechanisms/initial-two-values",
+      "mechanisms/rotation-out-of-plane"}},
     {"arithmetic over several numbers",
      {"mechanisms/axis-zero", "mechanisms/inertia-indefinite", "experiments/range-ends-equal",
       "experiments/range-log-signs", "experiments/family-range-rounded-twice",
@@ -95,8 +99,10 @@ bool ReaderAccepts(const std::string& schema, const fs::path& file) {
   try {
     if (schema == "mechanism") {
       ReadMechanism(file);
-    } else {
+    } else if (schema == "experiment") {
       ReadExperiments(file);
+    } else {
+      ReadBenchmarks(file);
     }
     return true;
   } catch (const ConfigError&) {
@@ -137,6 +143,36 @@ TEST_P(Schema, RefusesWhatTheReaderRefusesWhereItCanSeeTheFault) {
 
 INSTANTIATE_TEST_SUITE_P(Kinds, Schema, testing::Values("mechanism", "experiment"),
                          [](const auto& kind) { return kind.param; });
+
+TEST(BenchmarksSchema, AgreesWithTheReader) {
+  const fs::path shipped = kRoot / "configs/benchmarks/counts.json";
+  const std::string sound = ReadFile(shipped);
+  const fs::path folder = fs::path(testing::TempDir()) / "loopbench-benchmarks-schema";
+  fs::remove_all(folder);
+  std::vector<fs::path> broken;
+  const auto add = [&](const std::string& from, const std::string& to) {
+    std::string text = sound;
+    const std::size_t place = text.find(from);
+    ASSERT_NE(place, std::string::npos) << from;
+    broken.push_back(folder / (std::to_string(broken.size()) + ".json"));
+    WriteFileAtomically(broken.back(), text.replace(place, from.size(), to));
+  };
+  add("\"groups\"", "\"group\"");
+  add("\"name\": \"", "\"names\": \"");
+  add("\"measure\": \"rhs\"", "\"measure\": \"lhs\"");
+  add("\"family\": \"chain\"", "\"family\": \"chian\"");
+  add("\"sizes\": [", "\"sizes\": [2.5, ");
+  add("\"formulation\": ", "\"formulations\": ");
+  const std::vector<fs::path> good = {shipped, kRoot / "configs/benchmarks/default.json"};
+  for (const std::string& verdict : SchemaVerdicts("benchmarks", good)) EXPECT_EQ(verdict, "valid");
+  for (const fs::path& file : good) EXPECT_TRUE(ReaderAccepts("benchmarks", file)) << file;
+  const std::vector<std::string> verdicts = SchemaVerdicts("benchmarks", broken);
+  for (std::size_t i = 0; i < broken.size(); ++i) {
+    EXPECT_EQ(verdicts[i], "invalid") << ReadFile(broken[i]);
+    EXPECT_FALSE(ReaderAccepts("benchmarks", broken[i])) << ReadFile(broken[i]);
+  }
+  fs::remove_all(folder);
+}
 
 TEST(SchemaExceptions, AreFilesThatExist) {
   for (const auto& [reason, names] : kBeyondSchemas) {

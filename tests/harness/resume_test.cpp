@@ -20,8 +20,7 @@ namespace {
 
 using Seconds = std::chrono::duration<double>;
 
-/// drift.csv without what a clock measured: the lines with the column wall_s blanked, no
-/// provenance.
+/// drift.csv without provenance; no column of it is measured by a clock.
 std::vector<std::string> TableOf(const fs::path& folder) {
   std::istringstream text(ReadFile(folder / "drift.csv"));
   std::vector<std::string> lines;
@@ -31,7 +30,7 @@ std::vector<std::string> TableOf(const fs::path& folder) {
   return lines;
 }
 
-/// `columns` x `tolerances` short cases of the four-bar.
+/// Four columns at each of `tolerances` tolerances: short cases of the four-bar.
 std::string Sweep(int tolerances) {
   std::string list;
   for (int i = 0; i < tolerances; ++i) {

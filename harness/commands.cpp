@@ -95,7 +95,9 @@ int PrintVerdicts(const VerdictCommand& command, const std::string& typed) {
   if (!command.out.empty()) {
     WriteFileAtomically(command.out, ClaimsMarkdown(results, Provenance(typed)));
   }
-  fmt::print("{}\n", ToText(VerdictTable(results)));
+  Table verdicts = VerdictTable(results);
+  verdicts.notes = Provenance(typed);
+  fmt::print("{}\n", ToText(verdicts));
   if (!command.out.empty()) fmt::print("wrote {}\n", command.out.string());
   return 0;
 }

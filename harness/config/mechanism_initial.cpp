@@ -86,7 +86,8 @@ void CheckIndependentName(const JsonNode& node, const std::string& name, const S
               NearestSpelling(name, names.joints.all()));
   } else if (!names.owners.Find(owner)) {
     const std::string nearest = NearestSpelling(owner, names.owners.all());
-    node.Fail("a speed of a body or of a joint with several", nearest.empty() ? "" : nearest + "." + component);
+    node.Fail("a speed of a body or of a joint with several",
+              nearest.empty() ? "" : nearest + "." + component);
   } else {
     const std::string nearest = NearestSpelling(component, kComponents.all());
     node.Fail(fmt::format("one of the components {}", fmt::join(kComponents.all(), ", ")),

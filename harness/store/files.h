@@ -8,15 +8,16 @@
 namespace loopbench::harness {
 
 /// Writes `text` to `path` so that a reader finds the old file or the new one, never a part: the
-/// text goes to a temporary file beside `path`, which then takes its name by rename(2). It is on the
-/// disk when this returns. Missing parent folders are made. Throws std::runtime_error that names the path and the system's reason.
+/// text goes to a temporary file beside `path`, which then takes its name by rename(2). It is on
+/// the disk when this returns. Missing parent folders are made. Throws std::runtime_error that
+/// names the path and the system's reason.
 void WriteFileAtomically(const std::filesystem::path& path, std::string_view text);
 
 /// Throws std::runtime_error: "cannot VERB 'PATH': " and what errno says.
 [[noreturn]] void FailOn(std::string_view verb, const std::filesystem::path& path);
 
-/// All of `text` to an open file; `path` names it in the error. One write(2) in the usual case; more
-/// only if the system accepted a part or was interrupted.
+/// All of `text` to an open file; `path` names it in the error. One write(2) in the usual case;
+/// more only if the system accepted a part or was interrupted.
 void WriteAll(int descriptor, std::string_view text, const std::filesystem::path& path);
 
 /// Waits until the names in the folder of `path` are on the disk, where the file system can.

@@ -21,7 +21,8 @@ Formulation<Space, S>::Formulation(const Mechanism<Space, S>& mechanism, Formula
       udot_(VectorX<S>::Zero(mechanism.num_u())) {}
 
 template <class Space, class S>
-Outcome Formulation<Space, S>::Start(const VectorX<S>& q, const VectorX<S>& u) {
+Outcome Formulation<Space, S>::Start(S t, const VectorX<S>& q, const VectorX<S>& u) {
+  kinematics_.SetTime(t);
   q_ = q;
   u_ = u;
   kinematics_.UpdatePosition(q_);
@@ -39,7 +40,8 @@ void Formulation<Space, S>::ToState(const VectorX<S>& q, const VectorX<S>& u,
 }
 
 template <class Space, class S>
-Outcome Formulation<Space, S>::FromState(std::span<const S> y) {
+Outcome Formulation<Space, S>::FromState(S t, std::span<const S> y) {
+  kinematics_.SetTime(t);
   const int num_q = mechanism_.num_q();
   for (int i = 0; i < num_q; ++i) q_[i] = y[i];
   for (int i = 0; i < num_state_speeds(); ++i) u_[state_speed(i)] = y[num_q + i];
@@ -51,8 +53,8 @@ Outcome Formulation<Space, S>::FromState(std::span<const S> y) {
 }
 
 template <class Space, class S>
-Outcome Formulation<Space, S>::Derivative(S, std::span<const S> y, std::span<S> ydot) {
-  Outcome outcome = FromState(y);
+Outcome Formulation<Space, S>::Derivative(S t, std::span<const S> y, std::span<S> ydot) {
+  Outcome outcome = FromState(t, y);
   if (outcome == Outcome::kFinished) outcome = Accelerations();
   diagnostics_.outcome = outcome;
   if (outcome != Outcome::kFinished) return outcome;
@@ -63,8 +65,9 @@ Outcome Formulation<Space, S>::Derivative(S, std::span<const S> y, std::span<S> 
 }
 
 template <class Space, class S>
-Outcome Formulation<Space, S>::Evaluate(S, const VectorX<S>& q, const VectorX<S>& u,
+Outcome Formulation<Space, S>::Evaluate(S t, const VectorX<S>& q, const VectorX<S>& u,
                                         VectorX<S>& udot) {
+  kinematics_.SetTime(t);
   q_ = q;
   u_ = u;
   kinematics_.UpdatePosition(q_);
@@ -75,8 +78,8 @@ Outcome Formulation<Space, S>::Evaluate(S, const VectorX<S>& q, const VectorX<S>
 }
 
 template <class Space, class S>
-bool Formulation<Space, S>::BeginStep(std::span<S> y) {
-  if (FromState(y) != Outcome::kFinished) return false;  // the next evaluation will say why
+bool Formulation<Space, S>::BeginStep(S t, std::span<S> y) {
+  if (FromState(t, y) != Outcome::kFinished) return false;  // the next evaluation will say why
   kinematics_.AcceptStep();
   if (!ChangeMode()) return false;
   ToState(q_, u_, y);

@@ -80,6 +80,11 @@ Kinematics<Space, S>::Kinematics(const Mechanism<Space, S>& mechanism)
 }
 
 template <class Space, class S>
+void Kinematics<Space, S>::SetTime(S t) {
+  time_ = t;
+}
+
+template <class Space, class S>
 void Kinematics<Space, S>::UpdatePosition(const VectorX<S>& q) {
   q_ = q;
   ++position_version_;

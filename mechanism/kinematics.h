@@ -33,6 +33,11 @@ class Kinematics {
  public:
   explicit Kinematics(const Mechanism<Space, S>& mechanism);
 
+  /// The time [s] that prescribed motions and time-dependent forces are taken at; 0 until set. To
+  /// be called before the positions are updated.
+  void SetTime(S t);
+  S time() const { return time_; }
+
   /// Poses, joint points and directions from q.
   void UpdatePosition(const VectorX<S>& q);
   /// Motions and g from u; positions must be current.
@@ -89,6 +94,7 @@ class Kinematics {
   std::vector<Pose<Space, S>> measured_;  ///< X_FM of constraints and of kinds with a basis
   std::vector<S> accepted_;               ///< last accepted coordinate of each joint
   VectorX<S> q_, u_;
+  S time_ = S(0);
   long position_version_ = 0;
 };
 

@@ -30,8 +30,8 @@ Reduction<Space, S>::Reduction(const Mechanism<Space, S>& mechanism, Formulation
       residual_(h_) {}
 
 template <class Space, class S>
-Outcome Reduction<Space, S>::Start(const VectorX<S>& q, const VectorX<S>& u) {
-  Base::Start(q, u);
+Outcome Reduction<Space, S>::Start(S t, const VectorX<S>& q, const VectorX<S>& u) {
+  Base::Start(t, q, u);
   dynamics_.Jacobian(kinematics_, J_);
   const int n = mechanism_.num_u(), m = mechanism_.num_rows();
   const bool fixed = Base::options_.solver == SolverKind::kAsPublished;

@@ -35,7 +35,7 @@ class Reduction final : public Formulation<Space, S> {
 
   Reduction(const Mechanism<Space, S>& mechanism, FormulationOptions options);
 
-  Outcome Start(const VectorX<S>& q, const VectorX<S>& u) override;
+  Outcome Start(S t, const VectorX<S>& q, const VectorX<S>& u) override;
 
   /// Indices into u, ascending.
   const std::vector<int>& independent() const { return independent_; }

@@ -87,7 +87,7 @@ struct Bench {
         mechanism(sample.mechanism(c.coordinates)),
         state(sample.state(c.coordinates)),
         formulation(Make(c, mechanism)) {
-    EXPECT_EQ(formulation->Start(state.q, state.u), Outcome::kFinished);
+    EXPECT_EQ(formulation->Start(0.0, state.q, state.u), Outcome::kFinished);
     y.resize(formulation->state_size());
     ydot.resize(formulation->state_size());
     formulation->ToState(state.q, state.u, y);
@@ -148,7 +148,7 @@ TEST_P(ContractTest, DerivativeIsAPureFunction) {
     bench.Derivative(other);
     VectorX<double> udot;
     bench.formulation->Evaluate(1.0, bench.state.q, -bench.state.u, udot);
-    bench.formulation->FromState(std::span<const double>(other));
+    bench.formulation->FromState(0.0, std::span<const double>(other));
     ASSERT_EQ(bench.Derivative(bench.y), Outcome::kFinished);
     EXPECT_EQ(std::memcmp(first.data(), bench.ydot.data(), first.size() * sizeof(double)), 0);
     ASSERT_EQ(bench.Derivative(bench.y), Outcome::kFinished) << "the same position once more";
@@ -172,7 +172,7 @@ TEST_P(VelocityContractTest, SpeedsSatisfyTheLoops) {
 
 TEST_P(ContractTest, StateKeepsConsistentPositionsAndSpeeds) {
   Run(Description(7), 7, [&](auto bench) {
-    ASSERT_EQ(bench.formulation->FromState(std::span<const double>(bench.y)), Outcome::kFinished);
+    ASSERT_EQ(bench.formulation->FromState(0.0, std::span<const double>(bench.y)), Outcome::kFinished);
     EXPECT_EQ(bench.formulation->q(), bench.state.q);
     const double difference =
         (bench.formulation->u() - bench.state.u).template lpNorm<Eigen::Infinity>();

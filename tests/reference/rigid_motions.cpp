@@ -91,7 +91,7 @@ SymmetricTop::SymmetricTop(double A, double C, double mgl, double theta, double 
   const double cubic = 2 * mgl / A;
   const double linear = cubic * u0 - 2 * E / A - p_psi_ * p_psi_ / (A * A);
   const double constant = linear * u0 - cubic + 2 * p_phi_ * p_psi_ / (A * A);
-  // u3 > 0 is the larger of the two others in amount or the sum of both is small: no cancellation
+  // the root farther from zero first, the other one by their product: no cancellation
   const double half = -linear / 2;
   const double far = half + std::copysign(std::sqrt(half * half - cubic * constant), half);
   const double u3 = std::max(far / cubic, constant / far);
@@ -119,8 +119,8 @@ double SymmetricTop::PrecessionRate(double t) const {
 Eigen::Matrix3d SymmetricTop::Attitude(double t) const {
   const double period = 2.0 / rate_;  // as above
   const double phi = Integral([this](double s) { return PrecessionRate(s); }, period, t);
-  const double psi = Integral([this](double s) { return w3_ - Height(s) * PrecessionRate(s); },
-                              period, t);
+  const double psi =
+      Integral([this](double s) { return w3_ - Height(s) * PrecessionRate(s); }, period, t);
   return EulerRotation(phi, std::acos(Height(t)), psi);
 }
 

@@ -12,17 +12,19 @@
 namespace loopbench::harness::reference {
 namespace {
 
-/// The formulation's system with one more state, the integral of the kinetic energy.
+/// The formulation's system with two more states: the integral of the kinetic energy, and the work
+/// of forces without a potential.
 template <class Space>
-class WithKineticIntegral final : public Ode {
+class WithIntegrals final : public Ode {
  public:
-  explicit WithKineticIntegral(Formulation<Space, double>& formulation)
-      : formulation_(formulation) {}
-  int size() const override { return formulation_.state_size() + 1; }
+  explicit WithIntegrals(Formulation<Space, double>& formulation) : formulation_(formulation) {}
+  int size() const override { return formulation_.state_size() + 2; }
   Outcome Derivative(double t, std::span<const double> y, std::span<double> ydot) override {
-    const std::size_t n = y.size() - 1;
+    const std::size_t n = y.size() - 2;
     const Outcome outcome = formulation_.Derivative(t, y.first(n), ydot.first(n));
+    const Power<double> power = AppliedPower(formulation_.kinematics());
     ydot[n] = ComputeEnergy(formulation_.kinematics()).kinetic;
+    ydot[n + 1] = power.supplied - power.dissipated;
     return outcome;
   }
 
@@ -71,7 +73,7 @@ Simulation SimulateIn(const MechanismDescription& description, const Column& col
   if (simulation.result.outcome != Outcome::kFinished) return simulation;
 
   const std::size_t n = formulation->state_size();
-  std::vector<double> y(n + 1, 0.0), ydot(n);
+  std::vector<double> y(n + 2, 0.0), ydot(n);
   formulation->ToState(start.q, start.u, std::span(y).first(n));
   double first_energy = std::nan("");
   Outcome failure = Outcome::kFinished;  // of an accepted state
@@ -80,13 +82,13 @@ Simulation SimulateIn(const MechanismDescription& description, const Column& col
     failure = formulation->FromState(t, state.first(n));
     if (failure != Outcome::kFinished) return StepAction::kStop;
     simulation.last = SnapshotOf(t, formulation->kinematics());
-    const double energy = simulation.last.kinetic + simulation.last.potential;
+    const double energy = simulation.last.kinetic + simulation.last.potential - state[n + 1];
     if (std::isnan(first_energy)) first_energy = energy;
     simulation.energy_error = std::max(simulation.energy_error, std::abs(energy - first_energy));
     if (watch) watch(simulation.last);
     return restart ? StepAction::kRestart : StepAction::kContinue;
   };
-  WithKineticIntegral<Space> ode(*formulation);
+  WithIntegrals<Space> ode(*formulation);
   simulation.result = Integrate(ode, 0.0, horizon, y, options, observe);
   if (failure != Outcome::kFinished) simulation.result.outcome = failure;
   simulation.kinetic_integral = y[n];
@@ -155,6 +157,11 @@ MechanismDescription Tilted(MechanismDescription description, const Eigen::Matri
   for (ForceDescription& force : description.forces) {
     if (auto* point = std::get_if<PointForce>(&force); point && !point->in_body_axes) {
       point->force = (R * point->force).eval();
+    }
+    if (auto* spring = std::get_if<SpringDamper>(&force)) {
+      for (BodyPoint* end : {&spring->from, &spring->to}) {
+        if (end->body == kGround) end->at = (R * end->at).eval();
+      }
     }
   }
   return description;

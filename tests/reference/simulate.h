@@ -30,7 +30,8 @@ struct Snapshot {
 struct Simulation {
   IntegratorResult result;
   Snapshot last;
-  double energy_error = 0.0;      ///< largest change of kinetic + potential [J]
+  /// Largest change of kinetic + potential energy - work of the forces without a potential [J].
+  double energy_error = 0.0;
   double kinetic_integral = 0.0;  ///< of the kinetic energy over time [J s], integrated with it
 };
 

@@ -172,7 +172,8 @@ TEST_P(VelocityContractTest, SpeedsSatisfyTheLoops) {
 
 TEST_P(ContractTest, StateKeepsConsistentPositionsAndSpeeds) {
   Run(Description(7), 7, [&](auto bench) {
-    ASSERT_EQ(bench.formulation->FromState(0.0, std::span<const double>(bench.y)), Outcome::kFinished);
+    ASSERT_EQ(bench.formulation->FromState(0.0, std::span<const double>(bench.y)),
+              Outcome::kFinished);
     EXPECT_EQ(bench.formulation->q(), bench.state.q);
     const double difference =
         (bench.formulation->u() - bench.state.u).template lpNorm<Eigen::Infinity>();

@@ -47,7 +47,8 @@ TimeTable ReadTable(const JsonNode& node) {
   if (table.times.empty() || table.values.empty()) return table;
   const std::vector<JsonNode> times = node.Optional("times")->Elements("times");
   for (std::size_t i = 1; i < times.size(); ++i) {
-    if (!times[i].value().is_number() || table.times[i] > table.times[i - 1]) continue;
+    const bool numbers = times[i - 1].value().is_number() && times[i].value().is_number();
+    if (!numbers || table.times[i] > table.times[i - 1]) continue;
     times[i].Fail(fmt::format("more than the time before it, {}", table.times[i - 1]));
   }
   if (table.values.size() != table.times.size()) {

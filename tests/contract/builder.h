@@ -75,11 +75,14 @@ class Builder {
     return freedom + up[meet];
   }
 
+  /// Any kind of function of time, with kinks between -1 s and 2 s.
+  TimeFunctionDescription RandomFunction();
+  /// Forces of every kind.
   void AddForces(int count);
 
   /// Forces on the tree joints, then the loops.
   MechanismDescription Finish() {
-    AddForces(1 + static_cast<int>(description.joints.size()) / 3);
+    AddForces(1 + static_cast<int>(description.joints.size()) / 2);
     FinishClosures();
     return description;
   }

@@ -172,7 +172,8 @@ TEST_P(VelocityContractTest, SpeedsSatisfyTheLoops) {
 
 TEST_P(ContractTest, StateKeepsConsistentPositionsAndSpeeds) {
   Run(Description(7), 7, [&](auto bench) {
-    ASSERT_EQ(bench.formulation->FromState(0.0, std::span<const double>(bench.y)), Outcome::kFinished);
+    ASSERT_EQ(bench.formulation->FromState(0.0, std::span<const double>(bench.y)),
+              Outcome::kFinished);
     EXPECT_EQ(bench.formulation->q(), bench.state.q);
     const double difference =
         (bench.formulation->u() - bench.state.u).template lpNorm<Eigen::Infinity>();
@@ -220,32 +221,73 @@ TEST_P(ContractTest, DerivativeDoesNotAllocate) {
   });
 }
 
-/// Without dampers and forces that turn with a body.
+/// Without all that supplies or dissipates power.
 MechanismDescription Conservative(MechanismDescription description) {
-  std::erase_if(description.forces, [](const ForceDescription& force) {
-    const auto* point = std::get_if<PointForce>(&force);
-    return std::holds_alternative<JointDamper>(force) || (point && point->in_body_axes);
+  MechanismDescription one = description;
+  std::erase_if(description.forces, [&](const ForceDescription& force) {
+    one.forces = {force};
+    return CompileForces<Spatial, double>(one).has_power();
   });
   return description;
+}
+
+/// Rate of the oracle's energy along the bench's own motion, and what it is small against: the
+/// energies' own rates, at least their size per second.
+template <class Bench>
+std::pair<Real, Real> EnergyRate(Bench& bench) {
+  const Oracle oracle(bench.sample.description(), LayoutOf(bench.mechanism));
+  const RealVector q = ToReal(bench.formulation->q()), u = ToReal(bench.formulation->u());
+  const RealVector udot = ToReal(bench.formulation->udot());
+  const Eigen::Map<const VectorX<double>> qdot(bench.ydot.data(), q.size());
+  const Real step = 1e-6L;  // long double: truncation 1e-12, round-off 1e-13
+  const auto energy = [&](Real t) {
+    return oracle.TotalEnergy(q + t * ToReal(qdot), u + t * udot);
+  };
+  return {(energy(step) - energy(-step)) / (2 * step),
+          1 + std::abs(energy(0)) + udot.template lpNorm<Eigen::Infinity>()};
+}
+
+TEST_P(ContractTest, EnergyChangesByThePowerOfTheForces) {
+  Run(Description(11), 11, [&](auto bench) {
+    ASSERT_EQ(bench.Derivative(bench.y), Outcome::kFinished);
+    const auto [rate, scale] = EnergyRate(bench);
+    const Power<double> power = AppliedPower(bench.formulation->kinematics());
+    EXPECT_TRUE(bench.mechanism.has_power());
+    EXPECT_NEAR(static_cast<double>(rate), power.supplied - power.dissipated,
+                static_cast<double>((1e-10L + bench.Bound()) * scale));
+  });
+}
+
+TEST_P(ContractTest, AccelerationsFollowTheTime) {
+  MechanismDescription description = Description(12);
+  for (std::size_t j = 0; j < description.joints.size(); ++j) {
+    if (description.joints[j].type != JointType::kRevolute) continue;
+    description.forces.push_back(
+        JointTorque{static_cast<int>(j), Harmonic{.amplitude = 5.0, .omega = 2.0}});
+  }
+  Run(description, 12, [&](auto bench) {
+    Oracle oracle(bench.sample.description(), LayoutOf(bench.mechanism));
+    for (const double t : {-0.4, 0.8}) {
+      oracle.SetTime(t);
+      VectorX<double> udot;
+      ASSERT_EQ(bench.formulation->Evaluate(t, bench.state.q, bench.state.u, udot),
+                Outcome::kFinished);
+      const RealVector expected = oracle.Solve(ToReal(bench.state.q), ToReal(bench.state.u)).udot;
+      EXPECT_LE(RelativeError(udot, expected), bench.Bound()) << t;
+    }
+  });
 }
 
 TEST_P(ContractTest, EnergyOfConservativeScenesStays) {
   Run(Conservative(Description(10)), 10, [&](auto bench) {
     ASSERT_EQ(bench.Derivative(bench.y), Outcome::kFinished);
-    const Oracle oracle(bench.sample.description(), LayoutOf(bench.mechanism));
-    const RealVector q = ToReal(bench.formulation->q()), u = ToReal(bench.formulation->u());
-    const RealVector udot = ToReal(bench.formulation->udot());
-    const Eigen::Map<const VectorX<double>> qdot(bench.ydot.data(), q.size());
-    const Real step = 1e-6L;  // long double: truncation 1e-12, round-off 1e-13
-    const auto energy = [&](Real t) {
-      return oracle.TotalEnergy(q + t * ToReal(qdot), u + t * udot);
-    };
-    const Real rate = (energy(step) - energy(-step)) / (2 * step);
-    // what the rate is small against: the energies' own rates, at least their size per second
-    const Real scale = 1 + std::abs(energy(0)) + udot.template lpNorm<Eigen::Infinity>();
+    const auto [rate, scale] = EnergyRate(bench);
     EXPECT_LE(std::abs(rate), (1e-10L + bench.Bound()) * scale);
+    const Oracle oracle(bench.sample.description(), LayoutOf(bench.mechanism));
+    const Real energy =
+        oracle.TotalEnergy(ToReal(bench.formulation->q()), ToReal(bench.formulation->u()));
     const Energy<double> own = ComputeEnergy(bench.formulation->kinematics());
-    EXPECT_NEAR(own.total(), static_cast<double>(energy(0)),
+    EXPECT_NEAR(own.total(), static_cast<double>(energy),
                 100 * kEps * (own.kinetic + std::abs(own.potential) + 10.0));
   });
 }

@@ -83,6 +83,9 @@ class Oracle {
  public:
   Oracle(const MechanismDescription& description, Layout layout);
 
+  /// The time [s] at which given functions of time are taken from now on; 0 at first.
+  void SetTime(Real t) { time_ = t; }
+
   /// X_WB of every body at its centre of mass.
   std::vector<JetPose> Poses(const RealVector& q) const;
   /// Pose of M in F of a user joint.
@@ -93,6 +96,10 @@ class Oracle {
   RealVector Consistent(const RealVector& q, const RealVector& u) const;
   /// Kinetic energy, gravity, springs, constant torques and forces in ground axes [J].
   Real TotalEnergy(const RealVector& q, const RealVector& u) const;
+  /// Applied wrenches at the centres of mass, by body.
+  std::vector<Real6> Applied(const RealVector& q, const RealVector& u) const;
+  /// Power [W] of all applied wrenches, those with a potential included.
+  Real TotalPower(const RealVector& q, const RealVector& u) const;
 
  private:
   struct Frames {
@@ -121,6 +128,7 @@ class Oracle {
 
   const MechanismDescription description_;
   const Layout layout_;
+  Real time_ = 0;
   std::vector<Frames> frames_;
   // of the last Form()
   std::vector<JetPose> poses_;

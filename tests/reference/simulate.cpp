@@ -12,13 +12,14 @@
 namespace loopbench::harness::reference {
 namespace {
 
-/// The formulation's system with two more states: the integral of the kinetic energy, and the work
+/// The formulation's system with two quadratures: the integral of the kinetic energy, and the work
 /// of forces without a potential.
 template <class Space>
 class WithIntegrals final : public Ode {
  public:
   explicit WithIntegrals(Formulation<Space, double>& formulation) : formulation_(formulation) {}
   int size() const override { return formulation_.state_size() + 2; }
+  int num_quadratures() const override { return 2; }
   Outcome Derivative(double t, std::span<const double> y, std::span<double> ydot) override {
     const std::size_t n = y.size() - 2;
     const Outcome outcome = formulation_.Derivative(t, y.first(n), ydot.first(n));

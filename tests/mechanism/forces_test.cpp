@@ -29,6 +29,7 @@ std::vector<MechanismDescription> Samples() {
   for (std::uint64_t seed = 1; seed <= 6; ++seed) {
     samples.push_back(testing::RandomTree(20, kKind<Space>, seed));
     samples.push_back(testing::RandomGraph(2, kKind<Space>, seed));
+    samples.push_back(testing::MixedGraph(1, kKind<Space>, seed));
   }
   return samples;
 }

@@ -18,11 +18,13 @@ template <class Space>
 std::unique_ptr<Formulation<Space, double>> MakeFormulation(
     const Column& column, const Mechanism<Space, double>& mechanism);
 
-/// Power [W] that enters and leaves the mechanism at the formulation's current state: of whatever
-/// does work without a potential.
+/// Power [W] that enters and leaves the mechanism at the formulation's last successful evaluation:
+/// of whatever does work without a potential, prescribed motions included.
 template <class Space>
-Power<double> PowerOf(const Formulation<Space, double>& formulation) {
-  return AppliedPower(formulation.kinematics());
+Power<double> PowerOf(Formulation<Space, double>& formulation) {
+  Power<double> power = AppliedPower(formulation.kinematics());
+  power.supplied += formulation.DrivePower();
+  return power;
 }
 
 /// A formulation as the integrator sees it: its state, and after it, if asked for, the work [J]

@@ -73,7 +73,7 @@ void AddJointForce(const Kinematics<Space, S>& kinematics, int index, S tau,
                    std::span<Motion<Space, S>> wrenches) {
   const Joint<Space, S>& joint = kinematics.mechanism().joints()[index];
   const JointState<Space, S>& state = kinematics.joints()[index];
-  const Motion<Space, S> F = state.H(0) * tau;
+  const Motion<Space, S> F = state.H(0) * (tau * joint.kind->per_speed);
   wrenches[joint.to] += ShiftForce<Space, S>(F, state.r_Q);
   wrenches[joint.from] -= ShiftForce<Space, S>(F, state.r_P);
 }

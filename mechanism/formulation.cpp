@@ -18,7 +18,11 @@ Formulation<Space, S>::Formulation(const Mechanism<Space, S>& mechanism, Formula
       kinematics_(mechanism),
       q_(VectorX<S>::Zero(mechanism.num_q())),
       u_(VectorX<S>::Zero(mechanism.num_u())),
-      udot_(VectorX<S>::Zero(mechanism.num_u())) {}
+      udot_(VectorX<S>::Zero(mechanism.num_u())) {
+  if (mechanism.drives().empty()) return;
+  drives_ = std::make_unique<Drives<Space, S>>(mechanism);
+  lambda_of_drives_.setZero(mechanism.num_rows());
+}
 
 template <class Space, class S>
 Outcome Formulation<Space, S>::Start(S t, const VectorX<S>& q, const VectorX<S>& u) {
@@ -47,15 +51,33 @@ Outcome Formulation<Space, S>::FromState(S t, std::span<const S> y) {
   for (int i = 0; i < num_state_speeds(); ++i) u_[state_speed(i)] = y[num_q + i];
   kinematics_.UpdatePosition(q_);
   Outcome outcome = Outcome::kFinished;
-  if (options_.enforcement == Enforcement::kVelocity) outcome = CompleteSpeeds();
+  if (options_.enforcement == Enforcement::kVelocity && mechanism_.num_u() > 0) {
+    outcome = CompleteSpeeds();
+  }
   kinematics_.UpdateVelocity(u_);
   return outcome;
 }
 
 template <class Space, class S>
+Outcome Formulation<Space, S>::Solve() {
+  if (mechanism_.num_u() > 0) {
+    if (const Outcome outcome = Accelerations(); outcome != Outcome::kFinished) return outcome;
+  }
+  if (drives_ == nullptr || drives_->Followed(kinematics_, udot_)) return Outcome::kFinished;
+  return Outcome::kInconsistentMotion;
+}
+
+template <class Space, class S>
+S Formulation<Space, S>::DrivePower() {
+  if (drives_ == nullptr) return S(0);
+  if (mechanism_.num_u() > 0) Multipliers(lambda_of_drives_);
+  return drives_->Power(kinematics_, udot_, lambda_of_drives_);
+}
+
+template <class Space, class S>
 Outcome Formulation<Space, S>::Derivative(S t, std::span<const S> y, std::span<S> ydot) {
   Outcome outcome = FromState(t, y);
-  if (outcome == Outcome::kFinished) outcome = Accelerations();
+  if (outcome == Outcome::kFinished) outcome = Solve();
   diagnostics_.outcome = outcome;
   if (outcome != Outcome::kFinished) return outcome;
   const int num_q = mechanism_.num_q();
@@ -72,7 +94,7 @@ Outcome Formulation<Space, S>::Evaluate(S t, const VectorX<S>& q, const VectorX<
   u_ = u;
   kinematics_.UpdatePosition(q_);
   kinematics_.UpdateVelocity(u_);
-  diagnostics_.outcome = Accelerations();
+  diagnostics_.outcome = Solve();
   udot = udot_;
   return diagnostics_.outcome;
 }

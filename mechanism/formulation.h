@@ -15,7 +15,7 @@
 #include <memory>
 #include <string_view>
 
-#include "mechanism/kinematics.h"
+#include "mechanism/drives.h"
 #include "mechanism/outcome.h"
 
 namespace loopbench {
@@ -83,6 +83,9 @@ class Formulation {
   /// meaning may have changed too, `y` is rewritten and the integrator must restart.
   bool BeginStep(S t, std::span<S> y);
 
+  /// Power [W] that prescribed motions supply, after a successful evaluation. O(n); 0 without them.
+  S DrivePower();
+
   const Kinematics<Space, S>& kinematics() const { return kinematics_; }
   const Diagnostics& diagnostics() const { return diagnostics_; }
 
@@ -96,6 +99,8 @@ class Formulation {
   virtual Outcome CompleteSpeeds() = 0;
   /// udot_ from current positions and speeds; sets diagnostics_.
   virtual Outcome Accelerations() = 0;
+  /// Multipliers of all constraint rows after Accelerations(): D lambda is the force on Q.
+  virtual void Multipliers(VectorX<S>& lambda) = 0;
   /// Chance to change the mode at an accepted state.
   virtual bool ChangeMode() { return false; }
 
@@ -107,6 +112,13 @@ class Formulation {
   Kinematics<Space, S> kinematics_;
   VectorX<S> q_, u_, udot_;
   Diagnostics diagnostics_;
+
+ private:
+  /// Accelerations(), unless nothing is free, and whether prescribed motions can be followed.
+  Outcome Solve();
+
+  std::unique_ptr<Drives<Space, S>> drives_;  ///< null without prescribed motions
+  VectorX<S> lambda_of_drives_;
 };
 
 }  // namespace loopbench

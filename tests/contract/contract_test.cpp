@@ -72,11 +72,12 @@ std::unique_ptr<Formulation<Space, double>> Make(const Case& c,
   return std::make_unique<reduction::Reduction<Space, double>>(mechanism, options);
 }
 
-/// Coupled loops with forces of every kind, every second with joints of every kind; independent
-/// closures, so that every column can run.
+/// Coupled loops with forces of every kind, every second with joints of every kind, every fourth
+/// with prescribed motions; independent closures, so that every column can run.
 MechanismDescription CoupledLoops(SpaceKind space, std::uint64_t seed) {
   const int loops = space == SpaceKind::kPlanar ? 2 : 1;
-  return seed % 2 == 0 ? MixedGraph(loops, space, seed) : RandomGraph(loops, space, seed);
+  return seed % 2 == 0 ? MixedGraph(loops, space, seed, seed % 4 == 2 ? 2 : 0)
+                       : RandomGraph(loops, space, seed);
 }
 
 /// A formulation on a sample, started.
@@ -162,11 +163,12 @@ TEST_P(VelocityContractTest, SpeedsSatisfyTheLoops) {
     for (std::size_t i = bench.mechanism.num_q(); i < off.size(); ++i) off[i] += 0.1;
     ASSERT_EQ(bench.Derivative(off), Outcome::kFinished);
     Oracle oracle(bench.sample.description(), LayoutOf(bench.mechanism));
-    const RealVector u = ToReal(bench.formulation->u());
-    const RealMatrix J = oracle.Form(ToReal(bench.formulation->q()), u).J;
+    const RealVector q = ToReal(bench.formulation->q()), u = ToReal(bench.formulation->u());
+    const RealMatrix J = oracle.Form(q, u).J;
+    const Real at_rest = oracle.ClosureRates(q, 0 * u).template lpNorm<Eigen::Infinity>();
     const Real scale =
-        J.cwiseAbs().rowwise().sum().maxCoeff() * u.template lpNorm<Eigen::Infinity>();
-    EXPECT_LE((J * u).template lpNorm<Eigen::Infinity>(), bench.Bound() * scale);
+        at_rest + J.cwiseAbs().rowwise().sum().maxCoeff() * u.template lpNorm<Eigen::Infinity>();
+    EXPECT_LE(oracle.ClosureRates(q, u).template lpNorm<Eigen::Infinity>(), bench.Bound() * scale);
   });
 }
 
@@ -231,33 +233,6 @@ MechanismDescription Conservative(MechanismDescription description) {
   return description;
 }
 
-/// Rate of the oracle's energy along the bench's own motion, and what it is small against: the
-/// energies' own rates, at least their size per second.
-template <class Bench>
-std::pair<Real, Real> EnergyRate(Bench& bench) {
-  const Oracle oracle(bench.sample.description(), LayoutOf(bench.mechanism));
-  const RealVector q = ToReal(bench.formulation->q()), u = ToReal(bench.formulation->u());
-  const RealVector udot = ToReal(bench.formulation->udot());
-  const Eigen::Map<const VectorX<double>> qdot(bench.ydot.data(), q.size());
-  const Real step = 1e-6L;  // long double: truncation 1e-12, round-off 1e-13
-  const auto energy = [&](Real t) {
-    return oracle.TotalEnergy(q + t * ToReal(qdot), u + t * udot);
-  };
-  return {(energy(step) - energy(-step)) / (2 * step),
-          1 + std::abs(energy(0)) + udot.template lpNorm<Eigen::Infinity>()};
-}
-
-TEST_P(ContractTest, EnergyChangesByThePowerOfTheForces) {
-  Run(Description(11), 11, [&](auto bench) {
-    ASSERT_EQ(bench.Derivative(bench.y), Outcome::kFinished);
-    const auto [rate, scale] = EnergyRate(bench);
-    const Power<double> power = AppliedPower(bench.formulation->kinematics());
-    EXPECT_TRUE(bench.mechanism.has_power());
-    EXPECT_NEAR(static_cast<double>(rate), power.supplied - power.dissipated,
-                static_cast<double>((1e-10L + bench.Bound()) * scale));
-  });
-}
-
 TEST_P(ContractTest, AccelerationsFollowTheTime) {
   MechanismDescription description = Description(12);
   for (std::size_t j = 0; j < description.joints.size(); ++j) {
@@ -278,18 +253,40 @@ TEST_P(ContractTest, AccelerationsFollowTheTime) {
   });
 }
 
-TEST_P(ContractTest, EnergyOfConservativeScenesStays) {
-  Run(Conservative(Description(10)), 10, [&](auto bench) {
-    ASSERT_EQ(bench.Derivative(bench.y), Outcome::kFinished);
-    const auto [rate, scale] = EnergyRate(bench);
-    EXPECT_LE(std::abs(rate), (1e-10L + bench.Bound()) * scale);
-    const Oracle oracle(bench.sample.description(), LayoutOf(bench.mechanism));
-    const Real energy =
-        oracle.TotalEnergy(ToReal(bench.formulation->q()), ToReal(bench.formulation->u()));
-    const Energy<double> own = ComputeEnergy(bench.formulation->kinematics());
-    EXPECT_NEAR(own.total(), static_cast<double>(energy),
-                100 * kEps * (own.kinetic + std::abs(own.potential) + 10.0));
-  });
+/// The energy's rate by differences of the oracle's, the power by the formulation: of drives alone
+/// (seed 10 has some), of forces alone (seed 11) and of both.
+TEST_P(ContractTest, EnergyChangesByThePowerOfForcesAndDrives) {
+  const MechanismDescription driven = Description(10);
+  for (const MechanismDescription& description :
+       {driven, Conservative(driven), Description(11), Conservative(Description(12))}) {
+    Run(description, 10, [&](auto bench) {
+      SCOPED_TRACE(description.name);
+      ASSERT_EQ(bench.Derivative(bench.y), Outcome::kFinished);
+      Oracle oracle(bench.sample.description(), LayoutOf(bench.mechanism));
+      const RealVector q = ToReal(bench.formulation->q()), u = ToReal(bench.formulation->u());
+      const RealVector udot = ToReal(bench.formulation->udot());
+      const Eigen::Map<const VectorX<double>> qdot(bench.ydot.data(), q.size());
+      const Real step = 1e-6L;  // long double: truncation 1e-12, round-off 1e-13
+      const auto energy = [&](Real t) {
+        oracle.SetTime(t);
+        return oracle.TotalEnergy(q + t * ToReal(qdot), u + t * udot);
+      };
+      const Real rate = (energy(step) - energy(-step)) / (2 * step);
+      const Power<double> forces = AppliedPower(bench.formulation->kinematics());
+      const double drives = bench.formulation->DrivePower();
+      const bool conservative = CompileForces<Spatial, double>(description).has_power() == false;
+      EXPECT_EQ(drives != 0.0, !bench.mechanism.drives().empty());
+      EXPECT_EQ(forces.supplied == 0.0 && forces.dissipated == 0.0, conservative);
+      EXPECT_EQ(bench.mechanism.has_power(), drives != 0.0 || !conservative);
+      // what the rate is small against: the energies' own rates, at least their size per second
+      const Real scale = 1 + std::abs(energy(0)) + udot.template lpNorm<Eigen::Infinity>();
+      EXPECT_LE(std::abs(rate - (forces.supplied - forces.dissipated + drives)),
+                (1e-10L + bench.Bound()) * scale);
+      const Energy<double> own = ComputeEnergy(bench.formulation->kinematics());
+      EXPECT_NEAR(own.total(), static_cast<double>(energy(0)),
+                  100 * kEps * (own.kinetic + std::abs(own.potential) + 10.0));
+    });
+  }
 }
 
 /// Where constraints depend on each other, all rows at once keep what closing loop by loop loses.

@@ -20,14 +20,13 @@ Real33 Oracle::InertiaInGround(int body, const JetPose& pose) const {
 Jet Oracle::Coordinate(int index, const std::vector<JetPose>& poses) const {
   const JetPose X_FM = JointPose(index, poses);
   if (description_.joints[index].type == JointType::kPrismatic) return X_FM.p[0];
-  const Jet &c = X_FM.R(0, 0), &s = X_FM.R(1, 0);
-  return {std::atan2(s.f, c.f), c.f * s.d - s.f * c.d};
+  return Angle(X_FM.R(0, 0), X_FM.R(1, 0));
 }
 
 Equations Oracle::Form(const RealVector& q, const RealVector& u) {
   const int bodies = static_cast<int>(description_.bodies.size());
-  poses_ = PosesAlong(Curve(q, u));
-  const std::vector<Jet> along = Closures(poses_);
+  poses_ = PosesAlong(Curve(q, u, true));
+  const std::vector<Jet> along = Closures(poses_, true);
   const int rows = static_cast<int>(along.size());
   Equations e;
   e.gamma.resize(rows);
@@ -35,9 +34,10 @@ Equations Oracle::Form(const RealVector& q, const RealVector& u) {
   e.J.resize(rows, layout_.num_u);
   G_.resize(6 * bodies, layout_.num_u);
   for (int i = 0; i < layout_.num_u; ++i) {
-    const std::vector<JetPose> moved = PosesAlong(Curve(q, RealVector::Unit(layout_.num_u, i)));
+    const std::vector<JetPose> moved =
+        PosesAlong(Curve(q, RealVector::Unit(layout_.num_u, i), false));
     for (int b = 0; b < bodies; ++b) G_.col(i).segment<6>(6 * b) = MotionOf(moved[b], &Jet::d);
-    const std::vector<Jet> c = Closures(moved);
+    const std::vector<Jet> c = Closures(moved, false);
     for (int r = 0; r < rows; ++r) e.J(r, i) = c[r].d;
   }
   const std::vector<Real6> applied = Applied(poses_);
@@ -165,11 +165,19 @@ void Oracle::JointForces(const RealVector& lambda, Answer& answer) const {
 RealMatrix Oracle::Jacobian(const RealVector& q) const {
   RealMatrix J;
   for (int i = 0; i < layout_.num_u; ++i) {
-    const std::vector<Jet> c = Closures(PosesAlong(Curve(q, RealVector::Unit(layout_.num_u, i))));
+    const std::vector<Jet> c =
+        Closures(PosesAlong(Curve(q, RealVector::Unit(layout_.num_u, i), false)), false);
     if (i == 0) J.resize(static_cast<int>(c.size()), layout_.num_u);
     for (std::size_t r = 0; r < c.size(); ++r) J(r, i) = c[r].d;
   }
   return J;
+}
+
+RealVector Oracle::ClosureRates(const RealVector& q, const RealVector& u) const {
+  const std::vector<Jet> c = Closures(PosesAlong(Curve(q, u, true)), true);
+  RealVector rates(c.size());
+  for (std::size_t r = 0; r < c.size(); ++r) rates[r] = c[r].d;
+  return rates;
 }
 
 RealVector Oracle::Consistent(const RealVector& q, const RealVector& u) const {
@@ -182,6 +190,7 @@ RealVector Oracle::Consistent(const RealVector& q, const RealVector& u) const {
   A.topRightCorner(n, m) = A.bottomLeftCorner(m, n).transpose();
   RealVector rhs = RealVector::Zero(n + m);
   rhs.head(n) = u;
+  rhs.tail(m) = -ClosureRates(q, RealVector::Zero(n));
   return SolveFullPivot(A, rhs, Real(1e-12)).head(n);
 }
 

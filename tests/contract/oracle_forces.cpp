@@ -40,6 +40,10 @@ std::vector<Real6> Oracle::Applied(const std::vector<JetPose>& poses) const {
     const Jet q = Coordinate(index, poses);
     Real6 H = Real6::Zero();
     for (int i = 0; i < 3; ++i) H[slides ? 3 + i : i] = X_WF.R(i, slides ? 0 : 2).f;
+    if (joint.type == JointType::kHelical) {  // the part of the wrench along the free motion
+      H.tail<3>() = Real(joint.pitch) * H.head<3>();
+      H /= 1 + Real(joint.pitch) * joint.pitch;
+    }
     const Real3 p = ValueOf(X_WM.p, &Jet::f);
     const Real6 wrench = H * tau_of(q.f, q.d);
     F[joint.to.body] += AtCom(wrench, p - ValueOf(poses[joint.to.body].p, &Jet::f));
@@ -82,11 +86,11 @@ std::vector<Real6> Oracle::Applied(const std::vector<JetPose>& poses) const {
 }
 
 std::vector<Real6> Oracle::Applied(const RealVector& q, const RealVector& u) const {
-  return Applied(PosesAlong(Curve(q, u)));
+  return Applied(PosesAlong(Curve(q, u, true)));
 }
 
 Real Oracle::TotalPower(const RealVector& q, const RealVector& u) const {
-  const std::vector<JetPose> poses = PosesAlong(Curve(q, u));
+  const std::vector<JetPose> poses = PosesAlong(Curve(q, u, true));
   const std::vector<Real6> F = Applied(poses);
   Real power = 0;
   for (std::size_t b = 1; b < poses.size(); ++b) power += F[b].dot(MotionOf(poses[b], &Jet::d));
@@ -94,7 +98,7 @@ Real Oracle::TotalPower(const RealVector& q, const RealVector& u) const {
 }
 
 Real Oracle::TotalEnergy(const RealVector& q, const RealVector& u) const {
-  const std::vector<JetPose> poses = PosesAlong(Curve(q, u));
+  const std::vector<JetPose> poses = PosesAlong(Curve(q, u, true));
   Real energy = 0;
   for (std::size_t b = 1; b < poses.size(); ++b) {
     const Real6 V = MotionOf(poses[b], &Jet::d);

@@ -18,9 +18,21 @@ namespace {
 
 constexpr double kTolerance = 1e-10;
 constexpr double kHorizon = 5.0;  // [s]
-/// As for conservative scenes (energy_test.cpp): errors of at most rtol per step and component,
-/// some 1e3 steps and energies of some 10 J; work is of the same size.
-constexpr double kErrorPerTolerance = 1e4;  // [J]
+/// Errors of at most rtol per step and component, a few hundred steps, forces and speeds of a few
+/// units. Seen: 60.
+constexpr double kErrorPerTolerance = 1e3;  // [J]
+
+/// The published columns; reduction with a partition that may change: driven bars turn through the
+/// dead centres of any fixed one.
+std::vector<Column> Columns() {
+  std::vector<Column> columns = PublishedColumns();
+  for (Column& column : columns) {
+    if (column.formulation == FormulationKind::kReduction) {
+      column.solver = SolverKind::kRankRevealing;
+    }
+  }
+  return columns;
+}
 
 Record RunFile(const MechanismFile& file, const Column& column, double tolerance, double horizon) {
   const Experiment experiment = Single(file);
@@ -149,7 +161,7 @@ TEST_P(BalanceTest, ClosesToTheTolerance) {
 INSTANTIATE_TEST_SUITE_P(
     FourBar, BalanceTest,
     testing::Combine(testing::Values("damped", "driven", "dragged", "kinked", "everything"),
-                     testing::ValuesIn(PublishedColumns())),
+                     testing::ValuesIn(Columns())),
     [](const auto& test) { return std::get<0>(test.param) + NameOf(std::get<1>(test.param)); });
 
 TEST(Balance, ClosesInSpaceToo) {

@@ -18,6 +18,8 @@ std::string_view ToString(Outcome outcome) {
       return "time-limit";
     case Outcome::kInconsistentStart:
       return "inconsistent-start";
+    case Outcome::kNewtonFailure:
+      return "newton-failure";
     case Outcome::kIntegratorError:
       return "integrator-error";
   }

@@ -14,6 +14,7 @@ enum class Outcome {
   kStepLimit,          ///< more steps than allowed
   kTimeLimit,          ///< more wall time than allowed
   kInconsistentStart,  ///< positions or speeds that satisfy the loops were not found
+  kNewtonFailure,      ///< an implicit step's equations were not solved, however short the step
   kIntegratorError,    ///< any other error return of the integrator
 };
 

@@ -43,6 +43,13 @@ struct A02Angle {
 inline constexpr std::array<A02Angle, 3> kA02DerivedAtHalfSecond = {
     {{1, 0.7775178758353721}, {2, 0.7688186275552173}, {40, 0.7586275160827806}}};
 
+/// The same at 20 s, and of N = 2 at 10 s: derived, and the limit of the series of step sizes that
+/// github.com/jgerstmayr/EXUDYN (TestModels, N-four-bar) gives for x.
+inline constexpr PathPoint kA02PublishedN40At20Seconds = {20.0, 0.410902, 0.911679};
+inline constexpr PathPoint kA02DerivedN2AtTenSeconds = {10.0, 0.32845811153977883,
+                                                        0.9445185381789615};
+inline constexpr double kA02ExudynLimitX = 0.3284581;
+
 /// A03_andrews: angles beta, theta, gamma, phi, delta, omega, epsilon [rad] and their rates [rad/s]
 /// at 0.03 s. Source: Test Set for IVP Solvers (CWI and University of Bari), problem "andrews", as
 /// kept in github.com/cran/deTestSet (src/Ex_andrews.f); computed there by PSIDE with rtol = atol =
@@ -76,8 +83,6 @@ inline constexpr std::array<A05State, 5> kA05Derived = {
      {2.0, 0.5059092942943622, 0.516663797367313, 6.236223614468247},
      {5.0, 0.5355631037155776, 0.4828745765938844, 6.022496499824989},
      {10.0, 0.6196229170581472, 0.390073701848123, 5.548203622712205}}};
-inline constexpr double kA05Lowest = 0.4999176,
-                        kA05Highest = 0.7433622;  ///< of the slider within 10 s [m]
 
 /// Slider-crank of SUNDIALS: crank angle q [rad], position x of the rod's centre of mass [m], rod
 /// angle p [rad]. Source: github.com/LLNL/sundials, examples/ida/serial/idaSlCrank_dns.out (rtol =
@@ -108,6 +113,23 @@ inline constexpr std::array<SliderCrankState, 8> kSliderCrankVerified = {
 inline constexpr double kSliderCrankSpeedVerified = -0.23991499719592468;
 inline constexpr double kSliderCrankIntegralVerified = 3.3366067994828676;
 inline constexpr double kSliderCrankIntegralPublished = 3.3366160662909388;
+
+/// Errors of the Cartesian pendulum at 30 s [m], [m/s], and of its constraint x^2 + y^2 = 1.
+/// Published: github.com/LLNL/sundials, examples/cvode/serial/cvPendulum_dns.out, CVODE's BDF, with
+/// and without projection of the state.
+struct PendulumErrors {
+  double rtol = 0.0;
+  bool projected = false;
+  double x = 0.0, y = 0.0, vx = 0.0, vy = 0.0, constraint = 0.0;
+};
+inline constexpr std::array<PendulumErrors, 7> kPendulumDriftPublished = {
+    {{1e-05, false, 0.561, 0.898, 4.26, 2.1, 0.000619},
+     {1e-06, false, 0.00168, 0.0574, 0.0577, 1.0, 7.05e-05},
+     {1e-07, false, 0.000258, 0.0345, 0.0161, 1.11, 0.000677},
+     {1e-08, false, 9.55e-06, 0.00852, 0.000338, 0.195, 5.35e-05},
+     {1e-09, false, 1.39e-06, 0.0017, 0.000112, 0.039, 5.67e-06},
+     {1e-05, true, 2.53e-06, 0.00225, 0.00018, 0.0801, 0.0},
+     {1e-09, true, 1.6e-12, 1.79e-06, 1.39e-10, 7.79e-05, 1.11e-16}}};
 
 /// One unit in the fifth digit of a printed number.
 inline double FifthDigit(double printed) {

@@ -150,6 +150,37 @@ INSTANTIATE_TEST_SUITE_P(Columns, OneBody,
                                                                                : "FreeAndBall");
                          });
 
+class Bennett : public testing::TestWithParam<Column> {};
+
+TEST_P(Bennett, LinkageKeepsTheRelationOfItsAngles) {
+  // tan(theta1 / 2) tan(theta2 / 2) = sin((beta + alpha) / 2) / sin((beta - alpha) / 2)
+  const MechanismDescription scene =
+      ReadMechanism(kConfigs / "mechanisms/bennett.json").description;
+  const double alpha = 1.1, beta = std::asin(0.6 * std::sin(alpha));
+  const double plus = std::sin((beta + alpha) / 2), minus = std::sin((beta - alpha) / 2);
+  const Eigen::Matrix3d twist = Eigen::AngleAxisd(alpha, Eigen::Vector3d::UnitX()).matrix();
+  constexpr double kRtol = 1e-9;
+  double worst = 0.0;
+  const Simulation run =
+      Simulate(scene, GetParam(), Options("ode45", kRtol), 5.0, [&](const Snapshot& snapshot) {
+        const Eigen::Matrix3d& R1 = snapshot.bodies[1].R;
+        const Eigen::Matrix3d R12 = (R1 * twist).transpose() * snapshot.bodies[2].R;
+        const double half1 = std::atan2(R1(1, 0), R1(0, 0)) / 2;
+        const double half2 = std::atan2(R12(1, 0), R12(0, 0)) / 2;
+        worst = std::max(worst, std::abs(minus * std::sin(half1) * std::sin(half2) -
+                                         plus * std::cos(half1) * std::cos(half2)));
+      });
+  ASSERT_EQ(run.result.outcome, Outcome::kFinished) << run.result.message;
+  const double bound = static_cast<double>(run.result.steps) * kRtol;
+  EXPECT_LE(worst, bound);
+  EXPECT_LE(run.energy_error, 10.0 * bound);  // energies of some 10 J
+  std::cout << "relation " << worst << " of " << bound << ", energy " << run.energy_error << " J, "
+            << run.result.steps << " steps\n";
+}
+
+INSTANTIATE_TEST_SUITE_P(Columns, Bennett, testing::ValuesIn(RankRevealingColumns()),
+                         [](const auto& column) { return NameOf(column.param); });
+
 // The closed forms themselves against facts that need no elliptic function.
 
 TEST(SymmetricTop, PrecessesSteadilyWhereTheMomentsBalance) {

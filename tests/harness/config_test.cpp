@@ -48,7 +48,7 @@ TEST(ShippedMechanisms, HoldAsManyJointsAsTheyHaveDegreesOfFreedom) {
     const bool revolute = std::ranges::all_of(
         mechanism.joints, [](const auto& joint) { return joint.type == JointType::kRevolute; });
     // Grueebler's count for planar revolute joints; it holds for all of these scenes. The others
-    // are run (shipped_mechanisms_test.cpp).
+    // are run (tests/reference/shipped_mechanisms_test.cpp).
     if (mechanism.space != SpaceKind::kPlanar || !revolute) continue;
     const auto bodies = static_cast<int>(mechanism.bodies.size()) - 1;
     const int freedom = 3 * bodies - 2 * static_cast<int>(mechanism.joints.size());

@@ -86,6 +86,12 @@ class Runner {
     run.record.Set("rejected", result.rejected);
     run.record.Set("rhs_evaluations", result.rhs_evaluations);
     run.record.Set("restarts", result.restarts);
+    if (FindProfile(case_.integrator)->is_implicit) {
+      run.record.Set("newton_jacobians", result.jacobians);
+      run.record.Set("newton_rhs_evaluations", result.jacobian_rhs_evaluations);
+      run.record.Set("newton_iterations", result.newton_iterations);
+      run.record.Set("newton_failures", result.newton_failures);
+    }
     run.record.Set("wall_s", result.wall_s);
     run.drift = {drift_.series().t, drift_.series().value};
     return run;

@@ -22,6 +22,8 @@ std::string_view ToString(Outcome outcome) {
       return "inconsistent-motion";
     case Outcome::kLocked:
       return "locked";
+    case Outcome::kNewtonFailure:
+      return "newton-failure";
     case Outcome::kIntegratorError:
       return "integrator-error";
   }

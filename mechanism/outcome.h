@@ -16,6 +16,7 @@ enum class Outcome {
   kInconsistentStart,   ///< positions or speeds that satisfy the loops were not found
   kInconsistentMotion,  ///< prescribed motions ask for what the loops forbid
   kLocked,              ///< no speed is free and none is prescribed: nothing can move
+  kNewtonFailure,       ///< an implicit step's equations were not solved, however short the step
   kIntegratorError,     ///< any other error return of the integrator
 };
 

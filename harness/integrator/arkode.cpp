@@ -6,6 +6,7 @@
 #include <string>
 #include <vector>
 
+#include "harness/integrator/arkode_newton.h"
 #include "harness/integrator/arkode_vectors.h"
 #include "harness/integrator/arkode_versions.h"
 #include "harness/integrator/guarded_ode.h"
@@ -44,8 +45,8 @@ std::vector<double> StepEnds(const std::vector<double>& stop_times, double t0, d
 
 }  // namespace
 
-// Members are destroyed in reverse order: the context must outlive the vector, the controller and
-// the memory.
+// Members are destroyed in reverse order: the context must outlive the others, and the memory must
+// not.
 struct Stepper::Arkode {
   Arkode(GuardedOde& guarded, double t_start, double t_end, const std::vector<double>& y0)
       : ode_(guarded),
@@ -55,52 +56,64 @@ struct Stepper::Arkode {
     y_.reset(N_VNew_Serial(static_cast<sunindextype>(y0.size()), context_.get()));
     std::copy(y0.begin(), y0.end(), Span(y_.get()).begin());
     UseOurOperations(y_.get(), profile_.is_ode45);  // every vector of ARKODE is a clone of this one
-    memory_.reset(ERKStepCreate(Derivative, t_start, y_.get(), context_.get()));
-    CaptureMessages(memory(), kImplicit, &message_);
+    memory_ = Memory(profile_.is_implicit
+                         ? ARKStepCreate(nullptr, Derivative, t_start, y_.get(), context_.get())
+                         : ERKStepCreate(Derivative, t_start, y_.get(), context_.get()),
+                     FreeMemory{profile_.is_implicit});
+    CaptureMessages(memory(), profile_.is_implicit, &message_);
     SetProblem();
     SetController(profile_.controller);
     SetSteps(t_start);
   }
 
   void SetProblem() {
-    LOOPBENCH_SET(kImplicit, SetUserData, memory(), &ode_);
-    LOOPBENCH_SET(kImplicit, WFtolerances, memory(),
+    LOOPBENCH_SET(profile_.is_implicit, SetUserData, memory(), &ode_);
+    LOOPBENCH_SET(profile_.is_implicit, WFtolerances, memory(),
                   profile_.is_ode45 ? Weights<true> : Weights<false>);
-    Require(ERKStepSetTableName(memory(), profile_.table), "the table");
+    if (profile_.is_implicit) {
+      Require(ARKStepSetTableName(memory(), profile_.table, "ARKODE_ERK_NONE"), "the table");
+      newton_ = std::make_unique<Newton>(
+          memory(), y_.get(), static_cast<Eigen::Index>(ode_.Controlled()), context_.get());
+      // the other interpolant evaluates a derivative at the end of every step
+      LOOPBENCH_SET_IMPLICIT(SetInterpolantType, memory(), ARK_INTERP_LAGRANGE);
+    } else {
+      Require(ERKStepSetTableName(memory(), profile_.table), "the table");
+    }
     if (profile_.needs_fresh_derivative) {
-      LOOPBENCH_SET(kImplicit, SetPostprocessStepFn, memory(), NoChange);
+      LOOPBENCH_SET(profile_.is_implicit, SetPostprocessStepFn, memory(), NoChange);
     }
   }
 
   void SetController(const Controller& c) {
-    controller_ = SetControl(memory(), kImplicit, context_.get(), c);
-    LOOPBENCH_SET(kImplicit, SetSafetyFactor, memory(), c.safety);
-    LOOPBENCH_SET(kImplicit, SetMaxGrowth, memory(), c.growth);
-    LOOPBENCH_SET(kImplicit, SetMaxFirstGrowth, memory(), c.first_growth);
-    LOOPBENCH_SET(kImplicit, SetMinReduction, memory(), c.reduction);
-    LOOPBENCH_SET(kImplicit, SetMaxEFailGrowth, memory(), c.repeated_failure);
-    LOOPBENCH_SET(kImplicit, SetSmallNumEFails, memory(), 2);
-    LOOPBENCH_SET(kImplicit, SetFixedStepBounds, memory(), 1, c.keep_below);
+    controller_ = SetControl(memory(), profile_.is_implicit, context_.get(), c);
+    LOOPBENCH_SET(profile_.is_implicit, SetSafetyFactor, memory(), c.safety);
+    LOOPBENCH_SET(profile_.is_implicit, SetMaxGrowth, memory(), c.growth);
+    LOOPBENCH_SET(profile_.is_implicit, SetMaxFirstGrowth, memory(), c.first_growth);
+    LOOPBENCH_SET(profile_.is_implicit, SetMinReduction, memory(), c.reduction);
+    LOOPBENCH_SET(profile_.is_implicit, SetMaxEFailGrowth, memory(), c.repeated_failure);
+    LOOPBENCH_SET(profile_.is_implicit, SetSmallNumEFails, memory(), 2);
+    LOOPBENCH_SET(profile_.is_implicit, SetFixedStepBounds, memory(), 1, c.keep_below);
   }
 
   void SetSteps(double t0) {
     const IntegratorOptions& options = ode_.options();
-    LOOPBENCH_SET(kImplicit, SetMaxNumSteps, memory(), -1);   // the limit is ours
-    LOOPBENCH_SET(kImplicit, SetMaxHnilWarns, memory(), -1);  // so is the test for vanishing steps
+    LOOPBENCH_SET(profile_.is_implicit, SetMaxNumSteps, memory(), -1);  // the limit is ours
+    LOOPBENCH_SET(profile_.is_implicit, SetMaxHnilWarns, memory(),
+                  -1);  // so is the test for vanishing steps
     SetStopTime();
     // At the stop time 6.4 returns its interpolant. The step's end is moved to the stop time
     // first, and there the linear interpolant is 0 * y_old + 1 * y_new, the step's own end, whereas
     // higher degrees would evaluate derivatives for it.
-    LOOPBENCH_SET(kImplicit, SetInterpolantDegree, memory(), 1);
+    LOOPBENCH_SET(profile_.is_implicit, SetInterpolantDegree, memory(), 1);
     double longest = options.max_step;
     if (longest == 0 && profile_.is_ode45) {
       longest = 0.1 * (t_end() - t0);
     }
-    LOOPBENCH_SET(kImplicit, SetMaxStep, memory(), longest);  // 0 is none
+    LOOPBENCH_SET(profile_.is_implicit, SetMaxStep, memory(), longest);  // 0 is none
     if (options.fixed_step > 0) {
-      LOOPBENCH_SET(kImplicit, SetFixedStep, memory(), options.fixed_step);
+      LOOPBENCH_SET(profile_.is_implicit, SetFixedStep, memory(), options.fixed_step);
     } else if (profile_.is_ode45) {
-      LOOPBENCH_SET(kImplicit, SetInitStep, memory(),
+      LOOPBENCH_SET(profile_.is_implicit, SetInitStep, memory(),
                     ode_.FirstStepOfOde45(t0, t_end(), y(), longest));
     }
   }
@@ -113,11 +126,11 @@ struct Stepper::Arkode {
     const bool is_stop =
         end < t_end() || (!stops.empty() && std::binary_search(stops.begin(), stops.end(), end));
     ode_.SetStop(is_stop ? end : std::numeric_limits<double>::infinity());
-    LOOPBENCH_SET(kImplicit, SetStopTime, memory(), end);
+    LOOPBENCH_SET(profile_.is_implicit, SetStopTime, memory(), end);
   }
 
   void Restart(double t) {
-    LOOPBENCH_SET(kImplicit, Reset, memory(), t, y_.get());
+    LOOPBENCH_SET(profile_.is_implicit, Reset, memory(), t, y_.get());
     SetStopTime();  // Reset clears it
   }
 
@@ -126,14 +139,14 @@ struct Stepper::Arkode {
   void PassStop(double t, double clipped) {
     ++next_;
     if (clipped < unclipped_ && ode_.options().fixed_step == 0) {
-      LOOPBENCH_SET(kImplicit, SetInitStep, memory(), unclipped_);
+      LOOPBENCH_SET(profile_.is_implicit, SetInitStep, memory(), unclipped_);
     }
     Restart(t);
   }
 
   double last_step() const {
     sunrealtype h = 0;
-    LOOPBENCH_ARK(kImplicit, GetLastStep, memory(), &h);
+    LOOPBENCH_ARK(profile_.is_implicit, GetLastStep, memory(), &h);
     return h;
   }
 
@@ -141,7 +154,6 @@ struct Stepper::Arkode {
   double t_end() const { return ends_.back(); }
   std::span<double> y() const { return Span(y_.get()); }
 
-  static constexpr bool kImplicit = false;
   GuardedOde& ode_;
   const Profile& profile_;
   std::vector<double> ends_;  // where steps must end; the next is ends_[next_]
@@ -151,6 +163,7 @@ struct Stepper::Arkode {
   Context context_;
   Vector y_;
   ControllerPtr controller_;
+  std::unique_ptr<Newton> newton_;  // of implicit methods
   Memory memory_;
 };
 
@@ -161,8 +174,8 @@ Stepper::~Stepper() = default;
 
 int Stepper::Step(double& t) {
   Arkode& a = *arkode_;
-  const int code =
-      LOOPBENCH_ARK(a.kImplicit, Evolve, a.memory(), a.t_end(), a.y_.get(), &t, ARK_ONE_STEP);
+  const int code = LOOPBENCH_ARK(a.profile_.is_implicit, Evolve, a.memory(), a.t_end(), a.y_.get(),
+                                 &t, ARK_ONE_STEP);
   if (code != ARK_TSTOP_RETURN) {
     a.unclipped_ = a.last_step();
   } else if (t < a.t_end()) {
@@ -184,8 +197,16 @@ double Stepper::last_step() const { return arkode_->last_step(); }
 
 std::int64_t Stepper::rejected() const {
   long count = 0;
-  LOOPBENCH_ARK(arkode_->kImplicit, GetNumErrTestFails, arkode_->memory(), &count);
+  LOOPBENCH_ARK(arkode_->profile_.is_implicit, GetNumErrTestFails, arkode_->memory(), &count);
   return count;
+}
+
+std::int64_t Stepper::newton_iterations() const {
+  return arkode_->newton_ ? NewtonIterations(arkode_->memory()) : 0;
+}
+
+std::int64_t Stepper::newton_failures() const {
+  return arkode_->newton_ ? NewtonFailures(arkode_->memory()) : 0;
 }
 
 Outcome OutcomeOfReturnCode(int code) {
@@ -198,6 +219,9 @@ Outcome OutcomeOfReturnCode(int code) {
       return Outcome::kStepLimit;
     case ARK_ERR_FAILURE:
       return Outcome::kStepTooSmall;
+    case ARK_CONV_FAILURE:
+    case ARK_NLS_SETUP_RECVR:
+      return Outcome::kNewtonFailure;
     default:
       return Outcome::kIntegratorError;
   }

@@ -1,4 +1,4 @@
-// Explicit Runge-Kutta integration by ARKODE, with named profiles and named endings.
+// Runge-Kutta integration by ARKODE, with named profiles and named endings.
 //
 // SUNDIALS appears only in arkode.cpp and the files arkode_*; this header is what the rest of the
 // harness sees.
@@ -25,6 +25,13 @@ struct IntegratorResult {
   std::int64_t restarts = 0;         ///< times the observer asked for kRestart and was followed
   double last_step = 0;              ///< length of the last accepted step, s
   double wall_s = 0;                 ///< wall time of the run, observers included, s
+
+  // Implicit profiles only, else 0:
+  std::int64_t jacobians = 0;                 ///< Jacobians evaluated
+  std::int64_t jacobian_rhs_evaluations = 0;  ///< calls of Ode::Derivative for their difference
+                                              ///< quotients, not part of rhs_evaluations
+  std::int64_t newton_iterations = 0;         ///< of all stages, each with a call of Derivative
+  std::int64_t newton_failures = 0;           ///< stages that did not converge, the step shortened
 };
 
 /// Integrates from (t0, y) to t_end >= t0 and leaves in `y` the last accepted state, whatever the
@@ -41,9 +48,10 @@ IntegratorResult Integrate(Ode& ode, double t0, double t_end, std::vector<double
 
 /// The one table from ARKODE's return codes (ARK_... in arkode.h of SUNDIALS) to outcomes:
 /// 0 and 1 (step taken, stop time reached) and 99 (warning) are kFinished; -1 (too much work) is
-/// kStepLimit; -3 (error test failed too often in one step) is kStepTooSmall; every other code is
-/// kIntegratorError. A failure of the derivative (-8 to -11) is reported as what the derivative
-/// returned, and is kIntegratorError here because the code alone does not say.
+/// kStepLimit; -3 (error test failed too often in one step) is kStepTooSmall; -4 and -31 (Newton's
+/// iteration failed too often in one step, or at all with a fixed one) are kNewtonFailure; every
+/// other code is kIntegratorError. A failure of the derivative (-8 to -11) is reported as what the
+/// derivative returned, and is kIntegratorError here because the code alone does not say.
 Outcome OutcomeOfReturnCode(int code);
 
 }  // namespace loopbench::harness

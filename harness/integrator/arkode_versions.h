@@ -20,14 +20,18 @@
 #if SUNDIALS_VERSION_MAJOR >= 7
 #include <sundials/sundials_adaptcontroller.h>
 #define LOOPBENCH_ARK(implicit, call, ...) ARKode##call(__VA_ARGS__)
+#define LOOPBENCH_ARK_IMPLICIT(call, ...) ARKode##call(__VA_ARGS__)
 #else
 #define LOOPBENCH_ARK(implicit, call, ...) \
   ((implicit) ? ARKStep##call(__VA_ARGS__) : ERKStep##call(__VA_ARGS__))
+#define LOOPBENCH_ARK_IMPLICIT(call, ...) ARKStep##call(__VA_ARGS__)
 #endif
 
 // The same for calls that can only fail by a mistake of ours.
 #define LOOPBENCH_SET(implicit, call, ...) \
   ::loopbench::harness::Require(LOOPBENCH_ARK(implicit, call, __VA_ARGS__), #call)
+#define LOOPBENCH_SET_IMPLICIT(call, ...) \
+  ::loopbench::harness::Require(LOOPBENCH_ARK_IMPLICIT(call, __VA_ARGS__), #call)
 
 namespace loopbench::harness {
 
@@ -45,7 +49,7 @@ struct FreeVector {
   void operator()(std::remove_pointer_t<N_Vector>* vector) const { N_VDestroy(vector); }
 };
 struct FreeMemory {
-  bool implicit;
+  bool implicit = false;
   void operator()([[maybe_unused]] void* memory) const { LOOPBENCH_ARK(implicit, Free, &memory); }
 };
 using Context = std::unique_ptr<std::remove_pointer_t<SUNContext>, FreeContext>;

@@ -8,7 +8,14 @@
 namespace loopbench::harness {
 
 GuardedOde::GuardedOde(Ode& ode, const IntegratorOptions& options)
-    : options_(options), ode_(ode), start_(Clock::now()) {}
+    : options_(options), ode_(ode), start_(Clock::now()) {
+  if (FindProfile(options.profile)->is_implicit) {
+    const auto size = static_cast<size_t>(ode.size());
+    jacobian_.resize(size * Controlled());
+    shifted_.resize(size);
+    shifted_f_.resize(size);
+  }
+}
 
 bool GuardedOde::Evaluate(double t, std::span<const double> y, std::span<double> ydot) noexcept {
   // Reading the clock costs a fifth of a small system's derivative, hence every 16th call only.

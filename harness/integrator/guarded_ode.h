@@ -6,6 +6,7 @@
 #include <exception>
 #include <limits>
 #include <span>
+#include <vector>
 
 #include "harness/integrator/ode.h"
 #include "harness/integrator/options.h"
@@ -25,6 +26,13 @@ class GuardedOde {
   /// False if the run must end; `failure()` or `exception()` then says why.
   bool Evaluate(double t, std::span<const double> y, std::span<double> ydot) noexcept;
 
+  /// Renews jacobian() from the problem's own, or else by forward differences, whose evaluations
+  /// count as jacobian_calls(); f is the derivative at (t, y). False as above.
+  bool EvaluateJacobian(double t, std::span<const double> y, std::span<const double> f) noexcept;
+
+  /// df_i/dy_j at [i + y.size() * j] for all i and for the j that are not quadratures.
+  std::span<const double> jacobian() const { return jacobian_; }
+
   /// Lets the derivative see only times before `t` from now on; infinity lifts this.
   void SetStop(double t);
 
@@ -41,24 +49,31 @@ class GuardedOde {
   /// use it.
   double FirstStepOfOde45(double t0, double t_end, std::span<const double> y0, double longest);
 
+  /// Number of components that are not quadratures.
+  size_t Controlled() const { return static_cast<size_t>(ode_.size() - ode_.num_quadratures()); }
+
   /// Wall time since construction, s.
   double wall_s() const;
 
   Outcome failure() const { return failure_; }
   std::exception_ptr exception() const { return exception_; }
-  std::int64_t calls() const { return calls_; }  ///< of the derivative, the failing one included
+
+  /// Evaluations of the derivative, the failing one included, without those for Jacobians.
+  std::int64_t calls() const { return calls_ - jacobian_calls_; }
+  std::int64_t jacobian_calls() const { return jacobian_calls_; }  ///< evaluations for Jacobians
+  std::int64_t jacobians() const { return jacobians_; }            ///< Jacobians evaluated
   const IntegratorOptions& options() const { return options_; }
 
  private:
   using Clock = std::chrono::steady_clock;
-  /// Number of components that are not quadratures.
-  size_t Controlled() const { return static_cast<size_t>(ode_.size() - ode_.num_quadratures()); }
+  bool Differences(double t, std::span<const double> y, std::span<const double> f);
 
   const IntegratorOptions& options_;
   Ode& ode_;
   double latest_ = std::numeric_limits<double>::infinity();  // time that the derivative may see
   Clock::time_point start_;
-  std::int64_t calls_ = 0;
+  std::int64_t calls_ = 0, jacobian_calls_ = 0, jacobians_ = 0;
+  std::vector<double> jacobian_, shifted_, shifted_f_;  // empty for explicit profiles
   Outcome failure_ = Outcome::kFinished;
   std::exception_ptr exception_;
 };

@@ -110,8 +110,12 @@ IntegratorResult Integrate(Ode& ode, double t0, double t_end, std::vector<double
     Stepper stepper(guarded, t0, t_end, y);
     Advance(guarded, stepper, t_end, y, observe, result);
     result.rejected = stepper.rejected();
+    result.newton_iterations = stepper.newton_iterations();
+    result.newton_failures = stepper.newton_failures();
   }
   result.rhs_evaluations = guarded.calls();
+  result.jacobians = guarded.jacobians();
+  result.jacobian_rhs_evaluations = guarded.jacobian_calls();
   result.wall_s = guarded.wall_s();
   return result;
 }

@@ -31,6 +31,15 @@ class Ode {
   /// kFinished, or the failure that ends the run (kSingular,
   /// ...). The integrator checks for NaN and infinity itself, so no implementation need do so.
   virtual Outcome Derivative(double t, std::span<const double> y, std::span<double> ydot) = 0;
+
+  /// For implicit methods: writes df_i/dy_j to `jacobian`[i + size() * j], i < size() and
+  /// j < size() - num_quadratures(), and returns true. False, as here, asks for difference
+  /// quotients of f. It may be an approximation: that makes Newton's iteration slower, not the
+  /// solution wrong.
+  virtual bool Jacobian(double /*t*/, std::span<const double> /*y*/,
+                        std::span<double> /*jacobian*/) {
+    return false;
+  }
 };
 
 /// What the run does after an observation.

@@ -29,7 +29,7 @@ constexpr Controller kArkode{.proportional = true,
                              .repeated_failure = 0.3,
                              .keep_below = 1.5};
 
-constexpr std::array<Profile, 7> kProfiles{{
+constexpr std::array<Profile, 12> kProfiles{{
     {"ode45", "ARKODE_DORMAND_PRINCE_7_4_5", kMatlab, true, false},
     {"dormand-prince", "ARKODE_DORMAND_PRINCE_7_4_5", kArkode, false, false},
     {"bogacki-shampine", "ARKODE_BOGACKI_SHAMPINE_4_2_3", kArkode, false, false},
@@ -37,6 +37,11 @@ constexpr std::array<Profile, 7> kProfiles{{
     {"fehlberg", "ARKODE_FEHLBERG_6_4_5", kArkode, false, false},
     {"verner", "ARKODE_VERNER_8_5_6", kArkode, false, true},
     {"fehlberg-78", "ARKODE_FEHLBERG_13_7_8", kArkode, false, true},
+    {"trbdf2", "ARKODE_TRBDF2_3_3_2", kArkode, false, false, true},
+    {"kennedy-carpenter-32", "ARKODE_ESDIRK324L2SA_4_2_3", kArkode, false, false, true},
+    {"kennedy-carpenter-43", "ARKODE_ESDIRK436L2SA_6_3_4", kArkode, false, false, true},
+    {"kvaerno-54", "ARKODE_KVAERNO_7_4_5", kArkode, false, false, true},
+    {"kennedy-carpenter-54", "ARKODE_ESDIRK547L2SA_7_4_5", kArkode, false, false, true},
 }};
 
 std::string Joined(const std::vector<std::string>& names) {

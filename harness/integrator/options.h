@@ -22,6 +22,23 @@ namespace loopbench::harness {
 /// | verner           | Verner 6(5)           | 6     | as dormand-prince                        |
 /// | fehlberg-78      | Fehlberg 8(7)         | 8     | as dormand-prince                        |
 ///
+/// Implicit, for stiff mechanisms; norm and controller as dormand-prince. Each step solves for its
+/// stages one after the other by Newton's iteration with a dense matrix.
+///
+/// | profile              | pair                   | order | stability, and R(inf) of the embedding
+/// |
+/// |----------------------|------------------------|-------|----------------------------------------|
+/// | trbdf2               | TR-BDF2, embedded 3    | 2     | L; unbounded | | kennedy-carpenter-32
+/// | ESDIRK3(2)4L[2]SA      | 3     | L; 0.22                                | |
+/// kennedy-carpenter-43 | ESDIRK4(3)6L[2]SA      | 4     | L; 0                                   |
+/// | kvaerno-54           | ESDIRK5/4 of Kvaerno   | 5     | L; 0.75 | | kennedy-carpenter-54 |
+/// ESDIRK5(4)7L[2]SA      | 5     | L; 0.35                                |
+///
+/// Sources: R. Bank et al., IEEE Trans. Electron Devices 32, 1985, and M. Hosea, L. Shampine, Appl.
+/// Numer. Math. 20, 1996 (TR-BDF2); A. Kvaerno, BIT 44, 2004; C. Kennedy, M. Carpenter,
+/// NASA/TM-2016-219173. Left out of ARKODE's tables: those with an embedding that amplifies stiff
+/// components (SDIRK 5(3)4 and others), and ESDIRK547L2SA2, whose coefficients are wrong in 6.4.
+///
 /// "ode45" follows MATLAB's function of that name (L. Shampine, M. Reichelt, The MATLAB ODE suite,
 /// 1997): step counts agree with it within about 1 %. The list is closed because ARKODE 6.4.1 loses
 /// the order of many of its own tables (LLNL/sundials issue 311); each profile here has a
@@ -90,6 +107,8 @@ struct Profile {
   /// order with tables that are not; a post-step hook, even an empty one, makes it evaluate the
   /// derivative at the new solution (LLNL/sundials issue 311, fixed in 6.7).
   bool needs_fresh_derivative;
+
+  bool is_implicit = false;  ///< diagonally implicit, stages by Newton's iteration
 };
 
 /// The profile of that name, or nullptr.

@@ -33,6 +33,10 @@ class Stepper {
   double last_step() const;            ///< length of the last accepted step, s
   std::int64_t rejected() const;       ///< failed error tests so far
 
+  // Zero for explicit profiles:
+  std::int64_t newton_iterations() const;  ///< so far
+  std::int64_t newton_failures() const;    ///< stages so far that did not converge
+
  private:
   struct Arkode;
   std::unique_ptr<Arkode> arkode_;

@@ -46,6 +46,7 @@ std::vector<TableColumn> CompactCaseColumns() {
         {"step-too-small", "small step"},
         {"inconsistent-start", "bad start"},
         {"inconsistent-motion", "bad motion"},
+        {"newton-failure", "newton"},
         {"integrator-error", "integrator"}}},
   };
 }
@@ -74,6 +75,10 @@ std::vector<TableColumn> OtherColumns() {
       Make("rcond_min_t", "at time [s]", kSeconds),
       Make("softened_steps", "softened steps", kInteger),
       Make("wall_s", "wall [s]", kSeconds),
+      Make("newton_iterations", "newton iterations", kInteger),
+      Make("newton_failures", "newton failures", kInteger),
+      Make("newton_jacobians", "jacobians", kInteger),
+      Make("newton_rhs_evaluations", "rhs for jacobians", kInteger),
       Make("plan_depth", "plan depth", kInteger),
       Make("plan_largest_join", "largest join", kInteger),
       Make("rhs_operations", "rhs operations", kInteger),

@@ -74,7 +74,9 @@ inline IntegratorOptions WithTolerance(const std::string& profile, double tolera
 
 /// The order each profile claims (options.h).
 inline int OrderOf(const std::string& profile) {
-  if (profile == "bogacki-shampine") return 3;
+  if (profile == "trbdf2") return 2;
+  if (profile == "bogacki-shampine" || profile == "kennedy-carpenter-32") return 3;
+  if (profile == "kennedy-carpenter-43") return 4;
   if (profile == "verner") return 6;
   if (profile == "fehlberg-78") return 8;
   return 5;

@@ -143,7 +143,7 @@ TEST(IntegratorRun, ReturnCodesMapToOutcomes) {
       {0, Outcome::kFinished},          {1, Outcome::kFinished},
       {99, Outcome::kFinished},         {-1, Outcome::kStepLimit},
       {-2, Outcome::kIntegratorError},  {-3, Outcome::kStepTooSmall},
-      {-4, Outcome::kIntegratorError},  {-8, Outcome::kIntegratorError},
+      {-4, Outcome::kNewtonFailure},    {-8, Outcome::kIntegratorError},
       {-9, Outcome::kIntegratorError},  {-10, Outcome::kIntegratorError},
       {-11, Outcome::kIntegratorError}, {-22, Outcome::kIntegratorError},
       {-27, Outcome::kIntegratorError}, {-99, Outcome::kIntegratorError}};
@@ -214,6 +214,14 @@ TEST_P(EveryProfileRun, RestartWithUnchangedStateKeepsSteps) {
   };
   const auto [plain, y_plain] = run(StepAction::kContinue);
   const auto [restarted, y_restarted] = run(StepAction::kRestart);
+  if (FindProfile(GetParam())->is_implicit) {
+    // Newton starts from another prediction and leaves another hundredth of the tolerance
+    EXPECT_NEAR(static_cast<double>(restarted.steps), static_cast<double>(plain.steps),
+                0.02 * static_cast<double>(plain.steps));
+    EXPECT_EQ(restarted.restarts, restarted.steps - 1);
+    EXPECT_NEAR(y_restarted[0], y_plain[0], 1e-6);
+    return;
+  }
   EXPECT_EQ(restarted.steps, plain.steps);
   EXPECT_EQ(restarted.rejected, plain.rejected);
   EXPECT_EQ(plain.restarts, 0);

@@ -52,15 +52,17 @@ TEST_P(EveryProfile, ConvergesWithItsOrderAtFixedSteps) {
 }
 
 // A tolerance is met in the sense of "global error within 100 times the local tolerance": errors
-// of some 30 steps add up and the problem amplifies them by less than e^2.
+// of some 30 steps add up and the problem amplifies them by less than e^2. A pair of order 2 takes
+// thousands of steps, whose errors add up to more.
 TEST_P(EveryProfile, MeetsItsTolerance) {
   TestOde ode = SmoothProblem();
   State y = SmoothSolution(0);
   const IntegratorResult result = Integrate(ode, 0, 1.5, y, WithTolerance(GetParam(), 1e-8));
   EXPECT_EQ(result.outcome, Outcome::kFinished);
   EXPECT_EQ(result.t_reached, 1.5);
+  const double bound = OrderOf(GetParam()) == 2 ? 1e-8 * static_cast<double>(result.steps) : 1e-6;
   for (size_t i = 0; i < y.size(); ++i) {
-    EXPECT_NEAR(y[i], SmoothSolution(1.5)[i], 1e-6);
+    EXPECT_NEAR(y[i], SmoothSolution(1.5)[i], bound);
   }
 }
 
@@ -127,7 +129,8 @@ TEST(IntegratorOptions, ValidationNamesTheOptionAndWhatIsAccepted) {
   EXPECT_EQ(Validate({}), "");
   EXPECT_EQ(fault([](auto& o) { o.profile = "rk4"; }),
             "profile is \"rk4\"; accepted: ode45, dormand-prince, bogacki-shampine, cash-karp, "
-            "fehlberg, verner, fehlberg-78");
+            "fehlberg, verner, fehlberg-78, trbdf2, kennedy-carpenter-32, "
+            "kennedy-carpenter-43, kvaerno-54, kennedy-carpenter-54");
   EXPECT_EQ(fault([](auto& o) { o.rtol = 1e-17; }).substr(0, 4), "rtol");
   EXPECT_EQ(fault([=](auto& o) { o.atol = nan; }).substr(0, 4), "atol");
   EXPECT_EQ(fault([](auto& o) { o.step_limit = 0; }).substr(0, 10), "step_limit");

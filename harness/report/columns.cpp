@@ -45,6 +45,7 @@ std::vector<TableColumn> CompactCaseColumns() {
        {{"finished", "ok"},
         {"step-too-small", "small step"},
         {"inconsistent-start", "bad start"},
+        {"inconsistent-motion", "bad motion"},
         {"integrator-error", "integrator"}}},
   };
 }

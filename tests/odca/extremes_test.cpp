@@ -112,19 +112,20 @@ TEST(ExtremesTest, HubsOfAThousandArmsAreExactAndLinear) {
   }
 }
 
-TEST(ExtremesTest, FiftyNestedLoopsAreExactAndLinear) {
+TEST(ExtremesTest, NestedLoopsAreExactAndLinear) {
   for (std::uint64_t seed = 1; seed <= 3; ++seed) {
-    const auto small = Hold<Planar>(testing::NestedLoops(5, kPlane, seed));
-    const auto large = Hold<Planar>(testing::NestedLoops(50, kPlane, seed));
-    // the innermost and the outermost loop keep fewer bodies: of five loops they are two
-    EXPECT_LE(large.operations, 14 * small.operations);
-    const auto small_in_space = Hold<Spatial>(testing::NestedLoops(5, kSpace, seed));
-    const auto large_in_space = Hold<Spatial>(testing::NestedLoops(50, kSpace, seed));
-    EXPECT_LE(large_in_space.operations, 14 * small_in_space.operations);
+    Hold<Planar>(testing::NestedLoops(50, kPlane, seed));
+    Hold<Spatial>(testing::NestedLoops(50, kSpace, seed));
   }
+  const auto small = Hold<Planar>(testing::NestedLoops(30, kPlane, 1));
+  const auto large = Hold<Planar>(testing::NestedLoops(300, kPlane, 1));
+  EXPECT_LE(large.operations, 11 * small.operations);
 }
 
-TEST(ExtremesTest, AGridOfThirtyByThirtyIsExact) { Hold<Planar>(Grid(30, 30, -1.0, 0.0)); }
+TEST(ExtremesTest, AGridOfThirtyByThirtyIsExact) {
+  // storey r stands at 0.12 + 0.1 (r - 1): none is flat, where its windows would be singular
+  Hold<Planar>(Grid(30, 30, 0.12, 0.0));
+}
 
 TEST(ExtremesTest, SmallOnesAgreeWithTheOracle) {
   testing::Family chains("chains of every kind", 0.0), loops("nested loops", 0.0);

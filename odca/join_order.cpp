@@ -5,13 +5,14 @@
 #include <utility>
 
 #include "odca/dissection.h"
+#include "odca/front.h"
 #include "odca/pairing.h"
 
 namespace loopbench::odca {
 
 namespace {
 
-/// Joins of so few handles leave nothing to gain by dissection.
+/// Where no join has more handles, pairing needs no competition.
 constexpr int kFewHandles = 8;
 
 class Orderer {
@@ -31,24 +32,37 @@ class Orderer {
     double cost = 0.0;
   };
 
-  /// Orders the joins of a connected set of bodies by the better rule.
+  /// Orders the joins of a connected set of bodies by the best rule.
   Ordered Order(const std::vector<int>& bodies) {
     if (bodies.size() == 1) return {bodies.front(), 0.0};
     const std::size_t start = joins_.size();
     Mark(bodies);
     const JoinSum paired = Pairing(graph_, bodies, bodies, dim_, &marks_).Run(&joins_);
-    Ordered best{LastName(), paired.cost};
-    std::vector<int> side;
-    if (paired.handles > kFewHandles) side = BestSide(graph_, bodies, marks_.part_of);
+    double best = paired.cost;
+    if (paired.handles > kFewHandles) {
+      std::vector<Join> by_best = Take(start);
+      const auto compete = [&](double cost) {
+        std::vector<Join> joins = Take(start);
+        if (cost >= best) return;
+        best = cost;
+        by_best = std::move(joins);
+      };
+      compete(JoinToFront(graph_, bodies, dim_, &marks_, &joins_).cost);
+      std::vector<int> side = BestSide(graph_, bodies, marks_.part_of);
+      Unmark(bodies);
+      if (!side.empty()) compete(OrderParts(bodies, std::move(side)));
+      joins_.insert(joins_.end(), by_best.begin(), by_best.end());
+    }
     Unmark(bodies);
-    if (side.empty()) return best;
+    return {graph_.num_bodies() + static_cast<int>(joins_.size()) - 1, best};
+  }
 
-    const std::vector<Join> by_pairing(joins_.begin() + start, joins_.end());
-    joins_.resize(start);
-    std::vector<std::vector<int>> parts = Connected(side);
+  /// Orders the two sides of a cut, each by its connected parts, and joins these; the cost.
+  double OrderParts(const std::vector<int>& bodies, std::vector<int> side) {
     std::ranges::sort(side);
     std::vector<int> rest;
     std::ranges::set_difference(bodies, side, std::back_inserter(rest));
+    std::vector<std::vector<int>> parts = Connected(side);
     for (std::vector<int>& part : Connected(rest)) parts.push_back(std::move(part));
     std::vector<int> names;
     double cost = 0.0;
@@ -62,13 +76,15 @@ class Orderer {
     }
     cost += Pairing(graph_, bodies, names, dim_, &marks_).Run(&joins_).cost;
     Unmark(bodies);
-    if (cost < best.cost) return {LastName(), cost};
-    joins_.resize(start);
-    joins_.insert(joins_.end(), by_pairing.begin(), by_pairing.end());
-    return best;
+    return cost;
   }
 
-  int LastName() const { return graph_.num_bodies() + static_cast<int>(joins_.size()) - 1; }
+  /// Takes the joins from `start` on back.
+  std::vector<Join> Take(std::size_t start) {
+    std::vector<Join> joins(joins_.begin() + start, joins_.end());
+    joins_.resize(start);
+    return joins;
+  }
 
   /// Each body a part of its own.
   void Mark(std::span<const int> bodies) {

@@ -1,20 +1,20 @@
 // In which order assemblies are joined: the tree behind a plan, before its lists are written.
 //
-// Two rules compete, and what a sweep would cost decides (`JoinCost`).
+// Three rules compete, and what a sweep would cost decides (`JoinCost`).
 //
-// *Pairing* grows the tree from below. All pairs of neighbouring assemblies wait in a queue; the
-// next pair has the smallest boundary after its join, in classes a factor sqrt(2) apart (up to four
-// bodies are one class), then the fewest bodies, also in powers of two, then exactly the smallest
-// boundary. A chain halves, arms are finished before their hub takes them, and what would spread
-// along a hub waits.
+// *Pairing* grows the tree from below (pairing.h). All pairs of neighbouring assemblies wait in a
+// queue; the next pair has the smallest boundary after its join, in classes a factor sqrt(2) apart
+// (up to four bodies are one class), then the fewest bodies, also in powers of two, then exactly
+// the smallest boundary. A chain halves, arms are finished before their hub takes them, and what
+// would spread along a hub waits.
 //
-// *Dissection* splits from above, where pairing has made large joins. Four bodies far from each
-// other are landmarks; the difference of the distances to two of them is a coordinate of the graph,
-// and each of the six coordinates is swept for the cut with the fewest bodies on it
-// (`Dissection`). On a k x k grid cuts have O(k) bodies at the top and halve in area below, hence
-// O(k^3) multiply-adds = O(n^1.5) (Lipton, Rose and Tarjan 1979; George 1973).
+// Where pairing makes large joins, there are two others. *Front* (front.h): one assembly takes body
+// after body; right for bodies between several hubs. *Dissection* (dissection.h) cuts from above; a
+// k x k grid is cut by O(k) bodies at the top and halves in area below, hence O(k^3) multiply-adds
+// = O(n^1.5) (George 1973; Lipton, Rose and Tarjan 1979). Its parts are ordered by the best rule
+// again.
 //
-// Both take O(n log n) steps per level of the dissection, of which there are O(log n).
+// All take O(n log n) steps per level of the dissection, of which there are O(log n).
 #pragma once
 
 #include <span>

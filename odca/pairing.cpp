@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <bit>
 #include <limits>
+#include <tuple>
 
 namespace loopbench::odca {
 
@@ -10,8 +11,9 @@ namespace {
 
 /// Boundaries up to this many bodies are as good as each other: those of chains and ladders.
 constexpr int kFew = 4;
-/// A part with more neighbours is a hub: its pairs are looked at again when their turn comes.
-constexpr std::size_t kManyBonds = 16;
+/// Pairs of a part with more neighbours (a hub), and pairs with more joints, are looked at again
+/// only when their turn comes.
+constexpr std::size_t kMany = 16;
 
 /// 0 up to kFew bodies, then one class per factor sqrt(2).
 int BoundaryClass(int boundary) {
@@ -61,8 +63,11 @@ JoinSum Pairing::Run(std::vector<Join>* joins) {
     const Key key = queue_.top();
     queue_.pop();
     if (bonds_[key.bond].joints.empty()) continue;
-    // what was joined meanwhile may have made this pair worse
-    if (const Key now = KeyOf(key.bond); now > key) {
+    // what was joined meanwhile may have made this pair worse; within its classes that is let pass,
+    // or each join of a hub would send all its pairs back
+    const Key now = KeyOf(key.bond);
+    if (std::tie(now.boundary_class, now.size_class) >
+        std::tie(key.boundary_class, key.size_class)) {
       queue_.push(now);
     } else {
       Merge(key.bond, joins);
@@ -85,6 +90,10 @@ Pairing::Key Pairing::KeyOf(int index) {
   const int boundary = BoundaryAfter(bond);
   const auto bodies = static_cast<unsigned>(std::max(parts_[bond.a].bodies, parts_[bond.b].bodies));
   return {BoundaryClass(boundary), static_cast<int>(std::bit_width(bodies)), boundary, index};
+}
+
+void Pairing::Renew(int bond) {
+  if (bonds_[bond].joints.size() <= kMany) queue_.push(KeyOf(bond));
 }
 
 void Pairing::Merge(int index, std::vector<Join>* joins) {
@@ -127,10 +136,10 @@ void Pairing::Merge(int index, std::vector<Join>* joins) {
       to.joints.insert(to.joints.end(), from.joints.begin(), from.joints.end());
       from.joints.clear();
     }
-    if (into.bonds.size() > kManyBonds) queue_.push(KeyOf(it->second));
+    if (into.bonds.size() > kMany) Renew(it->second);
   }
-  if (into.bonds.size() > kManyBonds) return;
-  for (const auto& [other, bond_there] : into.bonds) queue_.push(KeyOf(bond_there));
+  if (into.bonds.size() > kMany) return;
+  for (const auto& [other, bond_there] : into.bonds) Renew(bond_there);
 }
 
 }  // namespace loopbench::odca

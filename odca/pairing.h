@@ -59,6 +59,8 @@ class Pairing {
 
   int BoundaryAfter(const Bond& bond);
   Key KeyOf(int bond);
+  /// A better place in the queue, if the pair has become better.
+  void Renew(int bond);
   void Merge(int bond, std::vector<Join>* joins);
 
   const int num_bodies_;

@@ -5,10 +5,10 @@
 // and keeps as boundary only the bodies that a joint still to come will touch. Ground is an
 // assembly with zero response and has no handle.
 //
-// Two rules make the tree, pairing from below and dissection from above; join_order.h has both. A
-// chain or ladder of n bodies gets depth O(log n) and boundaries of one to four bodies; a k x k
-// grid boundaries of O(k), hence O(n^1.5) multiply-adds; a hub takes its arms one by one, each
-// finished before, in O(n) multiply-adds and a depth of as many joins as it has arms.
+// Three rules make the tree, and the cheapest one wins (join_order.h). A chain or ladder of n
+// bodies gets depth O(log n) and boundaries of one to four bodies; a k x k grid boundaries of O(k),
+// hence O(n^1.5) multiply-adds; a hub takes its arms one by one, each finished before, in O(n)
+// multiply-adds and a depth of as many joins as it has arms.
 //
 // Properties: each body is a leaf of exactly one tree, each joint with constraints is in exactly
 // one node; children come before parents; the order is depth-first, so a node's children are recent

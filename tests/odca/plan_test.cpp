@@ -209,6 +209,25 @@ TEST(PlanTest, AWheelKeepsFewBodiesOnItsBoundaries) {
   EXPECT_LE(large.operations(3), 11 * small.operations(3));
 }
 
+TEST(PlanTest, BarsBetweenSeveralPlatesAreTakenOneByOne) {
+  // each bar is on all plates: pairs of bars and plates alone would leave all bars on the boundary
+  for (int plates : {2, 3, 5}) {
+    const auto plan_of = [&](int bars) {
+      std::vector<PlanJoint> joints = {{0, 0, 1, 2}};
+      for (int bar = plates + 1; bar <= plates + bars; ++bar) {
+        for (int plate = 1; plate <= plates; ++plate) {
+          joints.push_back({static_cast<int>(joints.size()), plate, bar, 2});
+        }
+      }
+      return Plan(plates + bars + 1, joints);
+    };
+    const Plan small = plan_of(100), large = plan_of(1000);
+    // the plates, a bar, and while the plates are collected one bar more
+    EXPECT_LE(large.most_handles(), plates + 2);
+    EXPECT_LE(large.operations(3), 11 * small.operations(3));
+  }
+}
+
 TEST(PlanTest, GridsCostNoMoreThanNestedDissection) {
   // least squares of log operations against log bodies; small grids have terms of lower order,
   // with either sign, so that single pairs of sizes lie on both sides

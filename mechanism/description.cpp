@@ -3,6 +3,7 @@
 #include <Eigen/Cholesky>
 #include <cmath>
 
+#include "mechanism/force_elements.h"
 #include "mechanism/joint.h"
 
 namespace loopbench {
@@ -47,6 +48,26 @@ std::string CheckPlanarJoint(const JointDescription& joint) {
   return "";
 }
 
+std::string CheckMotions(SpaceKind space, const JointDescription& joint) {
+  const int speeds = NumValues(joint.type, space, true);
+  if (joint.motions.empty()) return "";
+  if (NumValues(joint.type, space, false) != speeds) {
+    return "a joint with a quaternion has no coordinate to prescribe";
+  }
+  std::vector<bool> taken(speeds, false);
+  for (const PrescribedMotion& motion : joint.motions) {
+    if (motion.coordinate < 0 || motion.coordinate >= speeds) {
+      return "no coordinate " + std::to_string(motion.coordinate) + " to prescribe";
+    }
+    if (taken[motion.coordinate]) {
+      return "coordinate " + std::to_string(motion.coordinate) + " is prescribed twice";
+    }
+    taken[motion.coordinate] = true;
+    if (const std::string error = Validate(motion.value); !error.empty()) return error;
+  }
+  return "";
+}
+
 std::string CheckJoint(const MechanismDescription& description, const JointDescription& joint) {
   const int num_bodies = static_cast<int>(description.bodies.size());
   for (int body : {joint.from.body, joint.to.body}) {
@@ -64,31 +85,16 @@ std::string CheckJoint(const MechanismDescription& description, const JointDescr
       !joint.axis.allFinite()) {
     return "joint " + Quote(joint.name) + ": positions, rotations and axis must be finite";
   }
+  if (!std::isfinite(joint.pitch) || !std::isfinite(joint.length)) {
+    return "joint " + Quote(joint.name) + ": pitch and length must be finite";
+  }
+  if (joint.type == JointType::kRod && !(joint.length > 0.0)) {
+    return "joint " + Quote(joint.name) + ": a rod needs a length > 0";
+  }
+  if (const std::string error = CheckMotions(description.space, joint); !error.empty()) {
+    return "joint " + Quote(joint.name) + ": " + error;
+  }
   return description.space == SpaceKind::kPlanar ? CheckPlanarJoint(joint) : "";
-}
-
-std::string CheckForce(const MechanismDescription& description, const ForceDescription& force) {
-  return std::visit(
-      [&](const auto& f) -> std::string {
-        if constexpr (requires { f.joint; }) {
-          if (f.joint < 0 || f.joint >= static_cast<int>(description.joints.size())) {
-            return "force on joint index " + std::to_string(f.joint) + ", which does not exist";
-          }
-          const JointDescription& joint = description.joints[f.joint];
-          if (NumValues(joint.type, description.space, true) != 1) {
-            return "force on joint " + Quote(joint.name) +
-                   ": only joints with one coordinate carry a joint force";
-          }
-        } else {
-          if (f.body <= kGround || f.body >= static_cast<int>(description.bodies.size())) {
-            return "point force on body index " + std::to_string(f.body) +
-                   ", expected a moving body";
-          }
-          if (!f.at.allFinite() || !f.force.allFinite()) return "point force must be finite";
-        }
-        return "";
-      },
-      force);
 }
 
 std::string CheckValues(const MechanismDescription& description,
@@ -128,6 +134,8 @@ std::string_view ToString(JointType type) {
       return "free";
     case JointType::kPinInSlot:
       return "pin-in-slot";
+    case JointType::kRod:
+      return "rod";
     case JointType::kCylindrical:
       return "cylindrical";
     case JointType::kSpherical:
@@ -136,6 +144,8 @@ std::string_view ToString(JointType type) {
       return "planar";
     case JointType::kUniversal:
       return "universal";
+    case JointType::kHelical:
+      return "helical";
   }
   return "unknown";
 }
@@ -144,7 +154,7 @@ std::string_view ToString(SpaceKind space) {
   return space == SpaceKind::kPlanar ? "planar" : "spatial";
 }
 
-bool ExistsInPlane(JointType type) { return type <= JointType::kPinInSlot; }
+bool ExistsInPlane(JointType type) { return type <= JointType::kRod; }
 
 char OwnAxis(JointType type) {
   switch (type) {
@@ -154,6 +164,7 @@ char OwnAxis(JointType type) {
     case JointType::kRevolute:
     case JointType::kCylindrical:
     case JointType::kPlanar:
+    case JointType::kHelical:
       return 'z';
     default:
       return '-';
@@ -161,6 +172,7 @@ char OwnAxis(JointType type) {
 }
 
 int NumValues(JointType type, SpaceKind space, bool speeds) {
+  if (type == JointType::kRod) return 0;
   if (space == SpaceKind::kPlanar && ExistsInPlane(type)) {
     const auto& kind = KindOf<Planar, double>(type);
     return speeds ? kind.num_u : kind.num_q;
@@ -183,7 +195,7 @@ std::string Validate(const MechanismDescription& description) {
     error = CheckJoint(description, description.joints[i]);
   }
   for (std::size_t i = 0; i < description.forces.size() && error.empty(); ++i) {
-    error = CheckForce(description, description.forces[i]);
+    error = ValidateForce(description, description.forces[i]);
   }
   if (error.empty()) error = CheckValues(description, description.initial.coordinates, false);
   if (error.empty()) error = CheckValues(description, description.initial.speeds, true);

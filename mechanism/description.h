@@ -12,6 +12,8 @@
 #include <variant>
 #include <vector>
 
+#include "mechanism/time_function.h"
+
 namespace loopbench {
 
 /// Index of Ground in every list of bodies.
@@ -27,12 +29,14 @@ enum class JointType {
   kWeld,
   kFree,
   kPinInSlot,
+  kRod,
   kCylindrical,
   kSpherical,
   kPlanar,
   kUniversal,
+  kHelical,
 };
-inline constexpr int kNumJointTypes = 9;
+inline constexpr int kNumJointTypes = 11;
 
 std::string_view ToString(JointType type);
 /// Whether a planar scene may have it.
@@ -40,7 +44,8 @@ bool ExistsInPlane(JointType type);
 /// The axis of a joint's own frames that JointDescription::axis names: 'x' (slides along it), 'z'
 /// (turns about it, or is normal to its plane), or '-' for joints without one.
 char OwnAxis(JointType type);
-/// Coordinates (or speeds) of a joint.
+/// Coordinates (or speeds) of a joint that a user can give: none for a rod, which is never
+/// followed.
 int NumValues(JointType type, SpaceKind space, bool speeds);
 std::string_view ToString(SpaceKind space);
 
@@ -60,6 +65,12 @@ struct JointSide {
   Eigen::Vector3d rotation = Eigen::Vector3d::Zero();  ///< rotation vector body -> frame [rad]
 };
 
+/// A coordinate of a joint as a given function of time: a drive.
+struct PrescribedMotion {
+  int coordinate = 0;             ///< in the order of joint.h
+  TimeFunctionDescription value;  ///< [rad] or [m]
+};
+
 /// A joint from P to Q. Its frame F is fixed on P, its frame M on Q; coordinates describe M in F.
 struct JointDescription {
   std::string name;
@@ -69,20 +80,25 @@ struct JointDescription {
   /// Joint axis in the axes of both frames before alignment: the joint's own axis (OwnAxis()) is
   /// turned onto it. Zero means the own axis as it is.
   Eigen::Vector3d axis = Eigen::Vector3d::Zero();
-  bool cut = false;  ///< never part of the spanning tree (if the graph allows)
+  double pitch = 0.0;   ///< of a helical joint: advance along its axis per angle [m/rad]
+  double length = 0.0;  ///< of a rod: distance between its two points [m], > 0
+  bool cut = false;     ///< never part of the spanning tree (if the graph allows)
+  std::vector<PrescribedMotion> motions;  ///< at most one per coordinate; none with a quaternion
 };
 
-/// Constant moment (revolute) [N m] or force (prismatic) [N] on `to`, its opposite on `from`.
+/// Given moment (revolute) [N m] or force (prismatic) [N] on `to`, its opposite on `from`: constant
+/// (a polynomial of one coefficient; it has a potential) or a function of time (it supplies power).
 struct JointTorque {
   int joint = 0;
-  double value = 0.0;
+  TimeFunctionDescription value = Polynomial{{0.0}};
 };
 
-/// Linear spring on the joint's coordinate: -stiffness * (q - rest).
+/// Linear spring on the joint's coordinate: preload - stiffness * (q - rest).
 struct JointSpring {
   int joint = 0;
   double stiffness = 0.0;  ///< [N m/rad] or [N/m], >= 0
-  double rest = 0.0;       ///< coordinate without force [rad] or [m]
+  double rest = 0.0;       ///< coordinate at which only the preload is left [rad] or [m]
+  double preload = 0.0;    ///< [N m] or [N]
 };
 
 /// Linear damper on the joint's speed: -damping * u.
@@ -99,7 +115,34 @@ struct PointForce {
   bool in_body_axes = false;                        ///< force turns with the body
 };
 
-using ForceDescription = std::variant<JointTorque, JointSpring, JointDamper, PointForce>;
+/// A material point of a body.
+struct BodyPoint {
+  int body = kGround;
+  Eigen::Vector3d at = Eigen::Vector3d::Zero();  ///< in body axes from the body's origin [m]
+};
+
+/// Spring and damper between points of two bodies: with their distance d, the tension
+///   T = preload + stiffness (d - length) + damping ddot
+/// pulls them together (T < 0 pushes them apart). Where the points meet, d = 0, there is no
+/// direction to pull in and no force: an equilibrium, by the symmetry of all directions, and
+/// unless T is proportional to d a jump that an integrator meets as such.
+struct SpringDamper {
+  BodyPoint from, to;      ///< of different bodies; one may be Ground
+  double stiffness = 0.0;  ///< [N/m], >= 0
+  double damping = 0.0;    ///< [N s/m], >= 0
+  double length = 0.0;     ///< distance at which the spring is free [m], >= 0
+  double preload = 0.0;    ///< tension at that distance [N]
+};
+
+/// Resistance of a medium at rest at a material point of velocity v: -(linear + quadratic |v|) v.
+struct Drag {
+  BodyPoint point;
+  double linear = 0.0;     ///< [N s/m], >= 0
+  double quadratic = 0.0;  ///< [N s^2/m^2], >= 0
+};
+
+using ForceDescription =
+    std::variant<JointTorque, JointSpring, JointDamper, PointForce, SpringDamper, Drag>;
 
 /// Initial values of one joint's coordinates or speeds (one number; free joints: see joint.h).
 struct JointValues {

@@ -21,8 +21,9 @@ struct JointState {
   Block<Space, S> basis;      ///< [H D], orthogonal
   int num_u = 0;
 
-  auto H() const { return basis.leftCols(num_u); }                 ///< motion map
-  auto D() const { return basis.rightCols(Space::kDim - num_u); }  ///< constrained directions
+  auto H() const { return basis.leftCols(num_u); }  ///< motion map
+  /// Constrained directions, those of prescribed coordinates first.
+  auto D() const { return basis.rightCols(Space::kDim - num_u); }
   auto H(int i) const { return basis.col(i); }
   auto D(int i) const { return basis.col(num_u + i); }
   int rows() const { return Space::kDim - num_u; }
@@ -32,6 +33,13 @@ template <class Space, class S>
 class Kinematics {
  public:
   explicit Kinematics(const Mechanism<Space, S>& mechanism);
+
+  /// The time [s] that prescribed motions and time-dependent forces are taken at; 0 until set. To
+  /// be called before the positions are updated.
+  void SetTime(S t);
+  S time() const { return time_; }
+  /// Values of the mechanism's drives at that time.
+  const std::vector<TimeValue<S>>& drives() const { return drives_; }
 
   /// Poses, joint points and directions from q.
   void UpdatePosition(const VectorX<S>& q);
@@ -65,6 +73,10 @@ class Kinematics {
   /// constraint function whose Jacobian is tree_dynamics.h's J.
   Motion<Space, S> ConstraintMismatch(int joint) const;
 
+  /// D^T V_rel less the rates of prescribed coordinates: zero when a constraint holds at velocity
+  /// level. joints()[joint].rows() numbers, the others zero.
+  Motion<Space, S> ConstraintSpeed(int joint) const;
+
   /// Measured coordinate and speed of a joint with one coordinate (q, u for tree joints).
   S JointCoordinate(int joint) const;
   S JointSpeed(int joint) const;
@@ -80,6 +92,10 @@ class Kinematics {
 
  private:
   void AddBias(int index, const Joint<Space, S>& joint, JointState<Space, S>& state) const;
+  /// Coordinates of a tree joint, prescribed ones among them, in `room`.
+  const S* JointCoordinates(const Joint<Space, S>& joint, const VectorX<S>& q, S* room) const;
+  void SetDirections(const Joint<Space, S>& joint, const Rotation<Space, S>& R_WF,
+                     const Pose<Space, S>& X_FM, JointState<Space, S>& state) const;
   Pose<Space, S> MeasuredPose(const Joint<Space, S>& joint) const;
 
   const Mechanism<Space, S>* mechanism_;
@@ -87,19 +103,22 @@ class Kinematics {
   std::vector<Motion<Space, S>> motions_;
   std::vector<JointState<Space, S>> joints_;
   std::vector<Pose<Space, S>> measured_;  ///< X_FM of constraints and of kinds with a basis
-  std::vector<S> accepted_;               ///< last accepted coordinate of each joint
+  std::vector<TimeValue<S>> drives_;
+  std::vector<S> accepted_;  ///< last accepted coordinate of each joint
   VectorX<S> q_, u_;
+  S time_ = S(0);
   long position_version_ = 0;
 };
 
-/// Wrench of applied forces at each body's centre of mass: gravity, forces at points, joint forces
-/// (H tau on Q, the opposite on P). `wrenches` has one entry per body.
+/// Wrench of applied forces at each body's centre of mass: gravity, forces at points and between
+/// points, joint forces (H tau on Q, the opposite on P), at time(). `wrenches` has one entry per
+/// body.
 template <class Space, class S>
 void AppliedForces(const Kinematics<Space, S>& kinematics, std::span<Motion<Space, S>> wrenches);
 
 /// Energies [J] at the current position and speed; potential is zero for centres of mass in the
-/// ground origin and springs at rest. Constant forces on points (ground axes) and joints count as
-/// potentials; forces that turn with a body and dampers do not.
+/// ground origin and springs at rest. Constant forces on points (ground axes) and joints, preloads
+/// among them, count as potentials; what AppliedPower() knows does not.
 template <class S>
 struct Energy {
   S kinetic = S(0);
@@ -108,5 +127,16 @@ struct Energy {
 };
 template <class Space, class S>
 Energy<S> ComputeEnergy(const Kinematics<Space, S>& kinematics);
+
+/// Power [W] of the forces without a potential, at time(), position and speed:
+///   d/dt (kinetic + potential) = supplied - dissipated
+/// where the joints themselves do no work.
+template <class S>
+struct Power {
+  S supplied = S(0);    ///< torques that depend on time, forces that turn with a body; any sign
+  S dissipated = S(0);  ///< dampers and drag; >= 0
+};
+template <class Space, class S>
+Power<S> AppliedPower(const Kinematics<Space, S>& kinematics);
 
 }  // namespace loopbench

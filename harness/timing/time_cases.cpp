@@ -137,18 +137,19 @@ class SubjectIn final : public Subject {
  private:
   void Reset() {
     formulation_ = MakeFormulation<Space>(case_.column, mechanism_);
-    formulation_->Start(start_.q, start_.u);
+    formulation_->Start(0.0, start_.q, start_.u);
     y_.resize(formulation_->state_size());
     formulation_->ToState(start_.q, start_.u, y_);
   }
 
   IntegratorResult Simulate(const std::function<void(std::span<double>)>& keep) {
     FormulationOde<Space> ode(*formulation_);
-    return Integrate(
-        ode, 0.0, case_.horizon, y_, OptionsOf(case_), [&](double, std::span<double> y) {
-          if (keep) keep(y);
-          return formulation_->BeginStep(y) ? StepAction::kRestart : StepAction::kContinue;
-        });
+    const auto observe = [&](double t, std::span<double> y) {
+      if (keep) keep(y);
+      return formulation_->BeginStep(t, y) ? StepAction::kRestart : StepAction::kContinue;
+    };
+    return Integrate(ode, 0.0, case_.horizon, y_, OptionsOf(case_, mechanism_.stop_times()),
+                     observe);
   }
 
   /// Evaluations per batch, from the time of a first few (which also warm up).

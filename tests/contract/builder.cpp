@@ -28,6 +28,7 @@ int Builder::AddJoint(JointType type, int parent, const Eigen::Vector3d& at_pare
   if (OwnAxis(type) == 'z' && spatial && random.Chance(0.5)) {
     joint.axis = random.Vector(1.0, spatial) + 1.5 * Eigen::Vector3d::UnitZ();
   }
+  SetParameter(joint);
   if (turned && random.Chance(0.3)) std::swap(joint.from, joint.to);
   description.joints.push_back(joint);
   parent_[child] = parent;
@@ -38,31 +39,88 @@ int Builder::AddJoint(JointType type, int parent, const Eigen::Vector3d& at_pare
 }
 
 std::vector<double> Builder::Values(JointType type, double q) {
-  std::vector<double> values(NumValues(type, description.space, false), q);
+  const int shift = spatial ? 3 : 2;
+  std::vector<double> values(
+      type == JointType::kRod ? shift : NumValues(type, description.space, false), q);
   if (values.size() > 1) {
     for (double& value : values) value = random.Uniform(-1.0, 1.0);
   }
   return values;
 }
 
+TimeFunctionDescription Builder::RandomFunction() {
+  const int kind = random.Below(4);
+  if (kind == 0) {
+    return Polynomial{
+        {random.Uniform(-5.0, 5.0), random.Uniform(-2.0, 2.0), random.Uniform(-1.0, 1.0)}};
+  }
+  if (kind == 1) {
+    return Harmonic{.mean = random.Uniform(-1.0, 1.0),
+                    .amplitude = random.Uniform(1.0, 5.0),
+                    .omega = random.Uniform(0.5, 5.0),
+                    .phase = random.Uniform(-3.0, 3.0)};
+  }
+  TimeTable table;
+  table.cubic = kind == 2;
+  for (double t = -1.0; t < 2.0; t += random.Uniform(0.3, 0.8)) {
+    table.times.push_back(t);
+    table.values.push_back(random.Uniform(-5.0, 5.0));
+  }
+  return table;
+}
+
 void Builder::AddForces(int count) {
   const int joints = static_cast<int>(description.joints.size());
+  const int bodies = static_cast<int>(description.bodies.size());
+  const auto point = [&](int body) { return BodyPoint{body, random.Vector(1.0, spatial)}; };
   for (int k = 0; k < count; ++k) {
     const int joint = random.Below(joints);
     const JointType type = description.joints[joint].type;
-    const bool single = type == JointType::kRevolute || type == JointType::kPrismatic;
-    const int kind = single ? random.Below(4) : 3;
-    if (kind == 0) description.forces.push_back(JointTorque{joint, random.Uniform(-5.0, 5.0)});
+    const bool single = type == JointType::kRevolute || type == JointType::kPrismatic ||
+                        type == JointType::kHelical;
+    const int kind = single ? random.Below(7) : 4 + random.Below(3);
+    if (kind == 0) {
+      description.forces.push_back(JointTorque{joint, Polynomial{{random.Uniform(-5.0, 5.0)}}});
+    }
     if (kind == 1) {
-      description.forces.push_back(
-          JointSpring{joint, random.Uniform(1.0, 10.0), random.Uniform(-1.0, 1.0)});
+      description.forces.push_back(JointSpring{
+          joint, random.Uniform(1.0, 10.0), random.Uniform(-1.0, 1.0), random.Uniform(-2.0, 2.0)});
     }
     if (kind == 2) description.forces.push_back(JointDamper{joint, random.Uniform(0.1, 1.0)});
-    if (kind == 3) {
-      const int body = 1 + random.Below(static_cast<int>(description.bodies.size()) - 1);
+    if (kind == 3) description.forces.push_back(JointTorque{joint, RandomFunction()});
+    if (kind == 4) {
+      const int body = 1 + random.Below(bodies - 1);
       description.forces.push_back(PointForce{body, random.Vector(1.0, spatial),
                                               random.Vector(10.0, spatial), random.Chance(0.5)});
     }
+    if (kind == 5) {
+      const int from = random.Below(bodies), to = (from + 1 + random.Below(bodies - 1)) % bodies;
+      description.forces.push_back(SpringDamper{.from = point(from),
+                                                .to = point(to),
+                                                .stiffness = random.Uniform(1.0, 10.0),
+                                                .damping = random.Uniform(0.1, 1.0),
+                                                .length = random.Uniform(0.0, 2.0),
+                                                .preload = random.Uniform(-2.0, 2.0)});
+    }
+    if (kind == 6) {
+      description.forces.push_back(Drag{.point = point(1 + random.Below(bodies - 1)),
+                                        .linear = random.Uniform(0.0, 1.0),
+                                        .quadratic = random.Uniform(0.0, 1.0)});
+    }
+  }
+}
+
+void Builder::AddMotions(int count) {
+  for (int k = 0; k < count; ++k) {
+    const JointValues& values =
+        description.initial
+            .coordinates[random.Below(static_cast<int>(description.initial.coordinates.size()))];
+    JointDescription& joint = description.joints[values.joint];
+    const int speeds = NumValues(joint.type, description.space, true);
+    if (speeds == 0 || speeds < NumValues(joint.type, description.space, false)) continue;
+    const int coordinate = random.Below(speeds);
+    joint.motions = {{coordinate, Polynomial{{values.values[coordinate], random.Uniform(-1.0, 1.0),
+                                              random.Uniform(-1.0, 1.0)}}}};
   }
 }
 
@@ -82,7 +140,11 @@ void Builder::FinishClosures() {
     // with F at the body's com, JointPose() is M seen from there
     frames.joints[0].from.position = frames.bodies[joint.from.body].com;
     const JetPose X_PM = Oracle(frames, layout).JointPose(0, poses);
-    const JetPose X_PF = X_PM * Inverted(Transform(joint.type, spatial, coordinates.data()));
+    const JetPose X_PF =
+        X_PM * Inverted(Transform(joint.type, spatial, coordinates.data(), joint.pitch));
+    if (joint.type == JointType::kRod) {
+      joint.length = Eigen::Map<const VectorX<double>>(q.data(), q.size()).norm();
+    }
     Real33 R;
     for (int i = 0; i < 3; ++i) {
       joint.from.position[i] =

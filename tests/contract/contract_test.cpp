@@ -72,11 +72,12 @@ std::unique_ptr<Formulation<Space, double>> Make(const Case& c,
   return std::make_unique<reduction::Reduction<Space, double>>(mechanism, options);
 }
 
-/// Coupled loops with forces of every kind, every second with joints of every kind; independent
-/// closures, so that every column can run.
+/// Coupled loops with forces of every kind, every second with joints of every kind, every fourth
+/// with prescribed motions; independent closures, so that every column can run.
 MechanismDescription CoupledLoops(SpaceKind space, std::uint64_t seed) {
   const int loops = space == SpaceKind::kPlanar ? 2 : 1;
-  return seed % 2 == 0 ? MixedGraph(loops, space, seed) : RandomGraph(loops, space, seed);
+  return seed % 2 == 0 ? MixedGraph(loops, space, seed, seed % 4 == 2 ? 2 : 0)
+                       : RandomGraph(loops, space, seed);
 }
 
 /// A formulation on a sample, started.
@@ -87,7 +88,7 @@ struct Bench {
         mechanism(sample.mechanism(c.coordinates)),
         state(sample.state(c.coordinates)),
         formulation(Make(c, mechanism)) {
-    EXPECT_EQ(formulation->Start(state.q, state.u), Outcome::kFinished);
+    EXPECT_EQ(formulation->Start(0.0, state.q, state.u), Outcome::kFinished);
     y.resize(formulation->state_size());
     ydot.resize(formulation->state_size());
     formulation->ToState(state.q, state.u, y);
@@ -148,7 +149,7 @@ TEST_P(ContractTest, DerivativeIsAPureFunction) {
     bench.Derivative(other);
     VectorX<double> udot;
     bench.formulation->Evaluate(1.0, bench.state.q, -bench.state.u, udot);
-    bench.formulation->FromState(std::span<const double>(other));
+    bench.formulation->FromState(0.0, std::span<const double>(other));
     ASSERT_EQ(bench.Derivative(bench.y), Outcome::kFinished);
     EXPECT_EQ(std::memcmp(first.data(), bench.ydot.data(), first.size() * sizeof(double)), 0);
     ASSERT_EQ(bench.Derivative(bench.y), Outcome::kFinished) << "the same position once more";
@@ -162,17 +163,19 @@ TEST_P(VelocityContractTest, SpeedsSatisfyTheLoops) {
     for (std::size_t i = bench.mechanism.num_q(); i < off.size(); ++i) off[i] += 0.1;
     ASSERT_EQ(bench.Derivative(off), Outcome::kFinished);
     Oracle oracle(bench.sample.description(), LayoutOf(bench.mechanism));
-    const RealVector u = ToReal(bench.formulation->u());
-    const RealMatrix J = oracle.Form(ToReal(bench.formulation->q()), u).J;
+    const RealVector q = ToReal(bench.formulation->q()), u = ToReal(bench.formulation->u());
+    const RealMatrix J = oracle.Form(q, u).J;
+    const Real at_rest = oracle.ClosureRates(q, 0 * u).template lpNorm<Eigen::Infinity>();
     const Real scale =
-        J.cwiseAbs().rowwise().sum().maxCoeff() * u.template lpNorm<Eigen::Infinity>();
-    EXPECT_LE((J * u).template lpNorm<Eigen::Infinity>(), bench.Bound() * scale);
+        at_rest + J.cwiseAbs().rowwise().sum().maxCoeff() * u.template lpNorm<Eigen::Infinity>();
+    EXPECT_LE(oracle.ClosureRates(q, u).template lpNorm<Eigen::Infinity>(), bench.Bound() * scale);
   });
 }
 
 TEST_P(ContractTest, StateKeepsConsistentPositionsAndSpeeds) {
   Run(Description(7), 7, [&](auto bench) {
-    ASSERT_EQ(bench.formulation->FromState(std::span<const double>(bench.y)), Outcome::kFinished);
+    ASSERT_EQ(bench.formulation->FromState(0.0, std::span<const double>(bench.y)),
+              Outcome::kFinished);
     EXPECT_EQ(bench.formulation->q(), bench.state.q);
     const double difference =
         (bench.formulation->u() - bench.state.u).template lpNorm<Eigen::Infinity>();
@@ -220,34 +223,70 @@ TEST_P(ContractTest, DerivativeDoesNotAllocate) {
   });
 }
 
-/// Without dampers and forces that turn with a body.
+/// Without all that supplies or dissipates power.
 MechanismDescription Conservative(MechanismDescription description) {
-  std::erase_if(description.forces, [](const ForceDescription& force) {
-    const auto* point = std::get_if<PointForce>(&force);
-    return std::holds_alternative<JointDamper>(force) || (point && point->in_body_axes);
+  MechanismDescription one = description;
+  std::erase_if(description.forces, [&](const ForceDescription& force) {
+    one.forces = {force};
+    return CompileForces<Spatial, double>(one).has_power();
   });
   return description;
 }
 
-TEST_P(ContractTest, EnergyOfConservativeScenesStays) {
-  Run(Conservative(Description(10)), 10, [&](auto bench) {
-    ASSERT_EQ(bench.Derivative(bench.y), Outcome::kFinished);
-    const Oracle oracle(bench.sample.description(), LayoutOf(bench.mechanism));
-    const RealVector q = ToReal(bench.formulation->q()), u = ToReal(bench.formulation->u());
-    const RealVector udot = ToReal(bench.formulation->udot());
-    const Eigen::Map<const VectorX<double>> qdot(bench.ydot.data(), q.size());
-    const Real step = 1e-6L;  // long double: truncation 1e-12, round-off 1e-13
-    const auto energy = [&](Real t) {
-      return oracle.TotalEnergy(q + t * ToReal(qdot), u + t * udot);
-    };
-    const Real rate = (energy(step) - energy(-step)) / (2 * step);
-    // what the rate is small against: the energies' own rates, at least their size per second
-    const Real scale = 1 + std::abs(energy(0)) + udot.template lpNorm<Eigen::Infinity>();
-    EXPECT_LE(std::abs(rate), (1e-10L + bench.Bound()) * scale);
-    const Energy<double> own = ComputeEnergy(bench.formulation->kinematics());
-    EXPECT_NEAR(own.total(), static_cast<double>(energy(0)),
-                100 * kEps * (own.kinetic + std::abs(own.potential) + 10.0));
+TEST_P(ContractTest, AccelerationsFollowTheTime) {
+  MechanismDescription description = Description(12);
+  for (std::size_t j = 0; j < description.joints.size(); ++j) {
+    if (description.joints[j].type != JointType::kRevolute) continue;
+    description.forces.push_back(
+        JointTorque{static_cast<int>(j), Harmonic{.amplitude = 5.0, .omega = 2.0}});
+  }
+  Run(description, 12, [&](auto bench) {
+    Oracle oracle(bench.sample.description(), LayoutOf(bench.mechanism));
+    for (const double t : {-0.4, 0.8}) {
+      oracle.SetTime(t);
+      VectorX<double> udot;
+      ASSERT_EQ(bench.formulation->Evaluate(t, bench.state.q, bench.state.u, udot),
+                Outcome::kFinished);
+      const RealVector expected = oracle.Solve(ToReal(bench.state.q), ToReal(bench.state.u)).udot;
+      EXPECT_LE(RelativeError(udot, expected), bench.Bound()) << t;
+    }
   });
+}
+
+/// The energy's rate by differences of the oracle's, the power by the formulation: of drives alone
+/// (seed 10 has some), of forces alone (seed 11) and of both.
+TEST_P(ContractTest, EnergyChangesByThePowerOfForcesAndDrives) {
+  const MechanismDescription driven = Description(10);
+  for (const MechanismDescription& description :
+       {driven, Conservative(driven), Description(11), Conservative(Description(12))}) {
+    Run(description, 10, [&](auto bench) {
+      SCOPED_TRACE(description.name);
+      ASSERT_EQ(bench.Derivative(bench.y), Outcome::kFinished);
+      Oracle oracle(bench.sample.description(), LayoutOf(bench.mechanism));
+      const RealVector q = ToReal(bench.formulation->q()), u = ToReal(bench.formulation->u());
+      const RealVector udot = ToReal(bench.formulation->udot());
+      const Eigen::Map<const VectorX<double>> qdot(bench.ydot.data(), q.size());
+      const Real step = 1e-6L;  // long double: truncation 1e-12, round-off 1e-13
+      const auto energy = [&](Real t) {
+        oracle.SetTime(t);
+        return oracle.TotalEnergy(q + t * ToReal(qdot), u + t * udot);
+      };
+      const Real rate = (energy(step) - energy(-step)) / (2 * step);
+      const Power<double> forces = AppliedPower(bench.formulation->kinematics());
+      const double drives = bench.formulation->DrivePower();
+      const bool conservative = CompileForces<Spatial, double>(description).has_power() == false;
+      EXPECT_EQ(drives != 0.0, !bench.mechanism.drives().empty());
+      EXPECT_EQ(forces.supplied == 0.0 && forces.dissipated == 0.0, conservative);
+      EXPECT_EQ(bench.mechanism.has_power(), drives != 0.0 || !conservative);
+      // what the rate is small against: the energies' own rates, at least their size per second
+      const Real scale = 1 + std::abs(energy(0)) + udot.template lpNorm<Eigen::Infinity>();
+      EXPECT_LE(std::abs(rate - (forces.supplied - forces.dissipated + drives)),
+                (1e-10L + bench.Bound()) * scale);
+      const Energy<double> own = ComputeEnergy(bench.formulation->kinematics());
+      EXPECT_NEAR(own.total(), static_cast<double>(energy(0)),
+                  100 * kEps * (own.kinetic + std::abs(own.potential) + 10.0));
+    });
+  }
 }
 
 /// Where constraints depend on each other, all rows at once keep what closing loop by loop loses.

@@ -26,11 +26,13 @@ MechanismDescription ChainOfEveryKind(int n, SpaceKind space, std::uint64_t seed
   std::vector<JointType> kinds;
   for (int k = 0; k < kNumJointTypes; ++k) {
     const auto type = static_cast<JointType>(k);
-    if (type != JointType::kFree && (b.spatial || ExistsInPlane(type))) kinds.push_back(type);
+    if (type == JointType::kFree || type == JointType::kRod) continue;
+    if (b.spatial || ExistsInPlane(type)) kinds.push_back(type);
   }
   int last = 0;
   for (int i = 0; i < n; ++i) last = Append(b, kinds[i % kinds.size()], last);
   b.Close(JointType::kRevolute, 0, last, Tip(b), 0.0);
+  b.Close(JointType::kRod, n / 2 - 4, n / 2 + 4, Tip(b), 0.0);
   Append(b, JointType::kFree, last);
   return b.Finish();
 }

@@ -63,11 +63,15 @@ JoinSum Pairing::Run(std::vector<Join>* joins) {
     const Key key = queue_.top();
     queue_.pop();
     if (bonds_[key.bond].joints.empty()) continue;
-    // what was joined meanwhile may have made this pair worse; within its classes that is let pass,
-    // or each join of a hub would send all its pairs back
+    // what was joined meanwhile may have made this pair worse; of a hub's pairs, that counts from
+    // one class to the next only, or each join would send all of them back
     const Key now = KeyOf(key.bond);
-    if (std::tie(now.boundary_class, now.size_class) >
-        std::tie(key.boundary_class, key.size_class)) {
+    const auto neighbours = [&](int part) { return parts_[part].bonds.size(); };
+    const Bond& bond = bonds_[key.bond];
+    const bool hub = std::max(neighbours(bond.a), neighbours(bond.b)) > kMany;
+    const bool worse_class =
+        std::tie(now.boundary_class, now.size_class) > std::tie(key.boundary_class, key.size_class);
+    if (worse_class || (now > key && !hub)) {
       queue_.push(now);
     } else {
       Merge(key.bond, joins);

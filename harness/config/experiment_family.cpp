@@ -1,6 +1,8 @@
 // Families of mechanisms (mechanism/library.h) as scenes: {"family": "chain", "bars": 10}.
 #include <fmt/format.h>
 
+#include <numbers>
+
 #include "harness/config/experiment_sections.h"
 #include "mechanism/library.h"
 
@@ -39,12 +41,14 @@ class Members {
   Members(const JsonNode& node, std::size_t room) : node_(node), room_(room) {}
 
   template <class Build>
-  void Add(std::size_t bodies, std::string counts, const Json& canonical, Build build) {
+  void Add(std::size_t bodies, std::string counts, const Json& canonical, Build build,
+           const SceneObservation& observe = {}) {
     used_ += bodies;
     if (used_ > room_) return;
     FamilyMember member;
     member.counts = std::move(counts);
     member.mechanism.description = build();
+    member.mechanism.observe = observe;
     member.mechanism.canonical = canonical.dump();
     members_.push_back(std::move(member));
   }
@@ -78,6 +82,15 @@ std::vector<FamilyMember> ReadChains(const JsonNode& node, std::size_t room) {
   return members.Take();
 }
 
+/// The cranks turn as one pendulum: n + 1 cranks and n couplers, which only shift, all of 1 m and
+/// 1 kg, give [(n + 1) / 3 + n] phi'' = -[(n + 1) / 2 + n] g sin(phi).
+PendulumForm PendulumOfLadder(const MechanismDescription& ladder) {
+  const double n = static_cast<double>(ladder.bodies.size() - 2) / 2;  // without Ground
+  return {.body = "crank0",
+          .down_angle = -std::numbers::pi / 2,
+          .frequency_squared = ((n + 1) / 2 + n) * -ladder.gravity.y() / ((n + 1) / 3 + n)};
+}
+
 std::vector<FamilyMember> ReadLadders(const JsonNode& node, std::size_t room) {
   Members members(node, room);
   const double angle = ReadOr(node, "angle", kAngle), speed = ReadOr(node, "speed", kSpeed);
@@ -90,7 +103,11 @@ std::vector<FamilyMember> ReadLadders(const JsonNode& node, std::size_t room) {
                   return ladder;
                 });
   }
-  return members.Take();
+  std::vector<FamilyMember> ladders = members.Take();
+  for (FamilyMember& ladder : ladders) {
+    ladder.mechanism.observe.closed_form = PendulumOfLadder(ladder.mechanism.description);
+  }
+  return ladders;
 }
 
 /// The first crank of each storey moves as it likes: J crank 1.0, J crank 2.0, ...

@@ -54,8 +54,9 @@ std::string_view WhyNotForeign(std::string_view path, std::string_view header) {
     return path.starts_with("tests/") ? "" : "GoogleTest is for tests";
   }
   if (header.starts_with("boost/")) {
-    return path == "harness/observers/pendulum.cpp" ? ""
-                                                    : "Boost is for harness/observers/pendulum.cpp";
+    const bool allowed =
+        path == "harness/observers/pendulum.cpp" || path == "tests/reference/rigid_motions.cpp";
+    return allowed ? "" : "Boost is for closed forms of motions";
   }
   return "";
 }

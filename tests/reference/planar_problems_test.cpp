@@ -1,0 +1,218 @@
+// Published planar problems as shipped, in their plane and turned by any rotation into space, where
+// loops of parallel axes carry three redundant constraints each: the same numbers.
+#include <gtest/gtest.h>
+
+#include <cmath>
+#include <iostream>
+#include <numbers>
+
+#include "harness/observers/observer.h"
+#include "mechanism/library.h"
+#include "tests/reference/cases.h"
+#include "tests/reference/published_numbers.h"
+#include "tests/reference/simulate.h"
+
+namespace loopbench::harness::reference {
+namespace {
+
+constexpr double kPi = std::numbers::pi;
+constexpr double kTolerance = 1e-11;  // rtol = atol unless a test says otherwise
+
+enum class Place { kPlane, kTilted };
+
+/// A scene, and its points seen in the plane it was described in.
+class PlacedScene {
+ public:
+  PlacedScene(const MechanismDescription& planar, Place place)
+      : description_(place == Place::kPlane ? planar : Tilted(planar, AnyRotation())),
+        R_(place == Place::kPlane ? Eigen::Matrix3d::Identity() : AnyRotation()) {}
+
+  Simulation Run(const Column& column, const IntegratorOptions& options, double horizon,
+                 const Watch& watch = {}) const {
+    const Simulation run = Simulate(description_, column, options, horizon, watch);
+    EXPECT_EQ(run.result.outcome, Outcome::kFinished) << run.result.message;
+    EXPECT_EQ(run.result.t_reached, horizon);
+    return run;
+  }
+
+  Eigen::Vector3d Point(const Snapshot& snapshot, const std::string& body,
+                        const Eigen::Vector3d& at) const {
+    return R_.transpose() * PointOf(description_, snapshot, BodyNamed(description_, body), at);
+  }
+  Eigen::Vector3d Velocity(const Snapshot& snapshot, const std::string& body,
+                           const Eigen::Vector3d& at) const {
+    return R_.transpose() * VelocityOf(description_, snapshot, BodyNamed(description_, body), at);
+  }
+  /// Angle of a body from the plane's x axis [rad], in (-pi, pi], and its rate [rad/s].
+  double Angle(const Snapshot& snapshot, const std::string& body) const {
+    const Eigen::Vector3d x = R_.transpose() * At(snapshot, body).R.col(0);
+    return std::atan2(x.y(), x.x());
+  }
+  double Rate(const Snapshot& snapshot, const std::string& body) const {
+    return (R_.transpose() * At(snapshot, body).w).z();
+  }
+
+ private:
+  const BodyState& At(const Snapshot& snapshot, const std::string& body) const {
+    return snapshot.bodies[BodyNamed(description_, body)];
+  }
+
+  MechanismDescription description_;
+  Eigen::Matrix3d R_;
+};
+
+MechanismDescription Shipped(const std::string& name) {
+  return ReadMechanism(kConfigs / "mechanisms" / (name + ".json")).description;
+}
+
+/// Distance of two angles, whole turns aside.
+double Apart(double a, double b) { return std::abs(std::remainder(a - b, 2 * kPi)); }
+
+/// Each accepted step adds an error below the tolerance; all motions below are stable, so that one
+/// that is carried along grows at most with time, and what is propagated is of one order more than
+/// what the tolerance bounds.
+double Bound(const Simulation& run) { return static_cast<double>(run.result.steps) * kTolerance; }
+
+class PlanarProblem : public testing::TestWithParam<std::tuple<Column, Place>> {
+ protected:
+  const Column& column() const { return std::get<0>(GetParam()); }
+  PlacedScene Placed(const MechanismDescription& planar) const {
+    return PlacedScene(planar, std::get<1>(GetParam()));
+  }
+  static const IntegratorOptions& Accurate() {
+    static const IntegratorOptions kOptions = Options("ode45", kTolerance);
+    return kOptions;
+  }
+};
+
+const Eigen::Vector3d kTip = Eigen::Vector3d::UnitX();
+
+TEST_P(PlanarProblem, SimplePendulumIsThatOfA01) {
+  const PlacedScene scene = Placed(Shipped("simple-pendulum"));
+  for (std::size_t i = 0; i < kA01Published.size(); ++i) {
+    const Simulation run = scene.Run(column(), Accurate(), kA01Published[i].t);
+    const Eigen::Vector3d tip = scene.Point(run.last, "bob", kTip);
+    const double bound = Bound(run);
+    EXPECT_NEAR(tip.x(), kA01Derived[i].x, bound);
+    EXPECT_NEAR(tip.y(), kA01Derived[i].y, bound);
+    EXPECT_NEAR(tip.x(), kA01Published[i].x, 0.5e-6 + bound);  // printed with six digits
+    EXPECT_NEAR(tip.y(), kA01Published[i].y, 0.5e-6 + bound);
+    EXPECT_NEAR(tip.z(), 0.0, bound);
+  }
+}
+
+TEST_P(PlanarProblem, PendulumOfTwoSecondsReturns) {
+  // fifteen periods; the state returns to within 5e4 rtol at rtol 1e-8
+  constexpr double kRtol = 1e-8;
+  const PlacedScene scene = Placed(Shipped("pendulum-two-seconds"));
+  const Simulation run = scene.Run(column(), Options("ode45", kRtol), 30.0);
+  const Eigen::Vector3d x = scene.Point(run.last, "bob", kTip);
+  const Eigen::Vector3d v = scene.Velocity(run.last, "bob", kTip);
+  EXPECT_LE((x - kTip).lpNorm<Eigen::Infinity>(), 5e4 * kRtol);
+  EXPECT_LE(v.lpNorm<Eigen::Infinity>(), 5e4 * kRtol);
+  std::cout << "position " << (x - kTip).lpNorm<Eigen::Infinity>() / kRtol << " rtol, velocity "
+            << v.lpNorm<Eigen::Infinity>() / kRtol << " rtol\n";
+}
+
+TEST_P(PlanarProblem, NFourBarOfTwoIsThatOfA02) {
+  // 0.70 s: 0.014 s before the first position with all bars in line
+  const double w2 = 3.5 * 9.81 / 3.0;
+  const PlacedScene scene = Placed(Shipped("n-four-bar"));
+  double worst = 0.0;
+  scene.Run(column(), Accurate(), 0.70, [&](const Snapshot& snapshot) {
+    const double theta = PendulumAngle(w2, kPi, -1.0, snapshot.t);
+    const Eigen::Vector3d exact(std::cos(theta - kPi / 2), std::sin(theta - kPi / 2), 0.0);
+    worst = std::max(worst, (scene.Point(snapshot, "crank0", kTip) - exact).norm());
+  });
+  EXPECT_LE(worst, 1e-9);
+  std::cout << "tip of the first crank " << worst << " m\n";
+}
+
+TEST_P(PlanarProblem, ParallelogramOfThePaperIsAPendulum) {
+  // a quarter of the way to the position in line, see closed_forms_test.cpp
+  const PlacedScene scene = Placed(Shipped("parallelogram"));
+  double theta0 = std::nan(""), worst = 0.0;
+  const Simulation run = scene.Run(column(), Accurate(), 0.57, [&](const Snapshot& snapshot) {
+    const double theta = scene.Angle(snapshot, "bar1") + kPi / 2;
+    if (std::isnan(theta0)) theta0 = theta;
+    const double exact = PendulumAngle(2 * 9.81 / 3.5, theta0, 0.0, snapshot.t);
+    worst = std::max(worst, Apart(theta, exact));
+  });
+  EXPECT_LE(worst, Bound(run));
+}
+
+TEST_P(PlanarProblem, AndrewsSqueezerIsThatOfTheTestSet) {
+  const PlacedScene scene = Placed(Shipped("andrews-squeezer"));
+  // spring and torque by hand: 4530 (d - 0.07785)^2 / 2 and 0.033 N m times the crank's angle
+  const Eigen::Vector3d C(0.014, 0.072, 0.0), D(0.02, -0.018, 0.0);
+  double first = std::nan(""), worst = 0.0, most = 0.0, turned = -0.06171389001427645;
+  const auto balance = [&](const Snapshot& snapshot) {
+    turned += std::remainder(scene.Angle(snapshot, "K1") - turned, 2 * kPi);
+    const double stretch = (scene.Point(snapshot, "K3", D) - C).norm() - 0.07785;
+    const double energy = snapshot.kinetic + 4530.0 * stretch * stretch / 2 - 0.033 * turned;
+    if (std::isnan(first)) first = energy;
+    worst = std::max(worst, std::abs(energy - first));
+    most = std::max(most, snapshot.kinetic);
+  };
+  // 0.03 s; speeds reach 1e3 rad/s, and the bound for angles is 1e-10
+  const Simulation run = scene.Run(column(), Options("fehlberg-78", 1e-14), 0.03, balance);
+  const auto angle = [&](const char* body) { return scene.Angle(run.last, body); };
+  const auto rate = [&](const char* body) { return scene.Rate(run.last, body); };
+  const std::array<double, 7> q = {
+      angle("K1"), angle("K2") - angle("K1"), angle("K3"), angle("K4") - angle("K5"),
+      angle("K5"), angle("K6") - angle("K7"), angle("K7")};
+  const std::array<double, 7> v = {
+      rate("K1"), rate("K2") - rate("K1"), rate("K3"), rate("K4") - rate("K5"),
+      rate("K5"), rate("K6") - rate("K7"), rate("K7")};
+  double off = 0.0, off_rate = 0.0;
+  for (std::size_t i = 0; i < q.size(); ++i) {
+    EXPECT_LE(Apart(q[i], kA03Verified.q[i]), 1e-10) << i;
+    // the published digits are off by 1.5e-9 rad and 5.1e-8 themselves
+    EXPECT_LE(Apart(q[i], kA03Published.q[i]), 5e-9) << i;
+    EXPECT_NEAR(v[i] / kA03Published.v[i], 1.0, 2e-7) << i;
+    off = std::max(off, Apart(q[i], kA03Verified.q[i]));
+    off_rate = std::max(off_rate, std::abs(v[i] / kA03Verified.v[i] - 1.0));
+  }
+  EXPECT_LE(worst, 1e-10 * most);  // the bound of the angles in the energy
+  std::cout << "angles " << off << " rad, speeds " << off_rate << " relative, " << run.result.steps
+            << " steps, energy balance " << worst << " J of " << most << " J\n";
+}
+
+TEST_P(PlanarProblem, SliderCrankIsThatOfSundials) {
+  const PlacedScene scene = Placed(Shipped("slider-crank"));
+  for (std::size_t i = 0; i < kSliderCrankVerified.size(); ++i) {
+    const SliderCrankState& exact = kSliderCrankVerified[i];
+    const SliderCrankState& printed = kSliderCrankPublished[i];
+    const Simulation run = scene.Run(column(), Accurate(), exact.t);
+    const double q = scene.Angle(run.last, "crank"), p = scene.Angle(run.last, "rod");
+    const double x = scene.Point(run.last, "rod", Eigen::Vector3d::Zero()).x();
+    const double bound = Bound(run);
+    EXPECT_LE(Apart(q, exact.q), bound) << exact.t;
+    EXPECT_NEAR(x, exact.x, bound) << exact.t;
+    EXPECT_LE(Apart(p, exact.p), bound) << exact.t;
+    // five digits are printed, of a solution at 1e-6: one unit of the fifth
+    EXPECT_NEAR(q, printed.q, FifthDigit(printed.q)) << exact.t;
+    EXPECT_NEAR(x, printed.x, FifthDigit(printed.x)) << exact.t;
+    EXPECT_NEAR(p, printed.p, FifthDigit(printed.p)) << exact.t;
+    if (exact.t == 10.0) {
+      EXPECT_NEAR(scene.Rate(run.last, "crank"), kSliderCrankSpeedVerified, bound);
+      EXPECT_NEAR(run.kinetic_integral, kSliderCrankIntegralVerified, bound);
+      // published at rtol 1e-6, which leaves 9.3e-6
+      EXPECT_NEAR(run.kinetic_integral, kSliderCrankIntegralPublished, 1e-5);
+      EXPECT_LE(run.energy_error, bound);
+      std::cout << "crank " << q - exact.q << " rad of " << bound << ", integral off by "
+                << run.kinetic_integral - kSliderCrankIntegralVerified << " J s\n";
+    }
+  }
+}
+
+INSTANTIATE_TEST_SUITE_P(Columns, PlanarProblem,
+                         testing::Combine(testing::ValuesIn(RankRevealingColumns()),
+                                          testing::Values(Place::kPlane, Place::kTilted)),
+                         [](const auto& test) {
+                           return NameOf(std::get<0>(test.param)) +
+                                  (std::get<1>(test.param) == Place::kPlane ? "Plane" : "Tilted");
+                         });
+
+}  // namespace
+}  // namespace loopbench::harness::reference

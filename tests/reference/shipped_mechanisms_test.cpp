@@ -1,0 +1,58 @@
+// Every shipped mechanism runs: all three formulations, both coordinate sets, a short while.
+#include <gtest/gtest.h>
+
+#include <algorithm>
+#include <filesystem>
+#include <iostream>
+
+#include "tests/reference/cases.h"
+#include "tests/reference/simulate.h"
+
+namespace loopbench::harness::reference {
+namespace {
+
+std::vector<std::string> ShippedNames() {
+  std::vector<std::string> names;
+  for (const auto& entry : std::filesystem::directory_iterator(kConfigs / "mechanisms")) {
+    if (entry.path().extension() == ".json") names.push_back(entry.path().stem().string());
+  }
+  std::ranges::sort(names);
+  return names;
+}
+
+/// Time of a short run [s]: Andrews' squeezer turns a thousand times as fast as the others, the
+/// governor takes 1e4 steps a second.
+double ShortHorizon(const std::string& name) {
+  if (name == "andrews-squeezer") return 0.005;
+  return name == "flyball-governor" ? 0.02 : 0.2;
+}
+
+class ShippedMechanism : public testing::TestWithParam<std::string> {};
+
+TEST_P(ShippedMechanism, RunsInEveryColumnAndBalancesItsEnergy) {
+  const Experiment experiment =
+      Single(ReadMechanism(kConfigs / "mechanisms" / (GetParam() + ".json")));
+  constexpr double kRtol = 1e-8;
+  // rank-revealing: some start in singular positions
+  for (const Column& column : RankRevealingColumns()) {
+    const Record record = RunCase(
+        experiment, CaseOf(experiment, GetParam(), column, kRtol, ShortHorizon(GetParam())));
+    ASSERT_EQ(record.Text("outcome"), "finished")
+        << ToString(column) << ": " << record.Text("message");
+    // errors of at most rtol per step and component, some 1e3 steps and energies up to 1e3 J
+    EXPECT_LE(record.Number("energy_error_max"), 1e6 * kRtol) << ToString(column);
+    EXPECT_LE(record.Number("drift_position_max"), 1e3 * kRtol) << ToString(column);
+    std::cout << ToString(column) << ": " << record.Number("energy_error_max") << " J, "
+              << record.Number("drift_position_max") << " m\n";
+  }
+}
+
+INSTANTIATE_TEST_SUITE_P(All, ShippedMechanism, testing::ValuesIn(ShippedNames()),
+                         [](const auto& name) {
+                           std::string text = name.param;
+                           std::erase(text, '-');
+                           return text;
+                         });
+
+}  // namespace
+}  // namespace loopbench::harness::reference

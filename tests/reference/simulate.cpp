@@ -1,0 +1,184 @@
+#include "tests/reference/simulate.h"
+
+#include <Eigen/Geometry>
+#include <algorithm>
+#include <cmath>
+#include <stdexcept>
+
+#include "harness/run_case.h"
+#include "mechanism/assembly.h"
+#include "tests/reference/cases.h"
+
+namespace loopbench::harness::reference {
+namespace {
+
+/// The formulation's system with two quadratures: the integral of the kinetic energy, and the work
+/// of forces without a potential.
+template <class Space>
+class WithIntegrals final : public Ode {
+ public:
+  explicit WithIntegrals(Formulation<Space, double>& formulation) : formulation_(formulation) {}
+  int size() const override { return formulation_.state_size() + 2; }
+  int num_quadratures() const override { return 2; }
+  Outcome Derivative(double t, std::span<const double> y, std::span<double> ydot) override {
+    const std::size_t n = y.size() - 2;
+    const Outcome outcome = formulation_.Derivative(t, y.first(n), ydot.first(n));
+    const Power<double> power = AppliedPower(formulation_.kinematics());
+    ydot[n] = ComputeEnergy(formulation_.kinematics()).kinetic;
+    ydot[n + 1] = power.supplied - power.dissipated;
+    return outcome;
+  }
+
+ private:
+  Formulation<Space, double>& formulation_;
+};
+
+BodyState StateOf(const Pose<Planar, double>& X, const Motion<Planar, double>& V) {
+  BodyState state;
+  state.R.topLeftCorner<2, 2>() = X.R;
+  state.p.head<2>() = X.p;
+  state.w.z() = V[0];
+  state.v.head<2>() = V.tail<2>();
+  return state;
+}
+
+BodyState StateOf(const Pose<Spatial, double>& X, const Motion<Spatial, double>& V) {
+  return {X.R, X.p, V.head<3>(), V.tail<3>()};
+}
+
+template <class Space>
+Snapshot SnapshotOf(double t, const Kinematics<Space, double>& kinematics) {
+  Snapshot snapshot;
+  snapshot.t = t;
+  for (std::size_t i = 0; i < kinematics.poses().size(); ++i) {
+    snapshot.bodies.push_back(StateOf(kinematics.poses()[i], kinematics.motions()[i]));
+  }
+  const Energy<double> energy = ComputeEnergy(kinematics);
+  snapshot.kinetic = energy.kinetic;
+  snapshot.potential = energy.potential;
+  return snapshot;
+}
+
+template <class Space>
+Simulation SimulateIn(const MechanismDescription& description, const Column& column,
+                      const IntegratorOptions& options, double horizon, const Watch& watch) {
+  const Mechanism<Space, double> mechanism(description, column.coordinates);
+  Simulation simulation;
+  const Start<double> start = Assemble<Space>(description, mechanism);
+  const auto formulation = MakeFormulation<Space>(column, mechanism);
+  simulation.result.outcome = start.outcome;
+  simulation.result.message = start.message;
+  if (start.outcome == Outcome::kFinished) {
+    simulation.result.outcome = formulation->Start(0.0, start.q, start.u);
+  }
+  if (simulation.result.outcome != Outcome::kFinished) return simulation;
+
+  const std::size_t n = formulation->state_size();
+  std::vector<double> y(n + 2, 0.0), ydot(n);
+  formulation->ToState(start.q, start.u, std::span(y).first(n));
+  double first_energy = std::nan("");
+  Outcome failure = Outcome::kFinished;  // of an accepted state
+  const StepObserver observe = [&](double t, std::span<double> state) {
+    const bool restart = formulation->BeginStep(t, state.first(n));
+    failure = formulation->FromState(t, state.first(n));
+    if (failure != Outcome::kFinished) return StepAction::kStop;
+    simulation.last = SnapshotOf(t, formulation->kinematics());
+    const double energy = simulation.last.kinetic + simulation.last.potential - state[n + 1];
+    if (std::isnan(first_energy)) first_energy = energy;
+    simulation.energy_error = std::max(simulation.energy_error, std::abs(energy - first_energy));
+    if (watch) watch(simulation.last);
+    return restart ? StepAction::kRestart : StepAction::kContinue;
+  };
+  WithIntegrals<Space> ode(*formulation);
+  simulation.result = Integrate(ode, 0.0, horizon, y, options, observe);
+  if (failure != Outcome::kFinished) simulation.result.outcome = failure;
+  simulation.kinetic_integral = y[n];
+  return simulation;
+}
+
+/// Rotation vector of R1 then, in the turned axes, the rotation of vector `turn`.
+Eigen::Vector3d After(const Eigen::Matrix3d& R1, const Eigen::Vector3d& turn) {
+  const double angle = turn.norm();
+  Eigen::Matrix3d R = R1;
+  if (angle > 0.0) R = R1 * Eigen::AngleAxisd(angle, turn / angle).toRotationMatrix();
+  const Eigen::AngleAxisd both(R);
+  return both.angle() * both.axis();
+}
+
+}  // namespace
+
+Simulation Simulate(const MechanismDescription& description, const Column& column,
+                    const IntegratorOptions& options, double horizon, const Watch& watch) {
+  return description.space == SpaceKind::kPlanar
+             ? SimulateIn<Planar>(description, column, options, horizon, watch)
+             : SimulateIn<Spatial>(description, column, options, horizon, watch);
+}
+
+IntegratorOptions Options(const std::string& profile, double tolerance) {
+  IntegratorOptions options;
+  options.profile = profile;
+  options.rtol = options.atol = tolerance;
+  options.time_limit_s = 60.0;
+  return options;
+}
+
+int BodyNamed(const MechanismDescription& description, const std::string& name) {
+  const auto it = std::ranges::find(description.bodies, name, &BodyDescription::name);
+  if (it == description.bodies.end()) throw std::invalid_argument("no body " + name);
+  return static_cast<int>(it - description.bodies.begin());
+}
+
+Eigen::Vector3d PointOf(const MechanismDescription& description, const Snapshot& snapshot, int body,
+                        const Eigen::Vector3d& at) {
+  const BodyState& state = snapshot.bodies[body];
+  return state.p + state.R * (at - description.bodies[body].com);
+}
+
+Eigen::Vector3d VelocityOf(const MechanismDescription& description, const Snapshot& snapshot,
+                           int body, const Eigen::Vector3d& at) {
+  const BodyState& state = snapshot.bodies[body];
+  return state.v + state.w.cross(state.R * (at - description.bodies[body].com));
+}
+
+MechanismDescription Tilted(MechanismDescription description, const Eigen::Matrix3d& R) {
+  const bool planar = description.space == SpaceKind::kPlanar;
+  description.space = SpaceKind::kSpatial;
+  description.gravity = (R * description.gravity).eval();
+  for (auto& [name, point] : description.bodies[kGround].points) point = (R * point).eval();
+  for (JointDescription& joint : description.joints) {
+    if (planar && joint.type == JointType::kFree) {
+      throw std::invalid_argument("free joint " + joint.name + " of a planar scene");
+    }
+    for (JointSide* side : {&joint.from, &joint.to}) {
+      if (side->body != kGround) continue;
+      side->position = (R * side->position).eval();
+      side->rotation = After(R, side->rotation);
+    }
+  }
+  for (ForceDescription& force : description.forces) {
+    if (auto* point = std::get_if<PointForce>(&force); point && !point->in_body_axes) {
+      point->force = (R * point->force).eval();
+    }
+    if (auto* spring = std::get_if<SpringDamper>(&force)) {
+      for (BodyPoint* end : {&spring->from, &spring->to}) {
+        if (end->body == kGround) end->at = (R * end->at).eval();
+      }
+    }
+  }
+  return description;
+}
+
+Eigen::Matrix3d AnyRotation() {
+  return Eigen::AngleAxisd(1.2345, Eigen::Vector3d(0.48, -0.6, 0.64)).toRotationMatrix();
+}
+
+const std::vector<Column>& RankRevealingColumns() {
+  static const std::vector<Column> kColumns = [] {
+    std::vector<Column> columns = PublishedColumns();
+    for (Column& column : columns) column.solver = SolverKind::kRankRevealing;
+    return columns;
+  }();
+  return kColumns;
+}
+
+}  // namespace loopbench::harness::reference

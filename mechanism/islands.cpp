@@ -1,0 +1,68 @@
+#include "mechanism/islands.h"
+
+#include <numeric>
+
+namespace loopbench {
+
+namespace {
+
+/// Whether the force acts on bodies that are connected anyway: on one body, or along a joint.
+struct StaysInIsland {
+  bool operator()(const JointTorque&) const { return true; }
+  bool operator()(const JointSpring&) const { return true; }
+  bool operator()(const JointDamper&) const { return true; }
+  bool operator()(const PointForce&) const { return true; }
+  /// Of forces not listed here nothing is known.
+  template <class Other>
+  bool operator()(const Other&) const {
+    return false;
+  }
+};
+
+class Sets {
+ public:
+  explicit Sets(std::size_t n) : parent_(n) { std::iota(parent_.begin(), parent_.end(), 0); }
+  int Find(int i) {
+    while (parent_[i] != i) i = parent_[i] = parent_[parent_[i]];
+    return i;
+  }
+  void Unite(int a, int b) { parent_[Find(a)] = Find(b); }
+
+ private:
+  std::vector<int> parent_;
+};
+
+}  // namespace
+
+std::vector<Island> FindIslands(const MechanismDescription& description) {
+  const int num_bodies = static_cast<int>(description.bodies.size());
+  Sets sets(description.bodies.size());
+  for (const JointDescription& joint : description.joints) {
+    if (joint.from.body != kGround && joint.to.body != kGround) {
+      sets.Unite(joint.from.body, joint.to.body);
+    }
+  }
+  for (const ForceDescription& force : description.forces) {
+    if (std::visit(StaysInIsland(), force)) continue;
+    for (int body = 2; body < num_bodies; ++body) sets.Unite(1, body);
+  }
+  std::vector<Island> islands;
+  std::vector<int> island_of_root(description.bodies.size(), -1);
+  for (int body = 1; body < num_bodies; ++body) {
+    int& island = island_of_root[sets.Find(body)];
+    if (island < 0) {
+      island = static_cast<int>(islands.size());
+      islands.emplace_back();
+    }
+    islands[island].bodies.push_back(body);
+  }
+  for (const JointDescription& joint : description.joints) {
+    const bool from_ground = joint.from.body == kGround, to_ground = joint.to.body == kGround;
+    if (from_ground == to_ground) continue;
+    islands[island_of_root[sets.Find(from_ground ? joint.to.body : joint.from.body)]].grounded =
+        true;
+  }
+  return islands;
+}
+
+}  // namespace loopbench

@@ -5,6 +5,7 @@
 
 #include "harness/analysis/model_warnings.h"
 #include "harness/commands.h"
+#include "harness/compiled_scene.h"
 #include "harness/config/mechanism_reader.h"
 #include "harness/report/table.h"
 #include "odca/odca.h"
@@ -222,6 +223,14 @@ int ExplainMechanism(const std::filesystem::path& path) {
   PrintIslands(description, structure);
   PrintCoordinates(structure);
   PrintPlanOfJoins(description);
+  fmt::print("\nWhat need not be modelled\n");
+  const Compiled compiled = Compile(description, CompileOptions::All());
+  if (compiled.report.empty()) fmt::print("  nothing to save\n");
+  for (const std::string& line : compiled.report) fmt::print("  {}\n", line);
+  if (compiled.done != CompileOptions::None()) {
+    fmt::print("  Savings found: {}. By default a run makes: {} (\"compile\" of an experiment).\n",
+               ToString(compiled.done), ToString(CompileOptions()));
+  }
   fmt::print("\nWarnings\n");
   if (warnings.empty()) fmt::print("  none\n");
   for (const Warning& warning : warnings) fmt::print("  {}\n", warning.text);

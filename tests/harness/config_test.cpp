@@ -45,9 +45,11 @@ TEST(ShippedMechanisms, AllReadAndBearTheNamesOfTheirFiles) {
 TEST(ShippedMechanisms, HoldAsManyJointsAsTheyHaveDegreesOfFreedom) {
   for (const fs::path& file : JsonFilesIn(kConfigs / "mechanisms")) {
     const MechanismDescription mechanism = ReadMechanism(file).description;
-    // Grueebler's count for planar revolute joints; it holds for all of these scenes.
-    const auto bodies = static_cast<int>(mechanism.bodies.size()) - 1;
-    const int freedom = 3 * bodies - 2 * static_cast<int>(mechanism.joints.size());
+    // Gruebler's count for planar joints; it holds for all of these scenes.
+    int freedom = 3 * (static_cast<int>(mechanism.bodies.size()) - 1);
+    for (const JointDescription& joint : mechanism.joints) {
+      freedom -= 3 - NumValues(joint.type, mechanism.space, true);
+    }
     EXPECT_EQ(static_cast<int>(mechanism.initial.held.size()), freedom) << file;
     // One name for joint coordinates and one for absolute ones.
     EXPECT_EQ(static_cast<int>(mechanism.independent.size()), 2 * freedom) << file;

@@ -6,6 +6,7 @@
 #include "mechanism/immovable.h"
 #include "mechanism/islands.h"
 #include "mechanism/plane.h"
+#include "mechanism/topology.h"
 #include "mechanism/welds.h"
 
 namespace loopbench {
@@ -16,6 +17,18 @@ std::string Number(double value) {
   char text[32];
   std::snprintf(text, sizeof text, "%.6g", value);
   return text;
+}
+
+/// Whether loops are cut where they were. Another joint that closes one may carry a guess, which
+/// Assemble() refuses.
+bool KeepsCuts(const MechanismDescription& before, const MechanismDescription& after,
+               const Renumbering& renumbering) {
+  std::vector<bool> was_cut(after.joints.size(), false);
+  for (const int joint : BuildTopology(before, Coordinates::kJoint).constraints) {
+    if (renumbering.joints[joint] >= 0) was_cut[renumbering.joints[joint]] = true;
+  }
+  return std::ranges::all_of(BuildTopology(after, Coordinates::kJoint).constraints,
+                             [&](int joint) { return was_cut[joint]; });
 }
 
 class Compiler {
@@ -63,12 +76,19 @@ class Compiler {
     }
     Renumbering renumbering;
     const MechanismDescription before = whole();
+    MechanismDescription after = Attach(before, attachments, &renumbering);
+    if (!KeepsCuts(before, after, renumbering)) {
+      result_.report.push_back("bodies that could be " + how +
+                               " to others are kept: a joint with an initial value would have to "
+                               "close a loop");
+      return false;
+    }
     for (std::size_t i = 1; i < attachments.size(); ++i) {
       if (!attachments[i].attached) continue;
       result_.report.push_back("body \"" + before.bodies[i].name + "\": " + how + " to \"" +
                                before.bodies[attachments[i].carrier].name + "\"");
     }
-    whole() = Attach(before, attachments, &renumbering);
+    whole() = std::move(after);
     for (BodyImage& image : result_.bodies) {
       if (image.part < 0) continue;
       const Attachment& at = attachments[image.body];

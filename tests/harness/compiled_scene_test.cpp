@@ -116,11 +116,11 @@ TEST(CompiledSceneTest, ObservedAnglesFollowTheirBodies) {
 }
 
 TEST(MergePartsTest, TakesTheWorstAndAddsTheWork) {
-  Run a, b;
+  harness::Run a, b;
   a.record.Set("outcome", std::string("finished"));
   b.record.Set("outcome", std::string("singular"));
   b.record.Set("message", std::string("lost"));
-  for (Run* run : {&a, &b}) {
+  for (harness::Run* run : {&a, &b}) {
     run->record.Set("rank_min", std::int64_t{2});
     run->record.Set("steps", std::int64_t{10});
     run->record.Set("wall_s", 0.5);
@@ -134,8 +134,8 @@ TEST(MergePartsTest, TakesTheWorstAndAddsTheWork) {
   b.record.Set("worst_loop", std::string("y"));
   a.drift = {{0.0, 1.0, 2.0}, {0.0, 3.0, 1.0}};
   b.drift = {{0.0, 0.5, 1.0}, {0.0, 2.0, 1.0}};
-  const Run parts[] = {a, b};
-  const Run whole = MergeParts(parts);
+  const harness::Run parts[] = {a, b};
+  const harness::Run whole = MergeParts(parts);
   EXPECT_EQ(whole.record.Text("outcome"), "singular");
   EXPECT_EQ(whole.record.Text("message"), "lost");
   EXPECT_EQ(whole.record.Number("t_reached"), 1.0);

@@ -91,14 +91,14 @@ class Runner {
   IntegratorResult Integrate(const Start<double>& start) {
     const auto formulation = MakeFormulation<Space>(case_.column, mechanism_);
     IntegratorResult result;
-    result.outcome = formulation->Start(start.q, start.u);
+    result.outcome = formulation->Start(0.0, start.q, start.u);
     if (result.outcome != Outcome::kFinished) return result;
     y_.resize(formulation->state_size());
     formulation->ToState(start.q, start.u, y_);
     FormulationOde<Space> ode(*formulation);
     std::vector<double> ydot;
     const StepObserver observe = [&](double t, std::span<double> y) {
-      const bool restart = formulation->BeginStep(y);
+      const bool restart = formulation->BeginStep(t, y);
       ydot.resize(y.size());
       // a derivative that fails here fails in the integrator's next call, with its outcome; only
       // what the failing matrix looked like is worth keeping

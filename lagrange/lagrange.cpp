@@ -10,7 +10,7 @@ template <class Space, class S>
 std::vector<int> RowsOfConstraints(const Mechanism<Space, S>& mechanism) {
   std::vector<int> rows;
   for (int index : mechanism.constraints()) {
-    rows.push_back(mechanism.joints()[index].kind->num_constraints());
+    rows.push_back(mechanism.joints()[index].num_constraints());
   }
   return rows;
 }
@@ -28,6 +28,7 @@ Lagrange<Space, S>::Lagrange(const Mechanism<Space, S>& mechanism, FormulationOp
       lambda_(gamma_),
       force_(h_),
       target_(gamma_),
+      bias_(gamma_),
       change_(h_),
       loop_(RowsOfConstraints(mechanism)) {
   const int n = mechanism.num_u(), m = mechanism.num_rows();
@@ -139,7 +140,9 @@ template <class Space, class S>
 Outcome Lagrange<Space, S>::CompleteSpeeds() {
   if (const Outcome outcome = FactorOnce(); outcome != Outcome::kFinished) return outcome;
   force_.setZero();
-  target_.noalias() = -J_ * u_;
+  SpeedBias(kinematics_, force_, bias_);
+  target_ = -bias_;
+  target_.noalias() -= J_ * u_;
   SolveConstrained(force_, target_, change_);
   u_ += change_;
   return u_.allFinite() ? Outcome::kFinished : Outcome::kNonFinite;

@@ -29,6 +29,7 @@ class Lagrange final : public Formulation<Space, S> {
  private:
   Outcome CompleteSpeeds() override;
   Outcome Accelerations() override;
+  void Multipliers(VectorX<S>& lambda) override { lambda = lambda_; }
   /// M, J and the factors of (1) or S at the current positions, once per position.
   Outcome FactorOnce();
   Outcome FactorAugmented();
@@ -49,7 +50,7 @@ class Lagrange final : public Formulation<Space, S> {
   TreeDynamics<Space, S> dynamics_;
   long factored_version_ = -1;
   MatrixX<S> M_, J_, W_, response_;
-  VectorX<S> h_, gamma_, lambda_, force_, target_, change_;
+  VectorX<S> h_, gamma_, lambda_, force_, target_, bias_, change_;
   MatrixX<S> augmented_;
   VectorX<S> rhs_, solution_;
   Eigen::PartialPivLU<MatrixX<S>> lu_;

@@ -32,6 +32,7 @@ class Assembler {
   Start<double> Run() {
     if (start_.outcome == Outcome::kFinished) ClosePositions();
     if (start_.outcome == Outcome::kFinished) CloseSpeeds();
+    if (start_.outcome == Outcome::kFinished) CheckMobility();
     return start_;
   }
 
@@ -47,9 +48,11 @@ class Assembler {
     for (const JointValues& values : description_.initial.coordinates) {
       const Joint<Space, double>& joint = mechanism_.joints()[values.joint];
       if (joint.in_tree()) {
-        for (int i = 0; i < joint.kind->num_q; ++i) {
-          start_.q[joint.q_offset + i] = values.values[i];
+        for (int i = 0, next = joint.q_offset; i < joint.kind->num_q; ++i) {
+          if (mechanism_.DriveOf(joint, i) < 0) start_.q[next++] = values.values[i];
         }
+      } else if (joint.num_u() == 0) {
+        continue;  // prescribed
       } else if (is_held(values.joint) && joint.kind->num_u == 1) {
         held_cut_.push_back({values.joint, values.values[0]});
       } else {
@@ -60,19 +63,21 @@ class Assembler {
     }
     for (int index : description_.initial.held) {
       const Joint<Space, double>& joint = mechanism_.joints()[index];
-      for (int i = 0; joint.in_tree() && i < joint.kind->num_u; ++i) {
+      for (int i = 0; joint.in_tree() && i < joint.num_u(); ++i) {
         held_q_[joint.u_offset + i] = true;
       }
     }
     for (const JointValues& values : description_.initial.speeds) {
       const Joint<Space, double>& joint = mechanism_.joints()[values.joint];
-      for (int i = 0; i < joint.kind->num_u; ++i) {
+      for (int i = 0, free = 0; i < joint.kind->num_u; ++i) {
+        if (mechanism_.DriveOf(joint, i) >= 0) continue;
         if (!joint.in_tree()) {
-          given_cut_.push_back({values.joint, i, values.values[i]});
-          continue;
+          given_cut_.push_back({values.joint, free, values.values[i]});
+        } else {
+          start_.u[joint.u_offset + free] = values.values[i];
+          given_u_[joint.u_offset + free] = true;
         }
-        start_.u[joint.u_offset + i] = values.values[i];
-        given_u_[joint.u_offset + i] = true;
+        ++free;
       }
     }
   }
@@ -89,7 +94,7 @@ class Assembler {
     VectorX<double> e(mechanism_.num_rows() + static_cast<int>(held_cut_.size()));
     for (int index : mechanism_.constraints()) {
       const Joint<Space, double>& joint = mechanism_.joints()[index];
-      e.segment(joint.row, joint.kind->num_constraints()) =
+      e.segment(joint.row, joint.num_constraints()) =
           kinematics_.joints()[index].D().transpose() * kinematics_.ConstraintMismatch(index);
     }
     for (std::size_t k = 0; k < held_cut_.size(); ++k) {
@@ -99,16 +104,22 @@ class Assembler {
     return e;
   }
 
-  /// Row of H^T (V_Q - V_P): how fast the coordinate `component` of a cut joint changes.
+  /// Speed of the free coordinate `component` of a cut joint at u.
+  double CutJointSpeed(int index, int component, const VectorX<double>& u) {
+    kinematics_.UpdateVelocity(u);
+    const JointState<Space, double>& state = kinematics_.joints()[index];
+    return mechanism_.joints()[index].kind->per_speed * state.H(component).dot(state.V_rel);
+  }
+
+  /// Its derivatives by u.
   Eigen::RowVectorXd CutJointRow(int index, int component) {
     Eigen::RowVectorXd row(mechanism_.num_u());
-    VectorX<double> unit = VectorX<double>::Zero(mechanism_.num_u());
+    VectorX<double> u = VectorX<double>::Zero(mechanism_.num_u());
+    const double at_rest = CutJointSpeed(index, component, u);
     for (int i = 0; i < mechanism_.num_u(); ++i) {
-      unit[i] = 1.0;
-      kinematics_.UpdateVelocity(unit);
-      const JointState<Space, double>& state = kinematics_.joints()[index];
-      row[i] = state.H(component).dot(state.V_rel);
-      unit[i] = 0.0;
+      u[i] = 1.0;
+      row[i] = CutJointSpeed(index, component, u) - at_rest;
+      u[i] = 0.0;
     }
     return row;
   }
@@ -178,10 +189,15 @@ class Assembler {
     MatrixX<double> J;
     dynamics_.Jacobian(kinematics_, J);
     J.conservativeResize(rows + extra, Eigen::NoChange);
-    VectorX<double> target = VectorX<double>::Zero(rows + extra);
+    const VectorX<double> at_rest = VectorX<double>::Zero(mechanism_.num_u());
+    VectorX<double> target, bias;
+    SpeedBias(kinematics_, at_rest, bias);
+    target = -bias;
+    target.conservativeResize(rows + extra);
     for (int k = 0; k < extra; ++k) {
-      J.row(rows + k) = CutJointRow(given_cut_[k].joint, given_cut_[k].component);
-      target[rows + k] = given_cut_[k].value;
+      const auto& [joint, component, value] = given_cut_[k];
+      J.row(rows + k) = CutJointRow(joint, component);
+      target[rows + k] = value - CutJointSpeed(joint, component, at_rest);
     }
     if (J.rows() == 0) return;
     MatrixX<double> J_free = J;
@@ -189,7 +205,7 @@ class Assembler {
       if (given_u_[c]) J_free.col(c).setZero();
     }
     const VectorX<double> miss = target - J * start_.u;
-    const double size = 1.0 + start_.u.norm() * Extent();
+    const double size = 1.0 + target.norm() + start_.u.norm() * Extent();
     if (miss.norm() > 64 * std::numeric_limits<double>::epsilon() * size) {
       Eigen::CompleteOrthogonalDecomposition<MatrixX<double>> solver(J_free);
       start_.u += solver.solve(miss);
@@ -201,13 +217,33 @@ class Assembler {
     }
   }
 
+  /// A position where constraints leave no speed free. Singular positions, where they depend on
+  /// each other, have speeds left.
+  void CheckMobility() {
+    if (!mechanism_.drives().empty() || mechanism_.num_rows() < mechanism_.num_u()) return;
+    Eigen::Index rank = 0;
+    if (mechanism_.num_u() > 0) {
+      MatrixX<double> J;
+      kinematics_.UpdatePosition(start_.q);
+      dynamics_.Jacobian(kinematics_, J);
+      Eigen::ColPivHouseholderQR<MatrixX<double>> qr(J);
+      qr.setThreshold(1e-4);  // the square root of that of the weights (loop_solver.h)
+      rank = qr.rank();
+    }
+    if (rank < mechanism_.num_u()) return;
+    start_.outcome = Outcome::kLocked;
+    start_.message = mechanism_.name() +
+                     ": nothing can move: " + std::to_string(mechanism_.num_rows()) +
+                     " constraints take all " + std::to_string(mechanism_.num_u()) + " speeds";
+  }
+
   void NameWorstLoop(const VectorX<double>& e, const std::string& what, const std::string& unit) {
     Eigen::Index worst = 0;
     e.cwiseAbs().maxCoeff(&worst);
     std::string name = "of the held cut joint";
     for (int index : mechanism_.constraints()) {
       const Joint<Space, double>& joint = mechanism_.joints()[index];
-      if (worst >= joint.row && worst < joint.row + joint.kind->num_constraints()) {
+      if (worst >= joint.row && worst < joint.row + joint.num_constraints()) {
         name = "closed by joint \"" + mechanism_.joint_names()[index] + "\"";
       }
     }

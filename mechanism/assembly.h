@@ -18,14 +18,14 @@ namespace loopbench {
 /// A start in the coordinates of the mechanism it was made for.
 template <class S>
 struct Start {
-  Outcome outcome = Outcome::kFinished;  ///< or kInconsistentStart
+  Outcome outcome = Outcome::kFinished;  ///< or kInconsistentStart, kLocked
   std::string message;                   ///< names the loop that does not close and by how much
   VectorX<S> q, u;
   double position_residual = 0.0;  ///< largest mismatch left [rad or m]
   double speed_residual = 0.0;     ///< largest component of J u left [rad/s or m/s]
 };
 
-/// Assembles the description's initial data. `mechanism` must be compiled from the same
+/// Assembles the description's initial data at time 0. `mechanism` must be compiled from the same
 /// description, in either coordinate set: the result is in its coordinates.
 template <class Space>
 Start<double> Assemble(const MechanismDescription& description,

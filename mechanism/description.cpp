@@ -47,6 +47,26 @@ std::string CheckPlanarJoint(const JointDescription& joint) {
   return "";
 }
 
+std::string CheckMotions(SpaceKind space, const JointDescription& joint) {
+  const int speeds = NumValues(joint.type, space, true);
+  if (joint.motions.empty()) return "";
+  if (NumValues(joint.type, space, false) != speeds) {
+    return "a joint with a quaternion has no coordinate to prescribe";
+  }
+  std::vector<bool> taken(speeds, false);
+  for (const PrescribedMotion& motion : joint.motions) {
+    if (motion.coordinate < 0 || motion.coordinate >= speeds) {
+      return "no coordinate " + std::to_string(motion.coordinate) + " to prescribe";
+    }
+    if (taken[motion.coordinate]) {
+      return "coordinate " + std::to_string(motion.coordinate) + " is prescribed twice";
+    }
+    taken[motion.coordinate] = true;
+    if (const std::string error = Validate(motion.value); !error.empty()) return error;
+  }
+  return "";
+}
+
 std::string CheckJoint(const MechanismDescription& description, const JointDescription& joint) {
   const int num_bodies = static_cast<int>(description.bodies.size());
   for (int body : {joint.from.body, joint.to.body}) {
@@ -63,6 +83,15 @@ std::string CheckJoint(const MechanismDescription& description, const JointDescr
       !joint.from.rotation.allFinite() || !joint.to.rotation.allFinite() ||
       !joint.axis.allFinite()) {
     return "joint " + Quote(joint.name) + ": positions, rotations and axis must be finite";
+  }
+  if (!std::isfinite(joint.pitch) || !std::isfinite(joint.length)) {
+    return "joint " + Quote(joint.name) + ": pitch and length must be finite";
+  }
+  if (joint.type == JointType::kRod && !(joint.length > 0.0)) {
+    return "joint " + Quote(joint.name) + ": a rod needs a length > 0";
+  }
+  if (const std::string error = CheckMotions(description.space, joint); !error.empty()) {
+    return "joint " + Quote(joint.name) + ": " + error;
   }
   return description.space == SpaceKind::kPlanar ? CheckPlanarJoint(joint) : "";
 }
@@ -128,6 +157,8 @@ std::string_view ToString(JointType type) {
       return "free";
     case JointType::kPinInSlot:
       return "pin-in-slot";
+    case JointType::kRod:
+      return "rod";
     case JointType::kCylindrical:
       return "cylindrical";
     case JointType::kSpherical:
@@ -136,6 +167,8 @@ std::string_view ToString(JointType type) {
       return "planar";
     case JointType::kUniversal:
       return "universal";
+    case JointType::kHelical:
+      return "helical";
   }
   return "unknown";
 }
@@ -144,7 +177,7 @@ std::string_view ToString(SpaceKind space) {
   return space == SpaceKind::kPlanar ? "planar" : "spatial";
 }
 
-bool ExistsInPlane(JointType type) { return type <= JointType::kPinInSlot; }
+bool ExistsInPlane(JointType type) { return type <= JointType::kRod; }
 
 char OwnAxis(JointType type) {
   switch (type) {
@@ -154,6 +187,7 @@ char OwnAxis(JointType type) {
     case JointType::kRevolute:
     case JointType::kCylindrical:
     case JointType::kPlanar:
+    case JointType::kHelical:
       return 'z';
     default:
       return '-';
@@ -161,6 +195,7 @@ char OwnAxis(JointType type) {
 }
 
 int NumValues(JointType type, SpaceKind space, bool speeds) {
+  if (type == JointType::kRod) return 0;
   if (space == SpaceKind::kPlanar && ExistsInPlane(type)) {
     const auto& kind = KindOf<Planar, double>(type);
     return speeds ? kind.num_u : kind.num_q;

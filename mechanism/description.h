@@ -12,6 +12,8 @@
 #include <variant>
 #include <vector>
 
+#include "mechanism/time_function.h"
+
 namespace loopbench {
 
 /// Index of Ground in every list of bodies.
@@ -27,12 +29,14 @@ enum class JointType {
   kWeld,
   kFree,
   kPinInSlot,
+  kRod,
   kCylindrical,
   kSpherical,
   kPlanar,
   kUniversal,
+  kHelical,
 };
-inline constexpr int kNumJointTypes = 9;
+inline constexpr int kNumJointTypes = 11;
 
 std::string_view ToString(JointType type);
 /// Whether a planar scene may have it.
@@ -40,7 +44,8 @@ bool ExistsInPlane(JointType type);
 /// The axis of a joint's own frames that JointDescription::axis names: 'x' (slides along it), 'z'
 /// (turns about it, or is normal to its plane), or '-' for joints without one.
 char OwnAxis(JointType type);
-/// Coordinates (or speeds) of a joint.
+/// Coordinates (or speeds) of a joint that a user can give: none for a rod, which is never
+/// followed.
 int NumValues(JointType type, SpaceKind space, bool speeds);
 std::string_view ToString(SpaceKind space);
 
@@ -60,6 +65,12 @@ struct JointSide {
   Eigen::Vector3d rotation = Eigen::Vector3d::Zero();  ///< rotation vector body -> frame [rad]
 };
 
+/// A coordinate of a joint as a given function of time: a drive.
+struct PrescribedMotion {
+  int coordinate = 0;             ///< in the order of joint.h
+  TimeFunctionDescription value;  ///< [rad] or [m]
+};
+
 /// A joint from P to Q. Its frame F is fixed on P, its frame M on Q; coordinates describe M in F.
 struct JointDescription {
   std::string name;
@@ -69,7 +80,10 @@ struct JointDescription {
   /// Joint axis in the axes of both frames before alignment: the joint's own axis (OwnAxis()) is
   /// turned onto it. Zero means the own axis as it is.
   Eigen::Vector3d axis = Eigen::Vector3d::Zero();
-  bool cut = false;  ///< never part of the spanning tree (if the graph allows)
+  double pitch = 0.0;   ///< of a helical joint: advance along its axis per angle [m/rad]
+  double length = 0.0;  ///< of a rod: distance between its two points [m], > 0
+  bool cut = false;     ///< never part of the spanning tree (if the graph allows)
+  std::vector<PrescribedMotion> motions;  ///< at most one per coordinate; none with a quaternion
 };
 
 /// Constant moment (revolute) [N m] or force (prismatic) [N] on `to`, its opposite on `from`.

@@ -36,7 +36,7 @@ void AppliedForces(const Kinematics<Space, S>& kinematics, std::span<Motion<Spac
     if (force.damping != S(0)) tau -= force.damping * kinematics.JointSpeed(force.joint);
     const Joint<Space, S>& joint = mechanism.joints()[force.joint];
     const JointState<Space, S>& state = kinematics.joints()[force.joint];
-    const Motion<Space, S> F = state.H(0) * tau;
+    const Motion<Space, S> F = state.H(0) * (tau * joint.kind->per_speed);
     wrenches[joint.to] += ShiftForce<Space, S>(F, state.r_Q);
     wrenches[joint.from] -= ShiftForce<Space, S>(F, state.r_P);
   }

@@ -18,10 +18,15 @@ Formulation<Space, S>::Formulation(const Mechanism<Space, S>& mechanism, Formula
       kinematics_(mechanism),
       q_(VectorX<S>::Zero(mechanism.num_q())),
       u_(VectorX<S>::Zero(mechanism.num_u())),
-      udot_(VectorX<S>::Zero(mechanism.num_u())) {}
+      udot_(VectorX<S>::Zero(mechanism.num_u())) {
+  if (mechanism.drives().empty()) return;
+  drives_ = std::make_unique<Drives<Space, S>>(mechanism);
+  lambda_of_drives_.setZero(mechanism.num_rows());
+}
 
 template <class Space, class S>
-Outcome Formulation<Space, S>::Start(const VectorX<S>& q, const VectorX<S>& u) {
+Outcome Formulation<Space, S>::Start(S t, const VectorX<S>& q, const VectorX<S>& u) {
+  kinematics_.SetTime(t);
   q_ = q;
   u_ = u;
   kinematics_.UpdatePosition(q_);
@@ -39,21 +44,40 @@ void Formulation<Space, S>::ToState(const VectorX<S>& q, const VectorX<S>& u,
 }
 
 template <class Space, class S>
-Outcome Formulation<Space, S>::FromState(std::span<const S> y) {
+Outcome Formulation<Space, S>::FromState(S t, std::span<const S> y) {
+  kinematics_.SetTime(t);
   const int num_q = mechanism_.num_q();
   for (int i = 0; i < num_q; ++i) q_[i] = y[i];
   for (int i = 0; i < num_state_speeds(); ++i) u_[state_speed(i)] = y[num_q + i];
   kinematics_.UpdatePosition(q_);
   Outcome outcome = Outcome::kFinished;
-  if (options_.enforcement == Enforcement::kVelocity) outcome = CompleteSpeeds();
+  if (options_.enforcement == Enforcement::kVelocity && mechanism_.num_u() > 0) {
+    outcome = CompleteSpeeds();
+  }
   kinematics_.UpdateVelocity(u_);
   return outcome;
 }
 
 template <class Space, class S>
-Outcome Formulation<Space, S>::Derivative(S, std::span<const S> y, std::span<S> ydot) {
-  Outcome outcome = FromState(y);
-  if (outcome == Outcome::kFinished) outcome = Accelerations();
+Outcome Formulation<Space, S>::Solve() {
+  if (mechanism_.num_u() > 0) {
+    if (const Outcome outcome = Accelerations(); outcome != Outcome::kFinished) return outcome;
+  }
+  if (drives_ == nullptr || drives_->Followed(kinematics_, udot_)) return Outcome::kFinished;
+  return Outcome::kInconsistentMotion;
+}
+
+template <class Space, class S>
+S Formulation<Space, S>::DrivePower() {
+  if (drives_ == nullptr) return S(0);
+  if (mechanism_.num_u() > 0) Multipliers(lambda_of_drives_);
+  return drives_->Power(kinematics_, udot_, lambda_of_drives_);
+}
+
+template <class Space, class S>
+Outcome Formulation<Space, S>::Derivative(S t, std::span<const S> y, std::span<S> ydot) {
+  Outcome outcome = FromState(t, y);
+  if (outcome == Outcome::kFinished) outcome = Solve();
   diagnostics_.outcome = outcome;
   if (outcome != Outcome::kFinished) return outcome;
   const int num_q = mechanism_.num_q();
@@ -63,20 +87,21 @@ Outcome Formulation<Space, S>::Derivative(S, std::span<const S> y, std::span<S> 
 }
 
 template <class Space, class S>
-Outcome Formulation<Space, S>::Evaluate(S, const VectorX<S>& q, const VectorX<S>& u,
+Outcome Formulation<Space, S>::Evaluate(S t, const VectorX<S>& q, const VectorX<S>& u,
                                         VectorX<S>& udot) {
+  kinematics_.SetTime(t);
   q_ = q;
   u_ = u;
   kinematics_.UpdatePosition(q_);
   kinematics_.UpdateVelocity(u_);
-  diagnostics_.outcome = Accelerations();
+  diagnostics_.outcome = Solve();
   udot = udot_;
   return diagnostics_.outcome;
 }
 
 template <class Space, class S>
-bool Formulation<Space, S>::BeginStep(std::span<S> y) {
-  if (FromState(y) != Outcome::kFinished) return false;  // the next evaluation will say why
+bool Formulation<Space, S>::BeginStep(S t, std::span<S> y) {
+  if (FromState(t, y) != Outcome::kFinished) return false;  // the next evaluation will say why
   kinematics_.AcceptStep();
   if (!ChangeMode()) return false;
   ToState(q_, u_, y);

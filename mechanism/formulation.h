@@ -4,7 +4,7 @@
 // speeds do". It is used through
 //   Derivative(t, y)   the right-hand side for an integrator, y = (q, speeds of the state),
 //   Evaluate(t, q, u)  accelerations alone, for given q and all speeds u,
-//   BeginStep(y)       at accepted steps, the only call that may change the mode (an
+//   BeginStep(t, y)    at accepted steps, the only call that may change the mode (an
 //                      independent set, unwrapped angles). Everything else is a pure function
 //                      of (t, q, u, mode): calling it in any order gives the same bits.
 // After construction O-DCA allocates nothing in any of them, the dense baselines nothing in a
@@ -15,7 +15,7 @@
 #include <memory>
 #include <string_view>
 
-#include "mechanism/kinematics.h"
+#include "mechanism/drives.h"
 #include "mechanism/outcome.h"
 
 namespace loopbench {
@@ -61,8 +61,8 @@ class Formulation {
   const Mechanism<Space, S>& mechanism() const { return mechanism_; }
   const FormulationOptions& options() const { return options_; }
 
-  /// Called once with a consistent start, before anything else.
-  virtual Outcome Start(const VectorX<S>& q, const VectorX<S>& u);
+  /// Called once with a consistent start at time t, before anything else.
+  virtual Outcome Start(S t, const VectorX<S>& q, const VectorX<S>& u);
 
   int state_size() const { return mechanism_.num_q() + num_state_speeds(); }
   void ToState(const VectorX<S>& q, const VectorX<S>& u, std::span<S> y) const;
@@ -73,15 +73,18 @@ class Formulation {
   /// udot for given positions and speeds.
   Outcome Evaluate(S t, const VectorX<S>& q, const VectorX<S>& u, VectorX<S>& udot);
 
-  /// Positions and all speeds of a state; kinematics() is current afterwards.
-  Outcome FromState(std::span<const S> y);
+  /// Positions and all speeds of a state at time t; kinematics() is current afterwards.
+  Outcome FromState(S t, std::span<const S> y);
   const VectorX<S>& q() const { return q_; }
   const VectorX<S>& u() const { return u_; }
   const VectorX<S>& udot() const { return udot_; }
 
-  /// Accepts the step that ended in `y`. True when the mode changed: then the state's meaning may
-  /// have changed too, `y` is rewritten and the integrator must restart.
-  bool BeginStep(std::span<S> y);
+  /// Accepts the step that ended in `y` at time t. True when the mode changed: then the state's
+  /// meaning may have changed too, `y` is rewritten and the integrator must restart.
+  bool BeginStep(S t, std::span<S> y);
+
+  /// Power [W] that prescribed motions supply, after a successful evaluation. O(n); 0 without them.
+  S DrivePower();
 
   const Kinematics<Space, S>& kinematics() const { return kinematics_; }
   const Diagnostics& diagnostics() const { return diagnostics_; }
@@ -96,6 +99,8 @@ class Formulation {
   virtual Outcome CompleteSpeeds() = 0;
   /// udot_ from current positions and speeds; sets diagnostics_.
   virtual Outcome Accelerations() = 0;
+  /// Multipliers of all constraint rows after Accelerations(): D lambda is the force on Q.
+  virtual void Multipliers(VectorX<S>& lambda) = 0;
   /// Chance to change the mode at an accepted state.
   virtual bool ChangeMode() { return false; }
 
@@ -107,6 +112,13 @@ class Formulation {
   Kinematics<Space, S> kinematics_;
   VectorX<S> q_, u_, udot_;
   Diagnostics diagnostics_;
+
+ private:
+  /// Accelerations(), unless nothing is free, and whether prescribed motions can be followed.
+  Outcome Solve();
+
+  std::unique_ptr<Drives<Space, S>> drives_;  ///< null without prescribed motions
+  VectorX<S> lambda_of_drives_;
 };
 
 }  // namespace loopbench

@@ -17,6 +17,15 @@ void SameRates(const S*, const S* u, S* qdot) {
   for (int i = 0; i < n; ++i) qdot[i] = u[i];
 }
 
+/// The distance |p| has the second derivative n . p'' + |v_t|^2 / |p|, v_t the part of v across n.
+template <class Space, class S>
+void RodBias(const Pose<Space, S>& X, const Motion<Space, S>& V, Motion<Space, S>& Hdot_u) {
+  const S distance = X.p.norm();
+  const Linear<Space, S> n = X.p / distance, v = V.template tail<Space::kLin>();
+  Hdot_u.setZero();
+  Hdot_u.template tail<Space::kLin>() = -n * ((v - n * n.dot(v)).squaredNorm() / distance);
+}
+
 template <class S>
 struct PlanarKinds {
   using P = Pose<Planar, S>;
@@ -27,11 +36,11 @@ struct PlanarKinds {
             .axes = {0, 1, 2},
             .isotropic = true,
             .transform =
-                [](const S* q, P& X) {
+                [](const S* q, P& X, S) {
                   X.SetAngle(q[0]);
                   X.p.setZero();
                 },
-            .coordinates = [](const P& X, S* q) { q[0] = X.angle; },
+            .coordinates = [](const P& X, S* q, S) { q[0] = X.angle; },
             .rates = SameRates<S, 1>};
   }
   static JointKind<Planar, S> Prismatic() {
@@ -40,11 +49,11 @@ struct PlanarKinds {
             .axes = {1, 0, 2},
             .isotropic = false,
             .transform =
-                [](const S* q, P& X) {
+                [](const S* q, P& X, S) {
                   X.SetAngle(S(0));
                   X.p << q[0], S(0);
                 },
-            .coordinates = [](const P& X, S* q) { q[0] = X.p[0]; },
+            .coordinates = [](const P& X, S* q, S) { q[0] = X.p[0]; },
             .rates = SameRates<S, 1>};
   }
   static JointKind<Planar, S> Weld() {
@@ -52,8 +61,8 @@ struct PlanarKinds {
             .num_u = 0,
             .axes = {0, 1, 2},
             .isotropic = true,
-            .transform = [](const S*, P& X) { X = P(); },
-            .coordinates = [](const P&, S*) {},
+            .transform = [](const S*, P& X, S) { X = P(); },
+            .coordinates = [](const P&, S*, S) {},
             .rates = SameRates<S, 0>};
   }
   static JointKind<Planar, S> Free() {
@@ -62,12 +71,12 @@ struct PlanarKinds {
             .axes = {0, 1, 2},
             .isotropic = false,
             .transform =
-                [](const S* q, P& X) {
+                [](const S* q, P& X, S) {
                   X.SetAngle(q[0]);
                   X.p << q[1], q[2];
                 },
             .coordinates =
-                [](const P& X, S* q) {
+                [](const P& X, S* q, S) {
                   q[0] = X.angle;
                   q[1] = X.p[0];
                   q[2] = X.p[1];
@@ -80,16 +89,29 @@ struct PlanarKinds {
             .axes = {0, 1, 2},
             .isotropic = false,
             .transform =
-                [](const S* q, P& X) {
+                [](const S* q, P& X, S) {
                   X.SetAngle(q[0]);
                   X.p << q[1], S(0);
                 },
             .coordinates =
-                [](const P& X, S* q) {
+                [](const P& X, S* q, S) {
                   q[0] = X.angle;
                   q[1] = X.p[0];
                 },
             .rates = SameRates<S, 2>};
+  }
+
+  static JointKind<Planar, S> Rod() {
+    return {.num_q = 0,
+            .num_u = 2,
+            .axes = {0, 1, 2},
+            .isotropic = false,
+            .basis =
+                [](const P& X, Block<Planar, S>& basis_F, S) {
+                  const Linear<Planar, S> n = X.p.normalized();
+                  basis_F << S(1), S(0), S(0), S(0), -n[1], n[0], S(0), n[0], n[1];
+                },
+            .bias = RodBias<Planar, S>};
   }
 };
 
@@ -141,11 +163,11 @@ struct SpatialKinds {
             .axes = {2, 0, 1, 3, 4, 5},
             .isotropic = false,
             .transform =
-                [](const S* q, P& X) {
+                [](const S* q, P& X, S) {
                   TurnAboutZ(q[0], X);
                   X.p.setZero();
                 },
-            .coordinates = [](const P& X, S* q) { q[0] = AngleAboutZ(X); },
+            .coordinates = [](const P& X, S* q, S) { q[0] = AngleAboutZ(X); },
             .rates = SameRates<S, 1>};
   }
   static JointKind<Spatial, S> Prismatic() {
@@ -154,11 +176,11 @@ struct SpatialKinds {
             .axes = {3, 0, 1, 2, 4, 5},
             .isotropic = false,
             .transform =
-                [](const S* q, P& X) {
+                [](const S* q, P& X, S) {
                   X.R.setIdentity();
                   X.p << q[0], S(0), S(0);
                 },
-            .coordinates = [](const P& X, S* q) { q[0] = X.p[0]; },
+            .coordinates = [](const P& X, S* q, S) { q[0] = X.p[0]; },
             .rates = SameRates<S, 1>};
   }
   static JointKind<Spatial, S> Weld() {
@@ -166,8 +188,8 @@ struct SpatialKinds {
             .num_u = 0,
             .axes = {0, 1, 2, 3, 4, 5},
             .isotropic = true,
-            .transform = [](const S*, P& X) { X = P(); },
-            .coordinates = [](const P&, S*) {},
+            .transform = [](const S*, P& X, S) { X = P(); },
+            .coordinates = [](const P&, S*, S) {},
             .rates = SameRates<S, 0>};
   }
   static JointKind<Spatial, S> Free() {
@@ -176,12 +198,12 @@ struct SpatialKinds {
             .axes = {0, 1, 2, 3, 4, 5},
             .isotropic = false,
             .transform =
-                [](const S* q, P& X) {
+                [](const S* q, P& X, S) {
                   FromQuaternion(q, X);
                   X.p << q[4], q[5], q[6];
                 },
             .coordinates =
-                [](const P& X, S* q) {
+                [](const P& X, S* q, S) {
                   ToQuaternion(X, q);
                   for (int i = 0; i < 3; ++i) q[4 + i] = X.p[i];
                 },
@@ -196,12 +218,12 @@ struct SpatialKinds {
             .num_u = 2,
             .axes = {2, 3, 0, 1, 4, 5},
             .transform =
-                [](const S* q, P& X) {
+                [](const S* q, P& X, S) {
                   TurnAboutZ(q[0], X);
                   X.p << q[1], S(0), S(0);
                 },
             .coordinates =
-                [](const P& X, S* q) {
+                [](const P& X, S* q, S) {
                   q[0] = AngleAboutZ(X);
                   q[1] = X.p[0];
                 },
@@ -212,12 +234,12 @@ struct SpatialKinds {
             .num_u = 2,
             .axes = {2, 5, 0, 1, 3, 4},
             .transform =
-                [](const S* q, P& X) {
+                [](const S* q, P& X, S) {
                   TurnAboutZ(q[0], X);
                   X.p << S(0), S(0), q[1];
                 },
             .coordinates =
-                [](const P& X, S* q) {
+                [](const P& X, S* q, S) {
                   q[0] = AngleAboutZ(X);
                   q[1] = X.p[2];
                 },
@@ -228,11 +250,11 @@ struct SpatialKinds {
             .num_u = 3,
             .axes = {0, 1, 2, 3, 4, 5},
             .transform =
-                [](const S* q, P& X) {
+                [](const S* q, P& X, S) {
                   FromQuaternion(q, X);
                   X.p.setZero();
                 },
-            .coordinates = [](const P& X, S* q) { ToQuaternion(X, q); },
+            .coordinates = [](const P& X, S* q, S) { ToQuaternion(X, q); },
             .rates = QuaternionRates};
   }
   static JointKind<Spatial, S> InPlane() {
@@ -240,12 +262,12 @@ struct SpatialKinds {
             .num_u = 3,
             .axes = {2, 3, 4, 0, 1, 5},
             .transform =
-                [](const S* q, P& X) {
+                [](const S* q, P& X, S) {
                   TurnAboutZ(q[0], X);
                   X.p << q[1], q[2], S(0);
                 },
             .coordinates =
-                [](const P& X, S* q) {
+                [](const P& X, S* q, S) {
                   q[0] = AngleAboutZ(X);
                   q[1] = X.p[0];
                   q[2] = X.p[1];
@@ -257,7 +279,7 @@ struct SpatialKinds {
             .num_u = 2,
             .axes = {0, 1, 2, 3, 4, 5},
             .transform =
-                [](const S* q, P& X) {
+                [](const S* q, P& X, S) {
                   using std::cos;
                   using std::sin;
                   const S c = cos(q[0]), s = sin(q[0]), cy = cos(q[1]), sy = sin(q[1]);
@@ -265,14 +287,14 @@ struct SpatialKinds {
                   X.p.setZero();
                 },
             .coordinates =
-                [](const P& X, S* q) {
+                [](const P& X, S* q, S) {
                   using std::atan2;
                   q[0] = atan2(X.R(2, 1), X.R(1, 1));
                   q[1] = atan2(X.R(0, 2), X.R(0, 0));
                 },
             .rates = SameRates<S, 2>,
             .basis =
-                [](const P& X, Block<Spatial, S>& basis_F) {
+                [](const P& X, Block<Spatial, S>& basis_F, S) {
                   basis_F.setIdentity();
                   basis_F.template topLeftCorner<3, 3>() = CrossAxes(X);
                 },
@@ -285,6 +307,47 @@ struct SpatialKinds {
                   Hdot_u.template head<3>() = axes.col(0).dot(w) * axes.col(1).dot(w) * axes.col(2);
                 }};
   }
+
+  static JointKind<Spatial, S> Rod() {
+    return {.num_q = 0,
+            .num_u = 5,
+            .axes = {0, 1, 2, 3, 4, 5},
+            .basis =
+                [](const P& X, Block<Spatial, S>& basis_F, S) {
+                  const Linear<Spatial, S> n = X.p.normalized(), across = n.unitOrthogonal();
+                  basis_F.setIdentity();
+                  basis_F.template bottomRightCorner<3, 3>() << across, n.cross(across), n;
+                },
+            .bias = RodBias<Spatial, S>};
+  }
+  static JointKind<Spatial, S> Helical() {
+    return {.num_q = 1,
+            .num_u = 1,
+            .axes = {2, 0, 1, 3, 4, 5},
+            .transform =
+                [](const S* q, P& X, S pitch) {
+                  TurnAboutZ(q[0], X);
+                  X.p << S(0), S(0), pitch * q[0];
+                },
+            .coordinates =
+                [](const P& X, S* q, S pitch) {
+                  // the shift along the axis says in which turn the angle is
+                  const S turn = 2 * std::numbers::pi_v<S>;
+                  q[0] = AngleAboutZ(X);
+                  if (pitch != S(0)) q[0] += turn * std::round((X.p[2] / pitch - q[0]) / turn);
+                },
+            .rates = SameRates<S, 1>,
+            .basis =
+                [](const P&, Block<Spatial, S>& basis_F, S pitch) {
+                  basis_F.setZero();
+                  basis_F(2, 0) = S(1);
+                  basis_F(5, 0) = pitch;
+                  for (int i = 0; i < 2; ++i) basis_F(i, 1 + i) = basis_F(3 + i, 3 + i) = S(1);
+                  const S length = std::sqrt(1 + pitch * pitch);
+                  basis_F(2, 5) = -pitch / length;
+                  basis_F(5, 5) = S(1) / length;
+                }};
+  }
 };
 
 }  // namespace
@@ -294,12 +357,13 @@ const JointKind<Space, S>& KindOf(JointType type) {
   using Kinds = std::conditional_t<Space::kRot == 1, PlanarKinds<S>, SpatialKinds<S>>;
   const auto all = [] {
     std::vector<JointKind<Space, S>> kinds = {Kinds::Revolute(), Kinds::Prismatic(), Kinds::Weld(),
-                                              Kinds::Free(), Kinds::PinInSlot()};
+                                              Kinds::Free(),     Kinds::PinInSlot(), Kinds::Rod()};
     if constexpr (Space::kRot == 3) {
       kinds.push_back(Kinds::Cylindrical());
       kinds.push_back(Kinds::Spherical());
       kinds.push_back(Kinds::InPlane());
       kinds.push_back(Kinds::Universal());
+      kinds.push_back(Kinds::Helical());
     }
     return kinds;
   };
@@ -308,11 +372,24 @@ const JointKind<Space, S>& KindOf(JointType type) {
 }
 
 template <class Space, class S>
+JointKind<Space, S> KindWith(JointType type, S parameter) {
+  JointKind<Space, S> kind = KindOf<Space, S>(type);
+  kind.parameter = parameter;
+  if (type == JointType::kHelical) kind.per_speed = S(1) / (S(1) + parameter * parameter);
+  return kind;
+}
+
+template <class Space, class S>
 Motion<Space, S> Mismatch(const JointKind<Space, S>& kind, const Pose<Space, S>& X_FM) {
+  if (kind.coordinates == nullptr) {  // a rod: what it is too long along itself
+    Motion<Space, S> mismatch = Motion<Space, S>::Zero();
+    mismatch.template tail<Space::kLin>() = X_FM.p * (S(1) - kind.parameter / X_FM.p.norm());
+    return mismatch;
+  }
   S q[7];
   Pose<Space, S> nearest;
-  kind.coordinates(X_FM, q);
-  kind.transform(q, nearest);
+  kind.coordinates(X_FM, q, kind.parameter);
+  kind.transform(q, nearest, kind.parameter);
   Pose<Space, S> rest = Compose(X_FM, Inverse(nearest));
   Motion<Space, S> mismatch;
   mismatch << RotationVector(rest), X_FM.p - nearest.p;
@@ -325,6 +402,7 @@ Motion<Space, S> Mismatch(const JointKind<Space, S>& kind, const Pose<Space, S>&
 
 #define LOOPBENCH_INSTANTIATE(Space, S)                  \
   template const JointKind<Space, S>& KindOf(JointType); \
+  template JointKind<Space, S> KindWith(JointType, S);   \
   template Motion<Space, S> Mismatch(const JointKind<Space, S>&, const Pose<Space, S>&);
 LOOPBENCH_FOR_EACH_SPACE_AND_SCALAR(LOOPBENCH_INSTANTIATE)
 #undef LOOPBENCH_INSTANTIATE

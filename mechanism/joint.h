@@ -2,7 +2,9 @@
 //
 // With q the coordinates and u the speeds of the joint (paper, table 1 and eq. 7-9):
 //   X_FM(q)        pose of M in F,
-//   H_F(q)         motion map: [w_FM; v_FMo] = H_F u, in F axes; columns are orthonormal,
+//   H_F(q)         motion map: [w_FM; v_FMo] = H_F u, in F axes; columns are orthogonal and, but
+//   for
+//                  a helical joint, of unit length,
 //   D_F(q)         its orthogonal complement, D_F^T H_F = 0: the directions of constraint forces,
 //   qdot = N(q) u  kinematic rates,
 //   q*(X_FM)       the coordinates that a measured pose of M in F comes closest to; what is left of
@@ -19,10 +21,12 @@
 //   weld          none
 //   free          plane: angle, x, y; space: quaternion w x y z, then x, y, z
 //   pin-in-slot   angle about z, shift along x
+//   rod           none that is followed: the distance of Mo from Fo is constant, and D is along it
 //   cylindrical   angle about z, shift along z
 //   spherical     quaternion w x y z
 //   planar        angle about z, x, y
 //   universal     angle about x, then about the turned y
+//   helical       angle about z, along which it shifts by `pitch` times the angle
 // Speeds are their rates; with a quaternion, the angular velocity. A quaternion is normalised where
 // it is used, so its length carries no information.
 #pragma once
@@ -44,13 +48,18 @@ struct JointKind {
   /// The span of D is the same in all axes (a planar pin): then ground axes serve for F axes.
   bool isotropic = false;
 
-  void (*transform)(const S* q, Pose<Space, S>& X_FM) = nullptr;
-  void (*coordinates)(const Pose<Space, S>& X_FM, S* q) = nullptr;
+  /// What the kinds helical (pitch [m/rad]) and rod (length [m]) depend on; 0 for others.
+  S parameter = S(0);
+  /// 1 / |H u|^2 for u = 1: what takes H^T V to a speed; 1 but for a helical joint.
+  S per_speed = S(1);
+
+  void (*transform)(const S* q, Pose<Space, S>& X_FM, S parameter) = nullptr;
+  void (*coordinates)(const Pose<Space, S>& X_FM, S* q, S parameter) = nullptr;
   void (*rates)(const S* q, const S* u, S* qdot) = nullptr;
 
-  /// Where they are not: [H D] in F axes at a pose, orthogonal; null otherwise.
-  void (*basis)(const Pose<Space, S>& X_FM, Block<Space, S>& basis_F) = nullptr;
-  /// And Hdot u in F axes, for a relative motion V in F axes.
+  /// Where directions are not axes: [H D] in F axes at a pose, orthogonal; null otherwise.
+  void (*basis)(const Pose<Space, S>& X_FM, Block<Space, S>& basis_F, S parameter) = nullptr;
+  /// And Hdot u in F axes, for a relative motion V in F axes; null where it is zero.
   void (*bias)(const Pose<Space, S>& X_FM, const Motion<Space, S>& V,
                Motion<Space, S>& Hdot_u) = nullptr;
 
@@ -58,9 +67,13 @@ struct JointKind {
   int num_constraints() const { return Space::kDim - num_u; }
 };
 
-/// The kind's data and functions. Lives forever.
+/// The kind's data and functions, with parameter zero. Lives forever.
 template <class Space, class S>
 const JointKind<Space, S>& KindOf(JointType type);
+
+/// The same for one joint, with its own parameter.
+template <class Space, class S>
+JointKind<Space, S> KindWith(JointType type, S parameter);
 
 /// What keeps M from its nearest admissible pose, in F axes: [rotation vector; shift]. Its
 /// components along D are the joint's mismatch [rad; m].

@@ -40,7 +40,7 @@ template <class Space, class S>
 void SetBasisAt(const JointKind<Space, S>& kind, const Rotation<Space, S>& R,
                 const Pose<Space, S>& X_FM, Block<Space, S>& basis) {
   Block<Space, S> in_F;
-  kind.basis(X_FM, in_F);
+  kind.basis(X_FM, in_F, kind.parameter);
   basis.template bottomRows<Space::kLin>().noalias() = R * in_F.template bottomRows<Space::kLin>();
   if constexpr (Space::kRot == 1) {
     basis.template topRows<1>() = in_F.template topRows<1>();
@@ -52,7 +52,7 @@ void SetBasisAt(const JointKind<Space, S>& kind, const Rotation<Space, S>& R,
 /// Ground axes serve for H and D when their spans do not depend on axes, or when F is fixed.
 template <class Space, class S>
 bool TurnsWithBody(const Joint<Space, S>& joint) {
-  return !joint.kind->isotropic && joint.from != kGround;
+  return (!joint.kind->isotropic || joint.num_drives > 0) && joint.from != kGround;
 }
 
 }  // namespace
@@ -64,18 +64,59 @@ Kinematics<Space, S>::Kinematics(const Mechanism<Space, S>& mechanism)
       motions_(mechanism.num_bodies(), Motion<Space, S>::Zero()),
       joints_(mechanism.joints().size()),
       measured_(joints_.size()),
+      drives_(mechanism.drives().size()),
       accepted_(joints_.size(), S(0)),
       q_(VectorX<S>::Zero(mechanism.num_q())),
       u_(VectorX<S>::Zero(mechanism.num_u())) {
+  SetTime(S(0));
   for (std::size_t j = 0; j < joints_.size(); ++j) {
     const Joint<Space, S>& joint = mechanism.joints()[j];
     JointState<Space, S>& state = joints_[j];
-    state.num_u = joint.kind->num_u;
-    const bool any_axes = joint.kind->isotropic;
-    SetBasis<Space, S>(*joint.kind, any_axes ? Rotation<Space, S>::Identity() : joint.X_PF.R,
-                       state.basis);
+    state.num_u = joint.num_u();
+    const bool any_axes = joint.kind->isotropic && joint.num_drives == 0;
+    if (joint.kind->basis == nullptr) {
+      SetDirections(joint, any_axes ? Rotation<Space, S>::Identity() : joint.X_PF.R, {}, state);
+    }
     state.V_rel.setZero();
     state.g.setZero();
+  }
+}
+
+template <class Space, class S>
+void Kinematics<Space, S>::SetTime(S t) {
+  time_ = t;
+  for (std::size_t d = 0; d < drives_.size(); ++d) {
+    drives_[d] = mechanism_->drives()[d].value.At(t);
+  }
+}
+
+template <class Space, class S>
+const S* Kinematics<Space, S>::JointCoordinates(const Joint<Space, S>& joint, const VectorX<S>& q,
+                                                S* room) const {
+  const S* given = q.data() + joint.q_offset;
+  if (joint.num_drives == 0) return given;
+  for (int i = 0; i < joint.kind->num_q; ++i) {
+    const int drive = mechanism_->DriveOf(joint, i);
+    room[i] = drive >= 0 ? drives_[drive].value : *given++;
+  }
+  return room;
+}
+
+/// [H D] in ground axes; directions of prescribed coordinates go from H to the head of D.
+template <class Space, class S>
+void Kinematics<Space, S>::SetDirections(const Joint<Space, S>& joint,
+                                         const Rotation<Space, S>& R_WF, const Pose<Space, S>& X_FM,
+                                         JointState<Space, S>& state) const {
+  if (joint.kind->basis != nullptr) {
+    SetBasisAt<Space, S>(*joint.kind, R_WF, X_FM, state.basis);
+  } else {
+    SetBasis<Space, S>(*joint.kind, R_WF, state.basis);
+  }
+  if (joint.num_drives == 0) return;
+  const Block<Space, S> all = state.basis;
+  int free = 0, driven = joint.num_u();
+  for (int i = 0; i < joint.kind->num_u; ++i) {
+    state.basis.col(mechanism_->DriveOf(joint, i) >= 0 ? driven++ : free++) = all.col(i);
   }
 }
 
@@ -88,16 +129,15 @@ void Kinematics<Space, S>::UpdatePosition(const VectorX<S>& q) {
     JointState<Space, S>& state = joints_[index];
     state.r_P = X_WM.p - poses_[joint.from].p;
     state.r_Q = X_WM.p - poses_[joint.to].p;
-    if (joint.kind->basis != nullptr) {
-      measured_[index] = X_FM;
-      SetBasisAt<Space, S>(*joint.kind, X_WF.R, X_FM, state.basis);
-    } else if (TurnsWithBody(joint)) {
-      SetBasis<Space, S>(*joint.kind, X_WF.R, state.basis);
+    if (joint.kind->basis != nullptr) measured_[index] = X_FM;
+    if (joint.kind->basis != nullptr || TurnsWithBody(joint)) {
+      SetDirections(joint, X_WF.R, X_FM, state);
     }
   };
+  S room[7];
   for (const TreeStep& step : mechanism_->tree()) {
     const Joint<Space, S>& joint = mechanism_->joints()[step.joint];
-    joint.kind->transform(q.data() + joint.q_offset, X_FM);
+    joint.kind->transform(JointCoordinates(joint, q, room), X_FM, joint.kind->parameter);
     if (step.sign > 0) {
       X_WF = Compose(poses_[step.parent], joint.X_PF);
       X_WM = Compose(X_WF, X_FM);
@@ -130,13 +170,19 @@ void Kinematics<Space, S>::UpdateVelocity(const VectorX<S>& u) {
     const Linear<Space, S> v_rel = state.V_rel.template tail<Space::kLin>();
     state.g << CrossAngular<S>(w_P, w_rel), S(2) * Cross<S>(w_P, v_rel);
     if (joint.kind->bias != nullptr) AddBias(index, joint, state);
+    for (int k = 0; k < joint.num_drives; ++k) {
+      state.g += state.D(k) * drives_[joint.first_drive + k].acceleration;
+    }
   };
   for (const TreeStep& step : mechanism_->tree()) {
     const Joint<Space, S>& joint = mechanism_->joints()[step.joint];
     JointState<Space, S>& state = joints_[step.joint];
     state.V_rel.setZero();
-    for (int i = 0; i < joint.kind->num_u; ++i) {
+    for (int i = 0; i < state.num_u; ++i) {
       state.V_rel += state.H(i) * u[joint.u_offset + i];
+    }
+    for (int k = 0; k < joint.num_drives; ++k) {
+      state.V_rel += state.D(k) * drives_[joint.first_drive + k].rate;
     }
     const bool forward = step.sign > 0;
     const Linear<Space, S>& r_parent = forward ? state.r_P : state.r_Q;
@@ -212,15 +258,41 @@ Motion<Space, S> Kinematics<Space, S>::ConstraintMismatch(int index) const {
   if constexpr (Space::kRot == 3) {
     mismatch.template head<3>().noalias() = R_WF * in_F.template head<3>();
   }
+  if (joint.num_drives == 0) return mismatch;
+  S q[7];
+  joint.kind->coordinates(measured_[index], q, joint.kind->parameter);
+  for (int k = 0; k < joint.num_drives; ++k) {
+    const int drive = joint.first_drive + k, coordinate = mechanism_->drives()[drive].coordinate;
+    S miss = q[coordinate] - drives_[drive].value;
+    // an angle is measured modulo a turn, and which one a helix tells by its shift
+    const bool angle = joint.kind->axes[coordinate] < Space::kRot && joint.kind->parameter == S(0);
+    if (angle) miss = std::remainder(miss, 2 * std::numbers::pi_v<S>);
+    mismatch += joints_[index].D(k) * miss;
+  }
   return mismatch;
+}
+
+template <class Space, class S>
+Motion<Space, S> Kinematics<Space, S>::ConstraintSpeed(int index) const {
+  const Joint<Space, S>& joint = mechanism_->joints()[index];
+  const JointState<Space, S>& state = joints_[index];
+  Motion<Space, S> speed = Motion<Space, S>::Zero();
+  for (int i = 0; i < state.rows(); ++i) speed[i] = state.D(i).dot(state.V_rel);
+  for (int k = 0; k < joint.num_drives; ++k) {
+    speed[k] -= drives_[joint.first_drive + k].rate / joint.kind->per_speed;
+  }
+  return speed;
 }
 
 template <class Space, class S>
 S Kinematics<Space, S>::JointCoordinate(int index) const {
   const Joint<Space, S>& joint = mechanism_->joints()[index];
-  if (joint.in_tree()) return q_[joint.q_offset];
+  if (joint.in_tree()) {
+    return joint.num_drives > 0 ? drives_[joint.first_drive].value : q_[joint.q_offset];
+  }
   S q;
-  joint.kind->coordinates(measured_[index], &q);
+  joint.kind->coordinates(measured_[index], &q, joint.kind->parameter);
+  if (joint.kind->parameter != S(0)) return q;  // a helix tells its turns
   // Space measures an angle modulo a turn; take the one next to the last accepted.
   if (Space::kRot == 3 && joint.kind->axes[0] < 3) {
     const S turn = 2 * std::numbers::pi_v<S>;
@@ -232,8 +304,10 @@ S Kinematics<Space, S>::JointCoordinate(int index) const {
 template <class Space, class S>
 S Kinematics<Space, S>::JointSpeed(int index) const {
   const Joint<Space, S>& joint = mechanism_->joints()[index];
-  if (joint.in_tree()) return u_[joint.u_offset];
-  return joints_[index].H(0).dot(joints_[index].V_rel);
+  if (joint.in_tree()) {
+    return joint.num_drives > 0 ? drives_[joint.first_drive].rate : u_[joint.u_offset];
+  }
+  return joints_[index].H(0).dot(joints_[index].V_rel) * joint.kind->per_speed;
 }
 
 template <class Space, class S>
@@ -254,7 +328,11 @@ VectorX<S> Kinematics<Space, S>::CoordinatesIn(const Mechanism<Space, S>& other)
   VectorX<S> q(other.num_q());
   for (const TreeStep& step : other.tree()) {
     const Joint<Space, S>& joint = other.joints()[step.joint];
-    joint.kind->coordinates(MeasuredPose(joint), q.data() + joint.q_offset);
+    S all[7];
+    joint.kind->coordinates(MeasuredPose(joint), all, joint.kind->parameter);
+    for (int i = 0, next = joint.q_offset; i < joint.kind->num_q; ++i) {
+      if (other.DriveOf(joint, i) < 0) q[next++] = all[i];
+    }
   }
   return q;
 }
@@ -267,7 +345,8 @@ VectorX<S> Kinematics<Space, S>::SpeedsIn(const Kinematics& other) const {
     const JointState<Space, S>& state = other.joints()[step.joint];
     const Motion<Space, S> V_rel = ShiftMotion<Space, S>(motions_[joint.to], state.r_Q) -
                                    ShiftMotion<Space, S>(motions_[joint.from], state.r_P);
-    u.segment(joint.u_offset, joint.kind->num_u) = state.H().transpose() * V_rel;
+    u.segment(joint.u_offset, state.num_u) =
+        joint.kind->per_speed * (state.H().transpose() * V_rel);
   }
   return u;
 }

@@ -21,8 +21,9 @@ struct JointState {
   Block<Space, S> basis;      ///< [H D], orthogonal
   int num_u = 0;
 
-  auto H() const { return basis.leftCols(num_u); }                 ///< motion map
-  auto D() const { return basis.rightCols(Space::kDim - num_u); }  ///< constrained directions
+  auto H() const { return basis.leftCols(num_u); }  ///< motion map
+  /// Constrained directions, those of prescribed coordinates first.
+  auto D() const { return basis.rightCols(Space::kDim - num_u); }
   auto H(int i) const { return basis.col(i); }
   auto D(int i) const { return basis.col(num_u + i); }
   int rows() const { return Space::kDim - num_u; }
@@ -32,6 +33,13 @@ template <class Space, class S>
 class Kinematics {
  public:
   explicit Kinematics(const Mechanism<Space, S>& mechanism);
+
+  /// The time [s] that prescribed motions and time-dependent forces are taken at; 0 until set. To
+  /// be called before the positions are updated.
+  void SetTime(S t);
+  S time() const { return time_; }
+  /// Values of the mechanism's drives at that time.
+  const std::vector<TimeValue<S>>& drives() const { return drives_; }
 
   /// Poses, joint points and directions from q.
   void UpdatePosition(const VectorX<S>& q);
@@ -65,6 +73,10 @@ class Kinematics {
   /// constraint function whose Jacobian is tree_dynamics.h's J.
   Motion<Space, S> ConstraintMismatch(int joint) const;
 
+  /// D^T V_rel less the rates of prescribed coordinates: zero when a constraint holds at velocity
+  /// level. joints()[joint].rows() numbers, the others zero.
+  Motion<Space, S> ConstraintSpeed(int joint) const;
+
   /// Measured coordinate and speed of a joint with one coordinate (q, u for tree joints).
   S JointCoordinate(int joint) const;
   S JointSpeed(int joint) const;
@@ -80,6 +92,10 @@ class Kinematics {
 
  private:
   void AddBias(int index, const Joint<Space, S>& joint, JointState<Space, S>& state) const;
+  /// Coordinates of a tree joint, prescribed ones among them, in `room`.
+  const S* JointCoordinates(const Joint<Space, S>& joint, const VectorX<S>& q, S* room) const;
+  void SetDirections(const Joint<Space, S>& joint, const Rotation<Space, S>& R_WF,
+                     const Pose<Space, S>& X_FM, JointState<Space, S>& state) const;
   Pose<Space, S> MeasuredPose(const Joint<Space, S>& joint) const;
 
   const Mechanism<Space, S>* mechanism_;
@@ -87,8 +103,10 @@ class Kinematics {
   std::vector<Motion<Space, S>> motions_;
   std::vector<JointState<Space, S>> joints_;
   std::vector<Pose<Space, S>> measured_;  ///< X_FM of constraints and of kinds with a basis
-  std::vector<S> accepted_;               ///< last accepted coordinate of each joint
+  std::vector<TimeValue<S>> drives_;
+  std::vector<S> accepted_;  ///< last accepted coordinate of each joint
   VectorX<S> q_, u_;
+  S time_ = S(0);
   long position_version_ = 0;
 };
 

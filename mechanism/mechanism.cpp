@@ -93,10 +93,14 @@ Mechanism<Space, S>::Mechanism(const MechanismDescription& description, Coordina
   for (const TreeEdge& edge : joint_topology.edges) {
     const JointType type = edge.joint < 0 ? JointType::kFree : description.joints[edge.joint].type;
     num_joint_speeds_ += KindOf<Space, S>(type).num_u;
+    if (edge.joint >= 0) {
+      num_joint_speeds_ -= static_cast<int>(description.joints[edge.joint].motions.size());
+    }
   }
   AddBodies(description);
   AddJoints(description, BuildTopology(description, coordinates));
   AddForces(description);
+  AddStopTimes();
   AddLength();
   NameSpeeds(description);
 }
@@ -121,19 +125,46 @@ void Mechanism<Space, S>::AddBodies(const MechanismDescription& description) {
 }
 
 template <class Space, class S>
+Joint<Space, S> Mechanism<Space, S>::MakeJoint(const MechanismDescription& description, int index) {
+  const JointDescription& user = description.joints[index];
+  Joint<Space, S> joint;
+  joint.kind = &KindOf<Space, S>(user.type);
+  if (user.type == JointType::kHelical || user.type == JointType::kRod) {
+    const double parameter = user.type == JointType::kRod ? user.length : user.pitch;
+    own_kinds_.push_back(
+        std::make_shared<const JointKind<Space, S>>(KindWith<Space, S>(user.type, S(parameter))));
+    joint.kind = own_kinds_.back().get();
+  }
+  joint.from = user.from.body;
+  joint.to = user.to.body;
+  joint.X_PF = SidePose<Space, S>(user.from, user, description.bodies[joint.from].com);
+  joint.X_QM = SidePose<Space, S>(user.to, user, description.bodies[joint.to].com);
+  joint.description = index;
+  joint.first_drive = static_cast<int>(drives_.size());
+  joint.num_drives = static_cast<int>(user.motions.size());
+  for (const PrescribedMotion& motion : user.motions) {
+    drives_.push_back({index, motion.coordinate, TimeFunction(motion.value)});
+  }
+  std::ranges::sort(drives_.begin() + joint.first_drive, drives_.end(), {}, &Drive::coordinate);
+  return joint;
+}
+
+template <class Space, class S>
+void Mechanism<Space, S>::AddStopTimes() {
+  for (const Drive& drive : drives_) {
+    stop_times_.insert(stop_times_.end(), drive.value.knots().begin(), drive.value.knots().end());
+  }
+  std::ranges::sort(stop_times_);
+  const auto repeated = std::ranges::unique(stop_times_);
+  stop_times_.erase(repeated.begin(), repeated.end());
+}
+
+template <class Space, class S>
 void Mechanism<Space, S>::AddJoints(const MechanismDescription& description,
                                     const Topology& topology) {
-  for (std::size_t j = 0; j < description.joints.size(); ++j) {
-    const JointDescription& user = description.joints[j];
-    Joint<Space, S> joint;
-    joint_names_.push_back(user.name);
-    joint.kind = &KindOf<Space, S>(user.type);
-    joint.from = user.from.body;
-    joint.to = user.to.body;
-    joint.X_PF = SidePose<Space, S>(user.from, user, description.bodies[joint.from].com);
-    joint.X_QM = SidePose<Space, S>(user.to, user, description.bodies[joint.to].com);
-    joint.description = static_cast<int>(j);
-    joints_.push_back(joint);
+  for (int j = 0; j < static_cast<int>(description.joints.size()); ++j) {
+    joint_names_.push_back(description.joints[j].name);
+    joints_.push_back(MakeJoint(description, j));
   }
   step_of_body_.assign(bodies_.size(), -1);
   for (const TreeEdge& edge : topology.edges) {
@@ -149,14 +180,14 @@ void Mechanism<Space, S>::AddJoints(const MechanismDescription& description,
     Joint<Space, S>& joint = joints_[index];
     joint.q_offset = num_q_;
     joint.u_offset = num_u_;
-    num_q_ += joint.kind->num_q;
-    num_u_ += joint.kind->num_u;
+    num_q_ += joint.num_q();
+    num_u_ += joint.num_u();
     step_of_body_[edge.child] = static_cast<int>(tree_.size());
     tree_.push_back({index, edge.parent, edge.child, joint.to == edge.child ? 1 : -1});
   }
   for (int index : topology.constraints) {
     joints_[index].row = num_rows_;
-    num_rows_ += joints_[index].kind->num_constraints();
+    num_rows_ += joints_[index].num_constraints();
     constraints_.push_back(index);
   }
 }
@@ -207,11 +238,12 @@ template <class Space, class S>
 void Mechanism<Space, S>::NameSpeeds(const MechanismDescription& description) {
   const std::vector<std::string> components = ComponentNames<Space>();
   for (const TreeStep& step : tree_) {
-    const std::string& joint = joint_names_[step.joint];
-    const int num_u = joints_[step.joint].kind->num_u;
-    for (int i = 0; i < num_u; ++i) {
-      speed_names_.push_back(
-          num_u == 1 ? joint : joint + "." + components[joints_[step.joint].kind->axes[i]]);
+    const Joint<Space, S>& joint = joints_[step.joint];
+    const std::string& name = joint_names_[step.joint];
+    for (int i = 0; i < joint.kind->num_u; ++i) {
+      if (DriveOf(joint, i) >= 0) continue;
+      const bool single = joint.kind->num_u == 1;
+      speed_names_.push_back(single ? name : name + "." + components[joint.kind->axes[i]]);
     }
   }
   for (const std::string& name : description.independent) {
@@ -227,8 +259,12 @@ void Mechanism<Space, S>::Rates(const VectorX<S>& q, const VectorX<S>& u,
                                 Eigen::Ref<VectorX<S>> qdot) const {
   for (const TreeStep& step : tree_) {
     const Joint<Space, S>& joint = joints_[step.joint];
-    joint.kind->rates(q.data() + joint.q_offset, u.data() + joint.u_offset,
-                      qdot.data() + joint.q_offset);
+    if (joint.num_drives == 0) {
+      joint.kind->rates(q.data() + joint.q_offset, u.data() + joint.u_offset,
+                        qdot.data() + joint.q_offset);
+    } else {  // kinds whose speeds are the rates of their coordinates
+      qdot.segment(joint.q_offset, joint.num_q()) = u.segment(joint.u_offset, joint.num_u());
+    }
   }
 }
 

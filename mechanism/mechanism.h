@@ -2,6 +2,7 @@
 // formulations. Every frame of a body is re-expressed from the body's centre of mass.
 #pragma once
 
+#include <memory>
 #include <string>
 #include <vector>
 
@@ -26,13 +27,25 @@ Eigen::Matrix3d AxisAlignment(const JointDescription& joint);
 template <class Space, class S>
 struct Joint {
   const JointKind<Space, S>* kind = nullptr;
-  int from = kGround, to = kGround;  ///< bodies P and Q
-  int q_offset = -1, u_offset = -1;  ///< place in q and u; -1 for a constraint
-  int row = -1;                      ///< first constraint row; -1 for a tree joint
-  int description = -1;              ///< index of the user's joint, -1 for a virtual free joint
-  Pose<Space, S> X_PF, X_QM;         ///< seen from the centres of mass of P and Q
+  int from = kGround, to = kGround;     ///< bodies P and Q
+  int q_offset = -1, u_offset = -1;     ///< place in q and u; -1 for a constraint
+  int row = -1;                         ///< first constraint row; -1 for a tree joint
+  int description = -1;                 ///< index of the user's joint, -1 for a virtual free joint
+  int first_drive = 0, num_drives = 0;  ///< its prescribed coordinates, in Mechanism::drives()
+  Pose<Space, S> X_PF, X_QM;            ///< seen from the centres of mass of P and Q
 
   bool in_tree() const { return q_offset >= 0; }
+  /// What is left of the kind when prescribed coordinates count as constraints.
+  int num_q() const { return kind->num_q - num_drives; }
+  int num_u() const { return kind->num_u - num_drives; }
+  int num_constraints() const { return kind->num_constraints() + num_drives; }
+};
+
+/// A prescribed coordinate of a joint: its direction is the first (next, ..) of D.
+struct Drive {
+  int joint = 0;
+  int coordinate = 0;  ///< of the kind
+  TimeFunction value;
 };
 
 /// A tree joint seen from its root side. `sign` is +1 when the child is the joint's Q, else -1.
@@ -74,7 +87,7 @@ class Mechanism {
   int num_rows() const { return num_rows_; }  ///< scalar constraints of all cut joints
   /// Independent loops of the user's graph, the same number in both coordinate sets.
   int num_loops() const { return num_loops_; }
-  /// Speeds of the user's spanning forest: num_u() in joint coordinates.
+  /// Free speeds of the user's spanning forest: num_u() in joint coordinates.
   int num_joint_speeds() const { return num_joint_speeds_; }
 
   const std::vector<Inertia<Space, S>>& bodies() const { return bodies_; }
@@ -82,6 +95,18 @@ class Mechanism {
   const std::vector<Joint<Space, S>>& joints() const { return joints_; }
   /// A virtual free joint carries its body's name.
   const std::vector<std::string>& joint_names() const { return joint_names_; }
+  /// Prescribed motions, by joint and coordinate.
+  const std::vector<Drive>& drives() const { return drives_; }
+  /// Index into drives() of a prescribed coordinate, -1 for a free one.
+  int DriveOf(const Joint<Space, S>& joint, int coordinate) const {
+    for (int d = joint.first_drive; d < joint.first_drive + joint.num_drives; ++d) {
+      if (drives_[d].coordinate == coordinate) return d;
+    }
+    return -1;
+  }
+  /// Times [s] at which a prescribed motion's derivatives jump, ascending: an integrator must not
+  /// step across them.
+  const std::vector<double>& stop_times() const { return stop_times_; }
   const std::vector<TreeStep>& tree() const { return tree_; }
   const std::vector<int>& constraints() const { return constraints_; }  ///< joint indices
   const std::vector<JointForce<S>>& joint_forces() const { return joint_forces_; }
@@ -109,7 +134,9 @@ class Mechanism {
  private:
   void AddBodies(const MechanismDescription& description);
   void AddJoints(const MechanismDescription& description, const Topology& topology);
+  Joint<Space, S> MakeJoint(const MechanismDescription& description, int index);
   void AddForces(const MechanismDescription& description);
+  void AddStopTimes();
   void AddLength();
   void NameSpeeds(const MechanismDescription& description);
 
@@ -119,6 +146,10 @@ class Mechanism {
   std::vector<Inertia<Space, S>> bodies_, geometric_bodies_;
   std::vector<std::string> body_names_, joint_names_;
   std::vector<Joint<Space, S>> joints_;
+  /// Kinds with a parameter of their own; shared by copies of the mechanism.
+  std::vector<std::shared_ptr<const JointKind<Space, S>>> own_kinds_;
+  std::vector<Drive> drives_;
+  std::vector<double> stop_times_;
   std::vector<TreeStep> tree_;
   std::vector<int> constraints_, step_of_body_;
   std::vector<JointForce<S>> joint_forces_;

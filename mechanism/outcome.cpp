@@ -18,6 +18,10 @@ std::string_view ToString(Outcome outcome) {
       return "time-limit";
     case Outcome::kInconsistentStart:
       return "inconsistent-start";
+    case Outcome::kInconsistentMotion:
+      return "inconsistent-motion";
+    case Outcome::kLocked:
+      return "locked";
     case Outcome::kIntegratorError:
       return "integrator-error";
   }

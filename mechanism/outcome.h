@@ -7,14 +7,16 @@ namespace loopbench {
 
 /// Ending of one evaluation or of one run. `kFinished` is the only success.
 enum class Outcome {
-  kFinished,           ///< reached its end
-  kSingular,           ///< a matrix that must be regular was not (as-published solvers)
-  kStepTooSmall,       ///< the error test failed too often or the step fell below round-off
-  kNonFinite,          ///< a derivative was NaN or infinite
-  kStepLimit,          ///< more steps than allowed
-  kTimeLimit,          ///< more wall time than allowed
-  kInconsistentStart,  ///< positions or speeds that satisfy the loops were not found
-  kIntegratorError,    ///< any other error return of the integrator
+  kFinished,            ///< reached its end
+  kSingular,            ///< a matrix that must be regular was not (as-published solvers)
+  kStepTooSmall,        ///< the error test failed too often or the step fell below round-off
+  kNonFinite,           ///< a derivative was NaN or infinite
+  kStepLimit,           ///< more steps than allowed
+  kTimeLimit,           ///< more wall time than allowed
+  kInconsistentStart,   ///< positions or speeds that satisfy the loops were not found
+  kInconsistentMotion,  ///< prescribed motions ask for what the loops forbid
+  kLocked,              ///< no speed is free and none is prescribed: nothing can move
+  kIntegratorError,     ///< any other error return of the integrator
 };
 
 /// The name used in tables and files, e.g. "step-too-small".

@@ -30,7 +30,8 @@ class DisjointSets {
   std::vector<int> parent_;
 };
 
-/// 0: wants to stay in the tree (carries a force or an initial value), 1: neutral, 2: marked "cut".
+/// Low numbers want to stay in the tree. -1: follows a given motion or a thread exactly there, 0:
+/// carries a force or an initial value, 1: neutral, 2: marked "cut".
 std::vector<int> CutPreference(const MechanismDescription& description) {
   std::vector<int> preference(description.joints.size(), 1);
   const auto keep = [&](int joint) { preference[joint] = 0; };
@@ -44,7 +45,9 @@ std::vector<int> CutPreference(const MechanismDescription& description) {
   for (const JointValues& values : description.initial.coordinates) keep(values.joint);
   for (const JointValues& values : description.initial.speeds) keep(values.joint);
   for (std::size_t i = 0; i < preference.size(); ++i) {
-    if (description.joints[i].cut) preference[i] = 2;
+    const JointDescription& joint = description.joints[i];
+    if (!joint.motions.empty() || joint.type == JointType::kHelical) preference[i] = -1;
+    if (joint.cut) preference[i] = 2;
   }
   return preference;
 }
@@ -59,6 +62,7 @@ std::vector<bool> ChooseTreeJoints(const MechanismDescription& description) {
   std::vector<bool> chosen(order.size(), false);
   for (int j : order) {
     const JointDescription& joint = description.joints[j];
+    if (joint.type == JointType::kRod) continue;  // it has no coordinates to follow
     chosen[j] = connected.Unite(joint.from.body, joint.to.body);
   }
   return chosen;

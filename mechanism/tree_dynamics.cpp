@@ -52,7 +52,7 @@ void TreeDynamics<Space, S>::MassMatrix(const Kinematics<Space, S>& kinematics,
     const JointState<Space, S>& state = kinematics.joints()[step->joint];
     const Joint<Space, S>& joint = mechanism.joints()[step->joint];
     const Arms<Space, S> arms(*step, state);
-    for (int i = 0; i < joint.kind->num_u; ++i) {
+    for (int i = 0; i < joint.num_u(); ++i) {
       // momentum of the subtree moving along direction i, carried rootward
       const Motion<Space, S> h = state.H(i) * S(step->sign);
       Motion<Space, S> F = composite_[step->child] * ShiftMotion<Space, S>(h, arms.child);
@@ -62,7 +62,7 @@ void TreeDynamics<Space, S>::MassMatrix(const Kinematics<Space, S>& kinematics,
         const Joint<Space, S>& at_joint = mechanism.joints()[at.joint];
         const Arms<Space, S> at_arms(at, at_state);
         F = ShiftForce<Space, S>(F, at_arms.child);
-        for (int k = 0; k < at_joint.kind->num_u; ++k) {
+        for (int k = 0; k < at_joint.num_u(); ++k) {
           const S value = S(at.sign) * at_state.H(k).dot(F);
           M(at_joint.u_offset + k, joint.u_offset + i) = value;
           M(joint.u_offset + i, at_joint.u_offset + k) = value;
@@ -89,13 +89,26 @@ void TreeDynamics<Space, S>::BodyAccelerations(const Kinematics<Space, S>& kinem
     const Joint<Space, S>& joint = mechanism.joints()[step.joint];
     const Arms<Space, S> arms(step, state);
     Motion<Space, S> A_rel = state.g;
-    for (int i = 0; i < joint.kind->num_u; ++i) A_rel += state.H(i) * udot[joint.u_offset + i];
+    for (int i = 0; i < joint.num_u(); ++i) A_rel += state.H(i) * udot[joint.u_offset + i];
     const Motion<Space, S> at_joint = ShiftMotion<Space, S>(A[step.parent], arms.parent) +
                                       kinematics.Centripetal(step.parent, arms.parent) +
                                       S(step.sign) * A_rel;
     A[step.child] = ShiftMotion<Space, S>(at_joint, arms.child) +
                     kinematics.Centripetal(step.child, arms.child);
   }
+}
+
+template <class Space, class S>
+Motion<Space, S> InertialForce(const Kinematics<Space, S>& kinematics, int body,
+                               const Motion<Space, S>& A) {
+  const Inertia<Space, S>& inertia = kinematics.mechanism().bodies()[body];
+  const auto I = kinematics.RotationalInertia(inertia, body);
+  const Angular<Space, S> w = kinematics.motions()[body].template head<Space::kRot>();
+  const Angular<Space, S> alpha = A.template head<Space::kRot>();
+  Motion<Space, S> F;
+  F << I * alpha + CrossAngular<S>(w, Angular<Space, S>(I * w)),
+      inertia.mass * A.template tail<Space::kLin>();
+  return F;
 }
 
 template <class Space, class S>
@@ -106,21 +119,14 @@ void TreeDynamics<Space, S>::Bias(const Kinematics<Space, S>& kinematics, Vector
   BodyAccelerations(kinematics, h, A_bias_);
   AppliedForces<Space, S>(kinematics, F_);
   for (int body = 1; body < mechanism.num_bodies(); ++body) {
-    const Inertia<Space, S>& inertia = mechanism.bodies()[body];
-    const auto I = kinematics.RotationalInertia(inertia, body);
-    const Angular<Space, S> w = kinematics.motions()[body].template head<Space::kRot>();
-    const Angular<Space, S> alpha = A_bias_[body].template head<Space::kRot>();
-    Motion<Space, S> inertial;
-    inertial << I * alpha + CrossAngular<S>(w, Angular<Space, S>(I * w)),
-        inertia.mass * A_bias_[body].template tail<Space::kLin>();
-    F_[body] = inertial - F_[body];
+    F_[body] = InertialForce<Space, S>(kinematics, body, A_bias_[body]) - F_[body];
   }
   for (auto step = tree.rbegin(); step != tree.rend(); ++step) {
     const JointState<Space, S>& state = kinematics.joints()[step->joint];
     const Joint<Space, S>& joint = mechanism.joints()[step->joint];
     const Arms<Space, S> arms(*step, state);
     const Motion<Space, S> at_joint = ShiftForce<Space, S>(F_[step->child], arms.child);
-    for (int i = 0; i < joint.kind->num_u; ++i) {
+    for (int i = 0; i < joint.num_u(); ++i) {
       h[joint.u_offset + i] = S(step->sign) * state.H(i).dot(at_joint);
     }
     F_[step->parent] += ShiftForce<Space, S>(at_joint, arms.parent);
@@ -143,10 +149,10 @@ void TreeDynamics<Space, S>::Jacobian(const Kinematics<Space, S>& kinematics, Ma
         const JointState<Space, S>& moving = kinematics.joints()[step.joint];
         const Joint<Space, S>& joint = mechanism.joints()[step.joint];
         const Linear<Space, S> arm = p - kinematics.JointPoint(step.joint);
-        for (int i = 0; i < joint.kind->num_u; ++i) {
+        for (int i = 0; i < joint.num_u(); ++i) {
           const Motion<Space, S> h = moving.H(i) * (sign * S(step.sign));
           const Motion<Space, S> at_constraint = ShiftMotion<Space, S>(h, arm);
-          for (int r = 0; r < constraint.kind->num_constraints(); ++r) {
+          for (int r = 0; r < constraint.num_constraints(); ++r) {
             J(constraint.row + r, joint.u_offset + i) += state.D(r).dot(at_constraint);
           }
         }
@@ -157,13 +163,26 @@ void TreeDynamics<Space, S>::Jacobian(const Kinematics<Space, S>& kinematics, Ma
 }
 
 template <class Space, class S>
+void SpeedBias(Kinematics<Space, S>& kinematics, const VectorX<S>& zero, VectorX<S>& bias) {
+  const Mechanism<Space, S>& mechanism = kinematics.mechanism();
+  bias.setZero(mechanism.num_rows());
+  if (mechanism.drives().empty()) return;
+  kinematics.UpdateVelocity(zero);
+  for (int index : mechanism.constraints()) {
+    const Joint<Space, S>& joint = mechanism.joints()[index];
+    bias.segment(joint.row, joint.num_constraints()) =
+        kinematics.ConstraintSpeed(index).head(joint.num_constraints());
+  }
+}
+
+template <class Space, class S>
 void TreeDynamics<Space, S>::JacobianBias(const Kinematics<Space, S>& kinematics,
                                           VectorX<S>& gamma) const {
   const Mechanism<Space, S>& mechanism = kinematics.mechanism();
   gamma.resize(mechanism.num_rows());
   for (int index : mechanism.constraints()) {
     const Joint<Space, S>& joint = mechanism.joints()[index];
-    const int rows = joint.kind->num_constraints();
+    const int rows = joint.num_constraints();
     const Motion<Space, S> bias = JointAcceleration<Space, S>(kinematics, index, A_bias_);
     gamma.segment(joint.row, rows) = -bias.head(rows);
   }
@@ -180,7 +199,7 @@ Motion<Space, S> JointAcceleration(const Kinematics<Space, S>& kinematics, int i
                                kinematics.Centripetal(joint.from, state.r_P);
   const Motion<Space, S> rest = A_Q - A_P - state.g;
   Motion<Space, S> result = Motion<Space, S>::Zero();
-  for (int r = 0; r < joint.kind->num_constraints(); ++r) result[r] = state.D(r).dot(rest);
+  for (int r = 0; r < joint.num_constraints(); ++r) result[r] = state.D(r).dot(rest);
   return result;
 }
 
@@ -189,7 +208,7 @@ JointMatrix<S> FreeResponse(const Kinematics<Space, S>& kinematics,
                             const std::vector<Inertia<Space, S>>& inertias, int index) {
   const Joint<Space, S>& joint = kinematics.mechanism().joints()[index];
   const JointState<Space, S>& state = kinematics.joints()[index];
-  const int rows = joint.kind->num_constraints();
+  const int rows = joint.num_constraints();
   JointMatrix<S> X = JointMatrix<S>::Zero(rows, rows);
   for (int side = 0; side < 2; ++side) {
     const int body = side == 0 ? joint.to : joint.from;
@@ -213,6 +232,9 @@ JointMatrix<S> FreeResponse(const Kinematics<Space, S>& kinematics,
 
 #define LOOPBENCH_INSTANTIATE(Space, S)                                           \
   template class TreeDynamics<Space, S>;                                          \
+  template Motion<Space, S> InertialForce(const Kinematics<Space, S>&, int,       \
+                                          const Motion<Space, S>&);               \
+  template void SpeedBias(Kinematics<Space, S>&, const VectorX<S>&, VectorX<S>&); \
   template Motion<Space, S> JointAcceleration(const Kinematics<Space, S>&, int,   \
                                               std::span<const Motion<Space, S>>); \
   template JointMatrix<S> FreeResponse(const Kinematics<Space, S>&,               \

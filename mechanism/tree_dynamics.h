@@ -1,6 +1,8 @@
 // Equations of the spanning forest in its own coordinates, with the cut joints as constraints:
 //
-//   M(q) udot + h(q, u) = J^T lambda,      J(q) udot = gamma(q, u),      J u = 0.
+//   M(q) udot + h(q, u) = J^T lambda,      J(q) udot = gamma(q, u),      J u + b(q, t) = 0.
+//
+// b, from prescribed motions, is zero without them, and h and gamma then know no time.
 //
 // M by the composite-rigid-body method, h by one outward and one inward pass (Featherstone, Rigid
 // Body Dynamics Algorithms, ch. 5 and 6), J row by row from D^T (V_Q - V_P) at the joint's point.
@@ -42,6 +44,16 @@ class TreeDynamics {
   std::vector<Motion<Space, S>> A_bias_, F_;
   std::vector<Block<Space, S>> composite_;
 };
+
+/// Wrench at its centre of mass that gives a body the acceleration A there.
+template <class Space, class S>
+Motion<Space, S> InertialForce(const Kinematics<Space, S>& kinematics, int body,
+                               const Motion<Space, S>& A);
+
+/// b: what the constraints would miss if all free speeds were zero. `zero` has num_u zeros; the
+/// motions of `kinematics` are left at them where there are prescribed motions.
+template <class Space, class S>
+void SpeedBias(Kinematics<Space, S>& kinematics, const VectorX<S>& zero, VectorX<S>& bias);
 
 /// D^T (A_Q - A_P - g) of one joint from the accelerations of all centres of mass: zero when the
 /// joint is satisfied at acceleration level. At most Space::kDim numbers.

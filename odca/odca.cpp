@@ -17,7 +17,7 @@ Plan MakePlan(const Mechanism<Space, S>& mechanism, const PlanOptions& options) 
   std::vector<PlanJoint> joints;
   for (int j = 0; j < static_cast<int>(mechanism.joints().size()); ++j) {
     const Joint<Space, S>& joint = mechanism.joints()[j];
-    const int rows = joint.kind->num_constraints();
+    const int rows = joint.num_constraints();
     if (rows > 0) joints.push_back({j, joint.from, joint.to, rows});
   }
   return Plan(mechanism.num_bodies(), joints, options);
@@ -58,8 +58,8 @@ void Odca<Space, S>::TreeMotions(std::span<const Motion<Space, S>> A, VectorX<S>
     const JointState<Space, S>& state = kinematics_.joints()[step.joint];
     const Motion<Space, S> A_rel = ShiftMotion<Space, S>(A[joint.to], state.r_Q) -
                                    ShiftMotion<Space, S>(A[joint.from], state.r_P);
-    for (int i = 0; i < joint.kind->num_u; ++i) {
-      result[joint.u_offset + i] = state.H(i).dot(A_rel);
+    for (int i = 0; i < state.num_u; ++i) {
+      result[joint.u_offset + i] = joint.kind->per_speed * state.H(i).dot(A_rel);
     }
   }
 }
@@ -72,8 +72,7 @@ Outcome Odca<Space, S>::CompleteSpeeds() {
   for (Motion<Space, S>& b : b_) b.setZero();
   for (Motion<Space, S>& c0 : c0_) c0.setZero();
   for (int index : mechanism_.constraints()) {
-    const JointState<Space, S>& state = kinematics_.joints()[index];
-    for (int i = 0; i < state.rows(); ++i) c0_[index][i] = state.D(i).dot(state.V_rel);
+    c0_[index] = kinematics_.ConstraintSpeed(index);
   }
   sweep_.Solve(b_, c0_, A_);
   TreeMotions(A_, change_);
@@ -101,14 +100,23 @@ Outcome Odca<Space, S>::Accelerations() {
     const Motion<Space, S> known = kinematics_.Centripetal(joint.to, state.r_Q) -
                                    kinematics_.Centripetal(joint.from, state.r_P) - state.g;
     for (int i = 0; i < state.rows(); ++i) c0_[j][i] = state.D(i).dot(known);
-    for (int i = 0; i < (joint.in_tree() ? joint.kind->num_u : 0); ++i) {
-      change_[joint.u_offset + i] = state.H(i).dot(known);
+    for (int i = 0; i < (joint.in_tree() ? state.num_u : 0); ++i) {
+      change_[joint.u_offset + i] = joint.kind->per_speed * state.H(i).dot(known);
     }
   }
   sweep_.Solve(b_, c0_, A_);
   TreeMotions(A_, udot_);
   udot_ += change_;
   return udot_.allFinite() ? Outcome::kFinished : Outcome::kNonFinite;
+}
+
+template <class Space, class S>
+void Odca<Space, S>::Multipliers(VectorX<S>& lambda) {
+  for (int index : mechanism_.constraints()) {
+    const Joint<Space, S>& joint = mechanism_.joints()[index];
+    lambda.segment(joint.row, joint.num_constraints()) =
+        sweep_.multipliers()[index].head(joint.num_constraints());
+  }
 }
 
 template <class Space, class S>

@@ -28,6 +28,7 @@ class Odca final : public Formulation<Space, S> {
  private:
   Outcome CompleteSpeeds() override;
   Outcome Accelerations() override;
+  void Multipliers(VectorX<S>& lambda) override;
   Outcome AssembleOnce();
   /// H^T (A_Q - A_P) of a tree joint at its point, centripetal terms not included.
   void TreeMotions(std::span<const Motion<Space, S>> A, VectorX<S>& result) const;

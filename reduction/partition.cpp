@@ -28,10 +28,10 @@ int GeometricRank(const Kinematics<Space, S>& kinematics, TreeDynamics<Space, S>
   const Mechanism<Space, S>& mechanism = kinematics.mechanism();
   std::vector<int> rows;
   for (int index : mechanism.constraints()) {
-    rows.push_back(mechanism.joints()[index].kind->num_constraints());
+    rows.push_back(mechanism.joints()[index].num_constraints());
   }
   LoopSolver<S> loop(rows);
-  if (loop.size() == 0) return 0;
+  if (loop.size() == 0 || mechanism.num_u() == 0) return 0;
   for (int j = 0; j < static_cast<int>(rows.size()); ++j) {
     loop.SetScale(
         j, FreeResponse(kinematics, mechanism.geometric_bodies(), mechanism.constraints()[j]));

@@ -27,11 +27,12 @@ Reduction<Space, S>::Reduction(const Mechanism<Space, S>& mechanism, Formulation
       h_(VectorX<S>::Zero(mechanism.num_u())),
       gamma_(VectorX<S>::Zero(mechanism.num_rows())),
       c_(h_),
-      residual_(h_) {}
+      residual_(h_),
+      bias_(gamma_) {}
 
 template <class Space, class S>
-Outcome Reduction<Space, S>::Start(const VectorX<S>& q, const VectorX<S>& u) {
-  Base::Start(q, u);
+Outcome Reduction<Space, S>::Start(S t, const VectorX<S>& q, const VectorX<S>& u) {
+  Base::Start(t, q, u);
   dynamics_.Jacobian(kinematics_, J_);
   const int n = mechanism_.num_u(), m = mechanism_.num_rows();
   const bool fixed = Base::options_.solver == SolverKind::kAsPublished;
@@ -116,6 +117,12 @@ Outcome Reduction<Space, S>::CompleteSpeeds() {
     independent_speeds_[i] = u_[independent_[i]];
   }
   u_.noalias() = B_ * independent_speeds_;
+  if (mechanism_.drives().empty() || dependent_.empty()) return Outcome::kFinished;
+  c_.setZero();
+  SpeedBias(kinematics_, c_, bias_);
+  for (std::size_t k = 0; k < rows_.size(); ++k) rows_rhs_[k] = bias_[rows_[k]];
+  dependent_speeds_ = lu_.solve(rows_rhs_);
+  for (std::size_t k = 0; k < dependent_.size(); ++k) u_[dependent_[k]] -= dependent_speeds_[k];
   return Outcome::kFinished;
 }
 
@@ -133,15 +140,29 @@ Outcome Reduction<Space, S>::Accelerations() {
   }
   residual_ = h_;
   residual_.noalias() += M_ * c_;
+  udot_ = c_;
+  if (independent_.empty()) return Outcome::kFinished;
   MB_.noalias() = M_ * B_;
   reduced_.noalias() = B_.transpose() * MB_;
   reduced_factor_.compute(reduced_);
   residual_ = -residual_;
   independent_speeds_.noalias() = B_.transpose() * residual_;
   reduced_factor_.solveInPlace(independent_speeds_);
-  udot_ = c_;
   udot_.noalias() += B_ * independent_speeds_;
   return udot_.allFinite() ? Outcome::kFinished : Outcome::kNonFinite;
+}
+
+/// From the dependent equations of motion: J_D^T lambda = (M udot + h)_D, zero where rows are not
+/// used.
+template <class Space, class S>
+void Reduction<Space, S>::Multipliers(VectorX<S>& lambda) {
+  lambda.setZero();
+  if (dependent_.empty()) return;
+  residual_ = h_;
+  residual_.noalias() += M_ * udot_;
+  for (std::size_t k = 0; k < dependent_.size(); ++k) rows_rhs_[k] = residual_[dependent_[k]];
+  dependent_speeds_ = lu_.transpose().solve(rows_rhs_);
+  for (std::size_t k = 0; k < rows_.size(); ++k) lambda[rows_[k]] = dependent_speeds_[k];
 }
 
 template <class Space, class S>

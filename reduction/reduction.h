@@ -1,6 +1,6 @@
 // Coordinate reduction: the speeds are split into independent u_I and dependent u_D,
 //
-//   J_D u_D = -J_I u_I,        J_D udot_D = gamma - J_I udot_I,                   (1)
+//   J_D u_D = -J_I u_I - b,      J_D udot_D = gamma - J_I udot_I,                   (1)
 //   u = B u_I,  udot = B udot_I + c,  B = [1; -J_D^-1 J_I],  c = [0; J_D^-1 gamma],  (2)
 //   (B^T M B) udot_I = -B^T (h + M c).                                            (3)
 //
@@ -35,7 +35,7 @@ class Reduction final : public Formulation<Space, S> {
 
   Reduction(const Mechanism<Space, S>& mechanism, FormulationOptions options);
 
-  Outcome Start(const VectorX<S>& q, const VectorX<S>& u) override;
+  Outcome Start(S t, const VectorX<S>& q, const VectorX<S>& u) override;
 
   /// Indices into u, ascending.
   const std::vector<int>& independent() const { return independent_; }
@@ -45,6 +45,7 @@ class Reduction final : public Formulation<Space, S> {
   int state_speed(int i) const override;
   Outcome CompleteSpeeds() override;
   Outcome Accelerations() override;
+  void Multipliers(VectorX<S>& lambda) override;
   bool ChangeMode() override;
 
   Outcome FactorOnce();
@@ -62,7 +63,7 @@ class Reduction final : public Formulation<Space, S> {
   long factored_version_ = -1;
   bool outgrown_ = false;  ///< the rank exceeds the partition's
   MatrixX<S> M_, J_, J_D_, J_I_, solved_, B_, MB_, reduced_;
-  VectorX<S> h_, gamma_, c_, residual_, rows_rhs_, dependent_speeds_, independent_speeds_;
+  VectorX<S> h_, gamma_, c_, residual_, rows_rhs_, dependent_speeds_, independent_speeds_, bias_;
   Eigen::PartialPivLU<MatrixX<S>> lu_;
   Eigen::LLT<MatrixX<S>> reduced_factor_;
 };

@@ -32,7 +32,7 @@ BenchmarkState ComputeStateIn(const MechanismDescription& description, Coordinat
   const Column column{FormulationKind::kOdca, Enforcement::kVelocity, coordinates,
                       SolverKind::kRankRevealing};
   const auto formulation = MakeFormulation<Space>(column, mechanism);
-  state.outcome = formulation->Start(start.q, start.u);
+  state.outcome = formulation->Start(0.0, start.q, start.u);
   std::vector<double> y(formulation->state_size());
   formulation->ToState(start.q, start.u, y);
   IntegratorOptions options;
@@ -44,7 +44,8 @@ BenchmarkState ComputeStateIn(const MechanismDescription& description, Coordinat
     state.outcome = result.outcome;
     state.message = result.message;
   }
-  if (state.outcome == Outcome::kFinished) state.outcome = formulation->FromState(y);
+  if (state.outcome == Outcome::kFinished)
+    state.outcome = formulation->FromState(kWarmUpSteps * kWarmUpStep, y);
   if (state.outcome != Outcome::kFinished) return state;
   state.q = formulation->q();
   state.u = formulation->u();
@@ -62,7 +63,7 @@ class SubjectIn final : public BenchmarkSubject {
       : mechanism_(description, column.coordinates),
         formulation_(MakeFormulation<Space>(column, mechanism_)),
         ode_(*formulation_) {
-    const Outcome outcome = formulation_->Start(state.q, state.u);
+    const Outcome outcome = formulation_->Start(0.0, state.q, state.u);
     if (outcome != Outcome::kFinished) {
       throw std::invalid_argument(fmt::format("cannot start: {}", ToString(outcome)));
     }

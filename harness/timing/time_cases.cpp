@@ -138,7 +138,7 @@ class SubjectIn final : public Subject {
  private:
   void Reset() {
     formulation_ = MakeFormulation<Space>(case_.column, mechanism_);
-    formulation_->Start(start_.q, start_.u);
+    formulation_->Start(0.0, start_.q, start_.u);
     y_.resize(formulation_->state_size());
     formulation_->ToState(start_.q, start_.u, y_);
   }
@@ -146,9 +146,9 @@ class SubjectIn final : public Subject {
   IntegratorResult Simulate(const std::function<void(std::span<double>)>& keep) {
     FormulationOde<Space> ode(*formulation_);
     return Integrate(
-        ode, 0.0, case_.horizon, y_, OptionsOf(case_), [&](double, std::span<double> y) {
+        ode, 0.0, case_.horizon, y_, OptionsOf(case_), [&](double t, std::span<double> y) {
           if (keep) keep(y);
-          return formulation_->BeginStep(y) ? StepAction::kRestart : StepAction::kContinue;
+          return formulation_->BeginStep(t, y) ? StepAction::kRestart : StepAction::kContinue;
         });
   }
 

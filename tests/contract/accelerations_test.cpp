@@ -160,6 +160,17 @@ TEST(AccelerationsTest, GraphsOfEveryJointAgreeWithTheOracle) {
   space.Finish();
 }
 
+TEST(AccelerationsTest, DrivenGraphsOfEveryJointAgreeWithTheOracle) {
+  Family plane("driven, plane", kShare), space("driven, space", kShare);
+  for (const auto& [loops, seed] : GraphSeeds(4)) {
+    const int motions = 1 + static_cast<int>(seed) % 4;
+    plane.Hold(Sample<Planar>(MixedGraph(loops, kPlane, seed, motions), seed), true);
+    space.Hold(Sample<Spatial>(MixedGraph(loops, kSpace, seed, motions), seed), true);
+  }
+  plane.Finish();
+  space.Finish();
+}
+
 TEST(AccelerationsTest, PlanarGraphsInSpaceAgreeWithTheOracleWhereRankIsRevealed) {
   Family family("planar graphs in space", kShare);
   for (const auto& [loops, seed] : GraphSeeds(3)) {

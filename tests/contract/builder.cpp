@@ -28,6 +28,7 @@ int Builder::AddJoint(JointType type, int parent, const Eigen::Vector3d& at_pare
   if (OwnAxis(type) == 'z' && spatial && random.Chance(0.5)) {
     joint.axis = random.Vector(1.0, spatial) + 1.5 * Eigen::Vector3d::UnitZ();
   }
+  SetParameter(joint);
   if (turned && random.Chance(0.3)) std::swap(joint.from, joint.to);
   description.joints.push_back(joint);
   parent_[child] = parent;
@@ -38,7 +39,9 @@ int Builder::AddJoint(JointType type, int parent, const Eigen::Vector3d& at_pare
 }
 
 std::vector<double> Builder::Values(JointType type, double q) {
-  std::vector<double> values(NumValues(type, description.space, false), q);
+  const int shift = spatial ? 3 : 2;
+  std::vector<double> values(
+      type == JointType::kRod ? shift : NumValues(type, description.space, false), q);
   if (values.size() > 1) {
     for (double& value : values) value = random.Uniform(-1.0, 1.0);
   }
@@ -50,7 +53,8 @@ void Builder::AddForces(int count) {
   for (int k = 0; k < count; ++k) {
     const int joint = random.Below(joints);
     const JointType type = description.joints[joint].type;
-    const bool single = type == JointType::kRevolute || type == JointType::kPrismatic;
+    const bool single = type == JointType::kRevolute || type == JointType::kPrismatic ||
+                        type == JointType::kHelical;
     const int kind = single ? random.Below(4) : 3;
     if (kind == 0) description.forces.push_back(JointTorque{joint, random.Uniform(-5.0, 5.0)});
     if (kind == 1) {
@@ -63,6 +67,20 @@ void Builder::AddForces(int count) {
       description.forces.push_back(PointForce{body, random.Vector(1.0, spatial),
                                               random.Vector(10.0, spatial), random.Chance(0.5)});
     }
+  }
+}
+
+void Builder::AddMotions(int count) {
+  for (int k = 0; k < count; ++k) {
+    const JointValues& values =
+        description.initial
+            .coordinates[random.Below(static_cast<int>(description.initial.coordinates.size()))];
+    JointDescription& joint = description.joints[values.joint];
+    const int speeds = NumValues(joint.type, description.space, true);
+    if (speeds == 0 || speeds < NumValues(joint.type, description.space, false)) continue;
+    const int coordinate = random.Below(speeds);
+    joint.motions = {{coordinate, Polynomial{{values.values[coordinate], random.Uniform(-1.0, 1.0),
+                                              random.Uniform(-1.0, 1.0)}}}};
   }
 }
 
@@ -82,7 +100,11 @@ void Builder::FinishClosures() {
     // with F at the body's com, JointPose() is M seen from there
     frames.joints[0].from.position = frames.bodies[joint.from.body].com;
     const JetPose X_PM = Oracle(frames, layout).JointPose(0, poses);
-    const JetPose X_PF = X_PM * Inverted(Transform(joint.type, spatial, coordinates.data()));
+    const JetPose X_PF =
+        X_PM * Inverted(Transform(joint.type, spatial, coordinates.data(), joint.pitch));
+    if (joint.type == JointType::kRod) {
+      joint.length = Eigen::Map<const VectorX<double>>(q.data(), q.size()).norm();
+    }
     Real33 R;
     for (int i = 0; i < 3; ++i) {
       joint.from.position[i] =

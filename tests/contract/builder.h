@@ -57,7 +57,9 @@ class Builder {
     joint.to = {to, at_to, RandomTurn()};
     // `from` carries its frame in the ground for now; FinishClosures() turns it into body axes
     joint.from = {from, Eigen::Vector3d::Zero(), Eigen::Vector3d::Zero()};
-    joint.cut = random.Chance(0.5);  // the others are cut for having no initial value
+    SetParameter(joint);
+    // the others are cut for having no initial value, but helical joints like to be followed
+    joint.cut = random.Chance(0.5) || type == JointType::kHelical;
     closures_.push_back({joint, Values(type, q)});
   }
 
@@ -77,6 +79,9 @@ class Builder {
 
   void AddForces(int count);
 
+  /// Prescribes a coordinate of each of up to `count` tree joints, starting where it stands.
+  void AddMotions(int count);
+
   /// Forces on the tree joints, then the loops.
   MechanismDescription Finish() {
     AddForces(1 + static_cast<int>(description.joints.size()) / 3);
@@ -93,7 +98,11 @@ class Builder {
     return Eigen::AngleAxisd(turn.norm(), turn.normalized()).toRotationMatrix();
   }
 
-  /// Coordinates of a joint: `q` if it has one, else random.
+  void SetParameter(JointDescription& joint) {
+    if (joint.type == JointType::kHelical) joint.pitch = random.Uniform(-0.5, 0.5);
+  }
+
+  /// Coordinates of a joint: `q` if it has one, else random; of a rod, its shift.
   std::vector<double> Values(JointType type, double q);
 
   std::vector<JetPose> Poses() const;
@@ -112,8 +121,10 @@ VectorX<double> DescribedCoordinates(const MechanismDescription& description,
     if (joint.in_tree() && joint.kind->has_quaternion()) q[joint.q_offset] = 1.0;
   }
   for (const JointValues& values : description.initial.coordinates) {
-    const int offset = mechanism.joints()[values.joint].q_offset;
-    for (std::size_t i = 0; i < values.values.size(); ++i) q[offset + i] = values.values[i];
+    const Joint<Space, double>& joint = mechanism.joints()[values.joint];
+    for (int i = 0, next = joint.q_offset; i < joint.kind->num_q; ++i) {
+      if (mechanism.DriveOf(joint, i) < 0) q[next++] = values.values[i];
+    }
   }
   return q;
 }

@@ -72,7 +72,7 @@ Comparison Sample<Space>::CompareOdca(Coordinates coordinates, SolverKind solver
   const Mechanism<Space, double>& mechanism = this->mechanism(coordinates);
   const State& at = state(coordinates);
   odca::Odca<Space, double> odca(mechanism, {.solver = solver});
-  odca.Start(at.q, at.u);
+  odca.Start(0.0, at.q, at.u);
   Comparison result;
   VectorX<double> udot;
   result.outcome = odca.Evaluate(0.0, at.q, at.u, udot);

@@ -127,7 +127,7 @@ MechanismDescription RandomGraph(int loops, SpaceKind space, std::uint64_t seed)
   return b.Finish();
 }
 
-MechanismDescription MixedGraph(int loops, SpaceKind space, std::uint64_t seed) {
+MechanismDescription MixedGraph(int loops, SpaceKind space, std::uint64_t seed, int motions) {
   Builder b("mixed-" + std::to_string(loops), space, seed);
   const auto any = [&b] {
     for (;;) {
@@ -137,8 +137,9 @@ MechanismDescription MixedGraph(int loops, SpaceKind space, std::uint64_t seed) 
   };
   const auto grow = [&](int root, int least_freedom) {
     for (int freedom = 0; freedom < least_freedom;) {
-      const int body = b.AddBody(1.0);
       const JointType type = any();
+      if (type == JointType::kRod) continue;  // not in a tree
+      const int body = b.AddBody(1.0);
       const Eigen::Vector3d at = Tip(b);
       b.AddJoint(type, root, at, body, b.random.Vector(0.2, b.spatial),
                  b.random.Uniform(-2.0, 2.0));
@@ -156,6 +157,7 @@ MechanismDescription MixedGraph(int loops, SpaceKind space, std::uint64_t seed) 
     const int left = grow(from, enough), right = grow(to, enough);
     b.Close(any(), left, right, Tip(b), b.random.Uniform(-1.0, 1.0));
   }
+  b.AddMotions(motions);
   return b.Finish();
 }
 

@@ -56,7 +56,8 @@ MechanismDescription RandomLadder(int n, SpaceKind space, std::uint64_t seed);
 MechanismDescription RandomGraph(int loops, SpaceKind space, std::uint64_t seed);
 
 /// Every kind of joint but free ones, in the tree and as closures; loops with freedom to spare.
-MechanismDescription MixedGraph(int loops, SpaceKind space, std::uint64_t seed);
+/// Up to `motions` coordinates follow given motions.
+MechanismDescription MixedGraph(int loops, SpaceKind space, std::uint64_t seed, int motions = 0);
 
 /// A tree of n bodies with closing joints between random bodies: loops share most of their links.
 /// Closures are independent: draws that are over-constrained somewhere are drawn again.

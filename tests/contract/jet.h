@@ -35,6 +35,15 @@ inline Jet Sin(const Jet& a) {
   return {s, c * a.d, -s * a.d * a.d + c * a.dd};
 }
 
+inline Jet Sqrt(const Jet& a) {
+  const Real r = std::sqrt(a.f), d = a.d / (2 * r);
+  return {r, d, (a.dd / 2 - d * d) / r};
+}
+/// The angle whose cosine and sine are given.
+inline Jet Angle(const Jet& c, const Jet& s) {
+  return {std::atan2(s.f, c.f), c.f * s.d - s.f * c.d, c.f * s.dd - s.f * c.dd};
+}
+
 using JetVector = std::array<Jet, 3>;
 
 /// Row by row.

@@ -47,8 +47,7 @@ Real33 Oracle::InertiaInGround(int body, const JetPose& pose) const {
 Jet Oracle::Coordinate(int index, const std::vector<JetPose>& poses) const {
   const JetPose X_FM = JointPose(index, poses);
   if (description_.joints[index].type == JointType::kPrismatic) return X_FM.p[0];
-  const Jet &c = X_FM.R(0, 0), &s = X_FM.R(1, 0);
-  return {std::atan2(s.f, c.f), c.f * s.d - s.f * c.d};
+  return Angle(X_FM.R(0, 0), X_FM.R(1, 0));
 }
 
 std::vector<Real6> Oracle::Applied(const std::vector<JetPose>& poses) const {
@@ -64,6 +63,10 @@ std::vector<Real6> Oracle::Applied(const std::vector<JetPose>& poses) const {
     const Jet q = Coordinate(index, poses);
     Real6 H = Real6::Zero();
     for (int i = 0; i < 3; ++i) H[slides ? 3 + i : i] = X_WF.R(i, slides ? 0 : 2).f;
+    if (joint.type == JointType::kHelical) {  // the part of the wrench along the free motion
+      H.tail<3>() = Real(joint.pitch) * H.head<3>();
+      H /= 1 + Real(joint.pitch) * joint.pitch;
+    }
     const Real3 p = ValueOf(X_WM.p, &Jet::f);
     const Real6 wrench = H * tau_of(q.f, q.d);
     F[joint.to.body] += AtCom(wrench, p - ValueOf(poses[joint.to.body].p, &Jet::f));
@@ -91,8 +94,8 @@ std::vector<Real6> Oracle::Applied(const std::vector<JetPose>& poses) const {
 
 Equations Oracle::Form(const RealVector& q, const RealVector& u) {
   const int bodies = static_cast<int>(description_.bodies.size());
-  poses_ = PosesAlong(Curve(q, u));
-  const std::vector<Jet> along = Closures(poses_);
+  poses_ = PosesAlong(Curve(q, u, true));
+  const std::vector<Jet> along = Closures(poses_, true);
   const int rows = static_cast<int>(along.size());
   Equations e;
   e.gamma.resize(rows);
@@ -100,9 +103,10 @@ Equations Oracle::Form(const RealVector& q, const RealVector& u) {
   e.J.resize(rows, layout_.num_u);
   G_.resize(6 * bodies, layout_.num_u);
   for (int i = 0; i < layout_.num_u; ++i) {
-    const std::vector<JetPose> moved = PosesAlong(Curve(q, RealVector::Unit(layout_.num_u, i)));
+    const std::vector<JetPose> moved =
+        PosesAlong(Curve(q, RealVector::Unit(layout_.num_u, i), false));
     for (int b = 0; b < bodies; ++b) G_.col(i).segment<6>(6 * b) = MotionOf(moved[b], &Jet::d);
-    const std::vector<Jet> c = Closures(moved);
+    const std::vector<Jet> c = Closures(moved, false);
     for (int r = 0; r < rows; ++r) e.J(r, i) = c[r].d;
   }
   const std::vector<Real6> applied = Applied(poses_);
@@ -230,11 +234,19 @@ void Oracle::JointForces(const RealVector& lambda, Answer& answer) const {
 RealMatrix Oracle::Jacobian(const RealVector& q) const {
   RealMatrix J;
   for (int i = 0; i < layout_.num_u; ++i) {
-    const std::vector<Jet> c = Closures(PosesAlong(Curve(q, RealVector::Unit(layout_.num_u, i))));
+    const std::vector<Jet> c =
+        Closures(PosesAlong(Curve(q, RealVector::Unit(layout_.num_u, i), false)), false);
     if (i == 0) J.resize(static_cast<int>(c.size()), layout_.num_u);
     for (std::size_t r = 0; r < c.size(); ++r) J(r, i) = c[r].d;
   }
   return J;
+}
+
+RealVector Oracle::ClosureRates(const RealVector& q, const RealVector& u) const {
+  const std::vector<Jet> c = Closures(PosesAlong(Curve(q, u, true)), true);
+  RealVector rates(c.size());
+  for (std::size_t r = 0; r < c.size(); ++r) rates[r] = c[r].d;
+  return rates;
 }
 
 RealVector Oracle::Consistent(const RealVector& q, const RealVector& u) const {
@@ -247,11 +259,12 @@ RealVector Oracle::Consistent(const RealVector& q, const RealVector& u) const {
   A.topRightCorner(n, m) = A.bottomLeftCorner(m, n).transpose();
   RealVector rhs = RealVector::Zero(n + m);
   rhs.head(n) = u;
+  rhs.tail(m) = -ClosureRates(q, RealVector::Zero(n));
   return SolveFullPivot(A, rhs, Real(1e-12)).head(n);
 }
 
 Real Oracle::TotalEnergy(const RealVector& q, const RealVector& u) const {
-  const std::vector<JetPose> poses = PosesAlong(Curve(q, u));
+  const std::vector<JetPose> poses = PosesAlong(Curve(q, u, true));
   Real energy = 0;
   for (std::size_t b = 1; b < poses.size(); ++b) {
     const Real6 V = MotionOf(poses[b], &Jet::d);

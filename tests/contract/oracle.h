@@ -6,7 +6,8 @@
 //
 //   G_i   = d/dt of all poses along q' = N e_i             column i of the bodies' Jacobian
 //   A_0   = d2/dt2 of all poses along q' = N u, udot = 0   what the speeds alone do
-//   c(q)  = joint mismatches, J and gamma likewise,
+//   c(q)  = joint mismatches, J and gamma likewise; prescribed coordinates are jets of time in A_0
+//           and constants in G_i,
 //   M = sum G^T I G,   h = sum G^T (I A_0 + [w x I w; 0] - applied),
 //   [ M J^T; J 0 ] [ udot; -lambda ] = [ -h; gamma ]       dense, scaled to unit diagonal of M.
 //
@@ -83,13 +84,17 @@ class Oracle {
  public:
   Oracle(const MechanismDescription& description, Layout layout);
 
+  /// The time of prescribed motions; 0 until set.
+  void SetTime(double t) { time_ = t; }
   /// X_WB of every body at its centre of mass.
   std::vector<JetPose> Poses(const RealVector& q) const;
   /// Pose of M in F of a user joint.
   JetPose JointPose(int joint, const std::vector<JetPose>& poses) const;
   Equations Form(const RealVector& q, const RealVector& u);
   Answer Solve(const RealVector& q, const RealVector& u);
-  /// The speeds nearest to u with J u = 0.
+  /// d/dt of all closures: J u and what prescribed motions add.
+  RealVector ClosureRates(const RealVector& q, const RealVector& u) const;
+  /// The speeds nearest to u that keep the closures.
   RealVector Consistent(const RealVector& q, const RealVector& u) const;
   /// Kinetic energy, gravity, springs, constant torques and forces in ground axes [J].
   Real TotalEnergy(const RealVector& q, const RealVector& u) const;
@@ -103,10 +108,12 @@ class Oracle {
     Real6 wrench;
   };
 
-  std::vector<Jet> Curve(const RealVector& q, const RealVector& u) const;
+  /// Coordinates of all steps, prescribed ones among them; those stand still unless `driven`.
+  std::vector<Jet> Curve(const RealVector& q, const RealVector& u, bool driven) const;
+  Jet Prescribed(const PrescribedMotion& motion) const;
   std::vector<JetPose> PosesAlong(const std::vector<Jet>& q) const;
   /// c(q) of all constraints along a curve.
-  std::vector<Jet> Closures(const std::vector<JetPose>& poses) const;
+  std::vector<Jet> Closures(const std::vector<JetPose>& poses, bool driven) const;
   RealMatrix Jacobian(const RealVector& q) const;
   std::vector<Row> Rows(const std::vector<JetPose>& poses) const;
   /// Measured coordinate of a revolute or prismatic joint, with its speed.
@@ -122,6 +129,8 @@ class Oracle {
   const MechanismDescription description_;
   const Layout layout_;
   std::vector<Frames> frames_;
+  std::vector<int> first_;  ///< of each step in a curve
+  double time_ = 0.0;
   // of the last Form()
   std::vector<JetPose> poses_;
   RealMatrix G_;                      ///< six rows per body
@@ -129,7 +138,8 @@ class Oracle {
 };
 
 /// X_FM of a joint kind, written anew. `q` holds its coordinates along a curve.
-JetPose Transform(JointType type, bool spatial, const Jet* q);
+/// A rod has its shift instead.
+JetPose Transform(JointType type, bool spatial, const Jet* q, Real pitch = 0);
 
 template <class Derived>
 Eigen::Matrix<Real, Eigen::Dynamic, Derived::ColsAtCompileTime> ToReal(

@@ -1,4 +1,6 @@
 // Poses and constraint functions of the oracle, along curves.
+#include <optional>
+
 #include "tests/contract/oracle.h"
 
 namespace loopbench::testing {
@@ -82,6 +84,7 @@ struct Sizes {
 Sizes SizesOf(JointType type, bool spatial) {
   switch (type) {
     case JointType::kWeld:
+    case JointType::kRod:
       return {0, 0};
     case JointType::kFree:
       return spatial ? Sizes{7, 6} : Sizes{3, 3};
@@ -110,12 +113,43 @@ struct Mismatch {
   Jet value;
 };
 
-std::vector<Mismatch> Mismatches(JointType type, bool spatial, const JetPose& X) {
+/// Of a prescribed coordinate with the value s.
+Mismatch DriveMismatch(const JointDescription& joint, int coordinate, const JetPose& X,
+                       const Jet& s) {
+  // the sine of the difference of two angles grows as the difference does
+  const auto beyond = [&s](const Jet& cosine, const Jet& sine) {
+    return sine * Cos(s) - cosine * Sin(s);
+  };
+  if (joint.type == JointType::kUniversal) {
+    Real6 along = Real6::Zero();
+    for (int i = 0; i < 3; ++i) along[i] = coordinate == 0 ? Real(i == 0) : X.R(i, 1).f;
+    return {along, coordinate == 0 ? beyond(X.R(1, 1), X.R(2, 1)) : beyond(X.R(0, 0), X.R(0, 2))};
+  }
+  if (joint.type == JointType::kPrismatic) return {Real6::Unit(3), X.p[0] - s};
+  const Jet angle = beyond(X.R(0, 0), X.R(1, 0));
+  if (joint.type == JointType::kHelical) {
+    const Real pitch = joint.pitch;
+    return {Real6::Unit(2) + pitch * Real6::Unit(5), Jet(1 + pitch * pitch) * angle};
+  }
+  if (coordinate == 0) return {Real6::Unit(2), angle};
+  const int axis = joint.type == JointType::kCylindrical ? 2 : coordinate - 1;
+  return {Real6::Unit(3 + axis), X.p[axis] - s};
+}
+
+std::vector<Mismatch> Mismatches(const JointDescription& joint, bool spatial, const JetPose& X) {
+  const JointType type = joint.type;
   std::vector<Mismatch> c;
+  if (type == JointType::kRod) {
+    const Jet distance = Sqrt(X.p[0] * X.p[0] + X.p[1] * X.p[1] + X.p[2] * X.p[2]);
+    Real6 along = Real6::Zero();
+    for (int i = 0; i < 3; ++i) along[3 + i] = X.p[i].f / distance.f;
+    return {{along, distance - Jet(joint.length)}};
+  }
   const auto add = [&c](int axis, const Jet& value) { c.push_back({Real6::Unit(axis), value}); };
   const JetVector turn = SmallTurn(X.R);
   const bool in_plane = type == JointType::kRevolute || type == JointType::kPinInSlot ||
-                        type == JointType::kCylindrical || type == JointType::kPlanar;
+                        type == JointType::kCylindrical || type == JointType::kPlanar ||
+                        type == JointType::kHelical;
   if (!spatial) {
     if (!in_plane) add(2, turn[2]);
     if (type != JointType::kPrismatic && type != JointType::kPinInSlot) add(3, X.p[0]);
@@ -139,13 +173,23 @@ std::vector<Mismatch> Mismatches(JointType type, bool spatial, const JetPose& X)
       type == JointType::kPrismatic || type == JointType::kPinInSlot || type == JointType::kPlanar;
   if (!free_x) add(3, X.p[0]);
   if (type != JointType::kPlanar) add(4, X.p[1]);
-  if (type != JointType::kCylindrical) add(5, X.p[2]);
+  if (type == JointType::kHelical) {
+    const Real pitch = joint.pitch, length = std::sqrt(1 + pitch * pitch);
+    Real6 along = Real6::Zero();
+    along[2] = -pitch / length;
+    along[5] = 1 / length;
+    Jet ahead = X.p[2] - Jet(pitch) * Angle(X.R(0, 0), X.R(1, 0));
+    ahead.f = std::remainder(ahead.f, 2 * std::acos(Real(-1)) * pitch);  // whole turns
+    c.push_back({along, ahead * Jet(1 / length)});
+  } else if (type != JointType::kCylindrical) {
+    add(5, X.p[2]);
+  }
   return c;
 }
 
 }  // namespace
 
-JetPose Transform(JointType type, bool spatial, const Jet* q) {
+JetPose Transform(JointType type, bool spatial, const Jet* q, Real pitch) {
   JetPose X;
   switch (type) {
     case JointType::kWeld:
@@ -163,6 +207,13 @@ JetPose Transform(JointType type, bool spatial, const Jet* q) {
     case JointType::kCylindrical:
       X.R = AboutZ(q[0]);
       X.p[2] = q[1];
+      break;
+    case JointType::kRod:
+      for (int i = 0; i < (spatial ? 3 : 2); ++i) X.p[i] = q[i];
+      break;
+    case JointType::kHelical:
+      X.R = AboutZ(q[0]);
+      X.p[2] = Jet(pitch) * q[0];
       break;
     case JointType::kSpherical:
       X.R = FromQuaternion(q);
@@ -191,10 +242,21 @@ Oracle::Oracle(const MechanismDescription& description, Layout layout)
     frames_.push_back({FramePose(joint.from, joint, com(joint.from.body)),
                        FramePose(joint.to, joint, com(joint.to.body))});
   }
+  int next = 0;
+  for (const Layout::Step& step : layout_.steps) {
+    const JointType type = step.joint < 0 ? JointType::kFree : description_.joints[step.joint].type;
+    first_.push_back(next);
+    next += SizesOf(type, layout_.spatial).q;
+  }
 }
 
-std::vector<Jet> Oracle::Curve(const RealVector& q, const RealVector& u) const {
-  std::vector<Jet> curve(layout_.num_q);
+Jet Oracle::Prescribed(const PrescribedMotion& motion) const {
+  const TimeValue<double> s = TimeFunction(motion.value).At(time_);
+  return {s.value, s.rate, s.acceleration};
+}
+
+std::vector<Jet> Oracle::Curve(const RealVector& q, const RealVector& u, bool driven) const {
+  std::vector<Jet> curve;
   for (const Layout::Step& step : layout_.steps) {
     const JointType type = step.joint < 0 ? JointType::kFree : description_.joints[step.joint].type;
     const Sizes sizes = SizesOf(type, layout_.spatial);
@@ -206,10 +268,22 @@ std::vector<Jet> Oracle::Curve(const RealVector& q, const RealVector& u) const {
           -w[0] * e[1] - w[1] * e[2] - w[2] * e[3], w[0] * e[0] + w[1] * e[3] - w[2] * e[2],
           w[1] * e[0] + w[2] * e[1] - w[0] * e[3], w[2] * e[0] + w[0] * e[2] - w[1] * e[1]};
       const Real ww = w[0] * w[0] + w[1] * w[1] + w[2] * w[2];
-      for (int i = 0; i < 4; ++i) curve[step.q + i] = Jet(e[i], rate[i] / 2, -ww * e[i] / 4);
+      for (int i = 0; i < 4; ++i) curve.push_back(Jet(e[i], rate[i] / 2, -ww * e[i] / 4));
     }
-    for (int i = turned > 0 ? 3 : 0; i < sizes.u; ++i) {
-      curve[step.q + turned + i] = Jet(q[step.q + turned + i], u[step.u + i]);
+    std::vector<std::optional<Jet>> given(sizes.u);
+    if (step.joint >= 0) {
+      for (const PrescribedMotion& motion : description_.joints[step.joint].motions) {
+        const Jet s = Prescribed(motion);
+        given[motion.coordinate] = driven ? s : Jet(s.f);
+      }
+    }
+    for (int i = turned > 0 ? 3 : 0, free = i; i < sizes.u; ++i) {
+      if (given[i]) {
+        curve.push_back(*given[i]);
+      } else {
+        curve.push_back(Jet(q[step.q + turned + free], u[step.u + free]));
+        ++free;
+      }
     }
   }
   return curve;
@@ -217,22 +291,24 @@ std::vector<Jet> Oracle::Curve(const RealVector& q, const RealVector& u) const {
 
 std::vector<JetPose> Oracle::PosesAlong(const std::vector<Jet>& q) const {
   std::vector<JetPose> poses(description_.bodies.size());
-  for (const Layout::Step& step : layout_.steps) {
+  for (std::size_t k = 0; k < layout_.steps.size(); ++k) {
+    const Layout::Step& step = layout_.steps[k];
+    const Jet* at = q.data() + first_[k];
     if (step.joint < 0) {
-      poses[step.child] = Transform(JointType::kFree, layout_.spatial, &q[step.q]);
+      poses[step.child] = Transform(JointType::kFree, layout_.spatial, at);
       continue;
     }
     const JointDescription& joint = description_.joints[step.joint];
     const Frames& X = frames_[step.joint];
     const JetPose X_PQ =
-        X.X_PF * Transform(joint.type, layout_.spatial, q.data() + step.q) * Inverted(X.X_QM);
+        X.X_PF * Transform(joint.type, layout_.spatial, at, joint.pitch) * Inverted(X.X_QM);
     poses[step.child] = poses[step.parent] * (joint.to.body == step.child ? X_PQ : Inverted(X_PQ));
   }
   return poses;
 }
 
 std::vector<JetPose> Oracle::Poses(const RealVector& q) const {
-  return PosesAlong(Curve(q, RealVector::Zero(layout_.num_u)));
+  return PosesAlong(Curve(q, RealVector::Zero(layout_.num_u), false));
 }
 
 JetPose Oracle::JointPose(int index, const std::vector<JetPose>& poses) const {
@@ -241,14 +317,18 @@ JetPose Oracle::JointPose(int index, const std::vector<JetPose>& poses) const {
          (poses[joint.to.body] * frames_[index].X_QM);
 }
 
-std::vector<Jet> Oracle::Closures(const std::vector<JetPose>& poses) const {
+std::vector<Jet> Oracle::Closures(const std::vector<JetPose>& poses, bool driven) const {
   std::vector<Jet> c;
   for (int index : layout_.constraints) {
-    const JointType type = description_.joints[index].type;
-    if (type == JointType::kFree) continue;
-    for (const Mismatch& one : Mismatches(type, layout_.spatial, JointPose(index, poses))) {
-      c.push_back(one.value);
+    const JointDescription& joint = description_.joints[index];
+    const JetPose X_FM = JointPose(index, poses);
+    for (const PrescribedMotion& motion : joint.motions) {
+      Jet s = Prescribed(motion);
+      if (!driven) s = Jet(s.f);
+      c.push_back(DriveMismatch(joint, motion.coordinate, X_FM, s).value);
     }
+    if (joint.type == JointType::kFree) continue;
+    for (const Mismatch& one : Mismatches(joint, layout_.spatial, X_FM)) c.push_back(one.value);
   }
   return c;
 }
@@ -257,9 +337,16 @@ std::vector<Oracle::Row> Oracle::Rows(const std::vector<JetPose>& poses) const {
   std::vector<Row> rows;
   for (int index : layout_.constraints) {
     const JointDescription& joint = description_.joints[index];
-    if (joint.type == JointType::kFree) continue;
     const JetPose X_WF = poses[joint.from.body] * frames_[index].X_PF;
-    for (const Mismatch& one : Mismatches(joint.type, layout_.spatial, JointPose(index, poses))) {
+    const JetPose X_FM = JointPose(index, poses);
+    std::vector<Mismatch> all;
+    for (const PrescribedMotion& motion : joint.motions) {
+      all.push_back(DriveMismatch(joint, motion.coordinate, X_FM, Prescribed(motion)));
+    }
+    if (joint.type != JointType::kFree) {
+      for (const Mismatch& one : Mismatches(joint, layout_.spatial, X_FM)) all.push_back(one);
+    }
+    for (const Mismatch& one : all) {
       Row row{index, Real6::Zero()};
       for (int i = 0; i < 6; ++i) {
         for (int k = 0; k < 3; ++k) row.wrench[i] += X_WF.R(i % 3, k).f * one.along[i / 3 * 3 + k];

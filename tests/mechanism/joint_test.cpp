@@ -15,12 +15,14 @@ using testing::JetPose;
 using testing::Real;
 
 constexpr double kEps = std::numeric_limits<double>::epsilon();
+constexpr double kParameter = 0.3;  // pitch [m/rad] or length [m]; for other kinds nothing
 
 template <class Space>
 std::vector<JointType> Types() {
   std::vector<JointType> types;
   for (int i = 0; i < kNumJointTypes; ++i) {
     const auto type = static_cast<JointType>(i);
+    if (type == JointType::kRod) continue;  // it has no transform: tests of its own
     if (Space::kRot == 3 || ExistsInPlane(type)) types.push_back(type);
   }
   return types;
@@ -43,7 +45,7 @@ Motion<Space, double> MotionAlong(JointType type, const JointKind<Space, double>
   kind.rates(q.data(), u.data(), qdot.data());
   std::vector<Jet> curve(kind.num_q + 1);
   for (int i = 0; i < kind.num_q; ++i) curve[i] = Jet(q[i], qdot[i]);
-  const JetPose X = testing::Transform(type, Space::kRot == 3, curve.data());
+  const JetPose X = testing::Transform(type, Space::kRot == 3, curve.data(), kParameter);
   const auto skew = [&](int i, int j) {
     Real sum = 0;
     for (int k = 0; k < 3; ++k) sum += X.R(i, k).d * X.R(j, k).f;
@@ -66,8 +68,8 @@ Block<Space, double> Basis(const JointKind<Space, double>& kind, const VectorX<d
   for (int i = 0; i < Space::kDim; ++i) basis(kind.axes[i], i) = 1.0;
   if (kind.basis == nullptr) return basis;
   Pose<Space, double> X;
-  kind.transform(q.data(), X);
-  kind.basis(X, basis);
+  kind.transform(q.data(), X, kind.parameter);
+  kind.basis(X, basis, kind.parameter);
   return basis;
 }
 
@@ -78,16 +80,16 @@ TYPED_TEST_SUITE(JointTest, Spaces);
 
 TYPED_TEST(JointTest, TransformIsTheOracles) {
   for (JointType type : Types<TypeParam>()) {
-    const auto& kind = KindOf<TypeParam, double>(type);
+    const auto kind = KindWith<TypeParam, double>(type, kParameter);
     for (int seed = 0; seed < 5; ++seed) {
       const VectorX<double> q = Coordinates(kind, seed);
       Pose<TypeParam, double> X;
-      kind.transform(q.data(), X);
+      kind.transform(q.data(), X, kind.parameter);
       std::vector<Jet> jets(kind.num_q + 1);
       for (int i = 0; i < kind.num_q; ++i) jets[i] = Jet(q[i]);
-      const JetPose Y = testing::Transform(type, TypeParam::kRot == 3, jets.data());
+      const JetPose Y = testing::Transform(type, TypeParam::kRot == 3, jets.data(), kParameter);
       for (int i = 0; i < TypeParam::kLin; ++i) {
-        EXPECT_EQ(X.p[i], static_cast<double>(Y.p[i].f));
+        EXPECT_NEAR(X.p[i], static_cast<double>(Y.p[i].f), kEps);  // a product at most
         // normalising a quaternion and products of its components: a few roundings
         for (int j = 0; j < TypeParam::kLin; ++j) {
           EXPECT_NEAR(X.R(i, j), static_cast<double>(Y.R(i, j).f), 8 * kEps) << ToString(type);
@@ -99,7 +101,7 @@ TYPED_TEST(JointTest, TransformIsTheOracles) {
 
 TYPED_TEST(JointTest, MotionMapAndRatesAreTheDerivativeOfTheTransform) {
   for (JointType type : Types<TypeParam>()) {
-    const auto& kind = KindOf<TypeParam, double>(type);
+    const auto kind = KindWith<TypeParam, double>(type, kParameter);
     for (int seed = 0; seed < 5; ++seed) {
       const VectorX<double> q = Coordinates(kind, seed);
       for (int i = 0; i < kind.num_u; ++i) {
@@ -114,7 +116,7 @@ TYPED_TEST(JointTest, MotionMapAndRatesAreTheDerivativeOfTheTransform) {
 
 TYPED_TEST(JointTest, FreeAndConstrainedAxesShareTheSpaceBetweenThem) {
   for (JointType type : Types<TypeParam>()) {
-    const auto& kind = KindOf<TypeParam, double>(type);
+    const auto kind = KindWith<TypeParam, double>(type, kParameter);
     std::vector<int> seen(TypeParam::kDim, 0);
     for (int axis : kind.axes) ++seen[axis];
     EXPECT_EQ(seen, std::vector<int>(TypeParam::kDim, 1)) << "D^T H = 0 and both are complete";
@@ -124,14 +126,14 @@ TYPED_TEST(JointTest, FreeAndConstrainedAxesShareTheSpaceBetweenThem) {
 TYPED_TEST(JointTest, BasesAreOrthogonalAndTheirRateIsTheBias) {
   using Space = TypeParam;
   for (JointType type : Types<Space>()) {
-    const auto& kind = KindOf<Space, double>(type);
+    const auto kind = KindWith<Space, double>(type, kParameter);
     for (int seed = 0; seed < 5; ++seed) {
       const VectorX<double> q = Coordinates(kind, seed);
       const Block<Space, double> basis = Basis(kind, q);
-      const Block<Space, double> product = basis.transpose() * basis;
+      Block<Space, double> product = basis.transpose() * basis;
+      if (kind.num_u > 0) product.col(0) *= kind.per_speed;
       EXPECT_LE((product - Block<Space, double>::Identity()).norm(), 16 * kEps) << ToString(type);
-      ASSERT_EQ(kind.basis == nullptr, kind.bias == nullptr);
-      if (kind.basis == nullptr) continue;
+      if (kind.bias == nullptr) continue;
       VectorX<double> u(kind.num_u), qdot(kind.num_q);
       for (int i = 0; i < kind.num_u; ++i) u[i] = std::cos(2.3 * i + seed);
       kind.rates(q.data(), u.data(), qdot.data());
@@ -141,7 +143,7 @@ TYPED_TEST(JointTest, BasesAreOrthogonalAndTheirRateIsTheBias) {
       };
       const Motion<Space, double> rate = (motion(step) - motion(-step)) / (2 * step);
       Pose<Space, double> X;
-      kind.transform(q.data(), X);
+      kind.transform(q.data(), X, kind.parameter);
       Motion<Space, double> bias;
       kind.bias(X, motion(0.0), bias);
       EXPECT_LE((rate - bias).norm(), 1e-9) << ToString(type);
@@ -151,17 +153,17 @@ TYPED_TEST(JointTest, BasesAreOrthogonalAndTheirRateIsTheBias) {
 
 TYPED_TEST(JointTest, AdmissiblePosesHaveNoMismatchAndGiveTheirCoordinatesBack) {
   for (JointType type : Types<TypeParam>()) {
-    const auto& kind = KindOf<TypeParam, double>(type);
+    const auto kind = KindWith<TypeParam, double>(type, kParameter);
     for (int seed = 0; seed < 5; ++seed) {
       const VectorX<double> q = Coordinates(kind, seed);
       Pose<TypeParam, double> X, again;
-      kind.transform(q.data(), X);
+      kind.transform(q.data(), X, kind.parameter);
       EXPECT_LE((Mismatch(kind, X).template lpNorm<Eigen::Infinity>()), 32 * kEps);
       VectorX<double> measured(kind.num_q);
-      kind.coordinates(X, measured.data());
-      kind.transform(measured.data(), again);
+      kind.coordinates(X, measured.data(), kind.parameter);
+      kind.transform(measured.data(), again, kind.parameter);
       EXPECT_LE((again.R - X.R).template lpNorm<Eigen::Infinity>(), 32 * kEps);
-      EXPECT_EQ(again.p, X.p);
+      EXPECT_LE((again.p - X.p).norm(), 4 * kEps) << "an angle of a helix: one rounding";
     }
   }
 }
@@ -170,11 +172,49 @@ TYPED_TEST(JointTest, MismatchAlongConstrainedAxesIsMeasured) {
   const auto& kind = KindOf<TypeParam, double>(JointType::kRevolute);
   Pose<TypeParam, double> X;
   const double q = 0.7;
-  kind.transform(&q, X);
+  kind.transform(&q, X, kind.parameter);
   X.p[1] += 1e-3;
   const Motion<TypeParam, double> mismatch = Mismatch(kind, X);
   EXPECT_NEAR(mismatch[TypeParam::kRot + 1], 1e-3, 8 * kEps);
   EXPECT_NEAR(mismatch.norm(), 1e-3, 32 * kEps);
+}
+
+/// Distance, direction and acceleration term of a rod along a curve p(t) in F.
+TYPED_TEST(JointTest, RodMeasuresADistance) {
+  using Space = TypeParam;
+  const auto kind = KindWith<Space, double>(JointType::kRod, 2.0);
+  Linear<Space, double> p, v;
+  for (int i = 0; i < Space::kLin; ++i) p[i] = 1.0 + 0.5 * i, v[i] = 0.7 - i;
+  Pose<Space, double> X;
+  X.p = p;
+  const Motion<Space, double> mismatch = Mismatch(kind, X);
+  EXPECT_NEAR(mismatch.norm(), std::abs(p.norm() - 2.0), 4 * kEps);
+  Block<Space, double> basis;
+  kind.basis(X, basis, kind.parameter);
+  const Block<Space, double> product = basis.transpose() * basis;
+  EXPECT_LE((product - Block<Space, double>::Identity()).norm(), 16 * kEps);
+  const Motion<Space, double> D = basis.col(Space::kDim - 1);
+  EXPECT_NEAR(D.dot(mismatch), p.norm() - 2.0, 4 * kEps);
+  Motion<Space, double> V = Motion<Space, double>::Zero(), bias;
+  V.template tail<Space::kLin>() = v;
+  kind.bias(X, V, bias);
+  const double step = 1e-4;  // second difference: truncation 1e-8, round-off eps / step^2 = 2e-8
+  const auto distance = [&](double t) { return (p + t * v).norm(); };
+  EXPECT_NEAR(D.dot(V), (distance(step) - distance(-step)) / (2 * step), 1e-8);
+  EXPECT_NEAR(-D.dot(bias), (distance(step) - 2 * distance(0.0) + distance(-step)) / (step * step),
+              1e-6);
+}
+
+/// Angles beyond a turn are known from the shift.
+TEST(HelixTest, TurnsAreCounted) {
+  const auto kind = KindWith<Spatial, double>(JointType::kHelical, 0.01);
+  for (double angle : {-20.0, -3.2, 0.1, 3.2, 7.0, 100.0}) {
+    Pose<Spatial, double> X;
+    double measured = 0.0;
+    kind.transform(&angle, X, kind.parameter);
+    kind.coordinates(X, &measured, kind.parameter);
+    EXPECT_NEAR(measured, angle, 8 * kEps * (1 + std::abs(angle)));
+  }
 }
 
 }  // namespace

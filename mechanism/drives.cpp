@@ -1,0 +1,70 @@
+#include "mechanism/drives.h"
+
+#include <algorithm>
+
+#include "mechanism/instantiate.h"
+
+namespace loopbench {
+
+template <class Space, class S>
+Drives<Space, S>::Drives(const Mechanism<Space, S>& mechanism)
+    : dynamics_(mechanism), A_(mechanism.num_bodies(), Motion<Space, S>::Zero()), F_(A_) {}
+
+template <class Space, class S>
+bool Drives<Space, S>::Followed(const Kinematics<Space, S>& kinematics, const VectorX<S>& udot) {
+  dynamics_.BodyAccelerations(kinematics, udot, A_);
+  S worst = S(0), size = S(0);
+  for (int index : kinematics.mechanism().constraints()) {
+    const Joint<Space, S>& joint = kinematics.mechanism().joints()[index];
+    const S left = JointAcceleration<Space, S>(kinematics, index, A_).norm();
+    worst = std::max(worst, left);
+    size = std::max(
+        {size, A_[joint.from].norm(), A_[joint.to].norm(), kinematics.joints()[index].g.norm()});
+  }
+  return worst <= S(kFollowed) * size;
+}
+
+template <class Space, class S>
+S Drives<Space, S>::Power(const Kinematics<Space, S>& kinematics, const VectorX<S>& udot,
+                          const VectorX<S>& lambda) {
+  const Mechanism<Space, S>& mechanism = kinematics.mechanism();
+  S power = S(0);
+  const auto rate = [&](const Joint<Space, S>& joint, int k) {
+    return kinematics.drives()[joint.first_drive + k].rate;
+  };
+  dynamics_.BodyAccelerations(kinematics, udot, A_);
+  AppliedForces<Space, S>(kinematics, F_);
+  // what each body needs beyond applied forces and those of the cut joints
+  for (int body = 1; body < mechanism.num_bodies(); ++body) {
+    F_[body] = InertialForce<Space, S>(kinematics, body, A_[body]) - F_[body];
+  }
+  for (int index : mechanism.constraints()) {
+    const Joint<Space, S>& joint = mechanism.joints()[index];
+    const JointState<Space, S>& state = kinematics.joints()[index];
+    Motion<Space, S> F = Motion<Space, S>::Zero();
+    for (int r = 0; r < state.rows(); ++r) F += state.D(r) * lambda[joint.row + r];
+    F_[joint.to] -= ShiftForce<Space, S>(F, state.r_Q);
+    F_[joint.from] += ShiftForce<Space, S>(F, state.r_P);
+    for (int k = 0; k < joint.num_drives; ++k) {
+      power += lambda[joint.row + k] * rate(joint, k) / joint.kind->per_speed;
+    }
+  }
+  for (auto step = mechanism.tree().rbegin(); step != mechanism.tree().rend(); ++step) {
+    const Joint<Space, S>& joint = mechanism.joints()[step->joint];
+    const JointState<Space, S>& state = kinematics.joints()[step->joint];
+    const bool forward = step->sign > 0;
+    const Linear<Space, S> to_joint = forward ? -state.r_Q : -state.r_P;
+    const Motion<Space, S> needed = ShiftForce<Space, S>(F_[step->child], to_joint);
+    for (int k = 0; k < joint.num_drives; ++k) {
+      power += S(step->sign) * state.D(k).dot(needed) * rate(joint, k);
+    }
+    F_[step->parent] += ShiftForce<Space, S>(needed, forward ? state.r_P : state.r_Q);
+  }
+  return power;
+}
+
+#define LOOPBENCH_INSTANTIATE(Space, S) template class Drives<Space, S>;
+LOOPBENCH_FOR_EACH_SPACE_AND_SCALAR(LOOPBENCH_INSTANTIATE)
+#undef LOOPBENCH_INSTANTIATE
+
+}  // namespace loopbench

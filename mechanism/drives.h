@@ -1,0 +1,34 @@
+// What prescribed motions do to a mechanism: whether it can follow them, and the power they take.
+//
+// Drives may ask for what the loops forbid: two cranks of one four-bar, each with a motion of its
+// own. Solvers that tolerate redundant constraints then meet them halfway; the accelerations left
+// over tell.
+#pragma once
+
+#include "mechanism/tree_dynamics.h"
+
+namespace loopbench {
+
+template <class Space, class S>
+class Drives {
+ public:
+  explicit Drives(const Mechanism<Space, S>& mechanism);
+
+  /// Whether accelerations `udot` satisfy every constraint, to kFollowed of the largest
+  /// acceleration they are made of. Speeds must be current.
+  bool Followed(const Kinematics<Space, S>& kinematics, const VectorX<S>& udot);
+
+  /// Power [W] that drives put into the mechanism: force along each times its prescribed rate.
+  /// Those of cut joints are multipliers (`lambda`, rows as in TreeDynamics::Jacobian()); those of
+  /// tree joints are what the bodies outward of them need beyond other forces.
+  S Power(const Kinematics<Space, S>& kinematics, const VectorX<S>& udot, const VectorX<S>& lambda);
+
+ private:
+  /// Solvers leave some 1e-12 of a consistent system; what is inconsistent leaves much more.
+  static constexpr double kFollowed = 1e-6;
+
+  TreeDynamics<Space, S> dynamics_;
+  std::vector<Motion<Space, S>> A_, F_;
+};
+
+}  // namespace loopbench

@@ -55,6 +55,14 @@ Table BodyTable(const MechanismDescription& description, const Structure& struct
   return table;
 }
 
+/// What a joint leaves free: its kind's directions less those that follow a given motion.
+int FreeSpeeds(SpaceKind space, const JointDescription& joint) {
+  const int kind = space == SpaceKind::kPlanar && ExistsInPlane(joint.type)
+                       ? KindOf<Planar, double>(joint.type).num_u
+                       : KindOf<Spatial, double>(joint.type).num_u;
+  return kind - static_cast<int>(joint.motions.size());
+}
+
 Table JointTable(const MechanismDescription& description, const Structure& structure) {
   Table table;
   table.columns = {
@@ -62,19 +70,19 @@ Table JointTable(const MechanismDescription& description, const Structure& struc
       {"from", "from", Format::kText, {}},    {"to", "to", Format::kText, {}},
       {"free", "free", Format::kInteger, {}}, {"rows", "constrains", Format::kInteger, {}},
       {"place", "place", Format::kText, {}}};
-  const int all = description.space == SpaceKind::kPlanar ? 3 : 6;
+  const bool planar = description.space == SpaceKind::kPlanar;
   std::vector<bool> cut(description.joints.size());
   for (const LoopPath& loop : structure.loops) cut[loop.cut_joint] = true;
   for (std::size_t j = 0; j < description.joints.size(); ++j) {
     const JointDescription& joint = description.joints[j];
-    const int free = NumValues(joint.type, description.space, true);
+    const int free = FreeSpeeds(description.space, joint);
     Record row;
     row.Set("name", joint.name);
     row.Set("type", std::string(ToString(joint.type)));
     row.Set("from", description.bodies[joint.from.body].name);
     row.Set("to", description.bodies[joint.to.body].name);
     row.Set("free", std::int64_t{free});
-    row.Set("rows", std::int64_t{all - free});
+    row.Set("rows", std::int64_t{(planar ? 3 : 6) - free});
     row.Set("place", std::string(cut[j] ? "closes a loop" : "tree"));
     table.rows.push_back(row);
   }
@@ -124,16 +132,21 @@ void PrintFreedom(const Structure& s) {
   }
 }
 
+std::string Described(const MechanismDescription& description, const RedundantDirection& one) {
+  if (one.axis == 'r') return "the force along the rod";
+  if (one.axis == 'n') return "the moment about the normal of its two axes";
+  const JointDescription& joint = description.joints[one.joint];
+  return fmt::format(
+      "the {} {} of {}{}", one.moment ? "moment about" : "force along", one.axis,
+      one.ground_axes ? "ground" : "its frame on " + description.bodies[joint.from.body].name,
+      one.drive ? ", which follows a given motion" : "");
+}
+
 void PrintRedundant(const MechanismDescription& description, const Structure& structure) {
   if (!structure.analysed) return;
   fmt::print("\nRedundant constraints: {}\n", structure.redundant.size());
   for (const RedundantDirection& one : structure.redundant) {
-    fmt::print(
-        "  {}: the {} {} of {}\n", description.joints[one.joint].name,
-        one.moment ? "moment about" : "force along", one.axis,
-        one.ground_axes
-            ? "ground"
-            : "its frame on " + description.bodies[description.joints[one.joint].from.body].name);
+    fmt::print("  {}: {}\n", description.joints[one.joint].name, Described(description, one));
   }
   if (structure.redundant.empty()) return;
   fmt::print("  All of these can be dropped at once; the loops then stay closed as they do now.\n");
@@ -234,7 +247,7 @@ int ExplainMechanism(const std::filesystem::path& path) {
   fmt::print("\nWarnings\n");
   if (warnings.empty()) fmt::print("  none\n");
   for (const Warning& warning : warnings) fmt::print("  {}\n", warning.text);
-  return structure.start.outcome == Outcome::kFinished ? 0 : 2;
+  return structure.start.outcome == Outcome::kInconsistentStart ? 2 : 0;
 }
 
 }  // namespace loopbench::harness

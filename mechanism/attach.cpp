@@ -85,14 +85,6 @@ bool KnowsForces(const MechanismDescription& description) {
   });
 }
 
-Pose<Spatial, double> PoseOf(const JointSide& side) {
-  Pose<Spatial, double> X;
-  X.p = side.position;
-  const double turn = side.rotation.norm();
-  if (turn > 0.0) X.R = Eigen::AngleAxisd(turn, side.rotation / turn).toRotationMatrix();
-  return X;
-}
-
 MechanismDescription Select(const MechanismDescription& description,
                             const Renumbering& renumbering) {
   // A new member of the description must be thought about here: this line stops compiling.
@@ -108,8 +100,8 @@ MechanismDescription Select(const MechanismDescription& description,
   for (std::size_t j = 0; j < joints.size(); ++j) {
     if (renumbering.joints[j] < 0) continue;
     // And a new member of a joint: what it says must survive a change of the frames' bodies.
-    const auto& [joint_name, type, from, to, axis, cut] = joints[j];
-    JointDescription joint{joint_name, type, from, to, axis, cut};
+    const auto& [joint_name, type, from, to, axis, pitch, length, cut, motions] = joints[j];
+    JointDescription joint{joint_name, type, from, to, axis, pitch, length, cut, motions};
     joint.from.body = renumbering.bodies[from.body];
     joint.to.body = renumbering.bodies[to.body];
     part.joints.push_back(joint);
@@ -120,9 +112,11 @@ MechanismDescription Select(const MechanismDescription& description,
           if constexpr (requires { f.joint; }) {
             f.joint = renumbering.joints[f.joint];
             return f.joint >= 0;
-          } else {
+          } else if constexpr (requires { f.body; }) {
             f.body = renumbering.bodies[f.body];
             return f.body > kGround;
+          } else {
+            return true;  // not known, so nothing was renumbered (KnowsForces, FindIslands)
           }
         },
         force);

@@ -8,8 +8,7 @@
 
 #include <vector>
 
-#include "mechanism/description.h"
-#include "mechanism/space.h"
+#include "mechanism/joint_frames.h"
 
 namespace loopbench {
 
@@ -43,8 +42,5 @@ MechanismDescription Attach(const MechanismDescription& description,
 /// indices, in the old order.
 MechanismDescription Select(const MechanismDescription& description,
                             const Renumbering& renumbering);
-
-/// The frame of a joint's side in body axes, axis not included.
-Pose<Spatial, double> PoseOf(const JointSide& side);
 
 }  // namespace loopbench

@@ -26,6 +26,11 @@ class Search {
     while (Shrink(&rigid)) {
     }
     std::vector<Attachment> attachments(description_.bodies.size());
+    for (const JointDescription& joint : description_.joints) {
+      // a drive between bodies that cannot move cannot be followed: that is for a run to say
+      const bool within = rigid[joint.from.body] && rigid[joint.to.body];
+      if (!joint.motions.empty() && within) return attachments;
+    }
     for (int body = 1; body < mechanism_.num_bodies(); ++body) {
       if (rigid[body]) attachments[body] = ToGround(body);
     }
@@ -94,6 +99,8 @@ class Search {
     for (std::size_t j = 0; j < description_.joints.size(); ++j) {
       const Joint<Space, double>& joint = mechanism_.joints()[j];
       if (!in_set(joint.from) || !in_set(joint.to)) continue;
+      // what follows a given motion holds nothing still
+      if (!description_.joints[j].motions.empty()) continue;
       const JointState<Space, double>& state = kinematics_.joints()[j];
       for (int i = 0; i < state.rows(); ++i) {
         Eigen::RowVectorXd row = Eigen::RowVectorXd::Zero(columns);

@@ -21,8 +21,9 @@ inline constexpr double kCertain = 1e-3;
 /// The rule: a set of bodies, with the joints among them and to Ground and no others, whose
 /// constraints at the start have a Jacobian of full column rank, with a ratio of singular values
 /// above kCertain. Such a set has no motion even to first order, so its position is isolated and
-/// it stays there whatever the rest does. A body that merely stands still at the start, such as a
-/// slider at dead centre, is in no such set, because the rest of its loop moves.
+/// it stays there whatever the rest does. Joints with prescribed motions are not among these. A
+/// body that merely stands still at the start, such as a slider at dead centre, is in no such set,
+/// because the rest of its loop moves.
 std::vector<Attachment> FindImmovable(const MechanismDescription& description);
 
 }  // namespace loopbench

@@ -31,9 +31,4 @@ BodyDescription Bar(const std::string& name, double length, double mass, double 
 JointDescription Revolute(const std::string& name, int from, const Eigen::Vector3d& at_from, int to,
                           const Eigen::Vector3d& at_to);
 
-/// A planar description as a spatial one whose plane is turned by `turn` (rotation vector [rad])
-/// against the ground's axes. Bodies keep their axes, so their normal is z. Parts that do not reach
-/// ground start in ground's axes as ever, whatever the turn.
-MechanismDescription InSpace(const MechanismDescription& planar, const Eigen::Vector3d& turn);
-
 }  // namespace loopbench

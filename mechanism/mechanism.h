@@ -20,9 +20,6 @@ struct Inertia {
   Matrix rotational_inverse = Matrix::Zero();
 };
 
-/// Turns a joint's own axis (OwnAxis) onto the described one, by the shortest rotation.
-Eigen::Matrix3d AxisAlignment(const JointDescription& joint);
-
 /// Small on purpose: a long chain streams all of it through the cache at every evaluation.
 template <class Space, class S>
 struct Joint {

@@ -4,7 +4,7 @@
 #include <cmath>
 
 #include "mechanism/islands.h"
-#include "mechanism/mechanism.h"
+#include "mechanism/joint_frames.h"
 
 namespace loopbench {
 
@@ -63,6 +63,10 @@ class Search {
     for (const JointDescription& joint : d_.joints) {
       if (!KindOfJoint(joint.type).qualifies) {
         return "joint \"" + joint.name + "\" is " + std::string(ToString(joint.type));
+      }
+      const bool one = joint.type == JointType::kRevolute || joint.type == JointType::kPrismatic;
+      if (!joint.motions.empty() && !one) {
+        return "joint \"" + joint.name + "\" follows a given motion in one of several coordinates";
       }
     }
     for (const Island& island : FindIslands(d_)) {

@@ -22,7 +22,7 @@ ScaledLoops ScaleLoops(const Kinematics<Space, double>& kinematics) {
   scaled.B = scaled.rows;
   for (int index : mechanism.constraints()) {
     const Joint<Space, double>& joint = mechanism.joints()[index];
-    const int rows = joint.kind->num_constraints();
+    const int rows = joint.num_constraints();
     if (rows == 0) continue;
     const JointMatrix<double> free = FreeResponse<Space, double>(kinematics, unit_bodies, index);
     auto block = scaled.B.middleRows(joint.row, rows);

@@ -12,7 +12,8 @@ namespace {
 
 /// Rows that a pivoted factorisation leaves over once it has found the rank.
 template <class Space>
-std::vector<RedundantDirection> FindRedundant(const Mechanism<Space, double>& mechanism,
+std::vector<RedundantDirection> FindRedundant(const MechanismDescription& description,
+                                              const Mechanism<Space, double>& mechanism,
                                               const ScaledLoops& scaled) {
   std::vector<RedundantDirection> redundant;
   if (scaled.rows.rows() == scaled.rank) return redundant;
@@ -24,14 +25,22 @@ std::vector<RedundantDirection> FindRedundant(const Mechanism<Space, double>& me
     for (int index : mechanism.constraints()) {
       const Joint<Space, double>& joint = mechanism.joints()[index];
       const int i = row - joint.row;
-      if (i < 0 || i >= joint.kind->num_constraints()) continue;
-      const int component = joint.kind->axes[joint.kind->num_u + i];
+      if (i < 0 || i >= joint.num_constraints()) continue;
+      // drives stand first in D, in the order of their coordinates
+      const bool drive = i < joint.num_drives;
+      const int at = drive ? mechanism.drives()[joint.first_drive + i].coordinate
+                           : joint.kind->num_u + i - joint.num_drives;
+      const int component = joint.kind->axes[at];
       RedundantDirection direction;
       direction.joint = joint.description;
+      direction.drive = drive;
       direction.moment = component < Space::kRot;
       direction.axis = direction.moment ? (Space::kRot == 1 ? 'z' : "xyz"[component])
                                         : "xyz"[component - Space::kRot];
       direction.ground_axes = joint.kind->isotropic;
+      const JointType type = description.joints[joint.description].type;
+      if (type == JointType::kRod) direction.axis = 'r', direction.moment = false;
+      if (type == JointType::kUniversal && direction.moment && !drive) direction.axis = 'n';
       redundant.push_back(direction);
     }
   }
@@ -58,7 +67,7 @@ class Analysis {
     result_.singular_values = here.singular_values;
     const ScaledLoops nearby = Nearby(here, kinematics);
     result_.rank_nearby = nearby.rank;
-    result_.redundant = FindRedundant(mechanism_, nearby);
+    result_.redundant = FindRedundant(description_, mechanism_, nearby);
     return result_;
   }
 
@@ -116,8 +125,10 @@ class Analysis {
 
   /// The loops a little way along a motion they permit; `here` where nothing moves.
   ScaledLoops Nearby(const ScaledLoops& here, const Kinematics<Space, double>& kinematics) const {
-    const bool assembled = result_.start.outcome == Outcome::kFinished;
+    const bool assembled = result_.start.outcome != Outcome::kInconsistentStart;
     if (here.to_u.cols() == 0 || here.rank == here.rows.rows() || !assembled) return here;
+    // along a given motion the start cannot be moved without its time
+    if (!mechanism_.drives().empty()) return here;
     // no special direction: an irrational mixture of all of them
     Eigen::VectorXd mixture(here.to_u.cols());
     for (Eigen::Index i = 0; i < mixture.size(); ++i)

@@ -30,8 +30,11 @@ struct LoopPath {
 /// A constrained direction of a cut joint that says what the others say already.
 struct RedundantDirection {
   int joint = 0;
-  bool moment = false;       ///< a moment about the axis, else a force along it
-  char axis = 'x';           ///< x, y or z; in the plane moments are about z
+  bool moment = false;  ///< a moment about the axis, else a force along it
+  /// x, y or z (in the plane moments are about z); r: along a rod; n: about the normal of a
+  /// universal joint's two axes.
+  char axis = 'x';
+  bool drive = false;        ///< the direction of a prescribed coordinate
   bool ground_axes = false;  ///< the axes are Ground's (planar pins, welds), else the joint's F
 };
 

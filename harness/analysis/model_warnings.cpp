@@ -56,7 +56,7 @@ void AddRankWarnings(const MechanismDescription& description, const Structure& s
 std::vector<Warning> FindWarnings(const MechanismDescription& description,
                                   const Structure& structure) {
   std::vector<Warning> warnings;
-  if (structure.start.outcome != Outcome::kFinished) {
+  if (structure.start.outcome == Outcome::kInconsistentStart) {
     warnings.push_back({WarningKind::kInconsistentStart, structure.start.message});
   }
   AddRankWarnings(description, structure, &warnings);

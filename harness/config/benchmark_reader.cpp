@@ -12,7 +12,7 @@
 #include "harness/config/spelling.h"
 #include "harness/integrator/options.h"
 #include "mechanism/compile.h"
-#include "mechanism/library.h"
+#include "mechanism/in_space.h"
 
 namespace loopbench::harness {
 namespace {

@@ -7,6 +7,7 @@
 
 #include "harness/merge_parts.h"
 #include "harness/run_case.h"
+#include "mechanism/in_space.h"
 #include "mechanism/library.h"
 #include "tests/reference/cases.h"
 

@@ -4,6 +4,7 @@
 
 #include <cmath>
 
+#include "mechanism/in_space.h"
 #include "mechanism/library.h"
 #include "tests/mechanism/compiled_motion.h"
 

@@ -61,7 +61,7 @@ void AddPart(const Truth& truth, const Compiled& compiled, int part, double* err
   ASSERT_EQ(start.outcome, Outcome::kFinished) << start.message;
   odca::Odca<Space, double> odca(mechanism, {});
   VectorX<double> udot(mechanism.num_u());
-  ASSERT_EQ(odca.Start(start.q, start.u), Outcome::kFinished);
+  ASSERT_EQ(odca.Start(0.0, start.q, start.u), Outcome::kFinished);
   ASSERT_EQ(odca.Evaluate(0.0, start.q, start.u, udot), Outcome::kFinished);
   TreeDynamics<Space, double> dynamics(mechanism);
   std::vector<Motion<Space, double>> A(mechanism.num_bodies());

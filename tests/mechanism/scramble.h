@@ -4,7 +4,7 @@
 #include <cmath>
 
 #include "mechanism/attach.h"
-#include "mechanism/library.h"
+#include "mechanism/in_space.h"
 #include "tests/contract/generators.h"
 
 namespace loopbench::testing {

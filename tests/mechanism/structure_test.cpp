@@ -150,7 +150,7 @@ TEST(StructureTest, TriangleOfBarsIsLocked) {
               Revolute("C", 1, tip, 2, tip)};
   d.initial.coordinates = {{0, {1.0}}, {1, {2.0}}};
   const Structure s = AnalyseStructure(d);
-  EXPECT_EQ(s.start.outcome, Outcome::kFinished);
+  EXPECT_EQ(s.start.outcome, Outcome::kLocked);
   EXPECT_TRUE(s.locked());
   EXPECT_EQ(s.freedom(), 0);
 }

@@ -85,6 +85,16 @@ Run MergeParts(std::span<const Run> parts) {
     }
   }
   record.Set("wall_s", wall);
+  for (const char* key : {"energy_supplied", "energy_dissipated"}) {
+    double work = 0.0;
+    bool any = false;
+    for (const Run& part : parts) {
+      if (std::isnan(Real(part.record, key))) continue;
+      work += Real(part.record, key);
+      any = true;
+    }
+    if (any) record.Set(key, work);
+  }
   if (started) {
     record.Set("energy_error_max", energy);
     record.Set("state_hash", Fnv1a(hashes));

@@ -54,7 +54,7 @@ class Runner {
         description_(description),
         mechanism_(description, one.column.coordinates),
         drift_(description, mechanism_),
-        energy_(experiment.series_points),
+        energy_(experiment.series_points, mechanism_.has_power()),
         exact_(scene_, mechanism_),
         angles_(experiment.series_points),
         with_series_(with_series) {}
@@ -93,25 +93,30 @@ class Runner {
     IntegratorResult result;
     result.outcome = formulation->Start(0.0, start.q, start.u);
     if (result.outcome != Outcome::kFinished) return result;
-    y_.resize(formulation->state_size());
+    FormulationOde<Space> ode(*formulation, mechanism_.has_power());
+    const std::size_t n = static_cast<std::size_t>(formulation->state_size());
+    y_.assign(static_cast<std::size_t>(ode.size()), 0.0);
     formulation->ToState(start.q, start.u, y_);
-    FormulationOde<Space> ode(*formulation);
-    std::vector<double> ydot;
-    const StepObserver observe = [&](double t, std::span<double> y) {
+    std::vector<double> ydot(n);
+    const StepObserver observe = [&](double t, std::span<double> y_and_work) {
+      const std::span<double> y = y_and_work.first(n), work = y_and_work.subspan(n);
       const bool restart = formulation->BeginStep(t, y);
-      ydot.resize(y.size());
       // a derivative that fails here fails in the integrator's next call, with its outcome; only
       // what the failing matrix looked like is worth keeping
       const Outcome outcome = formulation->Derivative(t, y, ydot);
-      if (outcome == Outcome::kFinished) Observe(t, *formulation);
-      if (outcome == Outcome::kSingular) condition_.Observe({t, *formulation});
+      Sample<Space> sample{t, *formulation};
+      if (!work.empty()) sample.supplied = work[0], sample.dissipated = work[1];
+      if (outcome == Outcome::kFinished) Observe(sample);
+      if (outcome == Outcome::kSingular) condition_.Observe(sample);
       return restart ? StepAction::kRestart : StepAction::kContinue;
     };
-    return harness::Integrate(ode, 0.0, case_.horizon, y_, OptionsOf(case_), observe);
+    const IntegratorResult run = harness::Integrate(
+        ode, 0.0, case_.horizon, y_, OptionsOf(case_, mechanism_.stop_times()), observe);
+    y_.resize(n);
+    return run;
   }
 
-  void Observe(double t, const Formulation<Space, double>& formulation) {
-    const Sample<Space> sample{t, formulation};
+  void Observe(const Sample<Space>& sample) {
     drift_.Observe(sample);
     energy_.Observe(sample);
     condition_.Observe(sample);
@@ -172,13 +177,14 @@ void WriteGrowth(const Growth& growth, int failed, Record& record) {
 
 }  // namespace
 
-IntegratorOptions OptionsOf(const Case& one) {
+IntegratorOptions OptionsOf(const Case& one, const std::vector<double>& stop_times) {
   IntegratorOptions options;
   options.profile = one.integrator;
   options.rtol = one.rtol;
   options.atol = one.atol;
   options.step_limit = one.limits.steps;
   options.time_limit_s = one.limits.wall_s;
+  options.stop_times = stop_times;
   return options;
 }
 

@@ -18,22 +18,42 @@ template <class Space>
 std::unique_ptr<Formulation<Space, double>> MakeFormulation(
     const Column& column, const Mechanism<Space, double>& mechanism);
 
-/// A formulation as the integrator sees it.
+/// Power [W] that enters and leaves the mechanism at the formulation's last successful evaluation:
+/// of whatever does work without a potential, prescribed motions included.
+template <class Space>
+Power<double> PowerOf(Formulation<Space, double>& formulation) {
+  Power<double> power = AppliedPower(formulation.kinematics());
+  power.supplied += formulation.DrivePower();
+  return power;
+}
+
+/// A formulation as the integrator sees it: its state, and after it, if asked for, the work [J]
+/// supplied and the work dissipated since the start (quadratures: the motion has the same bits with
+/// and without them). Timings do without.
 template <class Space>
 class FormulationOde final : public Ode {
  public:
-  explicit FormulationOde(Formulation<Space, double>& formulation) : formulation_(formulation) {}
-  int size() const override { return formulation_.state_size(); }
+  explicit FormulationOde(Formulation<Space, double>& formulation, bool with_work = false)
+      : formulation_(formulation), with_work_(with_work) {}
+  int size() const override { return formulation_.state_size() + num_quadratures(); }
+  int num_quadratures() const override { return with_work_ ? 2 : 0; }
   Outcome Derivative(double t, std::span<const double> y, std::span<double> ydot) override {
-    return formulation_.Derivative(t, y, ydot);
+    const std::size_t n = static_cast<std::size_t>(formulation_.state_size());
+    const Outcome outcome = formulation_.Derivative(t, y.first(n), ydot.first(n));
+    if (!with_work_ || outcome != Outcome::kFinished) return outcome;
+    const Power<double> power = PowerOf(formulation_);
+    ydot[n] = power.supplied;
+    ydot[n + 1] = power.dissipated;
+    return outcome;
   }
 
  private:
   Formulation<Space, double>& formulation_;
+  bool with_work_;
 };
 
-/// Method, tolerances and limits of a case.
-IntegratorOptions OptionsOf(const Case& one);
+/// Method, tolerances and limits of a case, and the stop times of its mechanism.
+IntegratorOptions OptionsOf(const Case& one, const std::vector<double>& stop_times);
 
 /// Names all that decides the run: keys, ensemble, limits, and the mechanism itself.
 std::string CaseContent(const Experiment& experiment, const Case& one);

@@ -16,6 +16,8 @@ struct IsKnown {
   bool operator()(const JointSpring&) const { return true; }
   bool operator()(const JointDamper&) const { return true; }
   bool operator()(const PointForce&) const { return true; }
+  bool operator()(const SpringDamper&) const { return true; }
+  bool operator()(const Drag&) const { return true; }
   template <class Other>
   bool operator()(const Other&) const {
     return false;
@@ -51,6 +53,44 @@ void MoveSide(const Attachment& at, SpaceKind space, JointSide* side) {
   }
   const Eigen::AngleAxisd turned(at.X.R * PoseOf(*side).R);
   side->rotation = turned.angle() * turned.axis();
+}
+
+/// Renumbers a force. False when there is nothing left for it to do.
+struct Kept {
+  const Renumbering& renumbering;
+
+  template <class JointForce>
+  requires requires(JointForce f) { f.joint; }
+  bool operator()(JointForce& f) const {
+    f.joint = renumbering.joints[f.joint];
+    return f.joint >= 0;
+  }
+  bool operator()(PointForce& f) const { return Moves(&f.body); }
+  bool operator()(Drag& f) const { return Moves(&f.point.body); }
+  bool operator()(SpringDamper& f) const {
+    const bool from = Moves(&f.from.body), to = Moves(&f.to.body);
+    const bool lost = f.from.body < 0 || f.to.body < 0;  // another part's
+    return !lost && (from || to) && f.from.body != f.to.body;
+  }
+  /// What is not known has not been renumbered (KnowsForces, FindIslands).
+  template <class Other>
+  bool operator()(Other&) const {
+    return true;
+  }
+
+ private:
+  bool Moves(int* body) const {
+    *body = renumbering.bodies[*body];
+    return *body > kGround;
+  }
+};
+
+/// A point of a body, seen from the carrier.
+void MovePoint(const std::vector<Attachment>& attachments, int* body, Vector3* at) {
+  const Attachment& attachment = attachments[*body];
+  if (!attachment.attached) return;
+  *body = attachment.carrier;
+  *at = attachment.X.R * *at + attachment.X.p;
 }
 
 /// Names of independent speeds that still exist. A list with a gap is of no use: all or none.
@@ -106,21 +146,9 @@ MechanismDescription Select(const MechanismDescription& description,
     joint.to.body = renumbering.bodies[to.body];
     part.joints.push_back(joint);
   }
+  const Kept kept{renumbering};
   for (ForceDescription force : forces) {
-    const bool kept = std::visit(
-        [&](auto& f) {
-          if constexpr (requires { f.joint; }) {
-            f.joint = renumbering.joints[f.joint];
-            return f.joint >= 0;
-          } else if constexpr (requires { f.body; }) {
-            f.body = renumbering.bodies[f.body];
-            return f.body > kGround;
-          } else {
-            return true;  // not known, so nothing was renumbered (KnowsForces, FindIslands)
-          }
-        },
-        force);
-    if (kept) part.forces.push_back(force);
+    if (std::visit(kept, force)) part.forces.push_back(force);
   }
   part.initial.coordinates = KeptValues(initial.coordinates, renumbering);
   part.initial.speeds = KeptValues(initial.speeds, renumbering);
@@ -164,10 +192,13 @@ MechanismDescription Attach(const MechanismDescription& description,
   for (ForceDescription& force : changed.forces) {
     if (auto* point = std::get_if<PointForce>(&force); point != nullptr) {
       const Attachment& at = attachments[point->body];
-      if (!at.attached) continue;
-      point->body = at.carrier;
-      point->at = at.X.R * point->at + at.X.p;
-      if (point->in_body_axes) point->force = at.X.R * point->force;
+      if (at.attached && point->in_body_axes) point->force = at.X.R * point->force;
+      MovePoint(attachments, &point->body, &point->at);
+    } else if (auto* drag = std::get_if<Drag>(&force); drag != nullptr) {
+      MovePoint(attachments, &drag->point.body, &drag->point.at);
+    } else if (auto* spring = std::get_if<SpringDamper>(&force); spring != nullptr) {
+      MovePoint(attachments, &spring->from.body, &spring->from.at);
+      MovePoint(attachments, &spring->to.body, &spring->to.at);
     }
   }
   MechanismDescription result = Select(changed, *renumbering);

@@ -3,6 +3,7 @@
 #include <Eigen/Cholesky>
 #include <cmath>
 
+#include "mechanism/force_elements.h"
 #include "mechanism/joint.h"
 
 namespace loopbench {
@@ -94,30 +95,6 @@ std::string CheckJoint(const MechanismDescription& description, const JointDescr
     return "joint " + Quote(joint.name) + ": " + error;
   }
   return description.space == SpaceKind::kPlanar ? CheckPlanarJoint(joint) : "";
-}
-
-std::string CheckForce(const MechanismDescription& description, const ForceDescription& force) {
-  return std::visit(
-      [&](const auto& f) -> std::string {
-        if constexpr (requires { f.joint; }) {
-          if (f.joint < 0 || f.joint >= static_cast<int>(description.joints.size())) {
-            return "force on joint index " + std::to_string(f.joint) + ", which does not exist";
-          }
-          const JointDescription& joint = description.joints[f.joint];
-          if (NumValues(joint.type, description.space, true) != 1) {
-            return "force on joint " + Quote(joint.name) +
-                   ": only joints with one coordinate carry a joint force";
-          }
-        } else {
-          if (f.body <= kGround || f.body >= static_cast<int>(description.bodies.size())) {
-            return "point force on body index " + std::to_string(f.body) +
-                   ", expected a moving body";
-          }
-          if (!f.at.allFinite() || !f.force.allFinite()) return "point force must be finite";
-        }
-        return "";
-      },
-      force);
 }
 
 std::string CheckValues(const MechanismDescription& description,
@@ -218,7 +195,7 @@ std::string Validate(const MechanismDescription& description) {
     error = CheckJoint(description, description.joints[i]);
   }
   for (std::size_t i = 0; i < description.forces.size() && error.empty(); ++i) {
-    error = CheckForce(description, description.forces[i]);
+    error = ValidateForce(description, description.forces[i]);
   }
   if (error.empty()) error = CheckValues(description, description.initial.coordinates, false);
   if (error.empty()) error = CheckValues(description, description.initial.speeds, true);

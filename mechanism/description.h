@@ -86,17 +86,19 @@ struct JointDescription {
   std::vector<PrescribedMotion> motions;  ///< at most one per coordinate; none with a quaternion
 };
 
-/// Constant moment (revolute) [N m] or force (prismatic) [N] on `to`, its opposite on `from`.
+/// Given moment (revolute) [N m] or force (prismatic) [N] on `to`, its opposite on `from`: constant
+/// (a polynomial of one coefficient; it has a potential) or a function of time (it supplies power).
 struct JointTorque {
   int joint = 0;
-  double value = 0.0;
+  TimeFunctionDescription value = Polynomial{{0.0}};
 };
 
-/// Linear spring on the joint's coordinate: -stiffness * (q - rest).
+/// Linear spring on the joint's coordinate: preload - stiffness * (q - rest).
 struct JointSpring {
   int joint = 0;
   double stiffness = 0.0;  ///< [N m/rad] or [N/m], >= 0
-  double rest = 0.0;       ///< coordinate without force [rad] or [m]
+  double rest = 0.0;       ///< coordinate at which only the preload is left [rad] or [m]
+  double preload = 0.0;    ///< [N m] or [N]
 };
 
 /// Linear damper on the joint's speed: -damping * u.
@@ -113,7 +115,34 @@ struct PointForce {
   bool in_body_axes = false;                        ///< force turns with the body
 };
 
-using ForceDescription = std::variant<JointTorque, JointSpring, JointDamper, PointForce>;
+/// A material point of a body.
+struct BodyPoint {
+  int body = kGround;
+  Eigen::Vector3d at = Eigen::Vector3d::Zero();  ///< in body axes from the body's origin [m]
+};
+
+/// Spring and damper between points of two bodies: with their distance d, the tension
+///   T = preload + stiffness (d - length) + damping ddot
+/// pulls them together (T < 0 pushes them apart). Where the points meet, d = 0, there is no
+/// direction to pull in and no force: an equilibrium, by the symmetry of all directions, and
+/// unless T is proportional to d a jump that an integrator meets as such.
+struct SpringDamper {
+  BodyPoint from, to;      ///< of different bodies; one may be Ground
+  double stiffness = 0.0;  ///< [N/m], >= 0
+  double damping = 0.0;    ///< [N s/m], >= 0
+  double length = 0.0;     ///< distance at which the spring is free [m], >= 0
+  double preload = 0.0;    ///< tension at that distance [N]
+};
+
+/// Resistance of a medium at rest at a material point of velocity v: -(linear + quadratic |v|) v.
+struct Drag {
+  BodyPoint point;
+  double linear = 0.0;     ///< [N s/m], >= 0
+  double quadratic = 0.0;  ///< [N s^2/m^2], >= 0
+};
+
+using ForceDescription =
+    std::variant<JointTorque, JointSpring, JointDamper, PointForce, SpringDamper, Drag>;
 
 /// Initial values of one joint's coordinates or speeds (one number; free joints: see joint.h).
 struct JointValues {

@@ -19,8 +19,13 @@ MechanismDescription InSpace(const MechanismDescription& planar, const Eigen::Ve
     }
   }
   for (ForceDescription& force : spatial.forces) {
-    auto* point = std::get_if<PointForce>(&force);
-    if (point != nullptr && !point->in_body_axes) point->force = R * point->force;
+    if (auto* point = std::get_if<PointForce>(&force); point != nullptr) {
+      if (!point->in_body_axes) point->force = R * point->force;
+    } else if (auto* spring = std::get_if<SpringDamper>(&force); spring != nullptr) {
+      for (BodyPoint* end : {&spring->from, &spring->to}) {
+        if (end->body == kGround) end->at = R * end->at;
+      }
+    }
   }
   return spatial;
 }

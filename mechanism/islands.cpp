@@ -6,19 +6,6 @@ namespace loopbench {
 
 namespace {
 
-/// Whether the force acts on bodies that are connected anyway: on one body, or along a joint.
-struct StaysInIsland {
-  bool operator()(const JointTorque&) const { return true; }
-  bool operator()(const JointSpring&) const { return true; }
-  bool operator()(const JointDamper&) const { return true; }
-  bool operator()(const PointForce&) const { return true; }
-  /// Of forces not listed here nothing is known.
-  template <class Other>
-  bool operator()(const Other&) const {
-    return false;
-  }
-};
-
 class Sets {
  public:
   explicit Sets(std::size_t n) : parent_(n) { std::iota(parent_.begin(), parent_.end(), 0); }
@@ -32,6 +19,28 @@ class Sets {
   std::vector<int> parent_;
 };
 
+/// What a force connects.
+struct Connects {
+  Sets& sets;
+  int num_bodies;
+
+  void operator()(const JointTorque&) const {}  // along a joint, which connects anyway
+  void operator()(const JointSpring&) const {}
+  void operator()(const JointDamper&) const {}
+  void operator()(const PointForce&) const {}  // on one body
+  void operator()(const Drag&) const {}
+  void operator()(const SpringDamper& force) const {
+    if (force.from.body != kGround && force.to.body != kGround) {
+      sets.Unite(force.from.body, force.to.body);
+    }
+  }
+  /// Of forces not listed here nothing is known: they may connect all.
+  template <class Other>
+  void operator()(const Other&) const {
+    for (int body = 2; body < num_bodies; ++body) sets.Unite(1, body);
+  }
+};
+
 }  // namespace
 
 std::vector<Island> FindIslands(const MechanismDescription& description) {
@@ -42,10 +51,8 @@ std::vector<Island> FindIslands(const MechanismDescription& description) {
       sets.Unite(joint.from.body, joint.to.body);
     }
   }
-  for (const ForceDescription& force : description.forces) {
-    if (std::visit(StaysInIsland(), force)) continue;
-    for (int body = 2; body < num_bodies; ++body) sets.Unite(1, body);
-  }
+  const Connects connects{sets, num_bodies};
+  for (const ForceDescription& force : description.forces) std::visit(connects, force);
   std::vector<Island> islands;
   std::vector<int> island_of_root(description.bodies.size(), -1);
   for (int body = 1; body < num_bodies; ++body) {

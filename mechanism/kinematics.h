@@ -110,14 +110,15 @@ class Kinematics {
   long position_version_ = 0;
 };
 
-/// Wrench of applied forces at each body's centre of mass: gravity, forces at points, joint forces
-/// (H tau on Q, the opposite on P). `wrenches` has one entry per body.
+/// Wrench of applied forces at each body's centre of mass: gravity, forces at points and between
+/// points, joint forces (H tau on Q, the opposite on P), at time(). `wrenches` has one entry per
+/// body.
 template <class Space, class S>
 void AppliedForces(const Kinematics<Space, S>& kinematics, std::span<Motion<Space, S>> wrenches);
 
 /// Energies [J] at the current position and speed; potential is zero for centres of mass in the
-/// ground origin and springs at rest. Constant forces on points (ground axes) and joints count as
-/// potentials; forces that turn with a body and dampers do not.
+/// ground origin and springs at rest. Constant forces on points (ground axes) and joints, preloads
+/// among them, count as potentials; what AppliedPower() knows does not.
 template <class S>
 struct Energy {
   S kinetic = S(0);
@@ -126,5 +127,16 @@ struct Energy {
 };
 template <class Space, class S>
 Energy<S> ComputeEnergy(const Kinematics<Space, S>& kinematics);
+
+/// Power [W] of the forces without a potential, at time(), position and speed:
+///   d/dt (kinetic + potential) = supplied - dissipated
+/// where the joints themselves do no work.
+template <class S>
+struct Power {
+  S supplied = S(0);    ///< torques that depend on time, forces that turn with a body; any sign
+  S dissipated = S(0);  ///< dampers and drag; >= 0
+};
+template <class Space, class S>
+Power<S> AppliedPower(const Kinematics<Space, S>& kinematics);
 
 }  // namespace loopbench

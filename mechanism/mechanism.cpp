@@ -12,11 +12,6 @@ namespace loopbench {
 
 namespace {
 
-template <class Space, class S>
-Linear<Space, S> ToLinear(const Eigen::Vector3d& v) {
-  return v.head<Space::kLin>().template cast<S>();
-}
-
 /// The frame at `position` turned by `rotation`, in the user's body axes.
 Pose<Planar, double> MakePose(const Eigen::Vector3d& position, const Eigen::Matrix3d& rotation,
                               double angle, Planar) {
@@ -88,7 +83,7 @@ Mechanism<Space, S>::Mechanism(const MechanismDescription& description, Coordina
   }
   AddBodies(description);
   AddJoints(description, BuildTopology(description, coordinates));
-  AddForces(description);
+  forces_ = CompileForces<Space, S>(description);
   AddStopTimes();
   AddLength();
   NameSpeeds(description);
@@ -140,6 +135,7 @@ Joint<Space, S> Mechanism<Space, S>::MakeJoint(const MechanismDescription& descr
 
 template <class Space, class S>
 void Mechanism<Space, S>::AddStopTimes() {
+  stop_times_ = forces_.Knots();
   for (const Drive& drive : drives_) {
     stop_times_.insert(stop_times_.end(), drive.value.knots().begin(), drive.value.knots().end());
   }
@@ -178,24 +174,6 @@ void Mechanism<Space, S>::AddJoints(const MechanismDescription& description,
     joints_[index].row = num_rows_;
     num_rows_ += joints_[index].num_constraints();
     constraints_.push_back(index);
-  }
-}
-
-template <class Space, class S>
-void Mechanism<Space, S>::AddForces(const MechanismDescription& description) {
-  for (const ForceDescription& force : description.forces) {
-    if (const auto* torque = std::get_if<JointTorque>(&force)) {
-      joint_forces_.push_back({.joint = torque->joint, .value = S(torque->value)});
-    } else if (const auto* spring = std::get_if<JointSpring>(&force)) {
-      joint_forces_.push_back(
-          {.joint = spring->joint, .stiffness = S(spring->stiffness), .rest = S(spring->rest)});
-    } else if (const auto* damper = std::get_if<JointDamper>(&force)) {
-      joint_forces_.push_back({.joint = damper->joint, .damping = S(damper->damping)});
-    } else if (const auto* point = std::get_if<PointForce>(&force)) {
-      const Eigen::Vector3d from_com = point->at - description.bodies[point->body].com;
-      body_forces_.push_back({point->body, ToLinear<Space, S>(from_com),
-                              ToLinear<Space, S>(point->force), point->in_body_axes});
-    }
   }
 }
 

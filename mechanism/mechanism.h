@@ -6,6 +6,7 @@
 #include <string>
 #include <vector>
 
+#include "mechanism/force_elements.h"
 #include "mechanism/joint.h"
 #include "mechanism/topology.h"
 
@@ -53,22 +54,6 @@ struct TreeStep {
   int sign = 1;
 };
 
-/// Spring, damper and constant force along the coordinate of a joint:
-/// tau = value - stiffness (q - rest) - damping u.
-template <class S>
-struct JointForce {
-  int joint = 0;
-  S value = S(0), stiffness = S(0), rest = S(0), damping = S(0);
-};
-
-template <class Space, class S>
-struct BodyForce {
-  int body = 0;
-  Linear<Space, S> at;  ///< from the centre of mass, body axes
-  Linear<Space, S> force;
-  bool in_body_axes = false;
-};
-
 template <class Space, class S>
 class Mechanism {
  public:
@@ -101,14 +86,15 @@ class Mechanism {
     }
     return -1;
   }
-  /// Times [s] at which a prescribed motion's derivatives jump, ascending: an integrator must not
-  /// step across them.
-  const std::vector<double>& stop_times() const { return stop_times_; }
   const std::vector<TreeStep>& tree() const { return tree_; }
   const std::vector<int>& constraints() const { return constraints_; }  ///< joint indices
-  const std::vector<JointForce<S>>& joint_forces() const { return joint_forces_; }
-  const std::vector<BodyForce<Space, S>>& body_forces() const { return body_forces_; }
+  const ForceElements<Space, S>& forces() const { return forces_; }
   const Linear<Space, S>& gravity() const { return gravity_; }
+  /// Whether something supplies or dissipates power: else the total energy stays.
+  bool has_power() const { return forces_.has_power() || !drives_.empty(); }
+  /// Times [s] at which derivatives of a prescribed motion or of a force jump, ascending: an
+  /// integrator must not step across them.
+  const std::vector<double>& stop_times() const { return stop_times_; }
 
   /// Tree step that carries a body (index into tree()), -1 for Ground.
   int step_of_body(int body) const { return step_of_body_[body]; }
@@ -132,7 +118,6 @@ class Mechanism {
   void AddBodies(const MechanismDescription& description);
   void AddJoints(const MechanismDescription& description, const Topology& topology);
   Joint<Space, S> MakeJoint(const MechanismDescription& description, int index);
-  void AddForces(const MechanismDescription& description);
   void AddStopTimes();
   void AddLength();
   void NameSpeeds(const MechanismDescription& description);
@@ -149,8 +134,7 @@ class Mechanism {
   std::vector<double> stop_times_;
   std::vector<TreeStep> tree_;
   std::vector<int> constraints_, step_of_body_;
-  std::vector<JointForce<S>> joint_forces_;
-  std::vector<BodyForce<Space, S>> body_forces_;
+  ForceElements<Space, S> forces_;
   Linear<Space, S> gravity_;
   S length_ = S(1);
   std::vector<std::string> speed_names_;

@@ -76,7 +76,7 @@ class Search {
         d_.joints, [](const JointDescription& joint) { return KindOfJoint(joint.type).turns; });
     if (seed == d_.joints.end()) return "nothing turns";
     const std::string fault = Spread(static_cast<int>(seed - d_.joints.begin()));
-    return fault;
+    return fault.empty() ? TiltedSpring() : fault;
   }
 
   InPlane Express() const;
@@ -127,6 +127,24 @@ class Search {
     for (std::size_t i = 0; i < normal_.size(); ++i) {
       height_[i] -= zero;
       if (n[largest] < 0.0) normal_[i] = -normal_[i], height_[i] = -height_[i];
+    }
+    return "";
+  }
+
+  /// The distance of points at two heights is no distance in the plane.
+  std::string TiltedSpring() const {
+    const auto height = [&](const BodyPoint& point) {
+      return height_[point.body] + normal_[point.body].dot(point.at);
+    };
+    for (const ForceDescription& force : d_.forces) {
+      const auto* spring = std::get_if<SpringDamper>(&force);
+      if (spring == nullptr) continue;
+      const double from = height(spring->from), to = height(spring->to);
+      const double arms = 1.0 + std::abs(from) + spring->from.at.norm() + spring->to.at.norm();
+      if (std::abs(from - to) > kParallel * arms) {
+        return "a spring between \"" + d_.bodies[spring->from.body].name + "\" and \"" +
+               d_.bodies[spring->to.body].name + "\" is not level";
+      }
     }
     return "";
   }
@@ -195,15 +213,20 @@ InPlane Search::Express() const {
     FlattenJoint(axes, normal_, &joint, &mirrored);
     result.mirrored.push_back(mirrored);
   }
+  const auto flatten = [&](int body, Vector3* at) { *at = Flat(axes[body].transpose() * *at); };
   for (ForceDescription& force : planar.forces) {
     result.force_dropped.push_back(0.0);
     if (auto* point = std::get_if<PointForce>(&force); point != nullptr) {
-      const Matrix3& R = axes[point->body];
-      point->at = Flat(R.transpose() * point->at);
-      const Vector3 f =
-          axes[point->in_body_axes ? point->body : kGround].transpose() * point->force;
+      const Matrix3& R = axes[point->in_body_axes ? point->body : kGround];
+      const Vector3 f = R.transpose() * point->force;
       result.force_dropped.back() = f.z();
       point->force = Flat(f);
+      flatten(point->body, &point->at);
+    } else if (auto* drag = std::get_if<Drag>(&force); drag != nullptr) {
+      flatten(drag->point.body, &drag->point.at);
+    } else if (auto* spring = std::get_if<SpringDamper>(&force); spring != nullptr) {
+      flatten(spring->from.body, &spring->from.at);
+      flatten(spring->to.body, &spring->to.at);
     }
   }
   for (auto* list : {&planar.initial.coordinates, &planar.initial.speeds}) {

@@ -1,4 +1,4 @@
-// "joints" and "forces" of a mechanism file.
+// "joints" of a mechanism file.
 #include <fmt/format.h>
 
 #include "harness/config/mechanism_sections.h"
@@ -79,72 +79,6 @@ JointDescription ReadJoint(const JsonNode& node, const Draft& draft) {
   return joint;
 }
 
-/// The joint of a joint force; joints that carry no single coordinate have no room for one.
-int ReadForceJoint(const JsonNode& force, const Draft& draft) {
-  const auto node = force.Required("joint", "the name of a joint");
-  if (!node) return 0;
-  const auto joint = ReadJointName(*node, draft);
-  if (!joint) return 0;
-  const JointDescription& found = draft.joints[*joint];
-  if (NumValues(found.type, draft.space, true) != 1) {
-    node->FailAs(fmt::format("\"{}\" ({})", found.name, ToString(found.type)),
-                 "a joint with one coordinate (revolute or prismatic)");
-  }
-  return *joint;
-}
-
-double ReadRequiredNumber(const JsonNode& owner, const std::string& key, const Range& range = {}) {
-  const auto node = owner.Required(key, "a number" + range.Text());
-  return node ? node->Number(range) : 0.0;
-}
-
-ForceDescription ReadPointForce(const JsonNode& node, const Draft& draft) {
-  PointForce force;
-  if (!node.ExpectObject({"type", "body", "at", "force", "axes"})) return force;
-  std::optional<int> body;
-  if (const auto name = node.Required("body", "the name of a body")) {
-    body = ReadBodyName(*name, draft);
-    if (body == kGround) name->Fail("a body that can move");
-  }
-  force.body = body.value_or(kGround);
-  if (const auto at = node.Optional("at"); at && body) {
-    force.at = ReadPoint(*at, draft.bodies[*body], draft.space);
-  }
-  if (const auto vector = node.Required("force", "an array of 2 or 3 numbers [N]")) {
-    force.force = ReadVector(*vector, draft.space);
-  }
-  if (const auto axes = node.Optional("axes")) {
-    force.in_body_axes = axes->Choice({"ground", "body"}, "the axes of the force") == 1;
-  }
-  return force;
-}
-
-ForceDescription ReadForce(const JsonNode& node, const Draft& draft) {
-  static const NameList kTypes = {"joint_torque", "joint_spring", "joint_damper", "point_force"};
-  std::optional<int> type;
-  if (!node.value().is_object()) {
-    node.Fail("an object that describes a force");
-  } else if (const auto name = node.Required("type", "a force type")) {
-    type = name->Choice(kTypes, "a force type");
-  }
-  if (type == 0 && node.ExpectObject({"type", "joint", "value"})) {
-    return JointTorque{.joint = ReadForceJoint(node, draft),
-                       .value = ReadRequiredNumber(node, "value")};
-  }
-  if (type == 1 && node.ExpectObject({"type", "joint", "stiffness", "rest"})) {
-    const auto rest = node.Optional("rest");
-    return JointSpring{.joint = ReadForceJoint(node, draft),
-                       .stiffness = ReadRequiredNumber(node, "stiffness", kNotNegative),
-                       .rest = rest ? rest->Number() : 0.0};
-  }
-  if (type == 2 && node.ExpectObject({"type", "joint", "damping"})) {
-    return JointDamper{.joint = ReadForceJoint(node, draft),
-                       .damping = ReadRequiredNumber(node, "damping", kNotNegative)};
-  }
-  if (type == 3) return ReadPointForce(node, draft);
-  return JointTorque{};
-}
-
 }  // namespace
 
 const NameList& JointTypeNames() {
@@ -163,14 +97,6 @@ void ReadJoints(const JsonNode& root, Draft* draft) {
   for (const JsonNode& element : joints->Elements("joints")) {
     draft->joints.push_back(ReadJoint(element, *draft));
     draft->joint_names.Add(draft->joints.back().name);
-  }
-}
-
-void ReadForces(const JsonNode& root, Draft* draft) {
-  const auto forces = root.Optional("forces");
-  if (!forces) return;
-  for (const JsonNode& element : forces->Elements("forces")) {
-    draft->forces.push_back(ReadForce(element, *draft));
   }
 }
 

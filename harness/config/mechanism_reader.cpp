@@ -48,6 +48,17 @@ std::string ReadNewName(const JsonNode& owner, const NameList& taken) {
   return name;
 }
 
+double ReadRequiredNumber(const JsonNode& owner, const std::string& key, const Range& range) {
+  const auto node = owner.Required(key, "a number" + range.Text());
+  return node ? node->Number(range) : 0.0;
+}
+
+double ReadOptionalNumber(const JsonNode& owner, const std::string& key, const Range& range,
+                          double otherwise) {
+  const auto node = owner.Optional(key);
+  return node ? node->Number(range) : otherwise;
+}
+
 MechanismFile ReadMechanism(const std::filesystem::path& path) {
   return ParseMechanism(ReadTextFile(path), path.string());
 }

@@ -39,6 +39,14 @@ void ReadIndependent(const JsonNode& root, Draft* draft);
 /// "observe".
 SceneObservation ReadObservation(const JsonNode& root, const Draft& draft);
 
+/// A number (a constant), or an object with "type" polynomial, harmonic or table. A stand-in after
+/// an error.
+TimeFunctionDescription ReadTimeFunction(const JsonNode& node);
+/// A number that must be there.
+double ReadRequiredNumber(const JsonNode& owner, const std::string& key, const Range& range = {});
+/// A number, or `otherwise` when it is absent.
+double ReadOptionalNumber(const JsonNode& owner, const std::string& key, const Range& range = {},
+                          double otherwise = 0.0);
 /// Two or three numbers; reports a third one that is not zero in the plane.
 Eigen::Vector3d ReadVector(const JsonNode& node, SpaceKind space);
 /// The point that a name of the body's points or a vector denotes.

@@ -1,6 +1,7 @@
 // Explicit Runge-Kutta integration by ARKODE, with named profiles and named endings.
 //
-// SUNDIALS appears only in arkode.cpp; this header is what the rest of the harness sees.
+// SUNDIALS appears only in arkode.cpp and the files arkode_*; this header is what the rest of the
+// harness sees.
 #pragma once
 
 #include <cstdint>

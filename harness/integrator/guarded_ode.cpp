@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <cstddef>
 #include <vector>
 
 namespace loopbench::harness {
@@ -17,7 +18,7 @@ bool GuardedOde::Evaluate(double t, std::span<const double> y, std::span<double>
   }
   ++calls_;
   try {
-    failure_ = ode_.Derivative(t, y, ydot);
+    failure_ = ode_.Derivative(std::min(t, latest_), y, ydot);
   } catch (...) {  // Integrate() throws it again
     exception_ = std::current_exception();
     return false;
@@ -27,6 +28,10 @@ bool GuardedOde::Evaluate(double t, std::span<const double> y, std::span<double>
     failure_ = Outcome::kNonFinite;
   }
   return failure_ == Outcome::kFinished && !(calls_ % kCallsPerClock == 0 && OutOfTime());
+}
+
+void GuardedOde::SetStop(double t) {
+  latest_ = std::isinf(t) ? t : std::nextafter(t, -std::numeric_limits<double>::infinity());
 }
 
 bool GuardedOde::OutOfTime() {
@@ -39,10 +44,12 @@ bool GuardedOde::OutOfTime() {
 
 void GuardedOde::Weights(std::span<const double> y, std::span<double> weight, bool is_ode45) const {
   const double rtol = options_.rtol, atol = options_.atol;
-  for (size_t i = 0; i < y.size(); ++i) {
+  const size_t controlled = Controlled();
+  for (size_t i = 0; i < controlled; ++i) {
     const double relative = rtol * std::abs(y[i]);
     weight[i] = 1 / (is_ode45 ? std::max(relative, atol) : relative + atol);
   }
+  std::fill(weight.begin() + static_cast<std::ptrdiff_t>(controlled), weight.end(), 0.0);
 }
 
 double GuardedOde::FirstStepOfOde45(double t0, double t_end, std::span<const double> y0,
@@ -53,7 +60,7 @@ double GuardedOde::FirstStepOfOde45(double t0, double t_end, std::span<const dou
   }
   const double threshold = options_.atol / options_.rtol;
   double rate = 0;
-  for (size_t i = 0; i < y0.size(); ++i) {
+  for (size_t i = 0; i < Controlled(); ++i) {
     rate = std::max(rate, std::abs(f[i]) / std::max(std::abs(y0[i]), threshold));
   }
   rate /= 0.8 * std::pow(options_.rtol, 0.2);

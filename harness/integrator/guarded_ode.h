@@ -4,6 +4,7 @@
 #include <chrono>
 #include <cstdint>
 #include <exception>
+#include <limits>
 #include <span>
 
 #include "harness/integrator/ode.h"
@@ -24,11 +25,14 @@ class GuardedOde {
   /// False if the run must end; `failure()` or `exception()` then says why.
   bool Evaluate(double t, std::span<const double> y, std::span<double> ydot) noexcept;
 
+  /// Lets the derivative see only times before `t` from now on; infinity lifts this.
+  void SetStop(double t);
+
   /// True, and the failure is kTimeLimit, once the wall time is used up.
   bool OutOfTime();
 
   /// The reciprocal of each component's tolerance: 1 / max(rtol |y_i|, atol) for ode45, else
-  /// 1 / (rtol |y_i| + atol).
+  /// 1 / (rtol |y_i| + atol). Zero for quadratures.
   void Weights(std::span<const double> y, std::span<double> weight, bool is_ode45) const;
 
   /// MATLAB's first step: the time in which the fastest component changes by 0.8 rtol^(1/5) of its
@@ -47,8 +51,12 @@ class GuardedOde {
 
  private:
   using Clock = std::chrono::steady_clock;
+  /// Number of components that are not quadratures.
+  size_t Controlled() const { return static_cast<size_t>(ode_.size() - ode_.num_quadratures()); }
+
   const IntegratorOptions& options_;
   Ode& ode_;
+  double latest_ = std::numeric_limits<double>::infinity();  // time that the derivative may see
   Clock::time_point start_;
   std::int64_t calls_ = 0;
   Outcome failure_ = Outcome::kFinished;

@@ -90,6 +90,10 @@ IntegratorResult Integrate(Ode& ode, double t0, double t_end, std::vector<double
     fault = "the state has " + std::to_string(y.size()) + " components, the problem " +
             std::to_string(ode.size());
   }
+  if (fault.empty() && !(ode.num_quadratures() >= 0 && ode.num_quadratures() < ode.size())) {
+    fault = std::to_string(ode.num_quadratures()) + " of " + std::to_string(ode.size()) +
+            " components are quadratures; at least one must not be";
+  }
   if (fault.empty() && !(t_end >= t0)) {
     fault = "t_end is " + std::to_string(t_end) + "; it must not lie before t0";
   }

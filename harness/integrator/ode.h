@@ -20,7 +20,15 @@ class Ode {
   /// Number of components of y; constant during a run.
   virtual int size() const = 0;
 
-  /// Writes f(t, y) to `ydot`. Returns kFinished, or the failure that ends the run (kSingular,
+  /// How many of the last components of y are quadratures: integrals along the motion, such as the
+  /// work of a force, on which f does not depend. Fewer than size(), constant during a run. They
+  /// have no part in the choice of steps: the other components have the same bits with and without
+  /// them, and their own error is not controlled.
+  virtual int num_quadratures() const { return 0; }
+
+  /// Writes f(t, y) to `ydot`. Where f jumps in time (IntegratorOptions::stop_times) it is taken
+  /// from the right: at a stop time itself this writes the limit from later times. Returns
+  /// kFinished, or the failure that ends the run (kSingular,
   /// ...). The integrator checks for NaN and infinity itself, so no implementation need do so.
   virtual Outcome Derivative(double t, std::span<const double> y, std::span<double> ydot) = 0;
 };

@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <array>
+#include <cmath>
 #include <limits>
 
 namespace loopbench::harness {
@@ -84,6 +85,13 @@ std::string Validate(const IntegratorOptions& options) {
   }
   if (!(options.fixed_step >= 0)) {
     return "fixed_step is " + std::to_string(options.fixed_step) + "; it must not be negative";
+  }
+  for (size_t i = 0; i < options.stop_times.size(); ++i) {
+    const double t = options.stop_times[i];
+    if (!std::isfinite(t) || (i > 0 && t < options.stop_times[i - 1])) {
+      return "stop_times[" + std::to_string(i) + "] is " + std::to_string(t) +
+             "; stop times must be finite and in order";
+    }
   }
   return "";
 }

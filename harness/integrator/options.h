@@ -45,8 +45,18 @@ struct IntegratorOptions {
   /// Longest step in seconds; 0 is the profile's own (ode45: a tenth of the interval; else none).
   double max_step = 0;
 
-  /// When positive: every step has this length (the last is clipped) and no error test is made.
+  /// When positive: every step has this length (the last, and one that ends at a stop time, is
+  /// clipped) and no error test is made.
   double fixed_step = 0;
+
+  /// Times, in order, at which a step must end because f or a derivative of it jumps there: knots
+  /// of prescribed motions and of tables. The step that ends at such a time evaluates f before it
+  /// only (at the last representable time before it where a stage lies at the end), the next step
+  /// evaluates f anew at it, with the step length that was in use before it was clipped. Without
+  /// stops a method loses its order at the jump, and only some of it is caught by the error test.
+  /// Times outside (t0, t_end] have no effect; those closer than 100 round-offs of the interval's
+  /// ends are one.
+  std::vector<double> stop_times;
 };
 
 /// "" if the options can be used, else one sentence with the option, its value and what is allowed.

@@ -15,13 +15,14 @@ namespace loopbench::harness {
 /// this header; Integrate() (arkode.h) is the loop over Step() with limits and observers.
 class Stepper {
  public:
-  /// The profile and the limits on steps are those of `ode.options()`, which must be valid. May
-  /// evaluate the derivative at (t0, y0) to choose the first step; requires t0 < t_end.
+  /// The profile, the limits on steps and the stop times are those of `ode.options()`, which must
+  /// be valid. May evaluate the derivative at (t0, y0) to choose the first step; requires t0 <
+  /// t_end.
   Stepper(GuardedOde& ode, double t0, double t_end, const std::vector<double>& y0);
   ~Stepper();
 
   /// Takes one accepted step and returns ARKODE's code (see OutcomeOfReturnCode). On success t and
-  /// y() are the step's end; the step that reaches t_end ends there exactly.
+  /// y() are the step's end; a step that reaches t_end or a stop time ends there exactly.
   int Step(double& t);
 
   /// Starts anew from (t, y), t < t_end, with the step size meant for the next step.

@@ -17,6 +17,7 @@ template <class Space>
 struct Sample {
   double t = 0.0;
   const Formulation<Space, double>& formulation;
+  double supplied = 0.0, dissipated = 0.0;  ///< work since the start [J]
 };
 
 template <class Space>
@@ -64,18 +65,22 @@ class DriftObserver final : public Observer<Space> {
   TimeSeries series_;
 };
 
-/// Total energy's largest deviation from its first value [J], and its series.
+/// Energy balance: the largest deviation of
+///   kinetic + potential - work supplied + work dissipated
+/// from its first value [J], and its series. Without power, that of the total energy.
 template <class Space>
 class EnergyObserver final : public Observer<Space> {
  public:
-  explicit EnergyObserver(int points) : points_(points) {}
+  EnergyObserver(int points, bool has_power) : points_(points), has_power_(has_power) {}
   void Observe(const Sample<Space>& sample) override;
   void Write(Record& record) const override;
 
  private:
   int points_;
+  bool has_power_;
   bool started_ = false;
   double first_ = 0.0, largest_ = 0.0;
+  double supplied_ = 0.0, dissipated_ = 0.0;
   TimeSeries series_;
 };
 

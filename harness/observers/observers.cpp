@@ -21,7 +21,10 @@ TimeSeries Thin(const TimeSeries& series, int points) {
 
 template <class Space>
 void EnergyObserver<Space>::Observe(const Sample<Space>& sample) {
-  const double energy = ComputeEnergy(sample.formulation.kinematics()).total();
+  supplied_ = sample.supplied;
+  dissipated_ = sample.dissipated;
+  const double energy =
+      ComputeEnergy(sample.formulation.kinematics()).total() - supplied_ + dissipated_;
   if (!started_) first_ = energy;
   started_ = true;
   largest_ = std::max(largest_, std::abs(energy - first_));
@@ -33,6 +36,10 @@ template <class Space>
 void EnergyObserver<Space>::Write(Record& record) const {
   if (!started_) return;
   record.Set("energy_error_max", largest_);
+  if (has_power_) {
+    record.Set("energy_supplied", supplied_);
+    record.Set("energy_dissipated", dissipated_);
+  }
   const TimeSeries thin = Thin(series_, points_);
   record.Set("series.energy_t", thin.t);
   record.Set("series.energy_error", thin.value);

@@ -68,6 +68,8 @@ std::vector<TableColumn> OtherColumns() {
       Make("growth_from", "window from [s]", kSeconds),
       Make("growth_to", "window to [s]", kSeconds),
       Make("ensemble_failed", "ensemble failed", kInteger),
+      Make("energy_supplied", "work supplied [J]", kScientific),
+      Make("energy_dissipated", "work dissipated [J]", kScientific),
       Make("rcond_min_t", "at time [s]", kSeconds),
       Make("softened_steps", "softened steps", kInteger),
       Make("wall_s", "wall [s]", kSeconds),

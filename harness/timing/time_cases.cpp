@@ -145,11 +145,12 @@ class SubjectIn final : public Subject {
 
   IntegratorResult Simulate(const std::function<void(std::span<double>)>& keep) {
     FormulationOde<Space> ode(*formulation_);
-    return Integrate(
-        ode, 0.0, case_.horizon, y_, OptionsOf(case_), [&](double t, std::span<double> y) {
-          if (keep) keep(y);
-          return formulation_->BeginStep(t, y) ? StepAction::kRestart : StepAction::kContinue;
-        });
+    const auto observe = [&](double t, std::span<double> y) {
+      if (keep) keep(y);
+      return formulation_->BeginStep(t, y) ? StepAction::kRestart : StepAction::kContinue;
+    };
+    return Integrate(ode, 0.0, case_.horizon, y_, OptionsOf(case_, mechanism_.stop_times()),
+                     observe);
   }
 
   /// Evaluations per batch, from the time of a first few (which also warm up).

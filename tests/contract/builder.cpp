@@ -48,24 +48,64 @@ std::vector<double> Builder::Values(JointType type, double q) {
   return values;
 }
 
+TimeFunctionDescription Builder::RandomFunction() {
+  const int kind = random.Below(4);
+  if (kind == 0) {
+    return Polynomial{
+        {random.Uniform(-5.0, 5.0), random.Uniform(-2.0, 2.0), random.Uniform(-1.0, 1.0)}};
+  }
+  if (kind == 1) {
+    return Harmonic{.mean = random.Uniform(-1.0, 1.0),
+                    .amplitude = random.Uniform(1.0, 5.0),
+                    .omega = random.Uniform(0.5, 5.0),
+                    .phase = random.Uniform(-3.0, 3.0)};
+  }
+  TimeTable table;
+  table.cubic = kind == 2;
+  for (double t = -1.0; t < 2.0; t += random.Uniform(0.3, 0.8)) {
+    table.times.push_back(t);
+    table.values.push_back(random.Uniform(-5.0, 5.0));
+  }
+  return table;
+}
+
 void Builder::AddForces(int count) {
   const int joints = static_cast<int>(description.joints.size());
+  const int bodies = static_cast<int>(description.bodies.size());
+  const auto point = [&](int body) { return BodyPoint{body, random.Vector(1.0, spatial)}; };
   for (int k = 0; k < count; ++k) {
     const int joint = random.Below(joints);
     const JointType type = description.joints[joint].type;
     const bool single = type == JointType::kRevolute || type == JointType::kPrismatic ||
                         type == JointType::kHelical;
-    const int kind = single ? random.Below(4) : 3;
-    if (kind == 0) description.forces.push_back(JointTorque{joint, random.Uniform(-5.0, 5.0)});
+    const int kind = single ? random.Below(7) : 4 + random.Below(3);
+    if (kind == 0) {
+      description.forces.push_back(JointTorque{joint, Polynomial{{random.Uniform(-5.0, 5.0)}}});
+    }
     if (kind == 1) {
-      description.forces.push_back(
-          JointSpring{joint, random.Uniform(1.0, 10.0), random.Uniform(-1.0, 1.0)});
+      description.forces.push_back(JointSpring{
+          joint, random.Uniform(1.0, 10.0), random.Uniform(-1.0, 1.0), random.Uniform(-2.0, 2.0)});
     }
     if (kind == 2) description.forces.push_back(JointDamper{joint, random.Uniform(0.1, 1.0)});
-    if (kind == 3) {
-      const int body = 1 + random.Below(static_cast<int>(description.bodies.size()) - 1);
+    if (kind == 3) description.forces.push_back(JointTorque{joint, RandomFunction()});
+    if (kind == 4) {
+      const int body = 1 + random.Below(bodies - 1);
       description.forces.push_back(PointForce{body, random.Vector(1.0, spatial),
                                               random.Vector(10.0, spatial), random.Chance(0.5)});
+    }
+    if (kind == 5) {
+      const int from = random.Below(bodies), to = (from + 1 + random.Below(bodies - 1)) % bodies;
+      description.forces.push_back(SpringDamper{.from = point(from),
+                                                .to = point(to),
+                                                .stiffness = random.Uniform(1.0, 10.0),
+                                                .damping = random.Uniform(0.1, 1.0),
+                                                .length = random.Uniform(0.0, 2.0),
+                                                .preload = random.Uniform(-2.0, 2.0)});
+    }
+    if (kind == 6) {
+      description.forces.push_back(Drag{.point = point(1 + random.Below(bodies - 1)),
+                                        .linear = random.Uniform(0.0, 1.0),
+                                        .quadratic = random.Uniform(0.0, 1.0)});
     }
   }
 }

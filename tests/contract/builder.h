@@ -77,6 +77,9 @@ class Builder {
     return freedom + up[meet];
   }
 
+  /// Any kind of function of time, with kinks between -1 s and 2 s.
+  TimeFunctionDescription RandomFunction();
+  /// Forces of every kind.
   void AddForces(int count);
 
   /// Prescribes a coordinate of each of up to `count` tree joints, starting where it stands.
@@ -84,7 +87,7 @@ class Builder {
 
   /// Forces on the tree joints, then the loops.
   MechanismDescription Finish() {
-    AddForces(1 + static_cast<int>(description.joints.size()) / 3);
+    AddForces(1 + static_cast<int>(description.joints.size()) / 2);
     FinishClosures();
     return description;
   }

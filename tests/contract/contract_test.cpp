@@ -223,36 +223,65 @@ TEST_P(ContractTest, DerivativeDoesNotAllocate) {
   });
 }
 
-/// Without dampers and forces that turn with a body.
+/// Without all that supplies or dissipates power.
 MechanismDescription Conservative(MechanismDescription description) {
-  std::erase_if(description.forces, [](const ForceDescription& force) {
-    const auto* point = std::get_if<PointForce>(&force);
-    return std::holds_alternative<JointDamper>(force) || (point && point->in_body_axes);
+  MechanismDescription one = description;
+  std::erase_if(description.forces, [&](const ForceDescription& force) {
+    one.forces = {force};
+    return CompileForces<Spatial, double>(one).has_power();
   });
   return description;
 }
 
-/// Drives are the only ones that put energy in; seed 10 has some, seed 12 has none.
-TEST_P(ContractTest, EnergyChangesByThePowerOfDrives) {
-  for (std::uint64_t seed : {10, 12}) {
-    Run(Conservative(Description(seed)), seed, [&](auto bench) {
+TEST_P(ContractTest, AccelerationsFollowTheTime) {
+  MechanismDescription description = Description(12);
+  for (std::size_t j = 0; j < description.joints.size(); ++j) {
+    if (description.joints[j].type != JointType::kRevolute) continue;
+    description.forces.push_back(
+        JointTorque{static_cast<int>(j), Harmonic{.amplitude = 5.0, .omega = 2.0}});
+  }
+  Run(description, 12, [&](auto bench) {
+    Oracle oracle(bench.sample.description(), LayoutOf(bench.mechanism));
+    for (const double t : {-0.4, 0.8}) {
+      oracle.SetTime(t);
+      VectorX<double> udot;
+      ASSERT_EQ(bench.formulation->Evaluate(t, bench.state.q, bench.state.u, udot),
+                Outcome::kFinished);
+      const RealVector expected = oracle.Solve(ToReal(bench.state.q), ToReal(bench.state.u)).udot;
+      EXPECT_LE(RelativeError(udot, expected), bench.Bound()) << t;
+    }
+  });
+}
+
+/// The energy's rate by differences of the oracle's, the power by the formulation: of drives alone
+/// (seed 10 has some), of forces alone (seed 11) and of both.
+TEST_P(ContractTest, EnergyChangesByThePowerOfForcesAndDrives) {
+  const MechanismDescription driven = Description(10);
+  for (const MechanismDescription& description :
+       {driven, Conservative(driven), Description(11), Conservative(Description(12))}) {
+    Run(description, 10, [&](auto bench) {
+      SCOPED_TRACE(description.name);
       ASSERT_EQ(bench.Derivative(bench.y), Outcome::kFinished);
-      EXPECT_EQ(bench.mechanism.drives().empty(), seed == 12);
       Oracle oracle(bench.sample.description(), LayoutOf(bench.mechanism));
       const RealVector q = ToReal(bench.formulation->q()), u = ToReal(bench.formulation->u());
       const RealVector udot = ToReal(bench.formulation->udot());
       const Eigen::Map<const VectorX<double>> qdot(bench.ydot.data(), q.size());
-      const double step = 0x1p-20;  // 1e-6 in long double: truncation 1e-12, round-off 1e-13
-      const auto energy = [&](double t) {
+      const Real step = 1e-6L;  // long double: truncation 1e-12, round-off 1e-13
+      const auto energy = [&](Real t) {
         oracle.SetTime(t);
-        return oracle.TotalEnergy(q + Real(t) * ToReal(qdot), u + Real(t) * udot);
+        return oracle.TotalEnergy(q + t * ToReal(qdot), u + t * udot);
       };
       const Real rate = (energy(step) - energy(-step)) / (2 * step);
-      const double power = bench.formulation->DrivePower();
-      EXPECT_EQ(power != 0.0, seed == 10);
+      const Power<double> forces = AppliedPower(bench.formulation->kinematics());
+      const double drives = bench.formulation->DrivePower();
+      const bool conservative = CompileForces<Spatial, double>(description).has_power() == false;
+      EXPECT_EQ(drives != 0.0, !bench.mechanism.drives().empty());
+      EXPECT_EQ(forces.supplied == 0.0 && forces.dissipated == 0.0, conservative);
+      EXPECT_EQ(bench.mechanism.has_power(), drives != 0.0 || !conservative);
       // what the rate is small against: the energies' own rates, at least their size per second
       const Real scale = 1 + std::abs(energy(0)) + udot.template lpNorm<Eigen::Infinity>();
-      EXPECT_LE(std::abs(rate - power), (1e-10L + bench.Bound()) * scale);
+      EXPECT_LE(std::abs(rate - (forces.supplied - forces.dissipated + drives)),
+                (1e-10L + bench.Bound()) * scale);
       const Energy<double> own = ComputeEnergy(bench.formulation->kinematics());
       EXPECT_NEAR(own.total(), static_cast<double>(energy(0)),
                   100 * kEps * (own.kinetic + std::abs(own.potential) + 10.0));

@@ -3,36 +3,9 @@
 #include <Eigen/Geometry>
 #include <Eigen/LU>
 
+#include "tests/contract/oracle_geometry.h"
+
 namespace loopbench::testing {
-
-namespace {
-
-Real33 ValueOf(const JetMatrix& R, Real Jet::*part) {
-  Real33 A;
-  for (int i = 0; i < 3; ++i) {
-    for (int j = 0; j < 3; ++j) A(i, j) = R(i, j).*part;
-  }
-  return A;
-}
-Real3 ValueOf(const JetVector& p, Real Jet::*part) { return {p[0].*part, p[1].*part, p[2].*part}; }
-
-/// [w; v] from first derivatives, [alpha; a] from second ones: R' R^T = [w]x, R'' R^T = [alpha]x +
-/// a symmetric matrix.
-Real6 MotionOf(const JetPose& pose, Real Jet::*part) {
-  const Real33 A = ValueOf(pose.R, part) * ValueOf(pose.R, &Jet::f).transpose();
-  Real6 V;
-  V << A(2, 1) - A(1, 2), A(0, 2) - A(2, 0), A(1, 0) - A(0, 1), ValueOf(pose.p, part);
-  V.head<3>() /= 2;
-  return V;
-}
-
-Real6 AtCom(const Real6& wrench, const Real3& r) {
-  Real6 shifted = wrench;
-  shifted.head<3>() += r.cross(wrench.tail<3>());
-  return shifted;
-}
-
-}  // namespace
 
 Real33 Oracle::InertiaInGround(int body, const JetPose& pose) const {
   Real33 I = description_.bodies[body].inertia.cast<Real>();
@@ -48,48 +21,6 @@ Jet Oracle::Coordinate(int index, const std::vector<JetPose>& poses) const {
   const JetPose X_FM = JointPose(index, poses);
   if (description_.joints[index].type == JointType::kPrismatic) return X_FM.p[0];
   return Angle(X_FM.R(0, 0), X_FM.R(1, 0));
-}
-
-std::vector<Real6> Oracle::Applied(const std::vector<JetPose>& poses) const {
-  std::vector<Real6> F(poses.size(), Real6::Zero());
-  for (std::size_t b = 1; b < poses.size(); ++b) {
-    F[b].tail<3>() = description_.bodies[b].mass * description_.gravity.cast<Real>();
-  }
-  const auto joint_force = [&](int index, const auto& tau_of) {
-    const JointDescription& joint = description_.joints[index];
-    const bool slides = joint.type == JointType::kPrismatic;
-    const JetPose X_WF = poses[joint.from.body] * frames_[index].X_PF;
-    const JetPose X_WM = poses[joint.to.body] * frames_[index].X_QM;
-    const Jet q = Coordinate(index, poses);
-    Real6 H = Real6::Zero();
-    for (int i = 0; i < 3; ++i) H[slides ? 3 + i : i] = X_WF.R(i, slides ? 0 : 2).f;
-    if (joint.type == JointType::kHelical) {  // the part of the wrench along the free motion
-      H.tail<3>() = Real(joint.pitch) * H.head<3>();
-      H /= 1 + Real(joint.pitch) * joint.pitch;
-    }
-    const Real3 p = ValueOf(X_WM.p, &Jet::f);
-    const Real6 wrench = H * tau_of(q.f, q.d);
-    F[joint.to.body] += AtCom(wrench, p - ValueOf(poses[joint.to.body].p, &Jet::f));
-    F[joint.from.body] -= AtCom(wrench, p - ValueOf(poses[joint.from.body].p, &Jet::f));
-  };
-  for (const ForceDescription& force : description_.forces) {
-    if (const auto* torque = std::get_if<JointTorque>(&force)) {
-      joint_force(torque->joint, [&](Real, Real) { return Real(torque->value); });
-    } else if (const auto* spring = std::get_if<JointSpring>(&force)) {
-      joint_force(spring->joint,
-                  [&](Real q, Real) { return Real(spring->stiffness) * (spring->rest - q); });
-    } else if (const auto* damper = std::get_if<JointDamper>(&force)) {
-      joint_force(damper->joint, [&](Real, Real u) { return -Real(damper->damping) * u; });
-    } else if (const auto* point = std::get_if<PointForce>(&force)) {
-      const Real33 R = ValueOf(poses[point->body].R, &Jet::f);
-      const Real3 f = point->force.cast<Real>();
-      const Real3 r = (point->at - description_.bodies[point->body].com).cast<Real>();
-      Real6 wrench = Real6::Zero();
-      wrench.tail<3>() = point->in_body_axes ? Real3(R * f) : f;
-      F[point->body] += AtCom(wrench, R * r);
-    }
-  }
-  return F;
 }
 
 Equations Oracle::Form(const RealVector& q, const RealVector& u) {
@@ -261,32 +192,6 @@ RealVector Oracle::Consistent(const RealVector& q, const RealVector& u) const {
   rhs.head(n) = u;
   rhs.tail(m) = -ClosureRates(q, RealVector::Zero(n));
   return SolveFullPivot(A, rhs, Real(1e-12)).head(n);
-}
-
-Real Oracle::TotalEnergy(const RealVector& q, const RealVector& u) const {
-  const std::vector<JetPose> poses = PosesAlong(Curve(q, u, true));
-  Real energy = 0;
-  for (std::size_t b = 1; b < poses.size(); ++b) {
-    const Real6 V = MotionOf(poses[b], &Jet::d);
-    const Real m = description_.bodies[b].mass;
-    energy += V.head<3>().dot(InertiaInGround(static_cast<int>(b), poses[b]) * V.head<3>()) / 2 +
-              m * V.tail<3>().squaredNorm() / 2 -
-              m * description_.gravity.cast<Real>().dot(ValueOf(poses[b].p, &Jet::f));
-  }
-  for (const ForceDescription& force : description_.forces) {
-    if (const auto* torque = std::get_if<JointTorque>(&force)) {
-      energy -= torque->value * Coordinate(torque->joint, poses).f;
-    } else if (const auto* spring = std::get_if<JointSpring>(&force)) {
-      const Real stretch = Coordinate(spring->joint, poses).f - spring->rest;
-      energy += spring->stiffness * stretch * stretch / 2;
-    } else if (const auto* point = std::get_if<PointForce>(&force); point && !point->in_body_axes) {
-      const Real3 r = (point->at - description_.bodies[point->body].com).cast<Real>();
-      const Real3 p =
-          ValueOf(poses[point->body].p, &Jet::f) + ValueOf(poses[point->body].R, &Jet::f) * r;
-      energy -= point->force.cast<Real>().dot(p);
-    }
-  }
-  return energy;
 }
 
 }  // namespace loopbench::testing

@@ -84,8 +84,9 @@ class Oracle {
  public:
   Oracle(const MechanismDescription& description, Layout layout);
 
-  /// The time of prescribed motions; 0 until set.
-  void SetTime(double t) { time_ = t; }
+  /// The time [s] at which given functions of time are taken from now on; 0 at first.
+  void SetTime(Real t) { time_ = t; }
+
   /// X_WB of every body at its centre of mass.
   std::vector<JetPose> Poses(const RealVector& q) const;
   /// Pose of M in F of a user joint.
@@ -98,6 +99,10 @@ class Oracle {
   RealVector Consistent(const RealVector& q, const RealVector& u) const;
   /// Kinetic energy, gravity, springs, constant torques and forces in ground axes [J].
   Real TotalEnergy(const RealVector& q, const RealVector& u) const;
+  /// Applied wrenches at the centres of mass, by body.
+  std::vector<Real6> Applied(const RealVector& q, const RealVector& u) const;
+  /// Power [W] of all applied wrenches, those with a potential included.
+  Real TotalPower(const RealVector& q, const RealVector& u) const;
 
  private:
   struct Frames {
@@ -128,9 +133,9 @@ class Oracle {
 
   const MechanismDescription description_;
   const Layout layout_;
+  Real time_ = 0;
   std::vector<Frames> frames_;
   std::vector<int> first_;  ///< of each step in a curve
-  double time_ = 0.0;
   // of the last Form()
   std::vector<JetPose> poses_;
   RealMatrix G_;                      ///< six rows per body

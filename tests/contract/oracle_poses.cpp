@@ -2,6 +2,7 @@
 #include <optional>
 
 #include "tests/contract/oracle.h"
+#include "tests/contract/time_oracle.h"
 
 namespace loopbench::testing {
 
@@ -251,8 +252,7 @@ Oracle::Oracle(const MechanismDescription& description, Layout layout)
 }
 
 Jet Oracle::Prescribed(const PrescribedMotion& motion) const {
-  const TimeValue<double> s = TimeFunction(motion.value).At(time_);
-  return {s.value, s.rate, s.acceleration};
+  return OracleAt(motion.value, time_);
 }
 
 std::vector<Jet> Oracle::Curve(const RealVector& q, const RealVector& u, bool driven) const {

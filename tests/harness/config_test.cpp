@@ -67,6 +67,58 @@ TEST(ShippedMechanisms, CutEachLoopOnceAtTheJointListedLast) {
   EXPECT_TRUE(seven_bar.joints[6].cut && seven_bar.joints[7].cut);
 }
 
+TEST(MechanismReader, FillsEveryFieldOfEveryForce) {
+  const MechanismDescription m = ParseMechanism(R"({
+    "name": "m", "gravity": [0, -9.81], "ground": {"points": {"O": [1, 2]}},
+    "bodies": [{"name": "a", "mass": 2, "inertia": 3, "points": {"P": [1, 0]}}],
+    "joints": [{"name": "J", "type": "revolute", "from": {"body": "ground"}, "to": {"body": "a"}}],
+    "forces": [
+      {"type": "joint_spring", "joint": "J", "stiffness": 7, "preload": -2},
+      {"type": "joint_torque", "joint": "J", "value": {"type": "polynomial", "coefficients": [1, 2]}},
+      {"type": "joint_torque", "joint": "J",
+       "value": {"type": "harmonic", "amplitude": 3, "omega": 4, "mean": 5, "phase": 6}},
+      {"type": "joint_torque", "joint": "J",
+       "value": {"type": "table", "times": [0, 1, 3], "values": [4, 5, 4]}},
+      {"type": "joint_torque", "joint": "J", "value": {"type": "table", "times": [0, 1],
+       "values": [4, 5], "interpolation": "linear"}},
+      {"type": "spring_damper", "from": {"body": "ground", "at": "O"}, "to": {"body": "a", "at": "P"},
+       "stiffness": 1, "damping": 2, "length": 3, "preload": -4},
+      {"type": "spring_damper", "from": {"body": "a"}, "to": {"body": "ground"}, "damping": 2},
+      {"type": "drag", "body": "a", "at": [0, 1], "linear": 0.5, "quadratic": 0.25}]})",
+                                                "m.json")
+                                     .description;
+  const auto function = [&](int force) {
+    return std::get<JointTorque>(m.forces[static_cast<std::size_t>(force)]).value;
+  };
+  EXPECT_EQ(Validate(m), "");
+  EXPECT_EQ(std::get<JointSpring>(m.forces[0]).preload, -2.0);
+  EXPECT_EQ(std::get<Polynomial>(function(1)).coefficients, (std::vector<double>{1, 2}));
+  const Harmonic harmonic = std::get<Harmonic>(function(2));
+  EXPECT_EQ(harmonic.amplitude, 3.0);
+  EXPECT_EQ(harmonic.omega, 4.0);
+  EXPECT_EQ(harmonic.mean, 5.0);
+  EXPECT_EQ(harmonic.phase, 6.0);
+  EXPECT_EQ(std::get<TimeTable>(function(3)).times, (std::vector<double>{0, 1, 3}));
+  EXPECT_EQ(std::get<TimeTable>(function(3)).values, (std::vector<double>{4, 5, 4}));
+  EXPECT_TRUE(std::get<TimeTable>(function(3)).cubic);
+  EXPECT_FALSE(std::get<TimeTable>(function(4)).cubic);
+  const SpringDamper spring = std::get<SpringDamper>(m.forces[5]);
+  EXPECT_EQ(spring.from.body, kGround);
+  EXPECT_EQ(spring.from.at, Eigen::Vector3d(1, 2, 0));
+  EXPECT_EQ(spring.to.body, 1);
+  EXPECT_EQ(spring.to.at, Eigen::Vector3d(1, 0, 0));
+  EXPECT_EQ(spring.stiffness, 1.0);
+  EXPECT_EQ(spring.damping, 2.0);
+  EXPECT_EQ(spring.length, 3.0);
+  EXPECT_EQ(spring.preload, -4.0);
+  EXPECT_EQ(std::get<SpringDamper>(m.forces[6]).stiffness, 0.0);
+  const Drag drag = std::get<Drag>(m.forces[7]);
+  EXPECT_EQ(drag.point.body, 1);
+  EXPECT_EQ(drag.point.at, Eigen::Vector3d(0, 1, 0));
+  EXPECT_EQ(drag.linear, 0.5);
+  EXPECT_EQ(drag.quadratic, 0.25);
+}
+
 TEST(MechanismReader, FillsEveryFieldOfASpatialMechanism) {
   const MechanismFile file = ParseMechanism(R"({
     "name": "m", "comment": "all kinds", "space": "spatial", "gravity": [0, 0, -9.81],
@@ -102,7 +154,8 @@ TEST(MechanismReader, FillsEveryFieldOfASpatialMechanism) {
   EXPECT_EQ(m.joints[1].from.rotation, Eigen::Vector3d(0, 0, 0.5));
   EXPECT_EQ(std::get<JointSpring>(m.forces[0]).rest, 0.25);
   EXPECT_EQ(std::get<JointDamper>(m.forces[1]).damping, 8.0);
-  EXPECT_EQ(std::get<JointTorque>(m.forces[2]).value, -9.0);
+  EXPECT_EQ(std::get<Polynomial>(std::get<JointTorque>(m.forces[2]).value).coefficients,
+            std::vector<double>{-9.0});
   EXPECT_TRUE(std::get<PointForce>(m.forces[3]).in_body_axes);
   EXPECT_EQ(std::get<PointForce>(m.forces[3]).at, Eigen::Vector3d(1, 0, 0));
   EXPECT_EQ(m.initial.coordinates[1].values.size(), 7u);

@@ -21,8 +21,10 @@ constexpr double kGravity = 9.81;
 class TestOde : public Ode {
  public:
   using Function = std::function<Outcome(double, std::span<const double>, std::span<double>)>;
-  TestOde(int size, Function function) : size_(size), function_(std::move(function)) {}
+  TestOde(int size, Function function, int num_quadratures = 0)
+      : size_(size), num_quadratures_(num_quadratures), function_(std::move(function)) {}
   int size() const override { return size_; }
+  int num_quadratures() const override { return num_quadratures_; }
   Outcome Derivative(double t, std::span<const double> y, std::span<double> ydot) override {
     evaluated.emplace_back(t, State(y.begin(), y.end()));
     return function_(t, y, ydot);
@@ -30,7 +32,7 @@ class TestOde : public Ode {
   std::vector<std::pair<double, State>> evaluated;
 
  private:
-  int size_;
+  int size_, num_quadratures_;
   Function function_;
 };
 

@@ -155,10 +155,16 @@ MechanismDescription Beside(MechanismDescription a, const MechanismDescription& 
   for (ForceDescription force : b.forces) {
     std::visit(
         [&](auto& f) {
+          const auto shift = [&](int* body) { *body += *body == kGround ? 0 : bodies; };
           if constexpr (requires { f.joint; }) {
             f.joint += joints;
+          } else if constexpr (requires { f.point; }) {
+            shift(&f.point.body);
+          } else if constexpr (requires { f.from; }) {
+            shift(&f.from.body);
+            shift(&f.to.body);
           } else {
-            f.body += bodies;
+            shift(&f.body);
           }
         },
         force);

@@ -57,10 +57,18 @@ inline MechanismDescription Scramble(const MechanismDescription& planar, std::ui
       }
     }
     for (ForceDescription& force : d.forces) {
-      auto* point = std::get_if<PointForce>(&force);
-      if (point == nullptr || point->body != b) continue;
-      point->at = R.transpose() * (point->at - origin);
-      if (point->in_body_axes) point->force = R.transpose() * point->force;
+      const auto move = [&](int body, Eigen::Vector3d* at) {
+        if (body == b) *at = R.transpose() * (*at - origin);
+      };
+      if (auto* point = std::get_if<PointForce>(&force); point != nullptr) {
+        move(point->body, &point->at);
+        if (point->body == b && point->in_body_axes) point->force = R.transpose() * point->force;
+      } else if (auto* drag = std::get_if<Drag>(&force); drag != nullptr) {
+        move(drag->point.body, &drag->point.at);
+      } else if (auto* spring = std::get_if<SpringDamper>(&force); spring != nullptr) {
+        move(spring->from.body, &spring->from.at);
+        move(spring->to.body, &spring->to.at);
+      }
     }
   }
   return d;

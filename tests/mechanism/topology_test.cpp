@@ -31,7 +31,7 @@ TEST(TopologyTest, AJointMarkedCutIsCut) {
 
 TEST(TopologyTest, JointsWithForceOrInitialValueAreKept) {
   MechanismDescription d = FourBar();
-  d.forces.push_back(JointTorque{3, 1.0});
+  d.forces.push_back(JointTorque{3, Polynomial{{1.0}}});
   d.initial.coordinates = {{2, {0.1}}};
   EXPECT_EQ(BuildTopology(d, Coordinates::kJoint).constraints, std::vector<int>{1});
 }

@@ -37,6 +37,10 @@ TEST_P(ShippedMechanism, RunsInEveryColumnAndBalancesItsEnergy) {
   for (const Column& column : RankRevealingColumns()) {
     const Record record = RunCase(
         experiment, CaseOf(experiment, GetParam(), column, kRtol, ShortHorizon(GetParam())));
+    if (column.formulation == FormulationKind::kReduction &&
+        GetParam().ends_with("singular-start") && record.Text("outcome") == "singular") {
+      continue;  // no set of independent speeds serves there: a result, see results/paper
+    }
     ASSERT_EQ(record.Text("outcome"), "finished")
         << ToString(column) << ": " << record.Text("message");
     // errors of at most rtol per step and component, some 1e3 steps and energies up to 1e3 J

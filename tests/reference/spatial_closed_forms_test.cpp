@@ -67,8 +67,11 @@ double Bound(const Simulation& simulation) {
 void ExpectAttitude(const MechanismDescription& scene, const Column& column,
                     const std::function<Eigen::Matrix3d(double)>& exact) {
   double worst = 0.0;
+  int step = 0;
   const Simulation run = Simulate(
       scene, column, Options("ode45", kTolerance), kHorizon, [&](const Snapshot& snapshot) {
+        // the closed form costs a quadrature
+        if (step++ % 50 != 0 && snapshot.t < kHorizon) return;
         const Eigen::Matrix3d error = snapshot.bodies[1].R - exact(snapshot.t);
         worst = std::max(worst, error.lpNorm<Eigen::Infinity>());
       });

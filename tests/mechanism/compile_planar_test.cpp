@@ -1,6 +1,7 @@
 // Spatial descriptions that are planar, in any orientation, and those that are not quite.
 #include <gtest/gtest.h>
 
+#include <algorithm>
 #include <cmath>
 
 #include "mechanism/in_space.h"
@@ -19,6 +20,12 @@ TEST(CompilePlanarTest, TiltedPlanarMechanismsBecomePlanar) {
     scenes.push_back(RandomGraph(1 + static_cast<int>(seed % 3), SpaceKind::kPlanar, 100 + seed));
     scenes.push_back(MixedGraph(1 + static_cast<int>(seed % 2), SpaceKind::kPlanar, 200 + seed));
   }
+  // the ends of a rod may leave a plane, so it does not qualify
+  std::erase_if(scenes, [](const MechanismDescription& scene) {
+    return std::ranges::find(scene.joints, JointType::kRod, &JointDescription::type) !=
+           scene.joints.end();
+  });
+  ASSERT_GE(scenes.size(), 24u);
   for (std::size_t i = 0; i < scenes.size(); ++i) {
     const MechanismDescription tilted = Scramble(scenes[i], 1000 + i);
     ASSERT_EQ(tilted.space, SpaceKind::kSpatial);

@@ -100,18 +100,22 @@ TEST(CompileTest, SliderAtDeadCentreIsNotFixed) {
 TEST(CompileTest, RigidBodiesStayWhereALoopWouldHaveToBeCutAnew) {
   // the way to the second bar of the arch leads over the pendulum, by joints with initial values
   MechanismDescription d = Arch(0.7);
-  JointDescription back = Revolute("F", 4, Eigen::Vector3d::UnitX(), 1, Eigen::Vector3d::Zero());
+  d.bodies.push_back(Bar("third", 1.0, 1.0, 1.0));
+  d.joints.push_back(Revolute("G", 4, Eigen::Vector3d::UnitX(), 5, Eigen::Vector3d::Zero()));
+  d.initial.coordinates.push_back({5, {0.5}});
+  JointDescription back = Revolute("F", 5, Eigen::Vector3d::UnitX(), 1, Eigen::Vector3d::Zero());
   const Mechanism<Planar, double> mechanism(d, Coordinates::kJoint);
   const Start<double> start = Assemble(d, mechanism);
   ASSERT_EQ(start.outcome, Outcome::kFinished);
   Kinematics<Planar, double> kinematics(mechanism);
   kinematics.UpdatePosition(start.q);
-  const Pose<Planar, double>&left = kinematics.poses()[1], &last = kinematics.poses()[4];
+  const Pose<Planar, double>&left = kinematics.poses()[1], &last = kinematics.poses()[5];
   const Eigen::Vector2d tip = last.p + last.R * Eigen::Vector2d(0.5, 0.0);
   back.to.position.head<2>() = left.R.transpose() * (tip - left.p);
   back.to.position += d.bodies[1].com;
   d.joints.push_back(back);
-  d.initial.coordinates = {{0, {start.q[0]}}, {3, {2.0}}, {4, {1.0}}, {5, {last.angle}}};
+  d.initial.coordinates = {
+      {0, {start.q[0]}}, {3, {2.0}}, {4, {1.0}}, {5, {0.5}}, {6, {last.angle}}};
   d.initial.coordinates.back().values[0] = left.angle - last.angle;
   d.initial.speeds.clear();
   d.joints[1].cut = d.joints[2].cut = true;

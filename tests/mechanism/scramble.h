@@ -57,8 +57,8 @@ inline MechanismDescription Scramble(const MechanismDescription& planar, std::ui
       }
     }
     for (ForceDescription& force : d.forces) {
-      const auto move = [&](int body, Eigen::Vector3d* at) {
-        if (body == b) *at = R.transpose() * (*at - origin);
+      const auto move = [&](int of, Eigen::Vector3d* at) {
+        if (of == b) *at = R.transpose() * (*at - origin);
       };
       if (auto* point = std::get_if<PointForce>(&force); point != nullptr) {
         move(point->body, &point->at);

@@ -59,7 +59,10 @@ struct PlanCommand {
 };
 int PrintPlans(const PlanCommand& command);
 
+/// What experiments run and measure, and what mechanisms are made of, by the kind of each file.
 int Explain(const ExperimentFiles& files);
+/// Prints the structure of a mechanism; 2 when its start cannot be assembled, after all else.
+int ExplainMechanism(const std::filesystem::path& path);
 
 struct TableCommand {
   std::filesystem::path store;

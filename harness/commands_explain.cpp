@@ -5,6 +5,8 @@
 #include <set>
 
 #include "harness/commands.h"
+#include "harness/config/config_error.h"
+#include "harness/config/file_kind.h"
 #include "harness/timing/time_cases.h"
 
 namespace loopbench::harness {
@@ -180,33 +182,44 @@ void ExplainSweep(const std::vector<Experiment>& experiments) {
   }
 }
 
+void ExplainExperiment(const std::filesystem::path& path, const ExperimentFiles& files) {
+  const std::vector<Experiment> experiments = ReadSelected({{path}, files.settings, files.filter});
+  const Experiment& first = experiments.front();
+  std::size_t cases = 0;
+  for (const Experiment& one : experiments) cases += SelectCases(one, files.filter).size();
+  fmt::print("{} ({})\n", first.name, path.string());
+  if (!first.comment.empty()) fmt::print("  {}\n", first.comment);
+  fmt::print(
+      "  {}: each is one mechanism, column, tolerance and horizon. Units are SI, angles "
+      "in rad.\n",
+      Plural(cases, "case"));
+  ExplainSweep(experiments);
+  ExplainScenes(first);
+  ExplainFormulations(first);
+  ExplainChoices(first);
+  ExplainRuns(first);
+  ExplainMeasures(first);
+  fmt::print(
+      "\nloopbench list {0} shows every case, loopbench plan {0} the time they will "
+      "take.\n",
+      path.string());
+}
+
 }  // namespace
 
 int Explain(const ExperimentFiles& files) {
+  int exit_code = 0;
   for (const auto& path : files.paths) {
-    const std::vector<Experiment> experiments =
-        ReadSelected({{path}, files.settings, files.filter});
-    const Experiment& first = experiments.front();
-    std::size_t cases = 0;
-    for (const Experiment& one : experiments) cases += SelectCases(one, files.filter).size();
-    fmt::print("{} ({})\n", first.name, path.string());
-    if (!first.comment.empty()) fmt::print("  {}\n", first.comment);
-    fmt::print(
-        "  {}: each is one mechanism, column, tolerance and horizon. Units are SI, angles "
-        "in rad.\n",
-        Plural(cases, "case"));
-    ExplainSweep(experiments);
-    ExplainScenes(first);
-    ExplainFormulations(first);
-    ExplainChoices(first);
-    ExplainRuns(first);
-    ExplainMeasures(first);
-    fmt::print(
-        "\nloopbench list {0} shows every case, loopbench plan {0} the time they will "
-        "take.\n",
-        path.string());
+    if (KindOfFile(path) != FileKind::kMechanism) {
+      ExplainExperiment(path, files);
+    } else if (files.settings.empty() && files.filter.empty()) {
+      exit_code = std::max(exit_code, ExplainMechanism(path));
+    } else {
+      throw ConfigError(fmt::format(
+          "{}: --set and --filter are for experiments, and this is a mechanism", path.string()));
+    }
   }
-  return 0;
+  return exit_code;
 }
 
 }  // namespace loopbench::harness

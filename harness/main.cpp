@@ -121,8 +121,9 @@ int main(int argc, char** argv) {
   AddSettings(plan_app, &settings);
 
   CLI::App* explain_app =
-      app.add_subcommand("explain", "Say what experiments run and measure, and what words mean");
-  explain_app->add_option("experiment", files.paths, "Experiment files (JSON)")->required();
+      app.add_subcommand("explain",
+                         "Say what experiments run and measure, and what mechanisms are made of");
+  explain_app->add_option("file", files.paths, "Experiment or mechanism files (JSON)")->required();
   explain_app->add_option("--filter", conditions, "Only cases with key=value[,value]");
   AddSettings(explain_app, &settings);
 

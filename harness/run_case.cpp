@@ -4,8 +4,10 @@
 
 #include <algorithm>
 
+#include "harness/compiled_scene.h"
 #include "harness/hash.h"
 #include "harness/integrator/arkode.h"
+#include "harness/merge_parts.h"
 #include "harness/observers/observer.h"
 #include "harness/store/record_json.h"
 #include "lagrange/lagrange.h"
@@ -42,19 +44,13 @@ std::string StateHash(std::span<const double> y) {
   return Fnv1a({reinterpret_cast<const char*>(y.data()), y.size_bytes()});
 }
 
-/// What one run leaves behind.
-struct Run {
-  Record record;
-  DriftSeries drift;
-};
-
 template <class Space>
 class Runner {
  public:
   Runner(const Experiment& experiment, const Case& one, const MechanismDescription& description,
-         bool with_series)
+         const SceneObservation& observe, bool with_series)
       : case_(one),
-        scene_(experiment.scenes[one.scene].mechanism.observe),
+        scene_(observe),
         description_(description),
         mechanism_(description, one.column.coordinates),
         drift_(description, mechanism_),
@@ -149,10 +145,23 @@ class Runner {
 
 Run RunOnce(const Experiment& experiment, const Case& one, const MechanismDescription& description,
             bool with_series) {
-  if (description.space == SpaceKind::kPlanar) {
-    return Runner<Planar>(experiment, one, description, with_series).Execute();
+  const SceneObservation& observe = experiment.scenes[one.scene].mechanism.observe;
+  const CompiledScene scene = CompileScene(description, observe, experiment.compile);
+  std::vector<Run> parts;
+  for (const CompiledPart& part : scene.compiled.parts) {
+    if (part.description.space == SpaceKind::kPlanar) {
+      Runner<Planar> runner(experiment, one, part.description, scene.observe, with_series);
+      parts.push_back(runner.Execute());
+    } else {
+      Runner<Spatial> runner(experiment, one, part.description, scene.observe, with_series);
+      parts.push_back(runner.Execute());
+    }
   }
-  return Runner<Spatial>(experiment, one, description, with_series).Execute();
+  Run run = MergeParts(parts);
+  if (scene.compiled.done != CompileOptions::None()) {
+    run.record.Set("compiled", ToString(scene.compiled.done));
+  }
+  return run;
 }
 
 void WriteGrowth(const Growth& growth, int failed, Record& record) {
@@ -194,6 +203,7 @@ std::string CaseContent(const Experiment& experiment, const Case& one) {
   content.Set("steps", one.limits.steps);
   content.Set("memory_mb", one.limits.memory_mb);
   content.Set("series_points", std::int64_t{experiment.series_points});
+  content.Set("compile", ToString(experiment.compile));
   content.Set("document", experiment.scenes[one.scene].mechanism.canonical);
   return CaseId(content);
 }

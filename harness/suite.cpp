@@ -8,6 +8,7 @@
 #include <functional>
 #include <map>
 
+#include "harness/compiled_scene.h"
 #include "harness/config/config_error.h"
 #include "harness/hash.h"
 #include "harness/isolation/fault.h"
@@ -59,8 +60,9 @@ Piece TimingPiece(const Experiment& experiment, const TimingGroup& group) {
     const std::string document =
         group.simulate ? experiment.scenes[group.cases[i].scene].mechanism.canonical : "";
     const Limits& limits = experiment.limits;
-    keys.Set("id", Id(fmt::format("{} {} {} {} {} {}", CaseId(keys), experiment.timing.repeats,
-                                  limits.wall_s, limits.steps, limits.memory_mb, document)));
+    keys.Set("id", Id(fmt::format("{} {} {} {} {} {} {}", CaseId(keys), experiment.timing.repeats,
+                                  limits.wall_s, limits.steps, limits.memory_mb,
+                                  ToString(experiment.compile), document)));
     piece.owed.push_back(keys);
   }
   // the first column is timed twice (noise.h)

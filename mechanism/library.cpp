@@ -107,4 +107,47 @@ MechanismDescription Grid(int num_storeys, int num_windows, double angle, double
   return grid;
 }
 
+MechanismDescription Hub(int num_arms, int num_bars, bool closed) {
+  const Eigen::Vector3d origin = Eigen::Vector3d::Zero(), tip = Eigen::Vector3d::UnitX();
+  constexpr double kFirstBend = 0.3, kBend = 0.8;  // an arm is never stretched out
+  MechanismDescription hub;
+  hub.name = "hub-" + std::to_string(num_arms) + "x" + std::to_string(num_bars);
+  hub.gravity = {0.0, -9.81, 0.0};
+  BodyDescription disc;
+  disc.name = "disc";
+  disc.mass = 1.0;
+  disc.inertia = 0.5 * Eigen::Matrix3d::Identity();
+  hub.bodies.push_back(disc);
+  const auto add = [&](const JointDescription& joint, double q) {
+    hub.initial.coordinates.push_back({static_cast<int>(hub.joints.size()), {q}});
+    hub.joints.push_back(joint);
+  };
+  add(Revolute("O", kGround, origin, 1, origin), 0.0);
+  std::vector<JointDescription> closing;
+  for (int arm = 1; arm <= num_arms; ++arm) {
+    const double around = 2.0 * std::numbers::pi * (arm - 1) / num_arms;
+    const Eigen::Vector3d rim(std::cos(around), std::sin(around), 0.0);
+    Eigen::Vector3d end = rim;
+    double turned = around + kFirstBend;
+    for (int i = 1; i <= num_bars; ++i) {
+      const std::string place = std::to_string(arm) + "." + std::to_string(i);
+      hub.bodies.push_back(Bar("bar" + place, 1.0, 1.0, 1.0 / 12.0));
+      const int body = static_cast<int>(hub.bodies.size()) - 1;
+      if (i == 1) {
+        add(Revolute("J" + place, 1, rim, body, origin), turned);
+      } else {
+        add(Revolute("J" + place, body - 1, tip, body, origin), kBend);
+        turned += kBend;
+      }
+      end += Eigen::Vector3d(std::cos(turned), std::sin(turned), 0.0);
+    }
+    if (closed) {
+      closing.push_back(Revolute("T" + std::to_string(arm), kGround, end,
+                                 static_cast<int>(hub.bodies.size()) - 1, tip));
+    }
+  }
+  hub.joints.insert(hub.joints.end(), closing.begin(), closing.end());
+  return hub;
+}
+
 }  // namespace loopbench

@@ -5,6 +5,8 @@
 //                 |--|--|-- .. -|           (reference A02, "N-four-bar")
 //   Grid(m, n)    m ladders of n windows, each hanging from the joints of the one above: loops that
 //                 share bodies in two directions, m degrees of freedom
+//   Hub(m, n)     a disc on a ground pin, m arms of n bars around it; arms may end on ground pins,
+//                 then each closes a loop through the disc
 #pragma once
 
 #include "mechanism/description.h"
@@ -23,6 +25,12 @@ MechanismDescription Ladder(int num_windows, double angle, double speed);
 /// `num_storeys` rows of `num_windows` parallelograms of unit bars as in Ladder. Storey r = 1, 2,
 /// .. stands at `angle` + 0.1 (r - 1) from +x and turns at r `speed` [rad/s].
 MechanismDescription Grid(int num_storeys, int num_windows, double angle, double speed);
+
+/// A disc (radius 1 m, 1 kg) pinned to Ground at its centre, with `num_arms` arms of `num_bars`
+/// bars as in Ladder on its rim, all bent alike. Open arms have 1 + arms x bars degrees of freedom,
+/// those whose tips are pinned to Ground (`closed`, bars >= 2) 1 + arms x (bars - 2). Speeds are
+/// left to the caller.
+MechanismDescription Hub(int num_arms, int num_bars, bool closed);
 
 /// A unit bar from its origin A to B = (length, 0): com in the middle.
 BodyDescription Bar(const std::string& name, double length, double mass, double inertia);

@@ -6,6 +6,7 @@
 #include <stdexcept>
 
 #include "mechanism/instantiate.h"
+#include "mechanism/joint_frames.h"
 
 namespace loopbench {
 
@@ -37,24 +38,11 @@ Pose<Spatial, S> Cast(const Pose<Spatial, double>& X) {
   return {X.R.template cast<S>(), X.p.template cast<S>()};
 }
 
-/// Turns the joint's own axis, z or x, onto the described one, by the shortest rotation.
-Eigen::Matrix3d Alignment(const JointDescription& joint) {
-  if (joint.axis.isZero()) return Eigen::Matrix3d::Identity();
-  const bool along_x = OwnAxis(joint.type) == 'x';
-  const Eigen::Vector3d own = along_x ? Eigen::Vector3d::UnitX() : Eigen::Vector3d::UnitZ();
-  const Eigen::Vector3d axis = joint.axis.normalized(), normal = own.cross(axis);
-  const double s = normal.norm(), c = own.dot(axis);
-  // axis parallel to its own: nothing, or half a turn about y (perpendicular to x and to z)
-  if (s == 0.0 && c > 0.0) return Eigen::Matrix3d::Identity();
-  const Eigen::Vector3d about = s == 0.0 ? Eigen::Vector3d::UnitY() : Eigen::Vector3d(normal / s);
-  return Eigen::AngleAxisd(std::atan2(s, c), about).toRotationMatrix();
-}
-
 template <class Space, class S>
 Pose<Space, S> SidePose(const JointSide& side, const JointDescription& joint,
                         const Eigen::Vector3d& com) {
   const double turn = side.rotation.norm();
-  Eigen::Matrix3d R = Alignment(joint);
+  Eigen::Matrix3d R = AxisAlignment(joint);
   if (turn > 0.0) R = Eigen::AngleAxisd(turn, side.rotation / turn).toRotationMatrix() * R;
   double angle = side.rotation.z();
   if (OwnAxis(joint.type) == 'x' && !joint.axis.isZero()) {

@@ -20,7 +20,9 @@ Plan MakePlan(const Mechanism<Space, S>& mechanism, const PlanOptions& options) 
     const int rows = joint.num_constraints();
     if (rows > 0) joints.push_back({j, joint.from, joint.to, rows});
   }
-  return Plan(mechanism.num_bodies(), joints, options);
+  PlanOptions in_space = options;
+  in_space.dim = Space::kDim;
+  return Plan(mechanism.num_bodies(), joints, in_space);
 }
 
 template <class Space, class S>

@@ -1,8 +1,9 @@
 #include "odca/plan.h"
 
 #include <algorithm>
-#include <map>
-#include <set>
+#include <numeric>
+
+#include "odca/join_order.h"
 
 namespace loopbench::odca {
 
@@ -16,139 +17,126 @@ struct Draft {
   std::vector<NodeJoint> joints;
 };
 
-/// An assembly while the tree is grown.
+/// An assembly while the nodes are written.
 struct Assembly {
   int node = 0;
   std::vector<int> boundary;  ///< bodies with joints still to come, in order of entry
-  std::map<int, std::vector<int>> neighbours;  ///< other assembly -> joints between
-  std::vector<int> ground_joints;              ///< to Ground, still to come
+  std::vector<int> joints;    ///< to other assemblies: all that are to come, and some closed ones
+  std::vector<int> ground_joints;  ///< still to come
   bool reaches_ground = false;
-  bool alive = true;
 };
 
 class Planner {
  public:
   Planner(int num_bodies, std::span<const PlanJoint> joints, const PlanOptions& options)
-      : joints_(joints), options_(options), open_joints_(num_bodies, 0) {
-    assemblies_.resize(num_bodies - 1);
-    for (int a = 0; a < num_bodies - 1; ++a) {
-      assemblies_[a].node = a;
-      assemblies_[a].boundary = {a + 1};
+      : joints_(joints),
+        options_(options),
+        open_joints_(num_bodies, 0),
+        closed_(joints.size(), false) {
+    assemblies_.resize(num_bodies);
+    assembly_of_.resize(num_bodies);
+    for (int body = 1; body < num_bodies; ++body) {
+      assemblies_[body].node = body - 1;
+      assemblies_[body].boundary = {body};
+      assembly_of_[body] = body;
     }
     for (int j = 0; j < static_cast<int>(joints.size()); ++j) {
       const int from = joints[j].from, to = joints[j].to;
       ++open_joints_[from];
       ++open_joints_[to];
       if (from == 0 || to == 0) {
-        assemblies_[std::max(from, to) - 1].ground_joints.push_back(j);
+        assemblies_[std::max(from, to)].ground_joints.push_back(j);
       } else {
-        assemblies_[from - 1].neighbours[to - 1].push_back(j);
-        assemblies_[to - 1].neighbours[from - 1].push_back(j);
+        assemblies_[from].joints.push_back(j);
+        assemblies_[to].joints.push_back(j);
       }
     }
   }
 
   std::vector<Draft> Run() {
-    GroundLeaves();
-    while (PairOnce()) {
+    const int num_bodies = static_cast<int>(assemblies_.size());
+    const std::vector<int> waiting = GroundLeaves();
+    std::vector<int> number(num_bodies);  // assembly by its number in the joins
+    std::iota(number.begin(), number.end(), 0);
+    for (const Join& join : OrderJoins(num_bodies, joints_, waiting, options_.dim)) {
+      number.push_back(Merge(number[join.left], number[join.right]));
     }
     for (Assembly& assembly : assemblies_) {
-      if (assembly.alive && !assembly.ground_joints.empty()) Ground(assembly);
+      if (!assembly.ground_joints.empty()) Ground(assembly);
     }
     return DepthFirst();
   }
 
  private:
-  /// Number of joints to Ground in the connected part of each assembly.
-  std::vector<int> GroundJointsOfPart() const {
-    std::vector<int> part(assemblies_.size(), -1), count;
-    for (std::size_t root = 0; root < assemblies_.size(); ++root) {
-      if (part[root] >= 0) continue;
-      std::vector<std::size_t> stack = {root};
-      part[root] = static_cast<int>(count.size());
-      count.push_back(0);
-      while (!stack.empty()) {
-        const Assembly& assembly = assemblies_[stack.back()];
-        const int mine = part[stack.back()];
-        stack.pop_back();
-        count[mine] += static_cast<int>(assembly.ground_joints.size());
-        for (const auto& [other, list] : assembly.neighbours) {
-          if (part[other] < 0) {
-            part[other] = mine;
-            stack.push_back(other);
-          }
-        }
-      }
-    }
-    std::vector<int> result(assemblies_.size());
-    for (std::size_t a = 0; a < result.size(); ++a) result[a] = count[part[a]];
-    return result;
-  }
-
-  void GroundLeaves() {
-    const std::vector<int> in_part = GroundJointsOfPart();
-    for (std::size_t a = 0; a < assemblies_.size(); ++a) {
-      const bool wait = options_.grounding == Grounding::kAtRoot && in_part[a] <= 2;
-      if (!wait && !assemblies_[a].ground_joints.empty()) Ground(assemblies_[a]);
-    }
-  }
-
-  /// Bodies of the boundary once the given joints are closed.
-  int BoundaryAfter(const Assembly& a, const Assembly& b, const std::vector<int>& closed) const {
-    std::map<int, int> closing;
-    for (int j : closed) {
-      ++closing[joints_[j].from];
-      ++closing[joints_[j].to];
-    }
-    int count = 0;
-    for (const Assembly* side : {&a, &b}) {
-      for (int body : side->boundary) {
-        const auto it = closing.find(body);
-        count += open_joints_[body] > (it == closing.end() ? 0 : it->second);
-      }
-    }
-    return count;
-  }
-
-  bool PairOnce() {
-    struct Pair {
-      int cost, a, b;
-      auto operator<=>(const Pair&) const = default;
+  /// The body that stands for each body's connected part.
+  std::vector<int> PartOfBody() const {
+    std::vector<int> part(assemblies_.size());
+    std::iota(part.begin(), part.end(), 0);
+    const auto find = [&](int body) {
+      while (part[body] != body) body = part[body] = part[part[body]];
+      return body;
     };
-    std::vector<Pair> pairs;
-    for (int a = 0; a < static_cast<int>(assemblies_.size()); ++a) {
-      if (!assemblies_[a].alive) continue;
-      for (const auto& [b, list] : assemblies_[a].neighbours) {
-        if (a < b) pairs.push_back({BoundaryAfter(assemblies_[a], assemblies_[b], list), a, b});
-      }
+    for (const PlanJoint& joint : joints_) {
+      if (joint.from != 0 && joint.to != 0) part[find(joint.from)] = find(joint.to);
     }
-    std::ranges::sort(pairs);
-    std::vector<bool> taken(assemblies_.size(), false);
-    for (const Pair& pair : pairs) {
-      if (taken[pair.a] || taken[pair.b]) continue;
-      taken[pair.a] = taken[pair.b] = true;
-      Merge(pair.a, pair.b);
-    }
-    return !pairs.empty();
+    for (std::size_t body = 0; body < part.size(); ++body)
+      part[body] = find(static_cast<int>(body));
+    return part;
   }
 
-  void Merge(int a, int b) {
-    const std::vector<int> between = assemblies_[a].neighbours[b];
+  /// Closes joints to Ground that need not wait; the others are counted by body.
+  std::vector<int> GroundLeaves() {
+    const std::vector<int> part = PartOfBody();
+    std::vector<int> in_part(assemblies_.size(), 0), waiting(assemblies_.size(), 0);
+    for (std::size_t body = 1; body < assemblies_.size(); ++body) {
+      in_part[part[body]] += static_cast<int>(assemblies_[body].ground_joints.size());
+    }
+    for (std::size_t body = 1; body < assemblies_.size(); ++body) {
+      Assembly& assembly = assemblies_[body];
+      if (options_.grounding == Grounding::kAtRoot && in_part[part[body]] <= 2) {
+        waiting[body] = static_cast<int>(assembly.ground_joints.size());
+      } else if (!assembly.ground_joints.empty()) {
+        Ground(assembly);
+      }
+    }
+    return waiting;
+  }
+
+  /// Joins two assemblies through all joints between them; the place of the result.
+  int Merge(int left, int right) {
+    // the longer list of joints stays where it is, the shorter one is looked through: each joint is
+    // looked at O(log n) times
+    const auto size = [&](int a) { return assemblies_[a].joints.size(); };
+    const int into = size(left) < size(right) ? right : left, from = into == left ? right : left;
+    std::vector<int> between, leaving;
+    for (int j : assemblies_[from].joints) {
+      if (closed_[j]) continue;
+      const bool there = Find(joints_[j].from) == into || Find(joints_[j].to) == into;
+      (there ? between : leaving).push_back(j);
+    }
+    std::ranges::sort(between);
+    for (int j : between) closed_[j] = true;
+    Assembly a = std::move(assemblies_[left]), b = std::move(assemblies_[right]);
+    std::vector<int> joints = std::move(into == left ? a.joints : b.joints);
+    joints.insert(joints.end(), leaving.begin(), leaving.end());
     const std::size_t at_once = options_.closing == Closing::kTogether ? between.size() : 1;
-    AddNode(assemblies_[a], &assemblies_[b], {between.begin(), between.begin() + at_once});
+    AddNode(a, &b, std::span(between).first(at_once));
     for (std::size_t k = at_once; k < between.size(); ++k) {
-      AddNode(assemblies_[a], nullptr, {between[k]});
+      AddNode(a, nullptr, std::span(between).subspan(k, 1));
     }
-    assemblies_[a].neighbours.erase(b);
-    assemblies_[b].neighbours.erase(a);
-    for (const auto& [other, list] : assemblies_[b].neighbours) {
-      std::vector<int>& mine = assemblies_[a].neighbours[other];
-      mine.insert(mine.end(), list.begin(), list.end());
-      assemblies_[other].neighbours.erase(b);
-      assemblies_[other].neighbours[a] = mine;
+    a.joints = std::move(joints);
+    assemblies_[into] = std::move(a);
+    assemblies_[from] = {};
+    assembly_of_[from] = into;
+    return into;
+  }
+
+  /// Where the assembly that holds a body stands.
+  int Find(int body) {
+    while (assembly_of_[body] != body) {
+      body = assembly_of_[body] = assembly_of_[assembly_of_[body]];
     }
-    assemblies_[b].neighbours.clear();
-    assemblies_[b].alive = false;
+    return body;
   }
 
   void Ground(Assembly& assembly) {
@@ -157,12 +145,12 @@ class Planner {
     if (options_.closing == Closing::kTogether) {
       AddNode(assembly, nullptr, list);
     } else {
-      for (int j : list) AddNode(assembly, nullptr, {j});
+      for (const int& j : list) AddNode(assembly, nullptr, std::span(&j, 1));
     }
   }
 
   /// Appends the node that closes `list` and turns `a` into the result.
-  void AddNode(Assembly& a, Assembly* b, const std::vector<int>& list) {
+  void AddNode(Assembly& a, Assembly* b, std::span<const int> list) {
     Draft draft;
     PlanNode& node = draft.node;
     node.children[0] = a.node;
@@ -202,13 +190,13 @@ class Planner {
       a.ground_joints.insert(a.ground_joints.end(), b->ground_joints.begin(),
                              b->ground_joints.end());
     }
-    a.node = static_cast<int>(assemblies_.size() + drafts_.size());
+    a.node = static_cast<int>(assemblies_.size() - 1 + drafts_.size());
     drafts_.push_back(std::move(draft));
   }
 
   /// Renumbers the nodes depth-first, so that children are executed just before their parent.
   std::vector<Draft> DepthFirst() {
-    const int leaves = static_cast<int>(assemblies_.size());
+    const int leaves = static_cast<int>(assemblies_.size()) - 1;
     std::vector<int> new_number(drafts_.size(), -1);
     std::vector<bool> has_parent(drafts_.size(), false);
     for (const Draft& draft : drafts_) {
@@ -243,8 +231,10 @@ class Planner {
 
   std::span<const PlanJoint> joints_;
   PlanOptions options_;
-  std::vector<int> open_joints_;  ///< joints still to come, by body
-  std::vector<Assembly> assemblies_;
+  std::vector<int> open_joints_;      ///< joints still to come, by body
+  std::vector<bool> closed_;          ///< joints between assemblies
+  std::vector<int> assembly_of_;      ///< forest of merged places, see Find()
+  std::vector<Assembly> assemblies_;  ///< by place: at first the body's own
   std::vector<Draft> drafts_;
 };
 
@@ -301,6 +291,28 @@ int Plan::most_handles() const {
 
 int Plan::loop_joins() const {
   return static_cast<int>(std::ranges::count_if(nodes_, &PlanNode::closes_loop));
+}
+
+long Plan::operations(int dim) const {
+  const long d = dim;
+  long sum = num_leaves_ * d * d;
+  for (const PlanNode& node : nodes_) {
+    const long rows = node.rows, kept = static_cast<long>(node.kept.size());
+    // Z C^T: each end of a joint meets the handles of its child
+    for (const NodeJoint& joint : node.joints) {
+      for (int end : {joint.from, joint.to}) {
+        if (end < 0) continue;
+        const auto met = std::ranges::count(node.handles, node.handles[end].child, &Handle::child);
+        sum += joint.rows * d * d * met;
+      }
+    }
+    sum += 2 * d * rows * (rows + 1) / 2;             // X
+    sum += rows * rows * rows / 6 + rows;             // its factor
+    sum += d * rows * (rows + 1) / 2 * kept;          // V
+    sum += rows * d * d * kept * (kept + 1) / 2;      // V^T V
+    sum += 2 * rows * (2 * d + d * kept + rows / 2);  // vectors, up and down
+  }
+  return sum;
 }
 
 }  // namespace loopbench::odca

@@ -5,13 +5,15 @@
 // and keeps as boundary only the bodies that a joint still to come will touch. Ground is an
 // assembly with zero response and has no handle.
 //
-// The tree is grown from below: in each round, neighbouring assemblies are paired, pairs with the
-// smallest boundary first, so a chain or ladder of n bodies gives depth O(log n) and boundaries of
-// one to four bodies, and a two-dimensional grid boundaries of O(sqrt n).
+// Three rules make the tree, and the cheapest one wins (join_order.h). A chain or ladder of n
+// bodies gets depth O(log n) and boundaries of one to four bodies; a k x k grid boundaries of O(k),
+// hence O(n^1.5) multiply-adds; a hub takes its arms one by one, each finished before, in O(n)
+// multiply-adds and a depth of as many joins as it has arms.
 //
 // Properties: each body is a leaf of exactly one tree, each joint with constraints is in exactly
 // one node; children come before parents; the order is depth-first, so a node's children are recent
-// in memory; the plan is a function of the graph alone. A part that floats free has its own root.
+// in memory; the plan is a function of the graph (and its numbering) alone, and takes O(n log^2 n).
+// A part that floats free has its own root.
 #pragma once
 
 #include <span>
@@ -44,6 +46,7 @@ enum class Closing {
 struct PlanOptions {
   Grounding grounding = Grounding::kEager;
   Closing closing = Closing::kTogether;
+  int dim = 6;  ///< directions of a body: 3 in the plane, 6 in space; weighs what joins cost
 };
 
 /// A body of a node's boundary: which child brings it (0 or 1), and where it stands there.
@@ -87,6 +90,9 @@ class Plan {
   int largest_join() const;  ///< rows of the largest X
   int most_handles() const;  ///< largest number of bodies of any node before its join
   int loop_joins() const;    ///< nodes that close loops
+  /// Multiply-adds of one assembly and one sweep of vectors with `dim` directions per body, as
+  /// Sweep::operations() counts them where no direction is softened.
+  long operations(int dim) const;
 
  private:
   int num_leaves_;

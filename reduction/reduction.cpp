@@ -161,7 +161,10 @@ void Reduction<Space, S>::Multipliers(VectorX<S>& lambda) {
   residual_ = h_;
   residual_.noalias() += M_ * udot_;
   for (std::size_t k = 0; k < dependent_.size(); ++k) rows_rhs_[k] = residual_[dependent_[k]];
-  dependent_speeds_ = lu_.transpose().solve(rows_rhs_);
+  // lu_.transpose().solve() by its parts: its permutation in place would allocate
+  lu_.matrixLU().template triangularView<Eigen::Upper>().transpose().solveInPlace(rows_rhs_);
+  lu_.matrixLU().template triangularView<Eigen::UnitLower>().transpose().solveInPlace(rows_rhs_);
+  dependent_speeds_.noalias() = lu_.permutationP().transpose() * rows_rhs_;
   for (std::size_t k = 0; k < rows_.size(); ++k) lambda[rows_[k]] = dependent_speeds_[k];
 }
 

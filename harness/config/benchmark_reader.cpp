@@ -11,6 +11,8 @@
 #include "harness/config/mechanism_reader.h"
 #include "harness/config/spelling.h"
 #include "harness/integrator/options.h"
+#include "mechanism/compile.h"
+#include "mechanism/in_space.h"
 
 namespace loopbench::harness {
 namespace {
@@ -75,10 +77,44 @@ std::vector<BenchmarkMember> ReadBenchmarkFamily(const JsonNode& node, const Jso
   return members;
 }
 
+/// Planar members, described in a plane tilted against the axes of space.
+void PutInSpace(const JsonNode& node, std::vector<BenchmarkMember>* members) {
+  const Eigen::Vector3d tilt(0.3, -0.4, 0.5);
+  for (BenchmarkMember& member : *members) {
+    member.description = member.Make();
+    member.family.clear();
+    if (member.description.space == SpaceKind::kSpatial) {
+      node.FailAs(fmt::format("\"{}\", spatial already", member.name), "planar mechanisms");
+      return;
+    }
+    member.description = InSpace(member.description, tilt);
+    member.name += "/space";
+  }
+}
+
+/// Each member's simplified parts in its place.
+void CompileMembers(std::vector<BenchmarkMember>* members) {
+  std::vector<BenchmarkMember> compiled;
+  for (const BenchmarkMember& member : *members) {
+    const Compiled all = Compile(member.Make(), CompileOptions::All());
+    for (std::size_t i = 0; i < all.parts.size(); ++i) {
+      BenchmarkMember part;
+      part.name = member.name + "/compiled";
+      if (all.parts.size() > 1) part.name += fmt::format("/{}", i + 1);
+      part.description = all.parts[i].description;
+      compiled.push_back(std::move(part));
+    }
+  }
+  *members = std::move(compiled);
+}
+
 BenchmarkGroup ReadGroup(const JsonNode& node, const std::filesystem::path& folder,
                          ErrorList* errors) {
   BenchmarkGroup group;
-  if (!node.ExpectObject({"mechanisms", "family", "sizes", "measure", "columns"})) return group;
+  if (!node.ExpectObject(
+          {"mechanisms", "family", "sizes", "in_space", "compile", "measure", "columns"})) {
+    return group;
+  }
   const auto mechanisms = node.Optional("mechanisms"), family = node.Optional("family");
   if (mechanisms && family) {
     family->Fail("no \"family\" beside \"mechanisms\"; make two groups");
@@ -90,6 +126,9 @@ BenchmarkGroup ReadGroup(const JsonNode& node, const std::filesystem::path& fold
   } else {
     node.FailAs("neither \"mechanisms\" nor \"family\"", "one of them");
   }
+  const auto in_space = node.Optional("in_space"), compile = node.Optional("compile");
+  if (in_space && in_space->Bool()) PutInSpace(*in_space, &group.members);
+  if (compile && compile->Bool()) CompileMembers(&group.members);
   if (const auto measure = node.Required("measure", "\"rhs\", \"step\" or both")) {
     group.kinds = ReadEnums<BenchmarkKind>(*measure, "what is measured");
   }

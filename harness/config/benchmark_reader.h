@@ -1,6 +1,7 @@
 // Reads what is benchmarked (configs/benchmarks/default.json):
 //   {"name", "comment", "states", "integrator", "step",
 //    "groups": [{"mechanisms": [path, ...]  or  "family": "chain|ladder|grid", "sizes": [...],
+//                "in_space": false, "compile": false,
 //                "measure": ["rhs", "step"], "columns": [...]}]}
 // Paths are relative to the file; columns are those of experiments. "states" names a file of
 // hashes,

@@ -14,6 +14,7 @@
 #include "harness/config/scene.h"
 #include "harness/record.h"
 #include "harness/report/select.h"
+#include "mechanism/compile.h"
 #include "mechanism/formulation.h"
 #include "mechanism/topology.h"
 
@@ -122,6 +123,7 @@ struct Experiment {
   std::string integrator = "ode45";
   std::vector<EnsembleRule> ensembles;  ///< the first that matches a case counts
   Limits limits;
+  CompileOptions compile;   ///< what is simplified before a run
   int series_points = 200;  ///< points kept of a time series for figures
   Timing timing;
   /// Of a sweep: this combination's value on each axis, by the axis's name. The values are in every

@@ -1,4 +1,4 @@
-// "integrator", "limits", "series" and "timing" of an experiment file.
+// "integrator", "limits", "compile", "series" and "timing" of an experiment file.
 #include "harness/config/experiment_sections.h"
 #include "harness/integrator/options.h"
 
@@ -17,6 +17,15 @@ void ReadLimits(const JsonNode& root, Limits* limits) {
   if (const auto memory = node->Optional("memory_mb")) {
     limits->memory_mb = memory->Number(kPositive);
   }
+}
+
+void ReadCompile(const JsonNode& root, CompileOptions* options) {
+  const auto node = root.Optional("compile");
+  if (!node || !node->ExpectObject({"planar", "welds", "immovable", "islands"})) return;
+  if (const auto planar = node->Optional("planar")) options->planar = planar->Bool();
+  if (const auto welds = node->Optional("welds")) options->welds = welds->Bool();
+  if (const auto immovable = node->Optional("immovable")) options->immovable = immovable->Bool();
+  if (const auto islands = node->Optional("islands")) options->islands = islands->Bool();
 }
 
 TimingFamily ReadFamily(const JsonNode& node) {
@@ -70,6 +79,7 @@ void ReadSettings(const JsonNode& root, Experiment* experiment) {
     if (index) experiment->integrator = profiles[static_cast<std::size_t>(*index)];
   }
   ReadLimits(root, &experiment->limits);
+  ReadCompile(root, &experiment->compile);
   const auto series = root.Optional("series");
   if (series && series->ExpectObject({"points"})) {
     if (const auto points = series->Optional("points")) {

@@ -15,7 +15,7 @@ int ReadForceJoint(const JsonNode& force, const Draft& draft) {
   const JointDescription& found = draft.joints[*joint];
   if (NumValues(found.type, draft.space, true) != 1) {
     node->FailAs(fmt::format("\"{}\" ({})", found.name, ToString(found.type)),
-                 "a joint with one coordinate (revolute or prismatic)");
+                 "a joint with one coordinate (revolute, prismatic or helical)");
   }
   return *joint;
 }

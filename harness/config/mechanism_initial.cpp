@@ -45,6 +45,11 @@ std::vector<JointValues> ReadJointValues(const JsonNode& initial, const std::str
     if (!joint) continue;
     const JointDescription& described = draft.joints[static_cast<std::size_t>(*joint)];
     const int expected = NumValues(described.type, draft.space, speeds);
+    if (expected == 1 && !described.motions.empty()) {
+      node.FailAs(fmt::format("a value of \"{}\", whose motion is prescribed", described.name),
+                  "none");
+      continue;
+    }
     result.push_back({*joint, ReadJointNumbers(node, described, expected)});
     const bool quaternion = expected > NumValues(described.type, draft.space, true);
     if (quaternion) CheckQuaternion(node, result.back().values);

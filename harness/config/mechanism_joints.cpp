@@ -55,9 +55,66 @@ Eigen::Vector3d ReadAxis(const JsonNode& node, JointType type, SpaceKind space) 
   return axis;
 }
 
+/// A number that one type of joint must have and no other may.
+double ReadParameter(const JsonNode& node, const std::string& key, const JointDescription& joint,
+                     JointType owner, const Range& range, std::string_view what) {
+  if (joint.type == owner) {
+    const auto found = node.Required(key, what);
+    return found ? found->Number(range) : 1.0;
+  }
+  if (const auto found = node.Optional(key)) {
+    found->Fail(fmt::format("no {} on a {} joint", key, ToString(joint.type)));
+  }
+  return 0.0;
+}
+
+/// `speeds`: coordinates that may be prescribed.
+PrescribedMotion ReadOneMotion(const JsonNode& node, int speeds,
+                               const std::vector<PrescribedMotion>& taken) {
+  PrescribedMotion motion{0, Polynomial{{0.0}}};
+  if (!node.ExpectObject({"coordinate", "value"})) return motion;
+  if (const auto coordinate = node.Required("coordinate", "the number of a coordinate")) {
+    motion.coordinate = static_cast<int>(coordinate->Integer(0, speeds - 1));
+    for (const PrescribedMotion& other : taken) {
+      if (other.coordinate == motion.coordinate)
+        coordinate->Fail("a coordinate not yet prescribed");
+    }
+  }
+  if (const auto value = node.Required("value", "a number or a function of time")) {
+    motion.value = ReadTimeFunction(*value);
+  }
+  return motion;
+}
+
+/// One function for a joint with one coordinate, else a list that names coordinates.
+void ReadMotions(const JsonNode& node, SpaceKind space, JointDescription* joint) {
+  const int speeds = NumValues(joint->type, space, true);
+  if (speeds == 0 || NumValues(joint->type, space, false) != speeds) {
+    node.FailAs(fmt::format("a motion of a {} joint", ToString(joint->type)),
+                "a joint whose coordinates are angles and shifts");
+    return;
+  }
+  if (!node.value().is_array()) {
+    if (speeds > 1) {
+      node.Fail(
+          fmt::format("an array of {{\"coordinate\", \"value\"}}: a {} joint has {} coordinates",
+                      ToString(joint->type), speeds));
+      return;
+    }
+    joint->motions = {{0, ReadTimeFunction(node)}};
+    return;
+  }
+  for (const JsonNode& element : node.Elements("motions")) {
+    joint->motions.push_back(ReadOneMotion(element, speeds, joint->motions));
+  }
+}
+
 JointDescription ReadJoint(const JsonNode& node, const Draft& draft) {
   JointDescription joint;
-  if (!node.ExpectObject({"name", "type", "from", "to", "axis", "cut"})) return joint;
+  if (!node.ExpectObject(
+          {"name", "type", "from", "to", "axis", "pitch", "length", "motion", "cut"})) {
+    return joint;
+  }
   joint.name = ReadNewName(node, draft.joint_names);
   if (const auto type = node.Required("type", "a joint type")) {
     joint.type = static_cast<JointType>(type->Choice(JointTypeNames(), "a joint type").value_or(0));
@@ -75,6 +132,11 @@ JointDescription ReadJoint(const JsonNode& node, const Draft& draft) {
   if (const auto axis = node.Optional("axis")) {
     joint.axis = ReadAxis(*axis, joint.type, draft.space);
   }
+  joint.pitch = ReadParameter(node, "pitch", joint, JointType::kHelical, {},
+                              "the advance along the axis per angle [m/rad]");
+  joint.length = ReadParameter(node, "length", joint, JointType::kRod, kPositive,
+                               "the distance of the two points [m]");
+  if (const auto motion = node.Optional("motion")) ReadMotions(*motion, draft.space, &joint);
   if (const auto cut = node.Optional("cut")) joint.cut = cut->Bool();
   return joint;
 }

@@ -6,10 +6,9 @@
 namespace loopbench::harness {
 namespace {
 
-/// Numbers of an array with at least `least`; `what` names them.
+/// Numbers of an array with at least `least`.
 std::vector<double> ReadNumbers(const JsonNode& owner, const std::string& key, std::size_t least,
-                                std::string_view what) {
-  const std::string expected = fmt::format("an array of at least {} {}", least, what);
+                                std::string_view expected) {
   const auto node = owner.Required(key, expected);
   if (!node) return {};
   if (!node->value().is_array() || node->value().size() < least) {
@@ -17,13 +16,13 @@ std::vector<double> ReadNumbers(const JsonNode& owner, const std::string& key, s
     return {};
   }
   std::vector<double> numbers;
-  for (const JsonNode& element : node->Elements(what)) numbers.push_back(element.Number());
+  for (const JsonNode& element : node->Elements("numbers")) numbers.push_back(element.Number());
   return numbers;
 }
 
 Polynomial ReadPolynomial(const JsonNode& node) {
   if (!node.ExpectObject({"type", "coefficients"})) return {{0.0}};
-  return {ReadNumbers(node, "coefficients", 1, "numbers, constant first")};
+  return {ReadNumbers(node, "coefficients", 1, "an array of one or more numbers, constant first")};
 }
 
 Harmonic ReadHarmonic(const JsonNode& node) {
@@ -39,8 +38,8 @@ Harmonic ReadHarmonic(const JsonNode& node) {
 TimeTable ReadTable(const JsonNode& node) {
   TimeTable table;
   if (!node.ExpectObject({"type", "times", "values", "interpolation"})) return table;
-  table.times = ReadNumbers(node, "times", 2, "numbers that ascend [s]");
-  table.values = ReadNumbers(node, "values", 2, "numbers");
+  table.times = ReadNumbers(node, "times", 2, "an array of two or more numbers that ascend [s]");
+  table.values = ReadNumbers(node, "values", 2, "an array of two or more numbers");
   if (const auto interpolation = node.Optional("interpolation")) {
     table.cubic = interpolation->Choice({"cubic", "linear"}, "an interpolation").value_or(0) == 0;
   }

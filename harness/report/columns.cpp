@@ -45,6 +45,7 @@ std::vector<TableColumn> CompactCaseColumns() {
        {{"finished", "ok"},
         {"step-too-small", "small step"},
         {"inconsistent-start", "bad start"},
+        {"inconsistent-motion", "bad motion"},
         {"newton-failure", "newton"},
         {"integrator-error", "integrator"}}},
   };

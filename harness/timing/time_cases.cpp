@@ -5,6 +5,7 @@
 #include <memory>
 #include <optional>
 
+#include "harness/compiled_scene.h"
 #include "harness/integrator/arkode.h"
 #include "harness/run_case.h"
 #include "harness/store/record_json.h"
@@ -216,7 +217,14 @@ std::vector<TimingGroup> TimingGroups(const Experiment& experiment) {
   std::vector<TimingGroup> groups;
   const std::vector<Case> all = ExpandTiming(experiment);
   for (std::size_t scene = 0; scene < experiment.scenes.size(); ++scene) {
-    TimingGroup group{experiment.scenes[scene].mechanism.description, {}, true};
+    // one system per timing: parts are not timed apart
+    CompileOptions options = experiment.compile;
+    options.islands = false;
+    const MechanismFile& file = experiment.scenes[scene].mechanism;
+    TimingGroup group{
+        CompileScene(file.description, file.observe, options).compiled.parts.front().description,
+        {},
+        true};
     std::ranges::copy_if(all, std::back_inserter(group.cases),
                          [&](const Case& one) { return one.scene == scene; });
     if (!group.cases.empty()) groups.push_back(std::move(group));

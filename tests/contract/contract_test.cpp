@@ -223,6 +223,24 @@ TEST_P(ContractTest, DerivativeDoesNotAllocate) {
   });
 }
 
+/// It is part of the right-hand side when work is integrated along. Seed 10 has drives.
+TEST_P(ContractTest, PowerDoesNotAllocate) {
+  if (CountAllocations() < 0) GTEST_SKIP() << "allocations cannot be counted in this build";
+  Run(Description(10), 10, [&](auto bench) {
+    bench.Derivative(bench.y);
+    double sum = bench.formulation->DrivePower();
+    const long before = CountAllocations();
+    for (int i = 0; i < 10; ++i) {
+      bench.Derivative(bench.y);
+      sum += bench.formulation->DrivePower() +
+             AppliedPower(bench.formulation->kinematics()).dissipated;
+    }
+    const long allocations = CountAllocations() - before;
+    EXPECT_EQ(allocations, 0);
+    EXPECT_TRUE(std::isfinite(sum));
+  });
+}
+
 /// Without all that supplies or dissipates power.
 MechanismDescription Conservative(MechanismDescription description) {
   MechanismDescription one = description;

@@ -2,6 +2,7 @@
 #include <gtest/gtest.h>
 
 #include <filesystem>
+#include <map>
 #include <string>
 #include <vector>
 
@@ -40,6 +41,23 @@ TEST(BenchmarkSet, IsReadWithMembersKindsAndColumns) {
   EXPECT_EQ(set.groups[1].kinds.size(), 2u);
   EXPECT_EQ(BenchmarkName(BenchmarkKind::kStep, set.groups[1].members[1], set.groups[1].columns[0]),
             "step/grid/2/lagrange/velocity/joint/rank-revealing");
+}
+
+TEST(BenchmarkSet, TakesMembersIntoSpaceAndSimplifiesThem) {
+  const BenchmarkSet set = ReadBenchmarks(kConfigs / "benchmarks/compile.json");
+  std::map<std::string, MechanismDescription> members;
+  for (const BenchmarkGroup& group : set.groups) {
+    for (const BenchmarkMember& member : group.members) members[member.name] = member.Make();
+  }
+  EXPECT_EQ(members.at("four-bar").space, SpaceKind::kPlanar);
+  EXPECT_EQ(members.at("four-bar/space").space, SpaceKind::kSpatial);
+  EXPECT_EQ(members.at("four-bar/space/compiled").space, SpaceKind::kPlanar);
+  EXPECT_EQ(members.at("ladder/5/space").space, SpaceKind::kSpatial);
+  EXPECT_EQ(members.at("ladder/5/space/compiled").bodies.size(),
+            members.at("ladder/5").bodies.size());
+  EXPECT_EQ(members.at("welded-four-bar/compiled").bodies.size(), 4u);
+  EXPECT_EQ(members.at("truss/compiled").bodies.size(), 3u);
+  EXPECT_EQ(members.at("four-islands/compiled/4").bodies.size(), 4u);
 }
 
 TEST(BenchmarkSet, OfTheRepositoryReachesAThousandBodies) {

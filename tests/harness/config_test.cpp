@@ -8,6 +8,7 @@
 #include <string>
 #include <vector>
 
+#include "harness/config/config_error.h"
 #include "harness/config/experiment_reader.h"
 #include "harness/config/mechanism_reader.h"
 
@@ -244,6 +245,25 @@ TEST(ExperimentReader, DefaultsAreTheRecommendedOnes) {
   EXPECT_EQ(experiment.scenes[0].name, "p");
   EXPECT_EQ(experiment.timing.columns, experiment.columns);
   EXPECT_EQ(Expand(experiment)[0].ensemble, 1);
+}
+
+TEST(ExperimentReader, SavingsAreSwitchedOneByOne) {
+  const auto read = [](const std::string& compile) {
+    return ParseExperiment(R"({"name": "small", "tolerances": 1e-8, )" + compile + R"(
+      "scenes": [{"mechanism": "mechanisms/pendulum.json", "horizon": 10}],
+      "columns": {"formulation": "odca", "enforcement": "velocity"}})",
+                           kConfigs / "small.json")
+        .compile;
+  };
+  const CompileOptions usual = read("");
+  EXPECT_EQ(usual,
+            (CompileOptions{.planar = true, .welds = true, .immovable = true, .islands = false}));
+  EXPECT_EQ(read(R"("compile": {"welds": false, "islands": true},)"),
+            (CompileOptions{.planar = true, .welds = false, .immovable = true, .islands = true}));
+  EXPECT_EQ(read(R"("compile": {"planar": false, "immovable": false},)"),
+            (CompileOptions{.planar = false, .welds = true, .immovable = false, .islands = false}));
+  EXPECT_THROW(read(R"("compile": {"weld": false},)"), ConfigError);
+  EXPECT_THROW(read(R"("compile": {"welds": 1},)"), ConfigError);
 }
 
 TEST(EnumNames, ParseReturnsWhatToStringWrote) {

@@ -41,6 +41,15 @@ TEST(LibraryTest, GridsHaveALoopPerWindowAndAFreedomPerStorey) {
   EXPECT_EQ(shape.freedom, 3);
 }
 
+TEST(LibraryTest, HubsHaveALoopPerClosedArm) {
+  const Shape open = ShapeOf(Hub(5, 2, false));
+  EXPECT_EQ(open.loops, 0);
+  EXPECT_EQ(open.freedom, 11);
+  const Shape closed = ShapeOf(Hub(5, 3, true));
+  EXPECT_EQ(closed.loops, 5);
+  EXPECT_EQ(closed.freedom, 6);
+}
+
 TEST(LibraryTest, AGridStartsWhereItSays) {
   const MechanismDescription grid = Grid(3, 2, -1.0, 0.5);
   const Mechanism<Planar, double> mechanism(grid, Coordinates::kJoint);

@@ -5,6 +5,7 @@
 #include <gtest/gtest.h>
 
 #include <cmath>
+#include <numeric>
 #include <set>
 
 #include "mechanism/library.h"
@@ -116,13 +117,182 @@ TEST(PlanTest, PartsWithoutConnectionHaveTheirOwnRoots) {
   EXPECT_EQ(std::ranges::count(has_parent, false), 3) << "two parts and a body alone";
 }
 
-TEST(PlanTest, AHubWithManyArmsKeepsSmallJoins) {
+/// The boundary of every node is what the graph says: bodies below it with joints closed elsewhere.
+void ExpectBoundaries(const Plan& plan, std::span<const PlanJoint> joints) {
+  std::vector<std::vector<int>> bodies(plan.num_nodes()), closed(plan.num_nodes());
+  std::vector<std::vector<int>> joints_of(plan.num_leaves() + 1);
+  for (const PlanJoint& joint : joints) {
+    for (int body : {joint.from, joint.to}) joints_of[body].push_back(joint.index);
+  }
+  const auto boundary = [&](int n) {
+    std::set<int> result;
+    const std::set<int> done(closed[n].begin(), closed[n].end());
+    for (int body : bodies[n]) {
+      for (int joint : joints_of[body]) {
+        if (!done.contains(joint)) result.insert(body);
+      }
+    }
+    return result;
+  };
+  for (int n = 0; n < plan.num_leaves(); ++n) bodies[n] = {n + 1};
+  for (int k = 0; k < static_cast<int>(plan.nodes().size()); ++k) {
+    const PlanNode& node = plan.nodes()[k];
+    const int n = plan.num_leaves() + k;
+    std::set<int> before, handles, kept;
+    for (int child : node.children) {
+      if (child < 0) continue;
+      before.merge(boundary(child));
+      bodies[n].insert(bodies[n].end(), bodies[child].begin(), bodies[child].end());
+      closed[n].insert(closed[n].end(), closed[child].begin(), closed[child].end());
+    }
+    for (const NodeJoint& joint : node.joints) closed[n].push_back(joint.index);
+    for (const Handle& handle : node.handles) handles.insert(handle.body);
+    for (int h : node.kept) kept.insert(node.handles[h].body);
+    EXPECT_FALSE(node.joints.empty());
+    EXPECT_EQ(handles, before);
+    EXPECT_EQ(kept, boundary(n));
+  }
+}
+
+TEST(PlanTest, BoundariesAreThoseOfTheGraph) {
+  testing::Random random(7);
+  for (const PlanOptions& options : kAllOptions) {
+    for (int n : {2, 5, 20, 80}) {
+      std::vector<PlanJoint> joints;
+      for (int j = 0; j < 3 * n / 2; ++j) {
+        const int from = random.Below(n + 1), to = random.Below(n + 1);
+        if (from != to) joints.push_back({j, from, to, 1 + random.Below(5)});
+      }
+      const Plan plan(n + 1, joints, options);
+      ExpectProper(plan, static_cast<int>(joints.size()));
+      ExpectBoundaries(plan, joints);
+    }
+  }
+}
+
+/// Bodies around a hub, each on it; as a wheel each is on the next one too.
+std::vector<PlanJoint> Spokes(int num_arms, bool wheel) {
   std::vector<PlanJoint> joints = {{0, 0, 1, 2}};
-  for (int arm = 1; arm <= 100; ++arm) joints.push_back({arm, 1, arm + 1, 2});
-  const Plan plan(102, joints);
-  ExpectProper(plan, 101);
-  EXPECT_EQ(plan.largest_join(), 2);
-  EXPECT_LE(plan.most_handles(), 2);
+  const auto add = [&](int from, int to) {
+    joints.push_back({static_cast<int>(joints.size()), from, to, 2});
+  };
+  for (int arm = 2; arm <= num_arms + 1; ++arm) {
+    add(1, arm);
+    if (wheel) add(arm, arm <= num_arms ? arm + 1 : 2);
+  }
+  return joints;
+}
+
+TEST(PlanTest, AHubTakesItsArmsOneByOne) {
+  for (int arms : {100, 1000}) {
+    const std::vector<PlanJoint> joints = Spokes(arms, false);
+    const Plan plan(arms + 2, joints);
+    ExpectProper(plan, arms + 1);
+    EXPECT_EQ(plan.largest_join(), 2);
+    EXPECT_LE(plan.most_handles(), 2);
+    EXPECT_EQ(plan.depth(), arms + 1) << "and the disc's own pin";
+  }
+}
+
+TEST(PlanTest, ArmsAreFinishedBeforeTheirHubTakesThem) {
+  // an arm of 8 bars in a row is three joins deep, and so is the start of the hub's own line
+  const Plan plan = PlanOf(Hub(100, 8, false));
+  EXPECT_LE(plan.depth(), 100 + 1 + 3);
+  EXPECT_LE(plan.most_handles(), 4) << "two pieces of an arm with two ends each";
+}
+
+TEST(PlanTest, AWheelKeepsFewBodiesOnItsBoundaries) {
+  // of the rim only what one join brings, the two ends of what is joined, and the hub
+  const Plan small(102, Spokes(100, true)), large(1002, Spokes(1000, true));
+  EXPECT_LE(small.most_handles(), 8);
+  EXPECT_LE(large.most_handles(), 8);
+  EXPECT_LE(large.operations(3), 11 * small.operations(3));
+}
+
+TEST(PlanTest, BarsBetweenSeveralPlatesAreTakenOneByOne) {
+  // each bar is on all plates: pairs of bars and plates alone would leave all bars on the boundary
+  for (int plates : {2, 3, 5}) {
+    const auto plan_of = [&](int bars) {
+      std::vector<PlanJoint> joints = {{0, 0, 1, 2}};
+      for (int bar = plates + 1; bar <= plates + bars; ++bar) {
+        for (int plate = 1; plate <= plates; ++plate) {
+          joints.push_back({static_cast<int>(joints.size()), plate, bar, 2});
+        }
+      }
+      return Plan(plates + bars + 1, joints);
+    };
+    const Plan small = plan_of(100), large = plan_of(1000);
+    // the plates, a bar, and while the plates are collected one bar more
+    EXPECT_LE(large.most_handles(), plates + 2);
+    EXPECT_LE(large.operations(3), 11 * small.operations(3));
+  }
+}
+
+TEST(PlanTest, GridsCostNoMoreThanNestedDissection) {
+  // least squares of log operations against log bodies; small grids have terms of lower order,
+  // with either sign, so that single pairs of sizes lie on both sides
+  std::vector<double> x, y;
+  for (int k : {5, 10, 15, 20, 30}) {
+    const Plan plan = PlanOf(Grid(k, k, -1.0, 0.0));
+    x.push_back(std::log(plan.num_leaves()));
+    y.push_back(std::log(static_cast<double>(plan.operations(3))));
+    // twice a row of cranks and couplers: both sides of a straight cut
+    EXPECT_LE(plan.most_handles(), 2 * (2 * k + 1));
+    std::printf("grid %2d: %5d bodies, %9ld operations, %2d handles, depth %d\n", k,
+                plan.num_leaves(), plan.operations(3), plan.most_handles(), plan.depth());
+  }
+  const Eigen::Map<Eigen::ArrayXd> X(x.data(), 5), Y(y.data(), 5);
+  const Eigen::ArrayXd centred = X - X.mean();
+  const double exponent = (centred * (Y - Y.mean())).sum() / centred.square().sum();
+  std::printf("exponent of operations against bodies: %.3f\n", exponent);
+  EXPECT_LE(exponent, 1.5);
+}
+
+TEST(PlanTest, DissectionCostsNoMoreThanAnyNumberingOfTheGrid) {
+  // the plan may depend on the numbering, but not its quality
+  const MechanismDescription grid = Grid(12, 12, -1.0, 0.0);
+  const Mechanism<Planar, double> mechanism(grid, Coordinates::kJoint);
+  const long straight = MakePlan(mechanism).operations(3);
+  testing::Random random(3);
+  const int n = mechanism.num_bodies();
+  for (int draw = 0; draw < 5; ++draw) {
+    std::vector<int> number(n);
+    std::iota(number.begin(), number.end(), 0);
+    for (int i = n - 1; i > 1; --i) std::swap(number[i], number[1 + random.Below(i)]);
+    std::vector<PlanJoint> joints;
+    for (int j = 0; j < static_cast<int>(mechanism.joints().size()); ++j) {
+      const Joint<Planar, double>& joint = mechanism.joints()[j];
+      joints.push_back({j, number[joint.from], number[joint.to], joint.kind->num_constraints()});
+    }
+    // ties are broken by number; that is worth a fifth at most on such a grid
+    EXPECT_LE(static_cast<double>(Plan(n, joints, {.dim = 3}).operations(3)),
+              1.2 * static_cast<double>(straight));
+  }
+}
+
+TEST(PlanTest, OperationsAreThoseOfTheSweep) {
+  for (std::uint64_t seed = 1; seed <= 3; ++seed) {
+    const MechanismDescription graph = testing::RandomGraph(6, SpaceKind::kSpatial, seed);
+    const Mechanism<Spatial, double> mechanism(graph, Coordinates::kJoint);
+    const State state = ConsistentState(graph, mechanism, seed);
+    for (const PlanOptions& options : kAllOptions) {
+      Odca<Spatial, double> odca(mechanism, {}, options);
+      VectorX<double> udot;
+      ASSERT_EQ(odca.Evaluate(0.0, state.q, state.u, udot), Outcome::kFinished);
+      if (odca.sweep().joins().softened()) continue;
+      EXPECT_EQ(odca.plan().operations(6), odca.sweep().operations());
+    }
+  }
+}
+
+TEST(PlanTest, PlanningIsNearlyLinear) {
+  // what is quadratic in these numbers takes minutes, and the test its time limit
+  constexpr int kMany = 100000;
+  EXPECT_EQ(Plan(kMany + 2, Spokes(kMany, false)).most_handles(), 2);
+  EXPECT_LE(Plan(kMany + 2, Spokes(kMany, true)).most_handles(), 8);
+  std::vector<PlanJoint> chain;
+  for (int j = 0; j <= kMany; ++j) chain.push_back({j, j, j < kMany ? j + 1 : 0, 2});
+  EXPECT_LE(Plan(kMany + 1, chain).most_handles(), 4);
 }
 
 TEST(PlanTest, PlanIsAFunctionOfTheGraph) {

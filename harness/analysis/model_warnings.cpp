@@ -1,0 +1,82 @@
+#include "harness/analysis/model_warnings.h"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+
+namespace loopbench::harness {
+
+namespace {
+
+constexpr std::size_t kMostNames = 6;
+
+std::string BodyNames(const MechanismDescription& description, const std::vector<int>& bodies) {
+  std::string text;
+  for (std::size_t i = 0; i < bodies.size() && i < kMostNames; ++i) {
+    text += (i == 0 ? "" : ", ") + description.bodies[bodies[i]].name;
+  }
+  if (bodies.size() > kMostNames) text += fmt::format(" and {} more", bodies.size() - kMostNames);
+  return text;
+}
+
+void AddRankWarnings(const MechanismDescription& description, const Structure& structure,
+                     std::vector<Warning>* warnings) {
+  if (!structure.analysed) {
+    warnings->push_back(
+        {WarningKind::kNotAnalysed, fmt::format("rank is not analysed: {} speeds are more than {}",
+                                                structure.joint_u, kMostAnalysedSpeeds)});
+    return;
+  }
+  if (structure.locked() && structure.bodies > 0) {
+    std::string joints;
+    for (const LoopPath& loop : structure.loops) {
+      joints += (joints.empty() ? "" : ", ") + description.joints[loop.cut_joint].name;
+    }
+    warnings->push_back(
+        {WarningKind::kLocked,
+         fmt::format("{} is locked: its joints{} leave no motion at the start", description.name,
+                     joints.empty() ? "" : " and the loops closed by " + joints)});
+  }
+  if (structure.singular_start()) {
+    warnings->push_back({WarningKind::kSingularStart,
+                         fmt::format("the start is a singular position: rank {} there, {} close by",
+                                     structure.rank, structure.rank_nearby)});
+  } else if (structure.conditioning() < kNearSingularRatio) {
+    warnings->push_back(
+        {WarningKind::kNearSingular,
+         fmt::format(
+             "the loops are nearly dependent at the start (bodies almost in line): smallest "
+             "scaled singular value {:.3g} of the largest",
+             structure.conditioning())});
+  }
+}
+
+}  // namespace
+
+std::vector<Warning> FindWarnings(const MechanismDescription& description,
+                                  const Structure& structure) {
+  std::vector<Warning> warnings;
+  if (structure.start.outcome == Outcome::kInconsistentStart) {
+    warnings.push_back({WarningKind::kInconsistentStart, structure.start.message});
+  }
+  AddRankWarnings(description, structure, &warnings);
+  for (const Island& island : structure.islands) {
+    if (island.grounded) continue;
+    warnings.push_back({WarningKind::kFloating,
+                        fmt::format("unreachable from ground: no joint connects {}; it floats",
+                                    BodyNames(description, island.bodies))});
+  }
+  const auto lighter = [](const BodyDescription& a, const BodyDescription& b) {
+    return a.mass < b.mass;
+  };
+  const auto [light, heavy] =
+      std::minmax_element(description.bodies.begin() + 1, description.bodies.end(), lighter);
+  if (heavy->mass > kLargestMassRatio * light->mass) {
+    warnings.push_back(
+        {WarningKind::kMassRatio, fmt::format("{} has {:.3g} times the mass of {}", heavy->name,
+                                              heavy->mass / light->mass, light->name)});
+  }
+  return warnings;
+}
+
+}  // namespace loopbench::harness

@@ -1,0 +1,36 @@
+// What looks wrong about a mechanism before anything is run.
+#pragma once
+
+#include <string>
+#include <vector>
+
+#include "mechanism/structure.h"
+
+namespace loopbench::harness {
+
+enum class WarningKind {
+  kInconsistentStart,  ///< the start cannot be assembled
+  kLocked,             ///< nothing can move
+  kSingularStart,      ///< the start is a singular position
+  kNearSingular,       ///< the loops are almost dependent at the start: bodies nearly in line
+  kFloating,           ///< a part that no joint connects to ground
+  kMassRatio,          ///< masses further apart than their equations can resolve well
+  kNotAnalysed,        ///< too large for an analysis of rank
+};
+
+struct Warning {
+  WarningKind kind = WarningKind::kLocked;
+  std::string text;  ///< a sentence that names the parts
+};
+
+/// The heaviest body over the lightest: beyond it half the digits of a double are the light body's.
+inline constexpr double kLargestMassRatio = 1e8;
+/// Ratio of singular values (Structure::conditioning) below which a start is near singular. Forces
+/// in the loops are then some hundred times those that cause them. The scenes of the paper stay
+/// above 0.1 but at their singular positions.
+inline constexpr double kNearSingularRatio = 1e-2;
+
+std::vector<Warning> FindWarnings(const MechanismDescription& description,
+                                  const Structure& structure);
+
+}  // namespace loopbench::harness

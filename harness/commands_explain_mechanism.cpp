@@ -1,0 +1,253 @@
+// explain FILE for a mechanism: what it is made of, what can move, what is redundant or suspicious.
+#include <fmt/format.h>
+
+#include <cmath>
+
+#include "harness/analysis/model_warnings.h"
+#include "harness/commands.h"
+#include "harness/compiled_scene.h"
+#include "harness/config/mechanism_reader.h"
+#include "harness/report/table.h"
+#include "odca/odca.h"
+
+namespace loopbench::harness {
+
+namespace {
+
+void PrintSection(const std::string& title, const Table& table) {
+  fmt::print("\n{}\n", title);
+  if (table.rows.empty()) {
+    fmt::print("  none\n");
+    return;
+  }
+  const std::string text = ToText(table);
+  for (std::size_t begin = 0; begin < text.size();) {
+    const std::size_t end = std::min(text.find('\n', begin), text.size());
+    if (end > begin) fmt::print("  {}\n", text.substr(begin, end - begin));
+    begin = end + 1;
+  }
+}
+
+Table BodyTable(const MechanismDescription& description, const Structure& structure) {
+  Table table;
+  table.columns = {{"name", "body", Format::kText, {}},
+                   {"mass", "mass [kg]", Format::kShortest, {}},
+                   {"inertia", "inertia [kg m^2]", Format::kText, {}},
+                   {"com", "com [m]", Format::kText, {}},
+                   {"part", "part", Format::kInteger, {}}};
+  const bool planar = description.space == SpaceKind::kPlanar;
+  for (std::size_t i = 0; i < structure.islands.size(); ++i) {
+    for (const int body : structure.islands[i].bodies) {
+      const BodyDescription& described = description.bodies[body];
+      const auto& I = described.inertia;
+      Record row;
+      row.Set("name", described.name);
+      row.Set("mass", described.mass);
+      row.Set("inertia", planar ? fmt::format("{:.6g}", I(2, 2))
+                                : fmt::format("{:.6g} {:.6g} {:.6g}", I(0, 0), I(1, 1), I(2, 2)));
+      const Eigen::Vector3d& com = described.com;
+      row.Set("com", planar ? fmt::format("{:.6g} {:.6g}", com.x(), com.y())
+                            : fmt::format("{:.6g} {:.6g} {:.6g}", com.x(), com.y(), com.z()));
+      row.Set("part", static_cast<std::int64_t>(i + 1));
+      table.rows.push_back(row);
+    }
+  }
+  return table;
+}
+
+/// What a joint leaves free: its kind's directions less those that follow a given motion.
+int FreeSpeeds(SpaceKind space, const JointDescription& joint) {
+  const int kind = space == SpaceKind::kPlanar && ExistsInPlane(joint.type)
+                       ? KindOf<Planar, double>(joint.type).num_u
+                       : KindOf<Spatial, double>(joint.type).num_u;
+  return kind - static_cast<int>(joint.motions.size());
+}
+
+Table JointTable(const MechanismDescription& description, const Structure& structure) {
+  Table table;
+  table.columns = {
+      {"name", "joint", Format::kText, {}},   {"type", "type", Format::kText, {}},
+      {"from", "from", Format::kText, {}},    {"to", "to", Format::kText, {}},
+      {"free", "free", Format::kInteger, {}}, {"rows", "constrains", Format::kInteger, {}},
+      {"place", "place", Format::kText, {}}};
+  const bool planar = description.space == SpaceKind::kPlanar;
+  std::vector<bool> cut(description.joints.size());
+  for (const LoopPath& loop : structure.loops) cut[loop.cut_joint] = true;
+  for (std::size_t j = 0; j < description.joints.size(); ++j) {
+    const JointDescription& joint = description.joints[j];
+    const int free = FreeSpeeds(description.space, joint);
+    Record row;
+    row.Set("name", joint.name);
+    row.Set("type", std::string(ToString(joint.type)));
+    row.Set("from", description.bodies[joint.from.body].name);
+    row.Set("to", description.bodies[joint.to.body].name);
+    row.Set("free", std::int64_t{free});
+    row.Set("rows", std::int64_t{(planar ? 3 : 6) - free});
+    row.Set("place", std::string(cut[j] ? "closes a loop" : "tree"));
+    table.rows.push_back(row);
+  }
+  return table;
+}
+
+Table LoopTable(const MechanismDescription& description, const Structure& structure) {
+  Table table;
+  table.columns = {{"cut", "cut joint", Format::kText, {}},
+                   {"joints", "joints", Format::kText, {}},
+                   {"bodies", "bodies", Format::kText, {}},
+                   {"shift", "open [m]", Format::kScientific, {}},
+                   {"turn", "open [rad]", Format::kScientific, {}}};
+  for (const LoopPath& loop : structure.loops) {
+    std::string joints, bodies;
+    for (const int j : loop.joints)
+      joints += (joints.empty() ? "" : " ") + description.joints[j].name;
+    for (const int b : loop.bodies)
+      bodies += (bodies.empty() ? "" : " ") + description.bodies[b].name;
+    Record row;
+    row.Set("cut", description.joints[loop.cut_joint].name);
+    row.Set("joints", joints);
+    row.Set("bodies", bodies);
+    row.Set("shift", loop.open_shift);
+    row.Set("turn", loop.open_rotation);
+    table.rows.push_back(row);
+  }
+  return table;
+}
+
+void PrintFreedom(const Structure& s) {
+  const int each = s.space == SpaceKind::kPlanar ? 3 : 6;
+  fmt::print("\nDegrees of freedom\n");
+  fmt::print("  {} by counting (Gruebler, Kutzbach): {} bodies x {} - {} constraints\n",
+             s.counted_freedom, s.bodies, each, s.rows);
+  if (!s.analysed) return;
+  fmt::print("  {} by rank: {} speeds of the tree - rank {} of the {} constraints of loops\n",
+             s.freedom(), s.joint_u, s.rank_nearby, s.loop_rows);
+  if (s.freedom_at_start() != s.freedom()) {
+    fmt::print("  {} at the start, a singular position: rank {} there\n", s.freedom_at_start(),
+               s.rank);
+  }
+  if (s.rank > 0) {
+    fmt::print(
+        "  scaled singular values at the start: {:.3g} largest, {:.3g} smallest that counts\n",
+        s.singular_values[0], s.singular_values[s.rank - 1]);
+  }
+}
+
+std::string Described(const MechanismDescription& description, const RedundantDirection& one) {
+  if (one.axis == 'r') return "the force along the rod";
+  if (one.axis == 'n') return "the moment about the normal of its two axes";
+  const JointDescription& joint = description.joints[one.joint];
+  return fmt::format(
+      "the {} {} of {}{}", one.moment ? "moment about" : "force along", one.axis,
+      one.ground_axes ? "ground" : "its frame on " + description.bodies[joint.from.body].name,
+      one.drive ? ", which follows a given motion" : "");
+}
+
+void PrintRedundant(const MechanismDescription& description, const Structure& structure) {
+  if (!structure.analysed) return;
+  fmt::print("\nRedundant constraints: {}\n", structure.redundant.size());
+  for (const RedundantDirection& one : structure.redundant) {
+    fmt::print("  {}: {}\n", description.joints[one.joint].name, Described(description, one));
+  }
+  if (structure.redundant.empty()) return;
+  fmt::print("  All of these can be dropped at once; the loops then stay closed as they do now.\n");
+}
+
+void PrintIslands(const MechanismDescription& description, const Structure& structure) {
+  Table table;
+  table.columns = {{"part", "part", Format::kInteger, {}},
+                   {"bodies", "bodies", Format::kInteger, {}},
+                   {"first", "first body", Format::kText, {}},
+                   {"held", "held by", Format::kText, {}}};
+  for (std::size_t i = 0; i < structure.islands.size(); ++i) {
+    const Island& island = structure.islands[i];
+    Record row;
+    row.Set("part", static_cast<std::int64_t>(i + 1));
+    row.Set("bodies", static_cast<std::int64_t>(island.bodies.size()));
+    row.Set("first", description.bodies[island.bodies.front()].name);
+    row.Set("held", std::string(island.grounded ? "ground" : "nothing: it floats"));
+    table.rows.push_back(row);
+  }
+  PrintSection("Separate parts, connected through ground at most", table);
+}
+
+void PrintCoordinates(const Structure& structure) {
+  Table table;
+  table.columns = {{"set", "coordinates", Format::kText, {}},
+                   {"q", "positions", Format::kInteger, {}},
+                   {"u", "speeds", Format::kInteger, {}},
+                   {"rows", "constraints", Format::kInteger, {}},
+                   {"free", "independent speeds", Format::kInteger, {}}};
+  for (const Coordinates set : {Coordinates::kJoint, Coordinates::kAbsolute}) {
+    const bool joint = set == Coordinates::kJoint;
+    Record row;
+    row.Set("set", std::string(ToString(set)));
+    row.Set("q", std::int64_t{joint ? structure.joint_q : structure.absolute_q});
+    row.Set("u", std::int64_t{joint ? structure.joint_u : structure.absolute_u});
+    row.Set("rows", std::int64_t{joint ? structure.loop_rows : structure.rows});
+    if (structure.analysed) row.Set("free", std::int64_t{structure.freedom()});
+    table.rows.push_back(row);
+  }
+  PrintSection("Coordinates", table);
+}
+
+template <class Space>
+odca::Plan PlanFor(const MechanismDescription& description, odca::Grounding grounding) {
+  const Mechanism<Space, double> mechanism(description, Coordinates::kJoint);
+  return odca::MakePlan(mechanism, {.grounding = grounding});
+}
+
+void PrintPlanOfJoins(const MechanismDescription& description) {
+  Table table;
+  table.columns = {{"solver", "solver", Format::kText, {}},
+                   {"depth", "depth", Format::kInteger, {}},
+                   {"handles", "most handles", Format::kInteger, {}},
+                   {"largest", "largest join", Format::kInteger, {}},
+                   {"loops", "joins that close loops", Format::kInteger, {}}};
+  for (const SolverKind solver : {SolverKind::kRankRevealing, SolverKind::kAsPublished}) {
+    const auto grounding =
+        solver == SolverKind::kAsPublished ? odca::Grounding::kAtRoot : odca::Grounding::kEager;
+    const odca::Plan plan = description.space == SpaceKind::kPlanar
+                                ? PlanFor<Planar>(description, grounding)
+                                : PlanFor<Spatial>(description, grounding);
+    Record row;
+    row.Set("solver", std::string(ToString(solver)));
+    row.Set("depth", std::int64_t{plan.depth()});
+    row.Set("handles", std::int64_t{plan.most_handles()});
+    row.Set("largest", std::int64_t{plan.largest_join()});
+    row.Set("loops", std::int64_t{plan.loop_joins()});
+    table.rows.push_back(row);
+  }
+  PrintSection("Plan of O-DCA", table);
+}
+
+}  // namespace
+
+int ExplainMechanism(const std::filesystem::path& path) {
+  const MechanismDescription description = ReadMechanism(path).description;
+  const Structure structure = AnalyseStructure(description);
+  const std::vector<Warning> warnings = FindWarnings(description, structure);
+  fmt::print("{} ({})\n  described in {}; lengths in m, angles in rad\n", description.name,
+             path.string(), description.space == SpaceKind::kPlanar ? "the plane" : "space");
+  PrintSection("Bodies", BodyTable(description, structure));
+  PrintSection("Joints", JointTable(description, structure));
+  PrintFreedom(structure);
+  PrintSection("Loops", LoopTable(description, structure));
+  PrintRedundant(description, structure);
+  PrintIslands(description, structure);
+  PrintCoordinates(structure);
+  PrintPlanOfJoins(description);
+  fmt::print("\nWhat need not be modelled\n");
+  const Compiled compiled = Compile(description, CompileOptions::All());
+  if (compiled.report.empty()) fmt::print("  nothing to save\n");
+  for (const std::string& line : compiled.report) fmt::print("  {}\n", line);
+  if (compiled.done != CompileOptions::None()) {
+    fmt::print("  Savings found: {}. By default a run makes: {} (\"compile\" of an experiment).\n",
+               ToString(compiled.done), ToString(CompileOptions()));
+  }
+  fmt::print("\nWarnings\n");
+  if (warnings.empty()) fmt::print("  none\n");
+  for (const Warning& warning : warnings) fmt::print("  {}\n", warning.text);
+  return structure.start.outcome == Outcome::kInconsistentStart ? 2 : 0;
+}
+
+}  // namespace loopbench::harness

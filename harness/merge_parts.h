@@ -1,0 +1,23 @@
+// One record from the runs of parts that have nothing to do with each other.
+#pragma once
+
+#include <span>
+
+#include "harness/analysis/growth.h"
+#include "harness/record.h"
+
+namespace loopbench::harness {
+
+/// What one run leaves behind.
+struct Run {
+  Record record;
+  DriftSeries drift;
+};
+
+/// Each part has its own steps. Work adds up (steps, evaluations, wall time, rank); drift is the
+/// largest of the parts, at each time the largest of what each had last; the worst outcome and the
+/// earliest end count; energy errors add up, an upper bound of the whole's. Series of energy and
+/// angles, which belong to one sequence of steps, stay out.
+Run MergeParts(std::span<const Run> parts);
+
+}  // namespace loopbench::harness

@@ -1,0 +1,21 @@
+// Which bodies have to do with each other: the graph of bodies and joints without Ground.
+#pragma once
+
+#include <vector>
+
+#include "mechanism/description.h"
+
+namespace loopbench {
+
+/// Bodies that joints, or forces between two bodies, connect otherwise than through Ground.
+struct Island {
+  std::vector<int> bodies;  ///< ascending, without Ground
+  bool grounded = false;    ///< a joint leads to Ground; otherwise the part floats
+};
+
+/// The islands in the order of their first bodies; every body but Ground is in exactly one.
+///
+/// Forces that this file does not know are taken to connect all bodies.
+std::vector<Island> FindIslands(const MechanismDescription& description);
+
+}  // namespace loopbench

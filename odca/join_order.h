@@ -1,0 +1,42 @@
+// In which order assemblies are joined: the tree behind a plan, before its lists are written.
+//
+// Three rules compete, and what a sweep would cost decides (`JoinCost`).
+//
+// *Pairing* grows the tree from below (pairing.h). All pairs of neighbouring assemblies wait in a
+// queue; the next pair has the smallest boundary after its join, in classes a factor sqrt(2) apart
+// (up to four bodies are one class), then the fewest bodies, also in powers of two, then exactly
+// the smallest boundary. A chain halves, arms are finished before their hub takes them, and what
+// would spread along a hub waits.
+//
+// Where pairing makes large joins, there are two others. *Front* (front.h): one assembly takes body
+// after body; right for bodies between several hubs. *Dissection* (dissection.h) cuts from above; a
+// k x k grid is cut by O(k) bodies at the top and halves in area below, hence O(k^3) multiply-adds
+// = O(n^1.5) (George 1973; Lipton, Rose and Tarjan 1979). Its parts are ordered by the best rule
+// again.
+//
+// All take O(n log n) steps per level of the dissection, of which there are O(log n).
+#pragma once
+
+#include <span>
+#include <vector>
+
+#include "odca/plan.h"
+
+namespace loopbench::odca {
+
+/// A join of two assemblies. Assembly b < num_bodies is body b alone, num_bodies + k is the result
+/// of join k.
+struct Join {
+  int left = 0, right = 0;
+};
+
+/// Multiply-adds of a node with `rows` rows, `handles` bodies before it and `kept` after it, each
+/// with `dim` directions, as `Sweep::operations()` counts them when each joint meets both sides.
+double JoinCost(double rows, double handles, double kept, double dim);
+
+/// The joins of all bodies, children first. `waiting`: joints to Ground that no join closes, by
+/// body. Every join has at least one joint between its sides; separate parts stay separate.
+std::vector<Join> OrderJoins(int num_bodies, std::span<const PlanJoint> joints,
+                             std::span<const int> waiting, int dim);
+
+}  // namespace loopbench::odca

@@ -1,0 +1,75 @@
+// The rule that grows an assembly tree from below (join_order.h).
+#pragma once
+
+#include <functional>
+#include <map>
+#include <queue>
+#include <span>
+#include <utility>
+#include <vector>
+
+#include "odca/body_graph.h"
+#include "odca/join_order.h"
+
+namespace loopbench::odca {
+
+/// What a list of joins costs.
+struct JoinSum {
+  double cost = 0.0;  ///< multiply-adds
+  int handles = 0;    ///< of the largest join
+};
+
+/// Numbers by body of the whole graph, taken once for many small sets of bodies.
+struct BodyMarks {
+  explicit BodyMarks(int num_bodies) : part_of(num_bodies, -1), open(part_of), closing(part_of) {}
+  std::vector<int> part_of;  ///< -1 outside the set in hand
+  std::vector<int> open;     ///< joints still to come
+  std::vector<int> closing;  ///< of these, in the pair in hand
+};
+
+/// Joins the assemblies of one connected set of bodies. An object of one use.
+class Pairing {
+ public:
+  /// `marks->part_of` of each body in `bodies` is 0, 1, .. of the assembly that it is in; these are
+  /// numbered `names`.
+  Pairing(const BodyGraph& graph, std::span<const int> bodies, std::span<const int> names, int dim,
+          BodyMarks* marks);
+
+  /// Appends to the joins of the whole graph.
+  JoinSum Run(std::vector<Join>* joins);
+
+ private:
+  struct Part {
+    int name = 0;
+    int first = 0;  ///< lowest body: decides which side is left
+    int bodies = 0;
+    int boundary = 0;          ///< bodies with joints still to come
+    std::map<int, int> bonds;  ///< by other part
+  };
+  /// All joints between two parts.
+  struct Bond {
+    int a = 0, b = 0;
+    int rows = 0;
+    std::vector<std::pair<int, int>> joints;  ///< their bodies; empty once joined
+  };
+  struct Key {
+    int boundary_class, size_class, boundary, bond;
+    auto operator<=>(const Key&) const = default;
+  };
+
+  int BoundaryAfter(const Bond& bond);
+  Key KeyOf(int bond);
+  /// A better place in the queue, if the pair has become better.
+  void Renew(int bond);
+  void Merge(int bond, std::vector<Join>* joins);
+
+  const int num_bodies_;
+  const double dim_;
+  BodyMarks& marks_;
+  std::vector<Part> parts_;
+  std::vector<Bond> bonds_;
+  std::priority_queue<Key, std::vector<Key>, std::greater<>> queue_;
+  JoinSum sum_;
+};
+
+}  // namespace loopbench::odca

@@ -1,0 +1,152 @@
+// Runs of simplified scenes tell the same story as runs of the scenes themselves.
+#include "harness/compiled_scene.h"
+
+#include <gtest/gtest.h>
+
+#include <cmath>
+
+#include "harness/merge_parts.h"
+#include "harness/run_case.h"
+#include "mechanism/in_space.h"
+#include "mechanism/library.h"
+#include "tests/reference/cases.h"
+
+namespace loopbench::harness {
+namespace {
+
+using namespace reference;
+
+const Column kColumn{FormulationKind::kOdca, Enforcement::kVelocity, Coordinates::kJoint,
+                     SolverKind::kRankRevealing};
+constexpr double kTolerance = 1e-10;
+/// Two runs at kTolerance over 1 s differ by their errors of integration.
+constexpr double kSameRun = 1e3 * kTolerance;
+
+Record RunWith(const MechanismFile& file, const CompileOptions& options) {
+  Experiment experiment = Single(file);
+  experiment.compile = options;
+  return RunCase(experiment, CaseOf(experiment, file.description.name, kColumn, kTolerance, 1.0));
+}
+
+double LastAngle(const Record& record, const std::string& joint) {
+  const std::vector<double>& angles = record.Numbers("series.angle." + joint);
+  return angles.empty() ? std::nan("") : angles.back();
+}
+
+MechanismFile Shipped(const std::string& name) {
+  return ReadMechanism(kConfigs / ("mechanisms/" + name + ".json"));
+}
+
+TEST(CompiledSceneTest, NothingToSaveLeavesTheRecordAsItWas) {
+  const MechanismFile file = Shipped("four-bar");
+  const Record on = RunWith(file, CompileOptions()), off = RunWith(file, CompileOptions::None());
+  EXPECT_EQ(on.Find("compiled"), nullptr);
+  EXPECT_EQ(on.Text("state_hash"), off.Text("state_hash"));
+}
+
+TEST(CompiledSceneTest, TiltedFourBarRunsInThePlane) {
+  MechanismFile file = Shipped("four-bar");
+  file.description = InSpace(file.description, {0.3, -0.4, 0.5});
+  const Record on = RunWith(file, CompileOptions()), off = RunWith(file, CompileOptions::None());
+  EXPECT_EQ(on.Text("compiled"), "planar");
+  EXPECT_EQ(off.Find("compiled"), nullptr);
+  ASSERT_EQ(on.Text("outcome"), "finished") << on.Text("message");
+  ASSERT_EQ(off.Text("outcome"), "finished") << off.Text("message");
+  for (const char* joint : {"OA", "AB", "BC"}) {
+    EXPECT_NEAR(LastAngle(on, joint), LastAngle(off, joint), kSameRun) << joint;
+  }
+  EXPECT_EQ(on.Number("rank_min"), off.Number("rank_min"));
+}
+
+TEST(CompiledSceneTest, WeldedPiecesRunAsOneBar) {
+  const Record on = RunWith(Shipped("welded-four-bar"), CompileOptions());
+  const Record off = RunWith(Shipped("welded-four-bar"), CompileOptions::None());
+  EXPECT_EQ(on.Text("compiled"), "welds");
+  for (const char* joint : {"OA", "AB", "BC", "OC"}) {
+    EXPECT_NEAR(LastAngle(on, joint), LastAngle(off, joint), kSameRun) << joint;
+  }
+}
+
+TEST(CompiledSceneTest, TrussBecomesGround) {
+  const Record on = RunWith(Shipped("truss"), CompileOptions());
+  const Record off = RunWith(Shipped("truss"), CompileOptions::None());
+  EXPECT_EQ(on.Text("compiled"), "immovable");
+  for (const char* joint : {"D", "E"}) {
+    EXPECT_NEAR(LastAngle(on, joint), LastAngle(off, joint), kSameRun) << joint;
+  }
+}
+
+TEST(CompiledSceneTest, IslandsRunAloneAndAddUp) {
+  CompileOptions options;
+  options.islands = true;
+  const Record parts = RunWith(Shipped("four-islands"), options);
+  const Record whole = RunWith(Shipped("four-islands"), CompileOptions());
+  const Record one = RunWith(Shipped("four-bar"), CompileOptions());
+  EXPECT_EQ(parts.Text("compiled"), "islands");
+  EXPECT_EQ(whole.Find("compiled"), nullptr);
+  ASSERT_EQ(parts.Text("outcome"), "finished");
+  // the same four-bar four times, but for where the ground's origin is
+  EXPECT_NEAR(parts.Number("steps"), 4 * one.Number("steps"), 4.0);
+  EXPECT_EQ(parts.Number("rank_min"), 8);
+  EXPECT_EQ(whole.Number("rank_min"), 8);
+  EXPECT_LT(parts.Number("energy_error_max"), kSameRun);
+  for (const char* loop : {"OCa", "OCb", "OCc", "OCd"}) {
+    EXPECT_NE(parts.Find(std::string("drift.loop.") + loop), nullptr) << loop;
+  }
+}
+
+TEST(CompiledSceneTest, ObservedAnglesFollowTheirBodies) {
+  // what is observed is a small body welded to the pendulum at 0.3 rad
+  MechanismFile file = Shipped("pendulum");
+  MechanismDescription& d = file.description;
+  d.bodies.push_back(Bar("tag", 0.1, 1e-9, 1e-9));
+  JointDescription weld;
+  weld.name = "W";
+  weld.type = JointType::kWeld;
+  weld.from = {1, {0.5, 0.0, 0.0}, {0.0, 0.0, 0.3}};
+  weld.to.body = 2;
+  d.joints.push_back(weld);
+  file.observe.closed_form->body = "tag";
+  file.observe.closed_form->down_angle += 0.3;
+  for (const CompileOptions& options : {CompileOptions(), CompileOptions::None()}) {
+    const Record record = RunWith(file, options);
+    ASSERT_EQ(record.Text("outcome"), "finished") << record.Text("message");
+    // the tag's mass changes the pendulum's frequency by some 1e-9
+    EXPECT_LT(record.Number("closed_form_error_max"), 1e-7) << ToString(options);
+  }
+}
+
+TEST(MergePartsTest, TakesTheWorstAndAddsTheWork) {
+  harness::Run a, b;
+  a.record.Set("outcome", std::string("finished"));
+  b.record.Set("outcome", std::string("singular"));
+  b.record.Set("message", std::string("lost"));
+  for (harness::Run* run : {&a, &b}) {
+    run->record.Set("rank_min", std::int64_t{2});
+    run->record.Set("steps", std::int64_t{10});
+    run->record.Set("wall_s", 0.5);
+    run->record.Set("energy_error_max", 1e-3);
+  }
+  a.record.Set("t_reached", 2.0);
+  b.record.Set("t_reached", 1.0);
+  a.record.Set("drift_position_max", 1e-6);
+  b.record.Set("drift_position_max", 1e-5);
+  a.record.Set("worst_loop", std::string("x"));
+  b.record.Set("worst_loop", std::string("y"));
+  a.drift = {{0.0, 1.0, 2.0}, {0.0, 3.0, 1.0}};
+  b.drift = {{0.0, 0.5, 1.0}, {0.0, 2.0, 1.0}};
+  const harness::Run parts[] = {a, b};
+  const harness::Run whole = MergeParts(parts);
+  EXPECT_EQ(whole.record.Text("outcome"), "singular");
+  EXPECT_EQ(whole.record.Text("message"), "lost");
+  EXPECT_EQ(whole.record.Number("t_reached"), 1.0);
+  EXPECT_EQ(whole.record.Number("steps"), 20.0);
+  EXPECT_EQ(whole.record.Number("rank_min"), 4.0);
+  EXPECT_EQ(whole.record.Text("worst_loop"), "y");
+  EXPECT_DOUBLE_EQ(whole.record.Number("energy_error_max"), 2e-3);
+  EXPECT_EQ(whole.drift.t, (std::vector<double>{0.0, 0.5, 1.0, 2.0}));
+  EXPECT_EQ(whole.drift.value, (std::vector<double>{0.0, 2.0, 3.0, 1.0}));
+}
+
+}  // namespace
+}  // namespace loopbench::harness

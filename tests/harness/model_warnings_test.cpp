@@ -1,0 +1,76 @@
+#include "harness/analysis/model_warnings.h"
+
+#include <gtest/gtest.h>
+
+#include <algorithm>
+
+#include "harness/config/mechanism_reader.h"
+#include "tests/harness/cli_fixture.h"
+
+namespace loopbench::harness {
+namespace {
+
+std::vector<WarningKind> Kinds(const MechanismDescription& description) {
+  std::vector<WarningKind> kinds;
+  for (const Warning& one : FindWarnings(description, AnalyseStructure(description))) {
+    kinds.push_back(one.kind);
+  }
+  return kinds;
+}
+
+MechanismDescription Scene(const std::string& name) {
+  return ReadMechanism(kConfigs / ("mechanisms/" + name + ".json")).description;
+}
+
+using Found = std::vector<WarningKind>;
+
+TEST(ModelWarningsTest, SoundScenesHaveNone) {
+  for (const char* name : {"four-bar", "seven-bar", "general-seven-bar", "pendulum",
+                           "square-four-bar", "square-seven-bar", "parallelogram", "toggle"}) {
+    EXPECT_EQ(Kinds(Scene(name)), Found{}) << name;
+  }
+}
+
+TEST(ModelWarningsTest, SingularStartsAreNamed) {
+  for (const char* name : {"parallelogram-singular-start", "toggle-singular-start"}) {
+    EXPECT_EQ(Kinds(Scene(name)), Found{WarningKind::kSingularStart}) << name;
+  }
+}
+
+TEST(ModelWarningsTest, MassesFarApartAreNamed) {
+  MechanismDescription scene = Scene("four-bar");
+  scene.bodies[2].mass = 0.99e8;
+  EXPECT_EQ(Kinds(scene), Found{});
+  scene.bodies[2].mass = 1.01e8;
+  EXPECT_EQ(Kinds(scene), Found{WarningKind::kMassRatio});
+}
+
+TEST(ModelWarningsTest, FloatingPartsAreNamed) {
+  MechanismDescription scene = Scene("four-bar");
+  scene.bodies.push_back(scene.bodies[1]);
+  scene.bodies.back().name = "loose";
+  const auto warnings = FindWarnings(scene, AnalyseStructure(scene));
+  ASSERT_EQ(warnings.size(), 1u);
+  EXPECT_EQ(warnings[0].kind, WarningKind::kFloating);
+  EXPECT_NE(warnings[0].text.find("loose"), std::string::npos);
+}
+
+using ExplainMechanismTest = CommandLineTest;
+
+TEST_F(ExplainMechanismTest, NamesLoopsAndEndsWell) {
+  ExpectEnding(Call("explain four-bar.json"), 0,
+               {"OC OA AB BC", "1 by counting", "1 by rank", "Redundant constraints: 0"});
+}
+
+TEST_F(ExplainMechanismTest, StartThatDoesNotCloseIsSaidAfterAllElse) {
+  EditMechanism("\"C\": [1.5, 0.0]", "\"C\": [5.0, 0.0]");
+  ExpectEnding(Call("explain four-bar.json"), 2,
+               {"OC OA AB BC", "Plan of O-DCA", "closed by joint \"OC\" does not close"});
+}
+
+TEST_F(ExplainMechanismTest, ExperimentOptionsAreRefused) {
+  ExpectEnding(Call("explain four-bar.json --filter mechanism=a"), 2, {"are for experiments"});
+}
+
+}  // namespace
+}  // namespace loopbench::harness

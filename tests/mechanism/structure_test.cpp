@@ -1,0 +1,192 @@
+// Facts of mechanisms whose structure is known on paper.
+#include "mechanism/structure.h"
+
+#include <gtest/gtest.h>
+
+#include <cmath>
+#include <numbers>
+
+#include "harness/config/mechanism_reader.h"
+#include "mechanism/library.h"
+
+namespace loopbench {
+namespace {
+
+MechanismDescription Scene(const std::string& name) {
+  return harness::ReadMechanism(std::string(LOOPBENCH_SOURCE_DIR) + "/configs/mechanisms/" + name +
+                                ".json")
+      .description;
+}
+
+TEST(StructureTest, FourBarHasOneLoopThroughAllItsJoints) {
+  const Structure s = AnalyseStructure(Scene("four-bar"));
+  EXPECT_EQ(s.bodies, 3);
+  EXPECT_EQ(s.joints, 4);
+  EXPECT_EQ(s.rows, 8);
+  EXPECT_EQ(s.counted_freedom, 1);
+  EXPECT_EQ(s.freedom(), 1);
+  EXPECT_EQ(s.freedom_at_start(), 1);
+  EXPECT_EQ(s.rank, 2);
+  EXPECT_TRUE(s.redundant.empty());
+  EXPECT_FALSE(s.locked());
+  EXPECT_FALSE(s.singular_start());
+  ASSERT_EQ(s.loops.size(), 1u);
+  EXPECT_EQ(s.loops[0].cut_joint, 3);
+  EXPECT_EQ(s.loops[0].joints, (std::vector<int>{3, 0, 1, 2}));  // OC, then from ground again
+  EXPECT_EQ(s.loops[0].bodies, (std::vector<int>{0, 1, 2, 3}));
+  EXPECT_LT(s.loops[0].open_shift, 1e-13);
+  ASSERT_EQ(s.islands.size(), 1u);
+  EXPECT_TRUE(s.islands[0].grounded);
+  EXPECT_EQ(s.joint_u, 3);
+  EXPECT_EQ(s.absolute_u, 9);
+}
+
+TEST(StructureTest, PlanarLoopInSpaceHasThreeNamedRedundantDirections) {
+  MechanismDescription scene = Scene("four-bar");
+  scene.space = SpaceKind::kSpatial;
+  const Structure s = AnalyseStructure(scene);
+  EXPECT_EQ(s.counted_freedom, -2) << "6 * 3 - 5 * 4";
+  EXPECT_EQ(s.freedom(), 1);
+  EXPECT_EQ(s.rank, 2);
+  // of a pin normal to the plane: what would tip the bars or push them out of the plane
+  ASSERT_EQ(s.redundant.size(), 3u);
+  std::string named;
+  for (const RedundantDirection& one : s.redundant) {
+    EXPECT_EQ(one.joint, 3);
+    EXPECT_FALSE(one.ground_axes);
+    named += std::string(one.moment ? "m" : "f") + one.axis + " ";
+  }
+  EXPECT_EQ(named, "mx my fz ");
+}
+
+TEST(StructureTest, SevenBarHasTwoLoopsAndTwoFreedoms) {
+  const Structure s = AnalyseStructure(Scene("seven-bar"));
+  EXPECT_EQ(s.counted_freedom, 2) << "3 * 6 - 2 * 8";
+  EXPECT_EQ(s.freedom(), 2);
+  EXPECT_EQ(s.rank, 4);
+  EXPECT_TRUE(s.redundant.empty());
+  ASSERT_EQ(s.loops.size(), 2u);
+  EXPECT_EQ(s.loops[0].joints, (std::vector<int>{6, 0, 1, 2}));     // OC, OA, AB, BC
+  EXPECT_EQ(s.loops[1].joints, (std::vector<int>{7, 1, 3, 4, 5}));  // FB, AB, AD, DE, EF
+  EXPECT_EQ(s.loops[1].bodies, (std::vector<int>{2, 1, 4, 5, 6})) << "not through ground";
+}
+
+TEST(StructureTest, FlatParallelogramIsSingularNotRedundant) {
+  const Structure s = AnalyseStructure(Scene("parallelogram-singular-start"));
+  EXPECT_EQ(s.rank, 1);
+  EXPECT_EQ(s.rank_nearby, 2);
+  EXPECT_TRUE(s.singular_start());
+  EXPECT_EQ(s.freedom_at_start(), 2);
+  EXPECT_EQ(s.freedom(), 1);
+  EXPECT_TRUE(s.redundant.empty()) << "the loop is closed by both directions elsewhere";
+}
+
+/// Three equal cranks on one coupler: one more than needed, and it moves nevertheless.
+MechanismDescription ThreeCranks() {
+  const Eigen::Vector3d O = Eigen::Vector3d::Zero(), tip = Eigen::Vector3d::UnitX();
+  MechanismDescription d;
+  d.name = "three-cranks";
+  d.gravity = {0.0, -9.81, 0.0};
+  for (const char* name : {"c1", "c2", "c3"}) d.bodies.push_back(Bar(name, 1.0, 1.0, 1.0));
+  d.bodies.push_back(Bar("coupler", 2.0, 1.0, 1.0));
+  for (int i = 0; i < 3; ++i) {
+    d.joints.push_back(Revolute("O" + std::to_string(i), 0, i * tip, i + 1, O));
+    d.initial.coordinates.push_back({i, {-1.0}});
+  }
+  d.joints.push_back(Revolute("T0", 1, tip, 4, O));
+  d.initial.coordinates.push_back({3, {1.0}});
+  d.joints.push_back(Revolute("T1", 2, tip, 4, tip));
+  d.joints.push_back(Revolute("T2", 3, tip, 4, 2.0 * tip));
+  return d;
+}
+
+TEST(StructureTest, ThirdCrankIsRedundantEverywhere) {
+  const Structure s = AnalyseStructure(ThreeCranks());
+  EXPECT_EQ(s.counted_freedom, 0);
+  EXPECT_EQ(s.rank, 3);
+  EXPECT_EQ(s.rank_nearby, 3);
+  EXPECT_FALSE(s.singular_start());
+  EXPECT_EQ(s.freedom(), 1);
+  EXPECT_EQ(s.redundant.size(), 1u);
+}
+
+TEST(StructureTest, LoopsThroughGroundOnlyAreSeparateParts) {
+  MechanismDescription two = Scene("four-bar");
+  const MechanismDescription one = two;
+  for (std::size_t i = 1; i < one.bodies.size(); ++i) {
+    two.bodies.push_back(one.bodies[i]);
+    two.bodies.back().name += "b";
+  }
+  for (JointDescription joint : one.joints) {
+    joint.name += "b";
+    if (joint.from.body != kGround) joint.from.body += 3;
+    if (joint.to.body != kGround) joint.to.body += 3;
+    two.joints.push_back(joint);
+  }
+  for (JointValues values : one.initial.coordinates) {
+    values.joint += 4;
+    two.initial.coordinates.push_back(values);
+  }
+  two.bodies.push_back(Bar("loose", 1.0, 1.0, 1.0));
+  const Structure s = AnalyseStructure(two);
+  ASSERT_EQ(s.islands.size(), 3u);
+  EXPECT_EQ(s.islands[0].bodies, (std::vector<int>{1, 2, 3}));
+  EXPECT_EQ(s.islands[1].bodies, (std::vector<int>{4, 5, 6}));
+  EXPECT_TRUE(s.islands[1].grounded);
+  EXPECT_EQ(s.islands[2].bodies, (std::vector<int>{7}));
+  EXPECT_FALSE(s.islands[2].grounded);
+  EXPECT_EQ(s.freedom(), 1 + 1 + 3);
+  ASSERT_EQ(s.loops.size(), 2u);
+  EXPECT_EQ(s.loops[1].bodies, (std::vector<int>{0, 4, 5, 6}));
+}
+
+TEST(StructureTest, TriangleOfBarsIsLocked) {
+  const Eigen::Vector3d O = Eigen::Vector3d::Zero(), tip = Eigen::Vector3d::UnitX();
+  MechanismDescription d;
+  d.name = "triangle";
+  d.bodies.push_back(Bar("left", 1.0, 1.0, 1.0));
+  d.bodies.push_back(Bar("right", 1.0, 1.0, 1.0));
+  d.joints = {Revolute("A", 0, O, 1, O), Revolute("B", 0, tip, 2, O),
+              Revolute("C", 1, tip, 2, tip)};
+  d.initial.coordinates = {{0, {1.0}}, {1, {2.0}}};
+  const Structure s = AnalyseStructure(d);
+  EXPECT_EQ(s.start.outcome, Outcome::kLocked);
+  EXPECT_TRUE(s.locked());
+  EXPECT_EQ(s.freedom(), 0);
+}
+
+TEST(StructureTest, LoopThatCannotCloseIsMeasured) {
+  MechanismDescription scene = Scene("four-bar");
+  scene.joints[3].to.position.x() = 5.0;  // the first bar is held, the others reach 2 m
+  const Structure s = AnalyseStructure(scene);
+  EXPECT_EQ(s.start.outcome, Outcome::kInconsistentStart);
+  ASSERT_EQ(s.loops.size(), 1u);
+  // a minimum of the squared gap: known to the square root of round-off
+  EXPECT_NEAR(s.loops[0].open_shift, std::hypot(5.0 - std::cos(1.0), std::sin(1.0)) - 2.0, 1e-6);
+  EXPECT_EQ(s.bodies, 3);
+}
+
+TEST(StructureTest, NearlyFlatTriangleIsBadlyConditioned) {
+  // an arch of two bars whose joint stands h above the line through the supports
+  for (const double h : {1e-1, 1e-3}) {
+    const Eigen::Vector3d O = Eigen::Vector3d::Zero();
+    const double length = std::hypot(1.0, h);
+    MechanismDescription d;
+    d.name = "arch";
+    d.bodies.push_back(Bar("left", length, 1.0, 1.0));
+    d.bodies.push_back(Bar("right", length, 1.0, 1.0));
+    const Eigen::Vector3d tip = length * Eigen::Vector3d::UnitX();
+    d.joints = {Revolute("A", 0, O, 1, O), Revolute("B", 0, {2.0, 0.0, 0.0}, 2, O),
+                Revolute("C", 1, tip, 2, tip)};
+    d.initial.coordinates = {{0, {std::atan2(h, 1.0)}},
+                             {1, {std::numbers::pi - std::atan2(h, 1.0)}}};
+    const Structure s = AnalyseStructure(d);
+    // the second direction is lost like the height
+    EXPECT_LT(s.conditioning(), 3.0 * h);
+    EXPECT_GT(s.conditioning(), 0.1 * h);
+    EXPECT_EQ(s.rank, 2);
+  }
+}
+
+}  // namespace
+}  // namespace loopbench

@@ -56,8 +56,8 @@ TEST_P(PendulumDrift, IsBelowThePublishedOneOfBdf) {
 std::vector<Column> BothLevels() {
   std::vector<Column> columns;
   for (Column column : RankRevealingColumns()) {
-    if (column.formulation == FormulationKind::kReduction) continue;
     columns.push_back(column);
+    if (column.formulation == FormulationKind::kReduction) continue;
     column.enforcement = Enforcement::kVelocity;
     columns.push_back(column);
   }
@@ -66,24 +66,6 @@ std::vector<Column> BothLevels() {
 
 INSTANTIATE_TEST_SUITE_P(Columns, PendulumDrift, testing::ValuesIn(BothLevels()),
                          [](const auto& column) { return NameOf(column.param); });
-
-// Reduction integrates one of the bob's two speeds at a time and changes it twice a swing; the
-// error control does not see the other one, and the state returns less well than the bound above
-// asks for: to 0.011 m/s at 1e-8. It converges.
-TEST(PendulumDriftOfReduction, ConvergesInCartesianCoordinates) {
-  const Column reduction{.formulation = FormulationKind::kReduction,
-                         .enforcement = Enforcement::kVelocity,
-                         .coordinates = Coordinates::kAbsolute,
-                         .solver = SolverKind::kRankRevealing};
-  double coarse = 0.0, fine = 0.0;
-  for (const double rtol : {1e-5, 1e-6, 1e-7, 1e-8, 1e-9}) {
-    const PendulumErrors row = RodPendulum(reduction, rtol);
-    Print(ToString(reduction), row);
-    (rtol == 1e-5 ? coarse : fine) = row.vy;
-  }
-  // four decades of tolerance, three of them in the error
-  EXPECT_LE(fine, 1e-3 * coarse);
-}
 
 }  // namespace
 }  // namespace loopbench::harness::reference

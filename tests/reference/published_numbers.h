@@ -22,6 +22,10 @@ inline constexpr std::array<PathPoint, 4> kA01Published = {{{0.5, -0.391049, -0.
                                                             {1.5, 0.884132, -0.467237},
                                                             {10.0, -0.275087, -0.961419}}};
 
+/// The end of the same file.
+inline constexpr std::array<PathPoint, 2> kA01PublishedLate = {
+    {{1999.5, 0.995044, -0.0994392}, {2000.0, 0.814603, -0.580019}}};
+
 /// The same, derived.
 inline constexpr std::array<PathPoint, 4> kA01Derived = {
     {{0.5, -0.3910487915505463, -0.9203699487851922},

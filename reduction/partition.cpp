@@ -65,6 +65,11 @@ S PartitionCondition(const MatrixX<S>& J, const Partition<S>& partition) {
       J_D(k, i) = J(partition.rows[k], partition.dependent[i]);
     }
   }
+  // one pivot has no other to be compared with: the largest it could be
+  if (J_D.size() == 1) {
+    using std::abs;
+    return abs(J_D(0, 0)) / J.row(partition.rows[0]).cwiseAbs().maxCoeff();
+  }
   const Eigen::ColPivHouseholderQR<MatrixX<S>> qr(J_D);
   const auto pivots = qr.matrixQR().diagonal().cwiseAbs();
   return pivots.minCoeff() / pivots.maxCoeff();

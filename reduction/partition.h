@@ -25,7 +25,7 @@ int GeometricRank(const Kinematics<Space, S>& kinematics, TreeDynamics<Space, S>
 template <class S>
 Partition<S> BestPartition(const MatrixX<S>& J, int rank);
 
-/// rcond of a given partition at the current J.
+/// rcond of a given partition at the current J; of a single constraint its pivot over the best one.
 template <class S>
 S PartitionCondition(const MatrixX<S>& J, const Partition<S>& partition);
 

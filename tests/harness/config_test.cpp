@@ -54,7 +54,8 @@ TEST(ShippedMechanisms, HoldAsManyJointsAsTheyHaveDegreesOfFreedom) {
     const auto bodies = static_cast<int>(mechanism.bodies.size()) - 1;
     const int freedom = 3 * bodies - 2 * static_cast<int>(mechanism.joints.size());
     EXPECT_EQ(static_cast<int>(mechanism.initial.held.size()), freedom) << file;
-    // One name for joint coordinates and one for absolute ones.
+    // One name for joint coordinates and one for absolute ones; without any they are chosen.
+    if (mechanism.independent.empty()) continue;
     EXPECT_EQ(static_cast<int>(mechanism.independent.size()), 2 * freedom) << file;
     ++planar;
   }

@@ -120,7 +120,7 @@ JointDescription ReadJoint(const JsonNode& node, const Draft& draft) {
     joint.type = static_cast<JointType>(type->Choice(JointTypeNames(), "a joint type").value_or(0));
     if (draft.space == SpaceKind::kPlanar && !ExistsInPlane(joint.type)) {
       type->Fail("a joint of the plane, or \"space\": \"spatial\"");
-      joint.type = JointType::kRevolute;
+      return joint;  // what else it has cannot be judged
     }
   }
   joint.from = ReadSide(node, "from", draft);

@@ -34,9 +34,12 @@ template <class Space>
 class FormulationOde final : public Ode {
  public:
   explicit FormulationOde(Formulation<Space, double>& formulation, bool with_work = false)
-      : formulation_(formulation), with_work_(with_work) {}
-  int size() const override { return formulation_.state_size() + num_quadratures(); }
-  int num_quadratures() const override { return with_work_ ? 2 : 0; }
+      : formulation_(formulation), with_work_(with_work || formulation.state_size() == 0) {}
+  int size() const override { return formulation_.state_size() + (with_work_ ? 2 : 0); }
+  /// Where prescribed motions leave no state, the work itself is what is integrated.
+  int num_quadratures() const override {
+    return with_work_ && formulation_.state_size() > 0 ? 2 : 0;
+  }
   Outcome Derivative(double t, std::span<const double> y, std::span<double> ydot) override {
     const std::size_t n = static_cast<std::size_t>(formulation_.state_size());
     const Outcome outcome = formulation_.Derivative(t, y.first(n), ydot.first(n));

@@ -21,7 +21,24 @@ bool Drives<Space, S>::Followed(const Kinematics<Space, S>& kinematics, const Ve
     size = std::max(
         {size, A_[joint.from].norm(), A_[joint.to].norm(), kinematics.joints()[index].g.norm()});
   }
-  return worst <= S(kFollowed) * size;
+  if (worst <= S(kFollowed) * size) return true;
+  return worst <= S(kOfMismatch) * RelativeMismatch(kinematics) * size;
+}
+
+/// Of joints that have come apart, accelerations are inconsistent by as much as their positions
+/// are, or their speeds.
+template <class Space, class S>
+S Drives<Space, S>::RelativeMismatch(const Kinematics<Space, S>& kinematics) {
+  const Mechanism<Space, S>& mechanism = kinematics.mechanism();
+  S position = S(0), speed = S(0), size = S(0);
+  for (int index : mechanism.constraints()) {
+    const Motion<Space, S> mismatch = kinematics.ConstraintMismatch(index);
+    position = std::max({position, mismatch.template head<Space::kRot>().norm(),
+                         mismatch.template tail<Space::kLin>().norm() / mechanism.length()});
+    speed = std::max(speed, kinematics.ConstraintSpeed(index).norm());
+  }
+  for (const Motion<Space, S>& V : kinematics.motions()) size = std::max(size, V.norm());
+  return position + (size > S(0) ? speed / size : S(0));
 }
 
 template <class Space, class S>

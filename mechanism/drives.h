@@ -15,7 +15,8 @@ class Drives {
   explicit Drives(const Mechanism<Space, S>& mechanism);
 
   /// Whether accelerations `udot` satisfy every constraint, to kFollowed of the largest
-  /// acceleration they are made of. Speeds must be current.
+  /// acceleration they are made of; where joints have drifted apart, redundant constraints
+  /// contradict each other by as much, which is no fault of the drives. Speeds must be current.
   bool Followed(const Kinematics<Space, S>& kinematics, const VectorX<S>& udot);
 
   /// Power [W] that drives put into the mechanism: force along each times its prescribed rate.
@@ -26,6 +27,10 @@ class Drives {
  private:
   /// Solvers leave some 1e-12 of a consistent system; what is inconsistent leaves much more.
   static constexpr double kFollowed = 1e-6;
+  /// Times the relative mismatch of positions and speeds.
+  static constexpr double kOfMismatch = 10.0;
+
+  static S RelativeMismatch(const Kinematics<Space, S>& kinematics);
 
   TreeDynamics<Space, S> dynamics_;
   std::vector<Motion<Space, S>> A_, F_;

@@ -27,7 +27,9 @@ void AddRankWarnings(const MechanismDescription& description, const Structure& s
                                                 structure.joint_u, kMostAnalysedSpeeds)});
     return;
   }
-  if (structure.locked() && structure.bodies > 0) {
+  const bool driven = std::ranges::any_of(
+      description.joints, [](const JointDescription& joint) { return !joint.motions.empty(); });
+  if (structure.locked() && structure.bodies > 0 && !driven) {
     std::string joints;
     for (const LoopPath& loop : structure.loops) {
       joints += (joints.empty() ? "" : ", ") + description.joints[loop.cut_joint].name;

@@ -52,7 +52,8 @@ TEST(ShippedMechanisms, HoldAsManyJointsAsTheyHaveDegreesOfFreedom) {
     // are run (tests/reference/shipped_mechanisms_test.cpp).
     if (mechanism.space != SpaceKind::kPlanar || !revolute) continue;
     const auto bodies = static_cast<int>(mechanism.bodies.size()) - 1;
-    const int freedom = 3 * bodies - 2 * static_cast<int>(mechanism.joints.size());
+    int freedom = 3 * bodies - 2 * static_cast<int>(mechanism.joints.size());
+    for (const auto& joint : mechanism.joints) freedom -= static_cast<int>(joint.motions.size());
     EXPECT_EQ(static_cast<int>(mechanism.initial.held.size()), freedom) << file;
     // One name for joint coordinates and one for absolute ones; without any they are chosen.
     if (mechanism.independent.empty()) continue;

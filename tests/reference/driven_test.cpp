@@ -1,0 +1,196 @@
+// Prescribed motions: what is known of driven mechanisms beforehand, and motions that cannot be.
+#include <gtest/gtest.h>
+
+#include <array>
+#include <cmath>
+
+#include "mechanism/assembly.h"
+#include "mechanism/library.h"
+#include "tests/reference/cases.h"
+#include "tests/reference/simulate.h"
+
+namespace loopbench::harness::reference {
+namespace {
+
+constexpr double kRtol = 1e-9;
+
+MechanismFile Shipped(const std::string& name) {
+  return ReadMechanism(kConfigs / "mechanisms" / (name + ".json"));
+}
+
+class Driven : public testing::TestWithParam<Column> {};
+
+std::string NameOfParam(const testing::TestParamInfo<Column>& info) { return NameOf(info.param); }
+
+Record RunFile(const MechanismFile& file, const Column& column, double horizon) {
+  const Experiment experiment = Single(file);
+  return RunCase(experiment, CaseOf(experiment, file.description.name, column, kRtol, horizon));
+}
+
+/// Rocker angle of configs/mechanisms/driven-four-bar.json for a crank angle: where the circle of
+/// the coupler about B meets that of the rocker about C, on the left of BC.
+double RockerAngle(double crank) {
+  const Eigen::Vector2d B(0.4 * std::cos(crank), 0.4 * std::sin(crank)), C(1.0, 0.0);
+  const double d = (C - B).norm(), along = (1.2 * 1.2 - 1.0 + d * d) / (2 * d);
+  const Eigen::Vector2d e = (C - B) / d, n(-e.y(), e.x());
+  const Eigen::Vector2d from_C = B + along * e + std::sqrt(1.44 - along * along) * n - C;
+  return std::atan2(from_C.y(), from_C.x());
+}
+
+TEST_P(Driven, CrankRockerFollowsItsGeometry) {
+  const MechanismDescription description = Shipped("driven-four-bar").description;
+  double worst = 0.0;
+  const auto angle = [](const BodyState& body) { return std::atan2(body.R(1, 0), body.R(0, 0)); };
+  const Simulation run = Simulate(
+      description, GetParam(), Options("dormand-prince", kRtol), 10.0, [&](const Snapshot& at) {
+        const double crank = 0.5 + 3.0 * at.t;
+        const double rocker = angle(at.bodies[BodyNamed(description, "rocker")]);
+        worst = std::max(worst, std::abs(std::remainder(rocker - RockerAngle(crank), 2 * M_PI)));
+        const double miss = angle(at.bodies[BodyNamed(description, "crank")]) - crank;
+        worst = std::max(worst, std::abs(std::remainder(miss, 2 * M_PI)));
+      });
+  ASSERT_EQ(run.result.outcome, Outcome::kFinished) << run.result.message;
+  // errors of rtol per step, some 500 steps, and of speeds over 10 s at acceleration level
+  EXPECT_LE(worst, 1e4 * kRtol);
+  EXPECT_LE(run.energy_error, 1e4 * kRtol) << "of some 10 J";
+}
+
+TEST_P(Driven, DriftHoldsWhatTheDriveMisses) {
+  const Record record = RunFile(Shipped("driven-four-bar"), GetParam(), 5.0);
+  ASSERT_EQ(record.Text("outcome"), "finished");
+  EXPECT_GT(record.Number("energy_supplied"), 0.0) << "the damper takes it";
+  // in absolute coordinates q - s(t) is a rotation that drifts; in joint ones there is none
+  const bool absolute = GetParam().coordinates == Coordinates::kAbsolute;
+  EXPECT_EQ(record.Number("drift_rotation_max") > 0.0, absolute);
+  EXPECT_LE(record.Number("drift_rotation_max"), 1e4 * kRtol);
+}
+
+TEST_P(Driven, ScrewJackLiftsByItsTorque) {
+  const MechanismDescription description = Shipped("screw-jack").description;
+  // Multipliers share what redundant constraints contradict each other by among all joints of the
+  // loop; these then come apart as exp(speed t) in absolute coordinates (docs/numerics.md), 25
+  // rad/s and more from 1 s on.
+  const bool comes_apart = GetParam().formulation == FormulationKind::kLagrange &&
+                           GetParam().coordinates == Coordinates::kAbsolute;
+  const double after = comes_apart ? 0.0 : 2.0;  // [s] beyond the first
+  const Simulation run =
+      Simulate(description, GetParam(), Options("dormand-prince", kRtol), 1.0 + after, {});
+  ASSERT_EQ(run.result.outcome, Outcome::kFinished) << run.result.message;
+  // torque 2 + 4 t up to 1 s, 6 afterwards, less the load: integrated twice
+  const double pitch = 0.005, inertia = 0.05 + 50.0 * pitch * pitch, load = 50.0 * 9.81 * pitch;
+  const double speed_1 = 2.0 + 2.0 - load, angle_1 = 1.0 + 4.0 / 6.0 - load / 2;
+  const double angle = (angle_1 + speed_1 * after + (6.0 - load) * after * after / 2) / inertia;
+  // of 50 rad after a hundred steps or so
+  const BodyState& nut = run.last.bodies[BodyNamed(description, "nut")];
+  EXPECT_NEAR(nut.p.z(), pitch * angle, 1e3 * kRtol);
+  EXPECT_LE(run.energy_error, 1e5 * kRtol) << "of some 300 J";
+}
+
+/// A bar that hangs from a slider with a given motion.
+MechanismDescription CartPendulum(const TimeFunctionDescription& motion) {
+  MechanismDescription d;
+  d.name = "cart-pendulum";
+  d.gravity = {0.0, -9.81, 0.0};
+  d.bodies.push_back(Bar("cart", 1.0, 1.0, 1.0));
+  d.bodies.push_back(Bar("bar", 1.0, 2.0, 0.3));
+  JointDescription slide =
+      Revolute("slide", kGround, Eigen::Vector3d::Zero(), 1, Eigen::Vector3d::Zero());
+  slide.type = JointType::kPrismatic;
+  slide.motions = {{0, motion}};
+  d.joints = {slide, Revolute("pin", 1, Eigen::Vector3d::Zero(), 2, Eigen::Vector3d::Zero())};
+  d.initial.coordinates = {{1, {-1.0}}};
+  d.initial.held = {1};
+  return d;
+}
+
+/// Angle of its bar at `end` by the classical method with steps of 1e-3 s between knots: errors of
+/// some 1e-12.
+double BarAngle(const TimeFunctionDescription& motion, double end) {
+  const TimeFunction s(motion);
+  const double mass = 2.0, arm = 0.5, inertia = 0.3 + mass * arm * arm;
+  const auto rate = [&](double t, const Eigen::Vector2d& y) {
+    // the pin's acceleration along x acts as gravity turned about
+    const double a = s.At(t).acceleration;
+    return Eigen::Vector2d(y[1],
+                           mass * arm * (-9.81 * std::cos(y[0]) + a * std::sin(y[0])) / inertia);
+  };
+  Eigen::Vector2d y(-1.0, 0.0);
+  const double h = 1e-3;
+  for (int i = 0; i < std::lround(end / h); ++i) {
+    const double t = i * h;
+    const Eigen::Vector2d k1 = rate(t, y), k2 = rate(t + h / 2, y + h / 2 * k1),
+                          k3 = rate(t + h / 2, y + h / 2 * k2), k4 = rate(t + h, y + h * k3);
+    y += h / 6 * (k1 + 2 * k2 + 2 * k3 + k4);
+  }
+  return y[0];
+}
+
+TEST_P(Driven, BarOnAMovedSliderSwingsAsItsEquationSays) {
+  const TimeTable table{.times = {0.0, 0.5, 0.8, 1.7, 2.0}, .values = {0.0, 0.3, 0.1, -0.2, 0.0}};
+  for (const TimeFunctionDescription& motion : std::initializer_list<TimeFunctionDescription>{
+           Harmonic{.amplitude = 0.2, .omega = 6.0}, Polynomial{{0.0, 0.1, 0.4}}, table}) {
+    const MechanismDescription description = CartPendulum(motion);
+    const Simulation run =
+        Simulate(description, GetParam(), Options("dormand-prince", kRtol), 2.0, {});
+    ASSERT_EQ(run.result.outcome, Outcome::kFinished) << run.result.message;
+    const Eigen::Matrix3d& R = run.last.bodies[2].R;
+    const double angle = std::atan2(R(1, 0), R(0, 0));
+    EXPECT_NEAR(std::remainder(angle - BarAngle(motion, 2.0), 2 * M_PI), 0.0, 1e3 * kRtol);
+    EXPECT_LE(run.energy_error, 1e4 * kRtol);
+  }
+}
+
+/// Both cranks of a parallelogram driven: consistent, or not.
+MechanismDescription TwoDrives(const Polynomial& first, const Polynomial& second) {
+  MechanismDescription d = Ladder(1, 1.0, 0.0);
+  d.initial = {};
+  for (JointDescription& joint : d.joints) {
+    if (joint.from.body != kGround) continue;
+    joint.motions = {{0, d.joints[0].motions.empty() ? first : second}};
+  }
+  d.name = "two-drives";
+  return d;
+}
+
+TEST_P(Driven, TwoDrivesMustAgree) {
+  const auto outcome = [&](const Polynomial& first, const Polynomial& second) {
+    const IntegratorResult run =
+        Simulate(TwoDrives(first, second), GetParam(), Options("dormand-prince", kRtol), 1.0, {})
+            .result;
+    return run.outcome;
+  };
+  EXPECT_EQ(outcome({{1.0, 0.5}}, {{1.0, 0.5}}), Outcome::kFinished) << "redundant, but consistent";
+  EXPECT_EQ(outcome({{1.0, 0.5}}, {{1.2, 0.5}}), Outcome::kInconsistentStart) << "positions";
+  EXPECT_EQ(outcome({{1.0, 0.5}}, {{1.0, 0.6}}), Outcome::kInconsistentStart) << "speeds";
+  EXPECT_EQ(outcome({{1.0, 0.5}}, {{1.0, 0.5, 0.1}}), Outcome::kInconsistentMotion);
+}
+
+TEST_P(Driven, TriangleIsLocked) {
+  MechanismDescription d;
+  d.name = "triangle";
+  d.bodies.push_back(Bar("left", 1.0, 1.0, 0.1));
+  d.bodies.push_back(Bar("right", 1.0, 1.0, 0.1));
+  const Eigen::Vector3d tip(1.0, 0.0, 0.0), C(1.0, 0.0, 0.0), zero = Eigen::Vector3d::Zero();
+  d.joints = {Revolute("O", kGround, zero, 1, zero), Revolute("C", kGround, C, 2, zero),
+              Revolute("T", 1, tip, 2, tip)};
+  d.initial.coordinates = {{0, {1.0}}, {1, {2.0}}};
+  const Simulation run = Simulate(d, GetParam(), Options("dormand-prince", kRtol), 1.0, {});
+  EXPECT_EQ(run.result.outcome, Outcome::kLocked);
+  EXPECT_NE(run.result.message.find("nothing can move"), std::string::npos);
+}
+
+TEST_P(Driven, ArmWithAllJointsDrivenHasNothingToIntegrate) {
+  MechanismDescription d = CartPendulum(Harmonic{.amplitude = 0.2, .omega = 6.0});
+  d.joints[1].motions = {{0, Polynomial{{-1.0, 2.0}}}};
+  d.initial = {};
+  const Simulation run = Simulate(d, GetParam(), Options("dormand-prince", kRtol), 2.0, {});
+  ASSERT_EQ(run.result.outcome, Outcome::kFinished) << run.result.message;
+  const BodyState& bar = run.last.bodies[2];
+  EXPECT_NEAR(bar.p.x(), 0.2 * std::sin(12.0) + 0.5 * std::cos(3.0), 1e4 * kRtol);
+  EXPECT_LE(run.energy_error, 1e4 * kRtol);
+}
+
+INSTANTIATE_TEST_SUITE_P(Columns, Driven, testing::ValuesIn(RankRevealingColumns()), NameOfParam);
+
+}  // namespace
+}  // namespace loopbench::harness::reference

@@ -6,6 +6,7 @@
 #include <array>
 #include <cctype>
 #include <filesystem>
+#include <ostream>
 #include <stdexcept>
 #include <string>
 #include <vector>
@@ -13,6 +14,13 @@
 #include "harness/config/experiment_reader.h"
 #include "harness/config/mechanism_reader.h"
 #include "harness/run_case.h"
+
+namespace loopbench::harness {
+
+/// Keeps addresses out of the test list.
+inline void PrintTo(const Column& column, std::ostream* out) { *out << ToString(column); }
+
+}  // namespace loopbench::harness
 
 namespace loopbench::harness::reference {
 

@@ -15,7 +15,8 @@ class Drives {
   explicit Drives(const Mechanism<Space, S>& mechanism);
 
   /// Whether accelerations `udot` satisfy every constraint, to kFollowed of the largest
-  /// acceleration they are made of. Speeds must be current.
+  /// acceleration they are made of and kRoundOff of the largest that forces would cause in a body
+  /// alone: bodies that loops hold still have no other size. Speeds must be current.
   bool Followed(const Kinematics<Space, S>& kinematics, const VectorX<S>& udot);
 
   /// Power [W] that drives put into the mechanism: force along each times its prescribed rate.
@@ -26,6 +27,7 @@ class Drives {
  private:
   /// Solvers leave some 1e-12 of a consistent system; what is inconsistent leaves much more.
   static constexpr double kFollowed = 1e-6;
+  static constexpr double kRoundOff = 1e-10;
 
   TreeDynamics<Space, S> dynamics_;
   std::vector<Motion<Space, S>> A_, F_;

@@ -130,7 +130,9 @@ class Assembler {
     double damping = 1e-3;
     // what rounding leaves of a closure that passes through every body
     const double goal = 16 * std::numeric_limits<double>::epsilon() * Extent();
-    for (int i = 0; i < kMaxIterations && e.template lpNorm<Eigen::Infinity>() > goal; ++i) {
+    // where every coordinate is prescribed there is nothing to move
+    const int iterations = mechanism_.num_u() > 0 ? kMaxIterations : 0;
+    for (int i = 0; i < iterations && e.template lpNorm<Eigen::Infinity>() > goal; ++i) {
       kinematics_.UpdatePosition(start_.q);
       MatrixX<double> J;
       dynamics_.Jacobian(kinematics_, J);
@@ -206,7 +208,8 @@ class Assembler {
     }
     const VectorX<double> miss = target - J * start_.u;
     const double size = 1.0 + target.norm() + start_.u.norm() * Extent();
-    if (miss.norm() > 64 * std::numeric_limits<double>::epsilon() * size) {
+    const bool off = miss.norm() > 64 * std::numeric_limits<double>::epsilon() * size;
+    if (off && mechanism_.num_u() > 0) {
       Eigen::CompleteOrthogonalDecomposition<MatrixX<double>> solver(J_free);
       start_.u += solver.solve(miss);
     }

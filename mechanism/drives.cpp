@@ -21,7 +21,15 @@ bool Drives<Space, S>::Followed(const Kinematics<Space, S>& kinematics, const Ve
     size = std::max(
         {size, A_[joint.from].norm(), A_[joint.to].norm(), kinematics.joints()[index].g.norm()});
   }
-  if (worst <= S(kFollowed) * size) return true;
+  AppliedForces<Space, S>(kinematics, F_);
+  S alone = S(0);
+  for (int body = 1; body < kinematics.mechanism().num_bodies(); ++body) {
+    const Inertia<Space, S>& inertia = kinematics.mechanism().bodies()[body];
+    const Angular<Space, S> moment = F_[body].template head<Space::kRot>();
+    alone = std::max({alone, (kinematics.RotationalInverse(inertia, body) * moment).norm(),
+                      F_[body].template tail<Space::kLin>().norm() / inertia.mass});
+  }
+  if (worst <= S(kFollowed) * size + S(kRoundOff) * alone) return true;
   return worst <= S(kOfMismatch) * RelativeMismatch(kinematics) * size;
 }
 

@@ -15,8 +15,10 @@ class Drives {
   explicit Drives(const Mechanism<Space, S>& mechanism);
 
   /// Whether accelerations `udot` satisfy every constraint, to kFollowed of the largest
-  /// acceleration they are made of; where joints have drifted apart, redundant constraints
-  /// contradict each other by as much, which is no fault of the drives. Speeds must be current.
+  /// acceleration they are made of and kRoundOff of the largest that forces would cause in a body
+  /// alone: bodies that loops hold still have no other size. Where joints have drifted apart,
+  /// redundant constraints contradict each other by as much, which is no fault of the drives.
+  /// Speeds must be current.
   bool Followed(const Kinematics<Space, S>& kinematics, const VectorX<S>& udot);
 
   /// Power [W] that drives put into the mechanism: force along each times its prescribed rate.
@@ -27,6 +29,7 @@ class Drives {
  private:
   /// Solvers leave some 1e-12 of a consistent system; what is inconsistent leaves much more.
   static constexpr double kFollowed = 1e-6;
+  static constexpr double kRoundOff = 1e-10;
   /// Times the relative mismatch of positions and speeds.
   static constexpr double kOfMismatch = 10.0;
 

@@ -99,7 +99,7 @@ void LoopSolver<S>::FactorGeometric(const ConstRef& X_geometric) {
   using std::exp;
   form_ = Form::kGeometric;
   SymmetricEigen<S>(Scaled(X_geometric), directions_, eigenvalues_);
-  const S largest = eigenvalues_[size_ - 1];
+  const S largest = std::max(eigenvalues_[size_ - 1], S(kLeastResponse));
   const S theta = S(kTheta) * largest;
   rank_ = 0;
   for (int i = 0; i < size_; ++i) {

@@ -2,6 +2,7 @@
 
 #include <Eigen/Cholesky>
 #include <Eigen/SVD>
+#include <algorithm>
 #include <cmath>
 
 #include "mechanism/tree_dynamics.h"
@@ -33,7 +34,9 @@ ScaledLoops ScaleLoops(const Kinematics<Space, double>& kinematics) {
   if (J.rows() > 0 && J.cols() > 0) {
     const Eigen::BDCSVD<Eigen::MatrixXd> svd(scaled.B, Eigen::ComputeFullV);
     scaled.singular_values = svd.singularValues();
-    const double least = kRankRatio * scaled.singular_values[0];
+    const double largest =
+        std::max(scaled.singular_values[0], std::sqrt(LoopSolver<double>::kLeastResponse));
+    const double least = kRankRatio * largest;
     scaled.rank = static_cast<int>((scaled.singular_values.array() > least).count());
     null = svd.matrixV().rightCols(J.cols() - scaled.rank);
   }

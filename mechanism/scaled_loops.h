@@ -7,7 +7,8 @@
 //   B = K_g^-1 J L^-T
 //
 // lie between 0 and the square root of the number of constraints; those below kRankRatio of the
-// largest count as zero. Dense: for analyses before a run.
+// largest (which counts as 0.1 at least: between rigid parts all are round-off) count as zero.
+// Dense: for analyses before a run.
 #pragma once
 
 #include "mechanism/kinematics.h"

@@ -22,7 +22,8 @@ class Odca final : public Formulation<Space, S> {
   const Sweep<Space, S>& sweep() const { return sweep_; }
 
   /// Constraint force of a user joint after an evaluation: [moment; force] on Q at the joint's
-  /// point, ground axes. Unique only where the joint's loops carry no self-stress.
+  /// point, ground axes. Unique only where the joint's loops carry no self-stress. Zero where the
+  /// coordinate set has no free speed: then nothing is evaluated.
   Motion<Space, S> JointForce(int joint) const;
 
  private:

@@ -27,6 +27,14 @@ int Grow(Builder& b, int root, int n) {
   return root;
 }
 
+/// A joint of any kind that the space has.
+JointType AnyJoint(Builder& b) {
+  for (;;) {
+    const auto type = static_cast<JointType>(b.random.Below(kNumJointTypes));
+    if (b.spatial || ExistsInPlane(type)) return type;
+  }
+}
+
 MechanismDescription DrawGraph(int n, int loops, SpaceKind space, std::uint64_t seed,
                                int least_freedom) {
   Builder b("graph-" + std::to_string(n) + "-" + std::to_string(loops), space, seed);
@@ -131,8 +139,8 @@ MechanismDescription MixedGraph(int loops, SpaceKind space, std::uint64_t seed, 
   Builder b("mixed-" + std::to_string(loops), space, seed);
   const auto any = [&b] {
     for (;;) {
-      const auto type = static_cast<JointType>(b.random.Below(kNumJointTypes));
-      if (type != JointType::kFree && (b.spatial || ExistsInPlane(type))) return type;
+      const JointType type = AnyJoint(b);
+      if (type != JointType::kFree) return type;
     }
   };
   const auto grow = [&](int root, int least_freedom) {
@@ -175,6 +183,26 @@ MechanismDescription TightGraph(int n, int loops, SpaceKind space, std::uint64_t
 
 MechanismDescription RedundantGraph(int n, int loops, SpaceKind space, std::uint64_t seed) {
   return DrawGraph(n, loops, space, seed, space == SpaceKind::kSpatial ? 4 : 2);
+}
+
+MechanismDescription AnyMechanism(int n, int closures, int motions, SpaceKind space,
+                                  std::uint64_t seed) {
+  Builder b("any-" + std::to_string(n) + "-" + std::to_string(closures), space, seed);
+  for (int i = 1; i <= n; ++i) {
+    JointType type = AnyJoint(b);
+    while (type == JointType::kRod) type = AnyJoint(b);  // not in a tree
+    const int parent = b.random.Chance(0.6) ? i - 1 : b.random.Below(i);
+    const Eigen::Vector3d at_parent = b.random.Vector(0.7, b.spatial);
+    const int body = b.AddBody(1.0);
+    b.AddJoint(type, parent, at_parent, body, b.random.Vector(0.7, b.spatial),
+               b.random.Uniform(-2.0, 2.0));
+  }
+  for (int k = 0; k < closures; ++k) {
+    const int to = 1 + b.random.Below(n), from = (to + 1 + b.random.Below(n)) % (n + 1);
+    b.Close(AnyJoint(b), from, to, b.random.Vector(0.7, b.spatial), b.random.Uniform(-1.0, 1.0));
+  }
+  if (!b.description.initial.coordinates.empty()) b.AddMotions(motions);
+  return b.Finish();
 }
 
 MechanismDescription RandomLadder(int n, SpaceKind space, std::uint64_t seed) {

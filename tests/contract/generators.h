@@ -66,6 +66,12 @@ MechanismDescription TightGraph(int n, int loops, SpaceKind space, std::uint64_t
 /// The same with short loops and without that care: parts are rigid or over-constrained.
 MechanismDescription RedundantGraph(int n, int loops, SpaceKind space, std::uint64_t seed);
 
+/// Anything goes: a tree of n bodies with joints of every kind but rods, closed between random
+/// bodies by joints of every kind, rods among them; parts may be rigid, over-constrained, or the
+/// whole locked. Up to `motions` coordinates follow given motions, which loops may forbid.
+MechanismDescription AnyMechanism(int n, int closures, int motions, SpaceKind space,
+                                  std::uint64_t seed);
+
 /// A state of a mechanism: (q, u) in its own coordinates, rounded to double.
 struct State {
   VectorX<double> q, u;

@@ -2,6 +2,7 @@
 
 #include <Eigen/Geometry>
 #include <Eigen/LU>
+#include <algorithm>
 
 #include "tests/contract/oracle_geometry.h"
 
@@ -86,6 +87,12 @@ Answer Oracle::Solve(const RealVector& q, const RealVector& u) {
   return answer;
 }
 
+RealMatrix Oracle::ScaledConstraints(const RealVector& q) {
+  const Equations e = Form(q, RealVector::Zero(layout_.num_u));
+  const RealMatrix J = JointScales() * e.J;
+  return SolveLower(CholeskyFactor(e.M), J.transpose()).transpose();
+}
+
 /// K^-1 of every constraint along the diagonal, K K^T the response across it of its two bodies
 /// alone.
 RealMatrix Oracle::JointScales() const {
@@ -118,11 +125,13 @@ void Oracle::Rank(const RealMatrix& M, const RealMatrix& J, Answer& answer) cons
   if (answer.rows == 0) return;
   const RealMatrix W = SolveLower(CholeskyFactor(M), J.transpose());
   const RealVector lambda = SymmetricEigenvalues(W.transpose() * W);
-  // squares of lengths: rounding the state to double leaves 1e-32, forming the product 1e-19
-  const Real zero = Real(1e-14) * lambda[answer.rows - 1];
+  // squares of lengths: rounding the state to double leaves 1e-32, forming the product 1e-19. The
+  // rows are scaled, so that bodies free to answer give one: where none is, all is round-off.
+  const Real zero = Real(1e-14) * std::max(Real(1), lambda[answer.rows - 1]);
   int first = 0;
-  while (lambda[first] < zero) ++first;
+  while (first < answer.rows && lambda[first] < zero) ++first;
   answer.rank = answer.rows - first;
+  if (answer.rank == 0) return;
   answer.rcond = static_cast<double>(lambda[first] / lambda[answer.rows - 1]);
 }
 

@@ -93,6 +93,9 @@ class Oracle {
   JetPose JointPose(int joint, const std::vector<JetPose>& poses) const;
   Equations Form(const RealVector& q, const RealVector& u);
   Answer Solve(const RealVector& q, const RealVector& u);
+  /// K^-1 J L^-T with K as in Answer::rcond and M = L L^T: rows of constraints, columns of speeds.
+  /// Its singular values squared are the spectrum that rcond is taken of; no product is formed.
+  RealMatrix ScaledConstraints(const RealVector& q);
   /// d/dt of all closures: J u and what prescribed motions add.
   RealVector ClosureRates(const RealVector& q, const RealVector& u) const;
   /// The speeds nearest to u that keep the closures.

@@ -93,6 +93,8 @@ class Oracle {
   JetPose JointPose(int joint, const std::vector<JetPose>& poses) const;
   Equations Form(const RealVector& q, const RealVector& u);
   Answer Solve(const RealVector& q, const RealVector& u);
+  /// c(q): zero where every constraint holds.
+  RealVector ClosureMismatches(const RealVector& q) const;
   /// d/dt of all closures: J u and what prescribed motions add.
   RealVector ClosureRates(const RealVector& q, const RealVector& u) const;
   /// The speeds nearest to u that keep the closures.

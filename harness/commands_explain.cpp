@@ -82,6 +82,11 @@ void ExplainChoices(const Experiment& experiment) {
   if (any([](const Column& c) { return c.enforcement == Enforcement::kVelocity; })) {
     fmt::print("  velocity: the speeds satisfy the loops too; positions follow by integration.\n");
   }
+  if (any([](const Column& c) { return c.enforcement == Enforcement::kPosition; })) {
+    fmt::print(
+        "  position: as acceleration, and after each accepted step positions and speeds are moved "
+        "back to where the loops hold.\n");
+  }
   if (any([](const Column& c) { return c.coordinates == Coordinates::kJoint; })) {
     fmt::print(
         "  joint: the coordinates are those of the joints, but for one cut joint per loop, "

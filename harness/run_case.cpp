@@ -73,6 +73,9 @@ class Runner {
       condition_.Write(run.record);
       exact_.Write(run.record);
       if (with_series_) angles_.Write(run.record);
+      if (case_.column.enforcement == Enforcement::kPosition) {
+        run.record.Set("correction_max", correction_);
+      }
       run.record.Set("state_hash", StateHash(y_));
     }
     run.record.Set("outcome", std::string(ToString(result.outcome)));
@@ -107,6 +110,7 @@ class Runner {
     const StepObserver observe = [&](double t, std::span<double> y_and_work) {
       const std::span<double> y = y_and_work.first(n), work = y_and_work.subspan(n);
       const bool restart = formulation->BeginStep(t, y);
+      correction_ = std::max(correction_, formulation->correction().shift);
       // a derivative that fails here fails in the integrator's next call, with its outcome; only
       // what the failing matrix looked like is worth keeping
       const Outcome outcome = formulation->Derivative(t, y, ydot);
@@ -140,6 +144,7 @@ class Runner {
   ExactObserver<Space> exact_;
   AngleObserver<Space> angles_;
   bool with_series_;
+  double correction_ = 0.0;  ///< largest mismatch that a projection took away [m]
   std::vector<double> y_;
 };
 

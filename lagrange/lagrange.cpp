@@ -149,6 +149,15 @@ Outcome Lagrange<Space, S>::CompleteSpeeds() {
 }
 
 template <class Space, class S>
+Outcome Lagrange<Space, S>::Correct(const VectorX<S>& violation, VectorX<S>& change) {
+  if (const Outcome outcome = FactorOnce(); outcome != Outcome::kFinished) return outcome;
+  force_.setZero();
+  target_ = -violation;
+  SolveConstrained(force_, target_, change);
+  return change.allFinite() ? Outcome::kFinished : Outcome::kNonFinite;
+}
+
+template <class Space, class S>
 Outcome Lagrange<Space, S>::Accelerations() {
   if (const Outcome outcome = FactorOnce(); outcome != Outcome::kFinished) return outcome;
   dynamics_.Bias(kinematics_, h_);

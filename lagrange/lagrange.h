@@ -28,6 +28,7 @@ class Lagrange final : public Formulation<Space, S> {
 
  private:
   Outcome CompleteSpeeds() override;
+  Outcome Correct(const VectorX<S>& violation, VectorX<S>& change) override;
   Outcome Accelerations() override;
   void Multipliers(VectorX<S>& lambda) override { lambda = lambda_; }
   /// M, J and the factors of (1) or S at the current positions, once per position.

@@ -1,15 +1,33 @@
 #include "mechanism/formulation.h"
 
+#include <algorithm>
+#include <limits>
+
 #include "mechanism/instantiate.h"
 
 namespace loopbench {
 
 std::string_view ToString(Enforcement enforcement) {
-  return enforcement == Enforcement::kAcceleration ? "acceleration" : "velocity";
+  switch (enforcement) {
+    case Enforcement::kAcceleration:
+      return "acceleration";
+    case Enforcement::kVelocity:
+      return "velocity";
+    case Enforcement::kPosition:
+      return "position";
+  }
+  return "unknown";
 }
 std::string_view ToString(SolverKind solver) {
   return solver == SolverKind::kAsPublished ? "as-published" : "rank-revealing";
 }
+
+namespace {
+
+/// Newton converges in two or three steps from what one accepted step leaves.
+constexpr int kMostProjections = 10;
+
+}  // namespace
 
 template <class Space, class S>
 Formulation<Space, S>::Formulation(const Mechanism<Space, S>& mechanism, FormulationOptions options)
@@ -19,6 +37,12 @@ Formulation<Space, S>::Formulation(const Mechanism<Space, S>& mechanism, Formula
       q_(VectorX<S>::Zero(mechanism.num_q())),
       u_(VectorX<S>::Zero(mechanism.num_u())),
       udot_(VectorX<S>::Zero(mechanism.num_u())) {
+  if (options.enforcement == Enforcement::kPosition) {
+    violation_.setZero(mechanism.num_rows());
+    change_of_state_.setZero(mechanism.num_u());
+    moved_.setZero(mechanism.num_q());
+    step_.setZero(mechanism.num_q());
+  }
   if (mechanism.drives().empty()) return;
   drives_ = std::make_unique<Drives<Space, S>>(mechanism);
   lambda_of_drives_.setZero(mechanism.num_rows());
@@ -45,11 +69,15 @@ void Formulation<Space, S>::ToState(const VectorX<S>& q, const VectorX<S>& u,
 
 template <class Space, class S>
 Outcome Formulation<Space, S>::FromState(S t, std::span<const S> y) {
-  kinematics_.SetTime(t);
   const int num_q = mechanism_.num_q();
+  // right after a projection the positions are those it ended with, and so is what was assembled
+  const bool projected =
+      projected_ && t == kinematics_.time() && std::equal(q_.begin(), q_.end(), y.begin());
+  projected_ = false;
+  kinematics_.SetTime(t);
   for (int i = 0; i < num_q; ++i) q_[i] = y[i];
   for (int i = 0; i < num_state_speeds(); ++i) u_[state_speed(i)] = y[num_q + i];
-  kinematics_.UpdatePosition(q_);
+  if (!projected) kinematics_.UpdatePosition(q_);
   Outcome outcome = Outcome::kFinished;
   if (options_.enforcement == Enforcement::kVelocity && mechanism_.num_u() > 0) {
     outcome = CompleteSpeeds();
@@ -89,6 +117,7 @@ Outcome Formulation<Space, S>::Derivative(S t, std::span<const S> y, std::span<S
 template <class Space, class S>
 Outcome Formulation<Space, S>::Evaluate(S t, const VectorX<S>& q, const VectorX<S>& u,
                                         VectorX<S>& udot) {
+  projected_ = false;
   kinematics_.SetTime(t);
   q_ = q;
   u_ = u;
@@ -102,10 +131,76 @@ Outcome Formulation<Space, S>::Evaluate(S t, const VectorX<S>& q, const VectorX<
 template <class Space, class S>
 bool Formulation<Space, S>::BeginStep(S t, std::span<S> y) {
   if (FromState(t, y) != Outcome::kFinished) return false;  // the next evaluation will say why
+  const bool projects = options_.enforcement == Enforcement::kPosition &&
+                        mechanism_.num_rows() > 0 && mechanism_.num_u() > 0;
+  if (projects && Project() != Outcome::kFinished) return false;  // likewise
   kinematics_.AcceptStep();
-  if (!ChangeMode()) return false;
+  const bool changed = ChangeMode();
+  if (!projects && !changed) return false;
+  projected_ = projects;
   ToState(q_, u_, y);
   return true;
+}
+
+template <class Space, class S>
+void Formulation<Space, S>::PositionViolation(Correction<S>& largest) {
+  largest.shift = largest.rotation = S(0);
+  for (int index : mechanism_.constraints()) {
+    const Joint<Space, S>& joint = mechanism_.joints()[index];
+    const auto D = kinematics_.joints()[index].D();
+    const Motion<Space, S> all = kinematics_.ConstraintMismatch(index);
+    Motion<Space, S> constrained = Motion<Space, S>::Zero();
+    for (int r = 0; r < joint.num_constraints(); ++r) {
+      violation_[joint.row + r] = D.col(r).dot(all);
+      constrained += D.col(r) * violation_[joint.row + r];
+    }
+    largest.rotation = std::max(largest.rotation, constrained.template head<Space::kRot>().norm());
+    largest.shift = std::max(largest.shift, constrained.template tail<Space::kLin>().norm());
+  }
+}
+
+template <class Space, class S>
+Outcome Formulation<Space, S>::Project() {
+  // what rounding leaves of poses that went through all bodies
+  const S goal = S(4) * std::numeric_limits<S>::epsilon() * S(mechanism_.num_bodies());
+  const auto size = [&](const Correction<S>& c) {
+    return std::max(c.rotation, c.shift / mechanism_.length());
+  };
+  Correction<S> now;
+  PositionViolation(now);
+  correction_ = now;
+  for (int i = 0; i < kMostProjections && size(now) > goal; ++i) {
+    if (const Outcome outcome = Correct(violation_, change_of_state_);
+        outcome != Outcome::kFinished) {
+      return outcome;
+    }
+    const S before = size(now);
+    moved_ = q_;
+    mechanism_.Rates(q_, change_of_state_, step_);
+    q_ += step_;
+    mechanism_.Normalise(q_);
+    kinematics_.UpdatePosition(q_);
+    PositionViolation(now);
+    ++correction_.iterations;
+    if (!(size(now) < before)) {  // round-off, or a direction that is softened: as it was
+      q_ = moved_;
+      kinematics_.UpdatePosition(q_);
+      break;
+    }
+  }
+  kinematics_.UpdateVelocity(u_);
+  for (int index : mechanism_.constraints()) {
+    const Joint<Space, S>& joint = mechanism_.joints()[index];
+    violation_.segment(joint.row, joint.num_constraints()) =
+        kinematics_.ConstraintSpeed(index).head(joint.num_constraints());
+  }
+  if (const Outcome outcome = Correct(violation_, change_of_state_);
+      outcome != Outcome::kFinished) {
+    return outcome;
+  }
+  u_ += change_of_state_;
+  kinematics_.UpdateVelocity(u_);
+  return q_.allFinite() && u_.allFinite() ? Outcome::kFinished : Outcome::kNonFinite;
 }
 
 template <class Space, class S>

@@ -24,6 +24,8 @@ namespace loopbench {
 enum class Enforcement {
   kAcceleration,  ///< accelerations satisfy the constraints, speeds are integrated as they come
   kVelocity,      ///< speeds used in the right-hand side satisfy them too
+  kPosition,      ///< as kAcceleration, and after each accepted step positions, then speeds are
+                  ///< projected back to the constraints
 };
 
 enum class SolverKind {
@@ -47,6 +49,13 @@ struct Diagnostics {
   double rcond = 1.0;  ///< ratio of extreme pivots or eigenvalues of the formulation's own matrix
   double smallest_weight = 1.0;  ///< below 1: some direction was softened
   int worst_joint = -1;          ///< index of the joint behind rcond, -1 when not attributable
+};
+
+/// What a projection of positions found.
+template <class S>
+struct Correction {
+  S shift = S(0), rotation = S(0);
+  int iterations = 0;  ///< Newton steps, each with an assembly of its own
 };
 
 template <class Space, class S>
@@ -79,12 +88,17 @@ class Formulation {
   const VectorX<S>& u() const { return u_; }
   const VectorX<S>& udot() const { return udot_; }
 
-  /// Accepts the step that ended in `y` at time t. True when the mode changed: then the state's
+  /// Accepts the step that ended in `y` at time t. True when the state was projected or the mode
+  /// changed: then the state's
   /// meaning may have changed too, `y` is rewritten and the integrator must restart.
   bool BeginStep(S t, std::span<S> y);
 
   /// Power [W] that prescribed motions supply, after a successful evaluation. O(n); 0 without them.
   S DrivePower();
+
+  /// Largest mismatch of points [m] and of rotations [rad] that the last projection found and took
+  /// away; 0 at other levels.
+  const Correction<S>& correction() const { return correction_; }
 
   const Kinematics<Space, S>& kinematics() const { return kinematics_; }
   const Diagnostics& diagnostics() const { return diagnostics_; }
@@ -97,6 +111,10 @@ class Formulation {
 
   /// Makes u_ satisfy the constraints (positions current, velocity level only).
   virtual Outcome CompleteSpeeds() = 0;
+  /// A change of speeds with J change = -violation at the current positions, one row per constraint
+  /// row: the smallest in the metric M, unless the formulation has terms of its own. Directions in
+  /// which constraints have lost rank are softened as in Accelerations().
+  virtual Outcome Correct(const VectorX<S>& violation, VectorX<S>& change) = 0;
   /// udot_ from current positions and speeds; sets diagnostics_.
   virtual Outcome Accelerations() = 0;
   /// Multipliers of all constraint rows after Accelerations(): D lambda is the force on Q.
@@ -114,11 +132,18 @@ class Formulation {
   Diagnostics diagnostics_;
 
  private:
+  /// Newton's method on the mismatch of positions, then one step on that of speeds.
+  Outcome Project();
+  /// D^T mismatch of all constraints in violation_, its largest parts in `largest`.
+  void PositionViolation(Correction<S>& largest);
   /// Accelerations(), unless nothing is free, and whether prescribed motions can be followed.
   Outcome Solve();
 
   std::unique_ptr<Drives<Space, S>> drives_;  ///< null without prescribed motions
   VectorX<S> lambda_of_drives_;
+  Correction<S> correction_;
+  bool projected_ = false;                                 ///< the last call was a projection
+  VectorX<S> violation_, change_of_state_, moved_, step_;  ///< of projections
 };
 
 }  // namespace loopbench

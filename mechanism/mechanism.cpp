@@ -222,6 +222,14 @@ void Mechanism<Space, S>::NameSpeeds(const MechanismDescription& description) {
 }
 
 template <class Space, class S>
+void Mechanism<Space, S>::Normalise(VectorX<S>& q) const {
+  for (const TreeStep& step : tree_) {
+    const Joint<Space, S>& joint = joints_[step.joint];
+    if (joint.kind->has_quaternion()) q.template segment<4>(joint.q_offset).normalize();
+  }
+}
+
+template <class Space, class S>
 void Mechanism<Space, S>::Rates(const VectorX<S>& q, const VectorX<S>& u,
                                 Eigen::Ref<VectorX<S>> qdot) const {
   for (const TreeStep& step : tree_) {

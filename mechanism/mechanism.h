@@ -111,6 +111,9 @@ class Mechanism {
   /// Indices of the user's independent speeds that exist in this coordinate set.
   const std::vector<int>& independent() const { return independent_; }
 
+  /// Quaternions in q to length one.
+  void Normalise(VectorX<S>& q) const;
+
   /// qdot = N(q) u.
   void Rates(const VectorX<S>& q, const VectorX<S>& u, Eigen::Ref<VectorX<S>> qdot) const;
 

@@ -83,6 +83,21 @@ Outcome Odca<Space, S>::CompleteSpeeds() {
 }
 
 template <class Space, class S>
+Outcome Odca<Space, S>::Correct(const VectorX<S>& violation, VectorX<S>& change) {
+  if (const Outcome outcome = AssembleOnce(); outcome != Outcome::kFinished) return outcome;
+  for (Motion<Space, S>& b : b_) b.setZero();
+  for (Motion<Space, S>& c0 : c0_) c0.setZero();
+  for (int index : mechanism_.constraints()) {
+    const Joint<Space, S>& joint = mechanism_.joints()[index];
+    c0_[index].head(joint.num_constraints()) =
+        violation.segment(joint.row, joint.num_constraints());
+  }
+  sweep_.Solve(b_, c0_, A_);
+  TreeMotions(A_, change);
+  return change.allFinite() ? Outcome::kFinished : Outcome::kNonFinite;
+}
+
+template <class Space, class S>
 Outcome Odca<Space, S>::Accelerations() {
   if (const Outcome outcome = AssembleOnce(); outcome != Outcome::kFinished) return outcome;
   AppliedForces<Space, S>(kinematics_, wrenches_);

@@ -28,6 +28,7 @@ class Odca final : public Formulation<Space, S> {
 
  private:
   Outcome CompleteSpeeds() override;
+  Outcome Correct(const VectorX<S>& violation, VectorX<S>& change) override;
   Outcome Accelerations() override;
   void Multipliers(VectorX<S>& lambda) override;
   Outcome AssembleOnce();

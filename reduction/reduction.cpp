@@ -126,6 +126,18 @@ Outcome Reduction<Space, S>::CompleteSpeeds() {
   return Outcome::kFinished;
 }
 
+/// Independent coordinates and speeds stay; the dependent ones follow.
+template <class Space, class S>
+Outcome Reduction<Space, S>::Correct(const VectorX<S>& violation, VectorX<S>& change) {
+  if (const Outcome outcome = FactorOnce(); outcome != Outcome::kFinished) return outcome;
+  change.setZero();
+  if (dependent_.empty()) return Outcome::kFinished;
+  for (std::size_t k = 0; k < rows_.size(); ++k) rows_rhs_[k] = -violation[rows_[k]];
+  dependent_speeds_ = lu_.solve(rows_rhs_);
+  for (std::size_t k = 0; k < dependent_.size(); ++k) change[dependent_[k]] = dependent_speeds_[k];
+  return change.allFinite() ? Outcome::kFinished : Outcome::kNonFinite;
+}
+
 template <class Space, class S>
 Outcome Reduction<Space, S>::Accelerations() {
   if (const Outcome outcome = FactorOnce(); outcome != Outcome::kFinished) return outcome;

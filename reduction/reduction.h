@@ -44,6 +44,7 @@ class Reduction final : public Formulation<Space, S> {
   int num_state_speeds() const override;
   int state_speed(int i) const override;
   Outcome CompleteSpeeds() override;
+  Outcome Correct(const VectorX<S>& violation, VectorX<S>& change) override;
   Outcome Accelerations() override;
   void Multipliers(VectorX<S>& lambda) override;
   bool ChangeMode() override;

@@ -30,7 +30,8 @@ template <>
 inline constexpr std::array<std::string_view, 3> kNames<FormulationKind> = {"odca", "lagrange",
                                                                             "reduction"};
 template <>
-inline constexpr std::array<std::string_view, 2> kNames<Enforcement> = {"acceleration", "velocity"};
+inline constexpr std::array<std::string_view, 3> kNames<Enforcement> = {"acceleration", "velocity",
+                                                                        "position"};
 template <>
 inline constexpr std::array<std::string_view, 2> kNames<Coordinates> = {"joint", "absolute"};
 template <>

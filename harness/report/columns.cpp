@@ -34,7 +34,10 @@ std::vector<TableColumn> CompactCaseColumns() {
   return {
       Make("mechanism", "mechanism"),
       Make("formulation", "formul."),
-      {"enforcement", "level", kText, {{"acceleration", "accel"}, {"velocity", "veloc"}}},
+      {"enforcement",
+       "level",
+       kText,
+       {{"acceleration", "accel"}, {"velocity", "veloc"}, {"position", "posit"}}},
       {"coordinates", "coord", kText, {{"absolute", "abs"}}},
       {"solver", "solv", kText, {{"as-published", "publ"}, {"rank-revealing", "rank"}}},
       Make("rtol", "rtol", kShortest),

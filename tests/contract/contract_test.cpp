@@ -41,7 +41,8 @@ std::string NameOf(const ::testing::TestParamInfo<Case>& info) {
 std::vector<Case> AllCases() {
   std::vector<Case> cases;
   for (const char* formulation : {"odca", "lagrange", "reduction"}) {
-    for (Enforcement enforcement : {Enforcement::kAcceleration, Enforcement::kVelocity}) {
+    for (Enforcement enforcement :
+         {Enforcement::kAcceleration, Enforcement::kVelocity, Enforcement::kPosition}) {
       for (SolverKind solver : {SolverKind::kAsPublished, SolverKind::kRankRevealing}) {
         for (Coordinates coordinates : {Coordinates::kJoint, Coordinates::kAbsolute}) {
           for (SpaceKind space : {SpaceKind::kPlanar, SpaceKind::kSpatial}) {
@@ -57,6 +58,12 @@ std::vector<Case> AllCases() {
 std::vector<Case> VelocityCases() {
   std::vector<Case> cases = AllCases();
   std::erase_if(cases, [](const Case& c) { return c.enforcement != Enforcement::kVelocity; });
+  return cases;
+}
+
+std::vector<Case> PositionCases() {
+  std::vector<Case> cases = AllCases();
+  std::erase_if(cases, [](const Case& c) { return c.enforcement != Enforcement::kPosition; });
   return cases;
 }
 
@@ -124,6 +131,7 @@ class ContractTest : public ::testing::TestWithParam<Case> {
   }
 };
 class VelocityContractTest : public ContractTest {};
+class PositionContractTest : public ContractTest {};
 
 TEST_P(ContractTest, AccelerationsAgreeWithTheOracle) {
   double worst = 0.0;
@@ -169,6 +177,57 @@ TEST_P(VelocityContractTest, SpeedsSatisfyTheLoops) {
     const Real scale =
         at_rest + J.cwiseAbs().rowwise().sum().maxCoeff() * u.template lpNorm<Eigen::Infinity>();
     EXPECT_LE(oracle.ClosureRates(q, u).template lpNorm<Eigen::Infinity>(), bench.Bound() * scale);
+  });
+}
+
+/// Seeds 6 and 10 have prescribed motions.
+TEST_P(PositionContractTest, AcceptedStepsAreProjectedToTheConstraints) {
+  for (std::uint64_t seed : {5, 6, 8, 10}) {
+    Run(Description(seed), seed, [&](auto bench) {
+      for (std::size_t i = 0; i < bench.y.size(); ++i) {
+        bench.y[i] += 1e-4 * std::sin(2.0 * static_cast<double>(i + 1));
+      }
+      ASSERT_TRUE(bench.formulation->BeginStep(0.0, std::span<double>(bench.y)));
+      EXPECT_GT(bench.formulation->correction().shift, 0.0);
+      Oracle oracle(bench.sample.description(), LayoutOf(bench.mechanism));
+      const RealVector q = ToReal(bench.formulation->q()), u = ToReal(bench.formulation->u());
+      // rows of lengths and speeds of some metres, through as many bodies
+      const double scale = 1.0 + static_cast<double>(q.norm() + u.norm());
+      EXPECT_LE(oracle.ClosureMismatches(q).template lpNorm<Eigen::Infinity>(),
+                bench.Bound() * scale);
+      EXPECT_LE(oracle.ClosureRates(q, u).template lpNorm<Eigen::Infinity>(),
+                bench.Bound() * scale * scale);
+      // once more: nothing is left to do
+      const std::vector<double> first = bench.y;
+      bench.formulation->BeginStep(0.0, std::span<double>(bench.y));
+      for (std::size_t i = 0; i < first.size(); ++i) {
+        EXPECT_NEAR(bench.y[i], first[i], bench.Bound() * scale);
+      }
+    });
+  }
+}
+
+/// Impulses of constraints alone change the speeds: M (u' - u) = J^T lambda.
+TEST_P(PositionContractTest, SpeedsChangeByImpulsesOfConstraints) {
+  if (std::string(GetParam().formulation) == "reduction") {
+    GTEST_SKIP() << "keeps its independent speeds instead";
+  }
+  Run(Description(8), 8, [&](auto bench) {
+    for (std::size_t i = bench.mechanism.num_q(); i < bench.y.size(); ++i) {
+      bench.y[i] += 0.1 * std::sin(2.0 * static_cast<double>(i + 1));
+    }
+    const int n = bench.mechanism.num_q();
+    const RealVector before =
+        ToReal(Eigen::Map<const VectorX<double>>(bench.y.data() + n, bench.mechanism.num_u()));
+    ASSERT_TRUE(bench.formulation->BeginStep(0.0, std::span<double>(bench.y)));
+    Oracle oracle(bench.sample.description(), LayoutOf(bench.mechanism));
+    const Equations e = oracle.Form(ToReal(bench.formulation->q()), ToReal(bench.formulation->u()));
+    const RealVector impulse = e.M * (ToReal(bench.formulation->u()) - before);
+    // what is left of it beside the range of J^T
+    const RealMatrix S = e.J * e.J.transpose();
+    const RealVector lambda = SolveFullPivot(S, e.J * impulse, Real(1e-15L));
+    const RealVector rest = impulse - e.J.transpose() * lambda;
+    EXPECT_LE(rest.norm(), bench.Bound() * impulse.norm());
   });
 }
 
@@ -339,6 +398,8 @@ TEST(AllocationTest, SofteningDoesNotAllocate) {
 }
 
 INSTANTIATE_TEST_SUITE_P(All, ContractTest, ::testing::ValuesIn(AllCases()), NameOf);
+INSTANTIATE_TEST_SUITE_P(PositionLevel, PositionContractTest, ::testing::ValuesIn(PositionCases()),
+                         NameOf);
 INSTANTIATE_TEST_SUITE_P(VelocityLevel, VelocityContractTest, ::testing::ValuesIn(VelocityCases()),
                          NameOf);
 

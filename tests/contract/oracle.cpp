@@ -182,6 +182,13 @@ RealMatrix Oracle::Jacobian(const RealVector& q) const {
   return J;
 }
 
+RealVector Oracle::ClosureMismatches(const RealVector& q) const {
+  const std::vector<Jet> c = Closures(Poses(q), true);
+  RealVector values(c.size());
+  for (std::size_t r = 0; r < c.size(); ++r) values[r] = c[r].f;
+  return values;
+}
+
 RealVector Oracle::ClosureRates(const RealVector& q, const RealVector& u) const {
   const std::vector<Jet> c = Closures(PosesAlong(Curve(q, u, true)), true);
   RealVector rates(c.size());

@@ -96,6 +96,8 @@ class Oracle {
   /// K^-1 J L^-T with K as in Answer::rcond and M = L L^T: rows of constraints, columns of speeds.
   /// Its singular values squared are the spectrum that rcond is taken of; no product is formed.
   RealMatrix ScaledConstraints(const RealVector& q);
+  /// c(q): zero where every constraint holds.
+  RealVector ClosureMismatches(const RealVector& q) const;
   /// d/dt of all closures: J u and what prescribed motions add.
   RealVector ClosureRates(const RealVector& q, const RealVector& u) const;
   /// The speeds nearest to u that keep the closures.

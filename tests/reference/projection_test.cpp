@@ -1,0 +1,87 @@
+// Level position: loops that stay closed, branches that are kept, orders that survive.
+#include <gtest/gtest.h>
+
+#include <cmath>
+#include <iostream>
+
+#include "tests/reference/cases.h"
+#include "tests/reference/simulate.h"
+
+namespace loopbench::harness::reference {
+namespace {
+
+/// All formulations at level position, rank-revealing, in both coordinate sets.
+std::vector<Column> PositionColumns() {
+  std::vector<Column> columns = RankRevealingColumns();
+  for (Column& column : columns) column.enforcement = Enforcement::kPosition;
+  return columns;
+}
+
+class Projection : public testing::TestWithParam<Column> {};
+
+MechanismFile Shipped(const std::string& name) {
+  return ReadMechanism(kConfigs / "mechanisms" / (name + ".json"));
+}
+
+Record RunShipped(const std::string& name, const Column& column, double tolerance, double horizon) {
+  const Experiment experiment = Single(Shipped(name));
+  return RunCase(experiment, CaseOf(experiment, name, column, tolerance, horizon));
+}
+
+TEST_P(Projection, KeepsLoopsClosedWhateverTheTolerance) {
+  for (const char* name : {"four-bar", "seven-bar", "slider-crank", "spatial-four-bar"}) {
+    for (const double tolerance : {1e-4, 1e-8}) {
+      const Record record = RunShipped(name, GetParam(), tolerance, 5.0);
+      ASSERT_EQ(record.Text("outcome"), "finished") << name << ": " << record.Text("message");
+      // round-off of poses of some metres that go through seven bodies at most
+      EXPECT_LE(record.Number("drift_position_max"), 1e-14) << name;
+      EXPECT_GT(record.Number("correction_max"), 0.0) << name;
+      EXPECT_LE(record.Number("correction_max"), 10 * tolerance) << name << ": a step's error";
+    }
+  }
+}
+
+/// Fixed steps against a run with tiny ones: projection takes away errors of the method's order,
+/// and adds none of a lower one.
+TEST_P(Projection, KeepsTheOrderOfTheIntegrator) {
+  const MechanismDescription scene = Shipped("four-bar").description;
+  for (const auto& [profile, order] : {std::pair{"bogacki-shampine", 3}, {"dormand-prince", 5}}) {
+    const auto end = [&](double step) {
+      IntegratorOptions options = Options(profile, 1e-3);
+      options.fixed_step = step;
+      const Simulation run = Simulate(scene, GetParam(), options, 1.6, {});
+      EXPECT_EQ(run.result.outcome, Outcome::kFinished);
+      return run.last.bodies[2].p;
+    };
+    const Eigen::Vector3d exact = end(0.0025);
+    const double coarse = (end(0.04) - exact).norm(), fine = (end(0.02) - exact).norm();
+    // terms of the next order at these steps; the tiny steps' own error is 8^-order of the fine one
+    EXPECT_NEAR(std::log2(coarse / fine), order, 0.5) << profile << " " << coarse << " " << fine;
+  }
+}
+
+/// Through the flat position some ten times: what no level below it does at every tolerance.
+TEST_P(Projection, ParallelogramKeepsItsBranch) {
+  for (const char* name : {"parallelogram", "parallelogram-singular-start"}) {
+    for (const double tolerance : {1e-6, 1e-8, 1e-10, 1e-12}) {
+      if (GetParam().formulation == FormulationKind::kReduction) continue;  // see the tables
+      const Record record = RunShipped(name, GetParam(), tolerance, 20.0);
+      ASSERT_EQ(record.Text("outcome"), "finished") << name << ": " << record.Text("message");
+      EXPECT_LE(record.Number("branch_error_max"), 1e-8) << name << " " << tolerance;
+      EXPECT_LE(record.Number("drift_position_max"), 1e-13) << name << " " << tolerance;
+      EXPECT_LE(record.Number("closed_form_error_max"), 100 * tolerance) << name;
+      EXPECT_LE(record.Number("energy_error_max"), 500 * tolerance) << name;
+      std::cout << name << " " << tolerance << ": branch " << record.Number("branch_error_max")
+                << ", closed form " << record.Number("closed_form_error_max") / tolerance
+                << " tol, energy " << record.Number("energy_error_max") / tolerance
+                << " tol, steps " << record.Number("steps") << ", rejected "
+                << record.Number("rejected") << "\n";
+    }
+  }
+}
+
+INSTANTIATE_TEST_SUITE_P(Columns, Projection, testing::ValuesIn(PositionColumns()),
+                         [](const auto& test) { return NameOf(test.param); });
+
+}  // namespace
+}  // namespace loopbench::harness::reference

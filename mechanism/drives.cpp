@@ -30,7 +30,8 @@ bool Drives<Space, S>::Followed(const Kinematics<Space, S>& kinematics, const Ve
                       F_[body].template tail<Space::kLin>().norm() / inertia.mass});
   }
   if (worst <= S(kFollowed) * size + S(kRoundOff) * alone) return true;
-  return worst <= S(kOfMismatch) * RelativeMismatch(kinematics) * size;
+  const S mismatch = RelativeMismatch(kinematics);
+  return mismatch <= S(kMostDrift) && worst <= S(kOfMismatch) * mismatch * size;
 }
 
 /// Of joints that have come apart, accelerations are inconsistent by as much as their positions

@@ -32,6 +32,8 @@ class Drives {
   static constexpr double kRoundOff = 1e-10;
   /// Times the relative mismatch of positions and speeds.
   static constexpr double kOfMismatch = 10.0;
+  /// Beyond this the mismatch is no drift: speeds that drives contradict miss each other in full.
+  static constexpr double kMostDrift = 1e-2;
 
   static S RelativeMismatch(const Kinematics<Space, S>& kinematics);
 

@@ -120,9 +120,8 @@ int main(int argc, char** argv) {
   plan_app->add_option("--filter", conditions, "Only cases with key=value[,value]");
   AddSettings(plan_app, &settings);
 
-  CLI::App* explain_app =
-      app.add_subcommand("explain",
-                         "Say what experiments run and measure, and what mechanisms are made of");
+  CLI::App* explain_app = app.add_subcommand(
+      "explain", "Say what experiments run and measure, and what mechanisms are made of");
   explain_app->add_option("file", files.paths, "Experiment or mechanism files (JSON)")->required();
   explain_app->add_option("--filter", conditions, "Only cases with key=value[,value]");
   AddSettings(explain_app, &settings);

@@ -37,8 +37,7 @@ std::string_view WhyNotForeign(std::string_view path, std::string_view header) {
     return header.starts_with("Eigen/") ? "" : "the core knows Eigen and the standard library";
   }
   if (StartsWithOneOf(header, {"arkode/", "cvode/", "ida/", "kinsol/", "nvector/", "sun"})) {
-    return path == "harness/integrator/arkode.cpp" ||
-                   path.starts_with("harness/integrator/arkode_")
+    return path == "harness/integrator/arkode.cpp" || path.starts_with("harness/integrator/arkode_")
                ? ""
                : "SUNDIALS is for harness/integrator/arkode.cpp and arkode_*";
   }

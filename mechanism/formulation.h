@@ -4,8 +4,8 @@
 // speeds do". It is used through
 //   Derivative(t, y)   the right-hand side for an integrator, y = (q, speeds of the state),
 //   Evaluate(t, q, u)  accelerations alone, for given q and all speeds u,
-//   BeginStep(t, y)    at accepted steps, the only call that may change the mode (an
-//                      independent set, unwrapped angles). Everything else is a pure function
+//   BeginStep(t, y)    at accepted steps, the only call that may project the state or change the
+//                      mode (an independent set, angles). Everything else is a pure function
 //                      of (t, q, u, mode): calling it in any order gives the same bits.
 // After construction O-DCA allocates nothing in any of them, the dense baselines nothing in a
 // derivative unless Eigen's workspace for one product exceeds a mebibyte (some 300 unknowns); what
@@ -89,8 +89,8 @@ class Formulation {
   const VectorX<S>& udot() const { return udot_; }
 
   /// Accepts the step that ended in `y` at time t. True when the state was projected or the mode
-  /// changed: then the state's
-  /// meaning may have changed too, `y` is rewritten and the integrator must restart.
+  /// changed, and with it perhaps the state's meaning: then `y` is rewritten and the integrator
+  /// must restart. After a projection that failed `y` is as it was; the next evaluation says why.
   bool BeginStep(S t, std::span<S> y);
 
   /// Power [W] that prescribed motions supply, after a successful evaluation. O(n); 0 without them.

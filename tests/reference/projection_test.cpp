@@ -19,6 +19,16 @@ std::vector<Column> PositionColumns() {
 
 class Projection : public testing::TestWithParam<Column> {};
 
+/// Without reduction: where its independent set fails in the flat position is a result of the
+/// tables, not yet held here.
+std::vector<Column> PassingColumns() {
+  std::vector<Column> columns = PositionColumns();
+  std::erase_if(columns,
+                [](const Column& c) { return c.formulation == FormulationKind::kReduction; });
+  return columns;
+}
+class Passage : public Projection {};
+
 MechanismFile Shipped(const std::string& name) {
   return ReadMechanism(kConfigs / "mechanisms" / (name + ".json"));
 }
@@ -61,10 +71,9 @@ TEST_P(Projection, KeepsTheOrderOfTheIntegrator) {
 }
 
 /// Through the flat position some ten times: what no level below it does at every tolerance.
-TEST_P(Projection, ParallelogramKeepsItsBranch) {
+TEST_P(Passage, ParallelogramKeepsItsBranch) {
   for (const char* name : {"parallelogram", "parallelogram-singular-start"}) {
     for (const double tolerance : {1e-6, 1e-8, 1e-10, 1e-12}) {
-      if (GetParam().formulation == FormulationKind::kReduction) continue;  // see the tables
       const Record record = RunShipped(name, GetParam(), tolerance, 20.0);
       ASSERT_EQ(record.Text("outcome"), "finished") << name << ": " << record.Text("message");
       EXPECT_LE(record.Number("branch_error_max"), 1e-8) << name << " " << tolerance;
@@ -80,6 +89,8 @@ TEST_P(Projection, ParallelogramKeepsItsBranch) {
   }
 }
 
+INSTANTIATE_TEST_SUITE_P(Columns, Passage, testing::ValuesIn(PassingColumns()),
+                         [](const auto& test) { return NameOf(test.param); });
 INSTANTIATE_TEST_SUITE_P(Columns, Projection, testing::ValuesIn(PositionColumns()),
                          [](const auto& test) { return NameOf(test.param); });
 

@@ -12,13 +12,18 @@ namespace {
 
 double Real(const Record& record, const std::string& key) { return record.Number(key); }
 
+/// Sum of a key that some parts may lack; nothing when all do.
+template <class Number>
 void Add(std::span<const Run> parts, const std::string& key, Record* whole) {
-  std::int64_t sum = 0;
+  Number sum = 0;
+  bool any = false;
   for (const Run& part : parts) {
     const double value = Real(part.record, key);
-    if (!std::isnan(value)) sum += static_cast<std::int64_t>(value);
+    if (std::isnan(value)) continue;
+    sum += static_cast<Number>(value);
+    any = true;
   }
-  whole->Set(key, sum);
+  if (any) whole->Set(key, sum);
 }
 
 /// Largest (or smallest) of a key that some parts may lack; the part that has it.
@@ -68,12 +73,14 @@ Run MergeParts(std::span<const Run> parts) {
   record.Set("outcome", speaker.record.Text("outcome"));
   record.Set("message", speaker.record.Text("message"));
   Extreme(parts, "t_reached", false, &record);
-  for (const char* key : {"steps", "rejected", "rhs_evaluations", "restarts", "softened_steps"}) {
-    Add(parts, key, &record);
+  for (const char* key :
+       {"steps", "rejected", "rhs_evaluations", "restarts", "softened_steps", "newton_jacobians",
+        "newton_rhs_evaluations", "newton_iterations", "newton_failures"}) {
+    Add<std::int64_t>(parts, key, &record);
   }
   const bool started = std::ranges::all_of(
       parts, [](const Run& part) { return !std::isnan(Real(part.record, "rank_min")); });
-  if (started) Add(parts, "rank_min", &record);
+  if (started) Add<std::int64_t>(parts, "rank_min", &record);
   double wall = 0.0, energy = 0.0;
   std::string hashes;
   for (const Run& part : parts) {
@@ -85,24 +92,15 @@ Run MergeParts(std::span<const Run> parts) {
     }
   }
   record.Set("wall_s", wall);
-  for (const char* key : {"energy_supplied", "energy_dissipated"}) {
-    double work = 0.0;
-    bool any = false;
-    for (const Run& part : parts) {
-      if (std::isnan(Real(part.record, key))) continue;
-      work += Real(part.record, key);
-      any = true;
-    }
-    if (any) record.Set(key, work);
-  }
+  for (const char* key : {"energy_supplied", "energy_dissipated"}) Add<double>(parts, key, &record);
   if (started) {
     record.Set("energy_error_max", energy);
     record.Set("state_hash", Fnv1a(hashes));
   }
   const Run* worst = Extreme(parts, "drift_position_max", true, &record);
   if (worst != nullptr) record.Set("worst_loop", worst->record.Text("worst_loop"));
-  for (const char* key :
-       {"drift_rotation_max", "drift_velocity_max", "drift_acceleration_max", "loop_closure_max"}) {
+  for (const char* key : {"drift_rotation_max", "drift_velocity_max", "drift_acceleration_max",
+                          "loop_closure_max", "correction_max"}) {
     Extreme(parts, key, true, &record);
   }
   const Run* lowest = Extreme(parts, "rcond_min", false, &record);

@@ -95,6 +95,22 @@ TEST(CompiledSceneTest, IslandsRunAloneAndAddUp) {
   }
 }
 
+/// Whatever a run of the whole writes, but for series and what belongs to one sequence of steps.
+TEST(CompiledSceneTest, IslandsKeepTheCountsOfProjectionAndNewton) {
+  Experiment experiment = Single(Shipped("four-islands"));
+  experiment.compile = CompileOptions();
+  experiment.compile.islands = true;
+  Column column = kColumn;
+  column.enforcement = Enforcement::kPosition;
+  Case one = CaseOf(experiment, "four-islands", column, 1e-6, 0.2);
+  const Record projected = RunCase(experiment, one);
+  ASSERT_EQ(projected.Text("outcome"), "finished") << projected.Text("message");
+  EXPECT_GT(projected.Number("correction_max"), 0.0);
+  EXPECT_EQ(projected.Find("newton_iterations"), nullptr);
+  one.integrator = "kennedy-carpenter-43";
+  EXPECT_GT(RunCase(experiment, one).Number("newton_iterations"), 0.0);
+}
+
 TEST(CompiledSceneTest, ObservedAnglesFollowTheirBodies) {
   // what is observed is a small body welded to the pendulum at 0.3 rad
   MechanismFile file = Shipped("pendulum");

@@ -40,7 +40,8 @@ ScaledLoops ScaleLoops(const Kinematics<Space, double>& kinematics) {
     scaled.rank = static_cast<int>((scaled.singular_values.array() > least).count());
     null = svd.matrixV().rightCols(J.cols() - scaled.rank);
   }
-  scaled.to_u = L.matrixU().solve(null);
+  scaled.to_u = null;  // no columns where nothing can move, which a triangular solve does not take
+  if (null.cols() > 0) L.matrixU().solveInPlace(scaled.to_u);
   return scaled;
 }
 

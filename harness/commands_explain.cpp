@@ -87,6 +87,12 @@ void ExplainChoices(const Experiment& experiment) {
         "  position: as acceleration, and after each accepted step positions and speeds are moved "
         "back to where the loops hold.\n");
   }
+  if (any([](const Column& c) { return c.enforcement == Enforcement::kBaumgarte; })) {
+    fmt::print(
+        "  baumgarte: as acceleration, with feedback: a mismatch e obeys e'' + 2 alpha e' + beta^2 "
+        "e "
+        "= 0, alpha = beta = 1/step unless given.\n");
+  }
   if (any([](const Column& c) { return c.coordinates == Coordinates::kJoint; })) {
     fmt::print(
         "  joint: the coordinates are those of the joints, but for one cut joint per loop, "

@@ -20,7 +20,8 @@ namespace loopbench::harness {
 template <class Space>
 std::unique_ptr<Formulation<Space, double>> MakeFormulation(
     const Column& column, const Mechanism<Space, double>& mechanism) {
-  const FormulationOptions options{.enforcement = column.enforcement, .solver = column.solver};
+  const FormulationOptions options{
+      .enforcement = column.enforcement, .solver = column.solver, .gains = column.gains};
   switch (column.formulation) {
     case FormulationKind::kOdca:
       return std::make_unique<odca::Odca<Space, double>>(mechanism, options);

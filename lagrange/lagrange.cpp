@@ -162,6 +162,7 @@ Outcome Lagrange<Space, S>::Accelerations() {
   if (const Outcome outcome = FactorOnce(); outcome != Outcome::kFinished) return outcome;
   dynamics_.Bias(kinematics_, h_);
   dynamics_.JacobianBias(kinematics_, gamma_);
+  if (Base::feedback().size() > 0) gamma_ -= Base::feedback();
   force_ = -h_;
   SolveConstrained(force_, gamma_, udot_);
   return udot_.allFinite() ? Outcome::kFinished : Outcome::kNonFinite;

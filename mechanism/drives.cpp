@@ -11,13 +11,17 @@ Drives<Space, S>::Drives(const Mechanism<Space, S>& mechanism)
     : dynamics_(mechanism), A_(mechanism.num_bodies(), Motion<Space, S>::Zero()), F_(A_) {}
 
 template <class Space, class S>
-bool Drives<Space, S>::Followed(const Kinematics<Space, S>& kinematics, const VectorX<S>& udot) {
+bool Drives<Space, S>::Followed(const Kinematics<Space, S>& kinematics, const VectorX<S>& udot,
+                                const VectorX<S>& feedback) {
   dynamics_.BodyAccelerations(kinematics, udot, A_);
   S worst = S(0), size = S(0);
   for (int index : kinematics.mechanism().constraints()) {
     const Joint<Space, S>& joint = kinematics.mechanism().joints()[index];
-    const S left = JointAcceleration<Space, S>(kinematics, index, A_).norm();
-    worst = std::max(worst, left);
+    Motion<Space, S> left = JointAcceleration<Space, S>(kinematics, index, A_);
+    if (feedback.size() > 0) {
+      left.head(joint.num_constraints()) += feedback.segment(joint.row, joint.num_constraints());
+    }
+    worst = std::max(worst, left.norm());
     size = std::max(
         {size, A_[joint.from].norm(), A_[joint.to].norm(), kinematics.joints()[index].g.norm()});
   }

@@ -18,8 +18,10 @@ class Drives {
   /// acceleration they are made of and kRoundOff of the largest that forces would cause in a body
   /// alone: bodies that loops hold still have no other size. Where joints have drifted apart,
   /// redundant constraints contradict each other by as much, which is no fault of the drives.
-  /// Speeds must be current.
-  bool Followed(const Kinematics<Space, S>& kinematics, const VectorX<S>& udot);
+  /// `feedback`, where not empty, is what constraint accelerations were asked to miss (Baumgarte),
+  /// by row. Speeds must be current.
+  bool Followed(const Kinematics<Space, S>& kinematics, const VectorX<S>& udot,
+                const VectorX<S>& feedback);
 
   /// Power [W] that drives put into the mechanism: force along each times its prescribed rate.
   /// Those of cut joints are multipliers (`lambda`, rows as in TreeDynamics::Jacobian()); those of

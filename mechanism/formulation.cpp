@@ -15,6 +15,8 @@ std::string_view ToString(Enforcement enforcement) {
       return "velocity";
     case Enforcement::kPosition:
       return "position";
+    case Enforcement::kBaumgarte:
+      return "baumgarte";
   }
   return "unknown";
 }
@@ -43,6 +45,11 @@ Formulation<Space, S>::Formulation(const Mechanism<Space, S>& mechanism, Formula
     moved_.setZero(mechanism.num_q());
     step_.setZero(mechanism.num_q());
   }
+  if (options.enforcement == Enforcement::kBaumgarte) {
+    gains_ = options.gains.value_or(BaumgarteGains());
+    violation_.setZero(mechanism.num_rows());
+    feedback_ = violation_;
+  }
   if (mechanism.drives().empty()) return;
   drives_ = std::make_unique<Drives<Space, S>>(mechanism);
   lambda_of_drives_.setZero(mechanism.num_rows());
@@ -56,6 +63,7 @@ Outcome Formulation<Space, S>::Start(S t, const VectorX<S>& q, const VectorX<S>&
   kinematics_.UpdatePosition(q_);
   kinematics_.UpdateVelocity(u_);
   kinematics_.AcceptStep();
+  accepted_t_ = t;
   return Outcome::kFinished;
 }
 
@@ -88,10 +96,13 @@ Outcome Formulation<Space, S>::FromState(S t, std::span<const S> y) {
 
 template <class Space, class S>
 Outcome Formulation<Space, S>::Solve() {
+  UpdateFeedback();
   if (mechanism_.num_u() > 0) {
     if (const Outcome outcome = Accelerations(); outcome != Outcome::kFinished) return outcome;
+    if (diagnostics_.smallest_weight < 1.0) ++diagnostics_.softened_evaluations;
   }
-  if (drives_ == nullptr || drives_->Followed(kinematics_, udot_)) return Outcome::kFinished;
+  if (drives_ == nullptr || drives_->Followed(kinematics_, udot_, feedback_))
+    return Outcome::kFinished;
   return Outcome::kInconsistentMotion;
 }
 
@@ -135,7 +146,9 @@ bool Formulation<Space, S>::BeginStep(S t, std::span<S> y) {
                         mechanism_.num_rows() > 0 && mechanism_.num_u() > 0;
   if (projects && Project() != Outcome::kFinished) return false;  // likewise
   kinematics_.AcceptStep();
-  const bool changed = ChangeMode();
+  const bool changed_gains = ChangeGains(t);
+  const bool changed = ChangeMode() || changed_gains;
+  if (changed) ++diagnostics_.mode_changes;
   if (!projects && !changed) return false;
   projected_ = projects;
   ToState(q_, u_, y);
@@ -157,6 +170,35 @@ void Formulation<Space, S>::PositionViolation(Correction<S>& largest) {
     largest.rotation = std::max(largest.rotation, constrained.template head<Space::kRot>().norm());
     largest.shift = std::max(largest.shift, constrained.template tail<Space::kLin>().norm());
   }
+}
+
+template <class Space, class S>
+void Formulation<Space, S>::SpeedViolation(VectorX<S>& violation) const {
+  for (int index : mechanism_.constraints()) {
+    const Joint<Space, S>& joint = mechanism_.joints()[index];
+    violation.segment(joint.row, joint.num_constraints()) =
+        kinematics_.ConstraintSpeed(index).head(joint.num_constraints());
+  }
+}
+
+template <class Space, class S>
+void Formulation<Space, S>::UpdateFeedback() {
+  if (feedback_.size() == 0) return;
+  Correction<S> largest;
+  PositionViolation(largest);
+  SpeedViolation(feedback_);
+  feedback_ = S(2 * gains_.alpha) * feedback_ + S(gains_.beta * gains_.beta) * violation_;
+}
+
+template <class Space, class S>
+bool Formulation<Space, S>::ChangeGains(S t) {
+  const S step = t - accepted_t_;
+  accepted_t_ = t;
+  if (feedback_.size() == 0 || options_.gains || !(step > S(0))) return false;
+  const S ratio = S(gains_.alpha) * step;
+  if (ratio > S(0.5) && ratio < S(2)) return false;
+  gains_.alpha = gains_.beta = static_cast<double>(S(1) / step);
+  return true;
 }
 
 template <class Space, class S>
@@ -189,11 +231,7 @@ Outcome Formulation<Space, S>::Project() {
     }
   }
   kinematics_.UpdateVelocity(u_);
-  for (int index : mechanism_.constraints()) {
-    const Joint<Space, S>& joint = mechanism_.joints()[index];
-    violation_.segment(joint.row, joint.num_constraints()) =
-        kinematics_.ConstraintSpeed(index).head(joint.num_constraints());
-  }
+  SpeedViolation(violation_);
   if (const Outcome outcome = Correct(violation_, change_of_state_);
       outcome != Outcome::kFinished) {
     return outcome;

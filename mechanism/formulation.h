@@ -5,7 +5,7 @@
 //   Derivative(t, y)   the right-hand side for an integrator, y = (q, speeds of the state),
 //   Evaluate(t, q, u)  accelerations alone, for given q and all speeds u,
 //   BeginStep(t, y)    at accepted steps, the only call that may project the state or change the
-//                      mode (an independent set, angles). Everything else is a pure function
+//                      mode (an independent set, angles, gains). Everything else is a pure function
 //                      of (t, q, u, mode): calling it in any order gives the same bits.
 // After construction O-DCA allocates nothing in any of them, the dense baselines nothing in a
 // derivative unless Eigen's workspace for one product exceeds a mebibyte (some 300 unknowns); what
@@ -13,6 +13,7 @@
 #pragma once
 
 #include <memory>
+#include <optional>
 #include <string_view>
 
 #include "mechanism/drives.h"
@@ -26,6 +27,15 @@ enum class Enforcement {
   kVelocity,      ///< speeds used in the right-hand side satisfy them too
   kPosition,      ///< as kAcceleration, and after each accepted step positions, then speeds are
                   ///< projected back to the constraints
+  kBaumgarte,     ///< as kAcceleration, with feedback of the mismatch of positions and speeds
+};
+
+/// Gains [1/s] of Baumgarte's stabilisation: a mismatch e of positions obeys
+/// e'' + 2 alpha e' + beta^2 e = 0 (Baumgarte 1972; alpha = beta damps it critically).
+struct BaumgarteGains {
+  double alpha = 0.0, beta = 0.0;
+
+  friend bool operator==(const BaumgarteGains&, const BaumgarteGains&) = default;
 };
 
 enum class SolverKind {
@@ -40,6 +50,10 @@ std::string_view ToString(SolverKind solver);
 struct FormulationOptions {
   Enforcement enforcement = Enforcement::kAcceleration;
   SolverKind solver = SolverKind::kRankRevealing;
+  /// kBaumgarte only. Without them alpha = beta = 1/h, zero before the first step; h is the
+  /// accepted step at which they were set, and they are set again when steps have become twice or
+  /// half as long.
+  std::optional<BaumgarteGains> gains;
 };
 
 /// What the last evaluation met.
@@ -47,8 +61,10 @@ struct Diagnostics {
   Outcome outcome = Outcome::kFinished;
   int rank = 0;        ///< independent loop constraints: rank of J in joint coordinates
   double rcond = 1.0;  ///< ratio of extreme pivots or eigenvalues of the formulation's own matrix
-  double smallest_weight = 1.0;  ///< below 1: some direction was softened
-  int worst_joint = -1;          ///< index of the joint behind rcond, -1 when not attributable
+  double smallest_weight = 1.0;   ///< below 1: some direction was softened
+  int worst_joint = -1;           ///< index of the joint behind rcond, -1 when not attributable
+  long softened_evaluations = 0;  ///< since the formulation was made
+  long mode_changes = 0;          ///< likewise; projections are none
 };
 
 /// What a projection of positions found.
@@ -115,12 +131,16 @@ class Formulation {
   /// row: the smallest in the metric M, unless the formulation has terms of its own. Directions in
   /// which constraints have lost rank are softened as in Accelerations().
   virtual Outcome Correct(const VectorX<S>& violation, VectorX<S>& change) = 0;
-  /// udot_ from current positions and speeds; sets diagnostics_.
+  /// udot_ from current positions and speeds; sets diagnostics_. Constraint accelerations are
+  /// minus feedback(), not zero.
   virtual Outcome Accelerations() = 0;
   /// Multipliers of all constraint rows after Accelerations(): D lambda is the force on Q.
   virtual void Multipliers(VectorX<S>& lambda) = 0;
   /// Chance to change the mode at an accepted state.
   virtual bool ChangeMode() { return false; }
+
+  /// 2 alpha e' + beta^2 e of all constraint rows; empty unless kBaumgarte.
+  const VectorX<S>& feedback() const { return feedback_; }
 
   /// rank of J in joint coordinates, given how many of this set's constraint rows are dependent.
   int LoopRank(int dependent_rows) const;
@@ -136,6 +156,12 @@ class Formulation {
   Outcome Project();
   /// D^T mismatch of all constraints in violation_, its largest parts in `largest`.
   void PositionViolation(Correction<S>& largest);
+  /// D^T (V_Q - V_P) of all constraints, less prescribed rates.
+  void SpeedViolation(VectorX<S>& violation) const;
+  /// Feedback at current positions and speeds.
+  void UpdateFeedback();
+  /// Gains from the length of the step that ended at t. True when they changed.
+  bool ChangeGains(S t);
   /// Accelerations(), unless nothing is free, and whether prescribed motions can be followed.
   Outcome Solve();
 
@@ -144,6 +170,9 @@ class Formulation {
   Correction<S> correction_;
   bool projected_ = false;                                 ///< the last call was a projection
   VectorX<S> violation_, change_of_state_, moved_, step_;  ///< of projections
+  BaumgarteGains gains_;
+  S accepted_t_ = S(0);  ///< end of the last accepted step
+  VectorX<S> feedback_;
 };
 
 }  // namespace loopbench

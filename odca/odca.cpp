@@ -121,6 +121,13 @@ Outcome Odca<Space, S>::Accelerations() {
       change_[joint.u_offset + i] = joint.kind->per_speed * state.H(i).dot(known);
     }
   }
+  if (Base::feedback().size() > 0) {
+    for (int index : mechanism_.constraints()) {
+      const Joint<Space, S>& joint = mechanism_.joints()[index];
+      c0_[index].head(joint.num_constraints()) +=
+          Base::feedback().segment(joint.row, joint.num_constraints());
+    }
+  }
   sweep_.Solve(b_, c0_, A_);
   TreeMotions(A_, udot_);
   udot_ += change_;

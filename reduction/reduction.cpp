@@ -144,6 +144,7 @@ Outcome Reduction<Space, S>::Accelerations() {
   dynamics_.MassMatrix(kinematics_, mechanism_.bodies(), M_);
   dynamics_.Bias(kinematics_, h_);
   dynamics_.JacobianBias(kinematics_, gamma_);
+  if (Base::feedback().size() > 0) gamma_ -= Base::feedback();
   c_.setZero();
   if (!dependent_.empty()) {
     for (std::size_t k = 0; k < rows_.size(); ++k) rows_rhs_[k] = gamma_[rows_[k]];

@@ -36,8 +36,10 @@ void DropExcluded(const Experiment& experiment, std::vector<Case>* cases) {
 }  // namespace
 
 std::string ToString(const Column& column) {
-  return fmt::format("{}/{}/{}/{}", ToString(column.formulation), ToString(column.enforcement),
-                     ToString(column.coordinates), ToString(column.solver));
+  const std::string gains =
+      column.gains ? fmt::format("({}, {})", column.gains->alpha, column.gains->beta) : "";
+  return fmt::format("{}/{}{}/{}/{}", ToString(column.formulation), ToString(column.enforcement),
+                     gains, ToString(column.coordinates), ToString(column.solver));
 }
 
 Record CaseKeys(const Experiment& experiment, const Case& one) {
@@ -53,6 +55,10 @@ Record CaseKeys(const Experiment& experiment, const Case& one) {
   keys.Set("rtol", one.rtol);
   keys.Set("atol", one.atol);
   keys.Set("horizon", one.horizon);
+  if (one.column.gains) {
+    keys.Set("alpha", one.column.gains->alpha);
+    keys.Set("beta", one.column.gains->beta);
+  }
   for (const auto& [name, value] : experiment.parameters.items()) keys.Set(name, value);
   return keys;
 }

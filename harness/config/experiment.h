@@ -30,8 +30,8 @@ template <>
 inline constexpr std::array<std::string_view, 3> kNames<FormulationKind> = {"odca", "lagrange",
                                                                             "reduction"};
 template <>
-inline constexpr std::array<std::string_view, 3> kNames<Enforcement> = {"acceleration", "velocity",
-                                                                        "position"};
+inline constexpr std::array<std::string_view, 4> kNames<Enforcement> = {"acceleration", "velocity",
+                                                                        "position", "baumgarte"};
 template <>
 inline constexpr std::array<std::string_view, 2> kNames<Coordinates> = {"joint", "absolute"};
 template <>
@@ -59,11 +59,13 @@ struct Column {
   Enforcement enforcement = Enforcement::kAcceleration;
   Coordinates coordinates = Coordinates::kJoint;
   SolverKind solver = SolverKind::kRankRevealing;
+  /// Of "baumgarte", when the file gives them.
+  std::optional<BaumgarteGains> gains = std::nullopt;
 
   friend bool operator==(const Column&, const Column&) = default;
 };
 
-/// "odca/acceleration/joint/as-published".
+/// "odca/acceleration/joint/as-published", "odca/baumgarte(5, 5)/joint/rank-revealing".
 std::string ToString(const Column& column);
 
 /// A mechanism and how long it runs.

@@ -10,7 +10,7 @@ namespace {
 
 // Keys of records other than those of a case: a run would write over a parameter of that name. A
 // test holds this list against the records of actual runs.
-constexpr std::array<std::string_view, 60> kRecordKeys = {"libm",
+constexpr std::array<std::string_view, 64> kRecordKeys = {"libm",
                                                           "load1",
                                                           "kind",
                                                           "experiment",
@@ -37,6 +37,10 @@ constexpr std::array<std::string_view, 60> kRecordKeys = {"libm",
                                                           "ensemble_failed",
                                                           "worst_loop",
                                                           "softened_steps",
+                                                          "softened_evaluations",
+                                                          "mode_changes",
+                                                          "alpha",
+                                                          "beta",
                                                           "bodies",
                                                           "joints",
                                                           "loops",

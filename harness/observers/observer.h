@@ -85,7 +85,7 @@ class EnergyObserver final : public Observer<Space> {
 };
 
 /// Smallest rank, reciprocal condition and weight met at accepted steps, and when; how many steps
-/// were softened.
+/// and evaluations were softened, how often the mode changed.
 template <class Space>
 class ConditionObserver final : public Observer<Space> {
  public:
@@ -96,7 +96,7 @@ class ConditionObserver final : public Observer<Space> {
   bool started_ = false;
   int rank_min_ = 0;
   double rcond_min_ = 1.0, rcond_t_ = 0.0;
-  std::int64_t softened_steps_ = 0;
+  std::int64_t softened_steps_ = 0, softened_evaluations_ = 0, mode_changes_ = 0;
 };
 
 /// Distance from what is known of a scene: branch invariants and closed form (scene.h).

@@ -54,6 +54,8 @@ void ConditionObserver<Space>::Observe(const Sample<Space>& sample) {
     rcond_t_ = sample.t;
   }
   if (diagnostics.smallest_weight < 1.0) ++softened_steps_;
+  softened_evaluations_ = diagnostics.softened_evaluations;
+  mode_changes_ = diagnostics.mode_changes;
   started_ = true;
 }
 
@@ -64,6 +66,8 @@ void ConditionObserver<Space>::Write(Record& record) const {
   record.Set("rcond_min", rcond_min_);
   record.Set("rcond_min_t", rcond_t_);
   record.Set("softened_steps", softened_steps_);
+  record.Set("softened_evaluations", softened_evaluations_);
+  record.Set("mode_changes", mode_changes_);
 }
 
 template <class Space>

@@ -1,144 +1,14 @@
 // What every formulation owes, whatever its method: one suite for all combinations of formulation,
 // level of enforcement, solver, coordinate set and space.
-#include <gtest/gtest.h>
+#include "tests/contract/contract.h"
 
 #include <cmath>
 #include <cstring>
-#include <limits>
-#include <memory>
 
-#include "lagrange/lagrange.h"
-#include "odca/odca.h"
-#include "reduction/reduction.h"
 #include "tests/contract/allocations.h"
-#include "tests/contract/comparison.h"
 
 namespace loopbench::testing {
 namespace {
-
-constexpr double kEps = std::numeric_limits<double>::epsilon();
-
-struct Case {
-  const char* formulation;
-  Enforcement enforcement;
-  SolverKind solver;
-  Coordinates coordinates;
-  SpaceKind space;
-};
-
-/// Keeps addresses out of the test list.
-void PrintTo(const Case& c, std::ostream* out) { *out << c.formulation; }
-
-std::string NameOf(const ::testing::TestParamInfo<Case>& info) {
-  std::string name =
-      std::string(info.param.formulation) + "_" + std::string(ToString(info.param.enforcement)) +
-      "_" + std::string(ToString(info.param.solver)) + "_" +
-      std::string(ToString(info.param.coordinates)) + "_" + std::string(ToString(info.param.space));
-  for (char& c : name) c = c == '-' ? '_' : c;
-  return name;
-}
-
-std::vector<Case> AllCases() {
-  std::vector<Case> cases;
-  for (const char* formulation : {"odca", "lagrange", "reduction"}) {
-    for (Enforcement enforcement :
-         {Enforcement::kAcceleration, Enforcement::kVelocity, Enforcement::kPosition}) {
-      for (SolverKind solver : {SolverKind::kAsPublished, SolverKind::kRankRevealing}) {
-        for (Coordinates coordinates : {Coordinates::kJoint, Coordinates::kAbsolute}) {
-          for (SpaceKind space : {SpaceKind::kPlanar, SpaceKind::kSpatial}) {
-            cases.push_back({formulation, enforcement, solver, coordinates, space});
-          }
-        }
-      }
-    }
-  }
-  return cases;
-}
-
-std::vector<Case> VelocityCases() {
-  std::vector<Case> cases = AllCases();
-  std::erase_if(cases, [](const Case& c) { return c.enforcement != Enforcement::kVelocity; });
-  return cases;
-}
-
-std::vector<Case> PositionCases() {
-  std::vector<Case> cases = AllCases();
-  std::erase_if(cases, [](const Case& c) { return c.enforcement != Enforcement::kPosition; });
-  return cases;
-}
-
-std::vector<Case> ImpulseCases() {
-  std::vector<Case> cases = PositionCases();
-  std::erase_if(cases, [](const Case& c) { return std::string(c.formulation) == "reduction"; });
-  return cases;
-}
-
-template <class Space>
-std::unique_ptr<Formulation<Space, double>> Make(const Case& c,
-                                                 const Mechanism<Space, double>& mechanism) {
-  const FormulationOptions options{c.enforcement, c.solver};
-  const std::string name = c.formulation;
-  if (name == "odca") return std::make_unique<odca::Odca<Space, double>>(mechanism, options);
-  if (name == "lagrange") {
-    return std::make_unique<lagrange::Lagrange<Space, double>>(mechanism, options);
-  }
-  return std::make_unique<reduction::Reduction<Space, double>>(mechanism, options);
-}
-
-/// Coupled loops with forces of every kind, every second with joints of every kind, every fourth
-/// with prescribed motions; independent closures, so that every column can run.
-MechanismDescription CoupledLoops(SpaceKind space, std::uint64_t seed) {
-  const int loops = space == SpaceKind::kPlanar ? 2 : 1;
-  return seed % 2 == 0 ? MixedGraph(loops, space, seed, seed % 4 == 2 ? 2 : 0)
-                       : RandomGraph(loops, space, seed);
-}
-
-/// A formulation on a sample, started.
-template <class Space>
-struct Bench {
-  Bench(const Case& c, const MechanismDescription& description, std::uint64_t seed)
-      : sample(description, seed),
-        mechanism(sample.mechanism(c.coordinates)),
-        state(sample.state(c.coordinates)),
-        formulation(Make(c, mechanism)) {
-    EXPECT_EQ(formulation->Start(0.0, state.q, state.u), Outcome::kFinished);
-    y.resize(formulation->state_size());
-    ydot.resize(formulation->state_size());
-    formulation->ToState(state.q, state.u, y);
-  }
-  Outcome Derivative(std::vector<double>& at) {
-    return formulation->Derivative(0.0, std::span<const double>(at), std::span<double>(ydot));
-  }
-  /// 100 eps N / rcond with the size N of the dense system: elimination of N unknowns.
-  double Bound() const {
-    return 100 * kEps * (mechanism.num_u() + mechanism.num_rows()) / sample.answer().rcond;
-  }
-
-  Sample<Space> sample;
-  const Mechanism<Space, double>& mechanism;
-  State state;
-  std::unique_ptr<Formulation<Space, double>> formulation;
-  std::vector<double> y, ydot;
-};
-
-class ContractTest : public ::testing::TestWithParam<Case> {
- protected:
-  /// Calls `check` with a bench of the parameter's space.
-  template <class Check>
-  void Run(const MechanismDescription& description, std::uint64_t seed, Check check) {
-    if (GetParam().space == SpaceKind::kPlanar) {
-      check(Bench<Planar>(GetParam(), description, seed));
-    } else {
-      check(Bench<Spatial>(GetParam(), description, seed));
-    }
-  }
-  MechanismDescription Description(std::uint64_t seed) const {
-    return CoupledLoops(GetParam().space, seed);
-  }
-};
-class VelocityContractTest : public ContractTest {};
-class PositionContractTest : public ContractTest {};
-class ImpulseContractTest : public ContractTest {};
 
 TEST_P(ContractTest, AccelerationsAgreeWithTheOracle) {
   double worst = 0.0;
@@ -169,70 +39,6 @@ TEST_P(ContractTest, DerivativeIsAPureFunction) {
     EXPECT_EQ(std::memcmp(first.data(), bench.ydot.data(), first.size() * sizeof(double)), 0);
     ASSERT_EQ(bench.Derivative(bench.y), Outcome::kFinished) << "the same position once more";
     EXPECT_EQ(std::memcmp(first.data(), bench.ydot.data(), first.size() * sizeof(double)), 0);
-  });
-}
-
-TEST_P(VelocityContractTest, SpeedsSatisfyTheLoops) {
-  Run(Description(6), 6, [&](auto bench) {
-    std::vector<double> off = bench.y;
-    for (std::size_t i = bench.mechanism.num_q(); i < off.size(); ++i) off[i] += 0.1;
-    ASSERT_EQ(bench.Derivative(off), Outcome::kFinished);
-    Oracle oracle(bench.sample.description(), LayoutOf(bench.mechanism));
-    const RealVector q = ToReal(bench.formulation->q()), u = ToReal(bench.formulation->u());
-    const RealMatrix J = oracle.Form(q, u).J;
-    const Real at_rest = oracle.ClosureRates(q, 0 * u).template lpNorm<Eigen::Infinity>();
-    const Real scale =
-        at_rest + J.cwiseAbs().rowwise().sum().maxCoeff() * u.template lpNorm<Eigen::Infinity>();
-    EXPECT_LE(oracle.ClosureRates(q, u).template lpNorm<Eigen::Infinity>(), bench.Bound() * scale);
-  });
-}
-
-/// Seeds 6 and 10 have prescribed motions.
-TEST_P(PositionContractTest, AcceptedStepsAreProjectedToTheConstraints) {
-  for (std::uint64_t seed : {5, 6, 8, 10}) {
-    Run(Description(seed), seed, [&](auto bench) {
-      for (std::size_t i = 0; i < bench.y.size(); ++i) {
-        bench.y[i] += 1e-4 * std::sin(2.0 * static_cast<double>(i + 1));
-      }
-      ASSERT_TRUE(bench.formulation->BeginStep(0.0, std::span<double>(bench.y)));
-      EXPECT_GT(bench.formulation->correction().shift, 0.0);
-      Oracle oracle(bench.sample.description(), LayoutOf(bench.mechanism));
-      const RealVector q = ToReal(bench.formulation->q()), u = ToReal(bench.formulation->u());
-      // rows of lengths and speeds of some metres, through as many bodies
-      const double scale = 1.0 + static_cast<double>(q.norm() + u.norm());
-      EXPECT_LE(oracle.ClosureMismatches(q).template lpNorm<Eigen::Infinity>(),
-                bench.Bound() * scale);
-      EXPECT_LE(oracle.ClosureRates(q, u).template lpNorm<Eigen::Infinity>(),
-                bench.Bound() * scale * scale);
-      // once more: nothing is left to do
-      const std::vector<double> first = bench.y;
-      bench.formulation->BeginStep(0.0, std::span<double>(bench.y));
-      for (std::size_t i = 0; i < first.size(); ++i) {
-        EXPECT_NEAR(bench.y[i], first[i], bench.Bound() * scale);
-      }
-    });
-  }
-}
-
-/// Impulses of constraints alone change the speeds: M (u' - u) = J^T lambda. Reduction keeps its
-/// independent speeds instead.
-TEST_P(ImpulseContractTest, SpeedsChangeByImpulsesOfConstraints) {
-  Run(Description(8), 8, [&](auto bench) {
-    for (std::size_t i = bench.mechanism.num_q(); i < bench.y.size(); ++i) {
-      bench.y[i] += 0.1 * std::sin(2.0 * static_cast<double>(i + 1));
-    }
-    const int n = bench.mechanism.num_q();
-    const RealVector before =
-        ToReal(Eigen::Map<const VectorX<double>>(bench.y.data() + n, bench.mechanism.num_u()));
-    ASSERT_TRUE(bench.formulation->BeginStep(0.0, std::span<double>(bench.y)));
-    Oracle oracle(bench.sample.description(), LayoutOf(bench.mechanism));
-    const Equations e = oracle.Form(ToReal(bench.formulation->q()), ToReal(bench.formulation->u()));
-    const RealVector impulse = e.M * (ToReal(bench.formulation->u()) - before);
-    // what is left of it beside the range of J^T
-    const RealMatrix S = e.J * e.J.transpose();
-    const RealVector lambda = SolveFullPivot(S, e.J * impulse, Real(1e-15L));
-    const RealVector rest = impulse - e.J.transpose() * lambda;
-    EXPECT_LE(rest.norm(), bench.Bound() * impulse.norm());
   });
 }
 
@@ -403,12 +209,6 @@ TEST(AllocationTest, SofteningDoesNotAllocate) {
 }
 
 INSTANTIATE_TEST_SUITE_P(All, ContractTest, ::testing::ValuesIn(AllCases()), NameOf);
-INSTANTIATE_TEST_SUITE_P(PositionLevel, PositionContractTest, ::testing::ValuesIn(PositionCases()),
-                         NameOf);
-INSTANTIATE_TEST_SUITE_P(PositionLevel, ImpulseContractTest, ::testing::ValuesIn(ImpulseCases()),
-                         NameOf);
-INSTANTIATE_TEST_SUITE_P(VelocityLevel, VelocityContractTest, ::testing::ValuesIn(VelocityCases()),
-                         NameOf);
 
 }  // namespace
 }  // namespace loopbench::testing

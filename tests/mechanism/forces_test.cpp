@@ -7,11 +7,13 @@
 
 #include "mechanism/kinematics.h"
 #include "mechanism/library.h"
-#include "tests/contract/generators.h"
+#include "tests/mechanism/samples.h"
 
 namespace loopbench {
 namespace {
 
+using testing::ForBothSets;
+using testing::kKind;
 using testing::Oracle;
 using testing::Real;
 using testing::Real6;
@@ -19,9 +21,6 @@ using testing::State;
 using testing::ToReal;
 
 constexpr double kEps = std::numeric_limits<double>::epsilon();
-
-template <class Space>
-constexpr SpaceKind kKind = Space::kRot == 1 ? SpaceKind::kPlanar : SpaceKind::kSpatial;
 
 template <class Space>
 std::vector<MechanismDescription> Samples() {
@@ -57,27 +56,11 @@ class ForcesTest : public ::testing::Test {};
 using Spaces = ::testing::Types<Planar, Spatial>;
 TYPED_TEST_SUITE(ForcesTest, Spaces);
 
-/// Calls check(description, mechanism, state) for all samples in both coordinate sets.
-template <class Space, class Check>
-void ForAll(Check check) {
-  for (const MechanismDescription& d : Samples<Space>()) {
-    SCOPED_TRACE(d.name);
-    const Mechanism<Space, double> joint(d, Coordinates::kJoint);
-    const Mechanism<Space, double> absolute(d, Coordinates::kAbsolute);
-    const State state = testing::ConsistentState(d, joint, 1);
-    for (const auto& [mechanism, at] :
-         {std::pair{&joint, state}, {&absolute, testing::StateIn(absolute, joint, state)}}) {
-      SCOPED_TRACE(ToString(mechanism->coordinates()));
-      check(d, *mechanism, at);
-    }
-  }
-}
-
 TYPED_TEST(ForcesTest, WrenchesAgreeWithTheOracleAtAnyTime) {
   using Space = TypeParam;
   std::vector<int> kinds(std::variant_size_v<ForceDescription>);
   int timed = 0;
-  ForAll<Space>([&](const auto& d, const auto& mechanism, const State& at) {
+  ForBothSets<Space>(Samples<Space>(), [&](const auto& d, const auto& mechanism, const State& at) {
     for (const ForceDescription& force : d.forces) ++kinds[force.index()];
     timed += static_cast<int>(mechanism.forces().timed_torques.size());
     Oracle oracle(d, testing::LayoutOf(mechanism));
@@ -121,7 +104,7 @@ bool HasNoPotential(const ForceDescription& force) {
 TYPED_TEST(ForcesTest, EveryForceTakesItsWorkFromItsPotentialOrItsPower) {
   using Space = TypeParam;
   int with_power = 0;
-  ForAll<Space>([&](const auto& d, const auto& in_double, const State& at) {
+  ForBothSets<Space>(Samples<Space>(), [&](const auto& d, const auto& in_double, const State& at) {
     const Coordinates coordinates = in_double.coordinates();
     MechanismDescription one = d;
     one.gravity.setZero();

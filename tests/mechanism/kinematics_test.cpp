@@ -6,20 +6,18 @@
 #include <limits>
 
 #include "mechanism/tree_dynamics.h"
-#include "tests/contract/generators.h"
+#include "tests/mechanism/samples.h"
 
 namespace loopbench {
 namespace {
 
+using testing::kKind;
 using testing::Oracle;
 using testing::Real;
 using testing::State;
 using testing::ToReal;
 
 constexpr double kEps = std::numeric_limits<double>::epsilon();
-
-template <class Space>
-constexpr SpaceKind kKind = Space::kRot == 1 ? SpaceKind::kPlanar : SpaceKind::kSpatial;
 
 /// Trees with every joint kind, reversed joints, a floating body; graphs with closing joints.
 template <class Space>
@@ -40,20 +38,13 @@ TYPED_TEST_SUITE(KinematicsTest, Spaces);
 /// Calls check(description, mechanism, state, kinematics at the state) for all samples and sets.
 template <class Space, class Check>
 void ForAll(Check check) {
-  for (const MechanismDescription& d : Samples<Space>()) {
-    SCOPED_TRACE(d.name);
-    const Mechanism<Space, double> joint(d, Coordinates::kJoint);
-    const Mechanism<Space, double> absolute(d, Coordinates::kAbsolute);
-    const State state = testing::ConsistentState(d, joint, 1);
-    const State moved = testing::StateIn(absolute, joint, state);
-    for (const auto& [mechanism, at] : {std::pair{&joint, &state}, {&absolute, &moved}}) {
-      SCOPED_TRACE(ToString(mechanism->coordinates()));
-      Kinematics<Space, double> kinematics(*mechanism);
-      kinematics.UpdatePosition(at->q);
-      kinematics.UpdateVelocity(at->u);
-      check(d, *mechanism, *at, kinematics);
-    }
-  }
+  testing::ForBothSets<Space>(Samples<Space>(),
+                              [&](const auto& d, const auto& mechanism, const State& at) {
+                                Kinematics<Space, double> kinematics(mechanism);
+                                kinematics.UpdatePosition(at.q);
+                                kinematics.UpdateVelocity(at.u);
+                                check(d, mechanism, at, kinematics);
+                              });
 }
 
 TYPED_TEST(KinematicsTest, PosesAgreeWithTheOracle) {

@@ -105,6 +105,10 @@ Run MergeParts(std::span<const Run> parts) {
   }
   const Run* lowest = Extreme(parts, "rcond_min", false, &record);
   if (lowest != nullptr) record.Set("rcond_min_t", Real(lowest->record, "rcond_min_t"));
+  const Run* nearest = Extreme(parts, "singularity_distance_min", false, &record);
+  if (nearest != nullptr) {
+    record.Set("singularity_distance_min_t", Real(nearest->record, "singularity_distance_min_t"));
+  }
   whole.drift = MergeDrift(parts);
   return whole;
 }

@@ -55,6 +55,7 @@ class Runner {
         description_(description),
         mechanism_(description, one.column.coordinates),
         drift_(description, mechanism_),
+        singularity_(description, mechanism_),
         energy_(experiment.series_points, mechanism_.has_power()),
         exact_(scene_, mechanism_),
         angles_(experiment.series_points),
@@ -72,6 +73,7 @@ class Runner {
       drift_.Write(run.record);
       energy_.Write(run.record);
       condition_.Write(run.record);
+      singularity_.Write(run.record);
       exact_.Write(run.record);
       if (with_series_) angles_.Write(run.record);
       if (case_.column.enforcement == Enforcement::kPosition) {
@@ -131,6 +133,7 @@ class Runner {
     drift_.Observe(sample);
     energy_.Observe(sample);
     condition_.Observe(sample);
+    singularity_.Observe(sample);
     exact_.Observe(sample);
     if (with_series_) angles_.Observe(sample);
   }
@@ -140,6 +143,7 @@ class Runner {
   const MechanismDescription& description_;
   Mechanism<Space, double> mechanism_;
   DriftObserver<Space> drift_;
+  SingularityObserver<Space> singularity_;
   EnergyObserver<Space> energy_;
   ConditionObserver<Space> condition_;
   ExactObserver<Space> exact_;

@@ -194,10 +194,12 @@ template <class Space, class S>
 bool Formulation<Space, S>::ChangeGains(S t) {
   const S step = t - accepted_t_;
   accepted_t_ = t;
-  if (feedback_.size() == 0 || options_.gains || !(step > S(0))) return false;
-  const S ratio = S(gains_.alpha) * step;
-  if (ratio > S(0.5) && ratio < S(2)) return false;
-  gains_.alpha = gains_.beta = static_cast<double>(S(1) / step);
+  if (feedback_.size() == 0 || options_.gains) return false;
+  const bool still_growing = step > S(2) * longest_step_;
+  longest_step_ = std::max(longest_step_, step);
+  const bool fits = gains_.alpha > 0.0 ? S(gains_.alpha) * longest_step_ < S(2) : still_growing;
+  if (fits || !(longest_step_ > S(0))) return false;
+  gains_.alpha = gains_.beta = static_cast<double>(S(1) / longest_step_);
   return true;
 }
 

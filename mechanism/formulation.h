@@ -50,10 +50,11 @@ std::string_view ToString(SolverKind solver);
 struct FormulationOptions {
   Enforcement enforcement = Enforcement::kAcceleration;
   SolverKind solver = SolverKind::kRankRevealing;
-  /// kBaumgarte only. Without them alpha = beta = 1/h, zero before the first step; h is the
-  /// accepted step at which they were set, and they are set again when steps have become twice or
-  /// half as long.
-  std::optional<BaumgarteGains> gains;
+  /// kBaumgarte only. Without them alpha = beta = 1/h with the longest accepted step h so far:
+  /// zero while steps still double from one to the next, set again when h has doubled. Shorter
+  /// steps change nothing: gains that followed them would magnify round-off by 1/h^2, which makes
+  /// steps shorter still.
+  std::optional<BaumgarteGains> gains = std::nullopt;
 };
 
 /// What the last evaluation met.
@@ -171,7 +172,7 @@ class Formulation {
   bool projected_ = false;                                 ///< the last call was a projection
   VectorX<S> violation_, change_of_state_, moved_, step_;  ///< of projections
   BaumgarteGains gains_;
-  S accepted_t_ = S(0);  ///< end of the last accepted step
+  S accepted_t_ = S(0), longest_step_ = S(0);  ///< of accepted steps
   VectorX<S> feedback_;
 };
 

@@ -11,7 +11,7 @@
 //               bodies alone; K^-1 X K^-T has eigenvalues in [0, number of joints]. Cholesky of
 //               that; refused when a pivot is below kSuspicious, then:
 //   geometric   X of the same mechanism with unit masses: K_g^-1 X_g K_g^-T = U diag(lambda) U^T,
-//               weights w_i = 1 - exp(-(lambda_i / theta)^2), theta = (1e-4)^2 lambda_max, but
+//               weights w_i = 1 - exp(-(lambda_i / theta)^2), theta = (2e-4)^2 lambda_max, but
 //               lambda_max >= 1e-2: within a rigid part all of X_g is round-off. Solving with it: T
 //               = diag(sqrt(w / lambda)) U^T K_g^-1.
 //   softened    the physical X with the geometric directions: Y = U^T K_g^-1 X K_g^-T U,
@@ -54,8 +54,9 @@ class LoopSolver {
   static constexpr double kSuspicious = 1e-4;
   using ConstRef = Eigen::Ref<const MatrixX<S>>;
 
-  /// Softening threshold relative to the largest geometric eigenvalue: (1e-4)^2.
-  static constexpr double kTheta = 1e-8;
+  /// Softening threshold relative to the largest geometric eigenvalue: (2e-4)^2. docs/numerics.md,
+  /// section 2, has the trials.
+  static constexpr double kTheta = 4e-8;
   /// The largest geometric eigenvalue is taken as no smaller. Free bodies give one, and round-off
   /// of some 100 eps stays far below kTheta times this.
   static constexpr double kLeastResponse = 1e-2;

@@ -4,47 +4,87 @@
 #include <Eigen/SVD>
 #include <algorithm>
 #include <cmath>
+#include <utility>
 
 #include "mechanism/tree_dynamics.h"
 
 namespace loopbench {
 
+namespace {
+
+/// B, and what it is made of.
+struct Scaling {
+  Eigen::MatrixXd B, rows;
+  Eigen::LLT<Eigen::MatrixXd> L;
+};
+
 template <class Space>
-ScaledLoops ScaleLoops(const Kinematics<Space, double>& kinematics) {
+Scaling Scale(const Kinematics<Space, double>& kinematics) {
   const Mechanism<Space, double>& mechanism = kinematics.mechanism();
   const auto& unit_bodies = mechanism.geometric_bodies();
   TreeDynamics<Space, double> dynamics(mechanism);
   Eigen::MatrixXd M, J;
   dynamics.MassMatrix(kinematics, unit_bodies, M);
   dynamics.Jacobian(kinematics, J);
-  const Eigen::LLT<Eigen::MatrixXd> L(M);
-  ScaledLoops scaled;
-  scaled.rows = L.matrixL().solve(J.transpose()).transpose();
-  scaled.B = scaled.rows;
+  Scaling scaling;
+  scaling.L.compute(M);
+  scaling.rows = scaling.L.matrixL().solve(J.transpose()).transpose();
+  scaling.B = scaling.rows;
   for (int index : mechanism.constraints()) {
     const Joint<Space, double>& joint = mechanism.joints()[index];
     const int rows = joint.num_constraints();
     if (rows == 0) continue;
     const JointMatrix<double> free = FreeResponse<Space, double>(kinematics, unit_bodies, index);
-    auto block = scaled.B.middleRows(joint.row, rows);
+    auto block = scaling.B.middleRows(joint.row, rows);
     block = Eigen::LLT<Eigen::MatrixXd>(free).matrixL().solve(Eigen::MatrixXd(block));
-    for (int i = 0; i < rows; ++i) scaled.rows.row(joint.row + i) /= std::sqrt(free(i, i));
+    for (int i = 0; i < rows; ++i) scaling.rows.row(joint.row + i) /= std::sqrt(free(i, i));
   }
-  Eigen::MatrixXd null = Eigen::MatrixXd::Identity(J.cols(), J.cols());
-  if (J.rows() > 0 && J.cols() > 0) {
+  return scaling;
+}
+
+double Largest(const Eigen::VectorXd& singular_values) {
+  return std::max(singular_values[0], std::sqrt(LoopSolver<double>::kLeastResponse));
+}
+
+int Rank(const Eigen::VectorXd& singular_values) {
+  const double least = kRankRatio * Largest(singular_values);
+  return static_cast<int>((singular_values.array() > least).count());
+}
+
+}  // namespace
+
+template <class Space>
+LoopSpectrum SpectrumOfLoops(const Kinematics<Space, double>& kinematics) {
+  const Scaling scaling = Scale(kinematics);
+  LoopSpectrum spectrum;
+  if (scaling.B.size() == 0) return spectrum;
+  spectrum.singular_values = Eigen::JacobiSVD<Eigen::MatrixXd>(scaling.B).singularValues();
+  spectrum.largest = Largest(spectrum.singular_values);
+  spectrum.rank = Rank(spectrum.singular_values);
+  return spectrum;
+}
+
+template <class Space>
+ScaledLoops ScaleLoops(const Kinematics<Space, double>& kinematics) {
+  Scaling scaling = Scale(kinematics);
+  ScaledLoops scaled;
+  scaled.B = std::move(scaling.B);
+  scaled.rows = std::move(scaling.rows);
+  const Eigen::Index n = scaled.B.cols();
+  Eigen::MatrixXd null = Eigen::MatrixXd::Identity(n, n);
+  if (scaled.B.size() > 0) {
     const Eigen::BDCSVD<Eigen::MatrixXd> svd(scaled.B, Eigen::ComputeFullV);
     scaled.singular_values = svd.singularValues();
-    const double largest =
-        std::max(scaled.singular_values[0], std::sqrt(LoopSolver<double>::kLeastResponse));
-    const double least = kRankRatio * largest;
-    scaled.rank = static_cast<int>((scaled.singular_values.array() > least).count());
-    null = svd.matrixV().rightCols(J.cols() - scaled.rank);
+    scaled.rank = Rank(scaled.singular_values);
+    null = svd.matrixV().rightCols(n - scaled.rank);
   }
   scaled.to_u = null;  // no columns where nothing can move, which a triangular solve does not take
-  if (null.cols() > 0) L.matrixU().solveInPlace(scaled.to_u);
+  if (null.cols() > 0) scaling.L.matrixU().solveInPlace(scaled.to_u);
   return scaled;
 }
 
+template LoopSpectrum SpectrumOfLoops(const Kinematics<Planar, double>&);
+template LoopSpectrum SpectrumOfLoops(const Kinematics<Spatial, double>&);
 template ScaledLoops ScaleLoops(const Kinematics<Planar, double>&);
 template ScaledLoops ScaleLoops(const Kinematics<Spatial, double>&);
 

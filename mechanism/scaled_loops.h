@@ -15,8 +15,8 @@
 
 namespace loopbench {
 
-/// Where the softening weight of loop_solver.h is one half: 1e-4 sqrt(sqrt(ln 2)).
-inline constexpr double kRankRatio = 0.912e-4;
+/// Where the softening weight of loop_solver.h is one half: 2e-4 sqrt(sqrt(ln 2)).
+inline constexpr double kRankRatio = 1.825e-4;
 
 /// The loops' constraints of one position, scaled.
 struct ScaledLoops {
@@ -27,7 +27,16 @@ struct ScaledLoops {
   int rank = 0;
 };
 
-/// Positions of `kinematics`, in joint coordinates, must be current.
+/// Singular values of B alone.
+struct LoopSpectrum {
+  Eigen::VectorXd singular_values;  ///< the largest first
+  double largest = 0.0;             ///< what they are compared with: the first, or at least 0.1
+  int rank = 0;
+};
+template <class Space>
+LoopSpectrum SpectrumOfLoops(const Kinematics<Space, double>& kinematics);
+
+/// Positions of `kinematics`, in joint coordinates, must be current, for both.
 template <class Space>
 ScaledLoops ScaleLoops(const Kinematics<Space, double>& kinematics);
 

@@ -28,7 +28,12 @@ Reduction<Space, S>::Reduction(const Mechanism<Space, S>& mechanism, Formulation
       gamma_(VectorX<S>::Zero(mechanism.num_rows())),
       c_(h_),
       residual_(h_),
-      bias_(gamma_) {}
+      bias_(gamma_) {
+  const bool chooses = options.solver == SolverKind::kRankRevealing;
+  if (chooses && options.enforcement != Enforcement::kVelocity && mechanism.num_rows() > 0) {
+    null_space_ = std::make_unique<NullSpace<Space, S>>(mechanism);
+  }
+}
 
 template <class Space, class S>
 Outcome Reduction<Space, S>::Start(S t, const VectorX<S>& q, const VectorX<S>& u) {
@@ -82,25 +87,47 @@ void Reduction<Space, S>::SetPartition(const Partition<S>& partition) {
 }
 
 template <class Space, class S>
+S Reduction<Space, S>::FactorPartition() {
+  const int r = static_cast<int>(dependent_.size());
+  if (r == 0) return S(1);
+  for (int k = 0; k < r; ++k) {
+    for (int i = 0; i < r; ++i) J_D_(k, i) = J_(rows_[k], dependent_[i]);
+    for (int i = 0; i < J_I_.cols(); ++i) J_I_(k, i) = J_(rows_[k], independent_[i]);
+  }
+  lu_.compute(J_D_);
+  const auto pivots = lu_.matrixLU().diagonal().cwiseAbs();
+  return pivots.minCoeff() / pivots.maxCoeff();
+}
+
+template <class Space, class S>
+void Reduction<Space, S>::FactorNullSpace() {
+  null_space_->Factor(kinematics_, dynamics_, J_);
+  uses_null_space_ = true;
+  diagnostics_.rank = Base::LoopRank(mechanism_.num_rows() - null_space_->rank());
+  diagnostics_.rcond = static_cast<double>(null_space_->rcond());
+  diagnostics_.smallest_weight = static_cast<double>(null_space_->smallest_weight());
+  factored_version_ = kinematics_.position_version();
+}
+
+template <class Space, class S>
 Outcome Reduction<Space, S>::FactorOnce() {
   if (factored_version_ == kinematics_.position_version()) return Outcome::kFinished;
   const int r = static_cast<int>(dependent_.size());
   diagnostics_.rank = Base::LoopRank(mechanism_.num_rows() - r);
   diagnostics_.rcond = 0.0;
+  diagnostics_.smallest_weight = 1.0;
+  uses_null_space_ = false;
   // more rows than dependent speeds: redundant constraints, as published; or a rank that has grown
-  if (static_cast<int>(rows_.size()) > r || outgrown_) return Outcome::kSingular;
+  const bool fits = static_cast<int>(rows_.size()) == r && !outgrown_;
+  if (!fits && !null_space_) return Outcome::kSingular;
   dynamics_.Jacobian(kinematics_, J_);
-  for (int k = 0; k < r; ++k) {
-    for (int i = 0; i < r; ++i) J_D_(k, i) = J_(rows_[k], dependent_[i]);
-    for (int i = 0; i < J_I_.cols(); ++i) J_I_(k, i) = J_(rows_[k], independent_[i]);
-  }
-  S rcond = S(1);
-  if (r > 0) {
-    lu_.compute(J_D_);
-    const auto pivots = lu_.matrixLU().diagonal().cwiseAbs();
-    rcond = pivots.minCoeff() / pivots.maxCoeff();
-  }
+  const bool complete = r == mechanism_.num_rows();
+  const S rcond = null_space_ && !complete ? S(0) : FactorPartition();
   diagnostics_.rcond = static_cast<double>(rcond);
+  if (null_space_ && !(rcond >= S(kSuspicious))) {
+    FactorNullSpace();
+    return Outcome::kFinished;
+  }
   // a pivot below a few eps of the largest is round-off of the elimination
   if (!(rcond > S(16) * std::numeric_limits<S>::epsilon())) return Outcome::kSingular;
   if (r > 0) solved_ = lu_.solve(J_I_);
@@ -126,10 +153,15 @@ Outcome Reduction<Space, S>::CompleteSpeeds() {
   return Outcome::kFinished;
 }
 
-/// Independent coordinates and speeds stay; the dependent ones follow.
+/// Independent coordinates and speeds stay; the dependent ones follow. Without a partition: the
+/// smallest change.
 template <class Space, class S>
 Outcome Reduction<Space, S>::Correct(const VectorX<S>& violation, VectorX<S>& change) {
   if (const Outcome outcome = FactorOnce(); outcome != Outcome::kFinished) return outcome;
+  if (uses_null_space_) {
+    null_space_->Correct(violation, change);
+    return change.allFinite() ? Outcome::kFinished : Outcome::kNonFinite;
+  }
   change.setZero();
   if (dependent_.empty()) return Outcome::kFinished;
   for (std::size_t k = 0; k < rows_.size(); ++k) rows_rhs_[k] = -violation[rows_[k]];
@@ -145,6 +177,10 @@ Outcome Reduction<Space, S>::Accelerations() {
   dynamics_.Bias(kinematics_, h_);
   dynamics_.JacobianBias(kinematics_, gamma_);
   if (Base::feedback().size() > 0) gamma_ -= Base::feedback();
+  if (uses_null_space_) {
+    const bool solved = null_space_->Accelerate(M_, h_, gamma_, udot_);
+    return solved && udot_.allFinite() ? Outcome::kFinished : Outcome::kNonFinite;
+  }
   c_.setZero();
   if (!dependent_.empty()) {
     for (std::size_t k = 0; k < rows_.size(); ++k) rows_rhs_[k] = gamma_[rows_[k]];
@@ -169,10 +205,14 @@ Outcome Reduction<Space, S>::Accelerations() {
 /// used.
 template <class Space, class S>
 void Reduction<Space, S>::Multipliers(VectorX<S>& lambda) {
-  lambda.setZero();
-  if (dependent_.empty()) return;
   residual_ = h_;
   residual_.noalias() += M_ * udot_;
+  if (uses_null_space_) {
+    null_space_->Multipliers(residual_, lambda);
+    return;
+  }
+  lambda.setZero();
+  if (dependent_.empty()) return;
   for (std::size_t k = 0; k < dependent_.size(); ++k) rows_rhs_[k] = residual_[dependent_[k]];
   // lu_.transpose().solve() by its parts: its permutation in place would allocate
   lu_.matrixLU().template triangularView<Eigen::Upper>().transpose().solveInPlace(rows_rhs_);
@@ -185,8 +225,13 @@ template <class Space, class S>
 bool Reduction<Space, S>::ChangeMode() {
   if (Base::options_.solver == SolverKind::kAsPublished || J_.rows() == 0) return false;
   dynamics_.Jacobian(kinematics_, J_);
+  const int rank = GeometricRank(kinematics_, dynamics_, J_);
+  if (null_space_ && rank != static_cast<int>(dependent_.size())) {
+    SetPartition(BestPartition(J_, rank));
+    return true;
+  }
   // started at a singular position, the partition leaves constraints out that now hold again
-  outgrown_ = GeometricRank(kinematics_, dynamics_, J_) > static_cast<int>(dependent_.size());
+  outgrown_ = rank > static_cast<int>(dependent_.size());
   if (outgrown_ || dependent_.empty()) return false;
   const Partition<S> best = BestPartition(J_, static_cast<int>(dependent_.size()));
   const S current = PartitionCondition(J_, {dependent_, rows_, S(1)});

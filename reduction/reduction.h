@@ -14,15 +14,20 @@
 // pivoting; at each accepted step a partition whose conditioning has fallen below a tenth of the
 // best one's is replaced, which changes the state and restarts the integrator. The number of
 // dependent speeds stays that of the start; where the rank has grown beyond it (a start in a
-// singular position) the run ends as `singular`. J_D is factored by LU either way. Start() and
-// BeginStep() may allocate.
+// singular position) the run ends as `singular`. J_D is factored by LU either way.
+//
+// At the other levels the state does not depend on the partition, so that it may change its size.
+// Where it is suspicious, or leaves rows out, a basis of the free directions takes its place
+// (null_space.h). Start() and BeginStep() may allocate.
 #pragma once
 
 #include <Eigen/Cholesky>
 #include <Eigen/LU>
+#include <memory>
 
 #include "mechanism/formulation.h"
 #include "mechanism/tree_dynamics.h"
+#include "reduction/null_space.h"
 #include "reduction/partition.h"
 
 namespace loopbench::reduction {
@@ -32,6 +37,8 @@ class Reduction final : public Formulation<Space, S> {
  public:
   /// An automatic set is replaced when its reciprocal condition is below this part of the best.
   static constexpr double kReplaceBelow = 0.1;
+  /// Below this ratio of its pivots a partition gives way to the null space.
+  static constexpr double kSuspicious = 1e-3;
 
   Reduction(const Mechanism<Space, S>& mechanism, FormulationOptions options);
 
@@ -50,6 +57,9 @@ class Reduction final : public Formulation<Space, S> {
   bool ChangeMode() override;
 
   Outcome FactorOnce();
+  /// LU of J_D and the basis B, J being current; the reciprocal condition.
+  S FactorPartition();
+  void FactorNullSpace();
   void SetPartition(const Partition<S>& partition);
 
   using Base = Formulation<Space, S>;
@@ -67,6 +77,8 @@ class Reduction final : public Formulation<Space, S> {
   VectorX<S> h_, gamma_, c_, residual_, rows_rhs_, dependent_speeds_, independent_speeds_, bias_;
   Eigen::PartialPivLU<MatrixX<S>> lu_;
   Eigen::LLT<MatrixX<S>> reduced_factor_;
+  std::unique_ptr<NullSpace<Space, S>> null_space_;  ///< null at velocity level and as published
+  bool uses_null_space_ = false;                     ///< since the last factorisation
 };
 
 }  // namespace loopbench::reduction

@@ -10,7 +10,7 @@ namespace {
 
 // Keys of records other than those of a case: a run would write over a parameter of that name. A
 // test holds this list against the records of actual runs.
-constexpr std::array<std::string_view, 64> kRecordKeys = {"libm",
+constexpr std::array<std::string_view, 67> kRecordKeys = {"libm",
                                                           "load1",
                                                           "kind",
                                                           "experiment",
@@ -39,6 +39,9 @@ constexpr std::array<std::string_view, 64> kRecordKeys = {"libm",
                                                           "softened_steps",
                                                           "softened_evaluations",
                                                           "mode_changes",
+                                                          "energy_error_relative",
+                                                          "singularity_distance_min",
+                                                          "singularity_distance_min_t",
                                                           "alpha",
                                                           "beta",
                                                           "bodies",

@@ -10,6 +10,7 @@
 #include "harness/config/mechanism_reader.h"
 #include "harness/config/mechanism_sections.h"
 #include "harness/config/spelling.h"
+#include "mechanism/similarity.h"
 
 namespace loopbench::harness {
 namespace {
@@ -76,11 +77,18 @@ std::vector<ExperimentScene> ReadMechanisms(const JsonNode& node, MechanismFiles
   return scenes;
 }
 
+/// The mechanism at another size; what is known of its angles still holds.
+void Resize(MechanismFile* mechanism, double factor) {
+  mechanism->description = AtScale(mechanism->description, factor);
+  mechanism->observe.length *= factor;
+  mechanism->canonical += fmt::format(" at scale {}", factor);
+}
+
 /// One entry of "scenes": several scenes where a family has several counts.
 std::vector<ExperimentScene> ReadScene(const JsonNode& node, MechanismFiles& files,
                                        std::size_t room) {
   std::vector<ExperimentScene> scenes;
-  if (!node.ExpectObject({"mechanism", "horizon", "name", "tags"})) return scenes;
+  if (!node.ExpectObject({"mechanism", "horizon", "name", "tags", "scale"})) return scenes;
   if (const auto mechanism = node.Required(
           "mechanism", "the path of a mechanism file, a mechanism, or {\"family\": ...}")) {
     scenes = ReadMechanisms(*mechanism, files, room);
@@ -90,6 +98,8 @@ std::vector<ExperimentScene> ReadScene(const JsonNode& node, MechanismFiles& fil
     common.horizons = horizon->NumberList(kPositive);
   }
   if (const auto name = node.Optional("name")) common.name = name->Text();
+  double scale = 1.0;
+  if (const auto factor = node.Optional("scale")) scale = factor->Number({.min = 1e-12, .max = 1e12});
   if (const auto tags = node.Optional("tags")) {
     for (const JsonNode& tag : tags->Elements("tags")) common.tags.push_back(tag.Text());
   }
@@ -101,6 +111,7 @@ std::vector<ExperimentScene> ReadScene(const JsonNode& node, MechanismFiles& fil
                                 : scene.mechanism.description.name;
     const std::string counts = scene.name.empty() ? "" : "-" + scene.name;
     scene.name = common.name.empty() ? own : common.name + counts;
+    if (scale > 0.0 && scale != 1.0) Resize(&scene.mechanism, scale);
     scene.horizons = common.horizons;
     scene.tags = common.tags;
   }

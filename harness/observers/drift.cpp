@@ -1,6 +1,6 @@
 #include <algorithm>
-#include <optional>
 
+#include "harness/observers/joint_view.h"
 #include "harness/observers/observer.h"
 #include "mechanism/tree_dynamics.h"
 
@@ -33,20 +33,18 @@ struct Largest {
 template <class Space>
 struct DriftObserver<Space>::Work {
   Work(const MechanismDescription& description, const Mechanism<Space, double>& mechanism)
-      : dynamics(mechanism), A(mechanism.num_bodies()), loop_max(mechanism.joints().size(), 0.0) {
-    if (mechanism.coordinates() == Coordinates::kAbsolute) {
-      joint_mechanism.emplace(description, Coordinates::kJoint);
-      joint_kinematics.emplace(*joint_mechanism);
+      : dynamics(mechanism),
+        A(mechanism.num_bodies()),
+        view(description, mechanism),
+        loop_max(mechanism.joints().size(), 0.0) {
+    for (int index : view.mechanism().constraints()) {
+      loop_names.emplace_back(index, view.mechanism().joint_names()[index]);
     }
-    const auto& loops = joint_mechanism ? *joint_mechanism : mechanism;
-    for (int index : loops.constraints())
-      loop_names.emplace_back(index, loops.joint_names()[index]);
   }
 
   TreeDynamics<Space, double> dynamics;
   std::vector<Motion<Space, double>> A;
-  std::optional<Mechanism<Space, double>> joint_mechanism;
-  std::optional<Kinematics<Space, double>> joint_kinematics;
+  JointView<Space> view;
   std::vector<std::pair<int, std::string>> loop_names;
   std::vector<double> loop_max;
   double shift = 0.0, rotation = 0.0, velocity = 0.0, acceleration = 0.0, closure = 0.0;
@@ -86,14 +84,10 @@ void DriftObserver<Space>::Observe(const Sample<Space>& sample) {
   series_.t.push_back(sample.t);
   series_.value.push_back(now.shift);
 
-  const Kinematics<Space, double>* closure = &kinematics;
-  if (work.joint_mechanism) {
-    work.joint_kinematics->UpdatePosition(kinematics.CoordinatesIn(*work.joint_mechanism));
-    closure = &*work.joint_kinematics;
-  }
+  const Kinematics<Space, double>& closure = work.view.At(kinematics);
   for (const auto& [index, name] : work.loop_names) {
     Largest loop;
-    loop.Add(*closure, index);
+    loop.Add(closure, index);
     work.loop_max[index] = std::max(work.loop_max[index], loop.shift);
     work.closure = std::max(work.closure, loop.shift);
   }

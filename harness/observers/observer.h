@@ -67,7 +67,8 @@ class DriftObserver final : public Observer<Space> {
 
 /// Energy balance: the largest deviation of
 ///   kinetic + potential - work supplied + work dissipated
-/// from its first value [J], and its series. Without power, that of the total energy.
+/// from its first value [J], and its series. Without power, that of the total energy. The relative
+/// error compares it with the largest kinetic energy.
 template <class Space>
 class EnergyObserver final : public Observer<Space> {
  public:
@@ -79,7 +80,7 @@ class EnergyObserver final : public Observer<Space> {
   int points_;
   bool has_power_;
   bool started_ = false;
-  double first_ = 0.0, largest_ = 0.0;
+  double first_ = 0.0, largest_ = 0.0, kinetic_ = 0.0;
   double supplied_ = 0.0, dissipated_ = 0.0;
   TimeSeries series_;
 };
@@ -97,6 +98,25 @@ class ConditionObserver final : public Observer<Space> {
   int rank_min_ = 0;
   double rcond_min_ = 1.0, rcond_t_ = 0.0;
   std::int64_t softened_steps_ = 0, softened_evaluations_ = 0, mode_changes_ = 0;
+};
+
+/// How near the run came to a singular position: the smallest ratio of singular values of the
+/// scaled loops (mechanism/scaled_loops.h), at the largest rank met. By Eckart and Young it is the
+/// relative distance of the constraints from the nearest ones of lower rank; near a singular
+/// position it is about the angle [rad] still to go. At accepted steps only, and only for loops
+/// with few rows; redundant rows do not count.
+template <class Space>
+class SingularityObserver final : public Observer<Space> {
+ public:
+  SingularityObserver(const MechanismDescription& description,
+                      const Mechanism<Space, double>& mechanism);
+  ~SingularityObserver() override;
+  void Observe(const Sample<Space>& sample) override;
+  void Write(Record& record) const override;
+
+ private:
+  struct Work;
+  std::unique_ptr<Work> work_;
 };
 
 /// Distance from what is known of a scene: branch invariants and closed form (scene.h).

@@ -23,8 +23,9 @@ template <class Space>
 void EnergyObserver<Space>::Observe(const Sample<Space>& sample) {
   supplied_ = sample.supplied;
   dissipated_ = sample.dissipated;
-  const double energy =
-      ComputeEnergy(sample.formulation.kinematics()).total() - supplied_ + dissipated_;
+  const auto parts = ComputeEnergy(sample.formulation.kinematics());
+  const double energy = parts.total() - supplied_ + dissipated_;
+  kinetic_ = std::max(kinetic_, parts.kinetic);
   if (!started_) first_ = energy;
   started_ = true;
   largest_ = std::max(largest_, std::abs(energy - first_));
@@ -36,6 +37,7 @@ template <class Space>
 void EnergyObserver<Space>::Write(Record& record) const {
   if (!started_) return;
   record.Set("energy_error_max", largest_);
+  if (kinetic_ > 0.0) record.Set("energy_error_relative", largest_ / kinetic_);
   if (has_power_) {
     record.Set("energy_supplied", supplied_);
     record.Set("energy_dissipated", dissipated_);

@@ -6,6 +6,7 @@
 
 #include <limits>
 #include <memory>
+#include <optional>
 #include <string>
 #include <vector>
 
@@ -24,6 +25,7 @@ struct Case {
   SolverKind solver;
   Coordinates coordinates;
   SpaceKind space;
+  std::optional<BaumgarteGains> gains = std::nullopt;
 };
 
 /// Keeps addresses out of the test list.
@@ -41,8 +43,8 @@ inline std::string NameOf(const ::testing::TestParamInfo<Case>& info) {
 inline std::vector<Case> AllCases() {
   std::vector<Case> cases;
   for (const char* formulation : {"odca", "lagrange", "reduction"}) {
-    for (Enforcement enforcement :
-         {Enforcement::kAcceleration, Enforcement::kVelocity, Enforcement::kPosition}) {
+    for (Enforcement enforcement : {Enforcement::kAcceleration, Enforcement::kVelocity,
+                                    Enforcement::kPosition, Enforcement::kBaumgarte}) {
       for (SolverKind solver : {SolverKind::kAsPublished, SolverKind::kRankRevealing}) {
         for (Coordinates coordinates : {Coordinates::kJoint, Coordinates::kAbsolute}) {
           for (SpaceKind space : {SpaceKind::kPlanar, SpaceKind::kSpatial}) {
@@ -58,7 +60,7 @@ inline std::vector<Case> AllCases() {
 template <class Space>
 std::unique_ptr<Formulation<Space, double>> Make(const Case& c,
                                                  const Mechanism<Space, double>& mechanism) {
-  const FormulationOptions options{c.enforcement, c.solver};
+  const FormulationOptions options{c.enforcement, c.solver, c.gains};
   const std::string name = c.formulation;
   if (name == "odca") return std::make_unique<odca::Odca<Space, double>>(mechanism, options);
   if (name == "lagrange") {

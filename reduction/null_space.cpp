@@ -1,0 +1,144 @@
+#include "reduction/null_space.h"
+
+#include <algorithm>
+#include <cmath>
+
+namespace loopbench::reduction {
+
+template <class Space, class S>
+NullSpace<Space, S>::NullSpace(const Mechanism<Space, S>& mechanism)
+    : mechanism_(mechanism),
+      K_(mechanism.constraints().size()),
+      B_(MatrixX<S>::Zero(mechanism.num_rows(), mechanism.num_u())),
+      M_g_(MatrixX<S>::Zero(mechanism.num_u(), mechanism.num_u())),
+      Mh_(M_g_),
+      basis_(M_g_),
+      reduced_(M_g_),
+      weights_(VectorX<S>::Zero(std::min(mechanism.num_rows(), mechanism.num_u()))),
+      rows_(VectorX<S>::Zero(mechanism.num_rows())),
+      c_(weights_),
+      z_(VectorX<S>::Zero(mechanism.num_u())),
+      speeds_(z_),
+      column_(z_) {}
+
+template <class Space, class S>
+void NullSpace<Space, S>::Factor(const Kinematics<Space, S>& kinematics,
+                                 TreeDynamics<Space, S>& dynamics, const MatrixX<S>& J) {
+  using std::sqrt;
+  const auto& unit_bodies = mechanism_.geometric_bodies();
+  dynamics.MassMatrix(kinematics, unit_bodies, M_g_);
+  L_.compute(M_g_);
+  // B^T = L^-1 J^T by columns of J's rows, then K^-1 from the left
+  B_ = J;
+  for (Eigen::Index r = 0; r < B_.rows(); ++r) {
+    column_ = B_.row(r).transpose();
+    L_.matrixL().solveInPlace(column_);
+    B_.row(r) = column_.transpose();
+  }
+  for (std::size_t k = 0; k < K_.size(); ++k) {
+    const int index = mechanism_.constraints()[k];
+    const Joint<Space, S>& joint = mechanism_.joints()[index];
+    const Eigen::LLT<JointMatrix<S>> free(FreeResponse(kinematics, unit_bodies, index));
+    K_[k] = free.matrixL();
+    auto block = B_.middleRows(joint.row, joint.num_constraints());
+    K_[k].template triangularView<Eigen::Lower>().solveInPlace(block);
+  }
+  svd_.compute(B_, Eigen::ComputeFullU | Eigen::ComputeFullV);
+  const auto& sigma = svd_.singularValues();
+  const S largest = std::max(sigma[0] * sigma[0], S(LoopSolver<S>::kLeastResponse));
+  num_dependent_ = rank_ = 0;
+  for (Eigen::Index i = 0; i < sigma.size(); ++i) {
+    const S ratio = sigma[i] * sigma[i] / (S(LoopSolver<S>::kTheta) * largest);
+    weights_[i] = -std::expm1(-ratio * ratio);
+    if (weights_[i] >= S(1) / S(2)) ++rank_;
+    if (S(1) - weights_[i] < S(kHard)) ++num_dependent_;
+  }
+  smallest_weight_ = weights_.size() > 0 ? weights_.minCoeff() : S(1);
+  rcond_ = num_dependent_ > 0 ? sigma[num_dependent_ - 1] / sqrt(largest) : S(1);
+}
+
+template <class Space, class S>
+void NullSpace<Space, S>::ToDirections(const VectorX<S>& rows) {
+  rows_ = rows;
+  for (std::size_t k = 0; k < K_.size(); ++k) {
+    const Joint<Space, S>& joint = mechanism_.joints()[mechanism_.constraints()[k]];
+    auto part = rows_.segment(joint.row, joint.num_constraints());
+    K_[k].template triangularView<Eigen::Lower>().solveInPlace(part);
+  }
+  c_.noalias() = svd_.matrixU().leftCols(c_.size()).transpose() * rows_;
+}
+
+template <class Space, class S>
+bool NullSpace<Space, S>::Accelerate(const MatrixX<S>& M, const VectorX<S>& h,
+                                     const VectorX<S>& gamma, VectorX<S>& udot) {
+  const Eigen::Index n = M.rows(), d = num_dependent_, f = n - d;
+  const auto& sigma = svd_.singularValues();
+  const auto& V = svd_.matrixV();
+  // Mh V = L^-1 M L^-T V, V^T Mh V
+  Mh_ = M;
+  L_.matrixL().solveInPlace(Mh_);
+  Mh_.transposeInPlace();
+  L_.matrixL().solveInPlace(Mh_);
+  ToDirections(gamma);
+  z_.setZero();
+  for (Eigen::Index i = 0; i < d; ++i) z_[i] = c_[i] / sigma[i];
+  speeds_.noalias() = V * z_;
+  column_ = h;
+  L_.matrixL().solveInPlace(column_);
+  column_.noalias() += Mh_ * speeds_;
+  basis_.leftCols(f).noalias() = Mh_ * V.rightCols(f);
+  reduced_.topLeftCorner(f, f).noalias() = V.rightCols(f).transpose() * basis_.leftCols(f);
+  z_.tail(f).noalias() = -(V.rightCols(f).transpose() * column_);
+  bool factored = false;
+  for (Eigen::Index i = d; i < c_.size(); ++i) {
+    if (!(weights_[i] >= S(1e-16))) continue;
+    if (!factored) Mh_factor_.compute(Mh_);
+    factored = true;
+    column_ = V.col(i);
+    Mh_factor_.solveInPlace(column_);
+    const S stiffness = weights_[i] / ((S(1) - weights_[i]) * V.col(i).dot(column_));
+    reduced_(i - d, i - d) += stiffness;
+    z_[i] += stiffness * c_[i] / sigma[i];
+  }
+  if (f > 0) {
+    reduced_factor_.compute(reduced_.topLeftCorner(f, f));
+    if (reduced_factor_.info() != Eigen::Success) return false;
+    auto free = z_.tail(f);
+    reduced_factor_.solveInPlace(free);
+  }
+  udot.noalias() = V * z_;
+  L_.matrixU().solveInPlace(udot);
+  return true;
+}
+
+template <class Space, class S>
+void NullSpace<Space, S>::Correct(const VectorX<S>& violation, VectorX<S>& change) {
+  ToDirections(violation);
+  z_.setZero();
+  for (Eigen::Index i = 0; i < c_.size(); ++i) {
+    if (weights_[i] >= S(1e-16)) z_[i] = -weights_[i] * c_[i] / svd_.singularValues()[i];
+  }
+  change.noalias() = svd_.matrixV() * z_;
+  L_.matrixU().solveInPlace(change);
+}
+
+template <class Space, class S>
+void NullSpace<Space, S>::Multipliers(const VectorX<S>& force, VectorX<S>& lambda) {
+  column_ = force;
+  L_.matrixL().solveInPlace(column_);
+  c_.noalias() = svd_.matrixV().leftCols(c_.size()).transpose() * column_;
+  for (Eigen::Index i = 0; i < c_.size(); ++i) {
+    c_[i] = weights_[i] >= S(1e-16) ? S(c_[i] / svd_.singularValues()[i]) : S(0);
+  }
+  lambda.noalias() = svd_.matrixU().leftCols(c_.size()) * c_;
+  for (std::size_t k = 0; k < K_.size(); ++k) {
+    const Joint<Space, S>& joint = mechanism_.joints()[mechanism_.constraints()[k]];
+    auto part = lambda.segment(joint.row, joint.num_constraints());
+    K_[k].template triangularView<Eigen::Lower>().transpose().solveInPlace(part);
+  }
+}
+
+template class NullSpace<Planar, double>;
+template class NullSpace<Spatial, double>;
+
+}  // namespace loopbench::reduction

@@ -1,0 +1,70 @@
+// Coordinate reduction without a choice of coordinates: a basis of the directions that the
+// constraints leave free, where no set of independent speeds serves (near singular positions) or
+// none is known (redundant constraints).
+//
+// With the mass matrix of unit bodies M_g = L L^T and the free responses K K^T of loop_solver.h,
+//
+//   K^-1 J L^-T = U diag(sigma) V^T,    w_i = 1 - exp(-(sigma_i^2 / theta)^2),               (4)
+//
+// the speeds are u = L^-T V z. A direction with w_i = 1 but for kHard is dependent, its z_i given:
+// sigma_i z_i = (U^T K^-1 gamma)_i =: c_i. All others are independent,
+//
+//   (V_N^T Mh V_N + diag(k)) z_N = -V_N^T (L^-1 h + Mh V_D z_D) + diag(k) c_N / sigma_N,      (5)
+//   Mh = L^-1 M L^-T,   k_i = w_i / ((1 - w_i) v_i^T Mh^-1 v_i),
+//
+// and k_i, the stiffness with which a degenerating direction is still held, makes (5) the same
+// equations as the softened ones of loop_solver.h: there 1 / k_i stands beside the response.
+//
+// Basis by singular values: Singh and Likins, J. Appl. Mech. 52 (1985) 943; Mani, Haug and
+// Atkinson, J. Mech. Trans. Autom. Des. 107 (1985) 82.
+#pragma once
+
+#include <Eigen/Cholesky>
+#include <Eigen/SVD>
+#include <vector>
+
+#include "mechanism/tree_dynamics.h"
+
+namespace loopbench::reduction {
+
+template <class Space, class S>
+class NullSpace {
+ public:
+  /// 1 - w below which a direction counts as dependent: its stiffness would be a million times the
+  /// inertia behind it, and what is lost by rounding as much.
+  static constexpr double kHard = 1e-6;
+
+  explicit NullSpace(const Mechanism<Space, S>& mechanism);
+
+  /// The basis at the current positions, J being theirs. Allocates nothing once it was called.
+  void Factor(const Kinematics<Space, S>& kinematics, TreeDynamics<Space, S>& dynamics,
+              const MatrixX<S>& J);
+
+  /// udot from M udot + h = J^T lambda, J udot = gamma. False where M is not positive definite.
+  bool Accelerate(const MatrixX<S>& M, const VectorX<S>& h, const VectorX<S>& gamma,
+                  VectorX<S>& udot);
+  /// The smallest change in the metric of unit bodies with J change = -violation, softened.
+  void Correct(const VectorX<S>& violation, VectorX<S>& change);
+  /// lambda for which J^T lambda is nearest to `force`.
+  void Multipliers(const VectorX<S>& force, VectorX<S>& lambda);
+
+  int rank() const { return rank_; }
+  S smallest_weight() const { return smallest_weight_; }
+  /// Ratio of the extreme singular values of the dependent directions.
+  S rcond() const { return rcond_; }
+
+ private:
+  /// c = U^T K^-1 rows.
+  void ToDirections(const VectorX<S>& rows);
+
+  const Mechanism<Space, S>& mechanism_;
+  int num_dependent_ = 0, rank_ = 0;
+  S smallest_weight_ = S(1), rcond_ = S(1);
+  std::vector<JointMatrix<S>> K_;  ///< Cholesky factors, by constraint
+  MatrixX<S> B_, M_g_, Mh_, basis_, reduced_;
+  Eigen::LLT<MatrixX<S>> L_, Mh_factor_, reduced_factor_;
+  Eigen::JacobiSVD<MatrixX<S>> svd_;
+  VectorX<S> weights_, rows_, c_, z_, speeds_, column_;
+};
+
+}  // namespace loopbench::reduction

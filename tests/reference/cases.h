@@ -91,6 +91,18 @@ inline Case CaseOf(const Experiment& experiment, const std::string& scene, const
           .limits = {.wall_s = 60.0, .steps = 1'000'000}};
 }
 
+/// A mechanism of configs/mechanisms/.
+inline MechanismFile Shipped(const std::string& name) {
+  return ReadMechanism(kConfigs / "mechanisms" / (name + ".json"));
+}
+
+/// Runs it as it is.
+inline Record RunShipped(const std::string& name, const Column& column, double tolerance,
+                         double horizon) {
+  const Experiment experiment = Single(Shipped(name));
+  return RunCase(experiment, CaseOf(experiment, name, column, tolerance, horizon));
+}
+
 /// Runs one scene of the paper.
 inline Record RunPaper(const std::string& scene, const Column& column, double tolerance,
                        double horizon) {

@@ -1,8 +1,8 @@
-// Level position: loops that stay closed, branches that are kept, orders that survive.
+// Level position: loops that stay closed, orders that survive. singular_test.cpp takes it through
+// singular positions.
 #include <gtest/gtest.h>
 
 #include <cmath>
-#include <iostream>
 
 #include "tests/reference/cases.h"
 #include "tests/reference/simulate.h"
@@ -10,33 +10,7 @@
 namespace loopbench::harness::reference {
 namespace {
 
-/// All formulations at level position, rank-revealing, in both coordinate sets.
-std::vector<Column> PositionColumns() {
-  std::vector<Column> columns = RankRevealingColumns();
-  for (Column& column : columns) column.enforcement = Enforcement::kPosition;
-  return columns;
-}
-
 class Projection : public testing::TestWithParam<Column> {};
-
-/// Without reduction: where its independent set fails in the flat position is a result of the
-/// tables, not yet held here.
-std::vector<Column> PassingColumns() {
-  std::vector<Column> columns = PositionColumns();
-  std::erase_if(columns,
-                [](const Column& c) { return c.formulation == FormulationKind::kReduction; });
-  return columns;
-}
-class Passage : public Projection {};
-
-MechanismFile Shipped(const std::string& name) {
-  return ReadMechanism(kConfigs / "mechanisms" / (name + ".json"));
-}
-
-Record RunShipped(const std::string& name, const Column& column, double tolerance, double horizon) {
-  const Experiment experiment = Single(Shipped(name));
-  return RunCase(experiment, CaseOf(experiment, name, column, tolerance, horizon));
-}
 
 TEST_P(Projection, KeepsLoopsClosedWhateverTheTolerance) {
   for (const char* name : {"four-bar", "seven-bar", "slider-crank", "spatial-four-bar"}) {
@@ -70,27 +44,6 @@ TEST_P(Projection, KeepsTheOrderOfTheIntegrator) {
   }
 }
 
-/// Through the flat position some ten times: what no level below it does at every tolerance.
-TEST_P(Passage, ParallelogramKeepsItsBranch) {
-  for (const char* name : {"parallelogram", "parallelogram-singular-start"}) {
-    for (const double tolerance : {1e-6, 1e-8, 1e-10, 1e-12}) {
-      const Record record = RunShipped(name, GetParam(), tolerance, 20.0);
-      ASSERT_EQ(record.Text("outcome"), "finished") << name << ": " << record.Text("message");
-      EXPECT_LE(record.Number("branch_error_max"), 1e-8) << name << " " << tolerance;
-      EXPECT_LE(record.Number("drift_position_max"), 1e-13) << name << " " << tolerance;
-      EXPECT_LE(record.Number("closed_form_error_max"), 100 * tolerance) << name;
-      EXPECT_LE(record.Number("energy_error_max"), 500 * tolerance) << name;
-      std::cout << name << " " << tolerance << ": branch " << record.Number("branch_error_max")
-                << ", closed form " << record.Number("closed_form_error_max") / tolerance
-                << " tol, energy " << record.Number("energy_error_max") / tolerance
-                << " tol, steps " << record.Number("steps") << ", rejected "
-                << record.Number("rejected") << "\n";
-    }
-  }
-}
-
-INSTANTIATE_TEST_SUITE_P(Columns, Passage, testing::ValuesIn(PassingColumns()),
-                         [](const auto& test) { return NameOf(test.param); });
 INSTANTIATE_TEST_SUITE_P(Columns, Projection, testing::ValuesIn(PositionColumns()),
                          [](const auto& test) { return NameOf(test.param); });
 

@@ -181,4 +181,13 @@ const std::vector<Column>& RankRevealingColumns() {
   return kColumns;
 }
 
+const std::vector<Column>& PositionColumns() {
+  static const std::vector<Column> kColumns = [] {
+    std::vector<Column> columns = RankRevealingColumns();
+    for (Column& column : columns) column.enforcement = Enforcement::kPosition;
+    return columns;
+  }();
+  return kColumns;
+}
+
 }  // namespace loopbench::harness::reference

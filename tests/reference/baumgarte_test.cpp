@@ -1,0 +1,71 @@
+// Baumgarte's stabilisation over whole runs: drift that no longer grows, orders that survive.
+#include <gtest/gtest.h>
+
+#include <cmath>
+#include <iostream>
+
+#include "tests/reference/cases.h"
+#include "tests/reference/simulate.h"
+
+namespace loopbench::harness::reference {
+namespace {
+
+std::vector<Column> Columns() {
+  std::vector<Column> columns = PositionColumns();
+  for (Column& column : columns) column.enforcement = Enforcement::kBaumgarte;
+  return columns;
+}
+
+class BaumgarteRun : public testing::TestWithParam<Column> {};
+
+/// Without feedback drift grows with the square of time: four times the horizon, sixteen times the
+/// drift. With it, what is fed in per step decays within some steps.
+TEST_P(BaumgarteRun, DriftStopsGrowing) {
+  Column plain = GetParam();
+  plain.enforcement = Enforcement::kAcceleration;
+  for (const double tolerance : {1e-6, 1e-9}) {
+    const auto drift = [&](const Column& column, double horizon) {
+      const Record record = RunShipped("four-bar", column, tolerance, horizon);
+      EXPECT_EQ(record.Text("outcome"), "finished") << record.Text("message");
+      return record.Number("drift_position_max");
+    };
+    const double early = drift(GetParam(), 10.0), late = drift(GetParam(), 40.0);
+    const double unstabilised = drift(plain, 40.0);
+    EXPECT_LE(late, 2 * early) << tolerance;
+    EXPECT_LE(late, 0.01 * unstabilised) << tolerance;
+    std::cout << tolerance << ": " << early << ", " << late << ", without " << unstabilised << "\n";
+  }
+}
+
+/// Fixed steps against a run with tiny ones. Gains given: those of the step would change with it.
+TEST_P(BaumgarteRun, KeepsTheOrderOfTheIntegrator) {
+  const MechanismDescription scene = Shipped("four-bar").description;
+  Column column = GetParam();
+  column.gains = BaumgarteGains{5.0, 5.0};
+  for (const auto& [profile, order] : {std::pair{"bogacki-shampine", 3}, {"dormand-prince", 5}}) {
+    const auto end = [&](double step) {
+      IntegratorOptions options = Options(profile, 1e-3);
+      options.fixed_step = step;
+      const Simulation run = Simulate(scene, column, options, 1.6, {});
+      EXPECT_EQ(run.result.outcome, Outcome::kFinished);
+      return run.last.bodies[2].p;
+    };
+    const Eigen::Vector3d exact = end(0.0025);
+    const double coarse = (end(0.04) - exact).norm(), fine = (end(0.02) - exact).norm();
+    // terms of the next order at these steps; the tiny steps' own error is 8^-order of the fine one
+    EXPECT_NEAR(std::log2(coarse / fine), order, 0.5) << profile << " " << coarse << " " << fine;
+  }
+}
+
+/// Prescribed motions are constraints as others are; a drive in a loop is still followed.
+TEST_P(BaumgarteRun, FollowsPrescribedMotions) {
+  const Record record = RunShipped("driven-four-bar", GetParam(), 1e-8, 2.0);
+  ASSERT_EQ(record.Text("outcome"), "finished") << record.Text("message");
+  EXPECT_LE(record.Number("drift_position_max"), 1e-6);
+}
+
+INSTANTIATE_TEST_SUITE_P(Columns, BaumgarteRun, testing::ValuesIn(Columns()),
+                         [](const auto& test) { return NameOf(test.param); });
+
+}  // namespace
+}  // namespace loopbench::harness::reference

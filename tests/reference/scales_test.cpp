@@ -1,0 +1,131 @@
+// Size and mass decide nothing: the same mechanism in other units moves alike and has the same
+// rank.
+#include <gtest/gtest.h>
+
+#include <algorithm>
+#include <cmath>
+#include <filesystem>
+
+#include "mechanism/assembly.h"
+#include "mechanism/similarity.h"
+#include "tests/reference/cases.h"
+#include "tests/reference/simulate.h"
+
+namespace loopbench::harness::reference {
+namespace {
+
+std::vector<std::string> ShippedNames() {
+  std::vector<std::string> names;
+  for (const auto& entry : std::filesystem::directory_iterator(kConfigs / "mechanisms")) {
+    if (entry.path().extension() == ".json") names.push_back(entry.path().stem().string());
+  }
+  std::ranges::sort(names);
+  return names;
+}
+
+struct FirstEvaluation {
+  Outcome outcome = Outcome::kFinished;
+  int rank = 0;
+  VectorX<double> udot;
+};
+
+template <class Space>
+FirstEvaluation EvaluateIn(const MechanismDescription& scene, const Column& column) {
+  const Mechanism<Space, double> mechanism(scene, column.coordinates);
+  const Start<double> start = Assemble<Space>(scene, mechanism);
+  FirstEvaluation first;
+  first.outcome = start.outcome;
+  if (start.outcome != Outcome::kFinished) return first;
+  const auto formulation = MakeFormulation<Space>(column, mechanism);
+  first.outcome = formulation->Start(0.0, start.q, start.u);
+  if (first.outcome != Outcome::kFinished) return first;
+  // speeds of velocity level are the formulation's own: those of the start serve all
+  first.outcome = formulation->Evaluate(0.0, start.q, start.u, first.udot);
+  first.rank = formulation->diagnostics().rank;
+  return first;
+}
+
+FirstEvaluation EvaluateAt(const MechanismDescription& scene, const Column& column) {
+  return scene.space == SpaceKind::kPlanar ? EvaluateIn<Planar>(scene, column)
+                                           : EvaluateIn<Spatial>(scene, column);
+}
+
+/// Without those that start in singular positions, where the condition has no bound.
+std::vector<std::string> RegularNames() {
+  std::vector<std::string> names = ShippedNames();
+  std::erase_if(names, [](const std::string& name) { return name.ends_with("singular-start"); });
+  return names;
+}
+
+class Scales : public testing::TestWithParam<std::string> {};
+class RegularScales : public Scales {};
+
+TEST_P(Scales, RankIsThatOfTheOriginal) {
+  const MechanismDescription scene = Shipped(GetParam()).description;
+  for (const Column& column : PositionColumns()) {
+    const FirstEvaluation original = EvaluateAt(scene, column);
+    ASSERT_EQ(original.outcome, Outcome::kFinished) << ToString(column);
+    for (const double factor : {1e-6, 1e6}) {
+      const FirstEvaluation scaled = EvaluateAt(AtScale(scene, factor), column);
+      ASSERT_EQ(scaled.outcome, Outcome::kFinished) << ToString(column) << " at " << factor;
+      EXPECT_EQ(scaled.rank, original.rank) << ToString(column) << " at " << factor;
+    }
+  }
+}
+
+/// Speeds of joints are angles or lengths per time, whatever the formulation. A power of two
+/// rounds nothing, so that what is left comes from the order of sums alone: elimination of some 50
+/// unknowns in loops whose condition is 1e4 at worst away from singular positions.
+TEST_P(RegularScales, AnglesMoveAsBefore) {
+  const MechanismDescription scene = Shipped(GetParam()).description;
+  constexpr double kFactor = 1024;
+  for (const Column& column : PositionColumns()) {
+    if (column.coordinates != Coordinates::kJoint) continue;
+    const FirstEvaluation original = EvaluateAt(scene, column);
+    const FirstEvaluation scaled = EvaluateAt(AtScale(scene, kFactor), column);
+    ASSERT_EQ(scaled.udot.size(), original.udot.size());
+    const double bound = 1e-9 * (1.0 + original.udot.cwiseAbs().maxCoeff());
+    for (Eigen::Index i = 0; i < scaled.udot.size(); ++i) {
+      const double as_angle = std::abs(scaled.udot[i] - original.udot[i]);
+      const double as_length = std::abs(scaled.udot[i] / kFactor - original.udot[i]);
+      EXPECT_LE(std::min(as_angle, as_length), bound) << ToString(column) << " speed " << i;
+    }
+  }
+}
+
+std::string WithoutDashes(const testing::TestParamInfo<std::string>& name) {
+  std::string text = name.param;
+  std::erase(text, '-');
+  return text;
+}
+INSTANTIATE_TEST_SUITE_P(All, Scales, testing::ValuesIn(ShippedNames()), WithoutDashes);
+INSTANTIATE_TEST_SUITE_P(All, RegularScales, testing::ValuesIn(RegularNames()), WithoutDashes);
+
+/// D5: stiffness is physical, rank is not.
+TEST(Masses, RankOfTheFourBarIgnoresThem) {
+  const MechanismDescription scene = Shipped("four-bar").description;
+  for (const Column& column : PositionColumns()) {
+    const FirstEvaluation original = EvaluateAt(scene, column);
+    for (std::size_t body = 1; body < scene.bodies.size(); ++body) {
+      MechanismDescription heavy = scene;
+      heavy.bodies[body].mass *= 1e9;
+      heavy.bodies[body].inertia *= 1e9;
+      const FirstEvaluation changed = EvaluateAt(heavy, column);
+      ASSERT_EQ(changed.outcome, Outcome::kFinished) << ToString(column);
+      EXPECT_EQ(changed.rank, original.rank) << ToString(column) << " body " << body;
+    }
+  }
+}
+
+/// A planar loop described in space has three rows that say nothing new.
+TEST(Masses, PlanarLoopInSpaceReportsItsRedundantRows) {
+  MechanismDescription scene = Shipped("parallelogram-in-space").description;
+  for (const Column& column : PositionColumns()) {
+    const FirstEvaluation first = EvaluateAt(scene, column);
+    ASSERT_EQ(first.outcome, Outcome::kFinished) << ToString(column);
+    EXPECT_EQ(first.rank, 5 - 3) << ToString(column);
+  }
+}
+
+}  // namespace
+}  // namespace loopbench::harness::reference

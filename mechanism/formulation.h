@@ -50,10 +50,10 @@ std::string_view ToString(SolverKind solver);
 struct FormulationOptions {
   Enforcement enforcement = Enforcement::kAcceleration;
   SolverKind solver = SolverKind::kRankRevealing;
-  /// kBaumgarte only. Without them alpha = beta = 1/h with the longest accepted step h so far:
-  /// zero while steps still double from one to the next, set again when h has doubled. Shorter
-  /// steps change nothing: gains that followed them would magnify round-off by 1/h^2, which makes
-  /// steps shorter still.
+  /// kBaumgarte only. Without them alpha = beta = 0.05/h with the longest accepted step h so far:
+  /// zero while steps still double from one to the next, set again when h has doubled. Gains near
+  /// 1/h hold steps back; gains that follow shorter steps magnify round-off by 1/h^2, which makes
+  /// steps shorter still (docs/numerics.md, section 3).
   std::optional<BaumgarteGains> gains = std::nullopt;
 };
 

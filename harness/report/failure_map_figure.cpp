@@ -212,7 +212,8 @@ MapDrawing DrawMap(const FailureMap& map, double point) { return MapPainter(map,
 
 std::optional<std::string> WriteMapFigure(const std::filesystem::path& path, const FailureMap& map,
                                           const std::string& gnuplot) {
-  const MapDrawing drawing = DrawMap(map, path.extension() == ".pdf" ? 0.72 : 1.0);
+  constexpr double kPdfPoint = 1.1;  // with the terminal's own scale of fonts
+  const MapDrawing drawing = DrawMap(map, path.extension() == ".pdf" ? kPdfPoint : 1.0);
   return DrawWithGnuplot(path, drawing.page, drawing.script, gnuplot);
 }
 

@@ -19,7 +19,7 @@ struct MapDrawing {
 /// Rows of groups from top to bottom, methods from left to right, a legend below. Colours are told
 /// apart by colour-blind readers and in grey; every cell says in words what its colour says. Cells
 /// that must hold and do not have a frame. `point` is the size of a pixel of text in the unit of
-/// the terminal's fonts (1 for SVG, 0.72 for PDF, 72 points being 100 pixels).
+/// the terminal's fonts, 1 for SVG.
 MapDrawing DrawMap(const FailureMap& map, double point);
 
 /// Draws into `path`, as PDF when its extension is ".pdf", else as SVG; returns what

@@ -86,4 +86,12 @@ struct VerdictCommand {
 };
 int PrintVerdicts(const VerdictCommand& command, const std::string& typed);
 
+struct MapCommand {
+  std::filesystem::path store, rules;
+  std::filesystem::path out;   ///< folder; nothing is written when empty
+  std::string format = "svg";  ///< of the picture: svg or pdf
+  bool gate = false;           ///< 1 if a cell that must hold does not
+};
+int PrintMap(const MapCommand& command, const std::string& typed);
+
 }  // namespace loopbench::harness

@@ -7,6 +7,7 @@
 #include "harness/config/benchmark_reader.h"
 #include "harness/config/claims_reader.h"
 #include "harness/config/config_error.h"
+#include "harness/config/failure_map_reader.h"
 #include "harness/config/file_kind.h"
 #include "harness/config/mechanism_reader.h"
 #include "harness/report/table.h"
@@ -117,6 +118,14 @@ int CheckFiles(const ExperimentFiles& files) {
         case FileKind::kClaims:
           fmt::print("{}: {} claims\n", path.string(), ReadClaims(path).size());
           break;
+        case FileKind::kMap: {
+          const MapRules map = ReadMapRules(path);
+          std::size_t rows = 0;
+          for (const MapGroup& group : map.groups) rows += group.rows.size();
+          fmt::print("{}: failure map of {} rows and {} columns\n", path.string(), rows,
+                     map.columns.size());
+          break;
+        }
         case FileKind::kBenchmarks:
           fmt::print("{}: {} groups of benchmarks\n", path.string(),
                      ReadBenchmarks(path).groups.size());

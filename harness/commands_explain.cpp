@@ -129,11 +129,19 @@ void ExplainRuns(const Experiment& experiment) {
     const std::vector<Case> cases = Expand(experiment);
     const auto count = static_cast<std::size_t>(std::count_if(
         cases.begin(), cases.end(), [&rule](const Case& one) { return Matches(rule, one); }));
+    std::string start =
+        fmt::format("each held coordinate moved by up to {:g} (rad or m)", rule.perturb);
+    if (!rule.between.empty()) start.clear();
+    for (const DrawnCoordinate& drawn : rule.between) {
+      start += fmt::format("{}{} between {:g} and {:g} (rad or m)", start.empty() ? "" : ", ",
+                           drawn.joint, drawn.from, drawn.to);
+    }
     fmt::print(
-        "  {} also run{} {} times from perturbed starts: each held coordinate moved by up to "
-        "{:g} (rad or m), drawn from seed {}. The spread of the results says how far a "
-        "single run can be trusted.\n",
-        Plural(count, "case"), count == 1 ? "s" : "", rule.size, rule.perturb, rule.seed);
+        "  {} also run{} {} times from perturbed starts: {}, drawn from seed {}. The spread of the "
+        "results says how far a single run can be trusted; where the scene knows a branch, "
+        "ensemble_branch_kept counts the runs that stay within {:g} rad of it.\n",
+        Plural(count, "case"), count == 1 ? "s" : "", rule.size, start, rule.seed,
+        rule.branch_bound);
   }
   const Limits& limits = experiment.limits;
   fmt::print(

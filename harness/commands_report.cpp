@@ -2,13 +2,17 @@
 #include <fmt/format.h>
 #include <unistd.h>
 
+#include <algorithm>
 #include <cstdlib>
 #include <string_view>
 
 #include "harness/commands.h"
 #include "harness/config/config_error.h"
+#include "harness/config/failure_map_reader.h"
 #include "harness/provenance.h"
 #include "harness/report/columns.h"
+#include "harness/report/failure_map_figure.h"
+#include "harness/report/failure_map_report.h"
 #include "harness/report/figure_recipes.h"
 #include "harness/store/files.h"
 
@@ -79,6 +83,31 @@ int DrawFree(const std::vector<Record>& records, const PlotCommand& command) {
   return 0;
 }
 
+/// failure-map.csv, .md and the picture, which alone may fail: the reason is printed.
+int WriteMap(const FailureMap& map, const MapCommand& command, const std::string& typed) {
+  const std::filesystem::path stem = command.out / "failure-map";
+  Table cells = MapCellTable(map);
+  AppendProvenance(cells, typed);
+  WriteFileAtomically(stem.string() + ".csv", RenderKept(cells, "csv"));
+  WriteFileAtomically(stem.string() + ".md", MapMarkdown(map, Provenance(typed)));
+  const std::string picture = stem.string() + "." + command.format;
+  const auto error = WriteMapFigure(picture, map);
+  if (error) fmt::print(stderr, "{}\n", *error);
+  fmt::print("wrote {0}.csv, {0}.md{1}\n", stem.string(), error ? "" : ", " + picture);
+  return error ? 2 : 0;
+}
+
+/// Without a demand a gate could not fail, and its success would say nothing.
+void RequireDemands(const FailureMap& map, const std::filesystem::path& rules) {
+  for (const auto& group : map.cells) {
+    for (const auto& row : group) {
+      if (std::ranges::any_of(row, &MapCell::demanded)) return;
+    }
+  }
+  throw ConfigError(fmt::format(
+      "--gate: no cell of {} has to hold, expected a row with \"must_hold\"", rules.string()));
+}
+
 }  // namespace
 
 void WriteTables(const std::vector<Record>& records, const std::filesystem::path& out,
@@ -141,6 +170,25 @@ int Plot(const PlotCommand& command) {
     return 2;
   }
   return DrawAll(figures, command);
+}
+
+int PrintMap(const MapCommand& command, const std::string& typed) {
+  const MapRules rules = ReadMapRules(command.rules);
+  const std::vector<Record> records = LoadRecords(command.store);
+  if (records.empty()) {
+    fmt::print(stderr, "{}: no records\n", command.store.string());
+    return 2;
+  }
+  const FailureMap map = MakeFailureMap(rules, records);
+  if (command.gate) RequireDemands(map, command.rules);
+  Table table = MapTable(map);
+  AppendProvenance(table, typed);
+  fmt::print("{}", ToText(table, TerminalHasColour()));
+  const int written = command.out.empty() ? 0 : WriteMap(map, command, typed);
+  if (!command.gate) return written;
+  const std::vector<std::string> broken = BrokenDemands(map);
+  for (const std::string& cell : broken) fmt::print(stderr, "must hold: {}\n", cell);
+  return broken.empty() ? written : 1;
 }
 
 }  // namespace loopbench::harness

@@ -40,6 +40,7 @@ Examples:
   loopbench table results/runs/paper --where mechanism=four-bar,dead-centre --where rtol=1e-8
   loopbench plot results/runs/paper --out results/runs/paper/figures
   loopbench verdict results/runs/paper --claims configs/experiments/paper/claims.json
+  loopbench map results/runs/extremes --rules configs/experiments/extremes/map.json
 
 Conditions are key=value or key=value,value; keys are the columns of drift.csv.
 Exit codes: 0 done, 1 a gate failed, 2 could not measure or bad input.)";
@@ -60,6 +61,31 @@ Examples:
   loopbench plot out --out cost.pdf --where kind=timing --x bodies --y ns_per_body --group formulation
 
 Without --x and --y: angles, and drift with its fitted exponents. Runs that failed are crosses.)";
+
+constexpr const char* kMapFooter = R"(
+Examples:
+  loopbench map results/runs/extremes --rules configs/experiments/extremes/map.json
+  loopbench map out --rules map.json --out out --format pdf
+  loopbench map out --rules map.json --gate        (1 if a cell that must hold does not)
+
+Rules name methods (columns), extremes (rows) and what decides about a row:
+  {"title": "Extremes",
+   "columns": [{"label": "O-DCA, position",
+                "select": {"formulation": "odca", "enforcement": "position"}}],
+   "groups": [{"label": "singular positions", "rows": [
+     {"label": "parallelogram, 1e-8", "select": {"mechanism": "parallelogram", "rtol": 1e-8},
+      "decides": [{"measure": "branch_error_max", "limit": 500, "of": "rtol", "unit": "rad"}],
+      "why": "...", "must_hold": "all"}]}]}
+"limit", "at_least" or "equal" compare a key of the record with a number, or with that many times
+another key ("of"). "right": ["locked"] says how a run should end if not as finished.
+Of several records that match a cell the worst decides. A cell
+  holds         ended as it should, all measures within their limits
+  singular, ... stopped early with that reason; time-limit, ...: did not end by itself
+  inaccurate    finished, with a measure beyond its limit or not finite
+  crashed, ...  no result
+  ?             not measured: no record, too few ("cases"), or one without the measure
+  -             not applicable, with the rules' reason
+docs/extremes.md explains them, docs/design.md (section 6) has all keys of the rules.)";
 
 }  // namespace
 
@@ -176,6 +202,18 @@ int main(int argc, char** argv) {
   verdict_app->add_option("--claims", verdict.claims, "Rules (JSON)")->required();
   verdict_app->add_option("--out", verdict.out, "Markdown file with all numbers");
 
+  MapCommand map;
+  CLI::App* map_app =
+      app.add_subcommand("map", "Show which method survives which extreme, and the number why");
+  map_app->add_option("store", map.store, "Folder of a run, or a .jsonl file")->required();
+  map_app->add_option("--rules", map.rules, "Rows, columns and limits (JSON)")->required();
+  map_app->add_option("--out", map.out, "Folder for failure-map.csv, .md and the picture");
+  map_app->add_option("--format", map.format, "Of the picture")
+      ->check(CLI::IsMember({"svg", "pdf"}))
+      ->capture_default_str();
+  map_app->add_flag("--gate", map.gate, "Exit with 1 if a cell that must hold does not");
+  map_app->footer(kMapFooter);
+
   ComparisonOptions comparison(app);
 
   try {
@@ -204,6 +242,7 @@ int main(int argc, char** argv) {
     if (*check_app) return CheckFiles(files);
     if (*table_app) return PrintTable(table, typed);
     if (*plot_app) return Plot(plot);
+    if (*map_app) return PrintMap(map, typed);
     return PrintVerdicts(verdict, typed);
   } catch (const std::exception& error) {
     fmt::print(stderr, "{}\n", error.what());

@@ -2,6 +2,7 @@
 #pragma once
 
 #include <span>
+#include <vector>
 
 #include "harness/analysis/growth.h"
 #include "harness/record.h"
@@ -12,6 +13,8 @@ namespace loopbench::harness {
 struct Run {
   Record record;
   DriftSeries drift;
+  /// The scene's branch combinations (scene.h) at the assembled start [rad]; empty without.
+  std::vector<double> branch_start = {};
 };
 
 /// Each part has its own steps. Work adds up (steps, evaluations, wall time, rank); drift is the

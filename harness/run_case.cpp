@@ -5,6 +5,7 @@
 #include <algorithm>
 
 #include "harness/compiled_scene.h"
+#include "harness/ensemble.h"
 #include "harness/hash.h"
 #include "harness/integrator/arkode.h"
 #include "harness/merge_parts.h"
@@ -69,6 +70,9 @@ class Runner {
       result.outcome = start.outcome;
       result.message = start.message;
     } else {
+      Kinematics<Space, double> kinematics(mechanism_);
+      kinematics.UpdatePosition(start.q);
+      run.branch_start = exact_.BranchAt(kinematics);
       result = Integrate(start);
       drift_.Write(run.record);
       energy_.Write(run.record);
@@ -209,6 +213,10 @@ std::string CaseContent(const Experiment& experiment, const Case& one) {
   content.Set("ensemble", std::int64_t{one.ensemble});
   content.Set("seed", static_cast<std::int64_t>(one.seed));
   content.Set("perturb", one.perturb);
+  for (const DrawnCoordinate& drawn : one.between) {
+    content.Set("between." + drawn.joint, std::vector<double>{drawn.from, drawn.to});
+  }
+  content.Set("branch_bound", one.branch_bound);
   content.Set("wall_s", one.limits.wall_s);
   content.Set("steps", one.limits.steps);
   content.Set("memory_mb", one.limits.memory_mb);
@@ -226,10 +234,12 @@ Record RunCase(const Experiment& experiment, const Case& one) {
   for (const auto& [key, value] : nominal.record.items()) record.Set(key, value);
 
   std::vector<DriftSeries> runs;
+  EnsembleTally tally(nominal, one.branch_bound);
   int failed = 0;
   for (int member = 0; member < (one.ensemble > 1 ? one.ensemble : 0); ++member) {
-    Run run = RunOnce(experiment, one,
-                      Perturb(scene.mechanism.description, one.perturb, one.seed, member), false);
+    const MechanismDescription start = MemberStart(scene.mechanism.description, one, member);
+    Run run = RunOnce(experiment, one, start, false);
+    tally.Add(run, start);
     if (run.record.Text("outcome") != ToString(Outcome::kFinished)) {
       ++failed;
     } else {
@@ -245,6 +255,7 @@ Record RunCase(const Experiment& experiment, const Case& one) {
     options.round_off *= std::max(1.0, one.horizon / 10.0);
     WriteGrowth(AnalyseGrowth(runs, one.horizon, length, options), failed, record);
   }
+  if (one.ensemble > 1) tally.Write(record);
   const DriftSeries envelope = Envelope(nominal.drift, experiment.series_points);
   record.Set("series.drift_t", envelope.t);
   record.Set("series.drift", envelope.value);

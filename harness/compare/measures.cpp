@@ -45,6 +45,7 @@ const std::vector<Measure>& Measures() {
       {"loops", Rule::kEqual, "", false},
       {"dof", Rule::kEqual, "", false},
       {"ensemble", Rule::kEqual, "", false},
+      {"ensemble_branch_kept", Rule::kEqual, "", false},
       {"evaluations", Rule::kEqual, "", false},
       {"rank", Rule::kEqual, "", false},
       {"rank_min", Rule::kEqual, "", false},

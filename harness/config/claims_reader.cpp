@@ -1,57 +1,11 @@
 #include "harness/config/claims_reader.h"
 
-#include <fmt/format.h>
-
-#include <algorithm>
 #include <optional>
 
-#include "harness/config/json_reader.h"
+#include "harness/config/selection_reader.h"
 
 namespace loopbench::harness {
 namespace {
-
-constexpr const char* kAnyText = "a string that is not empty";
-
-std::string RequiredText(const JsonNode& owner, const std::string& key) {
-  const std::optional<JsonNode> node = owner.Required(key, kAnyText);
-  return node ? node->Text() : "";
-}
-
-std::string OptionalText(const JsonNode& owner, const std::string& key) {
-  const std::optional<JsonNode> node = owner.Optional(key);
-  return node ? node->Text() : "";
-}
-
-// A scalar as the text that a Condition compares with: 1e-6 becomes "1e-06", true becomes "true".
-std::string ConditionValue(const JsonNode& node) {
-  const Json& value = node.value();
-  if (value.is_string()) return node.Text();
-  if (value.is_boolean()) return value.get<bool>() ? "true" : "false";
-  if (value.is_number_integer()) return value.dump();
-  if (value.is_number()) return fmt::format("{}", value.get<double>());
-  node.Fail("a string, a number, a bool or a list of them");
-  return "";
-}
-
-Selection ReadSelection(const JsonNode& node) {
-  Selection selection;
-  for (const auto& [key, member] : node.Members()) {
-    Condition condition{key, {}};
-    for (const JsonNode& value : member.OneOrMore("values")) {
-      condition.values.push_back(ConditionValue(value));
-    }
-    selection.push_back(std::move(condition));
-  }
-  return selection;
-}
-
-Selection OptionalSelection(const JsonNode& check, const std::string& key) {
-  const std::optional<JsonNode> node = check.Optional(key);
-  if (!node) return {};
-  Selection selection = ReadSelection(*node);
-  if (selection.empty() && node->value().is_object()) node->Fail("at least one key");
-  return selection;
-}
 
 // The index of a required word; the first one after an error, which refuses the file anyway.
 int RequiredChoice(const JsonNode& owner, const std::string& key,
@@ -130,14 +84,6 @@ Wording ReadWording(const JsonNode& node) {
   wording.only_under = OptionalText(node, "only_under");
   wording.not_measured = OptionalText(node, "not_measured");
   return wording;
-}
-
-// Labels and ids name conditions in verdicts, so each may be there once.
-void ReportRepeated(const JsonNode& node, const std::string& key, const std::string& name,
-                    std::vector<std::string>* taken) {
-  const std::optional<JsonNode> member = node.Optional(key);
-  if (member && std::ranges::find(*taken, name) != taken->end()) member->Fail("each name once");
-  taken->push_back(name);
 }
 
 ClaimRule ReadRule(const JsonNode& node) {

@@ -93,6 +93,8 @@ std::vector<Case> Expand(const Experiment& experiment) {
     one.ensemble = rule->size;
     one.seed = rule->seed;
     one.perturb = rule->perturb;
+    one.between = rule->between;
+    one.branch_bound = rule->branch_bound;
   }
   return cases;
 }

@@ -79,11 +79,19 @@ struct ExperimentScene {
   std::vector<std::string> tags;  ///< for filters and tables
 };
 
+/// A held coordinate drawn uniformly between two bounds [rad or m].
+struct DrawnCoordinate {
+  std::string joint;
+  double from = 0.0, to = 0.0;
+};
+
 /// Perturbed repetitions for every case that matches all given lists; an empty list matches all.
 struct EnsembleRule {
-  int size = 16;           ///< runs per case, at least 2
-  std::uint64_t seed = 1;  ///< of the generator of perturbations
-  double perturb = 0.02;   ///< amplitude on the held coordinates [rad or m]
+  int size = 16;                         ///< runs per case, at least 2
+  std::uint64_t seed = 1;                ///< of the generator of perturbations
+  double perturb = 0.02;                 ///< amplitude on the held coordinates [rad or m]; or else
+  std::vector<DrawnCoordinate> between;  ///< held coordinates drawn anew, the others as they are
+  double branch_bound = 1e-6;            ///< a run further from its branch has left it [rad]
   std::vector<std::string> scenes;
   std::vector<double> horizons;
   std::vector<double> tolerances;
@@ -143,10 +151,12 @@ struct Case {
   std::string integrator;
   double rtol = 0.0;
   double atol = 0.0;
-  double horizon = 0.0;    ///< [s]
-  int ensemble = 1;        ///< runs; 1: the scene as it is, no perturbation
-  std::uint64_t seed = 0;  ///< of the ensemble
-  double perturb = 0.0;    ///< amplitude of the ensemble [rad or m]
+  double horizon = 0.0;                       ///< [s]
+  int ensemble = 1;                           ///< runs; 1: the scene as it is, no perturbation
+  std::uint64_t seed = 0;                     ///< of the ensemble
+  double perturb = 0.0;                       ///< amplitude of the ensemble [rad or m], or else
+  std::vector<DrawnCoordinate> between = {};  ///< as in the rule
+  double branch_bound = 1e-6;                 ///< [rad]
   Limits limits;
 };
 

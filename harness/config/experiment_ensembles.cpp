@@ -7,6 +7,7 @@
 
 #include "harness/config/experiment_reader.h"
 #include "harness/config/experiment_sections.h"
+#include "harness/config/spelling.h"
 
 namespace loopbench::harness {
 namespace {
@@ -49,10 +50,56 @@ std::vector<std::string> ReadSceneNames(const JsonNode& rule, const Experiment& 
   return chosen;
 }
 
+/// {"joint": [from, to]}.
+std::vector<DrawnCoordinate> ReadBetween(const JsonNode& node) {
+  std::vector<DrawnCoordinate> drawn;
+  for (const auto& [joint, bounds] : node.Members()) {
+    const std::vector<double> ends = bounds.Numbers(2);
+    const bool is_pair = bounds.value().is_array() && bounds.value().size() == 2;
+    if (is_pair && !(ends[0] < ends[1])) bounds.Fail("two numbers that ascend [rad or m]");
+    drawn.push_back({joint, ends[0], ends[1]});
+  }
+  if (node.value().is_object() && node.value().empty()) node.Fail("at least one joint");
+  return drawn;
+}
+
+/// Joints that can be drawn: held, with one coordinate.
+NameList DrawableJoints(const MechanismDescription& description) {
+  NameList names;
+  for (const JointValues& values : description.initial.coordinates) {
+    const std::vector<int>& held = description.initial.held;
+    if (values.values.size() == 1 && std::ranges::find(held, values.joint) != held.end()) {
+      names.Add(description.joints[static_cast<std::size_t>(values.joint)].name);
+    }
+  }
+  return names;
+}
+
+/// Every scene of the rule's cases must have the joints to draw.
+void CheckBetween(const JsonNode& element, const EnsembleRule& rule, const Experiment& experiment,
+                  const std::vector<Case>& cases) {
+  const auto node = element.Optional("between");
+  if (!node) return;
+  for (std::size_t s = 0; s < experiment.scenes.size(); ++s) {
+    const bool used = std::ranges::any_of(
+        cases, [&](const Case& one) { return one.scene == s && Matches(rule, one); });
+    if (!used) continue;
+    const NameList known = DrawableJoints(experiment.scenes[s].mechanism.description);
+    for (const auto& [joint, bounds] : node->Members()) {
+      if (known.Find(joint)) continue;
+      bounds.FailAs(fmt::format("no held joint \"{}\" of one coordinate in scene \"{}\"", joint,
+                                experiment.scenes[s].name),
+                    fmt::format("a joint among: {}", fmt::join(known.all(), ", ")),
+                    NearestSpelling(joint, known.all()));
+    }
+  }
+}
+
 EnsembleRule ReadEnsemble(const JsonNode& node, const Experiment& experiment) {
   EnsembleRule rule;
-  if (!node.ExpectObject({"size", "seed", "perturb", "scenes", "horizons", "tolerances",
-                          "formulation", "enforcement", "coordinates", "solver"})) {
+  if (!node.ExpectObject({"size", "seed", "perturb", "between", "branch_bound", "scenes",
+                          "horizons", "tolerances", "formulation", "enforcement", "coordinates",
+                          "solver"})) {
     return rule;
   }
   if (const auto size = node.Required("size", "an integer from 2")) {
@@ -62,8 +109,16 @@ EnsembleRule ReadEnsemble(const JsonNode& node, const Experiment& experiment) {
     constexpr std::int64_t kMaxSeed = std::numeric_limits<std::int32_t>::max();
     rule.seed = static_cast<std::uint64_t>(seed->Integer(0, kMaxSeed));
   }
-  if (const auto perturb = node.Required("perturb", "a number > 0")) {
+  if (const auto between = node.Optional("between")) {
+    if (const auto perturb = node.Optional("perturb"))
+      perturb->Fail("no \"perturb\" with \"between\"");
+    rule.between = ReadBetween(*between);
+    rule.perturb = 0.0;
+  } else if (const auto perturb = node.Required("perturb", "a number > 0, or \"between\"")) {
     rule.perturb = perturb->Number(kPositive);
+  }
+  if (const auto bound = node.Optional("branch_bound")) {
+    rule.branch_bound = bound->Number(kPositive);
   }
   rule.scenes = ReadSceneNames(node, experiment);
   rule.horizons = ReadUsedNumbers(node, "horizons", AllHorizons(experiment));
@@ -95,6 +150,7 @@ void ReadEnsembles(const JsonNode& root, const ErrorList& errors, Experiment* ex
     if (!used && errors.empty()) {
       element.FailAs("a rule that matches no case", "keys that match at least one case");
     }
+    CheckBetween(element, rule, *experiment, cases);
     experiment->ensembles.push_back(rule);
   }
 }

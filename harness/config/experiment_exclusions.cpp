@@ -79,9 +79,9 @@ constexpr std::array<std::string_view, 67> kRecordKeys = {"libm",
                                                           "real_ns"};
 
 // Measured values come in groups, and more of each kind may be added.
-constexpr std::array<std::string_view, 15> kRecordPrefixes = {
-    "drift_", "loop_", "energy_", "growth_",      "rank_",       "rcond_", "rhs_",   "step_",
-    "wall_",  "plan_", "branch_", "closed_form_", "correction_", "aa_",    "newton_"};
+constexpr std::array<std::string_view, 16> kRecordPrefixes = {
+    "drift_", "loop_", "energy_", "growth_",      "rank_",       "rcond_", "rhs_",    "step_",
+    "wall_",  "plan_", "branch_", "closed_form_", "correction_", "aa_",    "newton_", "ensemble_"};
 
 }  // namespace
 

@@ -5,10 +5,10 @@
 
 namespace loopbench::harness {
 
-enum class FileKind { kMechanism, kExperiment, kClaims, kBenchmarks };
+enum class FileKind { kMechanism, kExperiment, kClaims, kMap, kBenchmarks };
 
-/// By the one key that each kind must have and the others lack: "scenes", "claims", "groups"; all
-/// else is taken for a mechanism. Throws ConfigError when the file cannot be read.
+/// By the one key that each kind must have and the others lack: "scenes", "claims", "rows",
+/// "groups"; all else is taken for a mechanism. Throws ConfigError when the file cannot be read.
 FileKind KindOfFile(const std::filesystem::path& path);
 
 }  // namespace loopbench::harness

@@ -57,8 +57,6 @@ Newton::Newton(void* memory, N_Vector y, Eigen::Index controlled, SUNContext con
   // What Newton leaves over, in units of the tolerance: at ARKODE's 0.1 it rules the global error.
   LOOPBENCH_SET_IMPLICIT(SetNonlinConvCoef, memory, 0.01);
   LOOPBENCH_SET_IMPLICIT(SetMaxNonlinIters, memory, 8);
-  // A fast transient, after a knot say, may ask for a step shorter by many orders of magnitude.
-  LOOPBENCH_SET_IMPLICIT(SetMaxErrTestFails, memory, 30);
   // A stage starts from the line through the last two states: fewer and less distant iterations
   // than from the last state alone.
   LOOPBENCH_SET_IMPLICIT(SetPredictorMethod, memory, 1);

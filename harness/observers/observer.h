@@ -127,6 +127,10 @@ class ExactObserver final : public Observer<Space> {
   void Observe(const Sample<Space>& sample) override;
   void Write(Record& record) const override;
 
+  /// The branch combinations at the positions of `kinematics` [rad]; in space up to whole turns of
+  /// each body.
+  std::vector<double> BranchAt(const Kinematics<Space, double>& kinematics) const;
+
  private:
   double BodyAngle(const Sample<Space>& sample, int body);
 

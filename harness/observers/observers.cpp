@@ -90,14 +90,41 @@ ExactObserver<Space>::ExactObserver(const SceneObservation& scene,
   last_angle_.assign(mechanism.num_bodies(), 0.0);
 }
 
+namespace {
+
+// Of a planar scene, in space the angle about z.
 template <class Space>
-double ExactObserver<Space>::BodyAngle(const Sample<Space>& sample, int body) {
-  const Pose<Space, double>& X = sample.formulation.kinematics().poses()[body];
+double AngleOf(const Pose<Space, double>& X) {
   if constexpr (Space::kRot == 1) {
     return X.angle;
   } else {
-    // a planar scene in space: the angle about z, continued from step to step
-    const double angle = std::atan2(X.R(1, 0), X.R(0, 0));
+    return std::atan2(X.R(1, 0), X.R(0, 0));
+  }
+}
+
+}  // namespace
+
+template <class Space>
+std::vector<double> ExactObserver<Space>::BranchAt(
+    const Kinematics<Space, double>& kinematics) const {
+  std::vector<double> branch;
+  for (const auto& combination : combinations_) {
+    double value = 0.0;
+    for (const auto& [body, factor] : combination) {
+      value += factor * AngleOf<Space>(kinematics.poses()[body]);
+    }
+    branch.push_back(value);
+  }
+  return branch;
+}
+
+template <class Space>
+double ExactObserver<Space>::BodyAngle(const Sample<Space>& sample, int body) {
+  const double angle = AngleOf<Space>(sample.formulation.kinematics().poses()[body]);
+  if constexpr (Space::kRot == 1) {
+    return angle;
+  } else {
+    // continued from step to step
     const double turn = 2 * std::numbers::pi;
     last_angle_[body] += std::remainder(angle - last_angle_[body], turn);
     return last_angle_[body];

@@ -1,35 +1,21 @@
 #include "harness/report/figures.h"
 
 #include <fmt/format.h>
-#include <sys/wait.h>
 
 #include <algorithm>
 #include <array>
 #include <cmath>
 #include <cstddef>
-#include <cstdio>
-#include <cstdlib>
 #include <limits>
-#include <stdexcept>
 #include <string_view>
 #include <utility>
 
-#include "harness/store/files.h"
+#include "harness/report/gnuplot.h"
 
 namespace loopbench::harness {
 namespace {
 
 using Point = std::pair<double, double>;
-
-// A gnuplot string in single quotes: nothing is special inside but the quote itself.
-std::string Quote(std::string_view text) {
-  std::string quoted = "'";
-  for (const char c : text) {
-    if (c == '\'') quoted += '\'';
-    quoted += static_cast<unsigned char>(c) < ' ' ? ' ' : c;
-  }
-  return quoted + '\'';
-}
 
 bool CanBeDrawn(double value, bool logarithmic) {
   return std::isfinite(value) && (!logarithmic || value > 0.0);
@@ -109,7 +95,7 @@ std::vector<std::string> Elements(const Figure& figure, const Curve& curve, std:
     look = fmt::format("{} pt {} ps {:.3g}", curve.line ? "linespoints" : "points",
                        kShapes[index % kShapes.size()], 0.3 * curve.style.width);
   }
-  const std::string title = curve.label.empty() ? "notitle" : "title " + Quote(curve.label);
+  const std::string title = curve.label.empty() ? "notitle" : "title " + GnuplotQuote(curve.label);
   if (points.empty()) return {fmt::format("NaN with {} {} {}", look, line, title)};
   std::vector<std::string> elements = {fmt::format("$c{} with {} {} {}", index, look, line, title)};
   const auto [x_last, y_last] = points.back();
@@ -167,7 +153,8 @@ std::string Ranges(const Figure& figure, const Extent& x, const Extent& y) {
     commands += fmt::format("set xrange [0.5:{}]\nset xtics (",
                             static_cast<double>(figure.x_ticks.size()) + 0.5);
     for (std::size_t i = 0; i < figure.x_ticks.size(); ++i) {
-      commands += fmt::format("{}{} {}", i == 0 ? "" : ", ", Quote(figure.x_ticks[i]), i + 1);
+      commands +=
+          fmt::format("{}{} {}", i == 0 ? "" : ", ", GnuplotQuote(figure.x_ticks[i]), i + 1);
     }
     commands += ")\n";
   } else {
@@ -190,45 +177,6 @@ std::size_t LegendRows(const Figure& figure) {
   const std::size_t columns = std::max<std::size_t>(1, kCharacters / (longest + kSample));
   return std::max<std::size_t>(1, (entries + columns - 1) / columns);
 }
-
-struct ProgramResult {
-  int status = 0;
-  std::string output;
-};
-
-ProgramResult RunProgram(const std::string& command) {
-  ProgramResult result;
-  std::FILE* pipe = ::popen(command.c_str(), "r");
-  if (pipe == nullptr) return {-1, "no process could be started"};
-  std::array<char, 4096> buffer{};
-  for (std::size_t n = 0; (n = std::fread(buffer.data(), 1, buffer.size(), pipe)) > 0;) {
-    result.output.append(buffer.data(), n);
-  }
-  const int status = ::pclose(pipe);
-  result.status = WIFEXITED(status) ? WEXITSTATUS(status) : -1;
-  return result;
-}
-
-// A folder of its own in the system's temporary folder, removed at the end of the scope.
-class TemporaryFolder {
- public:
-  TemporaryFolder() {
-    std::string name = (std::filesystem::temp_directory_path() / "loopbench-XXXXXX").string();
-    if (::mkdtemp(name.data()) == nullptr) throw std::runtime_error("cannot make " + name);
-    path_ = name;
-  }
-  ~TemporaryFolder() {
-    std::error_code ignored;
-    std::filesystem::remove_all(path_, ignored);
-  }
-  TemporaryFolder(const TemporaryFolder&) = delete;
-  TemporaryFolder& operator=(const TemporaryFolder&) = delete;
-
-  const std::filesystem::path& path() const { return path_; }
-
- private:
-  std::filesystem::path path_;
-};
 
 }  // namespace
 
@@ -260,8 +208,10 @@ std::string GnuplotScript(const Figure& figure) {
       "set encoding utf8\nset title {}\nset xlabel {} offset 0,0.5\nset ylabel {}\n"
       "set grid lc rgb '#cccccc' lw 0.5\n"
       "set key bmargin center vertical maxrows {} Left reverse samplen 4 title {}\n",
-      Quote(figure.title), Quote(figure.x_label), Quote(figure.y_label), LegendRows(figure),
-      figure.legend_title.empty() ? Quote(" ") : "\"\\n\"." + Quote(figure.legend_title));
+      GnuplotQuote(figure.title), GnuplotQuote(figure.x_label), GnuplotQuote(figure.y_label),
+      LegendRows(figure),
+      figure.legend_title.empty() ? GnuplotQuote(" ")
+                                  : "\"\\n\"." + GnuplotQuote(figure.legend_title));
   if (figure.log_x) script += "set logscale x\n";
   if (figure.log_y) {
     // powers of ten are read most easily as such, unless all are near one
@@ -286,16 +236,11 @@ std::string GnuplotScript(const Figure& figure) {
 
 namespace {
 
-// Both 960 wide and 500 high without the legend, in pixels or hundredths of an inch.
-std::string Terminal(const Figure& figure, bool pdf) {
+// 960 wide, 500 high without the legend.
+GnuplotPage PageOf(const Figure& figure, bool pdf) {
   const std::size_t height =
       500 + 20 * (LegendRows(figure) + (figure.legend_title.empty() ? 0 : 1));
-  if (!pdf) {
-    return fmt::format("svg noenhanced size 960,{} font 'sans-serif,13' background '#ffffff'",
-                       height);
-  }
-  return fmt::format("pdfcairo noenhanced size 9.6in,{:.1f}in font 'sans-serif,11'",
-                     static_cast<double>(height) / 100);
+  return {960, static_cast<int>(height), pdf ? 11 : 13};
 }
 
 }  // namespace
@@ -306,23 +251,8 @@ std::optional<std::string> WriteFigure(const std::filesystem::path& path, const 
     return !Drawable(figure, curve).empty() || !curve.crosses.empty();
   });
   if (!anything) return fmt::format("{}: no curve has a point to draw", path.string());
-  const bool pdf = path.extension() == ".pdf";
-  const TemporaryFolder folder;
-  const std::filesystem::path script = folder.path() / "figure.gp";
-  const std::filesystem::path drawing = folder.path() / "figure";
-  WriteFileAtomically(script,
-                      fmt::format("set terminal {}\nset output {}\n{}", Terminal(figure, pdf),
-                                  Quote(drawing.string()), GnuplotScript(figure)));
-  const ProgramResult run = RunProgram(fmt::format("{} '{}' 2>&1", gnuplot, script.string()));
-  constexpr int kNotFound = 127;
-  if (run.status == kNotFound) {
-    return fmt::format("{}: '{}' not found; install gnuplot-nox", path.string(), gnuplot);
-  }
-  if (run.status != 0 || !std::filesystem::exists(drawing)) {
-    return fmt::format("{}: gnuplot failed: {}", path.string(), run.output);
-  }
-  WriteFileAtomically(path, ReadFile(drawing));
-  return std::nullopt;
+  return DrawWithGnuplot(path, PageOf(figure, path.extension() == ".pdf"), GnuplotScript(figure),
+                         gnuplot);
 }
 
 }  // namespace loopbench::harness

@@ -115,6 +115,10 @@ bool HasFailed(const Record& row) {
   return !outcome.empty() && outcome != "finished";
 }
 
+std::string RedFailures(const Record& row, const TableColumn& column) {
+  return column.key == "outcome" && HasFailed(row) ? "31" : "";
+}
+
 namespace {
 
 // The columns under a heading: the group's key stands in the heading.
@@ -124,8 +128,9 @@ std::vector<TableColumn> ColumnsUnderHeading(const Table& table) {
   return columns;
 }
 
-std::string RowsAsText(const std::vector<TableColumn>& columns, const std::vector<Record>& rows,
-                       std::vector<std::size_t> widths, bool colour) {
+std::string RowsAsText(const Table& table, const std::vector<TableColumn>& columns,
+                       const std::vector<Record>& rows, std::vector<std::size_t> widths,
+                       bool colour) {
   std::string heading;
   std::string rule;
   for (std::size_t c = 0; c < columns.size(); ++c) {
@@ -140,9 +145,8 @@ std::string RowsAsText(const std::vector<TableColumn>& columns, const std::vecto
     std::string text;
     for (std::size_t c = 0; c < columns.size(); ++c) {
       std::string cell = Pad(Cell(row, columns[c]), widths[c], columns[c].format);
-      if (colour && columns[c].key == "outcome" && HasFailed(row)) {
-        cell = "\033[31m" + cell + "\033[0m";
-      }
+      const std::string number = colour ? table.colour(row, columns[c]) : "";
+      if (!number.empty()) cell = "\033[" + number + "m" + cell + "\033[0m";
       text += (c == 0 ? "" : "  ") + cell;
     }
     AppendTrimmed(&out, text);
@@ -167,7 +171,7 @@ std::string ToText(const Table& table, bool colour) {
     if (!is_first) out += '\n';
     is_first = false;
     if (!group.heading.empty()) out += group.heading + "\n\n";
-    out += RowsAsText(columns, group.rows, widths, colour);
+    out += RowsAsText(table, columns, group.rows, widths, colour);
   }
   if (!table.notes.empty()) out += '\n';
   for (const std::string& note : table.notes) out += note + '\n';

@@ -30,6 +30,9 @@ struct TableColumn {
   std::vector<std::pair<std::string, std::string>> abbreviations;
 };
 
+/// Red for the outcome of a run that failed.
+std::string RedFailures(const Record& row, const TableColumn& column);
+
 /// Rows of records under columns. A run that failed is a row like any other, with its outcome and
 /// with empty cells for what it did not reach; nothing removes it.
 struct Table {
@@ -41,6 +44,8 @@ struct Table {
   /// LaTeX write one table per value under a heading; CSV and JSON keep one list with the key as a
   /// column.
   std::string group = "";
+  /// The colour of a cell on a terminal, as its SGR number ("31" is red), "" for none.
+  std::string (*colour)(const Record& row, const TableColumn& column) = &RedFailures;
 };
 
 /// Rows that share a value of the group's key, under "key = value".
@@ -61,8 +66,8 @@ bool HasFailed(const Record& row);
 std::string Cell(const Record& row, const TableColumn& column);
 
 /// Aligned text for a terminal: title, heading, rule, rows, notes. Columns are as wide as their
-/// widest cell, two spaces apart, counted in characters rather than bytes. With `colour` the
-/// outcomes of failed runs are red; the escape sequences take no place.
+/// widest cell, two spaces apart, counted in characters rather than bytes. With `colour` cells have
+/// the table's colours; the escape sequences take no place.
 std::string ToText(const Table& table, bool colour = false);
 
 /// RFC 4180: a header of the column keys, then one line per row, quoted where necessary, numbers in

@@ -1,0 +1,130 @@
+// Rules of failure maps: what a row inherits, and all mistakes at once.
+#include "harness/config/failure_map_reader.h"
+
+#include <gtest/gtest.h>
+
+#include <algorithm>
+#include <filesystem>
+#include <sstream>
+#include <string>
+#include <vector>
+
+#include "harness/config/config_error.h"
+#include "harness/config/file_kind.h"
+
+namespace loopbench::harness {
+namespace {
+
+constexpr const char* kRules = R"({
+  "title": "t",
+  "columns": [{"label": "A", "select": {"formulation": "odca"}},
+              {"label": "B", "select": {"formulation": "reduction", "rtol": [1e-6, 1e-8]}}],
+  "groups": [
+    {"label": "g", "select": {"horizon": 10}, "cases": 4, "why": "because", "must_hold": "all",
+     "not_applicable": {"B": "not B"},
+     "decides": [{"measure": "m", "limit": 500, "of": "rtol", "unit": "rad", "name": "n"}],
+     "rows": [
+       {"label": "all of the group's", "select": {"mechanism": "x"}},
+       {"label": "its own", "select": {"mechanism": "y"}, "right": ["locked", "finished"],
+        "decides": [{"measure": "k", "at_least": 3}, {"measure": "t", "equal": 0, "when": "locked"}],
+        "cases": 1, "why": "otherwise", "must_hold": [], "not_applicable": {"A": "nor A"}}]}]
+})";
+
+TEST(MapRules, RowsInheritFromTheirGroup) {
+  const MapRules rules = ParseMapRules(kRules, "map.json");
+  ASSERT_EQ(rules.columns.size(), 2u);
+  EXPECT_EQ(ToText(rules.columns[1].select), "formulation=reduction rtol=1e-06,1e-08");
+  const MapRow& row = rules.groups.at(0).rows.at(0);
+  EXPECT_EQ(ToText(row.select), "horizon=10 mechanism=x");
+  ASSERT_EQ(row.decides.size(), 1u);
+  EXPECT_EQ(ToText(row.decides[0]), "m <= 500 rtol [rad]");
+  EXPECT_EQ(row.right, std::vector<std::string>{"finished"});
+  EXPECT_EQ(row.cases, 4u);
+  EXPECT_EQ(row.why, "because");
+  EXPECT_EQ(row.must_hold, (std::vector<bool>{true, false}));  // all but what is not applicable
+  EXPECT_EQ(row.not_applicable.at("B"), "not B");
+}
+
+TEST(MapRules, RowsMaySayOtherwise) {
+  const MapRow row = ParseMapRules(kRules, "map.json").groups.at(0).rows.at(1);
+  EXPECT_EQ(ToText(row.decides.at(0)), "k >= 3");
+  EXPECT_EQ(ToText(row.decides.at(1)), "t = 0 when locked");
+  EXPECT_EQ(row.right, (std::vector<std::string>{"locked", "finished"}));
+  EXPECT_EQ(row.cases, 1u);
+  EXPECT_EQ(row.why, "otherwise");
+  EXPECT_EQ(row.must_hold, (std::vector<bool>{false, false}));
+  EXPECT_EQ(row.not_applicable.size(), 2u);
+}
+
+std::string MessageOf(const std::string& text) {
+  try {
+    ParseMapRules(text, "map.json");
+  } catch (const ConfigError& error) {
+    return error.what();
+  }
+  return "";
+}
+
+TEST(MapRules, AllMistakesAreReportedAtOnce) {
+  const std::string message = MessageOf(R"({
+  "titel": "t",
+  "columns": [{"label": "A", "select": {}}, {"label": "A", "select": {"rtol": null}}, {}],
+  "groups": [
+    {"label": "g", "rows": [
+      {"label": "r", "select": {"a": 1}},
+      {"label": "r", "select": {"a": 1}, "decides": [
+        {"measure": "m", "limit": 0},
+        {"measure": "m", "limit": 1, "at_least": 1},
+        {"measure": "m"},
+        {"limit": "1", "when": ["locked"]}],
+       "right": ["lockd", "finished"], "must_hold": ["C"], "not_applicable": {"D": "x"}},
+      {"label": "no selection", "right": "locked", "cases": 0}]},
+    {"label": "empty", "rows": []}]
+})");
+  std::istringstream lines(message);
+  std::vector<std::string> found;
+  for (std::string line; std::getline(lines, line);) found.push_back(line);
+  const std::vector<std::string> expected = {
+      "map.json:2: /titel: found unknown key \"titel\", expected one of \"title\", \"comment\", "
+      "\"columns\", \"groups\" (did you mean \"title\"?)",
+      "map.json:1: (top level): found no \"title\", expected a string that is not empty",
+      "map.json:3: /columns/0/select: found an empty object, expected at least one key",
+  };
+  for (const std::string& line : expected) {
+    EXPECT_NE(std::ranges::find(found, line), found.end()) << line << "\nnot in\n" << message;
+  }
+  for (const char* part :
+       {"/columns/1/label: found \"A\", expected each name once",
+        "/columns/1/select/rtol: found null", "/columns/2: found no \"label\"",
+        "/columns/2: found no \"select\"",
+        "/groups/0/rows/0: found nothing that decides about a finished run",
+        "/groups/0/rows/1/label: found \"r\", expected each name once",
+        "/groups/0/rows/1/decides/0/limit: found 0, expected a number > 0",
+        "/groups/0/rows/1/decides/1/at_least: found 1, expected one of \"limit\"",
+        "/groups/0/rows/1/decides/2: found no number, expected one of \"limit\"",
+        "/groups/0/rows/1/decides/3: found no \"measure\"",
+        "/groups/0/rows/1/decides/3/limit: found \"1\"",
+        "/groups/0/rows/1/decides/3/when: found [\"locked\"], expected endings that are \"right\"",
+        "/groups/0/rows/1/right/0: found \"lockd\"", "(did you mean \"locked\"?)",
+        "/groups/0/rows/1/must_hold/0: found \"C\"",
+        "/groups/0/rows/1/not_applicable/D: found unknown key",
+        "/groups/0/rows/2: found no \"select\"", "/groups/0/rows/2/cases: found 0",
+        "/groups/1/rows: found an empty array, expected at least one row"}) {
+    EXPECT_NE(message.find(part), std::string::npos) << part << "\nnot in\n" << message;
+  }
+  EXPECT_EQ(found.size(), 21u) << message;
+}
+
+TEST(MapRules, ThatAreShippedRead) {
+  int count = 0;
+  const std::filesystem::path configs = std::filesystem::path(LOOPBENCH_SOURCE_DIR) / "configs";
+  for (const auto& entry : std::filesystem::recursive_directory_iterator(configs)) {
+    if (entry.path().extension() != ".json" || KindOfFile(entry.path()) != FileKind::kMap) continue;
+    EXPECT_FALSE(ReadMapRules(entry.path()).groups.empty()) << entry.path();
+    ++count;
+  }
+  EXPECT_GE(count, 1);
+}
+
+}  // namespace
+}  // namespace loopbench::harness

@@ -2,6 +2,7 @@
 
 #include <Eigen/QR>
 #include <algorithm>
+#include <cmath>
 #include <limits>
 #include <random>
 
@@ -13,7 +14,8 @@ namespace {
 
 constexpr int kMaxIterations = 200;
 
-/// The assembly problem of one mechanism in joint coordinates.
+/// The assembly problem of one mechanism in joint coordinates. Lengths count in units of the
+/// mechanism's own, so that its size decides nothing; a power of two, so that they round nothing.
 template <class Space>
 class Assembler {
  public:
@@ -27,6 +29,7 @@ class Assembler {
     start_.q.setZero(mechanism.num_q());
     start_.u.setZero(mechanism.num_u());
     ReadInitialData();
+    SetUnits();
   }
 
   Start<double> Run() {
@@ -54,7 +57,7 @@ class Assembler {
       } else if (joint.num_u() == 0) {
         continue;  // prescribed
       } else if (is_held(values.joint) && joint.kind->num_u == 1) {
-        held_cut_.push_back({values.joint, values.values[0]});
+        held_cut_.push_back({values.joint, 0, values.values[0]});
       } else {
         Fail("joint \"" + mechanism_.joint_names()[&joint - mechanism_.joints().data()] +
              "\" closes a loop and carries only a guess: hold it, or mark "
@@ -82,13 +85,55 @@ class Assembler {
     }
   }
 
+  void SetUnits() {
+    unit_ = std::exp2(std::round(std::log2(mechanism_.length())));
+    kinematics_.UpdatePosition(start_.q);
+    const auto is_length = [](const auto& direction) {
+      return direction.template head<Space::kRot>().isZero();
+    };
+    column_units_.setOnes(mechanism_.num_u());
+    for (const TreeStep& step : mechanism_.tree()) {
+      const JointState<Space, double>& state = kinematics_.joints()[step.joint];
+      for (int i = 0; i < state.num_u; ++i) {
+        const int column = mechanism_.joints()[step.joint].u_offset + i;
+        if (is_length(state.H(i))) column_units_[column] = unit_;
+      }
+    }
+    row_units_.setOnes(mechanism_.num_rows());
+    for (int index : mechanism_.constraints()) {
+      const Joint<Space, double>& joint = mechanism_.joints()[index];
+      for (int r = 0; r < joint.num_constraints(); ++r) {
+        const bool length = is_length(kinematics_.joints()[index].D(r));
+        if (length) row_units_[joint.row + r] = unit_;
+      }
+    }
+  }
+
+  /// Units of all constraint rows and, below them, of free coordinates of cut joints.
+  template <class List>
+  VectorX<double> UnitsWith(const List& cut_joints) const {
+    VectorX<double> units = row_units_;
+    units.conservativeResize(row_units_.size() + static_cast<Eigen::Index>(cut_joints.size()));
+    Eigen::Index row = row_units_.size();
+    for (const auto& given : cut_joints) {
+      const auto H = kinematics_.joints()[given.joint].H(given.component);
+      units[row++] = H.template head<Space::kRot>().isZero() ? unit_ : 1.0;
+    }
+    return units;
+  }
+
+  /// Rows over their units, free columns times theirs.
+  void ToUnits(const VectorX<double>& units, MatrixX<double>& J) const {
+    J = units.cwiseInverse().asDiagonal() * J * column_units_.asDiagonal();
+  }
+
   void Fail(const std::string& message) {
     if (start_.outcome != Outcome::kFinished) return;
     start_.outcome = Outcome::kInconsistentStart;
     start_.message = mechanism_.name() + ": " + message;
   }
 
-  /// e and J over the free coordinates, with a row per held cut joint.
+  /// e in units, with a row per held cut joint.
   VectorX<double> Residual(const VectorX<double>& q) {
     kinematics_.UpdatePosition(q);
     VectorX<double> e(mechanism_.num_rows() + static_cast<int>(held_cut_.size()));
@@ -98,10 +143,10 @@ class Assembler {
           kinematics_.joints()[index].D().transpose() * kinematics_.ConstraintMismatch(index);
     }
     for (std::size_t k = 0; k < held_cut_.size(); ++k) {
-      const auto& [joint, value] = held_cut_[k];
+      const auto& [joint, component, value] = held_cut_[k];
       e[mechanism_.num_rows() + static_cast<int>(k)] = kinematics_.JointCoordinate(joint) - value;
     }
-    return e;
+    return e.cwiseQuotient(UnitsWith(held_cut_));
   }
 
   /// Speed of the free coordinate `component` of a cut joint at u.
@@ -130,6 +175,7 @@ class Assembler {
     double damping = 1e-3;
     // what rounding leaves of a closure that passes through every body
     const double goal = 16 * std::numeric_limits<double>::epsilon() * Extent();
+    const VectorX<double> units = UnitsWith(held_cut_);
     // where every coordinate is prescribed there is nothing to move
     const int iterations = mechanism_.num_u() > 0 ? kMaxIterations : 0;
     for (int i = 0; i < iterations && e.template lpNorm<Eigen::Infinity>() > goal; ++i) {
@@ -138,14 +184,16 @@ class Assembler {
       dynamics_.Jacobian(kinematics_, J);
       J.conservativeResize(e.size(), Eigen::NoChange);
       for (std::size_t k = 0; k < held_cut_.size(); ++k) {
-        J.row(mechanism_.num_rows() + static_cast<int>(k)) = CutJointRow(held_cut_[k].first, 0);
+        J.row(mechanism_.num_rows() + static_cast<int>(k)) = CutJointRow(held_cut_[k].joint, 0);
       }
+      ToUnits(units, J);
       for (int c = 0; c < mechanism_.num_u(); ++c) {
         if (held_q_[c]) J.col(c).setZero();
       }
       bool improved = false;
       for (; damping < 1e8 && !improved; damping *= 10) {
-        const VectorX<double> trial = Move(start_.q, DampedStep(J, e, damping));
+        const VectorX<double> trial =
+            Move(start_.q, DampedStep(J, e, damping).cwiseProduct(column_units_));
         const VectorX<double> e_trial = Residual(trial);
         if (!(e_trial.norm() < e.norm())) continue;
         improved = true;
@@ -156,9 +204,17 @@ class Assembler {
       if (!improved) break;
       damping = std::max(damping, 1e-16);
     }
-    start_.position_residual = e.template lpNorm<Eigen::Infinity>();
+    start_.position_residual = InSi(e, units);
     // a thousand times the goal: round-off of a long chain, far below any drift worth measuring
-    if (!(start_.position_residual <= 1e3 * goal)) NameWorstLoop(e, "does not close", "m or rad");
+    if (e.template lpNorm<Eigen::Infinity>() <= 1e3 * goal) return;
+    NameWorstLoop(e, "does not close", start_.position_residual, "m or rad");
+  }
+
+  /// The worst number of a list in units, without them.
+  static double InSi(const VectorX<double>& e, const VectorX<double>& units) {
+    Eigen::Index worst = 0;
+    e.cwiseAbs().maxCoeff(&worst);
+    return std::abs(e[worst]) * units[worst];
   }
 
   /// argmin |J d + e|^2 + damping^2 |d|^2.
@@ -196,12 +252,16 @@ class Assembler {
     SpeedBias(kinematics_, at_rest, bias);
     target = -bias;
     target.conservativeResize(rows + extra);
+    const VectorX<double> units = UnitsWith(given_cut_);
     for (int k = 0; k < extra; ++k) {
       const auto& [joint, component, value] = given_cut_[k];
       J.row(rows + k) = CutJointRow(joint, component);
       target[rows + k] = value - CutJointSpeed(joint, component, at_rest);
     }
     if (J.rows() == 0) return;
+    ToUnits(units, J);
+    target = target.cwiseQuotient(units);
+    start_.u = start_.u.cwiseQuotient(column_units_);
     MatrixX<double> J_free = J;
     for (int c = 0; c < mechanism_.num_u(); ++c) {
       if (given_u_[c]) J_free.col(c).setZero();
@@ -214,10 +274,11 @@ class Assembler {
       start_.u += solver.solve(miss);
     }
     const VectorX<double> left = target - J * start_.u;
-    start_.speed_residual = left.template lpNorm<Eigen::Infinity>();
-    if (!(start_.speed_residual <= 1e-10 * size)) {
-      NameWorstLoop(left, "has no speeds that fit the given ones", "m/s or rad/s");
-    }
+    start_.u = start_.u.cwiseProduct(column_units_);
+    start_.speed_residual = InSi(left, units);
+    if (left.template lpNorm<Eigen::Infinity>() <= 1e-10 * size) return;
+    NameWorstLoop(left, "has no speeds that fit the given ones", start_.speed_residual,
+                  "m/s or rad/s");
   }
 
   /// A position where constraints leave no speed free. Singular positions, where they depend on
@@ -229,6 +290,7 @@ class Assembler {
       MatrixX<double> J;
       kinematics_.UpdatePosition(start_.q);
       dynamics_.Jacobian(kinematics_, J);
+      ToUnits(row_units_, J);
       Eigen::ColPivHouseholderQR<MatrixX<double>> qr(J);
       qr.setThreshold(1e-4);  // the square root of that of the weights (loop_solver.h)
       rank = qr.rank();
@@ -240,7 +302,8 @@ class Assembler {
                      " constraints take all " + std::to_string(mechanism_.num_u()) + " speeds";
   }
 
-  void NameWorstLoop(const VectorX<double>& e, const std::string& what, const std::string& unit) {
+  void NameWorstLoop(const VectorX<double>& e, const std::string& what, double value,
+                     const std::string& unit) {
     Eigen::Index worst = 0;
     e.cwiseAbs().maxCoeff(&worst);
     std::string name = "of the held cut joint";
@@ -251,16 +314,17 @@ class Assembler {
       }
     }
     char residual[32];
-    std::snprintf(residual, sizeof residual, "%.3g", e.template lpNorm<Eigen::Infinity>());
+    std::snprintf(residual, sizeof residual, "%.3g", value);
     Fail("the loop " + name + " " + what + ": residual " + residual + " " + unit);
   }
 
-  /// A length that no position exceeds much: sum of all arms.
+  /// A length that no position exceeds much, in units: sum of all arms.
   double Extent() const {
-    return mechanism_.length() * static_cast<double>(mechanism_.joints().size() + 1);
+    return mechanism_.length() / unit_ * static_cast<double>(mechanism_.joints().size() + 1);
   }
 
-  struct GivenSpeed {
+  /// A coordinate or speed of a joint that is not in the tree.
+  struct OfCutJoint {
     int joint, component;
     double value;
   };
@@ -270,8 +334,9 @@ class Assembler {
   TreeDynamics<Space, double> dynamics_;
   Start<double> start_;
   std::vector<bool> held_q_, given_u_;
-  std::vector<std::pair<int, double>> held_cut_;
-  std::vector<GivenSpeed> given_cut_;
+  double unit_ = 1.0;                         ///< of lengths [m]
+  VectorX<double> row_units_, column_units_;  ///< of constraint rows and speeds, 1 for angles
+  std::vector<OfCutJoint> held_cut_, given_cut_;
 };
 
 }  // namespace

@@ -38,7 +38,7 @@ class Reduction final : public Formulation<Space, S> {
   /// An automatic set is replaced when its reciprocal condition is below this part of the best.
   static constexpr double kReplaceBelow = 0.1;
   /// Below this ratio of its pivots a partition gives way to the null space.
-  static constexpr double kSuspicious = 1e-3;
+  static constexpr double kSuspicious = 0.1;
 
   Reduction(const Mechanism<Space, S>& mechanism, FormulationOptions options);
 

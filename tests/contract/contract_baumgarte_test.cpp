@@ -1,5 +1,6 @@
 // Baumgarte's stabilisation: mismatches of positions and speeds come back as accelerations.
 #include <cmath>
+#include <utility>
 
 #include "tests/contract/contract.h"
 
@@ -31,33 +32,64 @@ std::vector<double> Off(const std::vector<double>& y, double size) {
   return off;
 }
 
-/// e'' + 2 alpha e' + beta^2 e of every row, by the oracle. Its rows are the mismatches themselves,
-/// the formulations' are in the joints' axes: they differ in the second order of e, and so does
-/// this from zero. Seeds 6 and 10 have prescribed motions.
+/// D^T mismatch of all constraint rows, in the joints' axes, and its rate.
+template <class Space>
+std::pair<VectorX<double>, VectorX<double>> Mismatches(Formulation<Space, double>& formulation,
+                                                       const std::vector<double>& y) {
+  EXPECT_EQ(formulation.FromState(0.0, y), Outcome::kFinished);
+  const Kinematics<Space, double>& kinematics = formulation.kinematics();
+  VectorX<double> e(kinematics.mechanism().num_rows()), rate(e.size());
+  for (int index : kinematics.mechanism().constraints()) {
+    const Joint<Space, double>& joint = kinematics.mechanism().joints()[index];
+    const int rows = joint.num_constraints();
+    e.segment(joint.row, rows) =
+        kinematics.joints()[index].D().transpose() * kinematics.ConstraintMismatch(index);
+    rate.segment(joint.row, rows) = kinematics.ConstraintSpeed(index).head(rows);
+  }
+  return {e, rate};
+}
+
+/// From states off the constraints the mismatches follow the closed form of
+/// e'' + 2 alpha e' + beta^2 e = 0 with these gains, underdamped. In space that holds to first
+/// order in the mismatch only (docs/numerics.md, section 1), so its size bounds the error: 1e-5
+/// off, and factors of some tens from speeds of some rad/s. Classic Runge-Kutta steps of 1 ms leave
+/// 1e-12.
 TEST_P(BaumgarteContractTest, MismatchesObeyTheEquationOfTheGains) {
-  for (std::uint64_t seed : {5, 6, 8, 10}) {
+  for (std::uint64_t seed : {5, 8}) {
     Run(Description(seed), seed, [&](auto bench) {
-      const auto left = [&](double size) {
-        std::vector<double> off = Off(bench.y, size);
-        EXPECT_EQ(bench.Derivative(off), Outcome::kFinished);
-        Oracle oracle(bench.sample.description(), LayoutOf(bench.mechanism));
-        const RealVector q = ToReal(bench.formulation->q()), u = ToReal(bench.formulation->u());
-        const Equations e = oracle.Form(q, u);
-        const RealVector acceleration = e.J * ToReal(bench.formulation->udot()) - e.gamma;
-        const RealVector feedback = 2 * kGains.alpha * oracle.ClosureRates(q, u) +
-                                    kGains.beta * kGains.beta * oracle.ClosureMismatches(q);
-        EXPECT_GT(double(feedback.norm()), size) << "nothing to feed back";
-        return static_cast<double>((acceleration + feedback).norm() / feedback.norm());
-      };
-      // relative to the feedback what is left falls in proportion to the mismatch
-      const double coarse = left(1e-4), fine = left(1e-5);
-      EXPECT_LE(coarse, 0.05) << seed;
-      EXPECT_LE(fine, 0.2 * coarse + bench.Bound() / 1e-5) << seed;
+      constexpr double kOff = 1e-5, kStep = 1e-3;
+      std::vector<double> y = Off(bench.y, kOff);
+      const auto [e, rate] = Mismatches(*bench.formulation, y);
+      ASSERT_GT(e.norm() + rate.norm(), kOff) << "nothing to feed back";
+      const std::size_t n = y.size();
+      constexpr int kSteps = 100;
+      for (int step = 0; step < kSteps; ++step) {
+        std::vector<double> sum(n, 0.0), at = y;
+        for (const auto& [share, next] :
+             {std::pair{1.0, 0.5}, {2.0, 0.5}, {2.0, 1.0}, {1.0, 0.0}}) {
+          ASSERT_EQ(bench.Derivative(at), Outcome::kFinished);
+          for (std::size_t i = 0; i < n; ++i) {
+            sum[i] += share / 6 * bench.ydot[i];
+            at[i] = y[i] + next * kStep * bench.ydot[i];
+          }
+        }
+        for (std::size_t i = 0; i < n; ++i) y[i] += kStep * sum[i];
+      }
+      const auto [e_end, rate_end] = Mismatches(*bench.formulation, y);
+      const double t = kSteps * kStep;
+      const double damped = std::sqrt(kGains.beta * kGains.beta - kGains.alpha * kGains.alpha);
+      const VectorX<double> expected =
+          std::exp(-kGains.alpha * t) *
+          (e * std::cos(damped * t) + (rate + kGains.alpha * e) * std::sin(damped * t) / damped);
+      EXPECT_LE((e_end - expected).norm(), 100 * kOff * expected.norm()) << seed;
+      // what would have become of them without gains is far from it
+      EXPECT_GT((e + t * rate - expected).norm(), 0.05 * expected.norm());
     });
   }
 }
 
-/// In proportion to 1/h of the longest step, once steps no longer double; set again when it has doubled.
+/// In proportion to 1/h of the longest step, once steps no longer double; set again when it has
+/// doubled.
 TEST_P(BaumgarteGainsTest, FollowTheLongestStep) {
   Run(Description(5), 5, [&](auto bench) {
     std::vector<double> y = Off(bench.y, 1e-4);

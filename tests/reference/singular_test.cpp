@@ -4,8 +4,9 @@
 
 #include <cmath>
 #include <iostream>
+#include <numbers>
 
-#include "mechanism/assembly.h"
+#include "harness/ensemble.h"
 #include "mechanism/library.h"
 #include "tests/harness/integrator_problems.h"
 #include "tests/reference/cases.h"
@@ -101,9 +102,12 @@ TEST(PassageCost, StepsStayNearThoseOfThePlainPendulum) {
 TEST(PassageStarts, PerturbedStartsKeepTheirBranch) {
   for (const char* name : {"parallelogram", "toggle"}) {
     const MechanismFile shipped = Shipped(name);
+    Case draw;
+    draw.perturb = 3.0;
+    draw.seed = 7;
     for (int member = 0; member < 12; ++member) {
       MechanismFile start = shipped;
-      start.description = Perturb(shipped.description, 2.5, 7, member);
+      start.description = MemberStart(shipped.description, draw, member);
       const Experiment experiment = Single(start);
       for (const double tolerance : {1e-6, 1e-10}) {
         const Record record =
@@ -121,7 +125,10 @@ class Ladders : public testing::TestWithParam<int> {};
 TEST_P(Ladders, TwentySecondsThroughAllSingularInstants) {
   MechanismFile file;
   file.description = Ladder(GetParam(), std::numbers::pi / 2, -1.0);
-  file.observe.closed_form = PendulumForm{"crank0", -std::numbers::pi / 2, 11.445};
+  // n couplers translate, n + 1 cranks turn: one pendulum (reference problem A02)
+  const double n = GetParam();
+  file.observe.closed_form =
+      PendulumForm{"crank0", -std::numbers::pi / 2, ((n + 1) / 2 + n) * 9.81 / ((n + 1) / 3 + n)};
   const Experiment experiment = Single(file);
   for (const double tolerance : {1e-8, 1e-9}) {
     const Record record = RunCase(

@@ -8,8 +8,8 @@
 //                      mode (an independent set, angles, gains). Everything else is a pure function
 //                      of (t, q, u, mode): calling it in any order gives the same bits.
 // After construction O-DCA allocates nothing in any of them, the dense baselines nothing in a
-// derivative unless Eigen's workspace for one product exceeds a mebibyte (some 300 unknowns); what
-// BeginStep() does is said by each formulation.
+// derivative unless Eigen's workspace for one product exceeds a mebibyte (some 300 unknowns) or,
+// in reduction's null space, 48 rows; what BeginStep() does is said by each formulation.
 #pragma once
 
 #include <memory>

@@ -88,7 +88,7 @@ bool NullSpace<Space, S>::Accelerate(const MatrixX<S>& M, const VectorX<S>& h,
   column_.noalias() += Mh_ * speeds_;
   basis_.leftCols(f).noalias() = Mh_ * V.rightCols(f);
   reduced_.topLeftCorner(f, f).noalias() = V.rightCols(f).transpose() * basis_.leftCols(f);
-  z_.tail(f).noalias() = -(V.rightCols(f).transpose() * column_);
+  z_.tail(f).noalias() -= V.rightCols(f).transpose() * column_;  // zero so far
   bool factored = false;
   for (Eigen::Index i = d; i < c_.size(); ++i) {
     if (!(weights_[i] >= S(1e-16))) continue;
@@ -109,17 +109,6 @@ bool NullSpace<Space, S>::Accelerate(const MatrixX<S>& M, const VectorX<S>& h,
   udot.noalias() = V * z_;
   L_.matrixU().solveInPlace(udot);
   return true;
-}
-
-template <class Space, class S>
-void NullSpace<Space, S>::Correct(const VectorX<S>& violation, VectorX<S>& change) {
-  ToDirections(violation);
-  z_.setZero();
-  for (Eigen::Index i = 0; i < c_.size(); ++i) {
-    if (weights_[i] >= S(1e-16)) z_[i] = -weights_[i] * c_[i] / svd_.singularValues()[i];
-  }
-  change.noalias() = svd_.matrixV() * z_;
-  L_.matrixU().solveInPlace(change);
 }
 
 template <class Space, class S>

@@ -40,11 +40,10 @@ class NullSpace {
   void Factor(const Kinematics<Space, S>& kinematics, TreeDynamics<Space, S>& dynamics,
               const MatrixX<S>& J);
 
-  /// udot from M udot + h = J^T lambda, J udot = gamma. False where M is not positive definite.
+  /// udot from M udot + h = J^T lambda, J udot = gamma; with h = 0 the smallest udot in the metric
+  /// M that meets gamma. False where M is not positive definite.
   bool Accelerate(const MatrixX<S>& M, const VectorX<S>& h, const VectorX<S>& gamma,
                   VectorX<S>& udot);
-  /// The smallest change in the metric of unit bodies with J change = -violation, softened.
-  void Correct(const VectorX<S>& violation, VectorX<S>& change);
   /// lambda for which J^T lambda is nearest to `force`.
   void Multipliers(const VectorX<S>& force, VectorX<S>& lambda);
 

@@ -154,13 +154,16 @@ Outcome Reduction<Space, S>::CompleteSpeeds() {
 }
 
 /// Independent coordinates and speeds stay; the dependent ones follow. Without a partition: the
-/// smallest change.
+/// smallest change in the metric M, which does no work along the free directions.
 template <class Space, class S>
 Outcome Reduction<Space, S>::Correct(const VectorX<S>& violation, VectorX<S>& change) {
   if (const Outcome outcome = FactorOnce(); outcome != Outcome::kFinished) return outcome;
   if (uses_null_space_) {
-    null_space_->Correct(violation, change);
-    return change.allFinite() ? Outcome::kFinished : Outcome::kNonFinite;
+    dynamics_.MassMatrix(kinematics_, mechanism_.bodies(), M_);
+    residual_.setZero();
+    gamma_ = -violation;
+    const bool solved = null_space_->Accelerate(M_, residual_, gamma_, change);
+    return solved && change.allFinite() ? Outcome::kFinished : Outcome::kNonFinite;
   }
   change.setZero();
   if (dependent_.empty()) return Outcome::kFinished;

@@ -54,7 +54,7 @@ class LoopSolver {
   static constexpr double kSuspicious = 1e-4;
   using ConstRef = Eigen::Ref<const MatrixX<S>>;
 
-  /// Softening threshold relative to the largest geometric eigenvalue: (1e-4)^2.
+  /// Softening threshold relative to the largest geometric eigenvalue: (1e-4)^2, or 64 eps if more.
   static constexpr double kTheta = 1e-8;
   /// The largest geometric eigenvalue is taken as no smaller. Free bodies give one, and round-off
   /// of some 100 eps stays far below kTheta times this.

@@ -5,6 +5,7 @@
 #include <map>
 
 #include "harness/config/claims_reader.h"
+#include "harness/precision_cases.h"
 #include "harness/provenance.h"
 #include "harness/report/claims_report.h"
 #include "harness/report/table_view.h"
@@ -26,6 +27,9 @@ int Run(const RunCommand& command, const std::string& typed) {
   // read everything first: a mistake in the last file must not cost the runs of the first
   const std::vector<Experiment> experiments =
       ReadSelected({command.experiments, command.settings, command.suite.filter});
+  if (command.suite.precision) {
+    for (const Experiment& experiment : experiments) RequireLadders(experiment);
+  }
   const std::filesystem::path out =
       command.out.empty() ? std::filesystem::path("results/runs") / experiments.front().name
                           : command.out;

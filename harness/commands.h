@@ -18,7 +18,8 @@ namespace loopbench::harness {
 /// The records of a store; warnings about it go to standard error.
 std::vector<Record> LoadRecords(const std::filesystem::path& store);
 
-/// drift.csv, drift.md, timing.csv and timing.md in `out`, and their short forms on the terminal.
+/// drift.csv, drift.md and so on of precision and timing in `out`, and their short forms on the
+/// terminal.
 void WriteTables(const std::vector<Record>& records, const std::filesystem::path& out,
                  const std::string& typed);
 

@@ -10,6 +10,7 @@
 #include "harness/config/failure_map_reader.h"
 #include "harness/config/file_kind.h"
 #include "harness/config/mechanism_reader.h"
+#include "harness/precision_cases.h"
 #include "harness/report/table.h"
 #include "harness/run_case.h"
 #include "harness/timing/time_cases.h"
@@ -46,7 +47,7 @@ Table CaseTable(const std::vector<Experiment>& experiments, const Selection& fil
   table.columns.push_back({"rtol", "rtol", Format::kShortest, {}});
   table.columns.push_back({"horizon", "horizon [s]", Format::kShortest, {}});
   table.columns.push_back({"ensemble", "runs", Format::kInteger, {}});
-  std::size_t timings = 0;
+  std::size_t timings = 0, rungs = 0;
   for (const Experiment& experiment : experiments) {
     for (const Case& one : SelectCases(experiment, filter)) {
       Record row = CaseKeys(experiment, one);
@@ -55,8 +56,10 @@ Table CaseTable(const std::vector<Experiment>& experiments, const Selection& fil
       table.rows.push_back(row);
     }
     timings += CountTimings(experiment);
+    rungs += CountRungs(experiment);
   }
   table.notes = {fmt::format("{} cases and {} timings", table.rows.size(), timings)};
+  if (rungs > 0) table.notes.front() += fmt::format(", {} runs in several scalars", rungs);
   if (experiments.size() > 1) {
     table.notes.front() += fmt::format(" in {} combinations", experiments.size());
   }
@@ -66,7 +69,10 @@ Table CaseTable(const std::vector<Experiment>& experiments, const Selection& fil
 void CheckExperiment(const std::filesystem::path& path, const std::vector<Setting>& settings) {
   const std::vector<Experiment> experiments = ReadExperiments(path, settings);
   std::size_t cases = 0;
-  for (const Experiment& experiment : experiments) cases += Expand(experiment).size();
+  for (const Experiment& experiment : experiments) {
+    cases += Expand(experiment).size();
+    LadderGroups(experiment);  // refuses what it cannot run
+  }
   fmt::print("{}: experiment \"{}\", {} cases{}\n", path.string(), experiments.front().name, cases,
              experiments.size() > 1 ? fmt::format(" in {} combinations", experiments.size()) : "");
 }

@@ -7,6 +7,7 @@
 #include "harness/commands.h"
 #include "harness/config/config_error.h"
 #include "harness/config/file_kind.h"
+#include "harness/precision_cases.h"
 #include "harness/timing/time_cases.h"
 
 namespace loopbench::harness {
@@ -158,6 +159,12 @@ void ExplainMeasures(const Experiment& experiment) {
       "  energy error [J]; rank and conditioning of the loops; how the run ended.\n"
       "  Series keep {} points for figures.\n",
       experiment.series_points);
+  if (const std::size_t rungs = CountRungs(experiment); rungs > 0) {
+    fmt::print(
+        "  {} in several scalars with one integrator: error and drift against tolerance, and "
+        "whether truncation or round-off rules them.\n",
+        Plural(rungs, "run"));
+  }
   const std::size_t timings = CountTimings(experiment);
   if (timings == 0) {
     fmt::print("  There are no timings.\n");

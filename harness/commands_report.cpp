@@ -14,6 +14,7 @@
 #include "harness/report/failure_map_figure.h"
 #include "harness/report/failure_map_report.h"
 #include "harness/report/figure_recipes.h"
+#include "harness/report/precision_report.h"
 #include "harness/store/files.h"
 
 namespace loopbench::harness {
@@ -112,7 +113,7 @@ void RequireDemands(const FailureMap& map, const std::filesystem::path& rules) {
 
 void WriteTables(const std::vector<Record>& records, const std::filesystem::path& out,
                  const std::string& typed) {
-  for (const std::string kind : {"drift", "timing"}) {
+  for (const std::string kind : {"drift", "precision", "timing"}) {
     Table full = MakeTable(records, {.kind = kind});
     if (full.rows.empty()) continue;
     AppendProvenance(full, typed);
@@ -161,11 +162,15 @@ int Plot(const PlotCommand& command) {
   if (!(free.x + free.y + free.group + free.log + free.title).empty()) {
     return DrawFree(records, command);
   }
-  const std::vector<NamedFigure> figures =
-      AllFigures(Filter(records, {Condition{"kind", {"accuracy"}}}));
+  std::vector<NamedFigure> figures = AllFigures(Filter(records, {Condition{"kind", {"accuracy"}}}));
+  for (NamedFigure& figure :
+       PrecisionFigures(Filter(records, {Condition{"kind", {"precision"}}}))) {
+    figures.push_back(std::move(figure));
+  }
   if (figures.empty()) {
     fmt::print(stderr,
-               "{}: no accuracy records with series match; --x KEY --y KEY draws other values\n",
+               "{}: no accuracy records with series and none in several scalars match; --x KEY --y "
+               "KEY draws other values\n",
                command.store.string());
     return 2;
   }

@@ -39,6 +39,7 @@ Examples:
   loopbench merge part1 part2 --out whole
   loopbench table results/runs/paper --where mechanism=four-bar,dead-centre --where rtol=1e-8
   loopbench plot results/runs/paper --out results/runs/paper/figures
+  loopbench run configs/experiments/precision.json --precision-only --jobs 2
   loopbench verdict results/runs/paper --claims configs/experiments/paper/claims.json
   loopbench map results/runs/extremes --rules configs/experiments/extremes/map.json
 
@@ -60,7 +61,8 @@ Examples:
   loopbench plot out --out work.svg --x rhs_evaluations --y drift_position_max --group formulation,coordinates
   loopbench plot out --out cost.pdf --where kind=timing --x bodies --y ns_per_body --group formulation
 
-Without --x and --y: angles, and drift with its fitted exponents. Runs that failed are crosses.)";
+Without --x and --y: angles, drift with its fitted exponents, and of runs in several scalars error
+and drift against tolerance. Runs that failed are crosses.)";
 
 constexpr const char* kMapFooter = R"(
 Examples:
@@ -105,7 +107,7 @@ int main(int argc, char** argv) {
   ExperimentFiles files;
 
   RunCommand run;
-  bool no_timing = false, timing_only = false;
+  bool no_timing = false, timing_only = false, precision_only = false;
   CLI::App* run_app =
       app.add_subcommand("run", "Run experiments, or go on with them; write records and tables");
   run_app->add_option("experiment", run.experiments, "Experiment files (JSON)")->required();
@@ -126,7 +128,11 @@ int main(int argc, char** argv) {
   run_app->footer(
       "A run that was interrupted goes on where it stopped: give the same command again.");
   CLI::Option* no = run_app->add_flag("--no-timing", no_timing, "Leave the timings out");
-  run_app->add_flag("--timing-only", timing_only, "Only the timings")->excludes(no);
+  CLI::Option* timings =
+      run_app->add_flag("--timing-only", timing_only, "Only the timings")->excludes(no);
+  run_app->add_flag("--precision-only", precision_only, "Only the runs in several scalars")
+      ->excludes(no)
+      ->excludes(timings);
 
   CLI::App* list_app = app.add_subcommand("list", "Show the cases of experiments");
   list_app->add_option("experiment", files.paths, "Experiment files (JSON)")->required();
@@ -163,7 +169,7 @@ int main(int argc, char** argv) {
   table_app
       ->add_option("--kind", table.view.kind,
                    "What the rows are (default: drift, or what the store has)")
-      ->check(CLI::IsMember({"drift", "timing", "factorial", "all"}));
+      ->check(CLI::IsMember({"drift", "precision", "timing", "factorial", "all"}));
   table_app->add_option("--format", table.format, "How they are written")
       ->check(CLI::IsMember({"text", "csv", "markdown", "json", "latex"}))
       ->capture_default_str();
@@ -224,8 +230,9 @@ int main(int argc, char** argv) {
   try {
     const std::string typed = CommandLine(argc, argv);
     run.suite.filter = table.view.where = plot.where = ParseSelection(conditions);
-    run.suite.timing = !no_timing;
-    run.suite.accuracy = !timing_only;
+    run.suite.timing = !no_timing && !precision_only;
+    run.suite.accuracy = !timing_only && !precision_only;
+    run.suite.precision = !timing_only;
     run.settings = files.settings = ParseSettings(settings);
     files.filter = ParseSelection(conditions);
     run.suite.shard = ParseShard(shard);

@@ -14,6 +14,7 @@
 #include "harness/isolation/fault.h"
 #include "harness/isolation/processes.h"
 #include "harness/origin.h"
+#include "harness/precision_cases.h"
 #include "harness/progress.h"
 #include "harness/provenance.h"
 #include "harness/run_case.h"
@@ -74,6 +75,29 @@ Piece TimingPiece(const Experiment& experiment, const TimingGroup& group) {
                   experiment.limits.memory_mb};
   piece.work = [&experiment, &group] { return TimeTogether(experiment, group); };
   piece.label = group.description.name;
+  return piece;
+}
+
+Piece LadderPiece(const Experiment& experiment, const LadderGroup& group) {
+  Piece piece;
+  const Limits& limits = experiment.limits;
+  const std::size_t scene = static_cast<std::size_t>(
+      std::ranges::find(experiment.scenes, group.keys.front().Text("mechanism"),
+                        &ExperimentScene::name) -
+      experiment.scenes.begin());
+  std::string ladder;  // the verdict on one rung depends on the others
+  for (const Record& keys : group.keys) ladder += CaseId(keys);
+  for (Record keys : group.keys) {
+    keys.Set("id", Id(fmt::format("{} {} {} {} {} {}", CaseId(keys), ladder, limits.wall_s,
+                                  limits.steps, ToString(experiment.compile),
+                                  experiment.scenes[scene].mechanism.canonical)));
+    piece.owed.push_back(keys);
+  }
+  const auto runs = static_cast<double>(group.keys.size() + 1);  // there are two references
+  piece.limits = {kPatience * runs * limits.wall_s + kGrace_s, limits.memory_mb};
+  piece.work = [&group] { return ClimbTogether(group); };
+  piece.label =
+      fmt::format("{} {}", group.keys.front().Text("mechanism"), ToString(group.task.column));
   return piece;
 }
 
@@ -230,6 +254,20 @@ SuiteCount RunSuite(const std::vector<Experiment>& experiments, const SuiteOptio
     }
     std::ranges::stable_sort(pieces, std::greater<>(), &Piece::cost);
     runner.Run("accuracy", std::move(pieces), options.jobs);
+  }
+  if (options.precision) {
+    std::vector<std::vector<LadderGroup>> ladders;  // pieces refer to them
+    for (const Experiment& experiment : experiments) {
+      ladders.push_back(LadderGroups(experiment, options.filter));
+    }
+    std::vector<Piece> pieces;
+    std::size_t number = 0;
+    for (std::size_t e = 0; e < experiments.size(); ++e) {
+      for (const LadderGroup& ladder : ladders[e]) {
+        if (options.shard.Takes(number++)) pieces.push_back(LadderPiece(experiments[e], ladder));
+      }
+    }
+    runner.Run("precision", std::move(pieces), options.jobs);
   }
   if (options.timing) {
     std::vector<std::vector<TimingGroup>> groups;  // pieces refer to them

@@ -29,7 +29,8 @@ struct SuiteOptions {
   int jobs = 1;  ///< accuracy cases at once; timing always runs alone
   bool accuracy = true;
   bool timing = true;
-  Selection filter;  ///< accuracy cases whose keys do not match are left out
+  bool precision = true;  ///< ladders of several scalars
+  Selection filter;       ///< accuracy cases and ladders whose keys do not match are left out
   Shard shard;
   Rerun rerun = Rerun::kNone;
 };
@@ -45,7 +46,8 @@ struct SuiteCount {
   std::size_t failed = 0;   ///< of those made now: any outcome but "finished"
 };
 
-/// Runs the accuracy cases of all experiments, costliest first, then their timings, appending each
+/// Runs the accuracy cases of all experiments, costliest first, then their precision ladders, then
+/// their timings, appending each
 /// record to the store as it is complete. A case is done when the store has a record with its id,
 /// which stands for everything that decides the run and for this very program; `records` is what
 /// the store has. Shows progress.

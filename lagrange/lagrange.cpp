@@ -2,6 +2,8 @@
 
 #include <limits>
 
+#include "mechanism/instantiate.h"
+
 namespace loopbench::lagrange {
 
 namespace {
@@ -168,7 +170,8 @@ Outcome Lagrange<Space, S>::Accelerations() {
   return udot_.allFinite() ? Outcome::kFinished : Outcome::kNonFinite;
 }
 
-template class Lagrange<Planar, double>;
-template class Lagrange<Spatial, double>;
+#define LOOPBENCH_INSTANTIATE(Space, S) template class Lagrange<Space, S>;
+LOOPBENCH_FOR_EACH_SPACE_AND_SCALAR(LOOPBENCH_INSTANTIATE)
+#undef LOOPBENCH_INSTANTIATE
 
 }  // namespace loopbench::lagrange

@@ -1,14 +1,8 @@
-// Which (space, scalar) pairs the templates are compiled for. long double serves tests and
-// references and doubles the time of a build, so it is a choice of the build
-// (LOOPBENCH_LONG_DOUBLE).
+// Which (space, scalar) pairs the templates are compiled for: double, unless the build has put
+// other macros before everything else (harness/precision/scalars.h).
 #pragma once
 
-#ifdef LOOPBENCH_LONG_DOUBLE
-#define LOOPBENCH_FOR_EACH_SCALAR(MACRO) MACRO(double) MACRO(long double)
-#define LOOPBENCH_FOR_EACH_SPACE_AND_SCALAR(MACRO) \
-  MACRO(Planar, double)                            \
-  MACRO(Spatial, double) MACRO(Planar, long double) MACRO(Spatial, long double)
-#else
+#ifndef LOOPBENCH_FOR_EACH_SCALAR
 #define LOOPBENCH_FOR_EACH_SCALAR(MACRO) MACRO(double)
 #define LOOPBENCH_FOR_EACH_SPACE_AND_SCALAR(MACRO) MACRO(Planar, double) MACRO(Spatial, double)
 #endif

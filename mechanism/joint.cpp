@@ -46,7 +46,8 @@ Motion<Space, S> Mismatch(const JointKind<Space, S>& kind, const Pose<Space, S>&
   mismatch << RotationVector(rest), X_FM.p - nearest.p;
   // A loop may wind: planar angles along it then differ by whole turns that are no mismatch.
   if constexpr (Space::kRot == 1) {
-    mismatch[0] = std::remainder(mismatch[0], 2 * std::numbers::pi_v<S>);
+    using std::remainder;
+    mismatch[0] = remainder(mismatch[0], S(2 * std::numbers::pi_v<S>));
   }
   return mismatch;
 }

@@ -25,7 +25,8 @@ Motion<Space, S> Kinematics<Space, S>::ConstraintMismatch(int index) const {
     S miss = q[coordinate] - drives_[drive].value;
     // an angle is measured modulo a turn, and which one a helix tells by its shift
     const bool angle = joint.kind->axes[coordinate] < Space::kRot && joint.kind->parameter == S(0);
-    if (angle) miss = std::remainder(miss, 2 * std::numbers::pi_v<S>);
+    using std::remainder;
+    if (angle) miss = remainder(miss, S(2 * std::numbers::pi_v<S>));
     mismatch += joints_[index].D(k) * miss;
   }
   return mismatch;
@@ -55,7 +56,8 @@ S Kinematics<Space, S>::JointCoordinate(int index) const {
   // Space measures an angle modulo a turn; take the one next to the last accepted.
   if (Space::kRot == 3 && joint.kind->axes[0] < 3) {
     const S turn = 2 * std::numbers::pi_v<S>;
-    q = accepted_[index] + std::remainder(q - accepted_[index], turn);
+    using std::remainder;
+    q = accepted_[index] + remainder(q - accepted_[index], turn);
   }
   return q;
 }

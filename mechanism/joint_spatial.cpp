@@ -226,18 +226,20 @@ struct Kinds {
             .coordinates =
                 [](const P& X, S* q, S pitch) {
                   // the shift along the axis says in which turn the angle is
+                  using std::round;
                   const S turn = 2 * std::numbers::pi_v<S>;
                   q[0] = AngleAboutZ(X);
-                  if (pitch != S(0)) q[0] += turn * std::round((X.p[2] / pitch - q[0]) / turn);
+                  if (pitch != S(0)) q[0] += turn * round((X.p[2] / pitch - q[0]) / turn);
                 },
             .rates = SameRates<S, 1>,
             .basis =
                 [](const P&, Block<Spatial, S>& basis_F, S pitch) {
+                  using std::sqrt;
                   basis_F.setZero();
                   basis_F(2, 0) = S(1);
                   basis_F(5, 0) = pitch;
                   for (int i = 0; i < 2; ++i) basis_F(i, 1 + i) = basis_F(3 + i, 3 + i) = S(1);
-                  const S length = std::sqrt(1 + pitch * pitch);
+                  const S length = sqrt(S(1) + pitch * pitch);
                   basis_F(2, 5) = -pitch / length;
                   basis_F(5, 5) = S(1) / length;
                 }};

@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <limits>
 
 #include "mechanism/instantiate.h"
 #include "mechanism/symmetric_eigen.h"
@@ -96,19 +97,21 @@ bool LoopSolver<S>::FactorScaled(const ConstRef& X) {
 
 template <class S>
 void LoopSolver<S>::FactorGeometric(const ConstRef& X_geometric) {
-  using std::exp;
+  using std::expm1;
+  using std::sqrt;
   form_ = Form::kGeometric;
   SymmetricEigen<S>(Scaled(X_geometric), directions_, eigenvalues_);
   const S largest = std::max(eigenvalues_[size_ - 1], S(kLeastResponse));
-  const S theta = S(kTheta) * largest;
+  // a narrow scalar's eigenvalues are round-off already above kTheta
+  const S theta = std::max(S(kTheta), S(64) * std::numeric_limits<S>::epsilon()) * largest;
   rank_ = 0;
   for (int i = 0; i < size_; ++i) {
     const S lambda = std::max(eigenvalues_[i], S(0));
     const S ratio = lambda / theta;
     // expm1 keeps the weight's relative accuracy where it is small
-    weights_[i] = -std::expm1(-ratio * ratio);
+    weights_[i] = -expm1(-ratio * ratio);
     if (weights_[i] >= S(1) / S(2)) ++rank_;
-    inverse_norms_[i] = weights_[i] < S(1e-16) ? S(0) : S(std::sqrt(weights_[i] / lambda));
+    inverse_norms_[i] = weights_[i] < S(1e-16) ? S(0) : S(sqrt(weights_[i] / lambda));
   }
   smallest_weight_ = weights_.minCoeff();
   rcond_ = std::max(eigenvalues_[0], S(0)) / largest;
@@ -116,6 +119,7 @@ void LoopSolver<S>::FactorGeometric(const ConstRef& X_geometric) {
 
 template <class S>
 void LoopSolver<S>::FactorSoftened(const ConstRef& X) {
+  using std::sqrt;
   form_ = Form::kSoftened;
   const auto scaled = Scaled(X);
   auto work = scratch_->work.topLeftCorner(size_, size_);
@@ -124,7 +128,7 @@ void LoopSolver<S>::FactorSoftened(const ConstRef& X) {
   rotated.noalias() = directions_.transpose() * work;
   for (int i = 0; i < size_; ++i) {
     const bool kept = weights_[i] >= S(1e-16) && rotated(i, i) > S(0);
-    inverse_norms_[i] = kept ? S(std::sqrt(weights_[i] / rotated(i, i))) : S(0);
+    inverse_norms_[i] = kept ? S(sqrt(weights_[i] / rotated(i, i))) : S(0);
   }
   // unit diagonal before factoring; directions left out become rows of the identity
   for (int j = 0; j < size_; ++j) {

@@ -54,8 +54,8 @@ class LoopSolver {
   static constexpr double kSuspicious = 1e-4;
   using ConstRef = Eigen::Ref<const MatrixX<S>>;
 
-  /// Softening threshold relative to the largest geometric eigenvalue: (2e-4)^2. docs/numerics.md,
-  /// section 2, has the trials.
+  /// Softening threshold relative to the largest geometric eigenvalue: (2e-4)^2, or 64 eps if more.
+  /// docs/numerics.md, section 3, has the trials.
   static constexpr double kTheta = 4e-8;
   /// The largest geometric eigenvalue is taken as no smaller. Free bodies give one, and round-off
   /// of some 100 eps stays far below kTheta times this.

@@ -12,30 +12,20 @@ namespace loopbench {
 
 namespace {
 
-/// The frame at `position` turned by `rotation`, in the user's body axes.
-Pose<Planar, double> MakePose(const Eigen::Vector3d& position, const Eigen::Matrix3d& rotation,
-                              double angle, Planar) {
-  (void)rotation;
-  Pose<Planar, double> X;
-  X.SetAngle(angle);
-  X.p = position.head<2>();
+/// The frame at `position` turned by `rotation`, which in the plane is `angle`, in the user's body
+/// axes.
+template <class Space, class S>
+Pose<Space, S> MakePose(const Eigen::Vector3d& position, const Eigen::Matrix3d& rotation,
+                        double angle) {
+  Pose<Space, S> X;
+  if constexpr (Space::kRot == 1) {
+    X.SetAngle(S(angle));
+    X.p = position.head<2>().template cast<S>();
+  } else {
+    X.R = rotation.template cast<S>();
+    X.p = position.template cast<S>();
+  }
   return X;
-}
-Pose<Spatial, double> MakePose(const Eigen::Vector3d& position, const Eigen::Matrix3d& rotation,
-                               double, Spatial) {
-  return {rotation, position};
-}
-
-template <class S>
-Pose<Planar, S> Cast(const Pose<Planar, double>& X) {
-  Pose<Planar, S> Y;
-  Y.SetAngle(S(X.angle));
-  Y.p = X.p.template cast<S>();
-  return Y;
-}
-template <class S>
-Pose<Spatial, S> Cast(const Pose<Spatial, double>& X) {
-  return {X.R.template cast<S>(), X.p.template cast<S>()};
 }
 
 template <class Space, class S>
@@ -48,7 +38,7 @@ Pose<Space, S> SidePose(const JointSide& side, const JointDescription& joint,
   if (OwnAxis(joint.type) == 'x' && !joint.axis.isZero()) {
     angle += std::atan2(joint.axis.y(), joint.axis.x());
   }
-  return Cast<S>(MakePose(side.position - com, R, angle, Space{}));
+  return MakePose<Space, S>(side.position - com, R, angle);
 }
 
 /// Names of the speeds of a joint with several, by component of a motion.

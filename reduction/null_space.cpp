@@ -2,6 +2,9 @@
 
 #include <algorithm>
 #include <cmath>
+#include <limits>
+
+#include "mechanism/instantiate.h"
 
 namespace loopbench::reduction {
 
@@ -24,6 +27,7 @@ NullSpace<Space, S>::NullSpace(const Mechanism<Space, S>& mechanism)
 template <class Space, class S>
 void NullSpace<Space, S>::Factor(const Kinematics<Space, S>& kinematics,
                                  TreeDynamics<Space, S>& dynamics, const MatrixX<S>& J) {
+  using std::expm1;
   using std::sqrt;
   const auto& unit_bodies = mechanism_.geometric_bodies();
   dynamics.MassMatrix(kinematics, unit_bodies, M_g_);
@@ -46,10 +50,13 @@ void NullSpace<Space, S>::Factor(const Kinematics<Space, S>& kinematics,
   svd_.compute(B_, Eigen::ComputeFullU | Eigen::ComputeFullV);
   const auto& sigma = svd_.singularValues();
   const S largest = std::max(sigma[0] * sigma[0], S(LoopSolver<S>::kLeastResponse));
+  // as in loop_solver.cpp, a narrow scalar's round-off counts
+  const S theta =
+      std::max(S(LoopSolver<S>::kTheta), S(64) * std::numeric_limits<S>::epsilon()) * largest;
   num_dependent_ = rank_ = 0;
   for (Eigen::Index i = 0; i < sigma.size(); ++i) {
-    const S ratio = sigma[i] * sigma[i] / (S(LoopSolver<S>::kTheta) * largest);
-    weights_[i] = -std::expm1(-ratio * ratio);
+    const S ratio = sigma[i] * sigma[i] / theta;
+    weights_[i] = -expm1(-ratio * ratio);
     if (weights_[i] >= S(1) / S(2)) ++rank_;
     if (S(1) - weights_[i] < S(kHard)) ++num_dependent_;
   }
@@ -127,7 +134,8 @@ void NullSpace<Space, S>::Multipliers(const VectorX<S>& force, VectorX<S>& lambd
   }
 }
 
-template class NullSpace<Planar, double>;
-template class NullSpace<Spatial, double>;
+#define LOOPBENCH_INSTANTIATE(Space, S) template class NullSpace<Space, S>;
+LOOPBENCH_FOR_EACH_SPACE_AND_SCALAR(LOOPBENCH_INSTANTIATE)
+#undef LOOPBENCH_INSTANTIATE
 
 }  // namespace loopbench::reduction

@@ -5,6 +5,7 @@
 #include <algorithm>
 #include <cmath>
 
+#include "mechanism/instantiate.h"
 #include "mechanism/loop_solver.h"
 
 namespace loopbench::reduction {
@@ -75,11 +76,16 @@ S PartitionCondition(const MatrixX<S>& J, const Partition<S>& partition) {
   return pivots.minCoeff() / pivots.maxCoeff();
 }
 
-template int GeometricRank(const Kinematics<Planar, double>&, TreeDynamics<Planar, double>&,
-                           const MatrixX<double>&);
-template int GeometricRank(const Kinematics<Spatial, double>&, TreeDynamics<Spatial, double>&,
-                           const MatrixX<double>&);
-template Partition<double> BestPartition(const MatrixX<double>&, int);
-template double PartitionCondition(const MatrixX<double>&, const Partition<double>&);
+#define LOOPBENCH_INSTANTIATE(Space, S)                                            \
+  template int GeometricRank(const Kinematics<Space, S>&, TreeDynamics<Space, S>&, \
+                             const MatrixX<S>&);
+LOOPBENCH_FOR_EACH_SPACE_AND_SCALAR(LOOPBENCH_INSTANTIATE)
+#undef LOOPBENCH_INSTANTIATE
+
+#define LOOPBENCH_INSTANTIATE(S)                               \
+  template Partition<S> BestPartition(const MatrixX<S>&, int); \
+  template S PartitionCondition(const MatrixX<S>&, const Partition<S>&);
+LOOPBENCH_FOR_EACH_SCALAR(LOOPBENCH_INSTANTIATE)
+#undef LOOPBENCH_INSTANTIATE
 
 }  // namespace loopbench::reduction

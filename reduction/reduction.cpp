@@ -4,6 +4,8 @@
 #include <limits>
 #include <numeric>
 
+#include "mechanism/instantiate.h"
+
 namespace loopbench::reduction {
 
 namespace {
@@ -243,7 +245,8 @@ bool Reduction<Space, S>::ChangeMode() {
   return true;
 }
 
-template class Reduction<Planar, double>;
-template class Reduction<Spatial, double>;
+#define LOOPBENCH_INSTANTIATE(Space, S) template class Reduction<Space, S>;
+LOOPBENCH_FOR_EACH_SPACE_AND_SCALAR(LOOPBENCH_INSTANTIATE)
+#undef LOOPBENCH_INSTANTIATE
 
 }  // namespace loopbench::reduction

@@ -24,6 +24,11 @@ Case MakeCase(const Experiment& experiment, std::size_t scene, const Column& col
           .limits = experiment.limits};
 }
 
+/// `wanted`, or the shortest.
+double HorizonOr(double wanted, const std::vector<double>& horizons) {
+  return wanted > 0.0 ? wanted : *std::min_element(horizons.begin(), horizons.end());
+}
+
 void DropExcluded(const Experiment& experiment, std::vector<Case>* cases) {
   if (experiment.exclusions.empty()) return;
   std::erase_if(*cases, [&experiment](const Case& one) {
@@ -99,6 +104,23 @@ std::vector<Case> Expand(const Experiment& experiment) {
   return cases;
 }
 
+std::vector<Case> ExpandLadders(const Experiment& experiment) {
+  std::vector<Case> cases;
+  const Precision& precision = experiment.precision;
+  if (precision.scalars.empty() || precision.tolerances.empty()) return cases;
+  for (std::size_t scene = 0; scene < experiment.scenes.size(); ++scene) {
+    const std::vector<double>& horizons = experiment.scenes[scene].horizons;
+    if (horizons.empty()) continue;
+    const double horizon = HorizonOr(precision.horizon, horizons);
+    for (const Column& column : experiment.columns) {
+      cases.push_back(MakeCase(experiment, scene, column, precision.tolerances.front(), horizon));
+      cases.back().integrator = "ode45";  // the one that there is in every scalar
+    }
+  }
+  DropExcluded(experiment, &cases);
+  return cases;
+}
+
 std::vector<Case> ExpandTiming(const Experiment& experiment) {
   std::vector<Case> cases;
   const Timing& timing = experiment.timing;
@@ -106,8 +128,7 @@ std::vector<Case> ExpandTiming(const Experiment& experiment) {
   for (std::size_t scene = 0; scene < experiment.scenes.size(); ++scene) {
     const std::vector<double>& horizons = experiment.scenes[scene].horizons;
     if (horizons.empty()) continue;
-    const double horizon =
-        timing.horizon > 0.0 ? timing.horizon : *std::min_element(horizons.begin(), horizons.end());
+    const double horizon = HorizonOr(timing.horizon, horizons);
     for (const Column& column : timing.columns) {
       cases.push_back(MakeCase(experiment, scene, column, timing.tolerance, horizon));
     }

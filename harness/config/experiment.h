@@ -38,6 +38,15 @@ template <>
 inline constexpr std::array<std::string_view, 2> kNames<SolverKind> = {"as-published",
                                                                        "rank-revealing"};
 
+/// What a run computes in, narrowest first (harness/precision/).
+enum class Scalar { kFloat, kDouble, kLongDouble, kFloat128 };
+template <>
+inline constexpr std::array<std::string_view, 4> kNames<Scalar> = {"float", "double", "long-double",
+                                                                   "float128"};
+inline std::string_view ToString(Scalar value) {
+  return kNames<Scalar>[static_cast<std::size_t>(value)];
+}
+
 /// The other enums have theirs beside them, in mechanism/.
 inline std::string_view ToString(FormulationKind value) {
   return kNames<FormulationKind>[static_cast<std::size_t>(value)];
@@ -124,6 +133,14 @@ struct Timing {
   std::vector<TimingFamily> families;
 };
 
+/// Runs in several scalars (harness/precision/ladder.h), separate from the others.
+struct Precision {
+  std::vector<Scalar> scalars;     ///< different; empty: none
+  std::vector<double> tolerances;  ///< those of the experiment unless given
+  double horizon = 0.0;            ///< [s]; 0: the shortest of each scene
+  double reference = 1e-25;        ///< tolerance of the reference: double's reach squared
+};
+
 struct Experiment {
   std::string name;
   std::string comment;
@@ -137,6 +154,7 @@ struct Experiment {
   CompileOptions compile;   ///< what is simplified before a run
   int series_points = 200;  ///< points kept of a time series for figures
   Timing timing;
+  Precision precision;
   /// Of a sweep: this combination's value on each axis, by the axis's name. The values are in every
   /// record, so that filters and tables can use them. Empty without a sweep.
   Record parameters;
@@ -169,6 +187,10 @@ Record CaseKeys(const Experiment& experiment, const Case& one);
 
 /// All cases for accuracy, in the order scene, horizon, column, tolerance, without excluded ones.
 std::vector<Case> Expand(const Experiment& experiment);
+
+/// One case for each precision ladder, in the order scene, column, without excluded ones; empty
+/// without scalars. Tolerances are those of the ladder.
+std::vector<Case> ExpandLadders(const Experiment& experiment);
 
 /// All cases for timing, in the order scene, column, without excluded ones; empty when timing is
 /// off.

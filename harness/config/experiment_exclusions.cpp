@@ -10,7 +10,7 @@ namespace {
 
 // Keys of records other than those of a case: a run would write over a parameter of that name. A
 // test holds this list against the records of actual runs.
-constexpr std::array<std::string_view, 67> kRecordKeys = {"libm",
+constexpr std::array<std::string_view, 68> kRecordKeys = {"libm",
                                                           "load1",
                                                           "kind",
                                                           "experiment",
@@ -72,6 +72,7 @@ constexpr std::array<std::string_view, 67> kRecordKeys = {"libm",
                                                           "bytes",
                                                           "instructions",
                                                           "derivative_hash",
+                                                          "scalar",
                                                           "start_hash",
                                                           "evaluations",
                                                           "benchmark",
@@ -79,9 +80,10 @@ constexpr std::array<std::string_view, 67> kRecordKeys = {"libm",
                                                           "real_ns"};
 
 // Measured values come in groups, and more of each kind may be added.
-constexpr std::array<std::string_view, 16> kRecordPrefixes = {
-    "drift_", "loop_", "energy_", "growth_",      "rank_",       "rcond_", "rhs_",    "step_",
-    "wall_",  "plan_", "branch_", "closed_form_", "correction_", "aa_",    "newton_", "ensemble_"};
+constexpr std::array<std::string_view, 17> kRecordPrefixes = {
+    "drift_",      "loop_", "energy_", "growth_",   "rank_",   "rcond_",
+    "rhs_",        "step_", "wall_",   "plan_",     "branch_", "closed_form_",
+    "correction_", "aa_",   "newton_", "ensemble_", "error_"};
 
 }  // namespace
 

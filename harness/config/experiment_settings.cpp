@@ -1,10 +1,12 @@
-// "integrator", "limits", "compile", "series" and "timing" of an experiment file.
+// "integrator", "limits", "compile", "series", "timing" and "precision" of an experiment file.
 #include "harness/config/experiment_sections.h"
 #include "harness/integrator/options.h"
 
 namespace loopbench::harness {
 namespace {
 
+// float128 reaches some 1e-30
+constexpr Range kReferences = {.min = 1e-30, .max = 1e-6};
 constexpr std::int64_t kMaxSteps = 1'000'000'000'000;  // no run gets there
 
 void ReadLimits(const JsonNode& root, Limits* limits) {
@@ -70,6 +72,25 @@ void ReadTiming(const JsonNode& root, Timing* timing) {
   }
 }
 
+void ReadPrecision(const JsonNode& root, const std::vector<double>& tolerances,
+                   Precision* precision) {
+  const auto node = root.Optional("precision");
+  if (!node || !node->ExpectObject({"scalars", "tolerances", "horizon", "reference"})) return;
+  precision->tolerances = tolerances;
+  if (const auto scalars = node->Required("scalars", "a list of scalars")) {
+    precision->scalars = ReadEnums<Scalar>(*scalars, "a scalar");
+  }
+  if (const auto given = node->Optional("tolerances")) {
+    precision->tolerances = given->NumberList(kTolerances);
+  }
+  if (const auto horizon = node->Optional("horizon")) {
+    precision->horizon = horizon->Number(kPositive);
+  }
+  if (const auto reference = node->Optional("reference")) {
+    precision->reference = reference->Number(kReferences);
+  }
+}
+
 }  // namespace
 
 void ReadSettings(const JsonNode& root, Experiment* experiment) {
@@ -87,6 +108,7 @@ void ReadSettings(const JsonNode& root, Experiment* experiment) {
     }
   }
   ReadTiming(root, &experiment->timing);
+  ReadPrecision(root, experiment->tolerances, &experiment->precision);
 }
 
 }  // namespace loopbench::harness

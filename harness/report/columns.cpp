@@ -112,7 +112,7 @@ std::vector<TableColumn> OtherColumns() {
 
 const TableColumn* FindKnown(const std::string& key) {
   static const std::vector<TableColumn> kOther = OtherColumns();
-  for (const auto* list : {&DriftColumns(), &TimingColumns(), &kOther}) {
+  for (const auto* list : {&DriftColumns(), &TimingColumns(), &PrecisionColumns(), &kOther}) {
     const auto it = std::ranges::find(*list, key, &TableColumn::key);
     if (it != list->end()) return &*it;
   }
@@ -253,6 +253,47 @@ const std::vector<TableColumn>& TimingColumns() {
                               Make("governor", "governor"),
                               Make("noise", "noise"),
                           });
+  return kColumns;
+}
+
+const std::vector<TableColumn>& PrecisionColumns() {
+  static const std::vector<TableColumn> kColumns = [] {
+    std::vector<TableColumn> columns = CaseColumns();
+    const auto rtol = std::ranges::find(columns, "rtol", &TableColumn::key);
+    columns.insert(rtol, Make("scalar", "scalar"));
+    return Join(std::move(columns),
+                {
+                    Make("error_final", "error at the end [m]", kScientific),
+                    Make("error_ruled_by", "error ruled by"),
+                    Make("drift_position_max", "drift, position [m]", kScientific),
+                    Make("drift_ruled_by", "drift ruled by"),
+                    Make("steps", "steps", kInteger),
+                    Make("rejected", "rejected", kInteger),
+                    Make("restarts", "restarts", kInteger),
+                    Make("rhs_evaluations", "rhs evaluations", kInteger),
+                });
+  }();
+  return kColumns;
+}
+
+const std::vector<TableColumn>& CompactPrecisionColumns() {
+  static const std::vector<TableColumn> kColumns = [] {
+    std::vector<TableColumn> columns = CompactCaseColumns();
+    std::erase_if(columns, [](const TableColumn& column) {
+      return column.key == "coordinates" || column.key == "solver" || column.key == "horizon";
+    });
+    const auto rtol = std::ranges::find(columns, "rtol", &TableColumn::key);
+    columns.insert(rtol, Make("scalar", "scalar"));
+    const std::vector<std::pair<std::string, std::string>> parts = {{"truncation", "trunc"},
+                                                                    {"round-off", "round"}};
+    return Join(std::move(columns), {
+                                        Make("error_final", "error/m", kScientific),
+                                        {"error_ruled_by", "by", kText, parts},
+                                        Make("drift_position_max", "drift/m", kScientific),
+                                        {"drift_ruled_by", "by", kText, parts},
+                                        Make("steps", "steps", kInteger),
+                                    });
+  }();
   return kColumns;
 }
 

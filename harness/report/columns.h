@@ -19,6 +19,13 @@ const std::vector<TableColumn>& DriftColumns();
 /// The columns of timing.csv: what was run and how it ended, the size of the mechanism, then times.
 const std::vector<TableColumn>& TimingColumns();
 
+/// The columns of precision.csv: what was run in which scalar and how it ended, error and drift
+/// with what rules them, counters.
+const std::vector<TableColumn>& PrecisionColumns();
+
+/// The part of PrecisionColumns() that fits a terminal.
+const std::vector<TableColumn>& CompactPrecisionColumns();
+
 /// The part of DriftColumns() that fits a terminal of some 100 columns, with shortened words.
 const std::vector<TableColumn>& CompactDriftColumns();
 

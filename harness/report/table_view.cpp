@@ -7,6 +7,7 @@
 
 #include "harness/report/columns.h"
 #include "harness/report/factorial.h"
+#include "harness/report/precision_report.h"
 #include "harness/timing/noise.h"
 
 namespace loopbench::harness {
@@ -20,6 +21,7 @@ bool HasKind(std::span<const Record> records, std::string_view kind) {
 std::string KindOf(const TableView& view, std::span<const Record> records) {
   if (!view.kind.empty()) return view.kind;
   if (HasKind(records, "accuracy")) return "drift";
+  if (HasKind(records, "precision")) return "precision";
   return HasKind(records, "timing") ? "timing" : "all";
 }
 
@@ -43,6 +45,9 @@ std::vector<TableColumn> DefaultColumns(const std::string& kind, bool compact,
                                         std::span<const Record> rows) {
   if (kind == "timing") {
     return WithParameters(compact ? CompactTimingColumns() : TimingColumns(), rows);
+  }
+  if (kind == "precision") {
+    return WithParameters(compact ? CompactPrecisionColumns() : PrecisionColumns(), rows);
   }
   if (kind == "drift") {
     return WithParameters(compact ? CompactDriftColumns() : DriftColumns(), rows);
@@ -74,6 +79,12 @@ void MarkUnresolved(Table& table) {
   }
 }
 
+std::string TitleOf(const std::string& kind) {
+  if (kind == "drift") return "Drift";
+  if (kind == "precision") return "Precision";
+  return kind == "timing" ? "Timing" : "Records";
+}
+
 Table Factorial(const std::vector<Record>& rows) {
   FactorialOptions options;
   if (!rows.empty()) {
@@ -90,10 +101,11 @@ Table MakeTable(std::span<const Record> records, const TableView& view) {
   for (const Condition& condition : view.where) RequireKey("--where", condition.key, records);
   const std::string kind = KindOf(view, records);
   Selection selection = view.where;
-  if (kind == "timing") selection.push_back({"kind", {"timing"}});
+  if (kind == "timing" || kind == "precision") selection.push_back({"kind", {kind}});
   if (kind == "drift" || kind == "factorial") selection.push_back({"kind", {"accuracy"}});
   std::vector<Record> rows = Filter(records, selection);
   SortRows(&rows);
+  if (kind == "precision") SortRungs(&rows);
   Table table;
   if (kind == "factorial") {
     table = Factorial(rows);
@@ -101,10 +113,11 @@ Table MakeTable(std::span<const Record> records, const TableView& view) {
     if (!view.columns.empty()) table.columns = ChosenColumns(view, table.rows);
   } else {
     RequireKeys(view, records);
-    table.title = kind == "drift" ? "Drift" : kind == "timing" ? "Timing" : "Records";
+    table.title = TitleOf(kind);
     table.columns =
         view.columns.empty() ? DefaultColumns(kind, view.compact, rows) : ChosenColumns(view, rows);
     table.notes = NoiseWarnings(rows);
+    if (kind == "precision") table.notes = PrecisionNotes();
     table.rows = std::move(rows);
   }
   table.group = view.group;

@@ -87,7 +87,7 @@ TYPED_TEST(ForcesTest, WrenchesAgreeWithTheOracleAtAnyTime) {
   EXPECT_GT(timed, 0);
 }
 
-#ifdef LOOPBENCH_LONG_DOUBLE
+#ifdef LOOPBENCH_PRECISIONS
 
 /// As the random mechanisms draw forces: with damping and drag that are not zero.
 bool HasNoPotential(const ForceDescription& force) {

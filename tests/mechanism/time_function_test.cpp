@@ -61,7 +61,7 @@ TEST(TimeFunctionTest, ValuesAndDerivativesAgreeWithTheOracle) {
       EXPECT_NEAR(y.value, static_cast<double>(expected.f), bound);
       EXPECT_NEAR(y.rate, static_cast<double>(expected.d), bound);
       EXPECT_NEAR(y.acceleration, static_cast<double>(expected.dd), bound);
-#ifdef LOOPBENCH_LONG_DOUBLE
+#ifdef LOOPBENCH_PRECISIONS
       // the spline's curvatures are rounded to double once
       const TimeValue<Real> fine = f.At(static_cast<Real>(t));
       EXPECT_NEAR(static_cast<double>(fine.value - expected.f), 0.0, bound);

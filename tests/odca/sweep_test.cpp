@@ -51,7 +51,7 @@ TEST(SweepTest, NoMatrixIsLargerThanThePlansLargestJoin) {
       << "two handles of three directions";
 }
 
-#ifdef LOOPBENCH_LONG_DOUBLE
+#ifdef LOOPBENCH_PRECISIONS
 TEST(SweepTest, LongDoubleAgreesWithDouble) {
   for (int n : {5, 20, 60}) {
     const MechanismDescription chain = testing::RandomChain(n, SpaceKind::kPlanar, 3);

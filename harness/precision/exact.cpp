@@ -1,0 +1,57 @@
+#include "harness/precision/exact.h"
+
+#include <algorithm>
+
+#include "lagrange/lagrange.h"
+#include "mechanism/assembly.h"
+
+namespace loopbench::harness {
+
+Exact::Exact(const MechanismDescription& description, Coordinates coordinates)
+    : mechanism_(description, coordinates), kinematics_(mechanism_) {
+  const Mechanism<Planar, double> in_double(description, Coordinates::kJoint);
+  const Start<double> start = Assemble<Planar>(description, in_double);
+  outcome_ = start.outcome;
+  message_ = start.message;
+  if (outcome_ != Outcome::kFinished) return;
+  const Mechanism<Planar, Float128> joints(description, Coordinates::kJoint);
+  lagrange::Lagrange<Planar, Float128> projection(joints, {.enforcement = Enforcement::kPosition});
+  q_ = start.q.cast<Float128>();
+  u_ = start.u.cast<Float128>();
+  outcome_ = projection.Start(Float128(0), q_, u_);
+  if (outcome_ != Outcome::kFinished) return;
+  std::vector<Float128> y(static_cast<std::size_t>(projection.state_size()));
+  projection.ToState(q_, u_, y);
+  projection.BeginStep(Float128(0), y);
+  q_ = projection.q();
+  u_ = projection.u();
+  if (coordinates == Coordinates::kJoint) return;
+  q_ = projection.kinematics().CoordinatesIn(mechanism_);
+  kinematics_.UpdatePosition(q_);
+  u_ = projection.kinematics().SpeedsIn(kinematics_);
+}
+
+Float128 Exact::Drift(const VectorX<Float128>& q) {
+  kinematics_.UpdatePosition(q);
+  Float128 largest = 0;
+  for (int index : mechanism_.constraints()) {
+    const auto D = kinematics_.joints()[index].D();
+    const Motion<Planar, Float128> all = kinematics_.ConstraintMismatch(index);
+    // what a joint leaves free is no mismatch
+    Motion<Planar, Float128> constrained = Motion<Planar, Float128>::Zero();
+    for (int r = 0; r < D.cols(); ++r) constrained += D.col(r) * D.col(r).dot(all);
+    largest = std::max(largest, Float128(constrained.tail<Planar::kLin>().norm()));
+  }
+  return largest;
+}
+
+VectorX<Float128> Exact::Centres(const VectorX<Float128>& q) {
+  kinematics_.UpdatePosition(q);
+  VectorX<Float128> centres(Planar::kLin * (mechanism_.num_bodies() - 1));
+  for (int body = 1; body < mechanism_.num_bodies(); ++body) {
+    centres.segment<Planar::kLin>(Planar::kLin * (body - 1)) = kinematics_.poses()[body].p;
+  }
+  return centres;
+}
+
+}  // namespace loopbench::harness

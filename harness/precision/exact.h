@@ -1,0 +1,37 @@
+// A mechanism in the widest scalar: its start, and what the states of all runs are held against.
+#pragma once
+
+#include <string>
+#include <vector>
+
+#include "harness/precision/scalars.h"
+#include "mechanism/kinematics.h"
+#include "mechanism/outcome.h"
+
+namespace loopbench::harness {
+
+class Exact {
+ public:
+  /// Assembles the start in double and closes its loops in Float128: positions, then speeds, by the
+  /// projection of level `position`.
+  Exact(const MechanismDescription& description, Coordinates coordinates);
+
+  Outcome outcome() const { return outcome_; }  ///< of the start
+  const std::string& message() const { return message_; }
+  const VectorX<Float128>& q() const { return q_; }
+  const VectorX<Float128>& u() const { return u_; }
+
+  /// Largest mismatch of the points of a constraint at q [m].
+  Float128 Drift(const VectorX<Float128>& q);
+  /// Centres of mass at q [m], in ground axes, one below the other.
+  VectorX<Float128> Centres(const VectorX<Float128>& q);
+
+ private:
+  Mechanism<Planar, Float128> mechanism_;
+  Kinematics<Planar, Float128> kinematics_;
+  Outcome outcome_ = Outcome::kFinished;
+  std::string message_;
+  VectorX<Float128> q_, u_;
+};
+
+}  // namespace loopbench::harness

@@ -1,0 +1,142 @@
+#include "harness/precision/integrator.h"
+
+#include <algorithm>
+#include <chrono>
+#include <cmath>
+#include <limits>
+
+#include "harness/precision/one_step.h"
+#include "harness/precision/scalars.h"
+
+namespace loopbench::harness {
+
+namespace {
+
+// harness/integrator/options.cpp: the values of profile ode45.
+constexpr double kSafety = 0.8, kGrowth = 5.0, kReduction = 0.1, kRepeatedFailure = 0.5;
+constexpr int kMostFailures = 7;  // ARKODE's
+
+template <class S>
+class Run {
+ public:
+  Run(const System<S>& system, S t_end, std::vector<S>& y, const OneStepOptions<S>& options)
+      : system_(system), options_(options), t_end_(t_end), y_(y), step_(system, options.method) {
+    f_.assign(y.size(), S(0));
+  }
+
+  OneStepResult Execute() {
+    system_.accept(t_, y_);
+    result_.outcome = step_.Evaluate(t_, y_, f_);
+    if (result_.outcome == Outcome::kFinished) h_ = FirstStep();
+    while (result_.outcome == Outcome::kFinished && t_ < t_end_) result_.outcome = Advance();
+    result_.t_reached = static_cast<double>(t_);
+    result_.rhs_evaluations = step_.evaluations();
+    return result_;
+  }
+
+ private:
+  /// MATLAB's: the fastest component changes by 0.8 rtol^(1/order) of its magnitude, at least 1.
+  S FirstStep() {
+    using std::abs;
+    using std::pow;
+    if (options_.fixed_step > S(0)) return options_.fixed_step;
+    S rate = S(0);
+    for (std::size_t i = 0; i < y_.size(); ++i) {
+      rate = std::max(rate, S(abs(f_[i]) / std::max(S(abs(y_[i])), S(1))));
+    }
+    rate /= S(kSafety) * pow(options_.tolerance, S(1) / S(step_.estimate_order()));
+    return longest_ * rate > S(1) ? S(1) / rate : longest_;
+  }
+
+  /// The largest component of the error estimate over its tolerance.
+  S ScaledError() const {
+    using std::abs;
+    S worst = S(0);
+    for (std::size_t i = 0; i < y_.size(); ++i) {
+      const S allowed = options_.tolerance * std::max(S(abs(y_[i])), S(1));
+      worst = std::max(worst, S(abs(step_.error()[i]) / allowed));
+    }
+    return worst;
+  }
+
+  /// The factor that would just be accepted, between the controller's bounds.
+  S Factor(S scaled_error, S largest) const {
+    using std::pow;
+    if (scaled_error == S(0)) return largest;
+    const S ideal = S(kSafety) * pow(scaled_error, S(-1) / S(step_.estimate_order()));
+    return std::clamp(ideal, S(kReduction), largest);
+  }
+
+  /// One accepted step.
+  Outcome Advance() {
+    S largest = S(kGrowth);
+    for (int failures = 0;;) {
+      const bool last = !(t_ + h_ < t_end_);
+      const S h = last ? t_end_ - t_ : h_;
+      const Outcome outcome = step_.Attempt(t_, y_, f_, h);
+      if (outcome != Outcome::kFinished) return outcome;
+      if (options_.fixed_step > S(0)) return Accept(last ? t_end_ : t_ + h, h);
+      const S error = ScaledError();
+      if (error <= S(1)) {
+        h_ = h * Factor(error, largest);
+        h_ = std::min(h_, longest_);
+        return Accept(last ? t_end_ : t_ + h, h);
+      }
+      ++result_.rejected;
+      if (++failures == kMostFailures) return Outcome::kStepTooSmall;
+      h_ = h * Factor(error, failures > 1 ? S(kRepeatedFailure) : S(1));
+      largest = S(1);  // a step after a failure does not grow
+    }
+  }
+
+  Outcome Accept(S t, S h) {
+    using std::abs;
+    t_ = t;
+    y_ = step_.y_new();
+    ++result_.steps;
+    const bool rewritten = system_.accept(t_, y_);
+    if (t_ < t_end_) {
+      if (h <= S(16) * std::numeric_limits<S>::epsilon() * abs(t_)) return Outcome::kStepTooSmall;
+      if (result_.steps >= options_.step_limit) return Outcome::kStepLimit;
+      if (Seconds() > options_.time_limit_s) return Outcome::kTimeLimit;
+    } else {
+      return Outcome::kFinished;
+    }
+    result_.restarts += rewritten ? 1 : 0;
+    if (rewritten || step_.f_new().empty()) return step_.Evaluate(t_, y_, f_);
+    f_ = step_.f_new();
+    return Outcome::kFinished;
+  }
+
+  double Seconds() const {
+    return std::chrono::duration<double>(std::chrono::steady_clock::now() - start_).count();
+  }
+
+  const System<S>& system_;
+  const OneStepOptions<S>& options_;
+  const S t_end_;
+  const S longest_ = t_end_ / S(10);  // ode45's longest step
+  std::vector<S>& y_;
+  std::vector<S> f_;
+  OneStep<S> step_;
+  OneStepResult result_;
+  S t_ = S(0), h_ = S(0);
+  std::chrono::steady_clock::time_point start_ = std::chrono::steady_clock::now();
+};
+
+}  // namespace
+
+template <class S>
+OneStepResult IntegrateSystem(const System<S>& system, S t_end, std::vector<S>& y,
+                              const OneStepOptions<S>& options) {
+  return Run<S>(system, t_end, y, options).Execute();
+}
+
+#define LOOPBENCH_INSTANTIATE(S)                                               \
+  template OneStepResult IntegrateSystem(const System<S>&, S, std::vector<S>&, \
+                                         const OneStepOptions<S>&);
+LOOPBENCH_INSTANTIATE(double)
+LOOPBENCH_FOR_EACH_SCALAR(LOOPBENCH_INSTANTIATE)
+#undef LOOPBENCH_INSTANTIATE
+
+}  // namespace loopbench::harness

@@ -1,0 +1,58 @@
+// One-step methods with the step-size control of profile `ode45`, in any scalar.
+//
+// ARKODE computes in double alone. To see what rounding does, the same method must run in narrower
+// and wider scalars: the Dormand-Prince pair, MATLAB's norm (max_i |e_i| / max(rtol |y_i|, atol)),
+// first step, longest step and I controller, as harness/integrator/options.h has them for ARKODE.
+// In double the two take the same steps but for rounding (tests/precision/). Times, tolerances and
+// coefficients are of the same scalar as the state.
+//
+// A reference far below the reach of order 5 comes from Gragg's method: the modified midpoint rule
+// with 2, 4, .., 20 substeps, extrapolated to order 20 by Aitken and Neville (Hairer, Norsett,
+// Wanner, Solving Ordinary Differential Equations I, section II.9), under the same controller.
+#pragma once
+
+#include <cstdint>
+#include <functional>
+#include <span>
+#include <vector>
+
+#include "mechanism/outcome.h"
+
+namespace loopbench::harness {
+
+/// y' = f(t, y).
+template <class S>
+struct System {
+  int size = 0;
+  /// Writes f(t, y); anything but kFinished ends the run. Values that are not finite do so too.
+  std::function<Outcome(S t, std::span<const S> y, std::span<S> ydot)> derivative;
+  /// Called with the start and with every accepted step. True when it has rewritten y, so that f
+  /// must be evaluated anew.
+  std::function<bool(S t, std::span<S> y)> accept;
+};
+
+enum class OneStepMethod { kDormandPrince, kGragg };
+
+template <class S>
+struct OneStepOptions {
+  OneStepMethod method = OneStepMethod::kDormandPrince;
+  S tolerance = S(1e-6);  ///< rtol = atol > 0
+  S fixed_step = S(0);    ///< positive: every step but the last has this length, untested
+  std::int64_t step_limit = 10'000'000;
+  double time_limit_s = 600.0;  ///< wall time, looked at after each step
+};
+
+/// How a run went.
+struct OneStepResult {
+  Outcome outcome = Outcome::kFinished;
+  double t_reached = 0.0;  ///< [s]
+  std::int64_t steps = 0, rejected = 0, rhs_evaluations = 0, restarts = 0;
+};
+
+/// From t = 0 to t_end > 0 [s]; y is the state at t_reached afterwards. A step that fails its error
+/// test seven times, or an accepted one of at most 16 eps t, ends the run as step-too-small.
+template <class S>
+OneStepResult IntegrateSystem(const System<S>& system, S t_end, std::vector<S>& y,
+                              const OneStepOptions<S>& options);
+
+}  // namespace loopbench::harness

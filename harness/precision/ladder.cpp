@@ -1,0 +1,195 @@
+#include "harness/precision/ladder.h"
+
+#include <chrono>
+#include <cmath>
+#include <limits>
+#include <memory>
+
+#include "harness/precision/exact.h"
+#include "harness/precision/integrator.h"
+#include "lagrange/lagrange.h"
+#include "odca/odca.h"
+#include "reduction/reduction.h"
+
+namespace loopbench::harness {
+
+namespace {
+
+template <class S>
+std::unique_ptr<Formulation<Planar, S>> Make(const Column& column,
+                                             const Mechanism<Planar, S>& mechanism) {
+  const FormulationOptions options{.enforcement = column.enforcement, .solver = column.solver};
+  switch (column.formulation) {
+    case FormulationKind::kOdca:
+      return std::make_unique<odca::Odca<Planar, S>>(mechanism, options);
+    case FormulationKind::kLagrange:
+      return std::make_unique<lagrange::Lagrange<Planar, S>>(mechanism, options);
+    case FormulationKind::kReduction:
+      return std::make_unique<reduction::Reduction<Planar, S>>(mechanism, options);
+  }
+  return nullptr;
+}
+
+/// A run and where it ended.
+struct Ended {
+  Rung rung;
+  VectorX<Float128> centres;
+};
+
+template <class S>
+Ended Climb(const LadderTask& task, Exact& exact, Scalar scalar, OneStepMethod method,
+            double tolerance) {
+  const auto start = std::chrono::steady_clock::now();
+  const Mechanism<Planar, S> mechanism(task.description, task.column.coordinates);
+  const auto formulation = Make<S>(task.column, mechanism);
+  Ended ended;
+  Rung& rung = ended.rung;
+  rung.scalar = scalar;
+  rung.tolerance = tolerance;
+  const VectorX<S> q = exact.q().template cast<S>(), u = exact.u().template cast<S>();
+  rung.outcome = formulation->Start(S(0), q, u);
+  if (rung.outcome != Outcome::kFinished) return ended;
+  std::vector<S> y(static_cast<std::size_t>(formulation->state_size()));
+  formulation->ToState(q, u, y);
+  VectorX<Float128> at;  // positions of the state
+  Float128 drift = 0;
+  const System<S> system{
+      formulation->state_size(),
+      [&](S t, std::span<const S> state, std::span<S> rates) {
+        return formulation->Derivative(t, state, rates);
+      },
+      [&](S t, std::span<S> state) {
+        const bool rewritten = formulation->BeginStep(t, state);
+        at =
+            Eigen::Map<const VectorX<S>>(state.data(), mechanism.num_q()).template cast<Float128>();
+        drift = std::max(drift, exact.Drift(at));
+        return rewritten;
+      }};
+  const OneStepResult result = IntegrateSystem<S>(system, S(task.horizon), y,
+                                                  {.method = method,
+                                                   .tolerance = S(tolerance),
+                                                   .step_limit = task.limits.steps,
+                                                   .time_limit_s = task.limits.wall_s});
+  rung.outcome = result.outcome;
+  rung.t_reached = result.t_reached;
+  rung.steps = result.steps;
+  rung.rejected = result.rejected;
+  rung.rhs_evaluations = result.rhs_evaluations;
+  rung.restarts = result.restarts;
+  rung.drift = static_cast<double>(drift);
+  rung.error = std::numeric_limits<double>::quiet_NaN();
+  ended.centres = exact.Centres(at);
+  rung.wall_s = std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
+  return ended;
+}
+
+Ended Climb(const LadderTask& task, Exact& exact, Scalar scalar, double tolerance) {
+  constexpr OneStepMethod kMethod = OneStepMethod::kDormandPrince;
+  switch (scalar) {
+    case Scalar::kFloat:
+      return Climb<float>(task, exact, scalar, kMethod, tolerance);
+    case Scalar::kDouble:
+      return Climb<double>(task, exact, scalar, kMethod, tolerance);
+    case Scalar::kLongDouble:
+      return Climb<long double>(task, exact, scalar, kMethod, tolerance);
+    case Scalar::kFloat128:
+      break;
+  }
+  return Climb<Float128>(task, exact, scalar, kMethod, tolerance);
+}
+
+double Distance(const Ended& a, const Ended& b) {
+  if (a.rung.outcome != Outcome::kFinished || b.rung.outcome != Outcome::kFinished) {
+    return std::numeric_limits<double>::quiet_NaN();
+  }
+  const VectorX<Float128> apart = a.centres - b.centres;
+  Float128 largest = 0;
+  for (int i = 0; i < apart.size(); i += Planar::kLin) {
+    largest = std::max(largest, Float128(apart.segment<Planar::kLin>(i).norm()));
+  }
+  return static_cast<double>(largest);
+}
+
+double Epsilon(Scalar scalar) {
+  switch (scalar) {
+    case Scalar::kFloat:
+      return std::numeric_limits<float>::epsilon();
+    case Scalar::kDouble:
+      return std::numeric_limits<double>::epsilon();
+    case Scalar::kLongDouble:
+      return static_cast<double>(std::numeric_limits<long double>::epsilon());
+    case Scalar::kFloat128:
+      break;
+  }
+  return static_cast<double>(std::numeric_limits<Float128>::epsilon());
+}
+
+/// The finished rung at the same tolerance whose scalar is next in width to `own`'s: wider if there
+/// is one, else narrower; or nullptr.
+const Rung* Neighbour(const std::vector<Rung>& rungs, const Rung& own) {
+  const Rung *wider = nullptr, *narrower = nullptr;
+  for (const Rung& rung : rungs) {
+    if (rung.tolerance != own.tolerance || rung.outcome != Outcome::kFinished) continue;
+    if (rung.scalar > own.scalar && (wider == nullptr || rung.scalar < wider->scalar)) {
+      wider = &rung;
+    }
+    if (rung.scalar < own.scalar && (narrower == nullptr || rung.scalar > narrower->scalar)) {
+      narrower = &rung;
+    }
+  }
+  return wider != nullptr ? wider : narrower;
+}
+
+void Judge(std::vector<Rung>& rungs) {
+  for (Rung& own : rungs) {
+    const Rung* other = Neighbour(rungs, own);
+    if (own.outcome != Outcome::kFinished || other == nullptr) continue;
+    if (other->scalar > own.scalar) {
+      own.error_ruled_by = RuledBy(own.error, other->error);
+      own.drift_ruled_by = RuledBy(own.drift, other->drift);
+      continue;
+    }
+    // nothing wider: its round-off is that of the narrower, as much smaller as its eps, give or
+    // take the luck of a random walk
+    const double walk = 10 * Epsilon(own.scalar) / Epsilon(other->scalar);
+    if (own.error > walk * other->error) own.error_ruled_by = "truncation";
+    if (own.drift > walk * other->drift) own.drift_ruled_by = "truncation";
+  }
+}
+
+}  // namespace
+
+std::string_view RuledBy(double own, double wider) {
+  if (std::isnan(own) || std::isnan(wider)) return "";
+  return own > 2 * wider || own < wider / 2 ? "round-off" : "truncation";
+}
+
+Ladder RunLadder(const LadderTask& task) {
+  Exact exact(task.description, task.column.coordinates);
+  Ladder ladder;
+  ladder.start = exact.outcome();
+  ladder.message = exact.message();
+  if (ladder.start != Outcome::kFinished) return ladder;
+  LadderTask unsoftened = task;
+  unsoftened.column = {FormulationKind::kLagrange, Enforcement::kPosition, Coordinates::kJoint,
+                       SolverKind::kAsPublished};
+  Exact in_joints(task.description, Coordinates::kJoint);
+  const auto reference_at = [&](double tolerance) {
+    return Climb<Float128>(unsoftened, in_joints, Scalar::kFloat128, OneStepMethod::kGragg,
+                           tolerance);
+  };
+  const Ended reference = reference_at(task.precision.reference);
+  ladder.reference = reference.rung;
+  ladder.reference.error = Distance(reference, reference_at(1e4 * task.precision.reference));
+  for (const Scalar scalar : task.precision.scalars) {
+    for (const double tolerance : task.precision.tolerances) {
+      Ended ended = Climb(task, exact, scalar, tolerance);
+      ended.rung.error = Distance(ended, reference);
+      ladder.rungs.push_back(ended.rung);
+    }
+  }
+  Judge(ladder.rungs);
+  return ladder;
+}
+
+}  // namespace loopbench::harness

@@ -1,0 +1,66 @@
+// The precision ladder: one mechanism and formulation in float, double, long double and float128,
+// with one integrator (integrator.h), against a reference in float128.
+//
+// Error and drift of a run have two parts: round-off of the scalar, and truncation, here all that
+// is left in a wider scalar at the same tolerance: that of the method, and near singular positions
+// what softening takes (mechanism/loop_solver.h). So what a wider scalar changes was round-off.
+//
+// The reference is one for all columns of a mechanism, whose exact motion is one: multipliers in
+// joint coordinates, positions projected after each step, without softening.
+#pragma once
+
+#include <array>
+#include <string>
+#include <string_view>
+#include <vector>
+
+#include "harness/config/experiment.h"
+
+namespace loopbench::harness {
+
+/// One mechanism and column, and the rungs to climb.
+struct LadderTask {
+  MechanismDescription description;  ///< planar, no tables of time
+  Column column;
+  double horizon = 1.0;  ///< [s]
+  Precision precision;   ///< scalars, tolerances, the reference's
+  Limits limits;         ///< wall time and steps, of each run
+};
+
+/// One run.
+struct Rung {
+  Scalar scalar = Scalar::kDouble;
+  double tolerance = 0.0;
+  Outcome outcome = Outcome::kFinished;
+  double t_reached = 0.0;  ///< [s]
+  std::int64_t steps = 0, rejected = 0, rhs_evaluations = 0, restarts = 0;
+  double wall_s = 0.0;
+  double drift = 0.0;  ///< largest mismatch of points at accepted steps [m]
+  double error = 0.0;  ///< largest distance of a centre of mass from the reference's at the end
+                       ///< [m]; NaN when one of them did not get there
+  /// "truncation", "round-off", or "" where that cannot be said.
+  std::string error_ruled_by, drift_ruled_by;
+};
+
+struct Ladder {
+  Outcome start = Outcome::kFinished;  ///< otherwise nothing was run
+  std::string message;
+  std::vector<Rung> rungs;  ///< by scalar, then by tolerance, in the order of the task
+  /// In float128 by Gragg's method. Its error is the distance from another reference with a
+  /// tolerance 10^4 times as large, its drift that of its own coordinates.
+  Rung reference;
+};
+
+/// Mismatches and distances are measured in float128 on the mechanism as described, whatever the
+/// run's scalar; all runs start from one point that closes the loops in float128, rounded to their
+/// scalar.
+Ladder RunLadder(const LadderTask& task);
+
+/// Which part rules a number (error or drift) that is `own` in one scalar and `wider` in the next
+/// wider one at the same tolerance: round-off when the two differ by more than a factor of two (by
+/// chance it may cancel truncation too), else truncation; "" when one is NaN. For the widest scalar
+/// of a ladder the next narrower one bounds the round-off instead: truncation rules where the own
+/// number is more than ten times the other's scaled by the ratio of their eps.
+std::string_view RuledBy(double own, double wider);
+
+}  // namespace loopbench::harness

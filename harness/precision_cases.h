@@ -1,0 +1,32 @@
+// The precision ladders of an experiment (harness/precision/ladder.h): one per scene and column.
+#pragma once
+
+#include <vector>
+
+#include "harness/precision/ladder.h"
+#include "harness/record.h"
+
+namespace loopbench::harness {
+
+/// A ladder and the keys of its records: those of the reference, then of every rung in the order of
+/// Ladder::rungs (kind "precision", with case_id).
+struct LadderGroup {
+  LadderTask task;
+  std::vector<Record> keys;
+};
+
+/// Groups without a rung that passes the filter are left out. Throws ConfigError for a scene that
+/// the ladder cannot run: one that is not planar once it is compiled, or with tables of time.
+std::vector<LadderGroup> LadderGroups(const Experiment& experiment, const Selection& filter = {});
+
+/// Number of records of all groups.
+std::size_t CountRungs(const Experiment& experiment);
+
+/// Throws ConfigError when the experiment has ladders and this program cannot run them: as above,
+/// or when it was built without their scalars (LOOPBENCH_PRECISIONS).
+void RequireLadders(const Experiment& experiment);
+
+/// One record per key, in order.
+std::vector<Record> ClimbTogether(const LadderGroup& group);
+
+}  // namespace loopbench::harness

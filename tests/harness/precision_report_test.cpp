@@ -1,0 +1,79 @@
+// Order, notes and figures of runs in several scalars.
+#include "harness/report/precision_report.h"
+
+#include <gtest/gtest.h>
+
+#include <cmath>
+#include <string>
+#include <vector>
+
+#include "harness/report/table_view.h"
+
+namespace loopbench::harness {
+namespace {
+
+Record Rung(const std::string& scalar, double rtol, const std::string& outcome = "finished") {
+  Record record;
+  record.Set("kind", std::string("precision"));
+  record.Set("mechanism", std::string("four-bar"));
+  record.Set("formulation", std::string("odca"));
+  record.Set("enforcement", std::string("velocity"));
+  record.Set("coordinates", std::string("joint"));
+  record.Set("solver", std::string("rank-revealing"));
+  record.Set("integrator", std::string("ode45"));
+  record.Set("rtol", rtol);
+  record.Set("horizon", 5.0);
+  record.Set("scalar", scalar);
+  record.Set("outcome", outcome);
+  record.Set("error_final", 10 * rtol);
+  record.Set("drift_position_max", rtol);
+  return record;
+}
+
+std::vector<Record> Ladder() {
+  Record reference = Rung("float128", 1e-25);
+  reference.Set("integrator", std::string("gragg"));
+  return {reference,
+          Rung("float", 1e-4),
+          Rung("float", 1e-8, "step-too-small"),
+          Rung("float128", 1e-4),
+          Rung("float128", 1e-8),
+          Rung("double", 1e-4),
+          Rung("double", 1e-8)};
+}
+
+TEST(PrecisionReportTest, ScalarsStandSideBySideAndTheReferenceLast) {
+  const Table table = MakeTable(Ladder(), {.kind = "precision"});
+  std::vector<std::string> order;
+  for (const Record& row : table.rows) order.push_back(row.Text("scalar") + row.Text("rtol"));
+  EXPECT_EQ(order,
+            (std::vector<std::string>{"float0.0001", "double0.0001", "float1280.0001", "float1e-08",
+                                      "double1e-08", "float1281e-08", "float1281e-25"}));
+  EXPECT_FALSE(table.notes.empty());
+}
+
+TEST(PrecisionReportTest, StoresWithoutAccuracyShowTheirLadders) {
+  EXPECT_EQ(MakeTable(Ladder(), {}).title, "Precision");
+  EXPECT_TRUE(MakeTable(Ladder(), {.kind = "drift"}).rows.empty());
+}
+
+TEST(PrecisionReportTest, OneFigurePerLadderWithErrorAndDriftOfEachScalar) {
+  const std::vector<NamedFigure> figures = PrecisionFigures(Ladder());
+  ASSERT_EQ(figures.size(), 1u);
+  EXPECT_EQ(figures[0].name, "precision-four-bar-odca-velocity-joint-rank-revealing");
+  const Figure& figure = figures[0].figure;
+  ASSERT_EQ(figure.curves.size(), 6u);
+  EXPECT_EQ(figure.curves[0].label, "error, float");
+  EXPECT_EQ(figure.curves[1].label, "drift, float");
+  EXPECT_EQ(figure.curves[4].label, "error, float128");
+  // the reference is no point; a run that failed is a cross without a height
+  EXPECT_EQ(figure.curves[4].x, (std::vector<double>{1e-4, 1e-8}));
+  EXPECT_EQ(figure.curves[0].x, (std::vector<double>{1e-4}));
+  ASSERT_EQ(figure.curves[0].crosses.size(), 1u);
+  EXPECT_EQ(figure.curves[0].crosses[0].first, 1e-8);
+  EXPECT_TRUE(std::isnan(figure.curves[0].crosses[0].second));
+  EXPECT_TRUE(PrecisionFigures({}).empty());
+}
+
+}  // namespace
+}  // namespace loopbench::harness

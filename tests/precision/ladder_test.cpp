@@ -1,0 +1,155 @@
+// Mechanisms in every scalar: closed forms, levels, and which part of an error rules.
+#include "harness/precision/ladder.h"
+
+#include <gtest/gtest.h>
+
+#include <boost/math/special_functions/ellint_1.hpp>
+#include <boost/math/special_functions/jacobi_elliptic.hpp>
+#include <cmath>
+#include <limits>
+
+#include "harness/config/mechanism_reader.h"
+#include "harness/precision/exact.h"
+#include "harness/precision/integrator.h"
+#include "lagrange/lagrange.h"
+#include "odca/odca.h"
+#include "reduction/reduction.h"
+
+namespace loopbench::harness {
+namespace {
+
+MechanismDescription Shipped(const std::string& name) {
+  return ReadMechanism(std::string(LOOPBENCH_SOURCE_DIR) + "/configs/mechanisms/" + name + ".json")
+      .description;
+}
+
+/// The angle at t of a pendulum theta'' = -w^2 sin(theta) that starts at rest at theta0
+/// (harness/observers/pendulum.cpp): sin(theta / 2) = k sn(w t + K(k), k), k = sin(theta0 / 2).
+Float128 PendulumAngle(const Float128& w, const Float128& theta0, const Float128& t) {
+  const Float128 k = sin(theta0 / 2);
+  const Float128 quarter = boost::math::ellint_1(k);
+  return 2 * asin(k * boost::math::jacobi_sn(k, Float128(w * t + quarter)));
+}
+
+/// The cranks of the parallelogram move as a pendulum with w^2 = 2 g / 3.5: between two bars of
+/// I + m L^2 / 4 = 1.25 and the coupler, whose mass moves with their tips, 3.5 kg m^2 in all.
+TEST(ClosedFormTest, ParallelogramFollowsItsPendulumInFloat128) {
+  const MechanismDescription description = Shipped("parallelogram");
+  Exact exact(description, Coordinates::kJoint);
+  ASSERT_EQ(exact.outcome(), Outcome::kFinished) << exact.message();
+  // loops close to a few roundings of lengths of a metre
+  const Float128 eps = std::numeric_limits<Float128>::epsilon();
+  EXPECT_LE(exact.Drift(exact.q()), 16 * eps);
+  const Mechanism<Planar, Float128> mechanism(description, Coordinates::kJoint);
+  odca::Odca<Planar, Float128> odca(mechanism, {});
+  ASSERT_EQ(odca.Start(Float128(0), exact.q(), exact.u()), Outcome::kFinished);
+  std::vector<Float128> y(odca.state_size());
+  odca.ToState(exact.q(), exact.u(), y);
+  const System<Float128> system{
+      odca.state_size(),
+      [&](const Float128& t, std::span<const Float128> state, std::span<Float128> rates) {
+        return odca.Derivative(t, state, rates);
+      },
+      [&](const Float128& t, std::span<Float128> state) { return odca.BeginStep(t, state); }};
+  const Float128 pi = std::numbers::pi_v<Float128>, end = Float128(1) / 4;
+  const OneStepResult result = IntegrateSystem<Float128>(
+      system, end, y, {.method = OneStepMethod::kGragg, .tolerance = Float128(1e-29)});
+  ASSERT_EQ(result.outcome, Outcome::kFinished);
+  const Float128 w = sqrt(2 * Float128(9.81) / (Float128(7) / 2));
+  const Float128 theta = y[0] + pi / 2;
+  const Float128 miss = theta - PendulumAngle(w, exact.q()[0] + pi / 2, end);
+  EXPECT_LE(std::abs(static_cast<double>(miss)), 1e-27) << result.steps;
+}
+
+LadderTask Task(const std::string& mechanism, FormulationKind formulation,
+                Enforcement enforcement) {
+  LadderTask task;
+  task.description = Shipped(mechanism);
+  task.column = {.formulation = formulation, .enforcement = enforcement};
+  task.horizon = 1.0;
+  task.precision.scalars = {Scalar::kFloat, Scalar::kDouble, Scalar::kLongDouble,
+                            Scalar::kFloat128};
+  task.precision.tolerances = {1e-4, 1e-15};
+  return task;
+}
+
+const Rung& At(const Ladder& ladder, Scalar scalar, double tolerance) {
+  for (const Rung& rung : ladder.rungs) {
+    if (rung.scalar == scalar && rung.tolerance == tolerance) return rung;
+  }
+  throw std::invalid_argument("no such rung");
+}
+
+class LadderTest : public ::testing::TestWithParam<std::pair<FormulationKind, Enforcement>> {};
+
+/// At 1e-4 truncation is the same in all scalars but float's; float ends at 1e-15.
+TEST_P(LadderTest, WideScalarsShareTheirTruncation) {
+  const auto [formulation, enforcement] = GetParam();
+  const Ladder ladder = RunLadder(Task("four-bar", formulation, enforcement));
+  ASSERT_EQ(ladder.start, Outcome::kFinished) << ladder.message;
+  ASSERT_EQ(ladder.rungs.size(), 8u);
+  EXPECT_EQ(ladder.reference.outcome, Outcome::kFinished);
+  // two references 10^4 apart in tolerance: far below the finest rung
+  EXPECT_LE(ladder.reference.error, 1e-18);
+  EXPECT_LE(ladder.reference.drift, 1e-18);
+  const Rung& wide = At(ladder, Scalar::kFloat128, 1e-4);
+  EXPECT_GT(wide.error, 1e-8) << "an error that says something";
+  for (const Scalar scalar : {Scalar::kDouble, Scalar::kLongDouble}) {
+    const Rung& rung = At(ladder, scalar, 1e-4);
+    EXPECT_EQ(rung.steps, wide.steps);
+    EXPECT_NEAR(rung.error, wide.error, 1e-6 * wide.error);
+    EXPECT_EQ(rung.error_ruled_by, "truncation");
+  }
+  EXPECT_EQ(wide.error_ruled_by, "truncation");
+  const Rung& lost = At(ladder, Scalar::kFloat, 1e-15);
+  EXPECT_EQ(lost.outcome, Outcome::kStepTooSmall);
+  EXPECT_TRUE(std::isnan(lost.error));
+  EXPECT_EQ(lost.error_ruled_by, "");
+}
+
+/// In joint coordinates the closure of a parallelogram is linear, and no Runge-Kutta method makes
+/// drift of it: all of it is round-off, and shrinks with the scalar's eps.
+TEST_P(LadderTest, DriftOfAParallelogramIsRoundOff) {
+  const auto [formulation, enforcement] = GetParam();
+  LadderTask task = Task("parallelogram", formulation, enforcement);
+  task.precision.tolerances = {1e-4};
+  const Ladder ladder = RunLadder(task);
+  ASSERT_EQ(ladder.start, Outcome::kFinished) << ladder.message;
+  double last = 1.0;
+  for (const Scalar scalar :
+       {Scalar::kFloat, Scalar::kDouble, Scalar::kLongDouble, Scalar::kFloat128}) {
+    const Rung& rung = At(ladder, scalar, 1e-4);
+    ASSERT_EQ(rung.outcome, Outcome::kFinished);
+    // widening by a scalar takes at least 2^11 of its eps away; a walk of round-off varies by ten
+    EXPECT_LE(rung.drift, last / 100) << ToString(scalar);
+    last = rung.drift;
+    if (scalar != Scalar::kFloat128) {
+      EXPECT_EQ(rung.drift_ruled_by, "round-off");
+    }
+  }
+}
+
+std::string NameOf(const ::testing::TestParamInfo<LadderTest::ParamType>& info) {
+  return std::string(ToString(info.param.first)) + "_" + std::string(ToString(info.param.second));
+}
+INSTANTIATE_TEST_SUITE_P(
+    Columns, LadderTest,
+    ::testing::Values(std::pair{FormulationKind::kOdca, Enforcement::kAcceleration},
+                      std::pair{FormulationKind::kOdca, Enforcement::kPosition},
+                      std::pair{FormulationKind::kLagrange, Enforcement::kVelocity},
+                      std::pair{FormulationKind::kReduction, Enforcement::kVelocity},
+                      std::pair{FormulationKind::kReduction, Enforcement::kPosition}),
+    NameOf);
+
+TEST(RuledByTest, RoundOffIsWhatAWiderScalarTakesAway) {
+  EXPECT_EQ(RuledBy(1e-6, 1e-6), "truncation");
+  EXPECT_EQ(RuledBy(1.9e-6, 1e-6), "truncation");
+  EXPECT_EQ(RuledBy(2.1e-6, 1e-6), "round-off");
+  EXPECT_EQ(RuledBy(1e-6, 1e-12), "round-off");
+  EXPECT_EQ(RuledBy(4e-7, 1e-6), "round-off") << "some of the truncation cancelled";
+  EXPECT_EQ(RuledBy(std::numeric_limits<double>::quiet_NaN(), 1e-6), "");
+  EXPECT_EQ(RuledBy(1e-6, std::numeric_limits<double>::quiet_NaN()), "");
+}
+
+}  // namespace
+}  // namespace loopbench::harness

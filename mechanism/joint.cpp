@@ -332,18 +332,20 @@ struct SpatialKinds {
             .coordinates =
                 [](const P& X, S* q, S pitch) {
                   // the shift along the axis says in which turn the angle is
+                  using std::round;
                   const S turn = 2 * std::numbers::pi_v<S>;
                   q[0] = AngleAboutZ(X);
-                  if (pitch != S(0)) q[0] += turn * std::round((X.p[2] / pitch - q[0]) / turn);
+                  if (pitch != S(0)) q[0] += turn * round((X.p[2] / pitch - q[0]) / turn);
                 },
             .rates = SameRates<S, 1>,
             .basis =
                 [](const P&, Block<Spatial, S>& basis_F, S pitch) {
+                  using std::sqrt;
                   basis_F.setZero();
                   basis_F(2, 0) = S(1);
                   basis_F(5, 0) = pitch;
                   for (int i = 0; i < 2; ++i) basis_F(i, 1 + i) = basis_F(3 + i, 3 + i) = S(1);
-                  const S length = std::sqrt(1 + pitch * pitch);
+                  const S length = sqrt(S(1) + pitch * pitch);
                   basis_F(2, 5) = -pitch / length;
                   basis_F(5, 5) = S(1) / length;
                 }};
@@ -395,7 +397,8 @@ Motion<Space, S> Mismatch(const JointKind<Space, S>& kind, const Pose<Space, S>&
   mismatch << RotationVector(rest), X_FM.p - nearest.p;
   // A loop may wind: planar angles along it then differ by whole turns that are no mismatch.
   if constexpr (Space::kRot == 1) {
-    mismatch[0] = std::remainder(mismatch[0], 2 * std::numbers::pi_v<S>);
+    using std::remainder;
+    mismatch[0] = remainder(mismatch[0], S(2 * std::numbers::pi_v<S>));
   }
   return mismatch;
 }
@@ -404,7 +407,7 @@ Motion<Space, S> Mismatch(const JointKind<Space, S>& kind, const Pose<Space, S>&
   template const JointKind<Space, S>& KindOf(JointType); \
   template JointKind<Space, S> KindWith(JointType, S);   \
   template Motion<Space, S> Mismatch(const JointKind<Space, S>&, const Pose<Space, S>&);
-LOOPBENCH_FOR_EACH_SPACE_AND_SCALAR(LOOPBENCH_INSTANTIATE)
+LOOPBENCH_FOR_EACH_SPACE_AND_MODEL_SCALAR(LOOPBENCH_INSTANTIATE)
 #undef LOOPBENCH_INSTANTIATE
 
 }  // namespace loopbench

@@ -266,7 +266,8 @@ Motion<Space, S> Kinematics<Space, S>::ConstraintMismatch(int index) const {
     S miss = q[coordinate] - drives_[drive].value;
     // an angle is measured modulo a turn, and which one a helix tells by its shift
     const bool angle = joint.kind->axes[coordinate] < Space::kRot && joint.kind->parameter == S(0);
-    if (angle) miss = std::remainder(miss, 2 * std::numbers::pi_v<S>);
+    using std::remainder;
+    if (angle) miss = remainder(miss, S(2 * std::numbers::pi_v<S>));
     mismatch += joints_[index].D(k) * miss;
   }
   return mismatch;
@@ -295,8 +296,9 @@ S Kinematics<Space, S>::JointCoordinate(int index) const {
   if (joint.kind->parameter != S(0)) return q;  // a helix tells its turns
   // Space measures an angle modulo a turn; take the one next to the last accepted.
   if (Space::kRot == 3 && joint.kind->axes[0] < 3) {
+    using std::remainder;
     const S turn = 2 * std::numbers::pi_v<S>;
-    q = accepted_[index] + std::remainder(q - accepted_[index], turn);
+    q = accepted_[index] + remainder(q - accepted_[index], turn);
   }
   return q;
 }
@@ -352,7 +354,7 @@ VectorX<S> Kinematics<Space, S>::SpeedsIn(const Kinematics& other) const {
 }
 
 #define LOOPBENCH_INSTANTIATE(Space, S) template class Kinematics<Space, S>;
-LOOPBENCH_FOR_EACH_SPACE_AND_SCALAR(LOOPBENCH_INSTANTIATE)
+LOOPBENCH_FOR_EACH_SPACE_AND_MODEL_SCALAR(LOOPBENCH_INSTANTIATE)
 #undef LOOPBENCH_INSTANTIATE
 
 }  // namespace loopbench

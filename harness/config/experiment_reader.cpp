@@ -17,7 +17,7 @@ Experiment ReadOne(const JsonNode& root, MechanismFiles& files) {
     return experiment;
   }
   if (!root.ExpectObject({"name", "comment", "scenes", "columns", "tolerances", "integrator",
-                          "ensembles", "limits", "compile", "series", "timing", "sweep",
+                          "jacobian", "ensembles", "limits", "compile", "series", "timing", "sweep",
                           "exclude"})) {
     return experiment;
   }

@@ -1,4 +1,4 @@
-// "integrator", "limits", "compile", "series" and "timing" of an experiment file.
+// "integrator", "jacobian", "limits", "compile", "series" and "timing" of an experiment file.
 #include "harness/config/experiment_sections.h"
 #include "harness/integrator/options.h"
 
@@ -77,6 +77,12 @@ void ReadSettings(const JsonNode& root, Experiment* experiment) {
     const std::vector<std::string> profiles = ProfileNames();
     const auto index = name->Choice(profiles, "an integrator profile");
     if (index) experiment->integrator = profiles[static_cast<std::size_t>(*index)];
+  }
+  if (const auto kind = root.Optional("jacobian")) {
+    const auto& names = kNames<JacobianKind>;
+    const auto index = kind->Choice(std::vector<std::string>(names.begin(), names.end()),
+                                    "where Jacobians come from");
+    if (index) experiment->jacobian = static_cast<JacobianKind>(*index);
   }
   ReadLimits(root, &experiment->limits);
   ReadCompile(root, &experiment->compile);

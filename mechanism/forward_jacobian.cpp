@@ -12,11 +12,11 @@ ForwardJacobian<Space>::ForwardJacobian(const MechanismDescription& description,
       kinematics_(mechanism_),
       dynamics_(mechanism_),
       drives_(mechanism_),
-      q_(VectorX<Forward>::Zero(mechanism_.num_q())),
-      u_(VectorX<Forward>::Zero(mechanism_.num_u())),
+      q_(VectorX<Dual>::Zero(mechanism_.num_q())),
+      u_(VectorX<Dual>::Zero(mechanism_.num_u())),
       qdot_(q_),
       udot_(u_),
-      lambda_(VectorX<Forward>::Zero(mechanism_.num_rows())),
+      lambda_(VectorX<Dual>::Zero(mechanism_.num_rows())),
       force_left_(u_),
       constraint_left_(lambda_),
       lambda_now_(VectorX<double>::Zero(mechanism_.num_rows())),
@@ -27,7 +27,7 @@ ForwardJacobian<Space>::ForwardJacobian(const MechanismDescription& description,
 
 template <class Space>
 int ForwardJacobian<Space>::evaluations() const {
-  return (formulation_.state_size() + kWidth - 1) / kWidth;
+  return (formulation_.state_size() + Dual::kWidth - 1) / Dual::kWidth;
 }
 
 template <class Space>
@@ -36,8 +36,8 @@ void ForwardJacobian<Space>::Evaluate(Eigen::Ref<MatrixX<double>> jacobian) {
   kinematics_.ResumeFrom(formulation_.kinematics().accepted());
   if (mechanism_.num_u() > 0) formulation_.Multipliers(lambda_now_);
   const int size = formulation_.state_size();
-  for (int first = 0; first < size; first += kWidth) {
-    const int count = std::min(kWidth, size - first);
+  for (int first = 0; first < size; first += Dual::kWidth) {
+    const int count = std::min(Dual::kWidth, size - first);
     Seed(first, count);
     kinematics_.UpdatePosition(q_);
     kinematics_.UpdateVelocity(u_);
@@ -49,11 +49,11 @@ void ForwardJacobian<Space>::Evaluate(Eigen::Ref<MatrixX<double>> jacobian) {
 
 template <class Space>
 void ForwardJacobian<Space>::Seed(int first, int count) {
-  q_ = formulation_.q().template cast<Forward>();
-  u_ = formulation_.u().template cast<Forward>();
+  q_ = formulation_.q().template cast<Dual>();
+  u_ = formulation_.u().template cast<Dual>();
   for (int k = 0; k < count; ++k) {
     const int i = first + k - mechanism_.num_q();
-    (i < 0 ? q_[first + k] : u_[formulation_.state_speed(i)]).partials[k] = 1.0;
+    (i < 0 ? q_[first + k] : u_[formulation_.state_speed(i)]).SetPartial(k, 1.0);
   }
 }
 
@@ -65,24 +65,24 @@ void ForwardJacobian<Space>::ProjectSpeeds(int count) {
     constraint_left_.segment(row, rows) = kinematics_.ConstraintSpeed(index).head(rows);
   }
   for (int k = 0; k < count && mechanism_.num_u() > 0; ++k) {
-    for (int r = 0; r < target_.size(); ++r) target_[r] = constraint_left_[r].partials[k];
+    for (int r = 0; r < target_.size(); ++r) target_[r] = constraint_left_[r].partial(k);
     formulation_.Correct(target_, x_);
-    for (int i = 0; i < x_.size(); ++i) u_[i].partials[k] += x_[i];
+    for (int i = 0; i < x_.size(); ++i) u_[i].SetPartial(k, u_[i].partial(k) + x_[i]);
   }
   kinematics_.UpdateVelocity(u_);
 }
 
 template <class Space>
 void ForwardJacobian<Space>::Accelerate(int count) {
-  udot_ = formulation_.udot().template cast<Forward>();
-  lambda_ = lambda_now_.template cast<Forward>();
+  udot_ = formulation_.udot().template cast<Dual>();
+  lambda_ = lambda_now_.template cast<Dual>();
   dynamics_.Residual(kinematics_, udot_, lambda_, force_left_, constraint_left_);
   for (int k = 0; k < count; ++k) {
-    for (int i = 0; i < force_.size(); ++i) force_[i] = -force_left_[i].partials[k];
-    for (int r = 0; r < target_.size(); ++r) target_[r] = -constraint_left_[r].partials[k];
+    for (int i = 0; i < force_.size(); ++i) force_[i] = -force_left_[i].partial(k);
+    for (int r = 0; r < target_.size(); ++r) target_[r] = -constraint_left_[r].partial(k);
     formulation_.SolveConstrained(force_, target_, x_, lambda_x_);
-    for (int i = 0; i < x_.size(); ++i) udot_[i].partials[k] = x_[i];
-    for (int r = 0; r < lambda_x_.size(); ++r) lambda_[r].partials[k] = lambda_x_[r];
+    for (int i = 0; i < x_.size(); ++i) udot_[i].SetPartial(k, x_[i]);
+    for (int r = 0; r < lambda_x_.size(); ++r) lambda_[r].SetPartial(k, lambda_x_[r]);
   }
 }
 
@@ -91,15 +91,15 @@ void ForwardJacobian<Space>::Write(int first, int count, Eigen::Ref<MatrixX<doub
   const int num_q = mechanism_.num_q(), size = formulation_.state_size();
   mechanism_.Rates(q_, u_, qdot_);
   for (int i = 0; i < size; ++i) {
-    const Forward& rate = i < num_q ? qdot_[i] : udot_[formulation_.state_speed(i - num_q)];
-    for (int k = 0; k < count; ++k) jacobian(i, first + k) = rate.partials[k];
+    const Dual& rate = i < num_q ? qdot_[i] : udot_[formulation_.state_speed(i - num_q)];
+    for (int k = 0; k < count; ++k) jacobian(i, first + k) = rate.partial(k);
   }
   if (jacobian.rows() == size) return;
-  Power<Forward> power = AppliedPower(kinematics_);
+  Power<Dual> power = AppliedPower(kinematics_);
   if (!mechanism_.drives().empty()) power.supplied += drives_.Power(kinematics_, udot_, lambda_);
   for (int k = 0; k < count; ++k) {
-    jacobian(size, first + k) = power.supplied.partials[k];
-    jacobian(size + 1, first + k) = power.dissipated.partials[k];
+    jacobian(size, first + k) = power.supplied.partial(k);
+    jacobian(size + 1, first + k) = power.dissipated.partial(k);
   }
 }
 

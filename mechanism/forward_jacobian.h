@@ -40,8 +40,6 @@ class ForwardJacobian {
   int evaluations() const;
 
  private:
-  static constexpr int kWidth = static_cast<int>(std::tuple_size_v<decltype(Forward::partials)>);
-
   /// Directions `first` to first + count of the state, in q_ and u_.
   void Seed(int first, int count);
   void ProjectSpeeds(int count);
@@ -49,11 +47,11 @@ class ForwardJacobian {
   void Write(int first, int count, Eigen::Ref<MatrixX<double>> jacobian);
 
   Formulation<Space, double>& formulation_;
-  Mechanism<Space, Forward> mechanism_;
-  Kinematics<Space, Forward> kinematics_;
-  TreeDynamics<Space, Forward> dynamics_;
-  Drives<Space, Forward> drives_;
-  VectorX<Forward> q_, u_, qdot_, udot_, lambda_, force_left_, constraint_left_;
+  Mechanism<Space, Dual> mechanism_;
+  Kinematics<Space, Dual> kinematics_;
+  TreeDynamics<Space, Dual> dynamics_;
+  Drives<Space, Dual> drives_;
+  VectorX<Dual> q_, u_, qdot_, udot_, lambda_, force_left_, constraint_left_;
   VectorX<double> lambda_now_, force_, target_, x_, lambda_x_;
 };
 

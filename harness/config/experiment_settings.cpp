@@ -80,8 +80,8 @@ void ReadSettings(const JsonNode& root, Experiment* experiment) {
   }
   if (const auto kind = root.Optional("jacobian")) {
     const auto& names = kNames<JacobianKind>;
-    const auto index = kind->Choice(std::vector<std::string>(names.begin(), names.end()),
-                                    "where Jacobians come from");
+    const auto index =
+        kind->Choice(std::vector<std::string>(names.begin(), names.end()), "a kind of Jacobian");
     if (index) experiment->jacobian = static_cast<JacobianKind>(*index);
   }
   ReadLimits(root, &experiment->limits);

@@ -95,6 +95,7 @@ class Runner {
     if (FindProfile(case_.integrator)->is_implicit) {
       run.record.Set("newton_jacobians", result.jacobians);
       run.record.Set("newton_rhs_evaluations", result.jacobian_rhs_evaluations);
+      run.record.Set("newton_dual_evaluations", result.dual_evaluations);
       run.record.Set("newton_iterations", result.newton_iterations);
       run.record.Set("newton_failures", result.newton_failures);
     }
@@ -109,7 +110,9 @@ class Runner {
     IntegratorResult result;
     result.outcome = formulation->Start(0.0, start.q, start.u);
     if (result.outcome != Outcome::kFinished) return result;
-    FormulationOde<Space> ode(*formulation, mechanism_.has_power());
+    FormulationOde<Space> ode(
+        *formulation, mechanism_.has_power(),
+        MakeJacobian(case_.integrator, case_.jacobian, description_, *formulation));
     const std::size_t n = static_cast<std::size_t>(formulation->state_size());
     y_.assign(static_cast<std::size_t>(ode.size()), 0.0);
     formulation->ToState(start.q, start.u, y_);

@@ -115,25 +115,25 @@ Outcome Lagrange<Space, S>::FactorResponse() {
 
 template <class Space, class S>
 void Lagrange<Space, S>::SolveConstrained(const VectorX<S>& force, const VectorX<S>& target,
-                                          VectorX<S>& x) {
+                                          VectorX<S>& x, VectorX<S>& lambda) {
   const int n = mechanism_.num_u(), m = mechanism_.num_rows();
   if (Base::options_.solver == SolverKind::kAsPublished) {
     rhs_.head(n) = force;
     rhs_.tail(m) = target;
     solution_ = lu_.solve(rhs_);
     x = solution_.head(n);
-    lambda_ = -solution_.tail(m);
+    lambda = -solution_.tail(m);
     return;
   }
   // x = M^-1 (force + J^T lambda) with S lambda = target - J M^-1 force
   x = force;
   mass_factor_.matrixL().solveInPlace(x);
   if (m > 0) {
-    lambda_ = target;
-    lambda_.noalias() -= W_.transpose() * x;
-    loop_.Apply(lambda_);
-    loop_.ApplyTransposed(lambda_);
-    x.noalias() += W_ * lambda_;
+    lambda = target;
+    lambda.noalias() -= W_.transpose() * x;
+    loop_.Apply(lambda);
+    loop_.ApplyTransposed(lambda);
+    x.noalias() += W_ * lambda;
   }
   mass_factor_.matrixU().solveInPlace(x);
 }
@@ -145,7 +145,7 @@ Outcome Lagrange<Space, S>::CompleteSpeeds() {
   SpeedBias(kinematics_, force_, bias_);
   target_ = -bias_;
   target_.noalias() -= J_ * u_;
-  SolveConstrained(force_, target_, change_);
+  SolveConstrained(force_, target_, change_, lambda_);
   u_ += change_;
   return u_.allFinite() ? Outcome::kFinished : Outcome::kNonFinite;
 }
@@ -155,7 +155,7 @@ Outcome Lagrange<Space, S>::Correct(const VectorX<S>& violation, VectorX<S>& cha
   if (const Outcome outcome = FactorOnce(); outcome != Outcome::kFinished) return outcome;
   force_.setZero();
   target_ = -violation;
-  SolveConstrained(force_, target_, change);
+  SolveConstrained(force_, target_, change, lambda_);
   return change.allFinite() ? Outcome::kFinished : Outcome::kNonFinite;
 }
 
@@ -166,7 +166,7 @@ Outcome Lagrange<Space, S>::Accelerations() {
   dynamics_.JacobianBias(kinematics_, gamma_);
   if (Base::feedback().size() > 0) gamma_ -= Base::feedback();
   force_ = -h_;
-  SolveConstrained(force_, gamma_, udot_);
+  SolveConstrained(force_, gamma_, udot_, lambda_);
   return udot_.allFinite() ? Outcome::kFinished : Outcome::kNonFinite;
 }
 

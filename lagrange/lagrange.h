@@ -38,8 +38,8 @@ class Lagrange final : public Formulation<Space, S> {
   /// W = L^-1 J^T and S = W^T W for the given inertias; leaves the factor of M in mass_factor_.
   void FormResponse(const std::vector<Inertia<Space, S>>& inertias);
   void SetScales(const std::vector<Inertia<Space, S>>& inertias);
-  /// Solves M x - J^T lambda = force, J x = target for x and lambda_.
-  void SolveConstrained(const VectorX<S>& force, const VectorX<S>& target, VectorX<S>& x);
+  void SolveConstrained(const VectorX<S>& force, const VectorX<S>& target, VectorX<S>& x,
+                        VectorX<S>& lambda) override;
 
   using Base = Formulation<Space, S>;
   using Base::diagnostics_;

@@ -94,7 +94,7 @@ S Drives<Space, S>::Power(const Kinematics<Space, S>& kinematics, const VectorX<
 }
 
 #define LOOPBENCH_INSTANTIATE(Space, S) template class Drives<Space, S>;
-LOOPBENCH_FOR_EACH_SPACE_AND_SCALAR(LOOPBENCH_INSTANTIATE)
+LOOPBENCH_FOR_EACH_SPACE_AND_MODEL_SCALAR(LOOPBENCH_INSTANTIATE)
 #undef LOOPBENCH_INSTANTIATE
 
 }  // namespace loopbench

@@ -88,7 +88,7 @@ ForceElements<Space, S> CompileForces(const MechanismDescription& description) {
 #define LOOPBENCH_INSTANTIATE(Space, S)    \
   template struct ForceElements<Space, S>; \
   template ForceElements<Space, S> CompileForces(const MechanismDescription&);
-LOOPBENCH_FOR_EACH_SPACE_AND_SCALAR(LOOPBENCH_INSTANTIATE)
+LOOPBENCH_FOR_EACH_SPACE_AND_MODEL_SCALAR(LOOPBENCH_INSTANTIATE)
 #undef LOOPBENCH_INSTANTIATE
 
 }  // namespace loopbench

@@ -186,7 +186,7 @@ Power<S> AppliedPower(const Kinematics<Space, S>& kinematics) {
   template void AppliedForces(const Kinematics<Space, S>&, std::span<Motion<Space, S>>); \
   template Energy<S> ComputeEnergy(const Kinematics<Space, S>&);                         \
   template Power<S> AppliedPower(const Kinematics<Space, S>&);
-LOOPBENCH_FOR_EACH_SPACE_AND_SCALAR(LOOPBENCH_INSTANTIATE)
+LOOPBENCH_FOR_EACH_SPACE_AND_MODEL_SCALAR(LOOPBENCH_INSTANTIATE)
 #undef LOOPBENCH_INSTANTIATE
 
 }  // namespace loopbench

@@ -75,6 +75,9 @@ struct Correction {
   int iterations = 0;  ///< Newton steps, each with an assembly of its own
 };
 
+template <class Space>
+class ForwardJacobian;
+
 template <class Space, class S>
 class Formulation {
  public:
@@ -113,6 +116,9 @@ class Formulation {
   /// Power [W] that prescribed motions supply, after a successful evaluation. O(n); 0 without them.
   S DrivePower();
 
+  /// Gains in use (kBaumgarte), zero at other levels.
+  const BaumgarteGains& gains() const { return gains_; }
+
   /// Largest mismatch of points [m] and of rotations [rad] that the last projection found and took
   /// away; 0 at other levels.
   const Correction<S>& correction() const { return correction_; }
@@ -137,6 +143,10 @@ class Formulation {
   virtual Outcome Accelerations() = 0;
   /// Multipliers of all constraint rows after Accelerations(): D lambda is the force on Q.
   virtual void Multipliers(VectorX<S>& lambda) = 0;
+  /// Solves M x - J^T lambda = force, J x = target as Accelerations() does for -h and gamma, with
+  /// what it factored last. Multipliers() and diagnostics are void until the next evaluation.
+  virtual void SolveConstrained(const VectorX<S>& force, const VectorX<S>& target, VectorX<S>& x,
+                                VectorX<S>& lambda) = 0;
   /// Chance to change the mode at an accepted state.
   virtual bool ChangeMode() { return false; }
 
@@ -153,6 +163,8 @@ class Formulation {
   Diagnostics diagnostics_;
 
  private:
+  friend class ForwardJacobian<Space>;
+
   /// Newton's method on the mismatch of positions, then one step on that of speeds.
   Outcome Project();
   /// D^T mismatch of all constraints in violation_, its largest parts in `largest`.

@@ -56,7 +56,7 @@ Motion<Space, S> Mismatch(const JointKind<Space, S>& kind, const Pose<Space, S>&
   template const JointKind<Space, S>& KindOf(JointType); \
   template JointKind<Space, S> KindWith(JointType, S);   \
   template Motion<Space, S> Mismatch(const JointKind<Space, S>&, const Pose<Space, S>&);
-LOOPBENCH_FOR_EACH_SPACE_AND_SCALAR(LOOPBENCH_INSTANTIATE)
+LOOPBENCH_FOR_EACH_SPACE_AND_MODEL_SCALAR(LOOPBENCH_INSTANTIATE)
 #undef LOOPBENCH_INSTANTIATE
 
 }  // namespace loopbench

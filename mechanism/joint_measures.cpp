@@ -120,7 +120,7 @@ VectorX<S> Kinematics<Space, S>::SpeedsIn(const Kinematics& other) const {
   template void Kinematics<Space, S>::AcceptStep();                                          \
   template VectorX<S> Kinematics<Space, S>::CoordinatesIn(const Mechanism<Space, S>&) const; \
   template VectorX<S> Kinematics<Space, S>::SpeedsIn(const Kinematics&) const;
-LOOPBENCH_FOR_EACH_SPACE_AND_SCALAR(LOOPBENCH_INSTANTIATE)
+LOOPBENCH_FOR_EACH_SPACE_AND_MODEL_SCALAR(LOOPBENCH_INSTANTIATE)
 #undef LOOPBENCH_INSTANTIATE
 
 }  // namespace loopbench

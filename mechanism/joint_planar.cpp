@@ -103,7 +103,7 @@ std::vector<JointKind<Planar, S>> PlanarKinds() {
 }
 
 #define LOOPBENCH_INSTANTIATE(S) template std::vector<JointKind<Planar, S>> PlanarKinds();
-LOOPBENCH_FOR_EACH_SCALAR(LOOPBENCH_INSTANTIATE)
+LOOPBENCH_FOR_EACH_MODEL_SCALAR(LOOPBENCH_INSTANTIATE)
 #undef LOOPBENCH_INSTANTIATE
 
 }  // namespace loopbench

@@ -256,7 +256,7 @@ std::vector<JointKind<Spatial, S>> SpatialKinds() {
 }
 
 #define LOOPBENCH_INSTANTIATE(S) template std::vector<JointKind<Spatial, S>> SpatialKinds();
-LOOPBENCH_FOR_EACH_SCALAR(LOOPBENCH_INSTANTIATE)
+LOOPBENCH_FOR_EACH_MODEL_SCALAR(LOOPBENCH_INSTANTIATE)
 #undef LOOPBENCH_INSTANTIATE
 
 }  // namespace loopbench

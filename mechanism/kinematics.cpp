@@ -246,7 +246,7 @@ typename Inertia<Space, S>::Matrix Kinematics<Space, S>::RotationalInverse(
 }
 
 #define LOOPBENCH_INSTANTIATE(Space, S) template class Kinematics<Space, S>;
-LOOPBENCH_FOR_EACH_SPACE_AND_SCALAR(LOOPBENCH_INSTANTIATE)
+LOOPBENCH_FOR_EACH_SPACE_AND_MODEL_SCALAR(LOOPBENCH_INSTANTIATE)
 #undef LOOPBENCH_INSTANTIATE
 
 }  // namespace loopbench

@@ -234,7 +234,7 @@ void Mechanism<Space, S>::Rates(const VectorX<S>& q, const VectorX<S>& u,
 }
 
 #define LOOPBENCH_INSTANTIATE(Space, S) template class Mechanism<Space, S>;
-LOOPBENCH_FOR_EACH_SPACE_AND_SCALAR(LOOPBENCH_INSTANTIATE)
+LOOPBENCH_FOR_EACH_SPACE_AND_MODEL_SCALAR(LOOPBENCH_INSTANTIATE)
 #undef LOOPBENCH_INSTANTIATE
 
 }  // namespace loopbench

@@ -70,6 +70,7 @@ TimeValue<S> TimeFunction::At(S t) const {
 
 #define LOOPBENCH_INSTANTIATE(S) template TimeValue<S> TimeFunction::At(S t) const;
 LOOPBENCH_FOR_EACH_SCALAR(LOOPBENCH_INSTANTIATE)
+LOOPBENCH_INSTANTIATE(Dual)
 #undef LOOPBENCH_INSTANTIATE
 
 }  // namespace loopbench

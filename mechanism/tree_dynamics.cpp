@@ -113,21 +113,54 @@ Motion<Space, S> InertialForce(const Kinematics<Space, S>& kinematics, int body,
 
 template <class Space, class S>
 void TreeDynamics<Space, S>::Bias(const Kinematics<Space, S>& kinematics, VectorX<S>& h) {
-  const Mechanism<Space, S>& mechanism = kinematics.mechanism();
-  const auto& tree = mechanism.tree();
-  h.setZero(mechanism.num_u());
+  h.setZero(kinematics.mechanism().num_u());
   BodyAccelerations(kinematics, h, A_bias_);
+  NeededWrenches(kinematics);
+  AlongForest(kinematics, h);
+}
+
+template <class Space, class S>
+void TreeDynamics<Space, S>::Residual(const Kinematics<Space, S>& kinematics,
+                                      const VectorX<S>& udot, const VectorX<S>& lambda,
+                                      VectorX<S>& force, VectorX<S>& constraint) {
+  const Mechanism<Space, S>& mechanism = kinematics.mechanism();
+  BodyAccelerations(kinematics, udot, A_bias_);
+  NeededWrenches(kinematics);
+  for (int index : mechanism.constraints()) {
+    const Joint<Space, S>& joint = mechanism.joints()[index];
+    const JointState<Space, S>& state = kinematics.joints()[index];
+    Motion<Space, S> F = Motion<Space, S>::Zero();
+    for (int r = 0; r < state.rows(); ++r) F += state.D(r) * lambda[joint.row + r];
+    F_[joint.to] -= ShiftForce<Space, S>(F, state.r_Q);
+    F_[joint.from] += ShiftForce<Space, S>(F, state.r_P);
+  }
+  force.setZero(mechanism.num_u());
+  AlongForest(kinematics, force);
+  JacobianBias(kinematics, constraint);
+  constraint = -constraint;
+}
+
+template <class Space, class S>
+void TreeDynamics<Space, S>::NeededWrenches(const Kinematics<Space, S>& kinematics) {
+  const Mechanism<Space, S>& mechanism = kinematics.mechanism();
   AppliedForces<Space, S>(kinematics, F_);
   for (int body = 1; body < mechanism.num_bodies(); ++body) {
     F_[body] = InertialForce<Space, S>(kinematics, body, A_bias_[body]) - F_[body];
   }
+}
+
+template <class Space, class S>
+void TreeDynamics<Space, S>::AlongForest(const Kinematics<Space, S>& kinematics,
+                                         VectorX<S>& force) {
+  const Mechanism<Space, S>& mechanism = kinematics.mechanism();
+  const auto& tree = mechanism.tree();
   for (auto step = tree.rbegin(); step != tree.rend(); ++step) {
     const JointState<Space, S>& state = kinematics.joints()[step->joint];
     const Joint<Space, S>& joint = mechanism.joints()[step->joint];
     const Arms<Space, S> arms(*step, state);
     const Motion<Space, S> at_joint = ShiftForce<Space, S>(F_[step->child], arms.child);
     for (int i = 0; i < joint.num_u(); ++i) {
-      h[joint.u_offset + i] = S(step->sign) * state.H(i).dot(at_joint);
+      force[joint.u_offset + i] = S(step->sign) * state.H(i).dot(at_joint);
     }
     F_[step->parent] += ShiftForce<Space, S>(at_joint, arms.parent);
   }
@@ -239,7 +272,7 @@ JointMatrix<S> FreeResponse(const Kinematics<Space, S>& kinematics,
                                               std::span<const Motion<Space, S>>); \
   template JointMatrix<S> FreeResponse(const Kinematics<Space, S>&,               \
                                        const std::vector<Inertia<Space, S>>&, int);
-LOOPBENCH_FOR_EACH_SPACE_AND_SCALAR(LOOPBENCH_INSTANTIATE)
+LOOPBENCH_FOR_EACH_SPACE_AND_MODEL_SCALAR(LOOPBENCH_INSTANTIATE)
 #undef LOOPBENCH_INSTANTIATE
 
 }  // namespace loopbench

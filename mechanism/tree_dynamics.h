@@ -36,11 +36,21 @@ class TreeDynamics {
   /// gamma, after Bias().
   void JacobianBias(const Kinematics<Space, S>& kinematics, VectorX<S>& gamma) const;
 
+  /// What udot and lambda leave of the equations above: M udot + h - J^T lambda in `force`,
+  /// J udot - gamma in `constraint`. O(n). Takes the place of what Bias() left.
+  void Residual(const Kinematics<Space, S>& kinematics, const VectorX<S>& udot,
+                const VectorX<S>& lambda, VectorX<S>& force, VectorX<S>& constraint);
+
   /// Accelerations of the centres of mass for given udot.
   void BodyAccelerations(const Kinematics<Space, S>& kinematics, const VectorX<S>& udot,
                          std::span<Motion<Space, S>> A) const;
 
  private:
+  /// Wrenches that bodies with accelerations A_bias_ need beyond applied forces, in F_.
+  void NeededWrenches(const Kinematics<Space, S>& kinematics);
+  /// Their components along the coordinates of the forest.
+  void AlongForest(const Kinematics<Space, S>& kinematics, VectorX<S>& force);
+
   std::vector<Motion<Space, S>> A_bias_, F_;
   std::vector<Block<Space, S>> composite_;
 };

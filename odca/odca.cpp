@@ -98,6 +98,40 @@ Outcome Odca<Space, S>::Correct(const VectorX<S>& violation, VectorX<S>& change)
 }
 
 template <class Space, class S>
+void Odca<Space, S>::SetFree(int body, const Motion<Space, S>& wrench) {
+  const Inertia<Space, S>& inertia = mechanism_.bodies()[body];
+  const Angular<Space, S> moment = wrench.template head<Space::kRot>();
+  b_[body] << kinematics_.RotationalInverse(inertia, body) * moment,
+      wrench.template tail<Space::kLin>() / inertia.mass;
+}
+
+/// A force along a tree joint is a pair of wrenches on its bodies.
+template <class Space, class S>
+void Odca<Space, S>::SolveConstrained(const VectorX<S>& force, const VectorX<S>& target,
+                                      VectorX<S>& x, VectorX<S>& lambda) {
+  for (Motion<Space, S>& wrench : wrenches_) wrench.setZero();
+  for (Motion<Space, S>& c0 : c0_) c0.setZero();
+  for (const TreeStep& step : mechanism_.tree()) {
+    const Joint<Space, S>& joint = mechanism_.joints()[step.joint];
+    const JointState<Space, S>& state = kinematics_.joints()[step.joint];
+    Motion<Space, S> F = Motion<Space, S>::Zero();
+    for (int i = 0; i < state.num_u; ++i) {
+      F += state.H(i) * (joint.kind->per_speed * force[joint.u_offset + i]);
+    }
+    wrenches_[joint.to] += ShiftForce<Space, S>(F, state.r_Q);
+    wrenches_[joint.from] -= ShiftForce<Space, S>(F, state.r_P);
+  }
+  for (int body = 1; body < mechanism_.num_bodies(); ++body) SetFree(body, wrenches_[body]);
+  for (int index : mechanism_.constraints()) {
+    const Joint<Space, S>& joint = mechanism_.joints()[index];
+    c0_[index].head(joint.num_constraints()) = -target.segment(joint.row, joint.num_constraints());
+  }
+  sweep_.Solve(b_, c0_, A_);
+  TreeMotions(A_, x);
+  Multipliers(lambda);
+}
+
+template <class Space, class S>
 Outcome Odca<Space, S>::Accelerations() {
   if (const Outcome outcome = AssembleOnce(); outcome != Outcome::kFinished) return outcome;
   AppliedForces<Space, S>(kinematics_, wrenches_);
@@ -105,10 +139,8 @@ Outcome Odca<Space, S>::Accelerations() {
     const Inertia<Space, S>& inertia = mechanism_.bodies()[body];
     const Angular<Space, S> w = kinematics_.motions()[body].template head<Space::kRot>();
     const Angular<Space, S> Iw = kinematics_.RotationalInertia(inertia, body) * w;
-    const Angular<Space, S> moment =
-        wrenches_[body].template head<Space::kRot>() - CrossAngular<S>(w, Iw);
-    b_[body] << kinematics_.RotationalInverse(inertia, body) * moment,
-        wrenches_[body].template tail<Space::kLin>() / inertia.mass;
+    wrenches_[body].template head<Space::kRot>() -= CrossAngular<S>(w, Iw);
+    SetFree(body, wrenches_[body]);
   }
   // c0 = D^T (n_Q - n_P - g); the same difference is needed along H below            (7)
   for (std::size_t j = 0; j < c0_.size(); ++j) {

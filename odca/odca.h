@@ -31,7 +31,12 @@ class Odca final : public Formulation<Space, S> {
   Outcome Correct(const VectorX<S>& violation, VectorX<S>& change) override;
   Outcome Accelerations() override;
   void Multipliers(VectorX<S>& lambda) override;
+  void SolveConstrained(const VectorX<S>& force, const VectorX<S>& target, VectorX<S>& x,
+                        VectorX<S>& lambda) override;
   Outcome AssembleOnce();
+  /// b_ of a body: its acceleration under its wrench alone, with [moment; force] at its centre of
+  /// mass.
+  void SetFree(int body, const Motion<Space, S>& wrench);
   /// H^T (A_Q - A_P) of a tree joint at its point, centripetal terms not included.
   void TreeMotions(std::span<const Motion<Space, S>> A, VectorX<S>& result) const;
 

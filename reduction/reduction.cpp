@@ -28,6 +28,7 @@ Reduction<Space, S>::Reduction(const Mechanism<Space, S>& mechanism, Formulation
       J_(MatrixX<S>::Zero(mechanism.num_rows(), mechanism.num_u())),
       h_(VectorX<S>::Zero(mechanism.num_u())),
       gamma_(VectorX<S>::Zero(mechanism.num_rows())),
+      force_(h_),
       c_(h_),
       residual_(h_),
       bias_(gamma_) {
@@ -182,36 +183,46 @@ Outcome Reduction<Space, S>::Accelerations() {
   dynamics_.Bias(kinematics_, h_);
   dynamics_.JacobianBias(kinematics_, gamma_);
   if (Base::feedback().size() > 0) gamma_ -= Base::feedback();
+  if (!uses_null_space_ && !independent_.empty()) {
+    MB_.noalias() = M_ * B_;
+    reduced_.noalias() = B_.transpose() * MB_;
+    reduced_factor_.compute(reduced_);
+  }
+  force_ = -h_;
+  const bool solved = SolveMotion(force_, gamma_, udot_);
+  return solved && udot_.allFinite() ? Outcome::kFinished : Outcome::kNonFinite;
+}
+
+template <class Space, class S>
+bool Reduction<Space, S>::SolveMotion(const VectorX<S>& force, const VectorX<S>& target,
+                                      VectorX<S>& x) {
   if (uses_null_space_) {
-    const bool solved = null_space_->Accelerate(M_, h_, gamma_, udot_);
-    return solved && udot_.allFinite() ? Outcome::kFinished : Outcome::kNonFinite;
+    residual_ = -force;
+    return null_space_->Accelerate(M_, residual_, target, x);
   }
   c_.setZero();
   if (!dependent_.empty()) {
-    for (std::size_t k = 0; k < rows_.size(); ++k) rows_rhs_[k] = gamma_[rows_[k]];
+    for (std::size_t k = 0; k < rows_.size(); ++k) rows_rhs_[k] = target[rows_[k]];
     dependent_speeds_ = lu_.solve(rows_rhs_);
     for (std::size_t k = 0; k < dependent_.size(); ++k) c_[dependent_[k]] = dependent_speeds_[k];
   }
-  residual_ = h_;
-  residual_.noalias() += M_ * c_;
-  udot_ = c_;
-  if (independent_.empty()) return Outcome::kFinished;
-  MB_.noalias() = M_ * B_;
-  reduced_.noalias() = B_.transpose() * MB_;
-  reduced_factor_.compute(reduced_);
-  residual_ = -residual_;
+  x = c_;
+  if (independent_.empty()) return true;
+  residual_ = force;
+  residual_.noalias() -= M_ * c_;
   independent_speeds_.noalias() = B_.transpose() * residual_;
   reduced_factor_.solveInPlace(independent_speeds_);
-  udot_.noalias() += B_ * independent_speeds_;
-  return udot_.allFinite() ? Outcome::kFinished : Outcome::kNonFinite;
+  x.noalias() += B_ * independent_speeds_;
+  return true;
 }
 
-/// From the dependent equations of motion: J_D^T lambda = (M udot + h)_D, zero where rows are not
+/// From the dependent equations of motion: J_D^T lambda = (M x - force)_D, zero where rows are not
 /// used.
 template <class Space, class S>
-void Reduction<Space, S>::Multipliers(VectorX<S>& lambda) {
-  residual_ = h_;
-  residual_.noalias() += M_ * udot_;
+void Reduction<Space, S>::SolveForces(const VectorX<S>& force, const VectorX<S>& x,
+                                      VectorX<S>& lambda) {
+  residual_ = -force;
+  residual_.noalias() += M_ * x;
   if (uses_null_space_) {
     null_space_->Multipliers(residual_, lambda);
     return;
@@ -224,6 +235,18 @@ void Reduction<Space, S>::Multipliers(VectorX<S>& lambda) {
   lu_.matrixLU().template triangularView<Eigen::UnitLower>().transpose().solveInPlace(rows_rhs_);
   dependent_speeds_.noalias() = lu_.permutationP().transpose() * rows_rhs_;
   for (std::size_t k = 0; k < rows_.size(); ++k) lambda[rows_[k]] = dependent_speeds_[k];
+}
+
+template <class Space, class S>
+void Reduction<Space, S>::Multipliers(VectorX<S>& lambda) {
+  SolveForces(force_, udot_, lambda);
+}
+
+template <class Space, class S>
+void Reduction<Space, S>::SolveConstrained(const VectorX<S>& force, const VectorX<S>& target,
+                                           VectorX<S>& x, VectorX<S>& lambda) {
+  SolveMotion(force, target, x);
+  SolveForces(force, x, lambda);
 }
 
 template <class Space, class S>

@@ -54,12 +54,18 @@ class Reduction final : public Formulation<Space, S> {
   Outcome Correct(const VectorX<S>& violation, VectorX<S>& change) override;
   Outcome Accelerations() override;
   void Multipliers(VectorX<S>& lambda) override;
+  void SolveConstrained(const VectorX<S>& force, const VectorX<S>& target, VectorX<S>& x,
+                        VectorX<S>& lambda) override;
   bool ChangeMode() override;
 
   Outcome FactorOnce();
   /// LU of J_D and the basis B, J being current; the reciprocal condition.
   S FactorPartition();
   void FactorNullSpace();
+  /// x of M x - J^T lambda = force, J x = target by (2) and (3), and lambda from that x. False
+  /// where M is not positive definite.
+  bool SolveMotion(const VectorX<S>& force, const VectorX<S>& target, VectorX<S>& x);
+  void SolveForces(const VectorX<S>& force, const VectorX<S>& x, VectorX<S>& lambda);
   void SetPartition(const Partition<S>& partition);
 
   using Base = Formulation<Space, S>;
@@ -74,7 +80,8 @@ class Reduction final : public Formulation<Space, S> {
   long factored_version_ = -1;
   bool outgrown_ = false;  ///< the rank exceeds the partition's
   MatrixX<S> M_, J_, J_D_, J_I_, solved_, B_, MB_, reduced_;
-  VectorX<S> h_, gamma_, c_, residual_, rows_rhs_, dependent_speeds_, independent_speeds_, bias_;
+  VectorX<S> h_, gamma_, force_, c_, residual_, rows_rhs_, dependent_speeds_, independent_speeds_,
+      bias_;
   Eigen::PartialPivLU<MatrixX<S>> lu_;
   Eigen::LLT<MatrixX<S>> reduced_factor_;
   std::unique_ptr<NullSpace<Space, S>> null_space_;  ///< null at velocity level and as published

@@ -62,6 +62,7 @@ const std::vector<Measure>& Measures() {
       {"newton_iterations", Rule::kCount, "", true},
       {"newton_failures", Rule::kCount, "", true},
       {"newton_rhs_evaluations", Rule::kCount, "", true},
+      {"newton_dual_evaluations", Rule::kCount, "", true},
       {"state_hash", Rule::kHash, "", true},
       {"derivative_hash", Rule::kHash, "", true},
       {"drift_position_max", Rule::kError, "m", false},

@@ -4,6 +4,8 @@
 
 #include <algorithm>
 
+#include "harness/integrator/options.h"
+
 namespace loopbench::harness {
 namespace {
 
@@ -18,6 +20,7 @@ Case MakeCase(const Experiment& experiment, std::size_t scene, const Column& col
           .mechanism = experiment.scenes[scene].name,
           .column = column,
           .integrator = experiment.integrator,
+          .jacobian = experiment.jacobian,
           .rtol = tolerance,
           .atol = tolerance,
           .horizon = horizon,
@@ -57,6 +60,10 @@ Record CaseKeys(const Experiment& experiment, const Case& one) {
   keys.Set("coordinates", std::string(ToString(one.column.coordinates)));
   keys.Set("solver", std::string(ToString(one.column.solver)));
   keys.Set("integrator", one.integrator);
+  if (const Profile* profile = FindProfile(one.integrator); profile && profile->is_implicit) {
+    const auto kind = static_cast<std::size_t>(one.jacobian);
+    keys.Set("jacobian", std::string(kNames<JacobianKind>[kind]));
+  }
   keys.Set("rtol", one.rtol);
   keys.Set("atol", one.atol);
   keys.Set("horizon", one.horizon);

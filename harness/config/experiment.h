@@ -23,6 +23,9 @@ namespace loopbench::harness {
 /// The three formulations (folders odca/, lagrange/, reduction/).
 enum class FormulationKind { kOdca, kLagrange, kReduction };
 
+/// Where the Newton iteration of an implicit profile has its Jacobians from.
+enum class JacobianKind { kForward, kFiniteDifference };
+
 /// Names in files and tables, by value of the enum.
 template <class Enum>
 inline constexpr std::array<std::string_view, 0> kNames = {};
@@ -37,6 +40,9 @@ inline constexpr std::array<std::string_view, 2> kNames<Coordinates> = {"joint",
 template <>
 inline constexpr std::array<std::string_view, 2> kNames<SolverKind> = {"as-published",
                                                                        "rank-revealing"};
+template <>
+inline constexpr std::array<std::string_view, 2> kNames<JacobianKind> = {"forward",
+                                                                         "finite-difference"};
 
 /// What a run computes in, narrowest first (harness/precision/).
 enum class Scalar { kFloat, kDouble, kLongDouble, kFloat128 };
@@ -149,7 +155,8 @@ struct Experiment {
   std::vector<Column> columns;
   std::vector<double> tolerances;  ///< rtol = atol
   std::string integrator = "ode45";
-  std::vector<EnsembleRule> ensembles;  ///< the first that matches a case counts
+  JacobianKind jacobian = JacobianKind::kForward;  ///< of no consequence to explicit profiles
+  std::vector<EnsembleRule> ensembles;             ///< the first that matches a case counts
   Limits limits;
   CompileOptions compile;   ///< what is simplified before a run
   int series_points = 200;  ///< points kept of a time series for figures
@@ -167,6 +174,7 @@ struct Case {
   std::string mechanism;  ///< the scene's name
   Column column;
   std::string integrator;
+  JacobianKind jacobian = JacobianKind::kForward;
   double rtol = 0.0;
   double atol = 0.0;
   double horizon = 0.0;                       ///< [s]

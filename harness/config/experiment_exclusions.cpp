@@ -10,7 +10,7 @@ namespace {
 
 // Keys of records other than those of a case: a run would write over a parameter of that name. A
 // test holds this list against the records of actual runs.
-constexpr std::array<std::string_view, 68> kRecordKeys = {"libm",
+constexpr std::array<std::string_view, 69> kRecordKeys = {"libm",
                                                           "load1",
                                                           "kind",
                                                           "experiment",
@@ -20,6 +20,7 @@ constexpr std::array<std::string_view, 68> kRecordKeys = {"libm",
                                                           "coordinates",
                                                           "solver",
                                                           "integrator",
+                                                          "jacobian",
                                                           "rtol",
                                                           "atol",
                                                           "horizon",

@@ -17,8 +17,8 @@ Experiment ReadOne(const JsonNode& root, MechanismFiles& files) {
     return experiment;
   }
   if (!root.ExpectObject({"name", "comment", "scenes", "columns", "tolerances", "integrator",
-                          "ensembles", "limits", "compile", "series", "timing", "precision",
-                          "sweep", "exclude"})) {
+                          "jacobian", "ensembles", "limits", "compile", "series", "timing",
+                          "precision", "sweep", "exclude"})) {
     return experiment;
   }
   if (const auto name = root.Required("name", "a name")) experiment.name = name->Text();

@@ -99,7 +99,8 @@ std::vector<ExperimentScene> ReadScene(const JsonNode& node, MechanismFiles& fil
   }
   if (const auto name = node.Optional("name")) common.name = name->Text();
   double scale = 1.0;
-  if (const auto factor = node.Optional("scale")) scale = factor->Number({.min = 1e-12, .max = 1e12});
+  if (const auto factor = node.Optional("scale"))
+    scale = factor->Number({.min = 1e-12, .max = 1e12});
   if (const auto tags = node.Optional("tags")) {
     for (const JsonNode& tag : tags->Elements("tags")) common.tags.push_back(tag.Text());
   }

@@ -60,7 +60,7 @@ struct FamilyMember {
 std::vector<FamilyMember> ReadFamilyMembers(const JsonNode& node, std::size_t room);
 /// A list of columns, each entry expanded.
 std::vector<Column> ReadColumns(const JsonNode& node);
-/// "integrator", "limits", "compile", "series", "timing" and "precision".
+/// "integrator", "jacobian", "limits", "compile", "series", "timing" and "precision".
 void ReadSettings(const JsonNode& root, Experiment* experiment);
 /// "ensembles", after everything that they select from.
 void ReadEnsembles(const JsonNode& root, const ErrorList& errors, Experiment* experiment);

@@ -1,4 +1,5 @@
-// "integrator", "limits", "compile", "series", "timing" and "precision" of an experiment file.
+// "integrator", "jacobian", "limits", "compile", "series", "timing" and "precision" of an
+// experiment file.
 #include "harness/config/experiment_sections.h"
 #include "harness/integrator/options.h"
 
@@ -98,6 +99,12 @@ void ReadSettings(const JsonNode& root, Experiment* experiment) {
     const std::vector<std::string> profiles = ProfileNames();
     const auto index = name->Choice(profiles, "an integrator profile");
     if (index) experiment->integrator = profiles[static_cast<std::size_t>(*index)];
+  }
+  if (const auto kind = root.Optional("jacobian")) {
+    const auto& names = kNames<JacobianKind>;
+    const auto index =
+        kind->Choice(std::vector<std::string>(names.begin(), names.end()), "a kind of Jacobian");
+    if (index) experiment->jacobian = static_cast<JacobianKind>(*index);
   }
   ReadLimits(root, &experiment->limits);
   ReadCompile(root, &experiment->compile);

@@ -28,8 +28,9 @@ struct IntegratorResult {
 
   // Implicit profiles only, else 0:
   std::int64_t jacobians = 0;                 ///< Jacobians evaluated
-  std::int64_t jacobian_rhs_evaluations = 0;  ///< calls of Ode::Derivative for their difference
-                                              ///< quotients, not part of rhs_evaluations
+  std::int64_t jacobian_rhs_evaluations = 0;  ///< derivatives for them, those of difference
+                                              ///< quotients above all; not in rhs_evaluations
+  std::int64_t dual_evaluations = 0;          ///< of a problem with Jacobians of its own
   std::int64_t newton_iterations = 0;         ///< of all stages, each with a call of Derivative
   std::int64_t newton_failures = 0;           ///< stages that did not converge, the step shortened
 };

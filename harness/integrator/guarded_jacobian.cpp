@@ -3,6 +3,7 @@
 #include <cmath>
 #include <cstddef>
 #include <limits>
+#include <optional>
 
 #include "harness/integrator/guarded_ode.h"
 
@@ -12,16 +13,19 @@ bool GuardedOde::EvaluateJacobian(double t, std::span<const double> y,
                                   std::span<const double> f) noexcept {
   ++jacobians_;
   std::fill(jacobian_.begin(), jacobian_.end(), 0.0);
-  bool is_own = false;
+  std::optional<JacobianWork> own;
   try {
-    is_own = ode_.Jacobian(std::min(t, latest_), y, jacobian_);
+    own = ode_.Jacobian(std::min(t, latest_), y, jacobian_);
   } catch (...) {  // Integrate() throws it again
     exception_ = std::current_exception();
     return false;
   }
-  if (!is_own) {
+  if (!own) {
     return Differences(t, y, f);
   }
+  calls_ += own->derivatives;
+  jacobian_calls_ += own->derivatives;
+  dual_evaluations_ += own->dual_evaluations;
   if (!std::all_of(jacobian_.begin(), jacobian_.end(), [](double v) { return std::isfinite(v); })) {
     failure_ = Outcome::kNonFinite;
   }

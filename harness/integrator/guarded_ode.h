@@ -62,6 +62,8 @@ class GuardedOde {
   std::int64_t calls() const { return calls_ - jacobian_calls_; }
   std::int64_t jacobian_calls() const { return jacobian_calls_; }  ///< evaluations for Jacobians
   std::int64_t jacobians() const { return jacobians_; }            ///< Jacobians evaluated
+  /// Evaluations with dual numbers, of a problem with Jacobians of its own.
+  std::int64_t dual_evaluations() const { return dual_evaluations_; }
   const IntegratorOptions& options() const { return options_; }
 
  private:
@@ -72,7 +74,7 @@ class GuardedOde {
   Ode& ode_;
   double latest_ = std::numeric_limits<double>::infinity();  // time that the derivative may see
   Clock::time_point start_;
-  std::int64_t calls_ = 0, jacobian_calls_ = 0, jacobians_ = 0;
+  std::int64_t calls_ = 0, jacobian_calls_ = 0, jacobians_ = 0, dual_evaluations_ = 0;
   std::vector<double> jacobian_, shifted_, shifted_f_;  // empty for explicit profiles
   Outcome failure_ = Outcome::kFinished;
   std::exception_ptr exception_;

@@ -116,6 +116,7 @@ IntegratorResult Integrate(Ode& ode, double t0, double t_end, std::vector<double
   result.rhs_evaluations = guarded.calls();
   result.jacobians = guarded.jacobians();
   result.jacobian_rhs_evaluations = guarded.jacobian_calls();
+  result.dual_evaluations = guarded.dual_evaluations();
   result.wall_s = guarded.wall_s();
   return result;
 }

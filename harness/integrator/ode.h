@@ -2,11 +2,18 @@
 #pragma once
 
 #include <functional>
+#include <optional>
 #include <span>
 
 #include "mechanism/outcome.h"
 
 namespace loopbench::harness {
+
+/// What a Jacobian of the problem's own has cost.
+struct JacobianWork {
+  int derivatives = 0;       ///< evaluations of f
+  int dual_evaluations = 0;  ///< evaluations with dual numbers, several columns at once
+};
 
 /// A system of first-order ordinary differential equations y' = f(t, y), t in seconds.
 ///
@@ -33,12 +40,12 @@ class Ode {
   virtual Outcome Derivative(double t, std::span<const double> y, std::span<double> ydot) = 0;
 
   /// For implicit methods: writes df_i/dy_j to `jacobian`[i + size() * j], i < size() and
-  /// j < size() - num_quadratures(), and returns true. False, as here, asks for difference
-  /// quotients of f. It may be an approximation: that makes Newton's iteration slower, not the
-  /// solution wrong.
-  virtual bool Jacobian(double /*t*/, std::span<const double> /*y*/,
-                        std::span<double> /*jacobian*/) {
-    return false;
+  /// j < size() - num_quadratures(), where the entries are zero, and returns what it took. Nothing,
+  /// as here, asks for difference quotients of f. It may be an approximation: that makes Newton's
+  /// iteration slower, not the solution wrong.
+  virtual std::optional<JacobianWork> Jacobian(double /*t*/, std::span<const double> /*y*/,
+                                               std::span<double> /*jacobian*/) {
+    return std::nullopt;
   }
 };
 

@@ -97,6 +97,8 @@ std::vector<TableColumn> OtherColumns() {
       Make("newton_failures", "newton failures", kInteger),
       Make("newton_jacobians", "jacobians", kInteger),
       Make("newton_rhs_evaluations", "rhs for jacobians", kInteger),
+      Make("newton_dual_evaluations", "dual evaluations", kInteger),
+      Make("jacobian", "jacobian"),
       Make("plan_depth", "plan depth", kInteger),
       Make("plan_largest_join", "largest join", kInteger),
       Make("rhs_operations", "rhs operations", kInteger),

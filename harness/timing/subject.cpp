@@ -62,7 +62,8 @@ class SubjectIn final : public BenchmarkSubject {
             const BenchmarkState& state, const std::string& integrator, double step)
       : mechanism_(description, column.coordinates),
         formulation_(MakeFormulation<Space>(column, mechanism_)),
-        ode_(*formulation_) {
+        ode_(*formulation_, false,
+             MakeJacobian(integrator, JacobianKind::kForward, description, *formulation_)) {
     const Outcome outcome = formulation_->Start(0.0, state.q, state.u);
     if (outcome != Outcome::kFinished) {
       throw std::invalid_argument(fmt::format("cannot start: {}", ToString(outcome)));

@@ -46,9 +46,11 @@ class Subject {
 template <class Space>
 class SubjectIn final : public Subject {
  public:
+  /// `description` must outlive the subject.
   SubjectIn(const MechanismDescription& description, const Case& one, bool simulate)
       : case_(one),
         simulate_(simulate),
+        description_(description),
         mechanism_(description, one.column.coordinates),
         start_(Assemble<Space>(description, mechanism_)) {
     result_.outcome = start_.outcome;
@@ -144,7 +146,9 @@ class SubjectIn final : public Subject {
   }
 
   IntegratorResult Simulate(const std::function<void(std::span<double>)>& keep) {
-    FormulationOde<Space> ode(*formulation_);
+    FormulationOde<Space> ode(
+        *formulation_, false,
+        MakeJacobian(case_.integrator, case_.jacobian, description_, *formulation_));
     const auto observe = [&](double t, std::span<double> y) {
       if (keep) keep(y);
       return formulation_->BeginStep(t, y) ? StepAction::kRestart : StepAction::kContinue;
@@ -172,6 +176,7 @@ class SubjectIn final : public Subject {
 
   Case case_;
   bool simulate_;
+  const MechanismDescription& description_;
   Mechanism<Space, double> mechanism_;
   Start<double> start_;
   std::unique_ptr<Formulation<Space, double>> formulation_;

@@ -4,6 +4,7 @@
 #include <algorithm>
 #include <cmath>
 #include <limits>
+#include <optional>
 #include <span>
 #include <stdexcept>
 #include <string>
@@ -112,13 +113,14 @@ TEST_P(EveryImplicitProfile, CountsWhatItDoes) {
 class WithOwnJacobian : public TestOde {
  public:
   explicit WithOwnJacobian(double factor) : TestOde(StiffLinear()), factor_(factor) {}
-  bool Jacobian(double, std::span<const double>, std::span<double> jacobian) override {
+  std::optional<JacobianWork> Jacobian(double, std::span<const double>,
+                                       std::span<double> jacobian) override {
     const double s = 1.0 / 3, fast = 1e5 / 3;
     const State entries{-2 * s - fast, -s + fast, 1, -2 * s + 2 * fast, -s - 2 * fast, 0};
     EXPECT_EQ(jacobian.size(), entries.size());
     std::transform(entries.begin(), entries.end(), jacobian.begin(),
                    [&](double v) { return factor_ * v; });
-    return true;
+    return JacobianWork{.derivatives = 2, .dual_evaluations = 3};
   }
 
  private:
@@ -135,8 +137,10 @@ TEST(IntegratorImplicit, OwnJacobianIsUsedInsteadOfDifferences) {
   State y, y_differences, y_zero;
   const IntegratorResult differences = run(StiffLinear(), y_differences);
   const IntegratorResult own = run(WithOwnJacobian(1), y);
-  EXPECT_EQ(own.jacobian_rhs_evaluations, 0);
   EXPECT_GT(own.jacobians, 0);
+  EXPECT_EQ(own.jacobian_rhs_evaluations, 2 * own.jacobians);
+  EXPECT_EQ(own.dual_evaluations, 3 * own.jacobians);
+  EXPECT_EQ(own.rhs_evaluations, differences.rhs_evaluations);
   EXPECT_EQ(own.steps, differences.steps);
   EXPECT_EQ(own.outcome, Outcome::kFinished);
   EXPECT_NEAR(y[0], y_differences[0], 1e-7);  // Newton leaves a hundredth of the tolerance per step
@@ -158,7 +162,8 @@ TEST(IntegratorImplicit, ExceptionsOfTheJacobianPassThrough) {
   class Throws : public TestOde {
    public:
     Throws() : TestOde(StiffLinear()) {}
-    bool Jacobian(double, std::span<const double>, std::span<double>) override {
+    std::optional<JacobianWork> Jacobian(double, std::span<const double>,
+                                         std::span<double>) override {
       throw std::runtime_error("from the Jacobian");
     }
   } ode;

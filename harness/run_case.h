@@ -84,6 +84,7 @@ class FormulationOde final : public Ode {
     }
     Eigen::Map<Eigen::MatrixXd> all(jacobian.data(), size(), size() - num_quadratures());
     jacobian_->Evaluate(all.leftCols(formulation_.state_size()));
+    version_ = -1;  // its solutions stand where those of the derivative stood
     return work;
   }
 

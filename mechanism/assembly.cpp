@@ -217,16 +217,19 @@ class Assembler {
     return std::abs(e[worst]) * units[worst];
   }
 
-  /// argmin |J d + e|^2 + damping^2 |d|^2.
+  /// argmin |J d + e|^2 + damping^2 |d|^2. Only the range of J^T can lessen it: with the thin
+  /// J^T = Q R and d = Q y a problem as small as J has rows.
   static VectorX<double> DampedStep(const MatrixX<double>& J, const VectorX<double>& e,
                                     double damping) {
-    const Eigen::Index m = J.rows(), n = J.cols();
-    MatrixX<double> A = MatrixX<double>::Zero(m + n, n);
-    A.topRows(m) = J;
-    A.bottomRows(n).diagonal().setConstant(damping);
-    VectorX<double> rhs = VectorX<double>::Zero(m + n);
-    rhs.head(m) = -e;
-    return A.householderQr().solve(rhs);
+    const Eigen::Index r = std::min(J.rows(), J.cols());
+    const Eigen::HouseholderQR<MatrixX<double>> qr(J.transpose());
+    const MatrixX<double> Q = qr.householderQ() * MatrixX<double>::Identity(J.cols(), r);
+    MatrixX<double> A = MatrixX<double>::Zero(J.rows() + r, r);
+    A.topRows(J.rows()).noalias() = J * Q;
+    A.bottomRows(r).diagonal().setConstant(damping);
+    VectorX<double> rhs = VectorX<double>::Zero(A.rows());
+    rhs.head(J.rows()) = -e;
+    return Q * A.householderQr().solve(rhs);
   }
 
   /// q moved by the speeds d for unit time (quaternions renormalised).

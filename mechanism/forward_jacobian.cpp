@@ -33,7 +33,6 @@ int ForwardJacobian<Space>::evaluations() const {
 template <class Space>
 void ForwardJacobian<Space>::Evaluate(Eigen::Ref<MatrixX<double>> jacobian) {
   kinematics_.SetTime(formulation_.kinematics().time());
-  kinematics_.ResumeFrom(formulation_.kinematics().accepted());
   if (mechanism_.num_u() > 0) formulation_.Multipliers(lambda_now_);
   const int size = formulation_.state_size();
   for (int first = 0; first < size; first += Dual::kWidth) {

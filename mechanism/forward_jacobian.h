@@ -14,6 +14,9 @@
 // velocity level the speeds that the right-hand side uses have derivatives of the same kind: the
 // formulation's Correct() of what a direction makes constraints miss at velocity level.
 //
+// How often a measured angle has turned round (Kinematics::AcceptStep) is of no consequence here: a
+// moment along H changes with H only along D, which lambda takes up.
+//
 // What is left out: the derivative of softening weights (loop_solver.h), and at velocity level that
 // of the metric of the projection, whose effect is as small as the change of speeds it makes. The
 // derivative is exact where nothing is softened and speeds satisfy the constraints.

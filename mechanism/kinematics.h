@@ -84,11 +84,6 @@ class Kinematics {
   /// Remembers the coordinates of cut joints, so that the next angles are unwrapped from here.
   /// Called at accepted steps only (the one memory of this class, part of the mode).
   void AcceptStep();
-  /// That memory, one coordinate per joint, for another scalar's kinematics to take over.
-  const std::vector<S>& accepted() const { return accepted_; }
-  void ResumeFrom(const std::vector<double>& accepted) {
-    accepted_.assign(accepted.begin(), accepted.end());
-  }
 
   /// q of a mechanism with the same bodies, from body poses here (other coordinate set).
   VectorX<S> CoordinatesIn(const Mechanism<Space, S>& other) const;

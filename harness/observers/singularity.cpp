@@ -8,8 +8,8 @@ namespace loopbench::harness {
 
 namespace {
 
-/// Rows up to which every accepted step can afford a dense decomposition (some 0.1 ms).
-constexpr int kMostRows = 24;
+/// Rows and speeds up to which every accepted step can afford a dense decomposition (some 0.1 ms).
+constexpr int kMostRows = 24, kMostSpeeds = 64;
 
 }  // namespace
 
@@ -35,8 +35,8 @@ SingularityObserver<Space>::~SingularityObserver() = default;
 template <class Space>
 void SingularityObserver<Space>::Observe(const Sample<Space>& sample) {
   Work& work = *work_;
-  const int rows = work.view.mechanism().num_rows();
-  if (rows == 0 || rows > kMostRows || work.view.mechanism().num_u() == 0) return;
+  const int rows = work.view.mechanism().num_rows(), speeds = work.view.mechanism().num_u();
+  if (rows == 0 || rows > kMostRows || speeds == 0 || speeds > kMostSpeeds) return;
   const LoopSpectrum now = SpectrumOfLoops(work.view.At(sample.formulation.kinematics()));
   const std::size_t count = static_cast<std::size_t>(now.singular_values.size());
   if (work.smallest.empty()) {

@@ -268,9 +268,9 @@ void CompareRandom() {
   }
 }
 
-// A constraint measures its angle modulo a turn, and a spring on it remembers how far it is wound:
-// its moment turns with the arm that carries it.
-TEST(ForwardJacobian, KnowsHowFarASpringIsWound) {
+// A constraint measures its angle modulo a turn, and a spring on it remembers how far it is wound.
+// Its moment turns with the arm that carries it, but what the turns add to that the joint takes up.
+TEST(ForwardJacobian, NeedNotKnowHowFarASpringIsWound) {
   MechanismDescription description;
   description.space = SpaceKind::kSpatial;
   description.gravity = {0.0, 0.0, -9.81};

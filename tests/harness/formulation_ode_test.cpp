@@ -51,8 +51,11 @@ TEST(FormulationOde, EvaluatesAfreshWhereTheFormulationHasMovedAway) {
   elsewhere[0] += 0.1;
   ode.Derivative(0.0, scene.y, ydot);
   EXPECT_EQ(ode.Jacobian(0.0, scene.y, at_once).value().derivatives, 0);
+  EXPECT_EQ(ode.Jacobian(0.0, scene.y, later).value().derivatives, 1);
+  EXPECT_EQ(later, at_once);
   EXPECT_EQ(ode.Jacobian(0.0, elsewhere, moved).value().derivatives, 1);
   EXPECT_NE(moved, at_once);
+  later = moved;
   // an observer evaluates the formulation itself
   ode.Derivative(0.0, scene.y, ydot);
   scene.formulation->Derivative(0.0, std::span<const double>(elsewhere), ydot);

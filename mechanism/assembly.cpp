@@ -4,8 +4,8 @@
 #include <algorithm>
 #include <cmath>
 #include <limits>
-#include <random>
 
+#include "mechanism/assembly_units.h"
 #include "mechanism/tree_dynamics.h"
 
 namespace loopbench {
@@ -29,7 +29,8 @@ class Assembler {
     start_.q.setZero(mechanism.num_q());
     start_.u.setZero(mechanism.num_u());
     ReadInitialData();
-    SetUnits();
+    kinematics_.UpdatePosition(start_.q);
+    units_ = AssemblyUnits<Space>(kinematics_);
   }
 
   Start<double> Run() {
@@ -85,46 +86,16 @@ class Assembler {
     }
   }
 
-  void SetUnits() {
-    unit_ = std::exp2(std::round(std::log2(mechanism_.length())));
-    kinematics_.UpdatePosition(start_.q);
-    const auto is_length = [](const auto& direction) {
-      return direction.template head<Space::kRot>().isZero();
-    };
-    column_units_.setOnes(mechanism_.num_u());
-    for (const TreeStep& step : mechanism_.tree()) {
-      const JointState<Space, double>& state = kinematics_.joints()[step.joint];
-      for (int i = 0; i < state.num_u; ++i) {
-        const int column = mechanism_.joints()[step.joint].u_offset + i;
-        if (is_length(state.H(i))) column_units_[column] = unit_;
-      }
-    }
-    row_units_.setOnes(mechanism_.num_rows());
-    for (int index : mechanism_.constraints()) {
-      const Joint<Space, double>& joint = mechanism_.joints()[index];
-      for (int r = 0; r < joint.num_constraints(); ++r) {
-        const bool length = is_length(kinematics_.joints()[index].D(r));
-        if (length) row_units_[joint.row + r] = unit_;
-      }
-    }
-  }
-
   /// Units of all constraint rows and, below them, of free coordinates of cut joints.
   template <class List>
   VectorX<double> UnitsWith(const List& cut_joints) const {
-    VectorX<double> units = row_units_;
-    units.conservativeResize(row_units_.size() + static_cast<Eigen::Index>(cut_joints.size()));
-    Eigen::Index row = row_units_.size();
+    VectorX<double> units = units_.rows;
+    units.conservativeResize(units.size() + static_cast<Eigen::Index>(cut_joints.size()));
+    Eigen::Index row = units_.rows.size();
     for (const auto& given : cut_joints) {
-      const auto H = kinematics_.joints()[given.joint].H(given.component);
-      units[row++] = H.template head<Space::kRot>().isZero() ? unit_ : 1.0;
+      units[row++] = units_.Of(kinematics_.joints()[given.joint].H(given.component));
     }
     return units;
-  }
-
-  /// Rows over their units, free columns times theirs.
-  void ToUnits(const VectorX<double>& units, MatrixX<double>& J) const {
-    J = units.cwiseInverse().asDiagonal() * J * column_units_.asDiagonal();
   }
 
   void Fail(const std::string& message) {
@@ -186,14 +157,14 @@ class Assembler {
       for (std::size_t k = 0; k < held_cut_.size(); ++k) {
         J.row(mechanism_.num_rows() + static_cast<int>(k)) = CutJointRow(held_cut_[k].joint, 0);
       }
-      ToUnits(units, J);
+      units_.Apply(units, J);
       for (int c = 0; c < mechanism_.num_u(); ++c) {
         if (held_q_[c]) J.col(c).setZero();
       }
       bool improved = false;
       for (; damping < 1e8 && !improved; damping *= 10) {
         const VectorX<double> trial =
-            Move(start_.q, DampedStep(J, e, damping).cwiseProduct(column_units_));
+            Move(start_.q, DampedStep(J, e, damping).cwiseProduct(units_.columns));
         const VectorX<double> e_trial = Residual(trial);
         if (!(e_trial.norm() < e.norm())) continue;
         improved = true;
@@ -262,9 +233,9 @@ class Assembler {
       target[rows + k] = value - CutJointSpeed(joint, component, at_rest);
     }
     if (J.rows() == 0) return;
-    ToUnits(units, J);
+    units_.Apply(units, J);
     target = target.cwiseQuotient(units);
-    start_.u = start_.u.cwiseQuotient(column_units_);
+    start_.u = start_.u.cwiseQuotient(units_.columns);
     MatrixX<double> J_free = J;
     for (int c = 0; c < mechanism_.num_u(); ++c) {
       if (given_u_[c]) J_free.col(c).setZero();
@@ -277,7 +248,7 @@ class Assembler {
       start_.u += solver.solve(miss);
     }
     const VectorX<double> left = target - J * start_.u;
-    start_.u = start_.u.cwiseProduct(column_units_);
+    start_.u = start_.u.cwiseProduct(units_.columns);
     start_.speed_residual = InSi(left, units);
     if (left.template lpNorm<Eigen::Infinity>() <= 1e-10 * size) return;
     NameWorstLoop(left, "has no speeds that fit the given ones", start_.speed_residual,
@@ -293,7 +264,7 @@ class Assembler {
       MatrixX<double> J;
       kinematics_.UpdatePosition(start_.q);
       dynamics_.Jacobian(kinematics_, J);
-      ToUnits(row_units_, J);
+      units_.Apply(units_.rows, J);
       Eigen::ColPivHouseholderQR<MatrixX<double>> qr(J);
       qr.setThreshold(1e-4);  // the square root of that of the weights (loop_solver.h)
       rank = qr.rank();
@@ -323,7 +294,8 @@ class Assembler {
 
   /// A length that no position exceeds much, in units: sum of all arms.
   double Extent() const {
-    return mechanism_.length() / unit_ * static_cast<double>(mechanism_.joints().size() + 1);
+    return mechanism_.length() / units_.length *
+           static_cast<double>(mechanism_.joints().size() + 1);
   }
 
   /// A coordinate or speed of a joint that is not in the tree.
@@ -337,8 +309,7 @@ class Assembler {
   TreeDynamics<Space, double> dynamics_;
   Start<double> start_;
   std::vector<bool> held_q_, given_u_;
-  double unit_ = 1.0;                         ///< of lengths [m]
-  VectorX<double> row_units_, column_units_;  ///< of constraint rows and speeds, 1 for angles
+  AssemblyUnits<Space> units_;
   std::vector<OfCutJoint> held_cut_, given_cut_;
 };
 
@@ -360,22 +331,6 @@ Start<double> Assemble(const MechanismDescription& description,
   to.UpdatePosition(start.q);
   start.u = from.SpeedsIn(to);
   return start;
-}
-
-MechanismDescription Perturb(MechanismDescription description, double amplitude, std::uint64_t seed,
-                             int member) {
-  std::seed_seq sequence{seed, static_cast<std::uint64_t>(member)};
-  std::mt19937_64 generator(sequence);
-  for (JointValues& values : description.initial.coordinates) {
-    const std::vector<int>& held = description.initial.held;
-    if (std::ranges::find(held, values.joint) == held.end()) continue;
-    for (double& value : values.values) {
-      // 53 random bits: the same number with every standard library
-      const double unit = static_cast<double>(generator() >> 11) * 0x1p-53;
-      value += amplitude * (2.0 * unit - 1.0);
-    }
-  }
-  return description;
 }
 
 template Start<double> Assemble(const MechanismDescription&, const Mechanism<Planar, double>&);

@@ -69,8 +69,7 @@ TimeValue<S> TimeFunction::At(S t) const {
 }
 
 #define LOOPBENCH_INSTANTIATE(S) template TimeValue<S> TimeFunction::At(S t) const;
-LOOPBENCH_FOR_EACH_SCALAR(LOOPBENCH_INSTANTIATE)
-LOOPBENCH_INSTANTIATE(Dual)
+LOOPBENCH_FOR_EACH_MODEL_SCALAR(LOOPBENCH_INSTANTIATE)
 #undef LOOPBENCH_INSTANTIATE
 
 }  // namespace loopbench

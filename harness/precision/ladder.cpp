@@ -124,25 +124,22 @@ double Epsilon(Scalar scalar) {
   return static_cast<double>(std::numeric_limits<Float128>::epsilon());
 }
 
-/// The finished rung at the same tolerance whose scalar is next in width to `own`'s: wider if there
-/// is one, else narrower; or nullptr.
-const Rung* Neighbour(const std::vector<Rung>& rungs, const Rung& own) {
-  const Rung *wider = nullptr, *narrower = nullptr;
+/// The rung that `own` is judged by: at the same tolerance the widest that finished, or for that
+/// one the next narrower; nullptr when there is none.
+const Rung* JudgeOf(const std::vector<Rung>& rungs, const Rung& own) {
+  const Rung *widest = &own, *narrower = nullptr;
   for (const Rung& rung : rungs) {
     if (rung.tolerance != own.tolerance || rung.outcome != Outcome::kFinished) continue;
-    if (rung.scalar > own.scalar && (wider == nullptr || rung.scalar < wider->scalar)) {
-      wider = &rung;
-    }
-    if (rung.scalar < own.scalar && (narrower == nullptr || rung.scalar > narrower->scalar)) {
-      narrower = &rung;
-    }
+    if (rung.scalar > widest->scalar) widest = &rung;
+    if (rung.scalar >= own.scalar) continue;
+    if (narrower == nullptr || rung.scalar > narrower->scalar) narrower = &rung;
   }
-  return wider != nullptr ? wider : narrower;
+  return widest == &own ? narrower : widest;
 }
 
 void Judge(std::vector<Rung>& rungs) {
   for (Rung& own : rungs) {
-    const Rung* other = Neighbour(rungs, own);
+    const Rung* other = JudgeOf(rungs, own);
     if (own.outcome != Outcome::kFinished || other == nullptr) continue;
     if (other->scalar > own.scalar) {
       own.error_ruled_by = RuledBy(own.error, other->error);
@@ -159,9 +156,9 @@ void Judge(std::vector<Rung>& rungs) {
 
 }  // namespace
 
-std::string_view RuledBy(double own, double wider) {
-  if (std::isnan(own) || std::isnan(wider)) return "";
-  return own > 2 * wider || own < wider / 2 ? "round-off" : "truncation";
+std::string_view RuledBy(double own, double widest) {
+  if (std::isnan(own) || std::isnan(widest)) return "";
+  return own > 2 * widest || own < widest / 2 ? "round-off" : "truncation";
 }
 
 Ladder RunLadder(const LadderTask& task) {

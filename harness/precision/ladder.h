@@ -56,11 +56,12 @@ struct Ladder {
 /// scalar.
 Ladder RunLadder(const LadderTask& task);
 
-/// Which part rules a number (error or drift) that is `own` in one scalar and `wider` in the next
-/// wider one at the same tolerance: round-off when the two differ by more than a factor of two (by
-/// chance it may cancel truncation too), else truncation; "" when one is NaN. For the widest scalar
-/// of a ladder the next narrower one bounds the round-off instead: truncation rules where the own
-/// number is more than ten times the other's scaled by the ratio of their eps.
-std::string_view RuledBy(double own, double wider);
+/// Which part rules a number (error or drift) that is `own` in one scalar and `widest` in the
+/// widest that finished at the same tolerance: round-off when the two differ by more than a factor
+/// of two (by chance it may cancel truncation too), else truncation; "" when one is NaN. Not the
+/// next wider scalar: two neighbours may fail alike. For the widest itself the next narrower one
+/// bounds the round-off: truncation rules where the own number is more than ten times the other's
+/// scaled by the ratio of their eps.
+std::string_view RuledBy(double own, double widest);
 
 }  // namespace loopbench::harness

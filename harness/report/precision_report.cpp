@@ -92,8 +92,9 @@ std::vector<std::string> PrecisionNotes() {
       "tolerance",
       "drift: largest mismatch of the points of a constraint at accepted steps, measured in "
       "float128",
-      "ruled by: round-off where the next wider scalar at the same tolerance changes the number by "
-      "more than a factor of two, else truncation (of the method, or by softening); of the widest, "
+      "ruled by: round-off where the widest scalar at the same tolerance changes the number by "
+      "more "
+      "than a factor of two, else truncation (of the method, or by softening); of the widest, "
       "truncation where the number is more than ten times the next narrower's scaled by the ratio "
       "of their eps"};
 }

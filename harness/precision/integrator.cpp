@@ -71,7 +71,7 @@ class Run {
   Outcome Advance() {
     S largest = S(kGrowth);
     for (int failures = 0;;) {
-      const bool last = !(t_ + h_ < t_end_);
+      const bool last = !(t_ + h_ < t_end_ - close_);
       const S h = last ? t_end_ - t_ : h_;
       const Outcome outcome = step_.Attempt(t_, y_, f_, h);
       if (outcome != Outcome::kFinished) return outcome;
@@ -116,6 +116,8 @@ class Run {
   const OneStepOptions<S>& options_;
   const S t_end_;
   const S longest_ = t_end_ / S(10);  // ode45's longest step
+  // no step for what rounding has left of the interval; ARKODE's bound
+  const S close_ = S(100) * std::numeric_limits<S>::epsilon() * t_end_;
   std::vector<S>& y_;
   std::vector<S> f_;
   OneStep<S> step_;

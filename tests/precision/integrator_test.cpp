@@ -109,6 +109,16 @@ TEST(OneStepOutcomeTest, StopsAtLimitsAndAtWhatIsNotFinite) {
             Outcome::kNonFinite);
 }
 
+/// Ten steps of 0.1 add up to 1 less a rounding in double and float128, for which there is no
+/// eleventh.
+TYPED_TEST(OneStepTest, TakesNoStepForARounding) {
+  std::vector<TypeParam> y = {TypeParam(1), TypeParam(1), TypeParam(0)};
+  const OneStepResult result = IntegrateSystem<TypeParam>(
+      SmoothProblem<TypeParam>(), TypeParam(1), y, {.fixed_step = TypeParam(1) / TypeParam(10)});
+  EXPECT_EQ(result.steps, 10);
+  EXPECT_EQ(result.t_reached, 1.0);
+}
+
 /// A rewritten state makes the derivative be evaluated anew: seven evaluations a step instead of
 /// six.
 TEST(OneStepOutcomeTest, RewrittenStatesRestart) {

@@ -92,7 +92,7 @@ void ExplainChoices(const Experiment& experiment) {
     fmt::print(
         "  baumgarte: as acceleration, with feedback: a mismatch e obeys e'' + 2 alpha e' + beta^2 "
         "e "
-        "= 0, alpha = beta = 1/step unless given.\n");
+        "= 0, alpha = beta = 0.05 over the longest step unless given.\n");
   }
   if (any([](const Column& c) { return c.coordinates == Coordinates::kJoint; })) {
     fmt::print(

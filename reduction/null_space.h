@@ -36,7 +36,7 @@ class NullSpace {
 
   explicit NullSpace(const Mechanism<Space, S>& mechanism);
 
-  /// The basis at the current positions, J being theirs. Allocates nothing once it was called.
+  /// The basis at the current positions, J being theirs. Below 48 rows it allocates only at first.
   void Factor(const Kinematics<Space, S>& kinematics, TreeDynamics<Space, S>& dynamics,
               const MatrixX<S>& J);
 

@@ -37,8 +37,7 @@ std::unique_ptr<ForwardJacobian<Space>> MakeJacobian(const std::string& integrat
                                                      JacobianKind kind,
                                                      const MechanismDescription& description,
                                                      Formulation<Space, double>& formulation) {
-  const bool wanted = FindProfile(integrator)->is_implicit && kind == JacobianKind::kForward &&
-                      formulation.options().enforcement != Enforcement::kBaumgarte;
+  const bool wanted = FindProfile(integrator)->is_implicit && kind == JacobianKind::kForward;
   return wanted ? std::make_unique<ForwardJacobian<Space>>(description, formulation) : nullptr;
 }
 

@@ -62,19 +62,9 @@ S Drives<Space, S>::Power(const Kinematics<Space, S>& kinematics, const VectorX<
   const auto rate = [&](const Joint<Space, S>& joint, int k) {
     return kinematics.drives()[joint.first_drive + k].rate;
   };
-  dynamics_.BodyAccelerations(kinematics, udot, A_);
-  AppliedForces<Space, S>(kinematics, F_);
-  // what each body needs beyond applied forces and those of the cut joints
-  for (int body = 1; body < mechanism.num_bodies(); ++body) {
-    F_[body] = InertialForce<Space, S>(kinematics, body, A_[body]) - F_[body];
-  }
+  std::ranges::copy(dynamics_.WrenchesLeft(kinematics, udot, lambda), F_.begin());
   for (int index : mechanism.constraints()) {
     const Joint<Space, S>& joint = mechanism.joints()[index];
-    const JointState<Space, S>& state = kinematics.joints()[index];
-    Motion<Space, S> F = Motion<Space, S>::Zero();
-    for (int r = 0; r < state.rows(); ++r) F += state.D(r) * lambda[joint.row + r];
-    F_[joint.to] -= ShiftForce<Space, S>(F, state.r_Q);
-    F_[joint.from] += ShiftForce<Space, S>(F, state.r_P);
     for (int k = 0; k < joint.num_drives; ++k) {
       power += lambda[joint.row + k] * rate(joint, k) / joint.kind->per_speed;
     }

@@ -76,12 +76,29 @@ void ForwardJacobian<Space>::Accelerate(int count) {
   udot_ = formulation_.udot().template cast<Dual>();
   lambda_ = lambda_now_.template cast<Dual>();
   dynamics_.Residual(kinematics_, udot_, lambda_, force_left_, constraint_left_);
+  if (formulation_.options().enforcement == Enforcement::kBaumgarte) AddFeedback();
   for (int k = 0; k < count; ++k) {
     for (int i = 0; i < force_.size(); ++i) force_[i] = -force_left_[i].partial(k);
     for (int r = 0; r < target_.size(); ++r) target_[r] = -constraint_left_[r].partial(k);
     formulation_.SolveConstrained(force_, target_, x_, lambda_x_);
     for (int i = 0; i < x_.size(); ++i) udot_[i].SetPartial(k, x_[i]);
     for (int r = 0; r < lambda_x_.size(); ++r) lambda_[r].SetPartial(k, lambda_x_[r]);
+  }
+}
+
+template <class Space>
+void ForwardJacobian<Space>::AddFeedback() {
+  const BaumgarteGains& gains = formulation_.gains();
+  for (int index : mechanism_.constraints()) {
+    const int row = mechanism_.joints()[index].row;
+    const int rows = mechanism_.joints()[index].num_constraints();
+    const auto D = kinematics_.joints()[index].D();
+    const Motion<Space, Dual> mismatch = kinematics_.ConstraintMismatch(index);
+    const Motion<Space, Dual> speed = kinematics_.ConstraintSpeed(index);
+    for (int r = 0; r < rows; ++r) {
+      constraint_left_[row + r] +=
+          Dual(2 * gains.alpha) * speed[r] + Dual(gains.beta * gains.beta) * D.col(r).dot(mismatch);
+    }
   }
 }
 

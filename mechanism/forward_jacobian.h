@@ -19,8 +19,7 @@
 //
 // What is left out: the derivative of softening weights (loop_solver.h), and at velocity level that
 // of the metric of the projection, whose effect is as small as the change of speeds it makes. The
-// derivative is exact where nothing is softened and speeds satisfy the constraints. Baumgarte's
-// feedback is not in it: the rotation vector that it feeds back has no derivative here at zero.
+// derivative is exact where nothing is softened and speeds satisfy the constraints.
 #pragma once
 
 #include "mechanism/dual.h"
@@ -48,6 +47,8 @@ class ForwardJacobian {
   void Seed(int first, int count);
   void ProjectSpeeds(int count);
   void Accelerate(int count);
+  /// Baumgarte's terms of the constraints.
+  void AddFeedback();
   void Write(int first, int count, Eigen::Ref<MatrixX<double>> jacobian);
 
   Formulation<Space, double>& formulation_;

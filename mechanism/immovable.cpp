@@ -1,9 +1,8 @@
 #include "mechanism/immovable.h"
 
-#include <Eigen/SVD>
-
 #include "mechanism/assembly.h"
 #include "mechanism/scaled_loops.h"
+#include "mechanism/singular_values.h"
 
 namespace loopbench {
 

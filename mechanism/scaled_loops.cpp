@@ -1,11 +1,11 @@
 #include "mechanism/scaled_loops.h"
 
 #include <Eigen/Cholesky>
-#include <Eigen/SVD>
 #include <algorithm>
 #include <cmath>
 #include <utility>
 
+#include "mechanism/singular_values.h"
 #include "mechanism/tree_dynamics.h"
 
 namespace loopbench {

@@ -168,8 +168,15 @@ Eigen::Matrix<S, 1, 1> RotationVector(const Pose<Planar, S>& X) {
 }
 template <class S>
 Eigen::Matrix<S, 3, 1> RotationVector(const Pose<Spatial, S>& X) {
-  const Eigen::AngleAxis<S> rotation(X.R);
-  return rotation.angle() * rotation.axis();
+  using std::abs;
+  using std::atan2;
+  using std::sqrt;
+  const Eigen::Quaternion<S> half(X.R);  // cosine and sine of half the angle
+  const S cosine = abs(half.w()), sine = sqrt(half.vec().squaredNorm());
+  // their ratio is linear to round-off below sqrt(eps), and then has a derivative at zero too
+  const bool tiny = sine * sine < S(Eigen::NumTraits<S>::epsilon());
+  const S stretch = tiny ? S(2) / cosine : S(2) * atan2(sine, cosine) / sine;
+  return (half.w() < S(0) ? S(-stretch) : stretch) * half.vec();
 }
 
 }  // namespace loopbench

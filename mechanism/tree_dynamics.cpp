@@ -120,21 +120,27 @@ void TreeDynamics<Space, S>::Bias(const Kinematics<Space, S>& kinematics, Vector
 }
 
 template <class Space, class S>
-void TreeDynamics<Space, S>::Residual(const Kinematics<Space, S>& kinematics,
-                                      const VectorX<S>& udot, const VectorX<S>& lambda,
-                                      VectorX<S>& force, VectorX<S>& constraint) {
-  const Mechanism<Space, S>& mechanism = kinematics.mechanism();
+std::span<const Motion<Space, S>> TreeDynamics<Space, S>::WrenchesLeft(
+    const Kinematics<Space, S>& kinematics, const VectorX<S>& udot, const VectorX<S>& lambda) {
   BodyAccelerations(kinematics, udot, A_bias_);
   NeededWrenches(kinematics);
-  for (int index : mechanism.constraints()) {
-    const Joint<Space, S>& joint = mechanism.joints()[index];
+  for (int index : kinematics.mechanism().constraints()) {
+    const Joint<Space, S>& joint = kinematics.mechanism().joints()[index];
     const JointState<Space, S>& state = kinematics.joints()[index];
     Motion<Space, S> F = Motion<Space, S>::Zero();
     for (int r = 0; r < state.rows(); ++r) F += state.D(r) * lambda[joint.row + r];
     F_[joint.to] -= ShiftForce<Space, S>(F, state.r_Q);
     F_[joint.from] += ShiftForce<Space, S>(F, state.r_P);
   }
-  force.setZero(mechanism.num_u());
+  return F_;
+}
+
+template <class Space, class S>
+void TreeDynamics<Space, S>::Residual(const Kinematics<Space, S>& kinematics,
+                                      const VectorX<S>& udot, const VectorX<S>& lambda,
+                                      VectorX<S>& force, VectorX<S>& constraint) {
+  WrenchesLeft(kinematics, udot, lambda);
+  force.setZero(kinematics.mechanism().num_u());
   AlongForest(kinematics, force);
   JacobianBias(kinematics, constraint);
   constraint = -constraint;

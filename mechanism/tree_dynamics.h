@@ -36,6 +36,11 @@ class TreeDynamics {
   /// gamma, after Bias().
   void JacobianBias(const Kinematics<Space, S>& kinematics, VectorX<S>& gamma) const;
 
+  /// Wrenches that bodies still need for udot beyond applied forces and those of lambda, at their
+  /// centres of mass: what the joints of the forest transmit. Good until the next call of anything.
+  std::span<const Motion<Space, S>> WrenchesLeft(const Kinematics<Space, S>& kinematics,
+                                                 const VectorX<S>& udot, const VectorX<S>& lambda);
+
   /// What udot and lambda leave of the equations above: M udot + h - J^T lambda in `force`,
   /// J udot - gamma in `constraint`. O(n). Takes the place of what Bias() left.
   void Residual(const Kinematics<Space, S>& kinematics, const VectorX<S>& udot,

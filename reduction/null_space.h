@@ -20,9 +20,9 @@
 #pragma once
 
 #include <Eigen/Cholesky>
-#include <Eigen/SVD>
 #include <vector>
 
+#include "mechanism/singular_values.h"
 #include "mechanism/tree_dynamics.h"
 
 namespace loopbench::reduction {

@@ -25,14 +25,13 @@ namespace loopbench::harness {
 /// Implicit, for stiff mechanisms; norm and controller as dormand-prince. Each step solves for its
 /// stages one after the other by Newton's iteration with a dense matrix.
 ///
-/// | profile              | pair                   | order | stability, and R(inf) of the embedding
-/// |
-/// |----------------------|------------------------|-------|----------------------------------------|
-/// | trbdf2               | TR-BDF2, embedded 3    | 2     | L; unbounded | | kennedy-carpenter-32
-/// | ESDIRK3(2)4L[2]SA      | 3     | L; 0.22                                | |
-/// kennedy-carpenter-43 | ESDIRK4(3)6L[2]SA      | 4     | L; 0                                   |
-/// | kvaerno-54           | ESDIRK5/4 of Kvaerno   | 5     | L; 0.75 | | kennedy-carpenter-54 |
-/// ESDIRK5(4)7L[2]SA      | 5     | L; 0.35                                |
+/// | profile              | pair              | order | stability; R(inf) of the embedding |
+/// |----------------------|-------------------|-------|------------------------------------|
+/// | trbdf2               | TR-BDF2           | 2     | L; unbounded                       |
+/// | kennedy-carpenter-32 | ESDIRK3(2)4L[2]SA | 3     | L; 0.22                            |
+/// | kennedy-carpenter-43 | ESDIRK4(3)6L[2]SA | 4     | L; 0                               |
+/// | kvaerno-54           | ESDIRK5/4         | 5     | L; 0.75                            |
+/// | kennedy-carpenter-54 | ESDIRK5(4)7L[2]SA | 5     | L; 0.35                            |
 ///
 /// Sources: R. Bank et al., IEEE Trans. Electron Devices 32, 1985, and M. Hosea, L. Shampine, Appl.
 /// Numer. Math. 20, 1996 (TR-BDF2); A. Kvaerno, BIT 44, 2004; C. Kennedy, M. Carpenter,

@@ -144,7 +144,7 @@ class ExactObserver final : public Observer<Space> {
   TimeSeries branch_;
 };
 
-/// Joint coordinates against time.
+/// Joint coordinates against time, of mechanisms with few of them: a series is for a figure.
 template <class Space>
 class AngleObserver final : public Observer<Space> {
  public:

@@ -177,6 +177,8 @@ template <class Space>
 void AngleObserver<Space>::Observe(const Sample<Space>& sample) {
   const Kinematics<Space, double>& kinematics = sample.formulation.kinematics();
   const auto& joints = kinematics.mechanism().joints();
+  constexpr std::size_t kMostJoints = 1000;
+  if (joints.size() > kMostJoints) return;
   const bool first = series_.empty();
   std::size_t s = 0;
   for (int j = 0; j < static_cast<int>(joints.size()); ++j) {

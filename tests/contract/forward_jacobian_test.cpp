@@ -193,8 +193,10 @@ Worst CompareAll(const MechanismDescription& description, double t, const Vector
     const VectorXd u = from.SpeedsIn(to);
     for (FormulationKind formulation :
          {FormulationKind::kOdca, FormulationKind::kLagrange, FormulationKind::kReduction}) {
-      for (Enforcement level : {Enforcement::kAcceleration, Enforcement::kVelocity}) {
-        const Column column{formulation, level, coordinates, SolverKind::kRankRevealing};
+      for (Enforcement level :
+           {Enforcement::kAcceleration, Enforcement::kVelocity, Enforcement::kBaumgarte}) {
+        Column column{formulation, level, coordinates, SolverKind::kRankRevealing};
+        if (level == Enforcement::kBaumgarte) column.gains = BaumgarteGains{3.0, 4.0};
         Compare<Space>(description, column, t, q, u, worst);
       }
     }

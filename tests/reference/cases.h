@@ -96,6 +96,20 @@ inline MechanismFile Shipped(const std::string& name) {
   return ReadMechanism(kConfigs / "mechanisms" / (name + ".json"));
 }
 
+/// Names of all of them, and such a name as part of a test's.
+inline std::vector<std::string> ShippedNames() {
+  std::vector<std::string> names;
+  for (const auto& entry : std::filesystem::directory_iterator(kConfigs / "mechanisms")) {
+    if (entry.path().extension() == ".json") names.push_back(entry.path().stem().string());
+  }
+  std::ranges::sort(names);
+  return names;
+}
+inline std::string WithoutDashes(std::string name) {
+  std::erase(name, '-');
+  return name;
+}
+
 /// Runs it as it is.
 inline Record RunShipped(const std::string& name, const Column& column, double tolerance,
                          double horizon) {

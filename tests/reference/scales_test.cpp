@@ -4,7 +4,6 @@
 
 #include <algorithm>
 #include <cmath>
-#include <filesystem>
 
 #include "mechanism/assembly.h"
 #include "mechanism/similarity.h"
@@ -13,15 +12,6 @@
 
 namespace loopbench::harness::reference {
 namespace {
-
-std::vector<std::string> ShippedNames() {
-  std::vector<std::string> names;
-  for (const auto& entry : std::filesystem::directory_iterator(kConfigs / "mechanisms")) {
-    if (entry.path().extension() == ".json") names.push_back(entry.path().stem().string());
-  }
-  std::ranges::sort(names);
-  return names;
-}
 
 struct FirstEvaluation {
   Outcome outcome = Outcome::kFinished;
@@ -93,13 +83,10 @@ TEST_P(RegularScales, AnglesMoveAsBefore) {
   }
 }
 
-std::string WithoutDashes(const testing::TestParamInfo<std::string>& name) {
-  std::string text = name.param;
-  std::erase(text, '-');
-  return text;
-}
-INSTANTIATE_TEST_SUITE_P(All, Scales, testing::ValuesIn(ShippedNames()), WithoutDashes);
-INSTANTIATE_TEST_SUITE_P(All, RegularScales, testing::ValuesIn(RegularNames()), WithoutDashes);
+INSTANTIATE_TEST_SUITE_P(All, Scales, testing::ValuesIn(ShippedNames()),
+                         [](const auto& name) { return WithoutDashes(name.param); });
+INSTANTIATE_TEST_SUITE_P(All, RegularScales, testing::ValuesIn(RegularNames()),
+                         [](const auto& name) { return WithoutDashes(name.param); });
 
 /// D5: stiffness is physical, rank is not.
 TEST(Masses, RankOfTheFourBarIgnoresThem) {

@@ -1,8 +1,6 @@
 // Every shipped mechanism runs: all three formulations, both coordinate sets, a short while.
 #include <gtest/gtest.h>
 
-#include <algorithm>
-#include <filesystem>
 #include <iostream>
 
 #include "tests/reference/cases.h"
@@ -10,15 +8,6 @@
 
 namespace loopbench::harness::reference {
 namespace {
-
-std::vector<std::string> ShippedNames() {
-  std::vector<std::string> names;
-  for (const auto& entry : std::filesystem::directory_iterator(kConfigs / "mechanisms")) {
-    if (entry.path().extension() == ".json") names.push_back(entry.path().stem().string());
-  }
-  std::ranges::sort(names);
-  return names;
-}
 
 /// Time of a short run [s]: Andrews' squeezer turns a thousand times as fast as the others, the
 /// governor takes 1e4 steps a second.
@@ -52,11 +41,7 @@ TEST_P(ShippedMechanism, RunsInEveryColumnAndBalancesItsEnergy) {
 }
 
 INSTANTIATE_TEST_SUITE_P(All, ShippedMechanism, testing::ValuesIn(ShippedNames()),
-                         [](const auto& name) {
-                           std::string text = name.param;
-                           std::erase(text, '-');
-                           return text;
-                         });
+                         [](const auto& name) { return WithoutDashes(name.param); });
 
 }  // namespace
 }  // namespace loopbench::harness::reference

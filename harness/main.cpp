@@ -140,7 +140,7 @@ int main(int argc, char** argv) {
   AddSettings(list_app, &settings);
 
   CLI::App* check_app =
-      app.add_subcommand("check", "Read mechanism or experiment files, report errors");
+      app.add_subcommand("check", "Read configuration files of any kind, report errors");
   check_app->add_option("file", files.paths, "Files (JSON)")->required();
   AddSettings(check_app, &settings);
 

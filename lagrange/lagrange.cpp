@@ -105,7 +105,7 @@ Outcome Lagrange<Space, S>::FactorResponse() {
     if (!response_.allFinite()) return Outcome::kNonFinite;
     loop_.FactorGeometric(response_);
     FormResponse(mechanism_.bodies());
-    loop_.FactorSoftened(response_);
+    if (!loop_.FactorSoftened(response_)) return Outcome::kSingular;
     diagnostics_.rank = Base::LoopRank(loop_.size() - loop_.rank());
     diagnostics_.smallest_weight = static_cast<double>(loop_.smallest_weight());
   }

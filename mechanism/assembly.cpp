@@ -266,7 +266,7 @@ class Assembler {
       dynamics_.Jacobian(kinematics_, J);
       units_.Apply(units_.rows, J);
       Eigen::ColPivHouseholderQR<MatrixX<double>> qr(J);
-      qr.setThreshold(1e-4);  // the square root of that of the weights (loop_solver.h)
+      qr.setThreshold(2e-4);  // the square root of LoopSolver::kTheta
       rank = qr.rank();
     }
     if (rank < mechanism_.num_u()) return;

@@ -118,7 +118,7 @@ void LoopSolver<S>::FactorGeometric(const ConstRef& X_geometric) {
 }
 
 template <class S>
-void LoopSolver<S>::FactorSoftened(const ConstRef& X) {
+bool LoopSolver<S>::FactorSoftened(const ConstRef& X) {
   using std::sqrt;
   form_ = Form::kSoftened;
   const auto scaled = Scaled(X);
@@ -137,6 +137,7 @@ void LoopSolver<S>::FactorSoftened(const ConstRef& X) {
     }
   }
   cholesky_.compute(rotated);
+  return cholesky_.info() == Eigen::Success;
 }
 
 template <class S>

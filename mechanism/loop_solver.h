@@ -76,8 +76,9 @@ class LoopSolver {
   bool FactorScaled(const ConstRef& X);
   /// Eigen-decomposition of the geometric response; sets rank and weights.
   void FactorGeometric(const ConstRef& X_geometric);
-  /// After FactorGeometric with the same scale.
-  void FactorSoftened(const ConstRef& X);
+  /// After FactorGeometric with the same scale. False when masses are so unequal that rounding
+  /// leaves X without a Cholesky factor.
+  bool FactorSoftened(const ConstRef& X);
 
   /// B := T B, in place.
   void Apply(Eigen::Ref<MatrixX<S>> B) const;

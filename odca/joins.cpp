@@ -71,8 +71,8 @@ Outcome Joins<Space, S>::Assemble(const Kinematics<Space, S>& kinematics) {
   // a loop looks degenerate: let geometry say in which directions, then solve the physics
   softened_ = true;
   AssembleAll(kinematics, mechanism_.geometric_bodies(), Pass::kGeometric);
-  const bool ok = AssembleAll(kinematics, mechanism_.bodies(), Pass::kSoftened);
-  return ok ? Outcome::kFinished : Outcome::kNonFinite;
+  if (AssembleAll(kinematics, mechanism_.bodies(), Pass::kSoftened)) return Outcome::kFinished;
+  return std::isfinite(static_cast<double>(rcond_)) ? Outcome::kSingular : Outcome::kNonFinite;
 }
 
 template <class Space, class S>
@@ -230,10 +230,9 @@ bool Joins<Space, S>::FactorLoop(const Kinematics<Space, S>& kinematics, const P
     loop.FactorGeometric(X);
     dependent_rows_ += loop.size() - loop.rank();
     NoteDiagnostics(node, loop);
-  } else {
-    loop.FactorSoftened(X);
+    return true;
   }
-  return true;
+  return loop.FactorSoftened(X);
 }
 
 template <class Space, class S>

@@ -66,8 +66,14 @@ std::vector<Demand> ReadDemands(const JsonNode& owner, const std::vector<std::st
     const bool possible = std::ranges::all_of(demand.when, [&right](const std::string& ending) {
       return std::ranges::find(right, ending) != right.end();
     });
-    if (const auto when = element.Optional("when"); when && !possible) {
-      when->Fail("endings that are \"right\" here");
+    if (!possible) {
+      constexpr const char* kExpected = "endings that are \"right\" here";
+      const auto when = element.Optional("when");
+      if (when) {
+        when->Fail(kExpected);
+      } else {
+        element.FailAs("no \"when\", which means finished", kExpected);
+      }
     }
     ReadNumber(element, &demand);
   }

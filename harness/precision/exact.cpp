@@ -31,7 +31,8 @@ Exact::Exact(const MechanismDescription& description, Coordinates coordinates)
   u_ = projection.kinematics().SpeedsIn(kinematics_);
 }
 
-Float128 Exact::Drift(const VectorX<Float128>& q) {
+Float128 Exact::Drift(const Float128& t, const VectorX<Float128>& q) {
+  kinematics_.SetTime(t);
   kinematics_.UpdatePosition(q);
   Float128 largest = 0;
   for (int index : mechanism_.constraints()) {
@@ -45,7 +46,8 @@ Float128 Exact::Drift(const VectorX<Float128>& q) {
   return largest;
 }
 
-VectorX<Float128> Exact::Centres(const VectorX<Float128>& q) {
+VectorX<Float128> Exact::Centres(const Float128& t, const VectorX<Float128>& q) {
+  kinematics_.SetTime(t);
   kinematics_.UpdatePosition(q);
   VectorX<Float128> centres(Planar::kLin * (mechanism_.num_bodies() - 1));
   for (int body = 1; body < mechanism_.num_bodies(); ++body) {

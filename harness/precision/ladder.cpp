@@ -51,7 +51,8 @@ Ended Climb(const LadderTask& task, Exact& exact, Scalar scalar, OneStepMethod m
   if (rung.outcome != Outcome::kFinished) return ended;
   std::vector<S> y(static_cast<std::size_t>(formulation->state_size()));
   formulation->ToState(q, u, y);
-  VectorX<Float128> at;  // positions of the state
+  Float128 t_at = 0;     // of the last accepted state
+  VectorX<Float128> at;  // its positions
   Float128 drift = 0;
   const System<S> system{
       formulation->state_size(),
@@ -62,7 +63,7 @@ Ended Climb(const LadderTask& task, Exact& exact, Scalar scalar, OneStepMethod m
         const bool rewritten = formulation->BeginStep(t, state);
         at =
             Eigen::Map<const VectorX<S>>(state.data(), mechanism.num_q()).template cast<Float128>();
-        drift = std::max(drift, exact.Drift(at));
+        drift = std::max(drift, exact.Drift(t_at = Float128(t), at));
         return rewritten;
       }};
   const OneStepResult result = IntegrateSystem<S>(system, S(task.horizon), y,
@@ -78,7 +79,7 @@ Ended Climb(const LadderTask& task, Exact& exact, Scalar scalar, OneStepMethod m
   rung.restarts = result.restarts;
   rung.drift = static_cast<double>(drift);
   rung.error = std::numeric_limits<double>::quiet_NaN();
-  ended.centres = exact.Centres(at);
+  ended.centres = exact.Centres(t_at, at);
   rung.wall_s = std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
   return ended;
 }

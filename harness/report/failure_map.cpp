@@ -81,7 +81,7 @@ void SetDecision(const Demand& demand, const Met& met, MapCell* cell) {
   cell->limit = met.limit;
   cell->ratio = met.ratio;
   cell->total = demand.of.empty() || demand.kind == Demand::Kind::kAtMost
-                    ? cell->total
+                    ? std::numeric_limits<double>::quiet_NaN()
                     : met.limit / demand.number;
 }
 

@@ -99,16 +99,20 @@ TEST(MemberStart, StaysOnTheBranchThroughPositionsWhereBranchesCross) {
 }
 
 TEST(MemberStart, ThatCannotBeReachedSaysSoItself) {
-  // a crank-rocker's rocker cannot be turned round
+  // bars of 1 m on a ground of 1.5 m: coupler and rocker do not reach a crank that points away
   MechanismDescription description = Shipped("dead-centre");
   Case one;
   one.ensemble = 2;
   one.perturb = 0.0;
   const std::string joint =
       description.joints[static_cast<std::size_t>(description.initial.coordinates[0].joint)].name;
-  one.between = {{joint, 50.0, 51.0}};
+  one.between = {{joint, 2.5, 3.5}};
   const MechanismDescription start = MemberStart(description, one, 0);
-  EXPECT_GE(Held(start), 50.0);
+  EXPECT_GE(Held(start), 2.5);
+  const Mechanism<Planar, double> mechanism(start, Coordinates::kJoint);
+  const Start<double> assembled = Assemble<Planar>(start, mechanism);
+  EXPECT_EQ(assembled.outcome, Outcome::kInconsistentStart);
+  EXPECT_FALSE(assembled.message.empty());
 }
 
 Case ParallelogramCase(const Experiment& experiment, const Column& column) {

@@ -115,6 +115,19 @@ TEST(MapRules, AllMistakesAreReportedAtOnce) {
   EXPECT_EQ(found.size(), 21u) << message;
 }
 
+TEST(MapRules, ADemandOfFinishedRunsNeedsThatFinishingIsRight) {
+  const std::string message = MessageOf(R"({
+  "title": "t",
+  "columns": [{"label": "A", "select": {"formulation": "odca"}}],
+  "groups": [{"label": "g", "rows": [
+    {"label": "r", "select": {"a": 1}, "right": "locked", "decides": [{"measure": "t", "limit": 1}]}]}]
+})");
+  EXPECT_NE(message.find("/groups/0/rows/0/decides/0: found no \"when\", which means finished, "
+                         "expected endings that are \"right\" here"),
+            std::string::npos)
+      << message;
+}
+
 TEST(MapRules, ThatAreShippedRead) {
   int count = 0;
   const std::filesystem::path configs = std::filesystem::path(LOOPBENCH_SOURCE_DIR) / "configs";

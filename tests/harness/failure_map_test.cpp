@@ -205,6 +205,22 @@ TEST(MapCell, AnotherEndingMayBeRight) {
   EXPECT_EQ(DecidingNumber(cell), "finished");
 }
 
+TEST(MapCell, ANumberIsShownOutOfItsOwnTotalOnly) {
+  MapRow row = Row();
+  row.decides = {{.measure = "kept",
+                  .name = "kept",
+                  .unit = "",
+                  .kind = Demand::Kind::kAtLeast,
+                  .number = 1.0,
+                  .of = "size"},
+                 {.measure = "slip", .name = "slip", .unit = "m", .number = 1e-6, .of = ""}};
+  Record record = RunOf("odca", 1e-8, 0.0, 0.0);
+  record.Set("size", std::int64_t{400});
+  record.Set("kept", std::int64_t{400});
+  record.Set("slip", 0.016);
+  EXPECT_EQ(DecidingNumber(CellOf({record}, row)), "slip 0.016 m");
+}
+
 TEST(MapCell, CountsAreDemandedAtLeastAndEqual) {
   MapRow row = Row();
   row.decides = {{.measure = "kept",

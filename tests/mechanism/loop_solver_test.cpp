@@ -55,7 +55,7 @@ TEST(LoopSolverTest, AtFullRankEveryFormIsTheInverse) {
     EXPECT_LE((Inverse(solver) - inverse).norm(), bound);
     EXPECT_EQ(solver.rank(), 5);
     EXPECT_EQ(solver.smallest_weight(), 1.0);
-    solver.FactorSoftened(X);
+    ASSERT_TRUE(solver.FactorSoftened(X));
     EXPECT_LE((Inverse(solver) - inverse).norm(), bound);
   }
 }
@@ -78,7 +78,7 @@ TEST(LoopSolverTest, ApplyTransposedIsTheTransposeOfApply) {
   check();
   solver.FactorGeometric(X);
   check();
-  solver.FactorSoftened(X);
+  ASSERT_TRUE(solver.FactorSoftened(X));
   check();
 }
 
@@ -93,12 +93,24 @@ TEST(LoopSolverTest, ExactRedundancyLowersTheRankAndSolvesWhatIsConsistent) {
     solver.FactorGeometric(X_geometric);
     EXPECT_EQ(solver.rank(), 3);
     EXPECT_LT(solver.smallest_weight(), 1e-10);
-    solver.FactorSoftened(X);
+    ASSERT_TRUE(solver.FactorSoftened(X));
     const VectorX<double> rhs = X * RandomMatrix(5, 1, seed + 200);
     const VectorX<double> x = Inverse(solver) * rhs;
     // the regular part of X has a condition of up to 1e5 in these draws
     EXPECT_LE((X * x - rhs).norm(), 1e5 * 100 * kEps * rhs.norm());
   }
+}
+
+TEST(LoopSolverTest, SofteningRefusesWhatRoundingMadeIndefinite) {
+  const MatrixX<double> A = RandomMatrix(5, 8, 1), X = A * A.transpose();
+  LoopSolver<double> solver(kRows);
+  SetScales(solver, X);
+  solver.FactorGeometric(X);
+  // one heavy direction, its response given to 16 digits, and nothing left for the others
+  const VectorX<double> a = RandomMatrix(5, 1, 2);
+  MatrixX<double> lost = a * a.transpose();
+  lost.diagonal() *= 1.0 - 4 * kEps;
+  EXPECT_FALSE(solver.FactorSoftened(lost));
 }
 
 TEST(LoopSolverTest, PlainFactorisationRefusesALostPivot) {

@@ -39,7 +39,7 @@ TEST(ClosedFormTest, ParallelogramFollowsItsPendulumInFloat128) {
   ASSERT_EQ(exact.outcome(), Outcome::kFinished) << exact.message();
   // loops close to a few roundings of lengths of a metre
   const Float128 eps = std::numeric_limits<Float128>::epsilon();
-  EXPECT_LE(exact.Drift(exact.q()), 16 * eps);
+  EXPECT_LE(exact.Drift(Float128(0), exact.q()), 16 * eps);
   const Mechanism<Planar, Float128> mechanism(description, Coordinates::kJoint);
   odca::Odca<Planar, Float128> odca(mechanism, {});
   ASSERT_EQ(odca.Start(Float128(0), exact.q(), exact.u()), Outcome::kFinished);
@@ -126,6 +126,24 @@ TEST_P(LadderTest, DriftOfAParallelogramIsRoundOff) {
     if (scalar != Scalar::kFloat128) {
       EXPECT_EQ(rung.drift_ruled_by, "round-off");
     }
+  }
+}
+
+/// What a prescribed motion says belongs to its time, in either coordinate set.
+TEST(DrivenLadder, FollowsItsDrive) {
+  LadderTask task = Task("driven-four-bar", FormulationKind::kOdca, Enforcement::kPosition);
+  task.precision.scalars = {Scalar::kDouble};
+  task.precision.tolerances = {1e-8};
+  for (const Coordinates coordinates : {Coordinates::kJoint, Coordinates::kAbsolute}) {
+    task.column.coordinates = coordinates;
+    const Ladder ladder = RunLadder(task);
+    ASSERT_EQ(ladder.start, Outcome::kFinished) << ladder.message;
+    const Rung& rung = At(ladder, Scalar::kDouble, 1e-8);
+    ASSERT_EQ(rung.outcome, Outcome::kFinished);
+    // kinematics decides: projected at every step, off by round-off and what it leaves
+    EXPECT_LE(rung.drift, 1e-13);
+    EXPECT_LE(rung.error, 1e-13);
+    EXPECT_LE(ladder.reference.drift, 1e-18);
   }
 }
 

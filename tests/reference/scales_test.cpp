@@ -4,6 +4,8 @@
 
 #include <algorithm>
 #include <cmath>
+#include <string>
+#include <vector>
 
 #include "mechanism/assembly.h"
 #include "mechanism/similarity.h"
@@ -17,7 +19,53 @@ struct FirstEvaluation {
   Outcome outcome = Outcome::kFinished;
   int rank = 0;
   VectorX<double> udot;
+  std::string units;  ///< of the speeds in joint coordinates: 'a' angle, 'l' length per time
 };
+
+/// Of a joint's speeds, in their order; '?' where a joint is none of a tree.
+std::string UnitsOf(JointType type, SpaceKind space) {
+  switch (type) {
+    case JointType::kWeld:
+      return "";
+    case JointType::kPrismatic:
+      return "l";
+    case JointType::kRevolute:
+    case JointType::kHelical:
+      return "a";
+    case JointType::kPinInSlot:
+    case JointType::kCylindrical:
+      return "al";
+    case JointType::kUniversal:
+      return "aa";
+    case JointType::kSpherical:
+      return "aaa";
+    case JointType::kPlanar:
+      return "all";
+    case JointType::kFree:
+      return space == SpaceKind::kPlanar ? "all" : "aaalll";
+    case JointType::kRod:
+      break;
+  }
+  return "?";
+}
+
+template <class Space>
+std::string UnitsOf(const MechanismDescription& scene, const Mechanism<Space, double>& mechanism) {
+  std::string units(static_cast<std::size_t>(mechanism.num_u()), '?');
+  for (int j = 0; j < static_cast<int>(mechanism.joints().size()); ++j) {
+    const Joint<Space, double>& joint = mechanism.joints()[j];
+    if (!joint.in_tree()) continue;
+    const JointType type =
+        joint.description < 0 ? JointType::kFree : scene.joints[joint.description].type;
+    std::string own = UnitsOf(type, scene.space);
+    for (const Drive& drive : mechanism.drives()) {
+      if (drive.joint == j) own[drive.coordinate] = ' ';
+    }
+    std::erase(own, ' ');
+    units.replace(joint.u_offset, own.size(), own);
+  }
+  return units;
+}
 
 template <class Space>
 FirstEvaluation EvaluateIn(const MechanismDescription& scene, const Column& column) {
@@ -26,6 +74,7 @@ FirstEvaluation EvaluateIn(const MechanismDescription& scene, const Column& colu
   FirstEvaluation first;
   first.outcome = start.outcome;
   if (start.outcome != Outcome::kFinished) return first;
+  if (column.coordinates == Coordinates::kJoint) first.units = UnitsOf(scene, mechanism);
   const auto formulation = MakeFormulation<Space>(column, mechanism);
   first.outcome = formulation->Start(0.0, start.q, start.u);
   if (first.outcome != Outcome::kFinished) return first;
@@ -76,9 +125,11 @@ TEST_P(RegularScales, AnglesMoveAsBefore) {
     ASSERT_EQ(scaled.udot.size(), original.udot.size());
     const double bound = 1e-9 * (1.0 + original.udot.cwiseAbs().maxCoeff());
     for (Eigen::Index i = 0; i < scaled.udot.size(); ++i) {
-      const double as_angle = std::abs(scaled.udot[i] - original.udot[i]);
-      const double as_length = std::abs(scaled.udot[i] / kFactor - original.udot[i]);
-      EXPECT_LE(std::min(as_angle, as_length), bound) << ToString(column) << " speed " << i;
+      const char unit = original.units.at(static_cast<std::size_t>(i));
+      ASSERT_NE(unit, '?') << ToString(column) << " speed " << i;
+      const double factor = unit == 'l' ? kFactor : 1.0;
+      EXPECT_NEAR(scaled.udot[i] / factor, original.udot[i], bound)
+          << ToString(column) << " speed " << i;
     }
   }
 }

@@ -104,10 +104,10 @@ Outcome Lagrange<Space, S>::FactorResponse() {
     FormResponse(mechanism_.geometric_bodies());
     if (!response_.allFinite()) return Outcome::kNonFinite;
     loop_.FactorGeometric(response_);
-    FormResponse(mechanism_.bodies());
-    if (!loop_.FactorSoftened(response_)) return Outcome::kSingular;
     diagnostics_.rank = Base::LoopRank(loop_.size() - loop_.rank());
     diagnostics_.smallest_weight = static_cast<double>(loop_.smallest_weight());
+    FormResponse(mechanism_.bodies());
+    if (!loop_.FactorSoftened(response_)) return Outcome::kSingular;
   }
   diagnostics_.rcond = static_cast<double>(loop_.rcond());
   return Outcome::kFinished;

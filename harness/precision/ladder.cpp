@@ -63,7 +63,8 @@ Ended Climb(const LadderTask& task, Exact& exact, Scalar scalar, OneStepMethod m
         const bool rewritten = formulation->BeginStep(t, state);
         at =
             Eigen::Map<const VectorX<S>>(state.data(), mechanism.num_q()).template cast<Float128>();
-        drift = std::max(drift, exact.Drift(t_at = Float128(t), at));
+        t_at = Float128(t);
+        drift = std::max(drift, exact.Drift(t_at, at));
         return rewritten;
       }};
   const OneStepResult result = IntegrateSystem<S>(system, S(task.horizon), y,

@@ -42,7 +42,13 @@ struct Dual {
   explicit operator double() const { return value; }
 
   double partial(int i) const { return i < 4 ? partials.low[i] : partials.high[i - 4]; }
-  void SetPartial(int i, double slope) { (i < 4 ? partials.low : partials.high)[i % 4] = slope; }
+  void SetPartial(int i, double slope) {  // not by ?:, which g++ 12 gets wrong with -fsanitize
+    if (i < 4) {
+      partials.low[i] = slope;
+    } else {
+      partials.high[i - 4] = slope;
+    }
+  }
 
   Dual& operator+=(const Dual& b) { return *this = *this + b; }
   Dual& operator-=(const Dual& b) { return *this = *this - b; }

@@ -28,6 +28,8 @@ Scaling Scale(const Kinematics<Space, double>& kinematics) {
   dynamics.Jacobian(kinematics, J);
   Scaling scaling;
   scaling.L.compute(M);
+  scaling.rows = scaling.B = J;
+  if (J.size() == 0) return scaling;  // which a triangular solve does not take
   scaling.rows = scaling.L.matrixL().solve(J.transpose()).transpose();
   scaling.B = scaling.rows;
   for (int index : mechanism.constraints()) {

@@ -133,7 +133,7 @@ Outcome Reduction<Space, S>::FactorOnce() {
   }
   // a pivot below a few eps of the largest is round-off of the elimination
   if (!(rcond > S(16) * std::numeric_limits<S>::epsilon())) return Outcome::kSingular;
-  if (r > 0) solved_ = lu_.solve(J_I_);
+  if (J_I_.size() > 0) solved_ = lu_.solve(J_I_);
   for (int i = 0; i < J_I_.cols(); ++i) B_(independent_[i], i) = S(1);
   for (int k = 0; k < r; ++k) B_.row(dependent_[k]) = -solved_.row(k);
   factored_version_ = kinematics_.position_version();

@@ -88,7 +88,7 @@ inline Case CaseOf(const Experiment& experiment, const std::string& scene, const
           .rtol = tolerance,
           .atol = tolerance,
           .horizon = horizon,
-          .limits = {.wall_s = 60.0, .steps = 1'000'000}};
+          .limits = {.wall_s = 600.0, .steps = 1'000'000}};
 }
 
 /// A mechanism of configs/mechanisms/.

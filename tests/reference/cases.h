@@ -75,8 +75,8 @@ inline std::string NameOf(const Column& column) {
   return name;
 }
 
-/// One run of a scene. A minute of wall time: limits are for suites, a test must not end by one on
-/// a busy machine.
+/// One run of a scene. Ten minutes of wall time: limits are for suites, a test must not end by one
+/// on a busy machine.
 inline Case CaseOf(const Experiment& experiment, const std::string& scene, const Column& column,
                    double tolerance, double horizon) {
   const auto it = std::ranges::find(experiment.scenes, scene, &ExperimentScene::name);

@@ -118,7 +118,7 @@ IntegratorOptions Options(const std::string& profile, double tolerance) {
   IntegratorOptions options;
   options.profile = profile;
   options.rtol = options.atol = tolerance;
-  options.time_limit_s = 60.0;
+  options.time_limit_s = 600.0;
   return options;
 }
 

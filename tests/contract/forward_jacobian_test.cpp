@@ -286,7 +286,8 @@ TEST(ForwardJacobian, NeedNotKnowHowFarASpringIsWound) {
   arm.name = "a";
   arm.to.body = 1;
   bar.name = "b";
-  bar.from = {1, {1.0, 0.0, 0.0}, {}};
+  bar.from.body = 1;
+  bar.from.position = {1.0, 0.0, 0.0};
   bar.to.body = 2;
   bar.axis = {0.0, 1.0, 0.0};
   description.joints = {arm, bar};

@@ -317,7 +317,7 @@ TEST(ForwardJacobian, NeedNotKnowHowFarASpringIsWound) {
 class ForwardJacobianOfRandom : public ::testing::TestWithParam<std::uint64_t> {};
 TEST_P(ForwardJacobianOfRandom, MechanismInThePlane) { CompareRandom<Planar>(GetParam()); }
 TEST_P(ForwardJacobianOfRandom, MechanismInSpace) { CompareRandom<Spatial>(GetParam()); }
-INSTANTIATE_TEST_SUITE_P(Seeds, ForwardJacobianOfRandom, ::testing::Range<std::uint64_t>(1, 9));
+INSTANTIATE_TEST_SUITE_P(Seeds, ForwardJacobianOfRandom, ::testing::Range<std::uint64_t>(1, 11));
 
 }  // namespace
 }  // namespace loopbench::testing

@@ -205,14 +205,16 @@ TEST(MapCell, AnotherEndingMayBeRight) {
   EXPECT_EQ(DecidingNumber(cell), "finished");
 }
 
+const Demand kAllKept{.measure = "kept",
+                      .name = "kept",
+                      .unit = "",
+                      .kind = Demand::Kind::kAtLeast,
+                      .number = 1.0,
+                      .of = "size"};
+
 TEST(MapCell, ANumberIsShownOutOfItsOwnTotalOnly) {
   MapRow row = Row();
-  row.decides = {{.measure = "kept",
-                  .name = "kept",
-                  .unit = "",
-                  .kind = Demand::Kind::kAtLeast,
-                  .number = 1.0,
-                  .of = "size"},
+  row.decides = {kAllKept,
                  {.measure = "slip", .name = "slip", .unit = "m", .number = 1e-6, .of = ""}};
   Record record = RunOf("odca", 1e-8, 0.0, 0.0);
   record.Set("size", std::int64_t{400});
@@ -223,12 +225,7 @@ TEST(MapCell, ANumberIsShownOutOfItsOwnTotalOnly) {
 
 TEST(MapCell, CountsAreDemandedAtLeastAndEqual) {
   MapRow row = Row();
-  row.decides = {{.measure = "kept",
-                  .name = "kept",
-                  .unit = "",
-                  .kind = Demand::Kind::kAtLeast,
-                  .number = 1.0,
-                  .of = "size"}};
+  row.decides = {kAllKept};
   Record record = RunOf("odca", 1e-8, 0.0, 0.0);
   record.Set("size", std::int64_t{400});
   record.Set("kept", std::int64_t{400});

@@ -140,7 +140,7 @@ TEST(DrivenLadder, FollowsItsDrive) {
     ASSERT_EQ(ladder.start, Outcome::kFinished) << ladder.message;
     const Rung& rung = At(ladder, Scalar::kDouble, 1e-8);
     ASSERT_EQ(rung.outcome, Outcome::kFinished);
-    // kinematics decides: projected at every step, off by round-off and what it leaves
+    // kinematics decides: what projections leave of lengths of a metre, some hundred roundings
     EXPECT_LE(rung.drift, 1e-13);
     EXPECT_LE(rung.error, 1e-13);
     EXPECT_LE(ladder.reference.drift, 1e-18);

@@ -96,6 +96,7 @@ int main(int argc, char** argv) {
       "Measures constraint drift and time of three formulations of closed-loop multibody dynamics.",
       "loopbench"};
   app.footer(kFooter);
+  app.set_version_flag("--version", VersionText);
   app.require_subcommand(1);
   app.failure_message([](const CLI::App* failed, const CLI::Error& error) {
     // CLI11 reports a misspelt subcommand only as a missing one: name it

@@ -31,6 +31,13 @@ std::vector<std::string> Provenance(const std::string& command) {
   };
 }
 
+std::string VersionText() {
+  std::string text = fmt::format("loopbench {}", kBuildVersion);
+  const std::vector<std::string> facts = Provenance("");
+  for (std::size_t i = 2; i < facts.size(); ++i) text += "\n" + facts[i];  // no command, no date
+  return text;
+}
+
 const std::string& CodeVersion() {
   static const std::string version = [] {
     std::ifstream file("/proc/self/exe", std::ios::binary);

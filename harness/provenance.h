@@ -9,6 +9,9 @@ namespace loopbench::harness {
 /// One fact per line, "command: ...". `command` is what the user typed.
 std::vector<std::string> Provenance(const std::string& command);
 
+/// What `loopbench --version` prints: the version, and those facts that no command changes.
+std::string VersionText();
+
 /// 16 hexadecimal digits that change with any byte of this program: results of different versions
 /// are different results.
 const std::string& CodeVersion();

@@ -19,10 +19,16 @@ Exact::Exact(const MechanismDescription& description, Coordinates coordinates)
   q_ = start.q.cast<Float128>();
   u_ = start.u.cast<Float128>();
   outcome_ = projection.Start(Float128(0), q_, u_);
-  if (outcome_ != Outcome::kFinished) return;
-  std::vector<Float128> y(static_cast<std::size_t>(projection.state_size()));
-  projection.ToState(q_, u_, y);
-  projection.BeginStep(Float128(0), y);
+  std::vector<Float128> y(static_cast<std::size_t>(projection.state_size())), ydot(y.size());
+  if (outcome_ == Outcome::kFinished) {
+    projection.ToState(q_, u_, y);
+    projection.BeginStep(Float128(0), y);
+    outcome_ = projection.Derivative(Float128(0), y, ydot);  // says whether the projection failed
+  }
+  if (outcome_ != Outcome::kFinished) {
+    message_ = "the start does not close in float128";
+    return;
+  }
   q_ = projection.q();
   u_ = projection.u();
   if (coordinates == Coordinates::kJoint) return;

@@ -74,9 +74,10 @@ Run MergeParts(std::span<const Run> parts) {
   record.Set("message", speaker.record.Text("message"));
   Extreme(parts, "t_reached", false, &record);
   for (const char* key :
-       {"steps", "rejected", "rhs_evaluations", "restarts", "softened_steps",
-        "softened_evaluations", "mode_changes", "newton_jacobians", "newton_rhs_evaluations",
-        "newton_dual_evaluations", "newton_iterations", "newton_failures"}) {
+       {"steps", "rejected", "rhs_evaluations", "rhs_equivalents", "projection_iterations",
+        "restarts", "softened_steps", "softened_evaluations", "mode_changes", "newton_jacobians",
+        "newton_rhs_evaluations", "newton_dual_evaluations", "newton_iterations",
+        "newton_failures"}) {
     Add<std::int64_t>(parts, key, &record);
   }
   const bool started = std::ranges::all_of(

@@ -80,9 +80,7 @@ class Runner {
       singularity_.Write(run.record);
       exact_.Write(run.record);
       if (with_series_) angles_.Write(run.record);
-      if (case_.column.enforcement == Enforcement::kPosition) {
-        run.record.Set("correction_max", correction_);
-      }
+      correction_.Write(run.record);
       run.record.Set("state_hash", StateHash(y_));
     }
     run.record.Set("outcome", std::string(ToString(result.outcome)));
@@ -91,6 +89,10 @@ class Runner {
     run.record.Set("steps", result.steps);
     run.record.Set("rejected", result.rejected);
     run.record.Set("rhs_evaluations", result.rhs_evaluations);
+    const double iterations = run.record.Number("projection_iterations");
+    run.record.Set("rhs_equivalents",
+                   result.rhs_evaluations +
+                       (std::isnan(iterations) ? 0 : static_cast<std::int64_t>(iterations)));
     run.record.Set("restarts", result.restarts);
     if (FindProfile(case_.integrator)->is_implicit) {
       run.record.Set("newton_jacobians", result.jacobians);
@@ -101,6 +103,11 @@ class Runner {
     }
     run.record.Set("wall_s", result.wall_s);
     run.drift = {drift_.series().t, drift_.series().value};
+    if (with_series_) {
+      run.correction = {correction_.series().t, correction_.series().value};
+      run.energy = {energy_.series().t, energy_.series().value};
+      run.kinetic = energy_.kinetic();
+    }
     return run;
   }
 
@@ -120,7 +127,6 @@ class Runner {
     const StepObserver observe = [&](double t, std::span<double> y_and_work) {
       const std::span<double> y = y_and_work.first(n), work = y_and_work.subspan(n);
       const bool restart = formulation->BeginStep(t, y);
-      correction_ = std::max(correction_, formulation->correction().shift);
       // a derivative that fails here fails in the integrator's next call, with its outcome; only
       // what the failing matrix looked like is worth keeping
       const Outcome outcome = formulation->Derivative(t, y, ydot);
@@ -139,6 +145,7 @@ class Runner {
   void Observe(const Sample<Space>& sample) {
     drift_.Observe(sample);
     energy_.Observe(sample);
+    correction_.Observe(sample);
     condition_.Observe(sample);
     singularity_.Observe(sample);
     exact_.Observe(sample);
@@ -152,11 +159,11 @@ class Runner {
   DriftObserver<Space> drift_;
   SingularityObserver<Space> singularity_;
   EnergyObserver<Space> energy_;
+  CorrectionObserver<Space> correction_;
   ConditionObserver<Space> condition_;
   ExactObserver<Space> exact_;
   AngleObserver<Space> angles_;
   bool with_series_;
-  double correction_ = 0.0;  ///< largest mismatch that a projection took away [m]
   std::vector<double> y_;
 };
 
@@ -196,6 +203,14 @@ void WriteGrowth(const Growth& growth, int failed, Record& record) {
   record.Set("growth_to", growth.t_to);
   record.Set("ensemble", std::int64_t{growth.members});
   record.Set("ensemble_failed", std::int64_t{failed});
+}
+
+/// Growth of what is no drift, in the one run that it is known of: its exponent, without a verdict.
+void WriteExponent(const std::string& key, const DriftSeries& series, double horizon, double scale,
+                   Record& record) {
+  if (series.t.empty() || !(scale > 0.0)) return;
+  const Growth growth = AnalyseGrowth(std::vector{series}, horizon, scale);
+  if (std::isfinite(growth.exponent)) record.Set(key, growth.exponent);
 }
 
 }  // namespace
@@ -258,6 +273,9 @@ Record RunCase(const Experiment& experiment, const Case& one) {
     options.round_off *= std::max(1.0, one.horizon / 10.0);
     WriteGrowth(AnalyseGrowth(runs, one.horizon, length, options), failed, record);
   }
+  WriteExponent("energy_growth_exponent", nominal.energy, one.horizon, nominal.kinetic, record);
+  WriteExponent("correction_growth_exponent", nominal.correction, one.horizon,
+                scene.mechanism.observe.length, record);
   if (one.ensemble > 1) tally.Write(record);
   const DriftSeries envelope = Envelope(nominal.drift, experiment.series_points);
   record.Set("series.drift_t", envelope.t);

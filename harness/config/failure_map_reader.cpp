@@ -125,7 +125,12 @@ class GroupReader {
 
   void ReadNotApplicable(const JsonNode& node, MapRow* row) {
     const auto reasons = node.Optional("not_applicable");
-    if (!reasons || !reasons->ExpectObject(columns_)) return;
+    if (!reasons) return;
+    if (reasons->value().is_string()) {
+      row->others_not_applicable = reasons->Text();
+      return;
+    }
+    if (!reasons->ExpectObject(columns_)) return;
     for (const auto& [column, reason] : reasons->Members()) {
       row->not_applicable[column] = reason.Text();
       const auto index = columns_.Find(column);  // what a group demands of all its rows

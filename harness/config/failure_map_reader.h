@@ -4,7 +4,7 @@
 //   {"title", "comment", "columns": [{"label", "select"}], "groups": [{"label", "rows": [row]}]}
 // and a row
 //   {"label", "select": {key: value or list}, "decides": [demand], "right": ["finished"],
-//    "must_hold": "all" or [column labels], "not_applicable": {column label: reason},
+//    "must_hold": "all" or [column labels], "not_applicable": {column label: reason} or a reason,
 //    "cases": 1, "why"}
 // A group may have all keys of a row too: its "select" and "not_applicable" join those of its rows,
 // each of the others stands where a row has none. A demand is

@@ -76,12 +76,33 @@ class EnergyObserver final : public Observer<Space> {
   void Observe(const Sample<Space>& sample) override;
   void Write(Record& record) const override;
 
+  /// The deviation [J] at each accepted step, and the largest kinetic energy [J] so far.
+  const TimeSeries& series() const { return series_; }
+  double kinetic() const { return kinetic_; }
+
  private:
   int points_;
   bool has_power_;
   bool started_ = false;
   double first_ = 0.0, largest_ = 0.0, kinetic_ = 0.0;
   double supplied_ = 0.0, dissipated_ = 0.0;
+  TimeSeries series_;
+};
+
+/// What projections (level `position`) took away and what they cost: the largest mismatch of points
+/// [m], its series, and Newton steps. Nothing at other levels.
+template <class Space>
+class CorrectionObserver final : public Observer<Space> {
+ public:
+  void Observe(const Sample<Space>& sample) override;
+  void Write(Record& record) const override;
+
+  /// The mismatch [m] at each accepted step.
+  const TimeSeries& series() const { return series_; }
+
+ private:
+  double largest_ = 0.0;
+  std::int64_t iterations_ = 0;
   TimeSeries series_;
 };
 

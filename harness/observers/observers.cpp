@@ -48,6 +48,23 @@ void EnergyObserver<Space>::Write(Record& record) const {
 }
 
 template <class Space>
+void CorrectionObserver<Space>::Observe(const Sample<Space>& sample) {
+  if (sample.formulation.options().enforcement != Enforcement::kPosition) return;
+  const Correction<double>& correction = sample.formulation.correction();
+  largest_ = std::max(largest_, correction.shift);
+  iterations_ += correction.iterations;
+  series_.t.push_back(sample.t);
+  series_.value.push_back(correction.shift);
+}
+
+template <class Space>
+void CorrectionObserver<Space>::Write(Record& record) const {
+  if (series_.t.empty()) return;
+  record.Set("correction_max", largest_);
+  record.Set("projection_iterations", iterations_);
+}
+
+template <class Space>
 void ConditionObserver<Space>::Observe(const Sample<Space>& sample) {
   const Diagnostics& diagnostics = sample.formulation.diagnostics();
   rank_min_ = started_ ? std::min(rank_min_, diagnostics.rank) : diagnostics.rank;
@@ -202,10 +219,11 @@ void AngleObserver<Space>::Write(Record& record) const {
   }
 }
 
-#define LOOPBENCH_INSTANTIATE(Space)       \
-  template class EnergyObserver<Space>;    \
-  template class ConditionObserver<Space>; \
-  template class ExactObserver<Space>;     \
+#define LOOPBENCH_INSTANTIATE(Space)        \
+  template class EnergyObserver<Space>;     \
+  template class CorrectionObserver<Space>; \
+  template class ConditionObserver<Space>;  \
+  template class ExactObserver<Space>;      \
   template class AngleObserver<Space>;
 LOOPBENCH_INSTANTIATE(Planar)
 LOOPBENCH_INSTANTIATE(Spatial)

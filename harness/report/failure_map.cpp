@@ -217,13 +217,16 @@ MapCell JudgeCell(const MapRow& row, std::size_t column, const MapColumn& method
     if (!worst || Badness(one) > Badness(*worst)) worst = one;
   }
   MapCell cell;
-  const auto excused = row.not_applicable.find(method.label);
+  const auto named = row.not_applicable.find(method.label);
+  const std::string excuse = named != row.not_applicable.end() ? named->second
+                             : row.must_hold.at(column)        ? ""
+                                                               : row.others_not_applicable;
   if (worst && (count >= row.cases || worst->state > CellState::kNotMeasured)) {
     cell = *worst;
-  } else if (!worst && excused != row.not_applicable.end()) {
+  } else if (!worst && !excuse.empty()) {
     cell.state = CellState::kNotApplicable;
     cell.word = ToString(cell.state);
-    cell.reason = excused->second;
+    cell.reason = excuse;
   } else {
     cell.reason =
         worst ? fmt::format("{} of {} cases have a record", count, row.cases) : "no record matches";

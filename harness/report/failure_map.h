@@ -41,8 +41,9 @@ struct MapRow {
   std::vector<std::string> right = {"finished"};  ///< how a run should end
   std::vector<bool> must_hold;                    ///< by column: whether the gate asks for it
   std::map<std::string, std::string> not_applicable;  ///< reason by column label
-  std::size_t cases = 1;                              ///< fewer records than these do not hold
-  std::string why;                                    ///< where the limits come from
+  std::string others_not_applicable;  ///< reason for all other columns that need not hold, or ""
+  std::size_t cases = 1;              ///< fewer records than these do not hold
+  std::string why;                    ///< where the limits come from
 };
 
 struct MapGroup {

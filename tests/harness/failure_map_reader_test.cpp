@@ -45,6 +45,14 @@ TEST(MapRules, RowsInheritFromTheirGroup) {
   EXPECT_EQ(row.not_applicable.at("B"), "not B");
 }
 
+TEST(MapRules, OneReasonMayStandForAllOtherColumns) {
+  std::string text = kRules;
+  text.replace(text.find(R"({"B": "not B"})"), 14, R"("elsewhere")");
+  const MapRow row = ParseMapRules(text, "map.json").groups.at(0).rows.at(0);
+  EXPECT_EQ(row.others_not_applicable, "elsewhere");
+  EXPECT_TRUE(row.not_applicable.empty());
+}
+
 TEST(MapRules, RowsMaySayOtherwise) {
   const MapRow row = ParseMapRules(kRules, "map.json").groups.at(0).rows.at(1);
   EXPECT_EQ(ToText(row.decides.at(0)), "k >= 3");

@@ -257,6 +257,17 @@ TEST(MapCell, NotApplicableExcusesAMissingRecordOnly) {
   EXPECT_EQ(cell.state, CellState::kInaccurate);
 }
 
+TEST(MapCell, OneReasonExcusesAllColumnsThatNeedNotHold) {
+  MapRow row = Row();
+  row.others_not_applicable = "not run";
+  row.must_hold = {false};
+  MapCell cell = CellOf({}, row);
+  EXPECT_EQ(cell.state, CellState::kNotApplicable);
+  EXPECT_EQ(cell.reason, "not run");
+  row.must_hold = {true};
+  EXPECT_EQ(CellOf({}, row).state, CellState::kNotMeasured);
+}
+
 constexpr const char* kRules = R"({
   "title": "Two methods", "comment": "For tests.",
   "columns": [{"label": "O-DCA", "select": {"formulation": "odca"}},

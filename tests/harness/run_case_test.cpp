@@ -89,6 +89,27 @@ TEST(FinishedCase, MeasuresFiniteNumbers) {
   EXPECT_GE(record.Number("rhs_evaluations"), 6 * record.Number("steps"));
 }
 
+/// Newton steps of projections are the work that evaluations do not count. On a regular mechanism
+/// one a step is enough at this tolerance, and what it takes away neither grows nor fades, while
+/// the energy's error, which nothing takes away, grows with time.
+TEST(FinishedCase, CountsProjectionsAndTheirGrowth) {
+  const Column position{.formulation = kOdca, .enforcement = Enforcement::kPosition};
+  const Record record = RunPaper("four-bar", position, kTolerance, 300.0);
+  ASSERT_EQ(record.Text("outcome"), "finished");
+  const double steps = record.Number("steps"), iterations = record.Number("projection_iterations");
+  EXPECT_GE(iterations, 0.9 * steps);
+  EXPECT_LE(iterations, 1.1 * steps);
+  EXPECT_EQ(record.Number("rhs_equivalents"), record.Number("rhs_evaluations") + iterations);
+  // 0.125 and 0.25: a running maximum lags by one of some 200 swings, exponents lie 1 apart
+  EXPECT_NEAR(record.Number("correction_growth_exponent"), 0.0, 0.125);
+  EXPECT_NEAR(record.Number("energy_growth_exponent"), 1.0, 0.25);
+
+  const Record without = RunPaper("four-bar", kOdcaJoint, kTolerance, 1.0);
+  EXPECT_EQ(without.Number("rhs_equivalents"), without.Number("rhs_evaluations"));
+  EXPECT_FALSE(IsSet(without, "projection_iterations"));
+  EXPECT_FALSE(IsSet(without, "correction_growth_exponent"));
+}
+
 TEST(FinishedCase, KeepsSeriesOfDriftEnergyAndAnglesToTheEnd) {
   const Record record = RunPaper("four-bar", kOdcaJoint, kTolerance, 2.0);
   EXPECT_EQ(record.Numbers("series.t").back(), 2.0);

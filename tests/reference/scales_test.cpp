@@ -5,9 +5,11 @@
 #include <algorithm>
 #include <cmath>
 #include <string>
+#include <utility>
 #include <vector>
 
 #include "mechanism/assembly.h"
+#include "mechanism/in_space.h"
 #include "mechanism/similarity.h"
 #include "tests/reference/cases.h"
 #include "tests/reference/simulate.h"
@@ -155,13 +157,19 @@ TEST(Masses, RankOfTheFourBarIgnoresThem) {
   }
 }
 
-/// A planar loop described in space has three rows that say nothing new.
-TEST(Masses, PlanarLoopInSpaceReportsItsRedundantRows) {
-  MechanismDescription scene = Shipped("parallelogram-in-space").description;
-  for (const Column& column : PositionColumns()) {
-    const FirstEvaluation first = EvaluateAt(scene, column);
-    ASSERT_EQ(first.outcome, Outcome::kFinished) << ToString(column);
-    EXPECT_EQ(first.rank, 5 - 3) << ToString(column);
+/// A planar loop of revolute joints described in space has three rows that say nothing new, in
+/// every plane and in every one of several loops.
+TEST(InSpace, PlanarLoopsReportThreeRedundantRowsEach) {
+  const std::vector<std::pair<std::string, int>> loops = {
+      {"parallelogram", 1}, {"seven-bar", 2}, {"n-four-bar", 2}, {"andrews-squeezer", 3}};
+  for (const auto& [name, count] : loops) {
+    const MechanismDescription scene =
+        InSpace(Shipped(name).description, Eigen::Vector3d(0.3, -0.5, 0.7));
+    for (const Column& column : PositionColumns()) {
+      const FirstEvaluation first = EvaluateAt(scene, column);
+      ASSERT_EQ(first.outcome, Outcome::kFinished) << name << " " << ToString(column);
+      EXPECT_EQ(first.rank, count * (5 - 3)) << name << " " << ToString(column);
+    }
   }
 }
 

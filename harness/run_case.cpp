@@ -89,10 +89,7 @@ class Runner {
     run.record.Set("steps", result.steps);
     run.record.Set("rejected", result.rejected);
     run.record.Set("rhs_evaluations", result.rhs_evaluations);
-    const double iterations = run.record.Number("projection_iterations");
-    run.record.Set("rhs_equivalents",
-                   result.rhs_evaluations +
-                       (std::isnan(iterations) ? 0 : static_cast<std::int64_t>(iterations)));
+    run.record.Set("rhs_equivalents", result.rhs_evaluations + correction_.iterations());
     run.record.Set("restarts", result.restarts);
     if (FindProfile(case_.integrator)->is_implicit) {
       run.record.Set("newton_jacobians", result.jacobians);

@@ -97,6 +97,7 @@ class CorrectionObserver final : public Observer<Space> {
   void Observe(const Sample<Space>& sample) override;
   void Write(Record& record) const override;
 
+  std::int64_t iterations() const { return iterations_; }
   /// The mismatch [m] at each accepted step.
   const TimeSeries& series() const { return series_; }
 

@@ -66,14 +66,13 @@ void Formulation<Space, S>::ToState(const VectorX<S>& q, const VectorX<S>& u,
 template <class Space, class S>
 Outcome Formulation<Space, S>::FromState(S t, std::span<const S> y) {
   const int num_q = mechanism_.num_q();
-  // right after a projection the positions are those it ended with, and so is what was assembled
-  const bool projected =
-      projected_ && t == kinematics_.time() && std::equal(q_.begin(), q_.end(), y.begin());
-  projected_ = false;
+  const bool known = at_step_end_ && kinematics_.position_version() > 0 &&
+                     t == kinematics_.time() && std::equal(q_.begin(), q_.end(), y.begin());
+  at_step_end_ = false;
   kinematics_.SetTime(t);
   for (int i = 0; i < num_q; ++i) q_[i] = y[i];
   for (int i = 0; i < num_state_speeds(); ++i) u_[state_speed(i)] = y[num_q + i];
-  if (!projected) kinematics_.UpdatePosition(q_);
+  if (!known) kinematics_.UpdatePosition(q_);
   Outcome outcome = Outcome::kFinished;
   if (options_.enforcement == Enforcement::kVelocity && mechanism_.num_u() > 0) {
     outcome = CompleteSpeeds();
@@ -116,7 +115,7 @@ Outcome Formulation<Space, S>::Derivative(S t, std::span<const S> y, std::span<S
 template <class Space, class S>
 Outcome Formulation<Space, S>::Evaluate(S t, const VectorX<S>& q, const VectorX<S>& u,
                                         VectorX<S>& udot) {
-  projected_ = false;
+  at_step_end_ = false;
   kinematics_.SetTime(t);
   q_ = q;
   u_ = u;
@@ -129,6 +128,7 @@ Outcome Formulation<Space, S>::Evaluate(S t, const VectorX<S>& q, const VectorX<
 
 template <class Space, class S>
 bool Formulation<Space, S>::BeginStep(S t, std::span<S> y) {
+  at_step_end_ = true;
   if (FromState(t, y) != Outcome::kFinished) return false;  // the next evaluation will say why
   const bool projects = options_.enforcement == Enforcement::kPosition &&
                         mechanism_.num_rows() > 0 && mechanism_.num_u() > 0;
@@ -137,8 +137,8 @@ bool Formulation<Space, S>::BeginStep(S t, std::span<S> y) {
   const bool changed_gains = ChangeGains(t);
   const bool changed = ChangeMode() || changed_gains;
   if (changed) ++diagnostics_.mode_changes;
+  at_step_end_ = true;
   if (!projects && !changed) return false;
-  projected_ = projects;
   ToState(q_, u_, y);
   return true;
 }

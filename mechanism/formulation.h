@@ -181,7 +181,9 @@ class Formulation {
   std::unique_ptr<Drives<Space, S>> drives_;  ///< null without prescribed motions
   VectorX<S> lambda_of_drives_;
   Correction<S> correction_;
-  bool projected_ = false;                                 ///< the last call was a projection
+  /// The last stage of a step, its projection and the next evaluation meet in the same positions,
+  /// and share what was assembled there. Elsewhere every evaluation is a whole one.
+  bool at_step_end_ = false;
   VectorX<S> violation_, change_of_state_, moved_, step_;  ///< of projections
   BaumgarteGains gains_;
   S accepted_t_ = S(0), longest_step_ = S(0);  ///< of accepted steps

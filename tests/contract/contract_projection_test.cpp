@@ -70,6 +70,36 @@ TEST_P(PositionContractTest, AcceptedStepsAreProjectedToTheConstraints) {
   }
 }
 
+/// The last stage of a step, its projection and the next evaluation share what belongs to the same
+/// positions, and nothing comes out differently for it.
+TEST_P(PositionContractTest, ProjectionsBeginWithWhatTheLastStageKnows) {
+  Run(Description(8), 8, [&](auto bench) {
+    for (std::size_t i = 0; i < bench.y.size(); ++i) {
+      bench.y[i] += 1e-4 * std::sin(2.0 * static_cast<double>(i + 1));
+    }
+    const auto version = [&] { return bench.formulation->kinematics().position_version(); };
+    std::vector<double> other = bench.y, ydot(bench.y.size());
+    ASSERT_TRUE(bench.formulation->BeginStep(0.0, std::span<double>(other)));  // knows nothing
+
+    ASSERT_EQ(bench.Derivative(bench.y), Outcome::kFinished);
+    const long before = version();
+    ASSERT_TRUE(bench.formulation->BeginStep(0.0, std::span<double>(bench.y)));
+    EXPECT_EQ(bench.y, other);
+    // one update a Newton step, and one to take the last of them back
+    const int steps = bench.formulation->correction().iterations;
+    EXPECT_GE(version() - before, steps);
+    EXPECT_LE(version() - before, steps + 1);
+    const long after = version();
+    ASSERT_EQ(bench.formulation->Derivative(0.0, bench.y, ydot), Outcome::kFinished);
+    EXPECT_EQ(version(), after);
+    // an evaluation that follows no step is a whole one
+    const std::vector<double> first = ydot;
+    ASSERT_EQ(bench.formulation->Derivative(0.0, bench.y, ydot), Outcome::kFinished);
+    EXPECT_EQ(version(), after + 1);
+    EXPECT_EQ(ydot, first);
+  });
+}
+
 /// Impulses of constraints alone change the speeds: M (u' - u) = J^T lambda. Reduction keeps its
 /// independent speeds instead.
 TEST_P(ImpulseContractTest, SpeedsChangeByImpulsesOfConstraints) {

@@ -192,7 +192,7 @@ TEST(LadderOfForty, EndsWhereThePublishedOneDoes) {
   ASSERT_EQ(run.result.outcome, Outcome::kFinished) << run.result.message;
   const Eigen::Vector3d tip =
       PointOf(ladder, run.last, BodyNamed(ladder, "crank0"), Eigen::Vector3d::UnitX());
-  // the published file's own 4.1e-6 from the closed form, and 664 rtol of ours
+  // the published file's own 4.1e-6 from the closed form, and what is left for ours at that time
   EXPECT_NEAR(tip.x(), end.x, 1e-5);
   EXPECT_NEAR(tip.y(), end.y, 1e-5);
 }

@@ -206,7 +206,7 @@ void WriteGrowth(const Growth& growth, int failed, Record& record) {
 void WriteExponent(const std::string& key, const DriftSeries& series, double horizon, double scale,
                    Record& record) {
   if (series.t.empty() || !(scale > 0.0)) return;
-  const Growth growth = AnalyseGrowth(std::vector{series}, horizon, scale);
+  const Growth growth = AnalyseGrowth({&series, 1}, horizon, scale);
   if (std::isfinite(growth.exponent)) record.Set(key, growth.exponent);
 }
 

@@ -1,20 +1,15 @@
 // Planted records turn each cell of a failure map into each of its classes.
 #include "harness/report/failure_map.h"
 
-#include <fmt/format.h>
 #include <gtest/gtest.h>
 
 #include <algorithm>
 #include <cmath>
-#include <filesystem>
 #include <limits>
 #include <string>
 #include <vector>
 
-#include "harness/config/failure_map_reader.h"
-#include "harness/report/failure_map_figure.h"
-#include "harness/report/failure_map_report.h"
-#include "harness/store/files.h"
+#include "tests/harness/failure_map_runs.h"
 
 namespace loopbench::harness {
 namespace {
@@ -23,21 +18,6 @@ constexpr double kNan = std::numeric_limits<double>::quiet_NaN();
 
 testing::AssertionResult Contains(const std::string& text, const std::string& part) {
   return testing::IsSubstring("part", "text", part, text);
-}
-
-Record RunOf(const std::string& formulation, double rtol, double branch, double energy,
-             const std::string& outcome = "finished") {
-  Record record;
-  record.Set("kind", std::string("accuracy"));
-  record.Set("mechanism", std::string("parallelogram"));
-  record.Set("formulation", formulation);
-  record.Set("rtol", rtol);
-  record.Set("case_id", fmt::format("{}-{}", formulation, rtol));
-  record.Set("outcome", outcome);
-  record.Set("t_reached", outcome == "finished" ? 20.0 : 0.3125);
-  record.Set("branch_error_max", branch);
-  record.Set("energy_error_max", energy);
-  return record;
 }
 
 /// Branch within 1e-6 rad, energy within 500 rtol.
@@ -266,96 +246,6 @@ TEST(MapCell, OneReasonExcusesAllColumnsThatNeedNotHold) {
   EXPECT_EQ(cell.reason, "not run");
   row.must_hold = {true};
   EXPECT_EQ(CellOf({}, row).state, CellState::kNotMeasured);
-}
-
-constexpr const char* kRules = R"({
-  "title": "Two methods", "comment": "For tests.",
-  "columns": [{"label": "O-DCA", "select": {"formulation": "odca"}},
-              {"label": "multipliers", "select": {"formulation": "lagrange"}}],
-  "groups": [{"label": "singular", "select": {"mechanism": "parallelogram"},
-    "decides": [{"measure": "branch_error_max", "name": "branch", "limit": 1e-6, "unit": "rad"}],
-    "rows": [
-      {"label": "one, \"1e-8\"", "select": {"rtol": 1e-8}, "must_hold": "all", "why": "a reason"},
-      {"label": "two", "select": {"rtol": 1e-6}, "must_hold": ["O-DCA"],
-       "not_applicable": {"multipliers": "none"}}]}]
-})";
-
-FailureMap SmallMap(const std::vector<Record>& records) {
-  return MakeFailureMap(ParseMapRules(kRules, "map.json"), records);
-}
-
-std::vector<Record> SmallRecords() {
-  return {RunOf("odca", 1e-8, 2.5e-7, 0.0), RunOf("lagrange", 1e-8, 0.5, 0.0)};
-}
-
-TEST(FailureMapReport, ListsEveryCellWithEveryDigit) {
-  EXPECT_EQ(ToCsv(MapCellTable(SmallMap(SmallRecords()))),
-            "group,row,column,state,class,outcome,measure,value,unit,limit,ratio,t_reached,holding,"
-            "records,cases,must_hold,reason,case_id\n"
-            "singular,\"one, \"\"1e-8\"\"\",O-DCA,holds,holds,finished,branch_error_max,2.5e-07,"
-            "rad,1e-06,0.25,20,1,1,1,true,,odca-1e-08\n"
-            "singular,\"one, \"\"1e-8\"\"\",multipliers,inaccurate,inaccurate,finished,"
-            "branch_error_max,0.5,rad,1e-06,500000,20,0,1,1,true,\"branch_error_max = 0.5 [rad], "
-            "limit 1e-06\",lagrange-1e-08\n"
-            "singular,two,O-DCA,not measured,not measured,,,,,,,,0,0,1,true,no record matches,\n"
-            "singular,two,multipliers,not applicable,not applicable,,,,,,,,0,0,1,false,none,\n");
-}
-
-TEST(FailureMapReport, PrintsCellsByMethod) {
-  const std::string text = ToText(MapTable(SmallMap(SmallRecords())));
-  EXPECT_TRUE(Contains(text, "one, \"1e-8\"  ok 2.5e-07  inaccurate 0.5\n"));
-  EXPECT_TRUE(Contains(text, "two          ?           -\n"));
-  EXPECT_TRUE(Contains(text, "B  multipliers\n"));
-  EXPECT_TRUE(Contains(text, "4 cells: 1 holds, 1 inaccurate, 1 not measured, 1 not applicable"));
-  EXPECT_EQ(text.find('\033'), std::string::npos);
-  const std::string coloured = ToText(MapTable(SmallMap(SmallRecords())), true);
-  EXPECT_TRUE(Contains(coloured, "\033[31minaccurate 0.5"));
-  EXPECT_TRUE(Contains(coloured, "\033[32mok 2.5e-07"));
-}
-
-TEST(FailureMapReport, PageHasLimitsReasonsAndProvenance) {
-  const std::string page = MapMarkdown(SmallMap(SmallRecords()), {"command: loopbench map"});
-  EXPECT_TRUE(
-      Contains(page, "| one, \"1e-8\" | holds branch 2.5e-07 rad | inaccurate branch 0.5 rad |"));
-  EXPECT_TRUE(Contains(page, "| branch_error_max <= 1e-06 [rad] | a reason |"));
-  EXPECT_TRUE(Contains(page, "| two | O-DCA | not measured (must hold) |"));
-  EXPECT_TRUE(Contains(page, "command: loopbench map"));
-}
-
-TEST(FailureMapReport, ListsDemandsThatAreNotMet) {
-  const std::vector<std::string> broken = BrokenDemands(SmallMap(SmallRecords()));
-  ASSERT_EQ(broken.size(), 2u);
-  EXPECT_TRUE(Contains(broken[0], "multipliers / one, \"1e-8\": inaccurate branch 0.5 rad"));
-  EXPECT_TRUE(Contains(broken[1], "O-DCA / two: not measured (no record matches)"));
-}
-
-TEST(FailureMapReport, RemarksOnKeysThatNoRecordHas) {
-  MapRules rules = ParseMapRules(kRules, "map.json");
-  rules.columns[0].select[0].key = "formulatoin";
-  const FailureMap map = MakeFailureMap(rules, SmallRecords());
-  ASSERT_EQ(map.remarks.size(), 1u);
-  EXPECT_EQ(map.remarks[0],
-            "no record has the key \"formulatoin\" (did you mean \"formulation\"?)");
-}
-
-TEST(FailureMapFigure, SaysEveryClassInWordsAndIsDrawn) {
-  const FailureMap map = SmallMap(SmallRecords());
-  const MapDrawing drawing = DrawMap(map, 1.0);
-  for (const char* word : {"'holds'", "'branch 2.5e-07 rad'", "'inaccurate'", "'not measured'",
-                           "'not applicable'", "'O-DCA'", "'one, \"1e-8\"'", "'Two methods'"}) {
-    EXPECT_TRUE(Contains(drawing.script, word));
-  }
-  const auto path = std::filesystem::path(testing::TempDir()) / "loopbench-failure-map.svg";
-  std::filesystem::remove(path);
-  const auto error = WriteMapFigure(path, map);
-  ASSERT_FALSE(error.has_value()) << *error;
-  const std::string svg = ReadFile(path);
-  EXPECT_TRUE(Contains(svg, "not applicable"));
-  EXPECT_TRUE(Contains(svg, "</svg>"));
-  std::filesystem::remove(path);
-  EXPECT_TRUE(WriteMapFigure(path, map, "no-such-gnuplot")->find("install gnuplot") !=
-              std::string::npos);
-  EXPECT_FALSE(std::filesystem::exists(path));
 }
 
 }  // namespace

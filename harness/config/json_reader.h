@@ -3,7 +3,7 @@
 // Reading goes on after an error with a stand-in value, so that one run shows all errors of a file:
 //   FILE:LINE: /json/pointer: found VALUE, expected WHAT (did you mean "x"?)
 // The caller ends with ErrorList::ThrowIfAny(); what was read before is not used when it throws.
-// Internal to harness/config (see json_document.h).
+// For harness/config and harness/store (see json_document.h).
 #pragma once
 
 #include <Eigen/Core>

@@ -3,19 +3,15 @@
 #include <fmt/format.h>
 
 #include <algorithm>
-#include <cmath>
+#include <array>
 #include <map>
-#include <nlohmann/json.hpp>
 #include <set>
-#include <stdexcept>
 
-#include "harness/store/files.h"
+#include "harness/config/json_reader.h"
 #include "harness/store/result_store.h"
 
 namespace loopbench::harness {
 namespace {
-
-using RunJson = nlohmann::ordered_json;
 
 /// What the library writes beside counters.
 const std::set<std::string> kLibraryKeys = {"name",
@@ -32,18 +28,42 @@ const std::set<std::string> kLibraryKeys = {"name",
                                             "time_unit",
                                             "label",
                                             "error_occurred",
-                                            "error_message"};
+                                            "error_message",
+                                            "skipped",
+                                            "skip_message"};
 
-double NanosecondsPer(const std::string& unit) {
-  if (unit == "us") return 1e3;
-  if (unit == "ms") return 1e6;
-  return unit == "s" ? 1e9 : 1.0;
-}
+/// What records of benchmarks hold beside counters.
+const std::set<std::string> kTakenKeys = {
+    "kind",    "benchmark", "outcome", "start_hash", "cpu_ns", "series.cpu_ns", "series.real_ns",
+    "machine", "compiler",  "flags",   "libm",       "commit", "load_average"};
 
 double MedianOf(std::vector<double> sample) {
   std::ranges::sort(sample);
   const std::size_t n = sample.size();
   return n % 2 == 1 ? sample[n / 2] : 0.5 * (sample[n / 2 - 1] + sample[n / 2]);
+}
+
+/// A string that may be absent or empty.
+std::string AnyText(const JsonNode& owner, const std::string& key) {
+  const std::optional<JsonNode> node = owner.Optional(key);
+  if (!node || node->value() == "") return "";
+  return node->Text();
+}
+
+bool IsTrue(const JsonNode& owner, const std::string& key) {
+  const std::optional<JsonNode> node = owner.Optional(key);
+  return node && node->Bool();
+}
+
+/// One of the times of a run [ns].
+double Time(const JsonNode& run, const std::string& key) {
+  const std::array<double, 4> nanoseconds = {1.0, 1e3, 1e6, 1e9};
+  const std::optional<JsonNode> unit = run.Optional("time_unit");
+  const std::optional<int> index =
+      unit ? unit->Choice({"ns", "us", "ms", "s"}, "a unit of time") : std::optional<int>(0);
+  const std::optional<JsonNode> time = run.Required(key, "a time");
+  return index && time ? time->Number(kNotNegative) * nanoseconds[static_cast<std::size_t>(*index)]
+                       : 0.0;
 }
 
 /// All repetitions of one benchmark.
@@ -52,19 +72,24 @@ struct Repetitions {
   std::vector<double> cpu_ns, real_ns;
   std::map<std::string, std::vector<double>> counters;
 
-  void Add(const RunJson& run) {
-    label = run.value("label", label);
-    if (run.value("error_occurred", false)) {
-      error = run.value("error_message", "an error without a message");
+  void Add(const JsonNode& run) {
+    if (const std::string text = AnyText(run, "label"); !text.empty()) label = text;
+    for (const auto& [flag, words] :
+         {std::pair{"error_occurred", "error_message"}, {"skipped", "skip_message"}}) {
+      if (!IsTrue(run, flag)) continue;
+      error = AnyText(run, words);
+      if (error.empty()) error = "an error without a message";
       return;
     }
-    const double unit = NanosecondsPer(run.value("time_unit", "ns"));
-    cpu_ns.push_back(run.at("cpu_time").get<double>() * unit);
-    real_ns.push_back(run.at("real_time").get<double>() * unit);
-    for (const auto& [key, value] : run.items()) {
-      if (value.is_number() && !kLibraryKeys.contains(key)) {
-        counters[key].push_back(value.get<double>());
+    cpu_ns.push_back(Time(run, "cpu_time"));
+    real_ns.push_back(Time(run, "real_time"));
+    for (const auto& [key, node] : run.Members()) {
+      // other versions of the library may add words and flags; whatever else is there is a counter
+      if (kLibraryKeys.contains(key) || node.value().is_string() || node.value().is_boolean()) {
+        continue;
       }
+      if (kTakenKeys.contains(key)) node.FailAs("a counter", "a name that records do not use");
+      counters[key].push_back(node.Number());
     }
   }
 
@@ -83,60 +108,58 @@ struct Repetitions {
   }
 };
 
-/// The origin, and how busy the machine was when the program started.
-void AddContext(const RunJson& context, Record& record) {
-  if (!context.is_object()) return;
-  for (const char* key : {"machine", "compiler", "flags", "libm", "commit"}) {
-    if (context.contains(key) && context[key].is_string()) {
-      record.Set(key, context[key].get<std::string>());
+std::vector<Repetitions> ReadRuns(const JsonNode& root) {
+  std::vector<Repetitions> all;
+  std::map<std::string, std::size_t> place;
+  const std::optional<JsonNode> runs = root.Required("benchmarks", "the runs of Google Benchmark");
+  if (!runs) return all;
+  for (const JsonNode& run : runs->Elements("runs of Google Benchmark")) {
+    if (!run.value().is_object()) {
+      run.Fail("an object, a run of Google Benchmark");
+      continue;
     }
+    const std::optional<JsonNode> type = run.Optional("run_type");
+    if (type && type->Choice({"iteration", "aggregate"}, "a type of run") != 0) continue;
+    const std::optional<JsonNode> run_name = run.Optional("run_name");
+    const std::optional<JsonNode> name = run_name ? run_name : run.Required("name", "a name");
+    if (!name) continue;
+    const auto [at, is_new] = place.try_emplace(name->Text(), all.size());
+    if (is_new) all.emplace_back().name = at->first;
+    all[at->second].Add(run);
   }
-  if (context.contains("load_avg") && context["load_avg"].is_array() &&
-      !context["load_avg"].empty() && context["load_avg"][0].is_number()) {
-    record.Set("load_average", context["load_avg"][0].get<double>());
+  return all;
+}
+
+/// The origin, and how busy the machine was when the program started.
+Record ReadContext(const JsonNode& root) {
+  Record record;
+  const std::optional<JsonNode> context = root.Optional("context");
+  if (!context) return record;
+  if (!context->value().is_object()) context->Fail("an object");
+  for (const char* key : {"machine", "compiler", "flags", "libm", "commit"}) {
+    if (const std::string text = AnyText(*context, key); !text.empty()) record.Set(key, text);
   }
+  if (const auto load = context->Optional("load_avg")) {
+    const std::vector<JsonNode> loads = load->Elements("numbers");
+    if (!loads.empty()) record.Set("load_average", loads.front().Number());
+  }
+  return record;
 }
 
 }  // namespace
 
 std::vector<Record> ParseBenchmarkJson(std::string_view text, const std::string& file) {
-  const auto fail = [&file](const std::string& found) {
-    throw std::runtime_error(
-        fmt::format("{}: {}, expected the JSON of Google Benchmark", file, found));
-  };
-  RunJson document;
-  try {
-    document = RunJson::parse(text.begin(), text.end());
-  } catch (const RunJson::exception& error) {
-    fail(fmt::format("not JSON ({})", error.what()));
-  }
-  if (!document.is_object() || !document.contains("benchmarks") ||
-      !document["benchmarks"].is_array()) {
-    fail("no array \"benchmarks\"");
-  }
-  std::vector<Repetitions> all;
-  std::map<std::string, std::size_t> place;
-  std::size_t index = 0;
-  for (const RunJson& run : document["benchmarks"]) {
-    try {
-      if (run.value("run_type", "iteration") == "iteration") {
-        const std::string name = run.contains("run_name") ? run.at("run_name").get<std::string>()
-                                                          : run.at("name").get<std::string>();
-        const auto [at, is_new] = place.try_emplace(name, all.size());
-        if (is_new) all.emplace_back().name = name;
-        all[at->second].Add(run);
-      }
-    } catch (const RunJson::exception& error) {
-      fail(fmt::format("/benchmarks/{}: {}", index, error.what()));
-    }
-    ++index;
-  }
-  const RunJson context = document.value("context", RunJson::object());
+  const Json document = ParseDocument(text, file);
+  ErrorList errors(file, text);
+  const JsonNode root(document, "", errors);
+  if (!document.is_object()) root.Fail("the JSON object that Google Benchmark writes");
+  const std::vector<Repetitions> all = ReadRuns(root);
+  const Record context = ReadContext(root);
+  errors.ThrowIfAny();
   std::vector<Record> records;
   for (const Repetitions& one : all) {
-    Record record = one.ToRecord();
-    AddContext(context, record);
-    records.push_back(std::move(record));
+    records.push_back(one.ToRecord());
+    for (const auto& [key, value] : context.items()) records.back().Set(key, value);
   }
   return records;
 }
@@ -147,7 +170,7 @@ std::vector<Record> ReadMeasurements(const std::filesystem::path& path,
   if (std::filesystem::is_directory(path, error) || path.extension() == ".jsonl") {
     return LatestRecords(ReadRecords(path, warnings));
   }
-  return ParseBenchmarkJson(ReadFile(path), path.string());
+  return ParseBenchmarkJson(ReadTextFile(path), path.string());
 }
 
 }  // namespace loopbench::harness

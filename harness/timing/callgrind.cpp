@@ -27,9 +27,13 @@ std::optional<std::string_view> LineAfter(std::string_view text, std::string_vie
 std::int64_t CallgrindInstructions(std::string_view text, const std::string& file) {
   const auto events = LineAfter(text, "events: "), totals = LineAfter(text, "totals: ");
   std::int64_t count = 0;
-  const bool is_count =
-      totals &&
-      std::from_chars(totals->data(), totals->data() + totals->size(), count).ec == std::errc();
+  bool is_count = false;
+  if (totals) {
+    const char* const line_end = totals->data() + totals->size();
+    const auto [end, error] = std::from_chars(totals->data(), line_end, count);
+    // other events may follow
+    is_count = error == std::errc() && count >= 0 && (end == line_end || *end == ' ');
+  }
   if (!is_count || !events || !events->starts_with("Ir")) {
     throw std::runtime_error(fmt::format(
         "{}: no \"events: Ir\" and \"totals: NUMBER\", expected a file of Callgrind", file));

@@ -42,8 +42,8 @@ TEST_F(ComparisonCommands, CompareARunWithItselfAndWithAPlantedDrift) {
 TEST_F(ComparisonCommands, RefuseWhatIsNotThere) {
   Write("b.json", R"({"benchmarks": []})");
   Write("text.json", "nothing");
-  Expect("compare none.json b.json", 2, {"cannot read 'none.json'"});
-  Expect("compare b.json text.json", 2, {"text.json: not JSON"});
+  Expect("compare none.json b.json", 2, {"none.json: cannot be read: no such file"});
+  Expect("compare b.json text.json", 2, {"text.json:1:"});
   Expect("compare b.json b.json", 2, {"COULD NOT MEASURE"});
   Expect("compare b.json b.json --only speed", 2, {"--only"});
   Expect("fit b.json", 2, {"no family of benchmarks"});

@@ -53,26 +53,65 @@ TEST(BenchmarkJson, BecomesOneRecordPerBenchmark) {
   EXPECT_EQ(b.Find("series.cpu_ns"), nullptr);
 }
 
-void ExpectRefused(const std::string& text, const std::string& word) {
+void ExpectRefused(const std::string& text, const std::string& words) {
   try {
     ParseBenchmarkJson(text, "b.json");
-    ADD_FAILURE() << "accepted: " << text;
+    ADD_FAILURE() << "accepted: " << text.substr(0, 200);
   } catch (const std::runtime_error& error) {
     const std::string message = error.what();
-    EXPECT_EQ(message.find("b.json: "), 0u) << message;
-    EXPECT_NE(message.find(word), std::string::npos) << message;
+    EXPECT_EQ(message.find("b.json:"), 0u) << message;
+    EXPECT_NE(message.find(words), std::string::npos) << message;
+    EXPECT_EQ(message.find("json.exception"), std::string::npos) << message;
+    EXPECT_LT(message.size(), 1000u) << message.substr(0, 1000);
   }
 }
 
+/// One run with these members beside its name.
+std::string OneRun(const std::string& members) {
+  return R"({"benchmarks": [{"name": "a", )" + members + "}]}";
+}
+
 TEST(BenchmarkJson, IsRefusedWithItsPlace) {
-  ExpectRefused("", "not JSON");
-  ExpectRefused(R"({"benchmarks": [{"name": "a", "cpu_time": NaN}]})", "not JSON");
-  ExpectRefused(R"({"context": {}})", "no array \"benchmarks\"");
-  ExpectRefused(R"({"benchmarks": 3})", "no array \"benchmarks\"");
-  ExpectRefused(R"({"benchmarks": [{"name": "a"}]})", "/benchmarks/0");
-  ExpectRefused(R"({"benchmarks": [{"name": "a", "cpu_time": "x", "real_time": 1}]})",
-                "/benchmarks/0");
-  ExpectRefused(R"({"benchmarks": [7]})", "/benchmarks/0");
+  ExpectRefused("", "b.json:1:1: found an empty file");
+  ExpectRefused("{\"benchmarks\": [\n{]}", "b.json:2:2: found ']'");
+  ExpectRefused("[]", "(top level): found an empty array");
+  ExpectRefused(R"({"context": {}})", "found no \"benchmarks\"");
+  ExpectRefused(R"({"benchmarks": 3})", "/benchmarks: found 3, expected an array");
+  ExpectRefused(R"({"benchmarks": [7]})", "/benchmarks/0: found 7, expected an object");
+  ExpectRefused(R"({"benchmarks": [{"cpu_time": 1}]})", "/benchmarks/0: found no \"name\"");
+  ExpectRefused(R"({"benchmarks": [{"name": "a"}]})", "/benchmarks/0: found no \"cpu_time\"");
+  ExpectRefused(R"({"benchmarks": [], "context": []})", "/context: found an empty array");
+  ExpectRefused(R"({"benchmarks": [], "context": {"machine": 7}})", "/context/machine: found 7");
+}
+
+TEST(BenchmarkJson, TakesFiniteNumbersInKnownUnitsOnly) {
+  ExpectRefused(OneRun(R"("cpu_time": NaN, "real_time": 1)"), "NaN and Infinity are not allowed");
+  ExpectRefused(OneRun(R"("cpu_time": 1e999, "real_time": 1)"), "expected one that fits a double");
+  ExpectRefused(OneRun(R"("cpu_time": null, "real_time": 1)"),
+                "/benchmarks/0/cpu_time: found null, expected a number >= 0");
+  ExpectRefused(OneRun(R"("cpu_time": 1, "real_time": "x")"), "/real_time: found \"x\"");
+  ExpectRefused(OneRun(R"("cpu_time": -1, "real_time": 1)"), "/cpu_time: found -1");
+  ExpectRefused(OneRun(R"("cpu_time": 1, "real_time": 1, "time_unit": "fs")"),
+                "/time_unit: found \"fs\", expected a unit of time: \"ns\", \"us\", \"ms\", \"s\"");
+  ExpectRefused(OneRun(R"("cpu_time": 1, "real_time": 1, "bytes": null)"), "/bytes: found null");
+  ExpectRefused(OneRun(R"("cpu_time": 1, "real_time": 1, "bytes": [1])"), "/bytes: found [1]");
+  ExpectRefused(OneRun(R"("cpu_time": 1, "real_time": 1, "outcome": 1)"),
+                "/outcome: found a counter, expected a name that records do not use");
+  ExpectRefused(OneRun(R"("cpu_time": 1, "real_time": 1, "bytes": 1, "bytes": 2)"), "twice");
+  ExpectRefused(OneRun(R"("error_occurred": "no")"), "/error_occurred: found \"no\"");
+}
+
+TEST(BenchmarkJson, OfAnyDepthIsReadOrRefused) {
+  const std::string deep(100'000, '['), end(100'000, ']');
+  ExpectRefused(R"({"benchmarks": [], "context": )" + deep + end + "}", "nesting deeper than 64");
+  ExpectRefused(R"({"benchmarks": )" + deep, "nesting deeper than 64");
+}
+
+TEST(BenchmarkJson, KeepsRunsThatWereSkipped) {
+  const std::vector<Record> records = ParseBenchmarkJson(
+      OneRun(R"("skipped": true, "skip_message": "no such size", "cpu_time": 0)"), "b.json");
+  ASSERT_EQ(records.size(), 1u);
+  EXPECT_EQ(records[0].Text("outcome"), "no such size");
 }
 
 std::vector<TrackedValue> Values() {
@@ -120,8 +159,9 @@ TEST(Callgrind, GivesTheTotal) {
   EXPECT_EQ(CallgrindInstructions("# callgrind format\nevents: Ir\nsummary: 9\n\ntotals: 291772\n",
                                   "cg.1"),
             291772);
-  for (const char* text :
-       {"", "events: Ir\n", "events: Dr\ntotals: 5\n", "events: Ir\ntotals: x"}) {
+  for (const char* text : {"", "events: Ir\n", "events: Dr\ntotals: 5\n", "events: Ir\ntotals: x",
+                           "events: Ir\ntotals: 12x", "events: Ir\ntotals: -5",
+                           "events: Ir\ntotals: 99999999999999999999"}) {
     try {
       CallgrindInstructions(text, "cg.1");
       ADD_FAILURE() << text;

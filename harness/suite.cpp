@@ -3,9 +3,10 @@
 #include <fmt/format.h>
 
 #include <algorithm>
+#include <charconv>
 #include <cmath>
-#include <cstdio>
 #include <functional>
+#include <limits>
 #include <map>
 
 #include "harness/compiled_scene.h"
@@ -232,11 +233,14 @@ std::vector<Case> SelectCases(const Experiment& experiment, const Selection& fil
 
 Shard ParseShard(const std::string& text) {
   Shard shard;
-  int length = 0;
-  const int read = std::sscanf(text.c_str(), "%d/%d%n", &shard.index, &shard.count, &length);
-  if (read != 2 || static_cast<std::size_t>(length) != text.size() || shard.index < 1 ||
+  const char* const end = text.data() + text.size();
+  const auto index = std::from_chars(text.data(), end, shard.index);
+  const bool has_count = index.ec == std::errc() && index.ptr != end && *index.ptr == '/';
+  const auto count = has_count ? std::from_chars(index.ptr + 1, end, shard.count) : index;
+  if (!has_count || count.ec != std::errc() || count.ptr != end || shard.index < 1 ||
       shard.index > shard.count) {
-    throw ConfigError(fmt::format("--shard: found \"{}\", expected k/n with 1 <= k <= n", text));
+    throw ConfigError(fmt::format("--shard: found \"{}\", expected k/n with 1 <= k <= n <= {}", text,
+                                  std::numeric_limits<int>::max()));
   }
   return shard;
 }

@@ -263,7 +263,8 @@ TEST_F(Shards, AreMergedIntoANewStoreOnly) {
 }
 
 TEST_F(Shards, WithBadNumbersAreRefused) {
-  for (const char* shard : {"0/2", "3/2", "1", "1/2x", "-1/2", "a/b"}) {
+  for (const char* shard : {"0/2", "3/2", "1", "1/2x", "-1/2", "a/b", "4294967297/4294967298",
+                            "1/4294967298", "1/", "/2", "+1/2", "1/1e3"}) {
     ExpectEnding(Call(std::string("run tiny.json --shard ") + shard), 2, {"--shard", "k/n"});
   }
 }

@@ -12,6 +12,7 @@
 #include "harness/run_case.h"
 #include "harness/store/files.h"
 #include "harness/store/result_store.h"
+#include "harness/terminal.h"
 #include "harness/timing/time_cases.h"
 
 namespace loopbench::harness {
@@ -19,7 +20,7 @@ namespace loopbench::harness {
 std::vector<Record> LoadRecords(const std::filesystem::path& store) {
   std::vector<std::string> warnings;
   const std::vector<Record> records = LatestRecords(ReadRecords(store, &warnings));
-  for (const std::string& warning : warnings) fmt::print(stderr, "warning: {}\n", warning);
+  for (const std::string& warning : warnings) PrintError("warning: {}\n", warning);
   return records;
 }
 
@@ -37,12 +38,12 @@ int Run(const RunCommand& command, const std::string& typed) {
     ResultStore store(out);
     const std::vector<Record> before = ReadRecords(out);
     const SuiteCount count = RunSuite(experiments, command.suite, before, store);
-    fmt::print(stderr, "{} run now{}, {} were done before\n", count.run,
+    PrintError("{} run now{}, {} were done before\n", count.run,
                count.failed > 0 ? fmt::format(" ({} not finished)", count.failed) : "",
                count.skipped);
   }
   WriteTables(LoadRecords(out), out, typed);
-  fmt::print("results in {}\n", out.string());
+  Print("results in {}\n", out.string());
   return 0;
 }
 
@@ -85,8 +86,8 @@ int Merge(const MergeCommand& command) {
                     command.out.string()));
   }
   WriteFileAtomically(target.file(), text);
-  fmt::print("{} records of {} stores are {} cases in {}\n", read, command.stores.size(),
-             merged.size(), target.file().string());
+  Print("{} records of {} stores are {} cases in {}\n", read, command.stores.size(), merged.size(),
+        target.file().string());
   return 0;
 }
 
@@ -101,8 +102,8 @@ int PrintVerdicts(const VerdictCommand& command, const std::string& typed) {
   }
   Table verdicts = VerdictTable(results);
   verdicts.notes = Provenance(typed);
-  fmt::print("{}\n", ToText(verdicts));
-  if (!command.out.empty()) fmt::print("wrote {}\n", command.out.string());
+  Print("{}\n", ToText(verdicts));
+  if (!command.out.empty()) Print("wrote {}\n", command.out.string());
   return 0;
 }
 

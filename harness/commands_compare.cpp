@@ -14,6 +14,7 @@
 #include "harness/report/table.h"
 #include "harness/store/files.h"
 #include "harness/store/measurements.h"
+#include "harness/terminal.h"
 
 namespace loopbench::harness {
 
@@ -22,7 +23,7 @@ namespace {
 std::vector<Record> LoadMeasurements(const std::filesystem::path& path) {
   std::vector<std::string> warnings;
   std::vector<Record> records = ReadMeasurements(path, &warnings);
-  for (const std::string& warning : warnings) fmt::print(stderr, "warning: {}\n", warning);
+  for (const std::string& warning : warnings) PrintError("warning: {}\n", warning);
   return records;
 }
 
@@ -34,10 +35,10 @@ std::string RenderTable(const Table& table, const std::string& format) {
 
 void Deliver(const std::string& text, const std::filesystem::path& out) {
   if (out.empty()) {
-    fmt::print("{}", text);
+    Print("{}", text);
   } else {
     WriteFileAtomically(out, text);
-    fmt::print("wrote {}\n", out.string());
+    Print("wrote {}\n", out.string());
   }
 }
 
@@ -182,15 +183,15 @@ int PrintComparison(const CompareCommand& command, const std::string& typed) {
   NoteOrigins("NEW", fresh, notes);
   Table findings = FindingTable(comparison, command.format == "csv");
   if (command.format == "csv") {
-    fmt::print("{}", ToCsv(findings));
-    fmt::print(stderr, "{}\n", Conclusion(comparison, code));
+    Print("{}", ToCsv(findings));
+    PrintError("{}\n", Conclusion(comparison, code));
     return code;
   }
   if (command.format == "markdown") notes.push_back(fmt::format("command: {}", typed));
-  if (!findings.rows.empty()) fmt::print("{}\n", RenderTable(findings, command.format));
+  if (!findings.rows.empty()) Print("{}\n", RenderTable(findings, command.format));
   Table summary = SummaryTable(comparison);
   summary.notes = notes;
-  fmt::print("{}\n{}\n", RenderTable(summary, command.format), Conclusion(comparison, code));
+  Print("{}\n{}\n", RenderTable(summary, command.format), Conclusion(comparison, code));
   return code;
 }
 
@@ -210,8 +211,7 @@ int PrintFits(const FitCommand& command, const std::string& typed) {
                    {"failed", "failed", Format::kInteger, {}}};
   table.rows = FitFamilies(benchmarks, command.from);
   if (table.rows.empty()) {
-    fmt::print(stderr, "{}: no family of benchmarks with two sizes or more\n",
-               command.file.string());
+    PrintError("{}: no family of benchmarks with two sizes or more\n", command.file.string());
     return 2;
   }
   if (command.format != "text" || !command.out.empty()) {
@@ -228,7 +228,7 @@ int PrintFits(const FitCommand& command, const std::string& typed) {
 int ExportMeasurements(const ExportCommand& command) {
   const std::vector<TrackedValue> values = TrackedValues(LoadMeasurements(command.file));
   if (values.empty()) {
-    fmt::print(stderr, "{}: nothing to export: no record that finished has a measure\n",
+    PrintError("{}: nothing to export: no record that finished has a measure\n",
                command.file.string());
     return 2;
   }

@@ -13,6 +13,7 @@
 #include "harness/precision_cases.h"
 #include "harness/report/table.h"
 #include "harness/run_case.h"
+#include "harness/terminal.h"
 #include "harness/timing/time_cases.h"
 
 namespace loopbench::harness {
@@ -73,8 +74,8 @@ void CheckExperiment(const std::filesystem::path& path, const std::vector<Settin
     cases += Expand(experiment).size();
     LadderGroups(experiment);  // refuses what it cannot run
   }
-  fmt::print("{}: experiment \"{}\", {} cases{}\n", path.string(), experiments.front().name, cases,
-             experiments.size() > 1 ? fmt::format(" in {} combinations", experiments.size()) : "");
+  Print("{}: experiment \"{}\", {} cases{}\n", path.string(), experiments.front().name, cases,
+        experiments.size() > 1 ? fmt::format(" in {} combinations", experiments.size()) : "");
 }
 
 void CheckMechanism(const std::filesystem::path& path, const std::vector<Setting>& settings) {
@@ -82,8 +83,8 @@ void CheckMechanism(const std::filesystem::path& path, const std::vector<Setting
     throw ConfigError(fmt::format("{}: --set is for experiments, and this is none", path.string()));
   }
   const MechanismFile file = ReadMechanism(path);
-  fmt::print("{}: mechanism \"{}\", {} bodies, {} joints\n", path.string(), file.description.name,
-             file.description.bodies.size() - 1, file.description.joints.size());
+  Print("{}: mechanism \"{}\", {} bodies, {} joints\n", path.string(), file.description.name,
+        file.description.bodies.size() - 1, file.description.joints.size());
 }
 
 }  // namespace
@@ -105,7 +106,7 @@ int List(const ExperimentFiles& files) {
   for (const auto& path : files.paths) {
     const std::vector<Experiment> experiments =
         ReadSelected({{path}, files.settings, files.filter});
-    fmt::print("{}\n", ToText(CaseTable(experiments, files.filter)));
+    Print("{}\n", ToText(CaseTable(experiments, files.filter)));
   }
   return 0;
 }
@@ -122,22 +123,21 @@ int CheckFiles(const ExperimentFiles& files) {
           CheckMechanism(path, files.settings);
           break;
         case FileKind::kClaims:
-          fmt::print("{}: {} claims\n", path.string(), ReadClaims(path).size());
+          Print("{}: {} claims\n", path.string(), ReadClaims(path).size());
           break;
         case FileKind::kMap: {
           const MapRules map = ReadMapRules(path);
           std::size_t rows = 0;
           for (const MapGroup& group : map.groups) rows += group.rows.size();
-          fmt::print("{}: failure map of {} rows and {} columns\n", path.string(), rows,
-                     map.columns.size());
+          Print("{}: failure map of {} rows and {} columns\n", path.string(), rows,
+                map.columns.size());
           break;
         }
         case FileKind::kBenchmarks:
-          fmt::print("{}: {} groups of benchmarks\n", path.string(),
-                     ReadBenchmarks(path).groups.size());
+          Print("{}: {} groups of benchmarks\n", path.string(), ReadBenchmarks(path).groups.size());
       }
     } catch (const ConfigError& error) {
-      fmt::print(stderr, "{}\n", error.what());
+      PrintError("{}\n", error.what());
       exit_code = 2;
     }
   }

@@ -8,6 +8,7 @@
 #include "harness/config/config_error.h"
 #include "harness/config/file_kind.h"
 #include "harness/precision_cases.h"
+#include "harness/terminal.h"
 #include "harness/timing/time_cases.h"
 
 namespace loopbench::harness {
@@ -40,16 +41,15 @@ bool Any(const Experiment& experiment, Is is) {
 }
 
 void ExplainScenes(const Experiment& experiment) {
-  fmt::print("\nMechanisms\n");
+  Print("\nMechanisms\n");
   for (const ExperimentScene& scene : experiment.scenes) {
     const MechanismDescription& description = scene.mechanism.description;
-    fmt::print("  {} is {} mechanism of {} and {}{}. It is simulated for {} s of its own time.\n",
-               scene.name, description.space == SpaceKind::kPlanar ? "a planar" : "a spatial",
-               description.bodies.size() == 2
-                   ? "1 body"
-                   : fmt::format("{} bodies", description.bodies.size() - 1),
-               Plural(description.joints.size(), "joint"),
-               scene.path.empty() ? "" : " (" + scene.path.string() + ")", Numbers(scene.horizons));
+    Print("  {} is {} mechanism of {} and {}{}. It is simulated for {} s of its own time.\n",
+          scene.name, description.space == SpaceKind::kPlanar ? "a planar" : "a spatial",
+          description.bodies.size() == 2 ? "1 body"
+                                         : fmt::format("{} bodies", description.bodies.size() - 1),
+          Plural(description.joints.size(), "joint"),
+          scene.path.empty() ? "" : " (" + scene.path.string() + ")", Numbers(scene.horizons));
   }
 }
 
@@ -57,72 +57,72 @@ void ExplainFormulations(const Experiment& experiment) {
   const auto uses = [&](FormulationKind kind) {
     return Any(experiment, [kind](const Column& one) { return one.formulation == kind; });
   };
-  fmt::print("\nColumns: {} ways of keeping the loops closed\n", experiment.columns.size());
-  for (const Column& column : experiment.columns) fmt::print("  {}\n", ToString(column));
-  fmt::print("  The words stand for formulation/enforcement/coordinates/solver.\n");
+  Print("\nColumns: {} ways of keeping the loops closed\n", experiment.columns.size());
+  for (const Column& column : experiment.columns) Print("  {}\n", ToString(column));
+  Print("  The words stand for formulation/enforcement/coordinates/solver.\n");
   if (uses(FormulationKind::kOdca)) {
-    fmt::print(
+    Print(
         "  odca: orthogonal complement divide and conquer. Bodies are joined pair by pair; "
         "the loops' forces are found on the way.\n");
   }
   if (uses(FormulationKind::kLagrange)) {
-    fmt::print("  lagrange: one multiplier per constraint, all solved at once.\n");
+    Print("  lagrange: one multiplier per constraint, all solved at once.\n");
   }
   if (uses(FormulationKind::kReduction)) {
-    fmt::print("  reduction: independent speeds only; the others follow from the loops.\n");
+    Print("  reduction: independent speeds only; the others follow from the loops.\n");
   }
 }
 
 void ExplainChoices(const Experiment& experiment) {
   const auto any = [&](auto is) { return Any(experiment, is); };
   if (any([](const Column& c) { return c.enforcement == Enforcement::kAcceleration; })) {
-    fmt::print(
+    Print(
         "  acceleration: the loops' accelerations are imposed. Speeds and positions follow "
         "by integration, and errors in them stay.\n");
   }
   if (any([](const Column& c) { return c.enforcement == Enforcement::kVelocity; })) {
-    fmt::print("  velocity: the speeds satisfy the loops too; positions follow by integration.\n");
+    Print("  velocity: the speeds satisfy the loops too; positions follow by integration.\n");
   }
   if (any([](const Column& c) { return c.enforcement == Enforcement::kPosition; })) {
-    fmt::print(
+    Print(
         "  position: as acceleration, and after each accepted step positions and speeds are moved "
         "back to where the loops hold.\n");
   }
   if (any([](const Column& c) { return c.enforcement == Enforcement::kBaumgarte; })) {
-    fmt::print(
+    Print(
         "  baumgarte: as acceleration, with feedback: a mismatch e obeys e'' + 2 alpha e' + beta^2 "
         "e "
         "= 0, alpha = beta = 0.05 over the longest step unless given.\n");
   }
   if (any([](const Column& c) { return c.coordinates == Coordinates::kJoint; })) {
-    fmt::print(
+    Print(
         "  joint: the coordinates are those of the joints, but for one cut joint per loop, "
         "where drift shows.\n");
   }
   if (any([](const Column& c) { return c.coordinates == Coordinates::kAbsolute; })) {
-    fmt::print(
+    Print(
         "  absolute: the coordinates are every body's position and angle; drift may show "
         "at every joint.\n");
   }
   if (any([](const Column& c) { return c.solver == SolverKind::kAsPublished; })) {
-    fmt::print(
+    Print(
         "  as-published: plain factorisations (for reduction: the mechanism's fixed "
         "independent speeds), which fail or go wrong where the loops lose rank.\n");
   }
   if (any([](const Column& c) { return c.solver == SolverKind::kRankRevealing; })) {
-    fmt::print(
+    Print(
         "  rank-revealing: solvers that notice lost rank (for reduction: independent speeds "
         "chosen anew).\n");
   }
 }
 
 void ExplainRuns(const Experiment& experiment) {
-  fmt::print(
+  Print(
       "\nRuns\n  The integrator is {}; its relative and absolute tolerances are equal: {}. "
       "Smaller is more accurate.\n",
       experiment.integrator, Numbers(experiment.tolerances));
   if (experiment.ensembles.empty()) {
-    fmt::print(
+    Print(
         "  Each case runs once. One run resolves no exponent of growth with confidence; "
         "\"ensembles\" would.\n");
   }
@@ -137,7 +137,7 @@ void ExplainRuns(const Experiment& experiment) {
       start += fmt::format("{}{} between {:g} and {:g} (rad or m)", start.empty() ? "" : ", ",
                            drawn.joint, drawn.from, drawn.to);
     }
-    fmt::print(
+    Print(
         "  {} also run{} {} times from perturbed starts: {}, drawn from seed {}. The spread of the "
         "results says how far a single run can be trusted; where the scene knows a branch, "
         "ensemble_branch_kept counts the runs that stay within {:g} rad of it.\n",
@@ -145,14 +145,14 @@ void ExplainRuns(const Experiment& experiment) {
         rule.branch_bound);
   }
   const Limits& limits = experiment.limits;
-  fmt::print(
+  Print(
       "  A run is given up after {:g} s of wall time, {} accepted steps, or {:g} MiB of "
       "memory; its row then says so.\n",
       limits.wall_s, limits.steps, limits.memory_mb);
 }
 
 void ExplainMeasures(const Experiment& experiment) {
-  fmt::print(
+  Print(
       "\nMeasured at every accepted step\n"
       "  drift [m, rad]: how far the joints that ought to hold have come apart, and the "
       "power of time it grows with;\n"
@@ -160,17 +160,17 @@ void ExplainMeasures(const Experiment& experiment) {
       "  Series keep {} points for figures.\n",
       experiment.series_points);
   if (const std::size_t rungs = CountRungs(experiment); rungs > 0) {
-    fmt::print(
+    Print(
         "  {} in several scalars with one integrator: error and drift against tolerance, and "
         "whether truncation or round-off rules them.\n",
         Plural(rungs, "run"));
   }
   const std::size_t timings = CountTimings(experiment);
   if (timings == 0) {
-    fmt::print("  There are no timings.\n");
+    Print("  There are no timings.\n");
     return;
   }
-  fmt::print(
+  Print(
       "  {}, in runs of their own and never two at once: time of one right-hand side [ns] "
       "and of whole simulations, {} repeats at tolerance {}.\n",
       Plural(timings, "timing"), experiment.timing.repeats, experiment.timing.tolerance);
@@ -179,8 +179,8 @@ void ExplainMeasures(const Experiment& experiment) {
 void ExplainSweep(const std::vector<Experiment>& experiments) {
   const Experiment& first = experiments.front();
   if (!first.parameters.items().empty()) {
-    fmt::print("\nSweep: {} of values; what follows is the first\n",
-               Plural(experiments.size(), "combination"));
+    Print("\nSweep: {} of values; what follows is the first\n",
+          Plural(experiments.size(), "combination"));
     for (const auto& [name, value] : first.parameters.items()) {
       std::vector<std::string> values;
       std::set<std::string> known;
@@ -196,15 +196,15 @@ void ExplainSweep(const std::vector<Experiment>& experiments) {
         values.push_back("...");
         values.push_back(last);
       }
-      fmt::print("  {}: {}\n", name, fmt::join(values, ", "));
+      Print("  {}: {}\n", name, fmt::join(values, ", "));
     }
-    fmt::print("  Every record carries these values, for --filter {}=...\n",
-               first.parameters.items().front().first);
+    Print("  Every record carries these values, for --filter {}=...\n",
+          first.parameters.items().front().first);
   }
   if (!first.exclusions.empty()) {
-    fmt::print("\nLeft out are cases with");
-    for (const Selection& rule : first.exclusions) fmt::print(" [{}]", ToText(rule));
-    fmt::print("\n");
+    Print("\nLeft out are cases with");
+    for (const Selection& rule : first.exclusions) Print(" [{}]", ToText(rule));
+    Print("\n");
   }
 }
 
@@ -213,9 +213,9 @@ void ExplainExperiment(const std::filesystem::path& path, const ExperimentFiles&
   const Experiment& first = experiments.front();
   std::size_t cases = 0;
   for (const Experiment& one : experiments) cases += SelectCases(one, files.filter).size();
-  fmt::print("{} ({})\n", first.name, path.string());
-  if (!first.comment.empty()) fmt::print("  {}\n", first.comment);
-  fmt::print(
+  Print("{} ({})\n", first.name, path.string());
+  if (!first.comment.empty()) Print("  {}\n", first.comment);
+  Print(
       "  {}: each is one mechanism, column, tolerance and horizon. Units are SI, angles "
       "in rad.\n",
       Plural(cases, "case"));
@@ -225,7 +225,7 @@ void ExplainExperiment(const std::filesystem::path& path, const ExperimentFiles&
   ExplainChoices(first);
   ExplainRuns(first);
   ExplainMeasures(first);
-  fmt::print(
+  Print(
       "\nloopbench list {0} shows every case, loopbench plan {0} the time they will "
       "take.\n",
       path.string());

@@ -8,6 +8,7 @@
 #include "harness/compiled_scene.h"
 #include "harness/config/mechanism_reader.h"
 #include "harness/report/table.h"
+#include "harness/terminal.h"
 #include "odca/odca.h"
 
 namespace loopbench::harness {
@@ -15,15 +16,15 @@ namespace loopbench::harness {
 namespace {
 
 void PrintSection(const std::string& title, const Table& table) {
-  fmt::print("\n{}\n", title);
+  Print("\n{}\n", title);
   if (table.rows.empty()) {
-    fmt::print("  none\n");
+    Print("  none\n");
     return;
   }
   const std::string text = ToText(table);
   for (std::size_t begin = 0; begin < text.size();) {
     const std::size_t end = std::min(text.find('\n', begin), text.size());
-    if (end > begin) fmt::print("  {}\n", text.substr(begin, end - begin));
+    if (end > begin) Print("  {}\n", text.substr(begin, end - begin));
     begin = end + 1;
   }
 }
@@ -115,20 +116,18 @@ Table LoopTable(const MechanismDescription& description, const Structure& struct
 
 void PrintFreedom(const Structure& s) {
   const int each = s.space == SpaceKind::kPlanar ? 3 : 6;
-  fmt::print("\nDegrees of freedom\n");
-  fmt::print("  {} by counting (Gruebler, Kutzbach): {} bodies x {} - {} constraints\n",
-             s.counted_freedom, s.bodies, each, s.rows);
+  Print("\nDegrees of freedom\n");
+  Print("  {} by counting (Gruebler, Kutzbach): {} bodies x {} - {} constraints\n",
+        s.counted_freedom, s.bodies, each, s.rows);
   if (!s.analysed) return;
-  fmt::print("  {} by rank: {} speeds of the tree - rank {} of the {} constraints of loops\n",
-             s.freedom(), s.joint_u, s.rank_nearby, s.loop_rows);
+  Print("  {} by rank: {} speeds of the tree - rank {} of the {} constraints of loops\n",
+        s.freedom(), s.joint_u, s.rank_nearby, s.loop_rows);
   if (s.freedom_at_start() != s.freedom()) {
-    fmt::print("  {} at the start, a singular position: rank {} there\n", s.freedom_at_start(),
-               s.rank);
+    Print("  {} at the start, a singular position: rank {} there\n", s.freedom_at_start(), s.rank);
   }
   if (s.rank > 0) {
-    fmt::print(
-        "  scaled singular values at the start: {:.3g} largest, {:.3g} smallest that counts\n",
-        s.singular_values[0], s.singular_values[s.rank - 1]);
+    Print("  scaled singular values at the start: {:.3g} largest, {:.3g} smallest that counts\n",
+          s.singular_values[0], s.singular_values[s.rank - 1]);
   }
 }
 
@@ -144,12 +143,12 @@ std::string Described(const MechanismDescription& description, const RedundantDi
 
 void PrintRedundant(const MechanismDescription& description, const Structure& structure) {
   if (!structure.analysed) return;
-  fmt::print("\nRedundant constraints: {}\n", structure.redundant.size());
+  Print("\nRedundant constraints: {}\n", structure.redundant.size());
   for (const RedundantDirection& one : structure.redundant) {
-    fmt::print("  {}: {}\n", description.joints[one.joint].name, Described(description, one));
+    Print("  {}: {}\n", description.joints[one.joint].name, Described(description, one));
   }
   if (structure.redundant.empty()) return;
-  fmt::print("  All of these can be dropped at once; the loops then stay closed as they do now.\n");
+  Print("  All of these can be dropped at once; the loops then stay closed as they do now.\n");
 }
 
 void PrintIslands(const MechanismDescription& description, const Structure& structure) {
@@ -226,8 +225,8 @@ int ExplainMechanism(const std::filesystem::path& path) {
   const MechanismDescription description = ReadMechanism(path).description;
   const Structure structure = AnalyseStructure(description);
   const std::vector<Warning> warnings = FindWarnings(description, structure);
-  fmt::print("{} ({})\n  described in {}; lengths in m, angles in rad\n", description.name,
-             path.string(), description.space == SpaceKind::kPlanar ? "the plane" : "space");
+  Print("{} ({})\n  described in {}; lengths in m, angles in rad\n", description.name,
+        path.string(), description.space == SpaceKind::kPlanar ? "the plane" : "space");
   PrintSection("Bodies", BodyTable(description, structure));
   PrintSection("Joints", JointTable(description, structure));
   PrintFreedom(structure);
@@ -236,17 +235,17 @@ int ExplainMechanism(const std::filesystem::path& path) {
   PrintIslands(description, structure);
   PrintCoordinates(structure);
   PrintPlanOfJoins(description);
-  fmt::print("\nWhat need not be modelled\n");
+  Print("\nWhat need not be modelled\n");
   const Compiled compiled = Compile(description, CompileOptions::All());
-  if (compiled.report.empty()) fmt::print("  nothing to save\n");
-  for (const std::string& line : compiled.report) fmt::print("  {}\n", line);
+  if (compiled.report.empty()) Print("  nothing to save\n");
+  for (const std::string& line : compiled.report) Print("  {}\n", line);
   if (compiled.done != CompileOptions::None()) {
-    fmt::print("  Savings found: {}. By default a run makes: {} (\"compile\" of an experiment).\n",
-               ToString(compiled.done), ToString(CompileOptions()));
+    Print("  Savings found: {}. By default a run makes: {} (\"compile\" of an experiment).\n",
+          ToString(compiled.done), ToString(CompileOptions()));
   }
-  fmt::print("\nWarnings\n");
-  if (warnings.empty()) fmt::print("  none\n");
-  for (const Warning& warning : warnings) fmt::print("  {}\n", warning.text);
+  Print("\nWarnings\n");
+  if (warnings.empty()) Print("  none\n");
+  for (const Warning& warning : warnings) Print("  {}\n", warning.text);
   return structure.start.outcome == Outcome::kInconsistentStart ? 2 : 0;
 }
 

@@ -11,6 +11,7 @@
 #include "harness/report/table.h"
 #include "harness/run_case.h"
 #include "harness/store/result_store.h"
+#include "harness/terminal.h"
 #include "harness/timing/time_cases.h"
 
 namespace loopbench::harness {
@@ -179,18 +180,18 @@ void PrintAxes(const std::vector<Experiment>& experiments) {
   for (const auto& [name, value] : experiments.front().parameters.items()) {
     std::set<std::string> values;
     for (const Experiment& one : experiments) values.insert(one.parameters.Text(name));
-    fmt::print("  axis {}: {} values\n", name, values.size());
+    Print("  axis {}: {} values\n", name, values.size());
   }
-  fmt::print("  {} combinations\n", experiments.size());
+  Print("  {} combinations\n", experiments.size());
 }
 
 void PrintPlan(const std::vector<Experiment>& experiments, const Plan& plan,
                const PlanCommand& command, const Pilot& pilot) {
   const Experiment& first = experiments.front();
-  fmt::print("{}{}{}\n", first.name, first.comment.empty() ? "" : ": ", first.comment);
+  Print("{}{}{}\n", first.name, first.comment.empty() ? "" : ": ", first.comment);
   PrintAxes(experiments);
-  fmt::print("  {} scenes, {} columns, {} tolerances\n\n", first.scenes.size(),
-             first.columns.size(), first.tolerances.size());
+  Print("  {} scenes, {} columns, {} tolerances\n\n", first.scenes.size(), first.columns.size(),
+        first.tolerances.size());
   Table table;
   table.columns = {{"mechanism", "mechanism", Format::kText, {}},
                    {"column", "column", Format::kText, {}},
@@ -206,11 +207,11 @@ void PrintPlan(const std::vector<Experiment>& experiments, const Plan& plan,
     row.Set("seconds", std::round(line.seconds * 100.0) / 100.0);
     table.rows.push_back(row);
   }
-  fmt::print("{}\n", ToText(table));
-  fmt::print("{} cases, {} runs (an ensemble comes on top of the unperturbed run), {} timings\n",
-             plan.cases, plan.runs, plan.timings);
-  fmt::print("estimated time: accuracy {} with one job, timings {}\n", Duration(plan.seconds),
-             Duration(plan.timing_seconds));
+  Print("{}\n", ToText(table));
+  Print("{} cases, {} runs (an ensemble comes on top of the unperturbed run), {} timings\n",
+        plan.cases, plan.runs, plan.timings);
+  Print("estimated time: accuracy {} with one job, timings {}\n", Duration(plan.seconds),
+        Duration(plan.timing_seconds));
   std::string source;
   if (!command.from.empty()) {
     source = fmt::format("{} of {} cases from {}", plan.known, plan.cases, command.from.string());
@@ -221,8 +222,8 @@ void PrintPlan(const std::vector<Experiment>& experiments, const Plan& plan,
         "with the horizon and rtol^(-1/5)",
         source.empty() ? "" : ", the rest from ", pilot.runs(), 100.0 * kPilotFraction);
   }
-  fmt::print("An estimate, from {}. Each run ends at {:g} s of wall time at the latest.\n", source,
-             first.limits.wall_s);
+  Print("An estimate, from {}. Each run ends at {:g} s of wall time at the latest.\n", source,
+        first.limits.wall_s);
 }
 
 }  // namespace

@@ -16,6 +16,7 @@
 #include "harness/report/figure_recipes.h"
 #include "harness/report/precision_report.h"
 #include "harness/store/files.h"
+#include "harness/terminal.h"
 
 namespace loopbench::harness {
 
@@ -46,12 +47,12 @@ int DrawAll(const std::vector<NamedFigure>& figures, const PlotCommand& command)
   for (const NamedFigure& figure : figures) {
     const auto path = command.out / (figure.name + "." + extension);
     if (const auto error = WriteFigure(path, figure.figure)) {
-      fmt::print(stderr, "{}\n", *error);
+      PrintError("{}\n", *error);
       return 2;
     }
   }
-  fmt::print("wrote {} figure{} to {}\n", figures.size(), figures.size() == 1 ? "" : "s",
-             command.out.string());
+  Print("wrote {} figure{} to {}\n", figures.size(), figures.size() == 1 ? "" : "s",
+        command.out.string());
   return 0;
 }
 
@@ -75,12 +76,12 @@ int DrawFree(const std::vector<Record>& records, const PlotCommand& command) {
   }
   const std::filesystem::path path = FileOf(command);
   const FreeFigureResult result = MakeFreeFigure(records, command.free);
-  for (const std::string& remark : result.remarks) fmt::print(stderr, "note: {}\n", remark);
+  for (const std::string& remark : result.remarks) PrintError("note: {}\n", remark);
   if (const auto error = WriteFigure(path, result.figure)) {
-    fmt::print(stderr, "{}\n", *error);
+    PrintError("{}\n", *error);
     return 2;
   }
-  fmt::print("wrote {}\n", path.string());
+  Print("wrote {}\n", path.string());
   return 0;
 }
 
@@ -93,8 +94,8 @@ int WriteMap(const FailureMap& map, const MapCommand& command, const std::string
   WriteFileAtomically(stem.string() + ".md", MapMarkdown(map, Provenance(typed)));
   const std::string picture = stem.string() + "." + command.format;
   const auto error = WriteMapFigure(picture, map);
-  if (error) fmt::print(stderr, "{}\n", *error);
-  fmt::print("wrote {0}.csv, {0}.md{1}\n", stem.string(), error ? "" : ", " + picture);
+  if (error) PrintError("{}\n", *error);
+  Print("wrote {0}.csv, {0}.md{1}\n", stem.string(), error ? "" : ", " + picture);
   return error ? 2 : 0;
 }
 
@@ -121,9 +122,9 @@ void WriteTables(const std::vector<Record>& records, const std::filesystem::path
       WriteFileAtomically(out / (kind + ending), RenderKept(full, format));
     }
     const Table compact = MakeTable(records, {.kind = kind, .compact = true});
-    fmt::print("{}\n", ToText(compact, TerminalHasColour()));
+    Print("{}\n", ToText(compact, TerminalHasColour()));
   }
-  for (const std::string& note : Provenance(typed)) fmt::print("{}\n", note);
+  for (const std::string& note : Provenance(typed)) Print("{}\n", note);
 }
 
 int PrintTable(const TableCommand& command, const std::string& typed) {
@@ -132,19 +133,19 @@ int PrintTable(const TableCommand& command, const std::string& typed) {
   view.compact = on_terminal;
   Table table = MakeTable(LoadRecords(command.store), view);
   if (table.rows.empty()) {
-    fmt::print(stderr, "{}: no {} records match{}{}\n", command.store.string(),
+    PrintError("{}: no {} records match{}{}\n", command.store.string(),
                view.kind.empty() ? "drift" : view.kind, view.where.empty() ? "" : " ",
                ToText(view.where));
     return 2;
   }
   AppendProvenance(table, typed);
   if (on_terminal) {
-    fmt::print("{}", ToText(table, TerminalHasColour()));
+    Print("{}", ToText(table, TerminalHasColour()));
   } else if (command.out.empty()) {
-    fmt::print("{}", RenderKept(table, command.format));
+    Print("{}", RenderKept(table, command.format));
   } else {
     WriteFileAtomically(command.out, RenderKept(table, command.format));
-    fmt::print("wrote {}\n", command.out.string());
+    Print("wrote {}\n", command.out.string());
   }
   return 0;
 }
@@ -154,7 +155,7 @@ int Plot(const PlotCommand& command) {
   for (const Condition& condition : command.where) RequireKey("--where", condition.key, records);
   records = Filter(records, command.where);
   if (records.empty()) {
-    fmt::print(stderr, "{}: no records match{}{}\n", command.store.string(),
+    PrintError("{}: no records match{}{}\n", command.store.string(),
                command.where.empty() ? "" : " ", ToText(command.where));
     return 2;
   }
@@ -168,10 +169,10 @@ int Plot(const PlotCommand& command) {
     figures.push_back(std::move(figure));
   }
   if (figures.empty()) {
-    fmt::print(stderr,
-               "{}: no accuracy records with series and none in several scalars match; --x KEY --y "
-               "KEY draws other values\n",
-               command.store.string());
+    PrintError(
+        "{}: no accuracy records with series and none in several scalars match; --x KEY --y "
+        "KEY draws other values\n",
+        command.store.string());
     return 2;
   }
   return DrawAll(figures, command);
@@ -181,18 +182,18 @@ int PrintMap(const MapCommand& command, const std::string& typed) {
   const MapRules rules = ReadMapRules(command.rules);
   const std::vector<Record> records = LoadRecords(command.store);
   if (records.empty()) {
-    fmt::print(stderr, "{}: no records\n", command.store.string());
+    PrintError("{}: no records\n", command.store.string());
     return 2;
   }
   const FailureMap map = MakeFailureMap(rules, records);
   if (command.gate) RequireDemands(map, command.rules);
   Table table = MapTable(map);
   AppendProvenance(table, typed);
-  fmt::print("{}", ToText(table, TerminalHasColour()));
+  Print("{}", ToText(table, TerminalHasColour()));
   const int written = command.out.empty() ? 0 : WriteMap(map, command, typed);
   if (!command.gate) return written;
   const std::vector<std::string> broken = BrokenDemands(map);
-  for (const std::string& cell : broken) fmt::print(stderr, "must hold: {}\n", cell);
+  for (const std::string& cell : broken) PrintError("must hold: {}\n", cell);
   return broken.empty() ? written : 1;
 }
 

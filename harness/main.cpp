@@ -1,5 +1,4 @@
 // loopbench: the command line.
-#include <fmt/format.h>
 
 #include <CLI/CLI.hpp>
 
@@ -7,6 +6,7 @@
 #include "harness/config/config_error.h"
 #include "harness/main_compare.h"
 #include "harness/provenance.h"
+#include "harness/terminal.h"
 
 namespace {
 
@@ -89,9 +89,7 @@ Of several records that match a cell the worst decides. A cell
   -             not applicable, with the rules' reason
 docs/extremes.md explains them, docs/design.md (section 6) has all keys of the rules.)";
 
-}  // namespace
-
-int main(int argc, char** argv) {
+int Main(int argc, char** argv) {
   CLI::App app{
       "Measures constraint drift and time of three formulations of closed-loop multibody dynamics.",
       "loopbench"};
@@ -253,7 +251,14 @@ int main(int argc, char** argv) {
     if (*map_app) return PrintMap(map, typed);
     return PrintVerdicts(verdict, typed);
   } catch (const std::exception& error) {
-    fmt::print(stderr, "{}\n", error.what());
+    PrintError("{}\n", error.what());
     return 2;
   }
+}
+
+}  // namespace
+
+int main(int argc, char** argv) {
+  PrepareStreams();
+  return FinishOutput(Main(argc, argv));
 }

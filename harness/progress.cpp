@@ -1,9 +1,8 @@
 #include "harness/progress.h"
 
-#include <fmt/format.h>
 #include <unistd.h>
 
-#include <cstdio>
+#include "harness/terminal.h"
 
 namespace loopbench::harness {
 
@@ -14,7 +13,7 @@ Progress::Progress(std::string what, std::size_t total)
       begin_(std::chrono::steady_clock::now()) {}
 
 Progress::~Progress() {
-  if (terminal_) fmt::print(stderr, "\r\033[K");
+  if (terminal_) PrintError("\r\033[K");
 }
 
 void Progress::Step(const std::string& label) {
@@ -24,9 +23,8 @@ void Progress::Step(const std::string& label) {
   const std::chrono::duration<double> spent = std::chrono::steady_clock::now() - begin_;
   const double left =
       spent.count() * static_cast<double>(total_ - done_) / static_cast<double>(done_);
-  fmt::print(stderr, "\r\033[K{} {}/{}  {:.0f} s gone, about {:.0f} s to go  {}", what_, done_,
-             total_, spent.count(), left, label);
-  std::fflush(stderr);
+  PrintError("\r\033[K{} {}/{}  {:.0f} s gone, about {:.0f} s to go  {}", what_, done_, total_,
+             spent.count(), left, label);
 }
 
 }  // namespace loopbench::harness

@@ -16,6 +16,7 @@
 #include "harness/origin.h"
 #include "harness/provenance.h"
 #include "harness/store/files.h"
+#include "harness/terminal.h"
 #include "harness/timing/allocations.h"
 #include "harness/timing/subject.h"
 
@@ -168,8 +169,7 @@ void Register(const BenchmarkSet& set, States& states, const BenchmarkMember& me
 
 int SaveStates(const BenchmarkSet& set) {
   if (set.states_path.empty()) {
-    fmt::print(stderr, "{}: no \"states\": it does not name a file to save them in\n",
-               set.path.string());
+    PrintError("{}: no \"states\": it does not name a file to save them in\n", set.path.string());
     return 2;
   }
   States states({});
@@ -179,14 +179,13 @@ int SaveStates(const BenchmarkSet& set) {
       for (const Column& column : group.columns) {
         const BenchmarkState& state = states.Get(member, description, column.coordinates);
         if (state.outcome == Outcome::kFinished) continue;
-        fmt::print(stderr, "{}: no state: {} {}\n", member.name, ToString(state.outcome),
-                   state.message);
+        PrintError("{}: no state: {} {}\n", member.name, ToString(state.outcome), state.message);
         return 2;
       }
     }
   }
   WriteFileAtomically(set.states_path, StatesToJson(states.hashes()));
-  fmt::print("wrote {} hashes to {}\n", states.hashes().size(), set.states_path.string());
+  Print("wrote {} hashes to {}\n", states.hashes().size(), set.states_path.string());
   return 0;
 }
 
@@ -221,10 +220,10 @@ std::string LibraryOption(const std::vector<char*>& arguments, const std::string
   return value;
 }
 
-int Main(int argc, char** argv) {
+int Measured(int argc, char** argv) {
   std::vector<char*> arguments(argv, argv + argc);
   if (TakeFlag(arguments, "--help") || TakeFlag(arguments, "-h")) {
-    fmt::print("{}", kHelp);
+    Print("{}", kHelp);
     return 0;
   }
   const std::string file = TakeOption(arguments, "--families")
@@ -267,14 +266,19 @@ int Main(int argc, char** argv) {
   return measured == 0 ? 2 : 0;
 }
 
+int Main(int argc, char** argv) {
+  try {
+    CheckAllocationsAreCounted();
+    return Measured(argc, argv);
+  } catch (const std::exception& error) {
+    PrintError("{}\n", error.what());
+    return 2;
+  }
+}
+
 }  // namespace
 
 int main(int argc, char** argv) {
-  try {
-    CheckAllocationsAreCounted();
-    return Main(argc, argv);
-  } catch (const std::exception& error) {
-    fmt::print(stderr, "{}\n", error.what());
-    return 2;
-  }
+  PrepareStreams();
+  return FinishOutput(Main(argc, argv));
 }

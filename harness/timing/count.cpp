@@ -16,6 +16,7 @@
 #include "harness/origin.h"
 #include "harness/store/files.h"
 #include "harness/store/record_json.h"
+#include "harness/terminal.h"
 #include "harness/timing/allocations.h"
 #include "harness/timing/callgrind.h"
 #include "harness/timing/subject.h"
@@ -107,18 +108,15 @@ int Count(const Options& options) {
     }
   }
   if (!options.out.empty()) WriteFileAtomically(options.out, lines);
-  fmt::print("{} cases\n", part);
+  Print("{} cases\n", part);
   return part == 0 ? 2 : 0;
 }
 
-}  // namespace
-}  // namespace loopbench::harness
-
-int main(int argc, char** argv) {
-  loopbench::harness::Options options;
+int Main(int argc, char** argv) {
+  Options options;
   CLI::App app{"Counts operations, allocations and instructions of right-hand sides.",
                "loopbench_count"};
-  app.footer(loopbench::harness::kFooter);
+  app.footer(kFooter);
   app.add_option("file", options.file, "What is counted (as for loopbench_bench)")->required();
   app.add_option("--out", options.out, "File of records (.jsonl)");
   app.add_option("--callgrind", options.callgrind,
@@ -135,9 +133,17 @@ int main(int argc, char** argv) {
     return app.exit(error) == 0 ? 0 : 2;
   }
   try {
-    return loopbench::harness::Count(options);
+    return Count(options);
   } catch (const std::exception& error) {
-    fmt::print(stderr, "{}\n", error.what());
+    PrintError("{}\n", error.what());
     return 2;
   }
+}
+
+}  // namespace
+}  // namespace loopbench::harness
+
+int main(int argc, char** argv) {
+  loopbench::harness::PrepareStreams();
+  return loopbench::harness::FinishOutput(loopbench::harness::Main(argc, argv));
 }

@@ -1,12 +1,7 @@
 #include "harness/report/columns.h"
 
-#include <fmt/format.h>
-
 #include <algorithm>
 #include <array>
-
-#include "harness/config/config_error.h"
-#include "harness/config/spelling.h"
 
 namespace loopbench::harness {
 namespace {
@@ -26,31 +21,6 @@ std::vector<TableColumn> CaseColumns() {
       Make("integrator", "integrator"),   Make("rtol", "rtol", kShortest),
       Make("atol", "atol", kShortest),    Make("horizon", "horizon [s]", kShortest),
       Make("outcome", "outcome"),         Make("t_reached", "t reached [s]", kSeconds),
-  };
-}
-
-// The same for a terminal: words that differ in their first letters can be short.
-std::vector<TableColumn> CompactCaseColumns() {
-  return {
-      Make("mechanism", "mechanism"),
-      Make("formulation", "formul."),
-      {"enforcement",
-       "level",
-       kText,
-       {{"acceleration", "accel"}, {"velocity", "veloc"}, {"position", "posit"}}},
-      {"coordinates", "coord", kText, {{"absolute", "abs"}}},
-      {"solver", "solv", kText, {{"as-published", "publ"}, {"rank-revealing", "rank"}}},
-      Make("rtol", "rtol", kShortest),
-      Make("horizon", "T/s", kShortest),
-      {"outcome",
-       "outcome",
-       kText,
-       {{"finished", "ok"},
-        {"step-too-small", "small step"},
-        {"inconsistent-start", "bad start"},
-        {"inconsistent-motion", "bad motion"},
-        {"newton-failure", "newton"},
-        {"integrator-error", "integrator"}}},
   };
 }
 
@@ -116,7 +86,9 @@ std::vector<TableColumn> OtherColumns() {
   };
 }
 
-const TableColumn* FindKnown(const std::string& key) {
+}  // namespace
+
+const TableColumn* KnownColumn(const std::string& key) {
   static const std::vector<TableColumn> kOther = OtherColumns();
   for (const auto* list : {&DriftColumns(), &TimingColumns(), &PrecisionColumns(), &kOther}) {
     const auto it = std::ranges::find(*list, key, &TableColumn::key);
@@ -125,80 +97,29 @@ const TableColumn* FindKnown(const std::string& key) {
   return nullptr;
 }
 
-// Keys of per-loop and per-body values, which are no parameters.
-bool IsFamily(const std::string& key) {
-  return key.starts_with("series.") || key.starts_with("drift.loop.");
-}
-
-// How a value without a column of its own is printed: by its type.
-Format FormatOf(const std::string& key, std::span<const Record> rows) {
-  for (const Record& row : rows) {
-    const Value* value = row.Find(key);
-    if (value == nullptr || std::holds_alternative<std::monostate>(*value)) continue;
-    if (std::holds_alternative<std::int64_t>(*value)) return kInteger;
-    if (std::holds_alternative<double>(*value)) return kShortest;
-    return kText;
-  }
-  return kText;
-}
-
-}  // namespace
-
-TableColumn ColumnOf(const std::string& key, std::span<const Record> rows) {
-  if (const TableColumn* known = FindKnown(key)) return *known;
-  if (key.starts_with("series.angle.")) return Make(key.c_str(), "angle [rad]", kSeconds);
-  if (key.starts_with("drift.loop.")) {
-    return Make(key.c_str(), (key.substr(11) + " [m]").c_str(), kScientific);
-  }
-  return Make(key.c_str(), key.c_str(), FormatOf(key, rows));
-}
-
-std::string UnitOf(const TableColumn& column) {
-  const std::size_t open = column.header.rfind('[');
-  if (open == std::string::npos || column.header.back() != ']') return "";
-  return column.header.substr(open + 1, column.header.size() - open - 2);
-}
-
-std::vector<std::string> KeysOf(std::span<const Record> rows) {
-  std::vector<std::string> keys;
-  for (const Record& row : rows) {
-    for (const auto& [key, value] : row.items()) {
-      if (std::ranges::find(keys, key) == keys.end()) keys.push_back(key);
-    }
-  }
-  return keys;
-}
-
-void RequireKey(const std::string& option, const std::string& key, std::span<const Record> rows) {
-  const std::vector<std::string> keys = KeysOf(rows);
-  // a column of the tables may be empty in every record
-  if (std::ranges::find(keys, key) != keys.end() || FindKnown(key) != nullptr) return;
-  std::vector<std::string> scalars;
-  std::ranges::copy_if(keys, std::back_inserter(scalars),
-                       [](const std::string& known) { return !IsFamily(known); });
-  const std::string nearest = NearestSpelling(key, keys);
-  const std::string cure = nearest.empty() ? "" : fmt::format(" (did you mean \"{}\"?)", nearest);
-  throw ConfigError(fmt::format("{}: found \"{}\", which no record has{}; expected one of {}",
-                                option, key, cure, fmt::join(scalars, ", ")));
-}
-
-std::vector<TableColumn> WithParameters(std::vector<TableColumn> columns,
-                                        std::span<const Record> rows) {
-  std::vector<std::string> keys;
-  for (const Record& row : rows) {
-    // the keys of a case end at its id; what follows is its result
-    for (const auto& [key, value] : row.items()) {
-      if (key == "case_id" || key == "outcome") break;
-      if (std::ranges::find(keys, key) == keys.end()) keys.push_back(key);
-    }
-  }
-  std::vector<TableColumn> parameters;
-  for (const std::string& key : keys) {
-    if (FindKnown(key) == nullptr) parameters.push_back(ColumnOf(key, rows));
-  }
-  const auto outcome = std::ranges::find(columns, "outcome", &TableColumn::key);
-  columns.insert(outcome, parameters.begin(), parameters.end());
-  return columns;
+const std::vector<TableColumn>& CompactCaseColumns() {
+  static const std::vector<TableColumn> kColumns = {
+      Make("mechanism", "mechanism"),
+      Make("formulation", "formul."),
+      {"enforcement",
+       "level",
+       kText,
+       {{"acceleration", "accel"}, {"velocity", "veloc"}, {"position", "posit"}}},
+      {"coordinates", "coord", kText, {{"absolute", "abs"}}},
+      {"solver", "solv", kText, {{"as-published", "publ"}, {"rank-revealing", "rank"}}},
+      Make("rtol", "rtol", kShortest),
+      Make("horizon", "T/s", kShortest),
+      {"outcome",
+       "outcome",
+       kText,
+       {{"finished", "ok"},
+        {"step-too-small", "small step"},
+        {"inconsistent-start", "bad start"},
+        {"inconsistent-motion", "bad motion"},
+        {"newton-failure", "newton"},
+        {"integrator-error", "integrator"}}},
+  };
+  return kColumns;
 }
 
 const std::vector<TableColumn>& DriftColumns() {
@@ -286,7 +207,7 @@ const std::vector<TableColumn>& CompactPrecisionColumns() {
   static const std::vector<TableColumn> kColumns = [] {
     std::vector<TableColumn> columns = CompactCaseColumns();
     std::erase_if(columns, [](const TableColumn& column) {
-      return column.key == "coordinates" || column.key == "solver" || column.key == "horizon";
+      return column.key == "solver" || column.key == "horizon";
     });
     const auto rtol = std::ranges::find(columns, "rtol", &TableColumn::key);
     columns.insert(rtol, Make("scalar", "scalar"));

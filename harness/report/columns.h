@@ -9,6 +9,10 @@
 
 namespace loopbench::harness {
 
+/// What was run and how it ended, for a terminal: words that differ in their first letters are
+/// short.
+const std::vector<TableColumn>& CompactCaseColumns();
+
 /// The columns of drift.csv (docs/design.md, section 6): what was run, how it ended, drift at
 /// position [m and rad, never mixed], velocity and acceleration level, energy, growth, counters,
 /// conditioning.
@@ -32,6 +36,9 @@ const std::vector<TableColumn>& CompactDriftColumns();
 /// The part of TimingColumns() that fits a terminal of some 100 columns, with shortened words.
 const std::vector<TableColumn>& CompactTimingColumns();
 
+/// The column that the tables have for a key, or null.
+const TableColumn* KnownColumn(const std::string& key);
+
 /// The column of any key: header, unit and format as in the tables where they have it; else the key
 /// is the header, and the type of its first value in `rows` decides the format.
 TableColumn ColumnOf(const std::string& key, std::span<const Record> rows);
@@ -50,5 +57,10 @@ void RequireKey(const std::string& option, const std::string& key, std::span<con
 /// of a sweep, without which rows could not be told apart.
 std::vector<TableColumn> WithParameters(std::vector<TableColumn> columns,
                                         std::span<const Record> rows);
+
+/// `columns` with, before "outcome", those further keys of cases in which rows differ that would
+/// look alike without: the integrator, the experiment, whatever a short table leaves out.
+std::vector<TableColumn> TellingApart(std::vector<TableColumn> columns,
+                                      std::span<const Record> rows);
 
 }  // namespace loopbench::harness

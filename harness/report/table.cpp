@@ -85,15 +85,28 @@ void AppendTrimmed(std::string* out, std::string line) {
 
 }  // namespace
 
+bool IsUnresolved(const Record& row, const std::string& key) {
+  const Value* value = row.Find(key);
+  if (value == nullptr || std::holds_alternative<std::monostate>(*value)) return false;
+  if (key == "growth_hypothesis") return row.Text("growth_hypothesis_resolved") != "true";
+  if (std::isnan(row.Number(key))) return false;
+  if (key == "energy_growth_exponent" || key == "correction_growth_exponent") return true;
+  return (key == "growth_exponent" || key == "growth_exponent_late") &&
+         row.Text("growth_resolved") != "true";
+}
+
 std::string Cell(const Record& row, const TableColumn& column) {
   const Value* value = row.Find(column.key);
   if (value == nullptr) return "";
-  if (const auto* number = std::get_if<double>(value)) return FormatNumber(*number, column.format);
+  const char* mark = IsUnresolved(row, column.key) ? "?" : "";
+  if (const auto* number = std::get_if<double>(value)) {
+    return FormatNumber(*number, column.format) + mark;
+  }
   if (std::holds_alternative<std::vector<double>>(*value)) return FullPrecision(row, column.key);
   const std::string text = row.Text(column.key);
   const auto it =
       std::ranges::find(column.abbreviations, text, &std::pair<std::string, std::string>::first);
-  return it == column.abbreviations.end() ? text : it->second;
+  return (it == column.abbreviations.end() ? text : it->second) + mark;
 }
 
 std::vector<RowGroup> Groups(const Table& table) {
@@ -128,26 +141,44 @@ std::vector<TableColumn> ColumnsUnderHeading(const Table& table) {
   return columns;
 }
 
-std::string RowsAsText(const Table& table, const std::vector<TableColumn>& columns,
-                       const std::vector<Record>& rows, std::vector<std::size_t> widths,
-                       bool colour) {
+// A column on a terminal: digits stand below digits, whether a mark follows them or not.
+struct TextColumn {
+  TextColumn(const TableColumn& shown, const std::vector<Record>& rows)
+      : column(shown), marked(std::ranges::any_of(rows, [&](const Record& row) {
+          return shown.format != Format::kText && IsUnresolved(row, shown.key);
+        })) {
+    width = Width(column.header);
+    for (const Record& row : rows) width = std::max(width, Width(CellOf(row)));
+  }
+
+  std::string CellOf(const Record& row) const {
+    return Cell(row, column) + (marked && !IsUnresolved(row, column.key) ? " " : "");
+  }
+
+  TableColumn column;
+  bool marked;
+  std::size_t width = 0;
+};
+
+std::string RowsAsText(const Table& table, const std::vector<TextColumn>& columns,
+                       const std::vector<Record>& rows, bool colour) {
   std::string heading;
   std::string rule;
-  for (std::size_t c = 0; c < columns.size(); ++c) {
-    const std::string gap = c == 0 ? "" : "  ";
-    heading += gap + Pad(columns[c].header, widths[c], columns[c].format);
-    rule += gap + std::string(widths[c], '-');
+  for (const TextColumn& shown : columns) {
+    const std::string gap = &shown == columns.data() ? "" : "  ";
+    heading += gap + Pad(shown.column.header, shown.width, shown.column.format);
+    rule += gap + std::string(shown.width, '-');
   }
   std::string out;
   AppendTrimmed(&out, heading);
   AppendTrimmed(&out, rule);
   for (const Record& row : rows) {
     std::string text;
-    for (std::size_t c = 0; c < columns.size(); ++c) {
-      std::string cell = Pad(Cell(row, columns[c]), widths[c], columns[c].format);
-      const std::string number = colour ? table.colour(row, columns[c]) : "";
+    for (const TextColumn& shown : columns) {
+      std::string cell = Pad(shown.CellOf(row), shown.width, shown.column.format);
+      const std::string number = colour ? table.colour(row, shown.column) : "";
       if (!number.empty()) cell = "\033[" + number + "m" + cell + "\033[0m";
-      text += (c == 0 ? "" : "  ") + cell;
+      text += (&shown == columns.data() ? "" : "  ") + cell;
     }
     AppendTrimmed(&out, text);
   }
@@ -157,13 +188,9 @@ std::string RowsAsText(const Table& table, const std::vector<TableColumn>& colum
 }  // namespace
 
 std::string ToText(const Table& table, bool colour) {
-  const std::vector<TableColumn> columns = ColumnsUnderHeading(table);
-  std::vector<std::size_t> widths;  // the same in all groups, so that they compare
-  for (const TableColumn& column : columns) {
-    widths.push_back(Width(column.header));
-    for (const Record& row : table.rows) {
-      widths.back() = std::max(widths.back(), Width(Cell(row, column)));
-    }
+  std::vector<TextColumn> columns;  // as wide in all groups, so that they compare
+  for (const TableColumn& column : ColumnsUnderHeading(table)) {
+    columns.emplace_back(column, table.rows);
   }
   std::string out = table.title.empty() ? "" : table.title + "\n\n";
   bool is_first = true;
@@ -171,7 +198,7 @@ std::string ToText(const Table& table, bool colour) {
     if (!is_first) out += '\n';
     is_first = false;
     if (!group.heading.empty()) out += group.heading + "\n\n";
-    out += RowsAsText(table, columns, group.rows, widths, colour);
+    out += RowsAsText(table, columns, group.rows, colour);
   }
   if (!table.notes.empty()) out += '\n';
   for (const std::string& note : table.notes) out += note + '\n';

@@ -60,9 +60,14 @@ std::vector<RowGroup> Groups(const Table& table);
 /// Whether a row's run ended in another way than as it should.
 bool HasFailed(const Record& row);
 
-/// The cell as the text and Markdown writers print it. Absent and NaN values are empty, never zero;
-/// a value that is not a number is printed as it is, whatever the format; a series joins its
-/// numbers with ';'.
+/// Whether `key` is an exponent or a law of growth that the row's runs do not resolve. Exponents of
+/// energy and corrections come from one run, which resolves none.
+bool IsUnresolved(const Record& row, const std::string& key);
+
+/// The cell as the text, Markdown and LaTeX writers print it, with '?' behind what is not resolved:
+/// such a value must not look like one that is, whichever columns are chosen. Absent and NaN values
+/// are empty, never zero; a value that is not a number is printed as it is, whatever the format; a
+/// series joins its numbers with ';'.
 std::string Cell(const Record& row, const TableColumn& column);
 
 /// Aligned text for a terminal: title, heading, rule, rows, notes. Columns are as wide as their
@@ -80,9 +85,9 @@ std::string ToCsv(const Table& table);
 /// A Markdown table with title and notes; '|' in cells is escaped.
 std::string ToMarkdown(const Table& table);
 
-/// One JSON object: "title", "columns" (key, header, unit), "rows" (one object each, every digit,
-/// null for what was not measured), "provenance" (notes of the form "name: text" by name),
-/// "warnings" and "notes" (the other notes). One row per line.
+/// A JSON array of row objects (pandas.read_json, jq '.[]'): every digit, null for what was not
+/// measured, one row per line. The notes, which an array has no other place for, are the last value
+/// of every row, "provenance", a text of as many lines.
 std::string ToJson(const Table& table);
 
 /// A LaTeX table (booktabs; no other package): a tabular per group, numbers in math mode, 2.05e-03

@@ -12,24 +12,6 @@
 namespace loopbench::harness {
 namespace {
 
-// A value of a record as JSON: the record's writer, without its braces and key.
-std::string JsonOf(Value value) {
-  Record one;
-  one.Set("v", std::move(value));
-  const std::string object = ToJsonLine(one);  // {"v":...}
-  return object.substr(5, object.size() - 6);
-}
-
-std::string JsonList(const std::vector<std::string>& items, std::string_view separator) {
-  return fmt::format("[{}]", fmt::join(items, separator));
-}
-
-std::string JsonStrings(const std::vector<std::string>& texts) {
-  std::vector<std::string> items;
-  for (const std::string& text : texts) items.push_back(JsonOf(text));
-  return JsonList(items, ", ");
-}
-
 // Columns of lists that machines read: the group's key comes first unless it is one of them.
 std::vector<TableColumn> FlatColumns(const Table& table) {
   std::vector<TableColumn> columns = table.columns;
@@ -38,28 +20,6 @@ std::vector<TableColumn> FlatColumns(const Table& table) {
     columns.insert(columns.begin(), ColumnOf(table.group, table.rows));
   }
   return columns;
-}
-
-// A table's notes by what they are.
-struct Notes {
-  Record provenance;
-  std::vector<std::string> warnings, others;
-};
-
-Notes Sort(const std::vector<std::string>& notes) {
-  Notes sorted;
-  for (const std::string& note : notes) {
-    const std::size_t colon = note.find(": ");
-    const std::string name = note.substr(0, colon);
-    if (name == "warning") {
-      sorted.warnings.push_back(note.substr(colon + 2));
-    } else if (colon != std::string::npos && name.find(' ') == std::string::npos) {
-      sorted.provenance.Set(name, note.substr(colon + 2));
-    } else {
-      sorted.others.push_back(note);
-    }
-  }
-  return sorted;
 }
 
 std::string EscapeLatex(std::string_view text) {
@@ -129,29 +89,18 @@ std::string LatexRow(const std::vector<std::string>& cells) {
 
 std::string ToJson(const Table& table) {
   const std::vector<TableColumn> columns = FlatColumns(table);
-  std::vector<std::string> heads, rows;
-  for (const TableColumn& column : columns) {
-    Record head;
-    head.Set("key", column.key);
-    head.Set("header", column.header);
-    head.Set("unit", UnitOf(column));
-    heads.push_back(ToJsonLine(head));
-  }
+  const std::string provenance = fmt::format("{}", fmt::join(table.notes, "\n"));
+  std::vector<std::string> rows;
   for (const Record& row : table.rows) {
     Record cells;
     for (const TableColumn& column : columns) {
       const Value* value = row.Find(column.key);
       cells.Set(column.key, value == nullptr ? Value() : *value);
     }
+    if (!provenance.empty()) cells.Set("provenance", provenance);
     rows.push_back(ToJsonLine(cells));
   }
-  const Notes notes = Sort(table.notes);
-  return fmt::format(
-      "{{\n\"title\": {},\n\"columns\": {},\n\"rows\": {},\n\"provenance\": {},\n\"warnings\": "
-      "{},\n"
-      "\"notes\": {}\n}}\n",
-      JsonOf(table.title), JsonList(heads, ",\n  "), JsonList(rows, ",\n  "),
-      ToJsonLine(notes.provenance), JsonStrings(notes.warnings), JsonStrings(notes.others));
+  return fmt::format("[{}]\n", fmt::join(rows, ",\n"));
 }
 
 std::string ToLatex(const Table& table) {

@@ -41,18 +41,17 @@ std::vector<TableColumn> AllColumns(std::span<const Record> rows) {
   return columns;
 }
 
+const std::vector<TableColumn>& ColumnsOfKind(const std::string& kind, bool compact) {
+  if (kind == "timing") return compact ? CompactTimingColumns() : TimingColumns();
+  if (kind == "precision") return compact ? CompactPrecisionColumns() : PrecisionColumns();
+  return compact ? CompactDriftColumns() : DriftColumns();
+}
+
 std::vector<TableColumn> DefaultColumns(const std::string& kind, bool compact,
                                         std::span<const Record> rows) {
-  if (kind == "timing") {
-    return WithParameters(compact ? CompactTimingColumns() : TimingColumns(), rows);
-  }
-  if (kind == "precision") {
-    return WithParameters(compact ? CompactPrecisionColumns() : PrecisionColumns(), rows);
-  }
-  if (kind == "drift") {
-    return WithParameters(compact ? CompactDriftColumns() : DriftColumns(), rows);
-  }
-  return AllColumns(rows);
+  if (kind == "all") return AllColumns(rows);
+  std::vector<TableColumn> columns = WithParameters(ColumnsOfKind(kind, compact), rows);
+  return compact ? TellingApart(std::move(columns), rows) : columns;
 }
 
 std::vector<TableColumn> ChosenColumns(const TableView& view, std::span<const Record> rows) {
@@ -61,22 +60,30 @@ std::vector<TableColumn> ChosenColumns(const TableView& view, std::span<const Re
   return columns;
 }
 
-// A slope that is not resolved must not look like one that is: the short table, which has no room
-// for growth_resolved, marks it.
-void MarkUnresolved(Table& table) {
-  bool any = false;
-  for (Record& row : table.rows) {
-    const double exponent = row.Number("growth_exponent");
-    if (std::isnan(exponent)) continue;
-    const bool resolved = row.Text("growth_resolved") == "true";
-    row.Set("growth_exponent", fmt::format("{:.2f}{}", exponent, resolved ? ' ' : '?'));
-    any = any || !resolved;
+// Where the columns chosen do not show that a value is none to rely on, a note does.
+std::vector<std::string> WhatColumnsHide(const Table& table) {
+  const auto shows = [&](const std::string& key) {
+    return table.group == key ||
+           std::ranges::find(table.columns, key, &TableColumn::key) != table.columns.end();
+  };
+  std::vector<std::string> notes;
+  const auto failed = std::ranges::count_if(table.rows, HasFailed);
+  if (failed > 0 && !shows("outcome")) {
+    notes.push_back(fmt::format("{} of {} runs did not finish; column outcome says which", failed,
+                                table.rows.size()));
   }
-  if (any) {
-    table.notes.push_back(
-        "slope of drift over time in log-log axes; ? marks what is not resolved (single runs, "
-        "windows that disagree)");
+  const bool unresolved = std::ranges::any_of(table.columns, [&](const TableColumn& column) {
+    return !(column.key.starts_with("growth_hypothesis") ? shows("growth_hypothesis_resolved")
+                                                         : shows("growth_resolved")) &&
+           std::ranges::any_of(table.rows,
+                               [&](const Record& row) { return IsUnresolved(row, column.key); });
+  });
+  if (unresolved) {
+    notes.push_back(
+        "slopes are those of log-log axes; ? marks what is not resolved (single runs, windows that "
+        "disagree), in CSV and JSON columns growth_resolved and growth_hypothesis_resolved do");
   }
+  return notes;
 }
 
 std::string TitleOf(const std::string& kind) {
@@ -123,7 +130,7 @@ Table MakeTable(std::span<const Record> records, const TableView& view) {
   table.group = view.group;
   if (!view.sort.empty()) SortRowsBy(&table.rows, view.sort, view.descending);
   if (!view.group.empty()) SortRowsBy(&table.rows, view.group, false);
-  if (kind == "drift" && view.compact && view.columns.empty()) MarkUnresolved(table);
+  for (std::string& note : WhatColumnsHide(table)) table.notes.push_back(std::move(note));
   return table;
 }
 

@@ -143,6 +143,10 @@ TEST_F(CommandLineTest, TablesInEveryFormatNameTheCommandAndTheCommit) {
     ExpectEnding(ending, 0, {"loopbench " + call, "commit", "machine", "compiler", "libraries"});
     EXPECT_EQ(ending.text.find("\033["), std::string::npos) << "colour in a pipe";
   }
+  // JSON as a stranger's reader takes it: a list of rows
+  ExpectEnding(Call("table out --format json | python3 -c \"import json, sys; "
+                    "print([type(row['steps']).__name__ for row in json.load(sys.stdin)])\""),
+               0, {"['int', 'int']"});
   ExpectEnding(Call("table out --columns formulation,stepz"), 2,
                {"--columns: found \"stepz\"", "did you mean \"steps\"", "energy_error_max"});
   ExpectEnding(Call("table out --descending"), 2, {"--sort"});

@@ -135,18 +135,94 @@ TEST(TableView, GroupsComeInOrderOfTheirValueAndKeepTheOrderWithin) {
   EXPECT_EQ(Values(table, "mechanism"), "b a c ");
 }
 
-TEST(TableView, TheShortTableMarksSlopesThatAreNotResolved) {
-  Record resolved = Accuracy("a", 1, 1), single = Accuracy("b", 1, 1);
-  resolved.Set("growth_exponent", 2.031);
-  resolved.Set("growth_resolved", true);
+// Not resolved: one run.
+Record SingleRun() {
+  Record single = Accuracy("b", 1, 1);
   single.Set("growth_exponent", 9.68);
   single.Set("growth_resolved", false);
-  const Table table = MakeTable(std::vector<Record>{resolved, single}, {.compact = true});
-  EXPECT_EQ(Values(table, "growth_exponent"), "2.03  9.68? ");
-  ASSERT_EQ(table.notes.size(), 1u);
-  EXPECT_NE(table.notes[0].find("? marks what is not resolved"), std::string::npos);
-  EXPECT_TRUE(MakeTable(std::vector<Record>{resolved}, {.compact = true}).notes.empty());
-  EXPECT_EQ(MakeTable(std::vector<Record>{single}, {}).rows[0].Number("growth_exponent"), 9.68);
+  single.Set("growth_hypothesis", std::string("t^2"));
+  single.Set("growth_hypothesis_resolved", false);
+  single.Set("energy_growth_exponent", 1.02);
+  return single;
+}
+
+Record Ensemble() {
+  Record resolved = Accuracy("a", 1, 1);
+  resolved.Set("growth_exponent", 2.031);
+  resolved.Set("growth_resolved", true);
+  resolved.Set("growth_hypothesis", std::string("t^2"));
+  resolved.Set("growth_hypothesis_resolved", true);
+  return resolved;
+}
+
+TEST(TableView, SlopesThatAreNotResolvedAreMarkedWhateverTheColumns) {
+  const std::vector<Record> records = {Ensemble(), SingleRun()};
+  for (const TableView& view : {TableView{.compact = true}, TableView{},
+                                TableView{.columns = {"mechanism", "growth_exponent"}},
+                                TableView{.compact = true, .columns = {"growth_exponent"}},
+                                TableView{.kind = "all", .columns = {"growth_exponent"}}}) {
+    const Table table = MakeTable(records, view);
+    for (const char* format : {"text", "markdown", "latex"}) {
+      const std::string text = Render(table, format);
+      EXPECT_NE(text.find("9.68?"), std::string::npos) << text;
+      EXPECT_EQ(text.find("2.03?"), std::string::npos) << text;
+    }
+    // a number stays a number where machines read it
+    EXPECT_EQ(table.rows[1].Number("growth_exponent"), 9.68);
+  }
+  const Table laws = MakeTable(
+      records, {.columns = {"growth_hypothesis", "energy_growth_exponent", "growth_resolved"}});
+  EXPECT_NE(ToMarkdown(laws).find("| t^2? | 1.02? |"), std::string::npos) << ToMarkdown(laws);
+  EXPECT_NE(ToMarkdown(laws).find("| t^2 |  |"), std::string::npos) << ToMarkdown(laws);
+  // digits below digits
+  const std::string text = ToText(MakeTable(records, {.columns = {"growth_exponent"}}));
+  EXPECT_NE(text.find("2.03\n"), std::string::npos) << text;
+  EXPECT_EQ(text.find("2.03\n") - text.rfind('\n', text.find("2.03\n")),
+            text.find("9.68?\n") - text.rfind('\n', text.find("9.68?\n")))
+      << text;
+}
+
+TEST(TableView, WhatChosenColumnsHideIsSaidInEveryFormat) {
+  Record failed = SingleRun();
+  failed.Set("outcome", std::string("singular"));
+  const std::vector<Record> records = {Ensemble(), failed};
+  const Table bare = MakeTable(records, {.columns = {"growth_exponent"}});
+  for (const char* format : {"text", "csv", "markdown", "json", "latex"}) {
+    const std::string text = Render(bare, format);
+    EXPECT_NE(text.find("1 of 2 runs did not finish"), std::string::npos) << text;
+    EXPECT_NE(text.find("not resolved"), std::string::npos) << text;
+  }
+  // columns that say it themselves, and runs of which there is nothing to say
+  EXPECT_TRUE(MakeTable(records, {}).notes.empty());
+  EXPECT_TRUE(MakeTable(records, {.columns = {"outcome", "drift_position_max"}}).notes.empty());
+  EXPECT_TRUE(
+      MakeTable(std::vector<Record>{Ensemble()}, {.columns = {"growth_exponent"}}).notes.empty());
+}
+
+TEST(TableView, ShortTablesTellRowsApart) {
+  // as runs of several scalars, whose short table had no column for the coordinates
+  const auto rung = [](const std::string& coordinates, const std::string& integrator) {
+    Record record;
+    record.Set("kind", std::string("precision"));
+    record.Set("mechanism", std::string("four-bar"));
+    record.Set("coordinates", coordinates);
+    record.Set("solver", std::string("rank-revealing"));
+    record.Set("integrator", integrator);
+    record.Set("scalar", std::string("double"));
+    record.Set("rtol", 1e-6);
+    record.Set("outcome", std::string("finished"));
+    return record;
+  };
+  const std::vector<Record> rungs = {rung("joint", "ode45"), rung("absolute", "ode45")};
+  const Table table = MakeTable(rungs, {.kind = "precision", .compact = true});
+  EXPECT_NE(ToText(table).find(" abs "), std::string::npos) << ToText(table);
+  EXPECT_EQ(Keys(table).find("integrator"), std::string::npos) << Keys(table);
+  // any key of cases that is needed comes in, and none besides
+  const Table both = MakeTable(std::vector<Record>{rung("joint", "ode45"), rung("joint", "gragg"),
+                                                   rung("absolute", "ode45")},
+                               {.kind = "precision", .compact = true});
+  EXPECT_NE(Keys(both).find("integrator outcome"), std::string::npos) << Keys(both);
+  EXPECT_EQ(Keys(both).find("solver"), std::string::npos) << Keys(both);
 }
 
 TEST(TableView, NoisyTimingsWarnWithTheWorstNumbersAndQuietOnesDoNot) {

@@ -146,9 +146,9 @@ void ExplainRuns(const Experiment& experiment) {
   }
   const Limits& limits = experiment.limits;
   Print(
-      "  A run is given up after {:g} s of wall time, {} accepted steps, or {:g} MiB of "
+      "  A run is given up after {:g} s of CPU time, {} accepted steps, or {:g} MiB of "
       "memory; its row then says so.\n",
-      limits.wall_s, limits.steps, limits.memory_mb);
+      limits.cpu_s, limits.steps, limits.memory_mb);
 }
 
 void ExplainMeasures(const Experiment& experiment) {

@@ -20,8 +20,8 @@ namespace {
 
 constexpr double kPilotFraction = 0.02;        ///< of the horizon, at first
 constexpr double kPilotGrowth = 5.0;           ///< then longer
-constexpr double kPilotEnough = 0.003;         ///< wall time that says something [s]
-constexpr double kPilotSeconds = 0.25;         ///< wall time of one pilot run
+constexpr double kPilotEnough = 0.003;         ///< CPU time that says something [s]
+constexpr double kPilotSeconds = 0.25;         ///< CPU time of one pilot run
 constexpr std::size_t kPilotCombinations = 8;  ///< of a sweep; the others take the nearest one's
 constexpr double kFamilySeconds = 0.02;        ///< batches of right-hand sides of one family member
 
@@ -35,19 +35,21 @@ std::string KeyText(const Record& keys) {
   return text;
 }
 
-/// Wall time of the unperturbed run by case, from an earlier store.
+/// CPU time of the unperturbed run by case, from an earlier store.
 std::map<std::string, double> EarlierTimes(const std::filesystem::path& store,
                                            const Record& example) {
   std::map<std::string, double> times;
   if (store.empty()) return times;
   for (const Record& record : ReadRecords(store)) {
-    if (record.Text("kind") != "accuracy" || std::isnan(record.Number("wall_s"))) continue;
+    // wall time depends on how many runs shared the processors; old stores have nothing else
+    const std::string measure = record.Find("cpu_s") != nullptr ? "cpu_s" : "wall_s";
+    if (record.Text("kind") != "accuracy" || std::isnan(record.Number(measure))) continue;
     Record keys;
     for (const auto& [key, value] : example.items()) {
       const Value* found = record.Find(key);
       keys.Set(key, found == nullptr ? Value() : *found);
     }
-    times[KeyText(keys)] = record.Number("wall_s");
+    times[KeyText(keys)] = record.Number(measure);
   }
   return times;
 }
@@ -55,12 +57,12 @@ std::map<std::string, double> EarlierTimes(const std::filesystem::path& store,
 /// Steps, and with them the time, grow with the horizon and with rtol^(-1/5) (order 5).
 double Work(double horizon, double rtol) { return horizon * std::pow(rtol, -0.2); }
 
-/// Wall time per unit of work of a scene and a column, from short runs.
+/// CPU time per unit of work of a scene and a column, from short runs.
 class Pilot {
  public:
   explicit Pilot(const std::vector<Experiment>& experiments) : experiments_(experiments) {}
 
-  /// Estimated wall time of one run of the case [s].
+  /// Estimated CPU time of one run of the case [s].
   double Seconds(std::size_t experiment, const Case& one) {
     const std::size_t piloted = Nearest(experiment);
     const Experiment& like = experiments_[piloted];
@@ -72,7 +74,7 @@ class Pilot {
     const double rate = known != rates_.end()
                             ? known->second
                             : rates_.emplace(key, Measure(like, scene, one)).first->second;
-    return std::min(rate * Work(one.horizon, one.rtol), one.limits.wall_s);
+    return std::min(rate * Work(one.horizon, one.rtol), one.limits.cpu_s);
   }
 
   std::size_t runs() const { return rates_.size(); }
@@ -94,17 +96,17 @@ class Pilot {
         *std::max_element(experiment.tolerances.begin(), experiment.tolerances.end());
     const std::vector<double>& horizons = experiment.scenes[scene].horizons;
     const double horizon = *std::max_element(horizons.begin(), horizons.end());
-    pilot.limits.wall_s = std::min(kPilotSeconds, like.limits.wall_s);
+    pilot.limits.cpu_s = std::min(kPilotSeconds, like.limits.cpu_s);
     // the first steps cost more than the later ones: longer, until the run is no longer short
     for (double fraction = kPilotFraction;; fraction = std::min(1.0, kPilotGrowth * fraction)) {
       pilot.horizon = fraction * horizon;
       const Record record = RunCase(experiment, pilot);
-      const double reached = record.Number("t_reached"), wall = record.Number("wall_s");
+      const double reached = record.Number("t_reached"), spent = record.Number("cpu_s");
       // a run that fails at once costs next to nothing, and so will the case
-      if (!(reached > 0.0) || !(wall > 0.0)) return 0.0;
+      if (!(reached > 0.0) || !(spent > 0.0)) return 0.0;
       const bool failed = record.Text("outcome") != ToString(Outcome::kFinished);
-      if (wall >= kPilotEnough || failed || fraction >= 1.0) {
-        return wall / Work(reached, pilot.rtol);
+      if (spent >= kPilotEnough || failed || fraction >= 1.0) {
+        return spent / Work(reached, pilot.rtol);
       }
     }
   }
@@ -222,8 +224,8 @@ void PrintPlan(const std::vector<Experiment>& experiments, const Plan& plan,
         "with the horizon and rtol^(-1/5)",
         source.empty() ? "" : ", the rest from ", pilot.runs(), 100.0 * kPilotFraction);
   }
-  Print("An estimate, from {}. Each run ends at {:g} s of wall time at the latest.\n", source,
-        first.limits.wall_s);
+  Print("An estimate, from {}. Each run ends at {:g} s of CPU time at the latest.\n", source,
+        first.limits.cpu_s);
 }
 
 }  // namespace

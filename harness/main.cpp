@@ -33,7 +33,7 @@ Selection ParseSelection(const std::vector<std::string>& conditions) {
 constexpr const char* kFooter = R"(
 Examples:
   loopbench list configs/experiments/paper/paper.json
-  loopbench plan configs/experiments/paper/paper.json --set /limits/wall_s=5
+  loopbench plan configs/experiments/paper/paper.json --set /limits/cpu_s=5
   loopbench run configs/experiments/paper/paper.json --jobs 2 --filter mechanism=four-bar
   loopbench run big.json --shard 1/2 --out part1   (and 2/2 elsewhere)
   loopbench merge part1 part2 --out whole

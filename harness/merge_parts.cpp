@@ -94,7 +94,8 @@ Run MergeParts(std::span<const Run> parts) {
     }
   }
   record.Set("wall_s", wall);
-  for (const char* key : {"energy_supplied", "energy_dissipated"}) Add<double>(parts, key, &record);
+  for (const char* key : {"cpu_s", "energy_supplied", "energy_dissipated"})
+    Add<double>(parts, key, &record);
   if (started) {
     record.Set("energy_error_max", energy);
     record.Set("state_hash", Fnv1a(hashes));

@@ -59,6 +59,7 @@ void Write(const Rung& rung, Record& record) {
   record.Set("rhs_evaluations", rung.rhs_evaluations);
   record.Set("restarts", rung.restarts);
   record.Set("wall_s", rung.wall_s);
+  record.Set("cpu_s", rung.cpu_s);
 }
 
 }  // namespace

@@ -99,6 +99,7 @@ class Runner {
       run.record.Set("newton_failures", result.newton_failures);
     }
     run.record.Set("wall_s", result.wall_s);
+    run.record.Set("cpu_s", result.cpu_s);
     run.drift = {drift_.series().t, drift_.series().value};
     if (with_series_) {
       run.correction = {correction_.series().t, correction_.series().value};
@@ -218,7 +219,7 @@ IntegratorOptions OptionsOf(const Case& one, const std::vector<double>& stop_tim
   options.rtol = one.rtol;
   options.atol = one.atol;
   options.step_limit = one.limits.steps;
-  options.time_limit_s = one.limits.wall_s;
+  options.time_limit_s = one.limits.cpu_s;
   options.stop_times = stop_times;
   return options;
 }
@@ -232,7 +233,7 @@ std::string CaseContent(const Experiment& experiment, const Case& one) {
     content.Set("between." + drawn.joint, std::vector<double>{drawn.from, drawn.to});
   }
   content.Set("branch_bound", one.branch_bound);
-  content.Set("wall_s", one.limits.wall_s);
+  content.Set("cpu_s", one.limits.cpu_s);
   content.Set("steps", one.limits.steps);
   content.Set("memory_mb", one.limits.memory_mb);
   content.Set("series_points", std::int64_t{experiment.series_points});

@@ -19,6 +19,8 @@
 #include "harness/progress.h"
 #include "harness/provenance.h"
 #include "harness/run_case.h"
+#include "harness/terminal.h"
+#include "harness/timing/noise.h"
 #include "harness/timing/time_cases.h"
 
 namespace loopbench::harness {
@@ -38,7 +40,7 @@ struct Piece {
   double cost = 0.0;
 };
 
-/// Twice the time that the runs inside may take by themselves, and a little for starting.
+/// Twice the CPU time that the runs inside may take by themselves, and a little for starting.
 constexpr double kPatience = 2.0, kGrace_s = 2.0;
 
 std::string Id(const std::string& content) { return Fnv1a(content + CodeVersion()); }
@@ -50,7 +52,7 @@ Piece AccuracyPiece(const Experiment& experiment, const Case& one) {
   const int runs = one.ensemble > 1 ? one.ensemble + 1 : 1;
   return {{keys},
           [&experiment, one] { return std::vector<Record>{RunCase(experiment, one)}; },
-          {kPatience * runs * one.limits.wall_s + kGrace_s, one.limits.memory_mb},
+          {kPatience * runs * one.limits.cpu_s + kGrace_s, one.limits.memory_mb},
           fmt::format("{} {} {}", one.mechanism, ToString(one.column), one.rtol),
           Cost(one)};
 }
@@ -63,7 +65,7 @@ Piece TimingPiece(const Experiment& experiment, const TimingGroup& group) {
         group.simulate ? experiment.scenes[group.cases[i].scene].mechanism.canonical : "";
     const Limits& limits = experiment.limits;
     keys.Set("id", Id(fmt::format("{} {} {} {} {} {} {}", CaseId(keys), experiment.timing.repeats,
-                                  limits.wall_s, limits.steps, limits.memory_mb,
+                                  limits.cpu_s, limits.steps, limits.memory_mb,
                                   ToString(experiment.compile), document)));
     piece.owed.push_back(keys);
   }
@@ -72,7 +74,7 @@ Piece TimingPiece(const Experiment& experiment, const TimingGroup& group) {
   const int runs = columns * (experiment.timing.repeats + 1);
   // right-hand sides have no limit of their own; a minute per column is far beyond any
   constexpr double kDerivatives_s = 60.0;
-  piece.limits = {kPatience * runs * experiment.limits.wall_s + kDerivatives_s * columns,
+  piece.limits = {kPatience * runs * experiment.limits.cpu_s + kDerivatives_s * columns,
                   experiment.limits.memory_mb};
   piece.work = [&experiment, &group] { return TimeTogether(experiment, group); };
   piece.label = group.description.name;
@@ -89,13 +91,13 @@ Piece LadderPiece(const Experiment& experiment, const LadderGroup& group) {
   std::string ladder;  // the verdict on one rung depends on the others
   for (const Record& keys : group.keys) ladder += CaseId(keys);
   for (Record keys : group.keys) {
-    keys.Set("id", Id(fmt::format("{} {} {} {} {} {}", CaseId(keys), ladder, limits.wall_s,
+    keys.Set("id", Id(fmt::format("{} {} {} {} {} {}", CaseId(keys), ladder, limits.cpu_s,
                                   limits.steps, ToString(experiment.compile),
                                   experiment.scenes[scene].mechanism.canonical)));
     piece.owed.push_back(keys);
   }
   const auto runs = static_cast<double>(group.keys.size() + 1);  // there are two references
-  piece.limits = {kPatience * runs * limits.wall_s + kGrace_s, limits.memory_mb};
+  piece.limits = {kPatience * runs * limits.cpu_s + kGrace_s, limits.memory_mb};
   piece.work = [&group] { return ClimbTogether(group); };
   piece.label =
       fmt::format("{} {}", group.keys.front().Text("mechanism"), ToString(group.task.column));
@@ -149,6 +151,7 @@ std::vector<Record> Records(const Piece& piece, const ProcessResult& result) {
       records[i].Set("outcome", outcome);
       records[i].Set("message", message);
       records[i].Set("wall_s", result.wall_s);
+      records[i].Set("cpu_s", result.cpu_s);
     }
     records[i].Set("id", piece.owed[i].Text("id"));
     records[i].Set("version", CodeVersion());
@@ -213,6 +216,16 @@ class Runner {
   throw ConfigError(fmt::format("--filter {}: no such key; cases have {}", key, known));
 }
 
+/// Limits of time are of CPU time, so that too many jobs change no outcome. They gain nothing.
+void WarnOfJobs(int jobs) {
+  const int processors = ReadMachineState().processors;
+  if (jobs <= processors) return;
+  PrintError(
+      "warning: --jobs {} on {} processor{}: the runs take turns, and together they may ask "
+      "for {} times the memory of one\n",
+      jobs, processors, processors == 1 ? "" : "s", jobs);
+}
+
 }  // namespace
 
 std::vector<Case> SelectCases(const Experiment& experiment, const Selection& filter) {
@@ -239,14 +252,15 @@ Shard ParseShard(const std::string& text) {
   const auto count = has_count ? std::from_chars(index.ptr + 1, end, shard.count) : index;
   if (!has_count || count.ec != std::errc() || count.ptr != end || shard.index < 1 ||
       shard.index > shard.count) {
-    throw ConfigError(fmt::format("--shard: found \"{}\", expected k/n with 1 <= k <= n <= {}", text,
-                                  std::numeric_limits<int>::max()));
+    throw ConfigError(fmt::format("--shard: found \"{}\", expected k/n with 1 <= k <= n <= {}",
+                                  text, std::numeric_limits<int>::max()));
   }
   return shard;
 }
 
 SuiteCount RunSuite(const std::vector<Experiment>& experiments, const SuiteOptions& options,
                     const std::vector<Record>& records, ResultStore& store) {
+  WarnOfJobs(options.jobs);
   Runner runner(options, records, store);
   if (options.accuracy) {
     std::vector<Piece> pieces;

@@ -118,7 +118,7 @@ struct EnsembleRule {
 
 /// When a case is given up. Its row then says so.
 struct Limits {
-  double wall_s = 10.0;            ///< wall time [s]: keeps a whole suite within minutes
+  double cpu_s = 10.0;             ///< CPU time [s]: keeps a whole suite within minutes
   std::int64_t steps = 1'000'000;  ///< accepted steps: far more than any case that ends needs
   double memory_mb = 2048.0;       ///< address space of the case's process [MiB]
 };

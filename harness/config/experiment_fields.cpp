@@ -43,6 +43,12 @@ FieldFault NoKey(const Json& object, const std::string& token, const std::string
           NearestSpelling(token, keys), ""};
 }
 
+/// The name under which "limits" has a field: "cpu_s" was "wall_s" once, and either is accepted.
+std::string NameInLimits(const Json& limits, const std::string& token) {
+  const std::string other = token == "wall_s" ? "cpu_s" : token == "cpu_s" ? "wall_s" : token;
+  return limits.contains(token) || !limits.contains(other) ? token : other;
+}
+
 }  // namespace
 
 std::optional<std::vector<std::string>> PointerTokens(const std::string& pointer) {
@@ -90,7 +96,8 @@ void ExperimentFields::Walk(Json& node, const std::vector<std::string>& tokens, 
   }
   const bool at_mechanism = depth == 3 && tokens[0] == "scenes" && tokens[2] == "mechanism";
   if (at_mechanism && node.is_string() && !TakeIn(node, pointer, found)) return;
-  const std::string& token = tokens[depth];
+  const bool of_limits = depth == 1 && tokens[0] == "limits" && node.is_object();
+  const std::string token = of_limits ? NameInLimits(node, tokens[depth]) : tokens[depth];
   if (node.is_array()) {
     const auto index = IndexOf(token);
     if (token == "*" && !node.empty()) {

@@ -12,8 +12,11 @@ constexpr std::int64_t kMaxSteps = 1'000'000'000'000;  // no run gets there
 
 void ReadLimits(const JsonNode& root, Limits* limits) {
   const auto node = root.Optional("limits");
-  if (!node || !node->ExpectObject({"wall_s", "steps", "memory_mb"})) return;
-  if (const auto wall = node->Optional("wall_s")) limits->wall_s = wall->Number(kPositive);
+  if (!node || !node->ExpectObject({"cpu_s", "steps", "memory_mb", "wall_s"})) return;
+  const auto cpu = node->Optional("cpu_s"), wall = node->Optional("wall_s");
+  if (cpu && wall) node->FailAs("\"cpu_s\" and \"wall_s\"", "one of them: both limit CPU time");
+  if (cpu) limits->cpu_s = cpu->Number(kPositive);
+  if (wall) limits->cpu_s = wall->Number(kPositive);  // its former name
   if (const auto steps = node->Optional("steps")) {
     limits->steps = steps->Integer(1, kMaxSteps);
   }

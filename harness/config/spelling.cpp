@@ -49,7 +49,7 @@ std::string NearestSpelling(std::string_view given, const std::vector<std::strin
     allowed = distance - 1;
   }
   if (!nearest.empty()) return nearest;
-  // a word cut short, or one too long: "wall" for "wall_s"
+  // a word cut short, or one too long: "cpu" for "cpu_s"
   constexpr std::size_t kShortestStart = 3;
   for (const std::string& word : known) {
     const std::string whole = Lowered(word);

@@ -25,6 +25,7 @@ struct IntegratorResult {
   std::int64_t restarts = 0;         ///< times the observer asked for kRestart and was followed
   double last_step = 0;              ///< length of the last accepted step, s
   double wall_s = 0;                 ///< wall time of the run, observers included, s
+  double cpu_s = 0;                  ///< CPU time of its thread, s
 
   // Implicit profiles only, else 0:
   std::int64_t jacobians = 0;                 ///< Jacobians evaluated

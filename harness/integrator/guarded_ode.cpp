@@ -8,7 +8,7 @@
 namespace loopbench::harness {
 
 GuardedOde::GuardedOde(Ode& ode, const IntegratorOptions& options)
-    : options_(options), ode_(ode), start_(Clock::now()) {
+    : options_(options), ode_(ode), time_(options.time_limit_s) {
   if (FindProfile(options.profile)->is_implicit) {
     const auto size = static_cast<size_t>(ode.size());
     jacobian_.resize(size * Controlled());
@@ -42,7 +42,7 @@ void GuardedOde::SetStop(double t) {
 }
 
 bool GuardedOde::OutOfTime() {
-  if (wall_s() < options_.time_limit_s) {
+  if (!time_.Reached()) {
     return false;
   }
   failure_ = Outcome::kTimeLimit;
@@ -73,10 +73,6 @@ double GuardedOde::FirstStepOfOde45(double t0, double t_end, std::span<const dou
   rate /= 0.8 * std::pow(options_.rtol, 0.2);
   const double h = std::min(longest, t_end - t0);
   return h * rate > 1 ? 1 / rate : h;
-}
-
-double GuardedOde::wall_s() const {
-  return std::chrono::duration<double>(Clock::now() - start_).count();
 }
 
 }  // namespace loopbench::harness

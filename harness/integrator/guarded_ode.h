@@ -1,13 +1,13 @@
 // The derivative as the integrator's C library may call it.
 #pragma once
 
-#include <chrono>
 #include <cstdint>
 #include <exception>
 #include <limits>
 #include <span>
 #include <vector>
 
+#include "harness/cpu_time.h"
 #include "harness/integrator/ode.h"
 #include "harness/integrator/options.h"
 #include "mechanism/outcome.h"
@@ -15,12 +15,12 @@
 namespace loopbench::harness {
 
 /// An Ode behind the checks that ARKODE lacks: a derivative that is not finite (ARKODE would
-/// shorten the step for ever), the wall clock, and exceptions, which must not travel through C
+/// shorten the step for ever), the CPU clock, and exceptions, which must not travel through C
 /// frames. The first failure is kept for the result and ends every later evaluation. Also computes
 /// the quantities of a profile that need only options, state and derivative.
 class GuardedOde {
  public:
-  /// Starts the clock. Both arguments must outlive the object.
+  /// Starts the clocks. Both arguments must outlive the object.
   GuardedOde(Ode& ode, const IntegratorOptions& options);
 
   /// False if the run must end; `failure()` or `exception()` then says why.
@@ -36,7 +36,7 @@ class GuardedOde {
   /// Lets the derivative see only times before `t` from now on; infinity lifts this.
   void SetStop(double t);
 
-  /// True, and the failure is kTimeLimit, once the wall time is used up.
+  /// True, and the failure is kTimeLimit, once the CPU time is used up.
   bool OutOfTime();
 
   /// The reciprocal of each component's tolerance: 1 / max(rtol |y_i|, atol) for ode45, else
@@ -52,8 +52,9 @@ class GuardedOde {
   /// Number of components that are not quadratures.
   size_t Controlled() const { return static_cast<size_t>(ode_.size() - ode_.num_quadratures()); }
 
-  /// Wall time since construction, s.
-  double wall_s() const;
+  /// Wall time and the thread's CPU time since construction, s.
+  double wall_s() const { return time_.wall_s(); }
+  double cpu_s() const { return time_.cpu_s(); }
 
   Outcome failure() const { return failure_; }
   std::exception_ptr exception() const { return exception_; }
@@ -67,13 +68,12 @@ class GuardedOde {
   const IntegratorOptions& options() const { return options_; }
 
  private:
-  using Clock = std::chrono::steady_clock;
   bool Differences(double t, std::span<const double> y, std::span<const double> f);
 
   const IntegratorOptions& options_;
   Ode& ode_;
   double latest_ = std::numeric_limits<double>::infinity();  // time that the derivative may see
-  Clock::time_point start_;
+  CpuLimit time_;
   std::int64_t calls_ = 0, jacobian_calls_ = 0, jacobians_ = 0, dual_evaluations_ = 0;
   std::vector<double> jacobian_, shifted_, shifted_f_;  // empty for explicit profiles
   Outcome failure_ = Outcome::kFinished;

@@ -118,6 +118,7 @@ IntegratorResult Integrate(Ode& ode, double t0, double t_end, std::vector<double
   result.jacobian_rhs_evaluations = guarded.jacobian_calls();
   result.dual_evaluations = guarded.dual_evaluations();
   result.wall_s = guarded.wall_s();
+  result.cpu_s = guarded.cpu_s();
   return result;
 }
 

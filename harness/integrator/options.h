@@ -54,7 +54,8 @@ struct IntegratorOptions {
   /// Accepted steps before the run ends with kStepLimit.
   std::int64_t step_limit = 10'000'000;
 
-  /// Wall time in seconds before the run ends with kTimeLimit. Checked after every accepted step
+  /// CPU time of the thread in seconds before the run ends with kTimeLimit: waiting for a processor
+  /// is not the run's doing. Checked after every accepted step
   /// and on every 16th derivative, so one derivative that hangs is not interrupted.
   double time_limit_s = 600;
 

@@ -19,6 +19,8 @@
 #include <stdexcept>
 #include <vector>
 
+#include "harness/isolation/child_watch.h"
+
 namespace loopbench::harness {
 namespace {
 
@@ -28,6 +30,10 @@ constexpr int kThrewExit = 91, kMemoryExit = 92;  ///< free for any use by this 
 
 double SecondsSince(Clock::time_point begin) {
   return std::chrono::duration<double>(Clock::now() - begin).count();
+}
+
+double Seconds(const timeval& time) {
+  return static_cast<double>(time.tv_sec) + 1e-6 * static_cast<double>(time.tv_usec);
 }
 
 [[noreturn]] void Fail(std::string_view what) {
@@ -83,11 +89,26 @@ struct Child {
   int answer = -1;
   ProcessLimits limits;
   Clock::time_point begin;
+  ChildWatch watch;
   std::string text;
-  bool killed = false;
+  std::string killed;  ///< why, in words
 
-  double Remaining() const {
-    return limits.wall_s > 0.0 ? limits.wall_s - SecondsSince(begin) : 1e9;
+  /// No sooner than in this time can it be over its limits or be worth a look [s].
+  double Wait() const {
+    if (!killed.empty() || limits.cpu_s <= 0.0) return kLook_s;
+    return std::clamp(limits.cpu_s - watch.cpu_s(), 0.01, kLook_s);
+  }
+
+  void KillIfOver() {
+    if (!killed.empty()) return;
+    if (limits.cpu_s > 0.0 && watch.cpu_s() >= limits.cpu_s) {
+      killed = fmt::format("killed after {:.4g} s of CPU time", limits.cpu_s);
+    } else if (watch.idle_s() >= limits.idle_s) {
+      killed = fmt::format("killed after {:.4g} s asleep, computing nothing", limits.idle_s);
+    } else {
+      return;
+    }
+    ::kill(pid, SIGKILL);  // its pipe closes, which the next wait sees
   }
 };
 
@@ -121,29 +142,28 @@ class Children {
       ::close(ends[0]);
       Fail("start a process");
     }
-    running_.push_back({piece, pid, ends[0], limits, Clock::now(), {}, false});
+    running_.push_back({piece, pid, ends[0], limits, Clock::now(), ChildWatch(pid), {}, {}});
   }
 
   /// Waits until something happens and returns the children that ended.
   std::vector<Child> Wait() {
     std::vector<pollfd> waiting;
-    double remaining = 1e6;
+    double wait_s = kLook_s;
     for (const Child& child : running_) {
       waiting.push_back({child.answer, POLLIN, 0});
-      remaining = std::min(remaining, child.Remaining());
+      wait_s = std::min(wait_s, child.Wait());
     }
-    const int timeout_ms = static_cast<int>(std::max(0.0, remaining) * 1e3) + 1;
+    const int timeout_ms = static_cast<int>(wait_s * 1e3) + 1;
     if (::poll(waiting.data(), waiting.size(), timeout_ms) < 0 && errno != EINTR) {
       Fail("wait for processes");
     }
     std::vector<Child> ended;
     for (std::size_t i = running_.size(); i-- > 0;) {
       Child& child = running_[i];
-      if (!child.killed && child.Remaining() <= 0.0) {
-        child.killed = true;
-        ::kill(child.pid, SIGKILL);  // its pipe closes, which the next wait sees
-      }
-      if ((waiting[i].revents & (POLLIN | POLLHUP)) == 0 || Read(child)) continue;
+      const bool unread = (waiting[i].revents & (POLLIN | POLLHUP)) != 0;
+      child.watch.Look(unread);
+      child.KillIfOver();
+      if (!unread || Read(child)) continue;
       ended.push_back(std::move(child));
       running_.erase(running_.begin() + static_cast<std::ptrdiff_t>(i));
     }
@@ -165,11 +185,13 @@ class Children {
 
 ProcessResult ResultOf(Child child) {
   int status = 0;
-  while (::waitpid(child.pid, &status, 0) < 0 && errno == EINTR) {
+  rusage usage{};
+  while (::wait4(child.pid, &status, 0, &usage) < 0 && errno == EINTR) {
   }
   ::close(child.answer);
   ProcessResult result;
   result.wall_s = SecondsSince(child.begin);
+  result.cpu_s = Seconds(usage.ru_utime) + Seconds(usage.ru_stime);
   if (WIFEXITED(status) && WEXITSTATUS(status) == EXIT_SUCCESS) {
     result.text = std::move(child.text);
   } else if (WIFEXITED(status) && WEXITSTATUS(status) == kThrewExit) {
@@ -178,9 +200,9 @@ ProcessResult ResultOf(Child child) {
   } else if (WIFEXITED(status) && WEXITSTATUS(status) == kMemoryExit) {
     result.ending = ProcessEnding::kOverMemory;
     result.text = fmt::format("asked for more than {} MiB", child.limits.memory_mb);
-  } else if (child.killed) {
+  } else if (!child.killed.empty()) {
     result.ending = ProcessEnding::kOverTime;
-    result.text = fmt::format("killed after {} s", child.limits.wall_s);
+    result.text = child.killed;
   } else {
     result.ending = ProcessEnding::kCrashed;
     result.text = WIFSIGNALED(status) ? fmt::format("ended by signal {} ({})", WTERMSIG(status),

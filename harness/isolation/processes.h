@@ -1,7 +1,9 @@
 // Work in child processes: whatever a piece of work does, the parent gets an answer and goes on.
 //
 // Each piece runs in a fork of this program, under limits of its own, and answers with text through
-// a pipe. A crash, an overrun of time or memory, or silence is an ending with a name. The caller
+// a pipe. A crash, an overrun of time or memory, or silence is an ending with a name. Time is CPU
+// time: how many pieces share a processor, and for how long the machine is stopped, decides nothing
+// (child_watch.h). The caller
 // must have a single thread: a fork copies only the thread that calls it.
 #pragma once
 
@@ -16,19 +18,21 @@ enum class ProcessEnding {
   kAnswered,    ///< returned a text
   kThrew,       ///< an exception left the work; the message is its text
   kCrashed,     ///< ended by a signal, or left through exit()
-  kOverTime,    ///< killed at its time limit
+  kOverTime,    ///< killed: it used up its CPU time, or slept for long
   kOverMemory,  ///< asked for more memory than allowed
 };
 
 struct ProcessLimits {
-  double wall_s = 0.0;     ///< killed after so much time [s]; 0: no limit
+  double cpu_s = 0.0;      ///< killed after so much CPU time [s]; 0: no limit
   double memory_mb = 0.0;  ///< address space beyond what the parent has [MiB]; 0: no limit
+  /// Killed after so much time asleep on end [s]: work that computes does not sleep at all.
+  double idle_s = 5.0;
 };
 
 struct ProcessResult {
   ProcessEnding ending = ProcessEnding::kAnswered;
   std::string text;  ///< the answer, or what is known about the failure
-  double wall_s = 0.0;
+  double wall_s = 0.0, cpu_s = 0.0;
 };
 
 /// Runs work(0) .. work(count - 1), at most `jobs` at once, started in order. `done` is called here

@@ -1,10 +1,10 @@
 #include "harness/precision/integrator.h"
 
 #include <algorithm>
-#include <chrono>
 #include <cmath>
 #include <limits>
 
+#include "harness/cpu_time.h"
 #include "harness/precision/one_step.h"
 #include "harness/precision/scalars.h"
 
@@ -101,7 +101,7 @@ class Run {
     if (t_ < t_end_) {
       if (h <= S(16) * std::numeric_limits<S>::epsilon() * abs(t_)) return Outcome::kStepTooSmall;
       if (result_.steps >= options_.step_limit) return Outcome::kStepLimit;
-      if (Seconds() > options_.time_limit_s) return Outcome::kTimeLimit;
+      if (time_.Reached()) return Outcome::kTimeLimit;
     } else {
       return Outcome::kFinished;
     }
@@ -109,10 +109,6 @@ class Run {
     if (rewritten || step_.f_new().empty()) return step_.Evaluate(t_, y_, f_);
     f_ = step_.f_new();
     return Outcome::kFinished;
-  }
-
-  double Seconds() const {
-    return std::chrono::duration<double>(std::chrono::steady_clock::now() - start_).count();
   }
 
   const System<S>& system_;
@@ -126,7 +122,7 @@ class Run {
   OneStep<S> step_;
   OneStepResult result_;
   S t_ = S(0), h_ = S(0);
-  std::chrono::steady_clock::time_point start_ = std::chrono::steady_clock::now();
+  CpuLimit time_{options_.time_limit_s};
 };
 
 }  // namespace

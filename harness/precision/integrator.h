@@ -39,7 +39,7 @@ struct OneStepOptions {
   S tolerance = S(1e-6);  ///< rtol = atol > 0
   S fixed_step = S(0);    ///< positive: every step but the last has this length, untested
   std::int64_t step_limit = 10'000'000;
-  double time_limit_s = 600.0;  ///< wall time, looked at after each step
+  double time_limit_s = 600.0;  ///< CPU time of the thread, looked at after each step
 };
 
 /// How a run went.

@@ -1,10 +1,10 @@
 #include "harness/precision/ladder.h"
 
-#include <chrono>
 #include <cmath>
 #include <limits>
 #include <memory>
 
+#include "harness/cpu_time.h"
 #include "harness/precision/exact.h"
 #include "harness/precision/integrator.h"
 #include "lagrange/lagrange.h"
@@ -39,7 +39,7 @@ struct Ended {
 template <class S>
 Ended Climb(const LadderTask& task, Exact& exact, Scalar scalar, OneStepMethod method,
             double tolerance) {
-  const auto start = std::chrono::steady_clock::now();
+  const CpuLimit time(task.limits.cpu_s);
   const Mechanism<Planar, S> mechanism(task.description, task.column.coordinates);
   const auto formulation = Make<S>(task.column, mechanism);
   Ended ended;
@@ -71,7 +71,7 @@ Ended Climb(const LadderTask& task, Exact& exact, Scalar scalar, OneStepMethod m
                                                   {.method = method,
                                                    .tolerance = S(tolerance),
                                                    .step_limit = task.limits.steps,
-                                                   .time_limit_s = task.limits.wall_s});
+                                                   .time_limit_s = task.limits.cpu_s});
   rung.outcome = result.outcome;
   rung.t_reached = result.t_reached;
   rung.steps = result.steps;
@@ -81,7 +81,8 @@ Ended Climb(const LadderTask& task, Exact& exact, Scalar scalar, OneStepMethod m
   rung.drift = static_cast<double>(drift);
   rung.error = std::numeric_limits<double>::quiet_NaN();
   ended.centres = exact.Centres(t_at, at);
-  rung.wall_s = std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
+  rung.wall_s = time.wall_s();
+  rung.cpu_s = time.cpu_s();
   return ended;
 }
 

@@ -25,7 +25,7 @@ struct LadderTask {
   Column column;
   double horizon = 1.0;  ///< [s]
   Precision precision;   ///< scalars, tolerances, the reference's
-  Limits limits;         ///< wall time and steps, of each run
+  Limits limits;         ///< CPU time and steps, of each run
 };
 
 /// One run.
@@ -35,7 +35,7 @@ struct Rung {
   Outcome outcome = Outcome::kFinished;
   double t_reached = 0.0;  ///< [s]
   std::int64_t steps = 0, rejected = 0, rhs_evaluations = 0, restarts = 0;
-  double wall_s = 0.0;
+  double wall_s = 0.0, cpu_s = 0.0;
   double drift = 0.0;  ///< largest mismatch of points at accepted steps [m]
   double error = 0.0;  ///< largest distance of a centre of mass from the reference's at the end
                        ///< [m]; NaN when one of them did not get there

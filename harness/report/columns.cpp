@@ -67,6 +67,7 @@ std::vector<TableColumn> OtherColumns() {
       Make("singularity_distance_min", "singularity distance", kScientific),
       Make("singularity_distance_min_t", "at time [s]", kSeconds),
       Make("wall_s", "wall [s]", kSeconds),
+      Make("cpu_s", "CPU [s]", kSeconds),
       Make("newton_iterations", "newton iterations", kInteger),
       Make("newton_failures", "newton failures", kInteger),
       Make("newton_jacobians", "jacobians", kInteger),

@@ -162,11 +162,22 @@ TEST(Sweep, CrossesAxesAndZipsInStep) {
   ASSERT_EQ(experiments.size(), 6u);
   std::vector<std::string> seen;
   for (const Experiment& one : experiments) {
-    EXPECT_EQ(one.limits.wall_s, one.parameters.Number("wall"));
+    EXPECT_EQ(one.limits.cpu_s, one.parameters.Number("wall"));
     EXPECT_EQ(one.comment, one.parameters.Text("kind_of"));
     seen.push_back(one.parameters.Text("mass") + one.parameters.Text("wall") + one.comment);
   }
   EXPECT_EQ(seen, (std::vector<std::string>{"11a", "12b", "13c", "2.51a", "2.52b", "2.53c"}));
+}
+
+// wall_s is the former name of cpu_s: whichever a file has, either name sets it.
+TEST(Settings, OfTheLimitOfTimeHaveTwoNames) {
+  for (const std::string in_file :
+       {"", R"(, "limits": {"cpu_s": 3})", R"(, "limits": {"wall_s": 3})"}) {
+    for (const std::string name : {"cpu_s", "wall_s"}) {
+      const auto experiments = Read(Text(in_file), {{"/limits/" + name, "7"}});
+      EXPECT_EQ(experiments.front().limits.cpu_s, 7.0) << in_file << " " << name;
+    }
+  }
 }
 
 TEST(Sweep, StarGoesThroughAllElements) {

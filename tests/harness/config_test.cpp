@@ -233,7 +233,7 @@ TEST(Expand, KeepsTheOrderSceneHorizonColumnTolerance) {
   EXPECT_EQ(cases[(15 + 12) * 4].scene, 1u);
   for (const Case& one : cases) {
     EXPECT_EQ(one.rtol, one.atol);
-    EXPECT_EQ(one.limits.wall_s, 10.0);
+    EXPECT_EQ(one.limits.cpu_s, 10.0);
     EXPECT_EQ(one.integrator, "ode45");
   }
 }

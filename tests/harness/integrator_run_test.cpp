@@ -12,6 +12,7 @@
 #include <utility>
 #include <vector>
 
+#include "harness/cpu_time.h"
 #include "harness/integrator/arkode.h"
 #include "tests/harness/integrator_problems.h"
 
@@ -91,9 +92,12 @@ TEST(IntegratorRun, StepLimitEndsTheRun) {
   EXPECT_EQ(result.steps, 7);
 }
 
+// A derivative that computes for 2 ms.
 TEST(IntegratorRun, TimeLimitEndsTheRun) {
   TestOde ode(1, [](double, auto, auto ydot) {
-    std::this_thread::sleep_for(std::chrono::milliseconds(2));
+    const double begin = ThreadCpuSeconds();
+    while (ThreadCpuSeconds() < begin + 2e-3) {
+    }
     ydot[0] = 1;
     return Outcome::kFinished;
   });
@@ -103,8 +107,37 @@ TEST(IntegratorRun, TimeLimitEndsTheRun) {
   options.time_limit_s = 0.05;
   const IntegratorResult result = Integrate(ode, 0, 1, y, options);
   EXPECT_EQ(result.outcome, Outcome::kTimeLimit);
-  EXPECT_GE(result.wall_s, 0.05);
-  EXPECT_LT(result.wall_s, 2);  // 16 calls of 2 ms and a loaded machine
+  EXPECT_GE(result.cpu_s, 0.05);
+  EXPECT_GE(result.wall_s, result.cpu_s);
+  EXPECT_LT(result.cpu_s, 0.15);  // 16 calls of 2 ms, and as much again
+}
+
+// Whatever keeps the thread from computing, a loaded machine or a stop, is not its doing: a run
+// that takes ten times its limit on the wall, asleep, finishes.
+TEST(IntegratorRun, TimeLimitDoesNotCountWaiting) {
+  TestOde ode(1, [](double, auto, auto ydot) {
+    std::this_thread::sleep_for(std::chrono::milliseconds(10));
+    ydot[0] = 1;
+    return Outcome::kFinished;
+  });
+  State y{0};
+  IntegratorOptions options;
+  options.max_step = 0.1;  // ten steps, 60 derivatives
+  options.time_limit_s = 0.06;
+  const IntegratorResult result = Integrate(ode, 0, 1, y, options);
+  EXPECT_EQ(result.outcome, Outcome::kFinished);
+  EXPECT_GE(result.wall_s, 0.6);
+  EXPECT_LT(result.cpu_s, 0.06);
+}
+
+TEST(CpuLimit, IsReachedByComputingAlone) {
+  CpuLimit limit(0.05);
+  std::this_thread::sleep_for(std::chrono::milliseconds(100));
+  EXPECT_FALSE(limit.Reached());
+  while (!limit.Reached()) {
+  }
+  EXPECT_GE(limit.cpu_s(), 0.05);
+  EXPECT_LT(limit.cpu_s(), 0.1) << "it looks again no later than it could be reached";
 }
 
 // y' = y^2 from 1 is 1 / (1 - t): steps shrink in proportion to the time left.

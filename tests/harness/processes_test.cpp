@@ -5,11 +5,16 @@
 #include <sys/wait.h>
 #include <unistd.h>
 
+#include <algorithm>
+#include <chrono>
 #include <csignal>
 #include <cstdlib>
 #include <map>
 #include <stdexcept>
+#include <thread>
 #include <vector>
+
+#include "harness/cpu_time.h"
 
 namespace loopbench::harness {
 namespace {
@@ -26,6 +31,25 @@ std::map<std::size_t, ProcessResult> RunAll(const std::vector<std::function<std:
 
 std::string Hang() {
   for (;;) ::pause();
+}
+
+/// Computes for some CPU time [s].
+std::string Compute(double seconds) {
+  const double begin = ThreadCpuSeconds();
+  while (ThreadCpuSeconds() < begin + seconds) {
+  }
+  return "done";
+}
+
+/// Has another process stop this one for a while [s].
+void BeStopped(double seconds) {
+  const pid_t self = ::getpid();
+  if (::fork() == 0) {
+    ::kill(self, SIGSTOP);
+    std::this_thread::sleep_for(std::chrono::duration<double>(seconds));
+    ::kill(self, SIGCONT);
+    ::_exit(0);
+  }
 }
 
 std::string Hoard() {
@@ -50,7 +74,7 @@ TEST(ProcessesTest, EachEndingHasItsName) {
       RunAll({[]() -> std::string { throw std::logic_error("a reason"); },
               [] { return ::raise(SIGKILL), std::string(); }, []() -> std::string { ::_exit(7); },
               Hang, [] { return std::string("fine"); }},
-             3, {.wall_s = 0.3, .memory_mb = 0.0});
+             3, {.cpu_s = 10.0, .memory_mb = 0.0, .idle_s = 0.5});
   EXPECT_EQ(results.at(0).ending, ProcessEnding::kThrew);
   EXPECT_EQ(results.at(0).text, "a reason");
   EXPECT_EQ(results.at(1).ending, ProcessEnding::kCrashed);
@@ -58,13 +82,66 @@ TEST(ProcessesTest, EachEndingHasItsName) {
   EXPECT_EQ(results.at(2).ending, ProcessEnding::kCrashed);
   EXPECT_NE(results.at(2).text.find("exit code 7"), std::string::npos);
   EXPECT_EQ(results.at(3).ending, ProcessEnding::kOverTime);
+  EXPECT_NE(results.at(3).text.find("0.5 s asleep"), std::string::npos) << results.at(3).text;
   EXPECT_EQ(results.at(4).text, "fine");
+}
+
+TEST(ProcessesTest, CpuTimeIsLimited) {
+  const auto results = RunAll({[] { return Compute(60.0); }, [] { return Compute(0.01); }}, 2,
+                              {.cpu_s = 0.3, .memory_mb = 0.0});
+  EXPECT_EQ(results.at(0).ending, ProcessEnding::kOverTime);
+  EXPECT_NE(results.at(0).text.find("0.3 s of CPU time"), std::string::npos) << results.at(0).text;
+  EXPECT_GE(results.at(0).cpu_s, 0.29);
+  EXPECT_LT(results.at(0).cpu_s, 1.0);
+  EXPECT_EQ(results.at(1).text, "done");
+}
+
+// Each takes 0.1 s of a limit of 0.4 s; together they keep the processors busy for at least twice
+// the limit, and each lasts nearly that long.
+TEST(ProcessesTest, OfMoreJobsThanProcessorsNoneIsOverTime) {
+  const std::size_t count = 8 * std::max(1u, std::thread::hardware_concurrency());
+  const std::vector<std::function<std::string()>> pieces(count, [] { return Compute(0.1); });
+  double longest = 0.0;
+  for (const auto& [i, result] :
+       RunAll(pieces, static_cast<int>(count), {.cpu_s = 0.4, .memory_mb = 0.0, .idle_s = 0.5})) {
+    EXPECT_EQ(result.text, "done") << i;
+    longest = std::max(longest, result.wall_s);
+  }
+  EXPECT_GT(longest, 0.4) << "or nothing is shown";
+}
+
+TEST(ProcessesTest, StoppingIsNeitherComputingNorIdling) {
+  const auto results = RunAll({[] { return BeStopped(1.5), Compute(0.05); }}, 1,
+                              {.cpu_s = 0.4, .memory_mb = 0.0, .idle_s = 0.5});
+  EXPECT_EQ(results.at(0).text, "done");
+  EXPECT_GE(results.at(0).wall_s, 1.4);
+}
+
+TEST(ProcessesTest, NapsOfAnotherKindOfHangingAreIdlingToo) {
+  const auto nap = []() -> std::string {
+    for (;;) std::this_thread::sleep_for(std::chrono::milliseconds(5));
+  };
+  const auto results = RunAll({nap}, 1, {.cpu_s = 10.0, .memory_mb = 0.0, .idle_s = 0.5});
+  EXPECT_EQ(results.at(0).ending, ProcessEnding::kOverTime);
+}
+
+TEST(ProcessesTest, AnAnswerThatWaitsToBeReadIsNotIdling) {
+  const std::string large(3'000'000, 'a');
+  std::map<std::size_t, ProcessResult> results;
+  RunInProcesses(
+      2, 2, [&](std::size_t i) { return i == 0 ? std::string("first") : Compute(0.1) + large; },
+      [](std::size_t) { return ProcessLimits{.cpu_s = 10.0, .memory_mb = 0.0, .idle_s = 0.5}; },
+      [&](std::size_t i, const ProcessResult& result) {
+        results[i] = result;
+        if (i == 0) std::this_thread::sleep_for(std::chrono::seconds(1));  // a slow disk
+      });
+  EXPECT_EQ(results.at(1).text.size(), large.size() + 4);
 }
 
 TEST(ProcessesTest, MemoryIsLimited) {
   if (!LimitsMemory()) GTEST_SKIP() << "sanitizers reserve the address space";
   const auto results = RunAll({Hoard, [] { return std::string(8 << 20, 'x'); }}, 1,
-                              {.wall_s = 0.0, .memory_mb = 64.0});
+                              {.cpu_s = 0.0, .memory_mb = 64.0});
   EXPECT_EQ(results.at(0).ending, ProcessEnding::kOverMemory);
   EXPECT_EQ(results.at(1).ending, ProcessEnding::kAnswered) << "8 MiB are within 64";
 }

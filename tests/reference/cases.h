@@ -75,7 +75,7 @@ inline std::string NameOf(const Column& column) {
   return name;
 }
 
-/// One run of a scene. Ten minutes of wall time: limits are for suites, a test must not end by one
+/// One run of a scene. Ten minutes of CPU time: limits are for suites, a test must not end by one
 /// on a busy machine.
 inline Case CaseOf(const Experiment& experiment, const std::string& scene, const Column& column,
                    double tolerance, double horizon) {
@@ -88,7 +88,7 @@ inline Case CaseOf(const Experiment& experiment, const std::string& scene, const
           .rtol = tolerance,
           .atol = tolerance,
           .horizon = horizon,
-          .limits = {.wall_s = 600.0, .steps = 1'000'000}};
+          .limits = {.cpu_s = 600.0, .steps = 1'000'000}};
 }
 
 /// A mechanism of configs/mechanisms/.

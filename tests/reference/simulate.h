@@ -42,7 +42,7 @@ using Watch = std::function<void(const Snapshot&)>;
 Simulation Simulate(const MechanismDescription& description, const Column& column,
                     const IntegratorOptions& options, double horizon, const Watch& watch = {});
 
-/// rtol = atol, ten minutes of wall time: a test must not end by them, sanitizers or not.
+/// rtol = atol, ten minutes of CPU time: a test must not end by them, sanitizers or not.
 IntegratorOptions Options(const std::string& profile, double tolerance);
 
 /// Index of a body by its name; throws std::invalid_argument when there is none.

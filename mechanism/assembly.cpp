@@ -6,6 +6,7 @@
 #include <limits>
 
 #include "mechanism/assembly_units.h"
+#include "mechanism/conflict.h"
 #include "mechanism/tree_dynamics.h"
 
 namespace loopbench {
@@ -178,7 +179,7 @@ class Assembler {
     start_.position_residual = InSi(e, units);
     // a thousand times the goal: round-off of a long chain, far below any drift worth measuring
     if (e.template lpNorm<Eigen::Infinity>() <= 1e3 * goal) return;
-    NameWorstLoop(e, "does not close", start_.position_residual, "m or rad");
+    Fail(DescribeConflict(description_, kinematics_, {e, units, false, Extra(held_cut_)}));
   }
 
   /// The worst number of a list in units, without them.
@@ -251,8 +252,7 @@ class Assembler {
     start_.u = start_.u.cwiseProduct(units_.columns);
     start_.speed_residual = InSi(left, units);
     if (left.template lpNorm<Eigen::Infinity>() <= 1e-10 * size) return;
-    NameWorstLoop(left, "has no speeds that fit the given ones", start_.speed_residual,
-                  "m/s or rad/s");
+    Fail(DescribeConflict(description_, kinematics_, {left, units, true, Extra(given_cut_)}));
   }
 
   /// A position where constraints leave no speed free. Singular positions, where they depend on
@@ -276,22 +276,6 @@ class Assembler {
                      " constraints take all " + std::to_string(mechanism_.num_u()) + " speeds";
   }
 
-  void NameWorstLoop(const VectorX<double>& e, const std::string& what, double value,
-                     const std::string& unit) {
-    Eigen::Index worst = 0;
-    e.cwiseAbs().maxCoeff(&worst);
-    std::string name = "of the held cut joint";
-    for (int index : mechanism_.constraints()) {
-      const Joint<Space, double>& joint = mechanism_.joints()[index];
-      if (worst >= joint.row && worst < joint.row + joint.num_constraints()) {
-        name = "closed by joint \"" + mechanism_.joint_names()[index] + "\"";
-      }
-    }
-    char residual[32];
-    std::snprintf(residual, sizeof residual, "%.3g", value);
-    Fail("the loop " + name + " " + what + ": residual " + residual + " " + unit);
-  }
-
   /// A length that no position exceeds much, in units: sum of all arms.
   double Extent() const {
     return mechanism_.length() / units_.length *
@@ -303,6 +287,11 @@ class Assembler {
     int joint, component;
     double value;
   };
+  static std::vector<std::pair<int, int>> Extra(const std::vector<OfCutJoint>& cut_joints) {
+    std::vector<std::pair<int, int>> extra;
+    for (const OfCutJoint& one : cut_joints) extra.emplace_back(one.joint, one.component);
+    return extra;
+  }
   const MechanismDescription& description_;
   const Mechanism<Space, double>& mechanism_;
   Kinematics<Space, double> kinematics_;

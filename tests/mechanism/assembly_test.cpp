@@ -127,12 +127,60 @@ TEST(AssemblyTest, AnUnreachableClosureNamesItsLoopAndResidual) {
   EXPECT_NE(start.message.find(residual), std::string::npos) << start.message;
 }
 
+bool Contains(const std::string& text, const std::string& part) {
+  return text.find(part) != std::string::npos;
+}
+
+TEST(AssemblyTest, ARodThatIsTooLongIsNamedBesideTheJointsThatItPullsApart) {
+  // two four-bars side by side; a rod of 5 m between points of the first, which are 3 m apart at
+  // most. Least squares leave a part of the gap to the pin that closes the loop.
+  MechanismDescription d = FourBar(1.5);
+  const MechanismDescription other = FourBar(1.4);
+  for (int i = 1; i <= 3; ++i) d.bodies.push_back(other.bodies[i]);
+  for (JointDescription joint : other.joints) {
+    joint.name = "2" + joint.name;
+    for (JointSide* side : {&joint.from, &joint.to}) {
+      if (side->body != kGround) side->body += 3;
+    }
+    d.joints.push_back(joint);
+  }
+  JointDescription rod;
+  rod.name = "R";
+  rod.type = JointType::kRod;
+  rod.from = {kGround, {-0.5, 0.0, 0.0}, {0.0, 0.0, 0.0}};
+  rod.to = {2, {0.5, 0.0, 0.0}, {0.0, 0.0, 0.0}};
+  rod.length = 5.0;
+  d.joints.push_back(rod);
+  const Start<double> start = Assemble(d, Joints(d, Coordinates::kJoint));
+  ASSERT_EQ(start.outcome, Outcome::kInconsistentStart);
+  EXPECT_TRUE(Contains(start.message, "closed by rod \"R\" (length 5 m) and joint \"OC\" do not"))
+      << start.message;
+  EXPECT_TRUE(Contains(start.message, " m and ")) << start.message;
+  EXPECT_TRUE(Contains(start.message, "held in it: \"OA\"")) << start.message;
+  EXPECT_FALSE(Contains(start.message, "\"2O")) << "a loop that closes: " << start.message;
+  EXPECT_FALSE(Contains(start.message, "rad")) << start.message;
+}
+
+TEST(AssemblyTest, MotionsThatExcludeEachOtherAreNamed) {
+  MechanismDescription d = FourBar(1.5);
+  d.initial.held.clear();
+  std::erase_if(d.initial.coordinates, [](const JointValues& one) { return one.joint != 1; });
+  d.joints[0].motions = {{0, Polynomial{{-1.0}}}};
+  d.joints[2].motions = {{0, Polynomial{{0.1}}}};  // 1.757 fits
+  const Start<double> start = Assemble(d, Joints(d, Coordinates::kJoint));
+  ASSERT_EQ(start.outcome, Outcome::kInconsistentStart);
+  EXPECT_TRUE(Contains(start.message, "prescribed in it: \"OA\" and \"BC\"")) << start.message;
+  EXPECT_TRUE(Contains(start.message, " m; prescribed")) << start.message;
+}
+
 TEST(AssemblyTest, SpeedsThatTheLoopForbidsAreRefused) {
   MechanismDescription d = FourBar(1.5);
   d.initial.speeds = {{0, {1.0}}, {1, {1.0}}, {2, {1.0}}};
   const Start<double> start = Assemble(d, Joints(d, Coordinates::kJoint));
   EXPECT_EQ(start.outcome, Outcome::kInconsistentStart);
   EXPECT_NE(start.message.find("speeds"), std::string::npos) << start.message;
+  EXPECT_TRUE(Contains(start.message, " m/s; speeds given in it: \"OA\", \"AB\" and \"BC\""))
+      << start.message;
 }
 
 TEST(AssemblyTest, AbsoluteCoordinatesStartFromTheSamePose) {

@@ -5,6 +5,7 @@
 #include "harness/commands.h"
 #include "harness/config/config_error.h"
 #include "harness/main_compare.h"
+#include "harness/numeric_option.h"
 #include "harness/provenance.h"
 #include "harness/terminal.h"
 
@@ -114,7 +115,7 @@ int Main(int argc, char** argv) {
                       "Folder for results.jsonl, drift.csv and timing.csv "
                       "(default: results/runs/NAME)");
   run_app->add_option("--jobs", run.suite.jobs, "Accuracy cases at once; timings run alone")
-      ->check(CLI::Range(1, 1024))
+      ->check(NumberFrom(1, 1024))
       ->capture_default_str();
   run_app->add_option("--filter", conditions, "Only accuracy cases with key=value[,value]");
   AddSettings(run_app, &settings);

@@ -1,5 +1,7 @@
 #include "harness/main_compare.h"
 
+#include "harness/numeric_option.h"
+
 namespace loopbench::harness {
 
 namespace {
@@ -8,13 +10,14 @@ constexpr const char* kCompareFooter = R"(
 Counts, hashes and outcomes are compared exactly; errors and instructions by their ratio; times by a
 Mann-Whitney test for effects beyond 2 % (Holm's correction over all times), on one machine only.
 What depends on round-off is compared under one compiler, flags and mathematical library only.
+A value that one side lacks, or that is none (null, a text for a number), is a difference.
 
 Examples:
   loopbench compare results/baselines results/runs/now
   loopbench compare old.json new.json --only times
   loopbench compare results/runs/before results/runs/after --only counts --only hashes
 
-Exit codes: 0 the same or better, 1 something is worse, 2 could not measure.)";
+Exit codes: 0 the same or better, 1 something is worse or different, 2 could not measure.)";
 
 constexpr const char* kFitFooter = R"(
 Examples:
@@ -25,7 +28,10 @@ Examples:
 constexpr const char* kExportFooter = R"(
 Examples:
   loopbench export new.json --out benchmarks.json      # github-action-benchmark, customSmallerIsBetter
-  loopbench export results/runs/paper --format bmf --out bmf.json    # Bencher, adapter json)";
+  loopbench export results/runs/paper --format bmf --out bmf.json    # Bencher, adapter json
+
+Cases that failed, and values that are no numbers, cannot be tracked: each is named.
+Exit codes: 0 all exported, 1 all but those named, 2 nothing to export or bad input.)";
 
 }  // namespace
 
@@ -42,7 +48,7 @@ ComparisonOptions::ComparisonOptions(CLI::App& app) {
   compare_app_->add_flag("--subset", compare_.options.subset, "NEW may lack cases of BASE");
   compare_app_
       ->add_option("--error-ratio", compare_.options.error_ratio, "Allowed on the same build")
-      ->check(CLI::Range(1.0, 1e9))
+      ->check(NumberFrom(1.0, 1e9))
       ->capture_default_str();
   compare_app_
       ->add_option("--format", compare_.format, "How tables are written (csv: all measures)")
@@ -53,7 +59,7 @@ ComparisonOptions::ComparisonOptions(CLI::App& app) {
   fit_app_->footer(kFitFooter);
   fit_app_->add_option("file", fit_.file, "JSON of Google Benchmark")->required();
   fit_app_->add_option("--from", fit_.from, "Leave out sizes below [bodies]")
-      ->check(CLI::NonNegativeNumber);
+      ->check(NumberFrom(0.0, 1e9));
   fit_app_->add_option("--format", fit_.format, "How the table is written")
       ->check(formats)
       ->capture_default_str();

@@ -13,6 +13,7 @@
 #include <vector>
 
 #include "harness/config/benchmark_reader.h"
+#include "harness/numeric_option.h"
 #include "harness/origin.h"
 #include "harness/store/files.h"
 #include "harness/store/record_json.h"
@@ -122,11 +123,11 @@ int Main(int argc, char** argv) {
   app.add_option("--callgrind", options.callgrind,
                  "Files of Callgrind to take instructions from, without .1, .2, ...");
   app.add_option("--evaluations", options.evaluations, "Per case")
-      ->check(CLI::Range(1, 1'000'000))
+      ->check(NumberFrom(1, 1'000'000))
       ->capture_default_str();
   app.add_option("--planted", options.planted,
                  "More evaluations than are reported: the gate's own test must catch them")
-      ->check(CLI::Range(0, 1'000'000));
+      ->check(NumberFrom(0, 1'000'000));
   try {
     app.parse(argc, argv);
   } catch (const CLI::ParseError& error) {

@@ -1,16 +1,17 @@
 // loopbench_bench: right-hand sides and integrator steps under Google Benchmark.
 //
-// What is measured stands in a JSON file and is registered at run time. The benchmark library of
-// Debian 12 calls itself a debug build; the context lines "compiler" and "flags" tell what this one
-// is. Its JSON writer prints NaN, which no reader takes: runs pass through SafeReporter first.
+// What is measured stands in a JSON file and is registered at run time. The library's JSON writer
+// prints NaN, which no reader takes: runs pass through SafeReporter first.
 #include <benchmark/benchmark.h>
 #include <fmt/format.h>
 
+#include <charconv>
 #include <cmath>
 #include <cstdlib>
 #include <ctime>
 #include <map>
 #include <optional>
+#include <sstream>
 
 #include "harness/config/benchmark_reader.h"
 #include "harness/origin.h"
@@ -49,6 +50,12 @@ Exit codes: 0 done, 2 bad input, or nothing could be measured.
 /// Leaves out what JSON cannot say, for example the spread of a counter that is always zero.
 class SafeReporter final : public benchmark::JSONReporter {
  public:
+  void Finalize() override {
+    JSONReporter::Finalize();
+    is_written_ = GetOutputStream().flush().good();
+  }
+  bool is_written() const { return is_written_; }
+
   void ReportRuns(const std::vector<Run>& runs) override {
     std::vector<Run> finite = runs;
     for (Run& run : finite) {
@@ -57,6 +64,41 @@ class SafeReporter final : public benchmark::JSONReporter {
     }
     JSONReporter::ReportRuns(finite);
   }
+
+ private:
+  bool is_written_ = true;
+};
+
+#ifdef NDEBUG
+constexpr const char* kAssertions = "off";
+#else
+constexpr const char* kAssertions = "on (the preset native builds without)";
+#endif
+
+/// The reporter of a terminal, with the truth in place of the library's warning that it was "built
+/// as DEBUG" and "timings may be affected". Debian builds it without NDEBUG, but what is timed is
+/// not in it: the loop over iterations is a header, and as good as this program's own flags.
+class PlainReporter final : public benchmark::BenchmarkReporter {
+ public:
+  bool ReportContext(const Context& context) override {
+    std::ostringstream said;
+    reporter_->SetErrorStream(&said);
+    const bool go_on = reporter_->ReportContext(context);
+    reporter_->SetErrorStream(&GetErrorStream());
+    std::string text = said.str();
+    const std::string_view warning =
+        "***WARNING*** Library was built as DEBUG. Timings may be affected.\n";
+    if (const std::size_t at = text.find(warning); at != std::string::npos)
+      text.erase(at, warning.size());
+    GetErrorStream() << text << "Assertions in what is timed: " << kAssertions << "\n";
+    return go_on;
+  }
+  void ReportRuns(const std::vector<Run>& runs) override { reporter_->ReportRuns(runs); }
+  void Finalize() override { reporter_->Finalize(); }
+
+ private:
+  std::unique_ptr<benchmark::BenchmarkReporter> reporter_{
+      benchmark::CreateDefaultDisplayReporter()};
 };
 
 /// The states of a set, each computed once.
@@ -220,6 +262,20 @@ std::string LibraryOption(const std::vector<char*>& arguments, const std::string
   return value;
 }
 
+/// The library takes "nan" and "inf" for times, and then does not end.
+void RequireSeconds(const std::vector<char*>& arguments, const std::string& name,
+                    const char* variable) {
+  const std::string text = LibraryOption(arguments, name, variable);
+  if (text.empty()) return;
+  constexpr double kLongest = 1e6;
+  double seconds = 0.0;
+  const auto [end, error] = std::from_chars(text.data(), text.data() + text.size(), seconds);
+  const bool is_number = error == std::errc() && end == text.data() + text.size();
+  if (is_number && seconds >= 0.0 && seconds <= kLongest) return;
+  throw std::runtime_error(
+      fmt::format("--{}: found \"{}\", expected seconds from 0 to {}", name, text, kLongest));
+}
+
 int Measured(int argc, char** argv) {
   std::vector<char*> arguments(argv, argv + argc);
   if (TakeFlag(arguments, "--help") || TakeFlag(arguments, "-h")) {
@@ -231,10 +287,12 @@ int Measured(int argc, char** argv) {
   const bool save = TakeFlag(arguments, "--save-states");
   const std::string out_format =
       LibraryOption(arguments, "benchmark_out_format", "BENCHMARK_OUT_FORMAT");
-  const bool json_to_file = !LibraryOption(arguments, "benchmark_out", "BENCHMARK_OUT").empty() &&
-                            (out_format.empty() || out_format == "json");
+  const std::string out = LibraryOption(arguments, "benchmark_out", "BENCHMARK_OUT");
+  const bool json_to_file = !out.empty() && (out_format.empty() || out_format == "json");
   const bool json_to_terminal =
       LibraryOption(arguments, "benchmark_format", "BENCHMARK_FORMAT") == "json";
+  RequireSeconds(arguments, "benchmark_min_time", "BENCHMARK_MIN_TIME");
+  RequireSeconds(arguments, "benchmark_min_warmup_time", "BENCHMARK_MIN_WARMUP_TIME");
   int count = static_cast<int>(arguments.size());
   arguments.push_back(nullptr);
   benchmark::Initialize(&count, arguments.data());
@@ -255,14 +313,17 @@ int Measured(int argc, char** argv) {
   benchmark::AddCustomContext("machine", origin.machine);
   benchmark::AddCustomContext("compiler", origin.compiler);
   benchmark::AddCustomContext("flags", origin.flags);
+  benchmark::AddCustomContext("assertions", kAssertions);
   benchmark::AddCustomContext("libm", origin.libm);
   benchmark::AddCustomContext("commit", origin.commit);
   SafeReporter to_terminal, to_file;
-  std::unique_ptr<benchmark::BenchmarkReporter> display(
-      json_to_terminal ? nullptr : benchmark::CreateDefaultDisplayReporter());
-  const std::size_t measured = benchmark::RunSpecifiedBenchmarks(
-      json_to_terminal ? &to_terminal : display.get(), json_to_file ? &to_file : nullptr);
+  PlainReporter plain;
+  benchmark::BenchmarkReporter* const display =
+      json_to_terminal ? static_cast<benchmark::BenchmarkReporter*>(&to_terminal) : &plain;
+  const std::size_t measured =
+      benchmark::RunSpecifiedBenchmarks(display, json_to_file ? &to_file : nullptr);
   benchmark::Shutdown();
+  if (!to_file.is_written()) throw std::runtime_error(fmt::format("cannot write '{}'", out));
   return measured == 0 ? 2 : 0;
 }
 

@@ -4,6 +4,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <ranges>
 #include <set>
 
 #include "harness/compare/fit.h"
@@ -50,6 +51,7 @@ Table SummaryTable(const ComparisonReport& comparison) {
                    {"same", "same", Format::kInteger, {}},
                    {"better", "better", Format::kInteger, {}},
                    {"worse", "worse", Format::kInteger, {}},
+                   {"different", "different", Format::kInteger, {}},
                    {"not_measured", "not measured", Format::kInteger, {}}};
   for (const std::string& group : GroupNames()) {
     Record row;
@@ -58,6 +60,7 @@ Table SummaryTable(const ComparisonReport& comparison) {
     for (const auto& [key, judgement] : {std::pair{"same", Judgement::kSame},
                                          {"better", Judgement::kBetter},
                                          {"worse", Judgement::kWorse},
+                                         {"different", Judgement::kDifferent},
                                          {"not_measured", Judgement::kNotMeasured}}) {
       const int count = comparison.Count(judgement, group);
       row.Set(key, std::int64_t{count});
@@ -79,8 +82,8 @@ Table FindingTable(const ComparisonReport& comparison, bool with_same) {
                    {"ratio", "ratio", Format::kSeconds, {}},
                    {"why", "why", Format::kText, {}}};
   // regressions first: they are what the reader came for
-  for (const Judgement judgement :
-       {Judgement::kWorse, Judgement::kBetter, Judgement::kNotMeasured, Judgement::kSame}) {
+  for (const Judgement judgement : {Judgement::kWorse, Judgement::kDifferent, Judgement::kBetter,
+                                    Judgement::kNotMeasured, Judgement::kSame}) {
     if (!with_same && (judgement == Judgement::kNotMeasured || judgement == Judgement::kSame))
       continue;
     for (const Finding& finding : comparison.findings) {
@@ -123,7 +126,22 @@ std::vector<std::string> ReasonNotes(const ComparisonReport& comparison) {
 void NoteCases(const std::string& what, const std::vector<std::string>& cases,
                std::vector<std::string>& notes) {
   if (cases.empty()) return;
-  notes.push_back(fmt::format("{} {}, for example: {}", cases.size(), what, cases.front()));
+  constexpr std::size_t kMostNamed = 20;
+  const bool all = cases.size() <= kMostNamed;
+  notes.push_back(
+      fmt::format("{} {}{}", cases.size(), what,
+                  all ? ":" : fmt::format(" (--format csv names all), the first {}:", kMostNamed)));
+  for (const std::string& one : cases | std::views::take(kMostNamed)) notes.push_back("  " + one);
+}
+
+/// A row for each case that has no counterpart.
+void AddCases(const std::string& judgement, const std::vector<std::string>& cases, Table& table) {
+  for (const std::string& one : cases) {
+    Record row;
+    row.Set("judgement", judgement);
+    row.Set("case", one);
+    table.rows.push_back(row);
+  }
 }
 
 /// Where the records of one side come from; differing origins in one file are all named.
@@ -160,7 +178,11 @@ void NoteCommonShift(const ComparisonReport& comparison, std::vector<std::string
 }
 
 std::string Conclusion(const ComparisonReport& comparison, int code) {
-  if (code == 1) return fmt::format("WORSE: {} measures", comparison.Count(Judgement::kWorse));
+  const int worse = comparison.Count(Judgement::kWorse);
+  const int different = comparison.Count(Judgement::kDifferent);
+  if (code == 1 && different == 0) return fmt::format("WORSE: {} measures", worse);
+  if (code == 1 && worse == 0) return fmt::format("DIFFERENT: {} measures", different);
+  if (code == 1) return fmt::format("WORSE: {} measures, {} more different", worse, different);
   if (code == 2) return "COULD NOT MEASURE: too little in common";
   const int better = comparison.Count(Judgement::kBetter);
   return better > 0 ? fmt::format("BETTER: {} measures, none worse", better) : "SAME";
@@ -183,6 +205,9 @@ int PrintComparison(const CompareCommand& command, const std::string& typed) {
   NoteOrigins("NEW", fresh, notes);
   Table findings = FindingTable(comparison, command.format == "csv");
   if (command.format == "csv") {
+    AddCases("only in BASE", comparison.only_base, findings);
+    AddCases("only in NEW", comparison.only_fresh, findings);
+    AddCases("more than once", comparison.ambiguous, findings);
     Print("{}", ToCsv(findings));
     PrintError("{}\n", Conclusion(comparison, code));
     return code;
@@ -222,11 +247,18 @@ int PrintFits(const FitCommand& command, const std::string& typed) {
     table.notes.push_back(fmt::format("command: {}", typed));
   }
   Deliver(RenderTable(table, command.format), command.out);
-  return 0;
+  const bool fitted = std::ranges::any_of(
+      table.rows, [](const Record& row) { return row.Find("exponent") != nullptr; });
+  return fitted ? 0 : 2;
 }
 
 int ExportMeasurements(const ExportCommand& command) {
-  const std::vector<TrackedValue> values = TrackedValues(LoadMeasurements(command.file));
+  std::vector<std::string> torn;
+  auto [values, left_out] = TrackRecords(ReadMeasurements(command.file, &torn));
+  left_out.insert(left_out.end(), torn.begin(), torn.end());
+  for (const std::string& line : left_out) {
+    PrintError("{}: not exported: {}\n", command.file.string(), line);
+  }
   if (values.empty()) {
     PrintError("{}: nothing to export: no record that finished has a measure\n",
                command.file.string());
@@ -234,7 +266,7 @@ int ExportMeasurements(const ExportCommand& command) {
   }
   Deliver(command.format == "bmf" ? ToBencherMetricFormat(values) : ToCustomSmallerIsBetter(values),
           command.out);
-  return 0;
+  return left_out.empty() ? 0 : 1;
 }
 
 }  // namespace loopbench::harness

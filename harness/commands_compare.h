@@ -13,7 +13,7 @@ struct CompareCommand {
   std::string format = "text";  ///< text, csv or markdown
   CompareOptions options;
 };
-/// 0 the same or better, 1 something is worse, 2 could not measure.
+/// 0 the same or better, 1 something is worse or different, 2 could not measure.
 int PrintComparison(const CompareCommand& command, const std::string& typed);
 
 struct FitCommand {
@@ -22,7 +22,7 @@ struct FitCommand {
   double from = 0.0;          ///< sizes below are left out
   std::filesystem::path out;  ///< standard output when empty
 };
-/// Exponents of time over size, one row per benchmark family.
+/// Exponents of time over size, one row per benchmark family. 0, or 2 when there is no exponent.
 int PrintFits(const FitCommand& command, const std::string& typed);
 
 struct ExportCommand {
@@ -30,7 +30,8 @@ struct ExportCommand {
   std::string format = "customSmallerIsBetter";  ///< or bmf
   std::filesystem::path out;                     ///< standard output when empty
 };
-/// Measurements as the JSON that trackers of continuous benchmarking take.
+/// Measurements as the JSON that trackers of continuous benchmarking take. 0; 1 when something had
+/// to be left out, each named on standard error; 2 when nothing is left.
 int ExportMeasurements(const ExportCommand& command);
 
 }  // namespace loopbench::harness

@@ -23,14 +23,6 @@ struct Pair {
   bool same_arithmetic, same_machine;
 };
 
-bool Has(const Record& record, const std::string& key) {
-  const Value* value = record.Find(key);
-  if (value == nullptr || std::holds_alternative<std::monostate>(*value)) return false;
-  if (const auto* number = std::get_if<double>(value)) return !std::isnan(*number);
-  const auto* series = std::get_if<std::vector<double>>(value);
-  return series == nullptr || !series->empty();
-}
-
 void Set(Finding& finding, Judgement judgement, std::string why = "") {
   finding.judgement = judgement;
   finding.why = std::move(why);
@@ -90,7 +82,44 @@ void TestTimes(Finding& finding, const Pair& pair, const CompareOptions& options
   finding.p = std::min(1.0, 2.0 * std::min(slower, faster));
 }
 
-/// Why this measure of this pair cannot be compared; "" when it can.
+bool EndedBadly(const Record& record) {
+  const std::string outcome = record.Text("outcome");
+  return !outcome.empty() && outcome != "finished";
+}
+
+/// Judges a pair of which a side lacks the measure, or holds what it is not made of; false when
+/// both have it.
+bool JudgeWhatIsMissing(Finding& finding, const Pair& pair) {
+  const Measure& measure = finding.measure;
+  const Held base = HeldBy(pair.base, measure), fresh = HeldBy(pair.fresh, measure);
+  if (base == Held::kFit && fresh == Held::kFit) return false;
+  finding.base = Shown(pair.base, measure.key);
+  finding.fresh = Shown(pair.fresh, measure.key);
+  if (base == Held::kNothing && fresh == Held::kFit && EndedBadly(pair.base) &&
+      !EndedBadly(pair.fresh)) {
+    Set(finding, Judgement::kNotMeasured, "BASE did not finish");
+    return true;
+  }
+  if (base != Held::kUnfit && fresh != Held::kUnfit) {
+    const bool lost = fresh == Held::kNothing;
+    Set(finding, lost ? Judgement::kWorse : Judgement::kDifferent,
+        lost ? "not in NEW" : "not in BASE");
+    return true;
+  }
+  const char* side = base != Held::kUnfit ? "NEW" : fresh != Held::kUnfit ? "BASE" : "BASE and NEW";
+  const std::string why = fmt::format("in {}: expected {}", side, Expected(measure.rule));
+  // a run that failed on both sides in one way may well end in NaN on both
+  const bool failed_alike = finding.base == "null" && finding.fresh == "null" &&
+                            EndedBadly(pair.base) && EndedBadly(pair.fresh);
+  Set(finding,
+      failed_alike         ? Judgement::kNotMeasured
+      : base == Held::kFit ? Judgement::kWorse
+                           : Judgement::kDifferent,
+      why);
+  return true;
+}
+
+/// Why values that both sides have cannot be compared; "" when they can.
 std::string Obstacle(const Measure& measure, const Pair& pair) {
   if (measure.rule == Rule::kTime && !pair.same_machine) {
     return OriginOf(pair.base).machine.empty() || OriginOf(pair.fresh).machine.empty()
@@ -100,9 +129,6 @@ std::string Obstacle(const Measure& measure, const Pair& pair) {
   if (measure.needs_same_arithmetic && !pair.same_arithmetic) {
     return "another compiler, flags or mathematical library";
   }
-  const bool in_base = Has(pair.base, measure.key), in_fresh = Has(pair.fresh, measure.key);
-  if (!in_base) return "not in BASE";
-  if (!in_fresh) return "not in NEW";
   if (measure.rule == Rule::kTime &&
       pair.base.Text("start_hash") != pair.fresh.Text("start_hash")) {
     return "measured at another state";
@@ -118,11 +144,9 @@ Finding Judge(const std::string& one, const Measure& measure, const Pair& pair,
   finding.base = pair.base.Text(measure.key);
   finding.fresh = pair.fresh.Text(measure.key);
   finding.ratio = finding.p = kNaN;
+  if (JudgeWhatIsMissing(finding, pair)) return finding;
   if (const std::string obstacle = Obstacle(measure, pair); !obstacle.empty()) {
-    // what is merely not taken this time (times, instructions) may be absent; a result may not
-    const bool optional = measure.rule == Rule::kTime || measure.rule == Rule::kInstructions;
-    const bool lost = obstacle == "not in NEW" && !optional;
-    Set(finding, lost ? Judgement::kWorse : Judgement::kNotMeasured, obstacle);
+    Set(finding, Judgement::kNotMeasured, obstacle);
     return finding;
   }
   switch (measure.rule) {
@@ -152,7 +176,8 @@ void DecideTimes(std::vector<Finding*>& times, const std::vector<double>& smalle
   for (std::size_t i = 0; i < times.size(); ++i) {
     Finding& finding = *times[i];
     finding.p = adjusted[i];
-    if (finding.p <= options.alpha) {
+    // medians that are both zero have no ratio, and no difference
+    if (finding.p <= options.alpha && !std::isnan(finding.ratio)) {
       Set(finding, finding.ratio > 1.0 ? Judgement::kWorse : Judgement::kBetter,
           fmt::format("ratio {:.3f}, p {:.2g}", finding.ratio, finding.p));
     } else if (smallest[i] * tests > options.alpha) {
@@ -178,7 +203,8 @@ std::map<std::string, const Record*> ByCase(const std::vector<Record>& records,
 }  // namespace
 
 std::string_view ToString(Judgement judgement) {
-  constexpr std::string_view kJudgements[] = {"same", "better", "worse", "not measured"};
+  constexpr std::string_view kJudgements[] = {"same", "better", "worse", "different",
+                                              "not measured"};
   return kJudgements[static_cast<int>(judgement)];
 }
 
@@ -190,7 +216,7 @@ int ComparisonReport::Count(Judgement judgement, std::string_view group) const {
 }
 
 int ComparisonReport::ExitCode(const CompareOptions& options) const {
-  if (Count(Judgement::kWorse) > 0) return 1;
+  if (Count(Judgement::kWorse) + Count(Judgement::kDifferent) > 0) return 1;
   const int compared = Count(Judgement::kSame) + Count(Judgement::kBetter);
   const bool missing = !options.subset && !only_base.empty();
   return compared == 0 || missing || !ambiguous.empty() ? 2 : 0;
@@ -216,7 +242,8 @@ ComparisonReport Compare(const std::vector<Record>& base, const std::vector<Reco
     for (const Measure& measure : Measures()) {
       const bool chosen =
           options.only.empty() || std::ranges::count(options.only, GroupOf(measure.rule)) > 0;
-      const bool anywhere = Has(pair.base, measure.key) || Has(pair.fresh, measure.key);
+      const bool anywhere = HeldBy(pair.base, measure) != Held::kNothing ||
+                            HeldBy(pair.fresh, measure) != Held::kNothing;
       if (!chosen || !anywhere) continue;
       comparison.findings.push_back(Judge(one, measure, pair, options));
       if (measure.rule == Rule::kTime) {
@@ -235,7 +262,7 @@ ComparisonReport Compare(const std::vector<Record>& base, const std::vector<Reco
   for (Finding& finding : comparison.findings) {
     if (finding.measure.rule != Rule::kTime) continue;
     const double p = smallest[next++];
-    if (finding.judgement == Judgement::kNotMeasured) continue;
+    if (std::isnan(finding.p)) continue;  // not tested
     times.push_back(&finding);
     least.push_back(p);
   }

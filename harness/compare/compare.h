@@ -3,7 +3,8 @@
 //
 // Counts and hashes are held against each other exactly, errors and instructions by their ratio,
 // times by a test, and never those of two machines. What could not be compared is said, with the
-// reason, and is never taken for "the same".
+// reason, and is never taken for "the same": a value that one side lacks, or that is not what its
+// measure is made of, is a difference.
 #pragma once
 
 #include <string>
@@ -28,7 +29,13 @@ struct CompareOptions {
   bool subset = false;              ///< NEW may lack cases of BASE
 };
 
-enum class Judgement { kSame, kBetter, kWorse, kNotMeasured };
+enum class Judgement {
+  kSame,
+  kBetter,
+  kWorse,      ///< also what BASE has and NEW has lost or holds as no value of the measure
+  kDifferent,  ///< only in NEW, or no value of the measure in BASE: neither better nor worse
+  kNotMeasured,
+};
 std::string_view ToString(Judgement judgement);
 
 /// One measure of one case.
@@ -49,8 +56,8 @@ struct ComparisonReport {
   std::vector<std::string> ambiguous;   ///< cases that one side holds twice, so not compared
 
   int Count(Judgement judgement, std::string_view group = "") const;
-  /// 1: something is worse. 2: nothing was measured on both sides, or cases are missing (unless
-  /// options.subset) or ambiguous. 0: the same or better.
+  /// 1: something is worse or different. 2: nothing was measured on both sides, or cases are
+  /// missing (unless options.subset) or ambiguous. 0: the same or better.
   int ExitCode(const CompareOptions& options) const;
 };
 

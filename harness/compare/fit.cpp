@@ -28,7 +28,8 @@ FamilyName Split(const std::string& benchmark) {
     const std::string_view part = std::string_view(benchmark).substr(start, end - start);
     double value = 0.0;
     const auto [rest, error] = std::from_chars(part.data(), part.data() + part.size(), value);
-    const bool is_number = error == std::errc() && rest == part.data() + part.size();
+    const bool is_number =
+        error == std::errc() && rest == part.data() + part.size() && std::isfinite(value);
     if (is_number) family.size = value;
     numbers += is_number;
     family.name += (start > 0 ? "/" : "") + (is_number ? std::string("N") : std::string(part));
@@ -67,11 +68,15 @@ std::vector<Record> FitFamilies(const std::vector<Record>& benchmarks, double fr
   for (const std::string& name : order) {
     const Points& points = families[name];
     const PowerFit fit = FitPower(points.sizes, points.times);
-    if (fit.sizes < 2) continue;
-    const auto largest = std::ranges::max_element(points.sizes) - points.sizes.begin();
+    // a family of which too few finished is a row without an exponent
+    if (fit.sizes + points.failed < 2) continue;
     Record row;
     row.Set("family", name);
     row.Set("sizes", std::int64_t{fit.sizes});
+    row.Set("failed", points.failed);
+    rows.push_back(row);
+    if (fit.sizes < 2) continue;
+    const auto largest = std::ranges::max_element(points.sizes) - points.sizes.begin();
     row.Set("bodies_min", std::round(fit.smallest * 1e6) / 1e6);
     row.Set("bodies_max", std::round(fit.largest * 1e6) / 1e6);
     row.Set("exponent", fit.exponent);
@@ -79,8 +84,7 @@ std::vector<Record> FitFamilies(const std::vector<Record>& benchmarks, double fr
     row.Set("slope_min", fit.slope_min);
     row.Set("slope_max", fit.slope_max);
     row.Set("ns_per_body", points.times[static_cast<std::size_t>(largest)] / fit.largest);
-    row.Set("failed", points.failed);
-    rows.push_back(std::move(row));
+    rows.back() = std::move(row);
   }
   return rows;
 }

@@ -1,5 +1,10 @@
 #include "harness/compare/measures.h"
 
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <cmath>
+
 namespace loopbench::harness {
 
 namespace {
@@ -7,6 +12,12 @@ namespace {
 /// Records begin with what names their case (CaseKeys); one of these ends it.
 bool EndsCase(std::string_view key) {
   return key == "case_id" || key == "id" || key == "version" || key == "outcome";
+}
+
+bool IsTime(double time) { return std::isfinite(time) && time >= 0.0; }
+
+bool IsNumber(const Value& value) {
+  return std::holds_alternative<double>(value) || std::holds_alternative<std::int64_t>(value);
 }
 
 }  // namespace
@@ -78,6 +89,64 @@ const std::vector<Measure>& Measures() {
       {"series.cpu_ns", Rule::kTime, "ns", false},
   };
   return measures;
+}
+
+Held HeldBy(const Record& record, const Measure& measure) {
+  const Value* value = record.Find(measure.key);
+  if (value == nullptr) return Held::kNothing;
+  const auto* series = std::get_if<std::vector<double>>(value);
+  const double number = IsNumber(*value) ? record.Number(measure.key) : std::nan("");
+  bool fits = false;
+  switch (measure.rule) {
+    case Rule::kOutcome:
+    case Rule::kHash:
+      fits = !record.Text(measure.key).empty() && std::holds_alternative<std::string>(*value);
+      break;
+    case Rule::kEqual:
+      fits = std::isfinite(number);
+      break;
+    case Rule::kCount:
+    case Rule::kError:
+      fits = std::isfinite(number) && number >= 0.0;
+      break;
+    case Rule::kInstructions:
+      fits = std::isfinite(number) && number > 0.0;
+      break;
+    case Rule::kTime:
+      if (series != nullptr && series->empty()) return Held::kNothing;
+      fits = series != nullptr && std::ranges::all_of(*series, IsTime);
+  }
+  return fits ? Held::kFit : Held::kUnfit;
+}
+
+std::string_view Expected(Rule rule) {
+  switch (rule) {
+    case Rule::kOutcome:
+    case Rule::kHash:
+      return "a text";
+    case Rule::kEqual:
+      return "a finite number";
+    case Rule::kCount:
+    case Rule::kError:
+      return "a finite number >= 0";
+    case Rule::kInstructions:
+      return "a finite number > 0";
+    case Rule::kTime:
+      return "finite times >= 0";
+  }
+  return "";
+}
+
+std::string Shown(const Record& record, const std::string& key) {
+  const Value* value = record.Find(key);
+  if (value == nullptr) return "";
+  if (std::holds_alternative<std::monostate>(*value)) return "null";
+  if (std::holds_alternative<std::string>(*value)) return '"' + record.Text(key) + '"';
+  const auto* series = std::get_if<std::vector<double>>(value);
+  if (series == nullptr) return record.Text(key);
+  const auto unfit = std::ranges::count_if(*series, [](double time) { return !IsTime(time); });
+  return fmt::format("{} values{}", series->size(),
+                     unfit > 0 ? fmt::format(" ({} null or negative)", unfit) : "");
 }
 
 std::string CaseText(const Record& record) {

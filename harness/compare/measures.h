@@ -37,6 +37,21 @@ struct Measure {
 /// All measures, in the order of reports.
 const std::vector<Measure>& Measures();
 
+/// What a record holds under the key of a measure.
+enum class Held {
+  kNothing,  ///< no such key, or no repetitions of a time
+  kUnfit,    ///< another type, or a number that the measure cannot have (null stands for NaN)
+  kFit,
+};
+Held HeldBy(const Record& record, const Measure& measure);
+
+/// What values of a rule are, as messages put it: "a number >= 0".
+std::string_view Expected(Rule rule);
+
+/// The value under `key` as messages show it: null, "a text" in quotes, numbers as they are, of a
+/// series how many values it has, and how many of them are unfit for a sample of times.
+std::string Shown(const Record& record, const std::string& key);
+
 /// What tells cases of one store apart, as one line of text: the keys that stand first in a record,
 /// before "case_id" or "outcome".
 std::string CaseText(const Record& record);

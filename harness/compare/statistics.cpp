@@ -41,7 +41,7 @@ double TieTerm(std::span<const double> a, std::span<const double> b) {
   std::ranges::sort(all);
   double term = 0.0;
   for (std::size_t i = 0; i < all.size();) {
-    std::size_t end = i;
+    std::size_t end = i + 1;
     while (end < all.size() && all[end] == all[i]) ++end;
     const double t = static_cast<double>(end - i);
     term += t * t * t - t;
@@ -60,7 +60,10 @@ double NormalTail(double u, double a, double b, double ties) {
 }  // namespace
 
 double Median(std::span<const double> sample) {
-  if (sample.empty()) return std::numeric_limits<double>::quiet_NaN();
+  const auto is_nan = [](double x) { return std::isnan(x); };
+  if (sample.empty() || std::ranges::any_of(sample, is_nan)) {
+    return std::numeric_limits<double>::quiet_NaN();
+  }
   std::vector<double> sorted(sample.begin(), sample.end());
   std::ranges::sort(sorted);
   const std::size_t n = sorted.size();
@@ -70,8 +73,12 @@ double Median(std::span<const double> sample) {
 MannWhitneyResult MannWhitney(std::span<const double> a, std::span<const double> b) {
   MannWhitneyResult result;
   if (a.empty() || b.empty()) return result;
+  std::vector<double> sorted(b.begin(), b.end());
+  std::ranges::sort(sorted);
   for (const double x : a) {
-    for (const double y : b) result.u += x > y ? 1.0 : x == y ? 0.5 : 0.0;
+    const auto [equal, above] = std::ranges::equal_range(sorted, x);
+    result.u +=
+        static_cast<double>(equal - sorted.begin()) + 0.5 * static_cast<double>(above - equal);
   }
   const double ties = TieTerm(a, b);
   result.exact = ties == 0.0 && std::max(a.size(), b.size()) <= kLargestExact;

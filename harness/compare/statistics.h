@@ -6,7 +6,7 @@
 
 namespace loopbench::harness {
 
-/// Median; NaN of nothing.
+/// Median; NaN of nothing, and of a sample with a NaN in it.
 double Median(std::span<const double> sample);
 
 /// Mann-Whitney test of two independent samples.
@@ -18,7 +18,7 @@ struct MannWhitneyResult {
 
 /// H1: values of `a` tend to be larger than those of `b` (H. B. Mann, D. R. Whitney, 1947). Exact
 /// without ties and up to 40 values in a sample; otherwise normal with corrections for ties and
-/// continuity. p = 1 when a sample is empty.
+/// continuity. p = 1 when a sample is empty. The samples are finite numbers.
 MannWhitneyResult MannWhitney(std::span<const double> a, std::span<const double> b);
 
 /// The smallest p_greater that samples of these sizes can give.

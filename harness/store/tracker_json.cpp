@@ -10,8 +10,6 @@ namespace {
 
 using TrackerDocument = nlohmann::ordered_json;
 
-bool IsTracked(const TrackedValue& value) { return std::isfinite(value.value); }
-
 bool HasSpread(const TrackedValue& value) {
   return std::isfinite(value.lower) && std::isfinite(value.upper) && value.lower < value.upper;
 }
@@ -25,7 +23,6 @@ std::string DumpTracker(const TrackerDocument& document) {
 std::string ToCustomSmallerIsBetter(const std::vector<TrackedValue>& values) {
   TrackerDocument document = TrackerDocument::array();
   for (const TrackedValue& value : values) {
-    if (!IsTracked(value)) continue;
     TrackerDocument entry = {{"name", value.benchmark + " " + value.measure},
                              {"unit", value.unit.empty() ? "1" : value.unit},
                              {"value", value.value}};
@@ -38,7 +35,6 @@ std::string ToCustomSmallerIsBetter(const std::vector<TrackedValue>& values) {
 std::string ToBencherMetricFormat(const std::vector<TrackedValue>& values) {
   TrackerDocument document = TrackerDocument::object();
   for (const TrackedValue& value : values) {
-    if (!IsTracked(value)) continue;
     TrackerDocument metric = {{"value", value.value}};
     if (HasSpread(value)) {
       metric["lower_value"] = value.lower;

@@ -15,7 +15,7 @@ struct TrackedValue {
 
 /// github-action-benchmark, tool "customSmallerIsBetter":
 ///   [{"name": "<benchmark> <measure>", "unit", "value", "range": "lower .. upper"}]
-/// `range` is left out without a spread, values that are not finite always.
+/// `range` is left out without a spread. Values are finite.
 std::string ToCustomSmallerIsBetter(const std::vector<TrackedValue>& values);
 
 /// Bencher Metric Format: {benchmark: {measure: {"value", "lower_value", "upper_value"}}}. Units

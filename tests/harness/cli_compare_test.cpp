@@ -51,6 +51,81 @@ TEST_F(ComparisonCommands, RefuseWhatIsNotThere) {
   Expect("compare --help", 0, {"Examples:", "Exit codes:"});
 }
 
+TEST_F(ComparisonCommands, RefuseNumbersThatSwitchGatesOff) {
+  ASSERT_EQ(Call("run tiny.json --out out").code, 0);
+  for (const char* ratio :
+       {"nan", "-nan", "inf", "-inf", "0", "0.99", "-2", "1e400", "0x2", "2x", "''"}) {
+    Expect(std::string("compare out out --error-ratio=") + ratio, 2, {"--error-ratio"});
+  }
+  Expect("compare out out --error-ratio 1.5", 0, {"SAME"});
+  for (const char* from : {"nan", "inf", "-1", "1e400", "x"}) {
+    Expect(std::string("fit b.json --from=") + from, 2, {"--from"});
+  }
+  for (const char* jobs : {"nan", "0", "-1", "1.5", "0x2", "4294967297", "1025", "''"}) {
+    Expect(std::string("run tiny.json --out out --jobs=") + jobs, 2, {"--jobs"});
+  }
+}
+
+TEST_F(ComparisonCommands, NameEveryDifference) {
+  ASSERT_EQ(Call("run tiny.json --out base").code, 0);
+  const std::vector<Record> records = ReadRecords(folder_ / "base");
+  const auto with = [&](const std::string& name, const Value& value) {
+    ResultStore store(folder_ / name);
+    Record odd = records[0];
+    odd.Set("drift_position_max", value);
+    store.Append(odd);
+    store.Append(records[1]);
+  };
+  with("text", std::string("oops"));
+  with("list", std::vector<double>{1.0});
+  with("null", Value());
+  for (const auto& [name, shown] :
+       {std::pair{"text", "\"oops\""}, {"list", "1 values"}, {"null", "null"}}) {
+    const std::string odd = name;
+    Expect("compare base " + odd, 1,
+           {"worse", "drift_position_max", shown, "expected a finite number >= 0", "WORSE: 1"});
+    Expect("compare " + odd + " base", 1, {"different", "drift_position_max", "DIFFERENT: 1"});
+    Expect("compare " + odd + " " + odd, 1, {"different", "in BASE and NEW", "DIFFERENT: 1"});
+    Expect("export " + odd + " --out b.json", 1,
+           {"not exported: accuracy tiny four-bar odca", "drift_position_max: found ", shown});
+  }
+  ASSERT_EQ(Call("run tiny.json --out half --filter formulation=odca").code, 0);
+  const std::string missing = "  accuracy tiny four-bar lagrange";
+  Expect("compare base half", 2, {"1 cases only in BASE:", missing});
+  Expect("compare half base", 0, {"1 cases only in NEW:", missing});
+  Expect("compare base half --format csv", 2, {"only in BASE,accuracy tiny four-bar lagrange"});
+}
+
+TEST_F(ComparisonCommands, NullSamplesEndTheComparison) {
+  Write("null.jsonl",
+        R"({"kind":"timing","mechanism":"a","case_id":"1","outcome":"finished",)"
+        R"("series.wall_s":[null],"machine":"m","compiler":"c","flags":"f","libm":"l"})"
+        "\n");
+  Expect("compare null.jsonl null.jsonl", 1,
+         {"different", "series.wall_s", "1 values (1 null or negative)", "expected finite times"});
+  Expect("export null.jsonl", 2, {"series.wall_s: found 1 values (1 null", "nothing to export"});
+}
+
+TEST_F(ComparisonCommands, ExportNamesTheCasesThatFailed) {
+  Write("b.json", R"({"benchmarks": [
+    {"name": "a/1", "cpu_time": 1, "real_time": 1}, {"name": "a/2", "cpu_time": 4, "real_time": 4},
+    {"name": "a/3", "error_occurred": true, "error_message": "singular"}]})");
+  Expect("export b.json", 1,
+         {"\"name\": \"benchmark a/1 cpu_ns\"",
+          "b.json: not exported: benchmark a/3: outcome \"singular\""});
+  Expect("export b.json --out t.json", 1, {"not exported: benchmark a/3", "wrote t.json"});
+  Expect("fit b.json", 0, {"a/N", "2.00"});
+}
+
+TEST_F(ComparisonCommands, BaselineSaysWhatToBuildFirst) {
+  fs::create_directories(folder_ / "tools");
+  fs::copy_file(fs::path(LOOPBENCH_SOURCE_DIR) / "tools/baseline", folder_ / "tools/baseline");
+  for (const char* command : {"check", "renew", "selftest"}) {
+    ExpectEnding(Call("", std::string("tools/baseline ") + command + " 2>&1; exit $?;"), 2,
+                 {"no build/portable/harness/loopbench", "cmake --preset portable", "./check"});
+  }
+}
+
 #ifdef LOOPBENCH_BENCH_BINARY
 
 class BenchmarkProgram : public ComparisonCommands {
@@ -105,7 +180,14 @@ TEST_F(BenchmarkProgram, WritesJsonThatTheCommandsTake) {
 
   Expect("fit out.json", 0, {"rhs/chain/N/odca/acceleration/joint/rank-revealing", "exponent"});
   Expect("compare out.json out.json", 0, {"times not measured: too few repetitions", "SAME"});
-  Expect("export out.json", 0, {"\"unit\": \"ns\""});
+  Expect("export out.json", 1, {"\"unit\": \"ns\"", "not exported: benchmark rhs/chain/3/odca"});
+  // nothing is said of how the library was built, but how this program was
+  const Ending list = bench("--benchmark_filter=rhs/chain/6 --benchmark_min_time=0.001");
+  ExpectEnding(list, 0, {"Assertions in what is timed: o"});
+  EXPECT_EQ(list.text.find("DEBUG"), std::string::npos) << list.text;
+  ExpectEnding(
+      bench("--benchmark_filter=rhs/chain/6 --benchmark_min_time=0.001 --benchmark_out=/dev/full"),
+      2, {"cannot write '/dev/full'"});
   // the same JSON on the terminal, where nothing else may stand
   const Ending terminal = bench(run + "--benchmark_format=json 2>/dev/null");
   EXPECT_EQ(ParseBenchmarkJson(terminal.text, "terminal").size(), 7u);
@@ -122,6 +204,9 @@ TEST_F(BenchmarkProgram, RefusesBadInput) {
   bench("--families", "expected a file");
   bench("--benchmark_filter=nothing_like_it", "");
   bench("--faimlies=bad.json", "--faimlies");
+  for (const char* time : {"nan", "inf", "-1", "1e300", "x"}) {
+    bench(std::string("--benchmark_min_time=") + time, "--benchmark_min_time: found");
+  }
   ExpectEnding(Bench("--help"), 0, {"Examples:", "--families"});
 }
 

@@ -89,6 +89,14 @@ TEST(MannWhitney, OfNothingDecidesNothing) {
   EXPECT_EQ(MannWhitney(std::vector<double>{1.0}, {}).p_greater, 1.0);
 }
 
+TEST(MannWhitney, EndsForSamplesOfAnySize) {
+  std::vector<double> a(200'000), b(200'000, std::nan(""));
+  std::iota(a.begin(), a.end(), 0.5);
+  EXPECT_GE(MannWhitney(b, b).p_greater, 0.0);  // means nothing, and ends
+  std::iota(b.begin(), b.end(), 0.0);
+  EXPECT_EQ(MannWhitney(a, b).u, 0.5 * 200'000 * 200'001.0);
+}
+
 TEST(SmallestP, IsOneOrderOfAll) {
   EXPECT_NEAR(SmallestP(5, 5), 1.0 / 252, 1e-15);
   EXPECT_NEAR(SmallestP(3, 4), 1.0 / 35, 1e-15);
@@ -112,6 +120,7 @@ TEST(Median, TakesTheMiddle) {
   EXPECT_EQ(Median(std::vector<double>{3, 1, 2}), 2.0);
   EXPECT_EQ(Median(std::vector<double>{4, 1, 2, 3}), 2.5);
   EXPECT_TRUE(std::isnan(Median({})));
+  EXPECT_TRUE(std::isnan(Median(std::vector<double>{1, std::nan(""), 3})));
 }
 
 }  // namespace

@@ -7,6 +7,7 @@
 #include <limits>
 #include <random>
 #include <string>
+#include <utility>
 #include <vector>
 
 #include "harness/origin.h"
@@ -115,6 +116,87 @@ TEST(Compare, ReportsARunThatNoLongerFailsAsBetter) {
 TEST(Compare, CatchesAResultThatIsGone) {
   ExpectChange("drift_position_max", Value(), Judgement::kWorse);
   ExpectChange("drift_position_max", std::numeric_limits<double>::quiet_NaN(), Judgement::kWorse);
+}
+
+/// Every measure of these records, with values that none of them can have.
+std::vector<std::pair<std::string, Value>> OddValues() {
+  const double nan = std::numeric_limits<double>::quiet_NaN();
+  const double infinity = std::numeric_limits<double>::infinity();
+  std::vector<std::pair<std::string, Value>> odd;
+  for (const std::string key :
+       {"steps", "rhs_operations", "instructions", "drift_position_max", "energy_error_max"}) {
+    for (const Value& value : {Value(std::string("oops")), Value(std::vector<double>{1.0}),
+                               Value(nan), Value(infinity), Value(-1.0), Value(true), Value()}) {
+      odd.emplace_back(key, value);
+    }
+  }
+  for (const Value& value : {Value(1.0), Value(std::vector<double>{1.0}), Value(), Value(true)}) {
+    odd.emplace_back("outcome", value);
+    odd.emplace_back("state_hash", value);
+  }
+  for (const Value& value :
+       {Value(std::string("oops")), Value(1.0), Value(), Value(std::vector<double>{1.0, nan}),
+        Value(std::vector<double>{1.0, infinity}), Value(std::vector<double>{1.0, -1.0})}) {
+    odd.emplace_back("series.rhs_ns", value);
+  }
+  return odd;
+}
+
+TEST(Compare, CallsAValueThatIsNoneADifferenceOnEitherSide) {
+  for (const auto& [key, value] : OddValues()) {
+    SCOPED_TRACE(key + " " + Shown(With(key, value)[0], key));
+    ComparisonReport report = Compare(Sound(), With(key, value), {});
+    EXPECT_EQ(Only(report, Judgement::kWorse).measure.key, key);
+    EXPECT_NE(Only(report, Judgement::kWorse).why.find("in NEW: expected"), std::string::npos);
+    EXPECT_EQ(report.ExitCode({}), 1);
+    report = Compare(With(key, value), Sound(), {});
+    EXPECT_EQ(Only(report, Judgement::kDifferent).measure.key, key);
+    EXPECT_NE(Only(report, Judgement::kDifferent).why.find("in BASE: expected"), std::string::npos);
+    EXPECT_EQ(report.ExitCode({}), 1);
+    // equal garbage is no equal result
+    report = Compare(With(key, value), With(key, value), {});
+    EXPECT_EQ(Only(report, Judgement::kDifferent).measure.key, key);
+    EXPECT_EQ(report.ExitCode({}), 1);
+  }
+}
+
+TEST(Compare, CallsAValueThatOneSideLacksADifference) {
+  for (const char* key :
+       {"steps", "instructions", "state_hash", "drift_position_max", "series.rhs_ns"}) {
+    SCOPED_TRACE(key);
+    std::vector<Record> lacking = Sound();
+    Record rest;
+    for (const auto& [name, value] : lacking[0].items()) {
+      if (name != key) rest.Set(name, value);
+    }
+    lacking[0] = rest;
+    ComparisonReport report = Compare(Sound(), lacking, {});
+    EXPECT_EQ(Only(report, Judgement::kWorse).measure.key, key);
+    EXPECT_EQ(Only(report, Judgement::kWorse).why, "not in NEW");
+    report = Compare(lacking, Sound(), {});
+    EXPECT_EQ(Only(report, Judgement::kDifferent).measure.key, key);
+    EXPECT_EQ(Only(report, Judgement::kDifferent).why, "not in BASE");
+    EXPECT_EQ(report.ExitCode({}), 1);
+    EXPECT_EQ(Compare(lacking, lacking, {}).ExitCode({}), 0);
+  }
+}
+
+TEST(Compare, TakesWhatAFailedRunLacksForPartOfItsFailure) {
+  std::vector<Record> failed = Sound();
+  Record stub;
+  for (const char* key : {"kind", "mechanism", "rtol", "machine", "compiler", "flags", "libm"}) {
+    stub.Set(key, *failed[0].Find(key));
+    if (std::string(key) == "rtol") stub.Set("outcome", std::string("singular"));
+  }
+  failed[0] = stub;
+  EXPECT_EQ(Exit(failed, Sound()), 0);  // better, and no more
+  EXPECT_EQ(Exit(Sound(), failed), 1);
+  // a run that blows up in one way on both sides ends in null on both
+  failed = With("outcome", std::string("non-finite"));
+  failed[0].Set("drift_position_max", Value());
+  const ComparisonReport report = Compare(failed, failed, {});
+  EXPECT_EQ(Only(report, Judgement::kNotMeasured).measure.key, "drift_position_max");
+  EXPECT_EQ(report.ExitCode({}), 0);
 }
 
 TEST(Compare, CatchesSlowerTimesBeyondTwoPercentOnly) {

@@ -80,8 +80,15 @@ TEST(FitFamilies, GroupsByTheNumberInTheName) {
   EXPECT_EQ(rows[1].Text("family"), "rhs/chain/N/odca");
   EXPECT_NEAR(rows[1].Number("exponent"), 2.0, 1e-13);
   EXPECT_EQ(rows[1].Number("failed"), 1.0);
-  // sizes below the start do not count; a single one left gives no exponent
-  EXPECT_EQ(FitFamilies(records, 3.0).size(), 1u);
+  // sizes below the start do not count; a single one left gives no exponent, and is no gap
+  const std::vector<Record> late = FitFamilies(records, 3.0);
+  ASSERT_EQ(late.size(), 2u);
+  EXPECT_EQ(late[1].Text("family"), "rhs/chain/N/odca");
+  EXPECT_EQ(late[1].Find("exponent"), nullptr);
+  EXPECT_EQ(late[1].Number("sizes"), 1.0);
+  EXPECT_EQ(late[1].Number("failed"), 1.0);
+  // "inf" and "nan" are words
+  EXPECT_EQ(FitFamilies({Benchmark("a/inf/1", 1, 1), Benchmark("a/inf/2", 2, 2)}, 0.0).size(), 1u);
 }
 
 }  // namespace

@@ -6,6 +6,7 @@
 #include <nlohmann/json.hpp>
 #include <stdexcept>
 #include <string>
+#include <tuple>
 
 #include "harness/compare/track.h"
 #include "harness/store/measurements.h"
@@ -117,14 +118,13 @@ TEST(BenchmarkJson, KeepsRunsThatWereSkipped) {
 std::vector<TrackedValue> Values() {
   return {{"case \"one\"", "time", "ns", 2.0, 1.0, 4.0},
           {"case \"one\"", "steps", "", 10.0, 10.0, 10.0},
-          {"case two", "drift", "m", std::numeric_limits<double>::quiet_NaN(), 0.0, 0.0},
           {"case two", "error", "J", 1e-300, 1e-300, std::numeric_limits<double>::infinity()}};
 }
 
 TEST(TrackerJson, CustomSmallerIsBetterHasNameUnitValue) {
   const json document = json::parse(ToCustomSmallerIsBetter(Values()));
   ASSERT_TRUE(document.is_array());
-  ASSERT_EQ(document.size(), 3u);  // the NaN is left out
+  ASSERT_EQ(document.size(), 3u);
   EXPECT_EQ(
       document[0],
       (json{{"name", "case \"one\" time"}, {"unit", "ns"}, {"value", 2.0}, {"range", "1 .. 4"}}));
@@ -141,10 +141,10 @@ TEST(TrackerJson, BencherMetricFormatNestsMeasures) {
   })json"));
 }
 
-TEST(TrackedValues, AreNumbersOfRunsThatFinished) {
+TEST(TrackRecords, TakesNumbersOfRunsThatFinished) {
   std::vector<Record> records = ParseBenchmarkJson(kBenchmarks, "b.json");
   records[0].Set("drift_position_max", 1e-9);
-  const std::vector<TrackedValue> values = TrackedValues(records);
+  const auto [values, left_out] = TrackRecords(records);
   ASSERT_EQ(values.size(), 3u);
   EXPECT_EQ(values[0].measure, "allocations");
   EXPECT_EQ(values[1].measure, "drift_position_max");
@@ -153,6 +153,36 @@ TEST(TrackedValues, AreNumbersOfRunsThatFinished) {
   EXPECT_EQ(values[2].value, 2000.0);
   EXPECT_EQ(values[2].lower, 1000.0);
   EXPECT_EQ(values[2].upper, 3000.0);
+  EXPECT_EQ(left_out, std::vector<std::string>{"benchmark b: outcome \"singular\""});
+}
+
+TEST(TrackRecords, NamesEveryValueThatIsNone) {
+  const std::vector<double> sample = {1.0, std::nan(""), 3.0};
+  for (const auto& [key, value, shown] : std::vector<std::tuple<std::string, Value, std::string>>{
+           {"drift_position_max", std::string("oops"), "found \"oops\", expected a finite number"},
+           {"drift_position_max", Value(), "found null"},
+           {"drift_position_max", std::vector<double>{1.0}, "found 1 values"},
+           {"drift_position_max", -1.0, "found -1"},
+           {"steps", std::nan(""), "found nan"},
+           {"steps", true, "found true"},
+           {"instructions", std::int64_t{0}, "found 0, expected a finite number > 0"},
+           {"series.cpu_ns", sample, "found 3 values (1 null or negative)"}}) {
+    std::vector<Record> records = ParseBenchmarkJson(kBenchmarks, "b.json");
+    records.pop_back();
+    records[0].Set(key, value);
+    const std::vector<std::string> left_out = TrackRecords(records).left_out;
+    ASSERT_EQ(left_out.size(), 1u) << key;
+    EXPECT_EQ(left_out[0].find("benchmark a/3: " + key + ": found "), 0u) << left_out[0];
+    EXPECT_NE(left_out[0].find(shown), std::string::npos) << left_out[0];
+  }
+}
+
+TEST(TrackRecords, DoesNotPickOneOfTwoRecordsOfACase) {
+  std::vector<Record> records = ParseBenchmarkJson(kBenchmarks, "b.json");
+  records[1] = records[0];
+  const auto [values, left_out] = TrackRecords(records);
+  EXPECT_TRUE(values.empty());
+  EXPECT_EQ(left_out.size(), 2u);
 }
 
 TEST(Callgrind, GivesTheTotal) {

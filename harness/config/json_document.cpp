@@ -18,8 +18,7 @@ namespace {
 /// Builds the document and notes what the parser would forgive.
 class Builder final : public Walker {
  public:
-  Builder(std::string_view text, const std::string& file, std::size_t first_line)
-      : Walker(first_line), text_(text), file_(file), first_line_(first_line) {}
+  Builder(std::string_view text, const std::string& file) : text_(text), file_(file) {}
 
   /// The document; throws ConfigError with all complaints when there are any.
   Json Take() {
@@ -31,8 +30,7 @@ class Builder final : public Walker {
   bool parse_error(std::size_t position, const std::string& token,
                    const nlohmann::detail::exception& error) override {
     const std::string_view read = text_.substr(0, std::min(position, text_.size()));
-    const auto ends = static_cast<std::size_t>(std::count(read.begin(), read.end(), '\n'));
-    const std::size_t line = first_line_ + ends;
+    const auto line = std::count(read.begin(), read.end(), '\n') + 1;
     const std::size_t start = read.rfind('\n');
     const std::size_t column =
         start == std::string_view::npos ? read.size() : read.size() - start - 1;
@@ -108,7 +106,6 @@ class Builder final : public Walker {
 
   std::string_view text_;
   const std::string& file_;
-  std::size_t first_line_;
   Json root_;
   std::vector<Json*> open_;  ///< containers not yet complete; only the last one grows
   std::vector<std::unordered_set<std::string>> keys_;
@@ -142,15 +139,14 @@ std::string ReadTextFile(const std::filesystem::path& path) {
   return text;
 }
 
-Json ParseDocument(std::string_view text, const std::string& file, std::size_t first_line) {
-  if (const std::string fault = EncodingFault(text, first_line); !fault.empty()) {
+Json ParseDocument(std::string_view text, const std::string& file) {
+  if (const std::string fault = EncodingFault(text); !fault.empty()) {
     throw ConfigError(fmt::format("{}:{}", file, fault));
   }
   if (text.find_first_not_of(" \t\r\n") == std::string_view::npos) {
-    throw ConfigError(
-        fmt::format("{}:{}:1: found an empty file, expected a JSON object", file, first_line));
+    throw ConfigError(fmt::format("{}:1:1: found an empty file, expected a JSON object", file));
   }
-  Builder builder(text, file, first_line);
+  Builder builder(text, file);
   builder.Walk(text);
   return builder.Take();
 }

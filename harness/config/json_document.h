@@ -1,7 +1,7 @@
 // From bytes to a JSON document, strictly: what the parser would forgive is an error here.
 //
 // For the .cpp files of harness/config and harness/store only, like json_reader.h and the
-// *_sections.h: these headers show nlohmann-json. Every reader of JSON begins here, so that all
+// *_sections.h: these headers show nlohmann-json. Every reader of a document begins here, so that all
 // have the same limits of size and depth and the same messages.
 #pragma once
 
@@ -38,9 +38,8 @@ std::string ReadTextFile(const std::filesystem::path& path);
 /// errors, comments, trailing commas, NaN, Infinity and text after the document; "FILE:LINE:
 /// /pointer: ..." for nesting deeper than kMaxConfigDepth and, all at once, for keys that occur
 /// twice in one object (the parser would keep one of them without a word) and numbers that are not
-/// zero but too small for a double. Linear in the size of the text. A document that is one line of
-/// a file gives its number as `first_line`.
-Json ParseDocument(std::string_view text, const std::string& file, std::size_t first_line = 1);
+/// zero but too small for a double. Linear in the size of the text.
+Json ParseDocument(std::string_view text, const std::string& file);
 
 /// Line of each value that one of `pointers` names, from 1; for a value of several lines the first.
 /// Pointers that name nothing are left out. `text` is a document that ParseDocument accepts.
@@ -58,8 +57,7 @@ std::string ShownPointer(const std::string& pointer);
 std::string Printable(const std::string& text);
 
 /// "" when the text is UTF-8 without a byte order mark and without zero bytes; else where, what was
-/// found and what was expected, as "LINE:COLUMN: found ..., expected ...", counted from
-/// `first_line`.
-std::string EncodingFault(std::string_view text, std::size_t first_line = 1);
+/// found and what was expected, as "LINE:COLUMN: found ..., expected ...".
+std::string EncodingFault(std::string_view text);
 
 }  // namespace loopbench::harness

@@ -41,27 +41,26 @@ std::size_t CharacterLength(std::string_view text) {
 }
 
 /// "LINE:COLUMN" of the byte at `position`; columns count bytes, as in the messages of compilers.
-std::string PlaceOf(std::string_view text, std::size_t position, std::size_t first_line) {
+std::string PlaceOf(std::string_view text, std::size_t position) {
   const std::string_view before = text.substr(0, position);
-  const auto ends = static_cast<std::size_t>(std::count(before.begin(), before.end(), '\n'));
+  const auto line = std::count(before.begin(), before.end(), '\n') + 1;
   const std::size_t start = before.rfind('\n');
-  return fmt::format("{}:{}", first_line + ends,
+  return fmt::format("{}:{}", line,
                      start == std::string_view::npos ? position + 1 : position - start);
 }
 
 }  // namespace
 
-std::string EncodingFault(std::string_view text, std::size_t first_line) {
+std::string EncodingFault(std::string_view text) {
   if (text.starts_with("\xEF\xBB\xBF")) {
-    return fmt::format("{}:1: found a UTF-8 byte order mark (EF BB BF), {} without one", first_line,
-                       kExpected);
+    return fmt::format("1:1: found a UTF-8 byte order mark (EF BB BF), {} without one", kExpected);
   }
   if (const std::string_view wide = WideEncoding(text); !wide.empty()) {
-    return fmt::format("{}:1: found {} text, {}", first_line, wide, kExpected);
+    return fmt::format("1:1: found {} text, {}", wide, kExpected);
   }
   for (std::size_t i = 0; i < text.size();) {
     if (text[i] == '\0') {
-      return fmt::format("{}: found a zero byte, {}", PlaceOf(text, i, first_line), kExpected);
+      return fmt::format("{}: found a zero byte, {}", PlaceOf(text, i), kExpected);
     }
     const std::size_t length = CharacterLength(text.substr(i, 4));
     if (length > 0) {
@@ -71,8 +70,8 @@ std::string EncodingFault(std::string_view text, std::size_t first_line) {
     const auto byte = static_cast<unsigned char>(text[i]);
     // Latin-1 has letters from C0 on; below are Windows' quotes and dashes
     return fmt::format("{}: found the byte {:02X}, which is not UTF-8 (it may be {}), {}",
-                       PlaceOf(text, i, first_line), byte,
-                       byte >= 0xA0 ? "Latin-1" : "Windows-1252", kExpected);
+                       PlaceOf(text, i), byte, byte >= 0xA0 ? "Latin-1" : "Windows-1252",
+                       kExpected);
   }
   return "";
 }

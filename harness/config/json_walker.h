@@ -52,8 +52,6 @@ class LineCounter {
 /// Follows the parser through the document and knows the pointer and the line of each value.
 class Walker : public nlohmann::json_sax<Json> {
  public:
-  explicit Walker(std::size_t first_line = 1) : reading_{first_line, first_line} {}
-
   /// Walks through `text` to its end, or until a callback returns false.
   void Walk(std::string_view text) {
     const LineCounter begin(text.data(), &reading_), end(text.data() + text.size(), &reading_);

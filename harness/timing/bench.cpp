@@ -9,6 +9,7 @@
 #include <cmath>
 #include <cstdlib>
 #include <ctime>
+#include <fstream>
 #include <map>
 #include <optional>
 #include <sstream>
@@ -288,6 +289,8 @@ int Measured(int argc, char** argv) {
   const std::string out_format =
       LibraryOption(arguments, "benchmark_out_format", "BENCHMARK_OUT_FORMAT");
   const std::string out = LibraryOption(arguments, "benchmark_out", "BENCHMARK_OUT");
+  // the library would leave with 1
+  if (!out.empty() && !std::ofstream(out, std::ios::app)) FailOn("write", out);
   const bool json_to_file = !out.empty() && (out_format.empty() || out_format == "json");
   const bool json_to_terminal =
       LibraryOption(arguments, "benchmark_format", "BENCHMARK_FORMAT") == "json";

@@ -204,6 +204,7 @@ TEST_F(BenchmarkProgram, RefusesBadInput) {
   bench("--families", "expected a file");
   bench("--benchmark_filter=nothing_like_it", "");
   bench("--faimlies=bad.json", "--faimlies");
+  bench("--benchmark_out=no/such/folder/b.json", "cannot write 'no/such/folder/b.json'");
   for (const char* time : {"nan", "inf", "-1", "1e300", "x"}) {
     bench(std::string("--benchmark_min_time=") + time, "--benchmark_min_time: found");
   }

@@ -16,6 +16,24 @@ class Streams : public CommandLineTest {
   }
 };
 
+TEST(Printing, GoesThroughOnePlace) {
+  int files = 0;
+  for (const auto& entry :
+       fs::recursive_directory_iterator(fs::path(LOOPBENCH_SOURCE_DIR) / "harness")) {
+    const fs::path& path = entry.path();
+    if (path.extension() != ".cpp" && path.extension() != ".h") continue;
+    if (path.stem() == "terminal") continue;
+    ++files;
+    const std::string text = ReadFile(path);
+    for (const char* way : {"fmt::print", "std::cout", "std::cerr", "std::printf", "fprintf",
+                            "std::puts", "fputs", "stdout,", "stderr,"}) {
+      EXPECT_EQ(text.find(way), std::string::npos)
+          << path << " prints with " << way << "; use Print or PrintError of harness/terminal.h";
+    }
+  }
+  EXPECT_GT(files, 100);
+}
+
 TEST_F(Streams, ClosedOnesKeepMessagesOutOfTheStore) {
   const Ending run =
       Shell("( exec >&- 2>&-; \"$L\" run tiny.json --out out ); code=$?; exit $code");

@@ -4,11 +4,13 @@
 #include <cmath>
 #include <limits>
 #include <nlohmann/json.hpp>
+#include <random>
 #include <stdexcept>
 #include <string>
 #include <tuple>
 
 #include "harness/compare/track.h"
+#include "harness/config/config_error.h"
 #include "harness/store/measurements.h"
 #include "harness/store/tracker_json.h"
 #include "harness/timing/callgrind.h"
@@ -106,6 +108,33 @@ TEST(BenchmarkJson, OfAnyDepthIsReadOrRefused) {
   const std::string deep(100'000, '['), end(100'000, ']');
   ExpectRefused(R"({"benchmarks": [], "context": )" + deep + end + "}", "nesting deeper than 64");
   ExpectRefused(R"({"benchmarks": )" + deep, "nesting deeper than 64");
+}
+
+TEST(BenchmarkJson, ChangedAnywhereIsReadOrRefused) {
+  // pieces that turn one kind of value into another
+  const std::vector<std::string> pieces = {"",   "{}",  "[]",   "null", "-1",   "1e308", "\"\"",
+                                           "\"", "[[[", "\xC3", ",",    "true", "1e-400"};
+  const std::string sound = kBenchmarks;
+  std::mt19937 random(1);
+  int refused = 0;
+  for (int change = 0; change < 4000; ++change) {
+    std::string text = sound;
+    const std::size_t at = random() % text.size();
+    text.replace(at, random() % 12, pieces[random() % pieces.size()]);
+    if (change % 8 == 7) text.resize(at);
+    try {
+      for (const Record& record : ParseBenchmarkJson(text, "b.json")) {
+        if (record.Text("outcome") != "finished") continue;
+        for (const double time : record.Numbers("series.cpu_ns")) {
+          EXPECT_TRUE(std::isfinite(time) && time >= 0.0) << text;
+        }
+      }
+    } catch (const ConfigError& error) {
+      ++refused;
+      EXPECT_EQ(std::string(error.what()).find("b.json:"), 0u) << error.what();
+    }
+  }
+  EXPECT_GT(refused, 1000);
 }
 
 TEST(BenchmarkJson, KeepsRunsThatWereSkipped) {

@@ -76,9 +76,10 @@ constexpr const char* kAssertions = "off";
 constexpr const char* kAssertions = "on (the preset native builds without)";
 #endif
 
-/// The reporter of a terminal, with the truth in place of the library's warning that it was "built
-/// as DEBUG" and "timings may be affected". Debian builds it without NDEBUG, but what is timed is
-/// not in it: the loop over iterations is a header, and as good as this program's own flags.
+/// The reporter of a terminal, without the library's warning that it was "built as DEBUG" and
+/// "timings may be affected". Debian builds it without NDEBUG, but what is timed is not in it: the
+/// loop over iterations is a header, and as good as this program's own flags. Of those the context
+/// tells, in the lines "assertions" and "flags".
 class PlainReporter final : public benchmark::BenchmarkReporter {
  public:
   bool ReportContext(const Context& context) override {
@@ -91,7 +92,7 @@ class PlainReporter final : public benchmark::BenchmarkReporter {
         "***WARNING*** Library was built as DEBUG. Timings may be affected.\n";
     if (const std::size_t at = text.find(warning); at != std::string::npos)
       text.erase(at, warning.size());
-    GetErrorStream() << text << "Assertions in what is timed: " << kAssertions << "\n";
+    GetErrorStream() << text;
     return go_on;
   }
   void ReportRuns(const std::vector<Run>& runs) override { reporter_->ReportRuns(runs); }

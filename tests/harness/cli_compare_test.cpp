@@ -183,7 +183,7 @@ TEST_F(BenchmarkProgram, WritesJsonThatTheCommandsTake) {
   Expect("export out.json", 1, {"\"unit\": \"ns\"", "not exported: benchmark rhs/chain/3/odca"});
   // nothing is said of how the library was built, but how this program was
   const Ending list = bench("--benchmark_filter=rhs/chain/6 --benchmark_min_time=0.001");
-  ExpectEnding(list, 0, {"Assertions in what is timed: o"});
+  ExpectEnding(list, 0, {"assertions: o"});
   EXPECT_EQ(list.text.find("DEBUG"), std::string::npos) << list.text;
   ExpectEnding(
       bench("--benchmark_filter=rhs/chain/6 --benchmark_min_time=0.001 --benchmark_out=/dev/full"),

@@ -31,9 +31,9 @@ int Run(const RunCommand& command, const std::string& typed) {
   if (command.suite.precision) {
     for (const Experiment& experiment : experiments) RequireLadders(experiment);
   }
-  const std::filesystem::path out =
-      command.out.empty() ? std::filesystem::path("results/runs") / experiments.front().name
-                          : command.out;
+  const std::filesystem::path out = command.out.empty() ? std::filesystem::path("results/runs") /
+                                                              FileName(experiments.front().name)
+                                                        : command.out;
   {
     ResultStore store(out);
     const std::vector<Record> before = ReadRecords(out);
@@ -102,7 +102,7 @@ int PrintVerdicts(const VerdictCommand& command, const std::string& typed) {
   }
   Table verdicts = VerdictTable(results);
   verdicts.notes = Provenance(typed);
-  Print("{}\n", ToText(verdicts));
+  PrintText(ToText(verdicts) + "\n");
   if (!command.out.empty()) Print("wrote {}\n", command.out.string());
   return 0;
 }

@@ -36,7 +36,7 @@ std::string RenderTable(const Table& table, const std::string& format) {
 
 void Deliver(const std::string& text, const std::filesystem::path& out) {
   if (out.empty()) {
-    Print("{}", text);
+    PrintText(text);
   } else {
     WriteFileAtomically(out, text);
     Print("wrote {}\n", out.string());
@@ -208,15 +208,16 @@ int PrintComparison(const CompareCommand& command, const std::string& typed) {
     AddCases("only in BASE", comparison.only_base, findings);
     AddCases("only in NEW", comparison.only_fresh, findings);
     AddCases("more than once", comparison.ambiguous, findings);
-    Print("{}", ToCsv(findings));
+    PrintText(ToCsv(findings));
     PrintError("{}\n", Conclusion(comparison, code));
     return code;
   }
   if (command.format == "markdown") notes.push_back(fmt::format("command: {}", typed));
-  if (!findings.rows.empty()) Print("{}\n", RenderTable(findings, command.format));
+  if (!findings.rows.empty()) PrintText(RenderTable(findings, command.format) + "\n");
   Table summary = SummaryTable(comparison);
   summary.notes = notes;
-  Print("{}\n{}\n", RenderTable(summary, command.format), Conclusion(comparison, code));
+  PrintText(RenderTable(summary, command.format) + "\n");
+  Print("{}\n", Conclusion(comparison, code));
   return code;
 }
 

@@ -106,7 +106,7 @@ int List(const ExperimentFiles& files) {
   for (const auto& path : files.paths) {
     const std::vector<Experiment> experiments =
         ReadSelected({{path}, files.settings, files.filter});
-    Print("{}\n", ToText(CaseTable(experiments, files.filter)));
+    PrintText(ToText(CaseTable(experiments, files.filter)) + "\n");
   }
   return 0;
 }
@@ -137,7 +137,7 @@ int CheckFiles(const ExperimentFiles& files) {
           Print("{}: {} groups of benchmarks\n", path.string(), ReadBenchmarks(path).groups.size());
       }
     } catch (const ConfigError& error) {
-      PrintError("{}\n", error.what());
+      PrintError("{}\n", Lines{error.what()});
       exit_code = 2;
     }
   }

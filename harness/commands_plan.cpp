@@ -209,7 +209,7 @@ void PrintPlan(const std::vector<Experiment>& experiments, const Plan& plan,
     row.Set("seconds", std::round(line.seconds * 100.0) / 100.0);
     table.rows.push_back(row);
   }
-  Print("{}\n", ToText(table));
+  PrintText(ToText(table) + "\n");
   Print("{} cases, {} runs (an ensemble comes on top of the unperturbed run), {} timings\n",
         plan.cases, plan.runs, plan.timings);
   Print("estimated time: accuracy {} with one job, timings {}\n", Duration(plan.seconds),

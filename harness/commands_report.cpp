@@ -45,9 +45,9 @@ std::string RenderKept(Table table, const std::string& format) {
 int DrawAll(const std::vector<NamedFigure>& figures, const PlotCommand& command) {
   const std::string extension = command.format.empty() ? "svg" : command.format;
   for (const NamedFigure& figure : figures) {
-    const auto path = command.out / (figure.name + "." + extension);
+    const auto path = command.out / (FileName(figure.name) + "." + extension);
     if (const auto error = WriteFigure(path, figure.figure)) {
-      PrintError("{}\n", *error);
+      PrintError("{}\n", Lines{*error});
       return 2;
     }
   }
@@ -61,7 +61,7 @@ std::filesystem::path FileOf(const PlotCommand& command) {
   const std::filesystem::path& out = command.out;
   const std::string ending = out.extension().string();
   if (ending != ".svg" && ending != ".pdf") {
-    return out / fmt::format("{}-over-{}.{}", command.free.y, command.free.x,
+    return out / fmt::format("{}.{}", FileName(command.free.y + "-over-" + command.free.x),
                              command.format.empty() ? "svg" : command.format);
   }
   if (command.format.empty() || ending == "." + command.format) return out;
@@ -78,7 +78,7 @@ int DrawFree(const std::vector<Record>& records, const PlotCommand& command) {
   const FreeFigureResult result = MakeFreeFigure(records, command.free);
   for (const std::string& remark : result.remarks) PrintError("note: {}\n", remark);
   if (const auto error = WriteFigure(path, result.figure)) {
-    PrintError("{}\n", *error);
+    PrintError("{}\n", Lines{*error});
     return 2;
   }
   Print("wrote {}\n", path.string());
@@ -94,7 +94,7 @@ int WriteMap(const FailureMap& map, const MapCommand& command, const std::string
   WriteFileAtomically(stem.string() + ".md", MapMarkdown(map, Provenance(typed)));
   const std::string picture = stem.string() + "." + command.format;
   const auto error = WriteMapFigure(picture, map);
-  if (error) PrintError("{}\n", *error);
+  if (error) PrintError("{}\n", Lines{*error});
   Print("wrote {0}.csv, {0}.md{1}\n", stem.string(), error ? "" : ", " + picture);
   return error ? 2 : 0;
 }
@@ -122,7 +122,7 @@ void WriteTables(const std::vector<Record>& records, const std::filesystem::path
       WriteFileAtomically(out / (kind + ending), RenderKept(full, format));
     }
     const Table compact = MakeTable(records, {.kind = kind, .compact = true});
-    Print("{}\n", ToText(compact, TerminalHasColour()));
+    PrintText(ToText(compact, TerminalHasColour()) + "\n");
   }
   for (const std::string& note : Provenance(typed)) Print("{}\n", note);
 }
@@ -140,9 +140,9 @@ int PrintTable(const TableCommand& command, const std::string& typed) {
   }
   AppendProvenance(table, typed);
   if (on_terminal) {
-    Print("{}", ToText(table, TerminalHasColour()));
+    PrintText(ToText(table, TerminalHasColour()));
   } else if (command.out.empty()) {
-    Print("{}", RenderKept(table, command.format));
+    PrintText(RenderKept(table, command.format));
   } else {
     WriteFileAtomically(command.out, RenderKept(table, command.format));
     Print("wrote {}\n", command.out.string());
@@ -189,7 +189,7 @@ int PrintMap(const MapCommand& command, const std::string& typed) {
   if (command.gate) RequireDemands(map, command.rules);
   Table table = MapTable(map);
   AppendProvenance(table, typed);
-  Print("{}", ToText(table, TerminalHasColour()));
+  PrintText(ToText(table, TerminalHasColour()));
   const int written = command.out.empty() ? 0 : WriteMap(map, command, typed);
   if (!command.gate) return written;
   const std::vector<std::string> broken = BrokenDemands(map);

@@ -101,7 +101,7 @@ int Main(int argc, char** argv) {
     // CLI11 reports a misspelt subcommand only as a missing one: name it
     std::string text = CLI::FailureMessage::simple(failed, error);
     for (const std::string& word : failed->remaining()) text += "unknown: " + word + "\n";
-    return text;
+    return EscapeTerminalLines(text);
   });
   std::vector<std::string> conditions, settings;
   ExperimentFiles files;
@@ -252,7 +252,7 @@ int Main(int argc, char** argv) {
     if (*map_app) return PrintMap(map, typed);
     return PrintVerdicts(verdict, typed);
   } catch (const std::exception& error) {
-    PrintError("{}\n", error.what());
+    PrintError("{}\n", Lines{error.what()});
     return 2;
   }
 }

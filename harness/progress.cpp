@@ -6,6 +6,12 @@
 
 namespace loopbench::harness {
 
+namespace {
+
+constexpr const char* kClear = "\r\033[K";  // the line that is there
+
+}  // namespace
+
 Progress::Progress(std::string what, std::size_t total)
     : what_(std::move(what)),
       total_(total),
@@ -13,7 +19,7 @@ Progress::Progress(std::string what, std::size_t total)
       begin_(std::chrono::steady_clock::now()) {}
 
 Progress::~Progress() {
-  if (terminal_) PrintError("\r\033[K");
+  if (terminal_) PrintErrorText(kClear);
 }
 
 void Progress::Step(const std::string& label) {
@@ -23,7 +29,8 @@ void Progress::Step(const std::string& label) {
   const std::chrono::duration<double> spent = std::chrono::steady_clock::now() - begin_;
   const double left =
       spent.count() * static_cast<double>(total_ - done_) / static_cast<double>(done_);
-  PrintError("\r\033[K{} {}/{}  {:.0f} s gone, about {:.0f} s to go  {}", what_, done_, total_,
+  PrintErrorText(kClear);
+  PrintError("{} {}/{}  {:.0f} s gone, about {:.0f} s to go  {}", what_, done_, total_,
              spent.count(), left, label);
 }
 

@@ -4,16 +4,9 @@
 
 #include <cstdint>
 
+#include "harness/report/escape.h"
+
 namespace loopbench::harness {
-namespace {
-
-std::string Joined(const std::vector<std::string>& lines, std::string_view separator) {
-  std::string text;
-  for (const std::string& line : lines) text += fmt::format("{}{}", separator, line);
-  return text;
-}
-
-}  // namespace
 
 Table VerdictTable(std::span<const ClaimResult> results) {
   Table table;
@@ -51,27 +44,20 @@ Table CheckTable(const ClaimResult& result) {
   return table;
 }
 
-std::string ClaimsText(std::span<const ClaimResult> results,
-                       const std::vector<std::string>& notes) {
-  std::string out;
-  for (const ClaimResult& result : results) {
-    out +=
-        fmt::format("{} (paper, {})\n  {}\n  verdict: {}\n\n{}\n", result.rule.id,
-                    result.rule.where, result.rule.claim, result.text, ToText(CheckTable(result)));
-  }
-  return out + Joined(notes, "\n") + (notes.empty() ? "" : "\n");
-}
-
 std::string ClaimsMarkdown(std::span<const ClaimResult> results,
                            const std::vector<std::string>& notes) {
   std::string out = fmt::format("# Verdicts\n\n{}", ToMarkdown(VerdictTable(results)));
   for (const ClaimResult& result : results) {
-    out += fmt::format("\n## {}\n\n{} (paper, {})\n\n**Verdict: {}**\n", result.rule.id,
-                       result.rule.claim, result.rule.where, result.text);
-    if (!result.rule.note.empty()) out += fmt::format("\n{}\n", result.rule.note);
+    out += fmt::format("\n## {}\n\n{} (paper, {})\n\n**Verdict: {}**\n",
+                       EscapeMarkdown(result.rule.id), EscapeMarkdownParagraph(result.rule.claim),
+                       EscapeMarkdown(result.rule.where), EscapeMarkdown(result.text));
+    if (!result.rule.note.empty()) {
+      out += fmt::format("\n{}\n", EscapeMarkdownParagraph(result.rule.note));
+    }
     out += fmt::format("\n{}", ToMarkdown(CheckTable(result)));
   }
-  return out + Joined(notes, "\n\n") + (notes.empty() ? "" : "\n");
+  for (const std::string& note : notes) out += "\n\n" + EscapeMarkdownParagraph(note);
+  return out + (notes.empty() ? "" : "\n");
 }
 
 }  // namespace loopbench::harness

@@ -16,10 +16,8 @@ Table VerdictTable(std::span<const ClaimResult> results);
 /// One row per check of a claim: condition, expected, measured, number of rows, result, reason.
 Table CheckTable(const ClaimResult& result);
 
-/// All verdicts for a terminal, `notes` (provenance, the command) at the end.
-std::string ClaimsText(std::span<const ClaimResult> results, const std::vector<std::string>& notes);
-
-/// The same as Markdown (results/paper/README.md).
+/// All verdicts as Markdown (results/paper/README.md), `notes` (provenance, the command) at the
+/// end.
 std::string ClaimsMarkdown(std::span<const ClaimResult> results,
                            const std::vector<std::string>& notes);
 

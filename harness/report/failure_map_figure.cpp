@@ -5,6 +5,8 @@
 #include <algorithm>
 #include <string_view>
 
+#include "harness/report/escape.h"
+
 namespace loopbench::harness {
 namespace {
 
@@ -128,7 +130,7 @@ class MapPainter {
     for (const std::string& line : lines) {
       commands_ +=
           fmt::format("set label {} at {:.1f},{:.1f} {} front tc rgb '{}' font ',{:.3g}'\n",
-                      GnuplotQuote(line), x, y, align, colour, size * point_);
+                      QuoteGnuplot(line), x, y, align, colour, size * point_);
       y += kLine;
     }
   }

@@ -5,6 +5,8 @@
 #include <cstdint>
 #include <functional>
 
+#include "harness/report/escape.h"
+
 namespace loopbench::harness {
 namespace {
 
@@ -198,10 +200,12 @@ Table MapCellTable(const FailureMap& map) {
 }
 
 std::string MapMarkdown(const FailureMap& map, const std::vector<std::string>& notes) {
-  std::string page = fmt::format("# {}\n\n", map.rules.title);
-  if (!map.rules.comment.empty()) page += map.rules.comment + "\n\n";
+  std::string page = fmt::format("# {}\n\n", EscapeMarkdown(map.rules.title));
+  if (!map.rules.comment.empty()) page += EscapeMarkdownParagraph(map.rules.comment) + "\n\n";
   page += CountCells(map) + ".\n\n";
-  for (const std::string& remark : map.remarks) page += "Note: " + remark + ".\n\n";
+  for (const std::string& remark : map.remarks) {
+    page += "Note: " + EscapeMarkdown(remark) + ".\n\n";
+  }
   for (std::size_t g = 0; g < map.cells.size(); ++g) {
     Table table;
     table.title = map.rules.groups[g].label;
@@ -213,7 +217,7 @@ std::string MapMarkdown(const FailureMap& map, const std::vector<std::string>& n
   page += ToMarkdown(LimitTable(map)) + "\n";
   Table details = DetailTable(map);
   if (!details.rows.empty()) page += ToMarkdown(details);
-  for (const std::string& note : notes) page += "\n" + note + "\n";
+  for (const std::string& note : notes) page += "\n" + EscapeMarkdownParagraph(note) + "\n";
   return page;
 }
 

@@ -10,6 +10,7 @@
 #include <string_view>
 #include <utility>
 
+#include "harness/report/escape.h"
 #include "harness/report/gnuplot.h"
 
 namespace loopbench::harness {
@@ -95,7 +96,7 @@ std::vector<std::string> Elements(const Figure& figure, const Curve& curve, std:
     look = fmt::format("{} pt {} ps {:.3g}", curve.line ? "linespoints" : "points",
                        kShapes[index % kShapes.size()], 0.3 * curve.style.width);
   }
-  const std::string title = curve.label.empty() ? "notitle" : "title " + GnuplotQuote(curve.label);
+  const std::string title = curve.label.empty() ? "notitle" : "title " + QuoteGnuplot(curve.label);
   if (points.empty()) return {fmt::format("NaN with {} {} {}", look, line, title)};
   std::vector<std::string> elements = {fmt::format("$c{} with {} {} {}", index, look, line, title)};
   const auto [x_last, y_last] = points.back();
@@ -154,7 +155,7 @@ std::string Ranges(const Figure& figure, const Extent& x, const Extent& y) {
                             static_cast<double>(figure.x_ticks.size()) + 0.5);
     for (std::size_t i = 0; i < figure.x_ticks.size(); ++i) {
       commands +=
-          fmt::format("{}{} {}", i == 0 ? "" : ", ", GnuplotQuote(figure.x_ticks[i]), i + 1);
+          fmt::format("{}{} {}", i == 0 ? "" : ", ", QuoteGnuplotTick(figure.x_ticks[i]), i + 1);
     }
     commands += ")\n";
   } else {
@@ -208,10 +209,10 @@ std::string GnuplotScript(const Figure& figure) {
       "set encoding utf8\nset title {}\nset xlabel {} offset 0,0.5\nset ylabel {}\n"
       "set grid lc rgb '#cccccc' lw 0.5\n"
       "set key bmargin center vertical maxrows {} Left reverse samplen 4 title {}\n",
-      GnuplotQuote(figure.title), GnuplotQuote(figure.x_label), GnuplotQuote(figure.y_label),
+      QuoteGnuplot(figure.title), QuoteGnuplot(figure.x_label), QuoteGnuplot(figure.y_label),
       LegendRows(figure),
-      figure.legend_title.empty() ? GnuplotQuote(" ")
-                                  : "\"\\n\"." + GnuplotQuote(figure.legend_title));
+      figure.legend_title.empty() ? QuoteGnuplot(" ")
+                                  : "\"\\n\"." + QuoteGnuplot(figure.legend_title));
   if (figure.log_x) script += "set logscale x\n";
   if (figure.log_y) {
     // powers of ten are read most easily as such, unless all are near one

@@ -1,56 +1,82 @@
 #include "harness/report/gnuplot.h"
 
 #include <fmt/format.h>
+#include <spawn.h>
+#include <sys/mman.h>
 #include <sys/wait.h>
+#include <unistd.h>
 
 #include <array>
-#include <cstdio>
-#include <cstdlib>
-#include <stdexcept>
+#include <cerrno>
+#include <cstring>
 
+#include "harness/report/escape.h"
 #include "harness/store/files.h"
 
 namespace loopbench::harness {
 namespace {
 
-struct ProgramResult {
-  int status = 0;
-  std::string output;
-};
-
-ProgramResult RunProgram(const std::string& command) {
-  ProgramResult result;
-  std::FILE* pipe = ::popen(command.c_str(), "r");
-  if (pipe == nullptr) return {-1, "no process could be started"};
-  std::array<char, 4096> buffer{};
-  for (std::size_t n = 0; (n = std::fread(buffer.data(), 1, buffer.size(), pipe)) > 0;) {
-    result.output.append(buffer.data(), n);
-  }
-  const int status = ::pclose(pipe);
-  result.status = WIFEXITED(status) ? WEXITSTATUS(status) : -1;
-  return result;
-}
-
-// A folder of its own in the system's temporary folder, removed at the end of the scope.
-class TemporaryFolder {
+// A file in memory: it has no name, and nothing of it is left however this process ends.
+class MemoryFile {
  public:
-  TemporaryFolder() {
-    std::string name = (std::filesystem::temp_directory_path() / "loopbench-XXXXXX").string();
-    if (::mkdtemp(name.data()) == nullptr) throw std::runtime_error("cannot make " + name);
-    path_ = name;
+  explicit MemoryFile(const char* what) {
+    descriptor_ = ::memfd_create(what, MFD_CLOEXEC);
+    if (descriptor_ < 0) FailOn("make in memory", what);
   }
-  ~TemporaryFolder() {
-    std::error_code ignored;
-    std::filesystem::remove_all(path_, ignored);
-  }
-  TemporaryFolder(const TemporaryFolder&) = delete;
-  TemporaryFolder& operator=(const TemporaryFolder&) = delete;
+  ~MemoryFile() { ::close(descriptor_); }
+  MemoryFile(const MemoryFile&) = delete;
+  MemoryFile& operator=(const MemoryFile&) = delete;
 
-  const std::filesystem::path& path() const { return path_; }
+  int descriptor() const { return descriptor_; }
+
+  std::string Text() const {
+    std::string text;
+    std::array<char, 1 << 16> buffer{};
+    for (off_t at = 0;;) {
+      const ssize_t n = ::pread(descriptor_, buffer.data(), buffer.size(), at);
+      if (n <= 0) return text;
+      text.append(buffer.data(), static_cast<std::size_t>(n));
+      at += n;
+    }
+  }
 
  private:
-  std::filesystem::path path_;
+  int descriptor_;
 };
+
+struct ProgramResult {
+  int status = 0;  ///< exit status, -1 after a signal
+  int error = 0;   ///< errno of a program that could not be started
+  std::string output, messages;
+};
+
+// `program` from PATH with these arguments, without a shell between.
+ProgramResult RunProgram(const std::string& program, const std::string& input) {
+  const MemoryFile in("input"), out("output"), messages("messages");
+  WriteAll(in.descriptor(), input, "input of " + program);
+  ::lseek(in.descriptor(), 0, SEEK_SET);
+  posix_spawn_file_actions_t streams;
+  ::posix_spawn_file_actions_init(&streams);
+  ::posix_spawn_file_actions_adddup2(&streams, in.descriptor(), STDIN_FILENO);
+  ::posix_spawn_file_actions_adddup2(&streams, out.descriptor(), STDOUT_FILENO);
+  ::posix_spawn_file_actions_adddup2(&streams, messages.descriptor(), STDERR_FILENO);
+  // without the settings of the user's own ~/.gnuplot, which would change figures
+  std::string name = program, plain = "--default-settings";
+  const std::array<char*, 3> arguments = {name.data(), plain.data(), nullptr};
+  pid_t child = 0;
+  ProgramResult result;
+  result.error =
+      ::posix_spawnp(&child, program.c_str(), &streams, nullptr, arguments.data(), environ);
+  ::posix_spawn_file_actions_destroy(&streams);
+  if (result.error != 0) return result;
+  int status = 0;
+  while (::waitpid(child, &status, 0) < 0 && errno == EINTR) {
+  }
+  result.status = WIFEXITED(status) ? WEXITSTATUS(status) : -1;
+  result.output = out.Text();
+  result.messages = messages.Text();
+  return result;
+}
 
 std::string TerminalOf(const GnuplotPage& page, bool pdf) {
   if (!pdf) {
@@ -63,33 +89,23 @@ std::string TerminalOf(const GnuplotPage& page, bool pdf) {
 
 }  // namespace
 
-std::string GnuplotQuote(std::string_view text) {
-  std::string quoted = "'";
-  for (const char c : text) {
-    if (c == '\'') quoted += '\'';
-    quoted += static_cast<unsigned char>(c) < ' ' ? ' ' : c;
-  }
-  return quoted + '\'';
-}
-
 std::optional<std::string> DrawWithGnuplot(const std::filesystem::path& path,
                                            const GnuplotPage& page, const std::string& script,
                                            const std::string& gnuplot) {
-  const TemporaryFolder folder;
-  const std::filesystem::path file = folder.path() / "figure.gp";
-  const std::filesystem::path drawing = folder.path() / "figure";
-  WriteFileAtomically(file, fmt::format("set terminal {}\nset output {}\n{}",
-                                        TerminalOf(page, path.extension() == ".pdf"),
-                                        GnuplotQuote(drawing.string()), script));
-  const ProgramResult run = RunProgram(fmt::format("{} '{}' 2>&1", gnuplot, file.string()));
-  constexpr int kNotFound = 127;
-  if (run.status == kNotFound) {
+  const ProgramResult run = RunProgram(
+      gnuplot,
+      fmt::format("set terminal {}\n{}", TerminalOf(page, path.extension() == ".pdf"), script));
+  if (run.error == ENOENT) {
     return fmt::format("{}: '{}' not found; install gnuplot-nox", path.string(), gnuplot);
   }
-  if (run.status != 0 || !std::filesystem::exists(drawing)) {
-    return fmt::format("{}: gnuplot failed: {}", path.string(), run.output);
+  if (run.error != 0) {
+    return fmt::format("{}: cannot start '{}': {}", path.string(), gnuplot,
+                       std::strerror(run.error));
   }
-  WriteFileAtomically(path, ReadFile(drawing));
+  if (run.status != 0 || run.output.empty()) {
+    return fmt::format("{}: gnuplot failed: {}", path.string(), run.messages);
+  }
+  WriteFileAtomically(path, run.output);
   return std::nullopt;
 }
 

@@ -4,13 +4,8 @@
 #include <filesystem>
 #include <optional>
 #include <string>
-#include <string_view>
 
 namespace loopbench::harness {
-
-/// A gnuplot string in single quotes: nothing is special inside but the quote itself. Control
-/// characters become spaces.
-std::string GnuplotQuote(std::string_view text);
 
 /// The size of a drawing in pixels (SVG) or hundredths of an inch (PDF) and of its font in pixels
 /// or points.
@@ -19,9 +14,11 @@ struct GnuplotPage {
   int font = 13;
 };
 
-/// Runs `script`, which sets neither terminal nor output, and writes `path`, as PDF when its
+/// Runs `script`, which sets neither terminal nor output and whose texts are QuoteGnuplot()'s, and
+/// writes `path`, as PDF when its
 /// extension is ".pdf", else as SVG. Returns nothing on success, else the reason: gnuplot missing
-/// (and the package that has it) or gnuplot's own message. The file is complete or absent.
+/// (and the package that has it) or gnuplot's own message. The file is complete or absent, and
+/// there are no others, even if this process is killed meanwhile. No shell takes part.
 [[nodiscard]] std::optional<std::string> DrawWithGnuplot(const std::filesystem::path& path,
                                                          const GnuplotPage& page,
                                                          const std::string& script,

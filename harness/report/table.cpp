@@ -7,6 +7,8 @@
 #include <cstdint>
 #include <string_view>
 
+#include "harness/report/escape.h"
+
 namespace loopbench::harness {
 namespace {
 
@@ -45,25 +47,6 @@ std::string FullPrecision(const Record& row, const std::string& key) {
     return "";
   }
   return row.Text(key);
-}
-
-std::string QuoteCsv(const std::string& text) {
-  if (text.find_first_of(",\"\r\n#") == std::string::npos) return text;
-  std::string quoted = "\"";
-  for (const char c : text) {
-    if (c == '"') quoted += '"';
-    quoted += c;
-  }
-  return quoted + '"';
-}
-
-std::string EscapeMarkdown(const std::string& text) {
-  std::string escaped;
-  for (const char c : text) {
-    if (c == '|') escaped += '\\';
-    escaped += c == '\n' ? ' ' : c;
-  }
-  return escaped;
 }
 
 // Characters, not bytes: UTF-8 continuation bytes are 10xxxxxx.
@@ -147,12 +130,13 @@ struct TextColumn {
       : column(shown), marked(std::ranges::any_of(rows, [&](const Record& row) {
           return shown.format != Format::kText && IsUnresolved(row, shown.key);
         })) {
-    width = Width(column.header);
+    width = Width(EscapeTerminal(column.header));
     for (const Record& row : rows) width = std::max(width, Width(CellOf(row)));
   }
 
   std::string CellOf(const Record& row) const {
-    return Cell(row, column) + (marked && !IsUnresolved(row, column.key) ? " " : "");
+    return EscapeTerminal(Cell(row, column)) +
+           (marked && !IsUnresolved(row, column.key) ? " " : "");
   }
 
   TableColumn column;
@@ -166,7 +150,7 @@ std::string RowsAsText(const Table& table, const std::vector<TextColumn>& column
   std::string rule;
   for (const TextColumn& shown : columns) {
     const std::string gap = &shown == columns.data() ? "" : "  ";
-    heading += gap + Pad(shown.column.header, shown.width, shown.column.format);
+    heading += gap + Pad(EscapeTerminal(shown.column.header), shown.width, shown.column.format);
     rule += gap + std::string(shown.width, '-');
   }
   std::string out;
@@ -192,45 +176,42 @@ std::string ToText(const Table& table, bool colour) {
   for (const TableColumn& column : ColumnsUnderHeading(table)) {
     columns.emplace_back(column, table.rows);
   }
-  std::string out = table.title.empty() ? "" : table.title + "\n\n";
+  std::string out = table.title.empty() ? "" : EscapeTerminal(table.title) + "\n\n";
   bool is_first = true;
   for (const RowGroup& group : Groups(table)) {
     if (!is_first) out += '\n';
     is_first = false;
-    if (!group.heading.empty()) out += group.heading + "\n\n";
+    if (!group.heading.empty()) out += EscapeTerminal(group.heading) + "\n\n";
     out += RowsAsText(table, columns, group.rows, colour);
   }
   if (!table.notes.empty()) out += '\n';
-  for (const std::string& note : table.notes) out += note + '\n';
+  for (const std::string& note : table.notes) out += EscapeTerminal(note) + '\n';
   return out;
 }
 
 std::string ToCsv(const Table& table) {
   std::string out;
-  const auto append = [&out](std::string_view separator, const std::string& text) {
-    out += separator;
-    out += QuoteCsv(text);
-  };
   for (std::size_t c = 0; c < table.columns.size(); ++c) {
-    append(c == 0 ? "" : ",", table.columns[c].key);
+    out += (c == 0 ? "" : ",") + EscapeCsv(table.columns[c].key);
   }
   out += '\n';
   for (const Record& row : table.rows) {
     for (std::size_t c = 0; c < table.columns.size(); ++c) {
-      append(c == 0 ? "" : ",", FullPrecision(row, table.columns[c].key));
+      const std::string& key = table.columns[c].key;
+      const Value* value = row.Find(key);
+      const bool is_text = value != nullptr && std::holds_alternative<std::string>(*value);
+      const std::string cell = FullPrecision(row, key);
+      out += (c == 0 ? "" : ",") + (is_text ? EscapeCsv(cell) : cell);
     }
     out += '\n';
   }
-  for (const std::string& note : table.notes) {
-    std::string line = note;
-    std::ranges::replace(line, '\n', ' ');
-    out += "# " + line + '\n';
-  }
+  for (const std::string& note : table.notes) out += "# " + EscapeTerminal(note) + '\n';
   return out;
 }
 
 std::string ToMarkdown(const Table& table) {
-  std::string out = table.title.empty() ? "" : fmt::format("## {}\n\n", table.title);
+  std::string out =
+      table.title.empty() ? "" : fmt::format("## {}\n\n", EscapeMarkdown(table.title));
   const std::vector<TableColumn> columns = ColumnsUnderHeading(table);
   std::string head = "|";
   std::string rule = "|";
@@ -254,7 +235,9 @@ std::string ToMarkdown(const Table& table) {
     }
   }
   // Each note is its own paragraph; a list would be read as part of the table by some renderers.
-  for (const std::string& note : table.notes) out += fmt::format("\n{}\n", note);
+  for (const std::string& note : table.notes) {
+    out += fmt::format("\n{}\n", EscapeMarkdownParagraph(note));
+  }
   return out;
 }
 

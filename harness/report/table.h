@@ -1,4 +1,5 @@
-// One table, five writers: terminal text, CSV, Markdown, JSON and LaTeX.
+// One table, five writers: terminal text, CSV, Markdown, JSON and LaTeX. Each passes texts through
+// the function of its medium in harness/report/escape.h.
 #pragma once
 
 #include <span>
@@ -82,7 +83,7 @@ std::string ToText(const Table& table, bool colour = false);
 /// quoted.
 std::string ToCsv(const Table& table);
 
-/// A Markdown table with title and notes; '|' in cells is escaped.
+/// A Markdown table with title and notes.
 std::string ToMarkdown(const Table& table);
 
 /// A JSON array of row objects (pandas.read_json, jq '.[]'): every digit, null for what was not
@@ -91,7 +92,7 @@ std::string ToMarkdown(const Table& table);
 std::string ToJson(const Table& table);
 
 /// A LaTeX table (booktabs; no other package): a tabular per group, numbers in math mode, 2.05e-03
-/// as 2.05 x 10^-3, all special characters escaped, notes as comments at the end.
+/// as 2.05 x 10^-3, notes as comments at the end.
 std::string ToLatex(const Table& table);
 
 /// The format's name ("text", "csv", "markdown", "json" or "latex") chooses the writer.

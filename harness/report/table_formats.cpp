@@ -6,6 +6,7 @@
 #include <string_view>
 
 #include "harness/report/columns.h"
+#include "harness/report/escape.h"
 #include "harness/report/table.h"
 #include "harness/store/record_json.h"
 
@@ -20,48 +21,6 @@ std::vector<TableColumn> FlatColumns(const Table& table) {
     columns.insert(columns.begin(), ColumnOf(table.group, table.rows));
   }
   return columns;
-}
-
-std::string EscapeLatex(std::string_view text) {
-  std::string escaped;
-  for (const char c : text) {
-    switch (c) {
-      case '\\':
-        escaped += "\\textbackslash{}";
-        break;
-      case '~':
-        escaped += "\\textasciitilde{}";
-        break;
-      case '^':
-        escaped += "\\textasciicircum{}";
-        break;
-      case '<':
-        escaped += "\\textless{}";  // not every font encoding has these three
-        break;
-      case '>':
-        escaped += "\\textgreater{}";
-        break;
-      case '|':
-        escaped += "\\textbar{}";
-        break;
-      case '&':
-      case '%':
-      case '$':
-      case '#':
-      case '_':
-      case '{':
-      case '}':
-        escaped += '\\';
-        escaped += c;
-        break;
-      case '\n':
-        escaped += ' ';
-        break;
-      default:
-        escaped += c;
-    }
-  }
-  return escaped;
 }
 
 // "2.05e-03" as $2.05 \times 10^{-3}$, "113.2" as $113.2$; a text stays a text.
@@ -113,7 +72,7 @@ std::string ToLatex(const Table& table) {
     head.push_back(EscapeLatex(column.header));
   }
   std::string out = "% needs \\usepackage{booktabs}\n";
-  if (!table.title.empty()) out += fmt::format("% {}\n", EscapeLatex(table.title));
+  if (!table.title.empty()) out += fmt::format("% {}\n", EscapeTerminal(table.title));
   for (const RowGroup& group : Groups(table)) {
     if (!group.heading.empty()) {
       out += fmt::format("\n\\paragraph{{{}}}\n\n", EscapeLatex(group.heading));
@@ -127,10 +86,7 @@ std::string ToLatex(const Table& table) {
     }
     out += "\\bottomrule\n\\end{tabular}\n";
   }
-  for (std::string note : table.notes) {
-    std::ranges::replace(note, '\n', ' ');  // a second line would be no comment
-    out += fmt::format("% {}\n", note);
-  }
+  for (const std::string& note : table.notes) out += fmt::format("% {}\n", EscapeTerminal(note));
   return out;
 }
 

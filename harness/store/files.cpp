@@ -29,9 +29,18 @@ void FailOn(std::string_view verb, const std::filesystem::path& path) {
       fmt::format("cannot {} '{}': {}", verb, path.string(), std::strerror(errno)));
 }
 
-void WriteFileAtomically(const std::filesystem::path& path, std::string_view text) {
+void MakeFolderOf(const std::filesystem::path& path) {
+  if (!path.has_parent_path()) return;
   std::error_code error;
-  if (path.has_parent_path()) std::filesystem::create_directories(path.parent_path(), error);
+  std::filesystem::create_directories(path.parent_path(), error);
+  if (!error) return;
+  throw std::runtime_error(
+      fmt::format("cannot make folder '{}': {}", path.parent_path().string(), error.message()));
+}
+
+void WriteFileAtomically(const std::filesystem::path& path, std::string_view text) {
+  MakeFolderOf(path);
+  std::error_code error;
   const std::filesystem::path temporary = TemporaryBeside(path);
   constexpr int kMode = 0644;
   const int descriptor = ::open(temporary.c_str(), O_WRONLY | O_CREAT | O_TRUNC | O_CLOEXEC, kMode);

@@ -13,6 +13,10 @@ namespace loopbench::harness {
 /// names the path and the system's reason.
 void WriteFileAtomically(const std::filesystem::path& path, std::string_view text);
 
+/// Makes the folder that `path` is in, with all above it. Throws std::runtime_error that names the
+/// folder and the system's reason.
+void MakeFolderOf(const std::filesystem::path& path);
+
 /// Throws std::runtime_error: "cannot VERB 'PATH': " and what errno says.
 [[noreturn]] void FailOn(std::string_view verb, const std::filesystem::path& path);
 

@@ -67,8 +67,7 @@ void MendLastLine(const std::filesystem::path& file, int descriptor) {
 }  // namespace
 
 ResultStore::ResultStore(const std::filesystem::path& path) : file_(FileOf(path)) {
-  std::error_code error;
-  if (file_.has_parent_path()) std::filesystem::create_directories(file_.parent_path(), error);
+  MakeFolderOf(file_);
   lock_ = Lock(file_);
   constexpr int kMode = 0644;
   descriptor_ = ::open(file_.c_str(), O_WRONLY | O_APPEND | O_CREAT | O_CLOEXEC, kMode);

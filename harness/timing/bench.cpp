@@ -281,7 +281,7 @@ void RequireSeconds(const std::vector<char*>& arguments, const std::string& name
 int Measured(int argc, char** argv) {
   std::vector<char*> arguments(argv, argv + argc);
   if (TakeFlag(arguments, "--help") || TakeFlag(arguments, "-h")) {
-    Print("{}", kHelp);
+    PrintText(kHelp);
     return 0;
   }
   const std::string file = TakeOption(arguments, "--families")
@@ -336,7 +336,7 @@ int Main(int argc, char** argv) {
     CheckAllocationsAreCounted();
     return Measured(argc, argv);
   } catch (const std::exception& error) {
-    PrintError("{}\n", error.what());
+    PrintError("{}\n", Lines{error.what()});
     return 2;
   }
 }

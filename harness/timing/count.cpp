@@ -136,7 +136,7 @@ int Main(int argc, char** argv) {
   try {
     return Count(options);
   } catch (const std::exception& error) {
-    PrintError("{}\n", error.what());
+    PrintError("{}\n", Lines{error.what()});
     return 2;
   }
 }

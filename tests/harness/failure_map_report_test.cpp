@@ -92,8 +92,9 @@ TEST(FailureMapReport, RemarksOnKeysThatNoRecordHas) {
 TEST(FailureMapFigure, SaysEveryClassInWordsAndIsDrawn) {
   const FailureMap map = SmallMap(SmallRecords());
   const MapDrawing drawing = DrawMap(map, 1.0);
-  for (const char* word : {"'holds'", "'branch 2.5e-07 rad'", "'inaccurate'", "'not measured'",
-                           "'not applicable'", "'O-DCA'", "'one, \"1e-8\"'", "'Two methods'"}) {
+  for (const char* word :
+       {"\"holds\"", "\"branch 2.5e-07 rad\"", "\"inaccurate\"", "\"not measured\"",
+        "\"not applicable\"", "\"O-DCA\"", "\"one, \\0421e-8\\042\"", "\"Two methods\""}) {
     EXPECT_TRUE(Contains(drawing.script, word));
   }
   const auto path = std::filesystem::path(testing::TempDir()) / "loopbench-failure-map.svg";

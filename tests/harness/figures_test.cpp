@@ -101,7 +101,7 @@ TEST_F(FiguresTest, LabelsAreNeitherGnuplotCodeNorMarkup) {
   figure.title = "it's <b> & `id` \"x\" q_{1} \n\\n $t @a \xc3\xa9";
   const std::string svg = Draw(figure);
   EXPECT_TRUE(Contains(svg, "it's &lt;b> &amp; `id` "));
-  EXPECT_TRUE(Contains(svg, "q_{1}  \\n $t @a \xc3\xa9"));
+  EXPECT_TRUE(Contains(svg, "q_{1} \\n\\n $t @a \xc3\xa9"));
 }
 
 TEST_F(FiguresTest, ValuesThatALogarithmicAxisCannotShowAreSkipped) {

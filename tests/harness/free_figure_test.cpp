@@ -126,7 +126,8 @@ TEST(FreeFigure, TextsOnTheHorizontalAxisAreNamedTicks) {
   EXPECT_EQ(figure.curves[0].label, "1e-10");
   EXPECT_EQ(figure.curves[0].x, (std::vector<double>{2}));
   EXPECT_FALSE(figure.log_x);
-  EXPECT_NE(GnuplotScript(figure).find("set xtics ('lagrange' 1, 'odca' 2)"), std::string::npos);
+  EXPECT_NE(GnuplotScript(figure).find("set xtics (\"lagrange\" 1, \"odca\" 2)"),
+            std::string::npos);
 }
 
 TEST(FreeFigure, TwoSeriesGiveACurvePerRecordAndALabelPerGroup) {

@@ -88,7 +88,7 @@ TEST(Table, CsvCellsThatLookLikeNotesAreQuoted) {
   table.rows[0].Set("mechanism", std::string("#1"));
   EXPECT_NE(ToCsv(table).find("\n\"#1\",finished"), std::string::npos);
   table.notes = {"two\nlines"};
-  EXPECT_TRUE(ToCsv(table).ends_with("# two lines\n"));
+  EXPECT_TRUE(ToCsv(table).ends_with("# two\\nlines\n"));
 }
 
 TEST(Table, ColourMarksTheOutcomesOfFailedRunsOnlyAndTakesNoPlace) {
@@ -138,7 +138,7 @@ TEST(Table, LatexIsBooktabsWithEscapesAndMathematicalNumbers) {
             "\\textbackslash{} \\$ & singular & $1.00 \\times 10^{-6}$ & $-0.50$ &  \\\\\n"
             "\\bottomrule\n"
             "\\end{tabular}\n"
-            "% flags 100 % \\end{tabular}\n");
+            "% flags 100 %\\n\\end{tabular}\n");
 }
 
 TEST(Table, GroupsAreTablesUnderHeadingsAndColumnsInListsForMachines) {

@@ -1,0 +1,48 @@
+// Names and other texts of users on their way into a terminal, a figure, a table or a file's name.
+//
+// Texts come from files that may have been written by anybody. Every writer passes them through the
+// function of its medium, so that what is drawn or printed is the text and never an instruction.
+// JSON is the exception: its writer (harness/store/record_json.h) keeps every character.
+#pragma once
+
+#include <string>
+#include <string_view>
+
+namespace loopbench::harness {
+
+/// The text with every character shown that would else act: control characters (also U+0080 to
+/// U+009F), marks of writing direction, line separators and bytes that are no UTF-8 become "\n",
+/// "\t", "\x1b" or "\u202e". One line, the same for the same text. Terminals, and the first step of
+/// all below.
+std::string EscapeTerminal(std::string_view text);
+
+/// The same for text of several lines: line ends stay.
+std::string EscapeTerminalLines(std::string_view text);
+
+/// Text within a line or cell of Markdown (GitHub's): no markup, HTML, link or formula begins in
+/// it. Characters that cannot begin any stay as they are, as in drift_position_max or "a <= b".
+std::string EscapeMarkdown(std::string_view text);
+
+/// A paragraph of its own, whose first characters must not make it a heading, list or quotation.
+std::string EscapeMarkdownParagraph(std::string_view text);
+
+/// Text of LaTeX, as a cell or in a comment: all special characters escaped.
+std::string EscapeLatex(std::string_view text);
+
+/// A field of CSV, quoted where RFC 4180 (or a reader that takes "#" for a comment) needs it. A
+/// text that a spreadsheet would take for a formula (it begins with =, +, - or @ and is no number)
+/// gets an apostrophe before it, which spreadsheets hide; JSON has such texts as they are.
+std::string EscapeCsv(std::string_view text);
+
+/// A string of gnuplot with its quotation marks; no character of it is special.
+std::string QuoteGnuplot(std::string_view text);
+
+/// The same for the label of a tick, which gnuplot would take for a format.
+std::string QuoteGnuplotTick(std::string_view text);
+
+/// The name of a file, without extension, for a thing called `name`: letters, digits, '.', '_',
+/// '+' and '-', at most 200 of them, not beginning with '.' or '-'. A name that is not one already
+/// becomes a slug with a hash of the whole name, so that two names never share a file.
+std::string FileName(std::string_view name);
+
+}  // namespace loopbench::harness

@@ -1,0 +1,118 @@
+// Names in files stay names: of files within the folder asked for, and of nothing on a terminal.
+#include <unistd.h>
+
+#include <algorithm>
+
+#include "tests/harness/cli_fixture.h"
+
+namespace loopbench::harness {
+namespace {
+
+constexpr const char* kRun = "run tiny.json --out out ";
+
+class Names : public CommandLineTest {
+ protected:
+  // All files under the folder of the test, by their paths.
+  std::vector<std::string> Files(const std::string& ending) const {
+    std::vector<std::string> files;
+    for (const auto& entry : fs::recursive_directory_iterator(folder_)) {
+      const std::string path = entry.path().lexically_relative(folder_).string();
+      if (path.ends_with(ending)) files.push_back(path);
+    }
+    return files;
+  }
+};
+
+TEST_F(Names, OfExperimentsDoNotLeaveTheFolderOfRuns) {
+  fs::create_directories(folder_ / "deep/er");
+  for (const std::string name : {"../../../escaped", "/tmp/loopbench-absolute", ".."}) {
+    ExpectEnding(
+        Call("run ../../tiny.json --filter formulation=odca --set /name=" + name, "cd deep/er &&"),
+        0, {"results in results/runs/"});
+  }
+  const std::vector<std::string> stores = Files("results.jsonl");
+  EXPECT_EQ(stores.size(), 3u);
+  for (const std::string& store : stores) {
+    EXPECT_TRUE(store.starts_with("deep/er/results/runs/")) << store;
+  }
+  EXPECT_FALSE(fs::exists("/tmp/loopbench-absolute"));
+}
+
+TEST_F(Names, OfMechanismsDoNotLeaveTheFolderOfFigures) {
+  ExpectEnding(Call(std::string(kRun) + "--set /scenes/0/name=a/../../../outside"), 0, {});
+  ExpectEnding(Call("plot out --out a/b/figures"), 0, {"wrote 2 figures"});
+  const std::vector<std::string> figures = Files(".svg");
+  EXPECT_EQ(figures.size(), 2u);
+  for (const std::string& figure : figures) EXPECT_TRUE(figure.starts_with("a/b/figures/"));
+  // keys of records are names, too
+  ExpectEnding(Call("run tiny.json --out keys --set '/scenes/0/mechanism/joints/3/name=../../x'"),
+               0, {});
+  ExpectEnding(Call("plot keys --out a/b/free --x series.t --y series.angle.../../x"), 0,
+               {"wrote a/b/free/series.angle.-..-x-over-series.t-"});
+}
+
+TEST_F(Names, WithAnythingInThemAreOnlyShown) {
+  EditMechanism("\"name\": \"four-bar\"",
+                R"("name": "\u001b]0;t\u0007\u001b[31mred\u0000nul\n<img src=x>''=1|a")");
+  Write("tiny.json", std::string(kExperiment)
+                         .replace(std::string(kExperiment).find("tiny"), 4,
+                                  R"(\u001b[2J'' `touch pwned` $(touch pwned))"));
+  for (const std::string call :
+       {"list tiny.json", "check tiny.json four-bar.json", "explain tiny.json",
+        "explain four-bar.json", "plan tiny.json", "run tiny.json --out out", "table out",
+        "table out --format csv", "table out --format markdown", "table out --format latex",
+        "table out --format json", "plot out --out figures", "run tiny.json",
+        "table out --where mechanism=none", "compare out out", "export out --format bmf"}) {
+    const Ending ending = Call(call);
+    EXPECT_EQ(ending.code, call.find("none") != std::string::npos ? 2 : 0) << call << ending.text;
+    const auto acts = [](char c) { return (c >= 0 && c < ' ' && c != '\n') || c == 0x7f; };
+    EXPECT_TRUE(std::ranges::none_of(ending.text, acts)) << call << "\n" << ending.text;
+    EXPECT_EQ(ending.text.find("\n<img"), std::string::npos) << call << "\n" << ending.text;
+  }
+  EXPECT_EQ(ReadFile(folder_ / "out/drift.md").find("<img"), std::string::npos);
+  EXPECT_TRUE(Files("pwned").empty());
+  EXPECT_EQ(Files(".svg").size(), 2u);
+}
+
+TEST_F(Names, OfTheTemporaryFolderAreNoCommands) {
+  ExpectEnding(Call(kRun), 0, {});
+  fs::create_directories(folder_ / "t$(touch pwned)'");
+  ExpectEnding(Call("plot out --out figures", "TMPDIR=\"$PWD/\"'t$(touch pwned)'\"'\""), 0,
+               {"wrote 2 figures"});
+  EXPECT_TRUE(Files("pwned").empty());
+}
+
+TEST_F(Names, TitlesMayHaveApostrophes) {
+  ExpectEnding(Call(kRun), 0, {});
+  ExpectEnding(Call("plot out --out t.svg --x drift_position_max --y energy_error_max --title "
+                    "\"'a''b'\""),
+               0, {"wrote t.svg"});
+  EXPECT_NE(ReadFile(folder_ / "t.svg").find("<text>'a''b'</text>"), std::string::npos);
+}
+
+TEST_F(Names, OfTemporaryFilesAreNoneEvenWhenGnuplotKillsThePlot) {
+  ExpectEnding(Call(kRun), 0, {});
+  Write("bin/gnuplot", "#!/bin/sh\nkill -9 $PPID\n");
+  fs::permissions(folder_ / "bin/gnuplot", fs::perms::owner_all);
+  fs::create_directories(folder_ / "tmp");
+  EXPECT_NE(Call("plot out --out figures", "TMPDIR=\"$PWD/tmp\" PATH=\"$PWD/bin:$PATH\"").code, 0);
+  EXPECT_TRUE(fs::is_empty(folder_ / "tmp"));
+  EXPECT_TRUE(Files(".svg").empty());
+}
+
+TEST_F(Names, OfFoldersThatCannotBeMadeAreInTheMessage) {
+  ExpectEnding(Call(kRun), 0, {});
+  fs::create_symlink("nowhere", folder_ / "dangling");  // cannot be made, even by root
+  ExpectEnding(Call("plot out --out dangling/figures"), 2,
+               {"cannot make folder 'dangling/figures'"});
+  ExpectEnding(Call("run tiny.json --out dangling/store"), 2,
+               {"cannot make folder 'dangling/store'"});
+  if (::geteuid() == 0) return;  // may write everywhere
+  fs::create_directories(folder_ / "kept");
+  fs::permissions(folder_ / "kept", fs::perms::owner_read | fs::perms::owner_exec);
+  ExpectEnding(Call("table out --out kept/a/t.csv --format csv"), 2,
+               {"cannot make folder 'kept/a': Permission denied"});
+}
+
+}  // namespace
+}  // namespace loopbench::harness

@@ -42,18 +42,20 @@ std::string RenderKept(Table table, const std::string& format) {
   return Render(table, format);
 }
 
+/// Those that can be drawn; the reasons of the others are printed, and the exit code is 2.
 int DrawAll(const std::vector<NamedFigure>& figures, const PlotCommand& command) {
   const std::string extension = command.format.empty() ? "svg" : command.format;
+  std::size_t written = 0;
   for (const NamedFigure& figure : figures) {
     const auto path = command.out / (FileName(figure.name) + "." + extension);
-    if (const auto error = WriteFigure(path, figure.figure)) {
-      PrintError("{}\n", Lines{*error});
-      return 2;
-    }
+    const auto error = WriteFigure(path, figure.figure);
+    if (error) PrintError("{}\n", Lines{*error});
+    written += error ? 0 : 1;
   }
-  Print("wrote {} figure{} to {}\n", figures.size(), figures.size() == 1 ? "" : "s",
-        command.out.string());
-  return 0;
+  const bool all = written == figures.size();
+  Print("wrote {}{} figure{} to {}\n", written, all ? "" : fmt::format(" of {}", figures.size()),
+        figures.size() == 1 ? "" : "s", command.out.string());
+  return all ? 0 : 2;
 }
 
 /// --out is a file when it ends like a figure, else a folder.

@@ -59,7 +59,7 @@ class Runner {
         singularity_(description, mechanism_),
         energy_(experiment.series_points, mechanism_.has_power()),
         exact_(scene_, mechanism_),
-        angles_(experiment.series_points),
+        coordinates_(experiment.series_points),
         with_series_(with_series) {}
 
   Run Execute() {
@@ -79,7 +79,7 @@ class Runner {
       condition_.Write(run.record);
       singularity_.Write(run.record);
       exact_.Write(run.record);
-      if (with_series_) angles_.Write(run.record);
+      if (with_series_) coordinates_.Write(run.record);
       correction_.Write(run.record);
       run.record.Set("state_hash", StateHash(y_));
     }
@@ -147,7 +147,7 @@ class Runner {
     condition_.Observe(sample);
     singularity_.Observe(sample);
     exact_.Observe(sample);
-    if (with_series_) angles_.Observe(sample);
+    if (with_series_) coordinates_.Observe(sample);
   }
 
   const Case& case_;
@@ -160,7 +160,7 @@ class Runner {
   CorrectionObserver<Space> correction_;
   ConditionObserver<Space> condition_;
   ExactObserver<Space> exact_;
-  AngleObserver<Space> angles_;
+  CoordinateObserver<Space> coordinates_;
   bool with_series_;
   std::vector<double> y_;
 };

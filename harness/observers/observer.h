@@ -3,7 +3,9 @@
 // saw nothing writes nothing: an empty cell is not a zero.
 #pragma once
 
+#include <cstdint>
 #include <memory>
+#include <string>
 #include <vector>
 
 #include "harness/config/scene.h"
@@ -33,8 +35,9 @@ struct TimeSeries {
   std::vector<double> t, value;
 };
 
-/// Every k-th sample, k chosen so that at most `points` remain, always with the last one.
-TimeSeries Thin(const TimeSeries& series, int points);
+/// Of the first `samples` (all, unless said) every k-th, k chosen so that at most `points` >= 2
+/// remain, always with the last one.
+TimeSeries Thin(const TimeSeries& series, int points, std::size_t samples = SIZE_MAX);
 
 /// Drift at position, velocity and acceleration level.
 ///
@@ -167,16 +170,27 @@ class ExactObserver final : public Observer<Space> {
 };
 
 /// Joint coordinates against time, of mechanisms with few of them: a series is for a figure.
+/// "series.angle.JOINT" [rad] and "series.displacement.JOINT" [m] against "series.t", from the
+/// start to the end of the run. Where so few points do not show the motion (a straight line between
+/// two of them misses a sample by more than 1 % of all angles or displacements), the same number of
+/// points of its first half, quarter, ... that they do show: "series.opening.angle.JOINT" and so on
+/// against "series.opening_t".
 template <class Space>
-class AngleObserver final : public Observer<Space> {
+class CoordinateObserver final : public Observer<Space> {
  public:
-  explicit AngleObserver(int points) : points_(points) {}
+  explicit CoordinateObserver(int points) : points_(points) {}
   void Observe(const Sample<Space>& sample) override;
   void Write(Record& record) const override;
 
  private:
+  /// Whether the points kept of the first `samples` show them, on an axis for all of the group.
+  bool Shows(const std::vector<std::size_t>& group, std::size_t samples) const;
+  void WriteOpening(std::size_t samples, const std::string& prefix, const std::string& time,
+                    Record& record) const;
+
   int points_;
-  std::vector<std::string> names_;
+  std::vector<std::string> keys_;             ///< "angle.crank", as their series
+  std::vector<std::size_t> angles_, shifts_;  ///< which series are
   std::vector<TimeSeries> series_;
 };
 

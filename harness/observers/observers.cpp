@@ -1,18 +1,42 @@
 #include <algorithm>
 #include <cmath>
+#include <limits>
 #include <numbers>
 
 #include "harness/observers/observer.h"
 
 namespace loopbench::harness {
 
-TimeSeries Thin(const TimeSeries& series, int points) {
-  const std::size_t n = series.t.size();
-  if (n <= static_cast<std::size_t>(points)) return series;
+namespace {
+
+// Which of `n` samples stay: evenly spaced, always with the last one.
+std::vector<std::size_t> Kept(std::size_t n, int points) {
+  const std::size_t count = std::min(n, static_cast<std::size_t>(points));
+  std::vector<std::size_t> kept(count);
+  for (std::size_t i = 0; i < count; ++i) kept[i] = count == n ? i : i * (n - 1) / (count - 1);
+  return kept;
+}
+
+// The largest distance of the first `samples` from the line through those that Thin() keeps.
+double LargestGap(const TimeSeries& series, int points, std::size_t samples) {
+  const std::vector<std::size_t> kept = Kept(samples, points);
+  double gap = 0.0;
+  for (std::size_t i = 1; i < kept.size(); ++i) {
+    const std::size_t a = kept[i - 1], b = kept[i];
+    const double slope = (series.value[b] - series.value[a]) / (series.t[b] - series.t[a]);
+    for (std::size_t k = a + 1; k < b; ++k) {
+      const double line = series.value[a] + slope * (series.t[k] - series.t[a]);
+      gap = std::max(gap, std::abs(series.value[k] - line));
+    }
+  }
+  return gap;
+}
+
+}  // namespace
+
+TimeSeries Thin(const TimeSeries& series, int points, std::size_t samples) {
   TimeSeries thin;
-  for (int i = 0; i < points; ++i) {
-    // evenly spaced in samples; the last one is always the run's end
-    const std::size_t k = i * (n - 1) / static_cast<std::size_t>(points - 1);
+  for (const std::size_t k : Kept(std::min(samples, series.t.size()), points)) {
     thin.t.push_back(series.t[k]);
     thin.value.push_back(series.value[k]);
   }
@@ -191,7 +215,7 @@ void ExactObserver<Space>::Write(Record& record) const {
 }
 
 template <class Space>
-void AngleObserver<Space>::Observe(const Sample<Space>& sample) {
+void CoordinateObserver<Space>::Observe(const Sample<Space>& sample) {
   const Kinematics<Space, double>& kinematics = sample.formulation.kinematics();
   const auto& joints = kinematics.mechanism().joints();
   constexpr std::size_t kMostJoints = 1000;
@@ -201,7 +225,11 @@ void AngleObserver<Space>::Observe(const Sample<Space>& sample) {
   for (int j = 0; j < static_cast<int>(joints.size()); ++j) {
     if (joints[j].description < 0 || joints[j].kind->num_u != 1) continue;
     if (first) {
-      names_.push_back(kinematics.mechanism().joint_names()[j]);
+      // motions have their rotations first; a helix is told by its angle
+      const bool shifts = joints[j].kind->axes[0] >= Space::kRot;
+      keys_.push_back((shifts ? "displacement." : "angle.") +
+                      kinematics.mechanism().joint_names()[j]);
+      (shifts ? shifts_ : angles_).push_back(s);
       series_.emplace_back();
     }
     series_[s].t.push_back(sample.t);
@@ -211,12 +239,41 @@ void AngleObserver<Space>::Observe(const Sample<Space>& sample) {
 }
 
 template <class Space>
-void AngleObserver<Space>::Write(Record& record) const {
+void CoordinateObserver<Space>::WriteOpening(std::size_t samples, const std::string& prefix,
+                                             const std::string& time, Record& record) const {
   for (std::size_t s = 0; s < series_.size(); ++s) {
-    const TimeSeries thin = Thin(series_[s], points_);
-    if (s == 0) record.Set("series.t", thin.t);
-    record.Set("series.angle." + names_[s], thin.value);
+    const TimeSeries thin = Thin(series_[s], points_, samples);
+    if (s == 0) record.Set(time, thin.t);
+    record.Set(prefix + keys_[s], thin.value);
   }
+}
+
+template <class Space>
+bool CoordinateObserver<Space>::Shows(const std::vector<std::size_t>& group,
+                                      std::size_t samples) const {
+  if (samples <= static_cast<std::size_t>(points_)) return true;
+  // a hundredth of the axis is four pixels of a figure
+  constexpr double kVisible = 0.01;
+  double low = std::numeric_limits<double>::infinity(), high = -low;
+  for (const std::size_t s : group) {
+    for (std::size_t i = 0; i < samples; ++i) {
+      low = std::min(low, series_[s].value[i]);
+      high = std::max(high, series_[s].value[i]);
+    }
+  }
+  return std::ranges::all_of(group, [&](std::size_t s) {
+    return LargestGap(series_[s], points_, samples) <= kVisible * (high - low);
+  });
+}
+
+template <class Space>
+void CoordinateObserver<Space>::Write(Record& record) const {
+  if (series_.empty()) return;
+  const std::size_t all = series_[0].t.size();
+  WriteOpening(all, "series.", "series.t", record);
+  std::size_t shown = all;
+  while (!Shows(angles_, shown) || !Shows(shifts_, shown)) shown /= 2;
+  if (shown < all) WriteOpening(shown, "series.opening.", "series.opening_t", record);
 }
 
 #define LOOPBENCH_INSTANTIATE(Space)        \
@@ -224,7 +281,7 @@ void AngleObserver<Space>::Write(Record& record) const {
   template class CorrectionObserver<Space>; \
   template class ConditionObserver<Space>;  \
   template class ExactObserver<Space>;      \
-  template class AngleObserver<Space>;
+  template class CoordinateObserver<Space>;
 LOOPBENCH_INSTANTIATE(Planar)
 LOOPBENCH_INSTANTIATE(Spatial)
 #undef LOOPBENCH_INSTANTIATE

@@ -60,7 +60,13 @@ void InsertBeforeOutcome(std::vector<TableColumn>* columns, TableColumn column) 
 
 TableColumn ColumnOf(const std::string& key, std::span<const Record> rows) {
   if (const TableColumn* known = KnownColumn(key)) return *known;
-  if (key.starts_with("series.angle.")) return NewColumn(key, "angle [rad]", kSeconds);
+  for (const std::string prefix : {"series.", "series.opening."}) {
+    if (key.starts_with(prefix + "angle.")) return NewColumn(key, "angle [rad]", kSeconds);
+    if (key.starts_with(prefix + "displacement.")) {
+      return NewColumn(key, "displacement [m]", kSeconds);
+    }
+  }
+  if (key == "series.opening_t") return NewColumn(key, "time [s]", kSeconds);
   if (key.starts_with("drift.loop.")) {
     return NewColumn(key, key.substr(11) + " [m]", kScientific);
   }

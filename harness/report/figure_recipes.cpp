@@ -15,23 +15,31 @@
 namespace loopbench::harness {
 namespace {
 
-constexpr std::string_view kAnglePrefix = "series.angle.";
-
-// Formulation and level share a colour family: the level of the paper in the strong colour.
+// Formulation by hue, coordinates by its strength.
 std::string ColorOf(const Record& record) {
-  const bool velocity = record.Text("enforcement") == "velocity";
+  const bool absolute = record.Text("coordinates") == "absolute";
   const std::string formulation = record.Text("formulation");
-  if (formulation == "odca") return velocity ? "#56B4E9" : "#0072B2";
-  if (formulation == "lagrange") return velocity ? "#E69F00" : "#D55E00";
-  if (formulation == "reduction") return velocity ? "#009E73" : "#999933";
+  if (formulation == "odca") return absolute ? "#56B4E9" : "#0072B2";
+  if (formulation == "lagrange") return absolute ? "#E69F00" : "#D55E00";
+  if (formulation == "reduction") return absolute ? "#999933" : "#009E73";
   return "#000000";
 }
 
+Shape ShapeOf(const Record& record) {
+  const std::string level = record.Text("enforcement");
+  if (level == "velocity") return Shape::kTriangle;
+  if (level == "position") return Shape::kSquare;
+  return level == "baumgarte" ? Shape::kDiamond : Shape::kCircle;
+}
+
+bool IsDoubtful(const Record& record) { return !record.Text("doubts").empty(); }
+
 CurveStyle StyleOf(const Record& record) {
-  const int absolute = record.Text("coordinates") == "absolute" ? 1 : 0;
-  const int rank_revealing = record.Text("solver") == "rank-revealing" ? 2 : 0;
-  const bool wide = record.Text("formulation") == "lagrange";
-  return {ColorOf(record), 1 + absolute + rank_revealing, wide ? 5.0 : 2.0};
+  return {.color = ColorOf(record),
+          .width = record.Text("formulation") == "lagrange" ? 5.0 : 2.0,
+          .shape = ShapeOf(record),
+          .filled = record.Text("solver") != "as-published",
+          .doubtful = IsDoubtful(record)};
 }
 
 bool Varies(std::span<const Record> records, std::string_view key) {
@@ -48,7 +56,7 @@ bool Failed(const Record& record) {
 // curves go into the title.
 std::string LabelOf(const Record& record, std::span<const Record> all, bool with_fit) {
   std::string label = record.Text("formulation");
-  for (const char* key : {"enforcement", "coordinates", "solver"}) {
+  for (const char* key : {"enforcement", "coordinates", "solver", "integrator", "experiment"}) {
     if (Varies(all, key)) label += ", " + record.Text(key);
   }
   for (const TableColumn& parameter : WithParameters({}, all)) {
@@ -98,43 +106,89 @@ std::vector<Curve> DriftCurves(std::span<const Record> records, bool with_fit) {
   return curves;
 }
 
-bool HasAngles(const Record& record) {
+// Joint coordinates of one kind: what their series are called and drawn as.
+struct CoordinateKind {
+  const char *name, *prefix, *opening_prefix, *axis;
+};
+constexpr CoordinateKind kCoordinateKinds[] = {
+    {"angles", "series.angle.", "series.opening.angle.", "angle [rad]"},
+    {"displacements", "series.displacement.", "series.opening.displacement.", "displacement [m]"}};
+
+bool HasSeries(const Record& record, std::string_view prefix) {
   return std::ranges::any_of(record.items(),
-                             [](const auto& item) { return item.first.starts_with(kAnglePrefix); });
+                             [&](const auto& item) { return item.first.starts_with(prefix); });
 }
 
-bool PassesSingularPositions(const std::string& mechanism) {
-  return mechanism.starts_with("parallelogram") || mechanism.starts_with("toggle") ||
-         mechanism.starts_with("dead-centre");
+// Whether the loops came within this of a singular position, where it is known: about the angle
+// [rad] that was still to go (SingularityObserver).
+bool PassesSingularPosition(const Record& record) {
+  constexpr double kNear = 0.01;
+  return record.Number("singularity_distance_min") < kNear;  // not when it is NaN
 }
 
-// Larger is the better choice for the figure of angles.
-auto AnglesRank(const Record& record) {
-  return std::tuple(!Failed(record), record.Text("formulation") == "odca",
-                    record.Text("coordinates") == "joint", -record.Number("rtol"));
+// Larger is the better choice of the run whose motion is shown: one that ended well and is not in
+// doubt; whose loops are closed to the last; then the finest tolerance.
+auto MotionRank(const Record& record) {
+  const double energy = record.Number("energy_error_relative");
+  constexpr double kTrusted = 1e-2;
+  return std::tuple(!Failed(record), !IsDoubtful(record) && !(energy > kTrusted),
+                    record.Text("enforcement") == "position", -record.Number("rtol"),
+                    record.Text("formulation") == "odca", record.Text("coordinates") == "joint",
+                    record.Text("solver") == "rank-revealing");
+}
+
+// All that names the run, for a figure that shows one of several.
+std::string RunOf(const Record& record) {
+  std::string text;
+  for (const char* key : {"formulation", "enforcement", "coordinates", "solver"}) {
+    if (!record.Text(key).empty()) text += ", " + record.Text(key);
+  }
+  text += ", rtol " + record.Text("rtol");
+  for (const TableColumn& parameter : WithParameters({}, {&record, 1})) {
+    text += fmt::format(", {} {}", parameter.key, record.Text(parameter.key));
+  }
+  return text;
+}
+
+Figure CoordinateFigure(const Record& record, const CoordinateKind& kind) {
+  // where the points of the whole run are too few for its motion, the record has those of its start
+  const bool opening = record.Find("series.opening_t") != nullptr;
+  const std::string_view prefix = opening ? kind.opening_prefix : kind.prefix;
+  const std::vector<double> t = record.Numbers(opening ? "series.opening_t" : "series.t");
+  Figure figure;
+  figure.title = fmt::format("{}: {}{}", record.Text("mechanism"), kind.name, RunOf(record));
+  if (opening && !t.empty()) {
+    figure.title +=
+        fmt::format(" (the first {:.3g} of {:.4g} s)", t.back(), record.Number("t_reached"));
+  }
+  figure.x_label = "time [s]";
+  figure.y_label = kind.axis;
+  for (const auto& [key, value] : record.items()) {
+    if (!key.starts_with(prefix)) continue;
+    const std::size_t index = figure.curves.size();
+    Curve curve;
+    curve.label = key.substr(prefix.size());
+    curve.x = t;
+    curve.y = record.Numbers(key);
+    curve.style = DistinctStyle(index);
+    curve.style.doubtful = IsDoubtful(record);
+    curve.ends_early = Failed(record) && !opening;
+    figure.curves.push_back(std::move(curve));
+  }
+  // later ones lie on top and are thinner: those that coincide are all seen
+  const double count = static_cast<double>(figure.curves.size());
+  for (std::size_t i = 0; i < figure.curves.size(); ++i) {
+    figure.curves[i].style.width = 4.0 - 2.5 * static_cast<double>(i) / count;
+  }
+  return figure;
 }
 
 }  // namespace
 
-Figure AnglesFigure(const Record& record) {
-  Figure figure;
-  figure.title =
-      fmt::format("{}: angles, {}, {}, rtol {}", record.Text("mechanism"),
-                  record.Text("formulation"), record.Text("coordinates"), record.Text("rtol"));
-  figure.x_label = "time [s]";
-  figure.y_label = "angle [rad]";
-  for (const auto& [key, value] : record.items()) {
-    if (!key.starts_with(kAnglePrefix)) continue;
-    const std::size_t index = figure.curves.size();
-    Curve curve;
-    curve.label = key.substr(kAnglePrefix.size());
-    curve.x = record.Numbers("series.t");
-    curve.y = record.Numbers(key);
-    curve.style = DistinctStyle(index);
-    curve.ends_early = Failed(record);
-    figure.curves.push_back(std::move(curve));
-  }
-  return figure;
+Figure AnglesFigure(const Record& record) { return CoordinateFigure(record, kCoordinateKinds[0]); }
+
+Figure DisplacementsFigure(const Record& record) {
+  return CoordinateFigure(record, kCoordinateKinds[1]);
 }
 
 Figure DriftFigure(std::span<const Record> records) {
@@ -164,27 +218,29 @@ std::vector<NamedFigure> AllFigures(std::span<const Record> records) {
   std::vector<Record> sorted(records.begin(), records.end());
   SortRows(&sorted);
   // Ordered maps, so that the figures come in the same order whatever the order of the store.
-  std::map<std::string, Record> angles;
+  std::map<std::string, Record> motions;
   std::map<std::string, std::vector<Record>> drift;
   for (const Record& record : sorted) {
     const std::string scene =
         fmt::format("{}-{}s", record.Text("mechanism"), record.Text("horizon"));
-    if (HasAngles(record)) {
-      const auto [it, is_new] = angles.try_emplace("angles-" + scene, record);
-      if (!is_new && AnglesRank(record) > AnglesRank(it->second)) it->second = record;
+    for (const CoordinateKind& kind : kCoordinateKinds) {
+      if (!HasSeries(record, kind.prefix)) continue;
+      const auto [it, is_new] = motions.try_emplace(fmt::format("{}-{}", kind.name, scene), record);
+      if (!is_new && MotionRank(record) > MotionRank(it->second)) it->second = record;
     }
     if (record.Find("series.drift") != nullptr) {
-      const bool singular = PassesSingularPositions(record.Text("mechanism"));
-      drift[fmt::format("{}-{}-rtol-{}", singular ? "singular" : "drift", scene,
-                        record.Text("rtol"))]
-          .push_back(record);
+      drift[fmt::format("{}-rtol-{}", scene, record.Text("rtol"))].push_back(record);
     }
   }
   std::vector<NamedFigure> figures;
-  for (const auto& [name, record] : angles) figures.push_back({name, AnglesFigure(record)});
+  for (const auto& [name, record] : motions) {
+    const bool angles = name.starts_with(kCoordinateKinds[0].name);
+    figures.push_back({name, angles ? AnglesFigure(record) : DisplacementsFigure(record)});
+  }
   for (const auto& [name, group] : drift) {
-    const bool singular = name.starts_with("singular");
-    figures.push_back({name, singular ? SingularFigure(group) : DriftFigure(group)});
+    const bool singular = std::ranges::any_of(group, PassesSingularPosition);
+    figures.push_back({(singular ? "singular-" : "drift-") + name,
+                       singular ? SingularFigure(group) : DriftFigure(group)});
   }
   return figures;
 }

@@ -71,34 +71,76 @@ std::string DataBlock(std::string_view name, const std::vector<Point>& points) {
   return block + "EOD\n";
 }
 
-// Dash types in pixels, solid and empty lengths in turn. gnuplot's SVG terminal multiplies them by
-// half the line's width, so they are divided by it: curves of any width have the same dashes.
+// Solid, or dashes of 9 pixels and gaps of 6. gnuplot's SVG terminal multiplies them by half the
+// line's width, so they are divided by it: curves of any width have the same dashes.
 std::string DashType(const CurveStyle& style) {
-  static const std::array<std::vector<double>, 4> kPixels = {
-      {{}, {9.0, 6.0}, {2.5, 4.0}, {9.0, 4.0, 2.5, 4.0}}};
-  const std::vector<double>& pixels = kPixels.at(static_cast<std::size_t>(style.dash - 1));
-  std::string lengths;
-  for (const double length : pixels) {
-    lengths += fmt::format("{}{:.3g}", lengths.empty() ? "" : ",", 2.0 * length / style.width);
-  }
-  return pixels.empty() ? "solid" : fmt::format("({})", lengths);
+  if (!style.doubtful) return "solid";
+  return fmt::format("({:.3g},{:.3g})", 2.0 * 9.0 / style.width, 2.0 * 6.0 / style.width);
 }
 
-// The plot elements of curve `index`; its data block is named c<index>.
+int PointType(const CurveStyle& style) {
+  switch (style.shape) {
+    case Shape::kNone:
+      break;
+    case Shape::kCircle:
+      return style.filled ? 7 : 6;
+    case Shape::kTriangle:
+      return style.filled ? 9 : 8;
+    case Shape::kSquare:
+      return style.filled ? 5 : 4;
+    case Shape::kDiamond:
+      return style.filled ? 13 : 12;
+  }
+  return 0;
+}
+
+// Where the marks of curve `index` of `count` lie: the points next to some places evenly spaced
+// over the axis, between those of the other curves, so that marks of equal curves are all seen.
+std::vector<Point> Marks(const Figure& figure, const std::vector<Point>& points, const Extent& x,
+                         std::size_t index, std::size_t count) {
+  constexpr int kMarks = 6;
+  std::vector<Point> marks;
+  const double phase = (static_cast<double>(index) + 0.5) / static_cast<double>(count);
+  for (int i = 0; i < kMarks; ++i) {
+    const double place = x.low + (i + phase) / kMarks * (x.high - x.low);
+    const auto at = std::ranges::lower_bound(
+        points, place, {}, [&](const Point& point) { return OnAxis(point.first, figure.log_x); });
+    if (at != points.end()) marks.push_back(*at);
+  }
+  if (marks.empty()) marks.push_back(points.back());
+  return marks;
+}
+
+// The plot elements of curve `index`; its data blocks are named c<index> and, of marks, m<index>.
 std::vector<std::string> Elements(const Figure& figure, const Curve& curve, std::size_t index,
                                   const std::vector<Point>& points) {
   const std::string line = fmt::format("lc rgb '{}' dt {} lw {:.3g}", curve.style.color,
                                        DashType(curve.style), curve.style.width);
-  std::string look = "lines";
+  const bool marked = curve.style.shape != Shape::kNone;
+  std::string look = "lines", marks;
   if (curve.points) {
     // shape and size tell curves apart that lie on each other
     constexpr std::array<int, 8> kShapes = {7, 5, 9, 13, 6, 4, 8, 12};
     look = fmt::format("{} pt {} ps {:.3g}", curve.line ? "linespoints" : "points",
                        kShapes[index % kShapes.size()], 0.3 * curve.style.width);
+  } else if (marked) {
+    marks = fmt::format("pt {} ps 0.8", PointType(curve.style));
   }
   const std::string title = curve.label.empty() ? "notitle" : "title " + QuoteGnuplot(curve.label);
-  if (points.empty()) return {fmt::format("NaN with {} {} {}", look, line, title)};
-  std::vector<std::string> elements = {fmt::format("$c{} with {} {} {}", index, look, line, title)};
+  // the legend shows a line with its mark
+  const std::string legend = marks.empty()
+                                 ? fmt::format("NaN with {} {} {}", look, line, title)
+                                 : fmt::format("NaN with linespoints {} {} {}", line, marks, title);
+  if (points.empty()) return {legend};
+  std::vector<std::string> elements;
+  if (marks.empty()) {
+    elements = {fmt::format("$c{} with {} {} {}", index, look, line, title)};
+  } else {
+    elements = {fmt::format("$c{} with lines {} notitle", index, line),
+                fmt::format("$m{} with points lc rgb '{}' lw 1.5 {} notitle", index,
+                            curve.style.color, marks),
+                legend};
+  }
   const auto [x_last, y_last] = points.back();
   if (curve.slope && figure.log_x && figure.log_y) {
     // Lifted a little, so that it does not hide what it describes.
@@ -179,15 +221,23 @@ std::size_t LegendRows(const Figure& figure) {
   return std::max<std::size_t>(1, (entries + columns - 1) / columns);
 }
 
+std::string LegendTitle(const Figure& figure) {
+  const bool has_doubts =
+      std::ranges::any_of(figure.curves, [](const Curve& curve) { return curve.style.doubtful; });
+  if (!has_doubts) return figure.legend_title;
+  return figure.legend_title + (figure.legend_title.empty() ? "" : "; ") + "dashed: doubtful";
+}
+
 }  // namespace
 
 CurveStyle DistinctStyle(std::size_t index) {
   // Okabe and Ito's palette, and a green
   constexpr std::array<const char*, 8> kPalette = {"#0072B2", "#D55E00", "#009E73", "#CC79A7",
                                                    "#E69F00", "#56B4E9", "#000000", "#999933"};
-  constexpr int kDashes = 4;
-  const int round = static_cast<int>(index / kPalette.size());
-  return {kPalette[index % kPalette.size()], 1 + round % kDashes, 2.0};
+  constexpr std::array<Shape, 5> kShapes = {Shape::kNone, Shape::kCircle, Shape::kTriangle,
+                                            Shape::kSquare, Shape::kDiamond};
+  return {.color = kPalette[index % kPalette.size()],
+          .shape = kShapes[index / kPalette.size() % kShapes.size()]};
 }
 
 std::string GnuplotScript(const Figure& figure) {
@@ -205,14 +255,14 @@ std::string GnuplotScript(const Figure& figure) {
       if (CanBeDrawn(cross.second, figure.log_y)) y.Include(OnAxis(cross.second, figure.log_y));
     }
   }
+  const std::string legend_title = LegendTitle(figure);
   std::string script = fmt::format(
       "set encoding utf8\nset title {}\nset xlabel {} offset 0,0.5\nset ylabel {}\n"
       "set grid lc rgb '#cccccc' lw 0.5\n"
       "set key bmargin center vertical maxrows {} Left reverse samplen 4 title {}\n",
       QuoteGnuplot(figure.title), QuoteGnuplot(figure.x_label), QuoteGnuplot(figure.y_label),
       LegendRows(figure),
-      figure.legend_title.empty() ? QuoteGnuplot(" ")
-                                  : "\"\\n\"." + QuoteGnuplot(figure.legend_title));
+      legend_title.empty() ? QuoteGnuplot(" ") : "\"\\n\"." + QuoteGnuplot(legend_title));
   if (figure.log_x) script += "set logscale x\n";
   if (figure.log_y) {
     // powers of ten are read most easily as such, unless all are near one
@@ -223,9 +273,14 @@ std::string GnuplotScript(const Figure& figure) {
   std::string plot;
   for (std::size_t i = 0; i < figure.curves.size(); ++i) {
     points[i] = Thin(figure, points[i], x, y);
+    const Curve& curve = figure.curves[i];
     if (!points[i].empty()) script += DataBlock(fmt::format("c{}", i), points[i]);
-    script += Crosses(figure, figure.curves[i]);
-    for (const std::string& element : Elements(figure, figure.curves[i], i, points[i])) {
+    if (!points[i].empty() && !curve.points && curve.style.shape != Shape::kNone) {
+      script +=
+          DataBlock(fmt::format("m{}", i), Marks(figure, points[i], x, i, figure.curves.size()));
+    }
+    script += Crosses(figure, curve);
+    for (const std::string& element : Elements(figure, curve, i, points[i])) {
       plot += fmt::format("{}{}", plot.empty() ? "plot " : ", \\\n  ", element);
     }
   }
@@ -240,7 +295,7 @@ namespace {
 // 960 wide, 500 high without the legend.
 GnuplotPage PageOf(const Figure& figure, bool pdf) {
   const std::size_t height =
-      500 + 20 * (LegendRows(figure) + (figure.legend_title.empty() ? 0 : 1));
+      500 + 20 * (LegendRows(figure) + (LegendTitle(figure).empty() ? 0 : 1));
   return {960, static_cast<int>(height), pdf ? 11 : 13};
 }
 

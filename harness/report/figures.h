@@ -9,15 +9,21 @@
 
 namespace loopbench::harness {
 
-/// How a curve looks. The defaults are a thin black line.
+/// Marks on a curve.
+enum class Shape { kNone, kCircle, kTriangle, kSquare, kDiamond };
+
+/// How a curve looks, one attribute per property of what it shows. The defaults are a thin black
+/// line. Dashes have one meaning in all figures: the run is doubtful.
 struct CurveStyle {
   std::string color = "#000000";
-  int dash = 1;        ///< gnuplot dash type: 1 solid, 2 dashed, 3 dotted, 4 dash-dot
-  double width = 2.0;  ///< [px]
+  double width = 2.0;          ///< [px]
+  Shape shape = Shape::kNone;  ///< at some places of the line, others than those of its neighbours
+  bool filled = true;          ///< of the marks
+  bool doubtful = false;       ///< dashed, and the legend says why
 };
 
 /// The style of the index-th curve of a figure: colours that colour-blind readers tell apart, then
-/// the same with other dashes.
+/// the same with marks.
 CurveStyle DistinctStyle(std::size_t index);
 
 /// Points joined by a line. `x` and `y` have the same length; points that are not finite, and on a

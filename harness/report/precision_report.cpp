@@ -4,16 +4,18 @@
 
 #include <algorithm>
 #include <limits>
+#include <map>
 #include <tuple>
 
 #include "harness/config/experiment.h"
+#include "harness/report/columns.h"
 #include "harness/report/table.h"
 
 namespace loopbench::harness {
 namespace {
 
-constexpr const char* kLadderKeys[] = {"mechanism",   "formulation", "enforcement",
-                                       "coordinates", "solver",      "horizon"};
+constexpr const char* kLadderKeys[] = {"mechanism", "formulation", "enforcement", "coordinates",
+                                       "solver",    "horizon",     "experiment"};
 
 bool IsReference(const Record& record) { return record.Text("integrator") == "gragg"; }
 
@@ -26,19 +28,22 @@ std::size_t WidthOf(const Record& record) {
 std::string LadderOf(const Record& record) {
   std::string text;
   for (const char* key : kLadderKeys) text += record.Text(key) + '\n';
+  for (const TableColumn& parameter : WithParameters({}, {&record, 1})) {
+    text += fmt::format("{} {}\n", parameter.key, record.Text(parameter.key));
+  }
   return text;
 }
 
-Curve CurveOf(std::span<const Record> rungs, Scalar scalar, const char* key, bool dashed) {
+Curve CurveOf(std::span<const Record> rungs, Scalar scalar, const char* key, bool drift) {
   constexpr const char* kColors[] = {"#E69F00", "#0072B2", "#009E73", "#CC79A7"};
   Curve curve;
-  curve.label = fmt::format("{}, {}", dashed ? "drift" : "error", ToString(scalar));
-  curve.style = {kColors[static_cast<std::size_t>(scalar)], dashed ? 2 : 1, 2.0};
-  curve.points = !dashed;
+  curve.label = fmt::format("{}, {}", drift ? "drift" : "error", ToString(scalar));
+  curve.style = {.color = kColors[static_cast<std::size_t>(scalar)], .width = drift ? 1.0 : 2.5};
+  curve.points = !drift;
   for (const Record& rung : rungs) {
     if (rung.Text("scalar") != ToString(scalar) || IsReference(rung)) continue;
     if (HasFailed(rung)) {
-      if (!dashed) {
+      if (!drift) {
         curve.crosses.emplace_back(rung.Number("rtol"), std::numeric_limits<double>::quiet_NaN());
       }
       continue;
@@ -54,20 +59,26 @@ NamedFigure FigureOf(std::span<const Record> rungs) {
   NamedFigure named;
   named.name = "precision";
   for (const char* key : kLadderKeys) {
-    if (std::string_view(key) != "horizon") named.name += "-" + first.Text(key);
+    const bool in_name =
+        std::string_view(key) != "horizon" && std::string_view(key) != "experiment";
+    if (in_name) named.name += "-" + first.Text(key);
   }
   Figure& figure = named.figure;
   figure.title =
       fmt::format("{}: {}, {}, {}, {}, after {} s", first.Text("mechanism"),
                   first.Text("formulation"), first.Text("enforcement"), first.Text("coordinates"),
                   first.Text("solver"), first.Text("horizon"));
+  for (const TableColumn& parameter : WithParameters({}, {&first, 1})) {
+    named.name += fmt::format("-{}-{}", parameter.key, first.Text(parameter.key));
+    figure.title += fmt::format(", {} {}", parameter.key, first.Text(parameter.key));
+  }
   figure.x_label = "tolerance";
   figure.y_label = "error at the end, largest drift [m]";
   figure.log_x = figure.log_y = true;
   for (std::size_t i = 0; i < kNames<Scalar>.size(); ++i) {
     const auto scalar = static_cast<Scalar>(i);
-    for (const bool dashed : {false, true}) {
-      Curve curve = CurveOf(rungs, scalar, dashed ? "drift_position_max" : "error_final", dashed);
+    for (const bool drift : {false, true}) {
+      Curve curve = CurveOf(rungs, scalar, drift ? "drift_position_max" : "error_final", drift);
       if (!curve.x.empty() || !curve.crosses.empty()) figure.curves.push_back(std::move(curve));
     }
   }
@@ -103,11 +114,19 @@ std::vector<NamedFigure> PrecisionFigures(std::span<const Record> records) {
   std::vector<Record> sorted(records.begin(), records.end());
   SortRungs(&sorted);
   std::vector<NamedFigure> figures;
+  std::map<std::string, int> uses;
+  std::vector<std::string> others;  // what else tells ladders apart
   for (std::size_t begin = 0; begin < sorted.size();) {
     std::size_t end = begin;
     while (end < sorted.size() && LadderOf(sorted[end]) == LadderOf(sorted[begin])) ++end;
     figures.push_back(FigureOf(std::span(sorted).subspan(begin, end - begin)));
+    others.push_back(
+        fmt::format("-{}s-{}", sorted[begin].Text("horizon"), sorted[begin].Text("experiment")));
+    ++uses[figures.back().name];
     begin = end;
+  }
+  for (std::size_t i = 0; i < figures.size(); ++i) {
+    if (uses[figures[i].name] > 1) figures[i].name += others[i];
   }
   return figures;
 }

@@ -6,6 +6,7 @@
 #include <cmath>
 #include <filesystem>
 #include <limits>
+#include <set>
 #include <string>
 #include <vector>
 
@@ -83,8 +84,8 @@ TEST_F(FiguresTest, DriftHasUnitsCurvesAndFittedSlopes) {
   EXPECT_TRUE(Contains(svg, "lagrange, acceleration, absolute: t^2.00"));
   EXPECT_TRUE(Contains(svg, "reduction, velocity, joint: t^1.03"));
   EXPECT_TRUE(Contains(svg, "four-bar: drift, as-published, rtol 1e-08"));
-  // Three curves and three slope lines.
-  EXPECT_EQ(Count(svg, "id=\"gnuplot_plot_"), 6u);
+  // Three curves, each with marks and an entry of the legend, and three slope lines.
+  EXPECT_EQ(Count(svg, "id=\"gnuplot_plot_"), 12u);
 }
 
 TEST_F(FiguresTest, TheSameFigureGivesTheSameBytes) {
@@ -159,17 +160,101 @@ TEST(FigureRecipes, OneFigureOfAnglesPerSceneAndOneOfDriftPerTolerance) {
   Record coarse = RunOf("odca", "joint", 2.0);
   coarse.Set("rtol", 1e-6);
   Record singular = RunOf("odca", "joint", 2.0);
-  singular.Set("mechanism", std::string("toggle"));
+  singular.Set("mechanism", std::string("a name that says nothing"));
+  singular.Set("singularity_distance_min", 1e-3);
   const std::vector<NamedFigure> figures = AllFigures(std::vector<Record>{
       RunOf("lagrange", "joint", 2.0), RunOf("odca", "joint", 2.0), coarse, singular});
   std::string names;
   for (const NamedFigure& figure : figures) names += figure.name + " ";
   EXPECT_EQ(names,
-            "angles-four-bar-10s angles-toggle-10s drift-four-bar-10s-rtol-1e-06 "
-            "drift-four-bar-10s-rtol-1e-08 singular-toggle-10s-rtol-1e-08 ");
-  EXPECT_EQ(figures[0].figure.title, "four-bar: angles, odca, joint, rtol 1e-08");
-  EXPECT_EQ(figures[3].figure.curves.size(), 2u);
-  EXPECT_GT(figures[3].figure.curves[0].style.width, figures[3].figure.curves[1].style.width);
+            "angles-a name that says nothing-10s angles-four-bar-10s "
+            "singular-a name that says nothing-10s-rtol-1e-08 drift-four-bar-10s-rtol-1e-06 "
+            "drift-four-bar-10s-rtol-1e-08 ");
+  EXPECT_EQ(figures[1].figure.title,
+            "four-bar: angles, odca, acceleration, joint, as-published, rtol 1e-08");
+  EXPECT_EQ(figures[4].figure.curves.size(), 2u);
+  EXPECT_GT(figures[4].figure.curves[0].style.width, figures[4].figure.curves[1].style.width);
+}
+
+std::string TitleOfAngles(const std::vector<Record>& records) {
+  return AllFigures(records).front().figure.title;
+}
+
+TEST(FigureRecipes, AnglesAreThoseOfTheRunThatIsTrustedMost) {
+  const Record drifting = RunOf("odca", "joint", 2.0);
+  Record closed = RunOf("lagrange", "absolute", 2.0);
+  closed.Set("enforcement", std::string("position"));
+  closed.Set("rtol", 1e-6);
+  const std::string position =
+      "four-bar: angles, lagrange, position, absolute, as-published, rtol ";
+  EXPECT_EQ(TitleOfAngles({drifting, closed}), position + "1e-06");
+  EXPECT_EQ(TitleOfAngles({closed, drifting}), position + "1e-06");
+  Record finer = closed;
+  finer.Set("rtol", 1e-10);
+  EXPECT_EQ(TitleOfAngles({finer, closed, drifting}), position + "1e-10");
+  finer.Set("energy_error_relative", 0.5);
+  EXPECT_EQ(TitleOfAngles({finer, closed, drifting}), position + "1e-06");
+  closed.Set("doubts", std::string("columns disagree"));
+  EXPECT_EQ(TitleOfAngles({finer, closed, drifting}).find("position"), std::string::npos);
+  Record swept;
+  swept.Set("mass", 5.0);  // a parameter of a sweep stands before the results
+  for (const auto& [key, value] : closed.items()) swept.Set(key, value);
+  EXPECT_TRUE(Contains(TitleOfAngles({swept}), "mass 5"));
+}
+
+TEST(FigureRecipes, DisplacementsHaveAFigureOfTheirOwnInMetres) {
+  Record record = RunOf("odca", "joint", 2.0);
+  record.Set("series.displacement.slider", record.Numbers("series.t"));
+  const std::vector<NamedFigure> figures = AllFigures(std::vector<Record>{record});
+  ASSERT_EQ(figures.size(), 3u);
+  EXPECT_EQ(figures[0].figure.y_label, "angle [rad]");
+  EXPECT_EQ(figures[0].figure.curves.size(), 2u);
+  EXPECT_EQ(figures[1].name, "displacements-four-bar-10s");
+  EXPECT_EQ(figures[1].figure.y_label, "displacement [m]");
+  ASSERT_EQ(figures[1].figure.curves.size(), 1u);
+  EXPECT_EQ(figures[1].figure.curves[0].label, "slider");
+}
+
+TEST(FigureRecipes, AMotionTooFastForThePointsIsShownByItsOpening) {
+  Record record = RunOf("odca", "joint", 2.0);
+  record.Set("series.opening_t", std::vector<double>{0.0, 0.1, 0.2});
+  record.Set("series.opening.angle.crank", std::vector<double>{0.0, 1.0, 0.0});
+  const Figure figure = AnglesFigure(record);
+  EXPECT_TRUE(figure.title.ends_with("(the first 0.2 of 10 s)")) << figure.title;
+  ASSERT_EQ(figure.curves.size(), 1u);
+  EXPECT_EQ(figure.curves[0].label, "crank");
+  EXPECT_EQ(figure.curves[0].x.size(), 3u);
+}
+
+TEST(FigureRecipes, EveryWayOfKeepingLoopsClosedLooksItsOwn) {
+  std::vector<Record> records;
+  for (const char* formulation : {"odca", "lagrange", "reduction"}) {
+    for (const char* level : {"acceleration", "velocity", "position", "baumgarte"}) {
+      for (const char* coordinates : {"joint", "absolute"}) {
+        for (const char* solver : {"as-published", "rank-revealing"}) {
+          records.push_back(RunOf(formulation, coordinates, 2.0));
+          records.back().Set("enforcement", std::string(level));
+          records.back().Set("solver", std::string(solver));
+        }
+      }
+    }
+  }
+  std::set<std::string> looks;
+  for (const Curve& curve : DriftFigure(records).curves) {
+    const CurveStyle& style = curve.style;
+    EXPECT_FALSE(style.doubtful);
+    looks.insert(style.color + (style.filled ? " filled " : " open ") +
+                 std::to_string(static_cast<int>(style.shape)));
+  }
+  EXPECT_EQ(looks.size(), 48u);
+}
+
+TEST_F(FiguresTest, OnlyDoubtfulRunsAreDashed) {
+  std::vector<Record> records = {RunOf("odca", "absolute", 2.0), RunOf("reduction", "joint", 2.0)};
+  EXPECT_FALSE(Contains(GnuplotScript(DriftFigure(records)), "dt ("));
+  records[1].Set("doubts", std::string("drift"));
+  EXPECT_TRUE(Contains(GnuplotScript(DriftFigure(records)), "dt ("));
+  EXPECT_TRUE(Contains(Draw(DriftFigure(records)), "dashed: doubtful"));
 }
 
 }  // namespace

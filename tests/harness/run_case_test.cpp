@@ -4,6 +4,7 @@
 
 #include <gtest/gtest.h>
 
+#include <algorithm>
 #include <cmath>
 #include <limits>
 #include <numbers>
@@ -120,6 +121,55 @@ TEST(FinishedCase, KeepsSeriesOfDriftEnergyAndAnglesToTheEnd) {
     EXPECT_EQ(record.Numbers(std::string("series.angle.") + joint).size(),
               record.Numbers("series.t").size())
         << joint;
+  }
+}
+
+/// Largest distance of the series from the line through points of another, up to its end.
+double GapBetween(const std::vector<double>& t, const std::vector<double>& value,
+                  const std::vector<double>& line_t, const std::vector<double>& line) {
+  double gap = 0.0;
+  std::size_t at = 1;
+  for (std::size_t i = 0; i < t.size() && t[i] <= line_t.back(); ++i) {
+    while (line_t[at] < t[i]) ++at;
+    const double part = (t[i] - line_t[at - 1]) / (line_t[at] - line_t[at - 1]);
+    gap = std::max(gap, std::abs(value[i] - std::lerp(line[at - 1], line[at], part)));
+  }
+  return gap;
+}
+
+/// A pendulum that swings some fifty times: forty points drawn as a line show none of it.
+TEST(FinishedCase, KeepsTheOpeningOfMotionsTooFastForItsPoints) {
+  const auto run = [](int points, double horizon) {
+    Experiment experiment = Single(BarAt(0.0));
+    experiment.series_points = points;
+    return RunCase(experiment, CaseOf(experiment, "bar", kOdcaJoint, kTolerance, horizon));
+  };
+  const Record all = run(1000000, 100.0), few = run(40, 100.0);
+  EXPECT_FALSE(IsSet(all, "series.opening_t"));
+  EXPECT_FALSE(IsSet(run(40, 1.0), "series.opening_t"));  // and half a swing needs none
+  const std::vector<double>& t = all.Numbers("series.t");
+  const std::vector<double>& angle = all.Numbers("series.angle.O");
+  const auto [low, high] = std::ranges::minmax(angle);
+  EXPECT_GT(GapBetween(t, angle, few.Numbers("series.t"), few.Numbers("series.angle.O")),
+            0.1 * (high - low));
+  const std::vector<double>& opening = few.Numbers("series.opening_t");
+  ASSERT_EQ(opening.size(), 40u);
+  // what the observer promises: a hundredth of the axis
+  EXPECT_LE(GapBetween(t, angle, opening, few.Numbers("series.opening.angle.O")),
+            0.01 * (high - low));
+  EXPECT_GT(opening.back(), 2.0);  // a whole swing is seen
+}
+
+TEST(FinishedCase, KeepsAnglesAndDisplacementsApart) {
+  const MechanismFile file = ReadMechanism(kConfigs / "mechanisms/flyball-governor.json");
+  for (const Coordinates coordinates : {Coordinates::kJoint, Coordinates::kAbsolute}) {
+    const Record record = RunSingle(file, Published(kOdca, coordinates), 0.1);
+    for (const JointDescription& joint : file.description.joints) {
+      if (joint.type != JointType::kRevolute && joint.type != JointType::kPrismatic) continue;
+      const bool shifts = joint.type == JointType::kPrismatic;
+      EXPECT_EQ(IsSet(record, "series.displacement." + joint.name), shifts) << joint.name;
+      EXPECT_EQ(IsSet(record, "series.angle." + joint.name), !shifts) << joint.name;
+    }
   }
 }
 

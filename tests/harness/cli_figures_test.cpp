@@ -1,0 +1,38 @@
+// The standard figures of a store: each that can be drawn, of the run that is trusted most.
+#include "tests/harness/cli_fixture.h"
+
+namespace loopbench::harness {
+namespace {
+
+class FiguresOfAStore : public CommandLineTest {};
+
+TEST_F(FiguresOfAStore, OneThatCannotBeDrawnDoesNotStopTheOthers) {
+  // the drift of a pendulum, which has no loops, is zero: nothing for a logarithmic axis
+  Write("pendulum.json", ReadFile(kConfigs / "mechanisms/pendulum.json"));
+  Write("tiny.json", std::string(kExperiment)
+                         .replace(std::string(kExperiment).find("{\"mechanism\": \"four"), 0,
+                                  R"({"mechanism": "pendulum.json", "horizon": 0.5}, )"));
+  ExpectEnding(Call("run tiny.json --out out"), 0, {});
+  ExpectEnding(Call("plot out --out figures"), 2,
+               {"drift-pendulum-0.5s-rtol-1e-06.svg: no curve has a point to draw",
+                "wrote 3 of 4 figures to figures"});
+  for (const char* name :
+       {"angles-four-bar-0.5s", "angles-pendulum-0.5s", "drift-four-bar-0.5s-rtol-1e-06"}) {
+    EXPECT_TRUE(fs::exists(folder_ / "figures" / (std::string(name) + ".svg"))) << name;
+  }
+}
+
+TEST_F(FiguresOfAStore, AnglesAreThoseOfLevelPositionWhereItIsStored) {
+  const std::string levels = R"("enforcement": ["acceleration", "position"])";
+  std::string text = kExperiment;
+  const std::string one = R"("enforcement": "acceleration")";
+  Write("tiny.json", text.replace(text.find(one), one.size(), levels));
+  ExpectEnding(Call("run tiny.json --out out"), 0, {});
+  ExpectEnding(Call("plot out --out figures"), 0, {"wrote 2 figures"});
+  const std::string svg = ReadFile(folder_ / "figures/angles-four-bar-0.5s.svg");
+  EXPECT_NE(svg.find("four-bar: angles, odca, position, joint, rank-revealing, rtol 1e-06"),
+            std::string::npos);
+}
+
+}  // namespace
+}  // namespace loopbench::harness

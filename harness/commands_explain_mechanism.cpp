@@ -121,7 +121,13 @@ void PrintFreedom(const Structure& s) {
         s.counted_freedom, s.bodies, each, s.rows);
   if (!s.analysed) return;
   Print("  {} by rank: {} speeds of the tree - rank {} of the {} constraints of loops\n",
-        s.freedom(), s.joint_u, s.rank_nearby, s.loop_rows);
+        s.joint_u - s.rank_nearby, s.joint_u, s.rank_nearby, s.loop_rows);
+  if (s.locked() && s.freedom_at_start() > 0) {
+    Print(
+        "  0 that lead anywhere: the start is singular, and what its constraints leave free to\n"
+        "  first order falls back to it\n");
+    return;
+  }
   if (s.freedom_at_start() != s.freedom()) {
     Print("  {} at the start, a singular position: rank {} there\n", s.freedom_at_start(), s.rank);
   }
@@ -131,24 +137,21 @@ void PrintFreedom(const Structure& s) {
   }
 }
 
-std::string Described(const MechanismDescription& description, const RedundantDirection& one) {
-  if (one.axis == 'r') return "the force along the rod";
-  if (one.axis == 'n') return "the moment about the normal of its two axes";
-  const JointDescription& joint = description.joints[one.joint];
-  return fmt::format(
-      "the {} {} of {}{}", one.moment ? "moment about" : "force along", one.axis,
-      one.ground_axes ? "ground" : "its frame on " + description.bodies[joint.from.body].name,
-      one.drive ? ", which follows a given motion" : "");
-}
-
 void PrintRedundant(const MechanismDescription& description, const Structure& structure) {
   if (!structure.analysed) return;
   Print("\nRedundant constraints: {}\n", structure.redundant.size());
+  bool released = false;
   for (const RedundantDirection& one : structure.redundant) {
-    Print("  {}: {}\n", description.joints[one.joint].name, Described(description, one));
+    Print("  {}: {}{}\n", description.joints[one.joint].name, one.name,
+          one.released ? "" : " (at the start)");
+    released = released || one.released;
   }
-  if (structure.redundant.empty()) return;
-  Print("  All of these can be dropped at once; the loops then stay closed as they do now.\n");
+  if (!released) return;
+  Print(
+      "  All of these can be dropped at once; the loops then stay closed as they do now.\n"
+      "  They are redundant at every position: a run imposes the others and observes all, and\n"
+      "  drops others of the same joints where those serve better (\"compile\": "
+      "\"redundancy\").\n");
 }
 
 void PrintIslands(const MechanismDescription& description, const Structure& structure) {

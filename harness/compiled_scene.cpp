@@ -52,6 +52,7 @@ std::string ToString(const CompileOptions& options) {
   add(options.welds, "welds");
   add(options.immovable, "immovable");
   add(options.islands, "islands");
+  add(options.redundancy, "redundancy");
   return text.empty() ? "none" : text;
 }
 

@@ -59,7 +59,7 @@ Outcome Lagrange<Space, S>::FactorOnce() {
 template <class Space, class S>
 Outcome Lagrange<Space, S>::FactorAugmented() {
   const int n = mechanism_.num_u(), m = mechanism_.num_rows();
-  dynamics_.MassMatrix(kinematics_, mechanism_.bodies(), M_);
+  dynamics_.MassMatrix(kinematics_, Masses::kPhysical, M_);
   augmented_.topLeftCorner(n, n) = M_;
   augmented_.topRightCorner(n, m) = J_.transpose();
   augmented_.bottomLeftCorner(m, n) = J_;
@@ -75,8 +75,8 @@ Outcome Lagrange<Space, S>::FactorAugmented() {
 }
 
 template <class Space, class S>
-void Lagrange<Space, S>::FormResponse(const std::vector<Inertia<Space, S>>& inertias) {
-  dynamics_.MassMatrix(kinematics_, inertias, M_);
+void Lagrange<Space, S>::FormResponse(Masses masses) {
+  dynamics_.MassMatrix(kinematics_, masses, M_);
   mass_factor_.compute(M_);
   if (loop_.size() == 0) return;  // a tree: nothing is constrained
   W_ = J_.transpose();
@@ -85,9 +85,9 @@ void Lagrange<Space, S>::FormResponse(const std::vector<Inertia<Space, S>>& iner
 }
 
 template <class Space, class S>
-void Lagrange<Space, S>::SetScales(const std::vector<Inertia<Space, S>>& inertias) {
+void Lagrange<Space, S>::SetScales(Masses masses) {
   for (int j = 0; j < static_cast<int>(mechanism_.constraints().size()); ++j) {
-    loop_.SetScale(j, FreeResponse(kinematics_, inertias, mechanism_.constraints()[j]));
+    loop_.SetScale(j, FreeResponse(kinematics_, masses, mechanism_.constraints()[j]));
   }
 }
 
@@ -95,18 +95,18 @@ template <class Space, class S>
 Outcome Lagrange<Space, S>::FactorResponse() {
   diagnostics_.rank = Base::LoopRank(0);
   diagnostics_.smallest_weight = 1.0;
-  FormResponse(mechanism_.bodies());
+  FormResponse(Masses::kPhysical);
   if (mass_factor_.info() != Eigen::Success) return Outcome::kNonFinite;
   if (loop_.size() == 0) return Outcome::kFinished;
-  SetScales(mechanism_.bodies());
+  SetScales(Masses::kPhysical);
   if (!loop_.FactorScaled(response_)) {
-    SetScales(mechanism_.geometric_bodies());
-    FormResponse(mechanism_.geometric_bodies());
+    SetScales(Masses::kGeometric);
+    FormResponse(Masses::kGeometric);
     if (!response_.allFinite()) return Outcome::kNonFinite;
     loop_.FactorGeometric(response_);
     diagnostics_.rank = Base::LoopRank(loop_.size() - loop_.rank());
     diagnostics_.smallest_weight = static_cast<double>(loop_.smallest_weight());
-    FormResponse(mechanism_.bodies());
+    FormResponse(Masses::kPhysical);
     if (!loop_.FactorSoftened(response_)) return Outcome::kSingular;
   }
   diagnostics_.rcond = static_cast<double>(loop_.rcond());

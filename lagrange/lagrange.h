@@ -35,9 +35,9 @@ class Lagrange final : public Formulation<Space, S> {
   Outcome FactorOnce();
   Outcome FactorAugmented();
   Outcome FactorResponse();
-  /// W = L^-1 J^T and S = W^T W for the given inertias; leaves the factor of M in mass_factor_.
-  void FormResponse(const std::vector<Inertia<Space, S>>& inertias);
-  void SetScales(const std::vector<Inertia<Space, S>>& inertias);
+  /// W = L^-1 J^T and S = W^T W with these masses; leaves the factor of M in mass_factor_.
+  void FormResponse(Masses masses);
+  void SetScales(Masses masses);
   void SolveConstrained(const VectorX<S>& force, const VectorX<S>& target, VectorX<S>& x,
                         VectorX<S>& lambda) override;
 

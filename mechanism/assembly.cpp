@@ -7,6 +7,7 @@
 
 #include "mechanism/assembly_units.h"
 #include "mechanism/conflict.h"
+#include "mechanism/mobility.h"
 #include "mechanism/tree_dynamics.h"
 
 namespace loopbench {
@@ -255,31 +256,22 @@ class Assembler {
     Fail(DescribeConflict(description_, kinematics_, {left, units, true, Extra(given_cut_)}));
   }
 
-  /// A position where constraints leave no speed free. Singular positions, where they depend on
-  /// each other, have speeds left.
   void CheckMobility() {
-    if (!mechanism_.drives().empty() || mechanism_.num_rows() < mechanism_.num_u()) return;
-    Eigen::Index rank = 0;
-    if (mechanism_.num_u() > 0) {
-      MatrixX<double> J;
-      kinematics_.UpdatePosition(start_.q);
-      dynamics_.Jacobian(kinematics_, J);
-      units_.Apply(units_.rows, J);
-      Eigen::ColPivHouseholderQR<MatrixX<double>> qr(J);
-      qr.setThreshold(2e-4);  // the square root of LoopSolver::kTheta
-      rank = qr.rank();
-    }
-    if (rank < mechanism_.num_u()) return;
+    const std::string why = WhyLocked(mechanism_, start_.q);
+    if (why.empty()) return;
     start_.outcome = Outcome::kLocked;
-    start_.message = mechanism_.name() +
-                     ": nothing can move: " + std::to_string(mechanism_.num_rows()) +
-                     " constraints take all " + std::to_string(mechanism_.num_u()) + " speeds";
+    start_.message = mechanism_.name() + ": nothing can move: " + why;
   }
 
-  /// A length that no position exceeds much, in units: sum of all arms.
+  /// A length that no position exceeds much, in units: the longest arm of a body, or the
+  /// mechanism's own length, for every joint.
   double Extent() const {
-    return mechanism_.length() / units_.length *
-           static_cast<double>(mechanism_.joints().size() + 1);
+    double longest = mechanism_.length();
+    for (const Joint<Space, double>& joint : mechanism_.joints()) {
+      if (joint.from != kGround) longest = std::max(longest, joint.X_PF.p.norm());
+      if (joint.to != kGround) longest = std::max(longest, joint.X_QM.p.norm());
+    }
+    return longest / units_.length * static_cast<double>(mechanism_.joints().size() + 1);
   }
 
   /// A coordinate or speed of a joint that is not in the tree.
@@ -307,12 +299,14 @@ class Assembler {
 template <class Space>
 Start<double> Assemble(const MechanismDescription& description,
                        const Mechanism<Space, double>& mechanism) {
-  if (mechanism.coordinates() == Coordinates::kJoint) {
+  if (mechanism.coordinates() == Coordinates::kJoint && mechanism.released().empty()) {
     return Assembler<Space>(description, mechanism).Run();
   }
-  const Mechanism<Space, double> joints(description, Coordinates::kJoint);
+  // released directions hold, too
+  const Mechanism<Space, double> joints(Unreleased(description), Coordinates::kJoint);
   Start<double> start = Assembler<Space>(description, joints).Run();
   if (start.outcome != Outcome::kFinished) return start;
+  if (mechanism.coordinates() == Coordinates::kJoint) return start;
   Kinematics<Space, double> from(joints), to(mechanism);
   from.UpdatePosition(start.q);
   from.UpdateVelocity(start.u);

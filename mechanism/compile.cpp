@@ -6,6 +6,7 @@
 #include "mechanism/immovable.h"
 #include "mechanism/islands.h"
 #include "mechanism/plane.h"
+#include "mechanism/redundancy.h"
 #include "mechanism/topology.h"
 #include "mechanism/welds.h"
 
@@ -59,6 +60,9 @@ class Compiler {
     if (options_.islands) Split();
     if (options_.planar) {
       for (int part = 0; part < static_cast<int>(result_.parts.size()); ++part) Flatten(part);
+    }
+    if (options_.redundancy) {
+      for (CompiledPart& part : result_.parts) ReleaseRedundant(part.description);
     }
     return std::move(result_);
   }
@@ -184,6 +188,20 @@ class Compiler {
     }
     one.R_WC = plane->R_WC;
     one.description = plane->description;
+  }
+
+  void ReleaseRedundant(MechanismDescription& description) {
+    const Redundancy redundancy = FindRedundancy(description);
+    for (const Released& out : redundancy.released) {
+      for (const int direction : out.directions) {
+        result_.report.push_back("joint \"" + description.joints[out.joint].name +
+                                 "\": " + NameOfDirection(description, out.joint, direction) +
+                                 " is released: the other constraints hold it at every position");
+      }
+    }
+    if (redundancy.released.empty()) return;
+    result_.done.redundancy = true;
+    description = Release(description, redundancy);
   }
 
   CompileOptions options_;

@@ -1,11 +1,12 @@
 // Models only what a scene requires (docs/design.md D9): a description, simplified before it is
 // compiled into a Mechanism, and the way back to the user's bodies and joints.
 //
-// Four savings, in this order, each with its switch:
+// Savings, in this order, each with its switch:
 //   welds      bodies joined by welds become one (welds.h);
 //   immovable  bodies that certainly cannot move become part of Ground (immovable.h);
 //   islands    parts connected through Ground at most become descriptions of their own (islands.h);
-//   planar     a spatial part that moves in parallel planes becomes planar (plane.h).
+//   planar     a spatial part that moves in parallel planes becomes planar (plane.h);
+//   redundancy constraints that say at every position what others say are released (redundancy.h).
 // The motion is the same but for rounding. What a saving does not know, a new kind of joint or
 // force, keeps it from being made.
 #pragma once
@@ -24,10 +25,12 @@ struct CompileOptions {
   bool immovable = true;
   /// Off: an adaptive integrator gives each part its own steps, so a run is another one.
   bool islands = false;
+  bool redundancy = true;
 
   static CompileOptions All() { return {.islands = true}; }
   static CompileOptions None() {
-    return {.planar = false, .welds = false, .immovable = false, .islands = false};
+    return {
+        .planar = false, .welds = false, .immovable = false, .islands = false, .redundancy = false};
   }
   friend bool operator==(const CompileOptions&, const CompileOptions&) = default;
 };

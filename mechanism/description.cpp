@@ -202,4 +202,10 @@ std::string Validate(const MechanismDescription& description) {
   return error.empty() ? "" : description.name + ": " + error;
 }
 
+MechanismDescription Unreleased(const MechanismDescription& description) {
+  MechanismDescription result = description;
+  for (JointDescription& joint : result.joints) joint.released.clear();
+  return result;
+}
+
 }  // namespace loopbench

@@ -83,6 +83,9 @@ struct JointDescription {
   double pitch = 0.0;   ///< of a helical joint: advance along its axis per angle [m/rad]
   double length = 0.0;  ///< of a rod: distance between its two points [m], > 0
   bool cut = false;     ///< never part of the spanning tree (if the graph allows)
+  /// Constrained directions, counted in the order of joint.h's D from 0, that the joint does not
+  /// impose because the others do (redundancy.h). Of cut joints only; none of a user's file.
+  std::vector<int> released;
   std::vector<PrescribedMotion> motions;  ///< at most one per coordinate; none with a quaternion
 };
 
@@ -170,6 +173,9 @@ struct MechanismDescription {
   /// belong to the coordinate set in use are skipped; none at all means: chosen at the start.
   std::vector<std::string> independent;
 };
+
+/// The same with every constrained direction imposed.
+MechanismDescription Unreleased(const MechanismDescription& description);
 
 /// First thing that makes the description unusable, as text ("" when it is usable): masses and
 /// inertias not positive, joints of a body with itself, forces or values on joints of another size,

@@ -134,8 +134,10 @@ bool Formulation<Space, S>::BeginStep(S t, std::span<S> y) {
                         mechanism_.num_rows() > 0 && mechanism_.num_u() > 0;
   if (projects && Project() != Outcome::kFinished) return false;  // likewise
   kinematics_.AcceptStep();
-  const bool changed_gains = ChangeGains(t);
-  const bool changed = ChangeMode() || changed_gains;
+  const S h = t - accepted_t_;
+  accepted_t_ = t;
+  const bool changed_released = ChangeReleased(h), changed_gains = ChangeGains(h);
+  const bool changed = ChangeMode() || changed_released || changed_gains;
   if (changed) ++diagnostics_.mode_changes;
   at_step_end_ = true;
   if (!projects && !changed) return false;
@@ -179,9 +181,7 @@ void Formulation<Space, S>::UpdateFeedback() {
 }
 
 template <class Space, class S>
-bool Formulation<Space, S>::ChangeGains(S t) {
-  const S step = t - accepted_t_;
-  accepted_t_ = t;
+bool Formulation<Space, S>::ChangeGains(S step) {
   if (feedback_.size() == 0 || options_.gains) return false;
   const bool still_growing = step > S(2) * longest_step_;
   longest_step_ = std::max(longest_step_, step);
@@ -189,6 +189,17 @@ bool Formulation<Space, S>::ChangeGains(S t) {
       gains_.alpha > 0.0 ? S(gains_.alpha) * longest_step_ < S(2 * kGainTimesStep) : still_growing;
   if (fits || !(longest_step_ > S(0))) return false;
   gains_.alpha = gains_.beta = static_cast<double>(S(kGainTimesStep) / longest_step_);
+  return true;
+}
+
+template <class Space, class S>
+bool Formulation<Space, S>::ChangeReleased(S h) {
+  if (kinematics_.released().empty()) return false;
+  const std::vector<Released>* better = review_.Review(kinematics_, h);
+  if (better == nullptr) return false;
+  kinematics_.Release(*better);
+  kinematics_.UpdatePosition(q_);
+  kinematics_.UpdateVelocity(u_);
   return true;
 }
 

@@ -18,6 +18,7 @@
 
 #include "mechanism/drives.h"
 #include "mechanism/outcome.h"
+#include "mechanism/release_review.h"
 
 namespace loopbench {
 
@@ -173,8 +174,10 @@ class Formulation {
   void SpeedViolation(VectorX<S>& violation) const;
   /// Feedback at current positions and speeds.
   void UpdateFeedback();
-  /// Gains from the length of the step that ended at t. True when they changed.
-  bool ChangeGains(S t);
+  /// Gains from the length h of the last step. True when they changed.
+  bool ChangeGains(S h);
+  /// Releases other directions where those released serve badly by now. True when it did.
+  bool ChangeReleased(S h);
   /// Accelerations(), unless nothing is free, and whether prescribed motions can be followed.
   Outcome Solve();
 
@@ -188,6 +191,7 @@ class Formulation {
   BaumgarteGains gains_;
   S accepted_t_ = S(0), longest_step_ = S(0);  ///< of accepted steps
   VectorX<S> feedback_;
+  ReleaseReview<Space, S> review_;
 };
 
 }  // namespace loopbench

@@ -33,6 +33,10 @@ int ForwardJacobian<Space>::evaluations() const {
 template <class Space>
 void ForwardJacobian<Space>::Evaluate(Eigen::Ref<MatrixX<double>> jacobian) {
   kinematics_.SetTime(formulation_.kinematics().time());
+  if (const auto& released = formulation_.kinematics().released();
+      released != kinematics_.released()) {
+    kinematics_.Release(released);
+  }
   if (mechanism_.num_u() > 0) formulation_.Multipliers(lambda_now_);
   const int size = formulation_.state_size();
   for (int first = 0; first < size; first += Dual::kWidth) {

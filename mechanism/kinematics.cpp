@@ -1,5 +1,7 @@
 #include "mechanism/kinematics.h"
 
+#include <algorithm>
+
 #include "mechanism/instantiate.h"
 
 namespace loopbench {
@@ -46,10 +48,11 @@ void SetBasisAt(const JointKind<Space, S>& kind, const Rotation<Space, S>& R,
   }
 }
 
-/// Ground axes serve for H and D when their spans do not depend on axes, or when F is fixed.
+/// Ground axes serve for H and D where their spans do not depend on axes: nothing is prescribed or
+/// released of them.
 template <class Space, class S>
-bool TurnsWithBody(const Joint<Space, S>& joint) {
-  return (!joint.kind->isotropic || joint.num_drives > 0) && joint.from != kGround;
+bool AnyAxes(const Joint<Space, S>& joint) {
+  return joint.kind->isotropic && joint.num_drives == 0 && joint.num_released == 0;
 }
 
 }  // namespace
@@ -70,13 +73,34 @@ Kinematics<Space, S>::Kinematics(const Mechanism<Space, S>& mechanism)
     const Joint<Space, S>& joint = mechanism.joints()[j];
     JointState<Space, S>& state = joints_[j];
     state.num_u = joint.num_u();
-    const bool any_axes = joint.kind->isotropic && joint.num_drives == 0;
-    if (joint.kind->basis == nullptr) {
-      SetDirections(joint, any_axes ? Rotation<Space, S>::Identity() : joint.X_PF.R, {}, state);
-    }
+    state.num_rows = joint.num_constraints();
     state.V_rel.setZero();
     state.g.setZero();
   }
+  Release(mechanism.released());
+}
+
+/// Directions that stand still are set once and for all.
+template <class Space, class S>
+void Kinematics<Space, S>::Release(const std::vector<Released>& released) {
+  released_ = released;
+  for (int j = 0; j < static_cast<int>(joints_.size()); ++j) {
+    const Joint<Space, S>& joint = mechanism_->joints()[j];
+    if (joint.kind->basis != nullptr) continue;
+    SetDirections(j, AnyAxes(joint) ? Rotation<Space, S>::Identity() : joint.X_PF.R, {});
+  }
+}
+
+template <class Space, class S>
+int Kinematics<Space, S>::DirectionOf(int index, int row) const {
+  const Joint<Space, S>& joint = mechanism_->joints()[index];
+  int direction = row - joint.num_drives;
+  const auto out = std::ranges::find(released_, index, &Released::joint);
+  if (out == released_.end()) return direction;
+  const int kept = joint.num_constraints() - joint.num_drives;
+  if (direction >= kept) return out->directions[direction - kept];
+  for (const int released : out->directions) direction += released <= direction;
+  return direction;
 }
 
 template <class Space, class S>
@@ -99,21 +123,30 @@ const S* Kinematics<Space, S>::JointCoordinates(const Joint<Space, S>& joint, co
   return room;
 }
 
-/// [H D] in ground axes; directions of prescribed coordinates go from H to the head of D.
+/// [H D] in ground axes; directions of prescribed coordinates go from H to the head of D, released
+/// ones to its end.
 template <class Space, class S>
-void Kinematics<Space, S>::SetDirections(const Joint<Space, S>& joint,
-                                         const Rotation<Space, S>& R_WF, const Pose<Space, S>& X_FM,
-                                         JointState<Space, S>& state) const {
+void Kinematics<Space, S>::SetDirections(int index, const Rotation<Space, S>& R_WF,
+                                         const Pose<Space, S>& X_FM) {
+  const Joint<Space, S>& joint = mechanism_->joints()[index];
+  JointState<Space, S>& state = joints_[index];
   if (joint.kind->basis != nullptr) {
     SetBasisAt<Space, S>(*joint.kind, R_WF, X_FM, state.basis);
   } else {
     SetBasis<Space, S>(*joint.kind, R_WF, state.basis);
   }
-  if (joint.num_drives == 0) return;
+  if (joint.num_drives == 0 && joint.num_released == 0) return;
   const Block<Space, S> all = state.basis;
   int free = 0, driven = joint.num_u();
   for (int i = 0; i < joint.kind->num_u; ++i) {
     state.basis.col(mechanism_->DriveOf(joint, i) >= 0 ? driven++ : free++) = all.col(i);
+  }
+  if (joint.num_released == 0) return;
+  const std::vector<int>& out = std::ranges::find(released_, index, &Released::joint)->directions;
+  int kept = joint.kind->num_u, last = Space::kDim - joint.num_released;
+  for (int i = 0; i < joint.kind->num_constraints(); ++i) {
+    const bool is_out = std::ranges::binary_search(out, i);
+    state.basis.col(is_out ? last++ : kept++) = all.col(joint.kind->num_u + i);
   }
 }
 
@@ -127,8 +160,8 @@ void Kinematics<Space, S>::UpdatePosition(const VectorX<S>& q) {
     state.r_P = X_WM.p - poses_[joint.from].p;
     state.r_Q = X_WM.p - poses_[joint.to].p;
     if (joint.kind->basis != nullptr) measured_[index] = X_FM;
-    if (joint.kind->basis != nullptr || TurnsWithBody(joint)) {
-      SetDirections(joint, X_WF.R, X_FM, state);
+    if (joint.kind->basis != nullptr || (!AnyAxes(joint) && joint.from != kGround)) {
+      SetDirections(index, X_WF.R, X_FM);
     }
   };
   S room[7];

@@ -19,14 +19,16 @@ struct JointState {
   Motion<Space, S> V_rel;     ///< [w_Q - w_P; v_Q - v_P] at Mo
   Motion<Space, S> g;         ///< A_Q - A_P = H udot + g                            (7)
   Block<Space, S> basis;      ///< [H D], orthogonal
-  int num_u = 0;
+  int num_u = 0, num_rows = 0;
 
   auto H() const { return basis.leftCols(num_u); }  ///< motion map
-  /// Constrained directions, those of prescribed coordinates first.
-  auto D() const { return basis.rightCols(Space::kDim - num_u); }
+  /// Constrained directions that are imposed, those of prescribed coordinates first.
+  auto D() const { return basis.middleCols(num_u, num_rows); }
+  /// The same and behind them those that are released (redundancy.h): what the joint is to hold.
+  auto AllD() const { return basis.rightCols(Space::kDim - num_u); }
   auto H(int i) const { return basis.col(i); }
   auto D(int i) const { return basis.col(num_u + i); }
-  int rows() const { return Space::kDim - num_u; }
+  int rows() const { return num_rows; }
 };
 
 template <class Space, class S>
@@ -64,6 +66,14 @@ class Kinematics {
   typename Inertia<Space, S>::Matrix RotationalInverse(const Inertia<Space, S>& inertia,
                                                        int body) const;
 
+  /// Mo of a joint from the centres of P and Q that the masses are at.
+  Linear<Space, S> ArmP(int joint, Masses masses) const {
+    return Arm(mechanism_->joints()[joint].from, joints_[joint].r_P, masses);
+  }
+  Linear<Space, S> ArmQ(int joint, Masses masses) const {
+    return Arm(mechanism_->joints()[joint].to, joints_[joint].r_Q, masses);
+  }
+
   /// Mo of a joint from the ground origin.
   Linear<Space, S> JointPoint(int joint) const {
     return poses_[mechanism_->joints()[joint].from].p + joints_[joint].r_P;
@@ -81,6 +91,14 @@ class Kinematics {
   S JointCoordinate(int joint) const;
   S JointSpeed(int joint) const;
 
+  /// Directions that are not imposed from now on, as many of each joint as the mechanism releases.
+  /// Part of the mode; the positions must be updated afterwards.
+  void Release(const std::vector<Released>& released);
+  const std::vector<Released>& released() const { return released_; }
+  /// Which direction of its kind's D a row of a constraint imposes (not of a prescribed
+  /// coordinate).
+  int DirectionOf(int joint, int row) const;
+
   /// Remembers the coordinates of cut joints, so that the next angles are unwrapped from here.
   /// Called at accepted steps only (the one memory of this class, part of the mode).
   void AcceptStep();
@@ -91,11 +109,14 @@ class Kinematics {
   VectorX<S> SpeedsIn(const Kinematics& other) const;
 
  private:
+  Linear<Space, S> Arm(int body, const Linear<Space, S>& r, Masses masses) const {
+    if (masses == Masses::kPhysical) return r;
+    return r - poses_[body].R * mechanism_->geometric_centre(body);
+  }
   void AddBias(int index, const Joint<Space, S>& joint, JointState<Space, S>& state) const;
   /// Coordinates of a tree joint, prescribed ones among them, in `room`.
   const S* JointCoordinates(const Joint<Space, S>& joint, const VectorX<S>& q, S* room) const;
-  void SetDirections(const Joint<Space, S>& joint, const Rotation<Space, S>& R_WF,
-                     const Pose<Space, S>& X_FM, JointState<Space, S>& state) const;
+  void SetDirections(int index, const Rotation<Space, S>& R_WF, const Pose<Space, S>& X_FM);
   Pose<Space, S> MeasuredPose(const Joint<Space, S>& joint) const;
 
   const Mechanism<Space, S>* mechanism_;
@@ -105,6 +126,7 @@ class Kinematics {
   std::vector<Pose<Space, S>> measured_;  ///< X_FM of constraints and of kinds with a basis
   std::vector<TimeValue<S>> drives_;
   std::vector<S> accepted_;  ///< last accepted coordinate of each joint
+  std::vector<Released> released_;
   VectorX<S> q_, u_;
   S time_ = S(0);
   long position_version_ = 0;

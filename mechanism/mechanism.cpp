@@ -3,9 +3,12 @@
 #include <Eigen/LU>
 #include <algorithm>
 #include <cmath>
+#include <numeric>
+#include <span>
 #include <stdexcept>
 
 #include "mechanism/instantiate.h"
+#include "mechanism/islands.h"
 #include "mechanism/joint_frames.h"
 
 namespace loopbench {
@@ -75,7 +78,7 @@ Mechanism<Space, S>::Mechanism(const MechanismDescription& description, Coordina
   AddJoints(description, BuildTopology(description, coordinates));
   forces_ = CompileForces<Space, S>(description);
   AddStopTimes();
-  AddLength();
+  AddGeometry(description);
   NameSpeeds(description);
 }
 
@@ -161,34 +164,59 @@ void Mechanism<Space, S>::AddJoints(const MechanismDescription& description,
     tree_.push_back({index, edge.parent, edge.child, joint.to == edge.child ? 1 : -1});
   }
   for (int index : topology.constraints) {
-    joints_[index].row = num_rows_;
-    num_rows_ += joints_[index].num_constraints();
+    Joint<Space, S>& joint = joints_[index];
+    if (const std::vector<int>& released = description.joints[index].released; !released.empty()) {
+      joint.num_released = static_cast<int>(released.size());
+      released_.push_back({index, released});
+    }
+    joint.row = num_rows_;
+    num_rows_ += joint.num_constraints();
     constraints_.push_back(index);
   }
 }
 
 template <class Space, class S>
-void Mechanism<Space, S>::AddLength() {
-  S sum = S(0);
-  int count = 0;
+void Mechanism<Space, S>::AddGeometry(const MechanismDescription& description) {
+  using Point = Linear<Space, S>;
+  std::vector<std::vector<Point>> joints_of(bodies_.size());
   for (const Joint<Space, S>& joint : joints_) {
-    if (joint.description < 0) continue;
+    if (joint.num_directions() == 0) continue;  // a free joint holds nothing
     for (const auto& [body, p] : {std::pair{joint.from, joint.X_PF.p}, {joint.to, joint.X_QM.p}}) {
-      if (body == kGround) continue;
-      sum += p.squaredNorm();
-      ++count;
+      if (body != kGround) joints_of[body].push_back(p);
     }
   }
-  using std::sqrt;
-  length_ = sum > S(0) ? sqrt(sum / S(count)) : S(1);
-  Inertia<Space, S> unit;
-  unit.mass = S(1);
-  unit.rotational.setIdentity();
-  unit.rotational *= length_ * length_;
-  unit.rotational_inverse.setIdentity();
-  unit.rotational_inverse /= length_ * length_;
-  geometric_bodies_.assign(bodies_.size(), unit);
-  geometric_bodies_[kGround] = {};
+  geometric_centres_.assign(bodies_.size(), Point::Zero());
+  for (std::size_t body = 0; body < bodies_.size(); ++body) {
+    for (const Point& p : joints_of[body]) {
+      geometric_centres_[body] += p / S(static_cast<int>(joints_of[body].size()));
+    }
+  }
+  const auto length = [&](std::span<const int> bodies) {
+    S sum = S(0), sum_from_com = S(0);
+    int count = 0, all = 0;
+    for (int body : bodies) {
+      all += static_cast<int>(joints_of[body].size());
+      for (const Point& p : joints_of[body]) sum_from_com += p.squaredNorm();
+      if (joints_of[body].size() < 2) continue;
+      count += static_cast<int>(joints_of[body].size());
+      for (const Point& p : joints_of[body]) sum += (p - geometric_centres_[body]).squaredNorm();
+    }
+    using std::sqrt;
+    if (sum > S(0)) return S(sqrt(sum / S(count)));
+    return sum_from_com > S(0) ? S(sqrt(sum_from_com / S(all))) : S(1);
+  };
+  std::vector<int> all(bodies_.size());
+  std::iota(all.begin(), all.end(), 0);
+  length_ = length(all);
+  geometric_bodies_.assign(bodies_.size(), {});
+  for (const Island& island : FindIslands(description)) {
+    const S radius = length(island.bodies);
+    for (int body : island.bodies) {
+      geometric_bodies_[body].mass = S(1);
+      geometric_bodies_[body].rotational.diagonal().setConstant(radius * radius);
+      geometric_bodies_[body].rotational_inverse.diagonal().setConstant(S(1) / (radius * radius));
+    }
+  }
 }
 
 template <class Space, class S>

@@ -21,6 +21,10 @@ struct Inertia {
   Matrix rotational_inverse = Matrix::Zero();
 };
 
+/// Whose mass properties: the bodies', or those that make rank a matter of geometry alone
+/// (docs/design.md D5): unit masses in the middle of each body's joints.
+enum class Masses { kPhysical, kGeometric };
+
 /// Small on purpose: a long chain streams all of it through the cache at every evaluation.
 template <class Space, class S>
 struct Joint {
@@ -30,13 +34,16 @@ struct Joint {
   int row = -1;                         ///< first constraint row; -1 for a tree joint
   int description = -1;                 ///< index of the user's joint, -1 for a virtual free joint
   int first_drive = 0, num_drives = 0;  ///< its prescribed coordinates, in Mechanism::drives()
+  int num_released = 0;                 ///< directions of D that are not imposed (redundancy.h)
   Pose<Space, S> X_PF, X_QM;            ///< seen from the centres of mass of P and Q
 
   bool in_tree() const { return q_offset >= 0; }
   /// What is left of the kind when prescribed coordinates count as constraints.
   int num_q() const { return kind->num_q - num_drives; }
   int num_u() const { return kind->num_u - num_drives; }
-  int num_constraints() const { return kind->num_constraints() + num_drives; }
+  int num_constraints() const { return num_directions() - num_released; }
+  /// Constrained directions, imposed or released.
+  int num_directions() const { return kind->num_constraints() + num_drives; }
 };
 
 /// A prescribed coordinate of a joint: its direction is the first (next, ..) of D.
@@ -44,6 +51,15 @@ struct Drive {
   int joint = 0;
   int coordinate = 0;  ///< of the kind
   TimeFunction value;
+};
+
+/// Directions of one joint that it does not impose (redundancy.h), ascending, counted in D behind
+/// those of prescribed coordinates.
+struct Released {
+  int joint = 0;
+  std::vector<int> directions;
+
+  friend bool operator==(const Released&, const Released&) = default;
 };
 
 /// A tree joint seen from its root side. `sign` is +1 when the child is the joint's Q, else -1.
@@ -88,6 +104,8 @@ class Mechanism {
   }
   const std::vector<TreeStep>& tree() const { return tree_; }
   const std::vector<int>& constraints() const { return constraints_; }  ///< joint indices
+  /// Directions that constraints do not impose at first, by joint; mostly none at all.
+  const std::vector<Released>& released() const { return released_; }
   const ForceElements<Space, S>& forces() const { return forces_; }
   const Linear<Space, S>& gravity() const { return gravity_; }
   /// Whether something supplies or dissipates power: else the total energy stays.
@@ -99,12 +117,18 @@ class Mechanism {
   /// Tree step that carries a body (index into tree()), -1 for Ground.
   int step_of_body(int body) const { return step_of_body_[body]; }
 
-  /// Root mean square distance from centres of mass to joints [m]; 1 when all are zero. The radius
-  /// of gyration of the bodies that decide rank (docs/design.md D5).
+  /// Root mean square distance of joints from the middle of their body's joints [m], over bodies
+  /// with several; without such, of joints from centres of mass; 1 when all are zero.
   S length() const { return length_; }
 
-  /// Mass properties with unit mass and radius of gyration length(): geometry without physics.
-  const std::vector<Inertia<Space, S>>& geometric_bodies() const { return geometric_bodies_; }
+  /// kGeometric: unit masses whose radius of gyration is length() of their own island (islands.h),
+  /// about geometric_centre(): parts of other sizes and far centres of mass say nothing.
+  const std::vector<Inertia<Space, S>>& bodies(Masses masses) const {
+    return masses == Masses::kPhysical ? bodies_ : geometric_bodies_;
+  }
+  /// Middle of a body's joints from its centre of mass, in body axes; zero for Ground and for
+  /// bodies without joints.
+  const Linear<Space, S>& geometric_centre(int body) const { return geometric_centres_[body]; }
 
   /// Names of the speeds: "<joint>" or "<joint>.<component>"; virtual joints carry the body's name.
   const std::vector<std::string>& speed_names() const { return speed_names_; }
@@ -122,13 +146,14 @@ class Mechanism {
   void AddJoints(const MechanismDescription& description, const Topology& topology);
   Joint<Space, S> MakeJoint(const MechanismDescription& description, int index);
   void AddStopTimes();
-  void AddLength();
+  void AddGeometry(const MechanismDescription& description);
   void NameSpeeds(const MechanismDescription& description);
 
   std::string name_;
   Coordinates coordinates_;
   int num_q_ = 0, num_u_ = 0, num_rows_ = 0, num_loops_ = 0, num_joint_speeds_ = 0;
   std::vector<Inertia<Space, S>> bodies_, geometric_bodies_;
+  std::vector<Linear<Space, S>> geometric_centres_;
   std::vector<std::string> body_names_, joint_names_;
   std::vector<Joint<Space, S>> joints_;
   /// Kinds with a parameter of their own; shared by copies of the mechanism.
@@ -137,6 +162,7 @@ class Mechanism {
   std::vector<double> stop_times_;
   std::vector<TreeStep> tree_;
   std::vector<int> constraints_, step_of_body_;
+  std::vector<Released> released_;
   ForceElements<Space, S> forces_;
   Linear<Space, S> gravity_;
   S length_ = S(1);

@@ -21,10 +21,9 @@ struct Scaling {
 template <class Space>
 Scaling Scale(const Kinematics<Space, double>& kinematics) {
   const Mechanism<Space, double>& mechanism = kinematics.mechanism();
-  const auto& unit_bodies = mechanism.geometric_bodies();
   TreeDynamics<Space, double> dynamics(mechanism);
   Eigen::MatrixXd M, J;
-  dynamics.MassMatrix(kinematics, unit_bodies, M);
+  dynamics.MassMatrix(kinematics, Masses::kGeometric, M);
   dynamics.Jacobian(kinematics, J);
   Scaling scaling;
   scaling.L.compute(M);
@@ -36,7 +35,7 @@ Scaling Scale(const Kinematics<Space, double>& kinematics) {
     const Joint<Space, double>& joint = mechanism.joints()[index];
     const int rows = joint.num_constraints();
     if (rows == 0) continue;
-    const JointMatrix<double> free = FreeResponse<Space, double>(kinematics, unit_bodies, index);
+    const JointMatrix<double> free = FreeResponse(kinematics, Masses::kGeometric, index);
     auto block = scaling.B.middleRows(joint.row, rows);
     block = Eigen::LLT<Eigen::MatrixXd>(free).matrixL().solve(Eigen::MatrixXd(block));
     for (int i = 0; i < rows; ++i) scaling.rows.row(joint.row + i) /= std::sqrt(free(i, i));

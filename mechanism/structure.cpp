@@ -2,7 +2,7 @@
 
 #include <Eigen/QR>
 #include <algorithm>
-#include <cmath>
+#include <iterator>
 
 #include "mechanism/scaled_loops.h"
 
@@ -10,13 +10,15 @@ namespace loopbench {
 
 namespace {
 
-/// Rows that a pivoted factorisation leaves over once it has found the rank.
+/// Directions that a pivoted factorisation leaves over at one position once it has found the rank:
+/// given motions that contradict each other, and what is lost only there.
 template <class Space>
-std::vector<RedundantDirection> FindRedundant(const MechanismDescription& description,
-                                              const Mechanism<Space, double>& mechanism,
-                                              const ScaledLoops& scaled) {
-  std::vector<RedundantDirection> redundant;
-  if (scaled.rows.rows() == scaled.rank) return redundant;
+std::vector<RedundantDirection> FindDependent(const MechanismDescription& description,
+                                              const Kinematics<Space, double>& kinematics) {
+  std::vector<RedundantDirection> dependent;
+  const Mechanism<Space, double>& mechanism = kinematics.mechanism();
+  const ScaledLoops scaled = ScaleLoops(kinematics);
+  if (scaled.rows.rows() == scaled.rank) return dependent;
   const Eigen::ColPivHouseholderQR<Eigen::MatrixXd> qr(scaled.rows.transpose());
   const auto& order = qr.colsPermutation().indices();
   std::vector<int> left(order.data() + scaled.rank, order.data() + order.size());
@@ -26,25 +28,16 @@ std::vector<RedundantDirection> FindRedundant(const MechanismDescription& descri
       const Joint<Space, double>& joint = mechanism.joints()[index];
       const int i = row - joint.row;
       if (i < 0 || i >= joint.num_constraints()) continue;
-      // drives stand first in D, in the order of their coordinates
+      // drives stand first in D
       const bool drive = i < joint.num_drives;
-      const int at = drive ? mechanism.drives()[joint.first_drive + i].coordinate
-                           : joint.kind->num_u + i - joint.num_drives;
-      const int component = joint.kind->axes[at];
-      RedundantDirection direction;
-      direction.joint = joint.description;
-      direction.drive = drive;
-      direction.moment = component < Space::kRot;
-      direction.axis = direction.moment ? (Space::kRot == 1 ? 'z' : "xyz"[component])
-                                        : "xyz"[component - Space::kRot];
-      direction.ground_axes = joint.kind->isotropic;
-      const JointType type = description.joints[joint.description].type;
-      if (type == JointType::kRod) direction.axis = 'r', direction.moment = false;
-      if (type == JointType::kUniversal && direction.moment && !drive) direction.axis = 'n';
-      redundant.push_back(direction);
+      dependent.push_back({joint.description,
+                           drive ? "what its given motion prescribes"
+                                 : NameOfDirection(description, joint.description,
+                                                   kinematics.DirectionOf(index, i)),
+                           false});
     }
   }
-  return redundant;
+  return dependent;
 }
 
 template <class Space>
@@ -62,12 +55,25 @@ class Analysis {
     for (int index : mechanism_.constraints()) result_.loops.push_back(FindLoop(index, kinematics));
     result_.analysed = result_.joint_u <= kMostAnalysedSpeeds;
     if (!result_.analysed) return result_;
-    const ScaledLoops here = ScaleLoops(kinematics);
+    const LoopSpectrum here = SpectrumOfLoops(kinematics);
     result_.rank = here.rank;
     result_.singular_values = here.singular_values;
-    const ScaledLoops nearby = Nearby(here, kinematics);
-    result_.rank_nearby = nearby.rank;
-    result_.redundant = FindRedundant(description_, mechanism_, nearby);
+    const Redundancy redundancy = FindRedundancy(description_);
+    for (const Released& out : redundancy.released) {
+      for (const int direction : out.directions) {
+        result_.redundant.push_back(
+            {out.joint, NameOfDirection(description_, out.joint, direction), true});
+      }
+    }
+    const bool driven = !mechanism_.drives().empty();
+    const bool known = redundancy.rows > 0 && !driven;
+    result_.rank_nearby = known ? redundancy.rank : result_.rank;
+    if (!driven) return result_;
+    const MechanismDescription released = Release(description_, redundancy);
+    const Mechanism<Space, double> rest(released, Coordinates::kJoint);
+    Kinematics<Space, double> at_start(rest);
+    at_start.UpdatePosition(result_.start.q);
+    std::ranges::copy(FindDependent(description_, at_start), std::back_inserter(result_.redundant));
     return result_;
   }
 
@@ -83,6 +89,10 @@ class Analysis {
     result_.joint_u = mechanism_.num_u();
     result_.absolute_q = absolute.num_q();
     result_.absolute_u = absolute.num_u();
+    result_.length = mechanism_.length();
+    for (int body = 0; body < mechanism_.num_bodies(); ++body) {
+      result_.centre_distances.push_back(mechanism_.geometric_centre(body).norm());
+    }
     result_.counted_freedom = Space::kDim * result_.bodies - result_.rows;
   }
 
@@ -121,44 +131,6 @@ class Analysis {
     loop.open_rotation = open.template head<Space::kRot>().norm();
     loop.open_shift = open.template tail<Space::kLin>().norm();
     return loop;
-  }
-
-  /// The loops a little way along a motion they permit; `here` where nothing moves.
-  ScaledLoops Nearby(const ScaledLoops& here, const Kinematics<Space, double>& kinematics) const {
-    const bool assembled = result_.start.outcome != Outcome::kInconsistentStart;
-    if (here.to_u.cols() == 0 || here.rank == here.rows.rows() || !assembled) return here;
-    // along a given motion the start cannot be moved without its time
-    if (!mechanism_.drives().empty()) return here;
-    // no special direction: an irrational mixture of all of them
-    Eigen::VectorXd mixture(here.to_u.cols());
-    for (Eigen::Index i = 0; i < mixture.size(); ++i)
-      mixture[i] = std::cos(1.0 + static_cast<double>(i * i));
-    Eigen::VectorXd u = here.to_u * mixture;
-    u *= kNearby / u.lpNorm<Eigen::Infinity>();
-    VectorX<double> q_rate(mechanism_.num_q());
-    mechanism_.Rates(result_.start.q, u, q_rate);
-    const VectorX<double> q = result_.start.q + q_rate;
-
-    MechanismDescription moved = description_;
-    moved.initial = {};
-    for (JointDescription& joint : moved.joints) joint.cut = false;
-    for (int index : mechanism_.constraints()) moved.joints[index].cut = true;  // the same forest
-    for (const TreeStep& step : mechanism_.tree()) {
-      const Joint<Space, double>& joint = mechanism_.joints()[step.joint];
-      if (joint.description < 0 || joint.kind->num_q == 0) continue;
-      const double* first = q.data() + joint.q_offset;
-      moved.initial.coordinates.push_back(
-          {joint.description, std::vector<double>(first, first + joint.kind->num_q)});
-    }
-    const Mechanism<Space, double> mechanism(moved, Coordinates::kJoint);
-    const Start<double> start = Assemble<Space>(moved, mechanism);
-    if (start.outcome != Outcome::kFinished || mechanism.num_q() != kinematics.mechanism().num_q())
-      return here;
-    Kinematics<Space, double> there(mechanism);
-    there.UpdatePosition(start.q);
-    ScaledLoops nearby = ScaleLoops(there);
-    // fewer than here would be an accident of the second position
-    return nearby.rank >= here.rank ? nearby : here;
   }
 
   const MechanismDescription& description_;

@@ -1,22 +1,17 @@
 // What a description amounts to at its start: loops, freedom, rank, redundant constraints.
 //
-// Rank is decided on geometry alone (scaled_loops.h). One position cannot tell a constraint that is
-// redundant everywhere from one that is lost only there, so a second position is looked at: the
-// start moved by kNearby along a direction that the loops permit, and assembled again. Numbers
-// only; the harness prints them.
+// Rank is decided on geometry alone (scaled_loops.h), at the start and at other positions that the
+// loops admit (redundancy.h). Numbers only; the harness prints them.
 #pragma once
 
+#include <string>
 #include <vector>
 
 #include "mechanism/assembly.h"
 #include "mechanism/islands.h"
+#include "mechanism/redundancy.h"
 
 namespace loopbench {
-
-/// How far the second position is from the start [rad or m, largest coordinate].
-inline constexpr double kNearby = 0.05;
-/// Speeds of the forest above which rank is not analysed: the matrices are dense.
-inline constexpr int kMostAnalysedSpeeds = 2000;
 
 /// One independent loop, closed by its cut joint.
 struct LoopPath {
@@ -30,12 +25,8 @@ struct LoopPath {
 /// A constrained direction of a cut joint that says what the others say already.
 struct RedundantDirection {
   int joint = 0;
-  bool moment = false;  ///< a moment about the axis, else a force along it
-  /// x, y or z (in the plane moments are about z); r: along a rod; n: about the normal of a
-  /// universal joint's two axes.
-  char axis = 'x';
-  bool drive = false;        ///< the direction of a prescribed coordinate
-  bool ground_axes = false;  ///< the axes are Ground's (planar pins, welds), else the joint's F
+  std::string name;       ///< in words
+  bool released = false;  ///< at every position, so that runs do not impose it (redundancy.h)
 };
 
 struct Structure {
@@ -49,26 +40,32 @@ struct Structure {
   /// Freedom by counting (Gruebler, Kutzbach): 3 or 6 per body less `rows`. Wrong where constraints
   /// are redundant.
   int counted_freedom = 0;
+  double length = 1.0;                   ///< Mechanism::length() [m]
+  std::vector<double> centre_distances;  ///< of centres of mass from the middle of the joints [m]
   std::vector<Island> islands;
   std::vector<LoopPath> loops;
   Start<double> start;  ///< as Assemble() left it, also where it failed
 
   bool analysed = false;  ///< whether what follows is known
   int rank = 0;           ///< of the cut joints' constraints at the start
-  int rank_nearby = 0;    ///< the same at the second position; `rank` where there is none
+  int rank_nearby = 0;    ///< at generic positions; `rank` where motions are prescribed
   /// Singular values of the scaled loops at the start, falling.
   Eigen::VectorXd singular_values;
-  /// Constraints that can be dropped together, at the second position; loop_rows - rank_nearby.
+  /// Constraints that can be dropped together; loop_rows - rank_nearby.
   std::vector<RedundantDirection> redundant;
 
-  int freedom() const { return joint_u - rank_nearby; }
+  /// Independent motions that lead somewhere.
+  int freedom() const { return locked() ? 0 : joint_u - rank_nearby; }
   /// Independent motions to first order, where the start is; more than freedom() where it is
   /// singular.
   int freedom_at_start() const { return joint_u - rank; }
-  bool singular_start() const { return rank_nearby > rank; }
+  bool singular_start() const { return rank_nearby > rank || (locked() && freedom_at_start() > 0); }
   /// Smallest singular value that counts, over the largest; 1 without loops.
   double conditioning() const;
-  bool locked() const { return analysed && freedom_at_start() == 0; }
+  /// Nothing moves, to first order or (Start::message) at all.
+  bool locked() const {
+    return analysed && (freedom_at_start() == 0 || start.outcome == Outcome::kLocked);
+  }
 };
 
 /// Throws std::invalid_argument for a description that Validate() refuses.

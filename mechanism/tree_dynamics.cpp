@@ -1,5 +1,7 @@
 #include "mechanism/tree_dynamics.h"
 
+#include <utility>
+
 #include "mechanism/instantiate.h"
 
 namespace loopbench {
@@ -13,6 +15,11 @@ struct Arms {
   Arms(const TreeStep& step, const JointState<Space, S>& state)
       : parent(step.sign > 0 ? state.r_P : state.r_Q),
         child(step.sign > 0 ? Linear<Space, S>(-state.r_Q) : Linear<Space, S>(-state.r_P)) {}
+  Arms(const TreeStep& step, const Kinematics<Space, S>& kinematics, Masses masses)
+      : parent(kinematics.ArmP(step.joint, masses)), child(kinematics.ArmQ(step.joint, masses)) {
+    if (step.sign < 0) std::swap(parent, child);
+    child = -child;
+  }
 };
 
 /// X^T I X for a shift of the reference point by r: inertia seen from c instead of c + r.
@@ -35,10 +42,10 @@ TreeDynamics<Space, S>::TreeDynamics(const Mechanism<Space, S>& mechanism)
       composite_(mechanism.num_bodies(), Block<Space, S>::Zero()) {}
 
 template <class Space, class S>
-void TreeDynamics<Space, S>::MassMatrix(const Kinematics<Space, S>& kinematics,
-                                        const std::vector<Inertia<Space, S>>& inertias,
+void TreeDynamics<Space, S>::MassMatrix(const Kinematics<Space, S>& kinematics, Masses masses,
                                         MatrixX<S>& M) {
   const Mechanism<Space, S>& mechanism = kinematics.mechanism();
+  const std::vector<Inertia<Space, S>>& inertias = mechanism.bodies(masses);
   const auto& tree = mechanism.tree();
   M.setZero(mechanism.num_u(), mechanism.num_u());
   for (int body = 1; body < mechanism.num_bodies(); ++body) {
@@ -51,7 +58,7 @@ void TreeDynamics<Space, S>::MassMatrix(const Kinematics<Space, S>& kinematics,
   for (auto step = tree.rbegin(); step != tree.rend(); ++step) {
     const JointState<Space, S>& state = kinematics.joints()[step->joint];
     const Joint<Space, S>& joint = mechanism.joints()[step->joint];
-    const Arms<Space, S> arms(*step, state);
+    const Arms<Space, S> arms(*step, kinematics, masses);
     for (int i = 0; i < joint.num_u(); ++i) {
       // momentum of the subtree moving along direction i, carried rootward
       const Motion<Space, S> h = state.H(i) * S(step->sign);
@@ -60,7 +67,7 @@ void TreeDynamics<Space, S>::MassMatrix(const Kinematics<Space, S>& kinematics,
         const TreeStep& at = tree[s];
         const JointState<Space, S>& at_state = kinematics.joints()[at.joint];
         const Joint<Space, S>& at_joint = mechanism.joints()[at.joint];
-        const Arms<Space, S> at_arms(at, at_state);
+        const Arms<Space, S> at_arms(at, kinematics, masses);
         F = ShiftForce<Space, S>(F, at_arms.child);
         for (int k = 0; k < at_joint.num_u(); ++k) {
           const S value = S(at.sign) * at_state.H(k).dot(F);
@@ -175,28 +182,37 @@ void TreeDynamics<Space, S>::AlongForest(const Kinematics<Space, S>& kinematics,
 template <class Space, class S>
 void TreeDynamics<Space, S>::Jacobian(const Kinematics<Space, S>& kinematics, MatrixX<S>& J) const {
   const Mechanism<Space, S>& mechanism = kinematics.mechanism();
-  J.setZero(mechanism.num_rows(), mechanism.num_u());
+  J.resize(mechanism.num_rows(), mechanism.num_u());
   for (int index : mechanism.constraints()) {
-    const Joint<Space, S>& constraint = mechanism.joints()[index];
-    const JointState<Space, S>& state = kinematics.joints()[index];
-    const Linear<Space, S> p = kinematics.JointPoint(index);
-    for (int side = 0; side < 2; ++side) {
-      const S sign = side == 0 ? S(1) : S(-1);
-      int s = mechanism.step_of_body(side == 0 ? constraint.to : constraint.from);
-      while (s >= 0) {
-        const TreeStep& step = mechanism.tree()[s];
-        const JointState<Space, S>& moving = kinematics.joints()[step.joint];
-        const Joint<Space, S>& joint = mechanism.joints()[step.joint];
-        const Linear<Space, S> arm = p - kinematics.JointPoint(step.joint);
-        for (int i = 0; i < joint.num_u(); ++i) {
-          const Motion<Space, S> h = moving.H(i) * (sign * S(step.sign));
-          const Motion<Space, S> at_constraint = ShiftMotion<Space, S>(h, arm);
-          for (int r = 0; r < constraint.num_constraints(); ++r) {
-            J(constraint.row + r, joint.u_offset + i) += state.D(r).dot(at_constraint);
-          }
+    const Joint<Space, S>& joint = mechanism.joints()[index];
+    JacobianOf(kinematics, index, J.middleRows(joint.row, joint.num_constraints()));
+  }
+}
+
+template <class Space, class S>
+void TreeDynamics<Space, S>::JacobianOf(const Kinematics<Space, S>& kinematics, int index,
+                                        Eigen::Ref<MatrixX<S>> rows) const {
+  const Mechanism<Space, S>& mechanism = kinematics.mechanism();
+  const Joint<Space, S>& constraint = mechanism.joints()[index];
+  const JointState<Space, S>& state = kinematics.joints()[index];
+  const Linear<Space, S> p = kinematics.JointPoint(index);
+  rows.setZero();
+  for (int side = 0; side < 2; ++side) {
+    const S sign = side == 0 ? S(1) : S(-1);
+    int s = mechanism.step_of_body(side == 0 ? constraint.to : constraint.from);
+    while (s >= 0) {
+      const TreeStep& step = mechanism.tree()[s];
+      const JointState<Space, S>& moving = kinematics.joints()[step.joint];
+      const Joint<Space, S>& joint = mechanism.joints()[step.joint];
+      const Linear<Space, S> arm = p - kinematics.JointPoint(step.joint);
+      for (int i = 0; i < joint.num_u(); ++i) {
+        const Motion<Space, S> h = moving.H(i) * (sign * S(step.sign));
+        const Motion<Space, S> at_constraint = ShiftMotion<Space, S>(h, arm);
+        for (Eigen::Index r = 0; r < rows.rows(); ++r) {
+          rows(r, joint.u_offset + i) += state.D(static_cast<int>(r)).dot(at_constraint);
         }
-        s = mechanism.step_of_body(step.parent);
       }
+      s = mechanism.step_of_body(step.parent);
     }
   }
 }
@@ -238,21 +254,23 @@ Motion<Space, S> JointAcceleration(const Kinematics<Space, S>& kinematics, int i
                                kinematics.Centripetal(joint.from, state.r_P);
   const Motion<Space, S> rest = A_Q - A_P - state.g;
   Motion<Space, S> result = Motion<Space, S>::Zero();
-  for (int r = 0; r < joint.num_constraints(); ++r) result[r] = state.D(r).dot(rest);
+  for (int r = 0; r < joint.num_directions(); ++r) result[r] = state.D(r).dot(rest);
   return result;
 }
 
 template <class Space, class S>
-JointMatrix<S> FreeResponse(const Kinematics<Space, S>& kinematics,
-                            const std::vector<Inertia<Space, S>>& inertias, int index) {
+JointMatrix<S> FreeResponse(const Kinematics<Space, S>& kinematics, Masses masses, int index,
+                            bool all_directions) {
   const Joint<Space, S>& joint = kinematics.mechanism().joints()[index];
+  const std::vector<Inertia<Space, S>>& inertias = kinematics.mechanism().bodies(masses);
   const JointState<Space, S>& state = kinematics.joints()[index];
-  const int rows = joint.num_constraints();
+  const int rows = all_directions ? joint.num_directions() : joint.num_constraints();
   JointMatrix<S> X = JointMatrix<S>::Zero(rows, rows);
   for (int side = 0; side < 2; ++side) {
     const int body = side == 0 ? joint.to : joint.from;
     if (body == kGround) continue;
-    const Linear<Space, S>& r = side == 0 ? state.r_Q : state.r_P;
+    const Linear<Space, S> r =
+        side == 0 ? kinematics.ArmQ(index, masses) : kinematics.ArmP(index, masses);
     const auto inverse = kinematics.RotationalInverse(inertias[body], body);
     for (int a = 0; a < rows; ++a) {
       const Motion<Space, S> D_a = state.D(a);
@@ -276,8 +294,7 @@ JointMatrix<S> FreeResponse(const Kinematics<Space, S>& kinematics,
   template void SpeedBias(Kinematics<Space, S>&, const VectorX<S>&, VectorX<S>&); \
   template Motion<Space, S> JointAcceleration(const Kinematics<Space, S>&, int,   \
                                               std::span<const Motion<Space, S>>); \
-  template JointMatrix<S> FreeResponse(const Kinematics<Space, S>&,               \
-                                       const std::vector<Inertia<Space, S>>&, int);
+  template JointMatrix<S> FreeResponse(const Kinematics<Space, S>&, Masses, int, bool);
 LOOPBENCH_FOR_EACH_SPACE_AND_MODEL_SCALAR(LOOPBENCH_INSTANTIATE)
 #undef LOOPBENCH_INSTANTIATE
 

@@ -22,9 +22,8 @@ class TreeDynamics {
  public:
   explicit TreeDynamics(const Mechanism<Space, S>& mechanism);
 
-  /// Mass matrix of the forest with the given body inertias (num_u x num_u, both triangles).
-  void MassMatrix(const Kinematics<Space, S>& kinematics,
-                  const std::vector<Inertia<Space, S>>& inertias, MatrixX<S>& M);
+  /// Mass matrix of the forest (num_u x num_u, both triangles).
+  void MassMatrix(const Kinematics<Space, S>& kinematics, Masses masses, MatrixX<S>& M);
 
   /// h: what the speeds alone cost, minus applied forces. Leaves the accelerations for udot = 0 in
   /// place for JacobianBias().
@@ -32,6 +31,9 @@ class TreeDynamics {
 
   /// J (num_rows x num_u).
   void Jacobian(const Kinematics<Space, S>& kinematics, MatrixX<S>& J) const;
+  /// Its rows for the first rows.rows() of all directions of one constraint, imposed or not.
+  void JacobianOf(const Kinematics<Space, S>& kinematics, int joint,
+                  Eigen::Ref<MatrixX<S>> rows) const;
 
   /// gamma, after Bias().
   void JacobianBias(const Kinematics<Space, S>& kinematics, VectorX<S>& gamma) const;
@@ -71,15 +73,16 @@ template <class Space, class S>
 void SpeedBias(Kinematics<Space, S>& kinematics, const VectorX<S>& zero, VectorX<S>& bias);
 
 /// D^T (A_Q - A_P - g) of one joint from the accelerations of all centres of mass: zero when the
-/// joint is satisfied at acceleration level. At most Space::kDim numbers.
+/// joint is satisfied at acceleration level. A number per direction, imposed ones first.
 template <class Space, class S>
 Motion<Space, S> JointAcceleration(const Kinematics<Space, S>& kinematics, int joint,
                                    std::span<const Motion<Space, S>> A);
 
 /// Response D^T (S M^-1 S^T) D of the two bodies of a joint when nothing else holds them, the scale
-/// against which the response of the assembled mechanism is judged (docs/design.md D5).
+/// against which the response of the assembled mechanism is judged (docs/design.md D5): of the
+/// directions imposed, or of all.
 template <class Space, class S>
-JointMatrix<S> FreeResponse(const Kinematics<Space, S>& kinematics,
-                            const std::vector<Inertia<Space, S>>& inertias, int joint);
+JointMatrix<S> FreeResponse(const Kinematics<Space, S>& kinematics, Masses masses, int joint,
+                            bool all_directions = false);
 
 }  // namespace loopbench

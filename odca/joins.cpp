@@ -65,19 +65,20 @@ template <class Space, class S>
 Outcome Joins<Space, S>::Assemble(const Kinematics<Space, S>& kinematics) {
   operations_ = 0;
   softened_ = false;
-  if (AssembleAll(kinematics, mechanism_.bodies(), Pass::kPhysical)) return Outcome::kFinished;
+  if (AssembleAll(kinematics, Pass::kPhysical)) return Outcome::kFinished;
   if (solver_ == SolverKind::kAsPublished) return Outcome::kSingular;
   if (!std::isfinite(static_cast<double>(rcond_))) return Outcome::kNonFinite;
   // a loop looks degenerate: let geometry say in which directions, then solve the physics
   softened_ = true;
-  AssembleAll(kinematics, mechanism_.geometric_bodies(), Pass::kGeometric);
-  if (AssembleAll(kinematics, mechanism_.bodies(), Pass::kSoftened)) return Outcome::kFinished;
+  AssembleAll(kinematics, Pass::kGeometric);
+  if (AssembleAll(kinematics, Pass::kSoftened)) return Outcome::kFinished;
   return std::isfinite(static_cast<double>(rcond_)) ? Outcome::kSingular : Outcome::kNonFinite;
 }
 
 template <class Space, class S>
-bool Joins<Space, S>::AssembleAll(const Kinematics<Space, S>& kinematics,
-                                  const std::vector<Inertia<Space, S>>& inertias, Pass pass) {
+bool Joins<Space, S>::AssembleAll(const Kinematics<Space, S>& kinematics, Pass pass) {
+  const Masses masses = pass == Pass::kGeometric ? Masses::kGeometric : Masses::kPhysical;
+  const std::vector<Inertia<Space, S>>& inertias = mechanism_.bodies(masses);
   if (pass != Pass::kSoftened) {
     dependent_rows_ = 0;
     worst_joint_ = -1;
@@ -92,10 +93,10 @@ bool Joins<Space, S>::AssembleAll(const Kinematics<Space, S>& kinematics,
         FillLeaf(kinematics, inertias[child + 1], child);
       }
     }
-    FillJoints(kinematics, node);
+    FillJoints(kinematics, masses, node);
     FormResponse(node, place);
-    const bool ok = node.closes_loop ? FactorLoop(kinematics, node, place, pass, inertias)
-                                     : FactorFloating(node, place);
+    const bool ok =
+        node.closes_loop ? FactorLoop(kinematics, node, place, pass) : FactorFloating(node, place);
     if (!ok) return false;
     ApplyToKept(node, place);
     Eliminate(node, place);
@@ -115,14 +116,17 @@ void Joins<Space, S>::FillLeaf(const Kinematics<Space, S>& kinematics,
 }
 
 template <class Space, class S>
-void Joins<Space, S>::FillJoints(const Kinematics<Space, S>& kinematics, const PlanNode& node) {
+void Joins<Space, S>::FillJoints(const Kinematics<Space, S>& kinematics, Masses masses,
+                                 const PlanNode& node) {
   for (const NodeJoint& joint : node.joints) {
     const JointState<Space, S>& state = kinematics.joints()[joint.index];
+    const Linear<Space, S> r_P = kinematics.ArmP(joint.index, masses);
+    const Linear<Space, S> r_Q = kinematics.ArmQ(joint.index, masses);
     Motion<Space, S>* c = &c_[c_offset_[joint.index]];
     for (int i = 0; i < joint.rows; ++i) {
       const Motion<Space, S> D_i = state.D(i);
-      c[i] = -ShiftForce<Space, S>(D_i, state.r_P);
-      c[joint.rows + i] = ShiftForce<Space, S>(D_i, state.r_Q);
+      c[i] = -ShiftForce<Space, S>(D_i, r_P);
+      c[joint.rows + i] = ShiftForce<Space, S>(D_i, r_Q);
     }
   }
 }
@@ -197,8 +201,8 @@ bool Joins<Space, S>::FactorFloating(const PlanNode& node, const Place& place) {
 
 template <class Space, class S>
 bool Joins<Space, S>::FactorLoop(const Kinematics<Space, S>& kinematics, const PlanNode& node,
-                                 const Place& place, Pass pass,
-                                 const std::vector<Inertia<Space, S>>& inertias) {
+                                 const Place& place, Pass pass) {
+  const Masses masses = pass == Pass::kGeometric ? Masses::kGeometric : Masses::kPhysical;
   LoopSolver<S>& loop = loops_[place.loop];
   const Eigen::Map<const MatrixX<S>> X(&X_[place.x], node.rows, node.rows);
   operations_ += static_cast<long>(node.rows) * node.rows * node.rows / 6 + node.rows;
@@ -208,7 +212,7 @@ bool Joins<Space, S>::FactorLoop(const Kinematics<Space, S>& kinematics, const P
     // ladders in space, whose pivots are zero, leave at most 0.6 eps per body. 64 is a margin.
     S scale = S(0);
     for (const NodeJoint& joint : node.joints) {
-      const auto free = FreeResponse(kinematics, inertias, joint.index);
+      const auto free = FreeResponse(kinematics, masses, joint.index);
       scale = std::max(scale, free.diagonal().maxCoeff());
     }
     const S eps = std::numeric_limits<S>::epsilon();
@@ -218,7 +222,7 @@ bool Joins<Space, S>::FactorLoop(const Kinematics<Space, S>& kinematics, const P
   }
   if (pass != Pass::kSoftened) {
     for (int j = 0; j < static_cast<int>(node.joints.size()); ++j) {
-      loop.SetScale(j, FreeResponse(kinematics, inertias, node.joints[j].index));
+      loop.SetScale(j, FreeResponse(kinematics, masses, node.joints[j].index));
     }
   }
   if (pass == Pass::kPhysical) {

@@ -81,14 +81,13 @@ class Joins {
   };
   enum class Pass { kPhysical, kGeometric, kSoftened };
 
-  bool AssembleAll(const Kinematics<Space, S>& kinematics,
-                   const std::vector<Inertia<Space, S>>& inertias, Pass pass);
+  bool AssembleAll(const Kinematics<Space, S>& kinematics, Pass pass);
   void FillLeaf(const Kinematics<Space, S>& kinematics, const Inertia<Space, S>& inertia, int n);
-  void FillJoints(const Kinematics<Space, S>& kinematics, const PlanNode& node);
+  void FillJoints(const Kinematics<Space, S>& kinematics, Masses masses, const PlanNode& node);
   void FormResponse(const PlanNode& node, const Place& place);
   bool FactorFloating(const PlanNode& node, const Place& place);
   bool FactorLoop(const Kinematics<Space, S>& kinematics, const PlanNode& node, const Place& place,
-                  Pass pass, const std::vector<Inertia<Space, S>>& inertias);
+                  Pass pass);
   void ApplyToKept(const PlanNode& node, const Place& place);
   void Eliminate(const PlanNode& node, const Place& place);
   void NoteDiagnostics(const PlanNode& node, const LoopSolver<S>& loop);

@@ -29,8 +29,7 @@ void NullSpace<Space, S>::Factor(const Kinematics<Space, S>& kinematics,
                                  TreeDynamics<Space, S>& dynamics, const MatrixX<S>& J) {
   using std::expm1;
   using std::sqrt;
-  const auto& unit_bodies = mechanism_.geometric_bodies();
-  dynamics.MassMatrix(kinematics, unit_bodies, M_g_);
+  dynamics.MassMatrix(kinematics, Masses::kGeometric, M_g_);
   L_.compute(M_g_);
   // B^T = L^-1 J^T by columns of J's rows, then K^-1 from the left
   B_ = J;
@@ -42,7 +41,7 @@ void NullSpace<Space, S>::Factor(const Kinematics<Space, S>& kinematics,
   for (std::size_t k = 0; k < K_.size(); ++k) {
     const int index = mechanism_.constraints()[k];
     const Joint<Space, S>& joint = mechanism_.joints()[index];
-    const Eigen::LLT<JointMatrix<S>> free(FreeResponse(kinematics, unit_bodies, index));
+    const Eigen::LLT<JointMatrix<S>> free(FreeResponse(kinematics, Masses::kGeometric, index));
     K_[k] = free.matrixL();
     auto block = B_.middleRows(joint.row, joint.num_constraints());
     K_[k].template triangularView<Eigen::Lower>().solveInPlace(block);

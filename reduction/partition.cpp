@@ -34,11 +34,10 @@ int GeometricRank(const Kinematics<Space, S>& kinematics, TreeDynamics<Space, S>
   LoopSolver<S> loop(rows);
   if (loop.size() == 0 || mechanism.num_u() == 0) return 0;
   for (int j = 0; j < static_cast<int>(rows.size()); ++j) {
-    loop.SetScale(
-        j, FreeResponse(kinematics, mechanism.geometric_bodies(), mechanism.constraints()[j]));
+    loop.SetScale(j, FreeResponse(kinematics, Masses::kGeometric, mechanism.constraints()[j]));
   }
   MatrixX<S> M;
-  dynamics.MassMatrix(kinematics, mechanism.geometric_bodies(), M);
+  dynamics.MassMatrix(kinematics, Masses::kGeometric, M);
   const MatrixX<S> response = J * M.llt().solve(J.transpose());
   loop.FactorGeometric(response);
   return loop.rank();

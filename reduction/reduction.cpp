@@ -162,7 +162,7 @@ template <class Space, class S>
 Outcome Reduction<Space, S>::Correct(const VectorX<S>& violation, VectorX<S>& change) {
   if (const Outcome outcome = FactorOnce(); outcome != Outcome::kFinished) return outcome;
   if (uses_null_space_) {
-    dynamics_.MassMatrix(kinematics_, mechanism_.bodies(), M_);
+    dynamics_.MassMatrix(kinematics_, Masses::kPhysical, M_);
     residual_.setZero();
     gamma_ = -violation;
     const bool solved = null_space_->Accelerate(M_, residual_, gamma_, change);
@@ -179,7 +179,7 @@ Outcome Reduction<Space, S>::Correct(const VectorX<S>& violation, VectorX<S>& ch
 template <class Space, class S>
 Outcome Reduction<Space, S>::Accelerations() {
   if (const Outcome outcome = FactorOnce(); outcome != Outcome::kFinished) return outcome;
-  dynamics_.MassMatrix(kinematics_, mechanism_.bodies(), M_);
+  dynamics_.MassMatrix(kinematics_, Masses::kPhysical, M_);
   dynamics_.Bias(kinematics_, h_);
   dynamics_.JacobianBias(kinematics_, gamma_);
   if (Base::feedback().size() > 0) gamma_ -= Base::feedback();

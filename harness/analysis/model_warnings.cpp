@@ -29,7 +29,10 @@ void AddRankWarnings(const MechanismDescription& description, const Structure& s
   }
   const bool driven = std::ranges::any_of(
       description.joints, [](const JointDescription& joint) { return !joint.motions.empty(); });
-  if (structure.locked() && structure.bodies > 0 && !driven) {
+  const bool locked = structure.locked() && structure.bodies > 0 && !driven;
+  if (locked && structure.freedom_at_start() > 0) {
+    warnings->push_back({WarningKind::kLocked, structure.start.message});
+  } else if (locked) {
     std::string joints;
     for (const LoopPath& loop : structure.loops) {
       joints += (joints.empty() ? "" : ", ") + description.joints[loop.cut_joint].name;
@@ -38,8 +41,7 @@ void AddRankWarnings(const MechanismDescription& description, const Structure& s
         {WarningKind::kLocked,
          fmt::format("{} is locked: its joints{} leave no motion at the start", description.name,
                      joints.empty() ? "" : " and the loops closed by " + joints)});
-  }
-  if (structure.singular_start()) {
+  } else if (structure.singular_start()) {
     warnings->push_back({WarningKind::kSingularStart,
                          fmt::format("the start is a singular position: rank {} there, {} close by",
                                      structure.rank, structure.rank_nearby)});
@@ -77,6 +79,15 @@ std::vector<Warning> FindWarnings(const MechanismDescription& description,
     warnings.push_back(
         {WarningKind::kMassRatio, fmt::format("{} has {:.3g} times the mass of {}", heavy->name,
                                               heavy->mass / light->mass, light->name)});
+  }
+  for (std::size_t body = 1; body < description.bodies.size(); ++body) {
+    const double distance = structure.centre_distances[body];
+    if (distance <= kFarthestCentre * structure.length) continue;
+    warnings.push_back(
+        {WarningKind::kFarCentre,
+         fmt::format("the centre of mass of {} is {:.3g} m from the middle of its joints, {:.3g} "
+                     "times the mechanism's length: positions lose as many digits",
+                     description.bodies[body].name, distance, distance / structure.length)});
   }
   return warnings;
 }

@@ -15,6 +15,7 @@ enum class WarningKind {
   kNearSingular,       ///< the loops are almost dependent at the start: bodies nearly in line
   kFloating,           ///< a part that no joint connects to ground
   kMassRatio,          ///< masses further apart than their equations can resolve well
+  kFarCentre,          ///< a centre of mass so far from its joints that poses lose digits
   kNotAnalysed,        ///< too large for an analysis of rank
 };
 
@@ -29,6 +30,11 @@ inline constexpr double kLargestMassRatio = 1e8;
 /// in the loops are then some hundred times those that cause them. The scenes of the paper stay
 /// above 0.1 but at their singular positions.
 inline constexpr double kNearSingularRatio = 1e-2;
+
+/// Distance of a centre of mass from the middle of its joints over the mechanism's length: poses go
+/// through centres of mass, so that joints know their places to eps times as much; beyond this a
+/// tolerance of 1e-12 cannot be met.
+inline constexpr double kFarthestCentre = 1e3;
 
 std::vector<Warning> FindWarnings(const MechanismDescription& description,
                                   const Structure& structure);

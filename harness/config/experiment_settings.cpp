@@ -27,11 +27,15 @@ void ReadLimits(const JsonNode& root, Limits* limits) {
 
 void ReadCompile(const JsonNode& root, CompileOptions* options) {
   const auto node = root.Optional("compile");
-  if (!node || !node->ExpectObject({"planar", "welds", "immovable", "islands"})) return;
+  if (!node || !node->ExpectObject({"planar", "welds", "immovable", "islands", "redundancy"}))
+    return;
   if (const auto planar = node->Optional("planar")) options->planar = planar->Bool();
   if (const auto welds = node->Optional("welds")) options->welds = welds->Bool();
   if (const auto immovable = node->Optional("immovable")) options->immovable = immovable->Bool();
   if (const auto islands = node->Optional("islands")) options->islands = islands->Bool();
+  if (const auto redundancy = node->Optional("redundancy")) {
+    options->redundancy = redundancy->Bool();
+  }
 }
 
 TimingFamily ReadFamily(const JsonNode& node) {

@@ -15,8 +15,8 @@ struct Largest {
 
   template <class Space>
   void Add(const Kinematics<Space, double>& kinematics, int index) {
-    // only constrained directions count: what a joint leaves free is no mismatch
-    const auto D = kinematics.joints()[index].D();
+    // what a joint leaves free is no mismatch; what it releases because others hold it is
+    const auto D = kinematics.joints()[index].AllD();
     const Motion<Space, double> all = kinematics.ConstraintMismatch(index);
     const Motion<Space, double> mismatch = D * (D.transpose() * all);
     rotation = std::max(rotation, mismatch.template head<Space::kRot>().norm());
@@ -69,12 +69,12 @@ void DriftObserver<Space>::Observe(const Sample<Space>& sample) {
     now.Add(kinematics, index);
     const JointState<Space, double>& state = kinematics.joints()[index];
     const auto shift_of = [&](const auto& rows) {
-      const Motion<Space, double> motion = state.D() * rows;
+      const Motion<Space, double> motion = state.AllD() * rows;
       return motion.template tail<Space::kLin>().norm();
     };
-    work.velocity = std::max(work.velocity, shift_of(state.D().transpose() * state.V_rel));
+    work.velocity = std::max(work.velocity, shift_of(state.AllD().transpose() * state.V_rel));
     const Motion<Space, double> rest = JointAcceleration<Space, double>(kinematics, index, work.A);
-    work.acceleration = std::max(work.acceleration, shift_of(rest.head(state.rows())));
+    work.acceleration = std::max(work.acceleration, shift_of(rest.head(state.AllD().cols())));
   }
   if (now.shift > work.shift) {
     work.worst_loop = kinematics.mechanism().joint_names()[now.joint];

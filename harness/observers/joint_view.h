@@ -1,4 +1,5 @@
-// The loops of a mechanism in joint coordinates, whatever coordinates are integrated.
+// The loops of a mechanism in joint coordinates, whatever coordinates are integrated, with all that
+// their joints constrain, released or not.
 #pragma once
 
 #include <memory>
@@ -13,8 +14,8 @@ class JointView {
   /// `mechanism` is made of `description` and must outlive the view.
   JointView(const MechanismDescription& description, const Mechanism<Space, double>& mechanism)
       : mechanism_(&mechanism) {
-    if (mechanism.coordinates() == Coordinates::kJoint) return;
-    own_ = std::make_unique<Mechanism<Space, double>>(description, Coordinates::kJoint);
+    if (mechanism.coordinates() == Coordinates::kJoint && mechanism.released().empty()) return;
+    own_ = std::make_unique<Mechanism<Space, double>>(Unreleased(description), Coordinates::kJoint);
     mechanism_ = own_.get();
     kinematics_ = std::make_unique<Kinematics<Space, double>>(*own_);
   }

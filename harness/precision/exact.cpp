@@ -42,7 +42,7 @@ Float128 Exact::Drift(const Float128& t, const VectorX<Float128>& q) {
   kinematics_.UpdatePosition(q);
   Float128 largest = 0;
   for (int index : mechanism_.constraints()) {
-    const auto D = kinematics_.joints()[index].D();
+    const auto D = kinematics_.joints()[index].AllD();
     const Motion<Planar, Float128> all = kinematics_.ConstraintMismatch(index);
     // what a joint leaves free is no mismatch
     Motion<Planar, Float128> constrained = Motion<Planar, Float128>::Zero();

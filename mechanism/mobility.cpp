@@ -1,0 +1,105 @@
+#include "mechanism/mobility.h"
+
+#include <Eigen/Eigenvalues>
+#include <algorithm>
+#include <vector>
+
+#include "mechanism/excursion.h"
+#include "mechanism/redundancy.h"
+#include "mechanism/singular_values.h"
+
+namespace loopbench {
+
+namespace {
+
+/// A motion that few mixtures lead to is missed by some of them, not by all. [rad or lengths]
+constexpr int kTrials = 12;
+constexpr double kTrialDistance = 0.02;
+
+/// Whether a self-stress s of the constraints e proves that nothing moves: along every speed v with
+/// J v = 0 the second derivative of s^T e has one and the same sign, so that no acceleration, to
+/// which s^T J = 0 is blind, can keep e at zero (second-order rigidity: Connelly and Whiteley, SIAM
+/// J. Discrete Math. 9 (1996) 453). Tried with each of a basis of self-stresses and with their sum.
+template <class Space>
+bool IsRigidToSecondOrder(const Mechanism<Space, double>& mechanism, const VectorX<double>& q,
+                          int rank) {
+  Kinematics<Space, double> kinematics(mechanism);
+  kinematics.UpdatePosition(q);
+  const DirectionRows here = RowsOfDirections(kinematics);
+  const Eigen::JacobiSVD<Eigen::MatrixXd> svd(here.rows, Eigen::ComputeFullU | Eigen::ComputeFullV);
+  const Eigen::MatrixXd stresses = svd.matrixU().rightCols(here.rows.rows() - rank);
+  const Eigen::Index free = here.rows.cols() - rank;
+  const Eigen::MatrixXd speeds = here.mass.matrixU().solve(svd.matrixV().rightCols(free));
+  // a difference of mismatches that are round-off at q, with an error of the order of its square
+  constexpr double kStep = 1e-4;
+  const auto second = [&](const Eigen::VectorXd& v) {
+    Eigen::VectorXd sum = Eigen::VectorXd::Zero(here.rows.rows());
+    for (const double sign : {1.0, -1.0}) {
+      VectorX<double> rate(q.size());
+      mechanism.Rates(q, VectorX<double>(v * (sign * kStep)), rate);
+      VectorX<double> moved = q + rate;
+      mechanism.Normalise(moved);
+      kinematics.UpdatePosition(moved);
+      sum += RowsOfDirections(kinematics).mismatch;
+    }
+    return Eigen::VectorXd(sum / (kStep * kStep));
+  };
+  // by polarisation, all self-stresses at once
+  std::vector<Eigen::MatrixXd> forms(static_cast<std::size_t>(stresses.cols()),
+                                     Eigen::MatrixXd::Zero(free, free));
+  for (Eigen::Index i = 0; i < free; ++i) {
+    for (Eigen::Index j = 0; j <= i; ++j) {
+      const Eigen::VectorXd along =
+          stresses.transpose() * second(i == j ? Eigen::VectorXd(speeds.col(i))
+                                               : Eigen::VectorXd(speeds.col(i) + speeds.col(j)));
+      for (std::size_t s = 0; s < forms.size(); ++s) {
+        double value = along[static_cast<Eigen::Index>(s)];
+        if (i != j) value = 0.5 * (value - forms[s](i, i) - forms[s](j, j));
+        forms[s](i, j) = forms[s](j, i) = value;
+      }
+    }
+  }
+  Eigen::MatrixXd all = Eigen::MatrixXd::Zero(free, free);
+  for (const Eigen::MatrixXd& form : forms) all += form;
+  forms.push_back(all);
+  constexpr double kDefinite = 1e-5;  // some ten times the error of the differences
+  return std::ranges::any_of(forms, [&](const Eigen::MatrixXd& form) {
+    const Eigen::VectorXd values =
+        Eigen::SelfAdjointEigenSolver<Eigen::MatrixXd>(form, Eigen::EigenvaluesOnly).eigenvalues();
+    const double least = kDefinite * values.cwiseAbs().maxCoeff();
+    return least > 0.0 && (values.minCoeff() > least || values.maxCoeff() < -least);
+  });
+}
+
+}  // namespace
+
+template <class Space>
+std::string WhyLocked(const Mechanism<Space, double>& mechanism, const VectorX<double>& q) {
+  if (!mechanism.drives().empty() || mechanism.num_u() > kMostAnalysedSpeeds) return "";
+  if (mechanism.num_u() == 0) return "no joint leaves a speed free";
+  if (mechanism.num_rows() == 0) return "";
+  Excursion<Space> excursion(mechanism, q);
+  const int n = mechanism.num_u(), first_order = excursion.freedom();
+  if (first_order == 0) {
+    return std::to_string(mechanism.num_rows()) + " constraints take all " + std::to_string(n) +
+           " speeds";
+  }
+  if (excursion.rank() == mechanism.num_rows()) return "";
+  const int rank = excursion.rank();
+  int fell_back = 0;
+  for (int trial = 1; trial <= kTrials; ++trial) {
+    const StepKind step = excursion.Step(kTrialDistance, trial);
+    if (step == StepKind::kMoved) return "";
+    fell_back += step == StepKind::kFellBack;
+  }
+  if (fell_back < kTrials && !IsRigidToSecondOrder(mechanism, q, rank)) return "";
+  return "this position is singular, the " + std::to_string(first_order) +
+         (first_order == 1 ? " speed that its" : " independent speeds that its") +
+         " constraints leave lead" + (first_order == 1 ? "s" : "") +
+         " nowhere: what is tried next to it falls back to it";
+}
+
+template std::string WhyLocked(const Mechanism<Planar, double>&, const VectorX<double>&);
+template std::string WhyLocked(const Mechanism<Spatial, double>&, const VectorX<double>&);
+
+}  // namespace loopbench

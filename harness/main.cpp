@@ -62,8 +62,10 @@ Examples:
   loopbench plot out --out work.svg --x rhs_evaluations --y drift_position_max --group formulation,coordinates
   loopbench plot out --out cost.pdf --where kind=timing --x bodies --y ns_per_body --group formulation
 
-Without --x and --y: angles, drift with its fitted exponents, and of runs in several scalars error
-and drift against tolerance. Runs that failed are crosses.)";
+Without --x and --y: angles and displacements of the run that is trusted most (finished, at level
+position, at the finest tolerance), drift with its fitted exponents, and of runs in several scalars
+error and drift against tolerance. Runs that failed are crosses, doubtful ones dashed. A figure that
+cannot be drawn is reported with its reason, and the exit code is 2 after all others are drawn.)";
 
 constexpr const char* kMapFooter = R"(
 Examples:

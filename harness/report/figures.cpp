@@ -263,7 +263,7 @@ std::string GnuplotScript(const Figure& figure) {
       QuoteGnuplot(figure.title), QuoteGnuplot(figure.x_label), QuoteGnuplot(figure.y_label),
       LegendRows(figure),
       legend_title.empty() ? QuoteGnuplot(" ") : "\"\\n\"." + QuoteGnuplot(legend_title));
-  if (figure.log_x) script += "set logscale x\n";
+  if (figure.log_x) script += "set logscale x\nset format x '%g'\n";
   if (figure.log_y) {
     // powers of ten are read most easily as such, unless all are near one
     const bool near_one = y.low > std::log(1e-4) && y.high < std::log(1e6);

@@ -208,7 +208,9 @@ void Register(const BenchmarkSet& set, States& states, const BenchmarkMember& me
       state.SkipWithError(error.what());
     }
   };
-  benchmark::RegisterBenchmark(BenchmarkName(kind, member, column).c_str(), run);
+  // the library prints names as they are, and up to a zero byte
+  const std::string shown = EscapeTerminal(BenchmarkName(kind, member, column));
+  benchmark::RegisterBenchmark(shown.c_str(), run);
 }
 
 int SaveStates(const BenchmarkSet& set) {

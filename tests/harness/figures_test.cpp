@@ -113,6 +113,7 @@ TEST_F(FiguresTest, ValuesThatALogarithmicAxisCannotShowAreSkipped) {
   figure.curves.push_back({"none", {1.0}, {0.0}, {}, {}});
   const std::string script = GnuplotScript(figure);
   EXPECT_TRUE(Contains(script, "$c0 << EOD\n3 5\n4 7\nEOD\n"));
+  EXPECT_TRUE(Contains(script, "set format x '%g'\n"));  // 1e-08, not 0.000000010
   const std::string svg = Draw(figure);
   EXPECT_TRUE(Contains(svg, "<text>some</text>"));
   EXPECT_TRUE(Contains(svg, "<text>none</text>"));

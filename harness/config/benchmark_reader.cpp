@@ -7,6 +7,7 @@
 #include <system_error>
 
 #include "harness/config/config_error.h"
+#include "harness/config/document_kind.h"
 #include "harness/config/experiment_sections.h"
 #include "harness/config/mechanism_reader.h"
 #include "harness/config/spelling.h"
@@ -187,7 +188,7 @@ BenchmarkSet ParseBenchmarks(std::string_view text, const std::filesystem::path&
   const std::filesystem::path folder = path.parent_path();
   BenchmarkSet set;
   set.path = path;
-  if (root.ExpectObject({"name", "comment", "states", "integrator", "step", "groups"})) {
+  if (ExpectDocument(root, FileKind::kBenchmarks)) {
     if (const auto name = root.Required("name", "a name")) set.name = name->Text();
     if (const auto comment = root.Optional("comment")) set.comment = comment->Text();
     const auto states = root.Optional("states");

@@ -2,6 +2,7 @@
 
 #include <optional>
 
+#include "harness/config/document_kind.h"
 #include "harness/config/selection_reader.h"
 
 namespace loopbench::harness {
@@ -119,7 +120,7 @@ std::vector<ClaimRule> ParseClaims(std::string_view text, const std::string& fil
   const JsonNode root(document, "", errors);
   std::vector<ClaimRule> rules;
   std::vector<std::string> ids;
-  if (root.ExpectObject({"claims"})) {
+  if (ExpectDocument(root, FileKind::kClaims)) {
     if (const auto claims = root.Required("claims", "an array of claims")) {
       for (const JsonNode& claim : claims->Elements("claims")) {
         rules.push_back(ReadRule(claim));

@@ -3,6 +3,7 @@
 #include <fmt/format.h>
 
 #include "harness/config/config_error.h"
+#include "harness/config/document_kind.h"
 #include "harness/config/experiment_sweep.h"
 
 namespace loopbench::harness {
@@ -12,15 +13,7 @@ namespace {
 Experiment ReadOne(const JsonNode& root, MechanismFiles& files) {
   Experiment experiment;
   ErrorList& errors = root.errors();
-  if (root.value().is_object() && root.value().contains("bodies")) {
-    root.FailAs("a mechanism (it has \"bodies\")", "an experiment");
-    return experiment;
-  }
-  if (!root.ExpectObject({"name", "comment", "scenes", "columns", "tolerances", "integrator",
-                          "jacobian", "ensembles", "limits", "compile", "series", "timing",
-                          "precision", "sweep", "exclude"})) {
-    return experiment;
-  }
+  if (!ExpectDocument(root, FileKind::kExperiment)) return experiment;
   if (const auto name = root.Required("name", "a name")) experiment.name = name->Text();
   if (const auto comment = root.Optional("comment")) experiment.comment = comment->Text();
   experiment.scenes = ReadScenes(root, files, &errors);

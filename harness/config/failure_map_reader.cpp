@@ -4,6 +4,7 @@
 #include <array>
 #include <optional>
 
+#include "harness/config/document_kind.h"
 #include "harness/config/selection_reader.h"
 
 namespace loopbench::harness {
@@ -215,7 +216,7 @@ MapRules ParseMapRules(std::string_view text, const std::string& file) {
   ErrorList errors(file, text);
   const JsonNode root(document, "", errors);
   MapRules rules;
-  if (root.ExpectObject({"title", "comment", "columns", "groups"})) {
+  if (ExpectDocument(root, FileKind::kMap)) {
     rules.title = RequiredText(root, "title");
     rules.comment = OptionalText(root, "comment");
     rules.columns = ReadMapColumns(root);

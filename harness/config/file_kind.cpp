@@ -1,19 +1,138 @@
 #include "harness/config/file_kind.h"
 
-#include <string>
+#include <fmt/format.h>
 
-#include "harness/config/json_document.h"
+#include <algorithm>
+#include <array>
+#include <string>
+#include <vector>
+
+#include "harness/config/document_kind.h"
 
 namespace loopbench::harness {
+namespace {
+
+/// A kind by what every file of it has and may have at its top level.
+struct Kind {
+  FileKind kind;
+  std::string_view name;
+  std::vector<std::string> own;  ///< what it is known by
+  NameList keys;                 ///< all, "$schema" last
+
+  std::ptrdiff_t CountKnown(const Json& document) const {
+    std::ptrdiff_t known = 0;
+    for (const auto& [key, value] : document.items()) {
+      if (key != "$schema" && keys.Find(key)) ++known;
+    }
+    return known;
+  }
+};
+
+const std::array<Kind, 5>& Kinds() {
+  static const std::array<Kind, 5> kinds = {{
+      {FileKind::kMechanism,
+       "a mechanism",
+       {"bodies", "joints"},
+       {"name", "comment", "space", "gravity", "bodies", "ground", "joints", "forces", "initial",
+        "independent", "observe", "$schema"}},
+      {FileKind::kExperiment,
+       "an experiment",
+       {"scenes", "columns", "tolerances"},
+       {"name", "comment", "scenes", "columns", "tolerances", "integrator", "jacobian", "ensembles",
+        "limits", "compile", "series", "timing", "precision", "sweep", "exclude", "$schema"}},
+      {FileKind::kClaims, "claims", {"claims"}, {"claims", "$schema"}},
+      {FileKind::kMap,
+       "a failure map",
+       {"columns", "groups"},
+       {"title", "comment", "columns", "groups", "$schema"}},
+      {FileKind::kBenchmarks,
+       "benchmarks",
+       {"name", "groups"},
+       {"name", "comment", "states", "integrator", "step", "groups", "$schema"}},
+  }};
+  return kinds;
+}
+
+/// The kinds that know the most keys of an object.
+std::vector<const Kind*> Likeliest(const Json& document) {
+  std::vector<const Kind*> best;
+  std::ptrdiff_t most = 0;
+  for (const Kind& kind : Kinds()) {
+    const std::ptrdiff_t known = kind.CountKnown(document);
+    if (known > most) best.clear();
+    most = std::max(most, known);
+    if (known == most) best.push_back(&kind);
+  }
+  return best;
+}
+
+/// "a, b and c", or another last word.
+std::string Joined(const std::vector<std::string>& words, std::string_view last) {
+  std::string text;
+  for (std::size_t i = 0; i < words.size(); ++i) {
+    text += (i == 0 ? "" : i + 1 == words.size() ? fmt::format(" {} ", last) : ", ") + words[i];
+  }
+  return text;
+}
+
+/// "a mechanism ("bodies", "joints")", of the keys that `has` holds.
+template <class Has>
+std::string WithKeys(const Kind& kind, const std::vector<std::string>& keys, Has has) {
+  std::vector<std::string> quoted;
+  for (const std::string& key : keys) {
+    if (has(key)) quoted.push_back('"' + key + '"');
+  }
+  return fmt::format("{} ({})", kind.name, fmt::join(quoted, ", "));
+}
+
+void ReportAmbiguous(const JsonNode& root, const std::vector<const Kind*>& kinds) {
+  std::vector<std::string> found, expected;
+  const bool any = kinds.front()->CountKnown(root.value()) > 0;
+  for (const Kind* kind : kinds) {
+    found.push_back(WithKeys(*kind, kind->keys.all(), [&](const std::string& key) {
+      return key != "$schema" && root.value().contains(key);
+    }));
+    expected.push_back(WithKeys(*kind, kind->own, [](const std::string&) { return true; }));
+  }
+  root.FailAs(any ? fmt::format("keys of {}", Joined(found, "and")) : "no key of any kind of file",
+              fmt::format("those of one kind: {}", Joined(expected, "or")));
+}
+
+}  // namespace
+
+bool ExpectDocument(const JsonNode& root, FileKind kind) {
+  const Kind& wanted = *std::ranges::find(Kinds(), kind, &Kind::kind);
+  if (root.value().is_object()) {
+    const Kind& likeliest = *Likeliest(root.value()).front();
+    if (likeliest.CountKnown(root.value()) > wanted.CountKnown(root.value())) {
+      const auto own = std::ranges::find_if(likeliest.own, [&](const std::string& key) {
+        return root.value().contains(key) && !wanted.keys.Find(key);
+      });
+      root.FailAs(own == likeliest.own.end()
+                      ? std::string(likeliest.name)
+                      : fmt::format("{} (it has \"{}\")", likeliest.name, *own),
+                  wanted.name);
+      return false;
+    }
+  }
+  if (!root.ExpectObject(wanted.keys)) return false;
+  if (const auto schema = root.Optional("$schema")) schema->Text();
+  return true;
+}
 
 FileKind KindOfFile(const std::filesystem::path& path) {
   const std::string text = ReadTextFile(path);
-  const auto has = [&text](const char* key) { return text.find(key) != std::string::npos; };
-  if (has("\"scenes\"")) return FileKind::kExperiment;
-  if (has("\"claims\"")) return FileKind::kClaims;
-  if (has("\"rows\"")) return FileKind::kMap;
-  if (has("\"groups\"")) return FileKind::kBenchmarks;
-  return FileKind::kMechanism;
+  const Json document = ParseDocument(text, path.string());
+  ErrorList errors(path.string(), text);
+  const JsonNode root(document, "", errors);
+  if (!document.is_object()) {
+    root.Fail("an object: a mechanism, an experiment, claims, a failure map or benchmarks");
+  }
+  errors.ThrowIfAny();
+  const std::vector<const Kind*> likeliest = Likeliest(document);
+  if (likeliest.size() > 1) ReportAmbiguous(root, likeliest);
+  errors.ThrowIfAny();
+  return likeliest.front()->kind;
 }
 
 }  // namespace loopbench::harness

@@ -1,4 +1,5 @@
-// What a configuration file is about, as far as its text tells before it is read.
+// What a configuration file is about: decided by the keys of its top level, never by names or texts
+// further inside.
 #pragma once
 
 #include <filesystem>
@@ -7,8 +8,9 @@ namespace loopbench::harness {
 
 enum class FileKind { kMechanism, kExperiment, kClaims, kMap, kBenchmarks };
 
-/// By the one key that each kind must have and the others lack: "scenes", "claims", "rows",
-/// "groups"; all else is taken for a mechanism. Throws ConfigError when the file cannot be read.
+/// The kind that knows the most of the file's top-level keys. Throws ConfigError when the file
+/// cannot be read or is no JSON, and when no kind or several know the most of its keys; the message
+/// then says which keys were found and what each kind has.
 FileKind KindOfFile(const std::filesystem::path& path);
 
 }  // namespace loopbench::harness

@@ -121,7 +121,11 @@ std::string ReadTextFile(const std::filesystem::path& path) {
   };
   std::error_code error;
   const auto status = std::filesystem::status(path, error);
-  if (!std::filesystem::exists(status)) fail("no such file");
+  if (!std::filesystem::exists(status)) {
+    const std::filesystem::path here = std::filesystem::current_path(error);
+    fail(path.is_absolute() ? "no such file"
+                            : fmt::format("no such file, seen from {}", here.string()));
+  }
   if (std::filesystem::is_directory(status)) fail("it is a folder");
   std::ifstream stream(path, std::ios::binary);
   if (!stream) fail("it cannot be opened");

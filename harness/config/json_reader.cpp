@@ -65,6 +65,20 @@ void ErrorList::Add(std::string_view pointer, std::string_view found, std::strin
   messages_.push_back({false, std::string(pointer), Printable(text)});
 }
 
+void ErrorList::AddWithCure(std::string_view cure, std::string_view pointer, std::string_view found,
+                            std::string_view expected) {
+  const auto first = std::ranges::find(messages_, cure, &Message::cure);
+  if (first == messages_.end()) {
+    const bool room = !full();
+    Add(pointer, found, fmt::format("{}, or {}", expected, cure));
+    if (room) messages_.back().cure = cure;
+    return;
+  }
+  constexpr std::size_t kMostPlaces = 3;
+  if (first->also.size() < kMostPlaces) first->also.push_back(ShownPointer(std::string(pointer)));
+  ++first->others;
+}
+
 void ErrorList::AddText(const std::string& text) {
   const bool again = std::any_of(messages_.begin(), messages_.end(), [&text](const Message& known) {
     return known.finished && known.text == text;
@@ -98,6 +112,11 @@ void ErrorList::ThrowIfAny(const std::string& ending) const {
                               line == known.end() ? "" : fmt::format(":{}", line->second),
                               Printable(ShownPointer(place.pointer)), messages_[i].text,
                               place.note.empty() ? "" : " (" + place.note + ")"));
+    if (const Message& message = messages_[i]; message.others > 0) {
+      all.back() += fmt::format("; the same cure for {} more: {}{}", message.others,
+                                Printable(fmt::format("{}", fmt::join(message.also, ", "))),
+                                message.others > message.also.size() ? ", ..." : "");
+    }
   }
   if (more_ > 0) all.push_back(fmt::format("{}: and {} more", origins_.Find("").file, more_));
   if (!ending.empty()) all.push_back(ending);
@@ -114,6 +133,10 @@ std::string Range::Text() const {
 
 void JsonNode::Fail(std::string_view expected, std::string_view suggestion) const {
   FailAs(errors_->full() ? "" : Shown(*value_), expected, suggestion);
+}
+
+void JsonNode::FailWithCure(std::string_view cure, std::string_view expected) const {
+  errors_->AddWithCure(cure, pointer_, errors_->full() ? "" : Shown(*value_), expected);
 }
 
 void JsonNode::FailAs(std::string_view found, std::string_view expected,

@@ -34,6 +34,12 @@ class ErrorList {
   void Add(std::string_view pointer, std::string_view found, std::string_view expected,
            std::string_view suggestion = "");
 
+  /// Adds a complaint of which many may have one cause, such as a key that is missing elsewhere:
+  /// "found ..., expected ..., or CURE", and the places of others with this cure, which have no
+  /// messages of their own.
+  void AddWithCure(std::string_view cure, std::string_view pointer, std::string_view found,
+                   std::string_view expected);
+
   /// Adds finished messages, such as those of a file that this file refers to; the same text twice
   /// (two scenes with one broken mechanism) once.
   void AddText(const std::string& text);
@@ -51,6 +57,9 @@ class ErrorList {
     bool finished;        ///< text is all of it
     std::string pointer;  ///< else: in front of it come file, line and pointer
     std::string text;
+    std::string cure = "";
+    std::vector<std::string> also = {};  ///< first places of others with this cure
+    std::size_t others = 0;              ///< how many there are
   };
   Origins origins_;
   std::vector<Message> messages_;
@@ -117,6 +126,9 @@ class JsonNode {
   /// Reports this place with a description of its own instead of the value.
   void FailAs(std::string_view found, std::string_view expected,
               std::string_view suggestion = "") const;
+
+  /// Reports this value, and what would make it and others like it right.
+  void FailWithCure(std::string_view cure, std::string_view expected) const;
 
   /// True for an object. Reports anything else, and every key that is not in `known`.
   bool ExpectObject(const NameList& known) const;

@@ -12,13 +12,18 @@ namespace {
 
 /// One number for a joint with one coordinate, else as many as it has.
 std::vector<double> ReadJointNumbers(const JsonNode& node, const JointDescription& joint,
-                                     int count) {
+                                     SpaceKind space, bool speeds) {
+  const int count = NumValues(joint.type, space, speeds);
   if (count == 1 && node.value().is_number()) return {node.Number()};
-  const bool fits =
-      node.value().is_array() && node.value().size() == static_cast<std::size_t>(count);
-  if (fits && count > 0) return node.Numbers(static_cast<std::size_t>(count));
+  const auto fits = [&node](int numbers) {
+    return node.value().is_array() && node.value().size() == static_cast<std::size_t>(numbers);
+  };
+  if (fits(count) && count > 0) return node.Numbers(static_cast<std::size_t>(count));
   const std::string_view type = ToString(joint.type);
-  if (count == 0) {
+  if (fits(NumValues(joint.type, SpaceKind::kSpatial, speeds)) && count > 0) {
+    node.FailWithCure(kSpatialCure, fmt::format("{} numbers in the plane: \"{}\" is {}", count,
+                                                joint.name, type));
+  } else if (count == 0) {
     node.Fail(fmt::format("no value: \"{}\" is a {} and has none", joint.name, type));
   } else if (count == 1) {
     node.Fail(fmt::format("one number: \"{}\" is {}", joint.name, type));
@@ -50,7 +55,7 @@ std::vector<JointValues> ReadJointValues(const JsonNode& initial, const std::str
                   "none");
       continue;
     }
-    result.push_back({*joint, ReadJointNumbers(node, described, expected)});
+    result.push_back({*joint, ReadJointNumbers(node, described, draft.space, speeds)});
     const bool quaternion = expected > NumValues(described.type, draft.space, true);
     if (quaternion) CheckQuaternion(node, result.back().values);
   }

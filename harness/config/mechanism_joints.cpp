@@ -15,8 +15,9 @@ Eigen::Vector3d ReadRotation(const JsonNode& node, SpaceKind space) {
   }
   const Eigen::Vector3d rotation = node.Vector();
   const bool about_z = rotation.x() == 0.0 && rotation.y() == 0.0;
-  if (space == SpaceKind::kPlanar && !about_z)
-    node.Fail("a rotation about z in a planar mechanism");
+  if (space == SpaceKind::kPlanar && !about_z) {
+    node.FailWithCure(kSpatialCure, "a rotation about z in a planar mechanism");
+  }
   return rotation;
 }
 
@@ -46,10 +47,10 @@ Eigen::Vector3d ReadAxis(const JsonNode& node, JointType type, SpaceKind space) 
   } else if (space == SpaceKind::kPlanar) {
     const bool along_z = axis.x() == 0.0 && axis.y() == 0.0 && axis.z() > 0.0;
     if (OwnAxis(type) == 'z' && !along_z) {
-      node.Fail("an axis along +z in a planar mechanism");
+      node.FailWithCure(kSpatialCure, "an axis along +z in a planar mechanism");
     }
     if (OwnAxis(type) == 'x' && axis.z() != 0.0) {
-      node.Fail("an axis with z = 0 in a planar mechanism");
+      node.FailWithCure(kSpatialCure, "an axis with z = 0 in a planar mechanism");
     }
   }
   return axis;
@@ -119,7 +120,7 @@ JointDescription ReadJoint(const JsonNode& node, const Draft& draft) {
   if (const auto type = node.Required("type", "a joint type")) {
     joint.type = static_cast<JointType>(type->Choice(JointTypeNames(), "a joint type").value_or(0));
     if (draft.space == SpaceKind::kPlanar && !ExistsInPlane(joint.type)) {
-      type->Fail("a joint of the plane, or \"space\": \"spatial\"");
+      type->FailWithCure(kSpatialCure, "a joint of the plane");
       return joint;  // what else it has cannot be judged
     }
   }

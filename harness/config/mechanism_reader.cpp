@@ -4,13 +4,16 @@
 
 #include <utility>
 
+#include "harness/config/document_kind.h"
 #include "harness/config/mechanism_sections.h"
 
 namespace loopbench::harness {
 
 Eigen::Vector3d ReadVector(const JsonNode& node, SpaceKind space) {
   const Eigen::Vector3d vector = node.Vector();
-  if (space == SpaceKind::kPlanar && vector.z() != 0.0) node.Fail("z = 0 in a planar mechanism");
+  if (space == SpaceKind::kPlanar && vector.z() != 0.0) {
+    node.FailWithCure(kSpatialCure, "z = 0 in a planar mechanism");
+  }
   return vector;
 }
 
@@ -75,12 +78,7 @@ MechanismFile ReadMechanismObject(const JsonNode& root) {
   MechanismFile result;
   result.canonical = root.value().dump(-1, ' ', false, Json::error_handler_t::replace);
   Draft draft;
-  if (root.value().is_object() && root.value().contains("scenes")) {
-    root.FailAs("an experiment (it has \"scenes\")", "a mechanism");
-    return result;
-  }
-  if (root.ExpectObject({"name", "comment", "space", "gravity", "bodies", "ground", "joints",
-                         "forces", "initial", "independent", "observe"})) {
+  if (ExpectDocument(root, FileKind::kMechanism)) {
     draft.name = ReadNewName(root, {});
     if (const auto comment = root.Optional("comment")) comment->Text();
     if (const auto space = root.Optional("space")) {

@@ -9,6 +9,7 @@
 #include <Eigen/Core>
 #include <optional>
 #include <string>
+#include <string_view>
 #include <vector>
 
 #include "harness/config/json_reader.h"
@@ -22,6 +23,9 @@ struct Draft : MechanismDescription {
   NameList body_names;  ///< ground first
   NameList joint_names;
 };
+
+/// What makes everything right that leaves the plane in a file that does not say so.
+inline constexpr std::string_view kSpatialCure = "\"space\": \"spatial\" at the top level";
 
 /// The whole of a mechanism; `root` may be a file's top level or a value inside an experiment.
 MechanismFile ReadMechanismObject(const JsonNode& root);

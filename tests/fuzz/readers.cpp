@@ -4,8 +4,10 @@
 #include <stdexcept>
 #include <string>
 
+#include "harness/config/claims_reader.h"
 #include "harness/config/config_error.h"
 #include "harness/config/experiment_reader.h"
+#include "harness/config/failure_map_reader.h"
 #include "harness/config/mechanism_reader.h"
 
 namespace loopbench::fuzz {
@@ -15,6 +17,9 @@ namespace {
 /// would hide what it says.
 void CheckMessage(const std::string& message) {
   if (message.empty()) throw std::logic_error("a refusal without a message");
+  if (message.find("json.exception") != std::string::npos) {
+    throw std::logic_error("the parser's own words: " + message);
+  }
   constexpr std::size_t kLongestLine = 4000, kMostLines = 250;
   std::size_t length = 0, lines = 1, following = 0;
   for (const char c : message) {
@@ -51,6 +56,14 @@ void CallMechanismReader(std::string_view bytes) {
 
 void CallExperimentReader(std::string_view bytes) {
   Call([bytes] { harness::ParseExperiments(bytes, "configs/experiments/paper/fuzz.json"); });
+}
+
+void CallClaimsReader(std::string_view bytes) {
+  Call([bytes] { harness::ParseClaims(bytes, "claims.json"); });
+}
+
+void CallMapReader(std::string_view bytes) {
+  Call([bytes] { harness::ParseMapRules(bytes, "map.json"); });
 }
 
 }  // namespace loopbench::fuzz

@@ -12,5 +12,7 @@ namespace loopbench::fuzz {
 /// Throw std::logic_error when a message is not fit to be shown.
 void CallMechanismReader(std::string_view bytes);
 void CallExperimentReader(std::string_view bytes);
+void CallClaimsReader(std::string_view bytes);
+void CallMapReader(std::string_view bytes);
 
 }  // namespace loopbench::fuzz

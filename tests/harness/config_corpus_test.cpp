@@ -10,8 +10,10 @@
 #include <string>
 #include <vector>
 
+#include "harness/config/claims_reader.h"
 #include "harness/config/config_error.h"
 #include "harness/config/experiment_reader.h"
+#include "harness/config/failure_map_reader.h"
 #include "harness/config/mechanism_reader.h"
 
 namespace loopbench::harness {
@@ -58,11 +60,11 @@ std::string MessageOf(Read read) {
 
 std::string MessageOf(const fs::path& path) {
   return MessageOf([&path] {
-    if (path.parent_path().filename() == "mechanisms") {
-      ReadMechanism(path);
-    } else {
-      ReadExperiments(path);
-    }
+    const fs::path kind = path.parent_path().filename();
+    if (kind == "mechanisms") ReadMechanism(path);
+    if (kind == "experiments") ReadExperiments(path);
+    if (kind == "claims") ReadClaims(path);
+    if (kind == "maps") ReadMapRules(path);
   });
 }
 
@@ -83,12 +85,14 @@ TEST_P(Corpus, IsRefusedWithTheExpectedMessages) {
   }
 }
 
-INSTANTIATE_TEST_SUITE_P(Kinds, Corpus, testing::Values("mechanisms", "experiments"),
+const std::vector<std::string> kKinds = {"mechanisms", "experiments", "claims", "maps"};
+
+INSTANTIATE_TEST_SUITE_P(Kinds, Corpus, testing::ValuesIn(kKinds),
                          [](const auto& kind) { return kind.param; });
 
 TEST(CorpusSize, IsAtLeastAHundredFilesAndNoMessageIsLeftOver) {
   std::size_t json = 0;
-  for (const char* kind : {"mechanisms", "experiments"}) {
+  for (const std::string& kind : kKinds) {
     json += BrokenFiles(kind).size();
     for (const auto& entry : fs::directory_iterator(kBroken / kind)) {
       fs::path file = entry.path();

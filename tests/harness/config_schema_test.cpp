@@ -12,8 +12,10 @@
 #include <vector>
 
 #include "harness/config/benchmark_reader.h"
+#include "harness/config/claims_reader.h"
 #include "harness/config/config_error.h"
 #include "harness/config/experiment_reader.h"
+#include "harness/config/failure_map_reader.h"
 #include "harness/config/file_kind.h"
 #include "harness/config/mechanism_reader.h"
 #include "harness/store/files.h"
@@ -28,14 +30,32 @@ const fs::path kRoot = LOOPBENCH_SOURCE_DIR;
 /// Broken files that the schemas accept, by the reason why a schema cannot see the fault.
 const std::map<std::string, std::set<std::string>> kBeyondSchemas = {
     {"names are compared with names elsewhere in the file",
-     {"mechanisms/body-name-twice", "mechanisms/body-named-ground", "mechanisms/body-unknown",
-      "mechanisms/joint-name-twice", "mechanisms/joint-with-itself", "mechanisms/point-unknown",
-      "mechanisms/point-of-body-without", "mechanisms/observe-unknown-body",
-      "mechanisms/initial-unknown-joint", "mechanisms/held-without-value",
-      "mechanisms/independent-component", "mechanisms/independent-owner",
-      "mechanisms/point-force-on-ground", "experiments/ensemble-unknown-scene",
-      "experiments/ensemble-unused-tolerance", "experiments/ensemble-between-unheld",
-      "experiments/scene-twice", "experiments/exclude-unknown-key", "experiments/sweep-same-name"}},
+     {"mechanisms/body-name-twice",
+      "mechanisms/body-named-ground",
+      "mechanisms/body-unknown",
+      "mechanisms/joint-name-twice",
+      "mechanisms/joint-with-itself",
+      "mechanisms/point-unknown",
+      "mechanisms/point-of-body-without",
+      "mechanisms/observe-unknown-body",
+      "mechanisms/initial-unknown-joint",
+      "mechanisms/held-without-value",
+      "mechanisms/independent-component",
+      "mechanisms/independent-owner",
+      "mechanisms/point-force-on-ground",
+      "experiments/ensemble-unknown-scene",
+      "claims/id-twice",
+      "claims/label-twice",
+      "maps/column-twice",
+      "maps/row-twice",
+      "maps/must-hold-unknown",
+      "maps/must-hold-not-applicable",
+      "maps/not-applicable-unknown",
+      "experiments/ensemble-unused-tolerance",
+      "experiments/ensemble-between-unheld",
+      "experiments/scene-twice",
+      "experiments/exclude-unknown-key",
+      "experiments/sweep-same-name"}},
     {"bodies of a force and their points are names, too",
      {"mechanisms/spring-damper-one-body", "mechanisms/spring-damper-point-unknown",
       "mechanisms/drag-on-ground"}},
@@ -50,7 +70,9 @@ const std::map<std::string, std::set<std::string>> kBeyondSchemas = {
       "mechanisms/motion-and-initial",      "mechanisms/motion-coordinate-range",
       "mechanisms/motion-coordinate-twice", "mechanisms/motion-list-of-pin-in-slot",
       "mechanisms/motion-of-rod",           "mechanisms/motion-of-spherical",
-      "mechanisms/motion-of-weld"}},
+      "mechanisms/motion-of-weld",          "mechanisms/spatial-not-said"}},
+    {"what a row of a map lacks may stand in its group", {"maps/nothing-decides"}},
+    {"endings that decide must be among the right ones", {"maps/when-not-right"}},
     {"arithmetic over several numbers",
      {"mechanisms/axis-zero", "mechanisms/table-lengths", "mechanisms/table-times-equal",
       "mechanisms/motion-table-length", "mechanisms/motion-table-order",
@@ -106,43 +128,72 @@ std::vector<std::string> SchemaVerdicts(const std::string& schema,
   return verdicts;
 }
 
-bool ReaderAccepts(const std::string& schema, const fs::path& file) {
+bool ReaderAccepts(FileKind kind, const fs::path& file) {
   try {
-    if (schema == "mechanism") {
-      ReadMechanism(file);
-    } else if (schema == "experiment") {
-      ReadExperiments(file);
-    } else {
-      ReadBenchmarks(file);
-    }
+    if (kind == FileKind::kMechanism) ReadMechanism(file);
+    if (kind == FileKind::kExperiment) ReadExperiments(file);
+    if (kind == FileKind::kClaims) ReadClaims(file);
+    if (kind == FileKind::kMap) ReadMapRules(file);
+    if (kind == FileKind::kBenchmarks) ReadBenchmarks(file);
     return true;
   } catch (const ConfigError&) {
     return false;
   }
 }
 
-class Schema : public testing::TestWithParam<std::string> {};
+struct KindOfSchema {
+  std::string schema, broken;  ///< names of the schema and of the folder of broken files
+  FileKind kind;
+  std::size_t shipped, refused;  ///< at least
+
+  friend std::ostream& operator<<(std::ostream& out, const KindOfSchema& kind) {
+    return out << kind.schema;
+  }
+};
+
+class Schema : public testing::TestWithParam<KindOfSchema> {};
 
 TEST_P(Schema, AcceptsWhatIsShippedAsTheReaderDoes) {
-  std::vector<fs::path> files = JsonFilesIn(kRoot / "configs" / (GetParam() + "s"));
-  std::erase_if(files, [](const fs::path& file) {  // rules have no schema
-    return KindOfFile(file) == FileKind::kClaims || KindOfFile(file) == FileKind::kMap;
-  });
-  EXPECT_GE(files.size(), 4u);
-  const std::vector<std::string> verdicts = SchemaVerdicts(GetParam(), files);
+  std::vector<fs::path> files;
+  for (const char* folder : {"mechanisms", "experiments"}) {
+    for (const fs::path& file : JsonFilesIn(kRoot / "configs" / folder)) {
+      if (KindOfFile(file) == GetParam().kind) files.push_back(file);
+    }
+  }
+  EXPECT_GE(files.size(), GetParam().shipped);
+  const std::vector<std::string> verdicts = SchemaVerdicts(GetParam().schema, files);
   for (std::size_t i = 0; i < files.size(); ++i) {
     EXPECT_EQ(verdicts[i], "valid") << files[i];
-    EXPECT_TRUE(ReaderAccepts(GetParam(), files[i])) << files[i];
+    EXPECT_TRUE(ReaderAccepts(GetParam().kind, files[i])) << files[i];
   }
 }
 
+TEST_P(Schema, MayBeNamedByTheFile) {
+  const fs::path folder = fs::path(testing::TempDir()) / ("loopbench-named-" + GetParam().schema);
+  fs::create_directories(folder);
+  const fs::path file = folder / "named.json";
+  for (const fs::path& shipped : JsonFilesIn(kRoot / "configs")) {
+    if (shipped.parent_path().filename() == "schema") continue;
+    if (KindOfFile(shipped) != GetParam().kind) continue;
+    std::string text = ReadFile(shipped);
+    if (text.find("\"mechanism\": \"") != std::string::npos) continue;  // paths of the old place
+    text.replace(text.find('{'), 1, "{\"$schema\": \"" + GetParam().schema + ".schema.json\",");
+    WriteFileAtomically(file, text);
+    EXPECT_TRUE(ReaderAccepts(GetParam().kind, file)) << shipped;
+    EXPECT_EQ(SchemaVerdicts(GetParam().schema, {file}).front(), "valid") << shipped;
+    break;
+  }
+  EXPECT_TRUE(fs::exists(file));
+  fs::remove_all(folder);
+}
+
 TEST_P(Schema, RefusesWhatTheReaderRefusesWhereItCanSeeTheFault) {
-  const std::vector<fs::path> files = JsonFilesIn(kRoot / "tests/broken" / (GetParam() + "s"));
-  const std::vector<std::string> verdicts = SchemaVerdicts(GetParam(), files);
+  const std::vector<fs::path> files = JsonFilesIn(kRoot / "tests/broken" / GetParam().broken);
+  const std::vector<std::string> verdicts = SchemaVerdicts(GetParam().schema, files);
   std::size_t refused = 0;
   for (std::size_t i = 0; i < files.size(); ++i) {
-    EXPECT_FALSE(ReaderAccepts(GetParam(), files[i])) << files[i];
-    const std::string name = GetParam() + "s/" + files[i].stem().string();
+    EXPECT_FALSE(ReaderAccepts(GetParam().kind, files[i])) << files[i];
+    const std::string name = GetParam().broken + "/" + files[i].stem().string();
     const bool beyond = std::any_of(kBeyondSchemas.begin(), kBeyondSchemas.end(),
                                     [&name](const auto& one) { return one.second.contains(name); });
     if (beyond) {
@@ -152,11 +203,23 @@ TEST_P(Schema, RefusesWhatTheReaderRefusesWhereItCanSeeTheFault) {
     }
     refused += verdicts[i] == "invalid" ? 1 : 0;
   }
-  EXPECT_GE(refused, 30u);
+  EXPECT_GE(refused, GetParam().refused);
 }
 
-INSTANTIATE_TEST_SUITE_P(Kinds, Schema, testing::Values("mechanism", "experiment"),
-                         [](const auto& kind) { return kind.param; });
+INSTANTIATE_TEST_SUITE_P(
+    Kinds, Schema,
+    testing::Values(KindOfSchema{"mechanism", "mechanisms", FileKind::kMechanism, 30, 30},
+                    KindOfSchema{"experiment", "experiments", FileKind::kExperiment, 20, 30},
+                    KindOfSchema{"claims", "claims", FileKind::kClaims, 2, 20},
+                    KindOfSchema{"map", "maps", FileKind::kMap, 2, 20}),
+    [](const auto& kind) { return kind.param.schema; });
+
+TEST(MapSchema, KnowsEveryEndingOfRuns) {
+  const std::string schema = ReadFile(kRoot / "configs/schema/map.schema.json");
+  for (const RunEnding& ending : RunEndings()) {
+    EXPECT_NE(schema.find('"' + std::string(ending.word) + '"'), std::string::npos) << ending.word;
+  }
+}
 
 TEST(BenchmarksSchema, AgreesWithTheReader) {
   const fs::path shipped = kRoot / "configs/benchmarks/counts.json";
@@ -179,11 +242,11 @@ TEST(BenchmarksSchema, AgreesWithTheReader) {
   add("\"formulation\": ", "\"formulations\": ");
   const std::vector<fs::path> good = {shipped, kRoot / "configs/benchmarks/default.json"};
   for (const std::string& verdict : SchemaVerdicts("benchmarks", good)) EXPECT_EQ(verdict, "valid");
-  for (const fs::path& file : good) EXPECT_TRUE(ReaderAccepts("benchmarks", file)) << file;
+  for (const fs::path& file : good) EXPECT_TRUE(ReaderAccepts(FileKind::kBenchmarks, file)) << file;
   const std::vector<std::string> verdicts = SchemaVerdicts("benchmarks", broken);
   for (std::size_t i = 0; i < broken.size(); ++i) {
     EXPECT_EQ(verdicts[i], "invalid") << ReadFile(broken[i]);
-    EXPECT_FALSE(ReaderAccepts("benchmarks", broken[i])) << ReadFile(broken[i]);
+    EXPECT_FALSE(ReaderAccepts(FileKind::kBenchmarks, broken[i])) << ReadFile(broken[i]);
   }
   fs::remove_all(folder);
 }

@@ -82,7 +82,9 @@ Run MergeParts(std::span<const Run> parts) {
   }
   const bool started = std::ranges::all_of(
       parts, [](const Run& part) { return !std::isnan(Real(part.record, "rank_min")); });
-  if (started) Add<std::int64_t>(parts, "rank_min", &record);
+  for (const char* key : {"rank_min", "rank_constraints_min"}) {
+    if (started) Add<std::int64_t>(parts, key, &record);
+  }
   double wall = 0.0, energy = 0.0;
   std::string hashes;
   for (const Run& part : parts) {

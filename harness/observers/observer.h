@@ -111,7 +111,9 @@ class CorrectionObserver final : public Observer<Space> {
 };
 
 /// Smallest rank, reciprocal condition and weight met at accepted steps, and when; how many steps
-/// and evaluations were softened, how often the mode changed.
+/// and evaluations were softened, how often the mode changed. `rank_min` is that of the loops, in
+/// joint coordinates whatever the set; `rank_constraints_min` that of all constraints of the set,
+/// by as much more as it has more speeds than the joints.
 template <class Space>
 class ConditionObserver final : public Observer<Space> {
  public:
@@ -120,7 +122,7 @@ class ConditionObserver final : public Observer<Space> {
 
  private:
   bool started_ = false;
-  int rank_min_ = 0;
+  int rank_min_ = 0, beyond_joint_speeds_ = 0;
   double rcond_min_ = 1.0, rcond_t_ = 0.0;
   std::int64_t softened_steps_ = 0, softened_evaluations_ = 0, mode_changes_ = 0;
 };

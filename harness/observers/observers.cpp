@@ -92,6 +92,8 @@ template <class Space>
 void ConditionObserver<Space>::Observe(const Sample<Space>& sample) {
   const Diagnostics& diagnostics = sample.formulation.diagnostics();
   rank_min_ = started_ ? std::min(rank_min_, diagnostics.rank) : diagnostics.rank;
+  const Mechanism<Space, double>& mechanism = sample.formulation.kinematics().mechanism();
+  beyond_joint_speeds_ = mechanism.num_u() - mechanism.num_joint_speeds();
   if (!started_ || diagnostics.rcond < rcond_min_) {
     rcond_min_ = diagnostics.rcond;
     rcond_t_ = sample.t;
@@ -106,6 +108,7 @@ template <class Space>
 void ConditionObserver<Space>::Write(Record& record) const {
   if (!started_) return;
   record.Set("rank_min", std::int64_t{rank_min_});
+  record.Set("rank_constraints_min", std::int64_t{rank_min_ + beyond_joint_speeds_});
   record.Set("rcond_min", rcond_min_);
   record.Set("rcond_min_t", rcond_t_);
   record.Set("softened_steps", softened_steps_);

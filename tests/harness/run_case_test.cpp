@@ -85,9 +85,18 @@ TEST(FinishedCase, MeasuresFiniteNumbers) {
     EXPECT_TRUE(std::isfinite(record.Number(key))) << key;
   }
   EXPECT_EQ(record.Number("rank_min"), 4);  // two planar pins
+  EXPECT_EQ(record.Number("rank_constraints_min"), 4);
   EXPECT_EQ(record.Text("message"), "");
   EXPECT_EQ(record.Number("drift_position_max"), record.Number("loop_closure_max"));
   EXPECT_GE(record.Number("rhs_evaluations"), 6 * record.Number("steps"));
+}
+
+TEST(FinishedCase, RankIsThatOfTheLoopsAndOfAllConstraintsOfTheSet) {
+  Column absolute = kOdcaJoint;
+  absolute.coordinates = Coordinates::kAbsolute;
+  const Record record = RunPaper("seven-bar", absolute, kTolerance, 0.5);
+  EXPECT_EQ(record.Number("rank_min"), 4) << "as in joint coordinates";
+  EXPECT_EQ(record.Number("rank_constraints_min"), 16) << "18 speeds less 2 degrees of freedom";
 }
 
 /// Newton steps of projections are the work that evaluations do not count. On a regular mechanism

@@ -61,9 +61,11 @@ struct PlanCommand {
 int PrintPlans(const PlanCommand& command);
 
 /// What experiments run and measure, and what mechanisms are made of, by the kind of each file.
-int Explain(const ExperimentFiles& files);
-/// Prints the structure of a mechanism; 2 when its start cannot be assembled, after all else.
-int ExplainMechanism(const std::filesystem::path& path);
+/// `all`: every row of long tables.
+int Explain(const ExperimentFiles& files, bool all);
+/// Prints what a mechanism is made of, its start and its structure; 2 when the start cannot be
+/// assembled, after all else.
+int ExplainMechanism(const std::filesystem::path& path, bool all);
 
 struct TableCommand {
   std::filesystem::path store;

@@ -3,6 +3,7 @@
 
 #include <algorithm>
 
+#include "harness/analysis/model_warnings.h"
 #include "harness/commands.h"
 #include "harness/config/benchmark_reader.h"
 #include "harness/config/claims_reader.h"
@@ -67,8 +68,18 @@ Table CaseTable(const std::vector<Experiment>& experiments, const Selection& fil
   return table;
 }
 
+/// What looks wrong about sound numbers; no reason to refuse them.
+void PrintUnitWarnings(const std::filesystem::path& path, const MechanismDescription& description) {
+  for (const Warning& warning : FindUnitWarnings(description)) {
+    PrintError("warning: {}: {}: {}\n", path.string(), description.name, warning.text);
+  }
+}
+
 void CheckExperiment(const std::filesystem::path& path, const std::vector<Setting>& settings) {
   const std::vector<Experiment> experiments = ReadExperiments(path, settings);
+  for (const ExperimentScene& scene : experiments.front().scenes) {
+    PrintUnitWarnings(path, scene.mechanism.description);
+  }
   std::size_t cases = 0;
   for (const Experiment& experiment : experiments) {
     cases += Expand(experiment).size();
@@ -83,6 +94,7 @@ void CheckMechanism(const std::filesystem::path& path, const std::vector<Setting
     throw ConfigError(fmt::format("{}: --set is for experiments, and this is none", path.string()));
   }
   const MechanismFile file = ReadMechanism(path);
+  PrintUnitWarnings(path, file.description);
   Print("{}: mechanism \"{}\", {} bodies, {} joints\n", path.string(), file.description.name,
         file.description.bodies.size() - 1, file.description.joints.size());
 }

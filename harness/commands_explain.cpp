@@ -7,6 +7,7 @@
 #include "harness/commands.h"
 #include "harness/config/config_error.h"
 #include "harness/config/file_kind.h"
+#include "harness/joint_words.h"
 #include "harness/precision_cases.h"
 #include "harness/terminal.h"
 #include "harness/timing/time_cases.h"
@@ -116,6 +117,18 @@ void ExplainChoices(const Experiment& experiment) {
   }
 }
 
+/// Of the coordinate of a joint, in the first scene that has it.
+std::string_view UnitOf(const Experiment& experiment, const std::string& joint) {
+  for (const ExperimentScene& scene : experiment.scenes) {
+    const MechanismDescription& description = scene.mechanism.description;
+    const auto found = std::ranges::find(description.joints, joint, &JointDescription::name);
+    if (found == description.joints.end()) continue;
+    const auto words = CoordinateWords(found->type, description.space);
+    if (words.size() == 1) return words.front().unit;
+  }
+  return "rad or m";
+}
+
 void ExplainRuns(const Experiment& experiment) {
   Print(
       "\nRuns\n  The integrator is {}; its relative and absolute tolerances are equal: {}. "
@@ -134,8 +147,8 @@ void ExplainRuns(const Experiment& experiment) {
         fmt::format("each held coordinate moved by up to {:g} (rad or m)", rule.perturb);
     if (!rule.between.empty()) start.clear();
     for (const DrawnCoordinate& drawn : rule.between) {
-      start += fmt::format("{}{} between {:g} and {:g} (rad or m)", start.empty() ? "" : ", ",
-                           drawn.joint, drawn.from, drawn.to);
+      start += fmt::format("{}{} between {:g} and {:g} ({})", start.empty() ? "" : ", ",
+                           drawn.joint, drawn.from, drawn.to, UnitOf(experiment, drawn.joint));
     }
     Print(
         "  {} also run{} {} times from perturbed starts: {}, drawn from seed {}. The spread of the "
@@ -233,13 +246,13 @@ void ExplainExperiment(const std::filesystem::path& path, const ExperimentFiles&
 
 }  // namespace
 
-int Explain(const ExperimentFiles& files) {
+int Explain(const ExperimentFiles& files, bool all) {
   int exit_code = 0;
   for (const auto& path : files.paths) {
     if (KindOfFile(path) != FileKind::kMechanism) {
       ExplainExperiment(path, files);
     } else if (files.settings.empty() && files.filter.empty()) {
-      exit_code = std::max(exit_code, ExplainMechanism(path));
+      exit_code = std::max(exit_code, ExplainMechanism(path, all));
     } else {
       throw ConfigError(fmt::format(
           "{}: --set and --filter are for experiments, and this is a mechanism", path.string()));

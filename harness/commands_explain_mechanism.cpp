@@ -5,9 +5,9 @@
 
 #include "harness/analysis/model_warnings.h"
 #include "harness/commands.h"
+#include "harness/commands_explain.h"
 #include "harness/compiled_scene.h"
 #include "harness/config/mechanism_reader.h"
-#include "harness/report/table.h"
 #include "harness/terminal.h"
 #include "odca/odca.h"
 
@@ -15,101 +15,39 @@ namespace loopbench::harness {
 
 namespace {
 
-void PrintSection(const std::string& title, const Table& table) {
-  Print("\n{}\n", title);
-  if (table.rows.empty()) {
-    Print("  none\n");
-    return;
-  }
-  const std::string text = ToText(table);
-  for (std::size_t begin = 0; begin < text.size();) {
-    const std::size_t end = std::min(text.find('\n', begin), text.size());
-    if (end > begin) Print("  {}\n", text.substr(begin, end - begin));
-    begin = end + 1;
-  }
+constexpr std::size_t kMostNames = 12;
+
+/// Names in order; of many the first and the last, unless all are asked for.
+std::string Names(const std::vector<std::string>& names, const ExplainView& view) {
+  if (view.all || names.size() <= kMostNames) return fmt::format("{}", fmt::join(names, " "));
+  const std::vector<std::string> first(names.begin(), names.begin() + kMostNames - 2);
+  return fmt::format("{} ... ({} left out) {}", fmt::join(first, " "),
+                     names.size() - kMostNames + 1, names.back());
 }
 
-Table BodyTable(const MechanismDescription& description, const Structure& structure) {
-  Table table;
-  table.columns = {{"name", "body", Format::kText, {}},
-                   {"mass", "mass [kg]", Format::kShortest, {}},
-                   {"inertia", "inertia [kg m^2]", Format::kText, {}},
-                   {"com", "com [m]", Format::kText, {}},
-                   {"part", "part", Format::kInteger, {}}};
-  const bool planar = description.space == SpaceKind::kPlanar;
-  for (std::size_t i = 0; i < structure.islands.size(); ++i) {
-    for (const int body : structure.islands[i].bodies) {
-      const BodyDescription& described = description.bodies[body];
-      const auto& I = described.inertia;
-      Record row;
-      row.Set("name", described.name);
-      row.Set("mass", described.mass);
-      row.Set("inertia", planar ? fmt::format("{:.6g}", I(2, 2))
-                                : fmt::format("{:.6g} {:.6g} {:.6g}", I(0, 0), I(1, 1), I(2, 2)));
-      const Eigen::Vector3d& com = described.com;
-      row.Set("com", planar ? fmt::format("{:.6g} {:.6g}", com.x(), com.y())
-                            : fmt::format("{:.6g} {:.6g} {:.6g}", com.x(), com.y(), com.z()));
-      row.Set("part", static_cast<std::int64_t>(i + 1));
-      table.rows.push_back(row);
-    }
-  }
-  return table;
-}
-
-/// What a joint leaves free: its kind's directions less those that follow a given motion.
-int FreeSpeeds(SpaceKind space, const JointDescription& joint) {
-  const int kind = space == SpaceKind::kPlanar && ExistsInPlane(joint.type)
-                       ? KindOf<Planar, double>(joint.type).num_u
-                       : KindOf<Spatial, double>(joint.type).num_u;
-  return kind - static_cast<int>(joint.motions.size());
-}
-
-Table JointTable(const MechanismDescription& description, const Structure& structure) {
-  Table table;
-  table.columns = {
-      {"name", "joint", Format::kText, {}},   {"type", "type", Format::kText, {}},
-      {"from", "from", Format::kText, {}},    {"to", "to", Format::kText, {}},
-      {"free", "free", Format::kInteger, {}}, {"rows", "constrains", Format::kInteger, {}},
-      {"place", "place", Format::kText, {}}};
-  const bool planar = description.space == SpaceKind::kPlanar;
-  std::vector<bool> cut(description.joints.size());
-  for (const LoopPath& loop : structure.loops) cut[loop.cut_joint] = true;
-  for (std::size_t j = 0; j < description.joints.size(); ++j) {
-    const JointDescription& joint = description.joints[j];
-    const int free = FreeSpeeds(description.space, joint);
-    Record row;
-    row.Set("name", joint.name);
-    row.Set("type", std::string(ToString(joint.type)));
-    row.Set("from", description.bodies[joint.from.body].name);
-    row.Set("to", description.bodies[joint.to.body].name);
-    row.Set("free", std::int64_t{free});
-    row.Set("rows", std::int64_t{(planar ? 3 : 6) - free});
-    row.Set("place", std::string(cut[j] ? "closes a loop" : "tree"));
-    table.rows.push_back(row);
-  }
-  return table;
-}
-
-Table LoopTable(const MechanismDescription& description, const Structure& structure) {
+Table LoopTable(const MechanismDescription& description, const Structure& structure,
+                const ExplainView& view) {
   Table table;
   table.columns = {{"cut", "cut joint", Format::kText, {}},
-                   {"joints", "joints", Format::kText, {}},
-                   {"bodies", "bodies", Format::kText, {}},
                    {"shift", "open [m]", Format::kScientific, {}},
-                   {"turn", "open [rad]", Format::kScientific, {}}};
+                   {"turn", "open [rad]", Format::kScientific, {}},
+                   {"what", "of", Format::kText, {}},
+                   {"through", "through", Format::kText, {}}};
   for (const LoopPath& loop : structure.loops) {
-    std::string joints, bodies;
-    for (const int j : loop.joints)
-      joints += (joints.empty() ? "" : " ") + description.joints[j].name;
-    for (const int b : loop.bodies)
-      bodies += (bodies.empty() ? "" : " ") + description.bodies[b].name;
+    std::vector<std::string> joints, bodies;
+    for (const int j : loop.joints) joints.push_back(description.joints[j].name);
+    for (const int b : loop.bodies) bodies.push_back(description.bodies[b].name);
     Record row;
     row.Set("cut", description.joints[loop.cut_joint].name);
-    row.Set("joints", joints);
-    row.Set("bodies", bodies);
     row.Set("shift", loop.open_shift);
     row.Set("turn", loop.open_rotation);
+    row.Set("what", std::string("joints"));
+    row.Set("through", Names(joints, view));
     table.rows.push_back(row);
+    Record second;
+    second.Set("what", std::string("bodies"));
+    second.Set("through", Names(bodies, view));
+    table.rows.push_back(second);
   }
   return table;
 }
@@ -154,7 +92,8 @@ void PrintRedundant(const MechanismDescription& description, const Structure& st
       "\"redundancy\").\n");
 }
 
-void PrintIslands(const MechanismDescription& description, const Structure& structure) {
+void PrintIslands(const MechanismDescription& description, const Structure& structure,
+                  const ExplainView& view) {
   Table table;
   table.columns = {{"part", "part", Format::kInteger, {}},
                    {"bodies", "bodies", Format::kInteger, {}},
@@ -169,15 +108,16 @@ void PrintIslands(const MechanismDescription& description, const Structure& stru
     row.Set("held", std::string(island.grounded ? "ground" : "nothing: it floats"));
     table.rows.push_back(row);
   }
-  PrintSection("Separate parts, connected through ground at most", table);
+  PrintSection("Separate parts, connected through ground at most", table, view);
 }
 
-void PrintCoordinates(const Structure& structure) {
+void PrintCoordinates(const Structure& structure, const ExplainView& view) {
   Table table;
   table.columns = {{"set", "coordinates", Format::kText, {}},
                    {"q", "positions", Format::kInteger, {}},
                    {"u", "speeds", Format::kInteger, {}},
                    {"rows", "constraints", Format::kInteger, {}},
+                   {"rank", "rank", Format::kInteger, {}},
                    {"free", "independent speeds", Format::kInteger, {}}};
   for (const Coordinates set : {Coordinates::kJoint, Coordinates::kAbsolute}) {
     const bool joint = set == Coordinates::kJoint;
@@ -186,10 +126,14 @@ void PrintCoordinates(const Structure& structure) {
     row.Set("q", std::int64_t{joint ? structure.joint_q : structure.absolute_q});
     row.Set("u", std::int64_t{joint ? structure.joint_u : structure.absolute_u});
     row.Set("rows", std::int64_t{joint ? structure.loop_rows : structure.rows});
-    if (structure.analysed) row.Set("free", std::int64_t{structure.freedom()});
+    if (structure.analysed) {
+      const int speeds = joint ? structure.joint_u : structure.absolute_u;
+      row.Set("rank", std::int64_t{speeds - structure.freedom()});
+      row.Set("free", std::int64_t{structure.freedom()});
+    }
     table.rows.push_back(row);
   }
-  PrintSection("Coordinates", table);
+  PrintSection("Coordinates", table, view);
 }
 
 template <class Space>
@@ -198,7 +142,7 @@ odca::Plan PlanFor(const MechanismDescription& description, odca::Grounding grou
   return odca::MakePlan(mechanism, {.grounding = grounding});
 }
 
-void PrintPlanOfJoins(const MechanismDescription& description) {
+void PrintPlanOfJoins(const MechanismDescription& description, const ExplainView& view) {
   Table table;
   table.columns = {{"solver", "solver", Format::kText, {}},
                    {"depth", "depth", Format::kInteger, {}},
@@ -219,25 +163,26 @@ void PrintPlanOfJoins(const MechanismDescription& description) {
     row.Set("loops", std::int64_t{plan.loop_joins()});
     table.rows.push_back(row);
   }
-  PrintSection("Plan of O-DCA", table);
+  PrintSection("Plan of O-DCA", table, view);
 }
 
 }  // namespace
 
-int ExplainMechanism(const std::filesystem::path& path) {
+int ExplainMechanism(const std::filesystem::path& path, bool all) {
   const MechanismDescription description = ReadMechanism(path).description;
   const Structure structure = AnalyseStructure(description);
   const std::vector<Warning> warnings = FindWarnings(description, structure);
   Print("{} ({})\n  described in {}; lengths in m, angles in rad\n", description.name,
         path.string(), description.space == SpaceKind::kPlanar ? "the plane" : "space");
-  PrintSection("Bodies", BodyTable(description, structure));
-  PrintSection("Joints", JointTable(description, structure));
+  const ExplainView view = ViewOfTerminal(all);
+  PrintModel(description, structure, view);
+  PrintStart(description, structure, view);
   PrintFreedom(structure);
-  PrintSection("Loops", LoopTable(description, structure));
+  PrintSection("Loops", LoopTable(description, structure, view), view);
   PrintRedundant(description, structure);
-  PrintIslands(description, structure);
-  PrintCoordinates(structure);
-  PrintPlanOfJoins(description);
+  PrintIslands(description, structure, view);
+  PrintCoordinates(structure, view);
+  PrintPlanOfJoins(description, view);
   Print("\nWhat need not be modelled\n");
   const Compiled compiled = Compile(description, CompileOptions::All());
   if (compiled.report.empty()) Print("  nothing to save\n");

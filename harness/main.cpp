@@ -32,7 +32,7 @@ Selection ParseSelection(const std::vector<std::string>& conditions) {
 }
 
 constexpr const char* kFooter = R"(
-Examples:
+Examples: (paths from the root of the repository)
   loopbench list configs/experiments/paper/paper.json
   loopbench plan configs/experiments/paper/paper.json --set /limits/cpu_s=5
   loopbench run configs/experiments/paper/paper.json --jobs 2 --filter mechanism=four-bar
@@ -68,7 +68,7 @@ error and drift against tolerance. Runs that failed are crosses, doubtful ones d
 cannot be drawn is reported with its reason, and the exit code is 2 after all others are drawn.)";
 
 constexpr const char* kMapFooter = R"(
-Examples:
+Examples: (paths from the root of the repository)
   loopbench map results/runs/extremes --rules configs/experiments/extremes/map.json
   loopbench map out --rules map.json --out out --format pdf
   loopbench map out --rules map.json --gate        (1 if a cell that must hold does not)
@@ -159,6 +159,8 @@ int Main(int argc, char** argv) {
   explain_app->add_option("file", files.paths, "Experiment or mechanism files (JSON)")->required();
   explain_app->add_option("--filter", conditions, "Only cases with key=value[,value]");
   AddSettings(explain_app, &settings);
+  bool explain_all = false;
+  explain_app->add_flag("--all", explain_all, "Every row of long tables of a mechanism");
 
   MergeCommand merge;
   CLI::App* merge_app = app.add_subcommand("merge", "Put the stores of shards together");
@@ -246,7 +248,7 @@ int Main(int argc, char** argv) {
     if (*list_app) return List(files);
     plan.files = files;
     if (*plan_app) return PrintPlans(plan);
-    if (*explain_app) return Explain(files);
+    if (*explain_app) return Explain(files, explain_all);
     if (*merge_app) return Merge(merge);
     if (*check_app) return CheckFiles(files);
     if (*table_app) return PrintTable(table, typed);

@@ -3,6 +3,10 @@
 #include <fmt/format.h>
 
 #include <algorithm>
+#include <cmath>
+#include <numbers>
+
+#include "harness/joint_words.h"
 
 namespace loopbench::harness {
 
@@ -55,11 +59,60 @@ void AddRankWarnings(const MechanismDescription& description, const Structure& s
   }
 }
 
+/// Angles of more than a turn, as "OA = 45 rad".
+class LargeAngles {
+ public:
+  void Add(const std::string& name, double angle) {
+    if (std::abs(angle) <= 2 * std::numbers::pi) return;
+    if (count_++ == 0) first_ = angle;
+    if (count_ > kMostNames) return;
+    text_ += fmt::format("{}{} = {:g} rad", count_ == 1 ? "" : ", ", name, angle);
+  }
+  std::string Text() const {
+    const std::string more =
+        count_ > kMostNames ? fmt::format(" and {} more", count_ - kMostNames) : "";
+    return fmt::format(
+        "more than a turn: {}{}; angles are in rad, and {:g} degrees would be {:.6g} rad", text_,
+        more, first_, first_ * std::numbers::pi / 180);
+  }
+  bool any() const { return count_ > 0; }
+
+ private:
+  std::size_t count_ = 0;
+  double first_ = 0.0;
+  std::string text_;
+};
+
 }  // namespace
+
+std::vector<Warning> FindUnitWarnings(const MechanismDescription& description) {
+  LargeAngles angles;
+  const auto is_angle = [&](int joint, std::size_t coordinate) {
+    const auto words = CoordinateWords(description.joints[joint].type, description.space);
+    return coordinate < words.size() && words[coordinate].unit == "rad";
+  };
+  for (const JointValues& given : description.initial.coordinates) {
+    for (std::size_t i = 0; i < given.values.size(); ++i) {
+      if (is_angle(given.joint, i))
+        angles.Add(description.joints[given.joint].name, given.values[i]);
+    }
+  }
+  for (const JointDescription& joint : description.joints) {
+    angles.Add("rotation of " + joint.name, joint.from.rotation.norm());
+    angles.Add("rotation of " + joint.name, joint.to.rotation.norm());
+  }
+  for (const ForceDescription& force : description.forces) {
+    const auto* spring = std::get_if<JointSpring>(&force);
+    if (spring == nullptr || !is_angle(spring->joint, 0)) continue;
+    angles.Add("rest of the spring in " + description.joints[spring->joint].name, spring->rest);
+  }
+  if (!angles.any()) return {};
+  return {{WarningKind::kDegrees, angles.Text()}};
+}
 
 std::vector<Warning> FindWarnings(const MechanismDescription& description,
                                   const Structure& structure) {
-  std::vector<Warning> warnings;
+  std::vector<Warning> warnings = FindUnitWarnings(description);
   if (structure.start.outcome == Outcome::kInconsistentStart) {
     warnings.push_back({WarningKind::kInconsistentStart, structure.start.message});
   }

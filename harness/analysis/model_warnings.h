@@ -17,6 +17,7 @@ enum class WarningKind {
   kMassRatio,          ///< masses further apart than their equations can resolve well
   kFarCentre,          ///< a centre of mass so far from its joints that poses lose digits
   kNotAnalysed,        ///< too large for an analysis of rank
+  kDegrees,            ///< angles of more than a turn, which may have been meant in degrees
 };
 
 struct Warning {
@@ -36,6 +37,12 @@ inline constexpr double kNearSingularRatio = 1e-2;
 /// tolerance of 1e-12 cannot be met.
 inline constexpr double kFarthestCentre = 1e3;
 
+/// What can be said of the numbers alone, without an assembly: angles of more than a turn among
+/// initial coordinates, frames and rests of springs. All in one warning, as sure as a guess can be:
+/// such an angle may be meant.
+std::vector<Warning> FindUnitWarnings(const MechanismDescription& description);
+
+/// All of them.
 std::vector<Warning> FindWarnings(const MechanismDescription& description,
                                   const Structure& structure);
 

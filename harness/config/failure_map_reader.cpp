@@ -120,6 +120,8 @@ class GroupReader {
       row->cases = static_cast<std::size_t>(cases->Integer(1, kMostCases));
     }
     if (node.Optional("why")) row->why = OptionalText(node, "why");
+    // without columns everything that names one would be a mistake, and none of its own
+    if (columns_.all().empty()) return;
     ReadNotApplicable(node, row);
     ReadMustHold(node, row);
   }

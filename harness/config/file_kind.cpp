@@ -16,7 +16,7 @@ namespace {
 struct Kind {
   FileKind kind;
   std::string_view name;
-  std::vector<std::string> own;  ///< what it is known by
+  std::vector<std::string> own;  ///< what it is known by; without any of these a file is not of it
   NameList keys;                 ///< all, "$schema" last
 
   std::ptrdiff_t CountKnown(const Json& document) const {
@@ -47,7 +47,7 @@ const std::array<Kind, 5>& Kinds() {
        {"title", "comment", "columns", "groups", "$schema"}},
       {FileKind::kBenchmarks,
        "benchmarks",
-       {"name", "groups"},
+       {"groups"},
        {"name", "comment", "states", "integrator", "step", "groups", "$schema"}},
   }};
   return kinds;
@@ -85,16 +85,20 @@ std::string WithKeys(const Kind& kind, const std::vector<std::string>& keys, Has
   return fmt::format("{} ({})", kind.name, fmt::join(quoted, ", "));
 }
 
+/// `kinds`: those that the file may be of.
 void ReportAmbiguous(const JsonNode& root, const std::vector<const Kind*>& kinds) {
   std::vector<std::string> found, expected;
-  const bool any = kinds.front()->CountKnown(root.value()) > 0;
   for (const Kind* kind : kinds) {
     found.push_back(WithKeys(*kind, kind->keys.all(), [&](const std::string& key) {
       return key != "$schema" && root.value().contains(key);
     }));
-    expected.push_back(WithKeys(*kind, kind->own, [](const std::string&) { return true; }));
   }
-  root.FailAs(any ? fmt::format("keys of {}", Joined(found, "and")) : "no key of any kind of file",
+  for (const Kind& kind : Kinds()) {
+    const bool possible = kinds.empty() || std::ranges::find(kinds, &kind) != kinds.end();
+    if (possible) expected.push_back(WithKeys(kind, kind.own, [](const auto&) { return true; }));
+  }
+  root.FailAs(kinds.empty() ? "no key that tells the kind of a file"
+                            : fmt::format("keys of {}", Joined(found, "and")),
               fmt::format("those of one kind: {}", Joined(expected, "or")));
 }
 
@@ -129,8 +133,14 @@ FileKind KindOfFile(const std::filesystem::path& path) {
     root.Fail("an object: a mechanism, an experiment, claims, a failure map or benchmarks");
   }
   errors.ThrowIfAny();
-  const std::vector<const Kind*> likeliest = Likeliest(document);
-  if (likeliest.size() > 1) ReportAmbiguous(root, likeliest);
+  std::vector<const Kind*> likeliest = Likeliest(document);
+  const auto has = [&document](const std::string& key) { return document.contains(key); };
+  std::erase_if(likeliest, [&](const Kind* kind) { return std::ranges::none_of(kind->own, has); });
+  const auto is_whole = [&](const Kind* kind) { return std::ranges::all_of(kind->own, has); };
+  if (likeliest.size() > 1 && std::ranges::count_if(likeliest, is_whole) == 1) {
+    likeliest = {*std::ranges::find_if(likeliest, is_whole)};
+  }
+  if (likeliest.size() != 1) ReportAmbiguous(root, likeliest);
   errors.ThrowIfAny();
   return likeliest.front()->kind;
 }

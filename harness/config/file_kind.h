@@ -8,9 +8,10 @@ namespace loopbench::harness {
 
 enum class FileKind { kMechanism, kExperiment, kClaims, kMap, kBenchmarks };
 
-/// The kind that knows the most of the file's top-level keys. Throws ConfigError when the file
-/// cannot be read or is no JSON, and when no kind or several know the most of its keys; the message
-/// then says which keys were found and what each kind has.
+/// The kind that knows the most of the file's top-level keys, and among them at least one that
+/// tells it apart; of several such kinds the one of which all of these are there. Throws
+/// ConfigError when the file cannot be read or is no JSON, and when that leaves no kind or several;
+/// the message then says which keys were found and what each kind has.
 FileKind KindOfFile(const std::filesystem::path& path);
 
 }  // namespace loopbench::harness

@@ -204,9 +204,11 @@ TEST_F(ExplainTest, FitsTheTerminalAndShortensLongMechanisms) {
 }
 
 TEST_F(ExplainTest, AnglesOfMoreThanATurnAreQuestionedAndNotRefused) {
-  EditMechanism("\"OA\": -1.0", "\"OA\": -90.0");
+  EditMechanism("\"OA\": -1.0", "\"OA\": 11.566370614359172");  // two turns on: it closes
   const std::string words =
-      "more than a turn: OA = -90 rad; angles are in rad, and -90 degrees would be -1.5708 rad";
+      "more than a turn: OA = 11.5664 rad; angles are in rad, and 11.5664 degrees would be "
+      "0.201871 "
+      "rad";
   ExpectEnding(Call("check four-bar.json"), 0, {"warning: four-bar.json: four-bar: " + words});
   ExpectEnding(Call("check tiny.json"), 0, {"warning: tiny.json: four-bar: " + words});
   ExpectEnding(Call("explain four-bar.json"), 0, {words});

@@ -138,7 +138,8 @@ TEST(MapRules, ADemandOfFinishedRunsNeedsThatFinishingIsRight) {
 
 TEST(MapRules, ThatAreShippedRead) {
   int count = 0;
-  const std::filesystem::path configs = std::filesystem::path(LOOPBENCH_SOURCE_DIR) / "configs";
+  const std::filesystem::path configs =
+      std::filesystem::path(LOOPBENCH_SOURCE_DIR) / "configs/experiments";
   for (const auto& entry : std::filesystem::recursive_directory_iterator(configs)) {
     if (entry.path().extension() != ".json" || KindOfFile(entry.path()) != FileKind::kMap) continue;
     EXPECT_FALSE(ReadMapRules(entry.path()).groups.empty()) << entry.path();

@@ -62,6 +62,7 @@ TEST_F(FileKindTest, AMisspeltKeyLeavesTheKindAsItIs) {
   EXPECT_EQ(KindOf(R"({"name": "m", "scnes": [], "columns": [], "tolerances": []})"),
             FileKind::kExperiment);
   EXPECT_EQ(KindOf(R"({"titel": "m", "columns": [], "groups": []})"), FileKind::kMap);
+  EXPECT_EQ(KindOf(R"({"title": "m", "claims": []})"), FileKind::kClaims);
 }
 
 TEST_F(FileKindTest, ABrokenFileIsAnsweredWithItsFault) {
@@ -81,8 +82,11 @@ TEST_F(FileKindTest, AnAmbiguousFileIsAnsweredWithWhatWasFound) {
                 "experiment (\"name\", \"scenes\"), expected those of one kind: a mechanism "
                 "(\"bodies\", \"joints\") or an experiment (\"scenes\", \"columns\", "
                 "\"tolerances\")");
-  EXPECT_NE(MessageOf("{\"benchmarks\": []}").find("found no key of any kind of file"),
-            std::string::npos);
+  for (const char* text :
+       {"{}", "{\"benchmarks\": []}", "{\"name\": \"x\"}", "{\"title\": \"x\"}"}) {
+    EXPECT_NE(MessageOf(text).find("found no key that tells the kind of a file"), std::string::npos)
+        << text;
+  }
 }
 
 TEST_F(FileKindTest, AFileOfAnotherKindIsNamed) {

@@ -10,6 +10,7 @@
 #include "harness/report/claims_report.h"
 #include "harness/report/table_view.h"
 #include "harness/run_case.h"
+#include "harness/store/contents.h"
 #include "harness/store/files.h"
 #include "harness/store/result_store.h"
 #include "harness/terminal.h"
@@ -24,6 +25,21 @@ std::vector<Record> LoadRecords(const std::filesystem::path& store) {
   return records;
 }
 
+namespace {
+
+/// The records of these cases, as they were asked for: what the store holds besides is another
+/// command's.
+std::vector<Record> RecordsOf(const std::vector<std::string>& ids,
+                              const std::vector<Record>& records) {
+  std::map<std::string, const Record*> last;
+  for (const Record& record : records) last[record.Text("id")] = &record;
+  std::vector<Record> asked;
+  for (const std::string& id : ids) asked.push_back(*last.at(id));
+  return WithContents(std::move(asked));
+}
+
+}  // namespace
+
 int Run(const RunCommand& command, const std::string& typed) {
   // read everything first: a mistake in the last file must not cost the runs of the first
   const std::vector<Experiment> experiments =
@@ -34,15 +50,16 @@ int Run(const RunCommand& command, const std::string& typed) {
   const std::filesystem::path out = command.out.empty() ? std::filesystem::path("results/runs") /
                                                               FileName(experiments.front().name)
                                                         : command.out;
+  SuiteCount count;
   {
     ResultStore store(out);
     const std::vector<Record> before = ReadRecords(out);
-    const SuiteCount count = RunSuite(experiments, command.suite, before, store);
+    count = RunSuite(experiments, command.suite, before, store);
     PrintError("{} run now{}, {} were done before\n", count.run,
                count.failed > 0 ? fmt::format(" ({} not finished)", count.failed) : "",
                count.skipped);
   }
-  WriteTables(LoadRecords(out), out, typed);
+  WriteTables(RecordsOf(count.ids, ReadRecords(out)), out, typed);
   Print("results in {}\n", out.string());
   return 0;
 }
@@ -93,6 +110,7 @@ int Merge(const MergeCommand& command) {
 
 int PrintVerdicts(const VerdictCommand& command, const std::string& typed) {
   const std::vector<Record> records = LoadRecords(command.store);
+  RequireOneContent(records, command.store, "verdict");
   std::vector<ClaimResult> results;
   for (const ClaimRule& rule : ReadClaims(command.claims)) {
     results.push_back(Evaluate(rule, records));

@@ -200,6 +200,8 @@ int PrintComparison(const CompareCommand& command, const std::string& typed) {
   NoteCases("cases only in BASE", comparison.only_base, notes);
   NoteCases("cases only in NEW", comparison.only_fresh, notes);
   NoteCases("cases there more than once, not compared", comparison.ambiguous, notes);
+  NoteCases("cases that ran another mechanism, limits or ensemble under equal keys, not compared",
+            comparison.other_content, notes);
   NoteCommonShift(comparison, notes);
   NoteOrigins("BASE", base, notes);
   NoteOrigins("NEW", fresh, notes);

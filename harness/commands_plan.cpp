@@ -6,6 +6,7 @@
 #include <map>
 #include <set>
 
+#include "harness/case_identity.h"
 #include "harness/commands.h"
 #include "harness/progress.h"
 #include "harness/report/table.h"
@@ -25,31 +26,25 @@ constexpr double kPilotSeconds = 0.25;         ///< CPU time of one pilot run
 constexpr std::size_t kPilotCombinations = 8;  ///< of a sweep; the others take the nearest one's
 constexpr double kFamilySeconds = 0.02;        ///< batches of right-hand sides of one family member
 
-/// Everything that names a case but the experiment's name: results of another file with the same
+/// Everything that decides a run but the experiment's name: results of another file with the same
 /// cases serve as well.
-std::string KeyText(const Record& keys) {
-  std::string text;
-  for (const auto& [key, value] : keys.items()) {
-    if (key != "experiment") text += key + "=" + keys.Text(key) + "\n";
+std::string SameRun(const Record& record) {
+  std::string text = record.Text("content") + "\n";
+  for (const auto& [key, value] : record.items()) {
+    if (key == "case_id") break;
+    if (key != "experiment") text += key + "=" + record.Text(key) + "\n";
   }
   return text;
 }
 
-/// CPU time of the unperturbed run by case, from an earlier store.
-std::map<std::string, double> EarlierTimes(const std::filesystem::path& store,
-                                           const Record& example) {
+/// CPU time [s] of the unperturbed run by SameRun(), from an earlier store.
+std::map<std::string, double> EarlierTimes(const std::filesystem::path& store) {
   std::map<std::string, double> times;
   if (store.empty()) return times;
   for (const Record& record : ReadRecords(store)) {
-    // wall time depends on how many runs shared the processors; old stores have nothing else
-    const std::string measure = record.Find("cpu_s") != nullptr ? "cpu_s" : "wall_s";
-    if (record.Text("kind") != "accuracy" || std::isnan(record.Number(measure))) continue;
-    Record keys;
-    for (const auto& [key, value] : example.items()) {
-      const Value* found = record.Find(key);
-      keys.Set(key, found == nullptr ? Value() : *found);
-    }
-    times[KeyText(keys)] = record.Number(measure);
+    // wall time depends on how many runs shared the processors
+    if (record.Text("kind") != "accuracy" || std::isnan(record.Number("cpu_s"))) continue;
+    times[SameRun(record)] = record.Number("cpu_s");
   }
   return times;
 }
@@ -154,13 +149,14 @@ Plan MakePlan(const std::vector<Experiment>& experiments, const PlanCommand& com
               Pilot* pilot) {
   Plan plan;
   std::map<std::string, std::size_t> places;
-  const Record example = CaseKeys(experiments.front(), Expand(experiments.front()).front());
-  const std::map<std::string, double> earlier = EarlierTimes(command.from, example);
+  const std::map<std::string, double> earlier = EarlierTimes(command.from);
   Progress progress("plan", experiments.size());
   for (std::size_t i = 0; i < experiments.size(); ++i) {
     const Experiment& experiment = experiments[i];
     for (const Case& one : SelectCases(experiment, command.files.filter)) {
-      const auto known = earlier.find(KeyText(CaseKeys(experiment, one)));
+      Record keys = CaseKeys(experiment, one);
+      SetCaseId(&keys, AccuracyContent(experiment, one));
+      const auto known = earlier.find(SameRun(keys));
       plan.known += known != earlier.end() ? 1 : 0;
       Add(one, known != earlier.end() ? known->second : pilot->Seconds(i, one), &plan, &places);
     }

@@ -15,6 +15,7 @@
 #include "harness/report/failure_map_report.h"
 #include "harness/report/figure_recipes.h"
 #include "harness/report/precision_report.h"
+#include "harness/store/contents.h"
 #include "harness/store/files.h"
 #include "harness/terminal.h"
 
@@ -187,6 +188,7 @@ int PrintMap(const MapCommand& command, const std::string& typed) {
     PrintError("{}: no records\n", command.store.string());
     return 2;
   }
+  RequireOneContent(records, command.store, "map");
   const FailureMap map = MakeFailureMap(rules, records);
   if (command.gate) RequireDemands(map, command.rules);
   Table table = MapTable(map);

@@ -238,6 +238,7 @@ int Main(int argc, char** argv) {
     run.suite.accuracy = !timing_only && !precision_only;
     run.suite.precision = !timing_only;
     run.settings = files.settings = ParseSettings(settings);
+    run.suite.set = fmt::format("{}", fmt::join(settings, " "));
     files.filter = ParseSelection(conditions);
     run.suite.shard = ParseShard(shard);
     run.suite.rerun = rerun == "all"      ? Rerun::kAll

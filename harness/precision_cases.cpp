@@ -5,6 +5,7 @@
 #include <algorithm>
 #include <cmath>
 
+#include "harness/case_identity.h"
 #include "harness/compiled_scene.h"
 #include "harness/config/config_error.h"
 #include "harness/store/record_json.h"
@@ -39,11 +40,6 @@ Record RungKeys(const Experiment& experiment, Case one, Scalar scalar, double to
   Record keys = CaseKeys(experiment, one);
   keys.Set("kind", std::string("precision"));
   keys.Set("scalar", std::string(ToString(scalar)));
-  return keys;
-}
-
-Record WithId(Record keys) {
-  keys.Set("case_id", CaseId(keys));
   return keys;
 }
 
@@ -85,7 +81,10 @@ std::vector<LadderGroup> LadderGroups(const Experiment& experiment, const Select
     Record reference = RungKeys(experiment, one, Scalar::kFloat128, precision.reference);
     reference.Set("integrator", std::string("gragg"));
     group.keys.insert(group.keys.begin(), reference);
-    std::ranges::transform(group.keys, group.keys.begin(), WithId);
+    std::string rungs;
+    for (const Record& keys : group.keys) rungs += CaseId(keys);
+    const std::string content = LadderContent(experiment, one, rungs);
+    for (Record& keys : group.keys) SetCaseId(&keys, content);
     group.task.description = PlanarPart(experiment, experiment.scenes[one.scene]);
     groups.push_back(std::move(group));
   }

@@ -9,7 +9,7 @@
 namespace loopbench::harness {
 
 /// A ladder and the keys of its records: those of the reference, then of every rung in the order of
-/// Ladder::rungs (kind "precision", with case_id).
+/// Ladder::rungs (kind "precision", with case_id and content).
 struct LadderGroup {
   LadderTask task;
   std::vector<Record> keys;

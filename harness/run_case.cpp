@@ -4,13 +4,13 @@
 
 #include <algorithm>
 
+#include "harness/case_identity.h"
 #include "harness/compiled_scene.h"
 #include "harness/ensemble.h"
 #include "harness/hash.h"
 #include "harness/integrator/arkode.h"
 #include "harness/merge_parts.h"
 #include "harness/observers/observer.h"
-#include "harness/store/record_json.h"
 #include "lagrange/lagrange.h"
 #include "mechanism/assembly.h"
 #include "odca/odca.h"
@@ -224,28 +224,10 @@ IntegratorOptions OptionsOf(const Case& one, const std::vector<double>& stop_tim
   return options;
 }
 
-std::string CaseContent(const Experiment& experiment, const Case& one) {
-  Record content = CaseKeys(experiment, one);
-  content.Set("ensemble", std::int64_t{one.ensemble});
-  content.Set("seed", static_cast<std::int64_t>(one.seed));
-  content.Set("perturb", one.perturb);
-  for (const DrawnCoordinate& drawn : one.between) {
-    content.Set("between." + drawn.joint, std::vector<double>{drawn.from, drawn.to});
-  }
-  content.Set("branch_bound", one.branch_bound);
-  content.Set("cpu_s", one.limits.cpu_s);
-  content.Set("steps", one.limits.steps);
-  content.Set("memory_mb", one.limits.memory_mb);
-  content.Set("series_points", std::int64_t{experiment.series_points});
-  content.Set("compile", ToString(experiment.compile));
-  content.Set("document", experiment.scenes[one.scene].mechanism.canonical);
-  return CaseId(content);
-}
-
 Record RunCase(const Experiment& experiment, const Case& one) {
   const ExperimentScene& scene = experiment.scenes[one.scene];
   Record record = CaseKeys(experiment, one);
-  record.Set("case_id", CaseId(record));
+  SetCaseId(&record, AccuracyContent(experiment, one));
   Run nominal = RunOnce(experiment, one, scene.mechanism.description, true);
   for (const auto& [key, value] : nominal.record.items()) record.Set(key, value);
 

@@ -106,9 +106,6 @@ class FormulationOde final : public Ode {
 /// Method, tolerances and limits of a case, and the stop times of its mechanism.
 IntegratorOptions OptionsOf(const Case& one, const std::vector<double>& stop_times);
 
-/// Names all that decides the run: keys, ensemble, limits, and the mechanism itself.
-std::string CaseContent(const Experiment& experiment, const Case& one);
-
 /// Runs the case and, where it asks for one, its ensemble of perturbed starts. The record holds the
 /// keys, the outcome and all measured values of the unperturbed run; growth is analysed over the
 /// ensemble (or over the single run, which resolves nothing). Limits hold for each run.

@@ -8,10 +8,11 @@
 #include <functional>
 #include <limits>
 #include <map>
+#include <set>
+#include <utility>
 
-#include "harness/compiled_scene.h"
+#include "harness/case_identity.h"
 #include "harness/config/config_error.h"
-#include "harness/hash.h"
 #include "harness/isolation/fault.h"
 #include "harness/isolation/processes.h"
 #include "harness/origin.h"
@@ -33,7 +34,8 @@ double Cost(const Case& one) { return one.ensemble * one.horizon * std::pow(one.
 
 /// One process: the records it owes, known but for their results, and how to make them.
 struct Piece {
-  std::vector<Record> owed;  ///< keys, case_id, id, version
+  std::vector<Record> owed;     ///< keys, case_id and content
+  std::int64_t experiment = 0;  ///< which of the command's
   std::function<std::vector<Record>()> work;
   ProcessLimits limits;
   std::string label;
@@ -43,31 +45,21 @@ struct Piece {
 /// Twice the CPU time that the runs inside may take by themselves, and a little for starting.
 constexpr double kPatience = 2.0, kGrace_s = 2.0;
 
-std::string Id(const std::string& content) { return Fnv1a(content + CodeVersion()); }
-
 Piece AccuracyPiece(const Experiment& experiment, const Case& one) {
   Record keys = CaseKeys(experiment, one);
-  keys.Set("case_id", CaseId(keys));
-  keys.Set("id", Id(CaseContent(experiment, one)));
+  SetCaseId(&keys, AccuracyContent(experiment, one));
   const int runs = one.ensemble > 1 ? one.ensemble + 1 : 1;
-  return {{keys},
-          [&experiment, one] { return std::vector<Record>{RunCase(experiment, one)}; },
-          {kPatience * runs * one.limits.cpu_s + kGrace_s, one.limits.memory_mb},
-          fmt::format("{} {} {}", one.mechanism, ToString(one.column), one.rtol),
-          Cost(one)};
+  return {.owed = {keys},
+          .work = [&experiment, one] { return std::vector<Record>{RunCase(experiment, one)}; },
+          .limits = {kPatience * runs * one.limits.cpu_s + kGrace_s, one.limits.memory_mb},
+          .label = fmt::format("{} {} {}", one.mechanism, ToString(one.column), one.rtol),
+          .cost = Cost(one)};
 }
 
 Piece TimingPiece(const Experiment& experiment, const TimingGroup& group) {
   Piece piece;
   for (std::size_t i = 0; i < group.cases.size(); ++i) {
-    Record keys = TimingKeys(experiment, group, i);
-    const std::string document =
-        group.simulate ? experiment.scenes[group.cases[i].scene].mechanism.canonical : "";
-    const Limits& limits = experiment.limits;
-    keys.Set("id", Id(fmt::format("{} {} {} {} {} {} {}", CaseId(keys), experiment.timing.repeats,
-                                  limits.cpu_s, limits.steps, limits.memory_mb,
-                                  ToString(experiment.compile), document)));
-    piece.owed.push_back(keys);
+    piece.owed.push_back(TimingKeys(experiment, group, i));
   }
   // the first column is timed twice (noise.h)
   const int columns = static_cast<int>(group.cases.size()) + 1;
@@ -84,18 +76,7 @@ Piece TimingPiece(const Experiment& experiment, const TimingGroup& group) {
 Piece LadderPiece(const Experiment& experiment, const LadderGroup& group) {
   Piece piece;
   const Limits& limits = experiment.limits;
-  const std::size_t scene = static_cast<std::size_t>(
-      std::ranges::find(experiment.scenes, group.keys.front().Text("mechanism"),
-                        &ExperimentScene::name) -
-      experiment.scenes.begin());
-  std::string ladder;  // the verdict on one rung depends on the others
-  for (const Record& keys : group.keys) ladder += CaseId(keys);
-  for (Record keys : group.keys) {
-    keys.Set("id", Id(fmt::format("{} {} {} {} {} {}", CaseId(keys), ladder, limits.cpu_s,
-                                  limits.steps, ToString(experiment.compile),
-                                  experiment.scenes[scene].mechanism.canonical)));
-    piece.owed.push_back(keys);
-  }
+  piece.owed = group.keys;
   const auto runs = static_cast<double>(group.keys.size() + 1);  // there are two references
   piece.limits = {kPatience * runs * limits.cpu_s + kGrace_s, limits.memory_mb};
   piece.work = [&group] { return ClimbTogether(group); };
@@ -124,7 +105,8 @@ std::string Answer(const Piece& piece) {
 }
 
 /// The parent's side: what the piece owes, filled from the answer or with the reason why not.
-std::vector<Record> Records(const Piece& piece, const ProcessResult& result) {
+std::vector<Record> Records(const Piece& piece, const ProcessResult& result,
+                            const std::string& set) {
   std::vector<Record> records;
   std::string outcome = OutcomeOf(result.ending), message = result.text;
   if (result.ending == ProcessEnding::kThrew) message = "threw: " + message;
@@ -153,8 +135,10 @@ std::vector<Record> Records(const Piece& piece, const ProcessResult& result) {
       records[i].Set("wall_s", result.wall_s);
       records[i].Set("cpu_s", result.cpu_s);
     }
-    records[i].Set("id", piece.owed[i].Text("id"));
+    records[i].Set("id", RunId(piece.owed[i]));
     records[i].Set("version", CodeVersion());
+    if (!set.empty()) records[i].Set("set", set);
+    records[i].Set("experiment_index", piece.experiment);
     Stamp(records[i]);
   }
   return records;
@@ -170,7 +154,20 @@ class Runner {
     }
   }
 
+  /// `pieces` in the order of the experiments.
   void Run(const std::string& what, std::vector<Piece> pieces, int jobs) {
+    // a case that two files share is one case
+    std::erase_if(pieces, [this](const Piece& piece) {
+      bool asked_before = true;
+      for (const Record& owed : piece.owed) {
+        const std::string id = RunId(owed);
+        if (!asked_.insert(id).second) continue;
+        asked_before = false;
+        count_.ids.push_back(id);
+      }
+      return asked_before;
+    });
+    std::ranges::stable_sort(pieces, std::greater<>(), &Piece::cost);
     std::erase_if(pieces, [this](const Piece& piece) {
       if (!Done(piece)) return false;
       count_.skipped += piece.owed.size();
@@ -182,7 +179,7 @@ class Runner {
         pieces.size(), jobs, [&](std::size_t i) { return Answer(pieces[i]); },
         [&](std::size_t i) { return pieces[i].limits; },
         [&](std::size_t i, const ProcessResult& result) {
-          for (const Record& record : Records(pieces[i], result)) {
+          for (const Record& record : Records(pieces[i], result, options_.set)) {
             store_.Append(record);
             ++count_.run;
             count_.failed += record.Text("outcome") != ToString(Outcome::kFinished);
@@ -197,7 +194,7 @@ class Runner {
   bool Done(const Piece& piece) const {
     if (options_.rerun == Rerun::kAll) return false;
     return std::ranges::all_of(piece.owed, [this](const Record& owed) {
-      const auto at = outcomes_.find(owed.Text("id"));
+      const auto at = outcomes_.find(RunId(owed));
       return at != outcomes_.end() &&
              (options_.rerun == Rerun::kNone || at->second == ToString(Outcome::kFinished));
     });
@@ -206,6 +203,7 @@ class Runner {
   const SuiteOptions& options_;
   ResultStore& store_;
   std::map<std::string, std::string> outcomes_;  ///< by id, the last one
+  std::set<std::string> asked_;                  ///< ids
   SuiteCount count_;
 };
 
@@ -262,42 +260,46 @@ SuiteCount RunSuite(const std::vector<Experiment>& experiments, const SuiteOptio
                     const std::vector<Record>& records, ResultStore& store) {
   WarnOfJobs(options.jobs);
   Runner runner(options, records, store);
+  std::vector<Piece> pieces;
+  std::size_t number = 0;
+  const auto add = [&](std::size_t e, auto make_piece) {
+    if (!options.shard.Takes(number++)) return;
+    pieces.push_back(make_piece());
+    pieces.back().experiment = static_cast<std::int64_t>(e);
+  };
+  const auto run = [&](const std::string& what, int jobs) {
+    runner.Run(what, std::exchange(pieces, {}), jobs);
+    number = 0;
+  };
   if (options.accuracy) {
-    std::vector<Piece> pieces;
-    std::size_t number = 0;
-    for (const Experiment& experiment : experiments) {
-      for (const Case& one : SelectCases(experiment, options.filter)) {
-        if (options.shard.Takes(number++)) pieces.push_back(AccuracyPiece(experiment, one));
+    for (std::size_t e = 0; e < experiments.size(); ++e) {
+      for (const Case& one : SelectCases(experiments[e], options.filter)) {
+        add(e, [&] { return AccuracyPiece(experiments[e], one); });
       }
     }
-    std::ranges::stable_sort(pieces, std::greater<>(), &Piece::cost);
-    runner.Run("accuracy", std::move(pieces), options.jobs);
+    run("accuracy", options.jobs);
   }
   if (options.precision) {
     std::vector<std::vector<LadderGroup>> ladders;  // pieces refer to them
     for (const Experiment& experiment : experiments) {
       ladders.push_back(LadderGroups(experiment, options.filter));
     }
-    std::vector<Piece> pieces;
-    std::size_t number = 0;
     for (std::size_t e = 0; e < experiments.size(); ++e) {
       for (const LadderGroup& ladder : ladders[e]) {
-        if (options.shard.Takes(number++)) pieces.push_back(LadderPiece(experiments[e], ladder));
+        add(e, [&] { return LadderPiece(experiments[e], ladder); });
       }
     }
-    runner.Run("precision", std::move(pieces), options.jobs);
+    run("precision", options.jobs);
   }
   if (options.timing) {
     std::vector<std::vector<TimingGroup>> groups;  // pieces refer to them
     for (const Experiment& experiment : experiments) groups.push_back(TimingGroups(experiment));
-    std::vector<Piece> pieces;
-    std::size_t number = 0;
     for (std::size_t e = 0; e < experiments.size(); ++e) {
       for (const TimingGroup& group : groups[e]) {
-        if (options.shard.Takes(number++)) pieces.push_back(TimingPiece(experiments[e], group));
+        add(e, [&] { return TimingPiece(experiments[e], group); });
       }
     }
-    runner.Run("timing", std::move(pieces), 1);
+    run("timing", 1);
   }
   return runner.count();
 }

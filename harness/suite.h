@@ -32,6 +32,7 @@ struct SuiteOptions {
   bool precision = true;  ///< ladders of several scalars
   Selection filter;       ///< accuracy cases and ladders whose keys do not match are left out
   Shard shard;
+  std::string set;  ///< what --set changed, kept in the records for people to read
   Rerun rerun = Rerun::kNone;
 };
 
@@ -44,6 +45,9 @@ struct SuiteCount {
   std::size_t run = 0;      ///< records made now
   std::size_t skipped = 0;  ///< cases the store had already
   std::size_t failed = 0;   ///< of those made now: any outcome but "finished"
+  /// Of every case that was asked for, run now or done before: kind after kind, each in the order
+  /// of the experiments.
+  std::vector<std::string> ids;
 };
 
 /// Runs the accuracy cases of all experiments, costliest first, then their precision ladders, then

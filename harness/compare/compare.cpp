@@ -219,7 +219,7 @@ int ComparisonReport::ExitCode(const CompareOptions& options) const {
   if (Count(Judgement::kWorse) + Count(Judgement::kDifferent) > 0) return 1;
   const int compared = Count(Judgement::kSame) + Count(Judgement::kBetter);
   const bool missing = !options.subset && !only_base.empty();
-  return compared == 0 || missing || !ambiguous.empty() ? 2 : 0;
+  return compared == 0 || missing || !ambiguous.empty() || !other_content.empty() ? 2 : 0;
 }
 
 ComparisonReport Compare(const std::vector<Record>& base, const std::vector<Record>& fresh,
@@ -234,6 +234,10 @@ ComparisonReport Compare(const std::vector<Record>& base, const std::vector<Reco
     const auto other = in_fresh.find(one);
     if (other == in_fresh.end()) {
       comparison.only_base.push_back(one);
+      continue;
+    }
+    if (record.Text("case_id") != other->second->Text("case_id")) {
+      comparison.other_content.push_back(one);
       continue;
     }
     const Origin base_origin = OriginOf(record), fresh_origin = OriginOf(*other->second);

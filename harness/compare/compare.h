@@ -54,10 +54,13 @@ struct ComparisonReport {
   std::vector<std::string> only_base;   ///< cases that NEW lacks
   std::vector<std::string> only_fresh;  ///< cases that BASE lacks
   std::vector<std::string> ambiguous;   ///< cases that one side holds twice, so not compared
+  /// Cases of equal keys that ran something else (case_id: mechanism, limits, ensemble, ...), so
+  /// not compared.
+  std::vector<std::string> other_content;
 
   int Count(Judgement judgement, std::string_view group = "") const;
   /// 1: something is worse or different. 2: nothing was measured on both sides, or cases are
-  /// missing (unless options.subset) or ambiguous. 0: the same or better.
+  /// missing (unless options.subset), ambiguous or of other content. 0: the same or better.
   int ExitCode(const CompareOptions& options) const;
 };
 

@@ -10,7 +10,7 @@ namespace {
 
 // Keys of records other than those of a case: a run would write over a parameter of that name. A
 // test holds this list against the records of actual runs.
-constexpr std::array<std::string_view, 69> kRecordKeys = {"libm",
+constexpr std::array<std::string_view, 72> kRecordKeys = {"libm",
                                                           "load1",
                                                           "kind",
                                                           "experiment",
@@ -26,6 +26,9 @@ constexpr std::array<std::string_view, 69> kRecordKeys = {"libm",
                                                           "horizon",
                                                           "case_id",
                                                           "content",
+                                                          "set",
+                                                          "experiment_index",
+                                                          "checksum",
                                                           "document",
                                                           "outcome",
                                                           "message",

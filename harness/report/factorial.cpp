@@ -9,6 +9,7 @@
 #include <limits>
 #include <map>
 
+#include "harness/config/config_error.h"
 #include "harness/report/columns.h"
 
 namespace loopbench::harness {
@@ -33,6 +34,18 @@ void SetScene(const std::string& mechanism, const FactorialOptions& options, Key
   }
 }
 
+// A table of one effect per factor has no place for two runs that differ in anything else.
+void RequireSameCase(const Record& one, const Record& other) {
+  if (one.Text("case_id") == other.Text("case_id")) return;
+  for (const char* key : {"experiment", "jacobian", "atol", "content", "case_id"}) {
+    if (one.Text(key) == other.Text(key)) continue;
+    throw ConfigError(fmt::format(
+        "factorial table: found {} {} with {} {} and {}, expected one of them: choose "
+        "with --where {}=...",
+        one.Text("mechanism"), one.Text("formulation"), key, one.Text(key), other.Text(key), key));
+  }
+}
+
 std::vector<Run> Collect(std::span<const Record> records, const FactorialOptions& options) {
   const std::vector<TableColumn> parameters = WithParameters({}, records);
   std::map<Key, Record> last;
@@ -48,10 +61,14 @@ std::vector<Run> Collect(std::span<const Record> records, const FactorialOptions
       key[name] = record.Text(name);
     }
     for (const TableColumn& parameter : parameters) {
+      // mechanisms differ in content, and are compared all the same
+      if (parameter.key == "content" || parameter.key == "set") continue;
       key["parameter " + parameter.key] = record.Text(parameter.key);
     }
     SetScene(record.Text("mechanism"), options, &key);
-    last[key] = record;
+    const auto [known, is_new] = last.try_emplace(key, record);
+    if (!is_new) RequireSameCase(known->second, record);
+    known->second = record;
   }
   std::vector<Run> runs;
   for (const auto& [key, record] : last) runs.push_back({key, record});

@@ -28,12 +28,14 @@ struct FactorialOptions {
 ///
 /// Pairs are records equal in mechanism, formulation, enforcement, coordinates, solver and
 /// integrator and in the parameters of a sweep, except for the factor. Of records equal in all of
-/// these the last one counts, as a store that grows by appending suggests. The ratio is
+/// these and in case_id the last one counts. The ratio is
 /// drift_position_max of `to` over that of `from`, given as geometric mean, least and largest;
 /// drift below the unit of round-off (2.2e-16 m) counts as that. exponent_difference is the mean of
 /// growth_exponent(to) - growth_exponent(from) over the pairs that have both. Pairs with a run that
 /// failed, or whose drift is not finite, have no ratio: they are counted in `left_out` and keep
 /// their row.
+///
+/// @throws ConfigError for records equal in all of these that are different cases.
 Table FactorialTable(std::span<const Record> records, const FactorialOptions& options = {});
 
 }  // namespace loopbench::harness

@@ -15,7 +15,7 @@ namespace loopbench::harness {
 namespace {
 
 constexpr const char* kLadderKeys[] = {"mechanism", "formulation", "enforcement", "coordinates",
-                                       "solver",    "horizon",     "experiment"};
+                                       "solver",    "horizon",     "experiment",  "content"};
 
 bool IsReference(const Record& record) { return record.Text("integrator") == "gragg"; }
 
@@ -59,8 +59,8 @@ NamedFigure FigureOf(std::span<const Record> rungs) {
   NamedFigure named;
   named.name = "precision";
   for (const char* key : kLadderKeys) {
-    const bool in_name =
-        std::string_view(key) != "horizon" && std::string_view(key) != "experiment";
+    const std::string_view word = key;
+    const bool in_name = word != "horizon" && word != "experiment" && word != "content";
     if (in_name) named.name += "-" + first.Text(key);
   }
   Figure& figure = named.figure;
@@ -114,19 +114,22 @@ std::vector<NamedFigure> PrecisionFigures(std::span<const Record> records) {
   std::vector<Record> sorted(records.begin(), records.end());
   SortRungs(&sorted);
   std::vector<NamedFigure> figures;
-  std::map<std::string, int> uses;
-  std::vector<std::string> others;  // what else tells ladders apart
+  std::vector<std::string> others, contents;  // what else tells ladders apart
   for (std::size_t begin = 0; begin < sorted.size();) {
     std::size_t end = begin;
     while (end < sorted.size() && LadderOf(sorted[end]) == LadderOf(sorted[begin])) ++end;
     figures.push_back(FigureOf(std::span(sorted).subspan(begin, end - begin)));
     others.push_back(
         fmt::format("-{}s-{}", sorted[begin].Text("horizon"), sorted[begin].Text("experiment")));
-    ++uses[figures.back().name];
+    contents.push_back("-" + sorted[begin].Text("content"));
     begin = end;
   }
-  for (std::size_t i = 0; i < figures.size(); ++i) {
-    if (uses[figures[i].name] > 1) figures[i].name += others[i];
+  for (const std::vector<std::string>& endings : {others, contents}) {
+    std::map<std::string, int> uses;
+    for (const NamedFigure& figure : figures) ++uses[figure.name];
+    for (std::size_t i = 0; i < figures.size(); ++i) {
+      if (uses[figures[i].name] > 1) figures[i].name += endings[i];
+    }
   }
   return figures;
 }

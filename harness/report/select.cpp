@@ -59,6 +59,24 @@ int CompareNaturally(const std::string& a, const std::string& b) {
   return a.compare(b);
 }
 
+// By all that names a case: a mechanism at two levels, the parameters of a sweep. Of cases that
+// share it, those of the command's first file come first.
+int CompareKeys(const Record& a, const Record& b) {
+  const auto ends = [](const Record& record, std::size_t i) {
+    if (i == record.items().size()) return true;
+    const std::string& key = record.items()[i].first;
+    return key == "content" || key == "case_id" || key == "outcome";
+  };
+  for (std::size_t i = 0; !ends(a, i) || !ends(b, i); ++i) {
+    if (ends(a, i) || ends(b, i)) return ends(a, i) ? -1 : 1;
+    const std::string &key = a.items()[i].first, &other = b.items()[i].first;
+    if (const int order = key.compare(other)) return order;
+    if (const int order = Compare(a.Number(key), b.Number(key))) return order;
+    if (const int order = CompareNaturally(a.Text(key), b.Text(key))) return order;
+  }
+  return Compare(a.Number("experiment_index"), b.Number("experiment_index"));
+}
+
 bool ComesBefore(const Record& a, const Record& b) {
   if (const int order = CompareNaturally(a.Text("mechanism"), b.Text("mechanism"))) {
     return order < 0;
@@ -67,7 +85,8 @@ bool ComesBefore(const Record& a, const Record& b) {
   for (const char* key : {"formulation", "coordinates", "solver"}) {
     if (const int order = a.Text(key).compare(b.Text(key))) return order < 0;
   }
-  return Compare(-a.Number("rtol"), -b.Number("rtol")) < 0;
+  if (const int order = Compare(-a.Number("rtol"), -b.Number("rtol"))) return order < 0;
+  return CompareKeys(a, b) < 0;
 }
 
 // A value as SortRowsBy() orders it: 0 numbers, 1 texts, 2 what is missing.

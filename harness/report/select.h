@@ -35,8 +35,10 @@ std::vector<Record> Filter(std::span<const Record> records, const Selection& sel
 std::string ToText(const Selection& selection);
 
 /// Order of rows in every table: by mechanism (chain-3 before chain-10), horizon, formulation,
-/// coordinates, solver, then rtol from coarse to fine. Stable, so rows equal in all six stay in the
-/// order of the store. A missing number comes last.
+/// coordinates, solver, rtol from coarse to fine, then by all other keys of the case as they stand
+/// in the record: which run ended first leaves no trace. Cases of equal keys and different content
+/// stay in the order of the files of their command, then in that of the store. A missing number
+/// comes last.
 void SortRows(std::vector<Record>* records);
 
 /// Stable order by one key: numbers by size, anything else by its text, texts after numbers.

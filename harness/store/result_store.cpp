@@ -10,6 +10,7 @@
 #include <stdexcept>
 #include <string_view>
 
+#include "harness/store/contents.h"
 #include "harness/store/files.h"
 
 namespace loopbench::harness {
@@ -113,7 +114,7 @@ std::vector<Record> LatestRecords(const std::vector<Record>& records) {
       latest[at->second] = record;
     }
   }
-  return latest;
+  return WithContents(std::move(latest));
 }
 
 std::vector<Record> ReadRecords(const std::filesystem::path& path,

@@ -40,7 +40,8 @@ class ResultStore {
 };
 
 /// The last record of each case ("case_id"), at the place of its first: what tables show when a
-/// case was run again. Records without a case_id all stay.
+/// case was run again. Records without a case_id all stay. Cases of equal keys are told apart
+/// (contents.h).
 std::vector<Record> LatestRecords(const std::vector<Record>& records);
 
 /// All records of a store, `path` as for ResultStore, in the order of the file. Empty lines are

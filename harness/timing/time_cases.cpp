@@ -5,10 +5,10 @@
 #include <memory>
 #include <optional>
 
+#include "harness/case_identity.h"
 #include "harness/compiled_scene.h"
 #include "harness/integrator/arkode.h"
 #include "harness/run_case.h"
-#include "harness/store/record_json.h"
 #include "harness/timing/noise.h"
 #include "mechanism/assembly.h"
 #include "mechanism/library.h"
@@ -257,7 +257,8 @@ Record TimingKeys(const Experiment& experiment, const TimingGroup& group, std::s
     // a right-hand side has no tolerance and no horizon
     for (const char* key : {"integrator", "rtol", "atol", "horizon"}) keys.Set(key, Value());
   }
-  keys.Set("case_id", CaseId(keys));
+  SetCaseId(&keys, group.simulate ? SceneTimingContent(experiment, group.cases[index])
+                                  : FamilyTimingContent(experiment));
   return keys;
 }
 

@@ -25,7 +25,7 @@ struct TimingGroup {
 /// The timings of an experiment: a group per scene, then one per member of a family.
 std::vector<TimingGroup> TimingGroups(const Experiment& experiment);
 
-/// The keys of one of the group's cases (kind "timing"), with its case_id.
+/// The keys of one of the group's cases (kind "timing"), with its case_id and content.
 Record TimingKeys(const Experiment& experiment, const TimingGroup& group, std::size_t index);
 
 /// One record per case, in order. A case whose simulation fails keeps its row with outcome and,

@@ -1,0 +1,173 @@
+// One identity everywhere: a case is its keys and its content, in stores, tables and judgements.
+#include "harness/case_identity.h"
+
+#include <algorithm>
+#include <cmath>
+#include <limits>
+#include <random>
+#include <set>
+
+#include "harness/config/experiment_reader.h"
+#include "harness/precision_cases.h"
+#include "harness/report/select.h"
+#include "harness/timing/time_cases.h"
+#include "tests/harness/cli_fixture.h"
+
+namespace loopbench::harness {
+namespace {
+
+constexpr const char* kMass5 = " --set /scenes/0/mechanism/bodies/0/mass=5";
+constexpr const char* kMass1 = " --set /scenes/0/mechanism/bodies/0/mass=1";
+
+class CaseIdentity : public CommandLineTest {
+ protected:
+  /// A table's rows, without provenance.
+  std::string Rows(const std::string& file) const {
+    const std::string text = ReadFile(folder_ / file);
+    return text.substr(0, text.find("\n#"));
+  }
+};
+
+TEST_F(CaseIdentity, GoingBackShowsTheNumbersOfWhatWasAskedFor) {
+  for (const auto& [there, back] :
+       {std::pair<std::string, std::string>{kMass5, kMass1},
+        {" --set '/limits={\"steps\":3}'", " --set '/limits={\"steps\":30000}'"}}) {
+    fs::remove_all(folder_ / "out");
+    ExpectEnding(Call("run tiny.json --out out" + there), 0, {"2 run now"});
+    const std::string first = Rows("out/drift.csv");
+    ExpectEnding(Call("run tiny.json --out out" + back), 0, {"2 run now"});
+    EXPECT_NE(Rows("out/drift.csv"), first) << "other numbers, or nothing is shown";
+    const Ending third = Call("run tiny.json --out out" + there);
+    ExpectEnding(third, 0, {"0 run now, 2 were done before"});
+    EXPECT_EQ(Rows("out/drift.csv"), first);
+    EXPECT_EQ(first.find("content"), std::string::npos) << "one content needs no name";
+  }
+}
+
+TEST_F(CaseIdentity, TablesShowEveryContentAndTellThemApart) {
+  for (const char* set : {kMass5, kMass1, kMass5}) {
+    ExpectEnding(Call(std::string("run tiny.json --out out") + set), 0, {});
+  }
+  ExpectEnding(Call("table out"), 0, {"content", "bodies/0/mass=5", "bodies/0/mass=1"});
+  const std::vector<Record> records = LatestRecords(ReadRecords(folder_ / "out"));
+  ASSERT_EQ(records.size(), 4u);
+  EXPECT_EQ(records[0].Text("content"), records[1].Text("content")) << "of one mechanism";
+  EXPECT_NE(records[0].Text("content"), records[2].Text("content"));
+  const std::string mass1 = records[2].Text("content");
+  ExpectEnding(Call("table out --format csv --columns set,steps --where content=" + mass1), 0,
+               {"bodies/0/mass=1"});
+  // drawn together or judged together they would be one case with two results
+  ExpectEnding(Call("verdict out --claims claims.json"), 2, {"four-bar", "more than once"});
+  ExpectEnding(Call("table out --kind factorial"), 2, {"--where content="});
+  ExpectEnding(Call("plot out --out w.svg --x steps --y energy_error_max"), 0, {"content"});
+}
+
+TEST_F(CaseIdentity, FilesOfEqualNamesAreDifferentCases) {
+  fs::create_directories(folder_ / "other");
+  Write("other/tiny.json", kExperiment);
+  Write("other/four-bar.json", mechanism_);
+  EditMechanism("\"mass\": 1.0", "\"mass\": 7.0");
+  std::string first;
+  for (const char* out : {"a", "b", "c"}) {
+    const std::string call =
+        std::string("run tiny.json other/tiny.json tiny.json --jobs 3 --out ") + out;
+    ExpectEnding(Call(call), 0, {"4 run now", "content"});
+    const std::string rows = Rows(std::string(out) + "/drift.csv");
+    EXPECT_EQ(std::ranges::count(rows, '\n'), 4);
+    if (first.empty()) first = rows;
+    EXPECT_EQ(rows, first);
+  }
+}
+
+TEST_F(CaseIdentity, TimesAreThoseOfTheirContentToo) {
+  const std::string run = "run tiny.json --timing-only --set /timing/repeats=1 --out out";
+  ExpectEnding(Call(run + kMass5), 0, {"2 run now"});
+  const std::string first = Rows("out/timing.csv");
+  ExpectEnding(Call(run + kMass1), 0, {"2 run now"});
+  ExpectEnding(Call(run + kMass5), 0, {"0 run now"});
+  EXPECT_EQ(Rows("out/timing.csv"), first);
+}
+
+TEST_F(CaseIdentity, PlansTakeNoTimesOfOtherContents) {
+  ExpectEnding(Call(std::string("run tiny.json --out out") + kMass5), 0, {});
+  ExpectEnding(Call(std::string("plan tiny.json --from out") + kMass5), 0, {"2 of 2 cases"});
+  ExpectEnding(Call(std::string("plan tiny.json --from out") + kMass1), 0, {"0 of 2 cases"});
+}
+
+TEST_F(CaseIdentity, ComparisonsPairEqualContentsOnly) {
+  ExpectEnding(Call(std::string("run tiny.json --out five") + kMass5), 0, {});
+  ExpectEnding(Call(std::string("run tiny.json --out one") + kMass1), 0, {});
+  ExpectEnding(Call(std::string("run tiny.json --out both") + kMass1), 0, {});
+  ExpectEnding(Call(std::string("run tiny.json --out both") + kMass5), 0, {});
+  ExpectEnding(Call("compare five one"), 2, {"2 cases that ran another mechanism"});
+  ExpectEnding(Call("compare five both"), 2, {"2 cases only in BASE", "4 cases only in NEW"});
+  ExpectEnding(Call("compare both both"), 0, {"SAME"});
+  ExpectEnding(Call("export both"), 0, {"bodies/0/mass=5", "bodies/0/mass=1"});
+}
+
+TEST_F(CaseIdentity, WhateverDecidesARunChangesEveryCaseId) {
+  const std::string timing = R"(/timing={"repeats":1,"families":[{"family":"chain","sizes":[3],
+      "columns":[{"formulation":"odca","enforcement":"acceleration"}]}]})";
+  const std::string precision = R"(/precision={"scalars":["float","double"]})";
+  const auto ids = [&](const std::string& change) {
+    std::vector<Setting> settings = {ParseSetting(timing), ParseSetting(precision)};
+    if (!change.empty()) settings.push_back(ParseSetting(change));
+    const Experiment experiment = ReadExperiments(folder_ / "tiny.json", settings).front();
+    Record accuracy = CaseKeys(experiment, Expand(experiment).front());
+    SetCaseId(&accuracy, AccuracyContent(experiment, Expand(experiment).front()));
+    const std::vector<TimingGroup> groups = TimingGroups(experiment);
+    return std::vector<std::string>{accuracy.Text("case_id"),
+                                    TimingKeys(experiment, groups.front(), 0).Text("case_id"),
+                                    LadderGroups(experiment).front().keys.front().Text("case_id"),
+                                    TimingKeys(experiment, groups.back(), 0).Text("case_id")};
+  };
+  const std::vector<std::string> plain = ids("");
+  EXPECT_EQ(std::set<std::string>(plain.begin(), plain.end()).size(), plain.size());
+  EXPECT_EQ(ids(""), plain);
+  EXPECT_EQ(ids("/comment=\"other words\""), plain);
+  const std::string mass = "/scenes/0/mechanism/bodies/0/mass=2";
+  for (const std::string change : {mass.c_str(), "/limits/cpu_s=3", "/limits/steps=77",
+                                   "/limits/memory_mb=1024", "/compile={\"welds\":false}"}) {
+    const std::vector<std::string> changed = ids(change);
+    for (std::size_t i = 0; i < plain.size(); ++i) {
+      const bool of_a_scene = i < 3;
+      EXPECT_EQ(changed[i] != plain[i], of_a_scene || change != mass) << i << " " << change;
+    }
+  }
+  for (const char* change : {R"(/ensembles=[{"size":4}])", R"(/series={"points":17})"}) {
+    EXPECT_NE(ids(change)[0], plain[0]) << change;
+  }
+  EXPECT_NE(ids(R"(/precision/scalars=["float","float128"])")[2], plain[2]);
+}
+
+TEST(RowOrder, IsTheSameWhicheverRunEndedFirst) {
+  std::vector<Record> rows;
+  const double none = std::numeric_limits<double>::quiet_NaN();
+  for (const char* enforcement : {"acceleration", "position"}) {
+    for (const double alpha : {none, 1.0, 5.0, 10.0}) {
+      for (const char* integrator : {"ode45", "trbdf2"}) {
+        for (const std::int64_t file : {0, 1}) {
+          Record row;
+          row.Set("mechanism", std::string("four-bar"));
+          row.Set("enforcement", std::string(enforcement));
+          row.Set("integrator", std::string(integrator));
+          if (!std::isnan(alpha)) row.Set("alpha", alpha);
+          row.Set("case_id", std::to_string(rows.size()));
+          row.Set("experiment_index", file);
+          rows.push_back(row);
+        }
+      }
+    }
+  }
+  SortRows(&rows);
+  const std::vector<Record> sorted = rows;
+  std::mt19937 random(1);
+  for (int i = 0; i < 50; ++i) {
+    std::ranges::shuffle(rows, random);
+    SortRows(&rows);
+    ASSERT_EQ(rows, sorted);
+  }
+}
+
+}  // namespace
+}  // namespace loopbench::harness

@@ -12,6 +12,7 @@
 #include "harness/run_case.h"
 #include "harness/store/contents.h"
 #include "harness/store/files.h"
+#include "harness/store/merge_stores.h"
 #include "harness/store/result_store.h"
 #include "harness/terminal.h"
 #include "harness/timing/time_cases.h"
@@ -20,7 +21,8 @@ namespace loopbench::harness {
 
 std::vector<Record> LoadRecords(const std::filesystem::path& store) {
   std::vector<std::string> warnings;
-  const std::vector<Record> records = LatestRecords(ReadRecords(store, &warnings));
+  std::vector<Record> records = LatestRecords(ReadRecords(store, &warnings), CodeVersion());
+  SortRows(&records);  // in the store they stand as they ended
   for (const std::string& warning : warnings) PrintError("warning: {}\n", warning);
   return records;
 }
@@ -59,50 +61,28 @@ int Run(const RunCommand& command, const std::string& typed) {
                count.failed > 0 ? fmt::format(" ({} not finished)", count.failed) : "",
                count.skipped);
   }
-  WriteTables(RecordsOf(count.ids, ReadRecords(out)), out, typed);
+  const bool is_file = out.extension() == ".jsonl";  // its tables stand beside it
+  WriteTables(RecordsOf(count.ids, ReadRecords(out)), is_file ? out.parent_path() : out, typed);
   Print("results in {}\n", out.string());
   return 0;
 }
 
 int Merge(const MergeCommand& command) {
-  // by id, in the order of the files: of equal cases the last that finished stays
-  std::vector<Record> merged;
-  std::map<std::string, std::size_t> place;
+  std::vector<PartOfStore> parts;
   std::size_t read = 0;
-  const auto finished = [](const Record& record) {
-    return record.Text("outcome") == ToString(Outcome::kFinished);
-  };
   for (const auto& store : command.stores) {
-    for (const Record& record : ReadRecords(store)) {
-      ++read;
-      const std::string id = record.Text("id");
-      const auto [at, is_new] = place.try_emplace(id, merged.size());
-      if (id.empty() || is_new) {
-        merged.push_back(record);
-        continue;
-      }
-      Record& other = merged[at->second];
-      if (finished(record) && finished(other) &&
-          record.Text("state_hash") != other.Text("state_hash")) {
-        throw std::runtime_error(fmt::format(
-            "{}: case {} ({} {}) ended in state {} here and in {} before; one of the stores is not "
-            "what it says",
-            store.string(), id, record.Text("mechanism"), record.Text("formulation"),
-            record.Text("state_hash"), other.Text("state_hash")));
-      }
-      if (finished(record) || !finished(other)) other = record;
+    std::vector<std::string> warnings;
+    parts.push_back({store, ReadRecords(store, &warnings)});
+    read += parts.back().records.size();
+    if (!warnings.empty()) {
+      throw std::runtime_error(fmt::format(
+          "{}\n{} was interrupted: give its command again, which completes it, and merge then",
+          warnings.front(), store.string()));
     }
   }
-  std::string text;
-  for (const Record& record : merged) text += ToJsonLine(record) + '\n';
-  ResultStore target(command.out);  // nobody else writes there now
-  if (!ReadRecords(command.out).empty()) {
-    throw std::runtime_error(
-        fmt::format("{}: found records, expected a new store; name it among the "
-                    "stores to merge and write to another",
-                    command.out.string()));
-  }
-  WriteFileAtomically(target.file(), text);
+  const std::vector<Record> merged = MergeStores(parts);
+  ResultStore target(command.out);
+  target.Fill(merged);
   Print("{} records of {} stores are {} cases in {}\n", read, command.stores.size(), merged.size(),
         target.file().string());
   return 0;

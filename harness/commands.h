@@ -15,7 +15,8 @@
 
 namespace loopbench::harness {
 
-/// The records of a store; warnings about it go to standard error.
+/// The records of a store, the last of each case, in the order of tables; warnings about it go to
+/// standard error.
 std::vector<Record> LoadRecords(const std::filesystem::path& store);
 
 /// drift.csv, drift.md and so on of precision and timing in `out`, and their short forms on the

@@ -210,6 +210,7 @@ int PrintComparison(const CompareCommand& command, const std::string& typed) {
     AddCases("only in BASE", comparison.only_base, findings);
     AddCases("only in NEW", comparison.only_fresh, findings);
     AddCases("more than once", comparison.ambiguous, findings);
+    AddCases("other content", comparison.other_content, findings);
     PrintText(ToCsv(findings));
     PrintError("{}\n", Conclusion(comparison, code));
     return code;

@@ -21,6 +21,11 @@ class Record {
   /// Sets or replaces the value of `key`.
   void Set(std::string_view key, Value value);
 
+  /// Adds a key that the record does not have yet, without looking for it.
+  void Append(std::string key, Value value) {
+    items_.emplace_back(std::move(key), std::move(value));
+  }
+
   /// The value, or nullptr when the record has no such key.
   const Value* Find(std::string_view key) const;
 

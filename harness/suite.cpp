@@ -176,7 +176,11 @@ class Runner {
     if (pieces.empty()) return;
     Progress progress(what, pieces.size());
     RunInProcesses(
-        pieces.size(), jobs, [&](std::size_t i) { return Answer(pieces[i]); },
+        pieces.size(), jobs,
+        [&](std::size_t i) {
+          store_.LeaveToParent();
+          return Answer(pieces[i]);
+        },
         [&](std::size_t i) { return pieces[i].limits; },
         [&](std::size_t i, const ProcessResult& result) {
           for (const Record& record : Records(pieces[i], result, options_.set)) {

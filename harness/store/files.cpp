@@ -81,6 +81,13 @@ void WriteAll(int descriptor, std::string_view text, const std::filesystem::path
 }
 
 std::string ReadFile(const std::filesystem::path& path) {
+  std::error_code error;
+  const auto kind = std::filesystem::status(path, error).type();
+  if (kind != std::filesystem::file_type::regular &&
+      (std::filesystem::exists(path, error) && kind != std::filesystem::file_type::directory)) {
+    throw std::runtime_error(
+        fmt::format("cannot read '{}': expected a regular file", path.string()));
+  }
   errno = 0;
   std::ifstream in(path, std::ios::binary);
   if (!in) FailOn("read", path);

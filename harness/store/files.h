@@ -27,7 +27,8 @@ void WriteAll(int descriptor, std::string_view text, const std::filesystem::path
 /// Waits until the names in the folder of `path` are on the disk, where the file system can.
 void SyncFolderOf(const std::filesystem::path& path);
 
-/// The bytes of `path`. Throws std::runtime_error that names the path and the system's reason.
+/// The bytes of `path`, a regular file: a device might never end. Throws std::runtime_error that
+/// names the path and the reason.
 std::string ReadFile(const std::filesystem::path& path);
 
 }  // namespace loopbench::harness

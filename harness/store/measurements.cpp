@@ -8,6 +8,7 @@
 #include <set>
 
 #include "harness/config/json_reader.h"
+#include "harness/report/select.h"
 #include "harness/store/result_store.h"
 
 namespace loopbench::harness {
@@ -168,7 +169,9 @@ std::vector<Record> ReadMeasurements(const std::filesystem::path& path,
                                      std::vector<std::string>* warnings) {
   std::error_code error;
   if (std::filesystem::is_directory(path, error) || path.extension() == ".jsonl") {
-    return LatestRecords(ReadRecords(path, warnings));
+    std::vector<Record> records = LatestRecords(ReadRecords(path, warnings));
+    SortRows(&records);  // in the store they stand as they ended
+    return records;
   }
   return ParseBenchmarkJson(ReadTextFile(path), path.string());
 }

@@ -8,17 +8,29 @@
 
 namespace loopbench::harness {
 
-/// The record as one JSON object without line breaks, keys in the record's order.
+/// The record as one JSON object without line breaks, keys in the record's order, and behind them
+/// its checksum.
 ///
 /// JSON has no NaN and no infinity. A non-finite double is written as null, which reads back as
 /// monostate ("not measured"); inside a series it reads back as NaN. Every other value comes back
 /// with the same type and the same bits (doubles in shortest round-trip form, "1.0" never "1").
 /// Bytes that are not UTF-8 become U+FFFD.
+///
+/// The line ends with ,"checksum":"16 hexadecimal digits"}: FNV-1a (64 bit) of all bytes before
+/// this. It finds whatever changes a line by accident, a flipped bit with certainty; it is no
+/// signature.
 std::string ToJsonLine(const Record& record);
 
-/// The record that `line` describes. Throws std::runtime_error that says what was found when the
-/// line is not one flat JSON object of null, bool, number, string or array of numbers.
+/// The record that `line` describes, without its checksum. A line without one (made by hand) is
+/// read as it is. Throws std::runtime_error that says what was found and what was expected: for a
+/// checksum that is not that of the line, for anything but one flat JSON object of null, bool,
+/// number, string or array of numbers, for a key that occurs twice, and for a value of another type
+/// than its key has (record_types.h). Linear in the length of the line, whatever it holds.
 Record FromJsonLine(std::string_view line);
+
+/// Whether `line` is the beginning of a line that ToJsonLine() wrote of a run's record, and no
+/// more: what a crash leaves.
+bool IsTornRecord(std::string_view line);
 
 /// 16 hexadecimal digits that name a case: FNV-1a (64 bit) of the canonical JSON of its keys. In
 /// the canonical form keys are sorted and there are no spaces, so the order in which keys were set

@@ -1,17 +1,17 @@
 #include "harness/store/result_store.h"
 
-#include <fcntl.h>
 #include <fmt/format.h>
 #include <unistd.h>
 
-#include <cerrno>
-#include <cstring>
 #include <map>
 #include <stdexcept>
 #include <string_view>
 
 #include "harness/store/contents.h"
+#include "harness/store/excerpt.h"
 #include "harness/store/files.h"
+#include "harness/store/record_json.h"
+#include "harness/store/store_lock.h"
 
 namespace loopbench::harness {
 namespace {
@@ -20,48 +20,56 @@ std::filesystem::path FileOf(const std::filesystem::path& path) {
   return path.extension() == ".jsonl" ? path : path / "results.jsonl";
 }
 
-// Locks of POSIX belong to the process: children do not inherit them, and they end with it.
-int Lock(const std::filesystem::path& file) {
-  const std::filesystem::path path = file.string() + ".lock";
-  constexpr int kMode = 0644;
-  const int lock = ::open(path.c_str(), O_RDWR | O_CREAT | O_CLOEXEC, kMode);
-  if (lock < 0) FailOn("open", path);
-  struct flock whole = {};
-  whole.l_type = F_WRLCK;
-  whole.l_whence = SEEK_SET;
-  if (::fcntl(lock, F_SETLK, &whole) == 0) return lock;
-  const int reason = errno;
-  whole.l_type = F_WRLCK;
-  const bool known = ::fcntl(lock, F_GETLK, &whole) == 0 && whole.l_type != F_UNLCK;
-  ::close(lock);
-  if (reason != EACCES && reason != EAGAIN) {
-    errno = reason;
-    FailOn("lock", path);
+/// What the text of a store holds.
+struct Lines {
+  std::vector<Record> records;
+  std::string warning;    ///< about a torn last line
+  std::size_t whole = 0;  ///< bytes before a torn last line
+  bool is_ended = true;   ///< the last record has its line end
+};
+
+Lines ReadLines(const std::string& text, const std::filesystem::path& file) {
+  Lines lines;
+  lines.whole = text.size();
+  int number = 0;
+  for (std::size_t start = 0; start < text.size();) {
+    const std::size_t end = text.find('\n', start);
+    lines.is_ended = end != std::string::npos;
+    const std::string_view line =
+        std::string_view(text).substr(start, lines.is_ended ? end - start : std::string::npos);
+    ++number;
+    try {
+      if (!line.empty() && line != "\r") lines.records.push_back(FromJsonLine(line));
+    } catch (const std::runtime_error& error) {
+      const std::string message =
+          fmt::format("{}:{}: {}: '{}'", file.string(), number, error.what(), Excerpt(line));
+      if (lines.is_ended || !IsTornRecord(line)) throw std::runtime_error(message);
+      lines.warning = message + " (torn last line, skipped)";
+      lines.whole = start;
+    }
+    start = lines.is_ended ? end + 1 : text.size();
   }
-  throw std::runtime_error(
-      fmt::format("'{}' is in use by process {}; wait for it, or write to another --out",
-                  file.string(), known ? std::to_string(whole.l_pid) : "?"));
+  return lines;
 }
 
-bool IsRecord(std::string_view line) {
-  try {
-    FromJsonLine(line);
-    return true;
-  } catch (const std::runtime_error&) {
-    return false;
-  }
-}
-
-// Ends the file with a line end: a complete record gets its own, a torn one goes.
+/// Ends the file with a line end: a complete record gets its own, a torn one goes. What is no store
+/// stays as it is.
 void MendLastLine(const std::filesystem::path& file, int descriptor) {
   const std::string text = ReadFile(file);
-  if (text.empty() || text.back() == '\n') return;
-  const std::size_t line_end = text.rfind('\n');
-  const std::size_t start = line_end == std::string::npos ? 0 : line_end + 1;
-  if (IsRecord(std::string_view(text).substr(start))) {
+  Lines lines;
+  try {
+    lines = ReadLines(text, file);
+  } catch (const std::runtime_error& error) {
+    throw std::runtime_error(
+        fmt::format("{}\n'{}' is no store, or a damaged one: nothing was changed", error.what(),
+                    file.string()));
+  }
+  if (!lines.warning.empty()) {
+    if (::ftruncate(descriptor, static_cast<off_t>(lines.whole)) != 0) {
+      FailOn("mend the last line of", file);
+    }
+  } else if (!lines.is_ended) {
     WriteAll(descriptor, "\n", file);
-  } else if (::ftruncate(descriptor, static_cast<off_t>(start)) != 0) {
-    FailOn("mend the last line of", file);
   }
 }
 
@@ -69,28 +77,31 @@ void MendLastLine(const std::filesystem::path& file, int descriptor) {
 
 ResultStore::ResultStore(const std::filesystem::path& path) : file_(FileOf(path)) {
   MakeFolderOf(file_);
-  lock_ = Lock(file_);
-  constexpr int kMode = 0644;
-  descriptor_ = ::open(file_.c_str(), O_WRONLY | O_APPEND | O_CREAT | O_CLOEXEC, kMode);
+  descriptor_ = OpenLocked(file_);
   try {
-    if (descriptor_ < 0) FailOn("open", file_);
     MendLastLine(file_, descriptor_);
     SyncFolderOf(file_);
   } catch (...) {
-    if (descriptor_ >= 0) ::close(descriptor_);
-    ::close(lock_);
+    ::close(descriptor_);
     throw;
   }
 }
 
-ResultStore::~ResultStore() {
-  ::close(descriptor_);
-  ::close(lock_);
+ResultStore::~ResultStore() { LeaveToParent(); }
+
+void ResultStore::LeaveToParent() {
+  if (descriptor_ >= 0) ::close(descriptor_);
+  descriptor_ = -1;
 }
 
 void ResultStore::Append(const Record& record) {
   const std::string line = ToJsonLine(record) + '\n';
   const std::lock_guard lock(mutex_);
+  if (!IsStillNamed(descriptor_, file_)) {
+    throw std::runtime_error(fmt::format(
+        "'{}' was removed or replaced while this run was writing to it; give the command again",
+        file_.string()));
+  }
   const off_t before = ::lseek(descriptor_, 0, SEEK_END);
   try {
     WriteAll(descriptor_, line, file_);
@@ -102,7 +113,19 @@ void ResultStore::Append(const Record& record) {
   }
 }
 
-std::vector<Record> LatestRecords(const std::vector<Record>& records) {
+void ResultStore::Fill(const std::vector<Record>& records) {
+  if (::lseek(descriptor_, 0, SEEK_END) > 0) {
+    throw std::runtime_error(
+        fmt::format("{}: found records, expected a new store; name it among the "
+                    "stores to merge and write to another",
+                    file_.string()));
+  }
+  std::string text;
+  for (const Record& record : records) text += ToJsonLine(record) + '\n';
+  WriteFileAtomically(std::filesystem::canonical(file_), text);  // a link stays one
+}
+
+std::vector<Record> LatestRecords(const std::vector<Record>& records, std::string_view version) {
   std::vector<Record> latest;
   std::map<std::string, std::size_t> place;
   for (const Record& record : records) {
@@ -110,9 +133,11 @@ std::vector<Record> LatestRecords(const std::vector<Record>& records) {
     const auto [at, is_new] = place.try_emplace(id, latest.size());
     if (id.empty() || is_new) {
       latest.push_back(record);
-    } else {
-      latest[at->second] = record;
+      continue;
     }
+    Record& known = latest[at->second];
+    const bool is_known_preferred = !version.empty() && known.Text("version") == version;
+    if (!is_known_preferred || record.Text("version") == version) known = record;
   }
   return WithContents(std::move(latest));
 }
@@ -120,28 +145,9 @@ std::vector<Record> LatestRecords(const std::vector<Record>& records) {
 std::vector<Record> ReadRecords(const std::filesystem::path& path,
                                 std::vector<std::string>* warnings) {
   const std::filesystem::path file = FileOf(path);
-  const std::string text = ReadFile(file);
-  std::vector<Record> records;
-  int number = 0;
-  for (std::size_t start = 0; start < text.size();) {
-    const std::size_t end = text.find('\n', start);
-    const bool ended = end != std::string::npos;
-    const std::string_view line =
-        std::string_view(text).substr(start, ended ? end - start : std::string::npos);
-    start = ended ? end + 1 : text.size();
-    ++number;
-    if (line.empty()) continue;
-    try {
-      records.push_back(FromJsonLine(line));
-    } catch (const std::runtime_error& error) {
-      constexpr std::size_t kShown = 80;
-      const std::string message = fmt::format("{}:{}: {}: '{}'", file.string(), number,
-                                              error.what(), line.substr(0, kShown));
-      if (ended) throw std::runtime_error(message);
-      if (warnings != nullptr) warnings->push_back(message + " (torn last line, skipped)");
-    }
-  }
-  return records;
+  Lines lines = ReadLines(ReadFile(file), file);
+  if (warnings != nullptr && !lines.warning.empty()) warnings->push_back(lines.warning);
+  return std::move(lines.records);
 }
 
 }  // namespace loopbench::harness

@@ -4,6 +4,7 @@
 #include <filesystem>
 #include <mutex>
 #include <string>
+#include <string_view>
 #include <vector>
 
 #include "harness/record.h"
@@ -14,13 +15,16 @@ namespace loopbench::harness {
 /// Appends records to a file of JSON Lines. Lines are never changed, and a record is on the disk
 /// when Append() returns: a crash or a power failure loses at most the line that was being written.
 ///
-/// One process at a time: a lock on "FILE.lock" goes with the process, however it ends.
+/// One process at a time: the file itself is locked, by whatever name it is opened, and the lock
+/// goes with the process, however it ends.
 class ResultStore {
  public:
   /// Opens `path` for appending and makes missing folders. A path that ends in ".jsonl" is the file
   /// itself; any other path is a folder that holds "results.jsonl". A torn last line, left behind
   /// by a crash, is removed first: the next record would otherwise continue it. Throws
-  /// std::runtime_error that names the file, and the process that has the store open.
+  /// std::runtime_error that names the file, and the process that has the store open. A file that
+  /// holds anything but records (and the beginning of one as its last line) is refused with its
+  /// line, and stays as it is.
   explicit ResultStore(const std::filesystem::path& path);
   ~ResultStore();
 
@@ -28,26 +32,36 @@ class ResultStore {
   ResultStore& operator=(const ResultStore&) = delete;
 
   /// Writes one line and waits until it is on the disk. Throws std::runtime_error when it could not
-  /// be written in full (a full disk); the file is then as it was before. From any thread.
+  /// be written in full (a full disk, a limit of file sizes); the file is then as it was before.
+  /// Throws as well when the file was removed or replaced meanwhile. From any thread.
   void Append(const Record& record);
+
+  /// The records of an empty store, all of them or none. Throws std::runtime_error when it has
+  /// some. Nothing can be appended afterwards.
+  void Fill(const std::vector<Record>& records);
+
+  /// In a forked child: lets go of the store, so that the lock ends with the parent.
+  void LeaveToParent();
 
   const std::filesystem::path& file() const { return file_; }
 
  private:
   std::filesystem::path file_;
-  int descriptor_ = -1, lock_ = -1;
+  int descriptor_ = -1;
   std::mutex mutex_;
 };
 
 /// The last record of each case ("case_id"), at the place of its first: what tables show when a
-/// case was run again. Records without a case_id all stay. Cases of equal keys are told apart
-/// (contents.h).
-std::vector<Record> LatestRecords(const std::vector<Record>& records);
+/// case was run again. One of the program `version` comes before those of others, so that going
+/// back to a program shows its numbers again. Records without a case_id all stay. Cases of equal
+/// keys are told apart (contents.h).
+std::vector<Record> LatestRecords(const std::vector<Record>& records,
+                                  std::string_view version = "");
 
 /// All records of a store, `path` as for ResultStore, in the order of the file. Empty lines are
-/// passed over. A bad line throws std::runtime_error: file, line number, what was found. A bad last
-/// line without a line end is what a crash leaves; it is skipped and reported in `warnings` (when
-/// given).
+/// passed over. A bad line throws std::runtime_error: file, line number, what was found. The
+/// beginning of a record as last line is what a crash leaves; it is skipped and reported in
+/// `warnings` (when given).
 std::vector<Record> ReadRecords(const std::filesystem::path& path,
                                 std::vector<std::string>* warnings = nullptr);
 

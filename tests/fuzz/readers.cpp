@@ -9,6 +9,7 @@
 #include "harness/config/experiment_reader.h"
 #include "harness/config/failure_map_reader.h"
 #include "harness/config/mechanism_reader.h"
+#include "harness/store/record_json.h"
 
 namespace loopbench::fuzz {
 namespace {
@@ -39,11 +40,11 @@ void CheckMessage(const std::string& message) {
   }
 }
 
-template <class Read>
+template <class Refusal, class Read>
 void Call(Read read) {
   try {
     read();
-  } catch (const harness::ConfigError& refusal) {
+  } catch (const Refusal& refusal) {
     CheckMessage(refusal.what());
   }
 }
@@ -51,11 +52,17 @@ void Call(Read read) {
 }  // namespace
 
 void CallMechanismReader(std::string_view bytes) {
-  Call([bytes] { harness::ParseMechanism(bytes, "m.json"); });
+  Call<harness::ConfigError>([bytes] { harness::ParseMechanism(bytes, "m.json"); });
 }
 
 void CallExperimentReader(std::string_view bytes) {
-  Call([bytes] { harness::ParseExperiments(bytes, "configs/experiments/paper/fuzz.json"); });
+  Call<harness::ConfigError>(
+      [bytes] { harness::ParseExperiments(bytes, "configs/experiments/paper/fuzz.json"); });
+}
+
+void CallRecordReader(std::string_view bytes) {
+  Call<std::runtime_error>([bytes] { harness::FromJsonLine(bytes); });
+  harness::IsTornRecord(bytes);
 }
 
 void CallClaimsReader(std::string_view bytes) {

@@ -56,10 +56,17 @@ TEST_F(CaseIdentity, TablesShowEveryContentAndTellThemApart) {
   const std::string mass1 = records[2].Text("content");
   ExpectEnding(Call("table out --format csv --columns set,steps --where content=" + mass1), 0,
                {"bodies/0/mass=1"});
+  Write("map.json",
+        R"({"title": "t", "columns": [{"label": "o", "select": {"formulation": "odca"}}],
+    "groups": [{"label": "g", "rows": [{"label": "r", "select": {"mechanism": "four-bar"},
+      "decides": [{"measure": "drift_position_max", "limit": 1, "unit": "m"}], "why": "w"}]}]})");
+  ExpectEnding(Call("map out --rules map.json"), 2, {"four-bar", "more than once"});
   // drawn together or judged together they would be one case with two results
   ExpectEnding(Call("verdict out --claims claims.json"), 2, {"four-bar", "more than once"});
   ExpectEnding(Call("table out --kind factorial"), 2, {"--where content="});
-  ExpectEnding(Call("plot out --out w.svg --x steps --y energy_error_max"), 0, {"content"});
+  ExpectEnding(Call("plot out --out figures"), 0, {});
+  const std::string figure = ReadFile(folder_ / "figures/drift-four-bar-0.5s-rtol-1e-06.svg");
+  EXPECT_NE(figure.find("content " + mass1), std::string::npos);
 }
 
 TEST_F(CaseIdentity, FilesOfEqualNamesAreDifferentCases) {
@@ -86,6 +93,21 @@ TEST_F(CaseIdentity, TimesAreThoseOfTheirContentToo) {
   ExpectEnding(Call(run + kMass1), 0, {"2 run now"});
   ExpectEnding(Call(run + kMass5), 0, {"0 run now"});
   EXPECT_EQ(Rows("out/timing.csv"), first);
+}
+
+TEST_F(CaseIdentity, GoingBackToAProgramShowsItsNumbers) {
+  ExpectEnding(Call("run tiny.json --out out --filter formulation=odca"), 0, {});
+  Record other = ReadRecords(folder_ / "out").front();
+  const std::string steps = other.Text("steps");
+  other.Set("version", std::string("0123456789abcdef"));
+  other.Set("id", std::string("fedcba9876543210"));
+  other.Set("steps", std::int64_t{123456});
+  ResultStore(folder_ / "out").Append(other);
+  const std::string run = "run tiny.json --out out --filter formulation=odca";
+  ExpectEnding(Call(run), 0, {"0 run now, 1 were done before"});
+  const std::string table = Call("table out --format csv --columns formulation,steps").text;
+  EXPECT_NE(table.find("odca," + steps), std::string::npos) << table;
+  EXPECT_EQ(table.find("123456"), std::string::npos) << table;
 }
 
 TEST_F(CaseIdentity, PlansTakeNoTimesOfOtherContents) {
@@ -134,7 +156,8 @@ TEST_F(CaseIdentity, WhateverDecidesARunChangesEveryCaseId) {
       EXPECT_EQ(changed[i] != plain[i], of_a_scene || change != mass) << i << " " << change;
     }
   }
-  for (const char* change : {R"(/ensembles=[{"size":4}])", R"(/series={"points":17})"}) {
+  for (const char* change :
+       {R"(/ensembles=[{"size":4,"seed":1,"perturb":0.1}])", R"(/series={"points":17})"}) {
     EXPECT_NE(ids(change)[0], plain[0]) << change;
   }
   EXPECT_NE(ids(R"(/precision/scalars=["float","float128"])")[2], plain[2]);

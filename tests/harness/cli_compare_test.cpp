@@ -2,6 +2,7 @@
 #include <gtest/gtest.h>
 
 #include <string>
+#include <tuple>
 #include <vector>
 
 #include "harness/store/measurements.h"
@@ -76,19 +77,23 @@ TEST_F(ComparisonCommands, NameEveryDifference) {
     store.Append(odd);
     store.Append(records[1]);
   };
-  with("text", std::string("oops"));
-  with("list", std::vector<double>{1.0});
-  with("null", Value());
-  for (const auto& [name, shown] :
-       {std::pair{"text", "\"oops\""}, {"list", "1 values"}, {"null", "null"}}) {
-    const std::string odd = name;
-    Expect("compare base " + odd, 1,
-           {"worse", "drift_position_max", shown, "expected a finite number >= 0", "WORSE: 1"});
-    Expect("compare " + odd + " base", 1, {"different", "drift_position_max", "DIFFERENT: 1"});
-    Expect("compare " + odd + " " + odd, 1, {"different", "in BASE and NEW", "DIFFERENT: 1"});
-    Expect("export " + odd + " --out b.json", 1,
-           {"not exported: accuracy tiny four-bar odca", "drift_position_max: found ", shown});
+  // what no record can hold is refused where it is read
+  for (const auto& [name, value, shown] :
+       {std::tuple{"text", Value(std::string("oops")), "\"oops\""},
+        {"list", Value(std::vector<double>{1.0}), "an array"}}) {
+    with(name, value);
+    const std::string place = std::string(name) + "/results.jsonl:1: key 'drift_position_max'";
+    for (const std::string call : {"compare base ", "compare --subset base ", "export "}) {
+      Expect(call + name, 2, {place, "expected a number or null, found " + std::string(shown)});
+    }
   }
+  with("null", Value());
+  Expect("compare base null", 1,
+         {"worse", "drift_position_max", "null", "expected a finite number >= 0", "WORSE: 1"});
+  Expect("compare null base", 1, {"different", "drift_position_max", "DIFFERENT: 1"});
+  Expect("compare null null", 1, {"different", "in BASE and NEW", "DIFFERENT: 1"});
+  Expect("export null --out b.json", 1,
+         {"not exported: accuracy tiny four-bar odca", "drift_position_max: found null"});
   ASSERT_EQ(Call("run tiny.json --out half --filter formulation=odca").code, 0);
   const std::string missing = "  accuracy tiny four-bar lagrange";
   Expect("compare base half", 2, {"1 cases only in BASE:", missing});

@@ -20,7 +20,21 @@ namespace fs = std::filesystem;
 
 const fs::path kRoot = LOOPBENCH_SOURCE_DIR;
 
+/// The lines of the stored baseline, as they are and without their checksums.
+std::vector<std::string> RecordLines() {
+  std::ifstream store(kRoot / "results/baselines/results.jsonl");
+  std::vector<std::string> lines;
+  for (std::string line; std::getline(store, line);) {
+    lines.push_back(line);
+    if (const std::size_t checksum = line.find(",\"checksum\""); checksum != std::string::npos) {
+      lines.push_back(line.substr(0, checksum) + "}");
+    }
+  }
+  return lines;
+}
+
 std::vector<std::string> Inputs(const std::string& kind) {
+  if (kind == "record") return RecordLines();
   std::vector<fs::path> files;
   for (const fs::path& folder :
        {kRoot / "tests/fuzz/seeds" / kind, kRoot / "tests/broken" / (kind + "s"),
@@ -47,6 +61,7 @@ void Call(const std::string& kind, const std::string& bytes) {
   if (kind == "experiment") CallExperimentReader(bytes);
   if (kind == "claim") CallClaimsReader(bytes);
   if (kind == "map") CallMapReader(bytes);
+  if (kind == "record") CallRecordReader(bytes);
 }
 
 class Readers : public testing::TestWithParam<std::string> {
@@ -87,7 +102,8 @@ TEST_P(Readers, AcceptOrRefuseChangedSeeds) {
   }
 }
 
-INSTANTIATE_TEST_SUITE_P(Kinds, Readers, testing::Values("mechanism", "experiment", "claim", "map"),
+INSTANTIATE_TEST_SUITE_P(Kinds, Readers,
+                         testing::Values("mechanism", "experiment", "claim", "map", "record"),
                          [](const auto& kind) { return kind.param; });
 
 }  // namespace

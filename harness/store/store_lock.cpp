@@ -1,0 +1,87 @@
+#include "harness/store/store_lock.h"
+
+#include <fcntl.h>
+#include <fmt/format.h>
+#include <sys/file.h>
+#include <sys/stat.h>
+#include <unistd.h>
+
+#include <cerrno>
+#include <chrono>
+#include <fstream>
+#include <sstream>
+#include <stdexcept>
+#include <string>
+#include <thread>
+
+#include "harness/store/files.h"
+
+namespace loopbench::harness {
+namespace {
+
+/// The process that locked the file, or "another process" where the system does not say.
+std::string Holder(int descriptor) {
+  struct stat status = {};
+  if (::fstat(descriptor, &status) != 0) return "another process";
+  const std::string inode = fmt::format(":{}", status.st_ino);
+  std::ifstream locks("/proc/locks");
+  for (std::string line; std::getline(locks, line);) {
+    // 1: FLOCK  ADVISORY  WRITE 1234 fe:00:5341448 0 EOF
+    std::istringstream words(line);
+    std::string number, kind, mode, access, process, file;
+    words >> number >> kind >> mode >> access >> process >> file;
+    if (kind == "FLOCK" && file.ends_with(inode)) return "process " + process;
+  }
+  return "another process";
+}
+
+/// What a killed process leaves behind, children that hold its descriptors, is gone in less.
+constexpr int kTries = 10;
+constexpr std::chrono::milliseconds kBetweenTries{20};
+
+bool TryLock(int descriptor, const std::filesystem::path& file) {
+  for (int i = 0; i < kTries; ++i) {
+    if (::flock(descriptor, LOCK_EX | LOCK_NB) == 0) return true;
+    if (errno != EWOULDBLOCK && errno != EINTR) FailOn("lock", file);
+    std::this_thread::sleep_for(kBetweenTries);
+  }
+  return false;
+}
+
+}  // namespace
+
+int OpenLocked(const std::filesystem::path& file) {
+  constexpr int kMode = 0644;
+  for (;;) {
+    // without blocking: a pipe of that name would wait for its other end
+    const int descriptor =
+        ::open(file.c_str(), O_RDWR | O_APPEND | O_CREAT | O_CLOEXEC | O_NONBLOCK, kMode);
+    if (descriptor < 0) FailOn("open", file);
+    try {
+      struct stat status = {};
+      if (::fstat(descriptor, &status) != 0) FailOn("open", file);
+      if (!S_ISREG(status.st_mode)) {
+        throw std::runtime_error(
+            fmt::format("'{}': expected a regular file for a store", file.string()));
+      }
+      if (!TryLock(descriptor, file)) {
+        throw std::runtime_error(
+            fmt::format("'{}' is in use by {}; wait for it, or write to another --out",
+                        file.string(), Holder(descriptor)));
+      }
+      if (IsStillNamed(descriptor, file)) return descriptor;
+    } catch (...) {
+      ::close(descriptor);
+      throw;
+    }
+    ::close(descriptor);  // replaced between opening and locking
+  }
+}
+
+bool IsStillNamed(int descriptor, const std::filesystem::path& file) {
+  struct stat opened = {}, named = {};
+  return ::fstat(descriptor, &opened) == 0 && ::stat(file.c_str(), &named) == 0 &&
+         opened.st_dev == named.st_dev && opened.st_ino == named.st_ino;
+}
+
+}  // namespace loopbench::harness

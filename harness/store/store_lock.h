@@ -1,0 +1,18 @@
+// Opens a store for one writer at a time.
+#pragma once
+
+#include <filesystem>
+
+namespace loopbench::harness {
+
+/// A descriptor of the regular file `file` for reading and appending, made if it is missing, with
+/// an exclusive lock on the file itself: by whatever name another process opens it, through a
+/// symbolic link or a hard one, it meets the lock. The lock ends when all copies of the descriptor
+/// are closed, those of forked children too. Throws std::runtime_error that names the file, and the
+/// process that holds the lock.
+int OpenLocked(const std::filesystem::path& file);
+
+/// Whether `file` still names what the descriptor is open on: no one deleted or replaced it.
+bool IsStillNamed(int descriptor, const std::filesystem::path& file);
+
+}  // namespace loopbench::harness

@@ -1,0 +1,10 @@
+// libFuzzer target of the reader of a store's lines (tests/fuzz/README.md).
+#include <cstddef>
+#include <cstdint>
+
+#include "tests/fuzz/readers.h"
+
+extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size) {
+  loopbench::fuzz::CallRecordReader({reinterpret_cast<const char*>(data), size});
+  return 0;
+}

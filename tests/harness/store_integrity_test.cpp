@@ -1,0 +1,251 @@
+// Stores that were damaged, edited, torn, shared or are none at all: nothing is lost, nothing is
+// taken for what it is not, and every refusal names its place.
+#include <sys/stat.h>
+#include <unistd.h>
+
+#include <fstream>
+#include <random>
+
+#include "harness/compare/measures.h"
+#include "harness/store/record_json.h"
+#include "harness/store/record_types.h"
+#include "tests/harness/cli_fixture.h"
+
+namespace loopbench::harness {
+namespace {
+
+std::string ErrorOf(const auto& action) {
+  try {
+    action();
+  } catch (const std::runtime_error& error) {
+    return error.what();
+  }
+  return "no error";
+}
+
+testing::AssertionResult Contains(const std::string& text, const std::string& part) {
+  return testing::IsSubstring("part", "text", part, text);
+}
+
+class StoreIntegrity : public CommandLineTest {
+ protected:
+  void SetUp() override {
+    CommandLineTest::SetUp();
+    Record record;
+    record.Set("kind", std::string("accuracy"));
+    record.Set("mechanism", std::string("four-bar"));
+    record.Set("drift_position_max", 1.25e-7);
+    record.Set("outcome", std::string("finished"));
+    record.Set("series.drift", std::vector<double>{0.0, 1e-9, 1.25e-7});
+    ResultStore store(folder_ / "store");
+    store.Append(record);
+    record.Set("mechanism", std::string("toggle"));
+    store.Append(record);
+    text_ = ReadFile(folder_ / "store/results.jsonl");
+  }
+
+  /// What reading `text` as a store says: an error or a warning, or "" for neither.
+  std::string Complaint(const std::string& text) const {
+    const fs::path file = folder_ / "changed.jsonl";
+    std::ofstream(file, std::ios::binary) << text;
+    std::vector<std::string> warnings;
+    const std::string error = ErrorOf([&] { ReadRecords(file, &warnings); });
+    if (error != "no error") return error;
+    return warnings.empty() ? "" : warnings.front();
+  }
+
+  std::string text_;
+};
+
+TEST_F(StoreIntegrity, EveryFlippedBitIsSeen) {
+  ASSERT_EQ(Complaint(text_), "");
+  for (std::size_t bit = 0; bit < 8 * text_.size(); ++bit) {
+    std::string changed = text_;
+    changed[bit / 8] = static_cast<char>(changed[bit / 8] ^ (1 << (bit % 8)));
+    const std::string complaint = Complaint(changed);
+    ASSERT_TRUE(Contains(complaint, "changed.jsonl:")) << "bit " << bit;
+  }
+}
+
+TEST_F(StoreIntegrity, AnEditedValueIsNamedWithBothChecksums) {
+  std::string edited = text_;
+  const std::string key = "\"drift_position_max\":";
+  edited.insert(edited.rfind(key) + key.size(), "9");
+  const std::string complaint = Complaint(edited);
+  const std::string checksum = text_.substr(text_.size() - 19, 16);
+  EXPECT_TRUE(Contains(complaint, "changed.jsonl:2: the line was changed"));
+  EXPECT_TRUE(Contains(complaint, "found checksum \"" + checksum + "\", expected \""));
+  for (const char* call : {"compare store changed.jsonl", "table changed.jsonl",
+                           "merge changed.jsonl --out m", "plot changed.jsonl --out f"}) {
+    ExpectEnding(Call(call), 2, {"changed.jsonl:2: the line was changed"});
+  }
+}
+
+TEST_F(StoreIntegrity, LinesMadeByHandNeedNoChecksum) {
+  EXPECT_EQ(Complaint("{\"kind\":\"timing\",\"bodies\":3}\n"), "");
+  EXPECT_EQ(Complaint("{\"kind\":\"timing\",\"bodies\":3}\r\n\r\n\n"), "");
+}
+
+TEST_F(StoreIntegrity, ValuesOfWrongTypeAreNamed) {
+  const auto of = [&](const std::string& item) { return Complaint("{" + item + "}\n"); };
+  EXPECT_TRUE(Contains(of(R"("drift_position_max":"oops")"),
+                       "changed.jsonl:1: key 'drift_position_max': expected a number or null, "
+                       "found \"oops\""));
+  EXPECT_TRUE(Contains(of(R"("drift_position_max":[1])"), "found an array"));
+  EXPECT_TRUE(Contains(of(R"("steps":true)"), "expected a number or null, found true"));
+  EXPECT_TRUE(Contains(of(R"("outcome":1)"), "expected a string or null, found 1"));
+  EXPECT_TRUE(Contains(of(R"("series.rhs_ns":2.5)"), "expected an array of numbers, found 2.5"));
+  EXPECT_TRUE(Contains(of(R"("series.rhs_ns":[1,[2]])"), "expected an array of numbers"));
+  EXPECT_TRUE(Contains(of(R"("growth_resolved":"yes")"), "expected true, false or null"));
+  EXPECT_TRUE(Contains(of(R"("steps":1,"steps":2)"), "key 'steps': expected each key once"));
+  EXPECT_TRUE(Contains(of(R"("rtol":1e999)"), "expected one that fits a double"));
+  EXPECT_TRUE(Contains(of(R"("rtol":1e-999)"), "at least 4.9e-324"));
+  EXPECT_EQ(of(R"("steps":null,"mass":"heavy","stiffness":[1,null],"flag":true)"), "");
+}
+
+TEST_F(StoreIntegrity, EveryMeasureHasAType) {
+  for (const Measure& measure : Measures()) {
+    EXPECT_NE(TypeOf(measure.key), ValueType::kAny) << measure.key;
+  }
+}
+
+TEST_F(StoreIntegrity, DepthAndLengthCostNoMoreThanTheirBytes) {
+  constexpr std::size_t kDeep = 1'000'000;
+  const std::string open(kDeep, '['), close(kDeep, ']');
+  EXPECT_TRUE(Contains(Complaint("{\"a\":[" + open + "1" + close + "]}\n"), "found an array"));
+  EXPECT_TRUE(Contains(Complaint(open + "\n"), "expected a JSON object, found an array"));
+  std::string objects;
+  for (std::size_t i = 0; i < kDeep; ++i) objects += "{\"a\":";
+  EXPECT_TRUE(Contains(Complaint(objects), "found an object"));
+  std::string wide = "{\"k\":0";
+  for (int i = 0; i < 300'000; ++i) wide += ",\"k" + std::to_string(i) + "\":0";
+  EXPECT_EQ(Complaint(wide + "}\n"), "");
+}
+
+TEST_F(StoreIntegrity, EveryBeginningOfALineIsTornAndNothingElse) {
+  const std::string line = text_.substr(0, text_.find('\n'));
+  for (std::size_t length = 1; length < line.size(); ++length) {
+    ASSERT_TRUE(IsTornRecord(line.substr(0, length))) << length;
+  }
+  EXPECT_FALSE(IsTornRecord(line));
+  EXPECT_FALSE(IsTornRecord(line + "J"));
+  EXPECT_FALSE(IsTornRecord("notes without a line end"));
+  EXPECT_FALSE(IsTornRecord("{\"todo\": \"buy"));
+}
+
+TEST_F(StoreIntegrity, WhatIsNoStoreStaysAsItIs) {
+  const std::vector<std::string> texts = {"notes without a line end",
+                                          "one\rtwo\r",
+                                          "{\"kind\":\"accuracy\"}\rsecond line",
+                                          text_ + "notes",
+                                          "notes\n" + text_ + "{\"kind\":\"acc",
+                                          "{\"todo\": \"buy milk"};
+  for (const std::string& text : texts) {
+    Write("notes.jsonl", text);
+    for (const char* call : {"merge store --out notes.jsonl", "run tiny.json --out notes.jsonl"}) {
+      ExpectEnding(Call(call), 2, {"notes.jsonl:", "nothing was changed"});
+      EXPECT_EQ(ReadFile(folder_ / "notes.jsonl"), text);
+    }
+  }
+}
+
+TEST_F(StoreIntegrity, AFileAsStoreHasItsTablesBesideIt) {
+  ExpectEnding(Call("run tiny.json --out new/mine.jsonl"), 0, {"2 run now"});
+  EXPECT_EQ(ReadRecords(folder_ / "new/mine.jsonl").size(), 2u);
+  EXPECT_TRUE(fs::exists(folder_ / "new/drift.csv"));
+}
+
+TEST_F(StoreIntegrity, ATornLineStopsAMerge) {
+  Write("torn.jsonl", text_.substr(0, text_.size() - 30));
+  ExpectEnding(Call("merge torn.jsonl --out merged"), 2,
+               {"torn.jsonl:2:", "give its command again"});
+  EXPECT_FALSE(fs::exists(folder_ / "merged"));
+}
+
+TEST_F(StoreIntegrity, RecordsOfOneIdThatDifferStopAMerge) {
+  ExpectEnding(Call("run tiny.json --out a"), 0, {});
+  const std::vector<Record> records = ReadRecords(folder_ / "a");
+  const auto write = [&](const std::string& name, const std::string& key, const Value& value) {
+    Record changed = records[0];
+    changed.Set(key, value);
+    ResultStore(folder_ / name).Append(changed);
+  };
+  write("drift.jsonl", "drift_position_max", 123.0);
+  write("series.jsonl", "series.drift", std::vector<double>{1.0});
+  write("more.jsonl", "extra", 1.0);
+  write("time.jsonl", "wall_s", 123.0);
+  write("late.jsonl", "outcome", std::string("time-limit"));
+  const std::string id = records[0].Text("id");
+  for (const std::string order : {"a drift.jsonl", "drift.jsonl a"}) {
+    ExpectEnding(Call("merge " + order + " --out m"), 2,
+                 {" and ", "drift.jsonl", id, "drift_position_max", "123", "not what it says"});
+  }
+  ExpectEnding(Call("merge a series.jsonl --out m"), 2, {"series.drift"});
+  ExpectEnding(Call("merge a more.jsonl --out m"), 2, {"has extra nothing in the first and 1"});
+  EXPECT_FALSE(fs::exists(folder_ / "m"));
+  // times differ from run to run, and a run that was cut short gives way
+  ExpectEnding(Call("merge a time.jsonl --out times"), 0, {"3 records of 2 stores are 2 cases"});
+  for (const std::string order : {"a late.jsonl --out m1", "late.jsonl a --out m2"}) {
+    ExpectEnding(Call("merge " + order), 0, {"are 2 cases"});
+  }
+  EXPECT_EQ(Call("table m1 --format csv --columns outcome,steps").text.find("time-limit"),
+            std::string::npos);
+  EXPECT_EQ(Call("table m2 --format csv --columns outcome,steps").text.find("time-limit"),
+            std::string::npos);
+}
+
+TEST_F(StoreIntegrity, TheLockIsOfTheFileByWhateverName) {
+  fs::create_directory_symlink("store", folder_ / "linked");
+  fs::create_symlink("store/results.jsonl", folder_ / "alias.jsonl");
+  fs::create_hard_link(folder_ / "store/results.jsonl", folder_ / "hard.jsonl");
+  const std::string holder = "in use by process " + std::to_string(::getpid());
+  {
+    const ResultStore store(folder_ / "store");
+    fs::remove(folder_ / "store/results.jsonl.lock");  // what earlier versions locked
+    for (const char* name : {"store", "linked", "alias.jsonl", "hard.jsonl"}) {
+      EXPECT_TRUE(Contains(ErrorOf([&] { ResultStore(folder_ / name); }), holder)) << name;
+    }
+  }
+  EXPECT_EQ(ErrorOf([&] { ResultStore(folder_ / "linked"); }), "no error");
+}
+
+TEST_F(StoreIntegrity, AStoreThatIsReplacedOrRemovedIsNoticed) {
+  for (const bool replace : {true, false}) {
+    ResultStore store(folder_ / "store");
+    store.Append(Record{});
+    if (replace) {
+      Write("store/results.jsonl", text_);
+    } else {
+      fs::remove(folder_ / "store/results.jsonl");
+    }
+    EXPECT_TRUE(Contains(ErrorOf([&] { store.Append(Record{}); }), "was removed or replaced"));
+    if (!replace) continue;
+    EXPECT_EQ(ReadFile(folder_ / "store/results.jsonl"), text_);
+  }
+}
+
+TEST_F(StoreIntegrity, WhatIsNoRegularFileIsRefused) {
+  ASSERT_EQ(::mkfifo((folder_ / "pipe.jsonl").c_str(), 0600), 0);
+  fs::create_symlink("/dev/zero", folder_ / "zero.jsonl");
+  for (const std::string name : {"pipe.jsonl", "zero.jsonl"}) {
+    ExpectEnding(Call("table " + name), 2, {name, "regular file"});
+    ExpectEnding(Call("merge store --out " + name), 2, {name, "regular file"});
+  }
+}
+
+TEST_F(StoreIntegrity, ALimitOfFileSizesIsAnErrorAndLeavesWholeRecords) {
+  std::string many = kExperiment;
+  many.replace(many.find("[1e-6]"), 6, "[1e-4, 1e-5, 1e-6, 1e-7, 1e-8]");
+  Write("many.json", many);
+  ExpectEnding(Call("run many.json --out out", "ulimit -f 64;"), 2, {"File too large"});
+  const std::string text = ReadFile(folder_ / "out/results.jsonl");
+  EXPECT_TRUE(text.ends_with("\n"));
+  EXPECT_GE(ReadRecords(folder_ / "out").size(), 1u);
+  for (const auto& entry : fs::directory_iterator(folder_ / "out")) {
+    EXPECT_EQ(entry.path().filename(), "results.jsonl") << "nothing half-written";
+  }
+  ExpectEnding(Call("run many.json --out out"), 0, {"10 "});
+}
+
+}  // namespace
+}  // namespace loopbench::harness

@@ -4,6 +4,7 @@
 
 #include <map>
 
+#include "harness/analysis/doubts.h"
 #include "harness/config/claims_reader.h"
 #include "harness/precision_cases.h"
 #include "harness/provenance.h"
@@ -23,6 +24,7 @@ std::vector<Record> LoadRecords(const std::filesystem::path& store) {
   std::vector<std::string> warnings;
   std::vector<Record> records = LatestRecords(ReadRecords(store, &warnings), CodeVersion());
   SortRows(&records);  // in the store they stand as they ended
+  SetDoubts(&records);
   for (const std::string& warning : warnings) PrintError("warning: {}\n", warning);
   return records;
 }
@@ -62,9 +64,11 @@ int Run(const RunCommand& command, const std::string& typed) {
                count.skipped);
   }
   const bool is_file = out.extension() == ".jsonl";  // its tables stand beside it
-  WriteTables(RecordsOf(count.ids, ReadRecords(out)), is_file ? out.parent_path() : out, typed);
+  std::vector<Record> records = RecordsOf(count.ids, ReadRecords(out));
+  SetDoubts(&records);
+  WriteTables(records, is_file ? out.parent_path() : out, typed);
   Print("results in {}\n", out.string());
-  return 0;
+  return command.gate.empty() ? 0 : DoubtGate(records);
 }
 
 int Merge(const MergeCommand& command) {

@@ -15,8 +15,8 @@
 
 namespace loopbench::harness {
 
-/// The records of a store, the last of each case, in the order of tables; warnings about it go to
-/// standard error.
+/// The records of a store, the last of each case, in the order of tables, with their doubts as they
+/// stand beside each other; warnings about it go to standard error.
 std::vector<Record> LoadRecords(const std::filesystem::path& store);
 
 /// drift.csv, drift.md and so on of precision and timing in `out`, and their short forms on the
@@ -24,11 +24,16 @@ std::vector<Record> LoadRecords(const std::filesystem::path& store);
 void WriteTables(const std::vector<Record>& records, const std::filesystem::path& out,
                  const std::string& typed);
 
+/// 1 when an accuracy run among `rows` did not finish or has doubts, and says how many; else 0.
+/// @throws ConfigError when there is none: such a gate could not fail.
+int DoubtGate(const std::vector<Record>& rows);
+
 struct RunCommand {
   std::vector<std::filesystem::path> experiments;
   std::filesystem::path out;  ///< folder; default results/runs/<name of the first experiment>
   std::vector<Setting> settings;
   SuiteOptions suite;
+  std::string gate;  ///< "doubts" or ""
 };
 /// Runs what the store does not have yet, then writes its tables.
 int Run(const RunCommand& command, const std::string& typed);
@@ -73,6 +78,7 @@ struct TableCommand {
   TableView view;
   std::string format = "text";  ///< text, csv, markdown, json or latex
   std::filesystem::path out;    ///< standard output when empty
+  std::string gate;             ///< "doubts" or "": of the rows shown
 };
 int PrintTable(const TableCommand& command, const std::string& typed);
 

@@ -6,6 +6,7 @@
 #include <cstdlib>
 #include <string_view>
 
+#include "harness/analysis/doubts.h"
 #include "harness/commands.h"
 #include "harness/config/config_error.h"
 #include "harness/config/failure_map_reader.h"
@@ -130,6 +131,24 @@ void WriteTables(const std::vector<Record>& records, const std::filesystem::path
   for (const std::string& note : Provenance(typed)) Print("{}\n", note);
 }
 
+int DoubtGate(const std::vector<Record>& rows) {
+  std::size_t runs = 0, failed = 0, doubted = 0;
+  for (const Record& row : rows) {
+    if (row.Text("kind") != "accuracy") continue;
+    ++runs;
+    failed += HasFailed(row) ? 1 : 0;
+    doubted += HasDoubt(row) ? 1 : 0;
+  }
+  if (runs == 0) {
+    throw ConfigError(
+        "--gate doubts: found no accuracy run, expected one: such a gate cannot fail");
+  }
+  if (failed + doubted == 0) return 0;
+  PrintError("gate doubts: of {} runs {} did not finish and {} have doubts\n", runs, failed,
+             doubted);
+  return 1;
+}
+
 int PrintTable(const TableCommand& command, const std::string& typed) {
   TableView view = command.view;
   const bool on_terminal = command.format == "text" && command.out.empty();
@@ -150,7 +169,7 @@ int PrintTable(const TableCommand& command, const std::string& typed) {
     WriteFileAtomically(command.out, RenderKept(table, command.format));
     Print("wrote {}\n", command.out.string());
   }
-  return 0;
+  return command.gate.empty() ? 0 : DoubtGate(table.rows);
 }
 
 int Plot(const PlotCommand& command) {

@@ -25,6 +25,12 @@ void AddSettings(CLI::App* app, std::vector<std::string>* settings) {
       ->allow_extra_args(false);
 }
 
+void AddGate(CLI::App* app, std::string* gate) {
+  app->add_option("--gate", *gate,
+                  "doubts: exit with 1 if an accuracy run shown did not finish or has doubts")
+      ->check(CLI::IsMember({"doubts"}));
+}
+
 Selection ParseSelection(const std::vector<std::string>& conditions) {
   Selection selection;
   for (const std::string& text : conditions) selection.push_back(ParseCondition(text));
@@ -53,6 +59,8 @@ Examples:
   loopbench table out --columns mechanism,formulation,drift_position_max --format latex
   loopbench table out --kind timing --sort rhs_ns_median --format csv --out timing.csv
 
+"ok?" is a run that finished with doubts: the lines below the table say why, column doubts has codes
+(docs/design.md, section 6), --gate doubts ends with 1.
 Any key of the records may be a column; a wrong one is answered with the list of all.
 Every table ends with the command, machine, compiler, libraries and commit.)";
 
@@ -127,6 +135,7 @@ int Main(int argc, char** argv) {
   run_app->add_option("--rerun", rerun, "Cases to run although the store has them")
       ->check(CLI::IsMember({"none", "failed", "all"}))
       ->capture_default_str();
+  AddGate(run_app, &run.gate);
   run_app->footer(
       "A run that was interrupted goes on where it stopped: give the same command again.");
   CLI::Option* no = run_app->add_flag("--no-timing", no_timing, "Leave the timings out");
@@ -184,6 +193,7 @@ int Main(int argc, char** argv) {
   table_app->add_option("--sort", table.view.sort, "Order by this key first");
   table_app->add_flag("--descending", table.view.descending, "Largest first")->needs("--sort");
   table_app->add_option("--out", table.out, "File (default: the terminal)");
+  AddGate(table_app, &table.gate);
   table_app->footer(kTableFooter);
 
   PlotCommand plot;

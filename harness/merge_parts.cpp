@@ -75,9 +75,9 @@ Run MergeParts(std::span<const Run> parts) {
   Extreme(parts, "t_reached", false, &record);
   for (const char* key :
        {"steps", "rejected", "rhs_evaluations", "rhs_equivalents", "projection_iterations",
-        "restarts", "softened_steps", "softened_evaluations", "mode_changes", "newton_jacobians",
-        "newton_rhs_evaluations", "newton_dual_evaluations", "newton_iterations",
-        "newton_failures"}) {
+        "restarts", "softened_steps", "softened_evaluations", "mode_changes",
+        "singularity_passages", "newton_jacobians", "newton_rhs_evaluations",
+        "newton_dual_evaluations", "newton_iterations", "newton_failures"}) {
     Add<std::int64_t>(parts, key, &record);
   }
   const bool started = std::ranges::all_of(
@@ -92,12 +92,15 @@ Run MergeParts(std::span<const Run> parts) {
     energy += Real(part.record, "energy_error_max");
     hashes += part.record.Text("state_hash");
     for (const auto& [key, value] : part.record.items()) {
-      if (key.rfind("drift.loop.", 0) == 0) record.Set(key, value);
+      if (key.starts_with("drift.loop.") || key.starts_with("series.final.")) {
+        record.Set(key, value);
+      }
     }
   }
   record.Set("wall_s", wall);
-  for (const char* key : {"cpu_s", "energy_supplied", "energy_dissipated"})
+  for (const char* key : {"cpu_s", "energy_supplied", "energy_dissipated", "energy_scale"}) {
     Add<double>(parts, key, &record);
+  }
   if (started) {
     record.Set("energy_error_max", energy);
     record.Set("state_hash", Fnv1a(hashes));

@@ -22,8 +22,9 @@ struct Run {
 
 /// Each part has its own steps. Work adds up (steps, evaluations, wall time, rank); drift is the
 /// largest of the parts, at each time the largest of what each had last; the worst outcome and the
-/// earliest end count; energy errors add up, an upper bound of the whole's. Series of corrections,
-/// energy and angles, which belong to one sequence of steps, stay out.
+/// earliest end count; energy errors and the energies that they are compared with add up, upper
+/// bounds of the whole's. Series of corrections, energy and angles, which belong to one sequence of
+/// steps, stay out.
 Run MergeParts(std::span<const Run> parts);
 
 }  // namespace loopbench::harness

@@ -3,13 +3,17 @@
 #include <fmt/format.h>
 
 #include <algorithm>
+#include <limits>
 
+#include "harness/analysis/doubts.h"
+#include "harness/analysis/link_length.h"
 #include "harness/case_identity.h"
 #include "harness/compiled_scene.h"
 #include "harness/ensemble.h"
 #include "harness/hash.h"
 #include "harness/integrator/arkode.h"
 #include "harness/merge_parts.h"
+#include "harness/observers/final_poses.h"
 #include "harness/observers/observer.h"
 #include "lagrange/lagrange.h"
 #include "mechanism/assembly.h"
@@ -49,14 +53,18 @@ std::string StateHash(std::span<const double> y) {
 template <class Space>
 class Runner {
  public:
-  Runner(const Experiment& experiment, const Case& one, const MechanismDescription& description,
-         const SceneObservation& observe, bool with_series)
+  /// Part `part` of `user`, simplified to `scene`.
+  Runner(const Experiment& experiment, const Case& one, const MechanismDescription& user,
+         const CompiledScene& scene, int part, bool with_series)
       : case_(one),
-        scene_(observe),
-        description_(description),
-        mechanism_(description, one.column.coordinates),
-        drift_(description, mechanism_),
-        singularity_(description, mechanism_),
+        user_(user),
+        compiled_(scene.compiled),
+        part_(part),
+        scene_(scene.observe),
+        description_(scene.compiled.parts[static_cast<std::size_t>(part)].description),
+        mechanism_(description_, one.column.coordinates),
+        drift_(description_, mechanism_),
+        singularity_(description_, mechanism_),
         energy_(experiment.series_points, mechanism_.has_power()),
         exact_(scene_, mechanism_),
         coordinates_(experiment.series_points),
@@ -81,6 +89,7 @@ class Runner {
       exact_.Write(run.record);
       if (with_series_) coordinates_.Write(run.record);
       correction_.Write(run.record);
+      for (const auto& [key, pose] : final_poses_.items()) run.record.Set(key, pose);
       run.record.Set("state_hash", StateHash(y_));
     }
     run.record.Set("outcome", std::string(ToString(result.outcome)));
@@ -137,6 +146,10 @@ class Runner {
     const IntegratorResult run = harness::Integrate(
         ode, 0.0, case_.horizon, y_, OptionsOf(case_, mechanism_.stop_times()), observe);
     y_.resize(n);
+    if (with_series_ && run.outcome == Outcome::kFinished &&
+        formulation->Derivative(run.t_reached, y_, ydot) == Outcome::kFinished) {
+      WriteFinalPoses(user_, compiled_, part_, formulation->kinematics(), final_poses_);
+    }
     return run;
   }
 
@@ -151,6 +164,9 @@ class Runner {
   }
 
   const Case& case_;
+  const MechanismDescription& user_;
+  const Compiled& compiled_;
+  int part_;
   const SceneObservation& scene_;
   const MechanismDescription& description_;
   Mechanism<Space, double> mechanism_;
@@ -162,6 +178,7 @@ class Runner {
   ExactObserver<Space> exact_;
   CoordinateObserver<Space> coordinates_;
   bool with_series_;
+  Record final_poses_;
   std::vector<double> y_;
 };
 
@@ -170,14 +187,13 @@ Run RunOnce(const Experiment& experiment, const Case& one, const MechanismDescri
   const SceneObservation& observe = experiment.scenes[one.scene].mechanism.observe;
   const CompiledScene scene = CompileScene(description, observe, experiment.compile);
   std::vector<Run> parts;
-  for (const CompiledPart& part : scene.compiled.parts) {
-    if (part.description.space == SpaceKind::kPlanar) {
-      Runner<Planar> runner(experiment, one, part.description, scene.observe, with_series);
-      parts.push_back(runner.Execute());
-    } else {
-      Runner<Spatial> runner(experiment, one, part.description, scene.observe, with_series);
-      parts.push_back(runner.Execute());
-    }
+  for (int part = 0; part < static_cast<int>(scene.compiled.parts.size()); ++part) {
+    const auto run = [&]<class Space>() {
+      return Runner<Space>(experiment, one, description, scene, part, with_series).Execute();
+    };
+    const auto& own = scene.compiled.parts[static_cast<std::size_t>(part)].description;
+    parts.push_back(own.space == SpaceKind::kPlanar ? run.template operator()<Planar>()
+                                                    : run.template operator()<Spatial>());
   }
   Run run = MergeParts(parts);
   if (scene.compiled.done != CompileOptions::None()) {
@@ -228,6 +244,12 @@ Record RunCase(const Experiment& experiment, const Case& one) {
   const ExperimentScene& scene = experiment.scenes[one.scene];
   Record record = CaseKeys(experiment, one);
   SetCaseId(&record, AccuracyContent(experiment, one));
+  record.Set("scene_id", Fnv1a(scene.mechanism.canonical));
+  const double link = LinkLength(scene.mechanism.description);
+  record.Set("link_length", link);
+  record.Set("position_goal",
+             4 * std::numeric_limits<double>::epsilon() * link *
+                 static_cast<double>(scene.mechanism.description.bodies.size() - 1));
   Run nominal = RunOnce(experiment, one, scene.mechanism.description, true);
   for (const auto& [key, value] : nominal.record.items()) record.Set(key, value);
 
@@ -260,6 +282,9 @@ Record RunCase(const Experiment& experiment, const Case& one) {
   const DriftSeries envelope = Envelope(nominal.drift, experiment.series_points);
   record.Set("series.drift_t", envelope.t);
   record.Set("series.drift", envelope.value);
+  if (record.Text("outcome") == ToString(Outcome::kFinished)) {
+    record.Set("doubts", OwnDoubts(record));
+  }
   return record;
 }
 

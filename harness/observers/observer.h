@@ -71,7 +71,9 @@ class DriftObserver final : public Observer<Space> {
 /// Energy balance: the largest deviation of
 ///   kinetic + potential - work supplied + work dissipated
 /// from its first value [J], and its series. Without power, that of the total energy. The relative
-/// error compares it with the largest kinetic energy.
+/// error compares it with the largest kinetic energy. The energy that moves is the largest of
+/// kinetic energy, span of the potential, and work supplied or dissipated: slow motions have little
+/// of the first; not below what rounding does to the potential, so that rest is no error.
 template <class Space>
 class EnergyObserver final : public Observer<Space> {
  public:
@@ -88,7 +90,8 @@ class EnergyObserver final : public Observer<Space> {
   bool has_power_;
   bool started_ = false;
   double first_ = 0.0, largest_ = 0.0, kinetic_ = 0.0;
-  double supplied_ = 0.0, dissipated_ = 0.0;
+  double supplied_ = 0.0, dissipated_ = 0.0, work_ = 0.0;
+  double potential_low_ = 0.0, potential_high_ = 0.0;
   TimeSeries series_;
 };
 
@@ -132,6 +135,10 @@ class ConditionObserver final : public Observer<Space> {
 /// relative distance of the constraints from the nearest ones of lower rank; near a singular
 /// position it is about the angle [rad] still to go. At accepted steps only, and only for loops
 /// with few rows; redundant rows do not count.
+///
+/// A step may carry the run across: then the ratio, which has no sign, falls and rises like the
+/// absolute value of a line, and its course is straighter with the sign changed on one side. Such
+/// passages are counted.
 template <class Space>
 class SingularityObserver final : public Observer<Space> {
  public:

@@ -50,7 +50,13 @@ void EnergyObserver<Space>::Observe(const Sample<Space>& sample) {
   const auto parts = ComputeEnergy(sample.formulation.kinematics());
   const double energy = parts.total() - supplied_ + dissipated_;
   kinetic_ = std::max(kinetic_, parts.kinetic);
-  if (!started_) first_ = energy;
+  work_ = std::max({work_, std::abs(supplied_), std::abs(dissipated_)});
+  if (!started_) {
+    first_ = energy;
+    potential_low_ = potential_high_ = parts.potential;
+  }
+  potential_low_ = std::min(potential_low_, parts.potential);
+  potential_high_ = std::max(potential_high_, parts.potential);
   started_ = true;
   largest_ = std::max(largest_, std::abs(energy - first_));
   series_.t.push_back(sample.t);
@@ -62,6 +68,11 @@ void EnergyObserver<Space>::Write(Record& record) const {
   if (!started_) return;
   record.Set("energy_error_max", largest_);
   if (kinetic_ > 0.0) record.Set("energy_error_relative", largest_ / kinetic_);
+  // an error of a hundredth of the scale is then a thousand round-offs of the potential
+  constexpr double kLeast = 1e5 * std::numeric_limits<double>::epsilon();
+  record.Set("energy_scale",
+             std::max({kinetic_, work_, potential_high_ - potential_low_,
+                       kLeast * std::max(std::abs(potential_low_), std::abs(potential_high_))}));
   if (has_power_) {
     record.Set("energy_supplied", supplied_);
     record.Set("energy_dissipated", dissipated_);

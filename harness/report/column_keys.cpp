@@ -36,18 +36,6 @@ Format FormatOf(const std::string& key, std::span<const Record> rows) {
   return kText;
 }
 
-// The keys that name cases: they end at a case's id; what follows is its result.
-std::vector<std::string> CaseKeysOf(std::span<const Record> rows) {
-  std::vector<std::string> keys;
-  for (const Record& row : rows) {
-    for (const auto& [key, value] : row.items()) {
-      if (key == "case_id" || key == "outcome") break;
-      if (std::ranges::find(keys, key) == keys.end()) keys.push_back(key);
-    }
-  }
-  return keys;
-}
-
 bool IsShown(const std::vector<TableColumn>& columns, const std::string& key) {
   return std::ranges::find(columns, key, &TableColumn::key) != columns.end();
 }
@@ -83,6 +71,17 @@ std::vector<std::string> KeysOf(std::span<const Record> rows) {
   std::vector<std::string> keys;
   for (const Record& row : rows) {
     for (const auto& [key, value] : row.items()) {
+      if (std::ranges::find(keys, key) == keys.end()) keys.push_back(key);
+    }
+  }
+  return keys;
+}
+
+std::vector<std::string> CaseKeysOf(std::span<const Record> rows) {
+  std::vector<std::string> keys;
+  for (const Record& row : rows) {
+    for (const auto& [key, value] : row.items()) {
+      if (key == "case_id" || key == "outcome") break;
       if (std::ranges::find(keys, key) == keys.end()) keys.push_back(key);
     }
   }

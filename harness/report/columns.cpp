@@ -45,6 +45,10 @@ std::vector<TableColumn> OtherColumns() {
       Make("ensemble_size", "ensemble size", kInteger),
       Make("ensemble_failed", "ensemble failed", kInteger),
       Make("energy_error_relative", "energy error / kinetic", kScientific),
+      Make("energy_scale", "energy that moves [J]", kScientific),
+      Make("link_length", "link [m]", kShortest),
+      Make("position_goal", "projection's goal [m]", kScientific),
+      Make("scene_id", "scene"),
       Make("ensemble_first_failed", "first failed member"),
       Make("ensemble_first_left", "first member off branch"),
       Make("ensemble_branch_kept", "branch kept", kInteger),
@@ -66,6 +70,7 @@ std::vector<TableColumn> OtherColumns() {
       Make("mode_changes", "changes of mode", kInteger),
       Make("singularity_distance_min", "singularity distance", kScientific),
       Make("singularity_distance_min_t", "at time [s]", kSeconds),
+      Make("singularity_passages", "singular passages", kInteger),
       Make("wall_s", "wall [s]", kSeconds),
       Make("cpu_s", "CPU [s]", kSeconds),
       Make("newton_iterations", "newton iterations", kInteger),
@@ -126,6 +131,8 @@ const std::vector<TableColumn>& CompactCaseColumns() {
 const std::vector<TableColumn>& DriftColumns() {
   static const std::vector<TableColumn> kColumns =
       Join(CaseColumns(), {
+                              Make("doubts", "doubts"),
+                              Make("agreement", "ends alike", kInteger),
                               Make("drift_position_max", "drift, position [m]", kScientific),
                               Make("drift_rotation_max", "drift, rotation [rad]", kScientific),
                               Make("drift_velocity_max", "drift, velocity [m/s]", kScientific),

@@ -46,6 +46,9 @@ TableColumn ColumnOf(const std::string& key, std::span<const Record> rows);
 /// The unit in the brackets that end the header, "" without.
 std::string UnitOf(const TableColumn& column);
 
+/// The keys that name cases: those before "case_id" or "outcome", each once.
+std::vector<std::string> CaseKeysOf(std::span<const Record> rows);
+
 /// All keys of the records, each once, in order of first appearance.
 std::vector<std::string> KeysOf(std::span<const Record> rows);
 

@@ -68,9 +68,10 @@ void AppendTrimmed(std::string* out, std::string line) {
 
 }  // namespace
 
-bool IsUnresolved(const Record& row, const std::string& key) {
+bool IsDoubtful(const Record& row, const std::string& key) {
   const Value* value = row.Find(key);
   if (value == nullptr || std::holds_alternative<std::monostate>(*value)) return false;
+  if (key == "outcome") return !HasFailed(row) && !row.Text("doubts").empty();
   if (key == "growth_hypothesis") return row.Text("growth_hypothesis_resolved") != "true";
   if (std::isnan(row.Number(key))) return false;
   if (key == "energy_growth_exponent" || key == "correction_growth_exponent") return true;
@@ -81,7 +82,7 @@ bool IsUnresolved(const Record& row, const std::string& key) {
 std::string Cell(const Record& row, const TableColumn& column) {
   const Value* value = row.Find(column.key);
   if (value == nullptr) return "";
-  const char* mark = IsUnresolved(row, column.key) ? "?" : "";
+  const char* mark = IsDoubtful(row, column.key) ? "?" : "";
   if (const auto* number = std::get_if<double>(value)) {
     return FormatNumber(*number, column.format) + mark;
   }
@@ -111,8 +112,10 @@ bool HasFailed(const Record& row) {
   return !outcome.empty() && outcome != "finished";
 }
 
-std::string RedFailures(const Record& row, const TableColumn& column) {
-  return column.key == "outcome" && HasFailed(row) ? "31" : "";
+std::string OutcomeColour(const Record& row, const TableColumn& column) {
+  if (column.key != "outcome") return "";
+  if (HasFailed(row)) return "31";
+  return IsDoubtful(row, column.key) ? "33" : "";
 }
 
 namespace {
@@ -128,15 +131,14 @@ std::vector<TableColumn> ColumnsUnderHeading(const Table& table) {
 struct TextColumn {
   TextColumn(const TableColumn& shown, const std::vector<Record>& rows)
       : column(shown), marked(std::ranges::any_of(rows, [&](const Record& row) {
-          return shown.format != Format::kText && IsUnresolved(row, shown.key);
+          return shown.format != Format::kText && IsDoubtful(row, shown.key);
         })) {
     width = Width(EscapeTerminal(column.header));
     for (const Record& row : rows) width = std::max(width, Width(CellOf(row)));
   }
 
   std::string CellOf(const Record& row) const {
-    return EscapeTerminal(Cell(row, column)) +
-           (marked && !IsUnresolved(row, column.key) ? " " : "");
+    return EscapeTerminal(Cell(row, column)) + (marked && !IsDoubtful(row, column.key) ? " " : "");
   }
 
   TableColumn column;

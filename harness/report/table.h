@@ -31,8 +31,8 @@ struct TableColumn {
   std::vector<std::pair<std::string, std::string>> abbreviations;
 };
 
-/// Red for the outcome of a run that failed.
-std::string RedFailures(const Record& row, const TableColumn& column);
+/// Red for the outcome of a run that failed, yellow for one with doubts.
+std::string OutcomeColour(const Record& row, const TableColumn& column);
 
 /// Rows of records under columns. A run that failed is a row like any other, with its outcome and
 /// with empty cells for what it did not reach; nothing removes it.
@@ -46,7 +46,7 @@ struct Table {
   /// column.
   std::string group = "";
   /// The colour of a cell on a terminal, as its SGR number ("31" is red), "" for none.
-  std::string (*colour)(const Record& row, const TableColumn& column) = &RedFailures;
+  std::string (*colour)(const Record& row, const TableColumn& column) = &OutcomeColour;
 };
 
 /// Rows that share a value of the group's key, under "key = value".
@@ -61,11 +61,12 @@ std::vector<RowGroup> Groups(const Table& table);
 /// Whether a row's run ended in another way than as it should.
 bool HasFailed(const Record& row);
 
-/// Whether `key` is an exponent or a law of growth that the row's runs do not resolve. Exponents of
-/// energy and corrections come from one run, which resolves none.
-bool IsUnresolved(const Record& row, const std::string& key);
+/// Whether the value of `key` is not to be relied on: the outcome of a finished run with `doubts`,
+/// an exponent or a law of growth that the row's runs do not resolve. Exponents of energy and
+/// corrections come from one run, which resolves none.
+bool IsDoubtful(const Record& row, const std::string& key);
 
-/// The cell as the text, Markdown and LaTeX writers print it, with '?' behind what is not resolved:
+/// The cell as the text, Markdown and LaTeX writers print it, with '?' behind what is doubtful:
 /// such a value must not look like one that is, whichever columns are chosen. Absent and NaN values
 /// are empty, never zero; a value that is not a number is printed as it is, whatever the format; a
 /// series joins its numbers with ';'.

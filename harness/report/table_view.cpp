@@ -4,8 +4,10 @@
 
 #include <algorithm>
 #include <cmath>
+#include <optional>
 
 #include "harness/report/columns.h"
+#include "harness/report/doubt_notes.h"
 #include "harness/report/factorial.h"
 #include "harness/report/precision_report.h"
 #include "harness/timing/noise.h"
@@ -60,12 +62,23 @@ std::vector<TableColumn> ChosenColumns(const TableView& view, std::span<const Re
   return columns;
 }
 
+bool Shows(const Table& table, const std::string& key) {
+  return table.group == key ||
+         std::ranges::find(table.columns, key, &TableColumn::key) != table.columns.end();
+}
+
+// `runs` are what the table's rows are made of.
+std::optional<std::string> HiddenDoubts(const Table& table, std::span<const Record> runs) {
+  const auto doubted =
+      std::ranges::count_if(runs, [](const Record& run) { return IsDoubtful(run, "outcome"); });
+  if (doubted == 0 || Shows(table, "doubts")) return std::nullopt;
+  return fmt::format("{} of {} runs finished with doubts; column doubts says which and why",
+                     doubted, runs.size());
+}
+
 // Where the columns chosen do not show that a value is none to rely on, a note does.
 std::vector<std::string> WhatColumnsHide(const Table& table) {
-  const auto shows = [&](const std::string& key) {
-    return table.group == key ||
-           std::ranges::find(table.columns, key, &TableColumn::key) != table.columns.end();
-  };
+  const auto shows = [&](const std::string& key) { return Shows(table, key); };
   std::vector<std::string> notes;
   const auto failed = std::ranges::count_if(table.rows, HasFailed);
   if (failed > 0 && !shows("outcome")) {
@@ -76,7 +89,7 @@ std::vector<std::string> WhatColumnsHide(const Table& table) {
     return !(column.key.starts_with("growth_hypothesis") ? shows("growth_hypothesis_resolved")
                                                          : shows("growth_resolved")) &&
            std::ranges::any_of(table.rows,
-                               [&](const Record& row) { return IsUnresolved(row, column.key); });
+                               [&](const Record& row) { return IsDoubtful(row, column.key); });
   });
   if (unresolved) {
     notes.push_back(
@@ -131,6 +144,13 @@ Table MakeTable(std::span<const Record> records, const TableView& view) {
   if (!view.sort.empty()) SortRowsBy(&table.rows, view.sort, view.descending);
   if (!view.group.empty()) SortRowsBy(&table.rows, view.group, false);
   for (std::string& note : WhatColumnsHide(table)) table.notes.push_back(std::move(note));
+  if (view.compact) {
+    for (std::string& note : DoubtNotes(table.rows, records)) {
+      table.notes.push_back(std::move(note));
+    }
+  } else if (const auto note = HiddenDoubts(table, kind == "factorial" ? rows : table.rows)) {
+    table.notes.push_back(*note);
+  }
   return table;
 }
 

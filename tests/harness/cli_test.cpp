@@ -156,6 +156,23 @@ TEST_F(CommandLineTest, TablesInEveryFormatNameTheCommandAndTheCommit) {
   EXPECT_EQ(ReadFile(folder_ / "out/drift.csv").find("# date"), std::string::npos);
 }
 
+TEST_F(CommandLineTest, DoubtsAreSaidBelowTheTableAndFailTheGate) {
+  ExpectEnding(Call("run tiny.json --out out --gate doubts"), 0, {"  ok  "});
+  ExpectEnding(Call("table out --gate doubts"), 0, {"  ok  "});
+  Write("parallelogram.json", ReadFile(kConfigs / "mechanisms/parallelogram.json"));
+  const std::string flat =
+      " --set /scenes/0/mechanism=parallelogram.json --set /scenes/0/horizon=2 --out out";
+  ExpectEnding(Call("run tiny.json --gate doubts" + flat), 1,
+               {"  ok?  ", "singular-passage: ", "2 have doubts"});
+  ExpectEnding(Call("table out --where mechanism=four-bar --gate doubts"), 0, {"  ok  "});
+  ExpectEnding(Call("table out --columns mechanism,outcome --gate doubts"), 1, {"finished?"});
+  // a run that did not finish has not passed either
+  ExpectEnding(Call("run tiny.json --out failed --gate doubts --set /limits/steps=3"), 1,
+               {"2 did not finish and 0 have doubts"});
+  ExpectEnding(Call("table out --where mechanism=four-bar --kind timing --gate doubts"), 2, {});
+  ExpectEnding(Call("run tiny.json --out out --gate doubt"), 2, {"doubts"});
+}
+
 TEST_F(CommandLineTest, FreeFiguresAreDrawnAndMistakesRefused) {
   ExpectEnding(Call("run tiny.json --out out"), 0, {});
   ExpectEnding(Call("plot out --out w.svg --x formulation --y steps"), 0, {"wrote w.svg"});

@@ -72,6 +72,7 @@ TEST(FinishedCase, HasAValueInEveryColumnOfTheDriftTable) {
     EXPECT_EQ(record.Number("t_reached"), 0.5);
     for (const TableColumn& table_column : DriftColumns()) {
       if (table_column.key == "correction_max") continue;  // nothing here corrects
+      if (table_column.key == "agreement") continue;       // needs another run
       EXPECT_TRUE(IsSet(record, table_column.key)) << table_column.key;
     }
   }

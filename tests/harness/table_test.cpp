@@ -193,7 +193,8 @@ std::string Keys(const std::vector<TableColumn>& columns) {
 TEST(Columns, DriftTableHasThePublishedOrder) {
   EXPECT_EQ(Keys(DriftColumns()),
             "experiment mechanism formulation enforcement coordinates solver integrator rtol atol "
-            "horizon outcome t_reached drift_position_max drift_rotation_max drift_velocity_max "
+            "horizon outcome t_reached doubts agreement drift_position_max drift_rotation_max "
+            "drift_velocity_max "
             "drift_acceleration_max loop_closure_max correction_max worst_loop energy_error_max "
             "growth_exponent growth_spread growth_regime growth_resolved growth_hypothesis "
             "growth_hypothesis_resolved ensemble steps rejected rhs_evaluations rank_min rcond_min "

@@ -1,0 +1,42 @@
+// Whether runs of one scene end alike. Neither drift nor energy sees a run that took a wrong
+// branch; the runs beside it do.
+#pragma once
+
+#include <cstdint>
+#include <span>
+#include <string>
+#include <vector>
+
+#include "harness/record.h"
+
+namespace loopbench::harness {
+
+/// Final poses are alike that differ by at most so many tolerances: over links and in rad.
+inline constexpr double kMostTolerances = 1000.0;
+
+struct Agreement {
+  /// Runs of the same scene, horizon and tolerance with the same number ended alike, the largest
+  /// such set being 1; 0 for runs that have nobody to be compared with.
+  std::int64_t cluster = 0;
+  bool doubted = false;
+};
+
+/// One for each record, in their order. Compared are accuracy runs that finished, of one scene
+/// (`scene_id`: its whole content) and horizon.
+///
+/// At one tolerance runs that do not all end alike are all doubted: which of them are right their
+/// number does not say, for formulations at one level make the same mistakes. Finer tolerances do:
+/// where runs of more than one level or coordinate set all ended alike, coarser runs are doubted
+/// only if they ended elsewhere.
+std::vector<Agreement> CompareFinalPoses(std::span<const Record> records);
+
+/// The largest difference of the final poses that two records both have: lengths over the link
+/// length, angles in rad, axes as they are; and the body that has it. Infinite where a number is
+/// missing.
+struct PoseDifference {
+  double largest = 0.0;
+  std::string body;
+};
+PoseDifference DifferenceOf(const Record& a, const Record& b);
+
+}  // namespace loopbench::harness

@@ -1,0 +1,113 @@
+#include "harness/analysis/doubts.h"
+
+#include <algorithm>
+#include <cmath>
+
+#include "harness/analysis/agreement.h"
+#include "mechanism/scaled_loops.h"
+
+namespace loopbench::harness {
+namespace {
+
+/// Energy balance: a hundredth of the energy that moves is no error of integration at any tolerance
+/// that deserves the name; regular runs at 1e-6 have 1e-3 and less.
+constexpr double kMostEnergyError = 1e-2;
+
+/// Factors of n^2 and n in the promised drift. Over 20 s at 1e-6 and 1e-9 the regular shipped
+/// mechanisms stay below 0.004 and 0.03 (the crank-rocker driven at 3 rad/s has both), Bennett's
+/// linkage, whose drift grows exponentially with its redundant rows kept, reached 0.1 after 20 s
+/// and 0.2 to 30 after 50 s.
+constexpr double kAcceleration = 0.02, kVelocity = 0.2;
+/// Few steps have more room: each may err by some tolerances.
+constexpr double kFewSteps = 10.0;
+/// Steps that Baumgarte's default gains, 0.05/h, remember: twice one over the gain.
+constexpr double kRemembered = 40.0;
+/// Over the projection's goal, for what rounding does to the evaluation itself: 15 were seen.
+constexpr double kProjection = 25.0;
+
+bool HasFinished(const Record& record) { return record.Text("outcome") == "finished"; }
+
+/// Accepted steps that Baumgarte's feedback remembers: those within 2/gain.
+double StepsRemembered(const Record& record) {
+  const double alpha = record.Number("alpha"), beta = record.Number("beta");
+  if (std::isnan(alpha) && std::isnan(beta)) return kRemembered;
+  const double gain = std::fmin(alpha, beta);
+  const double per_second = record.Number("steps") / record.Number("t_reached");
+  return gain > 0.0 ? 2.0 / gain * per_second : record.Number("steps");
+}
+
+/// Near enough to a singular position that the level has nothing to keep the branch by. Records of
+/// large mechanisms do not know the distance, but whether evaluations were softened.
+bool PassedSingularPosition(const Record& record) {
+  if (record.Text("enforcement") == "position") return false;
+  if (record.Number("singularity_passages") > 0) return true;
+  const double distance = record.Number("singularity_distance_min");
+  if (std::isnan(distance)) return record.Number("softened_evaluations") > 0;
+  return distance < kRankRatio;
+}
+
+void Add(std::string* codes, bool on, const char* code) {
+  if (on) *codes += (codes->empty() ? "" : " ") + std::string(code);
+}
+
+}  // namespace
+
+double EnergyErrorShare(const Record& record) {
+  const double scale = record.Number("energy_scale");
+  return scale > 0.0 ? record.Number("energy_error_max") / scale
+                     : record.Number("energy_error_relative");
+}
+
+double DriftShare(const Record& record) {
+  return std::fmax(record.Number("drift_position_max") / record.Number("link_length"),
+                   record.Number("drift_rotation_max"));
+}
+
+double PromisedDriftShare(const Record& record) {
+  const double rtol = record.Number("rtol"), steps = record.Number("steps");
+  const double goal = kProjection * record.Number("position_goal") / record.Number("link_length");
+  const std::string level = record.Text("enforcement");
+  double tolerances = kFewSteps;  // softened directions, level position
+  if (level == "position" && !(record.Number("softened_evaluations") > 0)) tolerances = 0.0;
+  if (level == "velocity") tolerances = kFewSteps + kVelocity * steps;
+  if (level == "acceleration") tolerances = kFewSteps + kAcceleration * steps * steps;
+  if (level == "baumgarte") {
+    const double remembered = std::min(steps, StepsRemembered(record));
+    tolerances = kFewSteps + kAcceleration * remembered * remembered;
+  }
+  return std::max(goal, tolerances * rtol);
+}
+
+std::string OwnDoubts(const Record& record) {
+  std::string codes;
+  if (record.Text("kind") != "accuracy" || !HasFinished(record)) return codes;
+  Add(&codes, EnergyErrorShare(record) > kMostEnergyError, kEnergyDoubt);
+  Add(&codes, PassedSingularPosition(record), kSingularDoubt);
+  Add(&codes, DriftShare(record) > PromisedDriftShare(record), kDriftDoubt);
+  Add(&codes, record.Number("ensemble_failed") > 0, kMembersDoubt);
+  // a single run was not asked for an exponent, and drift of round-off has none
+  Add(&codes,
+      record.Number("ensemble_size") > 0 && record.Text("growth_resolved") == "false" &&
+          record.Text("growth_regime") != "round-off",
+      kExponentDoubt);
+  return codes;
+}
+
+void SetDoubts(std::vector<Record>* records) {
+  const std::vector<Agreement> agreements = CompareFinalPoses(*records);
+  for (std::size_t i = 0; i < records->size(); ++i) {
+    Record& record = (*records)[i];
+    if (record.Text("kind") != "accuracy" || !HasFinished(record)) continue;
+    std::string codes = OwnDoubts(record);
+    Add(&codes, agreements[i].doubted, kDisagreementDoubt);
+    record.Set("doubts", codes);
+    if (agreements[i].cluster > 0) record.Set("agreement", agreements[i].cluster);
+  }
+}
+
+bool HasDoubt(const Record& record, const std::string& code) {
+  const std::string codes = record.Text("doubts");
+  return code.empty() ? !codes.empty() : (" " + codes + " ").find(" " + code + " ") != codes.npos;
+}
+
+}  // namespace loopbench::harness

@@ -1,0 +1,45 @@
+// Reasons not to rely on a run although it finished: what its own record says against it, and what
+// the other runs of its scene do (agreement.h).
+#pragma once
+
+#include <string>
+#include <vector>
+
+#include "harness/record.h"
+
+namespace loopbench::harness {
+
+/// The codes of `doubts`, which docs/design.md section 6 explains; programs may rely on them.
+inline constexpr const char* kEnergyDoubt = "energy";
+inline constexpr const char* kSingularDoubt = "singular-passage";
+inline constexpr const char* kDriftDoubt = "drift";
+inline constexpr const char* kMembersDoubt = "members-failed";
+inline constexpr const char* kExponentDoubt = "exponent";
+inline constexpr const char* kDisagreementDoubt = "disagreement";
+
+/// Largest error of the energy balance over the energy that moves (`energy_scale`; in records
+/// without it the largest kinetic energy). NaN where it was not measured.
+double EnergyErrorShare(const Record& record);
+
+/// Drift of a run over the length of a link, or in rad where a rotation has drifted further, and
+/// what its level of enforcement promises of it. NaN where it was not measured.
+///
+/// A step of tolerance rtol leaves errors of some rtol in positions and speeds (docs/numerics.md,
+/// section 2). At velocity level those of positions add up, n rtol; at acceleration level speeds
+/// keep theirs, n^2 rtol times the angle per step; Baumgarte's feedback forgets all but the last
+/// steps; a projection leaves round-off, and in softened directions some tolerance.
+double DriftShare(const Record& record);
+double PromisedDriftShare(const Record& record);
+
+/// The codes of what an accuracy record says against itself, separated by spaces, "" for none. Of
+/// runs that did not finish their outcome says enough: "".
+std::string OwnDoubts(const Record& record);
+
+/// Sets `doubts` of every accuracy record that finished, those that only runs together know among
+/// them, and `agreement`: which runs of the same scene, horizon and tolerance ended alike.
+void SetDoubts(std::vector<Record>* records);
+
+/// Whether the record's doubts contain `code`, or any with "".
+bool HasDoubt(const Record& record, const std::string& code = "");
+
+}  // namespace loopbench::harness

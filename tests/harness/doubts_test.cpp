@@ -1,0 +1,319 @@
+// Each doubt is raised by what it is about and by nothing else; runs of one scene judge each other;
+// and the runs that the rules were made for have them.
+#include "harness/analysis/doubts.h"
+
+#include <gtest/gtest.h>
+
+#include <string>
+#include <vector>
+
+#include "harness/analysis/agreement.h"
+#include "harness/analysis/link_length.h"
+#include "harness/report/doubt_notes.h"
+#include "harness/report/table_view.h"
+#include "mechanism/library.h"
+#include "tests/reference/cases.h"
+
+namespace loopbench::harness {
+namespace {
+
+using namespace reference;
+using enum FormulationKind;
+using enum Enforcement;
+
+/// A run without doubts: the four-bar, 20 s at 1e-8.
+Record Sound(const std::string& enforcement = "acceleration",
+             const std::string& coordinates = "joint") {
+  Record record;
+  record.Set("kind", std::string("accuracy"));
+  record.Set("mechanism", std::string("four-bar"));
+  record.Set("formulation", std::string("odca"));
+  record.Set("enforcement", enforcement);
+  record.Set("coordinates", coordinates);
+  record.Set("rtol", 1e-8);
+  record.Set("horizon", 20.0);
+  record.Set("scene_id", std::string("scene"));
+  record.Set("link_length", 1.0);
+  record.Set("position_goal", 2.7e-15);
+  record.Set("outcome", std::string("finished"));
+  record.Set("t_reached", 20.0);
+  record.Set("steps", std::int64_t{500});
+  record.Set("energy_error_max", 1e-6);
+  record.Set("energy_error_relative", 1e-6);
+  record.Set("energy_scale", 1.0);
+  record.Set("drift_position_max", enforcement == "position" ? 1e-15 : 1e-8);
+  record.Set("drift_rotation_max", 0.0);
+  record.Set("softened_evaluations", std::int64_t{0});
+  record.Set("singularity_distance_min", 0.75);
+  record.Set("singularity_passages", std::int64_t{0});
+  record.Set("ensemble_failed", std::int64_t{0});
+  record.Set("growth_exponent", 2.3);
+  record.Set("growth_regime", std::string("truncation"));
+  record.Set("growth_resolved", false);  // a single run
+  record.Set("series.final.bar1", std::vector<double>{0.1, 0.2, 3.0});
+  return record;
+}
+
+std::string With(const std::string& enforcement,
+                 const std::vector<std::pair<std::string, Value>>& changes) {
+  Record record = Sound(enforcement);
+  for (const auto& [key, value] : changes) record.Set(key, value);
+  return OwnDoubts(record);
+}
+
+TEST(Doubts, ASoundRunHasNoneAtAnyLevel) {
+  for (const char* level : {"acceleration", "velocity", "position", "baumgarte"}) {
+    EXPECT_EQ(OwnDoubts(Sound(level)), "") << level;
+  }
+}
+
+TEST(Doubts, EnergyIsComparedWithWhatMoves) {
+  EXPECT_EQ(With("velocity", {{"energy_error_max", 0.02}}), "energy");
+  EXPECT_EQ(With("velocity", {{"energy_error_max", 0.009}}), "");
+  // a slow motion has little kinetic energy, and moves the energy of its potential all the same
+  EXPECT_EQ(With("velocity", {{"energy_error_max", 0.02}, {"energy_scale", 50.0}}), "");
+  // records of before
+  EXPECT_EQ(With("velocity", {{"energy_scale", Value()}, {"energy_error_relative", 0.5}}),
+            "energy");
+}
+
+TEST(Doubts, SingularPassagesCountBelowLevelPosition) {
+  const std::vector<std::pair<std::string, Value>> across = {
+      {"singularity_passages", std::int64_t{1}}};
+  EXPECT_EQ(With("velocity", across), "singular-passage");
+  EXPECT_EQ(With("position", across), "");
+  EXPECT_EQ(With("acceleration", {{"singularity_distance_min", 1e-4}}), "singular-passage");
+  // loops too large for the distance know whether they were softened
+  EXPECT_EQ(With("acceleration", {{"singularity_distance_min", Value()},
+                                  {"softened_evaluations", std::int64_t{3}}}),
+            "singular-passage");
+  // reduction changes its independent set in regular motion too
+  EXPECT_EQ(With("velocity", {{"mode_changes", std::int64_t{5}}}), "");
+}
+
+TEST(Doubts, DriftBeyondWhatTheLevelPromises) {
+  // Bennett's linkage at 1e-8 with its redundant rows kept: the least of six runs over 50 s, and
+  // its sound neighbour, a crank-rocker driven at 3 rad/s over 20 s at 1e-6
+  EXPECT_EQ(With("acceleration", {{"drift_position_max", 8.8e-3}, {"steps", std::int64_t{2110}}}),
+            "drift");
+  EXPECT_EQ(With("acceleration", {{"drift_position_max", 3.04e-4},
+                                  {"rtol", 1e-6},
+                                  {"steps", std::int64_t{249}},
+                                  {"link_length", 1.2}}),
+            "");
+  // what is right at one level is not at the next
+  EXPECT_EQ(With("velocity", {{"drift_position_max", 1e-5}}), "drift");
+  EXPECT_EQ(With("acceleration", {{"drift_position_max", 1e-5}}), "");
+  EXPECT_EQ(With("velocity", {{"drift_position_max", 5e-7}}), "");
+  EXPECT_EQ(With("baumgarte", {{"drift_position_max", 1e-5}}), "drift");
+  EXPECT_EQ(With("position", {{"drift_position_max", 1e-9}}), "drift");
+  // gains of 0.1 1/s forget within 20 s: nothing of this run
+  EXPECT_EQ(With("baumgarte", {{"drift_position_max", 1e-5}, {"alpha", 0.1}, {"beta", 0.1}}), "");
+  // lengths are those of the links
+  EXPECT_EQ(With("velocity", {{"drift_position_max", 5e-7}, {"link_length", 1e-3}}), "drift");
+  EXPECT_EQ(With("velocity", {{"drift_rotation_max", 1e-3}}), "drift");
+}
+
+TEST(Doubts, EnsemblesThatFailOrDoNotResolveWhatTheyWereAskedFor) {
+  EXPECT_EQ(With("velocity", {{"ensemble_failed", std::int64_t{16}}}), "members-failed");
+  EXPECT_EQ(With("velocity", {{"ensemble_size", std::int64_t{16}}}), "exponent");
+  EXPECT_EQ(With("velocity", {{"ensemble_size", std::int64_t{16}}, {"growth_resolved", true}}), "");
+  EXPECT_EQ(With("velocity", {{"ensemble_size", std::int64_t{16}},
+                              {"growth_regime", std::string("round-off")}}),
+            "");
+}
+
+TEST(Doubts, AFailedRunHasItsOutcomeAndNoDoubts) {
+  EXPECT_EQ(With("velocity", {{"energy_error_max", 9.0}, {"outcome", std::string("singular")}}),
+            "");
+}
+
+/// Columns of one scene: those at level position and velocity agree, one took another branch.
+std::vector<Record> Scene(double rtol, double wrong_angle) {
+  std::vector<Record> records = {Sound("position"), Sound("velocity"),
+                                 Sound("velocity", "absolute")};
+  for (Record& record : records) record.Set("rtol", rtol);
+  records[0].Set("series.final.bar1", std::vector<double>{0.1, 0.2, 3.0 + 100 * rtol});
+  records[2].Set("series.final.bar1", std::vector<double>{0.1, 0.2, wrong_angle});
+  return records;
+}
+
+std::string DoubtsAndSets(std::vector<Record> records) {
+  SetDoubts(&records);
+  std::string text;
+  for (const Record& record : records) {
+    text += record.Text("doubts") + ":" + record.Text("agreement") + " ";
+  }
+  return text;
+}
+
+TEST(Agreement, RunsThatEndElsewhereMakeAllOfTheirToleranceDoubtful) {
+  EXPECT_EQ(DoubtsAndSets(Scene(1e-8, 3.0)), ":1 :1 :1 ");
+  EXPECT_EQ(DoubtsAndSets(Scene(1e-8, 2.0)), "disagreement:1 disagreement:1 disagreement:2 ");
+  // angles count with their turns
+  EXPECT_EQ(DoubtsAndSets(Scene(1e-8, 3.0 + 2 * M_PI)),
+            "disagreement:1 disagreement:1 disagreement:2 ");
+  // 1e-3 is a thousand tolerances of 1e-6, and more of 1e-8
+  EXPECT_EQ(DoubtsAndSets(Scene(1e-6, 3.0009)), ":1 :1 :1 ");
+  EXPECT_EQ(DoubtsAndSets(Scene(1e-8, 3.0009)), "disagreement:1 disagreement:1 disagreement:2 ");
+  // nobody to be compared with: another scene, another horizon, a run that failed
+  for (const auto& [key, value] :
+       std::vector<std::pair<std::string, Value>>{{"scene_id", std::string("other")},
+                                                  {"horizon", 10.0},
+                                                  {"outcome", std::string("singular")}}) {
+    std::vector<Record> records = Scene(1e-8, 2.0);
+    records[2].Set(key, value);
+    EXPECT_EQ(DoubtsAndSets(records), ":1 :1 : ") << key;
+  }
+  // lengths are compared over links
+  std::vector<Record> records = Scene(1e-8, 3.0);
+  records[2].Set("series.final.bar1", std::vector<double>{0.11, 0.2, 3.0});
+  EXPECT_EQ(DoubtsAndSets(records), "disagreement:1 disagreement:1 disagreement:2 ");
+  for (Record& record : records) record.Set("link_length", 1e4);
+  EXPECT_EQ(DoubtsAndSets(records), ":1 :1 :1 ");
+}
+
+TEST(Agreement, FinerTolerancesDecideWhereDifferentEquationsAgree) {
+  const auto both = [](std::vector<Record> finer, const std::vector<Record>& coarser) {
+    finer.insert(finer.begin(), coarser.begin(), coarser.end());
+    return DoubtsAndSets(finer);
+  };
+  EXPECT_EQ(both(Scene(1e-10, 3.0), Scene(1e-8, 2.0)), ":1 :1 disagreement:2 :1 :1 :1 ");
+  // all coarse runs wrong alike
+  std::vector<Record> alike = Scene(1e-8, 2.0);
+  for (Record& record : alike)
+    record.Set("series.final.bar1", alike[2].Numbers("series.final.bar1"));
+  EXPECT_EQ(both(Scene(1e-10, 3.0), alike),
+            "disagreement:1 disagreement:1 disagreement:1 :1 :1 :1 ");
+  // one level and coordinate set makes one mistake, however many formulations make it
+  std::vector<Record> same = Scene(1e-10, 3.0);
+  same.resize(2);
+  same[0] = same[1];
+  EXPECT_EQ(both(same, Scene(1e-8, 2.0)), "disagreement:1 disagreement:1 disagreement:2 :1 :1 ");
+}
+
+TEST(DoubtNotes, NameRowsNumbersAndWhoAgrees) {
+  std::vector<Record> records = Scene(1e-8, 2.0);
+  records[1].Set("energy_error_max", 0.5);
+  SetDoubts(&records);
+  const std::vector<std::string> notes = DoubtNotes(records, records);
+  ASSERT_EQ(notes.size(), 3u);
+  EXPECT_EQ(notes[1],
+            "energy: error of the energy balance above 1 % of the energy that moves: "
+            "velocity/joint (50 %)");
+  EXPECT_EQ(notes[2],
+            "disagreement: four-bar rtol 1e-08 horizon 20 ends 1 links or rad apart (bar1), 1000 "
+            "tolerances are expected at most; position/joint, velocity/joint agree; "
+            "each by itself: velocity/absolute");
+  // a table of one row judges it by the others of the store
+  EXPECT_EQ(DoubtNotes(std::vector<Record>{records[2]}, records).back(), notes[2]);
+  std::vector<Record> sound = {Sound()};
+  SetDoubts(&sound);
+  EXPECT_TRUE(DoubtNotes(sound, sound).empty());
+}
+
+TEST(DoubtNotes, TablesMarkTheOutcomeInEveryFormat) {
+  std::vector<Record> records = Scene(1e-8, 2.0);
+  records[0].Set("rtol", 1e-6);  // alone at its tolerance
+  SetDoubts(&records);
+  const std::string text = ToText(MakeTable(records, {.compact = true}));
+  EXPECT_NE(text.find("  ok   "), std::string::npos) << text;
+  EXPECT_NE(text.find("  ok?  "), std::string::npos) << text;
+  EXPECT_NE(text.find("each by itself"), std::string::npos) << text;
+  const Table full = MakeTable(records, {});
+  for (const char* format : {"csv", "markdown", "json", "latex"}) {
+    EXPECT_NE(Render(full, format).find("disagreement"), std::string::npos) << format;
+  }
+  EXPECT_NE(ToMarkdown(full).find("| finished? |"), std::string::npos);
+  EXPECT_NE(ToText(full, true).find("\033[33mfinished?"), std::string::npos);
+  EXPECT_EQ(ToCsv(full).find("finished?"), std::string::npos);
+  const Table bare = MakeTable(records, {.columns = {"outcome"}});
+  EXPECT_NE(ToCsv(bare).find("2 of 3 runs finished with doubts"), std::string::npos);
+}
+
+// What the rules were made for.
+
+Record RunScene(const std::string& mechanism, const Column& column, double rtol, double horizon) {
+  const Experiment experiment =
+      Single(ReadMechanism(kConfigs / "mechanisms" / (mechanism + ".json")));
+  return RunCase(experiment, CaseOf(experiment, mechanism, column, rtol, horizon));
+}
+
+TEST(Doubts, FinalPosesAreTheSameInAllCoordinatesOfPlaneAndSpace) {
+  for (const std::string mechanism : {"four-bar", "spatial-four-bar", "welded-four-bar"}) {
+    std::vector<Record> records;
+    for (const Coordinates coordinates : {Coordinates::kJoint, Coordinates::kAbsolute}) {
+      for (const Enforcement level : {kVelocity, kPosition}) {
+        records.push_back(RunScene(
+            mechanism, {.formulation = kOdca, .enforcement = level, .coordinates = coordinates},
+            1e-9, 0.5));
+      }
+    }
+    const std::size_t numbers = mechanism == "spatial-four-bar" ? 9 : 3;
+    std::size_t bodies = 0;
+    for (const auto& [key, value] : records.front().items()) {
+      if (!key.starts_with("series.final.")) continue;
+      ++bodies;
+      EXPECT_EQ(records.front().Numbers(key).size(), numbers) << key;
+    }
+    EXPECT_GE(bodies, 3u) << mechanism;
+    for (const Record& record : records) {
+      EXPECT_EQ(record.Text("outcome"), "finished");
+      EXPECT_EQ(record.Text("doubts"), "") << mechanism << " " << record.Text("enforcement");
+      // some 30 steps, each with some tolerance of error
+      EXPECT_LT(DifferenceOf(records.front(), record).largest, 100 * 1e-9) << mechanism;
+      EXPECT_EQ(record.Number("singularity_passages"), 0);
+    }
+  }
+}
+
+TEST(Doubts, PassagesAreSeenWhereNoStepEndsNearThem) {
+  // the parallelogram goes flat within 2 s; steps at 1e-6 are a tenth of a radian
+  const Column acceleration{.formulation = kOdca};
+  const Record record = RunScene("parallelogram", acceleration, 1e-6, 2.0);
+  ASSERT_EQ(record.Text("outcome"), "finished");
+  EXPECT_GE(record.Number("singularity_passages"), 1);
+  EXPECT_TRUE(HasDoubt(record, kSingularDoubt)) << record.Text("doubts");
+  const Column position{.formulation = kOdca, .enforcement = kPosition};
+  EXPECT_EQ(RunScene("parallelogram", position, 1e-8, 2.0).Text("doubts"), "");
+}
+
+/// Peaucellier's linkage through the position where its cell folds: below level position runs
+/// finish with small drift and energy errors on another branch than level position's.
+TEST(Doubts, TheStraightLineLinkageThatEndsOnAnotherBranch) {
+  std::vector<Record> records;
+  for (const Coordinates coordinates : {Coordinates::kJoint, Coordinates::kAbsolute}) {
+    for (const Enforcement level : {kVelocity, kPosition}) {
+      const Column column{.formulation = level == kVelocity ? kReduction : kOdca,
+                          .enforcement = level,
+                          .coordinates = coordinates};
+      records.push_back(RunScene("peaucellier", column, 1e-8, 1.0));
+    }
+  }
+  SetDoubts(&records);
+  for (const Record& record : records) {
+    ASSERT_EQ(record.Text("outcome"), "finished") << record.Text("message");
+    const bool position = record.Text("enforcement") == "position";
+    EXPECT_EQ(HasDoubt(record, kSingularDoubt), !position);
+    EXPECT_TRUE(HasDoubt(record, kDisagreementDoubt)) << record.Text("doubts");
+    EXPECT_EQ(record.Number("agreement") == 1, position);
+    EXPECT_FALSE(HasDoubt(record, kEnergyDoubt) || HasDoubt(record, kDriftDoubt));
+  }
+}
+
+TEST(LinkLength, IsThatOfTheLongestBodyBetweenItsJointsWhereverItStands) {
+  const auto length = [](const std::string& name) {
+    return LinkLength(ReadMechanism(kConfigs / "mechanisms" / (name + ".json")).description);
+  };
+  EXPECT_DOUBLE_EQ(length("parallelogram"), 1.0);
+  EXPECT_DOUBLE_EQ(length("driven-four-bar"), 1.2);  // the ground, 1 m, is no link
+  EXPECT_DOUBLE_EQ(length("rod-pendulum"), 1.0);     // a massless rod
+  MechanismDescription far =
+      ReadMechanism(kConfigs / "mechanisms/driven-four-bar.json").description;
+  for (BodyDescription& body : far.bodies) body.com *= 1e6;
+  EXPECT_DOUBLE_EQ(LinkLength(far), 1.2);  // centres of mass count only where there is one joint
+  EXPECT_DOUBLE_EQ(LinkLength(MechanismDescription{}), 1.0);
+}
+
+}  // namespace
+}  // namespace loopbench::harness

@@ -9,6 +9,7 @@
 #include <string_view>
 #include <tuple>
 
+#include "harness/analysis/doubts.h"
 #include "harness/report/columns.h"
 #include "harness/report/select.h"
 
@@ -32,14 +33,12 @@ Shape ShapeOf(const Record& record) {
   return level == "baumgarte" ? Shape::kDiamond : Shape::kCircle;
 }
 
-bool IsDoubtful(const Record& record) { return !record.Text("doubts").empty(); }
-
 CurveStyle StyleOf(const Record& record) {
   return {.color = ColorOf(record),
           .width = record.Text("formulation") == "lagrange" ? 5.0 : 2.0,
           .shape = ShapeOf(record),
           .filled = record.Text("solver") != "as-published",
-          .doubtful = IsDoubtful(record)};
+          .doubtful = HasDoubt(record)};
 }
 
 bool Varies(std::span<const Record> records, std::string_view key) {
@@ -131,7 +130,7 @@ bool PassesSingularPosition(const Record& record) {
 auto MotionRank(const Record& record) {
   const double energy = record.Number("energy_error_relative");
   constexpr double kTrusted = 1e-2;
-  return std::tuple(!Failed(record), !IsDoubtful(record) && !(energy > kTrusted),
+  return std::tuple(!Failed(record), !HasDoubt(record) && !(energy > kTrusted),
                     record.Text("enforcement") == "position", -record.Number("rtol"),
                     record.Text("formulation") == "odca", record.Text("coordinates") == "joint",
                     record.Text("solver") == "rank-revealing");
@@ -171,7 +170,7 @@ Figure CoordinateFigure(const Record& record, const CoordinateKind& kind) {
     curve.x = t;
     curve.y = record.Numbers(key);
     curve.style = DistinctStyle(index);
-    curve.style.doubtful = IsDoubtful(record);
+    curve.style.doubtful = HasDoubt(record);
     curve.ends_early = Failed(record) && !opening;
     figure.curves.push_back(std::move(curve));
   }

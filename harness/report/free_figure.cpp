@@ -9,6 +9,7 @@
 #include <set>
 #include <string_view>
 
+#include "harness/analysis/doubts.h"
 #include "harness/config/config_error.h"
 #include "harness/report/columns.h"
 #include "harness/report/select.h"
@@ -131,6 +132,7 @@ Curve SeriesCurve(const Record& row, const FreeFigure& wanted, const std::string
   curve.x = row.Numbers(wanted.x);
   curve.y = row.Numbers(wanted.y);
   curve.ends_early = HasFailed(row);
+  curve.style.doubtful = HasDoubt(row);
   return curve;
 }
 
@@ -140,6 +142,7 @@ Curve ValueCurve(const std::vector<Record>& rows, const FreeFigure& wanted, cons
   Curve curve = NewCurve(label, index);
   curve.points = true;
   for (const Record& row : rows) {
+    curve.style.doubtful = curve.style.doubtful || HasDoubt(row);
     if (HasFailed(row)) {
       curve.crosses.push_back({x.Of(row), row.Number(wanted.y)});
     } else {
@@ -265,6 +268,13 @@ FreeFigureResult MakeFreeFigure(std::span<const Record> records, const FreeFigur
     result.remarks.push_back(fmt::format("{} of {} runs failed and {} drawn as {}", failed,
                                          rows.size(), failed == 1 ? "is" : "are",
                                          failed == 1 ? "a cross" : "crosses"));
+  }
+  const auto doubted = std::ranges::count_if(rows, [](const Record& row) { return HasDoubt(row); });
+  if (doubted > 0) {
+    result.remarks.push_back(
+        fmt::format("{} of {} runs finished with doubts (column doubts of "
+                    "tables); curves with such runs are dashed",
+                    doubted, rows.size()));
   }
   return result;
 }

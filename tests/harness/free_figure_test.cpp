@@ -3,6 +3,7 @@
 
 #include <gtest/gtest.h>
 
+#include <algorithm>
 #include <cmath>
 #include <filesystem>
 #include <limits>
@@ -102,6 +103,24 @@ TEST(FreeFigure, FailedRunsAreCrossesWithOrWithoutAValue) {
   EXPECT_NE(script.find("at first 1e-12, graph 0.02 point pt 2"), std::string::npos) << script;
   EXPECT_NE(script.find("at first 1e-10, first 1e-08 point pt 2"), std::string::npos) << script;
   EXPECT_NE(script.find("title 'failed run'"), std::string::npos);
+}
+
+TEST(FreeFigure, CurvesWithDoubtedRunsAreDashedAndCounted) {
+  std::vector<Record> runs = Runs();
+  runs[1].Set("doubts", std::string("energy"));
+  for (Record& run : runs) {
+    if (run.Find("doubts") == nullptr) run.Set("doubts", std::string());
+  }
+  const FreeFigureResult values = MakeFreeFigure(runs, DriftOverTolerance());
+  EXPECT_FALSE(values.figure.curves[0].style.doubtful);  // lagrange
+  EXPECT_TRUE(values.figure.curves[1].style.doubtful);
+  ASSERT_EQ(values.remarks.size(), 1u);
+  EXPECT_EQ(values.remarks[0].find("1 of 5 runs finished with doubts"), 0u) << values.remarks[0];
+  const FreeFigureResult series = MakeFreeFigure(
+      runs, {.x = "series.drift_t", .y = "series.drift", .group = "rtol", .log = "", .title = ""});
+  EXPECT_EQ(std::ranges::count_if(series.figure.curves,
+                                  [](const Curve& curve) { return curve.style.doubtful; }),
+            1);
 }
 
 TEST(FreeFigure, PointsThatShareAnXAreNotJoinedAndTheRemarkSaysWhatIsMixed) {

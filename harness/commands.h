@@ -58,7 +58,15 @@ std::vector<Experiment> ReadSelected(const ExperimentFiles& files);
 
 int List(const ExperimentFiles& files);
 
-int CheckFiles(const ExperimentFiles& files);
+/// Limits of work on one mechanism file; experiments have their own.
+inline constexpr ProcessLimits kFileLimits = {.cpu_s = 60.0, .memory_mb = 2048.0};
+
+struct CheckCommand {
+  ExperimentFiles files;
+  bool assembly = true;  ///< assemble the starts of mechanisms and scenes
+  ProcessLimits limits = kFileLimits;
+};
+int CheckFiles(const CheckCommand& command);
 
 struct PlanCommand {
   ExperimentFiles files;
@@ -67,8 +75,9 @@ struct PlanCommand {
 int PrintPlans(const PlanCommand& command);
 
 /// What experiments run and measure, and what mechanisms are made of, by the kind of each file.
-/// `all`: every row of long tables.
-int Explain(const ExperimentFiles& files, bool all);
+/// Mechanisms are analysed in a child process under `limits`; 2 for one that they cut off. `all`:
+/// every row of long tables.
+int Explain(const ExperimentFiles& files, bool all, const ProcessLimits& limits);
 /// Prints what a mechanism is made of, its start and its structure; 2 when the start cannot be
 /// assembled, after all else.
 int ExplainMechanism(const std::filesystem::path& path, bool all);

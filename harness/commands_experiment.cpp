@@ -14,6 +14,7 @@
 #include "harness/precision_cases.h"
 #include "harness/report/table.h"
 #include "harness/run_case.h"
+#include "harness/start_check.h"
 #include "harness/terminal.h"
 #include "harness/timing/time_cases.h"
 
@@ -75,26 +76,38 @@ void PrintUnitWarnings(const std::filesystem::path& path, const MechanismDescrip
   }
 }
 
-void CheckExperiment(const std::filesystem::path& path, const std::vector<Setting>& settings) {
-  const std::vector<Experiment> experiments = ReadExperiments(path, settings);
+/// Throws ConfigError with all faults of starts, each with the file and the way around.
+void RefuseFaults(const std::filesystem::path& path, const std::vector<std::string>& faults) {
+  std::string text;
+  for (const std::string& fault : faults) {
+    if (fault.empty()) continue;
+    text += fmt::format("{}{}: {}", text.empty() ? "" : "\n", path.string(), fault);
+  }
+  if (!text.empty()) throw ConfigError(text + "\n(--no-assembly leaves this check out)");
+}
+
+void CheckExperiment(const std::filesystem::path& path, const CheckCommand& command) {
+  const std::vector<Experiment> experiments = ReadExperiments(path, command.files.settings);
   for (const ExperimentScene& scene : experiments.front().scenes) {
     PrintUnitWarnings(path, scene.mechanism.description);
   }
   std::size_t cases = 0;
   for (const Experiment& experiment : experiments) {
     cases += Expand(experiment).size();
-    LadderGroups(experiment);  // refuses what it cannot run
+    CheckLadders(experiment);
   }
+  if (command.assembly) RefuseFaults(path, StartFaults(experiments));
   Print("{}: experiment \"{}\", {} cases{}\n", path.string(), experiments.front().name, cases,
         experiments.size() > 1 ? fmt::format(" in {} combinations", experiments.size()) : "");
 }
 
-void CheckMechanism(const std::filesystem::path& path, const std::vector<Setting>& settings) {
-  if (!settings.empty()) {
+void CheckMechanism(const std::filesystem::path& path, const CheckCommand& command) {
+  if (!command.files.settings.empty()) {
     throw ConfigError(fmt::format("{}: --set is for experiments, and this is none", path.string()));
   }
   const MechanismFile file = ReadMechanism(path);
   PrintUnitWarnings(path, file.description);
+  if (command.assembly) RefuseFaults(path, {StartFault(file.description, command.limits)});
   Print("{}: mechanism \"{}\", {} bodies, {} joints\n", path.string(), file.description.name,
         file.description.bodies.size() - 1, file.description.joints.size());
 }
@@ -118,21 +131,22 @@ int List(const ExperimentFiles& files) {
   for (const auto& path : files.paths) {
     const std::vector<Experiment> experiments =
         ReadSelected({{path}, files.settings, files.filter});
+    for (const Experiment& experiment : experiments) CheckLadders(experiment);
     PrintText(ToText(CaseTable(experiments, files.filter)) + "\n");
   }
   return 0;
 }
 
-int CheckFiles(const ExperimentFiles& files) {
+int CheckFiles(const CheckCommand& command) {
   int exit_code = 0;
-  for (const auto& path : files.paths) {
+  for (const auto& path : command.files.paths) {
     try {
       switch (KindOfFile(path)) {
         case FileKind::kExperiment:
-          CheckExperiment(path, files.settings);
+          CheckExperiment(path, command);
           break;
         case FileKind::kMechanism:
-          CheckMechanism(path, files.settings);
+          CheckMechanism(path, command);
           break;
         case FileKind::kClaims:
           Print("{}: {} claims\n", path.string(), ReadClaims(path).size());

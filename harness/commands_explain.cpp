@@ -7,6 +7,7 @@
 #include "harness/commands.h"
 #include "harness/config/config_error.h"
 #include "harness/config/file_kind.h"
+#include "harness/isolation/print_from_child.h"
 #include "harness/joint_words.h"
 #include "harness/precision_cases.h"
 #include "harness/terminal.h"
@@ -225,7 +226,10 @@ void ExplainExperiment(const std::filesystem::path& path, const ExperimentFiles&
   const std::vector<Experiment> experiments = ReadSelected({{path}, files.settings, files.filter});
   const Experiment& first = experiments.front();
   std::size_t cases = 0;
-  for (const Experiment& one : experiments) cases += SelectCases(one, files.filter).size();
+  for (const Experiment& one : experiments) {
+    cases += SelectCases(one, files.filter).size();
+    CheckLadders(one);
+  }
   Print("{} ({})\n", first.name, path.string());
   if (!first.comment.empty()) Print("  {}\n", first.comment);
   Print(
@@ -246,13 +250,15 @@ void ExplainExperiment(const std::filesystem::path& path, const ExperimentFiles&
 
 }  // namespace
 
-int Explain(const ExperimentFiles& files, bool all) {
+int Explain(const ExperimentFiles& files, bool all, const ProcessLimits& limits) {
   int exit_code = 0;
   for (const auto& path : files.paths) {
     if (KindOfFile(path) != FileKind::kMechanism) {
       ExplainExperiment(path, files);
     } else if (files.settings.empty() && files.filter.empty()) {
-      exit_code = std::max(exit_code, ExplainMechanism(path, all));
+      const int code = PrintFromChild(path.string(), limits,
+                                      [&path, all] { return ExplainMechanism(path, all); });
+      exit_code = std::max(exit_code, code);
     } else {
       throw ConfigError(fmt::format(
           "{}: --set and --filter are for experiments, and this is a mechanism", path.string()));

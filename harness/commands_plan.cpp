@@ -3,11 +3,14 @@
 
 #include <algorithm>
 #include <cmath>
+#include <cstdio>
 #include <map>
 #include <set>
 
 #include "harness/case_identity.h"
 #include "harness/commands.h"
+#include "harness/cpu_time.h"
+#include "harness/isolation/processes.h"
 #include "harness/progress.h"
 #include "harness/report/table.h"
 #include "harness/run_case.h"
@@ -52,7 +55,13 @@ std::map<std::string, double> EarlierTimes(const std::filesystem::path& store) {
 /// Steps, and with them the time, grow with the horizon and with rtol^(-1/5) (order 5).
 double Work(double horizon, double rtol) { return horizon * std::pow(rtol, -0.2); }
 
-/// CPU time per unit of work of a scene and a column, from short runs.
+/// What short runs say about the CPU time of a scene and a column.
+struct Rate {
+  double start_s = 0.0;   ///< before the first step
+  double per_work = 0.0;  ///< per unit of work
+};
+
+/// Short runs, each in a process of its own under the limits of its case.
 class Pilot {
  public:
   explicit Pilot(const std::vector<Experiment>& experiments) : experiments_(experiments) {}
@@ -66,13 +75,15 @@ class Pilot {
     const std::string key =
         fmt::format("{}/{}/{}/{}", piloted, scene, ToString(one.column), one.integrator);
     const auto known = rates_.find(key);
-    const double rate = known != rates_.end()
-                            ? known->second
-                            : rates_.emplace(key, Measure(like, scene, one)).first->second;
-    return std::min(rate * Work(one.horizon, one.rtol), one.limits.cpu_s);
+    const Rate rate = known != rates_.end()
+                          ? known->second
+                          : rates_.emplace(key, Measure(like, scene, one)).first->second;
+    return rate.start_s + std::min(rate.per_work * Work(one.horizon, one.rtol), one.limits.cpu_s);
   }
 
   std::size_t runs() const { return rates_.size(); }
+  /// A sentence for each pilot that its limits cut off.
+  const std::vector<std::string>& cut_off() const { return cut_off_; }
 
  private:
   std::size_t Nearest(std::size_t experiment) const {
@@ -83,7 +94,30 @@ class Pilot {
         std::round(std::round(static_cast<double>(experiment) / step) * step));
   }
 
-  static double Measure(const Experiment& experiment, std::size_t scene, const Case& like) {
+  Rate Measure(const Experiment& experiment, std::size_t scene, const Case& like) {
+    Rate rate;
+    const auto work = [&](std::size_t) {
+      const Rate found = Run(experiment, scene, like);
+      return fmt::format("{} {}", found.start_s, found.per_work);
+    };
+    RunInProcesses(
+        1, 1, work, [&](std::size_t) { return LimitsOfRuns(like.limits, 1); },
+        [&](std::size_t, const ProcessResult& result) {
+          if (result.ending == ProcessEnding::kAnswered &&
+              std::sscanf(result.text.c_str(), "%lf %lf", &rate.start_s, &rate.per_work) == 2) {
+            return;
+          }
+          // the cases will end so as well
+          rate = {result.cpu_s, 0.0};
+          cut_off_.push_back(fmt::format("{} {}: {}, {}", experiment.scenes[scene].name,
+                                         ToString(like.column), OutcomeOf(result.ending),
+                                         result.text));
+        });
+    return rate;
+  }
+
+  /// In the child.
+  static Rate Run(const Experiment& experiment, std::size_t scene, const Case& like) {
     Case pilot = like;
     pilot.scene = scene;
     pilot.ensemble = 1;
@@ -95,19 +129,21 @@ class Pilot {
     // the first steps cost more than the later ones: longer, until the run is no longer short
     for (double fraction = kPilotFraction;; fraction = std::min(1.0, kPilotGrowth * fraction)) {
       pilot.horizon = fraction * horizon;
+      const CpuLimit all(kPilotSeconds);
       const Record record = RunCase(experiment, pilot);
       const double reached = record.Number("t_reached"), spent = record.Number("cpu_s");
-      // a run that fails at once costs next to nothing, and so will the case
-      if (!(reached > 0.0) || !(spent > 0.0)) return 0.0;
+      const double start_s = all.cpu_s() - (std::isnan(spent) ? 0.0 : spent);
+      // a run that fails at once costs its start, and so will the case
+      if (!(reached > 0.0) || !(spent > 0.0)) return {start_s, 0.0};
       const bool failed = record.Text("outcome") != ToString(Outcome::kFinished);
-      if (spent >= kPilotEnough || failed || fraction >= 1.0) {
-        return spent / Work(reached, pilot.rtol);
-      }
+      const bool enough = spent >= kPilotEnough || all.cpu_s() >= kPilotSeconds;
+      if (enough || failed || fraction >= 1.0) return {start_s, spent / Work(reached, pilot.rtol)};
     }
   }
 
   const std::vector<Experiment>& experiments_;
-  std::map<std::string, double> rates_;
+  std::map<std::string, Rate> rates_;
+  std::vector<std::string> cut_off_;
 };
 
 /// "1.5 s", "12 min", "3.4 h".
@@ -206,6 +242,9 @@ void PrintPlan(const std::vector<Experiment>& experiments, const Plan& plan,
     table.rows.push_back(row);
   }
   PrintText(ToText(table) + "\n");
+  for (const std::string& one : pilot.cut_off()) {
+    Print("A pilot was cut off: {}. Its cases are counted with the CPU time it had taken.\n", one);
+  }
   Print("{} cases, {} runs (an ensemble comes on top of the unperturbed run), {} timings\n",
         plan.cases, plan.runs, plan.timings);
   Print("estimated time: accuracy {} with one job, timings {}\n", Duration(plan.seconds),

@@ -31,6 +31,16 @@ void AddGate(CLI::App* app, std::string* gate) {
       ->check(CLI::IsMember({"doubts"}));
 }
 
+/// Of work on a mechanism; experiments say their own ("limits").
+void AddLimits(CLI::App* app, ProcessLimits* limits) {
+  app->add_option("--cpu", limits->cpu_s, "CPU time for one mechanism file [s]")
+      ->check(NumberFrom(0.001, 1e9))
+      ->capture_default_str();
+  app->add_option("--memory", limits->memory_mb, "Memory for one mechanism file [MiB]")
+      ->check(NumberFrom(1.0, 1e9))
+      ->capture_default_str();
+}
+
 Selection ParseSelection(const std::vector<std::string>& conditions) {
   Selection selection;
   for (const std::string& text : conditions) selection.push_back(ParseCondition(text));
@@ -150,9 +160,16 @@ int Main(int argc, char** argv) {
   list_app->add_option("--filter", conditions, "Only cases with key=value[,value]");
   AddSettings(list_app, &settings);
 
+  CheckCommand check;
   CLI::App* check_app =
-      app.add_subcommand("check", "Read configuration files of any kind, report errors");
+      app.add_subcommand("check",
+                         "Read configuration files of any kind, report errors; assemble "
+                         "the starts of mechanisms and scenes");
   check_app->add_option("file", files.paths, "Files (JSON)")->required();
+  check.limits = kFileLimits;
+  bool no_assembly = false;
+  check_app->add_flag("--no-assembly", no_assembly, "Read only, assemble no start");
+  AddLimits(check_app, &check.limits);
   AddSettings(check_app, &settings);
 
   PlanCommand plan;
@@ -167,6 +184,8 @@ int Main(int argc, char** argv) {
       "explain", "Say what experiments run and measure, and what mechanisms are made of");
   explain_app->add_option("file", files.paths, "Experiment or mechanism files (JSON)")->required();
   explain_app->add_option("--filter", conditions, "Only cases with key=value[,value]");
+  ProcessLimits explain_limits = kFileLimits;
+  AddLimits(explain_app, &explain_limits);
   AddSettings(explain_app, &settings);
   bool explain_all = false;
   explain_app->add_flag("--all", explain_all, "Every row of long tables of a mechanism");
@@ -259,9 +278,11 @@ int Main(int argc, char** argv) {
     if (*list_app) return List(files);
     plan.files = files;
     if (*plan_app) return PrintPlans(plan);
-    if (*explain_app) return Explain(files, explain_all);
+    if (*explain_app) return Explain(files, explain_all, explain_limits);
     if (*merge_app) return Merge(merge);
-    if (*check_app) return CheckFiles(files);
+    check.files = files;
+    check.assembly = !no_assembly;
+    if (*check_app) return CheckFiles(check);
     if (*table_app) return PrintTable(table, typed);
     if (*plot_app) return Plot(plot);
     if (*map_app) return PrintMap(map, typed);

@@ -4,11 +4,13 @@
 
 #include <algorithm>
 #include <cmath>
+#include <set>
 
 #include "harness/case_identity.h"
 #include "harness/compiled_scene.h"
 #include "harness/config/config_error.h"
 #include "harness/store/record_json.h"
+#include "harness/suite.h"
 #include "mechanism/mechanism.h"
 
 namespace loopbench::harness {
@@ -68,6 +70,7 @@ std::vector<LadderGroup> LadderGroups(const Experiment& experiment, const Select
                        .horizon = one.horizon,
                        .precision = experiment.precision,
                        .limits = one.limits},
+                      one.scene,
                       {}};
     const Precision& precision = group.task.precision;
     bool any = false;
@@ -85,7 +88,6 @@ std::vector<LadderGroup> LadderGroups(const Experiment& experiment, const Select
     for (const Record& keys : group.keys) rungs += CaseId(keys);
     const std::string content = LadderContent(experiment, one, rungs);
     for (Record& keys : group.keys) SetCaseId(&keys, content);
-    group.task.description = PlanarPart(experiment, experiment.scenes[one.scene]);
     groups.push_back(std::move(group));
   }
   return groups;
@@ -97,12 +99,31 @@ std::size_t CountRungs(const Experiment& experiment) {
   return count;
 }
 
+void CheckLadders(const Experiment& experiment) {
+  const std::vector<Case> cases = ExpandLadders(experiment);
+  if (cases.empty()) return;
+  const auto compile = [&](std::size_t) {
+    std::set<std::size_t> scenes;
+    for (const Case& one : cases) {
+      if (scenes.insert(one.scene).second) PlanarPart(experiment, experiment.scenes[one.scene]);
+    }
+    return std::string();
+  };
+  RunInProcesses(
+      1, 1, compile, [&](std::size_t) { return LimitsOfRuns(experiment.limits, 1); },
+      [&](std::size_t, const ProcessResult& result) {
+        if (result.ending == ProcessEnding::kThrew) throw ConfigError(result.text);
+      });
+}
+
 #ifdef LOOPBENCH_PRECISIONS
 
-void RequireLadders(const Experiment& experiment) { LadderGroups(experiment); }
+void RequireLadders(const Experiment& experiment) { CheckLadders(experiment); }
 
-std::vector<Record> ClimbTogether(const LadderGroup& group) {
-  const Ladder ladder = RunLadder(group.task);
+std::vector<Record> ClimbTogether(const Experiment& experiment, const LadderGroup& group) {
+  LadderTask task = group.task;
+  task.description = PlanarPart(experiment, experiment.scenes[group.scene]);
+  const Ladder ladder = RunLadder(task);
   std::vector<Record> records = group.keys;
   for (std::size_t i = 0; i < records.size(); ++i) {
     if (ladder.start != Outcome::kFinished) {
@@ -125,7 +146,9 @@ void RequireLadders(const Experiment& experiment) {
                   experiment.path.string()));
 }
 
-std::vector<Record> ClimbTogether(const LadderGroup& group) { return group.keys; }
+std::vector<Record> ClimbTogether(const Experiment&, const LadderGroup& group) {
+  return group.keys;
+}
 
 #endif
 

@@ -42,8 +42,7 @@ struct Piece {
   double cost = 0.0;
 };
 
-/// Twice the CPU time that the runs inside may take by themselves, and a little for starting.
-constexpr double kPatience = 2.0, kGrace_s = 2.0;
+constexpr double kPatience = 2.0, kGrace_s = 2.0;  ///< LimitsOfRuns
 
 Piece AccuracyPiece(const Experiment& experiment, const Case& one) {
   Record keys = CaseKeys(experiment, one);
@@ -51,7 +50,7 @@ Piece AccuracyPiece(const Experiment& experiment, const Case& one) {
   const int runs = one.ensemble > 1 ? one.ensemble + 1 : 1;
   return {.owed = {keys},
           .work = [&experiment, one] { return std::vector<Record>{RunCase(experiment, one)}; },
-          .limits = {kPatience * runs * one.limits.cpu_s + kGrace_s, one.limits.memory_mb},
+          .limits = LimitsOfRuns(one.limits, runs),
           .label = fmt::format("{} {} {}", one.mechanism, ToString(one.column), one.rtol),
           .cost = Cost(one)};
 }
@@ -69,7 +68,7 @@ Piece TimingPiece(const Experiment& experiment, const TimingGroup& group) {
   piece.limits = {kPatience * runs * experiment.limits.cpu_s + kDerivatives_s * columns,
                   experiment.limits.memory_mb};
   piece.work = [&experiment, &group] { return TimeTogether(experiment, group); };
-  piece.label = group.description.name;
+  piece.label = group.name;
   return piece;
 }
 
@@ -78,22 +77,11 @@ Piece LadderPiece(const Experiment& experiment, const LadderGroup& group) {
   const Limits& limits = experiment.limits;
   piece.owed = group.keys;
   const auto runs = static_cast<double>(group.keys.size() + 1);  // there are two references
-  piece.limits = {kPatience * runs * limits.cpu_s + kGrace_s, limits.memory_mb};
-  piece.work = [&group] { return ClimbTogether(group); };
+  piece.limits = LimitsOfRuns(limits, runs);
+  piece.work = [&experiment, &group] { return ClimbTogether(experiment, group); };
   piece.label =
       fmt::format("{} {}", group.keys.front().Text("mechanism"), ToString(group.task.column));
   return piece;
-}
-
-std::string OutcomeOf(ProcessEnding ending) {
-  switch (ending) {
-    case ProcessEnding::kOverTime:
-      return "process-time-limit";
-    case ProcessEnding::kOverMemory:
-      return "memory-limit";
-    default:
-      return "crashed";
-  }
 }
 
 /// The child's side: all records, one a line.
@@ -108,7 +96,7 @@ std::string Answer(const Piece& piece) {
 std::vector<Record> Records(const Piece& piece, const ProcessResult& result,
                             const std::string& set) {
   std::vector<Record> records;
-  std::string outcome = OutcomeOf(result.ending), message = result.text;
+  std::string outcome(OutcomeOf(result.ending)), message = result.text;
   if (result.ending == ProcessEnding::kThrew) message = "threw: " + message;
   if (result.ending == ProcessEnding::kAnswered) {
     outcome = "bad-answer";
@@ -244,6 +232,10 @@ std::vector<Case> SelectCases(const Experiment& experiment, const Selection& fil
         fmt::format("{}: no case matches {}", experiment.path.string(), ToText(filter)));
   }
   return cases;
+}
+
+ProcessLimits LimitsOfRuns(const Limits& limits, double runs) {
+  return {.cpu_s = kPatience * runs * limits.cpu_s + kGrace_s, .memory_mb = limits.memory_mb};
 }
 
 Shard ParseShard(const std::string& text) {

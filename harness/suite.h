@@ -6,6 +6,7 @@
 #include <vector>
 
 #include "harness/config/experiment.h"
+#include "harness/isolation/processes.h"
 #include "harness/report/select.h"
 #include "harness/store/result_store.h"
 
@@ -39,6 +40,10 @@ struct SuiteOptions {
 /// The accuracy cases that pass the filter. Throws ConfigError when none does, or when it names a
 /// key that cases do not have.
 std::vector<Case> SelectCases(const Experiment& experiment, const Selection& filter);
+
+/// Those of a process that makes so many runs: twice the CPU time that they may take by themselves,
+/// and a little for starting.
+ProcessLimits LimitsOfRuns(const Limits& limits, double runs);
 
 /// What a run did.
 struct SuiteCount {

@@ -7,6 +7,7 @@
 
 #include "mechanism/assembly_units.h"
 #include "mechanism/conflict.h"
+#include "mechanism/dense_memory.h"
 #include "mechanism/mobility.h"
 #include "mechanism/tree_dynamics.h"
 
@@ -142,6 +143,14 @@ class Assembler {
     return row;
   }
 
+  /// So many numbers at once in matrices of that many rows and a column per speed.
+  void Require(double numbers, Eigen::Index rows) const {
+    RequireDense(mechanism_.name() + ": the consistent start is dense: a matrix of " +
+                     std::to_string(rows) + " constraints by " +
+                     std::to_string(mechanism_.num_u()) + " speeds and its factors",
+                 numbers);
+  }
+
   void ClosePositions() {
     VectorX<double> e = Residual(start_.q);
     if (e.size() == 0) return;
@@ -151,6 +160,12 @@ class Assembler {
     const VectorX<double> units = UnitsWith(held_cut_);
     // where every coordinate is prescribed there is nothing to move
     const int iterations = mechanism_.num_u() > 0 ? kMaxIterations : 0;
+    if (iterations > 0 && e.template lpNorm<Eigen::Infinity>() > goal) {
+      // DampedStep: J, the factors of its transpose, Q, and the square problem with its factors
+      const auto r = static_cast<double>(e.size()), c = static_cast<double>(mechanism_.num_u());
+      const double m = std::min(r, c);
+      Require(2 * r * c + c * m + 2 * (r + m) * m, e.size());
+    }
     for (int i = 0; i < iterations && e.template lpNorm<Eigen::Infinity>() > goal; ++i) {
       kinematics_.UpdatePosition(start_.q);
       MatrixX<double> J;
@@ -220,6 +235,10 @@ class Assembler {
   void CloseSpeeds() {
     kinematics_.UpdatePosition(start_.q);
     const int rows = mechanism_.num_rows(), extra = static_cast<int>(given_cut_.size());
+    if (rows + extra == 0) return;
+    const auto numbers =
+        static_cast<double>(rows + extra) * static_cast<double>(mechanism_.num_u());
+    Require(2 * numbers, rows + extra);  // J and J_free
     MatrixX<double> J;
     dynamics_.Jacobian(kinematics_, J);
     J.conservativeResize(rows + extra, Eigen::NoChange);
@@ -234,7 +253,6 @@ class Assembler {
       J.row(rows + k) = CutJointRow(joint, component);
       target[rows + k] = value - CutJointSpeed(joint, component, at_rest);
     }
-    if (J.rows() == 0) return;
     units_.Apply(units, J);
     target = target.cwiseQuotient(units);
     start_.u = start_.u.cwiseQuotient(units_.columns);
@@ -246,6 +264,7 @@ class Assembler {
     const double size = 1.0 + target.norm() + start_.u.norm() * Extent();
     const bool off = miss.norm() > 64 * std::numeric_limits<double>::epsilon() * size;
     if (off && mechanism_.num_u() > 0) {
+      Require(numbers, rows + extra);
       Eigen::CompleteOrthogonalDecomposition<MatrixX<double>> solver(J_free);
       start_.u += solver.solve(miss);
     }

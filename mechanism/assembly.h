@@ -26,7 +26,8 @@ struct Start {
 };
 
 /// Assembles the description's initial data at time 0. `mechanism` must be compiled from the same
-/// description, in either coordinate set: the result is in its coordinates.
+/// description, in either coordinate set: the result is in its coordinates. The matrices of the
+/// loops are dense; throws TooDense (dense_memory.h) before it begins with some that cannot be had.
 template <class Space>
 Start<double> Assemble(const MechanismDescription& description,
                        const Mechanism<Space, double>& mechanism);

@@ -13,10 +13,15 @@
 
 #include "harness/config/experiment.h"
 #include "harness/config/json_reader.h"
+#include "harness/integrator/options.h"
 
 namespace loopbench::harness {
 
-inline constexpr Range kTolerances = {.min = 0.0, .max = 0.1, .above_min = true};
+inline constexpr Range kTolerances = {
+    .min = kLeastTolerance,
+    .max = 0.1,
+    .above_min = true,
+    .why = " (the spacing of doubles, below which rounding decides)"};
 inline constexpr int kMaxCount = 1'000'000;  ///< of anything: beyond it a number is a typing error
 inline constexpr std::size_t kMaxRules = 1000;      ///< ensembles, exclusions
 inline constexpr std::size_t kMaxBodies = 200'000;  ///< of all scenes of one combination

@@ -7,7 +7,13 @@ namespace loopbench::harness {
 namespace {
 
 // float128 reaches some 1e-30
-constexpr Range kReferences = {.min = 1e-30, .max = 1e-6};
+constexpr double kReach = 1e-30;
+constexpr Range kReferences = {.min = kReach, .max = 1e-6};
+// of runs in other scalars than double; what a narrow one cannot meet ends as step-too-small
+constexpr Range kTolerancesOfLadders = {
+    .min = kReach, .max = 0.1, .why = " (the reach of float128)"};
+// A picture has fewer points across, and a record of some ten series stays below 2 MB.
+constexpr int kMostPoints = 10'000;
 constexpr std::int64_t kMaxSteps = 1'000'000'000'000;  // no run gets there
 
 void ReadLimits(const JsonNode& root, Limits* limits) {
@@ -89,7 +95,7 @@ void ReadPrecision(const JsonNode& root, const std::vector<double>& tolerances,
     precision->scalars = ReadEnums<Scalar>(*scalars, "a scalar");
   }
   if (const auto given = node->Optional("tolerances")) {
-    precision->tolerances = given->NumberList(kTolerances);
+    precision->tolerances = given->NumberList(kTolerancesOfLadders);
   }
   if (const auto horizon = node->Optional("horizon")) {
     precision->horizon = horizon->Number(kPositive);
@@ -118,7 +124,7 @@ void ReadSettings(const JsonNode& root, Experiment* experiment) {
   const auto series = root.Optional("series");
   if (series && series->ExpectObject({"points"})) {
     if (const auto points = series->Optional("points")) {
-      experiment->series_points = static_cast<int>(points->Integer(2, kMaxCount));
+      experiment->series_points = static_cast<int>(points->Integer(2, kMostPoints));
     }
   }
   ReadTiming(root, &experiment->timing);

@@ -125,7 +125,7 @@ void ErrorList::ThrowIfAny(const std::string& ending) const {
 
 std::string Range::Text() const {
   if (std::isfinite(min) && std::isfinite(max)) {
-    return fmt::format(" {} {} and <= {}", above_min ? ">" : ">=", min, max);
+    return fmt::format(" {} {}{} and <= {}", above_min ? ">" : ">=", min, why, max);
   }
   if (std::isfinite(min)) return fmt::format(" {} {}", above_min ? ">" : ">=", min);
   return std::isfinite(max) ? fmt::format(" <= {}", max) : "";

@@ -98,7 +98,8 @@ class NameList {
 struct Range {
   double min = -std::numeric_limits<double>::infinity();
   double max = std::numeric_limits<double>::infinity();
-  bool above_min = false;  ///< min itself is refused
+  bool above_min = false;     ///< min itself is refused
+  std::string_view why = "";  ///< of min, after it in messages: " (the spacing of doubles)"
 
   bool Contains(double value) const {
     return (above_min ? value > min : value >= min) && value <= max;

@@ -1,5 +1,6 @@
 // "ground" and "bodies" of a mechanism file.
 #include <Eigen/Cholesky>
+#include <Eigen/Eigenvalues>
 
 #include "harness/config/mechanism_sections.h"
 
@@ -17,7 +18,11 @@ void ReadPoints(const JsonNode& owner, SpaceKind space, BodyDescription* body) {
 
 /// One number I becomes diag(I, I, I): in the plane only Izz matters, in space it is isotropic.
 /// Six numbers are the elements [Ixx, Iyy, Izz, Ixy, Ixz, Iyz] of the matrix as it stands.
-Eigen::Matrix3d ReadInertia(const JsonNode& node) {
+///
+/// A principal moment is the integral of two squared distances of three: none exceeds the sum of
+/// the other two, and in a thin rod or plate one equals it. In the plane only Izz is used, and
+/// nothing is known of the others.
+Eigen::Matrix3d ReadInertia(const JsonNode& node, SpaceKind space) {
   Eigen::Matrix3d inertia = Eigen::Matrix3d::Identity();
   if (node.value().is_number()) return inertia * node.Number(kPositive);
   const bool known_size =
@@ -37,6 +42,15 @@ Eigen::Matrix3d ReadInertia(const JsonNode& node) {
   const bool positive = inertia.diagonal().minCoeff() > 0.0 &&
                         Eigen::LLT<Eigen::Matrix3d>(inertia).info() == Eigen::Success;
   if (!positive) node.Fail("a positive definite inertia");
+  if (!positive || space == SpaceKind::kPlanar) return inertia;
+  // Three significant digits, as data sheets print them, are off by up to 0.5 % in each moment.
+  constexpr double kPrinted = 0.01;
+  const Eigen::Vector3d moments =
+      Eigen::SelfAdjointEigenSolver<Eigen::Matrix3d>(inertia, Eigen::EigenvaluesOnly).eigenvalues();
+  if (moments[2] > (1.0 + kPrinted) * (moments[0] + moments[1])) {
+    node.Fail(
+        "principal moments of which none exceeds the sum of the other two, as no body's does");
+  }
   return inertia;
 }
 
@@ -48,7 +62,7 @@ BodyDescription ReadBody(const JsonNode& node, const NameList& taken, SpaceKind 
     body.mass = mass->Number(kPositive);
   }
   if (const auto inertia = node.Required("inertia", "the inertia about the centre of mass")) {
-    body.inertia = ReadInertia(*inertia);
+    body.inertia = ReadInertia(*inertia, space);
   }
   if (const auto com = node.Optional("com")) body.com = ReadVector(*com, space);
   ReadPoints(node, space, &body);

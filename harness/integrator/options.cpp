@@ -1,5 +1,7 @@
 #include "harness/integrator/options.h"
 
+#include <fmt/format.h>
+
 #include <algorithm>
 #include <array>
 #include <cmath>
@@ -73,11 +75,12 @@ std::string Validate(const IntegratorOptions& options) {
   if (FindProfile(options.profile) == nullptr) {
     return "profile is \"" + options.profile + "\"; accepted: " + Joined(ProfileNames());
   }
-  if (!(options.rtol > std::numeric_limits<double>::epsilon() && options.rtol < 1)) {
-    return "rtol is " + std::to_string(options.rtol) + "; it must lie between 2.2e-16 and 1";
+  if (!(options.rtol > kLeastTolerance && options.rtol < 1)) {
+    return fmt::format("rtol is {}; it must lie between {:.2g} and 1", options.rtol,
+                       kLeastTolerance);
   }
   if (!(options.atol > 0 && options.atol <= std::numeric_limits<double>::max())) {
-    return "atol is " + std::to_string(options.atol) + "; it must be positive and finite";
+    return fmt::format("atol is {}; it must be positive and finite", options.atol);
   }
   if (options.step_limit < 1) {
     return "step_limit is " + std::to_string(options.step_limit) + "; it must be at least 1";

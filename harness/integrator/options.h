@@ -2,6 +2,7 @@
 #pragma once
 
 #include <cstdint>
+#include <limits>
 #include <string>
 #include <string_view>
 #include <vector>
@@ -75,6 +76,10 @@ struct IntegratorOptions {
   /// ends are one.
   std::vector<double> stop_times;
 };
+
+/// The least relative tolerance: at the spacing of doubles no step's error can be told from
+/// rounding, and ARKODE takes none (ARK_TOO_MUCH_ACC). It is refused itself.
+inline constexpr double kLeastTolerance = std::numeric_limits<double>::epsilon();
 
 /// "" if the options can be used, else one sentence with the option, its value and what is allowed.
 std::string Validate(const IntegratorOptions& options);

@@ -20,6 +20,7 @@
 #include <vector>
 
 #include "harness/isolation/child_watch.h"
+#include "mechanism/dense_memory.h"
 
 namespace loopbench::harness {
 namespace {
@@ -52,7 +53,10 @@ void SetLimits(const ProcessLimits& limits) {
   const rlimit no_core = {0, 0};
   ::setrlimit(RLIMIT_CORE, &no_core);
   if (limits.memory_mb <= 0.0 || !LimitsMemory()) return;
-  const rlim_t bytes = AddressSpace() + static_cast<rlim_t>(limits.memory_mb * 1024.0 * 1024.0);
+  const double allowed = limits.memory_mb * 1024.0 * 1024.0;
+  constexpr double kNoLimit = 1e18;  // beyond any machine, and soon beyond the integer
+  if (allowed >= kNoLimit) return;
+  const rlim_t bytes = AddressSpace() + static_cast<rlim_t>(allowed);
   const rlimit memory = {bytes, bytes};
   ::setrlimit(RLIMIT_AS, &memory);
 }
@@ -74,6 +78,9 @@ void WriteAll(int descriptor, std::string_view text) {
   SetLimits(limits);
   try {
     WriteAll(answer, work());
+  } catch (const TooDense& error) {
+    WriteAll(answer, error.what());
+    ::_exit(kMemoryExit);
   } catch (const std::bad_alloc&) {
     ::_exit(kMemoryExit);
   } catch (const std::exception& error) {
@@ -199,7 +206,9 @@ ProcessResult ResultOf(Child child) {
     result.text = std::move(child.text);
   } else if (WIFEXITED(status) && WEXITSTATUS(status) == kMemoryExit) {
     result.ending = ProcessEnding::kOverMemory;
-    result.text = fmt::format("asked for more than {} MiB", child.limits.memory_mb);
+    result.text =
+        fmt::format("{} more than {} MiB", child.text.empty() ? "asked for" : child.text + ",",
+                    child.limits.memory_mb);
   } else if (!child.killed.empty()) {
     result.ending = ProcessEnding::kOverTime;
     result.text = child.killed;
@@ -213,6 +222,17 @@ ProcessResult ResultOf(Child child) {
 }
 
 }  // namespace
+
+std::string_view OutcomeOf(ProcessEnding ending) {
+  switch (ending) {
+    case ProcessEnding::kOverTime:
+      return "process-time-limit";
+    case ProcessEnding::kOverMemory:
+      return "memory-limit";
+    default:
+      return "crashed";
+  }
+}
 
 bool LimitsMemory() {
 #ifdef __SANITIZE_ADDRESS__

@@ -46,6 +46,10 @@ void RunInProcesses(std::size_t count, int jobs,
                     const std::function<ProcessLimits(std::size_t)>& limits,
                     const std::function<void(std::size_t, const ProcessResult&)>& done);
 
+/// The outcome in tables of a piece that ended without an answer: "crashed", "process-time-limit"
+/// or "memory-limit".
+std::string_view OutcomeOf(ProcessEnding ending);
+
 /// Whether memory limits are set in this build.
 bool LimitsMemory();
 

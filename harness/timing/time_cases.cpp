@@ -1,5 +1,7 @@
 #include "harness/timing/time_cases.h"
 
+#include <fmt/format.h>
+
 #include <algorithm>
 #include <chrono>
 #include <memory>
@@ -209,6 +211,14 @@ Record NoiseKeys(const MachineState& machine, const Subject& first, const Subjec
   return keys;
 }
 
+/// One system per timing: parts are not timed apart.
+MechanismDescription OneSystem(const Experiment& experiment, std::size_t scene) {
+  CompileOptions options = experiment.compile;
+  options.islands = false;
+  const MechanismFile& file = experiment.scenes[scene].mechanism;
+  return CompileScene(file.description, file.observe, options).compiled.parts.front().description;
+}
+
 MechanismDescription MakeFamilyMember(const TimingFamily& family, int size) {
   if (family.family == "ladder") return Ladder(size, 1.0, 1.0);
   MechanismDescription chain = Chain(size);
@@ -222,14 +232,10 @@ std::vector<TimingGroup> TimingGroups(const Experiment& experiment) {
   std::vector<TimingGroup> groups;
   const std::vector<Case> all = ExpandTiming(experiment);
   for (std::size_t scene = 0; scene < experiment.scenes.size(); ++scene) {
-    // one system per timing: parts are not timed apart
-    CompileOptions options = experiment.compile;
-    options.islands = false;
-    const MechanismFile& file = experiment.scenes[scene].mechanism;
-    TimingGroup group{
-        CompileScene(file.description, file.observe, options).compiled.parts.front().description,
-        {},
-        true};
+    TimingGroup group{experiment.scenes[scene].name,
+                      [&experiment, scene] { return OneSystem(experiment, scene); },
+                      {},
+                      true};
     std::ranges::copy_if(all, std::back_inserter(group.cases),
                          [&](const Case& one) { return one.scene == scene; });
     if (!group.cases.empty()) groups.push_back(std::move(group));
@@ -237,10 +243,13 @@ std::vector<TimingGroup> TimingGroups(const Experiment& experiment) {
   if (experiment.timing.repeats == 0) return groups;
   for (const TimingFamily& family : experiment.timing.families) {
     for (const int size : family.sizes) {
-      TimingGroup group{MakeFamilyMember(family, size), {}, false};
+      TimingGroup group{fmt::format("{}-{}", family.family, size),
+                        [&family, size] { return MakeFamilyMember(family, size); },
+                        {},
+                        false};
       for (const Column& column : family.columns) {
         Case one;
-        one.mechanism = group.description.name;
+        one.mechanism = group.name;
         one.column = column;
         group.cases.push_back(one);
       }
@@ -263,12 +272,13 @@ Record TimingKeys(const Experiment& experiment, const TimingGroup& group, std::s
 }
 
 std::vector<Record> TimeTogether(const Experiment& experiment, const TimingGroup& group) {
+  const MechanismDescription description = group.describe();
   std::vector<std::unique_ptr<Subject>> subjects;
   for (const Case& one : group.cases) {
-    subjects.push_back(MakeSubject(group.description, one, group.simulate));
+    subjects.push_back(MakeSubject(description, one, group.simulate));
   }
   // the A/A pair stands first and last, as far apart as two columns can be
-  subjects.push_back(MakeSubject(group.description, group.cases.front(), group.simulate));
+  subjects.push_back(MakeSubject(description, group.cases.front(), group.simulate));
   for (auto& subject : subjects) subject->Prepare();
   const MachineState machine = ReadMachineState();
   for (int batch = 0; batch < kBatches; ++batch) {

@@ -8,6 +8,8 @@
 // moving start.
 #pragma once
 
+#include <functional>
+#include <string>
 #include <vector>
 
 #include "harness/config/experiment.h"
@@ -17,12 +19,15 @@ namespace loopbench::harness {
 
 /// Cases of one mechanism, timed against each other.
 struct TimingGroup {
-  MechanismDescription description;
+  std::string name;  ///< of the mechanism
+  /// Makes the mechanism, in the process that times it: a member of a family may be very large.
+  std::function<MechanismDescription()> describe;
   std::vector<Case> cases;
   bool simulate = true;  ///< whole simulations too; families have right-hand sides alone
 };
 
-/// The timings of an experiment: a group per scene, then one per member of a family.
+/// The timings of an experiment, which must outlive them: a group per scene, then one per member of
+/// a family.
 std::vector<TimingGroup> TimingGroups(const Experiment& experiment);
 
 /// The keys of one of the group's cases (kind "timing"), with its case_id and content.

@@ -127,6 +127,35 @@ TEST(MechanismReader, FillsEveryFieldOfEveryForce) {
   EXPECT_EQ(drag.quadratic, 0.25);
 }
 
+/// "" or the complaint about a body in space with this inertia.
+std::string InertiaError(const std::string& inertia, const std::string& space = "spatial") {
+  try {
+    ParseMechanism(R"({"name": "m", "space": ")" + space + R"(", "gravity": [0, 0],
+      "bodies": [{"name": "a", "mass": 1, "inertia": )" +
+                       inertia + R"(}],
+      "joints": [{"name": "F", "type": "free", "from": {"body": "ground"}, "to": {"body": "a"}}]})",
+                   "m.json");
+  } catch (const ConfigError& error) {
+    return error.what();
+  }
+  return "";
+}
+
+TEST(MechanismReader, TakesInertiasOfBodiesOnly) {
+  // a thin rod, a thin plate, and a plate in three significant digits, whose sum is off by 0.8 %
+  for (const char* body : {"[1, 1, 1e-9]", "[0.1, 0.2, 0.3]", "[0.125, 0.125, 0.252]",
+                           "[0.55, 0.55, 1.0, 0.45, 0, 0]"}) {
+    EXPECT_EQ(InertiaError(body), "") << body;
+  }
+  // the last has the principal moments 1, 0.1 and 0.1, in turned axes
+  for (const char* none :
+       {"[1, 0.1, 0.1]", "[0.125, 0.125, 0.253]", "[0.55, 0.55, 0.1, 0.45, 0, 0]"}) {
+    EXPECT_NE(InertiaError(none).find("none exceeds the sum of the other two"), std::string::npos)
+        << none << " " << InertiaError(none);
+  }
+  EXPECT_EQ(InertiaError("[1, 0.1, 0.1]", "planar"), "") << "only Izz counts in the plane";
+}
+
 TEST(MechanismReader, FillsEveryFieldOfASpatialMechanism) {
   const MechanismFile file = ParseMechanism(R"({
     "name": "m", "comment": "all kinds", "space": "spatial", "gravity": [0, 0, -9.81],

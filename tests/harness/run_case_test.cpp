@@ -318,6 +318,16 @@ TEST(Limits, OfCpuTimeEndTheRunWhereItStands) {
   EXPECT_LT(record.Number("cpu_s"), 1.0);
 }
 
+// What the reader takes a run takes; at the bound itself both refuse (config corpus, Integrator).
+TEST(Limits, OfTolerancesAreThoseOfRuns) {
+  const double least = std::nextafter(kLeastTolerance, 1.0);
+  const Record record = RunCase(Paper(), CaseOf(Paper(), "four-bar", kOdcaJoint, least, 0.1));
+  EXPECT_NE(record.Text("outcome"), "");
+  EXPECT_NE(record.Text("outcome"), "integrator-error") << record.Text("message");
+  EXPECT_THROW(RunCase(Paper(), CaseOf(Paper(), "four-bar", kOdcaJoint, kLeastTolerance, 0.1)),
+               std::invalid_argument);
+}
+
 TEST(WrittenRecord, HoldsNoNanAndNoInfinity) {
   std::vector<Record> records;
   records.push_back(RunPaper("four-bar", kOdcaJoint, kTolerance, 0.1));

@@ -1,0 +1,180 @@
+// Work of any size ends by limits, in a process of its own, with a reason.
+#include <gtest/gtest.h>
+#include <sys/resource.h>
+
+#include <cmath>
+#include <string>
+
+#include "harness/config/experiment_reader.h"
+#include "harness/isolation/print_from_child.h"
+#include "harness/isolation/processes.h"
+#include "harness/terminal.h"
+#include "harness/timing/time_cases.h"
+#include "mechanism/dense_memory.h"
+#include "tests/harness/cli_fixture.h"
+
+namespace loopbench::harness {
+namespace {
+
+/// Most memory that this process has had [MiB].
+double PeakMemory() {
+  rusage usage{};
+  ::getrusage(RUSAGE_SELF, &usage);
+  return static_cast<double>(usage.ru_maxrss) / 1024.0;
+}
+
+/// tiny.json on a family member.
+std::string OnFamily(const std::string& family, const std::string& limits) {
+  return R"({"name": "large", "scenes": [{"mechanism": )" + family + R"(, "horizon": 0.5}],
+    "columns": [{"formulation": "lagrange", "enforcement": "acceleration"}], "tolerances": 1e-6,
+    "limits": )" +
+         limits + R"(, "timing": {"repeats": 0}})";
+}
+
+/// A ladder as a file, from consistent positions.
+std::string LadderFile(int windows) {
+  std::string bodies, joints, start;
+  const auto body = [&](const std::string& name) {
+    bodies += (bodies.empty() ? "" : ",") + ("{\"name\": \"" + name) +
+              R"(", "mass": 1, "inertia": 0.1, "points": {"A": [0, 0], "B": [1, 0]}})";
+  };
+  const auto joint = [&](const std::string& name, const std::string& from, const std::string& at,
+                         const std::string& to, const std::string& end) {
+    joints += (joints.empty() ? "" : ",") + ("{\"name\": \"" + name) +
+              R"(", "type": "revolute", "from": {"body": ")" + from + "\", \"at\": " + at +
+              R"(}, "to": {"body": ")" + to + R"(", "at": ")" + end + "\"}}";
+  };
+  for (int i = 0; i <= windows; ++i) {
+    const std::string n = std::to_string(i), next = std::to_string(i + 1);
+    body("crank" + n);
+    joint("O" + n, "ground", "[" + n + ", 0]", "crank" + n, "A");
+    start += (start.empty() ? "\"O" : ", \"O") + n + "\": 1.0";
+    if (i == windows) break;
+    body("coupler" + n);
+    joint("P" + n, "crank" + n, "\"B\"", "coupler" + n, "A");
+    joint("Q" + n, "coupler" + n, "\"B\"", "crank" + next, "B");
+    start += ", \"P" + n + "\": -1.0";
+  }
+  return R"({"name": "long", "gravity": [0, -9.81], "bodies": [)" + bodies + "], \"joints\": [" +
+         joints + R"(], "initial": {"coordinates": {)" + start + R"(}, "held": ["O0"]}})";
+}
+
+TEST(Memory, ThatCannotBeHadIsRefusedByName) {
+  if (!LimitsMemory()) GTEST_SKIP() << "sanitizers reserve the address space";
+  for (const double numbers : {1e9, 1e30}) {
+    ProcessResult result;
+    RunInProcesses(
+        1, 1, [&](std::size_t) { return RequireDense("a matrix", numbers), std::string(); },
+        [](std::size_t) { return ProcessLimits{.cpu_s = 10.0, .memory_mb = 64.0}; },
+        [&](std::size_t, const ProcessResult& ended) { result = ended; });
+    EXPECT_EQ(result.ending, ProcessEnding::kOverMemory);
+    EXPECT_EQ(result.text, numbers == 1e9 ? "a matrix asks for 8 GB, more than 64 MiB"
+                                          : "a matrix asks for 8e+21 GB, more than 64 MiB");
+    EXPECT_LT(result.cpu_s, 1.0);
+  }
+  RequireDense("a small matrix", 1e4);
+}
+
+TEST(PrintedFromAChild, AreItsLinesHoweverItEnds) {
+  const ProcessLimits limits = {.cpu_s = 0.2, .memory_mb = 0.0};
+  testing::internal::CaptureStdout();
+  EXPECT_EQ(PrintFromChild("file", limits, [] { return Print("all is well\n"), 1; }), 1);
+  EXPECT_EQ(testing::internal::GetCapturedStdout(), "all is well\n");
+  testing::internal::CaptureStdout();
+  testing::internal::CaptureStderr();
+  const auto endless = []() -> int {
+    for (Print("so far\n");;) {
+    }
+  };
+  EXPECT_EQ(PrintFromChild("file", limits, endless), 2);
+  EXPECT_EQ(testing::internal::GetCapturedStdout(), "so far\n");
+  EXPECT_EQ(testing::internal::GetCapturedStderr(),
+            "file: cut off (process-time-limit): killed after 0.2 s of CPU time\n");
+  EXPECT_THROW(PrintFromChild("file", limits, []() -> int { throw std::runtime_error("no"); }),
+               std::runtime_error);
+}
+
+TEST(TimingFamilies, AreMadeWhereTheyAreTimed) {
+  Experiment experiment =
+      ReadExperiment(std::string(LOOPBENCH_SOURCE_DIR) + "/configs/experiments/paper/paper.json");
+  const Column column;
+  experiment.timing.families = {{"chain", {3, 1'000'000}, {column}},
+                                {"ladder", {1, 1'000'000}, {column}}};
+  const double before = PeakMemory();
+  std::size_t members = 0;
+  for (const TimingGroup& group : TimingGroups(experiment)) {
+    if (group.simulate) continue;
+    ++members;
+    EXPECT_EQ(group.cases.front().mechanism, group.name);
+    if (!group.name.ends_with("000000")) {
+      EXPECT_EQ(group.describe().name, group.name);
+    }
+  }
+  EXPECT_EQ(members, 4u);
+  EXPECT_LT(PeakMemory() - before, 50.0) << "MiB; two million bodies take a hundred times as much";
+}
+
+TEST_F(CommandLineTest, StartsTooDenseForTheirLimitsSaySo) {
+  if (!LimitsMemory()) GTEST_SKIP() << "sanitizers reserve the address space";
+  const std::vector<std::string> why = {"the consistent start is dense",
+                                        "4000 constraints by 4001 speeds", "asks for 0.256 GB",
+                                        "more than 128 MiB"};
+  Write("large.json",
+        OnFamily(R"({"family": "ladder", "windows": 2000})", R"({"cpu_s": 10, "memory_mb": 128})"));
+  ExpectEnding(Call("run large.json --out out"), 0, {"1 run now (1 not finished)"});
+  const std::vector<Record> records = ReadRecords(folder_ / "out");
+  ASSERT_EQ(records.size(), 1u);
+  EXPECT_EQ(records[0].Text("outcome"), "memory-limit");
+  for (const std::string& word : why) {
+    EXPECT_NE(records[0].Text("message").find(word), std::string::npos)
+        << records[0].Text("message");
+  }
+  std::vector<std::string> words = why;
+  words.push_back(
+      "A pilot was cut off: ladder-2000 lagrange/acceleration/joint/rank-revealing: "
+      "memory-limit");
+  words.push_back("1 cases, 1 runs");
+  ExpectEnding(Call("plan large.json"), 0, words);
+  words = why;
+  words.push_back("scene \"ladder-2000\": its start was not assembled (memory-limit)");
+  ExpectEnding(Call("check large.json"), 2, words);
+  ExpectEnding(Call("check large.json --no-assembly"), 0, {"1 cases"});
+  Write("long.json", LadderFile(2000));
+  words = why;
+  words.push_back("long.json: cut off (memory-limit)");
+  ExpectEnding(Call("explain long.json --memory 128"), 2, words);
+  ExpectEnding(Call("check long.json --memory 128"), 2, why);
+  ExpectEnding(Call("check long.json"), 0, {"4001 bodies"});
+}
+
+TEST_F(CommandLineTest, PilotsAreCutOffByTheLimitOfTheirCase) {
+  // a step of so many bodies takes longer than all of the limit
+  Write("large.json",
+        OnFamily(R"({"family": "chain", "bars": 5000})", R"({"cpu_s": 0.01, "memory_mb": 6000})"));
+  ExpectEnding(
+      Call("plan large.json"), 0,
+      {"A pilot was cut off: chain-5000", "process-time-limit", "of CPU time", "1 cases, 1 runs"});
+}
+
+TEST_F(CommandLineTest, CheckAssemblesStarts) {
+  EditMechanism("\"C\": [1.5, 0.0]", "\"C\": [5.0, 0.0]");
+  ExpectEnding(Call("check four-bar.json"), 2,
+               {"four-bar.json: found a start that cannot be assembled", "does not close",
+                "expected one from which every loop closes", "--no-assembly"});
+  ExpectEnding(Call("check tiny.json four-bar.json"), 2,
+               {"tiny.json: scene \"four-bar\": found a start"});
+  ExpectEnding(Call("check tiny.json four-bar.json --no-assembly"), 0, {"2 cases", "3 bodies"});
+}
+
+TEST_F(CommandLineTest, CheckNamesTheCombinationWhoseStartDoesNotClose) {
+  std::string text = kExperiment;
+  text.insert(text.find("\"timing\""), R"("sweep": [{"name": "apart", "values": [1.4, 1.5, 5, 6],
+      "field": "/scenes/0/mechanism/ground/points/C/0"}], )");
+  Write("sweep.json", text);
+  const Ending ending = Call("check sweep.json");
+  ExpectEnding(ending, 2, {"scene \"four-bar\": found a start", "(at apart = 5)"});
+  EXPECT_EQ(ending.text.find("apart = 6"), std::string::npos) << "the first combination is enough";
+}
+
+}  // namespace
+}  // namespace loopbench::harness

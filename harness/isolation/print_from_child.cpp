@@ -25,7 +25,7 @@ class Capture {
   /// In the child. Line by line, so that what is said before it is killed is not lost.
   void TakeStandardOutput() const {
     ::dup2(file_, STDOUT_FILENO);
-    std::setvbuf(stdout, nullptr, _IOLBF, BUFSIZ);
+    ::setlinebuf(stdout);
   }
 
   /// In the parent, when the child has ended.
@@ -53,16 +53,13 @@ int PrintFromChild(const std::string& name, const ProcessLimits& limits,
       1, 1,
       [&](std::size_t) {
         capture.TakeStandardOutput();
-        const int code = work();
-        std::fflush(stdout);
-        return std::to_string(code);
+        return std::to_string(FinishOutput(work()));
       },
       [&](std::size_t) { return limits; },
       [&](std::size_t, const ProcessResult& ended) { result = ended; });
   if (result.ending == ProcessEnding::kThrew) throw std::runtime_error(result.text);
   capture.Print();
   if (result.ending == ProcessEnding::kAnswered) return std::stoi(result.text);
-  std::fflush(stdout);
   PrintError("{}: cut off ({}): {}\n", name, OutcomeOf(result.ending), result.text);
   return 2;
 }

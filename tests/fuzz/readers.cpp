@@ -66,11 +66,11 @@ void CallRecordReader(std::string_view bytes) {
 }
 
 void CallClaimsReader(std::string_view bytes) {
-  Call([bytes] { harness::ParseClaims(bytes, "claims.json"); });
+  Call<harness::ConfigError>([bytes] { harness::ParseClaims(bytes, "claims.json"); });
 }
 
 void CallMapReader(std::string_view bytes) {
-  Call([bytes] { harness::ParseMapRules(bytes, "map.json"); });
+  Call<harness::ConfigError>([bytes] { harness::ParseMapRules(bytes, "map.json"); });
 }
 
 }  // namespace loopbench::fuzz

@@ -5,6 +5,6 @@
 #include "tests/fuzz/readers.h"
 
 extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size) {
-  loopbench::fuzz::CallExperimentReader({reinterpret_cast<const char*>(data), size});
+  loopbench::fuzz::CallReader("experiment", {reinterpret_cast<const char*>(data), size});
   return 0;
 }

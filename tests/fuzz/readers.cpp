@@ -1,15 +1,24 @@
 #include "tests/fuzz/readers.h"
 
+#include <fmt/format.h>
+#include <unistd.h>
+
 #include <algorithm>
+#include <filesystem>
+#include <fstream>
 #include <stdexcept>
 #include <string>
+#include <vector>
 
+#include "harness/config/benchmark_reader.h"
 #include "harness/config/claims_reader.h"
 #include "harness/config/config_error.h"
 #include "harness/config/experiment_reader.h"
 #include "harness/config/failure_map_reader.h"
 #include "harness/config/mechanism_reader.h"
+#include "harness/store/measurements.h"
 #include "harness/store/record_json.h"
+#include "harness/store/result_store.h"
 
 namespace loopbench::fuzz {
 namespace {
@@ -49,28 +58,41 @@ void Call(Read read) {
   }
 }
 
+void CallStoreReader(std::string_view bytes) {
+  const std::filesystem::path file =
+      std::filesystem::temp_directory_path() / fmt::format("fuzzed-{}.jsonl", ::getpid());
+  std::ofstream(file, std::ios::binary) << bytes;
+  std::vector<std::string> warnings;
+  Call<std::runtime_error>([&] { harness::LatestRecords(harness::ReadRecords(file, &warnings)); });
+  for (const std::string& warning : warnings) CheckMessage(warning);
+  std::filesystem::remove(file);
+}
+
 }  // namespace
 
-void CallMechanismReader(std::string_view bytes) {
-  Call<harness::ConfigError>([bytes] { harness::ParseMechanism(bytes, "m.json"); });
-}
-
-void CallExperimentReader(std::string_view bytes) {
-  Call<harness::ConfigError>(
-      [bytes] { harness::ParseExperiments(bytes, "configs/experiments/paper/fuzz.json"); });
-}
-
-void CallRecordReader(std::string_view bytes) {
-  Call<std::runtime_error>([bytes] { harness::FromJsonLine(bytes); });
-  harness::IsTornRecord(bytes);
-}
-
-void CallClaimsReader(std::string_view bytes) {
-  Call<harness::ConfigError>([bytes] { harness::ParseClaims(bytes, "claims.json"); });
-}
-
-void CallMapReader(std::string_view bytes) {
-  Call<harness::ConfigError>([bytes] { harness::ParseMapRules(bytes, "map.json"); });
+void CallReader(std::string_view kind, std::string_view bytes) {
+  using harness::ConfigError;
+  if (kind == "mechanism") {
+    Call<ConfigError>([bytes] { harness::ParseMechanism(bytes, "m.json"); });
+  } else if (kind == "experiment") {
+    Call<ConfigError>(
+        [bytes] { harness::ParseExperiments(bytes, "configs/experiments/paper/fuzz.json"); });
+  } else if (kind == "claim") {
+    Call<ConfigError>([bytes] { harness::ParseClaims(bytes, "claims.json"); });
+  } else if (kind == "map") {
+    Call<ConfigError>([bytes] { harness::ParseMapRules(bytes, "map.json"); });
+  } else if (kind == "benchmark") {
+    Call<ConfigError>([bytes] { harness::ParseBenchmarks(bytes, "configs/benchmarks/fuzz.json"); });
+  } else if (kind == "measurement") {
+    Call<std::runtime_error>([bytes] { harness::ParseBenchmarkJson(bytes, "b.json"); });
+  } else if (kind == "record") {
+    Call<std::runtime_error>([bytes] { harness::FromJsonLine(bytes); });
+    harness::IsTornRecord(bytes);
+  } else if (kind == "store") {
+    CallStoreReader(bytes);
+  } else {
+    throw std::logic_error("no reader of this kind");
+  }
 }
 
 }  // namespace loopbench::fuzz

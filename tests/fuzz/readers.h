@@ -1,19 +1,21 @@
 // One call of a reader on arbitrary bytes, for the fuzzers and for the replay in the test suite.
 //
-// A reader may accept the bytes or refuse them with ConfigError (lines of stores:
-// std::runtime_error) and a message in which every line is valid UTF-8 and not endless. Anything
-// else (another exception, a crash, a sanitizer's finding) is a fault.
+// A reader may accept the bytes or refuse them with its error and a message in which every line is
+// valid UTF-8 and not endless. Anything else (another exception, a crash, a sanitizer's finding) is
+// a fault.
 #pragma once
 
+#include <array>
 #include <string_view>
 
 namespace loopbench::fuzz {
 
-/// Throw std::logic_error when a message is not fit to be shown.
-void CallMechanismReader(std::string_view bytes);
-void CallExperimentReader(std::string_view bytes);
-void CallClaimsReader(std::string_view bytes);
-void CallMapReader(std::string_view bytes);
-void CallRecordReader(std::string_view bytes);  ///< a line of a store
+/// Everything that this program reads: four kinds of configuration, families of benchmarks, Google
+/// Benchmark's JSON, a line of a store, and a store (baselines are stores).
+inline constexpr std::array<std::string_view, 8> kKinds = {
+    "mechanism", "experiment", "claim", "map", "benchmark", "measurement", "record", "store"};
+
+/// Throws std::logic_error when a message is not fit to be shown, and for an unknown kind.
+void CallReader(std::string_view kind, std::string_view bytes);
 
 }  // namespace loopbench::fuzz

@@ -4,8 +4,10 @@
 
 #include <algorithm>
 #include <array>
+#include <cstdlib>
 #include <filesystem>
 #include <fstream>
+#include <iostream>
 #include <random>
 #include <sstream>
 #include <string>
@@ -33,8 +35,41 @@ std::vector<std::string> RecordLines() {
   return lines;
 }
 
+/// Stores of a few lines each.
+std::vector<std::string> Stores() {
+  std::vector<std::string> stores;
+  const std::vector<std::string> lines = RecordLines();
+  for (std::size_t i = 0; i < lines.size(); ++i) {
+    if (i % 8 == 0) stores.emplace_back();
+    stores.back() += lines[i] + '\n';
+  }
+  return stores;
+}
+
+/// What loopbench_bench writes, in small: repetitions, an aggregate, a complexity, an error.
+std::vector<std::string> Measurements() {
+  return {R"({
+  "context": {"machine": "M", "compiler": "C", "flags": "F", "libm": "L", "commit": "c", "load_avg": [0.5, 1, 2]},
+  "benchmarks": [
+    {"name": "a/3", "run_name": "a/3", "run_type": "iteration", "repetitions": 3, "repetition_index": 0,
+     "threads": 1, "iterations": 10, "real_time": 1.5, "cpu_time": 1.0, "time_unit": "us", "label": "00ff",
+     "bodies": 3, "allocations": 0},
+    {"name": "a/3", "run_name": "a/3", "run_type": "iteration", "iterations": 10, "real_time": 2.5,
+     "cpu_time": 3.0, "time_unit": "us", "label": "00ff", "bodies": 3, "allocations": 0},
+    {"name": "a/3_mean", "run_name": "a/3", "run_type": "aggregate", "aggregate_name": "mean",
+     "real_time": 2.0, "cpu_time": 2.0, "time_unit": "us"},
+    {"name": "a_BigO", "run_name": "a", "run_type": "aggregate", "aggregate_name": "BigO",
+     "cpu_coefficient": 1.0, "real_coefficient": 1.0, "big_o": "N", "time_unit": "ns"},
+    {"name": "b", "run_name": "b", "run_type": "iteration", "error_occurred": true,
+     "error_message": "singular", "iterations": 0, "real_time": 0.0, "cpu_time": 0.0, "time_unit": "ns"}
+  ]})",
+          R"({"context": {}, "benchmarks": []})"};
+}
+
 std::vector<std::string> Inputs(const std::string& kind) {
   if (kind == "record") return RecordLines();
+  if (kind == "store") return Stores();
+  if (kind == "measurement") return Measurements();
   std::vector<fs::path> files;
   for (const fs::path& folder :
        {kRoot / "tests/fuzz/seeds" / kind, kRoot / "tests/broken" / (kind + "s"),
@@ -56,15 +91,14 @@ std::vector<std::string> Inputs(const std::string& kind) {
   return inputs;
 }
 
-void Call(const std::string& kind, const std::string& bytes) {
-  if (kind == "mechanism") CallMechanismReader(bytes);
-  if (kind == "experiment") CallExperimentReader(bytes);
-  if (kind == "claim") CallClaimsReader(bytes);
-  if (kind == "map") CallMapReader(bytes);
-  if (kind == "record") CallRecordReader(bytes);
+/// Changes of each input: few here; LOOPBENCH_MUTATIONS in the environment asks for more of each
+/// kind, for long runs under sanitizers (tests/fuzz/README.md).
+int ChangesPerInput(std::size_t inputs) {
+  const char* wanted = std::getenv("LOOPBENCH_MUTATIONS");
+  return wanted == nullptr ? 12 : 1 + std::atoi(wanted) / static_cast<int>(inputs);
 }
 
-class Readers : public testing::TestWithParam<std::string> {
+class Readers : public testing::TestWithParam<std::string_view> {
  protected:
   void SetUp() override {
     folder_ = fs::current_path();
@@ -77,9 +111,9 @@ class Readers : public testing::TestWithParam<std::string> {
 };
 
 TEST_P(Readers, AcceptOrRefuseEverySeed) {
-  const std::vector<std::string> inputs = Inputs(GetParam());
-  EXPECT_GE(inputs.size(), 30u);
-  for (const std::string& input : inputs) EXPECT_NO_THROW(Call(GetParam(), input)) << input;
+  const std::vector<std::string> inputs = Inputs(std::string(GetParam()));
+  EXPECT_GE(inputs.size(), GetParam() == "measurement" ? 2u : 3u);
+  for (const std::string& input : inputs) EXPECT_NO_THROW(CallReader(GetParam(), input)) << input;
 }
 
 TEST_P(Readers, AcceptOrRefuseChangedSeeds) {
@@ -88,23 +122,25 @@ TEST_P(Readers, AcceptOrRefuseChangedSeeds) {
                                               "\"\"",   "\"", "\\u", "\xC3",        ",",  "[[[",
                                               "1e-400", "/",  "*",   "\xEF\xBB\xBF"};
   std::mt19937 generator(1);  // the same changes each time
-  for (const std::string& input : Inputs(GetParam())) {
-    if (input.size() > 20'000) continue;
-    for (int change = 0; change < 12; ++change) {
+  std::vector<std::string> inputs = Inputs(std::string(GetParam()));
+  std::erase_if(inputs, [](const std::string& input) { return input.size() > 20'000; });
+  const int changes = ChangesPerInput(inputs.size());
+  for (const std::string& input : inputs) {
+    for (int change = 0; change < changes; ++change) {
       std::string changed = input;
       const std::size_t at = generator() % (changed.size() + 1);
       const std::size_t length = generator() % 12;
       changed.replace(at, std::min(length, changed.size() - at),
                       pieces[generator() % pieces.size()]);
       if (change % 4 == 3) changed.resize(at);
-      EXPECT_NO_THROW(Call(GetParam(), changed)) << changed;
+      EXPECT_NO_THROW(CallReader(GetParam(), changed)) << changed;
     }
   }
+  std::cout << inputs.size() * static_cast<std::size_t>(changes) << " inputs\n";
 }
 
-INSTANTIATE_TEST_SUITE_P(Kinds, Readers,
-                         testing::Values("mechanism", "experiment", "claim", "map", "record"),
-                         [](const auto& kind) { return kind.param; });
+INSTANTIATE_TEST_SUITE_P(Kinds, Readers, testing::ValuesIn(kKinds),
+                         [](const auto& kind) { return std::string(kind.param); });
 
 }  // namespace
 }  // namespace loopbench::fuzz

@@ -108,14 +108,12 @@ bool ExpectDocument(const JsonNode& root, FileKind kind) {
   const Kind& wanted = *std::ranges::find(Kinds(), kind, &Kind::kind);
   if (root.value().is_object()) {
     const Kind& likeliest = *Likeliest(root.value()).front();
-    if (likeliest.CountKnown(root.value()) > wanted.CountKnown(root.value())) {
-      const auto own = std::ranges::find_if(likeliest.own, [&](const std::string& key) {
-        return root.value().contains(key) && !wanted.keys.Find(key);
-      });
-      root.FailAs(own == likeliest.own.end()
-                      ? std::string(likeliest.name)
-                      : fmt::format("{} (it has \"{}\")", likeliest.name, *own),
-                  wanted.name);
+    const auto own = std::ranges::find_if(likeliest.own, [&](const std::string& key) {
+      return root.value().contains(key) && !wanted.keys.Find(key);
+    });
+    const bool of_another = likeliest.CountKnown(root.value()) > wanted.CountKnown(root.value());
+    if (of_another && own != likeliest.own.end()) {
+      root.FailAs(fmt::format("{} (it has \"{}\")", likeliest.name, *own), wanted.name);
       return false;
     }
   }

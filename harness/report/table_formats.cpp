@@ -57,7 +57,7 @@ std::string ToJson(const Table& table) {
       cells.Set(column.key, value == nullptr ? Value() : *value);
     }
     if (!provenance.empty()) cells.Set("provenance", provenance);
-    rows.push_back(ToJsonLine(cells));
+    rows.push_back(ToJsonObject(cells));
   }
   return fmt::format("[{}]\n", fmt::join(rows, ",\n"));
 }

@@ -45,9 +45,9 @@ std::string Dump(const Record& record) {
 
 }  // namespace
 
-std::string ToJsonLine(const Record& record) {
-  return WithChecksum(Dump<nlohmann::ordered_json>(record));
-}
+std::string ToJsonObject(const Record& record) { return Dump<nlohmann::ordered_json>(record); }
+
+std::string ToJsonLine(const Record& record) { return WithChecksum(ToJsonObject(record)); }
 
 std::string CaseId(const Record& canonical_keys) {
   // nlohmann::json keeps its keys sorted.

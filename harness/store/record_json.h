@@ -20,6 +20,8 @@ namespace loopbench::harness {
 /// this. It finds whatever changes a line by accident, a flipped bit with certainty; it is no
 /// signature.
 std::string ToJsonLine(const Record& record);
+/// The same object without a checksum: a row of a table, not of a store.
+std::string ToJsonObject(const Record& record);
 
 /// The record that `line` describes, without its checksum. A line without one (made by hand) is
 /// read as it is. Throws std::runtime_error that says what was found and what was expected: for a

@@ -54,8 +54,9 @@ TEST_F(MapCommandTest, RefusesBadInput) {
   ExpectEnding(Call("check map.json"), 0, {"failure map of 1 rows and 2 columns"});
   ExpectEnding(Call("map nowhere --rules map.json"), 2, {"nowhere"});
   ExpectEnding(Call("map out --rules nowhere.json"), 2, {"nowhere.json"});
-  ExpectEnding(Call("map out --rules claims.json"), 2,
-               {"claims.json:1: /claims: found unknown key"});
+  ExpectEnding(
+      Call("map out --rules claims.json"), 2,
+      {"claims.json:1: (top level): found claims (it has \"claims\"), expected a failure map"});
   ExpectEnding(Call("map out"), 2, {"--rules"});
   ExpectEnding(Call("map out --rules map.json --format png"), 2, {"png"});
   ExpectEnding(Call("map --help"), 0, {"must_hold", "inaccurate", "\"of\": \"rtol\""});

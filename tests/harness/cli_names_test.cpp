@@ -80,8 +80,9 @@ TEST_F(Names, OfBenchmarksAreOnlyShown) {
   EditMechanism("\"name\": \"four-bar\"", R"("name": "a\u001b[31mb\u0000c")");
   Write("bench.json", R"({"name": "names", "groups": [{"mechanisms": ["four-bar.json"],
     "measure": "rhs", "columns": [{"formulation": "odca", "enforcement": "acceleration"}]}]})");
-  const std::string text =
-      Call("list tiny.json; '" LOOPBENCH_BENCH_BINARY "' bench.json --benchmark_list_tests").text;
+  const std::string text = Call("list tiny.json; '" LOOPBENCH_BENCH_BINARY
+                                "' --families bench.json --benchmark_list_tests")
+                               .text;
   EXPECT_NE(text.find("a\\x1b[31mb\\x00c/odca"), std::string::npos) << text;
   EXPECT_EQ(text.find('\x1b'), std::string::npos) << text;
 }

@@ -49,10 +49,10 @@ TEST(ShippedMechanisms, HoldAsManyJointsAsTheyHaveDegreesOfFreedom) {
     const MechanismDescription mechanism = ReadMechanism(file).description;
     const bool revolute = std::ranges::all_of(
         mechanism.joints, [](const auto& joint) { return joint.type == JointType::kRevolute; });
-    // Grueebler's count for planar revolute joints; it holds for all of these scenes but one, whose
+    // Grueebler's count for planar revolute joints; it holds for all of these scenes but two, whose
     // loop is redundant. The others are run (tests/reference/shipped_mechanisms_test.cpp).
     if (mechanism.space != SpaceKind::kPlanar || !revolute) continue;
-    if (mechanism.name == "locomotive") continue;
+    if (mechanism.name == "locomotive" || mechanism.name == "three-cranks") continue;
     const auto bodies = static_cast<int>(mechanism.bodies.size()) - 1;
     int freedom = 3 * bodies - 2 * static_cast<int>(mechanism.joints.size());
     for (const auto& joint : mechanism.joints) freedom -= static_cast<int>(joint.motions.size());

@@ -13,7 +13,7 @@ namespace loopbench {
 /// joint's own axes, imposed directions before released ones. In double, whatever the scalar.
 struct DirectionRows {
   Eigen::MatrixXd rows;
-  Eigen::VectorXd mismatch;          ///< of positions, scaled likewise
+  Eigen::VectorXd mismatch;          ///< of positions, scaled likewise: of unit masses, so [m]
   Eigen::LLT<Eigen::MatrixXd> mass;  ///< L
   std::vector<int> first, count;     ///< rows of each constraint, in the order of constraints()
 };

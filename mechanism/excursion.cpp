@@ -30,7 +30,7 @@ Excursion<Space>::Excursion(const Mechanism<Space, double>& mechanism, const Vec
     farthest = std::max({farthest, state.r_P.norm(), state.r_Q.norm()});
   }
   const double eps = std::numeric_limits<double>::epsilon();
-  closed_ = std::max(1e-11, 100 * eps * farthest / mechanism.length());
+  closed_ = std::max(1e-11 * mechanism.length(), 100 * eps * farthest);
   Factor();
 }
 

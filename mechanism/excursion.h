@@ -59,7 +59,7 @@ class Excursion {
   const Mechanism<Space, double>* mechanism_;
   Kinematics<Space, double> kinematics_;
   VectorX<double> q_, units_;  ///< units of speeds: 1, or the mechanism's length
-  double closed_ = 0.0;        ///< mismatches below this are round-off
+  double closed_ = 0.0;        ///< scaled mismatches below this are round-off [m]
   DirectionRows here_;
   Eigen::CompleteOrthogonalDecomposition<Eigen::MatrixXd> solver_;
   VectorX<double> course_;  ///< L^T u of the last step that moved

@@ -182,7 +182,9 @@ void Mechanism<Space, S>::AddGeometry(const MechanismDescription& description) {
   for (const Joint<Space, S>& joint : joints_) {
     if (joint.num_directions() == 0) continue;  // a free joint holds nothing
     for (const auto& [body, p] : {std::pair{joint.from, joint.X_PF.p}, {joint.to, joint.X_QM.p}}) {
-      if (body != kGround) joints_of[body].push_back(p);
+      // joints on one pin count once: how many there are says nothing about the body's shape
+      std::vector<Point>& points = joints_of[body];
+      if (body != kGround && std::ranges::find(points, p) == points.end()) points.push_back(p);
     }
   }
   geometric_centres_.assign(bodies_.size(), Point::Zero());

@@ -270,8 +270,8 @@ void PrintModel(const MechanismDescription& description, const Structure& struct
   Print("  gravity ({}) m/s^2 in ground axes\n",
         VectorText(description.gravity, description.space));
   PrintSection("Bodies", BodyTable(description, structure), view);
-  Print("  Points and com are seen from the body's origin, inertia is about com{}.\n",
-        planar ? "" : ":\n  Ixx Iyy Izz, and Ixy Ixz Iyz where not zero");
+  Print("  Points and com are seen from the body's origin, inertia is about com.\n");
+  if (!planar) Print("  Inertia is Ixx Iyy Izz, and Ixy Ixz Iyz where they are not zero.\n");
   PrintSection("Joints", JointTable(description, structure), view);
   PrintSection("Frames of joints",
                planar ? FrameTable<Planar>(description) : FrameTable<Spatial>(description), view);

@@ -150,6 +150,7 @@ TEST_F(ExplainTest, SaysAllThatTheFileSays) {
   ExpectSqueezed(
       Call(shipped + "double-wishbone.json'"),
       {"gravity (0 0 -9.81) m/s^2 in ground axes",
+       "inertia is about com. Inertia is Ixx Iyy Izz, and Ixy Ixz Iyz",
        "chassis 1 300 20 20 20 0 0 0.5 LI (0 0.35 0.25)",
        "F, from chassis LI (0 0.35 0.25) z = (0.998752 0 0.0499376)",
        "F, from upright W (0 0 0) z = (0 1 0)",

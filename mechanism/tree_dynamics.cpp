@@ -1,7 +1,5 @@
 #include "mechanism/tree_dynamics.h"
 
-#include <utility>
-
 #include "mechanism/instantiate.h"
 
 namespace loopbench {
@@ -15,10 +13,14 @@ struct Arms {
   Arms(const TreeStep& step, const JointState<Space, S>& state)
       : parent(step.sign > 0 ? state.r_P : state.r_Q),
         child(step.sign > 0 ? Linear<Space, S>(-state.r_Q) : Linear<Space, S>(-state.r_P)) {}
+  /// The same from the centres that the masses are at.
   Arms(const TreeStep& step, const Kinematics<Space, S>& kinematics, Masses masses)
-      : parent(kinematics.ArmP(step.joint, masses)), child(kinematics.ArmQ(step.joint, masses)) {
-    if (step.sign < 0) std::swap(parent, child);
-    child = -child;
+      : Arms(step, kinematics.joints()[step.joint]) {
+    if (masses == Masses::kPhysical) return;
+    parent =
+        step.sign > 0 ? kinematics.ArmP(step.joint, masses) : kinematics.ArmQ(step.joint, masses);
+    child = step.sign > 0 ? Linear<Space, S>(-kinematics.ArmQ(step.joint, masses))
+                          : Linear<Space, S>(-kinematics.ArmP(step.joint, masses));
   }
 };
 
@@ -33,26 +35,19 @@ Block<Space, S> ShiftInertia(const Block<Space, S>& I, const Linear<Space, S>& r
   return X.transpose() * I * X;
 }
 
-}  // namespace
-
-template <class Space, class S>
-TreeDynamics<Space, S>::TreeDynamics(const Mechanism<Space, S>& mechanism)
-    : A_bias_(mechanism.num_bodies(), Motion<Space, S>::Zero()),
-      F_(mechanism.num_bodies(), Motion<Space, S>::Zero()),
-      composite_(mechanism.num_bodies(), Block<Space, S>::Zero()) {}
-
-template <class Space, class S>
-void TreeDynamics<Space, S>::MassMatrix(const Kinematics<Space, S>& kinematics, Masses masses,
-                                        MatrixX<S>& M) {
+/// The choice of masses is made once, not in the loop over all pairs of joints.
+template <Masses masses, class Space, class S>
+void FillMassMatrix(const Kinematics<Space, S>& kinematics, std::vector<Block<Space, S>>& composite,
+                    MatrixX<S>& M) {
   const Mechanism<Space, S>& mechanism = kinematics.mechanism();
   const std::vector<Inertia<Space, S>>& inertias = mechanism.bodies(masses);
   const auto& tree = mechanism.tree();
   M.setZero(mechanism.num_u(), mechanism.num_u());
   for (int body = 1; body < mechanism.num_bodies(); ++body) {
-    composite_[body].setZero();
-    composite_[body].template topLeftCorner<Space::kRot, Space::kRot>() =
+    composite[body].setZero();
+    composite[body].template topLeftCorner<Space::kRot, Space::kRot>() =
         kinematics.RotationalInertia(inertias[body], body);
-    composite_[body].template bottomRightCorner<Space::kLin, Space::kLin>().diagonal().setConstant(
+    composite[body].template bottomRightCorner<Space::kLin, Space::kLin>().diagonal().setConstant(
         inertias[body].mass);
   }
   for (auto step = tree.rbegin(); step != tree.rend(); ++step) {
@@ -62,7 +57,7 @@ void TreeDynamics<Space, S>::MassMatrix(const Kinematics<Space, S>& kinematics, 
     for (int i = 0; i < joint.num_u(); ++i) {
       // momentum of the subtree moving along direction i, carried rootward
       const Motion<Space, S> h = state.H(i) * S(step->sign);
-      Motion<Space, S> F = composite_[step->child] * ShiftMotion<Space, S>(h, arms.child);
+      Motion<Space, S> F = composite[step->child] * ShiftMotion<Space, S>(h, arms.child);
       for (int s = mechanism.step_of_body(step->child); s >= 0;) {
         const TreeStep& at = tree[s];
         const JointState<Space, S>& at_state = kinematics.joints()[at.joint];
@@ -80,8 +75,26 @@ void TreeDynamics<Space, S>::MassMatrix(const Kinematics<Space, S>& kinematics, 
     }
     if (step->parent != kGround) {
       const Linear<Space, S> r = arms.parent + arms.child;
-      composite_[step->parent] += ShiftInertia<Space, S>(composite_[step->child], r);
+      composite[step->parent] += ShiftInertia<Space, S>(composite[step->child], r);
     }
+  }
+}
+
+}  // namespace
+
+template <class Space, class S>
+TreeDynamics<Space, S>::TreeDynamics(const Mechanism<Space, S>& mechanism)
+    : A_bias_(mechanism.num_bodies(), Motion<Space, S>::Zero()),
+      F_(mechanism.num_bodies(), Motion<Space, S>::Zero()),
+      composite_(mechanism.num_bodies(), Block<Space, S>::Zero()) {}
+
+template <class Space, class S>
+void TreeDynamics<Space, S>::MassMatrix(const Kinematics<Space, S>& kinematics, Masses masses,
+                                        MatrixX<S>& M) {
+  if (masses == Masses::kPhysical) {
+    FillMassMatrix<Masses::kPhysical>(kinematics, composite_, M);
+  } else {
+    FillMassMatrix<Masses::kGeometric>(kinematics, composite_, M);
   }
 }
 
@@ -197,6 +210,7 @@ void TreeDynamics<Space, S>::JacobianOf(const Kinematics<Space, S>& kinematics, 
   const JointState<Space, S>& state = kinematics.joints()[index];
   const Linear<Space, S> p = kinematics.JointPoint(index);
   rows.setZero();
+  const int count = static_cast<int>(rows.rows());
   for (int side = 0; side < 2; ++side) {
     const S sign = side == 0 ? S(1) : S(-1);
     int s = mechanism.step_of_body(side == 0 ? constraint.to : constraint.from);
@@ -208,9 +222,8 @@ void TreeDynamics<Space, S>::JacobianOf(const Kinematics<Space, S>& kinematics, 
       for (int i = 0; i < joint.num_u(); ++i) {
         const Motion<Space, S> h = moving.H(i) * (sign * S(step.sign));
         const Motion<Space, S> at_constraint = ShiftMotion<Space, S>(h, arm);
-        for (Eigen::Index r = 0; r < rows.rows(); ++r) {
-          rows(r, joint.u_offset + i) += state.D(static_cast<int>(r)).dot(at_constraint);
-        }
+        S* const column = &rows.coeffRef(0, joint.u_offset + i);
+        for (int r = 0; r < count; ++r) column[r] += state.D(r).dot(at_constraint);
       }
       s = mechanism.step_of_body(step.parent);
     }

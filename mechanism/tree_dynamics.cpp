@@ -80,6 +80,34 @@ void FillMassMatrix(const Kinematics<Space, S>& kinematics, std::vector<Block<Sp
   }
 }
 
+/// D^T (V_Q - V_P) of one constraint by speed, for `count` directions, from row `first` of J on.
+template <class Space, class S>
+void AddRows(const Kinematics<Space, S>& kinematics, int index, int first, int count,
+             MatrixX<S>& J) {
+  const Mechanism<Space, S>& mechanism = kinematics.mechanism();
+  const Joint<Space, S>& constraint = mechanism.joints()[index];
+  const JointState<Space, S>& state = kinematics.joints()[index];
+  const Linear<Space, S> p = kinematics.JointPoint(index);
+  for (int side = 0; side < 2; ++side) {
+    const S sign = side == 0 ? S(1) : S(-1);
+    int s = mechanism.step_of_body(side == 0 ? constraint.to : constraint.from);
+    while (s >= 0) {
+      const TreeStep& step = mechanism.tree()[s];
+      const JointState<Space, S>& moving = kinematics.joints()[step.joint];
+      const Joint<Space, S>& joint = mechanism.joints()[step.joint];
+      const Linear<Space, S> arm = p - kinematics.JointPoint(step.joint);
+      for (int i = 0; i < joint.num_u(); ++i) {
+        const Motion<Space, S> h = moving.H(i) * (sign * S(step.sign));
+        const Motion<Space, S> at_constraint = ShiftMotion<Space, S>(h, arm);
+        for (int r = 0; r < count; ++r) {
+          J(first + r, joint.u_offset + i) += state.D(r).dot(at_constraint);
+        }
+      }
+      s = mechanism.step_of_body(step.parent);
+    }
+  }
+}
+
 }  // namespace
 
 template <class Space, class S>
@@ -195,39 +223,19 @@ void TreeDynamics<Space, S>::AlongForest(const Kinematics<Space, S>& kinematics,
 template <class Space, class S>
 void TreeDynamics<Space, S>::Jacobian(const Kinematics<Space, S>& kinematics, MatrixX<S>& J) const {
   const Mechanism<Space, S>& mechanism = kinematics.mechanism();
-  J.resize(mechanism.num_rows(), mechanism.num_u());
+  J.setZero(mechanism.num_rows(), mechanism.num_u());
   for (int index : mechanism.constraints()) {
     const Joint<Space, S>& joint = mechanism.joints()[index];
-    JacobianOf(kinematics, index, J.middleRows(joint.row, joint.num_constraints()));
+    AddRows(kinematics, index, joint.row, joint.num_constraints(), J);
   }
 }
 
 template <class Space, class S>
 void TreeDynamics<Space, S>::JacobianOf(const Kinematics<Space, S>& kinematics, int index,
                                         Eigen::Ref<MatrixX<S>> rows) const {
-  const Mechanism<Space, S>& mechanism = kinematics.mechanism();
-  const Joint<Space, S>& constraint = mechanism.joints()[index];
-  const JointState<Space, S>& state = kinematics.joints()[index];
-  const Linear<Space, S> p = kinematics.JointPoint(index);
-  rows.setZero();
-  const int count = static_cast<int>(rows.rows());
-  for (int side = 0; side < 2; ++side) {
-    const S sign = side == 0 ? S(1) : S(-1);
-    int s = mechanism.step_of_body(side == 0 ? constraint.to : constraint.from);
-    while (s >= 0) {
-      const TreeStep& step = mechanism.tree()[s];
-      const JointState<Space, S>& moving = kinematics.joints()[step.joint];
-      const Joint<Space, S>& joint = mechanism.joints()[step.joint];
-      const Linear<Space, S> arm = p - kinematics.JointPoint(step.joint);
-      for (int i = 0; i < joint.num_u(); ++i) {
-        const Motion<Space, S> h = moving.H(i) * (sign * S(step.sign));
-        const Motion<Space, S> at_constraint = ShiftMotion<Space, S>(h, arm);
-        S* const column = &rows.coeffRef(0, joint.u_offset + i);
-        for (int r = 0; r < count; ++r) column[r] += state.D(r).dot(at_constraint);
-      }
-      s = mechanism.step_of_body(step.parent);
-    }
-  }
+  MatrixX<S> J = MatrixX<S>::Zero(rows.rows(), rows.cols());
+  AddRows(kinematics, index, 0, static_cast<int>(rows.rows()), J);
+  rows = J;
 }
 
 template <class Space, class S>

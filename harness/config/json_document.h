@@ -1,8 +1,8 @@
 // From bytes to a JSON document, strictly: what the parser would forgive is an error here.
 //
 // For the .cpp files of harness/config and harness/store only, like json_reader.h and the
-// *_sections.h: these headers show nlohmann-json. Every reader of a document begins here, so that all
-// have the same limits of size and depth and the same messages.
+// *_sections.h: these headers show nlohmann-json. Every reader of a document begins here, so that
+// all have the same limits of size and depth and the same messages.
 #pragma once
 
 #include <cstddef>

@@ -12,7 +12,7 @@ enum class Outcome {
   kStepTooSmall,        ///< the error test failed too often or the step fell below round-off
   kNonFinite,           ///< a derivative was NaN or infinite
   kStepLimit,           ///< more steps than allowed
-  kTimeLimit,           ///< more wall time than allowed
+  kTimeLimit,           ///< more CPU time than allowed
   kInconsistentStart,   ///< positions or speeds that satisfy the loops were not found
   kInconsistentMotion,  ///< prescribed motions ask for what the loops forbid
   kLocked,              ///< no speed is free and none is prescribed: nothing can move

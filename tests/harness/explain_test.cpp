@@ -1,5 +1,6 @@
 // explain says all that decides a motion: parts, axes in their frames, forces, start, energy.
 #include <fmt/format.h>
+#include <unistd.h>
 
 #include "harness/analysis/model_warnings.h"
 #include "harness/config/mechanism_reader.h"
@@ -57,9 +58,9 @@ struct AxisExample {
 
 class AxisOf : public CommandLineTest, public testing::WithParamInterface<AxisExample> {
  protected:
-  // gtest's names have slashes, which no folder may
+  // gtest's names have slashes, which no folder may; examples run side by side
   void SetUp() override {
-    folder_ = fs::path(testing::TempDir()) / "loopbench-axis-example";
+    folder_ = fs::path(testing::TempDir()) / fmt::format("loopbench-axis-example-{}", ::getpid());
     fs::remove_all(folder_);
     fs::create_directories(folder_);
   }

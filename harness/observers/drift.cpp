@@ -35,7 +35,7 @@ struct DriftObserver<Space>::Work {
   Work(const MechanismDescription& description, const Mechanism<Space, double>& mechanism)
       : dynamics(mechanism),
         A(mechanism.num_bodies()),
-        view(description, mechanism),
+        view(description, mechanism, true),
         loop_max(mechanism.joints().size(), 0.0) {
     for (int index : view.mechanism().constraints()) {
       loop_names.emplace_back(index, view.mechanism().joint_names()[index]);

@@ -1,5 +1,4 @@
-// The loops of a mechanism in joint coordinates, whatever coordinates are integrated, with all that
-// their joints constrain, released or not.
+// The loops of a mechanism in joint coordinates, whatever coordinates are integrated.
 #pragma once
 
 #include <memory>
@@ -11,11 +10,15 @@ namespace loopbench::harness {
 template <class Space>
 class JointView {
  public:
-  /// `mechanism` is made of `description` and must outlive the view.
-  JointView(const MechanismDescription& description, const Mechanism<Space, double>& mechanism)
+  /// `mechanism` is made of `description` and must outlive the view. Loops are seen with all that
+  /// their joints constrain, or without what was released as redundant at every position.
+  JointView(const MechanismDescription& description, const Mechanism<Space, double>& mechanism,
+            bool with_released)
       : mechanism_(&mechanism) {
-    if (mechanism.coordinates() == Coordinates::kJoint && mechanism.released().empty()) return;
-    own_ = std::make_unique<Mechanism<Space, double>>(Unreleased(description), Coordinates::kJoint);
+    const bool same = !with_released || mechanism.released().empty();
+    if (mechanism.coordinates() == Coordinates::kJoint && same) return;
+    own_ = std::make_unique<Mechanism<Space, double>>(
+        with_released ? Unreleased(description) : description, Coordinates::kJoint);
     mechanism_ = own_.get();
     kinematics_ = std::make_unique<Kinematics<Space, double>>(*own_);
   }

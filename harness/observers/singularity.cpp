@@ -50,7 +50,7 @@ class Passages {
 template <class Space>
 struct SingularityObserver<Space>::Work {
   Work(const MechanismDescription& description, const Mechanism<Space, double>& mechanism)
-      : view(description, mechanism) {}
+      : view(description, mechanism, false) {}  // released rows gain rank as they drift
 
   JointView<Space> view;
   /// Of each singular value, the largest first: its smallest ratio to the largest and when.

@@ -278,6 +278,18 @@ TEST(Doubts, PassagesAreSeenWhereNoStepEndsNearThem) {
   EXPECT_EQ(RunScene("parallelogram", position, 1e-8, 2.0).Text("doubts"), "");
 }
 
+TEST(Doubts, RedundantRowsThatDriftedApartAreNoSingularPosition) {
+  // drift of 1e-3 gives Bennett's redundant rows a rank of their own
+  for (const Coordinates coordinates : {Coordinates::kJoint, Coordinates::kAbsolute}) {
+    const Record record =
+        RunScene("bennett", {.formulation = kOdca, .coordinates = coordinates}, 1e-6, 50.0);
+    ASSERT_EQ(record.Text("outcome"), "finished");
+    EXPECT_GT(record.Number("drift_position_max"), 2e-4);
+    EXPECT_GT(record.Number("singularity_distance_min"), 0.1);
+    EXPECT_EQ(record.Text("doubts"), "");
+  }
+}
+
 /// Peaucellier's linkage through the position where its cell folds: below level position runs
 /// finish with small drift and energy errors on another branch than level position's.
 TEST(Doubts, TheStraightLineLinkageThatEndsOnAnotherBranch) {

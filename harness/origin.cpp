@@ -7,6 +7,7 @@
 #include <thread>
 #include <vector>
 
+#include "harness/build_commit.h"
 #include "harness/build_info.h"
 #include "harness/hash.h"
 

@@ -10,6 +10,7 @@
 #include <fstream>
 #include <iterator>
 
+#include "harness/build_commit.h"
 #include "harness/build_info.h"
 #include "harness/hash.h"
 #include "harness/origin.h"

@@ -12,6 +12,10 @@
 namespace loopbench::harness {
 namespace {
 
+// Farther coordinates [rad or m] start no member: its start is followed in steps of 0.1.
+constexpr Range kFarthest = {.min = -1e4, .max = 1e4};
+constexpr Range kAmplitude = {.min = 0.0, .max = kFarthest.max, .above_min = true};
+
 /// Numbers of a rule, each one of `used`: one that is not would match nothing.
 std::vector<double> ReadUsedNumbers(const JsonNode& rule, const std::string& key,
                                     const std::vector<double>& used) {
@@ -57,6 +61,9 @@ std::vector<DrawnCoordinate> ReadBetween(const JsonNode& node) {
     const std::vector<double> ends = bounds.Numbers(2);
     const bool is_pair = bounds.value().is_array() && bounds.value().size() == 2;
     if (is_pair && !(ends[0] < ends[1])) bounds.Fail("two numbers that ascend [rad or m]");
+    if (is_pair && !(kFarthest.Contains(ends[0]) && kFarthest.Contains(ends[1]))) {
+      bounds.Fail(fmt::format("numbers{} [rad or m]", kFarthest.Text()));
+    }
     drawn.push_back({joint, ends[0], ends[1]});
   }
   if (node.value().is_object() && node.value().empty()) node.Fail("at least one joint");
@@ -115,7 +122,7 @@ EnsembleRule ReadEnsemble(const JsonNode& node, const Experiment& experiment) {
     rule.between = ReadBetween(*between);
     rule.perturb = 0.0;
   } else if (const auto perturb = node.Required("perturb", "a number > 0, or \"between\"")) {
-    rule.perturb = perturb->Number(kPositive);
+    rule.perturb = perturb->Number(kAmplitude);
   }
   if (const auto bound = node.Optional("branch_bound")) {
     rule.branch_bound = bound->Number(kPositive);

@@ -191,7 +191,10 @@ std::string Ranges(const Figure& figure, const Extent& x, const Extent& y) {
     return fmt::format("set {}range [{:.6g}:{:.6g}]\n", axis, value(extent.low - margin),
                        value(extent.high + margin));
   };
-  std::string commands = range('y', y, figure.log_y, 0.08);
+  // lines, too, keep off the frame; logarithmic axes end at powers of ten anyway
+  std::string commands =
+      has_points || figure.log_y ? "" : "set offsets 0, 0, graph 0.04, graph 0.04\n";
+  commands += range('y', y, figure.log_y, 0.08);
   if (!figure.x_ticks.empty()) {
     commands += fmt::format("set xrange [0.5:{}]\nset xtics (",
                             static_cast<double>(figure.x_ticks.size()) + 0.5);

@@ -6,18 +6,14 @@
 
 #include <numbers>
 
-#include "harness/config/mechanism_reader.h"
 #include "mechanism/library.h"
 #include "mechanism/structure.h"
+#include "tests/mechanism/shipped.h"
 
 namespace loopbench {
 namespace {
 
-MechanismDescription Scene(const std::string& name) {
-  return harness::ReadMechanism(std::string(LOOPBENCH_SOURCE_DIR) + "/configs/mechanisms/" + name +
-                                ".json")
-      .description;
-}
+using testing::Shipped;
 
 /// Unit bars in line between ground pins as far apart as they are long together.
 MechanismDescription Stretched(int bars) {
@@ -67,7 +63,7 @@ TEST(Mobility, ALittleSlackAndItMoves) {
 TEST(Mobility, SingularStartsWithBranchesMove) {
   for (const char* name :
        {"parallelogram-singular-start", "toggle-singular-start", "flat-seven-bar"}) {
-    EXPECT_FALSE(AnalyseStructure(Scene(name)).locked()) << name;
+    EXPECT_FALSE(AnalyseStructure(Shipped(name)).locked()) << name;
   }
   for (const int windows : {1, 2, 10, 40}) {  // flat
     const Structure s = AnalyseStructure(Ladder(windows, 0.0, 0.0));
@@ -89,7 +85,7 @@ TEST(Mobility, ATriangleIsLockedToFirstOrder) {
 TEST(RankOfGeometry, DoesNotKnowWhereCentresOfMassAre) {
   for (const double far : {1e2, 1e4, 1e6}) {
     for (const char* name : {"four-bar", "seven-bar", "bennett", "spatial-four-bar"}) {
-      MechanismDescription d = Scene(name);
+      MechanismDescription d = Shipped(name);
       const Structure near = AnalyseStructure(d);
       d.bodies[1].com.x() = far;
       const Structure s = AnalyseStructure(d);
@@ -102,7 +98,7 @@ TEST(RankOfGeometry, DoesNotKnowWhereCentresOfMassAre) {
 }
 
 TEST(RankOfGeometry, KnowsEachPartByItself) {
-  const MechanismDescription one = Scene("four-bar");
+  const MechanismDescription one = Shipped("four-bar");
   for (const double size : {1e-6, 1e-3, 1e3, 1e6}) {
     MechanismDescription two = one;
     for (std::size_t i = 1; i < one.bodies.size(); ++i) {

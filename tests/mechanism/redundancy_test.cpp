@@ -5,21 +5,17 @@
 
 #include <cmath>
 
-#include "harness/config/mechanism_reader.h"
 #include "mechanism/assembly.h"
 #include "mechanism/direction_rows.h"
 #include "mechanism/library.h"
 #include "mechanism/release_review.h"
 #include "mechanism/scaled_loops.h"
+#include "tests/mechanism/shipped.h"
 
 namespace loopbench {
 namespace {
 
-MechanismDescription Scene(const std::string& name) {
-  return harness::ReadMechanism(std::string(LOOPBENCH_SOURCE_DIR) + "/configs/mechanisms/" + name +
-                                ".json")
-      .description;
-}
+using testing::Shipped;
 
 int Count(const std::vector<Released>& released) {
   int count = 0;
@@ -38,7 +34,7 @@ class RedundancyOf : public ::testing::TestWithParam<Known> {};
 
 TEST_P(RedundancyOf, IsWhatIsKnown) {
   const auto& [name, rows, rank] = GetParam();
-  const Redundancy found = FindRedundancy(Scene(name));
+  const Redundancy found = FindRedundancy(Shipped(name));
   EXPECT_EQ(found.rows, rows);
   EXPECT_EQ(found.rank, rank);
   EXPECT_EQ(Count(found.released), rows - rank);
@@ -58,7 +54,7 @@ void ExpectIndependent(const MechanismDescription& description, int rank) {
 
 TEST_P(RedundancyOf, LeavesIndependentConstraints) {
   const auto& [name, rows, rank] = GetParam();
-  const MechanismDescription description = Scene(name);
+  const MechanismDescription description = Shipped(name);
   const MechanismDescription released = Release(description, FindRedundancy(description));
   if (description.space == SpaceKind::kPlanar) {
     ExpectIndependent<Planar>(released, rank);
@@ -83,7 +79,7 @@ INSTANTIATE_TEST_SUITE_P(
 
 TEST(RedundancyTest, ASingularStartIsNoRedundancy) {
   for (const char* name : {"parallelogram-singular-start", "toggle-singular-start"}) {
-    const Redundancy found = FindRedundancy(Scene(name));
+    const Redundancy found = FindRedundancy(Shipped(name));
     EXPECT_EQ(found.rank_at_start, 1) << name;
     EXPECT_EQ(found.rank, 2) << name;
     EXPECT_TRUE(found.released.empty()) << name;
@@ -102,7 +98,7 @@ TEST(RedundancyTest, NothingIsReleasedWhereEverythingNearIsSingular) {
 TEST(RedundancyTest, AChoiceThatServesBadlyIsReplaced) {
   // self-stress of the parallel cranks is along them: of a pin seen from its crank x can be given
   // up and y cannot
-  MechanismDescription description = Scene("three-cranks");
+  MechanismDescription description = Shipped("three-cranks");
   for (int joint : FindRedundancy(description).cut) description.joints[joint].cut = true;
   for (const int given_up : {0, 1}) {
     description.joints[5].released = {given_up};
@@ -134,7 +130,7 @@ TEST(RedundancyTest, AChoiceThatServesBadlyIsReplaced) {
 }
 
 TEST(RedundancyTest, ReleasedDirectionsAreStillMeasured) {
-  MechanismDescription description = Scene("bennett");
+  MechanismDescription description = Shipped("bennett");
   const Mechanism<Spatial, double> all(description, Coordinates::kJoint);
   const MechanismDescription less = Release(description, FindRedundancy(description));
   const Mechanism<Spatial, double> released(less, Coordinates::kJoint);

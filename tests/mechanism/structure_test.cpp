@@ -6,20 +6,16 @@
 #include <cmath>
 #include <numbers>
 
-#include "harness/config/mechanism_reader.h"
 #include "mechanism/library.h"
+#include "tests/mechanism/shipped.h"
 
 namespace loopbench {
 namespace {
 
-MechanismDescription Scene(const std::string& name) {
-  return harness::ReadMechanism(std::string(LOOPBENCH_SOURCE_DIR) + "/configs/mechanisms/" + name +
-                                ".json")
-      .description;
-}
+using testing::Shipped;
 
 TEST(StructureTest, FourBarHasOneLoopThroughAllItsJoints) {
-  const Structure s = AnalyseStructure(Scene("four-bar"));
+  const Structure s = AnalyseStructure(Shipped("four-bar"));
   EXPECT_EQ(s.bodies, 3);
   EXPECT_EQ(s.joints, 4);
   EXPECT_EQ(s.rows, 8);
@@ -42,7 +38,7 @@ TEST(StructureTest, FourBarHasOneLoopThroughAllItsJoints) {
 }
 
 TEST(StructureTest, PlanarLoopInSpaceHasThreeNamedRedundantDirections) {
-  MechanismDescription scene = Scene("four-bar");
+  MechanismDescription scene = Shipped("four-bar");
   scene.space = SpaceKind::kSpatial;
   const Structure s = AnalyseStructure(scene);
   EXPECT_EQ(s.counted_freedom, -2) << "6 * 3 - 5 * 4";
@@ -62,7 +58,7 @@ TEST(StructureTest, PlanarLoopInSpaceHasThreeNamedRedundantDirections) {
 }
 
 TEST(StructureTest, SevenBarHasTwoLoopsAndTwoFreedoms) {
-  const Structure s = AnalyseStructure(Scene("seven-bar"));
+  const Structure s = AnalyseStructure(Shipped("seven-bar"));
   EXPECT_EQ(s.counted_freedom, 2) << "3 * 6 - 2 * 8";
   EXPECT_EQ(s.freedom(), 2);
   EXPECT_EQ(s.rank, 4);
@@ -74,7 +70,7 @@ TEST(StructureTest, SevenBarHasTwoLoopsAndTwoFreedoms) {
 }
 
 TEST(StructureTest, FlatParallelogramIsSingularNotRedundant) {
-  const Structure s = AnalyseStructure(Scene("parallelogram-singular-start"));
+  const Structure s = AnalyseStructure(Shipped("parallelogram-singular-start"));
   EXPECT_EQ(s.rank, 1);
   EXPECT_EQ(s.rank_nearby, 2);
   EXPECT_TRUE(s.singular_start());
@@ -113,7 +109,7 @@ TEST(StructureTest, ThirdCrankIsRedundantEverywhere) {
 }
 
 TEST(StructureTest, LoopsThroughGroundOnlyAreSeparateParts) {
-  MechanismDescription two = Scene("four-bar");
+  MechanismDescription two = Shipped("four-bar");
   const MechanismDescription one = two;
   for (std::size_t i = 1; i < one.bodies.size(); ++i) {
     two.bodies.push_back(one.bodies[i]);
@@ -158,7 +154,7 @@ TEST(StructureTest, TriangleOfBarsIsLocked) {
 }
 
 TEST(StructureTest, LoopThatCannotCloseIsMeasured) {
-  MechanismDescription scene = Scene("four-bar");
+  MechanismDescription scene = Shipped("four-bar");
   scene.joints[3].to.position.x() = 5.0;  // the first bar is held, the others reach 2 m
   const Structure s = AnalyseStructure(scene);
   EXPECT_EQ(s.start.outcome, Outcome::kInconsistentStart);

@@ -89,7 +89,7 @@ class FormulationOde final : public Ode {
   }
 
  private:
-  /// Whether the formulation still stands where its derivative was last taken, and that is here.
+  /// Whether the formulation's last evaluation was the derivative at this (t, y).
   bool IsAt(double t, std::span<const double> y) const {
     return version_ == formulation_.kinematics().position_version() && t == t_ &&
            std::equal(y.begin(), y.end(), y_.begin());

@@ -56,10 +56,11 @@ struct SuiteCount {
 };
 
 /// Runs the accuracy cases of all experiments, costliest first, then their precision ladders, then
-/// their timings, appending each
-/// record to the store as it is complete. A case is done when the store has a record with its id,
-/// which stands for everything that decides the run and for this very program; `records` is what
-/// the store has. Shows progress.
+/// their timings, and shows progress. Each record goes to the store as soon as it is complete.
+///
+/// A case is done when the store has a record with its id. The id stands for everything that
+/// decides the run and for this very program. `records` is what the store has when the call
+/// begins.
 ///
 /// Whatever a case does, it gets a record: outcomes "crashed", "process-time-limit", "memory-limit"
 /// and "bad-answer" are those of its process.

@@ -20,9 +20,9 @@ struct Unmet {
 
 /// Names the joints in conflict with the residual of each and its unit, rods first, then the
 /// largest; and the joints of their loops that the assembly may not move: prescribed, held or of
-/// given speed. Where least squares end, residuals balance each other (J^T e = 0), so what cannot
-/// be met together is all that has one, and joints without have no part in it. Positions of
-/// `kinematics` must be those of the residuals.
+/// given speed. At a least-squares solution the residuals e satisfy J^T e = 0: joints with a
+/// residual pull against each other and cannot be met together, and joints without one are not
+/// involved. Positions of `kinematics` must be those of the residuals.
 template <class Space>
 std::string DescribeConflict(const MechanismDescription& description,
                              const Kinematics<Space, double>& kinematics, const Unmet& unmet);

@@ -14,10 +14,10 @@ class Drives {
  public:
   explicit Drives(const Mechanism<Space, S>& mechanism);
 
-  /// Whether accelerations `udot` satisfy every constraint, to kFollowed of the largest
-  /// acceleration they are made of and kRoundOff of the largest that forces would cause in a body
-  /// alone: bodies that loops hold still have no other size. Where joints have drifted apart,
-  /// redundant constraints contradict each other by as much, which is no fault of the drives.
+  /// Whether accelerations `udot` satisfy every constraint. What is left may be kFollowed of the
+  /// largest acceleration in the sum, plus kRoundOff of the largest that forces would give a body
+  /// by itself (in a loop that stands still all others are zero), plus as much as drift explains:
+  /// redundant constraints of joints that have drifted apart contradict each other by that much.
   /// `feedback`, where not empty, is what constraint accelerations were asked to miss (Baumgarte),
   /// by row. Speeds must be current.
   bool Followed(const Kinematics<Space, S>& kinematics, const VectorX<S>& udot,

@@ -184,8 +184,8 @@ class Formulation {
   std::unique_ptr<Drives<Space, S>> drives_;  ///< null without prescribed motions
   VectorX<S> lambda_of_drives_;
   Correction<S> correction_;
-  /// The last stage of a step, its projection and the next evaluation meet in the same positions,
-  /// and share what was assembled there. Elsewhere every evaluation is a whole one.
+  /// Set by BeginStep(): the last stage of a step, its projection and the next evaluation have the
+  /// same positions and share what is assembled there. Any other evaluation assembles anew.
   bool at_step_end_ = false;
   VectorX<S> violation_, change_of_state_, moved_, step_;  ///< of projections
   BaumgarteGains gains_;

@@ -7,7 +7,7 @@
 
 namespace loopbench {
 
-/// Bodies that joints, or forces between two bodies, connect otherwise than through Ground.
+/// A set of bodies that joints or forces connect with each other, paths through Ground left out.
 struct Island {
   std::vector<int> bodies;  ///< ascending, without Ground
   bool grounded = false;    ///< a joint leads to Ground; otherwise the part floats

@@ -2,9 +2,9 @@
 //
 // With q the coordinates and u the speeds of the joint (paper, table 1 and eq. 7-9):
 //   X_FM(q)        pose of M in F,
-//   H_F(q)         motion map: [w_FM; v_FMo] = H_F u, in F axes; columns are orthogonal and, but
-//   for
-//                  a helical joint, of unit length,
+//   H_F(q)         motion map: [w_FM; v_FMo] = H_F u, in F axes,
+//                  with orthogonal columns, which have unit length
+//                  in every kind but the helical one,
 //   D_F(q)         its orthogonal complement, D_F^T H_F = 0: the directions of constraint forces,
 //   qdot = N(q) u  kinematic rates,
 //   q*(X_FM)       the coordinates that a measured pose of M in F comes closest to; what is left of
@@ -45,12 +45,12 @@ struct JointKind {
   /// Where every direction of H and D is a coordinate axis of F and constant: [H D] as a
   /// permutation of the components of a motion, the num_u free ones first.
   std::array<int, Space::kDim> axes{};
-  /// The span of D is the same in all axes (a planar pin): then ground axes serve for F axes.
+  /// No rotation changes the span of D (a planar pin): D may then be taken in ground axes.
   bool isotropic = false;
 
   /// What the kinds helical (pitch [m/rad]) and rod (length [m]) depend on; 0 for others.
   S parameter = S(0);
-  /// 1 / |H u|^2 for u = 1: what takes H^T V to a speed; 1 but for a helical joint.
+  /// u = per_speed H^T V: one over H's squared length, which is 1 in every kind but the helical.
   S per_speed = S(1);
 
   void (*transform)(const S* q, Pose<Space, S>& X_FM, S parameter) = nullptr;

@@ -24,7 +24,7 @@ struct JointState {
   auto H() const { return basis.leftCols(num_u); }  ///< motion map
   /// Constrained directions that are imposed, those of prescribed coordinates first.
   auto D() const { return basis.middleCols(num_u, num_rows); }
-  /// The same and behind them those that are released (redundancy.h): what the joint is to hold.
+  /// All constrained directions: those imposed, then those released as redundant (redundancy.h).
   auto AllD() const { return basis.rightCols(Space::kDim - num_u); }
   auto H(int i) const { return basis.col(i); }
   auto D(int i) const { return basis.col(num_u + i); }

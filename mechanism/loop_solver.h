@@ -7,13 +7,13 @@
 //
 //   plain       X = L L^T, T = L^-1: the factorisation of the paper's time. Fails when a pivot is
 //               lost in round-off.
-//   scaled      joints' own scale first: X_free = K K^T, the response across each joint of its two
-//               bodies alone; K^-1 X K^-T has eigenvalues in [0, number of joints]. Cholesky of
-//               that; refused when a pivot is below kSuspicious, then:
-//   geometric   X of the same mechanism with unit masses: K_g^-1 X_g K_g^-T = U diag(lambda) U^T,
-//               weights w_i = 1 - exp(-(lambda_i / theta)^2), theta = (2e-4)^2 lambda_max, but
-//               lambda_max >= 1e-2: within a rigid part all of X_g is round-off. Solving with it: T
-//               = diag(sqrt(w / lambda)) U^T K_g^-1.
+//   scaled      each joint on its own scale: X_free = K K^T is the response of the joint's two
+//               bodies alone, and K^-1 X K^-T has eigenvalues in [0, number of joints]. Cholesky
+//               of that, T = L^-1 K^-1; where a pivot is below kSuspicious, the next two instead.
+//   geometric   X_g of the same mechanism with unit masses: K_g^-1 X_g K_g^-T = U diag(lambda) U^T,
+//               weights w_i = 1 - exp(-(lambda_i / theta)^2), theta = (2e-4)^2 lambda_max, where
+//               lambda_max counts as 1e-2 at least: within a rigid part all of X_g is round-off.
+//               To solve with X_g itself, T = diag(sqrt(w / lambda)) U^T K_g^-1.
 //   softened    the physical X with the geometric directions: Y = U^T K_g^-1 X K_g^-T U,
 //               Y + diag(Y_ii (1 / w_i - 1)) = N L L^T N with N^2 the diagonal, and
 //               T = L^-1 N^-1 U^T K_g^-1. A degenerating direction grows soft; directions with

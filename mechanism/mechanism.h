@@ -21,8 +21,8 @@ struct Inertia {
   Matrix rotational_inverse = Matrix::Zero();
 };
 
-/// Whose mass properties: the bodies', or those that make rank a matter of geometry alone
-/// (docs/design.md D5): unit masses in the middle of each body's joints.
+/// Which masses an evaluation uses: the bodies' own, or unit masses in the middle of each body's
+/// joints, for decisions of rank that must depend on geometry alone (docs/design.md D5).
 enum class Masses { kPhysical, kGeometric };
 
 /// Small on purpose: a long chain streams all of it through the cache at every evaluation.
@@ -38,7 +38,7 @@ struct Joint {
   Pose<Space, S> X_PF, X_QM;            ///< seen from the centres of mass of P and Q
 
   bool in_tree() const { return q_offset >= 0; }
-  /// What is left of the kind when prescribed coordinates count as constraints.
+  /// The kind's numbers, with each prescribed coordinate counted as a constraint.
   int num_q() const { return kind->num_q - num_drives; }
   int num_u() const { return kind->num_u - num_drives; }
   int num_constraints() const { return num_directions() - num_released; }
@@ -46,7 +46,7 @@ struct Joint {
   int num_directions() const { return kind->num_constraints() + num_drives; }
 };
 
-/// A prescribed coordinate of a joint: its direction is the first (next, ..) of D.
+/// A prescribed coordinate of a joint. Directions of such coordinates are the first columns of D.
 struct Drive {
   int joint = 0;
   int coordinate = 0;  ///< of the kind

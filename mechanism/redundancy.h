@@ -9,8 +9,8 @@
 // is left is the same mechanism with its redundancy modelled away, and its drift grows as t^2.
 // Released directions are observed as all others are.
 //
-// A choice that serves at one position may serve badly at another, so the one is taken that serves
-// best where it serves worst. It is reviewed at accepted steps (release_review.h).
+// A choice that is well conditioned at one position may be badly conditioned at another. Of several
+// positions the worst counts; the best choice is reviewed at accepted steps (release_review.h).
 #pragma once
 
 #include <string>

@@ -31,15 +31,15 @@ class TreeDynamics {
 
   /// J (num_rows x num_u).
   void Jacobian(const Kinematics<Space, S>& kinematics, MatrixX<S>& J) const;
-  /// Its rows for the first rows.rows() of all directions of one constraint, imposed or not.
+  /// Rows of J for one cut joint, as many as `rows` has: directions imposed, then released ones.
   void JacobianOf(const Kinematics<Space, S>& kinematics, int joint,
                   Eigen::Ref<MatrixX<S>> rows) const;
 
   /// gamma, after Bias().
   void JacobianBias(const Kinematics<Space, S>& kinematics, VectorX<S>& gamma) const;
 
-  /// Wrenches that bodies still need for udot beyond applied forces and those of lambda, at their
-  /// centres of mass: what the joints of the forest transmit. Good until the next call of anything.
+  /// The wrench at each body's centre of mass that udot takes beyond applied forces and lambda: the
+  /// joints of the forest must transmit it. Good until the next call of any member function.
   std::span<const Motion<Space, S>> WrenchesLeft(const Kinematics<Space, S>& kinematics,
                                                  const VectorX<S>& udot, const VectorX<S>& lambda);
 

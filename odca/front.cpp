@@ -73,7 +73,8 @@ class Front {
     if (open == 1) NoteLast(body);
   }
 
-  /// The one joint to come of a body in the front, if it stays within the set, speaks for its end.
+  /// Called when a body of the front has one open joint left. Once that joint is closed the body
+  /// leaves the boundary, so the neighbour at its other end is counted as closing one body more.
   void NoteLast(int body) {
     if (noted_.contains(body)) return;
     for (const BodyGraph::End& end : graph_.ends(body)) {

@@ -5,8 +5,8 @@
 // *Pairing* grows the tree from below (pairing.h). All pairs of neighbouring assemblies wait in a
 // queue; the next pair has the smallest boundary after its join, in classes a factor sqrt(2) apart
 // (up to four bodies are one class), then the fewest bodies, also in powers of two, then exactly
-// the smallest boundary. A chain halves, arms are finished before their hub takes them, and what
-// would spread along a hub waits.
+// the smallest boundary. A chain becomes a balanced tree, arms are finished before their hub takes
+// them, and pairs whose boundary would grow along a hub come last.
 //
 // Where pairing makes large joins, there are two others. *Front* (front.h): one assembly takes body
 // after body; right for bodies between several hubs. *Dissection* (dissection.h) cuts from above; a

@@ -11,11 +11,11 @@
 //   phi = -X^+ (C b + c0 + C Z F)                                           (17, 64)
 //   Z' = Z - Z C^T X^+ C Z                                                  (26-28, 71)
 //   b' = b - Z C^T X^+ (C b + c0)                                           (29-30, 72)
-// X^+ = T^T T (loop_solver.h), so with V = T C Z and s = T (C b + c0): Z' = Z - V^T V, b' = b - V^T
-// s, phi = -T^T (s + V F). V and T are kept for the sweep of vectors (sweep.h).
+// X^+ is computed as T^T T (loop_solver.h). With V = T C Z and s = T (C b + c0) the last three are
+//   phi = -T^T (s + V F),    Z' = Z - V^T V,    b' = b - V^T s.
+// V and T are kept for the sweep of vectors (sweep.h).
 //
-// All memory is taken at construction; assembling allocates nothing, and holds no matrix larger
-// than the plan's largest join.
+// All memory is taken at construction, and no matrix is larger than the plan's largest join.
 #pragma once
 
 #include <memory>
@@ -56,7 +56,7 @@ class Joins {
   void Apply(const PlanNode& node, int n, S* v) const;
   void ApplyTransposed(const PlanNode& node, int n, S* v) const;
 
-  /// Some direction was left out or softened: then a solution deserves a correction.
+  /// Whether Assemble() left out or softened a direction: solutions are then refined (sweep.h).
   bool softened() const { return softened_; }
   int dependent_rows() const { return dependent_rows_; }
   S rcond() const { return rcond_; }

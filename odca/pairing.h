@@ -19,12 +19,12 @@ struct JoinSum {
   int handles = 0;    ///< of the largest join
 };
 
-/// Numbers by body of the whole graph, taken once for many small sets of bodies.
+/// Counts for every body of the graph; allocated once and reused for one set of bodies at a time.
 struct BodyMarks {
   explicit BodyMarks(int num_bodies) : part_of(num_bodies, -1), open(part_of), closing(part_of) {}
-  std::vector<int> part_of;  ///< -1 outside the set in hand
-  std::vector<int> open;     ///< joints still to come
-  std::vector<int> closing;  ///< of these, in the pair in hand
+  std::vector<int> part_of;  ///< the body's assembly; -1 outside the set that is being joined
+  std::vector<int> open;     ///< joints of the body that no join has closed yet
+  std::vector<int> closing;  ///< how many of these the pair under examination would close
 };
 
 /// Joins the assemblies of one connected set of bodies. An object of one use.

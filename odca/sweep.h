@@ -1,10 +1,10 @@
 // O-DCA's sweep of vectors over assembled joins (joins.h): free accelerations go up, forces come
 // down. Where rank was lost, a second sweep corrects the first.
 //
-// Loops are closed one after another. Where constraints depend on each other, an early closure may
-// be far worse conditioned than all of them together, and its round-off is then the sweep's. The
-// residual of the joints, r = C A + c0, shows it: A += sweep(b = 0, c0 = r), one step of iterative
-// refinement, takes the error e to e^2. A softened direction of weight w gets 1 - (1 - w)^2.
+// Joins close loops one after another. Where constraints depend on each other, one join may be far
+// worse conditioned than all constraints solved at once, and its round-off spoils the result. The
+// joints' residual r = C A + c0 shows that, and one step of iterative refinement, in place:
+//   A += sweep(b = 0, c0 = r),   squares the error; a softened weight w becomes 1 - (1 - w)^2.
 #pragma once
 
 #include "odca/joins.h"

@@ -24,10 +24,10 @@ struct Agreement {
 /// One for each record, in their order. Compared are accuracy runs that finished, of one scene
 /// (`scene_id`: its whole content) and horizon.
 ///
-/// At one tolerance runs that do not all end alike are all doubted: which of them are right their
-/// number does not say, for formulations at one level make the same mistakes. Finer tolerances do:
-/// where runs of more than one level or coordinate set all ended alike, coarser runs are doubted
-/// only if they ended elsewhere.
+/// Where the runs at one tolerance do not all end alike, all of them are doubted. The majority need
+/// not be right, because formulations at the same level make the same mistakes. A finer tolerance
+/// decides, if all runs there end alike and are of more than one level or coordinate set: then only
+/// those coarser runs are doubted that ended elsewhere.
 std::vector<Agreement> CompareFinalPoses(std::span<const Record> records);
 
 /// The largest difference of the final poses that two records both have: lengths over the link

@@ -4,8 +4,8 @@
 //                "in_space": false, "compile": false,
 //                "measure": ["rhs", "step"], "columns": [...]}]}
 // Paths are relative to the file; columns are those of experiments. "states" names a file of
-// hashes,
-// {"<member>/<coordinates>": "<16 hexadecimal digits>"}, that loopbench_bench --save-states writes.
+// hashes, which loopbench_bench --save-states writes:
+//   {"<member>/<coordinates>": "<16 hexadecimal digits>"}
 #pragma once
 
 #include <filesystem>

@@ -2,9 +2,9 @@
 //
 // Each piece runs in a fork of this program, under limits of its own, and answers with text through
 // a pipe. A crash, an overrun of time or memory, or silence is an ending with a name. Time is CPU
-// time: how many pieces share a processor, and for how long the machine is stopped, decides nothing
-// (child_watch.h). The caller
-// must have a single thread: a fork copies only the thread that calls it.
+// time: neither other work on the processor nor a pause of the machine decides anything
+// (child_watch.h).
+// The caller must have a single thread: a fork copies only the thread that calls it.
 #pragma once
 
 #include <cstddef>

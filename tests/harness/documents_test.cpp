@@ -1,13 +1,19 @@
-// The README's own mechanism, as a stranger types it: in a folder of his own, outside the
-// repository.
+// What the documents promise: the mechanism of docs/using.md, as a stranger types it, in a folder
+// of his own outside the repository; and that links and pictures lead to files that are there.
+#include <algorithm>
+#include <regex>
 #include <sstream>
+#include <string>
+#include <vector>
 
 #include "tests/harness/cli_fixture.h"
 
 namespace loopbench::harness {
 namespace {
 
-using ReadmeTest = CommandLineTest;
+using DocumentsTest = CommandLineTest;
+
+const fs::path kRoot = LOOPBENCH_SOURCE_DIR;
 
 /// What stands between the first fence after `words` and the next one.
 std::string BlockAfter(const std::string& text, const std::string& words) {
@@ -17,13 +23,37 @@ std::string BlockAfter(const std::string& text, const std::string& words) {
   return text.substr(begin, text.find("\n```", begin) - begin + 1);
 }
 
-TEST_F(ReadmeTest, ItsCommandsWorkInAFolderOutsideTheRepository) {
-  const std::string readme = ReadFile(fs::path(LOOPBENCH_SOURCE_DIR) / "README.md");
-  const std::string own = readme.substr(readme.find("## Your own mechanism"));
+/// The documents that people write: those of the root, of docs/ and of the rooms.
+std::vector<fs::path> Documents() {
+  std::vector<fs::path> documents;
+  for (const char* folder : {".", "docs", "mechanism", "odca", "lagrange", "reduction"}) {
+    for (const auto& entry : fs::directory_iterator(kRoot / folder)) {
+      if (entry.path().extension() == ".md") documents.push_back(entry.path());
+    }
+  }
+  std::ranges::sort(documents);
+  return documents;
+}
+
+/// Without blocks of code, in which brackets and parentheses are no links.
+std::string WithoutCode(const std::string& text) {
+  std::istringstream lines(text);
+  std::string prose;
+  bool code = false;
+  for (std::string line; std::getline(lines, line);) {
+    if (line.starts_with("```")) code = !code;
+    if (!code) prose += line + '\n';
+  }
+  return prose;
+}
+
+TEST_F(DocumentsTest, CommandsWorkInAFolderOutsideTheRepository) {
+  const std::string text = ReadFile(kRoot / "docs/using.md");
+  const std::string own = text.substr(text.find("## Your own mechanism"));
   for (const std::string file : {"slider-crank.json", "my-drift.json", "my-claims.json"}) {
-    const std::string text = BlockAfter(own, "`" + file + "`");
-    ASSERT_EQ(text.substr(0, 1), "{") << file;
-    Write(file, text);
+    const std::string block = BlockAfter(own, "`" + file + "`");
+    ASSERT_EQ(block.substr(0, 1), "{") << file;
+    Write(file, block);
   }
   std::istringstream commands(BlockAfter(own, "Then, with `loopbench`"));
   std::size_t count = 0;
@@ -41,11 +71,26 @@ TEST_F(ReadmeTest, ItsCommandsWorkInAFolderOutsideTheRepository) {
   EXPECT_GE(count, 9u);
 }
 
-TEST_F(ReadmeTest, AMissingFileIsSaidWithTheFolderItWasLookedForIn) {
+TEST_F(DocumentsTest, AMissingFileIsSaidWithTheFolderItWasLookedForIn) {
   ExpectEnding(Call("verdict out --claims configs/claims.json"), 2, {"out"});
   ExpectEnding(
       Call("check configs/claims.json"), 2,
       {"configs/claims.json: cannot be read: no such file, seen from " + folder_.string()});
+}
+
+TEST(Documents, LinksAndPicturesLeadToFilesOfTheRepository) {
+  const std::regex link(R"(\]\(([^)#]+)[^)]*\))");
+  std::size_t links = 0;
+  for (const fs::path& document : Documents()) {
+    const std::string text = WithoutCode(ReadFile(document));
+    for (std::sregex_iterator at(text.begin(), text.end(), link), end; at != end; ++at) {
+      const std::string target = (*at)[1];
+      if (target.find("://") != std::string::npos) continue;
+      EXPECT_TRUE(fs::exists(document.parent_path() / target)) << document << ": " << target;
+      ++links;
+    }
+  }
+  EXPECT_GE(links, 20u);
 }
 
 }  // namespace

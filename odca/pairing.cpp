@@ -82,6 +82,7 @@ JoinSum Pairing::Run(std::vector<Join>* joins) {
 
 int Pairing::BoundaryAfter(const Bond& bond) {
   int boundary = parts_[bond.a].boundary + parts_[bond.b].boundary;
+  sum_.looks += static_cast<long>(bond.joints.size());
   for (const auto& [a, b] : bond.joints) {
     for (int body : {a, b}) boundary -= ++marks_.closing[body] == marks_.open[body];
   }
@@ -125,6 +126,7 @@ void Pairing::Merge(int index, std::vector<Join>* joins) {
   into.bonds.erase(b);
   parts_[b].bonds.erase(a);
   const std::map<int, int> moved = std::move(parts_[b].bonds);
+  sum_.looks += static_cast<long>(moved.size());
   for (const auto& [other, old] : moved) {
     parts_[other].bonds.erase(b);
     Bond& from = bonds_[old];

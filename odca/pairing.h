@@ -17,6 +17,7 @@ namespace loopbench::odca {
 struct JoinSum {
   double cost = 0.0;  ///< multiply-adds
   int handles = 0;    ///< of the largest join
+  long looks = 0;     ///< joints looked at, again and again: what finding the list costs
 };
 
 /// Counts for every body of the graph; allocated once and reused for one set of bodies at a time.

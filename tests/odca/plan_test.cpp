@@ -5,11 +5,13 @@
 #include <gtest/gtest.h>
 
 #include <cmath>
+#include <functional>
 #include <numeric>
 #include <set>
 
 #include "mechanism/library.h"
 #include "odca/odca.h"
+#include "odca/pairing.h"
 #include "tests/contract/comparison.h"
 
 namespace loopbench::odca {
@@ -285,14 +287,43 @@ TEST(PlanTest, OperationsAreThoseOfTheSweep) {
   }
 }
 
+std::vector<PlanJoint> ChainOf(int bodies) {
+  std::vector<PlanJoint> joints;
+  for (int j = 0; j <= bodies; ++j) joints.push_back({j, j, j < bodies ? j + 1 : 0, 2});
+  return joints;
+}
+
+/// Joints looked at while the joins of all bodies are put in order.
+long Looks(int num_bodies, const std::vector<PlanJoint>& joints) {
+  std::vector<int> waiting(static_cast<std::size_t>(num_bodies), 0);
+  const BodyGraph graph(num_bodies, joints, waiting);
+  BodyMarks marks(num_bodies);
+  std::vector<int> bodies;
+  for (int body = 1; body < num_bodies; ++body) {
+    marks.part_of[body] = body - 1;
+    bodies.push_back(body);
+  }
+  std::vector<Join> joins;
+  return Pairing(graph, bodies, bodies, 3, &marks).Run(&joins).looks;
+}
+
 TEST(PlanTest, PlanningIsNearlyLinear) {
-  // what is quadratic in these numbers takes minutes, and the test its time limit
+  const auto arms = [](int n) { return Looks(n + 2, Spokes(n, false)); };
+  const auto wheel = [](int n) { return Looks(n + 2, Spokes(n, true)); };
+  const auto chain = [](int n) { return Looks(n + 1, ChainOf(n)); };
+  for (const auto& looks : std::vector<std::function<long(int)>>{arms, wheel, chain}) {
+    const long few = looks(1000);
+    EXPECT_GE(few, 1000);
+    // n log n would be 16 log(16000) / log(1000) = 22.4 times as many, n^2 256 times
+    EXPECT_LE(looks(16000), 22.4 * static_cast<double>(few));
+  }
+}
+
+TEST(PlanTest, BoundariesStayFewInLargeGraphs) {
   constexpr int kMany = 100000;
   EXPECT_EQ(Plan(kMany + 2, Spokes(kMany, false)).most_handles(), 2);
   EXPECT_LE(Plan(kMany + 2, Spokes(kMany, true)).most_handles(), 8);
-  std::vector<PlanJoint> chain;
-  for (int j = 0; j <= kMany; ++j) chain.push_back({j, j, j < kMany ? j + 1 : 0, 2});
-  EXPECT_LE(Plan(kMany + 1, chain).most_handles(), 4);
+  EXPECT_LE(Plan(kMany + 1, ChainOf(kMany)).most_handles(), 4);
 }
 
 TEST(PlanTest, PlanIsAFunctionOfTheGraph) {

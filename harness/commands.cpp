@@ -63,10 +63,9 @@ int Run(const RunCommand& command, const std::string& typed) {
                count.failed > 0 ? fmt::format(" ({} not finished)", count.failed) : "",
                count.skipped);
   }
-  const bool is_file = out.extension() == ".jsonl";  // its tables stand beside it
   std::vector<Record> records = RecordsOf(count.ids, ReadRecords(out));
   SetDoubts(&records);
-  WriteTables(records, is_file ? out.parent_path() : out, typed);
+  WriteTables(records, out, typed);
   Print("results in {}\n", out.string());
   return command.gate.empty() ? 0 : DoubtGate(records);
 }

@@ -19,9 +19,9 @@ namespace loopbench::harness {
 /// stand beside each other; warnings about it go to standard error.
 std::vector<Record> LoadRecords(const std::filesystem::path& store);
 
-/// drift.csv, drift.md and so on of precision and timing in `out`, and their short forms on the
-/// terminal.
-void WriteTables(const std::vector<Record>& records, const std::filesystem::path& out,
+/// drift.csv, drift.md and so on of precision and timing, of all that a store holds: in its folder,
+/// or beside a store that is a file, named after it. Short forms of `asked` go to the terminal.
+void WriteTables(const std::vector<Record>& asked, const std::filesystem::path& store,
                  const std::string& typed);
 
 /// 1 when an accuracy run among `rows` did not finish or has doubts, and says how many; else 0.
@@ -78,9 +78,6 @@ int PrintPlans(const PlanCommand& command);
 /// Mechanisms are analysed in a child process under `limits`; 2 for one that they cut off. `all`:
 /// every row of long tables.
 int Explain(const ExperimentFiles& files, bool all, const ProcessLimits& limits);
-/// Prints what a mechanism is made of, its start and its structure; 2 when the start cannot be
-/// assembled, after all else.
-int ExplainMechanism(const std::filesystem::path& path, bool all);
 
 struct TableCommand {
   std::filesystem::path store;

@@ -13,6 +13,7 @@
 #include "harness/origin.h"
 #include "harness/provenance.h"
 #include "harness/report/table.h"
+#include "harness/store/contents.h"
 #include "harness/store/files.h"
 #include "harness/store/measurements.h"
 #include "harness/terminal.h"
@@ -191,8 +192,9 @@ std::string Conclusion(const ComparisonReport& comparison, int code) {
 }  // namespace
 
 int PrintComparison(const CompareCommand& command, const std::string& typed) {
-  const std::vector<Record> base = LoadMeasurements(command.base);
-  const std::vector<Record> fresh = LoadMeasurements(command.fresh);
+  std::vector<Record> base = LoadMeasurements(command.base);
+  std::vector<Record> fresh = LoadMeasurements(command.fresh);
+  ShareContents(&base, &fresh);
   const ComparisonReport comparison = Compare(base, fresh, command.options);
   const int code = comparison.ExitCode(command.options);
 

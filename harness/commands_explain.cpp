@@ -1,4 +1,6 @@
 // explain: what an experiment runs and measures, in sentences.
+#include "harness/commands_explain.h"
+
 #include <fmt/format.h>
 
 #include <algorithm>
@@ -251,13 +253,15 @@ void ExplainExperiment(const std::filesystem::path& path, const ExperimentFiles&
 }  // namespace
 
 int Explain(const ExperimentFiles& files, bool all, const ProcessLimits& limits) {
+  // the child that does the work prints into memory, and sees no terminal
+  const ExplainView view = ViewOfTerminal(all);
   int exit_code = 0;
   for (const auto& path : files.paths) {
     if (KindOfFile(path) != FileKind::kMechanism) {
       ExplainExperiment(path, files);
     } else if (files.settings.empty() && files.filter.empty()) {
-      const int code = PrintFromChild(path.string(), limits,
-                                      [&path, all] { return ExplainMechanism(path, all); });
+      const int code =
+          PrintFromChild(path.string(), limits, [&] { return ExplainMechanism(path, view); });
       exit_code = std::max(exit_code, code);
     } else {
       throw ConfigError(fmt::format(

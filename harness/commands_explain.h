@@ -2,6 +2,7 @@
 #pragma once
 
 #include <cstddef>
+#include <filesystem>
 #include <string>
 #include <vector>
 
@@ -33,6 +34,10 @@ std::string Spaced(const Vector& vector) {
   }
   return text;
 }
+
+/// Prints what a mechanism is made of, its start and its structure; 2 when the start cannot be
+/// assembled, after all else.
+int ExplainMechanism(const std::filesystem::path& path, const ExplainView& view);
 
 /// What a file says: gravity, bodies, joints, their frames, forces.
 void PrintModel(const MechanismDescription& description, const Structure& structure,

@@ -66,6 +66,10 @@ void PrintFreedom(const Structure& s) {
         "  first order falls back to it\n");
     return;
   }
+  if (s.freedom_of_parts) {
+    Print("  {} that lead anywhere: a part cannot move, see Warnings\n", *s.freedom_of_parts);
+    return;
+  }
   if (s.freedom_at_start() != s.freedom()) {
     Print("  {} at the start, a singular position: rank {} there\n", s.freedom_at_start(), s.rank);
   }
@@ -168,13 +172,12 @@ void PrintPlanOfJoins(const MechanismDescription& description, const ExplainView
 
 }  // namespace
 
-int ExplainMechanism(const std::filesystem::path& path, bool all) {
+int ExplainMechanism(const std::filesystem::path& path, const ExplainView& view) {
   const MechanismDescription description = ReadMechanism(path).description;
   const Structure structure = AnalyseStructure(description);
   const std::vector<Warning> warnings = FindWarnings(description, structure);
   Print("{} ({})\n  described in {}; lengths in m, angles in rad\n", description.name,
         path.string(), description.space == SpaceKind::kPlanar ? "the plane" : "space");
-  const ExplainView view = ViewOfTerminal(all);
   PrintModel(description, structure, view);
   PrintStart(description, structure, view);
   PrintFreedom(structure);

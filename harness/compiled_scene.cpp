@@ -18,7 +18,11 @@ CompiledScene CompileScene(const MechanismDescription& description, const SceneO
                            CompileOptions options) {
   const bool angles = !observe.branch_invariants.empty() || observe.closed_form.has_value();
   if (angles) options.islands = false;
-  if (angles && description.space == SpaceKind::kSpatial) options = CompileOptions::None();
+  if (angles && description.space == SpaceKind::kSpatial) {  // no body may change its axes
+    const bool redundancy = options.redundancy;
+    options = CompileOptions::None();
+    options.redundancy = redundancy;
+  }
   CompiledScene scene{Compile(description, options), observe};
   if (scene.compiled.done == CompileOptions::None()) return scene;
   const std::vector<BodyDescription>& bodies = scene.compiled.parts.front().description.bodies;

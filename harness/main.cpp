@@ -25,9 +25,10 @@ void AddSettings(CLI::App* app, std::vector<std::string>* settings) {
       ->allow_extra_args(false);
 }
 
-void AddGate(CLI::App* app, std::string* gate) {
-  app->add_option("--gate", *gate,
-                  "doubts: exit with 1 if an accuracy run shown did not finish or has doubts")
+CLI::Option* AddGate(CLI::App* app, std::string* gate) {
+  return app
+      ->add_option("--gate", *gate,
+                   "doubts: exit with 1 if an accuracy run shown did not finish or has doubts")
       ->check(CLI::IsMember({"doubts"}));
 }
 
@@ -145,15 +146,17 @@ int Main(int argc, char** argv) {
   run_app->add_option("--rerun", rerun, "Cases to run although the store has them")
       ->check(CLI::IsMember({"none", "failed", "all"}))
       ->capture_default_str();
-  AddGate(run_app, &run.gate);
+  CLI::Option* gate = AddGate(run_app, &run.gate);
   run_app->footer(
       "A run that was interrupted goes on where it stopped: give the same command again.");
   CLI::Option* no = run_app->add_flag("--no-timing", no_timing, "Leave the timings out");
   CLI::Option* timings =
       run_app->add_flag("--timing-only", timing_only, "Only the timings")->excludes(no);
+  timings->excludes(gate);  // which judges accuracy runs
   run_app->add_flag("--precision-only", precision_only, "Only the runs in several scalars")
       ->excludes(no)
-      ->excludes(timings);
+      ->excludes(timings)
+      ->excludes(gate);
 
   CLI::App* list_app = app.add_subcommand("list", "Show the cases of experiments");
   list_app->add_option("experiment", files.paths, "Experiment files (JSON)")->required();

@@ -6,9 +6,13 @@
 #include <limits>
 
 #include "mechanism/assembly_units.h"
+#include "mechanism/compile.h"
 #include "mechanism/conflict.h"
 #include "mechanism/dense_memory.h"
+#include "mechanism/excursion.h"
+#include "mechanism/islands.h"
 #include "mechanism/mobility.h"
+#include "mechanism/redundancy.h"
 #include "mechanism/tree_dynamics.h"
 
 namespace loopbench {
@@ -276,19 +280,40 @@ class Assembler {
   }
 
   void CheckMobility() {
-    const std::string why = WhyLocked(mechanism_, start_.q);
-    if (why.empty()) return;
-    start_.outcome = Outcome::kLocked;
-    start_.message = mechanism_.name() + ": nothing can move: " + why;
+    if (const std::string why = WhyLocked(mechanism_, start_.q); !why.empty()) {
+      start_.outcome = Outcome::kLocked;
+      start_.message = mechanism_.name() + ": nothing can move: " + why;
+    } else {
+      CheckMobilityOfParts();
+    }
   }
 
-  /// A length that no position exceeds much, in units: the longest arm of a body, or the
+  /// A part that stands in a singular position it cannot leave would start to move along speeds
+  /// that lead nowhere. One without such speeds stays where it is, whatever others do.
+  void CheckMobilityOfParts() {
+    if (mechanism_.num_u() > kMostAnalysedSpeeds || FindIslands(description_).size() < 2) return;
+    if (Excursion<Space>(mechanism_, start_.q).rank() == mechanism_.num_rows()) return;
+    CompileOptions options = CompileOptions::None();
+    options.islands = true;
+    for (const CompiledPart& part : Compile(description_, options).parts) {
+      const Mechanism<Space, double> own(part.description, Coordinates::kJoint);
+      const Start<double> start = Assembler(part.description, own).Run();
+      if (start.outcome != Outcome::kLocked) continue;
+      if (Excursion<Space>(own, start.q).freedom() == 0) continue;
+      start_.outcome = Outcome::kLocked;
+      start_.message = mechanism_.name() + ": the part of body \"" +
+                       part.description.bodies[1].name +
+                       "\" cannot move, though others can: " + WhyLocked(own, start.q);
+      return;
+    }
+  }
+
+  /// A length that no position exceeds much, in units: the longest arm of a body or Ground, or the
   /// mechanism's own length, for every joint.
   double Extent() const {
     double longest = mechanism_.length();
     for (const Joint<Space, double>& joint : mechanism_.joints()) {
-      if (joint.from != kGround) longest = std::max(longest, joint.X_PF.p.norm());
-      if (joint.to != kGround) longest = std::max(longest, joint.X_QM.p.norm());
+      longest = std::max({longest, joint.X_PF.p.norm(), joint.X_QM.p.norm()});
     }
     return longest / units_.length * static_cast<double>(mechanism_.joints().size() + 1);
   }

@@ -21,7 +21,7 @@ bool Drives<Space, S>::Followed(const Kinematics<Space, S>& kinematics, const Ve
     if (feedback.size() > 0) {
       left.head(joint.num_constraints()) += feedback.segment(joint.row, joint.num_constraints());
     }
-    worst = std::max(worst, left.norm());
+    worst = std::max(worst, S(left.head(joint.num_constraints()).norm()));  // released ones follow
     size = std::max(
         {size, A_[joint.from].norm(), A_[joint.to].norm(), kinematics.joints()[index].g.norm()});
   }

@@ -44,11 +44,13 @@ void Excursion<Space>::Factor() {
   if (here_.rows.size() == 0) return;
   // independent rows are the rule, and cheap to recognise; their diagonal is at most one
   constexpr double kSurely = 1e-2;
-  const Eigen::LLT<Eigen::MatrixXd> cholesky(here_.rows * here_.rows.transpose());
-  if (cholesky.info() == Eigen::Success) {
-    conditioning_ = cholesky.matrixLLT().diagonal().minCoeff();
-    rank_ = static_cast<int>(here_.rows.rows());
-    if (conditioning_ > kSurely) return;
+  if (here_.rows.rows() <= here_.rows.cols()) {
+    const Eigen::LLT<Eigen::MatrixXd> cholesky(here_.rows * here_.rows.transpose());
+    if (cholesky.info() == Eigen::Success) {
+      conditioning_ = cholesky.matrixLLT().diagonal().minCoeff();
+      rank_ = static_cast<int>(here_.rows.rows());
+      if (conditioning_ > kSurely) return;
+    }
   }
   // between rigid parts all is round-off
   const double largest = here_.rows.colwise().norm().maxCoeff();

@@ -3,6 +3,7 @@
 #include <Eigen/LU>
 #include <algorithm>
 #include <cmath>
+#include <limits>
 #include <numeric>
 #include <span>
 #include <stdexcept>
@@ -14,6 +15,10 @@
 namespace loopbench {
 
 namespace {
+
+/// Joints of a body that are nearer to each other than this part of its size are on one pin, and so
+/// are those that the rounding of their places tells apart.
+constexpr double kOnePin = 1e-9;
 
 /// The frame at `position` turned by `rotation`, which in the plane is `angle`, in the user's body
 /// axes.
@@ -182,10 +187,23 @@ void Mechanism<Space, S>::AddGeometry(const MechanismDescription& description) {
   for (const Joint<Space, S>& joint : joints_) {
     if (joint.num_directions() == 0) continue;  // a free joint holds nothing
     for (const auto& [body, p] : {std::pair{joint.from, joint.X_PF.p}, {joint.to, joint.X_QM.p}}) {
-      // joints on one pin count once: how many there are says nothing about the body's shape
-      std::vector<Point>& points = joints_of[body];
-      if (body != kGround && std::ranges::find(points, p) == points.end()) points.push_back(p);
+      if (body != kGround) joints_of[body].push_back(p);
     }
+  }
+  // joints on one pin count once: how many there are says nothing about the body's shape
+  for (std::vector<Point>& points : joints_of) {
+    S nearest = S(0);
+    for (const Point& p : points) {
+      nearest = std::max({nearest, S(S(kOnePin) * (p - points[0]).norm()),
+                          S(S(16) * std::numeric_limits<S>::epsilon() * p.norm())});
+    }
+    std::vector<Point> apart;
+    for (const Point& p : points) {
+      const bool known = std::ranges::any_of(
+          apart, [&](const Point& other) { return !((p - other).norm() > nearest); });
+      if (!known) apart.push_back(p);
+    }
+    points = std::move(apart);
   }
   geometric_centres_.assign(bodies_.size(), Point::Zero());
   for (std::size_t body = 0; body < bodies_.size(); ++body) {
@@ -211,7 +229,9 @@ void Mechanism<Space, S>::AddGeometry(const MechanismDescription& description) {
   std::iota(all.begin(), all.end(), 0);
   length_ = length(all);
   geometric_bodies_.assign(bodies_.size(), {});
-  for (const Island& island : FindIslands(description)) {
+  MechanismDescription bare = description;
+  bare.forces.clear();  // joints decide, not springs
+  for (const Island& island : FindIslands(bare)) {
     const S radius = length(island.bodies);
     for (int body : island.bodies) {
       geometric_bodies_[body].mass = S(1);

@@ -7,6 +7,7 @@
 #include "mechanism/excursion.h"
 #include "mechanism/redundancy.h"
 #include "mechanism/singular_values.h"
+#include "mechanism/tree_dynamics.h"
 
 namespace loopbench {
 
@@ -16,6 +17,9 @@ namespace {
 constexpr int kTrials = 12;
 constexpr double kTrialDistance = 0.02;
 
+/// Self-stresses and speeds that constraints leave, above which nobody tries: both are squared.
+constexpr Eigen::Index kMostTried = 64;
+
 /// Whether a self-stress s of the constraints e proves that nothing moves: along every speed v with
 /// J v = 0 the second derivative of s^T e has one and the same sign, so that no acceleration, to
 /// which s^T J = 0 is blind, can keep e at zero (second-order rigidity: Connelly and Whiteley, SIAM
@@ -24,34 +28,38 @@ template <class Space>
 bool IsRigidToSecondOrder(const Mechanism<Space, double>& mechanism, const VectorX<double>& q,
                           int rank) {
   Kinematics<Space, double> kinematics(mechanism);
+  TreeDynamics<Space, double> dynamics(mechanism);
   kinematics.UpdatePosition(q);
-  const DirectionRows here = RowsOfDirections(kinematics);
-  const Eigen::JacobiSVD<Eigen::MatrixXd> svd(here.rows, Eigen::ComputeFullU | Eigen::ComputeFullV);
-  const Eigen::MatrixXd stresses = svd.matrixU().rightCols(here.rows.rows() - rank);
-  const Eigen::Index free = here.rows.cols() - rank;
-  const Eigen::MatrixXd speeds = here.mass.matrixU().solve(svd.matrixV().rightCols(free));
-  // a difference of mismatches that are round-off at q, with an error of the order of its square
-  constexpr double kStep = 1e-4;
+  MatrixX<double> M, J(mechanism.num_rows(), mechanism.num_u());
+  dynamics.MassMatrix(kinematics, Masses::kGeometric, M);
+  dynamics.Jacobian(kinematics, J);
+  const Eigen::LLT<Eigen::MatrixXd> mass(M);
+  Eigen::MatrixXd rows = mass.matrixL().solve(J.transpose()).transpose();
+  const Eigen::VectorXd size = rows.rowwise().norm().cwiseMax(1e-300);
+  rows = size.cwiseInverse().asDiagonal() * rows;
+  const Eigen::JacobiSVD<Eigen::MatrixXd> svd(rows, Eigen::ComputeFullU | Eigen::ComputeFullV);
+  const Eigen::MatrixXd stresses = svd.matrixU().rightCols(rows.rows() - rank);
+  const Eigen::Index free = rows.cols() - rank;
+  if (free > kMostTried || stresses.cols() > kMostTried) return false;
+  const Eigen::MatrixXd speeds = mass.matrixU().solve(svd.matrixV().rightCols(free));
+  // J udot = gamma(v) is e'' = 0, so that e'' is -gamma where nothing accelerates
+  VectorX<double> h(mechanism.num_u()), gamma(mechanism.num_rows());
+  double largest = 0.0;
   const auto second = [&](const Eigen::VectorXd& v) {
-    Eigen::VectorXd sum = Eigen::VectorXd::Zero(here.rows.rows());
-    for (const double sign : {1.0, -1.0}) {
-      VectorX<double> rate(q.size());
-      mechanism.Rates(q, VectorX<double>(v * (sign * kStep)), rate);
-      VectorX<double> moved = q + rate;
-      mechanism.Normalise(moved);
-      kinematics.UpdatePosition(moved);
-      sum += RowsOfDirections(kinematics).mismatch;
-    }
-    return Eigen::VectorXd(sum / (kStep * kStep));
+    kinematics.UpdateVelocity(v);
+    dynamics.Bias(kinematics, h);
+    dynamics.JacobianBias(kinematics, gamma);
+    const Eigen::VectorXd scaled = gamma.cwiseQuotient(size);
+    largest = std::max(largest, scaled.norm());
+    return Eigen::VectorXd(-stresses.transpose() * scaled);
   };
   // by polarisation, all self-stresses at once
   std::vector<Eigen::MatrixXd> forms(static_cast<std::size_t>(stresses.cols()),
                                      Eigen::MatrixXd::Zero(free, free));
   for (Eigen::Index i = 0; i < free; ++i) {
     for (Eigen::Index j = 0; j <= i; ++j) {
-      const Eigen::VectorXd along =
-          stresses.transpose() * second(i == j ? Eigen::VectorXd(speeds.col(i))
-                                               : Eigen::VectorXd(speeds.col(i) + speeds.col(j)));
+      const Eigen::VectorXd along = second(i == j ? Eigen::VectorXd(speeds.col(i))
+                                                  : Eigen::VectorXd(speeds.col(i) + speeds.col(j)));
       for (std::size_t s = 0; s < forms.size(); ++s) {
         double value = along[static_cast<Eigen::Index>(s)];
         if (i != j) value = 0.5 * (value - forms[s](i, i) - forms[s](j, j));
@@ -62,13 +70,15 @@ bool IsRigidToSecondOrder(const Mechanism<Space, double>& mechanism, const Vecto
   Eigen::MatrixXd all = Eigen::MatrixXd::Zero(free, free);
   for (const Eigen::MatrixXd& form : forms) all += form;
   forms.push_back(all);
-  constexpr double kDefinite = 1e-5;  // some ten times the error of the differences
-  return std::ranges::any_of(forms, [&](const Eigen::MatrixXd& form) {
-    const Eigen::VectorXd values =
-        Eigen::SelfAdjointEigenSolver<Eigen::MatrixXd>(form, Eigen::EigenvaluesOnly).eigenvalues();
-    const double least = kDefinite * values.cwiseAbs().maxCoeff();
-    return least > 0.0 && (values.minCoeff() > least || values.maxCoeff() < -least);
-  });
+  // the start closes to some 1e-10 of its size, and the self-stresses are as good
+  constexpr double kDefinite = 1e-8;
+  const double least = kDefinite * largest;
+  return largest > 0.0 && std::ranges::any_of(forms, [&](const Eigen::MatrixXd& form) {
+           const Eigen::VectorXd values =
+               Eigen::SelfAdjointEigenSolver<Eigen::MatrixXd>(form, Eigen::EigenvaluesOnly)
+                   .eigenvalues();
+           return values.minCoeff() > least || values.maxCoeff() < -least;
+         });
 }
 
 }  // namespace

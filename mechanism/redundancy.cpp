@@ -6,6 +6,7 @@
 #include <limits>
 
 #include "mechanism/assembly.h"
+#include "mechanism/compile.h"
 #include "mechanism/excursion.h"
 #include "mechanism/row_choice.h"
 
@@ -18,10 +19,17 @@ namespace {
 constexpr double kApart = 0.15;
 int Positions(int speeds) { return speeds <= 40 ? 48 : 6; }
 
+/// What a choice costs that imposes some moments of a joint in space and not all. Rates of rotation
+/// are no derivatives of angles: with both moments of a pin imposed its axis stays as far off as it
+/// is, with one of them the mismatch of the other turns into its own, and grows exponentially. As
+/// much as the largest coefficients that a choice of forces was seen to have over a turn.
+constexpr double kSomeMoments = 200.0;
+
 /// Largest mismatch of a released direction per unit of the imposed ones (both scaled as rows), the
 /// loops being as they are at one position: the released rows in terms of the imposed ones.
 double Amplification(const DirectionRows& at, const std::vector<bool>& imposed) {
   const Eigen::Index kept = std::ranges::count(imposed, true);
+  if (kept == 0) return 0.0;
   Eigen::MatrixXd K(kept, at.rows.cols()), out(at.rows.rows() - kept, at.rows.cols());
   Eigen::Index k = 0, o = 0;
   for (Eigen::Index r = 0; r < at.rows.rows(); ++r) {
@@ -48,18 +56,81 @@ std::vector<bool> BestRows(const DirectionRows& at, const std::vector<bool>& mus
   return choice.taken();
 }
 
-/// Every way to impose `rank` of few rows; none where there are many ways.
-std::vector<std::vector<bool>> AllChoices(int rows, int rank) {
-  constexpr int kMostRows = 8;
+/// Every way to impose as many rows of first .. first + count - 1 as `imposed` does, the others as
+/// they are.
+std::vector<std::vector<bool>> OtherChoices(const std::vector<bool>& imposed, int first,
+                                            int count) {
+  const auto begin = imposed.begin() + first;
+  const auto kept = std::count(begin, begin + count, true);
   std::vector<std::vector<bool>> all;
-  if (rows > kMostRows) return all;
-  for (unsigned bits = 0; bits < (1u << rows); ++bits) {
-    if (std::popcount(bits) != rank) continue;
-    std::vector<bool> imposed;
-    for (int r = 0; r < rows; ++r) imposed.push_back((bits >> r & 1u) != 0);
-    all.push_back(imposed);
+  for (unsigned bits = 0; bits < (1u << count); ++bits) {
+    if (std::popcount(bits) != kept) continue;
+    std::vector<bool> other = imposed;
+    for (int i = 0; i < count; ++i) other[static_cast<std::size_t>(first + i)] = (bits >> i & 1u);
+    all.push_back(std::move(other));
   }
   return all;
+}
+
+/// `moments_of` has the joint of each row that is one of several moments, else -1.
+bool ImposesSomeMoments(const std::vector<bool>& imposed, const std::vector<int>& moments_of) {
+  for (std::size_t r = 0; r < imposed.size(); ++r) {
+    for (std::size_t other = 0; other < r && moments_of[r] >= 0; ++other) {
+      if (moments_of[other] == moments_of[r] && imposed[other] != imposed[r]) return true;
+    }
+  }
+  return false;
+}
+
+/// The choice that serves best where it serves worst: of the best ones of each position, then
+/// changed, joint by joint and row for row, for as long as that helps. Joints that keep all their
+/// rows (`must`) have no choice.
+std::vector<bool> BestChoice(const std::vector<DirectionRows>& positions,
+                             const std::vector<bool>& must, const std::vector<int>& moments_of,
+                             int rank) {
+  double least = std::numeric_limits<double>::infinity();
+  std::size_t hardest = 0;
+  std::vector<bool> chosen(must.size(), true);
+  const auto consider = [&](const std::vector<bool>& candidate) {
+    for (std::size_t r = 0; r < must.size(); ++r) {
+      if (must[r] && !candidate[r]) return false;
+    }
+    const double cost = ImposesSomeMoments(candidate, moments_of) ? kSomeMoments : 1.0;
+    // where the last candidate failed this one will fail, too
+    double worst = cost * Amplification(positions[hardest], candidate);
+    for (std::size_t p = 0; p < positions.size() && worst < least; ++p) {
+      const double here = cost * Amplification(positions[p], candidate);
+      if (!(here < least)) hardest = p;
+      worst = std::max(worst, here);
+    }
+    if (!(worst < least)) return false;
+    least = worst;
+    chosen = candidate;
+    return true;
+  };
+  for (const DirectionRows& at : positions) consider(BestRows(at, must, rank));
+  // joints of many rows together would take minutes, and gain little
+  constexpr std::size_t kMostRows = 40;
+  if (must.size() > kMostRows) return chosen;
+  const DirectionRows& first = positions.front();
+  for (bool better = true; better;) {
+    better = false;
+    for (std::size_t c = 0; c < first.first.size(); ++c) {
+      for (const auto& other : OtherChoices(chosen, first.first[c], first.count[c])) {
+        better = consider(other) || better;
+      }
+    }
+    for (std::size_t in = 0; in < must.size(); ++in) {
+      for (std::size_t out = 0; out < must.size(); ++out) {
+        if (chosen[in] || !chosen[out] || must[out]) continue;
+        std::vector<bool> other = chosen;
+        other[in] = true;
+        other[out] = false;
+        better = consider(other) || better;
+      }
+    }
+  }
+  return chosen;
 }
 
 /// Whether all speeds that the constraints leave free lead to motions, as they do where constraints
@@ -79,6 +150,7 @@ bool IsRegular(const Excursion<Space>& position) {
   return true;
 }
 
+/// Of one part: bodies that joints connect.
 template <class Space>
 Redundancy Find(const MechanismDescription& description) {
   Redundancy result;
@@ -101,16 +173,22 @@ Redundancy Find(const MechanismDescription& description) {
 
   // positions of the largest rank met
   std::vector<DirectionRows> positions = {excursion.rows()};
-  Excursion<Space> last = excursion;
+  Excursion<Space> best = excursion;
   for (int k = 1; k <= Positions(mechanism.num_u()) && result.rank < result.rows; ++k) {
     if (excursion.Step(kApart, k) != StepKind::kMoved) continue;
     if (excursion.rank() < result.rank) continue;
-    if (excursion.rank() > result.rank) positions.clear();
+    const bool more = excursion.rank() > result.rank;
+    if (more) positions.clear();
     result.rank = excursion.rank();
     positions.push_back(excursion.rows());
-    last = excursion;
+    if (more || excursion.conditioning() > best.conditioning()) best = excursion;
   }
-  if (!IsRegular(last)) result.rank = std::min(result.rows, mechanism.num_u());
+  // what moves has a speed left
+  const bool moves = positions.size() > 1;
+  if (!IsRegular(best)) {
+    result.rank = std::min(result.rows, mechanism.num_u() - (moves ? 1 : 0));
+    return result;
+  }
   if (result.rank == result.rows || result.rank == mechanism.num_u()) return result;
 
   // axes of directions are other ones where a coordinate is prescribed: such a joint keeps all
@@ -121,26 +199,15 @@ Redundancy Find(const MechanismDescription& description) {
     const bool keeps = !description.joints[constraints[c]].motions.empty();
     for (int i = 0; keeps && i < first.count[c]; ++i) must[first.first[c] + i] = true;
   }
-  // candidates are all choices, or the best one of each position
-  std::vector<std::vector<bool>> candidates = AllChoices(result.rows, result.rank);
-  if (candidates.empty()) {
-    for (const DirectionRows& at : positions) candidates.push_back(BestRows(at, must, result.rank));
-  }
-  double least = std::numeric_limits<double>::infinity();
-  std::vector<bool> chosen(must.size(), true);
-  for (const std::vector<bool>& candidate : candidates) {
-    bool allowed = true;
-    for (std::size_t r = 0; r < must.size(); ++r) allowed = allowed && (candidate[r] || !must[r]);
-    if (!allowed) continue;
-    double worst = 0.0;
-    for (const DirectionRows& at : positions) {
-      worst = std::max(worst, Amplification(at, candidate));
-      if (!(worst < least)) break;
+  std::vector<int> moments_of(must.size(), -1);
+  for (std::size_t c = 0; c < constraints.size() && Space::kRot == 3; ++c) {
+    const auto& kind = *mechanism.joints()[constraints[c]].kind;
+    for (int i = 0; i < kind.num_constraints(); ++i) {
+      const bool moment = kind.axes[kind.num_u + i] < Space::kRot;
+      if (moment) moments_of[first.first[c] + i] = static_cast<int>(c);
     }
-    if (!(worst < least)) continue;
-    least = worst;
-    chosen = candidate;
   }
+  const std::vector<bool> chosen = BestChoice(positions, must, moments_of, result.rank);
   for (std::size_t c = 0; c < constraints.size(); ++c) {
     Released out{constraints[c], {}};
     for (int i = 0; i < first.count[c]; ++i) {
@@ -153,9 +220,35 @@ Redundancy Find(const MechanismDescription& description) {
 
 }  // namespace
 
+/// Each part by itself: neither its size nor whether it can move at all concerns another's.
 Redundancy FindRedundancy(const MechanismDescription& description) {
-  return description.space == SpaceKind::kPlanar ? Find<Planar>(description)
-                                                 : Find<Spatial>(description);
+  MechanismDescription bare = description;
+  bare.forces.clear();  // connect parts and constrain nothing
+  CompileOptions options = CompileOptions::None();
+  options.islands = true;
+  const Compiled compiled = Compile(bare, options);
+  Redundancy whole;
+  for (std::size_t p = 0; p < compiled.parts.size(); ++p) {
+    const MechanismDescription& part = compiled.parts[p].description;
+    const Redundancy found =
+        part.space == SpaceKind::kPlanar ? Find<Planar>(part) : Find<Spatial>(part);
+    whole.rows += found.rows;
+    whole.rank += found.rank;
+    whole.rank_at_start += found.rank_at_start;
+    std::vector<int> joints(part.joints.size(), -1);  // of the description
+    for (std::size_t j = 0; j < compiled.joints.size(); ++j) {
+      const JointImage& image = compiled.joints[j];
+      if (image.part == static_cast<int>(p)) joints[image.joint] = static_cast<int>(j);
+    }
+    for (const int joint : found.cut) whole.cut.push_back(joints[joint]);
+    for (Released out : found.released) {
+      out.joint = joints[out.joint];
+      whole.released.push_back(std::move(out));
+    }
+  }
+  std::ranges::sort(whole.cut);
+  std::ranges::sort(whole.released, {}, &Released::joint);
+  return whole;
 }
 
 std::string NameOfDirection(const MechanismDescription& description, int joint, int direction) {

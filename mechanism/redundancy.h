@@ -36,8 +36,9 @@ struct Redundancy {
   std::vector<int> cut;  ///< joints that close loops: only these release
 };
 
-/// Of a description whose start can be assembled; without one, and above kMostAnalysedSpeeds, all
-/// is zero. Prescribed motions are left free: what they contradict is no matter of structure.
+/// The sum over the parts of a description, each looked at by itself. Of parts whose start cannot
+/// be assembled, and of those above kMostAnalysedSpeeds, only `cut` is known. Prescribed motions
+/// are left free: what they contradict is no matter of structure.
 Redundancy FindRedundancy(const MechanismDescription& description);
 
 /// A constrained direction of a joint in words: "the moment about x of its frame on rod".

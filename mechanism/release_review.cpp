@@ -48,8 +48,21 @@ const std::vector<Released>* ReleaseReview<Space, S>::Review(const Kinematics<Sp
   }
   RowChoice best(scaled.rows, quotas);
   best.TakeFixed();
+  // moments in space stay as they are: some of a joint's without the others serve badly in time
+  std::vector<bool> is_moment(scaled.rows.rows(), false);
+  for (std::size_t c = 0; c < scaled.first.size() && Space::kRot == 3; ++c) {
+    const int index = mechanism.constraints()[c];
+    const Joint<Space, S>& joint = mechanism.joints()[index];
+    for (int i = joint.num_drives; i < scaled.count[c]; ++i) {
+      const int direction = joint.kind->num_u + kinematics.DirectionOf(index, i);
+      const int row = scaled.first[c] + i;
+      is_moment[row] = joint.kind->axes[direction] < Space::kRot;
+      const bool has_choice = quotas[c].keep < quotas[c].count;
+      if (is_moment[row] && imposed[row] && has_choice) best.Take(c, row);
+    }
+  }
   RowChoice current = best;
-  const double best_pivot = best.TakeBest(total, [](int) { return true; });
+  const double best_pivot = best.TakeBest(total, [&](int row) { return !is_moment[row]; });
   const double pivot = current.TakeBest(total, [&](int row) { return imposed[row]; });
   // at a singular position no choice is any good
   constexpr double kSingular = 1e-3;

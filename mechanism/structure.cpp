@@ -4,6 +4,7 @@
 #include <algorithm>
 #include <iterator>
 
+#include "mechanism/compile.h"
 #include "mechanism/scaled_loops.h"
 
 namespace loopbench {
@@ -68,6 +69,7 @@ class Analysis {
     const bool driven = !mechanism_.drives().empty();
     const bool known = redundancy.rows > 0 && !driven;
     result_.rank_nearby = known ? redundancy.rank : result_.rank;
+    FindFreedomOfParts();
     if (!driven) return result_;
     const MechanismDescription released = Release(description_, redundancy);
     const Mechanism<Space, double> rest(released, Coordinates::kJoint);
@@ -78,6 +80,17 @@ class Analysis {
   }
 
  private:
+  void FindFreedomOfParts() {
+    if (result_.start.outcome != Outcome::kLocked || result_.islands.size() < 2) return;
+    CompileOptions options = CompileOptions::None();
+    options.islands = true;
+    int freedom = 0;
+    for (const CompiledPart& part : Compile(description_, options).parts) {
+      freedom += AnalyseStructure(part.description).freedom();
+    }
+    if (freedom > 0) result_.freedom_of_parts = freedom;
+  }
+
   void Count() {
     const Mechanism<Space, double> absolute(description_, Coordinates::kAbsolute);
     result_.space = description_.space;

@@ -4,6 +4,7 @@
 // loops admit (redundancy.h). Numbers only; the harness prints them.
 #pragma once
 
+#include <optional>
 #include <string>
 #include <vector>
 
@@ -54,17 +55,23 @@ struct Structure {
   /// Constraints that can be dropped together; loop_rows - rank_nearby.
   std::vector<RedundantDirection> redundant;
 
+  /// Of parts that are analysed by themselves, where one of them cannot move and others can.
+  std::optional<int> freedom_of_parts;
+
   /// Independent motions that lead somewhere.
-  int freedom() const { return locked() ? 0 : joint_u - rank_nearby; }
+  int freedom() const { return freedom_of_parts.value_or(locked() ? 0 : joint_u - rank_nearby); }
   /// Independent motions to first order, where the start is; more than freedom() where it is
   /// singular.
   int freedom_at_start() const { return joint_u - rank; }
-  bool singular_start() const { return rank_nearby > rank || (locked() && freedom_at_start() > 0); }
+  bool singular_start() const {
+    return rank_nearby > rank || (start.outcome == Outcome::kLocked && freedom_at_start() > 0);
+  }
   /// Smallest singular value that counts, over the largest; 1 without loops.
   double conditioning() const;
   /// Nothing moves, to first order or (Start::message) at all.
   bool locked() const {
-    return analysed && (freedom_at_start() == 0 || start.outcome == Outcome::kLocked);
+    return analysed && !freedom_of_parts &&
+           (freedom_at_start() == 0 || start.outcome == Outcome::kLocked);
   }
 };
 

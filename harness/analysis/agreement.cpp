@@ -23,24 +23,69 @@ bool HasFinalPoses(const Record& record) {
                              [](const auto& item) { return item.first.starts_with(kPrefix); });
 }
 
+const std::vector<double>* PoseOf(const std::string& key, const Value& value) {
+  return key.starts_with(kPrefix) ? std::get_if<std::vector<double>>(&value) : nullptr;
+}
+
+/// What component i of a pose is measured in: lengths of a link, or rad.
+double UnitOf(const Record& record, std::size_t size, std::size_t i) {
+  return i < (size == 3 ? 2u : 3u) ? record.Number("link_length") : 1.0;
+}
+
 bool EndAlike(const Record& a, const Record& b, double rtol) {
   return DifferenceOf(a, b).largest <= kMostTolerances * rtol;
 }
 
+/// Final poses of a set of runs: of each component the least and the largest.
+class Bounds {
+ public:
+  /// Whether `run` ends like each of the runs taken so far.
+  bool Fit(const Record& run, double rtol) const {
+    for (const auto& [key, value] : run.items()) {
+      const auto* pose = PoseOf(key, value);
+      if (pose == nullptr) continue;
+      const auto known = bounds_.find(key);
+      if (known == bounds_.end()) continue;  // simplified away there
+      const auto& [low, high] = known->second;
+      if (low.size() < pose->size()) return false;
+      for (std::size_t i = 0; i < pose->size(); ++i) {
+        const double off = std::max((*pose)[i] - low[i], high[i] - (*pose)[i]);
+        if (!(off / UnitOf(run, pose->size(), i) <= kMostTolerances * rtol)) return false;
+      }
+    }
+    return true;
+  }
+  void Take(const Record& run) {
+    for (const auto& [key, value] : run.items()) {
+      const auto* pose = PoseOf(key, value);
+      if (pose == nullptr) continue;
+      const auto [known, is_new] = bounds_.try_emplace(key, *pose, *pose);
+      auto& [low, high] = known->second;
+      for (std::size_t i = 0; i < std::min(low.size(), pose->size()); ++i) {
+        low[i] = std::min(low[i], (*pose)[i]);
+        high[i] = std::max(high[i], (*pose)[i]);
+      }
+    }
+  }
+
+ private:
+  std::map<std::string, std::pair<std::vector<double>, std::vector<double>>> bounds_;
+};
+
 Clusters ClustersOf(std::span<const Record> records, const std::vector<std::size_t>& runs,
                     double rtol) {
   Clusters clusters;
+  std::vector<Bounds> bounds;
   for (const std::size_t run : runs) {
-    const auto fits = [&](const std::vector<std::size_t>& cluster) {
-      return std::ranges::all_of(
-          cluster, [&](std::size_t other) { return EndAlike(records[run], records[other], rtol); });
-    };
-    const auto place = std::ranges::find_if(clusters, fits);
-    if (place == clusters.end()) {
-      clusters.push_back({run});
-    } else {
-      place->push_back(run);
+    const auto place = std::ranges::find_if(
+        bounds, [&](const Bounds& cluster) { return cluster.Fit(records[run], rtol); });
+    const auto index = static_cast<std::size_t>(place - bounds.begin());
+    if (place == bounds.end()) {
+      clusters.emplace_back();
+      bounds.emplace_back();
     }
+    clusters[index].push_back(run);
+    bounds[index].Take(records[run]);
   }
   std::ranges::stable_sort(clusters, std::greater<>(), &std::vector<std::size_t>::size);
   return clusters;
@@ -61,13 +106,12 @@ bool Decides(std::span<const Record> records, const Clusters& clusters) {
 PoseDifference DifferenceOf(const Record& a, const Record& b) {
   PoseDifference difference;
   for (const auto& [key, value] : a.items()) {
-    const auto* pose = std::get_if<std::vector<double>>(&value);
-    if (pose == nullptr || !key.starts_with(kPrefix)) continue;
+    const auto* pose = PoseOf(key, value);
+    if (pose == nullptr) continue;
     const std::vector<double>& other = b.Numbers(key);
     if (other.empty()) continue;  // simplified away there
-    const std::size_t lengths = pose->size() == 3 ? 2 : 3;
     for (std::size_t i = 0; i < pose->size(); ++i) {
-      const double unit = i < lengths ? a.Number("link_length") : 1.0;
+      const double unit = UnitOf(a, pose->size(), i);
       double off = i < other.size() ? std::abs((*pose)[i] - other[i]) / unit : NAN;
       if (std::isnan(off)) off = std::numeric_limits<double>::infinity();
       if (off <= difference.largest) continue;

@@ -53,14 +53,16 @@ void Add(std::string* codes, bool on, const char* code) {
 }  // namespace
 
 double EnergyErrorShare(const Record& record) {
-  const double scale = record.Number("energy_scale");
-  return scale > 0.0 ? record.Number("energy_error_max") / scale
-                     : record.Number("energy_error_relative");
+  if (record.Find("energy_scale") == nullptr) return record.Number("energy_error_relative");
+  const double error = record.Number("energy_error_max");
+  return error == 0.0 ? 0.0 : error / record.Number("energy_scale");
 }
 
 double DriftShare(const Record& record) {
-  return std::fmax(record.Number("drift_position_max") / record.Number("link_length"),
-                   record.Number("drift_rotation_max"));
+  const double shift = record.Number("drift_position_max") / record.Number("link_length");
+  const double rotation = record.Number("drift_rotation_max");
+  if (record.Find("drift_rotation_max") == nullptr) return shift;
+  return shift <= rotation || std::isnan(rotation) ? rotation : shift;
 }
 
 double PromisedDriftShare(const Record& record) {
@@ -75,15 +77,24 @@ double PromisedDriftShare(const Record& record) {
     const double remembered = std::min(steps, StepsRemembered(record));
     tolerances = kFewSteps + kAcceleration * remembered * remembered;
   }
-  return std::max(goal, tolerances * rtol);
+  return record.Find("position_goal") == nullptr ? tolerances * rtol
+                                                 : std::max(tolerances * rtol, goal);
 }
 
 std::string OwnDoubts(const Record& record) {
   std::string codes;
   if (record.Text("kind") != "accuracy" || !HasFinished(record)) return codes;
-  Add(&codes, EnergyErrorShare(record) > kMostEnergyError, kEnergyDoubt);
+  // a measure that is no number is none to rely on; one that was not taken says nothing
+  const auto has = [&](const char* key) { return record.Find(key) != nullptr; };
+  Add(&codes,
+      (has("energy_scale") || has("energy_error_relative")) &&
+          !(EnergyErrorShare(record) <= kMostEnergyError),
+      kEnergyDoubt);
   Add(&codes, PassedSingularPosition(record), kSingularDoubt);
-  Add(&codes, DriftShare(record) > PromisedDriftShare(record), kDriftDoubt);
+  Add(&codes,
+      has("drift_position_max") && has("link_length") &&
+          !(DriftShare(record) <= PromisedDriftShare(record)),
+      kDriftDoubt);
   Add(&codes, record.Number("ensemble_failed") > 0, kMembersDoubt);
   // a single run was not asked for an exponent, and drift of round-off has none
   Add(&codes,

@@ -4,9 +4,13 @@
 
 #include <algorithm>
 #include <cmath>
+#include <iterator>
 #include <limits>
 #include <map>
+#include <set>
+#include <sstream>
 
+#include "harness/analysis/doubts.h"
 #include "harness/compare/statistics.h"
 #include "harness/origin.h"
 
@@ -32,6 +36,19 @@ void JudgeOutcome(Finding& finding) {
   if (finding.base == finding.fresh) return;
   if (finding.fresh == "finished") return Set(finding, Judgement::kBetter, "failed before");
   Set(finding, Judgement::kWorse, "ends otherwise");
+}
+
+/// Worse with a reason for doubt that BASE did not have, better without one.
+void JudgeDoubts(Finding& finding) {
+  const auto codes = [](const std::string& text) {
+    std::istringstream words(text);
+    return std::set<std::string>(std::istream_iterator<std::string>(words), {});
+  };
+  const std::set<std::string> base = codes(finding.base), fresh = codes(finding.fresh);
+  if (base == fresh) return;
+  const bool no_new = std::ranges::includes(base, fresh);
+  Set(finding, no_new ? Judgement::kBetter : Judgement::kWorse,
+      no_new ? "fewer doubts" : "new doubts");
 }
 
 void JudgeCount(Finding& finding, double base, double fresh) {
@@ -153,6 +170,9 @@ Finding Judge(const std::string& one, const Measure& measure, const Pair& pair,
     case Rule::kOutcome:
       JudgeOutcome(finding);
       break;
+    case Rule::kDoubts:
+      JudgeDoubts(finding);
+      break;
     case Rule::kHash:
       if (finding.base != finding.fresh) Set(finding, Judgement::kWorse, "other bits");
       break;
@@ -185,6 +205,15 @@ void DecideTimes(std::vector<Finding*>& times, const std::vector<double>& smalle
           fmt::format("too few repetitions to decide among {} times", times.size()));
     }
   }
+}
+
+/// Doubts of accuracy runs that each record has by itself: what runs beside it say depends on the
+/// store.
+std::vector<Record> WithOwnDoubts(std::vector<Record> records) {
+  for (Record& record : records) {
+    if (record.Text("kind") == "accuracy") record.Set("doubts", OwnDoubts(record));
+  }
+  return records;
 }
 
 /// Records by case; cases that occur twice go to `ambiguous`.
@@ -222,9 +251,10 @@ int ComparisonReport::ExitCode(const CompareOptions& options) const {
   return compared == 0 || missing || !ambiguous.empty() || !other_content.empty() ? 2 : 0;
 }
 
-ComparisonReport Compare(const std::vector<Record>& base, const std::vector<Record>& fresh,
-                         const CompareOptions& options) {
+ComparisonReport Compare(const std::vector<Record>& given_base,
+                         const std::vector<Record>& given_fresh, const CompareOptions& options) {
   ComparisonReport comparison;
+  const std::vector<Record> base = WithOwnDoubts(given_base), fresh = WithOwnDoubts(given_fresh);
   const auto in_base = ByCase(base, comparison.ambiguous);
   const auto in_fresh = ByCase(fresh, comparison.ambiguous);
   std::vector<double> smallest;

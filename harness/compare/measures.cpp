@@ -25,6 +25,7 @@ bool IsNumber(const Value& value) {
 std::string_view GroupOf(Rule rule) {
   switch (rule) {
     case Rule::kOutcome:
+    case Rule::kDoubts:
       return "outcomes";
     case Rule::kEqual:
     case Rule::kCount:
@@ -57,6 +58,8 @@ const std::vector<Measure>& Measures() {
       {"dof", Rule::kEqual, "", false},
       {"ensemble", Rule::kEqual, "", false},
       {"ensemble_branch_kept", Rule::kEqual, "", false},
+      {"ensemble_failed", Rule::kEqual, "", false},
+      {"doubts", Rule::kDoubts, "", false},
       {"evaluations", Rule::kEqual, "", false},
       {"rank", Rule::kEqual, "", false},
       {"rank_min", Rule::kEqual, "", false},
@@ -81,6 +84,7 @@ const std::vector<Measure>& Measures() {
       {"drift_velocity_max", Rule::kError, "", false},
       {"loop_closure_max", Rule::kError, "m", false},
       {"energy_error_max", Rule::kError, "J", false},
+      {"error_final", Rule::kError, "", false},
       {"branch_error_max", Rule::kError, "rad", false},
       {"closed_form_error_max", Rule::kError, "rad", false},
       {"instructions", Rule::kInstructions, "", true},
@@ -98,6 +102,9 @@ Held HeldBy(const Record& record, const Measure& measure) {
   const double number = IsNumber(*value) ? record.Number(measure.key) : std::nan("");
   bool fits = false;
   switch (measure.rule) {
+    case Rule::kDoubts:
+      fits = std::holds_alternative<std::string>(*value);
+      break;
     case Rule::kOutcome:
     case Rule::kHash:
       fits = !record.Text(measure.key).empty() && std::holds_alternative<std::string>(*value);
@@ -113,8 +120,7 @@ Held HeldBy(const Record& record, const Measure& measure) {
       fits = std::isfinite(number) && number > 0.0;
       break;
     case Rule::kTime:
-      if (series != nullptr && series->empty()) return Held::kNothing;
-      fits = series != nullptr && std::ranges::all_of(*series, IsTime);
+      fits = series != nullptr && !series->empty() && std::ranges::all_of(*series, IsTime);
   }
   return fits ? Held::kFit : Held::kUnfit;
 }
@@ -122,6 +128,7 @@ Held HeldBy(const Record& record, const Measure& measure) {
 std::string_view Expected(Rule rule) {
   switch (rule) {
     case Rule::kOutcome:
+    case Rule::kDoubts:
     case Rule::kHash:
       return "a text";
     case Rule::kEqual:

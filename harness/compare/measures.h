@@ -12,6 +12,7 @@ namespace loopbench::harness {
 /// How two values of a measure are held against each other.
 enum class Rule {
   kOutcome,       ///< "finished" must stay "finished"
+  kDoubts,        ///< what a run's own record says against it: no new reason may come (doubts.h)
   kEqual,         ///< a number that says what was measured: any change is a difference
   kCount,         ///< an exact count of work: more is worse, fewer is better
   kHash,          ///< equal bits
@@ -39,7 +40,7 @@ const std::vector<Measure>& Measures();
 
 /// What a record holds under the key of a measure.
 enum class Held {
-  kNothing,  ///< no such key, or no repetitions of a time
+  kNothing,  ///< no such key
   kUnfit,    ///< another type, or a number that the measure cannot have (null stands for NaN)
   kFit,
 };

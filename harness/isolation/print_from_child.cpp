@@ -4,7 +4,9 @@
 #include <unistd.h>
 
 #include <array>
+#include <cerrno>
 #include <cstdio>
+#include <cstring>
 #include <stdexcept>
 
 #include "harness/terminal.h"
@@ -16,7 +18,10 @@ namespace {
 class Capture {
  public:
   Capture() : file_(::memfd_create("stdout", MFD_CLOEXEC)) {
-    if (file_ < 0) throw std::runtime_error("cannot make a file in memory");
+    if (file_ < 0) {
+      throw std::runtime_error(std::string("cannot make a file in memory: ") +
+                               std::strerror(errno));
+    }
   }
   Capture(const Capture&) = delete;
   Capture& operator=(const Capture&) = delete;
@@ -57,8 +62,8 @@ int PrintFromChild(const std::string& name, const ProcessLimits& limits,
       },
       [&](std::size_t) { return limits; },
       [&](std::size_t, const ProcessResult& ended) { result = ended; });
-  if (result.ending == ProcessEnding::kThrew) throw std::runtime_error(result.text);
   capture.Print();
+  if (result.ending == ProcessEnding::kThrew) throw std::runtime_error(result.text);
   if (result.ending == ProcessEnding::kAnswered) return std::stoi(result.text);
   PrintError("{}: cut off ({}): {}\n", name, OutcomeOf(result.ending), result.text);
   return 2;

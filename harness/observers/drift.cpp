@@ -1,4 +1,5 @@
 #include <algorithm>
+#include <cmath>
 
 #include "harness/observers/joint_view.h"
 #include "harness/observers/observer.h"
@@ -7,6 +8,11 @@
 namespace loopbench::harness {
 
 namespace {
+
+/// Keeps the largest; one that is no number stays.
+void Keep(double* largest, double value) {
+  if (!std::isnan(*largest) && !(value <= *largest)) *largest = value;
+}
 
 /// Largest mismatch of some joints: points and rotations apart, and whose points are worst.
 struct Largest {
@@ -19,7 +25,7 @@ struct Largest {
     const auto D = kinematics.joints()[index].AllD();
     const Motion<Space, double> all = kinematics.ConstraintMismatch(index);
     const Motion<Space, double> mismatch = D * (D.transpose() * all);
-    rotation = std::max(rotation, mismatch.template head<Space::kRot>().norm());
+    Keep(&rotation, mismatch.template head<Space::kRot>().norm());
     const double s = mismatch.template tail<Space::kLin>().norm();
     if (joint < 0 || !(s <= shift)) {
       shift = s;
@@ -72,15 +78,15 @@ void DriftObserver<Space>::Observe(const Sample<Space>& sample) {
       const Motion<Space, double> motion = state.AllD() * rows;
       return motion.template tail<Space::kLin>().norm();
     };
-    work.velocity = std::max(work.velocity, shift_of(state.AllD().transpose() * state.V_rel));
+    Keep(&work.velocity, shift_of(state.AllD().transpose() * state.V_rel));
     const Motion<Space, double> rest = JointAcceleration<Space, double>(kinematics, index, work.A);
-    work.acceleration = std::max(work.acceleration, shift_of(rest.head(state.AllD().cols())));
+    Keep(&work.acceleration, shift_of(rest.head(state.AllD().cols())));
   }
   if (now.shift > work.shift) {
     work.worst_loop = kinematics.mechanism().joint_names()[now.joint];
   }
-  work.shift = std::max(work.shift, now.shift);
-  work.rotation = std::max(work.rotation, now.rotation);
+  Keep(&work.shift, now.shift);
+  Keep(&work.rotation, now.rotation);
   series_.t.push_back(sample.t);
   series_.value.push_back(now.shift);
 
@@ -88,8 +94,8 @@ void DriftObserver<Space>::Observe(const Sample<Space>& sample) {
   for (const auto& [index, name] : work.loop_names) {
     Largest loop;
     loop.Add(closure, index);
-    work.loop_max[index] = std::max(work.loop_max[index], loop.shift);
-    work.closure = std::max(work.closure, loop.shift);
+    Keep(&work.loop_max[index], loop.shift);
+    Keep(&work.closure, loop.shift);
   }
 }
 

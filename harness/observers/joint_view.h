@@ -29,6 +29,9 @@ class JointView {
   /// followed with the coordinates measured between its bodies.
   const Kinematics<Space, double>& At(const Kinematics<Space, double>& kinematics) {
     if (!own_) return kinematics;
+    if (!own_->released().empty() && kinematics.released() != kinematics_->released()) {
+      kinematics_->Release(kinematics.released());
+    }
     kinematics_->SetTime(kinematics.time());
     kinematics_->UpdatePosition(kinematics.CoordinatesIn(*own_));
     return *kinematics_;

@@ -58,7 +58,9 @@ void EnergyObserver<Space>::Observe(const Sample<Space>& sample) {
   potential_low_ = std::min(potential_low_, parts.potential);
   potential_high_ = std::max(potential_high_, parts.potential);
   started_ = true;
-  largest_ = std::max(largest_, std::abs(energy - first_));
+  // written so that an energy that overflowed stays
+  const double error = std::abs(energy - first_);
+  if (!std::isnan(largest_) && !(error <= largest_)) largest_ = error;
   series_.t.push_back(sample.t);
   series_.value.push_back(energy - first_);
 }

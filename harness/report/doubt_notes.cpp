@@ -96,6 +96,11 @@ SceneKey SceneOf(const Record& record) {
   return {record.Text("scene_id"), {record.Number("horizon"), record.Number("rtol")}};
 }
 
+std::string NameOfScene(const Record& record) {
+  return fmt::format("{}: {} rtol {} horizon {}", kDisagreementDoubt, record.Text("mechanism"),
+                     record.Text("rtol"), record.Text("horizon"));
+}
+
 // Which of the runs agree with each other; `runs` have a cluster each.
 std::string NoteOfScene(const std::vector<Record>& runs) {
   const std::vector<std::string> keys = TellingKeys(runs);
@@ -120,9 +125,7 @@ std::string NoteOfScene(const std::vector<Record>& runs) {
     }
   }
   text += alone;
-  const std::string scene =
-      fmt::format("{}: {} rtol {} horizon {}", kDisagreementDoubt, runs.front().Text("mechanism"),
-                  runs.front().Text("rtol"), runs.front().Text("horizon"));
+  const std::string scene = NameOfScene(runs.front());
   if (clusters.size() == 1) return scene + " does not end as with finer tolerances" + text;
   return fmt::format(
       "{} ends {:.2g} links or rad apart ({}), {:.0f} tolerances are expected at most{}", scene,
@@ -149,7 +152,13 @@ std::vector<std::string> DoubtNotes(std::span<const Record> rows, std::span<cons
       return record.Find("agreement") != nullptr && SceneOf(record) == scenes[i];
     });
     // a run with nobody beside it at its own tolerance has no cluster
-    if (!runs.empty()) notes.push_back(NoteOfScene(runs));
+    if (!runs.empty()) {
+      notes.push_back(NoteOfScene(runs));
+      continue;
+    }
+    const auto alone =
+        std::ranges::find_if(rows, [&](const Record& row) { return SceneOf(row) == scenes[i]; });
+    notes.push_back(NameOfScene(*alone) + " does not end as with finer tolerances");
   }
   if (scenes.size() > kScenesNamed) {
     notes.push_back(fmt::format("{}: {} scenes more; column agreement has the sets that agree",

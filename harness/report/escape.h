@@ -19,8 +19,9 @@ std::string EscapeTerminal(std::string_view text);
 /// The same for text of several lines: line ends stay.
 std::string EscapeTerminalLines(std::string_view text);
 
-/// Text within a line or cell of Markdown (GitHub's): no markup, HTML, link or formula begins in
-/// it. Characters that cannot begin any stay as they are, as in drift_position_max or "a <= b".
+/// Text within a line or cell of Markdown (GitHub's): no markup, HTML, written link or formula
+/// begins in it. Characters that cannot begin any stay as they are, as in drift_position_max or "a
+/// <= b".
 std::string EscapeMarkdown(std::string_view text);
 
 /// A paragraph of its own, whose first characters must not make it a heading, list or quotation.

@@ -19,7 +19,7 @@ struct CurveStyle {
   double width = 2.0;          ///< [px]
   Shape shape = Shape::kNone;  ///< at some places of the line, others than those of its neighbours
   bool filled = true;          ///< of the marks
-  bool doubtful = false;       ///< dashed, and the legend says why
+  bool doubtful = false;       ///< dashed, and the legend says so
 };
 
 /// The style of the index-th curve of a figure: colours that colour-blind readers tell apart, then

@@ -86,7 +86,8 @@ std::vector<std::string> WhatColumnsHide(const Table& table) {
                                 table.rows.size()));
   }
   const bool unresolved = std::ranges::any_of(table.columns, [&](const TableColumn& column) {
-    return !(column.key.starts_with("growth_hypothesis") ? shows("growth_hypothesis_resolved")
+    return column.key != "outcome" &&
+           !(column.key.starts_with("growth_hypothesis") ? shows("growth_hypothesis_resolved")
                                                          : shows("growth_resolved")) &&
            std::ranges::any_of(table.rows,
                                [&](const Record& row) { return IsDoubtful(row, column.key); });

@@ -56,6 +56,27 @@ std::vector<Record> WithContents(std::vector<Record> records) {
   return records;
 }
 
+void ShareContents(std::vector<Record>* one, std::vector<Record>* other) {
+  std::map<std::string, Namesakes> told;
+  for (const std::vector<Record>* records : {one, other}) {
+    for (const Record& record : *records) {
+      Record bare;
+      const Record keys = KeysBeforeId(record);
+      for (const auto& [key, value] : keys.items()) {
+        if (key != "content" && key != "set") bare.Set(key, value);
+      }
+      if (keys.Find("content") == nullptr) continue;
+      told[ToJsonLine(bare)].has_set = keys.Find("set") != nullptr;
+    }
+  }
+  for (std::vector<Record>* records : {one, other}) {
+    for (Record& record : *records) {
+      const auto namesakes = told.find(ToJsonLine(KeysBeforeId(record)));
+      if (namesakes != told.end()) record = ToldApart(record, namesakes->second);
+    }
+  }
+}
+
 void RequireOneContent(const std::vector<Record>& records, const std::filesystem::path& store,
                        std::string_view command) {
   const auto told = std::ranges::find_if(records, [](const Record& record) {

@@ -15,6 +15,10 @@ namespace loopbench::harness {
 /// without a case_id stay as they are.
 std::vector<Record> WithContents(std::vector<Record> records);
 
+/// Tells cases apart in both where one of them has to (WithContents() of each): equal cases then
+/// have equal keys.
+void ShareContents(std::vector<Record>* one, std::vector<Record>* other);
+
 /// Throws std::runtime_error naming the store and one such case: `command` judges all records that
 /// match a rule together, and a rule cannot mean two mechanisms at once.
 void RequireOneContent(const std::vector<Record>& records, const std::filesystem::path& store,

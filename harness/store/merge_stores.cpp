@@ -4,6 +4,7 @@
 
 #include <algorithm>
 #include <array>
+#include <cmath>
 #include <map>
 #include <stdexcept>
 #include <string_view>
@@ -15,8 +16,8 @@ namespace loopbench::harness {
 namespace {
 
 /// How a run ended when it was not by itself.
-constexpr std::array<std::string_view, 6> kCutShort = {
-    "time-limit", "process-time-limit", "idle-limit", "memory-limit", "crashed", "bad-answer"};
+constexpr std::array<std::string_view, 5> kCutShort = {"time-limit", "process-time-limit",
+                                                       "memory-limit", "crashed", "bad-answer"};
 
 /// What two runs of one case by one program may differ in: times, the machine and how busy it was,
 /// and how the command was typed.
@@ -29,8 +30,14 @@ constexpr std::array<std::string_view, 25> kMayDiffer = {
     "noise",           "machine",       "libm",           "set",
     "experiment_index"};
 
+/// The run, a member of its ensemble, or the reference of its ladder.
 bool WasCutShort(const Record& record) {
-  return std::ranges::find(kCutShort, record.Text("outcome")) != kCutShort.end();
+  const std::string member = record.Text("ensemble_first_failed");
+  const bool has_reference =
+      record.Find("error_final") == nullptr || !std::isnan(record.Number("error_final"));
+  return !has_reference || std::ranges::any_of(kCutShort, [&](std::string_view ending) {
+    return record.Text("outcome") == ending || member.find(ending) != std::string::npos;
+  });
 }
 
 bool MayDiffer(std::string_view key) {

@@ -3,6 +3,7 @@
 #include <fmt/format.h>
 #include <unistd.h>
 
+#include <algorithm>
 #include <map>
 #include <stdexcept>
 #include <string_view>
@@ -59,6 +60,11 @@ void MendLastLine(const std::filesystem::path& file, int descriptor) {
   Lines lines;
   try {
     lines = ReadLines(text, file);
+    if (std::ranges::any_of(lines.records,
+                            [](const Record& one) { return one.Text("kind").empty(); })) {
+      throw std::runtime_error(
+          fmt::format("{}: found a line without \"kind\", expected records", file.string()));
+    }
   } catch (const std::runtime_error& error) {
     throw std::runtime_error(
         fmt::format("{}\n'{}' is no store, or a damaged one: nothing was changed", error.what(),

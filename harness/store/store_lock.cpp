@@ -52,7 +52,7 @@ bool TryLock(int descriptor, const std::filesystem::path& file) {
 
 int OpenLocked(const std::filesystem::path& file) {
   constexpr int kMode = 0644;
-  for (;;) {
+  for (int i = 0; i < kTries; ++i) {
     // without blocking: a pipe of that name would wait for its other end
     const int descriptor =
         ::open(file.c_str(), O_RDWR | O_APPEND | O_CREAT | O_CLOEXEC | O_NONBLOCK, kMode);
@@ -76,6 +76,8 @@ int OpenLocked(const std::filesystem::path& file) {
     }
     ::close(descriptor);  // replaced between opening and locking
   }
+  throw std::runtime_error(fmt::format(
+      "'{}' is another file each time it is opened, expected one that stays", file.string()));
 }
 
 bool IsStillNamed(int descriptor, const std::filesystem::path& file) {

@@ -205,7 +205,7 @@ void Register(const BenchmarkSet& set, States& states, const BenchmarkMember& me
       state.SetLabel(prepared.hash);
       Measure(state, *prepared.subject, kind);
     } catch (const std::exception& error) {
-      state.SkipWithError(error.what());
+      state.SkipWithError(EscapeTerminal(error.what()).c_str());
     }
   };
   // the library prints names as they are, and up to a zero byte

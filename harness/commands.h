@@ -19,9 +19,9 @@ namespace loopbench::harness {
 /// stand beside each other; warnings about it go to standard error.
 std::vector<Record> LoadRecords(const std::filesystem::path& store);
 
-/// drift.csv, drift.md and so on of precision and timing, of all that a store holds: in its folder,
-/// or beside a store that is a file, named after it. Short forms of `asked` go to the terminal.
-void WriteTables(const std::vector<Record>& asked, const std::filesystem::path& store,
+/// drift.csv, drift.md and so on of precision and timing in the folder of a store, or beside a
+/// store that is a file, named after it; their short forms on the terminal.
+void WriteTables(const std::vector<Record>& records, const std::filesystem::path& store,
                  const std::string& typed);
 
 /// 1 when an accuracy run among `rows` did not finish or has doubts, and says how many; else 0.

@@ -116,12 +116,11 @@ void RequireDemands(const FailureMap& map, const std::filesystem::path& rules) {
 
 }  // namespace
 
-void WriteTables(const std::vector<Record>& asked, const std::filesystem::path& store,
+void WriteTables(const std::vector<Record>& records, const std::filesystem::path& store,
                  const std::string& typed) {
   const bool is_file = store.extension() == ".jsonl";
-  const std::vector<Record> all = LoadRecords(store);
   for (const std::string kind : {"drift", "precision", "timing"}) {
-    Table full = MakeTable(all, {.kind = kind});
+    Table full = MakeTable(records, {.kind = kind});
     if (full.rows.empty()) continue;
     AppendProvenance(full, typed);
     for (const auto& [format, ending] : {std::pair{"csv", ".csv"}, {"markdown", ".md"}}) {
@@ -129,8 +128,8 @@ void WriteTables(const std::vector<Record>& asked, const std::filesystem::path& 
       file = is_file ? file.replace_extension(kind + ending) : file / (kind + ending);
       WriteFileAtomically(file, RenderKept(full, format));
     }
-    const Table compact = MakeTable(asked, {.kind = kind, .compact = true});
-    if (!compact.rows.empty()) PrintText(ToText(compact, TerminalHasColour()) + "\n");
+    const Table compact = MakeTable(records, {.kind = kind, .compact = true});
+    PrintText(ToText(compact, TerminalHasColour()) + "\n");
   }
   for (const std::string& note : Provenance(typed)) Print("{}\n", note);
 }

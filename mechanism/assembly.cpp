@@ -279,33 +279,40 @@ class Assembler {
     Fail(DescribeConflict(description_, kinematics_, {left, units, true, Extra(given_cut_)}));
   }
 
+  /// Nothing can move, or a part stands in a singular position that it cannot leave and would start
+  /// along speeds that lead nowhere. A rigid part without such speeds locks nothing: it stays where
+  /// it is, whatever others do.
   void CheckMobility() {
-    if (const std::string why = WhyLocked(mechanism_, start_.q); !why.empty()) {
-      start_.outcome = Outcome::kLocked;
-      start_.message = mechanism_.name() + ": nothing can move: " + why;
-    } else {
-      CheckMobilityOfParts();
-    }
-  }
-
-  /// A part that stands in a singular position it cannot leave would start to move along speeds
-  /// that lead nowhere. One without such speeds stays where it is, whatever others do.
-  void CheckMobilityOfParts() {
-    if (mechanism_.num_u() > kMostAnalysedSpeeds || FindIslands(description_).size() < 2) return;
-    if (Excursion<Space>(mechanism_, start_.q).rank() == mechanism_.num_rows()) return;
-    CompileOptions options = CompileOptions::None();
-    options.islands = true;
-    for (const CompiledPart& part : Compile(description_, options).parts) {
-      const Mechanism<Space, double> own(part.description, Coordinates::kJoint);
-      const Start<double> start = Assembler(part.description, own).Run();
-      if (start.outcome != Outcome::kLocked) continue;
-      if (Excursion<Space>(own, start.q).freedom() == 0) continue;
-      start_.outcome = Outcome::kLocked;
-      start_.message = mechanism_.name() + ": the part of body \"" +
-                       part.description.bodies[1].name +
-                       "\" cannot move, though others can: " + WhyLocked(own, start.q);
+    MechanismDescription bare = description_;
+    bare.forces.clear();  // connect parts and hold nothing
+    if (mechanism_.num_u() > kMostAnalysedSpeeds || FindIslands(bare).size() < 2) {
+      if (const std::string why = WhyLocked(mechanism_, start_.q); !why.empty()) {
+        Lock("nothing can move: " + why);
+      }
       return;
     }
+    CompileOptions options = CompileOptions::None();
+    options.islands = true;
+    std::string first, stuck;
+    bool moves = false;
+    for (const CompiledPart& part : Compile(bare, options).parts) {
+      const Mechanism<Space, double> own(part.description, Coordinates::kJoint);
+      const Start<double> start = Assembler(part.description, own).Run();
+      const std::string why = WhyLocked(own, start.q);
+      moves = moves || why.empty();
+      if (first.empty()) first = why;
+      if (!why.empty() && stuck.empty() && Excursion<Space>(own, start.q).freedom() > 0) {
+        stuck = "the part of body \"" + part.description.bodies[1].name +
+                "\" cannot move, though others can: " + why;
+      }
+    }
+    if (!moves) Lock("nothing can move: " + first);
+    if (moves && !stuck.empty()) Lock(stuck);
+  }
+
+  void Lock(const std::string& why) {
+    start_.outcome = Outcome::kLocked;
+    start_.message = mechanism_.name() + ": " + why;
   }
 
   /// A length that no position exceeds much, in units: the longest arm of a body or Ground, or the

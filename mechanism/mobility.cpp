@@ -35,7 +35,10 @@ bool IsRigidToSecondOrder(const Mechanism<Space, double>& mechanism, const Vecto
   dynamics.Jacobian(kinematics, J);
   const Eigen::LLT<Eigen::MatrixXd> mass(M);
   Eigen::MatrixXd rows = mass.matrixL().solve(J.transpose()).transpose();
-  const Eigen::VectorXd size = rows.rowwise().norm().cwiseMax(1e-300);
+  // moments and forces compare by the speeds they take; one that takes none is like the others
+  Eigen::VectorXd size = rows.rowwise().norm();
+  const double usual = size.maxCoeff() > 0.0 ? size.maxCoeff() : 1.0;
+  size = (size.array() > 1e-6 * usual).select(size, usual);
   rows = size.cwiseInverse().asDiagonal() * rows;
   const Eigen::JacobiSVD<Eigen::MatrixXd> svd(rows, Eigen::ComputeFullU | Eigen::ComputeFullV);
   const Eigen::MatrixXd stresses = svd.matrixU().rightCols(rows.rows() - rank);
@@ -53,11 +56,11 @@ bool IsRigidToSecondOrder(const Mechanism<Space, double>& mechanism, const Vecto
     largest = std::max(largest, scaled.norm());
     return Eigen::VectorXd(-stresses.transpose() * scaled);
   };
-  // by polarisation, all self-stresses at once
+  // by polarisation, the diagonal first, all self-stresses at once
   std::vector<Eigen::MatrixXd> forms(static_cast<std::size_t>(stresses.cols()),
                                      Eigen::MatrixXd::Zero(free, free));
   for (Eigen::Index i = 0; i < free; ++i) {
-    for (Eigen::Index j = 0; j <= i; ++j) {
+    for (Eigen::Index j = i; j >= 0; --j) {
       const Eigen::VectorXd along = second(i == j ? Eigen::VectorXd(speeds.col(i))
                                                   : Eigen::VectorXd(speeds.col(i) + speeds.col(j)));
       for (std::size_t s = 0; s < forms.size(); ++s) {

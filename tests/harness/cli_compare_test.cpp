@@ -89,7 +89,8 @@ TEST_F(ComparisonCommands, NameEveryDifference) {
   }
   with("null", Value());
   Expect("compare base null", 1,
-         {"worse", "drift_position_max", "null", "expected a finite number >= 0", "WORSE: 1"});
+         {"worse", "drift_position_max", "null", "expected a finite number >= 0", "WORSE: 2",
+          "new doubts"});
   Expect("compare null base", 1, {"different", "drift_position_max", "DIFFERENT: 1"});
   Expect("compare null null", 1, {"different", "in BASE and NEW", "DIFFERENT: 1"});
   Expect("export null --out b.json", 1,

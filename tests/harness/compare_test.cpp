@@ -11,6 +11,7 @@
 #include <vector>
 
 #include "harness/origin.h"
+#include "harness/store/contents.h"
 
 namespace loopbench::harness {
 namespace {
@@ -105,6 +106,43 @@ TEST(Compare, TakesCountsHashesAndOutcomesExactly) {
   ExpectChange("rhs_operations", std::int64_t{618}, Judgement::kWorse);
   ExpectChange("state_hash", std::string("00000000000000ab"), Judgement::kWorse);
   ExpectChange("outcome", std::string("singular"), Judgement::kWorse);
+}
+
+TEST(Compare, CatchesNewDoubtsAndFailedMembers) {
+  const ComparisonReport report =
+      Compare(Sound(), With("singularity_passages", std::int64_t{3}), {});
+  EXPECT_EQ(Only(report, Judgement::kWorse).measure.key, "doubts");
+  EXPECT_EQ(Only(report, Judgement::kWorse).fresh, "singular-passage");
+  const ComparisonReport back = Compare(With("singularity_passages", std::int64_t{3}), Sound(), {});
+  EXPECT_EQ(Only(back, Judgement::kBetter).measure.key, "doubts");
+  std::vector<Record> base = Sound(), fresh = Sound(2);
+  for (std::vector<Record>* records : {&base, &fresh}) {
+    records->front().Set("ensemble_failed", std::int64_t{0});
+    records->front().Set("error_final", 1e-9);
+  }
+  EXPECT_EQ(Exit(base, fresh), 0);
+  fresh.front().Set("error_final", 5.0);
+  EXPECT_EQ(Only(Compare(base, fresh, {}), Judgement::kWorse).measure.key, "error_final");
+}
+
+TEST(Compare, EqualCasesAreEqualThoughOneStoreHasANamesake) {
+  const auto with = [](const std::string& content, const std::string& case_id) {
+    Record record;
+    record.Set("kind", std::string("accuracy"));
+    record.Set("mechanism", std::string("four-bar"));
+    record.Set("case_id", case_id);
+    record.Set("content", content);
+    record.Set("outcome", std::string("finished"));
+    record.Set("drift_position_max", 1e-7);
+    return record;
+  };
+  std::vector<Record> both = WithContents({with("a", "1"), with("b", "2")});
+  std::vector<Record> one = WithContents({with("a", "1")});
+  ShareContents(&both, &one);
+  const ComparisonReport report = Compare(both, one, {});
+  EXPECT_EQ(report.only_base.size(), 1u);
+  EXPECT_TRUE(report.only_fresh.empty());
+  EXPECT_GT(report.Count(Judgement::kSame), 0);
 }
 
 TEST(Compare, ReportsARunThatNoLongerFailsAsBetter) {

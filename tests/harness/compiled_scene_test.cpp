@@ -58,6 +58,15 @@ TEST(CompiledSceneTest, TiltedFourBarRunsInThePlane) {
   EXPECT_EQ(on.Number("rank_min"), off.Number("rank_min"));
 }
 
+TEST(CompiledSceneTest, AnglesThatAreWatchedInSpaceKeepRedundancyReleased) {
+  MechanismFile file = Shipped("bennett");
+  file.observe.branch_invariants = {{{"link2", 1.0}}};
+  const CompiledScene scene = CompileScene(file.description, file.observe, CompileOptions());
+  CompileOptions expected = CompileOptions::None();
+  expected.redundancy = true;
+  EXPECT_EQ(scene.compiled.done, expected);
+}
+
 TEST(CompiledSceneTest, WeldedPiecesRunAsOneBar) {
   const Record on = RunWith(Shipped("welded-four-bar"), CompileOptions());
   const Record off = RunWith(Shipped("welded-four-bar"), CompileOptions::None());

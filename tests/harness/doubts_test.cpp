@@ -77,6 +77,16 @@ TEST(Doubts, EnergyIsComparedWithWhatMoves) {
             "energy");
 }
 
+TEST(Doubts, AMeasureThatIsNoNumberIsOne) {
+  EXPECT_EQ(With("velocity", {{"energy_error_max", Value()}}), "energy");
+  EXPECT_EQ(With("velocity", {{"energy_scale", Value()}}), "energy");
+  EXPECT_EQ(With("velocity", {{"drift_position_max", Value()}}), "drift");
+  EXPECT_EQ(With("velocity", {{"drift_rotation_max", Value()}}), "drift");
+  EXPECT_EQ(With("position", {{"position_goal", Value()}}), "drift");
+  // nothing moves, and no energy is off
+  EXPECT_EQ(With("velocity", {{"energy_error_max", 0.0}, {"energy_scale", 0.0}}), "");
+}
+
 TEST(Doubts, SingularPassagesCountBelowLevelPosition) {
   const std::vector<std::pair<std::string, Value>> across = {
       {"singularity_passages", std::int64_t{1}}};

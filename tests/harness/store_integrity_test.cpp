@@ -139,7 +139,9 @@ TEST_F(StoreIntegrity, WhatIsNoStoreStaysAsItIs) {
                                           "{\"kind\":\"accuracy\"}\rsecond line",
                                           text_ + "notes",
                                           "notes\n" + text_ + "{\"kind\":\"acc",
-                                          "{\"todo\": \"buy milk"};
+                                          "{\"todo\": \"buy milk",
+                                          "{\"a\":1}",
+                                          "{\"a\":1}\n"};
   for (const std::string& text : texts) {
     Write("notes.jsonl", text);
     for (const char* call : {"merge store --out notes.jsonl", "run tiny.json --out notes.jsonl"}) {
@@ -152,7 +154,8 @@ TEST_F(StoreIntegrity, WhatIsNoStoreStaysAsItIs) {
 TEST_F(StoreIntegrity, AFileAsStoreHasItsTablesBesideIt) {
   ExpectEnding(Call("run tiny.json --out new/mine.jsonl"), 0, {"2 run now"});
   EXPECT_EQ(ReadRecords(folder_ / "new/mine.jsonl").size(), 2u);
-  EXPECT_TRUE(fs::exists(folder_ / "new/drift.csv"));
+  EXPECT_TRUE(fs::exists(folder_ / "new/mine.drift.csv"));
+  EXPECT_FALSE(fs::exists(folder_ / "new/drift.csv")) << "which may be somebody's";
 }
 
 TEST_F(StoreIntegrity, ATornLineStopsAMerge) {

@@ -127,7 +127,7 @@ TEST_F(StoreTest, ABadLineIsAnErrorWithFileLineAndText) {
 
 TEST_F(StoreTest, ATornLastLineIsSkippedWithAWarningAndRemovedBeforeTheNextAppend) {
   const auto file = folder_ / "torn.jsonl";
-  WriteFileAtomically(file, "{\"a\":1}\n{\"kind\":\"a\",\"b\":[1.0,");
+  WriteFileAtomically(file, "{\"kind\":\"a\"}\n{\"kind\":\"a\",\"b\":[1.0,");
   std::vector<std::string> warnings;
   EXPECT_EQ(ReadRecords(file, &warnings).size(), 1u);
   ASSERT_EQ(warnings.size(), 1u);
@@ -136,15 +136,15 @@ TEST_F(StoreTest, ATornLastLineIsSkippedWithAWarningAndRemovedBeforeTheNextAppen
   Record next;
   next.Set("a", std::int64_t{3});
   ResultStore(file).Append(next);
-  EXPECT_EQ(ReadFile(file), "{\"a\":1}\n" + ToJsonLine(next) + "\n");
+  EXPECT_EQ(ReadFile(file), "{\"kind\":\"a\"}\n" + ToJsonLine(next) + "\n");
 }
 
 TEST_F(StoreTest, ACompleteLastLineWithoutLineEndIsKept) {
   const auto file = folder_ / "complete.jsonl";
-  WriteFileAtomically(file, "{\"a\":1}");
+  WriteFileAtomically(file, "{\"kind\":\"a\"}");
   EXPECT_EQ(ReadRecords(file).size(), 1u);
   ResultStore(file).Append(Record{});
-  EXPECT_EQ(ReadFile(file), "{\"a\":1}\n" + ToJsonLine(Record{}) + "\n");
+  EXPECT_EQ(ReadFile(file), "{\"kind\":\"a\"}\n" + ToJsonLine(Record{}) + "\n");
 }
 
 TEST_F(StoreTest, LinesOfSeveralThreadsDoNotMix) {

@@ -95,6 +95,99 @@ TEST(RedundancyTest, NothingIsReleasedWhereEverythingNearIsSingular) {
   }
 }
 
+/// `more` beside `d`, its bodies and joints renamed.
+void Add(MechanismDescription* d, const MechanismDescription& more, const std::string& suffix) {
+  const int bodies = static_cast<int>(d->bodies.size()) - 1;
+  const int joints = static_cast<int>(d->joints.size());
+  for (std::size_t i = 1; i < more.bodies.size(); ++i) {
+    d->bodies.push_back(more.bodies[i]);
+    d->bodies.back().name += suffix;
+  }
+  for (JointDescription joint : more.joints) {
+    joint.name += suffix;
+    for (JointSide* side : {&joint.from, &joint.to})
+      side->body += side->body != kGround ? bodies : 0;
+    d->joints.push_back(joint);
+  }
+  for (const JointValues& values : more.initial.coordinates) {
+    d->initial.coordinates.push_back({values.joint + joints, values.values});
+  }
+  for (const int held : more.initial.held) d->initial.held.push_back(held + joints);
+}
+
+/// Unit bars in line in space, as long together as the pins at their ends are apart.
+MechanismDescription TautChain(int bars) {
+  MechanismDescription d;
+  d.name = "taut";
+  d.space = SpaceKind::kSpatial;
+  const Eigen::Vector3d O = Eigen::Vector3d::Zero(), tip = Eigen::Vector3d::UnitX();
+  for (int i = 0; i < bars; ++i) d.bodies.push_back(Bar("b" + std::to_string(i), 1.0, 1.0, 1.0));
+  for (int i = 0; i < bars; ++i) {
+    d.joints.push_back(Revolute("C" + std::to_string(i), i, i == 0 ? O : tip, i + 1, O));
+  }
+  d.joints.push_back(Revolute("end", bars, tip, 0, bars * tip));
+  d.joints.back().cut = true;
+  return d;
+}
+
+TEST(RedundancyTest, EachPartHasTheChoiceItWouldHaveAlone) {
+  const MechanismDescription bennett = Shipped("bennett");
+  const Redundancy alone = FindRedundancy(bennett);
+  ASSERT_EQ(alone.released.size(), 1u);
+  MechanismDescription two = bennett;
+  Add(&two, bennett, "'");
+  const Redundancy both = FindRedundancy(two);
+  EXPECT_EQ(both.rank, 2 * alone.rank);
+  ASSERT_EQ(both.released.size(), 2u);
+  for (const Released& out : both.released) {
+    EXPECT_EQ(out.directions, alone.released[0].directions);
+  }
+  EXPECT_EQ(both.released[1].joint, alone.released[0].joint + 4);
+  // beside a chain that cannot move, whose own constraints are lost at this position only
+  MechanismDescription beside = bennett;
+  Add(&beside, TautChain(3), "'");
+  const Redundancy found = FindRedundancy(beside);
+  ASSERT_EQ(found.released.size(), 1u);
+  EXPECT_EQ(found.released[0], alone.released[0]);
+}
+
+TEST(RedundancyTest, TwoHingesOfADoorNeedOne) {
+  MechanismDescription d;
+  d.name = "door";
+  d.space = SpaceKind::kSpatial;
+  d.bodies.push_back(Bar("door", 1.0, 1.0, 1.0));
+  for (const double z : {0.0, 2.0}) {
+    const Eigen::Vector3d at(0.0, 0.0, z);
+    d.joints.push_back(Revolute("hinge" + std::to_string(static_cast<int>(z)), 0, at, 1, at));
+  }
+  const Redundancy found = FindRedundancy(d);
+  EXPECT_EQ(found.rows, 5);
+  EXPECT_EQ(found.rank, 0);
+  EXPECT_EQ(Count(found.released), 5);
+}
+
+TEST(RedundancyTest, MomentsOfAPinAreImposedTogether) {
+  for (const char* name : {"bennett", "goldberg", "four-bar-in-space"}) {
+    const MechanismDescription description = Shipped(name);
+    for (const Released& out : FindRedundancy(description).released) {
+      ASSERT_EQ(description.joints[out.joint].type, JointType::kRevolute);
+      const auto moments = std::ranges::count_if(out.directions, [](int i) { return i < 2; });
+      EXPECT_NE(moments, 1) << name;
+    }
+  }
+}
+
+TEST(RedundancyTest, JointsOnOnePinMayBeWrittenDifferently) {
+  MechanismDescription d;
+  d.name = "pin";
+  d.bodies.push_back(Bar("bar", 1.0, 1.0, 1.0));
+  for (const double x : {0.3, 0.1 + 0.2}) {
+    const Eigen::Vector3d at(x, 0.0, 0.0);
+    d.joints.push_back(Revolute("pin" + std::to_string(d.joints.size()), 0, at, 1, at));
+  }
+  EXPECT_EQ(FindRedundancy(d).rank, 0) << "two pins 6e-17 m apart are one";
+}
+
 TEST(RedundancyTest, AChoiceThatServesBadlyIsReplaced) {
   // self-stress of the parallel cranks is along them: of a pin seen from its crank x can be given
   // up and y cannot

@@ -10,7 +10,6 @@
 #include "mechanism/conflict.h"
 #include "mechanism/dense_memory.h"
 #include "mechanism/excursion.h"
-#include "mechanism/islands.h"
 #include "mechanism/mobility.h"
 #include "mechanism/redundancy.h"
 #include "mechanism/tree_dynamics.h"
@@ -283,22 +282,22 @@ class Assembler {
   /// along speeds that lead nowhere. A rigid part without such speeds locks nothing: it stays where
   /// it is, whatever others do.
   void CheckMobility() {
-    MechanismDescription bare = description_;
-    bare.forces.clear();  // connect parts and hold nothing
-    if (mechanism_.num_u() > kMostAnalysedSpeeds || FindIslands(bare).size() < 2) {
+    const bool analysed = mechanism_.num_u() <= kMostAnalysedSpeeds;
+    const std::vector<CompiledPart> parts =
+        analysed ? SplitByJoints(description_).parts : std::vector<CompiledPart>();
+    if (parts.size() < 2) {
       if (const std::string why = WhyLocked(mechanism_, start_.q); !why.empty()) {
         Lock("nothing can move: " + why);
       }
       return;
     }
-    CompileOptions options = CompileOptions::None();
-    options.islands = true;
     std::string first, stuck;
     bool moves = false;
-    for (const CompiledPart& part : Compile(bare, options).parts) {
+    for (const CompiledPart& part : parts) {
       const Mechanism<Space, double> own(part.description, Coordinates::kJoint);
       const Start<double> start = Assembler(part.description, own).Run();
-      const std::string why = WhyLocked(own, start.q);
+      const std::string why =
+          start.outcome == Outcome::kLocked ? WhyLocked(own, start.q) : std::string();
       moves = moves || why.empty();
       if (first.empty()) first = why;
       if (!why.empty() && stuck.empty() && Excursion<Space>(own, start.q).freedom() > 0) {

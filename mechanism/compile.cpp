@@ -219,6 +219,14 @@ Compiled Compile(const MechanismDescription& description, const CompileOptions& 
   return Compiler(description, options).Run();
 }
 
+Compiled SplitByJoints(const MechanismDescription& description) {
+  MechanismDescription bare = description;
+  bare.forces.clear();
+  CompileOptions options = CompileOptions::None();
+  options.islands = true;
+  return Compile(bare, options);
+}
+
 template <class Space>
 Pose<Spatial, double> UserPose(const Compiled& compiled, int body,
                                const Kinematics<Space, double>* kinematics) {

@@ -66,6 +66,10 @@ struct Compiled {
 /// Throws std::invalid_argument for a description that Validate() refuses.
 Compiled Compile(const MechanismDescription& description, const CompileOptions& options = {});
 
+/// Each set of bodies that joints connect as a part by itself, without forces: for analyses of
+/// geometry, which springs between parts do not concern. Throws likewise.
+Compiled SplitByJoints(const MechanismDescription& description);
+
 /// Pose of a user's body, at its origin in the user's ground axes, when its part moves as
 /// `kinematics` says. Bodies fixed to Ground take no kinematics: nullptr.
 template <class Space>

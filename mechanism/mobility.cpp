@@ -27,6 +27,8 @@ constexpr Eigen::Index kMostTried = 64;
 template <class Space>
 bool IsRigidToSecondOrder(const Mechanism<Space, double>& mechanism, const VectorX<double>& q,
                           int rank) {
+  const Eigen::Index free = mechanism.num_u() - rank;
+  if (free > kMostTried || mechanism.num_rows() - rank > kMostTried) return false;
   Kinematics<Space, double> kinematics(mechanism);
   TreeDynamics<Space, double> dynamics(mechanism);
   kinematics.UpdatePosition(q);
@@ -42,8 +44,6 @@ bool IsRigidToSecondOrder(const Mechanism<Space, double>& mechanism, const Vecto
   rows = size.cwiseInverse().asDiagonal() * rows;
   const Eigen::JacobiSVD<Eigen::MatrixXd> svd(rows, Eigen::ComputeFullU | Eigen::ComputeFullV);
   const Eigen::MatrixXd stresses = svd.matrixU().rightCols(rows.rows() - rank);
-  const Eigen::Index free = rows.cols() - rank;
-  if (free > kMostTried || stresses.cols() > kMostTried) return false;
   const Eigen::MatrixXd speeds = mass.matrixU().solve(svd.matrixV().rightCols(free));
   // J udot = gamma(v) is e'' = 0, so that e'' is -gamma where nothing accelerates
   VectorX<double> h(mechanism.num_u()), gamma(mechanism.num_rows());

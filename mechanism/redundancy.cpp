@@ -222,11 +222,7 @@ Redundancy Find(const MechanismDescription& description) {
 
 /// Each part by itself: neither its size nor whether it can move at all concerns another's.
 Redundancy FindRedundancy(const MechanismDescription& description) {
-  MechanismDescription bare = description;
-  bare.forces.clear();  // connect parts and constrain nothing
-  CompileOptions options = CompileOptions::None();
-  options.islands = true;
-  const Compiled compiled = Compile(bare, options);
+  const Compiled compiled = SplitByJoints(description);
   Redundancy whole;
   for (std::size_t p = 0; p < compiled.parts.size(); ++p) {
     const MechanismDescription& part = compiled.parts[p].description;

@@ -81,11 +81,11 @@ class Analysis {
 
  private:
   void FindFreedomOfParts() {
-    if (result_.start.outcome != Outcome::kLocked || result_.islands.size() < 2) return;
-    CompileOptions options = CompileOptions::None();
-    options.islands = true;
+    if (result_.start.outcome != Outcome::kLocked) return;
+    const Compiled split = SplitByJoints(description_);
+    if (split.parts.size() < 2) return;
     int freedom = 0;
-    for (const CompiledPart& part : Compile(description_, options).parts) {
+    for (const CompiledPart& part : split.parts) {
       freedom += AnalyseStructure(part.description).freedom();
     }
     if (freedom > 0) result_.freedom_of_parts = freedom;

@@ -56,6 +56,18 @@ TEST(Mobility, APartThatCannotMoveIsNamedThoughOthersCan) {
   }
 }
 
+TEST(Mobility, ASpringBetweenPartsDoesNotHideTheLockedOne) {
+  MechanismDescription d = Stretched(3);
+  d.bodies.push_back(Bar("pendulum", 1.0, 1.0, 1.0));
+  const Eigen::Vector3d O = Eigen::Vector3d::Zero(), tip = Eigen::Vector3d::UnitX();
+  d.joints.push_back(Revolute("P", 0, O, 4, O));
+  d.forces.push_back(SpringDamper{.from = {1, tip}, .to = {4, tip}, .stiffness = 1.0});
+  const Structure s = AnalyseStructure(d);
+  EXPECT_EQ(s.islands.size(), 1u) << "parts that act on each other";
+  EXPECT_EQ(s.start.outcome, Outcome::kLocked);
+  EXPECT_EQ(s.freedom(), 1);
+}
+
 TEST(Mobility, RigidPartsStayWhereTheyAreAndLockNothing) {
   MechanismDescription d = Stretched(2);
   d.joints.back().to.position.x() -= 0.5;  // a triangle

@@ -2,7 +2,7 @@
 
 #include "mechanism/assembly.h"
 #include "mechanism/scaled_loops.h"
-#include "mechanism/singular_values.h"
+#include "mechanism/large_singular_values.h"
 
 namespace loopbench {
 

@@ -5,8 +5,8 @@
 #include <vector>
 
 #include "mechanism/excursion.h"
+#include "mechanism/large_singular_values.h"
 #include "mechanism/redundancy.h"
-#include "mechanism/singular_values.h"
 #include "mechanism/tree_dynamics.h"
 
 namespace loopbench {

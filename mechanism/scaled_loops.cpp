@@ -5,7 +5,7 @@
 #include <cmath>
 #include <utility>
 
-#include "mechanism/singular_values.h"
+#include "mechanism/large_singular_values.h"
 #include "mechanism/tree_dynamics.h"
 
 namespace loopbench {

@@ -46,8 +46,8 @@ void NullSpace<Space, S>::Factor(const Kinematics<Space, S>& kinematics,
     auto block = B_.middleRows(joint.row, joint.num_constraints());
     K_[k].template triangularView<Eigen::Lower>().solveInPlace(block);
   }
-  svd_.compute(B_, Eigen::ComputeFullU | Eigen::ComputeFullV);
-  const auto& sigma = svd_.singularValues();
+  svd_.Compute(B_);
+  const auto& sigma = svd_.sigma();
   const S largest = std::max(sigma[0] * sigma[0], S(LoopSolver<S>::kLeastResponse));
   // as in loop_solver.cpp, a narrow scalar's round-off counts
   const S theta =
@@ -71,15 +71,15 @@ void NullSpace<Space, S>::ToDirections(const VectorX<S>& rows) {
     auto part = rows_.segment(joint.row, joint.num_constraints());
     K_[k].template triangularView<Eigen::Lower>().solveInPlace(part);
   }
-  c_.noalias() = svd_.matrixU().leftCols(c_.size()).transpose() * rows_;
+  c_.noalias() = svd_.U().leftCols(c_.size()).transpose() * rows_;
 }
 
 template <class Space, class S>
 bool NullSpace<Space, S>::Accelerate(const MatrixX<S>& M, const VectorX<S>& h,
                                      const VectorX<S>& gamma, VectorX<S>& udot) {
   const Eigen::Index n = M.rows(), d = num_dependent_, f = n - d;
-  const auto& sigma = svd_.singularValues();
-  const auto& V = svd_.matrixV();
+  const auto& sigma = svd_.sigma();
+  const auto& V = svd_.V();
   // Mh V = L^-1 M L^-T V, V^T Mh V
   Mh_ = M;
   L_.matrixL().solveInPlace(Mh_);
@@ -121,11 +121,11 @@ template <class Space, class S>
 void NullSpace<Space, S>::Multipliers(const VectorX<S>& force, VectorX<S>& lambda) {
   column_ = force;
   L_.matrixL().solveInPlace(column_);
-  c_.noalias() = svd_.matrixV().leftCols(c_.size()).transpose() * column_;
+  c_.noalias() = svd_.V().leftCols(c_.size()).transpose() * column_;
   for (Eigen::Index i = 0; i < c_.size(); ++i) {
-    c_[i] = weights_[i] >= S(1e-16) ? S(c_[i] / svd_.singularValues()[i]) : S(0);
+    c_[i] = weights_[i] >= S(1e-16) ? S(c_[i] / svd_.sigma()[i]) : S(0);
   }
-  lambda.noalias() = svd_.matrixU().leftCols(c_.size()) * c_;
+  lambda.noalias() = svd_.U().leftCols(c_.size()) * c_;
   for (std::size_t k = 0; k < K_.size(); ++k) {
     const Joint<Space, S>& joint = mechanism_.joints()[mechanism_.constraints()[k]];
     auto part = lambda.segment(joint.row, joint.num_constraints());

@@ -36,7 +36,7 @@ class NullSpace {
 
   explicit NullSpace(const Mechanism<Space, S>& mechanism);
 
-  /// The basis at the current positions, J being theirs. Below 48 rows it allocates only at first.
+  /// The basis at the current positions, J being theirs. Allocates only at first.
   void Factor(const Kinematics<Space, S>& kinematics, TreeDynamics<Space, S>& dynamics,
               const MatrixX<S>& J);
 
@@ -62,7 +62,7 @@ class NullSpace {
   std::vector<JointMatrix<S>> K_;  ///< Cholesky factors, by constraint
   MatrixX<S> B_, M_g_, Mh_, basis_, reduced_;
   Eigen::LLT<MatrixX<S>> L_, Mh_factor_, reduced_factor_;
-  Eigen::JacobiSVD<MatrixX<S>> svd_;
+  SingularValues<S> svd_;
   VectorX<S> weights_, rows_, c_, z_, speeds_, column_;
 };
 

@@ -1,32 +1,20 @@
 // The scalars of the precision ladder besides double, and what mechanism and formulations are
-// compiled for a second time (mechanism/instantiate.h): the plane in each of them, and space in
-// long double for tests.
+// compiled for once more (mechanism/instantiate.h): the plane in each of them, and space in long
+// double for tests. A unit of CMakeLists.txt names the one scalar that it compiles them for.
 #pragma once
 
-#include <boost/multiprecision/eigen.hpp>
-#include <boost/multiprecision/float128.hpp>
-#include <numbers>
+#include "harness/precision/float128.h"
 
-namespace loopbench {
-
-/// IEEE binary128 in software (libquadmath): 113 bits, eps 1.9e-34.
-using Float128 = boost::multiprecision::float128;
-
-}  // namespace loopbench
-
-template <>
-inline const loopbench::Float128 std::numbers::pi_v<loopbench::Float128> =
-    acos(loopbench::Float128(-1));
-
-#define LOOPBENCH_FOR_EACH_SCALAR(MACRO) \
-  MACRO(float) MACRO(long double) MACRO(::loopbench::Float128)
-#define LOOPBENCH_FOR_EACH_PLANAR_AND_SCALAR(MACRO) \
-  MACRO(Planar, float) MACRO(Planar, long double) MACRO(Planar, ::loopbench::Float128)
-#ifdef LOOPBENCH_SPATIAL_LONG_DOUBLE
+#ifdef LOOPBENCH_ONE_SCALAR
+#define LOOPBENCH_FOR_EACH_SCALAR(MACRO) MACRO(LOOPBENCH_ONE_SCALAR)
+#ifdef LOOPBENCH_IN_SPACE_TOO
 #define LOOPBENCH_FOR_EACH_SPACE_AND_SCALAR(MACRO) \
-  LOOPBENCH_FOR_EACH_PLANAR_AND_SCALAR(MACRO) MACRO(Spatial, long double)
+  MACRO(Planar, LOOPBENCH_ONE_SCALAR) MACRO(Spatial, LOOPBENCH_ONE_SCALAR)
 #else
-#define LOOPBENCH_FOR_EACH_SPACE_AND_SCALAR(MACRO) LOOPBENCH_FOR_EACH_PLANAR_AND_SCALAR(MACRO)
+#define LOOPBENCH_FOR_EACH_SPACE_AND_SCALAR(MACRO) MACRO(Planar, LOOPBENCH_ONE_SCALAR)
+#endif
+#else
+#define LOOPBENCH_FOR_EACH_SCALAR(MACRO) MACRO(float) MACRO(long double) MACRO(Float128)
 #endif
 // the model's lists have no more scalars here
 #define LOOPBENCH_FOR_EACH_MODEL_SCALAR(MACRO) LOOPBENCH_FOR_EACH_SCALAR(MACRO)

@@ -54,9 +54,8 @@ std::string_view WhyNotForeign(std::string_view path, std::string_view header) {
   }
   if (header.starts_with("boost/")) {
     const bool allowed =
-        path == "harness/observers/pendulum.cpp" || path == "harness/precision/scalars.h" ||
-        StartsWithOneOf(path, {"tests/reference/rigid_motions.cpp", "tests/precision/"});
-    return allowed ? "" : "Boost is for closed forms of motions and wide scalars";
+        OneOf(path, {"harness/observers/pendulum.cpp", "tests/reference/rigid_motions.cpp"});
+    return allowed ? "" : "Boost is for closed forms of motions";
   }
   return "";
 }

@@ -2,7 +2,7 @@
 
 #include <limits>
 
-#include "mechanism/instantiate.h"
+#include "mechanism/algebra/instantiate.h"
 
 namespace loopbench::lagrange {
 

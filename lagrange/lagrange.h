@@ -12,9 +12,9 @@
 #include <Eigen/Cholesky>
 #include <Eigen/LU>
 
-#include "mechanism/formulation.h"
-#include "mechanism/loop_solver.h"
-#include "mechanism/tree_dynamics.h"
+#include "mechanism/formulation/formulation.h"
+#include "mechanism/loops/loop_solver.h"
+#include "mechanism/loops/tree_dynamics.h"
 
 namespace loopbench::lagrange {
 

@@ -4,8 +4,8 @@
 #include <cmath>
 #include <limits>
 
-#include "mechanism/instantiate.h"
-#include "mechanism/tree_dynamics.h"
+#include "mechanism/algebra/instantiate.h"
+#include "mechanism/loops/tree_dynamics.h"
 
 namespace loopbench::odca {
 

@@ -21,8 +21,8 @@
 #include <memory>
 #include <vector>
 
-#include "mechanism/formulation.h"
-#include "mechanism/loop_solver.h"
+#include "mechanism/formulation/formulation.h"
+#include "mechanism/loops/loop_solver.h"
 #include "odca/plan.h"
 
 namespace loopbench::odca {

@@ -1,6 +1,6 @@
 #include "odca/odca.h"
 
-#include "mechanism/instantiate.h"
+#include "mechanism/algebra/instantiate.h"
 
 namespace loopbench::odca {
 

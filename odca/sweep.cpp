@@ -1,6 +1,6 @@
 #include "odca/sweep.h"
 
-#include "mechanism/instantiate.h"
+#include "mechanism/algebra/instantiate.h"
 
 namespace loopbench::odca {
 

@@ -4,7 +4,7 @@
 #include <cmath>
 #include <limits>
 
-#include "mechanism/instantiate.h"
+#include "mechanism/algebra/instantiate.h"
 
 namespace loopbench::reduction {
 

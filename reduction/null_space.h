@@ -22,8 +22,8 @@
 #include <Eigen/Cholesky>
 #include <vector>
 
-#include "mechanism/singular_values.h"
-#include "mechanism/tree_dynamics.h"
+#include "mechanism/algebra/singular_values.h"
+#include "mechanism/loops/tree_dynamics.h"
 
 namespace loopbench::reduction {
 

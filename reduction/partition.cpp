@@ -5,8 +5,8 @@
 #include <algorithm>
 #include <cmath>
 
-#include "mechanism/instantiate.h"
-#include "mechanism/loop_solver.h"
+#include "mechanism/algebra/instantiate.h"
+#include "mechanism/loops/loop_solver.h"
 
 namespace loopbench::reduction {
 

@@ -5,7 +5,7 @@
 
 #include <vector>
 
-#include "mechanism/tree_dynamics.h"
+#include "mechanism/loops/tree_dynamics.h"
 
 namespace loopbench::reduction {
 
@@ -16,7 +16,7 @@ struct Partition {
   S rcond = S(1);  ///< ratio of the extreme pivots of J restricted to them
 };
 
-/// Rank of J at the current positions, a property of geometry (mechanism/loop_solver.h).
+/// Rank of J at the current positions, a property of geometry (mechanism/loops/loop_solver.h).
 template <class Space, class S>
 int GeometricRank(const Kinematics<Space, S>& kinematics, TreeDynamics<Space, S>& dynamics,
                   const MatrixX<S>& J);

@@ -4,7 +4,7 @@
 #include <limits>
 #include <numeric>
 
-#include "mechanism/instantiate.h"
+#include "mechanism/algebra/instantiate.h"
 
 namespace loopbench::reduction {
 

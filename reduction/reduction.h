@@ -25,8 +25,8 @@
 #include <Eigen/LU>
 #include <memory>
 
-#include "mechanism/formulation.h"
-#include "mechanism/tree_dynamics.h"
+#include "mechanism/formulation/formulation.h"
+#include "mechanism/loops/tree_dynamics.h"
 #include "reduction/null_space.h"
 #include "reduction/partition.h"
 

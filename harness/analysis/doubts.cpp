@@ -4,7 +4,7 @@
 #include <cmath>
 
 #include "harness/analysis/agreement.h"
-#include "mechanism/scaled_loops.h"
+#include "mechanism/loops/scaled_loops.h"
 
 namespace loopbench::harness {
 namespace {

@@ -1,7 +1,7 @@
 // The length that lengths of one mechanism are compared with.
 #pragma once
 
-#include "mechanism/description.h"
+#include "mechanism/description/description.h"
 
 namespace loopbench::harness {
 

@@ -6,7 +6,7 @@
 #include <cmath>
 #include <numbers>
 
-#include "harness/joint_words.h"
+#include "harness/record/joint_words.h"
 
 namespace loopbench::harness {
 

@@ -4,7 +4,7 @@
 #include <string>
 #include <vector>
 
-#include "mechanism/structure.h"
+#include "mechanism/simplify/structure.h"
 
 namespace loopbench::harness {
 

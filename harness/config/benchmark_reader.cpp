@@ -6,14 +6,14 @@
 #include <set>
 #include <system_error>
 
-#include "harness/config/config_error.h"
-#include "harness/config/document_kind.h"
 #include "harness/config/experiment_sections.h"
 #include "harness/config/mechanism_reader.h"
-#include "harness/config/spelling.h"
-#include "harness/integrator/options.h"
-#include "mechanism/compile.h"
-#include "mechanism/in_space.h"
+#include "harness/config/options.h"
+#include "harness/json/config_error.h"
+#include "harness/json/document_kind.h"
+#include "harness/json/spelling.h"
+#include "mechanism/description/in_space.h"
+#include "mechanism/simplify/compile.h"
 
 namespace loopbench::harness {
 namespace {

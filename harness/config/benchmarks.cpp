@@ -1,6 +1,6 @@
 #include "harness/config/benchmarks.h"
 
-#include "mechanism/library.h"
+#include "mechanism/description/library.h"
 
 namespace loopbench::harness {
 

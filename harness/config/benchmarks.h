@@ -9,7 +9,7 @@
 #include <vector>
 
 #include "harness/config/experiment.h"
-#include "mechanism/description.h"
+#include "mechanism/description/description.h"
 
 namespace loopbench::harness {
 

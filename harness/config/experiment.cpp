@@ -4,7 +4,7 @@
 
 #include <algorithm>
 
-#include "harness/integrator/options.h"
+#include "harness/config/options.h"
 
 namespace loopbench::harness {
 namespace {

@@ -12,11 +12,11 @@
 #include <vector>
 
 #include "harness/config/scene.h"
-#include "harness/record.h"
-#include "harness/report/select.h"
-#include "mechanism/compile.h"
-#include "mechanism/formulation.h"
-#include "mechanism/topology.h"
+#include "harness/record/record.h"
+#include "harness/record/select.h"
+#include "mechanism/description/topology.h"
+#include "mechanism/formulation/formulation.h"
+#include "mechanism/simplify/compile.h"
 
 namespace loopbench::harness {
 
@@ -123,7 +123,8 @@ struct Limits {
   double memory_mb = 2048.0;       ///< address space of the case's process [MiB]
 };
 
-/// A family of mechanisms of growing size (mechanism/library.h), timed per right-hand side only.
+/// A family of mechanisms of growing size (mechanism/description/library.h), timed per right-hand
+/// side only.
 struct TimingFamily {
   std::string family;      ///< "chain" or "ladder"
   std::vector<int> sizes;  ///< bars of a chain, windows of a ladder

@@ -7,7 +7,7 @@
 
 #include "harness/config/experiment_reader.h"
 #include "harness/config/experiment_sections.h"
-#include "harness/config/spelling.h"
+#include "harness/json/spelling.h"
 
 namespace loopbench::harness {
 namespace {

@@ -4,7 +4,7 @@
 #include <array>
 
 #include "harness/config/experiment_sweep.h"
-#include "harness/store/record_types.h"
+#include "harness/record/record_types.h"
 
 namespace loopbench::harness {
 namespace {

@@ -1,10 +1,11 @@
-// Families of mechanisms (mechanism/library.h) as scenes: {"family": "chain", "bars": 10}.
+// Families of mechanisms (mechanism/description/library.h) as scenes: {"family": "chain", "bars":
+// 10}.
 #include <fmt/format.h>
 
 #include <numbers>
 
 #include "harness/config/experiment_sections.h"
-#include "mechanism/library.h"
+#include "mechanism/description/library.h"
 
 namespace loopbench::harness {
 namespace {

@@ -5,8 +5,8 @@
 #include <algorithm>
 #include <charconv>
 
-#include "harness/config/config_error.h"
-#include "harness/config/spelling.h"
+#include "harness/json/config_error.h"
+#include "harness/json/spelling.h"
 
 namespace loopbench::harness {
 namespace {

@@ -2,9 +2,9 @@
 
 #include <fmt/format.h>
 
-#include "harness/config/config_error.h"
-#include "harness/config/document_kind.h"
 #include "harness/config/experiment_sweep.h"
+#include "harness/json/config_error.h"
+#include "harness/json/document_kind.h"
 
 namespace loopbench::harness {
 namespace {

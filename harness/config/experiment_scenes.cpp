@@ -5,12 +5,12 @@
 #include <set>
 #include <system_error>
 
-#include "harness/config/config_error.h"
 #include "harness/config/experiment_sections.h"
 #include "harness/config/mechanism_reader.h"
 #include "harness/config/mechanism_sections.h"
-#include "harness/config/spelling.h"
-#include "mechanism/similarity.h"
+#include "harness/json/config_error.h"
+#include "harness/json/spelling.h"
+#include "mechanism/description/similarity.h"
 
 namespace loopbench::harness {
 namespace {

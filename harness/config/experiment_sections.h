@@ -12,8 +12,8 @@
 #include <vector>
 
 #include "harness/config/experiment.h"
-#include "harness/config/json_reader.h"
-#include "harness/integrator/options.h"
+#include "harness/config/options.h"
+#include "harness/json/json_reader.h"
 
 namespace loopbench::harness {
 

@@ -1,7 +1,7 @@
 // "integrator", "jacobian", "limits", "compile", "series", "timing" and "precision" of an
 // experiment file.
 #include "harness/config/experiment_sections.h"
-#include "harness/integrator/options.h"
+#include "harness/config/options.h"
 
 namespace loopbench::harness {
 namespace {

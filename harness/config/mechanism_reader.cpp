@@ -4,8 +4,8 @@
 
 #include <utility>
 
-#include "harness/config/document_kind.h"
 #include "harness/config/mechanism_sections.h"
+#include "harness/json/document_kind.h"
 
 namespace loopbench::harness {
 

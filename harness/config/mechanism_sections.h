@@ -12,8 +12,8 @@
 #include <string_view>
 #include <vector>
 
-#include "harness/config/json_reader.h"
 #include "harness/config/scene.h"
+#include "harness/json/json_reader.h"
 
 namespace loopbench::harness {
 

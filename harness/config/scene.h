@@ -6,7 +6,7 @@
 #include <utility>
 #include <vector>
 
-#include "mechanism/description.h"
+#include "mechanism/description/description.h"
 
 namespace loopbench::harness {
 

@@ -6,8 +6,8 @@
 #include <string>
 #include <vector>
 
-#include "harness/config/json_reader.h"
-#include "harness/report/select.h"
+#include "harness/json/json_reader.h"
+#include "harness/record/select.h"
 
 namespace loopbench::harness {
 

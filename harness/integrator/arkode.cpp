@@ -6,11 +6,11 @@
 #include <string>
 #include <vector>
 
+#include "harness/config/options.h"
 #include "harness/integrator/arkode_newton.h"
 #include "harness/integrator/arkode_vectors.h"
 #include "harness/integrator/arkode_versions.h"
 #include "harness/integrator/guarded_ode.h"
-#include "harness/integrator/options.h"
 #include "harness/integrator/stepper.h"
 
 namespace loopbench::harness {

@@ -8,9 +8,9 @@
 #include <string>
 #include <vector>
 
+#include "harness/config/options.h"
 #include "harness/integrator/ode.h"
-#include "harness/integrator/options.h"
-#include "mechanism/outcome.h"
+#include "mechanism/description/outcome.h"
 
 namespace loopbench::harness {
 

@@ -13,7 +13,7 @@
 #include <string>
 #include <type_traits>
 
-#include "harness/integrator/options.h"
+#include "harness/config/options.h"
 
 // Explicit pairs run in ERKStep, implicit ones in ARKStep, which have the same calls under two
 // names. From 7.1 on they are one call, and this is the whole difference for most of them.

@@ -7,10 +7,10 @@
 #include <span>
 #include <vector>
 
-#include "harness/cpu_time.h"
+#include "harness/config/options.h"
+#include "harness/integrator/cpu_time.h"
 #include "harness/integrator/ode.h"
-#include "harness/integrator/options.h"
-#include "mechanism/outcome.h"
+#include "mechanism/description/outcome.h"
 
 namespace loopbench::harness {
 

@@ -5,7 +5,7 @@
 #include <optional>
 #include <span>
 
-#include "mechanism/outcome.h"
+#include "mechanism/description/outcome.h"
 
 namespace loopbench::harness {
 

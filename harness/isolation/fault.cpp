@@ -9,7 +9,7 @@
 #include <string_view>
 #include <vector>
 
-#include "harness/report/select.h"
+#include "harness/record/select.h"
 
 namespace loopbench::harness {
 

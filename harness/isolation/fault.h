@@ -8,7 +8,7 @@
 #include <optional>
 #include <string>
 
-#include "harness/record.h"
+#include "harness/record/record.h"
 
 namespace loopbench::harness {
 

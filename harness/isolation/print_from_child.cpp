@@ -9,7 +9,7 @@
 #include <cstring>
 #include <stdexcept>
 
-#include "harness/terminal.h"
+#include "harness/text/terminal.h"
 
 namespace loopbench::harness {
 namespace {

@@ -20,7 +20,7 @@
 #include <vector>
 
 #include "harness/isolation/child_watch.h"
-#include "mechanism/dense_memory.h"
+#include "mechanism/model/dense_memory.h"
 
 namespace loopbench::harness {
 namespace {

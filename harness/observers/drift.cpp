@@ -3,7 +3,7 @@
 
 #include "harness/observers/joint_view.h"
 #include "harness/observers/observer.h"
-#include "mechanism/tree_dynamics.h"
+#include "mechanism/loops/tree_dynamics.h"
 
 namespace loopbench::harness {
 

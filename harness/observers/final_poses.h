@@ -1,8 +1,8 @@
 // Where a run ended: the poses of the user's bodies, whatever was simplified for it.
 #pragma once
 
-#include "harness/record.h"
-#include "mechanism/compile.h"
+#include "harness/record/record.h"
+#include "mechanism/simplify/compile.h"
 
 namespace loopbench::harness {
 

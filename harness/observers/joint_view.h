@@ -3,7 +3,7 @@
 
 #include <memory>
 
-#include "mechanism/kinematics.h"
+#include "mechanism/model/kinematics.h"
 
 namespace loopbench::harness {
 

@@ -9,8 +9,8 @@
 #include <vector>
 
 #include "harness/config/scene.h"
-#include "harness/record.h"
-#include "mechanism/formulation.h"
+#include "harness/record/record.h"
+#include "mechanism/formulation/formulation.h"
 
 namespace loopbench::harness {
 
@@ -131,8 +131,8 @@ class ConditionObserver final : public Observer<Space> {
 };
 
 /// How near the run came to a singular position: the smallest ratio of singular values of the
-/// scaled loops (mechanism/scaled_loops.h), at the largest rank met. By Eckart and Young it is the
-/// relative distance of the constraints from the nearest ones of lower rank; near a singular
+/// scaled loops (mechanism/loops/scaled_loops.h), at the largest rank met. By Eckart and Young it
+/// is the relative distance of the constraints from the nearest ones of lower rank; near a singular
 /// position it is about the angle [rad] still to go. At accepted steps only, and only for loops
 /// with few rows; redundant rows do not count.
 ///

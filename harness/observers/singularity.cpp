@@ -4,7 +4,7 @@
 
 #include "harness/observers/joint_view.h"
 #include "harness/observers/observer.h"
-#include "mechanism/scaled_loops.h"
+#include "mechanism/loops/scaled_loops.h"
 
 namespace loopbench::harness {
 

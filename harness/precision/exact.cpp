@@ -3,7 +3,7 @@
 #include <algorithm>
 
 #include "lagrange/lagrange.h"
-#include "mechanism/assembly.h"
+#include "mechanism/start/assembly.h"
 
 namespace loopbench::harness {
 

@@ -5,8 +5,8 @@
 #include <vector>
 
 #include "harness/precision/scalars.h"
-#include "mechanism/kinematics.h"
-#include "mechanism/outcome.h"
+#include "mechanism/description/outcome.h"
+#include "mechanism/model/kinematics.h"
 
 namespace loopbench::harness {
 

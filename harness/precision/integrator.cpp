@@ -4,7 +4,7 @@
 #include <cmath>
 #include <limits>
 
-#include "harness/cpu_time.h"
+#include "harness/integrator/cpu_time.h"
 #include "harness/precision/one_step.h"
 #include "harness/precision/scalars.h"
 
@@ -12,7 +12,7 @@ namespace loopbench::harness {
 
 namespace {
 
-// harness/integrator/options.cpp: the values of profile ode45.
+// harness/config/options.cpp: the values of profile ode45.
 constexpr double kSafety = 0.8, kGrowth = 5.0, kReduction = 0.1, kRepeatedFailure = 0.5;
 // ARKODE's, not the 60 of runs in double (integrator/arkode.cpp): where rounding in float cannot
 // meet a tolerance, more halvings find steps that pass by chance, and a run crawls instead of

@@ -2,7 +2,7 @@
 //
 // ARKODE computes in double alone. To see what rounding does, the same method must run in narrower
 // and wider scalars: the Dormand-Prince pair, MATLAB's norm (max_i |e_i| / max(rtol |y_i|, atol)),
-// first step, longest step and I controller, as harness/integrator/options.h has them for ARKODE.
+// first step, longest step and I controller, as harness/config/options.h has them for ARKODE.
 // In double the two take the same steps but for rounding (tests/precision/). Times, tolerances and
 // coefficients are of the same scalar as the state.
 //
@@ -16,7 +16,7 @@
 #include <span>
 #include <vector>
 
-#include "mechanism/outcome.h"
+#include "mechanism/description/outcome.h"
 
 namespace loopbench::harness {
 

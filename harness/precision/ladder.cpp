@@ -4,7 +4,7 @@
 #include <limits>
 #include <memory>
 
-#include "harness/cpu_time.h"
+#include "harness/integrator/cpu_time.h"
 #include "harness/precision/exact.h"
 #include "harness/precision/integrator.h"
 #include "lagrange/lagrange.h"

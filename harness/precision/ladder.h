@@ -3,8 +3,8 @@
 //
 // Error and drift of a run have two parts: round-off of the scalar, and truncation, here all that
 // is left in the widest scalar at the same tolerance: that of the method, and near singular
-// positions what softening takes (mechanism/loop_solver.h). So what the widest scalar changes was
-// round-off.
+// positions what softening takes (mechanism/loops/loop_solver.h). So what the widest scalar changes
+// was round-off.
 //
 // The reference is one for all columns of a mechanism, whose exact motion is one: multipliers in
 // joint coordinates, positions projected after each step, without softening.

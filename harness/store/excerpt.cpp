@@ -2,7 +2,7 @@
 
 #include <fmt/format.h>
 
-#include "harness/config/json_document.h"
+#include "harness/json/json_document.h"
 
 namespace loopbench::harness {
 

@@ -7,8 +7,8 @@
 #include <map>
 #include <set>
 
-#include "harness/config/json_reader.h"
-#include "harness/report/select.h"
+#include "harness/json/json_reader.h"
+#include "harness/record/select.h"
 #include "harness/store/result_store.h"
 
 namespace loopbench::harness {

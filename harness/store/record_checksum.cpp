@@ -4,8 +4,8 @@
 
 #include <stdexcept>
 
-#include "harness/hash.h"
 #include "harness/store/excerpt.h"
+#include "harness/text/hash.h"
 
 namespace loopbench::harness {
 namespace {

@@ -6,8 +6,8 @@
 #include <utility>
 #include <vector>
 
-#include "harness/hash.h"
 #include "harness/store/record_checksum.h"
+#include "harness/text/hash.h"
 
 namespace loopbench::harness {
 namespace {

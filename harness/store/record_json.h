@@ -4,7 +4,7 @@
 #include <string>
 #include <string_view>
 
-#include "harness/record.h"
+#include "harness/record/record.h"
 
 namespace loopbench::harness {
 

@@ -11,12 +11,12 @@
 #include <utility>
 #include <vector>
 
-#include "harness/config/json_document.h"
-#include "harness/config/json_syntax.h"
+#include "harness/json/json_document.h"
+#include "harness/json/json_syntax.h"
+#include "harness/record/record_types.h"
 #include "harness/store/excerpt.h"
 #include "harness/store/record_checksum.h"
 #include "harness/store/record_json.h"
-#include "harness/store/record_types.h"
 
 namespace loopbench::harness {
 namespace {

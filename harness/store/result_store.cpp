@@ -10,9 +10,9 @@
 
 #include "harness/store/contents.h"
 #include "harness/store/excerpt.h"
-#include "harness/store/files.h"
 #include "harness/store/record_json.h"
 #include "harness/store/store_lock.h"
+#include "harness/text/files.h"
 
 namespace loopbench::harness {
 namespace {

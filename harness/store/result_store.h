@@ -7,7 +7,7 @@
 #include <string_view>
 #include <vector>
 
-#include "harness/record.h"
+#include "harness/record/record.h"
 #include "harness/store/record_json.h"
 
 namespace loopbench::harness {

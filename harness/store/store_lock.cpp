@@ -14,7 +14,7 @@
 #include <string>
 #include <thread>
 
-#include "harness/store/files.h"
+#include "harness/text/files.h"
 
 namespace loopbench::harness {
 namespace {

@@ -15,10 +15,10 @@
 #include <sstream>
 
 #include "harness/config/benchmark_reader.h"
-#include "harness/origin.h"
-#include "harness/provenance.h"
-#include "harness/store/files.h"
-#include "harness/terminal.h"
+#include "harness/record/origin.h"
+#include "harness/record/provenance.h"
+#include "harness/text/files.h"
+#include "harness/text/terminal.h"
 #include "harness/timing/allocations.h"
 #include "harness/timing/subject.h"
 

@@ -13,11 +13,11 @@
 #include <vector>
 
 #include "harness/config/benchmark_reader.h"
-#include "harness/numeric_option.h"
-#include "harness/origin.h"
-#include "harness/store/files.h"
+#include "harness/record/origin.h"
 #include "harness/store/record_json.h"
-#include "harness/terminal.h"
+#include "harness/text/files.h"
+#include "harness/text/numeric_option.h"
+#include "harness/text/terminal.h"
 #include "harness/timing/allocations.h"
 #include "harness/timing/callgrind.h"
 #include "harness/timing/subject.h"

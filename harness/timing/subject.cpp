@@ -6,11 +6,11 @@
 #include <stdexcept>
 #include <vector>
 
-#include "harness/hash.h"
 #include "harness/integrator/arkode.h"
 #include "harness/integrator/stepper.h"
-#include "harness/run_case.h"
-#include "mechanism/assembly.h"
+#include "harness/run/run_case.h"
+#include "harness/text/hash.h"
+#include "mechanism/start/assembly.h"
 #include "odca/odca.h"
 
 namespace loopbench::harness {

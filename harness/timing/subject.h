@@ -12,7 +12,7 @@
 #include <string>
 
 #include "harness/config/benchmarks.h"
-#include "mechanism/outcome.h"
+#include "mechanism/description/outcome.h"
 
 namespace loopbench::harness {
 

@@ -7,13 +7,13 @@
 #include <memory>
 #include <optional>
 
-#include "harness/case_identity.h"
-#include "harness/compiled_scene.h"
 #include "harness/integrator/arkode.h"
-#include "harness/run_case.h"
-#include "harness/timing/noise.h"
-#include "mechanism/assembly.h"
-#include "mechanism/library.h"
+#include "harness/record/noise.h"
+#include "harness/run/case_identity.h"
+#include "harness/run/compiled_scene.h"
+#include "harness/run/run_case.h"
+#include "mechanism/description/library.h"
+#include "mechanism/start/assembly.h"
 #include "odca/odca.h"
 
 namespace loopbench::harness {
@@ -116,7 +116,7 @@ class SubjectIn final : public Subject {
     record.Set("rhs_ns_p10", Quantile(rhs_ns_, 0.1));
     record.Set("rhs_ns_p90", Quantile(rhs_ns_, 0.9));
     record.Set("ns_per_body", rhs / bodies);
-    record.Set("series.rhs_ns", rhs_ns_);  // raw, for tests of significance (harness/compare)
+    record.Set("series.rhs_ns", rhs_ns_);  // raw, for tests of significance (harness/judge)
     record.Set("series.wall_s", wall_s_);
     if (!wall_s_.empty()) {
       record.Set("step_us_median", wall * 1e6 / static_cast<double>(result_.steps));

@@ -13,7 +13,7 @@
 #include <vector>
 
 #include "harness/config/experiment.h"
-#include "harness/record.h"
+#include "harness/record/record.h"
 
 namespace loopbench::harness {
 

@@ -4,7 +4,7 @@
 #include <optional>
 #include <string>
 
-#include "mechanism/formulation.h"
+#include "mechanism/formulation/formulation.h"
 #include "tests/contract/generators.h"
 
 namespace loopbench::testing {

@@ -1,6 +1,6 @@
 // Jacobians by forward differentiation against difference quotients of the right-hand side itself,
 // for every shipped mechanism and for random ones, in all formulations, levels and coordinate sets.
-#include "mechanism/forward_jacobian.h"
+#include "mechanism/formulation/forward_jacobian.h"
 
 #include <gtest/gtest.h>
 
@@ -15,8 +15,8 @@
 #include <vector>
 
 #include "harness/integrator/arkode.h"
-#include "harness/run_case.h"
-#include "mechanism/assembly.h"
+#include "harness/run/run_case.h"
+#include "mechanism/start/assembly.h"
 #include "odca/odca.h"
 #include "tests/contract/allocations.h"
 #include "tests/contract/generators.h"

@@ -2,7 +2,7 @@
 
 #include <stdexcept>
 
-#include "mechanism/kinematics.h"
+#include "mechanism/model/kinematics.h"
 #include "tests/contract/builder.h"
 
 namespace loopbench::testing {

@@ -11,7 +11,7 @@
 #include <string>
 #include <vector>
 
-#include "mechanism/assembly.h"
+#include "mechanism/start/assembly.h"
 #include "tests/contract/oracle.h"
 
 namespace loopbench::testing {

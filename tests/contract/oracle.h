@@ -20,7 +20,7 @@
 #include <string>
 #include <vector>
 
-#include "mechanism/mechanism.h"
+#include "mechanism/model/mechanism.h"
 #include "tests/contract/dense.h"
 #include "tests/contract/jet.h"
 

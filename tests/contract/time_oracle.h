@@ -2,7 +2,7 @@
 // powers of time whose coefficients solve one dense system.
 #pragma once
 
-#include "mechanism/time_function.h"
+#include "mechanism/description/time_function.h"
 #include "tests/contract/jet.h"
 
 namespace loopbench::testing {

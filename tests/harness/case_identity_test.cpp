@@ -1,5 +1,5 @@
 // One identity everywhere: a case is its keys and its content, in stores, tables and judgements.
-#include "harness/case_identity.h"
+#include "harness/run/case_identity.h"
 
 #include <algorithm>
 #include <cmath>
@@ -8,8 +8,8 @@
 #include <set>
 
 #include "harness/config/experiment_reader.h"
-#include "harness/precision_cases.h"
-#include "harness/report/select.h"
+#include "harness/record/select.h"
+#include "harness/suite/precision_cases.h"
 #include "harness/timing/time_cases.h"
 #include "tests/harness/cli_fixture.h"
 

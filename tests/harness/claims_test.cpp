@@ -1,5 +1,5 @@
 // Planted data turn each verdict, and the committed rules are readable and answer to planted data.
-#include "harness/report/claims.h"
+#include "harness/judge/claims.h"
 
 #include <gtest/gtest.h>
 
@@ -9,9 +9,9 @@
 #include <string>
 #include <vector>
 
-#include "harness/config/claims_reader.h"
-#include "harness/config/config_error.h"
-#include "harness/report/claims_report.h"
+#include "harness/json/config_error.h"
+#include "harness/judge/claims_reader.h"
+#include "harness/judge/claims_report.h"
 
 namespace loopbench::harness {
 namespace {

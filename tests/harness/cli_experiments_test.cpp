@@ -6,8 +6,8 @@
 #include <string>
 #include <vector>
 
-#include "harness/config/config_error.h"
 #include "harness/config/experiment_reader.h"
+#include "harness/json/config_error.h"
 #include "tests/harness/cli_fixture.h"
 
 namespace loopbench::harness {

@@ -10,8 +10,8 @@
 #include <string>
 #include <vector>
 
-#include "harness/store/files.h"
 #include "harness/store/result_store.h"
+#include "harness/text/files.h"
 
 namespace loopbench::harness {
 namespace fs = std::filesystem;

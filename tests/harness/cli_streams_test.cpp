@@ -28,7 +28,8 @@ TEST(Printing, GoesThroughOnePlace) {
     for (const char* way : {"fmt::print", "std::cout", "std::cerr", "std::printf", "fprintf",
                             "std::puts", "fputs", "stdout,", "stderr,"}) {
       EXPECT_EQ(text.find(way), std::string::npos)
-          << path << " prints with " << way << "; use Print or PrintError of harness/terminal.h";
+          << path << " prints with " << way
+          << "; use Print or PrintError of harness/text/terminal.h";
     }
   }
   EXPECT_GT(files, 100);

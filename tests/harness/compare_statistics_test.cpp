@@ -7,7 +7,7 @@
 #include <random>
 #include <vector>
 
-#include "harness/compare/statistics.h"
+#include "harness/judge/statistics.h"
 
 namespace loopbench::harness {
 namespace {

@@ -1,5 +1,5 @@
 // The gate: what is planted is caught, what is unchanged passes, what cannot be compared is said.
-#include "harness/compare/compare.h"
+#include "harness/judge/compare.h"
 
 #include <gtest/gtest.h>
 
@@ -10,7 +10,7 @@
 #include <utility>
 #include <vector>
 
-#include "harness/origin.h"
+#include "harness/record/origin.h"
 #include "harness/store/contents.h"
 
 namespace loopbench::harness {

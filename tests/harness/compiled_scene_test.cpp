@@ -1,14 +1,14 @@
 // Runs of simplified scenes tell the same story as runs of the scenes themselves.
-#include "harness/compiled_scene.h"
+#include "harness/run/compiled_scene.h"
 
 #include <gtest/gtest.h>
 
 #include <cmath>
 
-#include "harness/merge_parts.h"
-#include "harness/run_case.h"
-#include "mechanism/in_space.h"
-#include "mechanism/library.h"
+#include "harness/run/merge_parts.h"
+#include "harness/run/run_case.h"
+#include "mechanism/description/in_space.h"
+#include "mechanism/description/library.h"
 #include "tests/reference/cases.h"
 
 namespace loopbench::harness {

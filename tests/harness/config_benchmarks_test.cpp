@@ -7,10 +7,10 @@
 #include <vector>
 
 #include "harness/config/benchmark_reader.h"
-#include "harness/config/config_error.h"
-#include "harness/store/files.h"
+#include "harness/json/config_error.h"
+#include "harness/text/files.h"
 #include "harness/timing/subject.h"
-#include "mechanism/mechanism.h"
+#include "mechanism/model/mechanism.h"
 
 namespace loopbench::harness {
 namespace {

@@ -10,11 +10,11 @@
 #include <string>
 #include <vector>
 
-#include "harness/config/claims_reader.h"
-#include "harness/config/config_error.h"
 #include "harness/config/experiment_reader.h"
-#include "harness/config/failure_map_reader.h"
 #include "harness/config/mechanism_reader.h"
+#include "harness/json/config_error.h"
+#include "harness/judge/claims_reader.h"
+#include "harness/judge/failure_map_reader.h"
 
 namespace loopbench::harness {
 namespace {

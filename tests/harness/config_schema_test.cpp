@@ -12,13 +12,13 @@
 #include <vector>
 
 #include "harness/config/benchmark_reader.h"
-#include "harness/config/claims_reader.h"
-#include "harness/config/config_error.h"
 #include "harness/config/experiment_reader.h"
-#include "harness/config/failure_map_reader.h"
-#include "harness/config/file_kind.h"
 #include "harness/config/mechanism_reader.h"
-#include "harness/store/files.h"
+#include "harness/json/config_error.h"
+#include "harness/json/file_kind.h"
+#include "harness/judge/claims_reader.h"
+#include "harness/judge/failure_map_reader.h"
+#include "harness/text/files.h"
 
 namespace loopbench::harness {
 namespace {

@@ -7,10 +7,10 @@
 #include <string>
 #include <vector>
 
-#include "harness/config/config_error.h"
 #include "harness/config/experiment_reader.h"
-#include "harness/run_case.h"
-#include "mechanism/library.h"
+#include "harness/json/config_error.h"
+#include "harness/run/run_case.h"
+#include "mechanism/description/library.h"
 
 namespace loopbench::harness {
 namespace {

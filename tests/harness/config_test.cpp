@@ -8,10 +8,10 @@
 #include <string>
 #include <vector>
 
-#include "harness/config/config_error.h"
 #include "harness/config/experiment_reader.h"
-#include "harness/config/file_kind.h"
 #include "harness/config/mechanism_reader.h"
+#include "harness/json/config_error.h"
+#include "harness/json/file_kind.h"
 
 namespace loopbench::harness {
 namespace {

@@ -9,9 +9,9 @@
 
 #include "harness/analysis/agreement.h"
 #include "harness/analysis/link_length.h"
-#include "harness/report/doubt_notes.h"
-#include "harness/report/table_view.h"
-#include "mechanism/library.h"
+#include "harness/tables/doubt_notes.h"
+#include "harness/tables/table_view.h"
+#include "mechanism/description/library.h"
 #include "tests/reference/cases.h"
 
 namespace loopbench::harness {

@@ -1,6 +1,6 @@
 // Ensembles: starts that are drawn far away stay on their branch, and runs that leave it are
 // counted.
-#include "harness/ensemble.h"
+#include "harness/run/ensemble.h"
 
 #include <gtest/gtest.h>
 
@@ -9,8 +9,8 @@
 #include <numbers>
 #include <set>
 
-#include "harness/config/config_error.h"
-#include "mechanism/assembly.h"
+#include "harness/json/config_error.h"
+#include "mechanism/start/assembly.h"
 #include "tests/reference/cases.h"
 
 namespace loopbench::harness {

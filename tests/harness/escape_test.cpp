@@ -1,14 +1,14 @@
 // What users name reaches every medium as text and never as an instruction.
-#include "harness/report/escape.h"
+#include "harness/text/escape.h"
 
 #include <gtest/gtest.h>
 
 #include <set>
 #include <string>
 
-#include "harness/report/gnuplot.h"
-#include "harness/report/table.h"
-#include "harness/store/files.h"
+#include "harness/figures/gnuplot.h"
+#include "harness/tables/table.h"
+#include "harness/text/files.h"
 
 namespace loopbench::harness {
 namespace {

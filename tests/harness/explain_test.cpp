@@ -4,8 +4,8 @@
 
 #include "harness/analysis/model_warnings.h"
 #include "harness/config/mechanism_reader.h"
-#include "harness/joint_words.h"
-#include "mechanism/kinematics.h"
+#include "harness/record/joint_words.h"
+#include "mechanism/model/kinematics.h"
 #include "tests/harness/cli_fixture.h"
 
 namespace loopbench::harness {

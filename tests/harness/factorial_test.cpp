@@ -1,5 +1,5 @@
 // The factorial table finds the factor that drift was planted with.
-#include "harness/report/factorial.h"
+#include "harness/tables/factorial.h"
 
 #include <gtest/gtest.h>
 

@@ -1,5 +1,5 @@
 // Rules of failure maps: what a row inherits, and all mistakes at once.
-#include "harness/config/failure_map_reader.h"
+#include "harness/judge/failure_map_reader.h"
 
 #include <gtest/gtest.h>
 
@@ -9,8 +9,8 @@
 #include <string>
 #include <vector>
 
-#include "harness/config/config_error.h"
-#include "harness/config/file_kind.h"
+#include "harness/json/config_error.h"
+#include "harness/json/file_kind.h"
 
 namespace loopbench::harness {
 namespace {

@@ -1,5 +1,5 @@
 // A failure map as a whole: table, page, gate and picture of planted records.
-#include "harness/report/failure_map_report.h"
+#include "harness/judge/failure_map_report.h"
 
 #include <gtest/gtest.h>
 
@@ -7,9 +7,9 @@
 #include <string>
 #include <vector>
 
-#include "harness/config/failure_map_reader.h"
-#include "harness/report/failure_map_figure.h"
-#include "harness/store/files.h"
+#include "harness/figures/failure_map_figure.h"
+#include "harness/judge/failure_map_reader.h"
+#include "harness/text/files.h"
 #include "tests/harness/failure_map_runs.h"
 
 namespace loopbench::harness {

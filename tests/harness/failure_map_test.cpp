@@ -1,5 +1,5 @@
 // Planted records turn each cell of a failure map into each of its classes.
-#include "harness/report/failure_map.h"
+#include "harness/judge/failure_map.h"
 
 #include <gtest/gtest.h>
 

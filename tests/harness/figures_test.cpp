@@ -1,5 +1,5 @@
 // Figures carry labels with units and every curve, and say why when they cannot be drawn.
-#include "harness/report/figures.h"
+#include "harness/figures/figures.h"
 
 #include <gtest/gtest.h>
 
@@ -10,8 +10,8 @@
 #include <string>
 #include <vector>
 
-#include "harness/report/figure_recipes.h"
-#include "harness/store/files.h"
+#include "harness/figures/figure_recipes.h"
+#include "harness/text/files.h"
 
 namespace loopbench::harness {
 namespace {

@@ -1,10 +1,10 @@
 // What kind a file is of: its top-level keys decide, and nothing that stands inside.
-#include "harness/config/file_kind.h"
+#include "harness/json/file_kind.h"
 
 #include <gtest/gtest.h>
 
-#include "harness/config/config_error.h"
 #include "harness/config/experiment_reader.h"
+#include "harness/json/config_error.h"
 #include "tests/harness/cli_fixture.h"
 
 namespace loopbench::harness {

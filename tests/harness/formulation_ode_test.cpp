@@ -10,8 +10,8 @@
 #include <vector>
 
 #include "harness/integrator/arkode.h"
-#include "harness/run_case.h"
-#include "mechanism/assembly.h"
+#include "harness/run/run_case.h"
+#include "mechanism/start/assembly.h"
 #include "tests/reference/cases.h"
 
 namespace loopbench::harness {

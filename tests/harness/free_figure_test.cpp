@@ -1,5 +1,5 @@
 // A figure of any value against any other: labels, scales, curves, and nothing dropped.
-#include "harness/report/free_figure.h"
+#include "harness/figures/free_figure.h"
 
 #include <gtest/gtest.h>
 
@@ -10,8 +10,8 @@
 #include <string>
 #include <vector>
 
-#include "harness/config/config_error.h"
-#include "harness/store/files.h"
+#include "harness/json/config_error.h"
+#include "harness/text/files.h"
 
 namespace loopbench::harness {
 namespace {

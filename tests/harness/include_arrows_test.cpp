@@ -8,7 +8,7 @@
 #include <string>
 #include <vector>
 
-#include "harness/store/files.h"
+#include "harness/text/files.h"
 
 namespace loopbench::architecture {
 namespace {
@@ -53,18 +53,18 @@ TEST(IncludeArrows, LeadFromTestsOverHarnessAndFormulationsToMechanism) {
   for (const std::string formulation : {"odca", "lagrange", "reduction"}) {
     const std::string header = "\"" + formulation + "/" + formulation + ".h\"";
     const std::string source = formulation + "/" + formulation + ".cpp";
-    ExpectAllowed(source, "\"mechanism/joint.h\"");
+    ExpectAllowed(source, "\"mechanism/model/joint.h\"");
     ExpectAllowed(source, header);
-    ExpectAllowed("harness/run_case.cpp", header);
+    ExpectAllowed("harness/run/run_case.cpp", header);
     ExpectAllowed("tests/contract/contract_test.cpp", header);
-    ExpectRefused("mechanism/joint.cpp", header, "the other way");
-    ExpectRefused(source, "\"harness/record.h\"", "the other way");
+    ExpectRefused("mechanism/model/joint.cpp", header, "the other way");
+    ExpectRefused(source, "\"harness/record/record.h\"", "the other way");
     ExpectRefused(source, "\"tests/contract/oracle.h\"", "the other way");
   }
-  ExpectAllowed("harness/record.cpp", "\"mechanism/outcome.h\"");
-  ExpectAllowed("tests/harness/store_test.cpp", "\"harness/store/files.h\"");
-  ExpectRefused("mechanism/joint.h", "\"harness/record.h\"", "the other way");
-  ExpectRefused("harness/record.cpp", "\"tests/contract/oracle.h\"", "the other way");
+  ExpectAllowed("harness/record/record.cpp", "\"mechanism/description/outcome.h\"");
+  ExpectAllowed("tests/harness/store_test.cpp", "\"harness/text/files.h\"");
+  ExpectRefused("mechanism/model/joint.h", "\"harness/record/record.h\"", "the other way");
+  ExpectRefused("harness/record/record.cpp", "\"tests/contract/oracle.h\"", "the other way");
 }
 
 TEST(IncludeArrows, NeverLeadFromOneFormulationToAnother) {
@@ -82,7 +82,7 @@ TEST(IncludeArrows, OfSundialsEndBehindTheIntegrator) {
         "<sunmatrix/sunmatrix_dense.h>", "<sunadaptcontroller/sunadaptcontroller_soderlind.h>"}) {
     ExpectAllowed("harness/integrator/arkode.cpp", header);
     ExpectAllowed("harness/integrator/arkode_vectors.h", header);
-    for (const char* path : {"harness/integrator/arkode.h", "harness/run_case.cpp",
+    for (const char* path : {"harness/integrator/arkode.h", "harness/run/run_case.cpp",
                              "tests/harness/integrator_test.cpp"}) {
       ExpectRefused(path, header, "SUNDIALS");
     }
@@ -91,15 +91,15 @@ TEST(IncludeArrows, OfSundialsEndBehindTheIntegrator) {
 }
 
 TEST(IncludeArrows, OfOtherLibrariesEndWhereTheyBelong) {
-  ExpectAllowed("harness/config/json_reader.h", "<nlohmann/json.hpp>");
+  ExpectAllowed("harness/json/json_reader.h", "<nlohmann/json.hpp>");
   ExpectAllowed("harness/store/record_json.cpp", "<nlohmann/json.hpp>");
   ExpectAllowed("tests/harness/config_test.cpp", "<nlohmann/json.hpp>");
-  ExpectRefused("harness/report/table.cpp", "<nlohmann/json.hpp>", "nlohmann");
+  ExpectRefused("harness/tables/table.cpp", "<nlohmann/json.hpp>", "nlohmann");
   ExpectRefused("tests/contract/oracle.cpp", "<nlohmann/json.hpp>", "nlohmann");
   ExpectAllowed("harness/timing/bench.cpp", "<benchmark/benchmark.h>");
-  ExpectRefused("harness/suite.cpp", "<benchmark/benchmark.h>", "Benchmark");
+  ExpectRefused("harness/suite/suite.cpp", "<benchmark/benchmark.h>", "Benchmark");
   ExpectAllowed("tests/odca/plan_test.cpp", "<gtest/gtest.h>");
-  ExpectRefused("harness/suite.cpp", "<gtest/gtest.h>", "GoogleTest");
+  ExpectRefused("harness/suite/suite.cpp", "<gtest/gtest.h>", "GoogleTest");
   ExpectAllowed("harness/observers/pendulum.cpp", "<boost/math/special_functions/ellint_1.hpp>");
   ExpectRefused("harness/observers/drift.cpp", "<boost/math/tools/roots.hpp>", "Boost");
   ExpectRefused("tests/reference/pendulum_test.cpp", "<boost/math/tools/roots.hpp>", "Boost");
@@ -120,12 +120,13 @@ TEST(IncludeArrows, OfTheCoreReachEigenAndTheStandardLibraryOnly) {
 TEST(IncludeArrows, CannotBeHidden) {
   ExpectRefused("odca/a.cpp", "\"../lagrange/lagrange.h\"", "from the root");
   ExpectRefused("odca/a.cpp", "\"plan.h\"", "from the root");
-  ExpectRefused("odca/a.cpp", "\"odca/../harness/record.h\"", "from the root");
+  ExpectRefused("odca/a.cpp", "\"odca/../harness/record/record.h\"", "from the root");
   ExpectRefused("odca/a.cpp", "<lagrange/lagrange.h>", "in quotes");
   ExpectRefused("harness/a.cpp", "\"nlohmann/json.hpp\"", "from the root");
   ExpectRefused("odca/a.cpp", "HEADER", "named");
-  EXPECT_EQ(Violations("odca/a.cpp", "  #  include\t\"harness/record.h\"  // why\r\n").size(), 1u);
-  EXPECT_EQ(Violations("odca/a.cpp", "/* */ #include \"harness/record.h\"\n").size(), 1u);
+  EXPECT_EQ(
+      Violations("odca/a.cpp", "  #  include\t\"harness/record/record.h\"  // why\r\n").size(), 1u);
+  EXPECT_EQ(Violations("odca/a.cpp", "/* */ #include \"harness/record/record.h\"\n").size(), 1u);
   EXPECT_EQ(Violations("odca/a.cpp", "const char* s = \"/*\";\n#include <fmt/core.h>").size(), 1u);
 }
 

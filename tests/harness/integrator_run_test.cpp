@@ -12,8 +12,8 @@
 #include <utility>
 #include <vector>
 
-#include "harness/cpu_time.h"
 #include "harness/integrator/arkode.h"
+#include "harness/integrator/cpu_time.h"
 #include "tests/harness/integrator_problems.h"
 
 namespace loopbench::harness {

@@ -8,9 +8,9 @@
 #include "harness/config/experiment_reader.h"
 #include "harness/isolation/print_from_child.h"
 #include "harness/isolation/processes.h"
-#include "harness/terminal.h"
+#include "harness/text/terminal.h"
 #include "harness/timing/time_cases.h"
-#include "mechanism/dense_memory.h"
+#include "mechanism/model/dense_memory.h"
 #include "tests/harness/cli_fixture.h"
 
 namespace loopbench::harness {

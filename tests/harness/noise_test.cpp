@@ -1,5 +1,5 @@
 // When the machine counts as noisy: planted numbers on either side of each threshold.
-#include "harness/timing/noise.h"
+#include "harness/record/noise.h"
 
 #include <gtest/gtest.h>
 

@@ -1,13 +1,13 @@
 // Order, notes and figures of runs in several scalars.
-#include "harness/report/precision_report.h"
-
 #include <gtest/gtest.h>
 
 #include <cmath>
 #include <string>
 #include <vector>
 
-#include "harness/report/table_view.h"
+#include "harness/figures/precision_figures.h"
+#include "harness/tables/precision_ladders.h"
+#include "harness/tables/table_view.h"
 
 namespace loopbench::harness {
 namespace {

@@ -14,7 +14,7 @@
 #include <thread>
 #include <vector>
 
-#include "harness/cpu_time.h"
+#include "harness/integrator/cpu_time.h"
 
 namespace loopbench::harness {
 namespace {

@@ -1,6 +1,6 @@
 // One case from start to record: what is in it, that it is the same every time, and how each kind
 // of failure ends in it.
-#include "harness/run_case.h"
+#include "harness/run/run_case.h"
 
 #include <gtest/gtest.h>
 
@@ -12,9 +12,9 @@
 #include <string_view>
 #include <vector>
 
-#include "harness/report/columns.h"
 #include "harness/store/record_json.h"
-#include "mechanism/library.h"
+#include "harness/tables/columns.h"
+#include "mechanism/description/library.h"
 #include "tests/reference/cases.h"
 
 namespace loopbench::harness {

@@ -7,7 +7,7 @@
 #include <string>
 #include <vector>
 
-#include "harness/compare/fit.h"
+#include "harness/judge/fit.h"
 
 namespace loopbench::harness {
 namespace {

@@ -6,9 +6,9 @@
 #include <fstream>
 #include <random>
 
-#include "harness/compare/measures.h"
+#include "harness/judge/measures.h"
+#include "harness/record/record_types.h"
 #include "harness/store/record_json.h"
-#include "harness/store/record_types.h"
 #include "tests/harness/cli_fixture.h"
 
 namespace loopbench::harness {

@@ -9,8 +9,8 @@
 #include <string>
 #include <tuple>
 
-#include "harness/compare/track.h"
-#include "harness/config/config_error.h"
+#include "harness/json/config_error.h"
+#include "harness/judge/track.h"
 #include "harness/store/measurements.h"
 #include "harness/store/tracker_json.h"
 #include "harness/timing/callgrind.h"

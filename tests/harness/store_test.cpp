@@ -8,8 +8,8 @@
 #include <thread>
 #include <vector>
 
-#include "harness/store/files.h"
 #include "harness/store/result_store.h"
+#include "harness/text/files.h"
 
 namespace loopbench::harness {
 namespace {

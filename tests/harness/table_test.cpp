@@ -1,5 +1,5 @@
 // Tables look as written here, character by character.
-#include "harness/report/table.h"
+#include "harness/tables/table.h"
 
 #include <gtest/gtest.h>
 
@@ -9,9 +9,9 @@
 #include <string>
 #include <vector>
 
-#include "harness/config/config_error.h"
-#include "harness/report/columns.h"
-#include "harness/report/select.h"
+#include "harness/json/config_error.h"
+#include "harness/record/select.h"
+#include "harness/tables/columns.h"
 
 namespace loopbench::harness {
 namespace {

@@ -1,13 +1,13 @@
 // What a table of a store shows: rows, columns, order, groups and warnings.
-#include "harness/report/table_view.h"
+#include "harness/tables/table_view.h"
 
 #include <gtest/gtest.h>
 
 #include <string>
 #include <vector>
 
-#include "harness/config/config_error.h"
-#include "harness/report/columns.h"
+#include "harness/json/config_error.h"
+#include "harness/tables/columns.h"
 
 namespace loopbench::harness {
 namespace {

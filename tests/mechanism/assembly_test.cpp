@@ -1,13 +1,13 @@
 // Consistent starts from partial data.
-#include "mechanism/assembly.h"
+#include "mechanism/start/assembly.h"
 
 #include <gtest/gtest.h>
 
 #include <cmath>
 #include <limits>
 
-#include "mechanism/library.h"
-#include "mechanism/tree_dynamics.h"
+#include "mechanism/description/library.h"
+#include "mechanism/loops/tree_dynamics.h"
 
 namespace loopbench {
 namespace {

@@ -4,8 +4,8 @@
 #include <algorithm>
 #include <cmath>
 
-#include "mechanism/in_space.h"
-#include "mechanism/library.h"
+#include "mechanism/description/in_space.h"
+#include "mechanism/description/library.h"
 #include "tests/mechanism/compiled_motion.h"
 #include "tests/mechanism/scramble.h"
 

@@ -9,8 +9,8 @@
 #include <utility>
 #include <vector>
 
-#include "mechanism/compile.h"
-#include "mechanism/tree_dynamics.h"
+#include "mechanism/loops/tree_dynamics.h"
+#include "mechanism/simplify/compile.h"
 #include "odca/odca.h"
 #include "tests/contract/generators.h"
 

@@ -5,8 +5,8 @@
 #include <limits>
 #include <utility>
 
-#include "mechanism/kinematics.h"
-#include "mechanism/library.h"
+#include "mechanism/description/library.h"
+#include "mechanism/model/kinematics.h"
 #include "tests/mechanism/samples.h"
 
 namespace loopbench {

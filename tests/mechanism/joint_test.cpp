@@ -1,5 +1,5 @@
 // Joint kinds: motion maps and rates against derivatives of the transforms.
-#include "mechanism/joint.h"
+#include "mechanism/model/joint.h"
 
 #include <gtest/gtest.h>
 

@@ -1,11 +1,11 @@
 // Poses, motions and velocity terms against the oracle's differentiated poses.
-#include "mechanism/kinematics.h"
+#include "mechanism/model/kinematics.h"
 
 #include <gtest/gtest.h>
 
 #include <limits>
 
-#include "mechanism/tree_dynamics.h"
+#include "mechanism/loops/tree_dynamics.h"
 #include "tests/mechanism/samples.h"
 
 namespace loopbench {

@@ -1,9 +1,9 @@
 // Families of mechanisms: their loops, degrees of freedom and starts.
-#include "mechanism/library.h"
+#include "mechanism/description/library.h"
 
 #include <gtest/gtest.h>
 
-#include "mechanism/assembly.h"
+#include "mechanism/start/assembly.h"
 #include "odca/odca.h"
 
 namespace loopbench {

@@ -1,6 +1,6 @@
 // Where rank is decided: regular closures are plainly inverted, redundant ones keep their rank, and
 // neither masses nor units have a say.
-#include "mechanism/loop_solver.h"
+#include "mechanism/loops/loop_solver.h"
 
 #include <gtest/gtest.h>
 

@@ -1,13 +1,13 @@
 // Whether anything moves: first order, and at all. And that far centres of mass and other parts
 // have no say in it.
-#include "mechanism/mobility.h"
+#include "mechanism/start/mobility.h"
 
 #include <gtest/gtest.h>
 
 #include <numbers>
 
-#include "mechanism/library.h"
-#include "mechanism/structure.h"
+#include "mechanism/description/library.h"
+#include "mechanism/simplify/structure.h"
 #include "tests/mechanism/shipped.h"
 
 namespace loopbench {

@@ -1,15 +1,15 @@
 // Which constraints are redundant at generic positions, and what is left without them.
-#include "mechanism/redundancy.h"
+#include "mechanism/simplify/redundancy.h"
 
 #include <gtest/gtest.h>
 
 #include <cmath>
 
-#include "mechanism/assembly.h"
-#include "mechanism/direction_rows.h"
-#include "mechanism/library.h"
-#include "mechanism/release_review.h"
-#include "mechanism/scaled_loops.h"
+#include "mechanism/description/library.h"
+#include "mechanism/formulation/release_review.h"
+#include "mechanism/loops/direction_rows.h"
+#include "mechanism/loops/scaled_loops.h"
+#include "mechanism/start/assembly.h"
 #include "tests/mechanism/shipped.h"
 
 namespace loopbench {

@@ -3,8 +3,8 @@
 
 #include <cmath>
 
-#include "mechanism/attach.h"
-#include "mechanism/in_space.h"
+#include "mechanism/description/in_space.h"
+#include "mechanism/simplify/attach.h"
 #include "tests/contract/generators.h"
 
 namespace loopbench::testing {

@@ -1,12 +1,12 @@
 // Facts of mechanisms whose structure is known on paper.
-#include "mechanism/structure.h"
+#include "mechanism/simplify/structure.h"
 
 #include <gtest/gtest.h>
 
 #include <cmath>
 #include <numbers>
 
-#include "mechanism/library.h"
+#include "mechanism/description/library.h"
 #include "tests/mechanism/shipped.h"
 
 namespace loopbench {

@@ -1,5 +1,5 @@
 // Given functions of time against an evaluation written anew, and against their own differences.
-#include "mechanism/time_function.h"
+#include "mechanism/description/time_function.h"
 
 #include <gtest/gtest.h>
 

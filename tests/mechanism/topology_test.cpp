@@ -1,12 +1,12 @@
 // From the user's graph to a spanning forest: which joints are cut, in which order bodies come.
-#include "mechanism/topology.h"
+#include "mechanism/description/topology.h"
 
 #include <gtest/gtest.h>
 
 #include <algorithm>
 
-#include "mechanism/library.h"
-#include "mechanism/mechanism.h"
+#include "mechanism/description/library.h"
+#include "mechanism/model/mechanism.h"
 #include "tests/contract/generators.h"
 
 namespace loopbench {

@@ -1,5 +1,5 @@
 // M, h, J and gamma of the spanning forest against the oracle's.
-#include "mechanism/tree_dynamics.h"
+#include "mechanism/loops/tree_dynamics.h"
 
 #include <gtest/gtest.h>
 

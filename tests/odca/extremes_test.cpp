@@ -7,8 +7,8 @@
 #include <cmath>
 #include <limits>
 
-#include "mechanism/library.h"
-#include "mechanism/tree_dynamics.h"
+#include "mechanism/description/library.h"
+#include "mechanism/loops/tree_dynamics.h"
 #include "odca/odca.h"
 #include "tests/contract/builder.h"
 #include "tests/contract/comparison.h"

@@ -9,7 +9,7 @@
 #include <numeric>
 #include <set>
 
-#include "mechanism/library.h"
+#include "mechanism/description/library.h"
 #include "odca/odca.h"
 #include "odca/pairing.h"
 #include "tests/contract/comparison.h"

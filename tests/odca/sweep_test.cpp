@@ -5,7 +5,7 @@
 
 #include <limits>
 
-#include "mechanism/library.h"
+#include "mechanism/description/library.h"
 #include "odca/odca.h"
 #include "tests/contract/comparison.h"
 

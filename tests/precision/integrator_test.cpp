@@ -10,8 +10,8 @@
 #include "harness/config/mechanism_reader.h"
 #include "harness/integrator/arkode.h"
 #include "harness/precision/scalars.h"
-#include "harness/run_case.h"
-#include "mechanism/assembly.h"
+#include "harness/run/run_case.h"
+#include "mechanism/start/assembly.h"
 
 namespace loopbench::harness {
 namespace {

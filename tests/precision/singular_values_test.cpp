@@ -1,5 +1,5 @@
 // Singular values and vectors in every scalar.
-#include "mechanism/singular_values.h"
+#include "mechanism/algebra/singular_values.h"
 
 #include <gtest/gtest.h>
 

@@ -13,7 +13,7 @@
 
 #include "harness/config/experiment_reader.h"
 #include "harness/config/mechanism_reader.h"
-#include "harness/run_case.h"
+#include "harness/run/run_case.h"
 
 namespace loopbench::harness {
 

@@ -6,7 +6,7 @@
 #include <iostream>
 #include <numbers>
 
-#include "mechanism/library.h"
+#include "mechanism/description/library.h"
 #include "tests/reference/cases.h"
 #include "tests/reference/published_numbers.h"
 

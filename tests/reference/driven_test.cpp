@@ -4,8 +4,8 @@
 #include <array>
 #include <cmath>
 
-#include "mechanism/assembly.h"
-#include "mechanism/library.h"
+#include "mechanism/description/library.h"
+#include "mechanism/start/assembly.h"
 #include "tests/reference/cases.h"
 #include "tests/reference/simulate.h"
 

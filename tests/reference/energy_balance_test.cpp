@@ -9,8 +9,8 @@
 #include <utility>
 
 #include "harness/integrator/arkode.h"
-#include "mechanism/assembly.h"
-#include "mechanism/library.h"
+#include "mechanism/description/library.h"
+#include "mechanism/start/assembly.h"
 #include "tests/reference/cases.h"
 
 namespace loopbench::harness::reference {

@@ -7,7 +7,7 @@
 #include <numbers>
 
 #include "harness/observers/observer.h"
-#include "mechanism/library.h"
+#include "mechanism/description/library.h"
 #include "tests/reference/cases.h"
 #include "tests/reference/published_numbers.h"
 #include "tests/reference/simulate.h"

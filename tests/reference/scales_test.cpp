@@ -8,9 +8,9 @@
 #include <utility>
 #include <vector>
 
-#include "mechanism/assembly.h"
-#include "mechanism/in_space.h"
-#include "mechanism/similarity.h"
+#include "mechanism/description/in_space.h"
+#include "mechanism/description/similarity.h"
+#include "mechanism/start/assembly.h"
 #include "tests/reference/cases.h"
 #include "tests/reference/simulate.h"
 

@@ -5,8 +5,8 @@
 #include <cmath>
 #include <stdexcept>
 
-#include "harness/run_case.h"
-#include "mechanism/assembly.h"
+#include "harness/run/run_case.h"
+#include "mechanism/start/assembly.h"
 #include "tests/reference/cases.h"
 
 namespace loopbench::harness::reference {

@@ -7,8 +7,8 @@
 #include <iostream>
 #include <numbers>
 
-#include "harness/ensemble.h"
-#include "mechanism/library.h"
+#include "harness/run/ensemble.h"
+#include "mechanism/description/library.h"
 #include "tests/harness/integrator_problems.h"
 #include "tests/reference/cases.h"
 #include "tests/reference/published_numbers.h"

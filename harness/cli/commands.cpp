@@ -1,0 +1,111 @@
+#include "harness/cli/commands.h"
+
+#include <fmt/format.h>
+
+#include <map>
+
+#include "harness/analysis/doubts.h"
+#include "harness/judge/claims_reader.h"
+#include "harness/judge/claims_report.h"
+#include "harness/record/provenance.h"
+#include "harness/run/run_case.h"
+#include "harness/store/contents.h"
+#include "harness/store/merge_stores.h"
+#include "harness/store/result_store.h"
+#include "harness/suite/precision_cases.h"
+#include "harness/tables/table_view.h"
+#include "harness/text/files.h"
+#include "harness/text/terminal.h"
+#include "harness/timing/time_cases.h"
+
+namespace loopbench::harness {
+
+std::vector<Record> LoadRecords(const std::filesystem::path& store) {
+  std::vector<std::string> warnings;
+  std::vector<Record> records = LatestRecords(ReadRecords(store, &warnings), CodeVersion());
+  SortRows(&records);  // in the store they stand as they ended
+  SetDoubts(&records);
+  for (const std::string& warning : warnings) PrintError("warning: {}\n", warning);
+  return records;
+}
+
+namespace {
+
+/// The records of these cases, as they were asked for: what the store holds besides is another
+/// command's.
+std::vector<Record> RecordsOf(const std::vector<std::string>& ids,
+                              const std::vector<Record>& records) {
+  std::map<std::string, const Record*> last;
+  for (const Record& record : records) last[record.Text("id")] = &record;
+  std::vector<Record> asked;
+  for (const std::string& id : ids) asked.push_back(*last.at(id));
+  return WithContents(std::move(asked));
+}
+
+}  // namespace
+
+int Run(const RunCommand& command, const std::string& typed) {
+  // read everything first: a mistake in the last file must not cost the runs of the first
+  const std::vector<Experiment> experiments =
+      ReadSelected({command.experiments, command.settings, command.suite.filter});
+  if (command.suite.precision) {
+    for (const Experiment& experiment : experiments) RequireLadders(experiment);
+  }
+  const std::filesystem::path out = command.out.empty() ? std::filesystem::path("results/runs") /
+                                                              FileName(experiments.front().name)
+                                                        : command.out;
+  SuiteCount count;
+  {
+    ResultStore store(out);
+    const std::vector<Record> before = ReadRecords(out);
+    count = RunSuite(experiments, command.suite, before, store);
+    PrintError("{} run now{}, {} were done before\n", count.run,
+               count.failed > 0 ? fmt::format(" ({} not finished)", count.failed) : "",
+               count.skipped);
+  }
+  std::vector<Record> records = RecordsOf(count.ids, ReadRecords(out));
+  SetDoubts(&records);
+  WriteTables(records, out, typed);
+  Print("results in {}\n", out.string());
+  return command.gate.empty() ? 0 : DoubtGate(records);
+}
+
+int Merge(const MergeCommand& command) {
+  std::vector<PartOfStore> parts;
+  std::size_t read = 0;
+  for (const auto& store : command.stores) {
+    std::vector<std::string> warnings;
+    parts.push_back({store, ReadRecords(store, &warnings)});
+    read += parts.back().records.size();
+    if (!warnings.empty()) {
+      throw std::runtime_error(fmt::format(
+          "{}\n{} was interrupted: give its command again, which completes it, and merge then",
+          warnings.front(), store.string()));
+    }
+  }
+  const std::vector<Record> merged = MergeStores(parts);
+  ResultStore target(command.out);
+  target.Fill(merged);
+  Print("{} records of {} stores are {} cases in {}\n", read, command.stores.size(), merged.size(),
+        target.file().string());
+  return 0;
+}
+
+int PrintVerdicts(const VerdictCommand& command, const std::string& typed) {
+  const std::vector<Record> records = LoadRecords(command.store);
+  RequireOneContent(records, command.store, "verdict");
+  std::vector<ClaimResult> results;
+  for (const ClaimRule& rule : ReadClaims(command.claims)) {
+    results.push_back(Evaluate(rule, records));
+  }
+  if (!command.out.empty()) {
+    WriteFileAtomically(command.out, ClaimsMarkdown(results, Provenance(typed)));
+  }
+  Table verdicts = VerdictTable(results);
+  verdicts.notes = Provenance(typed);
+  PrintText(ToText(verdicts) + "\n");
+  if (!command.out.empty()) Print("wrote {}\n", command.out.string());
+  return 0;
+}
+
+}  // namespace loopbench::harness

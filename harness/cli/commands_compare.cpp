@@ -1,0 +1,278 @@
+#include "harness/cli/commands_compare.h"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <cmath>
+#include <ranges>
+#include <set>
+
+#include "harness/judge/fit.h"
+#include "harness/judge/statistics.h"
+#include "harness/judge/track.h"
+#include "harness/record/origin.h"
+#include "harness/record/provenance.h"
+#include "harness/store/contents.h"
+#include "harness/store/measurements.h"
+#include "harness/tables/table.h"
+#include "harness/text/files.h"
+#include "harness/text/terminal.h"
+
+namespace loopbench::harness {
+
+namespace {
+
+std::vector<Record> LoadMeasurements(const std::filesystem::path& path) {
+  std::vector<std::string> warnings;
+  std::vector<Record> records = ReadMeasurements(path, &warnings);
+  for (const std::string& warning : warnings) PrintError("warning: {}\n", warning);
+  return records;
+}
+
+std::string RenderTable(const Table& table, const std::string& format) {
+  if (format == "csv") return ToCsv(table);
+  if (format == "markdown") return ToMarkdown(table);
+  return ToText(table);
+}
+
+void Deliver(const std::string& text, const std::filesystem::path& out) {
+  if (out.empty()) {
+    PrintText(text);
+  } else {
+    WriteFileAtomically(out, text);
+    Print("wrote {}\n", out.string());
+  }
+}
+
+/// One row per group of measures: how many were compared, with which judgement.
+Table SummaryTable(const ComparisonReport& comparison) {
+  Table table;
+  table.title = "Compared";
+  table.columns = {{"group", "group", Format::kText, {}},
+                   {"same", "same", Format::kInteger, {}},
+                   {"better", "better", Format::kInteger, {}},
+                   {"worse", "worse", Format::kInteger, {}},
+                   {"different", "different", Format::kInteger, {}},
+                   {"not_measured", "not measured", Format::kInteger, {}}};
+  for (const std::string& group : GroupNames()) {
+    Record row;
+    row.Set("group", group);
+    int all = 0;
+    for (const auto& [key, judgement] : {std::pair{"same", Judgement::kSame},
+                                         {"better", Judgement::kBetter},
+                                         {"worse", Judgement::kWorse},
+                                         {"different", Judgement::kDifferent},
+                                         {"not_measured", Judgement::kNotMeasured}}) {
+      const int count = comparison.Count(judgement, group);
+      row.Set(key, std::int64_t{count});
+      all += count;
+    }
+    if (all > 0) table.rows.push_back(row);
+  }
+  return table;
+}
+
+Table FindingTable(const ComparisonReport& comparison, bool with_same) {
+  Table table;
+  table.title = with_same ? "All measures" : "Changes";
+  table.columns = {{"judgement", "judgement", Format::kText, {}},
+                   {"case", "case", Format::kText, {}},
+                   {"measure", "measure", Format::kText, {}},
+                   {"base", "base", Format::kText, {}},
+                   {"new", "new", Format::kText, {}},
+                   {"ratio", "ratio", Format::kSeconds, {}},
+                   {"why", "why", Format::kText, {}}};
+  // regressions first: they are what the reader came for
+  for (const Judgement judgement : {Judgement::kWorse, Judgement::kDifferent, Judgement::kBetter,
+                                    Judgement::kNotMeasured, Judgement::kSame}) {
+    if (!with_same && (judgement == Judgement::kNotMeasured || judgement == Judgement::kSame))
+      continue;
+    for (const Finding& finding : comparison.findings) {
+      if (finding.judgement != judgement) continue;
+      Record row;
+      row.Set("judgement", std::string(ToString(judgement)));
+      row.Set("case", finding.one);
+      row.Set("measure", finding.measure.unit.empty()
+                             ? finding.measure.key
+                             : fmt::format("{} [{}]", finding.measure.key, finding.measure.unit));
+      row.Set("base", finding.base);
+      row.Set("new", finding.fresh);
+      row.Set("ratio", std::isfinite(finding.ratio) ? Value(finding.ratio) : Value());
+      row.Set("why", finding.why);
+      table.rows.push_back(row);
+    }
+  }
+  return table;
+}
+
+/// "12 hashes not measured: another compiler, ..." for each reason.
+std::vector<std::string> ReasonNotes(const ComparisonReport& comparison) {
+  std::vector<std::pair<std::string, int>> reasons;
+  for (const Finding& finding : comparison.findings) {
+    if (finding.judgement != Judgement::kNotMeasured) continue;
+    const std::string reason =
+        fmt::format("{} not measured: {}", GroupOf(finding.measure.rule), finding.why);
+    const auto at = std::ranges::find(reasons, reason, &std::pair<std::string, int>::first);
+    if (at == reasons.end()) {
+      reasons.emplace_back(reason, 1);
+    } else {
+      ++at->second;
+    }
+  }
+  std::vector<std::string> notes;
+  for (const auto& [reason, count] : reasons) notes.push_back(fmt::format("{} {}", count, reason));
+  return notes;
+}
+
+void NoteCases(const std::string& what, const std::vector<std::string>& cases,
+               std::vector<std::string>& notes) {
+  if (cases.empty()) return;
+  constexpr std::size_t kMostNamed = 20;
+  const bool all = cases.size() <= kMostNamed;
+  notes.push_back(
+      fmt::format("{} {}{}", cases.size(), what,
+                  all ? ":" : fmt::format(" (--format csv names all), the first {}:", kMostNamed)));
+  for (const std::string& one : cases | std::views::take(kMostNamed)) notes.push_back("  " + one);
+}
+
+/// A row for each case that has no counterpart.
+void AddCases(const std::string& judgement, const std::vector<std::string>& cases, Table& table) {
+  for (const std::string& one : cases) {
+    Record row;
+    row.Set("judgement", judgement);
+    row.Set("case", one);
+    table.rows.push_back(row);
+  }
+}
+
+/// Where the records of one side come from; differing origins in one file are all named.
+void NoteOrigins(const std::string& side, const std::vector<Record>& records,
+                 std::vector<std::string>& notes) {
+  std::set<std::string> lines;
+  for (const Record& record : records) {
+    const Origin origin = OriginOf(record);
+    lines.insert(origin.machine.empty() && origin.compiler.empty()
+                     ? side + ": origin not recorded"
+                     : fmt::format("{}: commit {}, {}, {}, {}, libm {}", side, origin.commit,
+                                   origin.machine, origin.compiler, origin.flags, origin.libm));
+  }
+  notes.insert(notes.end(), lines.begin(), lines.end());
+}
+
+/// One run is faster or slower than another as a whole when the machine's speed has changed; no
+/// test within the runs can tell that from a change of all code.
+void NoteCommonShift(const ComparisonReport& comparison, std::vector<std::string>& notes) {
+  std::vector<double> ratios;
+  for (const Finding& finding : comparison.findings) {
+    if (finding.measure.rule == Rule::kTime && std::isfinite(finding.ratio)) {
+      ratios.push_back(finding.ratio);
+    }
+  }
+  constexpr std::size_t kMany = 5;
+  constexpr double kShift = 0.01;  // half of the smallest effect that is reported
+  const double shift = Median(ratios);
+  if (ratios.size() < kMany || !(std::abs(shift - 1.0) > kShift)) return;
+  notes.push_back(
+      fmt::format("all times: median ratio {:.3f}; unless everything changed, the machine's speed "
+                  "did: repeat the run before believing single times",
+                  shift));
+}
+
+std::string Conclusion(const ComparisonReport& comparison, int code) {
+  const int worse = comparison.Count(Judgement::kWorse);
+  const int different = comparison.Count(Judgement::kDifferent);
+  if (code == 1 && different == 0) return fmt::format("WORSE: {} measures", worse);
+  if (code == 1 && worse == 0) return fmt::format("DIFFERENT: {} measures", different);
+  if (code == 1) return fmt::format("WORSE: {} measures, {} more different", worse, different);
+  if (code == 2) return "COULD NOT MEASURE: too little in common";
+  const int better = comparison.Count(Judgement::kBetter);
+  return better > 0 ? fmt::format("BETTER: {} measures, none worse", better) : "SAME";
+}
+
+}  // namespace
+
+int PrintComparison(const CompareCommand& command, const std::string& typed) {
+  std::vector<Record> base = LoadMeasurements(command.base);
+  std::vector<Record> fresh = LoadMeasurements(command.fresh);
+  ShareContents(&base, &fresh);
+  const ComparisonReport comparison = Compare(base, fresh, command.options);
+  const int code = comparison.ExitCode(command.options);
+
+  std::vector<std::string> notes = ReasonNotes(comparison);
+  NoteCases("cases only in BASE", comparison.only_base, notes);
+  NoteCases("cases only in NEW", comparison.only_fresh, notes);
+  NoteCases("cases there more than once, not compared", comparison.ambiguous, notes);
+  NoteCases("cases that ran another mechanism, limits or ensemble under equal keys, not compared",
+            comparison.other_content, notes);
+  NoteCommonShift(comparison, notes);
+  NoteOrigins("BASE", base, notes);
+  NoteOrigins("NEW", fresh, notes);
+  Table findings = FindingTable(comparison, command.format == "csv");
+  if (command.format == "csv") {
+    AddCases("only in BASE", comparison.only_base, findings);
+    AddCases("only in NEW", comparison.only_fresh, findings);
+    AddCases("more than once", comparison.ambiguous, findings);
+    AddCases("other content", comparison.other_content, findings);
+    PrintText(ToCsv(findings));
+    PrintError("{}\n", Conclusion(comparison, code));
+    return code;
+  }
+  if (command.format == "markdown") notes.push_back(fmt::format("command: {}", typed));
+  if (!findings.rows.empty()) PrintText(RenderTable(findings, command.format) + "\n");
+  Table summary = SummaryTable(comparison);
+  summary.notes = notes;
+  PrintText(RenderTable(summary, command.format) + "\n");
+  Print("{}\n", Conclusion(comparison, code));
+  return code;
+}
+
+int PrintFits(const FitCommand& command, const std::string& typed) {
+  const std::vector<Record> benchmarks = LoadMeasurements(command.file);
+  Table table;
+  table.title = "Time over size: ns = c bodies^exponent";
+  table.columns = {{"family", "family", Format::kText, {}},
+                   {"sizes", "sizes", Format::kInteger, {}},
+                   {"bodies_min", "bodies from", Format::kInteger, {}},
+                   {"bodies_max", "to", Format::kInteger, {}},
+                   {"exponent", "exponent", Format::kExponent, {}},
+                   {"standard_error", "std. error", Format::kExponent, {}},
+                   {"slope_min", "local min", Format::kExponent, {}},
+                   {"slope_max", "local max", Format::kExponent, {}},
+                   {"ns_per_body", "ns per body at largest", Format::kFixed, {}},
+                   {"failed", "failed", Format::kInteger, {}}};
+  table.rows = FitFamilies(benchmarks, command.from);
+  if (table.rows.empty()) {
+    PrintError("{}: no family of benchmarks with two sizes or more\n", command.file.string());
+    return 2;
+  }
+  if (command.format != "text" || !command.out.empty()) {
+    NoteOrigins("measured", benchmarks, table.notes);
+    if (const double load = benchmarks.front().Number("load_average"); std::isfinite(load)) {
+      table.notes.push_back(fmt::format("load average of the minute before: {:.1f}", load));
+    }
+    table.notes.push_back(fmt::format("command: {}", typed));
+  }
+  Deliver(RenderTable(table, command.format), command.out);
+  const bool fitted = std::ranges::any_of(
+      table.rows, [](const Record& row) { return row.Find("exponent") != nullptr; });
+  return fitted ? 0 : 2;
+}
+
+int ExportMeasurements(const ExportCommand& command) {
+  std::vector<std::string> torn;
+  auto [values, left_out] = TrackRecords(ReadMeasurements(command.file, &torn));
+  left_out.insert(left_out.end(), torn.begin(), torn.end());
+  for (const std::string& line : left_out) {
+    PrintError("{}: not exported: {}\n", command.file.string(), line);
+  }
+  if (values.empty()) {
+    PrintError("{}: nothing to export: no record that finished has a measure\n",
+               command.file.string());
+    return 2;
+  }
+  Deliver(command.format == "bmf" ? ToBencherMetricFormat(values) : ToCustomSmallerIsBetter(values),
+          command.out);
+  return left_out.empty() ? 0 : 1;
+}
+
+}  // namespace loopbench::harness

@@ -1,0 +1,274 @@
+// explain: what an experiment runs and measures, in sentences.
+#include "harness/cli/commands_explain.h"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <set>
+
+#include "harness/cli/commands.h"
+#include "harness/isolation/print_from_child.h"
+#include "harness/json/config_error.h"
+#include "harness/json/file_kind.h"
+#include "harness/record/joint_words.h"
+#include "harness/suite/precision_cases.h"
+#include "harness/text/terminal.h"
+#include "harness/timing/time_cases.h"
+
+namespace loopbench::harness {
+
+namespace {
+
+/// "a, b and c".
+std::string Listed(const std::vector<std::string>& words) {
+  std::string text;
+  for (std::size_t i = 0; i < words.size(); ++i) {
+    text += (i == 0 ? "" : i + 1 == words.size() ? " and " : ", ") + words[i];
+  }
+  return text;
+}
+
+std::string Numbers(const std::vector<double>& numbers) {
+  std::vector<std::string> words;
+  for (const double number : numbers) words.push_back(fmt::format("{}", number));
+  return Listed(words);
+}
+
+std::string Plural(std::size_t count, const std::string& word) {
+  return fmt::format("{} {}{}", count, word, count == 1 ? "" : "s");
+}
+
+/// Whether some column passes.
+template <class Is>
+bool Any(const Experiment& experiment, Is is) {
+  return std::any_of(experiment.columns.begin(), experiment.columns.end(), is);
+}
+
+void ExplainScenes(const Experiment& experiment) {
+  Print("\nMechanisms\n");
+  for (const ExperimentScene& scene : experiment.scenes) {
+    const MechanismDescription& description = scene.mechanism.description;
+    Print("  {} is {} mechanism of {} and {}{}. It is simulated for {} s of its own time.\n",
+          scene.name, description.space == SpaceKind::kPlanar ? "a planar" : "a spatial",
+          description.bodies.size() == 2 ? "1 body"
+                                         : fmt::format("{} bodies", description.bodies.size() - 1),
+          Plural(description.joints.size(), "joint"),
+          scene.path.empty() ? "" : " (" + scene.path.string() + ")", Numbers(scene.horizons));
+  }
+}
+
+void ExplainFormulations(const Experiment& experiment) {
+  const auto uses = [&](FormulationKind kind) {
+    return Any(experiment, [kind](const Column& one) { return one.formulation == kind; });
+  };
+  Print("\nColumns: {} ways of keeping the loops closed\n", experiment.columns.size());
+  for (const Column& column : experiment.columns) Print("  {}\n", ToString(column));
+  Print("  The words stand for formulation/enforcement/coordinates/solver.\n");
+  if (uses(FormulationKind::kOdca)) {
+    Print(
+        "  odca: orthogonal complement divide and conquer. Bodies are joined pair by pair; "
+        "the loops' forces are found on the way.\n");
+  }
+  if (uses(FormulationKind::kLagrange)) {
+    Print("  lagrange: one multiplier per constraint, all solved at once.\n");
+  }
+  if (uses(FormulationKind::kReduction)) {
+    Print("  reduction: independent speeds only; the others follow from the loops.\n");
+  }
+}
+
+void ExplainChoices(const Experiment& experiment) {
+  const auto any = [&](auto is) { return Any(experiment, is); };
+  if (any([](const Column& c) { return c.enforcement == Enforcement::kAcceleration; })) {
+    Print(
+        "  acceleration: the loops' accelerations are imposed. Speeds and positions follow "
+        "by integration, and errors in them stay.\n");
+  }
+  if (any([](const Column& c) { return c.enforcement == Enforcement::kVelocity; })) {
+    Print("  velocity: the speeds satisfy the loops too; positions follow by integration.\n");
+  }
+  if (any([](const Column& c) { return c.enforcement == Enforcement::kPosition; })) {
+    Print(
+        "  position: as acceleration, and after each accepted step positions and speeds are moved "
+        "back to where the loops hold.\n");
+  }
+  if (any([](const Column& c) { return c.enforcement == Enforcement::kBaumgarte; })) {
+    Print(
+        "  baumgarte: as acceleration, with feedback: a mismatch e obeys e'' + 2 alpha e' + beta^2 "
+        "e "
+        "= 0, alpha = beta = 0.05 over the longest step unless given.\n");
+  }
+  if (any([](const Column& c) { return c.coordinates == Coordinates::kJoint; })) {
+    Print(
+        "  joint: the coordinates are those of the joints, but for one cut joint per loop, "
+        "where drift shows.\n");
+  }
+  if (any([](const Column& c) { return c.coordinates == Coordinates::kAbsolute; })) {
+    Print(
+        "  absolute: the coordinates are every body's position and angle; drift may show "
+        "at every joint.\n");
+  }
+  if (any([](const Column& c) { return c.solver == SolverKind::kAsPublished; })) {
+    Print(
+        "  as-published: plain factorisations (for reduction: the mechanism's fixed "
+        "independent speeds), which fail or go wrong where the loops lose rank.\n");
+  }
+  if (any([](const Column& c) { return c.solver == SolverKind::kRankRevealing; })) {
+    Print(
+        "  rank-revealing: solvers that notice lost rank (for reduction: independent speeds "
+        "chosen anew).\n");
+  }
+}
+
+/// Of the coordinate of a joint, in the first scene that has it.
+std::string_view UnitOf(const Experiment& experiment, const std::string& joint) {
+  for (const ExperimentScene& scene : experiment.scenes) {
+    const MechanismDescription& description = scene.mechanism.description;
+    const auto found = std::ranges::find(description.joints, joint, &JointDescription::name);
+    if (found == description.joints.end()) continue;
+    const auto words = CoordinateWords(found->type, description.space);
+    if (words.size() == 1) return words.front().unit;
+  }
+  return "rad or m";
+}
+
+void ExplainRuns(const Experiment& experiment) {
+  Print(
+      "\nRuns\n  The integrator is {}; its relative and absolute tolerances are equal: {}. "
+      "Smaller is more accurate.\n",
+      experiment.integrator, Numbers(experiment.tolerances));
+  if (experiment.ensembles.empty()) {
+    Print(
+        "  Each case runs once. One run resolves no exponent of growth with confidence; "
+        "\"ensembles\" would.\n");
+  }
+  for (const EnsembleRule& rule : experiment.ensembles) {
+    const std::vector<Case> cases = Expand(experiment);
+    const auto count = static_cast<std::size_t>(std::count_if(
+        cases.begin(), cases.end(), [&rule](const Case& one) { return Matches(rule, one); }));
+    std::string start =
+        fmt::format("each held coordinate moved by up to {:g} (rad or m)", rule.perturb);
+    if (!rule.between.empty()) start.clear();
+    for (const DrawnCoordinate& drawn : rule.between) {
+      start += fmt::format("{}{} between {:g} and {:g} ({})", start.empty() ? "" : ", ",
+                           drawn.joint, drawn.from, drawn.to, UnitOf(experiment, drawn.joint));
+    }
+    Print(
+        "  {} also run{} {} times from perturbed starts: {}, drawn from seed {}. The spread of the "
+        "results says how far a single run can be trusted; where the scene knows a branch, "
+        "ensemble_branch_kept counts the runs that stay within {:g} rad of it.\n",
+        Plural(count, "case"), count == 1 ? "s" : "", rule.size, start, rule.seed,
+        rule.branch_bound);
+  }
+  const Limits& limits = experiment.limits;
+  Print(
+      "  A run is given up after {:g} s of CPU time, {} accepted steps, or {:g} MiB of "
+      "memory; its row then says so.\n",
+      limits.cpu_s, limits.steps, limits.memory_mb);
+}
+
+void ExplainMeasures(const Experiment& experiment) {
+  Print(
+      "\nMeasured at every accepted step\n"
+      "  drift [m, rad]: how far the joints that ought to hold have come apart, and the "
+      "power of time it grows with;\n"
+      "  energy error [J]; rank and conditioning of the loops; how the run ended.\n"
+      "  Series keep {} points for figures.\n",
+      experiment.series_points);
+  if (const std::size_t rungs = CountRungs(experiment); rungs > 0) {
+    Print(
+        "  {} in several scalars with one integrator: error and drift against tolerance, and "
+        "whether truncation or round-off rules them.\n",
+        Plural(rungs, "run"));
+  }
+  const std::size_t timings = CountTimings(experiment);
+  if (timings == 0) {
+    Print("  There are no timings.\n");
+    return;
+  }
+  Print(
+      "  {}, in runs of their own and never two at once: time of one right-hand side [ns] "
+      "and of whole simulations, {} repeats at tolerance {}.\n",
+      Plural(timings, "timing"), experiment.timing.repeats, experiment.timing.tolerance);
+}
+
+void ExplainSweep(const std::vector<Experiment>& experiments) {
+  const Experiment& first = experiments.front();
+  if (!first.parameters.items().empty()) {
+    Print("\nSweep: {} of values; what follows is the first\n",
+          Plural(experiments.size(), "combination"));
+    for (const auto& [name, value] : first.parameters.items()) {
+      std::vector<std::string> values;
+      std::set<std::string> known;
+      for (const Experiment& one : experiments) {
+        if (known.insert(one.parameters.Text(name)).second)
+          values.push_back(one.parameters.Text(name));
+      }
+      constexpr std::size_t kMostShown = 12;
+      const std::size_t count = values.size();
+      if (count > kMostShown) {
+        const std::string last = values.back();
+        values.resize(kMostShown - 2);
+        values.push_back("...");
+        values.push_back(last);
+      }
+      Print("  {}: {}\n", name, fmt::join(values, ", "));
+    }
+    Print("  Every record carries these values, for --filter {}=...\n",
+          first.parameters.items().front().first);
+  }
+  if (!first.exclusions.empty()) {
+    Print("\nLeft out are cases with");
+    for (const Selection& rule : first.exclusions) Print(" [{}]", ToText(rule));
+    Print("\n");
+  }
+}
+
+void ExplainExperiment(const std::filesystem::path& path, const ExperimentFiles& files) {
+  const std::vector<Experiment> experiments = ReadSelected({{path}, files.settings, files.filter});
+  const Experiment& first = experiments.front();
+  std::size_t cases = 0;
+  for (const Experiment& one : experiments) {
+    cases += SelectCases(one, files.filter).size();
+    CheckLadders(one);
+  }
+  Print("{} ({})\n", first.name, path.string());
+  if (!first.comment.empty()) Print("  {}\n", first.comment);
+  Print(
+      "  {}: each is one mechanism, column, tolerance and horizon. Units are SI, angles "
+      "in rad.\n",
+      Plural(cases, "case"));
+  ExplainSweep(experiments);
+  ExplainScenes(first);
+  ExplainFormulations(first);
+  ExplainChoices(first);
+  ExplainRuns(first);
+  ExplainMeasures(first);
+  Print(
+      "\nloopbench list {0} shows every case, loopbench plan {0} the time they will "
+      "take.\n",
+      path.string());
+}
+
+}  // namespace
+
+int Explain(const ExperimentFiles& files, bool all, const ProcessLimits& limits) {
+  // the child that does the work prints into memory, and sees no terminal
+  const ExplainView view = ViewOfTerminal(all);
+  int exit_code = 0;
+  for (const auto& path : files.paths) {
+    if (KindOfFile(path) != FileKind::kMechanism) {
+      ExplainExperiment(path, files);
+    } else if (files.settings.empty() && files.filter.empty()) {
+      const int code =
+          PrintFromChild(path.string(), limits, [&] { return ExplainMechanism(path, view); });
+      exit_code = std::max(exit_code, code);
+    } else {
+      throw ConfigError(fmt::format(
+          "{}: --set and --filter are for experiments, and this is a mechanism", path.string()));
+    }
+  }
+  return exit_code;
+}
+
+}  // namespace loopbench::harness

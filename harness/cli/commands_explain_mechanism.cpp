@@ -1,0 +1,203 @@
+// explain FILE for a mechanism: what it is made of, what can move, what is redundant or suspicious.
+#include <fmt/format.h>
+
+#include <cmath>
+
+#include "harness/analysis/model_warnings.h"
+#include "harness/cli/commands.h"
+#include "harness/cli/commands_explain.h"
+#include "harness/config/mechanism_reader.h"
+#include "harness/run/compiled_scene.h"
+#include "harness/text/terminal.h"
+#include "odca/odca.h"
+
+namespace loopbench::harness {
+
+namespace {
+
+constexpr std::size_t kMostNames = 12;
+
+/// Names in order; of many the first and the last, unless all are asked for.
+std::string Names(const std::vector<std::string>& names, const ExplainView& view) {
+  if (view.all || names.size() <= kMostNames) return fmt::format("{}", fmt::join(names, " "));
+  const std::vector<std::string> first(names.begin(), names.begin() + kMostNames - 2);
+  return fmt::format("{} ... ({} left out) {}", fmt::join(first, " "),
+                     names.size() - kMostNames + 1, names.back());
+}
+
+Table LoopTable(const MechanismDescription& description, const Structure& structure,
+                const ExplainView& view) {
+  Table table;
+  table.columns = {{"cut", "cut joint", Format::kText, {}},
+                   {"shift", "open [m]", Format::kScientific, {}},
+                   {"turn", "open [rad]", Format::kScientific, {}},
+                   {"what", "of", Format::kText, {}},
+                   {"through", "through", Format::kText, {}}};
+  for (const LoopPath& loop : structure.loops) {
+    std::vector<std::string> joints, bodies;
+    for (const int j : loop.joints) joints.push_back(description.joints[j].name);
+    for (const int b : loop.bodies) bodies.push_back(description.bodies[b].name);
+    Record row;
+    row.Set("cut", description.joints[loop.cut_joint].name);
+    row.Set("shift", loop.open_shift);
+    row.Set("turn", loop.open_rotation);
+    row.Set("what", std::string("joints"));
+    row.Set("through", Names(joints, view));
+    table.rows.push_back(row);
+    Record second;
+    second.Set("what", std::string("bodies"));
+    second.Set("through", Names(bodies, view));
+    table.rows.push_back(second);
+  }
+  return table;
+}
+
+void PrintFreedom(const Structure& s) {
+  const int each = s.space == SpaceKind::kPlanar ? 3 : 6;
+  Print("\nDegrees of freedom\n");
+  Print("  {} by counting (Gruebler, Kutzbach): {} bodies x {} - {} constraints\n",
+        s.counted_freedom, s.bodies, each, s.rows);
+  if (!s.analysed) return;
+  Print("  {} by rank: {} speeds of the tree - rank {} of the {} constraints of loops\n",
+        s.joint_u - s.rank_nearby, s.joint_u, s.rank_nearby, s.loop_rows);
+  if (s.locked() && s.freedom_at_start() > 0) {
+    Print(
+        "  0 that lead anywhere: the start is singular, and what its constraints leave free to\n"
+        "  first order falls back to it\n");
+    return;
+  }
+  if (s.freedom_of_parts) {
+    Print("  {} that lead anywhere: a part cannot move, see Warnings\n", *s.freedom_of_parts);
+    return;
+  }
+  if (s.freedom_at_start() != s.freedom()) {
+    Print("  {} at the start, a singular position: rank {} there\n", s.freedom_at_start(), s.rank);
+  }
+  if (s.rank > 0) {
+    Print("  scaled singular values at the start: {:.3g} largest, {:.3g} smallest that counts\n",
+          s.singular_values[0], s.singular_values[s.rank - 1]);
+  }
+}
+
+void PrintRedundant(const MechanismDescription& description, const Structure& structure) {
+  if (!structure.analysed) return;
+  Print("\nRedundant constraints: {}\n", structure.redundant.size());
+  bool released = false;
+  for (const RedundantDirection& one : structure.redundant) {
+    Print("  {}: {}{}\n", description.joints[one.joint].name, one.name,
+          one.released ? "" : " (at the start)");
+    released = released || one.released;
+  }
+  if (!released) return;
+  Print(
+      "  All of these can be dropped at once; the loops then stay closed as they do now.\n"
+      "  They are redundant at every position: a run imposes the others and observes all, and\n"
+      "  drops others of the same joints where those serve better (\"compile\": "
+      "\"redundancy\").\n");
+}
+
+void PrintIslands(const MechanismDescription& description, const Structure& structure,
+                  const ExplainView& view) {
+  Table table;
+  table.columns = {{"part", "part", Format::kInteger, {}},
+                   {"bodies", "bodies", Format::kInteger, {}},
+                   {"first", "first body", Format::kText, {}},
+                   {"held", "held by", Format::kText, {}}};
+  for (std::size_t i = 0; i < structure.islands.size(); ++i) {
+    const Island& island = structure.islands[i];
+    Record row;
+    row.Set("part", static_cast<std::int64_t>(i + 1));
+    row.Set("bodies", static_cast<std::int64_t>(island.bodies.size()));
+    row.Set("first", description.bodies[island.bodies.front()].name);
+    row.Set("held", std::string(island.grounded ? "ground" : "nothing: it floats"));
+    table.rows.push_back(row);
+  }
+  PrintSection("Separate parts, connected through ground at most", table, view);
+}
+
+void PrintCoordinates(const Structure& structure, const ExplainView& view) {
+  Table table;
+  table.columns = {{"set", "coordinates", Format::kText, {}},
+                   {"q", "positions", Format::kInteger, {}},
+                   {"u", "speeds", Format::kInteger, {}},
+                   {"rows", "constraints", Format::kInteger, {}},
+                   {"rank", "rank", Format::kInteger, {}},
+                   {"free", "independent speeds", Format::kInteger, {}}};
+  for (const Coordinates set : {Coordinates::kJoint, Coordinates::kAbsolute}) {
+    const bool joint = set == Coordinates::kJoint;
+    Record row;
+    row.Set("set", std::string(ToString(set)));
+    row.Set("q", std::int64_t{joint ? structure.joint_q : structure.absolute_q});
+    row.Set("u", std::int64_t{joint ? structure.joint_u : structure.absolute_u});
+    row.Set("rows", std::int64_t{joint ? structure.loop_rows : structure.rows});
+    if (structure.analysed) {
+      const int speeds = joint ? structure.joint_u : structure.absolute_u;
+      row.Set("rank", std::int64_t{speeds - structure.freedom()});
+      row.Set("free", std::int64_t{structure.freedom()});
+    }
+    table.rows.push_back(row);
+  }
+  PrintSection("Coordinates", table, view);
+}
+
+template <class Space>
+odca::Plan PlanFor(const MechanismDescription& description, odca::Grounding grounding) {
+  const Mechanism<Space, double> mechanism(description, Coordinates::kJoint);
+  return odca::MakePlan(mechanism, {.grounding = grounding});
+}
+
+void PrintPlanOfJoins(const MechanismDescription& description, const ExplainView& view) {
+  Table table;
+  table.columns = {{"solver", "solver", Format::kText, {}},
+                   {"depth", "depth", Format::kInteger, {}},
+                   {"handles", "most handles", Format::kInteger, {}},
+                   {"largest", "largest join", Format::kInteger, {}},
+                   {"loops", "joins that close loops", Format::kInteger, {}}};
+  for (const SolverKind solver : {SolverKind::kRankRevealing, SolverKind::kAsPublished}) {
+    const auto grounding =
+        solver == SolverKind::kAsPublished ? odca::Grounding::kAtRoot : odca::Grounding::kEager;
+    const odca::Plan plan = description.space == SpaceKind::kPlanar
+                                ? PlanFor<Planar>(description, grounding)
+                                : PlanFor<Spatial>(description, grounding);
+    Record row;
+    row.Set("solver", std::string(ToString(solver)));
+    row.Set("depth", std::int64_t{plan.depth()});
+    row.Set("handles", std::int64_t{plan.most_handles()});
+    row.Set("largest", std::int64_t{plan.largest_join()});
+    row.Set("loops", std::int64_t{plan.loop_joins()});
+    table.rows.push_back(row);
+  }
+  PrintSection("Plan of O-DCA", table, view);
+}
+
+}  // namespace
+
+int ExplainMechanism(const std::filesystem::path& path, const ExplainView& view) {
+  const MechanismDescription description = ReadMechanism(path).description;
+  const Structure structure = AnalyseStructure(description);
+  const std::vector<Warning> warnings = FindWarnings(description, structure);
+  Print("{} ({})\n  described in {}; lengths in m, angles in rad\n", description.name,
+        path.string(), description.space == SpaceKind::kPlanar ? "the plane" : "space");
+  PrintModel(description, structure, view);
+  PrintStart(description, structure, view);
+  PrintFreedom(structure);
+  PrintSection("Loops", LoopTable(description, structure, view), view);
+  PrintRedundant(description, structure);
+  PrintIslands(description, structure, view);
+  PrintCoordinates(structure, view);
+  PrintPlanOfJoins(description, view);
+  Print("\nWhat need not be modelled\n");
+  const Compiled compiled = Compile(description, CompileOptions::All());
+  if (compiled.report.empty()) Print("  nothing to save\n");
+  for (const std::string& line : compiled.report) Print("  {}\n", line);
+  if (compiled.done != CompileOptions::None()) {
+    Print("  Savings found: {}. By default a run makes: {} (\"compile\" of an experiment).\n",
+          ToString(compiled.done), ToString(CompileOptions()));
+  }
+  Print("\nWarnings\n");
+  if (warnings.empty()) Print("  none\n");
+  for (const Warning& warning : warnings) Print("  {}\n", warning.text);
+  return structure.start.outcome == Outcome::kInconsistentStart ? 2 : 0;
+}
+
+}  // namespace loopbench::harness

@@ -1,0 +1,282 @@
+// explain: what a mechanism file says, in its own numbers.
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <cmath>
+
+#include "harness/cli/commands_explain.h"
+#include "harness/record/joint_words.h"
+#include "harness/text/terminal.h"
+#include "mechanism/model/mechanism.h"
+
+namespace loopbench::harness {
+
+namespace {
+
+using Eigen::Vector3d;
+
+std::string VectorText(const Vector3d& v, SpaceKind space) {
+  return space == SpaceKind::kPlanar ? Spaced(Eigen::Vector2d(v.head<2>())) : Spaced(v);
+}
+
+/// "tip (1 0)" where a point of the body has this place, else "(1 0)".
+std::string Place(const BodyDescription& body, const Vector3d& at, SpaceKind space) {
+  std::string text = fmt::format("({})", VectorText(at, space));
+  for (const auto& [name, point] : body.points) {
+    if (point == at) return fmt::format("{} {}", name, text);
+  }
+  return text;
+}
+
+std::string InertiaText(const Eigen::Matrix3d& I, SpaceKind space) {
+  if (space == SpaceKind::kPlanar) return ShortNumber(I(2, 2));
+  std::string text = Spaced(Vector3d(I.diagonal()));
+  const Vector3d products(I(0, 1), I(0, 2), I(1, 2));
+  if (!products.isZero(0.0)) text += " " + Spaced(products);
+  return text;
+}
+
+Table BodyTable(const MechanismDescription& description, const Structure& structure) {
+  Table table;
+  table.columns = {{"name", "body", Format::kText, {}},
+                   {"part", "part", Format::kInteger, {}},
+                   {"mass", "mass [kg]", Format::kShortest, {}},
+                   {"inertia", "inertia [kg m^2]", Format::kText, {}},
+                   {"com", "com [m]", Format::kText, {}},
+                   {"points", "points [m]", Format::kText, {}}};
+  const auto add = [&](const BodyDescription& body) -> Record& {
+    Record& row = table.rows.emplace_back();
+    row.Set("name", body.name);
+    std::string points;
+    for (const auto& [name, point] : body.points) {
+      points += fmt::format("{}{} ({})", points.empty() ? "" : ", ", name,
+                            VectorText(point, description.space));
+    }
+    row.Set("points", points);
+    return row;
+  };
+  add(description.bodies[kGround]);
+  for (std::size_t i = 0; i < structure.islands.size(); ++i) {
+    for (const int index : structure.islands[i].bodies) {
+      const BodyDescription& body = description.bodies[index];
+      Record& row = add(body);
+      row.Set("part", static_cast<std::int64_t>(i + 1));
+      row.Set("mass", body.mass);
+      row.Set("inertia", InertiaText(body.inertia, description.space));
+      row.Set("com", VectorText(body.com, description.space));
+    }
+  }
+  return table;
+}
+
+/// What a joint leaves free: its kind's directions less those that follow a given motion.
+int FreeSpeeds(SpaceKind space, const JointDescription& joint) {
+  const int kind = space == SpaceKind::kPlanar && ExistsInPlane(joint.type)
+                       ? KindOf<Planar, double>(joint.type).num_u
+                       : KindOf<Spatial, double>(joint.type).num_u;
+  return kind - static_cast<int>(joint.motions.size());
+}
+
+std::string FunctionText(const TimeFunctionDescription& function) {
+  if (const auto* polynomial = std::get_if<Polynomial>(&function)) {
+    std::string text;
+    for (std::size_t i = 0; i < polynomial->coefficients.size(); ++i) {
+      text += (i == 0 ? "" : " + ") + ShortNumber(polynomial->coefficients[i]);
+      if (i > 0) text += i == 1 ? " t" : fmt::format(" t^{}", i);
+    }
+    return text;
+  }
+  if (const auto* harmonic = std::get_if<Harmonic>(&function)) {
+    return fmt::format("{} + {} sin({} t + {})", ShortNumber(harmonic->mean),
+                       ShortNumber(harmonic->amplitude), ShortNumber(harmonic->omega),
+                       ShortNumber(harmonic->phase));
+  }
+  const TimeTable& table = std::get<TimeTable>(function);
+  return fmt::format("table of {} points, t = {} to {} s, {}", table.times.size(),
+                     ShortNumber(table.times.front()), ShortNumber(table.times.back()),
+                     table.cubic ? "cubic" : "straight lines");
+}
+
+/// Parameter and prescribed motions.
+std::string Given(SpaceKind space, const JointDescription& joint) {
+  std::string text;
+  if (joint.type == JointType::kHelical) {
+    text = fmt::format("pitch {} m/rad", ShortNumber(joint.pitch));
+  }
+  if (joint.type == JointType::kRod) text = fmt::format("length {} m", ShortNumber(joint.length));
+  const std::vector<CoordinateWord> words = CoordinateWords(joint.type, space);
+  for (const PrescribedMotion& motion : joint.motions) {
+    const CoordinateWord& word = words.at(static_cast<std::size_t>(motion.coordinate));
+    text += fmt::format("{}{} = {} [{}]", text.empty() ? "" : "; ", word.name,
+                        FunctionText(motion.value), word.unit);
+  }
+  return text;
+}
+
+Table JointTable(const MechanismDescription& description, const Structure& structure) {
+  Table table;
+  table.columns = {
+      {"name", "joint", Format::kText, {}},   {"type", "type", Format::kText, {}},
+      {"from", "from", Format::kText, {}},    {"to", "to", Format::kText, {}},
+      {"free", "free", Format::kInteger, {}}, {"rows", "constrains", Format::kInteger, {}},
+      {"place", "place", Format::kText, {}},  {"given", "given", Format::kText, {}}};
+  const int dim = description.space == SpaceKind::kPlanar ? 3 : 6;
+  std::vector<bool> cut(description.joints.size());
+  for (const LoopPath& loop : structure.loops) cut[loop.cut_joint] = true;
+  for (std::size_t j = 0; j < description.joints.size(); ++j) {
+    const JointDescription& joint = description.joints[j];
+    const int free = FreeSpeeds(description.space, joint);
+    Record& row = table.rows.emplace_back();
+    row.Set("name", joint.name);
+    row.Set("type", std::string(ToString(joint.type)));
+    row.Set("from", description.bodies[joint.from.body].name);
+    row.Set("to", description.bodies[joint.to.body].name);
+    row.Set("free", std::int64_t{free});
+    row.Set("rows", std::int64_t{dim - free});
+    row.Set("place", std::string(cut[j] ? "closes a loop" : "tree"));
+    row.Set("given", Given(description.space, joint));
+  }
+  return table;
+}
+
+/// Of a direction: what a turn by pi/2 leaves.
+constexpr double kRoundOff = 1e-14;
+
+/// The axes of a joint's frame that it moves along or about, in body axes.
+template <class Space>
+std::string AxesText(const Rotation<Space, double>& R, std::string_view axes) {
+  std::string text;
+  for (const char axis : axes) {
+    Linear<Space, double> direction = R.col(axis - 'x');
+    for (double& part : direction) {
+      if (std::abs(part) < kRoundOff) part = 0.0;
+    }
+    text += fmt::format("{}{} = ({})", text.empty() ? "" : ", ", axis, Spaced(direction));
+  }
+  return text;
+}
+
+template <class Space>
+Table FrameTable(const MechanismDescription& description) {
+  Table table;
+  table.columns = {
+      {"name", "joint", Format::kText, {}},   {"side", "frame", Format::kText, {}},
+      {"body", "on body", Format::kText, {}}, {"at", "origin [m]", Format::kText, {}},
+      {"axes", "axis", Format::kText, {}},    {"turn", "turned by [rad]", Format::kText, {}}};
+  const Mechanism<Space, double> mechanism(description, Coordinates::kJoint);
+  for (std::size_t j = 0; j < description.joints.size(); ++j) {
+    const JointDescription& joint = description.joints[j];
+    for (const bool from : {true, false}) {
+      const JointSide& side = from ? joint.from : joint.to;
+      const Pose<Space, double>& X = from ? mechanism.joints()[j].X_PF : mechanism.joints()[j].X_QM;
+      const BodyDescription& body = description.bodies[side.body];
+      Record& row = table.rows.emplace_back();
+      if (from) row.Set("name", joint.name);
+      row.Set("side", std::string(from ? "F, from" : "M, to"));
+      row.Set("body", body.name);
+      row.Set("at", Place(body, side.position, description.space));
+      row.Set("axes", AxesText<Space>(X.R, AxesOfSide(joint.type, description.space, from)));
+      const auto turn = RotationVector(X);
+      if (joint.type != JointType::kRod && !turn.isZero(0.0)) row.Set("turn", Spaced(turn));
+    }
+  }
+  return table;
+}
+
+/// Units of a joint force: per coordinate, and of the force itself.
+struct ForceUnits {
+  const char* force;
+  const char* coordinate;
+};
+
+/// A force as "type", "acts on" and "with".
+class ForceRow {
+ public:
+  explicit ForceRow(const MechanismDescription& description) : description_(description) {}
+
+  Record operator()(const JointTorque& torque) const {
+    const ForceUnits units = UnitsOf(torque.joint);
+    return Row("joint_torque", JointName(torque.joint),
+               fmt::format("{} [{}]", FunctionText(torque.value), units.force));
+  }
+  Record operator()(const JointSpring& spring) const {
+    const ForceUnits units = UnitsOf(spring.joint);
+    return Row(
+        "joint_spring", JointName(spring.joint),
+        fmt::format("stiffness {} {}/{}, rest {} {}, preload {} {}", ShortNumber(spring.stiffness),
+                    units.force, units.coordinate, ShortNumber(spring.rest), units.coordinate,
+                    ShortNumber(spring.preload), units.force));
+  }
+  Record operator()(const JointDamper& damper) const {
+    const ForceUnits units = UnitsOf(damper.joint);
+    return Row("joint_damper", JointName(damper.joint),
+               fmt::format("damping {} {} s/{}", ShortNumber(damper.damping), units.force,
+                           units.coordinate));
+  }
+  Record operator()(const PointForce& force) const {
+    return Row("point_force", PointName({force.body, force.at}),
+               fmt::format("force ({}) N in {} axes", VectorText(force.force, description_.space),
+                           force.in_body_axes ? "body" : "ground"));
+  }
+  Record operator()(const SpringDamper& spring) const {
+    return Row("spring_damper", fmt::format("{}, {}", PointName(spring.from), PointName(spring.to)),
+               fmt::format("stiffness {} N/m, damping {} N s/m, length {} m, preload {} N",
+                           ShortNumber(spring.stiffness), ShortNumber(spring.damping),
+                           ShortNumber(spring.length), ShortNumber(spring.preload)));
+  }
+  Record operator()(const Drag& drag) const {
+    return Row("drag", PointName(drag.point),
+               fmt::format("linear {} N s/m, quadratic {} N s^2/m^2", ShortNumber(drag.linear),
+                           ShortNumber(drag.quadratic)));
+  }
+
+ private:
+  static Record Row(const std::string& type, const std::string& on, const std::string& with) {
+    Record row;
+    row.Set("type", type);
+    row.Set("on", on);
+    row.Set("with", with);
+    return row;
+  }
+  ForceUnits UnitsOf(int joint) const {
+    const bool shift = description_.joints[joint].type == JointType::kPrismatic;
+    return shift ? ForceUnits{"N", "m"} : ForceUnits{"N m", "rad"};
+  }
+  std::string JointName(int joint) const { return "joint " + description_.joints[joint].name; }
+  std::string PointName(const BodyPoint& point) const {
+    const BodyDescription& body = description_.bodies[point.body];
+    return body.name + " at " + Place(body, point.at, description_.space);
+  }
+
+  const MechanismDescription& description_;
+};
+
+Table ForceTable(const MechanismDescription& description) {
+  Table table;
+  table.columns = {{"type", "force", Format::kText, {}},
+                   {"on", "acts on", Format::kText, {}},
+                   {"with", "with", Format::kText, {}}};
+  for (const ForceDescription& force : description.forces) {
+    table.rows.push_back(std::visit(ForceRow(description), force));
+  }
+  return table;
+}
+
+}  // namespace
+
+void PrintModel(const MechanismDescription& description, const Structure& structure,
+                const ExplainView& view) {
+  const bool planar = description.space == SpaceKind::kPlanar;
+  Print("  gravity ({}) m/s^2 in ground axes\n",
+        VectorText(description.gravity, description.space));
+  PrintSection("Bodies", BodyTable(description, structure), view);
+  Print("  Points and com are seen from the body's origin, inertia is about com.\n");
+  if (!planar) Print("  Inertia is Ixx Iyy Izz, and Ixy Ixz Iyz where they are not zero.\n");
+  PrintSection("Joints", JointTable(description, structure), view);
+  PrintSection("Frames of joints",
+               planar ? FrameTable<Planar>(description) : FrameTable<Spatial>(description), view);
+  Print("  Origin, axis and turn are in axes of the body; coordinates say how M moves in F.\n");
+  PrintSection("Forces", ForceTable(description), view);
+}
+
+}  // namespace loopbench::harness

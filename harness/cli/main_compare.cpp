@@ -1,0 +1,84 @@
+#include "harness/cli/main_compare.h"
+
+#include "harness/text/numeric_option.h"
+
+namespace loopbench::harness {
+
+namespace {
+
+constexpr const char* kCompareFooter = R"(
+Counts, hashes and outcomes are compared exactly; errors and instructions by their ratio; times by a
+Mann-Whitney test for effects beyond 2 % (Holm's correction over all times), on one machine only.
+What depends on round-off is compared under one compiler, flags and mathematical library only.
+A value that one side lacks, or that is none (null, a text for a number), is a difference.
+
+Examples:
+  loopbench compare results/baselines results/runs/now
+  loopbench compare old.json new.json --only times
+  loopbench compare results/runs/before results/runs/after --only counts --only hashes
+
+Exit codes: 0 the same or better, 1 something is worse or different, 2 could not measure.)";
+
+constexpr const char* kFitFooter = R"(
+Examples:
+  loopbench_bench --benchmark_filter=/chain/ --benchmark_out=chain.json
+  loopbench fit chain.json
+  loopbench fit chain.json --from 30 --format markdown --out chain.md)";
+
+constexpr const char* kExportFooter = R"(
+Examples:
+  loopbench export new.json --out benchmarks.json      # github-action-benchmark, customSmallerIsBetter
+  loopbench export results/runs/paper --format bmf --out bmf.json    # Bencher, adapter json
+
+Cases that failed, and values that are no numbers, cannot be tracked: each is named.
+Exit codes: 0 all exported, 1 all but those named, 2 nothing to export or bad input.)";
+
+}  // namespace
+
+ComparisonOptions::ComparisonOptions(CLI::App& app) {
+  const CLI::IsMember formats({"text", "csv", "markdown"});
+  const std::string what = "Folder of a run, a .jsonl file, or JSON of Google Benchmark";
+
+  compare_app_ = app.add_subcommand("compare", "Hold new measurements against a base");
+  compare_app_->footer(kCompareFooter);
+  compare_app_->add_option("base", compare_.base, what)->required();
+  compare_app_->add_option("new", compare_.fresh, what)->required();
+  compare_app_->add_option("--only", compare_.options.only, "Only this group (repeatable)")
+      ->check(CLI::IsMember(GroupNames()));
+  compare_app_->add_flag("--subset", compare_.options.subset, "NEW may lack cases of BASE");
+  compare_app_
+      ->add_option("--error-ratio", compare_.options.error_ratio, "Allowed on the same build")
+      ->check(NumberFrom(1.0, 1e9))
+      ->capture_default_str();
+  compare_app_
+      ->add_option("--format", compare_.format, "How tables are written (csv: all measures)")
+      ->check(formats)
+      ->capture_default_str();
+
+  fit_app_ = app.add_subcommand("fit", "Fit exponents of time over size to benchmarks");
+  fit_app_->footer(kFitFooter);
+  fit_app_->add_option("file", fit_.file, "JSON of Google Benchmark")->required();
+  fit_app_->add_option("--from", fit_.from, "Leave out sizes below [bodies]")
+      ->check(NumberFrom(0.0, 1e9));
+  fit_app_->add_option("--format", fit_.format, "How the table is written")
+      ->check(formats)
+      ->capture_default_str();
+  fit_app_->add_option("--out", fit_.out, "File (default: the terminal)");
+
+  export_app_ = app.add_subcommand("export", "Write measurements for a tracker of benchmarks");
+  export_app_->footer(kExportFooter);
+  export_app_->add_option("file", export_.file, what)->required();
+  export_app_->add_option("--format", export_.format, "Of github-action-benchmark, or of Bencher")
+      ->check(CLI::IsMember({"customSmallerIsBetter", "bmf"}))
+      ->capture_default_str();
+  export_app_->add_option("--out", export_.out, "File (default: the terminal)");
+}
+
+std::optional<int> ComparisonOptions::Run(const std::string& typed) {
+  if (*compare_app_) return PrintComparison(compare_, typed);
+  if (*fit_app_) return PrintFits(fit_, typed);
+  if (*export_app_) return ExportMeasurements(export_);
+  return std::nullopt;
+}
+
+}  // namespace loopbench::harness

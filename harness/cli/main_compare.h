@@ -1,0 +1,27 @@
+// Options of the subcommands compare, fit and export (main.cpp has the others).
+#pragma once
+
+#include <CLI/CLI.hpp>
+#include <optional>
+#include <string>
+
+#include "harness/cli/commands_compare.h"
+
+namespace loopbench::harness {
+
+class ComparisonOptions {
+ public:
+  /// Adds the subcommands to `app`, which must outlive this.
+  explicit ComparisonOptions(CLI::App& app);
+
+  /// Runs the subcommand that was parsed, if it is one of these: its exit code.
+  std::optional<int> Run(const std::string& typed);
+
+ private:
+  CLI::App *compare_app_, *fit_app_, *export_app_;
+  CompareCommand compare_;
+  FitCommand fit_;
+  ExportCommand export_;
+};
+
+}  // namespace loopbench::harness

@@ -1,0 +1,282 @@
+#include "harness/figures/free_figure.h"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <map>
+#include <set>
+#include <string_view>
+
+#include "harness/analysis/doubts.h"
+#include "harness/json/config_error.h"
+#include "harness/record/select.h"
+#include "harness/tables/columns.h"
+#include "harness/tables/table.h"
+
+namespace loopbench::harness {
+namespace {
+
+// What names a case, in the order of titles.
+constexpr std::array<const char*, 7> kCaseKeys = {
+    "mechanism", "formulation", "enforcement", "coordinates", "solver", "rtol", "horizon"};
+
+std::vector<std::string> Split(const std::string& list) {
+  std::vector<std::string> parts;
+  for (std::size_t from = 0; from < list.size();) {
+    const std::size_t comma = std::min(list.find(',', from), list.size());
+    if (comma > from) parts.push_back(list.substr(from, comma - from));
+    from = comma + 1;
+  }
+  return parts;
+}
+
+bool IsEmpty(const Record& record, const std::string& key) {
+  const Value* value = record.Find(key);
+  if (value == nullptr || std::holds_alternative<std::monostate>(*value)) return true;
+  const auto* number = std::get_if<double>(value);
+  return number != nullptr && std::isnan(*number);
+}
+
+bool IsSeries(const Record& record, const std::string& key) { return !record.Numbers(key).empty(); }
+
+bool IsText(const Record& record, const std::string& key) {
+  const Value* value = record.Find(key);
+  return value != nullptr && std::holds_alternative<std::string>(*value);
+}
+
+// The records that take part: with a value of x, and of the kinds that have values of y.
+std::vector<Record> Participants(std::span<const Record> records, const FreeFigure& wanted) {
+  std::set<std::string> kinds;
+  for (const Record& record : records) {
+    if (IsEmpty(record, wanted.y) || IsEmpty(record, wanted.x)) continue;
+    if (IsText(record, wanted.y)) {
+      throw ConfigError(
+          fmt::format("--y {}: found \"{}\", expected numbers", wanted.y, record.Text(wanted.y)));
+    }
+    if (IsSeries(record, wanted.x) != IsSeries(record, wanted.y)) {
+      throw ConfigError(
+          fmt::format("--x {} --y {}: found a series and a single value, expected two "
+                      "series or two values",
+                      wanted.x, wanted.y));
+    }
+    kinds.insert(record.Text("kind"));
+  }
+  if (kinds.empty()) {
+    throw ConfigError(fmt::format("no record has values of both {} and {}", wanted.x, wanted.y));
+  }
+  std::vector<Record> rows;
+  for (const Record& record : records) {
+    if (!kinds.contains(record.Text("kind")) || IsEmpty(record, wanted.x)) continue;
+    if (!IsEmpty(record, wanted.y) || HasFailed(record)) rows.push_back(record);
+  }
+  return rows;
+}
+
+std::string AxisLabel(const std::string& key, std::span<const Record> rows) {
+  const std::string unit = UnitOf(ColumnOf(key, rows));
+  return unit.empty() ? key : fmt::format("{} [{}]", key, unit);
+}
+
+bool Varies(std::span<const Record> rows, const std::string& key) {
+  return std::ranges::any_of(rows,
+                             [&](const Record& row) { return row.Text(key) != rows[0].Text(key); });
+}
+
+std::string TitleOf(std::span<const Record> rows, const FreeFigure& wanted) {
+  if (!wanted.title.empty()) return wanted.title;
+  std::string common;
+  for (const std::string key : kCaseKeys) {
+    if (key == wanted.x || Varies(rows, key) || rows[0].Text(key).empty()) continue;
+    const bool is_text = IsText(rows[0], key);
+    common += fmt::format("{}{}{}", common.empty() ? ": " : ", ", is_text ? "" : key + " ",
+                          rows[0].Text(key));
+    if (key == "horizon") common += " s";
+  }
+  return fmt::format("{} over {}{}", wanted.y, wanted.x, common);
+}
+
+// The x values: numbers as they are, texts as the places 1, 2, ... of their sorted list.
+class Positions {
+ public:
+  Positions(std::span<const Record> rows, const std::string& key) : key_(key) {
+    std::set<std::string> texts;
+    for (const Record& row : rows) {
+      if (IsText(row, key)) texts.insert(row.Text(key));
+    }
+    categories_.assign(texts.begin(), texts.end());
+  }
+  double Of(const Record& row) const {
+    if (categories_.empty()) return row.Number(key_);
+    const auto it = std::ranges::find(categories_, row.Text(key_));
+    return 1.0 + static_cast<double>(it - categories_.begin());
+  }
+  const std::vector<std::string>& categories() const { return categories_; }
+
+ private:
+  std::string key_;
+  std::vector<std::string> categories_;
+};
+
+Curve NewCurve(const std::string& label, std::size_t index) {
+  Curve curve;
+  curve.label = label;
+  curve.style = DistinctStyle(index);
+  return curve;
+}
+
+Curve SeriesCurve(const Record& row, const FreeFigure& wanted, const std::string& label,
+                  std::size_t index) {
+  Curve curve = NewCurve(label, index);
+  curve.x = row.Numbers(wanted.x);
+  curve.y = row.Numbers(wanted.y);
+  curve.ends_early = HasFailed(row);
+  curve.style.doubtful = HasDoubt(row);
+  return curve;
+}
+
+// `rows` in order of x.
+Curve ValueCurve(const std::vector<Record>& rows, const FreeFigure& wanted, const Positions& x,
+                 const std::string& label, std::size_t index) {
+  Curve curve = NewCurve(label, index);
+  curve.points = true;
+  for (const Record& row : rows) {
+    curve.style.doubtful = curve.style.doubtful || HasDoubt(row);
+    if (HasFailed(row)) {
+      curve.crosses.push_back({x.Of(row), row.Number(wanted.y)});
+    } else {
+      curve.x.push_back(x.Of(row));
+      curve.y.push_back(row.Number(wanted.y));
+    }
+  }
+  return curve;
+}
+
+// Later curves are thinner: curves that coincide stay visible. Lines join points only where no
+// curve has two of them at one x.
+void StyleCurves(Figure& figure) {
+  const bool joins =
+      figure.x_ticks.empty() && std::ranges::none_of(figure.curves, [](const Curve& curve) {
+        return curve.points && std::ranges::adjacent_find(curve.x) != curve.x.end();
+      });
+  const double count = static_cast<double>(figure.curves.size());
+  for (std::size_t i = 0; i < figure.curves.size(); ++i) {
+    figure.curves[i].style.width = 5.0 - 3.0 * (static_cast<double>(i) + 1.0) / count;
+    figure.curves[i].line = joins || !figure.curves[i].points;
+  }
+}
+
+struct Range {
+  double least_positive = INFINITY, largest = -INFINITY;
+  bool all_positive = true;
+
+  void Include(double value) {
+    if (!std::isfinite(value)) return;
+    largest = std::max(largest, value);
+    if (value > 0) least_positive = std::min(least_positive, value);
+    all_positive = all_positive && value > 0;
+  }
+  bool SpansDecades() const { return all_positive && largest >= 100 * least_positive; }
+};
+
+void ChooseScales(Figure& figure, const FreeFigure& wanted, bool is_series) {
+  Range x, y;
+  for (const Curve& curve : figure.curves) {
+    // a series starts at t = 0 with a drift of zero, which must not forbid logarithms
+    for (const double value : curve.x) {
+      if (!is_series || value > 0) x.Include(value);
+    }
+    for (const double value : curve.y) {
+      if (!is_series || value != 0) y.Include(value);
+    }
+    for (const auto& [at, value] : curve.crosses) {
+      x.Include(at);
+      y.Include(value);
+    }
+  }
+  const auto choose = [&](char axis, const Range& range) {
+    if (wanted.log.empty()) return range.SpansDecades();
+    if (wanted.log.find(axis) == std::string::npos) return false;
+    if (range.largest > 0) return true;
+    throw ConfigError(fmt::format("--log {}: no value of {} is positive", wanted.log,
+                                  axis == 'x' ? wanted.x : wanted.y));
+  };
+  figure.log_x = figure.x_ticks.empty() && choose('x', x);
+  figure.log_y = choose('y', y);
+}
+
+}  // namespace
+
+FreeFigureResult MakeFreeFigure(std::span<const Record> records, const FreeFigure& wanted) {
+  const std::vector<std::string> group_keys = Split(wanted.group);
+  RequireKey("--x", wanted.x, records);
+  RequireKey("--y", wanted.y, records);
+  for (const std::string& key : group_keys) RequireKey("--group", key, records);
+  std::vector<Record> rows = Participants(records, wanted);
+  SortRows(&rows);
+  SortRowsBy(&rows, wanted.x, false);
+  for (auto key = group_keys.rbegin(); key != group_keys.rend(); ++key) {
+    SortRowsBy(&rows, *key, false);
+  }
+  std::vector<std::pair<std::string, std::vector<Record>>> groups;
+  for (const Record& row : rows) {
+    std::vector<std::string> values;
+    for (const std::string& key : group_keys) values.push_back(row.Text(key));
+    const std::string label = fmt::format("{}", fmt::join(values, ", "));
+    if (groups.empty() || groups.back().first != label) groups.push_back({label, {}});
+    groups.back().second.push_back(row);
+  }
+
+  FreeFigureResult result;
+  Figure& figure = result.figure;
+  figure.title = TitleOf(rows, wanted);
+  figure.x_label = AxisLabel(wanted.x, rows);
+  figure.y_label = AxisLabel(wanted.y, rows);
+  if (!group_keys.empty()) {
+    figure.legend_title = fmt::format("curves by {}", fmt::join(group_keys, ", "));
+  }
+  const Positions x(rows, wanted.x);
+  figure.x_ticks = x.categories();
+  const bool is_series = IsSeries(rows[0], wanted.x);
+  std::vector<std::string> telling(kCaseKeys.begin(), kCaseKeys.end());
+  for (const TableColumn& parameter : WithParameters({}, rows)) telling.push_back(parameter.key);
+  std::set<std::string> mixed;
+  for (std::size_t g = 0; g < groups.size(); ++g) {
+    const auto& [label, members] = groups[g];
+    for (std::size_t i = 0; is_series && i < members.size(); ++i) {
+      figure.curves.push_back(SeriesCurve(members[i], wanted, i == 0 ? label : "", g));
+    }
+    if (!is_series) figure.curves.push_back(ValueCurve(members, wanted, x, label, g));
+    for (const std::string& key : telling) {
+      if (key != wanted.x && key != wanted.y && Varies(members, key)) mixed.insert(key);
+    }
+  }
+  StyleCurves(figure);
+  ChooseScales(figure, wanted, is_series);
+  // a joined curve may well run through tolerances; a cloud of points calls for a choice
+  const bool is_cloud = std::ranges::any_of(
+      figure.curves, [](const Curve& curve) { return curve.points && !curve.line; });
+  if (is_cloud && !mixed.empty()) {
+    result.remarks.push_back(
+        fmt::format("curves mix values of {}; --group KEY,KEY separates and "
+                    "--where KEY=VALUE selects them",
+                    fmt::join(mixed, ", ")));
+  }
+  const auto failed = std::ranges::count_if(rows, HasFailed);
+  if (failed > 0) {
+    result.remarks.push_back(fmt::format("{} of {} runs failed and {} drawn as {}", failed,
+                                         rows.size(), failed == 1 ? "is" : "are",
+                                         failed == 1 ? "a cross" : "crosses"));
+  }
+  const auto doubted = std::ranges::count_if(rows, [](const Record& row) { return HasDoubt(row); });
+  if (doubted > 0) {
+    result.remarks.push_back(
+        fmt::format("{} of {} runs finished with doubts (column doubts of "
+                    "tables); curves with such runs are dashed",
+                    doubted, rows.size()));
+  }
+  return result;
+}
+
+}  // namespace loopbench::harness

@@ -1,0 +1,146 @@
+#include "harness/json/file_kind.h"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <array>
+#include <string>
+#include <vector>
+
+#include "harness/json/document_kind.h"
+
+namespace loopbench::harness {
+namespace {
+
+/// A kind by what every file of it has and may have at its top level.
+struct Kind {
+  FileKind kind;
+  std::string_view name;
+  std::vector<std::string> own;  ///< what it is known by; without any of these a file is not of it
+  NameList keys;                 ///< all, "$schema" last
+
+  std::ptrdiff_t CountKnown(const Json& document) const {
+    std::ptrdiff_t known = 0;
+    for (const auto& [key, value] : document.items()) {
+      if (key != "$schema" && keys.Find(key)) ++known;
+    }
+    return known;
+  }
+};
+
+const std::array<Kind, 5>& Kinds() {
+  static const std::array<Kind, 5> kinds = {{
+      {FileKind::kMechanism,
+       "a mechanism",
+       {"bodies", "joints"},
+       {"name", "comment", "space", "gravity", "bodies", "ground", "joints", "forces", "initial",
+        "independent", "observe", "$schema"}},
+      {FileKind::kExperiment,
+       "an experiment",
+       {"scenes", "columns", "tolerances"},
+       {"name", "comment", "scenes", "columns", "tolerances", "integrator", "jacobian", "ensembles",
+        "limits", "compile", "series", "timing", "precision", "sweep", "exclude", "$schema"}},
+      {FileKind::kClaims, "claims", {"claims"}, {"claims", "$schema"}},
+      {FileKind::kMap,
+       "a failure map",
+       {"columns", "groups"},
+       {"title", "comment", "columns", "groups", "$schema"}},
+      {FileKind::kBenchmarks,
+       "benchmarks",
+       {"groups"},
+       {"name", "comment", "states", "integrator", "step", "groups", "$schema"}},
+  }};
+  return kinds;
+}
+
+/// The kinds that know the most keys of an object.
+std::vector<const Kind*> Likeliest(const Json& document) {
+  std::vector<const Kind*> best;
+  std::ptrdiff_t most = 0;
+  for (const Kind& kind : Kinds()) {
+    const std::ptrdiff_t known = kind.CountKnown(document);
+    if (known > most) best.clear();
+    most = std::max(most, known);
+    if (known == most) best.push_back(&kind);
+  }
+  return best;
+}
+
+/// "a, b and c", or another last word.
+std::string Joined(const std::vector<std::string>& words, std::string_view last) {
+  std::string text;
+  for (std::size_t i = 0; i < words.size(); ++i) {
+    text += (i == 0 ? "" : i + 1 == words.size() ? fmt::format(" {} ", last) : ", ") + words[i];
+  }
+  return text;
+}
+
+/// "a mechanism ("bodies", "joints")", of the keys that `has` holds.
+template <class Has>
+std::string WithKeys(const Kind& kind, const std::vector<std::string>& keys, Has has) {
+  std::vector<std::string> quoted;
+  for (const std::string& key : keys) {
+    if (has(key)) quoted.push_back('"' + key + '"');
+  }
+  return fmt::format("{} ({})", kind.name, fmt::join(quoted, ", "));
+}
+
+/// `kinds`: those that the file may be of.
+void ReportAmbiguous(const JsonNode& root, const std::vector<const Kind*>& kinds) {
+  std::vector<std::string> found, expected;
+  for (const Kind* kind : kinds) {
+    found.push_back(WithKeys(*kind, kind->keys.all(), [&](const std::string& key) {
+      return key != "$schema" && root.value().contains(key);
+    }));
+  }
+  for (const Kind& kind : Kinds()) {
+    const bool possible = kinds.empty() || std::ranges::find(kinds, &kind) != kinds.end();
+    if (possible) expected.push_back(WithKeys(kind, kind.own, [](const auto&) { return true; }));
+  }
+  root.FailAs(kinds.empty() ? "no key that tells the kind of a file"
+                            : fmt::format("keys of {}", Joined(found, "and")),
+              fmt::format("those of one kind: {}", Joined(expected, "or")));
+}
+
+}  // namespace
+
+bool ExpectDocument(const JsonNode& root, FileKind kind) {
+  const Kind& wanted = *std::ranges::find(Kinds(), kind, &Kind::kind);
+  if (root.value().is_object()) {
+    const Kind& likeliest = *Likeliest(root.value()).front();
+    const auto own = std::ranges::find_if(likeliest.own, [&](const std::string& key) {
+      return root.value().contains(key) && !wanted.keys.Find(key);
+    });
+    const bool of_another = likeliest.CountKnown(root.value()) > wanted.CountKnown(root.value());
+    if (of_another && own != likeliest.own.end()) {
+      root.FailAs(fmt::format("{} (it has \"{}\")", likeliest.name, *own), wanted.name);
+      return false;
+    }
+  }
+  if (!root.ExpectObject(wanted.keys)) return false;
+  if (const auto schema = root.Optional("$schema")) schema->Text();
+  return true;
+}
+
+FileKind KindOfFile(const std::filesystem::path& path) {
+  const std::string text = ReadTextFile(path);
+  const Json document = ParseDocument(text, path.string());
+  ErrorList errors(path.string(), text);
+  const JsonNode root(document, "", errors);
+  if (!document.is_object()) {
+    root.Fail("an object: a mechanism, an experiment, claims, a failure map or benchmarks");
+  }
+  errors.ThrowIfAny();
+  std::vector<const Kind*> likeliest = Likeliest(document);
+  const auto has = [&document](const std::string& key) { return document.contains(key); };
+  std::erase_if(likeliest, [&](const Kind* kind) { return std::ranges::none_of(kind->own, has); });
+  const auto is_whole = [&](const Kind* kind) { return std::ranges::all_of(kind->own, has); };
+  if (likeliest.size() > 1 && std::ranges::count_if(likeliest, is_whole) == 1) {
+    likeliest = {*std::ranges::find_if(likeliest, is_whole)};
+  }
+  if (likeliest.size() != 1) ReportAmbiguous(root, likeliest);
+  errors.ThrowIfAny();
+  return likeliest.front()->kind;
+}
+
+}  // namespace loopbench::harness

@@ -1,0 +1,278 @@
+#include "harness/json/json_reader.h"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <cmath>
+#include <cstddef>
+#include <map>
+
+#include "harness/json/config_error.h"
+#include "harness/json/spelling.h"
+
+namespace loopbench::harness {
+namespace {
+
+constexpr std::size_t kLongestShown = 60;  ///< characters of a value in a message
+constexpr std::size_t kMostListed = 16;    ///< names in a message
+
+/// The first letters; a cut inside a UTF-8 character would make the message invalid.
+std::string Cut(const std::string& text) {
+  std::size_t end = kLongestShown;
+  while (end > 0 && (static_cast<unsigned char>(text[end]) & 0xC0u) == 0x80u) --end;
+  return text.substr(0, end);
+}
+
+/// The value as a reader finds it in the file, or its kind where it would be too long.
+std::string Shown(const Json& value) {
+  if (value.is_object()) return value.empty() ? "an empty object" : "an object";
+  if (value.is_array() && value.empty()) return "an empty array";
+  std::string text = value.dump(-1, ' ', false, Json::error_handler_t::replace);
+  if (text.size() <= kLongestShown) return text;
+  if (value.is_array()) return fmt::format("an array of {} values", value.size());
+  return Cut(text) + "...";
+}
+
+/// A key as a message shows it: keys have no limit of their own.
+std::string ShortName(const std::string& name) {
+  return name.size() <= kLongestShown ? name : Cut(name) + "...";
+}
+
+/// "a", "b", "c" without empty names.
+std::string Listed(const std::vector<std::string>& names) {
+  std::vector<std::string> quoted;
+  for (const std::string& name : names) {
+    if (name.empty()) continue;
+    if (quoted.size() == kMostListed) {
+      quoted.push_back("...");
+      break;
+    }
+    quoted.push_back('"' + ShortName(name) + '"');
+  }
+  return quoted.empty() ? "there is none" : fmt::format("{}", fmt::join(quoted, ", "));
+}
+
+}  // namespace
+
+void ErrorList::Add(std::string_view pointer, std::string_view found, std::string_view expected,
+                    std::string_view suggestion) {
+  if (full()) {
+    ++more_;
+    return;
+  }
+  std::string text = fmt::format("found {}, expected {}", found, expected);
+  if (!suggestion.empty()) text += fmt::format(" (did you mean \"{}\"?)", suggestion);
+  messages_.push_back({false, std::string(pointer), Printable(text)});
+}
+
+void ErrorList::AddWithCure(std::string_view cure, std::string_view pointer, std::string_view found,
+                            std::string_view expected) {
+  const auto first = std::ranges::find(messages_, cure, &Message::cure);
+  if (first == messages_.end()) {
+    const bool room = !full();
+    Add(pointer, found, fmt::format("{}, or {}", expected, cure));
+    if (room) messages_.back().cure = cure;
+    return;
+  }
+  constexpr std::size_t kMostPlaces = 3;
+  if (first->also.size() < kMostPlaces) first->also.push_back(ShownPointer(std::string(pointer)));
+  ++first->others;
+}
+
+void ErrorList::AddText(const std::string& text) {
+  const bool again = std::any_of(messages_.begin(), messages_.end(), [&text](const Message& known) {
+    return known.finished && known.text == text;
+  });
+  if (!again) messages_.push_back({true, "", text});
+}
+
+void ErrorList::ThrowIfAny(const std::string& ending) const {
+  if (messages_.empty()) return;
+  // one pass through each text for all its lines
+  std::map<std::string_view, std::vector<std::string>> wanted;
+  std::vector<Origins::Place> places;
+  for (const Message& message : messages_) {
+    places.push_back(origins_.Find(message.pointer));
+    if (!message.finished) wanted[places.back().text].push_back(places.back().line_pointer);
+  }
+  std::map<std::string_view, std::map<std::string, std::size_t>> lines;
+  for (const auto& [text, pointers] : wanted) {
+    if (!text.empty()) lines[text] = LinesOf(text, pointers);
+  }
+  std::vector<std::string> all;
+  for (std::size_t i = 0; i < messages_.size(); ++i) {
+    if (messages_[i].finished) {
+      all.push_back(messages_[i].text);
+      continue;
+    }
+    const Origins::Place& place = places[i];
+    const auto& known = lines[place.text];
+    const auto line = known.find(place.line_pointer);
+    all.push_back(fmt::format("{}{}: {}: {}{}", place.file,
+                              line == known.end() ? "" : fmt::format(":{}", line->second),
+                              Printable(ShownPointer(place.pointer)), messages_[i].text,
+                              place.note.empty() ? "" : " (" + place.note + ")"));
+    if (const Message& message = messages_[i]; message.others > 0) {
+      all.back() += fmt::format("; the same cure for {} more: {}{}", message.others,
+                                Printable(fmt::format("{}", fmt::join(message.also, ", "))),
+                                message.others > message.also.size() ? ", ..." : "");
+    }
+  }
+  if (more_ > 0) all.push_back(fmt::format("{}: and {} more", origins_.Find("").file, more_));
+  if (!ending.empty()) all.push_back(ending);
+  throw ConfigError(fmt::format("{}", fmt::join(all, "\n")));
+}
+
+std::string Range::Text() const {
+  if (std::isfinite(min) && std::isfinite(max)) {
+    return fmt::format(" {} {}{} and <= {}", above_min ? ">" : ">=", min, why, max);
+  }
+  if (std::isfinite(min)) return fmt::format(" {} {}", above_min ? ">" : ">=", min);
+  return std::isfinite(max) ? fmt::format(" <= {}", max) : "";
+}
+
+void JsonNode::Fail(std::string_view expected, std::string_view suggestion) const {
+  FailAs(errors_->full() ? "" : Shown(*value_), expected, suggestion);
+}
+
+void JsonNode::FailWithCure(std::string_view cure, std::string_view expected) const {
+  errors_->AddWithCure(cure, pointer_, errors_->full() ? "" : Shown(*value_), expected);
+}
+
+void JsonNode::FailAs(std::string_view found, std::string_view expected,
+                      std::string_view suggestion) const {
+  errors_->Add(pointer_, found, expected, suggestion);
+}
+
+JsonNode JsonNode::Child(const Json& value, std::string_view token) const {
+  return JsonNode(value, pointer_ + "/" + PointerToken(token), *errors_);
+}
+
+bool JsonNode::ExpectObject(const NameList& known) const {
+  if (!value_->is_object()) {
+    Fail("an object with keys " + Listed(known.all()));
+    return false;
+  }
+  for (const auto& [key, value] : value_->items()) {
+    if (known.Find(key)) continue;
+    // past the limit of messages, spellings would only cost time
+    if (errors_->full()) {
+      Child(value, key).FailAs("", "");
+      continue;
+    }
+    Child(value, key)
+        .FailAs(fmt::format("unknown key \"{}\"", ShortName(key)), "one of " + Listed(known.all()),
+                NearestSpelling(key, known.all()));
+  }
+  return true;
+}
+
+std::optional<JsonNode> JsonNode::Optional(const std::string& key) const {
+  if (!value_->is_object()) return std::nullopt;
+  const auto found = value_->find(key);
+  if (found == value_->end()) return std::nullopt;
+  return Child(*found, key);
+}
+
+std::optional<JsonNode> JsonNode::Required(const std::string& key,
+                                           std::string_view expected) const {
+  std::optional<JsonNode> member = Optional(key);
+  if (!member && value_->is_object()) FailAs(fmt::format("no \"{}\"", key), expected);
+  return member;
+}
+
+std::vector<std::pair<std::string, JsonNode>> JsonNode::Members() const {
+  std::vector<std::pair<std::string, JsonNode>> members;
+  if (!value_->is_object()) {
+    Fail("an object");
+    return members;
+  }
+  for (const auto& [key, value] : value_->items()) members.emplace_back(key, Child(value, key));
+  return members;
+}
+
+std::vector<JsonNode> JsonNode::Elements(std::string_view what) const {
+  std::vector<JsonNode> elements;
+  if (!value_->is_array()) {
+    Fail(fmt::format("an array of {}", what));
+    return elements;
+  }
+  for (std::size_t i = 0; i < value_->size(); ++i) {
+    elements.push_back(Child((*value_)[i], std::to_string(i)));
+  }
+  return elements;
+}
+
+std::vector<JsonNode> JsonNode::OneOrMore(std::string_view what) const {
+  if (!value_->is_array()) return {*this};
+  if (value_->empty()) Fail("an array that is not empty");
+  return Elements(what);
+}
+
+double JsonNode::Number(const Range& range) const {
+  if (value_->is_number() && range.Contains(value_->get<double>())) return value_->get<double>();
+  Fail("a number" + range.Text());
+  return 0.0;
+}
+
+std::int64_t JsonNode::Integer(std::int64_t min, std::int64_t max) const {
+  // Through double for the comparison: get<int64_t> would cut 2.7 and wrap values beyond 2^63.
+  if (value_->is_number()) {
+    const double number = value_->get<double>();
+    const bool inside = number >= static_cast<double>(min) && number <= static_cast<double>(max);
+    if (inside && number == std::floor(number)) return value_->get<std::int64_t>();
+  }
+  Fail(fmt::format("an integer from {} to {}", min, max));
+  return min;
+}
+
+bool JsonNode::Bool() const {
+  if (value_->is_boolean()) return value_->get<bool>();
+  Fail("true or false");
+  return false;
+}
+
+std::string JsonNode::Text() const {
+  if (value_->is_string() && !value_->get_ref<const std::string&>().empty()) {
+    return value_->get<std::string>();
+  }
+  Fail("a string that is not empty");
+  return "";
+}
+
+Eigen::Vector3d JsonNode::Vector() const {
+  Eigen::Vector3d vector = Eigen::Vector3d::Zero();
+  if (!value_->is_array() || value_->size() < 2 || value_->size() > 3) {
+    Fail("an array of 2 or 3 numbers");
+    return vector;
+  }
+  const std::vector<double> numbers = Numbers(value_->size());
+  for (std::size_t i = 0; i < numbers.size(); ++i) vector[static_cast<int>(i)] = numbers[i];
+  return vector;
+}
+
+std::vector<double> JsonNode::Numbers(std::size_t count) const {
+  std::vector<double> numbers;
+  if (!value_->is_array() || value_->size() != count) {
+    Fail(fmt::format("an array of {} number{}", count, count == 1 ? "" : "s"));
+    return std::vector<double>(count, 0.0);
+  }
+  for (const JsonNode& element : Elements("numbers")) numbers.push_back(element.Number());
+  return numbers;
+}
+
+std::optional<int> JsonNode::Choice(const NameList& known, std::string_view what) const {
+  if (value_->is_string()) {
+    if (const auto found = known.Find(value_->get_ref<const std::string&>())) return found;
+  }
+  if (errors_->full()) {
+    FailAs("", "");
+    return std::nullopt;
+  }
+  Fail(fmt::format("{}: {}", what, Listed(known.all())),
+       value_->is_string() ? NearestSpelling(value_->get_ref<const std::string&>(), known.all())
+                           : "");
+  return std::nullopt;
+}
+
+}  // namespace loopbench::harness

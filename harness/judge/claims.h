@@ -1,0 +1,100 @@
+// Verdicts on claims, computed from records by rules.
+//
+// A rule (configs/experiments/paper/claims.json) restates one claim as checks. Each check selects
+// records, takes a statistic of one measure and compares it with a threshold. The verdict follows
+// from the checks alone, so that other data turn it and nobody writes it by hand.
+#pragma once
+
+#include <cstddef>
+#include <span>
+#include <string>
+#include <vector>
+
+#include "harness/record/record.h"
+#include "harness/record/select.h"
+
+namespace loopbench::harness {
+
+/// What is made of the selected rows: one number (max, min, mean), or a demand on every row or on
+/// at least one.
+enum class Statistic { kMax, kMin, kMean, kAll, kAny };
+
+/// How it is compared: <= threshold, >= threshold, |x - threshold| <= tolerance, or text equal to
+/// or different from a word.
+enum class Comparison { kAtMost, kAtLeast, kWithin, kIs, kIsNot };
+
+/// One condition under which the claim is examined.
+struct Check {
+  std::string label;      ///< the condition in words: "square four-bar, joint coordinates"
+  Selection select;       ///< which records
+  Selection relative_to;  ///< when not empty: the statistic is divided by that of these records
+  Selection require;      ///< what every selected record must also satisfy, or the check fails
+  std::string measure;    ///< key in the record
+  Statistic statistic = Statistic::kMax;
+  Comparison compare = Comparison::kAtMost;
+  double threshold = 0.0;
+  double tolerance = 0.0;  ///< for kWithin
+  std::string word;        ///< for kIs and kIsNot
+  bool failed_runs_hold =
+      false;  ///< for checks that expect failure: a run that did not finish holds
+};
+
+/// A sentence for each verdict, printed after it. Empty sentences are left out.
+struct Wording {
+  std::string reproduced;
+  std::string not_reproduced;
+  std::string only_under;
+  std::string not_measured;
+};
+
+/// One claim of the paper and how it is examined.
+struct ClaimRule {
+  std::string id;
+  std::string claim;  ///< in our own words
+  std::string where;  ///< section or figure of the paper
+  std::string note;   ///< where the thresholds come from
+  std::vector<Check> checks;
+  Wording wording;
+};
+
+enum class CheckState { kHolds, kFails, kNotMeasured };
+
+/// What one check found.
+struct CheckResult {
+  std::string label;
+  CheckState state = CheckState::kNotMeasured;
+  std::size_t rows = 0;  ///< records examined, both sides of a ratio
+  std::string measured;  ///< the numbers: "2.02 (1.98 .. 2.05)", "finished (3)"
+  std::string expected;  ///< the demand: "mean growth_exponent = 2 +- 0.15"
+  std::string reason;    ///< why it fails or is not measured, beyond the numbers
+};
+
+enum class Verdict { kReproduced, kNotReproduced, kOnlyUnder, kNotMeasured };
+
+/// A rule with what its checks found.
+struct ClaimResult {
+  ClaimRule rule;
+  std::vector<CheckResult> checks;
+  Verdict verdict = Verdict::kNotMeasured;
+  std::string text;  ///< verdict, conditions and wording, ready to print
+};
+
+/// Examines one check. Records that match `select` but lack the measure altogether are of another
+/// kind (timing next to drift) and do not count, unless their run failed. With no record left the
+/// state is kNotMeasured, never kHolds. A run that did not finish (an "outcome" other than
+/// "finished"), a value that is not finite, or a record that misses `require` makes the check fail;
+/// failed runs are admitted where the check measures or selects the outcome, or where
+/// failed_runs_hold.
+CheckResult Evaluate(const Check& check, std::span<const Record> records);
+
+/// Examines all checks of a rule. All hold: reproduced. None holds and at least one fails: not
+/// reproduced. No check was measured: not measured. Everything else is "only under", naming the
+/// checks that hold, those that fail and those not measured.
+ClaimResult Evaluate(const ClaimRule& rule, std::span<const Record> records);
+
+/// "reproduced", "not reproduced", "only under", "not measured".
+std::string_view ToString(Verdict verdict);
+/// "holds", "fails", "not measured".
+std::string_view ToString(CheckState state);
+
+}  // namespace loopbench::harness

@@ -1,0 +1,151 @@
+// The failure map: methods against extremes, each cell judged from records by rules.
+//
+// A rules file (configs/experiments/extremes/map.json) names columns (methods), rows (extremes) and
+// for each row the measures that decide. A cell's class and the number that decided it follow from
+// the records alone, so that other data turn it and nobody writes it by hand.
+#pragma once
+
+#include <array>
+#include <cstddef>
+#include <limits>
+#include <map>
+#include <span>
+#include <string>
+#include <string_view>
+#include <vector>
+
+#include "harness/record/record.h"
+#include "harness/record/select.h"
+
+namespace loopbench::harness {
+
+/// One measure of a run and what it must be: at most, at least or equal to `number`, or to `number`
+/// times another measure of the same record ("of": 500 rtol, 1 ensemble_size).
+struct Demand {
+  enum class Kind { kAtMost, kAtLeast, kEqual };
+
+  std::string measure;  ///< key in the record
+  std::string name;     ///< short word for it in cells, "" for none
+  std::string unit;     ///< of the measure, "" for counts
+  Kind kind = Kind::kAtMost;
+  double number = 0.0;  ///< > 0 unless kEqual
+  std::string of;       ///< key that the number is a multiple of, "" for none
+  std::vector<std::string> when = {"finished"};  ///< endings of runs that it applies to
+};
+
+/// One extreme.
+struct MapRow {
+  std::string label;
+  Selection select;                               ///< which records, with the column's selection
+  std::vector<Demand> decides;                    ///< all must be met
+  std::vector<std::string> right = {"finished"};  ///< how a run should end
+  std::vector<bool> must_hold;                    ///< by column: whether the gate asks for it
+  std::map<std::string, std::string> not_applicable;  ///< reason by column label
+  std::string others_not_applicable;  ///< reason for all other columns that need not hold, or ""
+  std::size_t cases = 1;              ///< fewer records than these do not hold
+  std::string why;                    ///< where the limits come from
+};
+
+struct MapGroup {
+  std::string label;
+  std::vector<MapRow> rows;
+};
+
+/// One method.
+struct MapColumn {
+  std::string label;
+  Selection select;
+};
+
+struct MapRules {
+  std::string title, comment;
+  std::vector<MapColumn> columns;
+  std::vector<MapGroup> groups;
+};
+
+/// What may become of a cell, from good to bad: of several records the worst decides. A number that
+/// is wrong without a word is worse than a run that ends and says why, or that does not end.
+enum class CellState {
+  kHolds,          ///< ended as it should, every measure as demanded
+  kNotApplicable,  ///< no record, and the rules say why there is none
+  kNotMeasured,    ///< too few records, or one without a measure that decides
+  kStopped,        ///< ended early with a numerical reason: singular, locked, ...
+  kLimit,          ///< did not end by itself: step-limit, time-limit, ...
+  kInaccurate,     ///< ended as if all were well, with a measure that is not as demanded
+  kBroken,         ///< crashed, or answered what is no result
+};
+inline constexpr std::array kCellStates = {CellState::kHolds,        CellState::kStopped,
+                                           CellState::kLimit,        CellState::kInaccurate,
+                                           CellState::kBroken,       CellState::kNotMeasured,
+                                           CellState::kNotApplicable};  ///< in the order of legends
+
+/// "holds", "stopped", "limit", "inaccurate", "broken", "not measured", "not applicable".
+std::string_view ToString(CellState state);
+
+/// All endings of runs that rules may name, and the state of a run that should have ended
+/// otherwise.
+struct RunEnding {
+  std::string_view word;
+  CellState state;
+};
+std::span<const RunEnding> RunEndings();
+
+/// What a cell shows and why.
+struct MapCell {
+  CellState state = CellState::kNotMeasured;
+  /// The class: "singular", "time-limit", ... for a run that ended so and should not; else the
+  /// state's name.
+  std::string word = "not measured";
+  std::string outcome;  ///< of the run that decided
+  std::string case_id;  ///< of that run
+  /// What decided: of the measures that are not as demanded the one furthest beyond its limit, else
+  /// the one closest to its limit. Empty where the ending decided.
+  std::string measure, name, unit;
+  double value = std::numeric_limits<double>::quiet_NaN();
+  double limit = std::numeric_limits<double>::quiet_NaN();  ///< the one that applied
+  /// value / limit, or limit / value where the limit is a least one: above 1 is beyond. Infinite
+  /// for what is not finite or not equal, 0 for what is equal.
+  double ratio = std::numeric_limits<double>::quiet_NaN();
+  double total = std::numeric_limits<double>::quiet_NaN();      ///< of counts: that of Demand::of
+  double t_reached = std::numeric_limits<double>::quiet_NaN();  ///< [s]
+  std::size_t holding = 0, records = 0;
+  std::size_t cases = 0;  ///< how many records there should be, at least `records`
+  std::string reason;     ///< in words: all measures beyond their limits, the run's message, ...
+  bool demanded = false;
+};
+
+/// The judgement on one run.
+MapCell JudgeRun(const MapRow& row, const Record& record);
+
+/// The judgement on one cell: the worst of its runs. Records of kind "accuracy" count, unless a
+/// selection names the kind.
+MapCell JudgeCell(const MapRow& row, std::size_t column, const MapColumn& method,
+                  std::span<const Record> records);
+
+/// Rules and, by group, row and column, the cells.
+struct FailureMap {
+  MapRules rules;
+  std::vector<std::vector<std::vector<MapCell>>> cells;
+  /// Keys that rules name and no record has: misspelt, or not run yet. One sentence each.
+  std::vector<std::string> remarks;
+};
+FailureMap MakeFailureMap(const MapRules& rules, std::span<const Record> records);
+
+/// "branch_error_max <= 500 rtol [rad]".
+std::string ToText(const Demand& demand);
+
+/// The class, with the ending where another one than "finished" is right: "holds: locked".
+std::string ClassText(const MapCell& cell);
+
+/// The number that decided: "branch 2.1e-09 rad", "397 of 400", "at 0.31 s"; "" where there is
+/// none.
+std::string DecidingNumber(const MapCell& cell);
+
+/// "3/4" where there is, or should be, more than one record, else "".
+std::string HoldingCount(const MapCell& cell);
+
+/// "O-DCA, position / parallelogram: singular at 0.31 s" for every cell that must hold and does
+/// not.
+std::vector<std::string> BrokenDemands(const FailureMap& map);
+
+}  // namespace loopbench::harness

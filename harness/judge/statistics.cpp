@@ -1,0 +1,119 @@
+#include "harness/judge/statistics.h"
+
+#include <algorithm>
+#include <cmath>
+#include <limits>
+#include <numeric>
+#include <utility>
+
+namespace loopbench::harness {
+
+namespace {
+
+constexpr std::size_t kLargestExact = 40;
+
+/// Probability of each u from 0 to a b, when all orders of a + b different values are equally
+/// likely. With f(u; a, b) = share of orders: the largest value belongs to the first sample with
+/// probability a / (a + b), and then lies above all b others.
+std::vector<double> ExactDistribution(std::size_t a, std::size_t b) {
+  // rows[i] holds f(.; i, j) for the current j
+  std::vector<std::vector<double>> rows(a + 1, std::vector<double>{1.0});
+  for (std::size_t j = 1; j <= b; ++j) {
+    std::vector<std::vector<double>> next(a + 1);
+    next[0] = {1.0};
+    for (std::size_t i = 1; i <= a; ++i) {
+      next[i].assign(i * j + 1, 0.0);
+      const double first = static_cast<double>(i) / static_cast<double>(i + j);
+      for (std::size_t u = 0; u < next[i - 1].size(); ++u) {
+        next[i][u + j] += first * next[i - 1][u];
+      }
+      for (std::size_t u = 0; u < rows[i].size(); ++u) next[i][u] += (1.0 - first) * rows[i][u];
+    }
+    rows = std::move(next);
+  }
+  return rows[a];
+}
+
+/// Sum over groups of equal values of t^3 - t.
+double TieTerm(std::span<const double> a, std::span<const double> b) {
+  std::vector<double> all(a.begin(), a.end());
+  all.insert(all.end(), b.begin(), b.end());
+  std::ranges::sort(all);
+  double term = 0.0;
+  for (std::size_t i = 0; i < all.size();) {
+    std::size_t end = i + 1;
+    while (end < all.size() && all[end] == all[i]) ++end;
+    const double t = static_cast<double>(end - i);
+    term += t * t * t - t;
+    i = end;
+  }
+  return term;
+}
+
+double NormalTail(double u, double a, double b, double ties) {
+  const double n = a + b;
+  const double variance = a * b / 12.0 * (n + 1.0 - ties / (n * (n - 1.0)));
+  if (!(variance > 0.0)) return 1.0;  // all values equal
+  return 0.5 * std::erfc((u - a * b / 2.0 - 0.5) / std::sqrt(2.0 * variance));
+}
+
+}  // namespace
+
+double Median(std::span<const double> sample) {
+  const auto is_nan = [](double x) { return std::isnan(x); };
+  if (sample.empty() || std::ranges::any_of(sample, is_nan)) {
+    return std::numeric_limits<double>::quiet_NaN();
+  }
+  std::vector<double> sorted(sample.begin(), sample.end());
+  std::ranges::sort(sorted);
+  const std::size_t n = sorted.size();
+  return n % 2 == 1 ? sorted[n / 2] : 0.5 * (sorted[n / 2 - 1] + sorted[n / 2]);
+}
+
+MannWhitneyResult MannWhitney(std::span<const double> a, std::span<const double> b) {
+  MannWhitneyResult result;
+  if (a.empty() || b.empty()) return result;
+  std::vector<double> sorted(b.begin(), b.end());
+  std::ranges::sort(sorted);
+  for (const double x : a) {
+    const auto [equal, above] = std::ranges::equal_range(sorted, x);
+    result.u +=
+        static_cast<double>(equal - sorted.begin()) + 0.5 * static_cast<double>(above - equal);
+  }
+  const double ties = TieTerm(a, b);
+  result.exact = ties == 0.0 && std::max(a.size(), b.size()) <= kLargestExact;
+  if (result.exact) {
+    const std::vector<double> f = ExactDistribution(a.size(), b.size());
+    const auto u = static_cast<std::ptrdiff_t>(result.u);
+    result.p_greater = std::min(1.0, std::accumulate(f.begin() + u, f.end(), 0.0));
+  } else {
+    result.p_greater =
+        NormalTail(result.u, static_cast<double>(a.size()), static_cast<double>(b.size()), ties);
+  }
+  return result;
+}
+
+double SmallestP(std::size_t a, std::size_t b) {
+  // one order of (a + b choose a)
+  double p = 1.0;
+  for (std::size_t i = 1; i <= a; ++i) {
+    p *= static_cast<double>(i) / static_cast<double>(b + i);
+  }
+  return p;
+}
+
+std::vector<double> HolmAdjusted(std::span<const double> p) {
+  std::vector<std::size_t> order(p.size());
+  std::iota(order.begin(), order.end(), std::size_t{0});
+  std::ranges::stable_sort(order, {}, [p](std::size_t i) { return p[i]; });
+  std::vector<double> adjusted(p.size());
+  double largest = 0.0;
+  for (std::size_t rank = 0; rank < order.size(); ++rank) {
+    const double factor = static_cast<double>(p.size() - rank);
+    largest = std::max(largest, std::min(1.0, factor * p[order[rank]]));
+    adjusted[order[rank]] = largest;
+  }
+  return adjusted;
+}
+
+}  // namespace loopbench::harness

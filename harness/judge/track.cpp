@@ -1,0 +1,65 @@
+#include "harness/judge/track.h"
+
+#include <fmt/format.h>
+
+#include <map>
+
+#include "harness/judge/measures.h"
+#include "harness/judge/statistics.h"
+#include "harness/record/noise.h"
+
+namespace loopbench::harness {
+
+namespace {
+
+bool IsTracked(Rule rule) {
+  return rule == Rule::kCount || rule == Rule::kError || rule == Rule::kInstructions ||
+         rule == Rule::kTime;
+}
+
+TrackedValue Tracked(const std::string& one, const Measure& measure, const Record& record) {
+  TrackedValue value{one, measure.key, measure.unit, 0.0, 0.0, 0.0};
+  if (measure.rule == Rule::kTime) {
+    const std::vector<double>& sample = record.Numbers(measure.key);
+    value.measure = value.measure.substr(value.measure.find('.') + 1);
+    value.value = Median(sample);
+    value.lower = Quantile(sample, 0.1);
+    value.upper = Quantile(sample, 0.9);
+  } else {
+    value.value = value.lower = value.upper = record.Number(measure.key);
+  }
+  return value;
+}
+
+}  // namespace
+
+TrackedRecords TrackRecords(const std::vector<Record>& records) {
+  TrackedRecords tracked;
+  std::map<std::string, int> times_there;
+  for (const Record& record : records) ++times_there[CaseText(record)];
+  for (const Record& record : records) {
+    const std::string one = CaseText(record);
+    const auto leave_out = [&](const std::string& why) {
+      tracked.left_out.push_back(fmt::format("{}: {}", one.empty() ? "a nameless case" : one, why));
+    };
+    if (times_there[one] > 1) {
+      leave_out("there more than once");
+      continue;
+    }
+    if (record.Text("outcome") != "finished") {
+      leave_out(fmt::format("outcome {}", Shown(record, "outcome")));
+      continue;
+    }
+    for (const Measure& measure : Measures()) {
+      if (!IsTracked(measure.rule)) continue;
+      const Held held = HeldBy(record, measure);
+      if (held == Held::kFit) tracked.values.push_back(Tracked(one, measure, record));
+      if (held != Held::kUnfit) continue;
+      leave_out(fmt::format("{}: found {}, expected {}", measure.key, Shown(record, measure.key),
+                            Expected(measure.rule)));
+    }
+  }
+  return tracked;
+}
+
+}  // namespace loopbench::harness

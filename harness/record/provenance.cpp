@@ -1,0 +1,57 @@
+#include "harness/record/provenance.h"
+
+#include <fmt/chrono.h>
+#include <fmt/format.h>
+#include <sys/utsname.h>
+
+#include <Eigen/Core>
+#include <ctime>
+#include <filesystem>
+#include <fstream>
+#include <iterator>
+
+#include "harness/build_commit.h"
+#include "harness/build_info.h"
+#include "harness/record/origin.h"
+#include "harness/text/hash.h"
+
+namespace loopbench::harness {
+
+std::vector<std::string> Provenance(const std::string& command) {
+  utsname system{};
+  uname(&system);
+  const std::time_t now = std::time(nullptr);
+  return {
+      fmt::format("command: {}", command),
+      fmt::format("date: {:%Y-%m-%d %H:%M} UTC", fmt::gmtime(now)),
+      fmt::format("commit: {}", kBuildCommit),
+      fmt::format("machine: {}, {} {}", ThisOrigin().machine, system.sysname, system.release),
+      fmt::format("compiler: {}, flags {}", ThisOrigin().compiler, ThisOrigin().flags),
+      fmt::format("libraries: Eigen {}.{}.{}, SUNDIALS {}, fmt {}", EIGEN_WORLD_VERSION,
+                  EIGEN_MAJOR_VERSION, EIGEN_MINOR_VERSION, kBuildSundials, FMT_VERSION),
+  };
+}
+
+std::string VersionText() {
+  std::string text = fmt::format("loopbench {}", kBuildVersion);
+  const std::vector<std::string> facts = Provenance("");
+  for (std::size_t i = 2; i < facts.size(); ++i) text += "\n" + facts[i];  // no command, no date
+  return text;
+}
+
+const std::string& CodeVersion() {
+  static const std::string version = [] {
+    std::ifstream file("/proc/self/exe", std::ios::binary);
+    const std::string bytes{std::istreambuf_iterator<char>(file), {}};
+    return Fnv1a(bytes);
+  }();
+  return version;
+}
+
+std::string CommandLine(int argc, const char* const* argv) {
+  std::string line = std::filesystem::path(argv[0]).filename().string();
+  for (int i = 1; i < argc; ++i) line += std::string(" ") + argv[i];
+  return line;
+}
+
+}  // namespace loopbench::harness

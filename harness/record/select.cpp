@@ -1,0 +1,159 @@
+#include "harness/record/select.h"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <charconv>
+#include <cmath>
+#include <cstdint>
+#include <iterator>
+#include <optional>
+#include <system_error>
+
+#include "harness/json/config_error.h"
+
+namespace loopbench::harness {
+namespace {
+
+std::optional<double> ParseNumber(std::string_view text) {
+  double number = 0.0;
+  const auto [end, error] = std::from_chars(text.data(), text.data() + text.size(), number);
+  if (error != std::errc{} || end != text.data() + text.size()) return std::nullopt;
+  return number;
+}
+
+bool Holds(const Record& record, const Condition& condition) {
+  const Value* value = record.Find(condition.key);
+  if (value == nullptr || std::holds_alternative<std::monostate>(*value)) return false;
+  const bool numeric =
+      std::holds_alternative<double>(*value) || std::holds_alternative<std::int64_t>(*value);
+  return std::ranges::any_of(condition.values, [&](const std::string& wanted) {
+    return numeric ? ParseNumber(wanted) == record.Number(condition.key)
+                   : record.Text(condition.key) == wanted;
+  });
+}
+
+// -1, 0 or 1; NaN is larger than every number, so that the order is total.
+int Compare(double a, double b) {
+  if (std::isnan(a) || std::isnan(b)) return int{std::isnan(a)} - int{std::isnan(b)};
+  return int{a > b} - int{a < b};
+}
+
+// Texts with numbers in them as a person orders them: chain-3 before chain-10.
+int CompareNaturally(const std::string& a, const std::string& b) {
+  const auto digits = [](const std::string& text, std::size_t from) {
+    const std::size_t end = text.find_first_not_of("0123456789", from);
+    return text.substr(from, std::min(end, text.size()) - from);
+  };
+  std::size_t i = 0;
+  while (i < a.size() && i < b.size()) {
+    const std::string one = digits(a, i), other = digits(b, i);
+    if (one != other && !one.empty() && !other.empty()) {
+      // by number of digits first: any length of number, no overflow
+      if (one.size() != other.size()) return one.size() < other.size() ? -1 : 1;
+      return one.compare(other);
+    }
+    if (a[i] != b[i]) break;
+    i += std::max<std::size_t>(1, one.size());
+  }
+  return a.compare(b);
+}
+
+// By all that names a case: a mechanism at two levels, the parameters of a sweep. Of cases that
+// share it, those of the command's first file come first.
+int CompareKeys(const Record& a, const Record& b) {
+  const auto ends = [](const Record& record, std::size_t i) {
+    if (i == record.items().size()) return true;
+    const std::string& key = record.items()[i].first;
+    return key == "content" || key == "case_id" || key == "outcome";
+  };
+  for (std::size_t i = 0; !ends(a, i) || !ends(b, i); ++i) {
+    if (ends(a, i) || ends(b, i)) return ends(a, i) ? -1 : 1;
+    const std::string &key = a.items()[i].first, &other = b.items()[i].first;
+    if (const int order = key.compare(other)) return order;
+    if (const int order = Compare(a.Number(key), b.Number(key))) return order;
+    if (const int order = CompareNaturally(a.Text(key), b.Text(key))) return order;
+  }
+  return Compare(a.Number("experiment_index"), b.Number("experiment_index"));
+}
+
+bool ComesBefore(const Record& a, const Record& b) {
+  if (const int order = CompareNaturally(a.Text("mechanism"), b.Text("mechanism"))) {
+    return order < 0;
+  }
+  if (const int order = Compare(a.Number("horizon"), b.Number("horizon"))) return order < 0;
+  for (const char* key : {"formulation", "coordinates", "solver"}) {
+    if (const int order = a.Text(key).compare(b.Text(key))) return order < 0;
+  }
+  if (const int order = Compare(-a.Number("rtol"), -b.Number("rtol"))) return order < 0;
+  return CompareKeys(a, b) < 0;
+}
+
+// A value as SortRowsBy() orders it: 0 numbers, 1 texts, 2 what is missing.
+struct SortKey {
+  int rank;
+  double number;
+  std::string text;
+};
+
+SortKey SortKeyOf(const Record& record, const std::string& key) {
+  const double number = record.Number(key);
+  if (!std::isnan(number)) return {0, number, ""};
+  const Value* value = record.Find(key);
+  if (value != nullptr && std::holds_alternative<std::string>(*value)) {
+    return {1, 0.0, record.Text(key)};
+  }
+  return {2, 0.0, ""};
+}
+
+}  // namespace
+
+Condition ParseCondition(std::string_view text) {
+  const std::size_t equals = text.find('=');
+  if (equals == std::string_view::npos || equals == 0 || equals + 1 == text.size()) {
+    throw ConfigError(fmt::format("filter '{}': expected key=value or key=value,value", text));
+  }
+  Condition condition{std::string(text.substr(0, equals)), {}};
+  std::string_view rest = text.substr(equals + 1);
+  for (;;) {
+    const std::size_t comma = rest.find(',');
+    condition.values.emplace_back(rest.substr(0, comma));
+    if (comma == std::string_view::npos) return condition;
+    rest.remove_prefix(comma + 1);
+  }
+}
+
+bool Matches(const Record& record, const Selection& selection) {
+  return std::ranges::all_of(selection,
+                             [&](const Condition& condition) { return Holds(record, condition); });
+}
+
+std::vector<Record> Filter(std::span<const Record> records, const Selection& selection) {
+  std::vector<Record> matching;
+  std::ranges::copy_if(records, std::back_inserter(matching),
+                       [&](const Record& record) { return Matches(record, selection); });
+  return matching;
+}
+
+std::string ToText(const Selection& selection) {
+  std::string text;
+  for (const auto& [key, values] : selection) {
+    text += fmt::format("{}{}", text.empty() ? "" : " ", key);
+    for (std::size_t i = 0; i < values.size(); ++i) text += (i == 0 ? "=" : ",") + values[i];
+  }
+  return text;
+}
+
+void SortRows(std::vector<Record>* records) { std::ranges::stable_sort(*records, ComesBefore); }
+
+void SortRowsBy(std::vector<Record>* records, const std::string& key, bool descending) {
+  std::ranges::stable_sort(*records, [&](const Record& a, const Record& b) {
+    const SortKey one = SortKeyOf(a, key), other = SortKeyOf(b, key);
+    if (one.rank != other.rank) return one.rank < other.rank;
+    const int order =
+        one.rank == 0 ? Compare(one.number, other.number) : CompareNaturally(one.text, other.text);
+    return descending ? order > 0 : order < 0;
+  });
+}
+
+}  // namespace loopbench::harness

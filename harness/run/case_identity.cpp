@@ -1,0 +1,68 @@
+#include "harness/run/case_identity.h"
+
+#include "harness/record/provenance.h"
+#include "harness/run/compiled_scene.h"
+#include "harness/store/record_json.h"
+#include "harness/text/hash.h"
+
+namespace loopbench::harness {
+namespace {
+
+/// What decides any run besides its keys.
+Record CommonContent(const Experiment& experiment) {
+  Record content;
+  content.Set("cpu_s", experiment.limits.cpu_s);
+  content.Set("steps", experiment.limits.steps);
+  content.Set("memory_mb", experiment.limits.memory_mb);
+  content.Set("compile", ToString(experiment.compile));
+  return content;
+}
+
+Record SceneContent(const Experiment& experiment, const Case& one) {
+  Record content = CommonContent(experiment);
+  content.Set("document", experiment.scenes[one.scene].mechanism.canonical);
+  return content;
+}
+
+}  // namespace
+
+void SetCaseId(Record* keys, const std::string& content) {
+  constexpr std::size_t kDigits = 8;
+  keys->Set("case_id", Fnv1a(CaseId(*keys) + content));
+  keys->Set("content", content.substr(0, kDigits));
+}
+
+std::string AccuracyContent(const Experiment& experiment, const Case& one) {
+  Record content = SceneContent(experiment, one);
+  content.Set("ensemble", std::int64_t{one.ensemble});
+  content.Set("seed", static_cast<std::int64_t>(one.seed));
+  content.Set("perturb", one.perturb);
+  for (const DrawnCoordinate& drawn : one.between) {
+    content.Set("between." + drawn.joint, std::vector<double>{drawn.from, drawn.to});
+  }
+  content.Set("branch_bound", one.branch_bound);
+  content.Set("series_points", std::int64_t{experiment.series_points});
+  return CaseId(content);
+}
+
+std::string SceneTimingContent(const Experiment& experiment, const Case& one) {
+  Record content = SceneContent(experiment, one);
+  content.Set("repeats", std::int64_t{experiment.timing.repeats});
+  return CaseId(content);
+}
+
+std::string FamilyTimingContent(const Experiment& experiment) {
+  Record content = CommonContent(experiment);
+  content.Set("repeats", std::int64_t{experiment.timing.repeats});
+  return CaseId(content);
+}
+
+std::string LadderContent(const Experiment& experiment, const Case& one, const std::string& rungs) {
+  Record content = SceneContent(experiment, one);
+  content.Set("rungs", rungs);
+  return CaseId(content);
+}
+
+std::string RunId(const Record& record) { return Fnv1a(record.Text("case_id") + CodeVersion()); }
+
+}  // namespace loopbench::harness

@@ -1,0 +1,303 @@
+#include "harness/suite/suite.h"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <charconv>
+#include <cmath>
+#include <functional>
+#include <limits>
+#include <map>
+#include <set>
+#include <utility>
+
+#include "harness/isolation/fault.h"
+#include "harness/isolation/processes.h"
+#include "harness/json/config_error.h"
+#include "harness/record/noise.h"
+#include "harness/record/origin.h"
+#include "harness/record/provenance.h"
+#include "harness/run/case_identity.h"
+#include "harness/run/run_case.h"
+#include "harness/suite/precision_cases.h"
+#include "harness/suite/progress.h"
+#include "harness/text/terminal.h"
+#include "harness/timing/time_cases.h"
+
+namespace loopbench::harness {
+
+namespace {
+
+/// Steps grow with the horizon and with rtol^(-1/5); costly cases go first, so that none is left to
+/// run alone at the end.
+double Cost(const Case& one) { return one.ensemble * one.horizon * std::pow(one.rtol, -0.2); }
+
+/// One process: the records it owes, known but for their results, and how to make them.
+struct Piece {
+  std::vector<Record> owed;     ///< keys, case_id and content
+  std::int64_t experiment = 0;  ///< which of the command's
+  std::function<std::vector<Record>()> work;
+  ProcessLimits limits;
+  std::string label;
+  double cost = 0.0;
+};
+
+constexpr double kPatience = 2.0, kGrace_s = 2.0;  ///< LimitsOfRuns
+
+Piece AccuracyPiece(const Experiment& experiment, const Case& one) {
+  Record keys = CaseKeys(experiment, one);
+  SetCaseId(&keys, AccuracyContent(experiment, one));
+  const int runs = one.ensemble > 1 ? one.ensemble + 1 : 1;
+  return {.owed = {keys},
+          .work = [&experiment, one] { return std::vector<Record>{RunCase(experiment, one)}; },
+          .limits = LimitsOfRuns(one.limits, runs),
+          .label = fmt::format("{} {} {}", one.mechanism, ToString(one.column), one.rtol),
+          .cost = Cost(one)};
+}
+
+Piece TimingPiece(const Experiment& experiment, const TimingGroup& group) {
+  Piece piece;
+  for (std::size_t i = 0; i < group.cases.size(); ++i) {
+    piece.owed.push_back(TimingKeys(experiment, group, i));
+  }
+  // the first column is timed twice (noise.h)
+  const int columns = static_cast<int>(group.cases.size()) + 1;
+  const int runs = columns * (experiment.timing.repeats + 1);
+  // right-hand sides have no limit of their own; a minute per column is far beyond any
+  constexpr double kDerivatives_s = 60.0;
+  piece.limits = {kPatience * runs * experiment.limits.cpu_s + kDerivatives_s * columns,
+                  experiment.limits.memory_mb};
+  piece.work = [&experiment, &group] { return TimeTogether(experiment, group); };
+  piece.label = group.name;
+  return piece;
+}
+
+Piece LadderPiece(const Experiment& experiment, const LadderGroup& group) {
+  Piece piece;
+  const Limits& limits = experiment.limits;
+  piece.owed = group.keys;
+  const auto runs = static_cast<double>(group.keys.size() + 1);  // there are two references
+  piece.limits = LimitsOfRuns(limits, runs);
+  piece.work = [&experiment, &group] { return ClimbTogether(experiment, group); };
+  piece.label =
+      fmt::format("{} {}", group.keys.front().Text("mechanism"), ToString(group.task.column));
+  return piece;
+}
+
+/// The child's side: all records, one a line.
+std::string Answer(const Piece& piece) {
+  if (const auto garbage = PlantedFault(piece.owed.front())) return *garbage;
+  std::string text;
+  for (const Record& record : piece.work()) text += ToJsonLine(record) + '\n';
+  return text;
+}
+
+/// The parent's side: what the piece owes, filled from the answer or with the reason why not.
+std::vector<Record> Records(const Piece& piece, const ProcessResult& result,
+                            const std::string& set) {
+  std::vector<Record> records;
+  std::string outcome(OutcomeOf(result.ending)), message = result.text;
+  if (result.ending == ProcessEnding::kThrew) message = "threw: " + message;
+  if (result.ending == ProcessEnding::kAnswered) {
+    outcome = "bad-answer";
+    message = "its process answered what is not its record";
+    try {
+      for (std::size_t start = 0; start < result.text.size();) {
+        const std::size_t end = std::min(result.text.find('\n', start), result.text.size());
+        records.push_back(FromJsonLine(std::string_view(result.text).substr(start, end - start)));
+        start = end + 1;
+      }
+    } catch (const std::runtime_error&) {
+      records.clear();
+    }
+  }
+  const auto same_case = [](const Record& a, const Record& b) {
+    return a.Text("case_id") == b.Text("case_id");
+  };
+  const bool good = std::ranges::equal(records, piece.owed, same_case);
+  if (!good) records = piece.owed;
+  for (std::size_t i = 0; i < records.size(); ++i) {
+    if (!good) {
+      records[i].Set("outcome", outcome);
+      records[i].Set("message", message);
+      records[i].Set("wall_s", result.wall_s);
+      records[i].Set("cpu_s", result.cpu_s);
+    }
+    records[i].Set("id", RunId(piece.owed[i]));
+    records[i].Set("version", CodeVersion());
+    if (!set.empty()) records[i].Set("set", set);
+    records[i].Set("experiment_index", piece.experiment);
+    Stamp(records[i]);
+  }
+  return records;
+}
+
+/// Runs the pieces the store does not have, or that are to be run again.
+class Runner {
+ public:
+  Runner(const SuiteOptions& options, const std::vector<Record>& records, ResultStore& store)
+      : options_(options), store_(store) {
+    for (const Record& record : records) {
+      outcomes_[record.Text("id")] = record.Text("outcome");
+    }
+  }
+
+  /// `pieces` in the order of the experiments.
+  void Run(const std::string& what, std::vector<Piece> pieces, int jobs) {
+    // a case that two files share is one case
+    std::erase_if(pieces, [this](const Piece& piece) {
+      bool asked_before = true;
+      for (const Record& owed : piece.owed) {
+        const std::string id = RunId(owed);
+        if (!asked_.insert(id).second) continue;
+        asked_before = false;
+        count_.ids.push_back(id);
+      }
+      return asked_before;
+    });
+    std::ranges::stable_sort(pieces, std::greater<>(), &Piece::cost);
+    std::erase_if(pieces, [this](const Piece& piece) {
+      if (!Done(piece)) return false;
+      count_.skipped += piece.owed.size();
+      return true;
+    });
+    if (pieces.empty()) return;
+    Progress progress(what, pieces.size());
+    RunInProcesses(
+        pieces.size(), jobs,
+        [&](std::size_t i) {
+          store_.LeaveToParent();
+          return Answer(pieces[i]);
+        },
+        [&](std::size_t i) { return pieces[i].limits; },
+        [&](std::size_t i, const ProcessResult& result) {
+          for (const Record& record : Records(pieces[i], result, options_.set)) {
+            store_.Append(record);
+            ++count_.run;
+            count_.failed += record.Text("outcome") != ToString(Outcome::kFinished);
+          }
+          progress.Step(pieces[i].label);
+        });
+  }
+
+  const SuiteCount& count() const { return count_; }
+
+ private:
+  bool Done(const Piece& piece) const {
+    if (options_.rerun == Rerun::kAll) return false;
+    return std::ranges::all_of(piece.owed, [this](const Record& owed) {
+      const auto at = outcomes_.find(RunId(owed));
+      return at != outcomes_.end() &&
+             (options_.rerun == Rerun::kNone || at->second == ToString(Outcome::kFinished));
+    });
+  }
+
+  const SuiteOptions& options_;
+  ResultStore& store_;
+  std::map<std::string, std::string> outcomes_;  ///< by id, the last one
+  std::set<std::string> asked_;                  ///< ids
+  SuiteCount count_;
+};
+
+/// A condition on a key that cases do not have would silently match nothing.
+[[noreturn]] void RejectKey(const std::string& key, const Record& keys) {
+  std::string known;
+  for (const auto& [name, value] : keys.items()) known += (known.empty() ? "" : ", ") + name;
+  throw ConfigError(fmt::format("--filter {}: no such key; cases have {}", key, known));
+}
+
+/// Limits of time are of CPU time, so that too many jobs change no outcome. They gain nothing.
+void WarnOfJobs(int jobs) {
+  const int processors = ReadMachineState().processors;
+  if (jobs <= processors) return;
+  PrintError(
+      "warning: --jobs {} on {} processor{}: the runs take turns, and together they may ask "
+      "for {} times the memory of one\n",
+      jobs, processors, processors == 1 ? "" : "s", jobs);
+}
+
+}  // namespace
+
+std::vector<Case> SelectCases(const Experiment& experiment, const Selection& filter) {
+  std::vector<Case> cases;
+  for (const Case& one : Expand(experiment)) {
+    const Record keys = CaseKeys(experiment, one);
+    for (const Condition& condition : filter) {
+      if (keys.Find(condition.key) == nullptr) RejectKey(condition.key, keys);
+    }
+    if (Matches(keys, filter)) cases.push_back(one);
+  }
+  if (cases.empty()) {
+    throw ConfigError(
+        fmt::format("{}: no case matches {}", experiment.path.string(), ToText(filter)));
+  }
+  return cases;
+}
+
+ProcessLimits LimitsOfRuns(const Limits& limits, double runs) {
+  return {.cpu_s = kPatience * runs * limits.cpu_s + kGrace_s, .memory_mb = limits.memory_mb};
+}
+
+Shard ParseShard(const std::string& text) {
+  Shard shard;
+  const char* const end = text.data() + text.size();
+  const auto index = std::from_chars(text.data(), end, shard.index);
+  const bool has_count = index.ec == std::errc() && index.ptr != end && *index.ptr == '/';
+  const auto count = has_count ? std::from_chars(index.ptr + 1, end, shard.count) : index;
+  if (!has_count || count.ec != std::errc() || count.ptr != end || shard.index < 1 ||
+      shard.index > shard.count) {
+    throw ConfigError(fmt::format("--shard: found \"{}\", expected k/n with 1 <= k <= n <= {}",
+                                  text, std::numeric_limits<int>::max()));
+  }
+  return shard;
+}
+
+SuiteCount RunSuite(const std::vector<Experiment>& experiments, const SuiteOptions& options,
+                    const std::vector<Record>& records, ResultStore& store) {
+  WarnOfJobs(options.jobs);
+  Runner runner(options, records, store);
+  std::vector<Piece> pieces;
+  std::size_t number = 0;
+  const auto add = [&](std::size_t e, auto make_piece) {
+    if (!options.shard.Takes(number++)) return;
+    pieces.push_back(make_piece());
+    pieces.back().experiment = static_cast<std::int64_t>(e);
+  };
+  const auto run = [&](const std::string& what, int jobs) {
+    runner.Run(what, std::exchange(pieces, {}), jobs);
+    number = 0;
+  };
+  if (options.accuracy) {
+    for (std::size_t e = 0; e < experiments.size(); ++e) {
+      for (const Case& one : SelectCases(experiments[e], options.filter)) {
+        add(e, [&] { return AccuracyPiece(experiments[e], one); });
+      }
+    }
+    run("accuracy", options.jobs);
+  }
+  if (options.precision) {
+    std::vector<std::vector<LadderGroup>> ladders;  // pieces refer to them
+    for (const Experiment& experiment : experiments) {
+      ladders.push_back(LadderGroups(experiment, options.filter));
+    }
+    for (std::size_t e = 0; e < experiments.size(); ++e) {
+      for (const LadderGroup& ladder : ladders[e]) {
+        add(e, [&] { return LadderPiece(experiments[e], ladder); });
+      }
+    }
+    run("precision", options.jobs);
+  }
+  if (options.timing) {
+    std::vector<std::vector<TimingGroup>> groups;  // pieces refer to them
+    for (const Experiment& experiment : experiments) groups.push_back(TimingGroups(experiment));
+    for (std::size_t e = 0; e < experiments.size(); ++e) {
+      for (const TimingGroup& group : groups[e]) {
+        add(e, [&] { return TimingPiece(experiments[e], group); });
+      }
+    }
+    run("timing", 1);
+  }
+  return runner.count();
+}
+
+}  // namespace loopbench::harness

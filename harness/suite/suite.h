@@ -1,0 +1,70 @@
+// Runs the cases of experiments, each in a process of its own, and keeps their records.
+#pragma once
+
+#include <set>
+#include <string>
+#include <vector>
+
+#include "harness/config/experiment.h"
+#include "harness/isolation/processes.h"
+#include "harness/record/select.h"
+#include "harness/store/result_store.h"
+
+namespace loopbench::harness {
+
+/// One of `count` parts of a run, for as many machines: every case is in exactly one part.
+struct Shard {
+  int index = 1, count = 1;
+  bool Takes(std::size_t number) const {
+    return number % static_cast<std::size_t>(count) == static_cast<std::size_t>(index - 1);
+  }
+};
+
+/// Reads "k/n" with 1 <= k <= n. Throws ConfigError.
+Shard ParseShard(const std::string& text);
+
+/// Which of the cases that a store already has are run again.
+enum class Rerun { kNone, kFailed, kAll };
+
+struct SuiteOptions {
+  int jobs = 1;  ///< accuracy cases at once; timing always runs alone
+  bool accuracy = true;
+  bool timing = true;
+  bool precision = true;  ///< ladders of several scalars
+  Selection filter;       ///< accuracy cases and ladders whose keys do not match are left out
+  Shard shard;
+  std::string set;  ///< what --set changed, kept in the records for people to read
+  Rerun rerun = Rerun::kNone;
+};
+
+/// The accuracy cases that pass the filter. Throws ConfigError when none does, or when it names a
+/// key that cases do not have.
+std::vector<Case> SelectCases(const Experiment& experiment, const Selection& filter);
+
+/// Those of a process that makes so many runs: twice the CPU time that they may take by themselves,
+/// and a little for starting.
+ProcessLimits LimitsOfRuns(const Limits& limits, double runs);
+
+/// What a run did.
+struct SuiteCount {
+  std::size_t run = 0;      ///< records made now
+  std::size_t skipped = 0;  ///< cases the store had already
+  std::size_t failed = 0;   ///< of those made now: any outcome but "finished"
+  /// Of every case that was asked for, run now or done before: kind after kind, each in the order
+  /// of the experiments.
+  std::vector<std::string> ids;
+};
+
+/// Runs the accuracy cases of all experiments, costliest first, then their precision ladders, then
+/// their timings, and shows progress. Each record goes to the store as soon as it is complete.
+///
+/// A case is done when the store has a record with its id. The id stands for everything that
+/// decides the run and for this very program. `records` is what the store has when the call
+/// begins.
+///
+/// Whatever a case does, it gets a record: outcomes "crashed", "process-time-limit", "memory-limit"
+/// and "bad-answer" are those of its process.
+SuiteCount RunSuite(const std::vector<Experiment>& experiments, const SuiteOptions& options,
+                    const std::vector<Record>& records, ResultStore& store);
+
+}  // namespace loopbench::harness

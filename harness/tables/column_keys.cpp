@@ -1,0 +1,141 @@
+// Columns by the keys of records, whichever they are.
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <iterator>
+#include <map>
+#include <utility>
+
+#include "harness/json/config_error.h"
+#include "harness/json/spelling.h"
+#include "harness/tables/columns.h"
+
+namespace loopbench::harness {
+namespace {
+
+using enum Format;
+
+TableColumn NewColumn(const std::string& key, const std::string& header, Format format) {
+  return {.key = key, .header = header, .format = format, .abbreviations = {}};
+}
+
+// Keys of per-loop and per-body values, which are no parameters.
+bool IsFamily(const std::string& key) {
+  return key.starts_with("series.") || key.starts_with("drift.loop.");
+}
+
+// How a value without a column of its own is printed: by its type.
+Format FormatOf(const std::string& key, std::span<const Record> rows) {
+  for (const Record& row : rows) {
+    const Value* value = row.Find(key);
+    if (value == nullptr || std::holds_alternative<std::monostate>(*value)) continue;
+    if (std::holds_alternative<std::int64_t>(*value)) return kInteger;
+    if (std::holds_alternative<double>(*value)) return kShortest;
+    return kText;
+  }
+  return kText;
+}
+
+bool IsShown(const std::vector<TableColumn>& columns, const std::string& key) {
+  return std::ranges::find(columns, key, &TableColumn::key) != columns.end();
+}
+
+void InsertBeforeOutcome(std::vector<TableColumn>* columns, TableColumn column) {
+  columns->insert(std::ranges::find(*columns, "outcome", &TableColumn::key), std::move(column));
+}
+
+}  // namespace
+
+TableColumn ColumnOf(const std::string& key, std::span<const Record> rows) {
+  if (const TableColumn* known = KnownColumn(key)) return *known;
+  for (const std::string prefix : {"series.", "series.opening."}) {
+    if (key.starts_with(prefix + "angle.")) return NewColumn(key, "angle [rad]", kSeconds);
+    if (key.starts_with(prefix + "displacement.")) {
+      return NewColumn(key, "displacement [m]", kSeconds);
+    }
+  }
+  if (key == "series.opening_t") return NewColumn(key, "time [s]", kSeconds);
+  if (key.starts_with("drift.loop.")) {
+    return NewColumn(key, key.substr(11) + " [m]", kScientific);
+  }
+  return NewColumn(key, key, FormatOf(key, rows));
+}
+
+std::string UnitOf(const TableColumn& column) {
+  const std::size_t open = column.header.rfind('[');
+  if (open == std::string::npos || column.header.back() != ']') return "";
+  return column.header.substr(open + 1, column.header.size() - open - 2);
+}
+
+std::vector<std::string> KeysOf(std::span<const Record> rows) {
+  std::vector<std::string> keys;
+  for (const Record& row : rows) {
+    for (const auto& [key, value] : row.items()) {
+      if (std::ranges::find(keys, key) == keys.end()) keys.push_back(key);
+    }
+  }
+  return keys;
+}
+
+std::vector<std::string> CaseKeysOf(std::span<const Record> rows) {
+  std::vector<std::string> keys;
+  for (const Record& row : rows) {
+    for (const auto& [key, value] : row.items()) {
+      if (key == "case_id" || key == "outcome") break;
+      if (std::ranges::find(keys, key) == keys.end()) keys.push_back(key);
+    }
+  }
+  return keys;
+}
+
+void RequireKey(const std::string& option, const std::string& key, std::span<const Record> rows) {
+  const std::vector<std::string> keys = KeysOf(rows);
+  // a column of the tables may be empty in every record
+  if (std::ranges::find(keys, key) != keys.end() || KnownColumn(key) != nullptr) return;
+  std::vector<std::string> scalars;
+  std::ranges::copy_if(keys, std::back_inserter(scalars),
+                       [](const std::string& known) { return !IsFamily(known); });
+  const std::string nearest = NearestSpelling(key, keys);
+  const std::string cure = nearest.empty() ? "" : fmt::format(" (did you mean \"{}\"?)", nearest);
+  throw ConfigError(fmt::format("{}: found \"{}\", which no record has{}; expected one of {}",
+                                option, key, cure, fmt::join(scalars, ", ")));
+}
+
+std::vector<TableColumn> WithParameters(std::vector<TableColumn> columns,
+                                        std::span<const Record> rows) {
+  for (const std::string& key : CaseKeysOf(rows)) {
+    if (KnownColumn(key) == nullptr) InsertBeforeOutcome(&columns, ColumnOf(key, rows));
+  }
+  return columns;
+}
+
+std::vector<TableColumn> TellingApart(std::vector<TableColumn> columns,
+                                      std::span<const Record> rows) {
+  std::vector<std::string> looks(rows.size());
+  const auto show = [&](const std::string& key) {
+    for (std::size_t i = 0; i < rows.size(); ++i) looks[i] += rows[i].Text(key) + '\n';
+  };
+  const std::vector<std::string> keys = CaseKeysOf(rows);
+  for (const std::string& key : keys) {
+    if (IsShown(columns, key)) show(key);
+  }
+  for (const std::string& key : keys) {
+    if (IsShown(columns, key)) continue;
+    std::map<std::string, std::string> values;  // of the first row that looks like this
+    const bool tells = [&] {
+      for (std::size_t i = 0; i < rows.size(); ++i) {
+        const auto [first, is_new] = values.try_emplace(looks[i], rows[i].Text(key));
+        if (!is_new && first->second != rows[i].Text(key)) return true;
+      }
+      return false;
+    }();
+    if (!tells) continue;
+    const std::vector<TableColumn>& compact = CompactCaseColumns();
+    const auto known = std::ranges::find(compact, key, &TableColumn::key);
+    InsertBeforeOutcome(&columns, known != compact.end() ? *known : ColumnOf(key, rows));
+    show(key);
+  }
+  return columns;
+}
+
+}  // namespace loopbench::harness

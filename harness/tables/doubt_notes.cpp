@@ -1,0 +1,170 @@
+#include "harness/tables/doubt_notes.h"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <map>
+#include <utility>
+
+#include "harness/analysis/agreement.h"
+#include "harness/analysis/doubts.h"
+#include "harness/tables/columns.h"
+
+namespace loopbench::harness {
+namespace {
+
+constexpr std::size_t kRowsNamed = 3, kScenesNamed = 6;
+
+// What a doubt is about, and a row's number of it.
+struct Reason {
+  const char* code;
+  const char* sentence;
+  std::string (*number)(const Record& row);
+};
+
+const Reason kReasons[] = {
+    {kEnergyDoubt, "error of the energy balance above 1 % of the energy that moves",
+     [](const Record& row) { return fmt::format("{:.2g} %", 100 * EnergyErrorShare(row)); }},
+    {kSingularDoubt,
+     "passes singular positions, where this level has nothing to keep the branch by",
+     [](const Record& row) {
+       return fmt::format("distance {:.1g} at {:.4g} s", row.Number("singularity_distance_min"),
+                          row.Number("singularity_distance_min_t"));
+     }},
+    {kDriftDoubt, "more drift than steps and tolerance explain at this level",
+     [](const Record& row) {
+       return fmt::format("{:.1e} of a link or rad, at most {:.1e} expected", DriftShare(row),
+                          PromisedDriftShare(row));
+     }},
+    {kMembersDoubt, "members of the ensemble failed",
+     [](const Record& row) {
+       return row.Text("ensemble_failed") + " of " + row.Text("ensemble_size");
+     }},
+    {kExponentDoubt, "the ensemble does not resolve the exponent it was asked for",
+     [](const Record& row) {
+       return fmt::format("{:.2f} +- {:.2g}", row.Number("growth_exponent"),
+                          row.Number("growth_spread"));
+     }},
+};
+
+// The keys of cases in which rows differ. Absolute tolerances go with relative ones.
+std::vector<std::string> TellingKeys(std::span<const Record> rows) {
+  std::vector<std::string> keys;
+  for (const std::string& key : CaseKeysOf(rows)) {
+    if (key == "atol") continue;
+    const bool differs = std::ranges::any_of(
+        rows, [&](const Record& row) { return row.Text(key) != rows.front().Text(key); });
+    if (differs) keys.push_back(key);
+  }
+  return keys;
+}
+
+// "odca/velocity/joint rtol 1e-08": texts as they are, numbers with their key.
+std::string NameOf(const Record& row, const std::vector<std::string>& keys) {
+  std::string words, numbers;
+  for (const std::string& key : keys) {
+    const Value* value = row.Find(key);
+    if (value == nullptr) continue;
+    if (std::holds_alternative<std::string>(*value)) {
+      words += (words.empty() ? "" : "/") + row.Text(key);
+    } else {
+      numbers += fmt::format("{}{} {}", numbers.empty() ? "" : " ", key, row.Text(key));
+    }
+  }
+  const std::string name = words + (words.empty() || numbers.empty() ? "" : " ") + numbers;
+  return name.empty() ? row.Text("mechanism") : name;
+}
+
+std::string NoteOf(const Reason& reason, std::span<const Record> rows,
+                   const std::vector<std::string>& keys) {
+  std::string names;
+  std::size_t count = 0;
+  for (const Record& row : rows) {
+    if (!HasDoubt(row, reason.code) || ++count > kRowsNamed) continue;
+    names +=
+        fmt::format("{}{} ({})", names.empty() ? "" : "; ", NameOf(row, keys), reason.number(row));
+  }
+  if (count == 0) return "";
+  if (count > kRowsNamed) names += fmt::format("; and {} more", count - kRowsNamed);
+  return fmt::format("{}: {}: {}", reason.code, reason.sentence, names);
+}
+
+// Runs of one scene, horizon and tolerance.
+using SceneKey = std::pair<std::string, std::pair<double, double>>;
+
+SceneKey SceneOf(const Record& record) {
+  return {record.Text("scene_id"), {record.Number("horizon"), record.Number("rtol")}};
+}
+
+std::string NameOfScene(const Record& record) {
+  return fmt::format("{}: {} rtol {} horizon {}", kDisagreementDoubt, record.Text("mechanism"),
+                     record.Text("rtol"), record.Text("horizon"));
+}
+
+// Which of the runs agree with each other; `runs` have a cluster each.
+std::string NoteOfScene(const std::vector<Record>& runs) {
+  const std::vector<std::string> keys = TellingKeys(runs);
+  std::map<std::int64_t, std::vector<Record>> clusters;
+  for (const Record& run : runs) {
+    clusters[static_cast<std::int64_t>(run.Number("agreement"))].push_back(run);
+  }
+  PoseDifference worst;
+  std::string text, alone;
+  for (const auto& [number, members] : clusters) {
+    std::vector<std::string> names;
+    for (const Record& run : members) names.push_back(NameOf(run, keys));
+    const PoseDifference off = DifferenceOf(clusters.begin()->second.front(), members.front());
+    if (off.largest > worst.largest) worst = off;
+    const bool cleared = !HasDoubt(members.front(), kDisagreementDoubt);
+    if (members.size() > 1) {
+      text += fmt::format("; {} agree{}", fmt::join(names, ", "),
+                          cleared ? ", with finer tolerances too" : "");
+    } else {
+      alone += (alone.empty() ? "; each by itself: " : ", ") + names.front() +
+               (cleared ? " (agrees with finer tolerances)" : "");
+    }
+  }
+  text += alone;
+  const std::string scene = NameOfScene(runs.front());
+  if (clusters.size() == 1) return scene + " does not end as with finer tolerances" + text;
+  return fmt::format(
+      "{} ends {:.2g} links or rad apart ({}), {:.0f} tolerances are expected at most{}", scene,
+      worst.largest, worst.body, kMostTolerances, text);
+}
+
+}  // namespace
+
+std::vector<std::string> DoubtNotes(std::span<const Record> rows, std::span<const Record> records) {
+  if (std::ranges::none_of(rows, [](const Record& row) { return HasDoubt(row); })) return {};
+  std::vector<std::string> notes = {"ok? marks runs that finished, but (column doubts):"};
+  const std::vector<std::string> keys = TellingKeys(rows);
+  for (const Reason& reason : kReasons) {
+    if (const std::string note = NoteOf(reason, rows, keys); !note.empty()) notes.push_back(note);
+  }
+  std::vector<SceneKey> scenes;
+  for (const Record& row : rows) {
+    if (!HasDoubt(row, kDisagreementDoubt)) continue;
+    if (std::ranges::find(scenes, SceneOf(row)) == scenes.end()) scenes.push_back(SceneOf(row));
+  }
+  for (std::size_t i = 0; i < std::min(scenes.size(), kScenesNamed); ++i) {
+    std::vector<Record> runs;
+    std::ranges::copy_if(records, std::back_inserter(runs), [&](const Record& record) {
+      return record.Find("agreement") != nullptr && SceneOf(record) == scenes[i];
+    });
+    // a run with nobody beside it at its own tolerance has no cluster
+    if (!runs.empty()) {
+      notes.push_back(NoteOfScene(runs));
+      continue;
+    }
+    const auto alone =
+        std::ranges::find_if(rows, [&](const Record& row) { return SceneOf(row) == scenes[i]; });
+    notes.push_back(NameOfScene(*alone) + " does not end as with finer tolerances");
+  }
+  if (scenes.size() > kScenesNamed) {
+    notes.push_back(fmt::format("{}: {} scenes more; column agreement has the sets that agree",
+                                kDisagreementDoubt, scenes.size() - kScenesNamed));
+  }
+  return notes;
+}
+
+}  // namespace loopbench::harness

@@ -1,0 +1,246 @@
+#include "harness/tables/table.h"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <cmath>
+#include <cstdint>
+#include <string_view>
+
+#include "harness/text/escape.h"
+
+namespace loopbench::harness {
+namespace {
+
+std::string FormatNumber(double number, Format format) {
+  if (std::isnan(number)) return "";
+  switch (format) {
+    case Format::kInteger:
+      return fmt::format("{:.0f}", number);
+    case Format::kScientific:
+      return fmt::format("{:.2e}", number);
+    case Format::kExponent:
+      return fmt::format("{:.2f}", number);
+    case Format::kFixed:
+      return fmt::format("{:.1f}", number);
+    case Format::kSeconds:
+      return fmt::format("{:.4g}", number);
+    case Format::kText:
+    case Format::kShortest:
+      break;
+  }
+  return fmt::format("{}", number);
+}
+
+// Every digit, for CSV: absent and NaN values are empty as in the other writers.
+std::string FullPrecision(const Record& row, const std::string& key) {
+  const Value* value = row.Find(key);
+  if (value == nullptr) return "";
+  if (const auto* series = std::get_if<std::vector<double>>(value)) {
+    std::string joined;
+    for (const double number : *series) {
+      joined += fmt::format("{}{}", joined.empty() ? "" : ";", number);
+    }
+    return joined;
+  }
+  if (const auto* number = std::get_if<double>(value); number != nullptr && std::isnan(*number)) {
+    return "";
+  }
+  return row.Text(key);
+}
+
+// Characters, not bytes: UTF-8 continuation bytes are 10xxxxxx.
+std::size_t Width(std::string_view text) {
+  return static_cast<std::size_t>(std::ranges::count_if(
+      text, [](char c) { return (static_cast<unsigned char>(c) & 0xC0u) != 0x80u; }));
+}
+
+// `text` padded to `width`, on the left for numbers. The last column of text stays unpadded.
+std::string Pad(const std::string& text, std::size_t width, Format format) {
+  const std::string padding(width - std::min(width, Width(text)), ' ');
+  return format == Format::kText ? text + padding : padding + text;
+}
+
+void AppendTrimmed(std::string* out, std::string line) {
+  line.erase(line.find_last_not_of(' ') + 1);
+  *out += line + '\n';
+}
+
+}  // namespace
+
+bool IsDoubtful(const Record& row, const std::string& key) {
+  const Value* value = row.Find(key);
+  if (value == nullptr || std::holds_alternative<std::monostate>(*value)) return false;
+  if (key == "outcome") return !HasFailed(row) && !row.Text("doubts").empty();
+  if (key == "growth_hypothesis") return row.Text("growth_hypothesis_resolved") != "true";
+  if (std::isnan(row.Number(key))) return false;
+  if (key == "energy_growth_exponent" || key == "correction_growth_exponent") return true;
+  return (key == "growth_exponent" || key == "growth_exponent_late") &&
+         row.Text("growth_resolved") != "true";
+}
+
+std::string Cell(const Record& row, const TableColumn& column) {
+  const Value* value = row.Find(column.key);
+  if (value == nullptr) return "";
+  const char* mark = IsDoubtful(row, column.key) ? "?" : "";
+  if (const auto* number = std::get_if<double>(value)) {
+    return FormatNumber(*number, column.format) + mark;
+  }
+  if (std::holds_alternative<std::vector<double>>(*value)) return FullPrecision(row, column.key);
+  const std::string text = row.Text(column.key);
+  const auto it =
+      std::ranges::find(column.abbreviations, text, &std::pair<std::string, std::string>::first);
+  return (it == column.abbreviations.end() ? text : it->second) + mark;
+}
+
+std::vector<RowGroup> Groups(const Table& table) {
+  if (table.group.empty()) return {{"", table.rows}};
+  const TableColumn column{table.group, table.group, Format::kShortest, {}};
+  std::vector<RowGroup> groups;
+  for (const Record& row : table.rows) {
+    const std::string cell = Cell(row, column);
+    const std::string heading = fmt::format("{} = {}", table.group, cell.empty() ? "(none)" : cell);
+    auto it = std::ranges::find(groups, heading, &RowGroup::heading);
+    if (it == groups.end()) it = groups.insert(it, {heading, {}});
+    it->rows.push_back(row);
+  }
+  return groups;
+}
+
+bool HasFailed(const Record& row) {
+  const std::string outcome = row.Text("outcome");
+  return !outcome.empty() && outcome != "finished";
+}
+
+std::string OutcomeColour(const Record& row, const TableColumn& column) {
+  if (column.key != "outcome") return "";
+  if (HasFailed(row)) return "31";
+  return IsDoubtful(row, column.key) ? "33" : "";
+}
+
+namespace {
+
+// The columns under a heading: the group's key stands in the heading.
+std::vector<TableColumn> ColumnsUnderHeading(const Table& table) {
+  std::vector<TableColumn> columns = table.columns;
+  std::erase_if(columns, [&](const TableColumn& column) { return column.key == table.group; });
+  return columns;
+}
+
+// A column on a terminal: digits stand below digits, whether a mark follows them or not.
+struct TextColumn {
+  TextColumn(const TableColumn& shown, const std::vector<Record>& rows)
+      : column(shown), marked(std::ranges::any_of(rows, [&](const Record& row) {
+          return shown.format != Format::kText && IsDoubtful(row, shown.key);
+        })) {
+    width = Width(EscapeTerminal(column.header));
+    for (const Record& row : rows) width = std::max(width, Width(CellOf(row)));
+  }
+
+  std::string CellOf(const Record& row) const {
+    return EscapeTerminal(Cell(row, column)) + (marked && !IsDoubtful(row, column.key) ? " " : "");
+  }
+
+  TableColumn column;
+  bool marked;
+  std::size_t width = 0;
+};
+
+std::string RowsAsText(const Table& table, const std::vector<TextColumn>& columns,
+                       const std::vector<Record>& rows, bool colour) {
+  std::string heading;
+  std::string rule;
+  for (const TextColumn& shown : columns) {
+    const std::string gap = &shown == columns.data() ? "" : "  ";
+    heading += gap + Pad(EscapeTerminal(shown.column.header), shown.width, shown.column.format);
+    rule += gap + std::string(shown.width, '-');
+  }
+  std::string out;
+  AppendTrimmed(&out, heading);
+  AppendTrimmed(&out, rule);
+  for (const Record& row : rows) {
+    std::string text;
+    for (const TextColumn& shown : columns) {
+      std::string cell = Pad(shown.CellOf(row), shown.width, shown.column.format);
+      const std::string number = colour ? table.colour(row, shown.column) : "";
+      if (!number.empty()) cell = "\033[" + number + "m" + cell + "\033[0m";
+      text += (&shown == columns.data() ? "" : "  ") + cell;
+    }
+    AppendTrimmed(&out, text);
+  }
+  return out;
+}
+
+}  // namespace
+
+std::string ToText(const Table& table, bool colour) {
+  std::vector<TextColumn> columns;  // as wide in all groups, so that they compare
+  for (const TableColumn& column : ColumnsUnderHeading(table)) {
+    columns.emplace_back(column, table.rows);
+  }
+  std::string out = table.title.empty() ? "" : EscapeTerminal(table.title) + "\n\n";
+  bool is_first = true;
+  for (const RowGroup& group : Groups(table)) {
+    if (!is_first) out += '\n';
+    is_first = false;
+    if (!group.heading.empty()) out += EscapeTerminal(group.heading) + "\n\n";
+    out += RowsAsText(table, columns, group.rows, colour);
+  }
+  if (!table.notes.empty()) out += '\n';
+  for (const std::string& note : table.notes) out += EscapeTerminal(note) + '\n';
+  return out;
+}
+
+std::string ToCsv(const Table& table) {
+  std::string out;
+  for (std::size_t c = 0; c < table.columns.size(); ++c) {
+    out += (c == 0 ? "" : ",") + EscapeCsv(table.columns[c].key);
+  }
+  out += '\n';
+  for (const Record& row : table.rows) {
+    for (std::size_t c = 0; c < table.columns.size(); ++c) {
+      const std::string& key = table.columns[c].key;
+      const Value* value = row.Find(key);
+      const bool is_text = value != nullptr && std::holds_alternative<std::string>(*value);
+      const std::string cell = FullPrecision(row, key);
+      out += (c == 0 ? "" : ",") + (is_text ? EscapeCsv(cell) : cell);
+    }
+    out += '\n';
+  }
+  for (const std::string& note : table.notes) out += "# " + EscapeTerminal(note) + '\n';
+  return out;
+}
+
+std::string ToMarkdown(const Table& table) {
+  std::string out =
+      table.title.empty() ? "" : fmt::format("## {}\n\n", EscapeMarkdown(table.title));
+  const std::vector<TableColumn> columns = ColumnsUnderHeading(table);
+  std::string head = "|";
+  std::string rule = "|";
+  for (const TableColumn& column : columns) {
+    head += fmt::format(" {} |", EscapeMarkdown(column.header));
+    rule += column.format == Format::kText ? " --- |" : " ---: |";
+  }
+  bool is_first = true;
+  for (const RowGroup& group : Groups(table)) {
+    if (!is_first) out += '\n';
+    is_first = false;
+    if (!group.heading.empty()) out += fmt::format("### {}\n\n", EscapeMarkdown(group.heading));
+    out += head + '\n' + rule + '\n';
+    for (const Record& row : group.rows) {
+      out += '|';
+      for (const TableColumn& column : columns) {
+        const std::string cell = EscapeMarkdown(Cell(row, column));
+        out += cell.empty() ? "  |" : fmt::format(" {} |", cell);
+      }
+      out += '\n';
+    }
+  }
+  // Each note is its own paragraph; a list would be read as part of the table by some renderers.
+  for (const std::string& note : table.notes) {
+    out += fmt::format("\n{}\n", EscapeMarkdownParagraph(note));
+  }
+  return out;
+}
+
+}  // namespace loopbench::harness

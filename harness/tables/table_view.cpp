@@ -1,0 +1,194 @@
+#include "harness/tables/table_view.h"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <cmath>
+#include <optional>
+
+#include "harness/record/noise.h"
+#include "harness/tables/columns.h"
+#include "harness/tables/doubt_notes.h"
+#include "harness/tables/factorial.h"
+#include "harness/tables/precision_ladders.h"
+
+namespace loopbench::harness {
+namespace {
+
+bool HasKind(std::span<const Record> records, std::string_view kind) {
+  return std::ranges::any_of(records,
+                             [&](const Record& record) { return record.Text("kind") == kind; });
+}
+
+std::string KindOf(const TableView& view, std::span<const Record> records) {
+  if (!view.kind.empty()) return view.kind;
+  if (HasKind(records, "accuracy")) return "drift";
+  if (HasKind(records, "precision")) return "precision";
+  return HasKind(records, "timing") ? "timing" : "all";
+}
+
+// `rows` are what the table shows: records, or for the factorial table its own rows.
+void RequireKeys(const TableView& view, std::span<const Record> rows) {
+  if (!view.group.empty()) RequireKey("--group", view.group, rows);
+  if (!view.sort.empty()) RequireKey("--sort", view.sort, rows);
+  for (const std::string& key : view.columns) RequireKey("--columns", key, rows);
+}
+
+// Every key of the records but series; what is in all records comes in the records' order.
+std::vector<TableColumn> AllColumns(std::span<const Record> rows) {
+  std::vector<TableColumn> columns;
+  for (const std::string& key : KeysOf(rows)) {
+    if (!key.starts_with("series.")) columns.push_back(ColumnOf(key, rows));
+  }
+  return columns;
+}
+
+const std::vector<TableColumn>& ColumnsOfKind(const std::string& kind, bool compact) {
+  if (kind == "timing") return compact ? CompactTimingColumns() : TimingColumns();
+  if (kind == "precision") return compact ? CompactPrecisionColumns() : PrecisionColumns();
+  return compact ? CompactDriftColumns() : DriftColumns();
+}
+
+std::vector<TableColumn> DefaultColumns(const std::string& kind, bool compact,
+                                        std::span<const Record> rows) {
+  if (kind == "all") return AllColumns(rows);
+  std::vector<TableColumn> columns = WithParameters(ColumnsOfKind(kind, compact), rows);
+  return compact ? TellingApart(std::move(columns), rows) : columns;
+}
+
+std::vector<TableColumn> ChosenColumns(const TableView& view, std::span<const Record> rows) {
+  std::vector<TableColumn> columns;
+  for (const std::string& key : view.columns) columns.push_back(ColumnOf(key, rows));
+  return columns;
+}
+
+bool Shows(const Table& table, const std::string& key) {
+  return table.group == key ||
+         std::ranges::find(table.columns, key, &TableColumn::key) != table.columns.end();
+}
+
+// `runs` are what the table's rows are made of.
+std::optional<std::string> HiddenDoubts(const Table& table, std::span<const Record> runs) {
+  const auto doubted =
+      std::ranges::count_if(runs, [](const Record& run) { return IsDoubtful(run, "outcome"); });
+  if (doubted == 0 || Shows(table, "doubts")) return std::nullopt;
+  return fmt::format("{} of {} runs finished with doubts; column doubts says which and why",
+                     doubted, runs.size());
+}
+
+// Where the columns chosen do not show that a value is none to rely on, a note does.
+std::vector<std::string> WhatColumnsHide(const Table& table) {
+  const auto shows = [&](const std::string& key) { return Shows(table, key); };
+  std::vector<std::string> notes;
+  const auto failed = std::ranges::count_if(table.rows, HasFailed);
+  if (failed > 0 && !shows("outcome")) {
+    notes.push_back(fmt::format("{} of {} runs did not finish; column outcome says which", failed,
+                                table.rows.size()));
+  }
+  const bool unresolved = std::ranges::any_of(table.columns, [&](const TableColumn& column) {
+    return column.key != "outcome" &&
+           !(column.key.starts_with("growth_hypothesis") ? shows("growth_hypothesis_resolved")
+                                                         : shows("growth_resolved")) &&
+           std::ranges::any_of(table.rows,
+                               [&](const Record& row) { return IsDoubtful(row, column.key); });
+  });
+  if (unresolved) {
+    notes.push_back(
+        "slopes are those of log-log axes; ? marks what is not resolved (single runs, windows that "
+        "disagree), in CSV and JSON columns growth_resolved and growth_hypothesis_resolved do");
+  }
+  return notes;
+}
+
+std::string TitleOf(const std::string& kind) {
+  if (kind == "drift") return "Drift";
+  if (kind == "precision") return "Precision";
+  return kind == "timing" ? "Timing" : "Records";
+}
+
+Table Factorial(const std::vector<Record>& rows) {
+  FactorialOptions options;
+  if (!rows.empty()) {
+    // the table is for one tolerance and horizon: those of the first record, unless chosen
+    options.rtol = rows.front().Number("rtol");
+    options.horizon = rows.front().Number("horizon");
+  }
+  return FactorialTable(rows, options);
+}
+
+}  // namespace
+
+Table MakeTable(std::span<const Record> records, const TableView& view) {
+  for (const Condition& condition : view.where) RequireKey("--where", condition.key, records);
+  const std::string kind = KindOf(view, records);
+  Selection selection = view.where;
+  if (kind == "timing" || kind == "precision") selection.push_back({"kind", {kind}});
+  if (kind == "drift" || kind == "factorial") selection.push_back({"kind", {"accuracy"}});
+  std::vector<Record> rows = Filter(records, selection);
+  SortRows(&rows);
+  if (kind == "precision") SortRungs(&rows);
+  Table table;
+  if (kind == "factorial") {
+    table = Factorial(rows);
+    RequireKeys(view, table.rows);
+    if (!view.columns.empty()) table.columns = ChosenColumns(view, table.rows);
+  } else {
+    RequireKeys(view, records);
+    table.title = TitleOf(kind);
+    table.columns =
+        view.columns.empty() ? DefaultColumns(kind, view.compact, rows) : ChosenColumns(view, rows);
+    table.notes = NoiseWarnings(rows);
+    if (kind == "precision") table.notes = PrecisionNotes();
+    table.rows = std::move(rows);
+  }
+  table.group = view.group;
+  if (!view.sort.empty()) SortRowsBy(&table.rows, view.sort, view.descending);
+  if (!view.group.empty()) SortRowsBy(&table.rows, view.group, false);
+  for (std::string& note : WhatColumnsHide(table)) table.notes.push_back(std::move(note));
+  if (view.compact) {
+    for (std::string& note : DoubtNotes(table.rows, records)) {
+      table.notes.push_back(std::move(note));
+    }
+  } else if (const auto note = HiddenDoubts(table, kind == "factorial" ? rows : table.rows)) {
+    table.notes.push_back(*note);
+  }
+  return table;
+}
+
+std::vector<std::string> NoiseWarnings(std::span<const Record> rows) {
+  std::size_t timed = 0, noisy = 0;
+  double spread = 0, load = 0;
+  std::string where_spread, processors, governor;
+  for (const Record& row : rows) {
+    if (row.Text("kind") != "timing") continue;
+    ++timed;
+    if (row.Text("noise").empty()) continue;
+    ++noisy;
+    for (const char* key : {"aa_spread", "aa_spread_wall"}) {
+      if (!(row.Number(key) > spread)) continue;
+      spread = row.Number(key);
+      where_spread = row.Text("mechanism");
+    }
+    load = std::fmax(load, row.Number("load1"));
+    processors = row.Text("processors");
+    if (row.Text("governor") != "performance") governor = row.Text("governor");
+  }
+  if (noisy == 0) return {};
+  std::string line = fmt::format(
+      "warning: noisy machine in {} of {} timings (column noise says why): load up to {:.1f} on {} "
+      "processors",
+      noisy, timed, load, processors);
+  if (spread > 0) {
+    line += fmt::format(", the same column timed twice differed by up to {:.1f} % ({})",
+                        100 * spread, where_spread);
+  }
+  if (!governor.empty()) line += ", CPU governor " + governor;
+  // what a quiet machine may show at most is not to be trusted on a noisy one
+  const double least = std::fmax(spread, NoiseThresholds{}.aa_spread);
+  return {line,
+          fmt::format("warning: differences between columns below {:.0f} % mean nothing here; "
+                      "repeat on a quiet machine",
+                      std::ceil(100 * least))};
+}
+
+}  // namespace loopbench::harness

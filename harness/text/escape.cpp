@@ -1,0 +1,225 @@
+#include "harness/text/escape.h"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <charconv>
+#include <cstdint>
+
+#include "harness/text/hash.h"
+
+namespace loopbench::harness {
+namespace {
+
+bool IsAlphanumeric(char c) {
+  return (c >= 'a' && c <= 'z') || (c >= 'A' && c <= 'Z') || (c >= '0' && c <= '9');
+}
+
+// A character of UTF-8: its code point and length in bytes; length 0 for a byte that is none.
+struct Character {
+  std::uint32_t code = 0;
+  std::size_t length = 0;
+};
+
+Character FirstOf(std::string_view text) {
+  const auto byte = [&](std::size_t i) { return static_cast<unsigned char>(text[i]); };
+  const std::uint32_t first = byte(0);
+  if (first < 0x80) return {first, 1};
+  const std::size_t length = first >= 0xF0 ? 4 : first >= 0xE0 ? 3 : 2;
+  if (first < 0xC2 || first > 0xF4 || text.size() < length) return {};
+  std::uint32_t code = first & (0xFFu >> (length + 1));
+  for (std::size_t i = 1; i < length; ++i) {
+    if ((byte(i) & 0xC0u) != 0x80u) return {};
+    code = code << 6u | (byte(i) & 0x3Fu);
+  }
+  constexpr std::uint32_t kLeast[] = {0, 0, 0x80, 0x800, 0x10000};
+  const bool surrogate = code >= 0xD800 && code <= 0xDFFF;
+  if (code < kLeast[length] || code > 0x10FFFF || surrogate) return {};
+  return {code, length};
+}
+
+// Whether a terminal or a viewer would act on it instead of showing it.
+bool Acts(std::uint32_t code) {
+  return code < 0x20 || (code >= 0x7F && code < 0xA0) ||  // controls
+         (code >= 0x200E && code <= 0x200F) || (code >= 0x2028 && code <= 0x202E) ||
+         (code >= 0x2066 && code <= 0x2069) || code == 0x061C || code == 0xFEFF;  // direction
+}
+
+std::string Shown(std::uint32_t code) {
+  if (code == '\n') return "\\n";
+  if (code == '\t') return "\\t";
+  return code < 0x80 ? fmt::format("\\x{:02x}", code) : fmt::format("\\u{:04x}", code);
+}
+
+std::string Escape(std::string_view text, bool keep_line_ends) {
+  std::string shown;
+  while (!text.empty()) {
+    const Character character = FirstOf(text);
+    const std::size_t length = std::max<std::size_t>(1, character.length);
+    if (character.length == 0) {
+      shown += fmt::format("\\x{:02x}", static_cast<unsigned char>(text[0]));
+    } else if (Acts(character.code) && !(keep_line_ends && text[0] == '\n')) {
+      shown += Shown(character.code);
+    } else {
+      shown += text.substr(0, length);
+    }
+    text.remove_prefix(length);
+  }
+  return shown;
+}
+
+bool IsNumber(std::string_view text) {
+  double number = 0.0;
+  text.remove_prefix(text.starts_with('+') ? 1 : 0);
+  const auto [end, error] = std::from_chars(text.data(), text.data() + text.size(), number);
+  return error == std::errc{} && end == text.data() + text.size();
+}
+
+bool IsFormula(std::string_view text) {
+  constexpr std::string_view kBegins = "=+-@";
+  return !text.empty() && kBegins.find(text[0]) != std::string_view::npos && text != "-" &&
+         !IsNumber(text);
+}
+
+// Whether the character at `i` could begin or end markup there.
+bool IsMarkup(std::string_view text, std::size_t i) {
+  const char before = i > 0 ? text[i - 1] : ' ';
+  const char after = i + 1 < text.size() ? text[i + 1] : ' ';
+  switch (text[i]) {
+    case '\\':
+    case '`':
+    case '*':
+    case '~':
+    case '|':
+    case '$':
+      return true;
+    case '_':  // within a word it is none
+      return !IsAlphanumeric(before) || !IsAlphanumeric(after);
+    case ']':  // of a link or the definition of one
+      return after == '(' || after == '[' || after == ':';
+    default:
+      return false;
+  }
+}
+
+std::string_view LatexOf(char c) {
+  switch (c) {
+    case '\\':
+      return "\\textbackslash{}";
+    case '~':
+      return "\\textasciitilde{}";
+    case '^':
+      return "\\textasciicircum{}";
+    case '<':
+      return "\\textless{}";  // not every font encoding has these three
+    case '>':
+      return "\\textgreater{}";
+    case '|':
+      return "\\textbar{}";
+    default:
+      return "";
+  }
+}
+
+}  // namespace
+
+std::string EscapeTerminal(std::string_view text) { return Escape(text, false); }
+
+std::string EscapeTerminalLines(std::string_view text) { return Escape(text, true); }
+
+std::string EscapeMarkdown(std::string_view raw) {
+  const std::string text = EscapeTerminal(raw);
+  std::string escaped;
+  for (std::size_t i = 0; i < text.size(); ++i) {
+    const char c = text[i];
+    const char after = i + 1 < text.size() ? text[i + 1] : ' ';
+    if (c == '<' && (IsAlphanumeric(after) || after == '/' || after == '!' || after == '?')) {
+      escaped += "&lt;";
+    } else if (c == '&' && (IsAlphanumeric(after) || after == '#')) {
+      escaped += "&amp;";
+    } else {
+      if (IsMarkup(text, i)) escaped += '\\';
+      escaped += c;
+    }
+  }
+  return escaped;
+}
+
+std::string EscapeMarkdownParagraph(std::string_view text) {
+  std::string escaped = EscapeMarkdown(text);
+  escaped.erase(0, escaped.find_first_not_of(' '));  // four spaces would make it code
+  const std::size_t digits = std::min(escaped.find_first_not_of("0123456789"), escaped.size());
+  const bool is_list =
+      digits > 0 && digits < escaped.size() && (escaped[digits] == '.' || escaped[digits] == ')');
+  constexpr std::string_view kBegins = "#>+-=";
+  if (is_list) {
+    escaped.insert(digits, 1, '\\');
+  } else if (!escaped.empty() && kBegins.find(escaped[0]) != std::string_view::npos) {
+    escaped.insert(0, 1, '\\');
+  }
+  return escaped;
+}
+
+std::string EscapeLatex(std::string_view text) {
+  constexpr std::string_view kSpecial = "&%$#_{}";
+  std::string escaped;
+  for (const char c : EscapeTerminal(text)) {
+    if (const std::string_view command = LatexOf(c); !command.empty()) {
+      escaped += command;
+      continue;
+    }
+    // at the start of a row these two would belong to the line end before it
+    if (escaped.empty() && (c == '[' || c == '*')) escaped += "{}";
+    if (kSpecial.find(c) != std::string_view::npos) escaped += '\\';
+    escaped += c;
+  }
+  return escaped;
+}
+
+std::string EscapeCsv(std::string_view raw) {
+  const std::string text = (IsFormula(raw) ? "'" : "") + EscapeTerminal(raw);
+  if (text.find_first_of(",\"#") == std::string::npos) return text;
+  std::string quoted = "\"";
+  for (const char c : text) {
+    if (c == '"') quoted += '"';
+    quoted += c;
+  }
+  return quoted + '"';
+}
+
+std::string QuoteGnuplot(std::string_view text) {
+  // Between double quotes, where every special character can be written by its number. Single
+  // quotes will not do: gnuplot 5.4 takes two apostrophes in a row for the end of the string.
+  std::string quoted = "\"";
+  for (const char c : EscapeTerminal(text)) {
+    const bool special = c == '"' || c == '\\' || c == '`' || c == '\'' || c == '@' || c == '$';
+    quoted += special ? fmt::format("\\{:03o}", c) : std::string(1, c);
+  }
+  return quoted + '"';
+}
+
+std::string QuoteGnuplotTick(std::string_view text) {
+  std::string doubled;
+  for (const char c : text) doubled += c == '%' ? "%%" : std::string(1, c);
+  return QuoteGnuplot(doubled);
+}
+
+std::string FileName(std::string_view name) {
+  constexpr std::size_t kLongest = 200, kHashDigits = 8;
+  std::string slug;
+  for (const char c : name) {
+    const bool kept = IsAlphanumeric(c) || c == '.' || c == '_' || c == '+' || c == '-';
+    if (kept) {
+      slug += c;
+    } else if (!slug.ends_with('-')) {
+      slug += '-';
+    }
+  }
+  slug.erase(0, std::min(slug.find_first_not_of(".-"), slug.size()));
+  if (slug == name && !slug.empty() && slug.size() <= kLongest) return slug;
+  slug.resize(std::min(slug.size(), kLongest - kHashDigits - 1));
+  slug.erase(slug.find_last_not_of(".-") + 1);
+  return slug + (slug.empty() ? "" : "-") + Fnv1a(name).substr(0, kHashDigits);
+}
+
+}  // namespace loopbench::harness

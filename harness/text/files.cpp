@@ -1,0 +1,99 @@
+#include "harness/text/files.h"
+
+#include <fcntl.h>
+#include <fmt/format.h>
+#include <unistd.h>
+
+#include <atomic>
+#include <cerrno>
+#include <cstring>
+#include <fstream>
+#include <iterator>
+#include <stdexcept>
+
+namespace loopbench::harness {
+namespace {
+
+// Unique among the threads and processes that write into the same folder.
+std::filesystem::path TemporaryBeside(const std::filesystem::path& path) {
+  static std::atomic<int> counter{0};
+  std::filesystem::path temporary = path;
+  temporary += fmt::format(".{}-{}.tmp", ::getpid(), counter++);
+  return temporary;
+}
+
+}  // namespace
+
+void FailOn(std::string_view verb, const std::filesystem::path& path) {
+  throw std::runtime_error(
+      fmt::format("cannot {} '{}': {}", verb, path.string(), std::strerror(errno)));
+}
+
+void MakeFolderOf(const std::filesystem::path& path) {
+  if (!path.has_parent_path()) return;
+  std::error_code error;
+  std::filesystem::create_directories(path.parent_path(), error);
+  if (!error) return;
+  throw std::runtime_error(
+      fmt::format("cannot make folder '{}': {}", path.parent_path().string(), error.message()));
+}
+
+void WriteFileAtomically(const std::filesystem::path& path, std::string_view text) {
+  MakeFolderOf(path);
+  std::error_code error;
+  const std::filesystem::path temporary = TemporaryBeside(path);
+  constexpr int kMode = 0644;
+  const int descriptor = ::open(temporary.c_str(), O_WRONLY | O_CREAT | O_TRUNC | O_CLOEXEC, kMode);
+  if (descriptor < 0) FailOn("write", path);
+  try {
+    WriteAll(descriptor, text, path);
+    if (::fsync(descriptor) != 0) FailOn("write", path);
+  } catch (...) {
+    ::close(descriptor);
+    std::filesystem::remove(temporary, error);
+    throw;
+  }
+  ::close(descriptor);
+  std::filesystem::rename(temporary, path, error);
+  if (error) {
+    errno = error.value();
+    std::filesystem::remove(temporary, error);
+    FailOn("write", path);
+  }
+  SyncFolderOf(path);
+}
+
+void SyncFolderOf(const std::filesystem::path& path) {
+  const std::filesystem::path folder = path.has_parent_path() ? path.parent_path() : ".";
+  const int descriptor = ::open(folder.c_str(), O_RDONLY | O_DIRECTORY | O_CLOEXEC);
+  if (descriptor < 0) return;
+  ::fsync(descriptor);
+  ::close(descriptor);
+}
+
+void WriteAll(int descriptor, std::string_view text, const std::filesystem::path& path) {
+  while (!text.empty()) {
+    const ssize_t written = ::write(descriptor, text.data(), text.size());
+    if (written < 0 && errno == EINTR) continue;
+    if (written < 0) FailOn("write", path);
+    text.remove_prefix(static_cast<std::size_t>(written));
+  }
+}
+
+std::string ReadFile(const std::filesystem::path& path) {
+  std::error_code error;
+  const auto kind = std::filesystem::status(path, error).type();
+  if (kind != std::filesystem::file_type::regular &&
+      (std::filesystem::exists(path, error) && kind != std::filesystem::file_type::directory)) {
+    throw std::runtime_error(
+        fmt::format("cannot read '{}': expected a regular file", path.string()));
+  }
+  errno = 0;
+  std::ifstream in(path, std::ios::binary);
+  if (!in) FailOn("read", path);
+  std::string text{std::istreambuf_iterator<char>(in), std::istreambuf_iterator<char>()};
+  if (in.bad()) FailOn("read", path);
+  return text;
+}
+
+}  // namespace loopbench::harness

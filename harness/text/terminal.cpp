@@ -1,0 +1,57 @@
+#include "harness/text/terminal.h"
+
+#include <fcntl.h>
+#include <poll.h>
+#include <unistd.h>
+
+#include <cerrno>
+#include <csignal>
+#include <cstdio>
+#include <cstdlib>
+#include <cstring>
+
+namespace loopbench::harness {
+
+namespace {
+
+int first_failure = 0;  ///< errno of the first write to standard output that failed, or 0
+
+bool ReaderIsGone() {
+  pollfd output = {STDOUT_FILENO, POLLOUT, 0};
+  return ::poll(&output, 1, 0) > 0 && (output.revents & POLLERR) != 0;
+}
+
+}  // namespace
+
+void PrepareStreams() {
+  for (const int descriptor : {STDIN_FILENO, STDOUT_FILENO, STDERR_FILENO}) {
+    if (::fcntl(descriptor, F_GETFD) >= 0) continue;
+    // the lowest free number is this one; read-only, so that writing fails as before
+    if (::open("/dev/null", O_RDONLY) != descriptor) std::_Exit(2);
+  }
+  std::signal(SIGPIPE, SIG_IGN);
+  std::signal(SIGXFSZ, SIG_IGN);
+}
+
+void PrintText(std::string_view text) {
+  errno = 0;
+  const bool written = std::fwrite(text.data(), 1, text.size(), stdout) == text.size();
+  if (!written && first_failure == 0) first_failure = errno;
+}
+
+void PrintErrorText(std::string_view text) {
+  [[maybe_unused]] const std::size_t written = std::fwrite(text.data(), 1, text.size(), stderr);
+}
+
+int FinishOutput(int code) {
+  errno = 0;
+  if (std::fflush(stdout) != 0 && first_failure == 0) first_failure = errno;
+  if (first_failure == 0 && std::ferror(stdout) == 0) return code;
+  if (!ReaderIsGone()) {
+    PrintError("cannot write to standard output{}{}\n", first_failure == 0 ? "" : ": ",
+               first_failure == 0 ? "" : std::strerror(first_failure));
+  }
+  return code == 0 ? 2 : code;
+}
+
+}  // namespace loopbench::harness

@@ -1,0 +1,155 @@
+#include "mechanism/description/description.h"
+
+#include <Eigen/Cholesky>
+#include <cmath>
+
+#include "mechanism/description/force_validation.h"
+
+namespace loopbench {
+
+namespace {
+
+std::string Quote(const std::string& name) { return "\"" + name + "\""; }
+
+std::string CheckBody(const BodyDescription& body) {
+  if (!(body.mass > 0.0) || !std::isfinite(body.mass)) {
+    return "body " + Quote(body.name) + ": mass is " + std::to_string(body.mass) +
+           ", expected a finite number > 0";
+  }
+  if (!body.com.allFinite() || !body.inertia.allFinite()) {
+    return "body " + Quote(body.name) + ": com and inertia must be finite";
+  }
+  if (!body.inertia.isApprox(body.inertia.transpose()) ||
+      Eigen::LLT<Eigen::Matrix3d>(body.inertia).info() != Eigen::Success) {
+    return "body " + Quote(body.name) + ": inertia must be symmetric and positive definite";
+  }
+  return "";
+}
+
+/// A planar scene turns about z only: anything that tips or leaves the plane is refused.
+std::string CheckPlanarJoint(const JointDescription& joint) {
+  if (!ExistsInPlane(joint.type)) {
+    return "joint " + Quote(joint.name) + ": a " + std::string(ToString(joint.type)) +
+           " joint does not exist in the plane";
+  }
+  const auto flat = [](const Eigen::Vector3d& v) { return v.z() == 0.0; };
+  const auto about_z = [](const Eigen::Vector3d& v) { return v.x() == 0.0 && v.y() == 0.0; };
+  if (!flat(joint.from.position) || !flat(joint.to.position)) {
+    return "joint " + Quote(joint.name) + ": lies out of the plane";
+  }
+  if (!about_z(joint.from.rotation) || !about_z(joint.to.rotation)) {
+    return "joint " + Quote(joint.name) + ": its frames may turn about z only in a planar scene";
+  }
+  if (joint.axis.isZero()) return "";
+  const bool fits =
+      OwnAxis(joint.type) == 'x' ? flat(joint.axis) : about_z(joint.axis) && joint.axis.z() > 0;
+  if (!fits) return "joint " + Quote(joint.name) + ": its axis does not belong to the plane";
+  return "";
+}
+
+std::string CheckMotions(SpaceKind space, const JointDescription& joint) {
+  const int speeds = NumValues(joint.type, space, true);
+  if (joint.motions.empty()) return "";
+  if (NumValues(joint.type, space, false) != speeds) {
+    return "a joint with a quaternion has no coordinate to prescribe";
+  }
+  std::vector<bool> taken(speeds, false);
+  for (const PrescribedMotion& motion : joint.motions) {
+    if (motion.coordinate < 0 || motion.coordinate >= speeds) {
+      return "no coordinate " + std::to_string(motion.coordinate) + " to prescribe";
+    }
+    if (taken[motion.coordinate]) {
+      return "coordinate " + std::to_string(motion.coordinate) + " is prescribed twice";
+    }
+    taken[motion.coordinate] = true;
+    if (const std::string error = Validate(motion.value); !error.empty()) return error;
+  }
+  return "";
+}
+
+std::string CheckJoint(const MechanismDescription& description, const JointDescription& joint) {
+  const int num_bodies = static_cast<int>(description.bodies.size());
+  for (int body : {joint.from.body, joint.to.body}) {
+    if (body < 0 || body >= num_bodies) {
+      return "joint " + Quote(joint.name) + ": body index " + std::to_string(body) +
+             " does not exist";
+    }
+  }
+  if (joint.from.body == joint.to.body) {
+    return "joint " + Quote(joint.name) + ": joins body " +
+           Quote(description.bodies[joint.from.body].name) + " with itself";
+  }
+  if (!joint.from.position.allFinite() || !joint.to.position.allFinite() ||
+      !joint.from.rotation.allFinite() || !joint.to.rotation.allFinite() ||
+      !joint.axis.allFinite()) {
+    return "joint " + Quote(joint.name) + ": positions, rotations and axis must be finite";
+  }
+  if (!std::isfinite(joint.pitch) || !std::isfinite(joint.length)) {
+    return "joint " + Quote(joint.name) + ": pitch and length must be finite";
+  }
+  if (joint.type == JointType::kRod && !(joint.length > 0.0)) {
+    return "joint " + Quote(joint.name) + ": a rod needs a length > 0";
+  }
+  if (const std::string error = CheckMotions(description.space, joint); !error.empty()) {
+    return "joint " + Quote(joint.name) + ": " + error;
+  }
+  return description.space == SpaceKind::kPlanar ? CheckPlanarJoint(joint) : "";
+}
+
+std::string CheckValues(const MechanismDescription& description,
+                        const std::vector<JointValues>& list, bool speeds) {
+  for (const JointValues& values : list) {
+    if (values.joint < 0 || values.joint >= static_cast<int>(description.joints.size())) {
+      return "initial value of joint index " + std::to_string(values.joint) +
+             ", which does not exist";
+    }
+    const JointDescription& joint = description.joints[values.joint];
+    const auto expected =
+        static_cast<std::size_t>(NumValues(joint.type, description.space, speeds));
+    if (values.values.size() != expected) {
+      return "initial values of joint " + Quote(joint.name) + ": " +
+             std::to_string(values.values.size()) + " given, expected " + std::to_string(expected);
+    }
+    for (double value : values.values) {
+      if (!std::isfinite(value)) {
+        return "initial values of joint " + Quote(joint.name) + " must be finite";
+      }
+    }
+  }
+  return "";
+}
+
+}  // namespace
+
+std::string_view ToString(SpaceKind space) {
+  return space == SpaceKind::kPlanar ? "planar" : "spatial";
+}
+
+std::string Validate(const MechanismDescription& description) {
+  if (description.bodies.size() < 2) return "a mechanism needs at least one body besides ground";
+  if (!description.gravity.allFinite()) return "gravity must be finite";
+  if (description.space == SpaceKind::kPlanar && description.gravity.z() != 0.0) {
+    return "gravity leaves the plane";
+  }
+  std::string error;
+  for (std::size_t i = 1; i < description.bodies.size() && error.empty(); ++i) {
+    error = CheckBody(description.bodies[i]);
+  }
+  for (std::size_t i = 0; i < description.joints.size() && error.empty(); ++i) {
+    error = CheckJoint(description, description.joints[i]);
+  }
+  for (std::size_t i = 0; i < description.forces.size() && error.empty(); ++i) {
+    error = ValidateForce(description, description.forces[i]);
+  }
+  if (error.empty()) error = CheckValues(description, description.initial.coordinates, false);
+  if (error.empty()) error = CheckValues(description, description.initial.speeds, true);
+  return error.empty() ? "" : description.name + ": " + error;
+}
+
+MechanismDescription Unreleased(const MechanismDescription& description) {
+  MechanismDescription result = description;
+  for (JointDescription& joint : result.joints) joint.released.clear();
+  return result;
+}
+
+}  // namespace loopbench

@@ -1,0 +1,140 @@
+#include "mechanism/description/parts.h"
+
+#include <numeric>
+#include <utility>
+
+namespace loopbench {
+
+namespace {
+
+/// Renumbers a force. False when there is nothing left for it to do.
+struct Kept {
+  const Renumbering& renumbering;
+
+  template <class JointForce>
+  requires requires(JointForce f) { f.joint; }
+  bool operator()(JointForce& f) const {
+    f.joint = renumbering.joints[f.joint];
+    return f.joint >= 0;
+  }
+  bool operator()(PointForce& f) const { return Moves(&f.body); }
+  bool operator()(Drag& f) const { return Moves(&f.point.body); }
+  bool operator()(SpringDamper& f) const {
+    const bool from = Moves(&f.from.body), to = Moves(&f.to.body);
+    const bool lost = f.from.body < 0 || f.to.body < 0;  // another part's
+    return !lost && (from || to) && f.from.body != f.to.body;
+  }
+  /// What is not known has not been renumbered (KnowsForces, FindIslands).
+  template <class Other>
+  bool operator()(Other&) const {
+    return true;
+  }
+
+ private:
+  bool Moves(int* body) const {
+    *body = renumbering.bodies[*body];
+    return *body > kGround;
+  }
+};
+
+/// Names of independent speeds that still exist. A list with a gap is of no use: all or none.
+std::vector<std::string> KeptNames(const MechanismDescription& old, const Renumbering& kept) {
+  for (const std::string& name : old.independent) {
+    const std::string owner = name.substr(0, name.rfind('.'));
+    for (std::size_t i = 0; i < old.bodies.size(); ++i) {
+      if (old.bodies[i].name == owner && kept.bodies[i] < 0) return {};
+    }
+    for (std::size_t j = 0; j < old.joints.size(); ++j) {
+      if ((old.joints[j].name == name || old.joints[j].name == owner) && kept.joints[j] < 0) {
+        return {};
+      }
+    }
+  }
+  return old.independent;
+}
+
+std::vector<JointValues> KeptValues(const std::vector<JointValues>& old, const Renumbering& kept) {
+  std::vector<JointValues> values;
+  for (const JointValues& one : old) {
+    if (kept.joints[one.joint] >= 0) values.push_back({kept.joints[one.joint], one.values});
+  }
+  return values;
+}
+
+}  // namespace
+
+MechanismDescription Select(const MechanismDescription& description,
+                            const Renumbering& renumbering) {
+  // A new member of the description must be thought about here: this line stops compiling.
+  const auto& [name, space, gravity, bodies, joints, forces, initial, independent] = description;
+  MechanismDescription part;
+  part.name = name;
+  part.space = space;
+  part.gravity = gravity;
+  part.bodies.clear();
+  for (std::size_t i = 0; i < bodies.size(); ++i) {
+    if (renumbering.bodies[i] >= 0) part.bodies.push_back(bodies[i]);
+  }
+  for (std::size_t j = 0; j < joints.size(); ++j) {
+    if (renumbering.joints[j] < 0) continue;
+    // And a new member of a joint: what it says must survive a change of the frames' bodies.
+    const auto& [joint_name, type, from, to, axis, pitch, length, cut, released, motions] =
+        joints[j];
+    JointDescription joint{joint_name, type, from, to, axis, pitch, length, cut, released, motions};
+    joint.from.body = renumbering.bodies[from.body];
+    joint.to.body = renumbering.bodies[to.body];
+    part.joints.push_back(joint);
+  }
+  const Kept kept{renumbering};
+  for (ForceDescription force : forces) {
+    if (std::visit(kept, force)) part.forces.push_back(force);
+  }
+  part.initial.coordinates = KeptValues(initial.coordinates, renumbering);
+  part.initial.speeds = KeptValues(initial.speeds, renumbering);
+  for (const int joint : initial.held) {
+    if (renumbering.joints[joint] >= 0) part.initial.held.push_back(renumbering.joints[joint]);
+  }
+  part.independent = KeptNames(description, renumbering);
+  return part;
+}
+
+std::vector<Part> Split(const MechanismDescription& description,
+                        const std::vector<Island>& islands) {
+  if (islands.size() == 1) {
+    Part whole{description, std::vector<int>(description.bodies.size()),
+               std::vector<int>(description.joints.size())};
+    std::iota(whole.bodies.begin(), whole.bodies.end(), 0);
+    std::iota(whole.joints.begin(), whole.joints.end(), 0);
+    return {whole};
+  }
+  std::vector<Part> parts;
+  for (const Island& island : islands) {
+    Part part;
+    Renumbering own{std::vector<int>(description.bodies.size(), -1),
+                    std::vector<int>(description.joints.size(), -1)};
+    const auto take = [](int index, std::vector<int>& numbers, std::vector<int>& taken) {
+      numbers[index] = static_cast<int>(taken.size());
+      taken.push_back(index);
+    };
+    take(kGround, own.bodies, part.bodies);
+    for (const int body : island.bodies) take(body, own.bodies, part.bodies);
+    for (std::size_t j = 0; j < description.joints.size(); ++j) {
+      const auto& [from, to] =
+          std::pair(description.joints[j].from.body, description.joints[j].to.body);
+      if (own.bodies[from == kGround ? to : from] > kGround) {
+        take(static_cast<int>(j), own.joints, part.joints);
+      }
+    }
+    part.description = Select(description, own);
+    part.description.name += "#" + std::to_string(parts.size() + 1);
+    parts.push_back(std::move(part));
+  }
+  return parts;
+}
+
+std::vector<Part> SplitByJoints(MechanismDescription description) {
+  description.forces.clear();
+  return Split(description, FindIslands(description));
+}
+
+}  // namespace loopbench

@@ -1,0 +1,117 @@
+#include "mechanism/description/topology.h"
+
+#include <algorithm>
+#include <numeric>
+
+namespace loopbench {
+
+std::string_view ToString(Coordinates coordinates) {
+  return coordinates == Coordinates::kJoint ? "joint" : "absolute";
+}
+
+namespace {
+
+/// Sets of bodies already connected by chosen joints.
+class DisjointSets {
+ public:
+  explicit DisjointSets(int n) : parent_(n) { std::iota(parent_.begin(), parent_.end(), 0); }
+  int Find(int i) {
+    while (parent_[i] != i) i = parent_[i] = parent_[parent_[i]];
+    return i;
+  }
+  bool Unite(int a, int b) {
+    a = Find(a);
+    b = Find(b);
+    parent_[std::max(a, b)] = std::min(a, b);
+    return a != b;
+  }
+
+ private:
+  std::vector<int> parent_;
+};
+
+/// Low numbers want to stay in the tree. -1: follows a given motion or a thread exactly there, 0:
+/// carries a force or an initial value, 1: neutral, 2: marked "cut".
+std::vector<int> CutPreference(const MechanismDescription& description) {
+  std::vector<int> preference(description.joints.size(), 1);
+  const auto keep = [&](int joint) { preference[joint] = 0; };
+  for (const ForceDescription& force : description.forces) {
+    std::visit(
+        [&](const auto& f) {
+          if constexpr (requires { f.joint; }) keep(f.joint);
+        },
+        force);
+  }
+  for (const JointValues& values : description.initial.coordinates) keep(values.joint);
+  for (const JointValues& values : description.initial.speeds) keep(values.joint);
+  for (std::size_t i = 0; i < preference.size(); ++i) {
+    const JointDescription& joint = description.joints[i];
+    if (!joint.motions.empty() || joint.type == JointType::kHelical) preference[i] = -1;
+    if (joint.cut) preference[i] = 2;
+  }
+  return preference;
+}
+
+/// Kruskal's choice: joints in order of preference, those that would close a loop are left out.
+std::vector<bool> ChooseTreeJoints(const MechanismDescription& description) {
+  const std::vector<int> preference = CutPreference(description);
+  std::vector<int> order(description.joints.size());
+  std::iota(order.begin(), order.end(), 0);
+  std::ranges::stable_sort(order, {}, [&](int j) { return preference[j]; });
+  DisjointSets connected(static_cast<int>(description.bodies.size()));
+  std::vector<bool> chosen(order.size(), false);
+  for (int j : order) {
+    const JointDescription& joint = description.joints[j];
+    if (joint.type == JointType::kRod) continue;  // it has no coordinates to follow
+    chosen[j] = connected.Unite(joint.from.body, joint.to.body);
+  }
+  return chosen;
+}
+
+}  // namespace
+
+Topology BuildTopology(const MechanismDescription& description, Coordinates coordinates) {
+  const int num_bodies = static_cast<int>(description.bodies.size());
+  const int num_joints = static_cast<int>(description.joints.size());
+  Topology topology;
+  std::vector<bool> in_tree(num_joints, false);
+  if (coordinates == Coordinates::kJoint) in_tree = ChooseTreeJoints(description);
+
+  std::vector<std::vector<int>> joints_of(num_bodies);
+  for (int j = 0; j < num_joints; ++j) {
+    if (!in_tree[j]) {
+      topology.constraints.push_back(j);
+      continue;
+    }
+    joints_of[description.joints[j].from.body].push_back(j);
+    joints_of[description.joints[j].to.body].push_back(j);
+  }
+
+  // Breadth first from Ground, then from the first body of each part not reached.
+  std::vector<bool> reached(num_bodies, false);
+  std::vector<int> queue;
+  const auto reach_from = [&](int root) {
+    reached[root] = true;
+    queue.push_back(root);
+    for (std::size_t k = queue.size() - 1; k < queue.size(); ++k) {
+      const int parent = queue[k];
+      for (int j : joints_of[parent]) {
+        const JointDescription& joint = description.joints[j];
+        const int child = joint.from.body == parent ? joint.to.body : joint.from.body;
+        if (reached[child]) continue;
+        reached[child] = true;
+        topology.edges.push_back({j, parent, child});
+        queue.push_back(child);
+      }
+    }
+  };
+  reach_from(kGround);
+  for (int body = 1; body < num_bodies; ++body) {
+    if (reached[body]) continue;
+    topology.edges.push_back({-1, kGround, body});
+    reach_from(body);
+  }
+  return topology;
+}
+
+}  // namespace loopbench

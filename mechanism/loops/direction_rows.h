@@ -1,0 +1,24 @@
+// What all cut joints constrain, as rows whose lengths and angles compare: geometry alone.
+#pragma once
+
+#include <Eigen/Cholesky>
+#include <vector>
+
+#include "mechanism/loops/tree_dynamics.h"
+
+namespace loopbench {
+
+/// Constraints of all cut joints as rows that compare: J L^-T with L L^T the geometric mass matrix,
+/// each row over the square root of its own free response. Rows are by joint and direction in the
+/// joint's own axes, imposed directions before released ones. In double, whatever the scalar.
+struct DirectionRows {
+  Eigen::MatrixXd rows;
+  Eigen::VectorXd mismatch;          ///< of positions, scaled likewise: of unit masses, so [m]
+  Eigen::LLT<Eigen::MatrixXd> mass;  ///< L
+  std::vector<int> first, count;     ///< rows of each constraint, in the order of constraints()
+};
+/// Positions of `kinematics` must be current; any coordinate set.
+template <class Space, class S>
+DirectionRows RowsOfDirections(const Kinematics<Space, S>& kinematics);
+
+}  // namespace loopbench

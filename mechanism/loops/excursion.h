@@ -1,0 +1,74 @@
+// Other positions that a mechanism's loops admit: a walk from one to the next.
+//
+// One position cannot tell a constraint that is redundant everywhere from one that is lost only
+// there, nor a speed that leads somewhere from one that leads nowhere: at a stretched four-bar two
+// speeds satisfy every constraint and no motion does. So the mechanism is moved a little way along
+// a speed that the constraints permit, and its loops are closed again. Dense: for analyses before a
+// run.
+#pragma once
+
+#include <Eigen/QR>
+
+#include "mechanism/loops/direction_rows.h"
+
+namespace loopbench {
+
+/// Speeds of the forest above which rank is not analysed: the matrices are dense.
+inline constexpr int kMostAnalysedSpeeds = 2000;
+
+enum class StepKind {
+  kMoved,      ///< to another position that closes all loops
+  kFellBack,   ///< the only position found nearby is the one it came from
+  kNotClosed,  ///< none was found
+};
+
+template <class Space>
+class Excursion {
+ public:
+  /// From the position q of a mechanism in joint coordinates without prescribed motions, which must
+  /// outlive this.
+  Excursion(const Mechanism<Space, double>& mechanism, const VectorX<double>& q);
+
+  /// Moves by `distance` (largest coordinate, angles in rad, lengths in mechanism lengths) along a
+  /// mixture of all permitted speeds, another one for each `seed` but mostly the last step's
+  /// continued, and closes the loops again. The position stays as it was unless it moved.
+  StepKind Step(double distance, int seed);
+
+  /// How far the last step ended from where its speed led, over the way it was to go: of the order
+  /// of the distance at a regular position of the loops, of order one where the speed leads
+  /// nowhere.
+  double bend() const { return bend_; }
+  /// Forgets the direction of the steps so far.
+  void TurnAnywhere() { course_.resize(0); }
+
+  const VectorX<double>& q() const { return q_; }
+  /// All directions here.
+  const DirectionRows& rows() const { return here_; }
+  /// Positions are current.
+  const Kinematics<Space, double>& kinematics() const { return kinematics_; }
+  /// Rank of all directions here, as scaled_loops.h has it.
+  int rank() const { return rank_; }
+  /// Smallest pivot that counts over the largest: how far this position is from losing rank.
+  double conditioning() const { return conditioning_; }
+  int freedom() const { return mechanism_->num_u() - rank_; }
+
+ private:
+  /// Rows and rank at q_.
+  void Factor();
+  /// Largest of u over its units: rad, or lengths of the mechanism.
+  double Size(const VectorX<double>& u) const;
+  VectorX<double> Moved(const VectorX<double>& q, const VectorX<double>& u) const;
+
+  const Mechanism<Space, double>* mechanism_;
+  Kinematics<Space, double> kinematics_;
+  VectorX<double> q_, units_;  ///< units of speeds: 1, or the mechanism's length
+  double closed_ = 0.0;        ///< scaled mismatches below this are round-off [m]
+  DirectionRows here_;
+  Eigen::CompleteOrthogonalDecomposition<Eigen::MatrixXd> solver_;
+  VectorX<double> course_;  ///< L^T u of the last step that moved
+  bool factored_ = false;   ///< solver_ has here_.rows
+  int rank_ = 0;
+  double conditioning_ = 1.0, bend_ = 0.0;
+};
+
+}  // namespace loopbench

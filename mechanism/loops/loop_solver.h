@@ -1,0 +1,118 @@
+// The one place where loop closures are solved and their rank is decided (docs/design.md D5).
+//
+// A loop closure is X phi = rhs, X = C Z C^T symmetric positive semidefinite: the response of the
+// mechanism, seen across one or several joints, to forces in those joints. X loses rank exactly
+// when a self-stress exists, at a singular position or through redundant constraints. Every solve
+// has the form X^+ = T^T T, and T is what is applied; the ways to T:
+//
+//   plain       X = L L^T, T = L^-1: the factorisation of the paper's time. Fails when a pivot is
+//               lost in round-off.
+//   scaled      each joint on its own scale: X_free = K K^T is the response of the joint's two
+//               bodies alone, and K^-1 X K^-T has eigenvalues in [0, number of joints]. Cholesky
+//               of that, T = L^-1 K^-1; where a pivot is below kSuspicious, the next two instead.
+//   geometric   X_g of the same mechanism with unit masses: K_g^-1 X_g K_g^-T = U diag(lambda) U^T,
+//               weights w_i = 1 - exp(-(lambda_i / theta)^2), theta = (2e-4)^2 lambda_max, where
+//               lambda_max counts as 1e-2 at least: within a rigid part all of X_g is round-off.
+//               To solve with X_g itself, T = diag(sqrt(w / lambda)) U^T K_g^-1.
+//   softened    the physical X with the geometric directions: Y = U^T K_g^-1 X K_g^-T U,
+//               Y + diag(Y_ii (1 / w_i - 1)) = N L L^T N with N^2 the diagonal, and
+//               T = L^-1 N^-1 U^T K_g^-1. A degenerating direction grows soft; directions with
+//               w < 1e-16 are left out.
+//
+// So rank depends on geometry alone, while stiffness stays physical.
+#pragma once
+
+#include <Eigen/Cholesky>
+#include <memory>
+#include <span>
+#include <vector>
+
+#include "mechanism/algebra/space.h"
+
+namespace loopbench {
+
+/// Square matrix of one joint's rows; never on the heap.
+template <class S>
+using JointMatrix = Eigen::Matrix<S, Eigen::Dynamic, Eigen::Dynamic, Eigen::ColMajor, 6, 6>;
+
+/// Room for intermediate matrices; many solvers may share one, not at the same time.
+template <class S>
+struct LoopScratch {
+  explicit LoopScratch(int largest)
+      : scaled(MatrixX<S>::Zero(largest, largest)),
+        work(scaled),
+        rotated(scaled),
+        vector(VectorX<S>::Zero(largest)) {}
+  MatrixX<S> scaled, work, rotated;
+  VectorX<S> vector;
+};
+
+template <class S>
+class LoopSolver {
+ public:
+  /// Scaled pivots below this send the decision to the geometry.
+  static constexpr double kSuspicious = 1e-4;
+  using ConstRef = Eigen::Ref<const MatrixX<S>>;
+
+  /// Softening threshold relative to the largest geometric eigenvalue: (2e-4)^2, or 64 eps if more.
+  /// docs/numerics.md, section 3, has the trials.
+  static constexpr double kTheta = 4e-8;
+  /// The largest geometric eigenvalue is taken as no smaller. Free bodies give one, and round-off
+  /// of some 100 eps stays far below kTheta times this.
+  static constexpr double kLeastResponse = 1e-2;
+
+  /// Joints contribute `rows[k]` rows each, in order. Without a scratch it has one of its own.
+  explicit LoopSolver(std::span<const int> rows, std::shared_ptr<LoopScratch<S>> scratch = nullptr);
+
+  int size() const { return size_; }
+
+  /// The K of each joint, from its free response; `which` as used by the next factorisation.
+  void SetScale(int joint, const JointMatrix<S>& free_response);
+
+  /// Plain Cholesky. False when a pivot falls below `tolerance` times `scale`, the size that
+  /// responses have before the loop is closed: X's own entries may be all round-off.
+  bool FactorPlain(const ConstRef& X, S scale, S tolerance);
+  /// Scaled Cholesky. False when suspicious; nothing can be applied then.
+  bool FactorScaled(const ConstRef& X);
+  /// Eigen-decomposition of the geometric response; sets rank and weights.
+  void FactorGeometric(const ConstRef& X_geometric);
+  /// After FactorGeometric with the same scale. False when masses are so unequal that rounding
+  /// leaves X without a Cholesky factor.
+  bool FactorSoftened(const ConstRef& X);
+
+  /// B := T B, in place.
+  void Apply(Eigen::Ref<MatrixX<S>> B) const;
+  /// v := T^T v, in place.
+  void ApplyTransposed(Eigen::Ref<VectorX<S>> v) const;
+
+  /// Directions enforced with a weight of at least one half; size() unless geometric.
+  int rank() const { return rank_; }
+  /// Smallest weight; 1 unless geometric or softened.
+  S smallest_weight() const { return smallest_weight_; }
+  /// Smallest pivot over the scale, or the ratio of extreme geometric eigenvalues.
+  S rcond() const { return rcond_; }
+
+ private:
+  struct Part {
+    int row = 0, rows = 0;
+    int scale = 0;  ///< first number in inverse_scales_
+  };
+  enum class Form { kNone, kPlain, kScaled, kGeometric, kSoftened };
+  auto K_inverse(std::size_t joint) const;
+  /// K^-1 X K^-T, in the scratch.
+  auto Scaled(const ConstRef& X);
+  void ScaleRows(Eigen::Ref<MatrixX<S>> B) const;
+
+  int size_ = 0;
+  Form form_ = Form::kNone;
+  std::vector<Part> parts_;        ///< the joints
+  std::vector<S> inverse_scales_;  ///< K^-1 of each joint, by columns
+  Eigen::LLT<MatrixX<S>> cholesky_;
+  MatrixX<S> directions_;  ///< U
+  VectorX<S> eigenvalues_, weights_, inverse_norms_;
+  std::shared_ptr<LoopScratch<S>> scratch_;
+  int rank_ = 0;
+  S smallest_weight_ = S(1), rcond_ = S(1);
+};
+
+}  // namespace loopbench

@@ -1,0 +1,43 @@
+// The constraints of all loops at one position, scaled so that their rank depends on geometry
+// alone.
+//
+// With M_g = L L^T the mass matrix of unit bodies (loop_solver.h) and K_g K_g^T the free response
+// of each cut joint, the singular values of
+//
+//   B = K_g^-1 J L^-T
+//
+// lie between 0 and the square root of the number of constraints; those below kRankRatio of the
+// largest (which counts as 0.1 at least: between rigid parts all are round-off) count as zero.
+// Dense: for analyses before a run.
+#pragma once
+
+#include "mechanism/model/kinematics.h"
+
+namespace loopbench {
+
+/// Where the softening weight of loop_solver.h is one half: 2e-4 sqrt(sqrt(ln 2)).
+inline constexpr double kRankRatio = 1.825e-4;
+
+/// The loops' constraints of one position, scaled.
+struct ScaledLoops {
+  Eigen::MatrixXd B;     ///< K_g^-1 J L^-T
+  Eigen::MatrixXd rows;  ///< rows of J L^-T, each over its own free response: joints not mixed
+  Eigen::MatrixXd to_u;  ///< null vectors of B as speeds, columns
+  Eigen::VectorXd singular_values;
+  int rank = 0;
+};
+
+/// Singular values of B alone.
+struct LoopSpectrum {
+  Eigen::VectorXd singular_values;  ///< the largest first
+  double largest = 0.0;             ///< what they are compared with: the first, or at least 0.1
+  int rank = 0;
+};
+template <class Space>
+LoopSpectrum SpectrumOfLoops(const Kinematics<Space, double>& kinematics);
+
+/// Positions of `kinematics`, in joint coordinates, must be current, for both.
+template <class Space>
+ScaledLoops ScaleLoops(const Kinematics<Space, double>& kinematics);
+
+}  // namespace loopbench

@@ -1,0 +1,322 @@
+#include "mechanism/loops/tree_dynamics.h"
+
+#include "mechanism/algebra/instantiate.h"
+
+namespace loopbench {
+
+namespace {
+
+/// The two arms of a tree step: from the parent's com to the joint, from the joint to the child's.
+template <class Space, class S>
+struct Arms {
+  Linear<Space, S> parent, child;
+  Arms(const TreeStep& step, const JointState<Space, S>& state)
+      : parent(step.sign > 0 ? state.r_P : state.r_Q),
+        child(step.sign > 0 ? Linear<Space, S>(-state.r_Q) : Linear<Space, S>(-state.r_P)) {}
+  /// The same from the centres that the masses are at.
+  Arms(const TreeStep& step, const Kinematics<Space, S>& kinematics, Masses masses)
+      : Arms(step, kinematics.joints()[step.joint]) {
+    if (masses == Masses::kPhysical) return;
+    parent =
+        step.sign > 0 ? kinematics.ArmP(step.joint, masses) : kinematics.ArmQ(step.joint, masses);
+    child = step.sign > 0 ? Linear<Space, S>(-kinematics.ArmQ(step.joint, masses))
+                          : Linear<Space, S>(-kinematics.ArmP(step.joint, masses));
+  }
+};
+
+/// X^T I X for a shift of the reference point by r: inertia seen from c instead of c + r.
+template <class Space, class S>
+Block<Space, S> ShiftInertia(const Block<Space, S>& I, const Linear<Space, S>& r) {
+  Block<Space, S> X;
+  for (int i = 0; i < Space::kDim; ++i) {
+    const Motion<Space, S> unit = Motion<Space, S>::Unit(i);
+    X.col(i) = ShiftMotion<Space, S>(unit, r);
+  }
+  return X.transpose() * I * X;
+}
+
+/// The choice of masses is made once, not in the loop over all pairs of joints.
+template <Masses masses, class Space, class S>
+void FillMassMatrix(const Kinematics<Space, S>& kinematics, std::vector<Block<Space, S>>& composite,
+                    MatrixX<S>& M) {
+  const Mechanism<Space, S>& mechanism = kinematics.mechanism();
+  const std::vector<Inertia<Space, S>>& inertias = mechanism.bodies(masses);
+  const auto& tree = mechanism.tree();
+  M.setZero(mechanism.num_u(), mechanism.num_u());
+  for (int body = 1; body < mechanism.num_bodies(); ++body) {
+    composite[body].setZero();
+    composite[body].template topLeftCorner<Space::kRot, Space::kRot>() =
+        kinematics.RotationalInertia(inertias[body], body);
+    composite[body].template bottomRightCorner<Space::kLin, Space::kLin>().diagonal().setConstant(
+        inertias[body].mass);
+  }
+  for (auto step = tree.rbegin(); step != tree.rend(); ++step) {
+    const JointState<Space, S>& state = kinematics.joints()[step->joint];
+    const Joint<Space, S>& joint = mechanism.joints()[step->joint];
+    const Arms<Space, S> arms(*step, kinematics, masses);
+    for (int i = 0; i < joint.num_u(); ++i) {
+      // momentum of the subtree moving along direction i, carried rootward
+      const Motion<Space, S> h = state.H(i) * S(step->sign);
+      Motion<Space, S> F = composite[step->child] * ShiftMotion<Space, S>(h, arms.child);
+      for (int s = mechanism.step_of_body(step->child); s >= 0;) {
+        const TreeStep& at = tree[s];
+        const JointState<Space, S>& at_state = kinematics.joints()[at.joint];
+        const Joint<Space, S>& at_joint = mechanism.joints()[at.joint];
+        const Arms<Space, S> at_arms(at, kinematics, masses);
+        F = ShiftForce<Space, S>(F, at_arms.child);
+        for (int k = 0; k < at_joint.num_u(); ++k) {
+          const S value = S(at.sign) * at_state.H(k).dot(F);
+          M(at_joint.u_offset + k, joint.u_offset + i) = value;
+          M(joint.u_offset + i, at_joint.u_offset + k) = value;
+        }
+        F = ShiftForce<Space, S>(F, at_arms.parent);
+        s = mechanism.step_of_body(at.parent);
+      }
+    }
+    if (step->parent != kGround) {
+      const Linear<Space, S> r = arms.parent + arms.child;
+      composite[step->parent] += ShiftInertia<Space, S>(composite[step->child], r);
+    }
+  }
+}
+
+/// D^T (V_Q - V_P) of one constraint by speed, for `count` directions, from row `first` of J on.
+template <class Space, class S>
+void AddRows(const Kinematics<Space, S>& kinematics, int index, int first, int count,
+             MatrixX<S>& J) {
+  const Mechanism<Space, S>& mechanism = kinematics.mechanism();
+  const Joint<Space, S>& constraint = mechanism.joints()[index];
+  const JointState<Space, S>& state = kinematics.joints()[index];
+  const Linear<Space, S> p = kinematics.JointPoint(index);
+  for (int side = 0; side < 2; ++side) {
+    const S sign = side == 0 ? S(1) : S(-1);
+    int s = mechanism.step_of_body(side == 0 ? constraint.to : constraint.from);
+    while (s >= 0) {
+      const TreeStep& step = mechanism.tree()[s];
+      const JointState<Space, S>& moving = kinematics.joints()[step.joint];
+      const Joint<Space, S>& joint = mechanism.joints()[step.joint];
+      const Linear<Space, S> arm = p - kinematics.JointPoint(step.joint);
+      for (int i = 0; i < joint.num_u(); ++i) {
+        const Motion<Space, S> h = moving.H(i) * (sign * S(step.sign));
+        const Motion<Space, S> at_constraint = ShiftMotion<Space, S>(h, arm);
+        for (int r = 0; r < count; ++r) {
+          J(first + r, joint.u_offset + i) += state.D(r).dot(at_constraint);
+        }
+      }
+      s = mechanism.step_of_body(step.parent);
+    }
+  }
+}
+
+}  // namespace
+
+template <class Space, class S>
+TreeDynamics<Space, S>::TreeDynamics(const Mechanism<Space, S>& mechanism)
+    : A_bias_(mechanism.num_bodies(), Motion<Space, S>::Zero()),
+      F_(mechanism.num_bodies(), Motion<Space, S>::Zero()),
+      composite_(mechanism.num_bodies(), Block<Space, S>::Zero()) {}
+
+template <class Space, class S>
+void TreeDynamics<Space, S>::MassMatrix(const Kinematics<Space, S>& kinematics, Masses masses,
+                                        MatrixX<S>& M) {
+  if (masses == Masses::kPhysical) {
+    FillMassMatrix<Masses::kPhysical>(kinematics, composite_, M);
+  } else {
+    FillMassMatrix<Masses::kGeometric>(kinematics, composite_, M);
+  }
+}
+
+template <class Space, class S>
+void TreeDynamics<Space, S>::BodyAccelerations(const Kinematics<Space, S>& kinematics,
+                                               const VectorX<S>& udot,
+                                               std::span<Motion<Space, S>> A) const {
+  const Mechanism<Space, S>& mechanism = kinematics.mechanism();
+  A[kGround].setZero();
+  for (const TreeStep& step : mechanism.tree()) {
+    const JointState<Space, S>& state = kinematics.joints()[step.joint];
+    const Joint<Space, S>& joint = mechanism.joints()[step.joint];
+    const Arms<Space, S> arms(step, state);
+    Motion<Space, S> A_rel = state.g;
+    for (int i = 0; i < joint.num_u(); ++i) A_rel += state.H(i) * udot[joint.u_offset + i];
+    const Motion<Space, S> at_joint = ShiftMotion<Space, S>(A[step.parent], arms.parent) +
+                                      kinematics.Centripetal(step.parent, arms.parent) +
+                                      S(step.sign) * A_rel;
+    A[step.child] = ShiftMotion<Space, S>(at_joint, arms.child) +
+                    kinematics.Centripetal(step.child, arms.child);
+  }
+}
+
+template <class Space, class S>
+Motion<Space, S> InertialForce(const Kinematics<Space, S>& kinematics, int body,
+                               const Motion<Space, S>& A) {
+  const Inertia<Space, S>& inertia = kinematics.mechanism().bodies()[body];
+  const auto I = kinematics.RotationalInertia(inertia, body);
+  const Angular<Space, S> w = kinematics.motions()[body].template head<Space::kRot>();
+  const Angular<Space, S> alpha = A.template head<Space::kRot>();
+  Motion<Space, S> F;
+  F << I * alpha + CrossAngular<S>(w, Angular<Space, S>(I * w)),
+      inertia.mass * A.template tail<Space::kLin>();
+  return F;
+}
+
+template <class Space, class S>
+void TreeDynamics<Space, S>::Bias(const Kinematics<Space, S>& kinematics, VectorX<S>& h) {
+  h.setZero(kinematics.mechanism().num_u());
+  BodyAccelerations(kinematics, h, A_bias_);
+  NeededWrenches(kinematics);
+  AlongForest(kinematics, h);
+}
+
+template <class Space, class S>
+std::span<const Motion<Space, S>> TreeDynamics<Space, S>::WrenchesLeft(
+    const Kinematics<Space, S>& kinematics, const VectorX<S>& udot, const VectorX<S>& lambda) {
+  BodyAccelerations(kinematics, udot, A_bias_);
+  NeededWrenches(kinematics);
+  for (int index : kinematics.mechanism().constraints()) {
+    const Joint<Space, S>& joint = kinematics.mechanism().joints()[index];
+    const JointState<Space, S>& state = kinematics.joints()[index];
+    Motion<Space, S> F = Motion<Space, S>::Zero();
+    for (int r = 0; r < state.rows(); ++r) F += state.D(r) * lambda[joint.row + r];
+    F_[joint.to] -= ShiftForce<Space, S>(F, state.r_Q);
+    F_[joint.from] += ShiftForce<Space, S>(F, state.r_P);
+  }
+  return F_;
+}
+
+template <class Space, class S>
+void TreeDynamics<Space, S>::Residual(const Kinematics<Space, S>& kinematics,
+                                      const VectorX<S>& udot, const VectorX<S>& lambda,
+                                      VectorX<S>& force, VectorX<S>& constraint) {
+  WrenchesLeft(kinematics, udot, lambda);
+  force.setZero(kinematics.mechanism().num_u());
+  AlongForest(kinematics, force);
+  JacobianBias(kinematics, constraint);
+  constraint = -constraint;
+}
+
+template <class Space, class S>
+void TreeDynamics<Space, S>::NeededWrenches(const Kinematics<Space, S>& kinematics) {
+  const Mechanism<Space, S>& mechanism = kinematics.mechanism();
+  AppliedForces<Space, S>(kinematics, F_);
+  for (int body = 1; body < mechanism.num_bodies(); ++body) {
+    F_[body] = InertialForce<Space, S>(kinematics, body, A_bias_[body]) - F_[body];
+  }
+}
+
+template <class Space, class S>
+void TreeDynamics<Space, S>::AlongForest(const Kinematics<Space, S>& kinematics,
+                                         VectorX<S>& force) {
+  const Mechanism<Space, S>& mechanism = kinematics.mechanism();
+  const auto& tree = mechanism.tree();
+  for (auto step = tree.rbegin(); step != tree.rend(); ++step) {
+    const JointState<Space, S>& state = kinematics.joints()[step->joint];
+    const Joint<Space, S>& joint = mechanism.joints()[step->joint];
+    const Arms<Space, S> arms(*step, state);
+    const Motion<Space, S> at_joint = ShiftForce<Space, S>(F_[step->child], arms.child);
+    for (int i = 0; i < joint.num_u(); ++i) {
+      force[joint.u_offset + i] = S(step->sign) * state.H(i).dot(at_joint);
+    }
+    F_[step->parent] += ShiftForce<Space, S>(at_joint, arms.parent);
+  }
+}
+
+template <class Space, class S>
+void TreeDynamics<Space, S>::Jacobian(const Kinematics<Space, S>& kinematics, MatrixX<S>& J) const {
+  const Mechanism<Space, S>& mechanism = kinematics.mechanism();
+  J.setZero(mechanism.num_rows(), mechanism.num_u());
+  for (int index : mechanism.constraints()) {
+    const Joint<Space, S>& joint = mechanism.joints()[index];
+    AddRows(kinematics, index, joint.row, joint.num_constraints(), J);
+  }
+}
+
+template <class Space, class S>
+void TreeDynamics<Space, S>::JacobianOf(const Kinematics<Space, S>& kinematics, int index,
+                                        Eigen::Ref<MatrixX<S>> rows) const {
+  MatrixX<S> J = MatrixX<S>::Zero(rows.rows(), rows.cols());
+  AddRows(kinematics, index, 0, static_cast<int>(rows.rows()), J);
+  rows = J;
+}
+
+template <class Space, class S>
+void SpeedBias(Kinematics<Space, S>& kinematics, const VectorX<S>& zero, VectorX<S>& bias) {
+  const Mechanism<Space, S>& mechanism = kinematics.mechanism();
+  bias.setZero(mechanism.num_rows());
+  if (mechanism.drives().empty()) return;
+  kinematics.UpdateVelocity(zero);
+  for (int index : mechanism.constraints()) {
+    const Joint<Space, S>& joint = mechanism.joints()[index];
+    bias.segment(joint.row, joint.num_constraints()) =
+        kinematics.ConstraintSpeed(index).head(joint.num_constraints());
+  }
+}
+
+template <class Space, class S>
+void TreeDynamics<Space, S>::JacobianBias(const Kinematics<Space, S>& kinematics,
+                                          VectorX<S>& gamma) const {
+  const Mechanism<Space, S>& mechanism = kinematics.mechanism();
+  gamma.resize(mechanism.num_rows());
+  for (int index : mechanism.constraints()) {
+    const Joint<Space, S>& joint = mechanism.joints()[index];
+    const int rows = joint.num_constraints();
+    const Motion<Space, S> bias = JointAcceleration<Space, S>(kinematics, index, A_bias_);
+    gamma.segment(joint.row, rows) = -bias.head(rows);
+  }
+}
+
+template <class Space, class S>
+Motion<Space, S> JointAcceleration(const Kinematics<Space, S>& kinematics, int index,
+                                   std::span<const Motion<Space, S>> A) {
+  const Joint<Space, S>& joint = kinematics.mechanism().joints()[index];
+  const JointState<Space, S>& state = kinematics.joints()[index];
+  const Motion<Space, S> A_Q =
+      ShiftMotion<Space, S>(A[joint.to], state.r_Q) + kinematics.Centripetal(joint.to, state.r_Q);
+  const Motion<Space, S> A_P = ShiftMotion<Space, S>(A[joint.from], state.r_P) +
+                               kinematics.Centripetal(joint.from, state.r_P);
+  const Motion<Space, S> rest = A_Q - A_P - state.g;
+  Motion<Space, S> result = Motion<Space, S>::Zero();
+  for (int r = 0; r < joint.num_directions(); ++r) result[r] = state.D(r).dot(rest);
+  return result;
+}
+
+template <class Space, class S>
+JointMatrix<S> FreeResponse(const Kinematics<Space, S>& kinematics, Masses masses, int index,
+                            bool all_directions) {
+  const Joint<Space, S>& joint = kinematics.mechanism().joints()[index];
+  const std::vector<Inertia<Space, S>>& inertias = kinematics.mechanism().bodies(masses);
+  const JointState<Space, S>& state = kinematics.joints()[index];
+  const int rows = all_directions ? joint.num_directions() : joint.num_constraints();
+  JointMatrix<S> X = JointMatrix<S>::Zero(rows, rows);
+  for (int side = 0; side < 2; ++side) {
+    const int body = side == 0 ? joint.to : joint.from;
+    if (body == kGround) continue;
+    const Linear<Space, S> r =
+        side == 0 ? kinematics.ArmQ(index, masses) : kinematics.ArmP(index, masses);
+    const auto inverse = kinematics.RotationalInverse(inertias[body], body);
+    for (int a = 0; a < rows; ++a) {
+      const Motion<Space, S> D_a = state.D(a);
+      const Motion<Space, S> F = ShiftForce<Space, S>(D_a, r);
+      Motion<Space, S> A;
+      A << inverse * F.template head<Space::kRot>(),
+          F.template tail<Space::kLin>() / inertias[body].mass;
+      for (int b = 0; b < rows; ++b) {
+        const Motion<Space, S> D_b = state.D(b);
+        X(b, a) += ShiftForce<Space, S>(D_b, r).dot(A);
+      }
+    }
+  }
+  return X;
+}
+
+#define LOOPBENCH_INSTANTIATE(Space, S)                                           \
+  template class TreeDynamics<Space, S>;                                          \
+  template Motion<Space, S> InertialForce(const Kinematics<Space, S>&, int,       \
+                                          const Motion<Space, S>&);               \
+  template void SpeedBias(Kinematics<Space, S>&, const VectorX<S>&, VectorX<S>&); \
+  template Motion<Space, S> JointAcceleration(const Kinematics<Space, S>&, int,   \
+                                              std::span<const Motion<Space, S>>); \
+  template JointMatrix<S> FreeResponse(const Kinematics<Space, S>&, Masses, int, bool);
+LOOPBENCH_FOR_EACH_SPACE_AND_MODEL_SCALAR(LOOPBENCH_INSTANTIATE)
+#undef LOOPBENCH_INSTANTIATE
+
+}  // namespace loopbench

@@ -1,0 +1,88 @@
+// Equations of the spanning forest in its own coordinates, with the cut joints as constraints:
+//
+//   M(q) udot + h(q, u) = J^T lambda,      J(q) udot = gamma(q, u),      J u + b(q, t) = 0.
+//
+// b, from prescribed motions, is zero without them, and h and gamma then know no time.
+//
+// M by the composite-rigid-body method, h by one outward and one inward pass (Featherstone, Rigid
+// Body Dynamics Algorithms, ch. 5 and 6), J row by row from D^T (V_Q - V_P) at the joint's point.
+// M is dense: O(n depth) to fill, which the dense baselines pay anyway.
+#pragma once
+
+#include <span>
+#include <vector>
+
+#include "mechanism/loops/loop_solver.h"
+#include "mechanism/model/kinematics.h"
+
+namespace loopbench {
+
+template <class Space, class S>
+class TreeDynamics {
+ public:
+  explicit TreeDynamics(const Mechanism<Space, S>& mechanism);
+
+  /// Mass matrix of the forest (num_u x num_u, both triangles).
+  void MassMatrix(const Kinematics<Space, S>& kinematics, Masses masses, MatrixX<S>& M);
+
+  /// h: what the speeds alone cost, minus applied forces. Leaves the accelerations for udot = 0 in
+  /// place for JacobianBias().
+  void Bias(const Kinematics<Space, S>& kinematics, VectorX<S>& h);
+
+  /// J (num_rows x num_u).
+  void Jacobian(const Kinematics<Space, S>& kinematics, MatrixX<S>& J) const;
+  /// Rows of J for one cut joint, as many as `rows` has: directions imposed, then released ones.
+  void JacobianOf(const Kinematics<Space, S>& kinematics, int joint,
+                  Eigen::Ref<MatrixX<S>> rows) const;
+
+  /// gamma, after Bias().
+  void JacobianBias(const Kinematics<Space, S>& kinematics, VectorX<S>& gamma) const;
+
+  /// The wrench at each body's centre of mass that udot takes beyond applied forces and lambda: the
+  /// joints of the forest must transmit it. Good until the next call of any member function.
+  std::span<const Motion<Space, S>> WrenchesLeft(const Kinematics<Space, S>& kinematics,
+                                                 const VectorX<S>& udot, const VectorX<S>& lambda);
+
+  /// What udot and lambda leave of the equations above: M udot + h - J^T lambda in `force`,
+  /// J udot - gamma in `constraint`. O(n). Takes the place of what Bias() left.
+  void Residual(const Kinematics<Space, S>& kinematics, const VectorX<S>& udot,
+                const VectorX<S>& lambda, VectorX<S>& force, VectorX<S>& constraint);
+
+  /// Accelerations of the centres of mass for given udot.
+  void BodyAccelerations(const Kinematics<Space, S>& kinematics, const VectorX<S>& udot,
+                         std::span<Motion<Space, S>> A) const;
+
+ private:
+  /// Wrenches that bodies with accelerations A_bias_ need beyond applied forces, in F_.
+  void NeededWrenches(const Kinematics<Space, S>& kinematics);
+  /// Their components along the coordinates of the forest.
+  void AlongForest(const Kinematics<Space, S>& kinematics, VectorX<S>& force);
+
+  std::vector<Motion<Space, S>> A_bias_, F_;
+  std::vector<Block<Space, S>> composite_;
+};
+
+/// Wrench at its centre of mass that gives a body the acceleration A there.
+template <class Space, class S>
+Motion<Space, S> InertialForce(const Kinematics<Space, S>& kinematics, int body,
+                               const Motion<Space, S>& A);
+
+/// b: what the constraints would miss if all free speeds were zero. `zero` has num_u zeros; the
+/// motions of `kinematics` are left at them where there are prescribed motions.
+template <class Space, class S>
+void SpeedBias(Kinematics<Space, S>& kinematics, const VectorX<S>& zero, VectorX<S>& bias);
+
+/// D^T (A_Q - A_P - g) of one joint from the accelerations of all centres of mass: zero when the
+/// joint is satisfied at acceleration level. A number per direction, imposed ones first.
+template <class Space, class S>
+Motion<Space, S> JointAcceleration(const Kinematics<Space, S>& kinematics, int joint,
+                                   std::span<const Motion<Space, S>> A);
+
+/// Response D^T (S M^-1 S^T) D of the two bodies of a joint when nothing else holds them, the scale
+/// against which the response of the assembled mechanism is judged (docs/design.md D5): of the
+/// directions imposed, or of all.
+template <class Space, class S>
+JointMatrix<S> FreeResponse(const Kinematics<Space, S>& kinematics, Masses masses, int joint,
+                            bool all_directions = false);
+
+}  // namespace loopbench

@@ -1,0 +1,62 @@
+#include "mechanism/model/joint.h"
+
+#include <cmath>
+#include <numbers>
+#include <vector>
+
+#include "mechanism/algebra/instantiate.h"
+#include "mechanism/model/joint_kinds.h"
+
+namespace loopbench {
+
+template <class Space, class S>
+const JointKind<Space, S>& KindOf(JointType type) {
+  const auto all = [] {
+    if constexpr (Space::kRot == 1) {
+      return PlanarKinds<S>();
+    } else {
+      return SpatialKinds<S>();
+    }
+  };
+  static const std::vector<JointKind<Space, S>> kKinds = all();
+  return kKinds.at(static_cast<std::size_t>(type));
+}
+
+template <class Space, class S>
+JointKind<Space, S> KindWith(JointType type, S parameter) {
+  JointKind<Space, S> kind = KindOf<Space, S>(type);
+  kind.parameter = parameter;
+  if (type == JointType::kHelical) kind.per_speed = S(1) / (S(1) + parameter * parameter);
+  return kind;
+}
+
+template <class Space, class S>
+Motion<Space, S> Mismatch(const JointKind<Space, S>& kind, const Pose<Space, S>& X_FM) {
+  if (kind.coordinates == nullptr) {  // a rod: what it is too long along itself
+    Motion<Space, S> mismatch = Motion<Space, S>::Zero();
+    mismatch.template tail<Space::kLin>() = X_FM.p * (S(1) - kind.parameter / X_FM.p.norm());
+    return mismatch;
+  }
+  S q[7];
+  Pose<Space, S> nearest;
+  kind.coordinates(X_FM, q, kind.parameter);
+  kind.transform(q, nearest, kind.parameter);
+  Pose<Space, S> rest = Compose(X_FM, Inverse(nearest));
+  Motion<Space, S> mismatch;
+  mismatch << RotationVector(rest), X_FM.p - nearest.p;
+  // A loop may wind: planar angles along it then differ by whole turns that are no mismatch.
+  if constexpr (Space::kRot == 1) {
+    using std::remainder;
+    mismatch[0] = remainder(mismatch[0], S(2 * std::numbers::pi_v<S>));
+  }
+  return mismatch;
+}
+
+#define LOOPBENCH_INSTANTIATE(Space, S)                  \
+  template const JointKind<Space, S>& KindOf(JointType); \
+  template JointKind<Space, S> KindWith(JointType, S);   \
+  template Motion<Space, S> Mismatch(const JointKind<Space, S>&, const Pose<Space, S>&);
+LOOPBENCH_FOR_EACH_SPACE_AND_MODEL_SCALAR(LOOPBENCH_INSTANTIATE)
+#undef LOOPBENCH_INSTANTIATE
+
+}  // namespace loopbench

@@ -1,0 +1,83 @@
+// A joint kind: one small piece of code that says how frame M of body Q moves in frame F of body P.
+//
+// With q the coordinates and u the speeds of the joint (paper, table 1 and eq. 7-9):
+//   X_FM(q)        pose of M in F,
+//   H_F(q)         motion map: [w_FM; v_FMo] = H_F u, in F axes,
+//                  with orthogonal columns, which have unit length
+//                  in every kind but the helical one,
+//   D_F(q)         its orthogonal complement, D_F^T H_F = 0: the directions of constraint forces,
+//   qdot = N(q) u  kinematic rates,
+//   q*(X_FM)       the coordinates that a measured pose of M in F comes closest to; what is left of
+//                  the pose is the joint's mismatch (position drift).
+// The constraint of a joint is imposed at one point, the point of P that now coincides with Mo:
+//   A_Q - A_P = H udot + g,   g = Hdot u + [w_P x w_rel; 2 w_P x v_rel],                  (7)
+// w_rel, v_rel being the measured relative motion seen in F. With that g, "D^T (A_Q - A_P - g) = 0"
+// says that the mismatch, written in F axes, has no second derivative (to first order in a rotation
+// mismatch in space). For most kinds H_F is constant and Hdot u = 0.
+//
+// Coordinates, in F axes:
+//   revolute      angle about z
+//   prismatic     shift along x
+//   weld          none
+//   free          plane: angle, x, y; space: quaternion w x y z, then x, y, z
+//   pin-in-slot   angle about z, shift along x
+//   rod           none that is followed: the distance of Mo from Fo is constant, and D is along it
+//   cylindrical   angle about z, shift along z
+//   spherical     quaternion w x y z
+//   planar        angle about z, x, y
+//   universal     angle about x, then about the turned y
+//   helical       angle about z, along which it shifts by `pitch` times the angle
+// Speeds are their rates; with a quaternion, the angular velocity. A quaternion is normalised where
+// it is used, so its length carries no information.
+#pragma once
+
+#include <array>
+
+#include "mechanism/algebra/space.h"
+#include "mechanism/description/description.h"
+
+namespace loopbench {
+
+template <class Space, class S>
+struct JointKind {
+  int num_q = 0;
+  int num_u = 0;
+  /// Where every direction of H and D is a coordinate axis of F and constant: [H D] as a
+  /// permutation of the components of a motion, the num_u free ones first.
+  std::array<int, Space::kDim> axes{};
+  /// No rotation changes the span of D (a planar pin): D may then be taken in ground axes.
+  bool isotropic = false;
+
+  /// What the kinds helical (pitch [m/rad]) and rod (length [m]) depend on; 0 for others.
+  S parameter = S(0);
+  /// u = per_speed H^T V: one over H's squared length, which is 1 in every kind but the helical.
+  S per_speed = S(1);
+
+  void (*transform)(const S* q, Pose<Space, S>& X_FM, S parameter) = nullptr;
+  void (*coordinates)(const Pose<Space, S>& X_FM, S* q, S parameter) = nullptr;
+  void (*rates)(const S* q, const S* u, S* qdot) = nullptr;
+
+  /// Where directions are not axes: [H D] in F axes at a pose, orthogonal; null otherwise.
+  void (*basis)(const Pose<Space, S>& X_FM, Block<Space, S>& basis_F, S parameter) = nullptr;
+  /// And Hdot u in F axes, for a relative motion V in F axes; null where it is zero.
+  void (*bias)(const Pose<Space, S>& X_FM, const Motion<Space, S>& V,
+               Motion<Space, S>& Hdot_u) = nullptr;
+
+  bool has_quaternion() const { return num_q > num_u; }
+  int num_constraints() const { return Space::kDim - num_u; }
+};
+
+/// The kind's data and functions, with parameter zero. Lives forever.
+template <class Space, class S>
+const JointKind<Space, S>& KindOf(JointType type);
+
+/// The same for one joint, with its own parameter.
+template <class Space, class S>
+JointKind<Space, S> KindWith(JointType type, S parameter);
+
+/// What keeps M from its nearest admissible pose, in F axes: [rotation vector; shift]. Its
+/// components along D are the joint's mismatch [rad; m].
+template <class Space, class S>
+Motion<Space, S> Mismatch(const JointKind<Space, S>& kind, const Pose<Space, S>& X_FM);
+
+}  // namespace loopbench

@@ -1,0 +1,126 @@
+// What the joints measure at the current poses and motions: mismatches, coordinates, speeds.
+#include <cmath>
+#include <numbers>
+
+#include "mechanism/algebra/instantiate.h"
+#include "mechanism/model/kinematics.h"
+
+namespace loopbench {
+
+template <class Space, class S>
+Motion<Space, S> Kinematics<Space, S>::ConstraintMismatch(int index) const {
+  const Joint<Space, S>& joint = mechanism_->joints()[index];
+  const Motion<Space, S> in_F = Mismatch(*joint.kind, measured_[index]);
+  const Rotation<Space, S> R_WF = poses_[joint.from].R * joint.X_PF.R;
+  Motion<Space, S> mismatch = in_F;
+  mismatch.template tail<Space::kLin>().noalias() = R_WF * in_F.template tail<Space::kLin>();
+  if constexpr (Space::kRot == 3) {
+    mismatch.template head<3>().noalias() = R_WF * in_F.template head<3>();
+  }
+  if (joint.num_drives == 0) return mismatch;
+  S q[7];
+  joint.kind->coordinates(measured_[index], q, joint.kind->parameter);
+  for (int k = 0; k < joint.num_drives; ++k) {
+    const int drive = joint.first_drive + k, coordinate = mechanism_->drives()[drive].coordinate;
+    S miss = q[coordinate] - drives_[drive].value;
+    // an angle is measured modulo a turn, and which one a helix tells by its shift
+    const bool angle = joint.kind->axes[coordinate] < Space::kRot && joint.kind->parameter == S(0);
+    using std::remainder;
+    if (angle) miss = remainder(miss, S(2 * std::numbers::pi_v<S>));
+    mismatch += joints_[index].D(k) * miss;
+  }
+  return mismatch;
+}
+
+template <class Space, class S>
+Motion<Space, S> Kinematics<Space, S>::ConstraintSpeed(int index) const {
+  const Joint<Space, S>& joint = mechanism_->joints()[index];
+  const JointState<Space, S>& state = joints_[index];
+  Motion<Space, S> speed = Motion<Space, S>::Zero();
+  for (int i = 0; i < state.rows(); ++i) speed[i] = state.D(i).dot(state.V_rel);
+  for (int k = 0; k < joint.num_drives; ++k) {
+    speed[k] -= drives_[joint.first_drive + k].rate / joint.kind->per_speed;
+  }
+  return speed;
+}
+
+template <class Space, class S>
+S Kinematics<Space, S>::JointCoordinate(int index) const {
+  const Joint<Space, S>& joint = mechanism_->joints()[index];
+  if (joint.in_tree()) {
+    return joint.num_drives > 0 ? drives_[joint.first_drive].value : q_[joint.q_offset];
+  }
+  S q;
+  joint.kind->coordinates(measured_[index], &q, joint.kind->parameter);
+  if (joint.kind->parameter != S(0)) return q;  // a helix tells its turns
+  // Space measures an angle modulo a turn; take the one next to the last accepted.
+  if (Space::kRot == 3 && joint.kind->axes[0] < 3) {
+    const S turn = 2 * std::numbers::pi_v<S>;
+    using std::remainder;
+    q = accepted_[index] + remainder(q - accepted_[index], turn);
+  }
+  return q;
+}
+
+template <class Space, class S>
+S Kinematics<Space, S>::JointSpeed(int index) const {
+  const Joint<Space, S>& joint = mechanism_->joints()[index];
+  if (joint.in_tree()) {
+    return joint.num_drives > 0 ? drives_[joint.first_drive].rate : u_[joint.u_offset];
+  }
+  return joints_[index].H(0).dot(joints_[index].V_rel) * joint.kind->per_speed;
+}
+
+template <class Space, class S>
+void Kinematics<Space, S>::AcceptStep() {
+  for (int index : mechanism_->constraints()) {
+    if (mechanism_->joints()[index].kind->num_u == 1) accepted_[index] = JointCoordinate(index);
+  }
+}
+
+template <class Space, class S>
+Pose<Space, S> Kinematics<Space, S>::MeasuredPose(const Joint<Space, S>& joint) const {
+  return Compose(Inverse(Compose(poses_[joint.from], joint.X_PF)),
+                 Compose(poses_[joint.to], joint.X_QM));
+}
+
+template <class Space, class S>
+VectorX<S> Kinematics<Space, S>::CoordinatesIn(const Mechanism<Space, S>& other) const {
+  VectorX<S> q(other.num_q());
+  for (const TreeStep& step : other.tree()) {
+    const Joint<Space, S>& joint = other.joints()[step.joint];
+    S all[7];
+    joint.kind->coordinates(MeasuredPose(joint), all, joint.kind->parameter);
+    for (int i = 0, next = joint.q_offset; i < joint.kind->num_q; ++i) {
+      if (other.DriveOf(joint, i) < 0) q[next++] = all[i];
+    }
+  }
+  return q;
+}
+
+template <class Space, class S>
+VectorX<S> Kinematics<Space, S>::SpeedsIn(const Kinematics& other) const {
+  VectorX<S> u(other.mechanism().num_u());
+  for (const TreeStep& step : other.mechanism().tree()) {
+    const Joint<Space, S>& joint = other.mechanism().joints()[step.joint];
+    const JointState<Space, S>& state = other.joints()[step.joint];
+    const Motion<Space, S> V_rel = ShiftMotion<Space, S>(motions_[joint.to], state.r_Q) -
+                                   ShiftMotion<Space, S>(motions_[joint.from], state.r_P);
+    u.segment(joint.u_offset, state.num_u) =
+        joint.kind->per_speed * (state.H().transpose() * V_rel);
+  }
+  return u;
+}
+
+#define LOOPBENCH_INSTANTIATE(Space, S)                                                      \
+  template Motion<Space, S> Kinematics<Space, S>::ConstraintMismatch(int) const;             \
+  template Motion<Space, S> Kinematics<Space, S>::ConstraintSpeed(int) const;                \
+  template S Kinematics<Space, S>::JointCoordinate(int) const;                               \
+  template S Kinematics<Space, S>::JointSpeed(int) const;                                    \
+  template void Kinematics<Space, S>::AcceptStep();                                          \
+  template VectorX<S> Kinematics<Space, S>::CoordinatesIn(const Mechanism<Space, S>&) const; \
+  template VectorX<S> Kinematics<Space, S>::SpeedsIn(const Kinematics&) const;
+LOOPBENCH_FOR_EACH_SPACE_AND_MODEL_SCALAR(LOOPBENCH_INSTANTIATE)
+#undef LOOPBENCH_INSTANTIATE
+
+}  // namespace loopbench

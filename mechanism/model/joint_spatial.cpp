@@ -1,0 +1,262 @@
+#include <Eigen/Geometry>
+#include <cmath>
+#include <numbers>
+
+#include "mechanism/algebra/instantiate.h"
+#include "mechanism/model/joint_kinds.h"
+
+namespace loopbench {
+
+namespace {
+
+template <class S>
+struct Kinds {
+  using P = Pose<Spatial, S>;
+
+  static void TurnAboutZ(S angle, P& X) {
+    using std::cos;
+    using std::sin;
+    const S c = cos(angle), s = sin(angle);
+    X.R << c, -s, S(0), s, c, S(0), S(0), S(0), S(1);
+  }
+  static S AngleAboutZ(const P& X) {
+    using std::atan2;
+    return atan2(X.R(1, 0) - X.R(0, 1), X.R(0, 0) + X.R(1, 1));
+  }
+  static void FromQuaternion(const S* q, P& X) {
+    X.R = Eigen::Quaternion<S>(q[0], q[1], q[2], q[3]).normalized().toRotationMatrix();
+  }
+  static void ToQuaternion(const P& X, S* q) {
+    const Eigen::Quaternion<S> e(X.R);
+    q[0] = e.w();
+    q[1] = e.x();
+    q[2] = e.y();
+    q[3] = e.z();
+  }
+  /// The angular velocity is in F axes, hence the product from the left: e' = w e / 2.
+  static void QuaternionRates(const S* q, const S* u, S* qdot) {
+    const S half = S(1) / S(2);
+    qdot[0] = half * (-u[0] * q[1] - u[1] * q[2] - u[2] * q[3]);
+    qdot[1] = half * (u[0] * q[0] + u[1] * q[3] - u[2] * q[2]);
+    qdot[2] = half * (-u[0] * q[3] + u[1] * q[0] + u[2] * q[1]);
+    qdot[3] = half * (u[0] * q[2] - u[1] * q[1] + u[2] * q[0]);
+  }
+  /// The axes of a universal joint: x of F, y of M made normal to it, and the normal of both, about
+  /// which it does not turn.
+  static Rotation<Spatial, S> CrossAxes(const P& X) {
+    const Linear<Spatial, S> x = Linear<Spatial, S>::UnitX(), y_M = X.R.col(1);
+    const Linear<Spatial, S> normal = x.cross(y_M).normalized();
+    Rotation<Spatial, S> axes;
+    axes << x, normal.cross(x), normal;
+    return axes;
+  }
+
+  static JointKind<Spatial, S> Revolute() {
+    return {.num_q = 1,
+            .num_u = 1,
+            .axes = {2, 0, 1, 3, 4, 5},
+            .isotropic = false,
+            .transform =
+                [](const S* q, P& X, S) {
+                  TurnAboutZ(q[0], X);
+                  X.p.setZero();
+                },
+            .coordinates = [](const P& X, S* q, S) { q[0] = AngleAboutZ(X); },
+            .rates = SameRates<S, 1>};
+  }
+  static JointKind<Spatial, S> Prismatic() {
+    return {.num_q = 1,
+            .num_u = 1,
+            .axes = {3, 0, 1, 2, 4, 5},
+            .isotropic = false,
+            .transform =
+                [](const S* q, P& X, S) {
+                  X.R.setIdentity();
+                  X.p << q[0], S(0), S(0);
+                },
+            .coordinates = [](const P& X, S* q, S) { q[0] = X.p[0]; },
+            .rates = SameRates<S, 1>};
+  }
+  static JointKind<Spatial, S> Weld() {
+    return {.num_q = 0,
+            .num_u = 0,
+            .axes = {0, 1, 2, 3, 4, 5},
+            .isotropic = true,
+            .transform = [](const S*, P& X, S) { X = P(); },
+            .coordinates = [](const P&, S*, S) {},
+            .rates = SameRates<S, 0>};
+  }
+  static JointKind<Spatial, S> Free() {
+    return {.num_q = 7,
+            .num_u = 6,
+            .axes = {0, 1, 2, 3, 4, 5},
+            .isotropic = false,
+            .transform =
+                [](const S* q, P& X, S) {
+                  FromQuaternion(q, X);
+                  X.p << q[4], q[5], q[6];
+                },
+            .coordinates =
+                [](const P& X, S* q, S) {
+                  ToQuaternion(X, q);
+                  for (int i = 0; i < 3; ++i) q[4 + i] = X.p[i];
+                },
+            .rates =
+                [](const S* q, const S* u, S* qdot) {
+                  QuaternionRates(q, u, qdot);
+                  for (int i = 0; i < 3; ++i) qdot[4 + i] = u[3 + i];
+                }};
+  }
+  static JointKind<Spatial, S> PinInSlot() {
+    return {.num_q = 2,
+            .num_u = 2,
+            .axes = {2, 3, 0, 1, 4, 5},
+            .transform =
+                [](const S* q, P& X, S) {
+                  TurnAboutZ(q[0], X);
+                  X.p << q[1], S(0), S(0);
+                },
+            .coordinates =
+                [](const P& X, S* q, S) {
+                  q[0] = AngleAboutZ(X);
+                  q[1] = X.p[0];
+                },
+            .rates = SameRates<S, 2>};
+  }
+  static JointKind<Spatial, S> Cylindrical() {
+    return {.num_q = 2,
+            .num_u = 2,
+            .axes = {2, 5, 0, 1, 3, 4},
+            .transform =
+                [](const S* q, P& X, S) {
+                  TurnAboutZ(q[0], X);
+                  X.p << S(0), S(0), q[1];
+                },
+            .coordinates =
+                [](const P& X, S* q, S) {
+                  q[0] = AngleAboutZ(X);
+                  q[1] = X.p[2];
+                },
+            .rates = SameRates<S, 2>};
+  }
+  static JointKind<Spatial, S> Spherical() {
+    return {.num_q = 4,
+            .num_u = 3,
+            .axes = {0, 1, 2, 3, 4, 5},
+            .transform =
+                [](const S* q, P& X, S) {
+                  FromQuaternion(q, X);
+                  X.p.setZero();
+                },
+            .coordinates = [](const P& X, S* q, S) { ToQuaternion(X, q); },
+            .rates = QuaternionRates};
+  }
+  static JointKind<Spatial, S> InPlane() {
+    return {.num_q = 3,
+            .num_u = 3,
+            .axes = {2, 3, 4, 0, 1, 5},
+            .transform =
+                [](const S* q, P& X, S) {
+                  TurnAboutZ(q[0], X);
+                  X.p << q[1], q[2], S(0);
+                },
+            .coordinates =
+                [](const P& X, S* q, S) {
+                  q[0] = AngleAboutZ(X);
+                  q[1] = X.p[0];
+                  q[2] = X.p[1];
+                },
+            .rates = SameRates<S, 3>};
+  }
+  static JointKind<Spatial, S> Universal() {
+    return {.num_q = 2,
+            .num_u = 2,
+            .axes = {0, 1, 2, 3, 4, 5},
+            .transform =
+                [](const S* q, P& X, S) {
+                  using std::cos;
+                  using std::sin;
+                  const S c = cos(q[0]), s = sin(q[0]), cy = cos(q[1]), sy = sin(q[1]);
+                  X.R << cy, S(0), sy, s * sy, c, -s * cy, -c * sy, s, c * cy;
+                  X.p.setZero();
+                },
+            .coordinates =
+                [](const P& X, S* q, S) {
+                  using std::atan2;
+                  q[0] = atan2(X.R(2, 1), X.R(1, 1));
+                  q[1] = atan2(X.R(0, 2), X.R(0, 0));
+                },
+            .rates = SameRates<S, 2>,
+            .basis =
+                [](const P& X, Block<Spatial, S>& basis_F, S) {
+                  basis_F.setIdentity();
+                  basis_F.template topLeftCorner<3, 3>() = CrossAxes(X);
+                },
+            // the second axis turns about the first: d/dt y' = u0 (x cross y')
+            .bias =
+                [](const P& X, const Motion<Spatial, S>& V, Motion<Spatial, S>& Hdot_u) {
+                  const Rotation<Spatial, S> axes = CrossAxes(X);
+                  const Linear<Spatial, S> w = V.template head<3>();
+                  Hdot_u.setZero();
+                  Hdot_u.template head<3>() = axes.col(0).dot(w) * axes.col(1).dot(w) * axes.col(2);
+                }};
+  }
+
+  static JointKind<Spatial, S> Rod() {
+    return {.num_q = 0,
+            .num_u = 5,
+            .axes = {0, 1, 2, 3, 4, 5},
+            .basis =
+                [](const P& X, Block<Spatial, S>& basis_F, S) {
+                  const Linear<Spatial, S> n = X.p.normalized(), across = n.unitOrthogonal();
+                  basis_F.setIdentity();
+                  basis_F.template bottomRightCorner<3, 3>() << across, n.cross(across), n;
+                },
+            .bias = RodBias<Spatial, S>};
+  }
+  static JointKind<Spatial, S> Helical() {
+    return {.num_q = 1,
+            .num_u = 1,
+            .axes = {2, 0, 1, 3, 4, 5},
+            .transform =
+                [](const S* q, P& X, S pitch) {
+                  TurnAboutZ(q[0], X);
+                  X.p << S(0), S(0), pitch * q[0];
+                },
+            .coordinates =
+                [](const P& X, S* q, S pitch) {
+                  // the shift along the axis says in which turn the angle is
+                  using std::round;
+                  const S turn = 2 * std::numbers::pi_v<S>;
+                  q[0] = AngleAboutZ(X);
+                  if (pitch != S(0)) q[0] += turn * round((X.p[2] / pitch - q[0]) / turn);
+                },
+            .rates = SameRates<S, 1>,
+            .basis =
+                [](const P&, Block<Spatial, S>& basis_F, S pitch) {
+                  using std::sqrt;
+                  basis_F.setZero();
+                  basis_F(2, 0) = S(1);
+                  basis_F(5, 0) = pitch;
+                  for (int i = 0; i < 2; ++i) basis_F(i, 1 + i) = basis_F(3 + i, 3 + i) = S(1);
+                  const S length = sqrt(S(1) + pitch * pitch);
+                  basis_F(2, 5) = -pitch / length;
+                  basis_F(5, 5) = S(1) / length;
+                }};
+  }
+};
+
+}  // namespace
+
+template <class S>
+std::vector<JointKind<Spatial, S>> SpatialKinds() {
+  using K = Kinds<S>;
+  return {K::Revolute(),    K::Prismatic(), K::Weld(),    K::Free(),      K::PinInSlot(), K::Rod(),
+          K::Cylindrical(), K::Spherical(), K::InPlane(), K::Universal(), K::Helical()};
+}
+
+#define LOOPBENCH_INSTANTIATE(S) template std::vector<JointKind<Spatial, S>> SpatialKinds();
+LOOPBENCH_FOR_EACH_MODEL_SCALAR(LOOPBENCH_INSTANTIATE)
+#undef LOOPBENCH_INSTANTIATE
+
+}  // namespace loopbench

@@ -1,0 +1,285 @@
+#include "mechanism/model/kinematics.h"
+
+#include <algorithm>
+
+#include "mechanism/algebra/instantiate.h"
+
+namespace loopbench {
+
+namespace {
+
+/// A planar pose accumulates its matrix by products; one sine and cosine bring it back to its
+/// angle.
+template <class S>
+void Refresh(Pose<Planar, S>& X) {
+  X.SetAngle(X.angle);
+}
+template <class S>
+void Refresh(Pose<Spatial, S>&) {}
+
+/// [H D] with F axes R. A rotation has one axis in the plane.
+template <class Space, class S>
+void SetBasis(const JointKind<Space, S>& kind, const Rotation<Space, S>& R,
+              Block<Space, S>& basis) {
+  basis.setZero();
+  for (int i = 0; i < Space::kDim; ++i) {
+    const int axis = kind.axes[i];
+    if (axis >= Space::kRot) {
+      basis.col(i).template tail<Space::kLin>() = R.col(axis - Space::kRot);
+    } else if constexpr (Space::kRot == 1) {
+      basis(0, i) = S(1);
+    } else {
+      basis.col(i).template head<3>() = R.col(axis);
+    }
+  }
+}
+
+/// [H D] of a kind whose directions depend on the pose.
+template <class Space, class S>
+void SetBasisAt(const JointKind<Space, S>& kind, const Rotation<Space, S>& R,
+                const Pose<Space, S>& X_FM, Block<Space, S>& basis) {
+  Block<Space, S> in_F;
+  kind.basis(X_FM, in_F, kind.parameter);
+  basis.template bottomRows<Space::kLin>().noalias() = R * in_F.template bottomRows<Space::kLin>();
+  if constexpr (Space::kRot == 1) {
+    basis.template topRows<1>() = in_F.template topRows<1>();
+  } else {
+    basis.template topRows<3>().noalias() = R * in_F.template topRows<3>();
+  }
+}
+
+/// Ground axes serve for H and D where their spans do not depend on axes: nothing is prescribed or
+/// released of them.
+template <class Space, class S>
+bool AnyAxes(const Joint<Space, S>& joint) {
+  return joint.kind->isotropic && joint.num_drives == 0 && joint.num_released == 0;
+}
+
+}  // namespace
+
+template <class Space, class S>
+Kinematics<Space, S>::Kinematics(const Mechanism<Space, S>& mechanism)
+    : mechanism_(&mechanism),
+      poses_(mechanism.num_bodies()),
+      motions_(mechanism.num_bodies(), Motion<Space, S>::Zero()),
+      joints_(mechanism.joints().size()),
+      measured_(joints_.size()),
+      drives_(mechanism.drives().size()),
+      accepted_(joints_.size(), S(0)),
+      q_(VectorX<S>::Zero(mechanism.num_q())),
+      u_(VectorX<S>::Zero(mechanism.num_u())) {
+  SetTime(S(0));
+  for (std::size_t j = 0; j < joints_.size(); ++j) {
+    const Joint<Space, S>& joint = mechanism.joints()[j];
+    JointState<Space, S>& state = joints_[j];
+    state.num_u = joint.num_u();
+    state.num_rows = joint.num_constraints();
+    state.V_rel.setZero();
+    state.g.setZero();
+  }
+  Release(mechanism.released());
+}
+
+/// Directions that stand still are set once and for all.
+template <class Space, class S>
+void Kinematics<Space, S>::Release(const std::vector<Released>& released) {
+  released_ = released;
+  for (int j = 0; j < static_cast<int>(joints_.size()); ++j) {
+    const Joint<Space, S>& joint = mechanism_->joints()[j];
+    if (joint.kind->basis != nullptr) continue;
+    SetDirections(j, AnyAxes(joint) ? Rotation<Space, S>::Identity() : joint.X_PF.R, {});
+  }
+}
+
+template <class Space, class S>
+int Kinematics<Space, S>::DirectionOf(int index, int row) const {
+  const Joint<Space, S>& joint = mechanism_->joints()[index];
+  int direction = row - joint.num_drives;
+  const auto out = std::ranges::find(released_, index, &Released::joint);
+  if (out == released_.end()) return direction;
+  const int kept = joint.num_constraints() - joint.num_drives;
+  if (direction >= kept) return out->directions[direction - kept];
+  for (const int released : out->directions) direction += released <= direction;
+  return direction;
+}
+
+template <class Space, class S>
+void Kinematics<Space, S>::SetTime(S t) {
+  time_ = t;
+  for (std::size_t d = 0; d < drives_.size(); ++d) {
+    drives_[d] = mechanism_->drives()[d].value.At(t);
+  }
+}
+
+template <class Space, class S>
+const S* Kinematics<Space, S>::JointCoordinates(const Joint<Space, S>& joint, const VectorX<S>& q,
+                                                S* room) const {
+  const S* given = q.data() + joint.q_offset;
+  if (joint.num_drives == 0) return given;
+  for (int i = 0; i < joint.kind->num_q; ++i) {
+    const int drive = mechanism_->DriveOf(joint, i);
+    room[i] = drive >= 0 ? drives_[drive].value : *given++;
+  }
+  return room;
+}
+
+/// [H D] in ground axes; directions of prescribed coordinates go from H to the head of D, released
+/// ones to its end.
+template <class Space, class S>
+void Kinematics<Space, S>::SetDirections(int index, const Rotation<Space, S>& R_WF,
+                                         const Pose<Space, S>& X_FM) {
+  const Joint<Space, S>& joint = mechanism_->joints()[index];
+  JointState<Space, S>& state = joints_[index];
+  if (joint.kind->basis != nullptr) {
+    SetBasisAt<Space, S>(*joint.kind, R_WF, X_FM, state.basis);
+  } else {
+    SetBasis<Space, S>(*joint.kind, R_WF, state.basis);
+  }
+  if (joint.num_drives == 0 && joint.num_released == 0) return;
+  const Block<Space, S> all = state.basis;
+  int free = 0, driven = joint.num_u();
+  for (int i = 0; i < joint.kind->num_u; ++i) {
+    state.basis.col(mechanism_->DriveOf(joint, i) >= 0 ? driven++ : free++) = all.col(i);
+  }
+  if (joint.num_released == 0) return;
+  const std::vector<int>& out = std::ranges::find(released_, index, &Released::joint)->directions;
+  int kept = joint.kind->num_u, last = Space::kDim - joint.num_released;
+  for (int i = 0; i < joint.kind->num_constraints(); ++i) {
+    const bool is_out = std::ranges::binary_search(out, i);
+    state.basis.col(is_out ? last++ : kept++) = all.col(joint.kind->num_u + i);
+  }
+}
+
+template <class Space, class S>
+void Kinematics<Space, S>::UpdatePosition(const VectorX<S>& q) {
+  q_ = q;
+  ++position_version_;
+  Pose<Space, S> X_WF, X_WM, X_FM;
+  const auto finish = [&](int index, const Joint<Space, S>& joint) {
+    JointState<Space, S>& state = joints_[index];
+    state.r_P = X_WM.p - poses_[joint.from].p;
+    state.r_Q = X_WM.p - poses_[joint.to].p;
+    if (joint.kind->basis != nullptr) measured_[index] = X_FM;
+    if (joint.kind->basis != nullptr || (!AnyAxes(joint) && joint.from != kGround)) {
+      SetDirections(index, X_WF.R, X_FM);
+    }
+  };
+  S room[7];
+  for (const TreeStep& step : mechanism_->tree()) {
+    const Joint<Space, S>& joint = mechanism_->joints()[step.joint];
+    joint.kind->transform(JointCoordinates(joint, q, room), X_FM, joint.kind->parameter);
+    if (step.sign > 0) {
+      X_WF = Compose(poses_[step.parent], joint.X_PF);
+      X_WM = Compose(X_WF, X_FM);
+      poses_[step.child] = Compose(X_WM, Inverse(joint.X_QM));
+    } else {
+      X_WM = Compose(poses_[step.parent], joint.X_QM);
+      X_WF = Compose(X_WM, Inverse(X_FM));
+      poses_[step.child] = Compose(X_WF, Inverse(joint.X_PF));
+    }
+    Refresh(poses_[step.child]);
+    finish(step.joint, joint);
+  }
+  for (int index : mechanism_->constraints()) {
+    const Joint<Space, S>& joint = mechanism_->joints()[index];
+    X_WF = Compose(poses_[joint.from], joint.X_PF);
+    X_WM = Compose(poses_[joint.to], joint.X_QM);
+    X_FM = Compose(Inverse(X_WF), X_WM);
+    measured_[index] = X_FM;
+    finish(index, joint);
+  }
+}
+
+template <class Space, class S>
+void Kinematics<Space, S>::UpdateVelocity(const VectorX<S>& u) {
+  u_ = u;
+  const auto finish = [&](int index, const Joint<Space, S>& joint) {
+    JointState<Space, S>& state = joints_[index];
+    const Angular<Space, S> w_P = motions_[joint.from].template head<Space::kRot>();
+    const Angular<Space, S> w_rel = state.V_rel.template head<Space::kRot>();
+    const Linear<Space, S> v_rel = state.V_rel.template tail<Space::kLin>();
+    state.g << CrossAngular<S>(w_P, w_rel), S(2) * Cross<S>(w_P, v_rel);
+    if (joint.kind->bias != nullptr) AddBias(index, joint, state);
+    for (int k = 0; k < joint.num_drives; ++k) {
+      state.g += state.D(k) * drives_[joint.first_drive + k].acceleration;
+    }
+  };
+  for (const TreeStep& step : mechanism_->tree()) {
+    const Joint<Space, S>& joint = mechanism_->joints()[step.joint];
+    JointState<Space, S>& state = joints_[step.joint];
+    state.V_rel.setZero();
+    for (int i = 0; i < state.num_u; ++i) {
+      state.V_rel += state.H(i) * u[joint.u_offset + i];
+    }
+    for (int k = 0; k < joint.num_drives; ++k) {
+      state.V_rel += state.D(k) * drives_[joint.first_drive + k].rate;
+    }
+    const bool forward = step.sign > 0;
+    const Linear<Space, S>& r_parent = forward ? state.r_P : state.r_Q;
+    const Linear<Space, S> to_child = forward ? -state.r_Q : -state.r_P;
+    Motion<Space, S> V = ShiftMotion<Space, S>(motions_[step.parent], r_parent);
+    V += S(step.sign) * state.V_rel;
+    motions_[step.child] = ShiftMotion<Space, S>(V, to_child);
+    finish(step.joint, joint);
+  }
+  for (int index : mechanism_->constraints()) {
+    const Joint<Space, S>& joint = mechanism_->joints()[index];
+    JointState<Space, S>& state = joints_[index];
+    state.V_rel = ShiftMotion<Space, S>(motions_[joint.to], state.r_Q) -
+                  ShiftMotion<Space, S>(motions_[joint.from], state.r_P);
+    finish(index, joint);
+  }
+}
+
+/// g += Hdot u, which the kind knows in F axes.
+template <class Space, class S>
+void Kinematics<Space, S>::AddBias(int index, const Joint<Space, S>& joint,
+                                   JointState<Space, S>& state) const {
+  const Rotation<Space, S> R = poses_[joint.from].R * joint.X_PF.R;
+  Motion<Space, S> in_F = state.V_rel, bias;
+  in_F.template tail<Space::kLin>() = R.transpose() * state.V_rel.template tail<Space::kLin>();
+  if constexpr (Space::kRot == 3) {
+    in_F.template head<3>() = R.transpose() * state.V_rel.template head<3>();
+  }
+  joint.kind->bias(measured_[index], in_F, bias);
+  state.g.template tail<Space::kLin>() += R * bias.template tail<Space::kLin>();
+  if constexpr (Space::kRot == 3) {
+    state.g.template head<3>() += R * bias.template head<3>();
+  } else {
+    state.g[0] += bias[0];
+  }
+}
+
+template <class Space, class S>
+Motion<Space, S> Kinematics<Space, S>::Centripetal(int body, const Linear<Space, S>& r) const {
+  const Angular<Space, S> w = motions_[body].template head<Space::kRot>();
+  Motion<Space, S> A = Motion<Space, S>::Zero();
+  A.template tail<Space::kLin>() = Cross<S>(w, Linear<Space, S>(Cross<S>(w, r)));
+  return A;
+}
+
+template <class Space, class S>
+typename Inertia<Space, S>::Matrix Kinematics<Space, S>::RotationalInertia(
+    const Inertia<Space, S>& inertia, int body) const {
+  if constexpr (Space::kRot == 1) {
+    return inertia.rotational;
+  } else {
+    return poses_[body].R * inertia.rotational * poses_[body].R.transpose();
+  }
+}
+
+template <class Space, class S>
+typename Inertia<Space, S>::Matrix Kinematics<Space, S>::RotationalInverse(
+    const Inertia<Space, S>& inertia, int body) const {
+  if constexpr (Space::kRot == 1) {
+    return inertia.rotational_inverse;
+  } else {
+    return poses_[body].R * inertia.rotational_inverse * poses_[body].R.transpose();
+  }
+}
+
+#define LOOPBENCH_INSTANTIATE(Space, S) template class Kinematics<Space, S>;
+LOOPBENCH_FOR_EACH_SPACE_AND_MODEL_SCALAR(LOOPBENCH_INSTANTIATE)
+#undef LOOPBENCH_INSTANTIATE
+
+}  // namespace loopbench

@@ -1,0 +1,164 @@
+// Poses, motions and joint frames of a mechanism at one (q, u): the workspace all formulations
+// share.
+//
+// Everything is in ground axes. Bodies are represented at their centre of mass, joints at Mo, the
+// origin of the frame fixed on Q (see joint.h).
+#pragma once
+
+#include <span>
+#include <vector>
+
+#include "mechanism/model/mechanism.h"
+
+namespace loopbench {
+
+/// A joint at the current position and speed.
+template <class Space, class S>
+struct JointState {
+  Linear<Space, S> r_P, r_Q;  ///< Mo from the centres of mass of P and Q
+  Motion<Space, S> V_rel;     ///< [w_Q - w_P; v_Q - v_P] at Mo
+  Motion<Space, S> g;         ///< A_Q - A_P = H udot + g                            (7)
+  Block<Space, S> basis;      ///< [H D], orthogonal
+  int num_u = 0, num_rows = 0;
+
+  auto H() const { return basis.leftCols(num_u); }  ///< motion map
+  /// Constrained directions that are imposed, those of prescribed coordinates first.
+  auto D() const { return basis.middleCols(num_u, num_rows); }
+  /// All constrained directions: those imposed, then those released as redundant (redundancy.h).
+  auto AllD() const { return basis.rightCols(Space::kDim - num_u); }
+  auto H(int i) const { return basis.col(i); }
+  auto D(int i) const { return basis.col(num_u + i); }
+  int rows() const { return num_rows; }
+};
+
+template <class Space, class S>
+class Kinematics {
+ public:
+  explicit Kinematics(const Mechanism<Space, S>& mechanism);
+
+  /// The time [s] that prescribed motions and time-dependent forces are taken at; 0 until set. To
+  /// be called before the positions are updated.
+  void SetTime(S t);
+  S time() const { return time_; }
+  /// Values of the mechanism's drives at that time.
+  const std::vector<TimeValue<S>>& drives() const { return drives_; }
+
+  /// Poses, joint points and directions from q.
+  void UpdatePosition(const VectorX<S>& q);
+  /// Motions and g from u; positions must be current.
+  void UpdateVelocity(const VectorX<S>& u);
+
+  /// Counts UpdatePosition() calls: what was computed from positions is good while it stands.
+  long position_version() const { return position_version_; }
+
+  const Mechanism<Space, S>& mechanism() const { return *mechanism_; }
+  const std::vector<Pose<Space, S>>& poses() const { return poses_; }        ///< at the com
+  const std::vector<Motion<Space, S>>& motions() const { return motions_; }  ///< at the com
+  const std::vector<JointState<Space, S>>& joints() const { return joints_; }
+
+  /// Classical acceleration of the point of `body` at r from its centre of mass minus that of the
+  /// centre of mass, for zero angular acceleration: [0; w x (w x r)].
+  Motion<Space, S> Centripetal(int body, const Linear<Space, S>& r) const;
+
+  /// Rotational inertia of a body in ground axes, and its inverse.
+  typename Inertia<Space, S>::Matrix RotationalInertia(const Inertia<Space, S>& inertia,
+                                                       int body) const;
+  typename Inertia<Space, S>::Matrix RotationalInverse(const Inertia<Space, S>& inertia,
+                                                       int body) const;
+
+  /// Mo of a joint from the centres of P and Q that the masses are at.
+  Linear<Space, S> ArmP(int joint, Masses masses) const {
+    return Arm(mechanism_->joints()[joint].from, joints_[joint].r_P, masses);
+  }
+  Linear<Space, S> ArmQ(int joint, Masses masses) const {
+    return Arm(mechanism_->joints()[joint].to, joints_[joint].r_Q, masses);
+  }
+
+  /// Mo of a joint from the ground origin.
+  Linear<Space, S> JointPoint(int joint) const {
+    return poses_[mechanism_->joints()[joint].from].p + joints_[joint].r_P;
+  }
+
+  /// Mismatch of a constraint in ground axes: [rotation; shift], see joint.h. D^T of it is the
+  /// constraint function whose Jacobian is tree_dynamics.h's J.
+  Motion<Space, S> ConstraintMismatch(int joint) const;
+
+  /// D^T V_rel less the rates of prescribed coordinates: zero when a constraint holds at velocity
+  /// level. joints()[joint].rows() numbers, the others zero.
+  Motion<Space, S> ConstraintSpeed(int joint) const;
+
+  /// Measured coordinate and speed of a joint with one coordinate (q, u for tree joints).
+  S JointCoordinate(int joint) const;
+  S JointSpeed(int joint) const;
+
+  /// Directions that are not imposed from now on, as many of each joint as the mechanism releases.
+  /// Part of the mode; the positions must be updated afterwards.
+  void Release(const std::vector<Released>& released);
+  const std::vector<Released>& released() const { return released_; }
+  /// Which direction of its kind's D a row of a constraint imposes (not of a prescribed
+  /// coordinate).
+  int DirectionOf(int joint, int row) const;
+
+  /// Remembers the coordinates of cut joints, so that the next angles are unwrapped from here.
+  /// Called at accepted steps only (the one memory of this class, part of the mode).
+  void AcceptStep();
+
+  /// q of a mechanism with the same bodies, from body poses here (other coordinate set).
+  VectorX<S> CoordinatesIn(const Mechanism<Space, S>& other) const;
+  /// u likewise.
+  VectorX<S> SpeedsIn(const Kinematics& other) const;
+
+ private:
+  Linear<Space, S> Arm(int body, const Linear<Space, S>& r, Masses masses) const {
+    if (masses == Masses::kPhysical) return r;
+    return r - poses_[body].R * mechanism_->geometric_centre(body);
+  }
+  void AddBias(int index, const Joint<Space, S>& joint, JointState<Space, S>& state) const;
+  /// Coordinates of a tree joint, prescribed ones among them, in `room`.
+  const S* JointCoordinates(const Joint<Space, S>& joint, const VectorX<S>& q, S* room) const;
+  void SetDirections(int index, const Rotation<Space, S>& R_WF, const Pose<Space, S>& X_FM);
+  Pose<Space, S> MeasuredPose(const Joint<Space, S>& joint) const;
+
+  const Mechanism<Space, S>* mechanism_;
+  std::vector<Pose<Space, S>> poses_;
+  std::vector<Motion<Space, S>> motions_;
+  std::vector<JointState<Space, S>> joints_;
+  std::vector<Pose<Space, S>> measured_;  ///< X_FM of constraints and of kinds with a basis
+  std::vector<TimeValue<S>> drives_;
+  std::vector<S> accepted_;  ///< last accepted coordinate of each joint
+  std::vector<Released> released_;
+  VectorX<S> q_, u_;
+  S time_ = S(0);
+  long position_version_ = 0;
+};
+
+/// Wrench of applied forces at each body's centre of mass: gravity, forces at points and between
+/// points, joint forces (H tau on Q, the opposite on P), at time(). `wrenches` has one entry per
+/// body.
+template <class Space, class S>
+void AppliedForces(const Kinematics<Space, S>& kinematics, std::span<Motion<Space, S>> wrenches);
+
+/// Energies [J] at the current position and speed; potential is zero for centres of mass in the
+/// ground origin and springs at rest. Constant forces on points (ground axes) and joints, preloads
+/// among them, count as potentials; what AppliedPower() knows does not.
+template <class S>
+struct Energy {
+  S kinetic = S(0);
+  S potential = S(0);
+  S total() const { return kinetic + potential; }
+};
+template <class Space, class S>
+Energy<S> ComputeEnergy(const Kinematics<Space, S>& kinematics);
+
+/// Power [W] of the forces without a potential, at time(), position and speed:
+///   d/dt (kinetic + potential) = supplied - dissipated
+/// where the joints themselves do no work.
+template <class S>
+struct Power {
+  S supplied = S(0);    ///< torques that depend on time, forces that turn with a body; any sign
+  S dissipated = S(0);  ///< dampers and drag; >= 0
+};
+template <class Space, class S>
+Power<S> AppliedPower(const Kinematics<Space, S>& kinematics);
+
+}  // namespace loopbench

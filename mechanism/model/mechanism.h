@@ -1,0 +1,173 @@
+// A mechanism compiled for one space, one scalar and one coordinate set: immutable, shared by all
+// formulations. Every frame of a body is re-expressed from the body's centre of mass.
+#pragma once
+
+#include <memory>
+#include <string>
+#include <vector>
+
+#include "mechanism/description/topology.h"
+#include "mechanism/model/force_elements.h"
+#include "mechanism/model/joint.h"
+
+namespace loopbench {
+
+/// Mass properties about the centre of mass, in body axes.
+template <class Space, class S>
+struct Inertia {
+  using Matrix = Eigen::Matrix<S, Space::kRot, Space::kRot>;
+  S mass = S(0);
+  Matrix rotational = Matrix::Zero();
+  Matrix rotational_inverse = Matrix::Zero();
+};
+
+/// Which masses an evaluation uses: the bodies' own, or unit masses in the middle of each body's
+/// joints, for decisions of rank that must depend on geometry alone (docs/design.md D5).
+enum class Masses { kPhysical, kGeometric };
+
+/// Small on purpose: a long chain streams all of it through the cache at every evaluation.
+template <class Space, class S>
+struct Joint {
+  const JointKind<Space, S>* kind = nullptr;
+  int from = kGround, to = kGround;     ///< bodies P and Q
+  int q_offset = -1, u_offset = -1;     ///< place in q and u; -1 for a constraint
+  int row = -1;                         ///< first constraint row; -1 for a tree joint
+  int description = -1;                 ///< index of the user's joint, -1 for a virtual free joint
+  int first_drive = 0, num_drives = 0;  ///< its prescribed coordinates, in Mechanism::drives()
+  int num_released = 0;                 ///< directions of D that are not imposed (redundancy.h)
+  Pose<Space, S> X_PF, X_QM;            ///< seen from the centres of mass of P and Q
+
+  bool in_tree() const { return q_offset >= 0; }
+  /// The kind's numbers, with each prescribed coordinate counted as a constraint.
+  int num_q() const { return kind->num_q - num_drives; }
+  int num_u() const { return kind->num_u - num_drives; }
+  int num_constraints() const { return num_directions() - num_released; }
+  /// Constrained directions, imposed or released.
+  int num_directions() const { return kind->num_constraints() + num_drives; }
+};
+
+/// A prescribed coordinate of a joint. Directions of such coordinates are the first columns of D.
+struct Drive {
+  int joint = 0;
+  int coordinate = 0;  ///< of the kind
+  TimeFunction value;
+};
+
+/// Directions of one joint that it does not impose (redundancy.h), ascending, counted in D behind
+/// those of prescribed coordinates.
+struct Released {
+  int joint = 0;
+  std::vector<int> directions;
+
+  friend bool operator==(const Released&, const Released&) = default;
+};
+
+/// A tree joint seen from its root side. `sign` is +1 when the child is the joint's Q, else -1.
+struct TreeStep {
+  int joint = 0;
+  int parent = kGround;
+  int child = kGround;
+  int sign = 1;
+};
+
+template <class Space, class S>
+class Mechanism {
+ public:
+  /// Throws std::invalid_argument with the text of Validate() when the description is unusable, or
+  /// when the space cannot hold it.
+  Mechanism(const MechanismDescription& description, Coordinates coordinates);
+
+  const std::string& name() const { return name_; }
+  Coordinates coordinates() const { return coordinates_; }
+  int num_bodies() const { return static_cast<int>(bodies_.size()); }  ///< with Ground
+  int num_q() const { return num_q_; }
+  int num_u() const { return num_u_; }
+  int num_rows() const { return num_rows_; }  ///< scalar constraints of all cut joints
+  /// Independent loops of the user's graph, the same number in both coordinate sets.
+  int num_loops() const { return num_loops_; }
+  /// Free speeds of the user's spanning forest: num_u() in joint coordinates.
+  int num_joint_speeds() const { return num_joint_speeds_; }
+
+  const std::vector<Inertia<Space, S>>& bodies() const { return bodies_; }
+  const std::vector<std::string>& body_names() const { return body_names_; }
+  const std::vector<Joint<Space, S>>& joints() const { return joints_; }
+  /// A virtual free joint carries its body's name.
+  const std::vector<std::string>& joint_names() const { return joint_names_; }
+  /// Prescribed motions, by joint and coordinate.
+  const std::vector<Drive>& drives() const { return drives_; }
+  /// Index into drives() of a prescribed coordinate, -1 for a free one.
+  int DriveOf(const Joint<Space, S>& joint, int coordinate) const {
+    for (int d = joint.first_drive; d < joint.first_drive + joint.num_drives; ++d) {
+      if (drives_[d].coordinate == coordinate) return d;
+    }
+    return -1;
+  }
+  const std::vector<TreeStep>& tree() const { return tree_; }
+  const std::vector<int>& constraints() const { return constraints_; }  ///< joint indices
+  /// Directions that constraints do not impose at first, by joint; mostly none at all.
+  const std::vector<Released>& released() const { return released_; }
+  const ForceElements<Space, S>& forces() const { return forces_; }
+  const Linear<Space, S>& gravity() const { return gravity_; }
+  /// Whether something supplies or dissipates power: else the total energy stays.
+  bool has_power() const { return forces_.has_power() || !drives_.empty(); }
+  /// Times [s] at which derivatives of a prescribed motion or of a force jump, ascending: an
+  /// integrator must not step across them.
+  const std::vector<double>& stop_times() const { return stop_times_; }
+
+  /// Tree step that carries a body (index into tree()), -1 for Ground.
+  int step_of_body(int body) const { return step_of_body_[body]; }
+
+  /// Root mean square distance of joints from the middle of their body's joints [m], over bodies
+  /// with several; without such, of joints from centres of mass; 1 when all are zero.
+  S length() const { return length_; }
+
+  /// kGeometric: unit masses whose radius of gyration is length() of their own island (islands.h),
+  /// about geometric_centre(): parts of other sizes and far centres of mass say nothing.
+  const std::vector<Inertia<Space, S>>& bodies(Masses masses) const {
+    return masses == Masses::kPhysical ? bodies_ : geometric_bodies_;
+  }
+  /// Middle of a body's joints from its centre of mass, in body axes; zero for Ground and for
+  /// bodies without joints.
+  const Linear<Space, S>& geometric_centre(int body) const { return geometric_centres_[body]; }
+
+  /// Names of the speeds: "<joint>" or "<joint>.<component>"; virtual joints carry the body's name.
+  const std::vector<std::string>& speed_names() const { return speed_names_; }
+  /// Indices of the user's independent speeds that exist in this coordinate set.
+  const std::vector<int>& independent() const { return independent_; }
+
+  /// Quaternions in q to length one.
+  void Normalise(VectorX<S>& q) const;
+
+  /// qdot = N(q) u.
+  void Rates(const VectorX<S>& q, const VectorX<S>& u, Eigen::Ref<VectorX<S>> qdot) const;
+
+ private:
+  void AddBodies(const MechanismDescription& description);
+  void AddJoints(const MechanismDescription& description, const Topology& topology);
+  Joint<Space, S> MakeJoint(const MechanismDescription& description, int index);
+  void AddStopTimes();
+  void AddGeometry(const MechanismDescription& description);
+  void NameSpeeds(const MechanismDescription& description);
+
+  std::string name_;
+  Coordinates coordinates_;
+  int num_q_ = 0, num_u_ = 0, num_rows_ = 0, num_loops_ = 0, num_joint_speeds_ = 0;
+  std::vector<Inertia<Space, S>> bodies_, geometric_bodies_;
+  std::vector<Linear<Space, S>> geometric_centres_;
+  std::vector<std::string> body_names_, joint_names_;
+  std::vector<Joint<Space, S>> joints_;
+  /// Kinds with a parameter of their own; shared by copies of the mechanism.
+  std::vector<std::shared_ptr<const JointKind<Space, S>>> own_kinds_;
+  std::vector<Drive> drives_;
+  std::vector<double> stop_times_;
+  std::vector<TreeStep> tree_;
+  std::vector<int> constraints_, step_of_body_;
+  std::vector<Released> released_;
+  ForceElements<Space, S> forces_;
+  Linear<Space, S> gravity_;
+  S length_ = S(1);
+  std::vector<std::string> speed_names_;
+  std::vector<int> independent_;
+};
+
+}  // namespace loopbench

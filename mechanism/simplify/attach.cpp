@@ -1,0 +1,131 @@
+#include "mechanism/simplify/attach.h"
+
+#include <algorithm>
+
+#include "mechanism/description/islands.h"
+
+namespace loopbench {
+
+namespace {
+
+using Matrix3 = Eigen::Matrix3d;
+using Vector3 = Eigen::Vector3d;
+
+struct IsKnown {
+  bool operator()(const JointTorque&) const { return true; }
+  bool operator()(const JointSpring&) const { return true; }
+  bool operator()(const JointDamper&) const { return true; }
+  bool operator()(const PointForce&) const { return true; }
+  bool operator()(const SpringDamper&) const { return true; }
+  bool operator()(const Drag&) const { return true; }
+  template <class Other>
+  bool operator()(const Other&) const {
+    return false;
+  }
+};
+
+/// Inertia of a point mass m at r.
+Matrix3 PointInertia(double m, const Vector3& r) {
+  return m * (r.squaredNorm() * Matrix3::Identity() - r * r.transpose());
+}
+
+/// The carrier with the mass of another body, given by its place.
+void AddMass(const BodyDescription& body, const Pose<Spatial, double>& X,
+             BodyDescription* carrier) {
+  const Vector3 com = X.R * body.com + X.p;
+  const double mass = carrier->mass + body.mass;
+  const Vector3 joint_com = (carrier->mass * carrier->com + body.mass * com) / mass;
+  carrier->inertia += PointInertia(carrier->mass, carrier->com - joint_com) +
+                      X.R * body.inertia * X.R.transpose() +
+                      PointInertia(body.mass, com - joint_com);
+  carrier->inertia = (0.5 * (carrier->inertia + carrier->inertia.transpose())).eval();
+  carrier->com = joint_com;
+  carrier->mass = mass;
+}
+
+void MoveSide(const Attachment& at, SpaceKind space, JointSide* side) {
+  side->body = at.carrier;
+  side->position = at.X.R * side->position + at.X.p;
+  if (space == SpaceKind::kPlanar) {
+    side->position.z() = 0.0;
+    side->rotation.z() += at.turn;
+    return;
+  }
+  const Eigen::AngleAxisd turned(at.X.R * PoseOf(*side).R);
+  side->rotation = turned.angle() * turned.axis();
+}
+
+/// A point of a body, seen from the carrier.
+void MovePoint(const std::vector<Attachment>& attachments, int* body, Vector3* at) {
+  const Attachment& attachment = attachments[*body];
+  if (!attachment.attached) return;
+  *body = attachment.carrier;
+  *at = attachment.X.R * *at + attachment.X.p;
+}
+
+}  // namespace
+
+bool KnowsForces(const MechanismDescription& description) {
+  return std::ranges::all_of(description.forces, [](const ForceDescription& force) {
+    return std::visit(IsKnown(), force);
+  });
+}
+
+MechanismDescription Attach(const MechanismDescription& description,
+                            const std::vector<Attachment>& attachments, Renumbering* renumbering) {
+  MechanismDescription changed = description;
+  const std::size_t num_bodies = description.bodies.size();
+  std::vector<int> carrier(num_bodies);
+  renumbering->bodies.assign(num_bodies, -1);
+  int kept = 0;
+  for (std::size_t i = 0; i < num_bodies; ++i) {
+    const Attachment& at = attachments[i];
+    carrier[i] = at.attached ? at.carrier : static_cast<int>(i);
+    if (!at.attached) {
+      renumbering->bodies[i] = kept++;
+      continue;
+    }
+    BodyDescription& whole = changed.bodies[at.carrier];
+    if (at.carrier != kGround) AddMass(description.bodies[i], at.X, &whole);
+    for (const auto& [name, p] : description.bodies[i].points) {
+      whole.points[description.bodies[i].name + "." + name] = at.X.R * p + at.X.p;
+    }
+  }
+  renumbering->joints.assign(description.joints.size(), -1);
+  int joints = 0;
+  for (std::size_t j = 0; j < description.joints.size(); ++j) {
+    JointDescription& joint = changed.joints[j];
+    for (JointSide* side : {&joint.from, &joint.to}) {
+      const Attachment& at = attachments[side->body];
+      if (at.attached) MoveSide(at, description.space, side);
+    }
+    if (joint.from.body != joint.to.body) renumbering->joints[j] = joints++;
+  }
+  for (ForceDescription& force : changed.forces) {
+    if (auto* point = std::get_if<PointForce>(&force); point != nullptr) {
+      const Attachment& at = attachments[point->body];
+      if (at.attached && point->in_body_axes) point->force = at.X.R * point->force;
+      MovePoint(attachments, &point->body, &point->at);
+    } else if (auto* drag = std::get_if<Drag>(&force); drag != nullptr) {
+      MovePoint(attachments, &drag->point.body, &drag->point.at);
+    } else if (auto* spring = std::get_if<SpringDamper>(&force); spring != nullptr) {
+      MovePoint(attachments, &spring->from.body, &spring->from.at);
+      MovePoint(attachments, &spring->to.body, &spring->to.at);
+    }
+  }
+  MechanismDescription result = Select(changed, *renumbering);
+  for (const Island& island : FindIslands(description)) {
+    const int root = island.bodies.front();
+    const Vector3& com = description.bodies[root].com;
+    if (island.grounded || carrier[root] != root || changed.bodies[root].com == com) continue;
+    JointDescription free;
+    free.name = description.bodies[root].name;
+    free.type = JointType::kFree;
+    free.to.body = renumbering->bodies[root];
+    free.to.position = com;
+    result.joints.push_back(free);
+  }
+  return result;
+}
+
+}  // namespace loopbench

@@ -1,0 +1,36 @@
+// Bodies fixed to other bodies: the description without them, and where they went.
+//
+// Welded bodies are fixed to one of their number, immovable ones to Ground. Mass, centre of mass
+// and inertia are those of the whole (parallel axes); points, joints and forces are re-expressed in
+// the carrier's axes. A joint's own frames stay where they are, so its coordinates keep their
+// meaning.
+#pragma once
+
+#include <vector>
+
+#include "mechanism/description/joint_frames.h"
+#include "mechanism/description/parts.h"
+
+namespace loopbench {
+
+/// Where a body sits on its carrier.
+struct Attachment {
+  int carrier = kGround;    ///< a body that is not attached itself
+  Pose<Spatial, double> X;  ///< the body's axes and origin in the carrier's
+  double turn = 0.0;        ///< plane: its angle as a number, not modulo a turn
+  bool attached = false;    ///< else the body stays and the rest does not matter
+};
+
+/// Whether this code knows all forces of the description. Those it does not know may depend on what
+/// a transformation does not keep, so nothing is transformed then.
+bool KnowsForces(const MechanismDescription& description);
+
+/// The description without the attached bodies. Joints between bodies of one carrier are dropped,
+/// with the forces in them, as are forces on Ground. A part that floated keeps its place: where its
+/// first body gains mass, an explicit free joint of that body's name takes the virtual one's place.
+///
+/// `attachments` has one entry per body.
+MechanismDescription Attach(const MechanismDescription& description,
+                            const std::vector<Attachment>& attachments, Renumbering* renumbering);
+
+}  // namespace loopbench

@@ -1,0 +1,234 @@
+#include "mechanism/simplify/compile.h"
+
+#include <algorithm>
+#include <stdexcept>
+
+#include "mechanism/description/parts.h"
+#include "mechanism/description/topology.h"
+#include "mechanism/simplify/immovable.h"
+#include "mechanism/simplify/plane.h"
+#include "mechanism/simplify/redundancy.h"
+#include "mechanism/simplify/welds.h"
+
+namespace loopbench {
+
+namespace {
+
+std::string Number(double value) {
+  char text[32];
+  std::snprintf(text, sizeof text, "%.6g", value);
+  return text;
+}
+
+/// Whether loops are cut where they were. Another joint that closes one may carry a guess, which
+/// Assemble() refuses.
+bool KeepsCuts(const MechanismDescription& before, const MechanismDescription& after,
+               const Renumbering& renumbering) {
+  std::vector<bool> was_cut(after.joints.size(), false);
+  for (const int joint : BuildTopology(before, Coordinates::kJoint).constraints) {
+    if (renumbering.joints[joint] >= 0) was_cut[renumbering.joints[joint]] = true;
+  }
+  return std::ranges::all_of(BuildTopology(after, Coordinates::kJoint).constraints,
+                             [&](int joint) { return was_cut[joint]; });
+}
+
+class Compiler {
+ public:
+  Compiler(const MechanismDescription& description, const CompileOptions& options)
+      : options_(options), name_(description.name) {
+    CompiledPart whole;
+    whole.description = description;
+    result_.parts.push_back(std::move(whole));
+    result_.done = CompileOptions::None();
+    for (std::size_t i = 0; i < description.bodies.size(); ++i) {
+      BodyImage image;
+      image.part = i == kGround ? -1 : 0;
+      image.body = static_cast<int>(i);
+      result_.bodies.push_back(image);
+      names_.push_back(description.bodies[i].name);
+    }
+    for (std::size_t j = 0; j < description.joints.size(); ++j) {
+      result_.joints.push_back({.part = 0, .joint = static_cast<int>(j)});
+    }
+  }
+
+  Compiled Run() {
+    if (options_.welds) result_.done.welds = AttachAll(FindWelded(whole()), "welded");
+    if (options_.immovable) {
+      result_.done.immovable = AttachAll(FindImmovable(whole()), "cannot move, fixed");
+    }
+    if (options_.islands) SplitIslands();
+    if (options_.planar) {
+      for (int part = 0; part < static_cast<int>(result_.parts.size()); ++part) Flatten(part);
+    }
+    if (options_.redundancy) {
+      for (CompiledPart& part : result_.parts) ReleaseRedundant(part.description);
+    }
+    return std::move(result_);
+  }
+
+ private:
+  MechanismDescription& whole() { return result_.parts.front().description; }
+
+  /// True when something was attached.
+  bool AttachAll(const std::vector<Attachment>& attachments, const std::string& how) {
+    const auto count = std::ranges::count_if(attachments, &Attachment::attached);
+    if (count == 0) return false;
+    if (count + 1 == static_cast<std::ptrdiff_t>(attachments.size())) {
+      result_.report.push_back("nothing can move: all bodies are kept as they are");
+      return false;
+    }
+    Renumbering renumbering;
+    const MechanismDescription before = whole();
+    MechanismDescription after = Attach(before, attachments, &renumbering);
+    if (!KeepsCuts(before, after, renumbering)) {
+      result_.report.push_back("bodies that could be " + how +
+                               " to others are kept: a joint with an initial value would have to "
+                               "close a loop");
+      return false;
+    }
+    for (std::size_t i = 1; i < attachments.size(); ++i) {
+      if (!attachments[i].attached) continue;
+      result_.report.push_back("body \"" + before.bodies[i].name + "\": " + how + " to \"" +
+                               before.bodies[attachments[i].carrier].name + "\"");
+    }
+    whole() = std::move(after);
+    for (BodyImage& image : result_.bodies) {
+      if (image.part < 0) continue;
+      const Attachment& at = attachments[image.body];
+      const int carrier = at.attached ? at.carrier : image.body;
+      if (at.attached) {
+        image.X = Compose(at.X, image.X);
+        image.turn += at.turn;
+      }
+      image.body = renumbering.bodies[carrier];
+      if (image.body == kGround) image.part = -1;
+    }
+    for (JointImage& image : result_.joints) {
+      if (image.joint >= 0) image.joint = renumbering.joints[image.joint];
+      if (image.joint < 0) image.part = -1;
+    }
+    return true;
+  }
+
+  void SplitIslands() {
+    const MechanismDescription all = whole();
+    const std::vector<Island> islands = FindIslands(all);
+    if (islands.size() < 2) return;
+    result_.done.islands = true;
+    result_.parts.clear();
+    std::vector<int> part_of(all.bodies.size(), -1), place(all.bodies.size(), -1);
+    std::vector<int> joint_part(all.joints.size(), -1), joint_place(all.joints.size(), -1);
+    for (Part& part : Split(all, islands)) {
+      const int index = static_cast<int>(result_.parts.size());
+      for (std::size_t b = 1; b < part.bodies.size(); ++b) {
+        part_of[part.bodies[b]] = index;
+        place[part.bodies[b]] = static_cast<int>(b);
+      }
+      for (std::size_t j = 0; j < part.joints.size(); ++j) {
+        joint_part[part.joints[j]] = index;
+        joint_place[part.joints[j]] = static_cast<int>(j);
+      }
+      result_.parts.push_back({.description = std::move(part.description)});
+    }
+    for (BodyImage& image : result_.bodies) {
+      if (image.part < 0) continue;
+      image.part = part_of[image.body];
+      image.body = place[image.body];
+    }
+    for (JointImage& image : result_.joints) {
+      if (image.part < 0) continue;
+      image.part = joint_part[image.joint];
+      image.joint = joint_place[image.joint];
+    }
+    result_.report.push_back(std::to_string(islands.size()) +
+                             " parts that have nothing to do with each other: one system each");
+  }
+
+  void Flatten(int part) {
+    CompiledPart& one = result_.parts[part];
+    if (one.description.space == SpaceKind::kPlanar) return;
+    const std::string& name = one.description.name;
+    std::string why;
+    const std::optional<InPlane> plane = ExpressInPlane(one.description, &why);
+    if (!plane) {
+      result_.report.push_back(name + " stays spatial: " + why);
+      return;
+    }
+    result_.done.planar = true;
+    const Eigen::Vector3d n = plane->R_WC.col(2);
+    result_.report.push_back(name + " moves in planes normal to (" + Number(n.x()) + ", " +
+                             Number(n.y()) + ", " + Number(n.z()) + "): planar");
+    if (plane->gravity_dropped != 0.0) {
+      result_.report.push_back(name + ": gravity along the normal is borne by the joints: " +
+                               Number(plane->gravity_dropped) + " m/s^2 dropped");
+    }
+    for (const double force : plane->force_dropped) {
+      if (force == 0.0) continue;
+      result_.report.push_back(name + ": a force along the normal is borne by the joints: " +
+                               Number(force) + " N dropped");
+    }
+    for (BodyImage& image : result_.bodies) {
+      if (image.part == part) image.X = Compose(plane->X_CB[image.body], image.X);
+    }
+    for (JointImage& image : result_.joints) {
+      if (image.part == part) image.mirrored = plane->mirrored[image.joint];
+    }
+    one.R_WC = plane->R_WC;
+    one.description = plane->description;
+  }
+
+  void ReleaseRedundant(MechanismDescription& description) {
+    const Redundancy redundancy = FindRedundancy(description);
+    for (const Released& out : redundancy.released) {
+      for (const int direction : out.directions) {
+        result_.report.push_back("joint \"" + description.joints[out.joint].name +
+                                 "\": " + NameOfDirection(description, out.joint, direction) +
+                                 " is released: the other constraints hold it at every position");
+      }
+    }
+    if (redundancy.released.empty()) return;
+    result_.done.redundancy = true;
+    description = Release(description, redundancy);
+  }
+
+  CompileOptions options_;
+  std::string name_;
+  std::vector<std::string> names_;
+  Compiled result_;
+};
+
+}  // namespace
+
+Compiled Compile(const MechanismDescription& description, const CompileOptions& options) {
+  if (const std::string error = Validate(description); !error.empty()) {
+    throw std::invalid_argument(error);
+  }
+  return Compiler(description, options).Run();
+}
+
+template <class Space>
+Pose<Spatial, double> UserPose(const Compiled& compiled, int body,
+                               const Kinematics<Space, double>* kinematics) {
+  const BodyImage& image = compiled.bodies[body];
+  if (image.part < 0) return image.X;
+  const CompiledPart& part = compiled.parts[image.part];
+  const Pose<Space, double>& at_com = kinematics->poses()[image.body];
+  Pose<Spatial, double> X;  // of the part's body, at its centre of mass
+  if constexpr (Space::kRot == 1) {
+    X.R.topLeftCorner<2, 2>() = at_com.R;
+    X.p.head<2>() = at_com.p;
+  } else {
+    X = at_com;
+  }
+  const Eigen::Vector3d& com = part.description.bodies[image.body].com;
+  X.p -= Space::kRot == 1 ? Eigen::Vector3d(X.R * Eigen::Vector3d(com.x(), com.y(), 0.0))
+                          : Eigen::Vector3d(X.R * com);
+  X = Compose(X, image.X);
+  return {part.R_WC * X.R, part.R_WC * X.p};
+}
+
+template Pose<Spatial, double> UserPose(const Compiled&, int, const Kinematics<Planar, double>*);
+template Pose<Spatial, double> UserPose(const Compiled&, int, const Kinematics<Spatial, double>*);
+
+}  // namespace loopbench

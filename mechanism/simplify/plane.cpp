@@ -1,0 +1,254 @@
+#include "mechanism/simplify/plane.h"
+
+#include <algorithm>
+#include <cmath>
+
+#include "mechanism/description/islands.h"
+#include "mechanism/description/joint_frames.h"
+
+namespace loopbench {
+
+namespace {
+
+using Matrix3 = Eigen::Matrix3d;
+using Vector3 = Eigen::Vector3d;
+
+struct Kind {
+  bool qualifies = false;
+  bool turns = false;   ///< about z of its frames, which must be along n
+  bool slides = false;  ///< along x of F, which must be across n
+};
+
+Kind KindOfJoint(JointType type) {
+  switch (type) {
+    case JointType::kRevolute:
+    case JointType::kPlanar:
+      return {.qualifies = true, .turns = true, .slides = false};
+    case JointType::kPinInSlot:
+      return {.qualifies = true, .turns = true, .slides = true};
+    case JointType::kPrismatic:
+      return {.qualifies = true, .turns = false, .slides = true};
+    case JointType::kWeld:
+      return {.qualifies = true, .turns = false, .slides = false};
+    default:  // also kinds that are new to this code
+      return {};
+  }
+}
+
+Pose<Spatial, double> FrameOf(const JointDescription& joint, const JointSide& side) {
+  Pose<Spatial, double> X = PoseOf(side);
+  X.R = X.R * AxisAlignment(joint);
+  return X;
+}
+
+/// Axes with z = n, x as near to the old x (or y) as that allows; unchanged when n is z.
+Matrix3 AxesWithNormal(const Vector3& n) {
+  const Vector3 near = std::abs(n.x()) < 0.9 ? Vector3::UnitX() : Vector3::UnitY();
+  const Vector3 x = (near - near.dot(n) * n).normalized();
+  Matrix3 axes;
+  axes << x, n.cross(x), n;
+  return axes;
+}
+
+class Search {
+ public:
+  explicit Search(const MechanismDescription& description)
+      : d_(description),
+        normal_(description.bodies.size(), Vector3::Zero()),
+        height_(description.bodies.size(), 0.0) {}
+
+  std::string Why() {
+    if (d_.space == SpaceKind::kPlanar) return "it is planar already";
+    if (!KnowsForces(d_)) return "it has forces that may leave a plane";
+    for (const JointDescription& joint : d_.joints) {
+      if (!KindOfJoint(joint.type).qualifies) {
+        return "joint \"" + joint.name + "\" is " + std::string(ToString(joint.type));
+      }
+      const bool one = joint.type == JointType::kRevolute || joint.type == JointType::kPrismatic;
+      if (!joint.motions.empty() && !one) {
+        return "joint \"" + joint.name + "\" follows a given motion in one of several coordinates";
+      }
+    }
+    for (const Island& island : FindIslands(d_)) {
+      if (!island.grounded) return "\"" + d_.bodies[island.bodies.front()].name + "\" floats";
+    }
+    const auto seed = std::ranges::find_if(
+        d_.joints, [](const JointDescription& joint) { return KindOfJoint(joint.type).turns; });
+    if (seed == d_.joints.end()) return "nothing turns";
+    const std::string fault = Spread(static_cast<int>(seed - d_.joints.begin()));
+    return fault.empty() ? TiltedSpring() : fault;
+  }
+
+  InPlane Express() const;
+
+ private:
+  /// Normals and heights from body to body, each joint checked. "" when all agree.
+  std::string Spread(int seed) {
+    const JointDescription& first = d_.joints[seed];
+    std::vector<bool> known(d_.bodies.size(), false);
+    std::vector<int> queue = {first.from.body};
+    normal_[queue[0]] = FrameOf(first, first.from).R.col(2);
+    known[queue[0]] = true;
+    for (std::size_t k = 0; k < queue.size(); ++k) {
+      for (const JointDescription& joint : d_.joints) {
+        for (const auto& [here, there] :
+             {std::pair{&joint.from, &joint.to}, {&joint.to, &joint.from}}) {
+          if (here->body != queue[k]) continue;
+          const Pose<Spatial, double> X_here = FrameOf(joint, *here),
+                                      X_there = FrameOf(joint, *there);
+          const Vector3 in_frame = X_here.R.transpose() * normal_[here->body];
+          const Kind kind = KindOfJoint(joint.type);
+          if ((kind.turns && in_frame.head<2>().norm() > kParallel) ||
+              (kind.slides && std::abs(in_frame.x()) > kParallel)) {
+            return "joint \"" + joint.name + "\" leaves the plane of the others";
+          }
+          const Vector3 normal = X_there.R * in_frame;
+          const double height =
+              height_[here->body] + normal_[here->body].dot(X_here.p) - normal.dot(X_there.p);
+          if (!known[there->body]) {
+            known[there->body] = true;
+            normal_[there->body] = normal.normalized();
+            height_[there->body] = height;
+            queue.push_back(there->body);
+            continue;
+          }
+          const double arms = 1.0 + std::abs(height) + X_here.p.norm() + X_there.p.norm();
+          if ((normal - normal_[there->body]).norm() > kParallel * 4 ||
+              std::abs(height - height_[there->body]) > kParallel * arms) {
+            return "the loop through joint \"" + joint.name + "\" is not level";
+          }
+        }
+      }
+    }
+    const Vector3 n = normal_[kGround];
+    Eigen::Index largest = 0;
+    n.cwiseAbs().maxCoeff(&largest);
+    const double zero = height_[kGround];
+    for (std::size_t i = 0; i < normal_.size(); ++i) {
+      height_[i] -= zero;
+      if (n[largest] < 0.0) normal_[i] = -normal_[i], height_[i] = -height_[i];
+    }
+    return "";
+  }
+
+  /// The distance of points at two heights is no distance in the plane.
+  std::string TiltedSpring() const {
+    const auto height = [&](const BodyPoint& point) {
+      return height_[point.body] + normal_[point.body].dot(point.at);
+    };
+    for (const ForceDescription& force : d_.forces) {
+      const auto* spring = std::get_if<SpringDamper>(&force);
+      if (spring == nullptr) continue;
+      const double from = height(spring->from), to = height(spring->to);
+      const double arms = 1.0 + std::abs(from) + spring->from.at.norm() + spring->to.at.norm();
+      if (std::abs(from - to) > kParallel * arms) {
+        return "a spring between \"" + d_.bodies[spring->from.body].name + "\" and \"" +
+               d_.bodies[spring->to.body].name + "\" is not level";
+      }
+    }
+    return "";
+  }
+
+  const MechanismDescription& d_;
+  std::vector<Vector3> normal_;  ///< n in body axes
+  std::vector<double> height_;   ///< of the body's origin along n, from the ground's [m]
+};
+
+/// Without its part along z.
+Vector3 Flat(const Vector3& v) { return {v.x(), v.y(), 0.0}; }
+
+/// One joint's sides in the new axes: positions and angles within the plane.
+void FlattenJoint(const std::vector<Matrix3>& axes, const std::vector<Vector3>& normal,
+                  JointDescription* joint, bool* mirrored) {
+  const Pose<Spatial, double> X_PF = FrameOf(*joint, joint->from),
+                              X_QM = FrameOf(*joint, joint->to);
+  const Vector3 n_F = X_PF.R.transpose() * normal[joint->from.body];
+  // any direction of the frames across n serves to measure angles; the slide must be one
+  const Vector3 across = std::abs(n_F.x()) < 0.5 ? Vector3::UnitX() : Vector3::UnitY();
+  const auto flatten = [&](const Pose<Spatial, double>& X, JointSide* side) {
+    const Matrix3& R = axes[side->body];
+    const Vector3 along = R.transpose() * (X.R * across);
+    side->rotation = {0.0, 0.0, std::atan2(along.y(), along.x())};
+    side->position = Flat(R.transpose() * side->position);
+  };
+  flatten(X_PF, &joint->from);
+  flatten(X_QM, &joint->to);
+  joint->axis.setZero();
+  if (KindOfJoint(joint->type).turns && n_F.z() < 0.0) {
+    // seen from n it turns the other way: as it does seen from the other body
+    if (joint->type == JointType::kRevolute) {
+      std::swap(joint->from, joint->to);
+    } else {
+      *mirrored = true;
+    }
+  }
+  if (joint->type == JointType::kPlanar) joint->type = JointType::kFree;
+}
+
+InPlane Search::Express() const {
+  InPlane result;
+  MechanismDescription& planar = result.description;
+  planar = d_;
+  planar.space = SpaceKind::kPlanar;
+  std::vector<Matrix3> axes;
+  for (std::size_t i = 0; i < d_.bodies.size(); ++i) {
+    const Matrix3 R = AxesWithNormal(normal_[i]);
+    axes.push_back(R);
+    Pose<Spatial, double> X_CB;
+    X_CB.R = R.transpose();
+    X_CB.p.z() = height_[i];
+    result.X_CB.push_back(X_CB);
+    BodyDescription& body = planar.bodies[i];
+    body.com = Flat(R.transpose() * body.com);
+    body.inertia = R.transpose() * body.inertia * R;
+    body.inertia = (0.5 * (body.inertia + body.inertia.transpose())).eval();
+    for (auto& [name, point] : body.points) point = Flat(R.transpose() * point);
+  }
+  result.R_WC = axes[kGround];
+  const Vector3 gravity = result.R_WC.transpose() * d_.gravity;
+  result.gravity_dropped = gravity.z();
+  planar.gravity = Flat(gravity);
+  for (JointDescription& joint : planar.joints) {
+    bool mirrored = false;
+    FlattenJoint(axes, normal_, &joint, &mirrored);
+    result.mirrored.push_back(mirrored);
+  }
+  const auto flatten = [&](int body, Vector3* at) { *at = Flat(axes[body].transpose() * *at); };
+  for (ForceDescription& force : planar.forces) {
+    result.force_dropped.push_back(0.0);
+    if (auto* point = std::get_if<PointForce>(&force); point != nullptr) {
+      const Matrix3& R = axes[point->in_body_axes ? point->body : kGround];
+      const Vector3 f = R.transpose() * point->force;
+      result.force_dropped.back() = f.z();
+      point->force = Flat(f);
+      flatten(point->body, &point->at);
+    } else if (auto* drag = std::get_if<Drag>(&force); drag != nullptr) {
+      flatten(drag->point.body, &drag->point.at);
+    } else if (auto* spring = std::get_if<SpringDamper>(&force); spring != nullptr) {
+      flatten(spring->from.body, &spring->from.at);
+      flatten(spring->to.body, &spring->to.at);
+    }
+  }
+  for (auto* list : {&planar.initial.coordinates, &planar.initial.speeds}) {
+    for (JointValues& values : *list) {
+      if (!result.mirrored[values.joint]) continue;
+      values.values[0] = -values.values[0];
+      if (values.values.size() > 2) values.values[2] = -values.values[2];
+    }
+  }
+  // speeds of bodies have other names in the plane
+  std::erase_if(planar.independent,
+                [](const std::string& name) { return name.find('.') != std::string::npos; });
+  return result;
+}
+
+}  // namespace
+
+std::optional<InPlane> ExpressInPlane(const MechanismDescription& description, std::string* why) {
+  Search search(description);
+  *why = search.Why();
+  if (!why->empty()) return std::nullopt;
+  return search.Express();
+}
+
+}  // namespace loopbench

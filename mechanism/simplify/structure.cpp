@@ -1,0 +1,165 @@
+#include "mechanism/simplify/structure.h"
+
+#include <Eigen/QR>
+#include <algorithm>
+#include <iterator>
+
+#include "mechanism/description/parts.h"
+#include "mechanism/loops/scaled_loops.h"
+
+namespace loopbench {
+
+namespace {
+
+/// Directions that a pivoted factorisation leaves over at one position once it has found the rank:
+/// given motions that contradict each other, and what is lost only there.
+template <class Space>
+std::vector<RedundantDirection> FindDependent(const MechanismDescription& description,
+                                              const Kinematics<Space, double>& kinematics) {
+  std::vector<RedundantDirection> dependent;
+  const Mechanism<Space, double>& mechanism = kinematics.mechanism();
+  const ScaledLoops scaled = ScaleLoops(kinematics);
+  if (scaled.rows.rows() == scaled.rank) return dependent;
+  const Eigen::ColPivHouseholderQR<Eigen::MatrixXd> qr(scaled.rows.transpose());
+  const auto& order = qr.colsPermutation().indices();
+  std::vector<int> left(order.data() + scaled.rank, order.data() + order.size());
+  std::ranges::sort(left);
+  for (const int row : left) {
+    for (int index : mechanism.constraints()) {
+      const Joint<Space, double>& joint = mechanism.joints()[index];
+      const int i = row - joint.row;
+      if (i < 0 || i >= joint.num_constraints()) continue;
+      // drives stand first in D
+      const bool drive = i < joint.num_drives;
+      dependent.push_back({joint.description,
+                           drive ? "what its given motion prescribes"
+                                 : NameOfDirection(description, joint.description,
+                                                   kinematics.DirectionOf(index, i)),
+                           false});
+    }
+  }
+  return dependent;
+}
+
+template <class Space>
+class Analysis {
+ public:
+  explicit Analysis(const MechanismDescription& description)
+      : description_(description), mechanism_(description, Coordinates::kJoint) {}
+
+  Structure Run() {
+    Count();
+    result_.islands = FindIslands(description_);
+    result_.start = Assemble<Space>(description_, mechanism_);
+    Kinematics<Space, double> kinematics(mechanism_);
+    kinematics.UpdatePosition(result_.start.q);
+    for (int index : mechanism_.constraints()) result_.loops.push_back(FindLoop(index, kinematics));
+    result_.analysed = result_.joint_u <= kMostAnalysedSpeeds;
+    if (!result_.analysed) return result_;
+    const LoopSpectrum here = SpectrumOfLoops(kinematics);
+    result_.rank = here.rank;
+    result_.singular_values = here.singular_values;
+    const Redundancy redundancy = FindRedundancy(description_);
+    for (const Released& out : redundancy.released) {
+      for (const int direction : out.directions) {
+        result_.redundant.push_back(
+            {out.joint, NameOfDirection(description_, out.joint, direction), true});
+      }
+    }
+    const bool driven = !mechanism_.drives().empty();
+    const bool known = redundancy.rows > 0 && !driven;
+    result_.rank_nearby = known ? redundancy.rank : result_.rank;
+    FindFreedomOfParts();
+    if (!driven) return result_;
+    const MechanismDescription released = Release(description_, redundancy);
+    const Mechanism<Space, double> rest(released, Coordinates::kJoint);
+    Kinematics<Space, double> at_start(rest);
+    at_start.UpdatePosition(result_.start.q);
+    std::ranges::copy(FindDependent(description_, at_start), std::back_inserter(result_.redundant));
+    return result_;
+  }
+
+ private:
+  void FindFreedomOfParts() {
+    if (result_.start.outcome != Outcome::kLocked) return;
+    const std::vector<Part> parts = SplitByJoints(description_);
+    if (parts.size() < 2) return;
+    int freedom = 0;
+    for (const Part& part : parts) {
+      freedom += AnalyseStructure(part.description).freedom();
+    }
+    if (freedom > 0) result_.freedom_of_parts = freedom;
+  }
+
+  void Count() {
+    const Mechanism<Space, double> absolute(description_, Coordinates::kAbsolute);
+    result_.space = description_.space;
+    result_.bodies = mechanism_.num_bodies() - 1;
+    result_.joints = static_cast<int>(description_.joints.size());
+    result_.rows = absolute.num_rows();
+    result_.loop_rows = mechanism_.num_rows();
+    result_.joint_q = mechanism_.num_q();
+    result_.joint_u = mechanism_.num_u();
+    result_.absolute_q = absolute.num_q();
+    result_.absolute_u = absolute.num_u();
+    result_.length = mechanism_.length();
+    for (int body = 0; body < mechanism_.num_bodies(); ++body) {
+      result_.centre_distances.push_back(mechanism_.geometric_centre(body).norm());
+    }
+    result_.counted_freedom = Space::kDim * result_.bodies - result_.rows;
+  }
+
+  /// From a body up to Ground: the steps of the tree.
+  std::vector<TreeStep> PathToGround(int body) const {
+    std::vector<TreeStep> path;
+    while (body != kGround) {
+      path.push_back(mechanism_.tree()[mechanism_.step_of_body(body)]);
+      body = path.back().parent;
+    }
+    return path;
+  }
+
+  LoopPath FindLoop(int index, const Kinematics<Space, double>& kinematics) const {
+    const Joint<Space, double>& joint = mechanism_.joints()[index];
+    std::vector<TreeStep> up = PathToGround(joint.to), down = PathToGround(joint.from);
+    while (!up.empty() && !down.empty() && up.back().joint == down.back().joint) {
+      up.pop_back();
+      down.pop_back();
+    }
+    LoopPath loop;
+    loop.cut_joint = index;
+    loop.joints.push_back(index);
+    loop.bodies.push_back(joint.to);
+    for (const TreeStep& step : up) {
+      loop.joints.push_back(step.joint);
+      loop.bodies.push_back(step.parent);
+    }
+    for (auto step = down.rbegin(); step != down.rend(); ++step) {
+      loop.joints.push_back(step->joint);
+      loop.bodies.push_back(step->child);
+    }
+    const auto D = kinematics.joints()[index].D();
+    const Motion<Space, double> all = kinematics.ConstraintMismatch(index);
+    const Motion<Space, double> open = D * (D.transpose() * all);
+    loop.open_rotation = open.template head<Space::kRot>().norm();
+    loop.open_shift = open.template tail<Space::kLin>().norm();
+    return loop;
+  }
+
+  const MechanismDescription& description_;
+  Mechanism<Space, double> mechanism_;
+  Structure result_;
+};
+
+}  // namespace
+
+double Structure::conditioning() const {
+  return rank > 0 ? singular_values[rank - 1] / singular_values[0] : 1.0;
+}
+
+Structure AnalyseStructure(const MechanismDescription& description) {
+  return description.space == SpaceKind::kPlanar ? Analysis<Planar>(description).Run()
+                                                 : Analysis<Spatial>(description).Run();
+}
+
+}  // namespace loopbench

@@ -1,0 +1,166 @@
+#include "mechanism/start/conflict.h"
+
+#include <algorithm>
+#include <cmath>
+#include <cstdio>
+#include <set>
+
+namespace loopbench {
+
+namespace {
+
+constexpr std::size_t kMostNames = 4;
+/// Smaller residuals, relative to the largest, are what an iteration that ended leaves anywhere.
+constexpr double kSmallest = 1e-3;
+
+std::string Short(double value) {
+  char text[32];
+  std::snprintf(text, sizeof text, "%.3g", value);
+  return text;
+}
+
+/// "a, b and c", and how many more there are.
+std::string Listed(const std::vector<std::string>& names) {
+  const std::size_t shown = std::min(names.size(), kMostNames), left = names.size() - shown;
+  std::string text;
+  for (std::size_t i = 0; i < shown; ++i) {
+    const bool last = i + 1 == shown && left == 0;
+    text += (i == 0 ? "" : last ? " and " : ", ") + names[i];
+  }
+  return left == 0 ? text : text + " and " + std::to_string(left) + " more";
+}
+
+/// The largest residual of one joint.
+struct OfJoint {
+  int joint = 0;
+  double scaled = 0.0, value = 0.0;  ///< in units, in SI
+  bool length = false;
+  bool rod = false;
+};
+
+template <class Space>
+class Conflict {
+ public:
+  Conflict(const MechanismDescription& description, const Kinematics<Space, double>& kinematics,
+           const Unmet& unmet)
+      : description_(description),
+        mechanism_(kinematics.mechanism()),
+        kinematics_(kinematics),
+        unmet_(unmet) {}
+
+  std::string Describe() {
+    for (int index : mechanism_.constraints()) AddConstraint(index);
+    int row = mechanism_.num_rows();
+    for (const auto& [index, component] : unmet_.extra) {
+      Add(row++, kinematics_.joints()[index].H(component),
+          *std::ranges::find(found_, index, &OfJoint::joint));
+    }
+    double largest = 0.0;
+    for (const OfJoint& one : found_) largest = std::max(largest, one.scaled);
+    std::erase_if(found_, [&](const OfJoint& one) { return one.scaled < kSmallest * largest; });
+    std::ranges::stable_sort(found_, [](const OfJoint& a, const OfJoint& b) {
+      return a.rod != b.rod ? a.rod : a.scaled > b.scaled;
+    });
+    return Sentence() + Given();
+  }
+
+ private:
+  template <class Direction>
+  void Add(int row, const Direction& direction, OfJoint& joint) {
+    const double scaled = std::abs(unmet_.rows[row]);
+    if (scaled < joint.scaled) return;
+    joint.scaled = scaled;
+    joint.value = scaled * unmet_.units[row];
+    joint.length = !direction.template tail<Space::kLin>().isZero();
+  }
+
+  void AddConstraint(int index) {
+    const Joint<Space, double>& joint = mechanism_.joints()[index];
+    const JointType type = description_.joints[joint.description].type;
+    found_.push_back({.joint = index, .rod = type == JointType::kRod});
+    for (int r = 0; r < joint.num_constraints(); ++r) {
+      Add(joint.row + r, kinematics_.joints()[index].D(r), found_.back());
+    }
+  }
+
+  std::string Sentence() const {
+    std::vector<std::string> names, residuals;
+    for (const OfJoint& one : found_) {
+      const JointDescription& joint =
+          description_.joints[mechanism_.joints()[one.joint].description];
+      std::string name = (one.rod ? "rod \"" : "joint \"") + joint.name + '"';
+      if (one.rod) name += " (length " + Short(joint.length) + " m)";
+      names.push_back(name);
+      residuals.push_back(Short(one.value) + (one.length ? " m" : " rad") +
+                          (unmet_.speeds ? "/s" : ""));
+    }
+    const bool one = names.size() == 1;
+    return std::string(one ? "the loop closed by " : "the loops closed by ") + Listed(names) +
+           (unmet_.speeds ? (one ? " has no speeds that fit" : " have no speeds that fit together")
+                          : (one ? " does not close" : " do not close together")) +
+           (one ? ": residual " : ": residuals ") + Listed(residuals);
+  }
+
+  /// Joints from a body to Ground, along the tree.
+  std::set<int> PathToGround(int body) const {
+    std::set<int> path;
+    while (body != kGround) {
+      const TreeStep& step = mechanism_.tree()[mechanism_.step_of_body(body)];
+      path.insert(step.joint);
+      body = step.parent;
+    }
+    return path;
+  }
+
+  /// What the loops hold fast, so that it may be what is to be changed.
+  std::string Given() const {
+    std::set<int> joints;  // of the description, in its order
+    for (const OfJoint& one : found_) {
+      const Joint<Space, double>& joint = mechanism_.joints()[one.joint];
+      joints.insert(joint.description);
+      const std::set<int> to = PathToGround(joint.to), from = PathToGround(joint.from);
+      for (const auto& [path, other] : {std::pair{&to, &from}, std::pair{&from, &to}}) {
+        for (const int index : *path) {
+          const int described = mechanism_.joints()[index].description;
+          if (!other->contains(index) && described >= 0) joints.insert(described);
+        }
+      }
+    }
+    std::vector<std::string> prescribed, held, given;
+    const InitialDescription& initial = description_.initial;
+    for (const int j : joints) {
+      const std::string name = '"' + description_.joints[j].name + '"';
+      if (!description_.joints[j].motions.empty()) prescribed.push_back(name);
+      if (std::ranges::find(initial.held, j) != initial.held.end()) held.push_back(name);
+      if (std::ranges::find(initial.speeds, j, &JointValues::joint) != initial.speeds.end()) {
+        given.push_back(name);
+      }
+    }
+    std::string text;
+    if (!prescribed.empty()) text += "; prescribed in it: " + Listed(prescribed);
+    if (!unmet_.speeds && !held.empty()) text += "; held in it: " + Listed(held);
+    if (unmet_.speeds && !given.empty()) text += "; speeds given in it: " + Listed(given);
+    return text;
+  }
+
+  const MechanismDescription& description_;
+  const Mechanism<Space, double>& mechanism_;
+  const Kinematics<Space, double>& kinematics_;
+  const Unmet& unmet_;
+  std::vector<OfJoint> found_;
+};
+
+}  // namespace
+
+template <class Space>
+std::string DescribeConflict(const MechanismDescription& description,
+                             const Kinematics<Space, double>& kinematics, const Unmet& unmet) {
+  return Conflict<Space>(description, kinematics, unmet).Describe();
+}
+
+template std::string DescribeConflict(const MechanismDescription&,
+                                      const Kinematics<Planar, double>&, const Unmet&);
+template std::string DescribeConflict(const MechanismDescription&,
+                                      const Kinematics<Spatial, double>&, const Unmet&);
+
+}  // namespace loopbench

@@ -1,0 +1,117 @@
+#include "mechanism/start/mobility.h"
+
+#include <Eigen/Eigenvalues>
+#include <algorithm>
+#include <vector>
+
+#include "mechanism/algebra/large_singular_values.h"
+#include "mechanism/loops/excursion.h"
+#include "mechanism/loops/tree_dynamics.h"
+
+namespace loopbench {
+
+namespace {
+
+/// A motion that few mixtures lead to is missed by some of them, not by all. [rad or lengths]
+constexpr int kTrials = 12;
+constexpr double kTrialDistance = 0.02;
+
+/// Self-stresses and speeds that constraints leave, above which nobody tries: both are squared.
+constexpr Eigen::Index kMostTried = 64;
+
+/// Whether a self-stress s of the constraints e proves that nothing moves: along every speed v with
+/// J v = 0 the second derivative of s^T e has one and the same sign, so that no acceleration, to
+/// which s^T J = 0 is blind, can keep e at zero (second-order rigidity: Connelly and Whiteley, SIAM
+/// J. Discrete Math. 9 (1996) 453). Tried with each of a basis of self-stresses and with their sum.
+template <class Space>
+bool IsRigidToSecondOrder(const Mechanism<Space, double>& mechanism, const VectorX<double>& q,
+                          int rank) {
+  const Eigen::Index free = mechanism.num_u() - rank;
+  if (free > kMostTried || mechanism.num_rows() - rank > kMostTried) return false;
+  Kinematics<Space, double> kinematics(mechanism);
+  TreeDynamics<Space, double> dynamics(mechanism);
+  kinematics.UpdatePosition(q);
+  MatrixX<double> M, J(mechanism.num_rows(), mechanism.num_u());
+  dynamics.MassMatrix(kinematics, Masses::kGeometric, M);
+  dynamics.Jacobian(kinematics, J);
+  const Eigen::LLT<Eigen::MatrixXd> mass(M);
+  Eigen::MatrixXd rows = mass.matrixL().solve(J.transpose()).transpose();
+  // moments and forces compare by the speeds they take; one that takes none is like the others
+  Eigen::VectorXd size = rows.rowwise().norm();
+  const double usual = size.maxCoeff() > 0.0 ? size.maxCoeff() : 1.0;
+  size = (size.array() > 1e-6 * usual).select(size, usual);
+  rows = size.cwiseInverse().asDiagonal() * rows;
+  const Eigen::JacobiSVD<Eigen::MatrixXd> svd(rows, Eigen::ComputeFullU | Eigen::ComputeFullV);
+  const Eigen::MatrixXd stresses = svd.matrixU().rightCols(rows.rows() - rank);
+  const Eigen::MatrixXd speeds = mass.matrixU().solve(svd.matrixV().rightCols(free));
+  // J udot = gamma(v) is e'' = 0, so that e'' is -gamma where nothing accelerates
+  VectorX<double> h(mechanism.num_u()), gamma(mechanism.num_rows());
+  double largest = 0.0;
+  const auto second = [&](const Eigen::VectorXd& v) {
+    kinematics.UpdateVelocity(v);
+    dynamics.Bias(kinematics, h);
+    dynamics.JacobianBias(kinematics, gamma);
+    const Eigen::VectorXd scaled = gamma.cwiseQuotient(size);
+    largest = std::max(largest, scaled.norm());
+    return Eigen::VectorXd(-stresses.transpose() * scaled);
+  };
+  // by polarisation, the diagonal first, all self-stresses at once
+  std::vector<Eigen::MatrixXd> forms(static_cast<std::size_t>(stresses.cols()),
+                                     Eigen::MatrixXd::Zero(free, free));
+  for (Eigen::Index i = 0; i < free; ++i) {
+    for (Eigen::Index j = i; j >= 0; --j) {
+      const Eigen::VectorXd along = second(i == j ? Eigen::VectorXd(speeds.col(i))
+                                                  : Eigen::VectorXd(speeds.col(i) + speeds.col(j)));
+      for (std::size_t s = 0; s < forms.size(); ++s) {
+        double value = along[static_cast<Eigen::Index>(s)];
+        if (i != j) value = 0.5 * (value - forms[s](i, i) - forms[s](j, j));
+        forms[s](i, j) = forms[s](j, i) = value;
+      }
+    }
+  }
+  Eigen::MatrixXd all = Eigen::MatrixXd::Zero(free, free);
+  for (const Eigen::MatrixXd& form : forms) all += form;
+  forms.push_back(all);
+  // the start closes to some 1e-10 of its size, and the self-stresses are as good
+  constexpr double kDefinite = 1e-8;
+  const double least = kDefinite * largest;
+  return largest > 0.0 && std::ranges::any_of(forms, [&](const Eigen::MatrixXd& form) {
+           const Eigen::VectorXd values =
+               Eigen::SelfAdjointEigenSolver<Eigen::MatrixXd>(form, Eigen::EigenvaluesOnly)
+                   .eigenvalues();
+           return values.minCoeff() > least || values.maxCoeff() < -least;
+         });
+}
+
+}  // namespace
+
+template <class Space>
+std::string WhyLocked(const Mechanism<Space, double>& mechanism, const VectorX<double>& q) {
+  if (!mechanism.drives().empty() || mechanism.num_u() > kMostAnalysedSpeeds) return "";
+  if (mechanism.num_u() == 0) return "no joint leaves a speed free";
+  if (mechanism.num_rows() == 0) return "";
+  Excursion<Space> excursion(mechanism, q);
+  const int n = mechanism.num_u(), first_order = excursion.freedom();
+  if (first_order == 0) {
+    return std::to_string(mechanism.num_rows()) + " constraints take all " + std::to_string(n) +
+           " speeds";
+  }
+  if (excursion.rank() == mechanism.num_rows()) return "";
+  const int rank = excursion.rank();
+  int fell_back = 0;
+  for (int trial = 1; trial <= kTrials; ++trial) {
+    const StepKind step = excursion.Step(kTrialDistance, trial);
+    if (step == StepKind::kMoved) return "";
+    fell_back += step == StepKind::kFellBack;
+  }
+  if (fell_back < kTrials && !IsRigidToSecondOrder(mechanism, q, rank)) return "";
+  return "this position is singular, the " + std::to_string(first_order) +
+         (first_order == 1 ? " speed that its" : " independent speeds that its") +
+         " constraints leave lead" + (first_order == 1 ? "s" : "") +
+         " nowhere: what is tried next to it falls back to it";
+}
+
+template std::string WhyLocked(const Mechanism<Planar, double>&, const VectorX<double>&);
+template std::string WhyLocked(const Mechanism<Spatial, double>&, const VectorX<double>&);
+
+}  // namespace loopbench

@@ -86,6 +86,7 @@ std::string_view WhyNotForeign(std::string_view path, std::string_view header) {
 /// The same for a header of this repository, named from its root.
 std::string_view WhyNotOwn(std::string_view path, std::string_view header) {
   const std::string_view room = Room(header);
+  if (Room(path).empty()) return "its folder is no room: say in kRooms on which floor it is";
   if (header.starts_with(kGenerated) && Room(path) == "harness/record") return "";
   if (header.find("..") != std::string_view::npos || room.empty()) {
     return "own headers are named from the root of the repository";

@@ -7,6 +7,7 @@
 #include <numbers>
 
 #include "harness/record/joint_words.h"
+#include "mechanism/loops/excursion.h"
 
 namespace loopbench::harness {
 

@@ -5,6 +5,7 @@
 #include <iterator>
 
 #include "mechanism/description/parts.h"
+#include "mechanism/loops/excursion.h"
 #include "mechanism/loops/scaled_loops.h"
 
 namespace loopbench {

@@ -5,6 +5,7 @@
 
 #include <limits>
 
+#include "mechanism/description/joint_traits.h"
 #include "tests/contract/oracle.h"
 
 namespace loopbench {
@@ -77,6 +78,23 @@ template <class Space>
 class JointTest : public ::testing::Test {};
 using Spaces = ::testing::Types<Planar, Spatial>;
 TYPED_TEST_SUITE(JointTest, Spaces);
+
+TYPED_TEST(JointTest, KindsAreWhatTheTableOfTraitsSays) {
+  constexpr bool kSpace = TypeParam::kRot == 3;
+  const SpaceKind space = kSpace ? SpaceKind::kSpatial : SpaceKind::kPlanar;
+  for (const JointType type : Types<TypeParam>()) {
+    const auto& kind = KindOf<TypeParam, double>(type);
+    const ValueCount coordinates = CountValues(type, space, false);
+    const ValueCount speeds = CountValues(type, space, true);
+    EXPECT_EQ(coordinates.all(), kind.num_q) << ToString(type);
+    EXPECT_EQ(speeds.all(), kind.num_u) << ToString(type);
+    EXPECT_EQ(coordinates.lengths, speeds.lengths) << ToString(type);
+    // a universal joint's directions turn with its first angle: they are no axes
+    for (int i = 0; i < kind.num_u && kind.basis == nullptr; ++i) {
+      EXPECT_EQ(i < speeds.angles, kind.axes[i] < TypeParam::kRot) << ToString(type) << i;
+    }
+  }
+}
 
 TYPED_TEST(JointTest, TransformIsTheOracles) {
   for (JointType type : Types<TypeParam>()) {

@@ -14,7 +14,8 @@ class Front {
       : graph_(graph), dim_(dim), marks_(*marks), count_(bodies.size()) {
     for (int body : bodies) {
       marks_.open[body] = graph.degree(body);
-      marks_.closing[body] = 0;  // the bodies of the front that it alone keeps open
+      // here: how many bodies leave the boundary when this one enters
+      marks_.closing[body] = 0;
     }
   }
 
@@ -36,7 +37,8 @@ class Front {
  private:
   bool InSet(int body) const { return marks_.part_of[body] >= 0; }
 
-  /// What the boundary changes by, then minus the number of joints.
+  /// The smallest enters next. First counts how many bodies leave the boundary with it, then how
+  /// many joints it has, both negative because more is better; its number breaks the tie.
   std::tuple<int, int, int> KeyOf(int body) const {
     return {-marks_.closing[body], -graph_.degree(body), body};
   }

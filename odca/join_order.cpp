@@ -12,7 +12,7 @@ namespace loopbench::odca {
 
 namespace {
 
-/// Where no join has more handles, pairing needs no competition.
+/// Where no join of pairing's list has more handles than this, the other two rules are not tried.
 constexpr int kFewHandles = 8;
 
 class Orderer {
@@ -79,7 +79,7 @@ class Orderer {
     return cost;
   }
 
-  /// Takes the joins from `start` on back.
+  /// Removes the joins from `start` on, and returns them.
   std::vector<Join> Take(std::size_t start) {
     std::vector<Join> joins(joins_.begin() + start, joins_.end());
     joins_.resize(start);

@@ -13,14 +13,14 @@ template <class Space, class S>
 Joins<Space, S>::Joins(const Mechanism<Space, S>& mechanism, const Plan& plan, SolverKind solver)
     : mechanism_(mechanism), plan_(plan), solver_(solver), places_(plan.num_nodes()) {
   const auto scratch = std::make_shared<LoopScratch<S>>(plan.largest_join());
-  int z = 0, w = 0, x = 0, c = 0, widest = 1;
+  int z = 0, y = 0, x = 0, c = 0, widest = 1;
   c_offset_.assign(mechanism.joints().size(), 0);
   std::vector<bool> joined(plan.num_leaves(), false);
   loops_.reserve(plan.loop_joins());
   for (int n = 0; n < plan.num_nodes(); ++n) {
     Place& place = places_[n];
     place.z = z;
-    place.w = w;
+    place.y = y;
     place.x = x;
     place.handle = num_handles_;
     place.row = num_rows_;
@@ -30,7 +30,7 @@ Joins<Space, S>::Joins(const Mechanism<Space, S>& mechanism, const Plan& plan, S
         if (child >= 0 && child < plan.num_leaves()) joined[child] = true;
       }
       place.kept = static_cast<int>(node.kept.size());
-      w += node.rows * static_cast<int>(node.handles.size());
+      y += node.rows * static_cast<int>(node.handles.size());
       x += node.rows * node.rows;
       num_rows_ += node.rows;
       widest = std::max(widest, place.kept);
@@ -55,7 +55,7 @@ Joins<Space, S>::Joins(const Mechanism<Space, S>& mechanism, const Plan& plan, S
     if (!joined[leaf]) lone_leaves_.push_back(leaf);
   }
   Z_.assign(z, Block<Space, S>::Zero());
-  W_.assign(w, Motion<Space, S>::Zero());
+  Y_.assign(y, Motion<Space, S>::Zero());
   X_.assign(x, S(0));
   c_.assign(c, Motion<Space, S>::Zero());
   columns_.setZero(plan.largest_join(), Space::kDim * widest);
@@ -104,6 +104,8 @@ bool Joins<Space, S>::AssembleAll(const Kinematics<Space, S>& kinematics, Pass p
   return true;
 }
 
+/// Z = M^-1 of body n + 1, at its centre of mass in ground axes. The paper's zeta_ij of the handles
+/// at r_i and r_j are S(r_i) Z S(r_j)^T: those of bodies k and k+1 (1-4) and of body 2 (45-46).
 template <class Space, class S>
 void Joins<Space, S>::FillLeaf(const Kinematics<Space, S>& kinematics,
                                const Inertia<Space, S>& inertia, int n) {
@@ -115,6 +117,9 @@ void Joins<Space, S>::FillLeaf(const Kinematics<Space, S>& kinematics,
                                                                                   inertia.mass);
 }
 
+/// Rows of C. D at Mo becomes c at the centres of mass, so that c^T A is the D^T A of the paper's
+/// handles, which removes udot (12, 37-38, 57-58). That c_P and c_Q have opposite signs is Newton's
+/// third law (51-52). Rows of one joint after those of another make the block-diagonal D (69).
 template <class Space, class S>
 void Joins<Space, S>::FillJoints(const Kinematics<Space, S>& kinematics, Masses masses,
                                  const PlanNode& node) {
@@ -131,7 +136,10 @@ void Joins<Space, S>::FillJoints(const Kinematics<Space, S>& kinematics, Masses 
   }
 }
 
-/// W = Z C^T on every handle and X = C W.                                        (16, 66)
+/// Y = C Z on every handle, and X = Y C^T, both triangles. Y is the paper's D^T zeta (67) but for
+/// the sign of c_P. X is D^T [zeta + zeta] D of a series join (16), the left side of (15); it is
+/// chi where base and terminal joint close (42), with the block rows (40) and (41); and in a
+/// coupled loop it has the block rows (61) and (63), and the paper writes X for its inverse (66).
 template <class Space, class S>
 void Joins<Space, S>::FormResponse(const PlanNode& node, const Place& place) {
   const int n = node.rows;
@@ -144,18 +152,18 @@ void Joins<Space, S>::FormResponse(const PlanNode& node, const Place& place) {
   for (int e = 0; e < static_cast<int>(node.handles.size()); ++e) {
     const Handle& handle = node.handles[e];
     const Place& child = places_[node.children[handle.child]];
-    Motion<Space, S>* W = &W_[place.w + e * n];
+    Motion<Space, S>* Y = &Y_[place.y + e * n];
     for (const NodeJoint& joint : node.joints) {
-      for (int i = 0; i < joint.rows; ++i) W[i].setZero();
+      for (int i = 0; i < joint.rows; ++i) Y[i].setZero();
       for (int which = 0; which < 2; ++which) {
         const int f = side(joint, which);
         if (f < 0 || node.handles[f].child != handle.child) continue;
         const Block<Space, S>& Z = Z_[child.z + handle.place + child.kept * node.handles[f].place];
         const Motion<Space, S>* c = direction(joint, which);
-        for (int i = 0; i < joint.rows; ++i) W[i].noalias() += Z * c[i];
+        for (int i = 0; i < joint.rows; ++i) Y[i].noalias() += Z * c[i];  // (67)
         operations_ += joint.rows * Space::kDim * Space::kDim;
       }
-      W += joint.rows;
+      Y += joint.rows;
     }
   }
   int row = 0;
@@ -165,16 +173,17 @@ void Joins<Space, S>::FormResponse(const PlanNode& node, const Place& place) {
         S sum = S(0);
         for (int which = 0; which < 2; ++which) {
           const int f = side(joint, which);
-          if (f >= 0) sum += direction(joint, which)[i].dot(W_[place.w + f * n + l]);
+          if (f >= 0) sum += direction(joint, which)[i].dot(Y_[place.y + f * n + l]);
         }
-        X_[place.x + row + l * n] = X_[place.x + l + row * n] = sum;
+        X_[place.x + row + l * n] = X_[place.x + l + row * n] = sum;  // (16, 42, 66)
       }
       operations_ += 2 * Space::kDim * (row + 1);
     }
   }
 }
 
-/// Cholesky in place (lower triangle of X): X is positive definite, because one side floats.
+/// X = L L^T in place of X's lower triangle, T = L^-1: what (17) inverts. X is positive definite,
+/// because one side floats.
 template <class Space, class S>
 bool Joins<Space, S>::FactorFloating(const PlanNode& node, const Place& place) {
   using std::sqrt;
@@ -199,6 +208,8 @@ bool Joins<Space, S>::FactorFloating(const PlanNode& node, const Place& place) {
   return true;
 }
 
+/// T of a node that closes loops, with T^T T = chi^-1 of (42) or the paper's X of (66). The matrix
+/// is only semidefinite here, and its rank is decided as loop_solver.h says.
 template <class Space, class S>
 bool Joins<Space, S>::FactorLoop(const Kinematics<Space, S>& kinematics, const PlanNode& node,
                                  const Place& place, Pass pass) {
@@ -248,17 +259,17 @@ void Joins<Space, S>::NoteDiagnostics(const PlanNode& node, const LoopSolver<S>&
   smallest_weight_ = std::min(smallest_weight_, loop.smallest_weight());
 }
 
-/// V = T W^T, kept transposed in W's place, for the handles that stay.
+/// V = T Y in Y's place, for the handles that stay: the X Y of (64) is -T^T V.
 template <class Space, class S>
 void Joins<Space, S>::ApplyToKept(const PlanNode& node, const Place& place) {
   const int rows = node.rows;
   if (!node.closes_loop) {
     const S* L = &X_[place.x];
     for (int e : node.kept) {
-      Motion<Space, S>* W = &W_[place.w + e * rows];
+      Motion<Space, S>* Y = &Y_[place.y + e * rows];
       for (int i = 0; i < rows; ++i) {
-        for (int k = 0; k < i; ++k) W[i] -= L[i + k * rows] * W[k];
-        W[i] /= L[i + i * rows];
+        for (int k = 0; k < i; ++k) Y[i] -= L[i + k * rows] * Y[k];
+        Y[i] /= L[i + i * rows];
       }
     }
   } else if (!node.kept.empty()) {
@@ -267,13 +278,13 @@ void Joins<Space, S>::ApplyToKept(const PlanNode& node, const Place& place) {
     for (std::size_t k = 0; k < node.kept.size(); ++k) {
       for (int i = 0; i < rows; ++i) {
         B.row(i).template segment<Space::kDim>(Space::kDim * k) =
-            W_[place.w + node.kept[k] * rows + i].transpose();
+            Y_[place.y + node.kept[k] * rows + i].transpose();
       }
     }
     loops_[place.loop].Apply(B);
     for (std::size_t k = 0; k < node.kept.size(); ++k) {
       for (int i = 0; i < rows; ++i) {
-        W_[place.w + node.kept[k] * rows + i] =
+        Y_[place.y + node.kept[k] * rows + i] =
             B.row(i).template segment<Space::kDim>(Space::kDim * k).transpose();
       }
     }
@@ -281,22 +292,24 @@ void Joins<Space, S>::ApplyToKept(const PlanNode& node, const Place& place) {
   operations_ += Space::kDim * rows * (rows + 1) / 2 * static_cast<long>(node.kept.size());
 }
 
-/// Z' = Z - V^T V over the handles that stay.                                    (26-28, 71)
+/// Z' = Z - V^T V over the handles that stay. In a series join the blocks of two bodies of one
+/// child are Upsilon_11 (26) and Upsilon_22 (27), those across, with Z = 0 between the children,
+/// Upsilon_12 (28); where body 2 alone stays of a coupled loop, the block is zeta^asm (71).
 template <class Space, class S>
 void Joins<Space, S>::Eliminate(const PlanNode& node, const Place& place) {
   const int n = node.rows;
   for (int f = 0; f < place.kept; ++f) {
     const Handle& at_f = node.handles[node.kept[f]];
-    const Motion<Space, S>* V_f = &W_[place.w + node.kept[f] * n];
+    const Motion<Space, S>* V_f = &Y_[place.y + node.kept[f] * n];
     for (int e = f; e < place.kept; ++e) {
       const Handle& at_e = node.handles[node.kept[e]];
-      const Motion<Space, S>* V_e = &W_[place.w + node.kept[e] * n];
+      const Motion<Space, S>* V_e = &Y_[place.y + node.kept[e] * n];
       Block<Space, S> Z = Block<Space, S>::Zero();
       if (at_e.child == at_f.child) {
         const Place& child = places_[node.children[at_e.child]];
         Z = Z_[child.z + at_e.place + child.kept * at_f.place];
       }
-      for (int i = 0; i < n; ++i) Z.noalias() -= V_e[i] * V_f[i].transpose();
+      for (int i = 0; i < n; ++i) Z.noalias() -= V_e[i] * V_f[i].transpose();  // (26-28, 71)
       Z_[place.z + e + place.kept * f] = Z;
       if (e != f) Z_[place.z + f + place.kept * e] = Z.transpose();
       operations_ += static_cast<long>(n) * Space::kDim * Space::kDim;
@@ -304,6 +317,7 @@ void Joins<Space, S>::Eliminate(const PlanNode& node, const Place& place) {
   }
 }
 
+/// Forward substitution with L, or as the loop solver has it.
 template <class Space, class S>
 void Joins<Space, S>::Apply(const PlanNode& node, int n, S* v) const {
   const Place& place = places_[n];
@@ -318,6 +332,7 @@ void Joins<Space, S>::Apply(const PlanNode& node, int n, S* v) const {
   }
 }
 
+/// Backward substitution with L^T, or as the loop solver has it.
 template <class Space, class S>
 void Joins<Space, S>::ApplyTransposed(const PlanNode& node, int n, S* v) const {
   const Place& place = places_[n];

@@ -1,18 +1,33 @@
 // What O-DCA knows at one position, before any force: Z of every assembly, T and V of every join.
 //
-// For an assembly with boundary bodies 1..h, all at their centres of mass,
-//   A = Z F + b                                                             (1-2, 5-6)
-// with F the forces of what is still outside. A joint j from P to Q demands
-//   c_Q^T A_Q + c_P^T A_P + c0 = 0,   c_Q = S(r_Q)^T D,  c_P = -S(r_P)^T D,
-//   c0 = D^T (n_Q - n_P - g),         n = [0; w x (w x r)],                  (7, 12)
-// and carries D phi on Q, -D phi on P, that is c phi on the centres of mass. With C the rows c of
-// all joints of a node, on the union of its children's boundaries:
-//   X = C Z C^T                                                             (16, 66)
-//   phi = -X^+ (C b + c0 + C Z F)                                           (17, 64)
-//   Z' = Z - Z C^T X^+ C Z                                                  (26-28, 71)
-//   b' = b - Z C^T X^+ (C b + c0)                                           (29-30, 72)
-// X^+ is computed as T^T T (loop_solver.h). With V = T C Z and s = T (C b + c0) the last three are
-//   phi = -T^T (s + V F),    Z' = Z - V^T V,    b' = b - V^T s.
+// Everything is in ground axes. What belongs to a body is taken at its centre of mass, what belongs
+// to a joint at Mo, the origin of the frame fixed on its body Q; r_P and r_Q lead from the two
+// centres of mass to Mo. Numbers in brackets are the paper's equations, README.md indexes them.
+//
+// An assembly with boundary bodies 1..h answers the forces F of what is still outside by
+//
+//   A = Z F + b
+//
+// A joint from P to Q demands D^T (A_Q - A_P - g) = 0 at Mo and carries the force D phi on Q and
+// -D phi on P. On the centres of mass that is, with n = [0; w x (w x r)],
+//
+//   c_Q^T A_Q + c_P^T A_P + c0 = 0           the demand                        (12)
+//   c_Q phi on Q,  c_P phi on P              the force
+//
+//   c_Q =  S(r_Q)^T D,    c_P = -S(r_P)^T D,    c0 = D^T (n_Q - n_P - g)
+//
+// With C the rows c^T of all joints of a node, on the union of its children's boundaries:
+//
+//   Y   = C Z                                                                  (67)
+//   X   = Y C^T                                                                (16, 66)
+//   phi = -X^+ (C b + c0 + Y F)
+//   Z'  = Z - Y^T X^+ Y                                                        (26-28, 71)
+//   b'  = b - Y^T X^+ (C b + c0)
+//
+// X^+ is computed as T^T T (loop_solver.h). With V = T Y and s = T (C b + c0) the last three are
+//
+//   phi = -T^T (s + V F),      Z' = Z - V^T V,      b' = b - V^T s.
+//
 // V and T are kept for the sweep of vectors (sweep.h).
 //
 // All memory is taken at construction, and no matrix is larger than the plan's largest join.
@@ -36,8 +51,9 @@ class Joins {
   /// From the leaves up, at the current positions.
   Outcome Assemble(const Kinematics<Space, S>& kinematics);
 
-  /// Kept handles of a node, 1 of a leaf; and the first of its numbers in lists with one entry per
-  /// kept handle, or one per row.
+  /// How many handles of a node stay on the boundary; a leaf has one. The sweep keeps lists with an
+  /// entry per such handle and per row of all nodes: these are the places of a node's first
+  /// entries.
   int kept(int n) const { return places_[n].kept; }
   int first_handle(int n) const { return places_[n].handle; }
   int first_row(int n) const { return places_[n].row; }
@@ -48,9 +64,10 @@ class Joins {
   /// Rows c of a joint.
   const Motion<Space, S>* c_P(const NodeJoint& joint) const { return &c_[c_offset_[joint.index]]; }
   const Motion<Space, S>* c_Q(const NodeJoint& joint) const { return c_P(joint) + joint.rows; }
-  /// V^T of an inner node on one of its kept handles (index into node.handles), a motion per row.
+  /// V of an inner node on one of its kept handles (index into node.handles): its rows, one after
+  /// the other, each a motion.
   const Motion<Space, S>* V(const PlanNode& node, int n, int handle) const {
-    return &W_[places_[n].w + handle * node.rows];
+    return &Y_[places_[n].y + handle * node.rows];
   }
   /// v := T v and v := T^T v for the rows of an inner node.
   void Apply(const PlanNode& node, int n, S* v) const;
@@ -72,7 +89,7 @@ class Joins {
   /// Where a node's numbers live. Leaves have one handle and no rows.
   struct Place {
     int z = 0;       ///< first block of Z (kept x kept, by columns)
-    int w = 0;       ///< first motion of W: rows per handle before the join
+    int y = 0;       ///< first motion of Y: rows per handle before the join
     int x = 0;       ///< first number of X
     int handle = 0;  ///< first of the kept handles
     int kept = 1;
@@ -97,7 +114,7 @@ class Joins {
   SolverKind solver_;
   std::vector<Place> places_;
   std::vector<Block<Space, S>> Z_;
-  std::vector<Motion<Space, S>> W_;
+  std::vector<Motion<Space, S>> Y_;  ///< Y of each node; on handles that stay then V = T Y
   std::vector<Motion<Space, S>> c_;  ///< rows c_P, then c_Q of each joint
   std::vector<int> c_offset_;        ///< of each mechanism joint in c_
   std::vector<S> X_;

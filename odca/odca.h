@@ -13,8 +13,8 @@ Plan MakePlan(const Mechanism<Space, S>& mechanism, const PlanOptions& options =
 template <class Space, class S>
 class Odca final : public Formulation<Space, S> {
  public:
-  /// As published, joints to Ground close at the root (31-42); else as early as possible. `plan`
-  /// overrides that choice.
+  /// As published, joints to Ground close at the root (the paper's section 3.1); else as early as
+  /// possible. `plan` overrides that choice.
   Odca(const Mechanism<Space, S>& mechanism, FormulationOptions options);
   Odca(const Mechanism<Space, S>& mechanism, FormulationOptions options, const PlanOptions& plan);
 

@@ -15,7 +15,7 @@ constexpr int kFew = 4;
 /// only when their turn comes.
 constexpr std::size_t kMany = 16;
 
-/// 0 up to kFew bodies, then one class per factor sqrt(2).
+/// The class of a boundary is 0 up to kFew bodies and grows by one with each factor sqrt(2) beyond.
 int BoundaryClass(int boundary) {
   if (boundary <= kFew) return 0;
   const auto area = static_cast<unsigned long>(boundary) * static_cast<unsigned long>(boundary);

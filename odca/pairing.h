@@ -17,7 +17,7 @@ namespace loopbench::odca {
 struct JoinSum {
   double cost = 0.0;  ///< multiply-adds
   int handles = 0;    ///< of the largest join
-  long looks = 0;     ///< joints looked at, again and again: what finding the list costs
+  long looks = 0;     ///< how often a joint was looked at: what finding the list costs
 };
 
 /// Counts for every body of the graph; allocated once and reused for one set of bodies at a time.
@@ -53,15 +53,19 @@ class Pairing {
     int rows = 0;
     std::vector<std::pair<int, int>> joints;  ///< their bodies; empty once joined
   };
+  /// A pair's place in the queue, the smallest first (join_order.h has the reasons).
   struct Key {
     int boundary_class, size_class, boundary, bond;
     auto operator<=>(const Key&) const = default;
   };
 
+  /// Bodies on the boundary of the two parts once they are joined.
   int BoundaryAfter(const Bond& bond);
   Key KeyOf(int bond);
-  /// A better place in the queue, if the pair has become better.
+  /// Enters a pair into the queue once more, in case it has become better. The older entry stays,
+  /// and counts for nothing when the pair has been joined by then.
   void Renew(int bond);
+  /// Joins the two parts of a pair and hands the bonds of one over to the other.
   void Merge(int bond, std::vector<Join>* joins);
 
   const int num_bodies_;

@@ -32,14 +32,14 @@ struct PlanJoint {
 /// When joints to Ground are closed.
 enum class Grounding {
   kEager,   ///< as soon as a body is a leaf: smallest boundaries, every loop closed where it closes
-  kAtRoot,  ///< last, both ends at once, as the paper does for a loop to Ground (31-42); a part
-            ///< with more than two joints to Ground closes them at its leaves, or the root would
-            ///< grow
+  kAtRoot,  ///< last, both ends at once, as the paper's section 3.1 does for a loop to Ground; a
+            ///< part with more than two joints to Ground closes them at its leaves, or the root
+            ///< would grow
 };
 
 /// How many joints a node may close at once.
 enum class Closing {
-  kTogether,  ///< all joints between two assemblies in one node (paper, eq. 64-72)
+  kTogether,  ///< all joints between two assemblies in one node (the paper's section 3.2)
   kOneByOne,  ///< the first joins, each further one is a self-join: smallest matrices
 };
 

@@ -28,7 +28,7 @@ void Sweep<Space, S>::Solve(std::span<const Motion<Space, S>> b,
     A[n + 1].setZero();
     b_[joins_.first_handle(n)] = b[n + 1];
   }
-  A[kGround].setZero();
+  A[kGround].setZero();  // the inertial frame of (33-34)
   for (Motion<Space, S>& phi : phi_) phi.setZero();
   Correct(c0, A);
   if (!joins_.softened()) return;
@@ -37,6 +37,7 @@ void Sweep<Space, S>::Solve(std::span<const Motion<Space, S>> b,
   Correct(residual_, A);
 }
 
+/// At the leaves A = Z F + b (1-4, 45-46) with all forces known, those of joints included.
 template <class Space, class S>
 void Sweep<Space, S>::Correct(std::span<const Motion<Space, S>> c0, std::span<Motion<Space, S>> A) {
   const int leaves = plan_.num_leaves();
@@ -52,7 +53,7 @@ void Sweep<Space, S>::Correct(std::span<const Motion<Space, S>> c0, std::span<Mo
   operations_ += static_cast<long>(leaves) * Space::kDim * Space::kDim;
 }
 
-/// r = C A + c0 of every joint.
+/// r = C A + c0 of every joint: D^T times the difference of the two sides of (7), without udot.
 template <class Space, class S>
 void Sweep<Space, S>::Residual(std::span<const Motion<Space, S>> c0,
                                std::span<const Motion<Space, S>> A) {
@@ -70,7 +71,10 @@ void Sweep<Space, S>::Residual(std::span<const Motion<Space, S>> c0,
   }
 }
 
-/// s = T (C b + c0), b' = b - V^T s.                                             (29-30, 72)
+/// C b + c0 is the negative of the bracket in (15) without outer forces, of chi_i3 in (42), of K
+/// (68); with T it is s, and the paper's Y-hat is -C^T T^T s (21). Then b' = b - V^T s is
+/// Upsilon_i3 (29-30) and zeta^asm_i3 (72). The zero that c0 + c_P^T A_P + c_Q^T A_Q must be is
+/// (37-38) at joints to Ground and (57-58) in a coupled loop.
 template <class Space, class S>
 void Sweep<Space, S>::Up(const PlanNode& node, int n, std::span<const Motion<Space, S>> c0) {
   S* s = &s_[joins_.first_row(n)];
@@ -81,23 +85,26 @@ void Sweep<Space, S>::Up(const PlanNode& node, int n, std::span<const Motion<Spa
   };
   for (const NodeJoint& joint : node.joints) {
     for (int i = 0; i < joint.rows; ++i, ++row) {
-      s[row] = c0[joint.index][i];
+      s[row] = c0[joint.index][i];  // (15, 42, 68)
       if (joint.from >= 0) s[row] += joins_.c_P(joint)[i].dot(b_of(joint.from));
       if (joint.to >= 0) s[row] += joins_.c_Q(joint)[i].dot(b_of(joint.to));
     }
   }
-  joins_.Apply(node, n, s);
+  joins_.Apply(node, n, s);  // (21)
   const int kept = joins_.kept(n);
   for (int e = 0; e < kept; ++e) {
     Motion<Space, S> b = b_of(node.kept[e]);
     const Motion<Space, S>* V = joins_.V(node, n, node.kept[e]);
-    for (int i = 0; i < node.rows; ++i) b -= V[i] * s[i];
+    for (int i = 0; i < node.rows; ++i) b -= V[i] * s[i];  // (29-30, 72)
     b_[joins_.first_handle(n) + e] = b;
   }
   operations_ += node.rows * (2 * Space::kDim + Space::kDim * kept + node.rows / 2);
 }
 
-/// phi = -T^T (s + V F), then the forces on the children's handles.                 (17, 64-65)
+/// phi = -T^T (s + V F) are the measure numbers of a series join (17), of the base and terminal
+/// joint, the solution of (42), and of a coupled loop (64). The force on a handle of a child is
+/// what comes from outside, F^ext of (47-48), and c phi, the D phi of (13, 18, 39, 59, 65) moved
+/// from Mo to the centre of mass.
 template <class Space, class S>
 void Sweep<Space, S>::Down(const PlanNode& node, int n) {
   const int kept = joins_.kept(n);
@@ -108,7 +115,7 @@ void Sweep<Space, S>::Down(const PlanNode& node, int n) {
     const Motion<Space, S>* V = joins_.V(node, n, node.kept[e]);
     for (int i = 0; i < node.rows; ++i) phi[i] -= V[i].dot(F_kept[e]);
   }
-  joins_.ApplyTransposed(node, n, phi);
+  joins_.ApplyTransposed(node, n, phi);  // (17, 42, 64)
   const auto force_on = [&](int f) -> Motion<Space, S>& {
     const Handle& handle = node.handles[f];
     return F_[joins_.first_handle(node.children[handle.child]) + handle.place];
@@ -116,7 +123,7 @@ void Sweep<Space, S>::Down(const PlanNode& node, int n) {
   int next = 0;
   for (int f = 0; f < static_cast<int>(node.handles.size()); ++f) {
     if (node.handles[f].kept) {
-      force_on(f) = F_kept[next++];
+      force_on(f) = F_kept[next++];  // F^ext of (47-48)
     } else {
       force_on(f).setZero();
     }
@@ -126,7 +133,7 @@ void Sweep<Space, S>::Down(const PlanNode& node, int n) {
     for (int i = 0; i < joint.rows; ++i, ++row) {
       phi_[joint.index][i] += phi[row];
       if (joint.from >= 0) force_on(joint.from) += joins_.c_P(joint)[i] * phi[row];
-      if (joint.to >= 0) force_on(joint.to) += joins_.c_Q(joint)[i] * phi[row];
+      if (joint.to >= 0) force_on(joint.to) += joins_.c_Q(joint)[i] * phi[row];  // (18, 39, 65)
     }
   }
   operations_ += node.rows * (2 * Space::kDim + Space::kDim * kept + node.rows / 2);

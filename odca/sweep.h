@@ -1,10 +1,23 @@
 // O-DCA's sweep of vectors over assembled joins (joins.h): free accelerations go up, forces come
 // down. Where rank was lost, a second sweep corrects the first.
 //
+//   up     s   = T (C b + c0)             from the children's b                (21, 68)
+//          b'  = b - V^T s                to the parent                        (29-30, 72)
+//   down   phi = -T^T (s + V F)           from the forces outside              (17, 42, 64)
+//          F_child = [F; 0] + C^T phi     to the children                      (18, 39, 47-48, 65)
+//   leaf   A   = Z F + b                                                       (1-4, 45-46)
+//
+// Letters, axes and points of reference are those of joins.h: a motion or force of a body is at its
+// centre of mass, in ground axes. Accelerations of assemblies are never formed, only forces are
+// handed down; a body's acceleration follows when all forces on it are known.
+//
 // Joins close loops one after another. Where constraints depend on each other, one join may be far
 // worse conditioned than all constraints solved at once, and its round-off spoils the result. The
-// joints' residual r = C A + c0 shows that, and one step of iterative refinement, in place:
-//   A += sweep(b = 0, c0 = r),   squares the error; a softened weight w becomes 1 - (1 - w)^2.
+// joints' residual r = C A + c0 shows that. One step of iterative refinement,
+//
+//   A += sweep(b = 0, c0 = r),
+//
+// squares the error; a softened weight w becomes 1 - (1 - w)^2.
 #pragma once
 
 #include "odca/joins.h"
@@ -25,17 +38,21 @@ class Sweep {
   void Solve(std::span<const Motion<Space, S>> b, std::span<const Motion<Space, S>> c0,
              std::span<Motion<Space, S>> A);
 
-  /// phi of each mechanism joint after Solve(); zero where the plan has no such joint.
+  /// phi of each mechanism joint after Solve(), the measure numbers (14) of its constraint force:
+  /// components along the columns of D, which need not part into moments and forces. Zero where the
+  /// plan has no such joint.
   std::span<const Motion<Space, S>> multipliers() const { return phi_; }
 
   /// Multiply-adds since the last Assemble() began.
   long operations() const { return joins_.operations() + operations_; }
 
  private:
+  /// One node on the way up, and on the way down.
   void Up(const PlanNode& node, int n, std::span<const Motion<Space, S>> c0);
   void Down(const PlanNode& node, int n);
   /// Up and down over what stands in b_; adds to A and phi_.
   void Correct(std::span<const Motion<Space, S>> c0, std::span<Motion<Space, S>> A);
+  /// r = C A + c0 of every joint, in residual_.
   void Residual(std::span<const Motion<Space, S>> c0, std::span<const Motion<Space, S>> A);
 
   const Plan& plan_;

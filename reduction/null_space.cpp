@@ -1,3 +1,5 @@
+// Numbers (4) and (5) are those of null_space.h. Rows of J are components along the directions D of
+// the cut joints at their points Mo, columns belong to the speeds of the forest.
 #include "reduction/null_space.h"
 
 #include <algorithm>
@@ -24,6 +26,8 @@ NullSpace<Space, S>::NullSpace(const Mechanism<Space, S>& mechanism)
       speeds_(z_),
       column_(z_) {}
 
+/// B = K^-1 J L^-T of (4) and its singular values; the K of each cut joint is kept in K_, V in
+/// svd_.
 template <class Space, class S>
 void NullSpace<Space, S>::Factor(const Kinematics<Space, S>& kinematics,
                                  TreeDynamics<Space, S>& dynamics, const MatrixX<S>& J) {
@@ -63,6 +67,7 @@ void NullSpace<Space, S>::Factor(const Kinematics<Space, S>& kinematics,
   rcond_ = num_dependent_ > 0 ? sigma[num_dependent_ - 1] / sqrt(largest) : S(1);
 }
 
+/// K is block-diagonal, a block per cut joint.
 template <class Space, class S>
 void NullSpace<Space, S>::ToDirections(const VectorX<S>& rows) {
   rows_ = rows;
@@ -74,6 +79,8 @@ void NullSpace<Space, S>::ToDirections(const VectorX<S>& rows) {
   c_.noalias() = svd_.U().leftCols(c_.size()).transpose() * rows_;
 }
 
+/// (5): z_D from gamma, then the equations of z_N, whose matrix is `reduced_` and whose right side
+/// is built in the tail of z_. Last udot = L^-T V z.
 template <class Space, class S>
 bool NullSpace<Space, S>::Accelerate(const MatrixX<S>& M, const VectorX<S>& h,
                                      const VectorX<S>& gamma, VectorX<S>& udot) {
@@ -117,6 +124,7 @@ bool NullSpace<Space, S>::Accelerate(const MatrixX<S>& M, const VectorX<S>& h,
   return true;
 }
 
+/// lambda = K^-T U diag(1 / sigma) V^T L^-1 force; directions with no weight carry nothing.
 template <class Space, class S>
 void NullSpace<Space, S>::Multipliers(const VectorX<S>& force, VectorX<S>& lambda) {
   column_ = force;

@@ -10,6 +10,8 @@ template <class Space, class S>
 Drives<Space, S>::Drives(const Mechanism<Space, S>& mechanism)
     : dynamics_(mechanism), A_(mechanism.num_bodies(), Motion<Space, S>::Zero()), F_(A_) {}
 
+/// `left` is D^T (A_Q - A_P - g) at Mo, the paper's (7) without udot, for the accelerations that
+/// udot gives the bodies. `alone` is M^-1 times each body's wrench at its centre of mass.
 template <class Space, class S>
 bool Drives<Space, S>::Followed(const Kinematics<Space, S>& kinematics, const VectorX<S>& udot,
                                 const VectorX<S>& feedback) {
@@ -54,6 +56,11 @@ S Drives<Space, S>::RelativeMismatch(const Kinematics<Space, S>& kinematics) {
   return position + (size > S(0) ? speed / size : S(0));
 }
 
+/// The directions of prescribed coordinates are columns H_k of the kind's motion map that stand in
+/// D, and the drive's relative motion is H_k times its rate. A cut joint's drive carries the force
+/// H_k lambda, whose power is lambda |H_k|^2 times the rate. For a tree joint, F_ is summed from
+/// the leaves of the tree inwards and moved to Mo; the component of that along H_k is the drive's.
+/// All in ground axes, wrenches of bodies at their centres of mass.
 template <class Space, class S>
 S Drives<Space, S>::Power(const Kinematics<Space, S>& kinematics, const VectorX<S>& udot,
                           const VectorX<S>& lambda) {

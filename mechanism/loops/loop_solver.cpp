@@ -1,3 +1,5 @@
+// Letters are those of loop_solver.h, where the formulas stand. Rows of X, and so all vectors here,
+// are components along the directions D of the joints, [rad or m] per [N m or N].
 #include "mechanism/loops/loop_solver.h"
 
 #include <algorithm>
@@ -35,6 +37,7 @@ auto LoopSolver<S>::K_inverse(std::size_t joint) const {
   return Eigen::Map<const MatrixX<S>>(&inverse_scales_[part.scale], part.rows, part.rows);
 }
 
+/// X_free = K K^T by Cholesky; what is kept is K^-1, lower triangular.
 template <class S>
 void LoopSolver<S>::SetScale(int joint, const JointMatrix<S>& free_response) {
   const Part& part = parts_[joint];
@@ -44,6 +47,7 @@ void LoopSolver<S>::SetScale(int joint, const JointMatrix<S>& free_response) {
   K.matrixL().solveInPlace(inverse);
 }
 
+/// B := K^-1 B, K being block-diagonal: a block per joint.
 template <class S>
 void LoopSolver<S>::ScaleRows(Eigen::Ref<MatrixX<S>> B) const {
   for (std::size_t j = 0; j < parts_.size(); ++j) {
@@ -57,6 +61,7 @@ void LoopSolver<S>::ScaleRows(Eigen::Ref<MatrixX<S>> B) const {
   }
 }
 
+/// (K^-1 (K^-1 X)^T) is K^-1 X K^-T, X being symmetric.
 template <class S>
 auto LoopSolver<S>::Scaled(const ConstRef& X) {
   auto scaled = scratch_->scaled.topLeftCorner(size_, size_);
@@ -68,6 +73,7 @@ auto LoopSolver<S>::Scaled(const ConstRef& X) {
   return scaled;
 }
 
+/// "plain": X = L L^T, T = L^-1, which takes the place of the paper's inverses in (17), (42), (66).
 template <class S>
 bool LoopSolver<S>::FactorPlain(const ConstRef& X, S scale, S tolerance) {
   form_ = Form::kPlain;
@@ -82,6 +88,7 @@ bool LoopSolver<S>::FactorPlain(const ConstRef& X, S scale, S tolerance) {
   return rcond_ > tolerance;
 }
 
+/// "scaled": K^-1 X K^-T = L L^T, T = L^-1 K^-1.
 template <class S>
 bool LoopSolver<S>::FactorScaled(const ConstRef& X) {
   form_ = Form::kScaled;
@@ -95,6 +102,8 @@ bool LoopSolver<S>::FactorScaled(const ConstRef& X) {
   return rcond_ >= S(kSuspicious);
 }
 
+/// "geometric": K_g^-1 X_g K_g^-T = U diag(lambda) U^T and the weights w_i; inverse_norms_ are
+/// sqrt(w_i / lambda_i), so that T = diag(inverse_norms_) U^T K_g^-1.
 template <class S>
 void LoopSolver<S>::FactorGeometric(const ConstRef& X_geometric) {
   using std::expm1;
@@ -117,6 +126,9 @@ void LoopSolver<S>::FactorGeometric(const ConstRef& X_geometric) {
   rcond_ = std::max(eigenvalues_[0], S(0)) / largest;
 }
 
+/// "softened": U and w_i stay from the geometry. The diagonal of Y + diag(Y_ii (1 / w_i - 1)) is
+/// Y_ii / w_i = N_i^2, so dividing by N from both sides leaves ones on it. inverse_norms_ are
+/// the 1 / N_i.
 template <class S>
 bool LoopSolver<S>::FactorSoftened(const ConstRef& X) {
   using std::sqrt;
@@ -140,6 +152,7 @@ bool LoopSolver<S>::FactorSoftened(const ConstRef& X) {
   return cholesky_.info() == Eigen::Success;
 }
 
+/// K^-1 first, then U^T and the inverse norms, then L^-1, as far as the form has them.
 template <class S>
 void LoopSolver<S>::Apply(Eigen::Ref<MatrixX<S>> B) const {
   if (form_ != Form::kPlain) ScaleRows(B);
@@ -153,6 +166,7 @@ void LoopSolver<S>::Apply(Eigen::Ref<MatrixX<S>> B) const {
   if (form_ != Form::kGeometric) cholesky_.matrixL().solveInPlace(B);
 }
 
+/// The same factors transposed, in the opposite order.
 template <class S>
 void LoopSolver<S>::ApplyTransposed(Eigen::Ref<VectorX<S>> v) const {
   if (form_ != Form::kGeometric) cholesky_.matrixU().solveInPlace(v);

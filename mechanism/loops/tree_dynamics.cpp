@@ -1,3 +1,7 @@
+// Everything is in ground axes. Motions, accelerations and wrenches of a body are at its centre of
+// mass, those of a joint at Mo (joint.h). With S(r) the shift of a motion by r, S(r)^T brings a
+// wrench back: [m; f] at c + r is [m + r x f; f] at c. Numbers in brackets are the O-DCA paper's
+// equations.
 #include "mechanism/loops/tree_dynamics.h"
 
 #include "mechanism/algebra/instantiate.h"
@@ -35,6 +39,13 @@ Block<Space, S> ShiftInertia(const Block<Space, S>& I, const Linear<Space, S>& r
   return X.transpose() * I * X;
 }
 
+/// Composite rigid bodies (Featherstone, Rigid Body Dynamics Algorithms, section 6.2). `composite`
+/// of a body is the inertia at its centre of mass of all that the tree has outward of it. Column i
+/// of M is the momentum that the unit speed i gives the composite body outward of its joint, moved
+/// inward and projected on H of each joint on the way:
+///
+///   M_ki = H_k^T S^T .. S^T I_composite S H_i
+///
 /// The choice of masses is made once, not in the loop over all pairs of joints.
 template <Masses masses, class Space, class S>
 void FillMassMatrix(const Kinematics<Space, S>& kinematics, std::vector<Block<Space, S>>& composite,
@@ -80,7 +91,11 @@ void FillMassMatrix(const Kinematics<Space, S>& kinematics, std::vector<Block<Sp
   }
 }
 
-/// D^T (V_Q - V_P) of one constraint by speed, for `count` directions, from row `first` of J on.
+/// D^T (V_Q - V_P) of one constraint by speed, for `count` directions, from row `first` of J on. A
+/// speed of a joint at p_j moves all that is outward of it, the constraint's point p included:
+///
+///   J_ri = D_r^T S(p - p_j) H_i        + on the way from Ground to Q, - on the way to P
+///
 template <class Space, class S>
 void AddRows(const Kinematics<Space, S>& kinematics, int index, int first, int count,
              MatrixX<S>& J) {
@@ -126,6 +141,12 @@ void TreeDynamics<Space, S>::MassMatrix(const Kinematics<Space, S>& kinematics, 
   }
 }
 
+/// (7) along the tree, parent before child: with both points at Mo and n = [0; w x (w x r)],
+///
+///   A at Mo of the parent's side  =  S(r_parent) A_parent + n_parent
+///   A at Mo of the child's side   =  that +- (H udot + g)
+///   A_child                       =  S(-r_child) (that) + n_child
+///
 template <class Space, class S>
 void TreeDynamics<Space, S>::BodyAccelerations(const Kinematics<Space, S>& kinematics,
                                                const VectorX<S>& udot,
@@ -146,6 +167,7 @@ void TreeDynamics<Space, S>::BodyAccelerations(const Kinematics<Space, S>& kinem
   }
 }
 
+/// Newton and Euler about the centre of mass: [I alpha + w x I w; m a].
 template <class Space, class S>
 Motion<Space, S> InertialForce(const Kinematics<Space, S>& kinematics, int body,
                                const Motion<Space, S>& A) {
@@ -159,6 +181,8 @@ Motion<Space, S> InertialForce(const Kinematics<Space, S>& kinematics, int body,
   return F;
 }
 
+/// h by the recursive Newton-Euler method: outwards accelerations for udot = 0, then the wrenches
+/// that bodies need for them beyond applied forces, then inwards their components along H.
 template <class Space, class S>
 void TreeDynamics<Space, S>::Bias(const Kinematics<Space, S>& kinematics, VectorX<S>& h) {
   h.setZero(kinematics.mechanism().num_u());
@@ -167,6 +191,7 @@ void TreeDynamics<Space, S>::Bias(const Kinematics<Space, S>& kinematics, Vector
   AlongForest(kinematics, h);
 }
 
+/// A cut joint carries D lambda on Q and -D lambda on P at Mo (13).
 template <class Space, class S>
 std::span<const Motion<Space, S>> TreeDynamics<Space, S>::WrenchesLeft(
     const Kinematics<Space, S>& kinematics, const VectorX<S>& udot, const VectorX<S>& lambda) {
@@ -183,6 +208,7 @@ std::span<const Motion<Space, S>> TreeDynamics<Space, S>::WrenchesLeft(
   return F_;
 }
 
+/// As h in Bias(), with the accelerations of udot and the forces of lambda.
 template <class Space, class S>
 void TreeDynamics<Space, S>::Residual(const Kinematics<Space, S>& kinematics,
                                       const VectorX<S>& udot, const VectorX<S>& lambda,
@@ -203,6 +229,8 @@ void TreeDynamics<Space, S>::NeededWrenches(const Kinematics<Space, S>& kinemati
   }
 }
 
+/// Inwards, child before parent: a joint transmits what all bodies outward of it need, and H^T of
+/// that at Mo is the force along its coordinates. Leaves in F_ of a body the sum for its subtree.
 template <class Space, class S>
 void TreeDynamics<Space, S>::AlongForest(const Kinematics<Space, S>& kinematics,
                                          VectorX<S>& force) {
@@ -238,6 +266,7 @@ void TreeDynamics<Space, S>::JacobianOf(const Kinematics<Space, S>& kinematics, 
   rows = J;
 }
 
+/// Motions with zero free speeds come from prescribed motions alone.
 template <class Space, class S>
 void SpeedBias(Kinematics<Space, S>& kinematics, const VectorX<S>& zero, VectorX<S>& bias) {
   const Mechanism<Space, S>& mechanism = kinematics.mechanism();
@@ -251,6 +280,8 @@ void SpeedBias(Kinematics<Space, S>& kinematics, const VectorX<S>& zero, VectorX
   }
 }
 
+/// gamma = -D^T (A_Q - A_P - g) with the accelerations that udot = 0 gives: what is
+/// missing in that is J udot.
 template <class Space, class S>
 void TreeDynamics<Space, S>::JacobianBias(const Kinematics<Space, S>& kinematics,
                                           VectorX<S>& gamma) const {
@@ -264,6 +295,7 @@ void TreeDynamics<Space, S>::JacobianBias(const Kinematics<Space, S>& kinematics
   }
 }
 
+/// D^T of (7), both sides at Mo; H udot drops out because D^T H = 0 (9).
 template <class Space, class S>
 Motion<Space, S> JointAcceleration(const Kinematics<Space, S>& kinematics, int index,
                                    std::span<const Motion<Space, S>> A) {
@@ -279,6 +311,8 @@ Motion<Space, S> JointAcceleration(const Kinematics<Space, S>& kinematics, int i
   return result;
 }
 
+/// X of (16) for two bodies that nothing else holds: the sum over both sides of
+/// (S^T D)^T M^-1 (S^T D), the wrenches S^T D being at the centres that the masses are at.
 template <class Space, class S>
 JointMatrix<S> FreeResponse(const Kinematics<Space, S>& kinematics, Masses masses, int index,
                             bool all_directions) {

@@ -1,4 +1,8 @@
 // What the forces of a mechanism do: wrenches, potential energy, power.
+//
+// Everything is in ground axes. A wrench on a body is [moment; force] at its centre of mass; a
+// force f at the point r from there adds [r x f; f]. These are the active forces of the paper
+// (section 2), which enter zeta_i3 of its two-handle equations.
 #include <cmath>
 
 #include "mechanism/algebra/instantiate.h"
@@ -8,6 +12,7 @@ namespace loopbench {
 
 namespace {
 
+/// R_WB f of a force that turns with its body, f of one that does not.
 template <class Space, class S>
 Linear<Space, S> ForceInGround(const BodyForce<Space, S>& force, const Pose<Space, S>& X_WB) {
   return force.in_body_axes ? Linear<Space, S>(X_WB.R * force.force) : force.force;
@@ -62,12 +67,15 @@ S Resistance(const PointDrag<Space, S>& drag, const Linear<Space, S>& v) {
   return drag.linear + drag.quadratic * v.norm();
 }
 
+/// A force at the point r from the centre of mass.
 template <class Space, class S>
 void AddForce(const Linear<Space, S>& f, const Linear<Space, S>& r, Motion<Space, S>& wrench) {
   wrench.template head<Space::kRot>() += Moment<S>(r, f);
   wrench.template tail<Space::kLin>() += f;
 }
 
+/// H tau / |H|^2 at Mo on Q, its opposite on P, both moved to the centres of mass. The power of it
+/// is tau u, because the joint's relative motion is H u.
 template <class Space, class S>
 void AddJointForce(const Kinematics<Space, S>& kinematics, int index, S tau,
                    std::span<Motion<Space, S>> wrenches) {
@@ -80,6 +88,8 @@ void AddJointForce(const Kinematics<Space, S>& kinematics, int index, S tau,
 
 }  // namespace
 
+/// tau of a spring and damper on a joint is value - stiffness (q - rest) - damping u; the tension
+/// of one between points pulls `from` along the direction to `to`, and `to` the other way.
 template <class Space, class S>
 void AppliedForces(const Kinematics<Space, S>& kinematics, std::span<Motion<Space, S>> wrenches) {
   const Mechanism<Space, S>& mechanism = kinematics.mechanism();
@@ -121,6 +131,9 @@ void AppliedForces(const Kinematics<Space, S>& kinematics, std::span<Motion<Spac
   }
 }
 
+/// Kinetic: (m v^2 + w . I w) / 2 at the centre of mass. Potential: -m g . p, -f . p of a force of
+/// fixed direction, stiffness s^2 / 2 + preload s of a spring stretched by s, and of a joint's
+/// force stiffness (q - rest)^2 / 2 - value q.
 template <class Space, class S>
 Energy<S> ComputeEnergy(const Kinematics<Space, S>& kinematics) {
   const Mechanism<Space, S>& mechanism = kinematics.mechanism();
@@ -152,6 +165,7 @@ Energy<S> ComputeEnergy(const Kinematics<Space, S>& kinematics) {
   return energy;
 }
 
+/// What ComputeEnergy() leaves out, as f . v at points and tau u at joints.
 template <class Space, class S>
 Power<S> AppliedPower(const Kinematics<Space, S>& kinematics) {
   const ForceElements<Space, S>& forces = kinematics.mechanism().forces();

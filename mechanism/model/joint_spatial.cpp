@@ -139,6 +139,7 @@ struct Kinds {
                 },
             .rates = SameRates<S, 2>};
   }
+  /// The paper's example: H = [1; 0], D = [0; 1] in blocks of three (8).
   static JointKind<Spatial, S> Spherical() {
     return {.num_q = 4,
             .num_u = 3,

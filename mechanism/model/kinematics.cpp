@@ -1,3 +1,6 @@
+// Equations in brackets are those of the O-DCA paper (odca/README.md has the index). Frames: W is
+// Ground, F is fixed on body P of a joint and M on its body Q; X_AB is the pose of B in A, and R_AB
+// takes components from B axes to A axes. All vectors are in ground axes unless a name ends in _F.
 #include "mechanism/model/kinematics.h"
 
 #include <algorithm>
@@ -17,7 +20,9 @@ void Refresh(Pose<Planar, S>& X) {
 template <class S>
 void Refresh(Pose<Spatial, S>&) {}
 
-/// [H D] with F axes R. A rotation has one axis in the plane.
+/// [H D] in ground axes, F having the axes R = R_WF. Each column is a rotation about one axis of F
+/// or a shift along one, all different, so D^T H = 0 holds as it is (9). The plane has one axis to
+/// rotate about, which is normal to it.
 template <class Space, class S>
 void SetBasis(const JointKind<Space, S>& kind, const Rotation<Space, S>& R,
               Block<Space, S>& basis) {
@@ -34,7 +39,8 @@ void SetBasis(const JointKind<Space, S>& kind, const Rotation<Space, S>& R,
   }
 }
 
-/// [H D] of a kind whose directions depend on the pose.
+/// [H D] in ground axes of a kind whose directions depend on its pose: the kind gives them in F
+/// axes, and R = R_WF turns both halves, angular and linear.
 template <class Space, class S>
 void SetBasisAt(const JointKind<Space, S>& kind, const Rotation<Space, S>& R,
                 const Pose<Space, S>& X_FM, Block<Space, S>& basis) {
@@ -80,7 +86,8 @@ Kinematics<Space, S>::Kinematics(const Mechanism<Space, S>& mechanism)
   Release(mechanism.released());
 }
 
-/// Directions that stand still are set once and for all.
+/// Directions that stand still are set once and for all: those whose span needs no axes, and those
+/// of joints on Ground, for which F stands where X_PF puts it. UpdatePosition() sets the others.
 template <class Space, class S>
 void Kinematics<Space, S>::Release(const std::vector<Released>& released) {
   released_ = released;
@@ -91,6 +98,8 @@ void Kinematics<Space, S>::Release(const std::vector<Released>& released) {
   }
 }
 
+/// Rows count prescribed coordinates, then the kind's D without the released directions, then the
+/// released ones; each released direction before the row moves it one place on.
 template <class Space, class S>
 int Kinematics<Space, S>::DirectionOf(int index, int row) const {
   const Joint<Space, S>& joint = mechanism_->joints()[index];
@@ -111,6 +120,7 @@ void Kinematics<Space, S>::SetTime(S t) {
   }
 }
 
+/// Free coordinates come from q, prescribed ones from their drives at time().
 template <class Space, class S>
 const S* Kinematics<Space, S>::JointCoordinates(const Joint<Space, S>& joint, const VectorX<S>& q,
                                                 S* room) const {
@@ -150,6 +160,13 @@ void Kinematics<Space, S>::SetDirections(int index, const Rotation<Space, S>& R_
   }
 }
 
+/// First half of the paper's first two sweeps, as a walk along the spanning tree: each body after
+/// its parent, outwards from Ground. Forward along a joint (the child is Q)
+///
+///   X_WF = X_WP X_PF,    X_WM = X_WF X_FM(q),    X_WQ = X_WM X_QM^-1,
+///
+/// and backward the same solved for X_WP. A cut joint's X_FM is what the two bodies leave. The
+/// point of every joint is Mo, and its arms r_P and r_Q lead there from the centres of mass.
 template <class Space, class S>
 void Kinematics<Space, S>::UpdatePosition(const VectorX<S>& q) {
   q_ = q;
@@ -190,6 +207,16 @@ void Kinematics<Space, S>::UpdatePosition(const VectorX<S>& q) {
   }
 }
 
+/// Second half: V of each body at its centre of mass from that of its parent, and g of each joint.
+///
+///   V_rel = H u,  V_child = S(-r_child) (S(r_parent) V_parent +- V_rel)        a tree joint
+///   V_rel = S(r_Q) V_Q - S(r_P) V_P                                            a cut joint
+///   g     = Hdot u + [w_P x w_rel; 2 w_P x v_rel] + D times given accelerations
+///
+/// S(r) takes a motion from a point to the one at r from it. g is what (7) has beside H udot, for
+/// the points of P and Q that coincide with Mo: one w_P x v_rel because the axes turn with P,
+/// another one because Mo slides along P. The same lines serve joints to Ground, one side of
+/// which stands still (33-34), and both joints of a coupled loop (49-50).
 template <class Space, class S>
 void Kinematics<Space, S>::UpdateVelocity(const VectorX<S>& u) {
   u_ = u;
@@ -198,7 +225,7 @@ void Kinematics<Space, S>::UpdateVelocity(const VectorX<S>& u) {
     const Angular<Space, S> w_P = motions_[joint.from].template head<Space::kRot>();
     const Angular<Space, S> w_rel = state.V_rel.template head<Space::kRot>();
     const Linear<Space, S> v_rel = state.V_rel.template tail<Space::kLin>();
-    state.g << CrossAngular<S>(w_P, w_rel), S(2) * Cross<S>(w_P, v_rel);
+    state.g << CrossAngular<S>(w_P, w_rel), S(2) * Cross<S>(w_P, v_rel);  // (7)
     if (joint.kind->bias != nullptr) AddBias(index, joint, state);
     for (int k = 0; k < joint.num_drives; ++k) {
       state.g += state.D(k) * drives_[joint.first_drive + k].acceleration;
@@ -231,7 +258,7 @@ void Kinematics<Space, S>::UpdateVelocity(const VectorX<S>& u) {
   }
 }
 
-/// g += Hdot u, which the kind knows in F axes.
+/// g += Hdot u of (7), seen from F. The kind takes V_rel and gives Hdot u in F axes.
 template <class Space, class S>
 void Kinematics<Space, S>::AddBias(int index, const Joint<Space, S>& joint,
                                    JointState<Space, S>& state) const {
@@ -250,6 +277,7 @@ void Kinematics<Space, S>::AddBias(int index, const Joint<Space, S>& joint,
   }
 }
 
+/// n of (7) on centres of mass: A at c + r is S(r) A + n.
 template <class Space, class S>
 Motion<Space, S> Kinematics<Space, S>::Centripetal(int body, const Linear<Space, S>& r) const {
   const Angular<Space, S> w = motions_[body].template head<Space::kRot>();
@@ -258,6 +286,7 @@ Motion<Space, S> Kinematics<Space, S>::Centripetal(int body, const Linear<Space,
   return A;
 }
 
+/// R_WB I R_WB^T about the centre of mass; in the plane a number that no rotation changes.
 template <class Space, class S>
 typename Inertia<Space, S>::Matrix Kinematics<Space, S>::RotationalInertia(
     const Inertia<Space, S>& inertia, int body) const {
@@ -268,6 +297,7 @@ typename Inertia<Space, S>::Matrix Kinematics<Space, S>::RotationalInertia(
   }
 }
 
+/// R_WB I^-1 R_WB^T: the inverse in body axes is a constant.
 template <class Space, class S>
 typename Inertia<Space, S>::Matrix Kinematics<Space, S>::RotationalInverse(
     const Inertia<Space, S>& inertia, int body) const {

@@ -110,6 +110,52 @@ TEST(PaperTest, ChainsClosedOnGroundInSpace) {
   EXPECT_GE(tally.assemblies, tally.scenes);
 }
 
+/// What stands in (7) beside H udot, less Hdot u with H differentiated in ground axes: where the
+/// joint slides, Mo moves along P, and w_P x v_rel is left over. Tree joints; the largest such
+/// rest.
+template <class Space>
+double RestOfEquation7(std::uint64_t seed) {
+  constexpr double h = 1e-5;  // truncation h^2 and round-off eps / h are both below 1e-9
+  const SpaceKind space = Space::kRot == 1 ? SpaceKind::kPlanar : SpaceKind::kSpatial;
+  const MechanismDescription description = ChainOfKinds(5, space, seed);
+  const Mechanism<Space, double> mechanism(description, Coordinates::kJoint);
+  const testing::State state = testing::ConsistentState(description, mechanism, seed);
+  VectorX<double> rates(mechanism.num_q());
+  mechanism.Rates(state.q, state.u, rates);
+  Kinematics<Space, double> now(mechanism), before(mechanism), after(mechanism);
+  now.UpdatePosition(state.q);
+  now.UpdateVelocity(state.u);
+  before.UpdatePosition(state.q - h * rates);
+  after.UpdatePosition(state.q + h * rates);
+  double largest = 0.0;
+  for (const TreeStep& step : mechanism.tree()) {
+    const Joint<Space, double>& joint = mechanism.joints()[step.joint];
+    const JointState<Space, double>& at = now.joints()[step.joint];
+    Motion<Space, double> Hdot_u = Motion<Space, double>::Zero();
+    for (int i = 0; i < at.num_u; ++i) {
+      Hdot_u += (after.joints()[step.joint].H(i) - before.joints()[step.joint].H(i)) *
+                (state.u[joint.u_offset + i] / (2 * h));
+    }
+    const Angular<Space, double> w_P = now.motions()[joint.from].template head<Space::kRot>();
+    const Linear<Space, double> v_rel = at.V_rel.template tail<Space::kLin>();
+    Motion<Space, double> rest = Motion<Space, double>::Zero();
+    rest.template tail<Space::kLin>() = Cross<double>(w_P, v_rel);
+    EXPECT_LE((at.g - Hdot_u - rest).norm(), 1e-7 * (1.0 + at.g.norm())) << joint.description;
+    largest = std::max(largest, rest.norm());
+  }
+  return largest;
+}
+
+TEST(PaperTest, Equation7NeedsMoreThanHdotUWhereAJointSlides) {
+  double plane = 0.0, space = 0.0;
+  for (std::uint64_t seed = 1; seed <= 8; ++seed) {
+    plane = std::max(plane, RestOfEquation7<Planar>(seed));
+    space = std::max(space, RestOfEquation7<Spatial>(seed));
+  }
+  EXPECT_GE(plane, 0.1);
+  EXPECT_GE(space, 0.1);
+}
+
 /// Section 3.3 says that all matrices stay positive definite. Those of joins with a floating side
 /// do; chi of a planar loop has three zero eigenvalues in space, in every position.
 TEST(PaperTest, ChiOfAPlanarLoopInSpaceIsNotPositiveDefinite) {

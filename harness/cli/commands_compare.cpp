@@ -92,9 +92,8 @@ Table FindingTable(const ComparisonReport& comparison, bool with_same) {
       Record row;
       row.Set("judgement", std::string(ToString(judgement)));
       row.Set("case", finding.one);
-      row.Set("measure", finding.measure.unit.empty()
-                             ? finding.measure.key
-                             : fmt::format("{} [{}]", finding.measure.key, finding.measure.unit));
+      const auto& [key, unit] = std::pair(finding.measure.key, finding.measure.heading.unit);
+      row.Set("measure", unit.empty() ? std::string(key) : fmt::format("{} [{}]", key, unit));
       row.Set("base", finding.base);
       row.Set("new", finding.fresh);
       row.Set("ratio", std::isfinite(finding.ratio) ? Value(finding.ratio) : Value());

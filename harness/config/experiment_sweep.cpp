@@ -7,6 +7,7 @@
 #include <set>
 
 #include "harness/config/experiment_reader.h"
+#include "harness/record/measures.h"
 
 namespace loopbench::harness {
 namespace {
@@ -69,7 +70,7 @@ std::string ReadAxisName(const JsonNode& axis, std::set<std::string>* taken) {
   if (name.empty()) return name;
   if (!IsName(name)) {
     node->Fail("a name of letters, digits, \"_\" and \"-\" that begins with a letter");
-  } else if (IsRecordKey(name)) {
+  } else if (IsReserved(name)) {
     node->Fail("a name that records do not use already");
   } else if (!taken->insert(name).second) {
     node->Fail("a name that no other axis has");

@@ -63,7 +63,4 @@ class Sweep {
 /// "exclude": conditions on case keys and axis names, as selections that match excluded cases.
 std::vector<Selection> ReadExclusions(const JsonNode& root, const Record& keys);
 
-/// Whether records have, or may get, a value of this name from a run.
-bool IsRecordKey(const std::string& name);
-
 }  // namespace loopbench::harness

@@ -275,7 +275,8 @@ ComparisonReport Compare(const std::vector<Record>& given_base,
                     base_origin.SameMachine(fresh_origin)};
     for (const Measure& measure : Measures()) {
       const bool chosen =
-          options.only.empty() || std::ranges::count(options.only, GroupOf(measure.rule)) > 0;
+          measure.rule != Rule::kNone &&
+          (options.only.empty() || std::ranges::count(options.only, GroupOf(measure.rule)) > 0);
       const bool anywhere = HeldBy(pair.base, measure) != Held::kNothing ||
                             HeldBy(pair.fresh, measure) != Held::kNothing;
       if (!chosen || !anywhere) continue;

@@ -10,7 +10,7 @@
 #include <string>
 #include <vector>
 
-#include "harness/judge/measures.h"
+#include "harness/judge/rules.h"
 #include "harness/record/record.h"
 
 namespace loopbench::harness {

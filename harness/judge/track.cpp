@@ -4,7 +4,7 @@
 
 #include <map>
 
-#include "harness/judge/measures.h"
+#include "harness/judge/rules.h"
 #include "harness/judge/statistics.h"
 #include "harness/record/noise.h"
 
@@ -18,7 +18,8 @@ bool IsTracked(Rule rule) {
 }
 
 TrackedValue Tracked(const std::string& one, const Measure& measure, const Record& record) {
-  TrackedValue value{one, measure.key, measure.unit, 0.0, 0.0, 0.0};
+  TrackedValue value{one, std::string(measure.key), std::string(measure.heading.unit), 0.0, 0.0,
+                     0.0};
   if (measure.rule == Rule::kTime) {
     const std::vector<double>& sample = record.Numbers(measure.key);
     value.measure = value.measure.substr(value.measure.find('.') + 1);

@@ -14,7 +14,7 @@ struct TrackedRecords {
   /// of the records that ended well, all finite; hashes and outcomes are no numbers.
   std::vector<TrackedValue> values;
   /// What a tracker cannot take, a line each with the case and the reason: runs that failed, values
-  /// that are none (compare/measures.h), cases that are there more than once.
+  /// that are none (rules.h), cases that are there more than once.
   std::vector<std::string> left_out;
 };
 

@@ -2,7 +2,11 @@
 
 #include <algorithm>
 #include <cmath>
+#include <string>
+#include <string_view>
+#include <utility>
 
+#include "harness/record/measures.h"
 #include "harness/text/hash.h"
 #include "mechanism/description/outcome.h"
 
@@ -10,34 +14,73 @@ namespace loopbench::harness {
 
 namespace {
 
-double Real(const Record& record, const std::string& key) { return record.Number(key); }
-
-/// Sum of a key that some parts may lack; nothing when all do.
-template <class Number>
-void Add(std::span<const Run> parts, const std::string& key, Record* whole) {
-  Number sum = 0;
-  bool any = false;
+/// Sum of a key over the parts that have it, or NaN where one of `all` lacks it; nothing where none
+/// has it.
+Value Sum(std::span<const Run> parts, std::string_view key, bool all) {
+  std::int64_t count = 0;
+  double sum = 0.0;
+  bool any = false, is_count = true;
   for (const Run& part : parts) {
-    const double value = Real(part.record, key);
+    const double value = part.record.Number(key);
+    if (std::isnan(value) && all) return value;
     if (std::isnan(value)) continue;
-    sum += static_cast<Number>(value);
+    is_count = is_count && std::holds_alternative<std::int64_t>(*part.record.Find(key));
+    count += static_cast<std::int64_t>(value);
+    sum += value;
     any = true;
   }
-  if (any) whole->Set(key, sum);
+  if (!any) return {};
+  return is_count ? Value(count) : Value(sum);
 }
 
-/// Largest (or smallest) of a key that some parts may lack; the part that has it.
-const Run* Extreme(std::span<const Run> parts, const std::string& key, bool largest,
-                   Record* whole) {
+/// The part that decides a key: the one with the largest or smallest number of those that have it,
+/// the first one that failed, ...; null where none has it.
+const Run* Deciding(std::span<const Run> parts, const Measure& measure, std::string_view key) {
+  const auto& [how, with] = measure.merging;
+  if (how == Merge::kWith) return Deciding(parts, *FindMeasure(with), with);
+  if (how == Merge::kOfEnding) {
+    const auto failed = std::ranges::find_if(parts, [](const Run& part) {
+      return part.record.Text("outcome") != ToString(Outcome::kFinished);
+    });
+    return failed == parts.end() ? &parts.front() : &*failed;
+  }
   const Run* best = nullptr;
   for (const Run& part : parts) {
-    const double value = Real(part.record, key);
-    if (std::isnan(value)) continue;
-    const double known = best == nullptr ? value : Real(best->record, key);
-    if (best == nullptr || (largest ? value > known : value < known)) best = &part;
+    const double value = part.record.Number(key);
+    if (how == Merge::kOfEachPart ? part.record.Find(key) == nullptr : std::isnan(value)) continue;
+    const double known = best == nullptr ? value : best->record.Number(key);
+    const bool better =
+        how == Merge::kLargest ? value > known : how == Merge::kSmallest && value < known;
+    if (best == nullptr || better) best = &part;
   }
-  if (best != nullptr) whole->Set(key, Real(best->record, key));
   return best;
+}
+
+/// The value of a key for the whole; nothing where it has none.
+Value MergeKey(std::span<const Run> parts, const Measure& measure, std::string_view key) {
+  const bool started = std::ranges::all_of(
+      parts, [](const Run& part) { return !std::isnan(part.record.Number("rank_min")); });
+  switch (measure.merging.how) {
+    case Merge::kLost:
+      return {};
+    case Merge::kSum:
+      return Sum(parts, key, false);
+    case Merge::kSumOfAll:
+      return started ? Sum(parts, key, true) : Value();
+    case Merge::kHashOfAll: {
+      std::string all;
+      for (const Run& part : parts) all += part.record.Text(key);
+      return started ? Value(Fnv1a(all)) : Value();
+    }
+    case Merge::kLargest:
+    case Merge::kSmallest:
+    case Merge::kWith:
+    case Merge::kOfEnding:
+    case Merge::kOfEachPart:
+      break;
+  }
+  const Run* part = Deciding(parts, measure, key);
+  return part == nullptr || part->record.Find(key) == nullptr ? Value() : *part->record.Find(key);
 }
 
 /// At every time of any part the largest of what the parts had last.
@@ -65,57 +108,15 @@ DriftSeries MergeDrift(std::span<const Run> parts) {
 Run MergeParts(std::span<const Run> parts) {
   if (parts.size() == 1) return parts.front();
   Run whole;
-  Record& record = whole.record;
-  const auto failed = std::ranges::find_if(parts, [](const Run& part) {
-    return part.record.Text("outcome") != ToString(Outcome::kFinished);
-  });
-  const Run& speaker = failed == parts.end() ? parts.front() : *failed;
-  record.Set("outcome", speaker.record.Text("outcome"));
-  record.Set("message", speaker.record.Text("message"));
-  Extreme(parts, "t_reached", false, &record);
-  for (const char* key :
-       {"steps", "rejected", "rhs_evaluations", "rhs_equivalents", "projection_iterations",
-        "restarts", "softened_steps", "softened_evaluations", "mode_changes",
-        "singularity_passages", "newton_jacobians", "newton_rhs_evaluations",
-        "newton_dual_evaluations", "newton_iterations", "newton_failures"}) {
-    Add<std::int64_t>(parts, key, &record);
-  }
-  const bool started = std::ranges::all_of(
-      parts, [](const Run& part) { return !std::isnan(Real(part.record, "rank_min")); });
-  for (const char* key : {"rank_min", "rank_constraints_min"}) {
-    if (started) Add<std::int64_t>(parts, key, &record);
-  }
-  double wall = 0.0, energy = 0.0;
-  std::string hashes;
   for (const Run& part : parts) {
-    wall += Real(part.record, "wall_s");
-    energy += Real(part.record, "energy_error_max");
-    hashes += part.record.Text("state_hash");
     for (const auto& [key, value] : part.record.items()) {
-      if (key.starts_with("drift.loop.") || key.starts_with("series.final.")) {
-        record.Set(key, value);
+      const Measure* measure = FindMeasure(key);
+      if (measure == nullptr || whole.record.Find(key) != nullptr) continue;
+      Value merged = MergeKey(parts, *measure, key);
+      if (!std::holds_alternative<std::monostate>(merged)) {
+        whole.record.Append(key, std::move(merged));
       }
     }
-  }
-  record.Set("wall_s", wall);
-  for (const char* key : {"cpu_s", "energy_supplied", "energy_dissipated", "energy_scale"}) {
-    Add<double>(parts, key, &record);
-  }
-  if (started) {
-    record.Set("energy_error_max", energy);
-    record.Set("state_hash", Fnv1a(hashes));
-  }
-  const Run* worst = Extreme(parts, "drift_position_max", true, &record);
-  if (worst != nullptr) record.Set("worst_loop", worst->record.Text("worst_loop"));
-  for (const char* key : {"drift_rotation_max", "drift_velocity_max", "drift_acceleration_max",
-                          "loop_closure_max", "correction_max"}) {
-    Extreme(parts, key, true, &record);
-  }
-  const Run* lowest = Extreme(parts, "rcond_min", false, &record);
-  if (lowest != nullptr) record.Set("rcond_min_t", Real(lowest->record, "rcond_min_t"));
-  const Run* nearest = Extreme(parts, "singularity_distance_min", false, &record);
-  if (nearest != nullptr) {
-    record.Set("singularity_distance_min_t", Real(nearest->record, "singularity_distance_min_t"));
   }
   whole.drift = MergeDrift(parts);
   return whole;

@@ -27,7 +27,7 @@ std::string ToJsonObject(const Record& record);
 /// read as it is. Throws std::runtime_error that says what was found and what was expected: for a
 /// checksum that is not that of the line, for anything but one flat JSON object of null, bool,
 /// number, string or array of numbers, for a key that occurs twice, and for a value of another type
-/// than its key has (record_types.h). Linear in the length of the line, whatever it holds.
+/// than its key has (measures.h). Linear in the length of the line, whatever it holds.
 Record FromJsonLine(std::string_view line);
 
 /// Whether `line` is the beginning of a line that ToJsonLine() wrote of a run's record, and no

@@ -13,7 +13,7 @@
 
 #include "harness/json/json_document.h"
 #include "harness/json/json_syntax.h"
-#include "harness/record/record_types.h"
+#include "harness/record/measures.h"
 #include "harness/store/excerpt.h"
 #include "harness/store/record_checksum.h"
 #include "harness/store/record_json.h"

@@ -15,13 +15,15 @@ namespace {
 
 using enum Format;
 
-TableColumn NewColumn(const std::string& key, const std::string& header, Format format) {
-  return {.key = key, .header = header, .format = format, .abbreviations = {}};
-}
-
 // Keys of per-loop and per-body values, which are no parameters.
 bool IsFamily(const std::string& key) {
   return key.starts_with("series.") || key.starts_with("drift.loop.");
+}
+
+// Whether tables know the very key, not only the family that it belongs to.
+bool HasColumn(const std::string& key) {
+  const Measure* measure = FindMeasure(key);
+  return measure != nullptr && measure->key == key && !measure->heading.words.empty();
 }
 
 // How a value without a column of its own is printed: by its type.
@@ -47,18 +49,8 @@ void InsertBeforeOutcome(std::vector<TableColumn>* columns, TableColumn column) 
 }  // namespace
 
 TableColumn ColumnOf(const std::string& key, std::span<const Record> rows) {
-  if (const TableColumn* known = KnownColumn(key)) return *known;
-  for (const std::string prefix : {"series.", "series.opening."}) {
-    if (key.starts_with(prefix + "angle.")) return NewColumn(key, "angle [rad]", kSeconds);
-    if (key.starts_with(prefix + "displacement.")) {
-      return NewColumn(key, "displacement [m]", kSeconds);
-    }
-  }
-  if (key == "series.opening_t") return NewColumn(key, "time [s]", kSeconds);
-  if (key.starts_with("drift.loop.")) {
-    return NewColumn(key, key.substr(11) + " [m]", kScientific);
-  }
-  return NewColumn(key, key, FormatOf(key, rows));
+  if (std::optional<TableColumn> known = KnownColumn(key)) return *std::move(known);
+  return {.key = key, .header = key, .format = FormatOf(key, rows), .abbreviations = {}};
 }
 
 std::string UnitOf(const TableColumn& column) {
@@ -91,7 +83,7 @@ std::vector<std::string> CaseKeysOf(std::span<const Record> rows) {
 void RequireKey(const std::string& option, const std::string& key, std::span<const Record> rows) {
   const std::vector<std::string> keys = KeysOf(rows);
   // a column of the tables may be empty in every record
-  if (std::ranges::find(keys, key) != keys.end() || KnownColumn(key) != nullptr) return;
+  if (std::ranges::find(keys, key) != keys.end() || HasColumn(key)) return;
   std::vector<std::string> scalars;
   std::ranges::copy_if(keys, std::back_inserter(scalars),
                        [](const std::string& known) { return !IsFamily(known); });
@@ -104,7 +96,7 @@ void RequireKey(const std::string& option, const std::string& key, std::span<con
 std::vector<TableColumn> WithParameters(std::vector<TableColumn> columns,
                                         std::span<const Record> rows) {
   for (const std::string& key : CaseKeysOf(rows)) {
-    if (KnownColumn(key) == nullptr) InsertBeforeOutcome(&columns, ColumnOf(key, rows));
+    if (!HasColumn(key)) InsertBeforeOutcome(&columns, ColumnOf(key, rows));
   }
   return columns;
 }

@@ -1,8 +1,10 @@
 // Which columns the tables have, and in which order.
 #pragma once
 
+#include <optional>
 #include <span>
 #include <string>
+#include <string_view>
 #include <vector>
 
 #include "harness/tables/table.h"
@@ -36,8 +38,8 @@ const std::vector<TableColumn>& CompactDriftColumns();
 /// The part of TimingColumns() that fits a terminal of some 100 columns, with shortened words.
 const std::vector<TableColumn>& CompactTimingColumns();
 
-/// The column that the tables have for a key, or null.
-const TableColumn* KnownColumn(const std::string& key);
+/// The column of a key that has words in the table of measures (harness/record/measures.h).
+std::optional<TableColumn> KnownColumn(std::string_view key);
 
 /// The column of any key: header, unit and format as in the tables where they have it; else the key
 /// is the header, and the type of its first value in `rows` decides the format.

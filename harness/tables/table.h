@@ -7,20 +7,10 @@
 #include <utility>
 #include <vector>
 
+#include "harness/record/measures.h"
 #include "harness/record/record.h"
 
 namespace loopbench::harness {
-
-/// How the text and Markdown writers print a value. CSV ignores it and keeps every digit.
-enum class Format {
-  kText,        ///< as it is; left-aligned, all others right-aligned
-  kInteger,     ///< 1234
-  kShortest,    ///< shortest form that reads back: 1e-06, 10, 0.25
-  kScientific,  ///< three digits: 2.05e-03
-  kExponent,    ///< two decimals: 1.97
-  kFixed,       ///< one decimal: 113.2
-  kSeconds,     ///< four significant digits: 0.4213
-};
 
 /// One column of a table.
 struct TableColumn {

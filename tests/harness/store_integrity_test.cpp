@@ -6,8 +6,6 @@
 #include <fstream>
 #include <random>
 
-#include "harness/judge/measures.h"
-#include "harness/record/record_types.h"
 #include "harness/store/record_json.h"
 #include "tests/harness/cli_fixture.h"
 
@@ -101,12 +99,6 @@ TEST_F(StoreIntegrity, ValuesOfWrongTypeAreNamed) {
   EXPECT_TRUE(Contains(of(R"("rtol":1e999)"), "expected one that fits a double"));
   EXPECT_TRUE(Contains(of(R"("rtol":1e-999)"), "at least 4.9e-324"));
   EXPECT_EQ(of(R"("steps":null,"mass":"heavy","stiffness":[1,null],"flag":true)"), "");
-}
-
-TEST_F(StoreIntegrity, EveryMeasureHasAType) {
-  for (const Measure& measure : Measures()) {
-    EXPECT_NE(TypeOf(measure.key), ValueType::kAny) << measure.key;
-  }
 }
 
 TEST_F(StoreIntegrity, DepthAndLengthCostNoMoreThanTheirBytes) {

@@ -1,0 +1,107 @@
+#include "harness/judge/rules.h"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <cmath>
+
+namespace loopbench::harness {
+
+namespace {
+
+/// Records begin with what names their case (CaseKeys); one of these ends it.
+bool EndsCase(std::string_view key) {
+  return key == "case_id" || key == "id" || key == "version" || key == "outcome";
+}
+
+bool IsTime(double time) { return std::isfinite(time) && time >= 0.0; }
+
+/// The group that `--only` and the summary name, and what values the rule is for.
+struct Facts {
+  std::string_view group, expected;
+};
+
+Facts FactsOf(Rule rule) {
+  switch (rule) {
+    case Rule::kOutcome:
+    case Rule::kDoubts:
+      return {"outcomes", "a text"};
+    case Rule::kEqual:
+      return {"counts", "a finite number"};
+    case Rule::kCount:
+      return {"counts", "a finite number >= 0"};
+    case Rule::kHash:
+      return {"hashes", "a text"};
+    case Rule::kError:
+      return {"errors", "a finite number >= 0"};
+    case Rule::kInstructions:
+      return {"instructions", "a finite number > 0"};
+    case Rule::kTime:
+      return {"times", "finite times >= 0"};
+    case Rule::kNone:
+      break;
+  }
+  return {};
+}
+
+bool IsNumber(const Value& value) {
+  return std::holds_alternative<double>(value) || std::holds_alternative<std::int64_t>(value);
+}
+
+}  // namespace
+
+std::string_view GroupOf(Rule rule) { return FactsOf(rule).group; }
+
+std::string_view Expected(Rule rule) { return FactsOf(rule).expected; }
+
+const std::vector<std::string>& GroupNames() {
+  static const std::vector<std::string> names = {"outcomes", "counts",       "hashes",
+                                                 "errors",   "instructions", "times"};
+  return names;
+}
+
+Held HeldBy(const Record& record, const Measure& measure) {
+  const Value* value = record.Find(measure.key);
+  if (value == nullptr) return Held::kNothing;
+  const Rule rule = measure.rule;
+  bool fits = false;
+  if (const auto* text = std::get_if<std::string>(value)) {
+    const bool is_text = rule == Rule::kOutcome || rule == Rule::kDoubts || rule == Rule::kHash;
+    fits = is_text && (!text->empty() || rule == Rule::kDoubts);
+  } else if (const auto* series = std::get_if<std::vector<double>>(value)) {
+    fits = rule == Rule::kTime && !series->empty() && std::ranges::all_of(*series, IsTime);
+  } else if (IsNumber(*value)) {
+    const double number = record.Number(measure.key);
+    fits = std::isfinite(number) &&
+           (rule == Rule::kEqual || (rule == Rule::kInstructions && number > 0.0) ||
+            ((rule == Rule::kCount || rule == Rule::kError) && number >= 0.0));
+  }
+  return fits ? Held::kFit : Held::kUnfit;
+}
+
+std::string Shown(const Record& record, std::string_view key) {
+  const Value* value = record.Find(key);
+  if (value == nullptr) return "";
+  if (std::holds_alternative<std::monostate>(*value)) return "null";
+  if (std::holds_alternative<std::string>(*value)) return '"' + record.Text(key) + '"';
+  const auto* series = std::get_if<std::vector<double>>(value);
+  if (series == nullptr) return record.Text(key);
+  const auto unfit = std::ranges::count_if(*series, [](double time) { return !IsTime(time); });
+  return fmt::format("{} values{}", series->size(),
+                     unfit > 0 ? fmt::format(" ({} null or negative)", unfit) : "");
+}
+
+std::string CaseText(const Record& record) {
+  std::string text;
+  for (const auto& [key, value] : record.items()) {
+    if (EndsCase(key)) break;
+    const std::string shown = record.Text(key);
+    if (shown.empty()) continue;
+    // names speak for themselves, numbers do not
+    const bool is_name = std::holds_alternative<std::string>(value);
+    text += (text.empty() ? "" : " ") + (is_name ? shown : key + " " + shown);
+  }
+  return text;
+}
+
+}  // namespace loopbench::harness

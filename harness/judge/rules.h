@@ -1,0 +1,38 @@
+// The rules by which measures (harness/record/measures.h) are compared: their groups, and what
+// values they are made of.
+#pragma once
+
+#include <string>
+#include <string_view>
+#include <vector>
+
+#include "harness/record/measures.h"
+#include "harness/record/record.h"
+
+namespace loopbench::harness {
+
+/// Groups of rules, as `--only` and the summary name them.
+std::string_view GroupOf(Rule rule);
+/// All of them.
+const std::vector<std::string>& GroupNames();
+
+/// What a record holds under the key of a measure.
+enum class Held {
+  kNothing,  ///< no such key
+  kUnfit,    ///< another type, or a number that the measure cannot have (null stands for NaN)
+  kFit,
+};
+Held HeldBy(const Record& record, const Measure& measure);
+
+/// What values of a rule are, as messages put it: "a number >= 0".
+std::string_view Expected(Rule rule);
+
+/// The value under `key` as messages show it: null, "a text" in quotes, numbers as they are, of a
+/// series how many values it has, and how many of them are unfit for a sample of times.
+std::string Shown(const Record& record, std::string_view key);
+
+/// What tells cases of one store apart, as one line of text: the keys that stand first in a record,
+/// before "case_id" or "outcome".
+std::string CaseText(const Record& record);
+
+}  // namespace loopbench::harness

@@ -1,0 +1,76 @@
+// The table of measures knows every key once, and all keys of a run.
+#include "harness/record/measures.h"
+
+#include <gtest/gtest.h>
+
+#include <set>
+#include <string>
+#include <string_view>
+
+#include "harness/config/mechanism_reader.h"
+#include "harness/run/run_case.h"
+
+namespace loopbench::harness {
+namespace {
+
+TEST(Measures, HaveEachKeyOnceAndATypeWhereTheyAreMore) {
+  std::set<std::string_view> keys;
+  for (const Measure& measure : Measures()) {
+    EXPECT_TRUE(keys.insert(measure.key).second) << measure.key;
+    const bool is_more = !measure.heading.words.empty() || measure.rule != Rule::kNone ||
+                         measure.merging.how != Merge::kLost;
+    if (is_more) EXPECT_NE(measure.type, ValueType::kAny) << measure.key;
+  }
+}
+
+TEST(Measures, AreMergedWithMeasuresThatAreMerged) {
+  for (const Measure& measure : Measures()) {
+    if (measure.merging.how != Merge::kWith) continue;
+    const Measure* other = FindMeasure(measure.merging.with);
+    ASSERT_NE(other, nullptr) << measure.key;
+    EXPECT_TRUE(other->merging.how == Merge::kLargest || other->merging.how == Merge::kSmallest);
+  }
+}
+
+TEST(Measures, AKeyHasItsOwnRowElseThatOfTheLongestBeginning) {
+  EXPECT_EQ(FindMeasure("drift_position_max")->heading.unit, "m");
+  EXPECT_EQ(FindMeasure("drift_of_a_later_version")->key, "drift_*");
+  EXPECT_EQ(FindMeasure("drift.loop.OC")->key, "drift.loop.*");
+  EXPECT_EQ(FindMeasure("series.opening.angle.OA")->key, "series.opening.angle.*");
+  EXPECT_EQ(FindMeasure("stiffness"), nullptr);
+  EXPECT_EQ(TypeOf("error_ruled_by"), ValueType::kText);
+  EXPECT_EQ(TypeOf("error_of_a_later_version"), ValueType::kNumber);
+  EXPECT_EQ(TypeOf("stiffness"), ValueType::kAny);
+}
+
+TEST(Measures, NoParameterMayBeCalledAsTheyAre) {
+  for (const char* name :
+       {"kind", "rtol", "seed", "wall_of_a_later_version", "machine", "doubts"}) {
+    EXPECT_TRUE(IsReserved(name)) << name;
+  }
+  for (const char* name : {"mass", "wall", "driftwood", "kind_of"}) {
+    EXPECT_FALSE(IsReserved(name)) << name;
+  }
+}
+
+TEST(Measures, KnowEveryKeyOfARun) {
+  const std::string folder = std::string(LOOPBENCH_SOURCE_DIR) + "/configs/mechanisms/";
+  Experiment experiment;
+  experiment.name = "test";
+  experiment.scenes.push_back(
+      {"parallelogram", {}, ReadMechanism(folder + "parallelogram.json"), {0.5}, {}});
+  Case one{.mechanism = "parallelogram",
+           .column = {.enforcement = Enforcement::kPosition},
+           .integrator = "trbdf2",
+           .rtol = 1e-6,
+           .atol = 1e-6,
+           .horizon = 0.5};
+  one.ensemble = 2;
+  one.perturb = 1e-3;
+  const Record record = RunCase(experiment, one);
+  EXPECT_EQ(record.Text("outcome"), "finished") << record.Text("message");
+  for (const auto& [key, value] : record.items()) EXPECT_NE(FindMeasure(key), nullptr) << key;
+}
+
+}  // namespace
+}  // namespace loopbench::harness

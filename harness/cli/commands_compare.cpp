@@ -48,26 +48,22 @@ void Deliver(const std::string& text, const std::filesystem::path& out) {
 Table SummaryTable(const ComparisonReport& comparison) {
   Table table;
   table.title = "Compared";
-  table.columns = {{"group", "group", Format::kText, {}},
-                   {"same", "same", Format::kInteger, {}},
-                   {"better", "better", Format::kInteger, {}},
-                   {"worse", "worse", Format::kInteger, {}},
-                   {"different", "different", Format::kInteger, {}},
-                   {"not_measured", "not measured", Format::kInteger, {}}};
+  table.columns = {{"group", "group"},
+                   {"same", "same", Format::kInteger},
+                   {"better", "better", Format::kInteger},
+                   {"worse", "worse", Format::kInteger},
+                   {"different", "different", Format::kInteger},
+                   {"not_measured", "not measured", Format::kInteger}};
   for (const std::string& group : GroupNames()) {
-    Record row;
-    row.Set("group", group);
+    std::vector<Value> row = {group};
     int all = 0;
-    for (const auto& [key, judgement] : {std::pair{"same", Judgement::kSame},
-                                         {"better", Judgement::kBetter},
-                                         {"worse", Judgement::kWorse},
-                                         {"different", Judgement::kDifferent},
-                                         {"not_measured", Judgement::kNotMeasured}}) {
+    for (const Judgement judgement : {Judgement::kSame, Judgement::kBetter, Judgement::kWorse,
+                                      Judgement::kDifferent, Judgement::kNotMeasured}) {
       const int count = comparison.Count(judgement, group);
-      row.Set(key, std::int64_t{count});
+      row.emplace_back(std::int64_t{count});
       all += count;
     }
-    if (all > 0) table.rows.push_back(row);
+    if (all > 0) AddRow(row, &table);
   }
   return table;
 }
@@ -75,13 +71,13 @@ Table SummaryTable(const ComparisonReport& comparison) {
 Table FindingTable(const ComparisonReport& comparison, bool with_same) {
   Table table;
   table.title = with_same ? "All measures" : "Changes";
-  table.columns = {{"judgement", "judgement", Format::kText, {}},
-                   {"case", "case", Format::kText, {}},
-                   {"measure", "measure", Format::kText, {}},
-                   {"base", "base", Format::kText, {}},
-                   {"new", "new", Format::kText, {}},
-                   {"ratio", "ratio", Format::kSeconds, {}},
-                   {"why", "why", Format::kText, {}}};
+  table.columns = {{"judgement", "judgement"},
+                   {"case", "case"},
+                   {"measure", "measure"},
+                   {"base", "base"},
+                   {"new", "new"},
+                   {"ratio", "ratio", Format::kSeconds},
+                   {"why", "why"}};
   // regressions first: they are what the reader came for
   for (const Judgement judgement : {Judgement::kWorse, Judgement::kDifferent, Judgement::kBetter,
                                     Judgement::kNotMeasured, Judgement::kSame}) {
@@ -89,16 +85,12 @@ Table FindingTable(const ComparisonReport& comparison, bool with_same) {
       continue;
     for (const Finding& finding : comparison.findings) {
       if (finding.judgement != judgement) continue;
-      Record row;
-      row.Set("judgement", std::string(ToString(judgement)));
-      row.Set("case", finding.one);
       const auto& [key, unit] = std::pair(finding.measure.key, finding.measure.heading.unit);
-      row.Set("measure", unit.empty() ? std::string(key) : fmt::format("{} [{}]", key, unit));
-      row.Set("base", finding.base);
-      row.Set("new", finding.fresh);
-      row.Set("ratio", std::isfinite(finding.ratio) ? Value(finding.ratio) : Value());
-      row.Set("why", finding.why);
-      table.rows.push_back(row);
+      AddRow({std::string(ToString(judgement)), finding.one,
+              unit.empty() ? std::string(key) : fmt::format("{} [{}]", key, unit), finding.base,
+              finding.fresh, std::isfinite(finding.ratio) ? Value(finding.ratio) : Value(),
+              finding.why},
+             &table);
     }
   }
   return table;
@@ -136,12 +128,7 @@ void NoteCases(const std::string& what, const std::vector<std::string>& cases,
 
 /// A row for each case that has no counterpart.
 void AddCases(const std::string& judgement, const std::vector<std::string>& cases, Table& table) {
-  for (const std::string& one : cases) {
-    Record row;
-    row.Set("judgement", judgement);
-    row.Set("case", one);
-    table.rows.push_back(row);
-  }
+  for (const std::string& one : cases) AddRow({judgement, one}, &table);
 }
 
 /// Where the records of one side come from; differing origins in one file are all named.
@@ -229,16 +216,16 @@ int PrintFits(const FitCommand& command, const std::string& typed) {
   const std::vector<Record> benchmarks = LoadMeasurements(command.file);
   Table table;
   table.title = "Time over size: ns = c bodies^exponent";
-  table.columns = {{"family", "family", Format::kText, {}},
-                   {"sizes", "sizes", Format::kInteger, {}},
-                   {"bodies_min", "bodies from", Format::kInteger, {}},
-                   {"bodies_max", "to", Format::kInteger, {}},
-                   {"exponent", "exponent", Format::kExponent, {}},
-                   {"standard_error", "std. error", Format::kExponent, {}},
-                   {"slope_min", "local min", Format::kExponent, {}},
-                   {"slope_max", "local max", Format::kExponent, {}},
-                   {"ns_per_body", "ns per body at largest", Format::kFixed, {}},
-                   {"failed", "failed", Format::kInteger, {}}};
+  table.columns = {{"family", "family"},
+                   {"sizes", "sizes", Format::kInteger},
+                   {"bodies_min", "bodies from", Format::kInteger},
+                   {"bodies_max", "to", Format::kInteger},
+                   {"exponent", "exponent", Format::kExponent},
+                   {"standard_error", "std. error", Format::kExponent},
+                   {"slope_min", "local min", Format::kExponent},
+                   {"slope_max", "local max", Format::kExponent},
+                   {"ns_per_body", "ns per body at largest", Format::kFixed},
+                   {"failed", "failed", Format::kInteger}};
   table.rows = FitFamilies(benchmarks, command.from);
   if (table.rows.empty()) {
     PrintError("{}: no family of benchmarks with two sizes or more\n", command.file.string());

@@ -10,6 +10,7 @@
 #include <string>
 #include <vector>
 
+#include "harness/judge/demand.h"
 #include "harness/record/record.h"
 #include "harness/record/select.h"
 
@@ -19,22 +20,14 @@ namespace loopbench::harness {
 /// at least one.
 enum class Statistic { kMax, kMin, kMean, kAll, kAny };
 
-/// How it is compared: <= threshold, >= threshold, |x - threshold| <= tolerance, or text equal to
-/// or different from a word.
-enum class Comparison { kAtMost, kAtLeast, kWithin, kIs, kIsNot };
-
-/// One condition under which the claim is examined.
+/// One condition under which the claim is examined: a demand on the statistic of some records.
 struct Check {
   std::string label;      ///< the condition in words: "square four-bar, joint coordinates"
   Selection select;       ///< which records
   Selection relative_to;  ///< when not empty: the statistic is divided by that of these records
   Selection require;      ///< what every selected record must also satisfy, or the check fails
-  std::string measure;    ///< key in the record
+  Demand demand;          ///< without `of` and `when`
   Statistic statistic = Statistic::kMax;
-  Comparison compare = Comparison::kAtMost;
-  double threshold = 0.0;
-  double tolerance = 0.0;  ///< for kWithin
-  std::string word;        ///< for kIs and kIsNot
   bool failed_runs_hold =
       false;  ///< for checks that expect failure: a run that did not finish holds
 };

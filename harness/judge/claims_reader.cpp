@@ -25,20 +25,22 @@ std::optional<JsonNode> Belonging(const JsonNode& check, const std::string& key,
   return std::nullopt;
 }
 
-void ReadComparison(const JsonNode& node, Check* check) {
+void ReadDemand(const JsonNode& node, Check* check) {
+  constexpr Relation kRelations[] = {Relation::kAtMost, Relation::kAtLeast, Relation::kWithin,
+                                     Relation::kIs, Relation::kIsNot};
+  Demand& demand = check->demand;
   check->statistic = static_cast<Statistic>(
       RequiredChoice(node, "statistic", {"max", "min", "mean", "all", "any"}, "a statistic"));
-  check->compare = static_cast<Comparison>(
-      RequiredChoice(node, "compare", {"<=", ">=", "within", "is", "is-not"}, "a comparison"));
-  const bool words = check->compare == Comparison::kIs || check->compare == Comparison::kIsNot;
-  const bool within = check->compare == Comparison::kWithin;
+  demand.relation = kRelations[RequiredChoice(
+      node, "compare", {"<=", ">=", "within", "is", "is-not"}, "a comparison")];
+  const bool words = demand.IsText(), within = demand.relation == Relation::kWithin;
   if (const auto threshold = Belonging(node, "threshold", !words, "a number")) {
-    check->threshold = threshold->Number();
+    demand.number = threshold->Number();
   }
   if (const auto tolerance = Belonging(node, "tolerance", within, "a number >= 0")) {
-    check->tolerance = tolerance->Number(kNotNegative);
+    demand.tolerance = tolerance->Number(kNotNegative);
   }
-  if (const auto word = Belonging(node, "word", words, kAnyText)) check->word = word->Text();
+  if (const auto word = Belonging(node, "word", words, kAnyText)) demand.word = word->Text();
 
   const bool quantified =
       check->statistic == Statistic::kAll || check->statistic == Statistic::kAny;
@@ -57,7 +59,7 @@ Check ReadCheck(const JsonNode& node, const Selection& common) {
     return check;
   }
   check.label = RequiredText(node, "label");
-  check.measure = RequiredText(node, "measure");
+  check.demand.measure = RequiredText(node, "measure");
   if (const auto select = node.Required("select", "an object of keys and values")) {
     check.select = ReadSelection(*select);
   }
@@ -67,7 +69,7 @@ Check ReadCheck(const JsonNode& node, const Selection& common) {
   if (!check.relative_to.empty()) {
     check.relative_to.insert(check.relative_to.begin(), common.begin(), common.end());
   }
-  ReadComparison(node, &check);
+  ReadDemand(node, &check);
   if (node.Optional("failed_runs")) {
     check.failed_runs_hold =
         RequiredChoice(node, "failed_runs", {"fail", "hold"}, "what a failed run does") == 1;

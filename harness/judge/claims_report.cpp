@@ -10,36 +10,22 @@ namespace loopbench::harness {
 
 Table VerdictTable(std::span<const ClaimResult> results) {
   Table table;
-  table.columns = {{"id", "id", Format::kText, {}},
-                   {"where", "paper", Format::kText, {}},
-                   {"claim", "claim", Format::kText, {}},
-                   {"verdict", "verdict", Format::kText, {}}};
-  for (const ClaimResult& result : results) {
-    Record row;
-    row.Set("id", result.rule.id);
-    row.Set("where", result.rule.where);
-    row.Set("claim", result.rule.claim);
-    row.Set("verdict", std::string(ToString(result.verdict)));
-    table.rows.push_back(std::move(row));
+  table.columns = {{"id", "id"}, {"where", "paper"}, {"claim", "claim"}, {"verdict", "verdict"}};
+  for (const auto& [rule, checks, verdict, text] : results) {
+    AddRow({rule.id, rule.where, rule.claim, std::string(ToString(verdict))}, &table);
   }
   return table;
 }
 
 Table CheckTable(const ClaimResult& result) {
   Table table;
-  table.columns = {
-      {"condition", "condition", Format::kText, {}}, {"result", "result", Format::kText, {}},
-      {"measured", "measured", Format::kText, {}},   {"expected", "expected", Format::kText, {}},
-      {"rows", "rows", Format::kInteger, {}},        {"reason", "remark", Format::kText, {}}};
-  for (const CheckResult& check : result.checks) {
-    Record row;
-    row.Set("condition", check.label);
-    row.Set("result", std::string(ToString(check.state)));
-    row.Set("measured", check.measured);
-    row.Set("expected", check.expected);
-    row.Set("rows", static_cast<std::int64_t>(check.rows));
-    row.Set("reason", check.reason);
-    table.rows.push_back(std::move(row));
+  table.columns = {{"condition", "condition"},         {"result", "result"},
+                   {"measured", "measured"},           {"expected", "expected"},
+                   {"rows", "rows", Format::kInteger}, {"reason", "remark"}};
+  for (const auto& [label, state, rows, measured, expected, reason] : result.checks) {
+    AddRow({label, std::string(ToString(state)), measured, expected,
+            static_cast<std::int64_t>(rows), reason},
+           &table);
   }
   return table;
 }

@@ -5,20 +5,20 @@
 #include <algorithm>
 #include <cmath>
 #include <iterator>
-#include <limits>
 #include <map>
+#include <optional>
 #include <set>
 #include <sstream>
 
 #include "harness/analysis/doubts.h"
+#include "harness/judge/demand.h"
 #include "harness/judge/statistics.h"
 #include "harness/record/origin.h"
+#include "harness/tables/table.h"
 
 namespace loopbench::harness {
 
 namespace {
-
-constexpr double kNaN = std::numeric_limits<double>::quiet_NaN();
 
 /// Two records of one case.
 struct Pair {
@@ -27,113 +27,106 @@ struct Pair {
   bool same_arithmetic, same_machine;
 };
 
-void Set(Finding& finding, Judgement judgement, std::string why = "") {
-  finding.judgement = judgement;
-  finding.why = std::move(why);
-}
+/// A judgement with its reason.
+struct Ruling {
+  Judgement judgement = Judgement::kSame;
+  std::string why = {};
+};
 
-void JudgeOutcome(Finding& finding) {
-  if (finding.base == finding.fresh) return;
-  if (finding.fresh == "finished") return Set(finding, Judgement::kBetter, "failed before");
-  Set(finding, Judgement::kWorse, "ends otherwise");
-}
-
-/// Worse with a reason for doubt that BASE did not have, better without one.
-void JudgeDoubts(Finding& finding) {
+Ruling OfTexts(Rule rule, const std::string& base, const std::string& fresh) {
+  if (base == fresh) return {};
+  if (rule == Rule::kHash) return {Judgement::kWorse, "other bits"};
+  if (rule == Rule::kOutcome) {
+    const Demand ends_well{.relation = Relation::kIs, .word = "finished"};
+    return Meets(ends_well, fresh) ? Ruling{Judgement::kBetter, "failed before"}
+                                   : Ruling{Judgement::kWorse, "ends otherwise"};
+  }
+  // worse with a reason for doubt that BASE did not have, better without one
   const auto codes = [](const std::string& text) {
     std::istringstream words(text);
     return std::set<std::string>(std::istream_iterator<std::string>(words), {});
   };
-  const std::set<std::string> base = codes(finding.base), fresh = codes(finding.fresh);
-  if (base == fresh) return;
-  const bool no_new = std::ranges::includes(base, fresh);
-  Set(finding, no_new ? Judgement::kBetter : Judgement::kWorse,
-      no_new ? "fewer doubts" : "new doubts");
+  const std::set<std::string> before = codes(base), now = codes(fresh);
+  if (before == now) return {};
+  return std::ranges::includes(before, now) ? Ruling{Judgement::kBetter, "fewer doubts"}
+                                            : Ruling{Judgement::kWorse, "new doubts"};
 }
 
-void JudgeCount(Finding& finding, double base, double fresh) {
-  if (base == fresh) return;
-  if (finding.measure.rule == Rule::kEqual) return Set(finding, Judgement::kWorse, "must be equal");
-  Set(finding, fresh > base ? Judgement::kWorse : Judgement::kBetter, "exact count");
+/// Worse above one limit, better below another.
+Ruling Between(double value, double lower, double upper, const std::string& why) {
+  if (!Meets({.relation = Relation::kAtMost, .number = upper}, value)) {
+    return {Judgement::kWorse, why};
+  }
+  if (Meets({.relation = Relation::kAtLeast, .number = lower}, value)) return {};
+  return {Judgement::kBetter, why};
 }
 
-/// Worse above the ratio, better below its inverse.
-void JudgeRatio(Finding& finding, double ratio, double allowed) {
-  const std::string rule = fmt::format("ratio {:.4g}, allowed {:.4g}", ratio, allowed);
-  if (ratio > allowed) Set(finding, Judgement::kWorse, rule);
-  if (ratio < 1.0 / allowed) Set(finding, Judgement::kBetter, rule);
+Ruling OfRatio(double ratio, double allowed) {
+  return Between(ratio, 1.0 / allowed, allowed,
+                 fmt::format("ratio {:.4g}, allowed {:.4g}", ratio, allowed));
 }
 
-void JudgeNumbers(Finding& finding, const Pair& pair, const CompareOptions& options) {
-  const double base = pair.base.Number(finding.measure.key);
-  const double fresh = pair.fresh.Number(finding.measure.key);
-  finding.ratio = fresh / base;
-  switch (finding.measure.rule) {
+Ruling OfNumbers(const Pair& pair, const CompareOptions& options, Finding* finding) {
+  const double base = pair.base.Number(finding->measure.key);
+  const double fresh = pair.fresh.Number(finding->measure.key);
+  finding->ratio = fresh / base;
+  switch (finding->measure.rule) {
     case Rule::kError: {
       // round-off has no size worth comparing
       const double floor = options.error_floor;
-      finding.ratio = std::max(std::abs(fresh), floor) / std::max(std::abs(base), floor);
-      return JudgeRatio(finding, finding.ratio,
-                        pair.same_arithmetic ? options.error_ratio : options.error_ratio_other);
+      finding->ratio = std::max(std::abs(fresh), floor) / std::max(std::abs(base), floor);
+      return OfRatio(finding->ratio,
+                     pair.same_arithmetic ? options.error_ratio : options.error_ratio_other);
     }
     case Rule::kInstructions:
-      return JudgeRatio(finding, finding.ratio, options.instruction_ratio);
+      return OfRatio(finding->ratio, options.instruction_ratio);
+    case Rule::kCount:
+      return Between(fresh, base, base, "exact count");
     default:
-      return JudgeCount(finding, base, fresh);
+      break;
   }
+  return base == fresh ? Ruling{} : Ruling{Judgement::kWorse, "must be equal"};
 }
 
 /// Leaves the unadjusted p of "different by more than the ratio" in the finding; Holm decides.
-void TestTimes(Finding& finding, const Pair& pair, const CompareOptions& options) {
-  const std::vector<double>& base = pair.base.Numbers(finding.measure.key);
-  const std::vector<double>& fresh = pair.fresh.Numbers(finding.measure.key);
+void TestTimes(const Pair& pair, const CompareOptions& options, Finding* finding) {
+  const std::vector<double>& base = pair.base.Numbers(finding->measure.key);
+  const std::vector<double>& fresh = pair.fresh.Numbers(finding->measure.key);
   const double base_median = Median(base), fresh_median = Median(fresh);
-  finding.base = fmt::format("{:.4g}", base_median);
-  finding.fresh = fmt::format("{:.4g}", fresh_median);
-  finding.ratio = fresh_median / base_median;
+  finding->base = fmt::format("{:.4g}", base_median);
+  finding->fresh = fmt::format("{:.4g}", fresh_median);
+  finding->ratio = fresh_median / base_median;
   std::vector<double> lifted_base = base, lifted_fresh = fresh;
   for (double& time : lifted_base) time *= options.time_ratio;
   for (double& time : lifted_fresh) time *= options.time_ratio;
   const double slower = MannWhitney(fresh, lifted_base).p_greater;
   const double faster = MannWhitney(base, lifted_fresh).p_greater;
-  finding.p = std::min(1.0, 2.0 * std::min(slower, faster));
+  finding->p = std::min(1.0, 2.0 * std::min(slower, faster));
+  finding->least_p = 2.0 * SmallestP(base.size(), fresh.size());
 }
 
-bool EndedBadly(const Record& record) {
-  const std::string outcome = record.Text("outcome");
-  return !outcome.empty() && outcome != "finished";
-}
-
-/// Judges a pair of which a side lacks the measure, or holds what it is not made of; false when
-/// both have it.
-bool JudgeWhatIsMissing(Finding& finding, const Pair& pair) {
-  const Measure& measure = finding.measure;
+/// Of a pair of which a side lacks the measure, or holds what it is not made of; nothing when both
+/// have it.
+std::optional<Ruling> OfWhatIsMissing(const Pair& pair, const Measure& measure) {
   const Held base = HeldBy(pair.base, measure), fresh = HeldBy(pair.fresh, measure);
-  if (base == Held::kFit && fresh == Held::kFit) return false;
-  finding.base = Shown(pair.base, measure.key);
-  finding.fresh = Shown(pair.fresh, measure.key);
-  if (base == Held::kNothing && fresh == Held::kFit && EndedBadly(pair.base) &&
-      !EndedBadly(pair.fresh)) {
-    Set(finding, Judgement::kNotMeasured, "BASE did not finish");
-    return true;
+  if (base == Held::kFit && fresh == Held::kFit) return std::nullopt;
+  const bool base_failed = HasFailed(pair.base), fresh_failed = HasFailed(pair.fresh);
+  if (base == Held::kNothing && fresh == Held::kFit && base_failed && !fresh_failed) {
+    return Ruling{Judgement::kNotMeasured, "BASE did not finish"};
   }
   if (base != Held::kUnfit && fresh != Held::kUnfit) {
-    const bool lost = fresh == Held::kNothing;
-    Set(finding, lost ? Judgement::kWorse : Judgement::kDifferent,
-        lost ? "not in NEW" : "not in BASE");
-    return true;
+    return fresh == Held::kNothing ? Ruling{Judgement::kWorse, "not in NEW"}
+                                   : Ruling{Judgement::kDifferent, "not in BASE"};
   }
   const char* side = base != Held::kUnfit ? "NEW" : fresh != Held::kUnfit ? "BASE" : "BASE and NEW";
-  const std::string why = fmt::format("in {}: expected {}", side, Expected(measure.rule));
   // a run that failed on both sides in one way may well end in NaN on both
-  const bool failed_alike = finding.base == "null" && finding.fresh == "null" &&
-                            EndedBadly(pair.base) && EndedBadly(pair.fresh);
-  Set(finding,
-      failed_alike         ? Judgement::kNotMeasured
-      : base == Held::kFit ? Judgement::kWorse
-                           : Judgement::kDifferent,
-      why);
-  return true;
+  const bool failed_alike = base_failed && fresh_failed &&
+                            Shown(pair.base, measure.key) == "null" &&
+                            Shown(pair.fresh, measure.key) == "null";
+  return Ruling{failed_alike         ? Judgement::kNotMeasured
+                : base == Held::kFit ? Judgement::kWorse
+                                     : Judgement::kDifferent,
+                fmt::format("in {}: expected {}", side, Expected(measure.rule))};
 }
 
 /// Why values that both sides have cannot be compared; "" when they can.
@@ -153,44 +146,42 @@ std::string Obstacle(const Measure& measure, const Pair& pair) {
   return "";
 }
 
-Finding Judge(const std::string& one, const Measure& measure, const Pair& pair,
-              const CompareOptions& options) {
-  Finding finding;
-  finding.one = one;
-  finding.measure = measure;
-  finding.base = pair.base.Text(measure.key);
-  finding.fresh = pair.fresh.Text(measure.key);
-  finding.ratio = finding.p = kNaN;
-  if (JudgeWhatIsMissing(finding, pair)) return finding;
-  if (const std::string obstacle = Obstacle(measure, pair); !obstacle.empty()) {
-    Set(finding, Judgement::kNotMeasured, obstacle);
-    return finding;
+Finding Compared(const std::string& one, const Measure& measure, const Pair& pair,
+                 const CompareOptions& options) {
+  Finding finding{.one = one, .measure = measure};
+  Ruling ruling;
+  const bool is_time = measure.rule == Rule::kTime;
+  if (const auto missing = OfWhatIsMissing(pair, measure)) {
+    finding.base = Shown(pair.base, measure.key);
+    finding.fresh = Shown(pair.fresh, measure.key);
+    ruling = *missing;
+  } else {
+    finding.base = pair.base.Text(measure.key);
+    finding.fresh = pair.fresh.Text(measure.key);
+    if (const std::string obstacle = Obstacle(measure, pair); !obstacle.empty()) {
+      ruling = {Judgement::kNotMeasured, obstacle};
+    } else if (is_time) {
+      TestTimes(pair, options, &finding);
+    } else if (TypeOf(measure.key) == ValueType::kText) {
+      ruling = OfTexts(measure.rule, finding.base, finding.fresh);
+    } else {
+      ruling = OfNumbers(pair, options, &finding);
+    }
   }
-  switch (measure.rule) {
-    case Rule::kOutcome:
-      JudgeOutcome(finding);
-      break;
-    case Rule::kDoubts:
-      JudgeDoubts(finding);
-      break;
-    case Rule::kHash:
-      if (finding.base != finding.fresh) Set(finding, Judgement::kWorse, "other bits");
-      break;
-    case Rule::kTime:
-      TestTimes(finding, pair, options);
-      break;
-    default:
-      JudgeNumbers(finding, pair, options);
-  }
+  finding.judgement = ruling.judgement;
+  finding.why = ruling.why;
   return finding;
 }
 
-/// Adjusts the p-values of all times together and judges them. `smallest` holds the least
-/// p that each sample could have given.
-void DecideTimes(std::vector<Finding*>& times, const std::vector<double>& smallest,
-                 const CompareOptions& options) {
+/// Adjusts the p-values of all times together and judges them.
+void DecideTimes(const CompareOptions& options, std::vector<Finding>* findings) {
+  std::vector<Finding*> times;
   std::vector<double> p;
-  for (const Finding* finding : times) p.push_back(finding->p);
+  for (Finding& finding : *findings) {
+    if (std::isnan(finding.p)) continue;  // no time, or not tested
+    times.push_back(&finding);
+    p.push_back(finding.p);
+  }
   const std::vector<double> adjusted = HolmAdjusted(p);
   const double tests = static_cast<double>(times.size());
   for (std::size_t i = 0; i < times.size(); ++i) {
@@ -198,11 +189,11 @@ void DecideTimes(std::vector<Finding*>& times, const std::vector<double>& smalle
     finding.p = adjusted[i];
     // medians that are both zero have no ratio, and no difference
     if (finding.p <= options.alpha && !std::isnan(finding.ratio)) {
-      Set(finding, finding.ratio > 1.0 ? Judgement::kWorse : Judgement::kBetter,
-          fmt::format("ratio {:.3f}, p {:.2g}", finding.ratio, finding.p));
-    } else if (smallest[i] * tests > options.alpha) {
-      Set(finding, Judgement::kNotMeasured,
-          fmt::format("too few repetitions to decide among {} times", times.size()));
+      finding.judgement = finding.ratio > 1.0 ? Judgement::kWorse : Judgement::kBetter;
+      finding.why = fmt::format("ratio {:.3f}, p {:.2g}", finding.ratio, finding.p);
+    } else if (finding.least_p * tests > options.alpha) {
+      finding.judgement = Judgement::kNotMeasured;
+      finding.why = fmt::format("too few repetitions to decide among {} times", times.size());
     }
   }
 }
@@ -257,7 +248,6 @@ ComparisonReport Compare(const std::vector<Record>& given_base,
   const std::vector<Record> base = WithOwnDoubts(given_base), fresh = WithOwnDoubts(given_fresh);
   const auto in_base = ByCase(base, comparison.ambiguous);
   const auto in_fresh = ByCase(fresh, comparison.ambiguous);
-  std::vector<double> smallest;
   for (const Record& record : base) {
     const std::string one = CaseText(record);
     if (in_base.at(one) != &record || std::ranges::count(comparison.ambiguous, one) > 0) continue;
@@ -277,31 +267,16 @@ ComparisonReport Compare(const std::vector<Record>& given_base,
       const bool chosen =
           measure.rule != Rule::kNone &&
           (options.only.empty() || std::ranges::count(options.only, GroupOf(measure.rule)) > 0);
-      const bool anywhere = HeldBy(pair.base, measure) != Held::kNothing ||
-                            HeldBy(pair.fresh, measure) != Held::kNothing;
-      if (!chosen || !anywhere) continue;
-      comparison.findings.push_back(Judge(one, measure, pair, options));
-      if (measure.rule == Rule::kTime) {
-        smallest.push_back(2.0 * SmallestP(pair.base.Numbers(measure.key).size(),
-                                           pair.fresh.Numbers(measure.key).size()));
-      }
+      const bool anywhere =
+          pair.base.Find(measure.key) != nullptr || pair.fresh.Find(measure.key) != nullptr;
+      if (chosen && anywhere) comparison.findings.push_back(Compared(one, measure, pair, options));
     }
   }
   for (const Record& record : fresh) {
     const std::string one = CaseText(record);
     if (!in_base.contains(one)) comparison.only_fresh.push_back(one);
   }
-  std::vector<Finding*> times;
-  std::vector<double> least;
-  std::size_t next = 0;
-  for (Finding& finding : comparison.findings) {
-    if (finding.measure.rule != Rule::kTime) continue;
-    const double p = smallest[next++];
-    if (std::isnan(finding.p)) continue;  // not tested
-    times.push_back(&finding);
-    least.push_back(p);
-  }
-  DecideTimes(times, least, options);
+  DecideTimes(options, &comparison.findings);
   return comparison;
 }
 

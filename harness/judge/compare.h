@@ -7,6 +7,7 @@
 // measure is made of, is a difference.
 #pragma once
 
+#include <limits>
 #include <string>
 #include <vector>
 
@@ -40,13 +41,14 @@ std::string_view ToString(Judgement judgement);
 
 /// One measure of one case.
 struct Finding {
-  std::string one;  ///< the case
-  Measure measure;
+  std::string one = {};  ///< the case
+  Measure measure = {};
   Judgement judgement = Judgement::kSame;
-  std::string base, fresh;  ///< as printed: numbers, medians, hashes
-  double ratio = 0.0;       ///< new / base; NaN where it says nothing
-  double p = 0.0;           ///< of times: adjusted by Holm; else NaN
-  std::string why;          ///< the rule it broke, or the reason why it was not measured
+  std::string base = {}, fresh = {};  ///< as printed: numbers, medians, hashes
+  double ratio = std::numeric_limits<double>::quiet_NaN();  ///< new / base, where it says anything
+  double p = std::numeric_limits<double>::quiet_NaN();      ///< of times: adjusted by Holm
+  double least_p = 0.0;  ///< of times: the least that samples of their sizes can give, unadjusted
+  std::string why = {};  ///< the rule it broke, or the reason why it was not measured
 };
 
 struct ComparisonReport {

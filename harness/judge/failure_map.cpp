@@ -15,24 +15,7 @@
 namespace loopbench::harness {
 namespace {
 
-constexpr double kInfinity = std::numeric_limits<double>::infinity();
 constexpr const char* kFinishedWord = "finished";
-
-constexpr std::array kRunEndings = {RunEnding{"finished", CellState::kInaccurate},
-                                    RunEnding{"singular", CellState::kStopped},
-                                    RunEnding{"step-too-small", CellState::kStopped},
-                                    RunEnding{"non-finite", CellState::kStopped},
-                                    RunEnding{"inconsistent-start", CellState::kStopped},
-                                    RunEnding{"inconsistent-motion", CellState::kStopped},
-                                    RunEnding{"locked", CellState::kStopped},
-                                    RunEnding{"newton-failure", CellState::kStopped},
-                                    RunEnding{"step-limit", CellState::kLimit},
-                                    RunEnding{"time-limit", CellState::kLimit},
-                                    RunEnding{"process-time-limit", CellState::kLimit},
-                                    RunEnding{"memory-limit", CellState::kLimit},
-                                    RunEnding{"integrator-error", CellState::kBroken},
-                                    RunEnding{"crashed", CellState::kBroken},
-                                    RunEnding{"bad-answer", CellState::kBroken}};
 
 bool Names(const std::vector<std::string>& words, const std::string& word) {
   return std::ranges::find(words, word) != words.end();
@@ -43,60 +26,9 @@ CellState StateOfEnding(const std::string& outcome) {
   return known == kRunEndings.end() ? CellState::kBroken : known->state;
 }
 
-// One demand against one record.
-struct Met {
-  bool measured = false, met = false;
-  double value = 0.0, limit = 0.0, ratio = kInfinity;
-};
-
-Met Hold(const Demand& demand, const Record& record) {
-  Met result;
-  const double unit = demand.of.empty() ? 1.0 : record.Number(demand.of);
-  result.measured = record.Find(demand.measure) != nullptr && std::isfinite(unit);
-  result.value = record.Number(demand.measure);
-  result.limit = demand.number * unit;
-  if (!result.measured || !std::isfinite(result.value)) return result;
-  switch (demand.kind) {
-    case Demand::Kind::kAtMost:
-      result.met = result.value <= result.limit;
-      result.ratio = result.value / result.limit;
-      break;
-    case Demand::Kind::kAtLeast:
-      result.met = result.value >= result.limit;
-      if (result.value > 0.0) result.ratio = result.limit / result.value;
-      break;
-    case Demand::Kind::kEqual:
-      result.met = result.value == result.limit;
-      result.ratio = result.met ? 0.0 : kInfinity;
-      break;
-  }
-  return result;
-}
-
-void SetDecision(const Demand& demand, const Met& met, MapCell* cell) {
-  cell->measure = demand.measure;
-  cell->name = demand.name;
-  cell->unit = demand.unit;
-  cell->value = met.value;
-  cell->limit = met.limit;
-  cell->ratio = met.ratio;
-  cell->total = demand.of.empty() || demand.kind == Demand::Kind::kAtMost
-                    ? std::numeric_limits<double>::quiet_NaN()
-                    : met.limit / demand.number;
-}
-
-// "energy_error_max = 0.016 [J], limit 5e-06".
-std::string Found(const Demand& demand, const Met& met) {
-  constexpr std::array kLimits = {"limit", "at least", "expected"};
-  return fmt::format("{} = {}{}, {} {:.3g}", demand.measure,
-                     std::isfinite(met.value) ? fmt::format("{:.3g}", met.value) : "not finite",
-                     demand.unit.empty() ? "" : " [" + demand.unit + "]",
-                     kLimits.at(static_cast<std::size_t>(demand.kind)), met.limit);
-}
-
 // Which of two judgements decides a cell: the greater one. Runs that stopped compare by when.
 auto Badness(const MapCell& cell) {
-  return std::tuple(cell.state, std::isnan(cell.ratio) ? 0.0 : cell.ratio,
+  return std::tuple(cell.state, std::isnan(cell.decided.ratio) ? 0.0 : cell.decided.ratio,
                     std::isnan(cell.t_reached) ? 0.0 : -cell.t_reached);
 }
 
@@ -135,29 +67,24 @@ std::vector<std::string> UnknownKeys(const MapRules& rules, std::span<const Reco
   return remarks;
 }
 
+// A run that ended otherwise than is right.
+void JudgeEnding(const MapRow& row, const Record& record, MapCell* cell) {
+  cell->state = StateOfEnding(cell->outcome);
+  cell->word = cell->state == CellState::kInaccurate ? ToString(cell->state) : cell->outcome;
+  cell->reason = record.Text("message");
+  if (row.right == std::vector<std::string>{kFinishedWord}) return;
+  cell->reason =
+      fmt::format("ended as {}, right is {}{}{}", cell->outcome, fmt::join(row.right, " or "),
+                  cell->reason.empty() ? "" : ": ", cell->reason);
+}
+
 }  // namespace
 
 std::string_view ToString(CellState state) {
-  switch (state) {
-    case CellState::kHolds:
-      return "holds";
-    case CellState::kNotApplicable:
-      return "not applicable";
-    case CellState::kNotMeasured:
-      break;
-    case CellState::kStopped:
-      return "stopped";
-    case CellState::kLimit:
-      return "limit";
-    case CellState::kInaccurate:
-      return "inaccurate";
-    case CellState::kBroken:
-      return "broken";
-  }
-  return "not measured";
+  constexpr std::string_view kWords[] = {"holds", "not applicable", "not measured", "stopped",
+                                         "limit", "inaccurate",     "broken"};
+  return kWords[static_cast<std::size_t>(state)];
 }
-
-std::span<const RunEnding> RunEndings() { return kRunEndings; }
 
 MapCell JudgeRun(const MapRow& row, const Record& record) {
   MapCell cell;
@@ -166,39 +93,29 @@ MapCell JudgeRun(const MapRow& row, const Record& record) {
   cell.t_reached = record.Number("t_reached");
   cell.records = 1;
   if (!Names(row.right, cell.outcome)) {
-    cell.state = StateOfEnding(cell.outcome);
-    cell.word = cell.state == CellState::kInaccurate ? ToString(cell.state) : cell.outcome;
-    cell.reason = record.Text("message");
-    if (row.right != std::vector<std::string>{kFinishedWord}) {
-      cell.reason =
-          fmt::format("ended as {}, right is {}{}{}", cell.outcome, fmt::join(row.right, " or "),
-                      cell.reason.empty() ? "" : ": ", cell.reason);
-    }
+    JudgeEnding(row, record, &cell);
     return cell;
   }
-  cell.state = CellState::kHolds;
-  MapCell unmeasured = cell;
-  std::string beyond;
+  std::string beyond, lacking;
   for (const Demand& demand : row.decides) {
     if (!Names(demand.when, cell.outcome)) continue;
-    const Met met = Hold(demand, record);
-    if (!met.measured) {
-      unmeasured.state = CellState::kNotMeasured;
-      unmeasured.reason =
-          "the record has no " +
-          (record.Find(demand.measure) == nullptr ? demand.measure : "finite " + demand.of);
-    } else if (!met.met) {
-      beyond += (beyond.empty() ? "" : "; ") + Found(demand, met);
-      if (cell.state == CellState::kHolds || met.ratio > cell.ratio) {
-        SetDecision(demand, met, &cell);
-      }
-      cell.state = CellState::kInaccurate;
-    } else if (met.met && cell.state == CellState::kHolds && !(met.ratio <= cell.ratio)) {
-      SetDecision(demand, met, &cell);
+    const Judged judged = Judge(demand, record);
+    if (!judged.measured) {
+      lacking = judged.reason;
+      continue;
     }
+    // of those that are met the closest to its limit decides, until one is not
+    if (judged.met ? beyond.empty() && !(judged.ratio <= cell.decided.ratio)
+                   : beyond.empty() || judged.ratio > cell.decided.ratio) {
+      cell.decided = judged;
+    }
+    if (!judged.met) beyond += (beyond.empty() ? "" : "; ") + judged.reason;
   }
-  if (cell.state == CellState::kHolds && unmeasured.state != cell.state) cell = unmeasured;
-  cell.reason += beyond;
+  cell.state = !beyond.empty()    ? CellState::kInaccurate
+               : !lacking.empty() ? CellState::kNotMeasured
+                                  : CellState::kHolds;
+  if (cell.state == CellState::kNotMeasured) cell.decided = {};
+  cell.reason = beyond.empty() ? lacking : beyond;
   cell.holding = cell.state == CellState::kHolds ? 1 : 0;
   cell.word = ToString(cell.state);
   return cell;
@@ -252,35 +169,23 @@ FailureMap MakeFailureMap(const MapRules& rules, std::span<const Record> records
   return map;
 }
 
-std::string ToText(const Demand& demand) {
-  constexpr std::array kSigns = {"<=", ">=", "="};
-  return fmt::format("{} {} {}{}{}{}", demand.measure,
-                     kSigns.at(static_cast<std::size_t>(demand.kind)), demand.number,
-                     demand.of.empty() ? "" : " " + demand.of,
-                     demand.unit.empty() ? "" : " [" + demand.unit + "]",
-                     demand.when == std::vector<std::string>{kFinishedWord}
-                         ? ""
-                         : fmt::format(" when {}", fmt::join(demand.when, " or ")));
-}
-
 std::string ClassText(const MapCell& cell) {
   const bool named = cell.state == CellState::kHolds && cell.outcome != kFinishedWord;
   return named ? cell.word + ": " + cell.outcome : cell.word;
 }
 
 std::string DecidingNumber(const MapCell& cell) {
-  const std::string name = cell.name.empty() ? "" : cell.name + " ";
-  const std::string unit = cell.unit.empty() ? "" : " " + cell.unit;
   if (cell.state == CellState::kNotMeasured || cell.state == CellState::kNotApplicable) return "";
-  if (cell.measure.empty()) {
+  const Judged& decided = cell.decided;
+  if (decided.measure.empty()) {
     if (cell.state == CellState::kInaccurate) return cell.outcome;
-    if (std::isnan(cell.t_reached)) return "";
-    return fmt::format("at {:.3g} s", cell.t_reached);
+    return std::isnan(cell.t_reached) ? "" : fmt::format("at {:.3g} s", cell.t_reached);
   }
-  if (!std::isfinite(cell.value)) return name + "not finite";
-  if (!std::isnan(cell.total))
-    return fmt::format("{}{} of {}{}", name, cell.value, cell.total, unit);
-  return fmt::format("{}{:.2g}{}", name, cell.value, unit);
+  const std::string name = decided.name.empty() ? "" : decided.name + " ";
+  const std::string unit = decided.unit.empty() ? "" : " " + decided.unit;
+  if (!std::isfinite(decided.value)) return name + "not finite";
+  if (std::isnan(decided.total)) return fmt::format("{}{:.2g}{}", name, decided.value, unit);
+  return fmt::format("{}{} of {}{}", name, decided.value, decided.total, unit);
 }
 
 std::string HoldingCount(const MapCell& cell) {
@@ -290,19 +195,14 @@ std::string HoldingCount(const MapCell& cell) {
 
 std::vector<std::string> BrokenDemands(const FailureMap& map) {
   std::vector<std::string> broken;
-  for (std::size_t g = 0; g < map.cells.size(); ++g) {
-    for (std::size_t r = 0; r < map.cells[g].size(); ++r) {
-      for (std::size_t c = 0; c < map.rules.columns.size(); ++c) {
-        const MapCell& cell = map.cells[g][r][c];
-        if (!cell.demanded || cell.state == CellState::kHolds) continue;
-        const std::string number = DecidingNumber(cell);
-        broken.push_back(fmt::format("{} / {}: {}{}{}{}", map.rules.columns[c].label,
-                                     map.rules.groups[g].rows[r].label, ClassText(cell),
-                                     number.empty() ? "" : " ", number,
-                                     cell.reason.empty() ? "" : " (" + cell.reason + ")"));
-      }
-    }
-  }
+  EachCell(map, [&broken](const MapGroup&, const MapRow& row, const MapColumn& column,
+                          const MapCell& cell) {
+    if (!cell.demanded || cell.state == CellState::kHolds) return;
+    const std::string number = DecidingNumber(cell);
+    broken.push_back(fmt::format("{} / {}: {}{}{}{}", column.label, row.label, ClassText(cell),
+                                 number.empty() ? "" : " ", number,
+                                 cell.reason.empty() ? "" : " (" + cell.reason + ")"));
+  });
   return broken;
 }
 

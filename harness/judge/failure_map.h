@@ -14,24 +14,11 @@
 #include <string_view>
 #include <vector>
 
+#include "harness/judge/demand.h"
 #include "harness/record/record.h"
 #include "harness/record/select.h"
 
 namespace loopbench::harness {
-
-/// One measure of a run and what it must be: at most, at least or equal to `number`, or to `number`
-/// times another measure of the same record ("of": 500 rtol, 1 ensemble_size).
-struct Demand {
-  enum class Kind { kAtMost, kAtLeast, kEqual };
-
-  std::string measure;  ///< key in the record
-  std::string name;     ///< short word for it in cells, "" for none
-  std::string unit;     ///< of the measure, "" for counts
-  Kind kind = Kind::kAtMost;
-  double number = 0.0;  ///< > 0 unless kEqual
-  std::string of;       ///< key that the number is a multiple of, "" for none
-  std::vector<std::string> when = {"finished"};  ///< endings of runs that it applies to
-};
 
 /// One extreme.
 struct MapRow {
@@ -88,7 +75,21 @@ struct RunEnding {
   std::string_view word;
   CellState state;
 };
-std::span<const RunEnding> RunEndings();
+inline constexpr std::array kRunEndings = {RunEnding{"finished", CellState::kInaccurate},
+                                           RunEnding{"singular", CellState::kStopped},
+                                           RunEnding{"step-too-small", CellState::kStopped},
+                                           RunEnding{"non-finite", CellState::kStopped},
+                                           RunEnding{"inconsistent-start", CellState::kStopped},
+                                           RunEnding{"inconsistent-motion", CellState::kStopped},
+                                           RunEnding{"locked", CellState::kStopped},
+                                           RunEnding{"newton-failure", CellState::kStopped},
+                                           RunEnding{"step-limit", CellState::kLimit},
+                                           RunEnding{"time-limit", CellState::kLimit},
+                                           RunEnding{"process-time-limit", CellState::kLimit},
+                                           RunEnding{"memory-limit", CellState::kLimit},
+                                           RunEnding{"integrator-error", CellState::kBroken},
+                                           RunEnding{"crashed", CellState::kBroken},
+                                           RunEnding{"bad-answer", CellState::kBroken}};
 
 /// What a cell shows and why.
 struct MapCell {
@@ -99,14 +100,8 @@ struct MapCell {
   std::string outcome;  ///< of the run that decided
   std::string case_id;  ///< of that run
   /// What decided: of the measures that are not as demanded the one furthest beyond its limit, else
-  /// the one closest to its limit. Empty where the ending decided.
-  std::string measure, name, unit;
-  double value = std::numeric_limits<double>::quiet_NaN();
-  double limit = std::numeric_limits<double>::quiet_NaN();  ///< the one that applied
-  /// value / limit, or limit / value where the limit is a least one: above 1 is beyond. Infinite
-  /// for what is not finite or not equal, 0 for what is equal.
-  double ratio = std::numeric_limits<double>::quiet_NaN();
-  double total = std::numeric_limits<double>::quiet_NaN();      ///< of counts: that of Demand::of
+  /// the one closest to its limit. Without a measure where the ending decided.
+  Judged decided;
   double t_reached = std::numeric_limits<double>::quiet_NaN();  ///< [s]
   std::size_t holding = 0, records = 0;
   std::size_t cases = 0;  ///< how many records there should be, at least `records`
@@ -131,8 +126,18 @@ struct FailureMap {
 };
 FailureMap MakeFailureMap(const MapRules& rules, std::span<const Record> records);
 
-/// "branch_error_max <= 500 rtol [rad]".
-std::string ToText(const Demand& demand);
+/// Calls `visit` with group, row, column and cell of every cell, in the order of the rules.
+template <class Visit>
+void EachCell(const FailureMap& map, const Visit& visit) {
+  for (std::size_t g = 0; g < map.cells.size(); ++g) {
+    const MapGroup& group = map.rules.groups[g];
+    for (std::size_t r = 0; r < map.cells[g].size(); ++r) {
+      for (std::size_t c = 0; c < map.rules.columns.size(); ++c) {
+        visit(group, group.rows[r], map.rules.columns[c], map.cells[g][r][c]);
+      }
+    }
+  }
+}
 
 /// The class, with the ending where another one than "finished" is right: "holds: locked".
 std::string ClassText(const MapCell& cell);

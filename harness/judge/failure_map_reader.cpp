@@ -1,8 +1,8 @@
 #include "harness/judge/failure_map_reader.h"
 
 #include <algorithm>
-#include <array>
 #include <optional>
+#include <utility>
 
 #include "harness/config/selection_reader.h"
 #include "harness/json/document_kind.h"
@@ -13,7 +13,7 @@ namespace {
 const NameList& EndingNames() {
   static const NameList names = [] {
     NameList list;
-    for (const RunEnding& ending : RunEndings()) list.Add(std::string(ending.word));
+    for (const RunEnding& ending : kRunEndings) list.Add(std::string(ending.word));
     return list;
   }();
   return names;
@@ -33,15 +33,16 @@ std::vector<std::string> ReadEndings(const JsonNode& owner, const std::string& k
 }
 
 void ReadNumber(const JsonNode& node, Demand* demand) {
-  constexpr std::array kKinds = {"limit", "at_least", "equal"};
+  constexpr std::pair<const char*, Relation> kRelations[] = {
+      {"limit", Relation::kAtMost}, {"at_least", Relation::kAtLeast}, {"equal", Relation::kEqual}};
   int found = 0;
-  for (std::size_t kind = 0; kind < kKinds.size(); ++kind) {
-    const auto number = node.Optional(kKinds[kind]);
+  for (const auto& [key, relation] : kRelations) {
+    const auto number = node.Optional(key);
     if (!number) continue;
     if (++found > 1) number->Fail("one of \"limit\", \"at_least\" and \"equal\"");
-    demand->kind = static_cast<Demand::Kind>(kind);
+    demand->relation = relation;
     // ratios to a limit of 0 say nothing; what must be 0 is "equal" to it
-    demand->number = number->Number(demand->kind == Demand::Kind::kEqual ? Range{} : kPositive);
+    demand->number = number->Number(relation == Relation::kEqual ? Range{} : kPositive);
   }
   if (found == 0 && node.value().is_object()) {
     node.FailAs("no number", "one of \"limit\", \"at_least\" and \"equal\"");

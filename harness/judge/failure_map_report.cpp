@@ -25,7 +25,7 @@ std::string MapCellText(const MapCell& cell, const std::string& shown) {
 std::string TerminalCell(const MapCell& cell) {
   if (cell.state == CellState::kNotApplicable) return "-";
   MapCell plain = cell;
-  plain.name = plain.unit = "";
+  plain.decided.name = plain.decided.unit = "";
   if (cell.state == CellState::kNotMeasured) return MapCellText(plain, "?");
   if (cell.state != CellState::kHolds) return MapCellText(plain, cell.word);
   return MapCellText(plain, ClassText(cell) == "holds" ? "ok" : "ok: " + cell.outcome);
@@ -41,7 +41,7 @@ std::string MethodLetter(std::size_t column) {
 std::string MapColour(const Record& row, const TableColumn& column) {
   const std::string text = row.Text(column.key);
   const std::string word = text.substr(0, text.find(' '));
-  for (const RunEnding& ending : RunEndings()) {
+  for (const RunEnding& ending : kRunEndings) {
     if (word != ending.word) continue;
     return ending.state == CellState::kStopped ? "33"  // yellow
            : ending.state == CellState::kLimit ? "35"  // magenta
@@ -66,44 +66,25 @@ void AddMapRows(const FailureMap& map, std::size_t group,
 }
 
 std::vector<TableColumn> MatrixColumns(const FailureMap& map, bool letters) {
-  std::vector<TableColumn> columns = {{"row", "extreme", Format::kText, {}}};
+  std::vector<TableColumn> columns = {{"row", "extreme"}};
   for (std::size_t c = 0; c < map.rules.columns.size(); ++c) {
-    columns.push_back(
-        {ColumnKey(c), letters ? MethodLetter(c) : map.rules.columns[c].label, Format::kText, {}});
+    columns.push_back({ColumnKey(c), letters ? MethodLetter(c) : map.rules.columns[c].label});
   }
   return columns;
 }
 
-void EachCell(const FailureMap& map,
-              const std::function<void(const MapGroup&, const MapRow&, const MapColumn&,
-                                       const MapCell&)>& visit) {
-  for (std::size_t g = 0; g < map.cells.size(); ++g) {
-    const MapGroup& group = map.rules.groups[g];
-    for (std::size_t r = 0; r < map.cells[g].size(); ++r) {
-      for (std::size_t c = 0; c < map.rules.columns.size(); ++c) {
-        visit(group, group.rows[r], map.rules.columns[c], map.cells[g][r][c]);
-      }
-    }
-  }
-}
-
 Table LimitTable(const FailureMap& map) {
-  Table table;
-  table.title = "Limits";
-  table.columns = {{"row", "extreme", Format::kText, {}},
-                   {"right", "right ending", Format::kText, {}},
-                   {"demands", "decides", Format::kText, {}},
-                   {"why", "why", Format::kText, {}}};
+  Table table{
+      .title = "Limits",
+      .columns = {
+          {"row", "extreme"}, {"right", "right ending"}, {"demands", "decides"}, {"why", "why"}}};
   for (const MapGroup& group : map.rules.groups) {
     for (const MapRow& row : group.rows) {
       std::vector<std::string> demands;
       for (const Demand& demand : row.decides) demands.push_back(ToText(demand));
-      Record line;
-      line.Set("row", row.label);
-      line.Set("right", fmt::format("{}", fmt::join(row.right, " or ")));
-      line.Set("demands", fmt::format("{}", fmt::join(demands, "; ")));
-      line.Set("why", row.why);
-      table.rows.push_back(std::move(line));
+      AddRow({row.label, fmt::format("{}", fmt::join(row.right, " or ")),
+              fmt::format("{}", fmt::join(demands, "; ")), row.why},
+             &table);
     }
   }
   return table;
@@ -111,22 +92,19 @@ Table LimitTable(const FailureMap& map) {
 
 // Cells with a reason to be read: all but those that hold.
 Table DetailTable(const FailureMap& map) {
-  Table table;
-  table.title = "Cells that do not hold";
-  table.columns = {{"row", "extreme", Format::kText, {}}, {"column", "method", Format::kText, {}},
-                   {"class", "class", Format::kText, {}}, {"number", "number", Format::kText, {}},
-                   {"count", "hold", Format::kText, {}},  {"reason", "why", Format::kText, {}}};
+  Table table{.title = "Cells that do not hold",
+              .columns = {{"row", "extreme"},
+                          {"column", "method"},
+                          {"class", "class"},
+                          {"number", "number"},
+                          {"count", "hold"},
+                          {"reason", "why"}}};
   EachCell(map, [&table](const MapGroup&, const MapRow& row, const MapColumn& column,
                          const MapCell& cell) {
     if (cell.state == CellState::kHolds) return;
-    Record line;
-    line.Set("row", row.label);
-    line.Set("column", column.label);
-    line.Set("class", cell.word + (cell.demanded ? " (must hold)" : ""));
-    line.Set("number", DecidingNumber(cell));
-    line.Set("count", HoldingCount(cell));
-    line.Set("reason", cell.reason);
-    table.rows.push_back(std::move(line));
+    AddRow({row.label, column.label, cell.word + (cell.demanded ? " (must hold)" : ""),
+            DecidingNumber(cell), HoldingCount(cell), cell.reason},
+           &table);
   });
   return table;
 }
@@ -153,7 +131,7 @@ Table MapTable(const FailureMap& map) {
   Table table;
   table.title = map.rules.title;
   table.columns = MatrixColumns(map, true);
-  table.columns.push_back({"group", "group", Format::kText, {}});
+  table.columns.push_back({"group", "group"});
   table.group = "group";
   table.colour = &MapColour;
   for (std::size_t g = 0; g < map.cells.size(); ++g) AddMapRows(map, g, TerminalCell, &table);
@@ -171,30 +149,17 @@ Table MapCellTable(const FailureMap& map) {
   for (const char* key :
        {"group", "row", "column", "state", "class", "outcome", "measure", "value", "unit", "limit",
         "ratio", "t_reached", "holding", "records", "cases", "must_hold", "reason", "case_id"}) {
-    table.columns.push_back({key, key, Format::kShortest, {}});
+    table.columns.push_back({key, key, Format::kShortest});
   }
-  EachCell(map, [&table](const MapGroup& group, const MapRow& row, const MapColumn& column,
-                         const MapCell& cell) {
-    Record line;
-    line.Set("group", group.label);
-    line.Set("row", row.label);
-    line.Set("column", column.label);
-    line.Set("state", std::string(ToString(cell.state)));
-    line.Set("class", cell.word);
-    line.Set("outcome", cell.outcome);
-    line.Set("measure", cell.measure);
-    line.Set("value", cell.value);
-    line.Set("unit", cell.unit);
-    line.Set("limit", cell.limit);
-    line.Set("ratio", cell.ratio);
-    line.Set("t_reached", cell.t_reached);
-    line.Set("holding", static_cast<std::int64_t>(cell.holding));
-    line.Set("records", static_cast<std::int64_t>(cell.records));
-    line.Set("cases", static_cast<std::int64_t>(cell.cases));
-    line.Set("must_hold", cell.demanded);
-    line.Set("reason", cell.reason);
-    line.Set("case_id", cell.case_id);
-    table.rows.push_back(std::move(line));
+  const auto count = [](std::size_t n) { return static_cast<std::int64_t>(n); };
+  EachCell(map, [&](const MapGroup& group, const MapRow& row, const MapColumn& column,
+                    const MapCell& cell) {
+    const Judged& decided = cell.decided;
+    AddRow({group.label, row.label, column.label, std::string(ToString(cell.state)), cell.word,
+            cell.outcome, decided.measure, decided.value, decided.unit, decided.limit,
+            decided.ratio, cell.t_reached, count(cell.holding), count(cell.records),
+            count(cell.cases), cell.demanded, cell.reason, cell.case_id},
+           &table);
   });
   return table;
 }

@@ -15,20 +15,6 @@ std::string Labels(const std::vector<CheckResult>& checks, CheckState state) {
   return labels;
 }
 
-const std::string& WordingOf(const Wording& wording, Verdict verdict) {
-  switch (verdict) {
-    case Verdict::kReproduced:
-      return wording.reproduced;
-    case Verdict::kNotReproduced:
-      return wording.not_reproduced;
-    case Verdict::kOnlyUnder:
-      return wording.only_under;
-    case Verdict::kNotMeasured:
-      break;
-  }
-  return wording.not_measured;
-}
-
 }  // namespace
 
 ClaimResult Evaluate(const ClaimRule& rule, std::span<const Record> records) {
@@ -52,35 +38,22 @@ ClaimResult Evaluate(const ClaimRule& rule, std::span<const Record> records) {
   if (result.verdict != Verdict::kNotMeasured && !missing.empty()) {
     result.text += ". Not measured: " + missing;
   }
-  const std::string& sentence = WordingOf(rule.wording, result.verdict);
+  const auto& [reproduced, not_reproduced, only_under, not_measured] = rule.wording;
+  const std::string* const sentences[] = {&reproduced, &not_reproduced, &only_under, &not_measured};
+  const std::string& sentence = *sentences[static_cast<std::size_t>(result.verdict)];
   if (!sentence.empty()) result.text += ". " + sentence;
   return result;
 }
 
 std::string_view ToString(Verdict verdict) {
-  switch (verdict) {
-    case Verdict::kReproduced:
-      return "reproduced";
-    case Verdict::kNotReproduced:
-      return "not reproduced";
-    case Verdict::kOnlyUnder:
-      return "only under";
-    case Verdict::kNotMeasured:
-      break;
-  }
-  return "not measured";
+  constexpr std::string_view kWords[] = {"reproduced", "not reproduced", "only under",
+                                         "not measured"};
+  return kWords[static_cast<std::size_t>(verdict)];
 }
 
 std::string_view ToString(CheckState state) {
-  switch (state) {
-    case CheckState::kHolds:
-      return "holds";
-    case CheckState::kFails:
-      return "fails";
-    case CheckState::kNotMeasured:
-      break;
-  }
-  return "not measured";
+  constexpr std::string_view kWords[] = {"holds", "fails", "not measured"};
+  return kWords[static_cast<std::size_t>(state)];
 }
 
 }  // namespace loopbench::harness

@@ -107,6 +107,11 @@ std::vector<RowGroup> Groups(const Table& table) {
   return groups;
 }
 
+void AddRow(const std::vector<Value>& values, Table* table) {
+  Record& row = table->rows.emplace_back();
+  for (std::size_t i = 0; i < values.size(); ++i) row.Set(table->columns.at(i).key, values[i]);
+}
+
 bool HasFailed(const Record& row) {
   const std::string outcome = row.Text("outcome");
   return !outcome.empty() && outcome != "finished";

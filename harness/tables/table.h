@@ -18,7 +18,7 @@ struct TableColumn {
   std::string header;  ///< heading for people, with the unit in brackets
   Format format = Format::kText;
   /// Shorter words for terminal columns: (value, replacement). Empty in tables that are kept.
-  std::vector<std::pair<std::string, std::string>> abbreviations;
+  std::vector<std::pair<std::string, std::string>> abbreviations = {};
 };
 
 /// Red for the outcome of a run that failed, yellow for one with doubts.
@@ -27,10 +27,10 @@ std::string OutcomeColour(const Record& row, const TableColumn& column);
 /// Rows of records under columns. A run that failed is a row like any other, with its outcome and
 /// with empty cells for what it did not reach; nothing removes it.
 struct Table {
-  std::string title;
-  std::vector<TableColumn> columns;
-  std::vector<Record> rows;
-  std::vector<std::string> notes;  ///< provenance and remarks, one line each, below the table
+  std::string title = "";
+  std::vector<TableColumn> columns = {};
+  std::vector<Record> rows = {};
+  std::vector<std::string> notes = {};  ///< provenance and remarks, one line each, below the table
   /// Key by whose values the rows are divided ("" for one undivided table). Text, Markdown and
   /// LaTeX write one table per value under a heading; CSV and JSON keep one list with the key as a
   /// column.
@@ -39,10 +39,13 @@ struct Table {
   std::string (*colour)(const Record& row, const TableColumn& column) = &OutcomeColour;
 };
 
+/// Adds a row of `values` under the table's columns, in their order.
+void AddRow(const std::vector<Value>& values, Table* table);
+
 /// Rows that share a value of the group's key, under "key = value".
 struct RowGroup {
   std::string heading;
-  std::vector<Record> rows;
+  std::vector<Record> rows = {};
 };
 
 /// The groups in order of first appearance; one without heading when the table is undivided.

@@ -36,10 +36,10 @@ Check DriftCheck(const std::string& mechanism) {
   Check check;
   check.label = mechanism + " scene";
   check.select = {{"mechanism", {mechanism}}};
-  check.measure = "drift";
+  check.demand.measure = "drift";
   check.statistic = Statistic::kMax;
-  check.compare = Comparison::kAtMost;
-  check.threshold = 1e-12;
+  check.demand.relation = Relation::kAtMost;
+  check.demand.number = 1e-12;
   return check;
 }
 
@@ -104,10 +104,10 @@ TEST(Claims, RecordsOfAnotherKindDoNotCount) {
 
 TEST(Claims, OutcomesAreExaminedWhereTheCheckAsksForThem) {
   Check check = DriftCheck("square");
-  check.measure = "outcome";
+  check.demand.measure = "outcome";
   check.statistic = Statistic::kAll;
-  check.compare = Comparison::kIsNot;
-  check.word = "singular";
+  check.demand.relation = Relation::kIsNot;
+  check.demand.word = "singular";
   std::vector<Record> records = {RunOf("square", "drift", 1.0),
                                  RunOf("square", "drift", 1.0, "time-limit")};
   CheckResult result = Evaluate(check, records);
@@ -122,8 +122,8 @@ TEST(Claims, OutcomesAreExaminedWhereTheCheckAsksForThem) {
 TEST(Claims, AnExpectedFailureHoldsForFailedRunsAndForBadNumbers) {
   Check check = DriftCheck("square");
   check.statistic = Statistic::kAll;
-  check.compare = Comparison::kAtLeast;
-  check.threshold = 0.1;
+  check.demand.relation = Relation::kAtLeast;
+  check.demand.number = 0.1;
   check.failed_runs_hold = true;
   std::vector<Record> records = {RunOf("square", "drift", 0.0, "singular")};
   EXPECT_EQ(Evaluate(check, records).state, CheckState::kHolds);
@@ -137,9 +137,9 @@ TEST(Claims, AnExpectedFailureHoldsForFailedRunsAndForBadNumbers) {
 TEST(Claims, AMeanWithinItsToleranceMustAlsoBeResolved) {
   Check check = DriftCheck("square");
   check.statistic = Statistic::kMean;
-  check.compare = Comparison::kWithin;
-  check.threshold = 2.0;
-  check.tolerance = 0.15;
+  check.demand.relation = Relation::kWithin;
+  check.demand.number = 2.0;
+  check.demand.tolerance = 0.15;
   check.require = {{"growth_resolved", {"true"}}};
   std::vector<Record> records = {RunOf("square", "drift", 1.8), RunOf("square", "drift", 2.1)};
   for (Record& record : records) record.Set("growth_resolved", true);
@@ -157,7 +157,7 @@ TEST(Claims, AMeanWithinItsToleranceMustAlsoBeResolved) {
 TEST(Claims, ARatioComparesTwoSelections) {
   Check check = DriftCheck("chain-1000");
   check.relative_to = {{"mechanism", {"chain-100"}}};
-  check.threshold = 12.0;
+  check.demand.number = 12.0;
   std::vector<Record> records = {RunOf("chain-100", "drift", 3000.0),
                                  RunOf("chain-1000", "drift", 33000.0)};
   CheckResult result = Evaluate(check, records);
@@ -218,7 +218,7 @@ TEST(ClaimsReader, TheSelectionOfARuleJoinsThatOfEveryCheck) {
   const Check& check = rules[0].checks[0];
   EXPECT_EQ(check.select, (Selection{{"horizon", {"10"}}, {"rtol", {"1e-06", "1e-08"}}}));
   EXPECT_EQ(check.require, (Selection{{"growth_resolved", {"true"}}}));
-  EXPECT_EQ(check.compare, Comparison::kWithin);
+  EXPECT_EQ(check.demand.relation, Relation::kWithin);
 }
 
 // A record that the check selects, with the same value everywhere.
@@ -227,7 +227,7 @@ Record Planted(const Selection& selection, const Check& check, double value) {
   record.Set("outcome", std::string("finished"));
   record.Set("growth_resolved", true);
   for (const auto& [key, values] : selection) record.Set(key, values.front());
-  if (check.measure != "outcome") record.Set(check.measure, value);
+  if (check.demand.measure != "outcome") record.Set(check.demand.measure, value);
   return record;
 }
 
@@ -237,9 +237,9 @@ TEST(PaperClaims, EachTurnsFromReproducedToNotReproducedWithPlantedData) {
   for (const ClaimRule& rule : rules) {
     EXPECT_EQ(Evaluate(rule, {}).verdict, Verdict::kNotMeasured) << rule.id;
     for (const Check& check : rule.checks) {
-      const bool word = check.compare == Comparison::kIs || check.compare == Comparison::kIsNot;
-      const bool at_most = check.compare == Comparison::kAtMost;
-      const double good = check.threshold;
+      const bool word = check.demand.IsText();
+      const bool at_most = check.demand.relation == Relation::kAtMost;
+      const double good = check.demand.number;
       const double bad = at_most ? good * 2.0 : good * 0.5;
       std::vector<Record> records;
       if (!check.relative_to.empty()) records.push_back(Planted(check.relative_to, check, 1.0));

@@ -46,12 +46,12 @@ TEST(MapCell, HoldsWithTheNumberClosestToItsLimit) {
   const MapCell cell = CellOf({RunOf("odca", 1e-8, 2e-7, 5e-7)});
   EXPECT_EQ(cell.state, CellState::kHolds);
   EXPECT_EQ(cell.word, "holds");
-  EXPECT_EQ(cell.measure, "branch_error_max");  // a fifth of its limit, energy a tenth
-  EXPECT_NEAR(cell.ratio, 0.2, 1e-12);
+  EXPECT_EQ(cell.decided.measure, "branch_error_max");  // a fifth of its limit, energy a tenth
+  EXPECT_NEAR(cell.decided.ratio, 0.2, 1e-12);
   EXPECT_EQ(DecidingNumber(cell), "branch 2e-07 rad");
   const MapCell other = CellOf({RunOf("odca", 1e-8, 2e-7, 4e-6)});
   EXPECT_EQ(DecidingNumber(other), "energy 4e-06 J");
-  EXPECT_DOUBLE_EQ(other.limit, 500 * 1e-8);
+  EXPECT_DOUBLE_EQ(other.decided.limit, 500 * 1e-8);
 }
 
 TEST(MapCell, IsInaccurateBeyondALimitAndNamesAllThatAre) {
@@ -81,7 +81,7 @@ TEST(MapCell, WhatIsNotFiniteIsInaccurate) {
 
 TEST(MapCell, NamesEveryOtherEndingOfARun) {
   std::size_t stopped = 0, limits = 0, broken = 0;
-  for (const RunEnding& ending : RunEndings()) {
+  for (const RunEnding& ending : kRunEndings) {
     if (ending.word == "finished") continue;
     const MapCell cell = CellOf({RunOf("odca", 1e-8, 0.0, 0.0, std::string(ending.word))});
     EXPECT_EQ(cell.word, ending.word);
@@ -161,7 +161,7 @@ TEST(MapCell, AnotherEndingMayBeRight) {
   row.decides = {{.measure = "t_reached",
                   .name = "",
                   .unit = "s",
-                  .kind = Demand::Kind::kAtMost,
+                  .relation = Relation::kAtMost,
                   .number = 0.32,
                   .of = "",
                   .when = {"locked"}}};
@@ -188,7 +188,7 @@ TEST(MapCell, AnotherEndingMayBeRight) {
 const Demand kAllKept{.measure = "kept",
                       .name = "kept",
                       .unit = "",
-                      .kind = Demand::Kind::kAtLeast,
+                      .relation = Relation::kAtLeast,
                       .number = 1.0,
                       .of = "size"};
 
@@ -214,11 +214,11 @@ TEST(MapCell, CountsAreDemandedAtLeastAndEqual) {
   EXPECT_EQ(CellOf({record}, row).state, CellState::kInaccurate);
   EXPECT_EQ(DecidingNumber(CellOf({record}, row)), "kept 397 of 400");
   record.Set("kept", std::int64_t{0});
-  EXPECT_TRUE(std::isinf(CellOf({record}, row).ratio));
+  EXPECT_TRUE(std::isinf(CellOf({record}, row).decided.ratio));
   row.decides[0] = {.measure = "rank",
                     .name = "",
                     .unit = "",
-                    .kind = Demand::Kind::kEqual,
+                    .relation = Relation::kEqual,
                     .number = 3.0,
                     .of = ""};
   record.Set("rank", std::int64_t{3});

@@ -19,7 +19,7 @@ TEST(Measures, HaveEachKeyOnceAndATypeWhereTheyAreMore) {
     EXPECT_TRUE(keys.insert(measure.key).second) << measure.key;
     const bool is_more = !measure.heading.words.empty() || measure.rule != Rule::kNone ||
                          measure.merging.how != Merge::kLost;
-    if (is_more) EXPECT_NE(measure.type, ValueType::kAny) << measure.key;
+    EXPECT_TRUE(!is_more || measure.type != ValueType::kAny) << measure.key;
   }
 }
 
@@ -64,9 +64,10 @@ TEST(Measures, KnowEveryKeyOfARun) {
            .integrator = "trbdf2",
            .rtol = 1e-6,
            .atol = 1e-6,
-           .horizon = 0.5};
-  one.ensemble = 2;
-  one.perturb = 1e-3;
+           .horizon = 0.5,
+           .ensemble = 2,
+           .perturb = 1e-3,
+           .limits = {}};
   const Record record = RunCase(experiment, one);
   EXPECT_EQ(record.Text("outcome"), "finished") << record.Text("message");
   for (const auto& [key, value] : record.items()) EXPECT_NE(FindMeasure(key), nullptr) << key;

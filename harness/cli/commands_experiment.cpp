@@ -26,12 +26,11 @@ namespace {
 bool Passes(const Experiment& experiment, const Selection& filter) {
   const std::vector<Case> cases = Expand(experiment);
   if (cases.empty() || filter.empty()) return !cases.empty();
-  const Record keys = CaseKeys(experiment, cases.front());
   for (const Condition& condition : filter) {
-    if (keys.Find(condition.key) == nullptr) return !SelectCases(experiment, filter).empty();
+    if (cases.front().keys.Find(condition.key) == nullptr)
+      return !SelectCases(experiment, filter).empty();
   }
-  return std::ranges::any_of(
-      cases, [&](const Case& one) { return Matches(CaseKeys(experiment, one), filter); });
+  return std::ranges::any_of(cases, [&](const Case& one) { return Matches(one.keys, filter); });
 }
 
 Table CaseTable(const std::vector<Experiment>& experiments, const Selection& filter) {
@@ -53,7 +52,7 @@ Table CaseTable(const std::vector<Experiment>& experiments, const Selection& fil
   std::size_t timings = 0, rungs = 0;
   for (const Experiment& experiment : experiments) {
     for (const Case& one : SelectCases(experiment, filter)) {
-      Record row = CaseKeys(experiment, one);
+      Record row = one.keys;
       // an ensemble comes on top of the unperturbed run
       row.Set("ensemble", std::int64_t{one.ensemble > 1 ? one.ensemble + 1 : 1});
       table.rows.push_back(row);

@@ -190,9 +190,7 @@ Plan MakePlan(const std::vector<Experiment>& experiments, const PlanCommand& com
   for (std::size_t i = 0; i < experiments.size(); ++i) {
     const Experiment& experiment = experiments[i];
     for (const Case& one : SelectCases(experiment, command.files.filter)) {
-      Record keys = CaseKeys(experiment, one);
-      SetCaseId(&keys, AccuracyContent(experiment, one));
-      const auto known = earlier.find(SameRun(keys));
+      const auto known = earlier.find(SameRun(Identified(experiment, one).keys));
       plan.known += known != earlier.end() ? 1 : 0;
       Add(one, known != earlier.end() ? known->second : pilot->Seconds(i, one), &plan, &places);
     }

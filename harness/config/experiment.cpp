@@ -15,16 +15,18 @@ bool EmptyOrContains(const std::vector<T>& accepted, const T& value) {
 }
 
 Case MakeCase(const Experiment& experiment, std::size_t scene, const Column& column,
-              double tolerance, double horizon) {
-  return {.scene = scene,
-          .mechanism = experiment.scenes[scene].name,
-          .column = column,
-          .integrator = experiment.integrator,
-          .jacobian = experiment.jacobian,
-          .rtol = tolerance,
-          .atol = tolerance,
-          .horizon = horizon,
-          .limits = experiment.limits};
+              double tolerance, double horizon, const std::string& integrator) {
+  Case one{.scene = scene,
+           .mechanism = experiment.scenes[scene].name,
+           .column = column,
+           .integrator = integrator,
+           .jacobian = experiment.jacobian,
+           .rtol = tolerance,
+           .atol = tolerance,
+           .horizon = horizon,
+           .limits = experiment.limits};
+  one.keys = CaseKeys(experiment, one);
+  return one;
 }
 
 /// `wanted`, or the shortest.
@@ -35,9 +37,8 @@ double HorizonOr(double wanted, const std::vector<double>& horizons) {
 void DropExcluded(const Experiment& experiment, std::vector<Case>* cases) {
   if (experiment.exclusions.empty()) return;
   std::erase_if(*cases, [&experiment](const Case& one) {
-    const Record keys = CaseKeys(experiment, one);
     return std::any_of(experiment.exclusions.begin(), experiment.exclusions.end(),
-                       [&keys](const Selection& exclusion) { return Matches(keys, exclusion); });
+                       [&one](const Selection& exclusion) { return Matches(one.keys, exclusion); });
   });
 }
 
@@ -91,7 +92,8 @@ std::vector<Case> Expand(const Experiment& experiment) {
     for (const double horizon : experiment.scenes[scene].horizons) {
       for (const Column& column : experiment.columns) {
         for (const double tolerance : experiment.tolerances) {
-          cases.push_back(MakeCase(experiment, scene, column, tolerance, horizon));
+          cases.push_back(
+              MakeCase(experiment, scene, column, tolerance, horizon, experiment.integrator));
         }
       }
     }
@@ -120,8 +122,9 @@ std::vector<Case> ExpandLadders(const Experiment& experiment) {
     if (horizons.empty()) continue;
     const double horizon = HorizonOr(precision.horizon, horizons);
     for (const Column& column : experiment.columns) {
-      cases.push_back(MakeCase(experiment, scene, column, precision.tolerances.front(), horizon));
-      cases.back().integrator = "ode45";  // the one that there is in every scalar
+      // the one integrator that there is in every scalar
+      cases.push_back(
+          MakeCase(experiment, scene, column, precision.tolerances.front(), horizon, "ode45"));
     }
   }
   DropExcluded(experiment, &cases);
@@ -137,7 +140,8 @@ std::vector<Case> ExpandTiming(const Experiment& experiment) {
     if (horizons.empty()) continue;
     const double horizon = HorizonOr(timing.horizon, horizons);
     for (const Column& column : timing.columns) {
-      cases.push_back(MakeCase(experiment, scene, column, timing.tolerance, horizon));
+      cases.push_back(
+          MakeCase(experiment, scene, column, timing.tolerance, horizon, experiment.integrator));
     }
   }
   DropExcluded(experiment, &cases);

@@ -184,7 +184,10 @@ struct Case {
   double perturb = 0.0;                       ///< amplitude of the ensemble [rad or m], or else
   std::vector<DrawnCoordinate> between = {};  ///< as in the rule
   double branch_bound = 1e-6;                 ///< [rad]
-  Limits limits;
+  Limits limits = {};
+  /// CaseKeys(), made with the case; where it is run also "case_id" and "content"
+  /// (harness/run/case_identity.h). What runs a case writes them, whatever they say.
+  Record keys = {};
 };
 
 /// Whether the rule applies to the case (its ensemble fields do not matter).

@@ -150,10 +150,9 @@ class Reader {
       own.swap(experiment.exclusions);
       bool any = false;
       for (const Case& one : Expand(experiment)) {
-        const Record keys = CaseKeys(experiment, one);
         bool excluded = false;
         for (std::size_t i = 0; i < rules.size(); ++i) {
-          if (!Matches(keys, rules[i])) continue;
+          if (!Matches(one.keys, rules[i])) continue;
           used[i] = true;
           excluded = true;
         }

@@ -45,6 +45,11 @@ std::string AccuracyContent(const Experiment& experiment, const Case& one) {
   return CaseId(content);
 }
 
+Case Identified(const Experiment& experiment, Case one) {
+  SetCaseId(&one.keys, AccuracyContent(experiment, one));
+  return one;
+}
+
 std::string SceneTimingContent(const Experiment& experiment, const Case& one) {
   Record content = SceneContent(experiment, one);
   content.Set("repeats", std::int64_t{experiment.timing.repeats});

@@ -17,6 +17,9 @@ namespace loopbench::harness {
 /// @param content  from one of the functions below
 void SetCaseId(Record* keys, const std::string& content);
 
+/// The accuracy case with its id.
+Case Identified(const Experiment& experiment, Case one);
+
 /// Of an accuracy case.
 std::string AccuracyContent(const Experiment& experiment, const Case& one);
 

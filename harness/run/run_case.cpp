@@ -10,7 +10,6 @@
 #include "harness/integrator/arkode.h"
 #include "harness/observers/final_poses.h"
 #include "harness/observers/observer.h"
-#include "harness/run/case_identity.h"
 #include "harness/run/compiled_scene.h"
 #include "harness/run/ensemble.h"
 #include "harness/run/merge_parts.h"
@@ -242,8 +241,7 @@ IntegratorOptions OptionsOf(const Case& one, const std::vector<double>& stop_tim
 
 Record RunCase(const Experiment& experiment, const Case& one) {
   const ExperimentScene& scene = experiment.scenes[one.scene];
-  Record record = CaseKeys(experiment, one);
-  SetCaseId(&record, AccuracyContent(experiment, one));
+  Record record = one.keys;
   record.Set("scene_id", Fnv1a(scene.mechanism.canonical));
   const double link = LinkLength(scene.mechanism.description);
   record.Set("link_length", link);

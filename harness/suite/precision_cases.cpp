@@ -37,10 +37,11 @@ MechanismDescription PlanarPart(const Experiment& experiment, const ExperimentSc
   return description;
 }
 
-Record RungKeys(const Experiment& experiment, Case one, Scalar scalar, double tolerance) {
-  one.rtol = one.atol = tolerance;
-  Record keys = CaseKeys(experiment, one);
+Record RungKeys(const Case& one, Scalar scalar, double tolerance) {
+  Record keys = one.keys;
   keys.Set("kind", std::string("precision"));
+  keys.Set("rtol", tolerance);
+  keys.Set("atol", tolerance);
   keys.Set("scalar", std::string(ToString(scalar)));
   return keys;
 }
@@ -76,12 +77,12 @@ std::vector<LadderGroup> LadderGroups(const Experiment& experiment, const Select
     bool any = false;
     for (const Scalar scalar : precision.scalars) {
       for (const double tolerance : precision.tolerances) {
-        group.keys.push_back(RungKeys(experiment, one, scalar, tolerance));
+        group.keys.push_back(RungKeys(one, scalar, tolerance));
         any = any || Matches(group.keys.back(), filter);
       }
     }
     if (!any) continue;
-    Record reference = RungKeys(experiment, one, Scalar::kFloat128, precision.reference);
+    Record reference = RungKeys(one, Scalar::kFloat128, precision.reference);
     reference.Set("integrator", std::string("gragg"));
     group.keys.insert(group.keys.begin(), reference);
     std::string rungs;

@@ -44,11 +44,10 @@ struct Piece {
 
 constexpr double kPatience = 2.0, kGrace_s = 2.0;  ///< LimitsOfRuns
 
+/// @param one  with its id
 Piece AccuracyPiece(const Experiment& experiment, const Case& one) {
-  Record keys = CaseKeys(experiment, one);
-  SetCaseId(&keys, AccuracyContent(experiment, one));
   const int runs = one.ensemble > 1 ? one.ensemble + 1 : 1;
-  return {.owed = {keys},
+  return {.owed = {one.keys},
           .work = [&experiment, one] { return std::vector<Record>{RunCase(experiment, one)}; },
           .limits = LimitsOfRuns(one.limits, runs),
           .label = fmt::format("{} {} {}", one.mechanism, ToString(one.column), one.rtol),
@@ -57,9 +56,7 @@ Piece AccuracyPiece(const Experiment& experiment, const Case& one) {
 
 Piece TimingPiece(const Experiment& experiment, const TimingGroup& group) {
   Piece piece;
-  for (std::size_t i = 0; i < group.cases.size(); ++i) {
-    piece.owed.push_back(TimingKeys(experiment, group, i));
-  }
+  for (const Case& one : group.cases) piece.owed.push_back(one.keys);
   // the first column is timed twice (noise.h)
   const int columns = static_cast<int>(group.cases.size()) + 1;
   const int runs = columns * (experiment.timing.repeats + 1);
@@ -221,11 +218,10 @@ void WarnOfJobs(int jobs) {
 std::vector<Case> SelectCases(const Experiment& experiment, const Selection& filter) {
   std::vector<Case> cases;
   for (const Case& one : Expand(experiment)) {
-    const Record keys = CaseKeys(experiment, one);
     for (const Condition& condition : filter) {
-      if (keys.Find(condition.key) == nullptr) RejectKey(condition.key, keys);
+      if (one.keys.Find(condition.key) == nullptr) RejectKey(condition.key, one.keys);
     }
-    if (Matches(keys, filter)) cases.push_back(one);
+    if (Matches(one.keys, filter)) cases.push_back(one);
   }
   if (cases.empty()) {
     throw ConfigError(
@@ -270,7 +266,7 @@ SuiteCount RunSuite(const std::vector<Experiment>& experiments, const SuiteOptio
   if (options.accuracy) {
     for (std::size_t e = 0; e < experiments.size(); ++e) {
       for (const Case& one : SelectCases(experiments[e], options.filter)) {
-        add(e, [&] { return AccuracyPiece(experiments[e], one); });
+        add(e, [&] { return AccuracyPiece(experiments[e], Identified(experiments[e], one)); });
       }
     }
     run("accuracy", options.jobs);

@@ -226,6 +226,11 @@ MechanismDescription MakeFamilyMember(const TimingFamily& family, int size) {
   return chain;
 }
 
+void SetTimingId(const std::string& content, Record* keys) {
+  keys->Set("kind", std::string("timing"));
+  SetCaseId(keys, content);
+}
+
 }  // namespace
 
 std::vector<TimingGroup> TimingGroups(const Experiment& experiment) {
@@ -236,8 +241,11 @@ std::vector<TimingGroup> TimingGroups(const Experiment& experiment) {
                       [&experiment, scene] { return OneSystem(experiment, scene); },
                       {},
                       true};
-    std::ranges::copy_if(all, std::back_inserter(group.cases),
-                         [&](const Case& one) { return one.scene == scene; });
+    for (const Case& one : all) {
+      if (one.scene != scene) continue;
+      group.cases.push_back(one);
+      SetTimingId(SceneTimingContent(experiment, one), &group.cases.back().keys);
+    }
     if (!group.cases.empty()) groups.push_back(std::move(group));
   }
   if (experiment.timing.repeats == 0) return groups;
@@ -251,24 +259,18 @@ std::vector<TimingGroup> TimingGroups(const Experiment& experiment) {
         Case one;
         one.mechanism = group.name;
         one.column = column;
+        one.keys = CaseKeys(experiment, one);
+        // a right-hand side has no tolerance and no horizon
+        for (const char* key : {"integrator", "rtol", "atol", "horizon"}) {
+          one.keys.Set(key, Value());
+        }
+        SetTimingId(FamilyTimingContent(experiment), &one.keys);
         group.cases.push_back(one);
       }
       groups.push_back(std::move(group));
     }
   }
   return groups;
-}
-
-Record TimingKeys(const Experiment& experiment, const TimingGroup& group, std::size_t index) {
-  Record keys = CaseKeys(experiment, group.cases[index]);
-  keys.Set("kind", std::string("timing"));
-  if (!group.simulate) {
-    // a right-hand side has no tolerance and no horizon
-    for (const char* key : {"integrator", "rtol", "atol", "horizon"}) keys.Set(key, Value());
-  }
-  SetCaseId(&keys, group.simulate ? SceneTimingContent(experiment, group.cases[index])
-                                  : FamilyTimingContent(experiment));
-  return keys;
 }
 
 std::vector<Record> TimeTogether(const Experiment& experiment, const TimingGroup& group) {
@@ -290,7 +292,7 @@ std::vector<Record> TimeTogether(const Experiment& experiment, const TimingGroup
   const Record noise = NoiseKeys(machine, *subjects.front(), *subjects.back());
   std::vector<Record> records;
   for (std::size_t i = 0; i < group.cases.size(); ++i) {
-    records.push_back(subjects[i]->Finish(TimingKeys(experiment, group, i)));
+    records.push_back(subjects[i]->Finish(group.cases[i].keys));
     for (const auto& [key, value] : noise.items()) records.back().Set(key, value);
   }
   return records;

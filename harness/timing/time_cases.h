@@ -22,16 +22,13 @@ struct TimingGroup {
   std::string name;  ///< of the mechanism
   /// Makes the mechanism, in the process that times it: a member of a family may be very large.
   std::function<MechanismDescription()> describe;
-  std::vector<Case> cases;
-  bool simulate = true;  ///< whole simulations too; families have right-hand sides alone
+  std::vector<Case> cases;  ///< with keys of kind "timing" and their ids
+  bool simulate = true;     ///< whole simulations too; families have right-hand sides alone
 };
 
 /// The timings of an experiment, which must outlive them: a group per scene, then one per member of
 /// a family.
 std::vector<TimingGroup> TimingGroups(const Experiment& experiment);
-
-/// The keys of one of the group's cases (kind "timing"), with its case_id and content.
-Record TimingKeys(const Experiment& experiment, const TimingGroup& group, std::size_t index);
 
 /// One record per case, in order. A case whose simulation fails keeps its row with outcome and,
 /// where it got so far, its right-hand side's time.

@@ -135,13 +135,12 @@ TEST_F(CaseIdentity, WhateverDecidesARunChangesEveryCaseId) {
     std::vector<Setting> settings = {ParseSetting(timing), ParseSetting(precision)};
     if (!change.empty()) settings.push_back(ParseSetting(change));
     const Experiment experiment = ReadExperiments(folder_ / "tiny.json", settings).front();
-    Record accuracy = CaseKeys(experiment, Expand(experiment).front());
-    SetCaseId(&accuracy, AccuracyContent(experiment, Expand(experiment).front()));
+    const Case accuracy = Identified(experiment, Expand(experiment).front());
     const std::vector<TimingGroup> groups = TimingGroups(experiment);
-    return std::vector<std::string>{accuracy.Text("case_id"),
-                                    TimingKeys(experiment, groups.front(), 0).Text("case_id"),
+    return std::vector<std::string>{accuracy.keys.Text("case_id"),
+                                    groups.front().cases.front().keys.Text("case_id"),
                                     LadderGroups(experiment).front().keys.front().Text("case_id"),
-                                    TimingKeys(experiment, groups.back(), 0).Text("case_id")};
+                                    groups.back().cases.front().keys.Text("case_id")};
   };
   const std::vector<std::string> plain = ids("");
   EXPECT_EQ(std::set<std::string>(plain.begin(), plain.end()).size(), plain.size());

@@ -150,7 +150,7 @@ TEST(Sweep, GoesThroughTheMechanismsFile) {
   EXPECT_EQ(Described(experiments[1]).bodies[2].mass, 2.5);
   EXPECT_EQ(Described(experiments[1]).bodies[1].mass, 1.0);
   EXPECT_EQ(experiments[1].parameters.Number("mass"), 2.5);
-  const Record keys = CaseKeys(experiments[1], Expand(experiments[1]).front());
+  const Record keys = Expand(experiments[1]).front().keys;
   EXPECT_EQ(keys.Number("mass"), 2.5);
   EXPECT_EQ(keys.Text("mechanism"), "four-bar");
 }

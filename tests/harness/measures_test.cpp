@@ -4,11 +4,10 @@
 #include <gtest/gtest.h>
 
 #include <set>
-#include <string>
 #include <string_view>
 
-#include "harness/config/mechanism_reader.h"
 #include "harness/run/run_case.h"
+#include "tests/reference/cases.h"
 
 namespace loopbench::harness {
 namespace {
@@ -54,20 +53,12 @@ TEST(Measures, NoParameterMayBeCalledAsTheyAre) {
 }
 
 TEST(Measures, KnowEveryKeyOfARun) {
-  const std::string folder = std::string(LOOPBENCH_SOURCE_DIR) + "/configs/mechanisms/";
-  Experiment experiment;
-  experiment.name = "test";
-  experiment.scenes.push_back(
-      {"parallelogram", {}, ReadMechanism(folder + "parallelogram.json"), {0.5}, {}});
-  Case one{.mechanism = "parallelogram",
-           .column = {.enforcement = Enforcement::kPosition},
-           .integrator = "trbdf2",
-           .rtol = 1e-6,
-           .atol = 1e-6,
-           .horizon = 0.5,
-           .ensemble = 2,
-           .perturb = 1e-3,
-           .limits = {}};
+  const Experiment experiment = reference::Single(reference::Shipped("parallelogram"));
+  Case one = reference::CaseOf(experiment, "parallelogram", {.enforcement = Enforcement::kPosition},
+                               1e-6, 0.5);
+  one.integrator = "trbdf2";
+  one.ensemble = 2;
+  one.perturb = 1e-3;
   const Record record = RunCase(experiment, one);
   EXPECT_EQ(record.Text("outcome"), "finished") << record.Text("message");
   for (const auto& [key, value] : record.items()) EXPECT_NE(FindMeasure(key), nullptr) << key;

@@ -81,14 +81,16 @@ inline Case CaseOf(const Experiment& experiment, const std::string& scene, const
                    double tolerance, double horizon) {
   const auto it = std::ranges::find(experiment.scenes, scene, &ExperimentScene::name);
   if (it == experiment.scenes.end()) throw std::invalid_argument("no scene " + scene);
-  return {.scene = static_cast<std::size_t>(it - experiment.scenes.begin()),
-          .mechanism = scene,
-          .column = column,
-          .integrator = experiment.integrator,
-          .rtol = tolerance,
-          .atol = tolerance,
-          .horizon = horizon,
-          .limits = {.cpu_s = 600.0, .steps = 1'000'000}};
+  Case one{.scene = static_cast<std::size_t>(it - experiment.scenes.begin()),
+           .mechanism = scene,
+           .column = column,
+           .integrator = experiment.integrator,
+           .rtol = tolerance,
+           .atol = tolerance,
+           .horizon = horizon,
+           .limits = {.cpu_s = 600.0, .steps = 1'000'000}};
+  one.keys = CaseKeys(experiment, one);
+  return one;
 }
 
 /// A mechanism of configs/mechanisms/.

@@ -9,6 +9,7 @@
 #include <vector>
 
 #include "harness/config/scene.h"
+#include "harness/observers/time_series.h"
 #include "harness/record/record.h"
 #include "mechanism/formulation/formulation.h"
 
@@ -22,22 +23,40 @@ struct Sample {
   double supplied = 0.0, dissipated = 0.0;  ///< work since the start [J]
 };
 
+/// What an analysis needs besides the record.
+struct Traces {
+  TimeSeries drift, correction;       ///< [m]
+  TimeSeries energy;                  ///< deviation [J]
+  double kinetic = 0.0;               ///< largest [J]
+  std::int64_t projection_steps = 0;  ///< Newton steps of projections
+};
+
 template <class Space>
 class Observer {
  public:
   virtual ~Observer() = default;
   virtual void Observe(const Sample<Space>& sample) = 0;
+  /// At a state whose accelerations were lost to a singular matrix: only diagnostics are valid.
+  virtual void ObserveSingular(const Sample<Space>& /*sample*/) {}
   virtual void Write(Record& record) const = 0;
+  virtual void Trace(Traces& /*traces*/) const {}
 };
 
-/// A value sampled at accepted steps.
-struct TimeSeries {
-  std::vector<double> t, value;
+/// What observers may know before the run; all of it outlives them.
+template <class Space>
+struct Watched {
+  const MechanismDescription& description;
+  const Mechanism<Space, double>& mechanism;  ///< made of the description
+  const SceneObservation& scene;
+  int points;        ///< kept of a series
+  bool with_series;  ///< false for members of ensembles, of which series would be many
 };
 
-/// Of the first `samples` (all, unless said) every k-th, k chosen so that at most `points` >= 2
-/// remain, always with the last one.
-TimeSeries Thin(const TimeSeries& series, int points, std::size_t samples = SIZE_MAX);
+/// All observers of a run, in the order of their keys in records. A new one is a line here
+/// (observers.cpp) and a row for each of its keys in the table of measures
+/// (harness/record/measures.cpp).
+template <class Space>
+std::vector<std::unique_ptr<Observer<Space>>> MakeObservers(const Watched<Space>& run);
 
 /// Drift at position, velocity and acceleration level.
 ///
@@ -58,9 +77,7 @@ class DriftObserver final : public Observer<Space> {
   ~DriftObserver() override;
   void Observe(const Sample<Space>& sample) override;
   void Write(Record& record) const override;
-
-  /// Position drift [m] at each accepted step.
-  const TimeSeries& series() const { return series_; }
+  void Trace(Traces& traces) const override { traces.drift = series_; }
 
  private:
   struct Work;
@@ -80,10 +97,10 @@ class EnergyObserver final : public Observer<Space> {
   EnergyObserver(int points, bool has_power) : points_(points), has_power_(has_power) {}
   void Observe(const Sample<Space>& sample) override;
   void Write(Record& record) const override;
-
-  /// The deviation [J] at each accepted step, and the largest kinetic energy [J] so far.
-  const TimeSeries& series() const { return series_; }
-  double kinetic() const { return kinetic_; }
+  void Trace(Traces& traces) const override {
+    traces.energy = series_;
+    traces.kinetic = kinetic_;
+  }
 
  private:
   int points_;
@@ -102,10 +119,10 @@ class CorrectionObserver final : public Observer<Space> {
  public:
   void Observe(const Sample<Space>& sample) override;
   void Write(Record& record) const override;
-
-  std::int64_t iterations() const { return iterations_; }
-  /// The mismatch [m] at each accepted step.
-  const TimeSeries& series() const { return series_; }
+  void Trace(Traces& traces) const override {
+    traces.correction = series_;
+    traces.projection_steps = iterations_;
+  }
 
  private:
   double largest_ = 0.0;
@@ -121,6 +138,7 @@ template <class Space>
 class ConditionObserver final : public Observer<Space> {
  public:
   void Observe(const Sample<Space>& sample) override;
+  void ObserveSingular(const Sample<Space>& sample) override { Observe(sample); }
   void Write(Record& record) const override;
 
  private:

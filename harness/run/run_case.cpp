@@ -62,11 +62,8 @@ class Runner {
         scene_(scene.observe),
         description_(scene.compiled.parts[static_cast<std::size_t>(part)].description),
         mechanism_(description_, one.column.coordinates),
-        drift_(description_, mechanism_),
-        singularity_(description_, mechanism_),
-        energy_(experiment.series_points, mechanism_.has_power()),
-        exact_(scene_, mechanism_),
-        coordinates_(experiment.series_points),
+        observers_(MakeObservers<Space>(
+            {description_, mechanism_, scene_, experiment.series_points, with_series})),
         with_series_(with_series) {}
 
   Run Execute() {
@@ -79,45 +76,47 @@ class Runner {
     } else {
       Kinematics<Space, double> kinematics(mechanism_);
       kinematics.UpdatePosition(start.q);
-      run.branch_start = exact_.BranchAt(kinematics);
+      run.branch_start = ExactObserver<Space>(scene_, mechanism_).BranchAt(kinematics);
       result = Integrate(start);
-      drift_.Write(run.record);
-      energy_.Write(run.record);
-      condition_.Write(run.record);
-      singularity_.Write(run.record);
-      exact_.Write(run.record);
-      if (with_series_) coordinates_.Write(run.record);
-      correction_.Write(run.record);
+      for (const auto& observer : observers_) observer->Write(run.record);
       for (const auto& [key, pose] : final_poses_.items()) run.record.Set(key, pose);
       run.record.Set("state_hash", StateHash(y_));
     }
-    run.record.Set("outcome", std::string(ToString(result.outcome)));
-    run.record.Set("message", result.message);
-    run.record.Set("t_reached", result.t_reached);
-    run.record.Set("steps", result.steps);
-    run.record.Set("rejected", result.rejected);
-    run.record.Set("rhs_evaluations", result.rhs_evaluations);
-    run.record.Set("rhs_equivalents", result.rhs_evaluations + correction_.iterations());
-    run.record.Set("restarts", result.restarts);
-    if (FindProfile(case_.integrator)->is_implicit) {
-      run.record.Set("newton_jacobians", result.jacobians);
-      run.record.Set("newton_rhs_evaluations", result.jacobian_rhs_evaluations);
-      run.record.Set("newton_dual_evaluations", result.dual_evaluations);
-      run.record.Set("newton_iterations", result.newton_iterations);
-      run.record.Set("newton_failures", result.newton_failures);
-    }
-    run.record.Set("wall_s", result.wall_s);
-    run.record.Set("cpu_s", result.cpu_s);
-    run.drift = {drift_.series().t, drift_.series().value};
+    Traces traces;
+    for (const auto& observer : observers_) observer->Trace(traces);
+    WriteResult(result, traces.projection_steps, run.record);
+    run.drift = {traces.drift.t, traces.drift.value};
     if (with_series_) {
-      run.correction = {correction_.series().t, correction_.series().value};
-      run.energy = {energy_.series().t, energy_.series().value};
-      run.kinetic = energy_.kinetic();
+      run.correction = {traces.correction.t, traces.correction.value};
+      run.energy = {traces.energy.t, traces.energy.value};
+      run.kinetic = traces.kinetic;
     }
     return run;
   }
 
  private:
+  /// What the integrator counted.
+  void WriteResult(const IntegratorResult& result, std::int64_t projection_steps,
+                   Record& record) const {
+    record.Set("outcome", std::string(ToString(result.outcome)));
+    record.Set("message", result.message);
+    record.Set("t_reached", result.t_reached);
+    record.Set("steps", result.steps);
+    record.Set("rejected", result.rejected);
+    record.Set("rhs_evaluations", result.rhs_evaluations);
+    record.Set("rhs_equivalents", result.rhs_evaluations + projection_steps);
+    record.Set("restarts", result.restarts);
+    if (FindProfile(case_.integrator)->is_implicit) {
+      record.Set("newton_jacobians", result.jacobians);
+      record.Set("newton_rhs_evaluations", result.jacobian_rhs_evaluations);
+      record.Set("newton_dual_evaluations", result.dual_evaluations);
+      record.Set("newton_iterations", result.newton_iterations);
+      record.Set("newton_failures", result.newton_failures);
+    }
+    record.Set("wall_s", result.wall_s);
+    record.Set("cpu_s", result.cpu_s);
+  }
+
   IntegratorResult Integrate(const Start<double>& start) {
     const auto formulation = MakeFormulation<Space>(case_.column, mechanism_);
     IntegratorResult result;
@@ -138,8 +137,10 @@ class Runner {
       const Outcome outcome = formulation->Derivative(t, y, ydot);
       Sample<Space> sample{t, *formulation};
       if (!work.empty()) sample.supplied = work[0], sample.dissipated = work[1];
-      if (outcome == Outcome::kFinished) Observe(sample);
-      if (outcome == Outcome::kSingular) condition_.Observe(sample);
+      for (const auto& observer : observers_) {
+        if (outcome == Outcome::kFinished) observer->Observe(sample);
+        if (outcome == Outcome::kSingular) observer->ObserveSingular(sample);
+      }
       return restart ? StepAction::kRestart : StepAction::kContinue;
     };
     const IntegratorResult run = harness::Integrate(
@@ -152,16 +153,6 @@ class Runner {
     return run;
   }
 
-  void Observe(const Sample<Space>& sample) {
-    drift_.Observe(sample);
-    energy_.Observe(sample);
-    correction_.Observe(sample);
-    condition_.Observe(sample);
-    singularity_.Observe(sample);
-    exact_.Observe(sample);
-    if (with_series_) coordinates_.Observe(sample);
-  }
-
   const Case& case_;
   const MechanismDescription& user_;
   const Compiled& compiled_;
@@ -169,13 +160,7 @@ class Runner {
   const SceneObservation& scene_;
   const MechanismDescription& description_;
   Mechanism<Space, double> mechanism_;
-  DriftObserver<Space> drift_;
-  SingularityObserver<Space> singularity_;
-  EnergyObserver<Space> energy_;
-  CorrectionObserver<Space> correction_;
-  ConditionObserver<Space> condition_;
-  ExactObserver<Space> exact_;
-  CoordinateObserver<Space> coordinates_;
+  std::vector<std::unique_ptr<Observer<Space>>> observers_;
   bool with_series_;
   Record final_poses_;
   std::vector<double> y_;

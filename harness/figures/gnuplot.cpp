@@ -2,7 +2,6 @@
 
 #include <fmt/format.h>
 #include <spawn.h>
-#include <sys/mman.h>
 #include <sys/wait.h>
 #include <unistd.h>
 
@@ -12,37 +11,10 @@
 
 #include "harness/text/escape.h"
 #include "harness/text/files.h"
+#include "harness/text/memory_file.h"
 
 namespace loopbench::harness {
 namespace {
-
-// A file in memory: it has no name, and nothing of it is left however this process ends.
-class MemoryFile {
- public:
-  explicit MemoryFile(const char* what) {
-    descriptor_ = ::memfd_create(what, MFD_CLOEXEC);
-    if (descriptor_ < 0) FailOn("make in memory", what);
-  }
-  ~MemoryFile() { ::close(descriptor_); }
-  MemoryFile(const MemoryFile&) = delete;
-  MemoryFile& operator=(const MemoryFile&) = delete;
-
-  int descriptor() const { return descriptor_; }
-
-  std::string Text() const {
-    std::string text;
-    std::array<char, 1 << 16> buffer{};
-    for (off_t at = 0;;) {
-      const ssize_t n = ::pread(descriptor_, buffer.data(), buffer.size(), at);
-      if (n <= 0) return text;
-      text.append(buffer.data(), static_cast<std::size_t>(n));
-      at += n;
-    }
-  }
-
- private:
-  int descriptor_;
-};
 
 struct ProgramResult {
   int status = 0;  ///< exit status, -1 after a signal

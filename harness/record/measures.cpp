@@ -217,7 +217,7 @@ constexpr Measure kMeasures[] = {
     {"series.t", kNumbers, {"time", "s", kSeconds}},
     {"series.angle.*", kNumbers, {"angle", "rad", kSeconds}},
     {"series.displacement.*", kNumbers, {"displacement", "m", kSeconds}},
-    {"series.opening_t", kNumbers, {"time", "s", kSeconds}},
+    {"series.opening_*", kNumbers, {"time", "s", kSeconds}},
     {"series.opening.angle.*", kNumbers, {"angle", "rad", kSeconds}},
     {"series.opening.displacement.*", kNumbers, {"displacement", "m", kSeconds}},
     {"series.final.*", kNumbers, {}, {kOfEachPart}},

@@ -148,7 +148,10 @@ std::string Validate(const MechanismDescription& description) {
 
 MechanismDescription Unreleased(const MechanismDescription& description) {
   MechanismDescription result = description;
-  for (JointDescription& joint : result.joints) joint.released.clear();
+  for (JointDescription& joint : result.joints) {
+    joint.released.clear();
+    joint.force_axes.setIdentity();
+  }
   return result;
 }
 

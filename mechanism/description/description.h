@@ -86,6 +86,9 @@ struct JointDescription {
   /// Constrained directions, counted in the order of joint.h's D from 0, that the joint does not
   /// impose because the others do (redundancy.h). Of cut joints only; none of a user's file.
   std::vector<int> released;
+  /// Where directions are released: the axes (columns, in frame F) along which forces are counted,
+  /// in place of x, y and z. Forces only; in the plane the first two.
+  Eigen::Matrix3d force_axes = Eigen::Matrix3d::Identity();
   std::vector<PrescribedMotion> motions;  ///< at most one per coordinate; none with a quaternion
 };
 

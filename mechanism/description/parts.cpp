@@ -78,9 +78,10 @@ MechanismDescription Select(const MechanismDescription& description,
   for (std::size_t j = 0; j < joints.size(); ++j) {
     if (renumbering.joints[j] < 0) continue;
     // And a new member of a joint: what it says must survive a change of the frames' bodies.
-    const auto& [joint_name, type, from, to, axis, pitch, length, cut, released, motions] =
-        joints[j];
-    JointDescription joint{joint_name, type, from, to, axis, pitch, length, cut, released, motions};
+    const auto& [joint_name, type, from, to, axis, pitch, length, cut, released, force_axes,
+                 motions] = joints[j];
+    JointDescription joint{joint_name, type, from,     to,         axis,   pitch,
+                           length,     cut,  released, force_axes, motions};
     joint.from.body = renumbering.bodies[from.body];
     joint.to.body = renumbering.bodies[to.body];
     part.joints.push_back(joint);

@@ -75,6 +75,8 @@ const std::vector<Released>* ReleaseReview<Space, S>::Review(const Kinematics<Sp
       direction = kinematics.DirectionOf(out.joint, drives + direction);
     }
     std::ranges::sort(out.directions);
+    const auto now = std::ranges::find(kinematics.released(), out.joint, &Released::joint);
+    out.force_axes = now->force_axes;
   }
   return &better_;
 }

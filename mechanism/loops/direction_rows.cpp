@@ -56,6 +56,7 @@ DirectionRows RowsOfDirections(const Kinematics<Space, S>& kinematics) {
         T * FreeResponse(kinematics, Masses::kGeometric, index, true) * T.transpose();
     const MatrixX<S> e =
         T * (kinematics.joints()[index].AllD().transpose() * kinematics.ConstraintMismatch(index));
+    result.free.push_back(free.template cast<double>());
     for (int i = 0; i < result.count[c]; ++i) {
       const double scale = std::sqrt(static_cast<double>(free(i, i)));
       const int row = result.first[c] + i;

@@ -13,9 +13,10 @@ namespace loopbench {
 /// joint's own axes, imposed directions before released ones. In double, whatever the scalar.
 struct DirectionRows {
   Eigen::MatrixXd rows;
-  Eigen::VectorXd mismatch;          ///< of positions, scaled likewise: of unit masses, so [m]
-  Eigen::LLT<Eigen::MatrixXd> mass;  ///< L
-  std::vector<int> first, count;     ///< rows of each constraint, in the order of constraints()
+  Eigen::VectorXd mismatch;           ///< of positions, scaled likewise: of unit masses, so [m]
+  Eigen::LLT<Eigen::MatrixXd> mass;   ///< L
+  std::vector<int> first, count;      ///< rows of each constraint, in the order of constraints()
+  std::vector<Eigen::MatrixXd> free;  ///< of each constraint: free responses, unscaled
 };
 /// Positions of `kinematics` must be current; any coordinate set.
 template <class Space, class S>

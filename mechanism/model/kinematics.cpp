@@ -22,15 +22,16 @@ void Refresh(Pose<Spatial, S>&) {}
 
 /// [H D] in ground axes, F having the axes R = R_WF. Each column is a rotation about one axis of F
 /// or a shift along one, all different, so D^T H = 0 holds as it is (9). The plane has one axis to
-/// rotate about, which is normal to it.
+/// rotate about, which is normal to it. Forces are counted along the columns of R_forces, which are
+/// those of R unless some are released.
 template <class Space, class S>
 void SetBasis(const JointKind<Space, S>& kind, const Rotation<Space, S>& R,
-              Block<Space, S>& basis) {
+              const Rotation<Space, S>& R_forces, Block<Space, S>& basis) {
   basis.setZero();
   for (int i = 0; i < Space::kDim; ++i) {
     const int axis = kind.axes[i];
     if (axis >= Space::kRot) {
-      basis.col(i).template tail<Space::kLin>() = R.col(axis - Space::kRot);
+      basis.col(i).template tail<Space::kLin>() = R_forces.col(axis - Space::kRot);
     } else if constexpr (Space::kRot == 1) {
       basis(0, i) = S(1);
     } else {
@@ -140,10 +141,17 @@ void Kinematics<Space, S>::SetDirections(int index, const Rotation<Space, S>& R_
                                          const Pose<Space, S>& X_FM) {
   const Joint<Space, S>& joint = mechanism_->joints()[index];
   JointState<Space, S>& state = joints_[index];
+  const auto released = joint.num_released > 0
+                            ? std::ranges::find(released_, index, &Released::joint)
+                            : released_.end();
   if (joint.kind->basis != nullptr) {
     SetBasisAt<Space, S>(*joint.kind, R_WF, X_FM, state.basis);
+  } else if (released == released_.end()) {
+    SetBasis<Space, S>(*joint.kind, R_WF, R_WF, state.basis);
   } else {
-    SetBasis<Space, S>(*joint.kind, R_WF, state.basis);
+    const Rotation<Space, S> force_axes =
+        released->force_axes.template topLeftCorner<Space::kLin, Space::kLin>().template cast<S>();
+    SetBasis<Space, S>(*joint.kind, R_WF, R_WF * force_axes, state.basis);
   }
   if (joint.num_drives == 0 && joint.num_released == 0) return;
   const Block<Space, S> all = state.basis;
@@ -152,7 +160,7 @@ void Kinematics<Space, S>::SetDirections(int index, const Rotation<Space, S>& R_
     state.basis.col(mechanism_->DriveOf(joint, i) >= 0 ? driven++ : free++) = all.col(i);
   }
   if (joint.num_released == 0) return;
-  const std::vector<int>& out = std::ranges::find(released_, index, &Released::joint)->directions;
+  const std::vector<int>& out = released->directions;
   int kept = joint.kind->num_u, last = Space::kDim - joint.num_released;
   for (int i = 0; i < joint.kind->num_constraints(); ++i) {
     const bool is_out = std::ranges::binary_search(out, i);

@@ -172,7 +172,7 @@ void Mechanism<Space, S>::AddJoints(const MechanismDescription& description,
     Joint<Space, S>& joint = joints_[index];
     if (const std::vector<int>& released = description.joints[index].released; !released.empty()) {
       joint.num_released = static_cast<int>(released.size());
-      released_.push_back({index, released});
+      released_.push_back({index, released, description.joints[index].force_axes});
     }
     joint.row = num_rows_;
     num_rows_ += joint.num_constraints();

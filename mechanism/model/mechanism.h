@@ -58,6 +58,7 @@ struct Drive {
 struct Released {
   int joint = 0;
   std::vector<int> directions;
+  Eigen::Matrix3d force_axes = Eigen::Matrix3d::Identity();  ///< of JointDescription
 
   friend bool operator==(const Released&, const Released&) = default;
 };

@@ -183,7 +183,7 @@ class Compiler {
     for (const Released& out : redundancy.released) {
       for (const int direction : out.directions) {
         result_.report.push_back("joint \"" + description.joints[out.joint].name +
-                                 "\": " + NameOfDirection(description, out.joint, direction) +
+                                 "\": " + NameOfDirection(description, out, direction) +
                                  " is released: the other constraints hold it at every position");
       }
     }

@@ -38,8 +38,10 @@ struct Redundancy {
 /// are left free: what they contradict is no matter of structure.
 Redundancy FindRedundancy(const MechanismDescription& description);
 
-/// A constrained direction of a joint in words: "the moment about x of its frame on rod".
-std::string NameOfDirection(const MechanismDescription& description, int joint, int direction);
+/// A constrained direction of a joint in words: "the moment about x of its frame on rod", forces
+/// along the axes that `released` counts them in.
+std::string NameOfDirection(const MechanismDescription& description, const Released& released,
+                            int direction);
 
 /// The description with those directions released, and the same joints cut.
 MechanismDescription Release(const MechanismDescription& description, const Redundancy& redundancy);

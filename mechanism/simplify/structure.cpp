@@ -34,7 +34,7 @@ std::vector<RedundantDirection> FindDependent(const MechanismDescription& descri
       const bool drive = i < joint.num_drives;
       dependent.push_back({joint.description,
                            drive ? "what its given motion prescribes"
-                                 : NameOfDirection(description, joint.description,
+                                 : NameOfDirection(description, {joint.description, {}},
                                                    kinematics.DirectionOf(index, i)),
                            false});
     }
@@ -64,7 +64,7 @@ class Analysis {
     for (const Released& out : redundancy.released) {
       for (const int direction : out.directions) {
         result_.redundant.push_back(
-            {out.joint, NameOfDirection(description_, out.joint, direction), true});
+            {out.joint, NameOfDirection(description_, out, direction), true});
       }
     }
     const bool driven = !mechanism_.drives().empty();

@@ -141,6 +141,7 @@ TEST(RedundancyTest, EachPartHasTheChoiceItWouldHaveAlone) {
   ASSERT_EQ(both.released.size(), 2u);
   for (const Released& out : both.released) {
     EXPECT_EQ(out.directions, alone.released[0].directions);
+    EXPECT_EQ(out.force_axes, alone.released[0].force_axes);
   }
   EXPECT_EQ(both.released[1].joint, alone.released[0].joint + 4);
   // beside a chain that cannot move, whose own constraints are lost at this position only

@@ -20,21 +20,20 @@ std::vector<int> RowsOfConstraints(const Mechanism<Space, S>& mechanism) {
 }  // namespace
 
 template <class Space, class S>
-Lagrange<Space, S>::Lagrange(const Mechanism<Space, S>& mechanism, FormulationOptions options)
-    : Base(mechanism, options),
+Lagrange<Space, S>::Lagrange(const Mechanism<Space, S>& mechanism,
+                             const FormulationOptions& options)
+    : mechanism_(mechanism),
+      kind_(options.solver),
       dynamics_(mechanism),
       M_(MatrixX<S>::Zero(mechanism.num_u(), mechanism.num_u())),
       J_(MatrixX<S>::Zero(mechanism.num_rows(), mechanism.num_u())),
-      h_(VectorX<S>::Zero(mechanism.num_u())),
-      gamma_(VectorX<S>::Zero(mechanism.num_rows())),
-      lambda_(gamma_),
-      force_(h_),
-      target_(gamma_),
-      bias_(gamma_),
-      change_(h_),
+      lambda_(VectorX<S>::Zero(mechanism.num_rows())),
+      zero_(VectorX<S>::Zero(mechanism.num_u())),
+      missed_(lambda_),
+      change_(zero_),
       loop_(RowsOfConstraints(mechanism)) {
   const int n = mechanism.num_u(), m = mechanism.num_rows();
-  if (options.solver == SolverKind::kAsPublished) {
+  if (kind_ == SolverKind::kAsPublished) {
     augmented_.setZero(n + m, n + m);
     rhs_.setZero(n + m);
     solution_.setZero(n + m);
@@ -47,19 +46,16 @@ Lagrange<Space, S>::Lagrange(const Mechanism<Space, S>& mechanism, FormulationOp
 }
 
 template <class Space, class S>
-Outcome Lagrange<Space, S>::FactorOnce() {
-  if (factored_version_ == kinematics_.position_version()) return Outcome::kFinished;
-  dynamics_.Jacobian(kinematics_, J_);
-  const bool plain = Base::options_.solver == SolverKind::kAsPublished;
-  const Outcome outcome = plain ? FactorAugmented() : FactorResponse();
-  factored_version_ = outcome == Outcome::kFinished ? kinematics_.position_version() : -1;
-  return outcome;
+Outcome Lagrange<Space, S>::Factor(const Kinematics<Space, S>& kinematics) {
+  dynamics_.Jacobian(kinematics, J_);
+  return kind_ == SolverKind::kAsPublished ? FactorAugmented(kinematics)
+                                           : FactorResponse(kinematics);
 }
 
 template <class Space, class S>
-Outcome Lagrange<Space, S>::FactorAugmented() {
+Outcome Lagrange<Space, S>::FactorAugmented(const Kinematics<Space, S>& kinematics) {
   const int n = mechanism_.num_u(), m = mechanism_.num_rows();
-  dynamics_.MassMatrix(kinematics_, Masses::kPhysical, M_);
+  dynamics_.MassMatrix(kinematics, Masses::kPhysical, M_);
   augmented_.topLeftCorner(n, n) = M_;
   augmented_.topRightCorner(n, m) = J_.transpose();
   augmented_.bottomLeftCorner(m, n) = J_;
@@ -67,16 +63,16 @@ Outcome Lagrange<Space, S>::FactorAugmented() {
   lu_.compute(augmented_);
   const auto pivots = lu_.matrixLU().diagonal().cwiseAbs();
   const S rcond = pivots.minCoeff() / pivots.maxCoeff();
-  diagnostics_.rank = Base::LoopRank(0);
-  diagnostics_.rcond = static_cast<double>(rcond);
+  this->conditioning_.rank = LoopRank(mechanism_, 0);
+  this->conditioning_.rcond = static_cast<double>(rcond);
   // a pivot below a few eps of the largest is round-off of the elimination
   return rcond > S(16) * std::numeric_limits<S>::epsilon() ? Outcome::kFinished
                                                            : Outcome::kSingular;
 }
 
 template <class Space, class S>
-void Lagrange<Space, S>::FormResponse(Masses masses) {
-  dynamics_.MassMatrix(kinematics_, masses, M_);
+void Lagrange<Space, S>::FormResponse(const Kinematics<Space, S>& kinematics, Masses masses) {
+  dynamics_.MassMatrix(kinematics, masses, M_);
   mass_factor_.compute(M_);
   if (loop_.size() == 0) return;  // a tree: nothing is constrained
   W_ = J_.transpose();
@@ -85,89 +81,70 @@ void Lagrange<Space, S>::FormResponse(Masses masses) {
 }
 
 template <class Space, class S>
-void Lagrange<Space, S>::SetScales(Masses masses) {
+void Lagrange<Space, S>::SetScales(const Kinematics<Space, S>& kinematics, Masses masses) {
   for (int j = 0; j < static_cast<int>(mechanism_.constraints().size()); ++j) {
-    loop_.SetScale(j, FreeResponse(kinematics_, masses, mechanism_.constraints()[j]));
+    loop_.SetScale(j, FreeResponse(kinematics, masses, mechanism_.constraints()[j]));
   }
 }
 
 template <class Space, class S>
-Outcome Lagrange<Space, S>::FactorResponse() {
-  diagnostics_.rank = Base::LoopRank(0);
-  diagnostics_.smallest_weight = 1.0;
-  FormResponse(Masses::kPhysical);
+Outcome Lagrange<Space, S>::FactorResponse(const Kinematics<Space, S>& kinematics) {
+  Conditioning& found = this->conditioning_;
+  found.rank = LoopRank(mechanism_, 0);
+  found.smallest_weight = 1.0;
+  FormResponse(kinematics, Masses::kPhysical);
   if (mass_factor_.info() != Eigen::Success) return Outcome::kNonFinite;
   if (loop_.size() == 0) return Outcome::kFinished;
-  SetScales(Masses::kPhysical);
+  SetScales(kinematics, Masses::kPhysical);
   if (!loop_.FactorScaled(response_)) {
-    SetScales(Masses::kGeometric);
-    FormResponse(Masses::kGeometric);
+    SetScales(kinematics, Masses::kGeometric);
+    FormResponse(kinematics, Masses::kGeometric);
     if (!response_.allFinite()) return Outcome::kNonFinite;
     loop_.FactorGeometric(response_);
-    diagnostics_.rank = Base::LoopRank(loop_.size() - loop_.rank());
-    diagnostics_.smallest_weight = static_cast<double>(loop_.smallest_weight());
-    FormResponse(Masses::kPhysical);
+    found.rank = LoopRank(mechanism_, loop_.size() - loop_.rank());
+    found.smallest_weight = static_cast<double>(loop_.smallest_weight());
+    FormResponse(kinematics, Masses::kPhysical);
     if (!loop_.FactorSoftened(response_)) return Outcome::kSingular;
   }
-  diagnostics_.rcond = static_cast<double>(loop_.rcond());
+  found.rcond = static_cast<double>(loop_.rcond());
   return Outcome::kFinished;
 }
 
 template <class Space, class S>
-void Lagrange<Space, S>::SolveConstrained(const VectorX<S>& force, const VectorX<S>& target,
-                                          VectorX<S>& x, VectorX<S>& lambda) {
+void Lagrange<Space, S>::Solve(const VectorX<S>& given, const VectorX<S>& target, VectorX<S>& x,
+                               VectorX<S>* lambda) {
+  const VectorX<S>& force = given.size() > 0 ? given : zero_;
   const int n = mechanism_.num_u(), m = mechanism_.num_rows();
-  if (Base::options_.solver == SolverKind::kAsPublished) {
+  if (kind_ == SolverKind::kAsPublished) {
     rhs_.head(n) = force;
     rhs_.tail(m) = target;
     solution_ = lu_.solve(rhs_);
     x = solution_.head(n);
-    lambda = -solution_.tail(m);
+    if (lambda != nullptr) *lambda = -solution_.tail(m);
     return;
   }
   // x = M^-1 (force + J^T lambda) with S lambda = target - J M^-1 force
   x = force;
   mass_factor_.matrixL().solveInPlace(x);
   if (m > 0) {
-    lambda = target;
-    lambda.noalias() -= W_.transpose() * x;
-    loop_.Apply(lambda);
-    loop_.ApplyTransposed(lambda);
-    x.noalias() += W_ * lambda;
+    lambda_ = target;
+    lambda_.noalias() -= W_.transpose() * x;
+    loop_.Apply(lambda_);
+    loop_.ApplyTransposed(lambda_);
+    x.noalias() += W_ * lambda_;
+    if (lambda != nullptr) *lambda = lambda_;
   }
   mass_factor_.matrixU().solveInPlace(x);
 }
 
 template <class Space, class S>
-Outcome Lagrange<Space, S>::CompleteSpeeds() {
-  if (const Outcome outcome = FactorOnce(); outcome != Outcome::kFinished) return outcome;
-  force_.setZero();
-  SpeedBias(kinematics_, force_, bias_);
-  target_ = -bias_;
-  target_.noalias() -= J_ * u_;
-  SolveConstrained(force_, target_, change_, lambda_);
-  u_ += change_;
-  return u_.allFinite() ? Outcome::kFinished : Outcome::kNonFinite;
-}
-
-template <class Space, class S>
-Outcome Lagrange<Space, S>::Correct(const VectorX<S>& violation, VectorX<S>& change) {
-  if (const Outcome outcome = FactorOnce(); outcome != Outcome::kFinished) return outcome;
-  force_.setZero();
-  target_ = -violation;
-  SolveConstrained(force_, target_, change, lambda_);
-  return change.allFinite() ? Outcome::kFinished : Outcome::kNonFinite;
-}
-
-template <class Space, class S>
-Outcome Lagrange<Space, S>::Accelerations() {
-  if (const Outcome outcome = FactorOnce(); outcome != Outcome::kFinished) return outcome;
-  dynamics_.Bias(kinematics_, h_);
-  dynamics_.JacobianBias(kinematics_, gamma_);
-  if (Base::feedback().size() > 0) gamma_ -= Base::feedback();
-  force_ = -h_;
-  SolveConstrained(force_, gamma_, udot_, lambda_);
-  return udot_.allFinite() ? Outcome::kFinished : Outcome::kNonFinite;
+bool Lagrange<Space, S>::CompleteSpeeds(Kinematics<Space, S>& kinematics, VectorX<S>& u) {
+  SpeedBias(kinematics, zero_, missed_);
+  missed_ = -missed_;
+  missed_.noalias() -= J_ * u;
+  Solve(zero_, missed_, change_, nullptr);
+  u += change_;
+  return true;
 }
 
 #define LOOPBENCH_INSTANTIATE(Space, S) template class Lagrange<Space, S>;

@@ -12,46 +12,38 @@
 #include <Eigen/Cholesky>
 #include <Eigen/LU>
 
-#include "mechanism/formulation/formulation.h"
+#include "mechanism/formulation/constraint_solver.h"
+#include "mechanism/formulation/options.h"
 #include "mechanism/loops/loop_solver.h"
 #include "mechanism/loops/tree_dynamics.h"
 
 namespace loopbench::lagrange {
 
 template <class Space, class S>
-class Lagrange final : public Formulation<Space, S> {
+class Lagrange final : public ConstraintSolver<Space, S> {
  public:
-  Lagrange(const Mechanism<Space, S>& mechanism, FormulationOptions options);
+  /// `mechanism` must outlive the solver.
+  Lagrange(const Mechanism<Space, S>& mechanism, const FormulationOptions& options);
 
-  /// lambda of the last evaluation: rows of the constraints as in TreeDynamics::Jacobian().
-  const VectorX<S>& multipliers() const { return lambda_; }
+  /// M, J and the factors of (1) or S.
+  Outcome Factor(const Kinematics<Space, S>& kinematics) override;
+  void Solve(const VectorX<S>& force, const VectorX<S>& target, VectorX<S>& x,
+             VectorX<S>* lambda) override;
+  /// What u misses, J u + b, by the J that is at hand.
+  bool CompleteSpeeds(Kinematics<Space, S>& kinematics, VectorX<S>& u) override;
 
  private:
-  Outcome CompleteSpeeds() override;
-  Outcome Correct(const VectorX<S>& violation, VectorX<S>& change) override;
-  Outcome Accelerations() override;
-  void Multipliers(VectorX<S>& lambda) override { lambda = lambda_; }
-  /// M, J and the factors of (1) or S at the current positions, once per position.
-  Outcome FactorOnce();
-  Outcome FactorAugmented();
-  Outcome FactorResponse();
+  Outcome FactorAugmented(const Kinematics<Space, S>& kinematics);
+  Outcome FactorResponse(const Kinematics<Space, S>& kinematics);
   /// W = L^-1 J^T and S = W^T W with these masses; leaves the factor of M in mass_factor_.
-  void FormResponse(Masses masses);
-  void SetScales(Masses masses);
-  void SolveConstrained(const VectorX<S>& force, const VectorX<S>& target, VectorX<S>& x,
-                        VectorX<S>& lambda) override;
+  void FormResponse(const Kinematics<Space, S>& kinematics, Masses masses);
+  void SetScales(const Kinematics<Space, S>& kinematics, Masses masses);
 
-  using Base = Formulation<Space, S>;
-  using Base::diagnostics_;
-  using Base::kinematics_;
-  using Base::mechanism_;
-  using Base::u_;
-  using Base::udot_;
-
+  const Mechanism<Space, S>& mechanism_;
+  SolverKind kind_;
   TreeDynamics<Space, S> dynamics_;
-  long factored_version_ = -1;
   MatrixX<S> M_, J_, W_, response_;
-  VectorX<S> h_, gamma_, lambda_, force_, target_, bias_, change_;
+  VectorX<S> lambda_, zero_, missed_, change_;
   MatrixX<S> augmented_;
   VectorX<S> rhs_, solution_;
   Eigen::PartialPivLU<MatrixX<S>> lu_;

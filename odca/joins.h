@@ -36,8 +36,10 @@
 #include <memory>
 #include <vector>
 
-#include "mechanism/formulation/formulation.h"
+#include "mechanism/description/outcome.h"
+#include "mechanism/formulation/options.h"
 #include "mechanism/loops/loop_solver.h"
+#include "mechanism/model/kinematics.h"
 #include "odca/plan.h"
 
 namespace loopbench::odca {

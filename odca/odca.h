@@ -1,7 +1,8 @@
-// O-DCA as a formulation: leaves from the current poses and motions, a sweep, joint accelerations.
+// O-DCA as a constraint solver: leaves from poses and forces, a sweep, speeds of joints.
 // The mathematics and the paper's equation numbers are in README.md beside this file.
 #pragma once
 
+#include "mechanism/formulation/constraint_solver.h"
 #include "odca/sweep.h"
 
 namespace loopbench::odca {
@@ -11,15 +12,26 @@ template <class Space, class S>
 Plan MakePlan(const Mechanism<Space, S>& mechanism, const PlanOptions& options = {});
 
 template <class Space, class S>
-class Odca final : public Formulation<Space, S> {
+class Odca final : public ConstraintSolver<Space, S> {
  public:
-  /// As published, joints to Ground close at the root (the paper's section 3.1); else as early as
-  /// possible. `plan` overrides that choice.
-  Odca(const Mechanism<Space, S>& mechanism, FormulationOptions options);
-  Odca(const Mechanism<Space, S>& mechanism, FormulationOptions options, const PlanOptions& plan);
+  /// `mechanism` must outlive the solver. As published, joints to Ground close at the root (the
+  /// paper's section 3.1); else as early as possible. `plan` overrides that choice.
+  Odca(const Mechanism<Space, S>& mechanism, const FormulationOptions& options);
+  Odca(const Mechanism<Space, S>& mechanism, const FormulationOptions& options,
+       const PlanOptions& plan);
 
   const Plan& plan() const { return plan_; }
   const Sweep<Space, S>& sweep() const { return sweep_; }
+
+  Outcome Factor(const Kinematics<Space, S>& kinematics) override;
+  /// A force along a tree joint is a pair of wrenches on its bodies.
+  void Solve(const VectorX<S>& force, const VectorX<S>& target, VectorX<S>& x,
+             VectorX<S>* lambda) override;
+  /// From wrenches on bodies, as the paper does: neither h nor gamma is formed.
+  bool Accelerate(const Kinematics<Space, S>& kinematics, const VectorX<S>& feedback,
+                  VectorX<S>& udot, VectorX<S>* lambda) override;
+  /// Size of the plan, and multiply-adds since Factor() began.
+  std::vector<NamedCount> Counters() const override;
 
   /// Constraint force of a user joint after an evaluation: [moment; force] on Q at the joint's
   /// point, ground axes. Unique only where the joint's loops carry no self-stress. Zero where the
@@ -27,31 +39,20 @@ class Odca final : public Formulation<Space, S> {
   Motion<Space, S> JointForce(int joint) const;
 
  private:
-  Outcome CompleteSpeeds() override;
-  Outcome Correct(const VectorX<S>& violation, VectorX<S>& change) override;
-  Outcome Accelerations() override;
-  void Multipliers(VectorX<S>& lambda) override;
-  void SolveConstrained(const VectorX<S>& force, const VectorX<S>& target, VectorX<S>& x,
-                        VectorX<S>& lambda) override;
-  Outcome AssembleOnce();
-  /// b_ of a body: its acceleration under its wrench alone, with [moment; force] at its centre of
-  /// mass.
-  void SetFree(int body, const Motion<Space, S>& wrench);
-  /// H^T (A_Q - A_P) of a tree joint at its point, centripetal terms not included.
-  void TreeMotions(std::span<const Motion<Space, S>> A, VectorX<S>& result) const;
+  /// b_ of all bodies for wrenches_: their accelerations under these alone, at centres of mass.
+  void SetFree();
+  /// c0_ of joints in all their directions, and what change_ misses of the free ones.
+  void SetKnown(const Kinematics<Space, S>& kinematics);
+  /// From b_ and c0_: H^T (A_Q - A_P) of the tree joints at their points, centripetal terms not
+  /// included, in x, and multipliers.
+  void SweepTo(VectorX<S>& x, VectorX<S>* lambda);
 
-  using Base = Formulation<Space, S>;
-  using Base::diagnostics_;
-  using Base::kinematics_;
-  using Base::mechanism_;
-  using Base::u_;
-  using Base::udot_;
-
+  const Mechanism<Space, S>& mechanism_;
   Plan plan_;
   Sweep<Space, S> sweep_;
-  long assembled_version_ = -1;
+  const Kinematics<Space, S>* kinematics_ = nullptr;  ///< of the last Factor()
   std::vector<Motion<Space, S>> wrenches_, b_, A_, c0_;
-  VectorX<S> change_;
+  VectorX<S> known_;
 };
 
 }  // namespace loopbench::odca

@@ -21,31 +21,30 @@ std::vector<int> Complement(const std::vector<int>& chosen, int n) {
 }  // namespace
 
 template <class Space, class S>
-Reduction<Space, S>::Reduction(const Mechanism<Space, S>& mechanism, FormulationOptions options)
-    : Base(mechanism, options),
+Reduction<Space, S>::Reduction(const Mechanism<Space, S>& mechanism,
+                               const FormulationOptions& options)
+    : mechanism_(mechanism),
+      kind_(options.solver),
+      at_velocity_(options.enforcement == Enforcement::kVelocity),
       dynamics_(mechanism),
       M_(MatrixX<S>::Zero(mechanism.num_u(), mechanism.num_u())),
       J_(MatrixX<S>::Zero(mechanism.num_rows(), mechanism.num_u())),
-      h_(VectorX<S>::Zero(mechanism.num_u())),
-      gamma_(VectorX<S>::Zero(mechanism.num_rows())),
-      force_(h_),
-      c_(h_),
-      residual_(h_),
-      bias_(gamma_) {
-  const bool chooses = options.solver == SolverKind::kRankRevealing;
-  if (chooses && options.enforcement != Enforcement::kVelocity && mechanism.num_rows() > 0) {
+      zero_(VectorX<S>::Zero(mechanism.num_u())),
+      c_(zero_),
+      residual_(zero_),
+      bias_(VectorX<S>::Zero(mechanism.num_rows())) {
+  if (kind_ == SolverKind::kRankRevealing && !at_velocity_ && mechanism.num_rows() > 0) {
     null_space_ = std::make_unique<NullSpace<Space, S>>(mechanism);
   }
 }
 
 template <class Space, class S>
-Outcome Reduction<Space, S>::Start(S t, const VectorX<S>& q, const VectorX<S>& u) {
-  Base::Start(t, q, u);
-  dynamics_.Jacobian(kinematics_, J_);
+void Reduction<Space, S>::Start(const Kinematics<Space, S>& kinematics) {
+  dynamics_.Jacobian(kinematics, J_);
   const int n = mechanism_.num_u(), m = mechanism_.num_rows();
-  const bool fixed = Base::options_.solver == SolverKind::kAsPublished;
+  const bool fixed = kind_ == SolverKind::kAsPublished;
   // as published knows no redundancy: as many dependent speeds as constraints
-  const int rank = fixed ? std::min(m, n) : GeometricRank(kinematics_, dynamics_, J_);
+  const int rank = fixed ? std::min(m, n) : GeometricRank(kinematics, dynamics_, J_);
   Partition<S> partition = BestPartition(J_, rank);
   if (fixed) {
     const std::vector<int>& wanted = mechanism_.independent();
@@ -54,18 +53,6 @@ Outcome Reduction<Space, S>::Start(S t, const VectorX<S>& q, const VectorX<S>& u
     std::iota(partition.rows.begin(), partition.rows.end(), 0);
   }
   SetPartition(partition);
-  return Outcome::kFinished;
-}
-
-template <class Space, class S>
-int Reduction<Space, S>::num_state_speeds() const {
-  const bool velocity = Base::options_.enforcement == Enforcement::kVelocity;
-  return velocity ? static_cast<int>(independent_.size()) : mechanism_.num_u();
-}
-
-template <class Space, class S>
-int Reduction<Space, S>::state_speed(int i) const {
-  return Base::options_.enforcement == Enforcement::kVelocity ? independent_[i] : i;
 }
 
 template <class Space, class S>
@@ -86,7 +73,6 @@ void Reduction<Space, S>::SetPartition(const Partition<S>& partition) {
   independent_speeds_.setZero(f);
   lu_ = Eigen::PartialPivLU<MatrixX<S>>(r);
   if (f > 0) reduced_factor_.compute(MatrixX<S>::Identity(f, f));
-  factored_version_ = -1;
 }
 
 template <class Space, class S>
@@ -103,32 +89,33 @@ S Reduction<Space, S>::FactorPartition() {
 }
 
 template <class Space, class S>
-void Reduction<Space, S>::FactorNullSpace() {
-  null_space_->Factor(kinematics_, dynamics_, J_);
+void Reduction<Space, S>::FactorNullSpace(const Kinematics<Space, S>& kinematics) {
+  null_space_->Factor(kinematics, dynamics_, J_);
   uses_null_space_ = true;
-  diagnostics_.rank = Base::LoopRank(mechanism_.num_rows() - null_space_->rank());
-  diagnostics_.rcond = static_cast<double>(null_space_->rcond());
-  diagnostics_.smallest_weight = static_cast<double>(null_space_->smallest_weight());
-  factored_version_ = kinematics_.position_version();
+  Conditioning& found = this->conditioning_;
+  found.rank = LoopRank(mechanism_, mechanism_.num_rows() - null_space_->rank());
+  found.rcond = static_cast<double>(null_space_->rcond());
+  found.smallest_weight = static_cast<double>(null_space_->smallest_weight());
 }
 
 template <class Space, class S>
-Outcome Reduction<Space, S>::FactorOnce() {
-  if (factored_version_ == kinematics_.position_version()) return Outcome::kFinished;
+Outcome Reduction<Space, S>::Factor(const Kinematics<Space, S>& kinematics) {
   const int r = static_cast<int>(dependent_.size());
-  diagnostics_.rank = Base::LoopRank(mechanism_.num_rows() - r);
-  diagnostics_.rcond = 0.0;
-  diagnostics_.smallest_weight = 1.0;
-  uses_null_space_ = false;
+  Conditioning& found = this->conditioning_;
+  found.rank = LoopRank(mechanism_, mechanism_.num_rows() - r);
+  found.rcond = 0.0;
+  found.smallest_weight = 1.0;
+  kinematics_ = &kinematics;
+  uses_null_space_ = mass_is_current_ = false;
   // more rows than dependent speeds: redundant constraints, as published; or a rank that has grown
   const bool fits = static_cast<int>(rows_.size()) == r && !outgrown_;
   if (!fits && !null_space_) return Outcome::kSingular;
-  dynamics_.Jacobian(kinematics_, J_);
+  dynamics_.Jacobian(kinematics, J_);
   const bool complete = r == mechanism_.num_rows();
   const S rcond = null_space_ && !complete ? S(0) : FactorPartition();
-  diagnostics_.rcond = static_cast<double>(rcond);
+  found.rcond = static_cast<double>(rcond);
   if (null_space_ && !(rcond >= S(kSuspicious))) {
-    FactorNullSpace();
+    FactorNullSpace(kinematics);
     return Outcome::kFinished;
   }
   // a pivot below a few eps of the largest is round-off of the elimination
@@ -136,84 +123,69 @@ Outcome Reduction<Space, S>::FactorOnce() {
   if (J_I_.size() > 0) solved_ = lu_.solve(J_I_);
   for (int i = 0; i < J_I_.cols(); ++i) B_(independent_[i], i) = S(1);
   for (int k = 0; k < r; ++k) B_.row(dependent_[k]) = -solved_.row(k);
-  factored_version_ = kinematics_.position_version();
   return Outcome::kFinished;
 }
 
 template <class Space, class S>
-Outcome Reduction<Space, S>::CompleteSpeeds() {
-  if (const Outcome outcome = FactorOnce(); outcome != Outcome::kFinished) return outcome;
+void Reduction<Space, S>::FactorMass() {
+  if (mass_is_current_) return;
+  mass_is_current_ = true;
+  dynamics_.MassMatrix(*kinematics_, Masses::kPhysical, M_);
+  if (uses_null_space_ || independent_.empty()) return;
+  MB_.noalias() = M_ * B_;
+  reduced_.noalias() = B_.transpose() * MB_;
+  reduced_factor_.compute(reduced_);
+}
+
+template <class Space, class S>
+bool Reduction<Space, S>::CompleteSpeeds(Kinematics<Space, S>& kinematics, VectorX<S>& u) {
   for (std::size_t i = 0; i < independent_.size(); ++i) {
-    independent_speeds_[i] = u_[independent_[i]];
+    independent_speeds_[i] = u[independent_[i]];
   }
-  u_.noalias() = B_ * independent_speeds_;
-  if (mechanism_.drives().empty() || dependent_.empty()) return Outcome::kFinished;
-  c_.setZero();
-  SpeedBias(kinematics_, c_, bias_);
+  u.noalias() = B_ * independent_speeds_;
+  if (mechanism_.drives().empty() || dependent_.empty()) return true;
+  SpeedBias(kinematics, zero_, bias_);
   for (std::size_t k = 0; k < rows_.size(); ++k) rows_rhs_[k] = bias_[rows_[k]];
   dependent_speeds_ = lu_.solve(rows_rhs_);
-  for (std::size_t k = 0; k < dependent_.size(); ++k) u_[dependent_[k]] -= dependent_speeds_[k];
-  return Outcome::kFinished;
+  for (std::size_t k = 0; k < dependent_.size(); ++k) u[dependent_[k]] -= dependent_speeds_[k];
+  return true;
 }
 
-/// Independent coordinates and speeds stay; the dependent ones follow. Without a partition: the
-/// smallest change in the metric M, which does no work along the free directions.
 template <class Space, class S>
-Outcome Reduction<Space, S>::Correct(const VectorX<S>& violation, VectorX<S>& change) {
-  if (const Outcome outcome = FactorOnce(); outcome != Outcome::kFinished) return outcome;
+void Reduction<Space, S>::Correct(const VectorX<S>& target, VectorX<S>& x) {
   if (uses_null_space_) {
-    dynamics_.MassMatrix(kinematics_, Masses::kPhysical, M_);
-    residual_.setZero();
-    gamma_ = -violation;
-    const bool solved = null_space_->Accelerate(M_, residual_, gamma_, change);
-    return solved && change.allFinite() ? Outcome::kFinished : Outcome::kNonFinite;
+    Solve(zero_, target, x, nullptr);
+    return;
   }
-  change.setZero();
-  if (dependent_.empty()) return Outcome::kFinished;
-  for (std::size_t k = 0; k < rows_.size(); ++k) rows_rhs_[k] = -violation[rows_[k]];
+  x.setZero();
+  if (dependent_.empty()) return;
+  for (std::size_t k = 0; k < rows_.size(); ++k) rows_rhs_[k] = target[rows_[k]];
   dependent_speeds_ = lu_.solve(rows_rhs_);
-  for (std::size_t k = 0; k < dependent_.size(); ++k) change[dependent_[k]] = dependent_speeds_[k];
-  return change.allFinite() ? Outcome::kFinished : Outcome::kNonFinite;
+  for (std::size_t k = 0; k < dependent_.size(); ++k) x[dependent_[k]] = dependent_speeds_[k];
 }
 
 template <class Space, class S>
-Outcome Reduction<Space, S>::Accelerations() {
-  if (const Outcome outcome = FactorOnce(); outcome != Outcome::kFinished) return outcome;
-  dynamics_.MassMatrix(kinematics_, Masses::kPhysical, M_);
-  dynamics_.Bias(kinematics_, h_);
-  dynamics_.JacobianBias(kinematics_, gamma_);
-  if (Base::feedback().size() > 0) gamma_ -= Base::feedback();
-  if (!uses_null_space_ && !independent_.empty()) {
-    MB_.noalias() = M_ * B_;
-    reduced_.noalias() = B_.transpose() * MB_;
-    reduced_factor_.compute(reduced_);
-  }
-  force_ = -h_;
-  const bool solved = SolveMotion(force_, gamma_, udot_);
-  return solved && udot_.allFinite() ? Outcome::kFinished : Outcome::kNonFinite;
-}
-
-template <class Space, class S>
-bool Reduction<Space, S>::SolveMotion(const VectorX<S>& force, const VectorX<S>& target,
-                                      VectorX<S>& x) {
+void Reduction<Space, S>::Solve(const VectorX<S>& given, const VectorX<S>& target, VectorX<S>& x,
+                                VectorX<S>* lambda) {
+  FactorMass();
+  const VectorX<S>& force = given.size() > 0 ? given : zero_;
   if (uses_null_space_) {
     residual_ = -force;
-    return null_space_->Accelerate(M_, residual_, target, x);
+    if (!null_space_->Accelerate(M_, residual_, target, x)) {
+      x.setConstant(std::numeric_limits<S>::quiet_NaN());
+    }
+  } else {
+    Correct(target, c_);
+    x = c_;
+    if (!independent_.empty()) {
+      residual_ = force;
+      residual_.noalias() -= M_ * c_;
+      independent_speeds_.noalias() = B_.transpose() * residual_;
+      reduced_factor_.solveInPlace(independent_speeds_);
+      x.noalias() += B_ * independent_speeds_;
+    }
   }
-  c_.setZero();
-  if (!dependent_.empty()) {
-    for (std::size_t k = 0; k < rows_.size(); ++k) rows_rhs_[k] = target[rows_[k]];
-    dependent_speeds_ = lu_.solve(rows_rhs_);
-    for (std::size_t k = 0; k < dependent_.size(); ++k) c_[dependent_[k]] = dependent_speeds_[k];
-  }
-  x = c_;
-  if (independent_.empty()) return true;
-  residual_ = force;
-  residual_.noalias() -= M_ * c_;
-  independent_speeds_.noalias() = B_.transpose() * residual_;
-  reduced_factor_.solveInPlace(independent_speeds_);
-  x.noalias() += B_ * independent_speeds_;
-  return true;
+  if (lambda != nullptr) SolveForces(force, x, *lambda);
 }
 
 /// From the dependent equations of motion: J_D^T lambda = (M x - force)_D, zero where rows are not
@@ -238,22 +210,10 @@ void Reduction<Space, S>::SolveForces(const VectorX<S>& force, const VectorX<S>&
 }
 
 template <class Space, class S>
-void Reduction<Space, S>::Multipliers(VectorX<S>& lambda) {
-  SolveForces(force_, udot_, lambda);
-}
-
-template <class Space, class S>
-void Reduction<Space, S>::SolveConstrained(const VectorX<S>& force, const VectorX<S>& target,
-                                           VectorX<S>& x, VectorX<S>& lambda) {
-  SolveMotion(force, target, x);
-  SolveForces(force, x, lambda);
-}
-
-template <class Space, class S>
-bool Reduction<Space, S>::ChangeMode() {
-  if (Base::options_.solver == SolverKind::kAsPublished || J_.rows() == 0) return false;
-  dynamics_.Jacobian(kinematics_, J_);
-  const int rank = GeometricRank(kinematics_, dynamics_, J_);
+bool Reduction<Space, S>::Review(const Kinematics<Space, S>& kinematics) {
+  if (kind_ == SolverKind::kAsPublished || J_.rows() == 0) return false;
+  dynamics_.Jacobian(kinematics, J_);
+  const int rank = GeometricRank(kinematics, dynamics_, J_);
   if (null_space_ && rank != static_cast<int>(dependent_.size())) {
     SetPartition(BestPartition(J_, rank));
     return true;

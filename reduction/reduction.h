@@ -18,14 +18,15 @@
 //
 // At the other levels the state does not depend on the partition, so that it may change its size.
 // Where it is suspicious, or leaves rows out, a basis of the free directions takes its place
-// (null_space.h). Start() and BeginStep() may allocate.
+// (null_space.h). Start() and Review() may allocate.
 #pragma once
 
 #include <Eigen/Cholesky>
 #include <Eigen/LU>
 #include <memory>
 
-#include "mechanism/formulation/formulation.h"
+#include "mechanism/formulation/constraint_solver.h"
+#include "mechanism/formulation/options.h"
 #include "mechanism/loops/tree_dynamics.h"
 #include "reduction/null_space.h"
 #include "reduction/partition.h"
@@ -33,59 +34,59 @@
 namespace loopbench::reduction {
 
 template <class Space, class S>
-class Reduction final : public Formulation<Space, S> {
+class Reduction final : public ConstraintSolver<Space, S> {
  public:
   /// An automatic set is replaced when its reciprocal condition is below this part of the best.
   static constexpr double kReplaceBelow = 0.1;
   /// Below this ratio of its pivots a partition gives way to the null space.
   static constexpr double kSuspicious = 0.1;
 
-  Reduction(const Mechanism<Space, S>& mechanism, FormulationOptions options);
-
-  Outcome Start(S t, const VectorX<S>& q, const VectorX<S>& u) override;
+  /// `mechanism` must outlive the solver.
+  Reduction(const Mechanism<Space, S>& mechanism, const FormulationOptions& options);
 
   /// Indices into u, ascending.
   const std::vector<int>& independent() const { return independent_; }
 
- private:
-  int num_state_speeds() const override;
-  int state_speed(int i) const override;
-  Outcome CompleteSpeeds() override;
-  Outcome Correct(const VectorX<S>& violation, VectorX<S>& change) override;
-  Outcome Accelerations() override;
-  void Multipliers(VectorX<S>& lambda) override;
-  void SolveConstrained(const VectorX<S>& force, const VectorX<S>& target, VectorX<S>& x,
-                        VectorX<S>& lambda) override;
-  bool ChangeMode() override;
+  /// LU of J_D and the basis B, or that of the null space.
+  Outcome Factor(const Kinematics<Space, S>& kinematics) override;
+  /// x by (2) and (3), and lambda from that x.
+  void Solve(const VectorX<S>& force, const VectorX<S>& target, VectorX<S>& x,
+             VectorX<S>* lambda) override;
+  /// Independent coordinates and speeds stay; the dependent ones follow. Without a partition: the
+  /// smallest change in the metric M, which does no work along the free directions.
+  void Correct(const VectorX<S>& target, VectorX<S>& x) override;
+  /// At level velocity the independent speeds; the others follow by (1).
+  const std::vector<int>* CarriedSpeeds() const override {
+    return at_velocity_ ? &independent_ : nullptr;
+  }
+  bool CompleteSpeeds(Kinematics<Space, S>& kinematics, VectorX<S>& u) override;
+  /// The partition.
+  void Start(const Kinematics<Space, S>& kinematics) override;
+  bool Review(const Kinematics<Space, S>& kinematics) override;
 
-  Outcome FactorOnce();
-  /// LU of J_D and the basis B, J being current; the reciprocal condition.
+ private:
+  /// LU of J_D, J being current; the reciprocal condition.
   S FactorPartition();
-  void FactorNullSpace();
-  /// x of M x - J^T lambda = force, J x = target by (2) and (3), and lambda from that x. False
-  /// where M is not positive definite.
-  bool SolveMotion(const VectorX<S>& force, const VectorX<S>& target, VectorX<S>& x);
+  void FactorNullSpace(const Kinematics<Space, S>& kinematics);
+  /// M, and the factors of (3), once per position; not before they are needed.
+  void FactorMass();
   void SolveForces(const VectorX<S>& force, const VectorX<S>& x, VectorX<S>& lambda);
   void SetPartition(const Partition<S>& partition);
 
-  using Base = Formulation<Space, S>;
-  using Base::diagnostics_;
-  using Base::kinematics_;
-  using Base::mechanism_;
-  using Base::u_;
-  using Base::udot_;
-
+  const Mechanism<Space, S>& mechanism_;
+  SolverKind kind_;
+  bool at_velocity_;
   TreeDynamics<Space, S> dynamics_;
+  const Kinematics<Space, S>* kinematics_ = nullptr;  ///< of the last Factor()
   std::vector<int> independent_, dependent_, rows_;
-  long factored_version_ = -1;
+  bool mass_is_current_ = false;
   bool outgrown_ = false;  ///< the rank exceeds the partition's
   MatrixX<S> M_, J_, J_D_, J_I_, solved_, B_, MB_, reduced_;
-  VectorX<S> h_, gamma_, force_, c_, residual_, rows_rhs_, dependent_speeds_, independent_speeds_,
-      bias_;
+  VectorX<S> zero_, c_, residual_, rows_rhs_, dependent_speeds_, independent_speeds_, bias_;
   Eigen::PartialPivLU<MatrixX<S>> lu_;
   Eigen::LLT<MatrixX<S>> reduced_factor_;
   std::unique_ptr<NullSpace<Space, S>> null_space_;  ///< null at velocity level and as published
-  bool uses_null_space_ = false;                     ///< since the last factorisation
+  bool uses_null_space_ = false;                     ///< since the last Factor()
 };
 
 }  // namespace loopbench::reduction

@@ -15,7 +15,7 @@
 #include "harness/record/record.h"
 #include "harness/record/select.h"
 #include "mechanism/description/topology.h"
-#include "mechanism/formulation/formulation.h"
+#include "mechanism/formulation/options.h"
 #include "mechanism/simplify/compile.h"
 
 namespace loopbench::harness {

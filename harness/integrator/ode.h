@@ -2,52 +2,14 @@
 #pragma once
 
 #include <functional>
-#include <optional>
 #include <span>
 
-#include "mechanism/description/outcome.h"
+#include "mechanism/formulation/ode.h"
 
 namespace loopbench::harness {
 
-/// What a Jacobian of the problem's own has cost.
-struct JacobianWork {
-  int derivatives = 0;       ///< evaluations of f
-  int dual_evaluations = 0;  ///< evaluations with dual numbers, several columns at once
-};
-
-/// A system of first-order ordinary differential equations y' = f(t, y), t in seconds.
-///
-/// The object may keep scratch memory, so `Derivative` is not const; it must nevertheless be a
-/// function of (t, y) alone between two restarts, because the integrator rejects steps and
-/// evaluates stages out of order.
-class Ode {
- public:
-  virtual ~Ode() = default;
-
-  /// Number of components of y; constant during a run.
-  virtual int size() const = 0;
-
-  /// How many of the last components of y are quadratures: integrals along the motion, such as the
-  /// work of a force, on which f does not depend. Fewer than size(), constant during a run. They
-  /// have no part in the choice of steps: the other components have the same bits with and without
-  /// them, and their own error is not controlled.
-  virtual int num_quadratures() const { return 0; }
-
-  /// Writes f(t, y) to `ydot`. Where f jumps in time (IntegratorOptions::stop_times) it is taken
-  /// from the right: at a stop time itself this writes the limit from later times. Returns
-  /// kFinished, or the failure that ends the run (kSingular,
-  /// ...). The integrator checks for NaN and infinity itself, so no implementation need do so.
-  virtual Outcome Derivative(double t, std::span<const double> y, std::span<double> ydot) = 0;
-
-  /// For implicit methods: writes df_i/dy_j to `jacobian`[i + size() * j], i < size() and
-  /// j < size() - num_quadratures(), where the entries are zero, and returns what it took. Nothing,
-  /// as here, asks for difference quotients of f. It may be an approximation: that makes Newton's
-  /// iteration slower, not the solution wrong.
-  virtual std::optional<JacobianWork> Jacobian(double /*t*/, std::span<const double> /*y*/,
-                                               std::span<double> /*jacobian*/) {
-    return std::nullopt;
-  }
-};
+/// The problem (mechanism/formulation/ode.h), in ARKODE's scalar.
+using Ode = loopbench::Ode<double>;
 
 /// What the run does after an observation.
 enum class StepAction {

@@ -11,7 +11,7 @@
 #include "harness/config/scene.h"
 #include "harness/observers/time_series.h"
 #include "harness/record/record.h"
-#include "mechanism/formulation/formulation.h"
+#include "mechanism/formulation/system.h"
 
 namespace loopbench::harness {
 
@@ -19,7 +19,7 @@ namespace loopbench::harness {
 template <class Space>
 struct Sample {
   double t = 0.0;
-  const Formulation<Space, double>& formulation;
+  const System<Space, double>& formulation;
   double supplied = 0.0, dissipated = 0.0;  ///< work since the start [J]
 };
 

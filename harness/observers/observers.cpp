@@ -50,7 +50,7 @@ void EnergyObserver<Space>::Write(Record& record) const {
 template <class Space>
 void CorrectionObserver<Space>::Observe(const Sample<Space>& sample) {
   if (sample.formulation.options().enforcement != Enforcement::kPosition) return;
-  const Correction<double>& correction = sample.formulation.correction();
+  const Correction<double>& correction = sample.formulation.level().correction();
   largest_ = std::max(largest_, correction.shift);
   iterations_ += correction.iterations;
   series_.t.push_back(sample.t);
@@ -66,7 +66,7 @@ void CorrectionObserver<Space>::Write(Record& record) const {
 
 template <class Space>
 void ConditionObserver<Space>::Observe(const Sample<Space>& sample) {
-  const Diagnostics& diagnostics = sample.formulation.diagnostics();
+  const Diagnostics diagnostics = sample.formulation.diagnostics();
   rank_min_ = started_ ? std::min(rank_min_, diagnostics.rank) : diagnostics.rank;
   const Mechanism<Space, double>& mechanism = sample.formulation.kinematics().mechanism();
   beyond_joint_speeds_ = mechanism.num_u() - mechanism.num_joint_speeds();

@@ -3,6 +3,7 @@
 #include <algorithm>
 
 #include "lagrange/lagrange.h"
+#include "mechanism/formulation/system.h"
 #include "mechanism/start/assembly.h"
 
 namespace loopbench::harness {
@@ -15,26 +16,27 @@ Exact::Exact(const MechanismDescription& description, Coordinates coordinates)
   message_ = start.message;
   if (outcome_ != Outcome::kFinished) return;
   const Mechanism<Planar, Float128> joints(description, Coordinates::kJoint);
-  lagrange::Lagrange<Planar, Float128> projection(joints, {.enforcement = Enforcement::kPosition});
+  const auto projection =
+      MakeSystem<lagrange::Lagrange>(joints, {.enforcement = Enforcement::kPosition});
   q_ = start.q.cast<Float128>();
   u_ = start.u.cast<Float128>();
-  outcome_ = projection.Start(Float128(0), q_, u_);
-  std::vector<Float128> y(static_cast<std::size_t>(projection.state_size())), ydot(y.size());
+  outcome_ = projection->Start(Float128(0), q_, u_);
+  std::vector<Float128> y(static_cast<std::size_t>(projection->state_size())), ydot(y.size());
   if (outcome_ == Outcome::kFinished) {
-    projection.ToState(q_, u_, y);
-    projection.BeginStep(Float128(0), y);
-    outcome_ = projection.Derivative(Float128(0), y, ydot);  // says whether the projection failed
+    projection->ToState(q_, u_, y);
+    projection->BeginStep(Float128(0), y);
+    outcome_ = projection->Derivative(Float128(0), y, ydot);  // says whether the projection failed
   }
   if (outcome_ != Outcome::kFinished) {
     message_ = "the start does not close in float128";
     return;
   }
-  q_ = projection.q();
-  u_ = projection.u();
+  q_ = projection->q();
+  u_ = projection->u();
   if (coordinates == Coordinates::kJoint) return;
-  q_ = projection.kinematics().CoordinatesIn(mechanism_);
+  q_ = projection->kinematics().CoordinatesIn(mechanism_);
   kinematics_.UpdatePosition(q_);
-  u_ = projection.kinematics().SpeedsIn(kinematics_);
+  u_ = projection->kinematics().SpeedsIn(kinematics_);
 }
 
 Float128 Exact::Drift(const Float128& t, const VectorX<Float128>& q) {

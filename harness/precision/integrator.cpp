@@ -22,7 +22,7 @@ constexpr int kMostFailures = 7;
 template <class S>
 class Run {
  public:
-  Run(const System<S>& system, S t_end, std::vector<S>& y, const OneStepOptions<S>& options)
+  Run(const Problem<S>& system, S t_end, std::vector<S>& y, const OneStepOptions<S>& options)
       : system_(system), options_(options), t_end_(t_end), y_(y), step_(system, options.method) {
     f_.assign(y.size(), S(0));
   }
@@ -111,7 +111,7 @@ class Run {
     return Outcome::kFinished;
   }
 
-  const System<S>& system_;
+  const Problem<S>& system_;
   const OneStepOptions<S>& options_;
   const S t_end_;
   const S longest_ = t_end_ / S(10);  // ode45's longest step
@@ -128,13 +128,13 @@ class Run {
 }  // namespace
 
 template <class S>
-OneStepResult IntegrateSystem(const System<S>& system, S t_end, std::vector<S>& y,
+OneStepResult IntegrateSystem(const Problem<S>& system, S t_end, std::vector<S>& y,
                               const OneStepOptions<S>& options) {
   return Run<S>(system, t_end, y, options).Execute();
 }
 
-#define LOOPBENCH_INSTANTIATE(S)                                               \
-  template OneStepResult IntegrateSystem(const System<S>&, S, std::vector<S>&, \
+#define LOOPBENCH_INSTANTIATE(S)                                                \
+  template OneStepResult IntegrateSystem(const Problem<S>&, S, std::vector<S>&, \
                                          const OneStepOptions<S>&);
 LOOPBENCH_INSTANTIATE(double)
 LOOPBENCH_FOR_EACH_SCALAR(LOOPBENCH_INSTANTIATE)

@@ -22,7 +22,7 @@ namespace loopbench::harness {
 
 /// y' = f(t, y).
 template <class S>
-struct System {
+struct Problem {
   int size = 0;
   /// Writes f(t, y); anything but kFinished ends the run. Values that are not finite do so too.
   std::function<Outcome(S t, std::span<const S> y, std::span<S> ydot)> derivative;
@@ -52,7 +52,7 @@ struct OneStepResult {
 /// From t = 0 to t_end > 0 [s]; y is the state at t_reached afterwards. A step that fails its error
 /// test seven times, or an accepted one of at most 16 eps t, ends the run as step-too-small.
 template <class S>
-OneStepResult IntegrateSystem(const System<S>& system, S t_end, std::vector<S>& y,
+OneStepResult IntegrateSystem(const Problem<S>& system, S t_end, std::vector<S>& y,
                               const OneStepOptions<S>& options);
 
 }  // namespace loopbench::harness

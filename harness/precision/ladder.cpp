@@ -8,6 +8,7 @@
 #include "harness/precision/exact.h"
 #include "harness/precision/integrator.h"
 #include "lagrange/lagrange.h"
+#include "mechanism/formulation/system.h"
 #include "odca/odca.h"
 #include "reduction/reduction.h"
 
@@ -16,16 +17,16 @@ namespace loopbench::harness {
 namespace {
 
 template <class S>
-std::unique_ptr<Formulation<Planar, S>> Make(const Column& column,
-                                             const Mechanism<Planar, S>& mechanism) {
+std::unique_ptr<System<Planar, S>> Make(const Column& column,
+                                        const Mechanism<Planar, S>& mechanism) {
   const FormulationOptions options{.enforcement = column.enforcement, .solver = column.solver};
   switch (column.formulation) {
     case FormulationKind::kOdca:
-      return std::make_unique<odca::Odca<Planar, S>>(mechanism, options);
+      return MakeSystem<odca::Odca>(mechanism, options);
     case FormulationKind::kLagrange:
-      return std::make_unique<lagrange::Lagrange<Planar, S>>(mechanism, options);
+      return MakeSystem<lagrange::Lagrange>(mechanism, options);
     case FormulationKind::kReduction:
-      return std::make_unique<reduction::Reduction<Planar, S>>(mechanism, options);
+      return MakeSystem<reduction::Reduction>(mechanism, options);
   }
   return nullptr;
 }
@@ -54,7 +55,7 @@ Ended Climb(const LadderTask& task, Exact& exact, Scalar scalar, OneStepMethod m
   Float128 t_at = 0;     // of the last accepted state
   VectorX<Float128> at;  // its positions
   Float128 drift = 0;
-  const System<S> system{
+  const Problem<S> system{
       formulation->state_size(),
       [&](S t, std::span<const S> state, std::span<S> rates) {
         return formulation->Derivative(t, state, rates);

@@ -34,7 +34,7 @@ constexpr Ratio kE[7] = {{71, 57600},      {0, 1},    {-71, 16695}, {71, 1920},
 }  // namespace
 
 template <class S>
-OneStep<S>::OneStep(const System<S>& system, OneStepMethod method)
+OneStep<S>::OneStep(const Problem<S>& system, OneStepMethod method)
     : system_(system), method_(method) {
   const std::size_t n = static_cast<std::size_t>(system.size);
   for (std::vector<S>* vector : {&y_new_, &error_, &stage_, &before_}) vector->assign(n, S(0));

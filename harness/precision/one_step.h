@@ -12,7 +12,7 @@ namespace loopbench::harness {
 template <class S>
 class OneStep {
  public:
-  OneStep(const System<S>& system, OneStepMethod method);
+  OneStep(const Problem<S>& system, OneStepMethod method);
 
   /// The error estimate grows with the step as h^estimate_order().
   int estimate_order() const { return method_ == OneStepMethod::kGragg ? 2 * kColumns - 1 : 5; }
@@ -39,7 +39,7 @@ class OneStep {
   Outcome Midpoint(S t, const std::vector<S>& y, const std::vector<S>& f, S h, int n,
                    std::vector<S>& result);
 
-  const System<S>& system_;
+  const Problem<S>& system_;
   OneStepMethod method_;
   std::vector<S> y_new_, error_, f_new_, stage_, before_;
   std::array<std::vector<S>, kStages> k_;

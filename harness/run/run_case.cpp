@@ -22,24 +22,24 @@
 namespace loopbench::harness {
 
 template <class Space>
-std::unique_ptr<Formulation<Space, double>> MakeFormulation(
-    const Column& column, const Mechanism<Space, double>& mechanism) {
+std::unique_ptr<System<Space, double>> MakeFormulation(const Column& column,
+                                                       const Mechanism<Space, double>& mechanism) {
   const FormulationOptions options{
       .enforcement = column.enforcement, .solver = column.solver, .gains = column.gains};
   switch (column.formulation) {
     case FormulationKind::kOdca:
-      return std::make_unique<odca::Odca<Space, double>>(mechanism, options);
+      return MakeSystem<odca::Odca>(mechanism, options);
     case FormulationKind::kLagrange:
-      return std::make_unique<lagrange::Lagrange<Space, double>>(mechanism, options);
+      return MakeSystem<lagrange::Lagrange>(mechanism, options);
     case FormulationKind::kReduction:
-      return std::make_unique<reduction::Reduction<Space, double>>(mechanism, options);
+      return MakeSystem<reduction::Reduction>(mechanism, options);
   }
   return nullptr;
 }
 
-template std::unique_ptr<Formulation<Planar, double>> MakeFormulation(
-    const Column&, const Mechanism<Planar, double>&);
-template std::unique_ptr<Formulation<Spatial, double>> MakeFormulation(
+template std::unique_ptr<System<Planar, double>> MakeFormulation(const Column&,
+                                                                 const Mechanism<Planar, double>&);
+template std::unique_ptr<System<Spatial, double>> MakeFormulation(
     const Column&, const Mechanism<Spatial, double>&);
 
 namespace {
@@ -122,11 +122,10 @@ class Runner {
     IntegratorResult result;
     result.outcome = formulation->Start(0.0, start.q, start.u);
     if (result.outcome != Outcome::kFinished) return result;
-    FormulationOde<Space> ode(
-        *formulation, mechanism_.has_power(),
-        MakeJacobian(case_.integrator, case_.jacobian, description_, *formulation));
+    formulation->IntegrateWork(mechanism_.has_power());
+    GiveJacobian(case_.integrator, case_.jacobian, description_, *formulation);
     const std::size_t n = static_cast<std::size_t>(formulation->state_size());
-    y_.assign(static_cast<std::size_t>(ode.size()), 0.0);
+    y_.assign(static_cast<std::size_t>(formulation->size()), 0.0);
     formulation->ToState(start.q, start.u, y_);
     std::vector<double> ydot(n);
     const StepObserver observe = [&](double t, std::span<double> y_and_work) {
@@ -144,7 +143,7 @@ class Runner {
       return restart ? StepAction::kRestart : StepAction::kContinue;
     };
     const IntegratorResult run = harness::Integrate(
-        ode, 0.0, case_.horizon, y_, OptionsOf(case_, mechanism_.stop_times()), observe);
+        *formulation, 0.0, case_.horizon, y_, OptionsOf(case_, mechanism_.stop_times()), observe);
     y_.resize(n);
     if (with_series_ && run.outcome == Outcome::kFinished &&
         formulation->Derivative(run.t_reached, y_, ydot) == Outcome::kFinished) {

@@ -2,6 +2,7 @@
 
 #include <fmt/format.h>
 
+#include <algorithm>
 #include <cmath>
 #include <stdexcept>
 #include <vector>
@@ -11,7 +12,6 @@
 #include "harness/run/run_case.h"
 #include "harness/text/hash.h"
 #include "mechanism/start/assembly.h"
-#include "odca/odca.h"
 
 namespace loopbench::harness {
 
@@ -38,9 +38,9 @@ BenchmarkState ComputeStateIn(const MechanismDescription& description, Coordinat
   IntegratorOptions options;
   options.profile = "dormand-prince";
   options.fixed_step = kWarmUpStep;
-  FormulationOde<Space> ode(*formulation);
   if (state.outcome == Outcome::kFinished) {
-    const IntegratorResult result = Integrate(ode, 0.0, kWarmUpSteps * kWarmUpStep, y, options);
+    const IntegratorResult result =
+        Integrate(*formulation, 0.0, kWarmUpSteps * kWarmUpStep, y, options);
     state.outcome = result.outcome;
     state.message = result.message;
   }
@@ -61,13 +61,12 @@ class SubjectIn final : public BenchmarkSubject {
   SubjectIn(const MechanismDescription& description, const Column& column,
             const BenchmarkState& state, const std::string& integrator, double step)
       : mechanism_(description, column.coordinates),
-        formulation_(MakeFormulation<Space>(column, mechanism_)),
-        ode_(*formulation_, false,
-             MakeJacobian(integrator, JacobianKind::kForward, description, *formulation_)) {
+        formulation_(MakeFormulation<Space>(column, mechanism_)) {
     const Outcome outcome = formulation_->Start(0.0, state.q, state.u);
     if (outcome != Outcome::kFinished) {
       throw std::invalid_argument(fmt::format("cannot start: {}", ToString(outcome)));
     }
+    GiveJacobian(integrator, JacobianKind::kForward, description, *formulation_);
     y_.resize(formulation_->state_size());
     ydot_.resize(y_.size());
     formulation_->ToState(state.q, state.u, y_);
@@ -80,7 +79,7 @@ class SubjectIn final : public BenchmarkSubject {
 
   Outcome Step() override {
     if (!stepper_) {
-      guarded_ = std::make_unique<GuardedOde>(ode_, options_);
+      guarded_ = std::make_unique<GuardedOde>(*formulation_, options_);
       // the end of the interval is far, so that no step is clipped
       stepper_ = std::make_unique<Stepper>(*guarded_, 0.0, 1e3 * options_.fixed_step, y_);
     } else {
@@ -95,14 +94,14 @@ class SubjectIn final : public BenchmarkSubject {
   int bodies() const override { return mechanism_.num_bodies() - 1; }
   int rank() const override { return formulation_->diagnostics().rank; }
   std::int64_t operations() const override {
-    const auto* odca = dynamic_cast<const odca::Odca<Space, double>*>(formulation_.get());
-    return odca == nullptr ? -1 : odca->sweep().operations();
+    const std::vector<NamedCount> counts = formulation_->solver().Counters();
+    const auto at = std::ranges::find(counts, "rhs_operations", &NamedCount::name);
+    return at == counts.end() ? -1 : at->value;
   }
 
  private:
   Mechanism<Space, double> mechanism_;
-  std::unique_ptr<Formulation<Space, double>> formulation_;
-  FormulationOde<Space> ode_;
+  std::unique_ptr<System<Space, double>> formulation_;
   IntegratorOptions options_;
   std::unique_ptr<GuardedOde> guarded_;
   std::unique_ptr<Stepper> stepper_;

@@ -14,7 +14,6 @@
 #include "harness/run/run_case.h"
 #include "mechanism/description/library.h"
 #include "mechanism/start/assembly.h"
-#include "odca/odca.h"
 
 namespace loopbench::harness {
 
@@ -128,10 +127,8 @@ class SubjectIn final : public Subject {
       record.Set("steps", result_.steps);
     }
     record.Set("repeats", static_cast<std::int64_t>(simulate_ ? wall_s_.size() : rhs_ns_.size()));
-    if (const auto* odca = dynamic_cast<const odca::Odca<Space, double>*>(formulation_.get())) {
-      record.Set("plan_depth", std::int64_t{odca->plan().depth()});
-      record.Set("plan_largest_join", std::int64_t{odca->plan().largest_join()});
-      record.Set("rhs_operations", std::int64_t{odca->sweep().operations()});
+    for (const auto& [key, count] : formulation_->solver().Counters()) {
+      record.Set(std::string(key), count);
     }
     return record;
   }
@@ -148,15 +145,13 @@ class SubjectIn final : public Subject {
   }
 
   IntegratorResult Simulate(const std::function<void(std::span<double>)>& keep) {
-    FormulationOde<Space> ode(
-        *formulation_, false,
-        MakeJacobian(case_.integrator, case_.jacobian, description_, *formulation_));
+    GiveJacobian(case_.integrator, case_.jacobian, description_, *formulation_);
     const auto observe = [&](double t, std::span<double> y) {
       if (keep) keep(y);
       return formulation_->BeginStep(t, y) ? StepAction::kRestart : StepAction::kContinue;
     };
-    return Integrate(ode, 0.0, case_.horizon, y_, OptionsOf(case_, mechanism_.stop_times()),
-                     observe);
+    return Integrate(*formulation_, 0.0, case_.horizon, y_,
+                     OptionsOf(case_, mechanism_.stop_times()), observe);
   }
 
   /// Evaluations per batch, from the time of a first few (which also warm up).
@@ -181,7 +176,7 @@ class SubjectIn final : public Subject {
   const MechanismDescription& description_;
   Mechanism<Space, double> mechanism_;
   Start<double> start_;
-  std::unique_ptr<Formulation<Space, double>> formulation_;
+  std::unique_ptr<System<Space, double>> formulation_;
   std::vector<double> y_, ydot_;
   std::vector<std::vector<double>> states_;
   int evaluations_ = 0;

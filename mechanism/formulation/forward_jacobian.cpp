@@ -6,9 +6,9 @@ namespace loopbench {
 
 template <class Space>
 ForwardJacobian<Space>::ForwardJacobian(const MechanismDescription& description,
-                                        Formulation<Space, double>& formulation)
-    : formulation_(formulation),
-      mechanism_(description, formulation.mechanism().coordinates()),
+                                        System<Space, double>& system)
+    : system_(system),
+      mechanism_(description, system.mechanism().coordinates()),
       kinematics_(mechanism_),
       dynamics_(mechanism_),
       drives_(mechanism_),
@@ -27,24 +27,23 @@ ForwardJacobian<Space>::ForwardJacobian(const MechanismDescription& description,
 
 template <class Space>
 int ForwardJacobian<Space>::evaluations() const {
-  return (formulation_.state_size() + Dual::kWidth - 1) / Dual::kWidth;
+  return (system_.state_size() + Dual::kWidth - 1) / Dual::kWidth;
 }
 
 template <class Space>
 void ForwardJacobian<Space>::Evaluate(Eigen::Ref<MatrixX<double>> jacobian) {
-  kinematics_.SetTime(formulation_.kinematics().time());
-  if (const auto& released = formulation_.kinematics().released();
-      released != kinematics_.released()) {
+  kinematics_.SetTime(system_.kinematics().time());
+  if (const auto& released = system_.kinematics().released(); released != kinematics_.released()) {
     kinematics_.Release(released);
   }
-  if (mechanism_.num_u() > 0) formulation_.Multipliers(lambda_now_);
-  const int size = formulation_.state_size();
+  lambda_now_ = system_.Multipliers();
+  const int size = system_.state_size();
   for (int first = 0; first < size; first += Dual::kWidth) {
     const int count = std::min(Dual::kWidth, size - first);
     Seed(first, count);
     kinematics_.UpdatePosition(q_);
     kinematics_.UpdateVelocity(u_);
-    if (formulation_.options().enforcement == Enforcement::kVelocity) ProjectSpeeds(count);
+    if (system_.level().changes_speeds()) ProjectSpeeds(count);
     if (mechanism_.num_u() > 0) Accelerate(count);
     Write(first, count, jacobian);
   }
@@ -52,11 +51,11 @@ void ForwardJacobian<Space>::Evaluate(Eigen::Ref<MatrixX<double>> jacobian) {
 
 template <class Space>
 void ForwardJacobian<Space>::Seed(int first, int count) {
-  q_ = formulation_.q().template cast<Dual>();
-  u_ = formulation_.u().template cast<Dual>();
+  q_ = system_.q().template cast<Dual>();
+  u_ = system_.u().template cast<Dual>();
   for (int k = 0; k < count; ++k) {
     const int i = first + k - mechanism_.num_q();
-    (i < 0 ? q_[first + k] : u_[formulation_.state_speed(i)]).SetPartial(k, 1.0);
+    (i < 0 ? q_[first + k] : u_[system_.state_speed(i)]).SetPartial(k, 1.0);
   }
 }
 
@@ -68,8 +67,8 @@ void ForwardJacobian<Space>::ProjectSpeeds(int count) {
     constraint_left_.segment(row, rows) = kinematics_.ConstraintSpeed(index).head(rows);
   }
   for (int k = 0; k < count && mechanism_.num_u() > 0; ++k) {
-    for (int r = 0; r < target_.size(); ++r) target_[r] = constraint_left_[r].partial(k);
-    formulation_.Correct(target_, x_);
+    for (int r = 0; r < target_.size(); ++r) target_[r] = -constraint_left_[r].partial(k);
+    system_.solver().Correct(target_, x_);
     for (int i = 0; i < x_.size(); ++i) u_[i].SetPartial(k, u_[i].partial(k) + x_[i]);
   }
   kinematics_.UpdateVelocity(u_);
@@ -77,41 +76,26 @@ void ForwardJacobian<Space>::ProjectSpeeds(int count) {
 
 template <class Space>
 void ForwardJacobian<Space>::Accelerate(int count) {
-  udot_ = formulation_.udot().template cast<Dual>();
+  udot_ = system_.udot().template cast<Dual>();
   lambda_ = lambda_now_.template cast<Dual>();
   dynamics_.Residual(kinematics_, udot_, lambda_, force_left_, constraint_left_);
-  if (formulation_.options().enforcement == Enforcement::kBaumgarte) AddFeedback();
+  const BaumgarteGains& gains = system_.level().gains();
+  if (gains != BaumgarteGains()) AddFeedback(kinematics_, gains, constraint_left_);
   for (int k = 0; k < count; ++k) {
     for (int i = 0; i < force_.size(); ++i) force_[i] = -force_left_[i].partial(k);
     for (int r = 0; r < target_.size(); ++r) target_[r] = -constraint_left_[r].partial(k);
-    formulation_.SolveConstrained(force_, target_, x_, lambda_x_);
+    system_.solver().Solve(force_, target_, x_, &lambda_x_);
     for (int i = 0; i < x_.size(); ++i) udot_[i].SetPartial(k, x_[i]);
     for (int r = 0; r < lambda_x_.size(); ++r) lambda_[r].SetPartial(k, lambda_x_[r]);
   }
 }
 
 template <class Space>
-void ForwardJacobian<Space>::AddFeedback() {
-  const BaumgarteGains& gains = formulation_.gains();
-  for (int index : mechanism_.constraints()) {
-    const int row = mechanism_.joints()[index].row;
-    const int rows = mechanism_.joints()[index].num_constraints();
-    const auto D = kinematics_.joints()[index].D();
-    const Motion<Space, Dual> mismatch = kinematics_.ConstraintMismatch(index);
-    const Motion<Space, Dual> speed = kinematics_.ConstraintSpeed(index);
-    for (int r = 0; r < rows; ++r) {
-      constraint_left_[row + r] +=
-          Dual(2 * gains.alpha) * speed[r] + Dual(gains.beta * gains.beta) * D.col(r).dot(mismatch);
-    }
-  }
-}
-
-template <class Space>
 void ForwardJacobian<Space>::Write(int first, int count, Eigen::Ref<MatrixX<double>> jacobian) {
-  const int num_q = mechanism_.num_q(), size = formulation_.state_size();
+  const int num_q = mechanism_.num_q(), size = system_.state_size();
   mechanism_.Rates(q_, u_, qdot_);
   for (int i = 0; i < size; ++i) {
-    const Dual& rate = i < num_q ? qdot_[i] : udot_[formulation_.state_speed(i - num_q)];
+    const Dual& rate = i < num_q ? qdot_[i] : udot_[system_.state_speed(i - num_q)];
     for (int k = 0; k < count; ++k) jacobian(i, first + k) = rate.partial(k);
   }
   if (jacobian.rows() == size) return;

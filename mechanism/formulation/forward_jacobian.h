@@ -1,4 +1,4 @@
-// The derivative of a formulation's right-hand side by the state, by forward differentiation.
+// The derivative of a system's right-hand side by the state, by forward differentiation.
 //
 // Only the mechanism model is evaluated with dual numbers, never a solver. Accelerations satisfy
 //
@@ -10,9 +10,9 @@
 //   M udot_x - J^T lambda_x = -d/dx (M udot + h - J^T lambda),   J udot_x = -d/dx (J udot - gamma).
 //
 // The left-hand sides are O(n) (TreeDynamics::Residual); the equations are solved with the factors
-// that the formulation has from its last evaluation, be it a sweep, an LU or a partition. At
+// that the solver has from the system's last evaluation, be it a sweep, an LU or a partition. At
 // velocity level the speeds that the right-hand side uses have derivatives of the same kind: the
-// formulation's Correct() of what a direction makes constraints miss at velocity level.
+// solver's Correct() of what a direction makes constraints miss at velocity level.
 //
 // How often a measured angle has turned round (Kinematics::AcceptStep) is of no consequence here: a
 // moment along H changes with H only along D, which lambda takes up.
@@ -23,18 +23,18 @@
 #pragma once
 
 #include "mechanism/algebra/dual.h"
-#include "mechanism/formulation/formulation.h"
+#include "mechanism/formulation/system.h"
 
 namespace loopbench {
 
 template <class Space>
 class ForwardJacobian {
  public:
-  /// `formulation`, of a mechanism compiled from `description`, must outlive the object.
-  ForwardJacobian(const MechanismDescription& description, Formulation<Space, double>& formulation);
+  /// `system`, of a mechanism compiled from `description`, must outlive the object.
+  ForwardJacobian(const MechanismDescription& description, System<Space, double>& system);
 
-  /// d(ydot)/dy at the state of the formulation's last call of Derivative(), which must have
-  /// succeeded; to be evaluated before anything else is asked of the formulation. `jacobian` is
+  /// d(ydot)/dy at the state of the system's last call of Derivative(), which must have
+  /// succeeded; to be evaluated before anything else is asked of the system. `jacobian` is
   /// state_size() x state_size(), or has two more rows: the derivatives of the power supplied
   /// (prescribed motions included) and of the power dissipated. Allocates nothing.
   void Evaluate(Eigen::Ref<MatrixX<double>> jacobian);
@@ -47,11 +47,9 @@ class ForwardJacobian {
   void Seed(int first, int count);
   void ProjectSpeeds(int count);
   void Accelerate(int count);
-  /// Baumgarte's terms of the constraints.
-  void AddFeedback();
   void Write(int first, int count, Eigen::Ref<MatrixX<double>> jacobian);
 
-  Formulation<Space, double>& formulation_;
+  System<Space, double>& system_;
   Mechanism<Space, Dual> mechanism_;
   Kinematics<Space, Dual> kinematics_;
   TreeDynamics<Space, Dual> dynamics_;

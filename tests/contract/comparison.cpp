@@ -7,6 +7,7 @@
 #include <limits>
 
 #include "odca/odca.h"
+#include "tests/contract/system_with.h"
 
 namespace loopbench::testing {
 
@@ -71,13 +72,13 @@ template <class Space>
 Comparison Sample<Space>::CompareOdca(Coordinates coordinates, SolverKind solver) const {
   const Mechanism<Space, double>& mechanism = this->mechanism(coordinates);
   const State& at = state(coordinates);
-  odca::Odca<Space, double> odca(mechanism, {.solver = solver});
-  odca.Start(0.0, at.q, at.u);
+  SystemWith<odca::Odca, Space, double> odca(mechanism, {.solver = solver});
+  odca->Start(0.0, at.q, at.u);
   Comparison result;
   VectorX<double> udot;
-  result.outcome = odca.Evaluate(0.0, at.q, at.u, udot);
+  result.outcome = odca->Evaluate(0.0, at.q, at.u, udot);
   if (result.outcome != Outcome::kFinished) return result;
-  result.rank = odca.diagnostics().rank;
+  result.rank = odca->diagnostics().rank;
   result.error = RelativeError(udot, this->udot(coordinates));
   const bool own = coordinates == Coordinates::kAbsolute && absolute_answer_;
   const std::vector<Real6>& forces = own ? absolute_answer_->forces : joint_answer_.forces;
@@ -85,7 +86,7 @@ Comparison Sample<Space>::CompareOdca(Coordinates coordinates, SolverKind solver
   for (int j = 0; j < static_cast<int>(description_.joints.size()); ++j) {
     const Eigen::Matrix<Real, Space::kDim, 1> force = InSpace<Space>(forces[j]);
     const Eigen::Matrix<Real, Space::kDim, 1> error =
-        odca.JointForce(j).template cast<Real>() - force;
+        odca.solver().JointForce(j).template cast<Real>() - force;
     difference = std::max<Real>(difference, error.template lpNorm<Eigen::Infinity>());
     scale = std::max<Real>(scale, force.template lpNorm<Eigen::Infinity>());
   }

@@ -4,7 +4,8 @@
 #include <optional>
 #include <string>
 
-#include "mechanism/formulation/formulation.h"
+#include "mechanism/formulation/options.h"
+#include "mechanism/model/mechanism.h"
 #include "tests/contract/generators.h"
 
 namespace loopbench::testing {

@@ -11,6 +11,7 @@
 #include <vector>
 
 #include "lagrange/lagrange.h"
+#include "mechanism/formulation/system.h"
 #include "odca/odca.h"
 #include "reduction/reduction.h"
 #include "tests/contract/comparison.h"
@@ -58,15 +59,13 @@ inline std::vector<Case> AllCases() {
 }
 
 template <class Space>
-std::unique_ptr<Formulation<Space, double>> Make(const Case& c,
-                                                 const Mechanism<Space, double>& mechanism) {
+std::unique_ptr<System<Space, double>> Make(const Case& c,
+                                            const Mechanism<Space, double>& mechanism) {
   const FormulationOptions options{c.enforcement, c.solver, c.gains};
   const std::string name = c.formulation;
-  if (name == "odca") return std::make_unique<odca::Odca<Space, double>>(mechanism, options);
-  if (name == "lagrange") {
-    return std::make_unique<lagrange::Lagrange<Space, double>>(mechanism, options);
-  }
-  return std::make_unique<reduction::Reduction<Space, double>>(mechanism, options);
+  if (name == "odca") return MakeSystem<odca::Odca>(mechanism, options);
+  if (name == "lagrange") return MakeSystem<lagrange::Lagrange>(mechanism, options);
+  return MakeSystem<reduction::Reduction>(mechanism, options);
 }
 
 /// Coupled loops with forces of every kind, every second with joints of every kind, every fourth
@@ -101,7 +100,7 @@ struct Bench {
   Sample<Space> sample;
   const Mechanism<Space, double>& mechanism;
   State state;
-  std::unique_ptr<Formulation<Space, double>> formulation;
+  std::unique_ptr<System<Space, double>> formulation;
   std::vector<double> y, ydot;
 };
 

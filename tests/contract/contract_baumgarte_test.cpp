@@ -37,7 +37,7 @@ std::vector<double> Off(const std::vector<double>& y, double size) {
 /// holds for small relative speeds only, since a rotation vector's rate is not the angular velocity
 /// (docs/numerics.md, section 1): they are left out, zero.
 template <class Space>
-std::pair<VectorX<double>, VectorX<double>> Mismatches(Formulation<Space, double>& formulation,
+std::pair<VectorX<double>, VectorX<double>> Mismatches(System<Space, double>& formulation,
                                                        const std::vector<double>& y) {
   EXPECT_EQ(formulation.FromState(0.0, y), Outcome::kFinished);
   const Kinematics<Space, double>& kinematics = formulation.kinematics();

@@ -51,7 +51,7 @@ TEST_P(PositionContractTest, AcceptedStepsAreProjectedToTheConstraints) {
         bench.y[i] += 1e-4 * std::sin(2.0 * static_cast<double>(i + 1));
       }
       ASSERT_TRUE(bench.formulation->BeginStep(0.0, std::span<double>(bench.y)));
-      EXPECT_GT(bench.formulation->correction().shift, 0.0);
+      EXPECT_GT(bench.formulation->level().correction().shift, 0.0);
       Oracle oracle(bench.sample.description(), LayoutOf(bench.mechanism));
       const RealVector q = ToReal(bench.formulation->q()), u = ToReal(bench.formulation->u());
       // rows of lengths and speeds of some metres, through as many bodies
@@ -86,7 +86,7 @@ TEST_P(PositionContractTest, ProjectionsBeginWithWhatTheLastStageKnows) {
     ASSERT_TRUE(bench.formulation->BeginStep(0.0, std::span<double>(bench.y)));
     EXPECT_EQ(bench.y, other);
     // one update a Newton step, and one to take the last of them back
-    const int steps = bench.formulation->correction().iterations;
+    const int steps = bench.formulation->level().correction().iterations;
     EXPECT_GE(version() - before, steps);
     EXPECT_LE(version() - before, steps + 1);
     const long after = version();

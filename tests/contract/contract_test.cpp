@@ -208,9 +208,9 @@ TEST(RedundancyTest, MultipliersKeepTheBoundOfOverconstrainedGraphs) {
           RedundantGraph(7 * loops, loops, SpaceKind::kSpatial, seed);
       const Sample<Spatial> sample(graph, seed);
       const State& state = sample.state(Coordinates::kJoint);
-      lagrange::Lagrange<Spatial, double> lagrange(sample.mechanism(Coordinates::kJoint), {});
+      const auto lagrange = MakeSystem<lagrange::Lagrange>(sample.mechanism(Coordinates::kJoint));
       VectorX<double> udot;
-      ASSERT_EQ(lagrange.Evaluate(0.0, state.q, state.u, udot), Outcome::kFinished);
+      ASSERT_EQ(lagrange->Evaluate(0.0, state.q, state.u, udot), Outcome::kFinished);
       EXPECT_LE(RelativeError(udot, sample.udot(Coordinates::kJoint)), sample.Bound())
           << graph.name;
     }
@@ -222,12 +222,12 @@ TEST(AllocationTest, SofteningDoesNotAllocate) {
   const MechanismDescription ladder = RandomLadder(4, SpaceKind::kPlanar, 1);
   const Mechanism<Spatial, double> mechanism(ladder, Coordinates::kJoint);
   const State state = ConsistentState(ladder, mechanism, 1);
-  odca::Odca<Spatial, double> odca(mechanism, {});
+  const auto odca = MakeSystem<odca::Odca>(mechanism);
   VectorX<double> udot(mechanism.num_u());
-  odca.Evaluate(0.0, state.q, state.u, udot);
-  ASSERT_LT(odca.diagnostics().smallest_weight, 1.0);
+  odca->Evaluate(0.0, state.q, state.u, udot);
+  ASSERT_LT(odca->diagnostics().smallest_weight, 1.0);
   const long before = CountAllocations();
-  for (int i = 0; i < 10; ++i) odca.Evaluate(0.0, state.q, state.u, udot);
+  for (int i = 0; i < 10; ++i) odca->Evaluate(0.0, state.q, state.u, udot);
   EXPECT_EQ(CountAllocations() - before, 0);
 }
 

@@ -43,7 +43,7 @@ struct Quotient {
 template <class Space>
 class RightHandSide {
  public:
-  RightHandSide(Formulation<Space, double>& formulation, double t)
+  RightHandSide(System<Space, double>& formulation, double t)
       : formulation_(formulation), t_(t), size_(formulation.state_size()) {}
 
   VectorXd operator()(const VectorXd& y) {
@@ -51,7 +51,7 @@ class RightHandSide {
     const Outcome outcome = formulation_.Derivative(t_, {y.data(), static_cast<std::size_t>(size_)},
                                                     {f.data(), static_cast<std::size_t>(size_)});
     EXPECT_EQ(outcome, Outcome::kFinished) << ToString(outcome);
-    const Power<double> power = harness::PowerOf(formulation_);
+    const Power<double> power = formulation_.TotalPower();
     f.tail<2>() << power.supplied, power.dissipated;
     return f;
   }
@@ -97,7 +97,7 @@ class RightHandSide {
   }
 
  private:
-  Formulation<Space, double>& formulation_;
+  System<Space, double>& formulation_;
   double t_;
   int size_;
 };
@@ -123,7 +123,7 @@ struct Worst {
 
 /// At a state of a formulation that has started.
 template <class Space>
-void CompareAt(const MechanismDescription& description, Formulation<Space, double>& formulation,
+void CompareAt(const MechanismDescription& description, System<Space, double>& formulation,
                double t, const VectorXd& y, Worst& worst) {
   const int n = formulation.state_size();
   if (n == 0) return;
@@ -135,7 +135,7 @@ void CompareAt(const MechanismDescription& description, Formulation<Space, doubl
   const long before = CountAllocations();
   forward.Evaluate(jacobian);
   EXPECT_EQ(CountAllocations(), before);
-  const Diagnostics& at = formulation.diagnostics();
+  const Diagnostics at = formulation.diagnostics();
   // Redundant constraints become independent ones some 1e-4 off their closure (kTheta), and f
   // another function. Those that count are at least as well conditioned as the solver's fast path
   // asks for.
@@ -143,7 +143,8 @@ void CompareAt(const MechanismDescription& description, Formulation<Space, doubl
   const double widest = redundant ? 1e-6 : 1.0 / 16;
   const double rcond = redundant ? LoopSolver<double>::kSuspicious : at.rcond;
   // round-off of accelerations (docs/numerics.md, section 7)
-  const bool is_odca = dynamic_cast<const odca::Odca<Space, double>*>(&formulation) != nullptr;
+  const bool is_odca =
+      dynamic_cast<const odca::Odca<Space, double>*>(&formulation.solver()) != nullptr;
   const double cancels = is_odca && !redundant ? Slenderness(formulation.mechanism()) : 1.0;
   const double relative = 100 * kEpsilon * formulation.mechanism().num_bodies() / (rcond * cancels);
   const double noise = relative * f0.cwiseAbs().maxCoeff();
@@ -212,18 +213,18 @@ void CompareShipped(const MechanismDescription& description, double t) {
   const Mechanism<Space, double> mechanism(description, Coordinates::kJoint);
   const Start<double> start = Assemble<Space>(description, mechanism);
   ASSERT_EQ(start.outcome, Outcome::kFinished) << start.message;
-  odca::Odca<Space, double> formulation(mechanism, {.enforcement = Enforcement::kVelocity});
-  ASSERT_EQ(formulation.Start(0.0, start.q, start.u), Outcome::kFinished);
-  std::vector<double> y(static_cast<std::size_t>(formulation.state_size()));
-  formulation.ToState(start.q, start.u, y);
-  harness::FormulationOde<Space> ode(formulation);
+  const auto formulation =
+      MakeSystem<odca::Odca>(mechanism, {.enforcement = Enforcement::kVelocity});
+  ASSERT_EQ(formulation->Start(0.0, start.q, start.u), Outcome::kFinished);
+  std::vector<double> y(static_cast<std::size_t>(formulation->state_size()));
+  formulation->ToState(start.q, start.u, y);
   harness::IntegratorOptions options;
   options.rtol = options.atol = 1e-11;
-  y.resize(static_cast<std::size_t>(ode.size()));
-  ASSERT_EQ(Integrate(ode, 0.0, t, y, options).outcome, Outcome::kFinished);
-  y.resize(static_cast<std::size_t>(formulation.state_size()));
-  ASSERT_EQ(formulation.FromState(t, std::span<const double>(y)), Outcome::kFinished);
-  CompareAll<Space>(description, t, formulation.q(), formulation.u());
+  y.resize(static_cast<std::size_t>(formulation->size()));
+  ASSERT_EQ(Integrate(*formulation, 0.0, t, y, options).outcome, Outcome::kFinished);
+  y.resize(static_cast<std::size_t>(formulation->state_size()));
+  ASSERT_EQ(formulation->FromState(t, std::span<const double>(y)), Outcome::kFinished);
+  CompareAll<Space>(description, t, formulation->q(), formulation->u());
 }
 
 class ForwardJacobianOf : public ::testing::TestWithParam<std::string> {};
@@ -294,8 +295,8 @@ TEST(ForwardJacobian, NeedNotKnowHowFarASpringIsWound) {
   description.forces = {JointSpring{.joint = 1, .stiffness = 3.0}};
   const Mechanism<Spatial, double> joint(description, Coordinates::kJoint);
   const Mechanism<Spatial, double> absolute(description, Coordinates::kAbsolute);
-  odca::Odca<Spatial, double> formulation(absolute, {});
-  VectorXd y(formulation.state_size());
+  const auto formulation = MakeSystem<odca::Odca>(absolute);
+  VectorXd y(formulation->state_size());
   const std::span<double> state(y.data(), static_cast<std::size_t>(y.size()));
   for (const double angle : {0.0, 2.0, 4.0, 6.0, 7.0}) {
     Kinematics<Spatial, double> from(joint), to(absolute);
@@ -304,13 +305,13 @@ TEST(ForwardJacobian, NeedNotKnowHowFarASpringIsWound) {
     const VectorXd q = from.CoordinatesIn(absolute);
     to.UpdatePosition(q);
     const VectorXd u = from.SpeedsIn(to);
-    if (angle == 0.0) formulation.Start(0.0, q, u);
-    formulation.ToState(q, u, state);
-    formulation.BeginStep(0.0, state);
+    if (angle == 0.0) formulation->Start(0.0, q, u);
+    formulation->ToState(q, u, state);
+    formulation->BeginStep(0.0, state);
   }
-  EXPECT_NEAR(formulation.kinematics().JointCoordinate(1), 7.0, 1e-12);
+  EXPECT_NEAR(formulation->kinematics().JointCoordinate(1), 7.0, 1e-12);
   Worst worst;
-  CompareAt<Spatial>(description, formulation, 0.0, y, worst);
+  CompareAt<Spatial>(description, *formulation, 0.0, y, worst);
   EXPECT_EQ(worst.comparisons, 1);
 }
 

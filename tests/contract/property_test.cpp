@@ -18,6 +18,7 @@
 #include <memory>
 
 #include "lagrange/lagrange.h"
+#include "mechanism/formulation/system.h"
 #include "odca/odca.h"
 #include "reduction/reduction.h"
 #include "tests/contract/comparison.h"
@@ -116,19 +117,17 @@ struct Method {
 };
 
 template <class Space>
-std::unique_ptr<Formulation<Space, double>> Make(const Method& method,
-                                                 const Mechanism<Space, double>& mechanism) {
+std::unique_ptr<System<Space, double>> Make(const Method& method,
+                                            const Mechanism<Space, double>& mechanism) {
   const FormulationOptions options{method.enforcement, SolverKind::kRankRevealing};
-  if (method.name == "odca") return std::make_unique<odca::Odca<Space, double>>(mechanism, options);
-  if (method.name == "lagrange") {
-    return std::make_unique<lagrange::Lagrange<Space, double>>(mechanism, options);
-  }
-  return std::make_unique<reduction::Reduction<Space, double>>(mechanism, options);
+  if (method.name == "odca") return MakeSystem<odca::Odca>(mechanism, options);
+  if (method.name == "lagrange") return MakeSystem<lagrange::Lagrange>(mechanism, options);
+  return MakeSystem<reduction::Reduction>(mechanism, options);
 }
 
 /// Rate of the energy by differences of the oracle's along the motion, against the powers.
 template <class Space>
-void CheckBalance(Truth<Space>& truth, Formulation<Space, double>& at, Tally& tally) {
+void CheckBalance(Truth<Space>& truth, System<Space, double>& at, Tally& tally) {
   const RealVector q = ToReal(at.q()), u = ToReal(at.u()), udot = ToReal(at.udot());
   VectorX<double> qdot(q.size());
   truth.mechanism.Rates(at.q(), at.u(), qdot);
@@ -152,8 +151,8 @@ void CheckBalance(Truth<Space>& truth, Formulation<Space, double>& at, Tally& ta
 /// Power of the forces `force(j)` in the given joints, against `expected`. Speeds have the size
 /// one.
 template <class Space, class Force>
-void CheckWork(const Formulation<Space, double>& at, const std::vector<int>& joints,
-               const Force& force, double expected, Tally& tally) {
+void CheckWork(const System<Space, double>& at, const std::vector<int>& joints, const Force& force,
+               double expected, Tally& tally) {
   double power = 0.0, scale = 0.0;
   for (int j : joints) {
     const Motion<Space, double> V = at.kinematics().joints()[j].V_rel, F = force(j);
@@ -174,27 +173,27 @@ void CheckWork(const Formulation<Space, double>& at, const std::vector<int>& joi
 /// prescribed motions, the drives' power with them. Reduction has no forces of its own: its balance
 /// says the same.
 template <class Space>
-void CheckConstraints(Formulation<Space, double>& at, int user_joints, Tally& tally) {
+void CheckConstraints(System<Space, double>& at, int user_joints, Tally& tally) {
   const Mechanism<Space, double>& mechanism = at.mechanism();
   const double drives = at.DrivePower();
   if (mechanism.drives().empty()) {
     EXPECT_EQ(drives, 0.0);
   }
   if (mechanism.num_u() == 0) return;  // nothing to solve for, no forces
-  if (const auto* odca = dynamic_cast<const odca::Odca<Space, double>*>(&at)) {
+  if (const auto* odca = dynamic_cast<const odca::Odca<Space, double>*>(&at.solver())) {
     std::vector<int> joints(user_joints);
     for (int j = 0; j < user_joints; ++j) joints[j] = j;
     CheckWork(
         at, joints, [&](int j) { return odca->JointForce(j); }, drives, tally);
   }
-  if (const auto* lagrange = dynamic_cast<const lagrange::Lagrange<Space, double>*>(&at)) {
+  if (dynamic_cast<const lagrange::Lagrange<Space, double>*>(&at.solver()) != nullptr) {
     // in joint coordinates all drives are in the tree, none among the multipliers
     const bool rows = mechanism.coordinates() == Coordinates::kAbsolute;
     const auto force = [&](int j) {
       const JointState<Space, double>& state = at.kinematics().joints()[j];
       Motion<Space, double> F = Motion<Space, double>::Zero();
       for (int r = 0; r < state.rows(); ++r) {
-        F += state.D(r) * lagrange->multipliers()[mechanism.joints()[j].row + r];
+        F += state.D(r) * at.Multipliers()[mechanism.joints()[j].row + r];
       }
       return F;
     };

@@ -9,6 +9,7 @@
 #include <utility>
 #include <vector>
 
+#include "mechanism/formulation/system.h"
 #include "mechanism/loops/tree_dynamics.h"
 #include "mechanism/simplify/compile.h"
 #include "odca/odca.h"
@@ -59,31 +60,31 @@ void AddPart(const Truth& truth, const Compiled& compiled, int part, double* err
   const Mechanism<Space, double> mechanism(description, Coordinates::kJoint);
   const Start<double> start = Assemble<Space>(description, mechanism);
   ASSERT_EQ(start.outcome, Outcome::kFinished) << start.message;
-  odca::Odca<Space, double> odca(mechanism, {});
+  const auto odca = MakeSystem<odca::Odca>(mechanism);
   VectorX<double> udot(mechanism.num_u());
-  ASSERT_EQ(odca.Start(0.0, start.q, start.u), Outcome::kFinished);
-  ASSERT_EQ(odca.Evaluate(0.0, start.q, start.u, udot), Outcome::kFinished);
+  ASSERT_EQ(odca->Start(0.0, start.q, start.u), Outcome::kFinished);
+  ASSERT_EQ(odca->Evaluate(0.0, start.q, start.u, udot), Outcome::kFinished);
   TreeDynamics<Space, double> dynamics(mechanism);
   std::vector<Motion<Space, double>> A(mechanism.num_bodies());
-  dynamics.BodyAccelerations(odca.kinematics(), udot, A);
+  dynamics.BodyAccelerations(odca->kinematics(), udot, A);
   const Eigen::Matrix3d& R_WC = compiled.parts[part].R_WC;
   for (std::size_t b = 1; b < compiled.bodies.size(); ++b) {
     const BodyImage& image = compiled.bodies[b];
     if (image.part != part) continue;
-    const auto X = UserPose<Space>(compiled, static_cast<int>(b), &odca.kinematics());
+    const auto X = UserPose<Space>(compiled, static_cast<int>(b), &odca->kinematics());
     const Eigen::Vector3d com = X.R * truth.description.bodies[b].com + X.p;
     Eigen::Vector3d w = Eigen::Vector3d::Zero(), alpha = w, a = w, from = w;
-    const Motion<Space, double>&V = odca.kinematics().motions()[image.body], &dV = A[image.body];
+    const Motion<Space, double>&V = odca->kinematics().motions()[image.body], &dV = A[image.body];
     if constexpr (Space::kRot == 1) {
       w.z() = V[0];
       alpha.z() = dV[0];
       a.head<2>() = dV.template tail<2>();
-      from.head<2>() = odca.kinematics().poses()[image.body].p;
+      from.head<2>() = odca->kinematics().poses()[image.body].p;
     } else {
       w = V.template head<3>();
       alpha = dV.template head<3>();
       a = dV.template tail<3>();
-      from = odca.kinematics().poses()[image.body].p;
+      from = odca->kinematics().poses()[image.body].p;
     }
     w = (R_WC * w).eval();
     alpha = (R_WC * alpha).eval();

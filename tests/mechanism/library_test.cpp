@@ -3,6 +3,7 @@
 
 #include <gtest/gtest.h>
 
+#include "mechanism/formulation/system.h"
 #include "mechanism/start/assembly.h"
 #include "odca/odca.h"
 
@@ -17,10 +18,10 @@ Shape ShapeOf(const MechanismDescription& description) {
   const Mechanism<Planar, double> mechanism(description, Coordinates::kJoint);
   const Start<double> start = Assemble<Planar>(description, mechanism);
   EXPECT_EQ(start.outcome, Outcome::kFinished) << description.name << ": " << start.message;
-  odca::Odca<Planar, double> formulation(mechanism, {});
+  const auto formulation = MakeSystem<odca::Odca>(mechanism);
   VectorX<double> udot;
-  EXPECT_EQ(formulation.Evaluate(0.0, start.q, start.u, udot), Outcome::kFinished);
-  return {mechanism.num_loops(), mechanism.num_joint_speeds() - formulation.diagnostics().rank};
+  EXPECT_EQ(formulation->Evaluate(0.0, start.q, start.u, udot), Outcome::kFinished);
+  return {mechanism.num_loops(), mechanism.num_joint_speeds() - formulation->diagnostics().rank};
 }
 
 TEST(LibraryTest, ChainsHaveOneLoop) {

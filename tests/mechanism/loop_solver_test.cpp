@@ -8,6 +8,7 @@
 #include <limits>
 
 #include "lagrange/lagrange.h"
+#include "mechanism/formulation/system.h"
 #include "odca/odca.h"
 #include "tests/contract/comparison.h"
 
@@ -143,11 +144,9 @@ void ExpectRankAndAccelerations(const MechanismDescription& d, int rank, double 
   for (Coordinates coordinates : {Coordinates::kJoint, Coordinates::kAbsolute}) {
     const testing::State& state = sample.state(coordinates);
     const Mechanism<Space, double>& mechanism = sample.mechanism(coordinates);
-    odca::Odca<Space, double> odca(mechanism, {});
-    lagrange::Lagrange<Space, double> lagrange(mechanism, {});
-    for (Formulation<Space, double>* formulation :
-         {static_cast<Formulation<Space, double>*>(&odca),
-          static_cast<Formulation<Space, double>*>(&lagrange)}) {
+    const auto odca = MakeSystem<odca::Odca>(mechanism);
+    const auto lagrange = MakeSystem<lagrange::Lagrange>(mechanism);
+    for (System<Space, double>* formulation : {odca.get(), lagrange.get()}) {
       VectorX<double> udot;
       ASSERT_EQ(formulation->Evaluate(0.0, state.q, state.u, udot), Outcome::kFinished);
       // rank in the joint set: that of the loop

@@ -12,6 +12,7 @@
 #include "odca/odca.h"
 #include "tests/contract/builder.h"
 #include "tests/contract/comparison.h"
+#include "tests/contract/system_with.h"
 
 namespace loopbench::odca {
 namespace {
@@ -31,13 +32,13 @@ struct Residuals {
 template <class Space>
 Residuals ResidualsOf(const MechanismDescription& description) {
   const Mechanism<Space, double> mechanism(description, Coordinates::kJoint);
-  Odca<Space, double> odca(mechanism, {});
+  testing::SystemWith<Odca, Space, double> odca(mechanism);
   testing::Random random(5);
   VectorX<double> u(mechanism.num_u()), udot;
   for (int i = 0; i < u.size(); ++i) u[i] = random.Uniform(-1.0, 1.0) / std::sqrt(u.size());
   const VectorX<double> q = testing::DescribedCoordinates(description, mechanism);
-  EXPECT_EQ(odca.Evaluate(0.0, q, u, udot), Outcome::kFinished);
-  const Kinematics<Space, double>& kinematics = odca.kinematics();
+  EXPECT_EQ(odca->Evaluate(0.0, q, u, udot), Outcome::kFinished);
+  const Kinematics<Space, double>& kinematics = odca->kinematics();
   std::vector<Motion<Space, double>> A(mechanism.num_bodies(), Motion<Space, double>::Zero());
   TreeDynamics<Space, double>(mechanism).BodyAccelerations(kinematics, udot, A);
 
@@ -63,7 +64,7 @@ Residuals ResidualsOf(const MechanismDescription& description) {
     const Motion<Space, double> miss = JointAcceleration<Space, double>(kinematics, j, A);
     result.joints = std::max(result.joints, miss.head(state.rows()).norm());
     if (state.rows() == 0) continue;
-    const Motion<Space, double> F = odca.JointForce(j);
+    const Motion<Space, double> F = odca.solver().JointForce(j);
     largest_F = std::max(largest_F, F.norm());
     missing[joint.to] += ShiftForce<Space, double>(F, state.r_Q);
     missing[joint.from] -= ShiftForce<Space, double>(F, state.r_P);
@@ -73,12 +74,12 @@ Residuals ResidualsOf(const MechanismDescription& description) {
   }
   result.joints /= largest_A;
   result.bodies /= largest_F;
-  result.rcond = odca.diagnostics().rcond;
-  result.operations = odca.sweep().operations();
+  result.rcond = odca->diagnostics().rcond;
+  result.operations = odca.solver().sweep().operations();
   std::printf("%-24s n %5d: joints %.1e bodies %.1e of their scales, rcond %.1e, %ld operations\n",
               description.name.c_str(), mechanism.num_bodies() - 1, result.joints, result.bodies,
               result.rcond, result.operations);
-  EXPECT_EQ(result.operations, odca.plan().operations(Space::kDim));
+  EXPECT_EQ(result.operations, odca.solver().plan().operations(Space::kDim));
   return result;
 }
 

@@ -13,6 +13,7 @@
 #include "odca/odca.h"
 #include "odca/pairing.h"
 #include "tests/contract/comparison.h"
+#include "tests/contract/system_with.h"
 
 namespace loopbench::odca {
 namespace {
@@ -278,11 +279,11 @@ TEST(PlanTest, OperationsAreThoseOfTheSweep) {
     const Mechanism<Spatial, double> mechanism(graph, Coordinates::kJoint);
     const State state = ConsistentState(graph, mechanism, seed);
     for (const PlanOptions& options : kAllOptions) {
-      Odca<Spatial, double> odca(mechanism, {}, options);
+      testing::SystemWith<Odca, Spatial, double> odca(mechanism, {}, options);
       VectorX<double> udot;
-      ASSERT_EQ(odca.Evaluate(0.0, state.q, state.u, udot), Outcome::kFinished);
-      if (odca.sweep().joins().softened()) continue;
-      EXPECT_EQ(odca.plan().operations(6), odca.sweep().operations());
+      ASSERT_EQ(odca->Evaluate(0.0, state.q, state.u, udot), Outcome::kFinished);
+      if (odca.solver().sweep().joins().softened()) continue;
+      EXPECT_EQ(odca.solver().plan().operations(6), odca.solver().sweep().operations());
     }
   }
 }
@@ -346,10 +347,10 @@ TEST(PlanTest, EveryOptionGivesTheSameAccelerations) {
         const State& state = sample.state(Coordinates::kJoint);
         for (const PlanOptions& options : kAllOptions) {
           for (SolverKind solver : {SolverKind::kAsPublished, SolverKind::kRankRevealing}) {
-            Odca<Space, double> odca(sample.mechanism(Coordinates::kJoint), {.solver = solver},
-                                     options);
+            testing::SystemWith<Odca, Space, double> odca(sample.mechanism(Coordinates::kJoint),
+                                                          {.solver = solver}, options);
             VectorX<double> udot;
-            ASSERT_EQ(odca.Evaluate(0.0, state.q, state.u, udot), Outcome::kFinished);
+            ASSERT_EQ(odca->Evaluate(0.0, state.q, state.u, udot), Outcome::kFinished);
             EXPECT_LE(RelativeError(udot, sample.udot(Coordinates::kJoint)), sample.Bound());
           }
         }

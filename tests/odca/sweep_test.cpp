@@ -8,6 +8,7 @@
 #include "mechanism/description/library.h"
 #include "odca/odca.h"
 #include "tests/contract/comparison.h"
+#include "tests/contract/system_with.h"
 
 namespace loopbench::odca {
 namespace {
@@ -15,14 +16,14 @@ namespace {
 /// Operations of one evaluation; any position will do.
 long Operations(const MechanismDescription& description, SolverKind solver) {
   const Mechanism<Planar, double> mechanism(description, Coordinates::kJoint);
-  Odca<Planar, double> odca(mechanism, {.solver = solver});
+  testing::SystemWith<Odca, Planar, double> odca(mechanism, {.solver = solver});
   VectorX<double> q = VectorX<double>::Zero(mechanism.num_q()), udot;
   for (const JointValues& values : description.initial.coordinates) {
     q[mechanism.joints()[values.joint].q_offset] = values.values[0];
   }
   const VectorX<double> u = VectorX<double>::Zero(mechanism.num_u());
-  EXPECT_EQ(odca.Evaluate(0.0, q, u, udot), Outcome::kFinished);
-  return odca.sweep().operations();
+  EXPECT_EQ(odca->Evaluate(0.0, q, u, udot), Outcome::kFinished);
+  return odca.solver().sweep().operations();
 }
 
 TEST(SweepTest, TenTimesTheBodiesCostAtMostTwelveTimesTheOperations) {
@@ -58,18 +59,18 @@ TEST(SweepTest, LongDoubleAgreesWithDouble) {
     const testing::Sample<Planar> sample(chain, 3);
     const testing::State& state = sample.state(Coordinates::kJoint);
     const Mechanism<Planar, long double> mechanism(chain, Coordinates::kJoint);
-    Odca<Planar, long double> odca(mechanism, {});
+    testing::SystemWith<Odca, Planar, long double> odca(mechanism);
     VectorX<long double> udot;
-    ASSERT_EQ(odca.Evaluate(0.0L, testing::ToReal(state.q), testing::ToReal(state.u), udot),
+    ASSERT_EQ(odca->Evaluate(0.0L, testing::ToReal(state.q), testing::ToReal(state.u), udot),
               Outcome::kFinished);
     const long double scale = udot.lpNorm<Eigen::Infinity>();
     const long double error =
         (udot - sample.udot(Coordinates::kJoint)).lpNorm<Eigen::Infinity>() / scale;
     // joint frames reach the mechanism in double, hence a few eps of double and not of long double
     EXPECT_LE(error, 10.0L * n * std::numeric_limits<double>::epsilon() / sample.answer().rcond);
-    Odca<Planar, double> in_double(sample.mechanism(Coordinates::kJoint), {});
+    testing::SystemWith<Odca, Planar, double> in_double(sample.mechanism(Coordinates::kJoint));
     VectorX<double> udot_double;
-    in_double.Evaluate(0.0, state.q, state.u, udot_double);
+    in_double->Evaluate(0.0, state.q, state.u, udot_double);
     EXPECT_LE(testing::RelativeError(udot_double, udot), sample.Bound());
   }
 }

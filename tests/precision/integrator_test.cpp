@@ -18,7 +18,7 @@ namespace {
 
 /// Smooth, non-autonomous and coupled, with the solution (e^sin t, cos t, sin t).
 template <class S>
-System<S> SmoothProblem() {
+Problem<S> SmoothProblem() {
   return {3,
           [](S t, std::span<const S> y, std::span<S> ydot) {
             using std::log;
@@ -122,7 +122,7 @@ TYPED_TEST(OneStepTest, TakesNoStepForARounding) {
 /// A rewritten state makes the derivative be evaluated anew: seven evaluations a step instead of
 /// six.
 TEST(OneStepOutcomeTest, RewrittenStatesRestart) {
-  System<double> system = SmoothProblem<double>();
+  Problem<double> system = SmoothProblem<double>();
   std::vector<double> y = {1.0, 1.0, 0.0};
   const OneStepOptions<double> options{.fixed_step = 1.0 / 16};
   const OneStepResult kept = IntegrateSystem<double>(system, 1.0, y, options);
@@ -151,7 +151,6 @@ TEST(ArkodeTest, TakesTheSameStepsInDouble) {
         SCOPED_TRACE(testing::Message()
                      << name << " " << ToString(enforcement) << " " << tolerance);
         const auto formulation = MakeFormulation<Planar>({.enforcement = enforcement}, mechanism);
-        FormulationOde<Planar> ode(*formulation);
         std::vector<double> theirs(formulation->state_size()), ours = theirs;
         const auto begin = [&](std::vector<double>& y) {
           formulation->Start(0.0, start.q, start.u);
@@ -161,11 +160,11 @@ TEST(ArkodeTest, TakesTheSameStepsInDouble) {
         IntegratorOptions options;
         options.rtol = options.atol = tolerance;
         const IntegratorResult expected =
-            Integrate(ode, 0.0, 5.0, theirs, options, [&](double t, std::span<double> y) {
+            Integrate(*formulation, 0.0, 5.0, theirs, options, [&](double t, std::span<double> y) {
               return formulation->BeginStep(t, y) ? StepAction::kRestart : StepAction::kContinue;
             });
         begin(ours);
-        const System<double> system{
+        const Problem<double> system{
             formulation->state_size(),
             [&](double t, std::span<const double> y, std::span<double> rates) {
               return formulation->Derivative(t, y, rates);

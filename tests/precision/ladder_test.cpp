@@ -10,6 +10,7 @@
 #include "harness/precision/exact.h"
 #include "harness/precision/integrator.h"
 #include "lagrange/lagrange.h"
+#include "mechanism/formulation/system.h"
 #include "odca/odca.h"
 #include "reduction/reduction.h"
 
@@ -58,16 +59,16 @@ TEST(ClosedFormTest, ParallelogramFollowsItsPendulumInFloat128) {
   const Float128 eps = std::numeric_limits<Float128>::epsilon();
   EXPECT_LE(exact.Drift(Float128(0), exact.q()), 16 * eps);
   const Mechanism<Planar, Float128> mechanism(description, Coordinates::kJoint);
-  odca::Odca<Planar, Float128> odca(mechanism, {});
-  ASSERT_EQ(odca.Start(Float128(0), exact.q(), exact.u()), Outcome::kFinished);
-  std::vector<Float128> y(odca.state_size());
-  odca.ToState(exact.q(), exact.u(), y);
-  const System<Float128> system{
-      odca.state_size(),
+  const auto odca = MakeSystem<odca::Odca>(mechanism);
+  ASSERT_EQ(odca->Start(Float128(0), exact.q(), exact.u()), Outcome::kFinished);
+  std::vector<Float128> y(odca->state_size());
+  odca->ToState(exact.q(), exact.u(), y);
+  const Problem<Float128> system{
+      odca->state_size(),
       [&](const Float128& t, std::span<const Float128> state, std::span<Float128> rates) {
-        return odca.Derivative(t, state, rates);
+        return odca->Derivative(t, state, rates);
       },
-      [&](const Float128& t, std::span<Float128> state) { return odca.BeginStep(t, state); }};
+      [&](const Float128& t, std::span<Float128> state) { return odca->BeginStep(t, state); }};
   const Float128 pi = std::numbers::pi_v<Float128>, end = Float128(1) / 4;
   const OneStepResult result = IntegrateSystem<Float128>(
       system, end, y, {.method = OneStepMethod::kGragg, .tolerance = Float128(1e-29)});

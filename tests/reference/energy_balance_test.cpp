@@ -195,12 +195,12 @@ TEST(Balance, IntegratingWorkLeavesTheBitsOfTheMotion) {
   for (const bool with_work : {false, true}) {
     const auto formulation = MakeFormulation<Planar>(PublishedColumns()[0], mechanism);
     ASSERT_EQ(formulation->Start(0.0, start.q, start.u), Outcome::kFinished);
-    FormulationOde<Planar> ode(*formulation, with_work);
-    std::vector<double> y(static_cast<std::size_t>(ode.size()), 0.0);
+    formulation->IntegrateWork(with_work);
+    std::vector<double> y(static_cast<std::size_t>(formulation->size()), 0.0);
     formulation->ToState(start.q, start.u, y);
     IntegratorOptions options;
     options.stop_times = mechanism.stop_times();
-    ASSERT_EQ(Integrate(ode, 0.0, kHorizon, y, options).outcome, Outcome::kFinished);
+    ASSERT_EQ(Integrate(*formulation, 0.0, kHorizon, y, options).outcome, Outcome::kFinished);
     y.resize(static_cast<std::size_t>(formulation->state_size()));
     ends.push_back(y);
   }

@@ -17,20 +17,20 @@ namespace {
 template <class Space>
 class WithIntegrals final : public Ode {
  public:
-  explicit WithIntegrals(Formulation<Space, double>& formulation) : formulation_(formulation) {}
+  explicit WithIntegrals(System<Space, double>& formulation) : formulation_(formulation) {}
   int size() const override { return formulation_.state_size() + 2; }
   int num_quadratures() const override { return formulation_.state_size() > 0 ? 2 : 0; }
   Outcome Derivative(double t, std::span<const double> y, std::span<double> ydot) override {
     const std::size_t n = y.size() - 2;
     const Outcome outcome = formulation_.Derivative(t, y.first(n), ydot.first(n));
-    const Power<double> power = PowerOf(formulation_);
+    const Power<double> power = formulation_.TotalPower();
     ydot[n] = ComputeEnergy(formulation_.kinematics()).kinetic;
     ydot[n + 1] = power.supplied - power.dissipated;
     return outcome;
   }
 
  private:
-  Formulation<Space, double>& formulation_;
+  System<Space, double>& formulation_;
 };
 
 BodyState StateOf(const Pose<Planar, double>& X, const Motion<Planar, double>& V) {

@@ -1,4 +1,4 @@
-#include "mechanism/formulation/formulation.h"
+#include "mechanism/formulation/options.h"
 
 namespace loopbench {
 

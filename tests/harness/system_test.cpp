@@ -1,4 +1,4 @@
-// A formulation as the integrator sees it: Jacobians at the right state, orders of implicit
+// A system as the integrator sees it: Jacobians at the right state, orders of implicit
 // profiles.
 #include <gtest/gtest.h>
 
@@ -24,50 +24,50 @@ struct Scene {
   explicit Scene(const std::string& name, const Column& column)
       : description(ReadMechanism(kConfigs / "mechanisms" / (name + ".json")).description),
         mechanism(description, column.coordinates),
-        formulation(MakeFormulation<Planar>(column, mechanism)) {
+        system(MakeFormulation<Planar>(column, mechanism)) {
     const Start<double> start = Assemble<Planar>(description, mechanism);
-    EXPECT_EQ(formulation->Start(0.0, start.q, start.u), Outcome::kFinished);
-    y.resize(static_cast<std::size_t>(formulation->state_size()));
-    formulation->ToState(start.q, start.u, y);
+    EXPECT_EQ(system->Start(0.0, start.q, start.u), Outcome::kFinished);
+    y.resize(static_cast<std::size_t>(system->state_size()));
+    system->ToState(start.q, start.u, y);
   }
-  std::unique_ptr<ForwardJacobian<Planar>> Jacobian() {
-    return std::make_unique<ForwardJacobian<Planar>>(description, *formulation);
+  void UseJacobian() {
+    system->UseJacobian(std::make_unique<ForwardJacobian<Planar>>(description, *system));
   }
 
   MechanismDescription description;
   Mechanism<Planar, double> mechanism;
-  std::unique_ptr<Formulation<Planar, double>> formulation;
+  std::unique_ptr<System<Planar, double>> system;
   std::vector<double> y;
 };
 
 constexpr Column kColumn{FormulationKind::kOdca, Enforcement::kAcceleration, Coordinates::kJoint,
                          SolverKind::kRankRevealing};
 
-TEST(FormulationOde, EvaluatesAfreshWhereTheFormulationHasMovedAway) {
+TEST(SystemTest, EvaluatesAfreshForAJacobianWhereItHasMovedAway) {
   Scene scene("four-bar", kColumn);
-  FormulationOde<Planar> ode(*scene.formulation, false, scene.Jacobian());
+  System<Planar, double>& system = *scene.system;
+  scene.UseJacobian();
   const std::size_t n = scene.y.size();
   std::vector<double> ydot(n), elsewhere = scene.y, at_once(n * n), later(n * n), moved(n * n);
   elsewhere[0] += 0.1;
-  ode.Derivative(0.0, scene.y, ydot);
-  EXPECT_EQ(ode.Jacobian(0.0, scene.y, at_once).value().derivatives, 0);
-  EXPECT_EQ(ode.Jacobian(0.0, scene.y, later).value().derivatives, 1);
+  system.Derivative(0.0, scene.y, ydot);
+  EXPECT_EQ(system.Jacobian(0.0, scene.y, at_once).value().derivatives, 0);
+  EXPECT_EQ(system.Jacobian(0.0, scene.y, later).value().derivatives, 1);
   EXPECT_EQ(later, at_once);
-  EXPECT_EQ(ode.Jacobian(0.0, elsewhere, moved).value().derivatives, 1);
+  EXPECT_EQ(system.Jacobian(0.0, elsewhere, moved).value().derivatives, 1);
   EXPECT_NE(moved, at_once);
   later = moved;
-  // an observer evaluates the formulation itself
-  ode.Derivative(0.0, scene.y, ydot);
-  scene.formulation->Derivative(0.0, std::span<const double>(elsewhere), ydot);
-  EXPECT_EQ(ode.Jacobian(0.0, scene.y, later).value().derivatives, 1);
+  // an observer evaluates it elsewhere
+  system.Derivative(0.0, scene.y, ydot);
+  system.Derivative(0.0, elsewhere, ydot);
+  EXPECT_EQ(system.Jacobian(0.0, scene.y, later).value().derivatives, 1);
   EXPECT_EQ(later, at_once);
 }
 
-TEST(FormulationOde, HasNoJacobianUnlessGivenOne) {
+TEST(SystemTest, HasNoJacobianUnlessGivenOne) {
   Scene scene("four-bar", kColumn);
-  FormulationOde<Planar> ode(*scene.formulation);
   std::vector<double> jacobian(scene.y.size() * scene.y.size());
-  EXPECT_FALSE(ode.Jacobian(0.0, scene.y, jacobian).has_value());
+  EXPECT_FALSE(scene.system->Jacobian(0.0, scene.y, jacobian).has_value());
 }
 
 struct Order {
@@ -79,12 +79,12 @@ struct Order {
 /// of 1e-14 in each stage.
 double ErrorWithStep(const std::string& profile, double step, const std::vector<double>& exact) {
   Scene scene("four-bar", kColumn);
-  FormulationOde<Planar> ode(*scene.formulation, false, scene.Jacobian());
+  scene.UseJacobian();
   IntegratorOptions options;
   options.profile = profile;
   options.rtol = options.atol = 1e-14;
   options.fixed_step = step;
-  const IntegratorResult result = Integrate(ode, 0.0, 1.0, scene.y, options);
+  const IntegratorResult result = Integrate(*scene.system, 0.0, 1.0, scene.y, options);
   EXPECT_EQ(result.outcome, Outcome::kFinished) << result.message;
   EXPECT_EQ(result.jacobian_rhs_evaluations, 0);
   EXPECT_EQ(result.dual_evaluations, result.jacobians);  // six components, eight columns at once
@@ -95,13 +95,12 @@ double ErrorWithStep(const std::string& profile, double step, const std::vector<
   return error;
 }
 
-TEST(FormulationOde, ImplicitProfilesHaveTheirOrderWithForwardJacobians) {
+TEST(SystemTest, ImplicitProfilesHaveTheirOrderWithForwardJacobians) {
   Scene exact("four-bar", kColumn);
-  FormulationOde<Planar> ode(*exact.formulation);
   IntegratorOptions options;
   options.profile = "fehlberg-78";
   options.rtol = options.atol = 1e-14;
-  ASSERT_EQ(Integrate(ode, 0.0, 1.0, exact.y, options).outcome, Outcome::kFinished);
+  ASSERT_EQ(Integrate(*exact.system, 0.0, 1.0, exact.y, options).outcome, Outcome::kFinished);
   for (const Order& one : {Order{"trbdf2", 2, 1.0 / 64},
                            {"kennedy-carpenter-32", 3, 1.0 / 64},
                            {"kennedy-carpenter-43", 4, 1.0 / 32},

@@ -1,0 +1,48 @@
+#include "mechanism/formulation/constraint_solver.h"
+
+#include "mechanism/algebra/instantiate.h"
+
+namespace loopbench {
+
+template <class Space, class S>
+bool ConstraintSolver<Space, S>::Accelerate(const Kinematics<Space, S>&, const VectorX<S>&,
+                                            VectorX<S>&, VectorX<S>*) {
+  return false;
+}
+
+template <class Space, class S>
+void ConstraintSolver<Space, S>::Correct(const VectorX<S>& target, VectorX<S>& x) {
+  Solve(VectorX<S>(), target, x, nullptr);
+}
+
+template <class Space, class S>
+bool ConstraintSolver<Space, S>::CompleteSpeeds(Kinematics<Space, S>&, VectorX<S>&) {
+  return false;
+}
+
+template <class Space, class S>
+void ConstraintSolver<Space, S>::Start(const Kinematics<Space, S>&) {}
+
+template <class Space, class S>
+bool ConstraintSolver<Space, S>::Review(const Kinematics<Space, S>&) {
+  return false;
+}
+
+template <class Space, class S>
+int LoopRank(const Mechanism<Space, S>& mechanism, int dependent_rows) {
+  int user_tree_rows = 0;
+  if (mechanism.coordinates() == Coordinates::kAbsolute) {
+    // every user joint is a constraint here; those of a spanning forest never depend on each other,
+    // and they are what turns the speeds of free bodies into joint speeds
+    user_tree_rows = mechanism.num_u() - mechanism.num_joint_speeds();
+  }
+  return mechanism.num_rows() - user_tree_rows - dependent_rows;
+}
+
+#define LOOPBENCH_INSTANTIATE(Space, S)      \
+  template class ConstraintSolver<Space, S>; \
+  template int LoopRank(const Mechanism<Space, S>&, int);
+LOOPBENCH_FOR_EACH_SPACE_AND_SCALAR(LOOPBENCH_INSTANTIATE)
+#undef LOOPBENCH_INSTANTIATE
+
+}  // namespace loopbench

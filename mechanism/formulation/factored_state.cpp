@@ -1,0 +1,59 @@
+#include "mechanism/formulation/factored_state.h"
+
+#include <algorithm>
+
+#include "mechanism/algebra/instantiate.h"
+
+namespace loopbench {
+
+template <class Space, class S>
+Outcome FactoredState<Space, S>::Factor() {
+  if (factored_version_ == kinematics_.position_version()) return Outcome::kFinished;
+  const Outcome outcome = solver_.Factor(kinematics_);
+  factored_version_ = outcome == Outcome::kFinished ? kinematics_.position_version() : -1;
+  return outcome;
+}
+
+template <class Space, class S>
+Outcome FactoredState<Space, S>::Correct(const VectorX<S>& violation, VectorX<S>& change) {
+  if (const Outcome outcome = Factor(); outcome != Outcome::kFinished) return outcome;
+  target_ = -violation;
+  solver_.Correct(target_, change);
+  return change.allFinite() ? Outcome::kFinished : Outcome::kNonFinite;
+}
+
+template <class Space, class S>
+void PositionViolation(const Kinematics<Space, S>& kinematics, VectorX<S>& violation,
+                       Correction<S>& largest) {
+  largest.shift = largest.rotation = S(0);
+  for (int index : kinematics.mechanism().constraints()) {
+    const Joint<Space, S>& joint = kinematics.mechanism().joints()[index];
+    const auto D = kinematics.joints()[index].D();
+    const Motion<Space, S> all = kinematics.ConstraintMismatch(index);
+    Motion<Space, S> constrained = Motion<Space, S>::Zero();
+    for (int r = 0; r < joint.num_constraints(); ++r) {
+      violation[joint.row + r] = D.col(r).dot(all);
+      constrained += D.col(r) * violation[joint.row + r];
+    }
+    largest.rotation = std::max(largest.rotation, constrained.template head<Space::kRot>().norm());
+    largest.shift = std::max(largest.shift, constrained.template tail<Space::kLin>().norm());
+  }
+}
+
+template <class Space, class S>
+void SpeedViolation(const Kinematics<Space, S>& kinematics, VectorX<S>& violation) {
+  for (int index : kinematics.mechanism().constraints()) {
+    const Joint<Space, S>& joint = kinematics.mechanism().joints()[index];
+    violation.segment(joint.row, joint.num_constraints()) =
+        kinematics.ConstraintSpeed(index).head(joint.num_constraints());
+  }
+}
+
+#define LOOPBENCH_INSTANTIATE(Space, S)                                                      \
+  template class FactoredState<Space, S>;                                                    \
+  template void PositionViolation(const Kinematics<Space, S>&, VectorX<S>&, Correction<S>&); \
+  template void SpeedViolation(const Kinematics<Space, S>&, VectorX<S>&);
+LOOPBENCH_FOR_EACH_SPACE_AND_SCALAR(LOOPBENCH_INSTANTIATE)
+#undef LOOPBENCH_INSTANTIATE
+
+}  // namespace loopbench

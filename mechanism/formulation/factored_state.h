@@ -1,0 +1,70 @@
+// A mechanism at one time, position and speed, with a solver's factors of that position.
+//
+// The one owner of (q, u): levels and the right-hand side read and change the state here, and with
+// it the kinematics. Factors are made when somebody needs them, once per position.
+#pragma once
+
+#include "mechanism/formulation/constraint_solver.h"
+
+namespace loopbench {
+
+template <class Space, class S>
+class FactoredState {
+ public:
+  /// Both must outlive the object.
+  FactoredState(const Mechanism<Space, S>& mechanism, ConstraintSolver<Space, S>& solver)
+      : kinematics_(mechanism),
+        solver_(solver),
+        q_(VectorX<S>::Zero(mechanism.num_q())),
+        u_(VectorX<S>::Zero(mechanism.num_u())),
+        target_(VectorX<S>::Zero(mechanism.num_rows())) {}
+
+  const VectorX<S>& q() const { return q_; }
+  const VectorX<S>& u() const { return u_; }
+  void SetPositions(const Eigen::Ref<const VectorX<S>>& q) {
+    q_ = q;
+    kinematics_.UpdatePosition(q_);
+  }
+  /// Positions must be current.
+  void SetSpeeds(const Eigen::Ref<const VectorX<S>>& u) {
+    u_ = u;
+    kinematics_.UpdateVelocity(u_);
+  }
+
+  Kinematics<Space, S>& kinematics() { return kinematics_; }
+  const Kinematics<Space, S>& kinematics() const { return kinematics_; }
+  const Mechanism<Space, S>& mechanism() const { return kinematics_.mechanism(); }
+  ConstraintSolver<Space, S>& solver() { return solver_; }
+
+  /// The solver's, unless it has factored the current positions already.
+  Outcome Factor();
+  /// The solver's mode has changed.
+  void ForgetFactors() { factored_version_ = -1; }
+
+  /// A change of speeds with J change = -violation at the current positions.
+  Outcome Correct(const VectorX<S>& violation, VectorX<S>& change);
+
+ private:
+  Kinematics<Space, S> kinematics_;
+  ConstraintSolver<Space, S>& solver_;
+  long factored_version_ = -1;  ///< of the kinematics' positions
+  VectorX<S> q_, u_, target_;
+};
+
+/// Largest mismatches of points [m] and of rotations [rad].
+template <class S>
+struct Correction {
+  S shift = S(0), rotation = S(0);
+  int iterations = 0;  ///< Newton steps, each with an assembly of its own
+};
+
+/// D^T mismatch of all constraints by row, and its largest parts in `largest`.
+template <class Space, class S>
+void PositionViolation(const Kinematics<Space, S>& kinematics, VectorX<S>& violation,
+                       Correction<S>& largest);
+
+/// J u + b, by row: D^T (V_Q - V_P) of all constraints, less prescribed rates.
+template <class Space, class S>
+void SpeedViolation(const Kinematics<Space, S>& kinematics, VectorX<S>& violation);
+
+}  // namespace loopbench

@@ -1,0 +1,95 @@
+// Level position: after each accepted step Newton's method on the mismatch of positions, then one
+// step on that of speeds.
+#include <algorithm>
+#include <limits>
+
+#include "mechanism/algebra/instantiate.h"
+#include "mechanism/formulation/level.h"
+
+namespace loopbench {
+
+namespace {
+
+/// Newton converges in two or three steps from what one accepted step leaves.
+constexpr int kMostProjections = 10;
+
+template <class Space, class S>
+class PositionLevel final : public Level<Space, S> {
+ public:
+  explicit PositionLevel(const Mechanism<Space, S>& mechanism)
+      : violation_(VectorX<S>::Zero(mechanism.num_rows())),
+        change_(VectorX<S>::Zero(mechanism.num_u())),
+        q_(VectorX<S>::Zero(mechanism.num_q())),
+        moved_(q_),
+        step_(q_),
+        u_(change_) {}
+
+  Accepted Accept(FactoredState<Space, S>& state, S) override {
+    if (violation_.size() == 0 || change_.size() == 0) return Accepted::kAsItWas;
+    Outcome outcome = ProjectPositions(state);
+    if (outcome == Outcome::kFinished) outcome = ProjectSpeeds(state);
+    const bool finite = state.q().allFinite() && state.u().allFinite();
+    return outcome == Outcome::kFinished && finite ? Accepted::kProjected : Accepted::kFailed;
+  }
+
+ private:
+  Outcome ProjectPositions(FactoredState<Space, S>& state) {
+    const Kinematics<Space, S>& kinematics = state.kinematics();
+    const Mechanism<Space, S>& mechanism = state.mechanism();
+    // what rounding leaves of poses that went through all bodies
+    const S goal = S(4) * std::numeric_limits<S>::epsilon() * S(mechanism.num_bodies());
+    const auto size = [&](const Correction<S>& c) {
+      return std::max(c.rotation, c.shift / mechanism.length());
+    };
+    Correction<S> now;
+    PositionViolation(kinematics, violation_, now);
+    Correction<S>& correction = Level<Space, S>::correction_;
+    correction = now;
+    for (int i = 0; i < kMostProjections && size(now) > goal; ++i) {
+      if (const Outcome outcome = state.Correct(violation_, change_);
+          outcome != Outcome::kFinished) {
+        return outcome;
+      }
+      const S before = size(now);
+      q_ = state.q();
+      mechanism.Rates(q_, change_, step_);
+      moved_ = q_ + step_;
+      mechanism.Normalise(moved_);
+      state.SetPositions(moved_);
+      PositionViolation(kinematics, violation_, now);
+      ++correction.iterations;
+      if (!(size(now) < before)) {  // round-off, or a direction that is softened: as it was
+        state.SetPositions(q_);
+        break;
+      }
+    }
+    return Outcome::kFinished;
+  }
+
+  Outcome ProjectSpeeds(FactoredState<Space, S>& state) {
+    state.SetSpeeds(state.u());
+    SpeedViolation(state.kinematics(), violation_);
+    if (const Outcome outcome = state.Correct(violation_, change_); outcome != Outcome::kFinished) {
+      return outcome;
+    }
+    u_ = state.u() + change_;
+    state.SetSpeeds(u_);
+    return Outcome::kFinished;
+  }
+
+  VectorX<S> violation_, change_, q_, moved_, step_, u_;
+};
+
+}  // namespace
+
+template <class Space, class S>
+std::unique_ptr<Level<Space, S>> MakePositionLevel(const Mechanism<Space, S>& mechanism) {
+  return std::make_unique<PositionLevel<Space, S>>(mechanism);
+}
+
+#define LOOPBENCH_INSTANTIATE(Space, S) \
+  template std::unique_ptr<Level<Space, S>> MakePositionLevel(const Mechanism<Space, S>&);
+LOOPBENCH_FOR_EACH_SPACE_AND_SCALAR(LOOPBENCH_INSTANTIATE)
+#undef LOOPBENCH_INSTANTIATE
+
+}  // namespace loopbench

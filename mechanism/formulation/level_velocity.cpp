@@ -1,0 +1,62 @@
+// Level velocity: speeds of the state are projected inside the right-hand side, or completed where
+// the state carries independent ones only.
+#include "mechanism/algebra/instantiate.h"
+#include "mechanism/formulation/level.h"
+
+namespace loopbench {
+
+namespace {
+
+template <class Space, class S>
+class VelocityLevel final : public Level<Space, S> {
+ public:
+  explicit VelocityLevel(const Mechanism<Space, S>& mechanism)
+      : u_(VectorX<S>::Zero(mechanism.num_u())),
+        change_(u_),
+        violation_(VectorX<S>::Zero(mechanism.num_rows())) {
+    Level<Space, S>::changes_speeds_ = true;
+  }
+
+  Outcome SetSpeeds(FactoredState<Space, S>& state,
+                    const Eigen::Ref<const VectorX<S>>& carried) override {
+    if (const std::vector<int>* speeds = state.solver().CarriedSpeeds()) {
+      for (Eigen::Index i = 0; i < carried.size(); ++i) u_[(*speeds)[i]] = carried[i];
+    } else {
+      u_ = carried;
+    }
+    const Outcome outcome = u_.size() > 0 ? Complete(state) : Outcome::kFinished;
+    state.SetSpeeds(u_);
+    return outcome;
+  }
+
+ private:
+  Outcome Complete(FactoredState<Space, S>& state) {
+    if (const Outcome outcome = state.Factor(); outcome != Outcome::kFinished) return outcome;
+    if (!state.solver().CompleteSpeeds(state.kinematics(), u_)) {
+      state.SetSpeeds(u_);
+      SpeedViolation(state.kinematics(), violation_);
+      if (const Outcome outcome = state.Correct(violation_, change_);
+          outcome != Outcome::kFinished) {
+        return outcome;
+      }
+      u_ += change_;
+    }
+    return u_.allFinite() ? Outcome::kFinished : Outcome::kNonFinite;
+  }
+
+  VectorX<S> u_, change_, violation_;
+};
+
+}  // namespace
+
+template <class Space, class S>
+std::unique_ptr<Level<Space, S>> MakeVelocityLevel(const Mechanism<Space, S>& mechanism) {
+  return std::make_unique<VelocityLevel<Space, S>>(mechanism);
+}
+
+#define LOOPBENCH_INSTANTIATE(Space, S) \
+  template std::unique_ptr<Level<Space, S>> MakeVelocityLevel(const Mechanism<Space, S>&);
+LOOPBENCH_FOR_EACH_SPACE_AND_SCALAR(LOOPBENCH_INSTANTIATE)
+#undef LOOPBENCH_INSTANTIATE
+
+}  // namespace loopbench

@@ -1,0 +1,223 @@
+#include "mechanism/formulation/system.h"
+
+#include <algorithm>
+#include <type_traits>
+
+#include "mechanism/algebra/instantiate.h"
+#include "mechanism/formulation/forward_jacobian.h"
+
+namespace loopbench {
+
+template <class Space, class S>
+System<Space, S>::System(const Mechanism<Space, S>& mechanism,
+                         std::unique_ptr<ConstraintSolver<Space, S>> solver,
+                         const FormulationOptions& options)
+    : mechanism_(mechanism),
+      options_(options),
+      solver_(std::move(solver)),
+      level_(MakeLevel(mechanism, options)),
+      state_(mechanism, *solver_),
+      dynamics_(mechanism),
+      drives_(mechanism.drives().empty() ? nullptr : std::make_unique<Drives<Space, S>>(mechanism)),
+      udot_(VectorX<S>::Zero(mechanism.num_u())),
+      lambda_(VectorX<S>::Zero(mechanism.num_rows())),
+      force_(udot_),
+      target_(lambda_) {}
+
+template <class Space, class S>
+System<Space, S>::~System() = default;
+
+template <class Space, class S>
+Outcome System<Space, S>::Start(S t, const VectorX<S>& q, const VectorX<S>& u) {
+  Kinematics<Space, S>& kinematics = state_.kinematics();
+  kinematics.SetTime(t);
+  state_.SetPositions(q);
+  state_.SetSpeeds(u);
+  kinematics.AcceptStep();
+  accepted_t_ = t;
+  solver_->Start(kinematics);
+  state_.ForgetFactors();
+  return Outcome::kFinished;
+}
+
+template <class Space, class S>
+void System<Space, S>::ToState(const VectorX<S>& q, const VectorX<S>& u, std::span<S> y) const {
+  std::copy(q.begin(), q.end(), y.begin());
+  const int num_q = mechanism_.num_q();
+  for (int i = 0; i < num_state_speeds(); ++i) y[num_q + i] = u[state_speed(i)];
+}
+
+template <class Space, class S>
+Outcome System<Space, S>::FromState(S t, std::span<const S> y) {
+  Kinematics<Space, S>& kinematics = state_.kinematics();
+  const Eigen::Map<const VectorX<S>> q(y.data(), mechanism_.num_q());
+  const Eigen::Map<const VectorX<S>> speeds(y.data() + q.size(), num_state_speeds());
+  const bool known = at_step_end_ && kinematics.position_version() > 0 && t == kinematics.time() &&
+                     std::equal(q.begin(), q.end(), this->q().begin());
+  at_step_end_ = false;
+  kinematics.SetTime(t);
+  if (!known) state_.SetPositions(q);
+  return level_->SetSpeeds(state_, speeds);
+}
+
+template <class Space, class S>
+void System<Space, S>::SolveFormed(VectorX<S>* lambda) {
+  dynamics_.Bias(kinematics(), force_);
+  dynamics_.JacobianBias(kinematics(), target_);
+  force_ = -force_;
+  if (feedback_->size() > 0) target_ -= *feedback_;
+  solver_->Solve(force_, target_, udot_, lambda);
+}
+
+template <class Space, class S>
+Outcome System<Space, S>::Accelerate() {
+  feedback_ = &level_->Feedback(kinematics());
+  const bool is_free = mechanism_.num_u() > 0;
+  VectorX<S>* lambda = drives_ != nullptr && integrates_work() ? &lambda_ : nullptr;
+  lambda_is_current_ = lambda != nullptr || !is_free;
+  if (is_free) {
+    if (const Outcome outcome = state_.Factor(); outcome != Outcome::kFinished) return outcome;
+    if (!solver_->Accelerate(kinematics(), *feedback_, udot_, lambda)) SolveFormed(lambda);
+    if (!udot_.allFinite()) return Outcome::kNonFinite;
+    if (solver_->conditioning().smallest_weight < 1.0) ++softened_evaluations_;
+  }
+  if (drives_ == nullptr || drives_->Followed(kinematics(), udot_, *feedback_)) {
+    return Outcome::kFinished;
+  }
+  return Outcome::kInconsistentMotion;
+}
+
+template <class Space, class S>
+Outcome System<Space, S>::Derivative(S t, std::span<const S> y, std::span<S> ydot) {
+  derivative_version_ = -1;
+  outcome_ = FromState(t, y);
+  if (outcome_ == Outcome::kFinished) outcome_ = Accelerate();
+  if (outcome_ != Outcome::kFinished) return outcome_;
+  const int num_q = mechanism_.num_q(), n = state_size();
+  mechanism_.Rates(q(), u(), Eigen::Map<VectorX<S>>(ydot.data(), num_q));
+  if (const std::vector<int>* carried = solver_->CarriedSpeeds()) {
+    for (int i = num_q; i < n; ++i) ydot[i] = udot_[(*carried)[i - num_q]];
+  } else {
+    std::copy(udot_.begin(), udot_.end(), ydot.begin() + num_q);
+  }
+  if (std::ssize(ydot) > n) {
+    const Power<S> power = TotalPower();
+    ydot[n] = power.supplied;
+    ydot[n + 1] = power.dissipated;
+  }
+  if (jacobian_ != nullptr) {
+    derivative_version_ = kinematics().position_version();
+    derivative_t_ = t;
+    derivative_y_.assign(y.begin(), y.end());
+  }
+  return outcome_;
+}
+
+template <class Space, class S>
+Outcome System<Space, S>::Evaluate(S t, const VectorX<S>& q, const VectorX<S>& u,
+                                   VectorX<S>& udot) {
+  at_step_end_ = false;
+  derivative_version_ = -1;
+  state_.kinematics().SetTime(t);
+  state_.SetPositions(q);
+  state_.SetSpeeds(u);
+  outcome_ = Accelerate();
+  udot = udot_;
+  return outcome_;
+}
+
+template <class Space, class S>
+bool System<Space, S>::BeginStep(S t, std::span<S> y) {
+  at_step_end_ = true;
+  if (FromState(t, y) != Outcome::kFinished) return false;  // the next evaluation will say why
+  const S h = t - accepted_t_;
+  const Accepted accepted = level_->Accept(state_, h);
+  if (accepted == Accepted::kFailed) return false;  // likewise
+  Kinematics<Space, S>& kinematics = state_.kinematics();
+  kinematics.AcceptStep();
+  accepted_t_ = t;
+  const bool changed_released = ChangeReleased(h);
+  const bool changed_solver = solver_->Review(kinematics);
+  if (changed_solver) state_.ForgetFactors();
+  const bool changed = changed_released || changed_solver || accepted == Accepted::kModeChanged;
+  if (changed) ++mode_changes_;
+  at_step_end_ = true;
+  if (!changed && accepted != Accepted::kProjected) return false;
+  ToState(q(), u(), y);
+  return true;
+}
+
+template <class Space, class S>
+bool System<Space, S>::ChangeReleased(S h) {
+  Kinematics<Space, S>& kinematics = state_.kinematics();
+  if (kinematics.released().empty()) return false;
+  const std::vector<Released>* better = review_.Review(kinematics, h);
+  if (better == nullptr) return false;
+  kinematics.Release(*better);
+  state_.SetPositions(q());
+  state_.SetSpeeds(u());
+  return true;
+}
+
+template <class Space, class S>
+const VectorX<S>& System<Space, S>::Multipliers() {
+  if (lambda_is_current_) return lambda_;
+  lambda_is_current_ = true;
+  if (!solver_->Accelerate(kinematics(), *feedback_, udot_, &lambda_)) SolveFormed(&lambda_);
+  return lambda_;
+}
+
+template <class Space, class S>
+S System<Space, S>::DrivePower() {
+  return drives_ == nullptr ? S(0) : drives_->Power(kinematics(), udot_, Multipliers());
+}
+
+template <class Space, class S>
+Power<S> System<Space, S>::TotalPower() {
+  Power<S> power = AppliedPower(kinematics());
+  power.supplied += DrivePower();
+  return power;
+}
+
+template <class Space, class S>
+Diagnostics System<Space, S>::diagnostics() const {
+  return {solver_->conditioning(), outcome_, softened_evaluations_, mode_changes_};
+}
+
+template <class Space, class S>
+void System<Space, S>::UseJacobian(std::unique_ptr<ForwardJacobian<Space>> jacobian) {
+  jacobian_ = std::move(jacobian);
+  derivative_version_ = -1;
+  scratch_.resize(static_cast<std::size_t>(size()));
+  derivative_y_.resize(scratch_.size());
+}
+
+template <class Space, class S>
+bool System<Space, S>::IsAt(S t, std::span<const S> y) const {
+  return derivative_version_ == kinematics().position_version() && t == derivative_t_ &&
+         std::ranges::equal(y, derivative_y_);
+}
+
+template <class Space, class S>
+std::optional<JacobianWork> System<Space, S>::Jacobian(S t, std::span<const S> y,
+                                                       std::span<S> jacobian) {
+  if (jacobian_ == nullptr) return std::nullopt;
+  if constexpr (std::is_same_v<S, double>) {
+    JacobianWork work{.derivatives = 0, .dual_evaluations = jacobian_->evaluations()};
+    if (!IsAt(t, y)) {
+      if (Derivative(t, y, scratch_) != Outcome::kFinished) return std::nullopt;  // it will say why
+      work.derivatives = 1;
+    }
+    Eigen::Map<Eigen::MatrixXd> all(jacobian.data(), size(), size() - num_quadratures());
+    jacobian_->Evaluate(all.leftCols(state_size()));
+    derivative_version_ = -1;  // one Jacobian from one derivative
+    return work;
+  }
+  return std::nullopt;
+}
+
+#define LOOPBENCH_INSTANTIATE(Space, S) template class System<Space, S>;
+LOOPBENCH_FOR_EACH_SPACE_AND_SCALAR(LOOPBENCH_INSTANTIATE)
+#undef LOOPBENCH_INSTANTIATE
+
+}  // namespace loopbench

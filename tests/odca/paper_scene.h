@@ -1,13 +1,14 @@
 // A random mechanism in the paper's terms: two-handle bodies, joints, and what O-DCA found.
 #pragma once
 
-#include <memory>
+#include <optional>
 #include <span>
 #include <vector>
 
 #include "mechanism/loops/tree_dynamics.h"
 #include "odca/odca.h"
 #include "tests/contract/generators.h"
+#include "tests/contract/system_with.h"
 #include "tests/odca/paper_formulas.h"
 
 namespace loopbench::odca::paper {
@@ -114,18 +115,18 @@ class Scene {
 
   /// Evaluates the code under test; its answers follow.
   Outcome Evaluate(SolverKind solver) {
-    odca_ = std::make_unique<Odca<Space, double>>(mechanism_, FormulationOptions{.solver = solver});
+    odca_.emplace(mechanism_, FormulationOptions{.solver = solver});
     VectorX<double> udot;
-    const Outcome outcome = odca_->Evaluate(0.0, state_.q, state_.u, udot);
+    const Outcome outcome = (*odca_)->Evaluate(0.0, state_.q, state_.u, udot);
     accelerations_.assign(mechanism_.num_bodies(), Motion<Space, double>::Zero());
     TreeDynamics<Space, double>(mechanism_)
-        .BodyAccelerations(odca_->kinematics(), udot, accelerations_);
+        .BodyAccelerations((*odca_)->kinematics(), udot, accelerations_);
     return outcome;
   }
-  const Odca<Space, double>& odca() const { return *odca_; }
+  const Odca<Space, double>& odca() const { return odca_->solver(); }
   /// Force of a joint on one of its bodies, at Mo.
   RealVector ForceOn(int body, int joint) const {
-    const RealVector F = odca_->JointForce(joint).template cast<testing::Real>();
+    const RealVector F = odca().JointForce(joint).template cast<testing::Real>();
     return mechanism_.joints()[joint].to == body ? F : RealVector(-F);
   }
   /// Acceleration of a body's point at Mo.
@@ -148,7 +149,7 @@ class Scene {
   const testing::State state_;
   Kinematics<Space, double> kinematics_;
   std::vector<Motion<Space, double>> wrenches_, accelerations_;
-  std::unique_ptr<Odca<Space, double>> odca_;
+  std::optional<testing::SystemWith<Odca, Space, double>> odca_;
 };
 
 /// M A - C^T phi = wrench, C A = -c0 with rows c_Q = S^T D, c_P = -S^T D.

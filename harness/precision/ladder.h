@@ -16,6 +16,7 @@
 #include <vector>
 
 #include "harness/config/experiment.h"
+#include "mechanism/description/outcome.h"
 
 namespace loopbench::harness {
 

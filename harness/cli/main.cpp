@@ -3,6 +3,7 @@
 #include <CLI/CLI.hpp>
 
 #include "harness/cli/commands.h"
+#include "harness/cli/commands_schema.h"
 #include "harness/cli/main_compare.h"
 #include "harness/json/config_error.h"
 #include "harness/record/provenance.h"
@@ -193,6 +194,15 @@ int Main(int argc, char** argv) {
   bool explain_all = false;
   explain_app->add_flag("--all", explain_all, "Every row of long tables of a mechanism");
 
+  std::string schema_kind;
+  bool schema_tables = false;
+  CLI::App* schema_app = app.add_subcommand(
+      "schema", "Print what files of a kind may hold, as JSON Schema (draft 07) for editors");
+  schema_app->add_option("kind", schema_kind, "Of files")
+      ->required()
+      ->check(CLI::IsMember(SchemaKinds()));
+  schema_app->add_flag("--tables", schema_tables, "Tables of keys in Markdown instead");
+
   MergeCommand merge;
   CLI::App* merge_app = app.add_subcommand("merge", "Put the stores of shards together");
   merge_app->add_option("store", merge.stores, "Folders of runs, or .jsonl files")->required();
@@ -282,6 +292,10 @@ int Main(int argc, char** argv) {
     plan.files = files;
     if (*plan_app) return PrintPlans(plan);
     if (*explain_app) return Explain(files, explain_all, explain_limits);
+    if (*schema_app) {
+      PrintText(schema_tables ? TablesOfKinds({schema_kind}) : SchemaOfKind(schema_kind));
+      return 0;
+    }
     if (*merge_app) return Merge(merge);
     check.files = files;
     check.assembly = !no_assembly;

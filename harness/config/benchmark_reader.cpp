@@ -7,48 +7,30 @@
 #include <system_error>
 
 #include "harness/config/experiment_sections.h"
+#include "harness/config/file_schemas.h"
 #include "harness/config/mechanism_reader.h"
 #include "harness/config/options.h"
 #include "harness/json/config_error.h"
 #include "harness/json/document_kind.h"
-#include "harness/json/spelling.h"
 #include "mechanism/description/in_space.h"
 #include "mechanism/simplify/compile.h"
 
 namespace loopbench::harness {
 namespace {
 
-/// The path a node names, relative to `folder`. Reports a file that is not there, with the nearest
-/// name beside it.
-std::optional<std::filesystem::path> ReadNamedFile(const JsonNode& node, std::string_view what,
-                                                   const std::filesystem::path& folder) {
-  const std::string named = node.Text();
-  if (named.empty()) return std::nullopt;
-  const std::filesystem::path path = (folder / named).lexically_normal();
-  std::error_code error;
-  if (std::filesystem::is_regular_file(path, error)) return path;
-  std::vector<std::string> beside;
-  const std::filesystem::path parent = path.has_parent_path() ? path.parent_path() : ".";
-  for (const auto& entry : std::filesystem::directory_iterator(parent, error)) {
-    beside.push_back(entry.path().filename().string());
-  }
-  std::ranges::sort(beside);
-  const std::string nearest = NearestSpelling(path.filename().string(), beside);
-  node.Fail(fmt::format("{} ({} does not exist)", what, path.string()),
-            nearest.empty() ? "" : (std::filesystem::path(named).parent_path() / nearest).string());
-  return std::nullopt;
-}
+const std::vector<std::string> kFamilies = {"chain", "ladder", "grid"};
 
 std::vector<BenchmarkMember> ReadBenchmarkMechanisms(const JsonNode& node,
                                                      const std::filesystem::path& folder,
                                                      ErrorList* errors) {
   std::vector<BenchmarkMember> members;
   for (const JsonNode& element : node.OneOrMore("mechanism files")) {
-    const auto path = ReadNamedFile(element, "a mechanism file", folder);
-    if (!path) continue;
+    const std::string named = element.Text();
+    const std::filesystem::path path = (folder / named).lexically_normal();
+    if (named.empty() || !ExpectMechanismFile(element, path)) continue;
     try {
       BenchmarkMember member;
-      member.description = ReadMechanism(*path).description;
+      member.description = ReadMechanism(path).description;
       member.name = member.description.name;
       members.push_back(std::move(member));
     } catch (const ConfigError& mistakes) {
@@ -59,7 +41,6 @@ std::vector<BenchmarkMember> ReadBenchmarkMechanisms(const JsonNode& node,
 }
 
 std::vector<BenchmarkMember> ReadBenchmarkFamily(const JsonNode& node, const JsonNode& owner) {
-  static const std::vector<std::string> kFamilies = {"chain", "ladder", "grid"};
   std::vector<BenchmarkMember> members;
   const auto index = node.Choice(kFamilies, "a family");
   const auto sizes = owner.Required("sizes", "a list of integers");
@@ -109,34 +90,54 @@ void CompileMembers(std::vector<BenchmarkMember>* members) {
   *members = std::move(compiled);
 }
 
-BenchmarkGroup ReadGroup(const JsonNode& node, const std::filesystem::path& folder,
-                         ErrorList* errors) {
-  BenchmarkGroup group;
-  if (!node.ExpectObject(
-          {"mechanisms", "family", "sizes", "in_space", "compile", "measure", "columns"})) {
-    return group;
-  }
+/// A group being read.
+struct GroupInFile : BenchmarkGroup {
+  std::filesystem::path folder;
+  bool in_space = false, compile = false;
+};
+
+/// Mechanisms of files or of a family.
+void ReadMembers(const JsonNode& node, GroupInFile& group) {
   const auto mechanisms = node.Optional("mechanisms"), family = node.Optional("family");
   if (mechanisms && family) {
     family->Fail("no \"family\" beside \"mechanisms\"; make two groups");
   } else if (mechanisms) {
-    group.members = ReadBenchmarkMechanisms(*mechanisms, folder, errors);
+    group.members = ReadBenchmarkMechanisms(*mechanisms, group.folder, &node.errors());
     if (const auto sizes = node.Optional("sizes")) sizes->Fail("no \"sizes\" without a \"family\"");
   } else if (family) {
     group.members = ReadBenchmarkFamily(*family, node);
   } else {
     node.FailAs("neither \"mechanisms\" nor \"family\"", "one of them");
   }
-  const auto in_space = node.Optional("in_space"), compile = node.Optional("compile");
-  if (in_space && in_space->Bool()) PutInSpace(*in_space, &group.members);
-  if (compile && compile->Bool()) CompileMembers(&group.members);
-  if (const auto measure = node.Required("measure", "\"rhs\", \"step\" or both")) {
-    group.kinds = ReadEnums<BenchmarkKind>(*measure, "what is measured");
-  }
-  if (const auto columns = node.Required("columns", "an array of columns")) {
-    group.columns = ReadColumns(*columns);
-  }
-  return group;
+}
+
+void ChangeMembers(const JsonNode& node, GroupInFile& group) {
+  if (group.in_space) PutInSpace(*node.Optional("in_space"), &group.members);
+  if (group.compile) CompileMembers(&group.members);
+}
+
+const Fields<GroupInFile>& GroupFields() {
+  const Json one_of_two = Json::parse(R"({"oneOf": [
+      {"required": ["mechanisms"], "not": {"anyOf": [{"required": ["family"]}, {"required": ["sizes"]}]}},
+      {"required": ["family", "sizes"], "not": {"required": ["mechanisms"]}}]})");
+  static const Fields<GroupInFile> fields(
+      "group", "Mechanisms, or members of a family, and what is measured of them.",
+      {{"mechanisms", OneOrMoreSchema(TextSchema()),
+        "Paths of mechanism files, relative to this file."},
+       {"family", ChoiceSchema(kFamilies),
+        "Bars in a closed chain, windows in a row, storeys of as many windows."},
+       {"sizes", OneOrMoreSchema(IntegerSchema(1, kLargestMember)), "Of the family's members."},
+       {"", By(one_of_two, ReadMembers)},
+       {"in_space", Bool(&GroupInFile::in_space),
+        "The planar members, described in a tilted plane in space."},
+       {"compile", Bool(&GroupInFile::compile),
+        "The members' simplified parts in their place, with all savings."},
+       {"", By(Json::object(), ChangeMembers)},
+       {"measure", Choices(&BenchmarkGroup::kinds, NamesOf<BenchmarkKind>(), "what is measured"),
+        "A right-hand side, an integrator step, or both.", "\"rhs\", \"step\" or both"},
+       {"columns", Columns(&BenchmarkGroup::columns), "How the loops are imposed.",
+        "an array of columns"}});
+  return fields;
 }
 
 /// Reports the first benchmark that a group repeats: names must tell results apart.
@@ -175,7 +176,51 @@ StateHashes ReadStates(const std::filesystem::path& path, ErrorList* errors) {
   return states;
 }
 
+void ReadNamedStates(const JsonNode& node, BenchmarkSet& set) {
+  const std::string named = node.Text();
+  if (named.empty()) return;
+  // the file itself may be missing: --save-states makes it
+  set.states_path = set.path.parent_path() / named;
+  std::error_code error;
+  if (std::filesystem::exists(set.states_path, error)) {
+    set.states = ReadStates(set.states_path, &node.errors());
+  }
+}
+
+void ReadGroups(const JsonNode& node, BenchmarkSet& set) {
+  std::set<std::string> taken;
+  for (const JsonNode& element : node.Elements("groups")) {
+    GroupInFile group;
+    group.folder = set.path.parent_path();
+    GroupFields().Read(element, &group);
+    set.groups.push_back(group);
+    ReportRepeatedBenchmark(element, group, &taken);
+  }
+  if (node.value().is_array() && set.groups.empty()) node.Fail("at least one group");
+}
+
+const Fields<BenchmarkSet>& BenchmarkFields() {
+  static const Fields<BenchmarkSet> fields(
+      "benchmarks",
+      "What loopbench_bench and loopbench_count measure. Every combination of a group's members, "
+      "measures and columns is a benchmark. The program checks more than this schema: that "
+      "mechanism files exist and are valid, and that benchmarks are different.",
+      {{"$schema", TextSchema(), "Address of this schema, for editors."},
+       {"name", Text(&BenchmarkSet::name), "Of the set.", "a name"},
+       {"comment", Text(&BenchmarkSet::comment), "Free text for readers."},
+       {"states", By(TextSchema(), ReadNamedStates),
+        "File of state hashes, relative to this file; loopbench_bench --save-states writes it."},
+       {"integrator", Choice(&BenchmarkSet::integrator, ProfileNames(), "an integrator profile"),
+        "Profile whose step is measured."},
+       {"step", Number(&BenchmarkSet::step, kPositive), "Length of the step [s]."},
+       {"groups", By(ArraySchema(GroupFields().Schema(), 1), ReadGroups), "What is measured.",
+        "an array of groups"}});
+  return fields;
+}
+
 }  // namespace
+
+Json BenchmarksSchema() { return BenchmarkFields().OwnSchema(); }
 
 BenchmarkSet ReadBenchmarks(const std::filesystem::path& path) {
   return ParseBenchmarks(ReadTextFile(path), path);
@@ -185,36 +230,9 @@ BenchmarkSet ParseBenchmarks(std::string_view text, const std::filesystem::path&
   const Json document = ParseDocument(text, path.string());
   ErrorList errors(path.string(), text);
   const JsonNode root(document, "", errors);
-  const std::filesystem::path folder = path.parent_path();
   BenchmarkSet set;
   set.path = path;
-  if (ExpectDocument(root, FileKind::kBenchmarks)) {
-    if (const auto name = root.Required("name", "a name")) set.name = name->Text();
-    if (const auto comment = root.Optional("comment")) set.comment = comment->Text();
-    const auto states = root.Optional("states");
-    if (const std::string named = states ? states->Text() : ""; !named.empty()) {
-      // the file itself may be missing: --save-states makes it
-      set.states_path = folder / named;
-      std::error_code error;
-      if (std::filesystem::exists(set.states_path, error)) {
-        set.states = ReadStates(set.states_path, &errors);
-      }
-    }
-    if (const auto name = root.Optional("integrator")) {
-      const std::vector<std::string> profiles = ProfileNames();
-      const auto index = name->Choice(profiles, "an integrator profile");
-      if (index) set.integrator = profiles[static_cast<std::size_t>(*index)];
-    }
-    if (const auto step = root.Optional("step")) set.step = step->Number(kPositive);
-    if (const auto groups = root.Required("groups", "an array of groups")) {
-      std::set<std::string> taken;
-      for (const JsonNode& element : groups->Elements("groups")) {
-        set.groups.push_back(ReadGroup(element, folder, &errors));
-        ReportRepeatedBenchmark(element, set.groups.back(), &taken);
-      }
-      if (groups->value().is_array() && set.groups.empty()) groups->Fail("at least one group");
-    }
-  }
+  if (ExpectDocument(root, FileKind::kBenchmarks)) BenchmarkFields().ReadRows(root, &set);
   errors.ThrowIfAny();
   return set;
 }

@@ -4,49 +4,64 @@
 namespace loopbench::harness {
 namespace {
 
+/// One entry of "columns", whose cross product is meant.
+struct ColumnLists {
+  std::vector<FormulationKind> formulations;
+  std::vector<Enforcement> enforcements;
+  std::vector<Coordinates> coordinates = {Column().coordinates};
+  std::vector<SolverKind> solvers = {Column().solver};
+  std::optional<BaumgarteGains> gains;
+};
+
 /// Gains of Baumgarte's stabilisation, which only it has, and both or none.
-std::optional<BaumgarteGains> ReadGains(const JsonNode& node,
-                                        const std::vector<Enforcement>& enforcements) {
+void ReadGains(const JsonNode& node, ColumnLists& lists) {
   const auto alpha = node.Optional("alpha"), beta = node.Optional("beta");
-  if (!alpha && !beta) return std::nullopt;
-  const bool only = enforcements == std::vector<Enforcement>{Enforcement::kBaumgarte};
+  if (!alpha && !beta) return;
+  const bool only = lists.enforcements == std::vector<Enforcement>{Enforcement::kBaumgarte};
   if (!only) {
     (alpha ? *alpha : *beta)
         .FailAs("gains of another level", "\"enforcement\": \"baumgarte\" beside them");
   }
-  BaumgarteGains gains;
+  lists.gains.emplace();
   const auto a = node.Required("alpha", "a gain [1/s] beside \"beta\"");
   const auto b = node.Required("beta", "a gain [1/s] beside \"alpha\"");
-  if (a) gains.alpha = a->Number(kNotNegative);
-  if (b) gains.beta = b->Number(kNotNegative);
-  return gains;
+  if (a) lists.gains->alpha = a->Number(kNotNegative);
+  if (b) lists.gains->beta = b->Number(kNotNegative);
 }
 
-/// One entry of "columns": the cross product of its lists, first key slowest.
+const Fields<ColumnLists>& ColumnFields() {
+  static const Fields<ColumnLists> fields(
+      "column", "A way of imposing the loops; lists expand as a cross product.",
+      {{"formulation",
+        Choices(&ColumnLists::formulations, NamesOf<FormulationKind>(), "a formulation"),
+        "The algorithm that imposes them.", "a formulation"},
+       {"enforcement",
+        Choices(&ColumnLists::enforcements, NamesOf<Enforcement>(), "a level of enforcement"),
+        "The level at which constraints act.", "a level of enforcement"},
+       {"coordinates",
+        Choices(&ColumnLists::coordinates, NamesOf<Coordinates>(), "a coordinate set"),
+        "Of the joints of a tree, or of every body."},
+       {"solver", Choices(&ColumnLists::solvers, NamesOf<SolverKind>(), "a solver"),
+        "For reduction: as-published is the fixed independent set, rank-revealing the automatic "
+        "partition."},
+       {"alpha", NumberSchema(kNotNegative),
+        "Gain on mismatches of speeds [1/s]; baumgarte only, beside beta."},
+       {"beta", NumberSchema(kNotNegative),
+        "Gain on mismatches of positions [1/s]; baumgarte only, beside alpha."},
+       {"", By({{"dependencies", {{"alpha", {"beta"}}, {"beta", {"alpha"}}}}}, ReadGains)}});
+  return fields;
+}
+
+/// The cross product of an entry's lists, first key slowest.
 std::vector<Column> ReadColumnEntry(const JsonNode& node) {
   std::vector<Column> columns;
-  if (!node.ExpectObject(
-          {"formulation", "enforcement", "coordinates", "solver", "alpha", "beta"})) {
-    return columns;
-  }
-  std::vector<FormulationKind> formulations;
-  if (const auto named = node.Required("formulation", "a formulation")) {
-    formulations = ReadEnums<FormulationKind>(*named, "a formulation");
-  }
-  std::vector<Enforcement> enforcements;
-  if (const auto named = node.Required("enforcement", "a level of enforcement")) {
-    enforcements = ReadEnums<Enforcement>(*named, "a level of enforcement");
-  }
-  const Column defaults;
-  const auto coordinates =
-      ReadEnums<Coordinates>(node, "coordinates", "a coordinate set", {defaults.coordinates});
-  const auto solvers = ReadEnums<SolverKind>(node, "solver", "a solver", {defaults.solver});
-  const auto gains = ReadGains(node, enforcements);
-  for (const FormulationKind formulation : formulations) {
-    for (const Enforcement enforcement : enforcements) {
-      for (const Coordinates set : coordinates) {
-        for (const SolverKind solver : solvers) {
-          columns.push_back({formulation, enforcement, set, solver, gains});
+  ColumnLists lists;
+  if (!ColumnFields().Read(node, &lists)) return columns;
+  for (const FormulationKind formulation : lists.formulations) {
+    for (const Enforcement enforcement : lists.enforcements) {
+      for (const Coordinates set : lists.coordinates) {
+        for (const SolverKind solver : lists.solvers) {
+          columns.push_back({formulation, enforcement, set, solver, lists.gains});
         }
       }
     }
@@ -55,6 +70,8 @@ std::vector<Column> ReadColumnEntry(const JsonNode& node) {
 }
 
 }  // namespace
+
+Json ColumnsSchema() { return Named("columns", OneOrMoreSchema(ColumnFields().Schema())); }
 
 std::vector<Column> ReadColumns(const JsonNode& node) {
   std::vector<Column> columns;

@@ -16,47 +16,48 @@ namespace {
 constexpr Range kFarthest = {.min = -1e4, .max = 1e4};
 constexpr Range kAmplitude = {.min = 0.0, .max = kFarthest.max, .above_min = true};
 
-/// Numbers of a rule, each one of `used`: one that is not would match nothing.
-std::vector<double> ReadUsedNumbers(const JsonNode& rule, const std::string& key,
-                                    const std::vector<double>& used) {
-  const auto node = rule.Optional(key);
-  if (!node) return {};
-  const std::vector<double> numbers = node->NumberList(kPositive);
+/// A rule and what it selects from.
+struct RuleOfExperiment : EnsembleRule {
+  const Experiment* experiment = nullptr;
+};
+
+/// Each must be one of `used`: one that is not would match nothing.
+std::vector<double> ReadUsedNumbers(const JsonNode& node, const std::vector<double>& used) {
+  const std::vector<double> numbers = node.NumberList(kPositive);
   for (const double number : numbers) {
     if (std::find(used.begin(), used.end(), number) != used.end()) continue;
     constexpr std::size_t kMostShown = 16;
     const auto end = used.begin() + static_cast<int>(std::min(used.size(), kMostShown));
-    node->Fail(fmt::format("values among those of this experiment: {}{}",
-                           fmt::join(used.begin(), end, ", "), end == used.end() ? "" : ", ..."));
+    node.Fail(fmt::format("values among those of this experiment: {}{}",
+                          fmt::join(used.begin(), end, ", "), end == used.end() ? "" : ", ..."));
     break;
   }
   return numbers;
 }
 
-std::vector<double> AllHorizons(const Experiment& experiment) {
-  std::set<double> horizons;
-  for (const ExperimentScene& scene : experiment.scenes) {
-    horizons.insert(scene.horizons.begin(), scene.horizons.end());
-  }
-  return {horizons.begin(), horizons.end()};
+void ReadTolerances(const JsonNode& node, RuleOfExperiment& rule) {
+  rule.tolerances = ReadUsedNumbers(node, rule.experiment->tolerances);
 }
 
-std::vector<std::string> ReadSceneNames(const JsonNode& rule, const Experiment& experiment) {
-  std::vector<std::string> chosen;
-  NameList known;
-  for (const ExperimentScene& scene : experiment.scenes) known.Add(scene.name);
-  const auto node = rule.Optional("scenes");
-  if (!node) return chosen;
-  for (const JsonNode& element : node->OneOrMore("scene names")) {
-    const auto scene = element.Choice(known, "a scene");
-    if (scene) chosen.push_back(known.all()[static_cast<std::size_t>(*scene)]);
+void ReadHorizons(const JsonNode& node, RuleOfExperiment& rule) {
+  std::set<double> horizons;
+  for (const ExperimentScene& scene : rule.experiment->scenes) {
+    horizons.insert(scene.horizons.begin(), scene.horizons.end());
   }
-  return chosen;
+  rule.horizons = ReadUsedNumbers(node, {horizons.begin(), horizons.end()});
+}
+
+void ReadSceneNames(const JsonNode& node, RuleOfExperiment& rule) {
+  NameList known;
+  for (const ExperimentScene& scene : rule.experiment->scenes) known.Add(scene.name);
+  for (const JsonNode& element : node.OneOrMore("scene names")) {
+    const auto scene = element.Choice(known, "a scene");
+    if (scene) rule.scenes.push_back(known.all()[static_cast<std::size_t>(*scene)]);
+  }
 }
 
 /// {"joint": [from, to]}.
-std::vector<DrawnCoordinate> ReadBetween(const JsonNode& node) {
-  std::vector<DrawnCoordinate> drawn;
+void ReadBetween(const JsonNode& node, EnsembleRule& rule) {
   for (const auto& [joint, bounds] : node.Members()) {
     const std::vector<double> ends = bounds.Numbers(2);
     const bool is_pair = bounds.value().is_array() && bounds.value().size() == 2;
@@ -64,10 +65,9 @@ std::vector<DrawnCoordinate> ReadBetween(const JsonNode& node) {
     if (is_pair && !(kFarthest.Contains(ends[0]) && kFarthest.Contains(ends[1]))) {
       bounds.Fail(fmt::format("numbers{} [rad or m]", kFarthest.Text()));
     }
-    drawn.push_back({joint, ends[0], ends[1]});
+    rule.between.push_back({joint, ends[0], ends[1]});
   }
   if (node.value().is_object() && node.value().empty()) node.Fail("at least one joint");
-  return drawn;
 }
 
 /// Joints that can be drawn: held, with one coordinate.
@@ -102,63 +102,75 @@ void CheckBetween(const JsonNode& element, const EnsembleRule& rule, const Exper
   }
 }
 
-EnsembleRule ReadEnsemble(const JsonNode& node, const Experiment& experiment) {
-  EnsembleRule rule;
-  if (!node.ExpectObject({"size", "seed", "perturb", "between", "branch_bound", "scenes",
-                          "horizons", "tolerances", "formulation", "enforcement", "coordinates",
-                          "solver"})) {
-    return rule;
-  }
-  if (const auto size = node.Required("size", "an integer from 2")) {
-    rule.size = static_cast<int>(size->Integer(2, kMaxCount));
-  }
-  if (const auto seed = node.Required("seed", "an integer from 0")) {
-    constexpr std::int64_t kMaxSeed = std::numeric_limits<std::int32_t>::max();
-    rule.seed = static_cast<std::uint64_t>(seed->Integer(0, kMaxSeed));
-  }
+/// One of the two ways to start anew.
+void ReadStart(const JsonNode& node, RuleOfExperiment& rule) {
   if (const auto between = node.Optional("between")) {
-    if (const auto perturb = node.Optional("perturb"))
+    if (const auto perturb = node.Optional("perturb")) {
       perturb->Fail("no \"perturb\" with \"between\"");
-    rule.between = ReadBetween(*between);
+    }
+    ReadBetween(*between, rule);
     rule.perturb = 0.0;
   } else if (const auto perturb = node.Required("perturb", "a number > 0, or \"between\"")) {
     rule.perturb = perturb->Number(kAmplitude);
   }
-  if (const auto bound = node.Optional("branch_bound")) {
-    rule.branch_bound = bound->Number(kPositive);
-  }
-  rule.scenes = ReadSceneNames(node, experiment);
-  rule.horizons = ReadUsedNumbers(node, "horizons", AllHorizons(experiment));
-  rule.tolerances = ReadUsedNumbers(node, "tolerances", experiment.tolerances);
-  rule.formulations = ReadEnums<FormulationKind>(node, "formulation", "a formulation", {});
-  rule.enforcements = ReadEnums<Enforcement>(node, "enforcement", "a level of enforcement", {});
-  rule.coordinates = ReadEnums<Coordinates>(node, "coordinates", "a coordinate set", {});
-  rule.solvers = ReadEnums<SolverKind>(node, "solver", "a solver", {});
-  return rule;
+}
+
+const Fields<RuleOfExperiment>& EnsembleFields() {
+  using Rule = RuleOfExperiment;
+  constexpr std::int64_t kMaxSeed = std::numeric_limits<std::int32_t>::max();
+  const Json bounds = ArraySchema(NumberSchema(kFarthest), 2, 2);
+  const Json one_start = {{"oneOf", {Requires({"perturb"}), Requires({"between"})}}};
+  static const Fields<Rule> fields(
+      "ensemble",
+      "Perturbed repetitions of the cases that match every given key of a case; the first rule "
+      "that matches counts.",
+      {{"size", Integer(&Rule::size, 2, kMaxCount), "Runs per case.", "an integer from 2"},
+       {"seed", Integer(&Rule::seed, 0, kMaxSeed), "Of the generator of perturbations.",
+        "an integer from 0"},
+       {"perturb", NumberSchema(kAmplitude), "Amplitude on the held coordinates [rad or m]."},
+       {"between", MapSchema(bounds, 1),
+        "Instead of perturb: held joints, each drawn uniformly between two bounds [rad or m]."},
+       {"", By(one_start, ReadStart)},
+       {"branch_bound", Number(&Rule::branch_bound, kPositive),
+        "A run further from its branch has left it [rad]."},
+       {"scenes", By(OneOrMoreSchema(TextSchema()), ReadSceneNames), "Names of scenes."},
+       {"horizons", By(NumberListSchema(kPositive), ReadHorizons), "Of cases [s]."},
+       {"tolerances", By(NumberListSchema(kPositive), ReadTolerances), "Of cases."},
+       {"formulation", Choices(&Rule::formulations, NamesOf<FormulationKind>(), "a formulation"),
+        "Of cases."},
+       {"enforcement",
+        Choices(&Rule::enforcements, NamesOf<Enforcement>(), "a level of enforcement"),
+        "Of cases."},
+       {"coordinates", Choices(&Rule::coordinates, NamesOf<Coordinates>(), "a coordinate set"),
+        "Of cases."},
+       {"solver", Choices(&Rule::solvers, NamesOf<SolverKind>(), "a solver"), "Of cases."}});
+  return fields;
 }
 
 }  // namespace
 
-void ReadEnsembles(const JsonNode& root, const ErrorList& errors, Experiment* experiment) {
-  const auto node = root.Optional("ensembles");
-  if (!node) return;
-  const std::vector<JsonNode> elements = node->Elements("ensemble rules");
+Json EnsemblesSchema() { return ArraySchema(EnsembleFields().Schema(), 0, kMaxRules); }
+
+void ReadEnsembles(const JsonNode& node, ExperimentFile& experiment) {
+  const std::vector<JsonNode> elements = node.Elements("ensemble rules");
   if (elements.size() > kMaxRules) {
-    node->Fail(fmt::format("at most {} ensemble rules", kMaxRules));
+    node.Fail(fmt::format("at most {} ensemble rules", kMaxRules));
     return;
   }
-  if (CountCases(*experiment) > kMaxCases) return;  // reported where it is counted
-  const std::vector<Case> cases = Expand(*experiment);
+  if (CountCases(experiment) > kMaxCases) return;  // reported where it is counted
+  const std::vector<Case> cases = Expand(experiment);
   for (const JsonNode& element : elements) {
-    const EnsembleRule rule = ReadEnsemble(element, *experiment);
+    RuleOfExperiment rule;
+    rule.experiment = &experiment;
+    EnsembleFields().Read(element, &rule);
     const bool used = std::any_of(cases.begin(), cases.end(),
                                   [&rule](const Case& one) { return Matches(rule, one); });
     // Behind other mistakes this one would only be their consequence.
-    if (!used && errors.empty()) {
+    if (!used && node.errors().empty()) {
       element.FailAs("a rule that matches no case", "keys that match at least one case");
     }
-    CheckBetween(element, rule, *experiment, cases);
-    experiment->ensembles.push_back(rule);
+    CheckBetween(element, rule, experiment, cases);
+    experiment.ensembles.push_back(rule);
   }
 }
 

@@ -4,6 +4,13 @@
 #include "harness/config/experiment_sweep.h"
 
 namespace loopbench::harness {
+
+Json ExclusionsSchema() {
+  const Json scalar = {{"type", {"string", "number", "boolean"}}, {"words", "a value"}};
+  const Json condition = OneOrMoreSchema(scalar, false, SpacedSchema(NumberSchema(), false));
+  return ArraySchema(MapSchema(Named("condition", condition), 1), 0, kMaxRules);
+}
+
 std::vector<Selection> ReadExclusions(const JsonNode& root, const Record& keys) {
   std::vector<Selection> exclusions;
   const auto node = root.Optional("exclude");

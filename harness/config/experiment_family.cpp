@@ -11,19 +11,57 @@ namespace loopbench::harness {
 namespace {
 
 constexpr std::int64_t kMostUnits = 100'000;  ///< bars, windows, storeys
-constexpr double kAngle = 1.0,
-                 kSpeed = 1.0;  ///< defaults of cranks [rad], [rad/s]: those of timing
 
-std::vector<std::int64_t> ReadCounts(const JsonNode& node, const std::string& key,
-                                     std::int64_t least) {
-  const auto counts =
-      node.Required(key, fmt::format("an integer from {}, a list of them or a range", least));
-  return counts ? counts->IntegerList(least, kMostUnits) : std::vector<std::int64_t>();
+/// {"family": "chain", ...} and so on; the defaults of cranks are those of timing.
+struct ChainFamily {
+  std::vector<std::int64_t> bars;
+  double speed = 0.0;
+};
+struct LadderFamily {
+  std::vector<std::int64_t> windows;
+  double angle = 1.0, speed = 1.0;
+};
+struct GridFamily : LadderFamily {
+  std::vector<std::int64_t> storeys;
+};
+
+std::string CountsExpected(int least) {
+  return fmt::format("an integer from {}, a list of them or a range", least);
 }
 
-double ReadOr(const JsonNode& node, const std::string& key, double fallback) {
-  const auto number = node.Optional(key);
-  return number ? number->Number() : fallback;
+const Fields<ChainFamily>& ChainFields() {
+  static const Fields<ChainFamily> fields(
+      "chain", "Closed chains of bars.",
+      {{"family", ChoiceSchema({"chain"}), "What it is.", "a family"},
+       {"bars", IntegerList(&ChainFamily::bars, 3, kMostUnits), "How many.", CountsExpected(3)},
+       {"speed", Number(&ChainFamily::speed), "Of the first bar [rad/s]."}});
+  return fields;
+}
+
+const Fields<LadderFamily>& LadderFields() {
+  static const Fields<LadderFamily> fields(
+      "ladder", "Parallel cranks, couplers between them: windows in a row.",
+      {{"family", ChoiceSchema({"ladder"}), "What it is.", "a family"},
+       {"windows", IntegerList(&LadderFamily::windows, 1, kMostUnits), "How many.",
+        CountsExpected(1)},
+       {"angle", Number(&LadderFamily::angle), "Of the cranks [rad]."},
+       {"speed", Number(&LadderFamily::speed), "Of the cranks [rad/s]."}});
+  return fields;
+}
+
+const Fields<GridFamily>& GridFields() {
+  static const Fields<GridFamily> fields(
+      "grid", "Storeys of windows.",
+      {{"family", ChoiceSchema({"grid"}), "What it is.", "a family"},
+       {"storeys", IntegerList(&GridFamily::storeys, 1, kMostUnits), "How many.",
+        CountsExpected(1)},
+       {"windows", IntegerList(&GridFamily::windows, 1, kMostUnits), "In each storey.",
+        CountsExpected(1)},
+       {"angle", Number(&GridFamily::angle),
+        "Of the first storey's cranks [rad]; each storey stands 0.1 further."},
+       {"speed", Number(&GridFamily::speed),
+        "Of the first storey's cranks [rad/s]; that of storey r is r times as much."}});
+  return fields;
 }
 
 /// Held joints are what ensembles perturb: as many as there are degrees of freedom.
@@ -68,10 +106,11 @@ class Members {
   std::vector<FamilyMember> members_;
 };
 
-std::vector<FamilyMember> ReadChains(const JsonNode& node, std::size_t room) {
+std::vector<FamilyMember> MakeMembers(const ChainFamily& family, const JsonNode& node,
+                                      std::size_t room) {
   Members members(node, room);
-  const double speed = ReadOr(node, "speed", 0.0);
-  for (const std::int64_t bars : ReadCounts(node, "bars", 3)) {
+  const double speed = family.speed;
+  for (const std::int64_t bars : family.bars) {
     members.Add(static_cast<std::size_t>(bars), fmt::format("{}", bars),
                 {{"family", "chain"}, {"bars", bars}, {"speed", speed}}, [&] {
                   MechanismDescription chain = Chain(static_cast<int>(bars));
@@ -92,10 +131,11 @@ PendulumForm PendulumOfLadder(const MechanismDescription& ladder) {
           .frequency_squared = ((n + 1) / 2 + n) * -ladder.gravity.y() / ((n + 1) / 3 + n)};
 }
 
-std::vector<FamilyMember> ReadLadders(const JsonNode& node, std::size_t room) {
+std::vector<FamilyMember> MakeMembers(const LadderFamily& family, const JsonNode& node,
+                                      std::size_t room) {
   Members members(node, room);
-  const double angle = ReadOr(node, "angle", kAngle), speed = ReadOr(node, "speed", kSpeed);
-  for (const std::int64_t windows : ReadCounts(node, "windows", 1)) {
+  const double angle = family.angle, speed = family.speed;
+  for (const std::int64_t windows : family.windows) {
     members.Add(static_cast<std::size_t>(2 * windows + 1), fmt::format("{}", windows),
                 {{"family", "ladder"}, {"windows", windows}, {"angle", angle}, {"speed", speed}},
                 [&] {
@@ -121,12 +161,12 @@ void HoldFirstCranks(MechanismDescription* grid) {
   }
 }
 
-std::vector<FamilyMember> ReadGrids(const JsonNode& node, std::size_t room) {
+std::vector<FamilyMember> MakeMembers(const GridFamily& family, const JsonNode& node,
+                                      std::size_t room) {
   Members members(node, room);
-  const double angle = ReadOr(node, "angle", kAngle), speed = ReadOr(node, "speed", kSpeed);
-  const std::vector<std::int64_t> all_windows = ReadCounts(node, "windows", 1);
-  for (const std::int64_t storeys : ReadCounts(node, "storeys", 1)) {
-    for (const std::int64_t windows : all_windows) {
+  const double angle = family.angle, speed = family.speed;
+  for (const std::int64_t storeys : family.storeys) {
+    for (const std::int64_t windows : family.windows) {
       members.Add(static_cast<std::size_t>(storeys * (2 * windows + 1)),
                   fmt::format("{}x{}", storeys, windows),
                   {{"family", "grid"},
@@ -145,18 +185,27 @@ std::vector<FamilyMember> ReadGrids(const JsonNode& node, std::size_t room) {
   return members.Take();
 }
 
+template <class Family>
+std::vector<FamilyMember> ReadFamily(const Fields<Family>& fields, const JsonNode& node,
+                                     std::size_t room) {
+  Family family;
+  if (!fields.Read(node, &family)) return {};
+  return MakeMembers(family, node, room);
+}
+
 }  // namespace
+
+Json FamilySchema() {
+  return Named("family", EitherSchema({ChainFields().Schema(), LadderFields().Schema(),
+                                       GridFields().Schema()}));
+}
 
 std::vector<FamilyMember> ReadFamilyMembers(const JsonNode& node, std::size_t room) {
   const auto family = node.Required("family", "a family");
   const auto kind = family ? family->Choice({"chain", "ladder", "grid"}, "a family") : std::nullopt;
-  if (kind == 0 && node.ExpectObject({"family", "bars", "speed"})) return ReadChains(node, room);
-  if (kind == 1 && node.ExpectObject({"family", "windows", "angle", "speed"})) {
-    return ReadLadders(node, room);
-  }
-  if (kind == 2 && node.ExpectObject({"family", "storeys", "windows", "angle", "speed"})) {
-    return ReadGrids(node, room);
-  }
+  if (kind == 0) return ReadFamily(ChainFields(), node, room);
+  if (kind == 1) return ReadFamily(LadderFields(), node, room);
+  if (kind == 2) return ReadFamily(GridFields(), node, room);
   return {};
 }
 

@@ -11,21 +11,10 @@ namespace {
 
 /// One combination, or all there is. Mistakes go to the root's errors.
 Experiment ReadOne(const JsonNode& root, MechanismFiles& files) {
-  Experiment experiment;
-  ErrorList& errors = root.errors();
-  if (!ExpectDocument(root, FileKind::kExperiment)) return experiment;
-  if (const auto name = root.Required("name", "a name")) experiment.name = name->Text();
-  if (const auto comment = root.Optional("comment")) experiment.comment = comment->Text();
-  experiment.scenes = ReadScenes(root, files, &errors);
-  if (const auto columns = root.Required("columns", "an array of columns")) {
-    experiment.columns = ReadColumns(*columns);
-  }
-  if (const auto tolerances = root.Required("tolerances", "a list of numbers")) {
-    experiment.tolerances = tolerances->NumberList(kTolerances);
-  }
-  experiment.timing.columns = experiment.columns;
-  ReadSettings(root, &experiment);
-  ReadEnsembles(root, errors, &experiment);
+  ExperimentFile experiment;
+  experiment.files = &files;
+  if (ExpectDocument(root, FileKind::kExperiment))
+    ExperimentFileFields().ReadRows(root, &experiment);
   return experiment;
 }
 

@@ -15,37 +15,12 @@
 namespace loopbench::harness {
 namespace {
 
-/// Names of the files beside a missing one, to suggest a spelling.
-std::vector<std::string> FilesBeside(const std::filesystem::path& path) {
-  std::vector<std::string> names;
-  std::error_code error;
-  const std::filesystem::path folder = path.has_parent_path() ? path.parent_path() : ".";
-  for (const auto& entry : std::filesystem::directory_iterator(folder, error)) {
-    names.push_back(entry.path().filename().string());
-  }
-  std::sort(names.begin(), names.end());
-  return names;
-}
-
 /// A file of mechanisms as a scene names it; its own mistakes join those of the experiment.
 void LoadMechanism(const JsonNode& node, MechanismFiles& files, ExperimentScene* scene) {
   const std::string named = node.Text();
   if (named.empty()) return;
   scene->path = files.Resolve(named);
-  std::error_code error;
-  const auto status = std::filesystem::status(scene->path, error);
-  if (!std::filesystem::exists(status)) {
-    const std::string nearest =
-        NearestSpelling(scene->path.filename().string(), FilesBeside(scene->path));
-    node.Fail(
-        fmt::format("a mechanism file ({} does not exist)", scene->path.string()),
-        nearest.empty() ? "" : (std::filesystem::path(named).parent_path() / nearest).string());
-    return;
-  }
-  if (!std::filesystem::is_regular_file(status)) {
-    node.Fail(fmt::format("a mechanism file ({} is none)", scene->path.string()));
-    return;
-  }
+  if (!ExpectMechanismFile(node, scene->path)) return;
   try {
     scene->mechanism = files.Mechanism(scene->path);
   } catch (const ConfigError& mistakes) {
@@ -84,39 +59,63 @@ void Resize(MechanismFile* mechanism, double factor) {
   mechanism->canonical += fmt::format(" at scale {}", factor);
 }
 
-/// One entry of "scenes": several scenes where a family has several counts.
+/// One entry of "scenes": several scenes where a family has several counts. The base is what they
+/// have in common.
+struct SceneEntry : ExperimentScene {
+  MechanismFiles* files = nullptr;
+  std::size_t room = 0;  ///< bodies there may be
+  double scale = 1.0;
+  std::vector<ExperimentScene> scenes;
+};
+
+void ReadMechanism(const JsonNode& node, SceneEntry& entry) {
+  entry.scenes = ReadMechanisms(node, *entry.files, entry.room);
+}
+
+void ReadTags(const JsonNode& node, SceneEntry& entry) {
+  for (const JsonNode& tag : node.Elements("tags")) entry.tags.push_back(tag.Text());
+}
+
+const Fields<SceneEntry>& SceneFields() {
+  const Json mechanism =
+      EitherSchema({TextSchema(),
+                    FamilySchema(),
+                    {{"$ref", "mechanism.schema.json#"}, {"words", "a [mechanism](#mechanism)"}}});
+  static const Fields<SceneEntry> fields(
+      "scene", "A mechanism and how long it moves.",
+      {{"mechanism", By(mechanism, ReadMechanism),
+        "Path of a mechanism file, relative to this file; a member of a family, one scene per "
+        "count; or a mechanism (mechanism.schema.json).",
+        "the path of a mechanism file, a mechanism, or {\"family\": ...}"},
+       {"horizon", NumberList(&SceneEntry::horizons, kPositive), "Simulated time [s].",
+        "a number > 0 or a list of them [s]"},
+       {"name", Text(&SceneEntry::name), "Instead of the mechanism's own name."},
+       {"tags", By(ArraySchema(TextSchema()), ReadTags), "Words for filters and tables."},
+       {"scale", Number(&SceneEntry::scale, {.min = 1e-12, .max = 1e12}),
+        "Factor on all lengths; gravity, forces and springs go with it so that angles move as "
+        "before."}});
+  return fields;
+}
+
 std::vector<ExperimentScene> ReadScene(const JsonNode& node, MechanismFiles& files,
                                        std::size_t room) {
-  std::vector<ExperimentScene> scenes;
-  if (!node.ExpectObject({"mechanism", "horizon", "name", "tags", "scale"})) return scenes;
-  if (const auto mechanism = node.Required(
-          "mechanism", "the path of a mechanism file, a mechanism, or {\"family\": ...}")) {
-    scenes = ReadMechanisms(*mechanism, files, room);
-  }
-  ExperimentScene common;
-  if (const auto horizon = node.Required("horizon", "a number > 0 or a list of them [s]")) {
-    common.horizons = horizon->NumberList(kPositive);
-  }
-  if (const auto name = node.Optional("name")) common.name = name->Text();
-  double scale = 1.0;
-  if (const auto factor = node.Optional("scale"))
-    scale = factor->Number({.min = 1e-12, .max = 1e12});
-  if (const auto tags = node.Optional("tags")) {
-    for (const JsonNode& tag : tags->Elements("tags")) common.tags.push_back(tag.Text());
-  }
-  for (ExperimentScene& scene : scenes) {
+  SceneEntry entry;
+  entry.files = &files;
+  entry.room = room;
+  SceneFields().Read(node, &entry);
+  for (ExperimentScene& scene : entry.scenes) {
     // A mechanism that could not be read lends its file's name, so that references to it still
     // hold.
     const std::string own = scene.mechanism.description.name.empty()
                                 ? scene.path.stem().string()
                                 : scene.mechanism.description.name;
     const std::string counts = scene.name.empty() ? "" : "-" + scene.name;
-    scene.name = common.name.empty() ? own : common.name + counts;
-    if (scale > 0.0 && scale != 1.0) Resize(&scene.mechanism, scale);
-    scene.horizons = common.horizons;
-    scene.tags = common.tags;
+    scene.name = entry.name.empty() ? own : entry.name + counts;
+    if (entry.scale > 0.0 && entry.scale != 1.0) Resize(&scene.mechanism, entry.scale);
+    scene.horizons = entry.horizons;
+    scene.tags = entry.tags;
   }
-  return scenes;
+  return std::move(entry.scenes);
 }
 
 /// Bodies other than ground.
@@ -124,7 +123,49 @@ std::size_t BodiesOf(const ExperimentScene& scene) {
   return scene.mechanism.description.bodies.size() - 1;
 }
 
+void ReadScenes(const JsonNode& node, ExperimentFile& experiment) {
+  std::set<std::string> names;
+  std::size_t bodies = 0;
+  const std::vector<JsonNode> elements = node.Elements("scenes");
+  if (node.value().is_array() && elements.empty()) node.Fail("at least one scene");
+  for (const JsonNode& element : elements) {
+    const std::size_t room = kMaxBodies - std::min(kMaxBodies, bodies);
+    for (ExperimentScene& scene : ReadScene(element, *experiment.files, room)) {
+      if (!scene.name.empty() && !names.insert(scene.name).second) {
+        element.FailAs(fmt::format("scene \"{}\" again", scene.name), "a \"name\" of its own");
+      }
+      bodies += BodiesOf(scene);
+      experiment.scenes.push_back(std::move(scene));
+    }
+    if (bodies > kMaxBodies) {
+      element.FailAs(fmt::format("mechanisms with {} bodies so far", bodies),
+                     fmt::format("at most {} in all scenes", kMaxBodies));
+      break;
+    }
+  }
+}
+
 }  // namespace
+
+bool ExpectMechanismFile(const JsonNode& node, const std::filesystem::path& path) {
+  std::error_code error;
+  if (std::filesystem::is_regular_file(path, error)) return true;
+  if (std::filesystem::exists(path, error)) {
+    node.Fail(fmt::format("a mechanism file ({} is none)", path.string()));
+    return false;
+  }
+  std::vector<std::string> beside;
+  const std::filesystem::path folder = path.has_parent_path() ? path.parent_path() : ".";
+  for (const auto& entry : std::filesystem::directory_iterator(folder, error)) {
+    beside.push_back(entry.path().filename().string());
+  }
+  std::ranges::sort(beside);
+  const std::string nearest = NearestSpelling(path.filename().string(), beside);
+  const std::filesystem::path named = node.Text();
+  node.Fail(fmt::format("a mechanism file ({} does not exist)", path.string()),
+            nearest.empty() ? "" : (named.parent_path() / nearest).string());
+  return false;
+}
 
 const std::string& MechanismFiles::Text(const std::filesystem::path& path) {
   const auto known = texts_.find(path);
@@ -150,31 +191,8 @@ const MechanismFile& MechanismFiles::Mechanism(const std::filesystem::path& path
   return known->second.mechanism;
 }
 
-std::vector<ExperimentScene> ReadScenes(const JsonNode& root, MechanismFiles& files,
-                                        ErrorList* errors) {
-  std::vector<ExperimentScene> scenes;
-  std::set<std::string> names;
-  std::size_t bodies = 0;
-  const auto node = root.Required("scenes", "an array of scenes");
-  if (!node) return scenes;
-  const std::vector<JsonNode> elements = node->Elements("scenes");
-  if (node->value().is_array() && elements.empty()) node->Fail("at least one scene");
-  for (const JsonNode& element : elements) {
-    const std::size_t room = kMaxBodies - std::min(kMaxBodies, bodies);
-    for (ExperimentScene& scene : ReadScene(element, files, room)) {
-      if (!scene.name.empty() && !names.insert(scene.name).second) {
-        element.FailAs(fmt::format("scene \"{}\" again", scene.name), "a \"name\" of its own");
-      }
-      bodies += BodiesOf(scene);
-      scenes.push_back(std::move(scene));
-    }
-    if (bodies > kMaxBodies) {
-      errors->Add(element.pointer(), fmt::format("mechanisms with {} bodies so far", bodies),
-                  fmt::format("at most {} in all scenes", kMaxBodies));
-      break;
-    }
-  }
-  return scenes;
+FieldValue<ExperimentFile> ScenesValue() {
+  return By(ArraySchema(SceneFields().Schema(), 1), ReadScenes);
 }
 
 }  // namespace loopbench::harness

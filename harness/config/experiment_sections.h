@@ -13,7 +13,7 @@
 
 #include "harness/config/experiment.h"
 #include "harness/config/options.h"
-#include "harness/json/json_reader.h"
+#include "harness/json/fields.h"
 
 namespace loopbench::harness {
 
@@ -53,9 +53,19 @@ class MechanismFiles {
   std::map<std::filesystem::path, File> files_;
 };
 
+/// Whether there is a file at `path`, which a node names; reports one that is not there with the
+/// nearest name beside it.
+bool ExpectMechanismFile(const JsonNode& node, const std::filesystem::path& path);
+
+/// An experiment and what reading it needs besides.
+struct ExperimentFile : Experiment {
+  MechanismFiles* files = nullptr;
+};
+/// All that an experiment file may hold.
+const Fields<ExperimentFile>& ExperimentFileFields();
+
 /// "scenes" with the mechanisms they name; a family with several counts makes several scenes.
-std::vector<ExperimentScene> ReadScenes(const JsonNode& root, MechanismFiles& files,
-                                        ErrorList* errors);
+FieldValue<ExperimentFile> ScenesValue();
 /// A member of a family that stands where a mechanism may, and what its counts are.
 struct FamilyMember {
   MechanismFile mechanism;
@@ -63,40 +73,36 @@ struct FamilyMember {
 };
 /// All members that {"family": ...} names; `room` is how many bodies there may be.
 std::vector<FamilyMember> ReadFamilyMembers(const JsonNode& node, std::size_t room);
+Json FamilySchema();
 /// A list of columns, each entry expanded.
 std::vector<Column> ReadColumns(const JsonNode& node);
-/// "integrator", "jacobian", "limits", "compile", "series", "timing" and "precision".
-void ReadSettings(const JsonNode& root, Experiment* experiment);
+Json ColumnsSchema();
+/// The sections of the same names, and "series".
+const Fields<Limits>& LimitsFields();
+const Fields<CompileOptions>& CompileFields();
+const Fields<Experiment>& SeriesFields();
+const Fields<Timing>& TimingFields();
+const Fields<Precision>& PrecisionFields();
 /// "ensembles", after everything that they select from.
-void ReadEnsembles(const JsonNode& root, const ErrorList& errors, Experiment* experiment);
+void ReadEnsembles(const JsonNode& node, ExperimentFile& experiment);
+Json EnsemblesSchema();
+/// "sweep" and "exclude" (experiment_sweep.h).
+Json SweepSchema();
+Json ExclusionsSchema();
 /// Number of cases before exclusion.
 std::size_t CountCases(const Experiment& experiment);
 
-/// One name or a list of different names of an enum's values.
+/// Names of an enum's values in files.
 template <class Enum>
-std::vector<Enum> ReadEnums(const JsonNode& node, std::string_view what) {
-  static const NameList kKnown(std::vector<std::string>(kNames<Enum>.begin(), kNames<Enum>.end()));
-  std::vector<Enum> values;
-  for (const JsonNode& element : node.OneOrMore("names")) {
-    const auto index = element.Choice(kKnown, what);
-    if (!index) continue;
-    const auto value = static_cast<Enum>(*index);
-    const bool again = std::find(values.begin(), values.end(), value) != values.end();
-    if (again) {
-      element.Fail("each value once");
-    } else {
-      values.push_back(value);
-    }
-  }
-  return values;
+const NameList& NamesOf() {
+  static const NameList known(std::vector<std::string>(kNames<Enum>.begin(), kNames<Enum>.end()));
+  return known;
 }
 
-/// The same for a member; `fallback` when it is absent.
-template <class Enum>
-std::vector<Enum> ReadEnums(const JsonNode& owner, const std::string& key, std::string_view what,
-                            std::vector<Enum> fallback) {
-  const auto node = owner.Optional(key);
-  return node ? ReadEnums<Enum>(*node, what) : std::move(fallback);
+template <class T>
+FieldValue<T> Columns(std::vector<Column> T::*member) {
+  return {ColumnsSchema(),
+          [=](const JsonNode& node, T& owner) { owner.*member = ReadColumns(node); }};
 }
 
 }  // namespace loopbench::harness

@@ -1,7 +1,6 @@
-// "integrator", "jacobian", "limits", "compile", "series", "timing" and "precision" of an
-// experiment file.
+// "limits", "compile", "series", "timing" and "precision" of an experiment file.
 #include "harness/config/experiment_sections.h"
-#include "harness/config/options.h"
+#include "harness/config/limits_record.h"
 
 namespace loopbench::harness {
 namespace {
@@ -16,119 +15,113 @@ constexpr Range kTolerancesOfLadders = {
 constexpr int kMostPoints = 10'000;
 constexpr std::int64_t kMaxSteps = 1'000'000'000'000;  // no run gets there
 
-void ReadLimits(const JsonNode& root, Limits* limits) {
-  const auto node = root.Optional("limits");
-  if (!node || !node->ExpectObject({"cpu_s", "steps", "memory_mb", "wall_s"})) return;
-  const auto cpu = node->Optional("cpu_s"), wall = node->Optional("wall_s");
-  if (cpu && wall) node->FailAs("\"cpu_s\" and \"wall_s\"", "one of them: both limit CPU time");
-  if (cpu) limits->cpu_s = cpu->Number(kPositive);
-  if (wall) limits->cpu_s = wall->Number(kPositive);  // its former name
-  if (const auto steps = node->Optional("steps")) {
-    limits->steps = steps->Integer(1, kMaxSteps);
-  }
-  if (const auto memory = node->Optional("memory_mb")) {
-    limits->memory_mb = memory->Number(kPositive);
+void CheckOneCpuLimit(const JsonNode& node, Limits&) {
+  if (!node.Optional("cpu_s") || !node.Optional("wall_s")) return;
+  node.FailAs("\"cpu_s\" and \"wall_s\"", "one of them: both limit CPU time");
+}
+
+void ReadFormerName(const JsonNode& node, Limits& limits) { limits.cpu_s = node.Number(kPositive); }
+
+void ReadSizes(const JsonNode& node, TimingFamily& family) {
+  // the smallest closed chain has three bars
+  const int smallest = family.family == "chain" ? 3 : 1;
+  for (const std::int64_t size : node.IntegerList(smallest, kMaxCount)) {
+    family.sizes.push_back(static_cast<int>(size));
   }
 }
 
-void ReadCompile(const JsonNode& root, CompileOptions* options) {
-  const auto node = root.Optional("compile");
-  if (!node || !node->ExpectObject({"planar", "welds", "immovable", "islands", "redundancy"}))
-    return;
-  if (const auto planar = node->Optional("planar")) options->planar = planar->Bool();
-  if (const auto welds = node->Optional("welds")) options->welds = welds->Bool();
-  if (const auto immovable = node->Optional("immovable")) options->immovable = immovable->Bool();
-  if (const auto islands = node->Optional("islands")) options->islands = islands->Bool();
-  if (const auto redundancy = node->Optional("redundancy")) {
-    options->redundancy = redundancy->Bool();
-  }
-}
-
-TimingFamily ReadFamily(const JsonNode& node) {
-  static const NameList kFamilies = {"chain", "ladder"};
-  constexpr int kLargest = 1'000'000;
-  TimingFamily family;
-  if (!node.ExpectObject({"family", "sizes", "columns"})) return family;
-  if (const auto name = node.Required("family", "a family")) {
-    const auto index = name->Choice(kFamilies, "a family");
-    if (index) family.family = kFamilies.all()[static_cast<std::size_t>(*index)];
-  }
-  if (const auto sizes = node.Required("sizes", "a list of integers")) {
-    // the smallest closed chain has three bars
-    const int smallest = family.family == "chain" ? 3 : 1;
-    for (const std::int64_t size : sizes->IntegerList(smallest, kLargest)) {
-      family.sizes.push_back(static_cast<int>(size));
-    }
-  }
-  if (const auto columns = node.Required("columns", "an array of columns")) {
-    family.columns = ReadColumns(*columns);
-  }
-  return family;
-}
-
-void ReadTiming(const JsonNode& root, Timing* timing) {
-  const auto node = root.Optional("timing");
-  if (!node || !node->ExpectObject({"repeats", "tolerance", "horizon", "columns", "families"})) {
-    return;
-  }
-  if (const auto repeats = node->Optional("repeats")) {
-    timing->repeats = static_cast<int>(repeats->Integer(0, kMaxCount));
-  }
-  if (const auto tolerance = node->Optional("tolerance")) {
-    timing->tolerance = tolerance->Number(kTolerances);
-  }
-  if (const auto horizon = node->Optional("horizon")) timing->horizon = horizon->Number(kPositive);
-  if (const auto columns = node->Optional("columns")) timing->columns = ReadColumns(*columns);
-  if (const auto families = node->Optional("families")) {
-    for (const JsonNode& family : families->Elements("families")) {
-      timing->families.push_back(ReadFamily(family));
-    }
-  }
-}
-
-void ReadPrecision(const JsonNode& root, const std::vector<double>& tolerances,
-                   Precision* precision) {
-  const auto node = root.Optional("precision");
-  if (!node || !node->ExpectObject({"scalars", "tolerances", "horizon", "reference"})) return;
-  precision->tolerances = tolerances;
-  if (const auto scalars = node->Required("scalars", "a list of scalars")) {
-    precision->scalars = ReadEnums<Scalar>(*scalars, "a scalar");
-  }
-  if (const auto given = node->Optional("tolerances")) {
-    precision->tolerances = given->NumberList(kTolerancesOfLadders);
-  }
-  if (const auto horizon = node->Optional("horizon")) {
-    precision->horizon = horizon->Number(kPositive);
-  }
-  if (const auto reference = node->Optional("reference")) {
-    precision->reference = reference->Number(kReferences);
-  }
+const Fields<TimingFamily>& TimingFamilyFields() {
+  static const Json chains_from_three = {
+      {"if", {{"properties", {{"family", ChoiceSchema({"chain"})}}}}},
+      {"then", {{"properties", {{"sizes", IntegerListSchema(3, kMaxCount)}}}}}};
+  static const Fields<TimingFamily> fields(
+      "timingFamily", "Mechanisms of growing size, timed per right-hand side only.",
+      {{"family", Choice(&TimingFamily::family, {"chain", "ladder"}, "a family"), "What grows.",
+        "a family"},
+       {"sizes", By(IntegerListSchema(1, kMaxCount), ReadSizes),
+        "Bars of a chain (from 3), windows of a ladder (from 1).", "a list of integers"},
+       {"columns", Columns(&TimingFamily::columns), "Timed.", "an array of columns"},
+       {"", chains_from_three}});
+  return fields;
 }
 
 }  // namespace
 
-void ReadSettings(const JsonNode& root, Experiment* experiment) {
-  if (const auto name = root.Optional("integrator")) {
-    const std::vector<std::string> profiles = ProfileNames();
-    const auto index = name->Choice(profiles, "an integrator profile");
-    if (index) experiment->integrator = profiles[static_cast<std::size_t>(*index)];
-  }
-  if (const auto kind = root.Optional("jacobian")) {
-    const auto& names = kNames<JacobianKind>;
-    const auto index =
-        kind->Choice(std::vector<std::string>(names.begin(), names.end()), "a kind of Jacobian");
-    if (index) experiment->jacobian = static_cast<JacobianKind>(*index);
-  }
-  ReadLimits(root, &experiment->limits);
-  ReadCompile(root, &experiment->compile);
-  const auto series = root.Optional("series");
-  if (series && series->ExpectObject({"points"})) {
-    if (const auto points = series->Optional("points")) {
-      experiment->series_points = static_cast<int>(points->Integer(2, kMostPoints));
+const Fields<Limits>& LimitsFields() {
+  static const Fields<Limits> fields(
+      "limits", "When a case is given up.",
+      {{"", By({{"not", Requires({"cpu_s", "wall_s"})}}, CheckOneCpuLimit)},
+       {"cpu_s", Number(&Limits::cpu_s, kPositive),
+        "CPU time of one run [s]. Waiting for a processor does not count."},
+       {"steps", Integer(&Limits::steps, 1, kMaxSteps), "Accepted steps."},
+       {"memory_mb", Number(&Limits::memory_mb, kPositive),
+        "Address space of a case's process [MiB]."},
+       {"wall_s", By(NumberSchema(kPositive), ReadFormerName), "The former name of cpu_s."}});
+  return fields;
+}
+
+Record RecordOf(const Limits& limits) {
+  Record record;
+  LimitsFields().Show(limits, [&record](const std::string& key, const Json& value) {
+    if (value.is_number_integer()) {
+      record.Set(key, value.get<std::int64_t>());
+    } else {
+      record.Set(key, value.get<double>());
     }
-  }
-  ReadTiming(root, &experiment->timing);
-  ReadPrecision(root, experiment->tolerances, &experiment->precision);
+  });
+  return record;
+}
+
+const Fields<CompileOptions>& CompileFields() {
+  static const Fields<CompileOptions> fields(
+      "compile",
+      "What is simplified before a run. The motion is the same but for rounding; records say in "
+      "\"compiled\" what was found to save.",
+      {{"planar", Bool(&CompileOptions::planar),
+        "Spatial mechanisms that move in parallel planes become planar."},
+       {"welds", Bool(&CompileOptions::welds), "Welded bodies become one."},
+       {"immovable", Bool(&CompileOptions::immovable),
+        "Rigid sub-structures on the ground become ground."},
+       {"islands", Bool(&CompileOptions::islands),
+        "Parts connected through ground at most run on their own, each with its own steps."},
+       {"redundancy", Bool(&CompileOptions::redundancy),
+        "Constraints that say at every position what others say are released."}});
+  return fields;
+}
+
+const Fields<Experiment>& SeriesFields() {
+  static const Fields<Experiment> fields(
+      "series", "Values over time that records keep.",
+      {{"points", Integer(&Experiment::series_points, 2, kMostPoints),
+        "Points kept of a time series for figures."}});
+  return fields;
+}
+
+const Fields<Timing>& TimingFields() {
+  static const Fields<Timing> fields(
+      "timing", "Timing runs, separate from those that measure accuracy.",
+      {{"repeats", Integer(&Timing::repeats, 0, kMaxCount), "0: no timing."},
+       {"tolerance", Number(&Timing::tolerance, kTolerances), "rtol = atol of the integrator."},
+       {"horizon", Number(&Timing::horizon, kPositive),
+        "Simulated time [s]; default: the shortest of each scene."},
+       {"columns", Columns(&Timing::columns), "Default: those of the experiment."},
+       {"families", ObjectList(&Timing::families, TimingFamilyFields(), "families")}});
+  return fields;
+}
+
+const Fields<Precision>& PrecisionFields() {
+  static const Fields<Precision> fields(
+      "precision",
+      "The columns in several scalars with one integrator (ode45), against a reference in "
+      "float128. Planar mechanisms; one horizon per scene.",
+      {{"scalars", Choices(&Precision::scalars, NamesOf<Scalar>(), "a scalar"),
+        "One or several, narrowest first by custom.", "a list of scalars"},
+       {"tolerances", NumberList(&Precision::tolerances, kTolerancesOfLadders),
+        "Default: those of the experiment."},
+       {"horizon", Number(&Precision::horizon, kPositive),
+        "Simulated time [s]; default: the shortest of each scene."},
+       {"reference", Number(&Precision::reference, kReferences), "Tolerance of the reference."}});
+  return fields;
 }
 
 }  // namespace loopbench::harness

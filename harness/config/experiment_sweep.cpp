@@ -49,62 +49,75 @@ std::vector<Value> AsParameters(const std::vector<Json>& values) {
   return parameters;
 }
 
-std::vector<Json> ReadValues(const JsonNode& node) {
-  std::vector<Json> values;
-  if (node.value().is_object()) {
-    for (const double number : node.Spaced()) values.emplace_back(number);
-    return values;
-  }
-  if (!node.value().is_array() || node.value().empty()) {
-    node.Fail("an array of values or a range: {\"lin\" or \"log\": [from, to, count]}");
-    return values;
-  }
-  return {node.value().begin(), node.value().end()};
-}
+/// An axis being read.
+struct AxisOfSweep : SweepAxis {
+  ExperimentFields* experiment = nullptr;
+  std::set<std::string>* taken = nullptr;
+};
 
 /// The name of an axis, which becomes a key of records.
-std::string ReadAxisName(const JsonNode& axis, std::set<std::string>* taken) {
-  const auto node = axis.Required("name", "a name for tables and filters");
-  if (!node) return "";
-  const std::string name = node->Text();
-  if (name.empty()) return name;
-  if (!IsName(name)) {
-    node->Fail("a name of letters, digits, \"_\" and \"-\" that begins with a letter");
-  } else if (IsReserved(name)) {
-    node->Fail("a name that records do not use already");
-  } else if (!taken->insert(name).second) {
-    node->Fail("a name that no other axis has");
+void ReadAxisName(const JsonNode& node, AxisOfSweep& axis) {
+  axis.name = node.Text();
+  if (axis.name.empty()) return;
+  if (!IsName(axis.name)) {
+    node.Fail("a name of letters, digits, \"_\" and \"-\" that begins with a letter");
+  } else if (IsReserved(axis.name)) {
+    node.Fail("a name that records do not use already");
+  } else if (!axis.taken->insert(axis.name).second) {
+    node.Fail("a name that no other axis has");
   }
-  return name;
 }
 
-void ReadField(const JsonNode& axis, ExperimentFields& fields, SweepAxis* result) {
-  const auto node = axis.Required("field", "a JSON Pointer such as /scenes/0/horizon");
-  if (!node) return;
-  const std::string pointer = node->Text();
+void ReadField(const JsonNode& node, AxisOfSweep& axis) {
+  const std::string pointer = node.Text();
   if (pointer.empty()) return;
   for (const char* own : {"/sweep", "/exclude"}) {
     if (pointer == own || pointer.starts_with(std::string(own) + "/")) {
-      node->Fail("a field outside of \"sweep\" and \"exclude\"");
+      node.Fail("a field outside of \"sweep\" and \"exclude\"");
       return;
     }
   }
-  result->fields = fields.Find(pointer);
-  if (!result->fields.fault) return;
-  const FieldFault& fault = *result->fields.fault;
-  if (!fault.of_file) node->FailAs(fault.found, fault.expected, fault.suggestion);
+  axis.fields = axis.experiment->Find(pointer);
+  if (!axis.fields.fault) return;
+  const FieldFault& fault = *axis.fields.fault;
+  if (!fault.of_file) node.FailAs(fault.found, fault.expected, fault.suggestion);
+}
+
+void ReadValues(const JsonNode& node, AxisOfSweep& axis) {
+  if (node.value().is_object()) {
+    for (const double number : node.Spaced()) axis.values.emplace_back(number);
+  } else if (!node.value().is_array() || node.value().empty()) {
+    node.Fail("an array of values or a range: {\"lin\" or \"log\": [from, to, count]}");
+  } else {
+    axis.values.assign(node.value().begin(), node.value().end());
+  }
+  axis.parameters = AsParameters(axis.values);
+}
+
+const Fields<AxisOfSweep>& AxisFields() {
+  const Json values =
+      EitherSchema({ArraySchema(Json::object(), 1), SpacedSchema(NumberSchema(), false)});
+  static const Fields<AxisOfSweep> fields(
+      "axis", "The values of one field.",
+      {{"name", By(PatternSchema("^[A-Za-z][A-Za-z0-9_-]*$"), ReadAxisName),
+        "In every record, for filters and tables; none of the names that records have already.",
+        "a name for tables and filters"},
+       {"field", By(PatternSchema("^/(?!sweep(/|$)|exclude(/|$))"), ReadField),
+        "JSON Pointer into this file, or through a scene's mechanism path into that one; \"*\" "
+        "stands for all elements of an array.",
+        "a JSON Pointer such as /scenes/0/horizon"},
+       {"values", By(values, ReadValues),
+        "Of any kind, each once (in step with others, they may repeat), or a range.",
+        "an array of values or a range"}});
+  return fields;
 }
 
 SweepAxis ReadAxis(const JsonNode& node, ExperimentFields& fields, std::set<std::string>* taken) {
-  SweepAxis axis;
+  AxisOfSweep axis;
   axis.source = node.pointer();
-  if (!node.ExpectObject({"name", "field", "values"})) return axis;
-  axis.name = ReadAxisName(node, taken);
-  ReadField(node, fields, &axis);
-  if (const auto values = node.Required("values", "an array of values or a range")) {
-    axis.values = ReadValues(*values);
-    axis.parameters = AsParameters(axis.values);
-  }
+  axis.experiment = &fields;
+  axis.taken = taken;
+  AxisFields().Read(node, &axis);
   return axis;
 }
 
@@ -143,6 +156,13 @@ SweepGroup ReadGroup(const JsonNode& node, ExperimentFields& fields, std::set<st
 }
 
 }  // namespace
+
+Json SweepSchema() {
+  const Json axis = AxisFields().Schema();
+  Json zip = ObjectSchema("", {{"zip", ArraySchema(axis, 2), "Axes that go in step.", true}});
+  zip["words"] = "`{\"zip\": [axis, ...]}`";
+  return ArraySchema(EitherSchema({axis, zip}), 0, kMaxAxes);
+}
 
 Sweep::Sweep(const JsonNode& root, ExperimentFields& fields,
              const std::vector<std::string>& settings) {

@@ -7,14 +7,20 @@
 namespace loopbench::harness {
 namespace {
 
-void ReadPoints(const JsonNode& owner, SpaceKind space, BodyDescription* body) {
-  const auto points = owner.Optional("points");
-  if (!points) return;
-  for (const auto& [name, position] : points->Members()) {
+void ReadPoints(const JsonNode& node, SpaceKind space, BodyDescription* body) {
+  for (const auto& [name, position] : node.Members()) {
     if (name.empty()) position.FailAs("a point without a name", "a name that is not empty");
     body->points[name] = ReadVector(position, space);
   }
 }
+
+Json PointsSchema() {
+  Json schema = MapSchema(VectorSchema());
+  schema["propertyNames"] = {{"minLength", 1}};
+  return Named("points", schema);
+}
+
+using Body = PartOf<BodyDescription>;
 
 /// One number I becomes diag(I, I, I): in the plane only Izz matters, in space it is isotropic.
 /// Six numbers are the elements [Ixx, Iyy, Izz, Ixy, Ixz, Iyz] of the matrix as it stands.
@@ -22,14 +28,16 @@ void ReadPoints(const JsonNode& owner, SpaceKind space, BodyDescription* body) {
 /// A principal moment is the integral of two squared distances of three: none exceeds the sum of
 /// the other two, and in a thin rod or plate one equals it. In the plane only Izz is used, and
 /// nothing is known of the others.
-Eigen::Matrix3d ReadInertia(const JsonNode& node, SpaceKind space) {
-  Eigen::Matrix3d inertia = Eigen::Matrix3d::Identity();
-  if (node.value().is_number()) return inertia * node.Number(kPositive);
+void ReadInertia(const JsonNode& node, Body& body) {
+  Eigen::Matrix3d& inertia = body.inertia;
+  inertia.setIdentity();
+  if (node.value().is_number()) inertia *= node.Number(kPositive);
+  if (node.value().is_number()) return;
   const bool known_size =
       node.value().is_array() && (node.value().size() == 3 || node.value().size() == 6);
   if (!known_size) {
     node.Fail("a number > 0, [Ixx, Iyy, Izz] or [Ixx, Iyy, Izz, Ixy, Ixz, Iyz]");
-    return inertia;
+    return;
   }
   const std::vector<double> values = node.Numbers(node.value().size());
   inertia.diagonal() << values[0], values[1], values[2];
@@ -42,7 +50,7 @@ Eigen::Matrix3d ReadInertia(const JsonNode& node, SpaceKind space) {
   const bool positive = inertia.diagonal().minCoeff() > 0.0 &&
                         Eigen::LLT<Eigen::Matrix3d>(inertia).info() == Eigen::Success;
   if (!positive) node.Fail("a positive definite inertia");
-  if (!positive || space == SpaceKind::kPlanar) return inertia;
+  if (!positive || body.draft->space == SpaceKind::kPlanar) return;
   // Three significant digits, as data sheets print them, are off by up to 0.5 % in each moment.
   constexpr double kPrinted = 0.01;
   const Eigen::Vector3d moments =
@@ -51,42 +59,59 @@ Eigen::Matrix3d ReadInertia(const JsonNode& node, SpaceKind space) {
     node.Fail(
         "principal moments of which none exceeds the sum of the other two, as no body's does");
   }
-  return inertia;
 }
 
-BodyDescription ReadBody(const JsonNode& node, const NameList& taken, SpaceKind space) {
-  BodyDescription body;
-  if (!node.ExpectObject({"name", "mass", "inertia", "com", "points"})) return body;
-  body.name = ReadNewName(node, taken);
-  if (const auto mass = node.Required("mass", "a number > 0 [kg]")) {
-    body.mass = mass->Number(kPositive);
+void ReadNameOfBody(const JsonNode& node, Body& body) {
+  body.name = ReadNewName(node, body.draft->body_names);
+}
+
+void ReadPointsOfBody(const JsonNode& node, Body& body) {
+  ReadPoints(node, body.draft->space, &body);
+}
+
+void ReadPointsOfGround(const JsonNode& node, Draft& draft) {
+  ReadPoints(node, draft.space, &draft.bodies[kGround]);
+}
+
+const Fields<Body>& BodyFields() {
+  const Json inertia =
+      EitherSchema({NumberSchema(kPositive), ArraySchema(NumberSchema(kPositive), 3, 3),
+                    ArraySchema(NumberSchema(), 6, 6)});
+  static const Fields<Body> fields(
+      "body", "A rigid body.",
+      {{"name", By(TextSchema(), ReadNameOfBody), "One that no other body has.", "a name"},
+       {"mass", Number(&BodyDescription::mass, kPositive), "Mass [kg].", "a number > 0 [kg]"},
+       {"inertia", By(inertia, ReadInertia),
+        "About the centre of mass, body axes [kg m^2]: Izz (isotropic in space), [Ixx, Iyy, Izz] "
+        "or the matrix elements [Ixx, Iyy, Izz, Ixy, Ixz, Iyz].",
+        "the inertia about the centre of mass"},
+       {"com", VectorOf(&BodyDescription::com),
+        "Centre of mass in body axes [m], default the body's origin."},
+       {"points", By(PointsSchema(), ReadPointsOfBody),
+        "Named points in body axes from the body's origin [m]."}});
+  return fields;
+}
+
+const Fields<Draft>& GroundFields() {
+  static const Fields<Draft> fields("ground", "What does not move.",
+                                    {{"points", By(PointsSchema(), ReadPointsOfGround),
+                                      "Named points in ground axes from the origin [m]."}});
+  return fields;
+}
+
+void ReadBodies(const JsonNode& node, Draft& draft) {
+  const std::vector<JsonNode> elements = node.Elements("bodies");
+  if (node.value().is_array() && elements.empty()) node.Fail("at least one body");
+  for (const JsonNode& element : elements) {
+    draft.bodies.push_back(ReadPart(BodyFields(), element, draft));
+    draft.body_names.Add(draft.bodies.back().name);
   }
-  if (const auto inertia = node.Required("inertia", "the inertia about the centre of mass")) {
-    body.inertia = ReadInertia(*inertia, space);
-  }
-  if (const auto com = node.Optional("com")) body.com = ReadVector(*com, space);
-  ReadPoints(node, space, &body);
-  return body;
 }
 
 }  // namespace
 
-void ReadBodies(const JsonNode& root, Draft* draft) {
-  const SpaceKind space = draft->space;
-  draft->bodies[kGround].name = "ground";
-  draft->body_names.Add("ground");
-  const auto ground = root.Optional("ground");
-  if (ground && ground->ExpectObject({"points"})) {
-    ReadPoints(*ground, space, &draft->bodies[kGround]);
-  }
-  const auto bodies = root.Required("bodies", "an array of bodies");
-  if (!bodies) return;
-  const std::vector<JsonNode> elements = bodies->Elements("bodies");
-  if (bodies->value().is_array() && elements.empty()) bodies->Fail("at least one body");
-  for (const JsonNode& element : elements) {
-    draft->bodies.push_back(ReadBody(element, draft->body_names, space));
-    draft->body_names.Add(draft->bodies.back().name);
-  }
-}
+FieldValue<Draft> GroundValue() { return Section(GroundFields()); }
+
+FieldValue<Draft> BodiesValue() { return By(ArraySchema(BodyFields().Schema(), 1), ReadBodies); }
 
 }  // namespace loopbench::harness

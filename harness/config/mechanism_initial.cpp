@@ -39,13 +39,10 @@ void CheckQuaternion(const JsonNode& node, const std::vector<double>& values) {
   if (zeros == 4) node.Fail("a quaternion qw, qx, qy, qz that is not zero");
 }
 
-std::vector<JointValues> ReadJointValues(const JsonNode& initial, const std::string& key,
-                                         const Draft& draft, bool speeds) {
+std::vector<JointValues> ReadJointValues(const JsonNode& section, const Draft& draft, bool speeds) {
   std::vector<JointValues> result;
-  const auto section = initial.Optional(key);
-  if (!section) return result;
-  if (!section->ExpectObject(draft.joint_names)) return result;
-  for (const auto& [name, node] : section->Members()) {
+  if (!section.ExpectObject(draft.joint_names)) return result;
+  for (const auto& [name, node] : section.Members()) {
     const auto joint = draft.joint_names.Find(name);
     if (!joint) continue;
     const JointDescription& described = draft.joints[static_cast<std::size_t>(*joint)];
@@ -105,23 +102,25 @@ void CheckIndependentName(const JsonNode& node, const std::string& name, const S
   }
 }
 
-PendulumForm ReadPendulum(const JsonNode& node, const Draft& draft) {
-  PendulumForm form;
-  if (!node.ExpectObject({"type", "body", "down_angle", "frequency_squared"})) return form;
-  if (const auto type = node.Required("type", "\"pendulum\"")) {
-    type->Choice({"pendulum"}, "a closed form");
-  }
-  if (const auto body = node.Required("body", "the name of a body")) {
-    const auto index = ReadBodyName(*body, draft);
-    if (index) form.body = draft.bodies[*index].name;
-  }
-  if (const auto angle = node.Required("down_angle", "a number [rad]")) {
-    form.down_angle = angle->Number();
-  }
-  if (const auto frequency = node.Required("frequency_squared", "a number > 0 [1/s^2]")) {
-    form.frequency_squared = frequency->Number(kPositive);
-  }
-  return form;
+using Form = PartOf<PendulumForm>;
+
+void ReadFormType(const JsonNode& node, Form&) { node.Choice({"pendulum"}, "a closed form"); }
+
+void ReadFormBody(const JsonNode& node, Form& form) {
+  const auto index = ReadBodyName(node, *form.draft);
+  if (index) form.body = form.draft->bodies[*index].name;
+}
+
+const Fields<Form>& PendulumFields() {
+  static const Fields<Form> fields(
+      "closed_form", "The exact motion of one body: that of a plain pendulum.",
+      {{"type", By(ChoiceSchema({"pendulum"}), ReadFormType), "What it is.", "\"pendulum\""},
+       {"body", By(TextSchema(), ReadFormBody), "Whose angle it is.", "the name of a body"},
+       {"down_angle", Number(&PendulumForm::down_angle),
+        "Absolute angle of the body where theta = 0 [rad].", "a number [rad]"},
+       {"frequency_squared", Number(&PendulumForm::frequency_squared, kPositive),
+        "In theta'' = -frequency_squared sin(theta) [1/s^2].", "a number > 0 [1/s^2]"}});
+  return fields;
 }
 
 AngleCombination ReadCombination(const JsonNode& node, const Draft& draft) {
@@ -134,57 +133,90 @@ AngleCombination ReadCombination(const JsonNode& node, const Draft& draft) {
   return combination;
 }
 
-}  // namespace
-
-void ReadInitial(const JsonNode& root, Draft* draft) {
-  const auto node = root.Optional("initial");
-  if (!node || !node->ExpectObject({"coordinates", "speeds", "held"})) return;
-  InitialDescription& initial = draft->initial;
-  initial.coordinates = ReadJointValues(*node, "coordinates", *draft, false);
-  initial.speeds = ReadJointValues(*node, "speeds", *draft, true);
-  const auto held = node->Optional("held");
-  if (!held) return;
+void ReadHeld(const JsonNode& node, Draft& draft) {
   std::set<int> given, known;
-  for (const JointValues& values : initial.coordinates) given.insert(values.joint);
-  for (const JsonNode& element : held->Elements("joint names")) {
-    const auto joint = ReadJointName(element, *draft);
+  for (const JointValues& values : draft.initial.coordinates) given.insert(values.joint);
+  for (const JsonNode& element : node.Elements("joint names")) {
+    const auto joint = ReadJointName(element, draft);
     if (!joint) continue;
     if (!given.contains(*joint)) element.Fail("a joint with a value in /initial/coordinates");
     if (!known.insert(*joint).second) element.Fail("each joint once");
-    initial.held.push_back(*joint);
+    draft.initial.held.push_back(*joint);
   }
 }
 
-void ReadIndependent(const JsonNode& root, Draft* draft) {
-  const auto independent = root.Optional("independent");
-  if (!independent) return;
-  const SpeedNames names = NamesOfSpeeds(*draft);
+void ReadIndependent(const JsonNode& node, Draft& draft) {
+  const SpeedNames names = NamesOfSpeeds(draft);
   std::set<std::string> known;
-  for (const JsonNode& element : independent->Elements("names")) {
+  for (const JsonNode& element : node.Elements("names")) {
     const std::string name = element.Text();
     if (name.empty()) continue;
     CheckIndependentName(element, name, names);
     if (!known.insert(name).second) element.Fail("each name once");
-    draft->independent.push_back(name);
+    draft.independent.push_back(name);
   }
 }
 
-SceneObservation ReadObservation(const JsonNode& root, const Draft& draft) {
-  SceneObservation observation;
-  const auto node = root.Optional("observe");
-  if (!node || !node->ExpectObject({"branch", "closed_form", "length"})) return observation;
-  if (const auto branch = node->Optional("branch")) {
-    for (const JsonNode& element : branch->Elements("combinations of body angles")) {
-      observation.branch_invariants.push_back(ReadCombination(element, draft));
-    }
+/// Names, each once.
+Json NamesSchema() {
+  Json schema = ArraySchema(TextSchema());
+  schema["uniqueItems"] = true;
+  return schema;
+}
+
+void ReadCoordinates(const JsonNode& node, Draft& draft) {
+  draft.initial.coordinates = ReadJointValues(node, draft, false);
+}
+
+void ReadSpeeds(const JsonNode& node, Draft& draft) {
+  draft.initial.speeds = ReadJointValues(node, draft, true);
+}
+
+void ReadBranch(const JsonNode& node, Draft& draft) {
+  for (const JsonNode& element : node.Elements("combinations of body angles")) {
+    draft.observe.branch_invariants.push_back(ReadCombination(element, draft));
   }
-  if (const auto form = node->Optional("closed_form")) {
-    observation.closed_form = ReadPendulum(*form, draft);
-  }
-  if (const auto length = node->Optional("length")) {
-    observation.length = length->Number(kPositive);
-  }
-  return observation;
+}
+
+void ReadClosedForm(const JsonNode& node, Draft& draft) {
+  draft.observe.closed_form = ReadPart(PendulumFields(), node, draft);
+}
+
+void ReadLength(const JsonNode& node, Draft& draft) {
+  draft.observe.length = node.Number(kPositive);
+}
+
+}  // namespace
+
+FieldValue<Draft> IndependentValue() { return By(NamesSchema(), ReadIndependent); }
+
+const Fields<Draft>& InitialFields() {
+  constexpr std::size_t kMostValues = 7;  // of a free joint in space
+  static const Json values =
+      Named("jointValues",
+            MapSchema(EitherSchema({NumberSchema(), ArraySchema(NumberSchema(), 1, kMostValues)})));
+  static const Fields<Draft> fields(
+      "initial", "Where and how fast it starts; what is not said is assembled.",
+      {{"coordinates", By(values, ReadCoordinates),
+        "By joint: guesses, or exact where the joint is held. Revolute [rad], prismatic [m], free "
+        "joint [angle, x, y] in the plane, [qw, qx, qy, qz, x, y, z] in space."},
+       {"speeds", By(values, ReadSpeeds),
+        "By joint; all of them are held when the loops are assembled."},
+       {"held", By(NamesSchema(), ReadHeld),
+        "Joints whose coordinates the assembly must not move."}});
+  return fields;
+}
+
+const Fields<Draft>& ObservationFields() {
+  static const Fields<Draft> fields(
+      "observe", "Exact facts that observers compare with.",
+      {{"branch", By(ArraySchema(MapSchema(NumberSchema(), 1)), ReadBranch),
+        "Linear combinations of absolute body angles, by body, that stay constant on the right "
+        "branch."},
+       {"closed_form", By(PendulumFields().Schema(), ReadClosedForm)},
+       {"length", By(NumberSchema(kPositive), ReadLength),
+        "Characteristic bar length [m], default 1."}});
+  return fields;
 }
 
 }  // namespace loopbench::harness

@@ -6,45 +6,47 @@
 namespace loopbench::harness {
 namespace {
 
+using Side = PartOf<JointSide>;
+using Joint = PartOf<JointDescription>;
+
 /// A number (about z) or a rotation vector of three numbers.
-Eigen::Vector3d ReadRotation(const JsonNode& node, SpaceKind space) {
-  if (node.value().is_number()) return {0.0, 0.0, node.Number()};
+void ReadRotation(const JsonNode& node, Side& side) {
+  if (node.value().is_number()) {
+    side.rotation = {0.0, 0.0, node.Number()};
+    return;
+  }
   if (!node.value().is_array() || node.value().size() != 3) {
     node.Fail("a number (rotation about z) or an array of 3 numbers [rad]");
-    return Eigen::Vector3d::Zero();
+    return;
   }
-  const Eigen::Vector3d rotation = node.Vector();
-  const bool about_z = rotation.x() == 0.0 && rotation.y() == 0.0;
-  if (space == SpaceKind::kPlanar && !about_z) {
+  side.rotation = node.Vector();
+  const bool about_z = side.rotation.x() == 0.0 && side.rotation.y() == 0.0;
+  if (side.draft->space == SpaceKind::kPlanar && !about_z) {
     node.FailWithCure(kSpatialCure, "a rotation about z in a planar mechanism");
   }
-  return rotation;
 }
 
-JointSide ReadSide(const JsonNode& joint, const char* key, const Draft& draft) {
-  JointSide side;
-  side.body = -1;  // not known: matches no other side
-  const auto node = joint.Required(key, "an object with keys \"body\", \"at\", \"rotation\"");
-  if (!node || !node->ExpectObject({"body", "at", "rotation"})) return side;
-  if (const auto body = node->Required("body", "the name of a body or \"ground\"")) {
-    side.body = ReadBodyName(*body, draft).value_or(-1);
-  }
-  if (const auto at = node->Optional("at"); at && side.body >= 0) {
-    side.position = ReadPoint(*at, draft.bodies[side.body], draft.space);
-  }
-  if (const auto rotation = node->Optional("rotation")) {
-    side.rotation = ReadRotation(*rotation, draft.space);
-  }
-  return side;
+const Fields<Side>& SideFields() {
+  const Json rotation = EitherSchema({NumberSchema(), ArraySchema(NumberSchema(), 3, 3)});
+  static const Fields<Side> fields(
+      "side", "A frame of a joint, fixed on a body.",
+      {{"body", BodyOf<JointSide>(&JointSide::body, true), "A body's name or \"ground\".",
+        "the name of a body or \"ground\""},
+       {"at", PlaceOf<JointSide>(&JointSide::body, &JointSide::position),
+        "Its origin: the name of one of the body's points, or coordinates in body axes [m]."},
+       {"rotation", By(rotation, ReadRotation),
+        "Body axes to the joint's frame [rad]: about z, or a rotation vector. Default 0."}});
+  return fields;
 }
 
-Eigen::Vector3d ReadAxis(const JsonNode& node, JointType type, SpaceKind space) {
-  const Eigen::Vector3d axis = node.Vector();
+void ReadAxis(const JsonNode& node, Joint& joint) {
+  const Eigen::Vector3d axis = joint.axis = node.Vector();
+  const JointType type = joint.type;
   if (OwnAxis(type) == '-') {
     node.Fail(fmt::format("no axis on a {} joint", ToString(type)));
   } else if (axis.isZero()) {
     if (node.value().is_array()) node.Fail("an axis that is not zero");
-  } else if (space == SpaceKind::kPlanar) {
+  } else if (joint.draft->space == SpaceKind::kPlanar) {
     const bool along_z = axis.x() == 0.0 && axis.y() == 0.0 && axis.z() > 0.0;
     if (OwnAxis(type) == 'z' && !along_z) {
       node.FailWithCure(kSpatialCure, "an axis along +z in a planar mechanism");
@@ -53,7 +55,6 @@ Eigen::Vector3d ReadAxis(const JsonNode& node, JointType type, SpaceKind space) 
       node.FailWithCure(kSpatialCure, "an axis with z = 0 in a planar mechanism");
     }
   }
-  return axis;
 }
 
 /// A number that one type of joint must have and no other may.
@@ -69,29 +70,36 @@ double ReadParameter(const JsonNode& node, const std::string& key, const JointDe
   return 0.0;
 }
 
-/// `speeds`: coordinates that may be prescribed.
-PrescribedMotion ReadOneMotion(const JsonNode& node, int speeds,
-                               const std::vector<PrescribedMotion>& taken) {
-  PrescribedMotion motion{0, Polynomial{{0.0}}};
-  if (!node.ExpectObject({"coordinate", "value"})) return motion;
-  if (const auto coordinate = node.Required("coordinate", "the number of a coordinate")) {
-    motion.coordinate = static_cast<int>(coordinate->Integer(0, speeds - 1));
-    for (const PrescribedMotion& other : taken) {
-      if (other.coordinate == motion.coordinate)
-        coordinate->Fail("a coordinate not yet prescribed");
-    }
+/// A motion of a joint with `speeds` coordinates that may be prescribed, of which some are.
+struct MotionOfJoint : PrescribedMotion {
+  int speeds = 1;
+  const std::vector<PrescribedMotion>* taken = nullptr;
+};
+
+void ReadCoordinate(const JsonNode& node, MotionOfJoint& motion) {
+  motion.coordinate = static_cast<int>(node.Integer(0, motion.speeds - 1));
+  for (const PrescribedMotion& other : *motion.taken) {
+    if (other.coordinate == motion.coordinate) node.Fail("a coordinate not yet prescribed");
   }
-  if (const auto value = node.Required("value", "a number or a function of time")) {
-    motion.value = ReadTimeFunction(*value);
-  }
-  return motion;
+}
+
+const Fields<MotionOfJoint>& MotionFields() {
+  constexpr int kMostCoordinates = 3;  // that can be prescribed: those of a planar joint
+  static const Fields<MotionOfJoint> fields(
+      "motion", "A coordinate as a given function of time.",
+      {{"coordinate", By(IntegerSchema(0, kMostCoordinates - 1), ReadCoordinate),
+        "In the order of initial coordinates, from 0.", "the number of a coordinate"},
+       {"value", TimeFunctionOf(&PrescribedMotion::value), "Its value [rad or m].",
+        "a number or a function of time"}});
+  return fields;
 }
 
 /// One function for a joint with one coordinate, else a list that names coordinates.
-void ReadMotions(const JsonNode& node, SpaceKind space, JointDescription* joint) {
-  const int speeds = NumValues(joint->type, space, true);
-  if (speeds == 0 || NumValues(joint->type, space, false) != speeds) {
-    node.FailAs(fmt::format("a motion of a {} joint", ToString(joint->type)),
+void ReadMotions(const JsonNode& node, Joint& joint) {
+  const SpaceKind space = joint.draft->space;
+  const int speeds = NumValues(joint.type, space, true);
+  if (speeds == 0 || NumValues(joint.type, space, false) != speeds) {
+    node.FailAs(fmt::format("a motion of a {} joint", ToString(joint.type)),
                 "a joint whose coordinates are angles and shifts");
     return;
   }
@@ -99,47 +107,87 @@ void ReadMotions(const JsonNode& node, SpaceKind space, JointDescription* joint)
     if (speeds > 1) {
       node.Fail(
           fmt::format("an array of {{\"coordinate\", \"value\"}}: a {} joint has {} coordinates",
-                      ToString(joint->type), speeds));
+                      ToString(joint.type), speeds));
       return;
     }
-    joint->motions = {{0, ReadTimeFunction(node)}};
+    joint.motions = {{0, ReadTimeFunction(node)}};
     return;
   }
   for (const JsonNode& element : node.Elements("motions")) {
-    joint->motions.push_back(ReadOneMotion(element, speeds, joint->motions));
+    MotionOfJoint motion{{0, Polynomial{{0.0}}}, speeds, &joint.motions};
+    MotionFields().Read(element, &motion);
+    joint.motions.push_back(motion);
   }
 }
 
-JointDescription ReadJoint(const JsonNode& node, const Draft& draft) {
-  JointDescription joint;
-  if (!node.ExpectObject(
-          {"name", "type", "from", "to", "axis", "pitch", "length", "motion", "cut"})) {
-    return joint;
-  }
-  joint.name = ReadNewName(node, draft.joint_names);
-  if (const auto type = node.Required("type", "a joint type")) {
-    joint.type = static_cast<JointType>(type->Choice(JointTypeNames(), "a joint type").value_or(0));
-    if (draft.space == SpaceKind::kPlanar && !ExistsInPlane(joint.type)) {
-      type->FailWithCure(kSpatialCure, "a joint of the plane");
-      return joint;  // what else it has cannot be judged
-    }
-  }
-  joint.from = ReadSide(node, "from", draft);
-  joint.to = ReadSide(node, "to", draft);
-  if (joint.from.body >= 0 && joint.from.body == joint.to.body) {
-    node.FailAs(fmt::format("a joint of \"{}\" with itself", draft.bodies[joint.from.body].name),
-                "two different bodies");
-  }
-  if (const auto axis = node.Optional("axis")) {
-    joint.axis = ReadAxis(*axis, joint.type, draft.space);
-  }
+bool IsMissingInPlane(const Joint& joint) {
+  return joint.draft->space == SpaceKind::kPlanar && !ExistsInPlane(joint.type);
+}
+
+void ReadType(const JsonNode& node, Joint& joint) {
+  joint.type = static_cast<JointType>(node.Choice(JointTypeNames(), "a joint type").value_or(0));
+  if (IsMissingInPlane(joint)) node.FailWithCure(kSpatialCure, "a joint of the plane");
+}
+
+void CheckSides(const JsonNode& node, Joint& joint) {
+  if (joint.from.body < 0 || joint.from.body != joint.to.body) return;
+  node.FailAs(
+      fmt::format("a joint of \"{}\" with itself", joint.draft->bodies[joint.from.body].name),
+      "two different bodies");
+}
+
+void ReadParameters(const JsonNode& node, Joint& joint) {
   joint.pitch = ReadParameter(node, "pitch", joint, JointType::kHelical, {},
                               "the advance along the axis per angle [m/rad]");
   joint.length = ReadParameter(node, "length", joint, JointType::kRod, kPositive,
                                "the distance of the two points [m]");
-  if (const auto motion = node.Optional("motion")) ReadMotions(*motion, draft.space, &joint);
-  if (const auto cut = node.Optional("cut")) joint.cut = cut->Bool();
-  return joint;
+}
+
+/// A key that joints of this type must have and others may not.
+Json OnlyOf(JointType type, const std::string& key) {
+  return {{"if", {{"properties", {{"type", ChoiceSchema({std::string(ToString(type))})}}}}},
+          {"then", Requires({key})},
+          {"else", {{"not", Requires({key})}}}};
+}
+
+void ReadNameOfJoint(const JsonNode& node, Joint& joint) {
+  joint.name = ReadNewName(node, joint.draft->joint_names);
+}
+
+const Fields<Joint>& JointFields() {
+  const Json motions = EitherSchema({TimeFunctionSchema(), ArraySchema(MotionFields().Schema())});
+  const Json parameters = {
+      {"allOf", {OnlyOf(JointType::kHelical, "pitch"), OnlyOf(JointType::kRod, "length")}}};
+  static const Fields<Joint> fields(
+      "joint", "From frame F on one body to frame M on another.",
+      {{"name", By(TextSchema(), ReadNameOfJoint), "One that no other joint has.", "a name"},
+       {"type", By(ChoiceSchema(JointTypeNames().all()), ReadType), "What it leaves free.",
+        "a joint type", IsMissingInPlane},
+       {"from", Part(&JointDescription::from, SideFields()), "Where F is.",
+        "an object with keys \"body\", \"at\", \"rotation\""},
+       {"to", Part(&JointDescription::to, SideFields()), "Where M is.",
+        "an object with keys \"body\", \"at\", \"rotation\""},
+       {"", By(Json::object(), CheckSides)},
+       {"axis", By(VectorSchema(), ReadAxis),
+        "Of a revolute (default z) or prismatic joint (default x), not zero."},
+       {"pitch", NumberSchema(), "Of a helical joint: advance along its axis per angle [m/rad]."},
+       {"length", NumberSchema(kPositive), "Of a rod: distance of its two points [m]."},
+       {"", By(parameters, ReadParameters)},
+       {"motion", By(motions, ReadMotions),
+        "Coordinates as given functions of time [rad or m]: one function for a joint with one "
+        "coordinate, else a list."},
+       {"cut", Bool(&JointDescription::cut),
+        "This joint closes its loop: it carries no joint coordinate."}});
+  return fields;
+}
+
+void ReadJoints(const JsonNode& node, Draft& draft) {
+  JointDescription unread;
+  unread.from.body = unread.to.body = -1;  // not known: matches no other side
+  for (const JsonNode& element : node.Elements("joints")) {
+    draft.joints.push_back(ReadPart(JointFields(), element, draft, unread));
+    draft.joint_names.Add(draft.joints.back().name);
+  }
 }
 
 }  // namespace
@@ -154,13 +202,6 @@ const NameList& JointTypeNames() {
   return kNames;
 }
 
-void ReadJoints(const JsonNode& root, Draft* draft) {
-  const auto joints = root.Required("joints", "an array of joints");
-  if (!joints) return;
-  for (const JsonNode& element : joints->Elements("joints")) {
-    draft->joints.push_back(ReadJoint(element, *draft));
-    draft->joint_names.Add(draft->joints.back().name);
-  }
-}
+FieldValue<Draft> JointsValue() { return By(ArraySchema(JointFields().Schema()), ReadJoints); }
 
 }  // namespace loopbench::harness

@@ -4,6 +4,7 @@
 
 #include <utility>
 
+#include "harness/config/file_schemas.h"
 #include "harness/config/mechanism_sections.h"
 #include "harness/json/document_kind.h"
 
@@ -43,24 +44,54 @@ std::optional<int> ReadJointName(const JsonNode& node, const Draft& draft) {
   return node.Choice(draft.joint_names, "a joint");
 }
 
-std::string ReadNewName(const JsonNode& owner, const NameList& taken) {
-  const auto node = owner.Required("name", "a name");
-  if (!node) return "";
-  std::string name = node->Text();
-  if (taken.Find(name)) node->Fail("a name that is not in use yet");
+std::string ReadNewName(const JsonNode& node, const NameList& taken) {
+  std::string name = node.Text();
+  if (taken.Find(name)) node.Fail("a name that is not in use yet");
   return name;
 }
 
-double ReadRequiredNumber(const JsonNode& owner, const std::string& key, const Range& range) {
-  const auto node = owner.Required(key, "a number" + range.Text());
-  return node ? node->Number(range) : 0.0;
+Json PlaceSchema() { return Named("place", EitherSchema({TextSchema(), VectorSchema()})); }
+
+namespace {
+
+void ReadComment(const JsonNode& node, Draft&) { node.Text(); }
+
+void ReadGravity(const JsonNode& node, Draft& draft) {
+  draft.gravity = ReadVector(node, draft.space);
 }
 
-double ReadOptionalNumber(const JsonNode& owner, const std::string& key, const Range& range,
-                          double otherwise) {
-  const auto node = owner.Optional(key);
-  return node ? node->Number(range) : otherwise;
+// without bodies everything that names one would be a mistake, and none of its own
+bool HasNoBodies(const Draft& draft) { return draft.bodies.size() < 2; }
+
+}  // namespace
+
+const Fields<Draft>& MechanismFileFields() {
+  static const Fields<Draft> fields(
+      "mechanism",
+      "Bodies, joints, forces and initial values; SI units, angles in rad. The program checks "
+      "more than this schema: that names exist, that inertias are positive definite and those of "
+      "a body, that each joint gets as many values as it has coordinates.",
+      {{"$schema", TextSchema(), "Address of this schema, for editors."},
+       {"name", Text(&Draft::name), "Of the scene.", "a name"},
+       {"comment", By(TextSchema(), ReadComment), "Free text for readers."},
+       {"space", Choice(&Draft::space, {"planar", "spatial"}, "a space"),
+        "Planar: everything moves in the x-y plane, third components are 0."},
+       {"gravity", By(VectorSchema(), ReadGravity),
+        "Acceleration of gravity [m/s^2] in ground axes.", "an array of 2 or 3 numbers [m/s^2]"},
+       {"ground", GroundValue()},
+       {"bodies", BodiesValue(), "All that moves.", "an array of bodies", HasNoBodies},
+       {"joints", JointsValue(), "What holds bodies together, and lets them move.",
+        "an array of joints"},
+       {"forces", ForcesValue(), "Besides gravity."},
+       {"initial", Section(InitialFields())},
+       {"independent", IndependentValue(),
+        "Speeds that the fixed coordinate reduction takes as independent: joint names for joint "
+        "coordinates, \"<body>.angle\", \"<body>.x\", ... for absolute ones."},
+       {"observe", Section(ObservationFields())}});
+  return fields;
 }
+
+Json MechanismSchema() { return MechanismFileFields().OwnSchema(); }
 
 MechanismFile ReadMechanism(const std::filesystem::path& path) {
   return ParseMechanism(ReadTextFile(path), path.string());
@@ -78,26 +109,10 @@ MechanismFile ReadMechanismObject(const JsonNode& root) {
   MechanismFile result;
   result.canonical = root.value().dump(-1, ' ', false, Json::error_handler_t::replace);
   Draft draft;
-  if (ExpectDocument(root, FileKind::kMechanism)) {
-    draft.name = ReadNewName(root, {});
-    if (const auto comment = root.Optional("comment")) comment->Text();
-    if (const auto space = root.Optional("space")) {
-      const auto chosen = space->Choice({"planar", "spatial"}, "a space");
-      if (chosen == 1) draft.space = SpaceKind::kSpatial;
-    }
-    if (const auto gravity = root.Required("gravity", "an array of 2 or 3 numbers [m/s^2]")) {
-      draft.gravity = ReadVector(*gravity, draft.space);
-    }
-    ReadBodies(root, &draft);
-    // without bodies everything that names one would be a mistake, and none of its own
-    if (draft.bodies.size() > 1) {
-      ReadJoints(root, &draft);
-      ReadForces(root, &draft);
-      ReadInitial(root, &draft);
-      ReadIndependent(root, &draft);
-      result.observe = ReadObservation(root, draft);
-    }
-  }
+  draft.bodies[kGround].name = "ground";
+  draft.body_names.Add("ground");
+  if (ExpectDocument(root, FileKind::kMechanism)) MechanismFileFields().ReadRows(root, &draft);
+  result.observe = std::move(draft.observe);
   result.description = std::move(static_cast<MechanismDescription&>(draft));
   return result;
 }

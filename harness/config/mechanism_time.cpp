@@ -6,44 +6,44 @@
 namespace loopbench::harness {
 namespace {
 
-/// Numbers of an array with at least `least`.
-std::vector<double> ReadNumbers(const JsonNode& owner, const std::string& key, std::size_t least,
-                                std::string_view expected) {
-  const auto node = owner.Required(key, expected);
-  if (!node) return {};
-  if (!node->value().is_array() || node->value().size() < least) {
-    node->Fail(expected);
-    return {};
-  }
-  std::vector<double> numbers;
-  for (const JsonNode& element : node->Elements("numbers")) numbers.push_back(element.Number());
-  return numbers;
+/// An array with at least `least` numbers.
+template <class T>
+FieldValue<T> Numbers(std::vector<double> T::*member, std::size_t least, std::string expected) {
+  return {ArraySchema(NumberSchema(), least), [=](const JsonNode& node, T& owner) {
+            if (!node.value().is_array() || node.value().size() < least) {
+              node.Fail(expected);
+              return;
+            }
+            std::vector<double>& numbers = owner.*member;
+            numbers.clear();
+            for (const JsonNode& one : node.Elements("numbers")) numbers.push_back(one.Number());
+          }};
 }
 
-Polynomial ReadPolynomial(const JsonNode& node) {
-  if (!node.ExpectObject({"type", "coefficients"})) return {{0.0}};
-  return {ReadNumbers(node, "coefficients", 1, "an array of one or more numbers, constant first")};
+const Fields<Polynomial>& PolynomialFields() {
+  constexpr const char* kExpected = "an array of one or more numbers, constant first";
+  static const Fields<Polynomial> fields(
+      "polynomial", "A polynomial in t.",
+      {{"type", ChoiceSchema({"polynomial"}), "What it is.", "a function of time"},
+       {"coefficients", Numbers(&Polynomial::coefficients, 1, kExpected), "Of 1, t, t^2, ...",
+        kExpected}});
+  return fields;
 }
 
-Harmonic ReadHarmonic(const JsonNode& node) {
-  Harmonic harmonic;
-  if (!node.ExpectObject({"type", "mean", "amplitude", "omega", "phase"})) return harmonic;
-  harmonic.mean = ReadOptionalNumber(node, "mean");
-  harmonic.amplitude = ReadRequiredNumber(node, "amplitude");
-  harmonic.omega = ReadRequiredNumber(node, "omega");
-  harmonic.phase = ReadOptionalNumber(node, "phase");
-  return harmonic;
+const Fields<Harmonic>& HarmonicFields() {
+  static const Fields<Harmonic> fields(
+      "harmonic", "mean + amplitude sin(omega t + phase)",
+      {{"type", ChoiceSchema({"harmonic"}), "What it is.", "a function of time"},
+       {"mean", Number(&Harmonic::mean), "About which it swings."},
+       {"amplitude", Number(&Harmonic::amplitude), "Of the sine.", "a number"},
+       {"omega", Number(&Harmonic::omega), "Angular frequency [rad/s].", "a number"},
+       {"phase", Number(&Harmonic::phase), "At t = 0 [rad]."}});
+  return fields;
 }
 
-TimeTable ReadTable(const JsonNode& node) {
-  TimeTable table;
-  if (!node.ExpectObject({"type", "times", "values", "interpolation"})) return table;
-  table.times = ReadNumbers(node, "times", 2, "an array of two or more numbers that ascend [s]");
-  table.values = ReadNumbers(node, "values", 2, "an array of two or more numbers");
-  if (const auto interpolation = node.Optional("interpolation")) {
-    table.cubic = interpolation->Choice({"cubic", "linear"}, "an interpolation").value_or(0) == 0;
-  }
-  if (table.times.empty() || table.values.empty()) return table;
+/// Times ascend, and each has a value.
+void CheckTable(const JsonNode& node, TimeTable& table) {
+  if (table.times.empty() || table.values.empty()) return;
   const std::vector<JsonNode> times = node.Optional("times")->Elements("times");
   for (std::size_t i = 1; i < times.size(); ++i) {
     const bool numbers = times[i - 1].value().is_number() && times[i].value().is_number();
@@ -54,10 +54,40 @@ TimeTable ReadTable(const JsonNode& node) {
     node.Optional("values")->FailAs(fmt::format("{} values", table.values.size()),
                                     fmt::format("{}, one per time", table.times.size()));
   }
-  return table;
+}
+
+void ReadInterpolation(const JsonNode& node, TimeTable& table) {
+  table.cubic = node.Choice({"cubic", "linear"}, "an interpolation").value_or(0) == 0;
+}
+
+const Fields<TimeTable>& TableFields() {
+  constexpr const char* kTimes = "an array of two or more numbers that ascend [s]";
+  constexpr const char* kValues = "an array of two or more numbers";
+  static const Fields<TimeTable> fields(
+      "table", "Values at given times, and between them.",
+      {{"type", ChoiceSchema({"table"}), "What it is.", "a function of time"},
+       {"times", Numbers(&TimeTable::times, 2, kTimes), "Ascending [s].", kTimes},
+       {"values", Numbers(&TimeTable::values, 2, kValues), "One per time.", kValues},
+       {"interpolation", By(ChoiceSchema({"cubic", "linear"}), ReadInterpolation),
+        "Cubic, the default: a natural spline that goes on straight; linear: end values hold."},
+       {"", By(Json::object(), CheckTable)}});
+  return fields;
+}
+
+/// Of an object of one type.
+template <class T>
+TimeFunctionDescription ReadAs(const Fields<T>& fields, const JsonNode& node) {
+  T function{};
+  fields.Read(node, &function);
+  return function;
 }
 
 }  // namespace
+
+Json TimeFunctionSchema() {
+  return Named("timeFunction", EitherSchema({NumberSchema(), PolynomialFields().Schema(),
+                                             HarmonicFields().Schema(), TableFields().Schema()}));
+}
 
 TimeFunctionDescription ReadTimeFunction(const JsonNode& node) {
   if (node.value().is_number()) return Polynomial{{node.Number()}};
@@ -68,9 +98,9 @@ TimeFunctionDescription ReadTimeFunction(const JsonNode& node) {
   const auto name = node.Required("type", "a function of time");
   if (!name) return Polynomial{{0.0}};
   const auto type = name->Choice({"polynomial", "harmonic", "table"}, "a function of time");
-  if (type == 0) return ReadPolynomial(node);
-  if (type == 1) return ReadHarmonic(node);
-  if (type == 2) return ReadTable(node);
+  if (type == 0) return ReadAs(PolynomialFields(), node);
+  if (type == 1) return ReadAs(HarmonicFields(), node);
+  if (type == 2) return ReadAs(TableFields(), node);
   return Polynomial{{0.0}};
 }
 

@@ -275,4 +275,19 @@ std::optional<int> JsonNode::Choice(const NameList& known, std::string_view what
   return std::nullopt;
 }
 
+std::vector<std::size_t> JsonNode::Choices(const NameList& known, std::string_view what) const {
+  std::vector<std::size_t> indices;
+  for (const JsonNode& element : OneOrMore("names")) {
+    const auto choice = element.Choice(known, what);
+    if (!choice) continue;
+    const auto index = static_cast<std::size_t>(*choice);
+    if (std::ranges::find(indices, index) != indices.end()) {
+      element.Fail("each value once");
+    } else {
+      indices.push_back(index);
+    }
+  }
+  return indices;
+}
+
 }  // namespace loopbench::harness

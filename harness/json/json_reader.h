@@ -169,6 +169,8 @@ class JsonNode {
   /// Index of this string in `known`; reports anything else with the nearest spelling. `what` names
   /// the thing ("a body"). An enum is a choice among its names.
   std::optional<int> Choice(const NameList& known, std::string_view what) const;
+  /// The same for one string or an array of different ones.
+  std::vector<std::size_t> Choices(const NameList& known, std::string_view what) const;
 
   const std::string& pointer() const { return pointer_; }
   ErrorList& errors() const { return *errors_; }

@@ -1,5 +1,6 @@
 #include "harness/run/case_identity.h"
 
+#include "harness/config/limits_record.h"
 #include "harness/record/provenance.h"
 #include "harness/run/compiled_scene.h"
 #include "harness/store/record_json.h"
@@ -10,10 +11,7 @@ namespace {
 
 /// What decides any run besides its keys.
 Record CommonContent(const Experiment& experiment) {
-  Record content;
-  content.Set("cpu_s", experiment.limits.cpu_s);
-  content.Set("steps", experiment.limits.steps);
-  content.Set("memory_mb", experiment.limits.memory_mb);
+  Record content = RecordOf(experiment.limits);
   content.Set("compile", ToString(experiment.compile));
   return content;
 }

@@ -34,11 +34,11 @@ def verdict(validator, path):
     return "valid" if validator.is_valid(document) else "invalid"
 
 
-schema_path = pathlib.Path(sys.argv[1])
+schema_path = pathlib.Path(sys.argv[1]).resolve()
 schema = load(schema_path)
 jsonschema.Draft7Validator.check_schema(schema)
-store = {path.name: load(path) for path in schema_path.parent.glob("*.json")}
-resolver = jsonschema.RefResolver("", schema, store=store)
+store = {path.as_uri(): load(path) for path in schema_path.parent.glob("*.json")}
+resolver = jsonschema.RefResolver(schema_path.as_uri(), schema, store=store)
 validator = jsonschema.Draft7Validator(schema, resolver=resolver)
 for name in sys.argv[2:]:
     print(verdict(validator, name))

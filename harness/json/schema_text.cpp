@@ -1,0 +1,121 @@
+// A schema as a file for editors, and as tables for people.
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <set>
+
+#include "harness/json/schema.h"
+
+namespace loopbench::harness {
+namespace {
+
+constexpr std::size_t kWidth = 100;  ///< characters of a line
+
+/// Of a schema that Named() made.
+std::string NameOf(const Json& reference) {
+  const std::string path = reference["$ref"];
+  return path.substr(path.rfind('/') + 1);
+}
+
+/// Takes out what is no word of draft 07: the schemas that Named() brought along, in the order of
+/// first use, and the words.
+void TakeOwn(Json* node, Json* definitions) {
+  if (!node->is_structured()) return;
+  if (node->is_object() && node->contains("$ref") && node->contains("schema")) {
+    Json named = std::move((*node)["schema"]);
+    node->erase("schema");
+    const std::string name = NameOf(*node);
+    if (!definitions->contains(name)) {
+      (*definitions)[name] = nullptr;  // its place, before those that it refers to
+      TakeOwn(&named, definitions);
+      (*definitions)[name] = std::move(named);
+    }
+  }
+  if (node->is_object() && node->contains("words") && (*node)["words"].is_string()) {
+    node->erase("words");
+  }
+  for (Json& child : *node) TakeOwn(&child, definitions);
+}
+
+/// On one line.
+std::string Flat(const Json& value) {
+  if (!value.is_structured()) return value.dump();
+  std::string text;
+  for (auto child = value.begin(); child != value.end(); ++child) {
+    text += text.empty() ? "" : ", ";
+    if (value.is_object()) text += Json(child.key()).dump() + ": ";
+    text += Flat(*child);
+  }
+  return value.is_object() ? "{" + text + "}" : "[" + text + "]";
+}
+
+/// On one line where it fits behind `used` characters, else one element per line.
+std::string Written(const Json& value, std::size_t indent, std::size_t used) {
+  const std::string flat = Flat(value);
+  if (used + flat.size() < kWidth || !value.is_structured() || value.empty()) return flat;
+  const std::string margin(indent + 2, ' ');
+  std::string text;
+  for (auto child = value.begin(); child != value.end(); ++child) {
+    const std::string key = value.is_object() ? Json(child.key()).dump() + ": " : "";
+    text += (text.empty() ? "\n" : ",\n") + margin + key +
+            Written(*child, indent + 2, margin.size() + key.size());
+  }
+  text += "\n" + std::string(indent, ' ');
+  return value.is_object() ? "{" + text + "}" : "[" + text + "]";
+}
+
+/// As one cell of a table.
+std::string Cell(const std::string& text) {
+  std::string cell;
+  for (const char c : text) cell += (c == '|' || c == '<' ? "\\" : "") + std::string(1, c);
+  return cell;
+}
+
+std::string Table(const std::string& heading, const Json& object) {
+  std::string text = fmt::format("{}\n\n{}\n\n", heading, object.value("description", ""));
+  text += "| key | value | default | meaning |\n|---|---|---|---|\n";
+  const Json required = object.value("required", Json::array());
+  for (const auto& [key, field] : object["properties"].items()) {
+    if (key == "$schema") continue;
+    std::string standard = field.contains("default") ? '`' + Flat(field["default"]) + '`' : "";
+    std::erase(standard, '"');
+    if (std::ranges::find(required, Json(key)) != required.end()) standard = "required";
+    text += fmt::format("| `{}` | {} | {} | {} |\n", key, field.value("words", ""), standard,
+                        Cell(field.value("description", "")));
+  }
+  return text + '\n';
+}
+
+/// Tables of the objects within, in the order of first use, but for those among `done`.
+void AddTables(const Json& node, std::set<std::string>* done, std::string* text) {
+  if (!node.is_structured()) return;
+  const bool is_named = node.is_object() && node.contains("$ref") && node.contains("schema");
+  const std::string name = is_named ? NameOf(node) : "";
+  const bool has_table = is_named && node["schema"].contains("properties");
+  if (has_table && !done->insert(name).second) return;
+  if (has_table) *text += Table("### " + name, node["schema"]);
+  for (const Json& child : node) AddTables(child, done, text);
+}
+
+}  // namespace
+
+std::string SchemaText(const std::string& title, const Json& object) {
+  Json schema = {{"$schema", "http://json-schema.org/draft-07/schema#"}, {"title", title}};
+  schema.update(object);
+  Json definitions = Json::object();
+  TakeOwn(&schema, &definitions);
+  schema["definitions"] = definitions;
+  return Written(schema, 0, 0) + "\n";
+}
+
+std::string SchemaTables(const std::vector<std::pair<std::string, Json>>& kinds) {
+  std::string text;
+  std::set<std::string> done;
+  for (const auto& [kind, object] : kinds) {
+    text += Table("## " + kind, object);
+    AddTables(object, &done, &text);
+  }
+  return text;
+}
+
+}  // namespace loopbench::harness

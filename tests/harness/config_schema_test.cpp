@@ -221,7 +221,7 @@ INSTANTIATE_TEST_SUITE_P(
 
 TEST(MapSchema, KnowsEveryEndingOfRuns) {
   const std::string schema = ReadFile(kRoot / "configs/schema/map.schema.json");
-  for (const RunEnding& ending : RunEndings()) {
+  for (const RunEnding& ending : kRunEndings) {
     EXPECT_NE(schema.find('"' + std::string(ending.word) + '"'), std::string::npos) << ending.word;
   }
 }

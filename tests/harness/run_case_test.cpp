@@ -12,6 +12,7 @@
 #include <string_view>
 #include <vector>
 
+#include "harness/run/case_identity.h"
 #include "harness/store/record_json.h"
 #include "harness/tables/columns.h"
 #include "mechanism/description/library.h"
@@ -214,8 +215,11 @@ TEST(FinishedCase, EnsembleLeavesTheUnperturbedRunAsItIs) {
 }
 
 TEST(FinishedCase, StateHashesOfDifferentRunsDiffer) {
-  const Record coarse = RunPaper("four-bar", kOdcaJoint, 1e-6, 1.0);
-  const Record fine = RunPaper("four-bar", kOdcaJoint, 1e-8, 1.0);
+  const auto run = [](double tolerance) {
+    return RunCase(Paper(),
+                   Identified(Paper(), CaseOf(Paper(), "four-bar", kOdcaJoint, tolerance, 1.0)));
+  };
+  const Record coarse = run(1e-6), fine = run(1e-8);
   EXPECT_NE(coarse.Text("state_hash"), fine.Text("state_hash"));
   EXPECT_NE(coarse.Text("case_id"), fine.Text("case_id"));
 }

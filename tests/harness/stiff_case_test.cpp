@@ -22,6 +22,7 @@ Record RunStiff(const std::string& scene, const Column& column, const std::strin
   Case one = CaseOf(experiment, scene, column, tolerance, horizon);
   one.integrator = profile;
   one.jacobian = jacobian;
+  one.keys = CaseKeys(experiment, one);
   return RunCase(experiment, one);
 }
 

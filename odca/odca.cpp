@@ -39,7 +39,8 @@ Odca<Space, S>::Odca(const Mechanism<Space, S>& mechanism, const FormulationOpti
       b_(wrenches_),
       A_(wrenches_),
       c0_(mechanism.joints().size(), Motion<Space, S>::Zero()),
-      known_(VectorX<S>::Zero(mechanism.num_u())) {}
+      known_(VectorX<S>::Zero(mechanism.num_u())),
+      change_(known_) {}
 
 template <class Space, class S>
 Outcome Odca<Space, S>::Factor(const Kinematics<Space, S>& kinematics) {
@@ -146,6 +147,18 @@ bool Odca<Space, S>::Accelerate(const Kinematics<Space, S>& kinematics, const Ve
   }
   SweepTo(udot, lambda);
   udot += known_;
+  return true;
+}
+
+/// What the speeds miss, joint by joint: no vector of rows is needed between.
+template <class Space, class S>
+bool Odca<Space, S>::CompleteSpeeds(Kinematics<Space, S>& kinematics, VectorX<S>& u) {
+  kinematics.UpdateVelocity(u);
+  for (Motion<Space, S>& b : b_) b.setZero();
+  for (Motion<Space, S>& c0 : c0_) c0.setZero();
+  for (int index : mechanism_.constraints()) c0_[index] = kinematics.ConstraintSpeed(index);
+  SweepTo(change_, nullptr);
+  u += change_;
   return true;
 }
 

@@ -28,6 +28,7 @@ class Odca final : public ConstraintSolver<Space, S> {
   void Solve(const VectorX<S>& force, const VectorX<S>& target, VectorX<S>& x,
              VectorX<S>* lambda) override;
   /// From wrenches on bodies, as the paper does: neither h nor gamma is formed.
+  bool CompleteSpeeds(Kinematics<Space, S>& kinematics, VectorX<S>& u) override;
   bool Accelerate(const Kinematics<Space, S>& kinematics, const VectorX<S>& feedback,
                   VectorX<S>& udot, VectorX<S>* lambda) override;
   /// Size of the plan, and multiply-adds since Factor() began.
@@ -41,7 +42,8 @@ class Odca final : public ConstraintSolver<Space, S> {
  private:
   /// b_ of all bodies for wrenches_: their accelerations under these alone, at centres of mass.
   void SetFree();
-  /// c0_ of joints in all their directions, and what change_ misses of the free ones.
+  /// c0_ of joints in all their directions, and what accelerations of relative motion add to the
+  /// free ones.
   void SetKnown(const Kinematics<Space, S>& kinematics);
   /// From b_ and c0_: H^T (A_Q - A_P) of the tree joints at their points, centripetal terms not
   /// included, in x, and multipliers.
@@ -52,7 +54,7 @@ class Odca final : public ConstraintSolver<Space, S> {
   Sweep<Space, S> sweep_;
   const Kinematics<Space, S>* kinematics_ = nullptr;  ///< of the last Factor()
   std::vector<Motion<Space, S>> wrenches_, b_, A_, c0_;
-  VectorX<S> known_;
+  VectorX<S> known_, change_;
 };
 
 }  // namespace loopbench::odca

@@ -46,7 +46,8 @@ struct Walk {
       }
       kept.joined = within;
     }
-    *this = std::move(kept);
+    // a start at rest in its lowest position, which is singular, reaches none of them
+    if (!kept.positions.empty()) *this = std::move(kept);
   }
 };
 

@@ -4,6 +4,7 @@
 #include <gtest/gtest.h>
 
 #include <cmath>
+#include <numbers>
 
 #include "mechanism/description/library.h"
 #include "mechanism/formulation/release_review.h"
@@ -165,6 +166,17 @@ TEST(RedundancyTest, TwoHingesOfADoorNeedOne) {
   EXPECT_EQ(found.rows, 5);
   EXPECT_EQ(found.rank, 0);
   EXPECT_EQ(Count(found.released), 5);
+}
+
+TEST(RedundancyTest, AStartAtRestInItsLowestPositionMayBeSingular) {
+  // the energy of the start takes it nowhere, and there the rank is not that of other positions
+  MechanismDescription hanging = Shipped("parallelogram-in-space");
+  hanging.initial.speeds.clear();
+  hanging.initial.coordinates = {{0, {-std::numbers::pi / 2}}, {1, {0.0}}, {2, {std::numbers::pi}}};
+  const Redundancy found = FindRedundancy(hanging);
+  EXPECT_EQ(found.rank_at_start, 1);
+  EXPECT_EQ(found.rank, 2);
+  EXPECT_EQ(Count(found.released), 3);
 }
 
 TEST(RedundancyTest, MomentsOfAPinAreImposedTogether) {

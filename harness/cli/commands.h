@@ -1,7 +1,7 @@
-// The subcommands of the program, apart from their option parsing (main.cpp).
+// The subcommands of the program, apart from their option parsing (program_*).
 //
 // Each returns an exit code: 0 done, 1 a gate failed, 2 could not measure or bad input. Bad input
-// throws ConfigError or std::runtime_error, which main() turns into a message and 2.
+// throws ConfigError or std::runtime_error, which Main() (program.h) turns into a message and 2.
 #pragma once
 
 #include <filesystem>

@@ -7,6 +7,7 @@
 #include <set>
 
 #include "harness/cli/commands.h"
+#include "harness/config/formulations.h"
 #include "harness/isolation/print_from_child.h"
 #include "harness/json/config_error.h"
 #include "harness/json/file_kind.h"
@@ -58,22 +59,13 @@ void ExplainScenes(const Experiment& experiment) {
 }
 
 void ExplainFormulations(const Experiment& experiment) {
-  const auto uses = [&](FormulationKind kind) {
-    return Any(experiment, [kind](const Column& one) { return one.formulation == kind; });
-  };
   Print("\nColumns: {} ways of keeping the loops closed\n", experiment.columns.size());
   for (const Column& column : experiment.columns) Print("  {}\n", ToString(column));
   Print("  The words stand for formulation/enforcement/coordinates/solver.\n");
-  if (uses(FormulationKind::kOdca)) {
-    Print(
-        "  odca: orthogonal complement divide and conquer. Bodies are joined pair by pair; "
-        "the loops' forces are found on the way.\n");
-  }
-  if (uses(FormulationKind::kLagrange)) {
-    Print("  lagrange: one multiplier per constraint, all solved at once.\n");
-  }
-  if (uses(FormulationKind::kReduction)) {
-    Print("  reduction: independent speeds only; the others follow from the loops.\n");
+  for (const FormulationRow& row : Formulations()) {
+    const bool used =
+        Any(experiment, [&row](const Column& one) { return one.formulation == row.name; });
+    if (used) Print("  {}: {}\n", row.name, row.sentence);
   }
 }
 

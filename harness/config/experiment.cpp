@@ -47,8 +47,8 @@ void DropExcluded(const Experiment& experiment, std::vector<Case>* cases) {
 std::string ToString(const Column& column) {
   const std::string gains =
       column.gains ? fmt::format("({}, {})", column.gains->alpha, column.gains->beta) : "";
-  return fmt::format("{}/{}{}/{}/{}", ToString(column.formulation), ToString(column.enforcement),
-                     gains, ToString(column.coordinates), ToString(column.solver));
+  return fmt::format("{}/{}{}/{}/{}", column.formulation, ToString(column.enforcement), gains,
+                     ToString(column.coordinates), ToString(column.solver));
 }
 
 Record CaseKeys(const Experiment& experiment, const Case& one) {
@@ -56,7 +56,7 @@ Record CaseKeys(const Experiment& experiment, const Case& one) {
   keys.Set("kind", std::string("accuracy"));
   keys.Set("experiment", experiment.name);
   keys.Set("mechanism", one.mechanism);
-  keys.Set("formulation", std::string(ToString(one.column.formulation)));
+  keys.Set("formulation", one.column.formulation);
   keys.Set("enforcement", std::string(ToString(one.column.enforcement)));
   keys.Set("coordinates", std::string(ToString(one.column.coordinates)));
   keys.Set("solver", std::string(ToString(one.column.solver)));

@@ -20,18 +20,12 @@
 
 namespace loopbench::harness {
 
-/// The three formulations (folders odca/, lagrange/, reduction/).
-enum class FormulationKind { kOdca, kLagrange, kReduction };
-
 /// Where the Newton iteration of an implicit profile has its Jacobians from.
 enum class JacobianKind { kForward, kFiniteDifference };
 
 /// Names in files and tables, by value of the enum.
 template <class Enum>
 inline constexpr std::array<std::string_view, 0> kNames = {};
-template <>
-inline constexpr std::array<std::string_view, 3> kNames<FormulationKind> = {"odca", "lagrange",
-                                                                            "reduction"};
 template <>
 inline constexpr std::array<std::string_view, 4> kNames<Enforcement> = {"acceleration", "velocity",
                                                                         "position", "baumgarte"};
@@ -49,13 +43,9 @@ enum class Scalar { kFloat, kDouble, kLongDouble, kFloat128 };
 template <>
 inline constexpr std::array<std::string_view, 4> kNames<Scalar> = {"float", "double", "long-double",
                                                                    "float128"};
+/// The other enums have theirs beside them, in mechanism/.
 inline std::string_view ToString(Scalar value) {
   return kNames<Scalar>[static_cast<std::size_t>(value)];
-}
-
-/// The other enums have theirs beside them, in mechanism/.
-inline std::string_view ToString(FormulationKind value) {
-  return kNames<FormulationKind>[static_cast<std::size_t>(value)];
 }
 
 /// The value with this name, or nothing.
@@ -70,7 +60,7 @@ std::optional<Enum> Parse(std::string_view name) {
 /// One way of imposing the loops: a column of the tables. For reduction the solver as published is
 /// the mechanism's fixed independent set, the rank-revealing one the automatic partition.
 struct Column {
-  FormulationKind formulation = FormulationKind::kOdca;
+  std::string formulation = "odca";  ///< a registered name (formulations.h)
   Enforcement enforcement = Enforcement::kAcceleration;
   Coordinates coordinates = Coordinates::kJoint;
   SolverKind solver = SolverKind::kRankRevealing;
@@ -110,7 +100,7 @@ struct EnsembleRule {
   std::vector<std::string> scenes;
   std::vector<double> horizons;
   std::vector<double> tolerances;
-  std::vector<FormulationKind> formulations;
+  std::vector<std::string> formulations;
   std::vector<Enforcement> enforcements;
   std::vector<Coordinates> coordinates;
   std::vector<SolverKind> solvers;

@@ -1,17 +1,34 @@
 // "columns" of an experiment file.
+#include <fmt/format.h>
+
 #include "harness/config/experiment_sections.h"
+#include "harness/config/formulations.h"
 
 namespace loopbench::harness {
 namespace {
 
 /// One entry of "columns", whose cross product is meant.
 struct ColumnLists {
-  std::vector<FormulationKind> formulations;
+  std::vector<std::string> formulations;
   std::vector<Enforcement> enforcements;
   std::vector<Coordinates> coordinates = {Column().coordinates};
   std::vector<SolverKind> solvers = {Column().solver};
   std::optional<BaumgarteGains> gains;
 };
+
+/// Reports a level that a formulation does not have.
+void RequireLevels(const JsonNode& node, ColumnLists& lists) {
+  for (const std::string& formulation : lists.formulations) {
+    const FormulationRow& row = *FindFormulation(formulation);
+    for (const Enforcement level : lists.enforcements) {
+      if (row.Has(level)) continue;
+      std::vector<std::string_view> levels;
+      for (const Enforcement own : row.levels) levels.push_back(ToString(own));
+      node.FailAs(fmt::format("\"{}\" at level \"{}\"", formulation, ToString(level)),
+                  fmt::format("a level that it has: {}", fmt::join(levels, ", ")));
+    }
+  }
+}
 
 /// Gains of Baumgarte's stabilisation, which only it has, and both or none.
 void ReadGains(const JsonNode& node, ColumnLists& lists) {
@@ -48,7 +65,8 @@ const Fields<ColumnLists>& ColumnFields() {
         "Gain on mismatches of speeds [1/s]; baumgarte only, beside beta."},
        {"beta", NumberSchema(kNotNegative),
         "Gain on mismatches of positions [1/s]; baumgarte only, beside alpha."},
-       {"", By({{"dependencies", {{"alpha", {"beta"}}, {"beta", {"alpha"}}}}}, ReadGains)}});
+       {"", By({{"dependencies", {{"alpha", {"beta"}}, {"beta", {"alpha"}}}}}, ReadGains)},
+       {"", By(Json::object(), RequireLevels)}});
   return fields;
 }
 
@@ -57,7 +75,7 @@ std::vector<Column> ReadColumnEntry(const JsonNode& node) {
   std::vector<Column> columns;
   ColumnLists lists;
   if (!ColumnFields().Read(node, &lists)) return columns;
-  for (const FormulationKind formulation : lists.formulations) {
+  for (const std::string& formulation : lists.formulations) {
     for (const Enforcement enforcement : lists.enforcements) {
       for (const Coordinates set : lists.coordinates) {
         for (const SolverKind solver : lists.solvers) {

@@ -12,6 +12,7 @@
 #include <vector>
 
 #include "harness/config/experiment.h"
+#include "harness/config/formulations.h"
 #include "harness/config/options.h"
 #include "harness/json/fields.h"
 
@@ -97,6 +98,19 @@ template <class Enum>
 const NameList& NamesOf() {
   static const NameList known(std::vector<std::string>(kNames<Enum>.begin(), kNames<Enum>.end()));
   return known;
+}
+
+/// One or several names of formulations that are registered when a file is read.
+template <class T>
+FieldValue<T> FormulationChoices(std::vector<std::string> T::*member) {
+  return {OneOrMoreSchema(ChoiceSchema(FormulationNames()), true),
+          [=](const JsonNode& node, T& owner) {
+            const NameList known(FormulationNames());
+            (owner.*member).clear();
+            for (const std::size_t index : node.Choices(known, "a formulation")) {
+              (owner.*member).push_back(known.all()[index]);
+            }
+          }};
 }
 
 template <class T>

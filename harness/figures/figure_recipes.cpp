@@ -5,11 +5,13 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
+#include <functional>
 #include <map>
 #include <string_view>
 #include <tuple>
 
 #include "harness/analysis/doubts.h"
+#include "harness/config/formulations.h"
 #include "harness/record/select.h"
 #include "harness/tables/columns.h"
 
@@ -19,11 +21,14 @@ namespace {
 // Formulation by hue, coordinates by its strength.
 std::string ColorOf(const Record& record) {
   const bool absolute = record.Text("coordinates") == "absolute";
-  const std::string formulation = record.Text("formulation");
-  if (formulation == "odca") return absolute ? "#56B4E9" : "#0072B2";
-  if (formulation == "lagrange") return absolute ? "#E69F00" : "#D55E00";
-  if (formulation == "reduction") return absolute ? "#999933" : "#009E73";
-  return "#000000";
+  const FormulationRow* row = FindFormulation(record.Text("formulation"));
+  if (row == nullptr) return "#000000";  // of another program
+  return absolute ? row->look.absolute : row->look.joint;
+}
+
+double WidthOf(const Record& record) {
+  const FormulationRow* row = FindFormulation(record.Text("formulation"));
+  return row == nullptr ? 2.0 : row->look.width;
 }
 
 Shape ShapeOf(const Record& record) {
@@ -35,7 +40,7 @@ Shape ShapeOf(const Record& record) {
 
 CurveStyle StyleOf(const Record& record) {
   return {.color = ColorOf(record),
-          .width = record.Text("formulation") == "lagrange" ? 5.0 : 2.0,
+          .width = WidthOf(record),
           .shape = ShapeOf(record),
           .filled = record.Text("solver") != "as-published",
           .doubtful = HasDoubt(record)};
@@ -88,8 +93,7 @@ std::string TitleOf(std::span<const Record> records, std::string_view what) {
 
 std::vector<Curve> DriftCurves(std::span<const Record> records, bool with_fit) {
   std::vector<Record> ordered(records.begin(), records.end());
-  std::ranges::stable_partition(
-      ordered, [](const Record& record) { return record.Text("formulation") == "lagrange"; });
+  std::ranges::stable_sort(ordered, std::greater(), WidthOf);
   std::vector<Curve> curves;
   for (const Record& record : ordered) {
     Curve curve;

@@ -31,8 +31,8 @@ Figure DisplacementsFigure(const Record& record);
 /// a grey line shows its slope. Hue tells the formulation, its strength the coordinates, marks the
 /// level (circle acceleration, triangle velocity, square position, diamond baumgarte), filled ones
 /// a rank-revealing solver; dashes a doubtful run. Formulations that agree to round-off hide each
-/// other; so multipliers are drawn first and wide, and the others lie on them. A run that failed
-/// ends in a cross and is named in the legend.
+/// other; so multipliers are drawn first and wide, and the others lie on them (FormulationLook). A
+/// run that failed ends in a cross and is named in the legend.
 Figure DriftFigure(std::span<const Record> records);
 
 /// The same on a linear time axis, without fits: what a passage through a singular position does.

@@ -3,6 +3,7 @@
 #include <cmath>
 #include <limits>
 #include <memory>
+#include <stdexcept>
 
 #include "harness/integrator/cpu_time.h"
 #include "harness/precision/exact.h"
@@ -16,19 +17,16 @@ namespace loopbench::harness {
 
 namespace {
 
+/// Those of kLadderFormulations, in their order.
 template <class S>
 std::unique_ptr<System<Planar, S>> Make(const Column& column,
                                         const Mechanism<Planar, S>& mechanism) {
   const FormulationOptions options{.enforcement = column.enforcement, .solver = column.solver};
-  switch (column.formulation) {
-    case FormulationKind::kOdca:
-      return MakeSystem<odca::Odca>(mechanism, options);
-    case FormulationKind::kLagrange:
-      return MakeSystem<lagrange::Lagrange>(mechanism, options);
-    case FormulationKind::kReduction:
-      return MakeSystem<reduction::Reduction>(mechanism, options);
-  }
-  return nullptr;
+  if (column.formulation == "odca") return MakeSystem<odca::Odca>(mechanism, options);
+  if (column.formulation == "lagrange") return MakeSystem<lagrange::Lagrange>(mechanism, options);
+  if (column.formulation == "reduction")
+    return MakeSystem<reduction::Reduction>(mechanism, options);
+  throw std::invalid_argument("no ladder of formulation " + column.formulation);
 }
 
 /// A run and where it ended.
@@ -172,7 +170,7 @@ Ladder RunLadder(const LadderTask& task) {
   ladder.message = exact.message();
   if (ladder.start != Outcome::kFinished) return ladder;
   LadderTask unsoftened = task;
-  unsoftened.column = {FormulationKind::kLagrange, Enforcement::kPosition, Coordinates::kJoint,
+  unsoftened.column = {"lagrange", Enforcement::kPosition, Coordinates::kJoint,
                        SolverKind::kAsPublished};
   Exact in_joints(task.description, Coordinates::kJoint);
   const auto reference_at = [&](double tolerance) {

@@ -20,13 +20,17 @@
 
 namespace loopbench::harness {
 
+/// The formulations that are compiled in all scalars.
+inline constexpr std::array<std::string_view, 3> kLadderFormulations = {"odca", "lagrange",
+                                                                        "reduction"};
+
 /// One mechanism and column, and the rungs to climb.
 struct LadderTask {
   MechanismDescription description;  ///< planar, no tables of time
-  Column column;
-  double horizon = 1.0;  ///< [s]
-  Precision precision;   ///< scalars, tolerances, the reference's
-  Limits limits;         ///< CPU time and steps, of each run
+  Column column;                     ///< with one of kLadderFormulations
+  double horizon = 1.0;              ///< [s]
+  Precision precision;               ///< scalars, tolerances, the reference's
+  Limits limits;                     ///< CPU time and steps, of each run
 };
 
 /// One run.

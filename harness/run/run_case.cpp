@@ -14,33 +14,9 @@
 #include "harness/run/ensemble.h"
 #include "harness/run/merge_parts.h"
 #include "harness/text/hash.h"
-#include "lagrange/lagrange.h"
 #include "mechanism/start/assembly.h"
-#include "odca/odca.h"
-#include "reduction/reduction.h"
 
 namespace loopbench::harness {
-
-template <class Space>
-std::unique_ptr<System<Space, double>> MakeFormulation(const Column& column,
-                                                       const Mechanism<Space, double>& mechanism) {
-  const FormulationOptions options{
-      .enforcement = column.enforcement, .solver = column.solver, .gains = column.gains};
-  switch (column.formulation) {
-    case FormulationKind::kOdca:
-      return MakeSystem<odca::Odca>(mechanism, options);
-    case FormulationKind::kLagrange:
-      return MakeSystem<lagrange::Lagrange>(mechanism, options);
-    case FormulationKind::kReduction:
-      return MakeSystem<reduction::Reduction>(mechanism, options);
-  }
-  return nullptr;
-}
-
-template std::unique_ptr<System<Planar, double>> MakeFormulation(const Column&,
-                                                                 const Mechanism<Planar, double>&);
-template std::unique_ptr<System<Spatial, double>> MakeFormulation(
-    const Column&, const Mechanism<Spatial, double>&);
 
 namespace {
 

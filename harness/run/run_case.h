@@ -7,6 +7,7 @@
 
 #include "harness/analysis/growth.h"
 #include "harness/config/experiment.h"
+#include "harness/config/formulations.h"
 #include "harness/config/options.h"
 #include "harness/integrator/ode.h"
 #include "harness/record/record.h"
@@ -17,7 +18,11 @@ namespace loopbench::harness {
 /// The mechanism with the formulation and level that a column names.
 template <class Space>
 std::unique_ptr<System<Space, double>> MakeFormulation(const Column& column,
-                                                       const Mechanism<Space, double>& mechanism);
+                                                       const Mechanism<Space, double>& mechanism) {
+  return MakeFormulation<Space>(
+      column.formulation, mechanism,
+      {.enforcement = column.enforcement, .solver = column.solver, .gains = column.gains});
+}
 
 /// Gives a system, after its start, the Jacobians that a case's Newton iteration asks for: none
 /// where it makes difference quotients, or has no iteration.

@@ -37,6 +37,16 @@ MechanismDescription PlanarPart(const Experiment& experiment, const ExperimentSc
   return description;
 }
 
+/// Throws ConfigError for a column whose formulation is compiled in double alone.
+void RequireScalars(const Experiment& experiment, const Column& column) {
+  if (std::ranges::find(kLadderFormulations, column.formulation) != kLadderFormulations.end()) {
+    return;
+  }
+  throw ConfigError(fmt::format(
+      "{}: /precision: found {}, expected columns of formulations in all scalars: {}",
+      experiment.path.string(), ToString(column), fmt::join(kLadderFormulations, ", ")));
+}
+
 Record RungKeys(const Case& one, Scalar scalar, double tolerance) {
   Record keys = one.keys;
   keys.Set("kind", std::string("precision"));
@@ -103,6 +113,7 @@ std::size_t CountRungs(const Experiment& experiment) {
 void CheckLadders(const Experiment& experiment) {
   const std::vector<Case> cases = ExpandLadders(experiment);
   if (cases.empty()) return;
+  for (const Case& one : cases) RequireScalars(experiment, one.column);
   const auto compile = [&](std::size_t) {
     std::set<std::size_t> scenes;
     for (const Case& one : cases) {

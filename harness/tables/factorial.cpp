@@ -3,12 +3,12 @@
 #include <fmt/format.h>
 
 #include <algorithm>
-#include <array>
 #include <cmath>
 #include <cstdint>
 #include <limits>
 #include <map>
 
+#include "harness/config/formulations.h"
 #include "harness/json/config_error.h"
 #include "harness/tables/columns.h"
 
@@ -118,16 +118,20 @@ struct Change {
   std::string split_by;
 };
 
-const std::array<Change, 6>& Changes() {
-  static const std::array<Change, 6> kChanges = {{
-      {"formulation", "formulation", "odca", "lagrange", "geometry"},
-      {"formulation", "formulation", "odca", "reduction", "geometry"},
-      {"formulation", "formulation", "lagrange", "reduction", "geometry"},
-      {"coordinates", "coordinates", "joint", "absolute", "geometry"},
-      {"level", "enforcement", "velocity", "acceleration", "geometry"},
-      {"geometry", "geometry", "square", "general", "coordinates"},
-  }};
-  return kChanges;
+// Every formulation with every later one, then the other factors.
+std::vector<Change> Changes() {
+  std::vector<Change> changes;
+  const std::vector<std::string> formulations = FormulationNames();
+  for (std::size_t i = 0; i < formulations.size(); ++i) {
+    for (std::size_t j = i + 1; j < formulations.size(); ++j) {
+      changes.push_back(
+          {"formulation", "formulation", formulations[i], formulations[j], "geometry"});
+    }
+  }
+  changes.push_back({"coordinates", "coordinates", "joint", "absolute", "geometry"});
+  changes.push_back({"level", "enforcement", "velocity", "acceleration", "geometry"});
+  changes.push_back({"geometry", "geometry", "square", "general", "coordinates"});
+  return changes;
 }
 
 // Rows of one change by setting of the splitting factor; "all" holds every pair.

@@ -59,7 +59,7 @@ Record CountCase(const BenchmarkMember& member, const Column& column, const Benc
   record.Set("kind", std::string("counts"));
   record.Set("experiment", set.name);
   record.Set("mechanism", member.name);
-  record.Set("formulation", std::string(ToString(column.formulation)));
+  record.Set("formulation", column.formulation);
   record.Set("enforcement", std::string(ToString(column.enforcement)));
   record.Set("coordinates", std::string(ToString(column.coordinates)));
   record.Set("solver", std::string(ToString(column.solver)));

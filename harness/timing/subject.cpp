@@ -29,8 +29,7 @@ BenchmarkState ComputeStateIn(const MechanismDescription& description, Coordinat
   state.outcome = start.outcome;
   state.message = start.message;
   if (start.outcome != Outcome::kFinished) return state;
-  const Column column{FormulationKind::kOdca, Enforcement::kVelocity, coordinates,
-                      SolverKind::kRankRevealing};
+  const Column column{"odca", Enforcement::kVelocity, coordinates, SolverKind::kRankRevealing};
   const auto formulation = MakeFormulation<Space>(column, mechanism);
   state.outcome = formulation->Start(0.0, start.q, start.u);
   std::vector<double> y(formulation->state_size());

@@ -25,7 +25,7 @@ void HoldInSpace(const MechanismDescription& description, std::uint64_t seed, Fa
   family.Hold(space, false);
   EXPECT_EQ(space.answer().rank, plane.answer().rank);
   for (Coordinates coordinates : {Coordinates::kJoint, Coordinates::kAbsolute}) {
-    const Comparison published = space.CompareOdca(coordinates, SolverKind::kAsPublished);
+    const Comparison published = CompareOdca(space, coordinates, SolverKind::kAsPublished);
     EXPECT_EQ(published.outcome, Outcome::kSingular) << description.name;
   }
 }

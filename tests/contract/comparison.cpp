@@ -11,67 +11,10 @@
 
 namespace loopbench::testing {
 
-namespace {
-
-constexpr int kLargestAbsolute = 20;
-
-/// Components of [angular; linear] that the space has.
 template <class Space>
-Eigen::Matrix<Real, Space::kDim, 1> InSpace(const Real6& v) {
-  if constexpr (Space::kRot == 1) {
-    return v.segment<3>(2);
-  } else {
-    return v;
-  }
-}
-
-}  // namespace
-
-double RelativeError(const VectorX<double>& a, const RealVector& b) {
-  if (!a.allFinite()) return std::numeric_limits<double>::quiet_NaN();
-  if (b.size() == 0) return 0.0;
-  const Real scale = b.lpNorm<Eigen::Infinity>();
-  return static_cast<double>((ToReal(a) - b).lpNorm<Eigen::Infinity>() / scale);
-}
-
-template <class Space>
-Sample<Space>::Sample(const MechanismDescription& description, std::uint64_t seed,
-                      const std::optional<VectorX<double>>& q)
-    : description_(description),
-      joint_(description, Coordinates::kJoint),
-      absolute_(description, Coordinates::kAbsolute) {
-  joint_state_ = q ? WithRandomSpeeds(description, joint_, *q, seed)
-                   : ConsistentState(description, joint_, seed);
-  absolute_state_ = StateIn(absolute_, joint_, joint_state_);
-  joint_answer_ =
-      Oracle(description, LayoutOf(joint_)).Solve(ToReal(joint_state_.q), ToReal(joint_state_.u));
-  if (num_bodies() <= kLargestAbsolute) {
-    absolute_answer_ = Oracle(description, LayoutOf(absolute_))
-                           .Solve(ToReal(absolute_state_.q), ToReal(absolute_state_.u));
-  }
-}
-
-template <class Space>
-RealVector Sample<Space>::udot(Coordinates coordinates) const {
-  if (coordinates == Coordinates::kJoint) return joint_answer_.udot;
-  if (absolute_answer_) return absolute_answer_->udot;
-  RealVector udot(absolute_.num_u());
-  for (const TreeStep& step : absolute_.tree()) {
-    const int offset = absolute_.joints()[step.joint].u_offset;
-    udot.segment<Space::kDim>(offset) = InSpace<Space>(joint_answer_.accelerations[step.child]);
-  }
-  return udot;
-}
-
-template <class Space>
-double Sample<Space>::Bound() const {
-  return 100 * std::numeric_limits<double>::epsilon() * num_bodies() / joint_answer_.rcond;
-}
-
-template <class Space>
-Comparison Sample<Space>::CompareOdca(Coordinates coordinates, SolverKind solver) const {
-  const Mechanism<Space, double>& mechanism = this->mechanism(coordinates);
-  const State& at = state(coordinates);
+Comparison CompareOdca(const Sample<Space>& sample, Coordinates coordinates, SolverKind solver) {
+  const Mechanism<Space, double>& mechanism = sample.mechanism(coordinates);
+  const State& at = sample.state(coordinates);
   SystemWith<odca::Odca, Space, double> odca(mechanism, {.solver = solver});
   odca->Start(0.0, at.q, at.u);
   Comparison result;
@@ -79,12 +22,11 @@ Comparison Sample<Space>::CompareOdca(Coordinates coordinates, SolverKind solver
   result.outcome = odca->Evaluate(0.0, at.q, at.u, udot);
   if (result.outcome != Outcome::kFinished) return result;
   result.rank = odca->diagnostics().rank;
-  result.error = RelativeError(udot, this->udot(coordinates));
-  const bool own = coordinates == Coordinates::kAbsolute && absolute_answer_;
-  const std::vector<Real6>& forces = own ? absolute_answer_->forces : joint_answer_.forces;
+  result.error = RelativeError(udot, sample.udot(coordinates));
+  const std::vector<Real6>& forces = sample.forces(coordinates);
   Real difference = 0, scale = 0;
-  for (int j = 0; j < static_cast<int>(description_.joints.size()); ++j) {
-    const Eigen::Matrix<Real, Space::kDim, 1> force = InSpace<Space>(forces[j]);
+  for (int j = 0; j < static_cast<int>(sample.description().joints.size()); ++j) {
+    const Eigen::Matrix<Real, Space::kDim, 1> force = OwnComponents<Space>(forces[j]);
     const Eigen::Matrix<Real, Space::kDim, 1> error =
         odca.solver().JointForce(j).template cast<Real>() - force;
     difference = std::max<Real>(difference, error.template lpNorm<Eigen::Infinity>());
@@ -108,7 +50,7 @@ void Family::Hold(const Sample<Space>& sample, bool as_published) {
       SCOPED_TRACE(sample.mechanism(coordinates).name() + ", " +
                    std::string(ToString(coordinates)) + ", " + std::string(ToString(solver)) +
                    ", rcond " + std::to_string(answer.rcond));
-      const Comparison result = sample.CompareOdca(coordinates, solver);
+      const Comparison result = CompareOdca(sample, coordinates, solver);
       ASSERT_EQ(result.outcome, Outcome::kFinished);
       EXPECT_EQ(result.rank, answer.rank);
       EXPECT_LE(result.error, bound);
@@ -137,8 +79,6 @@ void Family::Finish() {
   ::testing::Test::RecordProperty(name_, line);
 }
 
-template class Sample<Planar>;
-template class Sample<Spatial>;
 template void Family::Hold(const Sample<Planar>&, bool);
 template void Family::Hold(const Sample<Spatial>&, bool);
 

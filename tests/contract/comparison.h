@@ -1,12 +1,10 @@
 // O-DCA held against the oracle: errors of one sample, and the worst of a family.
 #pragma once
 
-#include <optional>
 #include <string>
 
 #include "mechanism/formulation/options.h"
-#include "mechanism/model/mechanism.h"
-#include "tests/contract/generators.h"
+#include "tests/contract/sample.h"
 
 namespace loopbench::testing {
 
@@ -18,43 +16,9 @@ struct Comparison {
   int rank = 0;              ///< as the formulation reports it
 };
 
-/// A sample in one space: mechanism and consistent state in both coordinate sets, the oracle's
-/// answers. Absolute coordinates of more than 20 bodies take their answer from the bodies'
-/// accelerations in joint coordinates: a dense system of six speeds per body grows too slow.
+/// What O-DCA makes of the sample's state.
 template <class Space>
-class Sample {
- public:
-  /// `q`: joint coordinates where the description itself has none that close its loops.
-  Sample(const MechanismDescription& description, std::uint64_t seed,
-         const std::optional<VectorX<double>>& q = {});
-
-  const MechanismDescription& description() const { return description_; }
-  const Answer& answer() const { return joint_answer_; }
-  int num_bodies() const { return joint_.num_bodies() - 1; }
-  const Mechanism<Space, double>& mechanism(Coordinates coordinates) const {
-    return coordinates == Coordinates::kJoint ? joint_ : absolute_;
-  }
-  const State& state(Coordinates coordinates) const {
-    return coordinates == Coordinates::kJoint ? joint_state_ : absolute_state_;
-  }
-  /// The oracle's udot in either set.
-  RealVector udot(Coordinates coordinates) const;
-  /// What the comparison allows: 100 eps n / rcond, round-off of n bodies magnified by the
-  /// condition of the closures.
-  double Bound() const;
-
-  Comparison CompareOdca(Coordinates coordinates, SolverKind solver) const;
-
- private:
-  const MechanismDescription description_;
-  const Mechanism<Space, double> joint_, absolute_;
-  State joint_state_, absolute_state_;
-  Answer joint_answer_;
-  std::optional<Answer> absolute_answer_;
-};
-
-/// max |a - b| / max |b|; NaN stays NaN.
-double RelativeError(const VectorX<double>& a, const RealVector& b);
+Comparison CompareOdca(const Sample<Space>& sample, Coordinates coordinates, SolverKind solver);
 
 /// What a family of samples must show, and its worst.
 class Family {

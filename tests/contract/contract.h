@@ -10,10 +10,7 @@
 #include <string>
 #include <vector>
 
-#include "lagrange/lagrange.h"
-#include "mechanism/formulation/system.h"
-#include "odca/odca.h"
-#include "reduction/reduction.h"
+#include "harness/config/formulations.h"
 #include "tests/contract/comparison.h"
 
 namespace loopbench::testing {
@@ -21,7 +18,7 @@ namespace loopbench::testing {
 constexpr double kEps = std::numeric_limits<double>::epsilon();
 
 struct Case {
-  const char* formulation;
+  std::string formulation;
   Enforcement enforcement;
   SolverKind solver;
   Coordinates coordinates;
@@ -33,47 +30,30 @@ struct Case {
 inline void PrintTo(const Case& c, std::ostream* out) { *out << c.formulation; }
 
 inline std::string NameOf(const ::testing::TestParamInfo<Case>& info) {
-  std::string name =
-      std::string(info.param.formulation) + "_" + std::string(ToString(info.param.enforcement)) +
-      "_" + std::string(ToString(info.param.solver)) + "_" +
-      std::string(ToString(info.param.coordinates)) + "_" + std::string(ToString(info.param.space));
+  std::string name = info.param.formulation + "_" + std::string(ToString(info.param.enforcement)) +
+                     "_" + std::string(ToString(info.param.solver)) + "_" +
+                     std::string(ToString(info.param.coordinates)) + "_" +
+                     std::string(ToString(info.param.space));
   for (char& c : name) c = c == '-' ? '_' : c;
   return name;
 }
 
 inline std::vector<Case> AllCases() {
   std::vector<Case> cases;
-  for (const char* formulation : {"odca", "lagrange", "reduction"}) {
+  for (const harness::FormulationRow& row : harness::Formulations()) {
     for (Enforcement enforcement : {Enforcement::kAcceleration, Enforcement::kVelocity,
                                     Enforcement::kPosition, Enforcement::kBaumgarte}) {
+      if (!row.Has(enforcement)) continue;
       for (SolverKind solver : {SolverKind::kAsPublished, SolverKind::kRankRevealing}) {
         for (Coordinates coordinates : {Coordinates::kJoint, Coordinates::kAbsolute}) {
           for (SpaceKind space : {SpaceKind::kPlanar, SpaceKind::kSpatial}) {
-            cases.push_back({formulation, enforcement, solver, coordinates, space});
+            cases.push_back({row.name, enforcement, solver, coordinates, space});
           }
         }
       }
     }
   }
   return cases;
-}
-
-template <class Space>
-std::unique_ptr<System<Space, double>> Make(const Case& c,
-                                            const Mechanism<Space, double>& mechanism) {
-  const FormulationOptions options{c.enforcement, c.solver, c.gains};
-  const std::string name = c.formulation;
-  if (name == "odca") return MakeSystem<odca::Odca>(mechanism, options);
-  if (name == "lagrange") return MakeSystem<lagrange::Lagrange>(mechanism, options);
-  return MakeSystem<reduction::Reduction>(mechanism, options);
-}
-
-/// Coupled loops with forces of every kind, every second with joints of every kind, every fourth
-/// with prescribed motions; independent closures, so that every column can run.
-inline MechanismDescription CoupledLoops(SpaceKind space, std::uint64_t seed) {
-  const int loops = space == SpaceKind::kPlanar ? 2 : 1;
-  return seed % 2 == 0 ? MixedGraph(loops, space, seed, seed % 4 == 2 ? 2 : 0)
-                       : RandomGraph(loops, space, seed);
 }
 
 /// A formulation on a sample, started.
@@ -83,7 +63,8 @@ struct Bench {
       : sample(description, seed),
         mechanism(sample.mechanism(c.coordinates)),
         state(sample.state(c.coordinates)),
-        formulation(Make(c, mechanism)) {
+        formulation(harness::MakeFormulation<Space>(c.formulation, mechanism,
+                                                    {c.enforcement, c.solver, c.gains})) {
     EXPECT_EQ(formulation->Start(0.0, state.q, state.u), Outcome::kFinished);
     y.resize(formulation->state_size());
     ydot.resize(formulation->state_size());

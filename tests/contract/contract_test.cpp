@@ -5,6 +5,8 @@
 #include <cmath>
 #include <cstring>
 
+#include "lagrange/lagrange.h"
+#include "odca/odca.h"
 #include "tests/contract/allocations.h"
 
 namespace loopbench::testing {

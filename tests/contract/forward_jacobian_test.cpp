@@ -28,7 +28,6 @@ namespace {
 using Eigen::MatrixXd;
 using Eigen::VectorXd;
 using harness::Column;
-using harness::FormulationKind;
 
 constexpr int kMostColumns = 12;
 constexpr double kEpsilon = std::numeric_limits<double>::epsilon();
@@ -192,8 +191,7 @@ Worst CompareAll(const MechanismDescription& description, double t, const Vector
     const VectorXd q = from.CoordinatesIn(mechanism);
     to.UpdatePosition(q);
     const VectorXd u = from.SpeedsIn(to);
-    for (FormulationKind formulation :
-         {FormulationKind::kOdca, FormulationKind::kLagrange, FormulationKind::kReduction}) {
+    for (const std::string formulation : {"odca", "lagrange", "reduction"}) {
       for (Enforcement level :
            {Enforcement::kAcceleration, Enforcement::kVelocity, Enforcement::kBaumgarte}) {
         Column column{formulation, level, coordinates, SolverKind::kRankRevealing};

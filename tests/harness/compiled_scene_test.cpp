@@ -16,7 +16,7 @@ namespace {
 
 using namespace reference;
 
-const Column kColumn{FormulationKind::kOdca, Enforcement::kVelocity, Coordinates::kJoint,
+const Column kColumn{"odca", Enforcement::kVelocity, Coordinates::kJoint,
                      SolverKind::kRankRevealing};
 constexpr double kTolerance = 1e-10;
 /// Two runs at kTolerance over 1 s differ by their errors of integration.

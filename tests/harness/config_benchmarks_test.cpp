@@ -68,7 +68,7 @@ TEST(BenchmarkSet, OfTheRepositoryReachesAThousandBodies) {
     for (const BenchmarkGroup& group : set.groups) {
       for (const BenchmarkMember& member : group.members) {
         if (member.family != family) continue;
-        const bool is_odca = group.columns[0].formulation == FormulationKind::kOdca;
+        const bool is_odca = group.columns[0].formulation == "odca";
         std::size_t& largest = is_odca ? odca : dense;
         largest = std::max(largest, member.Make().bodies.size() - 1);
       }

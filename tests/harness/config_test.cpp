@@ -302,10 +302,6 @@ TEST(ExperimentReader, SavingsAreSwitchedOneByOne) {
 }
 
 TEST(EnumNames, ParseReturnsWhatToStringWrote) {
-  for (const auto value :
-       {FormulationKind::kOdca, FormulationKind::kLagrange, FormulationKind::kReduction}) {
-    EXPECT_EQ(Parse<FormulationKind>(ToString(value)), value);
-  }
   // The names of the reader and those of mechanism/ are written in two places.
   for (const auto value : {Coordinates::kJoint, Coordinates::kAbsolute}) {
     EXPECT_EQ(Parse<Coordinates>(ToString(value)), value);

@@ -23,10 +23,12 @@ std::string BlockAfter(const std::string& text, const std::string& words) {
   return text.substr(begin, text.find("\n```", begin) - begin + 1);
 }
 
-/// The documents that people write: those of the root, of docs/ and of the rooms.
+/// The documents that people write: those of the root, of docs/, of the rooms and of
+/// examples/.
 std::vector<fs::path> Documents() {
   std::vector<fs::path> documents;
-  for (const char* folder : {".", "docs", "mechanism", "odca", "lagrange", "reduction"}) {
+  for (const char* folder :
+       {".", "docs", "mechanism", "odca", "lagrange", "reduction", "examples"}) {
     for (const auto& entry : fs::directory_iterator(kRoot / folder)) {
       if (entry.path().extension() == ".md") documents.push_back(entry.path());
     }

@@ -18,7 +18,6 @@ namespace loopbench::harness {
 namespace {
 
 using namespace reference;
-using enum FormulationKind;
 using enum Enforcement;
 
 /// A run without doubts: the four-bar, 20 s at 1e-8.
@@ -255,7 +254,7 @@ TEST(Doubts, FinalPosesAreTheSameInAllCoordinatesOfPlaneAndSpace) {
     for (const Coordinates coordinates : {Coordinates::kJoint, Coordinates::kAbsolute}) {
       for (const Enforcement level : {kVelocity, kPosition}) {
         records.push_back(RunScene(
-            mechanism, {.formulation = kOdca, .enforcement = level, .coordinates = coordinates},
+            mechanism, {.formulation = "odca", .enforcement = level, .coordinates = coordinates},
             1e-9, 0.5));
       }
     }
@@ -279,12 +278,12 @@ TEST(Doubts, FinalPosesAreTheSameInAllCoordinatesOfPlaneAndSpace) {
 
 TEST(Doubts, PassagesAreSeenWhereNoStepEndsNearThem) {
   // the parallelogram goes flat within 2 s; steps at 1e-6 are a tenth of a radian
-  const Column acceleration{.formulation = kOdca};
+  const Column acceleration{.formulation = "odca"};
   const Record record = RunScene("parallelogram", acceleration, 1e-6, 2.0);
   ASSERT_EQ(record.Text("outcome"), "finished");
   EXPECT_GE(record.Number("singularity_passages"), 1);
   EXPECT_TRUE(HasDoubt(record, kSingularDoubt)) << record.Text("doubts");
-  const Column position{.formulation = kOdca, .enforcement = kPosition};
+  const Column position{.formulation = "odca", .enforcement = kPosition};
   EXPECT_EQ(RunScene("parallelogram", position, 1e-8, 2.0).Text("doubts"), "");
 }
 
@@ -292,7 +291,7 @@ TEST(Doubts, RedundantRowsThatDriftedApartAreNoSingularPosition) {
   // drift of 1e-3 gives Bennett's redundant rows a rank of their own
   for (const Coordinates coordinates : {Coordinates::kJoint, Coordinates::kAbsolute}) {
     const Record record =
-        RunScene("bennett", {.formulation = kOdca, .coordinates = coordinates}, 1e-6, 50.0);
+        RunScene("bennett", {.formulation = "odca", .coordinates = coordinates}, 1e-6, 50.0);
     ASSERT_EQ(record.Text("outcome"), "finished");
     EXPECT_GT(record.Number("drift_position_max"), 2e-4);
     EXPECT_GT(record.Number("singularity_distance_min"), 0.1);
@@ -306,7 +305,7 @@ TEST(Doubts, TheStraightLineLinkageThatEndsOnAnotherBranch) {
   std::vector<Record> records;
   for (const Coordinates coordinates : {Coordinates::kJoint, Coordinates::kAbsolute}) {
     for (const Enforcement level : {kVelocity, kPosition}) {
-      const Column column{.formulation = level == kVelocity ? kReduction : kOdca,
+      const Column column{.formulation = level == kVelocity ? "reduction" : "odca",
                           .enforcement = level,
                           .coordinates = coordinates};
       records.push_back(RunScene("peaucellier", column, 1e-8, 1.0));

@@ -17,7 +17,6 @@ namespace loopbench::harness {
 namespace {
 
 using namespace reference;
-using enum FormulationKind;
 
 constexpr double kPi = std::numbers::pi;
 
@@ -124,7 +123,7 @@ Case ParallelogramCase(const Experiment& experiment, const Column& column) {
 }
 
 TEST(Ensemble, CountsTheRunsThatStayOnTheirBranch) {
-  const Column published = Published(kLagrange, Coordinates::kJoint);
+  const Column published = Published("lagrange", Coordinates::kJoint);
   const Record lost = RunCase(Paper(), ParallelogramCase(Paper(), published));
   EXPECT_EQ(lost.Number("ensemble_size"), 8);
   EXPECT_EQ(lost.Number("ensemble_started_off"), 0);
@@ -132,7 +131,7 @@ TEST(Ensemble, CountsTheRunsThatStayOnTheirBranch) {
   EXPECT_LT(lost.Number("ensemble_branch_kept") + lost.Number("ensemble_failed"), 8);
   EXPECT_GT(lost.Number("ensemble_branch_error_max"), 0.1);
 
-  Column position = Published(kOdca, Coordinates::kJoint);
+  Column position = Published("odca", Coordinates::kJoint);
   position.enforcement = Enforcement::kPosition;
   position.solver = SolverKind::kRankRevealing;
   Case one = ParallelogramCase(Paper(), position);
@@ -148,7 +147,7 @@ TEST(Ensemble, CountsTheRunsThatStayOnTheirBranch) {
 }
 
 TEST(Ensemble, KnowsNothingOfABranchWhereTheSceneDoesNot) {
-  Case one = CaseOf(Paper(), "four-bar", Published(kOdca, Coordinates::kJoint), 1e-6, 0.1);
+  Case one = CaseOf(Paper(), "four-bar", Published("odca", Coordinates::kJoint), 1e-6, 0.1);
   one.ensemble = 2;
   one.perturb = 0.02;
   const Record record = RunCase(Paper(), one);

@@ -22,10 +22,9 @@ namespace loopbench::harness {
 namespace {
 
 using namespace reference;
-using enum FormulationKind;
 
 constexpr double kTolerance = 1e-8;
-const Column kOdcaJoint = Published(kOdca, Coordinates::kJoint);
+const Column kOdcaJoint = Published("odca", Coordinates::kJoint);
 
 bool IsSet(const Record& record, std::string_view key) {
   const Value* value = record.Find(key);
@@ -105,7 +104,7 @@ TEST(FinishedCase, RankIsThatOfTheLoopsAndOfAllConstraintsOfTheSet) {
 /// one a step is enough at this tolerance, and what it takes away neither grows nor fades, while
 /// the energy's error, which nothing takes away, grows with time.
 TEST(FinishedCase, CountsProjectionsAndTheirGrowth) {
-  const Column position{.formulation = kOdca, .enforcement = Enforcement::kPosition};
+  const Column position{.formulation = "odca", .enforcement = Enforcement::kPosition};
   const Record record = RunPaper("four-bar", position, kTolerance, 300.0);
   ASSERT_EQ(record.Text("outcome"), "finished");
   const double steps = record.Number("steps"), iterations = record.Number("projection_iterations");
@@ -174,7 +173,7 @@ TEST(FinishedCase, KeepsTheOpeningOfMotionsTooFastForItsPoints) {
 TEST(FinishedCase, KeepsAnglesAndDisplacementsApart) {
   const MechanismFile file = ReadMechanism(kConfigs / "mechanisms/flyball-governor.json");
   for (const Coordinates coordinates : {Coordinates::kJoint, Coordinates::kAbsolute}) {
-    const Record record = RunSingle(file, Published(kOdca, coordinates), 0.1);
+    const Record record = RunSingle(file, Published("odca", coordinates), 0.1);
     for (const JointDescription& joint : file.description.joints) {
       if (joint.type != JointType::kRevolute && joint.type != JointType::kPrismatic) continue;
       const bool shifts = joint.type == JointType::kPrismatic;
@@ -313,7 +312,8 @@ TEST(Limits, OfStepsEndTheRunWhereItStands) {
 }
 
 TEST(Limits, OfCpuTimeEndTheRunWhereItStands) {
-  Case one = CaseOf(Paper(), "seven-bar", Published(kLagrange, Coordinates::kAbsolute), 1e-12, 1e4);
+  Case one =
+      CaseOf(Paper(), "seven-bar", Published("lagrange", Coordinates::kAbsolute), 1e-12, 1e4);
   one.limits.cpu_s = 0.05;
   const Record record = RunCase(Paper(), one);
   EXPECT_EQ(record.Text("outcome"), "time-limit");

@@ -40,8 +40,8 @@ struct Scene {
   std::vector<double> y;
 };
 
-constexpr Column kColumn{FormulationKind::kOdca, Enforcement::kAcceleration, Coordinates::kJoint,
-                         SolverKind::kRankRevealing};
+const Column kColumn{"odca", Enforcement::kAcceleration, Coordinates::kJoint,
+                     SolverKind::kRankRevealing};
 
 TEST(SystemTest, EvaluatesAfreshForAJacobianWhereItHasMovedAway) {
   Scene scene("four-bar", kColumn);

@@ -46,20 +46,19 @@ inline Experiment Single(const MechanismFile& mechanism) {
 }
 
 /// The paper's columns as published: level and solver belong to the formulation.
-inline Column Published(FormulationKind formulation, Coordinates coordinates) {
+inline Column Published(const std::string& formulation, Coordinates coordinates) {
   return {.formulation = formulation,
-          .enforcement = formulation == FormulationKind::kReduction ? Enforcement::kVelocity
-                                                                    : Enforcement::kAcceleration,
+          .enforcement =
+              formulation == "reduction" ? Enforcement::kVelocity : Enforcement::kAcceleration,
           .coordinates = coordinates,
           .solver = SolverKind::kAsPublished};
 }
 
 inline const std::vector<Column>& PublishedColumns() {
-  using enum FormulationKind;
   static const std::vector<Column> kColumns = {
-      Published(kOdca, Coordinates::kJoint),      Published(kOdca, Coordinates::kAbsolute),
-      Published(kLagrange, Coordinates::kJoint),  Published(kLagrange, Coordinates::kAbsolute),
-      Published(kReduction, Coordinates::kJoint), Published(kReduction, Coordinates::kAbsolute)};
+      Published("odca", Coordinates::kJoint),      Published("odca", Coordinates::kAbsolute),
+      Published("lagrange", Coordinates::kJoint),  Published("lagrange", Coordinates::kAbsolute),
+      Published("reduction", Coordinates::kJoint), Published("reduction", Coordinates::kAbsolute)};
   return kColumns;
 }
 

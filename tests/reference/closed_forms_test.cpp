@@ -144,11 +144,10 @@ TEST_P(LongLadder, OfFortyWindowsFollowsThePublishedFile) {
 
 // the dense matrices of the other two, three times as large, take seconds
 INSTANTIATE_TEST_SUITE_P(Columns, LongLadder,
-                         testing::Values(Published(FormulationKind::kOdca, Coordinates::kJoint),
-                                         Published(FormulationKind::kOdca, Coordinates::kAbsolute),
-                                         Published(FormulationKind::kLagrange, Coordinates::kJoint),
-                                         Published(FormulationKind::kReduction,
-                                                   Coordinates::kJoint)),
+                         testing::Values(Published("odca", Coordinates::kJoint),
+                                         Published("odca", Coordinates::kAbsolute),
+                                         Published("lagrange", Coordinates::kJoint),
+                                         Published("reduction", Coordinates::kJoint)),
                          [](const auto& column) { return NameOf(column.param); });
 
 }  // namespace

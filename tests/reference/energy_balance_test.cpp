@@ -27,7 +27,7 @@ constexpr double kErrorPerTolerance = 1e3;  // [J]
 std::vector<Column> Columns() {
   std::vector<Column> columns = PublishedColumns();
   for (Column& column : columns) {
-    if (column.formulation == FormulationKind::kReduction) {
+    if (column.formulation == "reduction") {
       column.solver = SolverKind::kRankRevealing;
     }
   }

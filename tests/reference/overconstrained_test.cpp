@@ -11,8 +11,6 @@
 namespace loopbench::harness::reference {
 namespace {
 
-using enum FormulationKind;
-
 Experiment InSpace(const MechanismFile& mechanism) {
   Experiment experiment = Single(mechanism);
   experiment.compile.planar = false;
@@ -29,7 +27,7 @@ Record RunScene(const MechanismFile& mechanism, const Column& column, double rto
   return RunCase(experiment, one);
 }
 
-Column At(FormulationKind formulation, Enforcement level,
+Column At(const std::string& formulation, Enforcement level,
           Coordinates coordinates = Coordinates::kJoint,
           SolverKind solver = SolverKind::kRankRevealing) {
   return {.formulation = formulation,
@@ -39,7 +37,7 @@ Column At(FormulationKind formulation, Enforcement level,
 }
 
 TEST(DriftOfBennettsLinkage, GrowsQuadraticallyAtAccelerationLevel) {
-  for (const FormulationKind formulation : {kOdca, kLagrange, kReduction}) {
+  for (const std::string formulation : {"odca", "lagrange", "reduction"}) {
     const Record record =
         RunScene(Shipped("bennett"), At(formulation, Enforcement::kAcceleration), 1e-8, 100.0, 8);
     EXPECT_EQ(record.Number("ensemble_failed"), 0);
@@ -52,7 +50,7 @@ TEST(DriftOfBennettsLinkage, GrowsQuadraticallyAtAccelerationLevel) {
 }
 
 TEST(DriftOfBennettsLinkage, GrowsLinearlyAtVelocityLevel) {
-  for (const FormulationKind formulation : {kOdca, kLagrange, kReduction}) {
+  for (const std::string formulation : {"odca", "lagrange", "reduction"}) {
     const Record record =
         RunScene(Shipped("bennett"), At(formulation, Enforcement::kVelocity), 1e-8, 100.0, 8);
     EXPECT_EQ(record.Number("ensemble_failed"), 0);
@@ -103,8 +101,8 @@ TEST_P(BennettsFrames, AtAnyAngleCostAFewTimesTheDriftOfRedundancyModelledAway) 
       const bool worst = set == Coordinates::kJoint && level == Enforcement::kVelocity;
       const double bound = worst ? 20.0 : 5.0;
       for (const double rtol : {1e-6, 1e-9, 1e-12}) {
-        const Record away = RunScene(ModelledAway(), At(kOdca, level, set), rtol, 100.0);
-        const Record record = RunScene(bennett, At(kOdca, level, set), rtol, 100.0);
+        const Record away = RunScene(ModelledAway(), At("odca", level, set), rtol, 100.0);
+        const Record record = RunScene(bennett, At("odca", level, set), rtol, 100.0);
         ASSERT_EQ(away.Text("outcome"), "finished");
         EXPECT_EQ(record.Text("outcome"), "finished");
         const double ratio =
@@ -124,11 +122,11 @@ class Overconstrained : public ::testing::TestWithParam<std::string> {};
 
 TEST_P(Overconstrained, KeepsItsEnergyInAllColumnsAsPublishedToo) {
   const MechanismFile mechanism = Shipped(GetParam());
-  for (const FormulationKind formulation : {kOdca, kLagrange, kReduction}) {
+  for (const std::string formulation : {"odca", "lagrange", "reduction"}) {
     for (const Coordinates set : {Coordinates::kJoint, Coordinates::kAbsolute}) {
       for (const SolverKind solver : {SolverKind::kRankRevealing, SolverKind::kAsPublished}) {
         const Enforcement level =
-            formulation == kReduction ? Enforcement::kVelocity : Enforcement::kAcceleration;
+            formulation == "reduction" ? Enforcement::kVelocity : Enforcement::kAcceleration;
         const Column column = At(formulation, level, set, solver);
         const Record record = RunScene(mechanism, column, 1e-8, 50.0);
         EXPECT_EQ(record.Text("outcome"), "finished") << ToString(column);

@@ -57,7 +57,7 @@ std::vector<Column> BothLevels() {
   std::vector<Column> columns;
   for (Column column : RankRevealingColumns()) {
     columns.push_back(column);
-    if (column.formulation == FormulationKind::kReduction) continue;
+    if (column.formulation == "reduction") continue;
     column.enforcement = Enforcement::kVelocity;
     columns.push_back(column);
   }

@@ -26,8 +26,8 @@ TEST_P(ShippedMechanism, RunsInEveryColumnAndBalancesItsEnergy) {
   for (const Column& column : RankRevealingColumns()) {
     const Record record = RunCase(
         experiment, CaseOf(experiment, GetParam(), column, kRtol, ShortHorizon(GetParam())));
-    if (column.formulation == FormulationKind::kReduction &&
-        GetParam().ends_with("singular-start") && record.Text("outcome") == "singular") {
+    if (column.formulation == "reduction" && GetParam().ends_with("singular-start") &&
+        record.Text("outcome") == "singular") {
       continue;  // no set of independent speeds serves there: a result, see results/paper
     }
     ASSERT_EQ(record.Text("outcome"), "finished")

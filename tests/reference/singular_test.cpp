@@ -17,10 +17,10 @@
 namespace loopbench::harness::reference {
 namespace {
 
-constexpr Column kOdcaPosition{.formulation = FormulationKind::kOdca,
-                               .enforcement = Enforcement::kPosition,
-                               .coordinates = Coordinates::kJoint,
-                               .solver = SolverKind::kRankRevealing};
+const Column kOdcaPosition{.formulation = "odca",
+                           .enforcement = Enforcement::kPosition,
+                           .coordinates = Coordinates::kJoint,
+                           .solver = SolverKind::kRankRevealing};
 
 class Passage : public testing::TestWithParam<Column> {
  protected:

@@ -1,4 +1,4 @@
-// Options of the subcommands compare, fit and export (main.cpp has the others).
+// Options of the subcommands compare, fit and export: those that hold measurements together.
 #pragma once
 
 #include <CLI/CLI.hpp>

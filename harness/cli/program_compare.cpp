@@ -1,4 +1,4 @@
-#include "harness/cli/main_compare.h"
+#include "harness/cli/program_compare.h"
 
 #include "harness/text/numeric_option.h"
 

@@ -1,0 +1,76 @@
+# cmake --install build/PRESET --prefix P:
+#
+#   bin/loopbench
+#   include/loopbench/     headers under the names that they have here: "mechanism/model/mechanism.h"
+#   lib/                   static libraries
+#   lib/cmake/loopbench/   the package: find_package(loopbench) gives the target loopbench::loopbench
+#   share/loopbench/       schema/ and mechanisms/
+if(LOOPBENCH_SANITIZE)
+  return()
+endif()
+include(GNUInstallDirs)
+include(CMakePackageConfigHelpers)
+
+# What Eigen's types look like in memory depends on -march: 32-byte alignment with AVX, 16 without. The
+# libraries are built with the default of their -march, and this says it to whoever includes their
+# headers, so that -march itself need not be forced on them. (In this build it would change nothing.)
+if(NOT "${LOOPBENCH_ALIGNMENT_OF}" STREQUAL "${LOOPBENCH_MARCH}")
+  get_target_property(eigen Eigen3::Eigen INTERFACE_INCLUDE_DIRECTORIES)
+  file(WRITE ${CMAKE_BINARY_DIR}/alignment.cpp
+    "#include <Eigen/src/Core/util/Macros.h>\n#include <Eigen/src/Core/util/ConfigureVectorization.h>\n"
+    "alignment EIGEN_MAX_ALIGN_BYTES EIGEN_MAX_STATIC_ALIGN_BYTES\n")
+  execute_process(COMMAND ${CMAKE_CXX_COMPILER} -march=${LOOPBENCH_MARCH} -std=c++20 -I${eigen} -E -P alignment.cpp
+    WORKING_DIRECTORY ${CMAKE_BINARY_DIR} OUTPUT_VARIABLE text ERROR_VARIABLE error)
+  if(NOT text MATCHES "alignment ([0-9]+) ([0-9]+)" OR NOT CMAKE_MATCH_1 EQUAL CMAKE_MATCH_2)
+    message(FATAL_ERROR "no alignment of Eigen's types for -march=${LOOPBENCH_MARCH}: ${CMAKE_MATCH_0}\n${error}")
+  endif()
+  set(LOOPBENCH_ALIGNMENT ${CMAKE_MATCH_1} CACHE INTERNAL "Alignment of Eigen's types [bytes]")
+  set(LOOPBENCH_ALIGNMENT_OF ${LOOPBENCH_MARCH} CACHE INTERNAL "The -march that it belongs to")
+endif()
+target_include_directories(loopbench_mechanism INTERFACE
+  $<INSTALL_INTERFACE:${CMAKE_INSTALL_INCLUDEDIR}/loopbench>)
+target_compile_definitions(loopbench_mechanism INTERFACE
+  $<INSTALL_INTERFACE:EIGEN_MAX_ALIGN_BYTES=${LOOPBENCH_ALIGNMENT}>
+  $<INSTALL_INTERFACE:EIGEN_MAX_STATIC_ALIGN_BYTES=${LOOPBENCH_ALIGNMENT}>)
+target_compile_features(loopbench_mechanism INTERFACE cxx_std_20)
+
+set(installed loopbench_mechanism ${LOOPBENCH_FORMULATION_LIBRARIES} loopbench_harness)
+foreach(optional loopbench_precision loopbench_contract)
+  if(TARGET ${optional})
+    list(APPEND installed ${optional})
+  endif()
+endforeach()
+foreach(library ${installed})
+  string(REPLACE "loopbench_" "" name ${library})
+  set_target_properties(${library} PROPERTIES EXPORT_NAME ${name})
+endforeach()
+set_target_properties(loopbench_harness PROPERTIES EXPORT_NAME loopbench)
+install(TARGETS ${installed} EXPORT loopbench)
+install(TARGETS loopbench RUNTIME)
+
+# Headers that need what is private here (JSON, SUNDIALS, CLI11) stay here.
+install(DIRECTORY mechanism ${LOOPBENCH_FORMULATIONS} harness
+  DESTINATION ${CMAKE_INSTALL_INCLUDEDIR}/loopbench FILES_MATCHING PATTERN "*.h"
+  REGEX "/(json/json_|json/document_kind|integrator/arkode_|config/.*_(sections|fields|sweep)\\.h|\
+config/selection_reader|cli/(options|program_)|text/numeric_option)" EXCLUDE)
+if(TARGET loopbench_contract)
+  install(FILES tests/contract/check.h DESTINATION ${CMAKE_INSTALL_INCLUDEDIR}/loopbench/tests/contract)
+endif()
+install(DIRECTORY configs/schema configs/mechanisms DESTINATION ${CMAKE_INSTALL_DATADIR}/loopbench)
+
+# What makes code of others comparable in time and bits: optimisation, assertions and -march as here.
+string(TOUPPER "${CMAKE_BUILD_TYPE}" build_type)
+separate_arguments(same_flags UNIX_COMMAND "${CMAKE_CXX_FLAGS} ${CMAKE_CXX_FLAGS_${build_type}}")
+if(NOT "-DNDEBUG" IN_LIST same_flags)
+  list(APPEND same_flags -UNDEBUG)
+endif()
+list(APPEND same_flags -march=${LOOPBENCH_MARCH} -ffp-contract=off -DEIGEN_DONT_PARALLELIZE
+  -DEIGEN_STACK_ALLOCATION_LIMIT=1048576)
+set(package ${CMAKE_INSTALL_LIBDIR}/cmake/loopbench)
+install(EXPORT loopbench NAMESPACE loopbench:: FILE loopbench-targets.cmake DESTINATION ${package})
+configure_package_config_file(cmake/loopbench-config.cmake.in ${CMAKE_BINARY_DIR}/loopbench-config.cmake
+  INSTALL_DESTINATION ${package})
+write_basic_package_version_file(${CMAKE_BINARY_DIR}/loopbench-config-version.cmake
+  COMPATIBILITY SameMinorVersion)
+install(FILES ${CMAKE_BINARY_DIR}/loopbench-config.cmake ${CMAKE_BINARY_DIR}/loopbench-config-version.cmake
+  DESTINATION ${package})

@@ -1,0 +1,25 @@
+// What the options of several subcommands share.
+#pragma once
+
+#include <CLI/CLI.hpp>
+#include <string>
+#include <vector>
+
+#include "harness/record/select.h"
+
+namespace loopbench::harness {
+
+inline Selection ParseSelection(const std::vector<std::string>& conditions) {
+  Selection selection;
+  for (const std::string& text : conditions) selection.push_back(ParseCondition(text));
+  return selection;
+}
+
+inline CLI::Option* AddGate(CLI::App* app, std::string* gate) {
+  return app
+      ->add_option("--gate", *gate,
+                   "doubts: exit with 1 if an accuracy run shown did not finish or has doubts")
+      ->check(CLI::IsMember({"doubts"}));
+}
+
+}  // namespace loopbench::harness

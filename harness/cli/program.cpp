@@ -1,0 +1,75 @@
+#include "harness/cli/program.h"
+
+#include <CLI/CLI.hpp>
+#include <exception>
+
+#include "harness/cli/program_compare.h"
+#include "harness/cli/program_files.h"
+#include "harness/cli/program_stores.h"
+#include "harness/config/formulations.h"
+#include "harness/record/provenance.h"
+#include "harness/text/terminal.h"
+
+namespace loopbench {
+namespace harness {
+namespace {
+
+// {}: the names of the formulations
+constexpr const char* kFooter = R"(
+Examples: (paths from the root of the repository)
+  loopbench list configs/experiments/paper/paper.json
+  loopbench plan configs/experiments/paper/paper.json --set /limits/cpu_s=5
+  loopbench run configs/experiments/paper/paper.json --jobs 2 --filter mechanism=four-bar
+  loopbench run big.json --shard 1/2 --out part1   (and 2/2 elsewhere)
+  loopbench merge part1 part2 --out whole
+  loopbench table results/runs/paper --where mechanism=four-bar,dead-centre --where rtol=1e-8
+  loopbench plot results/runs/paper --out results/runs/paper/figures
+  loopbench run configs/experiments/precision.json --precision-only --jobs 2
+  loopbench verdict results/runs/paper --claims configs/experiments/paper/claims.json
+  loopbench map results/runs/extremes --rules configs/experiments/extremes/map.json
+
+Conditions are key=value or key=value,value; keys are the columns of drift.csv.
+Formulations: {}.
+Exit codes: 0 done, 1 a gate failed, 2 could not measure or bad input.)";
+
+int RunProgram(int argc, char** argv) {
+  CLI::App app{
+      "Measures constraint drift and time of formulations of closed-loop multibody dynamics.",
+      "loopbench"};
+  app.footer(fmt::format(kFooter, fmt::join(FormulationNames(), ", ")));
+  app.set_version_flag("--version", VersionText);
+  app.require_subcommand(1);
+  app.failure_message([](const CLI::App* failed, const CLI::Error& error) {
+    // CLI11 reports a misspelt subcommand only as a missing one: name it
+    std::string text = CLI::FailureMessage::simple(failed, error);
+    for (const std::string& word : failed->remaining()) text += "unknown: " + word + "\n";
+    return EscapeTerminalLines(text);
+  });
+  FileOptions files(app);
+  StoreOptions stores(app);
+  ComparisonOptions comparison(app);
+  try {
+    app.parse(argc, argv);
+  } catch (const CLI::ParseError& error) {
+    return app.exit(error) == 0 ? 0 : 2;
+  }
+  try {
+    const std::string typed = CommandLine(argc, argv);
+    if (const auto code = files.Run(typed)) return *code;
+    if (const auto code = stores.Run(typed)) return *code;
+    return comparison.Run(typed).value();
+  } catch (const std::exception& error) {
+    PrintError("{}\n", Lines{error.what()});
+    return 2;
+  }
+}
+
+}  // namespace
+}  // namespace harness
+
+int Main(int argc, char** argv) {
+  harness::PrepareStreams();
+  return harness::FinishOutput(harness::RunProgram(argc, argv));
+}
+
+}  // namespace loopbench

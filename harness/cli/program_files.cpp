@@ -1,0 +1,154 @@
+#include "harness/cli/program_files.h"
+
+#include <fmt/format.h>
+
+#include "harness/cli/commands_schema.h"
+#include "harness/cli/options.h"
+#include "harness/text/numeric_option.h"
+
+namespace loopbench::harness {
+
+namespace {
+
+std::vector<Setting> ParseSettings(const std::vector<std::string>& texts) {
+  std::vector<Setting> settings;
+  for (const std::string& text : texts) settings.push_back(ParseSetting(text));
+  return settings;
+}
+
+/// Repeatable, one value each: a second word would be the name of a file.
+void AddSettings(CLI::App* app, std::vector<std::string>* settings) {
+  app->add_option("--set", *settings, "Set a field before reading: /json/pointer=value")
+      ->allow_extra_args(false);
+}
+
+/// Of work on a mechanism; experiments say their own ("limits").
+void AddLimits(CLI::App* app, ProcessLimits* limits) {
+  app->add_option("--cpu", limits->cpu_s, "CPU time for one mechanism file [s]")
+      ->check(NumberFrom(0.001, 1e9))
+      ->capture_default_str();
+  app->add_option("--memory", limits->memory_mb, "Memory for one mechanism file [MiB]")
+      ->check(NumberFrom(1.0, 1e9))
+      ->capture_default_str();
+}
+
+}  // namespace
+
+FileOptions::FileOptions(CLI::App& app) {
+  AddRun(app);
+
+  list_app_ = app.add_subcommand("list", "Show the cases of experiments");
+  list_app_->add_option("experiment", files_.paths, "Experiment files (JSON)")->required();
+  list_app_->add_option("--filter", conditions_, "Only cases with key=value[,value]");
+  AddSettings(list_app_, &settings_);
+
+  AddCheck(app);
+
+  plan_app_ = app.add_subcommand("plan", "Count cases and runs, estimate how long they take");
+  plan_app_->add_option("experiment", files_.paths, "Experiment files (JSON)")->required();
+  plan_app_->add_option("--from", plan_.from,
+                        "Earlier results whose times are used, not a pilot's");
+  plan_app_->add_option("--filter", conditions_, "Only cases with key=value[,value]");
+  AddSettings(plan_app_, &settings_);
+
+  AddExplain(app);
+  AddSchema(app);
+}
+
+void FileOptions::AddRun(CLI::App& app) {
+  run_app_ =
+      app.add_subcommand("run", "Run experiments, or go on with them; write records and tables");
+  run_app_->add_option("experiment", run_.experiments, "Experiment files (JSON)")->required();
+  run_app_->add_option("--out", run_.out,
+                       "Folder for results.jsonl, drift.csv and timing.csv "
+                       "(default: results/runs/NAME)");
+  run_app_->add_option("--jobs", run_.suite.jobs, "Accuracy cases at once; timings run alone")
+      ->check(NumberFrom(1, 1024))
+      ->capture_default_str();
+  run_app_->add_option("--filter", conditions_, "Only accuracy cases with key=value[,value]");
+  AddSettings(run_app_, &settings_);
+  run_app_->add_option("--shard", shard_, "k/n: the k-th of n parts, to be merged later")
+      ->capture_default_str();
+  run_app_->add_option("--rerun", rerun_, "Cases to run although the store has them")
+      ->check(CLI::IsMember({"none", "failed", "all"}))
+      ->capture_default_str();
+  CLI::Option* gate = AddGate(run_app_, &run_.gate);
+  run_app_->footer(
+      "A run that was interrupted goes on where it stopped: give the same command again.");
+  CLI::Option* no = run_app_->add_flag("--no-timing", no_timing_, "Leave the timings out");
+  CLI::Option* timings =
+      run_app_->add_flag("--timing-only", timing_only_, "Only the timings")->excludes(no);
+  timings->excludes(gate);  // which judges accuracy runs
+  run_app_->add_flag("--precision-only", precision_only_, "Only the runs in several scalars")
+      ->excludes(no)
+      ->excludes(timings)
+      ->excludes(gate);
+}
+
+void FileOptions::AddCheck(CLI::App& app) {
+  check_app_ = app.add_subcommand("check",
+                                  "Read configuration files of any kind, report errors; assemble "
+                                  "the starts of mechanisms and scenes");
+  check_app_->add_option("file", files_.paths, "Files (JSON)")->required();
+  check_app_->add_flag("--no-assembly", no_assembly_, "Read only, assemble no start");
+  AddLimits(check_app_, &check_.limits);
+  AddSettings(check_app_, &settings_);
+}
+
+void FileOptions::AddExplain(CLI::App& app) {
+  explain_app_ = app.add_subcommand(
+      "explain", "Say what experiments run and measure, and what mechanisms are made of");
+  explain_app_->add_option("file", files_.paths, "Experiment or mechanism files (JSON)")
+      ->required();
+  explain_app_->add_option("--filter", conditions_, "Only cases with key=value[,value]");
+  AddLimits(explain_app_, &explain_limits_);
+  AddSettings(explain_app_, &settings_);
+  explain_app_->add_flag("--all", explain_all_, "Every row of long tables of a mechanism");
+}
+
+void FileOptions::AddSchema(CLI::App& app) {
+  schema_app_ = app.add_subcommand(
+      "schema", "Print what files of a kind may hold, as JSON Schema (draft 07) for editors");
+  schema_app_->add_option("kind", schema_kind_, "Of files")
+      ->required()
+      ->check(CLI::IsMember(SchemaKinds()));
+  schema_app_->add_flag("--tables", schema_tables_, "Tables of keys in Markdown instead");
+}
+
+int FileOptions::RunExperiments(const std::string& typed) {
+  run_.settings = files_.settings;
+  run_.suite.filter = files_.filter;
+  run_.suite.timing = !no_timing_ && !precision_only_;
+  run_.suite.accuracy = !timing_only_ && !precision_only_;
+  run_.suite.precision = !timing_only_;
+  run_.suite.set = fmt::format("{}", fmt::join(settings_, " "));
+  run_.suite.shard = ParseShard(shard_);
+  run_.suite.rerun = rerun_ == "all"      ? Rerun::kAll
+                     : rerun_ == "failed" ? Rerun::kFailed
+                                          : Rerun::kNone;
+  return harness::Run(run_, typed);
+}
+
+std::optional<int> FileOptions::Run(const std::string& typed) {
+  files_.filter = ParseSelection(conditions_);
+  files_.settings = ParseSettings(settings_);
+  if (*run_app_) return RunExperiments(typed);
+  if (*list_app_) return List(files_);
+  if (*plan_app_) {
+    plan_.files = files_;
+    return PrintPlans(plan_);
+  }
+  if (*explain_app_) return Explain(files_, explain_all_, explain_limits_);
+  if (*schema_app_) {
+    PrintText(schema_tables_ ? TablesOfKinds({schema_kind_}) : SchemaOfKind(schema_kind_));
+    return 0;
+  }
+  if (*check_app_) {
+    check_.files = files_;
+    check_.assembly = !no_assembly_;
+    return CheckFiles(check_);
+  }
+  return std::nullopt;
+}
+
+}  // namespace loopbench::harness

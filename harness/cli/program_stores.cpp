@@ -1,0 +1,141 @@
+#include "harness/cli/program_stores.h"
+
+#include "harness/cli/options.h"
+
+namespace loopbench::harness {
+
+namespace {
+
+constexpr const char* kTableFooter = R"(
+Examples:
+  loopbench table out --where rtol=1e-8 --group mechanism
+  loopbench table out --columns mechanism,formulation,drift_position_max --format latex
+  loopbench table out --kind timing --sort rhs_ns_median --format csv --out timing.csv
+
+"ok?" is a run that finished with doubts: the lines below the table say why, column doubts has codes
+(docs/design.md, section 6), --gate doubts ends with 1.
+Any key of the records may be a column; a wrong one is answered with the list of all.
+Every table ends with the command, machine, compiler, libraries and commit.)";
+
+constexpr const char* kPlotFooter = R"(
+Examples:
+  loopbench plot out --out out/figures
+  loopbench plot out --out work.svg --x rhs_evaluations --y drift_position_max --group formulation,coordinates
+  loopbench plot out --out cost.pdf --where kind=timing --x bodies --y ns_per_body --group formulation
+
+Without --x and --y: angles and displacements of the run that is trusted most (finished, at level
+position, at the finest tolerance), drift with its fitted exponents, and of runs in several scalars
+error and drift against tolerance. Runs that failed are crosses, doubtful ones dashed. A figure that
+cannot be drawn is reported with its reason, and the exit code is 2 after all others are drawn.)";
+
+constexpr const char* kMapFooter = R"(
+Examples: (paths from the root of the repository)
+  loopbench map results/runs/extremes --rules configs/experiments/extremes/map.json
+  loopbench map out --rules map.json --out out --format pdf
+  loopbench map out --rules map.json --gate        (1 if a cell that must hold does not)
+
+Rules name methods (columns), extremes (rows) and what decides about a row:
+  {"title": "Extremes",
+   "columns": [{"label": "O-DCA, position",
+                "select": {"formulation": "odca", "enforcement": "position"}}],
+   "groups": [{"label": "singular positions", "rows": [
+     {"label": "parallelogram, 1e-8", "select": {"mechanism": "parallelogram", "rtol": 1e-8},
+      "decides": [{"measure": "branch_error_max", "limit": 500, "of": "rtol", "unit": "rad"}],
+      "why": "...", "must_hold": "all"}]}]}
+"limit", "at_least" or "equal" compare a key of the record with a number, or with that many times
+another key ("of"). "right": ["locked"] says how a run should end if not as finished.
+Of several records that match a cell the worst decides. A cell
+  holds         ended as it should, all measures within their limits
+  singular, ... stopped early with that reason; time-limit, ...: did not end by itself
+  inaccurate    finished, with a measure beyond its limit or not finite
+  crashed, ...  no result
+  ?             not measured: no record, too few ("cases"), or one without the measure
+  -             not applicable, with the rules' reason
+docs/extremes.md explains them, docs/design.md (section 6) has all keys of the rules.)";
+
+}  // namespace
+
+StoreOptions::StoreOptions(CLI::App& app) {
+  merge_app_ = app.add_subcommand("merge", "Put the stores of shards together");
+  merge_app_->add_option("store", merge_.stores, "Folders of runs, or .jsonl files")->required();
+  merge_app_->add_option("--out", merge_.out, "Folder of the new store")->required();
+
+  AddTable(app);
+  AddPlot(app);
+
+  verdict_app_ = app.add_subcommand("verdict", "Hold claims against stored records");
+  verdict_app_->add_option("store", verdict_.store, "Folder of a run, or a .jsonl file")
+      ->required();
+  verdict_app_->add_option("--claims", verdict_.claims, "Rules (JSON)")->required();
+  verdict_app_->add_option("--out", verdict_.out, "Markdown file with all numbers");
+
+  AddMap(app);
+}
+
+void StoreOptions::AddTable(CLI::App& app) {
+  table_app_ = app.add_subcommand("table", "Print a table of stored records");
+  table_app_->add_option("store", table_.store, "Folder of a run, or a .jsonl file")->required();
+  table_app_
+      ->add_option("--kind", table_.view.kind,
+                   "What the rows are (default: drift, or what the store has)")
+      ->check(CLI::IsMember({"drift", "precision", "timing", "factorial", "all"}));
+  table_app_->add_option("--format", table_.format, "How they are written")
+      ->check(CLI::IsMember({"text", "csv", "markdown", "json", "latex"}))
+      ->capture_default_str();
+  table_app_->add_option("--where", conditions_, "Only records with key=value[,value]");
+  table_app_->add_option("--columns", table_.view.columns, "Keys of records, in this order: a,b,c")
+      ->delimiter(',');
+  table_app_->add_option("--group", table_.view.group, "One table per value of this key");
+  table_app_->add_option("--sort", table_.view.sort, "Order by this key first");
+  table_app_->add_flag("--descending", table_.view.descending, "Largest first")->needs("--sort");
+  table_app_->add_option("--out", table_.out, "File (default: the terminal)");
+  AddGate(table_app_, &table_.gate);
+  table_app_->footer(kTableFooter);
+}
+
+void StoreOptions::AddPlot(CLI::App& app) {
+  plot_app_ = app.add_subcommand(
+      "plot", "Draw the standard figures of stored records, or one value against another");
+  plot_app_->add_option("store", plot_.store, "Folder of a run, or a .jsonl file")->required();
+  plot_app_
+      ->add_option("--out", plot_.out,
+                   "Folder for the figures; with --x and --y also a file's name")
+      ->required();
+  plot_app_->add_option("--format", plot_.format, "svg (default) or pdf")
+      ->check(CLI::IsMember({"svg", "pdf"}));
+  plot_app_->add_option("--where", conditions_, "Only records with key=value[,value]");
+  plot_app_->add_option("--x", plot_.free.x, "Key of the horizontal axis");
+  plot_app_->add_option("--y", plot_.free.y, "Key of the vertical axis");
+  plot_app_->add_option("--group", plot_.free.group, "One curve per value of these keys: a,b");
+  plot_app_
+      ->add_option("--log", plot_.free.log,
+                   "Logarithmic axes (default: those that span two decades)")
+      ->check(CLI::IsMember({"x", "y", "xy", "none"}));
+  plot_app_->add_option("--title", plot_.free.title, "Title (default: what the records share)");
+  plot_app_->footer(kPlotFooter);
+}
+
+void StoreOptions::AddMap(CLI::App& app) {
+  map_app_ =
+      app.add_subcommand("map", "Show which method survives which extreme, and the number why");
+  map_app_->add_option("store", map_.store, "Folder of a run, or a .jsonl file")->required();
+  map_app_->add_option("--rules", map_.rules, "Rows, columns and limits (JSON)")->required();
+  map_app_->add_option("--out", map_.out, "Folder for failure-map.csv, .md and the picture");
+  map_app_->add_option("--format", map_.format, "Of the picture")
+      ->check(CLI::IsMember({"svg", "pdf"}))
+      ->capture_default_str();
+  map_app_->add_flag("--gate", map_.gate, "Exit with 1 if a cell that must hold does not");
+  map_app_->footer(kMapFooter);
+}
+
+std::optional<int> StoreOptions::Run(const std::string& typed) {
+  table_.view.where = plot_.where = ParseSelection(conditions_);
+  if (*merge_app_) return Merge(merge_);
+  if (*table_app_) return PrintTable(table_, typed);
+  if (*plot_app_) return Plot(plot_);
+  if (*map_app_) return PrintMap(map_, typed);
+  if (*verdict_app_) return PrintVerdicts(verdict_, typed);
+  return std::nullopt;
+}
+
+}  // namespace loopbench::harness

@@ -1,0 +1,125 @@
+#include "harness/config/formulations.h"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <array>
+#include <stdexcept>
+#include <type_traits>
+
+#include "lagrange/lagrange.h"
+#include "odca/odca.h"
+#include "reduction/reduction.h"
+
+namespace loopbench::harness {
+namespace {
+
+/// Those that come with Loopbench. Colours are Okabe and Ito's, and a green.
+std::deque<FormulationRow> BuiltIn() {
+  return {Row<odca::Odca>("odca",
+                          "orthogonal complement divide and conquer. Bodies are joined pair by "
+                          "pair; the loops' forces are found on the way.",
+                          {"#0072B2", "#56B4E9", 2.0}),
+          Row<lagrange::Lagrange>("lagrange", "one multiplier per constraint, all solved at once.",
+                                  {"#D55E00", "#E69F00", 5.0}),
+          Row<reduction::Reduction>("reduction",
+                                    "independent speeds only; the others follow from the loops.",
+                                    {"#009E73", "#999933", 2.0})};
+}
+
+/// For rows without colours, in turn.
+constexpr std::array<std::array<const char*, 2>, 3> kFreeColors = {
+    {{"#882255", "#CC79A7"}, {"#332288", "#AA99DD"}, {"#000000", "#777777"}}};
+
+std::deque<FormulationRow>& Rows() {
+  static std::deque<FormulationRow> rows = BuiltIn();
+  return rows;
+}
+
+bool IsWord(std::string_view text) {
+  constexpr std::string_view kLetters = "abcdefghijklmnopqrstuvwxyz0123456789-";
+  return !text.empty() && text.front() != '-' &&
+         text.find_first_not_of(kLetters) == std::string_view::npos;
+}
+
+bool IsColor(std::string_view text) {
+  return text.size() == 7 && text.front() == '#' &&
+         text.find_first_not_of("0123456789abcdefABCDEF", 1) == std::string_view::npos;
+}
+
+[[noreturn]] void Refuse(const std::string& name, std::string_view found,
+                         std::string_view expected) {
+  throw std::invalid_argument(
+      fmt::format("formulation \"{}\": found {}, expected {}", name, found, expected));
+}
+
+}  // namespace
+
+bool FormulationRow::Has(Enforcement level) const {
+  return levels.empty() || std::ranges::find(levels, level) != levels.end();
+}
+
+void RegisterFormulation(FormulationRow row, int alignment) {
+  if (alignment != EIGEN_MAX_STATIC_ALIGN_BYTES) {
+    Refuse(
+        row.name, fmt::format("EIGEN_MAX_STATIC_ALIGN_BYTES={}", alignment),
+        fmt::format("{}, as the target loopbench::loopbench has it", EIGEN_MAX_STATIC_ALIGN_BYTES));
+  }
+  if (!IsWord(row.name)) Refuse(row.name, "no word", "a-z, 0-9 and '-'");
+  if (FindFormulation(row.name) != nullptr) Refuse(row.name, "it again", "each name once");
+  if (!row.planar || !row.spatial) Refuse(row.name, "no factory", "one for plane and space each");
+  std::string &joint = row.look.joint, &absolute = row.look.absolute;
+  if (joint.empty() && absolute.empty()) {
+    const std::size_t turn = (Rows().size() - BuiltIn().size()) % kFreeColors.size();
+    joint = kFreeColors[turn][0];
+    absolute = kFreeColors[turn][1];
+  }
+  if (!IsColor(joint) || !IsColor(absolute)) {
+    Refuse(row.name, fmt::format("colours \"{}\" and \"{}\"", joint, absolute),
+           "#RRGGBB twice, or none");
+  }
+  Rows().push_back(std::move(row));
+}
+
+const std::deque<FormulationRow>& Formulations() { return Rows(); }
+
+std::vector<std::string> FormulationNames() {
+  std::vector<std::string> names;
+  for (const FormulationRow& row : Rows()) names.push_back(row.name);
+  return names;
+}
+
+const FormulationRow* FindFormulation(std::string_view name) {
+  const auto row = std::ranges::find(Rows(), name, &FormulationRow::name);
+  return row == Rows().end() ? nullptr : &*row;
+}
+
+template <class Space>
+std::unique_ptr<System<Space, double>> MakeFormulation(std::string_view name,
+                                                       const Mechanism<Space, double>& mechanism,
+                                                       const FormulationOptions& options) {
+  const FormulationRow* row = FindFormulation(name);
+  if (row == nullptr) {
+    Refuse(std::string(name), "no such name",
+           fmt::format("one of {}", fmt::join(FormulationNames(), ", ")));
+  }
+  if (!row->Has(options.enforcement)) {
+    Refuse(row->name, ToString(options.enforcement), "a level that it has");
+  }
+  std::unique_ptr<ConstraintSolver<Space, double>> solver;
+  if constexpr (std::is_same_v<Space, Planar>) {
+    solver = row->planar(mechanism, options);
+  } else {
+    solver = row->spatial(mechanism, options);
+  }
+  return std::make_unique<System<Space, double>>(mechanism, std::move(solver), options);
+}
+
+template std::unique_ptr<System<Planar, double>> MakeFormulation(std::string_view,
+                                                                 const Mechanism<Planar, double>&,
+                                                                 const FormulationOptions&);
+template std::unique_ptr<System<Spatial, double>> MakeFormulation(std::string_view,
+                                                                  const Mechanism<Spatial, double>&,
+                                                                  const FormulationOptions&);
+
+}  // namespace loopbench::harness

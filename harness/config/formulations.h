@@ -1,0 +1,86 @@
+// The formulations by name: what experiments may ask for, and what readers, commands, tables and
+// figures know about each.
+//
+// Those that come with Loopbench are rows of formulations.cpp. A program of somebody else registers
+// its own before it calls loopbench::Main() (harness/cli/program.h; examples/own-formulation/):
+//
+//   harness::RegisterFormulation(harness::Row<NullSpace>("null-space", "a basis of ..."));
+//
+// and from then on the name is valid wherever "odca" is. Only runs in several scalars
+// (harness/precision/) know the built-in ones alone: a row makes solvers in double.
+#pragma once
+
+#include <deque>
+#include <functional>
+#include <memory>
+#include <string>
+#include <string_view>
+#include <utility>
+#include <vector>
+
+#include "mechanism/formulation/system.h"
+
+namespace loopbench::harness {
+
+/// Makes a formulation's solver for a mechanism, which must outlive it.
+template <class Space>
+using SolverFactory = std::function<std::unique_ptr<ConstraintSolver<Space, double>>(
+    const Mechanism<Space, double>&, const FormulationOptions&)>;
+
+/// How figures draw a formulation: "#RRGGBB", strong in joint coordinates and weak in absolute
+/// ones. Without colours the row is given the next free pair.
+struct FormulationLook {
+  std::string joint, absolute;
+  /// Of its curves [px]. Wide ones are drawn first, so that those which agree with them to
+  /// round-off are seen on them.
+  double width = 3.5;
+};
+
+/// All that the harness knows of a formulation.
+struct FormulationRow {
+  std::string name;      ///< a word in files, tables and names: a-z, 0-9 and '-'
+  std::string sentence;  ///< what `explain` says of it, after "name: "
+  SolverFactory<Planar> planar;
+  SolverFactory<Spatial> spatial;
+  std::vector<Enforcement> levels = {};  ///< those it has; empty: all
+  FormulationLook look = {};
+
+  bool Has(Enforcement level) const;
+};
+
+/// The row of a class template such as odca::Odca, made from a mechanism and options.
+template <template <class Space, class S> class Solver>
+FormulationRow Row(std::string name, std::string sentence, FormulationLook look = {}) {
+  const auto make = []<class Space>(const Mechanism<Space, double>& mechanism,
+                                    const FormulationOptions& options) {
+    return std::unique_ptr<ConstraintSolver<Space, double>>(
+        std::make_unique<Solver<Space, double>>(mechanism, options));
+  };
+  return {.name = std::move(name),
+          .sentence = std::move(sentence),
+          .planar = make,
+          .spatial = make,
+          .look = std::move(look)};
+}
+
+/// Adds a row; not while experiments run. Throws std::invalid_argument for a name that is taken or
+/// no word, a row without factories, colours of which one is missing or none, or a row compiled
+/// with another alignment of Eigen's types than this library: then they differ in memory, and the
+/// target loopbench::loopbench was not linked, which would have said so (cmake/install.cmake).
+void RegisterFormulation(FormulationRow row, int alignment = EIGEN_MAX_STATIC_ALIGN_BYTES);
+
+/// All rows: the built-in ones, then the others in the order of their registration. Rows stay where
+/// they are.
+const std::deque<FormulationRow>& Formulations();
+std::vector<std::string> FormulationNames();
+/// Null for a name that is not registered: stores may hold records of other programs.
+const FormulationRow* FindFormulation(std::string_view name);
+
+/// The mechanism with the solver of that name, at the level of the options. Throws
+/// std::invalid_argument where there is no such name, or where it does not have the level.
+template <class Space>
+std::unique_ptr<System<Space, double>> MakeFormulation(std::string_view name,
+                                                       const Mechanism<Space, double>& mechanism,
+                                                       const FormulationOptions& options);
+
+}  // namespace loopbench::harness

@@ -1,0 +1,158 @@
+// Formulations by name: those that come with Loopbench, and one that a program adds.
+#include "harness/config/formulations.h"
+
+#include <gtest/gtest.h>
+
+#include <cstdlib>
+#include <iostream>
+#include <stdexcept>
+
+#include "harness/figures/figure_recipes.h"
+#include "harness/json/config_error.h"
+#include "harness/suite/precision_cases.h"
+#include "harness/tables/factorial.h"
+#include "lagrange/lagrange.h"
+#include "tests/reference/cases.h"
+
+namespace loopbench::harness {
+namespace {
+
+using Names = std::vector<std::string>;
+
+/// Multipliers under another name.
+FormulationRow Echo() { return Row<lagrange::Lagrange>("echo", "multipliers once more."); }
+
+/// Runs `check` in a process of its own: what it registers, no other test sees.
+template <class Check>
+void InChild(Check check) {
+  const auto run = [&] {
+    check();
+    std::cerr << "checked\n";
+    std::_Exit(testing::Test::HasFailure() ? 1 : 0);
+  };
+  EXPECT_EXIT(run(), testing::ExitedWithCode(0), "checked");
+}
+
+Experiment Asking(const std::string& level, const std::string& more = "") {
+  return ParseExperiment(R"({"name": "own", "tolerances": 1e-6,
+      "scenes": [{"mechanism": "../mechanisms/four-bar.json", "horizon": 0.2}],
+      "columns": [{"formulation": ["lagrange", "echo"], "enforcement": ")" +
+                             level + "\"}]" + more + "}",
+                         reference::kConfigs / "experiments/own.json");
+}
+
+std::string MistakeOf(const std::string& level, const std::string& more = "") {
+  try {
+    CheckLadders(Asking(level, more));
+  } catch (const ConfigError& mistake) {
+    return mistake.what();
+  }
+  return "none";
+}
+
+TEST(FormulationsTest, ThoseBuiltInAreKnownInTheirOrder) {
+  EXPECT_EQ(FormulationNames(), (Names{"odca", "lagrange", "reduction"}));
+  for (const FormulationRow& row : Formulations()) {
+    EXPECT_EQ(FindFormulation(row.name), &row);
+    EXPECT_TRUE(row.sentence.ends_with('.')) << row.sentence;
+    EXPECT_TRUE(row.Has(Enforcement::kBaumgarte));
+  }
+  EXPECT_EQ(FindFormulation("Odca"), nullptr);
+}
+
+TEST(FormulationsTest, ARowThatCannotBeIsRefused) {
+  const auto refuses = [](FormulationRow row) {
+    EXPECT_THROW(RegisterFormulation(std::move(row)), std::invalid_argument);
+  };
+  FormulationRow row = Echo();
+  for (const char* name : {"", "Echo", "e cho", "-echo", "odca"}) {
+    row.name = name;
+    refuses(row);
+  }
+  row = Echo();
+  row.spatial = nullptr;
+  refuses(row);
+  row = Echo();
+  row.look = {"#123456", "", 2.0};
+  refuses(row);
+  row.look = {"#123456", "red", 2.0};
+  refuses(row);
+  EXPECT_THROW(RegisterFormulation(Echo(), EIGEN_MAX_STATIC_ALIGN_BYTES / 2),
+               std::invalid_argument);
+  EXPECT_EQ(FormulationNames().size(), 3u);
+}
+
+TEST(FormulationsTest, WhatIsNotThereIsNotMade) {
+  const MechanismFile file = ReadMechanism(reference::kConfigs / "mechanisms/four-bar.json");
+  const Mechanism<Planar, double> mechanism(file.description, Coordinates::kJoint);
+  EXPECT_THROW(MakeFormulation<Planar>("echo", mechanism, {}), std::invalid_argument);
+  EXPECT_NE(MakeFormulation<Planar>("lagrange", mechanism, {}), nullptr);
+  EXPECT_NE(MistakeOf("acceleration").find("expected a formulation: \"odca\""), std::string::npos)
+      << MistakeOf("acceleration");
+}
+
+TEST(FormulationsTest, ANewNameIsValidWhereverTheOthersAre) {
+  InChild([] {
+    RegisterFormulation(Echo());
+    const Experiment experiment = Asking("acceleration");
+    ASSERT_EQ(experiment.columns.size(), 2u);
+    EXPECT_EQ(ToString(experiment.columns[1]), "echo/acceleration/joint/rank-revealing");
+    std::vector<Record> records;
+    for (const Case& one : Expand(experiment)) records.push_back(RunCase(experiment, one));
+    EXPECT_EQ(records[1].Text("formulation"), "echo");
+    EXPECT_EQ(records[1].Text("state_hash"), records[0].Text("state_hash"));
+    EXPECT_NE(records[1].Text("case_id"), records[0].Text("case_id"));
+
+    const Figure figure = DriftFigure(records);
+    ASSERT_EQ(figure.curves.size(), 2u);  // the widest first
+    EXPECT_EQ(figure.curves[0].style.color, "#D55E00");
+    EXPECT_EQ(figure.curves[1].style.color, FindFormulation("echo")->look.joint);
+    EXPECT_LT(figure.curves[1].style.width, figure.curves[0].style.width);
+
+    const Table table = FactorialTable(records, {.rtol = 1e-6, .horizon = 0.2});
+    ASSERT_EQ(table.rows.size(), 1u);
+    EXPECT_EQ(table.rows[0].Text("from"), "lagrange");
+    EXPECT_EQ(table.rows[0].Text("to"), "echo");
+  });
+}
+
+TEST(FormulationsTest, ColoursAreGivenInTurn) {
+  InChild([] {
+    RegisterFormulation(Echo());
+    FormulationRow other = Echo();
+    other.name = "other";
+    RegisterFormulation(other);
+    EXPECT_EQ(FormulationNames(), (Names{"odca", "lagrange", "reduction", "echo", "other"}));
+    const FormulationLook &one = FindFormulation("echo")->look,
+                          &two = FindFormulation("other")->look;
+    EXPECT_NE(one.joint, two.joint);
+    EXPECT_NE(one.joint, one.absolute);
+  });
+}
+
+TEST(FormulationsTest, ALevelThatItDoesNotHaveIsAMistakeOfTheFile) {
+  InChild([] {
+    FormulationRow row = Echo();
+    row.levels = {Enforcement::kAcceleration, Enforcement::kPosition};
+    RegisterFormulation(row);
+    EXPECT_EQ(MistakeOf("position"), "none");
+    const std::string mistake = MistakeOf("velocity");
+    for (const char* part : {"/columns/0", "\"echo\" at level \"velocity\"",
+                             "a level that it has: acceleration, position"}) {
+      EXPECT_NE(mistake.find(part), std::string::npos) << mistake;
+    }
+  });
+}
+
+TEST(FormulationsTest, RunsInSeveralScalarsKnowTheBuiltInOnes) {
+  InChild([] {
+    RegisterFormulation(Echo());
+    const std::string mistake =
+        MistakeOf("acceleration", R"(, "precision": {"scalars": ["float", "double"]})");
+    EXPECT_NE(mistake.find("echo/acceleration/joint"), std::string::npos) << mistake;
+    EXPECT_NE(mistake.find("odca, lagrange, reduction"), std::string::npos) << mistake;
+  });
+}
+
+}  // namespace
+}  // namespace loopbench::harness

@@ -2,8 +2,10 @@
 
 #include <algorithm>
 #include <cmath>
+#include <optional>
 
 #include "harness/analysis/agreement.h"
+#include "harness/config/experiment.h"
 #include "mechanism/loops/scaled_loops.h"
 
 namespace loopbench::harness {
@@ -36,10 +38,17 @@ double StepsRemembered(const Record& record) {
   return gain > 0.0 ? 2.0 / gain * per_second : record.Number("steps");
 }
 
+/// Nothing for a level that this program does not know.
+std::optional<DriftGrowth> GrowthAt(const Record& record) {
+  const auto level = Parse<Enforcement>(record.Text("enforcement"));
+  if (!level) return std::nullopt;
+  return TraitsOf(*level).growth;
+}
+
 /// Near enough to a singular position that the level has nothing to keep the branch by. Records of
 /// large mechanisms do not know the distance, but whether evaluations were softened.
 bool PassedSingularPosition(const Record& record) {
-  if (record.Text("enforcement") == "position") return false;
+  if (GrowthAt(record) == DriftGrowth::kNone) return false;
   if (record.Number("singularity_passages") > 0) return true;
   const double distance = record.Number("singularity_distance_min");
   if (std::isnan(distance)) return record.Number("softened_evaluations") > 0;
@@ -68,15 +77,17 @@ double DriftShare(const Record& record) {
 double PromisedDriftShare(const Record& record) {
   const double rtol = record.Number("rtol"), steps = record.Number("steps");
   const double goal = kProjection * record.Number("position_goal") / record.Number("link_length");
-  const std::string level = record.Text("enforcement");
-  double tolerances = kFewSteps;  // softened directions, level position
-  if (level == "position" && !(record.Number("softened_evaluations") > 0)) tolerances = 0.0;
-  if (level == "velocity") tolerances = kFewSteps + kVelocity * steps;
-  if (level == "acceleration") tolerances = kFewSteps + kAcceleration * steps * steps;
-  if (level == "baumgarte") {
+  const auto growth = GrowthAt(record);
+  double tolerances = kFewSteps;
+  if (growth == DriftGrowth::kSquare) tolerances += kAcceleration * steps * steps;
+  if (growth == DriftGrowth::kLinear) tolerances += kVelocity * steps;
+  if (growth == DriftGrowth::kForgotten) {
     const double remembered = std::min(steps, StepsRemembered(record));
-    tolerances = kFewSteps + kAcceleration * remembered * remembered;
+    tolerances += kAcceleration * remembered * remembered;
   }
+  // nothing is left but of softened directions
+  const bool softened = record.Number("softened_evaluations") > 0;
+  if (growth == DriftGrowth::kNone && !softened) tolerances = 0.0;
   return record.Find("position_goal") == nullptr ? tolerances * rtol
                                                  : std::max(tolerances * rtol, goal);
 }

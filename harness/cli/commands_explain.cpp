@@ -71,24 +71,10 @@ void ExplainFormulations(const Experiment& experiment) {
 
 void ExplainChoices(const Experiment& experiment) {
   const auto any = [&](auto is) { return Any(experiment, is); };
-  if (any([](const Column& c) { return c.enforcement == Enforcement::kAcceleration; })) {
-    Print(
-        "  acceleration: the loops' accelerations are imposed. Speeds and positions follow "
-        "by integration, and errors in them stay.\n");
-  }
-  if (any([](const Column& c) { return c.enforcement == Enforcement::kVelocity; })) {
-    Print("  velocity: the speeds satisfy the loops too; positions follow by integration.\n");
-  }
-  if (any([](const Column& c) { return c.enforcement == Enforcement::kPosition; })) {
-    Print(
-        "  position: as acceleration, and after each accepted step positions and speeds are moved "
-        "back to where the loops hold.\n");
-  }
-  if (any([](const Column& c) { return c.enforcement == Enforcement::kBaumgarte; })) {
-    Print(
-        "  baumgarte: as acceleration, with feedback: a mismatch e obeys e'' + 2 alpha e' + beta^2 "
-        "e "
-        "= 0, alpha = beta = 0.05 over the longest step unless given.\n");
+  for (const LevelTraits& level : kLevels) {
+    if (any([&](const Column& c) { return ToString(c.enforcement) == level.name; })) {
+      Print("  {}: {}\n", level.name, level.sentence);
+    }
   }
   if (any([](const Column& c) { return c.coordinates == Coordinates::kJoint; })) {
     Print(

@@ -2,6 +2,7 @@
 // called. Plain data; experiment_reader.h fills it.
 #pragma once
 
+#include <algorithm>
 #include <array>
 #include <cstddef>
 #include <cstdint>
@@ -27,8 +28,11 @@ enum class JacobianKind { kForward, kFiniteDifference };
 template <class Enum>
 inline constexpr std::array<std::string_view, 0> kNames = {};
 template <>
-inline constexpr std::array<std::string_view, 4> kNames<Enforcement> = {"acceleration", "velocity",
-                                                                        "position", "baumgarte"};
+inline constexpr auto kNames<Enforcement> = [] {
+  std::array<std::string_view, kLevels.size()> names;
+  std::ranges::transform(kLevels, names.begin(), &LevelTraits::name);
+  return names;
+}();
 template <>
 inline constexpr std::array<std::string_view, 2> kNames<Coordinates> = {"joint", "absolute"};
 template <>

@@ -32,10 +32,10 @@ double WidthOf(const Record& record) {
 }
 
 Shape ShapeOf(const Record& record) {
-  const std::string level = record.Text("enforcement");
-  if (level == "velocity") return Shape::kTriangle;
-  if (level == "position") return Shape::kSquare;
-  return level == "baumgarte" ? Shape::kDiamond : Shape::kCircle;
+  constexpr std::array kShapes = {Shape::kCircle, Shape::kTriangle, Shape::kSquare,
+                                  Shape::kDiamond};
+  const auto level = Parse<Enforcement>(record.Text("enforcement"));
+  return kShapes[static_cast<std::size_t>(level.value_or(Enforcement())) % kShapes.size()];
 }
 
 CurveStyle StyleOf(const Record& record) {

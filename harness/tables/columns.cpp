@@ -6,6 +6,8 @@
 #include <initializer_list>
 #include <utility>
 
+#include "mechanism/formulation/options.h"
+
 namespace loopbench::harness {
 namespace {
 
@@ -28,6 +30,12 @@ std::vector<TableColumn> Columns(std::initializer_list<string_view> keys) {
 TableColumn Short(string_view key, const char* header,
                   std::vector<std::pair<std::string, std::string>> abbreviations = {}) {
   return {std::string(key), header, FindMeasure(key)->heading.format, std::move(abbreviations)};
+}
+
+std::vector<std::pair<std::string, std::string>> AbbreviatedLevels() {
+  std::vector<std::pair<std::string, std::string>> pairs;
+  for (const LevelTraits& level : kLevels) pairs.emplace_back(level.name, level.abbreviation);
+  return pairs;
 }
 
 std::vector<TableColumn> Join(std::vector<TableColumn> head, const std::vector<TableColumn>& tail) {
@@ -53,8 +61,7 @@ const std::vector<TableColumn>& CompactCaseColumns() {
   static const std::vector<TableColumn> kColumns = {
       Short("mechanism", "mechanism"),
       Short("formulation", "formul."),
-      Short("enforcement", "level",
-            {{"acceleration", "accel"}, {"velocity", "veloc"}, {"position", "posit"}}),
+      Short("enforcement", "level", AbbreviatedLevels()),
       Short("coordinates", "coord", {{"absolute", "abs"}}),
       Short("solver", "solv", {{"as-published", "publ"}, {"rank-revealing", "rank"}}),
       Short("rtol", "rtol"),

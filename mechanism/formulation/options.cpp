@@ -2,19 +2,8 @@
 
 namespace loopbench {
 
-std::string_view ToString(Enforcement enforcement) {
-  switch (enforcement) {
-    case Enforcement::kAcceleration:
-      return "acceleration";
-    case Enforcement::kVelocity:
-      return "velocity";
-    case Enforcement::kPosition:
-      return "position";
-    case Enforcement::kBaumgarte:
-      return "baumgarte";
-  }
-  return "unknown";
-}
+std::string_view ToString(Enforcement level) { return TraitsOf(level).name; }
+
 std::string_view ToString(SolverKind solver) {
   return solver == SolverKind::kAsPublished ? "as-published" : "rank-revealing";
 }

@@ -1,6 +1,7 @@
 // What users choose of a formulation: level of enforcement, kind of solver, gains.
 #pragma once
 
+#include <array>
 #include <optional>
 #include <string_view>
 
@@ -14,6 +15,41 @@ enum class Enforcement {
                   ///< projected back to the constraints
   kBaumgarte,     ///< as kAcceleration, with feedback of the mismatch of positions and speeds
 };
+
+/// How drift of positions grows with accepted steps at a level.
+enum class DriftGrowth {
+  kSquare,     ///< errors of speeds stay and are integrated
+  kLinear,     ///< errors of positions stay
+  kNone,       ///< nothing stays
+  kForgotten,  ///< as kSquare, over the steps that feedback remembers
+};
+
+/// What a level is called and what it lets one expect; what it does stands in level.h.
+struct LevelTraits {
+  std::string_view name;          ///< in files and tables
+  std::string_view abbreviation;  ///< in tables of a terminal
+  DriftGrowth growth;
+  std::string_view sentence;  ///< what `explain` says of it, after "name: "
+};
+
+/// In the order of Enforcement.
+inline constexpr std::array<LevelTraits, 4> kLevels = {{
+    {"acceleration", "accel", DriftGrowth::kSquare,
+     "the loops' accelerations are imposed. Speeds and positions follow by integration, and errors "
+     "in them stay."},
+    {"velocity", "veloc", DriftGrowth::kLinear,
+     "the speeds satisfy the loops too; positions follow by integration."},
+    {"position", "posit", DriftGrowth::kNone,
+     "as acceleration, and after each accepted step positions and speeds are moved back to where "
+     "the loops hold."},
+    {"baumgarte", "baumgarte", DriftGrowth::kForgotten,
+     "as acceleration, with feedback: a mismatch e obeys e'' + 2 alpha e' + beta^2 e = 0, alpha = "
+     "beta = 0.05 over the longest step unless given."},
+}};
+
+constexpr const LevelTraits& TraitsOf(Enforcement level) {
+  return kLevels[static_cast<std::size_t>(level)];
+}
 
 /// Gains [1/s] of Baumgarte's stabilisation: a mismatch e of positions obeys
 /// e'' + 2 alpha e' + beta^2 e = 0 (Baumgarte 1972; alpha = beta damps it critically).
@@ -29,7 +65,7 @@ enum class SolverKind {
                    ///< for reduction: the independent set is chosen, and chosen again when it ages
 };
 
-std::string_view ToString(Enforcement enforcement);
+std::string_view ToString(Enforcement level);
 std::string_view ToString(SolverKind solver);
 
 struct FormulationOptions {

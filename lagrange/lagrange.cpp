@@ -52,6 +52,7 @@ Outcome Lagrange<Space, S>::Factor(const Kinematics<Space, S>& kinematics) {
                                            : FactorResponse(kinematics);
 }
 
+/// The matrix of (1). Rows of J are components along D of the cut joints at Mo.
 template <class Space, class S>
 Outcome Lagrange<Space, S>::FactorAugmented(const Kinematics<Space, S>& kinematics) {
   const int n = mechanism_.num_u(), m = mechanism_.num_rows();
@@ -87,6 +88,8 @@ void Lagrange<Space, S>::SetScales(const Kinematics<Space, S>& kinematics, Masse
   }
 }
 
+/// S with the bodies' masses; where it is suspicious, directions and weights from S with unit
+/// masses, then the factors of the physical one once more (loop_solver.h).
 template <class Space, class S>
 Outcome Lagrange<Space, S>::FactorResponse(const Kinematics<Space, S>& kinematics) {
   Conditioning& found = this->conditioning_;
@@ -123,7 +126,8 @@ void Lagrange<Space, S>::Solve(const VectorX<S>& given, const VectorX<S>& target
     if (lambda != nullptr) *lambda = -solution_.tail(m);
     return;
   }
-  // x = M^-1 (force + J^T lambda) with S lambda = target - J M^-1 force
+  // S lambda = target - J M^-1 force, x = M^-1 (force + J^T lambda): on the way x is L^-1 of the
+  // bracket, and W lambda is L^-1 J^T lambda
   x = force;
   mass_factor_.matrixL().solveInPlace(x);
   if (m > 0) {
@@ -137,6 +141,7 @@ void Lagrange<Space, S>::Solve(const VectorX<S>& given, const VectorX<S>& target
   mass_factor_.matrixU().solveInPlace(x);
 }
 
+/// u less M^-1 J^T S^+ (J u + b): no force, and the target -(J u + b).
 template <class Space, class S>
 bool Lagrange<Space, S>::CompleteSpeeds(Kinematics<Space, S>& kinematics, VectorX<S>& u) {
   SpeedBias(kinematics, zero_, missed_);

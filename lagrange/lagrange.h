@@ -4,9 +4,13 @@
 //   [ J  0   ] [ -lambda ] = [ gamma ]                                            (1)
 //
 // As published: LU of (1) with partial pivoting; a pivot lost in round-off ends as `singular`.
-// Rank-revealing: M = L L^T, S = (L^-1 J^T)^T (L^-1 J^T), lambda = S^+ (gamma +
-// J M^-1 h) with the softened inverse of loop_solver.h; S in the same form with unit masses decides
-// the rank. Velocity level: u - M^-1 J^T S^+ J u, the projection in the metric of M.
+// Rank-revealing, with the softened inverse of loop_solver.h, where S in the same form with unit
+// masses decides the rank:
+//
+//   M = L L^T,      W = L^-1 J^T,      S = W^T W
+//   lambda = S^+ (gamma + J M^-1 h),      udot = M^-1 (J^T lambda - h)
+//
+// Velocity level: u - M^-1 J^T S^+ J u, the projection in the metric of M.
 #pragma once
 
 #include <Eigen/Cholesky>

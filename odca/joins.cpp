@@ -57,7 +57,7 @@ Joins<Space, S>::Joins(const Mechanism<Space, S>& mechanism, const Plan& plan, S
   Z_.assign(z, Block<Space, S>::Zero());
   Y_.assign(y, Motion<Space, S>::Zero());
   X_.assign(x, S(0));
-  c_.assign(c, Motion<Space, S>::Zero());
+  c_.assign(c, Wrench<Space, S>::Zero());
   columns_.setZero(plan.largest_join(), Space::kDim * widest);
 }
 
@@ -127,9 +127,9 @@ void Joins<Space, S>::FillJoints(const Kinematics<Space, S>& kinematics, Masses 
     const JointState<Space, S>& state = kinematics.joints()[joint.index];
     const Linear<Space, S> r_P = kinematics.ArmP(joint.index, masses);
     const Linear<Space, S> r_Q = kinematics.ArmQ(joint.index, masses);
-    Motion<Space, S>* c = &c_[c_offset_[joint.index]];
+    Wrench<Space, S>* c = &c_[c_offset_[joint.index]];
     for (int i = 0; i < joint.rows; ++i) {
-      const Motion<Space, S> D_i = state.D(i);
+      const Wrench<Space, S> D_i = state.D(i);
       c[i] = -ShiftForce<Space, S>(D_i, r_P);
       c[joint.rows + i] = ShiftForce<Space, S>(D_i, r_Q);
     }
@@ -159,7 +159,7 @@ void Joins<Space, S>::FormResponse(const PlanNode& node, const Place& place) {
         const int f = side(joint, which);
         if (f < 0 || node.handles[f].child != handle.child) continue;
         const Block<Space, S>& Z = Z_[child.z + handle.place + child.kept * node.handles[f].place];
-        const Motion<Space, S>* c = direction(joint, which);
+        const Wrench<Space, S>* c = direction(joint, which);
         for (int i = 0; i < joint.rows; ++i) Y[i].noalias() += Z * c[i];  // (67)
         operations_ += joint.rows * Space::kDim * Space::kDim;
       }

@@ -63,9 +63,10 @@ class Joins {
   int num_rows() const { return num_rows_; }
 
   const Block<Space, S>& LeafZ(int n) const { return Z_[places_[n].z]; }
-  /// Rows c of a joint.
-  const Motion<Space, S>* c_P(const NodeJoint& joint) const { return &c_[c_offset_[joint.index]]; }
-  const Motion<Space, S>* c_Q(const NodeJoint& joint) const { return c_P(joint) + joint.rows; }
+  /// Rows c of a joint, at the centres of mass: the wrenches on P and Q that unit forces along D
+  /// make.
+  const Wrench<Space, S>* c_P(const NodeJoint& joint) const { return &c_[c_offset_[joint.index]]; }
+  const Wrench<Space, S>* c_Q(const NodeJoint& joint) const { return c_P(joint) + joint.rows; }
   /// V of an inner node on one of its kept handles (index into node.handles): its rows, one after
   /// the other, each a motion.
   const Motion<Space, S>* V(const PlanNode& node, int n, int handle) const {
@@ -117,7 +118,7 @@ class Joins {
   std::vector<Place> places_;
   std::vector<Block<Space, S>> Z_;
   std::vector<Motion<Space, S>> Y_;  ///< Y of each node; on handles that stay then V = T Y
-  std::vector<Motion<Space, S>> c_;  ///< rows c_P, then c_Q of each joint
+  std::vector<Wrench<Space, S>> c_;  ///< rows c_P, then c_Q of each joint
   std::vector<int> c_offset_;        ///< of each mechanism joint in c_
   std::vector<S> X_;
   std::vector<LoopSolver<S>> loops_;

@@ -54,6 +54,8 @@ Outcome Odca<Space, S>::Factor(const Kinematics<Space, S>& kinematics) {
   return outcome;
 }
 
+/// The sweep, then x = H^T (A_Q - A_P) / |H|^2 of each tree joint, both points at Mo: udot of (7),
+/// but for what SetKnown() has noted. lambda is phi along the D of cut joints.
 template <class Space, class S>
 void Odca<Space, S>::SweepTo(VectorX<S>& x, VectorX<S>* lambda) {
   sweep_.Solve(b_, c0_, A_);
@@ -63,7 +65,7 @@ void Odca<Space, S>::SweepTo(VectorX<S>& x, VectorX<S>* lambda) {
     const Motion<Space, S> A_rel = ShiftMotion<Space, S>(A_[joint.to], state.r_Q) -
                                    ShiftMotion<Space, S>(A_[joint.from], state.r_P);
     for (int i = 0; i < state.num_u; ++i) {
-      x[joint.u_offset + i] = joint.kind->per_speed * state.H(i).dot(A_rel);
+      x[joint.u_offset + i] = joint.kind->inverse_H_squared * state.H(i).dot(A_rel);
     }
   }
   if (lambda == nullptr) return;
@@ -74,6 +76,8 @@ void Odca<Space, S>::SweepTo(VectorX<S>& x, VectorX<S>* lambda) {
   }
 }
 
+/// b = M^-1 times the wrench, at the centre of mass in ground axes: the part of the paper's zeta_i3
+/// that is the same at both handles, before its shift.
 template <class Space, class S>
 void Odca<Space, S>::SetFree() {
   for (int body = 1; body < mechanism_.num_bodies(); ++body) {
@@ -103,7 +107,7 @@ void Odca<Space, S>::Solve(const VectorX<S>& force, const VectorX<S>& target, Ve
     const JointState<Space, S>& state = kinematics_->joints()[step.joint];
     Motion<Space, S> F = Motion<Space, S>::Zero();
     for (int i = 0; i < state.num_u; ++i) {
-      F += state.H(i) * (joint.kind->per_speed * force[joint.u_offset + i]);
+      F += state.H(i) * (joint.kind->inverse_H_squared * force[joint.u_offset + i]);
     }
     wrenches_[joint.to] += ShiftForce<Space, S>(F, state.r_Q);
     wrenches_[joint.from] -= ShiftForce<Space, S>(F, state.r_P);
@@ -112,7 +116,8 @@ void Odca<Space, S>::Solve(const VectorX<S>& force, const VectorX<S>& target, Ve
   SweepTo(x, lambda);
 }
 
-/// c0 = D^T (n_Q - n_P - g); the same difference is needed along H                     (7)
+/// n_Q - n_P - g is what (7) has beside the accelerations at centres of mass and H udot, at Mo in
+/// ground axes. Its components along D are c0, those along H belong to udot.
 template <class Space, class S>
 void Odca<Space, S>::SetKnown(const Kinematics<Space, S>& kinematics) {
   for (std::size_t j = 0; j < c0_.size(); ++j) {
@@ -122,11 +127,12 @@ void Odca<Space, S>::SetKnown(const Kinematics<Space, S>& kinematics) {
                                    kinematics.Centripetal(joint.from, state.r_P) - state.g;
     for (int i = 0; i < state.rows(); ++i) c0_[j][i] = state.D(i).dot(known);
     for (int i = 0; i < (joint.in_tree() ? state.num_u : 0); ++i) {
-      known_[joint.u_offset + i] = joint.kind->per_speed * state.H(i).dot(known);
+      known_[joint.u_offset + i] = joint.kind->inverse_H_squared * state.H(i).dot(known);
     }
   }
 }
 
+/// The wrench of applied forces less w x I w makes b. Feedback is a part of c0.
 template <class Space, class S>
 bool Odca<Space, S>::Accelerate(const Kinematics<Space, S>& kinematics, const VectorX<S>& feedback,
                                 VectorX<S>& udot, VectorX<S>* lambda) {
@@ -174,6 +180,7 @@ Motion<Space, S> Odca<Space, S>::JointForce(int joint) const {
   Motion<Space, S> force = Motion<Space, S>::Zero();
   if (kinematics_ == nullptr) return force;
   const JointState<Space, S>& state = kinematics_->joints()[joint];
+  // D times measure numbers, on Q at Mo, in ground axes                               (13)
   for (int i = 0; i < state.rows(); ++i) force += state.D(i) * sweep_.multipliers()[joint][i];
   return force;
 }

@@ -9,8 +9,8 @@ Sweep<Space, S>::Sweep(const Mechanism<Space, S>& mechanism, const Plan& plan, S
     : plan_(plan),
       joins_(mechanism, plan, solver),
       b_(joins_.num_handles(), Motion<Space, S>::Zero()),
-      F_(b_),
-      phi_(mechanism.joints().size(), Motion<Space, S>::Zero()),
+      F_(joins_.num_handles(), Wrench<Space, S>::Zero()),
+      phi_(mechanism.joints().size(), Components<Space, S>::Zero()),
       residual_(phi_),
       s_(joins_.num_rows(), S(0)),
       forces_(plan.largest_join(), S(0)) {}
@@ -23,13 +23,14 @@ Outcome Sweep<Space, S>::Assemble(const Kinematics<Space, S>& kinematics) {
 
 template <class Space, class S>
 void Sweep<Space, S>::Solve(std::span<const Motion<Space, S>> b,
-                            std::span<const Motion<Space, S>> c0, std::span<Motion<Space, S>> A) {
+                            std::span<const Components<Space, S>> c0,
+                            std::span<Motion<Space, S>> A) {
   for (int n = 0; n < plan_.num_leaves(); ++n) {
     A[n + 1].setZero();
     b_[joins_.first_handle(n)] = b[n + 1];
   }
   A[kGround].setZero();  // the inertial frame of (33-34)
-  for (Motion<Space, S>& phi : phi_) phi.setZero();
+  for (Components<Space, S>& phi : phi_) phi.setZero();
   Correct(c0, A);
   if (!joins_.softened()) return;
   Residual(c0, A);
@@ -39,7 +40,8 @@ void Sweep<Space, S>::Solve(std::span<const Motion<Space, S>> b,
 
 /// At the leaves A = Z F + b (1-4, 45-46) with all forces known, those of joints included.
 template <class Space, class S>
-void Sweep<Space, S>::Correct(std::span<const Motion<Space, S>> c0, std::span<Motion<Space, S>> A) {
+void Sweep<Space, S>::Correct(std::span<const Components<Space, S>> c0,
+                              std::span<Motion<Space, S>> A) {
   const int leaves = plan_.num_leaves();
   for (int n = leaves; n < plan_.num_nodes(); ++n) Up(plan_.nodes()[n - leaves], n, c0);
   // a root's boundary is empty; a body without joints is a root whose one handle feels no force
@@ -55,12 +57,12 @@ void Sweep<Space, S>::Correct(std::span<const Motion<Space, S>> c0, std::span<Mo
 
 /// r = C A + c0 of every joint: D^T times the difference of the two sides of (7), without udot.
 template <class Space, class S>
-void Sweep<Space, S>::Residual(std::span<const Motion<Space, S>> c0,
+void Sweep<Space, S>::Residual(std::span<const Components<Space, S>> c0,
                                std::span<const Motion<Space, S>> A) {
   for (const PlanNode& node : plan_.nodes()) {
     const auto body = [&](int handle) { return node.handles[handle].body; };
     for (const NodeJoint& joint : node.joints) {
-      Motion<Space, S>& r = residual_[joint.index];
+      Components<Space, S>& r = residual_[joint.index];
       for (int i = 0; i < joint.rows; ++i) {
         r[i] = c0[joint.index][i];
         if (joint.from >= 0) r[i] += joins_.c_P(joint)[i].dot(A[body(joint.from)]);
@@ -76,7 +78,7 @@ void Sweep<Space, S>::Residual(std::span<const Motion<Space, S>> c0,
 /// Upsilon_i3 (29-30) and zeta^asm_i3 (72). The zero that c0 + c_P^T A_P + c_Q^T A_Q must be is
 /// (37-38) at joints to Ground and (57-58) in a coupled loop.
 template <class Space, class S>
-void Sweep<Space, S>::Up(const PlanNode& node, int n, std::span<const Motion<Space, S>> c0) {
+void Sweep<Space, S>::Up(const PlanNode& node, int n, std::span<const Components<Space, S>> c0) {
   S* s = &s_[joins_.first_row(n)];
   int row = 0;
   const auto b_of = [&](int f) -> const Motion<Space, S>& {
@@ -108,7 +110,7 @@ void Sweep<Space, S>::Up(const PlanNode& node, int n, std::span<const Motion<Spa
 template <class Space, class S>
 void Sweep<Space, S>::Down(const PlanNode& node, int n) {
   const int kept = joins_.kept(n);
-  const Motion<Space, S>* F_kept = F_.data() + joins_.first_handle(n);
+  const Wrench<Space, S>* F_kept = F_.data() + joins_.first_handle(n);
   S* phi = forces_.data();
   for (int i = 0; i < node.rows; ++i) phi[i] = -s_[joins_.first_row(n) + i];
   for (int e = 0; e < kept; ++e) {
@@ -116,7 +118,7 @@ void Sweep<Space, S>::Down(const PlanNode& node, int n) {
     for (int i = 0; i < node.rows; ++i) phi[i] -= V[i].dot(F_kept[e]);
   }
   joins_.ApplyTransposed(node, n, phi);  // (17, 42, 64)
-  const auto force_on = [&](int f) -> Motion<Space, S>& {
+  const auto force_on = [&](int f) -> Wrench<Space, S>& {
     const Handle& handle = node.handles[f];
     return F_[joins_.first_handle(node.children[handle.child]) + handle.place];
   };

@@ -35,30 +35,31 @@ class Sweep {
 
   /// In: `b` the free acceleration of each body (index = body), `c0` Space::kDim numbers per
   /// mechanism joint. Out: `A` of each body. After Assemble(). Allocates nothing.
-  void Solve(std::span<const Motion<Space, S>> b, std::span<const Motion<Space, S>> c0,
+  void Solve(std::span<const Motion<Space, S>> b, std::span<const Components<Space, S>> c0,
              std::span<Motion<Space, S>> A);
 
   /// phi of each mechanism joint after Solve(), the measure numbers (14) of its constraint force:
   /// components along the columns of D, which need not part into moments and forces. Zero where the
   /// plan has no such joint.
-  std::span<const Motion<Space, S>> multipliers() const { return phi_; }
+  std::span<const Components<Space, S>> multipliers() const { return phi_; }
 
   /// Multiply-adds since the last Assemble() began.
   long operations() const { return joins_.operations() + operations_; }
 
  private:
   /// One node on the way up, and on the way down.
-  void Up(const PlanNode& node, int n, std::span<const Motion<Space, S>> c0);
+  void Up(const PlanNode& node, int n, std::span<const Components<Space, S>> c0);
   void Down(const PlanNode& node, int n);
   /// Up and down over what stands in b_; adds to A and phi_.
-  void Correct(std::span<const Motion<Space, S>> c0, std::span<Motion<Space, S>> A);
+  void Correct(std::span<const Components<Space, S>> c0, std::span<Motion<Space, S>> A);
   /// r = C A + c0 of every joint, in residual_.
-  void Residual(std::span<const Motion<Space, S>> c0, std::span<const Motion<Space, S>> A);
+  void Residual(std::span<const Components<Space, S>> c0, std::span<const Motion<Space, S>> A);
 
   const Plan& plan_;
   Joins<Space, S> joins_;
-  std::vector<Motion<Space, S>> b_, F_;  ///< by kept handle
-  std::vector<Motion<Space, S>> phi_, residual_;
+  std::vector<Motion<Space, S>> b_;  ///< by kept handle
+  std::vector<Wrench<Space, S>> F_;  ///< likewise
+  std::vector<Components<Space, S>> phi_, residual_;
   std::vector<S> s_;       ///< by row
   std::vector<S> forces_;  ///< phi of one node
   long operations_ = 0;

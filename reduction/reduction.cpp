@@ -1,3 +1,5 @@
+// Numbers (1) to (3) are those of reduction.h. Rows of J are components along D of the cut joints
+// at Mo, in ground axes; columns belong to the speeds of the forest.
 #include "reduction/reduction.h"
 
 #include <algorithm>
@@ -75,6 +77,7 @@ void Reduction<Space, S>::SetPartition(const Partition<S>& partition) {
   if (f > 0) reduced_factor_.compute(MatrixX<S>::Identity(f, f));
 }
 
+/// J_D and J_I of (1) from the chosen rows and columns of J.
 template <class Space, class S>
 S Reduction<Space, S>::FactorPartition() {
   const int r = static_cast<int>(dependent_.size());
@@ -120,12 +123,14 @@ Outcome Reduction<Space, S>::Factor(const Kinematics<Space, S>& kinematics) {
   }
   // a pivot below a few eps of the largest is round-off of the elimination
   if (!(rcond > S(16) * std::numeric_limits<S>::epsilon())) return Outcome::kSingular;
+  // B of (2), in the order of u
   if (J_I_.size() > 0) solved_ = lu_.solve(J_I_);
   for (int i = 0; i < J_I_.cols(); ++i) B_(independent_[i], i) = S(1);
   for (int k = 0; k < r; ++k) B_.row(dependent_[k]) = -solved_.row(k);
   return Outcome::kFinished;
 }
 
+/// B^T M B of (3) = R R^T.
 template <class Space, class S>
 void Reduction<Space, S>::FactorMass() {
   if (mass_is_current_) return;
@@ -137,6 +142,7 @@ void Reduction<Space, S>::FactorMass() {
   reduced_factor_.compute(reduced_);
 }
 
+/// (1): u = B u_I, less J_D^-1 b where motions are prescribed.
 template <class Space, class S>
 bool Reduction<Space, S>::CompleteSpeeds(Kinematics<Space, S>& kinematics, VectorX<S>& u) {
   for (std::size_t i = 0; i < independent_.size(); ++i) {
@@ -151,6 +157,7 @@ bool Reduction<Space, S>::CompleteSpeeds(Kinematics<Space, S>& kinematics, Vecto
   return true;
 }
 
+/// c of (2) with `target` in the place of gamma.
 template <class Space, class S>
 void Reduction<Space, S>::Correct(const VectorX<S>& target, VectorX<S>& x) {
   if (uses_null_space_) {
@@ -164,6 +171,7 @@ void Reduction<Space, S>::Correct(const VectorX<S>& target, VectorX<S>& x) {
   for (std::size_t k = 0; k < dependent_.size(); ++k) x[dependent_[k]] = dependent_speeds_[k];
 }
 
+/// (2) and (3) with `force` in the place of -h: B^T M B z = B^T (force - M c), x = B z + c.
 template <class Space, class S>
 void Reduction<Space, S>::Solve(const VectorX<S>& given, const VectorX<S>& target, VectorX<S>& x,
                                 VectorX<S>* lambda) {

@@ -65,7 +65,7 @@ class StartText {
     for (int i = 0, next = 0; i < joint.kind->num_u; ++i) {
       const int drive = mechanism_.DriveOf(joint, i);
       u[i] = drive >= 0 ? kinematics_.drives()[drive].rate
-                        : joint.kind->per_speed * state.H(next++).dot(state.V_rel);
+                        : joint.kind->inverse_H_squared * state.H(next++).dot(state.V_rel);
     }
     return u;
   }

@@ -37,9 +37,17 @@ template <class Space, class S>
 using Angular = Eigen::Matrix<S, Space::kRot, 1>;
 template <class Space, class S>
 using Linear = Eigen::Matrix<S, Space::kLin, 1>;
-/// [w; v] or [moment; force].
+/// Velocity [w; v] or acceleration [alpha; a] of a body at a point.
 template <class Space, class S>
 using Motion = Eigen::Matrix<S, Space::kDim, 1>;
+/// [moment; force] on a body at a point. The same type as Motion, for the reader alone: the
+/// compiler does not keep the two apart.
+template <class Space, class S>
+using Wrench = Eigen::Matrix<S, Space::kDim, 1>;
+/// A number per direction of a joint, in the order of its D; those beyond the joint's own are zero.
+/// Again the same type, with room for a joint that constrains all directions.
+template <class Space, class S>
+using Components = Eigen::Matrix<S, Space::kDim, 1>;
 /// Maps motions to forces or back.
 template <class Space, class S>
 using Block = Eigen::Matrix<S, Space::kDim, Space::kDim>;
@@ -93,10 +101,10 @@ LOOPBENCH_INLINE Motion<Space, S> ShiftMotion(const Motion<Space, S>& V,
   return shifted;
 }
 
-/// The same force at c instead of c + r: [moment + r x f; f].
+/// The same force at c instead of c + r: [moment + r x f; f]. The transpose of ShiftMotion().
 template <class Space, class S>
-LOOPBENCH_INLINE Motion<Space, S> ShiftForce(const Motion<Space, S>& F, const Linear<Space, S>& r) {
-  Motion<Space, S> shifted = F;
+LOOPBENCH_INLINE Wrench<Space, S> ShiftForce(const Wrench<Space, S>& F, const Linear<Space, S>& r) {
+  Wrench<Space, S> shifted = F;
   const Linear<Space, S> f = F.template tail<Space::kLin>();
   shifted.template head<Space::kRot>() += Moment<S>(r, f);
   return shifted;

@@ -14,7 +14,8 @@ template <class Space, class S>
 MatrixX<S> ToOwnAxes(const Kinematics<Space, S>& kinematics, const Joint<Space, S>& joint,
                      const JointState<Space, S>& state) {
   const int size = joint.num_directions();
-  const bool own = !joint.kind->isotropic || joint.num_drives > 0 || joint.num_released > 0;
+  const bool own =
+      !joint.kind->rotation_invariant || joint.num_drives > 0 || joint.num_released > 0;
   if (own) return MatrixX<S>::Identity(size, size);
   const Rotation<Space, S> R = kinematics.poses()[joint.from].R * joint.X_PF.R;
   Block<Space, S> F = Block<Space, S>::Identity();

@@ -8,7 +8,9 @@ namespace loopbench {
 
 template <class Space, class S>
 Drives<Space, S>::Drives(const Mechanism<Space, S>& mechanism)
-    : dynamics_(mechanism), A_(mechanism.num_bodies(), Motion<Space, S>::Zero()), F_(A_) {}
+    : dynamics_(mechanism),
+      A_(mechanism.num_bodies(), Motion<Space, S>::Zero()),
+      F_(mechanism.num_bodies(), Wrench<Space, S>::Zero()) {}
 
 /// `left` is D^T (A_Q - A_P - g) at Mo, the paper's (7) without udot, for the accelerations that
 /// udot gives the bodies. `alone` is M^-1 times each body's wrench at its centre of mass.
@@ -19,7 +21,7 @@ bool Drives<Space, S>::Followed(const Kinematics<Space, S>& kinematics, const Ve
   S worst = S(0), size = S(0);
   for (int index : kinematics.mechanism().constraints()) {
     const Joint<Space, S>& joint = kinematics.mechanism().joints()[index];
-    Motion<Space, S> left = JointAcceleration<Space, S>(kinematics, index, A_);
+    Components<Space, S> left = JointAcceleration<Space, S>(kinematics, index, A_);
     if (feedback.size() > 0) {
       left.head(joint.num_constraints()) += feedback.segment(joint.row, joint.num_constraints());
     }
@@ -73,7 +75,7 @@ S Drives<Space, S>::Power(const Kinematics<Space, S>& kinematics, const VectorX<
   for (int index : mechanism.constraints()) {
     const Joint<Space, S>& joint = mechanism.joints()[index];
     for (int k = 0; k < joint.num_drives; ++k) {
-      power += lambda[joint.row + k] * rate(joint, k) / joint.kind->per_speed;
+      power += lambda[joint.row + k] * rate(joint, k) / joint.kind->inverse_H_squared;
     }
   }
   for (auto step = mechanism.tree().rbegin(); step != mechanism.tree().rend(); ++step) {
@@ -81,7 +83,7 @@ S Drives<Space, S>::Power(const Kinematics<Space, S>& kinematics, const VectorX<
     const JointState<Space, S>& state = kinematics.joints()[step->joint];
     const bool forward = step->sign > 0;
     const Linear<Space, S> to_joint = forward ? -state.r_Q : -state.r_P;
-    const Motion<Space, S> needed = ShiftForce<Space, S>(F_[step->child], to_joint);
+    const Wrench<Space, S> needed = ShiftForce<Space, S>(F_[step->child], to_joint);
     for (int k = 0; k < joint.num_drives; ++k) {
       power += S(step->sign) * state.D(k).dot(needed) * rate(joint, k);
     }

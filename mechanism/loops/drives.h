@@ -42,7 +42,8 @@ class Drives {
   static S RelativeMismatch(const Kinematics<Space, S>& kinematics);
 
   TreeDynamics<Space, S> dynamics_;
-  std::vector<Motion<Space, S>> A_, F_;
+  std::vector<Motion<Space, S>> A_;
+  std::vector<Wrench<Space, S>> F_;
 };
 
 }  // namespace loopbench

@@ -126,8 +126,8 @@ void LoopSolver<S>::FactorGeometric(const ConstRef& X_geometric) {
   rcond_ = std::max(eigenvalues_[0], S(0)) / largest;
 }
 
-/// "softened": U and w_i stay from the geometry. The diagonal of Y + diag(Y_ii (1 / w_i - 1)) is
-/// Y_ii / w_i = N_i^2, so dividing by N from both sides leaves ones on it. inverse_norms_ are
+/// "softened": U and w_i stay from the geometry. The diagonal of R + diag(R_ii (1 / w_i - 1)) is
+/// R_ii / w_i = N_i^2, so dividing by N from both sides leaves ones on it. inverse_norms_ are
 /// the 1 / N_i.
 template <class S>
 bool LoopSolver<S>::FactorSoftened(const ConstRef& X) {

@@ -1,23 +1,36 @@
 // The one place where loop closures are solved and their rank is decided (docs/design.md D5).
 //
 // A loop closure is X phi = rhs, X = C Z C^T symmetric positive semidefinite: the response of the
-// mechanism, seen across one or several joints, to forces in those joints. X loses rank exactly
-// when a self-stress exists, at a singular position or through redundant constraints. Every solve
-// has the form X^+ = T^T T, and T is what is applied; the ways to T:
+// mechanism, seen across one or several joints, to forces in those joints. It is X of the paper's
+// (16), chi of (42) and the inverse of X in (66). Rows are components along the joints' directions
+// D, so points and axes are those that D is given in. X loses rank exactly when a self-stress
+// exists, at a singular position or through redundant constraints.
 //
-//   plain       X = L L^T, T = L^-1: the factorisation of the paper's time. Fails when a pivot is
-//               lost in round-off.
-//   scaled      each joint on its own scale: X_free = K K^T is the response of the joint's two
-//               bodies alone, and K^-1 X K^-T has eigenvalues in [0, number of joints]. Cholesky
-//               of that, T = L^-1 K^-1; where a pivot is below kSuspicious, the next two instead.
-//   geometric   X_g of the same mechanism with unit masses: K_g^-1 X_g K_g^-T = U diag(lambda) U^T,
-//               weights w_i = 1 - exp(-(lambda_i / theta)^2), theta = (2e-4)^2 lambda_max, where
-//               lambda_max counts as 1e-2 at least: within a rigid part all of X_g is round-off.
-//               To solve with X_g itself, T = diag(sqrt(w / lambda)) U^T K_g^-1.
-//   softened    the physical X with the geometric directions: Y = U^T K_g^-1 X K_g^-T U,
-//               Y + diag(Y_ii (1 / w_i - 1)) = N L L^T N with N^2 the diagonal, and
-//               T = L^-1 N^-1 U^T K_g^-1. A degenerating direction grows soft; directions with
-//               w < 1e-16 are left out.
+// Every solve has the form X^+ = T^T T, and T is what is applied. The ways to T:
+//
+// *Plain*, the factorisation of the paper's time. Fails when a pivot is lost in round-off.
+//
+//     X = L L^T,      T = L^-1
+//
+// *Scaled*, each joint on its own scale K, where K K^T = X_free is the response of the joint's two
+// bodies alone. The eigenvalues of what is factored lie in [0, number of joints]. Where a pivot is
+// below kSuspicious, the next two take the place of this.
+//
+//     K^-1 X K^-T = L L^T,      T = L^-1 K^-1
+//
+// *Geometric*, for X_g, the response of the same mechanism with unit masses. lambda_max counts as
+// 1e-2 at least, because within a rigid part all of X_g is round-off.
+//
+//     K_g^-1 X_g K_g^-T = U diag(lambda) U^T
+//     w_i = 1 - exp(-(lambda_i / theta)^2),      theta = (2e-4)^2 lambda_max
+//     T = diag(sqrt(w_i / lambda_i)) U^T K_g^-1
+//
+// *Softened*, the physical X with directions U and weights w from the geometry. A degenerating
+// direction grows soft, and directions with w < 1e-16 are left out.
+//
+//     R = U^T K_g^-1 X K_g^-T U
+//     R + diag(R_ii (1 / w_i - 1)) = N L L^T N,      N_i^2 = R_ii / w_i
+//     T = L^-1 N^-1 U^T K_g^-1
 //
 // So rank depends on geometry alone, while stiffness stays physical.
 #pragma once

@@ -68,7 +68,7 @@ void FillMassMatrix(const Kinematics<Space, S>& kinematics, std::vector<Block<Sp
     for (int i = 0; i < joint.num_u(); ++i) {
       // momentum of the subtree moving along direction i, carried rootward
       const Motion<Space, S> h = state.H(i) * S(step->sign);
-      Motion<Space, S> F = composite[step->child] * ShiftMotion<Space, S>(h, arms.child);
+      Wrench<Space, S> F = composite[step->child] * ShiftMotion<Space, S>(h, arms.child);
       for (int s = mechanism.step_of_body(step->child); s >= 0;) {
         const TreeStep& at = tree[s];
         const JointState<Space, S>& at_state = kinematics.joints()[at.joint];
@@ -128,7 +128,7 @@ void AddRows(const Kinematics<Space, S>& kinematics, int index, int first, int c
 template <class Space, class S>
 TreeDynamics<Space, S>::TreeDynamics(const Mechanism<Space, S>& mechanism)
     : A_bias_(mechanism.num_bodies(), Motion<Space, S>::Zero()),
-      F_(mechanism.num_bodies(), Motion<Space, S>::Zero()),
+      F_(mechanism.num_bodies(), Wrench<Space, S>::Zero()),
       composite_(mechanism.num_bodies(), Block<Space, S>::Zero()) {}
 
 template <class Space, class S>
@@ -169,13 +169,13 @@ void TreeDynamics<Space, S>::BodyAccelerations(const Kinematics<Space, S>& kinem
 
 /// Newton and Euler about the centre of mass: [I alpha + w x I w; m a].
 template <class Space, class S>
-Motion<Space, S> InertialForce(const Kinematics<Space, S>& kinematics, int body,
+Wrench<Space, S> InertialForce(const Kinematics<Space, S>& kinematics, int body,
                                const Motion<Space, S>& A) {
   const Inertia<Space, S>& inertia = kinematics.mechanism().bodies()[body];
   const auto I = kinematics.RotationalInertia(inertia, body);
   const Angular<Space, S> w = kinematics.motions()[body].template head<Space::kRot>();
   const Angular<Space, S> alpha = A.template head<Space::kRot>();
-  Motion<Space, S> F;
+  Wrench<Space, S> F;
   F << I * alpha + CrossAngular<S>(w, Angular<Space, S>(I * w)),
       inertia.mass * A.template tail<Space::kLin>();
   return F;
@@ -193,14 +193,14 @@ void TreeDynamics<Space, S>::Bias(const Kinematics<Space, S>& kinematics, Vector
 
 /// A cut joint carries D lambda on Q and -D lambda on P at Mo (13).
 template <class Space, class S>
-std::span<const Motion<Space, S>> TreeDynamics<Space, S>::WrenchesLeft(
+std::span<const Wrench<Space, S>> TreeDynamics<Space, S>::WrenchesLeft(
     const Kinematics<Space, S>& kinematics, const VectorX<S>& udot, const VectorX<S>& lambda) {
   BodyAccelerations(kinematics, udot, A_bias_);
   NeededWrenches(kinematics);
   for (int index : kinematics.mechanism().constraints()) {
     const Joint<Space, S>& joint = kinematics.mechanism().joints()[index];
     const JointState<Space, S>& state = kinematics.joints()[index];
-    Motion<Space, S> F = Motion<Space, S>::Zero();
+    Wrench<Space, S> F = Wrench<Space, S>::Zero();
     for (int r = 0; r < state.rows(); ++r) F += state.D(r) * lambda[joint.row + r];
     F_[joint.to] -= ShiftForce<Space, S>(F, state.r_Q);
     F_[joint.from] += ShiftForce<Space, S>(F, state.r_P);
@@ -240,7 +240,7 @@ void TreeDynamics<Space, S>::AlongForest(const Kinematics<Space, S>& kinematics,
     const JointState<Space, S>& state = kinematics.joints()[step->joint];
     const Joint<Space, S>& joint = mechanism.joints()[step->joint];
     const Arms<Space, S> arms(*step, state);
-    const Motion<Space, S> at_joint = ShiftForce<Space, S>(F_[step->child], arms.child);
+    const Wrench<Space, S> at_joint = ShiftForce<Space, S>(F_[step->child], arms.child);
     for (int i = 0; i < joint.num_u(); ++i) {
       force[joint.u_offset + i] = S(step->sign) * state.H(i).dot(at_joint);
     }
@@ -290,15 +290,15 @@ void TreeDynamics<Space, S>::JacobianBias(const Kinematics<Space, S>& kinematics
   for (int index : mechanism.constraints()) {
     const Joint<Space, S>& joint = mechanism.joints()[index];
     const int rows = joint.num_constraints();
-    const Motion<Space, S> bias = JointAcceleration<Space, S>(kinematics, index, A_bias_);
+    const Components<Space, S> bias = JointAcceleration<Space, S>(kinematics, index, A_bias_);
     gamma.segment(joint.row, rows) = -bias.head(rows);
   }
 }
 
 /// D^T of (7), both sides at Mo; H udot drops out because D^T H = 0 (9).
 template <class Space, class S>
-Motion<Space, S> JointAcceleration(const Kinematics<Space, S>& kinematics, int index,
-                                   std::span<const Motion<Space, S>> A) {
+Components<Space, S> JointAcceleration(const Kinematics<Space, S>& kinematics, int index,
+                                       std::span<const Motion<Space, S>> A) {
   const Joint<Space, S>& joint = kinematics.mechanism().joints()[index];
   const JointState<Space, S>& state = kinematics.joints()[index];
   const Motion<Space, S> A_Q =
@@ -306,7 +306,7 @@ Motion<Space, S> JointAcceleration(const Kinematics<Space, S>& kinematics, int i
   const Motion<Space, S> A_P = ShiftMotion<Space, S>(A[joint.from], state.r_P) +
                                kinematics.Centripetal(joint.from, state.r_P);
   const Motion<Space, S> rest = A_Q - A_P - state.g;
-  Motion<Space, S> result = Motion<Space, S>::Zero();
+  Components<Space, S> result = Components<Space, S>::Zero();
   for (int r = 0; r < joint.num_directions(); ++r) result[r] = state.D(r).dot(rest);
   return result;
 }
@@ -328,13 +328,13 @@ JointMatrix<S> FreeResponse(const Kinematics<Space, S>& kinematics, Masses masse
         side == 0 ? kinematics.ArmQ(index, masses) : kinematics.ArmP(index, masses);
     const auto inverse = kinematics.RotationalInverse(inertias[body], body);
     for (int a = 0; a < rows; ++a) {
-      const Motion<Space, S> D_a = state.D(a);
-      const Motion<Space, S> F = ShiftForce<Space, S>(D_a, r);
+      const Wrench<Space, S> D_a = state.D(a);
+      const Wrench<Space, S> F = ShiftForce<Space, S>(D_a, r);
       Motion<Space, S> A;
       A << inverse * F.template head<Space::kRot>(),
           F.template tail<Space::kLin>() / inertias[body].mass;
       for (int b = 0; b < rows; ++b) {
-        const Motion<Space, S> D_b = state.D(b);
+        const Wrench<Space, S> D_b = state.D(b);
         X(b, a) += ShiftForce<Space, S>(D_b, r).dot(A);
       }
     }
@@ -342,13 +342,13 @@ JointMatrix<S> FreeResponse(const Kinematics<Space, S>& kinematics, Masses masse
   return X;
 }
 
-#define LOOPBENCH_INSTANTIATE(Space, S)                                           \
-  template class TreeDynamics<Space, S>;                                          \
-  template Motion<Space, S> InertialForce(const Kinematics<Space, S>&, int,       \
-                                          const Motion<Space, S>&);               \
-  template void SpeedBias(Kinematics<Space, S>&, const VectorX<S>&, VectorX<S>&); \
-  template Motion<Space, S> JointAcceleration(const Kinematics<Space, S>&, int,   \
-                                              std::span<const Motion<Space, S>>); \
+#define LOOPBENCH_INSTANTIATE(Space, S)                                               \
+  template class TreeDynamics<Space, S>;                                              \
+  template Wrench<Space, S> InertialForce(const Kinematics<Space, S>&, int,           \
+                                          const Motion<Space, S>&);                   \
+  template void SpeedBias(Kinematics<Space, S>&, const VectorX<S>&, VectorX<S>&);     \
+  template Components<Space, S> JointAcceleration(const Kinematics<Space, S>&, int,   \
+                                                  std::span<const Motion<Space, S>>); \
   template JointMatrix<S> FreeResponse(const Kinematics<Space, S>&, Masses, int, bool);
 LOOPBENCH_FOR_EACH_SPACE_AND_MODEL_SCALAR(LOOPBENCH_INSTANTIATE)
 #undef LOOPBENCH_INSTANTIATE

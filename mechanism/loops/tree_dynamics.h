@@ -40,7 +40,7 @@ class TreeDynamics {
 
   /// The wrench at each body's centre of mass that udot takes beyond applied forces and lambda: the
   /// joints of the forest must transmit it. Good until the next call of any member function.
-  std::span<const Motion<Space, S>> WrenchesLeft(const Kinematics<Space, S>& kinematics,
+  std::span<const Wrench<Space, S>> WrenchesLeft(const Kinematics<Space, S>& kinematics,
                                                  const VectorX<S>& udot, const VectorX<S>& lambda);
 
   /// What udot and lambda leave of the equations above: M udot + h - J^T lambda in `force`,
@@ -58,13 +58,14 @@ class TreeDynamics {
   /// Their components along the coordinates of the forest.
   void AlongForest(const Kinematics<Space, S>& kinematics, VectorX<S>& force);
 
-  std::vector<Motion<Space, S>> A_bias_, F_;
+  std::vector<Motion<Space, S>> A_bias_;
+  std::vector<Wrench<Space, S>> F_;
   std::vector<Block<Space, S>> composite_;
 };
 
 /// Wrench at its centre of mass that gives a body the acceleration A there.
 template <class Space, class S>
-Motion<Space, S> InertialForce(const Kinematics<Space, S>& kinematics, int body,
+Wrench<Space, S> InertialForce(const Kinematics<Space, S>& kinematics, int body,
                                const Motion<Space, S>& A);
 
 /// b: what the constraints would miss if all free speeds were zero. `zero` has num_u zeros; the
@@ -75,8 +76,8 @@ void SpeedBias(Kinematics<Space, S>& kinematics, const VectorX<S>& zero, VectorX
 /// D^T (A_Q - A_P - g) of one joint from the accelerations of all centres of mass: zero when the
 /// joint is satisfied at acceleration level. A number per direction, imposed ones first.
 template <class Space, class S>
-Motion<Space, S> JointAcceleration(const Kinematics<Space, S>& kinematics, int joint,
-                                   std::span<const Motion<Space, S>> A);
+Components<Space, S> JointAcceleration(const Kinematics<Space, S>& kinematics, int joint,
+                                       std::span<const Motion<Space, S>> A);
 
 /// Response D^T (S M^-1 S^T) D of the two bodies of a joint when nothing else holds them, the scale
 /// against which the response of the assembled mechanism is judged (docs/design.md D5): of the

@@ -69,7 +69,7 @@ S Resistance(const PointDrag<Space, S>& drag, const Linear<Space, S>& v) {
 
 /// A force at the point r from the centre of mass.
 template <class Space, class S>
-void AddForce(const Linear<Space, S>& f, const Linear<Space, S>& r, Motion<Space, S>& wrench) {
+void AddForce(const Linear<Space, S>& f, const Linear<Space, S>& r, Wrench<Space, S>& wrench) {
   wrench.template head<Space::kRot>() += Moment<S>(r, f);
   wrench.template tail<Space::kLin>() += f;
 }
@@ -78,10 +78,10 @@ void AddForce(const Linear<Space, S>& f, const Linear<Space, S>& r, Motion<Space
 /// is tau u, because the joint's relative motion is H u.
 template <class Space, class S>
 void AddJointForce(const Kinematics<Space, S>& kinematics, int index, S tau,
-                   std::span<Motion<Space, S>> wrenches) {
+                   std::span<Wrench<Space, S>> wrenches) {
   const Joint<Space, S>& joint = kinematics.mechanism().joints()[index];
   const JointState<Space, S>& state = kinematics.joints()[index];
-  const Motion<Space, S> F = state.H(0) * (tau * joint.kind->per_speed);
+  const Wrench<Space, S> F = state.H(0) * (tau * joint.kind->inverse_H_squared);
   wrenches[joint.to] += ShiftForce<Space, S>(F, state.r_Q);
   wrenches[joint.from] -= ShiftForce<Space, S>(F, state.r_P);
 }
@@ -91,7 +91,7 @@ void AddJointForce(const Kinematics<Space, S>& kinematics, int index, S tau,
 /// tau of a spring and damper on a joint is value - stiffness (q - rest) - damping u; the tension
 /// of one between points pulls `from` along the direction to `to`, and `to` the other way.
 template <class Space, class S>
-void AppliedForces(const Kinematics<Space, S>& kinematics, std::span<Motion<Space, S>> wrenches) {
+void AppliedForces(const Kinematics<Space, S>& kinematics, std::span<Wrench<Space, S>> wrenches) {
   const Mechanism<Space, S>& mechanism = kinematics.mechanism();
   const ForceElements<Space, S>& forces = mechanism.forces();
   wrenches[kGround].setZero();
@@ -197,7 +197,7 @@ Power<S> AppliedPower(const Kinematics<Space, S>& kinematics) {
 }
 
 #define LOOPBENCH_INSTANTIATE(Space, S)                                                  \
-  template void AppliedForces(const Kinematics<Space, S>&, std::span<Motion<Space, S>>); \
+  template void AppliedForces(const Kinematics<Space, S>&, std::span<Wrench<Space, S>>); \
   template Energy<S> ComputeEnergy(const Kinematics<Space, S>&);                         \
   template Power<S> AppliedPower(const Kinematics<Space, S>&);
 LOOPBENCH_FOR_EACH_SPACE_AND_MODEL_SCALAR(LOOPBENCH_INSTANTIATE)

@@ -26,7 +26,7 @@ template <class Space, class S>
 JointKind<Space, S> KindWith(JointType type, S parameter) {
   JointKind<Space, S> kind = KindOf<Space, S>(type);
   kind.parameter = parameter;
-  if (type == JointType::kHelical) kind.per_speed = S(1) / (S(1) + parameter * parameter);
+  if (type == JointType::kHelical) kind.inverse_H_squared = S(1) / (S(1) + parameter * parameter);
   return kind;
 }
 

@@ -1,19 +1,23 @@
 // A joint kind: one small piece of code that says how frame M of body Q moves in frame F of body P.
 //
 // With q the coordinates and u the speeds of the joint (paper, table 1 and eq. 7-9):
-//   X_FM(q)        pose of M in F,
-//   H_F(q)         motion map: [w_FM; v_FMo] = H_F u, in F axes,
-//                  with orthogonal columns, which have unit length
-//                  in every kind but the helical one,
-//   D_F(q)         its orthogonal complement, D_F^T H_F = 0: the directions of constraint forces,
-//   qdot = N(q) u  kinematic rates,
-//   q*(X_FM)       the coordinates that a measured pose of M in F comes closest to; what is left of
-//                  the pose is the joint's mismatch (position drift).
-// The constraint of a joint is imposed at one point, the point of P that now coincides with Mo:
-//   A_Q - A_P = H udot + g,   g = Hdot u + [w_P x w_rel; 2 w_P x v_rel],                  (7)
-// w_rel, v_rel being the measured relative motion seen in F. With that g, "D^T (A_Q - A_P - g) = 0"
-// says that the mismatch, written in F axes, has no second derivative (to first order in a rotation
-// mismatch in space). For most kinds H_F is constant and Hdot u = 0.
+//
+//   X_FM(q)         pose of M in F
+//   H_F(q)          motion map, [w_FM; v_FMo] = H_F u in F axes; its columns are orthogonal,
+//                   and of unit length in every kind but the helical one
+//   D_F(q)          its orthogonal complement, D_F^T H_F = 0: the directions of constraint forces
+//   qdot = N(q) u   kinematic rates
+//   q*(X_FM)        coordinates of the admissible pose nearest to a measured one; what is left
+//                   of the measured pose is the joint's mismatch (position drift)
+//
+// The constraint of a joint is imposed at one point, that of P and that of Q which now coincide
+// with Mo. In ground axes, with w_rel and v_rel the measured relative motion seen from F,
+//
+//   A_Q - A_P = H udot + g,        g = Hdot u + [w_P x w_rel; 2 w_P x v_rel]              (7)
+//
+// where Hdot u is the derivative seen from F, zero for most kinds, whose H_F is constant. With that
+// g, D^T (A_Q - A_P - g) = 0 says that the mismatch, written in F axes, has no second derivative
+// (to first order in a rotation mismatch in space).
 //
 // Coordinates, in F axes:
 //   revolute      angle about z
@@ -43,15 +47,17 @@ struct JointKind {
   int num_q = 0;
   int num_u = 0;
   /// Where every direction of H and D is a coordinate axis of F and constant: [H D] as a
-  /// permutation of the components of a motion, the num_u free ones first.
+  /// permutation of the components of a motion. The num_u free ones come first.
   std::array<int, Space::kDim> axes{};
-  /// No rotation changes the span of D (a planar pin): D may then be taken in ground axes.
-  bool isotropic = false;
+  /// No rotation of F changes the space that D spans, nor that of H, as for a pin in the plane.
+  /// Both may then be taken in ground axes.
+  bool rotation_invariant = false;
 
   /// What the kinds helical (pitch [m/rad]) and rod (length [m]) depend on; 0 for others.
   S parameter = S(0);
-  /// u = per_speed H^T V: one over H's squared length, which is 1 in every kind but the helical.
-  S per_speed = S(1);
+  /// 1 / |H|^2 of each column of H, by which u = inverse_H_squared H^T V for a relative motion V.
+  /// It is 1 in every kind but the helical, whose H is [z; pitch z].
+  S inverse_H_squared = S(1);
 
   void (*transform)(const S* q, Pose<Space, S>& X_FM, S parameter) = nullptr;
   void (*coordinates)(const Pose<Space, S>& X_FM, S* q, S parameter) = nullptr;
@@ -76,7 +82,7 @@ template <class Space, class S>
 JointKind<Space, S> KindWith(JointType type, S parameter);
 
 /// What keeps M from its nearest admissible pose, in F axes: [rotation vector; shift]. Its
-/// components along D are the joint's mismatch [rad; m].
+/// components along D are the joint's mismatch, in rad and m.
 template <class Space, class S>
 Motion<Space, S> Mismatch(const JointKind<Space, S>& kind, const Pose<Space, S>& X_FM);
 

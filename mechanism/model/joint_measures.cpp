@@ -33,13 +33,13 @@ Motion<Space, S> Kinematics<Space, S>::ConstraintMismatch(int index) const {
 }
 
 template <class Space, class S>
-Motion<Space, S> Kinematics<Space, S>::ConstraintSpeed(int index) const {
+Components<Space, S> Kinematics<Space, S>::ConstraintSpeed(int index) const {
   const Joint<Space, S>& joint = mechanism_->joints()[index];
   const JointState<Space, S>& state = joints_[index];
-  Motion<Space, S> speed = Motion<Space, S>::Zero();
+  Components<Space, S> speed = Components<Space, S>::Zero();
   for (int i = 0; i < state.rows(); ++i) speed[i] = state.D(i).dot(state.V_rel);
   for (int k = 0; k < joint.num_drives; ++k) {
-    speed[k] -= drives_[joint.first_drive + k].rate / joint.kind->per_speed;
+    speed[k] -= drives_[joint.first_drive + k].rate / joint.kind->inverse_H_squared;
   }
   return speed;
 }
@@ -68,7 +68,7 @@ S Kinematics<Space, S>::JointSpeed(int index) const {
   if (joint.in_tree()) {
     return joint.num_drives > 0 ? drives_[joint.first_drive].rate : u_[joint.u_offset];
   }
-  return joints_[index].H(0).dot(joints_[index].V_rel) * joint.kind->per_speed;
+  return joints_[index].H(0).dot(joints_[index].V_rel) * joint.kind->inverse_H_squared;
 }
 
 template <class Space, class S>
@@ -107,14 +107,14 @@ VectorX<S> Kinematics<Space, S>::SpeedsIn(const Kinematics& other) const {
     const Motion<Space, S> V_rel = ShiftMotion<Space, S>(motions_[joint.to], state.r_Q) -
                                    ShiftMotion<Space, S>(motions_[joint.from], state.r_P);
     u.segment(joint.u_offset, state.num_u) =
-        joint.kind->per_speed * (state.H().transpose() * V_rel);
+        joint.kind->inverse_H_squared * (state.H().transpose() * V_rel);
   }
   return u;
 }
 
 #define LOOPBENCH_INSTANTIATE(Space, S)                                                      \
   template Motion<Space, S> Kinematics<Space, S>::ConstraintMismatch(int) const;             \
-  template Motion<Space, S> Kinematics<Space, S>::ConstraintSpeed(int) const;                \
+  template Components<Space, S> Kinematics<Space, S>::ConstraintSpeed(int) const;            \
   template S Kinematics<Space, S>::JointCoordinate(int) const;                               \
   template S Kinematics<Space, S>::JointSpeed(int) const;                                    \
   template void Kinematics<Space, S>::AcceptStep();                                          \

@@ -13,7 +13,7 @@ struct Kinds {
     return {.num_q = 1,
             .num_u = 1,
             .axes = {0, 1, 2},
-            .isotropic = true,
+            .rotation_invariant = true,
             .transform =
                 [](const S* q, P& X, S) {
                   X.SetAngle(q[0]);
@@ -26,7 +26,7 @@ struct Kinds {
     return {.num_q = 1,
             .num_u = 1,
             .axes = {1, 0, 2},
-            .isotropic = false,
+            .rotation_invariant = false,
             .transform =
                 [](const S* q, P& X, S) {
                   X.SetAngle(S(0));
@@ -39,7 +39,7 @@ struct Kinds {
     return {.num_q = 0,
             .num_u = 0,
             .axes = {0, 1, 2},
-            .isotropic = true,
+            .rotation_invariant = true,
             .transform = [](const S*, P& X, S) { X = P(); },
             .coordinates = [](const P&, S*, S) {},
             .rates = SameRates<S, 0>};
@@ -48,7 +48,7 @@ struct Kinds {
     return {.num_q = 3,
             .num_u = 3,
             .axes = {0, 1, 2},
-            .isotropic = false,
+            .rotation_invariant = false,
             .transform =
                 [](const S* q, P& X, S) {
                   X.SetAngle(q[0]);
@@ -66,7 +66,7 @@ struct Kinds {
     return {.num_q = 2,
             .num_u = 2,
             .axes = {0, 1, 2},
-            .isotropic = false,
+            .rotation_invariant = false,
             .transform =
                 [](const S* q, P& X, S) {
                   X.SetAngle(q[0]);
@@ -84,7 +84,7 @@ struct Kinds {
     return {.num_q = 0,
             .num_u = 2,
             .axes = {0, 1, 2},
-            .isotropic = false,
+            .rotation_invariant = false,
             .basis =
                 [](const P& X, Block<Planar, S>& basis_F, S) {
                   const Linear<Planar, S> n = X.p.normalized();

@@ -55,7 +55,7 @@ struct Kinds {
     return {.num_q = 1,
             .num_u = 1,
             .axes = {2, 0, 1, 3, 4, 5},
-            .isotropic = false,
+            .rotation_invariant = false,
             .transform =
                 [](const S* q, P& X, S) {
                   TurnAboutZ(q[0], X);
@@ -68,7 +68,7 @@ struct Kinds {
     return {.num_q = 1,
             .num_u = 1,
             .axes = {3, 0, 1, 2, 4, 5},
-            .isotropic = false,
+            .rotation_invariant = false,
             .transform =
                 [](const S* q, P& X, S) {
                   X.R.setIdentity();
@@ -81,7 +81,7 @@ struct Kinds {
     return {.num_q = 0,
             .num_u = 0,
             .axes = {0, 1, 2, 3, 4, 5},
-            .isotropic = true,
+            .rotation_invariant = true,
             .transform = [](const S*, P& X, S) { X = P(); },
             .coordinates = [](const P&, S*, S) {},
             .rates = SameRates<S, 0>};
@@ -90,7 +90,7 @@ struct Kinds {
     return {.num_q = 7,
             .num_u = 6,
             .axes = {0, 1, 2, 3, 4, 5},
-            .isotropic = false,
+            .rotation_invariant = false,
             .transform =
                 [](const S* q, P& X, S) {
                   FromQuaternion(q, X);

@@ -59,7 +59,7 @@ void SetBasisAt(const JointKind<Space, S>& kind, const Rotation<Space, S>& R,
 /// released of them.
 template <class Space, class S>
 bool AnyAxes(const Joint<Space, S>& joint) {
-  return joint.kind->isotropic && joint.num_drives == 0 && joint.num_released == 0;
+  return joint.kind->rotation_invariant && joint.num_drives == 0 && joint.num_released == 0;
 }
 
 }  // namespace

@@ -1,8 +1,10 @@
 // Poses, motions and joint frames of a mechanism at one (q, u): the workspace all formulations
 // share.
 //
-// Everything is in ground axes. Bodies are represented at their centre of mass, joints at Mo, the
-// origin of the frame fixed on Q (see joint.h).
+// Everything is in ground axes. Motions and wrenches of a body are taken at its centre of mass,
+// those of a joint at Mo, the origin of the frame M fixed on its body Q (see joint.h). The paper
+// generates positions and velocities by an assembly and a disassembly of their own, its first two
+// sweeps; here they are a walk along the spanning tree from Ground outwards, body after body.
 #pragma once
 
 #include <span>
@@ -16,9 +18,9 @@ namespace loopbench {
 template <class Space, class S>
 struct JointState {
   Linear<Space, S> r_P, r_Q;  ///< Mo from the centres of mass of P and Q
-  Motion<Space, S> V_rel;     ///< [w_Q - w_P; v_Q - v_P] at Mo
-  Motion<Space, S> g;         ///< A_Q - A_P = H udot + g                            (7)
-  Block<Space, S> basis;      ///< [H D], orthogonal
+  Motion<Space, S> V_rel;     ///< [w_Q - w_P; v_Q - v_P], both points at Mo
+  Motion<Space, S> g;         ///< A_Q - A_P = H udot + g, both points at Mo             (7)
+  Block<Space, S> basis;      ///< [H D], columns orthogonal
   int num_u = 0, num_rows = 0;
 
   auto H() const { return basis.leftCols(num_u); }  ///< motion map
@@ -85,7 +87,7 @@ class Kinematics {
 
   /// D^T V_rel less the rates of prescribed coordinates: zero when a constraint holds at velocity
   /// level. joints()[joint].rows() numbers, the others zero.
-  Motion<Space, S> ConstraintSpeed(int joint) const;
+  Components<Space, S> ConstraintSpeed(int joint) const;
 
   /// Measured coordinate and speed of a joint with one coordinate (q, u for tree joints).
   S JointCoordinate(int joint) const;
@@ -136,7 +138,7 @@ class Kinematics {
 /// points, joint forces (H tau on Q, the opposite on P), at time(). `wrenches` has one entry per
 /// body.
 template <class Space, class S>
-void AppliedForces(const Kinematics<Space, S>& kinematics, std::span<Motion<Space, S>> wrenches);
+void AppliedForces(const Kinematics<Space, S>& kinematics, std::span<Wrench<Space, S>> wrenches);
 
 /// Energies [J] at the current position and speed; potential is zero for centres of mass in the
 /// ground origin and springs at rest. Constant forces on points (ground axes) and joints, preloads

@@ -129,7 +129,7 @@ class Assembler {
   double CutJointSpeed(int index, int component, const VectorX<double>& u) {
     kinematics_.UpdateVelocity(u);
     const JointState<Space, double>& state = kinematics_.joints()[index];
-    return mechanism_.joints()[index].kind->per_speed * state.H(component).dot(state.V_rel);
+    return mechanism_.joints()[index].kind->inverse_H_squared * state.H(component).dot(state.V_rel);
   }
 
   /// Its derivatives by u.

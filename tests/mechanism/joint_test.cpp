@@ -149,7 +149,7 @@ TYPED_TEST(JointTest, BasesAreOrthogonalAndTheirRateIsTheBias) {
       const VectorX<double> q = Coordinates(kind, seed);
       const Block<Space, double> basis = Basis(kind, q);
       Block<Space, double> product = basis.transpose() * basis;
-      if (kind.num_u > 0) product.col(0) *= kind.per_speed;
+      if (kind.num_u > 0) product.col(0) *= kind.inverse_H_squared;
       EXPECT_LE((product - Block<Space, double>::Identity()).norm(), 16 * kEps) << ToString(type);
       if (kind.bias == nullptr) continue;
       VectorX<double> u(kind.num_u), qdot(kind.num_q);

@@ -10,7 +10,7 @@ double LinkLength(const MechanismDescription& description) {
   std::vector<Eigen::AlignedBox3d> joints(description.bodies.size());
   double link = 0.0, arm = 0.0;
   for (const JointDescription& joint : description.joints) {
-    if (joint.type == JointType::kRod) link = std::max(link, joint.length);
+    if (joint.type == JointType::kRod) link = std::max(link, joint.parameter);
     if (joint.type == JointType::kFree) continue;
     for (const JointSide& side : {joint.from, joint.to}) {
       if (side.body == kGround) continue;

@@ -6,7 +6,6 @@
 #include <cmath>
 #include <numbers>
 
-#include "harness/record/joint_words.h"
 #include "mechanism/loops/excursion.h"
 
 namespace loopbench::harness {
@@ -89,7 +88,7 @@ class LargeAngles {
 std::vector<Warning> FindUnitWarnings(const MechanismDescription& description) {
   LargeAngles angles;
   const auto is_angle = [&](int joint, std::size_t coordinate) {
-    const auto words = CoordinateWords(description.joints[joint].type, description.space);
+    const auto words = ValueWords(description.joints[joint].type, description.space, false);
     return coordinate < words.size() && words[coordinate].unit == "rad";
   };
   for (const JointValues& given : description.initial.coordinates) {
@@ -102,10 +101,14 @@ std::vector<Warning> FindUnitWarnings(const MechanismDescription& description) {
     angles.Add("rotation of " + joint.name, joint.from.rotation.norm());
     angles.Add("rotation of " + joint.name, joint.to.rotation.norm());
   }
-  for (const ForceDescription& force : description.forces) {
-    const auto* spring = std::get_if<JointSpring>(&force);
-    if (spring == nullptr || !is_angle(spring->joint, 0)) continue;
-    angles.Add("rest of the spring in " + description.joints[spring->joint].name, spring->rest);
+  for (ForceDescription force : description.forces) {
+    const ForceParts parts = PartsOf(force);
+    for (const ForceNumber& number : parts.numbers) {
+      if (number.quantity != Quantity::kCoordinate || !is_angle(*parts.joint, 0)) continue;
+      angles.Add(fmt::format("{} of the {} in {}", number.key, parts.name,
+                             description.joints[*parts.joint].name),
+                 *number.value);
+    }
   }
   if (!angles.any()) return {};
   return {{WarningKind::kDegrees, angles.Text()}};

@@ -7,7 +7,6 @@
 #include "harness/cli/commands.h"
 #include "harness/config/benchmark_reader.h"
 #include "harness/config/mechanism_reader.h"
-#include "harness/json/config_error.h"
 #include "harness/json/file_kind.h"
 #include "harness/judge/claims_reader.h"
 #include "harness/judge/failure_map_reader.h"
@@ -15,6 +14,7 @@
 #include "harness/suite/precision_cases.h"
 #include "harness/suite/start_check.h"
 #include "harness/tables/table.h"
+#include "harness/text/config_error.h"
 #include "harness/text/terminal.h"
 #include "harness/timing/time_cases.h"
 

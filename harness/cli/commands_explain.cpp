@@ -9,10 +9,9 @@
 #include "harness/cli/commands.h"
 #include "harness/config/formulations.h"
 #include "harness/isolation/print_from_child.h"
-#include "harness/json/config_error.h"
 #include "harness/json/file_kind.h"
-#include "harness/record/joint_words.h"
 #include "harness/suite/precision_cases.h"
+#include "harness/text/config_error.h"
 #include "harness/text/terminal.h"
 #include "harness/timing/time_cases.h"
 
@@ -71,7 +70,7 @@ void ExplainFormulations(const Experiment& experiment) {
 
 void ExplainChoices(const Experiment& experiment) {
   const auto any = [&](auto is) { return Any(experiment, is); };
-  for (const LevelTraits& level : kLevels) {
+  for (const LevelTraits& level : kLevelTraits) {
     if (any([&](const Column& c) { return ToString(c.enforcement) == level.name; })) {
       Print("  {}: {}\n", level.name, level.sentence);
     }
@@ -104,7 +103,7 @@ std::string_view UnitOf(const Experiment& experiment, const std::string& joint) 
     const MechanismDescription& description = scene.mechanism.description;
     const auto found = std::ranges::find(description.joints, joint, &JointDescription::name);
     if (found == description.joints.end()) continue;
-    const auto words = CoordinateWords(found->type, description.space);
+    const auto words = ValueWords(found->type, description.space, false);
     if (words.size() == 1) return words.front().unit;
   }
   return "rad or m";

@@ -5,7 +5,6 @@
 #include <cmath>
 
 #include "harness/cli/commands_explain.h"
-#include "harness/record/joint_words.h"
 #include "harness/text/terminal.h"
 #include "mechanism/model/mechanism.h"
 
@@ -71,7 +70,7 @@ Table BodyTable(const MechanismDescription& description, const Structure& struct
 
 /// What a joint leaves free: its kind's directions less those that follow a given motion.
 int FreeSpeeds(SpaceKind space, const JointDescription& joint) {
-  const int kind = space == SpaceKind::kPlanar && ExistsInPlane(joint.type)
+  const int kind = space == SpaceKind::kPlanar && TraitsOf(joint.type).in_plane
                        ? KindOf<Planar, double>(joint.type).num_u
                        : KindOf<Spatial, double>(joint.type).num_u;
   return kind - static_cast<int>(joint.motions.size());
@@ -100,13 +99,13 @@ std::string FunctionText(const TimeFunctionDescription& function) {
 /// Parameter and prescribed motions.
 std::string Given(SpaceKind space, const JointDescription& joint) {
   std::string text;
-  if (joint.type == JointType::kHelical) {
-    text = fmt::format("pitch {} m/rad", ShortNumber(joint.pitch));
+  const JointParameter& own = TraitsOf(joint.type).parameter;
+  if (!own.key.empty()) {
+    text = fmt::format("{} {} {}", own.key, ShortNumber(joint.parameter), own.unit);
   }
-  if (joint.type == JointType::kRod) text = fmt::format("length {} m", ShortNumber(joint.length));
-  const std::vector<CoordinateWord> words = CoordinateWords(joint.type, space);
+  const std::vector<ValueWord> words = ValueWords(joint.type, space, false);
   for (const PrescribedMotion& motion : joint.motions) {
-    const CoordinateWord& word = words.at(static_cast<std::size_t>(motion.coordinate));
+    const ValueWord& word = words.at(static_cast<std::size_t>(motion.coordinate));
     text += fmt::format("{}{} = {} [{}]", text.empty() ? "" : "; ", word.name,
                         FunctionText(motion.value), word.unit);
   }
@@ -166,6 +165,9 @@ Table FrameTable(const MechanismDescription& description) {
   const Mechanism<Space, double> mechanism(description, Coordinates::kJoint);
   for (std::size_t j = 0; j < description.joints.size(); ++j) {
     const JointDescription& joint = description.joints[j];
+    const JointTraits& traits = TraitsOf(joint.type);
+    const bool planar = description.space == SpaceKind::kPlanar;
+    const SideWords& axes = planar ? traits.planar_axes : traits.axes;
     for (const bool from : {true, false}) {
       const JointSide& side = from ? joint.from : joint.to;
       const Pose<Space, double>& X = from ? mechanism.joints()[j].X_PF : mechanism.joints()[j].X_QM;
@@ -175,7 +177,7 @@ Table FrameTable(const MechanismDescription& description) {
       row.Set("side", std::string(from ? "F, from" : "M, to"));
       row.Set("body", body.name);
       row.Set("at", Place(body, side.position, description.space));
-      row.Set("axes", AxesText<Space>(X.R, AxesOfSide(joint.type, description.space, from)));
+      row.Set("axes", AxesText<Space>(X.R, from ? axes.from : axes.to));
       const auto turn = RotationVector(X);
       if (joint.type != JointType::kRod && !turn.isZero(0.0)) row.Set("turn", Spaced(turn));
     }
@@ -183,73 +185,39 @@ Table FrameTable(const MechanismDescription& description) {
   return table;
 }
 
-/// Units of a joint force: per coordinate, and of the force itself.
-struct ForceUnits {
-  const char* force;
-  const char* coordinate;
-};
-
 /// A force as "type", "acts on" and "with".
-class ForceRow {
- public:
-  explicit ForceRow(const MechanismDescription& description) : description_(description) {}
-
-  Record operator()(const JointTorque& torque) const {
-    const ForceUnits units = UnitsOf(torque.joint);
-    return Row("joint_torque", JointName(torque.joint),
-               fmt::format("{} [{}]", FunctionText(torque.value), units.force));
+Record ForceRow(const MechanismDescription& description, ForceDescription force) {
+  const ForceParts parts = PartsOf(force);
+  std::vector<std::string> on, with;
+  bool is_length = true;
+  if (parts.joint != nullptr) {
+    const JointDescription& joint = description.joints[*parts.joint];
+    on.push_back("joint " + joint.name);
+    is_length = ValueWords(joint.type, description.space, false).at(0).is_length();
   }
-  Record operator()(const JointSpring& spring) const {
-    const ForceUnits units = UnitsOf(spring.joint);
-    return Row(
-        "joint_spring", JointName(spring.joint),
-        fmt::format("stiffness {} {}/{}, rest {} {}, preload {} {}", ShortNumber(spring.stiffness),
-                    units.force, units.coordinate, ShortNumber(spring.rest), units.coordinate,
-                    ShortNumber(spring.preload), units.force));
+  for (const BodyPoint* point : parts.points) {
+    const BodyDescription& body = description.bodies[point->body];
+    on.push_back(body.name + " at " + Place(body, point->at, description.space));
   }
-  Record operator()(const JointDamper& damper) const {
-    const ForceUnits units = UnitsOf(damper.joint);
-    return Row("joint_damper", JointName(damper.joint),
-               fmt::format("damping {} {} s/{}", ShortNumber(damper.damping), units.force,
-                           units.coordinate));
+  if (parts.value != nullptr) {
+    with.push_back(
+        fmt::format("{} [{}]", FunctionText(*parts.value), UnitOf(Quantity::kEffort, is_length)));
   }
-  Record operator()(const PointForce& force) const {
-    return Row("point_force", PointName({force.body, force.at}),
-               fmt::format("force ({}) N in {} axes", VectorText(force.force, description_.space),
-                           force.in_body_axes ? "body" : "ground"));
+  if (parts.force != nullptr) {
+    with.push_back(fmt::format("force ({}) N in {} axes",
+                               VectorText(*parts.force, description.space),
+                               *parts.in_body_axes ? "body" : "ground"));
   }
-  Record operator()(const SpringDamper& spring) const {
-    return Row("spring_damper", fmt::format("{}, {}", PointName(spring.from), PointName(spring.to)),
-               fmt::format("stiffness {} N/m, damping {} N s/m, length {} m, preload {} N",
-                           ShortNumber(spring.stiffness), ShortNumber(spring.damping),
-                           ShortNumber(spring.length), ShortNumber(spring.preload)));
+  for (const ForceNumber& number : parts.numbers) {
+    with.push_back(fmt::format("{} {} {}", number.key, ShortNumber(*number.value),
+                               UnitOf(number.quantity, is_length)));
   }
-  Record operator()(const Drag& drag) const {
-    return Row("drag", PointName(drag.point),
-               fmt::format("linear {} N s/m, quadratic {} N s^2/m^2", ShortNumber(drag.linear),
-                           ShortNumber(drag.quadratic)));
-  }
-
- private:
-  static Record Row(const std::string& type, const std::string& on, const std::string& with) {
-    Record row;
-    row.Set("type", type);
-    row.Set("on", on);
-    row.Set("with", with);
-    return row;
-  }
-  ForceUnits UnitsOf(int joint) const {
-    const bool shift = description_.joints[joint].type == JointType::kPrismatic;
-    return shift ? ForceUnits{"N", "m"} : ForceUnits{"N m", "rad"};
-  }
-  std::string JointName(int joint) const { return "joint " + description_.joints[joint].name; }
-  std::string PointName(const BodyPoint& point) const {
-    const BodyDescription& body = description_.bodies[point.body];
-    return body.name + " at " + Place(body, point.at, description_.space);
-  }
-
-  const MechanismDescription& description_;
-};
+  Record row;
+  row.Set("type", std::string(parts.name));
+  row.Set("on", fmt::format("{}", fmt::join(on, ", ")));
+  row.Set("with", fmt::format("{}", fmt::join(with, ", ")));
+  return row;
+}
 
 Table ForceTable(const MechanismDescription& description) {
   Table table;
@@ -257,7 +225,7 @@ Table ForceTable(const MechanismDescription& description) {
                    {"on", "acts on", Format::kText, {}},
                    {"with", "with", Format::kText, {}}};
   for (const ForceDescription& force : description.forces) {
-    table.rows.push_back(std::visit(ForceRow(description), force));
+    table.rows.push_back(ForceRow(description, force));
   }
   return table;
 }

@@ -5,7 +5,6 @@
 #include <array>
 
 #include "harness/cli/commands_explain.h"
-#include "harness/record/joint_words.h"
 #include "harness/text/terminal.h"
 #include "mechanism/model/kinematics.h"
 
@@ -88,8 +87,8 @@ class StartText {
 
   void AddJoint(std::size_t index, Table* table) const {
     const JointType type = description_.joints[index].type;
-    const std::vector<CoordinateWord> positions = CoordinateWords(type, description_.space),
-                                      speeds = SpeedWords(type, description_.space);
+    const std::vector<ValueWord> positions = ValueWords(type, description_.space, false),
+                                 speeds = ValueWords(type, description_.space, true);
     const Values q = CoordinatesOf(mechanism_.joints()[index]), u = SpeedsOf(index);
     const auto with_unit = [](double value, std::string_view unit) {
       return fmt::format("{}{}{}", ShortNumber(value), unit.empty() ? "" : " ", unit);

@@ -11,12 +11,12 @@
 #include "harness/figures/failure_map_figure.h"
 #include "harness/figures/figure_recipes.h"
 #include "harness/figures/precision_figures.h"
-#include "harness/json/config_error.h"
 #include "harness/judge/failure_map_reader.h"
 #include "harness/judge/failure_map_report.h"
 #include "harness/record/provenance.h"
 #include "harness/store/contents.h"
 #include "harness/tables/columns.h"
+#include "harness/text/config_error.h"
 #include "harness/text/files.h"
 #include "harness/text/terminal.h"
 

@@ -10,8 +10,8 @@
 #include "harness/config/file_schemas.h"
 #include "harness/config/mechanism_reader.h"
 #include "harness/config/options.h"
-#include "harness/json/config_error.h"
 #include "harness/json/document_kind.h"
+#include "harness/text/config_error.h"
 #include "mechanism/description/in_space.h"
 #include "mechanism/simplify/compile.h"
 
@@ -117,7 +117,7 @@ void ChangeMembers(const JsonNode& node, GroupInFile& group) {
 }
 
 const Fields<GroupInFile>& GroupFields() {
-  const Json one_of_two = Json::parse(R"({"oneOf": [
+  static const Json one_of_two = Json::parse(R"({"oneOf": [
       {"required": ["mechanisms"], "not": {"anyOf": [{"required": ["family"]}, {"required": ["sizes"]}]}},
       {"required": ["family", "sizes"], "not": {"required": ["mechanisms"]}}]})");
   static const Fields<GroupInFile> fields(

@@ -29,8 +29,8 @@ template <class Enum>
 inline constexpr std::array<std::string_view, 0> kNames = {};
 template <>
 inline constexpr auto kNames<Enforcement> = [] {
-  std::array<std::string_view, kLevels.size()> names;
-  std::ranges::transform(kLevels, names.begin(), &LevelTraits::name);
+  std::array<std::string_view, kLevelTraits.size()> names;
+  std::ranges::transform(kLevelTraits, names.begin(), &LevelTraits::name);
   return names;
 }();
 template <>

@@ -49,8 +49,7 @@ void ReadGains(const JsonNode& node, ColumnLists& lists) {
 const Fields<ColumnLists>& ColumnFields() {
   static const Fields<ColumnLists> fields(
       "column", "A way of imposing the loops; lists expand as a cross product.",
-      {{"formulation",
-        Choices(&ColumnLists::formulations, NamesOf<FormulationKind>(), "a formulation"),
+      {{"formulation", FormulationChoices(&ColumnLists::formulations),
         "The algorithm that imposes them.", "a formulation"},
        {"enforcement",
         Choices(&ColumnLists::enforcements, NamesOf<Enforcement>(), "a level of enforcement"),

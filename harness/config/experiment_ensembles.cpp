@@ -7,7 +7,7 @@
 
 #include "harness/config/experiment_reader.h"
 #include "harness/config/experiment_sections.h"
-#include "harness/json/spelling.h"
+#include "harness/text/spelling.h"
 
 namespace loopbench::harness {
 namespace {
@@ -118,8 +118,8 @@ void ReadStart(const JsonNode& node, RuleOfExperiment& rule) {
 const Fields<RuleOfExperiment>& EnsembleFields() {
   using Rule = RuleOfExperiment;
   constexpr std::int64_t kMaxSeed = std::numeric_limits<std::int32_t>::max();
-  const Json bounds = ArraySchema(NumberSchema(kFarthest), 2, 2);
-  const Json one_start = {{"oneOf", {Requires({"perturb"}), Requires({"between"})}}};
+  static const Json bounds = ArraySchema(NumberSchema(kFarthest), 2, 2);
+  static const Json one_start = {{"oneOf", {Requires({"perturb"}), Requires({"between"})}}};
   static const Fields<Rule> fields(
       "ensemble",
       "Perturbed repetitions of the cases that match every given key of a case; the first rule "

@@ -5,8 +5,8 @@
 #include <algorithm>
 #include <charconv>
 
-#include "harness/json/config_error.h"
-#include "harness/json/spelling.h"
+#include "harness/text/config_error.h"
+#include "harness/text/spelling.h"
 
 namespace loopbench::harness {
 namespace {

@@ -3,8 +3,8 @@
 #include <fmt/format.h>
 
 #include "harness/config/experiment_sweep.h"
-#include "harness/json/config_error.h"
 #include "harness/json/document_kind.h"
+#include "harness/text/config_error.h"
 
 namespace loopbench::harness {
 namespace {

@@ -8,8 +8,8 @@
 #include "harness/config/experiment_sections.h"
 #include "harness/config/mechanism_reader.h"
 #include "harness/config/mechanism_sections.h"
-#include "harness/json/config_error.h"
-#include "harness/json/spelling.h"
+#include "harness/text/config_error.h"
+#include "harness/text/spelling.h"
 #include "mechanism/description/similarity.h"
 
 namespace loopbench::harness {
@@ -77,7 +77,7 @@ void ReadTags(const JsonNode& node, SceneEntry& entry) {
 }
 
 const Fields<SceneEntry>& SceneFields() {
-  const Json mechanism =
+  static const Json mechanism =
       EitherSchema({TextSchema(),
                     FamilySchema(),
                     {{"$ref", "mechanism.schema.json#"}, {"words", "a [mechanism](#mechanism)"}}});

@@ -95,7 +95,7 @@ void ReadValues(const JsonNode& node, AxisOfSweep& axis) {
 }
 
 const Fields<AxisOfSweep>& AxisFields() {
-  const Json values =
+  static const Json values =
       EitherSchema({ArraySchema(Json::object(), 1), SpacedSchema(NumberSchema(), false)});
   static const Fields<AxisOfSweep> fields(
       "axis", "The values of one field.",

@@ -74,7 +74,7 @@ void ReadPointsOfGround(const JsonNode& node, Draft& draft) {
 }
 
 const Fields<Body>& BodyFields() {
-  const Json inertia =
+  static const Json inertia =
       EitherSchema({NumberSchema(kPositive), ArraySchema(NumberSchema(kPositive), 3, 3),
                     ArraySchema(NumberSchema(), 6, 6)});
   static const Fields<Body> fields(

@@ -1,4 +1,5 @@
-// "forces" of a mechanism file.
+// "forces" of a mechanism file: read part by part (mechanism/description/force.h), whatever the
+// force.
 #include <fmt/format.h>
 
 #include "harness/config/mechanism_sections.h"
@@ -6,83 +7,40 @@
 namespace loopbench::harness {
 namespace {
 
+using Force = PartOf<ForceDescription>;
+using Rows = std::vector<Field<Force>>;
+
+/// One of each kind, as nothing is said.
+template <std::size_t... kinds>
+std::vector<ForceDescription> OneOfEach(std::index_sequence<kinds...>) {
+  return {ForceDescription(std::in_place_index<kinds>)...};
+}
+std::vector<ForceDescription> OneOfEach() {
+  return OneOfEach(std::make_index_sequence<std::variant_size_v<ForceDescription>>());
+}
+
 /// Joints that carry no single coordinate have no room for a force.
-template <class Force>
-FieldValue<PartOf<Force>> JointOf(int Force::*joint) {
-  return {TextSchema(), [=](const JsonNode& node, PartOf<Force>& force) {
-            const auto index = ReadJointName(node, *force.draft);
-            if (!index) return;
-            force.*joint = *index;
-            const JointDescription& found = force.draft->joints[force.*joint];
-            if (NumValues(found.type, force.draft->space, true) == 1) return;
-            node.FailAs(fmt::format("\"{}\" ({})", found.name, ToString(found.type)),
-                        "a joint with one coordinate (revolute, prismatic or helical)");
-          }};
+void ReadJoint(const JsonNode& node, Force& force) {
+  const auto index = ReadJointName(node, *force.draft);
+  if (!index) return;
+  *PartsOf(force).joint = *index;
+  const JointDescription& found = force.draft->joints[*index];
+  if (NumValues(found.type, force.draft->space, true) == 1) return;
+  node.FailAs(fmt::format("\"{}\" ({})", found.name, ToString(found.type)),
+              "a joint with one coordinate (revolute, prismatic or helical)");
 }
 
-/// A force that lacks all of these does nothing.
-template <class Force>
-FieldValue<PartOf<Force>> OneOf(std::vector<std::string> keys) {
-  std::vector<Json> required;
-  for (const std::string& key : keys) required.push_back(Requires({key}));
-  return {EitherSchema(required), [=](const JsonNode& node, PartOf<Force>&) {
-            const auto has = [&](const std::string& key) { return node.value().contains(key); };
-            if (std::ranges::any_of(keys, has)) return;
-            node.FailAs(fmt::format("none of \"{}\"", fmt::join(keys, "\", \"")),
-                        "at least one of them");
-          }};
-}
-
-constexpr const char* kJoint = "the name of a joint";
-constexpr const char* kJointOf = "With one coordinate: revolute, prismatic or helical.";
 constexpr const char* kPlaceOnBody =
     "The name of one of the body's points, or coordinates in body axes [m]; default its origin.";
 
-const Fields<PartOf<JointTorque>>& TorqueFields() {
-  static const Fields<PartOf<JointTorque>> fields(
-      "joint_torque",
-      "A given moment or force on a joint's second body, its opposite on the first.",
-      {{"type", ChoiceSchema({"joint_torque"}), "What it is.", "a force type"},
-       {"joint", JointOf(&JointTorque::joint), kJointOf, kJoint},
-       {"value", TimeFunctionOf(&JointTorque::value), "[N m] or [N] on the joint's second body.",
-        "a number or a function of time"}});
-  return fields;
-}
-
-const Fields<PartOf<JointSpring>>& JointSpringFields() {
-  static const Fields<PartOf<JointSpring>> fields(
-      "joint_spring", "preload - stiffness (q - rest) on the joint's coordinate q.",
-      {{"type", ChoiceSchema({"joint_spring"}), "What it is.", "a force type"},
-       {"joint", JointOf(&JointSpring::joint), kJointOf, kJoint},
-       {"stiffness", Number(&JointSpring::stiffness, kNotNegative), "[N m/rad] or [N/m]",
-        "a number >= 0"},
-       {"rest", Number(&JointSpring::rest),
-        "Coordinate at which only the preload is left [rad] or [m]."},
-       {"preload", Number(&JointSpring::preload), "[N m] or [N]"}});
-  return fields;
-}
-
-const Fields<PartOf<JointDamper>>& JointDamperFields() {
-  static const Fields<PartOf<JointDamper>> fields(
-      "joint_damper", "-damping u on the joint's speed u.",
-      {{"type", ChoiceSchema({"joint_damper"}), "What it is.", "a force type"},
-       {"joint", JointOf(&JointDamper::joint), kJointOf, kJoint},
-       {"damping", Number(&JointDamper::damping, kNotNegative), "[N m s/rad] or [N s/m]",
-        "a number >= 0"}});
-  return fields;
-}
-
-const Fields<PartOf<PointForce>>& PointForceFields() {
-  static const Fields<PartOf<PointForce>> fields(
-      "point_force", "A constant force at a point of a body.",
-      {{"type", ChoiceSchema({"point_force"}), "What it is.", "a force type"},
-       {"body", BodyOf<PointForce>(&PointForce::body, false), "A body that can move.",
-        "the name of a body"},
-       {"at", PlaceOf<PointForce>(&PointForce::body, &PointForce::at), kPlaceOnBody},
-       {"force", VectorOf(&PointForce::force), "[N]", "an array of 2 or 3 numbers [N]"},
-       {"axes", Choice(&PointForce::in_body_axes, {"ground", "body"}, "the axes of the force"),
-        "Body: the force turns with the body."}});
-  return fields;
+/// A force on one body names its point without an object around it.
+void AddPoint(Rows* rows) {
+  const auto point = [](ForceDescription& force) { return PartsOf(force).points[0]; };
+  const auto body = [=](ForceDescription& force) -> int& { return point(force)->body; };
+  const auto at = [=](ForceDescription& force) -> Eigen::Vector3d& { return point(force)->at; };
+  rows->push_back({"body", BodyOf<ForceDescription>(body, false), "A body that can move.",
+                   "the name of a body"});
+  rows->push_back({"at", PlaceOf<ForceDescription>(body, at), kPlaceOnBody});
 }
 
 const Fields<PartOf<BodyPoint>>& EndFields() {
@@ -94,68 +52,135 @@ const Fields<PartOf<BodyPoint>>& EndFields() {
   return fields;
 }
 
-void CheckEnds(const JsonNode& node, PartOf<SpringDamper>& spring) {
-  if (spring.from.body < 0 || spring.from.body != spring.to.body) return;
-  node.FailAs(fmt::format("a spring-damper of \"{}\" with itself",
-                          spring.draft->bodies[spring.from.body].name),
+void CheckEnds(const JsonNode& node, Force& force) {
+  const ForceParts parts = PartsOf(force);
+  const int from = parts.points[0]->body, to = parts.points[1]->body;
+  if (from < 0 || from != to) return;
+  std::string name(parts.name);
+  std::ranges::replace(name, '_', '-');
+  node.FailAs(fmt::format("a {} of \"{}\" with itself", name, force.draft->bodies[from].name),
               "two different bodies");
 }
 
-const Fields<PartOf<SpringDamper>>& SpringDamperFields() {
+void AddEnds(Rows* rows) {
   constexpr const char* kEnd = "an object with keys \"body\", \"at\"";
-  static const Fields<PartOf<SpringDamper>> fields(
-      "spring_damper",
-      "The tension preload + stiffness (d - length) + damping d' between points at distance d.",
-      {{"type", ChoiceSchema({"spring_damper"}), "What it is.", "a force type"},
-       {"from", Part(&SpringDamper::from, EndFields()), "One end.", kEnd},
-       {"to", Part(&SpringDamper::to, EndFields()), "The other, on another body.", kEnd},
-       {"", By(Json::object(), CheckEnds)},
-       {"", OneOf<SpringDamper>({"stiffness", "damping", "preload"})},
-       {"stiffness", Number(&SpringDamper::stiffness, kNotNegative), "[N/m]"},
-       {"damping", Number(&SpringDamper::damping, kNotNegative), "[N s/m]"},
-       {"length", Number(&SpringDamper::length, kNotNegative),
-        "Distance of the points at which only the preload is left [m]."},
-       {"preload", Number(&SpringDamper::preload), "Tension at that distance [N]."}});
-  return fields;
+  const auto end = [](std::size_t i) {
+    return FieldValue<Force>{EndFields().Schema(), [i](const JsonNode& node, Force& force) {
+                               BodyPoint& point = *PartsOf(force).points[i];
+                               point = ReadPart(EndFields(), node, *force.draft, point);
+                             }};
+  };
+  rows->push_back({"from", end(0), "One end.", kEnd});
+  rows->push_back({"to", end(1), "The other, on another body.", kEnd});
+  rows->push_back({"", By(Json::object(), CheckEnds)});
 }
 
-const Fields<PartOf<Drag>>& DragFields() {
-  static const auto body = [](Drag& drag) -> int& { return drag.point.body; };
-  static const auto at = [](Drag& drag) -> Eigen::Vector3d& { return drag.point.at; };
-  static const Fields<PartOf<Drag>> fields(
-      "drag", "-(linear + quadratic |v|) v at a point of velocity v.",
-      {{"type", ChoiceSchema({"drag"}), "What it is.", "a force type"},
-       {"body", BodyOf<Drag>(body, false), "A body that can move.", "the name of a body"},
-       {"at", PlaceOf<Drag>(body, at), kPlaceOnBody},
-       {"", OneOf<Drag>({"linear", "quadratic"})},
-       {"linear", Number(&Drag::linear, kNotNegative), "[N s/m]"},
-       {"quadratic", Number(&Drag::quadratic, kNotNegative), "[N s^2/m^2]"}});
-  return fields;
+/// A force that lacks all of these does nothing.
+FieldValue<Force> OneOf(const std::vector<std::string>& keys) {
+  std::vector<Json> required;
+  for (const std::string& key : keys) required.push_back(Requires({key}));
+  return {EitherSchema(required), [=](const JsonNode& node, Force&) {
+            const auto has = [&](const std::string& key) { return node.value().contains(key); };
+            if (std::ranges::any_of(keys, has)) return;
+            node.FailAs(fmt::format("none of \"{}\"", fmt::join(keys, "\", \"")),
+                        "at least one of them");
+          }};
 }
 
-/// Reads one of several kinds of force.
-template <class Force>
-ForceDescription ReadAs(const Fields<PartOf<Force>>& fields, const JsonNode& node,
-                        const Draft& draft, Force unread = {}) {
-  return ReadPart(fields, node, draft, unread);
+void AddVector(Rows* rows) {
+  rows->push_back({"force",
+                   {VectorSchema(),
+                    [](const JsonNode& node, Force& force) {
+                      *PartsOf(force).force = ReadVector(node, force.draft->space);
+                    }},
+                   "[N]",
+                   "an array of 2 or 3 numbers [N]"});
+  static const NameList axes = {"ground", "body"};
+  rows->push_back({"axes",
+                   {ChoiceSchema(axes.all()),
+                    [](const JsonNode& node, Force& force) {
+                      const auto index = node.Choice(axes, "the axes of the force");
+                      if (index) *PartsOf(force).in_body_axes = *index == 1;
+                    },
+                    [](const Force&) { return Json(axes.all().front()); }},
+                   "Body: the force turns with the body."});
+}
+
+void AddNumber(const ForceParts& parts, std::size_t i, Rows* rows) {
+  const ForceNumber& number = parts.numbers[i];
+  const Range range = number.any_sign ? Range{} : kNotNegative;
+  const std::string_view of_angle = UnitOf(number.quantity, false);
+  const std::string_view of_length = UnitOf(number.quantity, true);
+  std::string units = fmt::format("[{}]", of_angle);
+  if (of_length != of_angle) units += fmt::format(" or [{}]", of_length);
+  const double standard = *number.value;
+  rows->push_back({std::string(number.key),
+                   {NumberSchema(range),
+                    [=](const JsonNode& node, Force& force) {
+                      *PartsOf(force).numbers[i].value = node.Number(range);
+                    },
+                    [=](const Force&) { return Json(standard); }},
+                   number.sentence.empty() ? units : fmt::format("{} {}.", number.sentence, units),
+                   number.need == Need::kAlways ? "a number" + range.Text() : ""});
+}
+
+Fields<Force> FieldsOf(ForceDescription kind) {
+  const ForceParts parts = PartsOf(kind);
+  Rows rows = {{"type", ChoiceSchema({std::string(parts.name)}), "What it is.", "a force type"}};
+  if (parts.joint != nullptr) {
+    rows.push_back({"joint", By(TextSchema(), ReadJoint),
+                    "With one coordinate: revolute, prismatic or helical.", "the name of a joint"});
+  }
+  if (parts.points.size() == 1) AddPoint(&rows);
+  if (parts.points.size() == 2) AddEnds(&rows);
+  std::vector<std::string> one_of;
+  for (const ForceNumber& number : parts.numbers) {
+    if (number.need == Need::kOneOf) one_of.emplace_back(number.key);
+  }
+  if (!one_of.empty()) rows.push_back({"", OneOf(one_of)});
+  if (parts.force != nullptr) AddVector(&rows);
+  if (parts.value != nullptr) {
+    rows.push_back({"value",
+                    {TimeFunctionSchema(),
+                     [](const JsonNode& node, Force& force) {
+                       *PartsOf(force).value = ReadTimeFunction(node);
+                     }},
+                    "[N m] or [N] on the joint's second body.",
+                    "a number or a function of time"});
+  }
+  for (std::size_t i = 0; i < parts.numbers.size(); ++i) AddNumber(parts, i, &rows);
+  return {std::string(parts.name), std::string(parts.sentence), std::move(rows)};
+}
+
+/// In the order of ForceDescription.
+const std::vector<Fields<Force>>& AllFields() {
+  static const std::vector<Fields<Force>> all = [] {
+    std::vector<Fields<Force>> fields;
+    for (const ForceDescription& kind : OneOfEach()) fields.push_back(FieldsOf(kind));
+    return fields;
+  }();
+  return all;
 }
 
 ForceDescription ReadForce(const JsonNode& node, const Draft& draft) {
-  static const NameList kTypes = {"joint_torque", "joint_spring",  "joint_damper",
-                                  "point_force",  "spring_damper", "drag"};
+  static const NameList types = [] {
+    NameList names;
+    for (ForceDescription& kind : OneOfEach()) names.Add(std::string(PartsOf(kind).name));
+    return names;
+  }();
   std::optional<int> type;
   if (!node.value().is_object()) {
     node.Fail("an object that describes a force");
   } else if (const auto name = node.Required("type", "a force type")) {
-    type = name->Choice(kTypes, "a force type");
+    type = name->Choice(types, "a force type");
   }
-  if (type == 1) return ReadAs(JointSpringFields(), node, draft);
-  if (type == 2) return ReadAs(JointDamperFields(), node, draft);
-  if (type == 3) return ReadAs(PointForceFields(), node, draft);
+  if (!type) return JointTorque{};
+  const auto kind = static_cast<std::size_t>(*type);
+  ForceDescription force = OneOfEach()[kind];
+  const std::vector<BodyPoint*> points = PartsOf(force).points;
   // ends are not known yet: -1 matches no other
-  if (type == 4) return ReadAs(SpringDamperFields(), node, draft, {.from = {-1}, .to = {-1}});
-  if (type == 5) return ReadAs(DragFields(), node, draft);
-  return type ? ReadAs(TorqueFields(), node, draft) : JointTorque{};
+  for (BodyPoint* end : points) end->body = points.size() > 1 ? -1 : end->body;
+  return ReadPart(AllFields()[kind], node, draft, force);
 }
 
 void ReadForces(const JsonNode& node, Draft& draft) {
@@ -167,10 +192,9 @@ void ReadForces(const JsonNode& node, Draft& draft) {
 }  // namespace
 
 FieldValue<Draft> ForcesValue() {
-  const Json kinds = EitherSchema({TorqueFields().Schema(), JointSpringFields().Schema(),
-                                   JointDamperFields().Schema(), PointForceFields().Schema(),
-                                   SpringDamperFields().Schema(), DragFields().Schema()});
-  return By(ArraySchema(Named("force", kinds)), ReadForces);
+  std::vector<Json> kinds;
+  for (const Fields<Force>& fields : AllFields()) kinds.push_back(fields.Schema());
+  return By(ArraySchema(Named("force", EitherSchema(kinds))), ReadForces);
 }
 
 }  // namespace loopbench::harness

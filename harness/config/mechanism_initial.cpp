@@ -5,7 +5,7 @@
 #include <set>
 
 #include "harness/config/mechanism_sections.h"
-#include "harness/json/spelling.h"
+#include "harness/text/spelling.h"
 
 namespace loopbench::harness {
 namespace {

@@ -27,7 +27,7 @@ void ReadRotation(const JsonNode& node, Side& side) {
 }
 
 const Fields<Side>& SideFields() {
-  const Json rotation = EitherSchema({NumberSchema(), ArraySchema(NumberSchema(), 3, 3)});
+  static const Json rotation = EitherSchema({NumberSchema(), ArraySchema(NumberSchema(), 3, 3)});
   static const Fields<Side> fields(
       "side", "A frame of a joint, fixed on a body.",
       {{"body", BodyOf<JointSide>(&JointSide::body, true), "A body's name or \"ground\".",
@@ -42,32 +42,35 @@ const Fields<Side>& SideFields() {
 void ReadAxis(const JsonNode& node, Joint& joint) {
   const Eigen::Vector3d axis = joint.axis = node.Vector();
   const JointType type = joint.type;
-  if (OwnAxis(type) == '-') {
+  if (TraitsOf(type).own_axis == '-') {
     node.Fail(fmt::format("no axis on a {} joint", ToString(type)));
   } else if (axis.isZero()) {
     if (node.value().is_array()) node.Fail("an axis that is not zero");
   } else if (joint.draft->space == SpaceKind::kPlanar) {
     const bool along_z = axis.x() == 0.0 && axis.y() == 0.0 && axis.z() > 0.0;
-    if (OwnAxis(type) == 'z' && !along_z) {
+    if (TraitsOf(type).own_axis == 'z' && !along_z) {
       node.FailWithCure(kSpatialCure, "an axis along +z in a planar mechanism");
     }
-    if (OwnAxis(type) == 'x' && axis.z() != 0.0) {
+    if (TraitsOf(type).own_axis == 'x' && axis.z() != 0.0) {
       node.FailWithCure(kSpatialCure, "an axis with z = 0 in a planar mechanism");
     }
   }
 }
 
-/// A number that one type of joint must have and no other may.
-double ReadParameter(const JsonNode& node, const std::string& key, const JointDescription& joint,
-                     JointType owner, const Range& range, std::string_view what) {
-  if (joint.type == owner) {
-    const auto found = node.Required(key, what);
-    return found ? found->Number(range) : 1.0;
+Range RangeOf(const JointParameter& parameter) { return parameter.positive ? kPositive : Range{}; }
+
+/// A number that joints of some types must have and no other may.
+void ReadParameter(const JsonNode& node, Joint& joint) {
+  for (const JointTraits& traits : kJointTraits) {
+    const std::string key(traits.parameter.key);
+    if (key.empty()) continue;
+    if (traits.name == ToString(joint.type)) {
+      const auto found = node.Required(key, traits.parameter.meaning);
+      joint.parameter = found ? found->Number(RangeOf(traits.parameter)) : 1.0;
+    } else if (const auto found = node.Optional(key)) {
+      found->Fail(fmt::format("no {} on a {} joint", key, ToString(joint.type)));
+    }
   }
-  if (const auto found = node.Optional(key)) {
-    found->Fail(fmt::format("no {} on a {} joint", key, ToString(joint.type)));
-  }
-  return 0.0;
 }
 
 /// A motion of a joint with `speeds` coordinates that may be prescribed, of which some are.
@@ -121,7 +124,7 @@ void ReadMotions(const JsonNode& node, Joint& joint) {
 }
 
 bool IsMissingInPlane(const Joint& joint) {
-  return joint.draft->space == SpaceKind::kPlanar && !ExistsInPlane(joint.type);
+  return joint.draft->space == SpaceKind::kPlanar && !TraitsOf(joint.type).in_plane;
 }
 
 void ReadType(const JsonNode& node, Joint& joint) {
@@ -136,18 +139,17 @@ void CheckSides(const JsonNode& node, Joint& joint) {
       "two different bodies");
 }
 
-void ReadParameters(const JsonNode& node, Joint& joint) {
-  joint.pitch = ReadParameter(node, "pitch", joint, JointType::kHelical, {},
-                              "the advance along the axis per angle [m/rad]");
-  joint.length = ReadParameter(node, "length", joint, JointType::kRod, kPositive,
-                               "the distance of the two points [m]");
-}
-
-/// A key that joints of this type must have and others may not.
-Json OnlyOf(JointType type, const std::string& key) {
-  return {{"if", {{"properties", {{"type", ChoiceSchema({std::string(ToString(type))})}}}}},
-          {"then", Requires({key})},
-          {"else", {{"not", Requires({key})}}}};
+/// Keys that joints of one type must have and others may not.
+Json ParameterRules() {
+  Json rules = Json::array();
+  for (const JointTraits& traits : kJointTraits) {
+    const std::string key(traits.parameter.key);
+    if (key.empty()) continue;
+    rules.push_back({{"if", {{"properties", {{"type", ChoiceSchema({std::string(traits.name)})}}}}},
+                     {"then", Requires({key})},
+                     {"else", {{"not", Requires({key})}}}});
+  }
+  return {{"allOf", rules}};
 }
 
 void ReadNameOfJoint(const JsonNode& node, Joint& joint) {
@@ -155,9 +157,8 @@ void ReadNameOfJoint(const JsonNode& node, Joint& joint) {
 }
 
 const Fields<Joint>& JointFields() {
-  const Json motions = EitherSchema({TimeFunctionSchema(), ArraySchema(MotionFields().Schema())});
-  const Json parameters = {
-      {"allOf", {OnlyOf(JointType::kHelical, "pitch"), OnlyOf(JointType::kRod, "length")}}};
+  static const Json motions =
+      EitherSchema({TimeFunctionSchema(), ArraySchema(MotionFields().Schema())});
   static const Fields<Joint> fields(
       "joint", "From frame F on one body to frame M on another.",
       {{"name", By(TextSchema(), ReadNameOfJoint), "One that no other joint has.", "a name"},
@@ -172,7 +173,7 @@ const Fields<Joint>& JointFields() {
         "Of a revolute (default z) or prismatic joint (default x), not zero."},
        {"pitch", NumberSchema(), "Of a helical joint: advance along its axis per angle [m/rad]."},
        {"length", NumberSchema(kPositive), "Of a rod: distance of its two points [m]."},
-       {"", By(parameters, ReadParameters)},
+       {"", By(ParameterRules(), ReadParameter)},
        {"motion", By(motions, ReadMotions),
         "Coordinates as given functions of time [rad or m]: one function for a joint with one "
         "coordinate, else a list."},
@@ -195,8 +196,7 @@ void ReadJoints(const JsonNode& node, Draft& draft) {
 const NameList& JointTypeNames() {
   static const NameList kNames = [] {
     std::vector<std::string> names;
-    for (int i = 0; i < kNumJointTypes; ++i)
-      names.emplace_back(ToString(static_cast<JointType>(i)));
+    for (const JointTraits& traits : kJointTraits) names.emplace_back(traits.name);
     return names;
   }();
   return kNames;

@@ -21,17 +21,7 @@ std::string ConditionValue(const JsonNode& node) {
 
 }  // namespace
 
-std::string RequiredText(const JsonNode& owner, const std::string& key) {
-  const std::optional<JsonNode> node = owner.Required(key, kAnyText);
-  return node ? node->Text() : "";
-}
-
-std::string OptionalText(const JsonNode& owner, const std::string& key) {
-  const std::optional<JsonNode> node = owner.Optional(key);
-  return node ? node->Text() : "";
-}
-
-Selection ReadSelection(const JsonNode& node) {
+Selection ReadSelection(const JsonNode& node, std::size_t least) {
   Selection selection;
   for (const auto& [key, member] : node.Members()) {
     Condition condition{key, {}};
@@ -40,15 +30,14 @@ Selection ReadSelection(const JsonNode& node) {
     }
     selection.push_back(std::move(condition));
   }
+  if (selection.size() < least && node.value().is_object()) node.Fail("at least one key");
   return selection;
 }
 
-Selection OptionalSelection(const JsonNode& owner, const std::string& key) {
-  const std::optional<JsonNode> node = owner.Optional(key);
-  if (!node) return {};
-  Selection selection = ReadSelection(*node);
-  if (selection.empty() && node->value().is_object()) node->Fail("at least one key");
-  return selection;
+Json SelectionSchema(std::size_t least) {
+  const Json other = {{"type", {"number", "boolean"}}, {"words", "a number, `true`, `false`"}};
+  const Json value = Named("value", EitherSchema({TextSchema(), other}));
+  return Named(least > 0 ? "someSelection" : "selection", MapSchema(OneOrMoreSchema(value), least));
 }
 
 void ReportRepeated(const JsonNode& owner, const std::string& key, const std::string& name,

@@ -3,26 +3,27 @@
 // Internal to harness/config.
 #pragma once
 
+#include <cstddef>
 #include <string>
 #include <vector>
 
-#include "harness/json/json_reader.h"
+#include "harness/json/fields.h"
 #include "harness/record/select.h"
 
 namespace loopbench::harness {
 
 inline constexpr const char* kAnyText = "a string that is not empty";
 
-/// A member that must be a string that is not empty; "" after an error.
-std::string RequiredText(const JsonNode& owner, const std::string& key);
-/// The same where it may be absent.
-std::string OptionalText(const JsonNode& owner, const std::string& key);
+/// {"key": value, "key": [value, ...]} with at least so many keys (none would select everything):
+/// strings, numbers and bools as the texts that a Condition compares with.
+Selection ReadSelection(const JsonNode& node, std::size_t least = 0);
+Json SelectionSchema(std::size_t least = 0);
 
-/// {"key": value, "key": [value, ...]}: strings, numbers and bools as the texts that a Condition
-/// compares with.
-Selection ReadSelection(const JsonNode& node);
-/// The same for a member that may be absent, but not empty: that would select everything.
-Selection OptionalSelection(const JsonNode& owner, const std::string& key);
+template <class T>
+FieldValue<T> SelectionOf(Selection T::*member, std::size_t least = 0) {
+  return {SelectionSchema(least),
+          [=](const JsonNode& node, T& owner) { owner.*member = ReadSelection(node, least); }};
+}
 
 /// Labels and ids name results, so each may be there once: reports `owner`'s `key` where `name` is
 /// among `taken`, and adds it.

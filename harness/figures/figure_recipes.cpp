@@ -11,6 +11,7 @@
 #include <tuple>
 
 #include "harness/analysis/doubts.h"
+#include "harness/config/experiment.h"
 #include "harness/config/formulations.h"
 #include "harness/record/select.h"
 #include "harness/tables/columns.h"
@@ -26,7 +27,7 @@ std::string ColorOf(const Record& record) {
   return absolute ? row->look.absolute : row->look.joint;
 }
 
-double WidthOf(const Record& record) {
+double CurveWidth(const Record& record) {
   const FormulationRow* row = FindFormulation(record.Text("formulation"));
   return row == nullptr ? 2.0 : row->look.width;
 }
@@ -40,7 +41,7 @@ Shape ShapeOf(const Record& record) {
 
 CurveStyle StyleOf(const Record& record) {
   return {.color = ColorOf(record),
-          .width = WidthOf(record),
+          .width = CurveWidth(record),
           .shape = ShapeOf(record),
           .filled = record.Text("solver") != "as-published",
           .doubtful = HasDoubt(record)};
@@ -93,7 +94,7 @@ std::string TitleOf(std::span<const Record> records, std::string_view what) {
 
 std::vector<Curve> DriftCurves(std::span<const Record> records, bool with_fit) {
   std::vector<Record> ordered(records.begin(), records.end());
-  std::ranges::stable_sort(ordered, std::greater(), WidthOf);
+  std::ranges::stable_sort(ordered, std::greater(), CurveWidth);
   std::vector<Curve> curves;
   for (const Record& record : ordered) {
     Curve curve;

@@ -10,10 +10,10 @@
 #include <string_view>
 
 #include "harness/analysis/doubts.h"
-#include "harness/json/config_error.h"
 #include "harness/record/select.h"
 #include "harness/tables/columns.h"
 #include "harness/tables/table.h"
+#include "harness/text/config_error.h"
 
 namespace loopbench::harness {
 namespace {

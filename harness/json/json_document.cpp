@@ -8,9 +8,9 @@
 #include <unordered_set>
 #include <vector>
 
-#include "harness/json/config_error.h"
 #include "harness/json/json_syntax.h"
 #include "harness/json/json_walker.h"
+#include "harness/text/config_error.h"
 
 namespace loopbench::harness {
 namespace {

@@ -7,8 +7,8 @@
 #include <cstddef>
 #include <map>
 
-#include "harness/json/config_error.h"
-#include "harness/json/spelling.h"
+#include "harness/text/config_error.h"
+#include "harness/text/spelling.h"
 
 namespace loopbench::harness {
 namespace {

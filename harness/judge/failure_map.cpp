@@ -9,8 +9,8 @@
 #include <set>
 #include <tuple>
 
-#include "harness/json/spelling.h"
 #include "harness/tables/columns.h"
+#include "harness/text/spelling.h"
 
 namespace loopbench::harness {
 namespace {

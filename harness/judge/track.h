@@ -4,8 +4,8 @@
 #include <string>
 #include <vector>
 
+#include "harness/judge/tracker_json.h"
 #include "harness/record/record.h"
-#include "harness/store/tracker_json.h"
 
 namespace loopbench::harness {
 

@@ -41,8 +41,9 @@ std::string VersionText() {
 
 const std::string& CodeVersion() {
   static const std::string version = [] {
-    std::ifstream file("/proc/self/exe", std::ios::binary);
-    const std::string bytes{std::istreambuf_iterator<char>(file), {}};
+    constexpr const char* kProgram = "/proc/self/exe";
+    std::string bytes(std::filesystem::file_size(kProgram), '\0');
+    std::ifstream(kProgram, std::ios::binary).read(bytes.data(), std::ssize(bytes));
     return Fnv1a(bytes);
   }();
   return version;

@@ -10,7 +10,7 @@
 #include <optional>
 #include <system_error>
 
-#include "harness/json/config_error.h"
+#include "harness/text/config_error.h"
 
 namespace loopbench::harness {
 namespace {

@@ -2,8 +2,8 @@
 
 #include "harness/config/limits_record.h"
 #include "harness/record/provenance.h"
+#include "harness/record/record_json.h"
 #include "harness/run/compiled_scene.h"
-#include "harness/store/record_json.h"
 #include "harness/text/hash.h"
 
 namespace loopbench::harness {

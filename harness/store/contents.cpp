@@ -7,7 +7,7 @@
 #include <set>
 #include <stdexcept>
 
-#include "harness/store/record_json.h"
+#include "harness/record/record_json.h"
 
 namespace loopbench::harness {
 namespace {

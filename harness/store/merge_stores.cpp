@@ -10,7 +10,7 @@
 #include <string_view>
 #include <utility>
 
-#include "harness/store/record_json.h"
+#include "harness/record/record_json.h"
 
 namespace loopbench::harness {
 namespace {

@@ -13,10 +13,10 @@
 
 #include "harness/json/json_document.h"
 #include "harness/json/json_syntax.h"
+#include "harness/record/excerpt.h"
 #include "harness/record/measures.h"
-#include "harness/store/excerpt.h"
-#include "harness/store/record_checksum.h"
-#include "harness/store/record_json.h"
+#include "harness/record/record_checksum.h"
+#include "harness/record/record_json.h"
 
 namespace loopbench::harness {
 namespace {

@@ -8,9 +8,9 @@
 #include <stdexcept>
 #include <string_view>
 
+#include "harness/record/excerpt.h"
+#include "harness/record/record_json.h"
 #include "harness/store/contents.h"
-#include "harness/store/excerpt.h"
-#include "harness/store/record_json.h"
 #include "harness/store/store_lock.h"
 #include "harness/text/files.h"
 

@@ -8,7 +8,7 @@
 #include <vector>
 
 #include "harness/record/record.h"
-#include "harness/store/record_json.h"
+#include "harness/record/record_json.h"
 
 namespace loopbench::harness {
 

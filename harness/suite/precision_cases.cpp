@@ -6,11 +6,11 @@
 #include <cmath>
 #include <set>
 
-#include "harness/json/config_error.h"
+#include "harness/record/record_json.h"
 #include "harness/run/case_identity.h"
 #include "harness/run/compiled_scene.h"
-#include "harness/store/record_json.h"
 #include "harness/suite/suite.h"
+#include "harness/text/config_error.h"
 #include "mechanism/model/mechanism.h"
 
 namespace loopbench::harness {

@@ -13,7 +13,6 @@
 
 #include "harness/isolation/fault.h"
 #include "harness/isolation/processes.h"
-#include "harness/json/config_error.h"
 #include "harness/record/noise.h"
 #include "harness/record/origin.h"
 #include "harness/record/provenance.h"
@@ -21,6 +20,7 @@
 #include "harness/run/run_case.h"
 #include "harness/suite/precision_cases.h"
 #include "harness/suite/progress.h"
+#include "harness/text/config_error.h"
 #include "harness/text/terminal.h"
 #include "harness/timing/time_cases.h"
 

@@ -6,9 +6,9 @@
 #include <map>
 #include <utility>
 
-#include "harness/json/config_error.h"
-#include "harness/json/spelling.h"
 #include "harness/tables/columns.h"
+#include "harness/text/config_error.h"
+#include "harness/text/spelling.h"
 
 namespace loopbench::harness {
 namespace {

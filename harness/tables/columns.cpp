@@ -34,7 +34,7 @@ TableColumn Short(string_view key, const char* header,
 
 std::vector<std::pair<std::string, std::string>> AbbreviatedLevels() {
   std::vector<std::pair<std::string, std::string>> pairs;
-  for (const LevelTraits& level : kLevels) pairs.emplace_back(level.name, level.abbreviation);
+  for (const LevelTraits& level : kLevelTraits) pairs.emplace_back(level.name, level.abbreviation);
   return pairs;
 }
 

@@ -9,8 +9,8 @@
 #include <map>
 
 #include "harness/config/formulations.h"
-#include "harness/json/config_error.h"
 #include "harness/tables/columns.h"
+#include "harness/text/config_error.h"
 
 namespace loopbench::harness {
 namespace {

@@ -5,7 +5,7 @@
 #include <stdexcept>
 #include <string_view>
 
-#include "harness/store/record_json.h"
+#include "harness/record/record_json.h"
 #include "harness/tables/columns.h"
 #include "harness/tables/table.h"
 #include "harness/text/escape.h"

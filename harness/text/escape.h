@@ -2,7 +2,7 @@
 //
 // Texts come from files that may have been written by anybody. Every writer passes them through the
 // function of its medium, so that what is drawn or printed is the text and never an instruction.
-// JSON is the exception: its writer (harness/store/record_json.h) keeps every character.
+// JSON is the exception: its writer (harness/record/record_json.h) keeps every character.
 #pragma once
 
 #include <string>

@@ -14,7 +14,7 @@
 
 #include "harness/config/benchmark_reader.h"
 #include "harness/record/origin.h"
-#include "harness/store/record_json.h"
+#include "harness/record/record_json.h"
 #include "harness/text/files.h"
 #include "harness/text/numeric_option.h"
 #include "harness/text/terminal.h"

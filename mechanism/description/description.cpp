@@ -3,8 +3,6 @@
 #include <Eigen/Cholesky>
 #include <cmath>
 
-#include "mechanism/description/force_validation.h"
-
 namespace loopbench {
 
 namespace {
@@ -28,7 +26,7 @@ std::string CheckBody(const BodyDescription& body) {
 
 /// A planar scene turns about z only: anything that tips or leaves the plane is refused.
 std::string CheckPlanarJoint(const JointDescription& joint) {
-  if (!ExistsInPlane(joint.type)) {
+  if (!TraitsOf(joint.type).in_plane) {
     return "joint " + Quote(joint.name) + ": a " + std::string(ToString(joint.type)) +
            " joint does not exist in the plane";
   }
@@ -41,8 +39,9 @@ std::string CheckPlanarJoint(const JointDescription& joint) {
     return "joint " + Quote(joint.name) + ": its frames may turn about z only in a planar scene";
   }
   if (joint.axis.isZero()) return "";
-  const bool fits =
-      OwnAxis(joint.type) == 'x' ? flat(joint.axis) : about_z(joint.axis) && joint.axis.z() > 0;
+  const bool fits = TraitsOf(joint.type).own_axis == 'x'
+                        ? flat(joint.axis)
+                        : about_z(joint.axis) && joint.axis.z() > 0;
   if (!fits) return "joint " + Quote(joint.name) + ": its axis does not belong to the plane";
   return "";
 }
@@ -84,11 +83,13 @@ std::string CheckJoint(const MechanismDescription& description, const JointDescr
       !joint.axis.allFinite()) {
     return "joint " + Quote(joint.name) + ": positions, rotations and axis must be finite";
   }
-  if (!std::isfinite(joint.pitch) || !std::isfinite(joint.length)) {
+  const JointParameter& parameter = TraitsOf(joint.type).parameter;
+  if (!std::isfinite(joint.parameter)) {
     return "joint " + Quote(joint.name) + ": pitch and length must be finite";
   }
-  if (joint.type == JointType::kRod && !(joint.length > 0.0)) {
-    return "joint " + Quote(joint.name) + ": a rod needs a length > 0";
+  if (parameter.positive && !(joint.parameter > 0.0)) {
+    return "joint " + Quote(joint.name) + ": a " + std::string(ToString(joint.type)) + " needs a " +
+           std::string(parameter.key) + " > 0";
   }
   if (const std::string error = CheckMotions(description.space, joint); !error.empty()) {
     return "joint " + Quote(joint.name) + ": " + error;
@@ -120,10 +121,6 @@ std::string CheckValues(const MechanismDescription& description,
 }
 
 }  // namespace
-
-std::string_view ToString(SpaceKind space) {
-  return space == SpaceKind::kPlanar ? "planar" : "spatial";
-}
 
 std::string Validate(const MechanismDescription& description) {
   if (description.bodies.size() < 2) return "a mechanism needs at least one body besides ground";

@@ -9,45 +9,13 @@
 #include <map>
 #include <string>
 #include <string_view>
-#include <variant>
 #include <vector>
 
+#include "mechanism/description/force.h"
+#include "mechanism/description/joint_type.h"
 #include "mechanism/description/time_function.h"
 
 namespace loopbench {
-
-/// Index of Ground in every list of bodies.
-inline constexpr int kGround = 0;
-
-enum class SpaceKind { kPlanar, kSpatial };
-
-/// What a joint leaves free. The coordinates and directions of each are defined in joint.h. From
-/// cylindrical on they exist in space only.
-enum class JointType {
-  kRevolute,
-  kPrismatic,
-  kWeld,
-  kFree,
-  kPinInSlot,
-  kRod,
-  kCylindrical,
-  kSpherical,
-  kPlanar,
-  kUniversal,
-  kHelical,
-};
-inline constexpr int kNumJointTypes = 11;
-
-std::string_view ToString(JointType type);
-/// Whether a planar scene may have it.
-bool ExistsInPlane(JointType type);
-/// The axis of a joint's own frames that JointDescription::axis names: 'x' (slides along it), 'z'
-/// (turns about it, or is normal to its plane), or '-' for joints without one.
-char OwnAxis(JointType type);
-/// Coordinates (or speeds) of a joint that a user can give: none for a rod, which is never
-/// followed.
-int NumValues(JointType type, SpaceKind space, bool speeds);
-std::string_view ToString(SpaceKind space);
 
 /// A rigid body. All vectors in body axes from the body's origin.
 struct BodyDescription {
@@ -77,12 +45,11 @@ struct JointDescription {
   JointType type = JointType::kRevolute;
   JointSide from;  ///< P and F
   JointSide to;    ///< Q and M
-  /// Joint axis in the axes of both frames before alignment: the joint's own axis (OwnAxis()) is
+  /// Joint axis in the axes of both frames before alignment: the joint's own axis (JointTraits) is
   /// turned onto it. Zero means the own axis as it is.
   Eigen::Vector3d axis = Eigen::Vector3d::Zero();
-  double pitch = 0.0;   ///< of a helical joint: advance along its axis per angle [m/rad]
-  double length = 0.0;  ///< of a rod: distance between its two points [m], > 0
-  bool cut = false;     ///< never part of the spanning tree (if the graph allows)
+  double parameter = 0.0;  ///< of its kind (JointParameter): a pitch [m/rad], a length [m]
+  bool cut = false;        ///< never part of the spanning tree (if the graph allows)
   /// Constrained directions, counted in the order of joint.h's D from 0, that the joint does not
   /// impose because the others do (redundancy.h). Of cut joints only; none of a user's file.
   std::vector<int> released;
@@ -91,64 +58,6 @@ struct JointDescription {
   Eigen::Matrix3d force_axes = Eigen::Matrix3d::Identity();
   std::vector<PrescribedMotion> motions;  ///< at most one per coordinate; none with a quaternion
 };
-
-/// Given moment (revolute) [N m] or force (prismatic) [N] on `to`, its opposite on `from`: constant
-/// (a polynomial of one coefficient; it has a potential) or a function of time (it supplies power).
-struct JointTorque {
-  int joint = 0;
-  TimeFunctionDescription value = Polynomial{{0.0}};
-};
-
-/// Linear spring on the joint's coordinate: preload - stiffness * (q - rest).
-struct JointSpring {
-  int joint = 0;
-  double stiffness = 0.0;  ///< [N m/rad] or [N/m], >= 0
-  double rest = 0.0;       ///< coordinate at which only the preload is left [rad] or [m]
-  double preload = 0.0;    ///< [N m] or [N]
-};
-
-/// Linear damper on the joint's speed: -damping * u.
-struct JointDamper {
-  int joint = 0;
-  double damping = 0.0;  ///< [N m s/rad] or [N s/m], >= 0
-};
-
-/// Constant force at a material point of a body.
-struct PointForce {
-  int body = kGround;
-  Eigen::Vector3d at = Eigen::Vector3d::Zero();     ///< in body axes from the body's origin [m]
-  Eigen::Vector3d force = Eigen::Vector3d::Zero();  ///< [N]
-  bool in_body_axes = false;                        ///< force turns with the body
-};
-
-/// A material point of a body.
-struct BodyPoint {
-  int body = kGround;
-  Eigen::Vector3d at = Eigen::Vector3d::Zero();  ///< in body axes from the body's origin [m]
-};
-
-/// Spring and damper between points of two bodies: with their distance d, the tension
-///   T = preload + stiffness (d - length) + damping ddot
-/// pulls them together (T < 0 pushes them apart). Where the points meet, d = 0, there is no
-/// direction to pull in and no force: an equilibrium, by the symmetry of all directions, and
-/// unless T is proportional to d a jump that an integrator meets as such.
-struct SpringDamper {
-  BodyPoint from, to;      ///< of different bodies; one may be Ground
-  double stiffness = 0.0;  ///< [N/m], >= 0
-  double damping = 0.0;    ///< [N s/m], >= 0
-  double length = 0.0;     ///< distance at which the spring is free [m], >= 0
-  double preload = 0.0;    ///< tension at that distance [N]
-};
-
-/// Resistance of a medium at rest at a material point of velocity v: -(linear + quadratic |v|) v.
-struct Drag {
-  BodyPoint point;
-  double linear = 0.0;     ///< [N s/m], >= 0
-  double quadratic = 0.0;  ///< [N s^2/m^2], >= 0
-};
-
-using ForceDescription =
-    std::variant<JointTorque, JointSpring, JointDamper, PointForce, SpringDamper, Drag>;
 
 /// Initial values of one joint's coordinates or speeds (one number; free joints: see joint.h).
 struct JointValues {

@@ -19,12 +19,10 @@ MechanismDescription InSpace(const MechanismDescription& planar, const Eigen::Ve
     }
   }
   for (ForceDescription& force : spatial.forces) {
-    if (auto* point = std::get_if<PointForce>(&force); point != nullptr) {
-      if (!point->in_body_axes) point->force = R * point->force;
-    } else if (auto* spring = std::get_if<SpringDamper>(&force); spring != nullptr) {
-      for (BodyPoint* end : {&spring->from, &spring->to}) {
-        if (end->body == kGround) end->at = R * end->at;
-      }
+    const ForceParts parts = PartsOf(force);
+    if (parts.force != nullptr && !*parts.in_body_axes) *parts.force = R * *parts.force;
+    for (BodyPoint* point : parts.points) {
+      if (point->body == kGround) point->at = R * point->at;
     }
   }
   return spatial;

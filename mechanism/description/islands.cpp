@@ -19,28 +19,6 @@ class Sets {
   std::vector<int> parent_;
 };
 
-/// What a force connects.
-struct Connects {
-  Sets& sets;
-  int num_bodies;
-
-  void operator()(const JointTorque&) const {}  // along a joint, which connects anyway
-  void operator()(const JointSpring&) const {}
-  void operator()(const JointDamper&) const {}
-  void operator()(const PointForce&) const {}  // on one body
-  void operator()(const Drag&) const {}
-  void operator()(const SpringDamper& force) const {
-    if (force.from.body != kGround && force.to.body != kGround) {
-      sets.Unite(force.from.body, force.to.body);
-    }
-  }
-  /// Of forces not listed here nothing is known: they may connect all.
-  template <class Other>
-  void operator()(const Other&) const {
-    for (int body = 2; body < num_bodies; ++body) sets.Unite(1, body);
-  }
-};
-
 }  // namespace
 
 std::vector<Island> FindIslands(const MechanismDescription& description, Connection connection) {
@@ -52,8 +30,11 @@ std::vector<Island> FindIslands(const MechanismDescription& description, Connect
     }
   }
   if (connection == Connection::kJointsAndForces) {
-    const Connects connects{sets, num_bodies};
-    for (const ForceDescription& force : description.forces) std::visit(connects, force);
+    for (ForceDescription force : description.forces) {
+      const std::vector<BodyPoint*> points = PartsOf(force).points;
+      if (points.size() < 2 || points[0]->body == kGround || points[1]->body == kGround) continue;
+      sets.Unite(points[0]->body, points[1]->body);
+    }
   }
   std::vector<Island> islands;
   std::vector<int> island_of_root(description.bodies.size(), -1);

@@ -14,7 +14,7 @@ Pose<Spatial, double> PoseOf(const JointSide& side) {
 
 Eigen::Matrix3d AxisAlignment(const JointDescription& joint) {
   if (joint.axis.isZero()) return Eigen::Matrix3d::Identity();
-  const bool along_x = OwnAxis(joint.type) == 'x';
+  const bool along_x = TraitsOf(joint.type).own_axis == 'x';
   const Eigen::Vector3d own = along_x ? Eigen::Vector3d::UnitX() : Eigen::Vector3d::UnitZ();
   const Eigen::Vector3d axis = joint.axis.normalized(), normal = own.cross(axis);
   const double s = normal.norm(), c = own.dot(axis);

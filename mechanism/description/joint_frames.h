@@ -9,8 +9,8 @@ namespace loopbench {
 /// The frame of a side in body axes, the joint's axis not included.
 Pose<Spatial, double> PoseOf(const JointSide& side);
 
-/// Turns a joint's own axis (OwnAxis) onto the described one, by the shortest rotation. The joint's
-/// frames are those of PoseOf() times this.
+/// Turns a joint's own axis (JointTraits) onto the described one, by the shortest rotation. The
+/// joint's frames are those of PoseOf() times this.
 Eigen::Matrix3d AxisAlignment(const JointDescription& joint);
 
 }  // namespace loopbench

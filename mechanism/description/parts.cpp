@@ -8,34 +8,20 @@ namespace loopbench {
 namespace {
 
 /// Renumbers a force. False when there is nothing left for it to do.
-struct Kept {
-  const Renumbering& renumbering;
-
-  template <class JointForce>
-  requires requires(JointForce f) { f.joint; }
-  bool operator()(JointForce& f) const {
-    f.joint = renumbering.joints[f.joint];
-    return f.joint >= 0;
+bool Keep(const ForceParts& force, const Renumbering& renumbering) {
+  if (force.joint != nullptr) {
+    *force.joint = renumbering.joints[*force.joint];
+    return *force.joint >= 0;
   }
-  bool operator()(PointForce& f) const { return Moves(&f.body); }
-  bool operator()(Drag& f) const { return Moves(&f.point.body); }
-  bool operator()(SpringDamper& f) const {
-    const bool from = Moves(&f.from.body), to = Moves(&f.to.body);
-    const bool lost = f.from.body < 0 || f.to.body < 0;  // another part's
-    return !lost && (from || to) && f.from.body != f.to.body;
+  bool moves = false, lost = false;  // another part's
+  for (BodyPoint* point : force.points) {
+    point->body = renumbering.bodies[point->body];
+    moves = moves || point->body > kGround;
+    lost = lost || point->body < 0;
   }
-  /// What is not known has not been renumbered (KnowsForces, FindIslands).
-  template <class Other>
-  bool operator()(Other&) const {
-    return true;
-  }
-
- private:
-  bool Moves(int* body) const {
-    *body = renumbering.bodies[*body];
-    return *body > kGround;
-  }
-};
+  const bool on_itself = force.points.size() > 1 && force.points[0]->body == force.points[1]->body;
+  return moves && !lost && !on_itself;
+}
 
 /// Names of independent speeds that still exist. A list with a gap is of no use: all or none.
 std::vector<std::string> KeptNames(const MechanismDescription& old, const Renumbering& kept) {
@@ -78,17 +64,16 @@ MechanismDescription Select(const MechanismDescription& description,
   for (std::size_t j = 0; j < joints.size(); ++j) {
     if (renumbering.joints[j] < 0) continue;
     // And a new member of a joint: what it says must survive a change of the frames' bodies.
-    const auto& [joint_name, type, from, to, axis, pitch, length, cut, released, force_axes,
-                 motions] = joints[j];
-    JointDescription joint{joint_name, type, from,     to,         axis,   pitch,
-                           length,     cut,  released, force_axes, motions};
+    const auto& [joint_name, type, from, to, axis, parameter, cut, released, force_axes, motions] =
+        joints[j];
+    JointDescription joint{joint_name, type, from,     to,         axis,
+                           parameter,  cut,  released, force_axes, motions};
     joint.from.body = renumbering.bodies[from.body];
     joint.to.body = renumbering.bodies[to.body];
     part.joints.push_back(joint);
   }
-  const Kept kept{renumbering};
   for (ForceDescription force : forces) {
-    if (std::visit(kept, force)) part.forces.push_back(force);
+    if (Keep(PartsOf(force), renumbering)) part.forces.push_back(force);
   }
   part.initial.coordinates = KeptValues(initial.coordinates, renumbering);
   part.initial.speeds = KeptValues(initial.speeds, renumbering);

@@ -1,7 +1,5 @@
 #include "mechanism/description/similarity.h"
 
-#include "mechanism/description/joint_traits.h"
-
 namespace loopbench {
 
 namespace {
@@ -28,61 +26,41 @@ class Scaling {
       body.inertia *= factor_ * factor_;
       for (auto& [name, point] : body.points) point *= factor_;
     }
-    for (JointDescription& joint : scene_.joints) {
+    for (std::size_t index = 0; index < scene_.joints.size(); ++index) {
+      JointDescription& joint = scene_.joints[index];
       joint.from.position *= factor_;
       joint.to.position *= factor_;
-      joint.pitch *= factor_;
-      joint.length *= factor_;
+      joint.parameter *= factor_;
       for (PrescribedMotion& motion : joint.motions) {
-        const bool is_length =
-            motion.coordinate >= CountValues(joint.type, scene_.space, false).angles;
-        if (is_length) Scale(motion.value, factor_);
+        if (IsLength(index, motion.coordinate, false)) Scale(motion.value, factor_);
       }
     }
-    for (ForceDescription& force : scene_.forces) {
-      std::visit([this](auto& one) { Force(one); }, force);
-    }
+    for (ForceDescription& force : scene_.forces) Force(PartsOf(force));
     Values(scene_.initial.coordinates, false);
     Values(scene_.initial.speeds, true);
   }
 
  private:
-  /// Of a coordinate: 1 for an angle, the factor for a length.
-  double UnitOf(int joint) const {
-    return CountValues(scene_.joints[joint].type, scene_.space, false).angles > 0 ? 1.0 : factor_;
+  /// Whether a coordinate or speed is one: else it is an angle.
+  bool IsLength(std::size_t joint, int coordinate, bool speeds) const {
+    const auto words = ValueWords(scene_.joints[joint].type, scene_.space, speeds);
+    return coordinate < std::ssize(words) && words[coordinate].is_length();
   }
-  /// Of the moment or force that works on it: energies scale with the factor's square.
-  double EffortOf(int joint) const { return factor_ * factor_ / UnitOf(joint); }
-
-  void Force(JointTorque& torque) const { Scale(torque.value, EffortOf(torque.joint)); }
-  void Force(JointSpring& spring) const {
-    spring.stiffness *= EffortOf(spring.joint) / UnitOf(spring.joint);
-    spring.rest *= UnitOf(spring.joint);
-    spring.preload *= EffortOf(spring.joint);
-  }
-  void Force(JointDamper& damper) const {
-    damper.damping *= EffortOf(damper.joint) / UnitOf(damper.joint);
-  }
-  void Force(PointForce& point) const {
-    point.at *= factor_;
-    point.force *= factor_;
-  }
-  void Force(SpringDamper& spring) const {
-    spring.from.at *= factor_;
-    spring.to.at *= factor_;
-    spring.length *= factor_;
-    spring.preload *= factor_;
-  }
-  void Force(Drag& drag) const {
-    drag.point.at *= factor_;
-    drag.quadratic /= factor_;
+  void Force(const ForceParts& parts) const {
+    const bool is_length = parts.joint == nullptr || IsLength(*parts.joint, 0, false);
+    for (BodyPoint* point : parts.points) point->at *= factor_;
+    if (parts.force != nullptr) *parts.force *= factor_;
+    if (parts.value != nullptr)
+      Scale(*parts.value, AtScale(1.0, Quantity::kEffort, is_length, factor_));
+    for (const ForceNumber& number : parts.numbers) {
+      *number.value = loopbench::AtScale(*number.value, number.quantity, is_length, factor_);
+    }
   }
 
   void Values(std::vector<JointValues>& list, bool speeds) const {
     for (JointValues& given : list) {
-      const int angles = CountValues(scene_.joints[given.joint].type, scene_.space, speeds).angles;
-      for (int i = angles; i < static_cast<int>(given.values.size()); ++i) {
-        given.values[static_cast<std::size_t>(i)] *= factor_;
+      for (int i = 0; i < std::ssize(given.values); ++i) {
+        if (IsLength(given.joint, i, speeds)) given.values[i] *= factor_;
       }
     }
   }

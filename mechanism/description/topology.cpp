@@ -35,18 +35,14 @@ class DisjointSets {
 std::vector<int> CutPreference(const MechanismDescription& description) {
   std::vector<int> preference(description.joints.size(), 1);
   const auto keep = [&](int joint) { preference[joint] = 0; };
-  for (const ForceDescription& force : description.forces) {
-    std::visit(
-        [&](const auto& f) {
-          if constexpr (requires { f.joint; }) keep(f.joint);
-        },
-        force);
+  for (ForceDescription force : description.forces) {
+    if (const int* joint = PartsOf(force).joint; joint != nullptr) keep(*joint);
   }
   for (const JointValues& values : description.initial.coordinates) keep(values.joint);
   for (const JointValues& values : description.initial.speeds) keep(values.joint);
   for (std::size_t i = 0; i < preference.size(); ++i) {
     const JointDescription& joint = description.joints[i];
-    if (!joint.motions.empty() || joint.type == JointType::kHelical) preference[i] = -1;
+    if (!joint.motions.empty() || TraitsOf(joint.type).cut_last) preference[i] = -1;
     if (joint.cut) preference[i] = 2;
   }
   return preference;

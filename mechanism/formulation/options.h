@@ -33,7 +33,7 @@ struct LevelTraits {
 };
 
 /// In the order of Enforcement.
-inline constexpr std::array<LevelTraits, 4> kLevels = {{
+inline constexpr std::array<LevelTraits, 4> kLevelTraits = {{
     {"acceleration", "accel", DriftGrowth::kSquare,
      "the loops' accelerations are imposed. Speeds and positions follow by integration, and errors "
      "in them stay."},
@@ -48,7 +48,7 @@ inline constexpr std::array<LevelTraits, 4> kLevels = {{
 }};
 
 constexpr const LevelTraits& TraitsOf(Enforcement level) {
-  return kLevels[static_cast<std::size_t>(level)];
+  return kLevelTraits[static_cast<std::size_t>(level)];
 }
 
 /// Gains [1/s] of Baumgarte's stabilisation: a mismatch e of positions obeys

@@ -1,79 +1,67 @@
-// The forces of a description compiled for one space and scalar: points from centres of mass,
-// coefficients summed up by kind. forces.cpp says what they do.
+// The forces of a description compiled for one space and scalar.
 #pragma once
 
-#include <string>
+#include <algorithm>
+#include <utility>
+#include <variant>
 #include <vector>
 
-#include "mechanism/algebra/space.h"
-#include "mechanism/description/description.h"
+#include "mechanism/model/force_joint.h"
+#include "mechanism/model/force_point.h"
+#include "mechanism/model/force_spring.h"
 
 namespace loopbench {
 
-/// A description's 3-vector in the components of the space.
-template <class Space, class S>
-Linear<Space, S> ToLinear(const Eigen::Vector3d& v) {
-  return v.head<Space::kLin>().template cast<S>();
-}
-
-/// Spring, damper and constant force along the coordinate of a joint:
-/// tau = value - stiffness (q - rest) - damping u. A preload is part of the value.
-template <class S>
-struct JointForce {
-  int joint = 0;
-  S value = S(0), stiffness = S(0), rest = S(0), damping = S(0);
+/// One of all kinds.
+template <class Space, class S, class Descriptions = ForceDescription>
+struct AnyForceElement;
+template <class Space, class S, class... Descriptions>
+struct AnyForceElement<Space, S, std::variant<Descriptions...>> {
+  using Type = std::variant<ForceElement<Space, S, Descriptions>...>;
 };
 
-/// tau(t) along the coordinate of a joint.
-struct TimedTorque {
-  int joint = 0;
-  TimeFunction value;
-};
-
+/// All of a mechanism, in the order of the description.
 template <class Space, class S>
-struct PointOfBody {
-  int body = 0;
-  Linear<Space, S> at;  ///< from the centre of mass, body axes
-};
+class ForceElements {
+ public:
+  ForceElements() = default;
+  /// `description` must be valid.
+  explicit ForceElements(const MechanismDescription& description) {
+    for (const ForceDescription& force : description.forces) {
+      std::visit(
+          [&]<class Description>(const Description& one) {
+            elements_.emplace_back(std::in_place_type<ForceElement<Space, S, Description>>, one,
+                                   description);
+          },
+          force);
+    }
+  }
 
-template <class Space, class S>
-struct BodyForce {
-  PointOfBody<Space, S> point;
-  Linear<Space, S> force;
-  bool in_body_axes = false;
-};
-
-/// See SpringDamper.
-template <class Space, class S>
-struct PointSpring {
-  PointOfBody<Space, S> from, to;
-  S stiffness = S(0), damping = S(0), length = S(0), preload = S(0);
-};
-
-/// See Drag.
-template <class Space, class S>
-struct PointDrag {
-  PointOfBody<Space, S> point;
-  S linear = S(0), quadratic = S(0);
-};
-
-/// All of a mechanism, by kind and in the order of the description.
-template <class Space, class S>
-struct ForceElements {
-  std::vector<JointForce<S>> joint_forces;
-  std::vector<TimedTorque> timed_torques;
-  std::vector<BodyForce<Space, S>> body_forces;
-  std::vector<PointSpring<Space, S>> point_springs;
-  std::vector<PointDrag<Space, S>> drags;
+  /// Calls visit(element) for each.
+  template <class Visit>
+  void ForEach(Visit visit) const {
+    for (const auto& element : elements_) std::visit(visit, element);
+  }
 
   /// Whether any of them has no potential.
-  bool has_power() const;
+  bool has_power() const {
+    bool any = false;
+    ForEach([&](const auto& element) { any = any || element.has_power(); });
+    return any;
+  }
   /// Knots of all functions of time [s], ascending, each once.
-  std::vector<double> Knots() const;
-};
+  std::vector<double> Knots() const {
+    std::vector<double> knots;
+    ForEach([&](const auto& element) {
+      knots.insert(knots.end(), element.knots().begin(), element.knots().end());
+    });
+    std::ranges::sort(knots);
+    knots.erase(std::ranges::unique(knots).begin(), knots.end());
+    return knots;
+  }
 
-/// `description` must be valid.
-template <class Space, class S>
-ForceElements<Space, S> CompileForces(const MechanismDescription& description);
+ private:
+  std::vector<typename AnyForceElement<Space, S>::Type> elements_;
+};
 
 }  // namespace loopbench

@@ -26,7 +26,14 @@ template <class Space, class S>
 JointKind<Space, S> KindWith(JointType type, S parameter) {
   JointKind<Space, S> kind = KindOf<Space, S>(type);
   kind.parameter = parameter;
-  if (type == JointType::kHelical) kind.inverse_H_squared = S(1) / (S(1) + parameter * parameter);
+  if (kind.basis != nullptr && kind.num_u > 0) {
+    // columns of H are as long at every pose
+    Pose<Space, S> X;
+    X.p = Linear<Space, S>::UnitX();
+    Block<Space, S> basis;
+    kind.basis(X, basis, parameter);
+    kind.inverse_H_squared = S(1) / basis.col(0).squaredNorm();
+  }
   return kind;
 }
 

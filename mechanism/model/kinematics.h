@@ -152,14 +152,7 @@ struct Energy {
 template <class Space, class S>
 Energy<S> ComputeEnergy(const Kinematics<Space, S>& kinematics);
 
-/// Power [W] of the forces without a potential, at time(), position and speed:
-///   d/dt (kinetic + potential) = supplied - dissipated
-/// where the joints themselves do no work.
-template <class S>
-struct Power {
-  S supplied = S(0);    ///< torques that depend on time, forces that turn with a body; any sign
-  S dissipated = S(0);  ///< dampers and drag; >= 0
-};
+/// What forces without a potential supply and dissipate (force_element.h).
 template <class Space, class S>
 Power<S> AppliedPower(const Kinematics<Space, S>& kinematics);
 

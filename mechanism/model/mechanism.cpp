@@ -43,7 +43,7 @@ Pose<Space, S> SidePose(const JointSide& side, const JointDescription& joint,
   Eigen::Matrix3d R = AxisAlignment(joint);
   if (turn > 0.0) R = Eigen::AngleAxisd(turn, side.rotation / turn).toRotationMatrix() * R;
   double angle = side.rotation.z();
-  if (OwnAxis(joint.type) == 'x' && !joint.axis.isZero()) {
+  if (TraitsOf(joint.type).own_axis == 'x' && !joint.axis.isZero()) {
     angle += std::atan2(joint.axis.y(), joint.axis.x());
   }
   return MakePose<Space, S>(side.position - com, R, angle);
@@ -81,7 +81,7 @@ Mechanism<Space, S>::Mechanism(const MechanismDescription& description, Coordina
   }
   AddBodies(description);
   AddJoints(description, BuildTopology(description, coordinates));
-  forces_ = CompileForces<Space, S>(description);
+  forces_ = ForceElements<Space, S>(description);
   AddStopTimes();
   AddGeometry(description);
   NameSpeeds(description);
@@ -111,10 +111,9 @@ Joint<Space, S> Mechanism<Space, S>::MakeJoint(const MechanismDescription& descr
   const JointDescription& user = description.joints[index];
   Joint<Space, S> joint;
   joint.kind = &KindOf<Space, S>(user.type);
-  if (user.type == JointType::kHelical || user.type == JointType::kRod) {
-    const double parameter = user.type == JointType::kRod ? user.length : user.pitch;
-    own_kinds_.push_back(
-        std::make_shared<const JointKind<Space, S>>(KindWith<Space, S>(user.type, S(parameter))));
+  if (!TraitsOf(user.type).parameter.key.empty()) {
+    own_kinds_.push_back(std::make_shared<const JointKind<Space, S>>(
+        KindWith<Space, S>(user.type, S(user.parameter))));
     joint.kind = own_kinds_.back().get();
   }
   joint.from = user.from.body;

@@ -11,19 +11,6 @@ namespace {
 using Matrix3 = Eigen::Matrix3d;
 using Vector3 = Eigen::Vector3d;
 
-struct IsKnown {
-  bool operator()(const JointTorque&) const { return true; }
-  bool operator()(const JointSpring&) const { return true; }
-  bool operator()(const JointDamper&) const { return true; }
-  bool operator()(const PointForce&) const { return true; }
-  bool operator()(const SpringDamper&) const { return true; }
-  bool operator()(const Drag&) const { return true; }
-  template <class Other>
-  bool operator()(const Other&) const {
-    return false;
-  }
-};
-
 /// Inertia of a point mass m at r.
 Matrix3 PointInertia(double m, const Vector3& r) {
   return m * (r.squaredNorm() * Matrix3::Identity() - r * r.transpose());
@@ -55,21 +42,7 @@ void MoveSide(const Attachment& at, SpaceKind space, JointSide* side) {
   side->rotation = turned.angle() * turned.axis();
 }
 
-/// A point of a body, seen from the carrier.
-void MovePoint(const std::vector<Attachment>& attachments, int* body, Vector3* at) {
-  const Attachment& attachment = attachments[*body];
-  if (!attachment.attached) return;
-  *body = attachment.carrier;
-  *at = attachment.X.R * *at + attachment.X.p;
-}
-
 }  // namespace
-
-bool KnowsForces(const MechanismDescription& description) {
-  return std::ranges::all_of(description.forces, [](const ForceDescription& force) {
-    return std::visit(IsKnown(), force);
-  });
-}
 
 MechanismDescription Attach(const MechanismDescription& description,
                             const std::vector<Attachment>& attachments, Renumbering* renumbering) {
@@ -102,15 +75,12 @@ MechanismDescription Attach(const MechanismDescription& description,
     if (joint.from.body != joint.to.body) renumbering->joints[j] = joints++;
   }
   for (ForceDescription& force : changed.forces) {
-    if (auto* point = std::get_if<PointForce>(&force); point != nullptr) {
+    const ForceParts parts = PartsOf(force);
+    for (BodyPoint* point : parts.points) {
       const Attachment& at = attachments[point->body];
-      if (at.attached && point->in_body_axes) point->force = at.X.R * point->force;
-      MovePoint(attachments, &point->body, &point->at);
-    } else if (auto* drag = std::get_if<Drag>(&force); drag != nullptr) {
-      MovePoint(attachments, &drag->point.body, &drag->point.at);
-    } else if (auto* spring = std::get_if<SpringDamper>(&force); spring != nullptr) {
-      MovePoint(attachments, &spring->from.body, &spring->from.at);
-      MovePoint(attachments, &spring->to.body, &spring->to.at);
+      if (!at.attached) continue;
+      if (parts.force != nullptr && *parts.in_body_axes) *parts.force = at.X.R * *parts.force;
+      *point = {at.carrier, at.X.R * point->at + at.X.p};
     }
   }
   MechanismDescription result = Select(changed, *renumbering);

@@ -21,10 +21,6 @@ struct Attachment {
   bool attached = false;    ///< else the body stays and the rest does not matter
 };
 
-/// Whether this code knows all forces of the description. Those it does not know may depend on what
-/// a transformation does not keep, so nothing is transformed then.
-bool KnowsForces(const MechanismDescription& description);
-
 /// The description without the attached bodies. Joints between bodies of one carrier are dropped,
 /// with the forces in them, as are forces on Ground. A part that floated keeps its place: where its
 /// first body gains mass, an explicit free joint of that body's name takes the virtual one's place.

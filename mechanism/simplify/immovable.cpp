@@ -154,7 +154,6 @@ std::vector<Attachment> FindIn(const MechanismDescription& description) {
 }  // namespace
 
 std::vector<Attachment> FindImmovable(const MechanismDescription& description) {
-  if (!KnowsForces(description)) return std::vector<Attachment>(description.bodies.size());
   return description.space == SpaceKind::kPlanar ? FindIn<Planar>(description)
                                                  : FindIn<Spatial>(description);
 }

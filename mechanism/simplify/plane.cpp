@@ -13,28 +13,6 @@ namespace {
 using Matrix3 = Eigen::Matrix3d;
 using Vector3 = Eigen::Vector3d;
 
-struct Kind {
-  bool qualifies = false;
-  bool turns = false;   ///< about z of its frames, which must be along n
-  bool slides = false;  ///< along x of F, which must be across n
-};
-
-Kind KindOfJoint(JointType type) {
-  switch (type) {
-    case JointType::kRevolute:
-    case JointType::kPlanar:
-      return {.qualifies = true, .turns = true, .slides = false};
-    case JointType::kPinInSlot:
-      return {.qualifies = true, .turns = true, .slides = true};
-    case JointType::kPrismatic:
-      return {.qualifies = true, .turns = false, .slides = true};
-    case JointType::kWeld:
-      return {.qualifies = true, .turns = false, .slides = false};
-    default:  // also kinds that are new to this code
-      return {};
-  }
-}
-
 Pose<Spatial, double> FrameOf(const JointDescription& joint, const JointSide& side) {
   Pose<Spatial, double> X = PoseOf(side);
   X.R = X.R * AxisAlignment(joint);
@@ -59,12 +37,11 @@ class Search {
 
   std::string Why() {
     if (d_.space == SpaceKind::kPlanar) return "it is planar already";
-    if (!KnowsForces(d_)) return "it has forces that may leave a plane";
     for (const JointDescription& joint : d_.joints) {
-      if (!KindOfJoint(joint.type).qualifies) {
+      if (!TraitsOf(joint.type).flat.possible) {
         return "joint \"" + joint.name + "\" is " + std::string(ToString(joint.type));
       }
-      const bool one = joint.type == JointType::kRevolute || joint.type == JointType::kPrismatic;
+      const bool one = NumValues(joint.type, SpaceKind::kSpatial, false) == 1;
       if (!joint.motions.empty() && !one) {
         return "joint \"" + joint.name + "\" follows a given motion in one of several coordinates";
       }
@@ -73,7 +50,7 @@ class Search {
       if (!island.grounded) return "\"" + d_.bodies[island.bodies.front()].name + "\" floats";
     }
     const auto seed = std::ranges::find_if(
-        d_.joints, [](const JointDescription& joint) { return KindOfJoint(joint.type).turns; });
+        d_.joints, [](const JointDescription& joint) { return TraitsOf(joint.type).flat.turns; });
     if (seed == d_.joints.end()) return "nothing turns";
     const std::string fault = Spread(static_cast<int>(seed - d_.joints.begin()));
     return fault.empty() ? TiltedSpring() : fault;
@@ -97,7 +74,7 @@ class Search {
           const Pose<Spatial, double> X_here = FrameOf(joint, *here),
                                       X_there = FrameOf(joint, *there);
           const Vector3 in_frame = X_here.R.transpose() * normal_[here->body];
-          const Kind kind = KindOfJoint(joint.type);
+          const InPlaneOf& kind = TraitsOf(joint.type).flat;
           if ((kind.turns && in_frame.head<2>().norm() > kParallel) ||
               (kind.slides && std::abs(in_frame.x()) > kParallel)) {
             return "joint \"" + joint.name + "\" leaves the plane of the others";
@@ -136,14 +113,14 @@ class Search {
     const auto height = [&](const BodyPoint& point) {
       return height_[point.body] + normal_[point.body].dot(point.at);
     };
-    for (const ForceDescription& force : d_.forces) {
-      const auto* spring = std::get_if<SpringDamper>(&force);
-      if (spring == nullptr) continue;
-      const double from = height(spring->from), to = height(spring->to);
-      const double arms = 1.0 + std::abs(from) + spring->from.at.norm() + spring->to.at.norm();
-      if (std::abs(from - to) > kParallel * arms) {
-        return "a spring between \"" + d_.bodies[spring->from.body].name + "\" and \"" +
-               d_.bodies[spring->to.body].name + "\" is not level";
+    for (ForceDescription force : d_.forces) {
+      const std::vector<BodyPoint*> points = PartsOf(force).points;
+      if (points.size() < 2) continue;
+      const BodyPoint &from = *points[0], &to = *points[1];
+      const double arms = 1.0 + std::abs(height(from)) + from.at.norm() + to.at.norm();
+      if (std::abs(height(from) - height(to)) > kParallel * arms) {
+        return "a spring between \"" + d_.bodies[from.body].name + "\" and \"" +
+               d_.bodies[to.body].name + "\" is not level";
       }
     }
     return "";
@@ -174,15 +151,16 @@ void FlattenJoint(const std::vector<Matrix3>& axes, const std::vector<Vector3>& 
   flatten(X_PF, &joint->from);
   flatten(X_QM, &joint->to);
   joint->axis.setZero();
-  if (KindOfJoint(joint->type).turns && n_F.z() < 0.0) {
+  const JointTraits& traits = TraitsOf(joint->type);
+  if (traits.flat.turns && n_F.z() < 0.0) {
     // seen from n it turns the other way: as it does seen from the other body
-    if (joint->type == JointType::kRevolute) {
+    if (NumValues(joint->type, SpaceKind::kSpatial, false) == 1) {
       std::swap(joint->from, joint->to);
     } else {
       *mirrored = true;
     }
   }
-  if (joint->type == JointType::kPlanar) joint->type = JointType::kFree;
+  if (traits.flat.is_free) joint->type = JointType::kFree;
 }
 
 InPlane Search::Express() const {
@@ -213,20 +191,17 @@ InPlane Search::Express() const {
     FlattenJoint(axes, normal_, &joint, &mirrored);
     result.mirrored.push_back(mirrored);
   }
-  const auto flatten = [&](int body, Vector3* at) { *at = Flat(axes[body].transpose() * *at); };
   for (ForceDescription& force : planar.forces) {
+    const ForceParts parts = PartsOf(force);
     result.force_dropped.push_back(0.0);
-    if (auto* point = std::get_if<PointForce>(&force); point != nullptr) {
-      const Matrix3& R = axes[point->in_body_axes ? point->body : kGround];
-      const Vector3 f = R.transpose() * point->force;
+    if (parts.force != nullptr) {
+      const Matrix3& R = axes[*parts.in_body_axes ? parts.points[0]->body : kGround];
+      const Vector3 f = R.transpose() * *parts.force;
       result.force_dropped.back() = f.z();
-      point->force = Flat(f);
-      flatten(point->body, &point->at);
-    } else if (auto* drag = std::get_if<Drag>(&force); drag != nullptr) {
-      flatten(drag->point.body, &drag->point.at);
-    } else if (auto* spring = std::get_if<SpringDamper>(&force); spring != nullptr) {
-      flatten(spring->from.body, &spring->from.at);
-      flatten(spring->to.body, &spring->to.at);
+      *parts.force = Flat(f);
+    }
+    for (BodyPoint* point : parts.points) {
+      point->at = Flat(axes[point->body].transpose() * point->at);
     }
   }
   for (auto* list : {&planar.initial.coordinates, &planar.initial.speeds}) {

@@ -167,9 +167,9 @@ std::string NameOfDirection(const MechanismDescription& description, const Relea
   const auto name = [&](const auto& kind, int rotations) -> std::string {
     const int component = kind.axes[kind.num_u + direction];
     const bool moment = component < rotations;
-    if (one.type == JointType::kRod) return "the force along the rod";
-    if (one.type == JointType::kUniversal && moment) {
-      return "the moment about the normal of its two axes";
+    const JointTraits& traits = TraitsOf(one.type);
+    if (const std::string_view own = moment ? traits.moment : traits.force; !own.empty()) {
+      return std::string(own);
     }
     const std::string frame = " of its frame on " + description.bodies[one.from.body].name;
     if (!moment && !released.force_axes.isIdentity(0.0)) {

@@ -69,7 +69,6 @@ class Group {
 
 std::vector<Attachment> FindWelded(const MechanismDescription& description) {
   std::vector<Attachment> attachments(description.bodies.size());
-  if (!KnowsForces(description)) return attachments;
   std::vector<bool> seen(description.bodies.size(), false), welded(seen);
   std::vector<bool> in_tree(description.joints.size(), true);
   for (const int j : BuildTopology(description, Coordinates::kJoint).constraints)

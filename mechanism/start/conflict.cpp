@@ -89,7 +89,7 @@ class Conflict {
       const JointDescription& joint =
           description_.joints[mechanism_.joints()[one.joint].description];
       std::string name = (one.rod ? "rod \"" : "joint \"") + joint.name + '"';
-      if (one.rod) name += " (length " + Short(joint.length) + " m)";
+      if (one.rod) name += " (length " + Short(joint.parameter) + " m)";
       names.push_back(name);
       residuals.push_back(Short(one.value) + (one.length ? " m" : " rad") +
                           (unmet_.speeds ? "/s" : ""));

@@ -22,10 +22,10 @@ int Builder::AddJoint(JointType type, int parent, const Eigen::Vector3d& at_pare
   joint.from = {parent, at_parent, Eigen::Vector3d::Zero()};
   joint.to = {child, at_child, Eigen::Vector3d::Zero()};
   if (turned) joint.from.rotation = RandomTurn(), joint.to.rotation = RandomTurn();
-  if (OwnAxis(type) == 'x' && random.Chance(0.5)) {
+  if (TraitsOf(type).own_axis == 'x' && random.Chance(0.5)) {
     joint.axis = random.Vector(1.0, spatial) + 1.5 * Eigen::Vector3d::UnitX();
   }
-  if (OwnAxis(type) == 'z' && spatial && random.Chance(0.5)) {
+  if (TraitsOf(type).own_axis == 'z' && spatial && random.Chance(0.5)) {
     joint.axis = random.Vector(1.0, spatial) + 1.5 * Eigen::Vector3d::UnitZ();
   }
   SetParameter(joint);
@@ -141,9 +141,9 @@ void Builder::FinishClosures() {
     frames.joints[0].from.position = frames.bodies[joint.from.body].com;
     const JetPose X_PM = Oracle(frames, layout).JointPose(0, poses);
     const JetPose X_PF =
-        X_PM * Inverted(Transform(joint.type, spatial, coordinates.data(), joint.pitch));
+        X_PM * Inverted(Transform(joint.type, spatial, coordinates.data(), joint.parameter));
     if (joint.type == JointType::kRod) {
-      joint.length = Eigen::Map<const VectorX<double>>(q.data(), q.size()).norm();
+      joint.parameter = Eigen::Map<const VectorX<double>>(q.data(), q.size()).norm();
     }
     Real33 R;
     for (int i = 0; i < 3; ++i) {

@@ -102,7 +102,7 @@ class Builder {
   }
 
   void SetParameter(JointDescription& joint) {
-    if (joint.type == JointType::kHelical) joint.pitch = random.Uniform(-0.5, 0.5);
+    if (joint.type == JointType::kHelical) joint.parameter = random.Uniform(-0.5, 0.5);
   }
 
   /// Coordinates of a joint: `q` if it has one, else random; of a rod, its shift.

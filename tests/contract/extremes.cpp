@@ -27,7 +27,7 @@ MechanismDescription ChainOfEveryKind(int n, SpaceKind space, std::uint64_t seed
   for (int k = 0; k < kNumJointTypes; ++k) {
     const auto type = static_cast<JointType>(k);
     if (type == JointType::kFree || type == JointType::kRod) continue;
-    if (b.spatial || ExistsInPlane(type)) kinds.push_back(type);
+    if (b.spatial || TraitsOf(type).in_plane) kinds.push_back(type);
   }
   int last = 0;
   for (int i = 0; i < n; ++i) last = Append(b, kinds[i % kinds.size()], last);

@@ -31,7 +31,7 @@ int Grow(Builder& b, int root, int n) {
 JointType AnyJoint(Builder& b) {
   for (;;) {
     const auto type = static_cast<JointType>(b.random.Below(kNumJointTypes));
-    if (b.spatial || ExistsInPlane(type)) return type;
+    if (b.spatial || TraitsOf(type).in_plane) return type;
   }
 }
 

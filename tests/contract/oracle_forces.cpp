@@ -41,8 +41,8 @@ std::vector<Real6> Oracle::Applied(const std::vector<JetPose>& poses) const {
     Real6 H = Real6::Zero();
     for (int i = 0; i < 3; ++i) H[slides ? 3 + i : i] = X_WF.R(i, slides ? 0 : 2).f;
     if (joint.type == JointType::kHelical) {  // the part of the wrench along the free motion
-      H.tail<3>() = Real(joint.pitch) * H.head<3>();
-      H /= 1 + Real(joint.pitch) * joint.pitch;
+      H.tail<3>() = Real(joint.parameter) * H.head<3>();
+      H /= 1 + Real(joint.parameter) * joint.parameter;
     }
     const Real3 p = ValueOf(X_WM.p, &Jet::f);
     const Real6 wrench = H * tau_of(q.f, q.d);
@@ -66,8 +66,8 @@ std::vector<Real6> Oracle::Applied(const std::vector<JetPose>& poses) const {
       joint_force(damper->joint, [&](Real, Real u) { return -Real(damper->damping) * u; });
     } else if (const auto* point = std::get_if<PointForce>(&force)) {
       const Real3 f = point->force.cast<Real>();
-      const Real33 R = ValueOf(poses[point->body].R, &Jet::f);
-      point_force({point->body, point->at}, point->in_body_axes ? Real3(R * f) : f);
+      const Real33 R = ValueOf(poses[point->point.body].R, &Jet::f);
+      point_force(point->point, point->in_body_axes ? Real3(R * f) : f);
     } else if (const auto* link = std::get_if<SpringDamper>(&force)) {
       const JetVector a = PointOn(description_, poses, link->from);
       const JetVector b = PointOn(description_, poses, link->to);
@@ -116,7 +116,7 @@ Real Oracle::TotalEnergy(const RealVector& q, const RealVector& u) const {
       const Real at = Coordinate(spring->joint, poses).f, stretch = at - spring->rest;
       energy += spring->stiffness * stretch * stretch / 2 - spring->preload * at;
     } else if (const auto* point = std::get_if<PointForce>(&force); point && !point->in_body_axes) {
-      const JetVector p = PointOn(description_, poses, {point->body, point->at});
+      const JetVector p = PointOn(description_, poses, point->point);
       energy -= point->force.cast<Real>().dot(ValueOf(p, &Jet::f));
     } else if (const auto* link = std::get_if<SpringDamper>(&force)) {
       const Real stretch =

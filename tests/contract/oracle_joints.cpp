@@ -87,7 +87,7 @@ Mismatch DriveMismatch(const JointDescription& joint, int coordinate, const JetP
   if (joint.type == JointType::kPrismatic) return {Real6::Unit(3), X.p[0] - s};
   const Jet angle = beyond(X.R(0, 0), X.R(1, 0));
   if (joint.type == JointType::kHelical) {
-    const Real pitch = joint.pitch;
+    const Real pitch = joint.parameter;
     return {Real6::Unit(2) + pitch * Real6::Unit(5), Jet(1 + pitch * pitch) * angle};
   }
   if (coordinate == 0) return {Real6::Unit(2), angle};
@@ -102,7 +102,7 @@ std::vector<Mismatch> Mismatches(const JointDescription& joint, bool spatial, co
     const Jet distance = Sqrt(X.p[0] * X.p[0] + X.p[1] * X.p[1] + X.p[2] * X.p[2]);
     Real6 along = Real6::Zero();
     for (int i = 0; i < 3; ++i) along[3 + i] = X.p[i].f / distance.f;
-    return {{along, distance - Jet(joint.length)}};
+    return {{along, distance - Jet(joint.parameter)}};
   }
   const auto add = [&c](int axis, const Jet& value) { c.push_back({Real6::Unit(axis), value}); };
   const JetVector turn = SmallTurn(X.R);
@@ -133,7 +133,7 @@ std::vector<Mismatch> Mismatches(const JointDescription& joint, bool spatial, co
   if (!free_x) add(3, X.p[0]);
   if (type != JointType::kPlanar) add(4, X.p[1]);
   if (type == JointType::kHelical) {
-    const Real pitch = joint.pitch, length = std::sqrt(1 + pitch * pitch);
+    const Real pitch = joint.parameter, length = std::sqrt(1 + pitch * pitch);
     Real6 along = Real6::Zero();
     along[2] = -pitch / length;
     along[5] = 1 / length;

@@ -109,7 +109,7 @@ std::vector<JetPose> Oracle::PosesAlong(const std::vector<Jet>& q) const {
     const JointDescription& joint = description_.joints[step.joint];
     const Frames& X = frames_[step.joint];
     const JetPose X_PQ =
-        X.X_PF * Transform(joint.type, layout_.spatial, at, joint.pitch) * Inverted(X.X_QM);
+        X.X_PF * Transform(joint.type, layout_.spatial, at, joint.parameter) * Inverted(X.X_QM);
     poses[step.child] = poses[step.parent] * (joint.to.body == step.child ? X_PQ : Inverted(X_PQ));
   }
   return poses;

@@ -13,12 +13,12 @@
 #include "harness/config/benchmark_reader.h"
 #include "harness/config/experiment_reader.h"
 #include "harness/config/mechanism_reader.h"
-#include "harness/json/config_error.h"
 #include "harness/judge/claims_reader.h"
 #include "harness/judge/failure_map_reader.h"
+#include "harness/record/record_json.h"
 #include "harness/store/measurements.h"
-#include "harness/store/record_json.h"
 #include "harness/store/result_store.h"
+#include "harness/text/config_error.h"
 
 namespace loopbench::fuzz {
 namespace {

@@ -9,9 +9,9 @@
 #include <string>
 #include <vector>
 
-#include "harness/json/config_error.h"
 #include "harness/judge/claims_reader.h"
 #include "harness/judge/claims_report.h"
+#include "harness/text/config_error.h"
 
 namespace loopbench::harness {
 namespace {

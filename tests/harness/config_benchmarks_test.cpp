@@ -7,7 +7,7 @@
 #include <vector>
 
 #include "harness/config/benchmark_reader.h"
-#include "harness/json/config_error.h"
+#include "harness/text/config_error.h"
 #include "harness/text/files.h"
 #include "harness/timing/subject.h"
 #include "mechanism/model/mechanism.h"

@@ -12,9 +12,9 @@
 
 #include "harness/config/experiment_reader.h"
 #include "harness/config/mechanism_reader.h"
-#include "harness/json/config_error.h"
 #include "harness/judge/claims_reader.h"
 #include "harness/judge/failure_map_reader.h"
+#include "harness/text/config_error.h"
 
 namespace loopbench::harness {
 namespace {

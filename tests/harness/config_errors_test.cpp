@@ -10,8 +10,8 @@
 
 #include "harness/config/experiment_reader.h"
 #include "harness/config/mechanism_reader.h"
-#include "harness/json/config_error.h"
-#include "harness/json/spelling.h"
+#include "harness/text/config_error.h"
+#include "harness/text/spelling.h"
 
 namespace loopbench::harness {
 namespace {

@@ -14,10 +14,10 @@
 #include "harness/config/benchmark_reader.h"
 #include "harness/config/experiment_reader.h"
 #include "harness/config/mechanism_reader.h"
-#include "harness/json/config_error.h"
 #include "harness/json/file_kind.h"
 #include "harness/judge/claims_reader.h"
 #include "harness/judge/failure_map_reader.h"
+#include "harness/text/config_error.h"
 #include "harness/text/files.h"
 
 namespace loopbench::harness {

@@ -8,8 +8,8 @@
 #include <vector>
 
 #include "harness/config/experiment_reader.h"
-#include "harness/json/config_error.h"
 #include "harness/run/run_case.h"
+#include "harness/text/config_error.h"
 #include "mechanism/description/library.h"
 
 namespace loopbench::harness {

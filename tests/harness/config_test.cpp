@@ -10,8 +10,8 @@
 
 #include "harness/config/experiment_reader.h"
 #include "harness/config/mechanism_reader.h"
-#include "harness/json/config_error.h"
 #include "harness/json/file_kind.h"
+#include "harness/text/config_error.h"
 
 namespace loopbench::harness {
 namespace {
@@ -194,7 +194,7 @@ TEST(MechanismReader, FillsEveryFieldOfASpatialMechanism) {
   EXPECT_EQ(std::get<Polynomial>(std::get<JointTorque>(m.forces[2]).value).coefficients,
             std::vector<double>{-9.0});
   EXPECT_TRUE(std::get<PointForce>(m.forces[3]).in_body_axes);
-  EXPECT_EQ(std::get<PointForce>(m.forces[3]).at, Eigen::Vector3d(1, 0, 0));
+  EXPECT_EQ(std::get<PointForce>(m.forces[3]).point.at, Eigen::Vector3d(1, 0, 0));
   EXPECT_EQ(m.initial.coordinates[1].values.size(), 7u);
   EXPECT_EQ(m.initial.speeds[0].joint, 1);
   EXPECT_EQ(m.initial.held, std::vector<int>{0});

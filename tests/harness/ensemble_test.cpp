@@ -9,7 +9,7 @@
 #include <numbers>
 #include <set>
 
-#include "harness/json/config_error.h"
+#include "harness/text/config_error.h"
 #include "mechanism/start/assembly.h"
 #include "tests/reference/cases.h"
 

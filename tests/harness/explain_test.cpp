@@ -4,7 +4,6 @@
 
 #include "harness/analysis/model_warnings.h"
 #include "harness/config/mechanism_reader.h"
-#include "harness/record/joint_words.h"
 #include "mechanism/model/kinematics.h"
 #include "tests/harness/cli_fixture.h"
 
@@ -28,20 +27,6 @@ void ExpectSqueezed(const Ending& ending, const std::vector<std::string>& words)
   EXPECT_EQ(ending.code, 0) << ending.text;
   for (const std::string& word : words) {
     EXPECT_NE(text.find(word), std::string::npos) << "no <" << word << "> in\n" << ending.text;
-  }
-}
-
-TEST(JointWords, AreAsManyAsValues) {
-  for (int i = 0; i < kNumJointTypes; ++i) {
-    const auto type = static_cast<JointType>(i);
-    for (const SpaceKind space : {SpaceKind::kPlanar, SpaceKind::kSpatial}) {
-      if (space == SpaceKind::kPlanar && !ExistsInPlane(type)) continue;
-      const auto count = [&](bool speeds) {
-        return static_cast<std::size_t>(NumValues(type, space, speeds));
-      };
-      EXPECT_EQ(CoordinateWords(type, space).size(), count(false)) << ToString(type);
-      EXPECT_EQ(SpeedWords(type, space).size(), count(true)) << ToString(type);
-    }
   }
 }
 

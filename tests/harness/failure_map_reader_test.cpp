@@ -9,8 +9,8 @@
 #include <string>
 #include <vector>
 
-#include "harness/json/config_error.h"
 #include "harness/json/file_kind.h"
+#include "harness/text/config_error.h"
 
 namespace loopbench::harness {
 namespace {

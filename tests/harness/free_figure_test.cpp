@@ -10,7 +10,7 @@
 #include <string>
 #include <vector>
 
-#include "harness/json/config_error.h"
+#include "harness/text/config_error.h"
 #include "harness/text/files.h"
 
 namespace loopbench::harness {

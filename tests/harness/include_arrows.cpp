@@ -13,7 +13,7 @@ constexpr std::string_view kRooms[] = {"mechanism/algebra",  "mechanism/descript
                                        "mechanism/start",    "mechanism/formulation",
                                        "mechanism/simplify", "odca",
                                        "lagrange",           "reduction",
-                                       "harness/json",       "harness/text",
+                                       "harness/text",       "harness/json",
                                        "harness/record",     "harness/store",
                                        "harness/config",     "harness/analysis",
                                        "harness/integrator", "harness/observers",
@@ -64,9 +64,9 @@ std::string_view WhyNotForeign(std::string_view path, std::string_view header) {
                : "SUNDIALS is for harness/integrator/arkode.cpp and arkode_*";
   }
   if (header.starts_with("nlohmann/")) {
-    const bool allowed =
-        StartsWithOneOf(path, {"harness/json/", "harness/config/", "harness/store/",
-                               "harness/judge/", "tests/harness/config", "tests/harness/store"});
+    const bool allowed = StartsWithOneOf(
+        path, {"harness/json/", "harness/record/", "harness/config/", "harness/store/",
+               "harness/judge/", "tests/harness/config", "tests/harness/store"});
     return allowed ? "" : "nlohmann-json is for the rooms that read and write JSON";
   }
   if (header.starts_with("benchmark/")) {

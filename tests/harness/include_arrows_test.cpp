@@ -108,7 +108,7 @@ TEST(IncludeArrows, OfSundialsEndBehindTheIntegrator) {
 
 TEST(IncludeArrows, OfOtherLibrariesEndWhereTheyBelong) {
   ExpectAllowed("harness/json/json_reader.h", "<nlohmann/json.hpp>");
-  ExpectAllowed("harness/store/record_json.cpp", "<nlohmann/json.hpp>");
+  ExpectAllowed("harness/record/record_json.cpp", "<nlohmann/json.hpp>");
   ExpectAllowed("tests/harness/config_test.cpp", "<nlohmann/json.hpp>");
   ExpectRefused("harness/tables/table.cpp", "<nlohmann/json.hpp>", "nlohmann");
   ExpectRefused("tests/contract/oracle.cpp", "<nlohmann/json.hpp>", "nlohmann");

@@ -12,8 +12,8 @@
 #include <string_view>
 #include <vector>
 
+#include "harness/record/record_json.h"
 #include "harness/run/case_identity.h"
-#include "harness/store/record_json.h"
 #include "harness/tables/columns.h"
 #include "mechanism/description/library.h"
 #include "tests/reference/cases.h"

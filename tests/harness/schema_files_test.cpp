@@ -10,9 +10,9 @@
 
 #include "harness/cli/commands_schema.h"
 #include "harness/config/file_schemas.h"
-#include "harness/json/config_error.h"
 #include "harness/json/document_kind.h"
 #include "harness/json/fields.h"
+#include "harness/text/config_error.h"
 #include "harness/text/files.h"
 #include "tests/harness/cli_fixture.h"
 
@@ -47,7 +47,9 @@ TEST(SchemaFiles, TablesOfTheDocumentAreMadeFromTheFields) {
 TEST(SchemaFiles, KnowTheKeysThatTellKindsApart) {
   const std::map<std::string, FileKind> kinds = {{"mechanism", FileKind::kMechanism},
                                                  {"experiment", FileKind::kExperiment},
-                                                 {"benchmarks", FileKind::kBenchmarks}};
+                                                 {"benchmarks", FileKind::kBenchmarks},
+                                                 {"claims", FileKind::kClaims},
+                                                 {"map", FileKind::kMap}};
   for (const std::string& kind : SchemaKinds()) {
     const Json schema = ParseDocument(SchemaOfKind(kind), kind);
     std::string keys;

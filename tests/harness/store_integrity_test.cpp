@@ -6,7 +6,7 @@
 #include <fstream>
 #include <random>
 
-#include "harness/store/record_json.h"
+#include "harness/record/record_json.h"
 #include "tests/harness/cli_fixture.h"
 
 namespace loopbench::harness {

@@ -9,10 +9,10 @@
 #include <string>
 #include <tuple>
 
-#include "harness/json/config_error.h"
 #include "harness/judge/track.h"
+#include "harness/judge/tracker_json.h"
 #include "harness/store/measurements.h"
-#include "harness/store/tracker_json.h"
+#include "harness/text/config_error.h"
 #include "harness/timing/callgrind.h"
 
 namespace loopbench::harness {

@@ -9,9 +9,9 @@
 #include <string>
 #include <vector>
 
-#include "harness/json/config_error.h"
 #include "harness/record/select.h"
 #include "harness/tables/columns.h"
+#include "harness/text/config_error.h"
 
 namespace loopbench::harness {
 namespace {

@@ -6,8 +6,8 @@
 #include <string>
 #include <vector>
 
-#include "harness/json/config_error.h"
 #include "harness/tables/columns.h"
+#include "harness/text/config_error.h"
 
 namespace loopbench::harness {
 namespace {

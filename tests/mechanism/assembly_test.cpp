@@ -149,7 +149,7 @@ TEST(AssemblyTest, ARodThatIsTooLongIsNamedBesideTheJointsThatItPullsApart) {
   rod.type = JointType::kRod;
   rod.from = {kGround, {-0.5, 0.0, 0.0}, {0.0, 0.0, 0.0}};
   rod.to = {2, {0.5, 0.0, 0.0}, {0.0, 0.0, 0.0}};
-  rod.length = 5.0;
+  rod.parameter = 5.0;
   d.joints.push_back(rod);
   const Start<double> start = Assemble(d, Joints(d, Coordinates::kJoint));
   ASSERT_EQ(start.outcome, Outcome::kInconsistentStart);

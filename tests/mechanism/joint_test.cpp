@@ -5,7 +5,6 @@
 
 #include <limits>
 
-#include "mechanism/description/joint_traits.h"
 #include "tests/contract/oracle.h"
 
 namespace loopbench {
@@ -24,7 +23,7 @@ std::vector<JointType> Types() {
   for (int i = 0; i < kNumJointTypes; ++i) {
     const auto type = static_cast<JointType>(i);
     if (type == JointType::kRod) continue;  // it has no transform: tests of its own
-    if (Space::kRot == 3 || ExistsInPlane(type)) types.push_back(type);
+    if (Space::kRot == 3 || TraitsOf(type).in_plane) types.push_back(type);
   }
   return types;
 }
@@ -84,14 +83,16 @@ TYPED_TEST(JointTest, KindsAreWhatTheTableOfTraitsSays) {
   const SpaceKind space = kSpace ? SpaceKind::kSpatial : SpaceKind::kPlanar;
   for (const JointType type : Types<TypeParam>()) {
     const auto& kind = KindOf<TypeParam, double>(type);
-    const ValueCount coordinates = CountValues(type, space, false);
-    const ValueCount speeds = CountValues(type, space, true);
-    EXPECT_EQ(coordinates.all(), kind.num_q) << ToString(type);
-    EXPECT_EQ(speeds.all(), kind.num_u) << ToString(type);
-    EXPECT_EQ(coordinates.lengths, speeds.lengths) << ToString(type);
+    const auto coordinates = ValueWords(type, space, false), speeds = ValueWords(type, space, true);
+    const auto lengths = [](const auto& words) {
+      return std::ranges::count_if(words, &ValueWord::is_length);
+    };
+    EXPECT_EQ(lengths(coordinates), lengths(speeds)) << ToString(type);
+    EXPECT_EQ(std::ssize(coordinates), kind.num_q) << ToString(type);
+    ASSERT_EQ(std::ssize(speeds), kind.num_u) << ToString(type);
     // a universal joint's directions turn with its first angle: they are no axes
-    for (int i = 0; i < kind.num_u && kind.basis == nullptr; ++i) {
-      EXPECT_EQ(i < speeds.angles, kind.axes[i] < TypeParam::kRot) << ToString(type) << i;
+    for (std::size_t i = 0; i < speeds.size() && kind.basis == nullptr; ++i) {
+      EXPECT_EQ(speeds[i].is_length(), kind.axes[i] >= TypeParam::kRot) << ToString(type) << i;
     }
   }
 }

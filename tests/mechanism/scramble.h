@@ -57,17 +57,12 @@ inline MechanismDescription Scramble(const MechanismDescription& planar, std::ui
       }
     }
     for (ForceDescription& force : d.forces) {
-      const auto move = [&](int of, Eigen::Vector3d* at) {
-        if (of == b) *at = R.transpose() * (*at - origin);
-      };
-      if (auto* point = std::get_if<PointForce>(&force); point != nullptr) {
-        move(point->body, &point->at);
-        if (point->body == b && point->in_body_axes) point->force = R.transpose() * point->force;
-      } else if (auto* drag = std::get_if<Drag>(&force); drag != nullptr) {
-        move(drag->point.body, &drag->point.at);
-      } else if (auto* spring = std::get_if<SpringDamper>(&force); spring != nullptr) {
-        move(spring->from.body, &spring->from.at);
-        move(spring->to.body, &spring->to.at);
+      const ForceParts parts = PartsOf(force);
+      for (BodyPoint* point : parts.points) {
+        if (point->body != b) continue;
+        point->at = R.transpose() * (point->at - origin);
+        if (parts.force != nullptr && *parts.in_body_axes)
+          *parts.force = R.transpose() * *parts.force;
       }
     }
   }

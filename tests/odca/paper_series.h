@@ -54,7 +54,7 @@ inline std::vector<JointType> Kinds(Builder& b, int count, int least) {
     while (static_cast<int>(kinds.size()) < count) {
       const auto type = static_cast<JointType>(b.random.Below(kNumJointTypes));
       if (type == JointType::kFree || type == JointType::kRod) continue;
-      if (!b.spatial && !ExistsInPlane(type)) continue;
+      if (!b.spatial && !TraitsOf(type).in_plane) continue;
       kinds.push_back(type);
       freedom += NumValues(type, b.description.space, true);
       turning += type != JointType::kPrismatic && type != JointType::kWeld;

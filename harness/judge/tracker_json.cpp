@@ -1,4 +1,4 @@
-#include "harness/store/tracker_json.h"
+#include "harness/judge/tracker_json.h"
 
 #include <fmt/format.h>
 

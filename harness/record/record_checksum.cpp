@@ -1,10 +1,10 @@
-#include "harness/store/record_checksum.h"
+#include "harness/record/record_checksum.h"
 
 #include <fmt/format.h>
 
 #include <stdexcept>
 
-#include "harness/store/excerpt.h"
+#include "harness/record/excerpt.h"
 #include "harness/text/hash.h"
 
 namespace loopbench::harness {

@@ -1,4 +1,4 @@
-#include "harness/json/spelling.h"
+#include "harness/text/spelling.h"
 
 #include <algorithm>
 #include <cctype>

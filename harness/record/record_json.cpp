@@ -1,4 +1,4 @@
-#include "harness/store/record_json.h"
+#include "harness/record/record_json.h"
 
 #include <cmath>
 #include <nlohmann/json.hpp>
@@ -6,7 +6,7 @@
 #include <utility>
 #include <vector>
 
-#include "harness/store/record_checksum.h"
+#include "harness/record/record_checksum.h"
 #include "harness/text/hash.h"
 
 namespace loopbench::harness {

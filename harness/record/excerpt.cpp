@@ -1,4 +1,4 @@
-#include "harness/store/excerpt.h"
+#include "harness/record/excerpt.h"
 
 #include <fmt/format.h>
 

@@ -1,0 +1,100 @@
+#include "mechanism/description/force.h"
+
+#include <array>
+#include <cmath>
+
+#include "mechanism/description/description.h"
+
+namespace loopbench {
+
+namespace {
+
+/// Powers of length: of an angle's effort, N m, two; forces grow with lengths (similarity.h).
+struct Unit {
+  std::string_view of_angle, of_length;
+  int power_of_angle, power_of_length;
+};
+
+// in the order of Quantity
+constexpr std::array<Unit, 9> kUnits = {{{"rad", "m", 0, 1},
+                                         {"N m", "N", 2, 1},
+                                         {"N m/rad", "N/m", 2, 0},
+                                         {"N m s/rad", "N s/m", 2, 0},
+                                         {"m", "m", 1, 1},
+                                         {"N", "N", 1, 1},
+                                         {"N/m", "N/m", 0, 0},
+                                         {"N s/m", "N s/m", 0, 0},
+                                         {"N s^2/m^2", "N s^2/m^2", -1, -1}}};  // -1 at least
+
+const Unit& Of(Quantity quantity) { return kUnits.at(static_cast<std::size_t>(quantity)); }
+
+/// The first thing wrong with a force.
+class Validator {
+ public:
+  explicit Validator(const MechanismDescription& description) : description_(description) {}
+
+  std::string Check(const ForceParts& parts) const {
+    std::string error;
+    const auto note = [&](const std::string& found) {
+      if (error.empty()) error = found;
+    };
+    if (parts.joint != nullptr) note(Joint(*parts.joint));
+    const bool between = parts.points.size() > 1;
+    for (const BodyPoint* point : parts.points) note(Point(*point, between));
+    if (between && parts.points[0]->body == parts.points[1]->body) {
+      note("joins a body with itself");
+    }
+    if (parts.force != nullptr) note(Vector(*parts.force));
+    if (parts.value != nullptr) note(Validate(*parts.value));
+    for (const ForceNumber& number : parts.numbers) {
+      const std::string key(number.key);
+      if (!number.any_sign && !(*number.value >= 0.0)) note(key + " must not be negative");
+      if (!std::isfinite(*number.value)) note(key + " must be finite");
+    }
+    return error;
+  }
+
+ private:
+  std::string Joint(int index) const {
+    if (index < 0 || index >= std::ssize(description_.joints)) {
+      return "joint index " + std::to_string(index) + " does not exist";
+    }
+    const JointDescription& joint = description_.joints[index];
+    if (NumValues(joint.type, description_.space, true) == 1) return "";
+    return "joint \"" + joint.name + "\" has not one coordinate, which a joint force acts along";
+  }
+  std::string Point(const BodyPoint& point, bool may_be_ground) const {
+    const int first = may_be_ground ? kGround : kGround + 1;
+    if (point.body < first || point.body >= std::ssize(description_.bodies)) {
+      return "body index " + std::to_string(point.body) + ", expected a " +
+             (may_be_ground ? "" : "moving ") + "body";
+    }
+    return Vector(point.at);
+  }
+  std::string Vector(const Eigen::Vector3d& v) const {
+    if (!v.allFinite()) return "vectors must be finite";
+    return description_.space == SpaceKind::kPlanar && v.z() != 0.0 ? "leaves the plane" : "";
+  }
+
+  const MechanismDescription& description_;
+};
+
+}  // namespace
+
+std::string_view UnitOf(Quantity quantity, bool is_length) {
+  return is_length ? Of(quantity).of_length : Of(quantity).of_angle;
+}
+
+double AtScale(double value, Quantity quantity, bool is_length, double factor) {
+  const int power = is_length ? Of(quantity).power_of_length : Of(quantity).power_of_angle;
+  for (int i = 0; i < power; ++i) value *= factor;
+  return power < 0 ? value / factor : value;
+}
+
+std::string ValidateForce(const MechanismDescription& description, ForceDescription force) {
+  const ForceParts parts = PartsOf(force);
+  const std::string error = Validator(description).Check(parts);
+  return error.empty() ? "" : std::string(parts.name) + ": " + error;
+}
+
+}  // namespace loopbench

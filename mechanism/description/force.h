@@ -1,0 +1,181 @@
+// Forces: a struct each, and behind it what it is made of.
+//
+// Readers, schemas, validation, change of scale, `explain` and the compile step know the parts of a
+// force alone: a joint, points of bodies, numbers with their units, a vector, a function of time.
+// What a force does with them stands in mechanism/model/force_NAME.h.
+#pragma once
+
+#include <Eigen/Core>
+#include <string>
+#include <string_view>
+#include <variant>
+#include <vector>
+
+#include "mechanism/description/time_function.h"
+
+namespace loopbench {
+
+/// Index of Ground in every list of bodies.
+inline constexpr int kGround = 0;
+
+/// A material point of a body.
+struct BodyPoint {
+  int body = kGround;
+  Eigen::Vector3d at = Eigen::Vector3d::Zero();  ///< in body axes from the body's origin [m]
+};
+
+/// What a number of a force is, which says its unit. An effort is a moment or a force along a
+/// joint's coordinate.
+enum class Quantity {
+  kCoordinate,           ///< rad or m
+  kEffort,               ///< N m or N
+  kEffortPerCoordinate,  ///< N m/rad or N/m
+  kEffortPerSpeed,       ///< N m s/rad or N s/m
+  kLength,               ///< m
+  kForce,                ///< N
+  kForcePerLength,       ///< N/m
+  kForcePerSpeed,        ///< N s/m
+  kForcePerSpeedSquared  ///< N s^2/m^2
+};
+
+/// The unit; along a joint that of a coordinate that is an angle, or a length.
+std::string_view UnitOf(Quantity quantity, bool is_length);
+/// A value when all lengths have grown by `factor` and angles move as before (similarity.h).
+double AtScale(double value, Quantity quantity, bool is_length, double factor);
+
+/// Whether files must give a part: always, at least one of those marked so, or not at all.
+enum class Need { kAlways, kOneOf, kNot };
+
+struct ForceNumber {
+  std::string_view key;
+  double* value;
+  Quantity quantity;
+  Need need = Need::kNot;
+  std::string_view sentence = "";
+  bool any_sign = false;  ///< else it must not be negative
+};
+
+/// The parts of one force; what it has not is null or empty.
+struct ForceParts {
+  std::string_view name, sentence;  ///< in files; what it is
+  int* joint = nullptr;             ///< one with one coordinate, along which it acts
+  /// Where it acts: on one body, which is not Ground, or between two different ones, from and to.
+  std::vector<BodyPoint*> points = {};
+  TimeFunctionDescription* value = nullptr;  ///< of time: an effort
+  Eigen::Vector3d* force = nullptr;          ///< a vector [N], in axes of ground or of the body
+  bool* in_body_axes = nullptr;
+  std::vector<ForceNumber> numbers = {};
+};
+
+/// Given moment (revolute) [N m] or force (prismatic) [N] on `to`, its opposite on `from`: constant
+/// (a polynomial of one coefficient; it has a potential) or a function of time (it supplies power).
+struct JointTorque {
+  int joint = 0;
+  TimeFunctionDescription value = Polynomial{{0.0}};
+};
+inline ForceParts PartsOf(JointTorque& f) {
+  return {
+      .name = "joint_torque",
+      .sentence = "A given moment or force on a joint's second body, its opposite on the first.",
+      .joint = &f.joint,
+      .value = &f.value};
+}
+
+/// Linear spring on the joint's coordinate: preload - stiffness * (q - rest).
+struct JointSpring {
+  int joint = 0;
+  double stiffness = 0.0;  ///< >= 0
+  double rest = 0.0;       ///< coordinate at which only the preload is left
+  double preload = 0.0;
+};
+inline ForceParts PartsOf(JointSpring& f) {
+  return {.name = "joint_spring",
+          .sentence = "preload - stiffness (q - rest) on the joint's coordinate q.",
+          .joint = &f.joint,
+          .numbers = {{"stiffness", &f.stiffness, Quantity::kEffortPerCoordinate, Need::kAlways},
+                      {"rest", &f.rest, Quantity::kCoordinate, Need::kNot,
+                       "Coordinate at which only the preload is left", true},
+                      {"preload", &f.preload, Quantity::kEffort, Need::kNot, "", true}}};
+}
+
+/// Linear damper on the joint's speed: -damping * u.
+struct JointDamper {
+  int joint = 0;
+  double damping = 0.0;  ///< >= 0
+};
+inline ForceParts PartsOf(JointDamper& f) {
+  return {.name = "joint_damper",
+          .sentence = "-damping u on the joint's speed u.",
+          .joint = &f.joint,
+          .numbers = {{"damping", &f.damping, Quantity::kEffortPerSpeed, Need::kAlways}}};
+}
+
+/// Constant force at a material point of a body.
+struct PointForce {
+  BodyPoint point;
+  Eigen::Vector3d force = Eigen::Vector3d::Zero();  ///< [N]
+  bool in_body_axes = false;                        ///< force turns with the body
+};
+inline ForceParts PartsOf(PointForce& f) {
+  return {.name = "point_force",
+          .sentence = "A constant force at a point of a body.",
+          .points = {&f.point},
+          .force = &f.force,
+          .in_body_axes = &f.in_body_axes};
+}
+
+/// Spring and damper between points of two bodies: with their distance d, the tension
+///   T = preload + stiffness (d - length) + damping ddot
+/// pulls them together (T < 0 pushes them apart). Where the points meet, d = 0, there is no
+/// direction to pull in and no force: an equilibrium, by the symmetry of all directions, and
+/// unless T is proportional to d a jump that an integrator meets as such.
+struct SpringDamper {
+  BodyPoint from, to;      ///< of different bodies; one may be Ground
+  double stiffness = 0.0;  ///< >= 0
+  double damping = 0.0;    ///< >= 0
+  double length = 0.0;     ///< distance at which the spring is free, >= 0
+  double preload = 0.0;    ///< tension at that distance
+};
+inline ForceParts PartsOf(SpringDamper& f) {
+  return {
+      .name = "spring_damper",
+      .sentence =
+          "The tension preload + stiffness (d - length) + damping d' between points at distance d.",
+      .points = {&f.from, &f.to},
+      .numbers = {{"stiffness", &f.stiffness, Quantity::kForcePerLength, Need::kOneOf},
+                  {"damping", &f.damping, Quantity::kForcePerSpeed, Need::kOneOf},
+                  {"length", &f.length, Quantity::kLength, Need::kNot,
+                   "Distance of the points at which only the preload is left"},
+                  {"preload", &f.preload, Quantity::kForce, Need::kOneOf,
+                   "Tension at that distance", true}}};
+}
+
+/// Resistance of a medium at rest at a material point of velocity v: -(linear + quadratic |v|) v.
+struct Drag {
+  BodyPoint point;
+  double linear = 0.0;     ///< >= 0
+  double quadratic = 0.0;  ///< >= 0
+};
+inline ForceParts PartsOf(Drag& f) {
+  return {.name = "drag",
+          .sentence = "-(linear + quadratic |v|) v at a point of velocity v.",
+          .points = {&f.point},
+          .numbers = {{"linear", &f.linear, Quantity::kForcePerSpeed, Need::kOneOf},
+                      {"quadratic", &f.quadratic, Quantity::kForcePerSpeedSquared, Need::kOneOf}}};
+}
+
+using ForceDescription =
+    std::variant<JointTorque, JointSpring, JointDamper, PointForce, SpringDamper, Drag>;
+
+/// Parts of a force, which stays where it is while they are used. Who may not change it takes them
+/// of a copy.
+inline ForceParts PartsOf(ForceDescription& force) {
+  return std::visit([](auto& one) { return PartsOf(one); }, force);
+}
+
+struct MechanismDescription;
+/// "" or what makes a force unusable: joints with several coordinates, points of bodies that do not
+/// exist or of Ground, negative numbers, parts out of the plane, non-finite numbers.
+std::string ValidateForce(const MechanismDescription& description, ForceDescription force);
+
+}  // namespace loopbench

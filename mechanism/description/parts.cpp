@@ -119,7 +119,9 @@ std::vector<Part> Split(const MechanismDescription& description,
 }
 
 std::vector<Part> SplitByJoints(MechanismDescription description) {
-  description.forces.clear();
+  // forces along joints stay: they decide which joints are coordinates, and with them the rank
+  std::erase_if(description.forces,
+                [](ForceDescription& force) { return PartsOf(force).joint == nullptr; });
   return Split(description, FindIslands(description));
 }
 

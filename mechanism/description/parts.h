@@ -29,8 +29,9 @@ struct Part {
 std::vector<Part> Split(const MechanismDescription& description,
                         const std::vector<Island>& islands);
 
-/// Each set of bodies that joints connect, without forces: for analyses of geometry, which springs
-/// between parts do not concern.
+/// Each set of bodies that joints connect: for analyses of geometry, which springs between parts do
+/// not concern. Of forces only those along joints are left, because a joint that has one stays in
+/// the tree, and ranks belong to a tree.
 std::vector<Part> SplitByJoints(MechanismDescription description);
 
 }  // namespace loopbench

@@ -108,6 +108,24 @@ TEST(StructureTest, ThirdCrankIsRedundantEverywhere) {
   EXPECT_EQ(s.redundant.size(), 1u);
 }
 
+/// A force along a joint keeps it in the tree, where without it the loop would be cut there.
+TEST(StructureTest, AForceAlongAJointChangesTheCutAndNoFreedom) {
+  MechanismDescription without = Shipped("spatial-four-bar");
+  std::swap(without.joints[1], without.joints[3]);  // a revolute joint is the last
+  for (JointDescription& joint : without.joints) joint.cut = false;
+  std::erase_if(without.initial.coordinates, [](const JointValues& one) { return one.joint > 0; });
+  MechanismDescription with = without;
+  with.forces = {JointDamper{3, 1.0}};
+  const Structure plain = AnalyseStructure(without), damped = AnalyseStructure(with);
+  EXPECT_EQ(plain.start.outcome, Outcome::kFinished);
+  EXPECT_NE(plain.loop_rows, damped.loop_rows);
+  for (const Structure& structure : {plain, damped}) {
+    EXPECT_EQ(structure.rank, structure.loop_rows);
+    EXPECT_EQ(structure.rank_nearby, structure.loop_rows);
+    EXPECT_EQ(structure.freedom(), 1);
+  }
+}
+
 TEST(StructureTest, LoopsThroughGroundOnlyAreSeparateParts) {
   MechanismDescription two = Shipped("four-bar");
   const MechanismDescription one = two;

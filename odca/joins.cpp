@@ -55,7 +55,7 @@ Joins<Space, S>::Joins(const Mechanism<Space, S>& mechanism, const Plan& plan, S
     if (!joined[leaf]) lone_leaves_.push_back(leaf);
   }
   Z_.assign(z, Block<Space, S>::Zero());
-  Y_.assign(y, Motion<Space, S>::Zero());
+  Y_.assign(y, Acceleration<Space, S>::Zero());
   X_.assign(x, S(0));
   c_.assign(c, Wrench<Space, S>::Zero());
   columns_.setZero(plan.largest_join(), Space::kDim * widest);
@@ -109,12 +109,8 @@ bool Joins<Space, S>::AssembleAll(const Kinematics<Space, S>& kinematics, Pass p
 template <class Space, class S>
 void Joins<Space, S>::FillLeaf(const Kinematics<Space, S>& kinematics,
                                const Inertia<Space, S>& inertia, int n) {
-  Block<Space, S>& Z = Z_[places_[n].z];
-  Z.setZero();
-  Z.template topLeftCorner<Space::kRot, Space::kRot>() =
-      kinematics.RotationalInverse(inertia, n + 1);
-  Z.template bottomRightCorner<Space::kLin, Space::kLin>().diagonal().setConstant(S(1) /
-                                                                                  inertia.mass);
+  Z_[places_[n].z] = DiagonalBlock<Space, S>(kinematics.RotationalInverse(inertia, n + 1),
+                                             S(1) / inertia.mass);
 }
 
 /// Rows of C. D at Mo becomes c at the centres of mass, so that c^T A is the D^T A of the paper's
@@ -129,9 +125,8 @@ void Joins<Space, S>::FillJoints(const Kinematics<Space, S>& kinematics, Masses 
     const Linear<Space, S> r_Q = kinematics.ArmQ(joint.index, masses);
     Wrench<Space, S>* c = &c_[c_offset_[joint.index]];
     for (int i = 0; i < joint.rows; ++i) {
-      const Wrench<Space, S> D_i = state.D(i);
-      c[i] = -ShiftForce<Space, S>(D_i, r_P);
-      c[joint.rows + i] = ShiftForce<Space, S>(D_i, r_Q);
+      c[i] = -ShiftForce<Space, S>(state.D(i), r_P);
+      c[joint.rows + i] = ShiftForce<Space, S>(state.D(i), r_Q);
     }
   }
 }
@@ -152,7 +147,7 @@ void Joins<Space, S>::FormResponse(const PlanNode& node, const Place& place) {
   for (int e = 0; e < static_cast<int>(node.handles.size()); ++e) {
     const Handle& handle = node.handles[e];
     const Place& child = places_[node.children[handle.child]];
-    Motion<Space, S>* Y = &Y_[place.y + e * n];
+    Acceleration<Space, S>* Y = &Y_[place.y + e * n];
     for (const NodeJoint& joint : node.joints) {
       for (int i = 0; i < joint.rows; ++i) Y[i].setZero();
       for (int which = 0; which < 2; ++which) {
@@ -160,7 +155,7 @@ void Joins<Space, S>::FormResponse(const PlanNode& node, const Place& place) {
         if (f < 0 || node.handles[f].child != handle.child) continue;
         const Block<Space, S>& Z = Z_[child.z + handle.place + child.kept * node.handles[f].place];
         const Wrench<Space, S>* c = direction(joint, which);
-        for (int i = 0; i < joint.rows; ++i) Y[i].noalias() += Z * c[i];  // (67)
+        for (int i = 0; i < joint.rows; ++i) Y[i] += loopbench::Apply<Acceleration<Space, S>>(Z, c[i]);  // (67)
         operations_ += joint.rows * Space::kDim * Space::kDim;
       }
       Y += joint.rows;
@@ -266,7 +261,7 @@ void Joins<Space, S>::ApplyToKept(const PlanNode& node, const Place& place) {
   if (!node.closes_loop) {
     const S* L = &X_[place.x];
     for (int e : node.kept) {
-      Motion<Space, S>* Y = &Y_[place.y + e * rows];
+      Acceleration<Space, S>* Y = &Y_[place.y + e * rows];
       for (int i = 0; i < rows; ++i) {
         for (int k = 0; k < i; ++k) Y[i] -= L[i + k * rows] * Y[k];
         Y[i] /= L[i + i * rows];
@@ -277,15 +272,15 @@ void Joins<Space, S>::ApplyToKept(const PlanNode& node, const Place& place) {
     auto B = columns_.topLeftCorner(rows, width);
     for (std::size_t k = 0; k < node.kept.size(); ++k) {
       for (int i = 0; i < rows; ++i) {
-        B.row(i).template segment<Space::kDim>(Space::kDim * k) =
-            Y_[place.y + node.kept[k] * rows + i].transpose();
+        const Acceleration<Space, S>& Y = Y_[place.y + node.kept[k] * rows + i];
+        for (int d = 0; d < Space::kDim; ++d) B(i, Space::kDim * k + d) = Y[d];
       }
     }
     loops_[place.loop].Apply(B);
     for (std::size_t k = 0; k < node.kept.size(); ++k) {
       for (int i = 0; i < rows; ++i) {
-        Y_[place.y + node.kept[k] * rows + i] =
-            B.row(i).template segment<Space::kDim>(Space::kDim * k).transpose();
+        Acceleration<Space, S>& Y = Y_[place.y + node.kept[k] * rows + i];
+        for (int d = 0; d < Space::kDim; ++d) Y[d] = B(i, Space::kDim * k + d);
       }
     }
   }
@@ -300,16 +295,16 @@ void Joins<Space, S>::Eliminate(const PlanNode& node, const Place& place) {
   const int n = node.rows;
   for (int f = 0; f < place.kept; ++f) {
     const Handle& at_f = node.handles[node.kept[f]];
-    const Motion<Space, S>* V_f = &Y_[place.y + node.kept[f] * n];
+    const Acceleration<Space, S>* V_f = &Y_[place.y + node.kept[f] * n];
     for (int e = f; e < place.kept; ++e) {
       const Handle& at_e = node.handles[node.kept[e]];
-      const Motion<Space, S>* V_e = &Y_[place.y + node.kept[e] * n];
+      const Acceleration<Space, S>* V_e = &Y_[place.y + node.kept[e] * n];
       Block<Space, S> Z = Block<Space, S>::Zero();
       if (at_e.child == at_f.child) {
         const Place& child = places_[node.children[at_e.child]];
         Z = Z_[child.z + at_e.place + child.kept * at_f.place];
       }
-      for (int i = 0; i < n; ++i) Z.noalias() -= V_e[i] * V_f[i].transpose();  // (26-28, 71)
+      for (int i = 0; i < n; ++i) SubtractOuter(V_e[i], V_f[i], Z);  // (26-28, 71)
       Z_[place.z + e + place.kept * f] = Z;
       if (e != f) Z_[place.z + f + place.kept * e] = Z.transpose();
       operations_ += static_cast<long>(n) * Space::kDim * Space::kDim;

@@ -69,7 +69,7 @@ class Joins {
   const Wrench<Space, S>* c_Q(const NodeJoint& joint) const { return c_P(joint) + joint.rows; }
   /// V of an inner node on one of its kept handles (index into node.handles): its rows, one after
   /// the other, each a motion.
-  const Motion<Space, S>* V(const PlanNode& node, int n, int handle) const {
+  const Acceleration<Space, S>* V(const PlanNode& node, int n, int handle) const {
     return &Y_[places_[n].y + handle * node.rows];
   }
   /// v := T v and v := T^T v for the rows of an inner node.
@@ -117,7 +117,7 @@ class Joins {
   SolverKind solver_;
   std::vector<Place> places_;
   std::vector<Block<Space, S>> Z_;
-  std::vector<Motion<Space, S>> Y_;  ///< Y of each node; on handles that stay then V = T Y
+  std::vector<Acceleration<Space, S>> Y_;  ///< Y of each node; on handles that stay then V = T Y
   std::vector<Wrench<Space, S>> c_;  ///< rows c_P, then c_Q of each joint
   std::vector<int> c_offset_;        ///< of each mechanism joint in c_
   std::vector<S> X_;

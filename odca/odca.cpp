@@ -35,10 +35,10 @@ Odca<Space, S>::Odca(const Mechanism<Space, S>& mechanism, const FormulationOpti
     : mechanism_(mechanism),
       plan_(MakePlan(mechanism, plan)),
       sweep_(mechanism, plan_, options.solver),
-      wrenches_(mechanism.num_bodies(), Motion<Space, S>::Zero()),
-      b_(wrenches_),
-      A_(wrenches_),
-      c0_(mechanism.joints().size(), Motion<Space, S>::Zero()),
+      wrenches_(mechanism.num_bodies(), Wrench<Space, S>::Zero()),
+      b_(mechanism.num_bodies(), Acceleration<Space, S>::Zero()),
+      A_(b_),
+      c0_(mechanism.joints().size(), Components<Space, S>::Zero()),
       known_(VectorX<S>::Zero(mechanism.num_u())),
       change_(known_) {}
 
@@ -62,7 +62,7 @@ void Odca<Space, S>::SweepTo(VectorX<S>& x, VectorX<S>* lambda) {
   for (const TreeStep& step : mechanism_.tree()) {
     const Joint<Space, S>& joint = mechanism_.joints()[step.joint];
     const JointState<Space, S>& state = kinematics_->joints()[step.joint];
-    const Motion<Space, S> A_rel = ShiftMotion<Space, S>(A_[joint.to], state.r_Q) -
+    const Acceleration<Space, S> A_rel = ShiftMotion<Space, S>(A_[joint.to], state.r_Q) -
                                    ShiftMotion<Space, S>(A_[joint.from], state.r_P);
     for (int i = 0; i < state.num_u; ++i) {
       x[joint.u_offset + i] = joint.kind->inverse_H_squared * state.H(i).dot(A_rel);
@@ -82,30 +82,29 @@ template <class Space, class S>
 void Odca<Space, S>::SetFree() {
   for (int body = 1; body < mechanism_.num_bodies(); ++body) {
     const Inertia<Space, S>& inertia = mechanism_.bodies()[body];
-    const Angular<Space, S> moment = wrenches_[body].template head<Space::kRot>();
-    b_[body] << kinematics_->RotationalInverse(inertia, body) * moment,
-        wrenches_[body].template tail<Space::kLin>() / inertia.mass;
+    b_[body] = {kinematics_->RotationalInverse(inertia, body) * wrenches_[body].angular,
+                wrenches_[body].linear / inertia.mass};
   }
 }
 
 template <class Space, class S>
 void Odca<Space, S>::Solve(const VectorX<S>& force, const VectorX<S>& target, VectorX<S>& x,
                            VectorX<S>* lambda) {
-  for (Motion<Space, S>& c0 : c0_) c0.setZero();
+  for (Components<Space, S>& c0 : c0_) c0.setZero();
   for (int index : mechanism_.constraints()) {
     const Joint<Space, S>& joint = mechanism_.joints()[index];
     c0_[index].head(joint.num_constraints()) = -target.segment(joint.row, joint.num_constraints());
   }
   if (force.size() == 0) {
-    for (Motion<Space, S>& b : b_) b.setZero();
+    for (Acceleration<Space, S>& b : b_) b.setZero();
     SweepTo(x, lambda);
     return;
   }
-  for (Motion<Space, S>& wrench : wrenches_) wrench.setZero();
+  for (Wrench<Space, S>& wrench : wrenches_) wrench.setZero();
   for (const TreeStep& step : mechanism_.tree()) {
     const Joint<Space, S>& joint = mechanism_.joints()[step.joint];
     const JointState<Space, S>& state = kinematics_->joints()[step.joint];
-    Motion<Space, S> F = Motion<Space, S>::Zero();
+    auto F = Wrench<Space, S>::Zero();
     for (int i = 0; i < state.num_u; ++i) {
       F += state.H(i) * (joint.kind->inverse_H_squared * force[joint.u_offset + i]);
     }
@@ -123,9 +122,9 @@ void Odca<Space, S>::SetKnown(const Kinematics<Space, S>& kinematics) {
   for (std::size_t j = 0; j < c0_.size(); ++j) {
     const Joint<Space, S>& joint = mechanism_.joints()[j];
     const JointState<Space, S>& state = kinematics.joints()[j];
-    const Motion<Space, S> known = kinematics.Centripetal(joint.to, state.r_Q) -
+    const Acceleration<Space, S> known = kinematics.Centripetal(joint.to, state.r_Q) -
                                    kinematics.Centripetal(joint.from, state.r_P) - state.g;
-    for (int i = 0; i < state.rows(); ++i) c0_[j][i] = state.D(i).dot(known);
+    c0_[j] = state.Along(known, state.rows());
     for (int i = 0; i < (joint.in_tree() ? state.num_u : 0); ++i) {
       known_[joint.u_offset + i] = joint.kind->inverse_H_squared * state.H(i).dot(known);
     }
@@ -139,9 +138,8 @@ bool Odca<Space, S>::Accelerate(const Kinematics<Space, S>& kinematics, const Ve
   AppliedForces<Space, S>(kinematics, wrenches_);
   for (int body = 1; body < mechanism_.num_bodies(); ++body) {
     const Inertia<Space, S>& inertia = mechanism_.bodies()[body];
-    const Angular<Space, S> w = kinematics.motions()[body].template head<Space::kRot>();
-    const Angular<Space, S> Iw = kinematics.RotationalInertia(inertia, body) * w;
-    wrenches_[body].template head<Space::kRot>() -= CrossAngular<S>(w, Iw);
+    const Angular<Space, S>& w = kinematics.motions()[body].angular;
+    wrenches_[body].angular -= CrossAngular<S>(w, kinematics.RotationalInertia(inertia, body) * w);
   }
   SetFree();
   SetKnown(kinematics);
@@ -160,8 +158,8 @@ bool Odca<Space, S>::Accelerate(const Kinematics<Space, S>& kinematics, const Ve
 template <class Space, class S>
 bool Odca<Space, S>::CompleteSpeeds(Kinematics<Space, S>& kinematics, VectorX<S>& u) {
   kinematics.UpdateVelocity(u);
-  for (Motion<Space, S>& b : b_) b.setZero();
-  for (Motion<Space, S>& c0 : c0_) c0.setZero();
+  for (Acceleration<Space, S>& b : b_) b.setZero();
+  for (Components<Space, S>& c0 : c0_) c0.setZero();
   for (int index : mechanism_.constraints()) c0_[index] = kinematics.ConstraintSpeed(index);
   SweepTo(change_, nullptr);
   u += change_;
@@ -176,13 +174,10 @@ std::vector<NamedCount> Odca<Space, S>::Counters() const {
 }
 
 template <class Space, class S>
-Motion<Space, S> Odca<Space, S>::JointForce(int joint) const {
-  Motion<Space, S> force = Motion<Space, S>::Zero();
-  if (kinematics_ == nullptr) return force;
+Wrench<Space, S> Odca<Space, S>::JointForce(int joint) const {
+  if (kinematics_ == nullptr) return Wrench<Space, S>::Zero();
   const JointState<Space, S>& state = kinematics_->joints()[joint];
-  // D times measure numbers, on Q at Mo, in ground axes                               (13)
-  for (int i = 0; i < state.rows(); ++i) force += state.D(i) * sweep_.multipliers()[joint][i];
-  return force;
+  return state.Sum(sweep_.multipliers()[joint], state.rows());  // (13)
 }
 
 #define LOOPBENCH_INSTANTIATE(Space, S) template class Odca<Space, S>;

@@ -37,7 +37,7 @@ class Odca final : public ConstraintSolver<Space, S> {
   /// Constraint force of a user joint after an evaluation: [moment; force] on Q at the joint's
   /// point, ground axes. Unique only where the joint's loops carry no self-stress. Zero where the
   /// coordinate set has no free speed: then nothing is evaluated.
-  Motion<Space, S> JointForce(int joint) const;
+  Wrench<Space, S> JointForce(int joint) const;
 
  private:
   /// b_ of all bodies for wrenches_: their accelerations under these alone, at centres of mass.
@@ -53,7 +53,9 @@ class Odca final : public ConstraintSolver<Space, S> {
   Plan plan_;
   Sweep<Space, S> sweep_;
   const Kinematics<Space, S>* kinematics_ = nullptr;  ///< of the last Factor()
-  std::vector<Motion<Space, S>> wrenches_, b_, A_, c0_;
+  std::vector<Wrench<Space, S>> wrenches_;
+  std::vector<Acceleration<Space, S>> b_, A_;
+  std::vector<Components<Space, S>> c0_;
   VectorX<S> known_, change_;
 };
 

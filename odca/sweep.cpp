@@ -8,7 +8,7 @@ template <class Space, class S>
 Sweep<Space, S>::Sweep(const Mechanism<Space, S>& mechanism, const Plan& plan, SolverKind solver)
     : plan_(plan),
       joins_(mechanism, plan, solver),
-      b_(joins_.num_handles(), Motion<Space, S>::Zero()),
+      b_(joins_.num_handles(), Acceleration<Space, S>::Zero()),
       F_(joins_.num_handles(), Wrench<Space, S>::Zero()),
       phi_(mechanism.joints().size(), Components<Space, S>::Zero()),
       residual_(phi_),
@@ -22,9 +22,9 @@ Outcome Sweep<Space, S>::Assemble(const Kinematics<Space, S>& kinematics) {
 }
 
 template <class Space, class S>
-void Sweep<Space, S>::Solve(std::span<const Motion<Space, S>> b,
+void Sweep<Space, S>::Solve(std::span<const Acceleration<Space, S>> b,
                             std::span<const Components<Space, S>> c0,
-                            std::span<Motion<Space, S>> A) {
+                            std::span<Acceleration<Space, S>> A) {
   for (int n = 0; n < plan_.num_leaves(); ++n) {
     A[n + 1].setZero();
     b_[joins_.first_handle(n)] = b[n + 1];
@@ -41,7 +41,7 @@ void Sweep<Space, S>::Solve(std::span<const Motion<Space, S>> b,
 /// At the leaves A = Z F + b (1-4, 45-46) with all forces known, those of joints included.
 template <class Space, class S>
 void Sweep<Space, S>::Correct(std::span<const Components<Space, S>> c0,
-                              std::span<Motion<Space, S>> A) {
+                              std::span<Acceleration<Space, S>> A) {
   const int leaves = plan_.num_leaves();
   for (int n = leaves; n < plan_.num_nodes(); ++n) Up(plan_.nodes()[n - leaves], n, c0);
   // a root's boundary is empty; a body without joints is a root whose one handle feels no force
@@ -50,7 +50,7 @@ void Sweep<Space, S>::Correct(std::span<const Components<Space, S>> c0,
   for (int n = 0; n < leaves; ++n) {
     const int handle = joins_.first_handle(n);
     A[n + 1] += b_[handle];
-    A[n + 1].noalias() += joins_.LeafZ(n) * F_[handle];
+    A[n + 1] += Apply<Acceleration<Space, S>>(joins_.LeafZ(n), F_[handle]);
   }
   operations_ += static_cast<long>(leaves) * Space::kDim * Space::kDim;
 }
@@ -58,7 +58,7 @@ void Sweep<Space, S>::Correct(std::span<const Components<Space, S>> c0,
 /// r = C A + c0 of every joint: D^T times the difference of the two sides of (7), without udot.
 template <class Space, class S>
 void Sweep<Space, S>::Residual(std::span<const Components<Space, S>> c0,
-                               std::span<const Motion<Space, S>> A) {
+                               std::span<const Acceleration<Space, S>> A) {
   for (const PlanNode& node : plan_.nodes()) {
     const auto body = [&](int handle) { return node.handles[handle].body; };
     for (const NodeJoint& joint : node.joints) {
@@ -81,7 +81,7 @@ template <class Space, class S>
 void Sweep<Space, S>::Up(const PlanNode& node, int n, std::span<const Components<Space, S>> c0) {
   S* s = &s_[joins_.first_row(n)];
   int row = 0;
-  const auto b_of = [&](int f) -> const Motion<Space, S>& {
+  const auto b_of = [&](int f) -> const Acceleration<Space, S>& {
     const Handle& handle = node.handles[f];
     return b_[joins_.first_handle(node.children[handle.child]) + handle.place];
   };
@@ -95,8 +95,8 @@ void Sweep<Space, S>::Up(const PlanNode& node, int n, std::span<const Components
   joins_.Apply(node, n, s);  // (21)
   const int kept = joins_.kept(n);
   for (int e = 0; e < kept; ++e) {
-    Motion<Space, S> b = b_of(node.kept[e]);
-    const Motion<Space, S>* V = joins_.V(node, n, node.kept[e]);
+    Acceleration<Space, S> b = b_of(node.kept[e]);
+    const Acceleration<Space, S>* V = joins_.V(node, n, node.kept[e]);
     for (int i = 0; i < node.rows; ++i) b -= V[i] * s[i];  // (29-30, 72)
     b_[joins_.first_handle(n) + e] = b;
   }
@@ -114,7 +114,7 @@ void Sweep<Space, S>::Down(const PlanNode& node, int n) {
   S* phi = forces_.data();
   for (int i = 0; i < node.rows; ++i) phi[i] = -s_[joins_.first_row(n) + i];
   for (int e = 0; e < kept; ++e) {
-    const Motion<Space, S>* V = joins_.V(node, n, node.kept[e]);
+    const Acceleration<Space, S>* V = joins_.V(node, n, node.kept[e]);
     for (int i = 0; i < node.rows; ++i) phi[i] -= V[i].dot(F_kept[e]);
   }
   joins_.ApplyTransposed(node, n, phi);  // (17, 42, 64)

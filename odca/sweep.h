@@ -35,8 +35,8 @@ class Sweep {
 
   /// In: `b` the free acceleration of each body (index = body), `c0` Space::kDim numbers per
   /// mechanism joint. Out: `A` of each body. After Assemble(). Allocates nothing.
-  void Solve(std::span<const Motion<Space, S>> b, std::span<const Components<Space, S>> c0,
-             std::span<Motion<Space, S>> A);
+  void Solve(std::span<const Acceleration<Space, S>> b, std::span<const Components<Space, S>> c0,
+             std::span<Acceleration<Space, S>> A);
 
   /// phi of each mechanism joint after Solve(), the measure numbers (14) of its constraint force:
   /// components along the columns of D, which need not part into moments and forces. Zero where the
@@ -51,13 +51,13 @@ class Sweep {
   void Up(const PlanNode& node, int n, std::span<const Components<Space, S>> c0);
   void Down(const PlanNode& node, int n);
   /// Up and down over what stands in b_; adds to A and phi_.
-  void Correct(std::span<const Components<Space, S>> c0, std::span<Motion<Space, S>> A);
+  void Correct(std::span<const Components<Space, S>> c0, std::span<Acceleration<Space, S>> A);
   /// r = C A + c0 of every joint, in residual_.
-  void Residual(std::span<const Components<Space, S>> c0, std::span<const Motion<Space, S>> A);
+  void Residual(std::span<const Components<Space, S>> c0, std::span<const Acceleration<Space, S>> A);
 
   const Plan& plan_;
   Joins<Space, S> joins_;
-  std::vector<Motion<Space, S>> b_;  ///< by kept handle
+  std::vector<Acceleration<Space, S>> b_;  ///< by kept handle
   std::vector<Wrench<Space, S>> F_;  ///< likewise
   std::vector<Components<Space, S>> phi_, residual_;
   std::vector<S> s_;       ///< by row

@@ -146,7 +146,7 @@ template <class Space>
 std::string AxesText(const Rotation<Space, double>& R, std::string_view axes) {
   std::string text;
   for (const char axis : axes) {
-    Linear<Space, double> direction = R.col(axis - 'x');
+    auto direction = R.col(axis - 'x').eigen();
     for (double& part : direction) {
       if (std::abs(part) < kRoundOff) part = 0.0;
     }
@@ -178,7 +178,7 @@ Table FrameTable(const MechanismDescription& description) {
       row.Set("body", body.name);
       row.Set("at", Place(body, side.position, description.space));
       row.Set("axes", AxesText<Space>(X.R, from ? axes.from : axes.to));
-      const auto turn = RotationVector(X);
+      const auto turn = RotationVector(X).eigen();
       if (joint.type != JointType::kRod && !turn.isZero(0.0)) row.Set("turn", Spaced(turn));
     }
   }

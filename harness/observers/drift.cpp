@@ -22,11 +22,12 @@ struct Largest {
   template <class Space>
   void Add(const Kinematics<Space, double>& kinematics, int index) {
     // what a joint leaves free is no mismatch; what it releases because others hold it is
-    const auto D = kinematics.joints()[index].AllD();
-    const Motion<Space, double> all = kinematics.ConstraintMismatch(index);
-    const Motion<Space, double> mismatch = D * (D.transpose() * all);
-    Keep(&rotation, mismatch.template head<Space::kRot>().norm());
-    const double s = mismatch.template tail<Space::kLin>().norm();
+    const JointState<Space, double>& state = kinematics.joints()[index];
+    const int all = state.directions();
+    const Direction<Space, double> mismatch =
+        state.Sum(state.Along(kinematics.ConstraintMismatch(index), all), all);
+    Keep(&rotation, mismatch.angular.norm());
+    const double s = mismatch.linear.norm();
     if (joint < 0 || !(s <= shift)) {
       shift = s;
       joint = index;
@@ -49,7 +50,7 @@ struct DriftObserver<Space>::Work {
   }
 
   TreeDynamics<Space, double> dynamics;
-  std::vector<Motion<Space, double>> A;
+  std::vector<Acceleration<Space, double>> A;
   JointView<Space> view;
   std::vector<std::pair<int, std::string>> loop_names;
   std::vector<double> loop_max;
@@ -74,13 +75,12 @@ void DriftObserver<Space>::Observe(const Sample<Space>& sample) {
   for (int index : kinematics.mechanism().constraints()) {
     now.Add(kinematics, index);
     const JointState<Space, double>& state = kinematics.joints()[index];
-    const auto shift_of = [&](const auto& rows) {
-      const Motion<Space, double> motion = state.AllD() * rows;
-      return motion.template tail<Space::kLin>().norm();
+    const int all = state.directions();
+    const auto shift_of = [&](const Components<Space, double>& rows) {
+      return state.Sum(rows, all).linear.norm();
     };
-    Keep(&work.velocity, shift_of(state.AllD().transpose() * state.V_rel));
-    const Motion<Space, double> rest = JointAcceleration<Space, double>(kinematics, index, work.A);
-    Keep(&work.acceleration, shift_of(rest.head(state.AllD().cols())));
+    Keep(&work.velocity, shift_of(state.Along(state.V_rel, all)));
+    Keep(&work.acceleration, shift_of(JointAcceleration<Space, double>(kinematics, index, work.A)));
   }
   if (now.shift > work.shift) {
     work.worst_loop = kinematics.mechanism().joint_names()[now.joint];

@@ -9,7 +9,7 @@ void WriteFinalPoses(const MechanismDescription& user, const Compiled& compiled,
   for (std::size_t i = 0; i < user.bodies.size(); i += stride) {
     const BodyImage& image = compiled.bodies[i];
     if (image.part != part) continue;
-    const Pose<Spatial, double> X = UserPose(compiled, static_cast<int>(i), &kinematics);
+    const Frame X = UserPose(compiled, static_cast<int>(i), &kinematics);
     std::vector<double> pose{X.p.x(), X.p.y()};
     bool planar = false;
     if constexpr (Space::kRot == 1) planar = user.space == SpaceKind::kPlanar;

@@ -44,12 +44,12 @@ Float128 Exact::Drift(const Float128& t, const VectorX<Float128>& q) {
   kinematics_.UpdatePosition(q);
   Float128 largest = 0;
   for (int index : mechanism_.constraints()) {
-    const auto D = kinematics_.joints()[index].AllD();
-    const Motion<Planar, Float128> all = kinematics_.ConstraintMismatch(index);
+    const JointState<Planar, Float128>& state = kinematics_.joints()[index];
+    const int all = state.directions();
     // what a joint leaves free is no mismatch
-    Motion<Planar, Float128> constrained = Motion<Planar, Float128>::Zero();
-    for (int r = 0; r < D.cols(); ++r) constrained += D.col(r) * D.col(r).dot(all);
-    largest = std::max(largest, Float128(constrained.tail<Planar::kLin>().norm()));
+    const Direction<Planar, Float128> constrained =
+        state.Sum(state.Along(kinematics_.ConstraintMismatch(index), all), all);
+    largest = std::max(largest, constrained.linear.norm());
   }
   return largest;
 }
@@ -59,7 +59,7 @@ VectorX<Float128> Exact::Centres(const Float128& t, const VectorX<Float128>& q) 
   kinematics_.UpdatePosition(q);
   VectorX<Float128> centres(Planar::kLin * (mechanism_.num_bodies() - 1));
   for (int body = 1; body < mechanism_.num_bodies(); ++body) {
-    centres.segment<Planar::kLin>(Planar::kLin * (body - 1)) = kinematics_.poses()[body].p;
+    centres.segment<Planar::kLin>(Planar::kLin * (body - 1)) = kinematics_.poses()[body].p.eigen();
   }
   return centres;
 }

@@ -1,14 +1,15 @@
 // The plane and space as policies, so that every algorithm is written once (docs/design.md D1).
 //
 // Notation (docs/glossary.md): p_WB position of B's centre of mass from the ground origin, R_WB
-// orientation of B, V = [w; v] motion of a body at a point, F = [moment; force] at a point; all in
+// orientation of B, V = [w; v] velocity of a body at a point, F = [moment; force] at a point; all in
 // ground axes unless the name says otherwise. In the plane w and moments have one component, in
 // space three; "Dim" is the number of components of a motion: 3 or 6.
 #pragma once
 
 #include <Eigen/Core>
-#include <Eigen/Geometry>
 #include <cmath>
+
+#include "mechanism/algebra/spatial_vector.h"
 
 namespace loopbench {
 
@@ -24,91 +25,10 @@ struct Spatial {
   static constexpr int kDim = 6;
 };
 
-/// The small functions below run several times per body and evaluation; a call costs more than they
-/// do.
-#define LOOPBENCH_INLINE [[gnu::always_inline]] inline
-
 template <class S>
 using VectorX = Eigen::Matrix<S, Eigen::Dynamic, 1>;
 template <class S>
 using MatrixX = Eigen::Matrix<S, Eigen::Dynamic, Eigen::Dynamic>;
-
-template <class Space, class S>
-using Angular = Eigen::Matrix<S, Space::kRot, 1>;
-template <class Space, class S>
-using Linear = Eigen::Matrix<S, Space::kLin, 1>;
-/// Velocity [w; v] or acceleration [alpha; a] of a body at a point.
-template <class Space, class S>
-using Motion = Eigen::Matrix<S, Space::kDim, 1>;
-/// [moment; force] on a body at a point. The same type as Motion, for the reader alone: the
-/// compiler does not keep the two apart.
-template <class Space, class S>
-using Wrench = Eigen::Matrix<S, Space::kDim, 1>;
-/// A number per direction of a joint, in the order of its D; those beyond the joint's own are zero.
-/// Again the same type, with room for a joint that constrains all directions.
-template <class Space, class S>
-using Components = Eigen::Matrix<S, Space::kDim, 1>;
-/// Maps motions to forces or back.
-template <class Space, class S>
-using Block = Eigen::Matrix<S, Space::kDim, Space::kDim>;
-/// Orientation matrix.
-template <class Space, class S>
-using Rotation = Eigen::Matrix<S, Space::kLin, Space::kLin>;
-
-/// w x r.
-template <class S>
-LOOPBENCH_INLINE Eigen::Matrix<S, 2, 1> Cross(const Eigen::Matrix<S, 1, 1>& w,
-                                              const Eigen::Matrix<S, 2, 1>& r) {
-  return {-w[0] * r[1], w[0] * r[0]};
-}
-template <class S>
-LOOPBENCH_INLINE Eigen::Matrix<S, 3, 1> Cross(const Eigen::Matrix<S, 3, 1>& w,
-                                              const Eigen::Matrix<S, 3, 1>& r) {
-  return w.cross(r);
-}
-
-/// r x f, a moment.
-template <class S>
-LOOPBENCH_INLINE Eigen::Matrix<S, 1, 1> Moment(const Eigen::Matrix<S, 2, 1>& r,
-                                               const Eigen::Matrix<S, 2, 1>& f) {
-  return Eigen::Matrix<S, 1, 1>(r[0] * f[1] - r[1] * f[0]);
-}
-template <class S>
-LOOPBENCH_INLINE Eigen::Matrix<S, 3, 1> Moment(const Eigen::Matrix<S, 3, 1>& r,
-                                               const Eigen::Matrix<S, 3, 1>& f) {
-  return r.cross(f);
-}
-
-/// a x b of two angular vectors: zero in the plane.
-template <class S>
-LOOPBENCH_INLINE Eigen::Matrix<S, 1, 1> CrossAngular(const Eigen::Matrix<S, 1, 1>&,
-                                                     const Eigen::Matrix<S, 1, 1>&) {
-  return Eigen::Matrix<S, 1, 1>::Zero();
-}
-template <class S>
-LOOPBENCH_INLINE Eigen::Matrix<S, 3, 1> CrossAngular(const Eigen::Matrix<S, 3, 1>& a,
-                                                     const Eigen::Matrix<S, 3, 1>& b) {
-  return a.cross(b);
-}
-
-/// Motion of a body at c + r from its motion at c: [w; v + w x r].
-template <class Space, class S>
-LOOPBENCH_INLINE Motion<Space, S> ShiftMotion(const Motion<Space, S>& V,
-                                              const Linear<Space, S>& r) {
-  Motion<Space, S> shifted = V;
-  const Angular<Space, S> w = V.template head<Space::kRot>();
-  shifted.template tail<Space::kLin>() += Cross<S>(w, r);
-  return shifted;
-}
-
-/// The same force at c instead of c + r: [moment + r x f; f]. The transpose of ShiftMotion().
-template <class Space, class S>
-LOOPBENCH_INLINE Wrench<Space, S> ShiftForce(const Wrench<Space, S>& F, const Linear<Space, S>& r) {
-  Wrench<Space, S> shifted = F;
-  const Linear<Space, S> f = F.template tail<Space::kLin>();
-  shifted.template head<Space::kRot>() += Moment<S>(r, f);
-  return shifted;
-}
 
 /// Position and orientation of a frame. The planar angle is a number, not a class of numbers modulo
 /// 2 pi: relative angles along and across loops need no unwrapping.
@@ -126,7 +46,7 @@ struct Pose<Planar, S> {
     using std::sin;
     angle = value;
     const S c = cos(value), s = sin(value);
-    R << c, -s, s, c;
+    R = {c, -s, s, c};
   }
 };
 
@@ -142,7 +62,7 @@ template <class S>
 LOOPBENCH_INLINE Pose<Planar, S> Compose(const Pose<Planar, S>& X_AB, const Pose<Planar, S>& X_BC) {
   Pose<Planar, S> X;
   X.angle = X_AB.angle + X_BC.angle;
-  X.R.noalias() = X_AB.R * X_BC.R;
+  X.R = X_AB.R * X_BC.R;
   X.p = X_AB.p + X_AB.R * X_BC.p;
   return X;
 }
@@ -169,22 +89,60 @@ LOOPBENCH_INLINE Pose<Spatial, S> Inverse(const Pose<Spatial, S>& X_AB) {
   return X;
 }
 
+/// Orientation of the quaternion w x y z, of any length but zero.
+template <class S>
+Rotation<Spatial, S> FromQuaternion(const S* q) {
+  using std::sqrt;
+  const S length = sqrt(q[0] * q[0] + q[1] * q[1] + q[2] * q[2] + q[3] * q[3]);
+  const S w = q[0] / length, x = q[1] / length, y = q[2] / length, z = q[3] / length;
+  const S one = S(1), two = S(2);
+  return {one - two * (y * y + z * z), two * (x * y - z * w),       two * (x * z + y * w),
+          two * (x * y + z * w),       one - two * (x * x + z * z), two * (y * z - x * w),
+          two * (x * z - y * w),       two * (y * z + x * w),       one - two * (x * x + y * y)};
+}
+
+/// A unit quaternion w x y z of an orientation, from its largest component (K. Shoemake, Animating
+/// rotation with quaternion curves, SIGGRAPH 1985).
+template <class S>
+void ToQuaternion(const Rotation<Spatial, S>& R, S* q) {
+  using std::sqrt;
+  const S half = S(1) / S(2), trace = R(0, 0) + R(1, 1) + R(2, 2);
+  if (trace > S(0)) {
+    const S root = sqrt(trace + S(1)), t = half / root;
+    q[0] = half * root;
+    q[1] = (R(2, 1) - R(1, 2)) * t;
+    q[2] = (R(0, 2) - R(2, 0)) * t;
+    q[3] = (R(1, 0) - R(0, 1)) * t;
+    return;
+  }
+  int i = R(1, 1) > R(0, 0) ? 1 : 0;
+  if (R(2, 2) > R(i, i)) i = 2;
+  const int j = (i + 1) % 3, k = (j + 1) % 3;
+  const S root = sqrt(R(i, i) - R(j, j) - R(k, k) + S(1)), t = half / root;
+  q[0] = (R(k, j) - R(j, k)) * t;
+  q[1 + i] = half * root;
+  q[1 + j] = (R(j, i) + R(i, j)) * t;
+  q[1 + k] = (R(k, i) + R(i, k)) * t;
+}
+
 /// Rotation of a pose as a vector: angle (plane) or angle times axis, |.| <= pi (space).
 template <class S>
-Eigen::Matrix<S, 1, 1> RotationVector(const Pose<Planar, S>& X) {
-  return Eigen::Matrix<S, 1, 1>(X.angle);
+Angular<Planar, S> RotationVector(const Pose<Planar, S>& X) {
+  return Angular<Planar, S>(X.angle);
 }
 template <class S>
-Eigen::Matrix<S, 3, 1> RotationVector(const Pose<Spatial, S>& X) {
+Angular<Spatial, S> RotationVector(const Pose<Spatial, S>& X) {
   using std::abs;
   using std::atan2;
   using std::sqrt;
-  const Eigen::Quaternion<S> half(X.R);  // cosine and sine of half the angle
-  const S cosine = abs(half.w()), sine = sqrt(half.vec().squaredNorm());
+  S half[4];  // cosine of half the angle, and its sine along the axis
+  ToQuaternion(X.R, half);
+  const Angular<Spatial, S> axis = {half[1], half[2], half[3]};
+  const S cosine = abs(half[0]), sine = axis.norm();
   // their ratio is linear to round-off below sqrt(eps), and then has a derivative at zero too
   const bool tiny = sine * sine < S(Eigen::NumTraits<S>::epsilon());
   const S stretch = tiny ? S(2) / cosine : S(2) * atan2(sine, cosine) / sine;
-  return (half.w() < S(0) ? S(-stretch) : stretch) * half.vec();
+  return (half[0] < S(0) ? S(-stretch) : stretch) * axis;
 }
 
 }  // namespace loopbench

@@ -1,5 +1,7 @@
 #include "mechanism/description/in_space.h"
 
+#include <Eigen/Geometry>
+
 #include "mechanism/description/joint_frames.h"
 
 namespace loopbench {

@@ -1,11 +1,12 @@
 #include "mechanism/description/joint_frames.h"
 
+#include <Eigen/Geometry>
 #include <cmath>
 
 namespace loopbench {
 
-Pose<Spatial, double> PoseOf(const JointSide& side) {
-  Pose<Spatial, double> X;
+Frame PoseOf(const JointSide& side) {
+  Frame X;
   X.p = side.position;
   const double turn = side.rotation.norm();
   if (turn > 0.0) X.R = Eigen::AngleAxisd(turn, side.rotation / turn).toRotationMatrix();

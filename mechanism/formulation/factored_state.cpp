@@ -28,15 +28,12 @@ void PositionViolation(const Kinematics<Space, S>& kinematics, VectorX<S>& viola
   largest.shift = largest.rotation = S(0);
   for (int index : kinematics.mechanism().constraints()) {
     const Joint<Space, S>& joint = kinematics.mechanism().joints()[index];
-    const auto D = kinematics.joints()[index].D();
-    const Motion<Space, S> all = kinematics.ConstraintMismatch(index);
-    Motion<Space, S> constrained = Motion<Space, S>::Zero();
-    for (int r = 0; r < joint.num_constraints(); ++r) {
-      violation[joint.row + r] = D.col(r).dot(all);
-      constrained += D.col(r) * violation[joint.row + r];
-    }
-    largest.rotation = std::max(largest.rotation, constrained.template head<Space::kRot>().norm());
-    largest.shift = std::max(largest.shift, constrained.template tail<Space::kLin>().norm());
+    const JointState<Space, S>& state = kinematics.joints()[index];
+    const Components<Space, S> e = state.Along(kinematics.ConstraintMismatch(index), state.rows());
+    violation.segment(joint.row, state.rows()) = e.head(state.rows());
+    const Direction<Space, S> constrained = state.Sum(e, state.rows());
+    largest.rotation = std::max(largest.rotation, constrained.angular.norm());
+    largest.shift = std::max(largest.shift, constrained.linear.norm());
   }
 }
 

@@ -67,12 +67,11 @@ void AddFeedback(const Kinematics<Space, S>& kinematics, const BaumgarteGains& g
                  VectorX<S>& rows) {
   for (int index : kinematics.mechanism().constraints()) {
     const Joint<Space, S>& joint = kinematics.mechanism().joints()[index];
-    const auto D = kinematics.joints()[index].D();
-    const Motion<Space, S> mismatch = kinematics.ConstraintMismatch(index);
-    const Motion<Space, S> speed = kinematics.ConstraintSpeed(index);
+    const Velocity<Space, S> mismatch = kinematics.ConstraintMismatch(index);
+    const Components<Space, S> speed = kinematics.ConstraintSpeed(index);
     for (int r = 0; r < joint.num_constraints(); ++r) {
-      rows[joint.row + r] +=
-          S(2 * gains.alpha) * speed[r] + S(gains.beta * gains.beta) * D.col(r).dot(mismatch);
+      const S e = kinematics.joints()[index].D(r).dot(mismatch);
+      rows[joint.row + r] += S(2 * gains.alpha) * speed[r] + S(gains.beta * gains.beta) * e;
     }
   }
 }

@@ -26,9 +26,9 @@ const std::vector<Released>* ReleaseReview<Space, S>::Review(const Kinematics<Sp
                                                              S h) {
   const Mechanism<Space, S>& mechanism = kinematics.mechanism();
   double fastest = 0.0;
-  for (const Motion<Space, S>& V : kinematics.motions()) {
-    const double turn = static_cast<double>(S(V.template head<Space::kRot>().norm()));
-    const double shift = static_cast<double>(S(V.template tail<Space::kLin>().norm()));
+  for (const Velocity<Space, S>& V : kinematics.motions()) {
+    const double turn = static_cast<double>(V.angular.norm());
+    const double shift = static_cast<double>(V.linear.norm());
     fastest = std::max({fastest, turn, shift / static_cast<double>(mechanism.length())});
   }
   travel_ += fastest * static_cast<double>(h);

@@ -18,12 +18,13 @@ MatrixX<S> ToOwnAxes(const Kinematics<Space, S>& kinematics, const Joint<Space, 
       !joint.kind->rotation_invariant || joint.num_drives > 0 || joint.num_released > 0;
   if (own) return MatrixX<S>::Identity(size, size);
   const Rotation<Space, S> R = kinematics.poses()[joint.from].R * joint.X_PF.R;
-  Block<Space, S> F = Block<Space, S>::Identity();
-  F.template bottomRightCorner<Space::kLin, Space::kLin>() = R;
-  if constexpr (Space::kRot == 3) F.template topLeftCorner<3, 3>() = R;
-  MatrixX<S> D_F(Space::kDim, size);
-  for (int i = 0; i < size; ++i) D_F.col(i) = F.col(joint.kind->axes[joint.kind->num_u + i]);
-  return D_F.transpose() * state.AllD();
+  MatrixX<S> T(size, size);
+  for (int i = 0; i < size; ++i) {
+    const auto axis = Direction<Space, S>::Unit(joint.kind->axes[joint.kind->num_u + i]);
+    const Direction<Space, S> D_F = Rotate(R, axis);
+    for (int j = 0; j < size; ++j) T(i, j) = D_F.dot(state.D(j));
+  }
+  return T;
 }
 
 }  // namespace
@@ -55,8 +56,9 @@ DirectionRows RowsOfDirections(const Kinematics<Space, S>& kinematics) {
     rows = T * MatrixX<S>(rows);
     const MatrixX<S> free =
         T * FreeResponse(kinematics, Masses::kGeometric, index, true) * T.transpose();
-    const MatrixX<S> e =
-        T * (kinematics.joints()[index].AllD().transpose() * kinematics.ConstraintMismatch(index));
+    const Components<Space, S> all = kinematics.joints()[index].Along(
+        kinematics.ConstraintMismatch(index), result.count[c]);
+    const MatrixX<S> e = T * all.head(result.count[c]);
     result.free.push_back(free.template cast<double>());
     for (int i = 0; i < result.count[c]; ++i) {
       const double scale = std::sqrt(static_cast<double>(free(i, i)));

@@ -9,7 +9,7 @@ namespace loopbench {
 template <class Space, class S>
 Drives<Space, S>::Drives(const Mechanism<Space, S>& mechanism)
     : dynamics_(mechanism),
-      A_(mechanism.num_bodies(), Motion<Space, S>::Zero()),
+      A_(mechanism.num_bodies(), Acceleration<Space, S>::Zero()),
       F_(mechanism.num_bodies(), Wrench<Space, S>::Zero()) {}
 
 /// `left` is D^T (A_Q - A_P - g) at Mo, the paper's (7) without udot, for the accelerations that
@@ -33,9 +33,9 @@ bool Drives<Space, S>::Followed(const Kinematics<Space, S>& kinematics, const Ve
   S alone = S(0);
   for (int body = 1; body < kinematics.mechanism().num_bodies(); ++body) {
     const Inertia<Space, S>& inertia = kinematics.mechanism().bodies()[body];
-    const Angular<Space, S> moment = F_[body].template head<Space::kRot>();
-    alone = std::max({alone, (kinematics.RotationalInverse(inertia, body) * moment).norm(),
-                      F_[body].template tail<Space::kLin>().norm() / inertia.mass});
+    const auto inverse = kinematics.RotationalInverse(inertia, body);
+    alone = std::max({alone, (inverse * F_[body].angular).norm(),
+                      S(F_[body].linear.norm() / inertia.mass)});
   }
   if (worst <= S(kFollowed) * size + S(kRoundOff) * alone) return true;
   const S mismatch = RelativeMismatch(kinematics);
@@ -49,12 +49,12 @@ S Drives<Space, S>::RelativeMismatch(const Kinematics<Space, S>& kinematics) {
   const Mechanism<Space, S>& mechanism = kinematics.mechanism();
   S position = S(0), speed = S(0), size = S(0);
   for (int index : mechanism.constraints()) {
-    const Motion<Space, S> mismatch = kinematics.ConstraintMismatch(index);
-    position = std::max({position, mismatch.template head<Space::kRot>().norm(),
-                         mismatch.template tail<Space::kLin>().norm() / mechanism.length()});
+    const Velocity<Space, S> mismatch = kinematics.ConstraintMismatch(index);
+    position = std::max({position, mismatch.angular.norm(),
+                         S(mismatch.linear.norm() / mechanism.length())});
     speed = std::max(speed, kinematics.ConstraintSpeed(index).norm());
   }
-  for (const Motion<Space, S>& V : kinematics.motions()) size = std::max(size, V.norm());
+  for (const Velocity<Space, S>& V : kinematics.motions()) size = std::max(size, V.norm());
   return position + (size > S(0) ? speed / size : S(0));
 }
 

@@ -42,7 +42,7 @@ class Drives {
   static S RelativeMismatch(const Kinematics<Space, S>& kinematics);
 
   TreeDynamics<Space, S> dynamics_;
-  std::vector<Motion<Space, S>> A_;
+  std::vector<Acceleration<Space, S>> A_;
   std::vector<Wrench<Space, S>> F_;
 };
 

@@ -20,7 +20,7 @@ Excursion<Space>::Excursion(const Mechanism<Space, double>& mechanism, const Vec
     const JointState<Space, double>& state = kinematics_.joints()[step.joint];
     const int offset = mechanism.joints()[step.joint].u_offset;
     for (int i = 0; i < state.num_u; ++i) {
-      const bool shifts = state.H(i).template head<Space::kRot>().isZero();
+      const bool shifts = state.H(i).angular.isZero();
       if (shifts) units_[offset + i] = mechanism.length();
     }
   }

@@ -33,10 +33,10 @@ template <class Space, class S>
 Block<Space, S> ShiftInertia(const Block<Space, S>& I, const Linear<Space, S>& r) {
   Block<Space, S> X;
   for (int i = 0; i < Space::kDim; ++i) {
-    const Motion<Space, S> unit = Motion<Space, S>::Unit(i);
-    X.col(i) = ShiftMotion<Space, S>(unit, r);
+    const Velocity<Space, S> column = ShiftMotion<Space, S>(Velocity<Space, S>::Unit(i), r);
+    for (int k = 0; k < Space::kDim; ++k) X(k, i) = column[k];
   }
-  return X.transpose() * I * X;
+  return X.transpose() * (I * X);
 }
 
 /// Composite rigid bodies (Featherstone, Rigid Body Dynamics Algorithms, section 6.2). `composite`
@@ -55,11 +55,8 @@ void FillMassMatrix(const Kinematics<Space, S>& kinematics, std::vector<Block<Sp
   const auto& tree = mechanism.tree();
   M.setZero(mechanism.num_u(), mechanism.num_u());
   for (int body = 1; body < mechanism.num_bodies(); ++body) {
-    composite[body].setZero();
-    composite[body].template topLeftCorner<Space::kRot, Space::kRot>() =
-        kinematics.RotationalInertia(inertias[body], body);
-    composite[body].template bottomRightCorner<Space::kLin, Space::kLin>().diagonal().setConstant(
-        inertias[body].mass);
+    composite[body] = DiagonalBlock<Space, S>(kinematics.RotationalInertia(inertias[body], body),
+                                              inertias[body].mass);
   }
   for (auto step = tree.rbegin(); step != tree.rend(); ++step) {
     const JointState<Space, S>& state = kinematics.joints()[step->joint];
@@ -67,8 +64,9 @@ void FillMassMatrix(const Kinematics<Space, S>& kinematics, std::vector<Block<Sp
     const Arms<Space, S> arms(*step, kinematics, masses);
     for (int i = 0; i < joint.num_u(); ++i) {
       // momentum of the subtree moving along direction i, carried rootward
-      const Motion<Space, S> h = state.H(i) * S(step->sign);
-      Wrench<Space, S> F = composite[step->child] * ShiftMotion<Space, S>(h, arms.child);
+      const Velocity<Space, S> h = state.H(i) * S(step->sign);
+      auto F = Apply<Wrench<Space, S>>(composite[step->child],
+                                       ShiftMotion<Space, S>(h, arms.child));
       for (int s = mechanism.step_of_body(step->child); s >= 0;) {
         const TreeStep& at = tree[s];
         const JointState<Space, S>& at_state = kinematics.joints()[at.joint];
@@ -112,8 +110,8 @@ void AddRows(const Kinematics<Space, S>& kinematics, int index, int first, int c
       const Joint<Space, S>& joint = mechanism.joints()[step.joint];
       const Linear<Space, S> arm = p - kinematics.JointPoint(step.joint);
       for (int i = 0; i < joint.num_u(); ++i) {
-        const Motion<Space, S> h = moving.H(i) * (sign * S(step.sign));
-        const Motion<Space, S> at_constraint = ShiftMotion<Space, S>(h, arm);
+        const Velocity<Space, S> h = moving.H(i) * (sign * S(step.sign));
+        const Velocity<Space, S> at_constraint = ShiftMotion<Space, S>(h, arm);
         for (int r = 0; r < count; ++r) {
           J(first + r, joint.u_offset + i) += state.D(r).dot(at_constraint);
         }
@@ -127,7 +125,7 @@ void AddRows(const Kinematics<Space, S>& kinematics, int index, int first, int c
 
 template <class Space, class S>
 TreeDynamics<Space, S>::TreeDynamics(const Mechanism<Space, S>& mechanism)
-    : A_bias_(mechanism.num_bodies(), Motion<Space, S>::Zero()),
+    : A_bias_(mechanism.num_bodies(), Acceleration<Space, S>::Zero()),
       F_(mechanism.num_bodies(), Wrench<Space, S>::Zero()),
       composite_(mechanism.num_bodies(), Block<Space, S>::Zero()) {}
 
@@ -150,18 +148,18 @@ void TreeDynamics<Space, S>::MassMatrix(const Kinematics<Space, S>& kinematics, 
 template <class Space, class S>
 void TreeDynamics<Space, S>::BodyAccelerations(const Kinematics<Space, S>& kinematics,
                                                const VectorX<S>& udot,
-                                               std::span<Motion<Space, S>> A) const {
+                                               std::span<Acceleration<Space, S>> A) const {
   const Mechanism<Space, S>& mechanism = kinematics.mechanism();
   A[kGround].setZero();
   for (const TreeStep& step : mechanism.tree()) {
     const JointState<Space, S>& state = kinematics.joints()[step.joint];
     const Joint<Space, S>& joint = mechanism.joints()[step.joint];
     const Arms<Space, S> arms(step, state);
-    Motion<Space, S> A_rel = state.g;
+    Acceleration<Space, S> A_rel = state.g;
     for (int i = 0; i < joint.num_u(); ++i) A_rel += state.H(i) * udot[joint.u_offset + i];
-    const Motion<Space, S> at_joint = ShiftMotion<Space, S>(A[step.parent], arms.parent) +
-                                      kinematics.Centripetal(step.parent, arms.parent) +
-                                      S(step.sign) * A_rel;
+    const Acceleration<Space, S> at_joint = ShiftMotion<Space, S>(A[step.parent], arms.parent) +
+                                            kinematics.Centripetal(step.parent, arms.parent) +
+                                            S(step.sign) * A_rel;
     A[step.child] = ShiftMotion<Space, S>(at_joint, arms.child) +
                     kinematics.Centripetal(step.child, arms.child);
   }
@@ -170,15 +168,11 @@ void TreeDynamics<Space, S>::BodyAccelerations(const Kinematics<Space, S>& kinem
 /// Newton and Euler about the centre of mass: [I alpha + w x I w; m a].
 template <class Space, class S>
 Wrench<Space, S> InertialForce(const Kinematics<Space, S>& kinematics, int body,
-                               const Motion<Space, S>& A) {
+                               const Acceleration<Space, S>& A) {
   const Inertia<Space, S>& inertia = kinematics.mechanism().bodies()[body];
   const auto I = kinematics.RotationalInertia(inertia, body);
-  const Angular<Space, S> w = kinematics.motions()[body].template head<Space::kRot>();
-  const Angular<Space, S> alpha = A.template head<Space::kRot>();
-  Wrench<Space, S> F;
-  F << I * alpha + CrossAngular<S>(w, Angular<Space, S>(I * w)),
-      inertia.mass * A.template tail<Space::kLin>();
-  return F;
+  const Angular<Space, S>& w = kinematics.motions()[body].angular;
+  return {I * A.angular + CrossAngular<S>(w, I * w), inertia.mass * A.linear};
 }
 
 /// h by the recursive Newton-Euler method: outwards accelerations for udot = 0, then the wrenches
@@ -298,17 +292,14 @@ void TreeDynamics<Space, S>::JacobianBias(const Kinematics<Space, S>& kinematics
 /// D^T of (7), both sides at Mo; H udot drops out because D^T H = 0 (9).
 template <class Space, class S>
 Components<Space, S> JointAcceleration(const Kinematics<Space, S>& kinematics, int index,
-                                       std::span<const Motion<Space, S>> A) {
+                                       std::span<const Acceleration<Space, S>> A) {
   const Joint<Space, S>& joint = kinematics.mechanism().joints()[index];
   const JointState<Space, S>& state = kinematics.joints()[index];
-  const Motion<Space, S> A_Q =
+  const Acceleration<Space, S> A_Q =
       ShiftMotion<Space, S>(A[joint.to], state.r_Q) + kinematics.Centripetal(joint.to, state.r_Q);
-  const Motion<Space, S> A_P = ShiftMotion<Space, S>(A[joint.from], state.r_P) +
-                               kinematics.Centripetal(joint.from, state.r_P);
-  const Motion<Space, S> rest = A_Q - A_P - state.g;
-  Components<Space, S> result = Components<Space, S>::Zero();
-  for (int r = 0; r < joint.num_directions(); ++r) result[r] = state.D(r).dot(rest);
-  return result;
+  const Acceleration<Space, S> A_P = ShiftMotion<Space, S>(A[joint.from], state.r_P) +
+                                     kinematics.Centripetal(joint.from, state.r_P);
+  return state.Along(A_Q - A_P - state.g, joint.num_directions());
 }
 
 /// X of (16) for two bodies that nothing else holds: the sum over both sides of
@@ -328,15 +319,9 @@ JointMatrix<S> FreeResponse(const Kinematics<Space, S>& kinematics, Masses masse
         side == 0 ? kinematics.ArmQ(index, masses) : kinematics.ArmP(index, masses);
     const auto inverse = kinematics.RotationalInverse(inertias[body], body);
     for (int a = 0; a < rows; ++a) {
-      const Wrench<Space, S> D_a = state.D(a);
-      const Wrench<Space, S> F = ShiftForce<Space, S>(D_a, r);
-      Motion<Space, S> A;
-      A << inverse * F.template head<Space::kRot>(),
-          F.template tail<Space::kLin>() / inertias[body].mass;
-      for (int b = 0; b < rows; ++b) {
-        const Wrench<Space, S> D_b = state.D(b);
-        X(b, a) += ShiftForce<Space, S>(D_b, r).dot(A);
-      }
+      const Wrench<Space, S> F = ShiftForce<Space, S>(state.D(a), r);
+      const Acceleration<Space, S> A(inverse * F.angular, F.linear / inertias[body].mass);
+      for (int b = 0; b < rows; ++b) X(b, a) += ShiftForce<Space, S>(state.D(b), r).dot(A);
     }
   }
   return X;
@@ -345,10 +330,10 @@ JointMatrix<S> FreeResponse(const Kinematics<Space, S>& kinematics, Masses masse
 #define LOOPBENCH_INSTANTIATE(Space, S)                                               \
   template class TreeDynamics<Space, S>;                                              \
   template Wrench<Space, S> InertialForce(const Kinematics<Space, S>&, int,           \
-                                          const Motion<Space, S>&);                   \
+                                          const Acceleration<Space, S>&);                   \
   template void SpeedBias(Kinematics<Space, S>&, const VectorX<S>&, VectorX<S>&);     \
   template Components<Space, S> JointAcceleration(const Kinematics<Space, S>&, int,   \
-                                                  std::span<const Motion<Space, S>>); \
+                                                  std::span<const Acceleration<Space, S>>); \
   template JointMatrix<S> FreeResponse(const Kinematics<Space, S>&, Masses, int, bool);
 LOOPBENCH_FOR_EACH_SPACE_AND_MODEL_SCALAR(LOOPBENCH_INSTANTIATE)
 #undef LOOPBENCH_INSTANTIATE

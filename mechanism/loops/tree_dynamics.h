@@ -50,7 +50,7 @@ class TreeDynamics {
 
   /// Accelerations of the centres of mass for given udot.
   void BodyAccelerations(const Kinematics<Space, S>& kinematics, const VectorX<S>& udot,
-                         std::span<Motion<Space, S>> A) const;
+                         std::span<Acceleration<Space, S>> A) const;
 
  private:
   /// Wrenches that bodies with accelerations A_bias_ need beyond applied forces, in F_.
@@ -58,7 +58,7 @@ class TreeDynamics {
   /// Their components along the coordinates of the forest.
   void AlongForest(const Kinematics<Space, S>& kinematics, VectorX<S>& force);
 
-  std::vector<Motion<Space, S>> A_bias_;
+  std::vector<Acceleration<Space, S>> A_bias_;
   std::vector<Wrench<Space, S>> F_;
   std::vector<Block<Space, S>> composite_;
 };
@@ -66,7 +66,7 @@ class TreeDynamics {
 /// Wrench at its centre of mass that gives a body the acceleration A there.
 template <class Space, class S>
 Wrench<Space, S> InertialForce(const Kinematics<Space, S>& kinematics, int body,
-                               const Motion<Space, S>& A);
+                               const Acceleration<Space, S>& A);
 
 /// b: what the constraints would miss if all free speeds were zero. `zero` has num_u zeros; the
 /// motions of `kinematics` are left at them where there are prescribed motions.
@@ -77,7 +77,7 @@ void SpeedBias(Kinematics<Space, S>& kinematics, const VectorX<S>& zero, VectorX
 /// joint is satisfied at acceleration level. A number per direction, imposed ones first.
 template <class Space, class S>
 Components<Space, S> JointAcceleration(const Kinematics<Space, S>& kinematics, int joint,
-                                       std::span<const Motion<Space, S>> A);
+                                       std::span<const Acceleration<Space, S>> A);
 
 /// Response D^T (S M^-1 S^T) D of the two bodies of a joint when nothing else holds them, the scale
 /// against which the response of the assembled mechanism is judged (docs/design.md D5): of the

@@ -50,7 +50,9 @@ struct ForceDefaults {
 /// A description's 3-vector in the components of the space.
 template <class Space, class S>
 Linear<Space, S> ToLinear(const Eigen::Vector3d& v) {
-  return v.head<Space::kLin>().template cast<S>();
+  Linear<Space, S> linear;
+  for (int i = 0; i < Space::kLin; ++i) linear[i] = S(v[i]);
+  return linear;
 }
 
 /// A material point, in ground axes.
@@ -72,20 +74,18 @@ struct PointOfBody {
 
   PointState<Space, S> StateIn(const Kinematics<Space, S>& kinematics) const {
     const Pose<Space, S>& X_WB = kinematics.poses()[body];
-    const Motion<Space, S>& V = kinematics.motions()[body];
-    const Angular<Space, S> w = V.template head<Space::kRot>();
+    const Velocity<Space, S>& V = kinematics.motions()[body];
     PointState<Space, S> state;
     state.r = X_WB.R * at;
     state.p = X_WB.p + state.r;
-    state.v = V.template tail<Space::kLin>() + Cross<S>(w, state.r);
+    state.v = V.linear + Cross<S>(V.angular, state.r);
     return state;
   }
 
   /// Adds the force f at the point.
   void AddForce(const Linear<Space, S>& f, const PointState<Space, S>& state,
                 std::span<Wrench<Space, S>> wrenches) const {
-    wrenches[body].template head<Space::kRot>() += Moment<S>(state.r, f);
-    wrenches[body].template tail<Space::kLin>() += f;
+    wrenches[body] += {Moment<S>(state.r, f), f};
   }
 };
 

@@ -56,7 +56,7 @@ class ForceElements {
       knots.insert(knots.end(), element.knots().begin(), element.knots().end());
     });
     std::ranges::sort(knots);
-    knots.erase(std::ranges::unique(knots).begin(), knots.end());
+    knots.erase(std::unique(knots.begin(), knots.end()), knots.end());
     return knots;
   }
 

@@ -9,9 +9,8 @@ void AppliedForces(const Kinematics<Space, S>& kinematics, std::span<Wrench<Spac
   const Mechanism<Space, S>& mechanism = kinematics.mechanism();
   wrenches[kGround].setZero();
   for (int body = 1; body < mechanism.num_bodies(); ++body) {
-    wrenches[body].template head<Space::kRot>().setZero();
-    wrenches[body].template tail<Space::kLin>() =
-        mechanism.bodies()[body].mass * mechanism.gravity();
+    wrenches[body] = {Angular<Space, S>::Zero(),
+                      mechanism.bodies()[body].mass * mechanism.gravity()};
   }
   mechanism.forces().ForEach(
       [&](const auto& element) { element.AddWrenches(kinematics, wrenches); });
@@ -25,10 +24,9 @@ Energy<S> ComputeEnergy(const Kinematics<Space, S>& kinematics) {
   Energy<S> energy;
   for (int body = 1; body < mechanism.num_bodies(); ++body) {
     const Inertia<Space, S>& inertia = mechanism.bodies()[body];
-    const Angular<Space, S> w = kinematics.motions()[body].template head<Space::kRot>();
-    const Linear<Space, S> v = kinematics.motions()[body].template tail<Space::kLin>();
-    energy.kinetic += half * (inertia.mass * v.squaredNorm() +
-                              w.dot(kinematics.RotationalInertia(inertia, body) * w));
+    const Velocity<Space, S>& V = kinematics.motions()[body];
+    const Angular<Space, S> Iw = kinematics.RotationalInertia(inertia, body) * V.angular;
+    energy.kinetic += half * (inertia.mass * V.linear.squaredNorm() + V.angular.dot(Iw));
     energy.potential -= inertia.mass * mechanism.gravity().dot(kinematics.poses()[body].p);
   }
   mechanism.forces().ForEach(

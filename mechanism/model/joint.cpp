@@ -29,32 +29,28 @@ JointKind<Space, S> KindWith(JointType type, S parameter) {
   if (kind.basis != nullptr && kind.num_u > 0) {
     // columns of H are as long at every pose
     Pose<Space, S> X;
-    X.p = Linear<Space, S>::UnitX();
-    Block<Space, S> basis;
+    X.p = Linear<Space, S>::Unit(0);
+    Basis<Space, S> basis;
     kind.basis(X, basis, parameter);
-    kind.inverse_H_squared = S(1) / basis.col(0).squaredNorm();
+    kind.inverse_H_squared = S(1) / basis[0].squaredNorm();
   }
   return kind;
 }
 
 template <class Space, class S>
-Motion<Space, S> Mismatch(const JointKind<Space, S>& kind, const Pose<Space, S>& X_FM) {
+Velocity<Space, S> Mismatch(const JointKind<Space, S>& kind, const Pose<Space, S>& X_FM) {
   if (kind.coordinates == nullptr) {  // a rod: what it is too long along itself
-    Motion<Space, S> mismatch = Motion<Space, S>::Zero();
-    mismatch.template tail<Space::kLin>() = X_FM.p * (S(1) - kind.parameter / X_FM.p.norm());
-    return mismatch;
+    return {Angular<Space, S>::Zero(), X_FM.p * (S(1) - kind.parameter / X_FM.p.norm())};
   }
   S q[7];
   Pose<Space, S> nearest;
   kind.coordinates(X_FM, q, kind.parameter);
   kind.transform(q, nearest, kind.parameter);
-  Pose<Space, S> rest = Compose(X_FM, Inverse(nearest));
-  Motion<Space, S> mismatch;
-  mismatch << RotationVector(rest), X_FM.p - nearest.p;
+  Velocity<Space, S> mismatch(RotationVector(Compose(X_FM, Inverse(nearest))), X_FM.p - nearest.p);
   // A loop may wind: planar angles along it then differ by whole turns that are no mismatch.
   if constexpr (Space::kRot == 1) {
     using std::remainder;
-    mismatch[0] = remainder(mismatch[0], S(2 * std::numbers::pi_v<S>));
+    mismatch.angular[0] = remainder(mismatch.angular[0], S(2 * std::numbers::pi_v<S>));
   }
   return mismatch;
 }
@@ -62,7 +58,7 @@ Motion<Space, S> Mismatch(const JointKind<Space, S>& kind, const Pose<Space, S>&
 #define LOOPBENCH_INSTANTIATE(Space, S)                  \
   template const JointKind<Space, S>& KindOf(JointType); \
   template JointKind<Space, S> KindWith(JointType, S);   \
-  template Motion<Space, S> Mismatch(const JointKind<Space, S>&, const Pose<Space, S>&);
+  template Velocity<Space, S> Mismatch(const JointKind<Space, S>&, const Pose<Space, S>&);
 LOOPBENCH_FOR_EACH_SPACE_AND_MODEL_SCALAR(LOOPBENCH_INSTANTIATE)
 #undef LOOPBENCH_INSTANTIATE
 

@@ -42,6 +42,10 @@
 
 namespace loopbench {
 
+/// Columns of [H D].
+template <class Space, class S>
+using Basis = std::array<Direction<Space, S>, Space::kDim>;
+
 template <class Space, class S>
 struct JointKind {
   int num_q = 0;
@@ -55,7 +59,7 @@ struct JointKind {
 
   /// What the kinds helical (pitch [m/rad]) and rod (length [m]) depend on; 0 for others.
   S parameter = S(0);
-  /// 1 / |H|^2 of each column of H, by which u = inverse_H_squared H^T V for a relative motion V.
+  /// 1 / |H|^2 of each column of H, by which u = inverse_H_squared H^T V for a relative velocity V.
   /// It is 1 in every kind but the helical, whose H is [z; pitch z].
   S inverse_H_squared = S(1);
 
@@ -64,10 +68,9 @@ struct JointKind {
   void (*rates)(const S* q, const S* u, S* qdot) = nullptr;
 
   /// Where directions are not axes: [H D] in F axes at a pose, orthogonal; null otherwise.
-  void (*basis)(const Pose<Space, S>& X_FM, Block<Space, S>& basis_F, S parameter) = nullptr;
-  /// And Hdot u in F axes, for a relative motion V in F axes; null where it is zero.
-  void (*bias)(const Pose<Space, S>& X_FM, const Motion<Space, S>& V,
-               Motion<Space, S>& Hdot_u) = nullptr;
+  void (*basis)(const Pose<Space, S>& X_FM, Basis<Space, S>& basis_F, S parameter) = nullptr;
+  /// And Hdot u in F axes, for a relative velocity V in F axes; null where it is zero.
+  Acceleration<Space, S> (*bias)(const Pose<Space, S>& X_FM, const Velocity<Space, S>& V) = nullptr;
 
   bool has_quaternion() const { return num_q > num_u; }
   int num_constraints() const { return Space::kDim - num_u; }
@@ -81,9 +84,9 @@ const JointKind<Space, S>& KindOf(JointType type);
 template <class Space, class S>
 JointKind<Space, S> KindWith(JointType type, S parameter);
 
-/// What keeps M from its nearest admissible pose, in F axes: [rotation vector; shift]. Its
-/// components along D are the joint's mismatch, in rad and m.
+/// What keeps M from its nearest admissible pose, in F axes: [rotation vector; shift], the way that
+/// a velocity goes in unit time. Its components along D are the joint's mismatch, in rad and m.
 template <class Space, class S>
-Motion<Space, S> Mismatch(const JointKind<Space, S>& kind, const Pose<Space, S>& X_FM);
+Velocity<Space, S> Mismatch(const JointKind<Space, S>& kind, const Pose<Space, S>& X_FM);
 
 }  // namespace loopbench

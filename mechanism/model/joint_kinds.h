@@ -21,11 +21,11 @@ void SameRates(const S*, const S* u, S* qdot) {
 
 /// The distance |p| has the second derivative n . p'' + |v_t|^2 / |p|, v_t the part of v across n.
 template <class Space, class S>
-void RodBias(const Pose<Space, S>& X, const Motion<Space, S>& V, Motion<Space, S>& Hdot_u) {
+Acceleration<Space, S> RodBias(const Pose<Space, S>& X, const Velocity<Space, S>& V) {
   const S distance = X.p.norm();
-  const Linear<Space, S> n = X.p / distance, v = V.template tail<Space::kLin>();
-  Hdot_u.setZero();
-  Hdot_u.template tail<Space::kLin>() = -n * ((v - n * n.dot(v)).squaredNorm() / distance);
+  const Linear<Space, S> n = X.p / distance;
+  const S across = (V.linear - n * n.dot(V.linear)).squaredNorm();
+  return {Angular<Space, S>::Zero(), -n * (across / distance)};
 }
 
 }  // namespace loopbench

@@ -8,15 +8,10 @@
 namespace loopbench {
 
 template <class Space, class S>
-Motion<Space, S> Kinematics<Space, S>::ConstraintMismatch(int index) const {
+Velocity<Space, S> Kinematics<Space, S>::ConstraintMismatch(int index) const {
   const Joint<Space, S>& joint = mechanism_->joints()[index];
-  const Motion<Space, S> in_F = Mismatch(*joint.kind, measured_[index]);
-  const Rotation<Space, S> R_WF = poses_[joint.from].R * joint.X_PF.R;
-  Motion<Space, S> mismatch = in_F;
-  mismatch.template tail<Space::kLin>().noalias() = R_WF * in_F.template tail<Space::kLin>();
-  if constexpr (Space::kRot == 3) {
-    mismatch.template head<3>().noalias() = R_WF * in_F.template head<3>();
-  }
+  Velocity<Space, S> mismatch = Rotate<Space, S>(poses_[joint.from].R * joint.X_PF.R,
+                                                 Mismatch(*joint.kind, measured_[index]));
   if (joint.num_drives == 0) return mismatch;
   S q[7];
   joint.kind->coordinates(measured_[index], q, joint.kind->parameter);
@@ -36,8 +31,7 @@ template <class Space, class S>
 Components<Space, S> Kinematics<Space, S>::ConstraintSpeed(int index) const {
   const Joint<Space, S>& joint = mechanism_->joints()[index];
   const JointState<Space, S>& state = joints_[index];
-  Components<Space, S> speed = Components<Space, S>::Zero();
-  for (int i = 0; i < state.rows(); ++i) speed[i] = state.D(i).dot(state.V_rel);
+  Components<Space, S> speed = state.Along(state.V_rel, state.rows());
   for (int k = 0; k < joint.num_drives; ++k) {
     speed[k] -= drives_[joint.first_drive + k].rate / joint.kind->inverse_H_squared;
   }
@@ -104,16 +98,17 @@ VectorX<S> Kinematics<Space, S>::SpeedsIn(const Kinematics& other) const {
   for (const TreeStep& step : other.mechanism().tree()) {
     const Joint<Space, S>& joint = other.mechanism().joints()[step.joint];
     const JointState<Space, S>& state = other.joints()[step.joint];
-    const Motion<Space, S> V_rel = ShiftMotion<Space, S>(motions_[joint.to], state.r_Q) -
+    const Velocity<Space, S> V_rel = ShiftMotion<Space, S>(motions_[joint.to], state.r_Q) -
                                    ShiftMotion<Space, S>(motions_[joint.from], state.r_P);
-    u.segment(joint.u_offset, state.num_u) =
-        joint.kind->inverse_H_squared * (state.H().transpose() * V_rel);
+    for (int i = 0; i < state.num_u; ++i) {
+      u[joint.u_offset + i] = joint.kind->inverse_H_squared * state.H(i).dot(V_rel);
+    }
   }
   return u;
 }
 
 #define LOOPBENCH_INSTANTIATE(Space, S)                                                      \
-  template Motion<Space, S> Kinematics<Space, S>::ConstraintMismatch(int) const;             \
+  template Velocity<Space, S> Kinematics<Space, S>::ConstraintMismatch(int) const;             \
   template Components<Space, S> Kinematics<Space, S>::ConstraintSpeed(int) const;            \
   template S Kinematics<Space, S>::JointCoordinate(int) const;                               \
   template S Kinematics<Space, S>::JointSpeed(int) const;                                    \

@@ -30,7 +30,7 @@ struct Kinds {
             .transform =
                 [](const S* q, P& X, S) {
                   X.SetAngle(S(0));
-                  X.p << q[0], S(0);
+                  X.p = {q[0], S(0)};
                 },
             .coordinates = [](const P& X, S* q, S) { q[0] = X.p[0]; },
             .rates = SameRates<S, 1>};
@@ -52,7 +52,7 @@ struct Kinds {
             .transform =
                 [](const S* q, P& X, S) {
                   X.SetAngle(q[0]);
-                  X.p << q[1], q[2];
+                  X.p = {q[1], q[2]};
                 },
             .coordinates =
                 [](const P& X, S* q, S) {
@@ -70,7 +70,7 @@ struct Kinds {
             .transform =
                 [](const S* q, P& X, S) {
                   X.SetAngle(q[0]);
-                  X.p << q[1], S(0);
+                  X.p = {q[1], S(0)};
                 },
             .coordinates =
                 [](const P& X, S* q, S) {
@@ -86,9 +86,11 @@ struct Kinds {
             .axes = {0, 1, 2},
             .rotation_invariant = false,
             .basis =
-                [](const P& X, Block<Planar, S>& basis_F, S) {
+                [](const P& X, Basis<Planar, S>& basis_F, S) {
                   const Linear<Planar, S> n = X.p.normalized();
-                  basis_F << S(1), S(0), S(0), S(0), -n[1], n[0], S(0), n[0], n[1];
+                  basis_F[0] = Direction<Planar, S>::Unit(0);
+                  basis_F[1] = {Angular<Planar, S>::Zero(), {-n[1], n[0]}};
+                  basis_F[2] = {Angular<Planar, S>::Zero(), n};
                 },
             .bias = RodBias<Planar, S>};
   }

@@ -1,4 +1,3 @@
-#include <Eigen/Geometry>
 #include <cmath>
 #include <numbers>
 
@@ -17,21 +16,11 @@ struct Kinds {
     using std::cos;
     using std::sin;
     const S c = cos(angle), s = sin(angle);
-    X.R << c, -s, S(0), s, c, S(0), S(0), S(0), S(1);
+    X.R = {c, -s, S(0), s, c, S(0), S(0), S(0), S(1)};
   }
   static S AngleAboutZ(const P& X) {
     using std::atan2;
     return atan2(X.R(1, 0) - X.R(0, 1), X.R(0, 0) + X.R(1, 1));
-  }
-  static void FromQuaternion(const S* q, P& X) {
-    X.R = Eigen::Quaternion<S>(q[0], q[1], q[2], q[3]).normalized().toRotationMatrix();
-  }
-  static void ToQuaternion(const P& X, S* q) {
-    const Eigen::Quaternion<S> e(X.R);
-    q[0] = e.w();
-    q[1] = e.x();
-    q[2] = e.y();
-    q[3] = e.z();
   }
   /// The angular velocity is in F axes, hence the product from the left: e' = w e / 2.
   static void QuaternionRates(const S* q, const S* u, S* qdot) {
@@ -43,12 +32,23 @@ struct Kinds {
   }
   /// The axes of a universal joint: x of F, y of M made normal to it, and the normal of both, about
   /// which it does not turn.
-  static Rotation<Spatial, S> CrossAxes(const P& X) {
-    const Linear<Spatial, S> x = Linear<Spatial, S>::UnitX(), y_M = X.R.col(1);
-    const Linear<Spatial, S> normal = x.cross(y_M).normalized();
-    Rotation<Spatial, S> axes;
-    axes << x, normal.cross(x), normal;
-    return axes;
+  struct Cross {
+    Angular<Spatial, S> first, second, normal;
+    explicit Cross(const P& X) : first(Angular<Spatial, S>::Unit(0)) {
+      normal = first.cross(X.R.col(1)).normalized();
+      second = normal.cross(first);
+    }
+  };
+  static Direction<Spatial, S> Turn(const Angular<Spatial, S>& axis) {
+    return {axis, Linear<Spatial, S>::Zero()};
+  }
+  static Direction<Spatial, S> Shift(const Linear<Spatial, S>& axis) {
+    return {Angular<Spatial, S>::Zero(), axis};
+  }
+  static Basis<Spatial, S> Axes() {
+    Basis<Spatial, S> basis;
+    for (int i = 0; i < Spatial::kDim; ++i) basis[i] = Direction<Spatial, S>::Unit(i);
+    return basis;
   }
 
   static JointKind<Spatial, S> Revolute() {
@@ -72,7 +72,7 @@ struct Kinds {
             .transform =
                 [](const S* q, P& X, S) {
                   X.R.setIdentity();
-                  X.p << q[0], S(0), S(0);
+                  X.p = {q[0], S(0), S(0)};
                 },
             .coordinates = [](const P& X, S* q, S) { q[0] = X.p[0]; },
             .rates = SameRates<S, 1>};
@@ -93,12 +93,12 @@ struct Kinds {
             .rotation_invariant = false,
             .transform =
                 [](const S* q, P& X, S) {
-                  FromQuaternion(q, X);
-                  X.p << q[4], q[5], q[6];
+                  X.R = FromQuaternion(q);
+                  X.p = {q[4], q[5], q[6]};
                 },
             .coordinates =
                 [](const P& X, S* q, S) {
-                  ToQuaternion(X, q);
+                  ToQuaternion(X.R, q);
                   for (int i = 0; i < 3; ++i) q[4 + i] = X.p[i];
                 },
             .rates =
@@ -114,7 +114,7 @@ struct Kinds {
             .transform =
                 [](const S* q, P& X, S) {
                   TurnAboutZ(q[0], X);
-                  X.p << q[1], S(0), S(0);
+                  X.p = {q[1], S(0), S(0)};
                 },
             .coordinates =
                 [](const P& X, S* q, S) {
@@ -130,7 +130,7 @@ struct Kinds {
             .transform =
                 [](const S* q, P& X, S) {
                   TurnAboutZ(q[0], X);
-                  X.p << S(0), S(0), q[1];
+                  X.p = {S(0), S(0), q[1]};
                 },
             .coordinates =
                 [](const P& X, S* q, S) {
@@ -146,10 +146,10 @@ struct Kinds {
             .axes = {0, 1, 2, 3, 4, 5},
             .transform =
                 [](const S* q, P& X, S) {
-                  FromQuaternion(q, X);
+                  X.R = FromQuaternion(q);
                   X.p.setZero();
                 },
-            .coordinates = [](const P& X, S* q, S) { ToQuaternion(X, q); },
+            .coordinates = [](const P& X, S* q, S) { ToQuaternion(X.R, q); },
             .rates = QuaternionRates};
   }
   static JointKind<Spatial, S> InPlane() {
@@ -159,7 +159,7 @@ struct Kinds {
             .transform =
                 [](const S* q, P& X, S) {
                   TurnAboutZ(q[0], X);
-                  X.p << q[1], q[2], S(0);
+                  X.p = {q[1], q[2], S(0)};
                 },
             .coordinates =
                 [](const P& X, S* q, S) {
@@ -178,7 +178,7 @@ struct Kinds {
                   using std::cos;
                   using std::sin;
                   const S c = cos(q[0]), s = sin(q[0]), cy = cos(q[1]), sy = sin(q[1]);
-                  X.R << cy, S(0), sy, s * sy, c, -s * cy, -c * sy, s, c * cy;
+                  X.R = {cy, S(0), sy, s * sy, c, -s * cy, -c * sy, s, c * cy};
                   X.p.setZero();
                 },
             .coordinates =
@@ -189,17 +189,19 @@ struct Kinds {
                 },
             .rates = SameRates<S, 2>,
             .basis =
-                [](const P& X, Block<Spatial, S>& basis_F, S) {
-                  basis_F.setIdentity();
-                  basis_F.template topLeftCorner<3, 3>() = CrossAxes(X);
+                [](const P& X, Basis<Spatial, S>& basis_F, S) {
+                  const Cross axes(X);
+                  basis_F = Axes();
+                  basis_F[0] = Turn(axes.first);
+                  basis_F[1] = Turn(axes.second);
+                  basis_F[2] = Turn(axes.normal);
                 },
             // the second axis turns about the first: d/dt y' = u0 (x cross y')
             .bias =
-                [](const P& X, const Motion<Spatial, S>& V, Motion<Spatial, S>& Hdot_u) {
-                  const Rotation<Spatial, S> axes = CrossAxes(X);
-                  const Linear<Spatial, S> w = V.template head<3>();
-                  Hdot_u.setZero();
-                  Hdot_u.template head<3>() = axes.col(0).dot(w) * axes.col(1).dot(w) * axes.col(2);
+                [](const P& X, const Velocity<Spatial, S>& V) {
+                  const Cross axes(X);
+                  const S turn = axes.first.dot(V.angular) * axes.second.dot(V.angular);
+                  return Acceleration<Spatial, S>(turn * axes.normal, Linear<Spatial, S>::Zero());
                 }};
   }
 
@@ -208,10 +210,18 @@ struct Kinds {
             .num_u = 5,
             .axes = {0, 1, 2, 3, 4, 5},
             .basis =
-                [](const P& X, Block<Spatial, S>& basis_F, S) {
-                  const Linear<Spatial, S> n = X.p.normalized(), across = n.unitOrthogonal();
-                  basis_F.setIdentity();
-                  basis_F.template bottomRightCorner<3, 3>() << across, n.cross(across), n;
+                [](const P& X, Basis<Spatial, S>& basis_F, S) {
+                  const Linear<Spatial, S> n = X.p.normalized();
+                  // from the coordinate axis that is farthest from n
+                  using std::abs;
+                  int least = abs(n[1]) < abs(n[0]) ? 1 : 0;
+                  if (abs(n[2]) < abs(n[least])) least = 2;
+                  const Linear<Spatial, S> across =
+                      Linear<Spatial, S>::Unit(least).cross(n).normalized();
+                  basis_F = Axes();
+                  basis_F[3] = Shift(across);
+                  basis_F[4] = Shift(n.cross(across));
+                  basis_F[5] = Shift(n);
                 },
             .bias = RodBias<Spatial, S>};
   }
@@ -222,7 +232,7 @@ struct Kinds {
             .transform =
                 [](const S* q, P& X, S pitch) {
                   TurnAboutZ(q[0], X);
-                  X.p << S(0), S(0), pitch * q[0];
+                  X.p = {S(0), S(0), pitch * q[0]};
                 },
             .coordinates =
                 [](const P& X, S* q, S pitch) {
@@ -234,15 +244,16 @@ struct Kinds {
                 },
             .rates = SameRates<S, 1>,
             .basis =
-                [](const P&, Block<Spatial, S>& basis_F, S pitch) {
+                [](const P&, Basis<Spatial, S>& basis_F, S pitch) {
                   using std::sqrt;
-                  basis_F.setZero();
-                  basis_F(2, 0) = S(1);
-                  basis_F(5, 0) = pitch;
-                  for (int i = 0; i < 2; ++i) basis_F(i, 1 + i) = basis_F(3 + i, 3 + i) = S(1);
                   const S length = sqrt(S(1) + pitch * pitch);
-                  basis_F(2, 5) = -pitch / length;
-                  basis_F(5, 5) = S(1) / length;
+                  const Linear<Spatial, S> z = Linear<Spatial, S>::Unit(2);
+                  basis_F[0] = {z, pitch * z};
+                  for (int i = 0; i < 2; ++i) {
+                    basis_F[1 + i] = Turn(Angular<Spatial, S>::Unit(i));
+                    basis_F[3 + i] = Shift(Linear<Spatial, S>::Unit(i));
+                  }
+                  basis_F[5] = {-pitch / length * z, z / length};
                 }};
   }
 };

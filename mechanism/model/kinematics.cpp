@@ -26,16 +26,16 @@ void Refresh(Pose<Spatial, S>&) {}
 /// those of R unless some are released.
 template <class Space, class S>
 void SetBasis(const JointKind<Space, S>& kind, const Rotation<Space, S>& R,
-              const Rotation<Space, S>& R_forces, Block<Space, S>& basis) {
-  basis.setZero();
+              const Rotation<Space, S>& R_forces, Basis<Space, S>& basis) {
   for (int i = 0; i < Space::kDim; ++i) {
     const int axis = kind.axes[i];
+    basis[i].setZero();
     if (axis >= Space::kRot) {
-      basis.col(i).template tail<Space::kLin>() = R_forces.col(axis - Space::kRot);
+      basis[i].linear = R_forces.col(axis - Space::kRot);
     } else if constexpr (Space::kRot == 1) {
-      basis(0, i) = S(1);
+      basis[i].angular[0] = S(1);
     } else {
-      basis.col(i).template head<3>() = R.col(axis);
+      basis[i].angular = R.col(axis);
     }
   }
 }
@@ -44,15 +44,9 @@ void SetBasis(const JointKind<Space, S>& kind, const Rotation<Space, S>& R,
 /// axes, and R = R_WF turns both halves, angular and linear.
 template <class Space, class S>
 void SetBasisAt(const JointKind<Space, S>& kind, const Rotation<Space, S>& R,
-                const Pose<Space, S>& X_FM, Block<Space, S>& basis) {
-  Block<Space, S> in_F;
-  kind.basis(X_FM, in_F, kind.parameter);
-  basis.template bottomRows<Space::kLin>().noalias() = R * in_F.template bottomRows<Space::kLin>();
-  if constexpr (Space::kRot == 1) {
-    basis.template topRows<1>() = in_F.template topRows<1>();
-  } else {
-    basis.template topRows<3>().noalias() = R * in_F.template topRows<3>();
-  }
+                const Pose<Space, S>& X_FM, Basis<Space, S>& basis) {
+  kind.basis(X_FM, basis, kind.parameter);
+  for (Direction<Space, S>& direction : basis) direction = Rotate(R, direction);
 }
 
 /// Ground axes serve for H and D where their spans do not depend on axes: nothing is prescribed or
@@ -68,7 +62,7 @@ template <class Space, class S>
 Kinematics<Space, S>::Kinematics(const Mechanism<Space, S>& mechanism)
     : mechanism_(&mechanism),
       poses_(mechanism.num_bodies()),
-      motions_(mechanism.num_bodies(), Motion<Space, S>::Zero()),
+      motions_(mechanism.num_bodies(), Velocity<Space, S>::Zero()),
       joints_(mechanism.joints().size()),
       measured_(joints_.size()),
       drives_(mechanism.drives().size()),
@@ -149,22 +143,24 @@ void Kinematics<Space, S>::SetDirections(int index, const Rotation<Space, S>& R_
   } else if (released == released_.end()) {
     SetBasis<Space, S>(*joint.kind, R_WF, R_WF, state.basis);
   } else {
-    const Rotation<Space, S> force_axes =
-        released->force_axes.template topLeftCorner<Space::kLin, Space::kLin>().template cast<S>();
+    Rotation<Space, S> force_axes;
+    for (int i = 0; i < Space::kLin; ++i) {
+      for (int k = 0; k < Space::kLin; ++k) force_axes(i, k) = S(released->force_axes(i, k));
+    }
     SetBasis<Space, S>(*joint.kind, R_WF, R_WF * force_axes, state.basis);
   }
   if (joint.num_drives == 0 && joint.num_released == 0) return;
-  const Block<Space, S> all = state.basis;
+  const Basis<Space, S> all = state.basis;
   int free = 0, driven = joint.num_u();
   for (int i = 0; i < joint.kind->num_u; ++i) {
-    state.basis.col(mechanism_->DriveOf(joint, i) >= 0 ? driven++ : free++) = all.col(i);
+    state.basis[mechanism_->DriveOf(joint, i) >= 0 ? driven++ : free++] = all[i];
   }
   if (joint.num_released == 0) return;
   const std::vector<int>& out = released->directions;
   int kept = joint.kind->num_u, last = Space::kDim - joint.num_released;
   for (int i = 0; i < joint.kind->num_constraints(); ++i) {
     const bool is_out = std::ranges::binary_search(out, i);
-    state.basis.col(is_out ? last++ : kept++) = all.col(joint.kind->num_u + i);
+    state.basis[is_out ? last++ : kept++] = all[joint.kind->num_u + i];
   }
 }
 
@@ -230,10 +226,9 @@ void Kinematics<Space, S>::UpdateVelocity(const VectorX<S>& u) {
   u_ = u;
   const auto finish = [&](int index, const Joint<Space, S>& joint) {
     JointState<Space, S>& state = joints_[index];
-    const Angular<Space, S> w_P = motions_[joint.from].template head<Space::kRot>();
-    const Angular<Space, S> w_rel = state.V_rel.template head<Space::kRot>();
-    const Linear<Space, S> v_rel = state.V_rel.template tail<Space::kLin>();
-    state.g << CrossAngular<S>(w_P, w_rel), S(2) * Cross<S>(w_P, v_rel);  // (7)
+    const Angular<Space, S>& w_P = motions_[joint.from].angular;
+    state.g = {CrossAngular<S>(w_P, state.V_rel.angular),
+               S(2) * Cross<S>(w_P, state.V_rel.linear)};  // (7)
     if (joint.kind->bias != nullptr) AddBias(index, joint, state);
     for (int k = 0; k < joint.num_drives; ++k) {
       state.g += state.D(k) * drives_[joint.first_drive + k].acceleration;
@@ -252,7 +247,7 @@ void Kinematics<Space, S>::UpdateVelocity(const VectorX<S>& u) {
     const bool forward = step.sign > 0;
     const Linear<Space, S>& r_parent = forward ? state.r_P : state.r_Q;
     const Linear<Space, S> to_child = forward ? -state.r_Q : -state.r_P;
-    Motion<Space, S> V = ShiftMotion<Space, S>(motions_[step.parent], r_parent);
+    Velocity<Space, S> V = ShiftMotion<Space, S>(motions_[step.parent], r_parent);
     V += S(step.sign) * state.V_rel;
     motions_[step.child] = ShiftMotion<Space, S>(V, to_child);
     finish(step.joint, joint);
@@ -271,27 +266,16 @@ template <class Space, class S>
 void Kinematics<Space, S>::AddBias(int index, const Joint<Space, S>& joint,
                                    JointState<Space, S>& state) const {
   const Rotation<Space, S> R = poses_[joint.from].R * joint.X_PF.R;
-  Motion<Space, S> in_F = state.V_rel, bias;
-  in_F.template tail<Space::kLin>() = R.transpose() * state.V_rel.template tail<Space::kLin>();
-  if constexpr (Space::kRot == 3) {
-    in_F.template head<3>() = R.transpose() * state.V_rel.template head<3>();
-  }
-  joint.kind->bias(measured_[index], in_F, bias);
-  state.g.template tail<Space::kLin>() += R * bias.template tail<Space::kLin>();
-  if constexpr (Space::kRot == 3) {
-    state.g.template head<3>() += R * bias.template head<3>();
-  } else {
-    state.g[0] += bias[0];
-  }
+  const Velocity<Space, S> in_F = Rotate<Space, S>(R.transpose(), state.V_rel);
+  state.g += Rotate(R, joint.kind->bias(measured_[index], in_F));
 }
 
 /// n of (7) on centres of mass: A at c + r is S(r) A + n.
 template <class Space, class S>
-Motion<Space, S> Kinematics<Space, S>::Centripetal(int body, const Linear<Space, S>& r) const {
-  const Angular<Space, S> w = motions_[body].template head<Space::kRot>();
-  Motion<Space, S> A = Motion<Space, S>::Zero();
-  A.template tail<Space::kLin>() = Cross<S>(w, Linear<Space, S>(Cross<S>(w, r)));
-  return A;
+Acceleration<Space, S> Kinematics<Space, S>::Centripetal(int body,
+                                                         const Linear<Space, S>& r) const {
+  const Angular<Space, S>& w = motions_[body].angular;
+  return {Angular<Space, S>::Zero(), Cross<S>(w, Cross<S>(w, r))};
 }
 
 /// R_WB I R_WB^T about the centre of mass; in the plane a number that no rotation changes.

@@ -18,19 +18,32 @@ namespace loopbench {
 template <class Space, class S>
 struct JointState {
   Linear<Space, S> r_P, r_Q;  ///< Mo from the centres of mass of P and Q
-  Motion<Space, S> V_rel;     ///< [w_Q - w_P; v_Q - v_P], both points at Mo
-  Motion<Space, S> g;         ///< A_Q - A_P = H udot + g, both points at Mo             (7)
-  Block<Space, S> basis;      ///< [H D], columns orthogonal
+  Velocity<Space, S> V_rel;   ///< [w_Q - w_P; v_Q - v_P], both points at Mo
+  Acceleration<Space, S> g;   ///< A_Q - A_P = H udot + g, both points at Mo             (7)
+  Basis<Space, S> basis;      ///< [H D], columns orthogonal
   int num_u = 0, num_rows = 0;
 
-  auto H() const { return basis.leftCols(num_u); }  ///< motion map
-  /// Constrained directions that are imposed, those of prescribed coordinates first.
-  auto D() const { return basis.middleCols(num_u, num_rows); }
-  /// All constrained directions: those imposed, then those released as redundant (redundancy.h).
-  auto AllD() const { return basis.rightCols(Space::kDim - num_u); }
-  auto H(int i) const { return basis.col(i); }
-  auto D(int i) const { return basis.col(num_u + i); }
+  /// Column i of the motion map.
+  const Direction<Space, S>& H(int i) const { return basis[i]; }
+  /// Constrained direction i: those of prescribed coordinates first, then others that are imposed,
+  /// `rows()` in all; behind them those released as redundant (redundancy.h), `directions()` in all.
+  const Direction<Space, S>& D(int i) const { return basis[num_u + i]; }
   int rows() const { return num_rows; }
+  int directions() const { return Space::kDim - num_u; }
+
+  /// The first `count` components D^T V of a velocity, an acceleration or a mismatch; others zero.
+  template <class Kind>
+  Components<Space, S> Along(const SpatialVector<Space, S, Kind>& V, int count) const {
+    Components<Space, S> components = Components<Space, S>::Zero();
+    for (int i = 0; i < count; ++i) components[i] = D(i).dot(V);
+    return components;
+  }
+  /// The sum of the first `count` directions times these numbers.
+  Direction<Space, S> Sum(const Components<Space, S>& numbers, int count) const {
+    Direction<Space, S> sum = Direction<Space, S>::Zero();
+    for (int i = 0; i < count; ++i) sum += D(i) * numbers[i];
+    return sum;
+  }
 };
 
 template <class Space, class S>
@@ -55,12 +68,12 @@ class Kinematics {
 
   const Mechanism<Space, S>& mechanism() const { return *mechanism_; }
   const std::vector<Pose<Space, S>>& poses() const { return poses_; }        ///< at the com
-  const std::vector<Motion<Space, S>>& motions() const { return motions_; }  ///< at the com
+  const std::vector<Velocity<Space, S>>& motions() const { return motions_; }  ///< at the com
   const std::vector<JointState<Space, S>>& joints() const { return joints_; }
 
   /// Classical acceleration of the point of `body` at r from its centre of mass minus that of the
   /// centre of mass, for zero angular acceleration: [0; w x (w x r)].
-  Motion<Space, S> Centripetal(int body, const Linear<Space, S>& r) const;
+  Acceleration<Space, S> Centripetal(int body, const Linear<Space, S>& r) const;
 
   /// Rotational inertia of a body in ground axes, and its inverse.
   typename Inertia<Space, S>::Matrix RotationalInertia(const Inertia<Space, S>& inertia,
@@ -83,7 +96,7 @@ class Kinematics {
 
   /// Mismatch of a constraint in ground axes: [rotation; shift], see joint.h. D^T of it is the
   /// constraint function whose Jacobian is tree_dynamics.h's J.
-  Motion<Space, S> ConstraintMismatch(int joint) const;
+  Velocity<Space, S> ConstraintMismatch(int joint) const;
 
   /// D^T V_rel less the rates of prescribed coordinates: zero when a constraint holds at velocity
   /// level. joints()[joint].rows() numbers, the others zero.
@@ -123,7 +136,7 @@ class Kinematics {
 
   const Mechanism<Space, S>* mechanism_;
   std::vector<Pose<Space, S>> poses_;
-  std::vector<Motion<Space, S>> motions_;
+  std::vector<Velocity<Space, S>> motions_;
   std::vector<JointState<Space, S>> joints_;
   std::vector<Pose<Space, S>> measured_;  ///< X_FM of constraints and of kinds with a basis
   std::vector<TimeValue<S>> drives_;

@@ -1,6 +1,5 @@
 #include "mechanism/model/mechanism.h"
 
-#include <Eigen/LU>
 #include <algorithm>
 #include <cmath>
 #include <limits>
@@ -20,33 +19,33 @@ namespace {
 /// are those that the rounding of their places tells apart.
 constexpr double kOnePin = 1e-9;
 
-/// The frame at `position` turned by `rotation`, which in the plane is `angle`, in the user's body
-/// axes.
+/// A joint's frame in body axes, from the centre of mass.
 template <class Space, class S>
-Pose<Space, S> MakePose(const Eigen::Vector3d& position, const Eigen::Matrix3d& rotation,
-                        double angle) {
+Pose<Space, S> SidePose(const JointSide& side, const JointDescription& joint,
+                        const Eigen::Vector3d& com) {
   Pose<Space, S> X;
+  X.p = ToLinear<Space, S>(side.position - com);
   if constexpr (Space::kRot == 1) {
+    double angle = side.rotation.z();
+    if (TraitsOf(joint.type).own_axis == 'x' && !joint.axis.isZero()) {
+      angle += std::atan2(joint.axis.y(), joint.axis.x());
+    }
     X.SetAngle(S(angle));
-    X.p = position.head<2>().template cast<S>();
   } else {
-    X.R = rotation.template cast<S>();
-    X.p = position.template cast<S>();
+    X.R = Rotation<Space, double>(PoseOf(side).R * AxisAlignment(joint)).template cast<S>();
   }
   return X;
 }
 
-template <class Space, class S>
-Pose<Space, S> SidePose(const JointSide& side, const JointDescription& joint,
-                        const Eigen::Vector3d& com) {
-  const double turn = side.rotation.norm();
-  Eigen::Matrix3d R = AxisAlignment(joint);
-  if (turn > 0.0) R = Eigen::AngleAxisd(turn, side.rotation / turn).toRotationMatrix() * R;
-  double angle = side.rotation.z();
-  if (TraitsOf(joint.type).own_axis == 'x' && !joint.axis.isZero()) {
-    angle += std::atan2(joint.axis.y(), joint.axis.x());
+/// Of a symmetric matrix, by cofactors.
+template <class S>
+Small<S, 3, 3> Inverse(const Small<S, 3, 3>& A) {
+  Small<S, 3, 3> cofactors;
+  for (int j = 0; j < 3; ++j) {
+    const Small<S, 3> column = A.col((j + 1) % 3).cross(A.col((j + 2) % 3));
+    for (int i = 0; i < 3; ++i) cofactors(j, i) = column[i];
   }
-  return MakePose<Space, S>(side.position - com, R, angle);
+  return cofactors / A.col(0).dot(cofactors.transpose().col(0));
 }
 
 /// Names of the speeds of a joint with several, by component of a motion.
@@ -98,8 +97,8 @@ void Mechanism<Space, S>::AddBodies(const MechanismDescription& description) {
         inertia.rotational(0, 0) = S(body.inertia(2, 2));
         inertia.rotational_inverse(0, 0) = S(1) / inertia.rotational(0, 0);
       } else {
-        inertia.rotational = body.inertia.template cast<S>();
-        inertia.rotational_inverse = inertia.rotational.inverse();
+        inertia.rotational = Small<double, 3, 3>(body.inertia).template cast<S>();
+        inertia.rotational_inverse = Inverse(inertia.rotational);
       }
     }
     bodies_.push_back(inertia);
@@ -232,8 +231,9 @@ void Mechanism<Space, S>::AddGeometry(const MechanismDescription& description) {
     const S radius = length(island.bodies);
     for (int body : island.bodies) {
       geometric_bodies_[body].mass = S(1);
-      geometric_bodies_[body].rotational.diagonal().setConstant(radius * radius);
-      geometric_bodies_[body].rotational_inverse.diagonal().setConstant(S(1) / (radius * radius));
+      using Matrix = typename Inertia<Space, S>::Matrix;
+      geometric_bodies_[body].rotational = Matrix::Identity() * (radius * radius);
+      geometric_bodies_[body].rotational_inverse = Matrix::Identity() * (S(1) / (radius * radius));
     }
   }
 }

@@ -15,7 +15,7 @@ namespace loopbench {
 /// Mass properties about the centre of mass, in body axes.
 template <class Space, class S>
 struct Inertia {
-  using Matrix = Eigen::Matrix<S, Space::kRot, Space::kRot>;
+  using Matrix = Small<S, Space::kRot, Space::kRot>;
   S mass = S(0);
   Matrix rotational = Matrix::Zero();
   Matrix rotational_inverse = Matrix::Zero();

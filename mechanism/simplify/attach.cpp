@@ -1,5 +1,6 @@
 #include "mechanism/simplify/attach.h"
 
+#include <Eigen/Geometry>
 #include <algorithm>
 
 #include "mechanism/description/islands.h"
@@ -17,7 +18,7 @@ Matrix3 PointInertia(double m, const Vector3& r) {
 }
 
 /// The carrier with the mass of another body, given by its place.
-void AddMass(const BodyDescription& body, const Pose<Spatial, double>& X,
+void AddMass(const BodyDescription& body, const Frame& X,
              BodyDescription* carrier) {
   const Vector3 com = X.R * body.com + X.p;
   const double mass = carrier->mass + body.mass;

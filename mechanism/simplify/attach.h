@@ -16,7 +16,7 @@ namespace loopbench {
 /// Where a body sits on its carrier.
 struct Attachment {
   int carrier = kGround;    ///< a body that is not attached itself
-  Pose<Spatial, double> X;  ///< the body's axes and origin in the carrier's
+  Frame X;  ///< the body's axes and origin in the carrier's
   double turn = 0.0;        ///< plane: its angle as a number, not modulo a turn
   bool attached = false;    ///< else the body stays and the rest does not matter
 };

@@ -98,7 +98,7 @@ class Compiler {
       const Attachment& at = attachments[image.body];
       const int carrier = at.attached ? at.carrier : image.body;
       if (at.attached) {
-        image.X = Compose(at.X, image.X);
+        image.X = at.X * image.X;
         image.turn += at.turn;
       }
       image.body = renumbering.bodies[carrier];
@@ -169,7 +169,7 @@ class Compiler {
                                Number(force) + " N dropped");
     }
     for (BodyImage& image : result_.bodies) {
-      if (image.part == part) image.X = Compose(plane->X_CB[image.body], image.X);
+      if (image.part == part) image.X = plane->X_CB[image.body] * image.X;
     }
     for (JointImage& image : result_.joints) {
       if (image.part == part) image.mirrored = plane->mirrored[image.joint];
@@ -208,27 +208,27 @@ Compiled Compile(const MechanismDescription& description, const CompileOptions& 
 }
 
 template <class Space>
-Pose<Spatial, double> UserPose(const Compiled& compiled, int body,
+Frame UserPose(const Compiled& compiled, int body,
                                const Kinematics<Space, double>* kinematics) {
   const BodyImage& image = compiled.bodies[body];
   if (image.part < 0) return image.X;
   const CompiledPart& part = compiled.parts[image.part];
   const Pose<Space, double>& at_com = kinematics->poses()[image.body];
-  Pose<Spatial, double> X;  // of the part's body, at its centre of mass
+  Frame X;  // of the part's body, at its centre of mass
   if constexpr (Space::kRot == 1) {
-    X.R.topLeftCorner<2, 2>() = at_com.R;
-    X.p.head<2>() = at_com.p;
+    X.R.topLeftCorner<2, 2>() = at_com.R.eigen();
+    X.p.head<2>() = at_com.p.eigen();
   } else {
-    X = at_com;
+    X = {at_com.R.eigen(), at_com.p.eigen()};
   }
   const Eigen::Vector3d& com = part.description.bodies[image.body].com;
   X.p -= Space::kRot == 1 ? Eigen::Vector3d(X.R * Eigen::Vector3d(com.x(), com.y(), 0.0))
                           : Eigen::Vector3d(X.R * com);
-  X = Compose(X, image.X);
+  X = X * image.X;
   return {part.R_WC * X.R, part.R_WC * X.p};
 }
 
-template Pose<Spatial, double> UserPose(const Compiled&, int, const Kinematics<Planar, double>*);
-template Pose<Spatial, double> UserPose(const Compiled&, int, const Kinematics<Spatial, double>*);
+template Frame UserPose(const Compiled&, int, const Kinematics<Planar, double>*);
+template Frame UserPose(const Compiled&, int, const Kinematics<Spatial, double>*);
 
 }  // namespace loopbench

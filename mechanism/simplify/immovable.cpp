@@ -44,8 +44,8 @@ class Search {
     for (Eigen::Index i = 0; i < loops.to_u.cols(); ++i) {
       kinematics_.UpdateVelocity(loops.to_u.col(i));
       for (int body = 1; body < mechanism_.num_bodies(); ++body) {
-        Motion<Space, double> V = kinematics_.motions()[body];
-        V.template head<Space::kRot>() *= mechanism_.length();
+        Velocity<Space, double> V = kinematics_.motions()[body];
+        V.angular *= mechanism_.length();
         if (V.norm() > kStill) still[body] = false;
       }
     }
@@ -105,7 +105,7 @@ class Search {
         Eigen::RowVectorXd row = Eigen::RowVectorXd::Zero(columns);
         const auto add = [&](int body, const Linear<Space, double>& r, double sign) {
           for (int k = 0; body != kGround && k < Space::kDim; ++k) {
-            Motion<Space, double> unit = Motion<Space, double>::Unit(k);
+            auto unit = Velocity<Space, double>::Unit(k);
             if (k < Space::kRot) unit /= mechanism_.length();
             row[column[body] + k] += sign * state.D(i).dot(ShiftMotion<Space, double>(unit, r));
           }
@@ -127,10 +127,10 @@ class Search {
     at.attached = true;
     if constexpr (Space::kRot == 1) {
       at.turn = at_com.angle;
-      at.X.R.topLeftCorner<2, 2>() = at_com.R;
-      at.X.p.head<2>() = at_com.p;
+      at.X.R.topLeftCorner<2, 2>() = at_com.R.eigen();
+      at.X.p.head<2>() = at_com.p.eigen();
     } else {
-      at.X = at_com;
+      at.X = {at_com.R.eigen(), at_com.p.eigen()};
     }
     at.X.p -= at.X.R * com;
     return at;

@@ -1,5 +1,6 @@
 #include "mechanism/simplify/plane.h"
 
+#include <Eigen/Geometry>
 #include <algorithm>
 #include <cmath>
 
@@ -13,8 +14,8 @@ namespace {
 using Matrix3 = Eigen::Matrix3d;
 using Vector3 = Eigen::Vector3d;
 
-Pose<Spatial, double> FrameOf(const JointDescription& joint, const JointSide& side) {
-  Pose<Spatial, double> X = PoseOf(side);
+Frame FrameOf(const JointDescription& joint, const JointSide& side) {
+  Frame X = PoseOf(side);
   X.R = X.R * AxisAlignment(joint);
   return X;
 }
@@ -71,7 +72,7 @@ class Search {
         for (const auto& [here, there] :
              {std::pair{&joint.from, &joint.to}, {&joint.to, &joint.from}}) {
           if (here->body != queue[k]) continue;
-          const Pose<Spatial, double> X_here = FrameOf(joint, *here),
+          const Frame X_here = FrameOf(joint, *here),
                                       X_there = FrameOf(joint, *there);
           const Vector3 in_frame = X_here.R.transpose() * normal_[here->body];
           const InPlaneOf& kind = TraitsOf(joint.type).flat;
@@ -137,12 +138,12 @@ Vector3 Flat(const Vector3& v) { return {v.x(), v.y(), 0.0}; }
 /// One joint's sides in the new axes: positions and angles within the plane.
 void FlattenJoint(const std::vector<Matrix3>& axes, const std::vector<Vector3>& normal,
                   JointDescription* joint, bool* mirrored) {
-  const Pose<Spatial, double> X_PF = FrameOf(*joint, joint->from),
+  const Frame X_PF = FrameOf(*joint, joint->from),
                               X_QM = FrameOf(*joint, joint->to);
   const Vector3 n_F = X_PF.R.transpose() * normal[joint->from.body];
   // any direction of the frames across n serves to measure angles; the slide must be one
   const Vector3 across = std::abs(n_F.x()) < 0.5 ? Vector3::UnitX() : Vector3::UnitY();
-  const auto flatten = [&](const Pose<Spatial, double>& X, JointSide* side) {
+  const auto flatten = [&](const Frame& X, JointSide* side) {
     const Matrix3& R = axes[side->body];
     const Vector3 along = R.transpose() * (X.R * across);
     side->rotation = {0.0, 0.0, std::atan2(along.y(), along.x())};
@@ -172,7 +173,7 @@ InPlane Search::Express() const {
   for (std::size_t i = 0; i < d_.bodies.size(); ++i) {
     const Matrix3 R = AxesWithNormal(normal_[i]);
     axes.push_back(R);
-    Pose<Spatial, double> X_CB;
+    Frame X_CB;
     X_CB.R = R.transpose();
     X_CB.p.z() = height_[i];
     result.X_CB.push_back(X_CB);

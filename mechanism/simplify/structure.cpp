@@ -139,11 +139,11 @@ class Analysis {
       loop.joints.push_back(step->joint);
       loop.bodies.push_back(step->child);
     }
-    const auto D = kinematics.joints()[index].D();
-    const Motion<Space, double> all = kinematics.ConstraintMismatch(index);
-    const Motion<Space, double> open = D * (D.transpose() * all);
-    loop.open_rotation = open.template head<Space::kRot>().norm();
-    loop.open_shift = open.template tail<Space::kLin>().norm();
+    const JointState<Space, double>& state = kinematics.joints()[index];
+    const Direction<Space, double> open =
+        state.Sum(state.Along(kinematics.ConstraintMismatch(index), state.rows()), state.rows());
+    loop.open_rotation = open.angular.norm();
+    loop.open_shift = open.linear.norm();
     return loop;
   }
 

@@ -9,9 +9,9 @@ namespace {
 /// Poses along two ways through the same welds agree to this, in rad and in units of the arms.
 constexpr double kAgrees = 1e-12;
 
-Attachment Then(const Attachment& first, const Pose<Spatial, double>& X, double turn) {
+Attachment Then(const Attachment& first, const Frame& X, double turn) {
   Attachment at = first;
-  at.X = Compose(first.X, X);
+  at.X = first.X * X;
   at.turn = first.turn + turn;
   return at;
 }
@@ -37,7 +37,7 @@ class Group {
       const Attachment& Q = at_[joint.to.body];
       if (!P.attached || !Q.attached) continue;
       if (joint.type != JointType::kWeld) return false;
-      const auto X_F = Compose(P.X, PoseOf(joint.from)), X_M = Compose(Q.X, PoseOf(joint.to));
+      const auto X_F = P.X * PoseOf(joint.from), X_M = Q.X * PoseOf(joint.to);
       const double arm = 1.0 + X_F.p.norm() + joint.to.position.norm();
       if ((X_F.R - X_M.R).norm() > kAgrees || (X_F.p - X_M.p).norm() > kAgrees * arm) return false;
     }
@@ -52,7 +52,7 @@ class Group {
       for (const auto& [here, there] :
            {std::pair{&joint.from, &joint.to}, {&joint.to, &joint.from}}) {
         if (here->body != body || at_[there->body].attached) continue;
-        at_[there->body] = Then(at_[body], Compose(PoseOf(*here), Inverse(PoseOf(*there))),
+        at_[there->body] = Then(at_[body], PoseOf(*here) * PoseOf(*there).Inverse(),
                                 here->rotation.z() - there->rotation.z());
         bodies_.push_back(there->body);
       }

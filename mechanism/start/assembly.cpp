@@ -115,8 +115,9 @@ class Assembler {
     VectorX<double> e(mechanism_.num_rows() + static_cast<int>(held_cut_.size()));
     for (int index : mechanism_.constraints()) {
       const Joint<Space, double>& joint = mechanism_.joints()[index];
-      e.segment(joint.row, joint.num_constraints()) =
-          kinematics_.joints()[index].D().transpose() * kinematics_.ConstraintMismatch(index);
+      const int rows = joint.num_constraints();
+      const Velocity<Space, double> mismatch = kinematics_.ConstraintMismatch(index);
+      e.segment(joint.row, rows) = kinematics_.joints()[index].Along(mismatch, rows).head(rows);
     }
     for (std::size_t k = 0; k < held_cut_.size(); ++k) {
       const auto& [joint, component, value] = held_cut_[k];

@@ -36,9 +36,8 @@ struct AssemblyUnits {
   }
 
   /// Of a direction: H or D of a joint.
-  template <class Direction>
-  double Of(const Direction& direction) const {
-    return direction.template head<Space::kRot>().isZero() ? length : 1.0;
+  double Of(const Direction<Space, double>& direction) const {
+    return direction.angular.isZero() ? length : 1.0;
   }
 
   /// Rows over `row_units`, columns times theirs.

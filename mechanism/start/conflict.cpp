@@ -65,13 +65,12 @@ class Conflict {
   }
 
  private:
-  template <class Direction>
-  void Add(int row, const Direction& direction, OfJoint& joint) {
+  void Add(int row, const Direction<Space, double>& direction, OfJoint& joint) {
     const double scaled = std::abs(unmet_.rows[row]);
     if (scaled < joint.scaled) return;
     joint.scaled = scaled;
     joint.value = scaled * unmet_.units[row];
-    joint.length = !direction.template tail<Space::kLin>().isZero();
+    joint.length = !direction.linear.isZero();
   }
 
   void AddConstraint(int index) {

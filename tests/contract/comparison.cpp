@@ -28,7 +28,7 @@ Comparison CompareOdca(const Sample<Space>& sample, Coordinates coordinates, Sol
   for (int j = 0; j < static_cast<int>(sample.description().joints.size()); ++j) {
     const Eigen::Matrix<Real, Space::kDim, 1> force = OwnComponents<Space>(forces[j]);
     const Eigen::Matrix<Real, Space::kDim, 1> error =
-        odca.solver().JointForce(j).template cast<Real>() - force;
+        odca.solver().JointForce(j).eigen().template cast<Real>() - force;
     difference = std::max<Real>(difference, error.template lpNorm<Eigen::Infinity>());
     scale = std::max<Real>(scale, force.template lpNorm<Eigen::Infinity>());
   }

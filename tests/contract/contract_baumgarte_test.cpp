@@ -45,16 +45,16 @@ std::pair<VectorX<double>, VectorX<double>> Mismatches(System<Space, double>& fo
   VectorX<double> e = VectorX<double>::Zero(Space::kDim * constraints.size()), rate = e;
   for (std::size_t k = 0; k < constraints.size(); ++k) {
     const Joint<Space, double>& joint = kinematics.mechanism().joints()[constraints[k]];
-    const auto D = kinematics.joints()[constraints[k]].D();
+    const JointState<Space, double>& state = kinematics.joints()[constraints[k]];
     const auto& R = kinematics.poses()[joint.from].R;
-    const auto put = [&](const auto& rows, VectorX<double>& all) {
-      const Motion<Space, double> motion = D * rows;
+    const auto put = [&](const Components<Space, double>& rows, VectorX<double>& all) {
+      const Direction<Space, double> motion = state.Sum(rows, state.rows());
       auto part = all.template segment<Space::kDim>(Space::kDim * k);
-      part.template tail<Space::kLin>() = R.transpose() * motion.template tail<Space::kLin>();
+      part.template tail<Space::kLin>() = (R.transpose() * motion.linear).eigen();
       if constexpr (Space::kRot == 1) part[0] = motion[0];
     };
-    put(D.transpose() * kinematics.ConstraintMismatch(constraints[k]), e);
-    put(kinematics.ConstraintSpeed(constraints[k]).head(joint.num_constraints()), rate);
+    put(state.Along(kinematics.ConstraintMismatch(constraints[k]), state.rows()), e);
+    put(kinematics.ConstraintSpeed(constraints[k]), rate);
   }
   return {e, rate};
 }

@@ -155,7 +155,8 @@ void CheckWork(const System<Space, double>& at, const std::vector<int>& joints, 
                double expected, Tally& tally) {
   double power = 0.0, scale = 0.0;
   for (int j : joints) {
-    const Motion<Space, double> V = at.kinematics().joints()[j].V_rel, F = force(j);
+    const Velocity<Space, double>& V = at.kinematics().joints()[j].V_rel;
+    const Wrench<Space, double> F = force(j);
     power += F.dot(V);
     scale += F.norm() * std::max(1.0, V.norm());
   }
@@ -191,7 +192,7 @@ void CheckConstraints(System<Space, double>& at, int user_joints, Tally& tally) 
     const bool rows = mechanism.coordinates() == Coordinates::kAbsolute;
     const auto force = [&](int j) {
       const JointState<Space, double>& state = at.kinematics().joints()[j];
-      Motion<Space, double> F = Motion<Space, double>::Zero();
+      auto F = Wrench<Space, double>::Zero();
       for (int r = 0; r < state.rows(); ++r) {
         F += state.D(r) * at.Multipliers()[mechanism.joints()[j].row + r];
       }

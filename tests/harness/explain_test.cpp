@@ -66,8 +66,8 @@ TEST_P(AxisOf, IsSaidAndIsWhatTheJointMovesAlongOrAbout) {
   Kinematics<Spatial, double> kinematics(mechanism);
   VectorX<double> q = VectorX<double>::Zero(mechanism.num_q());
   kinematics.UpdatePosition(q);
-  const Eigen::Matrix<double, 6, 1> H = kinematics.joints()[0].H(0);
-  const Eigen::Vector3d direction = example.turns ? H.head<3>() : H.tail<3>();
+  const Direction<Spatial, double>& H = kinematics.joints()[0].H(0);
+  const Eigen::Vector3d direction = (example.turns ? H.angular : H.linear).eigen();
   EXPECT_LE((direction - example.first).norm(), 1e-15) << direction.transpose();
 }
 

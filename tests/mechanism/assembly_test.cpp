@@ -35,8 +35,8 @@ double Mismatch(const Joints& mechanism, const VectorX<double>& q) {
   kinematics.UpdatePosition(q);
   double worst = 0.0;
   for (int index : mechanism.constraints()) {
-    const auto D = kinematics.joints()[index].D();
-    worst = std::max(worst, (D.transpose() * kinematics.ConstraintMismatch(index)).norm());
+    const JointState<Planar, double>& state = kinematics.joints()[index];
+    worst = std::max(worst, state.Along(kinematics.ConstraintMismatch(index), state.rows()).norm());
   }
   return worst;
 }

@@ -110,8 +110,8 @@ TEST(CompileTest, RigidBodiesStayWhereALoopWouldHaveToBeCutAnew) {
   Kinematics<Planar, double> kinematics(mechanism);
   kinematics.UpdatePosition(start.q);
   const Pose<Planar, double>&left = kinematics.poses()[1], &last = kinematics.poses()[5];
-  const Eigen::Vector2d tip = last.p + last.R * Eigen::Vector2d(0.5, 0.0);
-  back.to.position.head<2>() = left.R.transpose() * (tip - left.p);
+  const Linear<Planar, double> tip = last.p + last.R * Linear<Planar, double>(0.5, 0.0);
+  back.to.position.head<2>() = (left.R.transpose() * (tip - left.p)).eigen();
   back.to.position += d.bodies[1].com;
   d.joints.push_back(back);
   d.initial.coordinates = {

@@ -65,7 +65,7 @@ void AddPart(const Truth& truth, const Compiled& compiled, int part, double* err
   ASSERT_EQ(odca->Start(0.0, start.q, start.u), Outcome::kFinished);
   ASSERT_EQ(odca->Evaluate(0.0, start.q, start.u, udot), Outcome::kFinished);
   TreeDynamics<Space, double> dynamics(mechanism);
-  std::vector<Motion<Space, double>> A(mechanism.num_bodies());
+  std::vector<Acceleration<Space, double>> A(mechanism.num_bodies());
   dynamics.BodyAccelerations(odca->kinematics(), udot, A);
   const Eigen::Matrix3d& R_WC = compiled.parts[part].R_WC;
   for (std::size_t b = 1; b < compiled.bodies.size(); ++b) {
@@ -74,18 +74,10 @@ void AddPart(const Truth& truth, const Compiled& compiled, int part, double* err
     const auto X = UserPose<Space>(compiled, static_cast<int>(b), &odca->kinematics());
     const Eigen::Vector3d com = X.R * truth.description.bodies[b].com + X.p;
     Eigen::Vector3d w = Eigen::Vector3d::Zero(), alpha = w, a = w, from = w;
-    const Motion<Space, double>&V = odca->kinematics().motions()[image.body], &dV = A[image.body];
-    if constexpr (Space::kRot == 1) {
-      w.z() = V[0];
-      alpha.z() = dV[0];
-      a.head<2>() = dV.template tail<2>();
-      from.head<2>() = odca->kinematics().poses()[image.body].p;
-    } else {
-      w = V.template head<3>();
-      alpha = dV.template head<3>();
-      a = dV.template tail<3>();
-      from = odca->kinematics().poses()[image.body].p;
-    }
+    w.tail<Space::kRot>() = odca->kinematics().motions()[image.body].angular.eigen();
+    alpha.tail<Space::kRot>() = A[image.body].angular.eigen();
+    a.head<Space::kLin>() = A[image.body].linear.eigen();
+    from.head<Space::kLin>() = odca->kinematics().poses()[image.body].p.eigen();
     w = (R_WC * w).eval();
     alpha = (R_WC * alpha).eval();
     const Eigen::Vector3d r = com - R_WC * from;

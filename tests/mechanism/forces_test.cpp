@@ -45,8 +45,8 @@ Kinematics<Space, S> KinematicsAt(const Mechanism<Space, S>& mechanism, S t, con
 }
 
 template <class Space, class S>
-std::vector<Motion<Space, S>> Wrenches(const Kinematics<Space, S>& kinematics) {
-  std::vector<Motion<Space, S>> wrenches(kinematics.mechanism().num_bodies());
+std::vector<Wrench<Space, S>> Wrenches(const Kinematics<Space, S>& kinematics) {
+  std::vector<Wrench<Space, S>> wrenches(kinematics.mechanism().num_bodies());
   AppliedForces<Space, S>(kinematics, wrenches);
   return wrenches;
 }
@@ -177,7 +177,7 @@ TYPED_TEST(ForcesTest, SpringBetweenPointsPullsThemTogether) {
   const auto kinematics = KinematicsAt<Space, double>(mechanism, 0.0, q, u);
   const auto wrenches = Wrenches<Space, double>(kinematics);
   const double tension = 0.5 + 2.0 * (5.0 - 4.0) + 3.0 * 6.0;
-  const auto f = wrenches[1].template tail<Space::kLin>();
+  const Linear<Space, double>& f = wrenches[1].linear;
   EXPECT_NEAR(f[0], -0.6 * tension, 8 * kEps * tension);
   EXPECT_NEAR(f[1], -0.8 * tension, 8 * kEps * tension);
   EXPECT_NEAR(wrenches[1][Space::kRot - 1], 0.5 * f[1], 8 * kEps * tension) << "about the com";
@@ -199,14 +199,14 @@ TYPED_TEST(ForcesTest, WherePointsMeetASpringHasNoDirectionAndNoForce) {
   q[q.size() - Space::kLin] = 0.5;
   const VectorX<double> u = VectorX<double>::Ones(mechanism.num_u());
   const auto kinematics = KinematicsAt<Space, double>(mechanism, 0.0, q, u);
-  EXPECT_TRUE((Wrenches<Space, double>(kinematics)[1].isZero(0.0)));
+  EXPECT_EQ((Wrenches<Space, double>(kinematics)[1].norm()), 0.0);
   EXPECT_EQ(AppliedPower(kinematics).dissipated, 0.0);
   EXPECT_EQ(ComputeEnergy(kinematics).potential, 0.5 * 2.0 * 16.0);
   // a hair away there is all of it
   q[q.size() - Space::kLin] += 1e-12;
   const auto apart =
       Wrenches<Space, double>(KinematicsAt<Space, double>(mechanism, 0.0, q, 0.0 * u));
-  EXPECT_NEAR(apart[1].template tail<Space::kLin>()[0], 8.0, 1e-11);
+  EXPECT_NEAR(apart[1].linear[0], 8.0, 1e-11);
 }
 
 TEST(ForceElementsTest, StopTimesAreTheKnotsOfAllTablesOnce) {

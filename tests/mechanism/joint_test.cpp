@@ -28,6 +28,11 @@ std::vector<JointType> Types() {
   return types;
 }
 
+template <class Space>
+using Matrix = Eigen::Matrix<double, Space::kDim, Space::kDim>;
+template <class Space>
+using Vector = Eigen::Matrix<double, Space::kDim, 1>;
+
 /// Coordinates of a kind; angles beyond half a turn are the mechanism's business, not the kind's.
 template <class Space>
 VectorX<double> Coordinates(const JointKind<Space, double>& kind, int seed) {
@@ -39,7 +44,7 @@ VectorX<double> Coordinates(const JointKind<Space, double>& kind, int seed) {
 
 /// [w; v] of M in F along the curve q + t N u, by differentiating the oracle's own transform.
 template <class Space>
-Motion<Space, double> MotionAlong(JointType type, const JointKind<Space, double>& kind,
+Velocity<Space, double> MotionAlong(JointType type, const JointKind<Space, double>& kind,
                                   const VectorX<double>& q, const VectorX<double>& u) {
   VectorX<double> qdot(kind.num_q);
   kind.rates(q.data(), u.data(), qdot.data());
@@ -51,26 +56,34 @@ Motion<Space, double> MotionAlong(JointType type, const JointKind<Space, double>
     for (int k = 0; k < 3; ++k) sum += X.R(i, k).d * X.R(j, k).f;
     return static_cast<double>(sum);
   };
-  Motion<Space, double> V;
+  Velocity<Space, double> V;
+  for (int i = 0; i < Space::kLin; ++i) V.linear[i] = static_cast<double>(X.p[i].d);
   if constexpr (Space::kRot == 1) {
-    V << skew(1, 0), static_cast<double>(X.p[0].d), static_cast<double>(X.p[1].d);
+    V.angular[0] = skew(1, 0);
   } else {
-    V << skew(2, 1), skew(0, 2), skew(1, 0), static_cast<double>(X.p[0].d),
-        static_cast<double>(X.p[1].d), static_cast<double>(X.p[2].d);
+    V.angular = {skew(2, 1), skew(0, 2), skew(1, 0)};
   }
   return V;
 }
 
-/// [H D] in F axes at q.
+/// [H D] in F axes.
 template <class Space>
-Block<Space, double> Basis(const JointKind<Space, double>& kind, const VectorX<double>& q) {
-  Block<Space, double> basis = Block<Space, double>::Zero();
+Matrix<Space> BasisAt(const JointKind<Space, double>& kind, const Pose<Space, double>& X) {
+  Basis<Space, double> basis;
+  kind.basis(X, basis, kind.parameter);
+  Matrix<Space> columns;
+  for (int i = 0; i < Space::kDim; ++i) columns.col(i) = basis[i].eigen();
+  return columns;
+}
+/// The same at q, of kinds with axes too.
+template <class Space>
+Matrix<Space> BasisAt(const JointKind<Space, double>& kind, const VectorX<double>& q) {
+  Matrix<Space> basis = Matrix<Space>::Zero();
   for (int i = 0; i < Space::kDim; ++i) basis(kind.axes[i], i) = 1.0;
   if (kind.basis == nullptr) return basis;
   Pose<Space, double> X;
   kind.transform(q.data(), X, kind.parameter);
-  kind.basis(X, basis, kind.parameter);
-  return basis;
+  return BasisAt(kind, X);
 }
 
 template <class Space>
@@ -124,9 +137,9 @@ TYPED_TEST(JointTest, MotionMapAndRatesAreTheDerivativeOfTheTransform) {
     for (int seed = 0; seed < 5; ++seed) {
       const VectorX<double> q = Coordinates(kind, seed);
       for (int i = 0; i < kind.num_u; ++i) {
-        const Motion<TypeParam, double> V =
-            MotionAlong(type, kind, q, VectorX<double>::Unit(kind.num_u, i));
-        const Motion<TypeParam, double> H = Basis(kind, q).col(i);
+        const Vector<TypeParam> V =
+            MotionAlong(type, kind, q, VectorX<double>::Unit(kind.num_u, i)).eigen();
+        const Vector<TypeParam> H = BasisAt(kind, q).col(i);
         EXPECT_LE((V - H).template lpNorm<Eigen::Infinity>(), 8 * kEps) << ToString(type);
       }
     }
@@ -148,24 +161,23 @@ TYPED_TEST(JointTest, BasesAreOrthogonalAndTheirRateIsTheBias) {
     const auto kind = KindWith<Space, double>(type, kParameter);
     for (int seed = 0; seed < 5; ++seed) {
       const VectorX<double> q = Coordinates(kind, seed);
-      const Block<Space, double> basis = Basis(kind, q);
-      Block<Space, double> product = basis.transpose() * basis;
+      const Matrix<Space> basis = BasisAt(kind, q);
+      Matrix<Space> product = basis.transpose() * basis;
       if (kind.num_u > 0) product.col(0) *= kind.inverse_H_squared;
-      EXPECT_LE((product - Block<Space, double>::Identity()).norm(), 16 * kEps) << ToString(type);
+      EXPECT_LE((product - Matrix<Space>::Identity()).norm(), 16 * kEps) << ToString(type);
       if (kind.bias == nullptr) continue;
       VectorX<double> u(kind.num_u), qdot(kind.num_q);
       for (int i = 0; i < kind.num_u; ++i) u[i] = std::cos(2.3 * i + seed);
       kind.rates(q.data(), u.data(), qdot.data());
       const double step = 1e-5;  // central: truncation 1e-10, round-off eps / step = 2e-11
-      const auto motion = [&](double t) -> Motion<Space, double> {
-        return Basis(kind, q + t * qdot).leftCols(kind.num_u) * u;
+      const auto motion = [&](double t) -> Vector<Space> {
+        return BasisAt<Space>(kind, VectorX<double>(q + t * qdot)).leftCols(kind.num_u) * u;
       };
-      const Motion<Space, double> rate = (motion(step) - motion(-step)) / (2 * step);
+      const Vector<Space> rate = (motion(step) - motion(-step)) / (2 * step);
       Pose<Space, double> X;
       kind.transform(q.data(), X, kind.parameter);
-      Motion<Space, double> bias;
-      kind.bias(X, motion(0.0), bias);
-      EXPECT_LE((rate - bias).norm(), 1e-9) << ToString(type);
+      const auto bias = kind.bias(X, Velocity<Space, double>(motion(0.0)));
+      EXPECT_LE((rate - bias.eigen()).norm(), 1e-9) << ToString(type);
     }
   }
 }
@@ -177,11 +189,11 @@ TYPED_TEST(JointTest, AdmissiblePosesHaveNoMismatchAndGiveTheirCoordinatesBack) 
       const VectorX<double> q = Coordinates(kind, seed);
       Pose<TypeParam, double> X, again;
       kind.transform(q.data(), X, kind.parameter);
-      EXPECT_LE((Mismatch(kind, X).template lpNorm<Eigen::Infinity>()), 32 * kEps);
+      EXPECT_LE((Mismatch(kind, X).eigen().template lpNorm<Eigen::Infinity>()), 32 * kEps);
       VectorX<double> measured(kind.num_q);
       kind.coordinates(X, measured.data(), kind.parameter);
       kind.transform(measured.data(), again, kind.parameter);
-      EXPECT_LE((again.R - X.R).template lpNorm<Eigen::Infinity>(), 32 * kEps);
+      EXPECT_LE((again.R - X.R).eigen().template lpNorm<Eigen::Infinity>(), 32 * kEps);
       EXPECT_LE((again.p - X.p).norm(), 4 * kEps) << "an angle of a helix: one rounding";
     }
   }
@@ -193,7 +205,7 @@ TYPED_TEST(JointTest, MismatchAlongConstrainedAxesIsMeasured) {
   const double q = 0.7;
   kind.transform(&q, X, kind.parameter);
   X.p[1] += 1e-3;
-  const Motion<TypeParam, double> mismatch = Mismatch(kind, X);
+  const Velocity<TypeParam, double> mismatch = Mismatch(kind, X);
   EXPECT_NEAR(mismatch[TypeParam::kRot + 1], 1e-3, 8 * kEps);
   EXPECT_NEAR(mismatch.norm(), 1e-3, 32 * kEps);
 }
@@ -206,17 +218,14 @@ TYPED_TEST(JointTest, RodMeasuresADistance) {
   for (int i = 0; i < Space::kLin; ++i) p[i] = 1.0 + 0.5 * i, v[i] = 0.7 - i;
   Pose<Space, double> X;
   X.p = p;
-  const Motion<Space, double> mismatch = Mismatch(kind, X);
+  const Velocity<Space, double> mismatch = Mismatch(kind, X);
   EXPECT_NEAR(mismatch.norm(), std::abs(p.norm() - 2.0), 4 * kEps);
-  Block<Space, double> basis;
-  kind.basis(X, basis, kind.parameter);
-  const Block<Space, double> product = basis.transpose() * basis;
-  EXPECT_LE((product - Block<Space, double>::Identity()).norm(), 16 * kEps);
-  const Motion<Space, double> D = basis.col(Space::kDim - 1);
+  const Matrix<Space> basis = BasisAt(kind, X), product = basis.transpose() * basis;
+  EXPECT_LE((product - Matrix<Space>::Identity()).norm(), 16 * kEps);
+  const Direction<Space, double> D(basis.col(Space::kDim - 1));
   EXPECT_NEAR(D.dot(mismatch), p.norm() - 2.0, 4 * kEps);
-  Motion<Space, double> V = Motion<Space, double>::Zero(), bias;
-  V.template tail<Space::kLin>() = v;
-  kind.bias(X, V, bias);
+  const Velocity<Space, double> V(Angular<Space, double>::Zero(), v);
+  const Acceleration<Space, double> bias = kind.bias(X, V);
   const double step = 1e-4;  // second difference: truncation 1e-8, round-off eps / step^2 = 2e-8
   const auto distance = [&](double t) { return (p + t * v).norm(); };
   EXPECT_NEAR(D.dot(V), (distance(step) - distance(-step)) / (2 * step), 1e-8);

@@ -73,7 +73,7 @@ TYPED_TEST(KinematicsTest, AccelerationsOfBodiesAreSecondDerivativesOfTheirPoses
       [](const auto& d, const auto& mechanism, const State& at, const auto& kinematics) {
         const testing::Answer answer =
             Oracle(d, testing::LayoutOf(mechanism)).Solve(ToReal(at.q), ToReal(at.u));
-        std::vector<Motion<TypeParam, double>> A(mechanism.num_bodies());
+        std::vector<Acceleration<TypeParam, double>> A(mechanism.num_bodies());
         const TreeDynamics<TypeParam, double> dynamics(mechanism);
         dynamics.BodyAccelerations(kinematics, answer.udot.template cast<double>(), A);
         double scale = 0.0;
@@ -97,12 +97,12 @@ TYPED_TEST(KinematicsTest, JointAccelerationsVanishOnTheOraclesAnswer) {
                        const auto& kinematics) {
     const testing::Answer answer =
         Oracle(d, testing::LayoutOf(mechanism)).Solve(ToReal(at.q), ToReal(at.u));
-    std::vector<Motion<TypeParam, double>> A(mechanism.num_bodies());
+    std::vector<Acceleration<TypeParam, double>> A(mechanism.num_bodies());
     double scale = 0.0;
     const int first = TypeParam::kRot == 1 ? 2 : 0;
     for (int b = 0; b < mechanism.num_bodies(); ++b) {
-      A[b] =
-          answer.accelerations[b].template segment<TypeParam::kDim>(first).template cast<double>();
+      A[b] = Acceleration<TypeParam, double>(
+          answer.accelerations[b].template segment<TypeParam::kDim>(first).template cast<double>());
       scale = std::max(scale, A[b].norm());
     }
     for (int j = 0; j < static_cast<int>(d.joints.size()); ++j) {
@@ -118,9 +118,11 @@ TYPED_TEST(KinematicsTest, ConsistentSpeedsKeepEveryJointTogether) {
         const double scale = mechanism.num_bodies() * (1.0 + at.u.norm());
         for (int j = 0; j < static_cast<int>(d.joints.size()); ++j) {
           const auto& state = kinematics.joints()[j];
-          EXPECT_LE((state.D().transpose() * state.V_rel).norm(), 100 * kEps * scale);
-          EXPECT_LE((state.D().transpose() * state.H()).norm(), 8 * kEps) << "D^T H = 0";
-          EXPECT_LE((state.D().transpose() * kinematics.ConstraintMismatch(j)).norm(),
+          EXPECT_LE(state.Along(state.V_rel, state.rows()).norm(), 100 * kEps * scale);
+          for (int i = 0; i < state.num_u; ++i) {
+            EXPECT_LE(state.Along(state.H(i), state.rows()).norm(), 8 * kEps) << "D^T H = 0";
+          }
+          EXPECT_LE(state.Along(kinematics.ConstraintMismatch(j), state.rows()).norm(),
                     100 * kEps * scale);
         }
       });
@@ -136,7 +138,7 @@ TYPED_TEST(KinematicsTest, SpeedsAreDerivativesOfPoses) {
         ahead.UpdatePosition(at.q + h * qdot);
         behind.UpdatePosition(at.q - h * qdot);
         for (int b = 1; b < mechanism.num_bodies(); ++b) {
-          const auto v = kinematics.motions()[b].template tail<TypeParam::kLin>();
+          const auto& v = kinematics.motions()[b].linear;
           const auto difference = (ahead.poses()[b].p - behind.poses()[b].p) / (2 * h);
           const double speed = 1.0 + kinematics.motions()[b].norm();
           EXPECT_LE((v - difference).norm(), 1e-8 * speed * speed * speed);

@@ -246,8 +246,9 @@ TEST(RedundancyTest, ReleasedDirectionsAreStillMeasured) {
   a.UpdatePosition(q);
   b.UpdatePosition(q);
   const auto mismatch = [](const Kinematics<Spatial, double>& kinematics) {
-    const auto D = kinematics.joints()[3].AllD();
-    return Motion<Spatial, double>(D * (D.transpose() * kinematics.ConstraintMismatch(3)));
+    const JointState<Spatial, double>& state = kinematics.joints()[3];
+    const int count = state.directions();
+    return state.Sum(state.Along(kinematics.ConstraintMismatch(3), count), count);
   };
   EXPECT_GT(mismatch(a).norm(), 0.01);
   EXPECT_LT((mismatch(a) - mismatch(b)).norm(), 1e-15 * 8);  // the same sums in another order

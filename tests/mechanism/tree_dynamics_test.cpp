@@ -105,8 +105,9 @@ TYPED_TEST(TreeDynamicsTest, JacobianIsTheDerivativeOfTheMismatch) {
       VectorX<double> e(mechanism.num_rows());
       for (int index : mechanism.constraints()) {
         const auto& joint = mechanism.joints()[index];
-        e.segment(joint.row, joint.kind->num_constraints()) =
-            moved.joints()[index].D().transpose() * moved.ConstraintMismatch(index);
+        const int rows = joint.kind->num_constraints();
+        e.segment(joint.row, rows) =
+            moved.joints()[index].Along(moved.ConstraintMismatch(index), rows).head(rows);
       }
       return e;
     };

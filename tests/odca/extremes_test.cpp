@@ -39,32 +39,30 @@ Residuals ResidualsOf(const MechanismDescription& description) {
   const VectorX<double> q = testing::DescribedCoordinates(description, mechanism);
   EXPECT_EQ(odca->Evaluate(0.0, q, u, udot), Outcome::kFinished);
   const Kinematics<Space, double>& kinematics = odca->kinematics();
-  std::vector<Motion<Space, double>> A(mechanism.num_bodies(), Motion<Space, double>::Zero());
+  std::vector<Acceleration<Space, double>> A(mechanism.num_bodies(),
+                                             Acceleration<Space, double>::Zero());
   TreeDynamics<Space, double>(mechanism).BodyAccelerations(kinematics, udot, A);
 
   Residuals result;
   double largest_A = 0.0, largest_F = 0.0;
-  for (const Motion<Space, double>& a : A) largest_A = std::max(largest_A, a.norm());
-  std::vector<Motion<Space, double>> missing(mechanism.num_bodies());
+  for (const Acceleration<Space, double>& a : A) largest_A = std::max(largest_A, a.norm());
+  std::vector<Wrench<Space, double>> missing(mechanism.num_bodies());
   AppliedForces<Space, double>(kinematics, missing);
   for (int body = 1; body < mechanism.num_bodies(); ++body) {
     const Inertia<Space, double>& inertia = mechanism.bodies()[body];
     const auto I = kinematics.RotationalInertia(inertia, body);
-    const Angular<Space, double> w = kinematics.motions()[body].template head<Space::kRot>();
-    const Angular<Space, double> Iw = I * w;
+    const Angular<Space, double>& w = kinematics.motions()[body].angular;
     largest_F = std::max(largest_F, missing[body].norm());
-    missing[body].template head<Space::kRot>() -=
-        I * A[body].template head<Space::kRot>() + CrossAngular<double>(w, Iw);
-    missing[body].template tail<Space::kLin>() -=
-        inertia.mass * A[body].template tail<Space::kLin>();
+    missing[body] -= {I * A[body].angular + CrossAngular<double>(w, I * w),
+                      inertia.mass * A[body].linear};
   }
   for (int j = 0; j < static_cast<int>(mechanism.joints().size()); ++j) {
     const Joint<Space, double>& joint = mechanism.joints()[j];
     const JointState<Space, double>& state = kinematics.joints()[j];
-    const Motion<Space, double> miss = JointAcceleration<Space, double>(kinematics, j, A);
+    const Components<Space, double> miss = JointAcceleration<Space, double>(kinematics, j, A);
     result.joints = std::max(result.joints, miss.head(state.rows()).norm());
     if (state.rows() == 0) continue;
-    const Motion<Space, double> F = odca.solver().JointForce(j);
+    const Wrench<Space, double> F = odca.solver().JointForce(j);
     largest_F = std::max(largest_F, F.norm());
     missing[joint.to] += ShiftForce<Space, double>(F, state.r_Q);
     missing[joint.from] -= ShiftForce<Space, double>(F, state.r_P);

@@ -47,8 +47,7 @@ class Scene {
   /// From a body's centre of mass to Mo of one of its joints.
   RealVector Arm(int body, int joint) const {
     const JointState<Space, double>& state = kinematics_.joints()[joint];
-    return (mechanism_.joints()[joint].to == body ? state.r_Q : state.r_P)
-        .template cast<testing::Real>();
+    return ToReal(mechanism_.joints()[joint].to == body ? state.r_Q : state.r_P);
   }
   /// Takes a motion from the centre of mass to r: [w; v + w x r].
   static RealMatrix Shift(const RealVector& r) {
@@ -65,12 +64,12 @@ class Scene {
     const auto& inertia = mechanism_.bodies()[body];
     const auto rotational = kinematics_.RotationalInertia(inertia, body);
     RealMatrix M = RealMatrix::Identity(Space::kDim, Space::kDim) * testing::Real(inertia.mass);
-    M.topLeftCorner(Space::kRot, Space::kRot) = rotational.template cast<testing::Real>();
+    M.topLeftCorner(Space::kRot, Space::kRot) = ToReal(rotational);
     return M;
   }
   /// What acts on the body beside joints, less w x I w.
   RealVector Wrench(int body) const {
-    RealVector wrench = wrenches_[body].template cast<testing::Real>();
+    RealVector wrench = ToReal(wrenches_[body]);
     const RealVector w = AngularVelocity(body);
     const RealVector Iw = Inertia(body).topLeftCorner(Space::kRot, Space::kRot) * w;
     if constexpr (Space::kRot == 3) wrench.head(3) -= Cross(w, Iw);
@@ -101,9 +100,10 @@ class Scene {
   /// The joint as one that leads to `outer`, whichever of its bodies that is.
   Cut JointTo(int outer, int joint) const {
     const JointState<Space, double>& state = kinematics_.joints()[joint];
-    const RealVector g = state.g.template cast<testing::Real>();
-    return {RealMatrix(state.D().template cast<testing::Real>()),
-            mechanism_.joints()[joint].to == outer ? g : RealVector(-g)};
+    const RealVector g = ToReal(state.g);
+    RealMatrix D(Space::kDim, state.rows());
+    for (int i = 0; i < state.rows(); ++i) D.col(i) = ToReal(state.D(i));
+    return {D, mechanism_.joints()[joint].to == outer ? g : RealVector(-g)};
   }
 
   // The same bodies and joints as one dense system, an answer of its own.
@@ -118,7 +118,7 @@ class Scene {
     odca_.emplace(mechanism_, FormulationOptions{.solver = solver});
     VectorX<double> udot;
     const Outcome outcome = (*odca_)->Evaluate(0.0, state_.q, state_.u, udot);
-    accelerations_.assign(mechanism_.num_bodies(), Motion<Space, double>::Zero());
+    accelerations_.assign(mechanism_.num_bodies(), Acceleration<Space, double>::Zero());
     TreeDynamics<Space, double>(mechanism_)
         .BodyAccelerations((*odca_)->kinematics(), udot, accelerations_);
     return outcome;
@@ -126,29 +126,33 @@ class Scene {
   const Odca<Space, double>& odca() const { return odca_->solver(); }
   /// Force of a joint on one of its bodies, at Mo.
   RealVector ForceOn(int body, int joint) const {
-    const RealVector F = odca().JointForce(joint).template cast<testing::Real>();
+    const RealVector F = ToReal(odca().JointForce(joint));
     return mechanism_.joints()[joint].to == body ? F : RealVector(-F);
   }
   /// Acceleration of a body's point at Mo.
   RealVector AccelerationAt(int body, int joint) const {
     const RealVector r = Arm(body, joint);
-    return Shift(r) * accelerations_[body].template cast<testing::Real>() + Centripetal(body, r);
+    return Shift(r) * ToReal(accelerations_[body]) + Centripetal(body, r);
   }
 
  private:
+  static RealMatrix ToReal(const auto& numbers) {
+    return numbers.eigen().template cast<testing::Real>();
+  }
   static RealVector Cross(const RealVector& a, const RealVector& b) {
     RealVector c(3);
     c << a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0];
     return c;
   }
   RealVector AngularVelocity(int body) const {
-    return kinematics_.motions()[body].template head<Space::kRot>().template cast<testing::Real>();
+    return ToReal(kinematics_.motions()[body].angular);
   }
 
   const Mechanism<Space, double> mechanism_;
   const testing::State state_;
   Kinematics<Space, double> kinematics_;
-  std::vector<Motion<Space, double>> wrenches_, accelerations_;
+  std::vector<loopbench::Wrench<Space, double>> wrenches_;
+  std::vector<Acceleration<Space, double>> accelerations_;
   std::optional<testing::SystemWith<Odca, Space, double>> odca_;
 };
 

@@ -175,7 +175,7 @@ std::vector<Response> Responses(const Odca<Space, double>& odca) {
   const Plan& plan = odca.plan();
   std::vector<Response> responses;
   for (int n = 0; n < plan.num_leaves(); ++n) {
-    responses.push_back({{n + 1}, {n + 1}, joins.LeafZ(n).template cast<Real>(), false});
+    responses.push_back({{n + 1}, {n + 1}, joins.LeafZ(n).eigen().template cast<Real>(), false});
   }
   for (int n = plan.num_leaves(); n < plan.num_nodes(); ++n) {
     const PlanNode& node = plan.nodes()[n - plan.num_leaves()];
@@ -201,7 +201,8 @@ std::vector<Response> Responses(const Odca<Space, double>& odca) {
         const auto* V_e = joins.V(node, n, node.kept[e]);
         const auto* V_f = joins.V(node, n, node.kept[f]);
         for (int i = 0; i < node.rows; ++i) {
-          block -= V_e[i].template cast<Real>() * V_f[i].template cast<Real>().transpose();
+          block -= V_e[i].eigen().template cast<Real>() *
+                   V_f[i].eigen().template cast<Real>().transpose();
         }
       }
     }

@@ -131,15 +131,14 @@ double RestOfEquation7(std::uint64_t seed) {
   for (const TreeStep& step : mechanism.tree()) {
     const Joint<Space, double>& joint = mechanism.joints()[step.joint];
     const JointState<Space, double>& at = now.joints()[step.joint];
-    Motion<Space, double> Hdot_u = Motion<Space, double>::Zero();
+    auto Hdot_u = Acceleration<Space, double>::Zero();
     for (int i = 0; i < at.num_u; ++i) {
       Hdot_u += (after.joints()[step.joint].H(i) - before.joints()[step.joint].H(i)) *
                 (state.u[joint.u_offset + i] / (2 * h));
     }
-    const Angular<Space, double> w_P = now.motions()[joint.from].template head<Space::kRot>();
-    const Linear<Space, double> v_rel = at.V_rel.template tail<Space::kLin>();
-    Motion<Space, double> rest = Motion<Space, double>::Zero();
-    rest.template tail<Space::kLin>() = Cross<double>(w_P, v_rel);
+    const Angular<Space, double>& w_P = now.motions()[joint.from].angular;
+    const Acceleration<Space, double> rest(Angular<Space, double>::Zero(),
+                                           Cross<double>(w_P, at.V_rel.linear));
     EXPECT_LE((at.g - Hdot_u - rest).norm(), 1e-7 * (1.0 + at.g.norm())) << joint.description;
     largest = std::max(largest, rest.norm());
   }

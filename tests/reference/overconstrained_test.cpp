@@ -2,6 +2,7 @@
 // other mechanism, by the level and not by the redundancy.
 #include <gtest/gtest.h>
 
+#include <Eigen/Geometry>
 #include <cmath>
 #include <iostream>
 

@@ -33,17 +33,17 @@ class WithIntegrals final : public Ode {
   System<Space, double>& formulation_;
 };
 
-BodyState StateOf(const Pose<Planar, double>& X, const Motion<Planar, double>& V) {
+BodyState StateOf(const Pose<Planar, double>& X, const Velocity<Planar, double>& V) {
   BodyState state;
-  state.R.topLeftCorner<2, 2>() = X.R;
-  state.p.head<2>() = X.p;
-  state.w.z() = V[0];
-  state.v.head<2>() = V.tail<2>();
+  state.R.topLeftCorner<2, 2>() = X.R.eigen();
+  state.p.head<2>() = X.p.eigen();
+  state.w.z() = V.angular[0];
+  state.v.head<2>() = V.linear.eigen();
   return state;
 }
 
-BodyState StateOf(const Pose<Spatial, double>& X, const Motion<Spatial, double>& V) {
-  return {X.R, X.p, V.head<3>(), V.tail<3>()};
+BodyState StateOf(const Pose<Spatial, double>& X, const Velocity<Spatial, double>& V) {
+  return {X.R.eigen(), X.p.eigen(), V.angular.eigen(), V.linear.eigen()};
 }
 
 template <class Space>

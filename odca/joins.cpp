@@ -109,8 +109,8 @@ bool Joins<Space, S>::AssembleAll(const Kinematics<Space, S>& kinematics, Pass p
 template <class Space, class S>
 void Joins<Space, S>::FillLeaf(const Kinematics<Space, S>& kinematics,
                                const Inertia<Space, S>& inertia, int n) {
-  Z_[places_[n].z] = DiagonalBlock<Space, S>(kinematics.RotationalInverse(inertia, n + 1),
-                                             S(1) / inertia.mass);
+  Z_[places_[n].z] =
+      DiagonalBlock<Space, S>(kinematics.RotationalInverse(inertia, n + 1), S(1) / inertia.mass);
 }
 
 /// Rows of C. D at Mo becomes c at the centres of mass, so that c^T A is the D^T A of the paper's
@@ -155,7 +155,8 @@ void Joins<Space, S>::FormResponse(const PlanNode& node, const Place& place) {
         if (f < 0 || node.handles[f].child != handle.child) continue;
         const Block<Space, S>& Z = Z_[child.z + handle.place + child.kept * node.handles[f].place];
         const Wrench<Space, S>* c = direction(joint, which);
-        for (int i = 0; i < joint.rows; ++i) Y[i] += loopbench::Apply<Acceleration<Space, S>>(Z, c[i]);  // (67)
+        for (int i = 0; i < joint.rows; ++i)
+          Y[i] += loopbench::Apply<Acceleration<Space, S>>(Z, c[i]);  // (67)
         operations_ += joint.rows * Space::kDim * Space::kDim;
       }
       Y += joint.rows;

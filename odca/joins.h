@@ -118,8 +118,8 @@ class Joins {
   std::vector<Place> places_;
   std::vector<Block<Space, S>> Z_;
   std::vector<Acceleration<Space, S>> Y_;  ///< Y of each node; on handles that stay then V = T Y
-  std::vector<Wrench<Space, S>> c_;  ///< rows c_P, then c_Q of each joint
-  std::vector<int> c_offset_;        ///< of each mechanism joint in c_
+  std::vector<Wrench<Space, S>> c_;        ///< rows c_P, then c_Q of each joint
+  std::vector<int> c_offset_;              ///< of each mechanism joint in c_
   std::vector<S> X_;
   std::vector<LoopSolver<S>> loops_;
   MatrixX<S> columns_;

@@ -63,7 +63,7 @@ void Odca<Space, S>::SweepTo(VectorX<S>& x, VectorX<S>* lambda) {
     const Joint<Space, S>& joint = mechanism_.joints()[step.joint];
     const JointState<Space, S>& state = kinematics_->joints()[step.joint];
     const Acceleration<Space, S> A_rel = ShiftMotion<Space, S>(A_[joint.to], state.r_Q) -
-                                   ShiftMotion<Space, S>(A_[joint.from], state.r_P);
+                                         ShiftMotion<Space, S>(A_[joint.from], state.r_P);
     for (int i = 0; i < state.num_u; ++i) {
       x[joint.u_offset + i] = joint.kind->inverse_H_squared * state.H(i).dot(A_rel);
     }
@@ -123,7 +123,7 @@ void Odca<Space, S>::SetKnown(const Kinematics<Space, S>& kinematics) {
     const Joint<Space, S>& joint = mechanism_.joints()[j];
     const JointState<Space, S>& state = kinematics.joints()[j];
     const Acceleration<Space, S> known = kinematics.Centripetal(joint.to, state.r_Q) -
-                                   kinematics.Centripetal(joint.from, state.r_P) - state.g;
+                                         kinematics.Centripetal(joint.from, state.r_P) - state.g;
     c0_[j] = state.Along(known, state.rows());
     for (int i = 0; i < (joint.in_tree() ? state.num_u : 0); ++i) {
       known_[joint.u_offset + i] = joint.kind->inverse_H_squared * state.H(i).dot(known);

@@ -53,12 +53,13 @@ class Sweep {
   /// Up and down over what stands in b_; adds to A and phi_.
   void Correct(std::span<const Components<Space, S>> c0, std::span<Acceleration<Space, S>> A);
   /// r = C A + c0 of every joint, in residual_.
-  void Residual(std::span<const Components<Space, S>> c0, std::span<const Acceleration<Space, S>> A);
+  void Residual(std::span<const Components<Space, S>> c0,
+                std::span<const Acceleration<Space, S>> A);
 
   const Plan& plan_;
   Joins<Space, S> joins_;
   std::vector<Acceleration<Space, S>> b_;  ///< by kept handle
-  std::vector<Wrench<Space, S>> F_;  ///< likewise
+  std::vector<Wrench<Space, S>> F_;        ///< likewise
   std::vector<Components<Space, S>> phi_, residual_;
   std::vector<S> s_;       ///< by row
   std::vector<S> forces_;  ///< phi of one node

@@ -23,8 +23,9 @@ struct Small {
   Small() = default;
   /// All numbers, row by row.
   template <class... Numbers>
-    requires(sizeof...(Numbers) == kSize && (std::is_convertible_v<Numbers, S> && ...))
-  LOOPBENCH_INLINE explicit(kSize == 1) Small(const Numbers&... numbers) {
+  requires(sizeof...(Numbers) == kSize &&
+           (std::is_convertible_v<Numbers, S> && ...)) LOOPBENCH_INLINE explicit(kSize == 1)
+      Small(const Numbers&... numbers) {
     const S given[] = {S(numbers)...};
     LOOPBENCH_UNROLL
     for (int i = 0; i < kSize; ++i) at[i / columns + i % columns * rows] = given[i];

@@ -1,8 +1,8 @@
 // The plane and space as policies, so that every algorithm is written once (docs/design.md D1).
 //
 // Notation (docs/glossary.md): p_WB position of B's centre of mass from the ground origin, R_WB
-// orientation of B, V = [w; v] velocity of a body at a point, F = [moment; force] at a point; all in
-// ground axes unless the name says otherwise. In the plane w and moments have one component, in
+// orientation of B, V = [w; v] velocity of a body at a point, F = [moment; force] at a point; all
+// in ground axes unless the name says otherwise. In the plane w and moments have one component, in
 // space three; "Dim" is the number of components of a motion: 3 or 6.
 #pragma once
 

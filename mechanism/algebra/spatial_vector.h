@@ -28,8 +28,9 @@ struct SpatialVector {
       : angular(about), linear(along) {}
   /// A direction serves as any kind.
   template <class Other>
-    requires(std::is_same_v<Other, DirectionKind> && !std::is_same_v<Kind, DirectionKind>)
-  LOOPBENCH_INLINE SpatialVector(const SpatialVector<Space, S, Other>& direction)
+  requires(std::is_same_v<Other, DirectionKind> &&
+           !std::is_same_v<Kind, DirectionKind>) LOOPBENCH_INLINE
+      SpatialVector(const SpatialVector<Space, S, Other>& direction)
       : angular(direction.angular), linear(direction.linear) {}
   template <class Derived>
   explicit SpatialVector(const Eigen::MatrixBase<Derived>& vector)
@@ -41,9 +42,7 @@ struct SpatialVector {
     return vector;
   }
 
-  static SpatialVector Zero() {
-    return {Angular<Space, S>::Zero(), Linear<Space, S>::Zero()};
-  }
+  static SpatialVector Zero() { return {Angular<Space, S>::Zero(), Linear<Space, S>::Zero()}; }
   static SpatialVector Unit(int i) {
     SpatialVector unit = Zero();
     unit[i] = S(1);
@@ -60,13 +59,10 @@ struct SpatialVector {
 
   /// Power of a force, or a component along a direction.
   template <class Other>
-  LOOPBENCH_INLINE S dot(const SpatialVector<Space, S, Other>& other) const {
-    constexpr bool along =
-        std::is_same_v<Kind, DirectionKind> || std::is_same_v<Other, DirectionKind>;
-    static_assert(along || std::is_same_v<Kind, ForceKind> != std::is_same_v<Other, ForceKind>,
-                  "neither a power nor a component");
-    return angular.dot(other.angular) + linear.dot(other.linear);
-  }
+  requires(std::is_same_v<Kind, DirectionKind> || std::is_same_v<Other, DirectionKind> ||
+           std::is_same_v<Kind, ForceKind> != std::is_same_v<Other, ForceKind>) LOOPBENCH_INLINE S
+      dot(const SpatialVector<Space, S, Other>& other)
+  const { return angular.dot(other.angular) + linear.dot(other.linear); }
   /// Of all components, whatever their units: for sizes and tolerances.
   S squaredNorm() const { return angular.squaredNorm() + linear.squaredNorm(); }
   S norm() const {
@@ -169,18 +165,18 @@ LOOPBENCH_INLINE Small<S, 3> CrossAngular(const Small<S, 3>& a, const Small<S, 3
 /// Velocity of a body at c + r from that at c: [w; v + w x r]. Accelerations likewise, without the
 /// centripetal part, and directions of motion.
 template <class Space, class S, class Kind>
-  requires(!std::is_same_v<Kind, ForceKind>)
-LOOPBENCH_INLINE SpatialVector<Space, S, Kind> ShiftMotion(const SpatialVector<Space, S, Kind>& V,
-                                                           const Linear<Space, S>& r) {
+requires(!std::is_same_v<Kind, ForceKind>) LOOPBENCH_INLINE
+    SpatialVector<Space, S, Kind> ShiftMotion(const SpatialVector<Space, S, Kind>& V,
+                                              const Linear<Space, S>& r) {
   return {V.angular, V.linear + Cross<S>(V.angular, r)};
 }
 
 /// The same force at c instead of c + r: [moment + r x f; f]. The transpose of ShiftMotion().
 /// Directions of forces likewise.
 template <class Space, class S, class Kind>
-  requires(std::is_same_v<Kind, ForceKind> || std::is_same_v<Kind, DirectionKind>)
-LOOPBENCH_INLINE SpatialVector<Space, S, Kind> ShiftForce(const SpatialVector<Space, S, Kind>& F,
-                                                          const Linear<Space, S>& r) {
+requires(std::is_same_v<Kind, ForceKind> || std::is_same_v<Kind, DirectionKind>) LOOPBENCH_INLINE
+    SpatialVector<Space, S, Kind> ShiftForce(const SpatialVector<Space, S, Kind>& F,
+                                             const Linear<Space, S>& r) {
   return {F.angular + Moment<S>(r, F.linear), F.linear};
 }
 

@@ -56,8 +56,8 @@ DirectionRows RowsOfDirections(const Kinematics<Space, S>& kinematics) {
     rows = T * MatrixX<S>(rows);
     const MatrixX<S> free =
         T * FreeResponse(kinematics, Masses::kGeometric, index, true) * T.transpose();
-    const Components<Space, S> all = kinematics.joints()[index].Along(
-        kinematics.ConstraintMismatch(index), result.count[c]);
+    const Components<Space, S> all =
+        kinematics.joints()[index].Along(kinematics.ConstraintMismatch(index), result.count[c]);
     const MatrixX<S> e = T * all.head(result.count[c]);
     result.free.push_back(free.template cast<double>());
     for (int i = 0; i < result.count[c]; ++i) {

@@ -34,8 +34,8 @@ bool Drives<Space, S>::Followed(const Kinematics<Space, S>& kinematics, const Ve
   for (int body = 1; body < kinematics.mechanism().num_bodies(); ++body) {
     const Inertia<Space, S>& inertia = kinematics.mechanism().bodies()[body];
     const auto inverse = kinematics.RotationalInverse(inertia, body);
-    alone = std::max({alone, (inverse * F_[body].angular).norm(),
-                      S(F_[body].linear.norm() / inertia.mass)});
+    alone = std::max(
+        {alone, (inverse * F_[body].angular).norm(), S(F_[body].linear.norm() / inertia.mass)});
   }
   if (worst <= S(kFollowed) * size + S(kRoundOff) * alone) return true;
   const S mismatch = RelativeMismatch(kinematics);
@@ -50,8 +50,8 @@ S Drives<Space, S>::RelativeMismatch(const Kinematics<Space, S>& kinematics) {
   S position = S(0), speed = S(0), size = S(0);
   for (int index : mechanism.constraints()) {
     const Velocity<Space, S> mismatch = kinematics.ConstraintMismatch(index);
-    position = std::max({position, mismatch.angular.norm(),
-                         S(mismatch.linear.norm() / mechanism.length())});
+    position = std::max(
+        {position, mismatch.angular.norm(), S(mismatch.linear.norm() / mechanism.length())});
     speed = std::max(speed, kinematics.ConstraintSpeed(index).norm());
   }
   for (const Velocity<Space, S>& V : kinematics.motions()) size = std::max(size, V.norm());

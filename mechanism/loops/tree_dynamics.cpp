@@ -65,8 +65,8 @@ void FillMassMatrix(const Kinematics<Space, S>& kinematics, std::vector<Block<Sp
     for (int i = 0; i < joint.num_u(); ++i) {
       // momentum of the subtree moving along direction i, carried rootward
       const Velocity<Space, S> h = state.H(i) * S(step->sign);
-      auto F = Apply<Wrench<Space, S>>(composite[step->child],
-                                       ShiftMotion<Space, S>(h, arms.child));
+      auto F =
+          Apply<Wrench<Space, S>>(composite[step->child], ShiftMotion<Space, S>(h, arms.child));
       for (int s = mechanism.step_of_body(step->child); s >= 0;) {
         const TreeStep& at = tree[s];
         const JointState<Space, S>& at_state = kinematics.joints()[at.joint];
@@ -327,12 +327,12 @@ JointMatrix<S> FreeResponse(const Kinematics<Space, S>& kinematics, Masses masse
   return X;
 }
 
-#define LOOPBENCH_INSTANTIATE(Space, S)                                               \
-  template class TreeDynamics<Space, S>;                                              \
-  template Wrench<Space, S> InertialForce(const Kinematics<Space, S>&, int,           \
+#define LOOPBENCH_INSTANTIATE(Space, S)                                                     \
+  template class TreeDynamics<Space, S>;                                                    \
+  template Wrench<Space, S> InertialForce(const Kinematics<Space, S>&, int,                 \
                                           const Acceleration<Space, S>&);                   \
-  template void SpeedBias(Kinematics<Space, S>&, const VectorX<S>&, VectorX<S>&);     \
-  template Components<Space, S> JointAcceleration(const Kinematics<Space, S>&, int,   \
+  template void SpeedBias(Kinematics<Space, S>&, const VectorX<S>&, VectorX<S>&);           \
+  template Components<Space, S> JointAcceleration(const Kinematics<Space, S>&, int,         \
                                                   std::span<const Acceleration<Space, S>>); \
   template JointMatrix<S> FreeResponse(const Kinematics<Space, S>&, Masses, int, bool);
 LOOPBENCH_FOR_EACH_SPACE_AND_MODEL_SCALAR(LOOPBENCH_INSTANTIATE)

@@ -99,7 +99,7 @@ VectorX<S> Kinematics<Space, S>::SpeedsIn(const Kinematics& other) const {
     const Joint<Space, S>& joint = other.mechanism().joints()[step.joint];
     const JointState<Space, S>& state = other.joints()[step.joint];
     const Velocity<Space, S> V_rel = ShiftMotion<Space, S>(motions_[joint.to], state.r_Q) -
-                                   ShiftMotion<Space, S>(motions_[joint.from], state.r_P);
+                                     ShiftMotion<Space, S>(motions_[joint.from], state.r_P);
     for (int i = 0; i < state.num_u; ++i) {
       u[joint.u_offset + i] = joint.kind->inverse_H_squared * state.H(i).dot(V_rel);
     }
@@ -108,7 +108,7 @@ VectorX<S> Kinematics<Space, S>::SpeedsIn(const Kinematics& other) const {
 }
 
 #define LOOPBENCH_INSTANTIATE(Space, S)                                                      \
-  template Velocity<Space, S> Kinematics<Space, S>::ConstraintMismatch(int) const;             \
+  template Velocity<Space, S> Kinematics<Space, S>::ConstraintMismatch(int) const;           \
   template Components<Space, S> Kinematics<Space, S>::ConstraintSpeed(int) const;            \
   template S Kinematics<Space, S>::JointCoordinate(int) const;                               \
   template S Kinematics<Space, S>::JointSpeed(int) const;                                    \

@@ -26,7 +26,8 @@ struct JointState {
   /// Column i of the motion map.
   const Direction<Space, S>& H(int i) const { return basis[i]; }
   /// Constrained direction i: those of prescribed coordinates first, then others that are imposed,
-  /// `rows()` in all; behind them those released as redundant (redundancy.h), `directions()` in all.
+  /// `rows()` in all; behind them those released as redundant (redundancy.h), `directions()` in
+  /// all.
   const Direction<Space, S>& D(int i) const { return basis[num_u + i]; }
   int rows() const { return num_rows; }
   int directions() const { return Space::kDim - num_u; }
@@ -67,7 +68,7 @@ class Kinematics {
   long position_version() const { return position_version_; }
 
   const Mechanism<Space, S>& mechanism() const { return *mechanism_; }
-  const std::vector<Pose<Space, S>>& poses() const { return poses_; }        ///< at the com
+  const std::vector<Pose<Space, S>>& poses() const { return poses_; }          ///< at the com
   const std::vector<Velocity<Space, S>>& motions() const { return motions_; }  ///< at the com
   const std::vector<JointState<Space, S>>& joints() const { return joints_; }
 

@@ -18,8 +18,7 @@ Matrix3 PointInertia(double m, const Vector3& r) {
 }
 
 /// The carrier with the mass of another body, given by its place.
-void AddMass(const BodyDescription& body, const Frame& X,
-             BodyDescription* carrier) {
+void AddMass(const BodyDescription& body, const Frame& X, BodyDescription* carrier) {
   const Vector3 com = X.R * body.com + X.p;
   const double mass = carrier->mass + body.mass;
   const Vector3 joint_com = (carrier->mass * carrier->com + body.mass * com) / mass;

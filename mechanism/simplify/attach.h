@@ -15,10 +15,10 @@ namespace loopbench {
 
 /// Where a body sits on its carrier.
 struct Attachment {
-  int carrier = kGround;    ///< a body that is not attached itself
-  Frame X;  ///< the body's axes and origin in the carrier's
-  double turn = 0.0;        ///< plane: its angle as a number, not modulo a turn
-  bool attached = false;    ///< else the body stays and the rest does not matter
+  int carrier = kGround;  ///< a body that is not attached itself
+  Frame X;                ///< the body's axes and origin in the carrier's
+  double turn = 0.0;      ///< plane: its angle as a number, not modulo a turn
+  bool attached = false;  ///< else the body stays and the rest does not matter
 };
 
 /// The description without the attached bodies. Joints between bodies of one carrier are dropped,

@@ -208,8 +208,7 @@ Compiled Compile(const MechanismDescription& description, const CompileOptions& 
 }
 
 template <class Space>
-Frame UserPose(const Compiled& compiled, int body,
-                               const Kinematics<Space, double>* kinematics) {
+Frame UserPose(const Compiled& compiled, int body, const Kinematics<Space, double>* kinematics) {
   const BodyImage& image = compiled.bodies[body];
   if (image.part < 0) return image.X;
   const CompiledPart& part = compiled.parts[image.part];

@@ -37,10 +37,10 @@ struct CompileOptions {
 
 /// Where a user's body is.
 struct BodyImage {
-  int part = -1;            ///< -1: fixed to Ground, at X in the user's ground axes
-  int body = kGround;       ///< of that part's description
-  Frame X;  ///< the user's body axes and origin in those of `body`
-  double turn = 0.0;        ///< plane: their angle, a number
+  int part = -1;       ///< -1: fixed to Ground, at X in the user's ground axes
+  int body = kGround;  ///< of that part's description
+  Frame X;             ///< the user's body axes and origin in those of `body`
+  double turn = 0.0;   ///< plane: their angle, a number
 };
 
 /// Where a user's joint is.
@@ -69,7 +69,6 @@ Compiled Compile(const MechanismDescription& description, const CompileOptions& 
 /// Pose of a user's body, at its origin in the user's ground axes, when its part moves as
 /// `kinematics` says. Bodies fixed to Ground take no kinematics: nullptr.
 template <class Space>
-Frame UserPose(const Compiled& compiled, int body,
-                               const Kinematics<Space, double>* kinematics);
+Frame UserPose(const Compiled& compiled, int body, const Kinematics<Space, double>* kinematics);
 
 }  // namespace loopbench

@@ -72,8 +72,7 @@ class Search {
         for (const auto& [here, there] :
              {std::pair{&joint.from, &joint.to}, {&joint.to, &joint.from}}) {
           if (here->body != queue[k]) continue;
-          const Frame X_here = FrameOf(joint, *here),
-                                      X_there = FrameOf(joint, *there);
+          const Frame X_here = FrameOf(joint, *here), X_there = FrameOf(joint, *there);
           const Vector3 in_frame = X_here.R.transpose() * normal_[here->body];
           const InPlaneOf& kind = TraitsOf(joint.type).flat;
           if ((kind.turns && in_frame.head<2>().norm() > kParallel) ||
@@ -138,8 +137,7 @@ Vector3 Flat(const Vector3& v) { return {v.x(), v.y(), 0.0}; }
 /// One joint's sides in the new axes: positions and angles within the plane.
 void FlattenJoint(const std::vector<Matrix3>& axes, const std::vector<Vector3>& normal,
                   JointDescription* joint, bool* mirrored) {
-  const Frame X_PF = FrameOf(*joint, joint->from),
-                              X_QM = FrameOf(*joint, joint->to);
+  const Frame X_PF = FrameOf(*joint, joint->from), X_QM = FrameOf(*joint, joint->to);
   const Vector3 n_F = X_PF.R.transpose() * normal[joint->from.body];
   // any direction of the frames across n serves to measure angles; the slide must be one
   const Vector3 across = std::abs(n_F.x()) < 0.5 ? Vector3::UnitX() : Vector3::UnitY();

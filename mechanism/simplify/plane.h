@@ -21,7 +21,7 @@ namespace loopbench {
 struct InPlane {
   MechanismDescription description;  ///< planar; bodies and joints keep their order and names
   Eigen::Matrix3d R_WC = Eigen::Matrix3d::Identity();  ///< its ground axes in the user's; z is n
-  std::vector<Frame> X_CB;  ///< the user's body axes and origin in the new ones
+  std::vector<Frame> X_CB;            ///< the user's body axes and origin in the new ones
   std::vector<bool> mirrored;         ///< joints whose angle (and y) changed sign: their z was -n
   double gravity_dropped = 0.0;       ///< gravity along n [m/s^2]
   std::vector<double> force_dropped;  ///< of each force, its part along n [N]

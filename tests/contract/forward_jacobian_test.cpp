@@ -107,8 +107,9 @@ template <class Space>
 double Slenderness(const Mechanism<Space, double>& mechanism) {
   double smallest = INFINITY, largest = 0.0;
   for (std::size_t body = 1; body < mechanism.bodies().size(); ++body) {
-    const auto moments =
-        MatrixXd(mechanism.bodies()[body].rotational.eigen()).selfadjointView<Eigen::Lower>().eigenvalues();
+    const auto moments = MatrixXd(mechanism.bodies()[body].rotational.eigen())
+                             .selfadjointView<Eigen::Lower>()
+                             .eigenvalues();
     smallest = std::min(smallest, moments.minCoeff());
     largest = std::max(largest, moments.maxCoeff());
   }

@@ -1,4 +1,5 @@
 // Poses and constraint functions of the oracle, along curves.
+#include <Eigen/Geometry>
 #include <optional>
 
 #include "tests/contract/oracle_joints.h"

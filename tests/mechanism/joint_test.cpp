@@ -45,7 +45,7 @@ VectorX<double> Coordinates(const JointKind<Space, double>& kind, int seed) {
 /// [w; v] of M in F along the curve q + t N u, by differentiating the oracle's own transform.
 template <class Space>
 Velocity<Space, double> MotionAlong(JointType type, const JointKind<Space, double>& kind,
-                                  const VectorX<double>& q, const VectorX<double>& u) {
+                                    const VectorX<double>& q, const VectorX<double>& u) {
   VectorX<double> qdot(kind.num_q);
   kind.rates(q.data(), u.data(), qdot.data());
   std::vector<Jet> curve(kind.num_q + 1);

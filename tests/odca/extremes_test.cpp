@@ -53,8 +53,8 @@ Residuals ResidualsOf(const MechanismDescription& description) {
     const auto I = kinematics.RotationalInertia(inertia, body);
     const Angular<Space, double>& w = kinematics.motions()[body].angular;
     largest_F = std::max(largest_F, missing[body].norm());
-    missing[body] -= {I * A[body].angular + CrossAngular<double>(w, I * w),
-                      inertia.mass * A[body].linear};
+    missing[body] -=
+        {I * A[body].angular + CrossAngular<double>(w, I * w), inertia.mass * A[body].linear};
   }
   for (int j = 0; j < static_cast<int>(mechanism.joints().size()); ++j) {
     const Joint<Space, double>& joint = mechanism.joints()[j];

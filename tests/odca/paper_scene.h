@@ -144,9 +144,7 @@ class Scene {
     c << a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0];
     return c;
   }
-  RealVector AngularVelocity(int body) const {
-    return ToReal(kinematics_.motions()[body].angular);
-  }
+  RealVector AngularVelocity(int body) const { return ToReal(kinematics_.motions()[body].angular); }
 
   const Mechanism<Space, double> mechanism_;
   const testing::State state_;

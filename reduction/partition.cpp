@@ -12,9 +12,17 @@ namespace loopbench::reduction {
 
 namespace {
 
-/// The first `rank` pivots of a column-pivoted QR, ascending.
-template <class QR>
-std::vector<int> FirstPivots(const QR& qr, int rank) {
+/// The first `rank` pivots of a QR with column pivoting, ascending. Columns that differ by rounding
+/// alone, as those of equal bodies do, are taken in their order: each counts a little less than the
+/// one before, by more than rounding in any scalar and less than what makes a choice better.
+template <class S>
+std::vector<int> FirstPivots(MatrixX<S> columns, int rank) {
+  constexpr double kFromFirstToLast = 1e-3;
+  for (Eigen::Index j = 1; j < columns.cols(); ++j) {
+    columns.col(j) *=
+        S(1.0 - kFromFirstToLast * static_cast<double>(j) / static_cast<double>(columns.cols()));
+  }
+  const Eigen::ColPivHouseholderQR<MatrixX<S>> qr(columns);
   std::vector<int> pivots(rank);
   for (int i = 0; i < rank; ++i) pivots[i] = static_cast<int>(qr.colsPermutation().indices()[i]);
   std::ranges::sort(pivots);
@@ -45,15 +53,13 @@ int GeometricRank(const Kinematics<Space, S>& kinematics, TreeDynamics<Space, S>
 
 template <class S>
 Partition<S> BestPartition(const MatrixX<S>& J, int rank) {
-  using std::abs;
   Partition<S> partition;
   if (rank == 0) return partition;
-  partition.dependent = FirstPivots(Eigen::ColPivHouseholderQR<MatrixX<S>>(J), rank);
+  partition.dependent = FirstPivots<S>(J, rank);
   MatrixX<S> transposed(rank, J.rows());
   for (int i = 0; i < rank; ++i) transposed.row(i) = J.col(partition.dependent[i]).transpose();
-  const Eigen::ColPivHouseholderQR<MatrixX<S>> qr(transposed);
-  partition.rows = FirstPivots(qr, rank);
-  partition.rcond = abs(qr.matrixQR()(rank - 1, rank - 1)) / abs(qr.matrixQR()(0, 0));
+  partition.rows = FirstPivots<S>(transposed, rank);
+  partition.rcond = PartitionCondition(J, partition);
   return partition;
 }
 

@@ -79,6 +79,18 @@ TEST(PartitionTest, RowsThatRepeatOthersAreLeftOut) {
   }
 }
 
+TEST(PartitionTest, RoundOffDoesNotChooseBetweenEqualSpeeds) {
+  for (std::uint64_t seed = 1; seed <= 20; ++seed) {
+    MatrixX<double> J(3, 6);
+    J.leftCols(3) = J.rightCols(3) = RandomMatrix(3, 3, seed);
+    const MatrixX<double> off = 1e-15 * RandomMatrix(3, 6, 100 + seed);
+    for (const double sign : {-1.0, 1.0}) {
+      const Partition<double> chosen = BestPartition<double>(J + sign * off, 3);
+      EXPECT_EQ(chosen.dependent, (std::vector<int>{0, 1, 2})) << seed;
+    }
+  }
+}
+
 TEST(PartitionTest, ConditionTellsALostPartition) {
   MatrixX<double> J(2, 4);
   J << 1.0, 0.0, 1.0, 2.0,  //

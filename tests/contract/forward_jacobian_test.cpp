@@ -230,8 +230,7 @@ class ForwardJacobianOf : public ::testing::TestWithParam<std::string> {};
 
 TEST_P(ForwardJacobianOf, ShippedMechanismIsThatOfDifferences) {
   const MechanismDescription description =
-      harness::ReadMechanism(harness::reference::kConfigs / "mechanisms" / (GetParam() + ".json"))
-          .description;
+      harness::ReadMechanism(harness::kConfigs / "mechanisms" / (GetParam() + ".json")).description;
   const double t = GetParam() == "andrews-squeezer" ? 0.005 : 0.05;
   if (description.space == SpaceKind::kPlanar) {
     CompareShipped<Planar>(description, t);
@@ -242,7 +241,7 @@ TEST_P(ForwardJacobianOf, ShippedMechanismIsThatOfDifferences) {
 
 std::vector<std::string> ShippedNames() {
   std::vector<std::string> names;
-  const auto folder = harness::reference::kConfigs / "mechanisms";
+  const auto folder = harness::kConfigs / "mechanisms";
   for (const auto& entry : std::filesystem::directory_iterator(folder)) {
     if (entry.path().extension() == ".json") names.push_back(entry.path().stem().string());
   }

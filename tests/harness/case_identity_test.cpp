@@ -14,7 +14,7 @@
 #include "tests/harness/cli_fixture.h"
 
 namespace loopbench::harness {
-namespace {
+namespace case_identity_test {
 
 constexpr const char* kMass5 = " --set /scenes/0/mechanism/bodies/0/mass=5";
 constexpr const char* kMass1 = " --set /scenes/0/mechanism/bodies/0/mass=1";
@@ -71,7 +71,7 @@ TEST_F(CaseIdentity, TablesShowEveryContentAndTellThemApart) {
 
 TEST_F(CaseIdentity, FilesOfEqualNamesAreDifferentCases) {
   fs::create_directories(folder_ / "other");
-  Write("other/tiny.json", kExperiment);
+  Write("other/tiny.json", kTinyExperiment);
   Write("other/four-bar.json", mechanism_);
   EditMechanism("\"mass\": 1.0", "\"mass\": 7.0");
   std::string first;
@@ -191,5 +191,5 @@ TEST(RowOrder, IsTheSameWhicheverRunEndedFirst) {
   }
 }
 
-}  // namespace
+}  // namespace case_identity_test
 }  // namespace loopbench::harness

@@ -14,7 +14,7 @@
 #include "harness/text/config_error.h"
 
 namespace loopbench::harness {
-namespace {
+namespace claims_test {
 
 const std::filesystem::path kClaimsFile =
     std::filesystem::path(LOOPBENCH_SOURCE_DIR) / "configs/experiments/paper/claims.json";
@@ -252,5 +252,5 @@ TEST(PaperClaims, EachTurnsFromReproducedToNotReproducedWithPlantedData) {
   }
 }
 
-}  // namespace
+}  // namespace claims_test
 }  // namespace loopbench::harness

@@ -9,7 +9,7 @@
 #include "tests/harness/cli_fixture.h"
 
 namespace loopbench::harness {
-namespace {
+namespace cli_compare_test {
 
 class ComparisonCommands : public CommandLineTest {
  protected:
@@ -219,5 +219,5 @@ TEST_F(BenchmarkProgram, RefusesBadInput) {
 
 #endif
 
-}  // namespace
+}  // namespace cli_compare_test
 }  // namespace loopbench::harness

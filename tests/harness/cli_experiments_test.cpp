@@ -11,11 +11,11 @@
 #include "tests/harness/cli_fixture.h"
 
 namespace loopbench::harness {
-namespace {
+namespace cli_experiments_test {
 
 /// tiny.json with a sweep of two masses, without the lagrange cases of the second.
 std::string Swept() {
-  std::string text = kExperiment;
+  std::string text = kTinyExperiment;
   const std::string end = "\"timing\": {\"repeats\": 0}";
   text.insert(text.find(end), R"("sweep": [{"name": "mass", "values": [1, 2],
       "field": "/scenes/0/mechanism/bodies/1/mass"}],
@@ -54,7 +54,7 @@ TEST_F(CommandLineTest, KeysOfStoredRecordsAreNoNamesForAxes) {
   }
   EXPECT_GE(keys.size(), 30u);
   for (const std::string& key : keys) {
-    std::string text = kExperiment;
+    std::string text = kTinyExperiment;
     text.insert(text.find("\"timing\""),
                 R"("sweep": [{"name": ")" + key + R"(", "field": "/comment", "values": ["x"]}], )");
     EXPECT_THROW(ParseExperiments(text, folder_ / "e.json"), ConfigError) << key;
@@ -105,5 +105,5 @@ TEST_F(CommandLineTest, ExplainSaysWhatRunsAndWhatWordsMean) {
   EXPECT_EQ(ending.text.find("  reduction: "), std::string::npos) << ending.text;
 }
 
-}  // namespace
+}  // namespace cli_experiments_test
 }  // namespace loopbench::harness

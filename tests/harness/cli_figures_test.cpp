@@ -2,15 +2,15 @@
 #include "tests/harness/cli_fixture.h"
 
 namespace loopbench::harness {
-namespace {
+namespace cli_figures_test {
 
 class FiguresOfAStore : public CommandLineTest {};
 
 TEST_F(FiguresOfAStore, OneThatCannotBeDrawnDoesNotStopTheOthers) {
   // the drift of a pendulum, which has no loops, is zero: nothing for a logarithmic axis
   Write("pendulum.json", ReadFile(kConfigs / "mechanisms/pendulum.json"));
-  Write("tiny.json", std::string(kExperiment)
-                         .replace(std::string(kExperiment).find("{\"mechanism\": \"four"), 0,
+  Write("tiny.json", std::string(kTinyExperiment)
+                         .replace(std::string(kTinyExperiment).find("{\"mechanism\": \"four"), 0,
                                   R"({"mechanism": "pendulum.json", "horizon": 0.5}, )"));
   ExpectEnding(Call("run tiny.json --out out"), 0, {});
   ExpectEnding(Call("plot out --out figures"), 2,
@@ -24,7 +24,7 @@ TEST_F(FiguresOfAStore, OneThatCannotBeDrawnDoesNotStopTheOthers) {
 
 TEST_F(FiguresOfAStore, AnglesAreThoseOfLevelPositionWhereItIsStored) {
   const std::string levels = R"("enforcement": ["acceleration", "position"])";
-  std::string text = kExperiment;
+  std::string text = kTinyExperiment;
   const std::string one = R"("enforcement": "acceleration")";
   Write("tiny.json", text.replace(text.find(one), one.size(), levels));
   ExpectEnding(Call("run tiny.json --out out"), 0, {});
@@ -34,5 +34,5 @@ TEST_F(FiguresOfAStore, AnglesAreThoseOfLevelPositionWhereItIsStored) {
             std::string::npos);
 }
 
-}  // namespace
+}  // namespace cli_figures_test
 }  // namespace loopbench::harness

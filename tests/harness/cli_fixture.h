@@ -12,25 +12,24 @@
 
 #include "harness/store/result_store.h"
 #include "harness/text/files.h"
+#include "tests/harness/places.h"
 
 namespace loopbench::harness {
 namespace fs = std::filesystem;
-
-inline const fs::path kConfigs = fs::path(LOOPBENCH_SOURCE_DIR) / "configs";
 
 struct Ending {
   int code = -1;
   std::string text;  ///< standard output and standard error together
 };
 
-inline constexpr const char* kExperiment = R"({
+inline constexpr const char* kTinyExperiment = R"({
   "name": "tiny", "comment": "two cases", "tolerances": [1e-6],
   "scenes": [{"mechanism": "four-bar.json", "horizon": 0.5}],
   "columns": [{"formulation": ["odca", "lagrange"], "enforcement": "acceleration"}],
   "timing": {"repeats": 0}
 })";
 
-inline constexpr const char* kClaims = R"({"claims": [{
+inline constexpr const char* kTinyClaims = R"({"claims": [{
   "id": "small", "claim": "Drift is small.", "where": "here",
   "checks": [{"label": "all", "select": {"formulation": "odca"}, "measure": "drift_position_max",
               "statistic": "max", "compare": "<=", "threshold": 1e-3}],
@@ -47,8 +46,8 @@ class CommandLineTest : public testing::Test {
     fs::create_directories(folder_);
     mechanism_ = ReadFile(kConfigs / "mechanisms/four-bar.json");
     Write("four-bar.json", mechanism_);
-    Write("tiny.json", kExperiment);
-    Write("claims.json", kClaims);
+    Write("tiny.json", kTinyExperiment);
+    Write("claims.json", kTinyClaims);
   }
   void TearDown() override { fs::remove_all(folder_); }
 

@@ -2,7 +2,7 @@
 #include "tests/harness/cli_fixture.h"
 
 namespace loopbench::harness {
-namespace {
+namespace cli_map_test {
 
 constexpr const char* kMap = R"({
   "title": "Tiny map",
@@ -62,5 +62,5 @@ TEST_F(MapCommandTest, RefusesBadInput) {
   ExpectEnding(Call("map --help"), 0, {"must_hold", "inaccurate", "\"of\": \"rtol\""});
 }
 
-}  // namespace
+}  // namespace cli_map_test
 }  // namespace loopbench::harness

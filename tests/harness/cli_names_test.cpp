@@ -6,7 +6,7 @@
 #include "tests/harness/cli_fixture.h"
 
 namespace loopbench::harness {
-namespace {
+namespace cli_names_test {
 
 constexpr const char* kRun = "run tiny.json --out out ";
 
@@ -55,8 +55,8 @@ TEST_F(Names, OfMechanismsDoNotLeaveTheFolderOfFigures) {
 TEST_F(Names, WithAnythingInThemAreOnlyShown) {
   EditMechanism("\"name\": \"four-bar\"",
                 R"("name": "\u001b]0;t\u0007\u001b[31mred\u0000nul\n<img src=x>''=1|a")");
-  Write("tiny.json", std::string(kExperiment)
-                         .replace(std::string(kExperiment).find("tiny"), 4,
+  Write("tiny.json", std::string(kTinyExperiment)
+                         .replace(std::string(kTinyExperiment).find("tiny"), 4,
                                   R"(\u001b[2J'' `touch pwned` $(touch pwned))"));
   for (const std::string call :
        {"list tiny.json", "check tiny.json four-bar.json", "explain tiny.json",
@@ -128,5 +128,5 @@ TEST_F(Names, OfFoldersThatCannotBeMadeAreInTheMessage) {
                {"cannot make folder 'kept/a': Permission denied"});
 }
 
-}  // namespace
+}  // namespace cli_names_test
 }  // namespace loopbench::harness

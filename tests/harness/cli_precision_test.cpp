@@ -6,11 +6,11 @@
 #include "tests/harness/cli_fixture.h"
 
 namespace loopbench::harness {
-namespace {
+namespace cli_precision_test {
 
 /// tiny.json with a section "precision".
 std::string WithPrecision(const std::string& section) {
-  std::string text = kExperiment;
+  std::string text = kTinyExperiment;
   return text.insert(text.find("\"timing\""), "\"precision\": " + section + ", ");
 }
 
@@ -93,5 +93,5 @@ TEST_F(CommandLineTest, LaddersNeedABuildWithTheirScalars) {
 
 #endif
 
-}  // namespace
+}  // namespace cli_precision_test
 }  // namespace loopbench::harness

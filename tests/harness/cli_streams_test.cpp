@@ -6,7 +6,7 @@
 #include "tests/harness/cli_fixture.h"
 
 namespace loopbench::harness {
-namespace {
+namespace cli_streams_test {
 
 class Streams : public CommandLineTest {
  protected:
@@ -97,5 +97,5 @@ TEST_F(Streams, OfTheBenchmarkProgramAreHeldToTheSame) {
 
 #endif
 
-}  // namespace
+}  // namespace cli_streams_test
 }  // namespace loopbench::harness

@@ -4,7 +4,7 @@
 #include "tests/harness/cli_fixture.h"
 
 namespace loopbench::harness {
-namespace {
+namespace cli_test {
 
 class BadInput : public CommandLineTest {
  protected:
@@ -22,7 +22,7 @@ TEST_F(BadInput, UnknownKeyOfAMechanismNamesFilePointerAndSpelling) {
 }
 
 TEST_F(BadInput, UnknownKeyOfAnExperimentNamesFilePointerAndSpelling) {
-  Write("tiny.json", std::string(R"({"tolerance": 1e-6,)") + (kExperiment + 1));
+  Write("tiny.json", std::string(R"({"tolerance": 1e-6,)") + (kTinyExperiment + 1));
   ExpectRefused({"/tolerance: found unknown key", "did you mean \"tolerances\""});
 }
 
@@ -233,7 +233,7 @@ TEST_F(OldResults, StayWhenTheSecondExperimentIsBad) {
 }
 
 TEST_F(OldResults, StayWhenARunIsKilled) {
-  std::string text = kExperiment;
+  std::string text = kTinyExperiment;
   const std::string horizon = "\"horizon\": 0.5";
   text.replace(text.find(horizon), horizon.size(), "\"horizon\": [0.5, 10000]");
   Write("long.json", text);
@@ -253,5 +253,5 @@ TEST_F(OldResults, StayWhenARunHasPartOfTheirCases) {
   ExpectEnding(Call("table out --format csv"), 0, {"lagrange", "odca"});
 }
 
-}  // namespace
+}  // namespace cli_test
 }  // namespace loopbench::harness

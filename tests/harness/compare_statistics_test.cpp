@@ -10,7 +10,7 @@
 #include "harness/judge/statistics.h"
 
 namespace loopbench::harness {
-namespace {
+namespace compare_statistics_test {
 
 /// Share of all ways to choose which of the values form the first sample whose u is at least that
 /// of the given samples: the definition of p, ties included.
@@ -123,5 +123,5 @@ TEST(Median, TakesTheMiddle) {
   EXPECT_TRUE(std::isnan(Median(std::vector<double>{1, std::nan(""), 3})));
 }
 
-}  // namespace
+}  // namespace compare_statistics_test
 }  // namespace loopbench::harness

@@ -14,7 +14,7 @@
 #include "harness/store/contents.h"
 
 namespace loopbench::harness {
-namespace {
+namespace compare_test {
 
 /// Times around `centre` with the spread of a quiet machine, 1 %.
 std::vector<double> Times(double centre, unsigned seed, int count = 15) {
@@ -339,5 +339,5 @@ TEST(Origin, OfThisProgramIsComplete) {
   EXPECT_FALSE(Origin{}.SameMachine(Origin{}));
 }
 
-}  // namespace
+}  // namespace compare_test
 }  // namespace loopbench::harness

@@ -12,7 +12,7 @@
 #include "tests/reference/cases.h"
 
 namespace loopbench::harness {
-namespace {
+namespace compiled_scene_test {
 
 using namespace reference;
 
@@ -173,5 +173,5 @@ TEST(MergePartsTest, TakesTheWorstAndAddsTheWork) {
   EXPECT_EQ(whole.drift.value, (std::vector<double>{0.0, 2.0, 3.0, 1.0}));
 }
 
-}  // namespace
+}  // namespace compiled_scene_test
 }  // namespace loopbench::harness

@@ -11,13 +11,12 @@
 #include "harness/text/files.h"
 #include "harness/timing/subject.h"
 #include "mechanism/model/mechanism.h"
+#include "tests/harness/places.h"
 
 namespace loopbench::harness {
-namespace {
+namespace config_benchmarks_test {
 
 namespace fs = std::filesystem;
-
-const fs::path kConfigs = fs::path(LOOPBENCH_SOURCE_DIR) / "configs";
 
 constexpr std::string_view kSet = R"({
   "name": "small", "step": 1e-4, "integrator": "ode45",
@@ -174,5 +173,5 @@ TEST(Subject, HashesForgiveRoundOffOrNothing) {
   EXPECT_NE(HashExact(a), HashExact(b));
 }
 
-}  // namespace
+}  // namespace config_benchmarks_test
 }  // namespace loopbench::harness

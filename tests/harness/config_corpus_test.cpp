@@ -15,13 +15,13 @@
 #include "harness/judge/claims_reader.h"
 #include "harness/judge/failure_map_reader.h"
 #include "harness/text/config_error.h"
+#include "tests/harness/places.h"
 
 namespace loopbench::harness {
-namespace {
+namespace config_corpus_test {
 
 namespace fs = std::filesystem;
 
-const fs::path kRoot = LOOPBENCH_SOURCE_DIR;
 const fs::path kBroken = kRoot / "tests/broken";
 
 std::vector<fs::path> BrokenFiles(const std::string& kind) {
@@ -179,5 +179,5 @@ TEST(HugeInput, LongTokensAreCutInMessages) {
   }
 }
 
-}  // namespace
+}  // namespace config_corpus_test
 }  // namespace loopbench::harness

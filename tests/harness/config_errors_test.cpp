@@ -12,11 +12,10 @@
 #include "harness/config/mechanism_reader.h"
 #include "harness/text/config_error.h"
 #include "harness/text/spelling.h"
+#include "tests/harness/places.h"
 
 namespace loopbench::harness {
-namespace {
-
-const std::filesystem::path kConfigs = std::filesystem::path(LOOPBENCH_SOURCE_DIR) / "configs";
+namespace config_errors_test {
 
 constexpr std::string_view kMechanism = R"({
   "name": "two bars", "gravity": [0, -9.81],
@@ -31,7 +30,7 @@ constexpr std::string_view kMechanism = R"({
   "independent": ["OA", "bar1.angle"]
 })";
 
-constexpr std::string_view kExperiment = R"({
+constexpr std::string_view kTinyExperiment = R"({
   "name": "small", "tolerances": [1e-6],
   "scenes": [{"mechanism": "mechanisms/pendulum.json", "horizon": 10}],
   "columns": [{"formulation": "odca", "enforcement": "acceleration"}],
@@ -202,7 +201,7 @@ TEST(MechanismErrors, AreReportedAllAtOnce) {
 
 TEST(MechanismErrors, SoundFileHasNone) {
   EXPECT_EQ(MechanismError(std::string(kMechanism)), "");
-  EXPECT_EQ(ExperimentError(std::string(kExperiment)), "");
+  EXPECT_EQ(ExperimentError(std::string(kTinyExperiment)), "");
 }
 
 TEST(MechanismErrors, EmptyAndForeignDocumentsAreRefused) {
@@ -222,7 +221,7 @@ TEST(MechanismErrors, UnreadableFilesAreNamed) {
 class ExperimentMistake : public testing::TestWithParam<Mistake> {};
 
 TEST_P(ExperimentMistake, IsRefusedOnceAndExplained) {
-  const std::string error = ExperimentError(Edited(kExperiment, GetParam()));
+  const std::string error = ExperimentError(Edited(kTinyExperiment, GetParam()));
   EXPECT_EQ(std::count(error.begin(), error.end(), '\n'), 0) << error;
   ExpectWords(error, GetParam().words);
 }
@@ -263,16 +262,16 @@ INSTANTIATE_TEST_SUITE_P(
 
 TEST(ExperimentErrors, TheSameTwiceIsRefused) {
   const std::string scene = R"({"mechanism": "mechanisms/pendulum.json", "horizon": 10})";
-  ExpectWords(ExperimentError(Edited(kExperiment, {"", scene, scene + ", " + scene, {}})),
+  ExpectWords(ExperimentError(Edited(kTinyExperiment, {"", scene, scene + ", " + scene, {}})),
               {"/scenes/1: found scene \"pendulum\" again"});
   const std::string column = R"({"formulation": "odca", "enforcement": "acceleration"})";
-  ExpectWords(ExperimentError(Edited(kExperiment, {"", column, column + ", " + column, {}})),
+  ExpectWords(ExperimentError(Edited(kTinyExperiment, {"", column, column + ", " + column, {}})),
               {"/columns/1: found odca/acceleration/joint/rank-revealing again"});
 }
 
 TEST(ExperimentErrors, IncludeThoseInsideTheMechanismFile) {
-  const std::string error = ExperimentError(
-      Edited(kExperiment, {"", "mechanisms/pendulum.json", "schema/mechanism.schema.json", {}}));
+  const std::string error = ExperimentError(Edited(
+      kTinyExperiment, {"", "mechanisms/pendulum.json", "schema/mechanism.schema.json", {}}));
   ExpectWords(error, {"mechanism.schema.json:1: (top level): found no \"gravity\""});
 }
 
@@ -291,5 +290,5 @@ TEST(EditDistance, CountsASwapOfNeighboursOnce) {
   EXPECT_EQ(EditDistance("", "abc"), 3);
 }
 
-}  // namespace
+}  // namespace config_errors_test
 }  // namespace loopbench::harness

@@ -14,13 +14,13 @@
 #include <vector>
 
 #include "tests/fuzz/readers.h"
+#include "tests/harness/places.h"
 
 namespace loopbench::fuzz {
-namespace {
+namespace config_fuzz_test {
 
 namespace fs = std::filesystem;
-
-const fs::path kRoot = LOOPBENCH_SOURCE_DIR;
+using harness::kRoot;
 
 /// The lines of the stored baseline, as they are and without their checksums.
 std::vector<std::string> RecordLines() {
@@ -142,5 +142,5 @@ TEST_P(Readers, AcceptOrRefuseChangedSeeds) {
 INSTANTIATE_TEST_SUITE_P(Kinds, Readers, testing::ValuesIn(kKinds),
                          [](const auto& kind) { return std::string(kind.param); });
 
-}  // namespace
+}  // namespace config_fuzz_test
 }  // namespace loopbench::fuzz

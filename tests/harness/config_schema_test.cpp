@@ -19,13 +19,12 @@
 #include "harness/judge/failure_map_reader.h"
 #include "harness/text/config_error.h"
 #include "harness/text/files.h"
+#include "tests/harness/places.h"
 
 namespace loopbench::harness {
-namespace {
+namespace config_schema_test {
 
 namespace fs = std::filesystem;
-
-const fs::path kRoot = LOOPBENCH_SOURCE_DIR;
 
 /// Broken files that the schemas accept, by the reason why a schema cannot see the fault.
 const std::map<std::string, std::set<std::string>> kBeyondSchemas = {
@@ -264,5 +263,5 @@ TEST(SchemaExceptions, AreFilesThatExist) {
   }
 }
 
-}  // namespace
+}  // namespace config_schema_test
 }  // namespace loopbench::harness

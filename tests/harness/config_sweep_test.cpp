@@ -11,11 +11,10 @@
 #include "harness/run/run_case.h"
 #include "harness/text/config_error.h"
 #include "mechanism/description/library.h"
+#include "tests/harness/places.h"
 
 namespace loopbench::harness {
-namespace {
-
-const std::filesystem::path kConfigs = std::filesystem::path(LOOPBENCH_SOURCE_DIR) / "configs";
+namespace config_sweep_test {
 
 /// A small experiment with one scene, and whatever else a test adds.
 std::string Text(const std::string& more,
@@ -287,5 +286,5 @@ TEST(Settings, UnknownFieldsAreRefusedWithTheNearestSpelling) {
   EXPECT_EQ(ParseSetting("/a=b=c").value, "b=c");
 }
 
-}  // namespace
+}  // namespace config_sweep_test
 }  // namespace loopbench::harness

@@ -12,13 +12,12 @@
 #include "harness/config/mechanism_reader.h"
 #include "harness/json/file_kind.h"
 #include "harness/text/config_error.h"
+#include "tests/harness/places.h"
 
 namespace loopbench::harness {
-namespace {
+namespace config_test {
 
 namespace fs = std::filesystem;
-
-const fs::path kConfigs = fs::path(LOOPBENCH_SOURCE_DIR) / "configs";
 
 std::vector<fs::path> JsonFilesIn(const fs::path& folder) {
   std::vector<fs::path> files;
@@ -315,5 +314,5 @@ TEST(EnumNames, ParseReturnsWhatToStringWrote) {
   EXPECT_EQ(Parse<SolverKind>("As-Published"), std::nullopt);
 }
 
-}  // namespace
+}  // namespace config_test
 }  // namespace loopbench::harness

@@ -7,13 +7,12 @@
 #include <vector>
 
 #include "tests/harness/cli_fixture.h"
+#include "tests/harness/places.h"
 
 namespace loopbench::harness {
-namespace {
+namespace documents_test {
 
 using DocumentsTest = CommandLineTest;
-
-const fs::path kRoot = LOOPBENCH_SOURCE_DIR;
 
 /// What stands between the first fence after `words` and the next one.
 std::string BlockAfter(const std::string& text, const std::string& words) {
@@ -95,5 +94,5 @@ TEST(Documents, LinksAndPicturesLeadToFilesOfTheRepository) {
   EXPECT_GE(links, 20u);
 }
 
-}  // namespace
+}  // namespace documents_test
 }  // namespace loopbench::harness

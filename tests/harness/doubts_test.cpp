@@ -15,7 +15,7 @@
 #include "tests/reference/cases.h"
 
 namespace loopbench::harness {
-namespace {
+namespace doubts_test {
 
 using namespace reference;
 using enum Enforcement;
@@ -336,5 +336,5 @@ TEST(LinkLength, IsThatOfTheLongestBodyBetweenItsJointsWhereverItStands) {
   EXPECT_DOUBLE_EQ(LinkLength(MechanismDescription{}), 1.0);
 }
 
-}  // namespace
+}  // namespace doubts_test
 }  // namespace loopbench::harness

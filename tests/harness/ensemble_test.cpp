@@ -14,7 +14,7 @@
 #include "tests/reference/cases.h"
 
 namespace loopbench::harness {
-namespace {
+namespace ensemble_test {
 
 using namespace reference;
 
@@ -196,5 +196,5 @@ TEST(EnsembleTally, DoesNotLoseAnErrorThatIsNotFinite) {
   EXPECT_EQ(record.Number("ensemble_branch_kept"), 1);
 }
 
-}  // namespace
+}  // namespace ensemble_test
 }  // namespace loopbench::harness

@@ -11,7 +11,7 @@
 #include "harness/text/files.h"
 
 namespace loopbench::harness {
-namespace {
+namespace escape_test {
 
 using namespace std::string_literals;
 
@@ -136,5 +136,5 @@ TEST(Escape, FileNamesAreSlugsOfOneComponent) {
   }
 }
 
-}  // namespace
+}  // namespace escape_test
 }  // namespace loopbench::harness

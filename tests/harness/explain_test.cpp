@@ -8,7 +8,7 @@
 #include "tests/harness/cli_fixture.h"
 
 namespace loopbench::harness {
-namespace {
+namespace explain_test {
 
 using ExplainTest = CommandLineTest;
 
@@ -204,5 +204,5 @@ TEST_F(ExplainTest, AnglesOfMoreThanATurnAreQuestionedAndNotRefused) {
   }
 }
 
-}  // namespace
+}  // namespace explain_test
 }  // namespace loopbench::harness

@@ -9,7 +9,7 @@
 #include <vector>
 
 namespace loopbench::harness {
-namespace {
+namespace factorial_test {
 
 Record RunOf(const std::string& mechanism, const std::string& formulation,
              const std::string& enforcement, const std::string& coordinates, double drift,
@@ -150,5 +150,5 @@ TEST(Factorial, RunsOfDifferentParametersAreNoPair) {
   EXPECT_NEAR(row.Number("ratio_max"), 3, 1e-12);
 }
 
-}  // namespace
+}  // namespace factorial_test
 }  // namespace loopbench::harness

@@ -13,7 +13,7 @@
 #include "harness/text/config_error.h"
 
 namespace loopbench::harness {
-namespace {
+namespace failure_map_reader_test {
 
 constexpr const char* kRules = R"({
   "title": "t",
@@ -148,5 +148,5 @@ TEST(MapRules, ThatAreShippedRead) {
   EXPECT_GE(count, 1);
 }
 
-}  // namespace
+}  // namespace failure_map_reader_test
 }  // namespace loopbench::harness

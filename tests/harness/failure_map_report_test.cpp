@@ -13,7 +13,7 @@
 #include "tests/harness/failure_map_runs.h"
 
 namespace loopbench::harness {
-namespace {
+namespace failure_map_report_test {
 
 testing::AssertionResult Contains(const std::string& text, const std::string& part) {
   return testing::IsSubstring("part", "text", part, text);
@@ -110,5 +110,5 @@ TEST(FailureMapFigure, SaysEveryClassInWordsAndIsDrawn) {
   EXPECT_FALSE(std::filesystem::exists(path));
 }
 
-}  // namespace
+}  // namespace failure_map_report_test
 }  // namespace loopbench::harness

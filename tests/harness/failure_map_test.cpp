@@ -12,7 +12,7 @@
 #include "tests/harness/failure_map_runs.h"
 
 namespace loopbench::harness {
-namespace {
+namespace failure_map_test {
 
 constexpr double kNan = std::numeric_limits<double>::quiet_NaN();
 
@@ -248,5 +248,5 @@ TEST(MapCell, OneReasonExcusesAllColumnsThatNeedNotHold) {
   EXPECT_EQ(CellOf({}, row).state, CellState::kNotMeasured);
 }
 
-}  // namespace
+}  // namespace failure_map_test
 }  // namespace loopbench::harness

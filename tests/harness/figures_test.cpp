@@ -14,7 +14,7 @@
 #include "harness/text/files.h"
 
 namespace loopbench::harness {
-namespace {
+namespace figures_test {
 
 testing::AssertionResult Contains(const std::string& text, const std::string& part) {
   if (text.find(part) != std::string::npos) return testing::AssertionSuccess();
@@ -258,5 +258,5 @@ TEST_F(FiguresTest, OnlyDoubtfulRunsAreDashed) {
   EXPECT_TRUE(Contains(Draw(DriftFigure(records)), "dashed: doubtful"));
 }
 
-}  // namespace
+}  // namespace figures_test
 }  // namespace loopbench::harness

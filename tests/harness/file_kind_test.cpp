@@ -8,7 +8,7 @@
 #include "tests/harness/cli_fixture.h"
 
 namespace loopbench::harness {
-namespace {
+namespace file_kind_test {
 
 class FileKindTest : public CommandLineTest {
  protected:
@@ -36,7 +36,7 @@ TEST_F(FileKindTest, NamesInsideDecideNothing) {
     ExpectEnding(Call("check file.json"), 0, {"mechanism \"four-bar\", 3 bodies, 4 joints"});
     ExpectEnding(Call("explain file.json"), 0, {name});
   }
-  std::string experiment = kExperiment;
+  std::string experiment = kTinyExperiment;
   experiment.replace(experiment.find("two cases"), 9, "claims\\\", \\\"rows\\\": \\\"groups");
   EXPECT_EQ(KindOf(experiment), FileKind::kExperiment);
 }
@@ -101,5 +101,5 @@ TEST_F(FileKindTest, AFileOfAnotherKindIsNamed) {
                {"found claims (it has \"claims\"), expected a failure map"});
 }
 
-}  // namespace
+}  // namespace file_kind_test
 }  // namespace loopbench::harness

@@ -15,7 +15,7 @@
 #include "tests/reference/cases.h"
 
 namespace loopbench::harness {
-namespace {
+namespace formulations_test {
 
 using Names = std::vector<std::string>;
 
@@ -44,7 +44,7 @@ Experiment Asking(const std::string& level, const std::string& more = "") {
       "scenes": [{"mechanism": "../mechanisms/four-bar.json", "horizon": 0.2}],
       "columns": [{"formulation": ["lagrange", "echo"], "enforcement": ")" +
                              level + "\"}]" + more + "}",
-                         reference::kConfigs / "experiments/own.json");
+                         kConfigs / "experiments/own.json");
 }
 
 std::string MistakeOf(const std::string& level, const std::string& more = "") {
@@ -89,7 +89,7 @@ TEST(FormulationsTest, ARowThatCannotBeIsRefused) {
 }
 
 TEST(FormulationsTest, WhatIsNotThereIsNotMade) {
-  const MechanismFile file = ReadMechanism(reference::kConfigs / "mechanisms/four-bar.json");
+  const MechanismFile file = ReadMechanism(kConfigs / "mechanisms/four-bar.json");
   const Mechanism<Planar, double> mechanism(file.description, Coordinates::kJoint);
   EXPECT_THROW(MakeFormulation<Planar>("echo", mechanism, {}), std::invalid_argument);
   EXPECT_NE(MakeFormulation<Planar>("lagrange", mechanism, {}), nullptr);
@@ -161,5 +161,5 @@ TEST(FormulationsTest, RunsInSeveralScalarsKnowTheBuiltInOnes) {
   });
 }
 
-}  // namespace
+}  // namespace formulations_test
 }  // namespace loopbench::harness

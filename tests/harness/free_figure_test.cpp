@@ -14,7 +14,7 @@
 #include "harness/text/files.h"
 
 namespace loopbench::harness {
-namespace {
+namespace free_figure_test {
 
 Record RunOf(const std::string& formulation, double rtol, double drift) {
   Record record;
@@ -209,5 +209,5 @@ TEST(FreeFigure, SvgHasTheSameBytesEachTimeAndPdfIsOne) {
   std::filesystem::remove_all(folder);
 }
 
-}  // namespace
+}  // namespace free_figure_test
 }  // namespace loopbench::harness

@@ -15,7 +15,7 @@
 #include <vector>
 
 namespace loopbench::harness {
-namespace {
+namespace growth_test {
 
 constexpr double kEpsilon = std::numeric_limits<double>::epsilon();
 constexpr double kEnd = 100;  // s
@@ -252,5 +252,5 @@ TEST(Envelope, IsEmptyWithoutAnInterval) {
   EXPECT_TRUE(Envelope({{0, 1, 2}, {0, 1, 2}}, 1).t.empty());
 }
 
-}  // namespace
+}  // namespace growth_test
 }  // namespace loopbench::harness

@@ -17,7 +17,7 @@
 #include "tests/harness/integrator_problems.h"
 
 namespace loopbench::harness {
-namespace {
+namespace hypotheses_test {
 
 constexpr double kEnd = 100;  // s
 constexpr int kMembers = 16;
@@ -214,5 +214,5 @@ TEST(CartesianPendulumDrift, GrowsExponentiallyWhenItFeedsItself) {
   EXPECT_NEAR(growth.hypothesis.rate, rate, 0.15 * rate);
 }
 
-}  // namespace
+}  // namespace hypotheses_test
 }  // namespace loopbench::harness

@@ -9,13 +9,13 @@
 #include <vector>
 
 #include "harness/text/files.h"
+#include "tests/harness/places.h"
 
 namespace loopbench::architecture {
-namespace {
+namespace include_arrows_test {
 
 namespace fs = std::filesystem;
-
-const fs::path kRoot = LOOPBENCH_SOURCE_DIR;
+using harness::kRoot;
 
 /// Violations of a file at `path` whose only line includes `header`.
 std::vector<std::string> Planted(const std::string& path, const std::string& header) {
@@ -154,5 +154,5 @@ TEST(Includes, AreReadInOrderAndNotFromComments) {
   EXPECT_TRUE(Includes("/* never closed\n#include <a>").empty());
 }
 
-}  // namespace
+}  // namespace include_arrows_test
 }  // namespace loopbench::architecture

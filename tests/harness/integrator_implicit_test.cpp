@@ -16,7 +16,7 @@
 namespace loopbench::harness {
 using namespace integrator_test;
 
-namespace {
+namespace integrator_implicit_test {
 
 std::vector<std::string> ImplicitProfiles() {
   std::vector<std::string> names;
@@ -223,5 +223,5 @@ TEST_P(EveryImplicitProfile, StopsAtKnotsOfStiffForcing) {
   EXPECT_LT(result.steps, 1000);
 }
 
-}  // namespace
+}  // namespace integrator_implicit_test
 }  // namespace loopbench::harness

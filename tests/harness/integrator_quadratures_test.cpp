@@ -15,7 +15,7 @@
 namespace loopbench::harness {
 using namespace integrator_test;
 
-namespace {
+namespace integrator_quadratures_test {
 
 class EveryProfileQuadrature : public testing::TestWithParam<std::string> {};
 
@@ -107,5 +107,5 @@ TEST(IntegratorQuadratures, MustLeaveAComponentToControl) {
   EXPECT_THROW(Integrate(ode, 0, 1, y, {}), std::invalid_argument);
 }
 
-}  // namespace
+}  // namespace integrator_quadratures_test
 }  // namespace loopbench::harness

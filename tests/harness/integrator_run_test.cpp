@@ -19,7 +19,7 @@
 namespace loopbench::harness {
 using namespace integrator_test;
 
-namespace {
+namespace integrator_run_test {
 
 class EveryProfileRun : public testing::TestWithParam<std::string> {};
 
@@ -329,5 +329,5 @@ TEST(IntegratorRun, EmptyIntervalIsFinishedAtOnce) {
   EXPECT_EQ(seen, 1);
 }
 
-}  // namespace
+}  // namespace integrator_run_test
 }  // namespace loopbench::harness

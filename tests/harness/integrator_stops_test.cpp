@@ -15,7 +15,7 @@
 namespace loopbench::harness {
 using namespace integrator_test;
 
-namespace {
+namespace integrator_stops_test {
 
 // On grids of steps 4^-k a knot at two thirds has the same place within its step for every k.
 constexpr double kKnot = 2.0 / 3;
@@ -182,5 +182,5 @@ TEST(IntegratorStops, OutOfOrderOrNotFiniteAreRefused) {
   EXPECT_THROW(Integrate(ode, 0, 1, y, options), std::invalid_argument);
 }
 
-}  // namespace
+}  // namespace integrator_stops_test
 }  // namespace loopbench::harness

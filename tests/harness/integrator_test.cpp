@@ -17,7 +17,7 @@
 namespace loopbench::harness {
 using namespace integrator_test;
 
-namespace {
+namespace integrator_test {
 
 class EveryProfile : public testing::TestWithParam<std::string> {};
 
@@ -139,5 +139,5 @@ TEST(IntegratorOptions, ValidationNamesTheOptionAndWhatIsAccepted) {
   EXPECT_EQ(fault([=](auto& o) { o.fixed_step = nan; }).substr(0, 10), "fixed_step");
 }
 
-}  // namespace
+}  // namespace integrator_test
 }  // namespace loopbench::harness

@@ -14,7 +14,7 @@
 #include "tests/harness/cli_fixture.h"
 
 namespace loopbench::harness {
-namespace {
+namespace limits_test {
 
 /// Most memory that this process has had [MiB].
 double PeakMemory() {
@@ -167,7 +167,7 @@ TEST_F(CommandLineTest, CheckAssemblesStarts) {
 }
 
 TEST_F(CommandLineTest, CheckNamesTheCombinationWhoseStartDoesNotClose) {
-  std::string text = kExperiment;
+  std::string text = kTinyExperiment;
   text.insert(text.find("\"timing\""), R"("sweep": [{"name": "apart", "values": [1.4, 1.5, 5, 6],
       "field": "/scenes/0/mechanism/ground/points/C/0"}], )");
   Write("sweep.json", text);
@@ -176,5 +176,5 @@ TEST_F(CommandLineTest, CheckNamesTheCombinationWhoseStartDoesNotClose) {
   EXPECT_EQ(ending.text.find("apart = 6"), std::string::npos) << "the first combination is enough";
 }
 
-}  // namespace
+}  // namespace limits_test
 }  // namespace loopbench::harness

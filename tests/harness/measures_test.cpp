@@ -10,7 +10,7 @@
 #include "tests/reference/cases.h"
 
 namespace loopbench::harness {
-namespace {
+namespace measures_test {
 
 TEST(Measures, HaveEachKeyOnceAndATypeWhereTheyAreMore) {
   std::set<std::string_view> keys;
@@ -64,5 +64,5 @@ TEST(Measures, KnowEveryKeyOfARun) {
   for (const auto& [key, value] : record.items()) EXPECT_NE(FindMeasure(key), nullptr) << key;
 }
 
-}  // namespace
+}  // namespace measures_test
 }  // namespace loopbench::harness

@@ -8,7 +8,7 @@
 #include "tests/harness/cli_fixture.h"
 
 namespace loopbench::harness {
-namespace {
+namespace model_warnings_test {
 
 std::vector<WarningKind> Kinds(const MechanismDescription& description) {
   std::vector<WarningKind> kinds;
@@ -72,5 +72,5 @@ TEST_F(ExplainMechanismTest, ExperimentOptionsAreRefused) {
   ExpectEnding(Call("explain four-bar.json --filter mechanism=a"), 2, {"are for experiments"});
 }
 
-}  // namespace
+}  // namespace model_warnings_test
 }  // namespace loopbench::harness

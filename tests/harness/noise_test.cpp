@@ -12,7 +12,7 @@
 #include "harness/timing/time_cases.h"
 
 namespace loopbench::harness {
-namespace {
+namespace noise_test {
 
 constexpr double kNaN = std::numeric_limits<double>::quiet_NaN();
 
@@ -112,5 +112,5 @@ TEST(TimeTogether, RecordsHoldOrderedStatisticsAndTheAaPair) {
   }
 }
 
-}  // namespace
+}  // namespace noise_test
 }  // namespace loopbench::harness

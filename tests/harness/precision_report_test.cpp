@@ -10,7 +10,7 @@
 #include "harness/tables/table_view.h"
 
 namespace loopbench::harness {
-namespace {
+namespace precision_report_test {
 
 Record Rung(const std::string& scalar, double rtol, const std::string& outcome = "finished") {
   Record record;
@@ -75,5 +75,5 @@ TEST(PrecisionReportTest, OneFigurePerLadderWithErrorAndDriftOfEachScalar) {
   EXPECT_TRUE(PrecisionFigures({}).empty());
 }
 
-}  // namespace
+}  // namespace precision_report_test
 }  // namespace loopbench::harness

@@ -17,7 +17,7 @@
 #include "harness/integrator/cpu_time.h"
 
 namespace loopbench::harness {
-namespace {
+namespace processes_test {
 
 std::map<std::size_t, ProcessResult> RunAll(const std::vector<std::function<std::string()>>& pieces,
                                             int jobs, const ProcessLimits& limits = {}) {
@@ -167,5 +167,5 @@ TEST(ProcessesTest, WhatDoneThrowsEndsEverything) {
   EXPECT_EQ(::waitpid(-1, nullptr, WNOHANG), -1);
 }
 
-}  // namespace
+}  // namespace processes_test
 }  // namespace loopbench::harness

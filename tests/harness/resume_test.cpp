@@ -16,7 +16,7 @@
 #include "tests/harness/cli_fixture.h"
 
 namespace loopbench::harness {
-namespace {
+namespace resume_test {
 
 using Seconds = std::chrono::duration<double>;
 
@@ -152,7 +152,7 @@ std::map<std::string, std::string> Hashes(const fs::path& store) {
 }
 
 TEST_F(Interruption, FaultsOfOneCaseAreItsOutcomeAndHarmNoOther) {
-  std::string text = kExperiment;
+  std::string text = kTinyExperiment;
   text.replace(text.find("\"timing\""), 8, R"("limits": {"wall_s": 0.2}, "timing")");
   Write("tiny.json", text);
   ExpectEnding(Call("run tiny.json --out clean"), 0, {});
@@ -270,5 +270,5 @@ TEST_F(Shards, WithBadNumbersAreRefused) {
   }
 }
 
-}  // namespace
+}  // namespace resume_test
 }  // namespace loopbench::harness

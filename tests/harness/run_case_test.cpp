@@ -19,7 +19,7 @@
 #include "tests/reference/cases.h"
 
 namespace loopbench::harness {
-namespace {
+namespace run_case_test {
 
 using namespace reference;
 
@@ -351,5 +351,5 @@ TEST(WrittenRecord, HoldsNoNanAndNoInfinity) {
   }
 }
 
-}  // namespace
+}  // namespace run_case_test
 }  // namespace loopbench::harness

@@ -10,7 +10,7 @@
 #include "harness/judge/fit.h"
 
 namespace loopbench::harness {
-namespace {
+namespace scaling_test {
 
 TEST(FitPower, FindsAnExactPower) {
   const std::vector<double> sizes = {3, 10, 30, 100};
@@ -91,5 +91,5 @@ TEST(FitFamilies, GroupsByTheNumberInTheName) {
   EXPECT_EQ(FitFamilies({Benchmark("a/inf/1", 1, 1), Benchmark("a/inf/2", 2, 2)}, 0.0).size(), 1u);
 }
 
-}  // namespace
+}  // namespace scaling_test
 }  // namespace loopbench::harness

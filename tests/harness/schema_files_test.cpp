@@ -15,11 +15,10 @@
 #include "harness/text/config_error.h"
 #include "harness/text/files.h"
 #include "tests/harness/cli_fixture.h"
+#include "tests/harness/places.h"
 
 namespace loopbench::harness {
-namespace {
-
-const fs::path kRoot = LOOPBENCH_SOURCE_DIR;
+namespace schema_files_test {
 
 void ExpectCommitted(const fs::path& file, const std::string& made) {
   if (std::getenv("LOOPBENCH_RENEW_EXPECTED") != nullptr) WriteFileAtomically(file, made);
@@ -173,5 +172,5 @@ TEST_F(SchemaCommandTest, PrintsTheSchemaOfAKind) {
   ExpectEnding(Call("schema mechanisms"), 2, {"mechanisms"});
 }
 
-}  // namespace
+}  // namespace schema_files_test
 }  // namespace loopbench::harness

@@ -11,7 +11,7 @@
 #include "tests/reference/cases.h"
 
 namespace loopbench::harness {
-namespace {
+namespace stiff_case_test {
 
 using namespace reference;
 
@@ -112,5 +112,5 @@ TEST(StiffRecords, RecordsOfImplicitProfilesCountNewton) {
   EXPECT_EQ(plain.Find("jacobian"), nullptr);
 }
 
-}  // namespace
+}  // namespace stiff_case_test
 }  // namespace loopbench::harness

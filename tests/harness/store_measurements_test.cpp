@@ -16,7 +16,7 @@
 #include "harness/timing/callgrind.h"
 
 namespace loopbench::harness {
-namespace {
+namespace store_measurements_test {
 
 using nlohmann::json;
 
@@ -230,5 +230,5 @@ TEST(Callgrind, GivesTheTotal) {
   }
 }
 
-}  // namespace
+}  // namespace store_measurements_test
 }  // namespace loopbench::harness

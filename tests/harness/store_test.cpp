@@ -12,7 +12,7 @@
 #include "harness/text/files.h"
 
 namespace loopbench::harness {
-namespace {
+namespace store_test {
 
 testing::AssertionResult Contains(const std::string& text, const std::string& part) {
   return testing::IsSubstring("part", "text", part, text);
@@ -180,5 +180,5 @@ TEST_F(StoreTest, AFileIsReplacedInOnePieceAndNoTemporaryStays) {
   EXPECT_THROW(WriteFileAtomically("/proc/none/file", "x"), std::runtime_error);
 }
 
-}  // namespace
+}  // namespace store_test
 }  // namespace loopbench::harness

@@ -15,7 +15,7 @@
 #include "tests/reference/cases.h"
 
 namespace loopbench::harness {
-namespace {
+namespace system_test {
 
 using namespace reference;
 
@@ -115,5 +115,5 @@ TEST(SystemTest, ImplicitProfilesHaveTheirOrderWithForwardJacobians) {
   }
 }
 
-}  // namespace
+}  // namespace system_test
 }  // namespace loopbench::harness

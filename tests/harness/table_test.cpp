@@ -14,7 +14,7 @@
 #include "harness/text/config_error.h"
 
 namespace loopbench::harness {
-namespace {
+namespace table_test {
 
 constexpr double kNan = std::numeric_limits<double>::quiet_NaN();
 
@@ -282,5 +282,5 @@ TEST(Select, NumbersWithinNamesAreOrderedByTheirSize) {
   EXPECT_EQ(order, "chain chain-3 chain-3b chain-03 chain-10 chain-100 ladder-1 ");
 }
 
-}  // namespace
+}  // namespace table_test
 }  // namespace loopbench::harness

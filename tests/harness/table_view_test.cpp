@@ -10,7 +10,7 @@
 #include "harness/text/config_error.h"
 
 namespace loopbench::harness {
-namespace {
+namespace table_view_test {
 
 Record Accuracy(const std::string& mechanism, double drift, double stiffness) {
   Record record;
@@ -245,5 +245,5 @@ TEST(TableView, NoisyTimingsWarnWithTheWorstNumbersAndQuietOnesDoNot) {
   EXPECT_NE(loaded[1].find("below 2 %"), std::string::npos) << loaded[1];
 }
 
-}  // namespace
+}  // namespace table_view_test
 }  // namespace loopbench::harness

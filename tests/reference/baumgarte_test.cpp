@@ -8,7 +8,7 @@
 #include "tests/reference/simulate.h"
 
 namespace loopbench::harness::reference {
-namespace {
+namespace baumgarte_test {
 
 std::vector<Column> Columns() {
   std::vector<Column> columns = PositionColumns();
@@ -67,5 +67,5 @@ TEST_P(BaumgarteRun, FollowsPrescribedMotions) {
 INSTANTIATE_TEST_SUITE_P(Columns, BaumgarteRun, testing::ValuesIn(Columns()),
                          [](const auto& test) { return NameOf(test.param); });
 
-}  // namespace
+}  // namespace baumgarte_test
 }  // namespace loopbench::harness::reference

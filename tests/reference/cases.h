@@ -14,6 +14,7 @@
 #include "harness/config/experiment_reader.h"
 #include "harness/config/mechanism_reader.h"
 #include "harness/run/run_case.h"
+#include "tests/harness/places.h"
 
 namespace loopbench::harness {
 
@@ -23,9 +24,6 @@ inline void PrintTo(const Column& column, std::ostream* out) { *out << ToString(
 }  // namespace loopbench::harness
 
 namespace loopbench::harness::reference {
-
-inline const std::filesystem::path kConfigs =
-    std::filesystem::path(LOOPBENCH_SOURCE_DIR) / "configs";
 
 /// configs/experiments/paper/paper.json.
 inline const Experiment& Paper() {

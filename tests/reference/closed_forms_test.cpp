@@ -11,7 +11,7 @@
 #include "tests/reference/published_numbers.h"
 
 namespace loopbench::harness::reference {
-namespace {
+namespace closed_forms_test {
 
 constexpr double kPi = std::numbers::pi;
 constexpr double kGravity = 9.81;
@@ -150,5 +150,5 @@ INSTANTIATE_TEST_SUITE_P(Columns, LongLadder,
                                          Published("reduction", Coordinates::kJoint)),
                          [](const auto& column) { return NameOf(column.param); });
 
-}  // namespace
+}  // namespace closed_forms_test
 }  // namespace loopbench::harness::reference

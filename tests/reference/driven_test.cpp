@@ -10,7 +10,7 @@
 #include "tests/reference/simulate.h"
 
 namespace loopbench::harness::reference {
-namespace {
+namespace driven_test {
 
 constexpr double kRtol = 1e-9;
 
@@ -192,5 +192,5 @@ TEST_P(Driven, ArmWithAllJointsDrivenHasNothingToIntegrate) {
 
 INSTANTIATE_TEST_SUITE_P(Columns, Driven, testing::ValuesIn(RankRevealingColumns()), NameOfParam);
 
-}  // namespace
+}  // namespace driven_test
 }  // namespace loopbench::harness::reference

@@ -14,7 +14,7 @@
 #include "tests/reference/cases.h"
 
 namespace loopbench::harness::reference {
-namespace {
+namespace energy_balance_test {
 
 constexpr double kTolerance = 1e-10;
 constexpr double kHorizon = 5.0;  // [s]
@@ -207,5 +207,5 @@ TEST(Balance, IntegratingWorkLeavesTheBitsOfTheMotion) {
   EXPECT_EQ(ends[0], ends[1]);
 }
 
-}  // namespace
+}  // namespace energy_balance_test
 }  // namespace loopbench::harness::reference

@@ -8,7 +8,7 @@
 #include "tests/reference/cases.h"
 
 namespace loopbench::harness::reference {
-namespace {
+namespace energy_test {
 
 /// Errors of at most rtol per step and component, some 1e3 steps and energies of some 10 J.
 constexpr double kErrorPerTolerance = 1e4;  // [J]
@@ -37,5 +37,5 @@ INSTANTIATE_TEST_SUITE_P(Paper, ConservativeScene,
                            return name;
                          });
 
-}  // namespace
+}  // namespace energy_test
 }  // namespace loopbench::harness::reference

@@ -8,7 +8,7 @@
 #include "tests/reference/cases.h"
 
 namespace loopbench::harness::reference {
-namespace {
+namespace exponents_test {
 
 /// Eight perturbed starts of the four-bar (ground 1.5 m), whose closure is no linear invariant.
 Record GeneralFourBar(const std::string& formulation) {
@@ -80,5 +80,5 @@ TEST(DriftOfTheSquareSevenBar, FollowsTheToleranceInAbsoluteCoordinates) {
   }
 }
 
-}  // namespace
+}  // namespace exponents_test
 }  // namespace loopbench::harness::reference

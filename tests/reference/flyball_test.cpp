@@ -12,7 +12,7 @@
 #include "tests/reference/simulate.h"
 
 namespace loopbench::harness::reference {
-namespace {
+namespace flyball_test {
 
 const MechanismDescription& Governor() {
   static const MechanismDescription kGovernor =
@@ -71,5 +71,5 @@ TEST_P(Flyball, ImplicitMethodNeedsAFiftiethOfTheSteps) {
 INSTANTIATE_TEST_SUITE_P(Columns, Flyball, testing::ValuesIn(RankRevealingColumns()),
                          [](const auto& column) { return NameOf(column.param); });
 
-}  // namespace
+}  // namespace flyball_test
 }  // namespace loopbench::harness::reference

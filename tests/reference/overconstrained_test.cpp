@@ -10,7 +10,7 @@
 #include "tests/reference/cases.h"
 
 namespace loopbench::harness::reference {
-namespace {
+namespace overconstrained_test {
 
 Experiment InSpace(const MechanismFile& mechanism) {
   Experiment experiment = Single(mechanism);
@@ -146,5 +146,5 @@ INSTANTIATE_TEST_SUITE_P(Mechanisms, Overconstrained,
                                            "three-cranks"),
                          [](const auto& one) { return WithoutDashes(one.param); });
 
-}  // namespace
+}  // namespace overconstrained_test
 }  // namespace loopbench::harness::reference

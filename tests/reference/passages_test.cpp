@@ -15,7 +15,7 @@
 #include "tests/reference/simulate.h"
 
 namespace loopbench::harness::reference {
-namespace {
+namespace passages_test {
 
 /// Where the tip of the first crank is at the end.
 Eigen::Vector3d Tip(int windows, const Column& column, double rtol, double horizon) {
@@ -73,5 +73,5 @@ TEST(LongPassages, TwentyOfTheNFourBarOfFortyByOdca) {
   EXPECT_NEAR(tip.y(), end.y, 4.1e-6 + 7e-6);
 }
 
-}  // namespace
+}  // namespace passages_test
 }  // namespace loopbench::harness::reference

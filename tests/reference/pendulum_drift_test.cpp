@@ -10,7 +10,7 @@
 #include "tests/reference/simulate.h"
 
 namespace loopbench::harness::reference {
-namespace {
+namespace pendulum_drift_test {
 
 /// Errors at 30 s, where the exact state is the first one: (1, 0) at rest.
 PendulumErrors RodPendulum(const Column& column, double rtol) {
@@ -67,5 +67,5 @@ std::vector<Column> BothLevels() {
 INSTANTIATE_TEST_SUITE_P(Columns, PendulumDrift, testing::ValuesIn(BothLevels()),
                          [](const auto& column) { return NameOf(column.param); });
 
-}  // namespace
+}  // namespace pendulum_drift_test
 }  // namespace loopbench::harness::reference

@@ -12,7 +12,7 @@
 #include "harness/observers/observer.h"
 
 namespace loopbench::harness::reference {
-namespace {
+namespace pendulum_test {
 
 constexpr double kEps = std::numeric_limits<double>::epsilon();
 constexpr double kPi = std::numbers::pi;
@@ -179,5 +179,5 @@ TEST(PendulumAngle, HalvesOfATurnedMotionMirrorEachOther) {
   }
 }
 
-}  // namespace
+}  // namespace pendulum_test
 }  // namespace loopbench::harness::reference

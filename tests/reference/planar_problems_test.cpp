@@ -13,7 +13,7 @@
 #include "tests/reference/simulate.h"
 
 namespace loopbench::harness::reference {
-namespace {
+namespace planar_problems_test {
 
 constexpr double kPi = std::numbers::pi;
 constexpr double kTolerance = 1e-11;  // rtol = atol unless a test says otherwise
@@ -235,5 +235,5 @@ INSTANTIATE_TEST_SUITE_P(Columns, PlanarProblem,
                                   (std::get<1>(test.param) == Place::kPlane ? "Plane" : "Tilted");
                          });
 
-}  // namespace
+}  // namespace planar_problems_test
 }  // namespace loopbench::harness::reference

@@ -8,7 +8,7 @@
 #include "tests/reference/simulate.h"
 
 namespace loopbench::harness::reference {
-namespace {
+namespace projection_test {
 
 class Projection : public testing::TestWithParam<Column> {};
 
@@ -47,5 +47,5 @@ TEST_P(Projection, KeepsTheOrderOfTheIntegrator) {
 INSTANTIATE_TEST_SUITE_P(Columns, Projection, testing::ValuesIn(PositionColumns()),
                          [](const auto& test) { return NameOf(test.param); });
 
-}  // namespace
+}  // namespace projection_test
 }  // namespace loopbench::harness::reference

@@ -15,7 +15,7 @@
 #include "tests/reference/simulate.h"
 
 namespace loopbench::harness::reference {
-namespace {
+namespace scales_test {
 
 struct FirstEvaluation {
   Outcome outcome = Outcome::kFinished;
@@ -173,5 +173,5 @@ TEST(InSpace, PlanarLoopsReportThreeRedundantRowsEach) {
   }
 }
 
-}  // namespace
+}  // namespace scales_test
 }  // namespace loopbench::harness::reference

@@ -7,7 +7,7 @@
 #include "tests/reference/simulate.h"
 
 namespace loopbench::harness::reference {
-namespace {
+namespace shipped_mechanisms_test {
 
 /// Time of a short run [s]: Andrews' squeezer turns a thousand times as fast as the others, the
 /// governor takes 1e4 steps a second.
@@ -43,5 +43,5 @@ TEST_P(ShippedMechanism, RunsInEveryColumnAndBalancesItsEnergy) {
 INSTANTIATE_TEST_SUITE_P(All, ShippedMechanism, testing::ValuesIn(ShippedNames()),
                          [](const auto& name) { return WithoutDashes(name.param); });
 
-}  // namespace
+}  // namespace shipped_mechanisms_test
 }  // namespace loopbench::harness::reference

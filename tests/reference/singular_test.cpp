@@ -15,7 +15,7 @@
 #include "tests/reference/simulate.h"
 
 namespace loopbench::harness::reference {
-namespace {
+namespace singular_test {
 
 const Column kOdcaPosition{.formulation = "odca",
                            .enforcement = Enforcement::kPosition,
@@ -197,5 +197,5 @@ TEST(LadderOfForty, EndsWhereThePublishedOneDoes) {
   EXPECT_NEAR(tip.y(), end.y, 1e-5);
 }
 
-}  // namespace
+}  // namespace singular_test
 }  // namespace loopbench::harness::reference

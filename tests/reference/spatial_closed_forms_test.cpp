@@ -13,7 +13,7 @@
 #include "tests/reference/simulate.h"
 
 namespace loopbench::harness::reference {
-namespace {
+namespace spatial_closed_forms_test {
 
 constexpr double kPi = std::numbers::pi;
 constexpr double kTolerance = 1e-11;  // rtol = atol of every run here
@@ -259,5 +259,5 @@ TEST(FreeBody, KeepsItsMomentumAndEnergy) {
   }
 }
 
-}  // namespace
+}  // namespace spatial_closed_forms_test
 }  // namespace loopbench::harness::reference

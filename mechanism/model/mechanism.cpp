@@ -136,8 +136,7 @@ void Mechanism<Space, S>::AddStopTimes() {
     stop_times_.insert(stop_times_.end(), drive.value.knots().begin(), drive.value.knots().end());
   }
   std::ranges::sort(stop_times_);
-  const auto repeated = std::ranges::unique(stop_times_);
-  stop_times_.erase(repeated.begin(), repeated.end());
+  stop_times_.erase(std::unique(stop_times_.begin(), stop_times_.end()), stop_times_.end());
 }
 
 template <class Space, class S>

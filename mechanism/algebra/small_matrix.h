@@ -1,11 +1,11 @@
 // Vectors and matrices of a few numbers, as kinematics has them: loops of a known length that the
-// compiler unrolls, and nothing else. Eigen is for what is larger or of a size known at run time;
-// its expressions of such sizes took most of the build, and their loads and stores much of a
-// right-hand side.
+// compiler unrolls, and nothing else. Eigen is for what is larger or of a size known at run time:
+// expressions of such sizes took half of the time to compile the files that hold them.
 #pragma once
 
 #include <Eigen/Core>
 #include <cmath>
+#include <concepts>
 
 namespace loopbench {
 
@@ -17,25 +17,24 @@ namespace loopbench {
 template <class S, int rows, int columns = 1>
 struct Small {
   static constexpr int kSize = rows * columns;
-  using Eigen = ::Eigen::Matrix<S, rows, columns>;
+  using Copy = Eigen::Matrix<S, rows, columns>;
   S at[kSize];
 
   Small() = default;
   /// All numbers, row by row.
-  template <class... Numbers>
-  requires(sizeof...(Numbers) == kSize &&
-           (std::is_convertible_v<Numbers, S> && ...)) LOOPBENCH_INLINE explicit(kSize == 1)
+  template <std::convertible_to<S>... Numbers>
+  requires(sizeof...(Numbers) == kSize) LOOPBENCH_INLINE explicit(kSize == 1)
       Small(const Numbers&... numbers) {
     const S given[] = {S(numbers)...};
     LOOPBENCH_UNROLL
     for (int i = 0; i < kSize; ++i) at[i / columns + i % columns * rows] = given[i];
   }
   template <class Derived>
-  Small(const ::Eigen::MatrixBase<Derived>& matrix) {  // of the same size
-    ::Eigen::Map<Eigen>{at} = matrix;
+  Small(const Eigen::MatrixBase<Derived>& matrix) {  // of the same size
+    Eigen::Map<Copy>{at} = matrix;
   }
   /// A copy that Eigen can work with.
-  Eigen eigen() const { return ::Eigen::Map<const Eigen>(at); }
+  Copy eigen() const { return Eigen::Map<const Copy>(at); }
 
   static Small Zero() {
     Small zero;
@@ -67,10 +66,8 @@ struct Small {
   S& operator()(int i, int j) { return at[i + j * rows]; }
   const S& operator()(int i, int j) const { return at[i + j * rows]; }
   /// The first n numbers, for vectors of a size known at run time.
-  auto head(int n) { return ::Eigen::Map<::Eigen::Matrix<S, ::Eigen::Dynamic, 1>>(at, n); }
-  auto head(int n) const {
-    return ::Eigen::Map<const ::Eigen::Matrix<S, ::Eigen::Dynamic, 1>>(at, n);
-  }
+  auto head(int n) { return Eigen::Map<Eigen::Matrix<S, Eigen::Dynamic, 1>>(at, n); }
+  auto head(int n) const { return Eigen::Map<const Eigen::Matrix<S, Eigen::Dynamic, 1>>(at, n); }
 
   LOOPBENCH_INLINE Small<S, rows> col(int j) const {
     Small<S, rows> column;
@@ -118,7 +115,11 @@ struct Small {
     }
     return true;
   }
-  Small normalized() const { return *this / norm(); }
+  /// Of length one; what has no length stays zero.
+  Small normalized() const {
+    const S length = norm();
+    return length > S(0) ? *this / length : *this;
+  }
 
   LOOPBENCH_INLINE Small& operator+=(const Small& other) {
     LOOPBENCH_UNROLL

@@ -89,11 +89,12 @@ LOOPBENCH_INLINE Pose<Spatial, S> Inverse(const Pose<Spatial, S>& X_AB) {
   return X;
 }
 
-/// Orientation of the quaternion w x y z, of any length but zero.
+/// Orientation of the quaternion w x y z of any length; that of no length turns nothing.
 template <class S>
 Rotation<Spatial, S> FromQuaternion(const S* q) {
   using std::sqrt;
-  const S length = sqrt(q[0] * q[0] + q[1] * q[1] + q[2] * q[2] + q[3] * q[3]);
+  const S square = q[0] * q[0] + q[1] * q[1] + q[2] * q[2] + q[3] * q[3];
+  const S length = square > S(0) ? sqrt(square) : S(1);
   const S w = q[0] / length, x = q[1] / length, y = q[2] / length, z = q[3] / length;
   const S one = S(1), two = S(2);
   return {one - two * (y * y + z * z), two * (x * y - z * w),       two * (x * z + y * w),

@@ -18,6 +18,15 @@ struct AccelerationKind {};
 struct ForceKind {};
 struct DirectionKind {};
 
+/// What is shifted as a velocity is, and what as a force.
+template <class Kind>
+concept KindOfMotion = !std::same_as<Kind, ForceKind>;
+template <class Kind>
+concept KindOfForce = std::same_as<Kind, ForceKind> || std::same_as<Kind, DirectionKind>;
+/// Pairs with a product: a power, its like with an acceleration, or a component along a direction.
+template <class A, class B>
+concept HaveProduct = (KindOfForce<A> && KindOfMotion<B>) || (KindOfMotion<A> && KindOfForce<B>);
+
 template <class Space, class S, class Kind>
 struct SpatialVector {
   Angular<Space, S> angular;  ///< w, alpha or moment
@@ -27,10 +36,8 @@ struct SpatialVector {
   LOOPBENCH_INLINE SpatialVector(const Angular<Space, S>& about, const Linear<Space, S>& along)
       : angular(about), linear(along) {}
   /// A direction serves as any kind.
-  template <class Other>
-  requires(std::is_same_v<Other, DirectionKind> &&
-           !std::is_same_v<Kind, DirectionKind>) LOOPBENCH_INLINE
-      SpatialVector(const SpatialVector<Space, S, Other>& direction)
+  template <std::same_as<DirectionKind> Other>
+  LOOPBENCH_INLINE SpatialVector(const SpatialVector<Space, S, Other>& direction)
       : angular(direction.angular), linear(direction.linear) {}
   template <class Derived>
   explicit SpatialVector(const Eigen::MatrixBase<Derived>& vector)
@@ -59,9 +66,8 @@ struct SpatialVector {
 
   /// Power of a force, or a component along a direction.
   template <class Other>
-  requires(std::is_same_v<Kind, DirectionKind> || std::is_same_v<Other, DirectionKind> ||
-           std::is_same_v<Kind, ForceKind> != std::is_same_v<Other, ForceKind>) LOOPBENCH_INLINE S
-      dot(const SpatialVector<Space, S, Other>& other)
+  requires HaveProduct<Kind, Other> LOOPBENCH_INLINE S
+  dot(const SpatialVector<Space, S, Other>& other)
   const { return angular.dot(other.angular) + linear.dot(other.linear); }
   /// Of all components, whatever their units: for sizes and tolerances.
   S squaredNorm() const { return angular.squaredNorm() + linear.squaredNorm(); }
@@ -164,19 +170,17 @@ LOOPBENCH_INLINE Small<S, 3> CrossAngular(const Small<S, 3>& a, const Small<S, 3
 
 /// Velocity of a body at c + r from that at c: [w; v + w x r]. Accelerations likewise, without the
 /// centripetal part, and directions of motion.
-template <class Space, class S, class Kind>
-requires(!std::is_same_v<Kind, ForceKind>) LOOPBENCH_INLINE
-    SpatialVector<Space, S, Kind> ShiftMotion(const SpatialVector<Space, S, Kind>& V,
-                                              const Linear<Space, S>& r) {
+template <class Space, class S, KindOfMotion Kind>
+LOOPBENCH_INLINE SpatialVector<Space, S, Kind> ShiftMotion(const SpatialVector<Space, S, Kind>& V,
+                                                           const Linear<Space, S>& r) {
   return {V.angular, V.linear + Cross<S>(V.angular, r)};
 }
 
 /// The same force at c instead of c + r: [moment + r x f; f]. The transpose of ShiftMotion().
 /// Directions of forces likewise.
-template <class Space, class S, class Kind>
-requires(std::is_same_v<Kind, ForceKind> || std::is_same_v<Kind, DirectionKind>) LOOPBENCH_INLINE
-    SpatialVector<Space, S, Kind> ShiftForce(const SpatialVector<Space, S, Kind>& F,
-                                             const Linear<Space, S>& r) {
+template <class Space, class S, KindOfForce Kind>
+LOOPBENCH_INLINE SpatialVector<Space, S, Kind> ShiftForce(const SpatialVector<Space, S, Kind>& F,
+                                                          const Linear<Space, S>& r) {
   return {F.angular + Moment<S>(r, F.linear), F.linear};
 }
 

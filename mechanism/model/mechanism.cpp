@@ -37,7 +37,7 @@ Pose<Space, S> SidePose(const JointSide& side, const JointDescription& joint,
   return X;
 }
 
-/// Of a symmetric matrix, by cofactors.
+/// By cofactors.
 template <class S>
 Small<S, 3, 3> Inverse(const Small<S, 3, 3>& A) {
   Small<S, 3, 3> cofactors;

@@ -5,8 +5,6 @@
 #include <cmath>
 #include <limits>
 
-#include "mechanism/description/parts.h"
-#include "mechanism/loops/excursion.h"
 #include "mechanism/loops/tree_dynamics.h"
 #include "mechanism/model/dense_memory.h"
 #include "mechanism/start/assembly_units.h"
@@ -41,7 +39,11 @@ class Assembler {
   Start<double> Run() {
     if (start_.outcome == Outcome::kFinished) ClosePositions();
     if (start_.outcome == Outcome::kFinished) CloseSpeeds();
-    if (start_.outcome == Outcome::kFinished) CheckMobility();
+    if (start_.outcome != Outcome::kFinished) return start_;
+    if (const std::string why = WhyLocked(description_, mechanism_, start_.q); !why.empty()) {
+      start_.outcome = Outcome::kLocked;
+      start_.message = mechanism_.name() + ": " + why;
+    }
     return start_;
   }
 
@@ -276,41 +278,6 @@ class Assembler {
     start_.speed_residual = InSi(left, units);
     if (left.template lpNorm<Eigen::Infinity>() <= 1e-10 * size) return;
     Fail(DescribeConflict(description_, kinematics_, {left, units, true, Extra(given_cut_)}));
-  }
-
-  /// Nothing can move, or a part stands in a singular position that it cannot leave and would start
-  /// along speeds that lead nowhere. A rigid part without such speeds locks nothing: it stays where
-  /// it is, whatever others do.
-  void CheckMobility() {
-    const bool analysed = mechanism_.num_u() <= kMostAnalysedSpeeds;
-    const std::vector<Part> parts = analysed ? SplitByJoints(description_) : std::vector<Part>();
-    if (parts.size() < 2) {
-      if (const std::string why = WhyLocked(mechanism_, start_.q); !why.empty()) {
-        Lock("nothing can move: " + why);
-      }
-      return;
-    }
-    std::string first, stuck;
-    bool moves = false;
-    for (const Part& part : parts) {
-      const Mechanism<Space, double> own(part.description, Coordinates::kJoint);
-      const Start<double> start = Assembler(part.description, own).Run();
-      const std::string why =
-          start.outcome == Outcome::kLocked ? WhyLocked(own, start.q) : std::string();
-      moves = moves || why.empty();
-      if (first.empty()) first = why;
-      if (!why.empty() && stuck.empty() && Excursion<Space>(own, start.q).freedom() > 0) {
-        stuck = "the part of body \"" + part.description.bodies[1].name +
-                "\" cannot move, though others can: " + why;
-      }
-    }
-    if (!moves) Lock("nothing can move: " + first);
-    if (moves && !stuck.empty()) Lock(stuck);
-  }
-
-  void Lock(const std::string& why) {
-    start_.outcome = Outcome::kLocked;
-    start_.message = mechanism_.name() + ": " + why;
   }
 
   /// A length that no position exceeds much, in units: the longest arm of a body or Ground, or the

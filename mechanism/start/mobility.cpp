@@ -5,8 +5,10 @@
 #include <vector>
 
 #include "mechanism/algebra/large_singular_values.h"
+#include "mechanism/description/parts.h"
 #include "mechanism/loops/excursion.h"
 #include "mechanism/loops/tree_dynamics.h"
+#include "mechanism/start/assembly.h"
 
 namespace loopbench {
 
@@ -83,10 +85,9 @@ bool IsRigidToSecondOrder(const Mechanism<Space, double>& mechanism, const Vecto
          });
 }
 
-}  // namespace
-
+/// Of a mechanism of one part, as the end of a sentence.
 template <class Space>
-std::string WhyLocked(const Mechanism<Space, double>& mechanism, const VectorX<double>& q) {
+std::string WhyStuck(const Mechanism<Space, double>& mechanism, const VectorX<double>& q) {
   if (!mechanism.drives().empty() || mechanism.num_u() > kMostAnalysedSpeeds) return "";
   if (mechanism.num_u() == 0) return "no joint leaves a speed free";
   if (mechanism.num_rows() == 0) return "";
@@ -111,7 +112,38 @@ std::string WhyLocked(const Mechanism<Space, double>& mechanism, const VectorX<d
          " nowhere: what is tried next to it falls back to it";
 }
 
-template std::string WhyLocked(const Mechanism<Planar, double>&, const VectorX<double>&);
-template std::string WhyLocked(const Mechanism<Spatial, double>&, const VectorX<double>&);
+}  // namespace
+
+template <class Space>
+std::string WhyLocked(const MechanismDescription& description,
+                      const Mechanism<Space, double>& mechanism, const VectorX<double>& q) {
+  const std::string nothing = "nothing can move: ";
+  const bool analysed = mechanism.num_u() <= kMostAnalysedSpeeds;
+  const std::vector<Part> parts = analysed ? SplitByJoints(description) : std::vector<Part>();
+  if (parts.size() < 2) {
+    const std::string why = WhyStuck(mechanism, q);
+    return why.empty() ? "" : nothing + why;
+  }
+  std::string first, stuck;
+  bool moves = false;
+  for (const Part& part : parts) {
+    const Mechanism<Space, double> own(part.description, Coordinates::kJoint);
+    const Start<double> start = Assemble<Space>(part.description, own);
+    const std::string why =
+        start.outcome == Outcome::kLocked ? WhyStuck(own, start.q) : std::string();
+    moves = moves || why.empty();
+    if (first.empty()) first = why;
+    if (!why.empty() && stuck.empty() && Excursion<Space>(own, start.q).freedom() > 0) {
+      stuck = "the part of body \"" + part.description.bodies[1].name +
+              "\" cannot move, though others can: " + why;
+    }
+  }
+  return moves ? stuck : nothing + first;
+}
+
+template std::string WhyLocked(const MechanismDescription&, const Mechanism<Planar, double>&,
+                               const VectorX<double>&);
+template std::string WhyLocked(const MechanismDescription&, const Mechanism<Spatial, double>&,
+                               const VectorX<double>&);
 
 }  // namespace loopbench

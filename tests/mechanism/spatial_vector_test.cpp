@@ -104,6 +104,12 @@ TYPED_TEST(SpatialVectorTest, NumbersAreGivenByRowsAndKeptByColumns) {
   EXPECT_EQ((Small<double, 2, 3>(matrix.eigen())(1, 2)), 6.0);
 }
 
+TEST(QuaternionTest, WhatHasNoLengthTurnsNothing) {
+  const double zero[4] = {0.0, 0.0, 0.0, 0.0};
+  EXPECT_EQ(FromQuaternion(zero).eigen(), Eigen::Matrix3d::Identity());
+  EXPECT_EQ((Small<double, 3>::Zero().normalized().eigen()), Eigen::Vector3d::Zero());
+}
+
 /// From orientations of all four branches, the largest component of each kind.
 TEST(QuaternionTest, OrientationsGoThereAndBack) {
   testing::Random random(2);

@@ -109,11 +109,15 @@ inline std::string WithoutDashes(std::string name) {
   return name;
 }
 
-/// Runs it as it is.
+/// Runs a mechanism as it is.
+inline Record RunFile(const MechanismFile& file, const Column& column, double tolerance,
+                      double horizon) {
+  const Experiment experiment = Single(file);
+  return RunCase(experiment, CaseOf(experiment, file.description.name, column, tolerance, horizon));
+}
 inline Record RunShipped(const std::string& name, const Column& column, double tolerance,
                          double horizon) {
-  const Experiment experiment = Single(Shipped(name));
-  return RunCase(experiment, CaseOf(experiment, name, column, tolerance, horizon));
+  return RunFile(Shipped(name), column, tolerance, horizon);
 }
 
 /// Runs one scene of the paper.

@@ -58,12 +58,6 @@ MechanismFile LadderOfA02(int windows) {
   return file;
 }
 
-Record RunSingle(const MechanismFile& file, const Column& column, double horizon) {
-  const Experiment experiment = Single(file);
-  return RunCase(experiment,
-                 CaseOf(experiment, file.description.name, column, kTolerance, horizon));
-}
-
 std::vector<Column> AllColumns() {
   std::vector<Column> columns = PublishedColumns();
   for (Column column : PublishedColumns()) {
@@ -79,7 +73,7 @@ TEST_P(ClosedForm, PendulumIsThatOfA01) {
   const MechanismFile file = BarOfA01();
   for (std::size_t i = 0; i < kA01Published.size(); ++i) {
     const double t = kA01Published[i].t;
-    const Record record = RunSingle(file, GetParam(), t);
+    const Record record = RunFile(file, GetParam(), kTolerance, t);
     const double bound = Bound(record);
     Expect(record, "closed_form_error_max", bound);
     const double x = std::cos(LastAngle(record, "O")), y = std::sin(LastAngle(record, "O"));
@@ -108,7 +102,7 @@ TEST_P(ClosedForm, ToggleIsAPendulumBeforeItsSingularPassage) {
 TEST_P(ClosedForm, LaddersOfOneAndTwoWindowsArePendulums) {
   for (const int windows : {1, 2}) {
     // 0.01 s before the first singular position
-    const Record record = RunSingle(LadderOfA02(windows), GetParam(), 0.70);
+    const Record record = RunFile(LadderOfA02(windows), GetParam(), kTolerance, 0.70);
     Expect(record, "closed_form_error_max", 1e-9);
   }
 }
@@ -116,7 +110,7 @@ TEST_P(ClosedForm, LaddersOfOneAndTwoWindowsArePendulums) {
 TEST_P(ClosedForm, LaddersPassThroughTheDerivedAngles) {
   for (const auto& [windows, phi] : kA02DerivedAtHalfSecond) {
     if (windows > 2) continue;
-    const Record record = RunSingle(LadderOfA02(windows), GetParam(), 0.5);
+    const Record record = RunFile(LadderOfA02(windows), GetParam(), kTolerance, 0.5);
     EXPECT_NEAR(kPi / 2 - LastAngle(record, "O0"), phi, 1e-9) << windows;
   }
 }
@@ -127,18 +121,18 @@ INSTANTIATE_TEST_SUITE_P(Columns, ClosedForm, testing::ValuesIn(AllColumns()),
 class LongLadder : public testing::TestWithParam<Column> {};
 
 TEST_P(LongLadder, OfFortyWindowsIsAPendulum) {
-  Expect(RunSingle(LadderOfA02(40), GetParam(), 0.70), "closed_form_error_max", 1e-9);
+  Expect(RunFile(LadderOfA02(40), GetParam(), kTolerance, 0.70), "closed_form_error_max", 1e-9);
 }
 
 TEST_P(LongLadder, OfFortyWindowsFollowsThePublishedFile) {
   // ADAMS's file is within 1.5e-6 of the closed form, its printed digits included
   for (const auto& [t, x, y] : kA02PublishedN40) {
-    const Record record = RunSingle(LadderOfA02(40), GetParam(), t);
+    const Record record = RunFile(LadderOfA02(40), GetParam(), kTolerance, t);
     const double angle = LastAngle(record, "O0");
     EXPECT_NEAR(std::cos(angle), x, 1.5e-6) << t;
     EXPECT_NEAR(std::sin(angle), y, 1.5e-6) << t;
   }
-  const Record record = RunSingle(LadderOfA02(40), GetParam(), 0.5);
+  const Record record = RunFile(LadderOfA02(40), GetParam(), kTolerance, 0.5);
   EXPECT_NEAR(kPi / 2 - LastAngle(record, "O0"), kA02DerivedAtHalfSecond[2].phi, 1e-9);
 }
 

@@ -22,11 +22,6 @@ class Driven : public testing::TestWithParam<Column> {};
 
 std::string NameOfParam(const testing::TestParamInfo<Column>& info) { return NameOf(info.param); }
 
-Record RunFile(const MechanismFile& file, const Column& column, double horizon) {
-  const Experiment experiment = Single(file);
-  return RunCase(experiment, CaseOf(experiment, file.description.name, column, kRtol, horizon));
-}
-
 /// Rocker angle of configs/mechanisms/driven-four-bar.json for a crank angle: where the circle of
 /// the coupler about B meets that of the rocker about C, on the left of BC.
 double RockerAngle(double crank) {
@@ -56,7 +51,7 @@ TEST_P(Driven, CrankRockerFollowsItsGeometry) {
 }
 
 TEST_P(Driven, DriftHoldsWhatTheDriveMisses) {
-  const Record record = RunFile(Shipped("driven-four-bar"), GetParam(), 5.0);
+  const Record record = RunFile(Shipped("driven-four-bar"), GetParam(), kRtol, 5.0);
   ASSERT_EQ(record.Text("outcome"), "finished");
   EXPECT_GT(record.Number("energy_supplied"), 0.0) << "the damper takes it";
   // in absolute coordinates q - s(t) is a rotation that drifts; in joint ones there is none

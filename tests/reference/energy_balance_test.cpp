@@ -34,11 +34,6 @@ std::vector<Column> Columns() {
   return columns;
 }
 
-Record RunFile(const MechanismFile& file, const Column& column, double tolerance, double horizon) {
-  const Experiment experiment = Single(file);
-  return RunCase(experiment, CaseOf(experiment, file.description.name, column, tolerance, horizon));
-}
-
 /// A bar on a pin, without gravity, of moment of inertia 2 kg m^2 about it.
 MechanismFile BarOnPin(const ForceDescription& force, double speed) {
   MechanismFile file;

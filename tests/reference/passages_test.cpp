@@ -41,9 +41,9 @@ class Passages : public testing::TestWithParam<std::string> {
 };
 
 /// How near a step comes to a position in line is chance, and with it what is lost there: of 41
-/// tolerances around 1e-10 each formulation kept the energy to 1.7e-7 J, as half of the bound asks,
-/// at 23 to 30, and at 2 to 7 it left the branch, which runs mark. Which ones these are, round-off
-/// decides. The test is of the median of nine.
+/// tolerances around 1e-10 each formulation kept the energy to 1.7e-7 J, which moves the tip by
+/// some 1e-7 m, at 23 to 30, and at 2 to 7 it left the branch, which runs mark (doubts_test.cpp).
+/// Which ones these are, round-off decides. The test is of the median of nine.
 TEST_P(Passages, TenOfTheNFourBarOfTwo) {
   std::vector<Eigen::Vector3d> tips;
   for (int k = -4; k <= 4; ++k) tips.push_back(Tip(2, column(), (1.0 + 0.01 * k) * 1e-10, 10.0));

@@ -38,13 +38,6 @@ double StepsRemembered(const Record& record) {
   return gain > 0.0 ? 2.0 / gain * per_second : record.Number("steps");
 }
 
-/// Nothing for a level that this program does not know.
-std::optional<DriftGrowth> GrowthAt(const Record& record) {
-  const auto level = Parse<Enforcement>(record.Text("enforcement"));
-  if (!level) return std::nullopt;
-  return TraitsOf(*level).growth;
-}
-
 /// Near enough to a singular position that the level has nothing to keep the branch by. Records of
 /// large mechanisms do not know the distance, but whether evaluations were softened.
 bool PassedSingularPosition(const Record& record) {
@@ -60,6 +53,12 @@ void Add(std::string* codes, bool on, const char* code) {
 }
 
 }  // namespace
+
+std::optional<DriftGrowth> GrowthAt(const Record& record) {
+  const auto level = FindLevel(record.Text("enforcement"));
+  if (!level) return std::nullopt;
+  return TraitsOf(*level).growth;
+}
 
 double EnergyErrorShare(const Record& record) {
   if (record.Find("energy_scale") == nullptr) return record.Number("energy_error_relative");

@@ -2,10 +2,12 @@
 // the other runs of its scene do (agreement.h).
 #pragma once
 
+#include <optional>
 #include <string>
 #include <vector>
 
 #include "harness/record/record.h"
+#include "mechanism/formulation/options.h"
 
 namespace loopbench::harness {
 
@@ -16,6 +18,9 @@ inline constexpr const char* kDriftDoubt = "drift";
 inline constexpr const char* kMembersDoubt = "members-failed";
 inline constexpr const char* kExponentDoubt = "exponent";
 inline constexpr const char* kDisagreementDoubt = "disagreement";
+
+/// How drift grows at the record's level; nothing for a level that this program does not know.
+std::optional<DriftGrowth> GrowthAt(const Record& record);
 
 /// Largest error of the energy balance over the energy that moves (`energy_scale`; in records
 /// without it the largest kinetic energy). NaN where it was not measured.

@@ -10,6 +10,7 @@
 #include "harness/config/formulations.h"
 #include "harness/isolation/print_from_child.h"
 #include "harness/json/file_kind.h"
+#include "harness/observers/registry.h"
 #include "harness/suite/precision_cases.h"
 #include "harness/text/config_error.h"
 #include "harness/text/terminal.h"
@@ -70,7 +71,7 @@ void ExplainFormulations(const Experiment& experiment) {
 
 void ExplainChoices(const Experiment& experiment) {
   const auto any = [&](auto is) { return Any(experiment, is); };
-  for (const LevelTraits& level : kLevelTraits) {
+  for (const LevelTraits& level : Levels()) {
     if (any([&](const Column& c) { return ToString(c.enforcement) == level.name; })) {
       Print("  {}: {}\n", level.name, level.sentence);
     }
@@ -152,6 +153,7 @@ void ExplainMeasures(const Experiment& experiment) {
       "  energy error [J]; rank and conditioning of the loops; how the run ended.\n"
       "  Series keep {} points for figures.\n",
       experiment.series_points);
+  for (const ObserverRow& row : RegisteredObservers()) Print("  {}: {}\n", row.name, row.sentence);
   if (const std::size_t rungs = CountRungs(experiment); rungs > 0) {
     Print(
         "  {} in several scalars with one integrator: error and drift against tolerance, and "

@@ -14,7 +14,7 @@ namespace loopbench {
 namespace harness {
 namespace {
 
-// {}: the names of the formulations
+// {}: the names of formulations and levels
 constexpr const char* kFooter = R"(
 Examples: (paths from the root of the repository)
   loopbench list configs/experiments/paper/paper.json
@@ -30,13 +30,15 @@ Examples: (paths from the root of the repository)
 
 Conditions are key=value or key=value,value; keys are the columns of drift.csv.
 Formulations: {}.
+Levels of enforcement: {}.
 Exit codes: 0 done, 1 a gate failed, 2 could not measure or bad input.)";
 
 int RunProgram(int argc, char** argv) {
   CLI::App app{
       "Measures constraint drift and time of formulations of closed-loop multibody dynamics.",
       "loopbench"};
-  app.footer(fmt::format(kFooter, fmt::join(FormulationNames(), ", ")));
+  app.footer(
+      fmt::format(kFooter, fmt::join(FormulationNames(), ", "), fmt::join(LevelNames(), ", ")));
   app.set_version_flag("--version", VersionText);
   app.require_subcommand(1);
   app.failure_message([](const CLI::App* failed, const CLI::Error& error) {

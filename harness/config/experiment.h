@@ -2,7 +2,6 @@
 // called. Plain data; experiment_reader.h fills it.
 #pragma once
 
-#include <algorithm>
 #include <array>
 #include <cstddef>
 #include <cstdint>
@@ -27,12 +26,6 @@ enum class JacobianKind { kForward, kFiniteDifference };
 /// Names in files and tables, by value of the enum.
 template <class Enum>
 inline constexpr std::array<std::string_view, 0> kNames = {};
-template <>
-inline constexpr auto kNames<Enforcement> = [] {
-  std::array<std::string_view, kLevelTraits.size()> names;
-  std::ranges::transform(kLevelTraits, names.begin(), &LevelTraits::name);
-  return names;
-}();
 template <>
 inline constexpr std::array<std::string_view, 2> kNames<Coordinates> = {"joint", "absolute"};
 template <>
@@ -59,6 +52,11 @@ std::optional<Enum> Parse(std::string_view name) {
     if (kNames<Enum>[i] == name) return static_cast<Enum>(i);
   }
   return std::nullopt;
+}
+/// Levels are a table that grows.
+template <>
+inline std::optional<Enforcement> Parse<Enforcement>(std::string_view name) {
+  return FindLevel(name);
 }
 
 /// One way of imposing the loops: a column of the tables. For reduction the solver as published is

@@ -137,9 +137,7 @@ const Fields<RuleOfExperiment>& EnsembleFields() {
        {"horizons", By(NumberListSchema(kPositive), ReadHorizons), "Of cases [s]."},
        {"tolerances", By(NumberListSchema(kPositive), ReadTolerances), "Of cases."},
        {"formulation", FormulationChoices(&Rule::formulations), "Of cases."},
-       {"enforcement",
-        Choices(&Rule::enforcements, NamesOf<Enforcement>(), "a level of enforcement"),
-        "Of cases."},
+       {"enforcement", LevelChoices(&Rule::enforcements), "Of cases."},
        {"coordinates", Choices(&Rule::coordinates, NamesOf<Coordinates>(), "a coordinate set"),
         "Of cases."},
        {"solver", Choices(&Rule::solvers, NamesOf<SolverKind>(), "a solver"), "Of cases."}});

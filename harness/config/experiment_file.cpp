@@ -1,4 +1,6 @@
 // The top level of an experiment file.
+#include <fmt/format.h>
+
 #include "harness/config/experiment_sections.h"
 #include "harness/config/file_schemas.h"
 #include "harness/config/options.h"
@@ -16,6 +18,24 @@ void ReadAllColumns(const JsonNode& node, File& file) {
 void ReadPrecision(const JsonNode& node, File& file) {
   file.precision.tolerances = file.tolerances;
   PrecisionFields().Read(node, &file.precision);
+}
+
+/// Reports levels whose derivative an implicit profile asks for, and that have none.
+void RequireDerivatives(const JsonNode& node, File& file) {
+  const auto integrator = node.Optional("integrator");
+  const Profile* profile = FindProfile(file.integrator);
+  if (!integrator || profile == nullptr || !profile->is_implicit) return;
+  if (file.jacobian != JacobianKind::kForward) return;
+  for (const auto& columns : {file.columns, file.timing.columns}) {
+    for (const Column& column : columns) {
+      const LevelTraits& level = TraitsOf(column.enforcement);
+      if (level.has_derivative) continue;
+      integrator->FailAs(
+          fmt::format("\"{}\" at level \"{}\", which has no derivative", profile->name, level.name),
+          "\"jacobian\": \"finite-difference\" beside it");
+      return;
+    }
+  }
 }
 
 }  // namespace
@@ -51,7 +71,8 @@ const Fields<ExperimentFile>& ExperimentFileFields() {
        {"exclude", ExclusionsSchema(),
         "Cases that match all conditions of a rule are left out. Keys are mechanism, formulation, "
         "enforcement, coordinates, solver, integrator, rtol, atol, horizon and the names of "
-        "axes."}});
+        "axes."},
+       {"", By(Json::object(), RequireDerivatives)}});
   return fields;
 }
 

@@ -4,6 +4,7 @@
 #pragma once
 
 #include <algorithm>
+#include <concepts>
 #include <filesystem>
 #include <map>
 #include <string>
@@ -100,17 +101,30 @@ const NameList& NamesOf() {
   return known;
 }
 
-/// One or several names of formulations that are registered when a file is read.
-template <class T>
-FieldValue<T> FormulationChoices(std::vector<std::string> T::*member) {
-  return {OneOrMoreSchema(ChoiceSchema(FormulationNames()), true),
-          [=](const JsonNode& node, T& owner) {
-            const NameList known(FormulationNames());
+/// One or several of the names that are registered when a file is read, or the enum values that
+/// their indices are.
+template <class T, class Chosen>
+FieldValue<T> RegisteredChoices(std::vector<Chosen> T::*member, std::vector<std::string> (*names)(),
+                                std::string what) {
+  return {OneOrMoreSchema(ChoiceSchema(names()), true), [=](const JsonNode& node, T& owner) {
+            const NameList known(names());
             (owner.*member).clear();
-            for (const std::size_t index : node.Choices(known, "a formulation")) {
-              (owner.*member).push_back(known.all()[index]);
+            for (const std::size_t index : node.Choices(known, what)) {
+              if constexpr (std::same_as<Chosen, std::string>) {
+                (owner.*member).push_back(known.all()[index]);
+              } else {
+                (owner.*member).push_back(static_cast<Chosen>(index));
+              }
             }
           }};
+}
+template <class T>
+FieldValue<T> FormulationChoices(std::vector<std::string> T::*member) {
+  return RegisteredChoices(member, FormulationNames, "a formulation");
+}
+template <class T>
+FieldValue<T> LevelChoices(std::vector<Enforcement> T::*member) {
+  return RegisteredChoices(member, LevelNames, "a level of enforcement");
 }
 
 template <class T>

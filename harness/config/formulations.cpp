@@ -4,10 +4,10 @@
 
 #include <algorithm>
 #include <array>
-#include <stdexcept>
 #include <type_traits>
 
 #include "lagrange/lagrange.h"
+#include "mechanism/formulation/registration.h"
 #include "odca/odca.h"
 #include "reduction/reduction.h"
 
@@ -36,22 +36,12 @@ std::deque<FormulationRow>& Rows() {
   return rows;
 }
 
-bool IsWord(std::string_view text) {
-  constexpr std::string_view kLetters = "abcdefghijklmnopqrstuvwxyz0123456789-";
-  return !text.empty() && text.front() != '-' &&
-         text.find_first_not_of(kLetters) == std::string_view::npos;
-}
-
 bool IsColor(std::string_view text) {
   return text.size() == 7 && text.front() == '#' &&
          text.find_first_not_of("0123456789abcdefABCDEF", 1) == std::string_view::npos;
 }
 
-[[noreturn]] void Refuse(const std::string& name, std::string_view found,
-                         std::string_view expected) {
-  throw std::invalid_argument(
-      fmt::format("formulation \"{}\": found {}, expected {}", name, found, expected));
-}
+constexpr const char* kKind = "formulation";  // of a NewRow
 
 }  // namespace
 
@@ -60,14 +50,12 @@ bool FormulationRow::Has(Enforcement level) const {
 }
 
 void RegisterFormulation(FormulationRow row, int alignment) {
-  if (alignment != EIGEN_MAX_STATIC_ALIGN_BYTES) {
-    Refuse(
-        row.name, fmt::format("EIGEN_MAX_STATIC_ALIGN_BYTES={}", alignment),
-        fmt::format("{}, as the target loopbench::loopbench has it", EIGEN_MAX_STATIC_ALIGN_BYTES));
-  }
-  if (!IsWord(row.name)) Refuse(row.name, "no word", "a-z, 0-9 and '-'");
-  if (FindFormulation(row.name) != nullptr) Refuse(row.name, "it again", "each name once");
-  if (!row.planar || !row.spatial) Refuse(row.name, "no factory", "one for plane and space each");
+  RequireSound({.kind = kKind,
+                .name = row.name,
+                .sentence = row.sentence,
+                .is_taken = FindFormulation(row.name) != nullptr,
+                .has_factories = row.planar && row.spatial,
+                .alignment = alignment});
   std::string &joint = row.look.joint, &absolute = row.look.absolute;
   if (joint.empty() && absolute.empty()) {
     const std::size_t turn = (Rows().size() - BuiltIn().size()) % kFreeColors.size();
@@ -75,8 +63,8 @@ void RegisterFormulation(FormulationRow row, int alignment) {
     absolute = kFreeColors[turn][1];
   }
   if (!IsColor(joint) || !IsColor(absolute)) {
-    Refuse(row.name, fmt::format("colours \"{}\" and \"{}\"", joint, absolute),
-           "#RRGGBB twice, or none");
+    RefuseRow(kKind, row.name, fmt::format("colours \"{}\" and \"{}\"", joint, absolute),
+              "#RRGGBB twice, or none");
   }
   Rows().push_back(std::move(row));
 }
@@ -100,11 +88,11 @@ std::unique_ptr<System<Space, double>> MakeFormulation(std::string_view name,
                                                        const FormulationOptions& options) {
   const FormulationRow* row = FindFormulation(name);
   if (row == nullptr) {
-    Refuse(std::string(name), "no such name",
-           fmt::format("one of {}", fmt::join(FormulationNames(), ", ")));
+    RefuseRow(kKind, name, "no such name",
+              fmt::format("one of {}", fmt::join(FormulationNames(), ", ")));
   }
   if (!row->Has(options.enforcement)) {
-    Refuse(row->name, ToString(options.enforcement), "a level that it has");
+    RefuseRow(kKind, row->name, ToString(options.enforcement), "a level that it has");
   }
   std::unique_ptr<ConstraintSolver<Space, double>> solver;
   if constexpr (std::is_same_v<Space, Planar>) {

@@ -42,7 +42,7 @@ struct FormulationRow {
   std::string sentence;  ///< what `explain` says of it, after "name: "
   SolverFactory<Planar> planar;
   SolverFactory<Spatial> spatial;
-  std::vector<Enforcement> levels = {};  ///< those it has; empty: all
+  std::vector<Enforcement> levels = {};  ///< those it has; empty: all there are
   FormulationLook look = {};
 
   bool Has(Enforcement level) const;
@@ -63,10 +63,8 @@ FormulationRow Row(std::string name, std::string sentence, FormulationLook look 
           .look = std::move(look)};
 }
 
-/// Adds a row; not while experiments run. Throws std::invalid_argument for a name that is taken or
-/// no word, a row without factories, colours of which one is missing or none, or a row compiled
-/// with another alignment of Eigen's types than this library: then they differ in memory, and the
-/// target loopbench::loopbench was not linked, which would have said so (cmake/install.cmake).
+/// Adds a row; not while experiments run. Throws std::invalid_argument for one that is not sound
+/// (mechanism/formulation/registration.h), or colours of which one is missing or none.
 void RegisterFormulation(FormulationRow row, int alignment = EIGEN_MAX_STATIC_ALIGN_BYTES);
 
 /// All rows: the built-in ones, then the others in the order of their registration. Rows stay where

@@ -33,8 +33,8 @@ double CurveWidth(const Record& record) {
 }
 
 Shape ShapeOf(const Record& record) {
-  constexpr std::array kShapes = {Shape::kCircle, Shape::kTriangle, Shape::kSquare,
-                                  Shape::kDiamond};
+  constexpr std::array kShapes = {Shape::kCircle, Shape::kTriangle, Shape::kSquare, Shape::kDiamond,
+                                  Shape::kTriangleDown};
   const auto level = Parse<Enforcement>(record.Text("enforcement"));
   return kShapes[static_cast<std::size_t>(level.value_or(Enforcement())) % kShapes.size()];
 }
@@ -136,7 +136,7 @@ auto MotionRank(const Record& record) {
   const double energy = record.Number("energy_error_relative");
   constexpr double kTrusted = 1e-2;
   return std::tuple(!Failed(record), !HasDoubt(record) && !(energy > kTrusted),
-                    record.Text("enforcement") == "position", -record.Number("rtol"),
+                    GrowthAt(record) == DriftGrowth::kNone, -record.Number("rtol"),
                     record.Text("formulation") == "odca", record.Text("coordinates") == "joint",
                     record.Text("solver") == "rank-revealing");
 }

@@ -79,19 +79,9 @@ std::string DashType(const CurveStyle& style) {
 }
 
 int PointType(const CurveStyle& style) {
-  switch (style.shape) {
-    case Shape::kNone:
-      break;
-    case Shape::kCircle:
-      return style.filled ? 7 : 6;
-    case Shape::kTriangle:
-      return style.filled ? 9 : 8;
-    case Shape::kSquare:
-      return style.filled ? 5 : 4;
-    case Shape::kDiamond:
-      return style.filled ? 13 : 12;
-  }
-  return 0;
+  constexpr std::array kOpen = {0, 6, 8, 4, 12, 10};  // in the order of Shape; filled is the next
+  const int open = kOpen.at(static_cast<std::size_t>(style.shape));
+  return style.filled && style.shape != Shape::kNone ? open + 1 : open;
 }
 
 // Where the marks of curve `index` of `count` lie: the points next to some places evenly spaced

@@ -10,7 +10,7 @@
 namespace loopbench::harness {
 
 /// Marks on a curve.
-enum class Shape { kNone, kCircle, kTriangle, kSquare, kDiamond };
+enum class Shape { kNone, kCircle, kTriangle, kSquare, kDiamond, kTriangleDown };
 
 /// How a curve looks, one attribute per property of what it shows. The defaults are a thin black
 /// line. Dashes have one meaning in all figures: the run is doubtful.

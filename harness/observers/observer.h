@@ -52,9 +52,9 @@ struct Watched {
   bool with_series;  ///< false for members of ensembles, of which series would be many
 };
 
-/// All observers of a run, in the order of their keys in records. A new one is a line here
-/// (observers.cpp) and a row for each of its keys in the table of measures
-/// (harness/record/measures.cpp).
+/// All observers of a run, in the order of their keys in records: the built-in ones, each a line
+/// here (observers.cpp) and a row for each of its keys in the table of measures
+/// (harness/record/measures.cpp), then those of other programs (registry.h).
 template <class Space>
 std::vector<std::unique_ptr<Observer<Space>>> MakeObservers(const Watched<Space>& run);
 
@@ -112,8 +112,8 @@ class EnergyObserver final : public Observer<Space> {
   TimeSeries series_;
 };
 
-/// What projections (level `position`) took away and what they cost: the largest mismatch of points
-/// [m], its series, and Newton steps. Nothing at other levels.
+/// What projections (levels that leave no drift) took away and what they cost: the largest mismatch
+/// of points [m], its series, and Newton steps. Nothing at other levels.
 template <class Space>
 class CorrectionObserver final : public Observer<Space> {
  public:

@@ -2,7 +2,7 @@
 #include <cmath>
 #include <limits>
 
-#include "harness/observers/observer.h"
+#include "harness/observers/registry.h"
 
 namespace loopbench::harness {
 
@@ -49,7 +49,7 @@ void EnergyObserver<Space>::Write(Record& record) const {
 
 template <class Space>
 void CorrectionObserver<Space>::Observe(const Sample<Space>& sample) {
-  if (sample.formulation.options().enforcement != Enforcement::kPosition) return;
+  if (TraitsOf(sample.formulation.options().enforcement).growth != DriftGrowth::kNone) return;
   const Correction<double>& correction = sample.formulation.level().correction();
   largest_ = std::max(largest_, correction.shift);
   iterations_ += correction.iterations;
@@ -102,6 +102,7 @@ std::vector<std::unique_ptr<Observer<Space>>> MakeObservers(const Watched<Space>
   all.push_back(std::make_unique<ExactObserver<Space>>(run.scene, run.mechanism));
   if (run.with_series) all.push_back(std::make_unique<CoordinateObserver<Space>>(run.points));
   all.push_back(std::make_unique<CorrectionObserver<Space>>());
+  for (const ObserverRow& row : RegisteredObservers()) all.push_back(row.Make(run));
   return all;
 }
 

@@ -1,7 +1,5 @@
 #include "harness/record/measures.h"
 
-#include <map>
-
 namespace loopbench::harness {
 namespace {
 
@@ -242,52 +240,8 @@ constexpr Measure kMeasures[] = {
     {"real_ns"},
 };
 
-constexpr bool IsFamily(const Measure& measure) { return measure.key.ends_with('*'); }
-
 }  // namespace
 
-std::span<const Measure> Measures() { return kMeasures; }
-
-const Measure* FindMeasure(std::string_view key) {
-  static const auto kByKey = [] {
-    std::map<std::string_view, const Measure*> rows;
-    for (const Measure& measure : kMeasures) {
-      if (!IsFamily(measure)) rows.emplace(measure.key, &measure);
-    }
-    return rows;
-  }();
-  if (const auto own = kByKey.find(key); own != kByKey.end()) return own->second;
-  const Measure* longest = nullptr;
-  for (const Measure& measure : kMeasures) {
-    if (!IsFamily(measure) || !key.starts_with(measure.key.substr(0, measure.key.size() - 1))) {
-      continue;
-    }
-    if (longest == nullptr || measure.key.size() > longest->key.size()) longest = &measure;
-  }
-  return longest;
-}
-
-ValueType TypeOf(std::string_view key) {
-  const Measure* measure = FindMeasure(key);
-  return measure == nullptr ? kAny : measure->type;
-}
-
-bool IsReserved(std::string_view name) { return FindMeasure(name) != nullptr; }
-
-std::string_view Describe(ValueType type) {
-  switch (type) {
-    case kAny:
-      break;
-    case kNumber:
-      return "a number or null";
-    case kText:
-      return "a string or null";
-    case kFlag:
-      return "true, false or null";
-    case kNumbers:
-      return "an array of numbers";
-  }
-  return "null, a bool, a number, a string or an array of numbers";
-}
+std::span<const Measure> BuiltInMeasures() { return kMeasures; }
 
 }  // namespace loopbench::harness

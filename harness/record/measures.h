@@ -3,8 +3,10 @@
 // values of it are compared. Tables, the store, `compare` and sweeps all read this one list.
 #pragma once
 
+#include <deque>
 #include <span>
 #include <string_view>
+#include <vector>
 
 namespace loopbench::harness {
 
@@ -78,8 +80,17 @@ struct Measure {
   bool needs_same_arithmetic = false;
 };
 
-/// All rows, those with a rule in the order of comparisons.
-std::span<const Measure> Measures();
+/// All rows, those with a rule in the order of comparisons: the built-in ones (measures.cpp), then
+/// those added. They stay where they are.
+const std::deque<Measure>& Measures();
+std::span<const Measure> BuiltInMeasures();
+std::vector<const Measure*> AddedMeasures();
+
+/// Adds rows of a program's own, of which RegisterObserver() is the way
+/// (harness/observers/registry.h); their words are copied. Throws std::invalid_argument, and adds
+/// none, where a key is no key or there already, has no type, or is merged with a key that does not
+/// decide which part counts.
+void AddMeasures(std::span<const Measure> fresh);
 
 /// The row of a key: its own, else that of the longest beginning; null where there is none.
 const Measure* FindMeasure(std::string_view key);

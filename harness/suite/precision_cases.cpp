@@ -37,14 +37,16 @@ MechanismDescription PlanarPart(const Experiment& experiment, const ExperimentSc
   return description;
 }
 
-/// Throws ConfigError for a column whose formulation is compiled in double alone.
+/// Throws ConfigError for a column whose formulation or level is compiled in double alone.
 void RequireScalars(const Experiment& experiment, const Column& column) {
-  if (std::ranges::find(kLadderFormulations, column.formulation) != kLadderFormulations.end()) {
-    return;
+  const auto refuse = [&](const std::string& expected) {
+    throw ConfigError(fmt::format("{}: /precision: found {}, expected columns {}",
+                                  experiment.path.string(), ToString(column), expected));
+  };
+  if (std::ranges::find(kLadderFormulations, column.formulation) == kLadderFormulations.end()) {
+    refuse(fmt::format("of formulations in all scalars: {}", fmt::join(kLadderFormulations, ", ")));
   }
-  throw ConfigError(fmt::format(
-      "{}: /precision: found {}, expected columns of formulations in all scalars: {}",
-      experiment.path.string(), ToString(column), fmt::join(kLadderFormulations, ", ")));
+  if (!IsBuiltIn(column.enforcement)) refuse("at levels that come with Loopbench");
 }
 
 Record RungKeys(const Case& one, Scalar scalar, double tolerance) {

@@ -34,8 +34,18 @@ TableColumn Short(string_view key, const char* header,
 
 std::vector<std::pair<std::string, std::string>> AbbreviatedLevels() {
   std::vector<std::pair<std::string, std::string>> pairs;
-  for (const LevelTraits& level : kLevelTraits) pairs.emplace_back(level.name, level.abbreviation);
+  for (const LevelTraits& level : Levels()) pairs.emplace_back(level.name, level.abbreviation);
   return pairs;
+}
+
+// Of measures that a program has added and that have words.
+std::vector<TableColumn> AddedColumns() {
+  std::vector<TableColumn> columns;
+  for (const Measure* measure : AddedMeasures()) {
+    const bool single = measure->type != ValueType::kNumbers && !measure->key.ends_with('*');
+    if (single && !measure->heading.words.empty()) columns.push_back(Of(*measure, measure->key));
+  }
+  return columns;
 }
 
 std::vector<TableColumn> Join(std::vector<TableColumn> head, const std::vector<TableColumn>& tail) {
@@ -79,33 +89,34 @@ const std::vector<TableColumn>& CompactCaseColumns() {
 
 const std::vector<TableColumn>& DriftColumns() {
   static const std::vector<TableColumn> kColumns =
-      Join(CaseColumns(), Columns({"doubts",
-                                   "agreement",
-                                   "drift_position_max",
-                                   "drift_rotation_max",
-                                   "drift_velocity_max",
-                                   "drift_acceleration_max",
-                                   "loop_closure_max",
-                                   "correction_max",
-                                   "worst_loop",
-                                   "energy_error_max",
-                                   "growth_exponent",
-                                   "growth_spread",
-                                   "growth_regime",
-                                   "growth_resolved",
-                                   "growth_hypothesis",
-                                   "growth_hypothesis_resolved",
-                                   "ensemble",
-                                   "steps",
-                                   "rejected",
-                                   "rhs_evaluations",
-                                   "rank_min",
-                                   "rcond_min",
-                                   "state_hash",
-                                   "restarts",
-                                   "branch_error_max",
-                                   "closed_form_error_max",
-                                   "message"}));
+      Join(Join(CaseColumns(), Columns({"doubts",
+                                        "agreement",
+                                        "drift_position_max",
+                                        "drift_rotation_max",
+                                        "drift_velocity_max",
+                                        "drift_acceleration_max",
+                                        "loop_closure_max",
+                                        "correction_max",
+                                        "worst_loop",
+                                        "energy_error_max",
+                                        "growth_exponent",
+                                        "growth_spread",
+                                        "growth_regime",
+                                        "growth_resolved",
+                                        "growth_hypothesis",
+                                        "growth_hypothesis_resolved",
+                                        "ensemble",
+                                        "steps",
+                                        "rejected",
+                                        "rhs_evaluations",
+                                        "rank_min",
+                                        "rcond_min",
+                                        "state_hash",
+                                        "restarts",
+                                        "branch_error_max",
+                                        "closed_form_error_max",
+                                        "message"})),
+           AddedColumns());
   return kColumns;
 }
 

@@ -17,7 +17,7 @@ const std::vector<TableColumn>& CompactCaseColumns();
 
 /// The columns of drift.csv (docs/design.md, section 6): what was run, how it ended, drift at
 /// position [m and rad, never mixed], velocity and acceleration level, energy, growth, counters,
-/// conditioning.
+/// conditioning, then what observers of other programs measure.
 /// `loop_closure_max` differs from the drift in absolute coordinates only, where every joint can
 /// open and mismatches may cancel around a loop.
 const std::vector<TableColumn>& DriftColumns();

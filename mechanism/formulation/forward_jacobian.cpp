@@ -2,6 +2,8 @@
 
 #include <algorithm>
 
+#include "mechanism/formulation/registration.h"
+
 namespace loopbench {
 
 template <class Space>
@@ -23,7 +25,12 @@ ForwardJacobian<Space>::ForwardJacobian(const MechanismDescription& description,
       force_(VectorX<double>::Zero(mechanism_.num_u())),
       target_(lambda_now_),
       x_(force_),
-      lambda_x_(lambda_now_) {}
+      lambda_x_(lambda_now_) {
+  const LevelTraits& level = TraitsOf(system.options().enforcement);
+  if (!level.has_derivative) {
+    RefuseRow("level", level.name, "a forward Jacobian", "difference quotients: no derivative");
+  }
+}
 
 template <class Space>
 int ForwardJacobian<Space>::evaluations() const {

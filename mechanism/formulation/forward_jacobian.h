@@ -12,7 +12,8 @@
 // The left-hand sides are O(n) (TreeDynamics::Residual); the equations are solved with the factors
 // that the solver has from the system's last evaluation, be it a sweep, an LU or a partition. At
 // velocity level the speeds that the right-hand side uses have derivatives of the same kind: the
-// solver's Correct() of what a direction makes constraints miss at velocity level.
+// solver's Correct() of what a direction makes constraints miss at velocity level. Levels of other
+// programs that do anything else to the right-hand side have no derivative, and say so.
 //
 // How often a measured angle has turned round (Kinematics::AcceptStep) is of no consequence here: a
 // moment along H changes with H only along D, which lambda takes up.
@@ -30,7 +31,8 @@ namespace loopbench {
 template <class Space>
 class ForwardJacobian {
  public:
-  /// `system`, of a mechanism compiled from `description`, must outlive the object.
+  /// `system`, of a mechanism compiled from `description`, must outlive the object. Throws
+  /// std::invalid_argument at a level without a derivative (LevelTraits::has_derivative).
   ForwardJacobian(const MechanismDescription& description, System<Space, double>& system);
 
   /// d(ydot)/dy at the state of the system's last call of Derivative(), which must have

@@ -1,17 +1,20 @@
 #include "mechanism/formulation/level.h"
 
 #include "mechanism/algebra/instantiate.h"
+#include "mechanism/formulation/registration.h"
 
 namespace loopbench {
 
 // Levels with a file of their own.
 template <class Space, class S>
-std::unique_ptr<Level<Space, S>> MakeVelocityLevel(const Mechanism<Space, S>& mechanism);
+std::unique_ptr<Level<Space, S>> MakeVelocityLevel(const Mechanism<Space, S>& mechanism,
+                                                   const FormulationOptions&);
 template <class Space, class S>
-std::unique_ptr<Level<Space, S>> MakePositionLevel(const Mechanism<Space, S>& mechanism);
+std::unique_ptr<Level<Space, S>> MakePositionLevel(const Mechanism<Space, S>& mechanism,
+                                                   const FormulationOptions&);
 template <class Space, class S>
 std::unique_ptr<Level<Space, S>> MakeBaumgarteLevel(const Mechanism<Space, S>& mechanism,
-                                                    std::optional<BaumgarteGains> gains);
+                                                    const FormulationOptions& options);
 
 template <class Space, class S>
 Outcome Level<Space, S>::SetSpeeds(FactoredState<Space, S>& state,
@@ -21,23 +24,31 @@ Outcome Level<Space, S>::SetSpeeds(FactoredState<Space, S>& state,
 }
 
 template <class Space, class S>
+std::deque<LevelFactory<Space, S>>& LevelFactories() {
+  const auto acceleration = [](const Mechanism<Space, S>&, const FormulationOptions&) {
+    return std::make_unique<Level<Space, S>>();
+  };
+  static std::deque<LevelFactory<Space, S>> factories = {acceleration, MakeVelocityLevel<Space, S>,
+                                                         MakePositionLevel<Space, S>,
+                                                         MakeBaumgarteLevel<Space, S>};
+  return factories;
+}
+
+template <class Space, class S>
 std::unique_ptr<Level<Space, S>> MakeLevel(const Mechanism<Space, S>& mechanism,
                                            const FormulationOptions& options) {
-  switch (options.enforcement) {
-    case Enforcement::kAcceleration:
-      break;
-    case Enforcement::kVelocity:
-      return MakeVelocityLevel(mechanism);
-    case Enforcement::kPosition:
-      return MakePositionLevel(mechanism);
-    case Enforcement::kBaumgarte:
-      return MakeBaumgarteLevel(mechanism, options.gains);
+  const auto& factories = LevelFactories<Space, S>();
+  const auto index = static_cast<std::size_t>(options.enforcement);
+  if (index >= factories.size()) {
+    RefuseRow("level", ToString(options.enforcement), "a scalar other than double",
+              "double, which levels of other programs are made in");
   }
-  return std::make_unique<Level<Space, S>>();
+  return factories[index](mechanism, options);
 }
 
 #define LOOPBENCH_INSTANTIATE(Space, S)                                           \
   template class Level<Space, S>;                                                 \
+  template std::deque<LevelFactory<Space, S>>& LevelFactories<Space, S>();        \
   template std::unique_ptr<Level<Space, S>> MakeLevel(const Mechanism<Space, S>&, \
                                                       const FormulationOptions&);
 LOOPBENCH_FOR_EACH_SPACE_AND_SCALAR(LOOPBENCH_INSTANTIATE)

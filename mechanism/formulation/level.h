@@ -5,9 +5,17 @@
 //   velocity       speeds of the right-hand side satisfy J u = -b  level_velocity.cpp
 //   position       Newton's method after each accepted step        level_position.cpp
 //   baumgarte      J udot = gamma - feedback                       level_baumgarte.cpp
+//
+// A program of somebody else registers its own before it calls loopbench::Main(), and from then on
+// its name is valid wherever "velocity" is:
+//
+//   RegisterLevel(LevelRowOf<HalfVelocity>({.name = "half-velocity", .sentence = "half of ..."}));
 #pragma once
 
+#include <deque>
+#include <functional>
 #include <memory>
+#include <utility>
 
 #include "mechanism/formulation/factored_state.h"
 #include "mechanism/formulation/options.h"
@@ -40,11 +48,13 @@ class Level {
   virtual Accepted Accept(FactoredState<Space, S>&, S /*h*/) { return Accepted::kAsItWas; }
 
   /// What derivatives of the right-hand side have to know (forward_jacobian.h): whether SetSpeeds()
-  /// changes speeds, and the gains of Feedback().
+  /// makes speeds satisfy the loops by the solver's Correct(), and the gains of a Feedback() that
+  /// is AddFeedback(). A level for which this is not all says so (LevelTraits::has_derivative).
   bool changes_speeds() const { return changes_speeds_; }
   const BaumgarteGains& gains() const { return gains_; }
 
-  /// What the last Accept() took away; 0 where a level takes nothing.
+  /// What the last Accept() took away; 0 where a level takes nothing. Records have it at levels
+  /// that leave nothing (DriftGrowth::kNone).
   const Correction<S>& correction() const { return correction_; }
 
  protected:
@@ -56,10 +66,43 @@ class Level {
   VectorX<S> nothing_;
 };
 
-/// The level that `options` name.
+/// Makes a level for a mechanism, which must outlive it.
+template <class Space, class S>
+using LevelFactory = std::function<std::unique_ptr<Level<Space, S>>(const Mechanism<Space, S>&,
+                                                                    const FormulationOptions&)>;
+
+/// The level that `options` name. Throws std::invalid_argument for one of another program in
+/// another scalar than double.
 template <class Space, class S>
 std::unique_ptr<Level<Space, S>> MakeLevel(const Mechanism<Space, S>& mechanism,
                                            const FormulationOptions& options);
+
+/// What makes them, in the order of Enforcement: all in double, the built-in ones in other scalars.
+/// RegisterLevel() alone adds to it.
+template <class Space, class S>
+std::deque<LevelFactory<Space, S>>& LevelFactories();
+
+/// A level of another program.
+struct LevelRow {
+  LevelTraits traits;
+  LevelFactory<Planar, double> planar;
+  LevelFactory<Spatial, double> spatial;
+};
+
+/// The row of a class template derived from Level<Space, S>, made from a mechanism and options.
+template <template <class Space, class S> class Own>
+LevelRow LevelRowOf(LevelTraits traits) {
+  const auto make = []<class Space>(const Mechanism<Space, double>& mechanism,
+                                    const FormulationOptions& options) {
+    return std::unique_ptr<Level<Space, double>>(
+        std::make_unique<Own<Space, double>>(mechanism, options));
+  };
+  return {std::move(traits), make, make};
+}
+
+/// Adds a level, not while experiments run, and returns its enumerator. Throws
+/// std::invalid_argument for a row that is not sound (registration.h).
+Enforcement RegisterLevel(LevelRow row, int alignment = EIGEN_MAX_STATIC_ALIGN_BYTES);
 
 /// 2 alpha e' + beta^2 e of all constraints, added to `rows`; in any scalar, for derivatives too.
 template <class Space, class S>

@@ -50,13 +50,13 @@ class BaumgarteLevel final : public Level<Space, S> {
 
 template <class Space, class S>
 std::unique_ptr<Level<Space, S>> MakeBaumgarteLevel(const Mechanism<Space, S>& mechanism,
-                                                    std::optional<BaumgarteGains> gains) {
-  return std::make_unique<BaumgarteLevel<Space, S>>(mechanism, gains);
+                                                    const FormulationOptions& options) {
+  return std::make_unique<BaumgarteLevel<Space, S>>(mechanism, options.gains);
 }
 
 #define LOOPBENCH_INSTANTIATE(Space, S)                                                    \
   template std::unique_ptr<Level<Space, S>> MakeBaumgarteLevel(const Mechanism<Space, S>&, \
-                                                               std::optional<BaumgarteGains>);
+                                                               const FormulationOptions&);
 LOOPBENCH_FOR_EACH_SPACE_AND_SCALAR(LOOPBENCH_INSTANTIATE)
 #undef LOOPBENCH_INSTANTIATE
 

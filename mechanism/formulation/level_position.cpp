@@ -83,12 +83,14 @@ class PositionLevel final : public Level<Space, S> {
 }  // namespace
 
 template <class Space, class S>
-std::unique_ptr<Level<Space, S>> MakePositionLevel(const Mechanism<Space, S>& mechanism) {
+std::unique_ptr<Level<Space, S>> MakePositionLevel(const Mechanism<Space, S>& mechanism,
+                                                   const FormulationOptions&) {
   return std::make_unique<PositionLevel<Space, S>>(mechanism);
 }
 
-#define LOOPBENCH_INSTANTIATE(Space, S) \
-  template std::unique_ptr<Level<Space, S>> MakePositionLevel(const Mechanism<Space, S>&);
+#define LOOPBENCH_INSTANTIATE(Space, S)                                                   \
+  template std::unique_ptr<Level<Space, S>> MakePositionLevel(const Mechanism<Space, S>&, \
+                                                              const FormulationOptions&);
 LOOPBENCH_FOR_EACH_SPACE_AND_SCALAR(LOOPBENCH_INSTANTIATE)
 #undef LOOPBENCH_INSTANTIATE
 

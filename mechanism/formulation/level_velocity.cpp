@@ -50,12 +50,14 @@ class VelocityLevel final : public Level<Space, S> {
 }  // namespace
 
 template <class Space, class S>
-std::unique_ptr<Level<Space, S>> MakeVelocityLevel(const Mechanism<Space, S>& mechanism) {
+std::unique_ptr<Level<Space, S>> MakeVelocityLevel(const Mechanism<Space, S>& mechanism,
+                                                   const FormulationOptions&) {
   return std::make_unique<VelocityLevel<Space, S>>(mechanism);
 }
 
-#define LOOPBENCH_INSTANTIATE(Space, S) \
-  template std::unique_ptr<Level<Space, S>> MakeVelocityLevel(const Mechanism<Space, S>&);
+#define LOOPBENCH_INSTANTIATE(Space, S)                                                   \
+  template std::unique_ptr<Level<Space, S>> MakeVelocityLevel(const Mechanism<Space, S>&, \
+                                                              const FormulationOptions&);
 LOOPBENCH_FOR_EACH_SPACE_AND_SCALAR(LOOPBENCH_INSTANTIATE)
 #undef LOOPBENCH_INSTANTIATE
 

@@ -1,6 +1,68 @@
 #include "mechanism/formulation/options.h"
 
+#include <algorithm>
+
+#include "mechanism/formulation/level.h"
+#include "mechanism/formulation/registration.h"
+
 namespace loopbench {
+
+namespace {
+
+/// In the order of Enforcement.
+std::deque<LevelTraits>& Rows() {
+  static std::deque<LevelTraits> rows = {
+      {"acceleration",
+       "the loops' accelerations are imposed. Speeds and positions follow by integration, and "
+       "errors in them stay.",
+       DriftGrowth::kSquare, "accel", true},
+      {"velocity", "the speeds satisfy the loops too; positions follow by integration.",
+       DriftGrowth::kLinear, "veloc", true},
+      {"position",
+       "as acceleration, and after each accepted step positions and speeds are moved back to where "
+       "the loops hold.",
+       DriftGrowth::kNone, "posit", true},
+      {"baumgarte",
+       "as acceleration, with feedback: a mismatch e obeys e'' + 2 alpha e' + beta^2 e = 0, alpha "
+       "= beta = 0.05 over the longest step unless given.",
+       DriftGrowth::kForgotten, "baumgarte", true}};
+  return rows;
+}
+
+}  // namespace
+
+const std::deque<LevelTraits>& Levels() { return Rows(); }
+
+std::vector<std::string> LevelNames() {
+  std::vector<std::string> names;
+  for (const LevelTraits& level : Rows()) names.push_back(level.name);
+  return names;
+}
+
+const LevelTraits& TraitsOf(Enforcement level) {
+  return Rows().at(static_cast<std::size_t>(level));
+}
+
+std::optional<Enforcement> FindLevel(std::string_view name) {
+  const auto level = std::ranges::find(Rows(), name, &LevelTraits::name);
+  if (level == Rows().end()) return std::nullopt;
+  return static_cast<Enforcement>(level - Rows().begin());
+}
+
+Enforcement RegisterLevel(LevelRow row, int alignment) {
+  LevelTraits& traits = row.traits;
+  RequireSound({.kind = "level",
+                .name = traits.name,
+                .sentence = traits.sentence,
+                .is_taken = FindLevel(traits.name).has_value(),
+                .has_factories = row.planar && row.spatial,
+                .alignment = alignment});
+  if (traits.abbreviation.empty()) traits.abbreviation = traits.name;
+  LevelFactories<Planar, double>().push_back(std::move(row.planar));
+  LevelFactories<Spatial, double>().push_back(std::move(row.spatial));
+  Rows().push_back(std::move(traits));
+  return static_cast<Enforcement>(Rows().size() - 1);
+}
 
 std::string_view ToString(Enforcement level) { return TraitsOf(level).name; }
 

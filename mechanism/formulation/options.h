@@ -1,13 +1,16 @@
 // What users choose of a formulation: level of enforcement, kind of solver, gains.
 #pragma once
 
-#include <array>
+#include <deque>
 #include <optional>
+#include <string>
 #include <string_view>
+#include <vector>
 
 namespace loopbench {
 
-/// At which level the constraints hold in the right-hand side (docs/design.md D3; level.h).
+/// At which level the constraints hold in the right-hand side (docs/design.md D3; level.h). Levels
+/// of other programs follow.
 enum class Enforcement {
   kAcceleration,  ///< accelerations satisfy the constraints, speeds are integrated as they come
   kVelocity,      ///< speeds used in the right-hand side satisfy them too
@@ -26,30 +29,26 @@ enum class DriftGrowth {
 
 /// What a level is called and what it lets one expect; what it does stands in level.h.
 struct LevelTraits {
-  std::string_view name;          ///< in files and tables
-  std::string_view abbreviation;  ///< in tables of a terminal
-  DriftGrowth growth;
-  std::string_view sentence;  ///< what `explain` says of it, after "name: "
+  std::string name;      ///< in files and tables: a-z, 0-9 and '-'
+  std::string sentence;  ///< what `explain` says of it, after "name: "
+  DriftGrowth growth = DriftGrowth::kSquare;
+  std::string abbreviation = {};  ///< in tables of a terminal; empty: the name
+  /// Whether its Level's changes_speeds() and gains() say all by which the right-hand side differs
+  /// from that of `acceleration`: then there is a derivative of it (forward_jacobian.h). Without
+  /// one, implicit profiles have to make difference quotients, and are refused otherwise.
+  bool has_derivative = false;
 };
 
-/// In the order of Enforcement.
-inline constexpr std::array<LevelTraits, 4> kLevelTraits = {{
-    {"acceleration", "accel", DriftGrowth::kSquare,
-     "the loops' accelerations are imposed. Speeds and positions follow by integration, and errors "
-     "in them stay."},
-    {"velocity", "veloc", DriftGrowth::kLinear,
-     "the speeds satisfy the loops too; positions follow by integration."},
-    {"position", "posit", DriftGrowth::kNone,
-     "as acceleration, and after each accepted step positions and speeds are moved back to where "
-     "the loops hold."},
-    {"baumgarte", "baumgarte", DriftGrowth::kForgotten,
-     "as acceleration, with feedback: a mismatch e obeys e'' + 2 alpha e' + beta^2 e = 0, alpha = "
-     "beta = 0.05 over the longest step unless given."},
-}};
-
-constexpr const LevelTraits& TraitsOf(Enforcement level) {
-  return kLevelTraits[static_cast<std::size_t>(level)];
-}
+/// All levels in the order of Enforcement: the built-in ones, then those of other programs in the
+/// order of their registration (level.h), whose enumerators are the next values. They stay where
+/// they are.
+const std::deque<LevelTraits>& Levels();
+std::vector<std::string> LevelNames();
+const LevelTraits& TraitsOf(Enforcement level);
+/// Nothing for a name that is not registered: stores may hold records of other programs.
+std::optional<Enforcement> FindLevel(std::string_view name);
+/// Whether it comes with Loopbench, in all scalars.
+constexpr bool IsBuiltIn(Enforcement level) { return level <= Enforcement::kBaumgarte; }
 
 /// Gains [1/s] of Baumgarte's stabilisation: a mismatch e of positions obeys
 /// e'' + 2 alpha e' + beta^2 e = 0 (Baumgarte 1972; alpha = beta damps it critically).

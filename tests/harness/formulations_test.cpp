@@ -3,8 +3,6 @@
 
 #include <gtest/gtest.h>
 
-#include <cstdlib>
-#include <iostream>
 #include <stdexcept>
 
 #include "harness/figures/figure_recipes.h"
@@ -12,6 +10,7 @@
 #include "harness/tables/factorial.h"
 #include "harness/text/config_error.h"
 #include "lagrange/lagrange.h"
+#include "tests/harness/in_child.h"
 #include "tests/reference/cases.h"
 
 namespace loopbench::harness {
@@ -21,23 +20,6 @@ using Names = std::vector<std::string>;
 
 /// Multipliers under another name.
 FormulationRow Echo() { return Row<lagrange::Lagrange>("echo", "multipliers once more."); }
-
-/// Runs `check` in a process of its own: what it registers, no other test sees.
-template <class Check>
-void InChild(Check check) {
-  const auto run = [&] {
-    check();
-    // what failed there is printed nowhere else
-    const testing::TestResult& found =
-        *testing::UnitTest::GetInstance()->current_test_info()->result();
-    for (int i = 0; i < found.total_part_count(); ++i) {
-      std::cerr << found.GetTestPartResult(i).summary() << '\n';
-    }
-    std::cerr << "checked\n";
-    std::_Exit(testing::Test::HasFailure() ? 1 : 0);
-  };
-  EXPECT_EXIT(run(), testing::ExitedWithCode(0), "checked");
-}
 
 Experiment Asking(const std::string& level, const std::string& more = "") {
   return ParseExperiment(R"({"name": "own", "tolerances": 1e-6,
@@ -77,6 +59,9 @@ TEST(FormulationsTest, ARowThatCannotBeIsRefused) {
   }
   row = Echo();
   row.spatial = nullptr;
+  refuses(row);
+  row = Echo();
+  row.sentence.clear();
   refuses(row);
   row = Echo();
   row.look = {"#123456", "", 2.0};

@@ -12,6 +12,7 @@
 #include <vector>
 
 #include "harness/record/record_json.h"
+#include "harness/run/case_identity.h"
 #include "harness/tables/columns.h"
 #include "mechanism/description/library.h"
 #include "tests/reference/cases.h"

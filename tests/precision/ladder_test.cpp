@@ -176,6 +176,30 @@ INSTANTIATE_TEST_SUITE_P(Columns, LadderTest,
                                            std::pair{"reduction", Enforcement::kPosition}),
                          NameOf);
 
+/// Of another program, made in double alone.
+template <class Space, class S>
+class Own final : public Level<Space, S> {
+ public:
+  Own(const Mechanism<Space, S>&, const FormulationOptions&) {}
+};
+
+TEST(LadderLevels, OfOtherProgramsAreRefusedByName) {
+  const Enforcement own =
+      RegisterLevel(LevelRowOf<Own>({.name = "own-in-double", .sentence = "as acceleration."}));
+  const MechanismDescription description = Shipped("four-bar");
+  const Mechanism<Planar, double> mechanism(description, Coordinates::kJoint);
+  EXPECT_NO_THROW(MakeSystem<odca::Odca>(mechanism, {.enforcement = own}));
+  try {
+    RunLadder(Task("four-bar", "odca", own));
+    FAIL();
+  } catch (const std::invalid_argument& refusal) {
+    EXPECT_STREQ(
+        refusal.what(),
+        "level \"own-in-double\": found a scalar other than double, expected double, which "
+        "levels of other programs are made in");
+  }
+}
+
 TEST(RuledByTest, RoundOffIsWhatAWiderScalarTakesAway) {
   EXPECT_EQ(RuledBy(1e-6, 1e-6), "truncation");
   EXPECT_EQ(RuledBy(1.9e-6, 1e-6), "truncation");

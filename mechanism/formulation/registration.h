@@ -1,0 +1,28 @@
+// What every row has that a program adds before it calls loopbench::Main(): a formulation
+// (harness/config/formulations.h), a level (level.h) or an observer (harness/observers/registry.h).
+#pragma once
+
+#include <Eigen/Core>
+#include <string_view>
+
+namespace loopbench {
+
+struct NewRow {
+  std::string_view kind;  ///< "level"
+  std::string_view name, sentence;
+  bool is_taken = false;  ///< the name
+  bool has_factories = false;
+  int alignment = 0;  ///< EIGEN_MAX_STATIC_ALIGN_BYTES where the row was compiled
+};
+
+/// Throws std::invalid_argument for a name that is no word or is taken, a row without a sentence or
+/// a factory, or one compiled with another alignment of Eigen's types than this library: then they
+/// differ in memory, and the target loopbench::loopbench was not linked, which would have said so
+/// (cmake/install.cmake).
+void RequireSound(const NewRow& row);
+
+/// Throws std::invalid_argument: KIND "NAME": found FOUND, expected EXPECTED.
+[[noreturn]] void RefuseRow(std::string_view kind, std::string_view name, std::string_view found,
+                            std::string_view expected);
+
+}  // namespace loopbench

@@ -104,7 +104,7 @@ std::vector<Warning> FindUnitWarnings(const MechanismDescription& description) {
   for (ForceDescription force : description.forces) {
     const ForceParts parts = PartsOf(force);
     for (const ForceNumber& number : parts.numbers) {
-      if (number.quantity != Quantity::kCoordinate || !is_angle(*parts.joint, 0)) continue;
+      if (number.quantity != quantity::kCoordinate || !is_angle(*parts.joint, 0)) continue;
       angles.Add(fmt::format("{} of the {} in {}", number.key, parts.name,
                              description.joints[*parts.joint].name),
                  *number.value);

@@ -201,7 +201,7 @@ Record ForceRow(const MechanismDescription& description, ForceDescription force)
   }
   if (parts.value != nullptr) {
     with.push_back(
-        fmt::format("{} [{}]", FunctionText(*parts.value), UnitOf(Quantity::kEffort, is_length)));
+        fmt::format("{} [{}]", FunctionText(*parts.value), quantity::kEffort.Unit(is_length)));
   }
   if (parts.force != nullptr) {
     with.push_back(fmt::format("force ({}) N in {} axes",
@@ -210,7 +210,7 @@ Record ForceRow(const MechanismDescription& description, ForceDescription force)
   }
   for (const ForceNumber& number : parts.numbers) {
     with.push_back(fmt::format("{} {} {}", number.key, ShortNumber(*number.value),
-                               UnitOf(number.quantity, is_length)));
+                               number.quantity.Unit(is_length)));
   }
   Record row;
   row.Set("type", std::string(parts.name));

@@ -7,7 +7,7 @@
 #include <type_traits>
 
 #include "lagrange/lagrange.h"
-#include "mechanism/formulation/registration.h"
+#include "mechanism/description/registration.h"
 #include "odca/odca.h"
 #include "reduction/reduction.h"
 
@@ -52,8 +52,8 @@ bool FormulationRow::Has(Enforcement level) const {
 void RegisterFormulation(FormulationRow row, int alignment) {
   RequireSound({.kind = kKind,
                 .name = row.name,
-                .sentence = row.sentence,
                 .is_taken = FindFormulation(row.name) != nullptr,
+                .has_sentence = !row.sentence.empty(),
                 .has_factories = row.planar && row.spatial,
                 .alignment = alignment});
   std::string &joint = row.look.joint, &absolute = row.look.absolute;

@@ -38,7 +38,7 @@ struct FormulationLook {
 
 /// All that the harness knows of a formulation.
 struct FormulationRow {
-  std::string name;      ///< a word in files, tables and names: a-z, 0-9 and '-'
+  std::string name;      ///< a word in files, tables and names: a-z, 0-9, '-' and '_'
   std::string sentence;  ///< what `explain` says of it, after "name: "
   SolverFactory<Planar> planar;
   SolverFactory<Spatial> spatial;
@@ -64,7 +64,7 @@ FormulationRow Row(std::string name, std::string sentence, FormulationLook look 
 }
 
 /// Adds a row; not while experiments run. Throws std::invalid_argument for one that is not sound
-/// (mechanism/formulation/registration.h), or colours of which one is missing or none.
+/// (mechanism/description/registration.h), or colours of which one is missing or none.
 void RegisterFormulation(FormulationRow row, int alignment = EIGEN_MAX_STATIC_ALIGN_BYTES);
 
 /// All rows: the built-in ones, then the others in the order of their registration. Rows stay where

@@ -10,15 +10,6 @@ namespace {
 using Force = PartOf<ForceDescription>;
 using Rows = std::vector<Field<Force>>;
 
-/// One of each kind, as nothing is said.
-template <std::size_t... kinds>
-std::vector<ForceDescription> OneOfEach(std::index_sequence<kinds...>) {
-  return {ForceDescription(std::in_place_index<kinds>)...};
-}
-std::vector<ForceDescription> OneOfEach() {
-  return OneOfEach(std::make_index_sequence<std::variant_size_v<ForceDescription>>());
-}
-
 /// Joints that carry no single coordinate have no room for a force.
 void ReadJoint(const JsonNode& node, Force& force) {
   const auto index = ReadJointName(node, *force.draft);
@@ -109,8 +100,8 @@ void AddVector(Rows* rows) {
 void AddNumber(const ForceParts& parts, std::size_t i, Rows* rows) {
   const ForceNumber& number = parts.numbers[i];
   const Range range = number.any_sign ? Range{} : kNotNegative;
-  const std::string_view of_angle = UnitOf(number.quantity, false);
-  const std::string_view of_length = UnitOf(number.quantity, true);
+  const std::string_view of_angle = number.quantity.of_angle;
+  const std::string_view of_length = number.quantity.of_length;
   std::string units = fmt::format("[{}]", of_angle);
   if (of_length != of_angle) units += fmt::format(" or [{}]", of_length);
   const double standard = *number.value;
@@ -152,11 +143,11 @@ Fields<Force> FieldsOf(ForceDescription kind) {
   return {std::string(parts.name), std::string(parts.sentence), std::move(rows)};
 }
 
-/// In the order of ForceDescription.
+/// In the order of ForceKinds().
 const std::vector<Fields<Force>>& AllFields() {
   static const std::vector<Fields<Force>> all = [] {
     std::vector<Fields<Force>> fields;
-    for (const ForceDescription& kind : OneOfEach()) fields.push_back(FieldsOf(kind));
+    for (const ForceDescription& kind : ForceKinds()) fields.push_back(FieldsOf(kind));
     return fields;
   }();
   return all;
@@ -165,7 +156,7 @@ const std::vector<Fields<Force>>& AllFields() {
 ForceDescription ReadForce(const JsonNode& node, const Draft& draft) {
   static const NameList types = [] {
     NameList names;
-    for (ForceDescription& kind : OneOfEach()) names.Add(std::string(PartsOf(kind).name));
+    for (ForceDescription kind : ForceKinds()) names.Add(std::string(PartsOf(kind).name));
     return names;
   }();
   std::optional<int> type;
@@ -176,7 +167,7 @@ ForceDescription ReadForce(const JsonNode& node, const Draft& draft) {
   }
   if (!type) return JointTorque{};
   const auto kind = static_cast<std::size_t>(*type);
-  ForceDescription force = OneOfEach()[kind];
+  ForceDescription force = ForceKinds()[kind];
   const std::vector<BodyPoint*> points = PartsOf(force).points;
   // ends are not known yet: -1 matches no other
   for (BodyPoint* end : points) end->body = points.size() > 1 ? -1 : end->body;

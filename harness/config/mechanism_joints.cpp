@@ -60,13 +60,31 @@ void ReadAxis(const JsonNode& node, Joint& joint) {
 Range RangeOf(const JointParameter& parameter) { return parameter.positive ? kPositive : Range{}; }
 
 /// A number that joints of some types must have and no other may.
+struct ParameterKey {
+  JointParameter parameter;
+  std::vector<std::string> types;
+};
+
+std::vector<ParameterKey> ParameterKeys() {
+  std::vector<ParameterKey> keys;
+  for (const JointTraits& traits : AllJointTraits()) {
+    if (traits.parameter.key.empty()) continue;
+    auto known = std::ranges::find(keys, traits.parameter.key,
+                                   [](const ParameterKey& other) { return other.parameter.key; });
+    if (known == keys.end()) known = keys.insert(keys.end(), {traits.parameter, {}});
+    known->types.emplace_back(traits.name);
+  }
+  return keys;
+}
+
 void ReadParameter(const JsonNode& node, Joint& joint) {
-  for (const JointTraits& traits : kJointTraits) {
-    const std::string key(traits.parameter.key);
-    if (key.empty()) continue;
-    if (traits.name == ToString(joint.type)) {
-      const auto found = node.Required(key, traits.parameter.meaning);
-      joint.parameter = found ? found->Number(RangeOf(traits.parameter)) : 1.0;
+  static const std::vector<ParameterKey> keys = ParameterKeys();
+  const JointParameter& own = TraitsOf(joint.type).parameter;
+  for (const ParameterKey& known : keys) {
+    const std::string key(known.parameter.key);
+    if (key == own.key) {
+      const auto found = node.Required(key, own.meaning);
+      joint.parameter = found ? found->Number(RangeOf(own)) : 1.0;
     } else if (const auto found = node.Optional(key)) {
       found->Fail(fmt::format("no {} on a {} joint", key, ToString(joint.type)));
     }
@@ -139,46 +157,49 @@ void CheckSides(const JsonNode& node, Joint& joint) {
       "two different bodies");
 }
 
-/// Keys that joints of one type must have and others may not.
-Json ParameterRules() {
+/// Keys that joints of some types must have and others may not, and the rule that says so.
+void AddParameters(std::vector<Field<Joint>>* rows) {
   Json rules = Json::array();
-  for (const JointTraits& traits : kJointTraits) {
-    const std::string key(traits.parameter.key);
-    if (key.empty()) continue;
-    rules.push_back({{"if", {{"properties", {{"type", ChoiceSchema({std::string(traits.name)})}}}}},
+  for (const auto& [parameter, types] : ParameterKeys()) {
+    const std::string key(parameter.key);
+    rows->push_back(
+        {key, NumberSchema(RangeOf(parameter)),
+         fmt::format("Of a {} joint: {}.", fmt::join(types, " or "), parameter.meaning)});
+    rules.push_back({{"if", {{"properties", {{"type", ChoiceSchema(types)}}}}},
                      {"then", Requires({key})},
                      {"else", {{"not", Requires({key})}}}});
   }
-  return {{"allOf", rules}};
+  rows->push_back({"", By({{"allOf", rules}}, ReadParameter)});
 }
 
 void ReadNameOfJoint(const JsonNode& node, Joint& joint) {
   joint.name = ReadNewName(node, joint.draft->joint_names);
 }
 
+Fields<Joint> MakeJointFields() {
+  const Json motions = EitherSchema({TimeFunctionSchema(), ArraySchema(MotionFields().Schema())});
+  std::vector<Field<Joint>> rows = {
+      {"name", By(TextSchema(), ReadNameOfJoint), "One that no other joint has.", "a name"},
+      {"type", By(ChoiceSchema(JointTypeNames().all()), ReadType), "What it leaves free.",
+       "a joint type", IsMissingInPlane},
+      {"from", Part(&JointDescription::from, SideFields()), "Where F is.",
+       "an object with keys \"body\", \"at\", \"rotation\""},
+      {"to", Part(&JointDescription::to, SideFields()), "Where M is.",
+       "an object with keys \"body\", \"at\", \"rotation\""},
+      {"", By(Json::object(), CheckSides)},
+      {"axis", By(VectorSchema(), ReadAxis),
+       "Of a revolute (default z) or prismatic joint (default x), not zero."}};
+  AddParameters(&rows);
+  rows.push_back({"motion", By(motions, ReadMotions),
+                  "Coordinates as given functions of time [rad or m]: one function for a joint "
+                  "with one coordinate, else a list."});
+  rows.push_back({"cut", Bool(&JointDescription::cut),
+                  "This joint closes its loop: it carries no joint coordinate."});
+  return {"joint", "From frame F on one body to frame M on another.", std::move(rows)};
+}
+
 const Fields<Joint>& JointFields() {
-  static const Json motions =
-      EitherSchema({TimeFunctionSchema(), ArraySchema(MotionFields().Schema())});
-  static const Fields<Joint> fields(
-      "joint", "From frame F on one body to frame M on another.",
-      {{"name", By(TextSchema(), ReadNameOfJoint), "One that no other joint has.", "a name"},
-       {"type", By(ChoiceSchema(JointTypeNames().all()), ReadType), "What it leaves free.",
-        "a joint type", IsMissingInPlane},
-       {"from", Part(&JointDescription::from, SideFields()), "Where F is.",
-        "an object with keys \"body\", \"at\", \"rotation\""},
-       {"to", Part(&JointDescription::to, SideFields()), "Where M is.",
-        "an object with keys \"body\", \"at\", \"rotation\""},
-       {"", By(Json::object(), CheckSides)},
-       {"axis", By(VectorSchema(), ReadAxis),
-        "Of a revolute (default z) or prismatic joint (default x), not zero."},
-       {"pitch", NumberSchema(), "Of a helical joint: advance along its axis per angle [m/rad]."},
-       {"length", NumberSchema(kPositive), "Of a rod: distance of its two points [m]."},
-       {"", By(ParameterRules(), ReadParameter)},
-       {"motion", By(motions, ReadMotions),
-        "Coordinates as given functions of time [rad or m]: one function for a joint with one "
-        "coordinate, else a list."},
-       {"cut", Bool(&JointDescription::cut),
-        "This joint closes its loop: it carries no joint coordinate."}});
+  static const Fields<Joint> fields = MakeJointFields();
   return fields;
 }
 
@@ -196,7 +217,7 @@ void ReadJoints(const JsonNode& node, Draft& draft) {
 const NameList& JointTypeNames() {
   static const NameList kNames = [] {
     std::vector<std::string> names;
-    for (const JointTraits& traits : kJointTraits) names.emplace_back(traits.name);
+    for (const JointTraits& traits : AllJointTraits()) names.emplace_back(traits.name);
     return names;
   }();
   return kNames;

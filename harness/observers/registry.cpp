@@ -2,7 +2,7 @@
 
 #include <algorithm>
 
-#include "mechanism/formulation/registration.h"
+#include "mechanism/description/registration.h"
 
 namespace loopbench::harness {
 
@@ -19,8 +19,8 @@ void RegisterObserver(ObserverRow row, int alignment) {
   const bool taken = std::ranges::find(Rows(), row.name, &ObserverRow::name) != Rows().end();
   RequireSound({.kind = "observer",
                 .name = row.name,
-                .sentence = row.sentence,
                 .is_taken = taken,
+                .has_sentence = !row.sentence.empty(),
                 .has_factories = row.planar && row.spatial,
                 .alignment = alignment});
   AddMeasures(row.measures);

@@ -26,7 +26,7 @@ template <class Space>
 using ObserverFactory = std::function<std::unique_ptr<Observer<Space>>(const Watched<Space>&)>;
 
 struct ObserverRow {
-  std::string name;      ///< a word: a-z, 0-9 and '-'
+  std::string name;      ///< a word: a-z, 0-9, '-' and '_'
   std::string sentence;  ///< what `explain` says of it, after "name: "
   ObserverFactory<Planar> planar;
   ObserverFactory<Spatial> spatial;
@@ -48,7 +48,7 @@ ObserverRow ObserverRowOf(std::string name, std::string sentence, std::vector<Me
 }
 
 /// Adds an observer and its measures; not while experiments run. Throws std::invalid_argument for a
-/// row that is not sound (mechanism/formulation/registration.h), and for a measure that cannot be
+/// row that is not sound (mechanism/description/registration.h), and for a measure that cannot be
 /// (AddMeasures()): then nothing is added.
 void RegisterObserver(ObserverRow row, int alignment = EIGEN_MAX_STATIC_ALIGN_BYTES);
 

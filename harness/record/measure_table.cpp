@@ -5,7 +5,7 @@
 #include <string>
 
 #include "harness/record/measures.h"
-#include "mechanism/formulation/registration.h"
+#include "mechanism/description/registration.h"
 
 namespace loopbench::harness {
 namespace {

@@ -29,6 +29,14 @@ MechanismDescription PlanarPart(const Experiment& experiment, const ExperimentSc
     throw ConfigError(fmt::format("{}: /precision: scene \"{}\": found {}, expected {}",
                                   experiment.path.string(), scene.name, found, expected));
   };
+  for (const JointDescription& joint : description.joints) {
+    if (!IsBuiltIn(joint.type)) refuse("a joint of another program", "kinds in all scalars");
+  }
+  for (const ForceDescription& force : description.forces) {
+    if (std::holds_alternative<OtherForce>(force)) {
+      refuse("a force of another program", "forces in all scalars");
+    }
+  }
   if (description.space != SpaceKind::kPlanar) refuse("a spatial mechanism", "planar ones");
   const Mechanism<Planar, double> mechanism(description, Coordinates::kJoint);
   if (!mechanism.stop_times().empty()) {

@@ -1,6 +1,5 @@
 #include "mechanism/description/force.h"
 
-#include <array>
 #include <cmath>
 
 #include "mechanism/description/description.h"
@@ -9,24 +8,11 @@ namespace loopbench {
 
 namespace {
 
-/// Powers of length: of an angle's effort, N m, two; forces grow with lengths (similarity.h).
-struct Unit {
-  std::string_view of_angle, of_length;
-  int power_of_angle, power_of_length;
-};
-
-// in the order of Quantity
-constexpr std::array<Unit, 9> kUnits = {{{"rad", "m", 0, 1},
-                                         {"N m", "N", 2, 1},
-                                         {"N m/rad", "N/m", 2, 0},
-                                         {"N m s/rad", "N s/m", 2, 0},
-                                         {"m", "m", 1, 1},
-                                         {"N", "N", 1, 1},
-                                         {"N/m", "N/m", 0, 0},
-                                         {"N s/m", "N s/m", 0, 0},
-                                         {"N s^2/m^2", "N s^2/m^2", -1, -1}}};  // -1 at least
-
-const Unit& Of(Quantity quantity) { return kUnits.at(static_cast<std::size_t>(quantity)); }
+std::deque<ForceDescription>& Kinds() {
+  static std::deque<ForceDescription> kinds = {JointTorque{}, JointSpring{},  JointDamper{},
+                                               PointForce{},  SpringDamper{}, Drag{}};
+  return kinds;
+}
 
 /// The first thing wrong with a force.
 class Validator {
@@ -81,15 +67,16 @@ class Validator {
 
 }  // namespace
 
-std::string_view UnitOf(Quantity quantity, bool is_length) {
-  return is_length ? Of(quantity).of_length : Of(quantity).of_angle;
+double Quantity::AtScale(double value, bool is_length, double factor) const {
+  const int power = is_length ? power_of_length : power_of_angle;
+  for (int i = 0; i < power; ++i) value *= factor;
+  for (int i = 0; i > power; --i) value /= factor;
+  return value;
 }
 
-double AtScale(double value, Quantity quantity, bool is_length, double factor) {
-  const int power = is_length ? Of(quantity).power_of_length : Of(quantity).power_of_angle;
-  for (int i = 0; i < power; ++i) value *= factor;
-  return power < 0 ? value / factor : value;
-}
+const std::deque<ForceDescription>& ForceKinds() { return Kinds(); }
+
+void AddForceKind(OtherForce force) { Kinds().push_back(std::move(force)); }
 
 std::string ValidateForce(const MechanismDescription& description, ForceDescription force) {
   const ForceParts parts = PartsOf(force);

@@ -2,12 +2,16 @@
 //
 // Readers, schemas, validation, change of scale, `explain` and the compile step know the parts of a
 // force alone: a joint, points of bodies, numbers with their units, a vector, a function of time.
-// What a force does with them stands in mechanism/model/force_NAME.h.
+// What a force does with them stands in mechanism/model/force_NAME.h. Other programs add kinds of
+// their own (mechanism/model/registry.h).
 #pragma once
 
 #include <Eigen/Core>
+#include <any>
+#include <deque>
 #include <string>
 #include <string_view>
+#include <utility>
 #include <variant>
 #include <vector>
 
@@ -24,24 +28,32 @@ struct BodyPoint {
   Eigen::Vector3d at = Eigen::Vector3d::Zero();  ///< in body axes from the body's origin [m]
 };
 
-/// What a number of a force is, which says its unit. An effort is a moment or a force along a
-/// joint's coordinate.
-enum class Quantity {
-  kCoordinate,           ///< rad or m
-  kEffort,               ///< N m or N
-  kEffortPerCoordinate,  ///< N m/rad or N/m
-  kEffortPerSpeed,       ///< N m s/rad or N s/m
-  kLength,               ///< m
-  kForce,                ///< N
-  kForcePerLength,       ///< N/m
-  kForcePerSpeed,        ///< N s/m
-  kForcePerSpeedSquared  ///< N s^2/m^2
+/// What a number of a force is: its unit at a joint that turns and its unit elsewhere, with the
+/// powers of length in them, a force counting as one. By these it grows when all lengths do and
+/// angles move as before (similarity.h).
+struct Quantity {
+  std::string_view of_angle, of_length;
+  int power_of_angle = 0, power_of_length = 0;
+
+  std::string_view Unit(bool is_length) const { return is_length ? of_length : of_angle; }
+  /// A value when all lengths have grown by `factor`.
+  double AtScale(double value, bool is_length, double factor) const;
+
+  friend bool operator==(const Quantity&, const Quantity&) = default;
 };
 
-/// The unit; along a joint that of a coordinate that is an angle, or a length.
-std::string_view UnitOf(Quantity quantity, bool is_length);
-/// A value when all lengths have grown by `factor` and angles move as before (similarity.h).
-double AtScale(double value, Quantity quantity, bool is_length, double factor);
+/// An effort is a moment or a force along a joint's coordinate.
+namespace quantity {
+inline constexpr Quantity kCoordinate = {"rad", "m", 0, 1};
+inline constexpr Quantity kEffort = {"N m", "N", 2, 1};
+inline constexpr Quantity kEffortPerCoordinate = {"N m/rad", "N/m", 2, 0};
+inline constexpr Quantity kEffortPerSpeed = {"N m s/rad", "N s/m", 2, 0};
+inline constexpr Quantity kLength = {"m", "m", 1, 1};
+inline constexpr Quantity kForce = {"N", "N", 1, 1};
+inline constexpr Quantity kForcePerLength = {"N/m", "N/m", 0, 0};
+inline constexpr Quantity kForcePerSpeed = {"N s/m", "N s/m", 0, 0};
+inline constexpr Quantity kForcePerSpeedSquared = {"N s^2/m^2", "N s^2/m^2", -1, -1};
+}  // namespace quantity
 
 /// Whether files must give a part: always, at least one of those marked so, or not at all.
 enum class Need { kAlways, kOneOf, kNot };
@@ -92,10 +104,10 @@ inline ForceParts PartsOf(JointSpring& f) {
   return {.name = "joint_spring",
           .sentence = "preload - stiffness (q - rest) on the joint's coordinate q.",
           .joint = &f.joint,
-          .numbers = {{"stiffness", &f.stiffness, Quantity::kEffortPerCoordinate, Need::kAlways},
-                      {"rest", &f.rest, Quantity::kCoordinate, Need::kNot,
+          .numbers = {{"stiffness", &f.stiffness, quantity::kEffortPerCoordinate, Need::kAlways},
+                      {"rest", &f.rest, quantity::kCoordinate, Need::kNot,
                        "Coordinate at which only the preload is left", true},
-                      {"preload", &f.preload, Quantity::kEffort, Need::kNot, "", true}}};
+                      {"preload", &f.preload, quantity::kEffort, Need::kNot, "", true}}};
 }
 
 /// Linear damper on the joint's speed: -damping * u.
@@ -107,7 +119,7 @@ inline ForceParts PartsOf(JointDamper& f) {
   return {.name = "joint_damper",
           .sentence = "-damping u on the joint's speed u.",
           .joint = &f.joint,
-          .numbers = {{"damping", &f.damping, Quantity::kEffortPerSpeed, Need::kAlways}}};
+          .numbers = {{"damping", &f.damping, quantity::kEffortPerSpeed, Need::kAlways}}};
 }
 
 /// Constant force at a material point of a body.
@@ -142,11 +154,11 @@ inline ForceParts PartsOf(SpringDamper& f) {
       .sentence =
           "The tension preload + stiffness (d - length) + damping d' between points at distance d.",
       .points = {&f.from, &f.to},
-      .numbers = {{"stiffness", &f.stiffness, Quantity::kForcePerLength, Need::kOneOf},
-                  {"damping", &f.damping, Quantity::kForcePerSpeed, Need::kOneOf},
-                  {"length", &f.length, Quantity::kLength, Need::kNot,
+      .numbers = {{"stiffness", &f.stiffness, quantity::kForcePerLength, Need::kOneOf},
+                  {"damping", &f.damping, quantity::kForcePerSpeed, Need::kOneOf},
+                  {"length", &f.length, quantity::kLength, Need::kNot,
                    "Distance of the points at which only the preload is left"},
-                  {"preload", &f.preload, Quantity::kForce, Need::kOneOf,
+                  {"preload", &f.preload, quantity::kForce, Need::kOneOf,
                    "Tension at that distance", true}}};
 }
 
@@ -160,18 +172,46 @@ inline ForceParts PartsOf(Drag& f) {
   return {.name = "drag",
           .sentence = "-(linear + quadratic |v|) v at a point of velocity v.",
           .points = {&f.point},
-          .numbers = {{"linear", &f.linear, Quantity::kForcePerSpeed, Need::kOneOf},
-                      {"quadratic", &f.quadratic, Quantity::kForcePerSpeedSquared, Need::kOneOf}}};
+          .numbers = {{"linear", &f.linear, quantity::kForcePerSpeed, Need::kOneOf},
+                      {"quadratic", &f.quadratic, quantity::kForcePerSpeedSquared, Need::kOneOf}}};
 }
 
+/// What compiles a kind of another program (mechanism/model/registry.h).
+struct ForceCompiler;
+
+/// A force of such a kind: its own struct, of which the parts are known.
+class OtherForce {
+ public:
+  template <class Description>
+  OtherForce(Description force, const ForceCompiler* compiler)
+      : force_(std::move(force)),
+        parts_([](std::any& any) { return PartsOf(*std::any_cast<Description>(&any)); }),
+        compiler_(compiler) {}
+
+  const std::any& force() const { return force_; }
+  const ForceCompiler& compiler() const { return *compiler_; }
+  friend ForceParts PartsOf(OtherForce& f) { return f.parts_(f.force_); }
+
+ private:
+  std::any force_;
+  ForceParts (*parts_)(std::any&);
+  const ForceCompiler* compiler_;
+};
+
 using ForceDescription =
-    std::variant<JointTorque, JointSpring, JointDamper, PointForce, SpringDamper, Drag>;
+    std::variant<JointTorque, JointSpring, JointDamper, PointForce, SpringDamper, Drag, OtherForce>;
 
 /// Parts of a force, which stays where it is while they are used. Who may not change it takes them
 /// of a copy.
 inline ForceParts PartsOf(ForceDescription& force) {
   return std::visit([](auto& one) { return PartsOf(one); }, force);
 }
+
+/// One force of each kind, of which nothing is said: the built-in kinds, then those of other
+/// programs. They stay where they are.
+const std::deque<ForceDescription>& ForceKinds();
+/// RegisterForce() is what programs call: a kind needs an element too.
+void AddForceKind(OtherForce force);
 
 struct MechanismDescription;
 /// "" or what makes a force unusable: joints with several coordinates, points of bodies that do not

@@ -3,7 +3,7 @@
 // two together.
 #pragma once
 
-#include <array>
+#include <deque>
 #include <string_view>
 #include <vector>
 
@@ -12,7 +12,7 @@ namespace loopbench {
 enum class SpaceKind { kPlanar, kSpatial };
 std::string_view ToString(SpaceKind space);
 
-/// What a joint leaves free.
+/// What a joint leaves free. Kinds of other programs have the numbers after these.
 enum class JointType {
   kRevolute,
   kPrismatic,
@@ -65,66 +65,18 @@ struct JointTraits {
   JointParameter parameter = {};
 };
 
-/// In the order of JointType.
-inline constexpr std::array kJointTraits = {
-    JointTraits{.name = "revolute",
-                .in_plane = true,
-                .own_axis = 'z',
-                .planar = "angle",
-                .coordinates = "angle",
-                .axes = {"z", "z"},
-                .flat = {.possible = true, .turns = true}},
-    JointTraits{.name = "prismatic",
-                .in_plane = true,
-                .own_axis = 'x',
-                .planar = "shift",
-                .coordinates = "shift",
-                .planar_axes = {"x", "x"},
-                .axes = {"x", "x"},
-                .flat = {.possible = true, .slides = true}},
-    JointTraits{.name = "weld", .in_plane = true, .flat = {.possible = true}},
-    JointTraits{.name = "free",
-                .in_plane = true,
-                .planar = "angle, x, y",
-                .coordinates = "qw, qx, qy, qz, x, y, z",
-                .speeds = "wx, wy, wz, x, y, z"},
-    JointTraits{.name = "pin-in-slot",
-                .in_plane = true,
-                .own_axis = 'x',
-                .planar = "angle, shift",
-                .coordinates = "angle, shift",
-                .planar_axes = {"x", ""},
-                .axes = {"zx", "z"},
-                .flat = {.possible = true, .turns = true, .slides = true}},
-    JointTraits{.name = "rod",
-                .in_plane = true,
-                .force = "the force along the rod",
-                .parameter = {"length", "the distance of the two points [m]", "m", true}},
-    JointTraits{
-        .name = "cylindrical", .own_axis = 'z', .coordinates = "angle, shift", .axes = {"z", "z"}},
-    JointTraits{.name = "spherical", .coordinates = "qw, qx, qy, qz", .speeds = "wx, wy, wz"},
-    JointTraits{.name = "planar",
-                .own_axis = 'z',
-                .coordinates = "angle, x, y",
-                .axes = {"z", "z"},
-                .flat = {.possible = true, .turns = true, .is_free = true}},
-    JointTraits{.name = "universal",
-                .coordinates = "angle about x, angle about y",
-                .axes = {"x", "y"},
-                .moment = "the moment about the normal of its two axes"},
-    JointTraits{.name = "helical",
-                .own_axis = 'z',
-                .coordinates = "angle",
-                .axes = {"z", "z"},
-                .cut_last = true,
-                .parameter = {"pitch", "the advance along the axis per angle [m/rad]", "m/rad"}},
-};
-inline constexpr int kNumJointTypes = static_cast<int>(kJointTraits.size());
+/// All kinds in the order of JointType: the built-in ones, then those of other programs
+/// (mechanism/model/registry.h). Rows stay where they are.
+const std::deque<JointTraits>& AllJointTraits();
+/// Adds a row, whose texts live as long as the program, and gives its number. RegisterJoint() is
+/// what programs call: a kind needs functions too.
+JointType AddJointTraits(const JointTraits& traits);
 
-constexpr const JointTraits& TraitsOf(JointType type) {
-  return kJointTraits.at(static_cast<std::size_t>(type));
-}
-constexpr std::string_view ToString(JointType type) { return TraitsOf(type).name; }
+/// Whether a kind comes with Loopbench, and so exists in all scalars.
+bool IsBuiltIn(JointType type);
+
+const JointTraits& TraitsOf(JointType type);
+std::string_view ToString(JointType type);
 
 /// A coordinate or speed of a joint.
 struct ValueWord {
@@ -135,6 +87,7 @@ struct ValueWord {
   bool is_length() const { return unit.starts_with('m'); }
 };
 
+std::vector<ValueWord> ValueWords(const JointTraits& traits, SpaceKind space, bool speeds);
 std::vector<ValueWord> ValueWords(JointType type, SpaceKind space, bool speeds);
 int NumValues(JointType type, SpaceKind space, bool speeds);
 

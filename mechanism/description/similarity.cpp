@@ -30,7 +30,8 @@ class Scaling {
       JointDescription& joint = scene_.joints[index];
       joint.from.position *= factor_;
       joint.to.position *= factor_;
-      joint.parameter *= factor_;
+      const bool is_length = TraitsOf(joint.type).parameter.unit.starts_with('m');
+      joint.parameter *= is_length ? factor_ : 1.0;
       for (PrescribedMotion& motion : joint.motions) {
         if (IsLength(index, motion.coordinate, false)) Scale(motion.value, factor_);
       }
@@ -50,10 +51,10 @@ class Scaling {
     const bool is_length = parts.joint == nullptr || IsLength(*parts.joint, 0, false);
     for (BodyPoint* point : parts.points) point->at *= factor_;
     if (parts.force != nullptr) *parts.force *= factor_;
-    if (parts.value != nullptr)
-      Scale(*parts.value, AtScale(1.0, Quantity::kEffort, is_length, factor_));
+    const double effort = quantity::kEffort.AtScale(1.0, is_length, factor_);
+    if (parts.value != nullptr) Scale(*parts.value, effort);
     for (const ForceNumber& number : parts.numbers) {
-      *number.value = loopbench::AtScale(*number.value, number.quantity, is_length, factor_);
+      *number.value = number.quantity.AtScale(*number.value, is_length, factor_);
     }
   }
 

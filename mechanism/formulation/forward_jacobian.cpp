@@ -2,7 +2,7 @@
 
 #include <algorithm>
 
-#include "mechanism/formulation/registration.h"
+#include "mechanism/description/registration.h"
 
 namespace loopbench {
 

@@ -1,7 +1,7 @@
 #include "mechanism/formulation/level.h"
 
 #include "mechanism/algebra/instantiate.h"
-#include "mechanism/formulation/registration.h"
+#include "mechanism/description/registration.h"
 
 namespace loopbench {
 

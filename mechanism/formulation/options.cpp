@@ -3,7 +3,7 @@
 #include <algorithm>
 
 #include "mechanism/formulation/level.h"
-#include "mechanism/formulation/registration.h"
+#include "mechanism/description/registration.h"
 
 namespace loopbench {
 

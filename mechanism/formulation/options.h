@@ -29,7 +29,7 @@ enum class DriftGrowth {
 
 /// What a level is called and what it lets one expect; what it does stands in level.h.
 struct LevelTraits {
-  std::string name;      ///< in files and tables: a-z, 0-9 and '-'
+  std::string name;      ///< in files and tables: a-z, 0-9, '-' and '_'
   std::string sentence;  ///< what `explain` says of it, after "name: "
   DriftGrowth growth = DriftGrowth::kSquare;
   std::string abbreviation = {};  ///< in tables of a terminal; empty: the name

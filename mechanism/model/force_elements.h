@@ -7,6 +7,7 @@
 #include <vector>
 
 #include "mechanism/model/force_joint.h"
+#include "mechanism/model/force_other.h"
 #include "mechanism/model/force_point.h"
 #include "mechanism/model/force_spring.h"
 

@@ -1,7 +1,10 @@
 #include "mechanism/model/joint.h"
 
 #include <cmath>
+#include <deque>
 #include <numbers>
+#include <stdexcept>
+#include <string>
 #include <vector>
 
 #include "mechanism/algebra/instantiate.h"
@@ -9,17 +12,38 @@
 
 namespace loopbench {
 
+namespace {
+
+/// Kinds that do not exist in the plane have no functions there, or no place behind the last.
+template <class Space, class S>
+std::deque<JointKind<Space, S>>& KindsOf() {
+  static std::deque<JointKind<Space, S>> kinds = [] {
+    std::vector<JointKind<Space, S>> built_in;
+    if constexpr (Space::kRot == 1) {
+      built_in = PlanarKinds<S>();
+    } else {
+      built_in = SpatialKinds<S>();
+    }
+    return std::deque<JointKind<Space, S>>(built_in.begin(), built_in.end());
+  }();
+  return kinds;
+}
+
+}  // namespace
+
+template <class Space, class S>
+void AddKind(JointType type, const JointKind<Space, S>& kind) {
+  KindsOf<Space, S>().resize(static_cast<std::size_t>(type));
+  KindsOf<Space, S>().push_back(kind);
+}
+
 template <class Space, class S>
 const JointKind<Space, S>& KindOf(JointType type) {
-  const auto all = [] {
-    if constexpr (Space::kRot == 1) {
-      return PlanarKinds<S>();
-    } else {
-      return SpatialKinds<S>();
-    }
-  };
-  static const std::vector<JointKind<Space, S>> kKinds = all();
-  return kKinds.at(static_cast<std::size_t>(type));
+  const auto index = static_cast<std::size_t>(type);
+  const auto& kinds = KindsOf<Space, S>();
+  if (index < kinds.size()) return kinds[index];
+  throw std::invalid_argument("joints of kind \"" + std::string(ToString(type)) +
+                              "\" do not exist here: not in a plane, or in double alone");
 }
 
 template <class Space, class S>
@@ -55,9 +79,10 @@ Velocity<Space, S> Mismatch(const JointKind<Space, S>& kind, const Pose<Space, S
   return mismatch;
 }
 
-#define LOOPBENCH_INSTANTIATE(Space, S)                  \
-  template const JointKind<Space, S>& KindOf(JointType); \
-  template JointKind<Space, S> KindWith(JointType, S);   \
+#define LOOPBENCH_INSTANTIATE(Space, S)                         \
+  template void AddKind(JointType, const JointKind<Space, S>&); \
+  template const JointKind<Space, S>& KindOf(JointType);        \
+  template JointKind<Space, S> KindWith(JointType, S);          \
   template Velocity<Space, S> Mismatch(const JointKind<Space, S>&, const Pose<Space, S>&);
 LOOPBENCH_FOR_EACH_SPACE_AND_MODEL_SCALAR(LOOPBENCH_INSTANTIATE)
 #undef LOOPBENCH_INSTANTIATE

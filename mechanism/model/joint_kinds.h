@@ -1,4 +1,5 @@
-// The kinds of joints of each space, in the order of JointType; for joint.cpp alone.
+// The kinds of joints of each space, in the order of JointType; for joint.cpp and registry.cpp
+// alone.
 #pragma once
 
 #include <vector>
@@ -12,6 +13,10 @@ std::vector<JointKind<Planar, S>> PlanarKinds();
 
 template <class S>
 std::vector<JointKind<Spatial, S>> SpatialKinds();
+
+/// Adds a kind's functions under the number that its traits have got.
+template <class Space, class S>
+void AddKind(JointType type, const JointKind<Space, S>& kind);
 
 /// qdot = u, for kinds whose speeds are the rates of their coordinates.
 template <class S, int n>

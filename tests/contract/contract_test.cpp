@@ -132,6 +132,7 @@ struct HasPower {
   bool operator()(const PointForce& force) const { return force.in_body_axes; }
   bool operator()(const SpringDamper& spring) const { return spring.damping != 0.0; }
   bool operator()(const Drag& drag) const { return drag.linear != 0.0 || drag.quadratic != 0.0; }
+  bool operator()(const OtherForce&) const { return true; }  // nobody knows
 };
 
 bool IsConservative(const MechanismDescription& description) {

@@ -24,7 +24,7 @@ int Append(Builder& b, JointType type, int parent) {
 MechanismDescription ChainOfEveryKind(int n, SpaceKind space, std::uint64_t seed) {
   Builder b("every-kind-" + std::to_string(n), space, seed);
   std::vector<JointType> kinds;
-  for (int k = 0; k < kNumJointTypes; ++k) {
+  for (int k = 0; k < std::ssize(AllJointTraits()); ++k) {
     const auto type = static_cast<JointType>(k);
     if (type == JointType::kFree || type == JointType::kRod) continue;
     if (b.spatial || TraitsOf(type).in_plane) kinds.push_back(type);

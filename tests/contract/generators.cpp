@@ -30,7 +30,8 @@ int Grow(Builder& b, int root, int n) {
 /// A joint of any kind that the space has.
 JointType AnyJoint(Builder& b) {
   for (;;) {
-    const auto type = static_cast<JointType>(b.random.Below(kNumJointTypes));
+    const auto type =
+        static_cast<JointType>(b.random.Below(static_cast<int>(AllJointTraits().size())));
     if (b.spatial || TraitsOf(type).in_plane) return type;
   }
 }

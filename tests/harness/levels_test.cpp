@@ -126,7 +126,7 @@ TEST(LevelsTest, ARowThatCannotBeIsRefused) {
   EXPECT_EQ(refusal(row), "level \"velocity\": found it again, expected each name once");
   for (const char* name : {"", "Half", "half velocity", "-half"}) {
     row.traits.name = name;
-    ExpectPart(refusal(row), "found no word, expected a-z, 0-9 and '-'");
+    ExpectPart(refusal(row), "found no word, expected a-z, 0-9, '-' and '_'");
   }
   row = Half();
   row.traits.sentence.clear();

@@ -125,7 +125,7 @@ TEST(ObserversTest, ARowThatCannotBeIsRefused) {
   };
   ObserverRow row = Hasty();
   row.name = "Haste";
-  EXPECT_EQ(refusal(row), "observer \"Haste\": found no word, expected a-z, 0-9 and '-'");
+  EXPECT_EQ(refusal(row), "observer \"Haste\": found no word, expected a-z, 0-9, '-' and '_'");
   row = Hasty();
   row.sentence.clear();
   ExpectPart(refusal(row), "observer \"haste\": found no sentence");

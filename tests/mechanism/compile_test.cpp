@@ -157,21 +157,9 @@ MechanismDescription Beside(MechanismDescription a, const MechanismDescription& 
     a.joints.push_back(joint);
   }
   for (ForceDescription force : b.forces) {
-    std::visit(
-        [&](auto& f) {
-          const auto shift = [&](int* body) { *body += *body == kGround ? 0 : bodies; };
-          if constexpr (requires { f.joint; }) {
-            f.joint += joints;
-          } else if constexpr (requires { f.point; }) {
-            shift(&f.point.body);
-          } else if constexpr (requires { f.from; }) {
-            shift(&f.from.body);
-            shift(&f.to.body);
-          } else {
-            shift(&f.body);
-          }
-        },
-        force);
+    const ForceParts parts = PartsOf(force);
+    if (parts.joint != nullptr) *parts.joint += joints;
+    for (BodyPoint* point : parts.points) point->body += point->body == kGround ? 0 : bodies;
     a.forces.push_back(force);
   }
   for (JointValues values : b.initial.coordinates) {

@@ -58,7 +58,7 @@ TYPED_TEST_SUITE(ForcesTest, Spaces);
 
 TYPED_TEST(ForcesTest, WrenchesAgreeWithTheOracleAtAnyTime) {
   using Space = TypeParam;
-  std::vector<int> kinds(std::variant_size_v<ForceDescription>);
+  std::vector<int> kinds(ForceKinds().size());
   int timed = 0;
   ForBothSets<Space>(Samples<Space>(), [&](const auto& d, const auto& mechanism, const State& at) {
     for (const ForceDescription& force : d.forces) ++kinds[force.index()];

@@ -20,7 +20,7 @@ constexpr double kParameter = 0.3;  // pitch [m/rad] or length [m]; for other ki
 template <class Space>
 std::vector<JointType> Types() {
   std::vector<JointType> types;
-  for (int i = 0; i < kNumJointTypes; ++i) {
+  for (int i = 0; i < std::ssize(AllJointTraits()); ++i) {
     const auto type = static_cast<JointType>(i);
     if (type == JointType::kRod) continue;  // it has no transform: tests of its own
     if (Space::kRot == 3 || TraitsOf(type).in_plane) types.push_back(type);

@@ -52,7 +52,8 @@ inline std::vector<JointType> Kinds(Builder& b, int count, int least) {
     std::vector<JointType> kinds;
     int freedom = 0, turning = 0;
     while (static_cast<int>(kinds.size()) < count) {
-      const auto type = static_cast<JointType>(b.random.Below(kNumJointTypes));
+      const auto type =
+          static_cast<JointType>(b.random.Below(static_cast<int>(AllJointTraits().size())));
       if (type == JointType::kFree || type == JointType::kRod) continue;
       if (!b.spatial && !TraitsOf(type).in_plane) continue;
       kinds.push_back(type);

@@ -1,5 +1,6 @@
-// What every row has that a program adds before it calls loopbench::Main(): a formulation
-// (harness/config/formulations.h), a level (level.h) or an observer (harness/observers/registry.h).
+// What every row has that a program adds before it calls loopbench::Main(): a joint kind or a force
+// (mechanism/model/registry.h), a level (mechanism/formulation/level.h), a formulation
+// (harness/config/formulations.h) or an observer (harness/observers/registry.h).
 #pragma once
 
 #include <Eigen/Core>
@@ -9,9 +10,10 @@ namespace loopbench {
 
 struct NewRow {
   std::string_view kind;  ///< "level"
-  std::string_view name, sentence;
+  std::string_view name;
   bool is_taken = false;  ///< the name
-  bool has_factories = false;
+  bool has_sentence = true;
+  bool has_factories = true;
   int alignment = 0;  ///< EIGEN_MAX_STATIC_ALIGN_BYTES where the row was compiled
 };
 

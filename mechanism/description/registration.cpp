@@ -1,4 +1,4 @@
-#include "mechanism/formulation/registration.h"
+#include "mechanism/description/registration.h"
 
 #include <stdexcept>
 #include <string>
@@ -8,7 +8,7 @@ namespace loopbench {
 namespace {
 
 bool IsWord(std::string_view text) {
-  constexpr std::string_view kLetters = "abcdefghijklmnopqrstuvwxyz0123456789-";
+  constexpr std::string_view kLetters = "abcdefghijklmnopqrstuvwxyz0123456789-_";
   return !text.empty() && text.front() != '-' &&
          text.find_first_not_of(kLetters) == std::string_view::npos;
 }
@@ -31,9 +31,9 @@ void RequireSound(const NewRow& row) {
            std::to_string(EIGEN_MAX_STATIC_ALIGN_BYTES) +
                ", as the target loopbench::loopbench has it");
   }
-  if (!IsWord(row.name)) refuse("no word", "a-z, 0-9 and '-'");
+  if (!IsWord(row.name)) refuse("no word", "a-z, 0-9, '-' and '_'");
   if (row.is_taken) refuse("it again", "each name once");
-  if (row.sentence.empty()) refuse("no sentence", "one that `explain` may say");
+  if (!row.has_sentence) refuse("no sentence", "one that `explain` may say");
   if (!row.has_factories) refuse("no factory", "one for plane and space each");
 }
 

@@ -1,0 +1,90 @@
+// Kinds of joints and forces of other programs. A program registers its own before anything reads
+// a mechanism, best first thing in main() (examples/own-parts/), and from then on the names are
+// valid in files and messages, `explain` and tables, as those of the built-in kinds are.
+//
+//   template <class Space, class S>
+//   struct RackAndPinion { static JointKind<Space, S> Make(); };      // joint.h says what it holds
+//   RegisterJoint<RackAndPinion>({.name = "rack-and-pinion", .in_plane = true, ...});
+//
+//   struct Friction { int joint; double moment, speed; };             // as in force.h, with
+//   ForceParts PartsOf(Friction& f);                                  // its parts beside it and
+//   template <class Space, class S>                                   // what it does
+//   class loopbench::ForceElement<Space, S, Friction> : ForceDefaults<Space, S> { ... };
+//   RegisterForce<Friction>();
+//
+// Both are templates on the scalar: the library evaluates them in double, and in dual numbers for
+// derivatives. Runs in several scalars (harness/precision/) have the built-in kinds alone.
+#pragma once
+
+#include "mechanism/description/joint_type.h"
+#include "mechanism/model/force_other.h"
+#include "mechanism/model/joint.h"
+
+namespace loopbench {
+
+/// A kind's functions in all that the library evaluates.
+struct JointKindSet {
+  JointKind<Planar, double> planar;
+  JointKind<Planar, Dual> planar_dual;
+  JointKind<Spatial, double> spatial;
+  JointKind<Spatial, Dual> spatial_dual;
+};
+
+/// Adds a kind. Throws std::invalid_argument, with what was found and expected, for a name that is
+/// no word of a-z, 0-9 and '-' or is taken, and for a kind that contradicts itself: its functions
+/// are evaluated, for parameter 0.3 if it has one, and H must be the derivative of the transform
+/// along the rates, D its orthogonal complement, the bias the derivative of H u, and `coordinates`
+/// must give back those of admissible poses. The texts of `traits` must outlive all use.
+JointType RegisterJoint(const JointTraits& traits, const JointKindSet& kinds);
+
+/// The same with Kind<Space, S>::Make(), which gives {} for the plane if the traits have no plane.
+template <template <class Space, class S> class Kind>
+JointType RegisterJoint(const JointTraits& traits) {
+  return RegisterJoint(traits, {Kind<Planar, double>::Make(), Kind<Planar, Dual>::Make(),
+                                Kind<Spatial, double>::Make(), Kind<Spatial, Dual>::Make()});
+}
+
+/// Adds a kind whose compiler lives forever. Throws std::invalid_argument for a name that is no
+/// word of a-z, 0-9, '-' and '_' or is taken, and for parts that no reader could fill.
+void RegisterForce(OtherForce force);
+
+/// An element of the kind behind virtual functions.
+template <class Space, class S, class Description>
+class OtherElementOf final : public OtherElement<Space, S> {
+ public:
+  OtherElementOf(const Description& force, const MechanismDescription& description)
+      : element_(force, description) {}
+  void AddWrenches(const Kinematics<Space, S>& kinematics,
+                   std::span<Wrench<Space, S>> wrenches) const override {
+    element_.AddWrenches(kinematics, wrenches);
+  }
+  S Potential(const Kinematics<Space, S>& kinematics) const override {
+    return element_.Potential(kinematics);
+  }
+  void AddPower(const Kinematics<Space, S>& kinematics, Power<S>& power) const override {
+    element_.AddPower(kinematics, power);
+  }
+  bool has_power() const override { return element_.has_power(); }
+  const std::vector<double>& knots() const override { return element_.knots(); }
+
+ private:
+  ForceElement<Space, S, Description> element_;
+};
+
+/// Adds the kind of force that `Description` describes, of which a default one says nothing.
+template <class Description>
+void RegisterForce() {
+  static constexpr auto make = []<class Space, class S>() -> MakeOtherElement<Space, S> {
+    return [](const std::any& force, const MechanismDescription& description)
+               -> std::shared_ptr<const OtherElement<Space, S>> {
+      return std::make_shared<OtherElementOf<Space, S, Description>>(
+          std::any_cast<const Description&>(force), description);
+    };
+  };
+  static const ForceCompiler compiler = {
+      {make.template operator()<Planar, double>(), make.template operator()<Planar, Dual>(),
+       make.template operator()<Spatial, double>(), make.template operator()<Spatial, Dual>()}};
+  RegisterForce(OtherForce(Description{}, &compiler));
+}
+
+}  // namespace loopbench

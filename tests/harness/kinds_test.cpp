@@ -1,0 +1,262 @@
+// Joints and forces that a program adds (mechanism/model/registry.h), and those of
+// examples/own-parts.
+#include <gtest/gtest.h>
+
+#include <fstream>
+#include <regex>
+#include <sstream>
+#include <stdexcept>
+
+#include "examples/own-parts/friction.h"
+#include "examples/own-parts/rack_and_pinion.h"
+#include "harness/text/config_error.h"
+#include "mechanism/description/library.h"
+#include "mechanism/model/registry.h"
+#include "tests/harness/in_child.h"
+#include "tests/reference/cases.h"
+#include "tests/reference/simulate.h"
+
+namespace kinds_test {
+
+/// A spring that is the built-in one but for its name.
+struct EchoSpring : loopbench::JointSpring {};
+inline loopbench::ForceParts PartsOf(EchoSpring& f) {
+  loopbench::ForceParts parts = loopbench::PartsOf(static_cast<loopbench::JointSpring&>(f));
+  parts.name = "echo_spring";
+  return parts;
+}
+
+}  // namespace kinds_test
+
+template <class Space, class S>
+class loopbench::ForceElement<Space, S, kinds_test::EchoSpring>
+    : public ForceElement<Space, S, JointSpring> {
+  using ForceElement<Space, S, JointSpring>::ForceElement;
+};
+
+namespace loopbench::harness {
+namespace kinds_test {
+
+using namespace reference;
+
+JointKindSet BuiltIn(JointType type, bool in_plane) {
+  JointKindSet kinds{{}, {}, KindOf<Spatial, double>(type), KindOf<Spatial, Dual>(type)};
+  if (in_plane) {
+    kinds.planar = KindOf<Planar, double>(type);
+    kinds.planar_dual = KindOf<Planar, Dual>(type);
+  }
+  return kinds;
+}
+
+JointTraits Named(JointType type, std::string_view name) {
+  JointTraits traits = TraitsOf(type);
+  traits.name = name;
+  return traits;
+}
+
+/// What is wrong with a joint kind that is the built-in one but for a change.
+template <class Change>
+std::string WrongWith(JointType type, Change change) {
+  JointTraits traits = Named(type, "other");
+  JointKindSet kinds = BuiltIn(type, traits.in_plane);
+  change(traits, kinds);
+  return RefusalOf([&] { RegisterJoint(traits, kinds); });
+}
+
+using Traits = JointTraits;
+using Kinds = JointKindSet;
+
+TEST(OtherJoints, WhatContradictsItselfIsRefused) {
+  const auto refuses = [](const std::string& refusal, const std::string& why) {
+    EXPECT_NE(refusal.find(why), std::string::npos) << refusal;
+  };
+  refuses(WrongWith(JointType::kRevolute, [](Traits& t, Kinds&) { t.name = "weld"; }), "it again");
+  refuses(WrongWith(JointType::kRevolute, [](Traits& t, Kinds&) { t.name = "My joint"; }),
+          "no word");
+  refuses(WrongWith(JointType::kRevolute, [](Traits&, Kinds& k) { k.planar = {}; }),
+          "no transform, coordinates or rates in the plane");
+  refuses(WrongWith(JointType::kRevolute, [](Traits& t, Kinds&) { t.coordinates = "shift"; }),
+          "an angle among its axes where its traits name a length");
+  refuses(WrongWith(JointType::kCylindrical, [](Traits& t, Kinds&) { t.coordinates = "angle"; }),
+          "other coordinates and speeds than its traits name");
+  refuses(WrongWith(JointType::kRevolute,
+                    [](Traits&, Kinds& k) { k.spatial.axes = {2, 0, 0, 3, 4, 5}; }),
+          "axes that are not each axis once");
+  refuses(WrongWith(JointType::kRevolute,
+                    [](Traits&, Kinds& k) { k.spatial.axes = {1, 0, 2, 3, 4, 5}; }),
+          "not the derivative of the transform");
+  refuses(WrongWith(JointType::kUniversal, [](Traits&, Kinds& k) { k.spatial.bias = nullptr; }),
+          "a bias that is not the derivative of H u");
+  refuses(WrongWith(JointType::kHelical,
+                    [](Traits&, Kinds& k) {
+                      k.spatial.coordinates = [](const Pose<Spatial, double>& X, double* q,
+                                                 double pitch) { q[0] = X.p[2] / pitch + 0.1; };
+                    }),
+          "an admissible pose that `coordinates` does not give back");
+  refuses(WrongWith(JointType::kPrismatic,
+                    [](Traits&, Kinds& k) { k.planar.rotation_invariant = true; }),
+          "rotations of F change D in the plane");
+  refuses(WrongWith(JointType::kUniversal,
+                    [](Traits&, Kinds& k) {
+                      k.spatial.basis = [](const Pose<Spatial, double>&, Basis<Spatial, double>& b,
+                                           double) {
+                        for (int i = 0; i < 6; ++i) b[i] = Direction<Spatial, double>::Unit(i / 2);
+                      };
+                    }),
+          "directions [H D] that are not orthogonal");
+}
+
+/// The check itself finds nothing wrong with what other tests hold to an oracle.
+TEST(OtherJoints, BuiltInKindsWouldPass) {
+  InChild([] {
+    const std::vector<JointTraits> all(AllJointTraits().begin(), AllJointTraits().end());
+    for (std::size_t i = 0; i < all.size(); ++i) {
+      const auto type = static_cast<JointType>(i);
+      if (type == JointType::kRod) continue;  // it has no coordinates, as only a built-in kind may
+      const std::string* name = new std::string("other-" + std::string(all[i].name));
+      EXPECT_EQ(
+          RefusalOf([&] { RegisterJoint(Named(type, *name), BuiltIn(type, all[i].in_plane)); }),
+          "none")
+          << *name;
+    }
+  });
+}
+
+std::string TextOf(const std::filesystem::path& path) {
+  std::ostringstream text;
+  text << std::ifstream(path).rdbuf();
+  return text.str();
+}
+
+Record RunText(const std::string& text, const Column& column, const std::string& profile) {
+  const MechanismFile file = ParseMechanism(text, "test.json");
+  const Experiment experiment = Single(file);
+  Case one = CaseOf(experiment, file.description.name, column, 1e-8, 0.5);
+  one.integrator.profile = profile;
+  return RunCase(experiment, one);
+}
+
+/// Pins and springs under other names are the same mechanism: the same bits, explicit and implicit
+/// (with derivatives in dual numbers), in plane and space.
+TEST(OtherKinds, UnderAnotherNameGiveTheSameBits) {
+  InChild([] {
+    RegisterJoint(Named(JointType::kRevolute, "hinge"), BuiltIn(JointType::kRevolute, true));
+    RegisterForce<::kinds_test::EchoSpring>();
+    for (const char* name : {"four-bar", "driven-four-bar", "spatial-four-bar"}) {
+      const std::filesystem::path path = kConfigs / "mechanisms" / (std::string(name) + ".json");
+      if (!std::filesystem::exists(path)) continue;
+      std::string text = TextOf(path);
+      const std::string spring = R"("forces": [{"type": "joint_spring", "joint": ")" +
+                                 ReadMechanism(path).description.joints[0].name +
+                                 R"(", "stiffness": 2.0, "rest": 0.1}],)";
+      text.insert(text.find('{') + 1, "\n" + spring);
+      const std::string other =
+          std::regex_replace(std::regex_replace(text, std::regex("\"revolute\""), "\"hinge\""),
+                             std::regex("joint_spring"), "echo_spring");
+      ASSERT_NE(other, text);
+      for (const Column& column : PublishedColumns()) {
+        for (const char* profile : {"dormand-prince", "kvaerno-54"}) {
+          const Record a = RunText(text, column, profile), b = RunText(other, column, profile);
+          EXPECT_EQ(a.Text("outcome"), "finished") << a.Text("message");
+          EXPECT_EQ(a.Text("state_hash"), b.Text("state_hash")) << name << ToString(column);
+          EXPECT_EQ(a.Number("energy_error_max"), b.Number("energy_error_max"));
+        }
+      }
+    }
+  });
+}
+
+/// A wheel and a slider on its axle, on a rack along x, which closes the loop; gravity pulls along
+/// it: x'' = g (m + M) / (m + M + I / r^2), with the slider's mass M.
+std::string WheelOnRack(const std::string& space) {
+  const std::string vector = space == "planar" ? "" : ", 0.0";
+  return R"({"name": "wheel-on-rack", "space": ")" + space + R"(", "gravity": [2.0, -9.0)" +
+         vector +
+         R"(],
+    "bodies": [{"name": "slider", "mass": 1.5, "inertia": )" +
+         (space == "planar" ? "0.1" : "[0.1, 0.1, 0.1]") + R"(},
+               {"name": "wheel", "mass": 2.0, "inertia": )" +
+         (space == "planar" ? "0.3" : "[0.2, 0.2, 0.3]") + R"(}],
+    "joints": [
+      {"name": "rail", "type": "prismatic", "from": {"body": "ground"}, "to": {"body": "slider"}},
+      {"name": "axle", "type": "revolute", "from": {"body": "slider"}, "to": {"body": "wheel"}},
+      {"name": "teeth", "type": "rack-and-pinion", "radius": -0.25, "cut": true,
+       "from": {"body": "ground"}, "to": {"body": "wheel"}}],
+    "initial": {"coordinates": {"rail": 0.5, "axle": -2.0}}})";
+}
+
+TEST(OtherKinds, AWheelRollsAsItsClosedFormSays) {
+  InChild([] {
+    own::RegisterRackAndPinion();
+    for (const char* space : {"planar", "spatial"}) {
+      const MechanismFile file = ParseMechanism(WheelOnRack(space), "wheel.json");
+      const double a = 2.0 * 3.5 / (3.5 + 0.3 / (0.25 * 0.25));
+      for (const Column& column : RankRevealingColumns()) {
+        const Record record = RunFile(file, column, 1e-10, 2.0);
+        ASSERT_EQ(record.Text("outcome"), "finished") << record.Text("message");
+        const auto* x = std::get_if<std::vector<double>>(record.Find("series.displacement.rail"));
+        ASSERT_NE(x, nullptr) << ToString(column);
+        // the motion is a parabola, which the method integrates but for round-off of 100 steps
+        EXPECT_NEAR(x->back(), 0.5 + a * 2.0, 1e-9) << ToString(column);
+      }
+    }
+  });
+}
+
+TEST(OtherKinds, AreReadAndRefusedAsOthersAre) {
+  InChild([] {
+    own::RegisterRackAndPinion();
+    RegisterForce<own::Friction>();
+    const auto mistake = [](std::string text, const std::string& from, const std::string& to) {
+      text.replace(text.find(from), from.size(), to);
+      try {
+        ParseMechanism(text, "wheel.json");
+      } catch (const ConfigError& found) {
+        return std::string(found.what());
+      }
+      return std::string("none");
+    };
+    const auto expects = [](const std::string& found, const std::string& part) {
+      EXPECT_NE(found.find(part), std::string::npos) << found;
+    };
+    const std::string wheel = WheelOnRack("planar");
+    expects(mistake(wheel, R"("radius": -0.25,)", ""), "\"radius\"");
+    expects(mistake(wheel, "revolute\"", "revolute\", \"radius\": 1"),
+            "no radius on a revolute joint");
+    expects(mistake(wheel, "rack-and-pinion", "rack-and-pinon"), "rack-and-pinion");
+    const auto force = [](const std::string& rest) {
+      return R"("forces": [{"type": "joint_friction", )" + rest + R"(}], "space")";
+    };
+    expects(mistake(wheel, "\"space\"", force(R"("joint": "rail", "effort": 1)")), "\"speed\"");
+    expects(mistake(wheel, "\"space\"", force(R"("joint": "rail", "effort": -1, "speed": 1)")),
+            "effort");
+    EXPECT_EQ(mistake(wheel, "\"space\"", force(R"("joint": "rail", "effort": 1, "speed": 1)")),
+              "none");
+  });
+}
+
+/// The example's mechanism in all formulations: energy, which has friction in its balance, and
+/// agreement.
+TEST(OtherKinds, TheExampleKeepsItsBalance) {
+  InChild([] {
+    own::RegisterRackAndPinion();
+    RegisterForce<own::Friction>();
+    const MechanismFile file = ReadMechanism(std::filesystem::path(LOOPBENCH_SOURCE_DIR) /
+                                             "examples/own-parts/mechanism.json");
+    for (const Column& column : RankRevealingColumns()) {
+      const Record record = RunFile(file, column, 1e-9, 2.0);
+      ASSERT_EQ(record.Text("outcome"), "finished") << record.Text("message");
+      // 1e3 tolerances, for the some hundred steps of a motion with sharp friction
+      EXPECT_LE(record.Number("energy_error_max"), 1e-6) << ToString(column);
+      EXPECT_GT(record.Number("energy_dissipated"), 0.01);
+    }
+  });
+}
+
+TEST(OtherForces, ThatNoFileCouldNameAreRefused) {
+  const auto refusal = [] { return RefusalOf([] { RegisterForce<Drag>(); }); };
+  EXPECT_NE(refusal().find("it again"), std::string::npos) << refusal();
+}
+
+}  // namespace kinds_test
+}  // namespace loopbench::harness

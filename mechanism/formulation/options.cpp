@@ -2,8 +2,8 @@
 
 #include <algorithm>
 
-#include "mechanism/formulation/level.h"
 #include "mechanism/description/registration.h"
+#include "mechanism/formulation/level.h"
 
 namespace loopbench {
 
@@ -53,8 +53,8 @@ Enforcement RegisterLevel(LevelRow row, int alignment) {
   LevelTraits& traits = row.traits;
   RequireSound({.kind = "level",
                 .name = traits.name,
-                .sentence = traits.sentence,
                 .is_taken = FindLevel(traits.name).has_value(),
+                .has_sentence = !traits.sentence.empty(),
                 .has_factories = row.planar && row.spatial,
                 .alignment = alignment});
   if (traits.abbreviation.empty()) traits.abbreviation = traits.name;

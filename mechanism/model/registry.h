@@ -30,12 +30,13 @@ struct JointKindSet {
   JointKind<Spatial, Dual> spatial_dual;
 };
 
-/// Adds a kind. Throws std::invalid_argument, with what was found and expected, for a name that is
-/// no word of a-z, 0-9 and '-' or is taken, and for a kind that contradicts itself: its functions
-/// are evaluated, for parameter 0.3 if it has one, and H must be the derivative of the transform
-/// along the rates, D its orthogonal complement, the bias the derivative of H u, and `coordinates`
-/// must give back those of admissible poses. The texts of `traits` must outlive all use.
-JointType RegisterJoint(const JointTraits& traits, const JointKindSet& kinds);
+/// Adds a kind. Throws std::invalid_argument where it is not sound (description/registration.h),
+/// and for a kind that contradicts itself: its functions are evaluated, for parameter 0.3 if it has
+/// one, and H must be the derivative of the transform along the rates, D its orthogonal complement,
+/// the bias the derivative of H u, and `coordinates` must give back those of admissible poses. The
+/// texts of `traits` must outlive all use.
+JointType RegisterJoint(const JointTraits& traits, const JointKindSet& kinds,
+                        int alignment = EIGEN_MAX_STATIC_ALIGN_BYTES);
 
 /// The same with Kind<Space, S>::Make(), which gives {} for the plane if the traits have no plane.
 template <template <class Space, class S> class Kind>
@@ -44,9 +45,9 @@ JointType RegisterJoint(const JointTraits& traits) {
                                 Kind<Spatial, double>::Make(), Kind<Spatial, Dual>::Make()});
 }
 
-/// Adds a kind whose compiler lives forever. Throws std::invalid_argument for a name that is no
-/// word of a-z, 0-9, '-' and '_' or is taken, and for parts that no reader could fill.
-void RegisterForce(OtherForce force);
+/// Adds a kind whose compiler lives forever. Throws std::invalid_argument where it is not sound,
+/// and for parts that no reader could fill.
+void RegisterForce(OtherForce force, int alignment = EIGEN_MAX_STATIC_ALIGN_BYTES);
 
 /// An element of the kind behind virtual functions.
 template <class Space, class S, class Description>

@@ -3,6 +3,7 @@
 
 #include <filesystem>
 
+#include "examples/own-parts/half_velocity.h"
 #include "harness/analysis/doubts.h"
 #include "harness/cli/commands_schema.h"
 #include "harness/figures/figure_recipes.h"
@@ -19,36 +20,7 @@ namespace levels_test {
 
 using Names = std::vector<std::string>;
 
-/// Half of what the speeds miss is mended in every evaluation.
-template <class Space, class S>
-class HalfVelocity final : public Level<Space, S> {
- public:
-  HalfVelocity(const Mechanism<Space, S>& mechanism, const FormulationOptions&)
-      : violation_(VectorX<S>::Zero(mechanism.num_rows())),
-        change_(VectorX<S>::Zero(mechanism.num_u())),
-        u_(change_) {}
-
-  Outcome SetSpeeds(FactoredState<Space, S>& state,
-                    const Eigen::Ref<const VectorX<S>>& carried) override {
-    state.SetSpeeds(carried);
-    SpeedViolation(state.kinematics(), violation_);
-    const Outcome outcome = state.Correct(violation_, change_);
-    if (outcome != Outcome::kFinished) return outcome;
-    u_ = carried + S(0.5) * change_;
-    state.SetSpeeds(u_);
-    return Outcome::kFinished;
-  }
-
- private:
-  VectorX<S> violation_, change_, u_;
-};
-
-LevelRow Half() {
-  return LevelRowOf<HalfVelocity>({.name = "half-velocity",
-                                   .sentence = "half of what the speeds miss is mended.",
-                                   .growth = DriftGrowth::kSquare,
-                                   .abbreviation = "half"});
-}
+LevelRow Half() { return own::HalfVelocityRow(); }
 
 /// Feedback with gains of its own.
 template <class Space, class S>

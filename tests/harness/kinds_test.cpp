@@ -137,7 +137,7 @@ std::string TextOf(const std::filesystem::path& path) {
 Record RunText(const std::string& text, const Column& column, const std::string& profile) {
   const MechanismFile file = ParseMechanism(text, "test.json");
   const Experiment experiment = Single(file);
-  Case one = CaseOf(experiment, file.description.name, column, 1e-8, 0.5);
+  Case one = CaseOf(experiment, file.description.name, column, 1e-6, 0.1);
   one.integrator = profile;
   return RunCase(experiment, one);
 }

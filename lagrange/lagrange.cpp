@@ -41,7 +41,7 @@ Lagrange<Space, S>::Lagrange(const Mechanism<Space, S>& mechanism,
   } else {
     W_.setZero(n, m);
     response_.setZero(m, m);
-    mass_factor_.compute(MatrixX<S>::Identity(n, n));
+    mass_factor_.compute(MatrixX<S>::Identity(n, n).eval());
   }
 }
 

@@ -13,9 +13,7 @@
 // Velocity level: u - M^-1 J^T S^+ J u, the projection in the metric of M.
 #pragma once
 
-#include <Eigen/Cholesky>
-#include <Eigen/LU>
-
+#include "mechanism/algebra/factors.h"
 #include "mechanism/formulation/constraint_solver.h"
 #include "mechanism/formulation/options.h"
 #include "mechanism/loops/loop_solver.h"

@@ -19,9 +19,9 @@
 // Atkinson, J. Mech. Trans. Autom. Des. 107 (1985) 82.
 #pragma once
 
-#include <Eigen/Cholesky>
 #include <vector>
 
+#include "mechanism/algebra/factors.h"
 #include "mechanism/algebra/singular_values.h"
 #include "mechanism/loops/tree_dynamics.h"
 

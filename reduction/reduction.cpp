@@ -74,7 +74,7 @@ void Reduction<Space, S>::SetPartition(const Partition<S>& partition) {
   dependent_speeds_.setZero(r);
   independent_speeds_.setZero(f);
   lu_ = Eigen::PartialPivLU<MatrixX<S>>(r);
-  if (f > 0) reduced_factor_.compute(MatrixX<S>::Identity(f, f));
+  if (f > 0) reduced_factor_.compute(MatrixX<S>::Identity(f, f).eval());
 }
 
 /// J_D and J_I of (1) from the chosen rows and columns of J.

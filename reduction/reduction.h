@@ -21,10 +21,9 @@
 // (null_space.h). Start() and Review() may allocate.
 #pragma once
 
-#include <Eigen/Cholesky>
-#include <Eigen/LU>
 #include <memory>
 
+#include "mechanism/algebra/factors.h"
 #include "mechanism/formulation/constraint_solver.h"
 #include "mechanism/formulation/options.h"
 #include "mechanism/loops/tree_dynamics.h"

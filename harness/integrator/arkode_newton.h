@@ -4,12 +4,12 @@
 #include <sundials/sundials_linearsolver.h>
 #include <sunmatrix/sunmatrix_dense.h>
 
-#include <Eigen/Dense>
 #include <cstdint>
 #include <memory>
 #include <type_traits>
 
 #include "harness/integrator/arkode_versions.h"
+#include "mechanism/algebra/factors.h"
 
 namespace loopbench::harness {
 

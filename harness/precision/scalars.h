@@ -14,7 +14,8 @@
 #define LOOPBENCH_FOR_EACH_SPACE_AND_SCALAR(MACRO) MACRO(Planar, LOOPBENCH_ONE_SCALAR)
 #endif
 #else
-#define LOOPBENCH_FOR_EACH_SCALAR(MACRO) MACRO(float) MACRO(long double) MACRO(Float128)
+#define LOOPBENCH_FOR_EACH_SCALAR(MACRO) \
+  MACRO(float) MACRO(long double) MACRO(::loopbench::Float128)
 #endif
 // the model's lists have no more scalars here
 #define LOOPBENCH_FOR_EACH_MODEL_SCALAR(MACRO) LOOPBENCH_FOR_EACH_SCALAR(MACRO)

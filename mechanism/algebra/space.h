@@ -29,6 +29,9 @@ template <class S>
 using VectorX = Eigen::Matrix<S, Eigen::Dynamic, 1>;
 template <class S>
 using MatrixX = Eigen::Matrix<S, Eigen::Dynamic, Eigen::Dynamic>;
+/// Square matrix of one joint's rows; never on the heap.
+template <class S>
+using JointMatrix = Eigen::Matrix<S, Eigen::Dynamic, Eigen::Dynamic, Eigen::ColMajor, 6, 6>;
 
 /// Position and orientation of a frame. The planar angle is a number, not a class of numbers modulo
 /// 2 pi: relative angles along and across loops need no unwrapping.

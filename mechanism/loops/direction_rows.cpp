@@ -42,7 +42,7 @@ DirectionRows RowsOfDirections(const Kinematics<Space, S>& kinematics) {
   }
   MatrixX<S> M;
   dynamics.MassMatrix(kinematics, Masses::kGeometric, M);
-  result.mass.compute(M.template cast<double>());
+  result.mass.compute(M.template cast<double>().eval());
   result.rows.setZero(size, mechanism.num_u());
   result.mismatch.setZero(size);
   if (result.rows.size() == 0) return result;

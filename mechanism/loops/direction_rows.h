@@ -1,9 +1,9 @@
 // What all cut joints constrain, as rows whose lengths and angles compare: geometry alone.
 #pragma once
 
-#include <Eigen/Cholesky>
 #include <vector>
 
+#include "mechanism/algebra/factors.h"
 #include "mechanism/loops/tree_dynamics.h"
 
 namespace loopbench {

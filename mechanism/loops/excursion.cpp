@@ -45,7 +45,8 @@ void Excursion<Space>::Factor() {
   // independent rows are the rule, and cheap to recognise; their diagonal is at most one
   constexpr double kSurely = 1e-2;
   if (here_.rows.rows() <= here_.rows.cols()) {
-    const Eigen::LLT<Eigen::MatrixXd> cholesky(here_.rows * here_.rows.transpose());
+    const Eigen::LLT<Eigen::MatrixXd> cholesky(
+        MatrixX<double>(here_.rows * here_.rows.transpose()));
     if (cholesky.info() == Eigen::Success) {
       conditioning_ = cholesky.matrixLLT().diagonal().minCoeff();
       rank_ = static_cast<int>(here_.rows.rows());
@@ -106,7 +107,8 @@ StepKind Excursion<Space>::Step(double distance, int seed) {
     Eigen::CompleteOrthogonalDecomposition<Eigen::MatrixXd> solver;
     solver.setThreshold(1e-9);  // far below what is left on the way to a singular position
     solver.compute(here.rows);
-    VectorX<double> back = here.mass.matrixU().solve(solver.solve(-here.mismatch));
+    VectorX<double> back = solver.solve(VectorX<double>(-here.mismatch));
+    here.mass.matrixU().solveInPlace(back);
     const double before = here.mismatch.norm();
     bool nearer = false;
     for (int halving = 0; halving < kMostHalvings && !nearer; ++halving, back *= 0.5) {

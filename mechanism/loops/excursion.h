@@ -7,8 +7,7 @@
 // run.
 #pragma once
 
-#include <Eigen/QR>
-
+#include "mechanism/algebra/decompositions.h"
 #include "mechanism/loops/direction_rows.h"
 
 namespace loopbench {

@@ -23,7 +23,7 @@ LoopSolver<S>::LoopSolver(std::span<const int> rows, std::shared_ptr<LoopScratch
   inverse_scales_.assign(numbers, S(0));
   if (scratch_ == nullptr) scratch_ = std::make_shared<LoopScratch<S>>(size_);
   // an LLT that has computed nothing has no valid state to copy
-  if (size_ > 0) cholesky_.compute(MatrixX<S>::Identity(size_, size_));
+  if (size_ > 0) cholesky_.compute(MatrixX<S>::Identity(size_, size_).eval());
   directions_.setIdentity(size_, size_);
   eigenvalues_.setZero(size_);
   weights_.setOnes(size_);

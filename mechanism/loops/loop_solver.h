@@ -35,18 +35,14 @@
 // So rank depends on geometry alone, while stiffness stays physical.
 #pragma once
 
-#include <Eigen/Cholesky>
 #include <memory>
 #include <span>
 #include <vector>
 
+#include "mechanism/algebra/factors.h"
 #include "mechanism/algebra/space.h"
 
 namespace loopbench {
-
-/// Square matrix of one joint's rows; never on the heap.
-template <class S>
-using JointMatrix = Eigen::Matrix<S, Eigen::Dynamic, Eigen::Dynamic, Eigen::ColMajor, 6, 6>;
 
 /// Room for intermediate matrices; many solvers may share one, not at the same time.
 template <class S>

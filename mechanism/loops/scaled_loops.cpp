@@ -1,11 +1,11 @@
 #include "mechanism/loops/scaled_loops.h"
 
-#include <Eigen/Cholesky>
 #include <algorithm>
 #include <cmath>
 #include <utility>
 
-#include "mechanism/algebra/large_singular_values.h"
+#include "mechanism/algebra/decompositions.h"
+#include "mechanism/algebra/factors.h"
 #include "mechanism/loops/tree_dynamics.h"
 
 namespace loopbench {

@@ -1,6 +1,6 @@
 #include "mechanism/simplify/immovable.h"
 
-#include "mechanism/algebra/large_singular_values.h"
+#include "mechanism/algebra/decompositions.h"
 #include "mechanism/loops/scaled_loops.h"
 #include "mechanism/start/assembly.h"
 

@@ -1,12 +1,12 @@
 #include "mechanism/simplify/release_choice.h"
 
 #include <Eigen/Geometry>
-#include <Eigen/QR>
 #include <algorithm>
 #include <bit>
 #include <limits>
 #include <numbers>
 
+#include "mechanism/algebra/factors.h"
 #include "mechanism/loops/row_choice.h"
 
 namespace loopbench {
@@ -47,13 +47,15 @@ double Amplification(const DirectionRows& at, const Rows& imposed) {
   const Eigen::MatrixXd out = Imposed(at, rest);
   const Eigen::ColPivHouseholderQR<Eigen::MatrixXd> qr(K.transpose());
   if (qr.rank() < kept) return std::numeric_limits<double>::infinity();
-  return qr.solve(out.transpose()).colwise().norm().maxCoeff();
+  const Eigen::MatrixXd combined = qr.solve(Eigen::MatrixXd(out.transpose()));
+  return combined.colwise().norm().maxCoeff();
 }
 
 /// Whether the imposed rows have another orientation in the space of all rows at the next position
 /// of a walk: somewhere in between they do not span it.
 bool IsLostBetween(const DirectionRows& at, const DirectionRows& next, const Rows& imposed) {
-  return (Imposed(at, imposed) * Imposed(next, imposed).transpose()).determinant() < 0.0;
+  const Eigen::MatrixXd mixed = Imposed(at, imposed) * Imposed(next, imposed).transpose();
+  return mixed.determinant() < 0.0;
 }
 
 /// Mixes as many directions of constraint c, from `direction` on, as `axes` has columns: each
@@ -63,11 +65,14 @@ void Turn(DirectionRows& at, std::size_t c, int direction, const Eigen::MatrixXd
   Eigen::MatrixXd T = Eigen::MatrixXd::Identity(count, count);
   T.block(direction, direction, n, n) = axes.transpose();
   const Eigen::VectorXd before = at.free[c].diagonal().cwiseSqrt();
-  at.free[c] = (T * at.free[c] * T.transpose()).eval();
+  const Eigen::MatrixXd turned = T * at.free[c];
+  at.free[c].noalias() = turned * T.transpose();
   const Eigen::VectorXd after = at.free[c].diagonal().cwiseSqrt();
   const Eigen::MatrixXd scaled = after.cwiseInverse().asDiagonal() * T * before.asDiagonal();
-  at.rows.middleRows(first, count) = (scaled * at.rows.middleRows(first, count)).eval();
-  at.mismatch.segment(first, count) = (scaled * at.mismatch.segment(first, count)).eval();
+  const Eigen::MatrixXd rows = at.rows.middleRows(first, count);
+  at.rows.middleRows(first, count) = scaled * rows;
+  const Eigen::VectorXd mismatch = at.mismatch.segment(first, count);
+  at.mismatch.segment(first, count) = scaled * mismatch;
 }
 
 /// Every way to impose as many rows of first .. first + count - 1 as `imposed` does, the others as
@@ -89,7 +94,12 @@ std::vector<Rows> OtherChoices(const Rows& imposed, int first, int count) {
 /// together.
 Eigen::MatrixXd AxesAlong(const Eigen::VectorXd& n) {
   if (n.size() == 2) return Eigen::Rotation2Dd(std::atan2(n.y(), n.x())).toRotationMatrix();
-  return Eigen::Quaterniond::FromTwoVectors(Eigen::Vector3d::UnitX(), n).toRotationMatrix();
+  // the shortest turn that takes x there; Eigen's FromTwoVectors took 16 s to compile
+  const Eigen::Vector3d to = n.normalized();
+  if (to.x() < -1.0 + 1e-12) return Eigen::Vector3d(-1.0, -1.0, 1.0).asDiagonal();
+  const double root = std::sqrt(2.0 * (1.0 + to.x())), inverse = 1.0 / root;
+  return Eigen::Quaterniond(0.5 * root, 0.0, -to.z() * inverse, to.y() * inverse)
+      .toRotationMatrix();
 }
 
 /// Directions all around, without their opposites: a spiral on the upper half of the sphere, or

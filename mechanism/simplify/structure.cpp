@@ -1,9 +1,9 @@
 #include "mechanism/simplify/structure.h"
 
-#include <Eigen/QR>
 #include <algorithm>
 #include <iterator>
 
+#include "mechanism/algebra/factors.h"
 #include "mechanism/description/parts.h"
 #include "mechanism/loops/excursion.h"
 #include "mechanism/loops/scaled_loops.h"

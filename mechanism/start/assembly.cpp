@@ -1,10 +1,10 @@
 #include "mechanism/start/assembly.h"
 
-#include <Eigen/QR>
 #include <algorithm>
 #include <cmath>
 #include <limits>
 
+#include "mechanism/algebra/decompositions.h"
 #include "mechanism/loops/tree_dynamics.h"
 #include "mechanism/model/dense_memory.h"
 #include "mechanism/start/assembly_units.h"
@@ -216,13 +216,14 @@ class Assembler {
                                     double damping) {
     const Eigen::Index r = std::min(J.rows(), J.cols());
     const Eigen::HouseholderQR<MatrixX<double>> qr(J.transpose());
-    const MatrixX<double> Q = qr.householderQ() * MatrixX<double>::Identity(J.cols(), r);
+    const MatrixX<double> Q = ThinQ(qr);
     MatrixX<double> A = MatrixX<double>::Zero(J.rows() + r, r);
     A.topRows(J.rows()).noalias() = J * Q;
     A.bottomRows(r).diagonal().setConstant(damping);
     VectorX<double> rhs = VectorX<double>::Zero(A.rows());
     rhs.head(J.rows()) = -e;
-    return Q * A.householderQr().solve(rhs);
+    const Eigen::HouseholderQR<MatrixX<double>> least(A);
+    return Q * VectorX<double>(least.solve(rhs));
   }
 
   /// q moved by the speeds d for unit time (quaternions renormalised).

@@ -1,10 +1,11 @@
 #include "mechanism/start/mobility.h"
 
-#include <Eigen/Eigenvalues>
 #include <algorithm>
 #include <vector>
 
-#include "mechanism/algebra/large_singular_values.h"
+#include "mechanism/algebra/decompositions.h"
+#include "mechanism/algebra/factors.h"
+#include "mechanism/algebra/symmetric_eigen.h"
 #include "mechanism/description/parts.h"
 #include "mechanism/loops/excursion.h"
 #include "mechanism/loops/tree_dynamics.h"
@@ -77,11 +78,11 @@ bool IsRigidToSecondOrder(const Mechanism<Space, double>& mechanism, const Vecto
   // the start closes to some 1e-10 of its size, and the self-stresses are as good
   constexpr double kDefinite = 1e-8;
   const double least = kDefinite * largest;
-  return largest > 0.0 && std::ranges::any_of(forms, [&](const Eigen::MatrixXd& form) {
-           const Eigen::VectorXd values =
-               Eigen::SelfAdjointEigenSolver<Eigen::MatrixXd>(form, Eigen::EigenvaluesOnly)
-                   .eigenvalues();
-           return values.minCoeff() > least || values.maxCoeff() < -least;
+  MatrixX<double> directions(free, free);
+  VectorX<double> values(free);
+  return largest > 0.0 && std::ranges::any_of(forms, [&](Eigen::MatrixXd& form) {
+           SymmetricEigen<double>(form, directions, values);
+           return values[0] > least || values[free - 1] < -least;
          });
 }
 

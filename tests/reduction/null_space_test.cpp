@@ -3,12 +3,9 @@
 
 #include <gtest/gtest.h>
 
-#include <Eigen/Cholesky>
-#include <Eigen/LU>
-#include <Eigen/QR>
-#include <Eigen/SVD>
 #include <limits>
 
+#include "mechanism/algebra/decompositions.h"
 #include "tests/contract/generators.h"
 #include "tests/mechanism/shipped.h"
 

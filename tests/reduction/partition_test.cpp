@@ -3,11 +3,11 @@
 
 #include <gtest/gtest.h>
 
-#include <Eigen/SVD>
 #include <algorithm>
 #include <bit>
 #include <cmath>
 
+#include "mechanism/algebra/decompositions.h"
 #include "tests/contract/generators.h"
 #include "tests/mechanism/shipped.h"
 

@@ -1,0 +1,3 @@
+#include "mechanism/algebra/decompositions.h"
+
+template class Eigen::BDCSVD<Eigen::MatrixXd>;

@@ -1,0 +1,4 @@
+#include "mechanism/algebra/factors.h"
+
+#define LOOPBENCH_DEFINE(S) LOOPBENCH_FACTORS(, S)
+LOOPBENCH_FOR_EACH_SCALAR(LOOPBENCH_DEFINE)

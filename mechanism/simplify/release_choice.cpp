@@ -96,7 +96,8 @@ Eigen::MatrixXd AxesAlong(const Eigen::VectorXd& n) {
   if (n.size() == 2) return Eigen::Rotation2Dd(std::atan2(n.y(), n.x())).toRotationMatrix();
   // the shortest turn that takes x there; Eigen's FromTwoVectors took 16 s to compile
   const Eigen::Vector3d to = n.normalized();
-  if (to.x() < -1.0 + 1e-12) return Eigen::Vector3d(-1.0, -1.0, 1.0).asDiagonal();
+  // where all turns by half a circle are as short, that from the other side
+  if (to.x() < -1.0 + 1e-12) return AxesAlong(-n) * Eigen::Vector3d(-1, -1, 1).asDiagonal();
   const double root = std::sqrt(2.0 * (1.0 + to.x())), inverse = 1.0 / root;
   return Eigen::Quaterniond(0.5 * root, 0.0, -to.z() * inverse, to.y() * inverse)
       .toRotationMatrix();

@@ -29,12 +29,23 @@ std::deque<JointKind<Space, S>>& KindsOf() {
   return kinds;
 }
 
+/// Columns of H are as long at every pose.
+template <class Space, class S>
+void SetLengthOfH(JointKind<Space, S>* kind) {
+  if (kind->basis == nullptr || kind->num_u == 0) return;
+  Pose<Space, S> X;
+  X.p = Linear<Space, S>::Unit(0);
+  Basis<Space, S> basis;
+  kind->basis(X, basis, kind->parameter);
+  kind->inverse_H_squared = S(1) / basis[0].squaredNorm();
+}
+
 }  // namespace
 
 template <class Space, class S>
 void AddKind(JointType type, const JointKind<Space, S>& kind) {
   KindsOf<Space, S>().resize(static_cast<std::size_t>(type));
-  KindsOf<Space, S>().push_back(kind);
+  SetLengthOfH(&KindsOf<Space, S>().emplace_back(kind));
 }
 
 template <class Space, class S>
@@ -50,14 +61,7 @@ template <class Space, class S>
 JointKind<Space, S> KindWith(JointType type, S parameter) {
   JointKind<Space, S> kind = KindOf<Space, S>(type);
   kind.parameter = parameter;
-  if (kind.basis != nullptr && kind.num_u > 0) {
-    // columns of H are as long at every pose
-    Pose<Space, S> X;
-    X.p = Linear<Space, S>::Unit(0);
-    Basis<Space, S> basis;
-    kind.basis(X, basis, parameter);
-    kind.inverse_H_squared = S(1) / basis[0].squaredNorm();
-  }
+  SetLengthOfH(&kind);
   return kind;
 }
 

@@ -60,7 +60,7 @@ struct JointKind {
   /// What the kinds helical (pitch [m/rad]) and rod (length [m]) depend on; 0 for others.
   S parameter = S(0);
   /// 1 / |H|^2 of each column of H, by which u = inverse_H_squared H^T V for a relative velocity V.
-  /// It is 1 in every kind but the helical, whose H is [z; pitch z].
+  /// It is 1 in every built-in kind but the helical, whose H is [z; pitch z]; found from `basis`.
   S inverse_H_squared = S(1);
 
   void (*transform)(const S* q, Pose<Space, S>& X_FM, S parameter) = nullptr;

@@ -17,7 +17,11 @@ namespace loopbench::harness {
 template <class Check>
 void InChild(Check check) {
   const auto run = [&] {
-    check();
+    try {
+      check();
+    } catch (const std::exception& thrown) {
+      ADD_FAILURE() << thrown.what();
+    }
     // what failed there is printed nowhere else
     const testing::TestResult& found =
         *testing::UnitTest::GetInstance()->current_test_info()->result();

@@ -19,11 +19,6 @@ using namespace reference;
 constexpr double kTolerance = 1e-8;
 const Column kOdcaJoint = Published("odca", Coordinates::kJoint);
 
-bool IsSet(const Record& record, std::string_view key) {
-  const Value* value = record.Find(key);
-  return value != nullptr && !std::holds_alternative<std::monostate>(*value);
-}
-
 bool IsMeasured(const Record& record, std::string_view key) {
   return IsSet(record, key) && !std::isnan(record.Number(key));
 }

@@ -25,11 +25,6 @@ using namespace reference;
 constexpr double kTolerance = 1e-8;
 const Column kOdcaJoint = Published("odca", Coordinates::kJoint);
 
-bool IsSet(const Record& record, std::string_view key) {
-  const Value* value = record.Find(key);
-  return value != nullptr && !std::holds_alternative<std::monostate>(*value);
-}
-
 /// A bar that swings about the origin like a point mass at 1 m, released at `angle` from +x.
 MechanismFile BarAt(double angle) {
   MechanismFile file;

@@ -9,6 +9,7 @@
 #include <ostream>
 #include <stdexcept>
 #include <string>
+#include <string_view>
 #include <vector>
 
 #include "harness/config/experiment_reader.h"
@@ -107,6 +108,12 @@ inline std::vector<std::string> ShippedNames() {
 inline std::string WithoutDashes(std::string name) {
   std::erase(name, '-');
   return name;
+}
+
+/// Whether a record says anything under a key.
+inline bool IsSet(const Record& record, std::string_view key) {
+  const Value* value = record.Find(key);
+  return value != nullptr && !std::holds_alternative<std::monostate>(*value);
 }
 
 /// Runs a mechanism as it is.

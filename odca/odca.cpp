@@ -1,6 +1,10 @@
 #include "odca/odca.h"
 
+#include <algorithm>
+#include <type_traits>
+
 #include "mechanism/algebra/instantiate.h"
+#include "odca/path_sweep.h"
 
 namespace loopbench::odca {
 
@@ -40,11 +44,19 @@ Odca<Space, S>::Odca(const Mechanism<Space, S>& mechanism, const FormulationOpti
       A_(b_),
       c0_(mechanism.joints().size(), Components<Space, S>::Zero()),
       known_(VectorX<S>::Zero(mechanism.num_u())),
-      change_(known_) {}
+      change_(known_) {
+  if constexpr (std::is_same_v<Space, Planar> && std::is_same_v<S, double>) {
+    if (options.solver == SolverKind::kRankRevealing) paths_ = pins::PathSweep::Make(mechanism);
+  }
+}
+
+template <class Space, class S>
+Odca<Space, S>::~Odca() = default;
 
 template <class Space, class S>
 Outcome Odca<Space, S>::Factor(const Kinematics<Space, S>& kinematics) {
   kinematics_ = &kinematics;
+  by_paths_ = false;
   const Outcome outcome = sweep_.Assemble(kinematics);
   const Joins<Space, S>& joins = sweep_.joins();
   this->conditioning_ = {.rank = LoopRank(mechanism_, joins.dependent_rows()),
@@ -154,6 +166,19 @@ bool Odca<Space, S>::Accelerate(const Kinematics<Space, S>& kinematics, const Ve
   return true;
 }
 
+template <class Space, class S>
+bool Odca<Space, S>::RightHandSide([[maybe_unused]] SpeedsUsed speeds,
+                                   [[maybe_unused]] std::span<const S> q,
+                                   [[maybe_unused]] std::span<const S> u,
+                                   [[maybe_unused]] std::span<S> qdot,
+                                   [[maybe_unused]] std::span<S> udot) {
+  if constexpr (std::is_same_v<Space, Planar> && std::is_same_v<S, double>) {
+    by_paths_ = paths_ != nullptr && paths_->Evaluate(speeds, q, u, qdot, udot);
+    return by_paths_;
+  }
+  return false;
+}
+
 /// What the speeds miss, joint by joint: no vector of rows is needed between.
 template <class Space, class S>
 bool Odca<Space, S>::CompleteSpeeds(Kinematics<Space, S>& kinematics, VectorX<S>& u) {
@@ -170,7 +195,7 @@ template <class Space, class S>
 std::vector<NamedCount> Odca<Space, S>::Counters() const {
   return {{"plan_depth", plan_.depth()},
           {"plan_largest_join", plan_.largest_join()},
-          {"rhs_operations", sweep_.operations()}};
+          {"rhs_operations", by_paths_ ? paths_->operations() : sweep_.operations()}};
 }
 
 template <class Space, class S>

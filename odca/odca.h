@@ -11,6 +11,10 @@ namespace loopbench::odca {
 template <class Space, class S>
 Plan MakePlan(const Mechanism<Space, S>& mechanism, const PlanOptions& options = {});
 
+namespace pins {
+class PathSweep;
+}
+
 template <class Space, class S>
 class Odca final : public ConstraintSolver<Space, S> {
  public:
@@ -19,6 +23,7 @@ class Odca final : public ConstraintSolver<Space, S> {
   Odca(const Mechanism<Space, S>& mechanism, const FormulationOptions& options);
   Odca(const Mechanism<Space, S>& mechanism, const FormulationOptions& options,
        const PlanOptions& plan);
+  ~Odca() override;
 
   const Plan& plan() const { return plan_; }
   const Sweep<Space, S>& sweep() const { return sweep_; }
@@ -31,6 +36,9 @@ class Odca final : public ConstraintSolver<Space, S> {
   bool CompleteSpeeds(Kinematics<Space, S>& kinematics, VectorX<S>& u) override;
   bool Accelerate(const Kinematics<Space, S>& kinematics, const VectorX<S>& feedback,
                   VectorX<S>& udot, VectorX<S>* lambda) override;
+  /// For paths of pins in double, unless as published (path_sweep.h).
+  bool RightHandSide(SpeedsUsed speeds, std::span<const S> q, std::span<const S> u,
+                     std::span<S> qdot, std::span<S> udot) override;
   /// Size of the plan, and multiply-adds since Factor() began.
   std::vector<NamedCount> Counters() const override;
 
@@ -52,6 +60,8 @@ class Odca final : public ConstraintSolver<Space, S> {
   const Mechanism<Space, S>& mechanism_;
   Plan plan_;
   Sweep<Space, S> sweep_;
+  std::unique_ptr<pins::PathSweep> paths_;            ///< null where there are none
+  bool by_paths_ = false;                             ///< the last evaluation was
   const Kinematics<Space, S>* kinematics_ = nullptr;  ///< of the last Factor()
   std::vector<Wrench<Space, S>> wrenches_;
   std::vector<Acceleration<Space, S>> b_, A_;

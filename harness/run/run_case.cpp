@@ -109,7 +109,7 @@ class Runner {
       const bool restart = formulation->BeginStep(t, y);
       // a derivative that fails here fails in the integrator's next call, with its outcome; only
       // what the failing matrix looked like is worth keeping
-      const Outcome outcome = formulation->Derivative(t, y, ydot);
+      const Outcome outcome = formulation->Examine(t, y, ydot);
       Sample<Space> sample{t, *formulation};
       if (!work.empty()) sample.supplied = work[0], sample.dissipated = work[1];
       for (const auto& observer : observers_) {
@@ -122,7 +122,7 @@ class Runner {
         *formulation, 0.0, case_.horizon, y_, OptionsOf(case_, mechanism_.stop_times()), observe);
     y_.resize(n);
     if (with_series_ && run.outcome == Outcome::kFinished &&
-        formulation->Derivative(run.t_reached, y_, ydot) == Outcome::kFinished) {
+        formulation->Examine(run.t_reached, y_, ydot) == Outcome::kFinished) {
       WriteFinalPoses(user_, compiled_, part_, formulation->kinematics(), final_poses_);
     }
     return run;

@@ -45,7 +45,7 @@ class BenchmarkSubject {
   /// dy/dt of the last Derivative().
   virtual std::span<const double> derivative() const = 0;
   virtual int bodies() const = 0;
-  virtual int rank() const = 0;  ///< as the last evaluation found it
+  virtual int rank() const = 0;  ///< at the state
   /// Multiplications and additions of a right-hand side as O-DCA counts them; -1 for the others.
   virtual std::int64_t operations() const = 0;
 };

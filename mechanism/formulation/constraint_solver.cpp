@@ -11,6 +11,12 @@ bool ConstraintSolver<Space, S>::Accelerate(const Kinematics<Space, S>&, const V
 }
 
 template <class Space, class S>
+bool ConstraintSolver<Space, S>::RightHandSide(SpeedsUsed, std::span<const S>, std::span<const S>,
+                                               std::span<S>, std::span<S>) {
+  return false;
+}
+
+template <class Space, class S>
 void ConstraintSolver<Space, S>::Correct(const VectorX<S>& target, VectorX<S>& x) {
   Solve(VectorX<S>(), target, x, nullptr);
 }

@@ -18,6 +18,7 @@
 #pragma once
 
 #include <cstdint>
+#include <span>
 #include <string_view>
 #include <vector>
 
@@ -40,6 +41,9 @@ struct NamedCount {
   std::int64_t value = 0;
 };
 
+/// Which speeds a right-hand side uses: those of the state, or the nearest that satisfy the loops.
+enum class SpeedsUsed { kGiven, kCompleted };
+
 template <class Space, class S>
 class ConstraintSolver {
  public:
@@ -61,6 +65,13 @@ class ConstraintSolver {
   /// Solve(). For solvers that take forces body by body and need neither.
   virtual bool Accelerate(const Kinematics<Space, S>& kinematics, const VectorX<S>& feedback,
                           VectorX<S>& udot, VectorX<S>* lambda);
+
+  /// Short cut for a whole right-hand side without feedback and drives: qdot and udot at (q, u), as
+  /// Factor() and Accelerate() would have it but for round-off, after CompleteSpeeds() if asked
+  /// for. False, as here, where there is none or the position is one that Factor() should judge.
+  /// Changes neither conditioning() nor what Factor() made.
+  virtual bool RightHandSide(SpeedsUsed speeds, std::span<const S> q, std::span<const S> u,
+                             std::span<S> qdot, std::span<S> udot);
 
   /// A change x of speeds (or of positions, per time) with J x = c. Here the smallest in the metric
   /// M, which is Solve() without force.

@@ -35,10 +35,10 @@ class ForwardJacobian {
   /// std::invalid_argument at a level without a derivative (LevelTraits::has_derivative).
   ForwardJacobian(const MechanismDescription& description, System<Space, double>& system);
 
-  /// d(ydot)/dy at the state of the system's last call of Derivative(), which must have
-  /// succeeded; to be evaluated before anything else is asked of the system. `jacobian` is
-  /// state_size() x state_size(), or has two more rows: the derivatives of the power supplied
-  /// (prescribed motions included) and of the power dissipated. Allocates nothing.
+  /// d(ydot)/dy at the state of the system's last call of Examine(), which must have succeeded; to
+  /// be evaluated before anything else is asked of the system. `jacobian` is state_size() x
+  /// state_size(), or has two more rows: the derivatives of the power supplied (prescribed motions
+  /// included) and of the power dissipated. Allocates nothing.
   void Evaluate(Eigen::Ref<MatrixX<double>> jacobian);
 
   /// Evaluations of the model with dual numbers that Evaluate() takes: one for every eight columns.

@@ -16,6 +16,16 @@ template <class Space, class S>
 std::unique_ptr<Level<Space, S>> MakeBaumgarteLevel(const Mechanism<Space, S>& mechanism,
                                                     const FormulationOptions& options);
 
+namespace {
+
+template <class Space, class S>
+class AccelerationLevel final : public Level<Space, S> {
+ public:
+  AccelerationLevel() { this->right_hand_side_ = SpeedsUsed::kGiven; }
+};
+
+}  // namespace
+
 template <class Space, class S>
 Outcome Level<Space, S>::SetSpeeds(FactoredState<Space, S>& state,
                                    const Eigen::Ref<const VectorX<S>>& carried) {
@@ -26,7 +36,7 @@ Outcome Level<Space, S>::SetSpeeds(FactoredState<Space, S>& state,
 template <class Space, class S>
 std::deque<LevelFactory<Space, S>>& LevelFactories() {
   const auto acceleration = [](const Mechanism<Space, S>&, const FormulationOptions&) {
-    return std::make_unique<Level<Space, S>>();
+    return std::make_unique<AccelerationLevel<Space, S>>();
   };
   static std::deque<LevelFactory<Space, S>> factories = {acceleration, MakeVelocityLevel<Space, S>,
                                                          MakePositionLevel<Space, S>,

@@ -15,6 +15,7 @@
 #include <deque>
 #include <functional>
 #include <memory>
+#include <optional>
 #include <utility>
 
 #include "mechanism/formulation/factored_state.h"
@@ -47,6 +48,11 @@ class Level {
   /// After an accepted step of length h, SetSpeeds() being done.
   virtual Accepted Accept(FactoredState<Space, S>&, S /*h*/) { return Accepted::kAsItWas; }
 
+  /// Which right-hand side it is, if a solver may have a short cut for the whole of it: that of
+  /// level acceleration or that of level velocity. A level that does not say so has every
+  /// right-hand side made from its parts.
+  std::optional<SpeedsUsed> right_hand_side() const { return right_hand_side_; }
+
   /// What derivatives of the right-hand side have to know (forward_jacobian.h): whether SetSpeeds()
   /// makes speeds satisfy the loops by the solver's Correct(), and the gains of a Feedback() that
   /// is AddFeedback(). A level for which this is not all says so (LevelTraits::has_derivative).
@@ -58,6 +64,7 @@ class Level {
   const Correction<S>& correction() const { return correction_; }
 
  protected:
+  std::optional<SpeedsUsed> right_hand_side_;
   bool changes_speeds_ = false;
   BaumgarteGains gains_;
   Correction<S> correction_;

@@ -22,7 +22,9 @@ class PositionLevel final : public Level<Space, S> {
         q_(VectorX<S>::Zero(mechanism.num_q())),
         moved_(q_),
         step_(q_),
-        u_(change_) {}
+        u_(change_) {
+    this->right_hand_side_ = SpeedsUsed::kGiven;
+  }
 
   Accepted Accept(FactoredState<Space, S>& state, S) override {
     if (violation_.size() == 0 || change_.size() == 0) return Accepted::kAsItWas;

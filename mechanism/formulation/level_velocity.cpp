@@ -14,7 +14,8 @@ class VelocityLevel final : public Level<Space, S> {
       : u_(VectorX<S>::Zero(mechanism.num_u())),
         change_(u_),
         violation_(VectorX<S>::Zero(mechanism.num_rows())) {
-    Level<Space, S>::changes_speeds_ = true;
+    this->changes_speeds_ = true;
+    this->right_hand_side_ = SpeedsUsed::kCompleted;
   }
 
   Outcome SetSpeeds(FactoredState<Space, S>& state,

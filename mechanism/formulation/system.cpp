@@ -87,8 +87,28 @@ Outcome System<Space, S>::Accelerate() {
   return Outcome::kInconsistentMotion;
 }
 
+/// Jacobians are made from what Examine() leaves behind.
+template <class Space, class S>
+bool System<Space, S>::MayTakeShortCut() const {
+  return level_->right_hand_side() && drives_ == nullptr && !integrates_work() &&
+         jacobian_ == nullptr && solver_->CarriedSpeeds() == nullptr;
+}
+
 template <class Space, class S>
 Outcome System<Space, S>::Derivative(S t, std::span<const S> y, std::span<S> ydot) {
+  if (MayTakeShortCut()) {
+    const auto num_q = static_cast<std::size_t>(mechanism_.num_q());
+    const auto num_u = static_cast<std::size_t>(mechanism_.num_u());
+    if (solver_->RightHandSide(*level_->right_hand_side(), y.first(num_q), y.subspan(num_q, num_u),
+                               ydot.first(num_q), ydot.subspan(num_q, num_u))) {
+      return outcome_ = Outcome::kFinished;
+    }
+  }
+  return Examine(t, y, ydot);
+}
+
+template <class Space, class S>
+Outcome System<Space, S>::Examine(S t, std::span<const S> y, std::span<S> ydot) {
   derivative_version_ = -1;
   outcome_ = FromState(t, y);
   if (outcome_ == Outcome::kFinished) outcome_ = Accelerate();
@@ -205,7 +225,7 @@ std::optional<JacobianWork> System<Space, S>::Jacobian(S t, std::span<const S> y
   if constexpr (std::is_same_v<S, double>) {
     JacobianWork work{.derivatives = 0, .dual_evaluations = jacobian_->evaluations()};
     if (!IsAt(t, y)) {
-      if (Derivative(t, y, scratch_) != Outcome::kFinished) return std::nullopt;  // it will say why
+      if (Examine(t, y, scratch_) != Outcome::kFinished) return std::nullopt;  // it will say why
       work.derivatives = 1;
     }
     Eigen::Map<Eigen::MatrixXd> all(jacobian.data(), size(), size() - num_quadratures());

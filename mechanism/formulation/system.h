@@ -1,7 +1,9 @@
 // A mechanism as an integrator sees it: its state and its derivative, by one formulation, which is
 // a solver (constraint_solver.h) and a level of enforcement (level.h).
 //
-//   Derivative(t, y)   the right-hand side, y = (q, speeds that the state carries),
+//   Derivative(t, y)   the right-hand side, y = (q, speeds that the state carries), by whatever way
+//                      is the shortest,
+//   Examine(t, y)      the same, with all that can be asked about it afterwards,
 //   Evaluate(t, q, u)  accelerations alone, for given q and all speeds u,
 //   BeginStep(t, y)    at accepted steps, the only call that may project the state or change the
 //                      mode (an independent set, angles, gains). Everything else is a pure function
@@ -72,7 +74,12 @@ class System final : public Ode<S> {
   int num_quadratures() const override { return with_work_ && state_size() > 0 ? 2 : 0; }
 
   /// dy/dt, with that of the works where `ydot` has room for them. On failure it is unspecified.
+  /// Where the solver has a short cut, nothing else is known of (t, y) afterwards: kinematics() and
+  /// all that follows from it are as they were.
   Outcome Derivative(S t, std::span<const S> y, std::span<S> ydot) override;
+  /// The same without a short cut, so with other rounding: kinematics(), udot(), diagnostics(),
+  /// multipliers and powers are then those of (t, y).
+  Outcome Examine(S t, std::span<const S> y, std::span<S> ydot);
 
   /// The Jacobian that Jacobian() is to give, or null for none. Of this system, after Start().
   void UseJacobian(std::unique_ptr<ForwardJacobian<Space>> jacobian);
@@ -94,10 +101,11 @@ class System final : public Ode<S> {
   /// must restart. After a projection that failed `y` is as it was; the next evaluation says why.
   bool BeginStep(S t, std::span<S> y);
 
-  /// Of all constraint rows at the last successful evaluation: D lambda is the force on Q.
+  /// Of all constraint rows at the last Evaluate() or Examine() that succeeded: D lambda is the
+  /// force on Q.
   const VectorX<S>& Multipliers();
 
-  /// Power [W] that prescribed motions supply at the last successful evaluation. O(n); 0 without
+  /// Power [W] that prescribed motions supply there. O(n); 0 without
   /// them.
   S DrivePower();
   /// Power [W] that enters and leaves the mechanism there: of whatever does work without a
@@ -107,6 +115,8 @@ class System final : public Ode<S> {
   Diagnostics diagnostics() const;
 
  private:
+  /// Whether the right-hand side is what a solver may have a short cut for.
+  bool MayTakeShortCut() const;
   bool integrates_work() const { return with_work_ || state_size() == 0; }
   /// udot_ at the current state, and whether prescribed motions can be followed.
   Outcome Accelerate();

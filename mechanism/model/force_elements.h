@@ -44,6 +44,7 @@ class ForceElements {
     for (const auto& element : elements_) std::visit(visit, element);
   }
 
+  bool empty() const { return elements_.empty(); }
   /// Whether any of them has no potential.
   bool has_power() const {
     bool any = false;

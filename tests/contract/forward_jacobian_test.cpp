@@ -47,8 +47,8 @@ class RightHandSide {
 
   VectorXd operator()(const VectorXd& y) {
     VectorXd f(size_ + 2);
-    const Outcome outcome = formulation_.Derivative(t_, {y.data(), static_cast<std::size_t>(size_)},
-                                                    {f.data(), static_cast<std::size_t>(size_)});
+    const Outcome outcome = formulation_.Examine(t_, {y.data(), static_cast<std::size_t>(size_)},
+                                                 {f.data(), static_cast<std::size_t>(size_)});
     EXPECT_EQ(outcome, Outcome::kFinished) << ToString(outcome);
     const Power<double> power = formulation_.TotalPower();
     f.tail<2>() << power.supplied, power.dissipated;

@@ -34,6 +34,7 @@ class Scene {
   }
 
   const Mechanism<Space, double>& mechanism() const { return mechanism_; }
+  const Kinematics<Space, double>& kinematics() const { return kinematics_; }
 
   /// The place of the user's joint `description` in the mechanism.
   int JointIndex(int description) const {

@@ -1,0 +1,314 @@
+// The sweep along paths against the general one, which the contract suite holds to an oracle.
+#include "odca/path_sweep.h"
+
+#include <gtest/gtest.h>
+
+#include <algorithm>
+#include <cstdio>
+#include <limits>
+#include <numbers>
+#include <numeric>
+
+#include "mechanism/description/library.h"
+#include "odca/odca.h"
+#include "tests/contract/allocations.h"
+#include "tests/contract/builder.h"
+#include "tests/contract/system_with.h"
+
+namespace loopbench::odca::pins {
+namespace {
+
+using testing::Builder;
+using testing::Random;
+using Numbers = VectorX<double>;
+
+std::span<const double> In(const Numbers& numbers) {
+  return {numbers.data(), static_cast<std::size_t>(numbers.size())};
+}
+std::span<double> In(Numbers& numbers) {
+  return {numbers.data(), static_cast<std::size_t>(numbers.size())};
+}
+
+JointDescription Pin(Random& random, int from, int to) {
+  const auto side = [&](int body) {
+    return JointSide{body,
+                     random.Vector(1.0, false),
+                     {0.0, 0.0, random.Uniform(-std::numbers::pi, std::numbers::pi)}};
+  };
+  JointDescription pin;
+  pin.from = side(from);
+  pin.to = side(to);
+  if (random.Chance(0.5)) std::swap(pin.from, pin.to);
+  return pin;
+}
+
+/// Bodies in a row, in any order of numbers, some of them pinned to Ground, no two neighbours, so
+/// that they can move; where that closes a loop the joint before such a body is cut, or the pin of
+/// the last one.
+MechanismDescription RandomPath(int n, std::uint64_t seed) {
+  Builder b("path", SpaceKind::kPlanar, seed);
+  std::vector<int> row;
+  for (int k = 0; k < n; ++k) row.push_back(b.AddBody(1.0));
+  for (int k = n - 1; k > 0; --k) std::swap(row[k], row[b.random.Below(k + 1)]);
+  const double share = b.random.Uniform(0.0, 1.0);
+  bool pinned_before = false, neighbour = false;
+  auto& joints = b.description.joints;
+  for (int k = 0; k < n; ++k) {
+    const bool last = k + 1 == n;
+    const bool pinned = (b.random.Chance(share) && !neighbour) || (last && !pinned_before);
+    const bool cut_pin = pinned && pinned_before && last && b.random.Chance(0.5);
+    if (k > 0) {
+      joints.push_back(Pin(b.random, row[k - 1], row[k]));
+      joints.back().cut = pinned && pinned_before && !cut_pin;
+    }
+    if (pinned) {
+      joints.push_back(Pin(b.random, kGround, row[k]));
+      joints.back().cut = cut_pin;
+    }
+    pinned_before = pinned_before || pinned;
+    neighbour = pinned;
+  }
+  for (std::size_t j = 0; j < joints.size(); ++j) joints[j].name = "j" + std::to_string(j);
+  return b.description;
+}
+
+Numbers RandomNumbers(Random& random, int n, double size) {
+  Numbers numbers(n);
+  for (double& x : numbers) x = random.Uniform(-size, size);
+  return numbers;
+}
+
+/// What both make of a state, loops closed or not, at a level with these speeds.
+struct Both {
+  Outcome outcome = Outcome::kFinished;
+  Diagnostics general;
+  bool evaluated = false;
+  /// Over the largest speed or acceleration of those that were added up: where loops leave no
+  /// freedom, nothing is left of them.
+  double difference = 0.0;
+};
+Both Compare(const Mechanism<Planar, double>& mechanism, SpeedsUsed speeds, const Numbers& q,
+             const Numbers& u) {
+  const auto level =
+      speeds == SpeedsUsed::kGiven ? Enforcement::kAcceleration : Enforcement::kVelocity;
+  testing::SystemWith<Odca, Planar, double> odca(mechanism, {.enforcement = level});
+  Both both;
+  both.outcome = odca->Start(0.0, q, u);
+  const Eigen::Index n = q.size();
+  Numbers y(2 * n), general(y), own = Numbers::Zero(2 * n);
+  odca->ToState(q, u, In(y));
+  both.outcome = odca->Examine(0.0, In(y), In(general));
+  both.general = odca->diagnostics();
+  const auto sweep = PathSweep::Make(mechanism);
+  const std::span<double> rates = In(own);
+  both.evaluated =
+      sweep != nullptr && sweep->Evaluate(speeds, In(q), In(u), rates.first(n), rates.last(n));
+  const auto largest = [](const Numbers& numbers) { return numbers.cwiseAbs().maxCoeff(); };
+  const double speed = std::max(largest(general.head(n)), largest(u));
+  const double acceleration =
+      std::max({largest(general.tail(n)), mechanism.gravity().norm(), speed * speed});
+  both.difference = std::max(largest(own.head(n) - general.head(n)) / speed,
+                             largest(own.tail(n) - general.tail(n)) / acceleration);
+  return both;
+}
+
+/// The contract's bound: sums along n bodies, magnified by the condition of what is inverted.
+double Bound(int n, double rcond) {
+  return 100.0 * std::numeric_limits<double>::epsilon() * n / rcond;
+}
+
+/// Both right-hand sides.
+class PathSweepTest : public ::testing::TestWithParam<SpeedsUsed> {};
+INSTANTIATE_TEST_SUITE_P(Speeds, PathSweepTest,
+                         ::testing::Values(SpeedsUsed::kGiven, SpeedsUsed::kCompleted));
+
+TEST_P(PathSweepTest, AgreesWithTheGeneralSweepWhereverJointsHaveDrifted) {
+  int refused = 0, states = 0;
+  double worst = 0.0;
+  for (int n = 1; n <= 40; ++n) {
+    for (std::uint64_t seed = 1; seed <= 12; ++seed) {
+      const MechanismDescription path = RandomPath(n, 100 * seed + n);
+      const Mechanism<Planar, double> mechanism(path, Coordinates::kJoint);
+      ASSERT_NE(PathSweep::Make(mechanism), nullptr) << path.name;
+      Random random(seed);
+      const Numbers q = RandomNumbers(random, mechanism.num_q(), 4.0);
+      const Numbers u = RandomNumbers(random, mechanism.num_u(), 2.0);
+      const Both both = Compare(mechanism, GetParam(), q, u);
+      ASSERT_EQ(both.outcome, Outcome::kFinished);
+      ++states;
+      // what the general sweep softens is not to be had here; a little more may be refused
+      EXPECT_TRUE(!both.evaluated || both.general.smallest_weight == 1.0) << path.name;
+      if (!both.evaluated) {
+        ++refused;
+        EXPECT_LT(both.general.rcond, 0.01) << path.name;
+        continue;
+      }
+      const double of_bound = both.difference / Bound(n, both.general.rcond);
+      EXPECT_LE(of_bound, 1.0) << path.name << " rcond " << both.general.rcond;
+      worst = std::max(worst, of_bound);
+    }
+  }
+  std::printf("%d states, %d refused, worst %.2g of the bound\n", states, refused, worst);
+  EXPECT_LE(10 * refused, states);
+}
+
+TEST_P(PathSweepTest, AgreesOnChainsAndLadders) {
+  const auto hold = [&](const MechanismDescription& description) {
+    const Mechanism<Planar, double> mechanism(description, Coordinates::kJoint);
+    Random random(1);
+    Numbers q = RandomNumbers(random, mechanism.num_q(), 1e-4);
+    const Numbers u = RandomNumbers(random, mechanism.num_u(), 1.0);
+    for (const JointValues& start : description.initial.coordinates) {
+      q[mechanism.joints()[start.joint].q_offset] += start.values[0];
+    }
+    const Both both = Compare(mechanism, GetParam(), q, u);
+    ASSERT_TRUE(both.evaluated) << description.name;
+    EXPECT_LE(both.difference, Bound(mechanism.num_bodies(), both.general.rcond))
+        << description.name;
+  };
+  for (const int n : {3, 4, 8, 9, 16, 31, 100, 400}) hold(Chain(n));
+  for (const int n : {1, 2, 3, 4, 5, 8, 15, 50, 200}) hold(Ladder(n, 1.1, -0.7));
+}
+
+TEST(PathSweep, LeavesOthersToTheGeneralSweep) {
+  const auto make = [](const MechanismDescription& description, Coordinates coordinates) {
+    return PathSweep::Make(Mechanism<Planar, double>(description, coordinates));
+  };
+  const MechanismDescription chain = Chain(5);
+  EXPECT_NE(make(chain, Coordinates::kJoint), nullptr);
+  EXPECT_EQ(make(chain, Coordinates::kAbsolute), nullptr);
+  EXPECT_EQ(make(Grid(2, 2, 1.0, 0.0), Coordinates::kJoint), nullptr) << "bodies with more joints";
+  EXPECT_EQ(make(Hub(3, 2, false), Coordinates::kJoint), nullptr);
+  MechanismDescription sprung = chain;
+  sprung.forces.push_back(JointSpring{.joint = 1, .stiffness = 2.0});
+  EXPECT_EQ(make(sprung, Coordinates::kJoint), nullptr);
+  MechanismDescription slides = chain;
+  slides.joints[2].type = JointType::kPrismatic;
+  EXPECT_EQ(make(slides, Coordinates::kJoint), nullptr);
+  MechanismDescription elsewhere = chain;
+  elsewhere.joints[2].cut = true;
+  EXPECT_EQ(make(elsewhere, Coordinates::kJoint), nullptr) << "cut where no pinned body follows";
+  const Mechanism<Planar, double> mechanism(chain, Coordinates::kJoint);
+  Odca<Planar, double> published(mechanism, {.solver = SolverKind::kAsPublished});
+  Numbers q = Numbers::Zero(5), u = q, qdot = q, udot = q;
+  EXPECT_FALSE(published.RightHandSide(SpeedsUsed::kGiven, In(q), In(u), In(qdot), In(udot)));
+}
+
+TEST_P(PathSweepTest, RefusesWhatItCannotJudge) {
+  const Mechanism<Planar, double> chain(Chain(4), Coordinates::kJoint);
+  const auto sweep = PathSweep::Make(chain);
+  Numbers u = Numbers::Ones(4), qdot = u, udot = u;
+  Numbers q = Numbers::Constant(4, 1.1);
+  const auto evaluate = [&] {
+    return sweep->Evaluate(GetParam(), In(q), In(u), In(qdot), In(udot));
+  };
+  EXPECT_TRUE(evaluate());
+  q.setZero();  // stretched out: no force along it moves the last pin
+  EXPECT_FALSE(evaluate());
+  q.setConstant(1.1);
+  q[1] = 2.0 * kLargestAngle;
+  EXPECT_FALSE(evaluate());
+  q[1] = std::numeric_limits<double>::quiet_NaN();
+  EXPECT_FALSE(evaluate());
+  q[1] = 1.1;
+  u[2] = std::numeric_limits<double>::infinity();
+  EXPECT_FALSE(evaluate());
+}
+
+TEST(PathSweep, IsTheDerivativeOfTheSystemWhereItServes) {
+  const MechanismDescription ladder = Ladder(6, 1.0, 0.5);
+  const Mechanism<Planar, double> mechanism(ladder, Coordinates::kJoint);
+  Numbers q = Numbers::Zero(mechanism.num_q()), u = Numbers::Ones(mechanism.num_u());
+  for (const JointValues& start : ladder.initial.coordinates) {
+    q[mechanism.joints()[start.joint].q_offset] = start.values[0];
+  }
+  std::vector<double> y(2 * mechanism.num_q()), shortest(y), examined(y), own(y);
+  const auto n = static_cast<std::size_t>(mechanism.num_q());
+  for (const Enforcement level : {Enforcement::kAcceleration, Enforcement::kPosition,
+                                  Enforcement::kVelocity, Enforcement::kBaumgarte}) {
+    testing::SystemWith<Odca, Planar, double> odca(mechanism, {.enforcement = level});
+    ASSERT_EQ(odca->Start(0.0, q, u), Outcome::kFinished);
+    odca->ToState(q, u, y);
+    ASSERT_EQ(odca->Derivative(0.0, y, shortest), Outcome::kFinished);
+    ASSERT_EQ(odca->Examine(0.0, y, examined), Outcome::kFinished);
+    const bool completed = level == Enforcement::kVelocity;
+    const bool serves = level != Enforcement::kBaumgarte;
+    ASSERT_TRUE(PathSweep::Make(mechanism)->Evaluate(
+        completed ? SpeedsUsed::kCompleted : SpeedsUsed::kGiven, In(q), In(u),
+        std::span(own).first(n), std::span(own).last(n)));
+    EXPECT_EQ(shortest == own, serves) << ToString(level);
+    EXPECT_EQ(shortest == examined, !serves) << ToString(level);
+  }
+}
+
+TEST_P(PathSweepTest, AllocatesNothing) {
+  if (testing::CountAllocations() < 0) GTEST_SKIP() << "the sanitizer owns malloc";
+  const Mechanism<Planar, double> mechanism(Ladder(20, 1.0, 0.5), Coordinates::kJoint);
+  const auto sweep = PathSweep::Make(mechanism);
+  Random random(1);
+  const Numbers q = RandomNumbers(random, mechanism.num_q(), 1.0);
+  const Numbers u = RandomNumbers(random, mechanism.num_u(), 1.0);
+  Numbers qdot = u, udot = u;
+  const long before = testing::CountAllocations();
+  sweep->Evaluate(GetParam(), In(q), In(u), In(qdot), In(udot));
+  EXPECT_EQ(testing::CountAllocations(), before);
+}
+
+/// A number that counts its products.
+struct Counted {
+  double value = 0.0;
+  inline static int products = 0;
+  Counted() = default;
+  Counted(double number) : value(number) {}
+  friend Counted operator+(Counted a, Counted b) { return a.value + b.value; }
+  friend Counted operator-(Counted a, Counted b) { return a.value - b.value; }
+  friend Counted operator-(Counted a) { return -a.value; }
+  friend Counted operator*(Counted a, Counted b) { return ++products, a.value * b.value; }
+  friend Counted operator/(Counted a, Counted b) { return ++products, a.value / b.value; }
+  friend bool operator<(Counted a, Counted b) { return a.value < b.value; }
+};
+
+TEST(TwoHandleKernels, TakeAsManyOperationsAsTheySay) {
+  const auto products = [](auto call) {
+    Counted::products = 0;
+    call();
+    return Counted::products;
+  };
+  Link<Counted> link;
+  TurnedLink<Counted> at;
+  TwoHandle<Counted> A, B;
+  OneHandle<Counted> end;
+  Cut<Counted> cut;
+  EndCut<Counted> end_cut;
+  Vector2<Counted> F;
+  Counted speed, slack;
+  EXPECT_EQ(products([&] { Leaf<Pass::kCompleted>(link, at, speed); }), Operations::kLeaf);
+  EXPECT_EQ(products([&] { Join(A, B, Counted(0.0), cut, slack); }), Operations::kJoin);
+  EXPECT_EQ(products([&] { Join(end, B, Counted(0.0), end_cut, slack); }), Operations::kEndJoin);
+  EXPECT_EQ(products([&] { ForceIn(cut, F, F); }), Operations::kForceIn);
+  EXPECT_EQ(products([&] { ForceIn(end_cut, F); }), Operations::kForceInEnd);
+  EXPECT_EQ(products([&] { AngularAcceleration<Pass::kCompleted>(at, F, F); }),
+            Operations::kAngularAcceleration);
+}
+
+TEST(Paths, AreFoundInAnyOrderOfJoints) {
+  using Joints = std::vector<PlanJoint>;
+  const auto bodies = [](int n, const Joints& joints) {
+    std::vector<std::vector<int>> found;
+    for (const Path& path : FindPaths(n + 1, joints)) {
+      found.emplace_back();
+      for (const PathBody& at : path) found.back().push_back(at.body);
+    }
+    return found;
+  };
+  using Found = std::vector<std::vector<int>>;
+  EXPECT_EQ(bodies(3, Joints{{0, 3, 1, 2}, {1, 2, 3, 2}, {2, 0, 3, 2}}), (Found{{1, 3, 2}}));
+  EXPECT_EQ(bodies(3, Joints{{0, 2, 3, 2}, {1, 0, 1, 2}}), (Found{{1}, {2, 3}}));
+  EXPECT_EQ(bodies(3, Joints{{0, 1, 2, 2}, {1, 2, 3, 2}, {2, 3, 1, 2}}), Found{}) << "a ring";
+  EXPECT_EQ(bodies(2, Joints{{0, 1, 2, 2}, {1, 2, 1, 2}}), Found{}) << "two joints to the same";
+  EXPECT_EQ(bodies(1, Joints{{0, 0, 1, 2}, {1, 1, 0, 2}}), Found{}) << "two to Ground";
+  EXPECT_EQ(bodies(4, Joints{{0, 1, 2, 2}, {1, 1, 3, 2}, {2, 1, 4, 2}}), Found{}) << "a hub";
+}
+
+}  // namespace
+}  // namespace loopbench::odca::pins

@@ -152,6 +152,10 @@ struct Closure {
   T inverse_radius;        ///< of the Link
 };
 
+inline bool IsCut(const Closure<double>& closure) {
+  return closure.cut_here + closure.cut_before > 0.0;
+}
+
 /// Handle 1 of a pinned body.
 template <class T>
 LOOPBENCH_INLINE Point<T> AtPin(const Link<T>& link, const TurnedLink<T>& at, const T& speed,

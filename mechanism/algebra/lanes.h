@@ -40,6 +40,28 @@ inline void Store(const T& value, double* to) {
   std::memcpy(to, &value, sizeof(T));
 }
 
+/// One lane of a struct of Lanes, which is a struct of numbers.
+template <template <class> class Struct>
+inline void SetLane(Struct<Lanes>& pack, int lane, const Struct<double>& one) {
+  static_assert(sizeof(pack) == kLanes * sizeof(one));
+  for (std::size_t i = 0; i < sizeof(one) / sizeof(double); ++i) {
+    std::memcpy(reinterpret_cast<char*>(&pack) + i * sizeof(Lanes) +
+                    static_cast<std::size_t>(lane) * sizeof(double),
+                reinterpret_cast<const char*>(&one) + i * sizeof(double), sizeof(double));
+  }
+}
+template <template <class> class Struct>
+inline Struct<double> LaneOf(const Struct<Lanes>& pack, int lane) {
+  Struct<double> one;
+  for (std::size_t i = 0; i < sizeof(one) / sizeof(double); ++i) {
+    std::memcpy(reinterpret_cast<char*>(&one) + i * sizeof(double),
+                reinterpret_cast<const char*>(&pack) + i * sizeof(Lanes) +
+                    static_cast<std::size_t>(lane) * sizeof(double),
+                sizeof(double));
+  }
+  return one;
+}
+
 /// The smaller one, lane by lane.
 template <class T>
 inline T Min(const T& a, const T& b) {

@@ -1,0 +1,179 @@
+// Where bodies of paths stand in the lists of a PathSweep, and their constants.
+#include <algorithm>
+#include <map>
+#include <string>
+
+#include "odca/path_sweep.h"
+
+namespace loopbench::odca::pins {
+
+namespace {
+
+/// Shorter lanes cost more side by side than one after another.
+constexpr int kShortestLane = 2;
+
+bool IsPin(const Joint<Planar, double>& joint) {
+  return joint.kind == &KindOf<Planar, double>(JointType::kRevolute) && joint.num_drives == 0 &&
+         joint.num_released == 0;
+}
+
+/// Whether points in each lane can be followed from its own first body on: a pinned body stands
+/// before the first cut joint in it.
+bool LanesStandAlone(const std::vector<Closure<double>>& closures, int packs) {
+  for (int start = 0; start < packs * kLanes; start += packs) {
+    bool pinned = closures[start].follows == 0.0;
+    for (int k = start + 1; k < start + packs; ++k) {
+      if (IsCut(closures[k]) && !pinned) return false;
+      pinned = pinned || closures[k].follows == 0.0;
+    }
+  }
+  return true;
+}
+
+/// The longest lanes that do, 0 for none.
+int LengthOfLanes(const std::vector<Closure<double>>& closures) {
+  constexpr int kTrials = 8;
+  const int longest = static_cast<int>(closures.size()) / kLanes;
+  for (int packs = longest; packs >= std::max(kShortestLane, longest - kTrials); --packs) {
+    if (LanesStandAlone(closures, packs)) return packs;
+  }
+  return 0;
+}
+
+/// Sets limits in the order of joins (PathSweep::Up): a join closes a loop where both its sides are
+/// pinned to Ground. Two sides of many bodies answer like one of their mass, which is no sign of a
+/// degenerate position: limits shrink with their number.
+void SetLimits(const Mechanism<Planar, double>& mechanism, int packs, PathLinks& path) {
+  struct Side {
+    int bodies = 0;
+    bool pinned = false;
+    void operator+=(const Side& other) {
+      bodies += other.bodies;
+      pinned = pinned || other.pinned;
+    }
+  };
+  const auto share = [](const Side& side) { return 8.0 / std::max(1, side.bodies); };
+  const auto body = [&](int k) { return Side{1, path.closures[k].follows == 0.0}; };
+  const auto join = [&](int k, Side& left, const Side& right) {
+    if (left.pinned && right.pinned) {
+      path.links[k].limit =
+          std::min(1.0, share(left) + share(right)) * LimitOf(mechanism, path.path[k].before);
+    }
+    left += right;
+  };
+  Side all;
+  const int packed = packs * kLanes;
+  for (int start = 0; start < packed; start += packs) {
+    Side lane = body(start);
+    for (int k = start + 1; k < start + packs; ++k) join(k, lane, body(k));
+    join(start, all, lane);
+  }
+  for (int k = packed; k < static_cast<int>(path.links.size()); ++k) join(k, all, body(k));
+  path.end_limit *= std::min(1.0, share(all));
+}
+
+}  // namespace
+
+std::unique_ptr<PathSweep> PathSweep::Make(const Mechanism<Planar, double>& mechanism) {
+  const auto& joints = mechanism.joints();
+  if (mechanism.num_u() == 0 || !mechanism.forces().empty() ||
+      !std::ranges::all_of(joints, IsPin)) {
+    return nullptr;
+  }
+  std::vector<PlanJoint> graph;
+  for (int j = 0; j < static_cast<int>(joints.size()); ++j) {
+    graph.push_back({j, joints[j].from, joints[j].to, joints[j].num_constraints()});
+  }
+  std::unique_ptr<PathSweep> sweep(new PathSweep);
+  std::vector<int> place_of(mechanism.num_bodies(), mechanism.num_bodies() - 1);
+  std::vector<double> axes(mechanism.num_bodies(), 0.0);
+  for (const Path& path : FindPaths(mechanism.num_bodies(), graph)) {
+    std::optional<PathLinks> links = MeasurePath(mechanism, path);
+    if (!links) return nullptr;
+    sweep->Add(mechanism, *links);
+    for (std::size_t k = 0; k < links->path.size(); ++k) {
+      place_of[links->path[k].body] = sweep->pieces_.back().place(static_cast<int>(k));
+      axes[links->path[k].body] = links->axes[k];
+    }
+  }
+  if (sweep->pieces_.empty()) return nullptr;
+  sweep->AddSteps(mechanism, place_of, axes);
+  return sweep;
+}
+
+void PathSweep::Add(const Mechanism<Planar, double>& mechanism, PathLinks path) {
+  Piece piece;
+  piece.bodies = static_cast<int>(path.links.size());
+  piece.packs = LengthOfLanes(path.closures);
+  piece.first = num_places_;
+  piece.first_pack = static_cast<int>(kind_of_pack_.size());
+  piece.first_single = static_cast<int>(singles_.size());
+  piece.first_cut = static_cast<int>(end_cuts_.size());
+  piece.has_loops = path.has_loops;
+  piece.ends_at_ground = path.ends_at_ground;
+  piece.ground_is_P = path.ground_is_P;
+  piece.end = path.end;
+  num_places_ += piece.bodies;
+  SetLimits(mechanism, piece.packs, path);
+  piece.end_limit = path.end_limit;
+  for (int lane = 0; lane < piece.lanes(); ++lane) {
+    Closure<double>& start = path.closures[lane * piece.packs];
+    piece.starts[lane] = start;
+    start.cut_here = start.cut_before = 0.0;  // Turn() sees to these
+    for (int k = lane * piece.packs; k < (lane + 1) * piece.packs; ++k) {
+      const bool pinned = path.closures[k].follows == 0.0;
+      piece.stands_alone[lane] = piece.stands_alone[lane] || pinned;
+      if (pinned && k > lane * piece.packs) piece.loops_in_lanes = true;
+    }
+  }
+  std::map<std::string, int> kinds;
+  for (int i = 0; i < piece.packs; ++i) {
+    Link<Lanes> pack;
+    Closure<Lanes> closure;
+    for (int lane = 0; lane < kLanes; ++lane) {
+      SetLane(pack, lane, path.links[lane * piece.packs + i]);
+      SetLane(closure, lane, path.closures[lane * piece.packs + i]);
+    }
+    const std::string bytes(reinterpret_cast<const char*>(&pack), sizeof(pack));
+    const auto [kind, is_new] = kinds.try_emplace(bytes, static_cast<int>(pack_kinds_.size()));
+    if (is_new) pack_kinds_.push_back(pack);
+    kind_of_pack_.push_back(kind->second);
+    pack_closures_.push_back(closure);
+  }
+  singles_.insert(singles_.end(), path.links.begin() + piece.packed(), path.links.end());
+  single_closures_.insert(single_closures_.end(), path.closures.begin() + piece.packed(),
+                          path.closures.end());
+  turned_packs_.resize(kind_of_pack_.size());
+  cuts_.resize(kind_of_pack_.size());
+  turned_singles_.resize(singles_.size());
+  end_cuts_.resize(end_cuts_.size() + piece.lanes() + piece.singles());
+  using Count = Operations;
+  constexpr int kOfEach = Count::kLeaf + Count::kAngularAcceleration + 1;
+  operations_of_pass_ += piece.packed() * (kOfEach + Count::kJoin + Count::kForceIn) +
+                         piece.singles() * (kOfEach + Count::kEndJoin + Count::kForceInEnd);
+  pieces_.push_back(piece);
+}
+
+/// X_PF and X_QM are angles here.
+void PathSweep::AddSteps(const Mechanism<Planar, double>& mechanism,
+                         const std::vector<int>& place_of, const std::vector<double>& axes) {
+  for (const TreeStep& step : mechanism.tree()) {
+    const Joint<Planar, double>& joint = mechanism.joints()[step.joint];
+    const bool goes_on = !steps_.empty() && steps_.back().child == place_of[step.parent];
+    if (goes_on) {
+      ++runs_.back();
+    } else {
+      runs_.push_back(1);
+    }
+    const double of_bodies = step.sign * (joint.X_PF.angle - joint.X_QM.angle);
+    steps_.push_back({.u = joint.u_offset,
+                      .child = place_of[step.child],
+                      .parent = place_of[step.parent],
+                      .sign = static_cast<double>(step.sign),
+                      .offset = of_bodies + axes[step.child] - axes[step.parent]});
+  }
+  angle_.setZero(num_places_ + 1);
+  speed_ = alpha_ = angle_;
+}
+
+}  // namespace loopbench::odca::pins

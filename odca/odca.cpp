@@ -17,16 +17,21 @@ PlanOptions DefaultPlan(SolverKind solver) {
 }  // namespace
 
 template <class Space, class S>
-Plan MakePlan(const Mechanism<Space, S>& mechanism, const PlanOptions& options) {
+std::vector<PlanJoint> PlanJoints(const Mechanism<Space, S>& mechanism) {
   std::vector<PlanJoint> joints;
   for (int j = 0; j < static_cast<int>(mechanism.joints().size()); ++j) {
     const Joint<Space, S>& joint = mechanism.joints()[j];
     const int rows = joint.num_constraints();
     if (rows > 0) joints.push_back({j, joint.from, joint.to, rows});
   }
+  return joints;
+}
+
+template <class Space, class S>
+Plan MakePlan(const Mechanism<Space, S>& mechanism, const PlanOptions& options) {
   PlanOptions in_space = options;
   in_space.dim = Space::kDim;
-  return Plan(mechanism.num_bodies(), joints, in_space);
+  return Plan(mechanism.num_bodies(), PlanJoints(mechanism), in_space);
 }
 
 template <class Space, class S>
@@ -209,7 +214,8 @@ Wrench<Space, S> Odca<Space, S>::JointForce(int joint) const {
 LOOPBENCH_FOR_EACH_SPACE_AND_SCALAR(LOOPBENCH_INSTANTIATE)
 #undef LOOPBENCH_INSTANTIATE
 
-#define LOOPBENCH_INSTANTIATE(Space, S) \
+#define LOOPBENCH_INSTANTIATE(Space, S)                                   \
+  template std::vector<PlanJoint> PlanJoints(const Mechanism<Space, S>&); \
   template Plan MakePlan(const Mechanism<Space, S>&, const PlanOptions&);
 LOOPBENCH_FOR_EACH_SPACE_AND_SCALAR(LOOPBENCH_INSTANTIATE)
 #undef LOOPBENCH_INSTANTIATE

@@ -7,7 +7,11 @@
 
 namespace loopbench::odca {
 
-/// The plan of a mechanism: every joint with constrained directions, tree joint or not.
+/// Every joint with constrained directions, tree joint or not, under its index.
+template <class Space, class S>
+std::vector<PlanJoint> PlanJoints(const Mechanism<Space, S>& mechanism);
+
+/// The plan of a mechanism, over these joints.
 template <class Space, class S>
 Plan MakePlan(const Mechanism<Space, S>& mechanism, const PlanOptions& options = {});
 

@@ -27,12 +27,12 @@ void PathSweep::SetAngles(const double* q, const double* u) {
 }
 
 template <bool kLoops>
-Point<Lanes> PathSweep::TurnPacks(const Piece& piece) {
+Point<Lanes> PathSweep::TurnPacks(const PathPlaces& path) {
   Point<Lanes> at_2 = {};
   Lanes room = Lanes{} + kLargestAngle;
   Lanes speed_before = {}, inverse_before = {};
-  for (int i = 0; i < piece.packs; ++i) {
-    const int pack = piece.first_pack + i, place = piece.first + i * kLanes;
+  for (int i = 0; i < path.packs; ++i) {
+    const int pack = path.first_pack + i, place = path.first + i * kLanes;
     const Link<Lanes>& link = pack_kinds_[kind_of_pack_[pack]];
     const Lanes speed = Load<Lanes>(&speed_[place]);
     const Lanes angle = Load<Lanes>(&angle_[place]);
@@ -54,7 +54,7 @@ Point<Lanes> PathSweep::TurnPacks(const Piece& piece) {
       }
       speed_before = speed;
       inverse_before = closure.inverse_radius;
-    } else if (piece.has_loops) {
+    } else if (path.has_loops) {
       at_2 = Across(link, at, speed, at_2);
     }
     turned_packs_[pack] = at;
@@ -69,122 +69,122 @@ struct PathSweep::At {
   TurnedLink<double> turned;
   double speed;
 };
-PathSweep::At PathSweep::Body(const Piece& piece, int k) const {
-  const double speed = speed_[piece.place(k)];
-  if (k >= piece.packed()) {
-    const int single = piece.first_single + k - piece.packed();
+PathSweep::At PathSweep::Body(const PathPlaces& path, int k) const {
+  const double speed = speed_[path.place(k)];
+  if (k >= path.packed()) {
+    const int single = path.first_single + k - path.packed();
     return {singles_[single], turned_singles_[single], speed};
   }
-  const int pack = piece.first_pack + k % piece.packs, lane = k / piece.packs;
+  const int pack = path.first_pack + k % path.packs, lane = k / path.packs;
   return {LaneOf(pack_kinds_[kind_of_pack_[pack]], lane), LaneOf(turned_packs_[pack], lane), speed};
 }
-void PathSweep::Set(const Piece& piece, int k, const TurnedLink<double>& turned) {
-  if (k >= piece.packed()) {
-    turned_singles_[piece.first_single + k - piece.packed()] = turned;
+void PathSweep::Set(const PathPlaces& path, int k, const TurnedLink<double>& turned) {
+  if (k >= path.packed()) {
+    turned_singles_[path.first_single + k - path.packed()] = turned;
   } else {
-    SetLane(turned_packs_[piece.first_pack + k % piece.packs], k / piece.packs, turned);
+    SetLane(turned_packs_[path.first_pack + k % path.packs], k / path.packs, turned);
   }
 }
 
-void PathSweep::Close(Piece& piece, int k, bool here, const Point<double>& gap) {
+void PathSweep::Close(PathPlaces& path, int k, bool here, const Point<double>& gap) {
   const int P = here ? k : k - 1;
-  At at_P = Body(piece, P);
+  At at_P = Body(path, P);
   const Vector2<double> to_Q = Scaled(1.0 / at_P.link.radius, gap.p);
   if (here) {
     at_P.turned.r1 = at_P.turned.r1 + to_Q;
   } else {
     at_P.turned.r2 = at_P.turned.r2 - to_Q;
   }
-  Set(piece, P, at_P.turned);
+  Set(path, P, at_P.turned);
   const Vector2<double> gap_v = RelativeVelocity(at_P.speed, gap);
-  if (k == piece.bodies) {
-    piece.gap_v = gap_v;
-    piece.gap_w = at_P.speed;
+  if (k == path.bodies) {
+    path.gap_v = gap_v;
+    path.gap_w = at_P.speed;
     return;
   }
-  At at = Body(piece, k);
+  At at = Body(path, k);
   at.turned.gap_v = gap_v;
   at.turned.gap_w = at_P.speed;
-  Set(piece, k, at.turned);
+  Set(path, k, at.turned);
 }
 
-void PathSweep::Turn(Piece& piece) {
-  const Point<Lanes> ends = piece.loops_in_lanes ? TurnPacks<true>(piece) : TurnPacks<false>(piece);
-  for (int k = piece.packed(); k < piece.bodies; ++k) {
-    const int single = piece.first_single + k - piece.packed();
-    const double angle = angle_[piece.place(k)];
+void PathSweep::Turn(PathPlaces& path) {
+  const Point<Lanes> ends = path.loops_in_lanes ? TurnPacks<true>(path) : TurnPacks<false>(path);
+  for (int k = path.packed(); k < path.bodies; ++k) {
+    const int single = path.first_single + k - path.packed();
+    const double angle = angle_[path.place(k)];
     room_ = Min(room_, kLargestAngle - Magnitude(angle));
     turned_singles_[single] = pins::Turn(singles_[single], angle);
   }
-  if (!piece.has_loops) return;
+  if (!path.has_loops) return;
   Point<double> at_2 = {};
   const auto start = [&](int k, const Closure<double>& closure) {
     if (closure.follows > 0.0) return at_2;
-    const At at = Body(piece, k);
+    const At at = Body(path, k);
     const Point<double> at_pin = AtPin(at.link, at.turned, at.speed, closure);
-    if (IsCut(closure)) Close(piece, k, closure.cut_here > 0.0, at_2 - at_pin);
+    if (IsCut(closure)) Close(path, k, closure.cut_here > 0.0, at_2 - at_pin);
     return at_pin;
   };
-  for (int lane = 0; lane < piece.lanes(); ++lane) {
-    const Point<double> at_1 = start(lane * piece.packs, piece.starts[lane]);
+  for (int lane = 0; lane < path.lanes(); ++lane) {
+    const Point<double> at_1 = start(lane * path.packs, path.starts[lane]);
     at_2 = LaneOf(ends, lane);
-    if (!piece.loops_in_lanes || !piece.stands_alone[lane]) at_2 = at_2 + at_1;
+    if (!path.loops_in_lanes || !path.stands_alone[lane]) at_2 = at_2 + at_1;
   }
-  for (int k = piece.packed(); k < piece.bodies; ++k) {
-    const int single = piece.first_single + k - piece.packed();
+  for (int k = path.packed(); k < path.bodies; ++k) {
+    const int single = path.first_single + k - path.packed();
     const TurnedLink<double> own = turned_singles_[single];  // before gaps move its arms
     const Point<double> at_1 = start(k, single_closures_[single]);
-    at_2 = Across(singles_[single], own, speed_[piece.place(k)], at_1);
+    at_2 = Across(singles_[single], own, speed_[path.place(k)], at_1);
   }
-  if (!piece.ends_at_ground) return;
-  if (piece.ground_is_P) {
-    piece.gap_v = at_2.v;
+  if (!path.ends_at_ground) return;
+  if (path.ground_is_P) {
+    path.gap_v = at_2.v;
   } else {
-    Close(piece, piece.bodies, false, {at_2.p - piece.end, at_2.v});
+    Close(path, path.bodies, false, {at_2.p - path.end, at_2.v});
   }
 }
 
 template <Pass kPass>
-double PathSweep::Up(Piece& piece) {
+double PathSweep::Up(PathPlaces& path) {
   OneHandle<double> all = {};
-  EndCut<double>* cut = &end_cuts_[piece.first_cut];
+  EndCut<double>* cut = &end_cuts_[path.first_cut];
   double slack = 0.0;
   const auto join = [&](const TwoHandle<double>& next, double limit) {
-    if (cut == &end_cuts_[piece.first_cut]) {
+    if (cut == &end_cuts_[path.first_cut]) {
       all = {next.zeta22, next.zeta23};
     } else {
       all = Join(all, next, limit, *cut, slack);
     }
     ++cut;
   };
-  if (piece.packs > 0) {
+  if (path.packs > 0) {
     Lanes slacks = {};
     const auto leaf = [&](int i) {
-      const int pack = piece.first_pack + i;
+      const int pack = path.first_pack + i;
       return Leaf<kPass>(pack_kinds_[kind_of_pack_[pack]], turned_packs_[pack],
-                         Load<Lanes>(&speed_[piece.first + i * kLanes]));
+                         Load<Lanes>(&speed_[path.first + i * kLanes]));
     };
     TwoHandle<Lanes> lanes = leaf(0);
-    for (int i = 1; i < piece.packs; ++i) {
-      const int pack = piece.first_pack + i;
+    for (int i = 1; i < path.packs; ++i) {
+      const int pack = path.first_pack + i;
       const Lanes limit = pack_kinds_[kind_of_pack_[pack]].limit;
       lanes = Join(lanes, leaf(i), limit, cuts_[pack], slacks);
     }
     slack = Smallest(slacks);
-    const Lanes limits = pack_kinds_[kind_of_pack_[piece.first_pack]].limit;
+    const Lanes limits = pack_kinds_[kind_of_pack_[path.first_pack]].limit;
     for (int lane = 0; lane < kLanes; ++lane) join(LaneOf(lanes, lane), limits[lane]);
   }
-  for (int k = 0; k < piece.singles(); ++k) {
-    const Link<double>& link = singles_[piece.first_single + k];
-    const double speed = speed_[piece.first + piece.packed() + k];
-    join(Leaf<kPass>(link, turned_singles_[piece.first_single + k], speed), link.limit);
+  for (int k = 0; k < path.singles(); ++k) {
+    const Link<double>& link = singles_[path.first_single + k];
+    const double speed = speed_[path.first + path.packed() + k];
+    join(Leaf<kPass>(link, turned_singles_[path.first_single + k], speed), link.limit);
   }
-  if (piece.ends_at_ground) {  // Ground has no response (33, 34)
-    const Symmetric2<double> inverse = InverseOf(all.zeta22, piece.end_limit, slack);
+  if (path.ends_at_ground) {  // Ground has no response (33, 34)
+    const Symmetric2<double> inverse = InverseOf(all.zeta22, path.end_limit, slack);
     Vector2<double> wanted = kNone;  // of the last body, as TwoHandle::zeta13 of Leaf()
-    if (kPass == Pass::kSpeeds) wanted = -piece.gap_v;
-    if (kPass == Pass::kAccelerations) wanted = Cross(2.0 * piece.gap_w, piece.gap_v);
-    piece.end_force = inverse * (all.zeta23 - wanted);
+    if (kPass == Pass::kSpeeds) wanted = -path.gap_v;
+    if (kPass == Pass::kAccelerations) wanted = Cross(2.0 * path.gap_w, path.gap_v);
+    path.end_force = inverse * (all.zeta23 - wanted);
   }
   return slack;
 }
@@ -192,17 +192,17 @@ double PathSweep::Up(Piece& piece) {
 /// From the path's end: the force in the joint before a body, then the body's angular acceleration.
 /// Forces on lanes are those in the joints between them.
 template <Pass kPass>
-void PathSweep::Down(const Piece& piece) {
-  const EndCut<double>* cuts = &end_cuts_[piece.first_cut];
-  Vector2<double> F2 = piece.ends_at_ground ? -piece.end_force : kNone;
-  for (int k = piece.singles() - 1; k >= 0; --k) {
-    const int single = piece.first_single + k, node = piece.lanes() + k;
+void PathSweep::Down(const PathPlaces& path) {
+  const EndCut<double>* cuts = &end_cuts_[path.first_cut];
+  Vector2<double> F2 = path.ends_at_ground ? -path.end_force : kNone;
+  for (int k = path.singles() - 1; k >= 0; --k) {
+    const int single = path.first_single + k, node = path.lanes() + k;
     const Vector2<double> F1 = node == 0 ? kNone : ForceIn(cuts[node], F2);
-    alpha_[piece.first + piece.packed() + k] =
+    alpha_[path.first + path.packed() + k] =
         AngularAcceleration<kPass>(turned_singles_[single], F1, F2) / singles_[single].radius;
     F2 = -F1;
   }
-  if (piece.packs == 0) return;
+  if (path.packs == 0) return;
   Vector2<Lanes> F1s, F2s;
   for (int lane = kLanes - 1; lane >= 0; --lane) {
     const Vector2<double> F1 = lane == 0 ? kNone : ForceIn(cuts[lane], F2);
@@ -210,11 +210,11 @@ void PathSweep::Down(const Piece& piece) {
     SetLane(F2s, lane, F2);
     F2 = -F1;
   }
-  for (int i = piece.packs - 1; i >= 0; --i) {
-    const int pack = piece.first_pack + i;
+  for (int i = path.packs - 1; i >= 0; --i) {
+    const int pack = path.first_pack + i;
     const Vector2<Lanes> F1 = i == 0 ? F1s : ForceIn(cuts_[pack], F1s, F2s);
     const Lanes alpha = AngularAcceleration<kPass>(turned_packs_[pack], F1, F2s);
-    Store(alpha / pack_kinds_[kind_of_pack_[pack]].radius, &alpha_[piece.first + i * kLanes]);
+    Store(alpha / pack_kinds_[kind_of_pack_[pack]].radius, &alpha_[path.first + i * kLanes]);
     F2s = -F1;
   }
 }
@@ -236,14 +236,18 @@ bool PathSweep::Evaluate(SpeedsUsed speeds, std::span<const double> q, std::span
   operations_ = 0;
   SetAngles(q.data(), u.data());
   room_ = kLargestAngle;
-  for (Piece& piece : pieces_) Turn(piece);
+  for (PathPlaces& path : paths_) Turn(path);
   if (!(room_ >= 0.0)) return false;
   const auto sweep = [&]<Pass kPass>() {
-    operations_ += operations_of_pass_;
     double slack = 0.0;
-    for (Piece& piece : pieces_) slack = Min(slack, Up<kPass>(piece));
+    for (PathPlaces& path : paths_) {
+      constexpr int kOfEach = Operations::Leaf(kPass) + Operations::kAngularAcceleration + 1;
+      operations_ += path.packed() * (kOfEach + Operations::kJoin + Operations::kForceIn) +
+                     path.singles() * (kOfEach + Operations::kEndJoin + Operations::kForceInEnd);
+      slack = Min(slack, Up<kPass>(path));
+    }
     if (!(slack >= 0.0)) return false;
-    for (const Piece& piece : pieces_) Down<kPass>(piece);
+    for (const PathPlaces& path : paths_) Down<kPass>(path);
     return true;
   };
   std::copy_n(u.data(), u.size(), qdot.data());

@@ -13,8 +13,7 @@
 //
 // Pins that close loops must not be degenerate: where InverseOf() sees one that may be, Evaluate()
 // gives up, and the general sweep decides. Its scale is the trace of the free response of the
-// joint's two bodies, which is at least the scale of loop_solver.h, so that nothing passes here
-// that would be softened there.
+// joint's two bodies, which is at least the scale of loop_solver.h.
 #pragma once
 
 #include <array>
@@ -42,7 +41,7 @@ class PathSweep {
  private:
   /// A path's places in the lists. Its body k stands in lane k / packs of pack k % packs; the last
   /// ones, which fill no pack, come after the packs.
-  struct Piece {
+  struct PathPlaces {
     int bodies = 0, packs = 0;
     int first = 0;           ///< place of its first body
     int first_pack = 0;      ///< in lists by pack
@@ -80,22 +79,22 @@ class PathSweep {
   template <bool kAdd>
   bool SetRates(double* rates) const;
   /// Bodies at their angles, with what the gaps of cut joints add to them.
-  void Turn(Piece& piece);
+  void Turn(PathPlaces& path);
   /// Where lanes end, seen from where they start unless they stand alone.
   template <bool kLoops>
-  Point<Lanes> TurnPacks(const Piece& piece);
+  Point<Lanes> TurnPacks(const PathPlaces& path);
   struct At;
-  At Body(const Piece& piece, int k) const;
-  void Set(const Piece& piece, int k, const TurnedLink<double>& turned);
+  At Body(const PathPlaces& path, int k) const;
+  void Set(const PathPlaces& path, int k, const TurnedLink<double>& turned);
   /// The joint before body k, or to Ground after the last one, being cut: `here` if its P is k.
-  void Close(Piece& piece, int k, bool here, const Point<double>& gap);
+  void Close(PathPlaces& path, int k, bool here, const Point<double>& gap);
   /// The least slack of all joins.
   template <Pass kPass>
-  double Up(Piece& piece);
+  double Up(PathPlaces& path);
   template <Pass kPass>
-  void Down(const Piece& piece);
+  void Down(const PathPlaces& path);
 
-  std::vector<Piece> pieces_;
+  std::vector<PathPlaces> paths_;
   std::vector<Step> steps_;
   std::vector<int> runs_;  ///< lengths of sequences of steps that go on where the one before ended
   std::vector<Link<Lanes>> pack_kinds_;  ///< equal packs share one
@@ -110,7 +109,7 @@ class PathSweep {
   VectorX<double> angle_, speed_, alpha_;  ///< by place; the last one is Ground's
   int num_places_ = 0;
   double room_ = 0.0;  ///< between the largest angle and kLargestAngle
-  long operations_of_pass_ = 0, operations_ = 0;
+  long operations_ = 0;
 };
 
 }  // namespace loopbench::odca::pins

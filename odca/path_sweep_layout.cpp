@@ -3,13 +3,14 @@
 #include <map>
 #include <string>
 
+#include "odca/odca.h"
 #include "odca/path_sweep.h"
 
 namespace loopbench::odca::pins {
 
 namespace {
 
-/// Shorter lanes cost more side by side than one after another.
+/// Shorter lanes are no faster than one body after another (measured with lanes of one).
 constexpr int kShortestLane = 2;
 
 bool IsPin(const Joint<Planar, double>& joint) {
@@ -30,7 +31,8 @@ bool LanesStandAlone(const std::vector<Closure<double>>& closures, int packs) {
   return true;
 }
 
-/// The longest lanes that do, 0 for none.
+/// The longest lanes that do, 0 for none. Where a sequence of bodies repeats, as crank and coupler
+/// of a ladder, lanes of whole periods do: periods of up to eight bodies are found.
 int LengthOfLanes(const std::vector<Closure<double>>& closures) {
   constexpr int kTrials = 8;
   const int longest = static_cast<int>(closures.size()) / kLanes;
@@ -75,64 +77,59 @@ void SetLimits(const Mechanism<Planar, double>& mechanism, int packs, PathLinks&
 }  // namespace
 
 std::unique_ptr<PathSweep> PathSweep::Make(const Mechanism<Planar, double>& mechanism) {
-  const auto& joints = mechanism.joints();
   if (mechanism.num_u() == 0 || !mechanism.forces().empty() ||
-      !std::ranges::all_of(joints, IsPin)) {
+      !std::ranges::all_of(mechanism.joints(), IsPin)) {
     return nullptr;
-  }
-  std::vector<PlanJoint> graph;
-  for (int j = 0; j < static_cast<int>(joints.size()); ++j) {
-    graph.push_back({j, joints[j].from, joints[j].to, joints[j].num_constraints()});
   }
   std::unique_ptr<PathSweep> sweep(new PathSweep);
   std::vector<int> place_of(mechanism.num_bodies(), mechanism.num_bodies() - 1);
   std::vector<double> axes(mechanism.num_bodies(), 0.0);
-  for (const Path& path : FindPaths(mechanism.num_bodies(), graph)) {
+  for (const Path& path : FindPaths(mechanism.num_bodies(), PlanJoints(mechanism))) {
     std::optional<PathLinks> links = MeasurePath(mechanism, path);
     if (!links) return nullptr;
     sweep->Add(mechanism, *links);
     for (std::size_t k = 0; k < links->path.size(); ++k) {
-      place_of[links->path[k].body] = sweep->pieces_.back().place(static_cast<int>(k));
+      place_of[links->path[k].body] = sweep->paths_.back().place(static_cast<int>(k));
       axes[links->path[k].body] = links->axes[k];
     }
   }
-  if (sweep->pieces_.empty()) return nullptr;
+  if (sweep->paths_.empty()) return nullptr;
   sweep->AddSteps(mechanism, place_of, axes);
   return sweep;
 }
 
-void PathSweep::Add(const Mechanism<Planar, double>& mechanism, PathLinks path) {
-  Piece piece;
-  piece.bodies = static_cast<int>(path.links.size());
-  piece.packs = LengthOfLanes(path.closures);
-  piece.first = num_places_;
-  piece.first_pack = static_cast<int>(kind_of_pack_.size());
-  piece.first_single = static_cast<int>(singles_.size());
-  piece.first_cut = static_cast<int>(end_cuts_.size());
-  piece.has_loops = path.has_loops;
-  piece.ends_at_ground = path.ends_at_ground;
-  piece.ground_is_P = path.ground_is_P;
-  piece.end = path.end;
-  num_places_ += piece.bodies;
-  SetLimits(mechanism, piece.packs, path);
-  piece.end_limit = path.end_limit;
-  for (int lane = 0; lane < piece.lanes(); ++lane) {
-    Closure<double>& start = path.closures[lane * piece.packs];
-    piece.starts[lane] = start;
+void PathSweep::Add(const Mechanism<Planar, double>& mechanism, PathLinks links) {
+  PathPlaces path;
+  path.bodies = static_cast<int>(links.links.size());
+  path.packs = LengthOfLanes(links.closures);
+  path.first = num_places_;
+  path.first_pack = static_cast<int>(kind_of_pack_.size());
+  path.first_single = static_cast<int>(singles_.size());
+  path.first_cut = static_cast<int>(end_cuts_.size());
+  path.has_loops = links.has_loops;
+  path.ends_at_ground = links.ends_at_ground;
+  path.ground_is_P = links.ground_is_P;
+  path.end = links.end;
+  num_places_ += path.bodies;
+  SetLimits(mechanism, path.packs, links);
+  path.end_limit = links.end_limit;
+  for (int lane = 0; lane < path.lanes(); ++lane) {
+    Closure<double>& start = links.closures[lane * path.packs];
+    path.starts[lane] = start;
     start.cut_here = start.cut_before = 0.0;  // Turn() sees to these
-    for (int k = lane * piece.packs; k < (lane + 1) * piece.packs; ++k) {
-      const bool pinned = path.closures[k].follows == 0.0;
-      piece.stands_alone[lane] = piece.stands_alone[lane] || pinned;
-      if (pinned && k > lane * piece.packs) piece.loops_in_lanes = true;
+    for (int k = lane * path.packs; k < (lane + 1) * path.packs; ++k) {
+      const bool pinned = links.closures[k].follows == 0.0;
+      path.stands_alone[lane] = path.stands_alone[lane] || pinned;
+      if (pinned && k > lane * path.packs) path.loops_in_lanes = true;
     }
   }
   std::map<std::string, int> kinds;
-  for (int i = 0; i < piece.packs; ++i) {
+  for (int i = 0; i < path.packs; ++i) {
     Link<Lanes> pack;
     Closure<Lanes> closure;
     for (int lane = 0; lane < kLanes; ++lane) {
-      SetLane(pack, lane, path.links[lane * piece.packs + i]);
-      SetLane(closure, lane, path.closures[lane * piece.packs + i]);
+      SetLane(pack, lane, links.links[lane * path.packs + i]);
+      SetLane(closure, lane, links.closures[lane * path.packs + i]);
     }
     const std::string bytes(reinterpret_cast<const char*>(&pack), sizeof(pack));
     const auto [kind, is_new] = kinds.try_emplace(bytes, static_cast<int>(pack_kinds_.size()));
@@ -140,18 +137,14 @@ void PathSweep::Add(const Mechanism<Planar, double>& mechanism, PathLinks path) 
     kind_of_pack_.push_back(kind->second);
     pack_closures_.push_back(closure);
   }
-  singles_.insert(singles_.end(), path.links.begin() + piece.packed(), path.links.end());
-  single_closures_.insert(single_closures_.end(), path.closures.begin() + piece.packed(),
-                          path.closures.end());
+  singles_.insert(singles_.end(), links.links.begin() + path.packed(), links.links.end());
+  single_closures_.insert(single_closures_.end(), links.closures.begin() + path.packed(),
+                          links.closures.end());
   turned_packs_.resize(kind_of_pack_.size());
   cuts_.resize(kind_of_pack_.size());
   turned_singles_.resize(singles_.size());
-  end_cuts_.resize(end_cuts_.size() + piece.lanes() + piece.singles());
-  using Count = Operations;
-  constexpr int kOfEach = Count::kLeaf + Count::kAngularAcceleration + 1;
-  operations_of_pass_ += piece.packed() * (kOfEach + Count::kJoin + Count::kForceIn) +
-                         piece.singles() * (kOfEach + Count::kEndJoin + Count::kForceInEnd);
-  pieces_.push_back(piece);
+  end_cuts_.resize(end_cuts_.size() + path.lanes() + path.singles());
+  paths_.push_back(path);
 }
 
 /// X_PF and X_QM are angles here.

@@ -292,9 +292,11 @@ LOOPBENCH_INLINE Vector2<T> ForceIn(const EndCut<T>& cut, const Vector2<T>& F2) 
 }
 
 /// Multiplications and divisions of these functions, as tests/odca/path_sweep_test.cpp counts them.
-/// A leaf has two more where gaps are counted; changes of speeds are a little less.
 struct Operations {
-  static constexpr int kLeaf = 20, kJoin = 55, kEndJoin = 29, kForceIn = 8, kForceInEnd = 4,
+  static constexpr int Leaf(Pass pass) {
+    return pass == Pass::kSpeeds ? 12 : pass == Pass::kAccelerations ? 22 : 20;
+  }
+  static constexpr int kJoin = 55, kEndJoin = 29, kForceIn = 8, kForceInEnd = 4,
                        kAngularAcceleration = 4;
 };
 

@@ -3,7 +3,6 @@
 // beside them stands for all lanes. A template over T = double or Lanes is one kernel for both.
 #pragma once
 
-#include <array>
 #include <bit>
 #include <cstdint>
 #include <cstring>

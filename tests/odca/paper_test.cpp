@@ -150,11 +150,9 @@ TEST(PaperTest, TwoHandleKernelsAreThePrintedFormulas) {
     MechanismDescription chain = ChainOf(std::vector(n + 1, JointType::kRevolute), b);
     chain.forces.clear();
     const Scene<Planar> scene(chain, seed);
-    const auto& joints = scene.mechanism().joints();
-    std::vector<PlanJoint> graph;
-    for (int j = 0; j <= n; ++j) graph.push_back({j, joints[j].from, joints[j].to, 2});
-    const auto links =
-        pins::MeasurePath(scene.mechanism(), FindPaths(n + 1, graph).front()).value();
+    const auto links = pins::MeasurePath(scene.mechanism(),
+                                         FindPaths(n + 1, PlanJoints(scene.mechanism())).front())
+                           .value();
     pins::TwoHandle<double> all;
     TwoHandles printed;
     double rcond = 1.0;

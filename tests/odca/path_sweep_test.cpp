@@ -136,7 +136,9 @@ TEST_P(PathSweepTest, AgreesWithTheGeneralSweepWhereverJointsHaveDrifted) {
       const Both both = Compare(mechanism, GetParam(), q, u);
       ASSERT_EQ(both.outcome, Outcome::kFinished);
       ++states;
-      // what the general sweep softens is not to be had here; a little more may be refused
+      // What the general sweep softens is not to be had here. What is refused is near that: limits
+      // are 1e-4 of traces, of which the smallest eigenvalue is a twentieth at least for these arms
+      // and radii, and det / trace is half the smallest of X at least: 0.004.
       EXPECT_TRUE(!both.evaluated || both.general.smallest_weight == 1.0) << path.name;
       if (!both.evaluated) {
         ++refused;
@@ -150,6 +152,66 @@ TEST_P(PathSweepTest, AgreesWithTheGeneralSweepWhereverJointsHaveDrifted) {
   }
   std::printf("%d states, %d refused, worst %.2g of the bound\n", states, refused, worst);
   EXPECT_LE(10 * refused, states);
+}
+
+/// Masses over eight decades, several pins in one point of a body, a pin at its centre of mass: a
+/// force that is right to eps of the heavy body is not for the light one, so neither sweep has more
+/// digits than the ratio of masses leaves, and which one has more in a given state is chance. Along
+/// many states they must be alike: the median and the worst error against long double within ten
+/// times (measured: 2.0 and 1.7), for hundred states spread over seven decades.
+TEST(PathSweep, LosesNoMoreAtExtremesThanTheGeneralSweep) {
+  int states = 0;
+  std::vector<double> errors, errors_general;
+  for (int n = 2; n <= 24; ++n) {
+    for (std::uint64_t seed = 1; seed <= 12; ++seed) {
+      MechanismDescription path = RandomPath(n, 1000 * seed + n);
+      Random random(seed);
+      double lightest = 1.0, heaviest = 1.0;
+      for (std::size_t body = 1; body < path.bodies.size(); ++body) {
+        const double times = std::pow(10.0, random.Uniform(-4.0, 4.0));
+        lightest = std::min(lightest, times);
+        heaviest = std::max(heaviest, times);
+        path.bodies[body].mass *= times;
+        path.bodies[body].inertia *= times;
+        for (JointDescription& joint : path.joints) {
+          for (JointSide* side : {&joint.from, &joint.to}) {
+            if (side->body != static_cast<int>(body)) continue;
+            if (body % 4 == 0) side->position = {0.3, 0.4, 0.0};
+            if (body % 4 == 1 && random.Chance(0.5)) side->position = path.bodies[body].com;
+          }
+        }
+      }
+      const Mechanism<Planar, double> mechanism(path, Coordinates::kJoint);
+      const Numbers q = RandomNumbers(random, mechanism.num_q(), 4.0);
+      const Numbers u = RandomNumbers(random, mechanism.num_u(), 2.0);
+      ++states;
+      Numbers qdot(u.size()), own(u.size()), general;
+      if (!PathSweep::Make(mechanism)->Evaluate(SpeedsUsed::kGiven, In(q), In(u), In(qdot),
+                                                In(own))) {
+        continue;
+      }
+      testing::SystemWith<Odca, Planar, double> odca(mechanism, {});
+      ASSERT_EQ(odca->Evaluate(0.0, q, u, general), Outcome::kFinished) << path.name;
+      const Numbers exact = testing::Oracle(path, testing::LayoutOf(mechanism))
+                                .Solve(q.cast<testing::Real>(), u.cast<testing::Real>())
+                                .udot.cast<double>();
+      const auto error = [&](const Numbers& udot) {
+        return (udot - exact).cwiseAbs().maxCoeff() / exact.cwiseAbs().maxCoeff();
+      };
+      errors.push_back(error(own));
+      errors_general.push_back(error(general));
+      EXPECT_LE(errors.back(), Bound(n, lightest / heaviest)) << path.name;
+    }
+  }
+  std::sort(errors.begin(), errors.end());
+  std::sort(errors_general.begin(), errors_general.end());
+  const std::size_t middle = errors.size() / 2;
+  std::printf("%d states, %zu answered, median %.2g (general sweep %.2g), worst %.2g (%.2g)\n",
+              states, errors.size(), errors[middle], errors_general[middle], errors.back(),
+              errors_general.back());
+  EXPECT_GT(errors.size(), 90u) << "else this test says little";
+  EXPECT_LE(errors[middle], 10.0 * errors_general[middle]);
+  EXPECT_LE(errors.back(), 10.0 * errors_general.back());
 }
 
 TEST_P(PathSweepTest, AgreesOnChainsAndLadders) {
@@ -254,6 +316,32 @@ TEST_P(PathSweepTest, AllocatesNothing) {
   EXPECT_EQ(testing::CountAllocations(), before);
 }
 
+/// Cranks at an angle from the line in which all bars lie: wherever the general sweep softens, by
+/// whatever order of joins, the short cut must not answer. It stops answering at 20 times the
+/// angle.
+TEST(PathSweep, LeavesWhatIsSoftenedToTheGeneralSweep) {
+  for (const int windows : {1, 3, 10, 40, 200}) {
+    double softened = 0.0, answered = 1.0;
+    for (double angle = 1e-5; angle < 0.3; angle *= 1.3) {
+      const MechanismDescription ladder = Ladder(windows, angle, 0.5);
+      const Mechanism<Planar, double> mechanism(ladder, Coordinates::kJoint);
+      Numbers q = Numbers::Zero(mechanism.num_q());
+      const Numbers u = Numbers::Ones(mechanism.num_u());
+      for (const JointValues& start : ladder.initial.coordinates) {
+        q[mechanism.joints()[start.joint].q_offset] = start.values[0];
+      }
+      const Both both = Compare(mechanism, SpeedsUsed::kGiven, q, u);
+      if (both.general.smallest_weight < 1.0) softened = std::max(softened, angle);
+      if (both.evaluated) answered = std::min(answered, angle);
+    }
+    std::printf("%3d windows: softened to %.1e rad, answered from %.1e\n", windows, softened,
+                answered);
+    EXPECT_GT(softened, 1e-4) << windows;
+    EXPECT_LT(softened, answered) << windows;
+    EXPECT_LT(answered, 0.2) << windows << ": it serves somewhere";
+  }
+}
+
 /// A number that counts its products.
 struct Counted {
   double value = 0.0;
@@ -282,7 +370,12 @@ TEST(TwoHandleKernels, TakeAsManyOperationsAsTheySay) {
   EndCut<Counted> end_cut;
   Vector2<Counted> F;
   Counted speed, slack;
-  EXPECT_EQ(products([&] { Leaf<Pass::kCompleted>(link, at, speed); }), Operations::kLeaf);
+  EXPECT_EQ(products([&] { Leaf<Pass::kAccelerations>(link, at, speed); }),
+            Operations::Leaf(Pass::kAccelerations));
+  EXPECT_EQ(products([&] { Leaf<Pass::kSpeeds>(link, at, speed); }),
+            Operations::Leaf(Pass::kSpeeds));
+  EXPECT_EQ(products([&] { Leaf<Pass::kCompleted>(link, at, speed); }),
+            Operations::Leaf(Pass::kCompleted));
   EXPECT_EQ(products([&] { Join(A, B, Counted(0.0), cut, slack); }), Operations::kJoin);
   EXPECT_EQ(products([&] { Join(end, B, Counted(0.0), end_cut, slack); }), Operations::kEndJoin);
   EXPECT_EQ(products([&] { ForceIn(cut, F, F); }), Operations::kForceIn);

@@ -1,20 +1,28 @@
 #include "lagrange/lagrange.h"
 
-#include <limits>
+#include <type_traits>
 
 #include "mechanism/algebra/instantiate.h"
+#include "mechanism/model/dense_memory.h"
 
 namespace loopbench::lagrange {
 
 namespace {
 
-template <class Space, class S>
-std::vector<int> RowsOfConstraints(const Mechanism<Space, S>& mechanism) {
-  std::vector<int> rows;
-  for (int index : mechanism.constraints()) {
-    rows.push_back(mechanism.joints()[index].num_constraints());
-  }
-  return rows;
+/// Numbers up to which dense matrices are kept ready for positions where sparse pivots leave rank
+/// in doubt: 160 MB.
+constexpr double kKeptReady = 2e7;
+/// Numbers beyond which X is not sparse.
+constexpr double kMostNumbers = 2e8;
+
+/// Whether sparse factors take less time. Multiply-adds of the dense ones are of M, W, S and S's
+/// own. Measured on chains and ladders: one in small blocks costs four to ten in
+/// large matrices, which take 2000 to begin with.
+template <class Space>
+bool IsLessWork(const JointResponse<Space>& sparse, const Mechanism<Space, double>& mechanism) {
+  const double n = mechanism.num_u(), m = mechanism.num_rows();
+  const double dense = n * n * n / 6.0 + n * m * (n + m) / 2.0 + m * m * m / 6.0;
+  return 4.0 * sparse.operations() < 2000.0 + dense;
 }
 
 }  // namespace
@@ -22,132 +30,77 @@ std::vector<int> RowsOfConstraints(const Mechanism<Space, S>& mechanism) {
 template <class Space, class S>
 Lagrange<Space, S>::Lagrange(const Mechanism<Space, S>& mechanism,
                              const FormulationOptions& options)
-    : mechanism_(mechanism),
-      kind_(options.solver),
-      dynamics_(mechanism),
-      M_(MatrixX<S>::Zero(mechanism.num_u(), mechanism.num_u())),
-      J_(MatrixX<S>::Zero(mechanism.num_rows(), mechanism.num_u())),
-      lambda_(VectorX<S>::Zero(mechanism.num_rows())),
-      zero_(VectorX<S>::Zero(mechanism.num_u())),
-      missed_(lambda_),
-      change_(zero_),
-      loop_(RowsOfConstraints(mechanism)) {
-  const int n = mechanism.num_u(), m = mechanism.num_rows();
-  if (kind_ == SolverKind::kAsPublished) {
-    augmented_.setZero(n + m, n + m);
-    rhs_.setZero(n + m);
-    solution_.setZero(n + m);
-    lu_ = Eigen::PartialPivLU<MatrixX<S>>(n + m);
-  } else {
-    W_.setZero(n, m);
-    response_.setZero(m, m);
-    mass_factor_.compute(MatrixX<S>::Identity(n, n).eval());
+    : mechanism_(mechanism), equations_(mechanism), change_(VectorX<S>::Zero(mechanism.num_u())) {
+  if constexpr (std::is_same_v<S, double>) {
+    if (options.solver == SolverKind::kRankRevealing) {
+      joints_ = JointResponse<Space>::Make(mechanism, kMostNumbers);
+    }
+    if (joints_ != nullptr && !IsLessWork(*joints_, mechanism)) joints_ = nullptr;
   }
+  const double numbers = DenseEquations<Space, S>::Numbers(mechanism, options.solver);
+  if (joints_ != nullptr && numbers > kKeptReady) return;
+  RequireDense(mechanism.name() + ": multipliers are dense: matrices of " +
+                   std::to_string(mechanism.num_rows()) + " constraints and " +
+                   std::to_string(mechanism.num_u()) + " speeds",
+               numbers);
+  dense_ = std::make_unique<DenseEquations<Space, S>>(mechanism, options.solver);
 }
 
 template <class Space, class S>
 Outcome Lagrange<Space, S>::Factor(const Kinematics<Space, S>& kinematics) {
-  dynamics_.Jacobian(kinematics, J_);
-  return kind_ == SolverKind::kAsPublished ? FactorAugmented(kinematics)
-                                           : FactorResponse(kinematics);
-}
-
-/// The matrix of (1). Rows of J are components along D of the cut joints at Mo.
-template <class Space, class S>
-Outcome Lagrange<Space, S>::FactorAugmented(const Kinematics<Space, S>& kinematics) {
-  const int n = mechanism_.num_u(), m = mechanism_.num_rows();
-  dynamics_.MassMatrix(kinematics, Masses::kPhysical, M_);
-  augmented_.topLeftCorner(n, n) = M_;
-  augmented_.topRightCorner(n, m) = J_.transpose();
-  augmented_.bottomLeftCorner(m, n) = J_;
-  augmented_.bottomRightCorner(m, m).setZero();
-  lu_.compute(augmented_);
-  const auto pivots = lu_.matrixLU().diagonal().cwiseAbs();
-  const S rcond = pivots.minCoeff() / pivots.maxCoeff();
-  this->conditioning_.rank = LoopRank(mechanism_, 0);
-  this->conditioning_.rcond = static_cast<double>(rcond);
-  // a pivot below a few eps of the largest is round-off of the elimination
-  return rcond > S(16) * std::numeric_limits<S>::epsilon() ? Outcome::kFinished
-                                                           : Outcome::kSingular;
+  kinematics_ = &kinematics;
+  is_sparse_ = false;
+  if constexpr (std::is_same_v<S, double>) {
+    if (joints_ != nullptr) {
+      is_sparse_ = joints_->Factor(kinematics);
+      this->conditioning_ = {.rank = LoopRank(mechanism_, 0),
+                             .rcond = joints_->rcond(),
+                             .smallest_weight = 1.0,
+                             .worst_joint = joints_->worst_joint()};
+      if (is_sparse_) return Outcome::kFinished;
+      if (dense_ == nullptr) return Outcome::kSingular;
+      this->conditioning_.worst_joint = -1;
+    }
+  }
+  return dense_->Factor(kinematics, this->conditioning_);
 }
 
 template <class Space, class S>
-void Lagrange<Space, S>::FormResponse(const Kinematics<Space, S>& kinematics, Masses masses) {
-  dynamics_.MassMatrix(kinematics, masses, M_);
-  mass_factor_.compute(M_);
-  if (loop_.size() == 0) return;  // a tree: nothing is constrained
-  W_ = J_.transpose();
-  mass_factor_.matrixL().solveInPlace(W_);
-  response_.noalias() = W_.transpose() * W_;
-}
-
-template <class Space, class S>
-void Lagrange<Space, S>::SetScales(const Kinematics<Space, S>& kinematics, Masses masses) {
-  for (int j = 0; j < static_cast<int>(mechanism_.constraints().size()); ++j) {
-    loop_.SetScale(j, FreeResponse(kinematics, masses, mechanism_.constraints()[j]));
+void Lagrange<Space, S>::SolveSparsely(VectorX<S>& x, VectorX<S>* lambda) {
+  if constexpr (std::is_same_v<S, double>) {
+    joints_->Solve(equations_.b(), equations_.c0(), equations_.A());
+    equations_.Read(*kinematics_, x);
+    if (lambda != nullptr) equations_.Read(joints_->phi(), *lambda);
   }
 }
 
-/// S with the bodies' masses; where it is suspicious, directions and weights from S with unit
-/// masses, then the factors of the physical one once more (loop_solver.h).
 template <class Space, class S>
-Outcome Lagrange<Space, S>::FactorResponse(const Kinematics<Space, S>& kinematics) {
-  Conditioning& found = this->conditioning_;
-  found.rank = LoopRank(mechanism_, 0);
-  found.smallest_weight = 1.0;
-  FormResponse(kinematics, Masses::kPhysical);
-  if (mass_factor_.info() != Eigen::Success) return Outcome::kNonFinite;
-  if (loop_.size() == 0) return Outcome::kFinished;
-  SetScales(kinematics, Masses::kPhysical);
-  if (!loop_.FactorScaled(response_)) {
-    SetScales(kinematics, Masses::kGeometric);
-    FormResponse(kinematics, Masses::kGeometric);
-    if (!response_.allFinite()) return Outcome::kNonFinite;
-    loop_.FactorGeometric(response_);
-    found.rank = LoopRank(mechanism_, loop_.size() - loop_.rank());
-    found.smallest_weight = static_cast<double>(loop_.smallest_weight());
-    FormResponse(kinematics, Masses::kPhysical);
-    if (!loop_.FactorSoftened(response_)) return Outcome::kSingular;
-  }
-  found.rcond = static_cast<double>(loop_.rcond());
-  return Outcome::kFinished;
-}
-
-template <class Space, class S>
-void Lagrange<Space, S>::Solve(const VectorX<S>& given, const VectorX<S>& target, VectorX<S>& x,
+void Lagrange<Space, S>::Solve(const VectorX<S>& force, const VectorX<S>& target, VectorX<S>& x,
                                VectorX<S>* lambda) {
-  const VectorX<S>& force = given.size() > 0 ? given : zero_;
-  const int n = mechanism_.num_u(), m = mechanism_.num_rows();
-  if (kind_ == SolverKind::kAsPublished) {
-    rhs_.head(n) = force;
-    rhs_.tail(m) = target;
-    solution_ = lu_.solve(rhs_);
-    x = solution_.head(n);
-    if (lambda != nullptr) *lambda = -solution_.tail(m);
-    return;
-  }
-  // S lambda = target - J M^-1 force, x = M^-1 (force + J^T lambda): on the way x is L^-1 of the
-  // bracket, and W lambda is L^-1 J^T lambda
-  x = force;
-  mass_factor_.matrixL().solveInPlace(x);
-  if (m > 0) {
-    lambda_ = target;
-    lambda_.noalias() -= W_.transpose() * x;
-    loop_.Apply(lambda_);
-    loop_.ApplyTransposed(lambda_);
-    x.noalias() += W_ * lambda_;
-    if (lambda != nullptr) *lambda = lambda_;
-  }
-  mass_factor_.matrixU().solveInPlace(x);
+  if (!is_sparse_) return dense_->Solve(force, target, x, lambda);
+  equations_.SetForce(*kinematics_, force, target);
+  SolveSparsely(x, lambda);
 }
 
-/// u less M^-1 J^T S^+ (J u + b): no force, and the target -(J u + b).
+template <class Space, class S>
+bool Lagrange<Space, S>::Accelerate(const Kinematics<Space, S>& kinematics,
+                                    const VectorX<S>& feedback, VectorX<S>& udot,
+                                    VectorX<S>* lambda) {
+  if (!is_sparse_) return false;
+  equations_.SetState(kinematics, feedback);
+  SolveSparsely(udot, lambda);
+  return true;
+}
+
 template <class Space, class S>
 bool Lagrange<Space, S>::CompleteSpeeds(Kinematics<Space, S>& kinematics, VectorX<S>& u) {
-  SpeedBias(kinematics, zero_, missed_);
-  missed_ = -missed_;
-  missed_.noalias() -= J_ * u;
-  Solve(zero_, missed_, change_, nullptr);
+  if (!is_sparse_) {
+    dense_->CompleteSpeeds(kinematics, u);
+    return true;
+  }
+  kinematics.UpdateVelocity(u);
+  equations_.SetMissed(kinematics);
+  SolveSparsely(change_, nullptr);
   u += change_;
   return true;
 }

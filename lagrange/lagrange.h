@@ -1,56 +1,47 @@
-// Acceleration-level Lagrange multipliers on the dense equations of the spanning forest.
+// Acceleration-level Lagrange multipliers: the equations of constraint_solver.h with all
+// multipliers solved at once.
 //
-//   [ M  J^T ] [ udot    ]   [ -h    ]
-//   [ J  0   ] [ -lambda ] = [ gamma ]                                            (1)
-//
-// As published: LU of (1) with partial pivoting; a pivot lost in round-off ends as `singular`.
-// Rank-revealing, with the softened inverse of loop_solver.h, where S in the same form with unit
-// masses decides the rank:
-//
-//   M = L L^T,      W = L^-1 J^T,      S = W^T W
-//   lambda = S^+ (gamma + J M^-1 h),      udot = M^-1 (J^T lambda - h)
-//
-// Velocity level: u - M^-1 J^T S^+ J u, the projection in the metric of M.
+// As published they are those of the cut joints, and the equations dense (dense_equations.h).
+// Rank-revealing they are those of all joints, and the equations sparse (joint_response.h), where
+// that is less work. Where a pivot leaves rank in doubt, the dense equations decide it, and soften;
+// where these would be too large to be kept ready for that, the evaluation ends as `singular`.
 #pragma once
 
-#include "mechanism/algebra/factors.h"
-#include "mechanism/formulation/constraint_solver.h"
-#include "mechanism/formulation/options.h"
-#include "mechanism/loops/loop_solver.h"
-#include "mechanism/loops/tree_dynamics.h"
+#include <memory>
+
+#include "lagrange/dense_equations.h"
+#include "lagrange/joint_response.h"
+#include "mechanism/loops/body_equations.h"
 
 namespace loopbench::lagrange {
 
 template <class Space, class S>
 class Lagrange final : public ConstraintSolver<Space, S> {
  public:
-  /// `mechanism` must outlive the solver.
+  /// `mechanism` must outlive the solver. Throws TooDense (dense_memory.h).
   Lagrange(const Mechanism<Space, S>& mechanism, const FormulationOptions& options);
 
-  /// M, J and the factors of (1) or S.
   Outcome Factor(const Kinematics<Space, S>& kinematics) override;
   void Solve(const VectorX<S>& force, const VectorX<S>& target, VectorX<S>& x,
              VectorX<S>* lambda) override;
-  /// What u misses, J u + b, by the J that is at hand.
+  bool Accelerate(const Kinematics<Space, S>& kinematics, const VectorX<S>& feedback,
+                  VectorX<S>& udot, VectorX<S>* lambda) override;
   bool CompleteSpeeds(Kinematics<Space, S>& kinematics, VectorX<S>& u) override;
 
+  /// Whether the last Factor() was sparse.
+  bool is_sparse() const { return is_sparse_; }
+
  private:
-  Outcome FactorAugmented(const Kinematics<Space, S>& kinematics);
-  Outcome FactorResponse(const Kinematics<Space, S>& kinematics);
-  /// W = L^-1 J^T and S = W^T W with these masses; leaves the factor of M in mass_factor_.
-  void FormResponse(const Kinematics<Space, S>& kinematics, Masses masses);
-  void SetScales(const Kinematics<Space, S>& kinematics, Masses masses);
+  /// The equations as they are set.
+  void SolveSparsely(VectorX<S>& x, VectorX<S>* lambda);
 
   const Mechanism<Space, S>& mechanism_;
-  SolverKind kind_;
-  TreeDynamics<Space, S> dynamics_;
-  MatrixX<S> M_, J_, W_, response_;
-  VectorX<S> lambda_, zero_, missed_, change_;
-  MatrixX<S> augmented_;
-  VectorX<S> rhs_, solution_;
-  Eigen::PartialPivLU<MatrixX<S>> lu_;
-  Eigen::LLT<MatrixX<S>> mass_factor_;
-  LoopSolver<S> loop_;
+  std::unique_ptr<JointResponse<Space>> joints_;  ///< null where they are not less work
+  std::unique_ptr<DenseEquations<Space, S>> dense_;
+  BodyEquations<Space, S> equations_;
+  const Kinematics<Space, S>* kinematics_ = nullptr;  ///< of the last Factor()
+  bool is_sparse_ = false;
+  VectorX<S> change_;
 };
 
 }  // namespace loopbench::lagrange

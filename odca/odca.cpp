@@ -44,12 +44,8 @@ Odca<Space, S>::Odca(const Mechanism<Space, S>& mechanism, const FormulationOpti
     : mechanism_(mechanism),
       plan_(MakePlan(mechanism, plan)),
       sweep_(mechanism, plan_, options.solver),
-      wrenches_(mechanism.num_bodies(), Wrench<Space, S>::Zero()),
-      b_(mechanism.num_bodies(), Acceleration<Space, S>::Zero()),
-      A_(b_),
-      c0_(mechanism.joints().size(), Components<Space, S>::Zero()),
-      known_(VectorX<S>::Zero(mechanism.num_u())),
-      change_(known_) {
+      equations_(mechanism),
+      change_(VectorX<S>::Zero(mechanism.num_u())) {
   if constexpr (std::is_same_v<Space, Planar> && std::is_same_v<S, double>) {
     if (options.solver == SolverKind::kRankRevealing) paths_ = pins::PathSweep::Make(mechanism);
   }
@@ -71,103 +67,25 @@ Outcome Odca<Space, S>::Factor(const Kinematics<Space, S>& kinematics) {
   return outcome;
 }
 
-/// The sweep, then x = H^T (A_Q - A_P) / |H|^2 of each tree joint, both points at Mo: udot of (7),
-/// but for what SetKnown() has noted. lambda is phi along the D of cut joints.
 template <class Space, class S>
 void Odca<Space, S>::SweepTo(VectorX<S>& x, VectorX<S>* lambda) {
-  sweep_.Solve(b_, c0_, A_);
-  for (const TreeStep& step : mechanism_.tree()) {
-    const Joint<Space, S>& joint = mechanism_.joints()[step.joint];
-    const JointState<Space, S>& state = kinematics_->joints()[step.joint];
-    const Acceleration<Space, S> A_rel = ShiftMotion<Space, S>(A_[joint.to], state.r_Q) -
-                                         ShiftMotion<Space, S>(A_[joint.from], state.r_P);
-    for (int i = 0; i < state.num_u; ++i) {
-      x[joint.u_offset + i] = joint.kind->inverse_H_squared * state.H(i).dot(A_rel);
-    }
-  }
-  if (lambda == nullptr) return;
-  for (int index : mechanism_.constraints()) {
-    const Joint<Space, S>& joint = mechanism_.joints()[index];
-    lambda->segment(joint.row, joint.num_constraints()) =
-        sweep_.multipliers()[index].head(joint.num_constraints());
-  }
-}
-
-/// b = M^-1 times the wrench, at the centre of mass in ground axes: the part of the paper's zeta_i3
-/// that is the same at both handles, before its shift.
-template <class Space, class S>
-void Odca<Space, S>::SetFree() {
-  for (int body = 1; body < mechanism_.num_bodies(); ++body) {
-    const Inertia<Space, S>& inertia = mechanism_.bodies()[body];
-    b_[body] = {kinematics_->RotationalInverse(inertia, body) * wrenches_[body].angular,
-                wrenches_[body].linear / inertia.mass};
-  }
+  sweep_.Solve(equations_.b(), equations_.c0(), equations_.A());
+  equations_.Read(*kinematics_, x);
+  if (lambda != nullptr) equations_.Read(sweep_.multipliers(), *lambda);
 }
 
 template <class Space, class S>
 void Odca<Space, S>::Solve(const VectorX<S>& force, const VectorX<S>& target, VectorX<S>& x,
                            VectorX<S>* lambda) {
-  for (Components<Space, S>& c0 : c0_) c0.setZero();
-  for (int index : mechanism_.constraints()) {
-    const Joint<Space, S>& joint = mechanism_.joints()[index];
-    c0_[index].head(joint.num_constraints()) = -target.segment(joint.row, joint.num_constraints());
-  }
-  if (force.size() == 0) {
-    for (Acceleration<Space, S>& b : b_) b.setZero();
-    SweepTo(x, lambda);
-    return;
-  }
-  for (Wrench<Space, S>& wrench : wrenches_) wrench.setZero();
-  for (const TreeStep& step : mechanism_.tree()) {
-    const Joint<Space, S>& joint = mechanism_.joints()[step.joint];
-    const JointState<Space, S>& state = kinematics_->joints()[step.joint];
-    auto F = Wrench<Space, S>::Zero();
-    for (int i = 0; i < state.num_u; ++i) {
-      F += state.H(i) * (joint.kind->inverse_H_squared * force[joint.u_offset + i]);
-    }
-    wrenches_[joint.to] += ShiftForce<Space, S>(F, state.r_Q);
-    wrenches_[joint.from] -= ShiftForce<Space, S>(F, state.r_P);
-  }
-  SetFree();
+  equations_.SetForce(*kinematics_, force, target);
   SweepTo(x, lambda);
 }
 
-/// n_Q - n_P - g is what (7) has beside the accelerations at centres of mass and H udot, at Mo in
-/// ground axes. Its components along D are c0, those along H belong to udot.
-template <class Space, class S>
-void Odca<Space, S>::SetKnown(const Kinematics<Space, S>& kinematics) {
-  for (std::size_t j = 0; j < c0_.size(); ++j) {
-    const Joint<Space, S>& joint = mechanism_.joints()[j];
-    const JointState<Space, S>& state = kinematics.joints()[j];
-    const Acceleration<Space, S> known = kinematics.Centripetal(joint.to, state.r_Q) -
-                                         kinematics.Centripetal(joint.from, state.r_P) - state.g;
-    c0_[j] = state.Along(known, state.rows());
-    for (int i = 0; i < (joint.in_tree() ? state.num_u : 0); ++i) {
-      known_[joint.u_offset + i] = joint.kind->inverse_H_squared * state.H(i).dot(known);
-    }
-  }
-}
-
-/// The wrench of applied forces less w x I w makes b. Feedback is a part of c0.
 template <class Space, class S>
 bool Odca<Space, S>::Accelerate(const Kinematics<Space, S>& kinematics, const VectorX<S>& feedback,
                                 VectorX<S>& udot, VectorX<S>* lambda) {
-  AppliedForces<Space, S>(kinematics, wrenches_);
-  for (int body = 1; body < mechanism_.num_bodies(); ++body) {
-    const Inertia<Space, S>& inertia = mechanism_.bodies()[body];
-    const Angular<Space, S>& w = kinematics.motions()[body].angular;
-    wrenches_[body].angular -= CrossAngular<S>(w, kinematics.RotationalInertia(inertia, body) * w);
-  }
-  SetFree();
-  SetKnown(kinematics);
-  for (int index : mechanism_.constraints()) {
-    if (feedback.size() == 0) break;
-    const Joint<Space, S>& joint = mechanism_.joints()[index];
-    c0_[index].head(joint.num_constraints()) +=
-        feedback.segment(joint.row, joint.num_constraints());
-  }
+  equations_.SetState(kinematics, feedback);
   SweepTo(udot, lambda);
-  udot += known_;
   return true;
 }
 
@@ -188,9 +106,7 @@ bool Odca<Space, S>::RightHandSide([[maybe_unused]] SpeedsUsed speeds,
 template <class Space, class S>
 bool Odca<Space, S>::CompleteSpeeds(Kinematics<Space, S>& kinematics, VectorX<S>& u) {
   kinematics.UpdateVelocity(u);
-  for (Acceleration<Space, S>& b : b_) b.setZero();
-  for (Components<Space, S>& c0 : c0_) c0.setZero();
-  for (int index : mechanism_.constraints()) c0_[index] = kinematics.ConstraintSpeed(index);
+  equations_.SetMissed(kinematics);
   SweepTo(change_, nullptr);
   u += change_;
   return true;

@@ -3,6 +3,7 @@
 #pragma once
 
 #include "mechanism/formulation/constraint_solver.h"
+#include "mechanism/loops/body_equations.h"
 #include "odca/sweep.h"
 
 namespace loopbench::odca {
@@ -33,7 +34,6 @@ class Odca final : public ConstraintSolver<Space, S> {
   const Sweep<Space, S>& sweep() const { return sweep_; }
 
   Outcome Factor(const Kinematics<Space, S>& kinematics) override;
-  /// A force along a tree joint is a pair of wrenches on its bodies.
   void Solve(const VectorX<S>& force, const VectorX<S>& target, VectorX<S>& x,
              VectorX<S>* lambda) override;
   /// From wrenches on bodies, as the paper does: neither h nor gamma is formed.
@@ -52,13 +52,7 @@ class Odca final : public ConstraintSolver<Space, S> {
   Wrench<Space, S> JointForce(int joint) const;
 
  private:
-  /// b_ of all bodies for wrenches_: their accelerations under these alone, at centres of mass.
-  void SetFree();
-  /// c0_ of joints in all their directions, and what accelerations of relative motion add to the
-  /// free ones.
-  void SetKnown(const Kinematics<Space, S>& kinematics);
-  /// From b_ and c0_: H^T (A_Q - A_P) of the tree joints at their points, centripetal terms not
-  /// included, in x, and multipliers.
+  /// The equations as they are set: x and multipliers.
   void SweepTo(VectorX<S>& x, VectorX<S>* lambda);
 
   const Mechanism<Space, S>& mechanism_;
@@ -67,10 +61,8 @@ class Odca final : public ConstraintSolver<Space, S> {
   std::unique_ptr<pins::PathSweep> paths_;            ///< null where there are none
   bool by_paths_ = false;                             ///< the last evaluation was
   const Kinematics<Space, S>* kinematics_ = nullptr;  ///< of the last Factor()
-  std::vector<Wrench<Space, S>> wrenches_;
-  std::vector<Acceleration<Space, S>> b_, A_;
-  std::vector<Components<Space, S>> c0_;
-  VectorX<S> known_, change_;
+  BodyEquations<Space, S> equations_;
+  VectorX<S> change_;
 };
 
 }  // namespace loopbench::odca

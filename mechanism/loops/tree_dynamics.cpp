@@ -5,6 +5,7 @@
 #include "mechanism/loops/tree_dynamics.h"
 
 #include "mechanism/algebra/instantiate.h"
+#include "mechanism/loops/loop_speeds.h"
 
 namespace loopbench {
 
@@ -89,36 +90,14 @@ void FillMassMatrix(const Kinematics<Space, S>& kinematics, std::vector<Block<Sp
   }
 }
 
-/// D^T (V_Q - V_P) of one constraint by speed, for `count` directions, from row `first` of J on. A
-/// speed of a joint at p_j moves all that is outward of it, the constraint's point p included:
-///
-///   J_ri = D_r^T S(p - p_j) H_i        + on the way from Ground to Q, - on the way to P
-///
+/// D^T (V_Q - V_P) of one constraint by speed, for `count` directions, from row `first` of J on.
 template <class Space, class S>
-void AddRows(const Kinematics<Space, S>& kinematics, int index, int first, int count,
+void SetRows(const Kinematics<Space, S>& kinematics, int index, int first, int count,
              MatrixX<S>& J) {
-  const Mechanism<Space, S>& mechanism = kinematics.mechanism();
-  const Joint<Space, S>& constraint = mechanism.joints()[index];
   const JointState<Space, S>& state = kinematics.joints()[index];
-  const Linear<Space, S> p = kinematics.JointPoint(index);
-  for (int side = 0; side < 2; ++side) {
-    const S sign = side == 0 ? S(1) : S(-1);
-    int s = mechanism.step_of_body(side == 0 ? constraint.to : constraint.from);
-    while (s >= 0) {
-      const TreeStep& step = mechanism.tree()[s];
-      const JointState<Space, S>& moving = kinematics.joints()[step.joint];
-      const Joint<Space, S>& joint = mechanism.joints()[step.joint];
-      const Linear<Space, S> arm = p - kinematics.JointPoint(step.joint);
-      for (int i = 0; i < joint.num_u(); ++i) {
-        const Velocity<Space, S> h = moving.H(i) * (sign * S(step.sign));
-        const Velocity<Space, S> at_constraint = ShiftMotion<Space, S>(h, arm);
-        for (int r = 0; r < count; ++r) {
-          J(first + r, joint.u_offset + i) += state.D(r).dot(at_constraint);
-        }
-      }
-      s = mechanism.step_of_body(step.parent);
-    }
-  }
+  ForEachSpeedOfLoop(kinematics, index, [&](int column, const Velocity<Space, S>& V) {
+    for (int r = 0; r < count; ++r) J(first + r, column) = state.D(r).dot(V);
+  });
 }
 
 }  // namespace
@@ -248,7 +227,7 @@ void TreeDynamics<Space, S>::Jacobian(const Kinematics<Space, S>& kinematics, Ma
   J.setZero(mechanism.num_rows(), mechanism.num_u());
   for (int index : mechanism.constraints()) {
     const Joint<Space, S>& joint = mechanism.joints()[index];
-    AddRows(kinematics, index, joint.row, joint.num_constraints(), J);
+    SetRows(kinematics, index, joint.row, joint.num_constraints(), J);
   }
 }
 
@@ -256,7 +235,7 @@ template <class Space, class S>
 void TreeDynamics<Space, S>::JacobianOf(const Kinematics<Space, S>& kinematics, int index,
                                         Eigen::Ref<MatrixX<S>> rows) const {
   MatrixX<S> J = MatrixX<S>::Zero(rows.rows(), rows.cols());
-  AddRows(kinematics, index, 0, static_cast<int>(rows.rows()), J);
+  SetRows(kinematics, index, 0, static_cast<int>(rows.rows()), J);
   rows = J;
 }
 

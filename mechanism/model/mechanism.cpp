@@ -55,14 +55,21 @@ std::vector<std::string> ComponentNames() {
   return {"wx", "wy", "wz", "x", "y", "z"};
 }
 
+/// Validate() in this space.
+template <class Space>
+std::string WhyUnusable(const MechanismDescription& description) {
+  if (Space::kRot == 1 || description.space == SpaceKind::kSpatial) return Validate(description);
+  MechanismDescription in_space = description;
+  in_space.space = SpaceKind::kSpatial;
+  return Validate(in_space);
+}
+
 }  // namespace
 
 template <class Space, class S>
 Mechanism<Space, S>::Mechanism(const MechanismDescription& description, Coordinates coordinates)
     : name_(description.name), coordinates_(coordinates) {
-  MechanismDescription checked = description;
-  if (Space::kRot == 3) checked.space = SpaceKind::kSpatial;
-  if (const std::string error = Validate(checked); !error.empty()) {
+  if (const std::string error = WhyUnusable<Space>(description); !error.empty()) {
     throw std::invalid_argument(error);
   }
   if (Space::kRot == 1 && description.space == SpaceKind::kSpatial) {
@@ -88,6 +95,8 @@ Mechanism<Space, S>::Mechanism(const MechanismDescription& description, Coordina
 
 template <class Space, class S>
 void Mechanism<Space, S>::AddBodies(const MechanismDescription& description) {
+  bodies_.reserve(description.bodies.size());
+  body_names_.reserve(description.bodies.size());
   for (const BodyDescription& body : description.bodies) {
     body_names_.push_back(body.name);
     Inertia<Space, S> inertia;
@@ -142,6 +151,8 @@ void Mechanism<Space, S>::AddStopTimes() {
 template <class Space, class S>
 void Mechanism<Space, S>::AddJoints(const MechanismDescription& description,
                                     const Topology& topology) {
+  joints_.reserve(description.joints.size());
+  joint_names_.reserve(description.joints.size());
   for (int j = 0; j < static_cast<int>(description.joints.size()); ++j) {
     joint_names_.push_back(description.joints[j].name);
     joints_.push_back(MakeJoint(description, j));

@@ -3,12 +3,13 @@
 #include <algorithm>
 #include <cmath>
 #include <limits>
+#include <numbers>
 
-#include "mechanism/algebra/decompositions.h"
+#include "mechanism/loops/loop_speeds.h"
 #include "mechanism/loops/tree_dynamics.h"
-#include "mechanism/model/dense_memory.h"
 #include "mechanism/start/assembly_units.h"
 #include "mechanism/start/conflict.h"
+#include "mechanism/start/least_squares.h"
 #include "mechanism/start/mobility.h"
 
 namespace loopbench {
@@ -26,7 +27,6 @@ class Assembler {
       : description_(description),
         mechanism_(mechanism),
         kinematics_(mechanism),
-        dynamics_(mechanism),
         held_q_(mechanism.num_u(), false),
         given_u_(mechanism.num_u(), false) {
     start_.q.setZero(mechanism.num_q());
@@ -128,32 +128,46 @@ class Assembler {
     return e.cwiseQuotient(UnitsWith(held_cut_));
   }
 
-  /// Speed of the free coordinate `component` of a cut joint at u.
-  double CutJointSpeed(int index, int component, const VectorX<double>& u) {
-    kinematics_.UpdateVelocity(u);
+  /// Speed of the free coordinate `component` of a cut joint.
+  double CutJointSpeed(int index, int component) const {
     const JointState<Space, double>& state = kinematics_.joints()[index];
     return mechanism_.joints()[index].kind->inverse_H_squared * state.H(component).dot(state.V_rel);
   }
 
-  /// Its derivatives by u.
-  Eigen::RowVectorXd CutJointRow(int index, int component) {
-    Eigen::RowVectorXd row(mechanism_.num_u());
-    VectorX<double> u = VectorX<double>::Zero(mechanism_.num_u());
-    const double at_rest = CutJointSpeed(index, component, u);
-    for (int i = 0; i < mechanism_.num_u(); ++i) {
-      u[i] = 1.0;
-      row[i] = CutJointSpeed(index, component, u) - at_rest;
-      u[i] = 0.0;
+  /// J, a row per constraint and below them one per free coordinate of `cut_joints`, in units.
+  template <class List>
+  SparseRows Rows(const List& cut_joints, const VectorX<double>& units) const {
+    std::vector<Eigen::Triplet<double>> entries;
+    const auto add = [&](int row, int column, double value) {
+      entries.emplace_back(row, column, value * units_.columns[column] / units[row]);
+    };
+    for (int index : mechanism_.constraints()) {
+      const Joint<Space, double>& joint = mechanism_.joints()[index];
+      const JointState<Space, double>& state = kinematics_.joints()[index];
+      ForEachSpeedOfLoop(kinematics_, index, [&](int column, const Velocity<Space, double>& V) {
+        for (int r = 0; r < joint.num_constraints(); ++r) {
+          add(joint.row + r, column, state.D(r).dot(V));
+        }
+      });
     }
-    return row;
+    int row = mechanism_.num_rows();
+    for (const auto& [index, component, value] : cut_joints) {
+      const double inverse = mechanism_.joints()[index].kind->inverse_H_squared;
+      const Direction<Space, double> H = kinematics_.joints()[index].H(component);
+      ForEachSpeedOfLoop(kinematics_, index, [&](int column, const Velocity<Space, double>& V) {
+        add(row, column, inverse * H.dot(V));
+      });
+      ++row;
+    }
+    SparseRows J(units.size(), mechanism_.num_u());
+    J.setFromTriplets(entries.begin(), entries.end());
+    return J;
   }
 
-  /// So many numbers at once in matrices of that many rows and a column per speed.
-  void Require(double numbers, Eigen::Index rows) const {
-    RequireDense(mechanism_.name() + ": the consistent start is dense: a matrix of " +
-                     std::to_string(rows) + " constraints by " +
-                     std::to_string(mechanism_.num_u()) + " speeds and its factors",
-                 numbers);
+  /// J over the speeds that may change.
+  static SparseRows Without(const std::vector<bool>& fixed, SparseRows J) {
+    J.prune([&](Eigen::Index, Eigen::Index column, double) { return !fixed[column]; });
+    return J;
   }
 
   void ClosePositions() {
@@ -165,28 +179,13 @@ class Assembler {
     const VectorX<double> units = UnitsWith(held_cut_);
     // where every coordinate is prescribed there is nothing to move
     const int iterations = mechanism_.num_u() > 0 ? kMaxIterations : 0;
-    if (iterations > 0 && e.template lpNorm<Eigen::Infinity>() > goal) {
-      // DampedStep: J, the factors of its transpose, Q, and the square problem with its factors
-      const auto r = static_cast<double>(e.size()), c = static_cast<double>(mechanism_.num_u());
-      const double m = std::min(r, c);
-      Require(2 * r * c + c * m + 2 * (r + m) * m, e.size());
-    }
     for (int i = 0; i < iterations && e.template lpNorm<Eigen::Infinity>() > goal; ++i) {
       kinematics_.UpdatePosition(start_.q);
-      MatrixX<double> J;
-      dynamics_.Jacobian(kinematics_, J);
-      J.conservativeResize(e.size(), Eigen::NoChange);
-      for (std::size_t k = 0; k < held_cut_.size(); ++k) {
-        J.row(mechanism_.num_rows() + static_cast<int>(k)) = CutJointRow(held_cut_[k].joint, 0);
-      }
-      units_.Apply(units, J);
-      for (int c = 0; c < mechanism_.num_u(); ++c) {
-        if (held_q_[c]) J.col(c).setZero();
-      }
+      LeastSquares steps(Without(held_q_, Rows(held_cut_, units)), mechanism_.name());
       bool improved = false;
       for (; damping < 1e8 && !improved; damping *= 10) {
         const VectorX<double> trial =
-            Move(start_.q, DampedStep(J, e, damping).cwiseProduct(units_.columns));
+            Move(start_.q, -steps.Damped(e, damping).cwiseProduct(units_.columns));
         const VectorX<double> e_trial = Residual(trial);
         if (!(e_trial.norm() < e.norm())) continue;
         improved = true;
@@ -198,8 +197,11 @@ class Assembler {
       damping = std::max(damping, 1e-16);
     }
     start_.position_residual = InSi(e, units);
-    // a thousand times the goal: round-off of a long chain, far below any drift worth measuring
-    if (e.template lpNorm<Eigen::Infinity>() <= 1e3 * goal) return;
+    // A thousand times the goal is far below any drift worth measuring. Along many joints angles up
+    // to pi add up with eps pi / 2 each, which turns all that is outward: no closure is known
+    // better.
+    const double known = std::numbers::pi * std::numeric_limits<double>::epsilon() * Depth();
+    if (e.template lpNorm<Eigen::Infinity>() <= std::max(1e3 * goal, known * Extent())) return;
     Fail(DescribeConflict(description_, kinematics_, {e, units, false, Extra(held_cut_)}));
   }
 
@@ -208,22 +210,6 @@ class Assembler {
     Eigen::Index worst = 0;
     e.cwiseAbs().maxCoeff(&worst);
     return std::abs(e[worst]) * units[worst];
-  }
-
-  /// argmin |J d + e|^2 + damping^2 |d|^2. Only the range of J^T can lessen it: with the thin
-  /// J^T = Q R and d = Q y a problem as small as J has rows.
-  static VectorX<double> DampedStep(const MatrixX<double>& J, const VectorX<double>& e,
-                                    double damping) {
-    const Eigen::Index r = std::min(J.rows(), J.cols());
-    const Eigen::HouseholderQR<MatrixX<double>> qr(J.transpose());
-    const MatrixX<double> Q = ThinQ(qr);
-    MatrixX<double> A = MatrixX<double>::Zero(J.rows() + r, r);
-    A.topRows(J.rows()).noalias() = J * Q;
-    A.bottomRows(r).diagonal().setConstant(damping);
-    VectorX<double> rhs = VectorX<double>::Zero(A.rows());
-    rhs.head(J.rows()) = -e;
-    const Eigen::HouseholderQR<MatrixX<double>> least(A);
-    return Q * VectorX<double>(least.solve(rhs));
   }
 
   /// q moved by the speeds d for unit time (quaternions renormalised).
@@ -242,37 +228,25 @@ class Assembler {
     kinematics_.UpdatePosition(start_.q);
     const int rows = mechanism_.num_rows(), extra = static_cast<int>(given_cut_.size());
     if (rows + extra == 0) return;
-    const auto numbers =
-        static_cast<double>(rows + extra) * static_cast<double>(mechanism_.num_u());
-    Require(2 * numbers, rows + extra);  // J and J_free
-    MatrixX<double> J;
-    dynamics_.Jacobian(kinematics_, J);
-    J.conservativeResize(rows + extra, Eigen::NoChange);
     const VectorX<double> at_rest = VectorX<double>::Zero(mechanism_.num_u());
     VectorX<double> target, bias;
     SpeedBias(kinematics_, at_rest, bias);
     target = -bias;
     target.conservativeResize(rows + extra);
     const VectorX<double> units = UnitsWith(given_cut_);
+    kinematics_.UpdateVelocity(at_rest);
     for (int k = 0; k < extra; ++k) {
       const auto& [joint, component, value] = given_cut_[k];
-      J.row(rows + k) = CutJointRow(joint, component);
-      target[rows + k] = value - CutJointSpeed(joint, component, at_rest);
+      target[rows + k] = value - CutJointSpeed(joint, component);
     }
-    units_.Apply(units, J);
+    const SparseRows J = Rows(given_cut_, units);
     target = target.cwiseQuotient(units);
     start_.u = start_.u.cwiseQuotient(units_.columns);
-    MatrixX<double> J_free = J;
-    for (int c = 0; c < mechanism_.num_u(); ++c) {
-      if (given_u_[c]) J_free.col(c).setZero();
-    }
     const VectorX<double> miss = target - J * start_.u;
     const double size = 1.0 + target.norm() + start_.u.norm() * Extent();
     const bool off = miss.norm() > 64 * std::numeric_limits<double>::epsilon() * size;
     if (off && mechanism_.num_u() > 0) {
-      Require(numbers, rows + extra);
-      Eigen::CompleteOrthogonalDecomposition<MatrixX<double>> solver(J_free);
-      start_.u += solver.solve(miss);
+      start_.u += LeastSquares(Without(given_u_, J), mechanism_.name()).Smallest(miss);
     }
     const VectorX<double> left = target - J * start_.u;
     start_.u = start_.u.cwiseProduct(units_.columns);
@@ -281,14 +255,32 @@ class Assembler {
     Fail(DescribeConflict(description_, kinematics_, {left, units, true, Extra(given_cut_)}));
   }
 
-  /// A length that no position exceeds much, in units: the longest arm of a body or Ground, or the
-  /// mechanism's own length, for every joint.
+  /// A length that no position exceeds much, in units: all arms of the longest way through the
+  /// tree, each at least as long as the mechanism's own length, and those of cut joints.
   double Extent() const {
-    double longest = mechanism_.length();
-    for (const Joint<Space, double>& joint : mechanism_.joints()) {
-      longest = std::max({longest, joint.X_PF.p.norm(), joint.X_QM.p.norm()});
+    const auto longer = [&](int index) {
+      const Joint<Space, double>& joint = mechanism_.joints()[index];
+      return std::max({mechanism_.length(), joint.X_PF.p.norm(), joint.X_QM.p.norm()});
+    };
+    double farthest = mechanism_.length(), last = 0.0;
+    std::vector<double> reach(static_cast<std::size_t>(mechanism_.num_bodies()), 0.0);
+    for (const TreeStep& step : mechanism_.tree()) {
+      reach[step.child] = reach[step.parent] + longer(step.joint);
+      farthest = std::max(farthest, reach[step.child]);
     }
-    return longest / units_.length * static_cast<double>(mechanism_.joints().size() + 1);
+    for (int index : mechanism_.constraints()) last = std::max(last, longer(index));
+    return (farthest + last) / units_.length;
+  }
+
+  /// Joints of the longest way through the tree.
+  double Depth() const {
+    int deepest = 0;
+    std::vector<int> depth(static_cast<std::size_t>(mechanism_.num_bodies()), 0);
+    for (const TreeStep& step : mechanism_.tree()) {
+      depth[step.child] = depth[step.parent] + 1;
+      deepest = std::max(deepest, depth[step.child]);
+    }
+    return deepest;
   }
 
   /// A coordinate or speed of a joint that is not in the tree.
@@ -304,7 +296,6 @@ class Assembler {
   const MechanismDescription& description_;
   const Mechanism<Space, double>& mechanism_;
   Kinematics<Space, double> kinematics_;
-  TreeDynamics<Space, double> dynamics_;
   Start<double> start_;
   std::vector<bool> held_q_, given_u_;
   AssemblyUnits<Space> units_;

@@ -39,11 +39,6 @@ struct AssemblyUnits {
   double Of(const Direction<Space, double>& direction) const {
     return direction.angular.isZero() ? length : 1.0;
   }
-
-  /// Rows over `row_units`, columns times theirs.
-  void Apply(const VectorX<double>& row_units, MatrixX<double>& J) const {
-    J = row_units.cwiseInverse().asDiagonal() * J * columns.asDiagonal();
-  }
 };
 
 }  // namespace loopbench

@@ -93,6 +93,59 @@ TEST(AssemblyTest, SpeedsNotGivenFollowFromThoseGiven) {
   EXPECT_GT(std::abs(start.u[1]), 0.1);
 }
 
+/// Thousands of loops: nothing may be dense in their number. Guesses are off by a hundredth.
+TEST(AssemblyTest, LongLaddersAreAssembledSparsely) {
+  constexpr int kWindows = 5000;
+  MechanismDescription d = Ladder(kWindows, 1.17, -0.7);
+  for (JointValues& guess : d.initial.coordinates) guess.values[0] += 0.01 * std::sin(guess.joint);
+  d.initial.speeds.resize(1);
+  const Joints mechanism(d, Coordinates::kJoint);
+  const Start<double> start = Assemble(d, mechanism);
+  ASSERT_EQ(start.outcome, Outcome::kFinished) << start.message;
+  // pins stand up to so many metres away, and three numbers of that size make up a mismatch
+  EXPECT_LE(Mismatch(mechanism, start.q), 16 * kEps * kWindows);
+  EXPECT_EQ(start.u[0], d.initial.speeds[0].values[0]);
+  Kinematics<Planar, double> kinematics(mechanism);
+  kinematics.UpdatePosition(start.q);
+  kinematics.UpdateVelocity(start.u);
+  double worst = 0.0;
+  for (int index : mechanism.constraints()) {
+    worst = std::max(worst, kinematics.ConstraintSpeed(index).head(2).cwiseAbs().maxCoeff());
+  }
+  EXPECT_LE(worst, 16 * kEps * kWindows);
+}
+
+/// The closure of a long chain is known as well as its angles add up, and is accepted so.
+TEST(AssemblyTest, ALongChainCloses) {
+  const MechanismDescription d = Chain(300000);
+  const Joints mechanism(d, Coordinates::kJoint);
+  const Start<double> start = Assemble(d, mechanism);
+  EXPECT_EQ(start.outcome, Outcome::kFinished) << start.message;
+}
+
+/// Speeds given at joints that close loops, many at once: as if they were read off a solution.
+TEST(AssemblyTest, SpeedsGivenAtCutJointsAreMet) {
+  MechanismDescription d = Ladder(50, 1.17, -0.7);
+  const Joints whole(d, Coordinates::kJoint);
+  const Start<double> expected = Assemble(d, whole);
+  Kinematics<Planar, double> kinematics(whole);
+  kinematics.UpdatePosition(expected.q);
+  kinematics.UpdateVelocity(expected.u);
+  d.initial.speeds.clear();
+  for (int index : whole.constraints()) {
+    const JointState<Planar, double>& state = kinematics.joints()[index];
+    d.joints[index].cut = true;
+    d.initial.speeds.push_back({index, {state.H(0).dot(state.V_rel)}});
+  }
+  d.initial.speeds.push_back({0, {-0.7}});
+  const Joints mechanism(d, Coordinates::kJoint);
+  ASSERT_EQ(mechanism.constraints(), whole.constraints());
+  const Start<double> start = Assemble(d, mechanism);
+  ASSERT_EQ(start.outcome, Outcome::kFinished) << start.message;
+  // each window's speeds follow from the last one's by some ten eps
+  EXPECT_LE((start.u - expected.u).cwiseAbs().maxCoeff(), 10 * 50 * kEps);
+}
+
 TEST(AssemblyTest, AHeldCutJointIsReached) {
   MechanismDescription d = FourBar(1.5);
   const Joints mechanism(d, Coordinates::kJoint);

@@ -1,0 +1,166 @@
+#include "lagrange/dense_equations.h"
+
+#include <limits>
+
+#include "mechanism/algebra/instantiate.h"
+
+namespace loopbench::lagrange {
+
+namespace {
+
+template <class Space, class S>
+std::vector<int> RowsOfConstraints(const Mechanism<Space, S>& mechanism) {
+  std::vector<int> rows;
+  for (int index : mechanism.constraints()) {
+    rows.push_back(mechanism.joints()[index].num_constraints());
+  }
+  return rows;
+}
+
+}  // namespace
+
+template <class Space, class S>
+DenseEquations<Space, S>::DenseEquations(const Mechanism<Space, S>& mechanism, SolverKind kind)
+    : mechanism_(mechanism),
+      kind_(kind),
+      dynamics_(mechanism),
+      M_(MatrixX<S>::Zero(mechanism.num_u(), mechanism.num_u())),
+      J_(MatrixX<S>::Zero(mechanism.num_rows(), mechanism.num_u())),
+      lambda_(VectorX<S>::Zero(mechanism.num_rows())),
+      zero_(VectorX<S>::Zero(mechanism.num_u())),
+      missed_(lambda_),
+      change_(zero_),
+      loop_(RowsOfConstraints(mechanism)) {
+  const int n = mechanism.num_u(), m = mechanism.num_rows();
+  if (kind_ == SolverKind::kAsPublished) {
+    augmented_.setZero(n + m, n + m);
+    rhs_.setZero(n + m);
+    solution_.setZero(n + m);
+    lu_ = Eigen::PartialPivLU<MatrixX<S>>(n + m);
+  } else {
+    W_.setZero(n, m);
+    response_.setZero(m, m);
+    mass_factor_.compute(MatrixX<S>::Identity(n, n).eval());
+  }
+}
+
+template <class Space, class S>
+double DenseEquations<Space, S>::Numbers(const Mechanism<Space, S>& mechanism, SolverKind kind) {
+  const double n = mechanism.num_u(), m = mechanism.num_rows();
+  if (kind == SolverKind::kAsPublished) return n * n + n * m + 2.0 * (n + m) * (n + m);
+  return 2.0 * n * n + 2.0 * n * m + 6.0 * m * m;  // loop_solver.h has five of m x m
+}
+
+template <class Space, class S>
+Outcome DenseEquations<Space, S>::Factor(const Kinematics<Space, S>& kinematics,
+                                         Conditioning& found) {
+  dynamics_.Jacobian(kinematics, J_);
+  return kind_ == SolverKind::kAsPublished ? FactorAugmented(kinematics, found)
+                                           : FactorResponse(kinematics, found);
+}
+
+/// The matrix of (1). Rows of J are components along D of the cut joints at Mo.
+template <class Space, class S>
+Outcome DenseEquations<Space, S>::FactorAugmented(const Kinematics<Space, S>& kinematics,
+                                                  Conditioning& found) {
+  const int n = mechanism_.num_u(), m = mechanism_.num_rows();
+  dynamics_.MassMatrix(kinematics, Masses::kPhysical, M_);
+  augmented_.topLeftCorner(n, n) = M_;
+  augmented_.topRightCorner(n, m) = J_.transpose();
+  augmented_.bottomLeftCorner(m, n) = J_;
+  augmented_.bottomRightCorner(m, m).setZero();
+  lu_.compute(augmented_);
+  const auto pivots = lu_.matrixLU().diagonal().cwiseAbs();
+  const S rcond = pivots.minCoeff() / pivots.maxCoeff();
+  found.rank = LoopRank(mechanism_, 0);
+  found.rcond = static_cast<double>(rcond);
+  // a pivot below a few eps of the largest is round-off of the elimination
+  return rcond > S(16) * std::numeric_limits<S>::epsilon() ? Outcome::kFinished
+                                                           : Outcome::kSingular;
+}
+
+template <class Space, class S>
+void DenseEquations<Space, S>::FormResponse(const Kinematics<Space, S>& kinematics, Masses masses) {
+  dynamics_.MassMatrix(kinematics, masses, M_);
+  mass_factor_.compute(M_);
+  if (loop_.size() == 0) return;  // a tree: nothing is constrained
+  W_ = J_.transpose();
+  mass_factor_.matrixL().solveInPlace(W_);
+  response_.noalias() = W_.transpose() * W_;
+}
+
+template <class Space, class S>
+void DenseEquations<Space, S>::SetScales(const Kinematics<Space, S>& kinematics, Masses masses) {
+  for (int j = 0; j < static_cast<int>(mechanism_.constraints().size()); ++j) {
+    loop_.SetScale(j, FreeResponse(kinematics, masses, mechanism_.constraints()[j]));
+  }
+}
+
+/// S with the bodies' masses; where it is suspicious, directions and weights from S with unit
+/// masses, then the factors of the physical one once more (loop_solver.h).
+template <class Space, class S>
+Outcome DenseEquations<Space, S>::FactorResponse(const Kinematics<Space, S>& kinematics,
+                                                 Conditioning& found) {
+  found.rank = LoopRank(mechanism_, 0);
+  found.smallest_weight = 1.0;
+  FormResponse(kinematics, Masses::kPhysical);
+  if (mass_factor_.info() != Eigen::Success) return Outcome::kNonFinite;
+  if (loop_.size() == 0) return Outcome::kFinished;
+  SetScales(kinematics, Masses::kPhysical);
+  if (!loop_.FactorScaled(response_)) {
+    SetScales(kinematics, Masses::kGeometric);
+    FormResponse(kinematics, Masses::kGeometric);
+    if (!response_.allFinite()) return Outcome::kNonFinite;
+    loop_.FactorGeometric(response_);
+    found.rank = LoopRank(mechanism_, loop_.size() - loop_.rank());
+    found.smallest_weight = static_cast<double>(loop_.smallest_weight());
+    FormResponse(kinematics, Masses::kPhysical);
+    if (!loop_.FactorSoftened(response_)) return Outcome::kSingular;
+  }
+  found.rcond = static_cast<double>(loop_.rcond());
+  return Outcome::kFinished;
+}
+
+template <class Space, class S>
+void DenseEquations<Space, S>::Solve(const VectorX<S>& given, const VectorX<S>& target,
+                                     VectorX<S>& x, VectorX<S>* lambda) {
+  const VectorX<S>& force = given.size() > 0 ? given : zero_;
+  const int n = mechanism_.num_u(), m = mechanism_.num_rows();
+  if (kind_ == SolverKind::kAsPublished) {
+    rhs_.head(n) = force;
+    rhs_.tail(m) = target;
+    solution_ = lu_.solve(rhs_);
+    x = solution_.head(n);
+    if (lambda != nullptr) *lambda = -solution_.tail(m);
+    return;
+  }
+  // S lambda = target - J M^-1 force, x = M^-1 (force + J^T lambda): on the way x is L^-1 of the
+  // bracket, and W lambda is L^-1 J^T lambda
+  x = force;
+  mass_factor_.matrixL().solveInPlace(x);
+  if (m > 0) {
+    lambda_ = target;
+    lambda_.noalias() -= W_.transpose() * x;
+    loop_.Apply(lambda_);
+    loop_.ApplyTransposed(lambda_);
+    x.noalias() += W_ * lambda_;
+    if (lambda != nullptr) *lambda = lambda_;
+  }
+  mass_factor_.matrixU().solveInPlace(x);
+}
+
+/// u less M^-1 J^T S^+ (J u + b): no force, and the target -(J u + b).
+template <class Space, class S>
+void DenseEquations<Space, S>::CompleteSpeeds(Kinematics<Space, S>& kinematics, VectorX<S>& u) {
+  SpeedBias(kinematics, zero_, missed_);
+  missed_ = -missed_;
+  missed_.noalias() -= J_ * u;
+  Solve(zero_, missed_, change_, nullptr);
+  u += change_;
+}
+
+#define LOOPBENCH_INSTANTIATE(Space, S) template class DenseEquations<Space, S>;
+LOOPBENCH_FOR_EACH_SPACE_AND_SCALAR(LOOPBENCH_INSTANTIATE)
+#undef LOOPBENCH_INSTANTIATE
+
+}  // namespace loopbench::lagrange

@@ -1,0 +1,137 @@
+#include "lagrange/joint_response.h"
+
+#include <algorithm>
+
+#include "mechanism/loops/loop_solver.h"
+
+namespace loopbench::lagrange {
+
+template <class Space>
+std::unique_ptr<JointResponse<Space>> JointResponse<Space>::Make(
+    const Mechanism<Space, double>& mechanism, double most) {
+  std::vector<Side> sides;
+  std::vector<int> joints, rows;
+  std::vector<std::vector<int>> sides_of_body(mechanism.num_bodies());
+  int first = 0, row = 0;
+  for (int j = 0; j < static_cast<int>(mechanism.joints().size()); ++j) {
+    const Joint<Space, double>& joint = mechanism.joints()[j];
+    const int n = joint.num_constraints();
+    if (n == 0) continue;
+    for (const bool is_Q : {false, true}) {
+      const int body = is_Q ? joint.to : joint.from;
+      if (body == kGround) continue;
+      sides_of_body[body].push_back(static_cast<int>(sides.size()));
+      sides.push_back({j, body, n, is_Q, first, row});
+      first += n;
+    }
+    joints.push_back(j);
+    rows.push_back(n);
+    row += n;
+  }
+  double numbers = 0.0;
+  for (const std::vector<int>& on_body : sides_of_body) {
+    double count = 0.0;
+    for (int side : on_body) count += sides[side].rows;
+    numbers += count * count;
+  }
+  if (numbers > most) return nullptr;
+  std::vector<int> block_of(mechanism.joints().size(), -1);
+  for (std::size_t k = 0; k < joints.size(); ++k) block_of[joints[k]] = static_cast<int>(k);
+  std::vector<std::pair<int, int>> pairs;
+  for (const std::vector<int>& on_body : sides_of_body) {
+    for (std::size_t a = 0; a < on_body.size(); ++a) {
+      for (std::size_t b = 0; b < a; ++b) {
+        pairs.emplace_back(block_of[sides[on_body[a]].joint], block_of[sides[on_body[b]].joint]);
+      }
+    }
+  }
+  BlockCholesky X(std::move(rows), pairs, most);
+  if (X.numbers() > most) return nullptr;
+  return std::unique_ptr<JointResponse>(
+      new JointResponse(std::move(sides), std::move(joints), std::move(X),
+                        static_cast<int>(mechanism.joints().size()), sides_of_body));
+}
+
+template <class Space>
+JointResponse<Space>::JointResponse(std::vector<Side> sides, std::vector<int> joints,
+                                    BlockCholesky X, int all_joints,
+                                    const std::vector<std::vector<int>>& sides_of_body)
+    : sides_(std::move(sides)),
+      joints_(std::move(joints)),
+      X_(std::move(X)),
+      x_(static_cast<std::size_t>(X_.size()), 0.0),
+      phi_(all_joints, Components<Space, double>::Zero()) {
+  int rows = 0;
+  for (const Side& side : sides_) rows += side.rows;
+  c_.assign(rows, Wrench<Space, double>::Zero());
+  Mc_.assign(rows, Acceleration<Space, double>::Zero());
+  std::vector<int> block_of(phi_.size(), -1);
+  for (std::size_t k = 0; k < joints_.size(); ++k) block_of[joints_[k]] = static_cast<int>(k);
+  for (const std::vector<int>& on_body : sides_of_body) {
+    for (std::size_t a = 0; a < on_body.size(); ++a) {
+      for (std::size_t b = 0; b <= a; ++b) {
+        int first = on_body[a], second = on_body[b];
+        const int i = block_of[sides_[first].joint], j = block_of[sides_[second].joint];
+        if (i != j && X_.FirstOf(i, j) == j) std::swap(first, second);
+        pairs_.push_back({first, second, i == j ? X_.Diagonal(i) : X_.OffDiagonal(i, j)});
+      }
+    }
+  }
+}
+
+template <class Space>
+bool JointResponse<Space>::Factor(const Kinematics<Space, double>& kinematics) {
+  const Mechanism<Space, double>& mechanism = kinematics.mechanism();
+  for (const Side& side : sides_) {
+    const JointState<Space, double>& state = kinematics.joints()[side.joint];
+    const Inertia<Space, double>& inertia = mechanism.bodies()[side.body];
+    const auto inverse = kinematics.RotationalInverse(inertia, side.body);
+    const double per_mass = 1.0 / inertia.mass;
+    for (int i = 0; i < side.rows; ++i) {
+      const Wrench<Space, double> c = side.is_Q ? ShiftForce<Space, double>(state.D(i), state.r_Q)
+                                                : -ShiftForce<Space, double>(state.D(i), state.r_P);
+      c_[side.first + i] = c;
+      Mc_[side.first + i] = {inverse * c.angular, c.linear * per_mass};
+    }
+  }
+  X_.SetZero();
+  for (const Pair& pair : pairs_) {
+    const Side &first = sides_[pair.first], &second = sides_[pair.second];
+    double* number = pair.block;
+    for (int i = 0; i < first.rows; ++i) {
+      for (int k = 0; k < second.rows; ++k) {
+        *number++ += c_[first.first + i].dot(Mc_[second.first + k]);
+      }
+    }
+  }
+  const bool positive = X_.Factor();
+  const auto [ratio, block] = X_.SmallestRatio(kUsual);
+  rcond_ = positive ? ratio : 0.0;
+  worst_joint_ = block < 0 ? -1 : joints_[block];
+  return rcond_ >= LoopSolver<double>::kSuspicious;
+}
+
+template <class Space>
+void JointResponse<Space>::Solve(std::span<const Acceleration<Space, double>> b,
+                                 std::span<const Components<Space, double>> c0,
+                                 std::span<Acceleration<Space, double>> A) {
+  for (std::size_t k = 0, row = 0; k < joints_.size(); ++k) {
+    for (int i = 0; i < X_.rows(static_cast<int>(k)); ++i) x_[row++] = -c0[joints_[k]][i];
+  }
+  for (const Side& side : sides_) {
+    for (int i = 0; i < side.rows; ++i) x_[side.row + i] -= c_[side.first + i].dot(b[side.body]);
+  }
+  X_.Solve(x_.data());
+  std::ranges::copy(b, A.begin());
+  for (const Side& side : sides_) {
+    for (int i = 0; i < side.rows; ++i) {
+      A[side.body] += Mc_[side.first + i] * x_[side.row + i];
+      phi_[side.joint][i] = x_[side.row + i];
+    }
+  }
+}
+
+template class JointResponse<Planar>;
+template class JointResponse<Spatial>;
+
+}  // namespace loopbench::lagrange

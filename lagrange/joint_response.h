@@ -1,0 +1,75 @@
+// One multiplier per constrained direction of every joint, those of the tree included: sparse.
+//
+//   X phi = -(C b + c0),      X = C M^-1 C^T,      A = b + M^-1 C^T phi
+//
+// with the rows c^T of all joints (body_equations.h) in C and M the block-diagonal mass matrix of
+// the bodies. X has a block for every two joints on one body, so its factors (block_cholesky.h) are
+// linear in size for chains, ladders and trees. A body with k joints makes k^2 blocks.
+//
+// Rank is not decided here. Pivots are those of K^-1 X K^-T, where K K^T is the free response of
+// each joint (loop_solver.h), so they say the same as there: below kSuspicious the loops may have
+// lost rank, and others have to look. Where a joint closes an assembly of more than kUsual joints,
+// the limit shrinks with their number: such an assembly answers like one of its mass.
+#pragma once
+
+#include <memory>
+#include <span>
+#include <vector>
+
+#include "mechanism/algebra/block_cholesky.h"
+#include "mechanism/model/kinematics.h"
+
+namespace loopbench::lagrange {
+
+template <class Space>
+class JointResponse {
+ public:
+  /// Null where X would have more numbers than `most`. `mechanism` must outlive this.
+  static std::unique_ptr<JointResponse> Make(const Mechanism<Space, double>& mechanism,
+                                             double most);
+
+  /// False where rank is in doubt.
+  bool Factor(const Kinematics<Space, double>& kinematics);
+  /// A of all bodies, and phi().
+  void Solve(std::span<const Acceleration<Space, double>> b,
+             std::span<const Components<Space, double>> c0,
+             std::span<Acceleration<Space, double>> A);
+
+  std::span<const Components<Space, double>> phi() const { return phi_; }
+  /// The least pivot of the last Factor(), and its joint, -1 where all are 1.
+  double rcond() const { return rcond_; }
+  int worst_joint() const { return worst_joint_; }
+  /// Multiply-adds of factors and one solution.
+  double operations() const { return X_.operations(); }
+
+ private:
+  /// A joint's rows on one of its bodies.
+  struct Side {
+    int joint = 0, body = 0, rows = 0;
+    bool is_Q = false;
+    int first = 0;  ///< in c_ and Mc_
+    int row = 0;    ///< in x_
+  };
+  /// Two sides on one body, and where the block of their joints is.
+  struct Pair {
+    int first = 0, second = 0;  ///< sides: its rows, its columns
+    double* block = nullptr;
+  };
+  static constexpr int kUsual = 8;
+
+  JointResponse(std::vector<Side> sides, std::vector<int> joints, BlockCholesky X, int all_joints,
+                const std::vector<std::vector<int>>& sides_of_body);
+
+  std::vector<Side> sides_;
+  std::vector<int> joints_;  ///< with constrained directions, in the order of blocks
+  BlockCholesky X_;
+  std::vector<Pair> pairs_;
+  std::vector<Wrench<Space, double>> c_;
+  std::vector<Acceleration<Space, double>> Mc_;
+  std::vector<double> x_;
+  std::vector<Components<Space, double>> phi_;
+  double rcond_ = 1.0;
+  int worst_joint_ = -1;
+};
+
+}  // namespace loopbench::lagrange

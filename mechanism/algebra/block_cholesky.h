@@ -1,0 +1,85 @@
+// Cholesky factors of a sparse symmetric positive definite matrix whose blocks are small and dense:
+//
+//   P A P^T = L L^T
+//
+// P orders whole blocks, once. Factors of any values then
+// cost no memory and no search: column by column from the left, each from the columns before it
+// that have a block in its row (A. George, J. W. Liu, Computer Solution of Large Sparse Positive
+// Definite Systems, 1981, section 5.3). Eigen's own sparse factors allocate whenever values change,
+// and see numbers where there are blocks.
+#pragma once
+
+#include <span>
+#include <utility>
+#include <vector>
+
+namespace loopbench {
+
+class BlockCholesky {
+ public:
+  /// Diagonal blocks of so many rows each; `pairs` are those (i, j), i != j, whose block is not
+  /// zero. A pair may come twice, either way round. Where L would have more than `most` numbers
+  /// none is made: numbers() is more than `most` then, and nothing else may be called.
+  BlockCholesky(const std::vector<int>& rows, std::span<const std::pair<int, int>> pairs,
+                double most);
+
+  /// Where A is put, block by block and row by row, each time after SetZero(). Of diagonal blocks
+  /// the lower triangle is used. Of a pair one block is kept: rows of the one that FirstOf() names,
+  /// columns of the other.
+  void SetZero();
+  double* Diagonal(int block) { return &L_[columns_[order_[block]].first_number]; }
+  int FirstOf(int i, int j) const { return order_[i] > order_[j] ? i : j; }
+  /// Null where no such pair was given.
+  double* OffDiagonal(int i, int j);
+
+  /// False where a pivot is not positive; nothing can be solved then.
+  bool Factor();
+  /// x := A^-1 x, in place, block after block as given.
+  void Solve(double* x) const;
+
+  /// The least pivot over what it was before other blocks were eliminated, and its block; where
+  /// more than `usual` blocks were eliminated into it, as many times larger. {1, -1} if none is
+  /// below 1.
+  std::pair<double, int> SmallestRatio(int usual) const;
+
+  int rows(int block) const { return columns_[order_[block]].rows; }
+  int size() const { return size_; }
+  /// Numbers in L, and multiply-adds of Factor() and one Solve().
+  double numbers() const { return numbers_; }
+  double operations() const { return operations_; }
+
+ private:
+  struct Column {
+    int block = 0, rows = 0;
+    int first_number = 0;              ///< in L_: the diagonal block, then those below it
+    int first_row = 0, num_rows = 0;   ///< in below_
+    int first_left = 0, num_left = 0;  ///< in left_
+    int first = 0;                     ///< in x
+    int eliminated = 1;                ///< blocks of its subtree
+  };
+  /// A block in a column's row, to the left of it.
+  struct Left {
+    int column = 0;
+    int place = 0;  ///< in below_
+  };
+  struct Below {
+    int column = 0;
+    int number = 0;  ///< in L_
+  };
+  template <int kRows>
+  bool FactorColumn(int j);
+  template <int kRows>
+  void SolveColumns(double* x) const;
+
+  int size_ = 0;
+  int uniform_ = 0;  ///< rows of every block; 0 where they differ
+  double numbers_ = 0.0, operations_ = 0.0;
+  std::vector<int> order_;  ///< column of each block
+  std::vector<Column> columns_;
+  std::vector<Below> below_;
+  std::vector<Left> left_;
+  std::vector<int> number_of_;      ///< by column: where the present one has its row in L_
+  std::vector<double> L_, ratios_;  ///< ratios_ by column
+};
+
+}  // namespace loopbench

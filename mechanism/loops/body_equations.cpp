@@ -1,0 +1,123 @@
+#include "mechanism/loops/body_equations.h"
+
+#include <algorithm>
+
+#include "mechanism/algebra/instantiate.h"
+
+namespace loopbench {
+
+template <class Space, class S>
+BodyEquations<Space, S>::BodyEquations(const Mechanism<Space, S>& mechanism)
+    : mechanism_(mechanism),
+      wrenches_(mechanism.num_bodies(), Wrench<Space, S>::Zero()),
+      b_(mechanism.num_bodies(), Acceleration<Space, S>::Zero()),
+      A_(b_),
+      c0_(mechanism.joints().size(), Components<Space, S>::Zero()),
+      known_(VectorX<S>::Zero(mechanism.num_u())) {}
+
+/// b = M^-1 times the wrench, at the centre of mass in ground axes: the part of the paper's zeta_i3
+/// that is the same at both handles, before its shift.
+template <class Space, class S>
+void BodyEquations<Space, S>::SetFree(const Kinematics<Space, S>& kinematics) {
+  for (int body = 1; body < mechanism_.num_bodies(); ++body) {
+    const Inertia<Space, S>& inertia = mechanism_.bodies()[body];
+    b_[body] = {kinematics.RotationalInverse(inertia, body) * wrenches_[body].angular,
+                wrenches_[body].linear / inertia.mass};
+  }
+}
+
+template <class Space, class S>
+void BodyEquations<Space, S>::SetForce(const Kinematics<Space, S>& kinematics,
+                                       const VectorX<S>& force, const VectorX<S>& target) {
+  known_.setZero();
+  for (Components<Space, S>& c0 : c0_) c0.setZero();
+  for (int index : mechanism_.constraints()) {
+    const Joint<Space, S>& joint = mechanism_.joints()[index];
+    c0_[index].head(joint.num_constraints()) = -target.segment(joint.row, joint.num_constraints());
+  }
+  if (force.size() == 0) {
+    for (Acceleration<Space, S>& b : b_) b.setZero();
+    return;
+  }
+  for (Wrench<Space, S>& wrench : wrenches_) wrench.setZero();
+  for (const TreeStep& step : mechanism_.tree()) {
+    const Joint<Space, S>& joint = mechanism_.joints()[step.joint];
+    const JointState<Space, S>& state = kinematics.joints()[step.joint];
+    auto F = Wrench<Space, S>::Zero();
+    for (int i = 0; i < state.num_u; ++i) {
+      F += state.H(i) * (joint.kind->inverse_H_squared * force[joint.u_offset + i]);
+    }
+    wrenches_[joint.to] += ShiftForce<Space, S>(F, state.r_Q);
+    wrenches_[joint.from] -= ShiftForce<Space, S>(F, state.r_P);
+  }
+  SetFree(kinematics);
+}
+
+/// n_Q - n_P - g is what (7) has beside the accelerations at centres of mass and H udot, at Mo in
+/// ground axes. Its components along D are c0, to which feedback adds; those along H belong to
+/// udot.
+template <class Space, class S>
+void BodyEquations<Space, S>::SetState(const Kinematics<Space, S>& kinematics,
+                                       const VectorX<S>& feedback) {
+  AppliedForces<Space, S>(kinematics, wrenches_);
+  for (int body = 1; body < mechanism_.num_bodies(); ++body) {
+    const Inertia<Space, S>& inertia = mechanism_.bodies()[body];
+    const Angular<Space, S>& w = kinematics.motions()[body].angular;
+    wrenches_[body].angular -= CrossAngular<S>(w, kinematics.RotationalInertia(inertia, body) * w);
+  }
+  SetFree(kinematics);
+  for (std::size_t j = 0; j < c0_.size(); ++j) {
+    const Joint<Space, S>& joint = mechanism_.joints()[j];
+    const JointState<Space, S>& state = kinematics.joints()[j];
+    const Acceleration<Space, S> known = kinematics.Centripetal(joint.to, state.r_Q) -
+                                         kinematics.Centripetal(joint.from, state.r_P) - state.g;
+    c0_[j] = state.Along(known, state.rows());
+    for (int i = 0; i < (joint.in_tree() ? state.num_u : 0); ++i) {
+      known_[joint.u_offset + i] = joint.kind->inverse_H_squared * state.H(i).dot(known);
+    }
+  }
+  if (feedback.size() == 0) return;
+  for (int index : mechanism_.constraints()) {
+    const Joint<Space, S>& joint = mechanism_.joints()[index];
+    c0_[index].head(joint.num_constraints()) +=
+        feedback.segment(joint.row, joint.num_constraints());
+  }
+}
+
+template <class Space, class S>
+void BodyEquations<Space, S>::SetMissed(const Kinematics<Space, S>& kinematics) {
+  known_.setZero();
+  for (Acceleration<Space, S>& b : b_) b.setZero();
+  for (Components<Space, S>& c0 : c0_) c0.setZero();
+  for (int index : mechanism_.constraints()) c0_[index] = kinematics.ConstraintSpeed(index);
+}
+
+/// x = H^T (A_Q - A_P) / |H|^2 of each tree joint, both points at Mo: udot of (7).
+template <class Space, class S>
+void BodyEquations<Space, S>::Read(const Kinematics<Space, S>& kinematics, VectorX<S>& x) const {
+  x = known_;
+  for (const TreeStep& step : mechanism_.tree()) {
+    const Joint<Space, S>& joint = mechanism_.joints()[step.joint];
+    const JointState<Space, S>& state = kinematics.joints()[step.joint];
+    const Acceleration<Space, S> A_rel = ShiftMotion<Space, S>(A_[joint.to], state.r_Q) -
+                                         ShiftMotion<Space, S>(A_[joint.from], state.r_P);
+    for (int i = 0; i < state.num_u; ++i) {
+      x[joint.u_offset + i] += joint.kind->inverse_H_squared * state.H(i).dot(A_rel);
+    }
+  }
+}
+
+template <class Space, class S>
+void BodyEquations<Space, S>::Read(std::span<const Components<Space, S>> phi,
+                                   VectorX<S>& lambda) const {
+  for (int index : mechanism_.constraints()) {
+    const Joint<Space, S>& joint = mechanism_.joints()[index];
+    lambda.segment(joint.row, joint.num_constraints()) = phi[index].head(joint.num_constraints());
+  }
+}
+
+#define LOOPBENCH_INSTANTIATE(Space, S) template class BodyEquations<Space, S>;
+LOOPBENCH_FOR_EACH_SPACE_AND_SCALAR(LOOPBENCH_INSTANTIATE)
+#undef LOOPBENCH_INSTANTIATE
+
+}  // namespace loopbench

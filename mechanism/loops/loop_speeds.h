@@ -1,0 +1,38 @@
+// Which speeds of the forest move the two sides of a cut joint against each other.
+#pragma once
+
+#include "mechanism/model/kinematics.h"
+
+namespace loopbench {
+
+/// Calls sink(index into u, V) for each speed of the forest between the two sides of a cut joint,
+/// with what one unit of that speed adds to V_Q - V_P at the joint's Mo. A speed of a joint at p_j
+/// moves all that is outward of it, the point p of the cut joint included:
+///
+///   V = S(p - p_j) H_i        + on the way from Ground to Q, - on the way to P
+///
+/// Where the ways are one, neither moves against the other.
+template <class Space, class S, class Sink>
+void ForEachSpeedOfLoop(const Kinematics<Space, S>& kinematics, int index, const Sink& sink) {
+  const Mechanism<Space, S>& mechanism = kinematics.mechanism();
+  const Joint<Space, S>& cut = mechanism.joints()[index];
+  const Linear<Space, S> p = kinematics.JointPoint(index);
+  const auto& tree = mechanism.tree();
+  int to_Q = mechanism.step_of_body(cut.to), to_P = mechanism.step_of_body(cut.from);
+  while (to_Q != to_P) {
+    // a step comes after those that it goes out from: the later one is on one way only
+    const bool on_Q = to_Q > to_P;
+    int& s = on_Q ? to_Q : to_P;
+    const TreeStep& step = tree[s];
+    const JointState<Space, S>& moving = kinematics.joints()[step.joint];
+    const Joint<Space, S>& joint = mechanism.joints()[step.joint];
+    const Linear<Space, S> arm = p - kinematics.JointPoint(step.joint);
+    const S sign = S(on_Q ? step.sign : -step.sign);
+    for (int i = 0; i < joint.num_u(); ++i) {
+      sink(joint.u_offset + i, ShiftMotion<Space, S>(Velocity<Space, S>(moving.H(i) * sign), arm));
+    }
+    s = mechanism.step_of_body(step.parent);
+  }
+}
+
+}  // namespace loopbench

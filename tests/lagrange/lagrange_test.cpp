@@ -1,0 +1,195 @@
+// Sparse multipliers of all joints against dense ones of the cut joints, and which are chosen.
+#include "lagrange/lagrange.h"
+
+#include <gtest/gtest.h>
+
+#include <cmath>
+#include <cstdio>
+#include <limits>
+#include <numbers>
+
+#include "mechanism/description/library.h"
+#include "odca/odca.h"
+#include "tests/contract/extremes.h"
+#include "tests/contract/generators.h"
+#include "tests/contract/system_with.h"
+
+namespace loopbench {
+namespace {
+
+using testing::ConsistentState;
+using testing::Random;
+using testing::State;
+
+constexpr double kEps = std::numeric_limits<double>::epsilon();
+constexpr double kNoLimit = 1e9;
+
+VectorX<double> RandomNumbers(Random& random, Eigen::Index count) {
+  VectorX<double> numbers(count);
+  for (double& number : numbers) number = random.Uniform(-1.0, 1.0);
+  return numbers;
+}
+
+/// Random forces and targets on both; solutions agree within the contract's bound, sums along n
+/// bodies magnified by the condition of what is inverted.
+template <class Space>
+void ExpectAlike(const MechanismDescription& description, Coordinates coordinates,
+                 std::uint64_t seed) {
+  const Mechanism<Space, double> joint_set(description, Coordinates::kJoint);
+  const Mechanism<Space, double> mechanism(description, coordinates);
+  State state = ConsistentState(description, joint_set, seed);
+  if (coordinates == Coordinates::kAbsolute) state = StateIn(mechanism, joint_set, state);
+  Kinematics<Space, double> kinematics(mechanism);
+  kinematics.UpdatePosition(state.q);
+  kinematics.UpdateVelocity(state.u);
+  const auto sparse = lagrange::JointResponse<Space>::Make(mechanism, kNoLimit);
+  ASSERT_NE(sparse, nullptr);
+  lagrange::DenseEquations<Space, double> dense(mechanism, SolverKind::kRankRevealing);
+  Conditioning found;
+  ASSERT_EQ(dense.Factor(kinematics, found), Outcome::kFinished);
+  if (!sparse->Factor(kinematics)) {
+    EXPECT_LT(found.rcond, 0.1) << description.name << ": what is in doubt is near that for both";
+    return;
+  }
+  EXPECT_EQ(found.smallest_weight, 1.0) << description.name;
+  Random random(seed);
+  const VectorX<double> force = RandomNumbers(random, mechanism.num_u());
+  const VectorX<double> target = RandomNumbers(random, mechanism.num_rows());
+  VectorX<double> x_dense, lambda_dense, x = force, lambda = target;
+  dense.Solve(force, target, x_dense, &lambda_dense);
+  BodyEquations<Space, double> equations(mechanism);
+  equations.SetForce(kinematics, force, target);
+  sparse->Solve(equations.b(), equations.c0(), equations.A());
+  equations.Read(kinematics, x);
+  equations.Read(sparse->phi(), lambda);
+  const double bound =
+      100.0 * kEps * mechanism.num_bodies() / std::min(found.rcond, sparse->rcond());
+  EXPECT_LE((x - x_dense).norm(), bound * std::max(1.0, x_dense.norm())) << description.name;
+  if (lambda.size() == 0) return;
+  EXPECT_LE((lambda - lambda_dense).norm(), bound * std::max(1.0, lambda_dense.norm()))
+      << description.name;
+}
+
+template <class Space>
+void ExpectAlikeInAll(SpaceKind space) {
+  for (const Coordinates coordinates : {Coordinates::kJoint, Coordinates::kAbsolute}) {
+    for (std::uint64_t seed = 1; seed <= 8; ++seed) {
+      const int n = 2 + static_cast<int>(seed);
+      ExpectAlike<Space>(testing::RandomChain(n + 6, space, seed), coordinates, seed);
+      ExpectAlike<Space>(testing::RandomTree(3 * n, space, seed), coordinates, seed);
+      ExpectAlike<Space>(testing::RandomLadder(n, space, seed), coordinates, seed);
+      ExpectAlike<Space>(testing::MixedGraph(n, space, seed, 2), coordinates, seed);
+      ExpectAlike<Space>(testing::NestedLoops(n, space, seed), coordinates, seed);
+    }
+  }
+}
+
+TEST(JointResponse, SolvesTheEquationsOfTheForestInThePlane) {
+  ExpectAlikeInAll<Planar>(SpaceKind::kPlanar);
+}
+
+TEST(JointResponse, SolvesTheEquationsOfTheForestInSpace) {
+  ExpectAlikeInAll<Spatial>(SpaceKind::kSpatial);
+}
+
+using Sparse = testing::SystemWith<lagrange::Lagrange, Planar, double>;
+
+/// A ladder of three windows with its cranks at `angle`, all speeds zero.
+Outcome Evaluate(Sparse& system, const Mechanism<Planar, double>& mechanism, double angle) {
+  VectorX<double> q = VectorX<double>::Zero(mechanism.num_q()), udot;
+  for (const TreeStep& step : mechanism.tree()) {
+    const bool is_crank = step.parent == kGround;
+    q[mechanism.joints()[step.joint].q_offset] = is_crank ? angle : -angle;
+  }
+  const VectorX<double> u = VectorX<double>::Zero(mechanism.num_u());
+  return system->Evaluate(0.0, q, u, udot);
+}
+
+TEST(Lagrange, LeavesDoubtfulPositionsToTheDenseEquations) {
+  const Mechanism<Planar, double> mechanism(Ladder(3, 1.0, 0.0), Coordinates::kJoint);
+  Sparse system(mechanism);
+  EXPECT_EQ(Evaluate(system, mechanism, 1.0), Outcome::kFinished);
+  EXPECT_TRUE(system.solver().is_sparse());
+  EXPECT_EQ(system->diagnostics().smallest_weight, 1.0);
+  for (const double angle : {1e-5, 0.0}) {
+    EXPECT_EQ(Evaluate(system, mechanism, angle), Outcome::kFinished);
+    EXPECT_FALSE(system.solver().is_sparse());
+    EXPECT_LT(system->diagnostics().smallest_weight, 0.5);
+  }
+  EXPECT_EQ(Evaluate(system, mechanism, 1.0), Outcome::kFinished);
+  EXPECT_TRUE(system.solver().is_sparse());
+}
+
+/// What is answered sparsely is right: O-DCA, which judges joint by joint, softens nothing there
+/// and has the same accelerations. Dense equations judge all loops at once, whose responses are the
+/// wider apart the more there are: from some 50 windows on they soften where sparse ones answer.
+TEST(Lagrange, AnswersNothingSparselyThatHasLostRank) {
+  for (const int windows : {1, 3, 10, 40}) {
+    const Mechanism<Planar, double> mechanism(Ladder(windows, 1.0, 0.0), Coordinates::kJoint);
+    Sparse system(mechanism);
+    testing::SystemWith<odca::Odca, Planar, double> odca(mechanism);
+    VectorX<double> udot, expected;
+    const VectorX<double> u = VectorX<double>::Zero(mechanism.num_u());
+    double softened_to = 0.0, sparse_from = 1.0, worst = 0.0;
+    for (double angle = 1e-6; angle < 1.0; angle *= 1.3) {
+      ASSERT_EQ(Evaluate(system, mechanism, angle), Outcome::kFinished);
+      if (!system.solver().is_sparse()) {
+        if (system->diagnostics().smallest_weight < 1.0) softened_to = angle;
+        continue;
+      }
+      sparse_from = std::min(sparse_from, angle);
+      ASSERT_EQ(system->Evaluate(0.0, system->q(), u, udot), Outcome::kFinished);
+      ASSERT_EQ(odca->Evaluate(0.0, system->q(), u, expected), Outcome::kFinished);
+      const Diagnostics found = odca->diagnostics();
+      EXPECT_EQ(found.smallest_weight, 1.0) << windows << " windows at " << angle;
+      const double bound = 100.0 * kEps * mechanism.num_bodies() /
+                           std::min(found.rcond, system->diagnostics().rcond);
+      worst = std::max(worst, (udot - expected).norm() / expected.norm() / bound);
+    }
+    std::printf(
+        "%3d windows: dense equations soften to %.1e rad, sparse from %.1e; %.2g of bound\n",
+        windows, softened_to, sparse_from, worst);
+    EXPECT_LE(worst, 1.0);
+    EXPECT_LT(sparse_from, 0.1);
+  }
+}
+
+TEST(Lagrange, IsSingularWhereDenseEquationsWouldBeTooLarge) {
+  const Mechanism<Planar, double> mechanism(Ladder(2000, 1.0, 0.0), Coordinates::kJoint);
+  Sparse system(mechanism);
+  EXPECT_EQ(Evaluate(system, mechanism, 1.0), Outcome::kFinished);
+  EXPECT_EQ(Evaluate(system, mechanism, 0.0), Outcome::kSingular);
+  EXPECT_EQ(Evaluate(system, mechanism, 1.0), Outcome::kFinished);
+}
+
+/// Where a closed chain meets, half of it hangs on either side: that is no loss of rank.
+TEST(Lagrange, AnswersLongChains) {
+  const Mechanism<Planar, double> mechanism(Chain(100000), Coordinates::kJoint);
+  Sparse system(mechanism);
+  const double turn = 2.0 * std::numbers::pi / 100001.0;
+  VectorX<double> q = VectorX<double>::Constant(mechanism.num_q(), turn), udot;
+  q[0] = turn - std::numbers::pi;
+  const VectorX<double> u = VectorX<double>::Zero(mechanism.num_u());
+  EXPECT_EQ(system->Evaluate(0.0, q, u, udot), Outcome::kFinished);
+  EXPECT_TRUE(system.solver().is_sparse());
+}
+
+/// A body with three hundred joints makes a block for every two of them.
+TEST(Lagrange, IsDenseWhereThatIsLessWork) {
+  MechanismDescription hub;
+  hub.name = "hub";
+  const Eigen::Vector3d origin = Eigen::Vector3d::Zero(), tip = Eigen::Vector3d::UnitX();
+  hub.bodies.push_back(Bar("hub", 1.0, 1.0, 1.0));
+  hub.joints.push_back(Revolute("axle", 0, origin, 1, origin));
+  for (int i = 0; i < 300; ++i) {
+    hub.bodies.push_back(Bar("spoke" + std::to_string(i), 1.0, 1.0, 1.0));
+    hub.joints.push_back(Revolute("J" + std::to_string(i), 1, tip, i + 2, origin));
+  }
+  const Mechanism<Planar, double> mechanism(hub, Coordinates::kJoint);
+  Sparse system(mechanism);
+  EXPECT_EQ(Evaluate(system, mechanism, 1.0), Outcome::kFinished);
+  EXPECT_FALSE(system.solver().is_sparse());
+}
+
+}  // namespace
+}  // namespace loopbench

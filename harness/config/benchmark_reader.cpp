@@ -18,7 +18,7 @@
 namespace loopbench::harness {
 namespace {
 
-const std::vector<std::string> kFamilies = {"chain", "ladder", "grid"};
+const std::vector<std::string> kFamilies = {"chain", "ladder", "grid", "tree"};
 
 std::vector<BenchmarkMember> ReadBenchmarkMechanisms(const JsonNode& node,
                                                      const std::filesystem::path& folder,
@@ -125,7 +125,8 @@ const Fields<GroupInFile>& GroupFields() {
       {{"mechanisms", OneOrMoreSchema(TextSchema()),
         "Paths of mechanism files, relative to this file."},
        {"family", ChoiceSchema(kFamilies),
-        "Bars in a closed chain, windows in a row, storeys of as many windows."},
+        "Bars in a closed chain, windows in a row, storeys of as many windows, bars in a binary "
+        "tree."},
        {"sizes", OneOrMoreSchema(IntegerSchema(1, kLargestMember)), "Of the family's members."},
        {"", By(one_of_two, ReadMembers)},
        {"in_space", Bool(&GroupInFile::in_space),

@@ -58,6 +58,6 @@ std::string BenchmarkName(BenchmarkKind kind, const BenchmarkMember& member, con
 /// Largest member of each family the readers accept. A grid's storeys stand at angles that grow by
 /// 0.1 rad; beyond 25 the last would fold flat.
 inline constexpr int kLargestGrid = 25;
-inline constexpr int kLargestMember = 100'000;
+inline constexpr int kLargestMember = 1'000'000;
 
 }  // namespace loopbench::harness

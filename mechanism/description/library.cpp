@@ -107,6 +107,23 @@ MechanismDescription Grid(int num_storeys, int num_windows, double angle, double
   return grid;
 }
 
+MechanismDescription Tree(int num_bars, double speed) {
+  const Eigen::Vector3d origin = Eigen::Vector3d::Zero(), tip = Eigen::Vector3d::UnitX();
+  constexpr double kBend = 0.4;
+  MechanismDescription tree;
+  tree.name = "tree-" + std::to_string(num_bars);
+  tree.gravity = {0.0, -9.81, 0.0};
+  for (int i = 1; i <= num_bars; ++i) {
+    tree.bodies.push_back(Bar("bar" + std::to_string(i), 1.0, 1.0, 1.0 / 12.0));
+    tree.joints.push_back(
+        Revolute("J" + std::to_string(i), i / 2, i == 1 ? origin : tip, i, origin));
+    const double bend = i == 1 ? -0.5 * std::numbers::pi : i % 2 == 0 ? kBend : -kBend;
+    tree.initial.coordinates.push_back({i - 1, {bend}});
+    tree.initial.speeds.push_back({i - 1, {speed}});
+  }
+  return tree;
+}
+
 MechanismDescription Hub(int num_arms, int num_bars, bool closed) {
   const Eigen::Vector3d origin = Eigen::Vector3d::Zero(), tip = Eigen::Vector3d::UnitX();
   constexpr double kFirstBend = 0.3, kBend = 0.8;  // an arm is never stretched out

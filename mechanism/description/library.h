@@ -5,6 +5,7 @@
 //                 |--|--|-- .. -|           (reference A02, "N-four-bar")
 //   Grid(m, n)    m ladders of n windows, each hanging from the joints of the one above: loops that
 //                 share bodies in two directions, m degrees of freedom
+//   Tree(n)       n bars below a ground pin, two on the tip of each: no loop, log2(n) deep
 //   Hub(m, n)     a disc on a ground pin, m arms of n bars around it; arms may end on ground pins,
 //                 then each closes a loop through the disc
 #pragma once
@@ -25,6 +26,11 @@ MechanismDescription Ladder(int num_windows, double angle, double speed);
 /// `num_storeys` rows of `num_windows` parallelograms of unit bars as in Ladder. Storey r = 1, 2,
 /// .. stands at `angle` + 0.1 (r - 1) from +x and turns at r `speed` [rad/s].
 MechanismDescription Grid(int num_storeys, int num_windows, double angle, double speed);
+
+/// Unit bars as in Ladder, the first hanging from Ground, the others in pairs from the tips of
+/// those before, bent to either side by 0.4 rad and all turning at `speed` [rad/s] against what
+/// they hang from.
+MechanismDescription Tree(int num_bars, double speed);
 
 /// A disc (radius 1 m, 1 kg) pinned to Ground at its centre, with `num_arms` arms of `num_bars`
 /// bars as in Ladder on its rim, all bent alike. Open arms have 1 + arms x bars degrees of freedom,

@@ -42,6 +42,15 @@ TEST(LibraryTest, GridsHaveALoopPerWindowAndAFreedomPerStorey) {
   EXPECT_EQ(shape.freedom, 3);
 }
 
+TEST(LibraryTest, TreesHaveNoLoopAndTwoBarsOnEachTip) {
+  const MechanismDescription tree = Tree(10, 0.1);
+  const Shape shape = ShapeOf(tree);
+  EXPECT_EQ(shape.freedom, 10);
+  EXPECT_EQ(shape.loops, 0);
+  EXPECT_EQ(tree.joints[7].from.body, 4);
+  EXPECT_EQ(tree.joints[8].from.body, 4);
+}
+
 TEST(LibraryTest, HubsHaveALoopPerClosedArm) {
   const Shape open = ShapeOf(Hub(5, 2, false));
   EXPECT_EQ(open.loops, 0);

@@ -12,8 +12,6 @@ namespace {
 /// Numbers up to which dense matrices are kept ready for positions where sparse pivots leave rank
 /// in doubt: 160 MB.
 constexpr double kKeptReady = 2e7;
-/// Numbers beyond which X is not sparse.
-constexpr double kMostNumbers = 2e8;
 
 /// Whether sparse factors take less time. Multiply-adds of the dense ones are of M, W, S and S's
 /// own. Measured on chains and ladders: one in small blocks costs four to ten in
@@ -33,7 +31,7 @@ Lagrange<Space, S>::Lagrange(const Mechanism<Space, S>& mechanism,
     : mechanism_(mechanism), equations_(mechanism), change_(VectorX<S>::Zero(mechanism.num_u())) {
   if constexpr (std::is_same_v<S, double>) {
     if (options.solver == SolverKind::kRankRevealing) {
-      joints_ = JointResponse<Space>::Make(mechanism, kMostNumbers);
+      joints_ = JointResponse<Space>::Make(mechanism, kMostOfResponse);
     }
     if (joints_ != nullptr && !IsLessWork(*joints_, mechanism)) joints_ = nullptr;
   }

@@ -10,8 +10,8 @@
 #include <memory>
 
 #include "lagrange/dense_equations.h"
-#include "lagrange/joint_response.h"
 #include "mechanism/loops/body_equations.h"
+#include "mechanism/loops/joint_response.h"
 
 namespace loopbench::lagrange {
 

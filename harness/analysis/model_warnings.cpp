@@ -27,8 +27,11 @@ void AddRankWarnings(const MechanismDescription& description, const Structure& s
                      std::vector<Warning>* warnings) {
   if (!structure.analysed) {
     warnings->push_back(
-        {WarningKind::kNotAnalysed, fmt::format("rank is not analysed: {} speeds are more than {}",
-                                                structure.joint_u, kMostAnalysedSpeeds)});
+        {WarningKind::kNotAnalysed,
+         fmt::format(
+             "rank is not analysed: sparse pivots leave it in doubt, and {} speeds are more "
+             "than {}",
+             structure.joint_u, kMostAnalysedSpeeds)});
     return;
   }
   const bool driven = std::ranges::any_of(

@@ -73,7 +73,9 @@ void PrintFreedom(const Structure& s) {
   if (s.freedom_at_start() != s.freedom()) {
     Print("  {} at the start, a singular position: rank {} there\n", s.freedom_at_start(), s.rank);
   }
-  if (s.rank > 0) {
+  if (s.rank > 0 && s.singular_values.size() == 0) {
+    Print("  all constraints are independent at the start, by sparse pivots\n");
+  } else if (s.rank > 0) {
     Print("  scaled singular values at the start: {:.3g} largest, {:.3g} smallest that counts\n",
           s.singular_values[0], s.singular_values[s.rank - 1]);
   }

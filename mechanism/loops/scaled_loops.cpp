@@ -59,7 +59,7 @@ LoopSpectrum SpectrumOfLoops(const Kinematics<Space, double>& kinematics) {
   const Scaling scaling = Scale(kinematics);
   LoopSpectrum spectrum;
   if (scaling.B.size() == 0) return spectrum;
-  spectrum.singular_values = Eigen::JacobiSVD<Eigen::MatrixXd>(scaling.B).singularValues();
+  spectrum.singular_values = Eigen::BDCSVD<Eigen::MatrixXd>(scaling.B).singularValues();
   spectrum.largest = Largest(spectrum.singular_values);
   spectrum.rank = Rank(spectrum.singular_values);
   return spectrum;

@@ -6,6 +6,7 @@
 
 #include "mechanism/description/parts.h"
 #include "mechanism/loops/excursion.h"
+#include "mechanism/loops/joint_response.h"
 #include "mechanism/simplify/release_choice.h"
 #include "mechanism/start/assembly.h"
 
@@ -74,7 +75,7 @@ Redundancy Find(const MechanismDescription& description, bool conservative) {
   Redundancy result;
   const Mechanism<Space, double> driven(description, Coordinates::kJoint);
   result.cut = driven.constraints();
-  if (driven.num_rows() == 0 || driven.num_u() > kMostAnalysedSpeeds) return result;
+  if (driven.num_rows() == 0) return result;
   const Start<double> start = Assemble<Space>(description, driven);
   if (start.outcome == Outcome::kInconsistentStart) return result;
 
@@ -90,8 +91,14 @@ Redundancy Find(const MechanismDescription& description, bool conservative) {
     const Energy<double> at_first = ComputeEnergy(at_start);
     energy = at_first.kinetic + at_first.potential;
   }
-  Excursion<Space> excursion(mechanism, at_start.CoordinatesIn(mechanism));
-  result.rows = mechanism.num_rows();
+  const VectorX<double> q = at_start.CoordinatesIn(mechanism);
+  Kinematics<Space, double> undriven(mechanism);
+  undriven.UpdatePosition(q);
+  const bool independent = AreIndependent(undriven);
+  if (!independent && mechanism.num_u() > kMostAnalysedSpeeds) return result;
+  result.rows = result.rank = result.rank_at_start = mechanism.num_rows();
+  if (independent) return result;
+  Excursion<Space> excursion(mechanism, q);
   result.rank = result.rank_at_start = excursion.rank();
   if (result.rank == result.rows) return result;
 

@@ -34,7 +34,8 @@ struct Redundancy {
 };
 
 /// The sum over the parts of a description, each looked at by itself. Of parts whose start cannot
-/// be assembled, and of those above kMostAnalysedSpeeds, only `cut` is known. Prescribed motions
+/// be assembled, and of those above kMostAnalysedSpeeds unless all their constraints are
+/// independent at the start (joint_response.h), only `cut` is known. Prescribed motions
 /// are left free: what they contradict is no matter of structure.
 Redundancy FindRedundancy(const MechanismDescription& description);
 

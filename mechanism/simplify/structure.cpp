@@ -6,6 +6,7 @@
 #include "mechanism/algebra/factors.h"
 #include "mechanism/description/parts.h"
 #include "mechanism/loops/excursion.h"
+#include "mechanism/loops/joint_response.h"
 #include "mechanism/loops/scaled_loops.h"
 
 namespace loopbench {
@@ -56,7 +57,11 @@ class Analysis {
     kinematics.UpdatePosition(result_.start.q);
     for (int index : mechanism_.constraints()) result_.loops.push_back(FindLoop(index, kinematics));
     result_.analysed = result_.joint_u <= kMostAnalysedSpeeds;
-    if (!result_.analysed) return result_;
+    if (!result_.analysed) {
+      result_.analysed = AreIndependent(kinematics);
+      if (result_.analysed) result_.rank = result_.rank_nearby = result_.loop_rows;
+      return result_;
+    }
     const LoopSpectrum here = SpectrumOfLoops(kinematics);
     result_.rank = here.rank;
     result_.singular_values = here.singular_values;
@@ -155,7 +160,8 @@ class Analysis {
 }  // namespace
 
 double Structure::conditioning() const {
-  return rank > 0 ? singular_values[rank - 1] / singular_values[0] : 1.0;
+  return singular_values.size() > 0 && rank > 0 ? singular_values[rank - 1] / singular_values[0]
+                                                : 1.0;
 }
 
 Structure AnalyseStructure(const MechanismDescription& description) {

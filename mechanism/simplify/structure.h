@@ -50,7 +50,8 @@ struct Structure {
   bool analysed = false;  ///< whether what follows is known
   int rank = 0;           ///< of the cut joints' constraints at the start
   int rank_nearby = 0;    ///< at generic positions; `rank` where motions are prescribed
-  /// Singular values of the scaled loops at the start, falling.
+  /// Singular values of the scaled loops at the start, falling; none above kMostAnalysedSpeeds, where
+  /// `analysed` says that all constraints are independent.
   Eigen::VectorXd singular_values;
   /// Constraints that can be dropped together; loop_rows - rank_nearby.
   std::vector<RedundantDirection> redundant;
@@ -66,7 +67,7 @@ struct Structure {
   bool singular_start() const {
     return rank_nearby > rank || (start.outcome == Outcome::kLocked && freedom_at_start() > 0);
   }
-  /// Smallest singular value that counts, over the largest; 1 without loops.
+  /// Smallest singular value that counts, over the largest; 1 without any.
   double conditioning() const;
   /// Nothing moves, to first order or (Start::message) at all.
   bool locked() const {

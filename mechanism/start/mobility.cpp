@@ -8,6 +8,7 @@
 #include "mechanism/algebra/symmetric_eigen.h"
 #include "mechanism/description/parts.h"
 #include "mechanism/loops/excursion.h"
+#include "mechanism/loops/joint_response.h"
 #include "mechanism/loops/tree_dynamics.h"
 #include "mechanism/start/assembly.h"
 
@@ -89,15 +90,19 @@ bool IsRigidToSecondOrder(const Mechanism<Space, double>& mechanism, const Vecto
 /// Of a mechanism of one part, as the end of a sentence.
 template <class Space>
 std::string WhyStuck(const Mechanism<Space, double>& mechanism, const VectorX<double>& q) {
-  if (!mechanism.drives().empty() || mechanism.num_u() > kMostAnalysedSpeeds) return "";
+  if (!mechanism.drives().empty()) return "";
   if (mechanism.num_u() == 0) return "no joint leaves a speed free";
   if (mechanism.num_rows() == 0) return "";
+  const int n = mechanism.num_u();
+  const std::string all_taken = std::to_string(mechanism.num_rows()) + " constraints take all " +
+                                std::to_string(n) + " speeds";
+  Kinematics<Space, double> here(mechanism);
+  here.UpdatePosition(q);
+  if (AreIndependent(here)) return n > mechanism.num_rows() ? "" : all_taken;
+  if (n > kMostAnalysedSpeeds) return "";
   Excursion<Space> excursion(mechanism, q);
-  const int n = mechanism.num_u(), first_order = excursion.freedom();
-  if (first_order == 0) {
-    return std::to_string(mechanism.num_rows()) + " constraints take all " + std::to_string(n) +
-           " speeds";
-  }
+  const int first_order = excursion.freedom();
+  if (first_order == 0) return all_taken;
   if (excursion.rank() == mechanism.num_rows()) return "";
   const int rank = excursion.rank();
   int fell_back = 0;

@@ -9,9 +9,10 @@ namespace loopbench {
 
 /// Why a mechanism in joint coordinates, compiled from `description`, is locked at the position q;
 /// "" where it is not, where motions are prescribed, and above kMostAnalysedSpeeds, where nobody
-/// looks. It is when nothing can move, or when a part stands in a singular position that it cannot
-/// leave and would start along speeds that lead nowhere. A rigid part without such speeds locks
-/// nothing: it stays where it is, whatever others do.
+/// looks unless all constraints are independent (joint_response.h). It is when nothing can move, or
+/// when a part stands in a singular position that it cannot leave and would start along speeds that
+/// lead nowhere. A rigid part without such speeds locks nothing: it stays where it is, whatever
+/// others do.
 ///
 /// Constraints may take every speed. Or they leave speeds at a singular position that lead nowhere:
 /// a stretched four-bar, whose hinges in line could each start to buckle and none may. There,

@@ -42,7 +42,7 @@ void ExpectAlike(const MechanismDescription& description, Coordinates coordinate
   Kinematics<Space, double> kinematics(mechanism);
   kinematics.UpdatePosition(state.q);
   kinematics.UpdateVelocity(state.u);
-  const auto sparse = lagrange::JointResponse<Space>::Make(mechanism, kNoLimit);
+  const auto sparse = JointResponse<Space>::Make(mechanism, kNoLimit);
   ASSERT_NE(sparse, nullptr);
   lagrange::DenseEquations<Space, double> dense(mechanism, SolverKind::kRankRevealing);
   Conditioning found;

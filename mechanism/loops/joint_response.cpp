@@ -1,10 +1,10 @@
-#include "lagrange/joint_response.h"
+#include "mechanism/loops/joint_response.h"
 
 #include <algorithm>
 
 #include "mechanism/loops/loop_solver.h"
 
-namespace loopbench::lagrange {
+namespace loopbench {
 
 template <class Space>
 std::unique_ptr<JointResponse<Space>> JointResponse<Space>::Make(
@@ -80,16 +80,18 @@ JointResponse<Space>::JointResponse(std::vector<Side> sides, std::vector<int> jo
 }
 
 template <class Space>
-bool JointResponse<Space>::Factor(const Kinematics<Space, double>& kinematics) {
-  const Mechanism<Space, double>& mechanism = kinematics.mechanism();
+bool JointResponse<Space>::Factor(const Kinematics<Space, double>& kinematics, Masses masses) {
+  const std::vector<Inertia<Space, double>>& inertias = kinematics.mechanism().bodies(masses);
   for (const Side& side : sides_) {
     const JointState<Space, double>& state = kinematics.joints()[side.joint];
-    const Inertia<Space, double>& inertia = mechanism.bodies()[side.body];
+    const Inertia<Space, double>& inertia = inertias[side.body];
+    const Linear<Space, double> r =
+        side.is_Q ? kinematics.ArmQ(side.joint, masses) : kinematics.ArmP(side.joint, masses);
     const auto inverse = kinematics.RotationalInverse(inertia, side.body);
     const double per_mass = 1.0 / inertia.mass;
     for (int i = 0; i < side.rows; ++i) {
-      const Wrench<Space, double> c = side.is_Q ? ShiftForce<Space, double>(state.D(i), state.r_Q)
-                                                : -ShiftForce<Space, double>(state.D(i), state.r_P);
+      const Wrench<Space, double> at_com = ShiftForce<Space, double>(state.D(i), r);
+      const Wrench<Space, double> c = side.is_Q ? at_com : -at_com;
       c_[side.first + i] = c;
       Mc_[side.first + i] = {inverse * c.angular, c.linear * per_mass};
     }
@@ -131,7 +133,15 @@ void JointResponse<Space>::Solve(std::span<const Acceleration<Space, double>> b,
   }
 }
 
+template <class Space>
+bool AreIndependent(const Kinematics<Space, double>& kinematics) {
+  const auto response = JointResponse<Space>::Make(kinematics.mechanism(), kMostOfResponse);
+  return response != nullptr && response->Factor(kinematics, Masses::kGeometric);
+}
+
 template class JointResponse<Planar>;
 template class JointResponse<Spatial>;
+template bool AreIndependent(const Kinematics<Planar, double>&);
+template bool AreIndependent(const Kinematics<Spatial, double>&);
 
-}  // namespace loopbench::lagrange
+}  // namespace loopbench

@@ -19,7 +19,10 @@
 #include "mechanism/algebra/block_cholesky.h"
 #include "mechanism/model/kinematics.h"
 
-namespace loopbench::lagrange {
+namespace loopbench {
+
+/// Numbers beyond which X is not sparse: 1.6 GB.
+inline constexpr double kMostOfResponse = 2e8;
 
 template <class Space>
 class JointResponse {
@@ -28,8 +31,8 @@ class JointResponse {
   static std::unique_ptr<JointResponse> Make(const Mechanism<Space, double>& mechanism,
                                              double most);
 
-  /// False where rank is in doubt.
-  bool Factor(const Kinematics<Space, double>& kinematics);
+  /// False where rank is in doubt. Equations are solved with physical masses.
+  bool Factor(const Kinematics<Space, double>& kinematics, Masses masses = Masses::kPhysical);
   /// A of all bodies, and phi().
   void Solve(std::span<const Acceleration<Space, double>> b,
              std::span<const Components<Space, double>> c0,
@@ -72,4 +75,9 @@ class JointResponse {
   int worst_joint_ = -1;
 };
 
-}  // namespace loopbench::lagrange
+/// Whether pivots leave no doubt that all constraints are independent at this position, by geometry
+/// alone; false says nothing.
+template <class Space>
+bool AreIndependent(const Kinematics<Space, double>& kinematics);
+
+}  // namespace loopbench

@@ -50,8 +50,8 @@ struct Structure {
   bool analysed = false;  ///< whether what follows is known
   int rank = 0;           ///< of the cut joints' constraints at the start
   int rank_nearby = 0;    ///< at generic positions; `rank` where motions are prescribed
-  /// Singular values of the scaled loops at the start, falling; none above kMostAnalysedSpeeds, where
-  /// `analysed` says that all constraints are independent.
+  /// Singular values of the scaled loops at the start, falling; none above kMostAnalysedSpeeds,
+  /// where `analysed` says that all constraints are independent.
   Eigen::VectorXd singular_values;
   /// Constraints that can be dropped together; loop_rows - rank_nearby.
   std::vector<RedundantDirection> redundant;

@@ -9,6 +9,12 @@
 
 namespace loopbench::odca {
 
+namespace {
+
+constexpr int kUsualBodies = 8;  ///< of an assembly whose mass needs no mention
+
+}  // namespace
+
 template <class Space, class S>
 Joins<Space, S>::Joins(const Mechanism<Space, S>& mechanism, const Plan& plan, SolverKind solver)
     : mechanism_(mechanism), plan_(plan), solver_(solver), places_(plan.num_nodes()) {
@@ -29,6 +35,8 @@ Joins<Space, S>::Joins(const Mechanism<Space, S>& mechanism, const Plan& plan, S
       for (int child : node.children) {
         if (child >= 0 && child < plan.num_leaves()) joined[child] = true;
       }
+      place.bodies = 0;
+      for (int child : node.children) place.bodies += child >= 0 ? places_[child].bodies : 0;
       place.kept = static_cast<int>(node.kept.size());
       y += node.rows * static_cast<int>(node.handles.size());
       x += node.rows * node.rows;
@@ -233,7 +241,10 @@ bool Joins<Space, S>::FactorLoop(const Kinematics<Space, S>& kinematics, const P
     }
   }
   if (pass == Pass::kPhysical) {
-    const bool ok = loop.FactorScaled(X);
+    // An assembly of many bodies answers like one of its mass, whatever its position: its pivots
+    // are that much smaller. The last 1e-6 is what geometry would still not soften (kTheta).
+    const S limit = S(LoopSolver<S>::kSuspicious) * S(kUsualBodies) / S(place.bodies);
+    const bool ok = loop.FactorScaled(X) || loop.rcond() >= std::max(limit, S(1e-6));
     NoteDiagnostics(node, loop);
     return ok;
   }

@@ -98,6 +98,7 @@ class Joins {
     int kept = 1;
     int row = 0;
     int loop = -1;  ///< index of the loop solver
+    int bodies = 1;
   };
   enum class Pass { kPhysical, kGeometric, kSoftened };
 

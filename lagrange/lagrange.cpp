@@ -56,11 +56,24 @@ Outcome Lagrange<Space, S>::Factor(const Kinematics<Space, S>& kinematics) {
                              .smallest_weight = 1.0,
                              .worst_joint = joints_->worst_joint()};
       if (is_sparse_) return Outcome::kFinished;
-      if (dense_ == nullptr) return Outcome::kSingular;
+      if (dense_ == nullptr) {
+        return joints_->IsFinite() ? Outcome::kSingular : Outcome::kNonFinite;
+      }
       this->conditioning_.worst_joint = -1;
     }
   }
   return dense_->Factor(kinematics, this->conditioning_);
+}
+
+template <class Space, class S>
+std::string Lagrange<Space, S>::WhySingular() const {
+  if (dense_ != nullptr) return {};
+  const int joint = this->conditioning_.worst_joint;
+  return "rank is in doubt" +
+         (joint < 0 ? std::string() : " at joint \"" + mechanism_.joint_names()[joint] + '"') +
+         ", and the dense equations that would decide it are too large: " +
+         std::to_string(mechanism_.num_rows()) + " constraints and " +
+         std::to_string(mechanism_.num_u()) + " speeds";
 }
 
 template <class Space, class S>

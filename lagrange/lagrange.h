@@ -28,6 +28,8 @@ class Lagrange final : public ConstraintSolver<Space, S> {
                   VectorX<S>& udot, VectorX<S>* lambda) override;
   bool CompleteSpeeds(Kinematics<Space, S>& kinematics, VectorX<S>& u) override;
 
+  std::string WhySingular() const override;
+
   /// Whether the last Factor() was sparse.
   bool is_sparse() const { return is_sparse_; }
 

@@ -118,9 +118,13 @@ class Runner {
       }
       return restart ? StepAction::kRestart : StepAction::kContinue;
     };
-    const IntegratorResult run = harness::Integrate(
-        *formulation, 0.0, case_.horizon, y_, OptionsOf(case_, mechanism_.stop_times()), observe);
+    IntegratorResult run = harness::Integrate(*formulation, 0.0, case_.horizon, y_,
+                                              OptionsOf(case_, mechanism_.stop_times()), observe);
     y_.resize(n);
+    if (run.outcome == Outcome::kSingular) {
+      const std::string why = formulation->solver().WhySingular();
+      if (!why.empty()) run.message += ": " + why;
+    }
     if (with_series_ && run.outcome == Outcome::kFinished &&
         formulation->Examine(run.t_reached, y_, ydot) == Outcome::kFinished) {
       WriteFinalPoses(user_, compiled_, part_, formulation->kinematics(), final_poses_);

@@ -19,6 +19,7 @@
 
 #include <cstdint>
 #include <span>
+#include <string>
 #include <string_view>
 #include <vector>
 
@@ -89,6 +90,9 @@ class ConstraintSolver {
   /// At accepted steps, the only other place where the mode may change. True when it did: factors
   /// are made anew then, and the state may carry other speeds.
   virtual bool Review(const Kinematics<Space, S>& kinematics);
+
+  /// More of a Factor() that ended as kSingular, for messages; "", as here, where there is no more.
+  virtual std::string WhySingular() const { return {}; }
 
   /// What the solver counts beside; since Factor() where it counts work.
   virtual std::vector<NamedCount> Counters() const { return {}; }

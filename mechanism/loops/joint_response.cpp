@@ -114,6 +114,13 @@ bool JointResponse<Space>::Factor(const Kinematics<Space, double>& kinematics, M
 }
 
 template <class Space>
+bool JointResponse<Space>::IsFinite() const {
+  double zeros = 0.0;  // or not a number
+  for (std::size_t i = 0; i < c_.size(); ++i) zeros += 0.0 * c_[i].dot(Mc_[i]);
+  return zeros == 0.0;
+}
+
+template <class Space>
 void JointResponse<Space>::Solve(std::span<const Acceleration<Space, double>> b,
                                  std::span<const Components<Space, double>> c0,
                                  std::span<Acceleration<Space, double>> A) {

@@ -31,7 +31,8 @@ class JointResponse {
   static std::unique_ptr<JointResponse> Make(const Mechanism<Space, double>& mechanism,
                                              double most);
 
-  /// False where rank is in doubt. Equations are solved with physical masses.
+  /// False where rank is in doubt, or a number is not finite. Equations are solved with physical
+  /// masses.
   bool Factor(const Kinematics<Space, double>& kinematics, Masses masses = Masses::kPhysical);
   /// A of all bodies, and phi().
   void Solve(std::span<const Acceleration<Space, double>> b,
@@ -42,6 +43,8 @@ class JointResponse {
   /// The least pivot of the last Factor(), and its joint, -1 where all are 1.
   double rcond() const { return rcond_; }
   int worst_joint() const { return worst_joint_; }
+  /// Whether all numbers that X is made of were finite.
+  bool IsFinite() const;
   /// Multiply-adds of factors and one solution.
   double operations() const { return X_.operations(); }
 

@@ -159,6 +159,10 @@ TEST(Lagrange, IsSingularWhereDenseEquationsWouldBeTooLarge) {
   Sparse system(mechanism);
   EXPECT_EQ(Evaluate(system, mechanism, 1.0), Outcome::kFinished);
   EXPECT_EQ(Evaluate(system, mechanism, 0.0), Outcome::kSingular);
+  EXPECT_NE(system.solver().WhySingular().find("rank is in doubt at joint \"T"), std::string::npos)
+      << system.solver().WhySingular();
+  EXPECT_EQ(Evaluate(system, mechanism, std::numeric_limits<double>::quiet_NaN()),
+            Outcome::kNonFinite);
   EXPECT_EQ(Evaluate(system, mechanism, 1.0), Outcome::kFinished);
 }
 

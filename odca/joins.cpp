@@ -9,12 +9,6 @@
 
 namespace loopbench::odca {
 
-namespace {
-
-constexpr int kUsualBodies = 8;  ///< of an assembly whose mass needs no mention
-
-}  // namespace
-
 template <class Space, class S>
 Joins<Space, S>::Joins(const Mechanism<Space, S>& mechanism, const Plan& plan, SolverKind solver)
     : mechanism_(mechanism), plan_(plan), solver_(solver), places_(plan.num_nodes()) {
@@ -241,10 +235,8 @@ bool Joins<Space, S>::FactorLoop(const Kinematics<Space, S>& kinematics, const P
     }
   }
   if (pass == Pass::kPhysical) {
-    // An assembly of many bodies answers like one of its mass, whatever its position: its pivots
-    // are that much smaller. The last 1e-6 is what geometry would still not soften (kTheta).
-    const S limit = S(LoopSolver<S>::kSuspicious) * S(kUsualBodies) / S(place.bodies);
-    const bool ok = loop.FactorScaled(X) || loop.rcond() >= std::max(limit, S(1e-6));
+    const S limit = S(LoopSolver<S>::kSuspicious * ShareOfLimit(place.bodies));
+    const bool ok = loop.FactorScaled(X) || loop.rcond() >= limit;
     NoteDiagnostics(node, loop);
     return ok;
   }

@@ -3,6 +3,7 @@
 #include <map>
 #include <string>
 
+#include "mechanism/loops/loop_solver.h"
 #include "odca/odca.h"
 #include "odca/path_sweep.h"
 
@@ -43,8 +44,7 @@ int LengthOfLanes(const std::vector<Closure<double>>& closures) {
 }
 
 /// Sets limits in the order of joins (PathSweep::Up): a join closes a loop where both its sides are
-/// pinned to Ground. Two sides of many bodies answer like one of their mass, which is no sign of a
-/// degenerate position: limits shrink with their number.
+/// pinned to Ground. The lighter of two sides is what answers.
 void SetLimits(const Mechanism<Planar, double>& mechanism, int packs, PathLinks& path) {
   struct Side {
     int bodies = 0;
@@ -54,12 +54,11 @@ void SetLimits(const Mechanism<Planar, double>& mechanism, int packs, PathLinks&
       pinned = pinned || other.pinned;
     }
   };
-  const auto share = [](const Side& side) { return 8.0 / std::max(1, side.bodies); };
   const auto body = [&](int k) { return Side{1, path.closures[k].follows == 0.0}; };
   const auto join = [&](int k, Side& left, const Side& right) {
     if (left.pinned && right.pinned) {
-      path.links[k].limit =
-          std::min(1.0, share(left) + share(right)) * LimitOf(mechanism, path.path[k].before);
+      path.links[k].limit = ShareOfLimit(std::min(left.bodies, right.bodies)) *
+                            LimitOf(mechanism, path.path[k].before);
     }
     left += right;
   };
@@ -71,7 +70,7 @@ void SetLimits(const Mechanism<Planar, double>& mechanism, int packs, PathLinks&
     join(start, all, lane);
   }
   for (int k = packed; k < static_cast<int>(path.links.size()); ++k) join(k, all, body(k));
-  path.end_limit *= std::min(1.0, share(all));
+  path.end_limit *= ShareOfLimit(all.bodies);
 }
 
 }  // namespace

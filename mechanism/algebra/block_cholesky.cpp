@@ -136,24 +136,14 @@ double* BlockCholesky::OffDiagonal(int i, int j) {
   return row != last && row->column == std::max(order_[i], order_[j]) ? &L_[row->number] : nullptr;
 }
 
-/// kRows: rows of every block, 0 where they differ. Diagonals of L hold their reciprocals.
+// kRows below: rows of every block, 0 where they differ. Diagonals of L hold their reciprocals.
+
+/// A_ij -= L_ik L_jk^T for all columns k to the left that have a row in j.
 template <int kRows>
-bool BlockCholesky::FactorColumn(int j) {
+void BlockCholesky::Eliminate(int j) {
   const Column& column = columns_[j];
   const int n = kRows > 0 ? kRows : column.rows;
-  double* diagonal = &L_[column.first_number];
   const Below *first = below_.data() + column.first_row, *end = first + column.num_rows;
-  // pivots of the diagonal block alone
-  std::array<double, kMostRows * kMostRows> alone;
-  std::array<double, kMostRows> before;
-  for (int c = 0; c < n; ++c) {
-    for (int a = c; a < n; ++a) {
-      double sum = diagonal[a * n + c];
-      for (int d = 0; d < c; ++d) sum -= alone[a * n + d] * alone[c * n + d] * before[d];
-      if (a == c) before[c] = sum;
-      alone[a * n + c] = a == c ? 1.0 : sum / before[c];
-    }
-  }
   number_of_[j] = column.first_number;
   for (const Below* row = first; row != end; ++row) number_of_[row->column] = row->number;
   for (int l = column.first_left; l < column.first_left + column.num_left; ++l) {
@@ -175,6 +165,33 @@ bool BlockCholesky::FactorColumn(int j) {
       }
     }
   }
+}
+
+namespace {
+
+/// The pivots of a diagonal block alone: of its factors L D L^T.
+void PivotsOf(const double* block, int n, std::array<double, kMostRows>& pivots) {
+  std::array<double, kMostRows * kMostRows> L;
+  for (int c = 0; c < n; ++c) {
+    for (int a = c; a < n; ++a) {
+      double sum = block[a * n + c];
+      for (int d = 0; d < c; ++d) sum -= L[a * n + d] * L[c * n + d] * pivots[d];
+      if (a == c) pivots[c] = sum;
+      L[a * n + c] = a == c ? 1.0 : sum / pivots[c];
+    }
+  }
+}
+
+}  // namespace
+
+template <int kRows>
+bool BlockCholesky::FactorColumn(int j) {
+  const Column& column = columns_[j];
+  const int n = kRows > 0 ? kRows : column.rows;
+  double* diagonal = &L_[column.first_number];
+  std::array<double, kMostRows> before;
+  PivotsOf(diagonal, n, before);
+  Eliminate<kRows>(j);
   double least = 1.0;
   for (int c = 0; c < n; ++c) {
     for (int a = c; a < n; ++a) {
@@ -184,13 +201,17 @@ bool BlockCholesky::FactorColumn(int j) {
         diagonal[a * n + c] = sum * diagonal[c * n + c];
         continue;
       }
-      if (!(sum > 0.0)) return false;
+      if (!(sum > 0.0)) {
+        ratios_[j] = 0.0;
+        return false;
+      }
       least = std::min(least, sum / before[c]);
       diagonal[c * n + c] = 1.0 / std::sqrt(sum);
     }
   }
   ratios_[j] = least;
-  for (const Below* row = first; row != end; ++row) {
+  const Below* row = below_.data() + column.first_row;
+  for (const Below* end = row + column.num_rows; row != end; ++row) {
     const int h = kRows > 0 ? kRows : columns_[row->column].rows;
     double* block = &L_[row->number];
     for (int a = 0; a < h; ++a) {
@@ -220,19 +241,12 @@ auto WithRows(int rows, const Call& call) {
 bool BlockCholesky::Factor() {
   return WithRows(uniform_, [&]<int kRows>() {
     for (int j = 0; j < static_cast<int>(columns_.size()); ++j) {
-      if (!FactorColumn<kRows>(j)) return false;
+      if (FactorColumn<kRows>(j)) continue;
+      std::fill(ratios_.begin() + j + 1, ratios_.end(), 1.0);
+      return false;
     }
     return true;
   });
-}
-
-std::pair<double, int> BlockCholesky::SmallestRatio(int usual) const {
-  std::pair<double, int> smallest = {1.0, -1};
-  for (std::size_t j = 0; j < columns_.size(); ++j) {
-    const double more = std::max(1.0, static_cast<double>(columns_[j].eliminated) / usual);
-    if (ratios_[j] * more < smallest.first) smallest = {ratios_[j] * more, columns_[j].block};
-  }
-  return smallest;
 }
 
 /// L y = x down the columns, L^T x = y back.

@@ -2,11 +2,11 @@
 //
 //   P A P^T = L L^T
 //
-// P orders whole blocks, once. Factors of any values then
-// cost no memory and no search: column by column from the left, each from the columns before it
-// that have a block in its row (A. George, J. W. Liu, Computer Solution of Large Sparse Positive
-// Definite Systems, 1981, section 5.3). Eigen's own sparse factors allocate whenever values change,
-// and see numbers where there are blocks.
+// P orders whole blocks, once. Factors of any values then cost no memory and no search: column by
+// column from the left, each from the columns before it that have a block in its row (A. George,
+// J. W. Liu, Computer Solution of Large Sparse Positive Definite Systems, 1981, section 5.3).
+// Eigen's own sparse factors allocate whenever values change, and see numbers where there are
+// blocks.
 #pragma once
 
 #include <span>
@@ -37,10 +37,11 @@ class BlockCholesky {
   /// x := A^-1 x, in place, block after block as given.
   void Solve(double* x) const;
 
-  /// The least pivot over what it was before other blocks were eliminated, and its block; where
-  /// more than `usual` blocks were eliminated into it, as many times larger. {1, -1} if none is
-  /// below 1.
-  std::pair<double, int> SmallestRatio(int usual) const;
+  /// Of the last Factor(): a block's least pivot over what it was before other blocks were
+  /// eliminated. 0 where that failed, 1 for blocks that it did not come to.
+  double ratio(int block) const { return ratios_[order_[block]]; }
+  /// Blocks of the elimination tree down from this one, itself included.
+  int eliminated(int block) const { return columns_[order_[block]].eliminated; }
 
   int rows(int block) const { return columns_[order_[block]].rows; }
   int size() const { return size_; }
@@ -66,6 +67,8 @@ class BlockCholesky {
     int column = 0;
     int number = 0;  ///< in L_
   };
+  template <int kRows>
+  void Eliminate(int j);
   template <int kRows>
   bool FactorColumn(int j);
   template <int kRows>

@@ -10,7 +10,7 @@ template <class Space>
 std::unique_ptr<JointResponse<Space>> JointResponse<Space>::Make(
     const Mechanism<Space, double>& mechanism, double most) {
   std::vector<Side> sides;
-  std::vector<int> joints, rows;
+  std::vector<int> rows, joints;
   std::vector<std::vector<int>> sides_of_body(mechanism.num_bodies());
   int first = 0, row = 0;
   for (int j = 0; j < static_cast<int>(mechanism.joints().size()); ++j) {
@@ -21,7 +21,7 @@ std::unique_ptr<JointResponse<Space>> JointResponse<Space>::Make(
       const int body = is_Q ? joint.to : joint.from;
       if (body == kGround) continue;
       sides_of_body[body].push_back(static_cast<int>(sides.size()));
-      sides.push_back({j, body, n, is_Q, first, row});
+      sides.push_back({j, static_cast<int>(rows.size()), body, n, is_Q, first, row});
       first += n;
     }
     joints.push_back(j);
@@ -35,13 +35,11 @@ std::unique_ptr<JointResponse<Space>> JointResponse<Space>::Make(
     numbers += count * count;
   }
   if (numbers > most) return nullptr;
-  std::vector<int> block_of(mechanism.joints().size(), -1);
-  for (std::size_t k = 0; k < joints.size(); ++k) block_of[joints[k]] = static_cast<int>(k);
   std::vector<std::pair<int, int>> pairs;
   for (const std::vector<int>& on_body : sides_of_body) {
     for (std::size_t a = 0; a < on_body.size(); ++a) {
       for (std::size_t b = 0; b < a; ++b) {
-        pairs.emplace_back(block_of[sides[on_body[a]].joint], block_of[sides[on_body[b]].joint]);
+        pairs.emplace_back(sides[on_body[a]].block, sides[on_body[b]].block);
       }
     }
   }
@@ -65,13 +63,14 @@ JointResponse<Space>::JointResponse(std::vector<Side> sides, std::vector<int> jo
   for (const Side& side : sides_) rows += side.rows;
   c_.assign(rows, Wrench<Space, double>::Zero());
   Mc_.assign(rows, Acceleration<Space, double>::Zero());
-  std::vector<int> block_of(phi_.size(), -1);
-  for (std::size_t k = 0; k < joints_.size(); ++k) block_of[joints_[k]] = static_cast<int>(k);
+  for (int block = 0; block < static_cast<int>(joints_.size()); ++block) {
+    inverse_shares_.push_back(1.0 / ShareOfLimit(X_.eliminated(block)));
+  }
   for (const std::vector<int>& on_body : sides_of_body) {
     for (std::size_t a = 0; a < on_body.size(); ++a) {
       for (std::size_t b = 0; b <= a; ++b) {
         int first = on_body[a], second = on_body[b];
-        const int i = block_of[sides_[first].joint], j = block_of[sides_[second].joint];
+        const int i = sides_[first].block, j = sides_[second].block;
         if (i != j && X_.FirstOf(i, j) == j) std::swap(first, second);
         pairs_.push_back({first, second, i == j ? X_.Diagonal(i) : X_.OffDiagonal(i, j)});
       }
@@ -106,11 +105,18 @@ bool JointResponse<Space>::Factor(const Kinematics<Space, double>& kinematics, M
       }
     }
   }
-  const bool positive = X_.Factor();
-  const auto [ratio, block] = X_.SmallestRatio(kUsual);
-  rcond_ = positive ? ratio : 0.0;
-  worst_joint_ = block < 0 ? -1 : joints_[block];
-  return rcond_ >= LoopSolver<double>::kSuspicious;
+  const bool is_positive = X_.Factor();
+  rcond_ = 1.0;
+  worst_joint_ = -1;
+  double worst = 1.0;
+  for (int block = 0; block < static_cast<int>(joints_.size()); ++block) {
+    const double ratio = X_.ratio(block), of_limit = ratio * inverse_shares_[block];
+    rcond_ = std::min(rcond_, ratio);
+    if (of_limit >= worst) continue;
+    worst = of_limit;
+    worst_joint_ = joints_[block];
+  }
+  return is_positive && worst >= LoopSolver<double>::kSuspicious;
 }
 
 template <class Space>

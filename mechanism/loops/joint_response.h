@@ -8,8 +8,7 @@
 //
 // Rank is not decided here. Pivots are those of K^-1 X K^-T, where K K^T is the free response of
 // each joint (loop_solver.h), so they say the same as there: below kSuspicious the loops may have
-// lost rank, and others have to look. Where a joint closes an assembly of more than kUsual joints,
-// the limit shrinks with their number: such an assembly answers like one of its mass.
+// lost rank, and others have to look. The limit is ShareOfLimit() of that.
 #pragma once
 
 #include <memory>
@@ -40,7 +39,7 @@ class JointResponse {
              std::span<Acceleration<Space, double>> A);
 
   std::span<const Components<Space, double>> phi() const { return phi_; }
-  /// The least pivot of the last Factor(), and its joint, -1 where all are 1.
+  /// The least pivot of the last Factor(), and the joint nearest to its limit, -1 where all are 1.
   double rcond() const { return rcond_; }
   int worst_joint() const { return worst_joint_; }
   /// Whether all numbers that X is made of were finite.
@@ -51,7 +50,7 @@ class JointResponse {
  private:
   /// A joint's rows on one of its bodies.
   struct Side {
-    int joint = 0, body = 0, rows = 0;
+    int joint = 0, block = 0, body = 0, rows = 0;
     bool is_Q = false;
     int first = 0;  ///< in c_ and Mc_
     int row = 0;    ///< in x_
@@ -61,13 +60,13 @@ class JointResponse {
     int first = 0, second = 0;  ///< sides: its rows, its columns
     double* block = nullptr;
   };
-  static constexpr int kUsual = 8;
 
   JointResponse(std::vector<Side> sides, std::vector<int> joints, BlockCholesky X, int all_joints,
                 const std::vector<std::vector<int>>& sides_of_body);
 
   std::vector<Side> sides_;
-  std::vector<int> joints_;  ///< with constrained directions, in the order of blocks
+  std::vector<int> joints_;             ///< with constrained directions, in the order of blocks
+  std::vector<double> inverse_shares_;  ///< of the limit (ShareOfLimit()), by block
   BlockCholesky X_;
   std::vector<Pair> pairs_;
   std::vector<Wrench<Space, double>> c_;

@@ -35,6 +35,7 @@
 // So rank depends on geometry alone, while stiffness stays physical.
 #pragma once
 
+#include <algorithm>
 #include <memory>
 #include <span>
 #include <vector>
@@ -43,6 +44,11 @@
 #include "mechanism/algebra/space.h"
 
 namespace loopbench {
+
+/// The share of the usual limit on pivots that holds where a joint closes an assembly of so many
+/// bodies. More than eight answer like one of their mass, whatever their position, and their pivots
+/// are that much smaller. Below a thousandth of kSuspicious geometry would soften (kTheta).
+constexpr double ShareOfLimit(int bodies) { return std::clamp(8.0 / bodies, 1e-3, 1.0); }
 
 /// Room for intermediate matrices; many solvers may share one, not at the same time.
 template <class S>

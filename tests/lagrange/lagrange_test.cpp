@@ -159,7 +159,7 @@ TEST(Lagrange, IsSingularWhereDenseEquationsWouldBeTooLarge) {
   Sparse system(mechanism);
   EXPECT_EQ(Evaluate(system, mechanism, 1.0), Outcome::kFinished);
   EXPECT_EQ(Evaluate(system, mechanism, 0.0), Outcome::kSingular);
-  EXPECT_NE(system.solver().WhySingular().find("rank is in doubt at joint \"T"), std::string::npos)
+  EXPECT_NE(system.solver().WhySingular().find("rank is in doubt at joint \""), std::string::npos)
       << system.solver().WhySingular();
   EXPECT_EQ(Evaluate(system, mechanism, std::numeric_limits<double>::quiet_NaN()),
             Outcome::kNonFinite);

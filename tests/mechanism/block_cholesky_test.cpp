@@ -162,20 +162,21 @@ TEST(BlockCholeskyTest, TellsWhatPivotsHaveLost) {
     *factors.OffDiagonal(0, 1) = 1.0;
     *factors.Diagonal(1) = 0.5 + e;
     ASSERT_TRUE(factors.Factor());
-    const auto [ratio, block] = factors.SmallestRatio(8);
-    EXPECT_NEAR(ratio, e / (0.5 + e), 4 * kEps);
-    EXPECT_TRUE(block == 0 || block == 1);
-    EXPECT_NEAR(factors.SmallestRatio(1).first, 2.0 * ratio, 8 * kEps) << "two blocks are in it";
+    EXPECT_NEAR(std::min(factors.ratio(0), factors.ratio(1)), e / (0.5 + e), 4 * kEps);
+    EXPECT_EQ(std::max(factors.ratio(0), factors.ratio(1)), 1.0);
+    EXPECT_EQ(factors.eliminated(0) + factors.eliminated(1), 3) << "one alone, then both";
   }
   BlockCholesky factors({1, 1}, pair, kNoLimit);
   factors.SetZero();
   *factors.Diagonal(0) = *factors.Diagonal(1) = 1.0;
   EXPECT_TRUE(factors.Factor());
-  EXPECT_EQ(factors.SmallestRatio(8), (std::pair<double, int>(1.0, -1)));
+  EXPECT_EQ(factors.ratio(0), 1.0) << "nothing is left of the factors before";
+  EXPECT_EQ(factors.ratio(1), 1.0);
   factors.SetZero();
   *factors.Diagonal(0) = *factors.Diagonal(1) = 1.0;
   *factors.OffDiagonal(0, 1) = 2.0;
   EXPECT_FALSE(factors.Factor());
+  EXPECT_EQ(std::min(factors.ratio(0), factors.ratio(1)), 0.0);
 }
 
 }  // namespace

@@ -47,7 +47,9 @@ Odca<Space, S>::Odca(const Mechanism<Space, S>& mechanism, const FormulationOpti
       equations_(mechanism),
       change_(VectorX<S>::Zero(mechanism.num_u())) {
   if constexpr (std::is_same_v<Space, Planar> && std::is_same_v<S, double>) {
-    if (options.solver == SolverKind::kRankRevealing) paths_ = pins::PathSweep::Make(mechanism);
+    if (options.solver == SolverKind::kRankRevealing) {
+      paths_ = pins::PathSweep::Make(mechanism, options.threads);
+    }
   }
 }
 

@@ -8,31 +8,26 @@ namespace {
 
 constexpr Vector2<double> kNone = {0.0, 0.0};
 
-}  // namespace
-
-/// Along a run the parent's values are at hand: to read them back from memory takes twice as long
-/// as all the rest.
-void PathSweep::SetAngles(const double* q, const double* u) {
-  double *angles = angle_.data(), *speeds = speed_.data();
-  const Step* step = steps_.data();
-  for (const int length : runs_) {
-    double angle = angles[step->parent], speed = speeds[step->parent];
-    for (const Step* end = step + length; step != end; ++step) {
-      angle += step->offset + step->sign * q[step->u];
-      speed += step->sign * u[step->u];
-      angles[step->child] = angle;
-      speeds[step->child] = speed;
-    }
-  }
+/// range(first, size) over parts of `size` numbers.
+template <class Range>
+void ForRanges(WorkerPool& pool, std::size_t size, const Range& range) {
+  constexpr std::size_t kPart = 4096;
+  pool.ForEach(static_cast<int>((size + kPart - 1) / kPart), [&](int i) {
+    const std::size_t first = static_cast<std::size_t>(i) * kPart;
+    range(first, std::min(kPart, size - first));
+  });
 }
 
+}  // namespace
+
 template <bool kLoops>
-Point<Lanes> PathSweep::TurnPacks(const PathPlaces& path) {
+void PathSweep::TurnPacks(Group& group) {
+  const PathPlaces& path = paths_[group.path];
   Point<Lanes> at_2 = {};
   Lanes room = Lanes{} + kLargestAngle;
   Lanes speed_before = {}, inverse_before = {};
   for (int i = 0; i < path.packs; ++i) {
-    const int pack = path.first_pack + i, place = path.first + i * kLanes;
+    const int pack = group.pack + i, place = group.place + i * kLanes;
     const Link<Lanes>& link = pack_kinds_[kind_of_pack_[pack]];
     const Lanes speed = Load<Lanes>(&speed_[place]);
     const Lanes angle = Load<Lanes>(&angle_[place]);
@@ -59,8 +54,8 @@ Point<Lanes> PathSweep::TurnPacks(const PathPlaces& path) {
     }
     turned_packs_[pack] = at;
   }
-  room_ = Min(room_, Smallest(room));
-  return at_2;
+  group.room = Smallest(room);
+  group.ends = at_2;
 }
 
 /// What a body's constants and numbers are, wherever it stands.
@@ -75,14 +70,14 @@ PathSweep::At PathSweep::Body(const PathPlaces& path, int k) const {
     const int single = path.first_single + k - path.packed();
     return {singles_[single], turned_singles_[single], speed};
   }
-  const int pack = path.first_pack + k % path.packs, lane = k / path.packs;
+  const int pack = path.first_pack + path.pack(k), lane = path.lane(k);
   return {LaneOf(pack_kinds_[kind_of_pack_[pack]], lane), LaneOf(turned_packs_[pack], lane), speed};
 }
 void PathSweep::Set(const PathPlaces& path, int k, const TurnedLink<double>& turned) {
   if (k >= path.packed()) {
     turned_singles_[path.first_single + k - path.packed()] = turned;
   } else {
-    SetLane(turned_packs_[path.first_pack + k % path.packs], k / path.packs, turned);
+    SetLane(turned_packs_[path.first_pack + path.pack(k)], path.lane(k), turned);
   }
 }
 
@@ -108,15 +103,18 @@ void PathSweep::Close(PathPlaces& path, int k, bool here, const Point<double>& g
   Set(path, k, at.turned);
 }
 
-void PathSweep::Turn(PathPlaces& path) {
-  const Point<Lanes> ends = path.loops_in_lanes ? TurnPacks<true>(path) : TurnPacks<false>(path);
+bool PathSweep::TurnSingles(const PathPlaces& path) {
+  double room = kLargestAngle;
   for (int k = path.packed(); k < path.bodies; ++k) {
     const int single = path.first_single + k - path.packed();
     const double angle = angle_[path.place(k)];
-    room_ = Min(room_, kLargestAngle - Magnitude(angle));
+    room = Min(room, kLargestAngle - Magnitude(angle));
     turned_singles_[single] = pins::Turn(singles_[single], angle);
   }
-  if (!path.has_loops) return;
+  return room >= 0.0;
+}
+
+void PathSweep::CloseLoops(PathPlaces& path) {
   Point<double> at_2 = {};
   const auto start = [&](int k, const Closure<double>& closure) {
     if (closure.follows > 0.0) return at_2;
@@ -125,10 +123,11 @@ void PathSweep::Turn(PathPlaces& path) {
     if (IsCut(closure)) Close(path, k, closure.cut_here > 0.0, at_2 - at_pin);
     return at_pin;
   };
-  for (int lane = 0; lane < path.lanes(); ++lane) {
-    const Point<double> at_1 = start(lane * path.packs, path.starts[lane]);
-    at_2 = LaneOf(ends, lane);
-    if (!path.loops_in_lanes || !path.stands_alone[lane]) at_2 = at_2 + at_1;
+  for (int i = 0; i < path.pieces(); ++i) {
+    const Piece& piece = pieces_[path.first_piece + i];
+    const Point<double> at_1 = start(i * path.packs, piece.start);
+    at_2 = LaneOf(groups_[path.first_group + i / kLanes].ends, i % kLanes);
+    if (!piece.stands_alone) at_2 = at_2 + at_1;
   }
   for (int k = path.packed(); k < path.bodies; ++k) {
     const int single = path.first_single + k - path.packed();
@@ -144,6 +143,43 @@ void PathSweep::Turn(PathPlaces& path) {
   }
 }
 
+bool PathSweep::Turn() {
+  pool_->ForEach(static_cast<int>(groups_.size()), [&](int i) {
+    if (paths_[groups_[i].path].loops_in_lanes) {
+      TurnPacks<true>(groups_[i]);
+    } else {
+      TurnPacks<false>(groups_[i]);
+    }
+  });
+  for (const Group& group : groups_) {
+    if (!(group.room >= 0.0)) return false;
+  }
+  for (PathPlaces& path : paths_) {
+    if (!TurnSingles(path)) return false;
+    if (path.has_loops) CloseLoops(path);
+  }
+  return true;
+}
+
+template <Pass kPass>
+void PathSweep::UpGroup(Group& group) {
+  const int packs = paths_[group.path].packs;
+  const auto leaf = [&](int i) {
+    const int pack = group.pack + i;
+    return Leaf<kPass>(pack_kinds_[kind_of_pack_[pack]], turned_packs_[pack],
+                       Load<Lanes>(&speed_[group.place + i * kLanes]));
+  };
+  Lanes slack = {};
+  TwoHandle<Lanes> all = leaf(0);
+  for (int i = 1; i < packs; ++i) {
+    const int pack = group.pack + i;
+    const Lanes limit = pack_kinds_[kind_of_pack_[pack]].limit;
+    all = Join(all, leaf(i), limit, cuts_[pack], slack);
+  }
+  group.assemblies = all;
+  group.slack = Smallest(slack);
+}
+
 template <Pass kPass>
 double PathSweep::Up(PathPlaces& path) {
   OneHandle<double> all = {};
@@ -157,22 +193,11 @@ double PathSweep::Up(PathPlaces& path) {
     }
     ++cut;
   };
-  if (path.packs > 0) {
-    Lanes slacks = {};
-    const auto leaf = [&](int i) {
-      const int pack = path.first_pack + i;
-      return Leaf<kPass>(pack_kinds_[kind_of_pack_[pack]], turned_packs_[pack],
-                         Load<Lanes>(&speed_[path.first + i * kLanes]));
-    };
-    TwoHandle<Lanes> lanes = leaf(0);
-    for (int i = 1; i < path.packs; ++i) {
-      const int pack = path.first_pack + i;
-      const Lanes limit = pack_kinds_[kind_of_pack_[pack]].limit;
-      lanes = Join(lanes, leaf(i), limit, cuts_[pack], slacks);
-    }
-    slack = Smallest(slacks);
-    const Lanes limits = pack_kinds_[kind_of_pack_[path.first_pack]].limit;
-    for (int lane = 0; lane < kLanes; ++lane) join(LaneOf(lanes, lane), limits[lane]);
+  for (int g = path.first_group; g < path.first_group + path.groups; ++g) {
+    const Group& group = groups_[g];
+    slack = Min(slack, group.slack);
+    const Lanes limits = pack_kinds_[kind_of_pack_[group.pack]].limit;
+    for (int lane = 0; lane < kLanes; ++lane) join(LaneOf(group.assemblies, lane), limits[lane]);
   }
   for (int k = 0; k < path.singles(); ++k) {
     const Link<double>& link = singles_[path.first_single + k];
@@ -190,76 +215,75 @@ double PathSweep::Up(PathPlaces& path) {
 }
 
 /// From the path's end: the force in the joint before a body, then the body's angular acceleration.
-/// Forces on lanes are those in the joints between them.
+/// Forces on pieces are those in the joints between them.
 template <Pass kPass>
 void PathSweep::Down(const PathPlaces& path) {
   const EndCut<double>* cuts = &end_cuts_[path.first_cut];
   Vector2<double> F2 = path.ends_at_ground ? -path.end_force : kNone;
   for (int k = path.singles() - 1; k >= 0; --k) {
-    const int single = path.first_single + k, node = path.lanes() + k;
+    const int single = path.first_single + k, node = path.pieces() + k;
     const Vector2<double> F1 = node == 0 ? kNone : ForceIn(cuts[node], F2);
     alpha_[path.first + path.packed() + k] =
         AngularAcceleration<kPass>(turned_singles_[single], F1, F2) / singles_[single].radius;
     F2 = -F1;
   }
-  if (path.packs == 0) return;
-  Vector2<Lanes> F1s, F2s;
-  for (int lane = kLanes - 1; lane >= 0; --lane) {
-    const Vector2<double> F1 = lane == 0 ? kNone : ForceIn(cuts[lane], F2);
-    SetLane(F1s, lane, F1);
-    SetLane(F2s, lane, F2);
+  for (int piece = path.pieces() - 1; piece >= 0; --piece) {
+    const Vector2<double> F1 = piece == 0 ? kNone : ForceIn(cuts[piece], F2);
+    Group& group = groups_[path.first_group + piece / kLanes];
+    SetLane(group.F1, piece % kLanes, F1);
+    SetLane(group.F2, piece % kLanes, F2);
     F2 = -F1;
-  }
-  for (int i = path.packs - 1; i >= 0; --i) {
-    const int pack = path.first_pack + i;
-    const Vector2<Lanes> F1 = i == 0 ? F1s : ForceIn(cuts_[pack], F1s, F2s);
-    const Lanes alpha = AngularAcceleration<kPass>(turned_packs_[pack], F1, F2s);
-    Store(alpha / pack_kinds_[kind_of_pack_[pack]].radius, &alpha_[path.first + i * kLanes]);
-    F2s = -F1;
   }
 }
 
-template <bool kAdd>
-bool PathSweep::SetRates(double* rates) const {
-  const double* alpha = alpha_.data();
-  double zeros = 0.0;  // or not a number
-  for (const Step& step : steps_) {
-    const double rate = step.sign * (alpha[step.child] - alpha[step.parent]);
-    rates[step.u] = kAdd ? rates[step.u] + rate : rate;
-    zeros += 0.0 * rate;
+template <Pass kPass>
+void PathSweep::DownGroup(const Group& group) {
+  Vector2<Lanes> F2 = group.F2;
+  for (int i = paths_[group.path].packs - 1; i >= 0; --i) {
+    const int pack = group.pack + i;
+    const Vector2<Lanes> F1 = i == 0 ? group.F1 : ForceIn(cuts_[pack], group.F1, F2);
+    const Lanes alpha = AngularAcceleration<kPass>(turned_packs_[pack], F1, F2);
+    Store(alpha / pack_kinds_[kind_of_pack_[pack]].radius, &alpha_[group.place + i * kLanes]);
+    F2 = -F1;
   }
-  return zeros == 0.0;
+}
+
+template <Pass kPass>
+bool PathSweep::Sweep() {
+  const int groups = static_cast<int>(groups_.size());
+  pool_->ForEach(groups, [&](int i) { UpGroup<kPass>(groups_[i]); });
+  double slack = 0.0;
+  for (PathPlaces& path : paths_) {
+    constexpr int kOfEach = Operations::Leaf(kPass) + Operations::kAngularAcceleration + 1;
+    operations_ += path.packed() * (kOfEach + Operations::kJoin + Operations::kForceIn) +
+                   path.singles() * (kOfEach + Operations::kEndJoin + Operations::kForceInEnd);
+    slack = Min(slack, Up<kPass>(path));
+  }
+  if (!(slack >= 0.0)) return false;
+  for (const PathPlaces& path : paths_) Down<kPass>(path);
+  pool_->ForEach(groups, [&](int i) { DownGroup<kPass>(groups_[i]); });
+  return true;
 }
 
 bool PathSweep::Evaluate(SpeedsUsed speeds, std::span<const double> q, std::span<const double> u,
                          std::span<double> qdot, std::span<double> udot) {
   operations_ = 0;
-  SetAngles(q.data(), u.data());
-  room_ = kLargestAngle;
-  for (PathPlaces& path : paths_) Turn(path);
-  if (!(room_ >= 0.0)) return false;
-  const auto sweep = [&]<Pass kPass>() {
-    double slack = 0.0;
-    for (PathPlaces& path : paths_) {
-      constexpr int kOfEach = Operations::Leaf(kPass) + Operations::kAngularAcceleration + 1;
-      operations_ += path.packed() * (kOfEach + Operations::kJoin + Operations::kForceIn) +
-                     path.singles() * (kOfEach + Operations::kEndJoin + Operations::kForceInEnd);
-      slack = Min(slack, Up<kPass>(path));
-    }
-    if (!(slack >= 0.0)) return false;
-    for (const PathPlaces& path : paths_) Down<kPass>(path);
-    return true;
-  };
-  std::copy_n(u.data(), u.size(), qdot.data());
+  tree_.ToBodies(q, u, angle_.data(), speed_.data(), *pool_);
+  if (!Turn()) return false;
   if (speeds == SpeedsUsed::kGiven) {
-    if (!sweep.operator()<Pass::kAccelerations>()) return false;
+    if (!Sweep<Pass::kAccelerations>()) return false;
+    ForRanges(*pool_, u.size(), [&](std::size_t first, std::size_t size) {
+      std::ranges::copy(u.subspan(first, size), qdot.begin() + first);
+    });
   } else {
-    if (!sweep.operator()<Pass::kSpeeds>()) return false;
-    SetRates<true>(qdot.data());
-    speed_ += alpha_;
-    if (!sweep.operator()<Pass::kCompleted>()) return false;
+    if (!Sweep<Pass::kSpeeds>()) return false;
+    tree_.ToJoints(alpha_.data(), u, qdot, *pool_);
+    ForRanges(*pool_, speed_.size(), [&](std::size_t first, std::size_t size) {
+      speed_.segment(first, size) += alpha_.segment(first, size);
+    });
+    if (!Sweep<Pass::kCompleted>()) return false;
   }
-  return SetRates<false>(udot.data());
+  return tree_.ToJoints(alpha_.data(), {}, udot, *pool_);
 }
 
 }  // namespace loopbench::odca::pins

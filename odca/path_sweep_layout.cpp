@@ -11,20 +11,25 @@ namespace loopbench::odca::pins {
 
 namespace {
 
-/// Shorter lanes are no faster than one body after another (measured with lanes of one).
-constexpr int kShortestLane = 2;
+/// Shorter pieces are no faster than one body after another (measured with lanes of one).
+constexpr int kShortestPiece = 2;
 
 bool IsPin(const Joint<Planar, double>& joint) {
   return joint.kind == &KindOf<Planar, double>(JointType::kRevolute) && joint.num_drives == 0 &&
          joint.num_released == 0;
 }
 
-/// Whether points in each lane can be followed from its own first body on: a pinned body stands
+/// Bodies of a group of a long path: enough work for a thread to wait for the others after it.
+constexpr int kBodiesOfGroup = 2048;
+/// Their pieces are joined one after another.
+constexpr int kMostGroups = 128;
+
+/// Whether points in each piece can be followed from its own first body on: a pinned body stands
 /// before the first cut joint in it.
-bool LanesStandAlone(const std::vector<Closure<double>>& closures, int packs) {
-  for (int start = 0; start < packs * kLanes; start += packs) {
+bool PiecesStandAlone(const std::vector<Closure<double>>& closures, int pieces, int length) {
+  for (int start = 0; start < pieces * length; start += length) {
     bool pinned = closures[start].follows == 0.0;
-    for (int k = start + 1; k < start + packs; ++k) {
+    for (int k = start + 1; k < start + length; ++k) {
       if (IsCut(closures[k]) && !pinned) return false;
       pinned = pinned || closures[k].follows == 0.0;
     }
@@ -32,20 +37,22 @@ bool LanesStandAlone(const std::vector<Closure<double>>& closures, int packs) {
   return true;
 }
 
-/// The longest lanes that do, 0 for none. Where a sequence of bodies repeats, as crank and coupler
-/// of a ladder, lanes of whole periods do: periods of up to eight bodies are found.
-int LengthOfLanes(const std::vector<Closure<double>>& closures) {
+/// The longest length of so many pieces that do, 0 for none. Where a sequence of bodies repeats, as
+/// crank and coupler of a ladder, pieces of whole periods do: periods of up to eight bodies are
+/// found.
+int LengthOfPieces(const std::vector<Closure<double>>& closures, int pieces) {
   constexpr int kTrials = 8;
-  const int longest = static_cast<int>(closures.size()) / kLanes;
-  for (int packs = longest; packs >= std::max(kShortestLane, longest - kTrials); --packs) {
-    if (LanesStandAlone(closures, packs)) return packs;
+  const int longest = static_cast<int>(closures.size()) / pieces;
+  for (int length = longest; length >= std::max(kShortestPiece, longest - kTrials); --length) {
+    if (PiecesStandAlone(closures, pieces, length)) return length;
   }
   return 0;
 }
 
 /// Sets limits in the order of joins (PathSweep::Up): a join closes a loop where both its sides are
 /// pinned to Ground. The lighter of two sides is what answers.
-void SetLimits(const Mechanism<Planar, double>& mechanism, int packs, PathLinks& path) {
+void SetLimits(const Mechanism<Planar, double>& mechanism, int pieces, int length,
+               PathLinks& path) {
   struct Side {
     int bodies = 0;
     bool pinned = false;
@@ -63,11 +70,11 @@ void SetLimits(const Mechanism<Planar, double>& mechanism, int packs, PathLinks&
     left += right;
   };
   Side all;
-  const int packed = packs * kLanes;
-  for (int start = 0; start < packed; start += packs) {
-    Side lane = body(start);
-    for (int k = start + 1; k < start + packs; ++k) join(k, lane, body(k));
-    join(start, all, lane);
+  const int packed = pieces * length;
+  for (int start = 0; start < packed; start += length) {
+    Side piece = body(start);
+    for (int k = start + 1; k < start + length; ++k) join(k, piece, body(k));
+    join(start, all, piece);
   }
   for (int k = packed; k < static_cast<int>(path.links.size()); ++k) join(k, all, body(k));
   path.end_limit *= ShareOfLimit(all.bodies);
@@ -75,7 +82,8 @@ void SetLimits(const Mechanism<Planar, double>& mechanism, int packs, PathLinks&
 
 }  // namespace
 
-std::unique_ptr<PathSweep> PathSweep::Make(const Mechanism<Planar, double>& mechanism) {
+std::unique_ptr<PathSweep> PathSweep::Make(const Mechanism<Planar, double>& mechanism,
+                                           int threads) {
   if (mechanism.num_u() == 0 || !mechanism.forces().empty() ||
       !std::ranges::all_of(mechanism.joints(), IsPin)) {
     return nullptr;
@@ -93,15 +101,26 @@ std::unique_ptr<PathSweep> PathSweep::Make(const Mechanism<Planar, double>& mech
     }
   }
   if (sweep->paths_.empty()) return nullptr;
-  sweep->AddSteps(mechanism, place_of, axes);
+  sweep->tree_ = TreeAngles(mechanism, place_of, axes);
+  sweep->angle_.setZero(sweep->num_places_ + 1);
+  sweep->speed_ = sweep->alpha_ = sweep->angle_;
+  const int useful = std::max(1, static_cast<int>(sweep->groups_.size()));
+  sweep->pool_ = std::make_unique<WorkerPool>(std::min(threads, useful));
   return sweep;
 }
 
 void PathSweep::Add(const Mechanism<Planar, double>& mechanism, PathLinks links) {
   PathPlaces path;
   path.bodies = static_cast<int>(links.links.size());
-  path.packs = LengthOfLanes(links.closures);
+  path.groups = std::clamp(path.bodies / kBodiesOfGroup, 1, kMostGroups);
+  while (path.groups > 0) {
+    path.packs = LengthOfPieces(links.closures, path.pieces());
+    if (path.packs > 0) break;
+    path.groups /= 2;
+  }
   path.first = num_places_;
+  path.first_group = static_cast<int>(groups_.size());
+  path.first_piece = static_cast<int>(pieces_.size());
   path.first_pack = static_cast<int>(kind_of_pack_.size());
   path.first_single = static_cast<int>(singles_.size());
   path.first_cut = static_cast<int>(end_cuts_.size());
@@ -110,62 +129,59 @@ void PathSweep::Add(const Mechanism<Planar, double>& mechanism, PathLinks links)
   path.ground_is_P = links.ground_is_P;
   path.end = links.end;
   num_places_ += path.bodies;
-  SetLimits(mechanism, path.packs, links);
+  SetLimits(mechanism, path.pieces(), path.packs, links);
   path.end_limit = links.end_limit;
-  for (int lane = 0; lane < path.lanes(); ++lane) {
-    Closure<double>& start = links.closures[lane * path.packs];
-    path.starts[lane] = start;
-    start.cut_here = start.cut_before = 0.0;  // Turn() sees to these
-    for (int k = lane * path.packs; k < (lane + 1) * path.packs; ++k) {
-      const bool pinned = links.closures[k].follows == 0.0;
-      path.stands_alone[lane] = path.stands_alone[lane] || pinned;
-      if (pinned && k > lane * path.packs) path.loops_in_lanes = true;
-    }
-  }
-  std::map<std::string, int> kinds;
-  for (int i = 0; i < path.packs; ++i) {
-    Link<Lanes> pack;
-    Closure<Lanes> closure;
-    for (int lane = 0; lane < kLanes; ++lane) {
-      SetLane(pack, lane, links.links[lane * path.packs + i]);
-      SetLane(closure, lane, links.closures[lane * path.packs + i]);
-    }
-    const std::string bytes(reinterpret_cast<const char*>(&pack), sizeof(pack));
-    const auto [kind, is_new] = kinds.try_emplace(bytes, static_cast<int>(pack_kinds_.size()));
-    if (is_new) pack_kinds_.push_back(pack);
-    kind_of_pack_.push_back(kind->second);
-    pack_closures_.push_back(closure);
-  }
+  AddPieces(path, links.closures);
+  AddPacks(path, links);
   singles_.insert(singles_.end(), links.links.begin() + path.packed(), links.links.end());
   single_closures_.insert(single_closures_.end(), links.closures.begin() + path.packed(),
                           links.closures.end());
-  turned_packs_.resize(kind_of_pack_.size());
-  cuts_.resize(kind_of_pack_.size());
   turned_singles_.resize(singles_.size());
-  end_cuts_.resize(end_cuts_.size() + path.lanes() + path.singles());
+  end_cuts_.resize(end_cuts_.size() + path.pieces() + path.singles());
   paths_.push_back(path);
 }
 
-/// X_PF and X_QM are angles here.
-void PathSweep::AddSteps(const Mechanism<Planar, double>& mechanism,
-                         const std::vector<int>& place_of, const std::vector<double>& axes) {
-  for (const TreeStep& step : mechanism.tree()) {
-    const Joint<Planar, double>& joint = mechanism.joints()[step.joint];
-    const bool goes_on = !steps_.empty() && steps_.back().child == place_of[step.parent];
-    if (goes_on) {
-      ++runs_.back();
-    } else {
-      runs_.push_back(1);
+void PathSweep::AddPieces(PathPlaces& path, std::vector<Closure<double>>& closures) {
+  for (int i = 0; i < path.pieces(); ++i) {
+    Closure<double>& start = closures[i * path.packs];
+    Piece piece = {.start = start};
+    start.cut_here = start.cut_before = 0.0;  // CloseLoops() sees to these
+    for (int k = i * path.packs; k < (i + 1) * path.packs; ++k) {
+      const bool pinned = closures[k].follows == 0.0;
+      piece.stands_alone = piece.stands_alone || pinned;
+      if (pinned && k > i * path.packs) path.loops_in_lanes = true;
     }
-    const double of_bodies = step.sign * (joint.X_PF.angle - joint.X_QM.angle);
-    steps_.push_back({.u = joint.u_offset,
-                      .child = place_of[step.child],
-                      .parent = place_of[step.parent],
-                      .sign = static_cast<double>(step.sign),
-                      .offset = of_bodies + axes[step.child] - axes[step.parent]});
+    pieces_.push_back(piece);
   }
-  angle_.setZero(num_places_ + 1);
-  speed_ = alpha_ = angle_;
+  if (path.loops_in_lanes) return;
+  for (int i = 0; i < path.pieces(); ++i) pieces_[path.first_piece + i].stands_alone = false;
+}
+
+void PathSweep::AddPacks(const PathPlaces& path, const PathLinks& links) {
+  std::map<std::string, int> kinds;
+  for (int g = 0; g < path.groups; ++g) {
+    Group group;
+    group.path = static_cast<int>(paths_.size());
+    group.pack = path.first_pack + g * path.packs;
+    group.place = path.first + g * path.packs * kLanes;
+    groups_.push_back(group);
+    for (int i = 0; i < path.packs; ++i) {
+      Link<Lanes> pack;
+      Closure<Lanes> closure;
+      for (int lane = 0; lane < kLanes; ++lane) {
+        const int k = (g * kLanes + lane) * path.packs + i;
+        SetLane(pack, lane, links.links[k]);
+        SetLane(closure, lane, links.closures[k]);
+      }
+      const std::string bytes(reinterpret_cast<const char*>(&pack), sizeof(pack));
+      const auto [kind, is_new] = kinds.try_emplace(bytes, static_cast<int>(pack_kinds_.size()));
+      if (is_new) pack_kinds_.push_back(pack);
+      kind_of_pack_.push_back(kind->second);
+      pack_closures_.push_back(closure);
+    }
+  }
+  turned_packs_.resize(kind_of_pack_.size());
+  cuts_.resize(kind_of_pack_.size());
 }
 
 }  // namespace loopbench::odca::pins

@@ -46,8 +46,11 @@ std::vector<Record> RecordsOf(const std::vector<std::string>& ids,
 
 int Run(const RunCommand& command, const std::string& typed) {
   // read everything first: a mistake in the last file must not cost the runs of the first
-  const std::vector<Experiment> experiments =
+  std::vector<Experiment> experiments =
       ReadSelected({command.experiments, command.settings, command.suite.filter});
+  if (command.threads > 0) {
+    for (Experiment& experiment : experiments) UseThreads(command.threads, experiment);
+  }
   if (command.suite.precision) {
     for (const Experiment& experiment : experiments) RequireLadders(experiment);
   }

@@ -33,6 +33,7 @@ struct RunCommand {
   std::filesystem::path out;  ///< folder; default results/runs/<name of the first experiment>
   std::vector<Setting> settings;
   SuiteOptions suite;
+  int threads = 0;   ///< of all columns; 0: as the files say
   std::string gate;  ///< "doubts" or ""
 };
 /// Runs what the store does not have yet, then writes its tables.

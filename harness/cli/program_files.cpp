@@ -65,6 +65,9 @@ void FileOptions::AddRun(CLI::App& app) {
   run_app_->add_option("--jobs", run_.suite.jobs, "Accuracy cases at once; timings run alone")
       ->check(NumberFrom(1, 1024))
       ->capture_default_str();
+  run_app_
+      ->add_option("--threads", run_.threads, "On one right-hand side; same results, in less time")
+      ->check(NumberFrom(1, kMostThreads));
   run_app_->add_option("--filter", conditions_, "Only accuracy cases with key=value[,value]");
   AddSettings(run_app_, &settings_);
   run_app_->add_option("--shard", shard_, "k/n: the k-th of n parts, to be merged later")

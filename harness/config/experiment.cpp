@@ -47,8 +47,9 @@ void DropExcluded(const Experiment& experiment, std::vector<Case>* cases) {
 std::string ToString(const Column& column) {
   const std::string gains =
       column.gains ? fmt::format("({}, {})", column.gains->alpha, column.gains->beta) : "";
-  return fmt::format("{}/{}{}/{}/{}", column.formulation, ToString(column.enforcement), gains,
-                     ToString(column.coordinates), ToString(column.solver));
+  const std::string threads = column.threads > 1 ? fmt::format("/{}-threads", column.threads) : "";
+  return fmt::format("{}/{}{}/{}/{}{}", column.formulation, ToString(column.enforcement), gains,
+                     ToString(column.coordinates), ToString(column.solver), threads);
 }
 
 Record CaseKeys(const Experiment& experiment, const Case& one) {
@@ -72,8 +73,23 @@ Record CaseKeys(const Experiment& experiment, const Case& one) {
     keys.Set("alpha", one.column.gains->alpha);
     keys.Set("beta", one.column.gains->beta);
   }
+  if (one.column.threads > 1) keys.Set("threads", std::int64_t{one.column.threads});
   for (const auto& [name, value] : experiment.parameters.items()) keys.Set(name, value);
   return keys;
+}
+
+void UseThreads(int threads, Experiment& experiment) {
+  const auto use = [threads](std::vector<Column>& columns) {
+    std::vector<Column> all;
+    for (Column& column : columns) {
+      column.threads = threads;
+      if (std::ranges::find(all, column) == all.end()) all.push_back(column);
+    }
+    columns = std::move(all);
+  };
+  use(experiment.columns);
+  use(experiment.timing.columns);
+  for (TimingFamily& family : experiment.timing.families) use(family.columns);
 }
 
 bool Matches(const EnsembleRule& rule, const Case& one) {

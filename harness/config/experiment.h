@@ -68,11 +68,16 @@ struct Column {
   SolverKind solver = SolverKind::kRankRevealing;
   /// Of "baumgarte", when the file gives them.
   std::optional<BaumgarteGains> gains = std::nullopt;
+  int threads = 1;  ///< that may work on one right-hand side
 
   friend bool operator==(const Column&, const Column&) = default;
 };
 
-/// "odca/acceleration/joint/as-published", "odca/baumgarte(5, 5)/joint/rank-revealing".
+/// The most threads that files may ask for: more than processors have.
+inline constexpr int kMostThreads = 256;
+
+/// "odca/acceleration/joint/as-published", "odca/baumgarte(5, 5)/joint/rank-revealing",
+/// "odca/velocity/joint/rank-revealing/2-threads".
 std::string ToString(const Column& column);
 
 /// A mechanism and how long it runs.
@@ -188,6 +193,9 @@ bool Matches(const EnsembleRule& rule, const Case& one);
 /// The keys that name a case, as they stand in every table row: those of docs/design.md section 6,
 /// then the experiment's parameters.
 Record CaseKeys(const Experiment& experiment, const Case& one);
+
+/// All columns with so many threads; those that differed in nothing else become one.
+void UseThreads(int threads, Experiment& experiment);
 
 /// All cases for accuracy, in the order scene, horizon, column, tolerance, without excluded ones.
 std::vector<Case> Expand(const Experiment& experiment);

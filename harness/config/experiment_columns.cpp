@@ -14,6 +14,7 @@ struct ColumnLists {
   std::vector<Coordinates> coordinates = {Column().coordinates};
   std::vector<SolverKind> solvers = {Column().solver};
   std::optional<BaumgarteGains> gains;
+  std::vector<std::int64_t> threads = {Column().threads};
 };
 
 /// Reports a level that a formulation does not have.
@@ -59,6 +60,8 @@ const Fields<ColumnLists>& ColumnFields() {
        {"solver", Choices(&ColumnLists::solvers, NamesOf<SolverKind>(), "a solver"),
         "For reduction: as-published is the fixed independent set, rank-revealing the automatic "
         "partition."},
+       {"threads", IntegerList(&ColumnLists::threads, 1, kMostThreads),
+        "That may work on one right-hand side; results have the same bits for any number."},
        {"alpha", NumberSchema(kNotNegative),
         "Gain on mismatches of speeds [1/s]; baumgarte only, beside beta."},
        {"beta", NumberSchema(kNotNegative),
@@ -77,7 +80,10 @@ std::vector<Column> ReadColumnEntry(const JsonNode& node) {
     for (const Enforcement enforcement : lists.enforcements) {
       for (const Coordinates set : lists.coordinates) {
         for (const SolverKind solver : lists.solvers) {
-          columns.push_back({formulation, enforcement, set, solver, lists.gains});
+          for (const std::int64_t threads : lists.threads) {
+            columns.push_back(
+                {formulation, enforcement, set, solver, lists.gains, static_cast<int>(threads)});
+          }
         }
       }
     }

@@ -19,9 +19,11 @@ namespace loopbench::harness {
 template <class Space>
 std::unique_ptr<System<Space, double>> MakeFormulation(const Column& column,
                                                        const Mechanism<Space, double>& mechanism) {
-  return MakeFormulation<Space>(
-      column.formulation, mechanism,
-      {.enforcement = column.enforcement, .solver = column.solver, .gains = column.gains});
+  return MakeFormulation<Space>(column.formulation, mechanism,
+                                {.enforcement = column.enforcement,
+                                 .solver = column.solver,
+                                 .gains = column.gains,
+                                 .threads = column.threads});
 }
 
 /// Gives a system, after its start, the Jacobians that a case's Newton iteration asks for: none

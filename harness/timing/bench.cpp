@@ -160,13 +160,15 @@ void Count(benchmark::State& state, const char* name, double value) {
   if (std::isfinite(value)) state.counters[name] = value;
 }
 
-double CpuNanoseconds() {
+/// Of the processor, or by the clock where several threads work.
+double Nanoseconds(const Column& column) {
   timespec now{};
-  clock_gettime(CLOCK_PROCESS_CPUTIME_ID, &now);
+  clock_gettime(column.threads > 1 ? CLOCK_MONOTONIC : CLOCK_PROCESS_CPUTIME_ID, &now);
   return 1e9 * static_cast<double>(now.tv_sec) + static_cast<double>(now.tv_nsec);
 }
 
-void Measure(benchmark::State& state, BenchmarkSubject& subject, BenchmarkKind kind) {
+void Measure(benchmark::State& state, BenchmarkSubject& subject, BenchmarkKind kind,
+             const Column& column) {
   const auto once = [&] {
     return kind == BenchmarkKind::kRhs ? subject.Derivative() : subject.Step();
   };
@@ -178,12 +180,12 @@ void Measure(benchmark::State& state, BenchmarkSubject& subject, BenchmarkKind k
     return;
   }
   const Allocations before = AllocationsSoFar();
-  const double begin = CpuNanoseconds();
+  const double begin = Nanoseconds(column);
   for (auto _ : state) {
     outcome = once();
     benchmark::DoNotOptimize(outcome);
   }
-  const double spent = CpuNanoseconds() - begin;
+  const double spent = Nanoseconds(column) - begin;
   const Allocations after = AllocationsSoFar();
   const double evaluations = static_cast<double>(state.iterations());
   const double bodies = subject.bodies();
@@ -203,7 +205,7 @@ void Register(const BenchmarkSet& set, States& states, const BenchmarkMember& me
     try {
       Prepared& prepared = Prepare(set, states, member, kind, column);
       state.SetLabel(prepared.hash);
-      Measure(state, *prepared.subject, kind);
+      Measure(state, *prepared.subject, kind, column);
     } catch (const std::exception& error) {
       state.SkipWithError(EscapeTerminal(error.what()).c_str());
     }

@@ -75,6 +75,9 @@ struct FormulationOptions {
   /// 1/h hold steps back; gains that follow shorter steps magnify round-off by 1/h^2, which makes
   /// steps shorter still (docs/numerics.md, section 3).
   std::optional<BaumgarteGains> gains = std::nullopt;
+  /// That may work on one right-hand side, where a formulation has work for them. The same bits for
+  /// any number.
+  int threads = 1;
 };
 
 }  // namespace loopbench

@@ -228,8 +228,52 @@ TEST_P(PathSweepTest, AgreesOnChainsAndLadders) {
     EXPECT_LE(both.difference, Bound(mechanism.num_bodies(), both.general.rcond))
         << description.name;
   };
-  for (const int n : {3, 4, 8, 9, 16, 31, 100, 400}) hold(Chain(n));
-  for (const int n : {1, 2, 3, 4, 5, 8, 15, 50, 200}) hold(Ladder(n, 1.1, -0.7));
+  // the last ones are in several groups: 2 and 4
+  for (const int n : {3, 4, 8, 9, 16, 31, 100, 400, 4100, 8300}) hold(Chain(n));
+  for (const int n : {1, 2, 3, 4, 5, 8, 15, 50, 200, 2060, 4200}) hold(Ladder(n, 1.1, -0.7));
+}
+
+/// Several groups in each, of which threads take shares; bodies whose angles follow from bodies of
+/// other threads; loops across the ends of groups.
+TEST_P(PathSweepTest, HasTheSameBitsForAnyNumberOfThreads) {
+  Random random(1);
+  const auto hold = [&](const MechanismDescription& description, double size, bool evaluates) {
+    const Mechanism<Planar, double> mechanism(description, Coordinates::kJoint);
+    Numbers q = RandomNumbers(random, mechanism.num_q(), size);
+    const Numbers u = RandomNumbers(random, mechanism.num_u(), 1.0);
+    for (const JointValues& start : description.initial.coordinates) {
+      q[mechanism.joints()[start.joint].q_offset] += start.values[0];
+    }
+    const auto rates = [&](int threads) {
+      const auto sweep = PathSweep::Make(mechanism, threads);
+      EXPECT_EQ(sweep->threads(), std::min(threads, 4)) << "no more than groups";
+      Numbers qdot = Numbers::Zero(u.size()), udot = qdot;
+      for (int round = 0; round < 3; ++round) {
+        EXPECT_EQ(sweep->Evaluate(GetParam(), In(q), In(u), In(qdot), In(udot)), evaluates);
+      }
+      return std::pair(qdot, udot);
+    };
+    const auto alone = rates(1);
+    EXPECT_EQ(alone.second.isZero(0.0), !evaluates);
+    for (const int threads : {2, 3, 7}) {
+      const auto shared = rates(threads);
+      EXPECT_TRUE(shared == alone) << description.name << ", " << threads << " threads";
+    }
+  };
+  hold(Chain(8300), 1e-4, true);
+  hold(Ladder(4200, 1.1, -0.7), 1e-4, true);
+  // open, and pinned at its middle: half of it follows the other way
+  MechanismDescription arms = Chain(8300);
+  std::erase_if(arms.joints, [](const JointDescription& joint) {
+    return joint.from.body == kGround || joint.to.body == kGround;
+  });
+  arms.joints.push_back(Pin(random, kGround, 4000));
+  arms.joints.back().name = "pin";
+  arms.initial = {};
+  hold(arms, 1.0, true);
+  MechanismDescription stretched = Chain(8300);
+  stretched.initial = {};
+  hold(stretched, 0.0, false);
 }
 
 TEST(PathSweep, LeavesOthersToTheGeneralSweep) {
@@ -305,15 +349,17 @@ TEST(PathSweep, IsTheDerivativeOfTheSystemWhereItServes) {
 
 TEST_P(PathSweepTest, AllocatesNothing) {
   if (testing::CountAllocations() < 0) GTEST_SKIP() << "the sanitizer owns malloc";
-  const Mechanism<Planar, double> mechanism(Ladder(20, 1.0, 0.5), Coordinates::kJoint);
-  const auto sweep = PathSweep::Make(mechanism);
-  Random random(1);
-  const Numbers q = RandomNumbers(random, mechanism.num_q(), 1.0);
-  const Numbers u = RandomNumbers(random, mechanism.num_u(), 1.0);
-  Numbers qdot = u, udot = u;
-  const long before = testing::CountAllocations();
-  sweep->Evaluate(GetParam(), In(q), In(u), In(qdot), In(udot));
-  EXPECT_EQ(testing::CountAllocations(), before);
+  for (const int windows : {20, 4200}) {
+    const Mechanism<Planar, double> mechanism(Ladder(windows, 1.0, 0.5), Coordinates::kJoint);
+    const auto sweep = PathSweep::Make(mechanism, 2);
+    Random random(1);
+    const Numbers q = RandomNumbers(random, mechanism.num_q(), 1.0);
+    const Numbers u = RandomNumbers(random, mechanism.num_u(), 1.0);
+    Numbers qdot = u, udot = u;
+    const long before = testing::CountAllocations();
+    sweep->Evaluate(GetParam(), In(q), In(u), In(qdot), In(udot));
+    EXPECT_EQ(testing::CountAllocations(), before);
+  }
 }
 
 /// Cranks at an angle from the line in which all bars lie: wherever the general sweep softens, by

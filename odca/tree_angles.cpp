@@ -1,0 +1,108 @@
+#include "odca/tree_angles.h"
+
+#include <algorithm>
+
+namespace loopbench::odca::pins {
+
+namespace {
+
+/// Steps of a stretch, and of the longest run: some 30 us of work.
+constexpr int kLongest = 4096;
+
+}  // namespace
+
+/// X_PF and X_QM are angles here.
+TreeAngles::TreeAngles(const Mechanism<Planar, double>& mechanism, const std::vector<int>& place_of,
+                       const std::vector<double>& axes) {
+  std::vector<int> run_of(place_of.size(), -1);  // by place
+  for (const TreeStep& step : mechanism.tree()) {
+    const Joint<Planar, double>& joint = mechanism.joints()[step.joint];
+    const int child = place_of[step.child], parent = place_of[step.parent];
+    const bool goes_on = !steps_.empty() && steps_.back().child == parent;
+    if (!goes_on || runs_.back().steps == kLongest) {
+      runs_.push_back({.first = static_cast<int>(steps_.size()), .before = run_of[parent]});
+    }
+    ++runs_.back().steps;
+    run_of[child] = static_cast<int>(runs_.size()) - 1;
+    const double of_bodies = step.sign * (joint.X_PF.angle - joint.X_QM.angle);
+    steps_.push_back({.u = joint.u_offset,
+                      .child = child,
+                      .parent = parent,
+                      .sign = static_cast<double>(step.sign),
+                      .offset = of_bodies + axes[step.child] - axes[step.parent]});
+  }
+  int steps = kLongest;
+  for (int run = 0; run < static_cast<int>(runs_.size()); ++run) {
+    if (steps >= kLongest) {
+      stretches_.push_back({.first = run});
+      steps = 0;
+    }
+    steps += runs_[run].steps;
+    stretches_.back().last = run + 1;
+  }
+}
+
+/// The parent's values are at hand: to read them back from memory takes twice as long as all the
+/// rest.
+void TreeAngles::Walk(const Run& run, double angle, double speed, const double* q, const double* u,
+                      double* angles, double* speeds) const {
+  double turned = 0.0, gained = 0.0;
+  const Step* step = steps_.data() + run.first;
+  for (const Step* end = step + run.steps; step != end; ++step) {
+    turned += step->offset + step->sign * q[step->u];
+    gained += step->sign * u[step->u];
+    angles[step->child] = angle + turned;
+    speeds[step->child] = speed + gained;
+  }
+}
+
+void TreeAngles::ToBodies(std::span<const double> q, std::span<const double> u, double* angles,
+                          double* speeds, WorkerPool& pool) {
+  const int stretches = static_cast<int>(stretches_.size());
+  if (pool.threads() == 1 || stretches < 2) {
+    for (const Run& run : runs_) {
+      const int parent = steps_[run.first].parent;
+      Walk(run, angles[parent], speeds[parent], q.data(), u.data(), angles, speeds);
+    }
+    return;
+  }
+  pool.ForEach(stretches, [&](int i) {
+    for (int run = stretches_[i].first; run < stretches_[i].last; ++run) {
+      Walk(runs_[run], 0.0, 0.0, q.data(), u.data(), angles, speeds);
+    }
+  });
+  for (Run& run : runs_) {
+    if (run.before < 0) continue;
+    const int parent = steps_[run.first].parent;
+    run.angle = runs_[run.before].angle + angles[parent];
+    run.speed = runs_[run.before].speed + speeds[parent];
+  }
+  pool.ForEach(stretches, [&](int i) {
+    for (int run = stretches_[i].first; run < stretches_[i].last; ++run) {
+      if (runs_[run].before < 0) continue;
+      const Step* step = steps_.data() + runs_[run].first;
+      for (const Step* end = step + runs_[run].steps; step != end; ++step) {
+        angles[step->child] += runs_[run].angle;
+        speeds[step->child] += runs_[run].speed;
+      }
+    }
+  });
+}
+
+bool TreeAngles::ToJoints(const double* of_bodies, std::span<const double> base,
+                          std::span<double> rates, WorkerPool& pool) {
+  pool.ForEach(static_cast<int>(stretches_.size()), [&](int i) {
+    const Run& last = runs_[stretches_[i].last - 1];
+    double zeros = 0.0;  // or not a number
+    const Step* step = steps_.data() + runs_[stretches_[i].first].first;
+    for (const Step* end = steps_.data() + last.first + last.steps; step != end; ++step) {
+      const double rate = step->sign * (of_bodies[step->child] - of_bodies[step->parent]);
+      rates[step->u] = base.empty() ? rate : base[step->u] + rate;
+      zeros += 0.0 * rate;
+    }
+    stretches_[i].is_finite = zeros == 0.0;
+  });
+  return std::ranges::all_of(stretches_, &Stretch::is_finite);
+}
+
+}  // namespace loopbench::odca::pins

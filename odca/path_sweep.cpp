@@ -65,17 +65,17 @@ struct PathSweep::At {
   double speed;
 };
 PathSweep::At PathSweep::Body(const PathPlaces& path, int k) const {
-  const double speed = speed_[path.place(k)];
-  if (k >= path.packed()) {
-    const int single = path.first_single + k - path.packed();
-    return {singles_[single], turned_singles_[single], speed};
+  if (k >= path.packed) {
+    const int single = path.first_single + k - path.packed;
+    return {singles_[single], turned_singles_[single], speed_[path.first + k]};
   }
   const int pack = path.first_pack + path.pack(k), lane = path.lane(k);
-  return {LaneOf(pack_kinds_[kind_of_pack_[pack]], lane), LaneOf(turned_packs_[pack], lane), speed};
+  return {LaneOf(pack_kinds_[kind_of_pack_[pack]], lane), LaneOf(turned_packs_[pack], lane),
+          speed_[path.place(k)]};
 }
 void PathSweep::Set(const PathPlaces& path, int k, const TurnedLink<double>& turned) {
-  if (k >= path.packed()) {
-    turned_singles_[path.first_single + k - path.packed()] = turned;
+  if (k >= path.packed) {
+    turned_singles_[path.first_single + k - path.packed] = turned;
   } else {
     SetLane(turned_packs_[path.first_pack + path.pack(k)], path.lane(k), turned);
   }
@@ -105,9 +105,9 @@ void PathSweep::Close(PathPlaces& path, int k, bool here, const Point<double>& g
 
 bool PathSweep::TurnSingles(const PathPlaces& path) {
   double room = kLargestAngle;
-  for (int k = path.packed(); k < path.bodies; ++k) {
-    const int single = path.first_single + k - path.packed();
-    const double angle = angle_[path.place(k)];
+  for (int k = path.packed; k < path.bodies; ++k) {
+    const int single = path.first_single + k - path.packed;
+    const double angle = angle_[path.first + k];
     room = Min(room, kLargestAngle - Magnitude(angle));
     turned_singles_[single] = pins::Turn(singles_[single], angle);
   }
@@ -129,11 +129,11 @@ void PathSweep::CloseLoops(PathPlaces& path) {
     at_2 = LaneOf(groups_[path.first_group + i / kLanes].ends, i % kLanes);
     if (!piece.stands_alone) at_2 = at_2 + at_1;
   }
-  for (int k = path.packed(); k < path.bodies; ++k) {
-    const int single = path.first_single + k - path.packed();
+  for (int k = path.packed; k < path.bodies; ++k) {
+    const int single = path.first_single + k - path.packed;
     const TurnedLink<double> own = turned_singles_[single];  // before gaps move its arms
     const Point<double> at_1 = start(k, single_closures_[single]);
-    at_2 = Across(singles_[single], own, speed_[path.place(k)], at_1);
+    at_2 = Across(singles_[single], own, speed_[path.first + k], at_1);
   }
   if (!path.ends_at_ground) return;
   if (path.ground_is_P) {
@@ -201,7 +201,7 @@ double PathSweep::Up(PathPlaces& path) {
   }
   for (int k = 0; k < path.singles(); ++k) {
     const Link<double>& link = singles_[path.first_single + k];
-    const double speed = speed_[path.first + path.packed() + k];
+    const double speed = speed_[path.first + path.packed + k];
     join(Leaf<kPass>(link, turned_singles_[path.first_single + k], speed), link.limit);
   }
   if (path.ends_at_ground) {  // Ground has no response (33, 34)
@@ -223,7 +223,7 @@ void PathSweep::Down(const PathPlaces& path) {
   for (int k = path.singles() - 1; k >= 0; --k) {
     const int single = path.first_single + k, node = path.pieces() + k;
     const Vector2<double> F1 = node == 0 ? kNone : ForceIn(cuts[node], F2);
-    alpha_[path.first + path.packed() + k] =
+    alpha_[path.first + path.packed + k] =
         AngularAcceleration<kPass>(turned_singles_[single], F1, F2) / singles_[single].radius;
     F2 = -F1;
   }
@@ -255,7 +255,7 @@ bool PathSweep::Sweep() {
   double slack = 0.0;
   for (PathPlaces& path : paths_) {
     constexpr int kOfEach = Operations::Leaf(kPass) + Operations::kAngularAcceleration + 1;
-    operations_ += path.packed() * (kOfEach + Operations::kJoin + Operations::kForceIn) +
+    operations_ += path.packed * (kOfEach + Operations::kJoin + Operations::kForceIn) +
                    path.singles() * (kOfEach + Operations::kEndJoin + Operations::kForceInEnd);
     slack = Min(slack, Up<kPass>(path));
   }

@@ -50,6 +50,7 @@ class PathSweep {
   struct PathPlaces {
     int bodies = 0, groups = 0;
     int packs = 0;                ///< of a group
+    int packed = 0;               ///< bodies in packs
     int first = 0;                ///< place of its first body
     int first_group = 0;          ///< in groups_
     int first_piece = 0;          ///< in pieces_
@@ -64,12 +65,11 @@ class PathSweep {
     double gap_w = 0.0, end_limit = 0.0;
 
     int pieces() const { return groups * kLanes; }
-    int packed() const { return packs * pieces(); }
-    int singles() const { return bodies - packed(); }
-    /// Of body k < packed().
+    int singles() const { return bodies - packed; }
+    /// Of body k < packed.
     int pack(int k) const { return k / (packs * kLanes) * packs + k % packs; }
     int lane(int k) const { return k / packs % kLanes; }
-    int place(int k) const { return first + (k < packed() ? pack(k) * kLanes + lane(k) : k); }
+    int place(int k) const { return first + (k < packed ? pack(k) * kLanes + lane(k) : k); }
   };
   /// kLanes pieces of a path side by side.
   struct Group {

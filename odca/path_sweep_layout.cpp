@@ -118,6 +118,7 @@ void PathSweep::Add(const Mechanism<Planar, double>& mechanism, PathLinks links)
     if (path.packs > 0) break;
     path.groups /= 2;
   }
+  path.packed = path.packs * path.pieces();
   path.first = num_places_;
   path.first_group = static_cast<int>(groups_.size());
   path.first_piece = static_cast<int>(pieces_.size());
@@ -133,8 +134,8 @@ void PathSweep::Add(const Mechanism<Planar, double>& mechanism, PathLinks links)
   path.end_limit = links.end_limit;
   AddPieces(path, links.closures);
   AddPacks(path, links);
-  singles_.insert(singles_.end(), links.links.begin() + path.packed(), links.links.end());
-  single_closures_.insert(single_closures_.end(), links.closures.begin() + path.packed(),
+  singles_.insert(singles_.end(), links.links.begin() + path.packed, links.links.end());
+  single_closures_.insert(single_closures_.end(), links.closures.begin() + path.packed,
                           links.closures.end());
   turned_singles_.resize(singles_.size());
   end_cuts_.resize(end_cuts_.size() + path.pieces() + path.singles());

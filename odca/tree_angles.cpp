@@ -44,15 +44,17 @@ TreeAngles::TreeAngles(const Mechanism<Planar, double>& mechanism, const std::ve
 
 /// The parent's values are at hand: to read them back from memory takes twice as long as all the
 /// rest.
-void TreeAngles::Walk(const Run& run, double angle, double speed, const double* q, const double* u,
-                      double* angles, double* speeds) const {
+LOOPBENCH_INLINE void TreeAngles::Walk(const Run& run, double angle, double speed, const double* q,
+                                       const double* u, double* angles, double* speeds) const {
   double turned = 0.0, gained = 0.0;
   const Step* step = steps_.data() + run.first;
   for (const Step* end = step + run.steps; step != end; ++step) {
-    turned += step->offset + step->sign * q[step->u];
-    gained += step->sign * u[step->u];
-    angles[step->child] = angle + turned;
-    speeds[step->child] = speed + gained;
+    const double sign = step->sign;
+    const int child = step->child;
+    turned += step->offset + sign * q[step->u];
+    gained += sign * u[step->u];
+    angles[child] = angle + turned;
+    speeds[child] = speed + gained;
   }
 }
 
@@ -89,18 +91,28 @@ void TreeAngles::ToBodies(std::span<const double> q, std::span<const double> u, 
   });
 }
 
+template <bool kAdd>
+bool TreeAngles::AlongStretch(const Stretch& stretch, const double* of_bodies, const double* base,
+                              double* rates) const {
+  const Run& last = runs_[stretch.last - 1];
+  double zeros = 0.0;  // or not a number
+  const Step* step = steps_.data() + runs_[stretch.first].first;
+  for (const Step* end = steps_.data() + last.first + last.steps; step != end; ++step) {
+    const int u = step->u;
+    const double rate = step->sign * (of_bodies[step->child] - of_bodies[step->parent]);
+    rates[u] = kAdd ? base[u] + rate : rate;
+    zeros += 0.0 * rate;
+  }
+  return zeros == 0.0;
+}
+
 bool TreeAngles::ToJoints(const double* of_bodies, std::span<const double> base,
                           std::span<double> rates, WorkerPool& pool) {
   pool.ForEach(static_cast<int>(stretches_.size()), [&](int i) {
-    const Run& last = runs_[stretches_[i].last - 1];
-    double zeros = 0.0;  // or not a number
-    const Step* step = steps_.data() + runs_[stretches_[i].first].first;
-    for (const Step* end = steps_.data() + last.first + last.steps; step != end; ++step) {
-      const double rate = step->sign * (of_bodies[step->child] - of_bodies[step->parent]);
-      rates[step->u] = base.empty() ? rate : base[step->u] + rate;
-      zeros += 0.0 * rate;
-    }
-    stretches_[i].is_finite = zeros == 0.0;
+    Stretch& stretch = stretches_[i];
+    stretch.is_finite = base.empty()
+                            ? AlongStretch<false>(stretch, of_bodies, nullptr, rates.data())
+                            : AlongStretch<true>(stretch, of_bodies, base.data(), rates.data());
   });
   return std::ranges::all_of(stretches_, &Stretch::is_finite);
 }

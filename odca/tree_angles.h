@@ -52,6 +52,10 @@ class TreeAngles {
   /// Along a run, from the given angle and speed on.
   void Walk(const Run& run, double angle, double speed, const double* q, const double* u,
             double* angles, double* speeds) const;
+  /// The part of ToJoints() that one thread does.
+  template <bool kAdd>
+  bool AlongStretch(const Stretch& stretch, const double* of_bodies, const double* base,
+                    double* rates) const;
   std::vector<Step> steps_;
   std::vector<Run> runs_;
   std::vector<Stretch> stretches_;

@@ -217,12 +217,13 @@ void WarnOfJobs(int jobs) {
 
 std::vector<Case> SelectCases(const Experiment& experiment, const Selection& filter) {
   std::vector<Case> cases;
-  for (const Case& one : Expand(experiment)) {
-    for (const Condition& condition : filter) {
-      if (one.keys.Find(condition.key) == nullptr) RejectKey(condition.key, one.keys);
-    }
-    if (Matches(one.keys, filter)) cases.push_back(one);
+  const std::vector<Case> all = Expand(experiment);
+  for (const Condition& condition : filter) {
+    const auto has = [&](const Case& one) { return one.keys.Find(condition.key) != nullptr; };
+    if (std::ranges::none_of(all, has)) RejectKey(condition.key, all.front().keys);
   }
+  std::ranges::copy_if(all, std::back_inserter(cases),
+                       [&](const Case& one) { return Matches(one.keys, filter); });
   if (cases.empty()) {
     throw ConfigError(
         fmt::format("{}: no case matches {}", experiment.path.string(), ToText(filter)));

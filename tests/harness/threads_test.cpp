@@ -1,0 +1,36 @@
+// Several threads on one right-hand side: a case of its own, with the same results.
+#include <gtest/gtest.h>
+
+#include "tests/harness/cli_fixture.h"
+
+namespace loopbench::harness {
+namespace threads_test {
+
+TEST_F(CommandLineTest, ThreadsChangeNothingButTimes) {
+  // long enough for threads to have work of their own
+  Write("long.json", R"({"name": "long",
+    "scenes": [{"mechanism": {"family": "ladder", "windows": 2100}, "horizon": 0.02}],
+    "columns": [{"formulation": "odca", "enforcement": "velocity", "threads": [1, 2]}],
+    "tolerances": 1e-6, "timing": {"repeats": 1}})");
+  ExpectEnding(Call("run long.json --out out"), 0, {"4 run now"});
+  std::string hash;
+  int with_threads = 0;
+  for (const Record& record : ReadRecords(folder_ / "out")) {
+    ASSERT_EQ(record.Text("outcome"), "finished") << record.Text("message");
+    with_threads += record.Number("threads") == 2.0;
+    if (record.Text("kind") != "accuracy") continue;
+    if (hash.empty()) hash = record.Text("state_hash");
+    EXPECT_EQ(record.Text("state_hash"), hash);
+  }
+  EXPECT_EQ(with_threads, 2);
+  ExpectEnding(Call("list long.json --filter threads=2"), 0, {});
+  ExpectEnding(Call("run long.json --no-timing --threads 3 --out three"), 0, {"1 run now"});
+  const std::vector<Record> three = ReadRecords(folder_ / "three");
+  ASSERT_EQ(three.size(), 1u) << "columns that differed in threads alone are one";
+  EXPECT_EQ(three[0].Text("state_hash"), hash);
+  EXPECT_EQ(three[0].Number("threads"), 3.0);
+  ExpectEnding(Call("run long.json --threads 0 --out none"), 2, {"--threads"});
+}
+
+}  // namespace threads_test
+}  // namespace loopbench::harness

@@ -1,7 +1,7 @@
 // O-DCA for planar mechanisms whose bodies form paths (paths.h) of pins under gravity: from joint
 // coordinates and speeds to their rates at once, in the kernels of two_handle.h.
 //
-//   angles and speeds of bodies   along the spanning tree, one after another
+//   angles and speeds of bodies   along the spanning tree (tree_angles.h)
 //   gaps of cut joints            along each path
 //   up                            a path is cut into groups of kLanes pieces, all of equal length;
 //                                 the pieces of a group are joined body after body, side by side,
@@ -10,8 +10,8 @@
 //   down                          the same the other way round
 //
 // A short path has no groups, a long one up to kMostGroups, which threads share. What is computed
-// depends on the mechanism alone, never on their number. The depth is that of one group's sweep and
-// of the sequence of pieces, n / (kLanes groups) + kLanes groups: work goes before depth here.
+// depends on the mechanism alone, never on their number. The depth is that of one piece and of the
+// sequence of pieces and left-over bodies: work goes before depth here.
 //
 // Pins that close loops must not be degenerate: where InverseOf() sees one that may be, Evaluate()
 // gives up, and the general sweep decides. Its scale is the trace of the free response of the
@@ -31,10 +31,14 @@ namespace loopbench::odca::pins {
 
 class PathSweep {
  public:
+  /// Enough work for a thread to wait for the others after it.
+  static constexpr int kBodiesOfGroup = 2048;
+
   /// Null where the mechanism is none of those, or MeasurePath() has nothing for a path of it. It
-  /// need not outlive the sweep. Up to `threads` threads work on it, if it has the groups for them.
+  /// need not outlive the sweep. Up to `threads` threads work on it, one for every
+  /// `bodies_of_group` bodies.
   static std::unique_ptr<PathSweep> Make(const Mechanism<Planar, double>& mechanism,
-                                         int threads = 1);
+                                         int threads = 1, int bodies_of_group = kBodiesOfGroup);
 
   /// As ConstraintSolver::RightHandSide(). False near a degenerate position, for angles beyond
   /// kLargestAngle, and for numbers that are not finite. Allocates nothing.
@@ -86,7 +90,7 @@ class PathSweep {
     bool stands_alone = false;  ///< it has a pin, if the path has loops_in_lanes
   };
   PathSweep() = default;
-  void Add(const Mechanism<Planar, double>& mechanism, PathLinks path);
+  void Add(const Mechanism<Planar, double>& mechanism, PathLinks path, int bodies_of_group);
   /// Closures of pieces' first bodies go there, and out of those of the packs.
   void AddPieces(PathPlaces& path, std::vector<Closure<double>>& closures);
   void AddPacks(const PathPlaces& path, const PathLinks& links);

@@ -19,8 +19,6 @@ bool IsPin(const Joint<Planar, double>& joint) {
          joint.num_released == 0;
 }
 
-/// Bodies of a group of a long path: enough work for a thread to wait for the others after it.
-constexpr int kBodiesOfGroup = 2048;
 /// Their pieces are joined one after another.
 constexpr int kMostGroups = 128;
 
@@ -82,8 +80,8 @@ void SetLimits(const Mechanism<Planar, double>& mechanism, int pieces, int lengt
 
 }  // namespace
 
-std::unique_ptr<PathSweep> PathSweep::Make(const Mechanism<Planar, double>& mechanism,
-                                           int threads) {
+std::unique_ptr<PathSweep> PathSweep::Make(const Mechanism<Planar, double>& mechanism, int threads,
+                                           int bodies_of_group) {
   if (mechanism.num_u() == 0 || !mechanism.forces().empty() ||
       !std::ranges::all_of(mechanism.joints(), IsPin)) {
     return nullptr;
@@ -94,7 +92,7 @@ std::unique_ptr<PathSweep> PathSweep::Make(const Mechanism<Planar, double>& mech
   for (const Path& path : FindPaths(mechanism.num_bodies(), PlanJoints(mechanism))) {
     std::optional<PathLinks> links = MeasurePath(mechanism, path);
     if (!links) return nullptr;
-    sweep->Add(mechanism, *links);
+    sweep->Add(mechanism, *links, bodies_of_group);
     for (std::size_t k = 0; k < links->path.size(); ++k) {
       place_of[links->path[k].body] = sweep->paths_.back().place(static_cast<int>(k));
       axes[links->path[k].body] = links->axes[k];
@@ -104,15 +102,16 @@ std::unique_ptr<PathSweep> PathSweep::Make(const Mechanism<Planar, double>& mech
   sweep->tree_ = TreeAngles(mechanism, place_of, axes);
   sweep->angle_.setZero(sweep->num_places_ + 1);
   sweep->speed_ = sweep->alpha_ = sweep->angle_;
-  const int useful = std::max(1, static_cast<int>(sweep->groups_.size()));
+  const int useful = std::max(1, sweep->num_places_ / bodies_of_group);
   sweep->pool_ = std::make_unique<WorkerPool>(std::min(threads, useful));
   return sweep;
 }
 
-void PathSweep::Add(const Mechanism<Planar, double>& mechanism, PathLinks links) {
+void PathSweep::Add(const Mechanism<Planar, double>& mechanism, PathLinks links,
+                    int bodies_of_group) {
   PathPlaces path;
   path.bodies = static_cast<int>(links.links.size());
-  path.groups = std::clamp(path.bodies / kBodiesOfGroup, 1, kMostGroups);
+  path.groups = std::clamp(path.bodies / bodies_of_group, 1, kMostGroups);
   while (path.groups > 0) {
     path.packs = LengthOfPieces(links.closures, path.pieces());
     if (path.packs > 0) break;
@@ -161,7 +160,7 @@ void PathSweep::AddPieces(PathPlaces& path, std::vector<Closure<double>>& closur
 void PathSweep::AddPacks(const PathPlaces& path, const PathLinks& links) {
   std::map<std::string, int> kinds;
   for (int g = 0; g < path.groups; ++g) {
-    Group group;
+    Group group{};
     group.path = static_cast<int>(paths_.size());
     group.pack = path.first_pack + g * path.packs;
     group.place = path.first + g * path.packs * kLanes;

@@ -14,20 +14,25 @@ constexpr int kLongest = 4096;
 /// X_PF and X_QM are angles here.
 TreeAngles::TreeAngles(const Mechanism<Planar, double>& mechanism, const std::vector<int>& place_of,
                        const std::vector<double>& axes) {
-  std::vector<int> run_of(place_of.size(), -1);  // by place
-  for (const TreeStep& step : mechanism.tree()) {
+  std::vector<std::vector<const TreeStep*>> below(place_of.size());  // by body
+  for (const TreeStep& step : mechanism.tree()) below[step.parent].push_back(&step);
+  std::vector<int> run_of(place_of.size(), -1);  // by body
+  std::vector<const TreeStep*> waiting = below[kGround];
+  while (!waiting.empty()) {  // depth first, so that runs are long
+    const TreeStep& step = *waiting.back();
+    waiting.pop_back();
+    waiting.insert(waiting.end(), below[step.child].begin(), below[step.child].end());
     const Joint<Planar, double>& joint = mechanism.joints()[step.joint];
-    const int child = place_of[step.child], parent = place_of[step.parent];
-    const bool goes_on = !steps_.empty() && steps_.back().child == parent;
+    const bool goes_on = !steps_.empty() && steps_.back().child == place_of[step.parent];
     if (!goes_on || runs_.back().steps == kLongest) {
-      runs_.push_back({.first = static_cast<int>(steps_.size()), .before = run_of[parent]});
+      runs_.push_back({.first = static_cast<int>(steps_.size()), .before = run_of[step.parent]});
     }
     ++runs_.back().steps;
-    run_of[child] = static_cast<int>(runs_.size()) - 1;
+    run_of[step.child] = static_cast<int>(runs_.size()) - 1;
     const double of_bodies = step.sign * (joint.X_PF.angle - joint.X_QM.angle);
     steps_.push_back({.u = joint.u_offset,
-                      .child = child,
-                      .parent = parent,
+                      .child = place_of[step.child],
+                      .parent = place_of[step.parent],
                       .sign = static_cast<double>(step.sign),
                       .offset = of_bodies + axes[step.child] - axes[step.parent]});
   }

@@ -46,11 +46,8 @@ std::vector<Record> RecordsOf(const std::vector<std::string>& ids,
 
 int Run(const RunCommand& command, const std::string& typed) {
   // read everything first: a mistake in the last file must not cost the runs of the first
-  std::vector<Experiment> experiments =
-      ReadSelected({command.experiments, command.settings, command.suite.filter});
-  if (command.threads > 0) {
-    for (Experiment& experiment : experiments) UseThreads(command.threads, experiment);
-  }
+  const std::vector<Experiment> experiments =
+      ReadSelected({command.experiments, command.settings, command.suite.filter, command.threads});
   if (command.suite.precision) {
     for (const Experiment& experiment : experiments) RequireLadders(experiment);
   }

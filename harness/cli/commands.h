@@ -33,7 +33,7 @@ struct RunCommand {
   std::filesystem::path out;  ///< folder; default results/runs/<name of the first experiment>
   std::vector<Setting> settings;
   SuiteOptions suite;
-  int threads = 0;   ///< of all columns; 0: as the files say
+  int threads = 0;   ///< as of ExperimentFiles
   std::string gate;  ///< "doubts" or ""
 };
 /// Runs what the store does not have yet, then writes its tables.
@@ -51,6 +51,7 @@ struct ExperimentFiles {
   std::vector<std::filesystem::path> paths;
   std::vector<Setting> settings;
   Selection filter;
+  int threads = 0;  ///< of all columns; 0: as the files say
 };
 
 /// The experiments of the files, each combination of a sweep one, of which at least one case passes

@@ -22,15 +22,27 @@ namespace loopbench::harness {
 
 namespace {
 
-/// Whether some case of the experiment passes; throws when the filter names a key it does not have.
-bool Passes(const Experiment& experiment, const Selection& filter) {
-  const std::vector<Case> cases = Expand(experiment);
-  if (cases.empty() || filter.empty()) return !cases.empty();
-  for (const Condition& condition : filter) {
-    if (cases.front().keys.Find(condition.key) == nullptr)
-      return !SelectCases(experiment, filter).empty();
+/// A condition on a key that no case has would silently match nothing.
+void RequireKeys(const std::vector<Experiment>& experiments, const Selection& filter) {
+  if (filter.empty()) return;
+  std::vector<std::string> known;
+  for (const Experiment& experiment : experiments) {
+    for (const Case& one : Expand(experiment)) {
+      for (const auto& [key, value] : one.keys.items()) {
+        if (std::ranges::find(known, key) == known.end()) known.push_back(key);
+      }
+    }
   }
-  return std::ranges::any_of(cases, [&](const Case& one) { return Matches(one.keys, filter); });
+  for (const Condition& condition : filter) {
+    if (std::ranges::find(known, condition.key) != known.end()) continue;
+    throw ConfigError(fmt::format("--filter {}: no such key; cases have {}", condition.key,
+                                  fmt::join(known, ", ")));
+  }
+}
+
+bool Passes(const Experiment& experiment, const Selection& filter) {
+  return std::ranges::any_of(Expand(experiment),
+                             [&](const Case& one) { return Matches(one.keys, filter); });
 }
 
 Table CaseTable(const std::vector<Experiment>& experiments, const Selection& filter) {
@@ -46,6 +58,11 @@ Table CaseTable(const std::vector<Experiment>& experiments, const Selection& fil
     if (std::holds_alternative<std::int64_t>(value)) format = Format::kInteger;
     table.columns.push_back({name, name, format, {}});
   }
+  const bool has_threads = std::ranges::any_of(experiments, [](const Experiment& experiment) {
+    return std::ranges::any_of(experiment.columns,
+                               [](const Column& column) { return column.threads > 1; });
+  });
+  if (has_threads) table.columns.push_back({"threads", "threads", Format::kInteger, {}});
   table.columns.push_back({"rtol", "rtol", Format::kShortest, {}});
   table.columns.push_back({"horizon", "horizon [s]", Format::kShortest, {}});
   table.columns.push_back({"ensemble", "runs", Format::kInteger, {}});
@@ -117,7 +134,12 @@ std::vector<Experiment> ReadSelected(const ExperimentFiles& files) {
   std::vector<Experiment> selected;
   for (const auto& path : files.paths) {
     const std::size_t before = selected.size();
-    for (Experiment& experiment : ReadExperiments(path, files.settings)) {
+    std::vector<Experiment> experiments = ReadExperiments(path, files.settings);
+    if (files.threads > 0) {
+      for (Experiment& experiment : experiments) UseThreads(files.threads, experiment);
+    }
+    RequireKeys(experiments, files.filter);
+    for (Experiment& experiment : experiments) {
       if (Passes(experiment, files.filter)) selected.push_back(std::move(experiment));
     }
     if (selected.size() > before) continue;
@@ -129,7 +151,7 @@ std::vector<Experiment> ReadSelected(const ExperimentFiles& files) {
 int List(const ExperimentFiles& files) {
   for (const auto& path : files.paths) {
     const std::vector<Experiment> experiments =
-        ReadSelected({{path}, files.settings, files.filter});
+        ReadSelected({{path}, files.settings, files.filter, files.threads});
     for (const Experiment& experiment : experiments) CheckLadders(experiment);
     PrintText(ToText(CaseTable(experiments, files.filter)) + "\n");
   }

@@ -101,7 +101,7 @@ class Pilot {
       return fmt::format("{} {}", found.start_s, found.per_work);
     };
     RunInProcesses(
-        1, 1, work, [&](std::size_t) { return LimitsOfRuns(like.limits, 1); },
+        1, 1, work, [&](std::size_t) { return LimitsOfRuns(like.limits, like.column.threads); },
         [&](std::size_t, const ProcessResult& result) {
           if (result.ending == ProcessEnding::kAnswered &&
               std::sscanf(result.text.c_str(), "%lf %lf", &rate.start_s, &rate.per_work) == 2) {

@@ -66,7 +66,8 @@ void FileOptions::AddRun(CLI::App& app) {
       ->check(NumberFrom(1, 1024))
       ->capture_default_str();
   run_app_
-      ->add_option("--threads", run_.threads, "On one right-hand side; same results, in less time")
+      ->add_option("--threads", run_.threads,
+                   "Allowed on one right-hand side, where O-DCA has long paths: same results")
       ->check(NumberFrom(1, kMostThreads));
   run_app_->add_option("--filter", conditions_, "Only accuracy cases with key=value[,value]");
   AddSettings(run_app_, &settings_);

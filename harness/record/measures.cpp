@@ -29,7 +29,7 @@ constexpr Measure kMeasures[] = {
     {"rtol", kNumber, {"rtol", "", kShortest}},
     {"atol", kNumber, {"atol", "", kShortest}},
     {"horizon", kNumber, {"horizon", "s", kShortest}},
-    {"threads", kNumber, {"threads", "", kInteger}},
+    {"threads", kNumber},
     {"alpha", kNumber},
     {"beta", kNumber},
     {"case_id", kText, {"case"}},

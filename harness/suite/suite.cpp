@@ -49,7 +49,7 @@ Piece AccuracyPiece(const Experiment& experiment, const Case& one) {
   const int runs = one.ensemble > 1 ? one.ensemble + 1 : 1;
   return {.owed = {one.keys},
           .work = [&experiment, one] { return std::vector<Record>{RunCase(experiment, one)}; },
-          .limits = LimitsOfRuns(one.limits, runs),
+          .limits = LimitsOfRuns(one.limits, runs * one.column.threads),
           .label = fmt::format("{} {} {}", one.mechanism, ToString(one.column), one.rtol),
           .cost = Cost(one)};
 }
@@ -59,10 +59,12 @@ Piece TimingPiece(const Experiment& experiment, const TimingGroup& group) {
   for (const Case& one : group.cases) piece.owed.push_back(one.keys);
   // the first column is timed twice (noise.h)
   const int columns = static_cast<int>(group.cases.size()) + 1;
-  const int runs = columns * (experiment.timing.repeats + 1);
+  int threads = 1;
+  for (const Case& one : group.cases) threads = std::max(threads, one.column.threads);
+  const int runs = columns * (experiment.timing.repeats + 1) * threads;
   // right-hand sides have no limit of their own; a minute per column is far beyond any
   constexpr double kDerivatives_s = 60.0;
-  piece.limits = {kPatience * runs * experiment.limits.cpu_s + kDerivatives_s * columns,
+  piece.limits = {kPatience * runs * experiment.limits.cpu_s + kDerivatives_s * columns * threads,
                   experiment.limits.memory_mb};
   piece.work = [&experiment, &group] { return TimeTogether(experiment, group); };
   piece.label = group.name;
@@ -196,16 +198,18 @@ class Runner {
   SuiteCount count_;
 };
 
-/// A condition on a key that cases do not have would silently match nothing.
-[[noreturn]] void RejectKey(const std::string& key, const Record& keys) {
-  std::string known;
-  for (const auto& [name, value] : keys.items()) known += (known.empty() ? "" : ", ") + name;
-  throw ConfigError(fmt::format("--filter {}: no such key; cases have {}", key, known));
-}
-
 /// Limits of time are of CPU time, so that too many jobs change no outcome. They gain nothing.
-void WarnOfJobs(int jobs) {
+void WarnOfJobs(int jobs, const std::vector<Experiment>& experiments) {
   const int processors = ReadMachineState().processors;
+  int threads = 1;
+  for (const Experiment& experiment : experiments) {
+    for (const Column& column : experiment.columns) threads = std::max(threads, column.threads);
+  }
+  if (threads > 1 && jobs * threads > processors) {
+    PrintError(
+        "warning: --jobs {} of up to {} threads on {} processor{}: they wait for each other\n",
+        jobs, threads, processors, processors == 1 ? "" : "s");
+  }
   if (jobs <= processors) return;
   PrintError(
       "warning: --jobs {} on {} processor{}: the runs take turns, and together they may ask "
@@ -216,14 +220,8 @@ void WarnOfJobs(int jobs) {
 }  // namespace
 
 std::vector<Case> SelectCases(const Experiment& experiment, const Selection& filter) {
-  std::vector<Case> cases;
-  const std::vector<Case> all = Expand(experiment);
-  for (const Condition& condition : filter) {
-    const auto has = [&](const Case& one) { return one.keys.Find(condition.key) != nullptr; };
-    if (std::ranges::none_of(all, has)) RejectKey(condition.key, all.front().keys);
-  }
-  std::ranges::copy_if(all, std::back_inserter(cases),
-                       [&](const Case& one) { return Matches(one.keys, filter); });
+  std::vector<Case> cases = Expand(experiment);
+  std::erase_if(cases, [&](const Case& one) { return !Matches(one.keys, filter); });
   if (cases.empty()) {
     throw ConfigError(
         fmt::format("{}: no case matches {}", experiment.path.string(), ToText(filter)));
@@ -251,7 +249,7 @@ Shard ParseShard(const std::string& text) {
 
 SuiteCount RunSuite(const std::vector<Experiment>& experiments, const SuiteOptions& options,
                     const std::vector<Record>& records, ResultStore& store) {
-  WarnOfJobs(options.jobs);
+  WarnOfJobs(options.jobs, experiments);
   Runner runner(options, records, store);
   std::vector<Piece> pieces;
   std::size_t number = 0;

@@ -37,12 +37,11 @@ struct SuiteOptions {
   Rerun rerun = Rerun::kNone;
 };
 
-/// The accuracy cases that pass the filter. Throws ConfigError when none does, or when it names a
-/// key that cases do not have.
+/// The accuracy cases that pass the filter. Throws ConfigError when none does.
 std::vector<Case> SelectCases(const Experiment& experiment, const Selection& filter);
 
-/// Those of a process that makes so many runs: twice the CPU time that they may take by themselves,
-/// and a little for starting.
+/// Those of a process that makes so many runs, each counted once for each of its threads: twice the
+/// CPU time that they may take by themselves, and a little for starting.
 ProcessLimits LimitsOfRuns(const Limits& limits, double runs);
 
 /// What a run did.

@@ -127,7 +127,7 @@ const std::vector<TableColumn>& TimingColumns() {
                               "step_us_median", "wall_s_median",  "realtime_factor", "repeats",
                               "rhs_ns_min",     "wall_s_min",     "wall_s_p10",      "wall_s_p90",
                               "aa_spread",      "aa_spread_wall", "load1",           "processors",
-                              "governor",       "noise",          "threads"}));
+                              "governor",       "noise"}));
   return kColumns;
 }
 

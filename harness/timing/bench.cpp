@@ -43,8 +43,9 @@ Examples:
   loopbench fit new.json
   loopbench compare base.json new.json
 
-Names are MEASURE/MECHANISM[/SIZE]/FORMULATION/LEVEL/COORDINATES/SOLVER. A benchmark that cannot be
-measured is an error with its reason, without counters.
+Names are MEASURE/MECHANISM[/SIZE]/FORMULATION/LEVEL/COORDINATES/SOLVER[/N-threads]. Times are of the
+processor, with several threads by the clock. A benchmark that cannot be measured is an error with
+its reason, without counters.
 Exit codes: 0 done, 2 bad input, or nothing could be measured.
 )";
 

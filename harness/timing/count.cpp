@@ -53,6 +53,10 @@ struct Options {
 
 Record CountCase(const BenchmarkMember& member, const Column& column, const BenchmarkSet& set,
                  const Options& options) {
+  if (column.threads > 1) {
+    throw std::runtime_error(
+        fmt::format("{} {}: instructions are those of one thread", member.name, ToString(column)));
+  }
   const MechanismDescription description = member.Make();
   const BenchmarkState state = ComputeState(description, column.coordinates);
   Record record;

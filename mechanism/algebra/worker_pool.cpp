@@ -1,6 +1,5 @@
 #include "mechanism/algebra/worker_pool.h"
 
-#include <chrono>
 #include <cstdint>
 
 namespace loopbench {
@@ -8,8 +7,8 @@ namespace loopbench {
 namespace {
 
 constexpr int kOver = -1;
-/// Looks at an atomic before a thread sleeps, some 20 to 60 us: rounds of one evaluation follow
-/// each other within a few, and to be woken takes as long.
+/// Looks at an atomic before a thread sleeps, some 20 to 60 us where there is a pause to make:
+/// rounds of one evaluation follow each other within a few, and to be woken takes as long.
 constexpr int kLooks = 1000;
 
 void Pause() {
@@ -45,7 +44,7 @@ WorkerPool::WorkerPool(int threads) {
 WorkerPool::~WorkerPool() { End(); }
 
 void WorkerPool::End() {
-  rounds_.store(kOver, std::memory_order_release);
+  rounds_.store(kOver);
   rounds_.notify_all();
   for (std::thread& worker : workers_) worker.join();
 }
@@ -60,8 +59,8 @@ void WorkerPool::Do(int thread) const {
 void WorkerPool::Share(const Round& round) {
   round_ = round;
   at_work_.store(static_cast<int>(workers_.size()), std::memory_order_relaxed);
-  rounds_.store((rounds_.load(std::memory_order_relaxed) + 1) & 0x3fffffff,
-                std::memory_order_release);
+  // in one order with notify_all's look at who sleeps: else both could miss the other
+  rounds_.store((rounds_.load(std::memory_order_relaxed) + 1) & 0x3fffffff);
   rounds_.notify_all();
   Do(0);
   for (int left = at_work_.load(std::memory_order_acquire); left != 0;) {

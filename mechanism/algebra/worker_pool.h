@@ -4,7 +4,8 @@
 // rounds of one right-hand side, and then sleep. Which thread does which piece is fixed by their
 // numbers alone, so pieces find in its cache what they left there. What is computed must not
 // depend on it: pieces write to places of their own, and what they add up is added by the caller,
-// in their order.
+// in their order. A process that forks has no workers in its child: a pool is to be made where it
+// is used.
 #pragma once
 
 #include <atomic>
@@ -28,13 +29,11 @@ class WorkerPool {
   /// all are done. From one thread at a time; `do_piece` must not throw. Allocates nothing.
   template <class Work>
   void ForEach(int pieces, const Work& do_piece) {
-    if (workers_.empty() || pieces < 2) {
-      for (int i = 0; i < pieces; ++i) do_piece(i);
-      return;
-    }
+    // one function for one thread and for many: what is compiled twice may round differently
     const auto range = [](const void* work, int first, int last) {
       for (int i = first; i < last; ++i) (*static_cast<const Work*>(work))(i);
     };
+    if (workers_.empty() || pieces < 2) return range(&do_piece, 0, pieces);
     Share({range, &do_piece, pieces});
   }
 
@@ -51,9 +50,10 @@ class WorkerPool {
   void Run(int thread);
 
   std::vector<std::thread> workers_;
-  Round round_;                   ///< written before rounds_ grows, read after
-  std::atomic<int> rounds_ = 0;   ///< begun so far; -1: all is over
-  std::atomic<int> at_work_ = 0;  ///< workers that have not done their share of the round
+  Round round_;  ///< written before rounds_ grows, read after
+  /// Begun so far; -1: all is over. What many look at has cache lines of its own.
+  alignas(64) std::atomic<int> rounds_ = 0;
+  alignas(64) std::atomic<int> at_work_ = 0;  ///< workers that have yet to do their share
 };
 
 }  // namespace loopbench

@@ -23,12 +23,16 @@ TEST_F(CommandLineTest, ThreadsChangeNothingButTimes) {
     EXPECT_EQ(record.Text("state_hash"), hash);
   }
   EXPECT_EQ(with_threads, 2);
-  ExpectEnding(Call("list long.json --filter threads=2"), 0, {});
+  ExpectEnding(Call("list long.json --filter threads=2"), 0, {"threads", "1 cases"});
+  ExpectEnding(Call("list long.json --filter threads=3"), 2, {"no case matches"});
+  ExpectEnding(Call("list long.json --filter thread=2"), 2, {"no such key", "threads"});
   ExpectEnding(Call("run long.json --no-timing --threads 3 --out three"), 0, {"1 run now"});
   const std::vector<Record> three = ReadRecords(folder_ / "three");
   ASSERT_EQ(three.size(), 1u) << "columns that differed in threads alone are one";
   EXPECT_EQ(three[0].Text("state_hash"), hash);
   EXPECT_EQ(three[0].Number("threads"), 3.0);
+  ExpectEnding(Call("run long.json --no-timing --threads 3 --filter threads=3 --out three"), 0,
+               {"0 run now, 1 were done before"});
   ExpectEnding(Call("run long.json --threads 0 --out none"), 2, {"--threads"});
 }
 

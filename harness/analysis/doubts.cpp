@@ -6,6 +6,7 @@
 
 #include "harness/analysis/agreement.h"
 #include "harness/config/experiment.h"
+#include "harness/config/formulations.h"
 #include "mechanism/loops/scaled_loops.h"
 
 namespace loopbench::harness {
@@ -84,9 +85,11 @@ double PromisedDriftShare(const Record& record) {
     const double remembered = std::min(steps, StepsRemembered(record));
     tolerances += kAcceleration * remembered * remembered;
   }
-  // nothing is left but of softened directions
-  const bool softened = record.Number("softened_evaluations") > 0;
-  if (growth == DriftGrowth::kNone && !softened) tolerances = 0.0;
+  // nothing is left but of softened directions, and what peers, which project to a part of their
+  // tolerance, leave
+  const FormulationRow* row = FindFormulation(record.Text("formulation"));
+  const bool left = record.Number("softened_evaluations") > 0 || (row && row->is_peer());
+  if (growth == DriftGrowth::kNone && !left) tolerances = 0.0;
   return record.Find("position_goal") == nullptr ? tolerances * rtol
                                                  : std::max(tolerances * rtol, goal);
 }

@@ -8,6 +8,7 @@
 #include "harness/judge/claims_reader.h"
 #include "harness/judge/claims_report.h"
 #include "harness/record/provenance.h"
+#include "harness/run/peers.h"
 #include "harness/run/run_case.h"
 #include "harness/store/contents.h"
 #include "harness/store/merge_stores.h"
@@ -48,6 +49,7 @@ int Run(const RunCommand& command, const std::string& typed) {
   // read everything first: a mistake in the last file must not cost the runs of the first
   const std::vector<Experiment> experiments =
       ReadSelected({command.experiments, command.settings, command.suite.filter, command.threads});
+  RequirePeers(experiments);
   if (command.suite.precision) {
     for (const Experiment& experiment : experiments) RequireLadders(experiment);
   }

@@ -4,6 +4,7 @@
 
 #include <algorithm>
 
+#include "harness/config/formulations.h"
 #include "harness/config/options.h"
 
 namespace loopbench::harness {
@@ -61,8 +62,11 @@ Record CaseKeys(const Experiment& experiment, const Case& one) {
   keys.Set("enforcement", std::string(ToString(one.column.enforcement)));
   keys.Set("coordinates", std::string(ToString(one.column.coordinates)));
   keys.Set("solver", std::string(ToString(one.column.solver)));
-  keys.Set("integrator", one.integrator);
-  if (const Profile* profile = FindProfile(one.integrator); profile && profile->is_implicit) {
+  const FormulationRow* row = FindFormulation(one.column.formulation);
+  const bool is_peer = row != nullptr && row->is_peer();
+  keys.Set("integrator", is_peer ? row->integrator : one.integrator);
+  const Profile* profile = FindProfile(one.integrator);
+  if (profile != nullptr && profile->is_implicit && !is_peer) {
     const auto kind = static_cast<std::size_t>(one.jacobian);
     keys.Set("jacobian", std::string(kNames<JacobianKind>[kind]));
   }

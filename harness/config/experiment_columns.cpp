@@ -31,6 +31,25 @@ void RequireLevels(const JsonNode& node, ColumnLists& lists) {
   }
 }
 
+/// Reports what a peer does not have: it has its own coordinates and solver.
+void RequirePeersOwn(const JsonNode& node, ColumnLists& lists) {
+  for (const std::string& formulation : lists.formulations) {
+    if (!FindFormulation(formulation)->is_peer()) continue;
+    const auto refuse = [&](std::string_view key, std::string_view found, std::string_view only) {
+      node.FailAs(fmt::format("\"{}\" with {} \"{}\"", formulation, key, found),
+                  fmt::format("\"{}\", or nothing: a peer has its own", only));
+    };
+    static const Column kOwn;
+    for (const Coordinates set : lists.coordinates) {
+      if (set != kOwn.coordinates) refuse("coordinates", ToString(set), ToString(kOwn.coordinates));
+    }
+    for (const SolverKind solver : lists.solvers) {
+      if (solver != kOwn.solver) refuse("solver", ToString(solver), ToString(kOwn.solver));
+    }
+    if (lists.gains) node.FailAs(fmt::format("\"{}\" with gains", formulation), "no gains");
+  }
+}
+
 /// Gains of Baumgarte's stabilisation, which only it has, and both or none.
 void ReadGains(const JsonNode& node, ColumnLists& lists) {
   const auto alpha = node.Optional("alpha"), beta = node.Optional("beta");
@@ -67,7 +86,8 @@ const Fields<ColumnLists>& ColumnFields() {
        {"beta", NumberSchema(kNotNegative),
         "Gain on mismatches of positions [1/s]; baumgarte only, beside alpha."},
        {"", By({{"dependencies", {{"alpha", {"beta"}}, {"beta", {"alpha"}}}}}, ReadGains)},
-       {"", By(Json::object(), RequireLevels)}});
+       {"", By(Json::object(), RequireLevels)},
+       {"", By(Json::object(), RequirePeersOwn)}});
   return fields;
 }
 

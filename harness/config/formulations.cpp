@@ -14,7 +14,17 @@
 namespace loopbench::harness {
 namespace {
 
-/// Those that come with Loopbench. Colours are Okabe and Ito's, and a green.
+/// A peer's states are looked at through O-DCA.
+FormulationRow PeerRow(std::string name, std::string sentence, Enforcement like,
+                       std::string integrator, FormulationLook look) {
+  FormulationRow row = Row<odca::Odca>(std::move(name), std::move(sentence), std::move(look));
+  row.levels = {like};
+  row.integrator = std::move(integrator);
+  return row;
+}
+
+/// Those that come with Loopbench, peers last. Colours are Okabe and Ito's, and a green; of peers
+/// dark red and violet, whose weak ones nothing has: they have joint coordinates only.
 std::deque<FormulationRow> BuiltIn() {
   return {Row<odca::Odca>("odca",
                           "orthogonal complement divide and conquer. Bodies are joined pair by "
@@ -24,7 +34,15 @@ std::deque<FormulationRow> BuiltIn() {
                                   {"#D55E00", "#E69F00", 5.0}),
           Row<reduction::Reduction>("reduction",
                                     "independent speeds only; the others follow from the loops.",
-                                    {"#009E73", "#999933", 2.0})};
+                                    {"#009E73", "#999933", 2.0}),
+          PeerRow("peer/simbody",
+                  "the library Simbody with its own integrator; after each step it projects "
+                  "positions and speeds, to a tenth of the tolerance.",
+                  Enforcement::kPosition, "simbody-merson", {"#661100", "#AA4466", 2.0}),
+          PeerRow("peer/mujoco",
+                  "the library MuJoCo with steps of one length, made from the tolerance; its "
+                  "closing constraints are springs and dampers.",
+                  Enforcement::kBaumgarte, "mujoco-rk4", {"#AA4499", "#DDAACC", 2.0})};
 }
 
 /// For rows without colours, in turn.
@@ -94,13 +112,15 @@ std::unique_ptr<System<Space, double>> MakeFormulation(std::string_view name,
   if (!row->Has(options.enforcement)) {
     RefuseRow(kKind, row->name, ToString(options.enforcement), "a level that it has");
   }
+  FormulationOptions own = options;
+  if (row->is_peer()) own.enforcement = Enforcement::kAcceleration;
   std::unique_ptr<ConstraintSolver<Space, double>> solver;
   if constexpr (std::is_same_v<Space, Planar>) {
-    solver = row->planar(mechanism, options);
+    solver = row->planar(mechanism, own);
   } else {
-    solver = row->spatial(mechanism, options);
+    solver = row->spatial(mechanism, own);
   }
-  return std::make_unique<System<Space, double>>(mechanism, std::move(solver), options);
+  return std::make_unique<System<Space, double>>(mechanism, std::move(solver), own);
 }
 
 template std::unique_ptr<System<Planar, double>> MakeFormulation(std::string_view,

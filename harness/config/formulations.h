@@ -38,13 +38,19 @@ struct FormulationLook {
 
 /// All that the harness knows of a formulation.
 struct FormulationRow {
-  std::string name;      ///< a word in files, tables and names: a-z, 0-9, '-' and '_'
+  /// A word in files, tables and names: a-z, 0-9, '-' and '_'; of peers "peer/" and a word.
+  std::string name;
   std::string sentence;  ///< what `explain` says of it, after "name: "
   SolverFactory<Planar> planar;
   SolverFactory<Spatial> spatial;
   std::vector<Enforcement> levels = {};  ///< those it has; empty: all there are
   FormulationLook look = {};
+  /// Of a peer (harness/run/peers.h), somebody else's program, the name of its own integrator,
+  /// which tables show in the place of the experiment's; empty for formulations. The factories are
+  /// then those of the solver that the peer's states are looked at through.
+  std::string integrator = {};
 
+  bool is_peer() const { return !integrator.empty(); }
   bool Has(Enforcement level) const;
 };
 
@@ -75,7 +81,8 @@ std::vector<std::string> FormulationNames();
 const FormulationRow* FindFormulation(std::string_view name);
 
 /// The mechanism with the solver of that name, at the level of the options. Throws
-/// std::invalid_argument where there is no such name, or where it does not have the level.
+/// std::invalid_argument where there is no such name, or where it does not have the level. Of a
+/// peer's row: what its states are looked at through, which projects nothing.
 template <class Space>
 std::unique_ptr<System<Space, double>> MakeFormulation(std::string_view name,
                                                        const Mechanism<Space, double>& mechanism,

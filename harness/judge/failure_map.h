@@ -83,6 +83,7 @@ inline constexpr std::array kRunEndings = {RunEnding{"finished", CellState::kIna
                                            RunEnding{"inconsistent-motion", CellState::kStopped},
                                            RunEnding{"locked", CellState::kStopped},
                                            RunEnding{"newton-failure", CellState::kStopped},
+                                           RunEnding{"inexpressible", CellState::kStopped},
                                            RunEnding{"step-limit", CellState::kLimit},
                                            RunEnding{"time-limit", CellState::kLimit},
                                            RunEnding{"process-time-limit", CellState::kLimit},

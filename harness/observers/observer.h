@@ -21,6 +21,7 @@ struct Sample {
   double t = 0.0;
   const System<Space, double>& formulation;
   double supplied = 0.0, dissipated = 0.0;  ///< work since the start [J]
+  bool knows_work = true;                   ///< else these two say nothing
 };
 
 /// What an analysis needs besides the record.

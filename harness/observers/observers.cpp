@@ -8,6 +8,7 @@ namespace loopbench::harness {
 
 template <class Space>
 void EnergyObserver<Space>::Observe(const Sample<Space>& sample) {
+  if (!sample.knows_work) return;  // and no balance
   supplied_ = sample.supplied;
   dissipated_ = sample.dissipated;
   const auto parts = ComputeEnergy(sample.formulation.kinematics());

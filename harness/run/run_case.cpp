@@ -13,6 +13,7 @@
 #include "harness/run/compiled_scene.h"
 #include "harness/run/ensemble.h"
 #include "harness/run/merge_parts.h"
+#include "harness/run/peers.h"
 #include "harness/text/hash.h"
 #include "mechanism/start/assembly.h"
 
@@ -96,9 +97,17 @@ class Runner {
   IntegratorResult Integrate(const Start<double>& start) {
     const auto formulation = MakeFormulation<Space>(case_.column, mechanism_);
     IntegratorResult result;
+    std::unique_ptr<Peer> peer;
+    try {
+      peer = MakePeer(case_.column.formulation, description_);
+    } catch (const Inexpressible& error) {
+      result.outcome = Outcome::kInexpressible;
+      result.message = error.what();
+      return result;
+    }
     result.outcome = formulation->Start(0.0, start.q, start.u);
     if (result.outcome != Outcome::kFinished) return result;
-    formulation->IntegrateWork(mechanism_.has_power());
+    formulation->IntegrateWork(mechanism_.has_power() && !peer);  // peers integrate none
     GiveJacobian(case_.integrator, case_.jacobian, description_, *formulation);
     const std::size_t n = static_cast<std::size_t>(formulation->state_size());
     y_.assign(static_cast<std::size_t>(formulation->size()), 0.0);
@@ -111,6 +120,7 @@ class Runner {
       // what the failing matrix looked like is worth keeping
       const Outcome outcome = formulation->Examine(t, y, ydot);
       Sample<Space> sample{t, *formulation};
+      sample.knows_work = !peer || !mechanism_.has_power();
       if (!work.empty()) sample.supplied = work[0], sample.dissipated = work[1];
       for (const auto& observer : observers_) {
         if (outcome == Outcome::kFinished) observer->Observe(sample);
@@ -118,8 +128,10 @@ class Runner {
       }
       return restart ? StepAction::kRestart : StepAction::kContinue;
     };
-    IntegratorResult run = harness::Integrate(*formulation, 0.0, case_.horizon, y_,
-                                              OptionsOf(case_, mechanism_.stop_times()), observe);
+    const IntegratorOptions options = OptionsOf(case_, mechanism_.stop_times());
+    IntegratorResult run =
+        peer ? peer->Integrate(case_.horizon, y_, options, observe)
+             : harness::Integrate(*formulation, 0.0, case_.horizon, y_, options, observe);
     y_.resize(n);
     if (run.outcome == Outcome::kSingular) {
       const std::string why = formulation->solver().WhySingular();

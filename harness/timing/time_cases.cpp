@@ -9,10 +9,8 @@
 
 #include "harness/integrator/arkode.h"
 #include "harness/record/noise.h"
-#include "harness/run/case_identity.h"
-#include "harness/run/compiled_scene.h"
+#include "harness/run/peers.h"
 #include "harness/run/run_case.h"
-#include "mechanism/description/library.h"
 #include "mechanism/start/assembly.h"
 
 namespace loopbench::harness {
@@ -56,15 +54,21 @@ class SubjectIn final : public Subject {
         start_(Assemble<Space>(description, mechanism_)) {
     result_.outcome = start_.outcome;
     result_.message = start_.message;
+    if (start_.outcome != Outcome::kFinished) return;
+    try {
+      peer_ = MakePeer(one.column.formulation, description);
+    } catch (const Inexpressible& error) {
+      result_.outcome = Outcome::kInexpressible;
+      result_.message = error.what();
+    }
   }
 
   void Prepare() override {
-    if (start_.outcome != Outcome::kFinished) return;
+    if (result_.outcome != Outcome::kFinished) return;
     Reset();
     states_.assign(1, y_);
-    ydot_.resize(y_.size());
     if (!simulate_) {
-      result_.outcome = formulation_->Derivative(0.0, y_, ydot_);
+      result_.outcome = ode().Derivative(0.0, y_, ydot_);
       CalibrateBatch();
       return;
     }
@@ -82,7 +86,7 @@ class SubjectIn final : public Subject {
     if (evaluations_ == 0) return;
     const Clock::time_point begin = Clock::now();
     for (int i = 0; i < evaluations_; ++i) {
-      formulation_->Derivative(0.0, states_[i % states_.size()], ydot_);
+      ode().Derivative(0.0, states_[i % states_.size()], ydot_);
     }
     rhs_ns_.push_back(SecondsSince(begin) * 1e9 / evaluations_);
   }
@@ -127,6 +131,7 @@ class SubjectIn final : public Subject {
       record.Set("steps", result_.steps);
     }
     record.Set("repeats", static_cast<std::int64_t>(simulate_ ? wall_s_.size() : rhs_ns_.size()));
+    if (!formulation_ || peer_) return record;
     for (const auto& [key, count] : formulation_->solver().Counters()) {
       record.Set(std::string(key), count);
     }
@@ -137,21 +142,35 @@ class SubjectIn final : public Subject {
   const std::vector<double>& wall_s() const override { return wall_s_; }
 
  private:
+  /// What is timed.
+  Ode& ode() {
+    if (peer_) return *peer_;
+    return *formulation_;
+  }
+
   void Reset() {
     formulation_ = MakeFormulation<Space>(case_.column, mechanism_);
     formulation_->Start(0.0, start_.q, start_.u);
     y_.resize(formulation_->state_size());
+    ydot_.resize(y_.size());
     formulation_->ToState(start_.q, start_.u, y_);
+    if (peer_) formulation_->Examine(0.0, y_, ydot_);  // to know the rank
   }
 
   IntegratorResult Simulate(const std::function<void(std::span<double>)>& keep) {
+    const IntegratorOptions options = OptionsOf(case_, mechanism_.stop_times());
+    if (peer_) {
+      StepObserver observe;
+      if (keep)
+        observe = [&](double, std::span<double> y) { return keep(y), StepAction::kContinue; };
+      return peer_->Integrate(case_.horizon, y_, options, observe);
+    }
     GiveJacobian(case_.integrator, case_.jacobian, description_, *formulation_);
     const auto observe = [&](double t, std::span<double> y) {
       if (keep) keep(y);
       return formulation_->BeginStep(t, y) ? StepAction::kRestart : StepAction::kContinue;
     };
-    return Integrate(*formulation_, 0.0, case_.horizon, y_,
-                     OptionsOf(case_, mechanism_.stop_times()), observe);
+    return Integrate(*formulation_, 0.0, case_.horizon, y_, options, observe);
   }
 
   /// Evaluations per batch, from the time of a first few (which also warm up).
@@ -161,7 +180,7 @@ class SubjectIn final : public Subject {
       const Clock::time_point begin = Clock::now();
       for (int i = 0; i < evaluations_; ++i) {
         const auto& state = states_[i % states_.size()];
-        if (formulation_->Derivative(0.0, state, ydot_) != Outcome::kFinished) {
+        if (ode().Derivative(0.0, state, ydot_) != Outcome::kFinished) {
           evaluations_ = 0;  // what fails is not timed
           return;
         }
@@ -177,6 +196,7 @@ class SubjectIn final : public Subject {
   Mechanism<Space, double> mechanism_;
   Start<double> start_;
   std::unique_ptr<System<Space, double>> formulation_;
+  std::unique_ptr<Peer> peer_;  ///< in the place of the formulation, which then only counts
   std::vector<double> y_, ydot_;
   std::vector<std::vector<double>> states_;
   int evaluations_ = 0;
@@ -206,67 +226,7 @@ Record NoiseKeys(const MachineState& machine, const Subject& first, const Subjec
   return keys;
 }
 
-/// One system per timing: parts are not timed apart.
-MechanismDescription OneSystem(const Experiment& experiment, std::size_t scene) {
-  CompileOptions options = experiment.compile;
-  options.islands = false;
-  const MechanismFile& file = experiment.scenes[scene].mechanism;
-  return CompileScene(file.description, file.observe, options).compiled.parts.front().description;
-}
-
-MechanismDescription MakeFamilyMember(const TimingFamily& family, int size) {
-  if (family.family == "ladder") return Ladder(size, 1.0, 1.0);
-  MechanismDescription chain = Chain(size);
-  chain.initial.speeds.push_back({0, {1.0}});  // a moving chain: the other speeds follow
-  return chain;
-}
-
-void SetTimingId(const std::string& content, Record* keys) {
-  keys->Set("kind", std::string("timing"));
-  SetCaseId(keys, content);
-}
-
 }  // namespace
-
-std::vector<TimingGroup> TimingGroups(const Experiment& experiment) {
-  std::vector<TimingGroup> groups;
-  const std::vector<Case> all = ExpandTiming(experiment);
-  for (std::size_t scene = 0; scene < experiment.scenes.size(); ++scene) {
-    TimingGroup group{experiment.scenes[scene].name,
-                      [&experiment, scene] { return OneSystem(experiment, scene); },
-                      {},
-                      true};
-    for (const Case& one : all) {
-      if (one.scene != scene) continue;
-      group.cases.push_back(one);
-      SetTimingId(SceneTimingContent(experiment, one), &group.cases.back().keys);
-    }
-    if (!group.cases.empty()) groups.push_back(std::move(group));
-  }
-  if (experiment.timing.repeats == 0) return groups;
-  for (const TimingFamily& family : experiment.timing.families) {
-    for (const int size : family.sizes) {
-      TimingGroup group{fmt::format("{}-{}", family.family, size),
-                        [&family, size] { return MakeFamilyMember(family, size); },
-                        {},
-                        false};
-      for (const Column& column : family.columns) {
-        Case one;
-        one.mechanism = group.name;
-        one.column = column;
-        one.keys = CaseKeys(experiment, one);
-        // a right-hand side has no tolerance and no horizon
-        for (const char* key : {"integrator", "rtol", "atol", "horizon"}) {
-          one.keys.Set(key, Value());
-        }
-        SetTimingId(FamilyTimingContent(experiment), &one.keys);
-        group.cases.push_back(one);
-      }
-      groups.push_back(std::move(group));
-    }
-  }
-  return groups;
-}
 
 std::vector<Record> TimeTogether(const Experiment& experiment, const TimingGroup& group) {
   const MechanismDescription description = group.describe();
@@ -291,15 +251,6 @@ std::vector<Record> TimeTogether(const Experiment& experiment, const TimingGroup
     for (const auto& [key, value] : noise.items()) records.back().Set(key, value);
   }
   return records;
-}
-
-std::size_t CountTimings(const Experiment& experiment) {
-  std::size_t count = ExpandTiming(experiment).size();
-  if (experiment.timing.repeats == 0) return count;
-  for (const TimingFamily& family : experiment.timing.families) {
-    count += family.sizes.size() * family.columns.size();
-  }
-  return count;
 }
 
 }  // namespace loopbench::harness

@@ -24,6 +24,8 @@ std::string_view ToString(Outcome outcome) {
       return "locked";
     case Outcome::kNewtonFailure:
       return "newton-failure";
+    case Outcome::kInexpressible:
+      return "inexpressible";
     case Outcome::kIntegratorError:
       return "integrator-error";
   }

@@ -17,6 +17,7 @@ enum class Outcome {
   kInconsistentMotion,  ///< prescribed motions ask for what the loops forbid
   kLocked,              ///< no speed is free and none is prescribed: nothing can move
   kNewtonFailure,       ///< an implicit step's equations were not solved, however short the step
+  kInexpressible,       ///< a peer does not have one of its joints or forces
   kIntegratorError,     ///< any other error return of the integrator
 };
 

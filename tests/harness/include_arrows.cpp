@@ -8,35 +8,21 @@ namespace loopbench::architecture {
 namespace {
 
 // From the ground floor up: files of a room include those of rooms above it in this list only.
-constexpr std::string_view kRooms[] = {"mechanism/algebra",
-                                       "mechanism/description",
-                                       "mechanism/model",
-                                       "mechanism/loops",
-                                       "mechanism/start",
-                                       "mechanism/formulation",
-                                       "mechanism/simplify",
-                                       "odca",
-                                       "lagrange",
-                                       "reduction",
-                                       "harness/text",
-                                       "harness/json",
-                                       "harness/record",
-                                       "harness/store",
-                                       "harness/config",
-                                       "harness/analysis",
-                                       "harness/integrator",
-                                       "harness/observers",
-                                       "harness/run",
-                                       "harness/precision",
-                                       "harness/isolation",
-                                       "harness/timing",
-                                       "harness/suite",
-                                       "harness/tables",
-                                       "harness/judge",
-                                       "harness/figures",
-                                       "harness/cli",
-                                       "examples/own-parts",
-                                       "tests"};
+constexpr std::string_view kRooms[] = {"mechanism/algebra",  "mechanism/description",
+                                       "mechanism/model",    "mechanism/loops",
+                                       "mechanism/start",    "mechanism/formulation",
+                                       "mechanism/simplify", "odca",
+                                       "lagrange",           "reduction",
+                                       "harness/text",       "harness/json",
+                                       "harness/record",     "harness/store",
+                                       "harness/config",     "harness/analysis",
+                                       "harness/integrator", "harness/observers",
+                                       "harness/run",        "harness/precision",
+                                       "harness/isolation",  "harness/timing",
+                                       "harness/suite",      "harness/tables",
+                                       "harness/judge",      "harness/figures",
+                                       "harness/cli",        "peers",
+                                       "examples/own-parts", "tests"};
 // The build writes these headers, and one room reads them.
 constexpr std::string_view kGenerated = "harness/build_";
 
@@ -89,6 +75,11 @@ std::string_view WhyNotForeign(std::string_view path, std::string_view header) {
   }
   if (StartsWithOneOf(header, {"gtest/", "gmock/"})) {
     return path.starts_with("tests/") ? "" : "GoogleTest is for tests";
+  }
+  if (header == "Simbody.h" || header.starts_with("mujoco/")) {
+    return StartsWithOneOf(path, {"peers/simbody/", "peers/mujoco/"})
+               ? ""
+               : "peers are for the folders of peers/";
   }
   if (header.starts_with("boost/")) {
     const bool allowed =

@@ -36,7 +36,7 @@ void ExpectRefused(const std::string& path, const std::string& header, const std
 TEST(IncludeArrows, OfTheRepositoryAllPointTheRightWay) {
   std::map<std::string, int> includes;
   for (const std::string room :
-       {"mechanism", "odca", "lagrange", "reduction", "harness", "tests"}) {
+       {"mechanism", "odca", "lagrange", "reduction", "harness", "peers", "tests"}) {
     for (const fs::directory_entry& entry : fs::recursive_directory_iterator(kRoot / room)) {
       const std::string extension = entry.path().extension().string();
       if (extension != ".h" && extension != ".cpp" && extension != ".in") continue;

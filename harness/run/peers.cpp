@@ -1,0 +1,65 @@
+#include "harness/run/peers.h"
+
+#include <fmt/format.h>
+
+#include <map>
+
+#include "harness/config/formulations.h"
+#include "harness/text/config_error.h"
+#include "mechanism/description/registration.h"
+
+namespace loopbench::harness {
+namespace {
+
+std::map<std::string, PeerFactory>& Factories() {
+  static std::map<std::string, PeerFactory> factories;
+  return factories;
+}
+
+bool IsMissing(const std::string& formulation) {
+  const FormulationRow* row = FindFormulation(formulation);
+  return row != nullptr && row->is_peer() && !Factories().contains(formulation);
+}
+
+std::string WhyMissing(const std::string& formulation) {
+  return fmt::format("formulation \"{}\" needs a build with -DLOOPBENCH_PEERS=ON", formulation);
+}
+
+}  // namespace
+
+void RegisterPeer(const std::string& name, PeerFactory make) {
+  const FormulationRow* row = FindFormulation(name);
+  if (row == nullptr || !row->is_peer()) {
+    RefuseRow("peer", name, "no peer's name", "that of a row of harness/config/formulations.cpp");
+  }
+  if (!Factories().emplace(name, std::move(make)).second) {
+    RefuseRow("peer", name, "it again", "each peer once");
+  }
+}
+
+std::unique_ptr<Peer> MakePeer(const std::string& formulation,
+                               const MechanismDescription& description) {
+  if (IsMissing(formulation)) throw ConfigError(WhyMissing(formulation));
+  const auto factory = Factories().find(formulation);
+  return factory == Factories().end() ? nullptr : factory->second(description);
+}
+
+void RequirePeers(const std::vector<Experiment>& experiments) {
+  for (const Experiment& experiment : experiments) {
+    const auto require = [&](const std::string& place, const std::vector<Column>& columns) {
+      for (const Column& column : columns) {
+        if (!IsMissing(column.formulation)) continue;
+        throw ConfigError(fmt::format("{}: {}: {}", experiment.path.string(), place,
+                                      WhyMissing(column.formulation)));
+      }
+    };
+    require("/columns", experiment.columns);
+    if (experiment.timing.repeats == 0) continue;
+    require("/timing/columns", experiment.timing.columns);
+    for (const TimingFamily& family : experiment.timing.families) {
+      require("/timing/families", family.columns);
+    }
+  }
+}
+
+}  // namespace loopbench::harness

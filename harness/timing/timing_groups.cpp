@@ -1,0 +1,84 @@
+// What is timed together: the columns of a scene, or of a member of a family.
+#include <fmt/format.h>
+
+#include "harness/run/case_identity.h"
+#include "harness/run/compiled_scene.h"
+#include "harness/timing/time_cases.h"
+#include "mechanism/description/library.h"
+
+namespace loopbench::harness {
+
+namespace {
+
+/// One system per timing: parts are not timed apart.
+MechanismDescription OneSystem(const Experiment& experiment, std::size_t scene) {
+  CompileOptions options = experiment.compile;
+  options.islands = false;
+  const MechanismFile& file = experiment.scenes[scene].mechanism;
+  return CompileScene(file.description, file.observe, options).compiled.parts.front().description;
+}
+
+MechanismDescription MakeFamilyMember(const TimingFamily& family, int size) {
+  if (family.family == "ladder") return Ladder(size, 1.0, 1.0);
+  MechanismDescription chain = Chain(size);
+  chain.initial.speeds.push_back({0, {1.0}});  // a moving chain: the other speeds follow
+  return chain;
+}
+
+void SetTimingId(const std::string& content, Record* keys) {
+  keys->Set("kind", std::string("timing"));
+  SetCaseId(keys, content);
+}
+
+}  // namespace
+
+std::vector<TimingGroup> TimingGroups(const Experiment& experiment) {
+  std::vector<TimingGroup> groups;
+  const std::vector<Case> all = ExpandTiming(experiment);
+  for (std::size_t scene = 0; scene < experiment.scenes.size(); ++scene) {
+    TimingGroup group{experiment.scenes[scene].name,
+                      [&experiment, scene] { return OneSystem(experiment, scene); },
+                      {},
+                      true};
+    for (const Case& one : all) {
+      if (one.scene != scene) continue;
+      group.cases.push_back(one);
+      SetTimingId(SceneTimingContent(experiment, one), &group.cases.back().keys);
+    }
+    if (!group.cases.empty()) groups.push_back(std::move(group));
+  }
+  if (experiment.timing.repeats == 0) return groups;
+  for (const TimingFamily& family : experiment.timing.families) {
+    for (const int size : family.sizes) {
+      TimingGroup group{fmt::format("{}-{}", family.family, size),
+                        [&family, size] { return MakeFamilyMember(family, size); },
+                        {},
+                        false};
+      for (const Column& column : family.columns) {
+        Case one;
+        one.mechanism = group.name;
+        one.column = column;
+        one.keys = CaseKeys(experiment, one);
+        // a right-hand side has no tolerance and no horizon
+        for (const char* key : {"integrator", "rtol", "atol", "horizon"}) {
+          one.keys.Set(key, Value());
+        }
+        SetTimingId(FamilyTimingContent(experiment), &one.keys);
+        group.cases.push_back(one);
+      }
+      groups.push_back(std::move(group));
+    }
+  }
+  return groups;
+}
+
+std::size_t CountTimings(const Experiment& experiment) {
+  std::size_t count = ExpandTiming(experiment).size();
+  if (experiment.timing.repeats == 0) return count;
+  for (const TimingFamily& family : experiment.timing.families) {
+    count += family.sizes.size() * family.columns.size();
+  }
+  return count;
+}
+
+}  // namespace loopbench::harness

@@ -1,0 +1,109 @@
+#include "peers/program_peer.h"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <cmath>
+#include <exception>
+
+#include "harness/integrator/cpu_time.h"
+#include "peers/make_model.h"
+
+namespace loopbench::peers {
+namespace {
+
+/// What libraries say is long: the sentence, without the lines around it.
+std::string OneLine(const std::string& text) {
+  std::string line = text.substr(0, 300);
+  std::ranges::replace(line, '\n', ' ');
+  return line;
+}
+
+class ProgramPeer final : public harness::Peer {
+ public:
+  ProgramPeer(std::string name, std::unique_ptr<Program> program, const Model& model)
+      : name_(std::move(name)),
+        program_(std::move(program)),
+        num_q_(model.num_q),
+        num_u_(model.num_u) {}
+
+  int size() const override { return num_q_ + num_u_; }
+
+  Outcome Derivative(double, std::span<const double> y, std::span<double> ydot) override {
+    try {
+      program_->Derivative(y.data(), y.data() + num_q_, ydot.data(), ydot.data() + num_q_);
+    } catch (const std::exception&) {
+      return Outcome::kIntegratorError;
+    }
+    const bool finite = std::ranges::all_of(ydot, [](double x) { return std::isfinite(x); });
+    return finite ? Outcome::kFinished : Outcome::kNonFinite;
+  }
+
+  harness::IntegratorResult Integrate(double t_end, std::vector<double>& y,
+                                      const harness::IntegratorOptions& options,
+                                      const harness::StepObserver& observe) override {
+    harness::CpuLimit limit(options.time_limit_s);
+    harness::IntegratorResult result;
+    try {
+      program_->Start(y.data(), y.data() + num_q_, options.rtol, t_end);
+      Run(t_end, y, options, observe, limit, result);
+    } catch (const std::exception& error) {
+      result.outcome = Outcome::kIntegratorError;
+      result.message = name_ + ": " + OneLine(error.what());
+    }
+    const Counts counts = program_->counts();
+    result.steps = counts.steps;
+    result.rejected = counts.rejected;
+    result.rhs_evaluations = counts.derivatives;
+    result.restarts = counts.projections;
+    result.wall_s = limit.wall_s();
+    result.cpu_s = limit.cpu_s();
+    return result;
+  }
+
+ private:
+  void Run(double t_end, std::vector<double>& y, const harness::IntegratorOptions& options,
+           const harness::StepObserver& observe, harness::CpuLimit& limit,
+           harness::IntegratorResult& result) {
+    bool stopped = false;
+    const auto accept = [&] {
+      result.t_reached = program_->time();
+      program_->State(y.data(), y.data() + num_q_);
+      if (observe) stopped = observe(result.t_reached, y) == harness::StepAction::kStop;
+    };
+    accept();
+    for (std::int64_t steps = 0; !stopped && program_->time() < t_end; ++steps) {
+      if (steps >= options.step_limit) result.outcome = Outcome::kStepLimit;
+      if (limit.Reached()) result.outcome = Outcome::kTimeLimit;
+      if (result.outcome != Outcome::kFinished) return;
+      const double before = program_->time();
+      program_->Step();
+      if (!(program_->time() > before)) {
+        result.outcome = Outcome::kStepTooSmall;
+        return;
+      }
+      accept();
+    }
+  }
+
+  std::string name_;
+  std::unique_ptr<Program> program_;
+  int num_q_, num_u_;
+};
+
+}  // namespace
+
+std::unique_ptr<harness::Peer> MakeProgramPeer(const std::string& name, const ProgramFactory& make,
+                                               const MechanismDescription& description) {
+  try {
+    const Model model = MakeModel(description);
+    return std::make_unique<ProgramPeer>(name, make(model), model);
+  } catch (const NotThere& missing) {
+    throw harness::Inexpressible(fmt::format("{} does not have: {}", name, missing.what()));
+  } catch (const std::exception& error) {
+    throw harness::Inexpressible(
+        fmt::format("{} refuses the model: {}", name, OneLine(error.what())));
+  }
+}
+
+}  // namespace loopbench::peers

@@ -1,0 +1,18 @@
+#include "peers/register.h"
+
+#include "harness/run/peers.h"
+#include "peers/program_peer.h"
+#include "peers/simbody/simbody_program.h"
+
+namespace loopbench::peers {
+
+void RegisterPeers() {
+  const auto add = [](const std::string& name, const ProgramFactory& make) {
+    harness::RegisterPeer(name, [name, make](const MechanismDescription& description) {
+      return MakeProgramPeer(name, make, description);
+    });
+  };
+  add("peer/simbody", MakeSimbodyProgram);
+}
+
+}  // namespace loopbench::peers

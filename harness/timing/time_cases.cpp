@@ -37,7 +37,7 @@ class Subject {
   virtual void TimeDerivative() = 0;
   /// One whole simulation.
   virtual void TimeSimulation() = 0;
-  virtual Record Finish(const Record& keys) const = 0;
+  virtual Record Finish(const Record& keys) = 0;
   virtual const std::vector<double>& rhs_ns() const = 0;  ///< one value per batch
   virtual const std::vector<double>& wall_s() const = 0;  ///< one value per simulation
 };
@@ -98,7 +98,7 @@ class SubjectIn final : public Subject {
     wall_s_.push_back(result_.wall_s);
   }
 
-  Record Finish(const Record& keys) const override {
+  Record Finish(const Record& keys) override {
     Record record = keys;
     record.Set("outcome", std::string(ToString(result_.outcome)));
     record.Set("message", result_.message);
@@ -109,7 +109,8 @@ class SubjectIn final : public Subject {
     record.Set("bodies", std::int64_t{bodies});
     record.Set("joints", joints);
     record.Set("loops", std::int64_t{mechanism_.num_loops()});
-    if (formulation_) {
+    // Derivative() may have taken a short cut past the rank
+    if (formulation_ && formulation_->Examine(0.0, y_, ydot_) == Outcome::kFinished) {
       const int dof = mechanism_.num_joint_speeds() - formulation_->diagnostics().rank;
       record.Set("dof", std::int64_t{dof});
     }
@@ -154,7 +155,6 @@ class SubjectIn final : public Subject {
     y_.resize(formulation_->state_size());
     ydot_.resize(y_.size());
     formulation_->ToState(start_.q, start_.u, y_);
-    if (peer_) formulation_->Examine(0.0, y_, ydot_);  // to know the rank
   }
 
   IntegratorResult Simulate(const std::function<void(std::span<double>)>& keep) {

@@ -1,6 +1,7 @@
 #include "peers/register.h"
 
 #include "harness/run/peers.h"
+#include "peers/mujoco/mujoco_program.h"
 #include "peers/program_peer.h"
 #include "peers/simbody/simbody_program.h"
 
@@ -13,6 +14,7 @@ void RegisterPeers() {
     });
   };
   add("peer/simbody", MakeSimbodyProgram);
+  add("peer/mujoco", MakeMujocoProgram);
 }
 
 }  // namespace loopbench::peers

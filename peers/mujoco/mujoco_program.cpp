@@ -1,0 +1,193 @@
+#include "peers/mujoco/mujoco_program.h"
+
+#include <mujoco/mujoco.h>
+
+#include <cmath>
+#include <cstring>
+#include <stdexcept>
+
+#include "peers/mujoco/mujoco_model.h"
+
+namespace loopbench::peers {
+namespace {
+
+/// Without these two, errors end the process after a key is pressed, and warnings go to a file.
+void Throw(const char* message) { throw std::runtime_error(message); }
+void Ignore(const char*) {}
+
+mjModel* Load(const std::string& document) {
+  mju_user_error = Throw;
+  mju_user_warning = Ignore;
+  constexpr const char* kName = "model.xml";
+  const auto files = std::make_unique<mjVFS>();
+  mj_defaultVFS(files.get());
+  const int size = static_cast<int>(document.size());
+  if (mj_makeEmptyFileVFS(files.get(), kName, size) != 0) Throw("no room for the model");
+  std::memcpy(files->filedata[0], document.data(), document.size());
+  char error[500] = "";
+  mjModel* model = mj_loadXML(kName, files.get(), error, sizeof error);
+  mj_deleteVFS(files.get());
+  if (model == nullptr) Throw(error);
+  return model;
+}
+
+struct Delete {
+  void operator()(mjModel* model) const { mj_deleteModel(model); }
+  void operator()(mjData* data) const { mj_deleteData(data); }
+};
+
+class MujocoProgram final : public Program {
+ public:
+  explicit MujocoProgram(const Model& model)
+      : made_(MakeMujocoModel(model)), model_(Load(made_.document)) {
+    if (model_->njnt != static_cast<int>(made_.coordinates.size()) ||
+        model_->neq != static_cast<int>(made_.closures.size())) {
+      Throw("joints or closures were lost");
+    }
+    SetClosures();
+    data_.reset(mj_makeData(model_.get()));
+    SetTimeStep(1e-3);
+    for (int j = 0; j < model_->njnt; ++j) {
+      data_->qfrc_applied[model_->jnt_dofadr[j]] = At(j).constant_effort;
+    }
+  }
+
+  void Derivative(const double* q, const double* u, double* qdot, double* udot) override {
+    Set(q, u);
+    mj_forward(model_.get(), data_.get());
+    ToOurs(data_->qacc, udot);
+    for (int j = 0; j < model_->njnt; ++j) {
+      const MujocoCoordinate& one = At(j);
+      if (one.ball) {
+        QuaternionRate(q + one.q, u + one.u, qdot + one.q);
+      } else {
+        qdot[one.q] = u[one.u];
+      }
+    }
+  }
+
+  void Start(const double* q, const double* u, double tolerance, double t_end) override {
+    Set(q, u);
+    for (auto& warning : data_->warning) warning.number = 0;
+    t_end_ = t_end;
+    num_steps_ = std::max<std::int64_t>(
+        1, std::llround(std::ceil(t_end / (0.1 * std::pow(tolerance, 0.25)))));
+    step_ = 0;
+    SetTimeStep(t_end / static_cast<double>(num_steps_));
+  }
+
+  void Step() override {
+    mj_step(model_.get(), data_.get());
+    for (const int kind : {mjWARN_BADQPOS, mjWARN_BADQVEL, mjWARN_BADQACC}) {
+      // MuJoCo has then gone back to its reference pose
+      if (data_->warning[kind].number > 0) Throw("unstable: numbers are not finite or too large");
+    }
+    ++step_;
+  }
+
+  double time() const override {
+    return step_ == num_steps_ ? t_end_ : static_cast<double>(step_) * model_->opt.timestep;
+  }
+
+  void State(double* q, double* u) const override {
+    for (int j = 0; j < model_->njnt; ++j) {
+      const MujocoCoordinate& one = At(j);
+      const double* own = data_->qpos + model_->jnt_qposadr[j];
+      q[one.q] = one.ball ? own[0] : one.sign * own[0];
+      for (int i = 1; one.ball && i < 4; ++i) q[one.q + i] = one.sign * own[i];
+    }
+    ToOurs(data_->qvel, u);
+  }
+
+  Counts counts() const override { return {step_, 0, 4 * step_, 0}; }
+
+ private:
+  const MujocoCoordinate& At(int j) const { return made_.coordinates[static_cast<std::size_t>(j)]; }
+
+  /// MuJoCo has put the second points where the closures hold in its reference pose.
+  void SetClosures() {
+    for (int e = 0; e < model_->neq; ++e) {
+      const MujocoClosure& closure = made_.closures[static_cast<std::size_t>(e)];
+      double* data = model_->eq_data + e * mjNEQDATA;
+      if (closure.rod >= 0.0) {
+        data[0] = closure.rod - model_->tendon_length0[model_->eq_obj1id[e]];
+        continue;
+      }
+      for (std::size_t i = 0; i < 3; ++i) {
+        data[i] = closure.at_first[i];
+        data[3 + i] = closure.at_second[i];
+      }
+    }
+  }
+
+  void SetTimeStep(double h) {
+    model_->opt.timestep = h;
+    for (int e = 0; e < model_->neq; ++e) {
+      double *reference = model_->eq_solref + e * mjNREF,
+             *impedance = model_->eq_solimp + e * mjNIMP;
+      reference[0] = 2.0 * h;  // less is not stable; critically damped
+      reference[1] = 1.0;
+      impedance[0] = impedance[1] = mjMAXIMP;
+    }
+  }
+
+  void Set(const double* q, const double* u) {
+    for (int j = 0; j < model_->njnt; ++j) {
+      const MujocoCoordinate& one = At(j);
+      double* own = data_->qpos + model_->jnt_qposadr[j];
+      double* speed = data_->qvel + model_->jnt_dofadr[j];
+      if (!one.ball) {
+        own[0] = one.sign * q[one.q];
+        speed[0] = one.sign * u[one.u];
+        continue;
+      }
+      own[0] = q[one.q];
+      for (int i = 1; i < 4; ++i) own[i] = one.sign * q[one.q + i];
+      mju_normalize4(own);
+      // MuJoCo's speeds are in axes of the body that moves
+      if (one.sign > 0.0) {
+        double back[4];
+        mju_negQuat(back, own);
+        mju_rotVecQuat(speed, u + one.u, back);
+      } else {
+        for (int i = 0; i < 3; ++i) speed[i] = -u[one.u + i];
+      }
+    }
+  }
+
+  /// Speeds or accelerations at data_'s pose: those of a ball differ by its orientation alone, for
+  /// w x w = 0.
+  void ToOurs(const double* own, double* ours) const {
+    for (int j = 0; j < model_->njnt; ++j) {
+      const MujocoCoordinate& one = At(j);
+      const double* value = own + model_->jnt_dofadr[j];
+      if (!one.ball) {
+        ours[one.u] = one.sign * value[0];
+      } else if (one.sign > 0.0) {
+        mju_rotVecQuat(ours + one.u, value, data_->qpos + model_->jnt_qposadr[j]);
+      } else {
+        for (int i = 0; i < 3; ++i) ours[one.u + i] = -value[i];
+      }
+    }
+  }
+
+  /// Half the product of (0, w) and q, w in axes of F.
+  static void QuaternionRate(const double* q, const double* w, double* qdot) {
+    const double half[] = {0.0, 0.5 * w[0], 0.5 * w[1], 0.5 * w[2]};
+    mju_mulQuat(qdot, half, q);
+  }
+
+  MujocoModel made_;
+  std::unique_ptr<mjModel, Delete> model_;
+  std::unique_ptr<mjData, Delete> data_;
+  double t_end_ = 0.0;
+  std::int64_t step_ = 0, num_steps_ = 0;
+};
+
+}  // namespace
+
+std::unique_ptr<Program> MakeMujocoProgram(const Model& model) {
+  return std::make_unique<MujocoProgram>(model);
+}
+
+}  // namespace loopbench::peers

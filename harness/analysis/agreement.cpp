@@ -8,6 +8,8 @@
 #include <string_view>
 #include <utility>
 
+#include "harness/config/formulations.h"
+
 namespace loopbench::harness {
 namespace {
 
@@ -30,6 +32,11 @@ const std::vector<double>* PoseOf(const std::string& key, const Value& value) {
 /// What component i of a pose is measured in: lengths of a link, or rad.
 double UnitOf(const Record& record, std::size_t size, std::size_t i) {
   return i < (size == 3 ? 2u : 3u) ? record.Number("link_length") : 1.0;
+}
+
+bool IsSoft(const Record& record) {
+  const FormulationRow* row = FindFormulation(record.Text("formulation"));
+  return row != nullptr && row->is_soft;
 }
 
 bool EndAlike(const Record& a, const Record& b, double rtol) {
@@ -132,16 +139,26 @@ std::vector<Agreement> CompareFinalPoses(std::span<const Record> records) {
   std::vector<Agreement> agreements(records.size());
   for (const auto& [scene, tolerances] : scenes) {
     const Record* decided = nullptr;
-    for (const auto& [rtol, runs] : tolerances) {
+    for (const auto& [rtol, all] : tolerances) {
+      std::vector<std::size_t> runs = all;
+      std::erase_if(runs, [&](std::size_t run) { return IsSoft(records[run]); });
       const Clusters clusters = ClustersOf(records, runs, rtol);
       for (std::size_t c = 0; c < clusters.size(); ++c) {
         for (const std::size_t run : clusters[c]) {
-          if (runs.size() > 1) agreements[run].cluster = static_cast<std::int64_t>(c) + 1;
+          if (all.size() > 1) agreements[run].cluster = static_cast<std::int64_t>(c) + 1;
           agreements[run].doubted =
               decided == nullptr ? clusters.size() > 1 : !EndAlike(records[run], *decided, rtol);
         }
       }
       if (decided == nullptr && Decides(records, clusters)) decided = &records[runs.front()];
+      const Record* others = decided;  // those that do not give way, where they agree
+      if (others == nullptr && clusters.size() == 1) others = &records[clusters.front().front()];
+      for (const std::size_t run : all) {
+        if (!IsSoft(records[run]) || runs.empty()) continue;
+        agreements[run].doubted = others == nullptr || !EndAlike(records[run], *others, rtol);
+        agreements[run].cluster =
+            agreements[run].doubted ? static_cast<std::int64_t>(clusters.size()) + 1 : 1;
+      }
     }
   }
   return agreements;

@@ -27,7 +27,8 @@ struct Agreement {
 /// Where the runs at one tolerance do not all end alike, all of them are doubted. The majority need
 /// not be right, because formulations at the same level make the same mistakes. A finer tolerance
 /// decides, if all runs there end alike and are of more than one level or coordinate set: then only
-/// those coarser runs are doubted that ended elsewhere.
+/// those coarser runs are doubted that ended elsewhere. Peers whose closures give way
+/// (FormulationRow::is_soft) are held to the others' end and cast no doubt on it.
 std::vector<Agreement> CompareFinalPoses(std::span<const Record> records);
 
 /// The largest difference of the final poses that two records both have: lengths over the link

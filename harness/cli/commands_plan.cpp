@@ -11,6 +11,7 @@
 #include "harness/integrator/cpu_time.h"
 #include "harness/isolation/processes.h"
 #include "harness/run/case_identity.h"
+#include "harness/run/peers.h"
 #include "harness/run/run_case.h"
 #include "harness/store/result_store.h"
 #include "harness/suite/progress.h"
@@ -267,6 +268,7 @@ int PrintPlans(const PlanCommand& command) {
   for (const auto& path : command.files.paths) {
     const std::vector<Experiment> experiments =
         ReadSelected({{path}, command.files.settings, command.files.filter});
+    RequirePeers(experiments);
     Pilot pilot(experiments);
     const Plan plan = MakePlan(experiments, command, &pilot);
     PrintPlan(experiments, plan, command, pilot);

@@ -8,6 +8,7 @@
 
 #include "harness/config/experiment_sections.h"
 #include "harness/config/file_schemas.h"
+#include "harness/config/formulations.h"
 #include "harness/config/mechanism_reader.h"
 #include "harness/config/options.h"
 #include "harness/json/document_kind.h"
@@ -141,6 +142,16 @@ const Fields<GroupInFile>& GroupFields() {
   return fields;
 }
 
+/// Reports a peer: its time is measured over whole runs, which benchmarks have none of.
+void ReportPeer(const JsonNode& node, const BenchmarkGroup& group) {
+  for (const Column& column : group.columns) {
+    if (!FindFormulation(column.formulation)->is_peer()) continue;
+    node.FailAs(fmt::format("\"{}\"", column.formulation),
+                "a formulation: peers are timed by experiments");
+    return;
+  }
+}
+
 /// Reports the first benchmark that a group repeats: names must tell results apart.
 void ReportRepeatedBenchmark(const JsonNode& node, const BenchmarkGroup& group,
                              std::set<std::string>* taken) {
@@ -195,6 +206,7 @@ void ReadGroups(const JsonNode& node, BenchmarkSet& set) {
     group.folder = set.path.parent_path();
     GroupFields().Read(element, &group);
     set.groups.push_back(group);
+    ReportPeer(element, group);
     ReportRepeatedBenchmark(element, group, &taken);
   }
   if (node.value().is_array() && set.groups.empty()) node.Fail("at least one group");

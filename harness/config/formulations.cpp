@@ -16,10 +16,11 @@ namespace {
 
 /// A peer's states are looked at through O-DCA.
 FormulationRow PeerRow(std::string name, std::string sentence, Enforcement like,
-                       std::string integrator, FormulationLook look) {
+                       std::string integrator, FormulationLook look, bool is_soft = false) {
   FormulationRow row = Row<odca::Odca>(std::move(name), std::move(sentence), std::move(look));
   row.levels = {like};
   row.integrator = std::move(integrator);
+  row.is_soft = is_soft;
   return row;
 }
 
@@ -42,7 +43,7 @@ std::deque<FormulationRow> BuiltIn() {
           PeerRow("peer/mujoco",
                   "the library MuJoCo with steps of one length, made from the tolerance; its "
                   "closing constraints are springs and dampers.",
-                  Enforcement::kBaumgarte, "mujoco-rk4", {"#AA4499", "#DDAACC", 2.0})};
+                  Enforcement::kBaumgarte, "mujoco-rk4", {"#AA4499", "#DDAACC", 2.0}, true)};
 }
 
 /// For rows without colours, in turn.

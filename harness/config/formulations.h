@@ -50,6 +50,9 @@ struct FormulationRow {
   /// then those of the solver that the peer's states are looked at through.
   std::string integrator = {};
 
+  /// Of a peer whose closures give way: where its runs end says nothing about others.
+  bool is_soft = false;
+
   bool is_peer() const { return !integrator.empty(); }
   bool Has(Enforcement level) const;
 };

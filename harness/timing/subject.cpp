@@ -133,11 +133,6 @@ std::string HashExact(std::span<const double> numbers) {
 std::unique_ptr<BenchmarkSubject> MakeSubject(const MechanismDescription& description,
                                               const Column& column, const BenchmarkState& state,
                                               const std::string& integrator, double step) {
-  if (FindFormulation(column.formulation)->is_peer()) {
-    throw std::invalid_argument(
-        fmt::format("found \"{}\", expected a formulation: peers are timed by experiments",
-                    column.formulation));
-  }
   if (state.outcome != Outcome::kFinished) {
     throw std::invalid_argument(
         fmt::format("no state to measure at: {} {}", ToString(state.outcome), state.message));

@@ -41,6 +41,7 @@ inline std::string NameOf(const ::testing::TestParamInfo<Case>& info) {
 inline std::vector<Case> AllCases() {
   std::vector<Case> cases;
   for (const harness::FormulationRow& row : harness::Formulations()) {
+    if (row.is_peer()) continue;  // somebody else's program: tests/peers
     for (Enforcement enforcement : {Enforcement::kAcceleration, Enforcement::kVelocity,
                                     Enforcement::kPosition, Enforcement::kBaumgarte}) {
       if (!row.Has(enforcement)) continue;

@@ -106,6 +106,9 @@ TEST(BenchmarkSet, MistakesAreNamedWithPlaceValueAndCure) {
       {"\"acceleration\"",
        "\"accelaration\"",
        {"/groups/0/columns", "did you mean \"acceleration\""}},
+      {"\"lagrange\", \"enforcement\": \"velocity\"",
+       "\"peer/simbody\", \"enforcement\": \"position\"",
+       {"/groups/1: found \"peer/simbody\", expected a formulation", "timed by experiments"}},
   };
   for (const Mistake& mistake : mistakes) {
     std::string text(kSet);

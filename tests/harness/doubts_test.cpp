@@ -116,6 +116,10 @@ TEST(Doubts, DriftBeyondWhatTheLevelPromises) {
   EXPECT_EQ(With("velocity", {{"drift_position_max", 5e-7}}), "");
   EXPECT_EQ(With("baumgarte", {{"drift_position_max", 1e-5}}), "drift");
   EXPECT_EQ(With("position", {{"drift_position_max", 1e-9}}), "drift");
+  // Simbody projects to a tenth of its tolerance, not to round-off
+  const Value simbody = std::string("peer/simbody");
+  EXPECT_EQ(With("position", {{"drift_position_max", 1e-9}, {"formulation", simbody}}), "");
+  EXPECT_EQ(With("position", {{"drift_position_max", 2e-7}, {"formulation", simbody}}), "drift");
   // gains of 0.1 1/s forget within 20 s: nothing of this run
   EXPECT_EQ(With("baumgarte", {{"drift_position_max", 1e-5}, {"alpha", 0.1}, {"beta", 0.1}}), "");
   // lengths are those of the links
@@ -199,6 +203,26 @@ TEST(Agreement, FinerTolerancesDecideWhereDifferentEquationsAgree) {
   same.resize(2);
   same[0] = same[1];
   EXPECT_EQ(both(same, Scene(1e-8, 2.0)), "disagreement:1 disagreement:1 disagreement:2 :1 :1 ");
+}
+
+TEST(Agreement, PeersTestifyUnlessTheirClosuresGiveWay) {
+  const auto with_peer = [](const char* name, double angle) {
+    std::vector<Record> records = Scene(1e-8, 3.0);
+    records[2].Set("formulation", std::string(name));
+    records[2].Set("series.final.bar1", std::vector<double>{0.1, 0.2, angle});
+    return DoubtsAndSets(records);
+  };
+  EXPECT_EQ(with_peer("peer/simbody", 3.0), ":1 :1 :1 ");
+  EXPECT_EQ(with_peer("peer/simbody", 2.0), "disagreement:1 disagreement:1 disagreement:2 ");
+  EXPECT_EQ(with_peer("peer/mujoco", 3.0), ":1 :1 :1 ");
+  EXPECT_EQ(with_peer("peer/mujoco", 2.0), ":1 :1 disagreement:2 ");
+  // beside others that disagree it is no better than they
+  std::vector<Record> records = Scene(1e-8, 2.0);
+  records.push_back(records[0]);
+  records[3].Set("formulation", std::string("peer/mujoco"));
+  EXPECT_EQ(DoubtsAndSets(records), "disagreement:1 disagreement:1 disagreement:2 disagreement:3 ");
+  // and alone it has nobody
+  EXPECT_EQ(DoubtsAndSets({records[3], records[3]}), ": : ");
 }
 
 TEST(DoubtNotes, NameRowsNumbersAndWhoAgrees) {

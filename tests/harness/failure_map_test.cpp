@@ -91,7 +91,7 @@ TEST(MapCell, NamesEveryOtherEndingOfARun) {
     limits += ending.state == CellState::kLimit ? 1 : 0;
     broken += ending.state == CellState::kBroken ? 1 : 0;
   }
-  EXPECT_EQ(stopped, 7u);
+  EXPECT_EQ(stopped, 8u);
   EXPECT_EQ(limits, 4u);
   EXPECT_EQ(broken, 3u);
   EXPECT_EQ(CellOf({RunOf("odca", 1e-8, 0.0, 0.0, "a new word")}).state, CellState::kBroken);

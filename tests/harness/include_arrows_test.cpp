@@ -78,6 +78,7 @@ TEST(IncludeArrows, OfRoomsLeadDownstairsOnly) {
   expect_above("harness/run", "reduction");
   expect_above("harness/judge", "harness/tables");
   expect_above("harness/cli", "harness/suite");
+  expect_above("peers", "harness/cli");
   ExpectRefused("harness/new/a.cpp", "\"harness/record/record.h\"", "no room");
   ExpectRefused("harness/run/a.cpp", "\"harness/build_info.h\"", "from the root");
   ExpectAllowed("harness/record/origin.cpp", "\"harness/build_info.h\"");
@@ -116,6 +117,10 @@ TEST(IncludeArrows, OfOtherLibrariesEndWhereTheyBelong) {
   ExpectRefused("harness/suite/suite.cpp", "<benchmark/benchmark.h>", "Benchmark");
   ExpectAllowed("tests/odca/plan_test.cpp", "<gtest/gtest.h>");
   ExpectRefused("harness/suite/suite.cpp", "<gtest/gtest.h>", "GoogleTest");
+  ExpectAllowed("peers/simbody/simbody_model.h", "<Simbody.h>");
+  ExpectAllowed("peers/mujoco/mujoco_program.cpp", "<mujoco/mujoco.h>");
+  ExpectRefused("harness/run/peers.cpp", "<Simbody.h>", "peers");
+  ExpectRefused("peers/program_peer.cpp", "<mujoco/mujoco.h>", "peers");
   ExpectAllowed("harness/observers/pendulum.cpp", "<boost/math/special_functions/ellint_1.hpp>");
   ExpectRefused("harness/observers/drift.cpp", "<boost/math/tools/roots.hpp>", "Boost");
   ExpectRefused("tests/reference/pendulum_test.cpp", "<boost/math/tools/roots.hpp>", "Boost");

@@ -1,0 +1,62 @@
+// Random mechanisms of the contract as peers can express them, and how far a peer's accelerations
+// are from the oracle's.
+#pragma once
+
+#include <algorithm>
+#include <optional>
+#include <string>
+#include <variant>
+#include <vector>
+
+#include "harness/run/peers.h"
+#include "tests/contract/sample.h"
+
+namespace loopbench::testing {
+
+/// Removes the forces that no peer has, and makes bodies of matter: with moments of inertia that
+/// satisfy the triangle inequality, to which peers hold them.
+inline void KeepExpressible(MechanismDescription& description) {
+  const Topology topology = BuildTopology(description, Coordinates::kJoint);
+  const auto is_cut = [&](int joint) {
+    return std::ranges::find(topology.constraints, joint) != topology.constraints.end();
+  };
+  std::erase_if(description.forces, [&](const ForceDescription& force) {
+    if (const auto* spring = std::get_if<JointSpring>(&force)) return is_cut(spring->joint);
+    if (const auto* damper = std::get_if<JointDamper>(&force)) return is_cut(damper->joint);
+    if (const auto* point = std::get_if<PointForce>(&force)) return point->in_body_axes;
+    return !std::holds_alternative<SpringDamper>(force);
+  });
+  for (BodyDescription& body : description.bodies) {
+    body.inertia += 0.5 * body.inertia.trace() * Eigen::Matrix3d::Identity();
+  }
+}
+
+/// Of max |udot|, and what is allowed (Sample::Bound()).
+struct AccelerationError {
+  double relative = 0.0, bound = 0.0;
+};
+
+/// Nothing where the peer does not have a helical joint.
+template <class Space>
+std::optional<AccelerationError> PeerError(const std::string& name,
+                                           const MechanismDescription& description,
+                                           std::uint64_t seed) {
+  std::unique_ptr<harness::Peer> peer;
+  try {
+    peer = harness::MakePeer(name, description);
+  } catch (const harness::Inexpressible& why) {
+    EXPECT_NE(std::string(why.what()).find("helical"), std::string::npos) << why.what();
+    return {};
+  }
+  const Sample<Space> sample(description, seed);
+  const State& state = sample.state(Coordinates::kJoint);
+  std::vector<double> y(state.q.begin(), state.q.end());
+  y.insert(y.end(), state.u.begin(), state.u.end());
+  std::vector<double> ydot(y.size());
+  EXPECT_EQ(peer->Derivative(0.0, y, ydot), Outcome::kFinished);
+  const VectorX<double> udot =
+      Eigen::Map<VectorX<double>>(ydot.data() + state.q.size(), state.u.size());
+  return AccelerationError{RelativeError(udot, sample.udot(Coordinates::kJoint)), sample.Bound()};
+}
+
+}  // namespace loopbench::testing

@@ -1,0 +1,139 @@
+// MuJoCo: trees to round-off, closures as far as they are soft.
+#include <gtest/gtest.h>
+
+#include <map>
+
+#include "mechanism/start/assembly.h"
+#include "tests/peers/expressible.h"
+#include "tests/peers/registered.h"
+#include "tests/reference/cases.h"
+
+namespace loopbench::testing {
+namespace {
+
+using harness::reference::RunShipped;
+using harness::reference::Shipped;
+
+const harness::Column kMujoco = {"peer/mujoco", Enforcement::kBaumgarte};
+const harness::Column kOdca = {"odca", Enforcement::kPosition};
+
+/// Trees of joints of every kind; how many of them MuJoCo has. Bodies are alike in all directions:
+/// MuJoCo finds the principal axes of others by an iteration that leaves errors of 1e-9.
+template <class Space>
+int CompareTrees(SpaceKind space) {
+  int compared = 0;
+  for (std::uint64_t seed = 1; seed <= 60; ++seed) {
+    MechanismDescription tree = AnyMechanism(6, 0, 0, space, seed);
+    KeepExpressible(tree);
+    for (BodyDescription& body : tree.bodies) {
+      body.inertia = body.inertia.trace() * Eigen::Matrix3d::Identity();
+    }
+    std::erase_if(tree.forces, [](ForceDescription& force) {
+      if (auto* spring = std::get_if<SpringDamper>(&force)) spring->preload = 0.0;
+      return std::holds_alternative<PointForce>(force);
+    });
+    const auto error = PeerError<Space>("peer/mujoco", tree, seed);
+    if (!error) continue;
+    EXPECT_LE(error->relative, error->bound) << tree.name;
+    ++compared;
+  }
+  return compared;
+}
+
+TEST(MujocoTrees, InThePlaneHaveTheOraclesAccelerations) {
+  EXPECT_EQ(CompareTrees<Planar>(SpaceKind::kPlanar), 60);
+}
+
+TEST(MujocoTrees, InSpaceHaveTheOraclesAccelerations) {
+  EXPECT_GE(CompareTrees<Spatial>(SpaceKind::kSpatial), 20);  // others have helical joints
+}
+
+/// Largest difference to O-DCA's accelerations, over the largest of these, at the four-bar's start
+/// with its crank turning.
+double ErrorOfFourBar(double speed) {
+  MechanismDescription four_bar = Shipped("four-bar").description;
+  four_bar.initial.speeds = {{0, {speed}}};
+  const Mechanism<Planar, double> mechanism(four_bar, Coordinates::kJoint);
+  const Start<double> start = Assemble<Planar>(four_bar, mechanism);
+  const auto system = harness::MakeFormulation<Planar>("odca", mechanism, {});
+  EXPECT_EQ(system->Start(0.0, start.q, start.u), Outcome::kFinished);
+  std::vector<double> y(6), ydot(6), theirs(6);
+  system->ToState(start.q, start.u, y);
+  EXPECT_EQ(system->Examine(0.0, y, ydot), Outcome::kFinished);
+  EXPECT_EQ(harness::MakePeer("peer/mujoco", four_bar)->Derivative(0.0, y, theirs),
+            Outcome::kFinished);
+  double largest = 0.0, difference = 0.0;
+  for (std::size_t i = 3; i < 6; ++i) {
+    largest = std::max(largest, std::abs(ydot[i]));
+    difference = std::max(difference, std::abs(theirs[i] - ydot[i]));
+  }
+  return difference / largest;
+}
+
+TEST(MujocoClosures, LeaveAShareOfAccelerationsAndAllThatComesWithSpeed) {
+  // a share of 1e-4 of the closure's acceleration, some times that of the joints
+  EXPECT_LE(ErrorOfFourBar(0.0), 1e-3);
+  EXPECT_GE(ErrorOfFourBar(1.0), 1e-2);
+}
+
+/// Runs with steps too long for the mechanism's fast modes end with a name.
+const std::map<std::string, std::string> kUnstable = {{"elastic-crank", "integrator-error"},
+                                                      {"flyball-governor", "integrator-error"}};
+const std::map<std::string, std::string> kInexpressible = {
+    {"driven-four-bar", "peer/mujoco does not have: joint \"OA\": a prescribed motion"},
+    {"screw-jack", "peer/mujoco does not have: joint_torque that depends on time"},
+    {"slider-crank", "peer/mujoco does not have: point_force"}};
+
+/// Of the final poses from those of O-DCA.
+double EndError(const std::string& name, double tolerance, double horizon) {
+  const harness::Record theirs = RunShipped(name, kMujoco, tolerance, horizon);
+  const harness::Record ours = RunShipped(name, kOdca, 1e-10, horizon);
+  EXPECT_EQ(theirs.Text("outcome"), "finished") << theirs.Text("message");
+  double difference = 0.0;
+  int poses = 0;
+  for (const auto& [key, value] : ours.items()) {
+    if (!key.starts_with("series.final.")) continue;
+    const std::vector<double> a = ours.Numbers(key), b = theirs.Numbers(key);
+    if (a.size() != b.size()) return INFINITY;
+    for (std::size_t i = 0; i < a.size(); ++i) {
+      difference = std::max(difference, std::abs(a[i] - b[i]));
+    }
+    ++poses;
+  }
+  EXPECT_GT(poses, 0);
+  return difference;
+}
+
+class ShippedMujoco : public ::testing::TestWithParam<std::string> {};
+
+TEST_P(ShippedMujoco, ComesCloserToOursWithTheSquareOfTheStep) {
+  // Andrews' squeezer turns a thousand times as fast as the others
+  const bool fast = GetParam() == "andrews-squeezer";
+  const double horizon = fast ? 0.005 : 0.2, coarse = fast ? 1e-14 : 1e-6;
+  if (const auto why = kInexpressible.find(GetParam()); why != kInexpressible.end()) {
+    const harness::Record run = RunShipped(GetParam(), kMujoco, coarse, horizon);
+    EXPECT_EQ(run.Text("outcome"), "inexpressible");
+    EXPECT_EQ(run.Text("message"), why->second);
+    return;
+  }
+  if (const auto ending = kUnstable.find(GetParam()); ending != kUnstable.end()) {
+    const harness::Record run = RunShipped(GetParam(), kMujoco, coarse, horizon);
+    EXPECT_EQ(run.Text("outcome"), ending->second);
+    EXPECT_NE(run.Text("message").find("unstable"), std::string::npos);
+    return;
+  }
+  // a hundredth of the tolerance is 10^(-1/2) of the step, which leaves a tenth; what is below
+  // 1e-10 m or rad is the error of our own run
+  const double error = EndError(GetParam(), coarse, horizon);
+  EXPECT_LE(EndError(GetParam(), 0.01 * coarse, horizon), 0.2 * error + 1e-10);
+  EXPECT_LE(error, 0.03);
+}
+
+INSTANTIATE_TEST_SUITE_P(All, ShippedMujoco,
+                         ::testing::ValuesIn(harness::reference::ShippedNames()),
+                         [](const auto& name) {
+                           return harness::reference::WithoutDashes(name.param);
+                         });
+
+}  // namespace
+}  // namespace loopbench::testing

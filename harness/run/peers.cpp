@@ -44,6 +44,17 @@ std::unique_ptr<Peer> MakePeer(const std::string& formulation,
   return factory == Factories().end() ? nullptr : factory->second(description);
 }
 
+std::unique_ptr<Peer> TryPeer(const std::string& formulation,
+                              const MechanismDescription& description, IntegratorResult* result) {
+  try {
+    return MakePeer(formulation, description);
+  } catch (const Inexpressible& why) {
+    result->outcome = Outcome::kInexpressible;
+    result->message = why.what();
+    return nullptr;
+  }
+}
+
 void RequirePeers(const std::vector<Experiment>& experiments) {
   for (const Experiment& experiment : experiments) {
     const auto require = [&](const std::string& place, const std::vector<Column>& columns) {

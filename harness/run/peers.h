@@ -25,6 +25,10 @@ void RegisterPeer(const std::string& name, PeerFactory make);
 std::unique_ptr<Peer> MakePeer(const std::string& formulation,
                                const MechanismDescription& description);
 
+/// The same with Inexpressible as outcome and message of `result`, which else is as it was.
+std::unique_ptr<Peer> TryPeer(const std::string& formulation,
+                              const MechanismDescription& description, IntegratorResult* result);
+
 /// Throws ConfigError when a column of an experiment names a peer that this build does not have:
 /// files with peers are read everywhere, and run where the peers are.
 void RequirePeers(const std::vector<Experiment>& experiments);

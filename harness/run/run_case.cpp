@@ -94,17 +94,18 @@ class Runner {
     record.Set("cpu_s", result.cpu_s);
   }
 
+  void Show(const Sample<Space>& sample, Outcome outcome) {
+    for (const auto& observer : observers_) {
+      if (outcome == Outcome::kFinished) observer->Observe(sample);
+      if (outcome == Outcome::kSingular) observer->ObserveSingular(sample);
+    }
+  }
+
   IntegratorResult Integrate(const Start<double>& start) {
     const auto formulation = MakeFormulation<Space>(case_.column, mechanism_);
     IntegratorResult result;
-    std::unique_ptr<Peer> peer;
-    try {
-      peer = MakePeer(case_.column.formulation, description_);
-    } catch (const Inexpressible& error) {
-      result.outcome = Outcome::kInexpressible;
-      result.message = error.what();
-      return result;
-    }
+    const auto peer = TryPeer(case_.column.formulation, description_, &result);
+    if (result.outcome != Outcome::kFinished) return result;
     result.outcome = formulation->Start(0.0, start.q, start.u);
     if (result.outcome != Outcome::kFinished) return result;
     formulation->IntegrateWork(mechanism_.has_power() && !peer);  // peers integrate none
@@ -122,10 +123,7 @@ class Runner {
       Sample<Space> sample{t, *formulation};
       sample.knows_work = !peer || !mechanism_.has_power();
       if (!work.empty()) sample.supplied = work[0], sample.dissipated = work[1];
-      for (const auto& observer : observers_) {
-        if (outcome == Outcome::kFinished) observer->Observe(sample);
-        if (outcome == Outcome::kSingular) observer->ObserveSingular(sample);
-      }
+      Show(sample, outcome);
       return restart ? StepAction::kRestart : StepAction::kContinue;
     };
     const IntegratorOptions options = OptionsOf(case_, mechanism_.stop_times());

@@ -55,12 +55,7 @@ class SubjectIn final : public Subject {
     result_.outcome = start_.outcome;
     result_.message = start_.message;
     if (start_.outcome != Outcome::kFinished) return;
-    try {
-      peer_ = MakePeer(one.column.formulation, description);
-    } catch (const Inexpressible& error) {
-      result_.outcome = Outcome::kInexpressible;
-      result_.message = error.what();
-    }
+    peer_ = TryPeer(one.column.formulation, description, &result_);
   }
 
   void Prepare() override {

@@ -2,6 +2,7 @@
 
 #include <fmt/format.h>
 
+#include <algorithm>
 #include <variant>
 
 #include "mechanism/model/mechanism.h"
@@ -83,6 +84,14 @@ class Maker {
     made.num_u = joint.num_u();
     made.q = joint.q_offset;
     made.u = joint.u_offset;
+    // where directions are no axes of F, all of them are imposed
+    if (!joint.in_tree() && joint.num_released > 0 && joint.kind->basis == nullptr) {
+      const std::vector<int>& released = description_.joints[joint.description].released;
+      for (int i = 0; i < joint.kind->num_constraints(); ++i) {
+        if (std::ranges::find(released, i) != released.end()) continue;
+        made.imposed.push_back(joint.kind->axes[joint.kind->num_u + i]);
+      }
+    }
     return made;
   }
 

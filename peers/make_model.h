@@ -6,11 +6,9 @@
 
 namespace loopbench::peers {
 
-/// With the tree and the order of Mechanism(description, Coordinates::kJoint), and all directions
-/// of the joints that close loops, those released for the sake of a formulation too. Throws
-/// NotThere for what no peer has here: prescribed motions, forces that depend on time or turn with
-/// a body, drag, forces along the coordinate of a joint that closes a loop, joints and forces of
-/// other programs.
+/// With the tree and the order of Mechanism(description, Coordinates::kJoint). Throws NotThere for
+/// what no peer has here: prescribed motions, forces that depend on time or turn with a body, drag,
+/// forces along the coordinate of a joint that closes a loop, joints and forces of other programs.
 Model MakeModel(const MechanismDescription& description);
 
 }  // namespace loopbench::peers

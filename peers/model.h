@@ -40,6 +40,10 @@ struct Joint {
   // of tree joints:
   int num_q = 0, num_u = 0, q = -1, u = -1;  ///< sizes, and place among all coordinates and speeds
   bool from_is_child = false;                ///< P hangs on Q
+  /// Of a joint in space that closes a loop and of which some directions say nothing that the loop
+  /// does not say already (mechanism/simplify/redundancy.h): the others, as components of a motion
+  /// [w; v] in axes of F. Empty: all that its kind constrains.
+  std::vector<int> imposed;
 };
 
 /// constant - stiffness (q - rest) - damping u along the one coordinate of a tree joint.

@@ -76,6 +76,19 @@ bool CloseInSpace(const std::string& kind, Closure& side) {
   return true;
 }
 
+/// Rotations about x and y of F, by z of M, which a free turn about z leaves; about z where there
+/// is none.
+void CloseAlong(const std::vector<int>& components, Closure& side) {
+  for (const int component : components) {
+    if (component == 0) side.Perpendicular(side.F.y(), side.M.z());
+    if (component == 1) side.Perpendicular(side.F.x(), side.M.z());
+    if (component == 2) side.Perpendicular(side.F.x(), side.M.y());
+    if (component == 3) side.InPlane(side.F.x());
+    if (component == 4) side.InPlane(side.F.y());
+    if (component == 5) side.InPlane(side.F.z());
+  }
+}
+
 }  // namespace
 
 void AddConstraint(const Joint& joint, bool planar, MobilizedBody& P, MobilizedBody& Q) {
@@ -83,6 +96,10 @@ void AddConstraint(const Joint& joint, bool planar, MobilizedBody& P, MobilizedB
   Closure side{P, Q, ToTransform(joint.F), ToTransform(joint.M)};
   if (joint.kind == "rod") {
     Constraint::Rod(P, side.F.p(), Q, side.M.p(), joint.parameter);
+    return;
+  }
+  if (!planar && !joint.imposed.empty()) {
+    CloseAlong(joint.imposed, side);
     return;
   }
   const bool closed = planar ? CloseInPlane(joint.kind, side) : CloseInSpace(joint.kind, side);

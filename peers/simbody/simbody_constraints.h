@@ -16,8 +16,8 @@ inline SimTK::Transform ToTransform(const Frame& frame) {
   return {SimTK::Rotation(matrix, true), ToVec3(frame.p)};
 }
 
-/// All constrained directions of the joint, redundant ones too: Simbody finds their rank. In the
-/// plane those of the plane alone. Throws NotThere for a helical joint.
+/// The directions that the joint imposes; where some are redundant all the same, Simbody finds the
+/// rank. In the plane those of the plane alone. Throws NotThere for a helical joint.
 void AddConstraint(const Joint& joint, bool planar, SimTK::MobilizedBody& P,
                    SimTK::MobilizedBody& Q);
 

@@ -87,4 +87,9 @@ class NotThere : public std::runtime_error {
   using std::runtime_error::runtime_error;
 };
 
+/// Thrown by a step that was not accepted however short it became.
+class StepTooSmall : public std::runtime_error {
+  using std::runtime_error::runtime_error;
+};
+
 }  // namespace loopbench::peers

@@ -20,7 +20,8 @@ class Program {
 
   /// From (q, u) at time 0 with steps that end at `t_end`.
   virtual void Start(const double* q, const double* u, double tolerance, double t_end) = 0;
-  /// One accepted step, projected. May throw std::exception: then the run is over.
+  /// One accepted step, projected. May throw StepTooSmall, or whatever the program throws: then the
+  /// run is over.
   virtual void Step() = 0;
   virtual double time() const = 0;  ///< [s]
   virtual void State(double* q, double* u) const = 0;

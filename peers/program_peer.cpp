@@ -12,7 +12,7 @@
 namespace loopbench::peers {
 namespace {
 
-/// What libraries say is long: the sentence, without the lines around it.
+/// What libraries say is long, and of several lines.
 std::string OneLine(const std::string& text) {
   std::string line = text.substr(0, 300);
   std::ranges::replace(line, '\n', ' ');
@@ -47,6 +47,9 @@ class ProgramPeer final : public harness::Peer {
     try {
       program_->Start(y.data(), y.data() + num_q_, options.rtol, t_end);
       Run(t_end, y, options, observe, limit, result);
+    } catch (const StepTooSmall& error) {
+      result.outcome = Outcome::kStepTooSmall;
+      result.message = name_ + ": " + OneLine(error.what());
     } catch (const std::exception& error) {
       result.outcome = Outcome::kIntegratorError;
       result.message = name_ + ": " + OneLine(error.what());

@@ -97,6 +97,19 @@ TEST(PeerRuns, EndAtTheirLimits) {
   EXPECT_LT(run.Number("t_reached"), 10.0);
 }
 
+TEST(PeerRuns, ThatGetStuckSayWhere) {
+  // all five rows of Bennett's closure, of which three are redundant: Simbody loses their rank
+  MechanismFile bennett = reference::Shipped("bennett");
+  Experiment experiment = reference::Single(bennett);
+  experiment.compile.redundancy = false;
+  const Record run =
+      RunCase(experiment, reference::CaseOf(experiment, "bennett", kSimbody, 1e-10, 10.0));
+  EXPECT_EQ(run.Text("outcome"), "step-too-small");
+  EXPECT_EQ(run.Text("message").find("peer/simbody: Unable to advance time past"), 0u)
+      << run.Text("message");
+  EXPECT_GT(run.Number("t_reached"), 0.1);
+}
+
 TEST(PeerRuns, AreEqualWhenRepeated) {
   const auto hash = [] { return RunShipped("bennett", kSimbody, 1e-8, 0.5).Text("state_hash"); };
   EXPECT_EQ(hash(), hash());

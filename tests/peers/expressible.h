@@ -36,14 +36,16 @@ struct AccelerationError {
   double relative = 0.0, bound = 0.0;
 };
 
-/// Nothing where the peer does not have a helical joint.
+/// Nothing where the peer does not have a helical joint. `given`: what the peer is made from, where
+/// it is another description of the same mechanism.
 template <class Space>
 std::optional<AccelerationError> PeerError(const std::string& name,
                                            const MechanismDescription& description,
-                                           std::uint64_t seed) {
+                                           std::uint64_t seed,
+                                           const MechanismDescription* given = nullptr) {
   std::unique_ptr<harness::Peer> peer;
   try {
-    peer = harness::MakePeer(name, description);
+    peer = harness::MakePeer(name, given != nullptr ? *given : description);
   } catch (const harness::Inexpressible& why) {
     EXPECT_NE(std::string(why.what()).find("helical"), std::string::npos) << why.what();
     return {};

@@ -2,8 +2,6 @@
 // a peer does not have is named.
 #include <gtest/gtest.h>
 
-#include <map>
-
 #include "harness/analysis/doubts.h"
 #include "harness/run/peers.h"
 #include "harness/timing/time_cases.h"
@@ -13,15 +11,11 @@
 namespace loopbench::harness {
 namespace peers_runs_test {
 
+using peers_test::kInexpressible;
 using reference::RunShipped;
 
 const Column kSimbody = {"peer/simbody", Enforcement::kPosition};
 const Column kOdca = {"odca", Enforcement::kPosition};
-
-/// Those that Simbody cannot express, with the reason.
-const std::map<std::string, std::string> kInexpressible = {
-    {"driven-four-bar", "peer/simbody does not have: joint \"OA\": a prescribed motion"},
-    {"screw-jack", "peer/simbody does not have: joint_torque that depends on time"}};
 
 /// Time of a short run [s]: Andrews' squeezer turns a thousand times as fast as the others, and
 /// Peaucellier's linkage passes a singular position at 0.32 s, where Simbody's energy jumps by 0.3

@@ -86,7 +86,7 @@ void UseThreads(int threads, Experiment& experiment) {
   const auto use = [threads](std::vector<Column>& columns) {
     std::vector<Column> all;
     for (Column& column : columns) {
-      column.threads = threads;
+      if (!FindFormulation(column.formulation)->is_peer()) column.threads = threads;
       if (std::ranges::find(all, column) == all.end()) all.push_back(column);
     }
     columns = std::move(all);

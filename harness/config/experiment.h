@@ -194,7 +194,7 @@ bool Matches(const EnsembleRule& rule, const Case& one);
 /// then the experiment's parameters.
 Record CaseKeys(const Experiment& experiment, const Case& one);
 
-/// All columns with so many threads; those that differed in nothing else become one.
+/// All columns but peers with so many threads; those that differed in nothing else become one.
 void UseThreads(int threads, Experiment& experiment);
 
 /// All cases for accuracy, in the order scene, horizon, column, tolerance, without excluded ones.

@@ -46,6 +46,9 @@ void RequirePeersOwn(const JsonNode& node, ColumnLists& lists) {
     for (const SolverKind solver : lists.solvers) {
       if (solver != kOwn.solver) refuse("solver", ToString(solver), ToString(kOwn.solver));
     }
+    for (const std::int64_t threads : lists.threads) {
+      if (threads != kOwn.threads) refuse("threads", std::to_string(threads), "1");
+    }
     if (lists.gains) node.FailAs(fmt::format("\"{}\" with gains", formulation), "no gains");
   }
 }

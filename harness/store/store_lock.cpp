@@ -24,13 +24,16 @@ std::string Holder(int descriptor) {
   struct stat status = {};
   if (::fstat(descriptor, &status) != 0) return "another process";
   const std::string inode = fmt::format(":{}", status.st_ino);
-  std::ifstream locks("/proc/locks");
-  for (std::string line; std::getline(locks, line);) {
-    // 1: FLOCK  ADVISORY  WRITE 1234 fe:00:5341448 0 EOF
-    std::istringstream words(line);
-    std::string number, kind, mode, access, process, file;
-    words >> number >> kind >> mode >> access >> process >> file;
-    if (kind == "FLOCK" && file.ends_with(inode)) return "process " + process;
+  // a list that changes while it is read may leave a line out
+  for (int look = 0; look < 3; ++look) {
+    std::ifstream locks("/proc/locks");
+    for (std::string line; std::getline(locks, line);) {
+      // 1: FLOCK  ADVISORY  WRITE 1234 fe:00:5341448 0 EOF
+      std::istringstream words(line);
+      std::string number, kind, mode, access, process, file;
+      words >> number >> kind >> mode >> access >> process >> file;
+      if (kind == "FLOCK" && file.ends_with(inode)) return "process " + process;
+    }
   }
   return "another process";
 }

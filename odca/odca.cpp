@@ -104,6 +104,16 @@ bool Odca<Space, S>::RightHandSide([[maybe_unused]] SpeedsUsed speeds,
   return false;
 }
 
+template <class Space, class S>
+std::optional<Correction<S>> Odca<Space, S>::Project([[maybe_unused]] std::span<S> q,
+                                                     [[maybe_unused]] std::span<S> u,
+                                                     [[maybe_unused]] S goal) {
+  if constexpr (std::is_same_v<Space, Planar> && std::is_same_v<S, double>) {
+    if (paths_ != nullptr) return paths_->Project(q, u, goal);
+  }
+  return std::nullopt;
+}
+
 /// What the speeds miss, joint by joint: no vector of rows is needed between.
 template <class Space, class S>
 bool Odca<Space, S>::CompleteSpeeds(Kinematics<Space, S>& kinematics, VectorX<S>& u) {

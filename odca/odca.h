@@ -43,6 +43,8 @@ class Odca final : public ConstraintSolver<Space, S> {
   /// For paths of pins in double, unless as published (path_sweep.h).
   bool RightHandSide(SpeedsUsed speeds, std::span<const S> q, std::span<const S> u,
                      std::span<S> qdot, std::span<S> udot) override;
+  /// Likewise.
+  std::optional<Correction<S>> Project(std::span<S> q, std::span<S> u, S goal) override;
   /// Size of the plan, and multiply-adds since Factor() began.
   std::vector<NamedCount> Counters() const override;
 

@@ -1,12 +1,17 @@
 #include "odca/path_sweep.h"
 
 #include <algorithm>
+#include <cmath>
 
 namespace loopbench::odca::pins {
 
 namespace {
 
 constexpr Vector2<double> kNone = {0.0, 0.0};
+
+std::span<double> In(VectorX<double>& numbers) {
+  return {numbers.data(), static_cast<std::size_t>(numbers.size())};
+}
 
 /// range(first, size) over parts of `size` numbers.
 template <class Range>
@@ -20,12 +25,12 @@ void ForRanges(WorkerPool& pool, std::size_t size, const Range& range) {
 
 }  // namespace
 
-template <bool kLoops>
+template <bool kLoops, PathSweep::Gaps kGaps>
 void PathSweep::TurnPacks(Group& group) {
   const PathPlaces& path = paths_[group.path];
   Point<Lanes> at_2 = {};
   Lanes room = Lanes{} + kLargestAngle;
-  Lanes speed_before = {}, inverse_before = {};
+  Lanes speed_before = {}, inverse_before = {}, largest = {};
   for (int i = 0; i < path.packs; ++i) {
     const int pack = group.pack + i, place = group.place + i * kLanes;
     const Link<Lanes>& link = pack_kinds_[kind_of_pack_[pack]];
@@ -41,8 +46,13 @@ void PathSweep::TurnPacks(Group& group) {
                                  at_pin.v + Scaled(closure.follows, gap.v)};
       at_2 = Across(link, at, speed, at_1);
       at.r1 = at.r1 + Scaled(closure.cut_here * closure.inverse_radius, gap.p);
-      at.gap_w = closure.cut_here * speed + closure.cut_before * speed_before;
-      at.gap_v = Scaled(closure.cut_here + closure.cut_before, RelativeVelocity(at.gap_w, gap));
+      if constexpr (kGaps == Gaps::kSpeeds) {
+        at.gap_w = closure.cut_here * speed + closure.cut_before * speed_before;
+        at.gap_v = Scaled(closure.cut_here + closure.cut_before, RelativeVelocity(at.gap_w, gap));
+      } else {
+        at.gap_v = Scaled(closure.cut_here + closure.cut_before, gap.p);
+        largest = -Min(-largest, -(at.gap_v.x * at.gap_v.x + at.gap_v.y * at.gap_v.y));
+      }
       if (i > 0) {
         Vector2<Lanes>& r2 = turned_packs_[pack - 1].r2;
         r2 = r2 - Scaled(closure.cut_before * inverse_before, gap.p);
@@ -55,6 +65,7 @@ void PathSweep::TurnPacks(Group& group) {
     turned_packs_[pack] = at;
   }
   group.room = Smallest(room);
+  group.largest = -Smallest(-largest);
   group.ends = at_2;
 }
 
@@ -81,6 +92,7 @@ void PathSweep::Set(const PathPlaces& path, int k, const TurnedLink<double>& tur
   }
 }
 
+template <PathSweep::Gaps kGaps>
 void PathSweep::Close(PathPlaces& path, int k, bool here, const Point<double>& gap) {
   const int P = here ? k : k - 1;
   At at_P = Body(path, P);
@@ -91,7 +103,8 @@ void PathSweep::Close(PathPlaces& path, int k, bool here, const Point<double>& g
     at_P.turned.r2 = at_P.turned.r2 - to_Q;
   }
   Set(path, P, at_P.turned);
-  const Vector2<double> gap_v = RelativeVelocity(at_P.speed, gap);
+  const Vector2<double> gap_v = kGaps == Gaps::kSpeeds ? RelativeVelocity(at_P.speed, gap) : gap.p;
+  largest_ = std::max(largest_, gap_v.x * gap_v.x + gap_v.y * gap_v.y);
   if (k == path.bodies) {
     path.gap_v = gap_v;
     path.gap_w = at_P.speed;
@@ -114,13 +127,14 @@ bool PathSweep::TurnSingles(const PathPlaces& path) {
   return room >= 0.0;
 }
 
+template <PathSweep::Gaps kGaps>
 void PathSweep::CloseLoops(PathPlaces& path) {
   Point<double> at_2 = {};
   const auto start = [&](int k, const Closure<double>& closure) {
     if (closure.follows > 0.0) return at_2;
     const At at = Body(path, k);
     const Point<double> at_pin = AtPin(at.link, at.turned, at.speed, closure);
-    if (IsCut(closure)) Close(path, k, closure.cut_here > 0.0, at_2 - at_pin);
+    if (IsCut(closure)) Close<kGaps>(path, k, closure.cut_here > 0.0, at_2 - at_pin);
     return at_pin;
   };
   for (int i = 0; i < path.pieces(); ++i) {
@@ -136,27 +150,28 @@ void PathSweep::CloseLoops(PathPlaces& path) {
     at_2 = Across(singles_[single], own, speed_[path.first + k], at_1);
   }
   if (!path.ends_at_ground) return;
-  if (path.ground_is_P) {
-    path.gap_v = at_2.v;
-  } else {
-    Close(path, path.bodies, false, {at_2.p - path.end, at_2.v});
-  }
+  const Point<double> gap = {at_2.p - path.end, at_2.v};
+  if (!path.ground_is_P) return Close<kGaps>(path, path.bodies, false, gap);
+  path.gap_v = kGaps == Gaps::kSpeeds ? gap.v : gap.p;
+  largest_ = std::max(largest_, gap.p.x * gap.p.x + gap.p.y * gap.p.y);
 }
 
+template <PathSweep::Gaps kGaps>
 bool PathSweep::Turn() {
   pool_->ForEach(static_cast<int>(groups_.size()), [&](int i) {
     if (paths_[groups_[i].path].loops_in_lanes) {
-      TurnPacks<true>(groups_[i]);
+      TurnPacks<true, kGaps>(groups_[i]);
     } else {
-      TurnPacks<false>(groups_[i]);
+      TurnPacks<false, kGaps>(groups_[i]);
     }
   });
+  largest_ = 0.0;
   for (const Group& group : groups_) {
     if (!(group.room >= 0.0)) return false;
   }
   for (PathPlaces& path : paths_) {
     if (!TurnSingles(path)) return false;
-    if (path.has_loops) CloseLoops(path);
+    if (path.has_loops) CloseLoops<kGaps>(path);
   }
   return true;
 }
@@ -269,7 +284,7 @@ bool PathSweep::Evaluate(SpeedsUsed speeds, std::span<const double> q, std::span
                          std::span<double> qdot, std::span<double> udot) {
   operations_ = 0;
   tree_.ToBodies(q, u, angle_.data(), speed_.data(), *pool_);
-  if (!Turn()) return false;
+  if (!Turn<Gaps::kSpeeds>()) return false;
   if (speeds == SpeedsUsed::kGiven) {
     if (!Sweep<Pass::kAccelerations>()) return false;
     ForRanges(*pool_, u.size(), [&](std::size_t first, std::size_t size) {
@@ -284,6 +299,43 @@ bool PathSweep::Evaluate(SpeedsUsed speeds, std::span<const double> q, std::span
     if (!Sweep<Pass::kCompleted>()) return false;
   }
   return tree_.ToJoints(alpha_.data(), {}, udot, *pool_);
+}
+
+std::optional<double> PathSweep::Gap() {
+  tree_.ToBodies(In(moved_), In(speeds_), angle_.data(), speed_.data(), *pool_);
+  if (!Turn<Gaps::kPositions>()) return std::nullopt;
+  double largest = largest_;
+  for (const Group& group : groups_) largest = std::max(largest, group.largest);
+  return std::sqrt(largest);
+}
+
+/// As level_position.cpp does it by parts.
+std::optional<Correction<double>> PathSweep::Project(std::span<double> q, std::span<double> u,
+                                                     double goal) {
+  std::ranges::copy(q, moved_.begin());
+  std::ranges::copy(u, speeds_.begin());
+  std::optional<double> now = Gap();
+  if (!now) return std::nullopt;
+  Correction<double> correction;
+  correction.shift = *now;
+  for (int i = 0; i<kMostProjections&& * now> goal; ++i) {
+    if (!Sweep<Pass::kSpeeds>()) return std::nullopt;
+    const double before = *now;
+    back_ = moved_;
+    if (!tree_.ToJoints(alpha_.data(), In(back_), In(moved_), *pool_)) return std::nullopt;
+    now = Gap();
+    if (!now) return std::nullopt;
+    ++correction.iterations;
+    if (*now < before) continue;
+    moved_ = back_;  // round-off: as it was
+    break;
+  }
+  tree_.ToBodies(In(moved_), In(speeds_), angle_.data(), speed_.data(), *pool_);
+  if (!Turn<Gaps::kSpeeds>() || !Sweep<Pass::kSpeeds>()) return std::nullopt;
+  if (!tree_.ToJoints(alpha_.data(), In(speeds_), In(speeds_), *pool_)) return std::nullopt;
+  std::ranges::copy(moved_, q.begin());
+  std::ranges::copy(speeds_, u.begin());
+  return correction;
 }
 
 }  // namespace loopbench::odca::pins

@@ -19,6 +19,7 @@
 #pragma once
 
 #include <memory>
+#include <optional>
 #include <span>
 #include <vector>
 
@@ -44,6 +45,8 @@ class PathSweep {
   /// kLargestAngle, and for numbers that are not finite. Allocates nothing.
   bool Evaluate(SpeedsUsed speeds, std::span<const double> q, std::span<const double> u,
                 std::span<double> qdot, std::span<double> udot);
+  /// As ConstraintSolver::Project(), where loops are closed; nothing where Evaluate() is false.
+  std::optional<Correction<double>> Project(std::span<double> q, std::span<double> u, double goal);
   /// Multiply-adds of the last evaluation, or what it did of it; angles are not counted.
   long operations() const { return operations_; }
   int threads() const { return pool_->threads(); }
@@ -82,6 +85,7 @@ class PathSweep {
     Point<Lanes> ends;            ///< of its pieces (TurnPacks())
     TwoHandle<Lanes> assemblies;  ///< they are joined to these
     double room = 0.0, slack = 0.0;
+    double largest = 0.0;   ///< square of the largest gap in it, of Gaps::kPositions
     Vector2<Lanes> F1, F2;  ///< on these
   };
   /// Bodies of a path one after the other.
@@ -95,20 +99,29 @@ class PathSweep {
   void AddPieces(PathPlaces& path, std::vector<Closure<double>>& closures);
   void AddPacks(const PathPlaces& path, const PathLinks& links);
 
+  /// Which mismatch of cut joints stands in gap_v, for Pass::kSpeeds to take it away: in each case
+  /// J is that of the bodies where they are.
+  enum class Gaps { kSpeeds, kPositions };
+
   /// Bodies at their angles, with what the gaps of cut joints add to them. False for angles beyond
   /// kLargestAngle.
+  template <Gaps kGaps>
   bool Turn();
   /// Sets ends of pieces, seen from where these start unless they stand alone.
-  template <bool kLoops>
+  template <bool kLoops, Gaps kGaps>
   void TurnPacks(Group& group);
   /// What comes after that.
   bool TurnSingles(const PathPlaces& path);
+  template <Gaps kGaps>
   void CloseLoops(PathPlaces& path);
   struct At;
   At Body(const PathPlaces& path, int k) const;
   void Set(const PathPlaces& path, int k, const TurnedLink<double>& turned);
   /// The joint before body k, or to Ground after the last one, being cut: `here` if its P is k.
+  template <Gaps kGaps>
   void Close(PathPlaces& path, int k, bool here, const Point<double>& gap);
+  /// Turns to positions moved_; the largest gap of a cut joint [m], or nothing.
+  std::optional<double> Gap();
   /// alpha_, or what is to be added to speeds. False near a degenerate position.
   template <Pass kPass>
   bool Sweep();
@@ -135,6 +148,8 @@ class PathSweep {
   std::vector<TurnedLink<double>> turned_singles_;
   std::vector<EndCut<double>> end_cuts_;
   VectorX<double> angle_, speed_, alpha_;  ///< by place; the last one is Ground's
+  VectorX<double> moved_, back_, speeds_;  ///< of Project(): positions, those before, speeds
+  double largest_ = 0.0;                   ///< as Group::largest, of all joints outside of groups
   int num_places_ = 0;
   TreeAngles tree_;
   std::unique_ptr<WorkerPool> pool_;

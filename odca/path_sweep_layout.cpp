@@ -102,6 +102,8 @@ std::unique_ptr<PathSweep> PathSweep::Make(const Mechanism<Planar, double>& mech
   sweep->tree_ = TreeAngles(mechanism, place_of, axes);
   sweep->angle_.setZero(sweep->num_places_ + 1);
   sweep->speed_ = sweep->alpha_ = sweep->angle_;
+  sweep->moved_.setZero(mechanism.num_u());
+  sweep->back_ = sweep->speeds_ = sweep->moved_;
   const int useful = std::max(1, sweep->num_places_ / bodies_of_group);
   sweep->pool_ = std::make_unique<WorkerPool>(std::min(threads, useful));
   return sweep;

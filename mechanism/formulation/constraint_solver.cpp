@@ -17,6 +17,11 @@ bool ConstraintSolver<Space, S>::RightHandSide(SpeedsUsed, std::span<const S>, s
 }
 
 template <class Space, class S>
+std::optional<Correction<S>> ConstraintSolver<Space, S>::Project(std::span<S>, std::span<S>, S) {
+  return std::nullopt;
+}
+
+template <class Space, class S>
 void ConstraintSolver<Space, S>::Correct(const VectorX<S>& target, VectorX<S>& x) {
   Solve(VectorX<S>(), target, x, nullptr);
 }

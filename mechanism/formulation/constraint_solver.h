@@ -18,6 +18,7 @@
 #pragma once
 
 #include <cstdint>
+#include <optional>
 #include <span>
 #include <string>
 #include <string_view>
@@ -36,6 +37,9 @@ struct Conditioning {
   int worst_joint = -1;          ///< index of the joint behind rcond, -1 when not attributable
 };
 
+/// Newton converges in two or three steps from what one accepted step leaves.
+inline constexpr int kMostProjections = 10;
+
 /// Something that a solver counts, under the key that it has in records.
 struct NamedCount {
   std::string_view name;
@@ -44,6 +48,13 @@ struct NamedCount {
 
 /// Which speeds a right-hand side uses: those of the state, or the nearest that satisfy the loops.
 enum class SpeedsUsed { kGiven, kCompleted };
+
+/// Largest mismatches of points [m] and of rotations [rad].
+template <class S>
+struct Correction {
+  S shift = S(0), rotation = S(0);
+  int iterations = 0;  ///< Newton steps, each with an assembly of its own
+};
 
 template <class Space, class S>
 class ConstraintSolver {
@@ -73,6 +84,12 @@ class ConstraintSolver {
   /// Changes neither conditioning() nor what Factor() made.
   virtual bool RightHandSide(SpeedsUsed speeds, std::span<const S> q, std::span<const S> u,
                              std::span<S> qdot, std::span<S> udot);
+
+  /// Short cut for what level position does to an accepted (q, u), in place and by Correct():
+  /// Newton steps until mismatches are at most `goal` [m], one at least where they are more, or no
+  /// longer shrink, then one of speeds. Nothing, as here, where there is no short cut or the
+  /// position is one that Factor() should judge: then (q, u) are as they were.
+  virtual std::optional<Correction<S>> Project(std::span<S> q, std::span<S> u, S goal);
 
   /// A change x of speeds (or of positions, per time) with J x = c. Here the smallest in the metric
   /// M, which is Solve() without force.

@@ -51,13 +51,6 @@ class FactoredState {
   VectorX<S> q_, u_, target_;
 };
 
-/// Largest mismatches of points [m] and of rotations [rad].
-template <class S>
-struct Correction {
-  S shift = S(0), rotation = S(0);
-  int iterations = 0;  ///< Newton steps, each with an assembly of its own
-};
-
 /// D^T mismatch of all constraints by row, and its largest parts in `largest`.
 template <class Space, class S>
 void PositionViolation(const Kinematics<Space, S>& kinematics, VectorX<S>& violation,

@@ -48,6 +48,12 @@ class Level {
   /// After an accepted step of length h, SetSpeeds() being done.
   virtual Accepted Accept(FactoredState<Space, S>&, S /*h*/) { return Accepted::kAsItWas; }
 
+  /// The same by a solver's short cut, of a state that is known by (q, u) alone, which it changes.
+  /// False, as here, where there is none: then Accept() is asked.
+  virtual bool Project(ConstraintSolver<Space, S>&, std::span<S> /*q*/, std::span<S> /*u*/) {
+    return false;
+  }
+
   /// Which right-hand side it is, if a solver may have a short cut for the whole of it: that of
   /// level acceleration or that of level velocity. A level that does not say so has every
   /// right-hand side made from its parts.

@@ -10,14 +10,14 @@ namespace loopbench {
 
 namespace {
 
-/// Newton converges in two or three steps from what one accepted step leaves.
-constexpr int kMostProjections = 10;
-
 template <class Space, class S>
 class PositionLevel final : public Level<Space, S> {
  public:
   explicit PositionLevel(const Mechanism<Space, S>& mechanism)
-      : violation_(VectorX<S>::Zero(mechanism.num_rows())),
+      // what rounding leaves of poses that went through all bodies
+      : goal_(S(4) * std::numeric_limits<S>::epsilon() * S(mechanism.num_bodies())),
+        length_(mechanism.length()),
+        violation_(VectorX<S>::Zero(mechanism.num_rows())),
         change_(VectorX<S>::Zero(mechanism.num_u())),
         q_(VectorX<S>::Zero(mechanism.num_q())),
         moved_(q_),
@@ -26,8 +26,15 @@ class PositionLevel final : public Level<Space, S> {
     this->right_hand_side_ = SpeedsUsed::kGiven;
   }
 
+  bool Project(ConstraintSolver<Space, S>& solver, std::span<S> q, std::span<S> u) override {
+    if (!has_constraints()) return false;
+    const auto correction = solver.Project(q, u, goal_ * length_);
+    if (correction) this->correction_ = *correction;
+    return correction.has_value();
+  }
+
   Accepted Accept(FactoredState<Space, S>& state, S) override {
-    if (violation_.size() == 0 || change_.size() == 0) return Accepted::kAsItWas;
+    if (!has_constraints()) return Accepted::kAsItWas;
     Outcome outcome = ProjectPositions(state);
     if (outcome == Outcome::kFinished) outcome = ProjectSpeeds(state);
     const bool finite = state.q().allFinite() && state.u().allFinite();
@@ -35,19 +42,19 @@ class PositionLevel final : public Level<Space, S> {
   }
 
  private:
+  bool has_constraints() const { return violation_.size() > 0 && change_.size() > 0; }
+
   Outcome ProjectPositions(FactoredState<Space, S>& state) {
     const Kinematics<Space, S>& kinematics = state.kinematics();
     const Mechanism<Space, S>& mechanism = state.mechanism();
-    // what rounding leaves of poses that went through all bodies
-    const S goal = S(4) * std::numeric_limits<S>::epsilon() * S(mechanism.num_bodies());
     const auto size = [&](const Correction<S>& c) {
-      return std::max(c.rotation, c.shift / mechanism.length());
+      return std::max(c.rotation, c.shift / length_);
     };
     Correction<S> now;
     PositionViolation(kinematics, violation_, now);
     Correction<S>& correction = Level<Space, S>::correction_;
     correction = now;
-    for (int i = 0; i < kMostProjections && size(now) > goal; ++i) {
+    for (int i = 0; i < kMostProjections && size(now) > goal_; ++i) {
       if (const Outcome outcome = state.Correct(violation_, change_);
           outcome != Outcome::kFinished) {
         return outcome;
@@ -79,6 +86,8 @@ class PositionLevel final : public Level<Space, S> {
     return Outcome::kFinished;
   }
 
+  S goal_;  ///< of rotations [rad], and of shifts over length_ [m]
+  S length_;
   VectorX<S> violation_, change_, q_, moved_, step_, u_;
 };
 

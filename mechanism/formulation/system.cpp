@@ -148,10 +148,13 @@ Outcome System<Space, S>::Evaluate(S t, const VectorX<S>& q, const VectorX<S>& u
 
 template <class Space, class S>
 bool System<Space, S>::BeginStep(S t, std::span<S> y) {
+  const bool is_projected =
+      MayTakeShortCut() && level_->Project(*solver_, y.first(mechanism_.num_q()),
+                                           y.subspan(mechanism_.num_q(), mechanism_.num_u()));
   at_step_end_ = true;
   if (FromState(t, y) != Outcome::kFinished) return false;  // the next evaluation will say why
   const S h = t - accepted_t_;
-  const Accepted accepted = level_->Accept(state_, h);
+  const Accepted accepted = is_projected ? Accepted::kProjected : level_->Accept(state_, h);
   if (accepted == Accepted::kFailed) return false;  // likewise
   Kinematics<Space, S>& kinematics = state_.kinematics();
   kinematics.AcceptStep();

@@ -9,6 +9,7 @@
 #include <numbers>
 #include <numeric>
 
+#include "lagrange/lagrange.h"
 #include "mechanism/description/library.h"
 #include "odca/odca.h"
 #include "tests/contract/allocations.h"
@@ -17,6 +18,8 @@
 
 namespace loopbench::odca::pins {
 namespace {
+
+constexpr double kEps = std::numeric_limits<double>::epsilon();
 
 using testing::Builder;
 using testing::Random;
@@ -355,6 +358,73 @@ TEST(PathSweep, IsTheDerivativeOfTheSystemWhereItServes) {
   }
 }
 
+/// What level position makes of an accepted step, by the short cut and in all generality:
+/// multipliers have no short cut, and their Newton steps are as long.
+TEST(PathSweep, ProjectsAsTheGeneralWayDoes) {
+  int projected = 0, refused = 0;
+  double worst = 0.0;
+  for (int n = 2; n <= 60; ++n) {
+    for (std::uint64_t seed = 1; seed <= 12; ++seed) {
+      const MechanismDescription path = RandomPath(n, 100 * seed + n, n > 40);
+      const Mechanism<Planar, double> mechanism(path, Coordinates::kJoint);
+      if (mechanism.num_rows() == 0) continue;
+      // a state with closed loops, found by the general way, and what a step of 1e-6 leaves of it
+      Random random(seed);
+      testing::SystemWith<lagrange::Lagrange, Planar, double> general(
+          mechanism, {.enforcement = Enforcement::kPosition});
+      Numbers y(2 * mechanism.num_u());
+      y << RandomNumbers(random, mechanism.num_q(), 4.0),
+          RandomNumbers(random, mechanism.num_u(), 2.0);
+      const auto q = [&](const Numbers& state) { return Numbers(state.head(mechanism.num_q())); };
+      const auto u = [&](const Numbers& state) { return Numbers(state.tail(mechanism.num_u())); };
+      ASSERT_EQ(general->Start(0.0, q(y), u(y)), Outcome::kFinished);
+      if (!general->BeginStep(0.0, In(y))) continue;  // no such position was found
+      y += RandomNumbers(random, static_cast<int>(y.size()), 1e-6);
+      Numbers expected = y, own = y;
+      if (!general->BeginStep(0.0, In(expected))) continue;
+      const Correction<double> by_parts = general->level().correction();
+      const double rcond = general->diagnostics().rcond;
+      if (general->diagnostics().smallest_weight < 1.0) continue;
+      const auto sweep = PathSweep::Make(mechanism, 2, n > 40 ? 2 * kLanes : n);
+      const double goal = 4.0 * kEps * mechanism.num_bodies() * mechanism.length();
+      const std::span<double> state = In(own);
+      const auto half = static_cast<std::size_t>(mechanism.num_q());
+      const auto correction = sweep->Project(state.first(half), state.subspan(half), goal);
+      if (!correction) {
+        ++refused;
+        EXPECT_EQ(own, y) << path.name << ": refused, so left alone";
+        continue;
+      }
+      ++projected;
+      EXPECT_NEAR(correction->shift, by_parts.shift, 1e-3 * by_parts.shift + goal);
+      EXPECT_GE(correction->iterations, by_parts.iterations > 0 ? 1 : 0);
+      // both stop within some round-offs of the mismatch; what that leaves in q is its inverse
+      const double bound = 100.0 * kEps * mechanism.num_bodies() / rcond;
+      const double size = std::max(1.0, u(expected).cwiseAbs().maxCoeff());
+      const double difference = (own - expected).cwiseAbs().maxCoeff() / size / bound;
+      EXPECT_LE(difference, 1.0) << path.name << " rcond " << rcond;
+      worst = std::max(worst, difference);
+    }
+  }
+  std::printf("%d states, %d refused, worst %.2g of the bound\n", projected, refused, worst);
+  EXPECT_GT(projected, 100) << "else this test says little";
+  EXPECT_LE(5 * refused, projected);
+}
+
+TEST(PathSweep, ProjectsNothingNearADegeneratePosition) {
+  const MechanismDescription ladder = Ladder(3, 1e-4, 0.5);
+  const Mechanism<Planar, double> mechanism(ladder, Coordinates::kJoint);
+  Numbers q = Numbers::Zero(mechanism.num_q());
+  for (const JointValues& start : ladder.initial.coordinates) {
+    q[mechanism.joints()[start.joint].q_offset] = start.values[0] + 1e-7;
+  }
+  Numbers u = Numbers::Ones(mechanism.num_u());
+  const Numbers q_before = q, u_before = u;
+  EXPECT_FALSE(PathSweep::Make(mechanism)->Project(In(q), In(u), 1e-15));
+  EXPECT_EQ(q, q_before);
+  EXPECT_EQ(u, u_before);
+}
+
 TEST_P(PathSweepTest, AllocatesNothing) {
   if (testing::CountAllocations() < 0) GTEST_SKIP() << "the sanitizer owns malloc";
   for (const int windows : {20, 4200}) {
@@ -369,6 +439,7 @@ TEST_P(PathSweepTest, AllocatesNothing) {
     Numbers qdot = u, udot = u;
     const long before = testing::CountAllocations();
     EXPECT_TRUE(sweep->Evaluate(GetParam(), In(q), In(u), In(qdot), In(udot)));
+    EXPECT_TRUE(sweep->Project(In(q), In(qdot), 0.0));
     EXPECT_EQ(testing::CountAllocations(), before);
   }
 }

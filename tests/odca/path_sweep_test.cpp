@@ -4,6 +4,7 @@
 #include <gtest/gtest.h>
 
 #include <algorithm>
+#include <array>
 #include <cstdio>
 #include <limits>
 #include <numbers>
@@ -262,10 +263,12 @@ TEST_P(PathSweepTest, HasTheSameBitsForAnyNumberOfThreads) {
       for (int round = 0; round < 3; ++round) {
         EXPECT_EQ(sweep->Evaluate(GetParam(), In(q), In(u), In(qdot), In(udot)), evaluates);
       }
-      return std::pair(qdot, udot);
+      Numbers moved = q, speeds = u;
+      EXPECT_EQ(sweep->Project(In(moved), In(speeds), 1e-12).has_value(), evaluates);
+      return std::array{qdot, udot, moved, speeds};
     };
     const auto alone = rates(1);
-    EXPECT_EQ(alone.second.isZero(0.0), !evaluates);
+    EXPECT_EQ(alone[1].isZero(0.0), !evaluates);
     for (const int threads : {2, 3, 7}) {
       const auto shared = rates(threads);
       EXPECT_TRUE(shared == alone) << description.name << ", " << threads << " threads";

@@ -20,7 +20,7 @@ using Clusters = std::vector<std::vector<std::size_t>>;
 
 bool HasFinalPoses(const Record& record) {
   return record.Text("kind") == "accuracy" && record.Text("outcome") == "finished" &&
-         !record.Text("scene_id").empty() &&
+         !record.Text("scene_id").empty() && !std::isnan(record.Number("rtol")) &&
          std::ranges::any_of(record.items(),
                              [](const auto& item) { return item.first.starts_with(kPrefix); });
 }

@@ -22,7 +22,8 @@ struct Agreement {
 };
 
 /// One for each record, in their order. Compared are accuracy runs that finished, of one scene
-/// (`scene_id`: its whole content) and horizon.
+/// (`scene_id`: its whole content) and horizon; but not those with a fixed step, which say of no
+/// difference that it is small.
 ///
 /// Where the runs at one tolerance do not all end alike, all of them are doubted. The majority need
 /// not be right, because formulations at the same level make the same mistakes. A finer tolerance

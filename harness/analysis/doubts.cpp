@@ -25,6 +25,9 @@ constexpr double kAcceleration = 0.02, kVelocity = 0.2;
 constexpr double kFewSteps = 10.0;
 /// Steps that Baumgarte's default gains, 0.05/h, remember: twice one over the gain.
 constexpr double kRemembered = 40.0;
+/// Where steps are fixed, no tolerance promises anything of their errors: a loop that is open by a
+/// tenth of a link, beyond which growth is not analysed either, is none whatever the step.
+constexpr double kOpenLoop = 0.1;
 /// Over the projection's goal, for what rounding does to the evaluation itself: 15 were seen.
 constexpr double kProjection = 25.0;
 
@@ -89,9 +92,10 @@ double PromisedDriftShare(const Record& record) {
   // tolerance, leave
   const FormulationRow* row = FindFormulation(record.Text("formulation"));
   const bool left = record.Number("softened_evaluations") > 0 || (row && row->is_peer());
-  if (growth == DriftGrowth::kNone && !left) tolerances = 0.0;
-  return record.Find("position_goal") == nullptr ? tolerances * rtol
-                                                 : std::max(tolerances * rtol, goal);
+  const bool is_fixed = record.Number("step") > 0.0;
+  double promised = is_fixed ? kOpenLoop : tolerances * rtol;
+  if (growth == DriftGrowth::kNone && !left) promised = 0.0;
+  return record.Find("position_goal") == nullptr ? promised : std::max(promised, goal);
 }
 
 std::string OwnDoubts(const Record& record) {

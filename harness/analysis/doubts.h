@@ -32,7 +32,8 @@ double EnergyErrorShare(const Record& record);
 /// A step of tolerance rtol leaves errors of some rtol in positions and speeds (docs/numerics.md,
 /// section 2). At velocity level those of positions add up, n rtol; at acceleration level speeds
 /// keep theirs, n^2 rtol times the angle per step; Baumgarte's feedback forgets all but the last
-/// steps; a projection leaves round-off, and in softened directions some tolerance.
+/// steps; a projection leaves round-off, and in softened directions some tolerance. A fixed step
+/// promises nothing but, at a level that leaves none, what the projection does.
 double DriftShare(const Record& record);
 double PromisedDriftShare(const Record& record);
 

@@ -14,6 +14,7 @@
 #include "harness/record/provenance.h"
 #include "harness/store/contents.h"
 #include "harness/store/measurements.h"
+#include "harness/tables/columns.h"
 #include "harness/tables/table.h"
 #include "harness/text/files.h"
 #include "harness/text/terminal.h"
@@ -175,11 +176,22 @@ std::string Conclusion(const ComparisonReport& comparison, int code) {
   return better > 0 ? fmt::format("BETTER: {} measures, none worse", better) : "SAME";
 }
 
+/// Leaves the records of both sides that match. A key that neither side has would choose nothing.
+void Choose(const Selection& where, std::vector<Record>& base, std::vector<Record>& fresh) {
+  if (where.empty()) return;
+  std::vector<Record> both = base;
+  both.insert(both.end(), fresh.begin(), fresh.end());
+  RequireConditions("--where", where, both);
+  base = Filter(base, where);
+  fresh = Filter(fresh, where);
+}
+
 }  // namespace
 
 int PrintComparison(const CompareCommand& command, const std::string& typed) {
   std::vector<Record> base = LoadMeasurements(command.base);
   std::vector<Record> fresh = LoadMeasurements(command.fresh);
+  Choose(command.where, base, fresh);
   ShareContents(&base, &fresh);
   const ComparisonReport comparison = Compare(base, fresh, command.options);
   const int code = comparison.ExitCode(command.options);

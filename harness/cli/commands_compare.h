@@ -5,6 +5,7 @@
 #include <string>
 
 #include "harness/judge/compare.h"
+#include "harness/record/select.h"
 
 namespace loopbench::harness {
 
@@ -12,6 +13,7 @@ struct CompareCommand {
   std::filesystem::path base, fresh;
   std::string format = "text";  ///< text, csv or markdown
   CompareOptions options;
+  Selection where = {};  ///< only such records of both sides
 };
 /// 0 the same or better, 1 something is worse or different, 2 could not measure.
 int PrintComparison(const CompareCommand& command, const std::string& typed);

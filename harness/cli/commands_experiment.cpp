@@ -10,6 +10,7 @@
 #include "harness/json/file_kind.h"
 #include "harness/judge/claims_reader.h"
 #include "harness/judge/failure_map_reader.h"
+#include "harness/record/measures.h"
 #include "harness/run/run_case.h"
 #include "harness/suite/precision_cases.h"
 #include "harness/suite/start_check.h"
@@ -35,8 +36,13 @@ void RequireKeys(const std::vector<Experiment>& experiments, const Selection& fi
   }
   for (const Condition& condition : filter) {
     if (std::ranges::find(known, condition.key) != known.end()) continue;
-    throw ConfigError(fmt::format("--filter {}: no such key; cases have {}", condition.key,
-                                  fmt::join(known, ", ")));
+    const bool is_measured = FindMeasure(condition.key) != nullptr;
+    throw ConfigError(fmt::format(
+        "--filter {}: no such key{}; cases have {}", condition.key,
+        is_measured ? " before a run, which measures it (table, plot and tradeoff choose by it: "
+                      "--where)"
+                    : "",
+        fmt::join(known, ", ")));
   }
 }
 
@@ -63,7 +69,14 @@ Table CaseTable(const std::vector<Experiment>& experiments, const Selection& fil
                                [](const Column& column) { return column.threads > 1; });
   });
   if (has_threads) table.columns.push_back({"threads", "threads", Format::kInteger, {}});
+  const auto any = [&experiments](auto has) { return std::ranges::any_of(experiments, has); };
+  const bool has_integrators =
+      any([](const Experiment& experiment) { return experiment.integrators.size() > 1; });
+  const bool has_steps =
+      any([](const Experiment& experiment) { return !experiment.fixed_steps.empty(); });
+  if (has_integrators) table.columns.push_back({"integrator", "integrator", Format::kText, {}});
   table.columns.push_back({"rtol", "rtol", Format::kShortest, {}});
+  if (has_steps) table.columns.push_back({"step", "step [s]", Format::kShortest, {}});
   table.columns.push_back({"horizon", "horizon [s]", Format::kShortest, {}});
   table.columns.push_back({"ensemble", "runs", Format::kInteger, {}});
   std::size_t timings = 0, rungs = 0;

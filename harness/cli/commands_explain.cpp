@@ -111,10 +111,18 @@ std::string_view UnitOf(const Experiment& experiment, const std::string& joint) 
 }
 
 void ExplainRuns(const Experiment& experiment) {
-  Print(
-      "\nRuns\n  The integrator is {}; its relative and absolute tolerances are equal: {}. "
-      "Smaller is more accurate.\n",
-      experiment.integrator, Numbers(experiment.tolerances));
+  const bool alone = experiment.integrators.size() == 1;
+  Print("\nRuns\n  The integrator{} {}; ", alone ? " is" : "s are",
+        fmt::join(experiment.integrators, ", "));
+  if (!experiment.tolerances.empty()) {
+    Print("{} relative and absolute tolerances are equal: {}. Smaller is more accurate.\n",
+          alone ? "its" : "their", Numbers(experiment.tolerances));
+  }
+  if (!experiment.fixed_steps.empty()) {
+    Print("{}steps of fixed length without error test: {} s.\n",
+          experiment.tolerances.empty() ? "" : "  Each case also runs with ",
+          Numbers(experiment.fixed_steps));
+  }
   if (experiment.ensembles.empty()) {
     Print(
         "  Each case runs once. One run resolves no exponent of growth with confidence; "
@@ -167,8 +175,10 @@ void ExplainMeasures(const Experiment& experiment) {
   }
   Print(
       "  {}, in runs of their own and never two at once: time of one right-hand side [ns] "
-      "and of whole simulations, {} repeats at tolerance {}.\n",
-      Plural(timings, "timing"), experiment.timing.repeats, experiment.timing.tolerance);
+      "and of whole simulations, {} repeats {}.\n",
+      Plural(timings, "timing"), experiment.timing.repeats,
+      experiment.timing.cases ? "of each case as it is"
+                              : fmt::format("at tolerance {}", experiment.timing.tolerance));
 }
 
 void ExplainSweep(const std::vector<Experiment>& experiments) {

@@ -53,13 +53,10 @@ std::map<std::string, double> EarlierTimes(const std::filesystem::path& store) {
   return times;
 }
 
-/// Steps, and with them the time, grow with the horizon and with rtol^(-1/5) (order 5).
-double Work(double horizon, double rtol) { return horizon * std::pow(rtol, -0.2); }
-
 /// What short runs say about the CPU time of a scene and a column.
 struct Rate {
   double start_s = 0.0;   ///< before the first step
-  double per_work = 0.0;  ///< per unit of work
+  double per_step = 0.0;  ///< per expected step (ExpectedSteps)
 };
 
 /// Short runs, each in a process of its own under the limits of its case.
@@ -73,13 +70,13 @@ class Pilot {
     const Experiment& like = experiments_[piloted];
     // another combination of a sweep may have other scenes
     const std::size_t scene = std::min(one.scene, like.scenes.size() - 1);
-    const std::string key =
-        fmt::format("{}/{}/{}/{}", piloted, scene, ToString(one.column), one.integrator);
+    const std::string key = fmt::format("{}/{}/{}/{}{}", piloted, scene, ToString(one.column),
+                                        one.integrator, one.step > 0.0 ? "/fixed" : "");
     const auto known = rates_.find(key);
     const Rate rate = known != rates_.end()
                           ? known->second
                           : rates_.emplace(key, Measure(like, scene, one)).first->second;
-    return rate.start_s + std::min(rate.per_work * Work(one.horizon, one.rtol), one.limits.cpu_s);
+    return rate.start_s + std::min(rate.per_step * ExpectedSteps(one), one.limits.cpu_s);
   }
 
   std::size_t runs() const { return rates_.size(); }
@@ -99,13 +96,13 @@ class Pilot {
     Rate rate;
     const auto work = [&](std::size_t) {
       const Rate found = Run(experiment, scene, like);
-      return fmt::format("{} {}", found.start_s, found.per_work);
+      return fmt::format("{} {}", found.start_s, found.per_step);
     };
     RunInProcesses(
         1, 1, work, [&](std::size_t) { return LimitsOfRuns(like.limits, like.column.threads); },
         [&](std::size_t, const ProcessResult& result) {
           if (result.ending == ProcessEnding::kAnswered &&
-              std::sscanf(result.text.c_str(), "%lf %lf", &rate.start_s, &rate.per_work) == 2) {
+              std::sscanf(result.text.c_str(), "%lf %lf", &rate.start_s, &rate.per_step) == 2) {
             return;
           }
           // the cases will end so as well
@@ -122,8 +119,11 @@ class Pilot {
     Case pilot = like;
     pilot.scene = scene;
     pilot.ensemble = 1;
-    pilot.rtol = pilot.atol =
-        *std::max_element(experiment.tolerances.begin(), experiment.tolerances.end());
+    if (pilot.step > 0.0) {
+      pilot.step = std::ranges::max(experiment.fixed_steps);
+    } else if (!experiment.tolerances.empty()) {  // else it is that of the timings
+      pilot.rtol = pilot.atol = std::ranges::max(experiment.tolerances);
+    }
     const std::vector<double>& horizons = experiment.scenes[scene].horizons;
     const double horizon = *std::max_element(horizons.begin(), horizons.end());
     pilot.limits.cpu_s = std::min(kPilotSeconds, like.limits.cpu_s);
@@ -138,7 +138,10 @@ class Pilot {
       if (!(reached > 0.0) || !(spent > 0.0)) return {start_s, 0.0};
       const bool failed = record.Text("outcome") != ToString(Outcome::kFinished);
       const bool enough = spent >= kPilotEnough || all.cpu_s() >= kPilotSeconds;
-      if (enough || failed || fraction >= 1.0) return {start_s, spent / Work(reached, pilot.rtol)};
+      if (enough || failed || fraction >= 1.0) {
+        pilot.horizon = reached;
+        return {start_s, spent / ExpectedSteps(pilot)};
+      }
     }
   }
 
@@ -223,8 +226,11 @@ void PrintPlan(const std::vector<Experiment>& experiments, const Plan& plan,
   const Experiment& first = experiments.front();
   Print("{}{}{}\n", first.name, first.comment.empty() ? "" : ": ", first.comment);
   PrintAxes(experiments);
-  Print("  {} scenes, {} columns, {} tolerances\n\n", first.scenes.size(), first.columns.size(),
+  Print("  {} scenes, {} columns, {} tolerances", first.scenes.size(), first.columns.size(),
         first.tolerances.size());
+  if (!first.fixed_steps.empty()) Print(", {} fixed steps", first.fixed_steps.size());
+  if (first.integrators.size() > 1) Print(", {} integrators", first.integrators.size());
+  Print("\n\n");
   Table table;
   table.columns = {{"mechanism", "mechanism", Format::kText, {}},
                    {"column", "column", Format::kText, {}},
@@ -255,8 +261,9 @@ void PrintPlan(const std::vector<Experiment>& experiments, const Plan& plan,
   if (pilot.runs() > 0) {
     source += fmt::format(
         "{}{} pilots over {:g} % or more of the longest horizon at the loosest tolerance, scaled "
-        "with the horizon and rtol^(-1/5)",
-        source.empty() ? "" : ", the rest from ", pilot.runs(), 100.0 * kPilotFraction);
+        "with the horizon and rtol^(-1/5){}",
+        source.empty() ? "" : ", the rest from ", pilot.runs(), 100.0 * kPilotFraction,
+        first.fixed_steps.empty() ? "" : ", or with the number of fixed steps");
   }
   Print("An estimate, from {}. Each run ends at {:g} s of CPU time at the latest.\n", source,
         first.limits.cpu_s);

@@ -177,7 +177,7 @@ int PrintTable(const TableCommand& command, const std::string& typed) {
 
 int Plot(const PlotCommand& command) {
   std::vector<Record> records = LoadRecords(command.store);
-  for (const Condition& condition : command.where) RequireKey("--where", condition.key, records);
+  RequireConditions("--where", command.where, records);
   records = Filter(records, command.where);
   if (records.empty()) {
     PrintError("{}: no records match{}{}\n", command.store.string(),

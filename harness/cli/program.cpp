@@ -28,7 +28,8 @@ Examples: (paths from the root of the repository)
   loopbench verdict results/runs/paper --claims configs/experiments/paper/claims.json
   loopbench map results/runs/extremes --rules configs/experiments/extremes/map.json
 
-Conditions are key=value or key=value,value; keys are the columns of drift.csv.
+Conditions are key=value, key=value,value, key!=value, or of numbers 'key<value' (<=, >, >=), quoted
+for the shell; keys are the columns of drift.csv, and before a run those that name cases.
 Formulations: {}.
 Levels of enforcement: {}.
 Exit codes: 0 done, 1 a gate failed, 2 could not measure or bad input.)";

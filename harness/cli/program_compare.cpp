@@ -1,5 +1,6 @@
 #include "harness/cli/program_compare.h"
 
+#include "harness/cli/options.h"
 #include "harness/text/numeric_option.h"
 
 namespace loopbench::harness {
@@ -45,6 +46,8 @@ ComparisonOptions::ComparisonOptions(CLI::App& app) {
   compare_app_->add_option("new", compare_.fresh, what)->required();
   compare_app_->add_option("--only", compare_.options.only, "Only this group (repeatable)")
       ->check(CLI::IsMember(GroupNames()));
+  compare_app_->add_option("--where", conditions_,
+                           "Only records of both with key=value[,value] (or !=, <, <=, >, >=)");
   compare_app_->add_flag("--subset", compare_.options.subset, "NEW may lack cases of BASE");
   compare_app_
       ->add_option("--error-ratio", compare_.options.error_ratio, "Allowed on the same build")
@@ -75,6 +78,7 @@ ComparisonOptions::ComparisonOptions(CLI::App& app) {
 }
 
 std::optional<int> ComparisonOptions::Run(const std::string& typed) {
+  compare_.where = ParseSelection(conditions_);
   if (*compare_app_) return PrintComparison(compare_, typed);
   if (*fit_app_) return PrintFits(fit_, typed);
   if (*export_app_) return ExportMeasurements(export_);

@@ -4,6 +4,7 @@
 #include <CLI/CLI.hpp>
 #include <optional>
 #include <string>
+#include <vector>
 
 #include "harness/cli/commands_compare.h"
 
@@ -19,6 +20,7 @@ class ComparisonOptions {
 
  private:
   CLI::App *compare_app_, *fit_app_, *export_app_;
+  std::vector<std::string> conditions_;  ///< --where, as typed
   CompareCommand compare_;
   FitCommand fit_;
   ExportCommand export_;

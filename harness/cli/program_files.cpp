@@ -39,7 +39,8 @@ FileOptions::FileOptions(CLI::App& app) {
 
   list_app_ = app.add_subcommand("list", "Show the cases of experiments");
   list_app_->add_option("experiment", files_.paths, "Experiment files (JSON)")->required();
-  list_app_->add_option("--filter", conditions_, "Only cases with key=value[,value]");
+  list_app_->add_option("--filter", conditions_,
+                        "Only cases with key=value[,value] (or !=, <, <=, >, >=)");
   AddSettings(list_app_, &settings_);
 
   AddCheck(app);
@@ -48,7 +49,8 @@ FileOptions::FileOptions(CLI::App& app) {
   plan_app_->add_option("experiment", files_.paths, "Experiment files (JSON)")->required();
   plan_app_->add_option("--from", plan_.from,
                         "Earlier results whose times are used, not a pilot's");
-  plan_app_->add_option("--filter", conditions_, "Only cases with key=value[,value]");
+  plan_app_->add_option("--filter", conditions_,
+                        "Only cases with key=value[,value] (or !=, <, <=, >, >=)");
   AddSettings(plan_app_, &settings_);
 
   AddExplain(app);
@@ -69,7 +71,8 @@ void FileOptions::AddRun(CLI::App& app) {
       ->add_option("--threads", run_.threads,
                    "Allowed on one right-hand side, where O-DCA has long paths: same results")
       ->check(NumberFrom(1, kMostThreads));
-  run_app_->add_option("--filter", conditions_, "Only accuracy cases with key=value[,value]");
+  run_app_->add_option("--filter", conditions_,
+                       "Only accuracy cases with key=value[,value] (or !=, <, <=, >, >=)");
   AddSettings(run_app_, &settings_);
   run_app_->add_option("--shard", shard_, "k/n: the k-th of n parts, to be merged later")
       ->capture_default_str();
@@ -104,7 +107,8 @@ void FileOptions::AddExplain(CLI::App& app) {
       "explain", "Say what experiments run and measure, and what mechanisms are made of");
   explain_app_->add_option("file", files_.paths, "Experiment or mechanism files (JSON)")
       ->required();
-  explain_app_->add_option("--filter", conditions_, "Only cases with key=value[,value]");
+  explain_app_->add_option("--filter", conditions_,
+                           "Only cases with key=value[,value] (or !=, <, <=, >, >=)");
   AddLimits(explain_app_, &explain_limits_);
   AddSettings(explain_app_, &settings_);
   explain_app_->add_flag("--all", explain_all_, "Every row of long tables of a mechanism");

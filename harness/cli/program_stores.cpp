@@ -9,6 +9,7 @@ namespace {
 constexpr const char* kTableFooter = R"(
 Examples:
   loopbench table out --where rtol=1e-8 --group mechanism
+  loopbench table out --where 'wall_s<0.02' --where 'drift_position_max<=1e-9'
   loopbench table out --columns mechanism,formulation,drift_position_max --format latex
   loopbench table out --kind timing --sort rhs_ns_median --format csv --out timing.csv
 
@@ -82,7 +83,8 @@ void StoreOptions::AddTable(CLI::App& app) {
   table_app_->add_option("--format", table_.format, "How they are written")
       ->check(CLI::IsMember({"text", "csv", "markdown", "json", "latex"}))
       ->capture_default_str();
-  table_app_->add_option("--where", conditions_, "Only records with key=value[,value]");
+  table_app_->add_option("--where", conditions_,
+                         "Only records with key=value[,value] (or !=, <, <=, >, >=)");
   table_app_->add_option("--columns", table_.view.columns, "Keys of records, in this order: a,b,c")
       ->delimiter(',');
   table_app_->add_option("--group", table_.view.group, "One table per value of this key");
@@ -103,7 +105,8 @@ void StoreOptions::AddPlot(CLI::App& app) {
       ->required();
   plot_app_->add_option("--format", plot_.format, "svg (default) or pdf")
       ->check(CLI::IsMember({"svg", "pdf"}));
-  plot_app_->add_option("--where", conditions_, "Only records with key=value[,value]");
+  plot_app_->add_option("--where", conditions_,
+                        "Only records with key=value[,value] (or !=, <, <=, >, >=)");
   plot_app_->add_option("--x", plot_.free.x, "Key of the horizontal axis");
   plot_app_->add_option("--y", plot_.free.y, "Key of the vertical axis");
   plot_app_->add_option("--group", plot_.free.group, "One curve per value of these keys: a,b");

@@ -3,6 +3,7 @@
 #include <fmt/format.h>
 
 #include <algorithm>
+#include <cmath>
 
 #include "harness/config/formulations.h"
 #include "harness/config/options.h"
@@ -15,16 +16,38 @@ bool EmptyOrContains(const std::vector<T>& accepted, const T& value) {
   return accepted.empty() || std::find(accepted.begin(), accepted.end(), value) != accepted.end();
 }
 
+/// Which steps a case takes: one of the two is there.
+struct StepChoice {
+  double tolerance = 0.0, step = 0.0;
+};
+
+std::vector<StepChoice> StepChoices(const Experiment& experiment) {
+  std::vector<StepChoice> choices;
+  for (const double tolerance : experiment.tolerances) choices.push_back({.tolerance = tolerance});
+  for (const double step : experiment.fixed_steps) choices.push_back({.step = step});
+  return choices;
+}
+
+/// The integrators that a column is run with: those of the experiment, and one of no consequence
+/// for a peer, which has its own.
+std::vector<std::string> IntegratorsOf(const Experiment& experiment, const Column& column) {
+  const FormulationRow* row = FindFormulation(column.formulation);
+  std::vector<std::string> integrators = experiment.integrators;
+  if (row != nullptr && row->is_peer() && integrators.size() > 1) integrators.resize(1);
+  return integrators;
+}
+
 Case MakeCase(const Experiment& experiment, std::size_t scene, const Column& column,
-              double tolerance, double horizon, const std::string& integrator) {
+              const StepChoice& choice, double horizon, const std::string& integrator) {
   Case one{.scene = scene,
            .mechanism = experiment.scenes[scene].name,
            .column = column,
            .integrator = integrator,
            .jacobian = experiment.jacobian,
-           .rtol = tolerance,
-           .atol = tolerance,
+           .rtol = choice.tolerance,
+           .atol = choice.tolerance,
            .horizon = horizon,
+           .step = choice.step,
            .limits = experiment.limits};
   one.keys = CaseKeys(experiment, one);
   return one;
@@ -70,8 +93,10 @@ Record CaseKeys(const Experiment& experiment, const Case& one) {
     const auto kind = static_cast<std::size_t>(one.jacobian);
     keys.Set("jacobian", std::string(kNames<JacobianKind>[kind]));
   }
-  keys.Set("rtol", one.rtol);
-  keys.Set("atol", one.atol);
+  const bool is_fixed = one.step > 0.0;
+  keys.Set("rtol", is_fixed ? Value() : Value(one.rtol));
+  keys.Set("atol", is_fixed ? Value() : Value(one.atol));
+  if (is_fixed) keys.Set("step", one.step);
   keys.Set("horizon", one.horizon);
   if (one.column.gains) {
     keys.Set("alpha", one.column.gains->alpha);
@@ -80,6 +105,15 @@ Record CaseKeys(const Experiment& experiment, const Case& one) {
   if (one.column.threads > 1) keys.Set("threads", std::int64_t{one.column.threads});
   for (const auto& [name, value] : experiment.parameters.items()) keys.Set(name, value);
   return keys;
+}
+
+std::string SettingOf(const Case& one) {
+  return one.step > 0.0 ? fmt::format("step {}", one.step) : fmt::format("{}", one.rtol);
+}
+
+double ExpectedSteps(const Case& one) {
+  if (one.step > 0.0) return one.horizon / one.step;
+  return one.horizon * std::pow(one.rtol, -0.2);
 }
 
 void UseThreads(int threads, Experiment& experiment) {
@@ -106,19 +140,31 @@ bool Matches(const EnsembleRule& rule, const Case& one) {
          EmptyOrContains(rule.solvers, one.column.solver);
 }
 
-std::vector<Case> Expand(const Experiment& experiment) {
+namespace {
+
+/// As Expand(), without ensembles.
+std::vector<Case> ExpandRuns(const Experiment& experiment) {
   std::vector<Case> cases;
+  const std::vector<StepChoice> choices = StepChoices(experiment);
   for (std::size_t scene = 0; scene < experiment.scenes.size(); ++scene) {
     for (const double horizon : experiment.scenes[scene].horizons) {
       for (const Column& column : experiment.columns) {
-        for (const double tolerance : experiment.tolerances) {
-          cases.push_back(
-              MakeCase(experiment, scene, column, tolerance, horizon, experiment.integrator));
+        for (const std::string& integrator : IntegratorsOf(experiment, column)) {
+          for (const StepChoice& choice : choices) {
+            cases.push_back(MakeCase(experiment, scene, column, choice, horizon, integrator));
+          }
         }
       }
     }
   }
   DropExcluded(experiment, &cases);
+  return cases;
+}
+
+}  // namespace
+
+std::vector<Case> Expand(const Experiment& experiment) {
+  std::vector<Case> cases = ExpandRuns(experiment);
   for (Case& one : cases) {
     const auto rule =
         std::find_if(experiment.ensembles.begin(), experiment.ensembles.end(),
@@ -143,8 +189,8 @@ std::vector<Case> ExpandLadders(const Experiment& experiment) {
     const double horizon = HorizonOr(precision.horizon, horizons);
     for (const Column& column : experiment.columns) {
       // the one integrator that there is in every scalar
-      cases.push_back(
-          MakeCase(experiment, scene, column, precision.tolerances.front(), horizon, "ode45"));
+      cases.push_back(MakeCase(experiment, scene, column,
+                               {.tolerance = precision.tolerances.front()}, horizon, "ode45"));
     }
   }
   DropExcluded(experiment, &cases);
@@ -155,13 +201,16 @@ std::vector<Case> ExpandTiming(const Experiment& experiment) {
   std::vector<Case> cases;
   const Timing& timing = experiment.timing;
   if (timing.repeats == 0) return cases;
+  if (timing.cases) return ExpandRuns(experiment);
   for (std::size_t scene = 0; scene < experiment.scenes.size(); ++scene) {
     const std::vector<double>& horizons = experiment.scenes[scene].horizons;
     if (horizons.empty()) continue;
     const double horizon = HorizonOr(timing.horizon, horizons);
     for (const Column& column : timing.columns) {
-      cases.push_back(
-          MakeCase(experiment, scene, column, timing.tolerance, horizon, experiment.integrator));
+      for (const std::string& integrator : IntegratorsOf(experiment, column)) {
+        cases.push_back(MakeCase(experiment, scene, column, {.tolerance = timing.tolerance},
+                                 horizon, integrator));
+      }
     }
   }
   DropExcluded(experiment, &cases);

@@ -134,6 +134,9 @@ struct Timing {
   double tolerance = 1e-8;      ///< rtol = atol
   double horizon = 0.0;         ///< [s]; 0: the shortest of each scene
   std::vector<Column> columns;  ///< those of the experiment unless given
+  /// Instead of one tolerance and horizon for all: every accuracy case with its own integrator,
+  /// tolerance or step, and horizon, so that each accuracy row has a timing row of the same keys.
+  bool cases = false;
   std::vector<TimingFamily> families;
 };
 
@@ -151,10 +154,11 @@ struct Experiment {
   std::filesystem::path path;
   std::vector<ExperimentScene> scenes;
   std::vector<Column> columns;
-  std::vector<double> tolerances;  ///< rtol = atol
-  std::string integrator = "ode45";
-  JacobianKind jacobian = JacobianKind::kForward;  ///< of no consequence to explicit profiles
-  std::vector<EnsembleRule> ensembles;             ///< the first that matches a case counts
+  std::vector<double> tolerances;   ///< rtol = atol; may be empty where there are
+  std::vector<double> fixed_steps;  ///< [s]; each makes cases without error test besides those
+  std::vector<std::string> integrators = {"ode45"};  ///< profiles, crossed with all of them
+  JacobianKind jacobian = JacobianKind::kForward;    ///< of no consequence to explicit profiles
+  std::vector<EnsembleRule> ensembles;               ///< the first that matches a case counts
   Limits limits;
   CompileOptions compile;   ///< what is simplified before a run
   int series_points = 200;  ///< points kept of a time series for figures
@@ -173,12 +177,13 @@ struct Case {
   Column column;
   std::string integrator;
   JacobianKind jacobian = JacobianKind::kForward;
-  double rtol = 0.0;
-  double atol = 0.0;
-  double horizon = 0.0;                       ///< [s]
-  int ensemble = 1;                           ///< runs; 1: the scene as it is, no perturbation
-  std::uint64_t seed = 0;                     ///< of the ensemble
-  double perturb = 0.0;                       ///< amplitude of the ensemble [rad or m], or else
+  double rtol = 0.0;       ///< 0 where the step is fixed
+  double atol = 0.0;       ///< likewise
+  double horizon = 0.0;    ///< [s]
+  double step = 0.0;       ///< [s]; of all steps, without error test; 0: the tolerance chooses them
+  int ensemble = 1;        ///< runs; 1: the scene as it is, no perturbation
+  std::uint64_t seed = 0;  ///< of the ensemble
+  double perturb = 0.0;    ///< amplitude of the ensemble [rad or m], or else
   std::vector<DrawnCoordinate> between = {};  ///< as in the rule
   double branch_bound = 1e-6;                 ///< [rad]
   Limits limits = {};
@@ -191,21 +196,29 @@ struct Case {
 bool Matches(const EnsembleRule& rule, const Case& one);
 
 /// The keys that name a case, as they stand in every table row: those of docs/design.md section 6,
-/// then the experiment's parameters.
+/// then the experiment's parameters. With a fixed step rtol and atol are empty and "step" is a key.
 Record CaseKeys(const Experiment& experiment, const Case& one);
+
+/// "1e-08", or "step 0.001": what decides how long the case's steps are.
+std::string SettingOf(const Case& one);
+
+/// In proportion to the steps that a run over `horizon` takes: the horizon over the fixed step, or
+/// times rtol^(-1/5), as with a pair of order 5. Only cases of one kind compare.
+double ExpectedSteps(const Case& one);
 
 /// All columns but peers with so many threads; those that differed in nothing else become one.
 void UseThreads(int threads, Experiment& experiment);
 
-/// All cases for accuracy, in the order scene, horizon, column, tolerance, without excluded ones.
+/// All cases for accuracy, in the order scene, horizon, column, integrator, tolerance, fixed step,
+/// without excluded ones. A peer, which has its own integrator, is there once for each tolerance.
 std::vector<Case> Expand(const Experiment& experiment);
 
 /// One case for each precision ladder, in the order scene, column, without excluded ones; empty
 /// without scalars. Tolerances are those of the ladder.
 std::vector<Case> ExpandLadders(const Experiment& experiment);
 
-/// All cases for timing, in the order scene, column, without excluded ones; empty when timing is
-/// off.
+/// All cases for timing, in the order scene, column, integrator, without excluded ones, or with
+/// `timing.cases` those for accuracy, each of which is one run; empty when timing is off.
 std::vector<Case> ExpandTiming(const Experiment& experiment);
 
 }  // namespace loopbench::harness

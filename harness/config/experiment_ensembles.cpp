@@ -28,6 +28,10 @@ std::vector<double> ReadUsedNumbers(const JsonNode& node, const std::vector<doub
     if (std::find(used.begin(), used.end(), number) != used.end()) continue;
     constexpr std::size_t kMostShown = 16;
     const auto end = used.begin() + static_cast<int>(std::min(used.size(), kMostShown));
+    if (used.empty()) {
+      node.Fail("no such key: the experiment has none");
+      break;
+    }
     node.Fail(fmt::format("values among those of this experiment: {}{}",
                           fmt::join(used.begin(), end, ", "), end == used.end() ? "" : ", ..."));
     break;

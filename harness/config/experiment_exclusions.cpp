@@ -24,6 +24,7 @@ std::vector<Selection> ReadExclusions(const JsonNode& root, const Record& keys) 
   for (const auto& [name, value] : keys.items()) {
     if (name != "kind" && name != "experiment") known.Add(name);
   }
+  known.Add("step");  // of those cases only whose steps are fixed
   for (const JsonNode& element : elements) {
     Selection& rule = exclusions.emplace_back();
     if (!element.ExpectObject(known)) continue;

@@ -175,7 +175,8 @@ class Reader {
 std::size_t CountCases(const Experiment& experiment) {
   std::size_t horizons = 0;
   for (const ExperimentScene& scene : experiment.scenes) horizons += scene.horizons.size();
-  return horizons * experiment.columns.size() * experiment.tolerances.size();
+  return horizons * experiment.columns.size() * experiment.integrators.size() *
+         (experiment.tolerances.size() + experiment.fixed_steps.size());
 }
 
 Setting ParseSetting(std::string_view text) {

@@ -1,4 +1,6 @@
 // "limits", "compile", "series", "timing" and "precision" of an experiment file.
+#include <fmt/format.h>
+
 #include "harness/config/experiment_sections.h"
 #include "harness/config/limits_record.h"
 
@@ -28,6 +30,25 @@ void ReadSizes(const JsonNode& node, TimingFamily& family) {
   for (const std::int64_t size : node.IntegerList(smallest, kMaxCount)) {
     family.sizes.push_back(static_cast<int>(size));
   }
+}
+
+/// What accuracy cases say themselves.
+constexpr const char* kOfCases[] = {"tolerance", "horizon", "columns"};
+
+void RequireCasesAlone(const JsonNode& node, Timing& timing) {
+  if (!timing.cases) return;
+  for (const char* key : kOfCases) {
+    if (!node.Optional(key)) continue;
+    node.FailAs(fmt::format("\"cases\" beside \"{}\"", key),
+                "one of them: cases are timed as they are");
+  }
+}
+
+Json CasesAloneSchema() {
+  Json others = Json::array();
+  for (const char* key : kOfCases) others.push_back(Requires({key}));
+  return {{"if", {{"required", {"cases"}}, {"properties", {{"cases", {{"const", true}}}}}}},
+          {"then", {{"not", {{"anyOf", others}}}}}};
 }
 
 const Fields<TimingFamily>& TimingFamilyFields() {
@@ -105,6 +126,10 @@ const Fields<Timing>& TimingFields() {
        {"horizon", Number(&Timing::horizon, kPositive),
         "Simulated time [s]; default: the shortest of each scene."},
        {"columns", Columns(&Timing::columns), "Default: those of the experiment."},
+       {"cases", Bool(&Timing::cases),
+        "Every accuracy case is timed as it is, with its own integrator, tolerance or step, and "
+        "horizon; not beside tolerance, horizon and columns."},
+       {"", By(CasesAloneSchema(), RequireCasesAlone)},
        {"families", ObjectList(&Timing::families, TimingFamilyFields(), "families")}});
   return fields;
 }

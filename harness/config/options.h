@@ -64,7 +64,7 @@ struct IntegratorOptions {
   double max_step = 0;
 
   /// When positive: every step has this length (the last, and one that ends at a stop time, is
-  /// clipped) and no error test is made.
+  /// clipped) and no error test is made. Tolerances then end Newton's iteration alone.
   double fixed_step = 0;
 
   /// Times, in order, at which a step must end because f or a derivative of it jumps there: knots
@@ -80,6 +80,11 @@ struct IntegratorOptions {
 /// The least relative tolerance: at the spacing of doubles no step's error can be told from
 /// rounding, and ARKODE takes none (ARK_TOO_MUCH_ACC). It is refused itself.
 inline constexpr double kLeastTolerance = std::numeric_limits<double>::epsilon();
+
+/// Of runs with a fixed step, which make no error test: Newton's iteration of implicit profiles
+/// ends by it. It leaves a hundredth, 1e-12, far below the error of any step worth taking, and
+/// still a thousand times above rounding, where the iteration would no longer converge.
+inline constexpr double kToleranceOfFixedSteps = 1e-10;
 
 /// "" if the options can be used, else one sentence with the option, its value and what is allowed.
 std::string Validate(const IntegratorOptions& options);

@@ -82,13 +82,19 @@ std::string LabelOf(const Record& record, std::span<const Record> all, bool with
   return label;
 }
 
+// What decides a run's steps: "rtol 1e-08", or "step 0.001 s".
+std::string StepsOf(const Record& record) {
+  const std::string step = record.Text("step");
+  return step.empty() ? "rtol " + record.Text("rtol") : fmt::format("step {} s", step);
+}
+
 std::string TitleOf(std::span<const Record> records, std::string_view what) {
   if (records.empty()) return std::string(what);
   std::string title = fmt::format("{}: {}", records[0].Text("mechanism"), what);
   for (const char* key : {"coordinates", "solver"}) {
     if (!Varies(records, key)) title += ", " + records[0].Text(key);
   }
-  if (!Varies(records, "rtol")) title += ", rtol " + records[0].Text("rtol");
+  if (!Varies(records, "rtol") && !Varies(records, "step")) title += ", " + StepsOf(records[0]);
   return title;
 }
 
@@ -147,8 +153,9 @@ std::string RunOf(const Record& record) {
   for (const char* key : {"formulation", "enforcement", "coordinates", "solver"}) {
     if (!record.Text(key).empty()) text += ", " + record.Text(key);
   }
-  text += ", rtol " + record.Text("rtol");
+  text += ", " + StepsOf(record);
   for (const TableColumn& parameter : WithParameters({}, {&record, 1})) {
+    if (parameter.key == "step") continue;
     text += fmt::format(", {} {}", parameter.key, record.Text(parameter.key));
   }
   return text;
@@ -233,7 +240,10 @@ std::vector<NamedFigure> AllFigures(std::span<const Record> records) {
       if (!is_new && MotionRank(record) > MotionRank(it->second)) it->second = record;
     }
     if (record.Find("series.drift") != nullptr) {
-      drift[fmt::format("{}-rtol-{}", scene, record.Text("rtol"))].push_back(record);
+      const std::string step = record.Text("step");
+      const std::string steps =
+          step.empty() ? "rtol-" + record.Text("rtol") : fmt::format("step-{}s", step);
+      drift[fmt::format("{}-{}", scene, steps)].push_back(record);
     }
   }
   std::vector<NamedFigure> figures;

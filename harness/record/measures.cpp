@@ -28,6 +28,7 @@ constexpr Measure kMeasures[] = {
     {"scalar", kText, {"scalar"}},
     {"rtol", kNumber, {"rtol", "", kShortest}},
     {"atol", kNumber, {"atol", "", kShortest}},
+    {"step", kNumber, {"step", "s", kShortest}},
     {"horizon", kNumber, {"horizon", "s", kShortest}},
     {"threads", kNumber},
     {"alpha", kNumber},

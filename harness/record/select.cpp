@@ -3,6 +3,7 @@
 #include <fmt/format.h>
 
 #include <algorithm>
+#include <array>
 #include <charconv>
 #include <cmath>
 #include <cstdint>
@@ -27,10 +28,53 @@ bool Holds(const Record& record, const Condition& condition) {
   if (value == nullptr || std::holds_alternative<std::monostate>(*value)) return false;
   const bool numeric =
       std::holds_alternative<double>(*value) || std::holds_alternative<std::int64_t>(*value);
-  return std::ranges::any_of(condition.values, [&](const std::string& wanted) {
-    return numeric ? ParseNumber(wanted) == record.Number(condition.key)
-                   : record.Text(condition.key) == wanted;
-  });
+  const double number = record.Number(condition.key);
+  if (numeric && std::isnan(number)) return false;
+  const auto is = [&](const std::string& wanted) {
+    return numeric ? ParseNumber(wanted) == number : record.Text(condition.key) == wanted;
+  };
+  // ParseCondition() has seen to it that what is ordered is one number
+  const auto bound = [&] { return ParseNumber(condition.values.front()).value(); };
+  switch (condition.op) {
+    case Operator::kEqual:
+      return std::ranges::any_of(condition.values, is);
+    case Operator::kUnequal:
+      return std::ranges::none_of(condition.values, is);
+    case Operator::kLess:
+      return numeric && number < bound();
+    case Operator::kAtMost:
+      return numeric && number <= bound();
+    case Operator::kGreater:
+      return numeric && number > bound();
+    case Operator::kAtLeast:
+      return numeric && number >= bound();
+  }
+  return false;
+}
+
+constexpr std::array<std::string_view, 6> kOperators = {"=", "!=", "<", "<=", ">", ">="};
+
+// The operator that `text` begins with, the longest there is; nothing for a "!" alone.
+std::optional<Operator> OperatorAt(std::string_view text) {
+  std::optional<Operator> found;
+  for (std::size_t i = 0; i < kOperators.size(); ++i) {
+    const bool longer = !found || kOperators[i].size() > ToString(*found).size();
+    if (text.starts_with(kOperators[i]) && longer) found = static_cast<Operator>(i);
+  }
+  return found;
+}
+
+void RequireOneNumber(std::string_view text, const Condition& condition) {
+  if (condition.op == Operator::kEqual || condition.op == Operator::kUnequal) return;
+  if (condition.values.size() > 1) {
+    throw ConfigError(fmt::format("filter '{}': found {} values, expected one number behind {}",
+                                  text, condition.values.size(), ToString(condition.op)));
+  }
+  const std::string& value = condition.values.front();
+  const auto number = ParseNumber(value);
+  if (number && !std::isnan(*number)) return;
+  throw ConfigError(fmt::format("filter '{}': found \"{}\", expected a number behind {}", text,
+                                value, ToString(condition.op)));
 }
 
 // -1, 0 or 1; NaN is larger than every number, so that the order is total.
@@ -86,6 +130,7 @@ bool ComesBefore(const Record& a, const Record& b) {
     if (const int order = a.Text(key).compare(b.Text(key))) return order < 0;
   }
   if (const int order = Compare(-a.Number("rtol"), -b.Number("rtol"))) return order < 0;
+  if (const int order = Compare(-a.Number("step"), -b.Number("step"))) return order < 0;
   return CompareKeys(a, b) < 0;
 }
 
@@ -108,19 +153,27 @@ SortKey SortKeyOf(const Record& record, const std::string& key) {
 
 }  // namespace
 
+std::string_view ToString(Operator op) { return kOperators[static_cast<std::size_t>(op)]; }
+
 Condition ParseCondition(std::string_view text) {
-  const std::size_t equals = text.find('=');
-  if (equals == std::string_view::npos || equals == 0 || equals + 1 == text.size()) {
-    throw ConfigError(fmt::format("filter '{}': expected key=value or key=value,value", text));
+  const std::size_t at = std::min(text.find_first_of("=!<>"), text.size());
+  const auto op = OperatorAt(text.substr(at));
+  const std::size_t behind = at + (op ? ToString(*op).size() : 0);
+  if (!op || at == 0 || behind == text.size()) {
+    throw ConfigError(fmt::format(
+        "filter '{}': expected key=value, key=value,value, key!=value or key<number (<=, >, >=)",
+        text));
   }
-  Condition condition{std::string(text.substr(0, equals)), {}};
-  std::string_view rest = text.substr(equals + 1);
+  Condition condition{std::string(text.substr(0, at)), {}, *op};
+  std::string_view rest = text.substr(behind);
   for (;;) {
     const std::size_t comma = rest.find(',');
     condition.values.emplace_back(rest.substr(0, comma));
-    if (comma == std::string_view::npos) return condition;
+    if (comma == std::string_view::npos) break;
     rest.remove_prefix(comma + 1);
   }
+  RequireOneNumber(text, condition);
+  return condition;
 }
 
 bool Matches(const Record& record, const Selection& selection) {
@@ -137,9 +190,9 @@ std::vector<Record> Filter(std::span<const Record> records, const Selection& sel
 
 std::string ToText(const Selection& selection) {
   std::string text;
-  for (const auto& [key, values] : selection) {
-    text += fmt::format("{}{}", text.empty() ? "" : " ", key);
-    for (std::size_t i = 0; i < values.size(); ++i) text += (i == 0 ? "=" : ",") + values[i];
+  for (const auto& [key, values, op] : selection) {
+    text +=
+        fmt::format("{}{}{}{}", text.empty() ? "" : " ", key, ToString(op), fmt::join(values, ","));
   }
   return text;
 }

@@ -10,11 +10,18 @@
 
 namespace loopbench::harness {
 
-/// "The value under `key` is one of `values`." A numeric value is compared as a number, so "1e-6"
-/// and "1e-06" are the same; every other value is compared as text ("true", "four-bar").
+/// How a condition holds a value against its own: "=" and "!=" any value, the others numbers.
+enum class Operator { kEqual, kUnequal, kLess, kAtMost, kGreater, kAtLeast };
+/// "=", "!=", "<", "<=", ">", ">=".
+std::string_view ToString(Operator op);
+
+/// "The value under `key` is one of `values`", or with another operator: none of them, less than
+/// the one of them, ... A numeric value is compared as a number, so "1e-6" and "1e-06" are the
+/// same; every other value is compared as text ("true", "four-bar"), and has no order.
 struct Condition {
   std::string key;
   std::vector<std::string> values;
+  Operator op = Operator::kEqual;
 
   friend bool operator==(const Condition&, const Condition&) = default;
 };
@@ -22,16 +29,19 @@ struct Condition {
 /// All conditions hold. The empty selection matches every record.
 using Selection = std::vector<Condition>;
 
-/// Reads "key=value" or "key=value,value". Throws ConfigError when the key or the value is missing.
+/// Reads "key=value", "key=value,value", "key!=value,value", "key<number", "key<=number" and so on.
+/// Throws ConfigError when the key or the value is missing, or an order is asked of what is no
+/// number.
 Condition ParseCondition(std::string_view text);
 
-/// Whether the record meets every condition. A record without the key meets none about it.
+/// Whether the record meets every condition. A record without the key, or with NaN under it, meets
+/// none about it, not even "!=".
 bool Matches(const Record& record, const Selection& selection);
 
 /// The records that match, in their order.
 std::vector<Record> Filter(std::span<const Record> records, const Selection& selection);
 
-/// The selection as a person would type it: "mechanism=four-bar rtol=1e-06,1e-08".
+/// The selection as a person would type it: "mechanism=four-bar rtol<=1e-06".
 std::string ToText(const Selection& selection);
 
 /// Order of rows in every table: by mechanism (chain-3 before chain-10), horizon, formulation,

@@ -205,8 +205,10 @@ void WriteExponent(const std::string& key, const DriftSeries& series, double hor
 IntegratorOptions OptionsOf(const Case& one, const std::vector<double>& stop_times) {
   IntegratorOptions options;
   options.profile = one.integrator;
-  options.rtol = one.rtol;
-  options.atol = one.atol;
+  options.fixed_step = one.step;
+  const bool is_fixed = one.step > 0.0;
+  options.rtol = is_fixed ? kToleranceOfFixedSteps : one.rtol;
+  options.atol = is_fixed ? kToleranceOfFixedSteps : one.atol;
   options.step_limit = one.limits.steps;
   options.time_limit_s = one.limits.cpu_s;
   options.stop_times = stop_times;

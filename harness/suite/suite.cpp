@@ -28,9 +28,8 @@ namespace loopbench::harness {
 
 namespace {
 
-/// Steps grow with the horizon and with rtol^(-1/5); costly cases go first, so that none is left to
-/// run alone at the end.
-double Cost(const Case& one) { return one.ensemble * one.horizon * std::pow(one.rtol, -0.2); }
+/// Costly cases go first, so that none is left to run alone at the end.
+double Cost(const Case& one) { return one.ensemble * ExpectedSteps(one); }
 
 /// One process: the records it owes, known but for their results, and how to make them.
 struct Piece {
@@ -50,7 +49,7 @@ Piece AccuracyPiece(const Experiment& experiment, const Case& one) {
   return {.owed = {one.keys},
           .work = [&experiment, one] { return std::vector<Record>{RunCase(experiment, one)}; },
           .limits = LimitsOfRuns(one.limits, runs * one.column.threads),
-          .label = fmt::format("{} {} {}", one.mechanism, ToString(one.column), one.rtol),
+          .label = fmt::format("{} {} {}", one.mechanism, ToString(one.column), SettingOf(one)),
           .cost = Cost(one)};
 }
 

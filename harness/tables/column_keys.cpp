@@ -2,6 +2,7 @@
 #include <fmt/format.h>
 
 #include <algorithm>
+#include <cmath>
 #include <iterator>
 #include <map>
 #include <utility>
@@ -20,8 +21,10 @@ bool IsFamily(const std::string& key) {
   return key.starts_with("series.") || key.starts_with("drift.loop.");
 }
 
-// Whether tables know the very key, not only the family that it belongs to.
+// Whether tables know the very key, not only the family that it belongs to. A fixed step is a key
+// of those cases alone that have one, as a parameter is: no table has its column always.
 bool HasColumn(const std::string& key) {
+  if (key == "step") return false;
   const Measure* measure = FindMeasure(key);
   return measure != nullptr && measure->key == key && !measure->heading.words.empty();
 }
@@ -91,6 +94,26 @@ void RequireKey(const std::string& option, const std::string& key, std::span<con
   const std::string cure = nearest.empty() ? "" : fmt::format(" (did you mean \"{}\"?)", nearest);
   throw ConfigError(fmt::format("{}: found \"{}\", which no record has{}; expected one of {}",
                                 option, key, cure, fmt::join(scalars, ", ")));
+}
+
+void RequireConditions(const std::string& option, const Selection& selection,
+                       std::span<const Record> rows) {
+  for (const Condition& condition : selection) {
+    RequireKey(option, condition.key, rows);
+    if (condition.op == Operator::kEqual || condition.op == Operator::kUnequal) {
+      continue;
+    }
+    std::string text;  // that some record has where a number belongs
+    const bool has_number = std::ranges::any_of(rows, [&](const Record& row) {
+      if (text.empty()) text = row.Text(condition.key);
+      return !std::isnan(row.Number(condition.key));
+    });
+    if (has_number || text.empty()) continue;
+    throw ConfigError(
+        fmt::format("{} {}: found \"{}\" in records, expected a key of numbers behind "
+                    "which {} may stand",
+                    option, ToText({condition}), text, ToString(condition.op)));
+  }
 }
 
 std::vector<TableColumn> WithParameters(std::vector<TableColumn> columns,

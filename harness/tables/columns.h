@@ -7,6 +7,7 @@
 #include <string_view>
 #include <vector>
 
+#include "harness/record/select.h"
 #include "harness/tables/table.h"
 
 namespace loopbench::harness {
@@ -57,6 +58,11 @@ std::vector<std::string> KeysOf(std::span<const Record> rows);
 /// Throws ConfigError, with `option`, the key, the nearest spelling and all keys, when neither a
 /// record nor a table has the key.
 void RequireKey(const std::string& option, const std::string& key, std::span<const Record> rows);
+
+/// The same for the keys of all conditions; and throws for one that asks for an order of a key
+/// under which no record has a number.
+void RequireConditions(const std::string& option, const Selection& selection,
+                       std::span<const Record> rows);
 
 /// `columns` with the keys that records have and no table knows, before "outcome": the parameters
 /// of a sweep, without which rows could not be told apart.

@@ -109,9 +109,13 @@ std::string TitleOf(const std::string& kind) {
 Table Factorial(const std::vector<Record>& rows) {
   FactorialOptions options;
   if (!rows.empty()) {
-    // the table is for one tolerance and horizon: those of the first record, unless chosen
-    options.rtol = rows.front().Number("rtol");
-    options.horizon = rows.front().Number("horizon");
+    // the table is for one tolerance and horizon: those of the first record that has a tolerance,
+    // unless chosen
+    const auto first = std::ranges::find_if(
+        rows, [](const Record& row) { return !std::isnan(row.Number("rtol")); });
+    const Record& shown = first == rows.end() ? rows.front() : *first;
+    options.rtol = shown.Number("rtol");
+    options.horizon = shown.Number("horizon");
   }
   return FactorialTable(rows, options);
 }
@@ -119,7 +123,7 @@ Table Factorial(const std::vector<Record>& rows) {
 }  // namespace
 
 Table MakeTable(std::span<const Record> records, const TableView& view) {
-  for (const Condition& condition : view.where) RequireKey("--where", condition.key, records);
+  RequireConditions("--where", view.where, records);
   const std::string kind = KindOf(view, records);
   Selection selection = view.where;
   if (kind == "timing" || kind == "precision") selection.push_back({"kind", {kind}});

@@ -26,8 +26,8 @@ struct TimingGroup {
   bool simulate = true;     ///< whole simulations too; families have right-hand sides alone
 };
 
-/// The timings of an experiment, which must outlive them: a group per scene, then one per member of
-/// a family.
+/// The timings of an experiment, which must outlive them: a group per scene (with `timing.cases`
+/// per scene and horizon), then one per member of a family.
 std::vector<TimingGroup> TimingGroups(const Experiment& experiment);
 
 /// One record per case, in order. A case whose simulation fails keeps its row with outcome and,

@@ -34,18 +34,18 @@ void SetTimingId(const std::string& content, Record* keys) {
 
 std::vector<TimingGroup> TimingGroups(const Experiment& experiment) {
   std::vector<TimingGroup> groups;
-  const std::vector<Case> all = ExpandTiming(experiment);
-  for (std::size_t scene = 0; scene < experiment.scenes.size(); ++scene) {
-    TimingGroup group{experiment.scenes[scene].name,
-                      [&experiment, scene] { return OneSystem(experiment, scene); },
-                      {},
-                      true};
-    for (const Case& one : all) {
-      if (one.scene != scene) continue;
-      group.cases.push_back(one);
-      SetTimingId(SceneTimingContent(experiment, one), &group.cases.back().keys);
+  // cases come scene by scene and, in a scene, horizon by horizon
+  for (const Case& one : ExpandTiming(experiment)) {
+    const bool is_next = groups.empty() || groups.back().cases.back().scene != one.scene ||
+                         groups.back().cases.back().horizon != one.horizon;
+    if (is_next) {
+      groups.push_back({one.mechanism,
+                        [&experiment, scene = one.scene] { return OneSystem(experiment, scene); },
+                        {},
+                        true});
     }
-    if (!group.cases.empty()) groups.push_back(std::move(group));
+    groups.back().cases.push_back(one);
+    SetTimingId(SceneTimingContent(experiment, one), &groups.back().cases.back().keys);
   }
   if (experiment.timing.repeats == 0) return groups;
   for (const TimingFamily& family : experiment.timing.families) {

@@ -226,7 +226,7 @@ Record Planted(const Selection& selection, const Check& check, double value) {
   Record record;
   record.Set("outcome", std::string("finished"));
   record.Set("growth_resolved", true);
-  for (const auto& [key, values] : selection) record.Set(key, values.front());
+  for (const auto& [key, values, op] : selection) record.Set(key, values.front());
   if (check.demand.measure != "outcome") record.Set(check.demand.measure, value);
   return record;
 }

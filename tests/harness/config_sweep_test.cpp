@@ -270,7 +270,7 @@ TEST(Settings, ChangeFieldsBeforeReading) {
   EXPECT_EQ(one.scenes.front().horizons, (std::vector<double>{2.0, 3.0}));
   EXPECT_EQ(one.limits.memory_mb, 512.0);
   EXPECT_EQ(Described(one).gravity.y(), -1.5);
-  EXPECT_EQ(one.integrator, "cash-karp");
+  EXPECT_EQ(one.integrators, std::vector<std::string>{"cash-karp"});
 }
 
 TEST(Settings, UnknownFieldsAreRefusedWithTheNearestSpelling) {

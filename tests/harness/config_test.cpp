@@ -274,7 +274,7 @@ TEST(ExperimentReader, DefaultsAreTheRecommendedOnes) {
                                                 kConfigs / "small.json");
   ASSERT_EQ(experiment.columns.size(), 1u);
   EXPECT_EQ(ToString(experiment.columns[0]), "odca/velocity/joint/rank-revealing");
-  EXPECT_EQ(experiment.integrator, "ode45");
+  EXPECT_EQ(experiment.integrators, std::vector<std::string>{"ode45"});
   EXPECT_EQ(experiment.series_points, 200);
   EXPECT_EQ(experiment.scenes[0].name, "p");
   EXPECT_EQ(experiment.timing.columns, experiment.columns);

@@ -80,8 +80,7 @@ TEST_F(FileKindTest, AnAmbiguousFileIsAnsweredWithWhatWasFound) {
             (folder_ / "file.json").string() +
                 ":1: (top level): found keys of a mechanism (\"name\", \"bodies\") and an "
                 "experiment (\"name\", \"scenes\"), expected those of one kind: a mechanism "
-                "(\"bodies\", \"joints\") or an experiment (\"scenes\", \"columns\", "
-                "\"tolerances\")");
+                "(\"bodies\", \"joints\") or an experiment (\"scenes\", \"columns\")");
   for (const char* text :
        {"{}", "{\"benchmarks\": []}", "{\"name\": \"x\"}", "{\"title\": \"x\"}"}) {
     EXPECT_NE(MessageOf(text).find("found no key that tells the kind of a file"), std::string::npos)

@@ -82,7 +82,7 @@ inline Case CaseOf(const Experiment& experiment, const std::string& scene, const
   Case one{.scene = static_cast<std::size_t>(it - experiment.scenes.begin()),
            .mechanism = scene,
            .column = column,
-           .integrator = experiment.integrator,
+           .integrator = experiment.integrators.front(),
            .rtol = tolerance,
            .atol = tolerance,
            .horizon = horizon,

@@ -98,7 +98,7 @@ Clusters ClustersOf(std::span<const Record> records, const std::vector<std::size
   return clusters;
 }
 
-/// Whether runs of different equations all ended alike.
+/// Whether runs of different equations all ended alike, that is in one cluster.
 bool Decides(std::span<const Record> records, const Clusters& clusters) {
   if (clusters.size() != 1) return false;
   std::set<std::string> ways;
@@ -106,6 +106,33 @@ bool Decides(std::span<const Record> records, const Clusters& clusters) {
     ways.insert(records[run].Text("enforcement") + " " + records[run].Text("coordinates"));
   }
   return ways.size() > 1;
+}
+
+bool IsPeer(const Record& record) {
+  const FormulationRow* row = FindFormulation(record.Text("formulation"));
+  return row != nullptr && row->is_peer();
+}
+
+/// What runs of one tolerance decide: those of an integrator that all end alike, beside the peers,
+/// unless another integrator's all end alike elsewhere. Nothing where none does.
+const Record* DecidedBy(std::span<const Record> records, const std::vector<std::size_t>& runs,
+                        double rtol) {
+  std::set<std::string> integrators;
+  for (const std::size_t run : runs) {
+    if (!IsPeer(records[run])) integrators.insert(records[run].Text("integrator"));
+  }
+  const Record* decided = nullptr;
+  for (const std::string& integrator : integrators) {
+    std::vector<std::size_t> own = runs;
+    std::erase_if(own, [&](std::size_t run) {
+      return !IsPeer(records[run]) && records[run].Text("integrator") != integrator;
+    });
+    if (!Decides(records, ClustersOf(records, own, rtol))) continue;
+    const Record* witness = &records[own.front()];
+    if (decided != nullptr && !EndAlike(*decided, *witness, rtol)) return nullptr;
+    if (decided == nullptr) decided = witness;
+  }
+  return decided;
 }
 
 }  // namespace
@@ -143,6 +170,7 @@ std::vector<Agreement> CompareFinalPoses(std::span<const Record> records) {
       std::vector<std::size_t> runs = all;
       std::erase_if(runs, [&](std::size_t run) { return IsSoft(records[run]); });
       const Clusters clusters = ClustersOf(records, runs, rtol);
+      if (decided == nullptr) decided = DecidedBy(records, runs, rtol);
       for (std::size_t c = 0; c < clusters.size(); ++c) {
         for (const std::size_t run : clusters[c]) {
           if (all.size() > 1) agreements[run].cluster = static_cast<std::int64_t>(c) + 1;
@@ -150,7 +178,6 @@ std::vector<Agreement> CompareFinalPoses(std::span<const Record> records) {
               decided == nullptr ? clusters.size() > 1 : !EndAlike(records[run], *decided, rtol);
         }
       }
-      if (decided == nullptr && Decides(records, clusters)) decided = &records[runs.front()];
       const Record* others = decided;  // those that do not give way, where they agree
       if (others == nullptr && clusters.size() == 1) others = &records[clusters.front().front()];
       for (const std::size_t run : all) {

@@ -28,7 +28,9 @@ struct Agreement {
 /// Where the runs at one tolerance do not all end alike, all of them are doubted. The majority need
 /// not be right, because formulations at the same level make the same mistakes. A finer tolerance
 /// decides, if all runs there end alike and are of more than one level or coordinate set: then only
-/// those coarser runs are doubted that ended elsewhere. Peers whose closures give way
+/// those coarser runs are doubted that ended elsewhere. Integrators make different errors at one
+/// tolerance: where all runs of one end alike, and no other one's all end alike elsewhere, they
+/// decide for the rest of their tolerance too. Peers whose closures give way
 /// (FormulationRow::is_soft) are held to the others' end and cast no doubt on it.
 std::vector<Agreement> CompareFinalPoses(std::span<const Record> records);
 

@@ -8,6 +8,7 @@
 
 #include "harness/analysis/doubts.h"
 #include "harness/cli/commands.h"
+#include "harness/cli/report.h"
 #include "harness/figures/failure_map_figure.h"
 #include "harness/figures/figure_recipes.h"
 #include "harness/figures/precision_figures.h"
@@ -23,42 +24,6 @@
 namespace loopbench::harness {
 
 namespace {
-
-/// Colour only where a person looks: a terminal that has it, unless https://no-color.org is obeyed.
-bool TerminalHasColour() {
-  const char* no_color = std::getenv("NO_COLOR");
-  const char* term = std::getenv("TERM");
-  return ::isatty(STDOUT_FILENO) == 1 && (no_color == nullptr || *no_color == '\0') &&
-         term != nullptr && std::string_view(term) != "dumb";
-}
-
-void AppendProvenance(Table& table, const std::string& typed) {
-  for (const std::string& note : Provenance(typed)) table.notes.push_back(note);
-}
-
-/// CSV goes without the date of printing: the same records and command give the same bytes.
-std::string RenderKept(Table table, const std::string& format) {
-  if (format == "csv") {
-    std::erase_if(table.notes, [](const std::string& note) { return note.starts_with("date: "); });
-  }
-  return Render(table, format);
-}
-
-/// Those that can be drawn; the reasons of the others are printed, and the exit code is 2.
-int DrawAll(const std::vector<NamedFigure>& figures, const PlotCommand& command) {
-  const std::string extension = command.format.empty() ? "svg" : command.format;
-  std::size_t written = 0;
-  for (const NamedFigure& figure : figures) {
-    const auto path = command.out / (FileName(figure.name) + "." + extension);
-    const auto error = WriteFigure(path, figure.figure);
-    if (error) PrintError("{}\n", Lines{*error});
-    written += error ? 0 : 1;
-  }
-  const bool all = written == figures.size();
-  Print("wrote {}{} figure{} to {}\n", written, all ? "" : fmt::format(" of {}", figures.size()),
-        figures.size() == 1 ? "" : "s", command.out.string());
-  return all ? 0 : 2;
-}
 
 /// --out is a file when it ends like a figure, else a folder.
 std::filesystem::path FileOf(const PlotCommand& command) {
@@ -115,6 +80,39 @@ void RequireDemands(const FailureMap& map, const std::filesystem::path& rules) {
 }
 
 }  // namespace
+
+bool TerminalHasColour() {
+  const char* no_color = std::getenv("NO_COLOR");
+  const char* term = std::getenv("TERM");
+  return ::isatty(STDOUT_FILENO) == 1 && (no_color == nullptr || *no_color == '\0') &&
+         term != nullptr && std::string_view(term) != "dumb";
+}
+
+void AppendProvenance(Table& table, const std::string& typed) {
+  for (const std::string& note : Provenance(typed)) table.notes.push_back(note);
+}
+
+std::string RenderKept(Table table, const std::string& format) {
+  if (format == "csv") {
+    std::erase_if(table.notes, [](const std::string& note) { return note.starts_with("date: "); });
+  }
+  return Render(table, format);
+}
+
+int DrawAll(const std::vector<NamedFigure>& figures, const std::filesystem::path& folder,
+            const std::string& format) {
+  std::size_t written = 0;
+  for (const NamedFigure& figure : figures) {
+    const auto path = folder / (FileName(figure.name) + "." + format);
+    const auto error = WriteFigure(path, figure.figure);
+    if (error) PrintError("{}\n", Lines{*error});
+    written += error ? 0 : 1;
+  }
+  const bool all = written == figures.size();
+  Print("wrote {}{} figure{} to {}\n", written, all ? "" : fmt::format(" of {}", figures.size()),
+        figures.size() == 1 ? "" : "s", folder.string());
+  return all ? 0 : 2;
+}
 
 void WriteTables(const std::vector<Record>& records, const std::filesystem::path& store,
                  const std::string& typed) {
@@ -200,7 +198,7 @@ int Plot(const PlotCommand& command) {
         command.store.string());
     return 2;
   }
-  return DrawAll(figures, command);
+  return DrawAll(figures, command.out, command.format.empty() ? "svg" : command.format);
 }
 
 int PrintMap(const MapCommand& command, const std::string& typed) {

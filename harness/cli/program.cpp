@@ -25,6 +25,7 @@ Examples: (paths from the root of the repository)
   loopbench table results/runs/paper --where mechanism=four-bar,dead-centre --where rtol=1e-8
   loopbench plot results/runs/paper --out results/runs/paper/figures
   loopbench run configs/experiments/precision.json --precision-only --jobs 2
+  loopbench tradeoff results/runs/tradeoff --figures
   loopbench verdict results/runs/paper --claims configs/experiments/paper/claims.json
   loopbench map results/runs/extremes --rules configs/experiments/extremes/map.json
 

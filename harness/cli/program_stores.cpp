@@ -1,6 +1,7 @@
 #include "harness/cli/program_stores.h"
 
 #include "harness/cli/options.h"
+#include "harness/text/numeric_option.h"
 
 namespace loopbench::harness {
 
@@ -28,6 +29,20 @@ Without --x and --y: angles and displacements of the run that is trusted most (f
 position, at the finest tolerance), drift with its fitted exponents, and of runs in several scalars
 error and drift against tolerance. Runs that failed are crosses, doubtful ones dashed. A figure that
 cannot be drawn is reported with its reason, and the exit code is 2 after all others are drawn.)";
+
+constexpr const char* kTradeoffFooter = R"(
+Examples:
+  loopbench run mine.json --out out               ("timing": {"cases": true} in mine.json)
+  loopbench tradeoff out --figures
+  loopbench tradeoff out --where 'rtol>1e-11' --cost rhs_equivalents --classes 1e-2,1e-5
+  loopbench tradeoff out --error closed_form_error_max --per mechanism,horizon,mass --out tradeoff
+
+Each accuracy run beside the timing of the same case, problem by problem (--per). Runs that failed
+or have doubts are compared with nobody, and listed with the reason. A '*' stands on the Pareto
+front. The overview has, per problem and class of errors, what the cheapest method of each formulation
+costs, and how many times the cheapest of all. Below stands, from the records, what was equal among the
+compared rows and what was not. All rows are in tradeoff.csv and tradeoff.md, the cheapest methods in
+tradeoff-overview.csv, figures (error over cost, over tolerance, over time) in figures/.)";
 
 constexpr const char* kMapFooter = R"(
 Examples: (paths from the root of the repository)
@@ -63,6 +78,7 @@ StoreOptions::StoreOptions(CLI::App& app) {
 
   AddTable(app);
   AddPlot(app);
+  AddTradeoff(app);
 
   verdict_app_ = app.add_subcommand("verdict", "Hold claims against stored records");
   verdict_app_->add_option("store", verdict_.store, "Folder of a run, or a .jsonl file")
@@ -118,6 +134,40 @@ void StoreOptions::AddPlot(CLI::App& app) {
   plot_app_->footer(kPlotFooter);
 }
 
+void StoreOptions::AddTradeoff(CLI::App& app) {
+  tradeoff_app_ =
+      app.add_subcommand("tradeoff", "Show what accuracy costs, and which methods no other beats");
+  tradeoff_app_->add_option("store", tradeoff_.store, "Folder of a run, or a .jsonl file")
+      ->required();
+  TradeoffOptions& options = tradeoff_.options;
+  tradeoff_app_->add_option("--error", options.error,
+                            "Key that is the error (default: error_position_max, or what the store "
+                            "has)");
+  tradeoff_app_->add_option("--cost", options.cost,
+                            "Key that is the cost: wall_s (default: the timed median), "
+                            "rhs_equivalents, steps, ...");
+  tradeoff_app_->add_option("--per", options.per, "Keys that make one problem: a,b")
+      ->delimiter(',')
+      ->capture_default_str();
+  tradeoff_app_->add_option("--classes", options.classes, "Errors that the overview asks for: a,b")
+      ->delimiter(',')
+      ->check(NumberFrom(0.0, 1e300))
+      ->capture_default_str();
+  tradeoff_app_->add_option("--where", conditions_,
+                            "Only records with key=value[,value] (or !=, <, <=, >, >=)");
+  tradeoff_app_->add_option("--out", tradeoff_.out, "Folder (default: that of the store)");
+  tradeoff_app_->add_option("--format", tradeoff_.format, "How it is printed")
+      ->check(CLI::IsMember({"text", "csv", "markdown", "json", "latex"}))
+      ->capture_default_str();
+  tradeoff_app_->add_flag("--all", tradeoff_.all, "Print every row");
+  CLI::Option* figures = tradeoff_app_->add_flag("--figures", draws_tradeoff_, "Draw figures too");
+  tradeoff_app_->add_option("--figure-format", drawn_as_, "svg or pdf")
+      ->check(CLI::IsMember({"svg", "pdf"}))
+      ->needs(figures)
+      ->capture_default_str();
+  tradeoff_app_->footer(kTradeoffFooter);
+}
+
 void StoreOptions::AddMap(CLI::App& app) {
   map_app_ =
       app.add_subcommand("map", "Show which method survives which extreme, and the number why");
@@ -132,10 +182,12 @@ void StoreOptions::AddMap(CLI::App& app) {
 }
 
 std::optional<int> StoreOptions::Run(const std::string& typed) {
-  table_.view.where = plot_.where = ParseSelection(conditions_);
+  table_.view.where = plot_.where = tradeoff_.options.where = ParseSelection(conditions_);
+  if (draws_tradeoff_) tradeoff_.figures = drawn_as_;
   if (*merge_app_) return Merge(merge_);
   if (*table_app_) return PrintTable(table_, typed);
   if (*plot_app_) return Plot(plot_);
+  if (*tradeoff_app_) return PrintTradeoff(tradeoff_, typed);
   if (*map_app_) return PrintMap(map_, typed);
   if (*verdict_app_) return PrintVerdicts(verdict_, typed);
   return std::nullopt;

@@ -1,4 +1,4 @@
-// Options of the subcommands merge, table, plot, verdict and map: those that read stores.
+// Options of the subcommands merge, table, plot, tradeoff, verdict and map: those that read stores.
 #pragma once
 
 #include <CLI/CLI.hpp>
@@ -7,6 +7,7 @@
 #include <vector>
 
 #include "harness/cli/commands.h"
+#include "harness/cli/commands_tradeoff.h"
 
 namespace loopbench::harness {
 
@@ -21,13 +22,17 @@ class StoreOptions {
  private:
   void AddTable(CLI::App& app);
   void AddPlot(CLI::App& app);
+  void AddTradeoff(CLI::App& app);
   void AddMap(CLI::App& app);
 
-  CLI::App *merge_app_, *table_app_, *plot_app_, *verdict_app_, *map_app_;
+  CLI::App *merge_app_, *table_app_, *plot_app_, *tradeoff_app_, *verdict_app_, *map_app_;
   std::vector<std::string> conditions_;  ///< --where, as typed
   MergeCommand merge_;
   TableCommand table_;
   PlotCommand plot_;
+  TradeoffCommand tradeoff_;
+  bool draws_tradeoff_ = false;  ///< --figures
+  std::string drawn_as_ = "svg";
   VerdictCommand verdict_;
   MapCommand map_;
 };

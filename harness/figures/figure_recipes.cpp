@@ -39,14 +39,6 @@ Shape ShapeOf(const Record& record) {
   return kShapes[static_cast<std::size_t>(level.value_or(Enforcement())) % kShapes.size()];
 }
 
-CurveStyle StyleOf(const Record& record) {
-  return {.color = ColorOf(record),
-          .width = CurveWidth(record),
-          .shape = ShapeOf(record),
-          .filled = record.Text("solver") != "as-published",
-          .doubtful = HasDoubt(record)};
-}
-
 bool Varies(std::span<const Record> records, std::string_view key) {
   return std::ranges::any_of(
       records, [&](const Record& record) { return record.Text(key) != records[0].Text(key); });
@@ -195,6 +187,14 @@ Figure CoordinateFigure(const Record& record, const CoordinateKind& kind) {
 }
 
 }  // namespace
+
+CurveStyle StyleOf(const Record& record) {
+  return {.color = ColorOf(record),
+          .width = CurveWidth(record),
+          .shape = ShapeOf(record),
+          .filled = record.Text("solver") != "as-published",
+          .doubtful = HasDoubt(record)};
+}
 
 Figure AnglesFigure(const Record& record) { return CoordinateFigure(record, kCoordinateKinds[0]); }
 

@@ -17,6 +17,10 @@ struct NamedFigure {
   Figure figure;
 };
 
+/// How figures draw a run: hue by formulation, its strength by coordinates, marks by level, filled
+/// for a rank-revealing solver, dashed where it is in doubt.
+CurveStyle StyleOf(const Record& record);
+
 /// Angles [rad] of the joints of one run against time: "series.angle.JOINT" against "series.t", or
 /// those of the run's opening where it has them (harness/observers/observer.h); the title says so,
 /// and names the run.

@@ -111,8 +111,9 @@ std::vector<std::string> Elements(const Figure& figure, const Curve& curve, std:
   if (curve.points) {
     // shape and size tell curves apart that lie on each other
     constexpr std::array<int, 8> kShapes = {7, 5, 9, 13, 6, 4, 8, 12};
-    look = fmt::format("{} pt {} ps {:.3g}", curve.line ? "linespoints" : "points",
-                       kShapes[index % kShapes.size()], 0.3 * curve.style.width);
+    const int shape = curve.own_marks ? PointType(curve.style) : kShapes[index % kShapes.size()];
+    look = fmt::format("{} pt {} ps {:.3g}", curve.line ? "linespoints" : "points", shape,
+                       curve.own_marks ? 0.5 + 0.2 * curve.style.width : 0.3 * curve.style.width);
   } else if (marked) {
     marks = fmt::format("pt {} ps 0.8", PointType(curve.style));
   }

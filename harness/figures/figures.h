@@ -30,16 +30,17 @@ CurveStyle DistinctStyle(std::size_t index);
 /// logarithmic axis those that are not positive, are left out. A curve without points keeps its
 /// place in the legend.
 struct Curve {
-  std::string label;
-  std::vector<double> x;
-  std::vector<double> y;
-  CurveStyle style;
+  std::string label = "";
+  std::vector<double> x = {};
+  std::vector<double> y = {};
+  CurveStyle style = {};
   /// Draws y ~ x^slope as a grey line above the last decade of the curve. Logarithmic axes only.
-  std::optional<double> slope;
+  std::optional<double> slope = std::nullopt;
   /// Marks the last point with a cross: the run failed there.
   bool ends_early = false;
-  bool points = false;  ///< marks each point, for few of them
-  bool line = true;     ///< joins them
+  bool points = false;     ///< marks each point, for few of them
+  bool own_marks = false;  ///< these are of the style's shape, not of the curve's place
+  bool line = true;        ///< joins them
   /// Runs that failed, as crosses in the curve's colour. Without a y that can be drawn (NaN) the
   /// cross lies on the lower edge of the plot.
   std::vector<std::pair<double, double>> crosses = {};

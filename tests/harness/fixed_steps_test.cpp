@@ -196,6 +196,29 @@ TEST(FixedSteps, NeitherJudgeNorAreJudgedByTheEndsOfOthers) {
   EXPECT_TRUE(agreements[2].doubted && agreements[3].doubted);
 }
 
+/// Of one integrator all end alike, of the other none: the first decide at their own tolerance.
+TEST(Integrators, ThoseThatAllEndAlikeDecide) {
+  const auto run = [](const std::string& integrator, const std::string& level, double at) {
+    Record record = FixedRun(level, at);
+    record.Set("rtol", 1e-9);
+    record.Set("step", Value());
+    record.Set("integrator", integrator);
+    return record;
+  };
+  std::vector<Record> records = {run("a", "acceleration", 0.0), run("a", "position", 0.0),
+                                 run("b", "acceleration", 0.1), run("b", "position", 0.2)};
+  const auto doubted = [&] {
+    std::string text;
+    for (const Agreement& one : CompareFinalPoses(records)) text += one.doubted ? "x" : "-";
+    return text;
+  };
+  EXPECT_EQ(doubted(), "--xx");
+  records[3] = run("b", "position", 0.1);
+  EXPECT_EQ(doubted(), "xxxx") << "two integrators decide differently: numbers do not tell";
+  records[1] = run("a", "acceleration", 0.0);
+  EXPECT_EQ(doubted(), "xx--") << "equations of one kind decide nothing";
+}
+
 class FixedStepsProgram : public CommandLineTest {};
 
 TEST_F(FixedStepsProgram, StandInEveryTableAndNowhereElse) {

@@ -113,7 +113,7 @@ std::vector<std::string> Elements(const Figure& figure, const Curve& curve, std:
     constexpr std::array<int, 8> kShapes = {7, 5, 9, 13, 6, 4, 8, 12};
     const int shape = curve.own_marks ? PointType(curve.style) : kShapes[index % kShapes.size()];
     look = fmt::format("{} pt {} ps {:.3g}", curve.line ? "linespoints" : "points", shape,
-                       curve.own_marks ? 0.5 + 0.2 * curve.style.width : 0.3 * curve.style.width);
+                       curve.own_marks ? 0.4 + 0.3 * curve.style.width : 0.3 * curve.style.width);
   } else if (marked) {
     marks = fmt::format("pt {} ps 0.8", PointType(curve.style));
   }

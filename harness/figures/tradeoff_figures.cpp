@@ -3,6 +3,7 @@
 #include <fmt/format.h>
 
 #include <algorithm>
+#include <array>
 #include <cmath>
 #include <limits>
 #include <map>
@@ -21,6 +22,7 @@ constexpr double kNowhere = std::numeric_limits<double>::quiet_NaN();
 struct MethodRows {
   std::string name;
   std::vector<const TradeoffRow*> rows;
+  std::size_t formulation = 0;  ///< its place among those of the figure
 };
 
 std::vector<MethodRows> RowsByMethod(const std::vector<const TradeoffRow*>& rows) {
@@ -30,7 +32,11 @@ std::vector<MethodRows> RowsByMethod(const std::vector<const TradeoffRow*>& rows
         row);
   }
   std::vector<MethodRows> result;
-  for (auto& [name, own] : methods) result.push_back({name, std::move(own)});
+  std::set<std::string> formulations;
+  for (auto& [name, own] : methods) {
+    formulations.insert(own.front()->record.Text("formulation"));
+    result.push_back({name, std::move(own), formulations.size() - 1});
+  }
   return result;
 }
 
@@ -56,7 +62,8 @@ CurveStyle StyleOfMethod(const MethodRows& method) {
   record.Set("doubts", std::string());
   CurveStyle style = StyleOf(record);
   // formulations differ in the width of lines and the size of marks too, for those who see no hues
-  style.width *= 0.5;
+  constexpr std::array<double, 5> kWidths = {3.0, 1.8, 1.0, 0.7, 0.5};
+  style.width = kWidths[std::min(method.formulation, kWidths.size() - 1)];
   return style;
 }
 

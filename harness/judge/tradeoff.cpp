@@ -66,12 +66,28 @@ std::string ErrorKey(std::span<const Record> records, const TradeoffOptions& opt
       fmt::format("--error: no accuracy record has one of {}", fmt::join(kErrors, ", ")));
 }
 
-std::string CostKey(std::span<const Record> records, const TradeoffOptions& options,
-                    std::vector<std::string>* remarks) {
+/// Timings by the name of their case.
+using Timings = std::map<std::string, const Record*>;
+
+/// Of the same case; a record without keys where there is none.
+const Record& TimingOf(const Record& run, const Timings& timings) {
+  static const Record kNone;
+  const auto place = timings.find(NameOfCase(run));
+  return place == timings.end() ? kNone : *place->second;
+}
+
+std::string CostKey(std::span<const Record> records, const Timings& timings,
+                    const TradeoffOptions& options, std::vector<std::string>* remarks) {
   if (options.cost.empty()) {
-    if (HasNumber(records, kWall, "timing")) return kWall;
+    // timings of other cases, such as those at one tolerance for all, are none of these
+    const bool any = std::ranges::any_of(records, [&](const Record& record) {
+      return record.Text("kind") == "accuracy" &&
+             std::isfinite(TimingOf(record, timings).Number(kWall));
+    });
+    if (any) return kWall;
     remarks->push_back(
-        "no case was timed (\"timing\": {\"cases\": true} does it): --cost is rhs_equivalents");
+        "no accuracy case was timed as it is (\"timing\": {\"cases\": true} does it): --cost is "
+        "rhs_equivalents");
     return "rhs_equivalents";
   }
   const std::string key = options.cost == "wall_s" ? kWall : options.cost;
@@ -206,17 +222,16 @@ Tradeoff MakeTradeoff(std::span<const Record> records, const TradeoffOptions& op
   RequireConditions("--where", options.where, records);
   Tradeoff tradeoff;
   tradeoff.error = ErrorKey(records, options, &tradeoff.remarks);
-  tradeoff.cost = CostKey(records, options, &tradeoff.remarks);
-  std::map<std::string, const Record*> timings;
+  Timings timings;
   for (const Record& record : records) {
     if (record.Text("kind") == "timing") timings[NameOfCase(record)] = &record;
   }
+  tradeoff.cost = CostKey(records, timings, options, &tradeoff.remarks);
   std::vector<Record> runs = Filter(records, {{"kind", {"accuracy"}}});
   SortRows(&runs);  // equal costs stay in the order of tables
   std::map<std::string, std::size_t> places;
   for (const Record& run : runs) {
-    const auto timing = timings.find(NameOfCase(run));
-    TradeoffRow row = MakeRow(run, timing == timings.end() ? Record() : *timing->second, tradeoff);
+    TradeoffRow row = MakeRow(run, TimingOf(run, timings), tradeoff);
     if (!Matches(row.record, options.where)) continue;
     const std::string name = NameOfProblem(run, options.per);
     const auto [place, is_new] = places.try_emplace(name, tradeoff.problems.size());

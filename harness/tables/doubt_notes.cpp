@@ -101,8 +101,18 @@ std::string NameOfScene(const Record& record) {
                      record.Text("rtol"), record.Text("horizon"));
 }
 
+// What decides about runs that end differently (harness/analysis/agreement.h).
+std::string Deciding(const std::vector<Record>& runs) {
+  const bool one_integrator = std::ranges::all_of(runs, [&](const Record& run) {
+    return run.Text("integrator") == runs.front().Text("integrator");
+  });
+  return one_integrator ? "finer tolerances"
+                        : "finer tolerances or an integrator all of whose runs agree";
+}
+
 // Which of the runs agree with each other; `runs` have a cluster each.
 std::string NoteOfScene(const std::vector<Record>& runs) {
+  const std::string deciding = Deciding(runs);
   const std::vector<std::string> keys = TellingKeys(runs);
   std::map<std::int64_t, std::vector<Record>> clusters;
   for (const Record& run : runs) {
@@ -118,15 +128,15 @@ std::string NoteOfScene(const std::vector<Record>& runs) {
     const bool cleared = !HasDoubt(members.front(), kDisagreementDoubt);
     if (members.size() > 1) {
       text += fmt::format("; {} agree{}", fmt::join(names, ", "),
-                          cleared ? ", with finer tolerances too" : "");
+                          cleared ? ", with " + deciding + " too" : "");
     } else {
       alone += (alone.empty() ? "; each by itself: " : ", ") + names.front() +
-               (cleared ? " (agrees with finer tolerances)" : "");
+               (cleared ? " (agrees with " + deciding + ")" : "");
     }
   }
   text += alone;
   const std::string scene = NameOfScene(runs.front());
-  if (clusters.size() == 1) return scene + " does not end as with finer tolerances" + text;
+  if (clusters.size() == 1) return scene + " does not end as with " + deciding + text;
   return fmt::format(
       "{} ends {:.2g} links or rad apart ({}), {:.0f} tolerances are expected at most{}", scene,
       worst.largest, worst.body, kMostTolerances, text);

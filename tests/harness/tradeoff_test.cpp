@@ -192,7 +192,19 @@ TEST(Tradeoff, FallsBackAndSaysSo) {
   EXPECT_EQ(tradeoff.cost, "rhs_equivalents");
   ASSERT_EQ(tradeoff.remarks.size(), 2u);
   EXPECT_NE(tradeoff.remarks[0].find("no distance from the right motion"), std::string::npos);
-  EXPECT_NE(tradeoff.remarks[1].find("no case was timed"), std::string::npos);
+  EXPECT_NE(tradeoff.remarks[1].find("no accuracy case was timed"), std::string::npos);
+}
+
+/// The usual timings of an experiment are at one tolerance for all: of no accuracy case.
+TEST(Tradeoff, TimingsOfOtherCasesAreNoCost) {
+  std::vector<Record> records = Store({1e-3, 1e-6}, {1.0, 2.0});
+  for (Record& record : records) {
+    if (record.Text("kind") == "timing") record.Set("horizon", 1.0);
+  }
+  EXPECT_EQ(MakeTradeoff(records, {}).cost, "rhs_equivalents");
+  for (const TradeoffRow& row : OnlyRows(MakeTradeoff(records, {.cost = "wall_s"}))) {
+    EXPECT_EQ(row.reason, "not timed");
+  }
 }
 
 TEST(Tradeoff, RefusesWhatNoRecordHas) {

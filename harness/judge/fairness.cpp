@@ -165,7 +165,21 @@ std::string CostLine(const Tradeoff& tradeoff) {
     return "cost: wall_s_median [s], simulations timed alone and unobserved, each case as it is";
   }
   const std::string unit = UnitOf(ColumnOf(tradeoff.cost, {}));
-  return fmt::format("cost: {}{}", tradeoff.cost, unit.empty() ? "" : " [" + unit + "]");
+  std::string line =
+      fmt::format("cost: {}{}", tradeoff.cost, unit.empty() ? "" : " [" + unit + "]");
+  const bool is_count = tradeoff.cost.starts_with("rhs_e") || tradeoff.cost == "steps";
+  const auto implicit = [](const TradeoffRow& row) {
+    return row.reason.empty() && row.record.Number("newton_iterations") > 0;
+  };
+  const bool any = std::ranges::any_of(tradeoff.problems, [&](const TradeoffProblem& problem) {
+    return std::ranges::any_of(problem.rows, implicit);
+  });
+  if (is_count && any) {
+    line +=
+        "; of implicit integrators it leaves out Jacobians and linear solves, so that they look "
+        "cheaper than they are";
+  }
+  return line;
 }
 
 }  // namespace

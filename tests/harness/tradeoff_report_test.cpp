@@ -95,6 +95,15 @@ TEST(Fairness, SaysWhatReferencesAreCertifiedTo) {
                "1 row goes beyond the trust horizon"});
 }
 
+TEST(Fairness, CountsOfImplicitIntegratorsAreNotAllTheyDo) {
+  std::vector<Record> records = Store({1e-3, 1e-6}, {0.1, 0.2});
+  for (Record& record : records) record.Set("wall_s_median", Value());
+  ExpectWords(Statement(records), {"cost: rhs_equivalents"});
+  ExpectWords(Statement(records), {"leaves out Jacobians"}, false);
+  records[2].Set("newton_iterations", std::int64_t{40});
+  ExpectWords(Statement(records), {"leaves out Jacobians"});
+}
+
 /// Two problems differ in what each has alone in common.
 TEST(Fairness, WhatIsEqualInEachProblemIsEqual) {
   std::vector<Record> records = Store({1e-3, 1e-6}, {0.1, 0.2});

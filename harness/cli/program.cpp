@@ -20,6 +20,7 @@ Examples: (paths from the root of the repository)
   loopbench list configs/experiments/paper/paper.json
   loopbench plan configs/experiments/paper/paper.json --set /limits/cpu_s=5
   loopbench run configs/experiments/paper/paper.json --jobs 2 --filter mechanism=four-bar
+  loopbench simplify configs/experiments/models/hall.json --errors 2
   loopbench run big.json --shard 1/2 --out part1   (and 2/2 elsewhere)
   loopbench merge part1 part2 --out whole
   loopbench table results/runs/paper --where mechanism=four-bar,dead-centre --where rtol=1e-8

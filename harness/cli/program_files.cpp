@@ -2,6 +2,8 @@
 
 #include <fmt/format.h>
 
+#include <algorithm>
+
 #include "harness/cli/commands_schema.h"
 #include "harness/cli/options.h"
 #include "harness/text/numeric_option.h"
@@ -32,6 +34,27 @@ void AddLimits(CLI::App* app, ProcessLimits* limits) {
       ->capture_default_str();
 }
 
+std::string SimplifyFooter() {
+  std::string ideas;
+  for (const Idea& idea : Ideas()) {
+    ideas += fmt::format("  {:16} {}\n", idea.name, idea.sentence);
+    if (idea.limit != nullptr) {
+      ideas += fmt::format("  {:16} by {}\n", "", idea.number);
+    }
+  }
+  return fmt::format(
+      "\nIdeas; those with a number change the motion, the others do not:\n{}\n"
+      "Examples:\n"
+      "  loopbench simplify configs/experiments/models/light-rod-compressor.json\n"
+      "  loopbench simplify my.json --threshold light-links=0.05 --only welds,light-links --out "
+      "ladder\n"
+      "  loopbench run ladder/NAME-ladder.json\n\n"
+      "Bodies, joints and points keep their names; points of a body that another one took over\n"
+      "are called BODY.POINT there. ladder.md says what was done, what is gone, and when it is "
+      "right.",
+      ideas);
+}
+
 }  // namespace
 
 FileOptions::FileOptions(CLI::App& app) {
@@ -54,6 +77,7 @@ FileOptions::FileOptions(CLI::App& app) {
   AddSettings(plan_app_, &settings_);
 
   AddExplain(app);
+  AddSimplify(app);
   AddSchema(app);
 }
 
@@ -114,6 +138,49 @@ void FileOptions::AddExplain(CLI::App& app) {
   explain_app_->add_flag("--all", explain_all_, "Every row of long tables of a mechanism");
 }
 
+void FileOptions::AddSimplify(CLI::App& app) {
+  simplify_app_ = app.add_subcommand(
+      "simplify", "Models of one mechanism, from the whole one down to the simplest");
+  simplify_app_->add_option("mechanism", simplify_.mechanism, "Mechanism file (JSON)")->required();
+  CLI::Option* list = simplify_app_->add_flag("--list", simplify_list_,
+                                              "Only list what could be simplified (the default)");
+  simplify_app_->add_option("--only", simplify_.only, "Only these ideas: NAME[,NAME]")
+      ->delimiter(',')
+      ->allow_extra_args(false);
+  simplify_app_
+      ->add_option("--threshold", simplify_.thresholds,
+                   "NAME=VALUE: an idea's limit, unless said " + LimitsText())
+      ->allow_extra_args(false);
+  simplify_app_->add_option("--lump", lumping_, "Where the mass of a light link goes")
+      ->check(CLI::IsMember(LumpingNames()))
+      ->capture_default_str();
+  simplify_app_
+      ->add_option("--short-run", simplify_.short_run,
+                   "Length of the short run that shows what hardly moves [s], 0: none")
+      ->check(NumberFrom(0.0, 1e6))
+      ->capture_default_str();
+  simplify_app_
+      ->add_option("--errors", simplify_.errors,
+                   "Run all models for so long [s] and say how far their points are off, 0: no")
+      ->check(NumberFrom(0.0, 1e6))
+      ->capture_default_str();
+  simplify_app_->add_option("--horizon", simplify_.horizon, "Of the experiment [s]")
+      ->check(NumberFrom(1e-9, 1e9))
+      ->capture_default_str();
+  simplify_app_
+      ->add_option("--out", simplify_.out,
+                   "New folder for the models, an experiment that runs them, and ladder.md")
+      ->excludes(list);
+  simplify_app_->add_flag("--assembled", simplify_.assembled,
+                          "Begin from a whole model that says all of its assembled start");
+  simplify_app_->add_flag("--force", simplify_.force,
+                          "Put them into a folder that is there, over files of their names");
+  simplify_.limits = kFileLimits;
+  AddLimits(simplify_app_, &simplify_.limits);
+  simplify_app_->add_flag("--all", simplify_all_, "Every row of long tables");
+  simplify_app_->footer(SimplifyFooter());
+}
+
 void FileOptions::AddSchema(CLI::App& app) {
   schema_app_ = app.add_subcommand(
       "schema", "Print what files of a kind may hold, as JSON Schema (draft 07) for editors");
@@ -147,6 +214,11 @@ std::optional<int> FileOptions::Run(const std::string& typed) {
     return PrintPlans(plan_);
   }
   if (*explain_app_) return Explain(files_, explain_all_, explain_limits_);
+  if (*simplify_app_) {
+    simplify_.lumping =
+        static_cast<Lumping>(std::ranges::find(LumpingNames(), lumping_) - LumpingNames().begin());
+    return Simplify(simplify_, simplify_all_, typed);
+  }
   if (*schema_app_) {
     PrintText(schema_tables_ ? TablesOfKinds({schema_kind_}) : SchemaOfKind(schema_kind_));
     return 0;

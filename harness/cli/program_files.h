@@ -1,5 +1,5 @@
-// Options of the subcommands run, list, check, plan, explain and schema: those of the files that
-// users write.
+// Options of the subcommands run, list, check, plan, explain, simplify and schema: those of the
+// files that users write.
 #pragma once
 
 #include <CLI/CLI.hpp>
@@ -8,6 +8,7 @@
 #include <vector>
 
 #include "harness/cli/commands.h"
+#include "harness/cli/commands_simplify.h"
 
 namespace loopbench::harness {
 
@@ -23,10 +24,12 @@ class FileOptions {
   void AddRun(CLI::App& app);
   void AddCheck(CLI::App& app);
   void AddExplain(CLI::App& app);
+  void AddSimplify(CLI::App& app);
   void AddSchema(CLI::App& app);
   int RunExperiments(const std::string& typed);
 
-  CLI::App *run_app_, *list_app_, *check_app_, *plan_app_, *explain_app_, *schema_app_;
+  CLI::App *run_app_, *list_app_, *check_app_, *plan_app_, *explain_app_, *simplify_app_,
+      *schema_app_;
   std::vector<std::string> conditions_, settings_;  ///< --filter and --set, as typed
   ExperimentFiles files_;
   RunCommand run_;
@@ -37,6 +40,9 @@ class FileOptions {
   PlanCommand plan_;
   ProcessLimits explain_limits_ = kFileLimits;
   bool explain_all_ = false;
+  SimplifyCommand simplify_;
+  std::string lumping_ = LumpingNames().front();
+  bool simplify_list_ = false, simplify_all_ = false;
   std::string schema_kind_;
   bool schema_tables_ = false;
 };

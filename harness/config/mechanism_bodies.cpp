@@ -14,6 +14,12 @@ void ReadPoints(const JsonNode& node, SpaceKind space, BodyDescription* body) {
   }
 }
 
+Json WritePoints(const BodyDescription& body, SpaceKind space) {
+  Json points = Json::object();
+  for (const auto& [name, position] : body.points) points[name] = WriteVector(position, space);
+  return points.empty() ? Json() : points;
+}
+
 Json PointsSchema() {
   Json schema = MapSchema(VectorSchema());
   schema["propertyNames"] = {{"minLength", 1}};
@@ -61,16 +67,36 @@ void ReadInertia(const JsonNode& node, Body& body) {
   }
 }
 
+/// As short as it can be said without loss.
+Json WriteInertia(const Body& body) {
+  const Eigen::Matrix3d& I = body.inertia;
+  const bool is_diagonal = I(0, 1) == 0.0 && I(0, 2) == 0.0 && I(1, 2) == 0.0;
+  if (is_diagonal && I(0, 0) == I(2, 2) && I(1, 1) == I(2, 2)) return I(2, 2);
+  Json json = {I(0, 0), I(1, 1), I(2, 2)};
+  for (const double product : {I(0, 1), I(0, 2), I(1, 2)}) {
+    if (!is_diagonal) json.push_back(product);
+  }
+  return json;
+}
+
 void ReadNameOfBody(const JsonNode& node, Body& body) {
   body.name = ReadNewName(node, body.draft->body_names);
 }
+
+Json WriteNameOfBody(const Body& body) { return body.name; }
 
 void ReadPointsOfBody(const JsonNode& node, Body& body) {
   ReadPoints(node, body.draft->space, &body);
 }
 
+Json WritePointsOfBody(const Body& body) { return WritePoints(body, body.draft->space); }
+
 void ReadPointsOfGround(const JsonNode& node, Draft& draft) {
   ReadPoints(node, draft.space, &draft.bodies[kGround]);
+}
+
+Json WritePointsOfGround(const Draft& draft) {
+  return WritePoints(draft.bodies[kGround], draft.space);
 }
 
 const Fields<Body>& BodyFields() {
@@ -79,23 +105,25 @@ const Fields<Body>& BodyFields() {
                     ArraySchema(NumberSchema(), 6, 6)});
   static const Fields<Body> fields(
       "body", "A rigid body.",
-      {{"name", By(TextSchema(), ReadNameOfBody), "One that no other body has.", "a name"},
+      {{"name", By(TextSchema(), ReadNameOfBody, WriteNameOfBody), "One that no other body has.",
+        "a name"},
        {"mass", Number(&BodyDescription::mass, kPositive), "Mass [kg].", "a number > 0 [kg]"},
-       {"inertia", By(inertia, ReadInertia),
+       {"inertia", By(inertia, ReadInertia, WriteInertia),
         "About the centre of mass, body axes [kg m^2]: Izz (isotropic in space), [Ixx, Iyy, Izz] "
         "or the matrix elements [Ixx, Iyy, Izz, Ixy, Ixz, Iyz].",
         "the inertia about the centre of mass"},
        {"com", VectorOf(&BodyDescription::com),
         "Centre of mass in body axes [m], default the body's origin."},
-       {"points", By(PointsSchema(), ReadPointsOfBody),
+       {"points", By(PointsSchema(), ReadPointsOfBody, WritePointsOfBody),
         "Named points in body axes from the body's origin [m]."}});
   return fields;
 }
 
 const Fields<Draft>& GroundFields() {
-  static const Fields<Draft> fields("ground", "What does not move.",
-                                    {{"points", By(PointsSchema(), ReadPointsOfGround),
-                                      "Named points in ground axes from the origin [m]."}});
+  static const Fields<Draft> fields(
+      "ground", "What does not move.",
+      {{"points", By(PointsSchema(), ReadPointsOfGround, WritePointsOfGround),
+        "Named points in ground axes from the origin [m]."}});
   return fields;
 }
 
@@ -108,10 +136,20 @@ void ReadBodies(const JsonNode& node, Draft& draft) {
   }
 }
 
+Json WriteBodies(const Draft& draft) {
+  Json bodies = Json::array();
+  for (std::size_t i = kGround + 1; i < draft.bodies.size(); ++i) {
+    bodies.push_back(WritePart(BodyFields(), draft, draft.bodies[i]));
+  }
+  return bodies;
+}
+
 }  // namespace
 
 FieldValue<Draft> GroundValue() { return Section(GroundFields()); }
 
-FieldValue<Draft> BodiesValue() { return By(ArraySchema(BodyFields().Schema(), 1), ReadBodies); }
+FieldValue<Draft> BodiesValue() {
+  return By(ArraySchema(BodyFields().Schema(), 1), ReadBodies, WriteBodies);
+}
 
 }  // namespace loopbench::harness

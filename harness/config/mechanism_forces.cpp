@@ -21,6 +21,11 @@ void ReadJoint(const JsonNode& node, Force& force) {
               "a joint with one coordinate (revolute, prismatic or helical)");
 }
 
+Json WriteJoint(const Force& force) {
+  ForceDescription copy = force;
+  return force.draft->joints[*PartsOf(copy).joint].name;
+}
+
 constexpr const char* kPlaceOnBody =
     "The name of one of the body's points, or coordinates in body axes [m]; default its origin.";
 
@@ -56,9 +61,16 @@ void CheckEnds(const JsonNode& node, Force& force) {
 void AddEnds(Rows* rows) {
   constexpr const char* kEnd = "an object with keys \"body\", \"at\"";
   const auto end = [](std::size_t i) {
-    return FieldValue<Force>{EndFields().Schema(), [i](const JsonNode& node, Force& force) {
+    return FieldValue<Force>{EndFields().Schema(),
+                             [i](const JsonNode& node, Force& force) {
                                BodyPoint& point = *PartsOf(force).points[i];
                                point = ReadPart(EndFields(), node, *force.draft, point);
+                             },
+                             nullptr,
+                             [i](const Force& force) {
+                               ForceDescription copy = force;
+                               return WritePart(EndFields(), *force.draft,
+                                                *PartsOf(copy).points[i]);
                              }};
   };
   rows->push_back({"from", end(0), "One end.", kEnd});
@@ -83,6 +95,11 @@ void AddVector(Rows* rows) {
                    {VectorSchema(),
                     [](const JsonNode& node, Force& force) {
                       *PartsOf(force).force = ReadVector(node, force.draft->space);
+                    },
+                    nullptr,
+                    [](const Force& force) {
+                      ForceDescription copy = force;
+                      return WriteVector(*PartsOf(copy).force, force.draft->space);
                     }},
                    "[N]",
                    "an array of 2 or 3 numbers [N]"});
@@ -93,7 +110,11 @@ void AddVector(Rows* rows) {
                       const auto index = node.Choice(axes, "the axes of the force");
                       if (index) *PartsOf(force).in_body_axes = *index == 1;
                     },
-                    [](const Force&) { return Json(axes.all().front()); }},
+                    [](const Force&) { return Json(axes.all().front()); },
+                    [](const Force& force) {
+                      ForceDescription copy = force;
+                      return *PartsOf(copy).in_body_axes ? Json(axes.all().back()) : Json();
+                    }},
                    "Body: the force turns with the body."});
 }
 
@@ -110,16 +131,22 @@ void AddNumber(const ForceParts& parts, std::size_t i, Rows* rows) {
                     [=](const JsonNode& node, Force& force) {
                       *PartsOf(force).numbers[i].value = node.Number(range);
                     },
-                    [=](const Force&) { return Json(standard); }},
+                    [=](const Force&) { return Json(standard); },
+                    [=](const Force& force) {
+                      ForceDescription copy = force;
+                      const ForceNumber written = PartsOf(copy).numbers[i];
+                      const bool may_lack = written.need != Need::kAlways;
+                      return may_lack && *written.value == standard ? Json() : Json(*written.value);
+                    }},
                    number.sentence.empty() ? units : fmt::format("{} {}.", number.sentence, units),
                    number.need == Need::kAlways ? "a number" + range.Text() : ""});
 }
 
 Fields<Force> FieldsOf(ForceDescription kind) {
   const ForceParts parts = PartsOf(kind);
-  Rows rows = {{"type", ChoiceSchema({std::string(parts.name)}), "What it is.", "a force type"}};
+  Rows rows = {{"type", Constant<Force>(std::string(parts.name)), "What it is.", "a force type"}};
   if (parts.joint != nullptr) {
-    rows.push_back({"joint", By(TextSchema(), ReadJoint),
+    rows.push_back({"joint", By(TextSchema(), ReadJoint, WriteJoint),
                     "With one coordinate: revolute, prismatic or helical.", "the name of a joint"});
   }
   if (parts.points.size() == 1) AddPoint(&rows);
@@ -135,6 +162,11 @@ Fields<Force> FieldsOf(ForceDescription kind) {
                     {TimeFunctionSchema(),
                      [](const JsonNode& node, Force& force) {
                        *PartsOf(force).value = ReadTimeFunction(node);
+                     },
+                     nullptr,
+                     [](const Force& force) {
+                       ForceDescription copy = force;
+                       return WriteTimeFunction(*PartsOf(copy).value);
                      }},
                     "[N m] or [N] on the joint's second body.",
                     "a number or a function of time"});
@@ -180,12 +212,24 @@ void ReadForces(const JsonNode& node, Draft& draft) {
   }
 }
 
+Json WriteForces(const Draft& draft) {
+  Json forces = Json::array();
+  for (ForceDescription force : draft.forces) {
+    const std::string_view name = PartsOf(force).name;
+    const auto kind = std::ranges::find_if(
+        ForceKinds(), [&](ForceDescription known) { return PartsOf(known).name == name; });
+    const auto index = static_cast<std::size_t>(kind - ForceKinds().begin());
+    forces.push_back(WritePart(AllFields()[index], draft, force));
+  }
+  return forces.empty() ? Json() : forces;
+}
+
 }  // namespace
 
 FieldValue<Draft> ForcesValue() {
   std::vector<Json> kinds;
   for (const Fields<Force>& fields : AllFields()) kinds.push_back(fields.Schema());
-  return By(ArraySchema(Named("force", EitherSchema(kinds))), ReadForces);
+  return By(ArraySchema(Named("force", EitherSchema(kinds))), ReadForces, WriteForces);
 }
 
 }  // namespace loopbench::harness

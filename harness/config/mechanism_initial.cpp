@@ -59,6 +59,19 @@ std::vector<JointValues> ReadJointValues(const JsonNode& section, const Draft& d
   return result;
 }
 
+/// One number, or as many as there are. Those of joints that follow a given motion say nothing, and
+/// no file has them.
+Json WriteJointValues(const Draft& draft, const std::vector<JointValues>& list, bool speeds) {
+  Json written = Json::object();
+  for (const JointValues& one : list) {
+    const JointDescription& joint = draft.joints[one.joint];
+    const int count = NumValues(joint.type, draft.space, speeds);
+    if (count == 1 && !joint.motions.empty()) continue;
+    written[joint.name] = count == 1 ? Json(one.values[0]) : Json(one.values);
+  }
+  return written.empty() ? Json() : written;
+}
+
 /// What bears speeds: joints with one, which has the joint's name, and owners of several, named
 /// "<owner>.<component>": bodies in absolute coordinates, and free joints.
 struct SpeedNames {
@@ -106,16 +119,22 @@ using Form = PartOf<PendulumForm>;
 
 void ReadFormType(const JsonNode& node, Form&) { node.Choice({"pendulum"}, "a closed form"); }
 
+Json WriteFormType(const Form&) { return "pendulum"; }
+
 void ReadFormBody(const JsonNode& node, Form& form) {
   const auto index = ReadBodyName(node, *form.draft);
   if (index) form.body = form.draft->bodies[*index].name;
 }
 
+Json WriteFormBody(const Form& form) { return form.body; }
+
 const Fields<Form>& PendulumFields() {
   static const Fields<Form> fields(
       "closed_form", "The exact motion of one body: that of a plain pendulum.",
-      {{"type", By(ChoiceSchema({"pendulum"}), ReadFormType), "What it is.", "\"pendulum\""},
-       {"body", By(TextSchema(), ReadFormBody), "Whose angle it is.", "the name of a body"},
+      {{"type", By(ChoiceSchema({"pendulum"}), ReadFormType, WriteFormType), "What it is.",
+        "\"pendulum\""},
+       {"body", By(TextSchema(), ReadFormBody, WriteFormBody), "Whose angle it is.",
+        "the name of a body"},
        {"down_angle", Number(&PendulumForm::down_angle),
         "Absolute angle of the body where theta = 0 [rad].", "a number [rad]"},
        {"frequency_squared", Number(&PendulumForm::frequency_squared, kPositive),
@@ -145,6 +164,16 @@ void ReadHeld(const JsonNode& node, Draft& draft) {
   }
 }
 
+Json WriteHeld(const Draft& draft) {
+  Json held = Json::array();
+  for (const int index : draft.initial.held) {
+    const JointDescription& joint = draft.joints[index];
+    const bool is_driven = !joint.motions.empty() && NumValues(joint.type, draft.space, false) == 1;
+    if (!is_driven) held.push_back(joint.name);
+  }
+  return held.empty() ? Json() : held;
+}
+
 void ReadIndependent(const JsonNode& node, Draft& draft) {
   const SpeedNames names = NamesOfSpeeds(draft);
   std::set<std::string> known;
@@ -155,6 +184,10 @@ void ReadIndependent(const JsonNode& node, Draft& draft) {
     if (!known.insert(name).second) element.Fail("each name once");
     draft.independent.push_back(name);
   }
+}
+
+Json WriteIndependent(const Draft& draft) {
+  return draft.independent.empty() ? Json() : Json(draft.independent);
 }
 
 /// Names, each once.
@@ -168,9 +201,15 @@ void ReadCoordinates(const JsonNode& node, Draft& draft) {
   draft.initial.coordinates = ReadJointValues(node, draft, false);
 }
 
+Json WriteCoordinates(const Draft& draft) {
+  return WriteJointValues(draft, draft.initial.coordinates, false);
+}
+
 void ReadSpeeds(const JsonNode& node, Draft& draft) {
   draft.initial.speeds = ReadJointValues(node, draft, true);
 }
+
+Json WriteSpeeds(const Draft& draft) { return WriteJointValues(draft, draft.initial.speeds, true); }
 
 void ReadBranch(const JsonNode& node, Draft& draft) {
   for (const JsonNode& element : node.Elements("combinations of body angles")) {
@@ -178,17 +217,38 @@ void ReadBranch(const JsonNode& node, Draft& draft) {
   }
 }
 
+Json WriteBranch(const Draft& draft) {
+  Json branch = Json::array();
+  for (const AngleCombination& combination : draft.observe.branch_invariants) {
+    Json& written = branch.emplace_back(Json::object());
+    for (const auto& [body, coefficient] : combination) written[body] = coefficient;
+  }
+  return branch.empty() ? Json() : branch;
+}
+
 void ReadClosedForm(const JsonNode& node, Draft& draft) {
   draft.observe.closed_form = ReadPart(PendulumFields(), node, draft);
+}
+
+Json WriteClosedForm(const Draft& draft) {
+  const std::optional<PendulumForm>& form = draft.observe.closed_form;
+  return form ? WritePart(PendulumFields(), draft, *form) : Json();
 }
 
 void ReadLength(const JsonNode& node, Draft& draft) {
   draft.observe.length = node.Number(kPositive);
 }
 
+Json WriteLength(const Draft& draft) {
+  const double length = draft.observe.length;
+  return length == SceneObservation{}.length ? Json() : Json(length);
+}
+
 }  // namespace
 
-FieldValue<Draft> IndependentValue() { return By(NamesSchema(), ReadIndependent); }
+FieldValue<Draft> IndependentValue() {
+  return By(NamesSchema(), ReadIndependent, WriteIndependent);
+}
 
 const Fields<Draft>& InitialFields() {
   constexpr std::size_t kMostValues = 7;  // of a free joint in space
@@ -197,12 +257,12 @@ const Fields<Draft>& InitialFields() {
             MapSchema(EitherSchema({NumberSchema(), ArraySchema(NumberSchema(), 1, kMostValues)})));
   static const Fields<Draft> fields(
       "initial", "Where and how fast it starts; what is not said is assembled.",
-      {{"coordinates", By(values, ReadCoordinates),
+      {{"coordinates", By(values, ReadCoordinates, WriteCoordinates),
         "By joint: guesses, or exact where the joint is held. Revolute [rad], prismatic [m], free "
         "joint [angle, x, y] in the plane, [qw, qx, qy, qz, x, y, z] in space."},
-       {"speeds", By(values, ReadSpeeds),
+       {"speeds", By(values, ReadSpeeds, WriteSpeeds),
         "By joint; all of them are held when the loops are assembled."},
-       {"held", By(NamesSchema(), ReadHeld),
+       {"held", By(NamesSchema(), ReadHeld, WriteHeld),
         "Joints whose coordinates the assembly must not move."}});
   return fields;
 }
@@ -210,11 +270,11 @@ const Fields<Draft>& InitialFields() {
 const Fields<Draft>& ObservationFields() {
   static const Fields<Draft> fields(
       "observe", "Exact facts that observers compare with.",
-      {{"branch", By(ArraySchema(MapSchema(NumberSchema(), 1)), ReadBranch),
+      {{"branch", By(ArraySchema(MapSchema(NumberSchema(), 1)), ReadBranch, WriteBranch),
         "Linear combinations of absolute body angles, by body, that stay constant on the right "
         "branch."},
-       {"closed_form", By(PendulumFields().Schema(), ReadClosedForm)},
-       {"length", By(NumberSchema(kPositive), ReadLength),
+       {"closed_form", By(PendulumFields().Schema(), ReadClosedForm, WriteClosedForm)},
+       {"length", By(NumberSchema(kPositive), ReadLength, WriteLength),
         "Characteristic bar length [m], default 1."}});
   return fields;
 }

@@ -26,6 +26,13 @@ void ReadRotation(const JsonNode& node, Side& side) {
   }
 }
 
+Json WriteRotation(const Side& side) {
+  const Eigen::Vector3d& turn = side.rotation;
+  if (turn.isZero(0.0)) return Json();
+  if (turn.x() == 0.0 && turn.y() == 0.0) return turn.z();
+  return {turn.x(), turn.y(), turn.z()};
+}
+
 const Fields<Side>& SideFields() {
   static const Json rotation = EitherSchema({NumberSchema(), ArraySchema(NumberSchema(), 3, 3)});
   static const Fields<Side> fields(
@@ -34,7 +41,7 @@ const Fields<Side>& SideFields() {
         "the name of a body or \"ground\""},
        {"at", PlaceOf<JointSide>(&JointSide::body, &JointSide::position),
         "Its origin: the name of one of the body's points, or coordinates in body axes [m]."},
-       {"rotation", By(rotation, ReadRotation),
+       {"rotation", By(rotation, ReadRotation, WriteRotation),
         "Body axes to the joint's frame [rad]: about z, or a rotation vector. Default 0."}});
   return fields;
 }
@@ -55,6 +62,10 @@ void ReadAxis(const JsonNode& node, Joint& joint) {
       node.FailWithCure(kSpatialCure, "an axis with z = 0 in a planar mechanism");
     }
   }
+}
+
+Json WriteAxis(const Joint& joint) {
+  return joint.axis.isZero(0.0) ? Json() : WriteVector(joint.axis, joint.draft->space);
 }
 
 Range RangeOf(const JointParameter& parameter) { return parameter.positive ? kPositive : Range{}; }
@@ -104,11 +115,13 @@ void ReadCoordinate(const JsonNode& node, MotionOfJoint& motion) {
   }
 }
 
+Json WriteCoordinate(const MotionOfJoint& motion) { return motion.coordinate; }
+
 const Fields<MotionOfJoint>& MotionFields() {
   constexpr int kMostCoordinates = 3;  // that can be prescribed: those of a planar joint
   static const Fields<MotionOfJoint> fields(
       "motion", "A coordinate as a given function of time.",
-      {{"coordinate", By(IntegerSchema(0, kMostCoordinates - 1), ReadCoordinate),
+      {{"coordinate", By(IntegerSchema(0, kMostCoordinates - 1), ReadCoordinate, WriteCoordinate),
         "In the order of initial coordinates, from 0.", "the number of a coordinate"},
        {"value", TimeFunctionOf(&PrescribedMotion::value), "Its value [rad or m].",
         "a number or a function of time"}});
@@ -141,6 +154,18 @@ void ReadMotions(const JsonNode& node, Joint& joint) {
   }
 }
 
+Json WriteMotions(const Joint& joint) {
+  if (joint.motions.empty()) return Json();
+  if (NumValues(joint.type, joint.draft->space, true) == 1) {
+    return WriteTimeFunction(joint.motions[0].value);
+  }
+  Json motions = Json::array();
+  for (const PrescribedMotion& motion : joint.motions) {
+    motions.push_back(MotionFields().Write(MotionOfJoint{motion}));
+  }
+  return motions;
+}
+
 bool IsMissingInPlane(const Joint& joint) {
   return joint.draft->space == SpaceKind::kPlanar && !TraitsOf(joint.type).in_plane;
 }
@@ -149,6 +174,8 @@ void ReadType(const JsonNode& node, Joint& joint) {
   joint.type = static_cast<JointType>(node.Choice(JointTypeNames(), "a joint type").value_or(0));
   if (IsMissingInPlane(joint)) node.FailWithCure(kSpatialCure, "a joint of the plane");
 }
+
+Json WriteType(const Joint& joint) { return std::string(ToString(joint.type)); }
 
 void CheckSides(const JsonNode& node, Joint& joint) {
   if (joint.from.body < 0 || joint.from.body != joint.to.body) return;
@@ -162,8 +189,11 @@ void AddParameters(std::vector<Field<Joint>>* rows) {
   Json rules = Json::array();
   for (const auto& [parameter, types] : ParameterKeys()) {
     const std::string key(parameter.key);
+    const auto write = [key](const Joint& joint) {
+      return TraitsOf(joint.type).parameter.key == key ? Json(joint.parameter) : Json();
+    };
     rows->push_back(
-        {key, NumberSchema(RangeOf(parameter)),
+        {key, FieldValue<Joint>(NumberSchema(RangeOf(parameter)), nullptr, nullptr, write),
          fmt::format("Of a {} joint: {}.", fmt::join(types, " or "), parameter.meaning)});
     rules.push_back({{"if", {{"properties", {{"type", ChoiceSchema(types)}}}}},
                      {"then", Requires({key})},
@@ -176,21 +206,24 @@ void ReadNameOfJoint(const JsonNode& node, Joint& joint) {
   joint.name = ReadNewName(node, joint.draft->joint_names);
 }
 
+Json WriteNameOfJoint(const Joint& joint) { return joint.name; }
+
 Fields<Joint> MakeJointFields() {
   const Json motions = EitherSchema({TimeFunctionSchema(), ArraySchema(MotionFields().Schema())});
   std::vector<Field<Joint>> rows = {
-      {"name", By(TextSchema(), ReadNameOfJoint), "One that no other joint has.", "a name"},
-      {"type", By(ChoiceSchema(JointTypeNames().all()), ReadType), "What it leaves free.",
-       "a joint type", IsMissingInPlane},
+      {"name", By(TextSchema(), ReadNameOfJoint, WriteNameOfJoint), "One that no other joint has.",
+       "a name"},
+      {"type", By(ChoiceSchema(JointTypeNames().all()), ReadType, WriteType),
+       "What it leaves free.", "a joint type", IsMissingInPlane},
       {"from", Part(&JointDescription::from, SideFields()), "Where F is.",
        "an object with keys \"body\", \"at\", \"rotation\""},
       {"to", Part(&JointDescription::to, SideFields()), "Where M is.",
        "an object with keys \"body\", \"at\", \"rotation\""},
       {"", By(Json::object(), CheckSides)},
-      {"axis", By(VectorSchema(), ReadAxis),
+      {"axis", By(VectorSchema(), ReadAxis, WriteAxis),
        "Of a revolute (default z) or prismatic joint (default x), not zero."}};
   AddParameters(&rows);
-  rows.push_back({"motion", By(motions, ReadMotions),
+  rows.push_back({"motion", By(motions, ReadMotions, WriteMotions),
                   "Coordinates as given functions of time [rad or m]: one function for a joint "
                   "with one coordinate, else a list."});
   rows.push_back({"cut", Bool(&JointDescription::cut),
@@ -212,6 +245,14 @@ void ReadJoints(const JsonNode& node, Draft& draft) {
   }
 }
 
+Json WriteJoints(const Draft& draft) {
+  Json joints = Json::array();
+  for (const JointDescription& joint : draft.joints) {
+    joints.push_back(WritePart(JointFields(), draft, joint));
+  }
+  return joints;
+}
+
 }  // namespace
 
 const NameList& JointTypeNames() {
@@ -223,6 +264,8 @@ const NameList& JointTypeNames() {
   return kNames;
 }
 
-FieldValue<Draft> JointsValue() { return By(ArraySchema(JointFields().Schema()), ReadJoints); }
+FieldValue<Draft> JointsValue() {
+  return By(ArraySchema(JointFields().Schema()), ReadJoints, WriteJoints);
+}
 
 }  // namespace loopbench::harness

@@ -18,6 +18,19 @@ Eigen::Vector3d ReadVector(const JsonNode& node, SpaceKind space) {
   return vector;
 }
 
+Json WriteVector(const Eigen::Vector3d& vector, SpaceKind space) {
+  Json json = {vector.x(), vector.y()};
+  if (space == SpaceKind::kSpatial || vector.z() != 0.0) json.push_back(vector.z());
+  return json;
+}
+
+Json WritePoint(const Eigen::Vector3d& at, const BodyDescription& body, SpaceKind space) {
+  for (const auto& [name, point] : body.points) {
+    if (point == at) return name;
+  }
+  return at.isZero(0.0) ? Json() : WriteVector(at, space);
+}
+
 Eigen::Vector3d ReadPoint(const JsonNode& node, const BodyDescription& body, SpaceKind space) {
   if (node.value().is_array()) return ReadVector(node, space);
   if (node.value().is_string()) {
@@ -54,11 +67,17 @@ Json PlaceSchema() { return Named("place", EitherSchema({TextSchema(), VectorSch
 
 namespace {
 
-void ReadComment(const JsonNode& node, Draft&) { node.Text(); }
+void ReadComment(const JsonNode& node, Draft& draft) { draft.comment = node.Text(); }
+
+Json WriteComment(const Draft& draft) {
+  return draft.comment.empty() ? Json() : Json(draft.comment);
+}
 
 void ReadGravity(const JsonNode& node, Draft& draft) {
   draft.gravity = ReadVector(node, draft.space);
 }
+
+Json WriteGravity(const Draft& draft) { return WriteVector(draft.gravity, draft.space); }
 
 // without bodies everything that names one would be a mistake, and none of its own
 bool HasNoBodies(const Draft& draft) { return draft.bodies.size() < 2; }
@@ -73,10 +92,10 @@ const Fields<Draft>& MechanismFileFields() {
       "a body, that each joint gets as many values as it has coordinates.",
       {{"$schema", TextSchema(), "Address of this schema, for editors."},
        {"name", Text(&Draft::name), "Of the scene.", "a name"},
-       {"comment", By(TextSchema(), ReadComment), "Free text for readers."},
+       {"comment", By(TextSchema(), ReadComment, WriteComment), "Free text for readers."},
        {"space", Choice(&Draft::space, {"planar", "spatial"}, "a space"),
         "Planar: everything moves in the x-y plane, third components are 0."},
-       {"gravity", By(VectorSchema(), ReadGravity),
+       {"gravity", By(VectorSchema(), ReadGravity, WriteGravity),
         "Acceleration of gravity [m/s^2] in ground axes.", "an array of 2 or 3 numbers [m/s^2]"},
        {"ground", GroundValue()},
        {"bodies", BodiesValue(), "All that moves.", "an array of bodies", HasNoBodies},

@@ -25,6 +25,7 @@ struct Draft : MechanismDescription {
   NameList body_names;  ///< ground first
   NameList joint_names;
   SceneObservation observe;
+  std::string comment;
 };
 
 /// A part of it, which refers to others by name.
@@ -53,9 +54,15 @@ const Fields<Draft>& ObservationFields();
 /// A number (a constant), or an object with "type" polynomial, harmonic or table. A stand-in after
 /// an error.
 TimeFunctionDescription ReadTimeFunction(const JsonNode& node);
+/// A constant as a number.
+Json WriteTimeFunction(const TimeFunctionDescription& function);
 Json TimeFunctionSchema();
 /// Two or three numbers; reports a third one that is not zero in the plane.
 Eigen::Vector3d ReadVector(const JsonNode& node, SpaceKind space);
+/// Two numbers in the plane, unless the third is not zero; else three.
+Json WriteVector(const Eigen::Vector3d& vector, SpaceKind space);
+/// The name of the body's point that is there, else the vector.
+Json WritePoint(const Eigen::Vector3d& at, const BodyDescription& body, SpaceKind space);
 /// The point that a name of the body's points or a vector denotes.
 Eigen::Vector3d ReadPoint(const JsonNode& node, const BodyDescription& body, SpaceKind space);
 Json PlaceSchema();
@@ -77,46 +84,82 @@ T ReadPart(const Fields<PartOf<T>>& fields, const JsonNode& node, const Draft& d
   return part;
 }
 
+/// A part as a file says it.
+template <class T>
+Json WritePart(const Fields<PartOf<T>>& fields, const Draft& draft, const T& whole) {
+  PartOf<T> part;
+  static_cast<T&>(part) = whole;
+  part.draft = &draft;
+  return fields.Write(part);
+}
+
 /// An object within an object.
 template <class T, class Owner>
 FieldValue<PartOf<Owner>> Part(T Owner::*member, const Fields<PartOf<T>>& fields) {
-  return {fields.Schema(), [member, &fields](const JsonNode& node, PartOf<Owner>& owner) {
+  return {fields.Schema(),
+          [member, &fields](const JsonNode& node, PartOf<Owner>& owner) {
             owner.*member = ReadPart(fields, node, *owner.draft, owner.*member);
+          },
+          nullptr,
+          [member, &fields](const PartOf<Owner>& owner) {
+            return WritePart(fields, *owner.draft, owner.*member);
           }};
 }
 
 template <class T>
 FieldValue<PartOf<T>> VectorOf(Eigen::Vector3d T::*member) {
-  return {VectorSchema(), [=](const JsonNode& node, PartOf<T>& owner) {
+  return {VectorSchema(),
+          [=](const JsonNode& node, PartOf<T>& owner) {
             owner.*member = ReadVector(node, owner.draft->space);
+          },
+          nullptr,
+          [=](const PartOf<T>& owner) {
+            const Eigen::Vector3d& vector = owner.*member;
+            return vector.isZero(0.0) ? Json() : WriteVector(vector, owner.draft->space);
           }};
 }
 
 template <class T>
 FieldValue<T> TimeFunctionOf(TimeFunctionDescription T::*member) {
   return {TimeFunctionSchema(),
-          [=](const JsonNode& node, T& owner) { owner.*member = ReadTimeFunction(node); }};
+          [=](const JsonNode& node, T& owner) { owner.*member = ReadTimeFunction(node); }, nullptr,
+          [=](const T& owner) { return WriteTimeFunction(owner.*member); }};
 }
 
 /// The index of a body, -1 for a name that is not known; `get(owner)` refers to it.
 template <class T, class Get>
 FieldValue<PartOf<T>> BodyOf(Get get, bool may_be_ground) {
-  return {TextSchema(), [=](const JsonNode& node, PartOf<T>& owner) {
+  return {TextSchema(),
+          [=](const JsonNode& node, PartOf<T>& owner) {
             int& body = std::invoke(get, static_cast<T&>(owner));
             body = ReadBodyName(node, *owner.draft).value_or(-1);
             if (body == kGround && !may_be_ground) node.Fail("a body that can move");
+          },
+          nullptr,
+          [=](const PartOf<T>& owner) {
+            T part = owner;  // forces know their parts by reference
+            const int body = std::invoke(get, part);
+            return Json(owner.draft->bodies[body].name);
           }};
 }
 
 /// A place on that body, in its axes from its origin.
 template <class T, class GetBody, class Get>
 FieldValue<PartOf<T>> PlaceOf(GetBody body, Get get) {
-  return {PlaceSchema(), [=](const JsonNode& node, PartOf<T>& owner) {
+  return {PlaceSchema(),
+          [=](const JsonNode& node, PartOf<T>& owner) {
             T& part = owner;
             const int index = std::invoke(body, part);
             if (index < 0) return;
             const Draft& draft = *owner.draft;
             std::invoke(get, part) = ReadPoint(node, draft.bodies[index], draft.space);
+          },
+          nullptr,
+          [=](const PartOf<T>& owner) {
+            T part = owner;
+            const int index = std::invoke(body, part);
+            return WritePoint(std::invoke(get, part), owner.draft->bodies[index],
+                              owner.draft->space);
           }};
 }
 

@@ -9,7 +9,8 @@ namespace {
 /// An array with at least `least` numbers.
 template <class T>
 FieldValue<T> Numbers(std::vector<double> T::*member, std::size_t least, std::string expected) {
-  return {ArraySchema(NumberSchema(), least), [=](const JsonNode& node, T& owner) {
+  return {ArraySchema(NumberSchema(), least),
+          [=](const JsonNode& node, T& owner) {
             if (!node.value().is_array() || node.value().size() < least) {
               node.Fail(expected);
               return;
@@ -17,14 +18,15 @@ FieldValue<T> Numbers(std::vector<double> T::*member, std::size_t least, std::st
             std::vector<double>& numbers = owner.*member;
             numbers.clear();
             for (const JsonNode& one : node.Elements("numbers")) numbers.push_back(one.Number());
-          }};
+          },
+          nullptr, [=](const T& owner) { return Json(owner.*member); }};
 }
 
 const Fields<Polynomial>& PolynomialFields() {
   constexpr const char* kExpected = "an array of one or more numbers, constant first";
   static const Fields<Polynomial> fields(
       "polynomial", "A polynomial in t.",
-      {{"type", ChoiceSchema({"polynomial"}), "What it is.", "a function of time"},
+      {{"type", Constant<Polynomial>("polynomial"), "What it is.", "a function of time"},
        {"coefficients", Numbers(&Polynomial::coefficients, 1, kExpected), "Of 1, t, t^2, ...",
         kExpected}});
   return fields;
@@ -33,7 +35,7 @@ const Fields<Polynomial>& PolynomialFields() {
 const Fields<Harmonic>& HarmonicFields() {
   static const Fields<Harmonic> fields(
       "harmonic", "mean + amplitude sin(omega t + phase)",
-      {{"type", ChoiceSchema({"harmonic"}), "What it is.", "a function of time"},
+      {{"type", Constant<Harmonic>("harmonic"), "What it is.", "a function of time"},
        {"mean", Number(&Harmonic::mean), "About which it swings."},
        {"amplitude", Number(&Harmonic::amplitude), "Of the sine.", "a number"},
        {"omega", Number(&Harmonic::omega), "Angular frequency [rad/s].", "a number"},
@@ -60,15 +62,18 @@ void ReadInterpolation(const JsonNode& node, TimeTable& table) {
   table.cubic = node.Choice({"cubic", "linear"}, "an interpolation").value_or(0) == 0;
 }
 
+Json WriteInterpolation(const TimeTable& table) { return table.cubic ? Json() : Json("linear"); }
+
 const Fields<TimeTable>& TableFields() {
   constexpr const char* kTimes = "an array of two or more numbers that ascend [s]";
   constexpr const char* kValues = "an array of two or more numbers";
   static const Fields<TimeTable> fields(
       "table", "Values at given times, and between them.",
-      {{"type", ChoiceSchema({"table"}), "What it is.", "a function of time"},
+      {{"type", Constant<TimeTable>("table"), "What it is.", "a function of time"},
        {"times", Numbers(&TimeTable::times, 2, kTimes), "Ascending [s].", kTimes},
        {"values", Numbers(&TimeTable::values, 2, kValues), "One per time.", kValues},
-       {"interpolation", By(ChoiceSchema({"cubic", "linear"}), ReadInterpolation),
+       {"interpolation",
+        By(ChoiceSchema({"cubic", "linear"}), ReadInterpolation, WriteInterpolation),
         "Cubic, the default: a natural spline that goes on straight; linear: end values hold."},
        {"", By(Json::object(), CheckTable)}});
   return fields;
@@ -82,7 +87,19 @@ TimeFunctionDescription ReadAs(const Fields<T>& fields, const JsonNode& node) {
   return function;
 }
 
+Json Written(const Polynomial& function) {
+  // a file says a constant as a number, and any other list of coefficients in full
+  if (function.coefficients.size() == 1) return function.coefficients[0];
+  return PolynomialFields().Write(function);
+}
+Json Written(const Harmonic& function) { return HarmonicFields().Write(function); }
+Json Written(const TimeTable& function) { return TableFields().Write(function); }
+
 }  // namespace
+
+Json WriteTimeFunction(const TimeFunctionDescription& function) {
+  return std::visit([](const auto& one) { return Written(one); }, function);
+}
 
 Json TimeFunctionSchema() {
   return Named("timeFunction", EitherSchema({NumberSchema(), PolynomialFields().Schema(),

@@ -11,7 +11,8 @@
 // A row is the key, what its value may be and where it goes, and a sentence with the unit; a key
 // that must be there has in addition the words for the message that it is not. Defaults are those
 // of the struct. From the rows come the reader, the refusal of other keys with the nearest
-// spelling, the JSON schema (configs/schema/) and the tables of docs/fields.md.
+// spelling, the JSON schema (configs/schema/), the tables of docs/fields.md, and, where every row
+// can say its value, the writer of such an object.
 #pragma once
 
 #include <concepts>
@@ -33,14 +34,21 @@ struct FieldValue {
   Json schema;
   Read read;  ///< null: read elsewhere
   Show show;  ///< as a file says it; null where there is no one way
+  /// As a file that is written says it: null where the key is left out. Without one it is `show`,
+  /// left out where the value is the default and may be.
+  Show write;
 
-  FieldValue(Json what, Read reader = nullptr, Show shown = nullptr)  // NOLINT: a schema is one
-      : schema(std::move(what)), read(std::move(reader)), show(std::move(shown)) {}
+  FieldValue(Json what, Read reader = nullptr, Show shown = nullptr,  // NOLINT: a schema is one
+             Show written = nullptr)
+      : schema(std::move(what)),
+        read(std::move(reader)),
+        show(std::move(shown)),
+        write(std::move(written)) {}
   /// A member of a base is one of the derived struct, which may carry what reading needs besides.
   template <class Base>
   requires(std::derived_from<T, Base> && !std::same_as<T, Base>)
       FieldValue(const FieldValue<Base>& other)  // NOLINT: as a T is a Base
-      : schema(other.schema), read(other.read), show(other.show) {}
+      : schema(other.schema), read(other.read), show(other.show), write(other.write) {}
 };
 
 /// One row. Without a name it is a rule about the whole object: `schema` says it, `read` gets the
@@ -96,6 +104,21 @@ class Fields {
     }
   }
 
+  /// The object as a file may say it, by all rows that can: Read() of it gives the same.
+  Json Write(const T& object) const {
+    const T standard{};
+    Json written = Json::object();
+    for (const Field<T>& row : rows_) {
+      const auto& say = row.value.write ? row.value.write : row.value.show;
+      if (row.name.empty() || !say) continue;
+      Json value = say(object);
+      const bool may_lack = !row.value.write && row.missing.empty();
+      if (value.is_null() || (may_lack && value == say(standard))) continue;
+      written[row.name] = std::move(value);
+    }
+    return written;
+  }
+
   /// The object by itself, and as others refer to it.
   Json OwnSchema() const {
     const T standard{};
@@ -114,10 +137,17 @@ class Fields {
   NameList keys_;
 };
 
-/// A value with a reader of its own, a function of the node and of a T.
+/// A value with a reader of its own, a function of the node and of a T, and perhaps a writer.
 template <class T>
-FieldValue<T> By(Json schema, void (*read)(const JsonNode&, T&)) {
-  return {std::move(schema), read};
+FieldValue<T> By(Json schema, void (*read)(const JsonNode&, T&),
+                 Json (*write)(const T&) = nullptr) {
+  return {std::move(schema), read, nullptr, write};
+}
+
+/// The word that says of which kind an object is: read by who chose these fields for it.
+template <class T>
+FieldValue<T> Constant(const std::string& word) {
+  return {ChoiceSchema({word}), nullptr, nullptr, [word](const T&) { return Json(word); }};
 }
 
 template <class T>
@@ -147,7 +177,9 @@ FieldValue<T> Bool(bool T::*member) {
 
 template <class T>
 FieldValue<T> Text(std::string T::*member) {
-  return {TextSchema(), [=](const JsonNode& node, T& owner) { owner.*member = node.Text(); }};
+  return {TextSchema(), [=](const JsonNode& node, T& owner) { owner.*member = node.Text(); },
+          nullptr,
+          [=](const T& owner) { return (owner.*member).empty() ? Json() : Json(owner.*member); }};
 }
 
 /// One of some names; `what` names the thing. The member is the name, or an enum or bool with the
@@ -213,8 +245,12 @@ FieldValue<T> Object(Part T::*member, const Fields<Part>& fields) {
 /// An object whose fields go to the same struct.
 template <class T>
 FieldValue<T> Section(const Fields<T>& fields) {
-  return {fields.Schema(),
-          [&fields](const JsonNode& node, T& owner) { fields.Read(node, &owner); }};
+  return {fields.Schema(), [&fields](const JsonNode& node, T& owner) { fields.Read(node, &owner); },
+          nullptr,
+          [&fields](const T& owner) {
+            Json section = fields.Write(owner);
+            return section.empty() ? Json() : section;
+          }};
 }
 
 /// An array of objects; `what` names them.

@@ -4,12 +4,11 @@
 #include <algorithm>
 #include <set>
 
+#include "harness/json/json_text.h"
 #include "harness/json/schema.h"
 
 namespace loopbench::harness {
 namespace {
-
-constexpr std::size_t kWidth = 100;  ///< characters of a line
 
 /// Of a schema that Named() made.
 std::string NameOf(const Json& reference) {
@@ -37,33 +36,6 @@ void TakeOwn(Json* node, Json* definitions) {
   for (Json& child : *node) TakeOwn(&child, definitions);
 }
 
-/// On one line.
-std::string Flat(const Json& value) {
-  if (!value.is_structured()) return value.dump();
-  std::string text;
-  for (auto child = value.begin(); child != value.end(); ++child) {
-    text += text.empty() ? "" : ", ";
-    if (value.is_object()) text += Json(child.key()).dump() + ": ";
-    text += Flat(*child);
-  }
-  return value.is_object() ? "{" + text + "}" : "[" + text + "]";
-}
-
-/// On one line where it fits behind `used` characters, else one element per line.
-std::string Written(const Json& value, std::size_t indent, std::size_t used) {
-  const std::string flat = Flat(value);
-  if (used + flat.size() < kWidth || !value.is_structured() || value.empty()) return flat;
-  const std::string margin(indent + 2, ' ');
-  std::string text;
-  for (auto child = value.begin(); child != value.end(); ++child) {
-    const std::string key = value.is_object() ? Json(child.key()).dump() + ": " : "";
-    text += (text.empty() ? "\n" : ",\n") + margin + key +
-            Written(*child, indent + 2, margin.size() + key.size());
-  }
-  text += "\n" + std::string(indent, ' ');
-  return value.is_object() ? "{" + text + "}" : "[" + text + "]";
-}
-
 /// As one cell of a table.
 std::string Cell(const std::string& text) {
   std::string cell;
@@ -77,7 +49,7 @@ std::string Table(const std::string& heading, const Json& object) {
   const Json required = object.value("required", Json::array());
   for (const auto& [key, field] : object["properties"].items()) {
     if (key == "$schema") continue;
-    std::string standard = field.contains("default") ? '`' + Flat(field["default"]) + '`' : "";
+    std::string standard = field.contains("default") ? '`' + FlatText(field["default"]) + '`' : "";
     std::erase(standard, '"');
     if (std::ranges::find(required, Json(key)) != required.end()) standard = "required";
     text += fmt::format("| `{}` | {} | {} | {} |\n", key, field.value("words", ""), standard,
@@ -105,7 +77,7 @@ std::string SchemaText(const std::string& title, const Json& object) {
   Json definitions = Json::object();
   TakeOwn(&schema, &definitions);
   schema["definitions"] = definitions;
-  return Written(schema, 0, 0) + "\n";
+  return JsonText(schema);
 }
 
 std::string SchemaTables(const std::vector<std::pair<std::string, Json>>& kinds) {

@@ -17,19 +17,6 @@ Matrix3 PointInertia(double m, const Vector3& r) {
   return m * (r.squaredNorm() * Matrix3::Identity() - r * r.transpose());
 }
 
-/// The carrier with the mass of another body, given by its place.
-void AddMass(const BodyDescription& body, const Frame& X, BodyDescription* carrier) {
-  const Vector3 com = X.R * body.com + X.p;
-  const double mass = carrier->mass + body.mass;
-  const Vector3 joint_com = (carrier->mass * carrier->com + body.mass * com) / mass;
-  carrier->inertia += PointInertia(carrier->mass, carrier->com - joint_com) +
-                      X.R * body.inertia * X.R.transpose() +
-                      PointInertia(body.mass, com - joint_com);
-  carrier->inertia = (0.5 * (carrier->inertia + carrier->inertia.transpose())).eval();
-  carrier->com = joint_com;
-  carrier->mass = mass;
-}
-
 void MoveSide(const Attachment& at, SpaceKind space, JointSide* side) {
   side->body = at.carrier;
   side->position = at.X.R * side->position + at.X.p;
@@ -43,6 +30,18 @@ void MoveSide(const Attachment& at, SpaceKind space, JointSide* side) {
 }
 
 }  // namespace
+
+void AddMass(const BodyDescription& body, const Frame& X, BodyDescription* carrier) {
+  const Vector3 com = X.R * body.com + X.p;
+  const double mass = carrier->mass + body.mass;
+  const Vector3 joint_com = (carrier->mass * carrier->com + body.mass * com) / mass;
+  carrier->inertia += PointInertia(carrier->mass, carrier->com - joint_com) +
+                      X.R * body.inertia * X.R.transpose() +
+                      PointInertia(body.mass, com - joint_com);
+  carrier->inertia = (0.5 * (carrier->inertia + carrier->inertia.transpose())).eval();
+  carrier->com = joint_com;
+  carrier->mass = mass;
+}
 
 MechanismDescription Attach(const MechanismDescription& description,
                             const std::vector<Attachment>& attachments, Renumbering* renumbering) {

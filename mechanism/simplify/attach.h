@@ -21,6 +21,9 @@ struct Attachment {
   bool attached = false;  ///< else the body stays and the rest does not matter
 };
 
+/// The carrier with the mass of another body, given by its place in the carrier's axes.
+void AddMass(const BodyDescription& body, const Frame& X, BodyDescription* carrier);
+
 /// The description without the attached bodies. Joints between bodies of one carrier are dropped,
 /// with the forces in them, as are forces on Ground. A part that floated keeps its place: where its
 /// first body gains mass, an explicit free joint of that body's name takes the virtual one's place.

@@ -20,15 +20,6 @@ Frame FrameOf(const JointDescription& joint, const JointSide& side) {
   return X;
 }
 
-/// Axes with z = n, x as near to the old x (or y) as that allows; unchanged when n is z.
-Matrix3 AxesWithNormal(const Vector3& n) {
-  const Vector3 near = std::abs(n.x()) < 0.9 ? Vector3::UnitX() : Vector3::UnitY();
-  const Vector3 x = (near - near.dot(n) * n).normalized();
-  Matrix3 axes;
-  axes << x, n.cross(x), n;
-  return axes;
-}
-
 class Search {
  public:
   explicit Search(const MechanismDescription& description)
@@ -217,6 +208,15 @@ InPlane Search::Express() const {
 }
 
 }  // namespace
+
+Eigen::Matrix3d AxesWithNormal(const Vector3& n) {
+  const Eigen::Vector3d near =
+      std::abs(n.x()) < 0.9 ? Eigen::Vector3d::UnitX() : Eigen::Vector3d::UnitY();
+  const Eigen::Vector3d x = (near - near.dot(n) * n).normalized();
+  Eigen::Matrix3d axes;
+  axes << x, n.cross(x), n;
+  return axes;
+}
 
 std::optional<InPlane> ExpressInPlane(const MechanismDescription& description, std::string* why) {
   Search search(description);

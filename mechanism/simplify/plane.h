@@ -31,6 +31,9 @@ struct InPlane {
 /// length: what rounding leaves of a description turned in space.
 inline constexpr double kParallel = 1e-12;
 
+/// Axes with z = n, x as near to the old x (or y) as that allows; unchanged when n is z.
+Eigen::Matrix3d AxesWithNormal(const Eigen::Vector3d& n);
+
 /// Nothing when the description is planar already or does not qualify; `why` then says what was
 /// met.
 std::optional<InPlane> ExpressInPlane(const MechanismDescription& description, std::string* why);

@@ -19,8 +19,12 @@ Attachment Then(const Attachment& first, const Frame& X, double turn) {
 /// The group of welded bodies that begins with `root`; its poses seen from there.
 class Group {
  public:
-  Group(const MechanismDescription& description, const std::vector<bool>& in_tree, int root)
-      : description_(description), in_tree_(in_tree), at_(description.bodies.size()) {
+  Group(const MechanismDescription& description, const std::vector<bool>& welds,
+        const std::vector<bool>& in_tree, int root)
+      : description_(description),
+        welds_(welds),
+        in_tree_(in_tree),
+        at_(description.bodies.size()) {
     at_[root].attached = true;
     at_[root].carrier = root;
     bodies_.push_back(root);
@@ -32,11 +36,12 @@ class Group {
 
   /// Whether all joints within the group are welds that agree.
   bool IsOneBody() const {
-    for (const JointDescription& joint : description_.joints) {
+    for (std::size_t j = 0; j < description_.joints.size(); ++j) {
+      const JointDescription& joint = description_.joints[j];
       const Attachment& P = at_[joint.from.body];
       const Attachment& Q = at_[joint.to.body];
       if (!P.attached || !Q.attached) continue;
-      if (joint.type != JointType::kWeld) return false;
+      if (!welds_[j]) return false;
       const auto X_F = P.X * PoseOf(joint.from), X_M = Q.X * PoseOf(joint.to);
       const double arm = 1.0 + X_F.p.norm() + joint.to.position.norm();
       if ((X_F.R - X_M.R).norm() > kAgrees || (X_F.p - X_M.p).norm() > kAgrees * arm) return false;
@@ -48,7 +53,7 @@ class Group {
   void GrowFrom(int body) {
     for (std::size_t j = 0; j < description_.joints.size(); ++j) {
       const JointDescription& joint = description_.joints[j];
-      if (joint.type != JointType::kWeld || !in_tree_[j]) continue;
+      if (!welds_[j] || !in_tree_[j]) continue;
       for (const auto& [here, there] :
            {std::pair{&joint.from, &joint.to}, {&joint.to, &joint.from}}) {
         if (here->body != body || at_[there->body].attached) continue;
@@ -60,6 +65,7 @@ class Group {
   }
 
   const MechanismDescription& description_;
+  const std::vector<bool>& welds_;
   const std::vector<bool>& in_tree_;
   std::vector<Attachment> at_;
   std::vector<int> bodies_;
@@ -68,17 +74,27 @@ class Group {
 }  // namespace
 
 std::vector<Attachment> FindWelded(const MechanismDescription& description) {
+  std::vector<bool> welds;
+  for (const JointDescription& joint : description.joints) {
+    welds.push_back(joint.type == JointType::kWeld);
+  }
+  return FindWelded(description, welds);
+}
+
+std::vector<Attachment> FindWelded(const MechanismDescription& description,
+                                   const std::vector<bool>& welds) {
   std::vector<Attachment> attachments(description.bodies.size());
   std::vector<bool> seen(description.bodies.size(), false), welded(seen);
   std::vector<bool> in_tree(description.joints.size(), true);
   for (const int j : BuildTopology(description, Coordinates::kJoint).constraints)
     in_tree[j] = false;
-  for (const JointDescription& joint : description.joints) {
-    if (joint.type == JointType::kWeld) welded[joint.from.body] = welded[joint.to.body] = true;
+  for (std::size_t j = 0; j < description.joints.size(); ++j) {
+    const JointDescription& joint = description.joints[j];
+    if (welds[j]) welded[joint.from.body] = welded[joint.to.body] = true;
   }
   for (int root = 0; root < static_cast<int>(seen.size()); ++root) {
     if (seen[root] || !welded[root]) continue;
-    const Group group(description, in_tree, root);
+    const Group group(description, welds, in_tree, root);
     const bool merge = group.IsOneBody();
     for (const int body : group.bodies()) {
       seen[body] = true;

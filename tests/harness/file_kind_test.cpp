@@ -46,7 +46,11 @@ TEST_F(FileKindTest, EveryShippedFileIsOfTheKindOfItsFolder) {
     for (const auto& entry : fs::recursive_directory_iterator(kConfigs / folder)) {
       const std::string name = entry.path().filename().string();
       if (entry.path().extension() != ".json" || name.find("states") != std::string::npos) continue;
+      // experiments/models/ has models and for each of them a folder with its ladder
+      const bool is_model = entry.path().string().find("/experiments/models/") != name.npos &&
+                            name.find("-ladder.json") == name.npos;
       const FileKind expected = folder == std::string("mechanisms")   ? FileKind::kMechanism
+                                : is_model                            ? FileKind::kMechanism
                                 : folder == std::string("benchmarks") ? FileKind::kBenchmarks
                                 : name == "claims.json"               ? FileKind::kClaims
                                 : name.find("map.json") != name.npos  ? FileKind::kMap

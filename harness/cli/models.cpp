@@ -1,0 +1,265 @@
+#include "harness/cli/models.h"
+
+#include <fmt/format.h>
+#include <unistd.h>
+
+#include <algorithm>
+#include <map>
+#include <system_error>
+
+#include "harness/config/experiment_reader.h"
+#include "harness/config/ladder_writer.h"
+#include "harness/config/mechanism_writer.h"
+#include "harness/run/model_error.h"
+#include "harness/text/config_error.h"
+#include "harness/text/escape.h"
+#include "harness/text/files.h"
+
+namespace loopbench::harness {
+
+namespace {
+
+namespace fs = std::filesystem;
+
+/// What is still known of exact facts: about bodies that are there, and in an approximate model
+/// nothing but its length.
+SceneObservation ObserveIn(const MechanismDescription& description, const SceneObservation& observe,
+                           bool keeps_facts) {
+  SceneObservation known = observe;
+  const auto is_there = [&](const std::string& body) {
+    return std::ranges::find(description.bodies, body, &BodyDescription::name) !=
+           description.bodies.end();
+  };
+  std::erase_if(known.branch_invariants, [&](const AngleCombination& combination) {
+    return !keeps_facts || !std::ranges::all_of(
+                               combination, [&](const auto& term) { return is_there(term.first); });
+  });
+  if (known.closed_form && (!keeps_facts || !is_there(known.closed_form->body))) {
+    known.closed_form.reset();
+  }
+  return known;
+}
+
+void AddModels(const MechanismFile& file, const std::string& name, bool is_exact,
+               const std::string& assumption, const Simplified& simplified, SceneModels* ladder) {
+  for (std::size_t part = 0; part < simplified.parts.size(); ++part) {
+    SceneModel model;
+    model.name = simplified.parts.size() == 1 ? name : fmt::format("{}-{}", name, part + 1);
+    model.is_exact = is_exact;
+    model.description = simplified.parts[part];
+    model.description.name = fmt::format("{}-{}", file.description.name, model.name);
+    const bool same_axes =
+        simplified.R_WC.isIdentity(0.0) && model.description.space == file.description.space;
+    model.observe = ObserveIn(model.description, file.observe, is_exact && same_axes);
+    model.done = simplified.done;
+    model.dropped = simplified.dropped;
+    model.assumption = assumption;
+    model.R_WC = simplified.R_WC;
+    ladder->models.push_back(std::move(model));
+  }
+}
+
+std::string Sentence(std::string text) {
+  if (!text.empty() && text.back() != '.') text += '.';
+  return text;
+}
+
+std::string CommentOf(const SceneModel& model, const std::string& whole) {
+  std::string text =
+      fmt::format("{} of {}: {}", model.is_exact ? "The same motion" : "A simpler model", whole,
+                  Sentence(fmt::format("{}", fmt::join(model.done, "; "))));
+  if (!model.dropped.empty()) {
+    text += fmt::format(" No longer there: {}",
+                        Sentence(fmt::format("{}", fmt::join(model.dropped, "; "))));
+  }
+  if (!model.assumption.empty()) text += fmt::format(" Right where {}", Sentence(model.assumption));
+  return text;
+}
+
+std::string List(const std::vector<std::string>& lines) {
+  std::string text;
+  for (const std::string& line : lines) text += fmt::format("- {}\n", EscapeMarkdown(line));
+  return text;
+}
+
+/// Of the experiment.
+std::string LadderName(const SceneModels& ladder) {
+  return ladder.models.front().description.name + "-ladder";
+}
+
+std::string PageOf(const SceneModels& ladder, double horizon, const std::string& typed) {
+  const MechanismDescription& whole = ladder.models.front().description;
+  std::string page = fmt::format(
+      "# Models of {}\n\nWritten by `{}`. `{}` runs all of them alike for {} s.\n\n"
+      "| file | motion | bodies | joints | forces | off by [m] | evaluations |\n"
+      "|---|---|---|---|---|---|---|\n",
+      EscapeMarkdown(whole.name), EscapeMarkdown(typed), LadderFileName(ladder), horizon);
+  for (const SceneModel& model : ladder.models) {
+    page +=
+        fmt::format("| {}.json | {} | {} | {} | {} | {} | {} |\n", model.name,
+                    model.is_exact ? "the same" : "changed", model.description.bodies.size() - 1,
+                    model.description.joints.size(), model.description.forces.size(), model.error,
+                    model.rhs_evaluations < 0 ? "" : std::to_string(model.rhs_evaluations));
+  }
+  if (ladder.models.front().rhs_evaluations >= 0) {
+    page +=
+        "\n*off by*: the largest distance of a named point from where the whole model has it, at "
+        "50 "
+        "times of a run in tight steps (multipliers at level position, dormand-prince at 1e-10); "
+        "*evaluations*: right-hand sides that run took.\n";
+  }
+  for (std::size_t i = 1; i < ladder.models.size(); ++i) {
+    const SceneModel& model = ladder.models[i];
+    page += fmt::format("\n## {}\n\n{}", model.name, List(model.done));
+    if (!model.dropped.empty())
+      page += fmt::format("\nNo longer there:\n\n{}", List(model.dropped));
+    if (!model.assumption.empty()) {
+      page += fmt::format("\nRight where {}\n", EscapeMarkdown(Sentence(model.assumption)));
+    }
+    const std::vector<std::string> gone = Gone(whole, model.description);
+    if (!gone.empty()) page += fmt::format("\nBy name:\n\n{}", List(gone));
+    if (!model.R_WC.isIdentity(0.0)) {
+      const auto axis = [&](int i_axis) {
+        const Eigen::Vector3d v = model.R_WC.col(i_axis);
+        return fmt::format("({:.6g}, {:.6g}, {:.6g})", v.x() + 0.0, v.y() + 0.0, v.z() + 0.0);
+      };
+      page += fmt::format("\nIts x, y and z are {}, {} and {} of the whole model.\n", axis(0),
+                          axis(1), axis(2));
+    }
+  }
+  return page;
+}
+
+/// Removes a folder that was not finished.
+struct Unfinished {
+  fs::path folder;
+  ~Unfinished() {
+    std::error_code ignored;
+    fs::remove_all(folder, ignored);
+  }
+};
+
+bool IsThere(const fs::path& folder) {
+  std::error_code error;
+  const bool there = fs::exists(fs::symlink_status(folder, error));
+  return there && !(fs::is_directory(folder, error) && fs::is_empty(folder, error));
+}
+
+}  // namespace
+
+SceneModels MakeModels(const MechanismFile& file, const std::vector<const Idea*>& ideas,
+                       const ShortRun& run, const SimplifyOptions& options) {
+  SceneModels ladder;
+  SceneModel& whole = ladder.models.emplace_back();
+  whole.name = "full";
+  whole.description = file.description;
+  whole.observe = file.observe;
+  for (const Idea* idea : ideas) {
+    ladder.ideas.emplace_back(idea, idea->apply(file.description, run, options));
+    const Simplified& simplified = ladder.ideas.back().second;
+    if (!simplified.applies()) continue;
+    AddModels(file, std::string(idea->name), idea->is_exact, std::string(idea->assumption),
+              simplified, &ladder);
+  }
+  const Simplified all = Combine(file.description, ideas, run, options);
+  if (all.ideas.size() < 2) return ladder;  // it would be that idea's model once more
+  std::vector<std::string_view> assumptions;
+  for (const Idea* idea : all.ideas) {
+    if (!idea->assumption.empty()) assumptions.push_back(idea->assumption);
+  }
+  AddModels(file, "combined", std::ranges::all_of(all.ideas, &Idea::is_exact),
+            fmt::format("{}", fmt::join(assumptions, "; ")), all, &ladder);
+  return ladder;
+}
+
+void MeasureErrors(double horizon, double cpu_s, SceneModels* ladder) {
+  const MechanismDescription& whole = ladder->models.front().description;
+  Track truth;
+  for (SceneModel& model : ladder->models) {
+    const bool is_whole = &model == &ladder->models.front();
+    Track track = TrackOf(model.description, model.R_WC, whole, horizon, cpu_s);
+    model.rhs_evaluations = track.rhs_evaluations;
+    model.worst = track.failure;
+    if (is_whole) truth = std::move(track);
+    if (is_whole || !model.worst.empty()) continue;
+    if (!truth.failure.empty()) {
+      model.worst = "the whole model: " + truth.failure;
+      continue;
+    }
+    const ModelError error = Compare(truth, track);
+    model.error = error.points > 0 ? fmt::format("{:.1e}", error.distance) : "";
+    model.worst = error.points > 0 ? error.point : "no point in common";
+  }
+}
+
+std::string LadderFileName(const SceneModels& ladder) {
+  return FileName(LadderName(ladder)) + ".json";
+}
+
+std::vector<std::string> Gone(const MechanismDescription& whole,
+                              const MechanismDescription& simplified) {
+  std::vector<std::string> lines;
+  for (std::size_t b = 1; b < whole.bodies.size(); ++b) {
+    const BodyDescription& body = whole.bodies[b];
+    const auto same = std::ranges::find(simplified.bodies.begin() + 1, simplified.bodies.end(),
+                                        body.name, &BodyDescription::name);
+    if (same != simplified.bodies.end()) continue;
+    std::vector<std::string> found, lost;
+    for (const auto& [point, at] : body.points) {
+      const FoundPoint now = FindPoint(simplified, body.name, point);
+      if (now.body < 0) {
+        lost.push_back(point);
+      } else {
+        found.push_back(fmt::format(
+            "{} on {}", point, now.body == kGround ? "ground" : simplified.bodies[now.body].name));
+      }
+    }
+    std::string line = fmt::format("body {} is gone", body.name);
+    if (!found.empty()) line += fmt::format("; its points: {}", fmt::join(found, ", "));
+    if (!lost.empty()) line += fmt::format("; points that are gone: {}", fmt::join(lost, ", "));
+    lines.push_back(line);
+  }
+  return lines;
+}
+
+void WriteModels(const SceneModels& ladder, double horizon, const std::string& typed,
+                 const std::filesystem::path& folder, bool force) {
+  const bool is_there = IsThere(folder);
+  if (is_there && !force) {
+    throw ConfigError(fmt::format(
+        "{}: found a folder with files, expected a new one; --force puts the models among them",
+        folder.string()));
+  }
+  const std::string& whole = ladder.models.front().description.name;
+  std::map<std::string, std::string> files;
+  LadderFile experiment{LadderName(ladder),
+                        fmt::format("Models of {}, from the whole one down (ladder.md).", whole),
+                        {},
+                        horizon};
+  for (const SceneModel& model : ladder.models) {
+    const std::string file = model.name + ".json";
+    const std::string comment =
+        &model == &ladder.models.front() ? "The whole model." : CommentOf(model, whole);
+    files[file] = MechanismText(model.description, model.observe, comment);
+    experiment.mechanisms.push_back(file);
+  }
+  const std::string run = LadderFileName(ladder);
+  files[run] = LadderText(experiment);
+  files["ladder.md"] = PageOf(ladder, horizon, typed);
+  fs::path target = folder;
+  if (!target.has_filename()) target = target.parent_path();  // "out/"
+  const Unfinished fresh{fs::path(target).concat(fmt::format(".new-{}", ::getpid()))};
+  for (const auto& [name, text] : files) WriteFileAtomically(fresh.folder / name, text);
+  ReadExperiments(fresh.folder / run);
+  if (is_there) {
+    for (const auto& [name, text] : files) WriteFileAtomically(folder / name, text);
+    return;
+  }
+  std::error_code error;
+  fs::rename(fresh.folder, target, error);
+  if (error) {
+    throw std::runtime_error(fmt::format("cannot make '{}': {}", target.string(), error.message()));
+  }
+}
+
+}  // namespace loopbench::harness

@@ -1,0 +1,253 @@
+#include "mechanism/simplify/freedom.h"
+
+#include <Eigen/Cholesky>
+#include <Eigen/Eigenvalues>
+#include <algorithm>
+#include <cmath>
+
+#include "mechanism/loops/excursion.h"
+#include "mechanism/loops/scaled_loops.h"
+#include "mechanism/start/assembly.h"
+
+namespace loopbench {
+
+namespace {
+
+using Eigen::MatrixXd;
+using Eigen::VectorXd;
+
+template <class Space>
+class Measuring {
+ public:
+  explicit Measuring(const MechanismDescription& description)
+      : description_(description),
+        mechanism_(description, Coordinates::kJoint),
+        kinematics_(mechanism_) {}
+
+  Freedom Run() {
+    Freedom freedom;
+    freedom.length = mechanism_.length();
+    freedom.shares.assign(description_.bodies.size(), 0.0);
+    freedom.mobility.assign(description_.forces.size(), 0.0);
+    freedom.travel = freedom.mobility;
+    if (mechanism_.num_u() > kMostAnalysedSpeeds) {
+      freedom.why = "it has more than " + std::to_string(kMostAnalysedSpeeds) + " speeds";
+      return freedom;
+    }
+    const Start<double> start = Assemble<Space>(description_, mechanism_);
+    if (start.outcome != Outcome::kFinished) {
+      freedom.why = start.message;
+      return freedom;
+    }
+    kinematics_.UpdatePosition(start.q);
+    kinematics_.UpdateVelocity(start.u);
+    freedom.rate = Rate();
+    for (std::size_t i = 0; i < description_.forces.size(); ++i) {
+      freedom.travel[i] = Coordinate(description_.forces[i]);
+    }
+    Permit();
+    freedom.speeds = static_cast<int>(permitted_.cols());
+    if (freedom.speeds == 0) return freedom;
+    for (std::size_t body = 1; body < freedom.shares.size(); ++body) {
+      freedom.shares[body] = Share(static_cast<int>(body));
+    }
+    for (std::size_t i = 0; i < freedom.mobility.size(); ++i) {
+      freedom.mobility[i] = Mobility(description_.forces[i]);
+    }
+    return freedom;
+  }
+
+ private:
+  double Rate() const {
+    double rate = std::sqrt(description_.gravity.norm() / mechanism_.length());
+    for (int body = 1; body < mechanism_.num_bodies(); ++body) {
+      const Velocity<Space, double>& V = kinematics_.motions()[body];
+      rate = std::max({rate, V.angular.norm(), V.linear.norm() / mechanism_.length()});
+    }
+    for (const Drive& drive : mechanism_.drives()) {
+      const auto* swing = std::get_if<Harmonic>(&drive.value.description());
+      if (swing != nullptr) rate = std::max(rate, std::abs(swing->omega));
+    }
+    return rate;
+  }
+
+  /// The permitted speeds, and the motions of all bodies along each of them.
+  void Permit() {
+    permitted_ = ScaleLoops(kinematics_).to_u;
+    const VectorX<double> none = VectorX<double>::Zero(mechanism_.num_u());
+    kinematics_.UpdateVelocity(none);  // given motions alone
+    const std::vector<Velocity<Space, double>> given = kinematics_.motions();
+    const std::vector<double> given_rates = SpringRates();
+    for (Eigen::Index i = 0; i < permitted_.cols(); ++i) {
+      kinematics_.UpdateVelocity(permitted_.col(i));
+      motions_.push_back(kinematics_.motions());
+      rates_.push_back(SpringRates());
+      for (std::size_t b = 0; b < given.size(); ++b) motions_.back()[b] -= given[b];
+      for (std::size_t f = 0; f < given_rates.size(); ++f) rates_.back()[f] -= given_rates[f];
+    }
+    MatrixXd G = MatrixXd::Zero(permitted_.cols(), permitted_.cols());
+    for (int body = 1; body < mechanism_.num_bodies(); ++body) G += Energies(body);
+    whole_.compute(G);
+  }
+
+  /// x^T of it x is twice the kinetic energy of the body.
+  MatrixXd Energies(int body) const {
+    const Eigen::Index n = permitted_.cols();
+    MatrixXd G(n, n);
+    const auto I = kinematics_.RotationalInertia(mechanism_.bodies()[body], body);
+    for (Eigen::Index i = 0; i < n; ++i) {
+      const Velocity<Space, double>& V = motions_[static_cast<std::size_t>(i)][body];
+      const auto turning = I * V.angular;
+      for (Eigen::Index k = 0; k < n; ++k) {
+        const Velocity<Space, double>& W = motions_[static_cast<std::size_t>(k)][body];
+        G(i, k) = W.angular.dot(turning) + mechanism_.bodies()[body].mass * W.linear.dot(V.linear);
+      }
+    }
+    return 0.5 * (G + G.transpose());
+  }
+
+  double Share(int body) const {
+    MatrixXd scaled = whole_.matrixL().solve(Energies(body));
+    scaled = whole_.matrixL().solve(MatrixXd(scaled.transpose()));
+    return Eigen::SelfAdjointEigenSolver<MatrixXd>(scaled, Eigen::EigenvaluesOnly)
+        .eigenvalues()
+        .maxCoeff();
+  }
+
+  double Mobility(const ForceDescription& force) const {
+    const std::size_t index = static_cast<std::size_t>(&force - description_.forces.data());
+    VectorXd r(permitted_.cols());
+    for (Eigen::Index i = 0; i < r.size(); ++i) r[i] = rates_[static_cast<std::size_t>(i)][index];
+    return r.dot(whole_.solve(r));
+  }
+
+  /// Of a point in body axes, from the centre of mass in ground axes.
+  Linear<Space, double> Arm(const BodyPoint& point) const {
+    Eigen::Vector3d from_com = point.at;
+    if (point.body != kGround) from_com -= description_.bodies[point.body].com;
+    Linear<Space, double> arm;
+    for (int i = 0; i < Space::kLin; ++i) arm[i] = from_com[i];
+    return kinematics_.poses()[point.body].R * arm;
+  }
+
+  Linear<Space, double> Between(const SpringDamper& spring) const {
+    return kinematics_.poses()[spring.to.body].p + Arm(spring.to) -
+           kinematics_.poses()[spring.from.body].p - Arm(spring.from);
+  }
+
+  /// A spring's coordinate less that where it is free; 0 of other forces.
+  double Coordinate(const ForceDescription& force) const {
+    if (const auto* joint = std::get_if<JointSpring>(&force); joint && joint->stiffness > 0.0) {
+      return kinematics_.JointCoordinate(joint->joint) - FreeCoordinate(*joint);
+    }
+    if (const auto* spring = std::get_if<SpringDamper>(&force); spring && spring->stiffness > 0.0) {
+      return Between(*spring).norm() - FreeCoordinate(*spring);
+    }
+    return 0.0;
+  }
+
+  /// By force, at the current speeds: what a spring's coordinate changes by.
+  std::vector<double> SpringRates() const {
+    std::vector<double> rates;
+    for (const ForceDescription& force : description_.forces) {
+      double& rate = rates.emplace_back(0.0);
+      if (const auto* joint = std::get_if<JointSpring>(&force)) {
+        rate = kinematics_.JointSpeed(joint->joint);
+      } else if (const auto* spring = std::get_if<SpringDamper>(&force)) {
+        const Linear<Space, double> way = Between(*spring);
+        const auto velocity = [&](const BodyPoint& point) {
+          return ShiftMotion<Space, double>(kinematics_.motions()[point.body], Arm(point)).linear;
+        };
+        const double distance = way.norm();
+        if (distance > 0.0)
+          rate = way.dot(velocity(spring->to) - velocity(spring->from)) / distance;
+      }
+    }
+    return rates;
+  }
+
+  const MechanismDescription& description_;
+  Mechanism<Space, double> mechanism_;
+  Kinematics<Space, double> kinematics_;
+  MatrixXd permitted_;
+  std::vector<std::vector<Velocity<Space, double>>> motions_;  ///< by permitted speed and body
+  std::vector<std::vector<double>> rates_;                     ///< by permitted speed and force
+  Eigen::LLT<MatrixXd> whole_;
+};
+
+/// Relative speed of a joint's bodies below which it stands still, per unit speed of the whole.
+constexpr double kStill = 1e-8;
+
+template <class Space>
+std::vector<bool> StillIn(const MechanismDescription& description) {
+  const Mechanism<Space, double> mechanism(description, Coordinates::kJoint);
+  std::vector<bool> still(description.joints.size(), false);
+  if (mechanism.num_u() > kMostAnalysedSpeeds) return still;
+  const Start<double> start = Assemble<Space>(description, mechanism);
+  if (start.outcome != Outcome::kFinished) return still;
+  Kinematics<Space, double> kinematics(mechanism);
+  kinematics.UpdatePosition(start.q);
+  const MatrixXd permitted = ScaleLoops(kinematics).to_u;
+  still.assign(still.size(), true);
+  for (Eigen::Index i = 0; i < permitted.cols(); ++i) {
+    kinematics.UpdateVelocity(permitted.col(i));
+    for (std::size_t j = 0; j < still.size(); ++j) {
+      Velocity<Space, double> V = kinematics.joints()[j].V_rel;
+      V.angular *= mechanism.length();
+      if (V.norm() > kStill) still[j] = false;
+    }
+  }
+  return still;
+}
+
+/// The description at its start with given motions left free: each begins where it is at t = 0.
+MechanismDescription WithoutMotions(MechanismDescription description) {
+  for (std::size_t j = 0; j < description.joints.size(); ++j) {
+    JointDescription& joint = description.joints[j];
+    const int count = NumValues(joint.type, description.space, false);
+    if (joint.motions.empty()) continue;
+    for (auto* list : {&description.initial.coordinates, &description.initial.speeds}) {
+      std::erase_if(*list,
+                    [&](const JointValues& one) { return one.joint == static_cast<int>(j); });
+    }
+    if (count == 1) {
+      const double value = TimeFunction(joint.motions[0].value).At(0.0).value;
+      description.initial.coordinates.push_back({static_cast<int>(j), {value}});
+    }
+    joint.motions.clear();
+  }
+  return description;
+}
+
+Freedom Measure(const MechanismDescription& description) {
+  return description.space == SpaceKind::kPlanar ? Measuring<Planar>(description).Run()
+                                                 : Measuring<Spatial>(description).Run();
+}
+
+}  // namespace
+
+std::vector<bool> FindStill(const MechanismDescription& description) {
+  const MechanismDescription free = WithoutMotions(description);
+  return description.space == SpaceKind::kPlanar ? StillIn<Planar>(free) : StillIn<Spatial>(free);
+}
+
+Freedom MeasureFreedom(const MechanismDescription& description) {
+  Freedom freedom = Measure(description);
+  const bool is_driven = std::ranges::any_of(
+      description.joints, [](const JointDescription& joint) { return !joint.motions.empty(); });
+  if (!is_driven || !freedom.why.empty()) return freedom;
+  // what follows a given motion moves, and has energy
+  Freedom free = Measure(WithoutMotions(description));
+  if (free.why.empty()) freedom.shares = std::move(free.shares);
+  return freedom;
+}
+
+double FreeCoordinate(const JointSpring& spring) {
+  return spring.rest + spring.preload / spring.stiffness;
+}
+
+double FreeCoordinate(const SpringDamper& spring) {
+  return spring.length - spring.preload / spring.stiffness;
+}
+
+}  // namespace loopbench

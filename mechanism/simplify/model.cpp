@@ -1,0 +1,177 @@
+#include "mechanism/simplify/model.h"
+
+#include <algorithm>
+#include <limits>
+#include <stdexcept>
+
+#include "mechanism/simplify/compile.h"
+#include "mechanism/simplify/ideas.h"
+#include "mechanism/simplify/restart.h"
+
+namespace loopbench {
+
+namespace {
+
+constexpr double kNoNumber = std::numeric_limits<double>::quiet_NaN();
+
+/// One saving of compile.h, as a model of its own.
+Simplified Exactly(const MechanismDescription& description, bool CompileOptions::*saving) {
+  CompileOptions options = CompileOptions::None();
+  options.*saving = true;
+  Compiled compiled = Compile(description, options);
+  Simplified result;
+  for (CompiledPart& part : compiled.parts) result.parts.push_back(std::move(part.description));
+  result.R_WC = compiled.parts.front().R_WC;
+  if (!(compiled.done.*saving)) {
+    result.why_not = compiled.report.empty() ? kNothingOfTheKind : compiled.report[0];
+    return result;
+  }
+  for (const std::string& sentence : compiled.report) {
+    (sentence.ends_with(" dropped") ? result.dropped : result.done).push_back(sentence);
+  }
+  for (const std::string& sentence : result.done) {
+    result.candidates.push_back({sentence, kNoNumber, true, ""});
+  }
+  return result;
+}
+
+Simplified Flat(const MechanismDescription& description, const ShortRun&, const SimplifyOptions&) {
+  Simplified result = Exactly(description, &CompileOptions::planar);
+  if (description.space == SpaceKind::kPlanar) result.why_not = "it is planar already";
+  return result;
+}
+
+template <bool CompileOptions::*saving>
+Simplified Exact(const MechanismDescription& description, const ShortRun&, const SimplifyOptions&) {
+  return Exactly(description, saving);
+}
+
+/// A part that cannot move by itself is no model: a run of it would end as locked.
+Simplified Apart(const MechanismDescription& description, const ShortRun&, const SimplifyOptions&) {
+  Simplified result = Exactly(description, &CompileOptions::islands);
+  if (!result.applies()) return result;
+  std::erase_if(result.parts, [&](const MechanismDescription& part) {
+    std::string why;
+    AssembledStart(part, &why);
+    if (!why.empty()) result.dropped.push_back(why);
+    return !why.empty();
+  });
+  if (result.parts.empty()) result.why_not = "none of its parts moves by itself";
+  return result;
+}
+
+/// What runs release is no matter of files.
+Simplified Redundant(const MechanismDescription& description, const ShortRun&,
+                     const SimplifyOptions&) {
+  Simplified result = Exactly(description, &CompileOptions::redundancy);
+  result.parts = {description};
+  if (!result.applies()) return result;
+  result.done.clear();
+  for (Candidate& candidate : result.candidates) candidate.taken = false;
+  result.why_not =
+      "no file can say which directions of a joint are imposed: runs release these themselves "
+      "(\"compile\", \"redundancy\")";
+  return result;
+}
+
+/// What an idea makes of the last model, where it applies.
+void Append(const Idea& idea, const ShortRun& run, const SimplifyOptions& options,
+            Simplified* model) {
+  Simplified next = idea.apply(model->parts.front(), run, options);
+  if (!next.applies() || next.parts.size() > 1) return;
+  model->parts = std::move(next.parts);
+  if (std::ranges::find(model->ideas, &idea) == model->ideas.end()) {
+    model->ideas.push_back(&idea);
+  }
+  model->R_WC = (model->R_WC * next.R_WC).eval();
+  for (auto [from, to] : {std::pair{&next.done, &model->done}, {&next.dropped, &model->dropped}}) {
+    for (std::string& sentence : *from) to->push_back(std::string(idea.name) + ": " + sentence);
+  }
+}
+
+}  // namespace
+
+const std::vector<Idea>& Ideas() {
+  static const std::vector<Idea> ideas = {
+      {.name = "welds",
+       .is_exact = true,
+       .sentence = "bodies joined by welds become one",
+       .apply = Exact<&CompileOptions::welds>},
+      {.name = "immovable",
+       .is_exact = true,
+       .sentence = "bodies that cannot move become part of the ground",
+       .apply = Exact<&CompileOptions::immovable>},
+      {.name = "redundancy",
+       .is_exact = true,
+       .sentence = "constraints that others imply at every position are left out",
+       .apply = Redundant},
+      {.name = "planar",
+       .is_exact = true,
+       .sentence = "a spatial mechanism that moves in parallel planes becomes planar",
+       .apply = Flat},
+      {.name = "constant-parts",
+       .sentence = "bodies that hardly move against each other become one, where they start",
+       .assumption = "their joints go on standing still when the short run is over",
+       .number = "travel in the short run [rad, or lengths of the mechanism]",
+       .limit = &SimplifyOptions::constant_parts,
+       .apply = FreezeConstantParts},
+      {.name = "stiff-springs",
+       .sentence = "springs much faster than the motion become rods, or hold their joint",
+       .assumption = "nothing excites them: they stay where they are free",
+       .number = "frequency over the rate of the motion",
+       .limit = &SimplifyOptions::stiff_springs,
+       .is_least = true,
+       .apply = HoldStiffSprings},
+      {.name = "light-links",
+       .sentence = "links of small mass become massless rods, their mass goes to their ends",
+       .assumption = "the rotation of the link itself takes no energy worth counting",
+       .number = "largest share in the kinetic energy of any motion at the start",
+       .limit = &SimplifyOptions::light_links,
+       .apply = LightenLinks},
+      {.name = "nearly-planar",
+       .sentence = "what nearly moves in parallel planes becomes planar, seen along their normal",
+       .assumption = "axes stay as near to the normal as they are at the start",
+       .number = "tilt at the start (sine)",
+       .limit = &SimplifyOptions::nearly_planar,
+       .apply = FlattenNearly},
+      {.name = "islands",
+       .is_exact = true,
+       .sentence = "parts that have nothing to do with each other become models of their own",
+       .apply = Apart},
+  };
+  return ideas;
+}
+
+Simplified Combine(const MechanismDescription& description, const std::vector<const Idea*>& ideas,
+                   const ShortRun& run, const SimplifyOptions& options) {
+  if (const std::string error = Validate(description); !error.empty()) {
+    throw std::invalid_argument(error);
+  }
+  Simplified model;
+  model.parts = {description};
+  for (const Idea* idea : ideas) Append(*idea, run, options, &model);
+  // what was simplified may have left more that cannot move, or that is one body
+  for (const Idea* idea : ideas) {
+    if (idea->is_exact && !model.ideas.empty()) Append(*idea, run, options, &model);
+  }
+  if (model.ideas.empty()) model.why_not = "none of them applies";
+  return model;
+}
+
+FoundPoint FindPoint(const MechanismDescription& simplified, const std::string& body,
+                     const std::string& point) {
+  const std::string attached = body + "." + point;
+  FoundPoint found;
+  for (std::size_t b = 0; b < simplified.bodies.size(); ++b) {
+    const BodyDescription& one = simplified.bodies[b];
+    const bool is_body = b != kGround && one.name == body;
+    for (const auto& [name, at] : one.points) {
+      const bool same =
+          is_body ? name == point : name == attached || name.ends_with("." + attached);
+      if (same) found = {static_cast<int>(b), at};
+    }
+  }
+  return found;
+}
+
+}  // namespace loopbench

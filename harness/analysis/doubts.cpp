@@ -2,9 +2,12 @@
 
 #include <algorithm>
 #include <cmath>
+#include <limits>
+#include <numbers>
 #include <optional>
 
 #include "harness/analysis/agreement.h"
+#include "harness/analysis/refinement.h"
 #include "harness/config/experiment.h"
 #include "harness/config/formulations.h"
 #include "mechanism/loops/scaled_loops.h"
@@ -31,6 +34,22 @@ constexpr double kOpenLoop = 0.1;
 /// Over the projection's goal, for what rounding does to the evaluation itself: 15 were seen.
 constexpr double kProjection = 25.0;
 
+/// Sampled less than twice a period, an oscillation looks like a slow one (Nyquist).
+constexpr double kMostPeriods = 0.5;
+/// A step of 16 eps t ends a run (harness/integrator/integrate.cpp). Steps within three decades of
+/// that gain digits of nothing; no regular run comes within six.
+constexpr double kStepFloor = 1e3 * 16 * std::numeric_limits<double>::epsilon();
+/// Rejected steps for each accepted one: step control that fails more often than not follows what
+/// is no smooth solution. Less than a dozen say nothing.
+constexpr double kMostRejected = 1.0, kFewRejected = 12.0;
+
+/// Step control at its floor, or failing all the time.
+bool StepsStruggle(const Record& record) {
+  const double rejected = record.Number("rejected");
+  if (rejected > kFewRejected && rejected > kMostRejected * record.Number("steps")) return true;
+  return record.Number("step_shortest") <= kStepFloor * record.Number("step_shortest_t");
+}
+
 bool HasFinished(const Record& record) { return record.Text("outcome") == "finished"; }
 
 /// Accepted steps that Baumgarte's feedback remembers: those within 2/gain.
@@ -50,6 +69,19 @@ bool PassedSingularPosition(const Record& record) {
   const double distance = record.Number("singularity_distance_min");
   if (std::isnan(distance)) return record.Number("softened_evaluations") > 0;
   return distance < kRankRatio;
+}
+
+/// Within as many tolerances as runs may be apart. The reference has an error of its own, and
+/// rounding is no fault of a tolerance.
+bool IsNearReference(const Record& record) {
+  const double certain =
+      record.Number("reference_error") / record.Number("link_length") + kRoundOffShare;
+  return TrueErrorShare(record) <= kMostTolerances * record.Number("rtol") + certain;
+}
+
+/// The same to the end of the run.
+bool IsCertified(const Record& record) {
+  return record.Find("error_position_end") != nullptr && IsNearReference(record);
 }
 
 void Add(std::string* codes, bool on, const char* code) {
@@ -98,6 +130,14 @@ double PromisedDriftShare(const Record& record) {
   return record.Find("position_goal") == nullptr ? promised : std::max(promised, goal);
 }
 
+double TrueErrorShare(const Record& record) {
+  return record.Number("error_position_max") / record.Number("link_length");
+}
+
+double PeriodsPerStep(const Record& record) {
+  return record.Number("step_longest") * record.Number("drive_frequency") / (2 * std::numbers::pi);
+}
+
 std::string OwnDoubts(const Record& record) {
   std::string codes;
   if (record.Text("kind") != "accuracy" || !HasFinished(record)) return codes;
@@ -107,11 +147,16 @@ std::string OwnDoubts(const Record& record) {
       (has("energy_scale") || has("energy_error_relative")) &&
           !(EnergyErrorShare(record) <= kMostEnergyError),
       kEnergyDoubt);
-  Add(&codes, PassedSingularPosition(record), kSingularDoubt);
+  // where the reference knows the way, who kept to it did
+  Add(&codes, PassedSingularPosition(record) && !IsCertified(record), kSingularDoubt);
   Add(&codes,
       has("drift_position_max") && has("link_length") &&
           !(DriftShare(record) <= PromisedDriftShare(record)),
       kDriftDoubt);
+  Add(&codes, has("error_position_max") && record.Number("rtol") > 0.0 && !IsNearReference(record),
+      kErrorDoubt);
+  Add(&codes, PeriodsPerStep(record) > kMostPeriods, kDriveDoubt);
+  Add(&codes, StepsStruggle(record), kStepsDoubt);
   Add(&codes, record.Number("ensemble_failed") > 0, kMembersDoubt);
   // a single run was not asked for an exponent, and drift of round-off has none
   Add(&codes,
@@ -123,11 +168,15 @@ std::string OwnDoubts(const Record& record) {
 
 void SetDoubts(std::vector<Record>* records) {
   const std::vector<Agreement> agreements = CompareFinalPoses(*records);
+  const std::vector<Refinement> refinements = CompareTolerances(*records);
   for (std::size_t i = 0; i < records->size(); ++i) {
     Record& record = (*records)[i];
     if (record.Text("kind") != "accuracy" || !HasFinished(record)) continue;
     std::string codes = OwnDoubts(record);
-    Add(&codes, agreements[i].doubted, kDisagreementDoubt);
+    // the others need not be right; a reference is
+    const bool certified = IsCertified(record);
+    Add(&codes, agreements[i].doubted && !certified, kDisagreementDoubt);
+    Add(&codes, refinements[i].doubted && !certified, kRefinementDoubt);
     record.Set("doubts", codes);
     if (agreements[i].cluster > 0) record.Set("agreement", agreements[i].cluster);
   }

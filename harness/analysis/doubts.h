@@ -19,6 +19,11 @@ inline constexpr const char* kMembersDoubt = "members-failed";
 inline constexpr const char* kExponentDoubt = "exponent";
 inline constexpr const char* kDisagreementDoubt = "disagreement";
 
+inline constexpr const char* kErrorDoubt = "error";
+inline constexpr const char* kRefinementDoubt = "refinement";
+inline constexpr const char* kDriveDoubt = "drive";
+inline constexpr const char* kStepsDoubt = "steps";
+
 /// How drift grows at the record's level; nothing for a level that this program does not know.
 std::optional<DriftGrowth> GrowthAt(const Record& record);
 
@@ -36,6 +41,12 @@ double EnergyErrorShare(const Record& record);
 /// promises nothing but, at a level that leaves none, what the projection does.
 double DriftShare(const Record& record);
 double PromisedDriftShare(const Record& record);
+
+/// The largest true error of points over the length of a link, where a reference told it; else NaN.
+double TrueErrorShare(const Record& record);
+/// The longest step in periods of the fastest drive: what has less than two looks per period may
+/// take it for anything. NaN without a drive.
+double PeriodsPerStep(const Record& record);
 
 /// The codes of what an accuracy record says against itself, separated by spaces, "" for none. Of
 /// runs that did not finish their outcome says enough: "".

@@ -14,6 +14,7 @@
 #include "harness/store/merge_stores.h"
 #include "harness/store/result_store.h"
 #include "harness/suite/precision_cases.h"
+#include "harness/suite/reference_cases.h"
 #include "harness/tables/table_view.h"
 #include "harness/text/files.h"
 #include "harness/text/terminal.h"
@@ -52,6 +53,9 @@ int Run(const RunCommand& command, const std::string& typed) {
   RequirePeers(experiments);
   if (command.suite.precision) {
     for (const Experiment& experiment : experiments) RequireLadders(experiment);
+  }
+  if (command.suite.accuracy) {
+    for (const Experiment& experiment : experiments) RequireReferences(experiment);
   }
   const std::filesystem::path out = command.out.empty() ? std::filesystem::path("results/runs") /
                                                               FileName(experiments.front().name)

@@ -79,6 +79,7 @@ FileOptions::FileOptions(CLI::App& app) {
   AddExplain(app);
   AddSimplify(app);
   AddSchema(app);
+  AddAdvise(app);
 }
 
 void FileOptions::AddRun(CLI::App& app) {
@@ -190,6 +191,48 @@ void FileOptions::AddSchema(CLI::App& app) {
   schema_app_->add_flag("--tables", schema_tables_, "Tables of keys in Markdown instead");
 }
 
+void FileOptions::AddAdvise(CLI::App& app) {
+  advise_app_ = app.add_subcommand(
+      "advise", "Find the cheapest way to run a mechanism that keeps an error, by a short pilot");
+  advise_app_->add_option("mechanism", advise_.mechanism, "Mechanism file (JSON)")->required();
+  CLI::Option* error =
+      advise_app_
+          ->add_option("--error", advise_.error, "Largest error of points [m] (default: 1e-6)")
+          ->check(NumberFrom(1e-13, 1e9));
+  advise_app_
+      ->add_option("--budget", advise_.budget,
+                   "Instead: the most accurate way within so many wall seconds per simulated one")
+      ->check(NumberFrom(1e-9, 1e6))
+      ->excludes(error);
+  advise_app_->add_option("--horizon", advise_.horizon, "Simulated time [s]")
+      ->check(NumberFrom(1e-9, 1e9))
+      ->capture_default_str();
+  advise_app_->add_option("--points", advise_.points,
+                          "Whose error counts: BODY.POINT, or BODY for its centre of mass "
+                          "(default: all points)");
+  advise_app_
+      ->add_flag("--simplify", advise_.simplify,
+                 "Try simpler models of the scene too (loopbench simplify), and say what each "
+                 "causes and saves")
+      ->excludes("--budget");
+  advise_app_->add_flag("--exhaustive", advise_.exhaustive,
+                        "Try the whole product of formulations, levels, methods and tolerances; "
+                        "give it --cpu");
+  advise_app_->add_option("--out", advise_.out, "File for the experiment that reproduces it");
+  advise_app_->add_option("--format", advise_.format, "Of the finalists' table")
+      ->check(CLI::IsMember({"text", "csv", "markdown", "json", "latex"}))
+      ->capture_default_str();
+  AddLimits(advise_app_, &advise_.limits);
+  advise_app_->footer(
+      "Errors are true ones, against a certified reference; times are of bare runs, one at a "
+      "time.\n"
+      "Exit codes: 0 found, 1 nothing reached what was asked for (the nearest is shown), 2 no "
+      "reference or bad input.\n"
+      "  loopbench advise four-bar.json --error 1e-6\n"
+      "  loopbench advise arm.json --budget 0.001 --horizon 5 --points gripper.tip --out "
+      "best.json");
+}
+
 int FileOptions::RunExperiments(const std::string& typed) {
   run_.settings = files_.settings;
   run_.suite.filter = files_.filter;
@@ -214,6 +257,11 @@ std::optional<int> FileOptions::Run(const std::string& typed) {
     return PrintPlans(plan_);
   }
   if (*explain_app_) return Explain(files_, explain_all_, explain_limits_);
+  if (*advise_app_) {
+    constexpr double kError = 1e-6;
+    if (advise_.error == 0.0 && advise_.budget == 0.0) advise_.error = kError;
+    return Advise(advise_, typed);
+  }
   if (*simplify_app_) {
     simplify_.lumping =
         static_cast<Lumping>(std::ranges::find(LumpingNames(), lumping_) - LumpingNames().begin());

@@ -8,6 +8,7 @@
 #include <vector>
 
 #include "harness/cli/commands.h"
+#include "harness/cli/commands_advise.h"
 #include "harness/cli/commands_simplify.h"
 
 namespace loopbench::harness {
@@ -26,10 +27,11 @@ class FileOptions {
   void AddExplain(CLI::App& app);
   void AddSimplify(CLI::App& app);
   void AddSchema(CLI::App& app);
+  void AddAdvise(CLI::App& app);
   int RunExperiments(const std::string& typed);
 
   CLI::App *run_app_, *list_app_, *check_app_, *plan_app_, *explain_app_, *simplify_app_,
-      *schema_app_;
+      *schema_app_, *advise_app_;
   std::vector<std::string> conditions_, settings_;  ///< --filter and --set, as typed
   ExperimentFiles files_;
   RunCommand run_;
@@ -40,6 +42,7 @@ class FileOptions {
   PlanCommand plan_;
   ProcessLimits explain_limits_ = kFileLimits;
   bool explain_all_ = false;
+  AdviseCommand advise_;
   SimplifyCommand simplify_;
   std::string lumping_ = LumpingNames().front();
   bool simplify_list_ = false, simplify_all_ = false;

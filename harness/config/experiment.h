@@ -148,6 +148,13 @@ struct Precision {
   double reference = 1e-25;        ///< tolerance of the reference: double's reach squared
 };
 
+/// Certified references that accuracy runs are held against (harness/precision/make_reference.h).
+struct ReferenceOptions {
+  std::string scalar = "long-double";  ///< or "float128", of planar mechanisms
+  int points = 101;                    ///< times, evenly from the start to the end
+  double cpu_s = 20.0;                 ///< of one witness [s]; it certifies as far as it gets
+};
+
 struct Experiment {
   std::string name;
   std::string comment;
@@ -164,6 +171,7 @@ struct Experiment {
   int series_points = 200;  ///< points kept of a time series for figures
   Timing timing;
   Precision precision;
+  std::optional<ReferenceOptions> reference;
   /// Of a sweep: this combination's value on each axis, by the axis's name. The values are in every
   /// record, so that filters and tables can use them. Empty without a sweep.
   Record parameters;

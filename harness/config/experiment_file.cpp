@@ -59,6 +59,10 @@ FieldValue<File> Integrators() {
   return value;
 }
 
+void ReadReferenceOptions(const JsonNode& node, File& file) {
+  ReferenceFields().Read(node, &file.reference.emplace());
+}
+
 /// Reports levels whose derivative an implicit profile asks for, and that have none.
 void RequireDerivatives(const JsonNode& node, File& file) {
   const auto integrator = node.Optional("integrator");
@@ -118,6 +122,7 @@ const Fields<ExperimentFile>& ExperimentFileFields() {
        {"series", Section(SeriesFields())},
        {"timing", Object(&File::timing, TimingFields())},
        {"precision", By(PrecisionFields().Schema(), ReadPrecision)},
+       {"reference", By(ReferenceFields().Schema(), ReadReferenceOptions)},
        {"ensembles", By(EnsemblesSchema(), ReadEnsembles), "Perturbed repetitions of cases."},
        {"sweep", SweepSchema(),
         "Axes that are crossed, the first one slowest; each combination of values is run as if "

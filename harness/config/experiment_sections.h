@@ -85,6 +85,7 @@ const Fields<CompileOptions>& CompileFields();
 const Fields<Experiment>& SeriesFields();
 const Fields<Timing>& TimingFields();
 const Fields<Precision>& PrecisionFields();
+const Fields<ReferenceOptions>& ReferenceFields();
 /// "ensembles", after everything that they select from.
 void ReadEnsembles(const JsonNode& node, ExperimentFile& experiment);
 Json EnsemblesSchema();

@@ -149,4 +149,20 @@ const Fields<Precision>& PrecisionFields() {
   return fields;
 }
 
+const Fields<ReferenceOptions>& ReferenceFields() {
+  static const NameList scalars({"long-double", "float128"});
+  static const Fields<ReferenceOptions> fields(
+      "reference",
+      "Each mechanism and horizon once more at high order in a wide scalar, by two formulations "
+      "and "
+      "at two tolerances: where these agree, runs are held against them. Kept beside the store.",
+      {{"scalar", Choice(&ReferenceOptions::scalar, scalars, "a wide scalar"),
+        "float128 has 33 digits, takes some 50 times as long, and is for planar mechanisms."},
+       {"points", Integer(&ReferenceOptions::points, 2, kMostPoints),
+        "Times at which errors are taken, evenly from the start to the end."},
+       {"cpu_s", Number(&ReferenceOptions::cpu_s, kPositive),
+        "CPU time of each integration [s]. One that is cut off certifies as far as it got."}});
+  return fields;
+}
+
 }  // namespace loopbench::harness

@@ -9,6 +9,7 @@
 #include <vector>
 
 #include "harness/config/options.h"
+#include "harness/integrator/dense_output.h"
 #include "harness/integrator/ode.h"
 #include "mechanism/description/outcome.h"
 
@@ -41,12 +42,16 @@ struct IntegratorResult {
 /// like every other. (A step that ends within 100 round-offs of t_end counts as ending there.)
 /// An observer that stops the run gives kFinished with t_reached < t_end.
 ///
-/// Nothing is allocated per step or per derivative, and equal calls give equal bits.
+/// Nothing is allocated per step or per derivative, and equal calls give equal bits. `dense`,
+/// unless null, is shown the solution at the times it asks for, which changes no bit of the run:
+/// its derivatives are not counted. Times that the run does not reach are not shown, nor those in a
+/// step where a derivative for it fails.
 ///
 /// @throws std::invalid_argument if Validate() finds fault, y has the wrong size, or t_end < t0.
 /// Exceptions of `ode` and of `observe` pass through.
 IntegratorResult Integrate(Ode& ode, double t0, double t_end, std::vector<double>& y,
-                           const IntegratorOptions& options, const StepObserver& observe = {});
+                           const IntegratorOptions& options, const StepObserver& observe = {},
+                           const DenseObserver* dense = nullptr);
 
 /// The one table from ARKODE's return codes (ARK_... in arkode.h of SUNDIALS) to outcomes:
 /// 0 and 1 (step taken, stop time reached) and 99 (warning) are kFinished; -1 (too much work) is

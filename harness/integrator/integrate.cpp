@@ -48,19 +48,71 @@ bool Exhausted(GuardedOde& ode, IntegratorResult& result) {
   return true;
 }
 
+// Shows a dense observer the times it asks for, from step to step.
+class Watcher {
+ public:
+  Watcher(Ode& ode, const DenseObserver* dense) : ode_(ode), dense_(dense) {}
+
+  /// Where the next step begins.
+  void Leave(double t, const std::vector<double>& y) {
+    if (dense_ == nullptr) return;
+    t0_ = t;
+    y0_ = y;
+  }
+
+  /// Before the step's end is observed: the times within the step.
+  void Pass(double t1, const std::vector<double>& y1) {
+    if (dense_ == nullptr || !IsBefore(t1)) return;
+    const bool good = output_.Prepare(
+        t0_, y0_, t1, y1, [&](double t, std::span<const double> y, std::span<double> f) {
+          return ode_.Derivative(t, y, f) == Outcome::kFinished;
+        });
+    y_.resize(y1.size()), lower_.resize(y1.size());
+    for (; IsBefore(t1); ++next_) {
+      if (!good) continue;
+      output_.At(dense_->times[next_], y_, lower_);
+      dense_->observe(next_, y_, lower_);
+    }
+  }
+
+  /// After the end of a step, or the start, was observed.
+  void Reach(double t, const std::vector<double>& y) {
+    if (dense_ == nullptr) return;
+    for (; next_ < dense_->times.size() && dense_->times[next_] <= t + Close(t); ++next_) {
+      dense_->observe(next_, y, y);
+    }
+  }
+
+ private:
+  static double Close(double t) { return 100 * kEpsilon * std::abs(t); }
+  bool IsBefore(double t) const {
+    return next_ < dense_->times.size() && dense_->times[next_] < t - Close(t);
+  }
+
+  Ode& ode_;
+  const DenseObserver* dense_;
+  std::size_t next_ = 0;
+  DenseOutput output_;
+  double t0_ = 0.0;
+  std::vector<double> y0_, y_, lower_;
+};
+
 // The loop over accepted steps, from a start point that has been observed.
 void Advance(GuardedOde& ode, Stepper& stepper, double t_end, std::vector<double>& y,
-             const StepObserver& observe, IntegratorResult& result) {
+             const StepObserver& observe, Watcher& watcher, IntegratorResult& result) {
   for (double t = result.t_reached;;) {
+    watcher.Leave(t, y);
     if (Fails(ode, stepper, stepper.Step(t), result)) {
       return;
     }
     const std::span<const double> accepted = stepper.y();
     std::copy(accepted.begin(), accepted.end(), y.begin());
+    watcher.Pass(t, y);
     result.t_reached = t;
     result.last_step = stepper.last_step();
     ++result.steps;
     const StepAction action = observe ? observe(t, y) : StepAction::kContinue;
+    watcher.Reach(t, y);
     if (t >= t_end) {
       return;
     }
@@ -81,7 +133,8 @@ void Advance(GuardedOde& ode, Stepper& stepper, double t_end, std::vector<double
 }  // namespace
 
 IntegratorResult Integrate(Ode& ode, double t0, double t_end, std::vector<double>& y,
-                           const IntegratorOptions& options, const StepObserver& observe) {
+                           const IntegratorOptions& options, const StepObserver& observe,
+                           const DenseObserver* dense) {
   std::string fault = Validate(options);
   if (fault.empty() && y.empty()) {
     fault = "the state is empty";
@@ -104,11 +157,13 @@ IntegratorResult Integrate(Ode& ode, double t0, double t_end, std::vector<double
   IntegratorResult result;
   result.t_reached = t0;
   const StepAction action = observe ? observe(t0, y) : StepAction::kContinue;
+  Watcher watcher(ode, dense);
+  watcher.Reach(t0, y);
   if (action == StepAction::kStop) {
     result.message = "stopped by the observer" + At(t0);
   } else if (t0 < t_end) {
     Stepper stepper(guarded, t0, t_end, y);
-    Advance(guarded, stepper, t_end, y, observe, result);
+    Advance(guarded, stepper, t_end, y, observe, watcher, result);
     result.rejected = stepper.rejected();
     result.newton_iterations = stepper.newton_iterations();
     result.newton_failures = stepper.newton_failures();

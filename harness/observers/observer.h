@@ -113,6 +113,27 @@ class EnergyObserver final : public Observer<Space> {
   TimeSeries series_;
 };
 
+/// Lengths of accepted steps, and the fastest given function of time: an error estimate sees
+/// nothing of what happens between the points that a step looks at. The shortest step is taken
+/// without those that a stop time or the end has clipped.
+template <class Space>
+class StepLengthObserver final : public Observer<Space> {
+ public:
+  explicit StepLengthObserver(const Watched<Space>& run);
+  void Observe(const Sample<Space>& sample) override;
+  void Write(Record& record) const override;
+
+ private:
+  std::vector<double> stops_;    ///< [s], rising
+  double fastest_ = 0.0;         ///< [rad/s]
+  double t_ = 0.0, last_ = 0.0;  ///< of the last step, which the end may have clipped
+  double longest_ = 0.0, shortest_ = 0.0, shortest_t_ = 0.0;
+};
+
+/// The largest angular frequency [rad/s] of prescribed motions and of forces that are harmonic in
+/// time; 0 without any. Tables have knots, at which steps end.
+double FastestDrive(const MechanismDescription& description);
+
 /// What projections (levels that leave no drift) took away and what they cost: the largest mismatch
 /// of points [m], its series, and Newton steps. Nothing at other levels.
 template <class Space>

@@ -103,6 +103,7 @@ std::vector<std::unique_ptr<Observer<Space>>> MakeObservers(const Watched<Space>
   all.push_back(std::make_unique<ExactObserver<Space>>(run.scene, run.mechanism));
   if (run.with_series) all.push_back(std::make_unique<CoordinateObserver<Space>>(run.points));
   all.push_back(std::make_unique<CorrectionObserver<Space>>());
+  all.push_back(std::make_unique<StepLengthObserver<Space>>(run));
   for (const ObserverRow& row : RegisteredObservers()) all.push_back(row.Make(run));
   return all;
 }

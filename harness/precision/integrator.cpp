@@ -23,17 +23,27 @@ template <class S>
 class Run {
  public:
   Run(const Problem<S>& system, S t_end, std::vector<S>& y, const OneStepOptions<S>& options)
-      : system_(system), options_(options), t_end_(t_end), y_(y), step_(system, options.method) {
+      : system_(system),
+        options_(options),
+        t_end_(t_end),
+        longest_(options.longest_step > S(0) ? options.longest_step
+                                             : (t_end - options.begin) / S(10)),
+        y_(y),
+        step_(system, options.method, options.columns),
+        t_(options.begin) {
     f_.assign(y.size(), S(0));
   }
 
   OneStepResult Execute() {
     system_.accept(t_, y_);
     result_.outcome = step_.Evaluate(t_, y_, f_);
-    if (result_.outcome == Outcome::kFinished) h_ = FirstStep();
+    if (result_.outcome == Outcome::kFinished) {
+      h_ = options_.first_step > S(0) ? options_.first_step : FirstStep();
+    }
     while (result_.outcome == Outcome::kFinished && t_ < t_end_) result_.outcome = Advance();
     result_.t_reached = static_cast<double>(t_);
     result_.rhs_evaluations = step_.evaluations();
+    result_.next_step = static_cast<double>(h_);
     return result_;
   }
 
@@ -81,8 +91,9 @@ class Run {
       if (options_.fixed_step > S(0)) return Accept(last ? t_end_ : t_ + h, h);
       const S error = ScaledError();
       if (error <= S(1)) {
-        h_ = h * Factor(error, largest);
-        h_ = std::min(h_, longest_);
+        // what was clipped was good enough, and says less than the step that was meant
+        const S next = h * Factor(error, largest);
+        h_ = std::min(last && failures == 0 ? std::max(h_, next) : next, longest_);
         return Accept(last ? t_end_ : t_ + h, h);
       }
       ++result_.rejected;
@@ -114,14 +125,14 @@ class Run {
   const Problem<S>& system_;
   const OneStepOptions<S>& options_;
   const S t_end_;
-  const S longest_ = t_end_ / S(10);  // ode45's longest step
+  const S longest_;  // ode45's longest step is a tenth of the interval
   // no step for what rounding has left of the interval; ARKODE's bound
   const S close_ = S(100) * std::numeric_limits<S>::epsilon() * t_end_;
   std::vector<S>& y_;
   std::vector<S> f_;
   OneStep<S> step_;
   OneStepResult result_;
-  S t_ = S(0), h_ = S(0);
+  S t_, h_ = S(0);
   CpuLimit time_{options_.time_limit_s};
 };
 

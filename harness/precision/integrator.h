@@ -8,7 +8,8 @@
 //
 // A reference far below the reach of order 5 comes from Gragg's method: the modified midpoint rule
 // with 2, 4, .., 20 substeps, extrapolated to order 20 by Aitken and Neville (Hairer, Norsett,
-// Wanner, Solving Ordinary Differential Equations I, section II.9), under the same controller.
+// Wanner, Solving Ordinary Differential Equations I, section II.9), under the same controller. The
+// weights of ten columns add up to 550, and round-off grows as much; those of seven, to 56.
 #pragma once
 
 #include <cstdint>
@@ -32,12 +33,17 @@ struct Problem {
 };
 
 enum class OneStepMethod { kDormandPrince, kGragg };
+inline constexpr int kMostColumns = 10;  ///< of Gragg's extrapolation, each worth two orders
 
 template <class S>
 struct OneStepOptions {
   OneStepMethod method = OneStepMethod::kDormandPrince;
   S tolerance = S(1e-6);  ///< rtol = atol > 0
+  int columns = kMostColumns;
   S fixed_step = S(0);    ///< positive: every step but the last has this length, untested
+  S begin = S(0);         ///< [s]
+  S first_step = S(0);    ///< 0: found by the profile's rule
+  S longest_step = S(0);  ///< 0: a tenth of the interval
   std::int64_t step_limit = 10'000'000;
   double time_limit_s = 600.0;  ///< CPU time of the thread, looked at after each step
 };
@@ -47,10 +53,12 @@ struct OneStepResult {
   Outcome outcome = Outcome::kFinished;
   double t_reached = 0.0;  ///< [s]
   std::int64_t steps = 0, rejected = 0, rhs_evaluations = 0, restarts = 0;
+  double next_step = 0.0;  ///< that would have come next, were the last one not clipped [s]
 };
 
-/// From t = 0 to t_end > 0 [s]; y is the state at t_reached afterwards. A step that fails its error
-/// test seven times, or an accepted one of at most 16 eps t, ends the run as step-too-small.
+/// From options.begin to t_end [s] behind it; y is the state at t_reached afterwards. A step that
+/// fails its error test seven times, or an accepted one of at most 16 eps t, ends the run as
+/// step-too-small.
 template <class S>
 OneStepResult IntegrateSystem(const Problem<S>& system, S t_end, std::vector<S>& y,
                               const OneStepOptions<S>& options);

@@ -34,8 +34,8 @@ constexpr Ratio kE[7] = {{71, 57600},      {0, 1},    {-71, 16695}, {71, 1920},
 }  // namespace
 
 template <class S>
-OneStep<S>::OneStep(const Problem<S>& system, OneStepMethod method)
-    : system_(system), method_(method) {
+OneStep<S>::OneStep(const Problem<S>& system, OneStepMethod method, int columns)
+    : system_(system), method_(method), columns_(columns) {
   const std::size_t n = static_cast<std::size_t>(system.size);
   for (std::vector<S>* vector : {&y_new_, &error_, &stage_, &before_}) vector->assign(n, S(0));
   if (method == OneStepMethod::kDormandPrince) {
@@ -107,7 +107,7 @@ Outcome OneStep<S>::Midpoint(S t, const std::vector<S>& y, const std::vector<S>&
 ///   T_j,k+1 = T_jk + (T_jk - T_j-1,k) / ((n_j / n_j-k-1)^2 - 1),  n_j = 2 (j + 1).
 template <class S>
 Outcome OneStep<S>::Gragg(S t, const std::vector<S>& y, const std::vector<S>& f, S h) {
-  for (int j = 0; j < kColumns; ++j) {
+  for (int j = 0; j < columns_; ++j) {
     const Outcome outcome = Midpoint(t, y, f, h, 2 * (j + 1), y_new_);
     if (outcome != Outcome::kFinished) return outcome;
     for (int k = 0; k < j; ++k) {
@@ -120,7 +120,7 @@ Outcome OneStep<S>::Gragg(S t, const std::vector<S>& y, const std::vector<S>& f,
     }
     table_[j] = y_new_;
   }
-  for (std::size_t i = 0; i < y.size(); ++i) error_[i] = y_new_[i] - table_[kColumns - 2][i];
+  for (std::size_t i = 0; i < y.size(); ++i) error_[i] = y_new_[i] - table_[columns_ - 2][i];
   return Outcome::kFinished;
 }
 

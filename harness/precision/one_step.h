@@ -12,10 +12,11 @@ namespace loopbench::harness {
 template <class S>
 class OneStep {
  public:
-  OneStep(const Problem<S>& system, OneStepMethod method);
+  /// `columns` of Gragg's extrapolation, kMostColumns at most.
+  OneStep(const Problem<S>& system, OneStepMethod method, int columns);
 
   /// The error estimate grows with the step as h^estimate_order().
-  int estimate_order() const { return method_ == OneStepMethod::kGragg ? 2 * kColumns - 1 : 5; }
+  int estimate_order() const { return method_ == OneStepMethod::kGragg ? 2 * columns_ - 1 : 5; }
 
   /// y_new() and error() of a step; f is the derivative at (t, y). kNonFinite when a derivative is
   /// not finite.
@@ -31,7 +32,6 @@ class OneStep {
   std::int64_t evaluations() const { return evaluations_; }
 
  private:
-  static constexpr int kColumns = 10;  ///< order 20
   static constexpr int kStages = 7;
   Outcome DormandPrince(S t, const std::vector<S>& y, const std::vector<S>& f, S h);
   Outcome Gragg(S t, const std::vector<S>& y, const std::vector<S>& f, S h);
@@ -41,9 +41,10 @@ class OneStep {
 
   const Problem<S>& system_;
   OneStepMethod method_;
+  int columns_;
   std::vector<S> y_new_, error_, f_new_, stage_, before_;
   std::array<std::vector<S>, kStages> k_;
-  std::array<std::vector<S>, kColumns> table_;  ///< the last row of the extrapolation
+  std::array<std::vector<S>, kMostColumns> table_;  ///< the last row of the extrapolation
   std::int64_t evaluations_ = 0;
 };
 

@@ -40,6 +40,11 @@ std::string AccuracyContent(const Experiment& experiment, const Case& one) {
   }
   content.Set("branch_bound", one.branch_bound);
   content.Set("series_points", std::int64_t{experiment.series_points});
+  if (experiment.reference) {
+    content.Set("reference", experiment.reference->scalar);
+    content.Set("reference_points", std::int64_t{experiment.reference->points});
+    content.Set("reference_cpu_s", experiment.reference->cpu_s);
+  }
   return CaseId(content);
 }
 

@@ -4,12 +4,14 @@
 
 #include <algorithm>
 #include <limits>
+#include <optional>
 
 #include "harness/analysis/doubts.h"
 #include "harness/analysis/link_length.h"
 #include "harness/integrator/arkode.h"
 #include "harness/observers/final_poses.h"
 #include "harness/observers/observer.h"
+#include "harness/reference/error_meter.h"
 #include "harness/run/compiled_scene.h"
 #include "harness/run/ensemble.h"
 #include "harness/run/merge_parts.h"
@@ -31,7 +33,7 @@ class Runner {
  public:
   /// Part `part` of `user`, simplified to `scene`.
   Runner(const Experiment& experiment, const Case& one, const MechanismDescription& user,
-         const CompiledScene& scene, int part, bool with_series)
+         const CompiledScene& scene, int part, bool with_series, const Reference* reference)
       : case_(one),
         user_(user),
         compiled_(scene.compiled),
@@ -41,7 +43,9 @@ class Runner {
         mechanism_(description_, one.column.coordinates),
         observers_(MakeObservers<Space>(
             {description_, mechanism_, scene_, experiment.series_points, with_series})),
-        with_series_(with_series) {}
+        with_series_(with_series) {
+    if (reference != nullptr) errors_.emplace(Measured{user_, compiled_}, part, *reference);
+  }
 
   Run Execute() {
     const Start<double> start = Assemble<Space>(description_, mechanism_);
@@ -56,6 +60,7 @@ class Runner {
       run.branch_start = ExactObserver<Space>(scene_, mechanism_).BranchAt(kinematics);
       result = Integrate(start);
       for (const auto& observer : observers_) observer->Write(run.record);
+      if (errors_) errors_->Write(run.record);
       for (const auto& [key, pose] : final_poses_.items()) run.record.Set(key, pose);
       run.record.Set("state_hash", StateHash(y_));
     }
@@ -101,6 +106,20 @@ class Runner {
     }
   }
 
+  /// Holds the state at the k-th time of the reference against it. `lower` is the same with more of
+  /// the interpolation's error in it.
+  void Compare(System<Space, double>& system, std::size_t k, std::span<const double> y,
+               std::span<const double> lower) {
+    const auto picture = [&](std::span<const double> state) {
+      Snapshot snapshot = EmptySnapshot({user_, compiled_});
+      system.FromState(errors_->times()[k], state);
+      TakeSnapshot({user_, compiled_}, part_, system.kinematics(), &snapshot);
+      return snapshot;
+    };
+    const Snapshot own = picture(y);
+    errors_->Add(k, own, lower.data() == y.data() ? own : picture(lower));
+  }
+
   IntegratorResult Integrate(const Start<double>& start) {
     const auto formulation = MakeFormulation<Space>(case_.column, mechanism_);
     IntegratorResult result;
@@ -124,12 +143,23 @@ class Runner {
       sample.knows_work = !peer || !mechanism_.has_power();
       if (!work.empty()) sample.supplied = work[0], sample.dissipated = work[1];
       Show(sample, outcome);
+      // peers have no dense output
+      if (peer && errors_ && outcome == Outcome::kFinished && t == errors_->times().back()) {
+        Compare(*formulation, errors_->times().size() - 1, y, y);
+      }
       return restart ? StepAction::kRestart : StepAction::kContinue;
     };
+    DenseObserver dense;
+    if (errors_) {
+      dense.times = errors_->times();
+      dense.observe = [&](std::size_t k, std::span<const double> y, std::span<const double> lower) {
+        Compare(*formulation, k, y.first(n), lower.first(n));
+      };
+    }
     const IntegratorOptions options = OptionsOf(case_, mechanism_.stop_times());
-    IntegratorResult run =
-        peer ? peer->Integrate(case_.horizon, y_, options, observe)
-             : harness::Integrate(*formulation, 0.0, case_.horizon, y_, options, observe);
+    IntegratorResult run = peer ? peer->Integrate(case_.horizon, y_, options, observe)
+                                : harness::Integrate(*formulation, 0.0, case_.horizon, y_, options,
+                                                     observe, errors_ ? &dense : nullptr);
     y_.resize(n);
     if (run.outcome == Outcome::kSingular) {
       const std::string why = formulation->solver().WhySingular();
@@ -151,18 +181,20 @@ class Runner {
   Mechanism<Space, double> mechanism_;
   std::vector<std::unique_ptr<Observer<Space>>> observers_;
   bool with_series_;
+  std::optional<ErrorMeter> errors_;
   Record final_poses_;
   std::vector<double> y_;
 };
 
 Run RunOnce(const Experiment& experiment, const Case& one, const MechanismDescription& description,
-            bool with_series) {
+            bool with_series, const Reference* reference = nullptr) {
   const SceneObservation& observe = experiment.scenes[one.scene].mechanism.observe;
   const CompiledScene scene = CompileScene(description, observe, experiment.compile);
   std::vector<Run> parts;
   for (int part = 0; part < static_cast<int>(scene.compiled.parts.size()); ++part) {
     const auto run = [&]<class Space>() {
-      return Runner<Space>(experiment, one, description, scene, part, with_series).Execute();
+      return Runner<Space>(experiment, one, description, scene, part, with_series, reference)
+          .Execute();
     };
     const auto& own = scene.compiled.parts[static_cast<std::size_t>(part)].description;
     parts.push_back(own.space == SpaceKind::kPlanar ? run.template operator()<Planar>()
@@ -215,7 +247,7 @@ IntegratorOptions OptionsOf(const Case& one, const std::vector<double>& stop_tim
   return options;
 }
 
-Record RunCase(const Experiment& experiment, const Case& one) {
+Record RunCase(const Experiment& experiment, const Case& one, const Reference* reference) {
   const ExperimentScene& scene = experiment.scenes[one.scene];
   Record record = one.keys;
   record.Set("scene_id", Fnv1a(scene.mechanism.canonical));
@@ -224,7 +256,10 @@ Record RunCase(const Experiment& experiment, const Case& one) {
   record.Set("position_goal",
              4 * std::numeric_limits<double>::epsilon() * link *
                  static_cast<double>(scene.mechanism.description.bodies.size() - 1));
-  Run nominal = RunOnce(experiment, one, scene.mechanism.description, true);
+  if (reference != nullptr) WriteCertificate(*reference, record);
+  const bool usable = reference != nullptr && reference->NumTrusted() > 0;
+  Run nominal =
+      RunOnce(experiment, one, scene.mechanism.description, true, usable ? reference : nullptr);
   for (const auto& [key, value] : nominal.record.items()) record.Set(key, value);
 
   std::vector<DriftSeries> runs;

@@ -11,6 +11,7 @@
 #include "harness/config/options.h"
 #include "harness/integrator/ode.h"
 #include "harness/record/record.h"
+#include "harness/reference/reference.h"
 #include "mechanism/formulation/forward_jacobian.h"
 
 namespace loopbench::harness {
@@ -42,7 +43,10 @@ IntegratorOptions OptionsOf(const Case& one, const std::vector<double>& stop_tim
 /// keys, the outcome and all measured values of the unperturbed run; growth is analysed over the
 /// ensemble (or over the single run, which resolves nothing). Limits hold for each run.
 ///
+/// With a reference (harness/reference/), the unperturbed run is held against it at the reference's
+/// times, between steps through dense output.
+///
 /// Whatever goes wrong numerically ends in the record; only misuse throws.
-Record RunCase(const Experiment& experiment, const Case& one);
+Record RunCase(const Experiment& experiment, const Case& one, const Reference* reference = nullptr);
 
 }  // namespace loopbench::harness

@@ -8,6 +8,7 @@
 #include <functional>
 #include <limits>
 #include <map>
+#include <optional>
 #include <set>
 #include <utility>
 
@@ -20,6 +21,7 @@
 #include "harness/run/run_case.h"
 #include "harness/suite/precision_cases.h"
 #include "harness/suite/progress.h"
+#include "harness/suite/reference_cases.h"
 #include "harness/text/config_error.h"
 #include "harness/text/terminal.h"
 #include "harness/timing/time_cases.h"
@@ -39,18 +41,37 @@ struct Piece {
   ProcessLimits limits;
   std::string label;
   double cost = 0.0;
+  std::filesystem::path product = {};  ///< a file without which the piece is not done
 };
 
 constexpr double kPatience = 2.0, kGrace_s = 2.0;  ///< LimitsOfRuns
 
-/// @param one  with its id
-Piece AccuracyPiece(const Experiment& experiment, const Case& one) {
+/// @param one    with its id
+/// @param store  the file beside which references are kept
+Piece AccuracyPiece(const Experiment& experiment, const Case& one,
+                    const std::filesystem::path& store) {
   const int runs = one.ensemble > 1 ? one.ensemble + 1 : 1;
+  const auto work = [&experiment, one, store] {
+    const std::optional<Reference> reference = FindReference(experiment, one, store);
+    return std::vector<Record>{RunCase(experiment, one, reference ? &*reference : nullptr)};
+  };
   return {.owed = {one.keys},
-          .work = [&experiment, one] { return std::vector<Record>{RunCase(experiment, one)}; },
+          .work = work,
           .limits = LimitsOfRuns(one.limits, runs * one.column.threads),
           .label = fmt::format("{} {} {}", one.mechanism, ToString(one.column), SettingOf(one)),
           .cost = Cost(one)};
+}
+
+Piece ReferencePiece(const Experiment& experiment, const ReferenceCase& one) {
+  Limits limits = experiment.limits;
+  limits.cpu_s = experiment.reference->cpu_s;
+  constexpr double kWitnesses = 3.0;
+  return {.owed = {one.keys},
+          .work = [&experiment, one] { return std::vector<Record>{MakeOne(experiment, one)}; },
+          .limits = LimitsOfRuns(limits, kWitnesses),
+          .label = fmt::format("{} {} s", one.keys.Text("mechanism"), one.horizon),
+          .cost = one.horizon,
+          .product = one.file};
 }
 
 Piece TimingPiece(const Experiment& experiment, const TimingGroup& group) {
@@ -183,6 +204,7 @@ class Runner {
  private:
   bool Done(const Piece& piece) const {
     if (options_.rerun == Rerun::kAll) return false;
+    if (!piece.product.empty() && !std::filesystem::exists(piece.product)) return false;
     return std::ranges::all_of(piece.owed, [this](const Record& owed) {
       const auto at = outcomes_.find(RunId(owed));
       return at != outcomes_.end() &&
@@ -262,11 +284,20 @@ SuiteCount RunSuite(const std::vector<Experiment>& experiments, const SuiteOptio
     number = 0;
   };
   if (options.accuracy) {
+    std::vector<Piece> references;
     for (std::size_t e = 0; e < experiments.size(); ++e) {
       for (const Case& one : SelectCases(experiments[e], options.filter)) {
-        add(e, [&] { return AccuracyPiece(experiments[e], Identified(experiments[e], one)); });
+        add(e, [&] {
+          if (experiments[e].reference) {
+            references.push_back(
+                ReferencePiece(experiments[e], ReferenceOf(experiments[e], one, store.file())));
+            references.back().experiment = static_cast<std::int64_t>(e);
+          }
+          return AccuracyPiece(experiments[e], Identified(experiments[e], one), store.file());
+        });
       }
     }
+    runner.Run("references", std::move(references), options.jobs);
     run("accuracy", options.jobs);
   }
   if (options.precision) {

@@ -54,8 +54,9 @@ struct SuiteCount {
   std::vector<std::string> ids;
 };
 
-/// Runs the accuracy cases of all experiments, costliest first, then their precision ladders, then
-/// their timings, and shows progress. Each record goes to the store as soon as it is complete.
+/// Makes the references that the accuracy cases of all experiments ask for, runs these cases,
+/// costliest first, then the precision ladders, then the timings, and shows progress. Each record
+/// goes to the store as soon as it is complete.
 ///
 /// A case is done when the store has a record with its id. The id stands for everything that
 /// decides the run and for this very program. `records` is what the store has when the call

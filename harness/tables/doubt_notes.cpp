@@ -36,6 +36,20 @@ const Reason kReasons[] = {
        return fmt::format("{:.1e} of a link or rad, at most {:.1e} expected", DriftShare(row),
                           PromisedDriftShare(row));
      }},
+    {kErrorDoubt, "further from the reference than 1000 tolerances",
+     [](const Record& row) { return fmt::format("{:.1e} of a link", TrueErrorShare(row)); }},
+    {kRefinementDoubt, "finer tolerances do not bring it nearer to one end",
+     [](const Record& row) {
+       return fmt::format("{} steps, state {}", row.Text("steps"), row.Text("state_hash"));
+     }},
+    {kDriveDoubt, "steps so long that the fastest drive is seen less than twice a period",
+     [](const Record& row) { return fmt::format("{:.2g} periods a step", PeriodsPerStep(row)); }},
+    {kStepsDoubt, "step control at its floor, or failing more often than not",
+     [](const Record& row) {
+       return fmt::format("{} rejected of {}, shortest {:.1e} s", row.Text("rejected"),
+                          row.Number("steps") + row.Number("rejected"),
+                          row.Number("step_shortest"));
+     }},
     {kMembersDoubt, "members of the ensemble failed",
      [](const Record& row) {
        return row.Text("ensemble_failed") + " of " + row.Text("ensemble_size");

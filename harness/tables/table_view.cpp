@@ -156,6 +156,12 @@ Table MakeTable(std::span<const Record> records, const TableView& view) {
   } else if (const auto note = HiddenDoubts(table, kind == "factorial" ? rows : table.rows)) {
     table.notes.push_back(*note);
   }
+  const auto doubtful = std::ranges::count_if(
+      table.rows, [](const Record& row) { return IsDoubtful(row, "outcome"); });
+  if (doubtful > 0 && !table.title.empty()) {
+    table.title += fmt::format(" - {} of {} rows are doubtful (marked ?, reasons below)", doubtful,
+                               table.rows.size());
+  }
   return table;
 }
 

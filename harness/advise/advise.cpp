@@ -1,0 +1,321 @@
+#include "harness/advise/advise.h"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <chrono>
+#include <cmath>
+
+#include "harness/config/formulations.h"
+#include "harness/config/options.h"
+
+namespace loopbench::harness {
+namespace {
+
+/// Tolerances that trials are made at. Below the least rounding rules, above the largest the error
+/// estimate means nothing.
+constexpr double kLeastRtol = 3e-15, kLargestRtol = 0.05;
+/// Of an error or a budget: the search aims a little inside, and is content within a factor.
+constexpr double kAim = 0.7, kContent = 0.4;
+/// Trials of one method and level. Errors follow tolerances by a power near one: three are enough
+/// in most cases.
+constexpr int kMostTrials = 5;
+/// A trial may cost so much more than the best, for timing's sake, and so much at least [s].
+constexpr double kRoom = 1.5, kLeastLimit_s = 2e-4;
+/// Of a sweep: trials beyond are cut off.
+constexpr double kHopeless = 20.0, kHopelessLeast_s = 2e-3;
+/// Pairs of method and level that all formulations are tried in, and runs that decide.
+constexpr std::size_t kBestPairs = 4, kFinalists = 6;
+constexpr int kRepeats = 7;
+
+/// With two digits, as people write tolerances, and within bounds.
+double Tolerance(double wanted) {
+  const double unit = std::pow(10.0, std::floor(std::log10(wanted)) - 1);
+  return std::clamp(std::floor(wanted / unit) * unit, kLeastRtol, kLargestRtol);
+}
+
+class Pilot {
+ public:
+  Pilot(const AdviceRequest& request, TrialBench& bench, double horizon, double length)
+      : request_(request), bench_(bench), horizon_(horizon), length_(length) {}
+
+  Advice Find(const std::function<std::string(const Choice&)>& doubts) {
+    fastest_ = FastestFormulation();
+    for (const bool implicit : {false, true}) {
+      for (const std::string& profile : ProfileNames()) {
+        if (FindProfile(profile)->is_implicit != implicit) continue;
+        for (const Enforcement level :
+             {Enforcement::kVelocity, Enforcement::kPosition, Enforcement::kAcceleration}) {
+          Look(profile, level);
+        }
+      }
+    }
+    advice_.finalists = Finalists();
+    return Decide(doubts);
+  }
+
+  Advice FindInAll(const std::function<std::string(const Choice&)>& doubts) {
+    for (const FormulationRow& row : Formulations()) {
+      if (row.is_peer()) continue;
+      for (const std::string& profile : ProfileNames()) {
+        for (const Enforcement level :
+             {Enforcement::kVelocity, Enforcement::kPosition, Enforcement::kAcceleration}) {
+          if (row.Has(level)) TryAll(row.name, profile, level);
+        }
+      }
+    }
+    Sort(&advice_.looked_at);
+    advice_.finalists = advice_.looked_at;
+    if (advice_.finalists.size() > kFinalists) advice_.finalists.resize(kFinalists);
+    return Decide(doubts);
+  }
+
+ private:
+  Advice Decide(const std::function<std::string(const Choice&)>& doubts) {
+    for (int i = 0; i < kRepeats; ++i) {
+      for (Trial& trial : advice_.finalists) bench_.TimeAgain(&trial);
+    }
+    Sort(&advice_.finalists);
+    Doubt(doubts);
+    advice_.reached = !advice_.finalists.empty() && Keeps(advice_.finalists.front());
+    advice_.pilot_s = Elapsed();
+    return advice_;
+  }
+
+  /// All tolerances of a column and profile; the best of them is looked at.
+  void TryAll(const std::string& formulation, const std::string& profile, Enforcement level) {
+    for (const Coordinates coordinates : {Coordinates::kJoint, Coordinates::kAbsolute}) {
+      Choice choice;
+      choice.column = {
+          .formulation = formulation, .enforcement = level, .coordinates = coordinates};
+      choice.integrator = profile;
+      std::optional<Trial> best;
+      const auto take = [&] {
+        if (OutOfTime()) return;
+        // twenty times the best is no candidate, and low orders at 1e-13 would take hours
+        const double limit =
+            best_ ? std::max(kHopeless * best_->wall_s, kHopelessLeast_s) : request_.cpu_s / 10;
+        const Trial trial = bench_.Try(choice, limit);
+        ++advice_.trials;
+        if (Keeps(trial) && (!best_ || Better(trial, *best_))) best_ = trial;
+        if (!best || Better(trial, *best)) best = trial;
+      };
+      constexpr int kDecades = 13;
+      for (int i = 1; i <= kDecades; ++i) {
+        choice.rtol = std::pow(10.0, -i);
+        take();
+      }
+      for (int i = 2; request_.budget && i <= 2 * kDecades / 2; ++i) {
+        choice.step = horizon_ * std::pow(10.0, -i / 2.0);
+        take();
+      }
+      if (best) advice_.looked_at.push_back(*best);
+    }
+  }
+
+  using Clock = std::chrono::steady_clock;
+  double Elapsed() const { return std::chrono::duration<double>(Clock::now() - begin_).count(); }
+  bool OutOfTime() const { return Elapsed() > request_.cpu_s; }
+  double Budget() const { return *request_.budget * horizon_; }
+
+  bool Keeps(const Trial& trial) const {
+    if (trial.outcome != Outcome::kFinished || !std::isfinite(trial.error)) return false;
+    return request_.error ? trial.error <= *request_.error : trial.wall_s <= Budget();
+  }
+
+  /// Whether a is better advice than b.
+  bool Better(const Trial& a, const Trial& b) const {
+    if (Keeps(a) != Keeps(b)) return Keeps(a);
+    // of those that miss what was asked for, the one that misses it least
+    const bool by_time = request_.error.has_value() == Keeps(a);
+    return by_time ? a.wall_s < b.wall_s : a.error < b.error;
+  }
+  void Sort(std::vector<Trial>* trials) const {
+    std::ranges::stable_sort(*trials,
+                             [this](const Trial& a, const Trial& b) { return Better(a, b); });
+  }
+
+  /// CPU time that the next trial may take: of what is left, and not much more than the best.
+  double Limit() const {
+    const double left = std::max(request_.cpu_s - Elapsed(), 1e-3) / 4;
+    if (request_.budget) return std::min(left, std::max(kLeastLimit_s, 4 * Budget()));
+    if (!best_) return left;
+    return std::min(left, std::max(kLeastLimit_s, kRoom * best_->wall_s));
+  }
+
+  Trial Try(const Choice& choice) {
+    Trial trial = bench_.Try(choice, Limit());
+    ++advice_.trials;
+    if (Keeps(trial) && (!best_ || Better(trial, *best_))) best_ = trial;
+    return trial;
+  }
+
+  /// By the cost of an evaluation over a coarse run.
+  std::string FastestFormulation() {
+    std::string fastest;
+    double least = 0.0;
+    for (const FormulationRow& row : Formulations()) {
+      if (row.is_peer() || !row.Has(Enforcement::kVelocity)) continue;
+      Choice choice;
+      choice.column = {.formulation = row.name, .enforcement = Enforcement::kVelocity};
+      choice.rtol = 1e-5;
+      const Trial trial = bench_.Try(choice, request_.cpu_s / 10);
+      ++advice_.trials;
+      const double cost =
+          trial.wall_s / static_cast<double>(std::max<std::int64_t>(trial.rhs_evaluations, 1));
+      if (trial.outcome != Outcome::kFinished && !fastest.empty()) continue;
+      if (fastest.empty() || cost < least) fastest = row.name, least = cost;
+    }
+    return fastest;
+  }
+
+  /// The best of a method at a level, as the fastest formulation has it.
+  void Look(const std::string& profile, Enforcement level) {
+    if (OutOfTime() || !FindFormulation(fastest_)->Has(level)) return;
+    Choice choice;
+    choice.column = {.formulation = fastest_, .enforcement = level};
+    choice.integrator = profile;
+    std::optional<Trial> best;
+    const auto take = [&](const Trial& trial) {
+      if (!best || Better(trial, *best)) best = trial;
+    };
+    if (request_.error) {
+      SearchError(choice, take);
+    } else {
+      SearchBudget(choice, take);
+      if (!FindProfile(profile)->is_implicit) SearchSteps(choice, take);
+    }
+    if (best) advice_.looked_at.push_back(*best);
+  }
+
+  template <class Take>
+  void SearchError(Choice choice, Take take) {
+    const double asked = *request_.error;
+    // a coarse trial is a cheap one, and tells where to go
+    choice.rtol = Tolerance(10 * asked / length_);
+    for (int i = 0; i < kMostTrials && !OutOfTime(); ++i) {
+      const Trial trial = Try(choice);
+      take(trial);
+      if (trial.outcome != Outcome::kFinished) {
+        // too coarse for its loops, or too dear
+        if (trial.outcome == Outcome::kTimeLimit || trial.outcome == Outcome::kStepLimit) return;
+        choice.rtol = Tolerance(choice.rtol / 10);
+        continue;
+      }
+      if (trial.error <= asked && trial.error >= kContent * asked) return;
+      const double factor = std::clamp(kAim * asked / std::max(trial.error, 1e-300), 1e-4, 1e4);
+      const double next = Tolerance(choice.rtol * factor);
+      if (next == choice.rtol) return;
+      choice.rtol = next;
+    }
+  }
+
+  template <class Take>
+  void SearchBudget(Choice choice, Take take) {
+    choice.rtol = 1e-8;
+    for (int i = 0; i < kMostTrials && !OutOfTime(); ++i) {
+      const Trial trial = Try(choice);
+      take(trial);
+      if (trial.outcome != Outcome::kFinished && trial.outcome != Outcome::kTimeLimit) return;
+      const double used = trial.wall_s / Budget();
+      if (Keeps(trial) && used > kAim) return;
+      // a method of order p takes rtol^(-1/p) steps; p is near six
+      const double factor = std::clamp(std::pow(used / 0.9, 6.0), 1e-5, 1e5);
+      const double next = Tolerance(choice.rtol * factor);
+      if (next == choice.rtol) return;
+      choice.rtol = next;
+    }
+  }
+
+  /// Fixed steps have no error estimate and cost the same every time.
+  template <class Take>
+  void SearchSteps(Choice choice, Take take) {
+    choice.step = horizon_ / 1000;
+    for (int i = 0; i < kMostTrials && !OutOfTime(); ++i) {
+      const Trial trial = Try(choice);
+      take(trial);
+      const double used = trial.wall_s / Budget();
+      if (Keeps(trial) && used > kAim) return;
+      // a run that failed may need shorter steps, if they can be had
+      if (trial.outcome != Outcome::kFinished && trial.outcome != Outcome::kTimeLimit &&
+          used > 0.5) {
+        return;
+      }
+      const double factor = std::clamp(used / 0.85, 1e-3, 1e3);
+      choice.step = std::min(choice.step * factor, horizon_ / 4);
+    }
+  }
+
+  /// The best pairs of method and level in all formulations and coordinates.
+  std::vector<Trial> Finalists() {
+    std::vector<Trial> pairs = advice_.looked_at;
+    Sort(&pairs);
+    if (pairs.size() > kBestPairs) pairs.resize(kBestPairs);
+    std::vector<Trial> finalists = pairs;
+    for (const Trial& pair : pairs) {
+      for (const FormulationRow& row : Formulations()) {
+        if (row.is_peer() || !row.Has(pair.choice.column.enforcement)) continue;
+        for (const Coordinates coordinates : {Coordinates::kJoint, Coordinates::kAbsolute}) {
+          Choice choice = pair.choice;
+          choice.column.formulation = row.name;
+          choice.column.coordinates = coordinates;
+          if (choice == pair.choice || OutOfTime()) continue;
+          const Trial trial = Try(choice);
+          if (trial.outcome == Outcome::kFinished) finalists.push_back(trial);
+        }
+      }
+    }
+    Sort(&finalists);
+    if (finalists.size() > kFinalists) finalists.resize(kFinalists);
+    return finalists;
+  }
+
+  /// Looks at the best until one is without doubts, and puts it first.
+  void Doubt(const std::function<std::string(const Choice&)>& doubts) {
+    for (std::size_t i = 0; i < advice_.finalists.size(); ++i) {
+      Trial& trial = advice_.finalists[i];
+      trial.doubts = doubts(trial.choice);
+      if (!trial.doubts.empty() || !Keeps(trial)) continue;
+      std::rotate(advice_.finalists.begin(),
+                  advice_.finalists.begin() + static_cast<std::ptrdiff_t>(i),
+                  advice_.finalists.begin() + static_cast<std::ptrdiff_t>(i) + 1);
+      return;
+    }
+  }
+
+  const AdviceRequest& request_;
+  TrialBench& bench_;
+  double horizon_, length_;
+  Clock::time_point begin_ = Clock::now();
+  std::string fastest_;
+  std::optional<Trial> best_;
+  Advice advice_;
+};
+
+}  // namespace
+
+Advice Advise(const AdviceRequest& request, TrialBench& bench, double horizon, double length,
+              const std::function<std::string(const Choice&)>& doubts) {
+  return Pilot(request, bench, horizon, length).Find(doubts);
+}
+
+Advice Sweep(const AdviceRequest& request, TrialBench& bench, double horizon, double length,
+             const std::function<std::string(const Choice&)>& doubts) {
+  return Pilot(request, bench, horizon, length).FindInAll(doubts);
+}
+
+std::string WhatLimits(const Trial& trial, double reference_error) {
+  if (!std::isfinite(trial.error)) return "it did not finish";
+  if (trial.error <= 10 * reference_error) {
+    return "the reference is not certified to much more than this error";
+  }
+  if (trial.shape < 0.2 * trial.error) {
+    return fmt::format(
+        "time on the way: it is {:.1e} s late or early, and keeps to the way to {:.1e} m",
+        trial.late, trial.shape);
+  }
+  return fmt::format("the way itself: {:.1e} m off it, {:.1e} s late or early on it", trial.shape,
+                     trial.late);
+}
+
+}  // namespace loopbench::harness

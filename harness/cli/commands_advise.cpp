@@ -1,0 +1,352 @@
+#include "harness/cli/commands_advise.h"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <cmath>
+
+#include "harness/advise/advise.h"
+#include "harness/analysis/link_length.h"
+#include "harness/cli/advise_models.h"
+#include "harness/config/experiment_writer.h"
+#include "harness/config/mechanism_reader.h"
+#include "harness/isolation/print_from_child.h"
+#include "harness/run/run_case.h"
+#include "harness/run/short_run.h"
+#include "harness/tables/table.h"
+#include "harness/text/config_error.h"
+#include "harness/text/files.h"
+#include "harness/text/terminal.h"
+#ifdef LOOPBENCH_PRECISIONS
+#include "harness/precision/make_reference.h"
+#endif
+
+namespace loopbench::harness {
+namespace {
+
+/// Times that errors are taken at: enough to see the largest, few against a run's steps.
+constexpr int kTimes = 41;
+/// Of all CPU time, what the reference's three witnesses may take each.
+constexpr double kWitnessShare = 0.15, kPilotShare = 0.4;
+
+MeasuredPoint PointNamed(const MechanismDescription& user, const std::string& name) {
+  const std::size_t dot = name.find('.');
+  const std::string body = name.substr(0, dot);
+  std::vector<std::string> known;
+  for (std::size_t i = 1; i < user.bodies.size(); ++i) {
+    known.push_back(user.bodies[i].name);
+    for (const auto& [point, at] : user.bodies[i].points) {
+      known.push_back(user.bodies[i].name + "." + point);
+      if (name == known.back()) return {i, at};
+    }
+    if (name == user.bodies[i].name) return {i, user.bodies[i].com};
+  }
+  throw ConfigError(
+      fmt::format("--points: found \"{}\", expected BODY (its centre of mass) or "
+                  "BODY.POINT, of: {}",
+                  name, fmt::join(known, ", ")));
+}
+
+std::string WhatIsAsked(const AdviseCommand& command) {
+  return command.budget > 0.0
+             ? fmt::format("at most {} s of wall time per simulated second", command.budget)
+             : fmt::format("an error of at most {} m", command.error);
+}
+
+Record RowOf(const Trial& trial, const Trial& best, double horizon) {
+  Record row;
+  row.Set("formulation", trial.choice.column.formulation);
+  row.Set("enforcement", std::string(ToString(trial.choice.column.enforcement)));
+  row.Set("coordinates", std::string(ToString(trial.choice.column.coordinates)));
+  row.Set("integrator", trial.choice.integrator);
+  if (trial.choice.step > 0.0) {
+    row.Set("step", trial.choice.step);
+  } else {
+    row.Set("rtol", trial.choice.rtol);
+  }
+  row.Set("outcome", std::string(ToString(trial.outcome)));
+  row.Set("doubts", trial.doubts);
+  if (std::isfinite(trial.error)) row.Set("error_position_max", trial.error);
+  row.Set("wall_s", trial.wall_s);
+  row.Set("ratio", trial.wall_s / best.wall_s);
+  row.Set("realtime_factor", horizon / trial.wall_s);
+  row.Set("rhs_evaluations", trial.rhs_evaluations);
+  return row;
+}
+
+Table TableOf(const std::vector<Trial>& trials, const Trial& best, double horizon) {
+  Table table;
+  bool adaptive = false, fixed = false;
+  for (const Trial& trial : trials) {
+    (trial.choice.step > 0.0 ? fixed : adaptive) = true;
+  }
+  table.columns = {{"formulation", "formulation", Format::kText},
+                   {"enforcement", "level", Format::kText},
+                   {"coordinates", "coords", Format::kText},
+                   {"integrator", "integrator", Format::kText}};
+  if (adaptive) table.columns.push_back({"rtol", "rtol", Format::kScientific});
+  if (fixed) table.columns.push_back({"step", "step [s]", Format::kScientific});
+  for (const TableColumn& column :
+       {TableColumn{"outcome", "outcome", Format::kText},
+        TableColumn{"error_position_max", "error [m]", Format::kScientific},
+        TableColumn{"wall_s", "wall [s]", Format::kSeconds},
+        TableColumn{"ratio", "ratio", Format::kExponent}}) {
+    table.columns.push_back(column);
+  }
+  for (const Trial& trial : trials) table.rows.push_back(RowOf(trial, best, horizon));
+  return table;
+}
+
+/// The experiment that runs one choice and times it.
+std::string ExperimentOf(const AdviseCommand& command, const Choice& choice, double horizon) {
+  const auto folder = std::filesystem::absolute(command.out).parent_path();
+  return ExperimentText(
+      {.name = "advice for " + command.mechanism.stem().string(),
+       .comment = "Asked for " + WhatIsAsked(command) + ".",
+       .mechanism = std::filesystem::absolute(command.mechanism).lexically_relative(folder),
+       .horizon = horizon,
+       .column = choice.column,
+       .integrator = choice.integrator,
+       .rtol = choice.rtol,
+       .step = choice.step});
+}
+
+Experiment SingleOf(const MechanismFile& file, double horizon) {
+  Experiment experiment;
+  experiment.name = "advise";
+  experiment.scenes.push_back({.name = file.description.name,
+                               .path = {},
+                               .mechanism = file,
+                               .horizons = {horizon},
+                               .tags = {}});
+  return experiment;
+}
+
+/// What a run with all observers says against a choice.
+std::string DoubtsOf(const MechanismFile& file, const Choice& choice, double horizon,
+                     const Reference& reference) {
+  const Experiment experiment = SingleOf(file, horizon);
+  Case one;
+  one.mechanism = file.description.name;
+  one.column = choice.column;
+  one.integrator = choice.integrator;
+  one.rtol = one.atol = choice.step > 0.0 ? 0.0 : choice.rtol;
+  one.step = choice.step;
+  one.horizon = horizon;
+  one.limits.cpu_s = 60.0;
+  one.keys = CaseKeys(experiment, one);
+  const Record record = RunCase(experiment, one, &reference);
+  return record.Text("outcome") == "finished" ? record.Text("doubts") : record.Text("outcome");
+}
+
+void PrintAdvice(const AdviseCommand& command, const Advice& advice, const Reference& reference,
+                 double horizon) {
+  const Trial& best = advice.finalists.front();
+  Print("{} over {} s: {}\n\n", command.mechanism.stem().string(), horizon, WhatIsAsked(command));
+  if (advice.reached) {
+    Print("Take {}:\n  error {:.1e} m, {:.3g} s of wall time ({:.3g} simulated seconds a second)\n",
+          ToString(best.choice), best.error, best.wall_s, horizon / best.wall_s);
+  } else {
+    Print("None reached it. The nearest is {}:\n  error {:.1e} m, {:.3g} s of wall time\n",
+          ToString(best.choice), best.error, best.wall_s);
+  }
+  if (!best.doubts.empty()) Print("  doubtful: {}\n", best.doubts);
+  Print("What limits it is {}.\n", WhatLimits(best, reference.Certified().position));
+  const auto next = std::ranges::find_if(advice.finalists, [&](const Trial& trial) {
+    return trial.choice.integrator != best.choice.integrator ||
+           trial.choice.column.formulation != best.choice.column.formulation;
+  });
+  if (next != advice.finalists.end()) {
+    Print("Runner-up: {}, {:.2f} times the time, error {:.1e} m\n", ToString(next->choice),
+          next->wall_s / best.wall_s, next->error);
+  }
+  Print("\nFinalists, timed in turn\n\n");
+  PrintText(ToText(TableOf(advice.finalists, best, horizon)));
+  std::vector<Trial> finished;
+  std::vector<std::string> cut_off;
+  for (const Trial& trial : advice.looked_at) {
+    if (std::isfinite(trial.error)) {
+      finished.push_back(trial);
+    } else {
+      const std::string name =
+          fmt::format("{} ({})", trial.choice.integrator, ToString(trial.outcome));
+      if (std::ranges::find(cut_off, name) == cut_off.end()) cut_off.push_back(name);
+    }
+  }
+  Print("\nThe best of each method and level, as the pilot had it\n\n");
+  PrintText(ToText(TableOf(finished, best, horizon)));
+  if (!cut_off.empty()) {
+    Print("\nfailed or cut off as dearer, at some level: {}\n",
+          fmt::format("{}", fmt::join(cut_off, ", ")));
+  }
+  Print(
+      "\nreference: {} ({}), certified to {:.1e} m until {:g} s\n"
+      "pilot: {} ways of running it, {:.3g} s\n",
+      reference.scalar, reference.witnesses, reference.Certified().position,
+      reference.trust_horizon, advice.trials, advice.pilot_s);
+}
+
+#ifdef LOOPBENCH_PRECISIONS
+
+/// A mechanism with its reference, as far as that is certified.
+struct Certain {
+  Reference reference;
+  double horizon = 0.0;  ///< [s]; 0: there is none
+};
+
+Certain MakeCertain(const AdviseCommand& command, const MechanismDescription& user,
+                    double horizon) {
+  const auto reference_until = [&](double end) {
+    return MakeReference(
+        user, end, LinkLength(user),
+        {.scalar = "long-double", .points = kTimes, .cpu_s = kWitnessShare * command.limits.cpu_s});
+  };
+  Certain certain{reference_until(horizon), horizon};
+  if (certain.reference.trust_horizon == horizon) return certain;
+  certain.horizon = certain.reference.trust_horizon;
+  if (certain.horizon > 0.0) certain.reference = reference_until(certain.horizon);
+  return certain;
+}
+
+Advice AdviceFor(const AdviseCommand& command, const MechanismFile& file, const Certain& certain,
+                 const std::vector<MeasuredPoint>& points, const AdviceRequest& request) {
+  const TrialScene scene{.user = file.description,
+                         .reference = certain.reference,
+                         .horizon = certain.horizon,
+                         .points = points};
+  const auto bench = MakeTrialBench(scene);
+  const auto find = command.exhaustive ? &Sweep : static_cast<decltype(&Sweep)>(&Advise);
+  return find(request, *bench, certain.horizon, LinkLength(file.description),
+              [&](const Choice& choice) {
+                return DoubtsOf(file, choice, certain.horizon, certain.reference);
+              });
+}
+
+/// What a model causes and saves, as a row; `whole` is what the whole model takes [s].
+Record RowOfModel(const AdviseCommand& command, const MechanismFile& file, const Certain& certain,
+                  const SceneModel& model, double whole) {
+  Record row;
+  row.Set("model", model.name);
+  const auto refuse = [&](const std::string& why) {
+    row.Set("verdict", "refused: " + why);
+    return row;
+  };
+  // the same times: those of the whole model
+  const Certain own = MakeCertain(command, model.description, certain.horizon);
+  if (own.horizon < certain.horizon) {
+    return refuse(own.reference.message.empty() ? "its motion is not certified so far"
+                                                : own.reference.message);
+  }
+  const CausedError caused =
+      ErrorOfModel(file.description, certain.reference, model, own.reference, command.points);
+  if (caused.points == 0 ||
+      (!command.points.empty() && caused.points < static_cast<int>(command.points.size()))) {
+    return refuse("it does not have the points");
+  }
+  row.Set("caused", caused.largest);
+  row.Set("point", caused.point);
+  // half of the error is left to the integrator
+  if (!(caused.largest <= command.error / 2)) return refuse("its error is too large");
+  const Advice advice = AdviceFor(command, {model.description, model.observe, ""}, own, {},
+                                  {.error = command.error - caused.largest,
+                                   .budget = std::nullopt,
+                                   .cpu_s = kPilotShare * command.limits.cpu_s / 4});
+  if (!advice.reached) return refuse("no method reaches the rest of the error");
+  const Trial& best = advice.finalists.front();
+  row.Set("total", caused.largest + best.error);
+  row.Set("wall_s", best.wall_s);
+  row.Set("ratio", best.wall_s / whole);
+  row.Set("verdict",
+          (best.wall_s < whole ? "saves time: " : "saves none: ") + ToString(best.choice));
+  return row;
+}
+
+void PrintModels(const AdviseCommand& command, const MechanismFile& file, const Certain& certain,
+                 double whole) {
+  std::vector<const Idea*> ideas;
+  for (const Idea& idea : Ideas()) ideas.push_back(&idea);
+  constexpr double kShortRun_s = 1.0;
+  const ShortRun run = MakeShortRun(file.description, std::min(kShortRun_s, certain.horizon),
+                                    kWitnessShare * command.limits.cpu_s);
+  const SceneModels models = MakeModels(file, ideas, run, {});
+  Table table;
+  table.columns = {{"model", "model", Format::kText},
+                   {"caused", "error it causes [m]", Format::kScientific},
+                   {"point", "of", Format::kText},
+                   {"total", "in all [m]", Format::kScientific},
+                   {"wall_s", "wall [s]", Format::kSeconds},
+                   {"ratio", "of the whole's", Format::kExponent},
+                   {"verdict", "", Format::kText}};
+  for (const SceneModel& model : models.models) {
+    if (model.name == "full" || model.name.starts_with("islands")) continue;
+    table.rows.push_back(RowOfModel(command, file, certain, model, whole));
+  }
+  Print("\nSimpler models of it, against the whole one's certified motion\n\n");
+  if (table.rows.empty()) {
+    Print("  none: nothing can be left out (loopbench simplify says why)\n");
+    return;
+  }
+  PrintText(ToText(table));
+  Print("\nloopbench simplify {} --out FOLDER writes them.\n", command.mechanism.string());
+}
+
+int AdviseInChild(const AdviseCommand& command, const MechanismFile& file) {
+  const MechanismDescription& user = file.description;
+  const std::string name = command.mechanism.string();
+  std::vector<MeasuredPoint> points;
+  for (const std::string& point : command.points) points.push_back(PointNamed(user, point));
+  const Certain certain = MakeCertain(command, user, command.horizon);
+  if (!(certain.horizon > 0.0)) {
+    throw std::runtime_error(fmt::format("{}: there is no certified reference to advise by: {}",
+                                         name, certain.reference.message));
+  }
+  if (certain.horizon < command.horizon && command.format == "text") {
+    Print("The motion is certified until {:g} s only. Advice is for that.\n", certain.horizon);
+  }
+  AdviceRequest request;
+  if (command.budget > 0.0) {
+    request.budget = command.budget;
+  } else {
+    request.error = command.error;
+  }
+  request.cpu_s = kPilotShare * command.limits.cpu_s;
+  const Advice advice = AdviceFor(command, file, certain, points, request);
+  if (advice.finalists.empty()) {
+    throw std::runtime_error(fmt::format("{}: no way of running it finished", name));
+  }
+  const Trial& best = advice.finalists.front();
+  if (command.format == "text") {
+    PrintAdvice(command, advice, certain.reference, certain.horizon);
+    if (command.simplify) PrintModels(command, file, certain, best.wall_s);
+  } else {
+    Table table = TableOf(advice.finalists, best, certain.horizon);
+    table.notes = {fmt::format("{} ways in {:.3g} s", advice.trials, advice.pilot_s)};
+    PrintText(Render(table, command.format));
+  }
+  if (!command.out.empty()) {
+    WriteFileAtomically(command.out, ExperimentOf(command, best.choice, certain.horizon));
+    PrintError("the experiment that reproduces it: {}\n", command.out.string());
+  }
+  return advice.reached ? 0 : 1;
+}
+
+#else
+
+int AdviseInChild(const AdviseCommand& command, const MechanismFile&) {
+  throw ConfigError(
+      fmt::format("{}: advice needs certified references: this program was built "
+                  "without wide scalars (cmake -DLOOPBENCH_PRECISIONS=ON)",
+                  command.mechanism.string()));
+}
+
+#endif
+
+}  // namespace
+
+int Advise(const AdviseCommand& command, const std::string&) {
+  const MechanismFile file = ReadMechanism(command.mechanism);
+  return PrintFromChild(command.mechanism.string(), command.limits,
+                        [&] { return AdviseInChild(command, file); });
+}
+
+}  // namespace loopbench::harness

@@ -1,0 +1,136 @@
+#include "harness/precision/make_reference.h"
+
+#include <algorithm>
+#include <cmath>
+#include <limits>
+
+#include "harness/precision/certify.h"
+
+namespace loopbench::harness {
+namespace {
+
+/// What the user's points are away from the centres of mass of the bodies they sit on [m]: turns
+/// bounds of orientations into bounds of points.
+double LongestArm(const Measured& measured) {
+  double longest = 0.0;
+  for (const auto& [body, at] : PointsOf(measured.user)) {
+    const BodyImage& image = measured.compiled.bodies[body];
+    if (image.part < 0) continue;
+    const MechanismDescription& part =
+        measured.compiled.parts[static_cast<std::size_t>(image.part)].description;
+    const Eigen::Vector3d& centre = part.bodies[static_cast<std::size_t>(image.body)].com;
+    longest = std::max(longest, (image.X.p + image.X.R * at - centre).norm());
+  }
+  return longest;
+}
+
+/// A bound in double of what is kept in double, of a part's pictures with points at `arm` from the
+/// centres.
+template <class S>
+Distance InUsersTerms(const WideDistance<S>& wide, double arm, const Snapshot& kept) {
+  constexpr double kEps = std::numeric_limits<double>::epsilon();
+  // each number is rounded once, and a few products lie between the part's axes and the user's
+  constexpr double kRoundings = 8.0;
+  double far = 0.0, fast = 0.0, turning = 0.0;
+  for (const BodyState& body : kept.bodies) {
+    far = std::max(far, body.pose.p.norm());
+    fast = std::max(fast, body.velocity.norm());
+    turning = std::max(turning, body.angular_velocity.norm());
+  }
+  const auto sum = [](const S& bound, double size) {
+    return static_cast<double>(bound) + kRoundings * kEps * size;
+  };
+  Distance bound;
+  bound.rotation = sum(wide.rotation, 1.0);
+  bound.position = sum(wide.position, far + arm) + bound.rotation * arm;
+  bound.angular_velocity = sum(wide.angular_velocity, turning);
+  bound.velocity = sum(wide.velocity, fast + turning * arm) +
+                   (bound.angular_velocity + bound.rotation * turning) * arm;
+  bound.angle = 2 * bound.rotation;  // of two bodies against each other
+  bound.displacement = 2 * bound.position;
+  bound.energy = sum(wide.energy, std::abs(kept.energy));
+  return bound;
+}
+
+template <class Space, class S>
+void Fill(const Measured& measured, const Certified<Space, S>& certified, Reference* reference) {
+  const MechanismDescription& part = measured.compiled.parts.front().description;
+  const Mechanism<Space, double> mechanism(part, Coordinates::kJoint);
+  Kinematics<Space, double> kinematics(mechanism);
+  const double arm = LongestArm(measured);
+  for (std::size_t k = 0; k < certified.bounds.size(); ++k) {
+    const Moment<Space, S>& moment = certified.reference.moments[k];
+    Snapshot snapshot = EmptySnapshot(measured);
+    for (std::size_t i = 1; i < moment.poses.size(); ++i) {
+      EnterBody(measured, 0, static_cast<int>(i),
+                StateAtCentre<Space, S>(moment.poses[i], moment.motions[i]), &snapshot);
+    }
+    // joint coordinates are those of the tree, rounded
+    kinematics.SetTime(reference->times[k]);
+    kinematics.UpdatePosition(certified.reference.positions[k].template cast<double>());
+    for (int j = 0; j < static_cast<int>(mechanism.joints().size()); ++j) {
+      const auto& joint = mechanism.joints()[static_cast<std::size_t>(j)];
+      if (joint.description < 0 || joint.kind->num_u != 1) continue;
+      EnterJoint(measured, 0, joint.description, kinematics.JointCoordinate(j), &snapshot);
+    }
+    snapshot.energy = static_cast<double>(moment.energy);
+    reference->bounds.push_back(InUsersTerms(certified.bounds[k], arm, snapshot));
+    reference->snapshots.push_back(std::move(snapshot));
+  }
+  reference->outcome = ToString(certified.outcome);
+  reference->message = certified.message;
+  reference->witnesses = certified.witnesses;
+  reference->rhs_evaluations = certified.rhs_evaluations;
+  reference->cpu_s = certified.cpu_s;
+}
+
+/// In one piece: its energy is then that of all, and its times are one list.
+CompileOptions InOnePiece() { return {.islands = false}; }
+
+}  // namespace
+
+std::string WhyNoReference(const MechanismDescription& user, const ReferenceOptions& options) {
+  for (const JointDescription& joint : user.joints) {
+    if (!IsBuiltIn(joint.type)) return "joint \"" + joint.name + "\" is of another program";
+  }
+  for (const ForceDescription& force : user.forces) {
+    if (std::holds_alternative<OtherForce>(force)) return "a force is of another program";
+  }
+  if (options.scalar == "float128" &&
+      Compile(user, InOnePiece()).parts.front().description.space != SpaceKind::kPlanar) {
+    return "float128 is for planar mechanisms";
+  }
+  return "";
+}
+
+Reference MakeReference(const MechanismDescription& user, double horizon, double length,
+                        const ReferenceOptions& options) {
+  Reference reference;
+  reference.scalar = options.scalar;
+  for (int k = 0; k < options.points; ++k) {
+    reference.times.push_back(k + 1 == options.points ? horizon
+                                                      : horizon * k / (options.points - 1));
+  }
+  reference.message = WhyNoReference(user, options);
+  if (!reference.message.empty()) {
+    reference.outcome = "inexpressible";
+    return reference;
+  }
+  const Compiled compiled = Compile(user, InOnePiece());
+  const Measured measured{user, compiled};
+  const MechanismDescription& part = compiled.parts.front().description;
+  if (part.space == SpaceKind::kSpatial) {
+    Fill(measured, Certify<Spatial, long double>(part, reference.times, options.cpu_s), &reference);
+  } else if (options.scalar == "float128") {
+    Fill(measured, Certify<Planar, Float128>(part, reference.times, options.cpu_s), &reference);
+  } else {
+    Fill(measured, Certify<Planar, long double>(part, reference.times, options.cpu_s), &reference);
+  }
+  for (std::size_t k = 0; k < reference.bounds.size(); ++k) {
+    if (!(reference.bounds[k].position <= kCertifiedShare * length)) break;
+    reference.trust_horizon = reference.times[k];
+  }
+  return reference;
+}
+
+}  // namespace loopbench::harness

@@ -1,0 +1,143 @@
+// Advice: what it recommends keeps what was asked for, it says so where nothing does, and the
+// command line with what it writes.
+#include "harness/advise/advise.h"
+
+#include <gtest/gtest.h>
+
+#include <string>
+
+#include "harness/analysis/link_length.h"
+#include "harness/config/experiment_reader.h"
+#include "harness/config/mechanism_reader.h"
+#include "tests/harness/cli_fixture.h"
+#ifdef LOOPBENCH_PRECISIONS
+#include "harness/precision/make_reference.h"
+#include "tests/reference/cases.h"
+#endif
+
+namespace loopbench::harness {
+namespace advise_test {
+
+#ifdef LOOPBENCH_PRECISIONS
+
+class AdviceTest : public testing::Test {
+ protected:
+  void Load(const std::string& name, double horizon) {
+    file_ = ReadMechanism(kConfigs / "mechanisms" / (name + ".json"));
+    horizon_ = horizon;
+    reference_ = MakeReference(file_.description, horizon, LinkLength(file_.description),
+                               {.scalar = "long-double", .points = 21, .cpu_s = 20.0});
+    ASSERT_EQ(reference_.trust_horizon, horizon);
+  }
+  Advice Ask(const AdviceRequest& request) {
+    const TrialScene scene{file_.description, reference_, horizon_, {}};
+    const auto bench = MakeTrialBench(scene);
+    return Advise(request, *bench, horizon_, LinkLength(file_.description),
+                  [](const Choice&) { return std::string(); });
+  }
+
+  MechanismFile file_;
+  double horizon_ = 0.0;
+  Reference reference_;
+};
+
+TEST_F(AdviceTest, KeepsTheErrorInARunOfItsOwn) {
+  for (const char* name : {"four-bar", "bennett"}) {
+    Load(name, 1.0);
+    for (const double error : {1e-3, 1e-7}) {
+      const Advice advice = Ask({.error = error, .budget = {}, .cpu_s = 60.0});
+      ASSERT_TRUE(advice.reached) << name << " " << error;
+      const Trial& best = advice.finalists.front();
+      EXPECT_LE(best.error, error);
+      const Experiment experiment = reference::Single(file_);
+      Case one = reference::CaseOf(experiment, file_.description.name, best.choice.column,
+                                   best.choice.rtol, horizon_);
+      one.integrator = best.choice.integrator;
+      const Record record = RunCase(experiment, one, &reference_);
+      EXPECT_EQ(record.Number("error_position_max"), best.error) << ToString(best.choice);
+      // what was looked at covers every explicit method at every level
+      EXPECT_GE(advice.looked_at.size(), 21u);
+    }
+  }
+}
+
+TEST_F(AdviceTest, SaysThatNothingReachedIt) {
+  Load("four-bar", 1.0);
+  const Advice advice = Ask({.error = 1e-16, .budget = {}, .cpu_s = 60.0});
+  EXPECT_FALSE(advice.reached);
+  ASSERT_FALSE(advice.finalists.empty());
+  // the nearest first
+  EXPECT_LT(advice.finalists.front().error, 1e-11);
+  EXPECT_FALSE(Ask({.error = {}, .budget = 1e-9, .cpu_s = 60.0}).reached);
+}
+
+TEST_F(AdviceTest, SpendsABudgetOnAccuracy) {
+  Load("four-bar", 1.0);
+  // a hundredth of a second for each is far more than round-off takes here on any machine
+  const Advice advice = Ask({.error = {}, .budget = 0.01, .cpu_s = 60.0});
+  ASSERT_TRUE(advice.reached);
+  EXPECT_LT(advice.finalists.front().error, 1e-9);
+}
+
+TEST_F(AdviceTest, SweepTriesTheWholeProduct) {
+  Load("pendulum", 0.5);
+  const TrialScene scene{file_.description, reference_, horizon_, {}};
+  const auto bench = MakeTrialBench(scene);
+  const Advice sweep = Sweep({.error = 1e-6, .budget = {}, .cpu_s = 60.0}, *bench, horizon_, 1.0,
+                             [](const Choice&) { return std::string(); });
+  EXPECT_TRUE(sweep.reached);
+  // 3 formulations, 3 levels, 2 coordinate sets, 12 profiles, 13 tolerances
+  EXPECT_EQ(sweep.trials, 3 * 3 * 2 * static_cast<int>(ProfileNames().size()) * 13);
+}
+
+TEST_F(AdviceTest, DoubtfulWaysAreNoAdvice) {
+  Load("four-bar", 1.0);
+  const TrialScene scene{file_.description, reference_, horizon_, {}};
+  const auto bench = MakeTrialBench(scene);
+  int asked = 0;
+  const Advice advice = Advise({.error = 1e-5, .budget = {}, .cpu_s = 60.0}, *bench, horizon_, 1.0,
+                               [&](const Choice&) { return ++asked == 1 ? "energy" : ""; });
+  ASSERT_GE(advice.finalists.size(), 2u);
+  EXPECT_EQ(advice.finalists[0].doubts, "");
+  EXPECT_EQ(advice.finalists[1].doubts, "energy");
+}
+
+TEST_F(CommandLineTest, AdviceIsPrintedAndWritten) {
+  const Ending ending = Call("advise four-bar.json --error 1e-5 --horizon 1 --out best.json");
+  EXPECT_EQ(ending.code, 0) << ending.text;
+  for (const char* words : {"Take ", "Runner-up", "What limits it", "reference: long-double"}) {
+    EXPECT_NE(ending.text.find(words), std::string::npos) << words << "\n" << ending.text;
+  }
+  EXPECT_EQ(Call("check best.json").code, 0);
+  const Ending run = Call("run best.json --out best --gate doubts --no-timing");
+  EXPECT_EQ(run.code, 0) << run.text;
+  // a point of its own, and a table for programs
+  const Ending csv =
+      Call("advise four-bar.json --error 1e-5 --horizon 1 --points bar2.B --format csv");
+  EXPECT_EQ(csv.text.substr(0, 12), "formulation,") << csv.text;
+  EXPECT_EQ(Call("advise four-bar.json --budget 1e-9 --horizon 1").code, 1);
+}
+
+TEST_F(CommandLineTest, AdviceRefusesWhatItCannotGive) {
+  const Ending point = Call("advise four-bar.json --points bar9.X");
+  EXPECT_EQ(point.code, 2);
+  EXPECT_NE(point.text.find("found \"bar9.X\", expected BODY"), std::string::npos) << point.text;
+  EXPECT_EQ(Call("advise four-bar.json --error 1e-3 --budget 1").code, 2);
+  EXPECT_EQ(Call("advise four-bar.json --error -1").code, 2);
+  EXPECT_EQ(Call("advise nothing.json").code, 2);
+}
+
+TEST_F(CommandLineTest, AdviceRefusesModelsWhoseErrorIsTooLarge) {
+  const std::string model = (kConfigs / "experiments/models/light-rod-compressor.json").string();
+  // the rod's mass moves it by 1e-4 m in a few seconds
+  const Ending fine = Call("advise " + model + " --error 1e-7 --horizon 2 --simplify");
+  EXPECT_NE(fine.text.find("refused: its error is too large"), std::string::npos) << fine.text;
+  const Ending coarse = Call("advise " + model + " --error 1e-2 --horizon 2 --simplify");
+  EXPECT_NE(coarse.text.find("light-links"), std::string::npos) << coarse.text;
+  EXPECT_EQ(coarse.text.find("refused"), std::string::npos) << coarse.text;
+}
+
+#endif
+
+}  // namespace advise_test
+}  // namespace loopbench::harness

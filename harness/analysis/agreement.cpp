@@ -113,6 +113,12 @@ bool IsPeer(const Record& record) {
   return row != nullptr && row->is_peer();
 }
 
+/// Whether its level puts the branch back at every step.
+bool KeepsBranches(const Record& record) {
+  const auto level = FindLevel(record.Text("enforcement"));
+  return level && TraitsOf(*level).growth == DriftGrowth::kNone && !IsPeer(record);
+}
+
 /// What runs of one tolerance decide: those of an integrator that all end alike, beside the peers,
 /// unless another integrator's all end alike elsewhere. Nothing where none does.
 const Record* DecidedBy(std::span<const Record> records, const std::vector<std::size_t>& runs,
@@ -155,7 +161,8 @@ PoseDifference DifferenceOf(const Record& a, const Record& b) {
   return difference;
 }
 
-std::vector<Agreement> CompareFinalPoses(std::span<const Record> records) {
+std::vector<Agreement> CompareFinalPoses(std::span<const Record> records,
+                                         const std::vector<bool>& testifies) {
   // by scene and horizon, then by tolerance, the finest first
   std::map<std::pair<std::string, double>, std::map<double, std::vector<std::size_t>>> scenes;
   for (std::size_t i = 0; i < records.size(); ++i) {
@@ -169,26 +176,39 @@ std::vector<Agreement> CompareFinalPoses(std::span<const Record> records) {
     for (const auto& [rtol, all] : tolerances) {
       std::vector<std::size_t> runs = all;
       std::erase_if(runs, [&](std::size_t run) { return IsSoft(records[run]); });
+      std::vector<std::size_t> witnesses = runs;
+      std::erase_if(witnesses, [&](std::size_t run) { return !testifies[run]; });
+      if (witnesses.empty()) witnesses = runs;
       const Clusters clusters = ClustersOf(records, runs, rtol);
-      if (decided == nullptr) decided = DecidedBy(records, runs, rtol);
+      if (decided == nullptr) decided = DecidedBy(records, witnesses, rtol);
+      const Record* others = decided;  // those that do not give way, where they agree
+      if (others == nullptr && clusters.size() == 1) others = &records[clusters.front().front()];
       for (std::size_t c = 0; c < clusters.size(); ++c) {
         for (const std::size_t run : clusters[c]) {
           if (all.size() > 1) agreements[run].cluster = static_cast<std::int64_t>(c) + 1;
-          agreements[run].doubted =
-              decided == nullptr ? clusters.size() > 1 : !EndAlike(records[run], *decided, rtol);
+          agreements[run].doubted = others == nullptr || !EndAlike(records[run], *others, rtol);
         }
       }
-      const Record* others = decided;  // those that do not give way, where they agree
-      if (others == nullptr && clusters.size() == 1) others = &records[clusters.front().front()];
       for (const std::size_t run : all) {
         if (!IsSoft(records[run]) || runs.empty()) continue;
         agreements[run].doubted = others == nullptr || !EndAlike(records[run], *others, rtol);
         agreements[run].cluster =
             agreements[run].doubted ? static_cast<std::int64_t>(clusters.size()) + 1 : 1;
       }
+      // a branch is kept by who ends as those do that can keep it
+      const bool is_kept = std::ranges::any_of(witnesses, [&](std::size_t run) {
+        return testifies[run] && KeepsBranches(records[run]) && !agreements[run].doubted;
+      });
+      for (const std::size_t run : runs) {
+        agreements[run].is_backed = is_kept && !agreements[run].doubted;
+      }
     }
   }
   return agreements;
+}
+
+std::vector<Agreement> CompareFinalPoses(std::span<const Record> records) {
+  return CompareFinalPoses(records, std::vector<bool>(records.size(), true));
 }
 
 }  // namespace loopbench::harness

@@ -19,6 +19,8 @@ struct Agreement {
   /// such set being 1; 0 for runs that have nobody to be compared with.
   std::int64_t cluster = 0;
   bool doubted = false;
+  /// Ended as one that testifies and whose level puts the branch back at every step.
+  bool is_backed = false;
 };
 
 /// One for each record, in their order. Compared are accuracy runs that finished, of one scene
@@ -32,6 +34,12 @@ struct Agreement {
 /// tolerance: where all runs of one end alike, and no other one's all end alike elsewhere, they
 /// decide for the rest of their tolerance too. Peers whose closures give way
 /// (FormulationRow::is_soft) are held to the others' end and cast no doubt on it.
+///
+/// Only runs that testify decide, one flag for each record: who has reason to doubt itself is held
+/// to the others' end. Where nobody testifies, all do.
+std::vector<Agreement> CompareFinalPoses(std::span<const Record> records,
+                                         const std::vector<bool>& testifies);
+/// All testify.
 std::vector<Agreement> CompareFinalPoses(std::span<const Record> records);
 
 /// The largest difference of the final poses that two records both have: lengths over the link

@@ -5,6 +5,7 @@
 #include <limits>
 #include <numbers>
 #include <optional>
+#include <sstream>
 
 #include "harness/analysis/agreement.h"
 #include "harness/analysis/refinement.h"
@@ -61,6 +62,13 @@ double StepsRemembered(const Record& record) {
   return gain > 0.0 ? 2.0 / gain * per_second : record.Number("steps");
 }
 
+/// What moves is a millionth of what the absolute tolerance lets pass, with masses near 1 kg: what
+/// feedback makes of rounding in a mechanism at rest.
+bool IsAtRest(const Record& record) {
+  const double speed = 1e-6 * record.Number("atol");
+  return record.Number("energy_scale") <= speed * speed;
+}
+
 /// Near enough to a singular position that the level has nothing to keep the branch by. Records of
 /// large mechanisms do not know the distance, but whether evaluations were softened.
 bool PassedSingularPosition(const Record& record) {
@@ -69,6 +77,24 @@ bool PassedSingularPosition(const Record& record) {
   const double distance = record.Number("singularity_distance_min");
   if (std::isnan(distance)) return record.Number("softened_evaluations") > 0;
   return distance < kRankRatio;
+}
+
+void Add(std::string* codes, bool on, const char* code) {
+  if (on) *codes += (codes->empty() ? "" : " ") + std::string(code);
+}
+
+/// The same codes but for one.
+std::string Without(const std::string& code, const std::string& codes) {
+  std::istringstream words(codes);
+  std::string rest;
+  for (std::string word; words >> word;) Add(&rest, word != code, word.c_str());
+  return rest;
+}
+
+/// Whether a run with these codes has nothing against the way that it went: members of ensembles
+/// and exponents are not about it.
+bool TellsOfItsWay(const std::string& codes) {
+  return Without(kMembersDoubt, Without(kExponentDoubt, codes)).empty();
 }
 
 /// Within as many tolerances as runs may be apart. The reference has an error of its own, and
@@ -82,10 +108,6 @@ bool IsNearReference(const Record& record) {
 /// The same to the end of the run.
 bool IsCertified(const Record& record) {
   return record.Find("error_position_end") != nullptr && IsNearReference(record);
-}
-
-void Add(std::string* codes, bool on, const char* code) {
-  if (on) *codes += (codes->empty() ? "" : " ") + std::string(code);
 }
 
 }  // namespace
@@ -145,7 +167,7 @@ std::string OwnDoubts(const Record& record) {
   const auto has = [&](const char* key) { return record.Find(key) != nullptr; };
   Add(&codes,
       (has("energy_scale") || has("energy_error_relative")) &&
-          !(EnergyErrorShare(record) <= kMostEnergyError),
+          !(EnergyErrorShare(record) <= kMostEnergyError) && !IsAtRest(record),
       kEnergyDoubt);
   // where the reference knows the way, who kept to it did
   Add(&codes, PassedSingularPosition(record) && !IsCertified(record), kSingularDoubt);
@@ -167,14 +189,21 @@ std::string OwnDoubts(const Record& record) {
 }
 
 void SetDoubts(std::vector<Record>* records) {
-  const std::vector<Agreement> agreements = CompareFinalPoses(*records);
+  std::vector<std::string> own;
+  std::vector<bool> testifies;
+  for (const Record& record : *records) {
+    own.push_back(OwnDoubts(record));
+    testifies.push_back(TellsOfItsWay(own.back()));
+  }
+  const std::vector<Agreement> agreements = CompareFinalPoses(*records, testifies);
   const std::vector<Refinement> refinements = CompareTolerances(*records);
   for (std::size_t i = 0; i < records->size(); ++i) {
     Record& record = (*records)[i];
     if (record.Text("kind") != "accuracy" || !HasFinished(record)) continue;
-    std::string codes = OwnDoubts(record);
     // the others need not be right; a reference is
     const bool certified = IsCertified(record);
+    // who ends as those do that can keep a branch has kept it
+    std::string codes = agreements[i].is_backed ? Without(kSingularDoubt, own[i]) : own[i];
     Add(&codes, agreements[i].doubted && !certified, kDisagreementDoubt);
     Add(&codes, refinements[i].doubted && !certified, kRefinementDoubt);
     record.Set("doubts", codes);

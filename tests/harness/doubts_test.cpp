@@ -205,6 +205,27 @@ TEST(Agreement, FinerTolerancesDecideWhereDifferentEquationsAgree) {
   EXPECT_EQ(both(same, Scene(1e-8, 2.0)), "disagreement:1 disagreement:1 disagreement:2 :1 :1 ");
 }
 
+TEST(Agreement, RunsThatDoubtThemselvesDecideNothing) {
+  // the third passed a singular position below level position, and ended elsewhere
+  std::vector<Record> records = Scene(1e-8, 2.0);
+  records[2].Set("singularity_passages", std::int64_t{1});
+  EXPECT_EQ(DoubtsAndSets(records), ":1 :1 singular-passage disagreement:2 ");
+  // one that went the same way as level position kept its branch
+  records = Scene(1e-8, 3.0);
+  records[2].Set("singularity_passages", std::int64_t{1});
+  EXPECT_EQ(DoubtsAndSets(records), ":1 :1 :1 ");
+  // but not where nobody's level keeps one
+  records[0].Set("enforcement", std::string("velocity"));
+  EXPECT_EQ(DoubtsAndSets(records), ":1 :1 singular-passage:1 ");
+  // where all doubt themselves, all testify: nobody is cleared by numbers
+  records = Scene(1e-8, 2.0);
+  records[0].Set("enforcement", std::string("velocity"));
+  for (Record& record : records) record.Set("singularity_passages", std::int64_t{1});
+  EXPECT_EQ(DoubtsAndSets(records),
+            "singular-passage disagreement:1 singular-passage disagreement:1 "
+            "singular-passage disagreement:2 ");
+}
+
 TEST(Agreement, PeersTestifyUnlessTheirClosuresGiveWay) {
   const auto with_peer = [](const char* name, double angle) {
     std::vector<Record> records = Scene(1e-8, 3.0);
@@ -340,7 +361,8 @@ TEST(Doubts, TheStraightLineLinkageThatEndsOnAnotherBranch) {
     ASSERT_EQ(record.Text("outcome"), "finished") << record.Text("message");
     const bool position = record.Text("enforcement") == "position";
     EXPECT_EQ(HasDoubt(record, kSingularDoubt), !position);
-    EXPECT_TRUE(HasDoubt(record, kDisagreementDoubt)) << record.Text("doubts");
+    // two coordinate sets agree that have nothing against themselves: they decide
+    EXPECT_EQ(HasDoubt(record, kDisagreementDoubt), !position) << record.Text("doubts");
     EXPECT_EQ(record.Number("agreement") == 1, position);
     EXPECT_FALSE(HasDoubt(record, kEnergyDoubt) || HasDoubt(record, kDriftDoubt));
   }

@@ -85,9 +85,9 @@ class BenchIn final : public TrialBench {
     const StepObserver observe = [&](double t, std::span<double> state) {
       return system->BeginStep(t, state) ? StepAction::kRestart : StepAction::kContinue;
     };
+    const Measured measured{scene_.user, compiled_, {}};
     DenseObserver dense;
     if (meter != nullptr) {
-      const Measured measured{scene_.user, compiled_, {}};
       dense.times = meter->times();
       dense.observe = [&](std::size_t k, std::span<const double> state, std::span<const double>) {
         Snapshot snapshot = EmptySnapshot(measured);

@@ -150,9 +150,10 @@ struct Precision {
 
 /// Certified references that accuracy runs are held against (harness/precision/make_reference.h).
 struct ReferenceOptions {
-  std::string scalar = "long-double";  ///< or "float128", of planar mechanisms
-  int points = 101;                    ///< times, evenly from the start to the end
-  double cpu_s = 20.0;                 ///< of one witness [s]; it certifies as far as it gets
+  /// "long-double", "float128" (of planar mechanisms), or the first that certifies to the end.
+  std::string scalar = "as-needed";
+  int points = 101;     ///< times, evenly from the start to the end
+  double cpu_s = 20.0;  ///< of one witness [s]; it certifies as far as it gets
 };
 
 struct Experiment {

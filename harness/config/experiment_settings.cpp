@@ -150,14 +150,15 @@ const Fields<Precision>& PrecisionFields() {
 }
 
 const Fields<ReferenceOptions>& ReferenceFields() {
-  static const NameList scalars({"long-double", "float128"});
+  static const NameList scalars({"as-needed", "long-double", "float128"});
   static const Fields<ReferenceOptions> fields(
       "reference",
       "Each mechanism and horizon once more at high order in a wide scalar, by two formulations "
       "and "
       "at two tolerances: where these agree, runs are held against them. Kept beside the store.",
       {{"scalar", Choice(&ReferenceOptions::scalar, scalars, "a wide scalar"),
-        "float128 has 33 digits, takes some 50 times as long, and is for planar mechanisms."},
+        "float128 has 33 digits, takes some 50 times as long, and is for planar mechanisms; as "
+        "needed it follows where long-double does not certify to the end."},
        {"points", Integer(&ReferenceOptions::points, 2, kMostPoints),
         "Times at which errors are taken, evenly from the start to the end."},
        {"cpu_s", Number(&ReferenceOptions::cpu_s, kPositive),

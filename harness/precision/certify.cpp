@@ -1,9 +1,10 @@
 #include "harness/precision/certify.h"
 
+#include <fmt/format.h>
+
 #include <algorithm>
 #include <cmath>
 #include <limits>
-#include <sstream>
 
 namespace loopbench::harness {
 namespace {
@@ -66,35 +67,33 @@ WideDistance<S> Bound(const WideDistance<S>& a, const WideDistance<S>& b) {
 
 template <class Space, class S>
 Certified<Space, S> Certify(const MechanismDescription& description,
-                            const std::vector<double>& times, double cpu_s) {
-  const S tightest = S(kTightest<S>) * std::numeric_limits<S>::epsilon();
-  const auto follow = [&](const char* formulation, double factor, int fewer) {
-    return Follow<Space, S>(description, formulation, S(factor) * tightest, fewer, times, cpu_s);
-  };
+                            const std::vector<double>& times, double cpu_s, PutBack put_back) {
+  const S tightest = S(Tightest<S>(put_back)) * std::numeric_limits<S>::epsilon();
   Certified<Space, S> result;
-  result.reference = follow("lagrange", 1.0, 0);
-  const Witness<Space, S> others[] = {follow("lagrange", kLooser, 1), follow("odca", kBetween, 2)};
-  result.witnesses = "gragg";
-  std::size_t count = times.size();
-  const auto count_in = [&](const Witness<Space, S>& witness) {
-    std::ostringstream text;
-    text.precision(1);
-    text << ' ' << witness.formulation << ' ' << static_cast<double>(witness.tolerance);
-    result.witnesses += text.str();
+  result.witnesses = put_back == PutBack::kAtStages ? "gragg, stages put back," : "gragg";
+  std::vector<double> followed = times;
+  const auto follow = [&](const char* formulation, double factor, int fewer) {
+    const WitnessOptions<S> options{formulation, S(factor) * tightest, fewer, put_back, cpu_s};
+    Witness<Space, S> witness = Follow<Space, S>(description, options, followed);
+    result.witnesses += fmt::format(" {} {:.2g}", formulation, double(options.tolerance));
     result.rhs_evaluations += witness.rhs_evaluations;
     result.cpu_s += witness.cpu_s;
     if (witness.outcome != Outcome::kFinished && result.outcome == Outcome::kFinished) {
       result.outcome = witness.outcome;
       result.message = witness.message;
     }
-    count = std::min(count, witness.moments.size());
+    followed.resize(witness.moments.size());
+    return witness;
   };
-  count_in(result.reference);
-  for (const auto& other : others) count_in(other);
-  for (std::size_t k = 0; k < count; ++k) {
+  result.reference = follow("lagrange", 1.0, 0);
+  if (followed.size() < 2) return result;  // nothing moves
+  const Witness<Space, S> looser = follow("lagrange", kLooser, 1);
+  if (followed.size() < 2) return result;
+  const Witness<Space, S> other = follow("odca", kBetween, 2);
+  for (std::size_t k = 0; k < followed.size(); ++k) {
     const Moment<Space, S>& own = result.reference.moments[k];
-    WideDistance<S> bound = Bound(DistanceOf<Space, S>(own, others[0].moments[k]),
-                                  DistanceOf<Space, S>(own, others[1].moments[k]));
+    WideDistance<S> bound = Bound(DistanceOf<Space, S>(own, looser.moments[k]),
+                                  DistanceOf<Space, S>(own, other.moments[k]));
     // witnesses may meet by chance; a bound that was reached stays
     if (k > 0) bound = Larger(bound, result.bounds.back());
     result.bounds.push_back(bound);
@@ -104,7 +103,7 @@ Certified<Space, S> Certify(const MechanismDescription& description,
 
 #define LOOPBENCH_INSTANTIATE(SPACE, S)                                       \
   template Certified<SPACE, S> Certify<SPACE, S>(const MechanismDescription&, \
-                                                 const std::vector<double>&, double);
+                                                 const std::vector<double>&, double, PutBack);
 LOOPBENCH_INSTANTIATE(Planar, long double)
 LOOPBENCH_INSTANTIATE(Planar, ::loopbench::Float128)
 LOOPBENCH_INSTANTIATE(Spatial, long double)

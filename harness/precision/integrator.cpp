@@ -14,10 +14,6 @@ namespace {
 
 // harness/config/options.cpp: the values of profile ode45.
 constexpr double kSafety = 0.8, kGrowth = 5.0, kReduction = 0.1, kRepeatedFailure = 0.5;
-// ARKODE's, not the 60 of runs in double (integrator/arkode.cpp): where rounding in float cannot
-// meet a tolerance, more halvings find steps that pass by chance, and a run crawls instead of
-// ending.
-constexpr int kMostFailures = 7;
 
 template <class S>
 class Run {
@@ -87,9 +83,10 @@ class Run {
       const bool last = !(t_ + h_ < t_end_ - close_);
       const S h = last ? t_end_ - t_ : h_;
       const Outcome outcome = step_.Attempt(t_, y_, f_, h);
-      if (outcome != Outcome::kFinished) return outcome;
+      const bool is_known = outcome == Outcome::kFinished;
+      if (!is_known && !options_.steps_around_failures) return outcome;
       if (options_.fixed_step > S(0)) return Accept(last ? t_end_ : t_ + h, h);
-      const S error = ScaledError();
+      const S error = is_known ? ScaledError() : std::numeric_limits<S>::max();
       if (error <= S(1)) {
         // what was clipped was good enough, and says less than the step that was meant
         const S next = h * Factor(error, largest);
@@ -97,8 +94,11 @@ class Run {
         return Accept(last ? t_end_ : t_ + h, h);
       }
       ++result_.rejected;
-      if (++failures == kMostFailures) return Outcome::kStepTooSmall;
-      h_ = h * Factor(error, failures > 1 ? S(kRepeatedFailure) : S(1));
+      if (++failures == options_.most_failures) {
+        return is_known ? Outcome::kStepTooSmall : outcome;
+      }
+      h_ = h * (is_known ? Factor(error, failures > 1 ? S(kRepeatedFailure) : S(1))
+                         : S(kRepeatedFailure));
       largest = S(1);  // a step after a failure does not grow
     }
   }

@@ -45,6 +45,12 @@ struct OneStepOptions {
   S first_step = S(0);    ///< 0: found by the profile's rule
   S longest_step = S(0);  ///< 0: a tenth of the interval
   std::int64_t step_limit = 10'000'000;
+  /// Error tests a step may fail before the run ends; ARKODE's, not the 60 of runs in double
+  /// (integrator/arkode.cpp): where rounding in float cannot meet a tolerance, more halvings find
+  /// steps that pass by chance, and a run crawls instead of ending.
+  int most_failures = 7;
+  /// A stage without a derivative fails the error test, else it ends the run.
+  bool steps_around_failures = false;
   double time_limit_s = 600.0;  ///< CPU time of the thread, looked at after each step
 };
 
@@ -57,7 +63,7 @@ struct OneStepResult {
 };
 
 /// From options.begin to t_end [s] behind it; y is the state at t_reached afterwards. A step that
-/// fails its error test seven times, or an accepted one of at most 16 eps t, ends the run as
+/// fails its error test too often, or an accepted one of at most 16 eps t, ends the run as
 /// step-too-small.
 template <class S>
 OneStepResult IntegrateSystem(const Problem<S>& system, S t_end, std::vector<S>& y,

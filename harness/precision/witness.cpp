@@ -16,17 +16,63 @@ namespace loopbench::harness {
 namespace {
 
 template <class Space, class S>
-std::unique_ptr<System<Space, S>> Make(std::string_view formulation,
+std::unique_ptr<System<Space, S>> Make(std::string_view formulation, SolverKind solver,
                                        const Mechanism<Space, S>& mechanism) {
-  const FormulationOptions options{.enforcement = Enforcement::kPosition,
-                                   .solver = SolverKind::kAsPublished};
+  const FormulationOptions options{.enforcement = Enforcement::kPosition, .solver = solver};
   if (formulation == "odca") return MakeSystem<odca::Odca>(mechanism, options);
   return MakeSystem<lagrange::Lagrange>(mechanism, options);
 }
 
+/// A system as it is integrated, with derivatives by PutBack.
+template <class Space, class S>
+class Followed {
+ public:
+  Followed(const Mechanism<Space, S>& mechanism, const WitnessOptions<S>& options)
+      : mechanism_(mechanism),
+        options_(options),
+        system_(Make<Space, S>(options.formulation, SolverKind::kAsPublished, mechanism)) {}
+
+  System<Space, S>& system() { return *system_; }
+
+  Outcome Derivative(S t, std::span<const S> y, std::span<S> rates) {
+    if (options_.put_back == PutBack::kAtSteps) return system_->Derivative(t, y, rates);
+    stage_.assign(y.begin(), y.end());
+    system_->BeginStep(t, stage_);
+    const Outcome outcome = system_->Derivative(t, stage_, rates);
+    const bool goes_on_from_here = t == accepted_t_;
+    return outcome == Outcome::kSingular && goes_on_from_here ? Softened(t, y, rates) : outcome;
+  }
+
+  bool Accept(S t, std::span<S> y) {
+    accepted_t_ = t;
+    return system_->BeginStep(t, y);
+  }
+
+ private:
+  Outcome Softened(S t, std::span<const S> y, std::span<S> rates) {
+    if (softened_ == nullptr) {
+      softened_ = Make<Space, S>(options_.formulation, SolverKind::kRankRevealing, mechanism_);
+      softened_->Start(t, system_->q(), system_->u());
+    }
+    return softened_->Derivative(t, y, rates);
+  }
+
+  const Mechanism<Space, S>& mechanism_;
+  const WitnessOptions<S>& options_;
+  std::unique_ptr<System<Space, S>> system_, softened_;
+  std::vector<S> stage_;
+  S accepted_t_ = S(0);
+};
+
 /// Of Gragg's method: orders 14 and 20.
 template <class S>
 constexpr int kColumns = std::same_as<S, long double> ? 7 : kMostColumns;
+
+/// Halvings of a step that runs into a singular position, before a witness gives up.
+constexpr int kMostFailures = 40;
+/// What a stretch without a singular position may take: so many steps and so many times those of
+/// the longest one before it. Of the first nothing is known.
+constexpr std::int64_t kFewSteps = 5000, kManyTimes = 100, kFirstStretch = 100'000;
 
 /// Where a step must end, and what for.
 struct Stop {
@@ -66,41 +112,42 @@ Moment<Space, S> MomentOf(const Kinematics<Space, S>& kinematics) {
 }  // namespace
 
 template <class Space, class S>
-Witness<Space, S> Follow(const MechanismDescription& description, std::string_view formulation,
-                         S tolerance, int fewer, const std::vector<double>& times, double cpu_s) {
+Witness<Space, S> Follow(const MechanismDescription& description, const WitnessOptions<S>& options,
+                         const std::vector<double>& times) {
   Witness<Space, S> witness;
-  witness.formulation = formulation;
-  witness.tolerance = tolerance;
-  const CpuLimit time(cpu_s);
+  const CpuLimit time(options.cpu_s);
   const auto start = CloseStart<Space, S>(description);
   witness.outcome = start.outcome;
   witness.message = start.message;
   if (witness.outcome != Outcome::kFinished) return witness;
-  const auto system = Make<Space, S>(formulation, *start.mechanism);
-  witness.outcome = system->Start(S(0), start.system->q(), start.system->u());
+  Followed<Space, S> followed(*start.mechanism, options);
+  System<Space, S>& system = followed.system();
+  witness.outcome = system.Start(S(0), start.system->q(), start.system->u());
   if (witness.outcome != Outcome::kFinished) {
-    witness.message = std::string(formulation) + " does not start";
+    witness.message = std::string(options.formulation) + " does not start";
     return witness;
   }
-  std::vector<S> y(static_cast<std::size_t>(system->state_size()));
-  system->ToState(start.system->q(), start.system->u(), y);
-  S end = S(0), last = S(0);  // of the stretch, and the last time that its derivatives see
-  const Problem<S> problem{system->state_size(),
+  std::vector<S> y(static_cast<std::size_t>(system.state_size()));
+  system.ToState(start.system->q(), start.system->u(), y);
+  S last = S(times.back());  // the last time that derivatives of the stretch see
+  const Problem<S> problem{system.state_size(),
                            [&](S t, std::span<const S> state, std::span<S> rates) {
-                             return system->Derivative(std::min(t, last), state, rates);
+                             return followed.Derivative(std::min(t, last), state, rates);
                            },
-                           [&](S t, std::span<S> state) { return system->BeginStep(t, state); }};
+                           [&](S t, std::span<S> state) { return followed.Accept(t, state); }};
   const auto keep = [&](S t) {
-    witness.outcome = system->FromState(t, y);
-    witness.positions.push_back(system->q());
-    witness.moments.push_back(MomentOf(system->kinematics()));
+    witness.outcome = system.FromState(t, y);
+    witness.positions.push_back(system.q());
+    witness.moments.push_back(MomentOf(system.kinematics()));
   };
-  OneStepOptions<S> options{.method = OneStepMethod::kGragg,
-                            .tolerance = tolerance,
-                            .columns = kColumns<S> - fewer,
-                            .longest_step = S(times.back()) / S(10)};
-  last = S(times.back());
-  system->BeginStep(S(0), y);
+  const bool at_stages = options.put_back == PutBack::kAtStages;
+  OneStepOptions<S> steps{.method = OneStepMethod::kGragg,
+                          .tolerance = options.tolerance,
+                          .columns = kColumns<S> - options.fewer,
+                          .longest_step = S(times.back()) / S(10),
+                          .most_failures = at_stages ? kMostFailures : 7,
+                          .steps_around_failures = at_stages};
+  followed.Accept(S(0), y);
   keep(S(0));
   if (y.empty()) {  // prescribed motions leave nothing to integrate
     for (std::size_t i = 1; i < times.size() && witness.outcome == Outcome::kFinished; ++i) {
@@ -108,34 +155,39 @@ Witness<Space, S> Follow(const MechanismDescription& description, std::string_vi
     }
     return witness;
   }
+  std::int64_t most_steps = 0;
   for (const Stop& stop : StopsOf(times, start.mechanism->stop_times())) {
-    end = S(stop.t);
+    const S end = S(stop.t);
     last = stop.is_knot ? end * (S(1) - std::numeric_limits<S>::epsilon()) : end;
-    options.time_limit_s = cpu_s - time.cpu_s();
-    if (options.time_limit_s <= 0.0) {
+    steps.time_limit_s = options.cpu_s - time.cpu_s();
+    if (steps.time_limit_s <= 0.0) {
       witness.outcome = Outcome::kTimeLimit;
       break;
     }
-    const OneStepResult result = IntegrateSystem<S>(problem, end, y, options);
+    if (!at_stages) {
+      steps.step_limit = most_steps == 0 ? kFirstStretch : kFewSteps + kManyTimes * most_steps;
+    }
+    const OneStepResult result = IntegrateSystem<S>(problem, end, y, steps);
+    most_steps = std::max(most_steps, result.steps);
     witness.rhs_evaluations += result.rhs_evaluations;
     witness.outcome = result.outcome;
     if (result.outcome != Outcome::kFinished) break;
     if (stop.is_time) keep(end);
     if (witness.outcome != Outcome::kFinished) break;
-    options.begin = end;
-    options.first_step = S(result.next_step);
+    steps.begin = end;
+    steps.first_step = S(result.next_step);
   }
   if (witness.outcome != Outcome::kFinished) {
     witness.message =
-        std::string(formulation) + " ends at " + std::to_string(double(options.begin)) + " s";
+        std::string(options.formulation) + " ends at " + std::to_string(double(steps.begin)) + " s";
   }
   witness.cpu_s = time.cpu_s();
   return witness;
 }
 
 #define LOOPBENCH_INSTANTIATE(SPACE, S)                                                    \
-  template Witness<SPACE, S> Follow(const MechanismDescription&, std::string_view, S, int, \
-                                    const std::vector<double>&, double);
+  template Witness<SPACE, S> Follow(const MechanismDescription&, const WitnessOptions<S>&, \
+                                    const std::vector<double>&);
 LOOPBENCH_INSTANTIATE(Planar, long double)
 LOOPBENCH_INSTANTIATE(Planar, ::loopbench::Float128)
 LOOPBENCH_INSTANTIATE(Spatial, long double)

@@ -6,6 +6,7 @@
 #include "harness/cli/program_compare.h"
 #include "harness/cli/program_files.h"
 #include "harness/cli/program_stores.h"
+#include "harness/cli/program_view.h"
 #include "harness/config/formulations.h"
 #include "harness/record/provenance.h"
 #include "harness/text/terminal.h"
@@ -20,6 +21,7 @@ Examples: (paths from the root of the repository)
   loopbench list configs/experiments/paper/paper.json
   loopbench plan configs/experiments/paper/paper.json --set /limits/cpu_s=5
   loopbench run configs/experiments/paper/paper.json --jobs 2 --filter mechanism=four-bar
+  loopbench view configs/mechanisms/double-wishbone.json
   loopbench simplify configs/experiments/models/hall.json --errors 2
   loopbench run big.json --shard 1/2 --out part1   (and 2/2 elsewhere)
   loopbench merge part1 part2 --out whole
@@ -51,6 +53,7 @@ int RunProgram(int argc, char** argv) {
     return EscapeTerminalLines(text);
   });
   FileOptions files(app);
+  ViewOptions view(app);
   StoreOptions stores(app);
   ComparisonOptions comparison(app);
   try {
@@ -61,6 +64,7 @@ int RunProgram(int argc, char** argv) {
   try {
     const std::string typed = CommandLine(argc, argv);
     if (const auto code = files.Run(typed)) return *code;
+    if (const auto code = view.Run()) return *code;
     if (const auto code = stores.Run(typed)) return *code;
     return comparison.Run(typed).value();
   } catch (const std::exception& error) {

@@ -22,8 +22,9 @@ constexpr std::string_view kRooms[] = {"mechanism/algebra",  "mechanism/descript
                                        "harness/timing",     "harness/suite",
                                        "harness/advise",     "harness/tables",
                                        "harness/judge",      "harness/figures",
-                                       "harness/cli",        "peers",
-                                       "examples/own-parts", "tests"};
+                                       "harness/view",       "harness/cli",
+                                       "peers",              "examples/own-parts",
+                                       "tests"};
 // The build writes these headers, and one room reads them.
 constexpr std::string_view kGenerated = "harness/build_";
 

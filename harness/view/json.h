@@ -1,0 +1,21 @@
+// A picture as JSON for web/scene.js, safe inside an element of HTML.
+#pragma once
+
+#include <string>
+#include <string_view>
+
+#include "harness/view/picture.h"
+
+namespace loopbench::harness {
+
+/// A JSON string without <, >, & and separators of lines, so that no text ends the element or the
+/// line that it stands in. Control characters and bytes that are no UTF-8 are shown (escape.h).
+std::string ScriptString(std::string_view text);
+
+/// Numbers have ten digits, poses are as scene.js describes them.
+std::string ToJson(const Picture& picture);
+
+/// Poses alone, for what is drawn with the picture of the same mechanism.
+std::string PosesJson(const Poses& poses, bool planar);
+
+}  // namespace loopbench::harness

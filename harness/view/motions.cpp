@@ -1,0 +1,340 @@
+#include "harness/view/motions.h"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <cmath>
+#include <numbers>
+
+#include "mechanism/algebra/decompositions.h"
+#include "mechanism/loops/direction_rows.h"
+#include "mechanism/loops/scaled_loops.h"
+
+namespace loopbench::harness {
+namespace {
+
+using Eigen::MatrixXd;
+using Eigen::VectorXd;
+
+/// Of the largest coordinate along a swing, in rad or lengths of the mechanism; and its frames to
+/// either side.
+constexpr double kSwing = 0.7;
+constexpr int kFramesAside = 14, kFramesOfPass = 49;
+/// Where a motion leads nowhere.
+constexpr double kSmall = 0.05;
+
+/// One position of a mechanism that is moved about.
+template <class Space>
+class Follower {
+ public:
+  Follower(const Mechanism<Space, double>& mechanism, const VectorX<double>& q)
+      : mechanism_(mechanism), kinematics_(mechanism), q_(q), units_(mechanism.num_u()) {
+    kinematics_.UpdatePosition(q_);
+    units_.setOnes();
+    for (const TreeStep& step : mechanism.tree()) {
+      const JointState<Space, double>& state = kinematics_.joints()[step.joint];
+      const int offset = mechanism.joints()[step.joint].u_offset;
+      for (int i = 0; i < state.num_u; ++i) {
+        if (state.H(i).angular.isZero()) units_[offset + i] = mechanism.length();
+      }
+    }
+  }
+
+  const VectorX<double>& q() const { return q_; }
+  const VectorXd& units() const { return units_; }
+  const Kinematics<Space, double>& kinematics() const { return kinematics_; }
+
+  void Place(const VectorX<double>& q) {
+    q_ = q;
+    kinematics_.UpdatePosition(q_);
+  }
+
+  /// At another time of the prescribed motions, from the coordinates here: whether the loops close.
+  bool SetTime(double t) {
+    kinematics_.SetTime(t);
+    kinematics_.UpdatePosition(q_);
+    return Close();
+  }
+
+  /// Without regard to loops.
+  void Shift(const VectorXd& u) { Place(Moved(u)); }
+
+  /// Along what the constraints leave of `u`, which becomes the direction taken; whether the loops
+  /// close there and it is another position.
+  bool Step(double distance, VectorXd* u) {
+    if (mechanism_.num_rows() == 0) {
+      Shift(*u * (distance / Size(*u)));
+      return true;
+    }
+    const VectorX<double> before = q_;
+    const DirectionRows here = RowsOfDirections(kinematics_);
+    Eigen::CompleteOrthogonalDecomposition<MatrixXd> solver;
+    solver.setThreshold(kRankRatio);
+    solver.compute(here.rows);
+    VectorXd y = here.mass.matrixU() * *u;
+    y -= solver.solve(VectorXd(here.rows * y));
+    *u = here.mass.matrixU().solve(y);
+    *u *= distance / Size(*u);
+    Shift(*u);
+    // one that comes back to where it was has led nowhere
+    const bool moved = Close() && (q_ - before).norm() > 0.3 * (Moved(*u, before) - before).norm();
+    if (!moved) Place(before);
+    return moved;
+  }
+
+ private:
+  double Size(const VectorXd& u) const {
+    return u.cwiseQuotient(units_).template lpNorm<Eigen::Infinity>();
+  }
+  VectorX<double> Moved(const VectorXd& u, const VectorX<double>& from) const {
+    VectorX<double> rate(from.size());
+    mechanism_.Rates(from, u, rate);
+    VectorX<double> moved = from + rate;
+    mechanism_.Normalise(moved);
+    return moved;
+  }
+  VectorX<double> Moved(const VectorXd& u) const { return Moved(u, q_); }
+
+  /// Newton's method to the nearest position whose loops are closed.
+  bool Close() {
+    constexpr int kMostIterations = 12;
+    const double goal = 1e-10 * mechanism_.length();
+    for (int i = 0; i < kMostIterations; ++i) {
+      const DirectionRows here = RowsOfDirections(kinematics_);
+      if (!here.mismatch.allFinite()) return false;
+      if (here.mismatch.size() == 0 || here.mismatch.norm() < goal) return true;
+      Eigen::CompleteOrthogonalDecomposition<MatrixXd> solver;
+      solver.setThreshold(1e-9);
+      solver.compute(here.rows);
+      const VectorXd back = here.mass.matrixU().solve(VectorXd(solver.solve(-here.mismatch)));
+      if (!(Size(back) < 1.0)) return false;
+      Shift(back);
+    }
+    return false;
+  }
+
+  const Mechanism<Space, double>& mechanism_;
+  Kinematics<Space, double> kinematics_;
+  VectorX<double> q_;
+  VectorXd units_;
+};
+
+/// One of the directions in which a mechanism can begin to move.
+struct Beginning {
+  int speed = 0;  ///< the one that is one unit in it, and zero in the others
+  VectorXd u;
+};
+
+/// By speed: one where its joint has no other, less where it has.
+template <class Space>
+VectorXd Clearness(const Mechanism<Space, double>& mechanism) {
+  VectorXd clearness(mechanism.num_u());
+  for (const TreeStep& step : mechanism.tree()) {
+    const Joint<Space, double>& joint = mechanism.joints()[static_cast<std::size_t>(step.joint)];
+    if (joint.num_u() > 0) {
+      clearness.segment(joint.u_offset, joint.num_u()).setConstant(joint.num_u() == 1 ? 1.0 : 0.1);
+    }
+  }
+  return clearness;
+}
+
+/// The permitted speeds, each called by one of them; the first `most`.
+template <class Space>
+std::vector<Beginning> Beginnings(const Follower<Space>& start, std::size_t most) {
+  const Mechanism<Space, double>& mechanism = start.kinematics().mechanism();
+  const Eigen::Index n = mechanism.num_u();
+  std::vector<Beginning> all;
+  if (mechanism.num_rows() == 0) {
+    for (int i = 0; i < n && all.size() < most; ++i) all.push_back({i, VectorXd::Unit(n, i)});
+    return all;
+  }
+  const MatrixXd permitted = ScaleLoops(start.kinematics()).to_u;
+  const Eigen::Index count = permitted.cols();
+  if (count == 0) return all;
+  const MatrixXd scaled = start.units().cwiseInverse().asDiagonal() * permitted;
+  // speeds that the user calls independent, if they are, else those that are so the most
+  std::vector<int> chosen = mechanism.independent();
+  MatrixXd own(count, count);
+  const auto take = [&] {
+    for (Eigen::Index i = 0; i < count; ++i) own.row(i) = scaled.row(chosen[i]);
+  };
+  constexpr double kIndependent = 1e-2;
+  bool good = static_cast<Eigen::Index>(chosen.size()) == count;
+  if (good) {
+    take();
+    const Eigen::VectorXd values = Eigen::JacobiSVD<MatrixXd>(own).singularValues();
+    good = values[count - 1] > kIndependent * values[0];
+  }
+  if (!good) {
+    // a motion is better called by a pin than by one of the three speeds of a ball
+    const Eigen::ColPivHouseholderQR<MatrixXd> qr(
+        (scaled.transpose() * Clearness(mechanism).asDiagonal()).eval());
+    const auto& order = qr.colsPermutation().indices();
+    chosen.assign(order.data(), order.data() + count);
+    std::ranges::sort(chosen);
+    take();
+  }
+  const MatrixXd basis = permitted * own.fullPivLu().inverse();
+  for (Eigen::Index i = 0; i < count && all.size() < most; ++i) {
+    all.push_back({chosen[static_cast<std::size_t>(i)], basis.col(i)});
+  }
+  return all;
+}
+
+/// How far a swing went, in the speed that it is called by.
+std::string SwingText(double from, double to, bool is_length, bool whole) {
+  return fmt::format("{:+.3g} to {:+.3g} {}{}; loops closed again in every frame", from, to,
+                     is_length ? "m" : "rad", whole ? "" : ", where it cannot be followed further");
+}
+
+template <class Space>
+PictureMotion Swing(const MechanismDescription& description, Follower<Space>* follower,
+                    const Beginning& beginning, int frames) {
+  const Mechanism<Space, double>& mechanism = follower->kinematics().mechanism();
+  const VectorX<double> start = follower->q();
+  const Poses at_start = PosesOf(description, follower->kinematics());
+  const bool is_length = follower->units()[beginning.speed] != 1.0 ||
+                         mechanism.speed_names()[beginning.speed].ends_with("shift");
+  PictureMotion motion;
+  motion.name = mechanism.speed_names()[static_cast<std::size_t>(beginning.speed)];
+  double reach[2] = {0.0, 0.0};
+  std::vector<Poses> sides[2];
+  for (const int side : {0, 1}) {
+    follower->Place(start);
+    VectorXd u = side == 0 ? VectorXd(-beginning.u) : beginning.u;
+    while (static_cast<int>(sides[side].size()) < frames && follower->Step(kSwing / frames, &u)) {
+      reach[side] += u[beginning.speed];
+      sides[side].push_back(PosesOf(description, follower->kinematics()));
+    }
+  }
+  follower->Place(start);
+  const bool whole = std::ssize(sides[0]) == frames && std::ssize(sides[1]) == frames;
+  motion.text = SwingText(reach[0], reach[1], is_length, whole);
+  if (sides[0].empty() && sides[1].empty()) {
+    const double size =
+        beginning.u.cwiseQuotient(follower->units()).template lpNorm<Eigen::Infinity>();
+    for (const int side : {0, 1}) {
+      follower->Shift(beginning.u * ((side == 0 ? -kSmall : kSmall) / size));
+      sides[side].push_back(PosesOf(description, follower->kinematics()));
+      follower->Place(start);
+    }
+    motion.text = fmt::format(
+        "to first order only, by {:g} rad or lengths: no position that closes the "
+        "loops follows",
+        kSmall);
+  }
+  motion.frames.assign(sides[0].rbegin(), sides[0].rend());
+  motion.start = static_cast<int>(motion.frames.size());
+  motion.frames.push_back(at_start);
+  motion.frames.insert(motion.frames.end(), sides[1].begin(), sides[1].end());
+  return motion;
+}
+
+/// A time in which a given motion shows itself: a period, all of a table, a turn or a length.
+double TimeToShow(const TimeFunctionDescription& function, double unit) {
+  constexpr double kTurn = 2 * std::numbers::pi;
+  if (const auto* harmonic = std::get_if<Harmonic>(&function)) {
+    return harmonic->omega != 0.0 ? kTurn / std::abs(harmonic->omega) : 0.0;
+  }
+  if (const auto* table = std::get_if<TimeTable>(&function)) return table->times.back();
+  const Polynomial& polynomial = std::get<Polynomial>(function);
+  const auto& c = polynomial.coefficients;
+  if (c.size() > 1 && c[1] != 0.0) return kTurn * unit / std::abs(c[1]);
+  return c.size() > 2 && c[2] != 0.0 ? std::sqrt(kTurn * unit / std::abs(c[2])) : 0.0;
+}
+
+template <class Space>
+PictureMotion Pass(const MechanismDescription& description, const VectorX<double>& q,
+                   Follower<Space>* follower, int frames) {
+  double horizon = 0.0;
+  for (const JointDescription& joint : description.joints) {
+    const auto words = ValueWords(joint.type, description.space, false);
+    for (const PrescribedMotion& motion : joint.motions) {
+      const bool length = words.at(static_cast<std::size_t>(motion.coordinate)).is_length();
+      const double unit = length ? follower->kinematics().mechanism().length() / 8 : 1.0;
+      horizon = std::max(horizon, TimeToShow(motion.value, unit));
+    }
+  }
+  PictureMotion motion{.name = "prescribed motions", .returns = false};
+  double t = 0.0;
+  for (int i = 0; i < frames; ++i) {
+    t = horizon * i / (frames - 1);
+    if (!follower->SetTime(t)) break;
+    motion.frames.push_back(PosesOf(description, follower->kinematics()));
+  }
+  const bool whole = std::ssize(motion.frames) == frames;
+  motion.text = fmt::format("t = 0 to {:.3g} s, all else as the loops carry it{}", t,
+                            whole ? "" : "; they close no further");
+  follower->Place(q);
+  follower->SetTime(0.0);
+  follower->Place(q);
+  return motion;
+}
+
+}  // namespace
+
+template <class Space>
+Poses PosesOf(const MechanismDescription& description,
+              const Kinematics<Space, double>& kinematics) {
+  Poses poses(description.bodies.size());
+  for (std::size_t b = 0; b < poses.size(); ++b) {
+    const Pose<Space, double>& X = kinematics.poses()[b];
+    for (int i = 0; i < Space::kLin; ++i) {
+      poses[b].p[i] = X.p[i];
+      for (int j = 0; j < Space::kLin; ++j) poses[b].R(i, j) = X.R(i, j);
+    }
+    if (b == kGround) continue;
+    Eigen::Vector3d com = description.bodies[b].com;
+    if (Space::kLin == 2) com.z() = 0.0;
+    poses[b].p -= poses[b].R * com;
+  }
+  return poses;
+}
+
+template <class Space>
+std::vector<PictureMotion> FindMotions(const MechanismDescription& description,
+                                       const Mechanism<Space, double>& mechanism,
+                                       const VectorX<double>& q, std::string* left_out) {
+  std::vector<PictureMotion> motions;
+  if (mechanism.num_rows() > 0 && mechanism.num_u() > kMostFollowed) {
+    *left_out = fmt::format("motions: the loops have {} speeds, followed are up to {}",
+                            mechanism.num_u(), kMostFollowed);
+    return motions;
+  }
+  Follower<Space> follower(mechanism, q);
+  // few frames rather than few motions
+  const auto bodies = description.bodies.size();
+  const std::size_t fit = kMostFrames / bodies;
+  const auto frames_of = [&](std::size_t count, int wanted) {
+    return std::min(wanted, static_cast<int>(fit / count));
+  };
+  if (!mechanism.drives().empty() && fit >= 2) {
+    motions.push_back(Pass(description, q, &follower, frames_of(2, kFramesOfPass)));
+  }
+  constexpr int kFewest = 3;
+  const std::size_t most =
+      std::clamp<std::size_t>(fit / (2 * (2 * kFewest + 1)), fit >= 7 ? 1 : 0, kMostMotions);
+  if (most == 0) {
+    *left_out = fmt::format("motions: {} bodies have no room in the {} places of all frames",
+                            bodies - 1, kMostFrames);
+    return motions;
+  }
+  const std::vector<Beginning> beginnings = Beginnings(follower, most);
+  for (const Beginning& beginning : beginnings) {
+    const int aside =
+        std::clamp(frames_of(4 * beginnings.size(), kFramesAside), kFewest, kFramesAside);
+    motions.push_back(Swing(description, &follower, beginning, aside));
+  }
+  return motions;
+}
+
+#define LOOPBENCH_INSTANTIATE(Space)                                                     \
+  template Poses PosesOf(const MechanismDescription&, const Kinematics<Space, double>&); \
+  template std::vector<PictureMotion> FindMotions(const MechanismDescription&,           \
+                                                  const Mechanism<Space, double>&,       \
+                                                  const VectorX<double>&, std::string*);
+LOOPBENCH_INSTANTIATE(Planar)
+LOOPBENCH_INSTANTIATE(Spatial)
+#undef LOOPBENCH_INSTANTIATE
+
+}  // namespace loopbench::harness

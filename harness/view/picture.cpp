@@ -1,0 +1,296 @@
+#include "harness/view/picture.h"
+
+#include <fmt/format.h>
+
+#include <Eigen/Geometry>
+#include <algorithm>
+#include <cmath>
+
+#include "harness/view/motions.h"
+#include "harness/view/shapes.h"
+#include "mechanism/loops/excursion.h"
+#include "mechanism/simplify/compile.h"
+#include "mechanism/simplify/structure.h"
+
+namespace loopbench::harness {
+namespace {
+
+using Eigen::Vector3d;
+
+std::string VectorText(const Vector3d& v, SpaceKind space) {
+  return space == SpaceKind::kPlanar ? fmt::format("({:.6g}, {:.6g})", v.x(), v.y())
+                                     : fmt::format("({:.6g}, {:.6g}, {:.6g})", v.x(), v.y(), v.z());
+}
+
+std::string ForceText(const MechanismDescription& description, ForceDescription force) {
+  const ForceParts parts = PartsOf(force);
+  std::vector<std::string> words;
+  bool is_length = true;
+  if (parts.joint != nullptr) {
+    const JointDescription& joint = description.joints[static_cast<std::size_t>(*parts.joint)];
+    words.push_back("at joint " + joint.name);
+    is_length = ValueWords(joint.type, description.space, false).at(0).is_length();
+  }
+  for (const BodyPoint* point : parts.points) {
+    words.push_back("at " + description.bodies[static_cast<std::size_t>(point->body)].name + " " +
+                    VectorText(point->at, description.space));
+  }
+  if (parts.force != nullptr) {
+    words.push_back(fmt::format("{} N in {} axes", VectorText(*parts.force, description.space),
+                                *parts.in_body_axes ? "body" : "ground"));
+  }
+  for (const ForceNumber& number : parts.numbers) {
+    if (*number.value == 0.0) continue;
+    words.push_back(
+        fmt::format("{} {:.6g} {}", number.key, *number.value, number.quantity.Unit(is_length)));
+  }
+  return fmt::format("{}", fmt::join(words, ", "));
+}
+
+/// What of a mechanism stands in no position: names and numbers.
+void AddItems(const MechanismDescription& description, Picture* picture) {
+  const bool detailed = description.bodies.size() <= kMostDetailed;
+  for (const BodyDescription& body : description.bodies) {
+    picture->centres.push_back({.body = static_cast<int>(picture->items.size()), .at = body.com});
+    PictureItem& item = picture->items.emplace_back(PictureItem{ItemKind::kBody, body.name});
+    if (!detailed || picture->items.size() == 1) continue;
+    item.detail = fmt::format("body, {:.6g} kg, centre of mass {}", body.mass,
+                              VectorText(body.com, description.space));
+  }
+  picture->items.front().detail = "ground";
+  for (const JointDescription& joint : description.joints) {
+    PictureItem& item = picture->items.emplace_back(PictureItem{ItemKind::kJoint, joint.name});
+    item.detail = fmt::format("{} from {} to {}", ToString(joint.type),
+                              description.bodies[static_cast<std::size_t>(joint.from.body)].name,
+                              description.bodies[static_cast<std::size_t>(joint.to.body)].name);
+    if (!joint.motions.empty()) item.detail += ", with a prescribed motion";
+  }
+  for (ForceDescription force : description.forces) {
+    const ForceParts parts = PartsOf(force);
+    picture->items.push_back(
+        {ItemKind::kForce, std::string(parts.name), ForceText(description, force)});
+  }
+}
+
+/// What a run leaves out or takes together, by the images of bodies and joints.
+void MarkGone(const MechanismDescription& description, Picture* picture) {
+  const Compiled compiled = Compile(description);
+  picture->notes = compiled.report;
+  for (std::size_t b = 1; b < compiled.bodies.size(); ++b) {
+    const BodyImage& image = compiled.bodies[b];
+    PictureItem& item = picture->items[b];
+    if (image.part < 0 || image.body == kGround) {
+      item.gone = "does not move: part of the ground";
+      continue;
+    }
+    const std::string& host = compiled.parts[static_cast<std::size_t>(image.part)]
+                                  .description.bodies[static_cast<std::size_t>(image.body)]
+                                  .name;
+    if (host != item.name) item.gone = "moves as one with " + host;
+  }
+  for (std::size_t j = 0; j < compiled.joints.size(); ++j) {
+    if (compiled.joints[j].part >= 0) continue;
+    picture->items[picture->ItemOfJoint(static_cast<int>(j))].gone =
+        "nothing moves in it: its bodies are one";
+  }
+}
+
+/// Coordinates as a file says them, of the joints of the tree; zero where it says nothing.
+template <class Space>
+VectorX<double> GivenCoordinates(const MechanismDescription& description,
+                                 const Mechanism<Space, double>& mechanism) {
+  VectorX<double> q = VectorX<double>::Zero(mechanism.num_q());
+  for (const TreeStep& step : mechanism.tree()) {
+    const Joint<Space, double>& joint = mechanism.joints()[static_cast<std::size_t>(step.joint)];
+    if (joint.kind->has_quaternion()) q[joint.q_offset] = 1.0;
+  }
+  for (const JointValues& values : description.initial.coordinates) {
+    const Joint<Space, double>& joint = mechanism.joints()[static_cast<std::size_t>(values.joint)];
+    for (int i = 0, next = joint.q_offset; joint.in_tree() && i < joint.kind->num_q; ++i) {
+      if (mechanism.DriveOf(joint, i) < 0) q[next++] = values.values[static_cast<std::size_t>(i)];
+    }
+  }
+  mechanism.Normalise(q);
+  return q;
+}
+
+/// How open a cut joint is: about [rad] and along [m] what it should hold, in ground axes.
+template <class Space>
+Direction<Space, double> OpennessOf(const Kinematics<Space, double>& kinematics, int joint) {
+  const JointState<Space, double>& state = kinematics.joints()[static_cast<std::size_t>(joint)];
+  return state.Sum(state.Along(kinematics.ConstraintMismatch(joint), state.rows()), state.rows());
+}
+
+/// Symbols as large as suits the links, and no larger than suits the picture.
+void Measure(const MechanismDescription& description, Picture* picture) {
+  const auto points = Attachments(description);
+  Eigen::AlignedBox3d box;
+  std::vector<double> links;
+  for (std::size_t b = 0; b < points.size(); ++b) {
+    Eigen::AlignedBox3d own;
+    for (const Vector3d& at : points[b]) {
+      const Vector3d p = PicturePlace{.body = static_cast<int>(b), .at = at}.In(picture->start);
+      box.extend(p);
+      own.extend(p);
+    }
+    if (b != kGround && !own.isEmpty() && own.diagonal().norm() > 0.0) {
+      links.push_back(own.diagonal().norm());
+    }
+  }
+  picture->extent = box.isEmpty() ? 0.0 : box.sizes().maxCoeff();
+  // a mechanism of one point has no size: anything will do
+  if (!(picture->extent > 0.0)) picture->extent = 1.0;
+  double link = picture->extent;
+  if (!links.empty()) {
+    const auto middle = links.begin() + static_cast<std::ptrdiff_t>(links.size() / 2);
+    std::nth_element(links.begin(), middle, links.end());
+    link = *middle;
+  }
+  picture->symbol = std::min(0.016 * picture->extent, 0.08 * link);
+  // links much shorter than the whole: pins of a picture that is looked at from afar
+  picture->symbol = std::max(picture->symbol, 1e-5 * picture->extent);
+}
+
+std::string FreedomText(const Structure& structure) {
+  std::string text = fmt::format("{} by counting", structure.counted_freedom);
+  if (!structure.analysed) return text;
+  text += fmt::format(", {} by rank", structure.freedom());
+  if (structure.freedom_at_start() != structure.freedom()) {
+    text += fmt::format("; {} to first order at the start, a singular position",
+                        structure.freedom_at_start());
+  }
+  return text;
+}
+
+template <class Space>
+class Maker {
+ public:
+  Maker(const MechanismDescription& description, Picture* picture)
+      : description_(description),
+        picture_(picture),
+        mechanism_(description, Coordinates::kJoint),
+        kinematics_(mechanism_) {}
+
+  void Make() {
+    const bool analysed = mechanism_.num_rows() == 0 || mechanism_.num_u() <= kMostFollowed;
+    Structure structure;
+    if (analysed && mechanism_.num_u() <= kMostAnalysedSpeeds) {
+      structure = AnalyseStructure(description_);
+      picture_->freedom = FreedomText(structure);
+      MarkGone(description_, picture_);
+    } else {
+      structure.start = Assemble<Space>(description_, mechanism_);
+      picture_->notes.push_back(fmt::format(
+          "{} speeds: rank, redundant constraints and what a run leaves out are looked for up to "
+          "{} of them; loopbench explain has more patience",
+          mechanism_.num_u(), mechanism_.num_rows() == 0 ? kMostAnalysedSpeeds : kMostFollowed));
+    }
+    const Start<double>& start = structure.start;
+    picture_->assembled = start.outcome != Outcome::kInconsistentStart;
+    picture_->message = start.message;
+    if (picture_->assembled && !start.message.empty()) picture_->notes.push_back(start.message);
+    kinematics_.UpdatePosition(GivenCoordinates(description_, mechanism_));
+    picture_->given = PosesOf(description_, kinematics_);
+    AddLoops(structure);
+    picture_->start = picture_->given;
+    if (picture_->assembled) {
+      kinematics_.UpdatePosition(start.q);
+      picture_->start = PosesOf(description_, kinematics_);
+      for (PictureLoop& loop : picture_->loops) {
+        loop.left = OpennessOf(kinematics_, loop.cut_joint).linear.norm();
+      }
+    }
+    Measure(description_, picture_);
+    AddShapes(description_, picture_);
+    if (!picture_->assembled) return;
+    std::string left_out;
+    picture_->motions = FindMotions(description_, mechanism_, start.q, &left_out);
+    if (!left_out.empty()) picture_->notes.push_back(left_out);
+    if (picture_->motions.size() == kMostMotions) {
+      picture_->notes.push_back(fmt::format("motions: the first {}", kMostMotions));
+    }
+  }
+
+ private:
+  /// With kinematics at what the file says.
+  void AddLoops(const Structure& structure) {
+    const auto add = [&](int joint) -> PictureLoop& {
+      const JointDescription& cut = description_.joints[static_cast<std::size_t>(joint)];
+      PictureLoop& loop = picture_->loops.emplace_back();
+      loop.cut_joint = joint;
+      const Direction<Space, double> open = OpennessOf(kinematics_, joint);
+      loop.turn = open.angular.norm();
+      loop.gap = open.linear.norm();
+      loop.to = loop.from = {.body = cut.to.body, .at = cut.to.position};
+      for (int i = 0; i < Space::kLin; ++i) loop.from.offset[i] = -open.linear[i];
+      return loop;
+    };
+    if (structure.loops.empty()) {
+      for (const int joint : mechanism_.constraints()) add(joint);
+    }
+    for (const LoopPath& path : structure.loops) {
+      PictureLoop& loop = add(path.cut_joint);
+      loop.bodies = path.bodies;
+      loop.joints = path.joints;
+      for (const RedundantDirection& one : structure.redundant) {
+        if (one.joint != path.cut_joint) continue;
+        loop.redundant.push_back(one.name + (one.released ? "" : " (at the start)"));
+      }
+      picture_->items[picture_->ItemOfJoint(path.cut_joint)].redundant = loop.redundant;
+    }
+  }
+
+  const MechanismDescription& description_;
+  Picture* picture_;
+  Mechanism<Space, double> mechanism_;
+  Kinematics<Space, double> kinematics_;
+};
+
+}  // namespace
+
+double Lift(ShapeStyle style) {
+  switch (style) {
+    case ShapeStyle::kGround:
+    case ShapeStyle::kBody:
+      return 0.0;
+    case ShapeStyle::kGuide:
+      return 1.0;
+    case ShapeStyle::kRod:
+    case ShapeStyle::kSpring:
+    case ShapeStyle::kDamper:
+      return 1.5;
+    case ShapeStyle::kJoint:
+      return 3.0;
+    case ShapeStyle::kSolid:
+      return 3.3;
+    case ShapeStyle::kCentre:
+      return 12.0;
+    case ShapeStyle::kForce:
+    case ShapeStyle::kDrive:
+      return 4.0;
+  }
+  return 0.0;
+}
+
+Picture MakePicture(const MechanismDescription& description, const std::string& file) {
+  Picture picture;
+  picture.name = description.name;
+  picture.file = file;
+  picture.planar = description.space == SpaceKind::kPlanar;
+  picture.gravity = description.gravity;
+  picture.bodies = description.bodies.size();
+  picture.joints = description.joints.size();
+  if (!picture.planar) {
+    const double g = description.gravity.norm();
+    picture.up = g > 0.0 ? Vector3d(-description.gravity / g) : Vector3d::UnitZ();
+  }
+  AddItems(description, &picture);
+  if (picture.planar) {
+    Maker<Planar>(description, &picture).Make();
+  } else {
+    Maker<Spatial>(description, &picture).Make();
+  }
+  return picture;
+}
+
+}  // namespace loopbench::harness

@@ -8,8 +8,20 @@
 
 namespace loopbench::harness {
 
+namespace {
+
+std::string VerdictColour(const Record& row, const TableColumn& column) {
+  if (column.key != "verdict") return "";
+  const std::string verdict = row.Text("verdict");
+  if (verdict == ToString(Verdict::kReproduced)) return "32";
+  return verdict == ToString(Verdict::kNotReproduced) ? "31" : "33";
+}
+
+}  // namespace
+
 Table VerdictTable(std::span<const ClaimResult> results) {
   Table table;
+  table.colour = &VerdictColour;
   table.columns = {{"id", "id"}, {"where", "paper"}, {"claim", "claim"}, {"verdict", "verdict"}};
   for (const auto& [rule, checks, verdict, text] : results) {
     AddRow({rule.id, rule.where, rule.claim, std::string(ToString(verdict))}, &table);

@@ -26,10 +26,15 @@ std::vector<TableColumn> Columns(std::initializer_list<string_view> keys) {
   return columns;
 }
 
+// What a table was made for stays longer than some of what tells its rows apart.
+constexpr int kAnswer = 2;
+
 // The column of a narrow table: another heading, and shorter words for values.
 TableColumn Short(string_view key, const char* header,
-                  std::vector<std::pair<std::string, std::string>> abbreviations = {}) {
-  return {std::string(key), header, FindMeasure(key)->heading.format, std::move(abbreviations)};
+                  std::vector<std::pair<std::string, std::string>> abbreviations = {},
+                  int importance = 0) {
+  return {std::string(key), header, FindMeasure(key)->heading.format, std::move(abbreviations),
+          importance};
 }
 
 std::vector<std::pair<std::string, std::string>> AbbreviatedLevels() {
@@ -153,7 +158,7 @@ const std::vector<TableColumn>& CompactPrecisionColumns() {
     const std::vector<std::pair<std::string, std::string>> parts = {{"truncation", "trunc"},
                                                                     {"round-off", "round"}};
     return Join(std::move(columns),
-                {Short("error_final", "error/m"), Short("error_ruled_by", "by", parts),
+                {Short("error_final", "error/m", {}, kAnswer), Short("error_ruled_by", "by", parts),
                  Short("drift_position_max", "drift/m"), Short("drift_ruled_by", "by", parts),
                  Short("steps", "steps")});
   }();
@@ -163,15 +168,16 @@ const std::vector<TableColumn>& CompactPrecisionColumns() {
 const std::vector<TableColumn>& CompactDriftColumns() {
   static const std::vector<TableColumn> kColumns =
       Join(CompactCaseColumns(),
-           {Short("drift_position_max", "drift [m]"), Short("energy_error_max", "dE [J]"),
-            Short("growth_exponent", "slope")});
+           {Short("drift_position_max", "drift [m]", {}, kAnswer),
+            Short("energy_error_max", "dE [J]"), Short("growth_exponent", "slope")});
   return kColumns;
 }
 
 const std::vector<TableColumn>& CompactTimingColumns() {
   static const std::vector<TableColumn> kColumns =
-      Join(CompactCaseColumns(), {Short("bodies", "bodies"), Short("rhs_ns_median", "rhs [ns]"),
-                                  Short("wall_s_median", "wall [s]")});
+      Join(CompactCaseColumns(),
+           {Short("bodies", "bodies", {}, -1), Short("rhs_ns_median", "rhs [ns]", {}, kAnswer),
+            Short("wall_s_median", "wall [s]")});
   return kColumns;
 }
 

@@ -49,23 +49,6 @@ std::string FullPrecision(const Record& row, const std::string& key) {
   return row.Text(key);
 }
 
-// Characters, not bytes: UTF-8 continuation bytes are 10xxxxxx.
-std::size_t Width(std::string_view text) {
-  return static_cast<std::size_t>(std::ranges::count_if(
-      text, [](char c) { return (static_cast<unsigned char>(c) & 0xC0u) != 0x80u; }));
-}
-
-// `text` padded to `width`, on the left for numbers. The last column of text stays unpadded.
-std::string Pad(const std::string& text, std::size_t width, Format format) {
-  const std::string padding(width - std::min(width, Width(text)), ' ');
-  return format == Format::kText ? text + padding : padding + text;
-}
-
-void AppendTrimmed(std::string* out, std::string line) {
-  line.erase(line.find_last_not_of(' ') + 1);
-  *out += line + '\n';
-}
-
 }  // namespace
 
 bool IsDoubtful(const Record& row, const std::string& key) {
@@ -123,77 +106,10 @@ std::string OutcomeColour(const Record& row, const TableColumn& column) {
   return IsDoubtful(row, column.key) ? "33" : "";
 }
 
-namespace {
-
-// The columns under a heading: the group's key stands in the heading.
 std::vector<TableColumn> ColumnsUnderHeading(const Table& table) {
   std::vector<TableColumn> columns = table.columns;
   std::erase_if(columns, [&](const TableColumn& column) { return column.key == table.group; });
   return columns;
-}
-
-// A column on a terminal: digits stand below digits, whether a mark follows them or not.
-struct TextColumn {
-  TextColumn(const TableColumn& shown, const std::vector<Record>& rows)
-      : column(shown), marked(std::ranges::any_of(rows, [&](const Record& row) {
-          return shown.format != Format::kText && IsDoubtful(row, shown.key);
-        })) {
-    width = Width(EscapeTerminal(column.header));
-    for (const Record& row : rows) width = std::max(width, Width(CellOf(row)));
-  }
-
-  std::string CellOf(const Record& row) const {
-    return EscapeTerminal(Cell(row, column)) + (marked && !IsDoubtful(row, column.key) ? " " : "");
-  }
-
-  TableColumn column;
-  bool marked;
-  std::size_t width = 0;
-};
-
-std::string RowsAsText(const Table& table, const std::vector<TextColumn>& columns,
-                       const std::vector<Record>& rows, bool colour) {
-  std::string heading;
-  std::string rule;
-  for (const TextColumn& shown : columns) {
-    const std::string gap = &shown == columns.data() ? "" : "  ";
-    heading += gap + Pad(EscapeTerminal(shown.column.header), shown.width, shown.column.format);
-    rule += gap + std::string(shown.width, '-');
-  }
-  std::string out;
-  AppendTrimmed(&out, heading);
-  AppendTrimmed(&out, rule);
-  for (const Record& row : rows) {
-    std::string text;
-    for (const TextColumn& shown : columns) {
-      std::string cell = Pad(shown.CellOf(row), shown.width, shown.column.format);
-      const std::string number = colour ? table.colour(row, shown.column) : "";
-      if (!number.empty()) cell = "\033[" + number + "m" + cell + "\033[0m";
-      text += (&shown == columns.data() ? "" : "  ") + cell;
-    }
-    AppendTrimmed(&out, text);
-  }
-  return out;
-}
-
-}  // namespace
-
-std::string ToText(const Table& table, bool colour) {
-  std::vector<TextColumn> columns;  // as wide in all groups, so that they compare
-  for (const TableColumn& column : ColumnsUnderHeading(table)) {
-    columns.emplace_back(column, table.rows);
-  }
-  std::string out = table.title.empty() ? "" : EscapeTerminal(table.title) + "\n\n";
-  bool is_first = true;
-  for (const RowGroup& group : Groups(table)) {
-    if (!is_first) out += '\n';
-    is_first = false;
-    if (!group.heading.empty()) out += EscapeTerminal(group.heading) + "\n\n";
-    out += RowsAsText(table, columns, group.rows, colour);
-  }
-  if (!table.notes.empty()) out += '\n';
-  for (const std::string& note : table.notes) out += EscapeTerminal(note) + '\n';
-  return out;
 }
 
 std::string ToCsv(const Table& table) {

@@ -19,6 +19,9 @@ struct TableColumn {
   Format format = Format::kText;
   /// Shorter words for terminal columns: (value, replacement). Empty in tables that are kept.
   std::vector<std::pair<std::string, std::string>> abbreviations = {};
+  /// Where a terminal is too narrow the least goes first, of equals the one furthest to the right.
+  int importance = 0;
+  std::size_t most_cells = 0;  ///< a text is broken into lines of so many cells; 0: it is not
 };
 
 /// Red for the outcome of a run that failed, yellow for one with doubts.
@@ -65,9 +68,13 @@ bool IsDoubtful(const Record& row, const std::string& key);
 /// series joins its numbers with ';'.
 std::string Cell(const Record& row, const TableColumn& column);
 
-/// Aligned text for a terminal: title, heading, rule, rows, notes. Columns are as wide as their
-/// widest cell, two spaces apart, counted in characters rather than bytes. With `colour` cells have
-/// the table's colours; the escape sequences take no place.
+/// The columns under a group's heading: without the group's key, which stands there.
+std::vector<TableColumn> ColumnsUnderHeading(const Table& table);
+
+/// Aligned text: title, heading, rule, rows, notes. Columns are as wide as their widest cell, two
+/// spaces apart, counted in cells of a terminal (harness/text/cells.h). With `colour` cells have
+/// the table's colours; the escape sequences take no place. fit.h makes tables as wide as a
+/// terminal.
 std::string ToText(const Table& table, bool colour = false);
 
 /// RFC 4180: a header of the column keys, then one line per row, quoted where necessary, numbers in

@@ -5,6 +5,7 @@
 #include <algorithm>
 #include <charconv>
 #include <cstdint>
+#include <iterator>
 
 #include "harness/text/hash.h"
 
@@ -102,6 +103,12 @@ bool IsMarkup(std::string_view text, std::size_t i) {
   }
 }
 
+/// Those that a font of 128 characters can put together: no thorn, no eth, no signs.
+bool IsLatin1Letter(std::uint32_t code) {
+  constexpr std::uint32_t kOthers[] = {0xD0, 0xD7, 0xDE, 0xF0, 0xF7, 0xFE};
+  return code >= 0xC0 && code <= 0xFF && std::ranges::find(kOthers, code) == std::end(kOthers);
+}
+
 std::string_view LatexOf(char c) {
   switch (c) {
     case '\\':
@@ -160,20 +167,47 @@ std::string EscapeMarkdownParagraph(std::string_view text) {
   return escaped;
 }
 
-std::string EscapeLatex(std::string_view text) {
+std::string EscapeLatex(std::string_view raw) {
   constexpr std::string_view kSpecial = "&%$#_{}";
+  const std::string shown = EscapeTerminal(raw);
   std::string escaped;
-  for (const char c : EscapeTerminal(text)) {
-    if (const std::string_view command = LatexOf(c); !command.empty()) {
+  for (std::string_view text = shown; !text.empty();) {
+    const Character character = FirstOf(text);
+    const char c = text[0];
+    if (character.code >= 0x80) {
+      const bool known = IsLatin1Letter(character.code);
+      escaped += known ? std::string(text.substr(0, character.length))
+                       : fmt::format("(U+{:04X})", character.code);
+    } else if (const std::string_view command = LatexOf(c); !command.empty()) {
       escaped += command;
-      continue;
+    } else {
+      // at the start of a row these two would belong to the line end before it
+      if (escaped.empty() && (c == '[' || c == '*')) escaped += "{}";
+      if (kSpecial.find(c) != std::string_view::npos) escaped += '\\';
+      escaped += c;
     }
-    // at the start of a row these two would belong to the line end before it
-    if (escaped.empty() && (c == '[' || c == '*')) escaped += "{}";
-    if (kSpecial.find(c) != std::string_view::npos) escaped += '\\';
-    escaped += c;
+    text.remove_prefix(character.length);
   }
   return escaped;
+}
+
+std::string BreakableLatex(std::string_view raw) {
+  constexpr std::string_view kEnds = "-_/.,:;=+";
+  constexpr int kMostLetters = 8;
+  const std::string shown = EscapeTerminal(raw);
+  std::string text;
+  int letters = 0;
+  for (std::string_view left = shown; !left.empty();) {
+    const std::size_t length = FirstOf(left).length;
+    text += EscapeLatex(left.substr(0, length));
+    letters = left[0] == ' ' ? 0 : letters + 1;
+    if (kEnds.find(left[0]) != std::string_view::npos || letters == kMostLetters) {
+      text += "\\allowbreak{}";
+      letters = 0;
+    }
+    left.remove_prefix(length);
+  }
+  return text;
 }
 
 std::string EscapeCsv(std::string_view raw) {

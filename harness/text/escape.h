@@ -27,8 +27,14 @@ std::string EscapeMarkdown(std::string_view text);
 /// A paragraph of its own, whose first characters must not make it a heading, list or quotation.
 std::string EscapeMarkdownParagraph(std::string_view text);
 
-/// Text of LaTeX, as a cell or in a comment: all special characters escaped.
+/// Text of LaTeX, as a cell or in a comment: all special characters escaped. Characters that
+/// pdflatex does not have without further packages are written as "(U+6F22)"; of accented letters
+/// it has those of Latin-1.
 std::string EscapeLatex(std::string_view text);
+
+/// The same for text that is set in lines: a word may end behind punctuation, and after eight
+/// letters.
+std::string BreakableLatex(std::string_view text);
 
 /// A field of CSV, quoted where RFC 4180 (or a reader that takes "#" for a comment) needs it. A
 /// text that a spreadsheet would take for a formula (it begins with =, +, - or @ and is no number)

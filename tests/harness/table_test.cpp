@@ -127,17 +127,24 @@ TEST(Table, LatexIsBooktabsWithEscapesAndMathematicalNumbers) {
   table.rows[1].Set("slope", -0.5);
   table.notes = {"flags 100 %\n\\end{tabular}"};
   EXPECT_EQ(ToLatex(table),
-            "% needs \\usepackage{booktabs}\n"
-            "% Drift\n"
-            "\\begin{tabular}{llrrr}\n"
+            "% needs \\usepackage{array,booktabs,longtable}\n"
+            "{\\normalsize\\setlength{\\tabcolsep}{6pt}\n"
+            "\\begin{longtable}{>{\\raggedright\\arraybackslash}p{120pt}lrrr}\n"
+            "\\caption{Drift}\\label{tab:drift} \\\\\n"
             "\\toprule\n"
             "mechanism & outcome & drift [m] & slope & steps \\\\\n"
             "\\midrule\n"
-            "four-bar & ok & $2.05 \\times 10^{-3}$ & $1.97$ & $412$ \\\\\n"
-            "50\\%\\_of \\#1 \\& \\{x\\} \\textasciitilde{}\\textasciicircum{}"
-            "\\textbackslash{} \\$ & singular & $1.00 \\times 10^{-6}$ & $-0.50$ &  \\\\\n"
+            "\\endfirsthead\n"
+            "\\toprule\n"
+            "mechanism & outcome & drift [m] & slope & steps \\\\\n"
+            "\\midrule\n"
+            "\\endhead\n"
             "\\bottomrule\n"
-            "\\end{tabular}\n"
+            "\\endfoot\n"
+            "four-\\allowbreak{}bar & ok & $2.05 \\times 10^{-3}$ & $1.97$ & $412$ \\\\\n"
+            "50\\%\\_\\allowbreak{}of \\#1 \\& \\{x\\} \\textasciitilde{}\\textasciicircum{}"
+            "\\textbackslash{} \\$ & singular & $1.00 \\times 10^{-6}$ & $-0.50$ &  \\\\\n"
+            "\\end{longtable}}\n"
             "% flags 100 %\\n\\end{tabular}\n");
 }
 
@@ -154,7 +161,7 @@ TEST(Table, GroupsAreTablesUnderHeadingsAndColumnsInListsForMachines) {
             "commit 1234\n");
   EXPECT_NE(ToMarkdown(table).find("### outcome = singular\n\n| mechanism |\n| --- |\n| a\\|b"),
             std::string::npos);
-  EXPECT_NE(ToLatex(table).find("\\paragraph{outcome = singular}"), std::string::npos);
+  EXPECT_NE(ToLatex(table).find("\\label{tab:drift-2}"), std::string::npos);
   table.columns.resize(1);
   EXPECT_TRUE(Render(table, "csv").starts_with("outcome,mechanism\nfinished,four-bar\n"));
   EXPECT_NE(Render(table, "json").find("{\"outcome\":\"finished\",\"mechanism\":\"four-bar\","),

@@ -5,6 +5,8 @@
 #   lib/                   static libraries
 #   lib/cmake/loopbench/   the package: find_package(loopbench) gives the target loopbench::loopbench
 #   share/loopbench/       schema/ and mechanisms/
+#   share/man/man1/        loopbench.1
+#   share/bash-completion/completions/, share/zsh/site-functions/, share/fish/vendor_completions.d/
 if(LOOPBENCH_SANITIZE)
   return()
 endif()
@@ -47,6 +49,21 @@ endforeach()
 set_target_properties(loopbench_harness PROPERTIES EXPORT_NAME loopbench)
 install(TARGETS ${installed} EXPORT loopbench)
 install(TARGETS loopbench RUNTIME)
+
+# The program itself knows its options: it writes its manual page and what shells complete.
+set(shell_files ${CMAKE_BINARY_DIR}/shell)
+file(MAKE_DIRECTORY ${shell_files})
+add_custom_command(OUTPUT ${shell_files}/loopbench.1 ${shell_files}/loopbench ${shell_files}/_loopbench ${shell_files}/loopbench.fish
+  COMMAND loopbench manual > ${shell_files}/loopbench.1
+  COMMAND loopbench completion bash > ${shell_files}/loopbench
+  COMMAND loopbench completion zsh > ${shell_files}/_loopbench
+  COMMAND loopbench completion fish > ${shell_files}/loopbench.fish
+  DEPENDS loopbench VERBATIM)
+add_custom_target(loopbench_shell ALL DEPENDS ${shell_files}/loopbench.1)
+install(FILES ${shell_files}/loopbench.1 DESTINATION ${CMAKE_INSTALL_MANDIR}/man1)
+install(FILES ${shell_files}/loopbench DESTINATION ${CMAKE_INSTALL_DATADIR}/bash-completion/completions)
+install(FILES ${shell_files}/_loopbench DESTINATION ${CMAKE_INSTALL_DATADIR}/zsh/site-functions)
+install(FILES ${shell_files}/loopbench.fish DESTINATION ${CMAKE_INSTALL_DATADIR}/fish/vendor_completions.d)
 
 # Headers that need what is private here (JSON, SUNDIALS, CLI11) stay here.
 install(DIRECTORY mechanism ${LOOPBENCH_FORMULATIONS} harness

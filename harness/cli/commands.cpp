@@ -5,6 +5,7 @@
 #include <map>
 
 #include "harness/analysis/doubts.h"
+#include "harness/isolation/interruption.h"
 #include "harness/judge/claims_reader.h"
 #include "harness/judge/claims_report.h"
 #include "harness/record/provenance.h"
@@ -15,6 +16,7 @@
 #include "harness/store/result_store.h"
 #include "harness/suite/precision_cases.h"
 #include "harness/suite/reference_cases.h"
+#include "harness/tables/fit.h"
 #include "harness/tables/table_view.h"
 #include "harness/text/files.h"
 #include "harness/text/terminal.h"
@@ -44,6 +46,20 @@ std::vector<Record> RecordsOf(const std::vector<std::string>& ids,
   return WithContents(std::move(asked));
 }
 
+void PrintInterrupted(const RunCommand& command, const ResultStore& store, std::size_t before) {
+  const std::size_t kept = ReadRecords(store.file()).size();
+  PrintError(
+      "interrupted: {} records are kept in {}, {} of them of this run; cases under way were "
+      "stopped "
+      "and left nothing, tables were not written\n",
+      kept, store.file().string(), kept - before);
+  if (command.suite.rerun == Rerun::kAll) {
+    PrintError("to go on, without those that were run again: the same command with --rerun none\n");
+  } else {
+    PrintError("to go on: {}\n", command.again);
+  }
+}
+
 }  // namespace
 
 int Run(const RunCommand& command, const std::string& typed) {
@@ -64,7 +80,12 @@ int Run(const RunCommand& command, const std::string& typed) {
   {
     ResultStore store(out);
     const std::vector<Record> before = ReadRecords(out);
-    count = RunSuite(experiments, command.suite, before, store);
+    try {
+      count = RunSuite(experiments, command.suite, before, store);
+    } catch (const Interrupted& interrupted) {
+      PrintInterrupted(command, store, before.size());
+      return interrupted.exit_code();
+    }
     PrintError("{} run now{}, {} were done before\n", count.run,
                count.failed > 0 ? fmt::format(" ({} not finished)", count.failed) : "",
                count.skipped);
@@ -109,7 +130,7 @@ int PrintVerdicts(const VerdictCommand& command, const std::string& typed) {
   }
   Table verdicts = VerdictTable(results);
   verdicts.notes = Provenance(typed);
-  PrintText(ToText(verdicts) + "\n");
+  PrintText(ToScreen(verdicts) + "\n");
   if (!command.out.empty()) Print("wrote {}\n", command.out.string());
   return 0;
 }

@@ -33,10 +33,12 @@ struct RunCommand {
   std::filesystem::path out;  ///< folder; default results/runs/<name of the first experiment>
   std::vector<Setting> settings;
   SuiteOptions suite;
-  int threads = 0;   ///< as of ExperimentFiles
-  std::string gate;  ///< "doubts" or ""
+  int threads = 0;    ///< as of ExperimentFiles
+  std::string gate;   ///< "doubts" or ""
+  std::string again;  ///< the command as a shell takes it, for who goes on later
 };
-/// Runs what the store does not have yet, then writes its tables.
+/// Runs what the store does not have yet, then writes its tables. Interrupted, it says what is
+/// kept, and returns 128 + the signal's number: 130 for Ctrl-C.
 int Run(const RunCommand& command, const std::string& typed);
 
 struct MergeCommand {
@@ -58,7 +60,8 @@ struct ExperimentFiles {
 /// the filter. Throws ConfigError as the reader does, and when no case of a file passes.
 std::vector<Experiment> ReadSelected(const ExperimentFiles& files);
 
-int List(const ExperimentFiles& files);
+/// `json`, here and below: one document on standard output (docs/using.md has its keys).
+int List(const ExperimentFiles& files, bool json);
 
 /// Limits of work on one mechanism file; experiments have their own.
 inline constexpr ProcessLimits kFileLimits = {.cpu_s = 60.0, .memory_mb = 2048.0};
@@ -67,19 +70,21 @@ struct CheckCommand {
   ExperimentFiles files;
   bool assembly = true;  ///< assemble the starts of mechanisms and scenes
   ProcessLimits limits = kFileLimits;
+  bool json = false;
 };
 int CheckFiles(const CheckCommand& command);
 
 struct PlanCommand {
   ExperimentFiles files;
   std::filesystem::path from;  ///< store of earlier results; times of cases it has come from there
+  bool json = false;
 };
 int PrintPlans(const PlanCommand& command);
 
 /// What experiments run and measure, and what mechanisms are made of, by the kind of each file.
 /// Mechanisms are analysed in a child process under `limits`; 2 for one that they cut off. `all`:
 /// every row of long tables.
-int Explain(const ExperimentFiles& files, bool all, const ProcessLimits& limits);
+int Explain(const ExperimentFiles& files, bool all, bool json, const ProcessLimits& limits);
 
 struct TableCommand {
   std::filesystem::path store;

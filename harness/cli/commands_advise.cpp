@@ -13,7 +13,7 @@
 #include "harness/isolation/print_from_child.h"
 #include "harness/run/run_case.h"
 #include "harness/run/short_run.h"
-#include "harness/tables/table.h"
+#include "harness/tables/fit.h"
 #include "harness/text/config_error.h"
 #include "harness/text/files.h"
 #include "harness/text/terminal.h"
@@ -161,7 +161,7 @@ void PrintAdvice(const AdviseCommand& command, const Advice& advice, const Refer
           next->wall_s / best.wall_s, next->error);
   }
   Print("\nFinalists, timed in turn\n\n");
-  PrintText(ToText(TableOf(advice.finalists, best, horizon)));
+  PrintText(ToScreen(TableOf(advice.finalists, best, horizon)));
   std::vector<Trial> finished;
   std::vector<std::string> cut_off;
   for (const Trial& trial : advice.looked_at) {
@@ -174,7 +174,7 @@ void PrintAdvice(const AdviseCommand& command, const Advice& advice, const Refer
     }
   }
   Print("\nThe best of each method and level, as the pilot had it\n\n");
-  PrintText(ToText(TableOf(finished, best, horizon)));
+  PrintText(ToScreen(TableOf(finished, best, horizon)));
   if (!cut_off.empty()) {
     Print("\nfailed or cut off as dearer, at some level: {}\n",
           fmt::format("{}", fmt::join(cut_off, ", ")));
@@ -286,7 +286,7 @@ void PrintModels(const AdviseCommand& command, const MechanismFile& file, const 
     Print("  none: nothing can be left out (loopbench simplify says why)\n");
     return;
   }
-  PrintText(ToText(table));
+  PrintText(ToScreen(table));
   Print("\nloopbench simplify {} --out FOLDER writes them.\n", command.mechanism.string());
 }
 

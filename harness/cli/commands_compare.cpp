@@ -10,12 +10,13 @@
 #include "harness/judge/fit.h"
 #include "harness/judge/statistics.h"
 #include "harness/judge/track.h"
+#include "harness/record/json_object.h"
 #include "harness/record/origin.h"
 #include "harness/record/provenance.h"
 #include "harness/store/contents.h"
 #include "harness/store/measurements.h"
 #include "harness/tables/columns.h"
-#include "harness/tables/table.h"
+#include "harness/tables/fit.h"
 #include "harness/text/files.h"
 #include "harness/text/terminal.h"
 
@@ -28,12 +29,6 @@ std::vector<Record> LoadMeasurements(const std::filesystem::path& path) {
   std::vector<Record> records = ReadMeasurements(path, &warnings);
   for (const std::string& warning : warnings) PrintError("warning: {}\n", warning);
   return records;
-}
-
-std::string RenderTable(const Table& table, const std::string& format) {
-  if (format == "csv") return ToCsv(table);
-  if (format == "markdown") return ToMarkdown(table);
-  return ToText(table);
 }
 
 void Deliver(const std::string& text, const std::filesystem::path& out) {
@@ -69,8 +64,17 @@ Table SummaryTable(const ComparisonReport& comparison) {
   return table;
 }
 
+/// Red for what makes the comparison fail.
+std::string JudgementColour(const Record& row, const TableColumn& column) {
+  if (column.key != "judgement") return "";
+  const std::string judgement = row.Text("judgement");
+  if (judgement == ToString(Judgement::kBetter)) return "32";
+  return judgement == ToString(Judgement::kSame) ? "" : "31";
+}
+
 Table FindingTable(const ComparisonReport& comparison, bool with_same) {
   Table table;
+  table.colour = &JudgementColour;
   table.title = with_same ? "All measures" : "Changes";
   table.columns = {{"judgement", "judgement"},
                    {"case", "case"},
@@ -186,6 +190,34 @@ void Choose(const Selection& where, std::vector<Record>& base, std::vector<Recor
   fresh = Filter(fresh, where);
 }
 
+JsonObject ComparisonDocument(const ComparisonReport& comparison, int code,
+                              const std::vector<std::string>& notes) {
+  std::vector<JsonObject> groups, findings;
+  for (const Record& row : SummaryTable(comparison).rows) groups.emplace_back(row);
+  for (const Finding& finding : comparison.findings) {
+    const auto& [key, unit] = std::pair(finding.measure.key, finding.measure.heading.unit);
+    findings.push_back(JsonObject()
+                           .Add("judgement", std::string(ToString(finding.judgement)))
+                           .Add("case", finding.one)
+                           .Add("measure", std::string(key))
+                           .Add("unit", std::string(unit))
+                           .Add("base", finding.base)
+                           .Add("new", finding.fresh)
+                           .Add("ratio", finding.ratio)
+                           .Add("why", finding.why));
+  }
+  return JsonObject()
+      .Add("conclusion", Conclusion(comparison, code))
+      .Add("exit_code", std::int64_t{code})
+      .Add("groups", groups)
+      .Add("findings", findings)
+      .Add("only_in_base", comparison.only_base)
+      .Add("only_in_new", comparison.only_fresh)
+      .Add("more_than_once", comparison.ambiguous)
+      .Add("other_content", comparison.other_content)
+      .Add("notes", notes);
+}
+
 }  // namespace
 
 int PrintComparison(const CompareCommand& command, const std::string& typed) {
@@ -196,7 +228,15 @@ int PrintComparison(const CompareCommand& command, const std::string& typed) {
   const ComparisonReport comparison = Compare(base, fresh, command.options);
   const int code = comparison.ExitCode(command.options);
 
-  std::vector<std::string> notes = ReasonNotes(comparison);
+  std::vector<std::string> notes;
+  NoteCommonShift(comparison, notes);
+  NoteOrigins("BASE", base, notes);
+  NoteOrigins("NEW", fresh, notes);
+  if (command.json) {
+    PrintText(ComparisonDocument(comparison, code, notes).Text() + "\n");
+    return code;
+  }
+  notes = ReasonNotes(comparison);
   NoteCases("cases only in BASE", comparison.only_base, notes);
   NoteCases("cases only in NEW", comparison.only_fresh, notes);
   NoteCases("cases there more than once, not compared", comparison.ambiguous, notes);
@@ -216,10 +256,13 @@ int PrintComparison(const CompareCommand& command, const std::string& typed) {
     return code;
   }
   if (command.format == "markdown") notes.push_back(fmt::format("command: {}", typed));
-  if (!findings.rows.empty()) PrintText(RenderTable(findings, command.format) + "\n");
+  const auto print = [&](const Table& table) {
+    PrintText((command.format == "text" ? ToScreen(table) : ToMarkdown(table)) + "\n");
+  };
+  if (!findings.rows.empty()) print(findings);
   Table summary = SummaryTable(comparison);
   summary.notes = notes;
-  PrintText(RenderTable(summary, command.format) + "\n");
+  print(summary);
   Print("{}\n", Conclusion(comparison, code));
   return code;
 }
@@ -250,7 +293,8 @@ int PrintFits(const FitCommand& command, const std::string& typed) {
     }
     table.notes.push_back(fmt::format("command: {}", typed));
   }
-  Deliver(RenderTable(table, command.format), command.out);
+  const bool on_screen = command.format == "text" && command.out.empty();
+  Deliver(on_screen ? ToScreen(table) : Render(table, command.format), command.out);
   const bool fitted = std::ranges::any_of(
       table.rows, [](const Record& row) { return row.Find("exponent") != nullptr; });
   return fitted ? 0 : 2;

@@ -14,6 +14,7 @@ struct CompareCommand {
   std::string format = "text";  ///< text, csv or markdown
   CompareOptions options;
   Selection where = {};  ///< only such records of both sides
+  bool json = false;     ///< one document on standard output, with every measure
 };
 /// 0 the same or better, 1 something is worse or different, 2 could not measure.
 int PrintComparison(const CompareCommand& command, const std::string& typed);

@@ -239,24 +239,106 @@ void ExplainExperiment(const std::filesystem::path& path, const ExperimentFiles&
       path.string());
 }
 
+JsonObject ExperimentDocument(const std::filesystem::path& path, const ExperimentFiles& files) {
+  const std::vector<Experiment> experiments = ReadSelected({{path}, files.settings, files.filter});
+  const Experiment& first = experiments.front();
+  std::size_t cases = 0, timings = 0, rungs = 0;
+  for (const Experiment& one : experiments) {
+    cases += SelectCases(one, files.filter).size();
+    timings += CountTimings(one);
+    CheckLadders(one);
+    rungs += CountRungs(one);
+  }
+  std::vector<JsonObject> scenes, sweep;
+  for (const ExperimentScene& scene : first.scenes) {
+    const MechanismDescription& description = scene.mechanism.description;
+    const bool planar = description.space == SpaceKind::kPlanar;
+    scenes.push_back(JsonObject()
+                         .Add("name", scene.name)
+                         .Add("file", scene.path.string())
+                         .Add("space", std::string(planar ? "planar" : "spatial"))
+                         .Add("bodies", Count(description.bodies.size() - 1))
+                         .Add("joints", Count(description.joints.size()))
+                         .Add("horizons", scene.horizons));
+  }
+  for (const auto& [name, value] : first.parameters.items()) {
+    std::vector<std::string> values;
+    for (const Experiment& one : experiments) {
+      const std::string text = one.parameters.Text(name);
+      if (std::ranges::find(values, text) == values.end()) values.push_back(text);
+    }
+    sweep.push_back(JsonObject().Add("name", name).Add("values", values));
+  }
+  std::vector<std::string> columns;
+  for (const Column& column : first.columns) columns.push_back(ToString(column));
+  return JsonObject()
+      .Add("file", path.string())
+      .Add("kind", std::string("experiment"))
+      .Add("name", first.name)
+      .Add("comment", first.comment)
+      .Add("cases", Count(cases))
+      .Add("combinations", Count(experiments.size()))
+      .Add("timings", Count(timings))
+      .Add("runs_in_several_scalars", Count(rungs))
+      .Add("references", first.reference.has_value())
+      .Add("sweep", sweep)
+      .Add("scenes", scenes)
+      .Add("columns", columns)
+      .Add("integrators", first.integrators)
+      .Add("tolerances", first.tolerances)
+      .Add("fixed_steps", first.fixed_steps)
+      .Add("limits", JsonObject()
+                         .Add("cpu_s", first.limits.cpu_s)
+                         .Add("steps", first.limits.steps)
+                         .Add("memory_mb", first.limits.memory_mb));
+}
+
+/// The document of a mechanism, as its child process prints it.
+std::string MechanismText(const std::filesystem::path& path, bool all, const ProcessLimits& limits,
+                          int* code) {
+  std::string text;
+  const auto work = [&] {
+    JsonObject document;
+    document.Add("file", path.string()).Add("kind", std::string("mechanism"));
+    const int ended = ExplainMechanism(path, {.all = all, .document = &document});
+    PrintText(document.Text());
+    return ended;
+  };
+  *code = std::max(*code, TextFromChild(path.string(), limits, work, &text));
+  if (!text.empty()) return text;
+  return JsonObject()
+      .Add("file", path.string())
+      .Add("kind", std::string("mechanism"))
+      .Add("error", std::string("cut off"))
+      .Text();
+}
+
 }  // namespace
 
-int Explain(const ExperimentFiles& files, bool all, const ProcessLimits& limits) {
+int Explain(const ExperimentFiles& files, bool all, bool json, const ProcessLimits& limits) {
   // the child that does the work prints into memory, and sees no terminal
-  const ExplainView view = ViewOfTerminal(all);
+  const ExplainView view = ViewOfOutput(all);
   int exit_code = 0;
+  std::string documents;
   for (const auto& path : files.paths) {
-    if (KindOfFile(path) != FileKind::kMechanism) {
-      ExplainExperiment(path, files);
-    } else if (files.settings.empty() && files.filter.empty()) {
+    const bool is_mechanism = KindOfFile(path) == FileKind::kMechanism;
+    if (is_mechanism && !(files.settings.empty() && files.filter.empty())) {
+      throw ConfigError(fmt::format(
+          "{}: --set and --filter are for experiments, and this is a mechanism", path.string()));
+    }
+    if (json) {
+      documents += (documents.empty() ? "" : ",\n") +
+                   (is_mechanism ? MechanismText(path, all, limits, &exit_code)
+                                 : ExperimentDocument(path, files).Text());
+    } else if (is_mechanism) {
       const int code =
           PrintFromChild(path.string(), limits, [&] { return ExplainMechanism(path, view); });
       exit_code = std::max(exit_code, code);
     } else {
-      throw ConfigError(fmt::format(
-          "{}: --set and --filter are for experiments, and this is a mechanism", path.string()));
+      ExplainExperiment(path, files);
     }
   }
+  if (json) PrintText("{\"files\":[" + documents + "]}\n");
   return exit_code;
 }
 

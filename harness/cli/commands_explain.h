@@ -3,25 +3,41 @@
 
 #include <cstddef>
 #include <filesystem>
+#include <optional>
 #include <string>
 #include <vector>
 
+#include "harness/record/json_object.h"
 #include "harness/tables/table.h"
+#include "harness/text/terminal.h"
 #include "mechanism/simplify/structure.h"
 
 namespace loopbench::harness {
 
 /// How much of a mechanism explain shows, and how wide.
 struct ExplainView {
-  bool all = false;         ///< else the first rows of long tables, and how many more there are
-  std::size_t width = 100;  ///< of the terminal [characters]
+  bool all = false;  ///< else the first rows of long tables, and how many more there are
+  /// Of the terminal [cells], 0: as wide as it takes; none: there is no terminal.
+  std::optional<std::size_t> width = {};
+  /// Where sections go instead, under their keys: --json.
+  JsonObject* document = nullptr;
 };
 
-/// The terminal's own width where there is one.
-ExplainView ViewOfTerminal(bool all);
+/// Of standard output.
+ExplainView ViewOfOutput(bool all);
 
-/// Title and table, indented; the last column is broken into several lines where it is too wide.
-void PrintSection(const std::string& title, const Table& table, const ExplainView& view);
+/// A sentence for people.
+template <typename... Values>
+void Say(const ExplainView& view, fmt::format_string<internal::PrintedAs<Values>...> format,
+         const Values&... values) {
+  if (view.document == nullptr) Print<Values...>(format, values...);
+}
+
+/// Title and table, indented, as wide as the terminal; without one the last column is broken into
+/// lines that end at 100 characters.
+/// In a document all rows stand under `key`, if it has one.
+void PrintSection(const std::string& title, const Table& table, const ExplainView& view,
+                  const char* key = "");
 
 /// Six digits; -0 is 0.
 std::string ShortNumber(double value);

@@ -52,46 +52,49 @@ Table LoopTable(const MechanismDescription& description, const Structure& struct
   return table;
 }
 
-void PrintFreedom(const Structure& s) {
+void PrintFreedom(const Structure& s, const ExplainView& view) {
   const int each = s.space == SpaceKind::kPlanar ? 3 : 6;
-  Print("\nDegrees of freedom\n");
-  Print("  {} by counting (Gruebler, Kutzbach): {} bodies x {} - {} constraints\n",
-        s.counted_freedom, s.bodies, each, s.rows);
+  Say(view, "\nDegrees of freedom\n");
+  Say(view, "  {} by counting (Gruebler, Kutzbach): {} bodies x {} - {} constraints\n",
+      s.counted_freedom, s.bodies, each, s.rows);
   if (!s.analysed) return;
-  Print("  {} by rank: {} speeds of the tree - rank {} of the {} constraints of loops\n",
-        s.joint_u - s.rank_nearby, s.joint_u, s.rank_nearby, s.loop_rows);
+  Say(view, "  {} by rank: {} speeds of the tree - rank {} of the {} constraints of loops\n",
+      s.joint_u - s.rank_nearby, s.joint_u, s.rank_nearby, s.loop_rows);
   if (s.locked() && s.freedom_at_start() > 0) {
-    Print(
+    Say(view,
         "  0 that lead anywhere: the start is singular, and what its constraints leave free to\n"
         "  first order falls back to it\n");
     return;
   }
   if (s.freedom_of_parts) {
-    Print("  {} that lead anywhere: a part cannot move, see Warnings\n", *s.freedom_of_parts);
+    Say(view, "  {} that lead anywhere: a part cannot move, see Warnings\n", *s.freedom_of_parts);
     return;
   }
   if (s.freedom_at_start() != s.freedom()) {
-    Print("  {} at the start, a singular position: rank {} there\n", s.freedom_at_start(), s.rank);
+    Say(view, "  {} at the start, a singular position: rank {} there\n", s.freedom_at_start(),
+        s.rank);
   }
   if (s.rank > 0 && s.singular_values.size() == 0) {
-    Print("  all constraints are independent at the start, by sparse pivots\n");
+    Say(view, "  all constraints are independent at the start, by sparse pivots\n");
   } else if (s.rank > 0) {
-    Print("  scaled singular values at the start: {:.3g} largest, {:.3g} smallest that counts\n",
-          s.singular_values[0], s.singular_values[s.rank - 1]);
+    Say(view,
+        "  scaled singular values at the start: {:.3g} largest, {:.3g} smallest that counts\n",
+        s.singular_values[0], s.singular_values[s.rank - 1]);
   }
 }
 
-void PrintRedundant(const MechanismDescription& description, const Structure& structure) {
+void PrintRedundant(const MechanismDescription& description, const Structure& structure,
+                    const ExplainView& view) {
   if (!structure.analysed) return;
-  Print("\nRedundant constraints: {}\n", structure.redundant.size());
+  Say(view, "\nRedundant constraints: {}\n", structure.redundant.size());
   bool released = false;
   for (const RedundantDirection& one : structure.redundant) {
-    Print("  {}: {}{}\n", description.joints[one.joint].name, one.name,
-          one.released ? "" : " (at the start)");
+    Say(view, "  {}: {}{}\n", description.joints[one.joint].name, one.name,
+        one.released ? "" : " (at the start)");
     released = released || one.released;
   }
   if (!released) return;
-  Print(
+  Say(view,
       "  All of these can be dropped at once; the loops then stay closed as they do now.\n"
       "  They are redundant at every position: a run imposes the others and observes all, and\n"
       "  drops others of the same joints where those serve better (\"compile\": "
@@ -114,7 +117,7 @@ void PrintIslands(const MechanismDescription& description, const Structure& stru
     row.Set("held", std::string(island.grounded ? "ground" : "nothing: it floats"));
     table.rows.push_back(row);
   }
-  PrintSection("Separate parts, connected through ground at most", table, view);
+  PrintSection("Separate parts, connected through ground at most", table, view, "parts");
 }
 
 void PrintCoordinates(const Structure& structure, const ExplainView& view) {
@@ -139,7 +142,7 @@ void PrintCoordinates(const Structure& structure, const ExplainView& view) {
     }
     table.rows.push_back(row);
   }
-  PrintSection("Coordinates", table, view);
+  PrintSection("Coordinates", table, view, "coordinates");
 }
 
 template <class Space>
@@ -169,7 +172,50 @@ void PrintPlanOfJoins(const MechanismDescription& description, const ExplainView
     row.Set("loops", std::int64_t{plan.loop_joins()});
     table.rows.push_back(row);
   }
-  PrintSection("Plan of O-DCA", table, view);
+  PrintSection("Plan of O-DCA", table, view, "odca_plan");
+}
+
+std::vector<JsonObject> LoopDocuments(const MechanismDescription& description,
+                                      const Structure& structure) {
+  std::vector<JsonObject> loops;
+  for (const LoopPath& loop : structure.loops) {
+    std::vector<std::string> joints, bodies;
+    for (const int j : loop.joints) joints.push_back(description.joints[j].name);
+    for (const int b : loop.bodies) bodies.push_back(description.bodies[b].name);
+    loops.push_back(JsonObject()
+                        .Add("cut", description.joints[loop.cut_joint].name)
+                        .Add("open_shift", loop.open_shift)
+                        .Add("open_rotation", loop.open_rotation)
+                        .Add("joints", joints)
+                        .Add("bodies", bodies));
+  }
+  return loops;
+}
+
+/// What sections do not say.
+void DescribeStructure(const MechanismDescription& description, const Structure& s,
+                       JsonObject* document) {
+  std::vector<JsonObject> redundant;
+  for (const RedundantDirection& one : s.redundant) {
+    redundant.push_back(JsonObject()
+                            .Add("joint", description.joints[one.joint].name)
+                            .Add("direction", one.name)
+                            .Add("at_every_position", one.released));
+  }
+  const auto known = [&s](int number) {
+    return s.analysed ? Value(std::int64_t{number}) : Value();
+  };
+  document->Add("start_outcome", std::string(ToString(s.start.outcome)))
+      .Add("start_message", s.start.message)
+      .Add("freedom", JsonObject()
+                          .Add("by_counting", std::int64_t{s.counted_freedom})
+                          .Add("by_rank", known(s.freedom()))
+                          .Add("at_start", known(s.freedom_at_start()))
+                          .Add("constraints_of_loops", std::int64_t{s.loop_rows})
+                          .Add("rank", known(s.rank_nearby))
+                          .Add("rank_at_start", known(s.rank)))
+      .Add("loops", LoopDocuments(description, s))
+      .Add("redundant", redundant);
 }
 
 }  // namespace
@@ -178,27 +224,40 @@ int ExplainMechanism(const std::filesystem::path& path, const ExplainView& view)
   const MechanismDescription description = ReadMechanism(path).description;
   const Structure structure = AnalyseStructure(description);
   const std::vector<Warning> warnings = FindWarnings(description, structure);
-  Print("{} ({})\n  described in {}; lengths in m, angles in rad\n", description.name,
-        path.string(), description.space == SpaceKind::kPlanar ? "the plane" : "space");
+  if (view.document != nullptr) {
+    const bool planar = description.space == SpaceKind::kPlanar;
+    view.document->Add("name", description.name)
+        .Add("space", std::string(planar ? "planar" : "spatial"))
+        .Add("gravity",
+             std::vector<double>(description.gravity.begin(), description.gravity.end()));
+    DescribeStructure(description, structure, view.document);
+  }
+  Say(view, "{} ({})\n  described in {}; lengths in m, angles in rad\n", description.name,
+      path.string(), description.space == SpaceKind::kPlanar ? "the plane" : "space");
   PrintModel(description, structure, view);
   PrintStart(description, structure, view);
-  PrintFreedom(structure);
+  PrintFreedom(structure, view);
   PrintSection("Loops", LoopTable(description, structure, view), view);
-  PrintRedundant(description, structure);
+  PrintRedundant(description, structure, view);
   PrintIslands(description, structure, view);
   PrintCoordinates(structure, view);
   PrintPlanOfJoins(description, view);
-  Print("\nWhat need not be modelled\n");
+  Say(view, "\nWhat need not be modelled\n");
   const Compiled compiled = Compile(description, CompileOptions::All());
-  if (compiled.report.empty()) Print("  nothing to save\n");
-  for (const std::string& line : compiled.report) Print("  {}\n", line);
+  if (compiled.report.empty()) Say(view, "  nothing to save\n");
+  for (const std::string& line : compiled.report) Say(view, "  {}\n", line);
   if (compiled.done != CompileOptions::None()) {
-    Print("  Savings found: {}. By default a run makes: {} (\"compile\" of an experiment).\n",
-          ToString(compiled.done), ToString(CompileOptions()));
+    Say(view, "  Savings found: {}. By default a run makes: {} (\"compile\" of an experiment).\n",
+        ToString(compiled.done), ToString(CompileOptions()));
   }
-  Print("\nWarnings\n");
-  if (warnings.empty()) Print("  none\n");
-  for (const Warning& warning : warnings) Print("  {}\n", warning.text);
+  if (view.document != nullptr) {
+    std::vector<std::string> texts;
+    for (const Warning& warning : warnings) texts.push_back(warning.text);
+    view.document->Add("savings", compiled.report).Add("warnings", texts);
+  }
+  Say(view, "\nWarnings\n");
+  if (warnings.empty()) Say(view, "  none\n");
+  for (const Warning& warning : warnings) Say(view, "  {}\n", warning.text);
   return structure.start.outcome == Outcome::kInconsistentStart ? 2 : 0;
 }
 

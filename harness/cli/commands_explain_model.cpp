@@ -174,6 +174,7 @@ Table FrameTable(const MechanismDescription& description) {
       const BodyDescription& body = description.bodies[side.body];
       Record& row = table.rows.emplace_back();
       if (from) row.Set("name", joint.name);
+      row.Set("joint", joint.name);  // for programs, in every row
       row.Set("side", std::string(from ? "F, from" : "M, to"));
       row.Set("body", body.name);
       row.Set("at", Place(body, side.position, description.space));
@@ -235,16 +236,17 @@ Table ForceTable(const MechanismDescription& description) {
 void PrintModel(const MechanismDescription& description, const Structure& structure,
                 const ExplainView& view) {
   const bool planar = description.space == SpaceKind::kPlanar;
-  Print("  gravity ({}) m/s^2 in ground axes\n",
-        VectorText(description.gravity, description.space));
-  PrintSection("Bodies", BodyTable(description, structure), view);
-  Print("  Points and com are seen from the body's origin, inertia is about com.\n");
-  if (!planar) Print("  Inertia is Ixx Iyy Izz, and Ixy Ixz Iyz where they are not zero.\n");
-  PrintSection("Joints", JointTable(description, structure), view);
+  Say(view, "  gravity ({}) m/s^2 in ground axes\n",
+      VectorText(description.gravity, description.space));
+  PrintSection("Bodies", BodyTable(description, structure), view, "bodies");
+  Say(view, "  Points and com are seen from the body's origin, inertia is about com.\n");
+  if (!planar) Say(view, "  Inertia is Ixx Iyy Izz, and Ixy Ixz Iyz where they are not zero.\n");
+  PrintSection("Joints", JointTable(description, structure), view, "joints");
   PrintSection("Frames of joints",
-               planar ? FrameTable<Planar>(description) : FrameTable<Spatial>(description), view);
-  Print("  Origin, axis and turn are in axes of the body; coordinates say how M moves in F.\n");
-  PrintSection("Forces", ForceTable(description), view);
+               planar ? FrameTable<Planar>(description) : FrameTable<Spatial>(description), view,
+               "frames");
+  Say(view, "  Origin, axis and turn are in axes of the body; coordinates say how M moves in F.\n");
+  PrintSection("Forces", ForceTable(description), view, "forces");
 }
 
 }  // namespace loopbench::harness

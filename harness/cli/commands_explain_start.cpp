@@ -95,6 +95,7 @@ class StartText {
     };
     for (std::size_t i = 0; i < positions.size(); ++i) {
       Record& row = table->rows.emplace_back();
+      row.Set("joint", description_.joints[index].name);  // for programs, in every row
       if (i == 0) {
         row.Set("name", description_.joints[index].name);
         row.Set("given", GivenBy(static_cast<int>(index)));
@@ -119,13 +120,20 @@ void PrintOf(const MechanismDescription& description, const Start<double>& start
   const StartText<Space> text(description, start);
   const bool closed = start.outcome != Outcome::kInconsistentStart;
   PrintSection(closed ? "Start as assembled, t = 0" : "Start, where the assembly gave up",
-               text.JointValuesTable(), view);
+               text.JointValuesTable(), view, "start");
   if (!closed) return;
   const Energy<double> energy = text.EnergyAtStart();
-  Print("  Energy: kinetic {} J + potential {} J = {} J\n", ShortNumber(energy.kinetic),
-        ShortNumber(energy.potential), ShortNumber(energy.total()));
-  Print("  Potential 0: coms and constant forces in the ground origin, springs at rest, joint\n");
-  Print("  torques at coordinate 0.\n");
+  if (view.document != nullptr) {
+    view.document->Add("energy", JsonObject()
+                                     .Add("kinetic", energy.kinetic)
+                                     .Add("potential", energy.potential)
+                                     .Add("total", energy.total()));
+  }
+  Say(view, "  Energy: kinetic {} J + potential {} J = {} J\n", ShortNumber(energy.kinetic),
+      ShortNumber(energy.potential), ShortNumber(energy.total()));
+  Say(view,
+      "  Potential 0: coms and constant forces in the ground origin, springs at rest, joint\n");
+  Say(view, "  torques at coordinate 0.\n");
 }
 
 }  // namespace

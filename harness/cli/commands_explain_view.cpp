@@ -1,35 +1,19 @@
 // Tables of explain on the terminal.
 #include <fmt/format.h>
-#include <sys/ioctl.h>
-#include <unistd.h>
 
 #include <algorithm>
 
 #include "harness/cli/commands_explain.h"
+#include "harness/tables/fit.h"
+#include "harness/tables/text_column.h"
+#include "harness/text/screen.h"
 #include "harness/text/terminal.h"
 
 namespace loopbench::harness {
 
 namespace {
 
-constexpr std::size_t kMostRows = 40, kFirstRows = 30, kIndent = 2, kGap = 2, kNarrowest = 24;
-
-/// `text` in pieces of at most `width` bytes where it has room for that, broken behind commas, else
-/// at spaces.
-std::vector<std::string> Broken(const std::string& text, std::size_t width) {
-  std::vector<std::string> pieces;
-  std::size_t begin = 0;
-  while (text.size() - begin > width) {
-    std::size_t end = text.rfind(", ", begin + width - 1);
-    end = end == std::string::npos || end <= begin ? text.rfind(' ', begin + width) : end + 1;
-    if (end == std::string::npos || end <= begin) end = text.find(' ', begin);
-    if (end == std::string::npos) break;
-    pieces.push_back(text.substr(begin, end - begin));
-    begin = end + 1;
-  }
-  pieces.push_back(text.substr(begin));
-  return pieces;
-}
+constexpr std::size_t kMostRows = 40, kFirstRows = 30, kIndent = 2, kNarrowest = 24;
 
 /// Without columns that say nothing.
 Table WithoutEmpty(Table table) {
@@ -40,47 +24,55 @@ Table WithoutEmpty(Table table) {
   return table;
 }
 
-/// The last column in lines of its own, as wide as the others leave it.
-Table Fitted(const Table& table, const ExplainView& view) {
+std::size_t LongestWord(std::string_view text) {
+  std::size_t longest = 0;
+  while (!text.empty()) {
+    const std::size_t end = std::min(text.find(' '), text.size());
+    longest = std::max(longest, CellsOf(text.substr(0, end)));
+    text.remove_prefix(std::min(end + 1, text.size()));
+  }
+  return longest;
+}
+
+/// For a pipe: only the last column is broken, and no name in it, for somebody may look for it.
+Table LastColumnBroken(Table table) {
+  TableColumn& last = table.columns.back();
+  if (last.format != Format::kText) return table;
   std::size_t taken = kIndent;
   for (std::size_t c = 0; c + 1 < table.columns.size(); ++c) {
-    std::size_t widest = table.columns[c].header.size();
-    for (const Record& row : table.rows) {
-      widest = std::max(widest, Cell(row, table.columns[c]).size());
-    }
-    taken += widest + kGap;
+    taken += TextColumn(table.columns[c], table.rows).width + kColumnGap;
   }
-  const std::size_t room = view.width > taken + kNarrowest ? view.width - taken : kNarrowest;
-  Table fitted = table;
-  fitted.rows.clear();
-  const TableColumn& last = table.columns.back();
+  constexpr std::size_t kUsual = 100;
+  last.most_cells = kUsual > taken + kNarrowest ? kUsual - taken : kNarrowest;
   for (const Record& row : table.rows) {
-    fitted.rows.push_back(row);
-    if (last.format != Format::kText) continue;
-    const std::vector<std::string> pieces = Broken(row.Text(last.key), room);
-    fitted.rows.back().Set(last.key, pieces.front());
-    for (std::size_t i = 1; i < pieces.size(); ++i) {
-      fitted.rows.emplace_back().Set(last.key, pieces[i]);
-    }
+    last.most_cells = std::max(last.most_cells, LongestWord(EscapeTerminal(row.Text(last.key))));
   }
-  return fitted;
+  return table;
+}
+
+Table Fitted(Table table, const ExplainView& view) {
+  if (!view.width) return LastColumnBroken(std::move(table));
+  return FitWidth(std::move(table),
+                  *view.width == 0 ? 0 : *view.width - std::min(*view.width, kIndent));
 }
 
 }  // namespace
 
-ExplainView ViewOfTerminal(bool all) {
+ExplainView ViewOfOutput(bool all) {
   ExplainView view{.all = all};
-  winsize size{};
-  if (::isatty(STDOUT_FILENO) == 1 && ::ioctl(STDOUT_FILENO, TIOCGWINSZ, &size) == 0 &&
-      size.ws_col > 0) {
-    view.width = size.ws_col;
-  }
+  if (OutputIsTerminal()) view.width = OutputScreen().width;
   return view;
 }
 
 std::string ShortNumber(double value) { return fmt::format("{:.6g}", value + 0.0); }
 
-void PrintSection(const std::string& title, const Table& table, const ExplainView& view) {
+void PrintSection(const std::string& title, const Table& table, const ExplainView& view,
+                  const char* key) {
+  if (view.document != nullptr) {
+    std::vector<JsonObject> rows(table.rows.begin(), table.rows.end());
+    if (*key != '\0') view.document->Add(key, rows);
+    return;
+  }
   Print("\n{}\n", title);
   if (table.rows.empty()) {
     Print("  none\n");

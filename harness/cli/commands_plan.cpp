@@ -1,34 +1,25 @@
 // plan: what a run would be, and about how long it would take.
 #include <fmt/format.h>
 
-#include <algorithm>
 #include <cmath>
-#include <cstdio>
 #include <map>
 #include <set>
 
 #include "harness/cli/commands.h"
 #include "harness/integrator/cpu_time.h"
-#include "harness/isolation/processes.h"
+#include "harness/record/json_object.h"
 #include "harness/run/case_identity.h"
 #include "harness/run/peers.h"
-#include "harness/run/run_case.h"
 #include "harness/store/result_store.h"
+#include "harness/suite/estimate.h"
 #include "harness/suite/progress.h"
-#include "harness/tables/table.h"
+#include "harness/tables/fit.h"
 #include "harness/text/terminal.h"
 #include "harness/timing/time_cases.h"
 
 namespace loopbench::harness {
 
 namespace {
-
-constexpr double kPilotFraction = 0.02;        ///< of the horizon, at first
-constexpr double kPilotGrowth = 5.0;           ///< then longer
-constexpr double kPilotEnough = 0.003;         ///< CPU time that says something [s]
-constexpr double kPilotSeconds = 0.25;         ///< CPU time of one pilot run
-constexpr std::size_t kPilotCombinations = 8;  ///< of a sweep; the others take the nearest one's
-constexpr double kFamilySeconds = 0.02;        ///< batches of right-hand sides of one family member
 
 /// Everything that decides a run but the experiment's name: results of another file with the same
 /// cases serve as well.
@@ -53,103 +44,6 @@ std::map<std::string, double> EarlierTimes(const std::filesystem::path& store) {
   return times;
 }
 
-/// What short runs say about the CPU time of a scene and a column.
-struct Rate {
-  double start_s = 0.0;   ///< before the first step
-  double per_step = 0.0;  ///< per expected step (ExpectedSteps)
-};
-
-/// Short runs, each in a process of its own under the limits of its case.
-class Pilot {
- public:
-  explicit Pilot(const std::vector<Experiment>& experiments) : experiments_(experiments) {}
-
-  /// Estimated CPU time of one run of the case [s].
-  double Seconds(std::size_t experiment, const Case& one) {
-    const std::size_t piloted = Nearest(experiment);
-    const Experiment& like = experiments_[piloted];
-    // another combination of a sweep may have other scenes
-    const std::size_t scene = std::min(one.scene, like.scenes.size() - 1);
-    const std::string key = fmt::format("{}/{}/{}/{}{}", piloted, scene, ToString(one.column),
-                                        one.integrator, one.step > 0.0 ? "/fixed" : "");
-    const auto known = rates_.find(key);
-    const Rate rate = known != rates_.end()
-                          ? known->second
-                          : rates_.emplace(key, Measure(like, scene, one)).first->second;
-    return rate.start_s + std::min(rate.per_step * ExpectedSteps(one), one.limits.cpu_s);
-  }
-
-  std::size_t runs() const { return rates_.size(); }
-  /// A sentence for each pilot that its limits cut off.
-  const std::vector<std::string>& cut_off() const { return cut_off_; }
-
- private:
-  std::size_t Nearest(std::size_t experiment) const {
-    const std::size_t count = experiments_.size();
-    if (count <= kPilotCombinations) return experiment;
-    const double step = static_cast<double>(count - 1) / (kPilotCombinations - 1);
-    return static_cast<std::size_t>(
-        std::round(std::round(static_cast<double>(experiment) / step) * step));
-  }
-
-  Rate Measure(const Experiment& experiment, std::size_t scene, const Case& like) {
-    Rate rate;
-    const auto work = [&](std::size_t) {
-      const Rate found = Run(experiment, scene, like);
-      return fmt::format("{} {}", found.start_s, found.per_step);
-    };
-    RunInProcesses(
-        1, 1, work, [&](std::size_t) { return LimitsOfRuns(like.limits, like.column.threads); },
-        [&](std::size_t, const ProcessResult& result) {
-          if (result.ending == ProcessEnding::kAnswered &&
-              std::sscanf(result.text.c_str(), "%lf %lf", &rate.start_s, &rate.per_step) == 2) {
-            return;
-          }
-          // the cases will end so as well
-          rate = {result.cpu_s, 0.0};
-          cut_off_.push_back(fmt::format("{} {}: {}, {}", experiment.scenes[scene].name,
-                                         ToString(like.column), OutcomeOf(result.ending),
-                                         result.text));
-        });
-    return rate;
-  }
-
-  /// In the child.
-  static Rate Run(const Experiment& experiment, std::size_t scene, const Case& like) {
-    Case pilot = like;
-    pilot.scene = scene;
-    pilot.ensemble = 1;
-    if (pilot.step > 0.0) {
-      pilot.step = std::ranges::max(experiment.fixed_steps);
-    } else if (!experiment.tolerances.empty()) {  // else it is that of the timings
-      pilot.rtol = pilot.atol = std::ranges::max(experiment.tolerances);
-    }
-    const std::vector<double>& horizons = experiment.scenes[scene].horizons;
-    const double horizon = *std::max_element(horizons.begin(), horizons.end());
-    pilot.limits.cpu_s = std::min(kPilotSeconds, like.limits.cpu_s);
-    // the first steps cost more than the later ones: longer, until the run is no longer short
-    for (double fraction = kPilotFraction;; fraction = std::min(1.0, kPilotGrowth * fraction)) {
-      pilot.horizon = fraction * horizon;
-      const CpuLimit all(kPilotSeconds);
-      const Record record = RunCase(experiment, pilot);
-      const double reached = record.Number("t_reached"), spent = record.Number("cpu_s");
-      const double start_s = all.cpu_s() - (std::isnan(spent) ? 0.0 : spent);
-      // a run that fails at once costs its start, and so will the case
-      if (!(reached > 0.0) || !(spent > 0.0)) return {start_s, 0.0};
-      const bool failed = record.Text("outcome") != ToString(Outcome::kFinished);
-      const bool enough = spent >= kPilotEnough || all.cpu_s() >= kPilotSeconds;
-      if (enough || failed || fraction >= 1.0) {
-        pilot.horizon = reached;
-        return {start_s, spent / ExpectedSteps(pilot)};
-      }
-    }
-  }
-
-  const std::vector<Experiment>& experiments_;
-  std::map<std::string, Rate> rates_;
-  std::vector<std::string> cut_off_;
-};
-
 /// "1.5 s", "12 min", "3.4 h".
 std::string Duration(double seconds) {
   if (seconds < 0.1) return "less than 0.1 s";
@@ -165,49 +59,63 @@ struct Line {
   double seconds = 0.0;
 };
 
+std::size_t RunsOf(const Case& one) {
+  return one.ensemble > 1 ? static_cast<std::size_t>(one.ensemble) + 1 : 1;
+}
+
 struct Plan {
   std::vector<Line> lines;
-  std::size_t cases = 0, runs = 0, timings = 0, known = 0;
-  double seconds = 0.0, timing_seconds = 0.0;
+  std::size_t cases = 0, runs = 0, references = 0, rungs = 0, timings = 0, known = 0;
+  double seconds = 0.0, reference_seconds = 0.0, ladder_seconds = 0.0, timing_seconds = 0.0;
 };
 
+/// @param seconds  of all runs of the case
 void Add(const Case& one, double seconds, Plan* plan, std::map<std::string, std::size_t>* places) {
   const std::string column = ToString(one.column);
   const auto [place, fresh] = places->emplace(one.mechanism + "\n" + column, plan->lines.size());
   if (fresh) plan->lines.push_back({one.mechanism, column, 0, 0, 0.0});
   Line& line = plan->lines[place->second];
-  const std::size_t runs = one.ensemble > 1 ? static_cast<std::size_t>(one.ensemble) + 1 : 1;
+  const std::size_t runs = RunsOf(one);
   ++line.cases;
   line.runs += runs;
-  line.seconds += static_cast<double>(runs) * seconds;
+  line.seconds += seconds;
   ++plan->cases;
   plan->runs += runs;
-  plan->seconds += static_cast<double>(runs) * seconds;
+  plan->seconds += seconds;
 }
 
 Plan MakePlan(const std::vector<Experiment>& experiments, const PlanCommand& command,
-              Pilot* pilot) {
+              Estimate* estimate) {
   Plan plan;
   std::map<std::string, std::size_t> places;
+  std::set<std::string> references;
   const std::map<std::string, double> earlier = EarlierTimes(command.from);
-  Progress progress("plan", experiments.size());
+  Progress progress("plan", {experiments.size(), {"", 0.0}}, 1);
   for (std::size_t i = 0; i < experiments.size(); ++i) {
     const Experiment& experiment = experiments[i];
+    progress.Start(i);
     for (const Case& one : SelectCases(experiment, command.files.filter)) {
       const auto known = earlier.find(SameRun(Identified(experiment, one).keys));
       plan.known += known != earlier.end() ? 1 : 0;
-      Add(one, known != earlier.end() ? known->second : pilot->Seconds(i, one), &plan, &places);
+      const auto runs = static_cast<double>(RunsOf(one));
+      Add(one, known != earlier.end() ? runs * known->second : estimate->OfCase(i, one), &plan,
+          &places);
+      if (!experiment.reference) continue;
+      const ReferenceCase reference = ReferenceOf(experiment, one, "results.jsonl");
+      if (!references.insert(reference.id).second) continue;
+      plan.reference_seconds += estimate->OfReference(i, reference);
     }
-    // the first simulation of a timing warms up and is not counted by its repeats
-    const std::vector<Case> timings = ExpandTiming(experiment);
-    for (const Case& one : timings) {
-      plan.timing_seconds += (experiment.timing.repeats + 1) * pilot->Seconds(i, one);
+    for (const LadderGroup& ladder : LadderGroups(experiment, command.files.filter)) {
+      plan.ladder_seconds += estimate->OfLadder(i, ladder);
+      plan.rungs += ladder.keys.size();
     }
-    const std::size_t members = CountTimings(experiment) - timings.size();
-    plan.timing_seconds += kFamilySeconds * static_cast<double>(members);
+    for (const TimingGroup& group : TimingGroups(experiment)) {
+      plan.timing_seconds += estimate->OfTiming(i, group);
+    }
     plan.timings += CountTimings(experiment);
-    progress.Step(experiment.name);
+    progress.Done(i);
   }
+  plan.references = references.size();
   return plan;
 }
 
@@ -222,7 +130,7 @@ void PrintAxes(const std::vector<Experiment>& experiments) {
 }
 
 void PrintPlan(const std::vector<Experiment>& experiments, const Plan& plan,
-               const PlanCommand& command, const Pilot& pilot) {
+               const PlanCommand& command, const Estimate& estimate) {
   const Experiment& first = experiments.front();
   Print("{}{}{}\n", first.name, first.comment.empty() ? "" : ": ", first.comment);
   PrintAxes(experiments);
@@ -246,40 +154,85 @@ void PrintPlan(const std::vector<Experiment>& experiments, const Plan& plan,
     row.Set("seconds", std::round(line.seconds * 100.0) / 100.0);
     table.rows.push_back(row);
   }
-  PrintText(ToText(table) + "\n");
-  for (const std::string& one : pilot.cut_off()) {
+  PrintText(ToScreen(table) + "\n");
+  for (const std::string& one : estimate.cut_off()) {
     Print("A pilot was cut off: {}. Its cases are counted with the CPU time it had taken.\n", one);
   }
   Print("{} cases, {} runs (an ensemble comes on top of the unperturbed run), {} timings\n",
         plan.cases, plan.runs, plan.timings);
-  Print("estimated time: accuracy {} with one job, timings {}\n", Duration(plan.seconds),
-        Duration(plan.timing_seconds));
+  Print("estimated time: accuracy {} with one job", Duration(plan.seconds));
+  if (plan.references > 0) {
+    Print(", {} references {}", plan.references, Duration(plan.reference_seconds));
+  }
+  if (plan.rungs > 0) {
+    Print(", {} runs in several scalars {}", plan.rungs, Duration(plan.ladder_seconds));
+  }
+  Print(", timings {}\n", Duration(plan.timing_seconds));
   std::string source;
   if (!command.from.empty()) {
     source = fmt::format("{} of {} cases from {}", plan.known, plan.cases, command.from.string());
   }
-  if (pilot.runs() > 0) {
+  if (estimate.pilots() > 0) {
     source += fmt::format(
-        "{}{} pilots over {:g} % or more of the longest horizon at the loosest tolerance, scaled "
-        "with the horizon and rtol^(-1/5){}",
-        source.empty() ? "" : ", the rest from ", pilot.runs(), 100.0 * kPilotFraction,
-        first.fixed_steps.empty() ? "" : ", or with the number of fixed steps");
+        "{}{} pilots over the first part of the longest horizon, at the loosest and the finest "
+        "tolerance{}",
+        source.empty() ? "" : ", the rest from ", estimate.pilots(),
+        first.fixed_steps.empty() ? "" : ", or the longest fixed step");
   }
   Print("An estimate, from {}. Each run ends at {:g} s of CPU time at the latest.\n", source,
         first.limits.cpu_s);
 }
 
+JsonObject PlanDocument(const std::filesystem::path& path,
+                        const std::vector<Experiment>& experiments, const Plan& plan,
+                        const Estimate& estimate) {
+  std::vector<JsonObject> lines;
+  for (const Line& line : plan.lines) {
+    lines.push_back(JsonObject()
+                        .Add("mechanism", line.mechanism)
+                        .Add("column", line.column)
+                        .Add("cases", Count(line.cases))
+                        .Add("runs", Count(line.runs))
+                        .Add("seconds", line.seconds));
+  }
+  return JsonObject()
+      .Add("file", path.string())
+      .Add("name", experiments.front().name)
+      .Add("combinations", Count(experiments.size()))
+      .Add("cases", Count(plan.cases))
+      .Add("runs", Count(plan.runs))
+      .Add("accuracy_seconds", plan.seconds)
+      .Add("references", Count(plan.references))
+      .Add("reference_seconds", plan.reference_seconds)
+      .Add("runs_in_several_scalars", Count(plan.rungs))
+      .Add("several_scalars_seconds", plan.ladder_seconds)
+      .Add("timings", Count(plan.timings))
+      .Add("timing_seconds", plan.timing_seconds)
+      .Add("cases_known", Count(plan.known))
+      .Add("pilots", Count(estimate.pilots()))
+      .Add("pilots_cut_off", estimate.cut_off())
+      .Add("lines", lines);
+}
+
 }  // namespace
 
 int PrintPlans(const PlanCommand& command) {
+  std::vector<JsonObject> documents;
   for (const auto& path : command.files.paths) {
+    const double begin = ThreadCpuSeconds();
     const std::vector<Experiment> experiments =
         ReadSelected({{path}, command.files.settings, command.files.filter});
     RequirePeers(experiments);
-    Pilot pilot(experiments);
-    const Plan plan = MakePlan(experiments, command, &pilot);
-    PrintPlan(experiments, plan, command, pilot);
+    Estimate estimate(experiments, Estimate::Budget());
+    Plan plan = MakePlan(experiments, command, &estimate);
+    plan.seconds += ThreadCpuSeconds() - begin;  // a run reads and expands the file too
+    if (command.json) {
+      documents.push_back(PlanDocument(path, experiments, plan, estimate));
+    } else {
+      PrintPlan(experiments, plan, command, estimate);
+    }
   }
+  if (command.json) PrintText(JsonObject().Add("experiments", documents).Text() + "\n");
   return 0;
 }
 

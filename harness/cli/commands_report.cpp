@@ -1,10 +1,7 @@
 // The subcommands that read a store: tables and figures of its records.
 #include <fmt/format.h>
-#include <unistd.h>
 
 #include <algorithm>
-#include <cstdlib>
-#include <string_view>
 
 #include "harness/analysis/doubts.h"
 #include "harness/cli/commands.h"
@@ -17,6 +14,7 @@
 #include "harness/record/provenance.h"
 #include "harness/store/contents.h"
 #include "harness/tables/columns.h"
+#include "harness/tables/fit.h"
 #include "harness/text/config_error.h"
 #include "harness/text/files.h"
 #include "harness/text/terminal.h"
@@ -81,13 +79,6 @@ void RequireDemands(const FailureMap& map, const std::filesystem::path& rules) {
 
 }  // namespace
 
-bool TerminalHasColour() {
-  const char* no_color = std::getenv("NO_COLOR");
-  const char* term = std::getenv("TERM");
-  return ::isatty(STDOUT_FILENO) == 1 && (no_color == nullptr || *no_color == '\0') &&
-         term != nullptr && std::string_view(term) != "dumb";
-}
-
 void AppendProvenance(Table& table, const std::string& typed) {
   for (const std::string& note : Provenance(typed)) table.notes.push_back(note);
 }
@@ -127,7 +118,7 @@ void WriteTables(const std::vector<Record>& records, const std::filesystem::path
       WriteFileAtomically(file, RenderKept(full, format));
     }
     const Table compact = MakeTable(records, {.kind = kind, .compact = true});
-    PrintText(ToText(compact, TerminalHasColour()) + "\n");
+    PrintText(ToScreen(compact) + "\n");
   }
   for (const std::string& note : Provenance(typed)) Print("{}\n", note);
 }
@@ -153,7 +144,8 @@ int DoubtGate(const std::vector<Record>& rows) {
 int PrintTable(const TableCommand& command, const std::string& typed) {
   TableView view = command.view;
   const bool on_terminal = command.format == "text" && command.out.empty();
-  view.compact = on_terminal;
+  // a page is no wider than a terminal
+  view.compact = on_terminal || (command.format == "latex" && view.columns.empty());
   Table table = MakeTable(LoadRecords(command.store), view);
   if (table.rows.empty()) {
     PrintError("{}: no {} records match{}{}\n", command.store.string(),
@@ -163,7 +155,7 @@ int PrintTable(const TableCommand& command, const std::string& typed) {
   }
   AppendProvenance(table, typed);
   if (on_terminal) {
-    PrintText(ToText(table, TerminalHasColour()));
+    PrintText(ToScreen(table));
   } else if (command.out.empty()) {
     PrintText(RenderKept(table, command.format));
   } else {
@@ -213,7 +205,7 @@ int PrintMap(const MapCommand& command, const std::string& typed) {
   if (command.gate) RequireDemands(map, command.rules);
   Table table = MapTable(map);
   AppendProvenance(table, typed);
-  PrintText(ToText(table, TerminalHasColour()));
+  PrintText(ToScreen(table));
   const int written = command.out.empty() ? 0 : WriteMap(map, command, typed);
   if (!command.gate) return written;
   const std::vector<std::string> broken = BrokenDemands(map);

@@ -252,7 +252,7 @@ const std::vector<std::string>& LumpingNames() {
 
 int Simplify(const SimplifyCommand& command, bool all, const std::string& typed) {
   // the child that does the work prints into memory, and sees no terminal
-  const ExplainView view = ViewOfTerminal(all);
+  const ExplainView view = ViewOfOutput(all);
   return PrintFromChild(command.mechanism.string(), command.limits,
                         [&] { return SimplifyFile(command, view, typed); });
 }

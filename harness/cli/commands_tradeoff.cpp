@@ -9,6 +9,7 @@
 #include "harness/judge/tradeoff_report.h"
 #include "harness/record/provenance.h"
 #include "harness/store/contents.h"
+#include "harness/tables/fit.h"
 #include "harness/text/files.h"
 #include "harness/text/terminal.h"
 
@@ -38,11 +39,11 @@ void WriteTradeoff(const Tradeoff& tradeoff, const std::filesystem::path& folder
 void PrintForPeople(const Tradeoff& tradeoff, const TradeoffCommand& command,
                     const std::string& typed) {
   const Table fronts = TradeoffTable(tradeoff, {.compact = true, .all = command.all});
-  PrintText(ToText(fronts, TerminalHasColour()) + "\n");
+  PrintText(ToScreen(fronts) + "\n");
   Table overview = OverviewTable(tradeoff);
   overview.notes = FairnessStatement(tradeoff);
   AppendProvenance(overview, typed);
-  PrintText(ToText(overview) + "\n");
+  PrintText(ToScreen(overview) + "\n");
 }
 
 }  // namespace

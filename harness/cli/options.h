@@ -6,6 +6,7 @@
 #include <vector>
 
 #include "harness/record/select.h"
+#include "harness/text/screen.h"
 
 namespace loopbench::harness {
 
@@ -13,6 +14,16 @@ inline Selection ParseSelection(const std::vector<std::string>& conditions) {
   Selection selection;
   for (const std::string& text : conditions) selection.push_back(ParseCondition(text));
   return selection;
+}
+
+/// For commands that print tables.
+inline void AddWide(CLI::App* app) {
+  app->add_flag_callback("--wide", ShowWide,
+                         "Tables on a terminal as wide as they take, with all columns");
+}
+
+inline CLI::Option* AddJson(CLI::App* app, bool* json) {
+  return app->add_flag("--json", *json, "One JSON document instead (docs/using.md has its keys)");
 }
 
 inline CLI::Option* AddGate(CLI::App* app, std::string* gate) {

@@ -5,6 +5,7 @@
 
 #include "harness/cli/program_compare.h"
 #include "harness/cli/program_files.h"
+#include "harness/cli/program_shell.h"
 #include "harness/cli/program_stores.h"
 #include "harness/cli/program_view.h"
 #include "harness/config/formulations.h"
@@ -47,15 +48,13 @@ int RunProgram(int argc, char** argv) {
   app.set_version_flag("--version", VersionText);
   app.require_subcommand(1);
   app.failure_message([](const CLI::App* failed, const CLI::Error& error) {
-    // CLI11 reports a misspelt subcommand only as a missing one: name it
-    std::string text = CLI::FailureMessage::simple(failed, error);
-    for (const std::string& word : failed->remaining()) text += "unknown: " + word + "\n";
-    return EscapeTerminalLines(text);
+    return EscapeTerminalLines(CLI::FailureMessage::simple(failed, error) + WhatWasMeant(*failed));
   });
   FileOptions files(app);
   ViewOptions view(app);
   StoreOptions stores(app);
   ComparisonOptions comparison(app);
+  ShellOptions shell(app);
   try {
     app.parse(argc, argv);
   } catch (const CLI::ParseError& error) {
@@ -63,10 +62,11 @@ int RunProgram(int argc, char** argv) {
   }
   try {
     const std::string typed = CommandLine(argc, argv);
-    if (const auto code = files.Run(typed)) return *code;
+    if (const auto code = files.Run(typed, ShellLine(argc, argv))) return *code;
     if (const auto code = view.Run()) return *code;
     if (const auto code = stores.Run(typed)) return *code;
-    return comparison.Run(typed).value();
+    if (const auto code = comparison.Run(typed)) return *code;
+    return shell.Run();
   } catch (const std::exception& error) {
     PrintError("{}\n", Lines{error.what()});
     return 2;

@@ -57,6 +57,8 @@ ComparisonOptions::ComparisonOptions(CLI::App& app) {
       ->add_option("--format", compare_.format, "How tables are written (csv: all measures)")
       ->check(formats)
       ->capture_default_str();
+  AddWide(compare_app_);
+  AddJson(compare_app_, &compare_.json);
 
   fit_app_ = app.add_subcommand("fit", "Fit exponents of time over size to benchmarks");
   fit_app_->footer(kFitFooter);
@@ -67,6 +69,7 @@ ComparisonOptions::ComparisonOptions(CLI::App& app) {
       ->check(formats)
       ->capture_default_str();
   fit_app_->add_option("--out", fit_.out, "File (default: the terminal)");
+  AddWide(fit_app_);
 
   export_app_ = app.add_subcommand("export", "Write measurements for a tracker of benchmarks");
   export_app_->footer(kExportFooter);

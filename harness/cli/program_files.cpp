@@ -65,6 +65,8 @@ FileOptions::FileOptions(CLI::App& app) {
   list_app_->add_option("--filter", conditions_,
                         "Only cases with key=value[,value] (or !=, <, <=, >, >=)");
   AddSettings(list_app_, &settings_);
+  AddWide(list_app_);
+  AddJson(list_app_, &json_);
 
   AddCheck(app);
 
@@ -75,6 +77,8 @@ FileOptions::FileOptions(CLI::App& app) {
   plan_app_->add_option("--filter", conditions_,
                         "Only cases with key=value[,value] (or !=, <, <=, >, >=)");
   AddSettings(plan_app_, &settings_);
+  AddWide(plan_app_);
+  AddJson(plan_app_, &json_);
 
   AddExplain(app);
   AddSimplify(app);
@@ -99,6 +103,7 @@ void FileOptions::AddRun(CLI::App& app) {
   run_app_->add_option("--filter", conditions_,
                        "Only accuracy cases with key=value[,value] (or !=, <, <=, >, >=)");
   AddSettings(run_app_, &settings_);
+  AddWide(run_app_);
   run_app_->add_option("--shard", shard_, "k/n: the k-th of n parts, to be merged later")
       ->capture_default_str();
   run_app_->add_option("--rerun", rerun_, "Cases to run although the store has them")
@@ -124,6 +129,7 @@ void FileOptions::AddCheck(CLI::App& app) {
   check_app_->add_option("file", files_.paths, "Files (JSON)")->required();
   check_app_->add_flag("--no-assembly", no_assembly_, "Read only, assemble no start");
   AddLimits(check_app_, &check_.limits);
+  AddJson(check_app_, &json_);
   AddSettings(check_app_, &settings_);
 }
 
@@ -136,6 +142,8 @@ void FileOptions::AddExplain(CLI::App& app) {
                            "Only cases with key=value[,value] (or !=, <, <=, >, >=)");
   AddLimits(explain_app_, &explain_limits_);
   AddSettings(explain_app_, &settings_);
+  AddWide(explain_app_);
+  AddJson(explain_app_, &json_);
   explain_app_->add_flag("--all", explain_all_, "Every row of long tables of a mechanism");
 }
 
@@ -168,6 +176,7 @@ void FileOptions::AddSimplify(CLI::App& app) {
   simplify_app_->add_option("--horizon", simplify_.horizon, "Of the experiment [s]")
       ->check(NumberFrom(1e-9, 1e9))
       ->capture_default_str();
+  AddWide(simplify_app_);
   simplify_app_
       ->add_option("--out", simplify_.out,
                    "New folder for the models, an experiment that runs them, and ladder.md")
@@ -223,6 +232,7 @@ void FileOptions::AddAdvise(CLI::App& app) {
       ->check(CLI::IsMember({"text", "csv", "markdown", "json", "latex"}))
       ->capture_default_str();
   AddLimits(advise_app_, &advise_.limits);
+  AddWide(advise_app_);
   advise_app_->footer(
       "Errors are true ones, against a certified reference; times are of bare runs, one at a "
       "time.\n"
@@ -247,16 +257,18 @@ int FileOptions::RunExperiments(const std::string& typed) {
   return harness::Run(run_, typed);
 }
 
-std::optional<int> FileOptions::Run(const std::string& typed) {
+std::optional<int> FileOptions::Run(const std::string& typed, const std::string& again) {
   files_.filter = ParseSelection(conditions_);
   files_.settings = ParseSettings(settings_);
+  run_.again = again;
   if (*run_app_) return RunExperiments(typed);
-  if (*list_app_) return List(files_);
+  if (*list_app_) return List(files_, json_);
   if (*plan_app_) {
     plan_.files = files_;
+    plan_.json = json_;
     return PrintPlans(plan_);
   }
-  if (*explain_app_) return Explain(files_, explain_all_, explain_limits_);
+  if (*explain_app_) return Explain(files_, explain_all_, json_, explain_limits_);
   if (*advise_app_) {
     constexpr double kError = 1e-6;
     if (advise_.error == 0.0 && advise_.budget == 0.0) advise_.error = kError;
@@ -273,6 +285,7 @@ std::optional<int> FileOptions::Run(const std::string& typed) {
   }
   if (*check_app_) {
     check_.files = files_;
+    check_.json = json_;
     check_.assembly = !no_assembly_;
     return CheckFiles(check_);
   }

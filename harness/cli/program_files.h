@@ -19,7 +19,8 @@ class FileOptions {
   explicit FileOptions(CLI::App& app);
 
   /// Runs the subcommand that was parsed, if it is one of these: its exit code.
-  std::optional<int> Run(const std::string& typed);
+  /// @param again  the command as a shell takes it (ShellLine)
+  std::optional<int> Run(const std::string& typed, const std::string& again);
 
  private:
   void AddRun(CLI::App& app);
@@ -41,7 +42,7 @@ class FileOptions {
   bool no_assembly_ = false;
   PlanCommand plan_;
   ProcessLimits explain_limits_ = kFileLimits;
-  bool explain_all_ = false;
+  bool explain_all_ = false, json_ = false;
   AdviseCommand advise_;
   SimplifyCommand simplify_;
   std::string lumping_ = LumpingNames().front();

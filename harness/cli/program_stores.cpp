@@ -86,6 +86,8 @@ StoreOptions::StoreOptions(CLI::App& app) {
   verdict_app_->add_option("--claims", verdict_.claims, "Rules (JSON)")->required();
   verdict_app_->add_option("--out", verdict_.out, "Markdown file with all numbers");
 
+  AddWide(verdict_app_);
+
   AddMap(app);
 }
 
@@ -108,6 +110,7 @@ void StoreOptions::AddTable(CLI::App& app) {
   table_app_->add_flag("--descending", table_.view.descending, "Largest first")->needs("--sort");
   table_app_->add_option("--out", table_.out, "File (default: the terminal)");
   AddGate(table_app_, &table_.gate);
+  AddWide(table_app_);
   table_app_->footer(kTableFooter);
 }
 
@@ -160,6 +163,7 @@ void StoreOptions::AddTradeoff(CLI::App& app) {
       ->check(CLI::IsMember({"text", "csv", "markdown", "json", "latex"}))
       ->capture_default_str();
   tradeoff_app_->add_flag("--all", tradeoff_.all, "Print every row");
+  AddWide(tradeoff_app_);
   CLI::Option* figures = tradeoff_app_->add_flag("--figures", draws_tradeoff_, "Draw figures too");
   tradeoff_app_->add_option("--figure-format", drawn_as_, "svg or pdf")
       ->check(CLI::IsMember({"svg", "pdf"}))
@@ -178,6 +182,7 @@ void StoreOptions::AddMap(CLI::App& app) {
       ->check(CLI::IsMember({"svg", "pdf"}))
       ->capture_default_str();
   map_app_->add_flag("--gate", map_.gate, "Exit with 1 if a cell that must hold does not");
+  AddWide(map_app_);
   map_app_->footer(kMapFooter);
 }
 

@@ -1,4 +1,4 @@
-// What the commands that show records share: colour, provenance, files that are kept, figures.
+// What the commands that show records share: provenance, files that are kept, figures.
 #pragma once
 
 #include <filesystem>
@@ -9,9 +9,6 @@
 #include "harness/tables/table.h"
 
 namespace loopbench::harness {
-
-/// Colour only where a person looks: a terminal that has it, unless https://no-color.org is obeyed.
-bool TerminalHasColour();
 
 void AppendProvenance(Table& table, const std::string& typed);
 

@@ -9,8 +9,12 @@
 #include "harness/text/terminal.h"
 
 namespace loopbench::harness {
-int PrintFromChild(const std::string& name, const ProcessLimits& limits,
-                   const std::function<int()>& work) {
+namespace {
+
+/// @param deliver  takes what was printed, before anything is thrown
+int FromChild(const std::string& name, const ProcessLimits& limits,
+              const std::function<int()>& work,
+              const std::function<void(const std::string&)>& deliver) {
   const MemoryFile output("stdout");
   ProcessResult result;
   RunInProcesses(
@@ -23,11 +27,23 @@ int PrintFromChild(const std::string& name, const ProcessLimits& limits,
       },
       [&](std::size_t) { return limits; },
       [&](std::size_t, const ProcessResult& ended) { result = ended; });
-  PrintText(output.Text());
+  deliver(output.Text());
   if (result.ending == ProcessEnding::kThrew) throw std::runtime_error(result.text);
   if (result.ending == ProcessEnding::kAnswered) return std::stoi(result.text);
   PrintError("{}: cut off ({}): {}\n", name, OutcomeOf(result.ending), result.text);
   return 2;
+}
+
+}  // namespace
+
+int PrintFromChild(const std::string& name, const ProcessLimits& limits,
+                   const std::function<int()>& work) {
+  return FromChild(name, limits, work, &PrintText);
+}
+
+int TextFromChild(const std::string& name, const ProcessLimits& limits,
+                  const std::function<int()>& work, std::string* text) {
+  return FromChild(name, limits, work, [text](const std::string& printed) { *text = printed; });
 }
 
 }  // namespace loopbench::harness

@@ -15,4 +15,8 @@ namespace loopbench::harness {
 int PrintFromChild(const std::string& name, const ProcessLimits& limits,
                    const std::function<int()>& work);
 
+/// The same with what it prints in `text`.
+int TextFromChild(const std::string& name, const ProcessLimits& limits,
+                  const std::function<int()>& work, std::string* text);
+
 }  // namespace loopbench::harness

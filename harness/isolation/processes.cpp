@@ -20,6 +20,7 @@
 #include <vector>
 
 #include "harness/isolation/child_watch.h"
+#include "harness/isolation/interruption.h"
 #include "mechanism/model/dense_memory.h"
 
 namespace loopbench::harness {
@@ -73,6 +74,7 @@ void WriteAll(int descriptor, std::string_view text) {
 /// The child's life. It never returns: destructors and exit handlers belong to the parent.
 [[noreturn]] void Work(int answer, pid_t parent, const ProcessLimits& limits,
                        const std::function<std::string()>& work) {
+  Interruption::LeaveToParent();
   ::prctl(PR_SET_PDEATHSIG, SIGKILL);
   if (::getppid() != parent) ::_exit(EXIT_FAILURE);  // it died before the line above
   SetLimits(limits);
@@ -245,18 +247,22 @@ bool LimitsMemory() {
 void RunInProcesses(std::size_t count, int jobs,
                     const std::function<std::string(std::size_t)>& work,
                     const std::function<ProcessLimits(std::size_t)>& limits,
-                    const std::function<void(std::size_t, const ProcessResult&)>& done) {
+                    const std::function<void(std::size_t, const ProcessResult&)>& done,
+                    const ProcessNews& news) {
   Children children;
   std::size_t next = 0;
   while (next < count || children.size() > 0) {
     while (next < count && children.size() < static_cast<std::size_t>(jobs)) {
       children.Start(next, limits(next), [&work, next] { return work(next); });
+      if (news.started) news.started(next);
       ++next;
     }
     for (Child& child : children.Wait()) {
       const std::size_t piece = child.piece;
       done(piece, ResultOf(std::move(child)));
     }
+    Interruption::Check();
+    if (news.waited) news.waited();
   }
 }
 

@@ -35,16 +35,24 @@ struct ProcessResult {
   double wall_s = 0.0, cpu_s = 0.0;
 };
 
+/// What the parent may want to know while pieces work.
+struct ProcessNews {
+  std::function<void(std::size_t)> started = {};
+  std::function<void()> waited = {};  ///< four times a second at least
+};
+
 /// Runs work(0) .. work(count - 1), at most `jobs` at once, started in order. `done` is called here
 /// in the parent as pieces end, one at a time. No piece outlives this process. Throws
-/// std::runtime_error when a process cannot be started, and what `done` throws; pieces still under
-/// way are killed then.
+/// std::runtime_error when a process cannot be started, what `done` throws, and Interrupted
+/// (interruption.h) when all pieces that have ended are done; pieces still under way are killed
+/// then.
 ///
 /// Sanitizers reserve the whole address space, so memory limits are not set under them.
 void RunInProcesses(std::size_t count, int jobs,
                     const std::function<std::string(std::size_t)>& work,
                     const std::function<ProcessLimits(std::size_t)>& limits,
-                    const std::function<void(std::size_t, const ProcessResult&)>& done);
+                    const std::function<void(std::size_t, const ProcessResult&)>& done,
+                    const ProcessNews& news = {});
 
 /// The outcome in tables of a piece that ended without an answer: "crashed", "process-time-limit"
 /// or "memory-limit".

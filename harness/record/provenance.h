@@ -16,7 +16,10 @@ std::string VersionText();
 /// are different results.
 const std::string& CodeVersion();
 
-/// The program's arguments as one shell line.
+/// The program's name and its arguments, with spaces between.
 std::string CommandLine(int argc, const char* const* argv);
+
+/// The same as a shell takes it, with the program as it was called.
+std::string ShellLine(int argc, const char* const* argv);
 
 }  // namespace loopbench::harness

@@ -2,26 +2,54 @@
 #pragma once
 
 #include <chrono>
-#include <mutex>
 #include <string>
+#include <vector>
 
 namespace loopbench::harness {
 
-/// Counts finished pieces of work. Silent when standard error is not a terminal.
+/// Shows what is under way from the first moment on. Silent when standard error is no terminal.
 class Progress {
  public:
-  Progress(std::string what, std::size_t total);
-  ~Progress();  ///< clears the line
+  /// A piece of work: what people call it, and how long it will take about [s], NaN where nobody
+  /// knows: then as long as the others.
+  struct Piece {
+    std::string label;
+    double estimate_s;
+  };
 
-  /// One more piece is done; `label` is shown. May be called from several threads.
-  void Step(const std::string& label);
+  /// `jobs` pieces are under way at once.
+  Progress(std::string what, std::vector<Piece> pieces, int jobs);
+  ~Progress();  ///< clears the line
+  Progress(const Progress&) = delete;
+  Progress& operator=(const Progress&) = delete;
+
+  static bool IsSeen();
+
+  void Start(std::size_t piece);
+  void Done(std::size_t piece);
+  /// Draws the line anew if a second has passed.
+  void Look();
 
  private:
+  using Clock = std::chrono::steady_clock;
+  struct Running {
+    std::size_t piece;
+    Clock::time_point begin;
+  };
+
+  /// Estimates are corrected by what the pieces that are done have taken. Negative: not known.
+  double SecondsToGo() const;
+  void Draw();
+
   std::string what_;
-  std::size_t total_, done_ = 0;
-  bool terminal_;
-  std::chrono::steady_clock::time_point begin_;
-  std::mutex mutex_;
+  std::vector<Piece> pieces_;
+  int jobs_;
+  bool is_seen_;
+  std::size_t done_ = 0;
+  double taken_s_ = 0.0, foreseen_s_ = 0.0;  ///< of the pieces that are done
+  double waiting_s_ = 0.0;                   ///< foreseen for those that have not begun
+  std::vector<Running> running_;
+  Clock::time_point begin_, drawn_;
 };
 
 }  // namespace loopbench::harness

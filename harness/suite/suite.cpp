@@ -13,12 +13,14 @@
 #include <utility>
 
 #include "harness/isolation/fault.h"
+#include "harness/isolation/interruption.h"
 #include "harness/isolation/processes.h"
 #include "harness/record/noise.h"
 #include "harness/record/origin.h"
 #include "harness/record/provenance.h"
 #include "harness/run/case_identity.h"
 #include "harness/run/run_case.h"
+#include "harness/suite/estimate.h"
 #include "harness/suite/precision_cases.h"
 #include "harness/suite/progress.h"
 #include "harness/suite/reference_cases.h"
@@ -42,9 +44,13 @@ struct Piece {
   std::string label;
   double cost = 0.0;
   std::filesystem::path product = {};  ///< a file without which the piece is not done
+  std::function<double(Estimate&)> seconds = {};
 };
 
 constexpr double kPatience = 2.0, kGrace_s = 2.0;  ///< LimitsOfRuns
+/// A person waits for the pilots before the first case begins.
+constexpr Estimate::Budget kForProgress = {
+    .share = 0.01, .least_s = 0.003, .most_s = 0.25, .all_s = 2.0};
 
 /// @param one    with its id
 /// @param store  the file beside which references are kept
@@ -154,8 +160,9 @@ std::vector<Record> Records(const Piece& piece, const ProcessResult& result,
 /// Runs the pieces the store does not have, or that are to be run again.
 class Runner {
  public:
-  Runner(const SuiteOptions& options, const std::vector<Record>& records, ResultStore& store)
-      : options_(options), store_(store) {
+  Runner(const std::vector<Experiment>& experiments, const SuiteOptions& options,
+         const std::vector<Record>& records, ResultStore& store)
+      : options_(options), store_(store), estimate_(experiments, kForProgress) {
     for (const Record& record : records) {
       outcomes_[record.Text("id")] = record.Text("outcome");
     }
@@ -181,7 +188,7 @@ class Runner {
       return true;
     });
     if (pieces.empty()) return;
-    Progress progress(what, pieces.size());
+    Progress progress(what, Foreseen(pieces), jobs);
     RunInProcesses(
         pieces.size(), jobs,
         [&](std::size_t i) {
@@ -195,8 +202,9 @@ class Runner {
             ++count_.run;
             count_.failed += record.Text("outcome") != ToString(Outcome::kFinished);
           }
-          progress.Step(pieces[i].label);
-        });
+          progress.Done(i);
+        },
+        {.started = [&](std::size_t i) { progress.Start(i); }, .waited = [&] { progress.Look(); }});
   }
 
   const SuiteCount& count() const { return count_; }
@@ -212,8 +220,20 @@ class Runner {
     });
   }
 
+  /// Pilots run only where somebody sees what they are for.
+  std::vector<Progress::Piece> Foreseen(const std::vector<Piece>& pieces) {
+    std::vector<Progress::Piece> foreseen;
+    for (const Piece& piece : pieces) {
+      foreseen.push_back({piece.label, Progress::IsSeen()
+                                           ? piece.seconds(estimate_)
+                                           : std::numeric_limits<double>::quiet_NaN()});
+    }
+    return foreseen;
+  }
+
   const SuiteOptions& options_;
   ResultStore& store_;
+  Estimate estimate_;
   std::map<std::string, std::string> outcomes_;  ///< by id, the last one
   std::set<std::string> asked_;                  ///< ids
   SuiteCount count_;
@@ -271,13 +291,15 @@ Shard ParseShard(const std::string& text) {
 SuiteCount RunSuite(const std::vector<Experiment>& experiments, const SuiteOptions& options,
                     const std::vector<Record>& records, ResultStore& store) {
   WarnOfJobs(options.jobs, experiments);
-  Runner runner(options, records, store);
+  const Interruption interruption;
+  Runner runner(experiments, options, records, store);
   std::vector<Piece> pieces;
   std::size_t number = 0;
-  const auto add = [&](std::size_t e, auto make_piece) {
+  const auto add = [&](std::size_t e, auto make_piece, auto seconds) {
     if (!options.shard.Takes(number++)) return;
     pieces.push_back(make_piece());
     pieces.back().experiment = static_cast<std::int64_t>(e);
+    pieces.back().seconds = seconds;
   };
   const auto run = [&](const std::string& what, int jobs) {
     runner.Run(what, std::exchange(pieces, {}), jobs);
@@ -287,14 +309,20 @@ SuiteCount RunSuite(const std::vector<Experiment>& experiments, const SuiteOptio
     std::vector<Piece> references;
     for (std::size_t e = 0; e < experiments.size(); ++e) {
       for (const Case& one : SelectCases(experiments[e], options.filter)) {
-        add(e, [&] {
-          if (experiments[e].reference) {
-            references.push_back(
-                ReferencePiece(experiments[e], ReferenceOf(experiments[e], one, store.file())));
-            references.back().experiment = static_cast<std::int64_t>(e);
-          }
-          return AccuracyPiece(experiments[e], Identified(experiments[e], one), store.file());
-        });
+        add(
+            e,
+            [&] {
+              if (experiments[e].reference) {
+                const ReferenceCase reference = ReferenceOf(experiments[e], one, store.file());
+                references.push_back(ReferencePiece(experiments[e], reference));
+                references.back().experiment = static_cast<std::int64_t>(e);
+                references.back().seconds = [e, reference](Estimate& estimate) {
+                  return estimate.OfReference(e, reference);
+                };
+              }
+              return AccuracyPiece(experiments[e], Identified(experiments[e], one), store.file());
+            },
+            [e, one](Estimate& estimate) { return estimate.OfCase(e, one); });
       }
     }
     runner.Run("references", std::move(references), options.jobs);
@@ -307,7 +335,9 @@ SuiteCount RunSuite(const std::vector<Experiment>& experiments, const SuiteOptio
     }
     for (std::size_t e = 0; e < experiments.size(); ++e) {
       for (const LadderGroup& ladder : ladders[e]) {
-        add(e, [&] { return LadderPiece(experiments[e], ladder); });
+        add(
+            e, [&] { return LadderPiece(experiments[e], ladder); },
+            [e, &ladder](Estimate& estimate) { return estimate.OfLadder(e, ladder); });
       }
     }
     run("precision", options.jobs);
@@ -317,7 +347,9 @@ SuiteCount RunSuite(const std::vector<Experiment>& experiments, const SuiteOptio
     for (const Experiment& experiment : experiments) groups.push_back(TimingGroups(experiment));
     for (std::size_t e = 0; e < experiments.size(); ++e) {
       for (const TimingGroup& group : groups[e]) {
-        add(e, [&] { return TimingPiece(experiments[e], group); });
+        add(
+            e, [&] { return TimingPiece(experiments[e], group); },
+            [e, &group](Estimate& estimate) { return estimate.OfTiming(e, group); });
       }
     }
     run("timing", 1);

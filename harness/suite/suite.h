@@ -62,6 +62,9 @@ struct SuiteCount {
 /// decides the run and for this very program. `records` is what the store has when the call
 /// begins.
 ///
+/// Throws Interrupted (harness/isolation/interruption.h) on Ctrl-C; what is complete by then is in
+/// the store.
+///
 /// Whatever a case does, it gets a record: outcomes "crashed", "process-time-limit", "memory-limit"
 /// and "bad-answer" are those of its process.
 SuiteCount RunSuite(const std::vector<Experiment>& experiments, const SuiteOptions& options,

@@ -1,0 +1,243 @@
+#include "harness/suite/estimate.h"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <cmath>
+#include <cstdio>
+#include <limits>
+
+#include "harness/analysis/link_length.h"
+#include "harness/integrator/cpu_time.h"
+#include "harness/run/run_case.h"
+#include "harness/suite/suite.h"
+#ifdef LOOPBENCH_PRECISIONS
+#include "harness/precision/make_reference.h"
+#endif
+
+namespace loopbench::harness {
+
+/// Of one pilot.
+struct Estimate::Spent {
+  double all_s = 0.0, running_s = 0.0;  ///< CPU time, and what of it grows with the horizon
+  double reached = 1.0;                 ///< of the horizon
+  bool failed = false;                  ///< it went no further, and nor will the piece
+  double most_s = std::numeric_limits<double>::infinity();  ///< when its limit of steps ends it
+};
+
+namespace {
+
+constexpr double kFirst = 0.02, kGrowth = 3.0;  ///< of the horizon
+constexpr double kLeastSlope = 0.2;             ///< of the mean
+constexpr std::size_t kCombinations = 8;        ///< of a sweep; others take the nearest one's
+constexpr double kShort_s = 0.1;                ///< too short for a pilot at each tolerance
+constexpr double kUnknown = std::numeric_limits<double>::quiet_NaN();
+
+double Longest(const Experiment& experiment, std::size_t scene) {
+  return std::ranges::max(experiment.scenes[scene].horizons);
+}
+
+template <class Spent>
+Rate Next(const Rate& before, const Spent& spent) {
+  const double reached = std::max(spent.reached, 1e-9), mean = spent.running_s / reached;
+  const double grown = reached - before.reached;
+  // clocks are coarse, and one step more or less is much in a short run
+  const double slope = grown > 0.0 ? (spent.running_s - before.running_s) / grown : mean;
+  return {.fixed_s = std::max(0.0, spent.all_s - spent.running_s),
+          .running_s = spent.running_s,
+          .reached = reached,
+          .slope_s = std::clamp(slope, kLeastSlope * mean, mean / kLeastSlope),
+          .ends_at = spent.failed ? reached : 1.0,
+          .most_s = spent.most_s};
+}
+
+double RunsOf(const Case& one) { return one.ensemble > 1 ? one.ensemble + 1.0 : 1.0; }
+
+}  // namespace
+
+Estimate::Estimate(const std::vector<Experiment>& experiments, const Budget& budget)
+    : experiments_(experiments), budget_(budget) {}
+
+std::size_t Estimate::Nearest(std::size_t experiment) const {
+  const std::size_t count = experiments_.size();
+  if (count <= kCombinations) return experiment;
+  const double step = static_cast<double>(count - 1) / (kCombinations - 1);
+  return static_cast<std::size_t>(
+      std::round(std::round(static_cast<double>(experiment) / step) * step));
+}
+
+/// @param times  how often the piece does what the pilot does once
+const Rate* Estimate::Known(const std::string& key, const std::string& name,
+                            const ProcessLimits& limits, double times,
+                            const std::function<Spent(double fraction)>& work) {
+  if (const auto known = rates_.find(key); known != rates_.end()) return &known->second;
+  if (spent_s_ >= budget_.all_s) return nullptr;
+  const auto pilot = [&](std::size_t) {
+    Rate rate = {.running_s = 0.0, .reached = 0.0};
+    double worked = 0.0;
+    for (double fraction = kFirst;; fraction = std::min(1.0, kGrowth * fraction)) {
+      const Spent spent = work(fraction);
+      rate = Next(rate, spent);
+      worked += spent.all_s;
+      const double enough = std::clamp(budget_.share * times * (rate.fixed_s + rate.Running(1.0)),
+                                       budget_.least_s, budget_.most_s);
+      if (spent.failed || fraction >= 1.0 || spent.all_s >= enough) {
+        return fmt::format("{} {} {} {} {} {} {}", rate.fixed_s, rate.running_s, rate.reached,
+                           rate.slope_s, rate.ends_at, rate.most_s, worked);
+      }
+    }
+  };
+  Rate& rate = rates_[key];
+  const double before = ThreadCpuSeconds();
+  RunInProcesses(
+      1, 1, pilot, [&](std::size_t) { return limits; },
+      [&](std::size_t, const ProcessResult& result) {
+        spent_s_ += result.wall_s;
+        double worked = 0.0;
+        if (result.ending == ProcessEnding::kAnswered &&
+            std::sscanf(result.text.c_str(), "%lf %lf %lf %lf %lf %lf %lf", &rate.fixed_s,
+                        &rate.running_s, &rate.reached, &rate.slope_s, &rate.ends_at, &rate.most_s,
+                        &worked) == 7) {
+          // a process costs its parent and itself something before it works
+          rate.process_s = std::max(0.0, result.cpu_s - worked) + ThreadCpuSeconds() - before;
+          return;
+        }
+        rate = {.fixed_s = result.cpu_s};
+        cut_off_.push_back(fmt::format("{}: {}, {}", name, OutcomeOf(result.ending), result.text));
+      });
+  return &rate;
+}
+
+/// @param rtol  0 with fixed steps, of which the longest is tried
+const Rate* Estimate::RateOfCase(std::size_t experiment, const Case& one, double rtol) {
+  const Experiment& like = experiments_[experiment];
+  const std::size_t scene = std::min(one.scene, like.scenes.size() - 1);  // a sweep's may differ
+  const std::string column = ToString(one.column);
+  const auto run = [&](double fraction) {
+    Case pilot = one;
+    pilot.scene = scene;
+    pilot.ensemble = 1;
+    if (rtol > 0.0) pilot.rtol = pilot.atol = rtol;
+    if (pilot.step > 0.0) pilot.step = std::ranges::max(like.fixed_steps);
+    pilot.horizon = fraction * Longest(like, scene);
+    pilot.limits.cpu_s = std::min(budget_.most_s, one.limits.cpu_s);
+    const CpuLimit all(pilot.limits.cpu_s);
+    const Record record = RunCase(like, pilot);
+    const double reached = record.Number("t_reached"), running = record.Number("cpu_s");
+    const bool ended = record.Text("outcome") != ToString(Outcome::kFinished);
+    Spent spent = {.all_s = all.cpu_s(), .running_s = std::isnan(running) ? 0.0 : running};
+    spent.reached = std::isnan(reached) ? 0.0 : fraction * reached / pilot.horizon;
+    const double steps = record.Number("steps");
+    if (steps > 0.0) {
+      spent.most_s = spent.running_s * static_cast<double>(pilot.limits.steps) / steps;
+    }
+    spent.failed = ended && record.Text("outcome") != ToString(Outcome::kTimeLimit);
+    return spent;
+  };
+  return Known(fmt::format("case/{}/{}/{}/{}/{}/{}", experiment, scene, column, one.integrator,
+                           rtol, one.step > 0.0),
+               fmt::format("{} {}", like.scenes[scene].name, column),
+               LimitsOfRuns(one.limits, one.column.threads), RunsOf(one), run);
+}
+
+double Estimate::OfCase(std::size_t experiment, const Case& one) {
+  const std::size_t near = Nearest(experiment);
+  const Experiment& like = experiments_[near];
+  const double part = one.horizon / Longest(like, std::min(one.scene, like.scenes.size() - 1));
+  const auto total = [&](const Rate& rate, double scale) {
+    const double running = rate.Running(part) * scale;
+    return rate.process_s + RunsOf(one) * (rate.fixed_s + std::min(running, one.limits.cpu_s));
+  };
+  if (one.step > 0.0) {
+    const Rate* rate = RateOfCase(near, one, 0.0);
+    return rate == nullptr ? kUnknown : total(*rate, std::ranges::max(like.fixed_steps) / one.step);
+  }
+  const auto [fine, loose] =
+      like.tolerances.empty()  // then it is that of the timings
+          ? std::pair(one.rtol, one.rtol)
+          : std::pair(std::ranges::min(like.tolerances), std::ranges::max(like.tolerances));
+  const Rate* at_loose = RateOfCase(near, one, loose);
+  if (at_loose == nullptr) return kUnknown;
+  const double usual = std::pow(one.rtol / loose, -0.2);  // of methods of order 5
+  if (RunsOf(one) * at_loose->Running(1.0) * std::pow(fine / loose, -0.2) < kShort_s) {
+    return total(*at_loose, usual);
+  }
+  const Rate* at_fine = RateOfCase(near, one, fine);
+  if (at_fine == nullptr) return total(*at_loose, usual);
+  // the nearer one decides where a run fails
+  const double share = fine < loose ? std::log(one.rtol / loose) / std::log(fine / loose) : 0.0;
+  const Rate& rate = share < 0.5 ? *at_loose : *at_fine;
+  const double ratio = at_fine->Running(part) / at_loose->Running(part);
+  const bool known = ratio > 0.0 && std::isfinite(ratio);
+  return total(rate, known ? std::pow(ratio, share < 0.5 ? share : share - 1.0) : 1.0);
+}
+
+double Estimate::OfReference(std::size_t experiment, const ReferenceCase& one) {
+  const Experiment& own = experiments_[experiment];
+  const double most = own.reference->cpu_s;
+  const auto run = [&](double fraction) -> Spent {
+#ifdef LOOPBENCH_PRECISIONS
+    const MechanismDescription& user = own.scenes[one.scene].mechanism.description;
+    ReferenceOptions options = *own.reference;
+    options.points = std::max(2, static_cast<int>(fraction * options.points));
+    const CpuLimit all(most);
+    const Reference reference =
+        MakeReference(user, fraction * one.horizon, LinkLength(user), options);
+    return {.all_s = all.cpu_s(), .running_s = reference.cpu_s, .reached = fraction};
+#else
+    return {.reached = fraction};
+#endif
+  };
+  const Rate* rate = Known("reference/" + one.id, one.keys.Text("mechanism"),
+                           {.cpu_s = 4.0 * most, .memory_mb = own.limits.memory_mb}, 1.0, run);
+  constexpr double kWitnesses = 3.0;
+  return rate == nullptr ? kUnknown
+                         : rate->fixed_s + std::min(rate->Running(1.0), kWitnesses * most);
+}
+
+double Estimate::OfLadder(std::size_t experiment, const LadderGroup& group) {
+  const Experiment& own = experiments_[experiment];
+  const auto run = [&](double fraction) -> Spent {
+    LadderGroup part = group;
+    part.task.horizon *= fraction;
+    const CpuLimit all(budget_.most_s);
+    ClimbTogether(own, part);
+    return {.all_s = all.cpu_s(), .running_s = all.cpu_s(), .reached = fraction};
+  };
+  const auto runs = static_cast<double>(group.keys.size() + 1);  // there are two references
+  const Rate* rate =
+      Known("ladder/" + group.keys.front().Text("case_id"), group.keys.front().Text("mechanism"),
+            LimitsOfRuns(own.limits, runs), 1.0, run);
+  return rate == nullptr ? kUnknown
+                         : rate->fixed_s + std::min(rate->Running(1.0), runs * own.limits.cpu_s);
+}
+
+double Estimate::OfTiming(std::size_t experiment, const TimingGroup& group) {
+  const Experiment& own = experiments_[experiment];
+  const double runs = own.timing.repeats + 1.0;  // the first one warms up
+  const auto run = [&](double fraction) -> Spent {
+    Experiment once = own;
+    once.timing.repeats = 1;
+    TimingGroup part = group;
+    for (Case& one : part.cases) one.horizon *= fraction;
+    const CpuLimit all(budget_.most_s);
+    double each = 0.0;
+    const std::vector<Record> records = TimeTogether(once, part);
+    for (const Record& record : records) {
+      // the first column is timed twice (noise.h)
+      const double wall = record.Number("wall_s_median");
+      if (!std::isnan(wall)) each += (&record == &records.front() ? 2.0 : 1.0) * wall;
+    }
+    return {.all_s = all.cpu_s(),
+            // of CPU time like the rest, whatever else the machine does
+            .running_s = 2.0 * each * all.cpu_s() / all.wall_s(),
+            .reached = group.simulate ? fraction : 1.0,
+            .failed = !group.simulate};
+  };
+  const Rate* rate = Known(
+      "timing/" + group.cases.front().keys.Text("case_id"), group.name,
+      LimitsOfRuns(own.limits, 2.0 * static_cast<double>(group.cases.size() + 1)), runs / 2.0, run);
+  return rate == nullptr ? kUnknown : rate->fixed_s + 0.5 * runs * rate->Running(1.0);
+}
+
+}  // namespace loopbench::harness

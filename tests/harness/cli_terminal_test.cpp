@@ -1,0 +1,179 @@
+// What a person sees on a terminal: tables as wide as it is, colours, progress, Ctrl-C.
+#include <gtest/gtest.h>
+
+#include <algorithm>
+#include <fstream>
+#include <iterator>
+
+#include "harness/store/result_store.h"
+#include "tests/harness/cli_fixture.h"
+#include "tests/harness/pseudo_terminal.h"
+
+namespace loopbench::harness {
+namespace cli_terminal_test {
+
+/// Cells of texts that have Latin letters, marks of U+0300 to U+036F and Chinese characters alone.
+std::size_t Cells(const std::string& text) {
+  std::size_t cells = 0;
+  for (std::size_t i = 0; i < text.size(); ++i) {
+    const auto byte = static_cast<unsigned char>(text[i]);
+    if ((byte & 0xC0u) == 0x80u) continue;
+    if (byte == 0xCC || byte == 0xCD) continue;     // U+0300 to U+036F
+    cells += byte >= 0xE4 && byte <= 0xE9 ? 2 : 1;  // U+4E00 to U+9FFF
+  }
+  return cells;
+}
+
+/// The lines of the first table: heading, rule, rows.
+std::vector<std::string> TableLines(const std::string& text) {
+  const std::size_t rule = text.find("\n--");
+  const std::size_t heading = text.rfind('\n', rule - 1) + 1;
+  const std::size_t end = text.find("\n\n", rule);
+  std::vector<std::string> lines;
+  for (std::size_t begin = heading; begin < end;) {
+    const std::size_t next = text.find('\n', begin);
+    lines.push_back(text.substr(begin, next - begin));
+    begin = next + 1;
+  }
+  return lines;
+}
+
+class CliTerminalTest : public CommandLineTest {
+ protected:
+  TerminalEnding See(const std::string& arguments, int columns, const std::string& before = "",
+                     const std::function<std::string(const std::string&)>& look = {}) const {
+    return OnTerminal(
+        "cd '" + folder_.string() + "' && " + before + " '" LOOPBENCH_BINARY "' " + arguments,
+        columns, look);
+  }
+};
+
+TEST_F(CliTerminalTest, TablesAreAsWideAsTheTerminalAndNameWhatIsLeftOut) {
+  const std::string piped = (Call("run tiny.json --out out"), Call("table out").text);
+  EXPECT_EQ(piped.find("left out"), std::string::npos) << piped;
+  const std::size_t whole = TableLines(piped).at(1).size();
+  ASSERT_GT(whole, 80u);  // or this tests nothing
+  for (const int columns : {24, 40, 60, 80, 100}) {
+    const TerminalEnding seen = See("table out", columns);
+    EXPECT_EQ(seen.code, 0) << seen.text;
+    for (const std::string& line : TableLines(seen.text)) {
+      EXPECT_LE(static_cast<int>(line.size()), columns) << seen.text;
+    }
+    const bool fits = static_cast<int>(whole) <= columns;
+    EXPECT_EQ(
+        seen.text.find("left out for a width of " + std::to_string(columns)) == std::string::npos,
+        fits)
+        << seen.text;
+    // what differs between the two rows is what they are told apart by
+    if (columns >= 40) {
+      EXPECT_NE(TableLines(seen.text).at(2), TableLines(seen.text).at(3)) << seen.text;
+    }
+  }
+  const std::string rows = piped.substr(0, piped.find("\ncommand: "));
+  for (const TerminalEnding& seen : {See("table out", 300), See("table out --wide", 40)}) {
+    EXPECT_EQ(seen.text.substr(0, seen.text.find("\ncommand: ")), rows);
+  }
+}
+
+TEST_F(CliTerminalTest, ColourIsForTerminalsWithoutNoColorAndNeverInFiles) {
+  Write("short.json", R"({"name": "short", "scenes": [{"mechanism": "four-bar.json", "horizon": 1}],
+    "columns": [{"formulation": "odca", "enforcement": "acceleration"}], "tolerances": [1e-6],
+    "limits": {"steps": 3}, "timing": {"repeats": 0}})");
+  const TerminalEnding seen = See("run short.json --out out 2>&-", 120);
+  EXPECT_NE(seen.text.find("\033[31mstep-limit"), std::string::npos) << seen.text;
+  for (const std::string& plain :
+       {See("table out", 120, "NO_COLOR=1").text, See("table out", 120, "TERM=dumb").text,
+        See("table out | cat", 120).text, Call("table out").text,
+        ReadFile(folder_ / "out/drift.md"), ReadFile(folder_ / "out/drift.csv")}) {
+    EXPECT_EQ(plain.find('\033'), std::string::npos) << plain;
+    EXPECT_NE(plain.find("step-limit"), std::string::npos) << plain;
+  }
+  Write("claims.json", kTinyClaims);
+  EXPECT_NE(See("verdict out --claims claims.json", 120).text.find("\033["), std::string::npos);
+}
+
+TEST_F(CliTerminalTest, HostileNamesNeitherActNorMoveColumns) {
+  EditMechanism("\"name\": \"four-bar\"",
+                R"("name": "a\n\u001b[31m\tb e\u0301\u0301 \u6f22\u5b57\u6f22")");
+  Write("two.json", R"({"name": "two", "scenes": [{"mechanism": "four-bar.json", "horizon": 0.1},
+    {"mechanism": "four-bar.json", "name": "plain", "horizon": 0.1}], "tolerances": [1e-6],
+    "columns": [{"formulation": "odca", "enforcement": "acceleration"}], "timing": {"repeats": 0}})");
+  ExpectEnding(Call("run two.json --out out"), 0, {});
+  for (const int columns : {30, 50, 80, 200}) {
+    const TerminalEnding seen = See("table out --columns mechanism,steps", columns, "NO_COLOR=1");
+    EXPECT_EQ(seen.code, 0);
+    for (const char c : seen.text) {
+      EXPECT_TRUE(c == '\n' || static_cast<unsigned char>(c) >= 0x20) << seen.text;
+    }
+    EXPECT_NE(seen.text.find("a\\n\\x1b[31m\\tb"), std::string::npos) << seen.text;
+    const std::vector<std::string> lines = TableLines(seen.text);
+    ASSERT_GE(lines.size(), 4u);
+    std::size_t ends = 0;  // numbers end where the rule does
+    for (const std::string& line : lines) {
+      EXPECT_LE(static_cast<int>(Cells(line)), columns) << seen.text;
+      const bool has_number = std::isdigit(static_cast<unsigned char>(line.back())) != 0;
+      if (has_number && line.find("  ") != std::string::npos) {
+        ++ends;
+        EXPECT_EQ(Cells(line), Cells(lines[1])) << seen.text;
+      }
+    }
+    EXPECT_EQ(ends, 2u) << seen.text;
+  }
+}
+
+TEST_F(CliTerminalTest, CtrlCKeepsWhatIsDoneAndSaysHowToGoOn) {
+  // the long one is begun first, and ends by its limit; the others end beside it
+  Write("long.json", R"({"name": "it's long", "tolerances": [1e-6],
+    "scenes": [{"mechanism": "four-bar.json", "horizon": [0.5, 100000]}],
+    "columns": [{"formulation": ["odca", "lagrange", "reduction"], "enforcement": "velocity"}],
+    "exclude": [{"formulation": ["lagrange", "reduction"], "horizon": 100000}],
+    "limits": {"cpu_s": 2, "steps": 100000000}, "timing": {"repeats": 0}})");
+  const fs::path store = folder_ / "o ut/results.jsonl";
+  const auto press = [&, pressed = false](const std::string&) mutable -> std::string {
+    std::ifstream file(store);
+    const auto lines = std::count(std::istreambuf_iterator<char>(file), {}, '\n');
+    if (pressed || lines < 3) return "";
+    pressed = true;
+    return "\003";
+  };
+  const TerminalEnding seen =
+      See("run long.json --out 'o ut' --jobs 2 --filter 'rtol<1'", 100, "exec", press);
+  EXPECT_EQ(seen.code, 130) << seen.text;
+  const std::size_t first = seen.text.find("accuracy 0/4");
+  ASSERT_NE(first, std::string::npos) << seen.text;
+  EXPECT_NE(seen.text.find("now four-bar", first), std::string::npos) << seen.text;
+  EXPECT_NE(seen.text.find("s to go", first), std::string::npos) << seen.text;
+  EXPECT_NE(seen.text.find("3 records are kept in o ut/results.jsonl, 3 of them of this run"),
+            std::string::npos)
+      << seen.text;
+  std::vector<std::string> warnings;
+  EXPECT_EQ(ReadRecords(store, &warnings).size(), 3u);
+  EXPECT_TRUE(warnings.empty());
+  // the command that it says, word for word
+  const std::string say = "to go on: ";
+  const std::size_t begin = seen.text.find(say) + say.size();
+  const std::string command = seen.text.substr(begin, seen.text.find('\n', begin) - begin);
+  const TerminalEnding again = OnTerminal("cd '" + folder_.string() + "' && " + command, 100);
+  EXPECT_EQ(again.code, 0) << command << "\n" << again.text;
+  EXPECT_NE(again.text.find("1 run now (1 not finished), 3 were done before"), std::string::npos)
+      << again.text;
+  EXPECT_EQ(ReadRecords(store).size(), 4u);
+}
+
+TEST_F(CliTerminalTest, EveryLineOfProgressFitsTheTerminal) {
+  const TerminalEnding seen = See("run tiny.json --out out >out.txt", 30);
+  EXPECT_EQ(seen.code, 0) << seen.text;
+  std::size_t lines = 0;
+  for (std::size_t at = 0; (at = seen.text.find("\r\033[K", at)) != std::string::npos; ++lines) {
+    at += 4;
+    const std::size_t end = seen.text.find_first_of("\r\n", at);
+    if (seen.text.compare(at, 8, "accuracy") == 0) {
+      EXPECT_LT(end - at, 30u) << seen.text;
+    }
+  }
+  EXPECT_GT(lines, 2u);
+  EXPECT_EQ(Call("run tiny.json --out other").text.find("s gone"), std::string::npos);
+}
+
+}  // namespace cli_terminal_test
+}  // namespace loopbench::harness

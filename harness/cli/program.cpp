@@ -37,7 +37,7 @@ Conditions are key=value, key=value,value, key!=value, or of numbers 'key<value'
 for the shell; keys are the columns of drift.csv, and before a run those that name cases.
 Formulations: {}.
 Levels of enforcement: {}.
-Exit codes: 0 done, 1 a gate failed, 2 could not measure or bad input.)";
+Exit codes: 0 done, 1 a gate failed, 2 could not measure or bad input, 130 run was interrupted.)";
 
 int RunProgram(int argc, char** argv) {
   CLI::App app{

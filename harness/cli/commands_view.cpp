@@ -62,7 +62,7 @@ int View(const ViewCommand& command) {
   if (format == "html" && command.svg.view != ViewNames().front()) {
     throw ConfigError("--view is for svg: a page is turned by hand");
   }
-  const ExplainView view = ViewOfTerminal(command.all);
+  const ExplainView view = ViewOfOutput(command.all);
   return PrintFromChild(command.mechanism.string(), command.limits,
                         [&] { return ViewHere(command, format, view); });
 }

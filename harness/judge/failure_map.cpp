@@ -5,10 +5,13 @@
 #include <algorithm>
 #include <cmath>
 #include <iterator>
+#include <map>
 #include <optional>
 #include <set>
+#include <sstream>
 #include <tuple>
 
+#include "harness/analysis/doubts.h"
 #include "harness/tables/columns.h"
 #include "harness/text/spelling.h"
 
@@ -125,11 +128,17 @@ MapCell JudgeCell(const MapRow& row, std::size_t column, const MapColumn& method
                   std::span<const Record> records) {
   const Selection selection = RowAndColumn(row.select, method.select);
   std::optional<MapCell> worst;
-  std::size_t holding = 0, count = 0;
+  std::size_t holding = 0, count = 0, doubted = 0;
+  std::map<std::string, int> doubts;
   for (const Record& record : records) {
     if (!Matches(record, selection)) continue;
     const MapCell one = JudgeRun(row, record);
     holding += one.holding;
+    if (one.holding > 0 && HasDoubt(record)) {
+      ++doubted;
+      std::istringstream codes(record.Text("doubts"));
+      for (std::string code; codes >> code;) ++doubts[code];
+    }
     ++count;
     if (!worst || Badness(one) > Badness(*worst)) worst = one;
   }
@@ -150,6 +159,10 @@ MapCell JudgeCell(const MapRow& row, std::size_t column, const MapColumn& method
   }
   cell.holding = holding;
   cell.records = count;
+  cell.doubted = doubted;
+  for (const auto& [code, times] : doubts) {
+    cell.doubts += fmt::format("{}{} {}", cell.doubts.empty() ? "" : ", ", code, times);
+  }
   cell.cases = std::max(count, row.cases);
   cell.demanded = row.must_hold.at(column);
   return cell;

@@ -105,6 +105,9 @@ struct MapCell {
   Judged decided;
   double t_reached = std::numeric_limits<double>::quiet_NaN();  ///< [s]
   std::size_t holding = 0, records = 0;
+  /// Of the runs that hold those with a doubt, and its codes, each with how often: "energy 2".
+  std::size_t doubted = 0;
+  std::string doubts;
   std::size_t cases = 0;  ///< how many records there should be, at least `records`
   std::string reason;     ///< in words: all measures beyond their limits, the run's message, ...
   bool demanded = false;
@@ -117,6 +120,12 @@ MapCell JudgeRun(const MapRow& row, const Record& record);
 /// selection names the kind.
 MapCell JudgeCell(const MapRow& row, std::size_t column, const MapColumn& method,
                   std::span<const Record> records);
+
+/// Whether the cell holds and one of its runs that hold has a doubt: that run is right by what the
+/// map demands, so that the doubt is a false alarm, or the map demands less.
+inline bool HoldsInDoubt(const MapCell& cell) {
+  return cell.state == CellState::kHolds && cell.doubted > 0;
+}
 
 /// Rules and, by group, row and column, the cells.
 struct FailureMap {

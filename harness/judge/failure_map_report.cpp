@@ -109,7 +109,32 @@ Table DetailTable(const FailureMap& map) {
   return table;
 }
 
+// Cells that hold with a run that trust does not let read "ok": each to be explained.
+Table DoubtTable(const FailureMap& map) {
+  Table table{
+      .title = "Cells that hold, with runs in doubt",
+      .columns = {
+          {"row", "extreme"}, {"column", "method"}, {"count", "in doubt"}, {"doubts", "doubts"}}};
+  EachCell(map, [&table](const MapGroup&, const MapRow& row, const MapColumn& column,
+                         const MapCell& cell) {
+    if (!HoldsInDoubt(cell)) return;
+    AddRow(
+        {row.label, column.label, fmt::format("{} of {}", cell.doubted, cell.holding), cell.doubts},
+        &table);
+  });
+  return table;
+}
+
 }  // namespace
+
+std::string CountDoubts(const FailureMap& map) {
+  std::size_t holding = 0, doubted = 0;
+  EachCell(map, [&](const MapGroup&, const MapRow&, const MapColumn&, const MapCell& cell) {
+    holding += cell.state == CellState::kHolds ? 1 : 0;
+    doubted += HoldsInDoubt(cell) ? 1 : 0;
+  });
+  return fmt::format("{} of {} cells that hold have runs in doubt", doubted, holding);
+}
 
 std::string CountCells(const FailureMap& map) {
   std::string text;
@@ -140,6 +165,7 @@ Table MapTable(const FailureMap& map) {
   }
   table.notes.push_back("");
   table.notes.push_back(CountCells(map));
+  table.notes.push_back(CountDoubts(map));
   for (const std::string& remark : map.remarks) table.notes.push_back("note: " + remark);
   return table;
 }
@@ -147,18 +173,25 @@ Table MapTable(const FailureMap& map) {
 Table MapCellTable(const FailureMap& map) {
   Table table;
   for (const char* key :
-       {"group", "row", "column", "state", "class", "outcome", "measure", "value", "unit", "limit",
-        "ratio", "t_reached", "holding", "records", "cases", "must_hold", "reason", "case_id"}) {
+       {"group", "row",       "column", "state",   "class",     "outcome", "measure",
+        "value", "unit",      "limit",  "ratio",   "t_reached", "holding", "records",
+        "cases", "must_hold", "reason", "case_id", "doubted",   "doubts"}) {
     table.columns.push_back({key, key, Format::kShortest});
   }
   const auto count = [](std::size_t n) { return static_cast<std::int64_t>(n); };
   EachCell(map, [&](const MapGroup& group, const MapRow& row, const MapColumn& column,
                     const MapCell& cell) {
     const Judged& decided = cell.decided;
-    AddRow({group.label, row.label, column.label, std::string(ToString(cell.state)), cell.word,
-            cell.outcome, decided.measure, decided.value, decided.unit, decided.limit,
-            decided.ratio, cell.t_reached, count(cell.holding), count(cell.records),
-            count(cell.cases), cell.demanded, cell.reason, cell.case_id},
+    AddRow({group.label,         row.label,
+            column.label,        std::string(ToString(cell.state)),
+            cell.word,           cell.outcome,
+            decided.measure,     decided.value,
+            decided.unit,        decided.limit,
+            decided.ratio,       cell.t_reached,
+            count(cell.holding), count(cell.records),
+            count(cell.cases),   cell.demanded,
+            cell.reason,         cell.case_id,
+            count(cell.doubted), cell.doubts},
            &table);
   });
   return table;
@@ -167,7 +200,7 @@ Table MapCellTable(const FailureMap& map) {
 std::string MapMarkdown(const FailureMap& map, const std::vector<std::string>& notes) {
   std::string page = fmt::format("# {}\n\n", EscapeMarkdown(map.rules.title));
   if (!map.rules.comment.empty()) page += EscapeMarkdownParagraph(map.rules.comment) + "\n\n";
-  page += CountCells(map) + ".\n\n";
+  page += CountCells(map) + ". " + CountDoubts(map) + ".\n\n";
   for (const std::string& remark : map.remarks) {
     page += "Note: " + EscapeMarkdown(remark) + ".\n\n";
   }
@@ -182,6 +215,8 @@ std::string MapMarkdown(const FailureMap& map, const std::vector<std::string>& n
   page += ToMarkdown(LimitTable(map)) + "\n";
   Table details = DetailTable(map);
   if (!details.rows.empty()) page += ToMarkdown(details);
+  Table doubts = DoubtTable(map);
+  if (!doubts.rows.empty()) page += "\n" + ToMarkdown(doubts);
   for (const std::string& note : notes) page += "\n" + EscapeMarkdownParagraph(note) + "\n";
   return page;
 }

@@ -11,6 +11,8 @@ namespace loopbench::harness {
 
 /// "24 cells: 15 holds, 3 stopped, 1 inaccurate, 5 not measured".
 std::string CountCells(const FailureMap& map);
+/// "3 of 877 cells that hold have runs in doubt".
+std::string CountDoubts(const FailureMap& map);
 
 /// One row per extreme, one column per method (by letter, named in the notes), coloured by state on
 /// a terminal: "ok 2.1e-09", "singular at 0.31 s 3/4", "?" for what was not measured, "-" for what

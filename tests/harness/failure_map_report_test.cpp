@@ -42,14 +42,23 @@ std::vector<Record> SmallRecords() {
 TEST(FailureMapReport, ListsEveryCellWithEveryDigit) {
   EXPECT_EQ(ToCsv(MapCellTable(SmallMap(SmallRecords()))),
             "group,row,column,state,class,outcome,measure,value,unit,limit,ratio,t_reached,holding,"
-            "records,cases,must_hold,reason,case_id\n"
+            "records,cases,must_hold,reason,case_id,doubted,doubts\n"
             "singular,\"one, \"\"1e-8\"\"\",O-DCA,holds,holds,finished,branch_error_max,2.5e-07,"
-            "rad,1e-06,0.25,20,1,1,1,true,,odca-1e-08\n"
+            "rad,1e-06,0.25,20,1,1,1,true,,odca-1e-08,0,\n"
             "singular,\"one, \"\"1e-8\"\"\",multipliers,inaccurate,inaccurate,finished,"
             "branch_error_max,0.5,rad,1e-06,500000,20,0,1,1,true,\"branch_error_max = 0.5 [rad], "
-            "limit 1e-06\",lagrange-1e-08\n"
-            "singular,two,O-DCA,not measured,not measured,,,,,,,,0,0,1,true,no record matches,\n"
-            "singular,two,multipliers,not applicable,not applicable,,,,,,,,0,0,1,false,none,\n");
+            "limit 1e-06\",lagrange-1e-08,0,\n"
+            "singular,two,O-DCA,not measured,not measured,,,,,,,,0,0,1,true,no record matches,,0,\n"
+            "singular,two,multipliers,not applicable,not applicable,,,,,,,,0,0,1,false,none,,0,\n");
+}
+
+TEST(FailureMapReport, NamesCellsThatHoldInDoubt) {
+  std::vector<Record> records = SmallRecords();
+  EXPECT_EQ(CountDoubts(SmallMap(records)), "0 of 1 cells that hold have runs in doubt");
+  for (Record& record : records) record.Set("doubts", std::string("energy drift"));
+  const FailureMap map = SmallMap(records);
+  EXPECT_EQ(CountDoubts(map), "1 of 1 cells that hold have runs in doubt");
+  EXPECT_TRUE(Contains(MapMarkdown(map, {}), "O-DCA | 1 of 1 | drift 1, energy 1 |"));
 }
 
 TEST(FailureMapReport, PrintsCellsByMethod) {

@@ -156,6 +156,38 @@ struct ReferenceOptions {
   double cpu_s = 20.0;  ///< of one witness [s]; it certifies as far as it gets
 };
 
+/// What rows of a trajectory hold, in the order of their columns (harness/trajectory/columns.h).
+enum class OutputPart { kJoints, kBodies, kPoints, kReactions, kForces, kEnergy };
+template <>
+inline constexpr std::array<std::string_view, 6> kNames<OutputPart> = {
+    "joints", "bodies", "points", "reactions", "forces", "energy"};
+/// Axes of reactions: the ground's, or frame F of each joint, which is fixed on its first body.
+enum class OutputAxes { kGround, kJoint };
+template <>
+inline constexpr std::array<std::string_view, 2> kNames<OutputAxes> = {"ground", "joint"};
+
+/// A trajectory of each accuracy case. Times are said in one of four ways.
+struct OutputOptions {
+  double step = 0.0;            ///< [s] from row to row, 0: said otherwise
+  int number = 0;               ///< of rows, evenly from the start to the end; 0: likewise
+  std::vector<double> times;    ///< [s], rising; those beyond a horizon are left out
+  bool accepted_steps = false;  ///< the ends of the integrator's own steps
+  /// The integrator's steps end at the times; else they lie on dense output and the run is the same
+  /// as without.
+  bool exact = false;
+  std::vector<OutputPart> quantities = {OutputPart::kJoints, OutputPart::kBodies,
+                                        OutputPart::kPoints, OutputPart::kReactions,
+                                        OutputPart::kForces, OutputPart::kEnergy};
+  OutputAxes axes = OutputAxes::kGround;
+
+  bool Has(OutputPart part) const;
+};
+
+/// The times of rows of a run until `horizon`; none for accepted steps.
+std::vector<double> OutputTimes(const OutputOptions& output, double horizon);
+/// All that it says, for the identity of cases.
+std::string ToString(const OutputOptions& output);
+
 struct Experiment {
   std::string name;
   std::string comment;
@@ -173,6 +205,7 @@ struct Experiment {
   Timing timing;
   Precision precision;
   std::optional<ReferenceOptions> reference;
+  std::optional<OutputOptions> output;
   /// Of a sweep: this combination's value on each axis, by the axis's name. The values are in every
   /// record, so that filters and tables can use them. Empty without a sweep.
   Record parameters;

@@ -63,6 +63,10 @@ void ReadReferenceOptions(const JsonNode& node, File& file) {
   ReferenceFields().Read(node, &file.reference.emplace());
 }
 
+void ReadOutputOptions(const JsonNode& node, File& file) {
+  OutputFields().Read(node, &file.output.emplace());
+}
+
 /// Reports levels whose derivative an implicit profile asks for, and that have none.
 void RequireDerivatives(const JsonNode& node, File& file) {
   const auto integrator = node.Optional("integrator");
@@ -123,6 +127,8 @@ const Fields<ExperimentFile>& ExperimentFileFields() {
        {"timing", Object(&File::timing, TimingFields())},
        {"precision", By(PrecisionFields().Schema(), ReadPrecision)},
        {"reference", By(ReferenceFields().Schema(), ReadReferenceOptions)},
+       {"output", By(OutputFields().Schema(), ReadOutputOptions)},
+       {"", By(Json::object(), RequireOutput)},
        {"ensembles", By(EnsemblesSchema(), ReadEnsembles), "Perturbed repetitions of cases."},
        {"sweep", SweepSchema(),
         "Axes that are crossed, the first one slowest; each combination of values is run as if "

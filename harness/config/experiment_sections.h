@@ -86,6 +86,9 @@ const Fields<Experiment>& SeriesFields();
 const Fields<Timing>& TimingFields();
 const Fields<Precision>& PrecisionFields();
 const Fields<ReferenceOptions>& ReferenceFields();
+const Fields<OutputOptions>& OutputFields();
+/// Reports output that the rest of the experiment rules out.
+void RequireOutput(const JsonNode& node, ExperimentFile& experiment);
 /// "ensembles", after everything that they select from.
 void ReadEnsembles(const JsonNode& node, ExperimentFile& experiment);
 Json EnsemblesSchema();

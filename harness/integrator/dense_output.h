@@ -14,6 +14,10 @@
 
 namespace loopbench::harness {
 
+/// f(t, y) to `ydot`; false when it cannot be had.
+using DenseDerivative =
+    std::function<bool(double t, std::span<const double> y, std::span<double> ydot)>;
+
 /// Where the solution is wanted besides the steps' ends.
 struct DenseObserver {
   std::vector<double> times;  ///< [s], rising
@@ -21,12 +25,14 @@ struct DenseObserver {
   /// interpolation adds. At the end of a step both are the step's own end as the observer left it.
   std::function<void(std::size_t k, std::span<const double> y, std::span<const double> lower)>
       observe;
+  /// The problem's derivative, where those taken here are to be told from the integrator's; else
+  /// the problem is asked itself.
+  DenseDerivative derivative = nullptr;
 };
 
 class DenseOutput {
  public:
-  /// f(t, y) to `ydot`; false when it cannot be had.
-  using Derivative = std::function<bool(double t, std::span<const double> y, std::span<double>)>;
+  using Derivative = DenseDerivative;
 
   /// The step from (t0, y0) to (t1, y1), t0 < t1. Five derivatives, of which that at t1 is taken at
   /// the last time before it: what jumps there is the next step's. False when one cannot be had.

@@ -63,10 +63,11 @@ class Watcher {
   /// Before the step's end is observed: the times within the step.
   void Pass(double t1, const std::vector<double>& y1) {
     if (dense_ == nullptr || !IsBefore(t1)) return;
-    const bool good = output_.Prepare(
-        t0_, y0_, t1, y1, [&](double t, std::span<const double> y, std::span<double> f) {
-          return ode_.Derivative(t, y, f) == Outcome::kFinished;
-        });
+    const DenseDerivative own = [&](double t, std::span<const double> y, std::span<double> f) {
+      return ode_.Derivative(t, y, f) == Outcome::kFinished;
+    };
+    const bool good =
+        output_.Prepare(t0_, y0_, t1, y1, dense_->derivative ? dense_->derivative : own);
     y_.resize(y1.size()), lower_.resize(y1.size());
     for (; IsBefore(t1); ++next_) {
       if (!good) continue;

@@ -40,7 +40,7 @@ const std::array<Kind, 5>& Kinds() {
        {"scenes", "columns"},
        {"name", "comment", "scenes", "columns", "tolerances", "fixed_steps", "integrator",
         "jacobian", "ensembles", "limits", "compile", "series", "timing", "precision", "reference",
-        "sweep", "exclude", "$schema"}},
+        "output", "sweep", "exclude", "$schema"}},
       {FileKind::kClaims, "claims", {"claims"}, {"claims", "$schema"}},
       {FileKind::kMap,
        "a failure map",

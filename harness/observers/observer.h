@@ -51,6 +51,7 @@ struct Watched {
   const SceneObservation& scene;
   int points;        ///< kept of a series
   bool with_series;  ///< false for members of ensembles, of which series would be many
+  std::span<const double> stops = {};  ///< [s], rising: times at which steps have to end
 };
 
 /// All observers of a run, in the order of their keys in records: the built-in ones, each a line

@@ -23,7 +23,7 @@ double FastestDrive(const MechanismDescription& description) {
 
 template <class Space>
 StepLengthObserver<Space>::StepLengthObserver(const Watched<Space>& run)
-    : stops_(run.mechanism.stop_times()), fastest_(FastestDrive(run.description)) {}
+    : stops_(run.stops.begin(), run.stops.end()), fastest_(FastestDrive(run.description)) {}
 
 template <class Space>
 void StepLengthObserver<Space>::Observe(const Sample<Space>& sample) {

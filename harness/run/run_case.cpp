@@ -16,7 +16,9 @@
 #include "harness/run/ensemble.h"
 #include "harness/run/merge_parts.h"
 #include "harness/run/peers.h"
+#include "harness/run/run_keys.h"
 #include "harness/text/hash.h"
+#include "harness/trajectory/recorder.h"
 #include "mechanism/start/assembly.h"
 
 namespace loopbench::harness {
@@ -33,7 +35,8 @@ class Runner {
  public:
   /// Part `part` of `user`, simplified to `scene`.
   Runner(const Experiment& experiment, const Case& one, const MechanismDescription& user,
-         const CompiledScene& scene, int part, bool with_series, const Reference* reference)
+         const CompiledScene& scene, int part, bool with_series, const Reference* reference,
+         const TrajectoryTask* trajectory)
       : case_(one),
         user_(user),
         compiled_(scene.compiled),
@@ -41,10 +44,12 @@ class Runner {
         scene_(scene.observe),
         description_(scene.compiled.parts[static_cast<std::size_t>(part)].description),
         mechanism_(description_, one.column.coordinates),
-        observers_(MakeObservers<Space>(
-            {description_, mechanism_, scene_, experiment.series_points, with_series})),
+        stops_(mechanism_.stop_times()),
         with_series_(with_series) {
     if (reference != nullptr) errors_.emplace(Measured{user_, compiled_}, part, *reference);
+    if (trajectory != nullptr) PrepareRows(*trajectory);
+    observers_ = MakeObservers<Space>(
+        {description_, mechanism_, scene_, experiment.series_points, with_series, stops_});
   }
 
   Run Execute() {
@@ -60,13 +65,18 @@ class Runner {
       run.branch_start = ExactObserver<Space>(scene_, mechanism_).BranchAt(kinematics);
       result = Integrate(start);
       for (const auto& observer : observers_) observer->Write(run.record);
+      if (const Value* softened = run.record.Find("softened_evaluations")) {
+        run.record.Set("softened_evaluations", std::get<std::int64_t>(*softened) - looked_by_then_);
+      }
       if (errors_) errors_->Write(run.record);
+      if (recorder_) recorder_->Finish(run.record);
       for (const auto& [key, pose] : final_poses_.items()) run.record.Set(key, pose);
       run.record.Set("state_hash", StateHash(y_));
     }
     Traces traces;
     for (const auto& observer : observers_) observer->Trace(traces);
-    WriteResult(result, traces.projection_steps, run.record);
+    WriteCounts(result, traces.projection_steps, FindProfile(case_.integrator)->is_implicit,
+                run.record);
     run.drift = {traces.drift.t, traces.drift.value};
     if (with_series_) {
       run.correction = {traces.correction.t, traces.correction.value};
@@ -77,26 +87,15 @@ class Runner {
   }
 
  private:
-  /// What the integrator counted.
-  void WriteResult(const IntegratorResult& result, std::int64_t projection_steps,
-                   Record& record) const {
-    record.Set("outcome", std::string(ToString(result.outcome)));
-    record.Set("message", result.message);
-    record.Set("t_reached", result.t_reached);
-    record.Set("steps", result.steps);
-    record.Set("rejected", result.rejected);
-    record.Set("rhs_evaluations", result.rhs_evaluations);
-    record.Set("rhs_equivalents", result.rhs_evaluations + projection_steps);
-    record.Set("restarts", result.restarts);
-    if (FindProfile(case_.integrator)->is_implicit) {
-      record.Set("newton_jacobians", result.jacobians);
-      record.Set("newton_rhs_evaluations", result.jacobian_rhs_evaluations);
-      record.Set("newton_dual_evaluations", result.dual_evaluations);
-      record.Set("newton_iterations", result.newton_iterations);
-      record.Set("newton_failures", result.newton_failures);
-    }
-    record.Set("wall_s", result.wall_s);
-    record.Set("cpu_s", result.cpu_s);
+  /// Prepares the rows of a trajectory.
+  void PrepareRows(const TrajectoryTask& task) {
+    recorder_.emplace(user_, compiled_, mechanism_, task);
+    by_steps_ = task.output.accepted_steps;
+    rows_ = OutputTimes(task.output, case_.horizon);
+    if (!task.output.exact) return;
+    stops_.insert(stops_.end(), rows_.begin(), rows_.end());
+    std::ranges::sort(stops_);
+    stops_.erase(std::unique(stops_.begin(), stops_.end()), stops_.end());
   }
 
   void Show(const Sample<Space>& sample, Outcome outcome) {
@@ -118,6 +117,42 @@ class Runner {
     };
     const Snapshot own = picture(y);
     errors_->Add(k, own, lower.data() == y.data() ? own : picture(lower));
+  }
+
+  /// Runs `look`, which is none of the integrator's, and keeps its evaluations from being counted.
+  template <class Look>
+  void Uncounted(const System<Space, double>& system, Look look) {
+    const std::int64_t before = system.diagnostics().softened_evaluations;
+    look();
+    looked_ += system.diagnostics().softened_evaluations - before;
+  }
+
+  /// The times of the reference and of rows, each once, for the integrator to show.
+  DenseObserver Dense(System<Space, double>& system) {
+    DenseObserver dense;
+    if (errors_) dense.times = errors_->times();
+    dense.times.insert(dense.times.end(), rows_.begin(), rows_.end());
+    std::ranges::sort(dense.times);
+    dense.times.erase(std::unique(dense.times.begin(), dense.times.end()), dense.times.end());
+    const std::size_t n = static_cast<std::size_t>(system.state_size());
+    dense.observe = [this, &system, n, times = dense.times](
+                        std::size_t k, std::span<const double> y, std::span<const double> lower) {
+      const auto find = [&](const std::vector<double>& in) -> std::optional<std::size_t> {
+        const auto at = std::ranges::lower_bound(in, times[k]);
+        if (at == in.end() || *at != times[k]) return std::nullopt;
+        return static_cast<std::size_t>(at - in.begin());
+      };
+      const auto reference = errors_ ? find(errors_->times()) : std::nullopt;
+      if (reference) Compare(system, *reference, y.first(n), lower.first(n));
+      if (!find(rows_)) return;
+      Uncounted(system, [&] { recorder_->TakeAt(times[k], system, y, lower); });
+    };
+    dense.derivative = [this, &system](double t, std::span<const double> y, std::span<double> f) {
+      Outcome outcome;
+      Uncounted(system, [&] { outcome = system.Derivative(t, y, f); });
+      return outcome == Outcome::kFinished;
+    };
+    return dense;
   }
 
   IntegratorResult Integrate(const Start<double>& start) {
@@ -143,23 +178,22 @@ class Runner {
       sample.knows_work = !peer || !mechanism_.has_power();
       if (!work.empty()) sample.supplied = work[0], sample.dissipated = work[1];
       Show(sample, outcome);
+      looked_by_then_ = looked_;
+      if (recorder_ && by_steps_) {
+        recorder_->Take(t, *formulation, outcome == Outcome::kFinished, work);
+      }
       // peers have no dense output
       if (peer && errors_ && outcome == Outcome::kFinished && t == errors_->times().back()) {
         Compare(*formulation, errors_->times().size() - 1, y, y);
       }
       return restart ? StepAction::kRestart : StepAction::kContinue;
     };
-    DenseObserver dense;
-    if (errors_) {
-      dense.times = errors_->times();
-      dense.observe = [&](std::size_t k, std::span<const double> y, std::span<const double> lower) {
-        Compare(*formulation, k, y.first(n), lower.first(n));
-      };
-    }
-    const IntegratorOptions options = OptionsOf(case_, mechanism_.stop_times());
-    IntegratorResult run = peer ? peer->Integrate(case_.horizon, y_, options, observe)
-                                : harness::Integrate(*formulation, 0.0, case_.horizon, y_, options,
-                                                     observe, errors_ ? &dense : nullptr);
+    const DenseObserver dense = Dense(*formulation);
+    const IntegratorOptions options = OptionsOf(case_, stops_);
+    IntegratorResult run =
+        peer ? peer->Integrate(case_.horizon, y_, options, observe)
+             : harness::Integrate(*formulation, 0.0, case_.horizon, y_, options, observe,
+                                  dense.times.empty() ? nullptr : &dense);
     y_.resize(n);
     if (run.outcome == Outcome::kSingular) {
       const std::string why = formulation->solver().WhySingular();
@@ -180,20 +214,27 @@ class Runner {
   const MechanismDescription& description_;
   Mechanism<Space, double> mechanism_;
   std::vector<std::unique_ptr<Observer<Space>>> observers_;
+  std::vector<double> stops_;  ///< [s], at which steps end
   bool with_series_;
   std::optional<ErrorMeter> errors_;
+  std::optional<Recorder<Space>> recorder_;
+  bool by_steps_ = false;                         ///< rows are at the ends of steps
+  std::vector<double> rows_;                      ///< else at these times
+  std::int64_t looked_ = 0, looked_by_then_ = 0;  ///< softened, for nobody's step; at the last one
   Record final_poses_;
   std::vector<double> y_;
 };
 
 Run RunOnce(const Experiment& experiment, const Case& one, const MechanismDescription& description,
-            bool with_series, const Reference* reference = nullptr) {
+            bool with_series, const Reference* reference = nullptr,
+            const TrajectoryTask* trajectory = nullptr) {
   const SceneObservation& observe = experiment.scenes[one.scene].mechanism.observe;
   const CompiledScene scene = CompileScene(description, observe, experiment.compile);
   std::vector<Run> parts;
   for (int part = 0; part < static_cast<int>(scene.compiled.parts.size()); ++part) {
     const auto run = [&]<class Space>() {
-      return Runner<Space>(experiment, one, description, scene, part, with_series, reference)
+      return Runner<Space>(experiment, one, description, scene, part, with_series, reference,
+                           trajectory)
           .Execute();
     };
     const auto& own = scene.compiled.parts[static_cast<std::size_t>(part)].description;
@@ -205,31 +246,6 @@ Run RunOnce(const Experiment& experiment, const Case& one, const MechanismDescri
     run.record.Set("compiled", ToString(scene.compiled.done));
   }
   return run;
-}
-
-void WriteGrowth(const Growth& growth, int failed, Record& record) {
-  record.Set("growth_exponent", growth.exponent);
-  record.Set("growth_spread", growth.spread);
-  record.Set("growth_exponent_late", growth.exponent_late);
-  record.Set("growth_spread_late", growth.spread_late);
-  record.Set("growth_regime", growth.regime);
-  record.Set("growth_resolved", growth.resolved && failed == 0);
-  record.Set("growth_hypothesis", growth.hypothesis.name);
-  record.Set("growth_hypothesis_resolved", growth.hypothesis_resolved && failed == 0);
-  record.Set("growth_hypothesis_ratio", growth.hypothesis.ratio);
-  record.Set("growth_rate", growth.hypothesis.rate);
-  record.Set("growth_from", growth.t_from);
-  record.Set("growth_to", growth.t_to);
-  record.Set("ensemble", std::int64_t{growth.members});
-  record.Set("ensemble_failed", std::int64_t{failed});
-}
-
-/// Growth of what is no drift, in the one run that it is known of: its exponent, without a verdict.
-void WriteExponent(const std::string& key, const DriftSeries& series, double horizon, double scale,
-                   Record& record) {
-  if (series.t.empty() || !(scale > 0.0)) return;
-  const Growth growth = AnalyseGrowth({&series, 1}, horizon, scale);
-  if (std::isfinite(growth.exponent)) record.Set(key, growth.exponent);
 }
 
 }  // namespace
@@ -247,7 +263,8 @@ IntegratorOptions OptionsOf(const Case& one, const std::vector<double>& stop_tim
   return options;
 }
 
-Record RunCase(const Experiment& experiment, const Case& one, const Reference* reference) {
+Record RunCase(const Experiment& experiment, const Case& one, const Reference* reference,
+               const std::filesystem::path& trajectory) {
   const ExperimentScene& scene = experiment.scenes[one.scene];
   Record record = one.keys;
   record.Set("scene_id", Fnv1a(scene.mechanism.canonical));
@@ -258,8 +275,14 @@ Record RunCase(const Experiment& experiment, const Case& one, const Reference* r
                  static_cast<double>(scene.mechanism.description.bodies.size() - 1));
   if (reference != nullptr) WriteCertificate(*reference, record);
   const bool usable = reference != nullptr && reference->NumTrusted() > 0;
-  Run nominal =
-      RunOnce(experiment, one, scene.mechanism.description, true, usable ? reference : nullptr);
+  std::optional<TrajectoryTask> task;
+  if (experiment.output && !trajectory.empty()) {
+    task.emplace(*experiment.output, trajectory,
+                 fmt::format("{} {} {} {}", one.mechanism, ToString(one.column), one.integrator,
+                             SettingOf(one)));
+  }
+  Run nominal = RunOnce(experiment, one, scene.mechanism.description, true,
+                        usable ? reference : nullptr, task ? &*task : nullptr);
   for (const auto& [key, value] : nominal.record.items()) record.Set(key, value);
 
   std::vector<DriftSeries> runs;

@@ -1,6 +1,7 @@
 // Runs one case for accuracy: start, integration, observers, record.
 #pragma once
 
+#include <filesystem>
 #include <memory>
 #include <string>
 #include <vector>
@@ -46,7 +47,11 @@ IntegratorOptions OptionsOf(const Case& one, const std::vector<double>& stop_tim
 /// With a reference (harness/reference/), the unperturbed run is held against it at the reference's
 /// times, between steps through dense output.
 ///
+/// Where the experiment asks for output, the unperturbed run's trajectory is written to
+/// `trajectory` (harness/trajectory/), unless that is empty.
+///
 /// Whatever goes wrong numerically ends in the record; only misuse throws.
-Record RunCase(const Experiment& experiment, const Case& one, const Reference* reference = nullptr);
+Record RunCase(const Experiment& experiment, const Case& one, const Reference* reference = nullptr,
+               const std::filesystem::path& trajectory = {});
 
 }  // namespace loopbench::harness

@@ -17,10 +17,6 @@
 namespace loopbench::harness {
 namespace {
 
-std::filesystem::path FileOf(const std::filesystem::path& path) {
-  return path.extension() == ".jsonl" ? path : path / "results.jsonl";
-}
-
 /// What the text of a store holds.
 struct Lines {
   std::vector<Record> records;
@@ -81,7 +77,11 @@ void MendLastLine(const std::filesystem::path& file, int descriptor) {
 
 }  // namespace
 
-ResultStore::ResultStore(const std::filesystem::path& path) : file_(FileOf(path)) {
+std::filesystem::path StoreFile(const std::filesystem::path& path) {
+  return path.extension() == ".jsonl" ? path : path / "results.jsonl";
+}
+
+ResultStore::ResultStore(const std::filesystem::path& path) : file_(StoreFile(path)) {
   MakeFolderOf(file_);
   descriptor_ = OpenLocked(file_);
   try {
@@ -150,7 +150,7 @@ std::vector<Record> LatestRecords(const std::vector<Record>& records, std::strin
 
 std::vector<Record> ReadRecords(const std::filesystem::path& path,
                                 std::vector<std::string>* warnings) {
-  const std::filesystem::path file = FileOf(path);
+  const std::filesystem::path file = StoreFile(path);
   Lines lines = ReadLines(ReadFile(file), file);
   if (warnings != nullptr && !lines.warning.empty()) warnings->push_back(lines.warning);
   return std::move(lines.records);

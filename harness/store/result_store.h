@@ -12,6 +12,9 @@
 
 namespace loopbench::harness {
 
+/// The file of a store: `path` itself if it ends in ".jsonl", else results.jsonl in that folder.
+std::filesystem::path StoreFile(const std::filesystem::path& path);
+
 /// Appends records to a file of JSON Lines. Lines are never changed, and a record is on the disk
 /// when Append() returns: a crash or a power failure loses at most the line that was being written.
 ///

@@ -27,6 +27,8 @@
 #include "harness/text/config_error.h"
 #include "harness/text/terminal.h"
 #include "harness/timing/time_cases.h"
+#include "harness/trajectory/trajectory.h"
+#include "harness/trajectory/trajectory_writer.h"
 
 namespace loopbench::harness {
 
@@ -43,7 +45,8 @@ struct Piece {
   ProcessLimits limits;
   std::string label;
   double cost = 0.0;
-  std::filesystem::path product = {};  ///< a file without which the piece is not done
+  std::filesystem::path product = {};     ///< a file without which the piece is not done
+  std::filesystem::path trajectory = {};  ///< one that its process may leave unfinished
   std::function<double(Estimate&)> seconds = {};
 };
 
@@ -57,15 +60,19 @@ constexpr Estimate::Budget kForProgress = {
 Piece AccuracyPiece(const Experiment& experiment, const Case& one,
                     const std::filesystem::path& store) {
   const int runs = one.ensemble > 1 ? one.ensemble + 1 : 1;
-  const auto work = [&experiment, one, store] {
+  std::filesystem::path trajectory;
+  if (experiment.output) trajectory = TrajectoryPath(store, RunId(one.keys));
+  const auto work = [&experiment, one, store, trajectory] {
     const std::optional<Reference> reference = FindReference(experiment, one, store);
-    return std::vector<Record>{RunCase(experiment, one, reference ? &*reference : nullptr)};
+    return std::vector<Record>{
+        RunCase(experiment, one, reference ? &*reference : nullptr, trajectory)};
   };
   return {.owed = {one.keys},
           .work = work,
           .limits = LimitsOfRuns(one.limits, runs * one.column.threads),
           .label = fmt::format("{} {} {}", one.mechanism, ToString(one.column), SettingOf(one)),
-          .cost = Cost(one)};
+          .cost = Cost(one),
+          .trajectory = trajectory};
 }
 
 Piece ReferencePiece(const Experiment& experiment, const ReferenceCase& one) {
@@ -197,6 +204,7 @@ class Runner {
         },
         [&](std::size_t i) { return pieces[i].limits; },
         [&](std::size_t i, const ProcessResult& result) {
+          if (!pieces[i].trajectory.empty()) RemovePart(pieces[i].trajectory);
           for (const Record& record : Records(pieces[i], result, options_.set)) {
             store_.Append(record);
             ++count_.run;
@@ -291,6 +299,7 @@ Shard ParseShard(const std::string& text) {
 SuiteCount RunSuite(const std::vector<Experiment>& experiments, const SuiteOptions& options,
                     const std::vector<Record>& records, ResultStore& store) {
   WarnOfJobs(options.jobs, experiments);
+  RemoveParts(store.file());
   const Interruption interruption;
   Runner runner(experiments, options, records, store);
   std::vector<Piece> pieces;

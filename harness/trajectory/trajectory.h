@@ -1,0 +1,84 @@
+// A trajectory as it stands in a file: columns of numbers over time.
+//
+// The file is CSV: lines that begin with "#" say what it is, then a line of labels (columns.h),
+// then a line per time. A number that is not known is nan or an empty cell. What writes one
+// (trajectory_writer.h) uses all columns that it was asked for; what reads one takes those of
+// another program that have the same labels, however few, in any order.
+#pragma once
+
+#include <filesystem>
+#include <fstream>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "harness/trajectory/columns.h"
+#include "mechanism/description/joint_frames.h"
+
+namespace loopbench::harness {
+
+/// Row by row, for files of any length. Errors are std::runtime_error with file, line, what was
+/// found and what was expected.
+class TrajectoryReader {
+ public:
+  /// Reads the labels, of which "t [s]" must be one, and none twice. One that is no label is a
+  /// column with an empty kind, whose component is its text.
+  explicit TrajectoryReader(const std::filesystem::path& path);
+
+  const std::vector<TrajectoryColumn>& columns() const { return columns_; }
+  std::size_t time() const { return time_; }  ///< column of t
+  /// What the lines above the labels say, without "# ".
+  const std::vector<std::string>& notes() const { return notes_; }
+
+  /// The next row, a number per column; false at the end. Times rise.
+  bool Next(std::vector<double>* row);
+
+ private:
+  bool NextLine();
+  [[noreturn]] void Refuse(const std::string& found, const std::string& expected) const;
+
+  std::filesystem::path path_;
+  std::ifstream in_;
+  std::string line_;
+  std::size_t number_ = 0, time_ = 0;  ///< of the line, from 1; column of t
+  double last_t_ = 0.0;
+  bool has_row_ = false;
+  std::vector<TrajectoryColumn> columns_;
+  std::vector<std::string> notes_;
+};
+
+/// All of a file.
+struct Trajectory {
+  std::vector<TrajectoryColumn> columns;
+  std::vector<std::string> notes;
+  std::vector<double> values;  ///< row after row
+  std::size_t time = 0;        ///< column of t
+
+  std::size_t rows() const { return columns.empty() ? 0 : values.size() / columns.size(); }
+  double At(std::size_t row, std::size_t column) const {
+    return values[row * columns.size() + column];
+  }
+  /// `name` as it stands in the mechanism; that of a point is LabelName(body) + ":" +
+  /// LabelName(point), with `is_label`.
+  std::optional<std::size_t> Find(std::string_view kind, std::string_view name,
+                                  std::string_view component, bool is_label = false) const;
+};
+Trajectory ReadTrajectory(const std::filesystem::path& path);
+
+/// Where the pose of a body stands in rows.
+struct PoseColumns {
+  std::vector<std::size_t> columns;  ///< x, y, angle, or x, y, z, qw, qx, qy, qz
+  bool planar = true;
+
+  /// The pose in a row, which is NaN where a number is. A quaternion may be of any length.
+  Frame At(const double* row) const;
+};
+/// Nothing where the pose is not there, or not all of it.
+std::optional<PoseColumns> FindPose(const std::vector<TrajectoryColumn>& columns,
+                                    std::string_view body);
+
+/// trajectories/ID.csv beside a store's `file`.
+std::filesystem::path TrajectoryPath(const std::filesystem::path& store_file,
+                                     const std::string& id);
+
+}  // namespace loopbench::harness

@@ -1,0 +1,375 @@
+// Trajectories against closed forms and published numbers, and reactions against statics.
+#include <fmt/format.h>
+#include <gtest/gtest.h>
+#include <unistd.h>
+
+#include <cmath>
+#include <iostream>
+#include <numbers>
+
+#include "harness/observers/observer.h"
+#include "harness/text/files.h"
+#include "harness/trajectory/check.h"
+#include "harness/trajectory/reactions.h"
+#include "mechanism/start/assembly.h"
+#include "tests/reference/cases.h"
+#include "tests/reference/published_numbers.h"
+#include "tests/reference/simulate.h"
+
+namespace loopbench::harness::reference {
+namespace trajectory_test {
+
+constexpr double kPi = std::numbers::pi;
+constexpr double kEpsilon = std::numeric_limits<double>::epsilon();
+
+const Column kOdcaJoint = {.formulation = "odca"};
+
+/// A run's record and trajectory.
+struct Written {
+  Record record;
+  Trajectory rows;
+  std::filesystem::path path;
+
+  double At(std::size_t row, const std::string& kind, const std::string& name,
+            const std::string& component) const {
+    const auto column = rows.Find(kind, name, component);
+    if (!column) throw std::invalid_argument("no column " + kind + ":" + name + ":" + component);
+    return rows.At(row, *column);
+  }
+  double Time(std::size_t row) const { return rows.At(row, rows.time); }
+};
+
+MechanismFile ShippedFile(const std::string& name) {
+  return ReadMechanism(kConfigs / "mechanisms" / (name + ".json"));
+}
+
+Written WriteTrajectory(const MechanismFile& mechanism, const Column& column,
+                        const std::string& integrator, double tolerance, double horizon,
+                        const OutputOptions& output, const CompileOptions& compile = {},
+                        double step = 0.0) {
+  Experiment experiment = Single(mechanism);
+  experiment.output = output;
+  experiment.compile = compile;
+  Case one = CaseOf(experiment, mechanism.description.name, column, tolerance, horizon);
+  one.integrator = integrator;
+  one.step = step;
+  Written written;
+  written.path = std::filesystem::path(testing::TempDir()) /
+                 fmt::format("loopbench-trajectory-{}.csv", ::getpid());
+  written.record = RunCase(experiment, one, nullptr, written.path);
+  EXPECT_EQ(written.record.Text("outcome"), "finished") << written.record.Text("message");
+  written.rows = ReadTrajectory(written.path);
+  EXPECT_EQ(static_cast<double>(written.rows.rows()), written.record.Number("trajectory_rows"));
+  return written;
+}
+
+OutputOptions Times(std::vector<double> times, bool exact = false) {
+  OutputOptions output;
+  output.times = std::move(times);
+  output.exact = exact;
+  return output;
+}
+OutputOptions Rows(int number) {
+  OutputOptions output;
+  output.number = number;
+  return output;
+}
+
+/// What steps may leave (each an error below the tolerance), carried along by a stable motion, and
+/// what interpolation adds: at least the distance of its two degrees.
+double BoundOf(const Written& run, double tolerance) {
+  const double steps = run.record.Number("steps") * tolerance;
+  const double dense = run.record.Number("trajectory_interpolation_max");
+  return steps + (std::isnan(dense) ? 0.0 : dense);
+}
+
+double Apart(double a, double b) { return std::abs(std::remainder(a - b, 2 * kPi)); }
+
+TEST(Trajectory, OfA01IsTheEllipticFunctionAndItsPinForce) {
+  const MechanismFile pendulum = ShippedFile("simple-pendulum");
+  for (const bool exact : {false, true}) {
+    OutputOptions output = Times({0.0, 0.3, 0.5, 1.0, 1.5, 7.77, 10.0}, exact);
+    const Written run = WriteTrajectory(pendulum, kOdcaJoint, "ode45", 1e-11, 10.0, output);
+    ASSERT_EQ(run.rows.rows(), 7u);
+    const double bound = BoundOf(run, 1e-11);
+    double worst = 0.0, worst_force = 0.0;
+    for (std::size_t row = 0; row < 7; ++row) {
+      const double t = run.Time(row);
+      // theta from hanging down; (-1, 0) is at -pi/2 of it
+      const double theta = PendulumAngle(9.81, -kPi / 2, 0.0, t);
+      worst = std::max(worst, Apart(run.At(row, "joint", "O", "angle"), theta - kPi / 2));
+      EXPECT_NEAR(run.At(row, "body", "bob", "x"), 0.0, bound);
+      const double w = run.At(row, "joint", "O", "angle speed");
+      // energy: w^2 / 2 = 9.81 (cos theta - cos theta_0)
+      EXPECT_NEAR(w * w, 2 * 9.81 * std::cos(theta), 20 * bound);
+      // 1 kg at 0.5 m: F = m (a - g), a = r theta'' across the rod and - r theta'^2 along it
+      const double along_x = std::sin(theta), along_y = -std::cos(theta);
+      const double angular = -9.81 * std::sin(theta), square = 2 * 9.81 * std::cos(theta);
+      const double fx = 0.5 * (-angular * along_y - square * along_x);
+      const double fy = 0.5 * (angular * along_x - square * along_y) + 9.81;
+      worst_force = std::max({worst_force, std::abs(run.At(row, "reaction", "O", "fx") - fx),
+                              std::abs(run.At(row, "reaction", "O", "fy") - fy)});
+      EXPECT_NEAR(run.At(row, "reaction", "O", "mz"), 0.0, 100 * kEpsilon);  // a pin has none
+      EXPECT_NEAR(run.At(row, "energy", "", "kinetic") + run.At(row, "energy", "", "potential"),
+                  0.0, 20 * bound);
+    }
+    EXPECT_LE(worst, bound);
+    EXPECT_LE(worst_force, 30 * bound);  // forces change by some 30 N/rad
+    std::cout << (exact ? "exact " : "dense ") << worst << " rad, pin force " << worst_force
+              << " N of " << bound << '\n';
+    for (const PathPoint& point : kA01Published) {
+      for (std::size_t row = 0; row < 7; ++row) {
+        if (run.Time(row) != point.t) continue;
+        const auto x = run.rows.Find("point", "bob:B", "x", true);
+        ASSERT_TRUE(x);
+        EXPECT_NEAR(run.rows.At(row, *x), point.x, 0.5e-6 + bound);  // six digits
+      }
+    }
+    EXPECT_EQ(run.record.Text("trajectory_output"), exact ? "exact times" : "dense output");
+  }
+}
+
+TEST(Trajectory, OfTheSliderCrankIsThatOfSundials) {
+  std::vector<double> times;
+  for (const SliderCrankState& state : kSliderCrankVerified) times.push_back(state.t);
+  for (const Column& column : PositionColumns()) {
+    const Written run =
+        WriteTrajectory(ShippedFile("slider-crank"), column, "ode45", 1e-11, 10.0, Times(times));
+    const double bound = BoundOf(run, 1e-11);
+    for (std::size_t row = 0; row < times.size(); ++row) {
+      const SliderCrankState& exact = kSliderCrankVerified[row];
+      EXPECT_LE(Apart(run.At(row, "body", "crank", "angle"), exact.q), bound) << exact.t;
+      EXPECT_NEAR(run.At(row, "body", "rod", "x"), exact.x, bound) << exact.t;
+      EXPECT_LE(Apart(run.At(row, "body", "rod", "angle"), exact.p), bound) << exact.t;
+    }
+    EXPECT_NEAR(run.At(times.size() - 1, "body", "crank", "w"), kSliderCrankSpeedVerified, bound);
+  }
+}
+
+TEST(Trajectory, OfAndrewsSqueezerIsThatOfTheTestSet) {
+  // t = 0.03 s lies between two steps of a run to 0.0301 s
+  const Written run = WriteTrajectory(ShippedFile("andrews-squeezer"), kOdcaJoint, "fehlberg-78",
+                                      1e-13, 0.0301, Times({0.03}));
+  const auto angle = [&](const char* body) { return run.At(0, "body", body, "angle"); };
+  const auto rate = [&](const char* body) { return run.At(0, "body", body, "w"); };
+  const std::array<double, 7> q = {
+      angle("K1"), angle("K2") - angle("K1"), angle("K3"), angle("K4") - angle("K5"),
+      angle("K5"), angle("K6") - angle("K7"), angle("K7")};
+  double worst = 0.0;
+  for (std::size_t i = 0; i < q.size(); ++i) {
+    worst = std::max(worst, Apart(q[i], kA03Verified.q[i]));
+  }
+  // Steps of order 8 are long for an interpolant of order 6: positions in a mechanism of 0.1 m are
+  // off by what the degrees differ by, and angles by that over the shortest arm, 7 mm.
+  const double interpolation = run.record.Number("trajectory_interpolation_max");
+  EXPECT_LE(worst, 1e-9 + interpolation / 7e-3);
+  EXPECT_NEAR(rate("K1") / kA03Published.v[0], 1.0, 2e-7 + interpolation / 7e-3);
+  std::cout << "angles " << worst << " rad, degrees apart " << interpolation << " m\n";
+  const Written exact = WriteTrajectory(ShippedFile("andrews-squeezer"), kOdcaJoint, "fehlberg-78",
+                                        1e-13, 0.0301, Times({0.03}, true));
+  EXPECT_LE(Apart(exact.At(0, "body", "K1", "angle"), kA03Verified.q[0]), 1e-9);
+}
+
+TEST(Trajectory, ErrorOfDenseOutputIsOfOrderSix) {
+  // Steps of order 8 leave nothing to see at their ends, so rows between them have the error of
+  // dense output alone.
+  const MechanismFile pendulum = ShippedFile("simple-pendulum");
+  std::vector<double> errors;
+  for (const double step : {0.1, 0.05, 0.025}) {
+    const Written run =
+        WriteTrajectory(pendulum, kOdcaJoint, "fehlberg-78", 1e-8, 4.0, Rows(4001), {}, step);
+    double worst = 0.0;
+    for (std::size_t row = 0; row < run.rows.rows(); ++row) {
+      const double theta = PendulumAngle(9.81, -kPi / 2, 0.0, run.Time(row));
+      worst = std::max(worst, Apart(run.At(row, "joint", "O", "angle"), theta - kPi / 2));
+    }
+    errors.push_back(worst);
+    std::cout << step << " s: " << worst << " rad\n";
+  }
+  // 2^6 = 64, and what higher terms do to steps of a thirtieth of a period
+  EXPECT_NEAR(errors[0] / errors[1], 64, 20);
+  EXPECT_NEAR(errors[1] / errors[2], 64, 12);
+}
+
+TEST(Trajectory, LeavesTheRunAsItIs) {
+  // the parallelogram passes singular positions, near which rows see softened constraints too
+  for (const char* name : {"four-bar", "parallelogram", "driven-four-bar", "bennett"}) {
+    const bool passes = std::string(name) == "parallelogram";
+    const double horizon = passes ? 3.0 : 0.9;
+    const MechanismFile mechanism = ShippedFile(name);
+    std::vector<Column> columns = RankRevealingColumns();
+    columns.insert(columns.end(), PositionColumns().begin(), PositionColumns().end());
+    for (const Column& column : columns) {
+      Experiment experiment = Single(mechanism);
+      const Case one = CaseOf(experiment, mechanism.description.name, column, 1e-7, horizon);
+      const Record alone = RunCase(experiment, one);
+      const Written run = WriteTrajectory(mechanism, column, one.integrator, 1e-7, horizon,
+                                          Rows(passes ? 3001 : 97));
+      for (const char* key : {"state_hash", "steps", "rejected", "rhs_evaluations", "restarts",
+                              "drift_position_max", "energy_error_max", "softened_evaluations"}) {
+        EXPECT_EQ(alone.Text(key), run.record.Text(key)) << name << ' ' << ToString(column) << key;
+      }
+    }
+  }
+}
+
+/// O (0, 0), A (1, 2), B (2, 2), C (3, 0), at rest, the crank held where it is by a drive.
+MechanismFile HeldFourBar() {
+  return ParseMechanism(R"({"name": "held", "gravity": [0, -10],
+    "ground": {"points": {"O": [0, 0], "C": [3, 0]}},
+    "bodies": [
+      {"name": "crank", "mass": 2, "inertia": 0.7, "com": [0.5, 1], "points": {"O": [0, 0], "A": [1, 2]}},
+      {"name": "coupler", "mass": 3, "inertia": 0.4, "com": [0.5, 0], "points": {"A": [0, 0], "B": [1, 0]}},
+      {"name": "follower", "mass": 5, "inertia": 0.6, "com": [-0.5, 1], "points": {"C": [0, 0], "B": [-1, 2]}}],
+    "joints": [
+      {"name": "O", "type": "revolute", "from": {"body": "ground", "at": "O"}, "to": {"body": "crank", "at": "O"},
+       "motion": {"type": "polynomial", "coefficients": [0]}},
+      {"name": "A", "type": "revolute", "from": {"body": "crank", "at": "A"}, "to": {"body": "coupler", "at": "A"}},
+      {"name": "B", "type": "revolute", "from": {"body": "coupler", "at": "B"}, "to": {"body": "follower", "at": "B"}, "cut": true},
+      {"name": "C", "type": "revolute", "from": {"body": "ground", "at": "C"}, "to": {"body": "follower", "at": "C"}}],
+    "initial": {"coordinates": {"A": 0, "C": 0}}})",
+                        "held.json");
+}
+
+TEST(Reactions, OfAStaticFourBarAreThoseOfStatics) {
+  const double g = 10, m1 = 2, m2 = 3, m3 = 5;
+  // of the follower on the coupler: moments about A of the coupler, about C of the follower
+  const double by = m2 * g / 2, bx = -(by + m3 * g / 2) / 2;
+  const double ax = -bx, ay = m2 * g - by;  // of the crank on the coupler
+  const double moment = ay - 2 * ax + m1 * g / 2;
+  for (const Column& column : RankRevealingColumns()) {
+    const Written run = WriteTrajectory(HeldFourBar(), column, "ode45", 1e-9, 1.0, Rows(3));
+    for (std::size_t row = 0; row < 3; ++row) {
+      // assembled to 1e-15 of some metres; loads of 100 N, condition below 10
+      const double bound = 1000 * 100 * kEpsilon;
+      EXPECT_NEAR(run.At(row, "reaction", "A", "fx"), ax, bound) << ToString(column);
+      EXPECT_NEAR(run.At(row, "reaction", "A", "fy"), ay, bound);
+      EXPECT_NEAR(run.At(row, "reaction", "B", "fx"), -bx, bound);  // on the follower
+      EXPECT_NEAR(run.At(row, "reaction", "B", "fy"), -by, bound);
+      EXPECT_NEAR(run.At(row, "reaction", "O", "fx"), ax, bound);
+      EXPECT_NEAR(run.At(row, "reaction", "O", "fy"), ay + m1 * g, bound);
+      EXPECT_NEAR(run.At(row, "reaction", "O", "mz"), 0.0, bound);  // that is the drive's
+      EXPECT_NEAR(run.At(row, "drive", "O", "angle"), moment, bound);
+    }
+  }
+}
+
+/// Wrenches of all joints on their second bodies by a formulation's multipliers.
+template <class Space>
+void ExpectMultipliers(const MechanismDescription& description, const std::string& formulation) {
+  const Mechanism<Space, double> mechanism(description, Coordinates::kAbsolute);
+  const auto start = Assemble<Space>(description, mechanism);
+  ASSERT_EQ(start.outcome, Outcome::kFinished) << start.message;
+  const auto system = MakeFormulation<Space>(
+      {.formulation = formulation, .coordinates = Coordinates::kAbsolute}, mechanism);
+  ASSERT_EQ(system->Start(0.0, start.q, start.u), Outcome::kFinished);
+  VectorX<double> udot(mechanism.num_u());
+  ASSERT_EQ(system->Evaluate(0.0, start.q, start.u, udot), Outcome::kFinished);
+  const VectorX<double>& lambda = system->Multipliers();
+  const Kinematics<Space, double>& kinematics = system->kinematics();
+  TreeDynamics<Space, double> dynamics(mechanism);
+  std::vector<Acceleration<Space, double>> A(mechanism.num_bodies());
+  std::vector<Wrench<Space, double>> applied(A.size());
+  dynamics.BodyAccelerations(kinematics, udot, A);
+  AppliedForces<Space, double>(kinematics, applied);
+
+  const Compiled compiled = Compile(description, CompileOptions::None());
+  std::vector<BodyMotion> bodies = AtRest(compiled);
+  EnterPart<Space>(compiled, 0, kinematics, {}, &bodies);
+  UserMechanism<Space> user(description);
+  user.Set(0.0, bodies);
+  Reactions<Space> reactions(user);
+  reactions.Solve(A, applied);
+  double load = 1.0, worst = 0.0;
+  for (const auto& wrench : applied) load = std::max(load, wrench.norm());
+  for (const int j : mechanism.constraints()) {
+    const auto& joint = mechanism.joints()[j];
+    const auto& state = kinematics.joints()[j];
+    Wrench<Space, double> expected = Wrench<Space, double>::Zero();
+    for (int i = joint.num_drives; i < joint.num_constraints(); ++i) {
+      expected += state.D(i) * lambda[joint.row + i];
+    }
+    load = std::max(load, expected.norm());
+    const auto found = reactions.Of(j, Rotation<Space, double>::Identity());
+    for (int i = 0; i < Space::kDim; ++i) {
+      ASSERT_FALSE(std::isnan(found[i])) << mechanism.joint_names()[j];
+      worst = std::max(worst, std::abs(found[i] - expected[i]));
+    }
+  }
+  // both solve equations whose condition is some thousand here
+  EXPECT_LE(worst, 1e5 * kEpsilon * load) << formulation << ' ' << description.name;
+}
+
+TEST(Reactions, AreTheMultipliersOfAllFormulations) {
+  for (const std::string formulation : {"odca", "lagrange", "reduction"}) {
+    for (const char* name : {"four-bar", "slider-crank", "driven-four-bar", "andrews-squeezer",
+                             "general-seven-bar", "elastic-crank"}) {
+      ExpectMultipliers<Planar>(ShippedFile(name).description, formulation);
+    }
+    for (const char* name : {"double-wishbone", "stewart-platform", "spatial-four-bar"}) {
+      ExpectMultipliers<Spatial>(ShippedFile(name).description, formulation);
+    }
+  }
+}
+
+TEST(Reactions, AreOpenWhereConstraintsAreRedundant) {
+  // the plane determines forces in it; a loop of parallel pins in space has three directions too
+  // many
+  const Written flat =
+      WriteTrajectory(ShippedFile("four-bar"), kOdcaJoint, "ode45", 1e-9, 1.0, Rows(5));
+  EXPECT_FALSE(flat.record.Find("trajectory_open"));
+  for (const bool planar : {true, false}) {
+    CompileOptions compile;
+    compile.planar = planar;
+    const Written run = WriteTrajectory(ShippedFile("four-bar-in-space"), kOdcaJoint, "ode45", 1e-9,
+                                        1.0, Rows(5), compile);
+    EXPECT_GT(run.record.Number("trajectory_open"), 0.0);
+  }
+  // the same loop in the plane of x and y, as a spatial mechanism
+  MechanismFile turned = ShippedFile("four-bar");
+  turned.description = Tilted(turned.description, Eigen::Matrix3d::Identity());
+  CompileOptions whole = CompileOptions::None();
+  for (const CompileOptions& compile : {CompileOptions(), whole}) {
+    const Written run = WriteTrajectory(turned, kOdcaJoint, "ode45", 1e-9, 1.0, Rows(5), compile);
+    for (std::size_t row = 0; row < 5; ++row) {
+      for (const char* joint : {"OA", "AB", "BC", "OC"}) {
+        for (const char* known : {"fx", "fy"}) {
+          EXPECT_NEAR(run.At(row, "reaction", joint, known), flat.At(row, "reaction", joint, known),
+                      1e-6)
+              << joint;  // other sums and steps, at 1e-9, of some 100 N
+        }
+        for (const char* open : {"fz", "mx", "my"}) {
+          EXPECT_TRUE(std::isnan(run.At(row, "reaction", joint, open))) << joint << open;
+        }
+        EXPECT_NEAR(run.At(row, "reaction", joint, "mz"), 0.0, 1e-6);
+      }
+    }
+    EXPECT_NE(ReadFile(run.path).find("# nan, because redundant constraints"), std::string::npos);
+  }
+}
+
+TEST(Reactions, OfMergedBodiesAreKnown) {
+  // the run has one body where the user has two: their weld bears what statics says
+  const Written merged =
+      WriteTrajectory(ShippedFile("welded-four-bar"), kOdcaJoint, "ode45", 1e-10, 0.5, Rows(4));
+  EXPECT_NE(merged.record.Text("compiled").find("welds"), std::string::npos);
+  const Written whole = WriteTrajectory(ShippedFile("welded-four-bar"), kOdcaJoint, "ode45", 1e-10,
+                                        0.5, Rows(4), CompileOptions::None());
+  ASSERT_EQ(merged.rows.columns, whole.rows.columns);
+  int welds = 0;
+  for (std::size_t i = 0; i < merged.rows.columns.size(); ++i) {
+    const TrajectoryColumn& column = merged.rows.columns[i];
+    for (std::size_t row = 0; row < 4; ++row) {
+      const double a = merged.rows.At(row, i), b = whole.rows.At(row, i);
+      EXPECT_EQ(std::isnan(a), std::isnan(b)) << column.Label();
+      if (!std::isnan(a)) {
+        EXPECT_NEAR(a, b, 1e-6) << column.Label() << row;
+      }
+    }
+    welds += column.kind == "reaction";
+  }
+  EXPECT_GT(welds, 0);
+}
+
+}  // namespace trajectory_test
+}  // namespace loopbench::harness::reference

@@ -21,6 +21,7 @@
 #include "harness/text/files.h"
 #include "harness/text/terminal.h"
 #include "harness/timing/time_cases.h"
+#include "harness/trajectory/store_files.h"
 
 namespace loopbench::harness {
 
@@ -112,6 +113,11 @@ int Merge(const MergeCommand& command) {
   }
   const std::vector<Record> merged = MergeStores(parts);
   ResultStore target(command.out);
+  std::vector<std::filesystem::path> files;
+  for (const auto& store : command.stores) files.push_back(StoreFile(store));
+  for (const std::string& name : CopyTrajectories(merged, files, target.file())) {
+    PrintError("warning: no store has trajectories/{}\n", name);
+  }
   target.Fill(merged);
   Print("{} records of {} stores are {} cases in {}\n", read, command.stores.size(), merged.size(),
         target.file().string());

@@ -44,6 +44,19 @@ costs, and how many times the cheapest of all. Below stands, from the records, w
 compared rows and what was not. All rows are in tradeoff.csv and tradeoff.md, the cheapest methods in
 tradeoff-overview.csv, figures (error over cost, over tolerance, over time) in figures/.)";
 
+constexpr const char* kTrajectoryFooter = R"(
+Examples:
+  loopbench trajectory out                                    ("output": {"step": 0.01} in the experiment)
+  loopbench trajectory out --where formulation=odca --out csv
+  loopbench trajectory out --out lines --format jsonl --columns joint:,energy: --every 10
+  loopbench trajectory theirs.csv --mechanism my.json         (constraints, energy, speeds)
+  loopbench trajectory theirs.csv --ours ours.csv --figure beside.svg --columns joint:
+
+A store's trajectories are files of rows over time, in its folder trajectories/; without --out they
+are listed. A trajectory of any program is CSV with a column "t [s]" and others that are called as
+ours are, however few; `loopbench trajectory FILE.csv` prints those of a file. Held against a mechanism are the
+poses of all bodies, or the coordinates of joints that lead to them.)";
+
 constexpr const char* kMapFooter = R"(
 Examples: (paths from the root of the repository)
   loopbench map results/runs/extremes --rules configs/experiments/extremes/map.json
@@ -79,6 +92,7 @@ StoreOptions::StoreOptions(CLI::App& app) {
   AddTable(app);
   AddPlot(app);
   AddTradeoff(app);
+  AddTrajectory(app);
 
   verdict_app_ = app.add_subcommand("verdict", "Hold claims against stored records");
   verdict_app_->add_option("store", verdict_.store, "Folder of a run, or a .jsonl file")
@@ -172,6 +186,32 @@ void StoreOptions::AddTradeoff(CLI::App& app) {
   tradeoff_app_->footer(kTradeoffFooter);
 }
 
+void StoreOptions::AddTrajectory(CLI::App& app) {
+  trajectory_app_ = app.add_subcommand(
+      "trajectory", "List, write and check motions over time, of runs or of other programs");
+  TrajectoryCommand& command = trajectory_;
+  trajectory_app_->add_option("source", command.source, "Folder of a run, or a trajectory (.csv)")
+      ->required();
+  trajectory_app_->add_option("--where", conditions_,
+                              "Only records with key=value[,value] (or !=, <, <=, >, >=)");
+  trajectory_app_->add_option("--out", command.out, "Folder to write to; of a .csv a file");
+  trajectory_app_->add_option("--format", command.format, "Of what is written")
+      ->check(CLI::IsMember({"csv", "jsonl"}))
+      ->capture_default_str();
+  trajectory_app_
+      ->add_option("--columns", command.columns, "Only columns that begin so, and t: a,b")
+      ->delimiter(',');
+  trajectory_app_->add_option("--every", command.every, "Only each so many-th row")
+      ->check(NumberFrom(1, 1'000'000'000));
+  trajectory_app_->add_option("--mechanism", command.mechanism,
+                              "Mechanism (JSON) that a trajectory is held against");
+  trajectory_app_->add_option("--ours", command.ours, "Trajectory that another is laid beside");
+  trajectory_app_
+      ->add_option("--figure", command.figure, "Picture of both and their difference: .svg, .pdf")
+      ->needs("--ours");
+  trajectory_app_->footer(kTrajectoryFooter);
+}
+
 void StoreOptions::AddMap(CLI::App& app) {
   map_app_ =
       app.add_subcommand("map", "Show which method survives which extreme, and the number why");
@@ -187,12 +227,14 @@ void StoreOptions::AddMap(CLI::App& app) {
 }
 
 std::optional<int> StoreOptions::Run(const std::string& typed) {
-  table_.view.where = plot_.where = tradeoff_.options.where = ParseSelection(conditions_);
+  table_.view.where = plot_.where = tradeoff_.options.where = trajectory_.where =
+      ParseSelection(conditions_);
   if (draws_tradeoff_) tradeoff_.figures = drawn_as_;
   if (*merge_app_) return Merge(merge_);
   if (*table_app_) return PrintTable(table_, typed);
   if (*plot_app_) return Plot(plot_);
   if (*tradeoff_app_) return PrintTradeoff(tradeoff_, typed);
+  if (*trajectory_app_) return ShowTrajectories(trajectory_, typed);
   if (*map_app_) return PrintMap(map_, typed);
   if (*verdict_app_) return PrintVerdicts(verdict_, typed);
   return std::nullopt;

@@ -1,4 +1,5 @@
-// Options of the subcommands merge, table, plot, tradeoff, verdict and map: those that read stores.
+// Options of the subcommands merge, table, plot, tradeoff, trajectory, verdict and map: those that
+// read stores.
 #pragma once
 
 #include <CLI/CLI.hpp>
@@ -8,6 +9,7 @@
 
 #include "harness/cli/commands.h"
 #include "harness/cli/commands_tradeoff.h"
+#include "harness/cli/commands_trajectory.h"
 
 namespace loopbench::harness {
 
@@ -23,9 +25,11 @@ class StoreOptions {
   void AddTable(CLI::App& app);
   void AddPlot(CLI::App& app);
   void AddTradeoff(CLI::App& app);
+  void AddTrajectory(CLI::App& app);
   void AddMap(CLI::App& app);
 
-  CLI::App *merge_app_, *table_app_, *plot_app_, *tradeoff_app_, *verdict_app_, *map_app_;
+  CLI::App *merge_app_, *table_app_, *plot_app_, *tradeoff_app_, *trajectory_app_, *verdict_app_,
+      *map_app_;
   std::vector<std::string> conditions_;  ///< --where, as typed
   MergeCommand merge_;
   TableCommand table_;
@@ -33,6 +37,7 @@ class StoreOptions {
   TradeoffCommand tradeoff_;
   bool draws_tradeoff_ = false;  ///< --figures
   std::string drawn_as_ = "svg";
+  TrajectoryCommand trajectory_;
   VerdictCommand verdict_;
   MapCommand map_;
 };

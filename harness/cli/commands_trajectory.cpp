@@ -1,0 +1,233 @@
+#include "harness/cli/commands_trajectory.h"
+
+#include <algorithm>
+#include <cmath>
+
+#include "harness/cli/commands.h"
+#include "harness/cli/report.h"
+#include "harness/config/mechanism_reader.h"
+#include "harness/figures/trajectory_figure.h"
+#include "harness/store/result_store.h"
+#include "harness/tables/columns.h"
+#include "harness/text/config_error.h"
+#include "harness/text/escape.h"
+#include "harness/text/terminal.h"
+#include "harness/trajectory/check.h"
+#include "harness/trajectory/store_files.h"
+
+namespace loopbench::harness {
+namespace {
+
+using enum Format;
+
+Value Maybe(const LargestAt& largest) {
+  return largest.is_known ? Value(largest.value) : Value(std::monostate());
+}
+Value When(const LargestAt& largest) {
+  return largest.is_known ? Value(largest.t) : Value(std::monostate());
+}
+
+/// The columns that are asked for, t among them.
+std::vector<std::size_t> Chosen(const TrajectoryReader& reader, const TrajectoryCommand& command) {
+  std::vector<std::size_t> chosen;
+  const auto& columns = reader.columns();
+  std::vector<bool> used(command.columns.size(), false);
+  for (std::size_t i = 0; i < columns.size(); ++i) {
+    bool wanted = command.columns.empty() || i == reader.time();
+    for (std::size_t k = 0; k < command.columns.size(); ++k) {
+      if (!columns[i].Label().starts_with(command.columns[k])) continue;
+      used[k] = wanted = true;
+    }
+    if (wanted) chosen.push_back(i);
+  }
+  const auto unused = std::ranges::find(used, false);
+  if (unused == used.end()) return chosen;
+  std::string known;
+  for (const TrajectoryColumn& column : columns) known += "\n  " + column.Label();
+  throw ConfigError(fmt::format("--columns: found \"{}\", expected the beginning of one of{}",
+                                command.columns[unused - used.begin()], known));
+}
+
+/// Row by row, whatever the size. Gives the number of rows.
+std::int64_t Copy(const std::filesystem::path& from, const std::filesystem::path& to,
+                  const TrajectoryCommand& command) {
+  TrajectoryReader reader(from);
+  const std::vector<std::size_t> chosen = Chosen(reader, command);
+  std::vector<TrajectoryColumn> columns;
+  for (const std::size_t i : chosen) columns.push_back(reader.columns()[i]);
+  const auto format =
+      command.format == "jsonl" ? TrajectoryFormat::kJsonLines : TrajectoryFormat::kCsv;
+  TrajectoryWriter writer(to, columns, reader.notes(), format);
+  std::int64_t number = 0;
+  for (std::vector<double> row, kept; reader.Next(&row);) {
+    if (number++ % command.every != 0) continue;
+    kept.clear();
+    for (const std::size_t i : chosen) kept.push_back(row[i]);
+    writer.Write(kept);
+  }
+  writer.Finish();
+  return writer.rows();
+}
+
+int ExportOne(const std::filesystem::path& from, const std::filesystem::path& to,
+              const TrajectoryCommand& command) {
+  const std::int64_t rows = Copy(from, to, command);
+  Print("wrote {}: {} rows\n", to.string(), rows);
+  return 0;
+}
+
+/// What names a case, as the name of a file.
+std::string NameOf(const Record& record) {
+  std::string name;
+  for (const char* key : {"mechanism", "formulation", "enforcement", "coordinates", "solver",
+                          "integrator", "rtol", "step", "horizon", "content"}) {
+    if (!record.Text(key).empty()) name += (name.empty() ? "" : "-") + record.Text(key);
+  }
+  return FileName(name);
+}
+
+int OfStore(const TrajectoryCommand& command, const std::string& typed) {
+  std::vector<Record> records = LoadRecords(command.source);
+  std::erase_if(records, [&](const Record& record) {
+    return record.Text("trajectory").empty() || !Matches(record, command.where);
+  });
+  if (records.empty()) {
+    throw ConfigError(
+        fmt::format("{}: found no trajectory{}, expected records of an experiment with \"output\"",
+                    command.source.string(), command.where.empty() ? "" : " that meets --where"));
+  }
+  const std::filesystem::path file = StoreFile(command.source);
+  Table table;
+  for (const char* key : {"mechanism", "formulation", "enforcement", "coordinates", "solver",
+                          "rtol", "horizon", "outcome", "trajectory_rows", "trajectory_output",
+                          "trajectory_interpolation_max", "trajectory_open", "trajectory"}) {
+    table.columns.push_back(ColumnOf(key, records));
+  }
+  table.rows = records;
+  int code = 0;
+  for (const Record& record : records) {
+    const std::filesystem::path from = TrajectoryOf(record, file);
+    if (from.empty() || !std::filesystem::exists(from)) {
+      PrintError("{}: it is gone; run --rerun all makes it again\n",
+                 (file.parent_path() / "trajectories" / record.Text("trajectory")).string());
+      code = 2;
+    } else if (!command.out.empty()) {
+      ExportOne(from, command.out / (NameOf(record) + "." + command.format), command);
+    }
+  }
+  if (command.out.empty()) {
+    table.notes = {"files are in " + (file.parent_path() / "trajectories").string()};
+    AppendProvenance(table, typed);
+    PrintText(ToText(table, TerminalHasColour()) + "\n");
+  }
+  return code;
+}
+
+void PrintCheck(const TrajectoryCommand& command, const std::string& typed) {
+  const MechanismDescription user = ReadMechanism(command.mechanism).description;
+  const TrajectoryCheck check = CheckTrajectory(command.source, user);
+  Table table;
+  table.title = fmt::format("{} against {}: {} rows, {:g} s to {:g} s, by {}{}",
+                            command.source.string(), user.name, check.rows, check.from, check.to,
+                            check.source, check.has_speeds ? "" : ", without speeds");
+  table.columns = {{"joint", "joint"},
+                   {"shift", "mismatch [m]", kScientific},
+                   {"shift_t", "at [s]", kSeconds},
+                   {"rotation", "rotation [rad]", kScientific},
+                   {"velocity", "speed [m/s]", kScientific},
+                   {"angular_velocity", "turning [rad/s]", kScientific},
+                   {"coordinates", "coordinates off", kScientific}};
+  for (const JointCheck& joint : check.joints) {
+    AddRow({joint.joint, Maybe(joint.shift), When(joint.shift), Maybe(joint.rotation),
+            Maybe(joint.velocity), Maybe(joint.angular_velocity), Maybe(joint.coordinates)},
+           &table);
+  }
+  table.notes.push_back(
+      check.no_energy.empty()
+          ? fmt::format("energy: changes by {:.3e} J at most, at {:g} s; kinetic up to {:.3e} J",
+                        check.energy.value, check.energy.t, check.kinetic)
+          : "energy: not known, for " + check.no_energy);
+  if (!check.speeds.empty()) {
+    const auto worst = std::ranges::max_element(
+        check.speeds, {}, [](const SpeedCheck& speed) { return speed.apart.value; });
+    table.notes.push_back(
+        fmt::format("speeds: at most {:.3e} from the differences of positions, {} at {:g} s",
+                    worst->apart.value, worst->label, worst->apart.t));
+  }
+  for (const std::string& label : check.unknown) {
+    table.notes.push_back("not of this mechanism, passed over: " + label);
+  }
+  AppendProvenance(table, typed);
+  PrintText(ToText(table) + "\n");
+}
+
+int LayBeside(const TrajectoryCommand& command, const std::string& typed) {
+  const Trajectory ours = ReadTrajectory(command.ours), theirs = ReadTrajectory(command.source);
+  std::vector<SharedColumn> shared = SharedColumns(ours, theirs);
+  std::erase_if(shared, [&](const SharedColumn& column) {
+    return !command.columns.empty() &&
+           std::ranges::none_of(command.columns, [&](const std::string& start) {
+             return column.label.starts_with(start);
+           });
+  });
+  if (shared.empty()) {
+    throw ConfigError(fmt::format("{} and {}: found no column that both have, expected one{}",
+                                  command.ours.string(), command.source.string(),
+                                  command.columns.empty() ? "" : " of --columns"));
+  }
+  Table table;
+  table.title = fmt::format("{} less {}", command.source.string(), command.ours.string());
+  table.columns = {{"column", "column"},
+                   {"largest", "largest difference", kScientific},
+                   {"t", "at [s]", kSeconds},
+                   {"compared", "rows", kInteger}};
+  for (const SharedColumn& column : shared) {
+    LargestAt largest;
+    std::int64_t compared = 0;
+    const std::vector<double> apart = Differences(ours, theirs, column);
+    for (std::size_t row = 0; row < apart.size(); ++row) {
+      compared += std::isfinite(apart[row]);
+      largest.Add(std::abs(apart[row]), theirs.At(row, theirs.time));
+    }
+    AddRow({column.label, Maybe(largest), When(largest), compared}, &table);
+  }
+  AppendProvenance(table, typed);
+  PrintText(ToText(table) + "\n");
+  if (command.figure.empty()) return 0;
+  // one axis has one unit
+  std::vector<SharedColumn> drawn;
+  constexpr std::size_t kMost = 4;
+  for (const SharedColumn& column : shared) {
+    if (column.unit == shared.front().unit && drawn.size() < kMost) drawn.push_back(column);
+  }
+  const auto fault = DrawTrajectories(command.figure, ours, theirs, drawn, "ours and theirs");
+  if (fault) throw std::runtime_error(fmt::format("{}: {}", command.figure.string(), *fault));
+  Print("wrote {}: {} of {} columns\n", command.figure.string(), drawn.size(), shared.size());
+  return 0;
+}
+
+}  // namespace
+
+int ShowTrajectories(const TrajectoryCommand& command, const std::string& typed) {
+  if (command.source.extension() != ".csv") {
+    if (command.mechanism.empty() && command.ours.empty()) return OfStore(command, typed);
+    throw ConfigError(
+        fmt::format("{}: found a store beside --mechanism or --ours, expected a "
+                    "trajectory (.csv)",
+                    command.source.string()));
+  }
+  if (!command.mechanism.empty()) PrintCheck(command, typed);
+  if (!command.ours.empty()) return LayBeside(command, typed);
+  if (!command.out.empty()) return ExportOne(command.source, command.out, command);
+  if (!command.mechanism.empty()) return 0;
+  TrajectoryReader reader(command.source);
+  std::int64_t rows = 0;
+  for (std::vector<double> row; reader.Next(&row);) ++rows;
+  Print("{}: {} rows of\n", command.source.string(), rows);
+  for (const TrajectoryColumn& column : reader.columns()) {
+    Print("  {}\n", column.kind.empty() ? column.component : column.Label());
+  }
+  return 0;
+}
+
+}  // namespace loopbench::harness

@@ -1,0 +1,453 @@
+// Files of trajectories: labels, what is written and read back, what is refused, whole runs by the
+// command line.
+#include <fmt/format.h>
+#include <gtest/gtest.h>
+#include <sys/resource.h>
+
+#include <cmath>
+#include <fstream>
+#include <limits>
+
+#include "harness/config/experiment_reader.h"
+#include "harness/config/mechanism_reader.h"
+#include "harness/text/escape.h"
+#include "harness/trajectory/check.h"
+#include "harness/trajectory/compare.h"
+#include "harness/trajectory/trajectory_writer.h"
+#include "tests/harness/cli_fixture.h"
+#include "tests/harness/in_child.h"
+
+namespace loopbench::harness {
+namespace trajectory_test {
+
+/// Names that mean something to CSV, gnuplot, shells, HTML or labels themselves.
+const std::vector<std::string> kHostile = {
+    "a,b\"c\"",  "line\nend\r", "$(touch pwned) `x`",     "a:b\\:c", "</td><b>&amp;'", "x [m]",
+    "# comment", "=1+1",        "\xc3\xa9 {/Symbol a}_1", "@%s"};
+
+class File : public testing::Test {
+ protected:
+  void SetUp() override {
+    const auto* test = testing::UnitTest::GetInstance()->current_test_info();
+    path_ = fs::path(testing::TempDir()) / (std::string("loopbench-rows-") + test->name() + ".csv");
+    fs::remove(path_);
+  }
+  void TearDown() override { fs::remove(path_); }
+
+  void Write(const std::string& text) const { WriteFileAtomically(path_, text); }
+  /// Why the file is refused, without its name.
+  std::string Refusal() const {
+    try {
+      ReadTrajectory(path_);
+    } catch (const std::runtime_error& error) {
+      const std::string text = error.what(), name = path_.string();
+      EXPECT_TRUE(text.starts_with(name)) << text;
+      return text.substr(std::min(text.size(), name.size()));
+    }
+    return "none";
+  }
+  fs::path path_;
+};
+
+TEST_F(File, KeepsEveryNameAndEveryBit) {
+  std::vector<TrajectoryColumn> columns = {{"t", "", "t", "s"}};
+  for (const std::string& name : kHostile) {
+    columns.push_back({"joint", LabelName(name), "angle", "rad"});
+    columns.push_back({"point", LabelName(name) + ":" + LabelName(name + "2"), "x", "m"});
+    EXPECT_EQ(ParseLabel(columns.back().Label()), columns.back()) << name;
+  }
+  std::vector<double> first(columns.size(), 0.1), second(columns.size(), 1e-310);
+  first[1] = std::nan(""), second[0] = 1 / 3.0, second[2] = -1.7976931348623157e308;
+  TrajectoryWriter writer(path_, columns, {"a note\nof two lines", "reactions: none"});
+  EXPECT_FALSE(fs::exists(path_));  // nothing until all is there
+  writer.Write(first);
+  writer.Write(second);
+  writer.Finish({"the end"});
+  EXPECT_FALSE(fs::exists(path_.string() + ".part"));
+  const Trajectory read = ReadTrajectory(path_);
+  EXPECT_EQ(read.columns, columns);
+  EXPECT_EQ(read.notes, (std::vector<std::string>{"a note\\nof two lines", "reactions: none"}));
+  ASSERT_EQ(read.rows(), 2u);
+  EXPECT_TRUE(std::isnan(read.At(0, 1)));
+  for (std::size_t i = 0; i < columns.size(); ++i) EXPECT_EQ(read.At(1, i), second[i]);
+  EXPECT_EQ(*read.Find("joint", kHostile[0], "angle"), 1u);
+}
+
+TEST_F(File, LeavesNothingUnfinished) {
+  { TrajectoryWriter writer(path_, {{"t", "", "t", "s"}}, {}); }
+  EXPECT_FALSE(fs::exists(path_));
+  EXPECT_FALSE(fs::exists(path_.string() + ".part"));
+}
+
+TEST_F(File, OfAnotherProgramIsReadWithWhatItHas) {
+  Write(
+      "\xef\xbb\xbf# theirs\r\n\"body:crank:x [m]\", t [s] ,\"own \"\"thing\"\"\"\r\n"
+      "1, 0,\r\n\r\n# more\r\n+2.5e-1,1e0,nan\r\n");
+  const Trajectory read = ReadTrajectory(path_);
+  ASSERT_EQ(read.rows(), 2u);
+  EXPECT_EQ(read.time, 1u);
+  EXPECT_EQ(read.columns[2].kind, "");
+  EXPECT_EQ(read.columns[2].component, "own \"thing\"");
+  EXPECT_EQ(read.At(1, *read.Find("body", "crank", "x")), 0.25);
+  EXPECT_TRUE(std::isnan(read.At(0, 2)));
+}
+
+TEST_F(File, ThatIsNoneIsRefusedWithItsPlace) {
+  Write("");
+  EXPECT_EQ(Refusal().substr(0, 32), ":0: found no line of labels, exp");
+  Write("x [m]\n1\n");
+  EXPECT_EQ(Refusal(), ":1: found no column \"t [s]\", expected a column of times");
+  Write("t [s],t [s]\n");
+  EXPECT_EQ(Refusal(), ":1: found \"t [s]\" twice, expected each label once");
+  Write("t [s],\"x\n1,2\n");
+  EXPECT_EQ(Refusal(),
+            ":1: found a quotation mark without its end, expected labels, quoted as RFC "
+            "4180 says");
+  Write("t [s],x\n0,1\n1\n");
+  EXPECT_EQ(Refusal(), ":3: found 1 values, expected 2, as labels");
+  Write("t [s],x\n0,0x10\n");
+  EXPECT_EQ(Refusal(), ":2: found \"0x10\" in column 2, expected a number");
+  Write("t [s],x\n0,1\n0,1\n");
+  EXPECT_EQ(Refusal(), ":3: found t = 0, expected times that rise");
+  Write("t [s],x\nnan,1\n");
+  EXPECT_EQ(Refusal(), ":2: found t = nan, expected times that rise");
+}
+
+TEST_F(File, OfAMillionRowsStreams) {
+  InChild([&] {
+    // some 45 MB of text, with room for 24 MB more than the program has
+    std::ifstream statm("/proc/self/statm");
+    std::size_t pages = 0;
+    statm >> pages;
+    const rlim_t room = pages * 4096 + (24u << 20);
+    const rlimit limit{room, room};
+    ASSERT_EQ(::setrlimit(RLIMIT_AS, &limit), 0);
+    constexpr int kRows = 1'000'000;
+    {
+      TrajectoryWriter writer(path_, {{"t", "", "t", "s"}, {"body", "a", "x", "m"}}, {});
+      for (int i = 0; i < kRows; ++i) writer.Write(std::vector<double>{i * 1e-3, 1.0 / (i + 1)});
+      writer.Finish();
+    }
+    EXPECT_GT(fs::file_size(path_), 24u << 20);
+    TrajectoryReader reader(path_);
+    int rows = 0;
+    for (std::vector<double> row; reader.Next(&row); ++rows) {
+      if (row[1] != 1.0 / (rows + 1)) ADD_FAILURE() << rows;
+    }
+    EXPECT_EQ(rows, kRows);
+  });
+}
+
+TEST(Output, SaysTimesInOneWay) {
+  OutputOptions output;
+  output.step = 0.1;
+  EXPECT_EQ(OutputTimes(output, 1.0).size(), 11u);  // 1 / 0.1 rounds to 10 from below or above
+  EXPECT_EQ(OutputTimes(output, 0.3).back(), 0.3);
+  EXPECT_EQ(OutputTimes(output, 0.35).size(), 4u);
+  output = {};
+  output.number = 4;
+  EXPECT_EQ(OutputTimes(output, 3.0), (std::vector<double>{0, 1, 2, 3}));
+  output = {};
+  output.times = {0.0, 1.0, 5.0};
+  EXPECT_EQ(OutputTimes(output, 2.0), (std::vector<double>{0, 1}));
+  output = {};
+  output.accepted_steps = true;
+  EXPECT_TRUE(OutputTimes(output, 2.0).empty());
+}
+
+/// A row of a file's trajectory by the label of its column.
+double At(const Trajectory& rows, std::size_t row, const std::string& label) {
+  for (std::size_t i = 0; i < rows.columns.size(); ++i) {
+    if (rows.columns[i].Label() == label) return rows.At(row, i);
+  }
+  ADD_FAILURE() << "no " << label;
+  return std::nan("");
+}
+
+class Command : public CommandLineTest {
+ protected:
+  void WriteExperiment(const std::string& output, const std::string& mechanism,
+                       const std::string& more = "") const {
+    Write("out.json", R"({"name": "out", "tolerances": 1e-9, "timing": {"repeats": 0},
+      "scenes": [{"mechanism": ")" +
+                          mechanism + R"(", "horizon": 1}],
+      "columns": [{"formulation": "odca", "enforcement": "acceleration", "coordinates": "absolute"}],
+      "output": )" + output +
+                          more + "}");
+  }
+  std::vector<fs::path> Files(const std::string& folder) const {
+    std::vector<fs::path> files;
+    for (const auto& entry : fs::directory_iterator(folder_ / folder))
+      files.push_back(entry.path());
+    return files;
+  }
+  static std::string Shipped(const std::string& name) {
+    return (kConfigs / "mechanisms" / (name + ".json")).string();
+  }
+};
+
+TEST_F(Command, MistakesOfOutputAreNamed) {
+  const auto refused = [&](const std::string& output, const std::string& found,
+                           const std::string& more = "") {
+    WriteExperiment(output, "four-bar.json", more);
+    ExpectEnding(Call("run out.json --out out"), 2, {found});
+    EXPECT_FALSE(fs::exists(folder_ / "out"));
+  };
+  refused("{}", "/output: found no times, expected one of");
+  refused(R"({"step": 0.1, "number": 3})", "/output: found several ways to say times");
+  refused(R"({"times": [1, 1]})", "/output/times: found times that do not rise");
+  refused(R"({"accepted_steps": true, "exact": true})", "\"exact\" beside \"accepted_steps\"");
+  refused(R"({"step": 1e-300})", "rows, expected at most 100000000");
+  refused(R"({"step": 0.1, "quantities": ["poses"]})", "/output/quantities/0");
+  refused(R"({"step": 0.1})", "found output of parts that run on their own",
+          R"(, "compile": {"islands": true})");
+}
+
+TEST_F(Command, HostileNamesStayNames) {
+  std::string text = mechanism_;
+  const auto rename = [&](const std::string& from, const std::string& to) {
+    const std::string own = "\"" + from + "\"";
+    for (std::size_t at = text.find(own); at != std::string::npos; at = text.find(own, at + 1)) {
+      text.replace(at, own.size(), to);
+    }
+  };
+  rename("bar1.angle", R"("a,b\"c\":\\d.angle")");
+  rename("bar1", R"("a,b\"c\":\\d")");
+  rename("AB", R"("line\nend $(touch pwned) `touch pwned`")");
+  rename("OA", R"("# <b>'=1|x [m]")");
+  Write("hostile.json", text);
+  WriteExperiment(R"({"number": 5})", "hostile.json");
+  ExpectEnding(Call("run out.json --out out"), 0, {});
+  const std::vector<fs::path> files = Files("out/trajectories");
+  ASSERT_EQ(files.size(), 1u);
+  const Trajectory rows = ReadTrajectory(files[0]);
+  EXPECT_EQ(rows.rows(), 5u);
+  EXPECT_TRUE(FindPose(rows.columns, "a,b\"c\":\\d"));
+  EXPECT_TRUE(rows.Find("joint", "line\nend $(touch pwned) `touch pwned`", "angle"));
+  EXPECT_TRUE(rows.Find("reaction", "# <b>'=1|x [m]", "fx"));
+  ExpectEnding(Call("trajectory '" + files[0].string() + "' --mechanism hostile.json --ours '" +
+                    files[0].string() + "' --figure own.svg"),
+               0, {"by body poses", "wrote own.svg"});
+  EXPECT_FALSE(fs::exists(folder_ / "pwned"));
+}
+
+/// A chain of one joint of every kind with coordinates, each with values that a user gives.
+constexpr const char* kEveryKind =
+    R"({"name": "kinds", "space": "spatial", "gravity": [0, 0, -9.81],
+  "bodies": [BODIES],
+  "joints": [
+    {"name": "r", "type": "revolute", "from": {"body": "ground"}, "to": {"body": "b0", "at": [0.1, 0, 0.2]}, "axis": [1, 2, 2]},
+    {"name": "p", "type": "prismatic", "from": {"body": "b0", "at": [0.3, 0, 0]}, "to": {"body": "b1"}, "axis": [0, 1, 1]},
+    {"name": "s", "type": "pin-in-slot", "from": {"body": "b1"}, "to": {"body": "b2", "at": [0, 0.2, 0]}},
+    {"name": "c", "type": "cylindrical", "from": {"body": "b2", "at": [0, 0, 0.4]}, "to": {"body": "b3"}},
+    {"name": "b", "type": "spherical", "from": {"body": "b3", "at": [0.5, 0, 0]}, "to": {"body": "b4", "at": [0, 0.3, 0]}},
+    {"name": "e", "type": "planar", "from": {"body": "b4"}, "to": {"body": "b5", "at": [0.1, 0.1, 0]}, "axis": [0, 1, 0]},
+    {"name": "u", "type": "universal", "from": {"body": "b5"}, "to": {"body": "b6", "at": [0, 0, 0.2]}},
+    {"name": "h", "type": "helical", "pitch": 0.1, "from": {"body": "b6", "at": [0, 0.2, 0]}, "to": {"body": "b7"}},
+    {"name": "w", "type": "weld", "from": {"body": "b7", "at": [0.2, 0, 0]}, "to": {"body": "b8", "at": [0, 0.1, 0], "rotation": [0.3, 0.2, 0.1]}},
+    {"name": "f", "type": "free", "from": {"body": "ground"}, "to": {"body": "b9", "at": [0, 0, 0.1]}}],
+  "initial": {"coordinates": {"r": 7.5, "p": 0.3, "s": [0.4, 0.2], "c": [-4.0, 0.1], "b": [0.8, 0.2, 0.4, 0.4],
+      "e": [0.7, 0.1, -0.2], "u": [0.3, -0.5], "h": 9.0, "f": [0.5, 0.5, -0.5, 0.5, 1, 2, 3]},
+    "held": ["r", "p", "s", "c", "b", "e", "u", "h", "f"],
+    "speeds": {"r": 1.0, "p": -0.2, "s": [0.3, 0.1], "c": [0.5, -0.3], "b": [0.1, 0.2, 0.3],
+      "e": [0.4, 0.2, 0.1], "u": [0.6, -0.4], "h": -0.5, "f": [1, -2, 0.5, 0.1, 0.2, 0.3]}}})";
+
+std::string EveryKind() {
+  std::string bodies, text = kEveryKind;
+  for (int i = 0; i < 10; ++i) {
+    bodies += fmt::format(
+        R"({}{{"name": "b{}", "mass": 1, "inertia": [0.1, 0.2, 0.15], "com": [0.05, 0.1, 0]}})",
+        i == 0 ? "" : ", ", i);
+  }
+  return text.replace(text.find("BODIES"), 6, bodies);
+}
+
+TEST_F(Command, EveryKindOfJointHasTheCoordinatesThatTheUserGave) {
+  Write("kinds.json", EveryKind());
+  for (const char* coordinates : {"joint", "absolute"}) {
+    WriteExperiment(R"({"step": 0.01})", "kinds.json");
+    ExpectEnding(
+        Call(fmt::format("run out.json --out {0} --set /columns/0/coordinates={0}", coordinates)),
+        0, {});
+    const fs::path file = Files(std::string(coordinates) + "/trajectories").at(0);
+    const Trajectory rows = ReadTrajectory(file);
+    ASSERT_EQ(rows.rows(), 101u);
+    const std::vector<std::pair<std::string, double>> given = {
+        {"r:angle [rad]", 7.5},
+        {"p:shift [m]", 0.3},
+        {"s:angle [rad]", 0.4},
+        {"s:shift [m]", 0.2},
+        {"c:shift [m]", 0.1},
+        {"b:qw [1]", 0.8},
+        {"b:qx [1]", 0.2},
+        {"b:qy [1]", 0.4},
+        {"b:qz [1]", 0.4},
+        {"e:angle [rad]", 0.7},
+        {"e:x [m]", 0.1},
+        {"e:y [m]", -0.2},
+        {"u:angle about x [rad]", 0.3},
+        {"u:angle about y [rad]", -0.5},
+        {"h:angle [rad]", 9.0},
+        {"f:qw [1]", 0.5},
+        {"f:qz [1]", 0.5},
+        {"f:x [m]", 1},
+        {"f:z [m]", 3},
+        {"r:angle speed [rad/s]", 1},
+        {"p:shift speed [m/s]", -0.2},
+        {"s:angle speed [rad/s]", 0.3},
+        {"s:shift speed [m/s]", 0.1},
+        {"c:angle speed [rad/s]", 0.5},
+        {"c:shift speed [m/s]", -0.3},
+        {"b:wx [rad/s]", 0.1},
+        {"b:wz [rad/s]", 0.3},
+        {"e:angle speed [rad/s]", 0.4},
+        {"e:x speed [m/s]", 0.2},
+        {"u:angle about x speed [rad/s]", 0.6},
+        {"u:angle about y speed [rad/s]", -0.4},
+        {"h:angle speed [rad/s]", -0.5},
+        {"f:wy [rad/s]", -2},
+        {"f:y speed [m/s]", 0.2}};
+    for (const auto& [label, value] : given) {
+      // products of ten frames, and in absolute coordinates back
+      if (label[0] == 'r' && std::string(coordinates) == "absolute" && label.ends_with("[rad]")) {
+        EXPECT_NEAR(std::remainder(At(rows, 0, "joint:" + label) - value, 2 * M_PI), 0.0, 1e-13);
+      } else {
+        EXPECT_NEAR(At(rows, 0, "joint:" + label), value, 1e-13) << label << ' ' << coordinates;
+      }
+    }
+    // whole turns of a joint with two coordinates are those next to the row before, and at first
+    // none
+    EXPECT_NEAR(std::remainder(At(rows, 0, "joint:c:angle [rad]") + 4.0, 2 * M_PI), 0.0, 1e-13);
+    const TrajectoryCheck check =
+        CheckTrajectory(file, ReadMechanism(folder_ / "kinds.json").description);
+    EXPECT_EQ(check.joints.size(), 10u);
+    EXPECT_LE(check.shift.value, std::string(coordinates) == "joint" ? 1e-13 : 1e-7);
+    for (const JointCheck& joint : check.joints) {
+      if (joint.joint != "w") {
+        EXPECT_LE(joint.coordinates.value, 1e-12) << joint.joint;
+      }
+    }
+    // Simpson's rule with h = 0.01 s: h^4 / 90 times a fourth derivative of some 1e3
+    EXPECT_EQ(check.speeds.size(), 45u);  // three of each body, fifteen of joints
+    for (const SpeedCheck& speed : check.speeds) EXPECT_LE(speed.apart.value, 1e-6) << speed.label;
+    // gravity's potential and kinetic energy: steps at 1e-9
+    EXPECT_LE(check.energy.value, 1e-5);
+  }
+}
+
+TEST_F(Command, AnExportComesBackWithTheDriftOfTheRecord) {
+  for (const char* name : {"four-bar", "double-wishbone", "stewart-platform", "bennett"}) {
+    WriteExperiment(R"({"accepted_steps": true})", Shipped(name));
+    ExpectEnding(Call("run out.json --out " + std::string(name)), 0, {});
+    const std::vector<Record> records = ReadRecords(folder_ / name);
+    ASSERT_EQ(records.size(), 1u);
+    const MechanismDescription user = ReadMechanism(Shipped(name)).description;
+    ExpectEnding(Call(fmt::format("trajectory {0} --out {0}/theirs --columns body:", name)), 0,
+                 {"rows"});
+    const fs::path theirs = Files(std::string(name) + "/theirs").at(0);
+    const TrajectoryCheck check = CheckTrajectory(theirs, user);
+    EXPECT_EQ(check.source, "body poses");
+    EXPECT_EQ(check.rows, static_cast<std::int64_t>(records[0].Number("steps")) + 1);
+    // poses of metres go through frames and back
+    constexpr double kRounding = 1e-14;
+    EXPECT_NEAR(check.shift.value, records[0].Number("drift_position_max"), kRounding) << name;
+    EXPECT_NEAR(check.rotation.value, records[0].Number("drift_rotation_max"), kRounding) << name;
+    const bool has_work = records[0].Find("energy_supplied") != nullptr;
+    EXPECT_EQ(check.no_energy.empty(), !has_work) << check.no_energy;
+    if (!has_work) {
+      EXPECT_NEAR(check.energy.value, records[0].Number("energy_error_max"),
+                  1e-13 * records[0].Number("energy_scale") + 1e-12)
+          << name;
+    }
+    // by the joints of the tree alone: what its cut joints then miss
+    ExpectEnding(Call(fmt::format("trajectory {0} --out {0}/joints --columns joint:", name)), 0,
+                 {});
+    const TrajectoryCheck closure =
+        CheckTrajectory(Files(std::string(name) + "/joints").at(0), user);
+    EXPECT_EQ(closure.source, "joint coordinates");
+    EXPECT_NEAR(closure.shift.value, records[0].Number("loop_closure_max"), 10 * kRounding) << name;
+  }
+}
+
+TEST_F(Command, WhatIsMissingIsNamed) {
+  Write("theirs.csv", "t [s],joint:OA:angle [rad],body:bar1:x [m]\n0,0,0\n");
+  ExpectEnding(Call("trajectory theirs.csv --mechanism four-bar.json"), 2,
+               {"found neither the poses of all bodies nor the coordinates", "\"body:bar1:y [m]\"",
+                "\"joint:AB:angle [rad]\""});
+  Write("theirs.csv", "t [s],x [m]\n0,0\n");
+  ExpectEnding(Call("trajectory theirs.csv --ours theirs.csv"), 2,
+               {"found no column that both have"});
+  ExpectEnding(Call("run tiny.json --out out"), 0, {});
+  ExpectEnding(Call("trajectory out"), 2, {"found no trajectory"});
+  ExpectEnding(Call("trajectory out --mechanism four-bar.json"), 2, {"found a store beside"});
+  ExpectEnding(Call("trajectory theirs.csv --columns y --out y.csv"), 2,
+               {"--columns: found \"y\", expected the beginning of one of"});
+  EXPECT_FALSE(fs::exists(folder_ / "y.csv"));
+}
+
+TEST_F(Command, MergeCarriesTrajectoriesAndAResumedRunLeavesNoParts) {
+  Write("two.json", std::string(kTinyExperiment).insert(1, R"("output": {"number": 3},)"));
+  ExpectEnding(Call("run two.json --out one --shard 1/2"), 0, {});
+  ExpectEnding(Call("run two.json --out two --shard 2/2"), 0, {});
+  ExpectEnding(Call("merge one two --out whole"), 0, {"2 cases"});
+  EXPECT_EQ(Files("whole/trajectories").size(), 2u);
+  ExpectEnding(Call("trajectory whole"), 0, {"dense output"});
+  // what a killed run leaves goes with the next one
+  Write("whole/trajectories/0123.csv.part", "t [s]\n0");
+  ExpectEnding(Call("run two.json --out whole"), 0, {"0 run now"});
+  EXPECT_EQ(Files("whole/trajectories").size(), 2u);
+  // a process that crashes takes its part along
+  ExpectEnding(Call("run two.json --out crashed", "LOOPBENCH_FAULT=crash:formulation=odca"), 0,
+               {"not finished"});
+  EXPECT_EQ(Files("crashed/trajectories").size(), 1u);
+  fs::remove_all(folder_ / "one/trajectories");
+  ExpectEnding(Call("trajectory one"), 2, {"it is gone; run --rerun all makes it again"});
+}
+
+TEST_F(Command, OneLineReadsItInGnuplotAndPandas) {
+  WriteExperiment(R"({"number": 50})", "four-bar.json");
+  ExpectEnding(Call("run out.json --out out"), 0, {});
+  fs::copy_file(Files("out/trajectories").at(0), folder_ / "rows.csv");
+  // the lines of docs/using.md
+  const std::string using_md = ReadFile(fs::path(LOOPBENCH_SOURCE_DIR) / "docs/using.md");
+  const std::string plot =
+      R"(set datafile separator comma; plot "rows.csv" using "t [s]":"joint:OA:angle [rad]" with lines)";
+  const std::string frame =
+      R"(import pandas; rows = pandas.read_csv("rows.csv", comment="#", index_col="t [s]"))";
+  EXPECT_NE(using_md.find(plot), std::string::npos);
+  EXPECT_NE(using_md.find(frame), std::string::npos);
+  const auto run = [&](const std::string& command) {
+    return std::system(("cd '" + folder_.string() + "' && " + command + " >log 2>&1").c_str());
+  };
+  if (run("gnuplot --version") == 0) {
+    Write("plot.gp", "set terminal svg\nset output 'angle.svg'\n" + plot + "\n");
+    EXPECT_EQ(run("gnuplot plot.gp"), 0) << ReadFile(folder_ / "log");
+    EXPECT_GT(fs::file_size(folder_ / "angle.svg"), 5000u);
+  }
+  // Debian's interpreter: another one in the path need not have the module
+  if (run("/usr/bin/python3 -c 'import pandas'") == 0) {
+    Write("frame.py", frame +
+                          "\nassert rows.shape[0] == 50, rows.shape\n"
+                          "assert rows['joint:OA:angle [rad]'].notna().all()\n");
+    EXPECT_EQ(run("/usr/bin/python3 frame.py"), 0) << ReadFile(folder_ / "log");
+  }
+}
+
+TEST(Compared, RowsMeetAtTheirTimes) {
+  Trajectory ours{{{"t", "", "t", "s"}, {"joint", "a", "angle", "rad"}}, {}, {}, 0}, theirs = ours;
+  for (int i = 0; i < 10; ++i) {
+    const double t = 0.1 * i;
+    ours.values.insert(ours.values.end(), {t, t * t * t});
+  }
+  for (const double t : {-0.1, 0.0, 0.25, 0.9, 1.0}) {
+    theirs.values.insert(theirs.values.end(), {t, t * t * t + 2 * M_PI + 0.5});
+  }
+  const auto shared = SharedColumns(ours, theirs);
+  ASSERT_EQ(shared.size(), 1u);
+  const std::vector<double> apart = Differences(ours, theirs, shared[0]);
+  EXPECT_TRUE(std::isnan(apart[0]) && std::isnan(apart[4]));            // ours has no such time
+  for (const int row : {1, 2, 3}) EXPECT_NEAR(apart[row], 0.5, 1e-14);  // a cubic is met exactly
+}
+
+}  // namespace trajectory_test
+}  // namespace loopbench::harness

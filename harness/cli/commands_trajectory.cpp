@@ -65,7 +65,7 @@ std::int64_t Copy(const std::filesystem::path& from, const std::filesystem::path
     for (const std::size_t i : chosen) kept.push_back(row[i]);
     writer.Write(kept);
   }
-  writer.Finish();
+  writer.Finish(reader.later_notes());
   return writer.rows();
 }
 

@@ -96,7 +96,9 @@ bool TrajectoryReader::NextLine() {
     if (line_.ends_with('\r')) line_.pop_back();
     if (line_.empty()) continue;
     if (line_.front() != '#') return true;
-    if (columns_.empty()) notes_.push_back(line_.substr(line_.starts_with("# ") ? 2 : 1));
+    std::vector<std::string>& notes = columns_.empty() ? notes_ : later_notes_;
+    constexpr std::size_t kMostNotes = 1000;  // more are no notes
+    if (notes.size() < kMostNotes) notes.push_back(line_.substr(line_.starts_with("# ") ? 2 : 1));
   }
   return false;
 }

@@ -29,6 +29,8 @@ class TrajectoryReader {
   std::size_t time() const { return time_; }  ///< column of t
   /// What the lines above the labels say, without "# ".
   const std::vector<std::string>& notes() const { return notes_; }
+  /// The same of lines below the labels, as far as they have been read.
+  const std::vector<std::string>& later_notes() const { return later_notes_; }
 
   /// The next row, a number per column; false at the end. Times rise.
   bool Next(std::vector<double>* row);
@@ -44,7 +46,7 @@ class TrajectoryReader {
   double last_t_ = 0.0;
   bool has_row_ = false;
   std::vector<TrajectoryColumn> columns_;
-  std::vector<std::string> notes_;
+  std::vector<std::string> notes_, later_notes_;
 };
 
 /// All of a file.

@@ -67,6 +67,9 @@ TEST_F(File, KeepsEveryNameAndEveryBit) {
   const Trajectory read = ReadTrajectory(path_);
   EXPECT_EQ(read.columns, columns);
   EXPECT_EQ(read.notes, (std::vector<std::string>{"a note\\nof two lines", "reactions: none"}));
+  TrajectoryReader reader(path_);
+  for (std::vector<double> row; reader.Next(&row);) EXPECT_TRUE(reader.later_notes().empty());
+  EXPECT_EQ(reader.later_notes(), std::vector<std::string>{"the end"});
   ASSERT_EQ(read.rows(), 2u);
   EXPECT_TRUE(std::isnan(read.At(0, 1)));
   for (std::size_t i = 0; i < columns.size(); ++i) EXPECT_EQ(read.At(1, i), second[i]);

@@ -9,6 +9,7 @@
 #include "harness/figures/trajectory_figure.h"
 #include "harness/store/result_store.h"
 #include "harness/tables/columns.h"
+#include "harness/tables/fit.h"
 #include "harness/text/config_error.h"
 #include "harness/text/escape.h"
 #include "harness/text/terminal.h"
@@ -118,7 +119,7 @@ int OfStore(const TrajectoryCommand& command, const std::string& typed) {
   if (command.out.empty()) {
     table.notes = {"files are in " + (file.parent_path() / "trajectories").string()};
     AppendProvenance(table, typed);
-    PrintText(ToText(table, TerminalHasColour()) + "\n");
+    PrintText(ToScreen(table) + "\n");
   }
   return code;
 }
@@ -158,7 +159,7 @@ void PrintCheck(const TrajectoryCommand& command, const std::string& typed) {
     table.notes.push_back("not of this mechanism, passed over: " + label);
   }
   AppendProvenance(table, typed);
-  PrintText(ToText(table) + "\n");
+  PrintText(ToScreen(table) + "\n");
 }
 
 int LayBeside(const TrajectoryCommand& command, const std::string& typed) {
@@ -192,7 +193,7 @@ int LayBeside(const TrajectoryCommand& command, const std::string& typed) {
     AddRow({column.label, Maybe(largest), When(largest), compared}, &table);
   }
   AppendProvenance(table, typed);
-  PrintText(ToText(table) + "\n");
+  PrintText(ToScreen(table) + "\n");
   if (command.figure.empty()) return 0;
   // one axis has one unit
   std::vector<SharedColumn> drawn;

@@ -3,8 +3,7 @@
 #include <algorithm>
 
 #include "harness/integrator/arkode.h"
-#include "harness/run/run_case.h"
-#include "mechanism/start/assembly.h"
+#include "harness/run/level_position.h"
 
 namespace loopbench::harness {
 
@@ -31,20 +30,9 @@ class Tracking {
   }
 
   Track Run(double horizon, double cpu_s) {
-    const Start<double> start = Assemble<Space>(model_, mechanism_);
-    track_.failure = start.message;
-    if (start.outcome != Outcome::kFinished) return track_;
-    Column column;
-    column.formulation = "lagrange";
-    column.enforcement = Enforcement::kPosition;
-    const auto system = MakeFormulation<Space>(column, mechanism_);
-    if (const Outcome outcome = system->Start(0.0, start.q, start.u);
-        outcome != Outcome::kFinished) {
-      track_.failure = std::string(ToString(outcome));
-      return track_;
-    }
-    std::vector<double> y(static_cast<std::size_t>(system->size()), 0.0);
-    system->ToState(start.q, start.u, y);
+    auto [system, y, failure] = StartAtLevelPosition<Space>(model_, mechanism_, "lagrange");
+    track_.failure = failure;
+    if (system == nullptr) return track_;
     std::vector<double> wanted;
     for (int i = 1; i <= kTimes; ++i) wanted.push_back(horizon * i / kTimes);
     IntegratorOptions options;
@@ -55,7 +43,7 @@ class Tracking {
     options.stop_times.insert(options.stop_times.end(), wanted.begin(), wanted.end());
     std::ranges::sort(options.stop_times);
     std::size_t next = 0;
-    const auto observe = [&](double t, std::span<double> state) {
+    const auto observe = [&, &system = system](double t, std::span<double> state) {
       const bool restart = system->BeginStep(t, state);
       // a stop is met to round-off
       const bool is_wanted = next < wanted.size() && t > wanted[next] - 1e-9 * horizon;

@@ -6,8 +6,7 @@
 #include <cmath>
 
 #include "harness/integrator/arkode.h"
-#include "harness/run/run_case.h"
-#include "mechanism/start/assembly.h"
+#include "harness/run/level_position.h"
 
 namespace loopbench::harness {
 
@@ -27,25 +26,14 @@ class Watching {
       : description_(description), mechanism_(description, Coordinates::kJoint) {}
 
   ShortRun Run(double duration, double cpu_s) {
-    const Start<double> start = Assemble<Space>(description_, mechanism_);
-    run_.message = start.message;
-    if (start.outcome != Outcome::kFinished) return run_;
-    Column column;
-    column.formulation = "odca";
-    column.enforcement = Enforcement::kPosition;
-    const auto system = MakeFormulation<Space>(column, mechanism_);
-    if (const Outcome outcome = system->Start(0.0, start.q, start.u);
-        outcome != Outcome::kFinished) {
-      run_.message = std::string(ToString(outcome));
-      return run_;
-    }
-    std::vector<double> y(static_cast<std::size_t>(system->size()), 0.0);
-    system->ToState(start.q, start.u, y);
+    auto [system, y, failure] = StartAtLevelPosition<Space>(description_, mechanism_, "odca");
+    run_.message = failure;
+    if (system == nullptr) return run_;
     IntegratorOptions options;
     options.rtol = options.atol = 1e-6;
     options.time_limit_s = cpu_s;
     options.stop_times = mechanism_.stop_times();
-    const auto observe = [&](double t, std::span<double> state) {
+    const auto observe = [&, &system = system](double t, std::span<double> state) {
       const bool restart = system->BeginStep(t, state);
       if (system->FromState(t, state) == Outcome::kFinished) Look(t, system->kinematics());
       return restart ? StepAction::kRestart : StepAction::kContinue;

@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <stdexcept>
 
+#include "mechanism/description/number_text.h"
 #include "mechanism/description/parts.h"
 #include "mechanism/description/topology.h"
 #include "mechanism/simplify/immovable.h"
@@ -13,12 +14,6 @@
 namespace loopbench {
 
 namespace {
-
-std::string Number(double value) {
-  char text[32];
-  std::snprintf(text, sizeof text, "%.6g", value);
-  return text;
-}
 
 /// Whether loops are cut where they were. Another joint that closes one may carry a guess, which
 /// Assemble() refuses.
@@ -157,16 +152,16 @@ class Compiler {
     }
     result_.done.planar = true;
     const Eigen::Vector3d n = plane->R_WC.col(2);
-    result_.report.push_back(name + " moves in planes normal to (" + Number(n.x()) + ", " +
-                             Number(n.y()) + ", " + Number(n.z()) + "): planar");
+    result_.report.push_back(name + " moves in planes normal to (" + NumberText(n.x(), 6) + ", " +
+                             NumberText(n.y(), 6) + ", " + NumberText(n.z(), 6) + "): planar");
     if (plane->gravity_dropped != 0.0) {
       result_.report.push_back(name + ": gravity along the normal is borne by the joints: " +
-                               Number(plane->gravity_dropped) + " m/s^2 dropped");
+                               NumberText(plane->gravity_dropped, 6) + " m/s^2 dropped");
     }
     for (const double force : plane->force_dropped) {
       if (force == 0.0) continue;
       result_.report.push_back(name + ": a force along the normal is borne by the joints: " +
-                               Number(force) + " N dropped");
+                               NumberText(force, 6) + " N dropped");
     }
     for (BodyImage& image : result_.bodies) {
       if (image.part == part) image.X = plane->X_CB[image.body] * image.X;

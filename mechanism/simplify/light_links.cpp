@@ -1,8 +1,8 @@
 // Links of small mass: massless rods.
 #include <algorithm>
-#include <cstdio>
 #include <set>
 
+#include "mechanism/description/number_text.h"
 #include "mechanism/simplify/attach.h"
 #include "mechanism/simplify/freedom.h"
 #include "mechanism/simplify/ideas.h"
@@ -11,12 +11,6 @@
 namespace loopbench {
 
 namespace {
-
-std::string Number(double value) {
-  char text[32];
-  std::snprintf(text, sizeof text, "%.4g", value);
-  return text;
-}
 
 /// A body with two joints, and what is at the other side of each.
 struct Link {
@@ -142,9 +136,9 @@ std::string Lost(const BodyDescription& body, const Link& link, Lumping lumping)
   const double lumped = body.mass * first * second * link.length * link.length;
   const bool in_plane = body.inertia.isApprox(inertia * Eigen::Matrix3d::Identity(), 0.0);
   std::string text = "body \"" + body.name + "\" with its own inertia " +
-                     Number(in_plane ? inertia : across) +
-                     " kg m^2 across the rod; two lumps have " + Number(lumped);
-  if (left > 0.0) text += "; " + Number(left) + " kg are gone";
+                     NumberText(in_plane ? inertia : across, 4) +
+                     " kg m^2 across the rod; two lumps have " + NumberText(lumped, 4);
+  if (left > 0.0) text += "; " + NumberText(left, 4) + " kg are gone";
   return text;
 }
 
@@ -194,8 +188,8 @@ Simplified LightenLinks(const MechanismDescription& description, const ShortRun&
       continue;
     }
     candidate->taken = true;
-    result.done.push_back(Named(model, *link) + " is a massless rod of " + Number(link->length) +
-                          " m");
+    result.done.push_back(Named(model, *link) + " is a massless rod of " +
+                          NumberText(link->length, 4) + " m");
     result.dropped.push_back(Lost(model.bodies[link->body], *link, options.lumping));
     model = std::move(with_rod);
   }

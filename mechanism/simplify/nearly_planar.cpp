@@ -3,9 +3,9 @@
 #include <Eigen/Geometry>
 #include <algorithm>
 #include <cmath>
-#include <cstdio>
 #include <numbers>
 
+#include "mechanism/description/number_text.h"
 #include "mechanism/simplify/ideas.h"
 #include "mechanism/simplify/plane.h"
 #include "mechanism/simplify/restart.h"
@@ -16,12 +16,6 @@ namespace {
 
 using Matrix3 = Eigen::Matrix3d;
 using Vector3 = Eigen::Vector3d;
-
-std::string Number(double value) {
-  char text[32];
-  std::snprintf(text, sizeof text, "%.4g", value);
-  return text;
-}
 
 /// A joint at the start: its frames in ground axes, what becomes of it, and how far off that is.
 struct Flat {
@@ -235,7 +229,8 @@ std::string Judged(const MechanismDescription& description, const Flattening& fl
     result->candidates.push_back({what, flat.tilt, flat.why.empty() && flat.tilt <= limit,
                                   flat.why.empty() ? "" : flat.why});
     if (fault.empty() && !flat.why.empty()) fault = what + ": " + flat.why;
-    if (fault.empty() && flat.tilt > limit) fault = what + " is tilted by " + Number(flat.tilt);
+    if (fault.empty() && flat.tilt > limit)
+      fault = what + " is tilted by " + NumberText(flat.tilt, 4);
   }
   for (ForceDescription force : description.forces) {
     const ForceParts parts = PartsOf(force);
@@ -245,7 +240,7 @@ std::string Judged(const MechanismDescription& description, const Flattening& fl
     const double tilt = flattening.Tilt(between);
     result->candidates.push_back({std::string(parts.name), tilt, tilt <= limit, ""});
     if (fault.empty() && tilt > limit) {
-      fault = "a " + std::string(parts.name) + " is tilted by " + Number(tilt);
+      fault = "a " + std::string(parts.name) + " is tilted by " + NumberText(tilt, 4);
     }
   }
   return fault;
@@ -277,10 +272,11 @@ Simplified FlattenNearly(const MechanismDescription& description, const ShortRun
       result.parts = {std::move(planar)};
       result.R_WC = flattening.R_WC();
       const Vector3 n = result.R_WC.col(2);
-      result.done.push_back("all that moves is seen along (" + Number(n.x()) + ", " +
-                            Number(n.y()) + ", " + Number(n.z()) + ")");
+      result.done.push_back("all that moves is seen along (" + NumberText(n.x(), 4) + ", " +
+                            NumberText(n.y(), 4) + ", " + NumberText(n.z(), 4) + ")");
       const double along = n.dot(description.gravity);
-      if (along != 0.0) result.dropped.push_back("gravity along it, " + Number(along) + " m/s^2");
+      if (along != 0.0)
+        result.dropped.push_back("gravity along it, " + NumberText(along, 4) + " m/s^2");
       result.dropped.push_back("motions out of the plane, and turns of bodies about axes in it");
     }
   }

@@ -2,8 +2,8 @@
 #include <Eigen/Geometry>
 #include <algorithm>
 #include <cmath>
-#include <cstdio>
 
+#include "mechanism/description/number_text.h"
 #include "mechanism/model/joint.h"
 #include "mechanism/simplify/attach.h"
 #include "mechanism/simplify/freedom.h"
@@ -14,12 +14,6 @@
 namespace loopbench {
 
 namespace {
-
-std::string Number(double value, int digits = 4) {
-  char text[32];
-  std::snprintf(text, sizeof text, "%.*g", digits, value);
-  return text;
-}
 
 /// A spring, the frequency at which it swings alone, and the rate of what is slower [rad/s].
 struct Spring {
@@ -153,15 +147,15 @@ void Say(const MechanismDescription& description, const Spring& spring, double o
   const ForceDescription& force = description.forces[spring.force];
   const std::string name = Named(description, force);
   if (const auto* between = std::get_if<SpringDamper>(&force)) {
-    result->done.push_back(name + " is a rod of " + Number(FreeCoordinate(*between)) + " m");
+    result->done.push_back(name + " is a rod of " + NumberText(FreeCoordinate(*between), 4) + " m");
     if (between->damping > 0.0) result->dropped.push_back("the damper of the " + name);
   } else {
     result->done.push_back(name + " holds it at " +
-                           Number(FreeCoordinate(std::get<JointSpring>(force))));
+                           NumberText(FreeCoordinate(std::get<JointSpring>(force)), 4));
   }
-  result->dropped.push_back("the swing of the " + name + " at " + Number(spring.frequency, 2) +
-                            " rad/s, where the motion has " + Number(spring.rate, 2) +
-                            "; it starts off by " + Number(off));
+  result->dropped.push_back("the swing of the " + name + " at " + NumberText(spring.frequency, 2) +
+                            " rad/s, where the motion has " + NumberText(spring.rate, 2) +
+                            "; it starts off by " + NumberText(off, 4));
 }
 
 }  // namespace

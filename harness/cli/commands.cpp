@@ -9,6 +9,7 @@
 #include "harness/judge/claims_reader.h"
 #include "harness/judge/claims_report.h"
 #include "harness/record/provenance.h"
+#include "harness/reference/merge_references.h"
 #include "harness/run/peers.h"
 #include "harness/run/run_case.h"
 #include "harness/store/contents.h"
@@ -112,6 +113,11 @@ int Merge(const MergeCommand& command) {
     }
   }
   const std::vector<Record> merged = MergeStores(parts);
+  // those that stand where the store will be are one more part
+  std::vector<std::filesystem::path> files;
+  for (const auto& store : command.stores) files.push_back(StoreFile(store));
+  files.push_back(StoreFile(command.out));
+  const MergedReferences references = MergeReferences(files);
   ResultStore target(command.out);
   std::vector<std::filesystem::path> files;
   for (const auto& store : command.stores) files.push_back(StoreFile(store));
@@ -119,8 +125,13 @@ int Merge(const MergeCommand& command) {
     PrintError("warning: no store has trajectories/{}\n", name);
   }
   target.Fill(merged);
+  WriteReferences(references, target.file());
+  for (const std::string& note : references.notes) PrintError("{}\n", note);
   Print("{} records of {} stores are {} cases in {}\n", read, command.stores.size(), merged.size(),
         target.file().string());
+  if (!references.texts.empty()) {
+    Print("{} references beside it\n", references.texts.size());
+  }
   return 0;
 }
 

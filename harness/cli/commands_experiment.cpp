@@ -229,6 +229,14 @@ Checked CheckFile(const std::filesystem::path& path, const CheckCommand& command
     case FileKind::kBenchmarks: {
       const std::size_t groups = ReadBenchmarks(path).groups.size();
       of("benchmarks", fmt::format("{} groups of benchmarks", groups)).Add("groups", Count(groups));
+      break;
+    }
+    case FileKind::kSeries: {
+      const PublishedSeries series = ReadPublishedSeries(path);
+      of("series", fmt::format("published series \"{}\", {} quantities at {} times", series.name,
+                               series.quantities.size(), series.times.size()))
+          .Add("quantities", Count(series.quantities.size()))
+          .Add("times", Count(series.times.size()));
     }
   }
   return checked;

@@ -15,12 +15,14 @@ struct Kind {
   Json (*schema)();
 };
 
-const std::array<Kind, 5>& Kinds() {
-  static const std::array<Kind, 5> kinds = {{{"mechanism", "mechanism", MechanismSchema},
-                                             {"experiment", "experiment", ExperimentSchema},
-                                             {"benchmarks", "benchmarks", BenchmarksSchema},
-                                             {"claims", "claims", ClaimsSchema},
-                                             {"map", "failure map", MapSchema}}};
+const std::array<Kind, 6>& Kinds() {
+  static const std::array<Kind, 6> kinds = {
+      {{"mechanism", "mechanism", MechanismSchema},
+       {"experiment", "experiment", ExperimentSchema},
+       {"benchmarks", "benchmarks", BenchmarksSchema},
+       {"claims", "claims", ClaimsSchema},
+       {"map", "failure map", MapSchema},
+       {"series", "published series", PublishedSeriesSchema}}};
   return kinds;
 }
 

@@ -28,7 +28,7 @@ std::vector<BenchmarkMember> ReadBenchmarkMechanisms(const JsonNode& node,
   for (const JsonNode& element : node.OneOrMore("mechanism files")) {
     const std::string named = element.Text();
     const std::filesystem::path path = (folder / named).lexically_normal();
-    if (named.empty() || !ExpectMechanismFile(element, path)) continue;
+    if (named.empty() || !ExpectFile(element, path, "a mechanism file")) continue;
     try {
       BenchmarkMember member;
       member.description = ReadMechanism(path).description;

@@ -11,6 +11,7 @@
 #include <string_view>
 #include <vector>
 
+#include "harness/config/published_series.h"
 #include "harness/config/scene.h"
 #include "harness/record/record.h"
 #include "harness/record/select.h"
@@ -89,6 +90,8 @@ struct ExperimentScene {
   MechanismFile mechanism;
   std::vector<double> horizons;   ///< [s], different
   std::vector<std::string> tags;  ///< for filters and tables
+  /// What accuracy runs are held against in place of a certified reference.
+  std::optional<PublishedSeries> series = std::nullopt;
 };
 
 /// A held coordinate drawn uniformly between two bounds [rad or m].

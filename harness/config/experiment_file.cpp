@@ -59,10 +59,6 @@ FieldValue<File> Integrators() {
   return value;
 }
 
-void ReadReferenceOptions(const JsonNode& node, File& file) {
-  ReferenceFields().Read(node, &file.reference.emplace());
-}
-
 void ReadOutputOptions(const JsonNode& node, File& file) {
   OutputFields().Read(node, &file.output.emplace());
 }

@@ -20,7 +20,7 @@ void LoadMechanism(const JsonNode& node, MechanismFiles& files, ExperimentScene*
   const std::string named = node.Text();
   if (named.empty()) return;
   scene->path = files.Resolve(named);
-  if (!ExpectMechanismFile(node, scene->path)) return;
+  if (!ExpectFile(node, scene->path, "a mechanism file")) return;
   try {
     scene->mechanism = files.Mechanism(scene->path);
   } catch (const ConfigError& mistakes) {
@@ -147,11 +147,11 @@ void ReadScenes(const JsonNode& node, ExperimentFile& experiment) {
 
 }  // namespace
 
-bool ExpectMechanismFile(const JsonNode& node, const std::filesystem::path& path) {
+bool ExpectFile(const JsonNode& node, const std::filesystem::path& path, std::string_view what) {
   std::error_code error;
   if (std::filesystem::is_regular_file(path, error)) return true;
   if (std::filesystem::exists(path, error)) {
-    node.Fail(fmt::format("a mechanism file ({} is none)", path.string()));
+    node.Fail(fmt::format("{} ({} is none)", what, path.string()));
     return false;
   }
   std::vector<std::string> beside;
@@ -162,7 +162,7 @@ bool ExpectMechanismFile(const JsonNode& node, const std::filesystem::path& path
   std::ranges::sort(beside);
   const std::string nearest = NearestSpelling(path.filename().string(), beside);
   const std::filesystem::path named = node.Text();
-  node.Fail(fmt::format("a mechanism file ({} does not exist)", path.string()),
+  node.Fail(fmt::format("{} ({} does not exist)", what, path.string()),
             nearest.empty() ? "" : (named.parent_path() / nearest).string());
   return false;
 }

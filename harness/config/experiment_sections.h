@@ -24,6 +24,9 @@ inline constexpr Range kTolerances = {
     .max = 0.1,
     .above_min = true,
     .why = " (the spacing of doubles, below which rounding decides)"};
+/// Of a series: a picture has fewer points across, and a record of some ten series stays below 2
+/// MB.
+inline constexpr int kMostPoints = 10'000;
 inline constexpr int kMaxCount = 1'000'000;  ///< of anything: beyond it a number is a typing error
 inline constexpr std::size_t kMaxRules = 1000;      ///< ensembles, exclusions
 inline constexpr std::size_t kMaxBodies = 200'000;  ///< of all scenes of one combination
@@ -56,8 +59,8 @@ class MechanismFiles {
 };
 
 /// Whether there is a file at `path`, which a node names; reports one that is not there with the
-/// nearest name beside it.
-bool ExpectMechanismFile(const JsonNode& node, const std::filesystem::path& path);
+/// nearest name beside it. `what` it should be: "a mechanism file".
+bool ExpectFile(const JsonNode& node, const std::filesystem::path& path, std::string_view what);
 
 /// An experiment and what reading it needs besides.
 struct ExperimentFile : Experiment {
@@ -89,6 +92,8 @@ const Fields<ReferenceOptions>& ReferenceFields();
 const Fields<OutputOptions>& OutputFields();
 /// Reports output that the rest of the experiment rules out.
 void RequireOutput(const JsonNode& node, ExperimentFile& experiment);
+/// "reference", after the scenes: options of certified ones, or the published series of scenes.
+void ReadReferenceOptions(const JsonNode& node, ExperimentFile& experiment);
 /// "ensembles", after everything that they select from.
 void ReadEnsembles(const JsonNode& node, ExperimentFile& experiment);
 Json EnsemblesSchema();

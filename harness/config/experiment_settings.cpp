@@ -13,8 +13,6 @@ constexpr Range kReferences = {.min = kReach, .max = 1e-6};
 // of runs in other scalars than double; what a narrow one cannot meet ends as step-too-small
 constexpr Range kTolerancesOfLadders = {
     .min = kReach, .max = 0.1, .why = " (the reach of float128)"};
-// A picture has fewer points across, and a record of some ten series stays below 2 MB.
-constexpr int kMostPoints = 10'000;
 constexpr std::int64_t kMaxSteps = 1'000'000'000'000;  // no run gets there
 
 void CheckOneCpuLimit(const JsonNode& node, Limits&) {
@@ -146,23 +144,6 @@ const Fields<Precision>& PrecisionFields() {
        {"horizon", Number(&Precision::horizon, kPositive),
         "Simulated time [s]; default: the shortest of each scene."},
        {"reference", Number(&Precision::reference, kReferences), "Tolerance of the reference."}});
-  return fields;
-}
-
-const Fields<ReferenceOptions>& ReferenceFields() {
-  static const NameList scalars({"as-needed", "long-double", "float128"});
-  static const Fields<ReferenceOptions> fields(
-      "reference",
-      "Each mechanism and horizon once more at high order in a wide scalar, by two formulations "
-      "and "
-      "at two tolerances: where these agree, runs are held against them. Kept beside the store.",
-      {{"scalar", Choice(&ReferenceOptions::scalar, scalars, "a wide scalar"),
-        "float128 has 33 digits, takes some 50 times as long, and is for planar mechanisms; as "
-        "needed it follows where long-double does not certify to the end."},
-       {"points", Integer(&ReferenceOptions::points, 2, kMostPoints),
-        "Times at which errors are taken, evenly from the start to the end."},
-       {"cpu_s", Number(&ReferenceOptions::cpu_s, kPositive),
-        "CPU time of each integration [s]. One that is cut off certifies as far as it got."}});
   return fields;
 }
 

@@ -8,5 +8,6 @@ namespace loopbench::harness {
 Json MechanismSchema();
 Json ExperimentSchema();
 Json BenchmarksSchema();
+Json PublishedSeriesSchema();
 
 }  // namespace loopbench::harness

@@ -28,8 +28,8 @@ struct Kind {
   }
 };
 
-const std::array<Kind, 5>& Kinds() {
-  static const std::array<Kind, 5> kinds = {{
+const std::array<Kind, 6>& Kinds() {
+  static const std::array<Kind, 6> kinds = {{
       {FileKind::kMechanism,
        "a mechanism",
        {"bodies", "joints"},
@@ -50,6 +50,10 @@ const std::array<Kind, 5>& Kinds() {
        "benchmarks",
        {"groups"},
        {"name", "comment", "states", "integrator", "step", "groups", "$schema"}},
+      {FileKind::kSeries,
+       "a published series",
+       {"times", "quantities"},
+       {"name", "comment", "source", "times", "quantities", "$schema"}},
   }};
   return kinds;
 }
@@ -129,7 +133,9 @@ FileKind KindOfFile(const std::filesystem::path& path) {
   ErrorList errors(path.string(), text);
   const JsonNode root(document, "", errors);
   if (!document.is_object()) {
-    root.Fail("an object: a mechanism, an experiment, claims, a failure map or benchmarks");
+    root.Fail(
+        "an object: a mechanism, an experiment, claims, a failure map, benchmarks or a published "
+        "series");
   }
   errors.ThrowIfAny();
   std::vector<const Kind*> likeliest = Likeliest(document);

@@ -6,7 +6,7 @@
 
 namespace loopbench::harness {
 
-enum class FileKind { kMechanism, kExperiment, kClaims, kMap, kBenchmarks };
+enum class FileKind { kMechanism, kExperiment, kClaims, kMap, kBenchmarks, kSeries };
 
 /// The kind that knows the most of the file's top-level keys, and among them at least one that
 /// tells it apart; of several such kinds the one of which all of these are there. Throws

@@ -76,7 +76,8 @@ void Fill(const Measured& measured, const Certified<Space, S>& certified, Refere
     for (int j = 0; j < static_cast<int>(mechanism.joints().size()); ++j) {
       const auto& joint = mechanism.joints()[static_cast<std::size_t>(j)];
       if (joint.description < 0 || joint.kind->num_u != 1) continue;
-      EnterJoint(measured, 0, joint.description, kinematics.JointCoordinate(j), &snapshot);
+      EnterJoint(measured, 0, joint.description, kinematics.JointCoordinate(j),
+                 std::numeric_limits<double>::quiet_NaN(), &snapshot);
     }
     snapshot.energy = static_cast<double>(moment.energy);
     reference->bounds.push_back(InUsersTerms(certified.bounds[k], arm, snapshot));

@@ -4,27 +4,26 @@
 
 #include <vector>
 
-#include "harness/record/record.h"
+#include "harness/reference/meter.h"
 #include "harness/reference/reference.h"
 
 namespace loopbench::harness {
 
-class ErrorMeter {
+class ErrorMeter : public Meter {
  public:
   /// Of the run of one part. What `measured` and the reference refer to outlives the meter.
   ErrorMeter(const Measured& measured, int part, const Reference& reference);
 
-  /// The times that the reference is certified at [s].
-  const std::vector<double>& times() const { return times_; }
+  /// Those that the reference is certified at.
+  const std::vector<double>& times() const override { return times_; }
 
-  /// The run at times()[k], and the same with an interpolant of one degree less: their distance is
-  /// at least what interpolation adds. Energies count from the first picture, which is that of the
-  /// start: what does not move may be left out of a simplified model.
-  void Add(std::size_t k, const Snapshot& own, const Snapshot& lower);
+  /// Energies count from the first picture, which is that of the start: what does not move may be
+  /// left out of a simplified model.
+  void Add(std::size_t k, const Snapshot& own, const Snapshot& lower) override;
 
   /// Errors at the end, at most and in the mean (keys error_*, docs/using.md), and series.error.
   /// The error at the end is left out where the run or the certificate did not get there.
-  void Write(Record& record) const;
+  void Write(Record& record) const override;
 
  private:
   Measured measured_;

@@ -14,10 +14,14 @@ bool BelongsTo(const BodyImage& image, int part) {
   return image.part >= 0 && (part < 0 || image.part == part);
 }
 
+}  // namespace
+
 bool IsLength(const MechanismDescription& user, std::size_t joint) {
   const auto words = ValueWords(user.joints[joint].type, user.space, false);
   return !words.empty() && words.front().is_length();
 }
+
+namespace {
 
 /// The angle of the rotation from one orientation to the other [rad], to the last digit for small
 /// ones: |R_a - R_b| = 2 sqrt(2) sin(angle / 2).
@@ -40,7 +44,12 @@ std::vector<MeasuredPoint> PointsOf(const MechanismDescription& user) {
 Snapshot EmptySnapshot(const Measured& measured) {
   Snapshot snapshot;
   snapshot.bodies.resize(measured.user.bodies.size());
+  for (std::size_t i = 0; i < measured.compiled.bodies.size(); ++i) {
+    const BodyImage& image = measured.compiled.bodies[i];
+    if (image.part < 0) snapshot.bodies[i].pose = image.X;
+  }
   snapshot.joints.assign(measured.user.joints.size(), kNaN);
+  snapshot.rates = snapshot.joints;
   return snapshot;
 }
 
@@ -62,13 +71,14 @@ void EnterBody(const Measured& measured, int part, int body, const BodyState& at
   }
 }
 
-void EnterJoint(const Measured& measured, int part, int joint, double coordinate,
+void EnterJoint(const Measured& measured, int part, int joint, double coordinate, double rate,
                 Snapshot* snapshot) {
   for (std::size_t j = 0; j < measured.compiled.joints.size(); ++j) {
     const JointImage& image = measured.compiled.joints[j];
     if (image.part != part || image.joint != joint) continue;
-    const bool turns = !IsLength(measured.user, j);
-    snapshot->joints[j] = image.mirrored && turns ? -coordinate : coordinate;
+    const double sign = image.mirrored && !IsLength(measured.user, j) ? -1.0 : 1.0;
+    snapshot->joints[j] = sign * coordinate;
+    snapshot->rates[j] = sign * rate;
   }
 }
 

@@ -20,6 +20,7 @@ struct Snapshot {
   std::vector<BodyState> bodies;  ///< by the user's body, Ground included
   /// By the user's joint: its coordinate [rad or m] where it has one, else NaN.
   std::vector<double> joints;
+  std::vector<double> rates = {};  ///< of these coordinates; NaN where it was not taken
   double energy = 0.0;  ///< kinetic and potential [J]; NaN where it is not known of the whole
 };
 
@@ -37,10 +38,14 @@ struct Measured {
   std::vector<MeasuredPoint> points = {};
 };
 
+/// Whether the first coordinate of a joint is a length, not an angle.
+bool IsLength(const MechanismDescription& user, std::size_t joint);
+
 /// Origins, centres of mass and named points of all bodies but Ground.
 std::vector<MeasuredPoint> PointsOf(const MechanismDescription& user);
 
-/// One with room for all bodies and joints, at rest at the origin.
+/// One with room for all bodies and joints: what is fixed to Ground is where it is, all else at the
+/// origin.
 Snapshot EmptySnapshot(const Measured& measured);
 
 /// The same state of one part's body, at its centre of mass in the part's ground axes.
@@ -50,8 +55,8 @@ BodyState StateAtCentre(const Pose<Space, S>& pose, const Velocity<Space, S>& mo
 /// Enters a part's body, with all that is fixed to it.
 void EnterBody(const Measured& measured, int part, int body, const BodyState& at_centre,
                Snapshot* snapshot);
-/// Enters the coordinate of a joint of a part's description.
-void EnterJoint(const Measured& measured, int part, int joint, double coordinate,
+/// Enters the coordinate of a joint of a part's description and its rate, which may be NaN.
+void EnterJoint(const Measured& measured, int part, int joint, double coordinate, double rate,
                 Snapshot* snapshot);
 
 /// The picture of one part at `kinematics`, rounded to double; other parts stay as they are.
@@ -69,7 +74,8 @@ void TakeSnapshot(const Measured& measured, int part, const Kinematics<Space, S>
     const auto& joint = mechanism.joints()[static_cast<std::size_t>(j)];
     if (joint.description < 0 || joint.kind->num_u != 1) continue;
     EnterJoint(measured, part, joint.description,
-               static_cast<double>(kinematics.JointCoordinate(j)), snapshot);
+               static_cast<double>(kinematics.JointCoordinate(j)),
+               static_cast<double>(kinematics.JointSpeed(j)), snapshot);
   }
   snapshot->energy = static_cast<double>(ComputeEnergy(kinematics).total());
 }

@@ -40,6 +40,9 @@ std::string AccuracyContent(const Experiment& experiment, const Case& one) {
   }
   content.Set("branch_bound", one.branch_bound);
   content.Set("series_points", std::int64_t{experiment.series_points});
+  if (const auto& series = experiment.scenes[one.scene].series) {
+    content.Set("reference_series", series->canonical);
+  }
   if (experiment.reference) {
     content.Set("reference", experiment.reference->scalar);
     content.Set("reference_points", std::int64_t{experiment.reference->points});

@@ -4,6 +4,7 @@
 
 #include <algorithm>
 #include <limits>
+#include <memory>
 #include <optional>
 
 #include "harness/analysis/doubts.h"
@@ -12,6 +13,7 @@
 #include "harness/observers/final_poses.h"
 #include "harness/observers/observer.h"
 #include "harness/reference/error_meter.h"
+#include "harness/reference/series_meter.h"
 #include "harness/run/compiled_scene.h"
 #include "harness/run/ensemble.h"
 #include "harness/run/merge_parts.h"
@@ -30,12 +32,18 @@ std::string StateHash(std::span<const double> y) {
   return Fnv1a({reinterpret_cast<const char*>(y.data()), y.size_bytes()});
 }
 
+/// What is known of the motion: one of them, or nothing.
+struct HeldAgainst {
+  const Reference* reference = nullptr;     ///< with snapshots
+  const PublishedSeries* series = nullptr;  ///< with times within the horizon
+};
+
 template <class Space>
 class Runner {
  public:
   /// Part `part` of `user`, simplified to `scene`.
   Runner(const Experiment& experiment, const Case& one, const MechanismDescription& user,
-         const CompiledScene& scene, int part, bool with_series, const Reference* reference,
+         const CompiledScene& scene, int part, bool with_series, const HeldAgainst& held,
          const TrajectoryTask* trajectory)
       : case_(one),
         user_(user),
@@ -46,7 +54,12 @@ class Runner {
         mechanism_(description_, one.column.coordinates),
         stops_(mechanism_.stop_times()),
         with_series_(with_series) {
-    if (reference != nullptr) errors_.emplace(Measured{user_, compiled_}, part, *reference);
+    const Measured measured{user_, compiled_};
+    if (held.series != nullptr) {
+      errors_ = std::make_unique<SeriesMeter>(measured, part, *held.series, one.horizon);
+    } else if (held.reference != nullptr) {
+      errors_ = std::make_unique<ErrorMeter>(measured, part, *held.reference);
+    }
     if (trajectory != nullptr) PrepareRows(*trajectory);
     observers_ = MakeObservers<Space>(
         {description_, mechanism_, scene_, experiment.series_points, with_series, stops_});
@@ -216,7 +229,7 @@ class Runner {
   std::vector<std::unique_ptr<Observer<Space>>> observers_;
   std::vector<double> stops_;  ///< [s], at which steps end
   bool with_series_;
-  std::optional<ErrorMeter> errors_;
+  std::unique_ptr<Meter> errors_;
   std::optional<Recorder<Space>> recorder_;
   bool by_steps_ = false;                         ///< rows are at the ends of steps
   std::vector<double> rows_;                      ///< else at these times
@@ -226,15 +239,14 @@ class Runner {
 };
 
 Run RunOnce(const Experiment& experiment, const Case& one, const MechanismDescription& description,
-            bool with_series, const Reference* reference = nullptr,
+            bool with_series, const HeldAgainst& held = {},
             const TrajectoryTask* trajectory = nullptr) {
   const SceneObservation& observe = experiment.scenes[one.scene].mechanism.observe;
   const CompiledScene scene = CompileScene(description, observe, experiment.compile);
   std::vector<Run> parts;
   for (int part = 0; part < static_cast<int>(scene.compiled.parts.size()); ++part) {
     const auto run = [&]<class Space>() {
-      return Runner<Space>(experiment, one, description, scene, part, with_series, reference,
-                           trajectory)
+      return Runner<Space>(experiment, one, description, scene, part, with_series, held, trajectory)
           .Execute();
     };
     const auto& own = scene.compiled.parts[static_cast<std::size_t>(part)].description;
@@ -273,16 +285,22 @@ Record RunCase(const Experiment& experiment, const Case& one, const Reference* r
   record.Set("position_goal",
              4 * std::numeric_limits<double>::epsilon() * link *
                  static_cast<double>(scene.mechanism.description.bodies.size() - 1));
-  if (reference != nullptr) WriteCertificate(*reference, record);
-  const bool usable = reference != nullptr && reference->NumTrusted() > 0;
+  HeldAgainst held;
+  if (scene.series) {
+    WriteCertificate(scene.mechanism.description, *scene.series, one.horizon, record);
+    if (scene.series->NumWithin(one.horizon) > 0) held.series = &*scene.series;
+  } else if (reference != nullptr) {
+    WriteCertificate(*reference, record);
+    if (reference->NumTrusted() > 0) held.reference = reference;
+  }
   std::optional<TrajectoryTask> task;
   if (experiment.output && !trajectory.empty()) {
     task.emplace(*experiment.output, trajectory,
                  fmt::format("{} {} {} {}", one.mechanism, ToString(one.column), one.integrator,
                              SettingOf(one)));
   }
-  Run nominal = RunOnce(experiment, one, scene.mechanism.description, true,
-                        usable ? reference : nullptr, task ? &*task : nullptr);
+  Run nominal =
+      RunOnce(experiment, one, scene.mechanism.description, true, held, task ? &*task : nullptr);
   for (const auto& [key, value] : nominal.record.items()) record.Set(key, value);
 
   std::vector<DriftSeries> runs;

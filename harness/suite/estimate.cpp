@@ -174,6 +174,7 @@ double Estimate::OfCase(std::size_t experiment, const Case& one) {
 
 double Estimate::OfReference(std::size_t experiment, const ReferenceCase& one) {
   const Experiment& own = experiments_[experiment];
+  if (!own.reference) return 0.0;  // a published series is read
   const double most = own.reference->cpu_s;
   const auto run = [&](double fraction) -> Spent {
 #ifdef LOOPBENCH_PRECISIONS

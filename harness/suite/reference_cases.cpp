@@ -4,8 +4,11 @@
 
 #include "harness/analysis/link_length.h"
 #include "harness/reference/error_meter.h"
+#include "harness/reference/series_meter.h"
 #include "harness/run/case_identity.h"
 #include "harness/text/config_error.h"
+#include "harness/text/hash.h"
+#include "mechanism/description/outcome.h"
 #ifdef LOOPBENCH_PRECISIONS
 #include "harness/precision/make_reference.h"
 #endif
@@ -17,13 +20,19 @@ ReferenceCase ReferenceOf(const Experiment& experiment, const Case& one,
   ReferenceCase reference;
   reference.scene = one.scene;
   reference.horizon = one.horizon;
-  reference.id = ReferenceId(experiment.scenes[one.scene], one.horizon, *experiment.reference);
-  reference.file = ReferencePath(store, reference.id);
+  const ExperimentScene& scene = experiment.scenes[one.scene];
+  if (scene.series) {
+    reference.id = Fnv1a(
+        fmt::format("{}|{}|{}", scene.mechanism.canonical, one.horizon, scene.series->canonical));
+  } else {
+    reference.id = ReferenceId(scene, one.horizon, *experiment.reference);
+    reference.file = ReferencePath(store, reference.id);
+  }
   reference.keys.Set("kind", std::string("reference"));
   reference.keys.Set("experiment", experiment.name);
   reference.keys.Set("mechanism", one.mechanism);
   reference.keys.Set("horizon", one.horizon);
-  reference.keys.Set("scalar", experiment.reference->scalar);
+  if (!scene.series) reference.keys.Set("scalar", experiment.reference->scalar);
   SetCaseId(&reference.keys, reference.id);
   return reference;
 }
@@ -41,10 +50,27 @@ std::optional<Reference> FindReference(const Experiment& experiment, const Case&
   return none;
 }
 
+namespace {
+
+Record CertificateOf(const ExperimentScene& scene, const ReferenceCase& one) {
+  Record record = one.keys;
+  record.Set("outcome", std::string(ToString(Outcome::kFinished)));
+  WriteCertificate(scene.mechanism.description, *scene.series, one.horizon, record);
+  return record;
+}
+
+}  // namespace
+
+bool HasReference(const Experiment& experiment, const Case& one) {
+  return experiment.reference || experiment.scenes[one.scene].series;
+}
+
 #ifdef LOOPBENCH_PRECISIONS
 
 Record MakeOne(const Experiment& experiment, const ReferenceCase& one) {
-  const MechanismDescription& user = experiment.scenes[one.scene].mechanism.description;
+  const ExperimentScene& scene = experiment.scenes[one.scene];
+  if (scene.series) return CertificateOf(scene, one);
+  const MechanismDescription& user = scene.mechanism.description;
   std::optional<Reference> reference = ReadReference(one.file, one.id, user);
   if (!reference) {
     reference = MakeReference(user, one.horizon, LinkLength(user), *experiment.reference);
@@ -63,7 +89,10 @@ void RequireReferences(const Experiment&) {}
 
 #else
 
-Record MakeOne(const Experiment&, const ReferenceCase& one) { return one.keys; }
+Record MakeOne(const Experiment& experiment, const ReferenceCase& one) {
+  const ExperimentScene& scene = experiment.scenes[one.scene];
+  return scene.series ? CertificateOf(scene, one) : one.keys;
+}
 
 void RequireReferences(const Experiment& experiment) {
   if (!experiment.reference) return;

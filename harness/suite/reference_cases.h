@@ -1,5 +1,5 @@
-// The certified references that the accuracy cases of an experiment are held against, one per scene
-// and horizon: files beside the store, and a record of each.
+// The references that the accuracy cases of an experiment are held against, one per scene and
+// horizon: a record of each, and of certified ones a file beside the store.
 #pragma once
 
 #include <filesystem>
@@ -16,20 +16,23 @@ struct ReferenceCase {
   std::size_t scene = 0;
   double horizon = 0.0;  ///< [s]
   std::string id;
-  std::filesystem::path file;
-  Record keys;  ///< of kind "reference", with case_id and content
+  std::filesystem::path file;  ///< empty where it is a published series
+  Record keys;                 ///< of kind "reference", with case_id and content
 };
 
-/// The reference of a case of an experiment that asks for them.
+/// Whether the case is to be held against a certified reference or a published series.
+bool HasReference(const Experiment& experiment, const Case& one);
+
+/// The reference of a case that has one.
 /// @param store  the file of the store
 ReferenceCase ReferenceOf(const Experiment& experiment, const Case& one,
                           const std::filesystem::path& store);
 
-/// Makes the file, unless it is there, and says in a record what is certified.
+/// Makes the file, unless it is there or none is needed, and says in a record what is certified.
 Record MakeOne(const Experiment& experiment, const ReferenceCase& one);
 
-/// The case's reference as the file has it; nothing where the experiment asks for none. A reference
-/// that could not be made comes without snapshots and with the reason.
+/// The case's certified reference as the file has it; nothing where the experiment asks for none. A
+/// reference that could not be made comes without snapshots and with the reason.
 std::optional<Reference> FindReference(const Experiment& experiment, const Case& one,
                                        const std::filesystem::path& store);
 

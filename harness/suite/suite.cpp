@@ -77,7 +77,7 @@ Piece AccuracyPiece(const Experiment& experiment, const Case& one,
 
 Piece ReferencePiece(const Experiment& experiment, const ReferenceCase& one) {
   Limits limits = experiment.limits;
-  limits.cpu_s = experiment.reference->cpu_s;
+  if (experiment.reference) limits.cpu_s = experiment.reference->cpu_s;
   constexpr double kWitnesses = 3.0;
   return {.owed = {one.keys},
           .work = [&experiment, one] { return std::vector<Record>{MakeOne(experiment, one)}; },
@@ -321,7 +321,7 @@ SuiteCount RunSuite(const std::vector<Experiment>& experiments, const SuiteOptio
         add(
             e,
             [&] {
-              if (experiments[e].reference) {
+              if (HasReference(experiments[e], one)) {
                 const ReferenceCase reference = ReferenceOf(experiments[e], one, store.file());
                 references.push_back(ReferencePiece(experiments[e], reference));
                 references.back().experiment = static_cast<std::int64_t>(e);

@@ -165,6 +165,43 @@ const std::vector<TableColumn>& CompactPrecisionColumns() {
   return kColumns;
 }
 
+const std::vector<TableColumn>& ModelColumns() {
+  static const std::vector<TableColumn> kColumns = Columns({"mechanism",
+                                                            "model",
+                                                            "formulation",
+                                                            "enforcement",
+                                                            "coordinates",
+                                                            "integrator",
+                                                            "rtol",
+                                                            "horizon",
+                                                            "outcome",
+                                                            "model_motion",
+                                                            "bodies",
+                                                            "joints",
+                                                            "model_error",
+                                                            "model_error_at",
+                                                            "reference_error",
+                                                            "trust_horizon",
+                                                            "model_accepts",
+                                                            "model_verdict",
+                                                            "error_position_max",
+                                                            "rhs_evaluations",
+                                                            "model_rhs_ratio",
+                                                            "wall_s",
+                                                            "model_wall_ratio"});
+  return kColumns;
+}
+
+const std::vector<TableColumn>& CompactModelColumns() {
+  static const std::vector<TableColumn> kColumns = {
+      Short("mechanism", "mechanism"),  Short("model", "model"),
+      Short("bodies", "bodies"),        Short("model_error", "causes/m"),
+      Short("rhs_evaluations", "rhs"),  Short("model_rhs_ratio", "of full"),
+      Short("wall_s", "wall/s"),        Short("model_wall_ratio", "of full"),
+      Short("model_verdict", "verdict")};
+  return kColumns;
+}
+
 const std::vector<TableColumn>& CompactDriftColumns() {
   static const std::vector<TableColumn> kColumns =
       Join(CompactCaseColumns(),

@@ -33,6 +33,11 @@ const std::vector<TableColumn>& PrecisionColumns();
 /// The part of PrecisionColumns() that fits a terminal.
 const std::vector<TableColumn>& CompactPrecisionColumns();
 
+/// What simpler models of a mechanism cause and take (harness/cli/model_records.h), and the part of
+/// it that fits a terminal.
+const std::vector<TableColumn>& ModelColumns();
+const std::vector<TableColumn>& CompactModelColumns();
+
 /// The part of DriftColumns() that fits a terminal of some 100 columns, with shortened words.
 const std::vector<TableColumn>& CompactDriftColumns();
 

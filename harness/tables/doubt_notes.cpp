@@ -8,6 +8,7 @@
 
 #include "harness/analysis/agreement.h"
 #include "harness/analysis/doubts.h"
+#include "harness/config/published_series.h"
 #include "harness/tables/columns.h"
 
 namespace loopbench::harness {
@@ -37,7 +38,10 @@ const Reason kReasons[] = {
                           PromisedDriftShare(row));
      }},
     {kErrorDoubt, "further from the reference than 1000 tolerances",
-     [](const Record& row) { return fmt::format("{:.1e} of a link", TrueErrorShare(row)); }},
+     [](const Record& row) {
+       const bool only_points = row.Text("reference") != kPublished;
+       return fmt::format("{:.1e} of a link{}", TrueErrorShare(row), only_points ? "" : " or rad");
+     }},
     {kRefinementDoubt, "finer tolerances do not bring it nearer to one end",
      [](const Record& row) {
        return fmt::format("{} steps, state {}", row.Text("steps"), row.Text("state_hash"));

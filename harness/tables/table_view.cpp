@@ -24,6 +24,7 @@ std::string KindOf(const TableView& view, std::span<const Record> records) {
   if (!view.kind.empty()) return view.kind;
   if (HasKind(records, "accuracy")) return "drift";
   if (HasKind(records, "precision")) return "precision";
+  if (HasKind(records, "model")) return "models";
   return HasKind(records, "timing") ? "timing" : "all";
 }
 
@@ -46,6 +47,7 @@ std::vector<TableColumn> AllColumns(std::span<const Record> rows) {
 const std::vector<TableColumn>& ColumnsOfKind(const std::string& kind, bool compact) {
   if (kind == "timing") return compact ? CompactTimingColumns() : TimingColumns();
   if (kind == "precision") return compact ? CompactPrecisionColumns() : PrecisionColumns();
+  if (kind == "models") return compact ? CompactModelColumns() : ModelColumns();
   return compact ? CompactDriftColumns() : DriftColumns();
 }
 
@@ -85,6 +87,16 @@ std::vector<std::string> WhatColumnsHide(const Table& table) {
     notes.push_back(fmt::format("{} of {} runs did not finish; column outcome says which", failed,
                                 table.rows.size()));
   }
+  const bool shows_errors = std::ranges::any_of(
+      table.columns, [](const TableColumn& column) { return column.key.starts_with("error_"); });
+  const auto within = std::ranges::count_if(
+      table.rows, [](const Record& row) { return row.Number("error_over_accuracy") <= 1.0; });
+  if (shows_errors && within > 0) {
+    notes.push_back(fmt::format(
+        "{} of {} runs are as near to a published series as that is accurate: it does not tell "
+        "them from the truth (column error_over_accuracy, at most 1)",
+        within, table.rows.size()));
+  }
   const bool unresolved = std::ranges::any_of(table.columns, [&](const TableColumn& column) {
     return column.key != "outcome" &&
            !(column.key.starts_with("growth_hypothesis") ? shows("growth_hypothesis_resolved")
@@ -103,6 +115,7 @@ std::vector<std::string> WhatColumnsHide(const Table& table) {
 std::string TitleOf(const std::string& kind) {
   if (kind == "drift") return "Drift";
   if (kind == "precision") return "Precision";
+  if (kind == "models") return "Models";
   return kind == "timing" ? "Timing" : "Records";
 }
 
@@ -127,6 +140,7 @@ Table MakeTable(std::span<const Record> records, const TableView& view) {
   const std::string kind = KindOf(view, records);
   Selection selection = view.where;
   if (kind == "timing" || kind == "precision") selection.push_back({"kind", {kind}});
+  if (kind == "models") selection.push_back({"kind", {"model"}});
   if (kind == "drift" || kind == "factorial") selection.push_back({"kind", {"accuracy"}});
   std::vector<Record> rows = Filter(records, selection);
   SortRows(&rows);

@@ -12,6 +12,7 @@
 
 #include "harness/config/experiment_reader.h"
 #include "harness/config/mechanism_reader.h"
+#include "harness/config/published_series.h"
 #include "harness/judge/claims_reader.h"
 #include "harness/judge/failure_map_reader.h"
 #include "harness/text/config_error.h"
@@ -65,6 +66,7 @@ std::string MessageOf(const fs::path& path) {
     if (kind == "experiments") ReadExperiments(path);
     if (kind == "claims") ReadClaims(path);
     if (kind == "maps") ReadMapRules(path);
+    if (kind == "series") ReadPublishedSeries(path);
   });
 }
 
@@ -85,7 +87,7 @@ TEST_P(Corpus, IsRefusedWithTheExpectedMessages) {
   }
 }
 
-const std::vector<std::string> kKinds = {"mechanisms", "experiments", "claims", "maps"};
+const std::vector<std::string> kKinds = {"mechanisms", "experiments", "claims", "maps", "series"};
 
 INSTANTIATE_TEST_SUITE_P(Kinds, Corpus, testing::ValuesIn(kKinds),
                          [](const auto& kind) { return kind.param; });

@@ -14,6 +14,7 @@
 #include "harness/config/benchmark_reader.h"
 #include "harness/config/experiment_reader.h"
 #include "harness/config/mechanism_reader.h"
+#include "harness/config/published_series.h"
 #include "harness/json/file_kind.h"
 #include "harness/judge/claims_reader.h"
 #include "harness/judge/failure_map_reader.h"
@@ -43,6 +44,8 @@ const std::map<std::string, std::set<std::string>> kBeyondSchemas = {
       "mechanisms/independent-owner",
       "mechanisms/point-force-on-ground",
       "experiments/ensemble-unknown-scene",
+      "experiments/series-unknown-scene",
+      "series/quantity-twice",
       "claims/id-twice",
       "claims/label-twice",
       "maps/column-twice",
@@ -75,13 +78,26 @@ const std::map<std::string, std::set<std::string>> kBeyondSchemas = {
     {"what a row of a map lacks may stand in its group", {"maps/nothing-decides"}},
     {"endings that decide must be among the right ones", {"maps/when-not-right"}},
     {"arithmetic over several numbers",
-     {"mechanisms/axis-zero", "experiments/output-times-fall", "mechanisms/table-lengths",
-      "mechanisms/table-times-equal", "mechanisms/motion-table-length",
-      "mechanisms/motion-table-order", "mechanisms/inertia-indefinite",
-      "mechanisms/inertia-triangle", "mechanisms/inertia-triangle-turned",
-      "experiments/range-ends-equal", "experiments/range-log-signs",
-      "experiments/family-range-rounded-twice", "experiments/ensemble-between-order",
-      "experiments/family-too-large", "experiments/cases-too-many", "experiments/sweep-too-many"}},
+     {"mechanisms/axis-zero",
+      "experiments/output-times-fall",
+      "mechanisms/table-lengths",
+      "mechanisms/table-times-equal",
+      "mechanisms/motion-table-length",
+      "mechanisms/motion-table-order",
+      "mechanisms/inertia-indefinite",
+      "mechanisms/inertia-triangle",
+      "mechanisms/inertia-triangle-turned",
+      "experiments/range-ends-equal",
+      "experiments/range-log-signs",
+      "experiments/family-range-rounded-twice",
+      "experiments/ensemble-between-order",
+      "experiments/family-too-large",
+      "experiments/cases-too-many",
+      "experiments/sweep-too-many",
+      "experiments/series-one-for-two-scenes",
+      "series/lengths",
+      "series/times-falling",
+      "series/times-not-rising"}},
     {"equal after expansion, or without effect",
      {"experiments/column-twice", "experiments/gains-of-position",
       "experiments/ensemble-matches-nothing", "experiments/exclude-everything",
@@ -99,12 +115,16 @@ const std::map<std::string, std::set<std::string>> kBeyondSchemas = {
       "experiments/sweep-field-unknown", "experiments/sweep-new-key", "experiments/sweep-new-point",
       "experiments/sweep-value-refused"}},
     {"the fault is in another file, or in its absence",
-     {"experiments/mechanism-broken", "experiments/mechanism-folder",
+     {"experiments/series-body-unknown", "experiments/series-joint-unknown",
+      "experiments/series-point-unknown", "experiments/series-ground",
+      "experiments/series-axis-out-of-plane", "experiments/series-joint-of-two-coordinates",
+      "experiments/series-missing-file", "experiments/series-is-a-mechanism",
+      "experiments/mechanism-broken", "experiments/mechanism-folder",
       "experiments/mechanism-is-an-experiment", "experiments/mechanism-missing-file",
       "experiments/mechanism-no-json", "experiments/repeated-broken-mechanism"}},
     {"a number or character that the validator's own parser takes",
      {"mechanisms/mass-huge", "mechanisms/number-overflow", "mechanisms/number-underflow",
-      "mechanisms/lone-surrogate"}}};
+      "mechanisms/lone-surrogate", "series/number-overflow"}}};
 
 std::vector<fs::path> JsonFilesIn(const fs::path& folder) {
   std::vector<fs::path> files;
@@ -143,6 +163,7 @@ bool ReaderAccepts(FileKind kind, const fs::path& file) {
     if (kind == FileKind::kClaims) ReadClaims(file);
     if (kind == FileKind::kMap) ReadMapRules(file);
     if (kind == FileKind::kBenchmarks) ReadBenchmarks(file);
+    if (kind == FileKind::kSeries) ReadPublishedSeries(file);
     return true;
   } catch (const ConfigError&) {
     return false;
@@ -164,7 +185,7 @@ class Schema : public testing::TestWithParam<KindOfSchema> {};
 /// Mechanisms and experiments, claims and maps as they are shipped.
 std::vector<fs::path> ShippedOf(FileKind kind) {
   std::vector<fs::path> files;
-  for (const char* folder : {"mechanisms", "experiments"}) {
+  for (const char* folder : {"mechanisms", "experiments", "references"}) {
     for (const fs::path& file : JsonFilesIn(kRoot / "configs" / folder)) {
       if (KindOfFile(file) == kind) files.push_back(file);
     }
@@ -223,7 +244,8 @@ INSTANTIATE_TEST_SUITE_P(
     testing::Values(KindOfSchema{"mechanism", "mechanisms", FileKind::kMechanism, 30, 30},
                     KindOfSchema{"experiment", "experiments", FileKind::kExperiment, 20, 30},
                     KindOfSchema{"claims", "claims", FileKind::kClaims, 2, 20},
-                    KindOfSchema{"map", "maps", FileKind::kMap, 2, 20}),
+                    KindOfSchema{"map", "maps", FileKind::kMap, 2, 20},
+                    KindOfSchema{"series", "series", FileKind::kSeries, 3, 20}),
     [](const auto& kind) { return kind.param.schema; });
 
 TEST(MapSchema, KnowsEveryEndingOfRuns) {

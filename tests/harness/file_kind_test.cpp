@@ -42,7 +42,7 @@ TEST_F(FileKindTest, NamesInsideDecideNothing) {
 }
 
 TEST_F(FileKindTest, EveryShippedFileIsOfTheKindOfItsFolder) {
-  for (const char* folder : {"mechanisms", "experiments", "benchmarks"}) {
+  for (const char* folder : {"mechanisms", "experiments", "benchmarks", "references"}) {
     for (const auto& entry : fs::recursive_directory_iterator(kConfigs / folder)) {
       const std::string name = entry.path().filename().string();
       if (entry.path().extension() != ".json" || name.find("states") != std::string::npos) continue;
@@ -52,6 +52,7 @@ TEST_F(FileKindTest, EveryShippedFileIsOfTheKindOfItsFolder) {
       const FileKind expected = folder == std::string("mechanisms")   ? FileKind::kMechanism
                                 : is_model                            ? FileKind::kMechanism
                                 : folder == std::string("benchmarks") ? FileKind::kBenchmarks
+                                : folder == std::string("references") ? FileKind::kSeries
                                 : name == "claims.json"               ? FileKind::kClaims
                                 : name.find("map.json") != name.npos  ? FileKind::kMap
                                                                       : FileKind::kExperiment;

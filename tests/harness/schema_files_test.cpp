@@ -48,7 +48,8 @@ TEST(SchemaFiles, KnowTheKeysThatTellKindsApart) {
                                                  {"experiment", FileKind::kExperiment},
                                                  {"benchmarks", FileKind::kBenchmarks},
                                                  {"claims", FileKind::kClaims},
-                                                 {"map", FileKind::kMap}};
+                                                 {"map", FileKind::kMap},
+                                                 {"series", FileKind::kSeries}};
   for (const std::string& kind : SchemaKinds()) {
     const Json schema = ParseDocument(SchemaOfKind(kind), kind);
     std::string keys;

@@ -1,0 +1,226 @@
+#include "harness/config/published_series.h"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+
+#include "harness/config/file_schemas.h"
+#include "harness/json/document_kind.h"
+#include "harness/json/fields.h"
+#include "mechanism/description/joint_type.h"
+
+namespace loopbench::harness {
+namespace {
+
+/// More than any printed table has; a dense output stops at every one of them.
+constexpr std::size_t kMostTimes = 10'000;
+
+const NameList& Axes() {
+  static const NameList axes({"x", "y", "z", "angle"});
+  return axes;
+}
+constexpr int kAxisZ = 2, kTurning = 3;
+
+/// A series while it is read.
+struct SeriesDraft : PublishedSeries {
+  std::string comment;
+  const MechanismDescription* mechanism = nullptr;
+};
+
+/// One of its quantities, with what it belongs to.
+struct QuantityDraft : PublishedQuantity {
+  const SeriesDraft* series = nullptr;
+};
+
+void ReadTimes(const JsonNode& node, SeriesDraft& draft) {
+  const std::vector<JsonNode> elements = node.Elements("times");
+  if (node.value().is_array() && elements.empty()) node.Fail("at least one time");
+  if (elements.size() > kMostTimes) {
+    node.FailAs(fmt::format("{} times", elements.size()), fmt::format("at most {}", kMostTimes));
+    return;
+  }
+  for (const JsonNode& element : elements) {
+    const double time = element.Number(kNotNegative);
+    if (!draft.times.empty() && time <= draft.times.back()) {
+      element.Fail(fmt::format("a time after {} s", draft.times.back()));
+    }
+    draft.times.push_back(time);
+  }
+}
+
+void ReadValues(const JsonNode& node, QuantityDraft& draft) {
+  for (const JsonNode& element : node.Elements("values")) draft.values.push_back(element.Number());
+  const std::size_t wanted = draft.series->times.size();
+  if (!node.value().is_array() || wanted == 0 || draft.values.size() == wanted) return;
+  node.FailAs(fmt::format("{} values", draft.values.size()),
+              fmt::format("one for each of the {} times", wanted));
+}
+
+/// Looks `name` up among things of the mechanism; their index, or nothing where it is none.
+template <class Things, class Name>
+std::optional<int> Among(const JsonNode& node, const Things& things, Name name, std::size_t first,
+                         const std::string& what) {
+  NameList known;
+  for (std::size_t i = first; i < things.size(); ++i) known.Add(things[i].*name);
+  const auto found = node.Choice(known, what);
+  return found ? std::optional<int>(*found + static_cast<int>(first)) : std::nullopt;
+}
+
+void ReadBody(const JsonNode& node, QuantityDraft& draft) {
+  draft.body = node.Text();
+  const MechanismDescription* mechanism = draft.series->mechanism;
+  if (mechanism == nullptr || draft.body.empty()) return;
+  const auto found = Among(node, mechanism->bodies, &BodyDescription::name, 1,
+                           fmt::format("a body of mechanism \"{}\" that moves", mechanism->name));
+  if (found) draft.index = static_cast<std::size_t>(*found);
+}
+
+void ReadPoint(const JsonNode& node, QuantityDraft& draft) {
+  draft.point = node.Text();
+  if (draft.series->mechanism == nullptr || draft.index == 0) return;
+  const BodyDescription& body = draft.series->mechanism->bodies[draft.index];
+  NameList known;
+  for (const auto& [name, at] : body.points) known.Add(name);
+  if (node.Choice(known, fmt::format("a point of body \"{}\"", body.name))) {
+    draft.at = body.points.at(draft.point);
+  }
+}
+
+void ReadAxis(const JsonNode& node, QuantityDraft& draft) {
+  const auto found = node.Choice(Axes(), "an axis");
+  if (!found) return;
+  draft.axis = Axes().all()[static_cast<std::size_t>(*found)];
+  draft.kind = *found == kTurning ? PublishedKind::kAngle : PublishedKind::kPoint;
+  draft.along = *found;
+  const MechanismDescription* mechanism = draft.series->mechanism;
+  if (mechanism == nullptr) return;
+  const bool in_plane = mechanism->space == SpaceKind::kPlanar;
+  if (in_plane && *found == kAxisZ) node.Fail("x, y or angle: the mechanism is planar");
+  if (!in_plane && *found == kTurning) node.Fail("x, y or z: the mechanism is spatial");
+}
+
+void ReadJoint(const JsonNode& node, QuantityDraft& draft) {
+  draft.joint = node.Text();
+  draft.kind = PublishedKind::kJoint;
+  const MechanismDescription* mechanism = draft.series->mechanism;
+  if (mechanism == nullptr || draft.joint.empty()) return;
+  const auto found = Among(node, mechanism->joints, &JointDescription::name, 0,
+                           fmt::format("a joint of mechanism \"{}\"", mechanism->name));
+  if (!found) return;
+  draft.index = static_cast<std::size_t>(*found);
+  const JointType type = mechanism->joints[draft.index].type;
+  const std::size_t count = ValueWords(type, mechanism->space, false).size();
+  if (count != 1) {
+    node.FailAs(fmt::format("joint \"{}\" with {} coordinates", draft.joint, count),
+                "a joint with one, or points of its bodies");
+  }
+}
+
+/// A body's point along an axis, a body's angle, or a joint.
+void RequireOneThing(const JsonNode& node, QuantityDraft& draft) {
+  const bool body = node.Optional("body").has_value(), joint = node.Optional("joint").has_value();
+  const auto point = node.Optional("point"), axis = node.Optional("axis");
+  if (body == joint) {
+    node.FailAs(body ? "a body and a joint" : "neither a body nor a joint",
+                "\"joint\", or \"body\" with its \"axis\"");
+  } else if (joint && (point || axis)) {
+    (point ? *point : *axis).Fail("none beside \"joint\"");
+  } else if (body && !axis) {
+    node.Required("axis", "x, y or z of a point, or angle");
+  } else if (body && draft.axis == "angle" && point) {
+    point->Fail("none beside \"axis\": \"angle\": all points of a body turn alike");
+  } else if (body && !draft.axis.empty() && draft.axis != "angle" && !point) {
+    node.Required("point", "a named point of the body");
+  }
+}
+
+Json OneThingSchema() {
+  Json of_joint = Requires({"joint"}), turning = Requires({"body", "axis"});
+  Json of_point = Requires({"body", "axis", "point"});
+  of_joint["properties"] = {{"body", false}, {"point", false}, {"axis", false}};
+  turning["properties"] = {{"joint", false}, {"point", false}, {"axis", {{"const", "angle"}}}};
+  of_point["properties"] = {{"joint", false}, {"axis", {{"enum", {"x", "y", "z"}}}}};
+  return {{"oneOf", {of_joint, turning, of_point}}};
+}
+
+const Fields<QuantityDraft>& QuantityFields() {
+  static const Fields<QuantityDraft> fields(
+      "quantity",
+      "Numbers by time of a named point of a body along an axis, of a planar body's angle, or of a "
+      "joint.",
+      {{"body", By(TextSchema(), ReadBody), "A body of the mechanism, with axis."},
+       {"point", By(TextSchema(), ReadPoint), "A named point of the body."},
+       {"axis", By(ChoiceSchema(Axes().all()), ReadAxis),
+        "Of the ground [m], or the angle that the body is turned by [rad]."},
+       {"joint", By(TextSchema(), ReadJoint), "A joint with one coordinate [rad or m]."},
+       {"", By(OneThingSchema(), RequireOneThing)},
+       {"speed", Bool(&QuantityDraft::is_speed), "The values are its rate, per second."},
+       {"values", By(ArraySchema(NumberSchema(), 1, kMostTimes), ReadValues), "One for each time.",
+        "a list of numbers, one for each time"},
+       {"accuracy", Number(&QuantityDraft::accuracy, kPositive),
+        "What the source claims of every value, absolute, in their unit: half a unit of the last "
+        "printed digit at least.",
+        "a number > 0 in the unit of the values"}});
+  return fields;
+}
+
+void ReadQuantities(const JsonNode& node, SeriesDraft& draft) {
+  const std::vector<JsonNode> elements = node.Elements("quantities");
+  if (node.value().is_array() && elements.empty()) node.Fail("at least one quantity");
+  for (const JsonNode& element : elements) {
+    QuantityDraft quantity;
+    quantity.series = &draft;
+    QuantityFields().Read(element, &quantity);
+    const auto same = [&](const PublishedQuantity& other) {
+      return other.body == quantity.body && other.point == quantity.point &&
+             other.axis == quantity.axis && other.joint == quantity.joint &&
+             other.is_speed == quantity.is_speed;
+    };
+    if (std::ranges::any_of(draft.quantities, same)) {
+      element.FailAs("the same quantity again", "each once");
+    }
+    draft.quantities.push_back(std::move(quantity));
+  }
+}
+
+const Fields<SeriesDraft>& SeriesFileFields() {
+  static const Fields<SeriesDraft> fields(
+      "series",
+      "Published numbers of a mechanism's motion, for \"reference\" in an experiment. The program "
+      "checks more than this schema: that times rise, that there are as many values, that bodies, "
+      "points and joints are the mechanism's.",
+      {{"$schema", TextSchema(), "Address of this schema, for editors."},
+       {"name", Text(&SeriesDraft::name), "Of the series, for tables.", "a name"},
+       {"source", Text(&SeriesDraft::source), "Where the numbers were published, and by what.",
+        "where the numbers were published"},
+       {"comment", Text(&SeriesDraft::comment), "Free text for readers."},
+       {"times", By(ArraySchema(NumberSchema(kNotNegative), 1, kMostTimes), ReadTimes),
+        "Rising [s].", "a list of rising numbers >= 0 [s]"},
+       {"quantities", By(ArraySchema(QuantityFields().Schema(), 1), ReadQuantities),
+        "What is known at these times.", "a list of quantities"}});
+  return fields;
+}
+
+}  // namespace
+
+Json PublishedSeriesSchema() { return SeriesFileFields().OwnSchema(); }
+
+std::size_t PublishedSeries::NumWithin(double horizon) const {
+  return static_cast<std::size_t>(std::ranges::upper_bound(times, horizon) - times.begin());
+}
+
+PublishedSeries ReadPublishedSeries(const std::filesystem::path& path,
+                                    const MechanismDescription* mechanism) {
+  const std::string text = ReadTextFile(path);
+  const Json document = ParseDocument(text, path.string());
+  ErrorList errors(path.string(), text);
+  const JsonNode root(document, "", errors);
+  SeriesDraft draft;
+  draft.mechanism = mechanism;
+  if (ExpectDocument(root, FileKind::kSeries)) SeriesFileFields().ReadRows(root, &draft);
+  errors.ThrowIfAny();
+  draft.canonical = document.dump(-1, ' ', false, Json::error_handler_t::replace);
+  return static_cast<PublishedSeries&&>(draft);
+}
+
+}  // namespace loopbench::harness

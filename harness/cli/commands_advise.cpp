@@ -8,6 +8,7 @@
 #include "harness/advise/advise.h"
 #include "harness/analysis/link_length.h"
 #include "harness/cli/advise_models.h"
+#include "harness/cli/certain_motion.h"
 #include "harness/config/experiment_writer.h"
 #include "harness/config/mechanism_reader.h"
 #include "harness/isolation/print_from_child.h"
@@ -17,15 +18,10 @@
 #include "harness/text/config_error.h"
 #include "harness/text/files.h"
 #include "harness/text/terminal.h"
-#ifdef LOOPBENCH_PRECISIONS
-#include "harness/precision/make_reference.h"
-#endif
 
 namespace loopbench::harness {
 namespace {
 
-/// Times that errors are taken at: enough to see the largest, few against a run's steps.
-constexpr int kTimes = 41;
 /// Of all CPU time, what the reference's three witnesses may take each.
 constexpr double kWitnessShare = 0.15, kPilotShare = 0.4;
 
@@ -186,30 +182,15 @@ void PrintAdvice(const AdviseCommand& command, const Advice& advice, const Refer
       reference.trust_horizon, advice.trials, advice.pilot_s);
 }
 
-#ifdef LOOPBENCH_PRECISIONS
-
-/// A mechanism with its reference, as far as that is certified.
-struct Certain {
-  Reference reference;
-  double horizon = 0.0;  ///< [s]; 0: there is none
-};
-
-Certain MakeCertain(const AdviseCommand& command, const MechanismDescription& user,
-                    double horizon) {
-  const auto reference_until = [&](double end) {
-    return MakeReference(
-        user, end, LinkLength(user),
-        {.scalar = "long-double", .points = kTimes, .cpu_s = kWitnessShare * command.limits.cpu_s});
-  };
-  Certain certain{reference_until(horizon), horizon};
-  if (certain.reference.trust_horizon == horizon) return certain;
-  certain.horizon = certain.reference.trust_horizon;
-  if (certain.horizon > 0.0) certain.reference = reference_until(certain.horizon);
-  return certain;
+CertainMotion CertainFor(const AdviseCommand& command, const MechanismDescription& user,
+                         double horizon) {
+  return MakeCertainMotion(user, horizon, kWitnessShare * command.limits.cpu_s,
+                           command.mechanism.string() + ": advice");
 }
 
-Advice AdviceFor(const AdviseCommand& command, const MechanismFile& file, const Certain& certain,
-                 const std::vector<MeasuredPoint>& points, const AdviceRequest& request) {
+Advice AdviceFor(const AdviseCommand& command, const MechanismFile& file,
+                 const CertainMotion& certain, const std::vector<MeasuredPoint>& points,
+                 const AdviceRequest& request) {
   const TrialScene scene{.user = file.description,
                          .reference = certain.reference,
                          .horizon = certain.horizon,
@@ -223,8 +204,8 @@ Advice AdviceFor(const AdviseCommand& command, const MechanismFile& file, const 
 }
 
 /// What a model causes and saves, as a row; `whole` is what the whole model takes [s].
-Record RowOfModel(const AdviseCommand& command, const MechanismFile& file, const Certain& certain,
-                  const SceneModel& model, double whole) {
+Record RowOfModel(const AdviseCommand& command, const MechanismFile& file,
+                  const CertainMotion& certain, const SceneModel& model, double whole) {
   Record row;
   row.Set("model", model.name);
   const auto refuse = [&](const std::string& why) {
@@ -232,7 +213,7 @@ Record RowOfModel(const AdviseCommand& command, const MechanismFile& file, const
     return row;
   };
   // the same times: those of the whole model
-  const Certain own = MakeCertain(command, model.description, certain.horizon);
+  const CertainMotion own = CertainFor(command, model.description, certain.horizon);
   if (own.horizon < certain.horizon) {
     return refuse(own.reference.message.empty() ? "its motion is not certified so far"
                                                 : own.reference.message);
@@ -261,8 +242,8 @@ Record RowOfModel(const AdviseCommand& command, const MechanismFile& file, const
   return row;
 }
 
-void PrintModels(const AdviseCommand& command, const MechanismFile& file, const Certain& certain,
-                 double whole) {
+void PrintModels(const AdviseCommand& command, const MechanismFile& file,
+                 const CertainMotion& certain, double whole) {
   std::vector<const Idea*> ideas;
   for (const Idea& idea : Ideas()) ideas.push_back(&idea);
   constexpr double kShortRun_s = 1.0;
@@ -295,7 +276,7 @@ int AdviseInChild(const AdviseCommand& command, const MechanismFile& file) {
   const std::string name = command.mechanism.string();
   std::vector<MeasuredPoint> points;
   for (const std::string& point : command.points) points.push_back(PointNamed(user, point));
-  const Certain certain = MakeCertain(command, user, command.horizon);
+  const CertainMotion certain = CertainFor(command, user, command.horizon);
   if (!(certain.horizon > 0.0)) {
     throw std::runtime_error(fmt::format("{}: there is no certified reference to advise by: {}",
                                          name, certain.reference.message));
@@ -329,17 +310,6 @@ int AdviseInChild(const AdviseCommand& command, const MechanismFile& file) {
   }
   return advice.reached ? 0 : 1;
 }
-
-#else
-
-int AdviseInChild(const AdviseCommand& command, const MechanismFile&) {
-  throw ConfigError(
-      fmt::format("{}: advice needs certified references: this program was built "
-                  "without wide scalars (cmake -DLOOPBENCH_PRECISIONS=ON)",
-                  command.mechanism.string()));
-}
-
-#endif
 
 }  // namespace
 

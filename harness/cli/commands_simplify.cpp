@@ -6,10 +6,13 @@
 #include <charconv>
 #include <cmath>
 
+#include "harness/cli/model_records.h"
 #include "harness/cli/models.h"
 #include "harness/config/mechanism_reader.h"
 #include "harness/isolation/print_from_child.h"
 #include "harness/run/short_run.h"
+#include "harness/store/result_store.h"
+#include "harness/tables/table_view.h"
 #include "harness/text/config_error.h"
 #include "harness/text/spelling.h"
 #include "harness/text/terminal.h"
@@ -196,6 +199,23 @@ void PrintIdeas(const SceneModels& ladder, const SimplifyOptions& options,
   if (!idle.empty()) Print("\nThere is nothing for: {}.\n", fmt::join(idle, ", "));
 }
 
+/// What each model causes and takes, in the store and on the terminal.
+void PrintVerdicts(const SimplifyCommand& command, const MechanismFile& file,
+                   const SceneModels& ladder, const ExplainView& view) {
+  const std::vector<Record> records = RecordsOfModels(
+      file, ladder,
+      {.horizon = command.errors,
+       .accept = command.accept,
+       .cpu_s = PartOfTime(command, 0.3) / static_cast<double>(ladder.models.size()),
+       .what = command.mechanism.string() + ": --store"});
+  ResultStore store(command.store);
+  for (const Record& record : records) store.Append(record);
+  Table table = MakeTable(records, {.kind = "models", .compact = true});
+  table.title.clear();
+  PrintSection("Against the whole one's certified motion", table, view);
+  Print("  {} records in {}\n", records.size(), store.file().string());
+}
+
 /// In the child.
 int SimplifyFile(const SimplifyCommand& command, const ExplainView& view,
                  const std::string& typed) {
@@ -207,7 +227,9 @@ int SimplifyFile(const SimplifyCommand& command, const ExplainView& view,
   SceneModels ladder = MakeModels(file, ideas, run, options);
   PrintIdeas(ladder, options, view);
   const bool any = ladder.models.size() > 1;
-  if (any && command.errors > 0.0) {
+  if (!command.store.empty()) {
+    PrintVerdicts(command, file, ladder, view);
+  } else if (any && command.errors > 0.0) {
     const auto count = static_cast<double>(ladder.models.size());
     MeasureErrors(command.errors, PartOfTime(command, 0.3) / count, &ladder);
   }

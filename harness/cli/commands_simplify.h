@@ -16,12 +16,14 @@ struct SimplifyCommand {
   std::vector<std::string> only;        ///< names of ideas; empty: all
   std::vector<std::string> thresholds;  ///< NAME=VALUE, as typed
   Lumping lumping = Lumping::kCentreOfMass;
-  double short_run = 1.0;     ///< length of the short run [s]; 0: none
-  double horizon = 10.0;      ///< of the experiment [s]
-  double errors = 0.0;        ///< length of runs that show how far models are off [s]; 0: none
-  std::filesystem::path out;  ///< folder; nothing is written when empty
-  bool assembled = false;     ///< the whole model says all of its start
-  bool force = false;         ///< into a folder that is there
+  double short_run = 1.0;       ///< length of the short run [s]; 0: none
+  double horizon = 10.0;        ///< of the experiment [s]
+  double errors = 0.0;          ///< length of runs that show how far models are off [s]; 0: none
+  std::filesystem::path store;  ///< that gets a record of each model; none when empty
+  double accept = 0.0;          ///< error that a model may cause, for its verdict there [m]
+  std::filesystem::path out;    ///< folder; nothing is written when empty
+  bool assembled = false;       ///< the whole model says all of its start
+  bool force = false;           ///< into a folder that is there
   ProcessLimits limits;
 };
 

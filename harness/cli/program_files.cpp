@@ -173,6 +173,17 @@ void FileOptions::AddSimplify(CLI::App& app) {
                    "Run all models for so long [s] and say how far their points are off, 0: no")
       ->check(NumberFrom(0.0, 1e6))
       ->capture_default_str();
+  CLI::Option* accept =
+      simplify_app_
+          ->add_option("--accept", simplify_.accept,
+                       "Largest error that a model may cause [m]: its verdict in the store")
+          ->check(NumberFrom(1e-15, 1e6));
+  accept->needs("--errors");
+  simplify_app_
+      ->add_option("--store", simplify_.store,
+                   "Add a record for each model to this store: error against the certified motion "
+                   "of the whole one, times, verdict (loopbench table STORE --kind models)")
+      ->needs(accept);
   simplify_app_->add_option("--horizon", simplify_.horizon, "Of the experiment [s]")
       ->check(NumberFrom(1e-9, 1e9))
       ->capture_default_str();

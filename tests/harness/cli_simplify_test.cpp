@@ -12,6 +12,7 @@
 
 #include "harness/config/experiment_reader.h"
 #include "harness/config/mechanism_reader.h"
+#include "harness/store/result_store.h"
 #include "tests/harness/cli_fixture.h"
 #include "tests/harness/places.h"
 
@@ -276,6 +277,55 @@ TEST(ShippedLadders, HaveAModelBesideThem) {
     EXPECT_TRUE(fs::is_directory(kModels / entry.path().stem())) << entry.path();
   }
 }
+
+#ifdef LOOPBENCH_PRECISIONS
+
+TEST_F(SimplifyTest, JudgesEachModelByTheErrorItCausesAndKeepsARecord) {
+  // half a second of the compressor: its massless rod is off by micrometres
+  const std::string judge = "simplify light-rod-compressor.json --errors 0.5 --store s --accept ";
+  ExpectEnding(Call(judge + "1e-3"), 0,
+               {"Against the whole one's certified motion", "the whole model",
+                "accepted at 0.001 m", "2 records in s/results.jsonl"});
+  ExpectEnding(Call(judge + "1e-9"), 0, {"refused at 1e-09 m"});
+  const std::vector<Record> records = ReadRecords(folder_ / "s");
+  ASSERT_EQ(records.size(), 4u);
+  const Record &whole = records[0], &rod = records[1];
+  EXPECT_EQ(whole.Text("model"), "full");
+  EXPECT_EQ(rod.Text("model"), "light-links");
+  EXPECT_EQ(rod.Number("model_error"), records[3].Number("model_error")) << "as certain as that";
+  EXPECT_GT(rod.Number("model_error"), 1e6 * rod.Number("reference_error"));
+  EXPECT_LT(rod.Number("model_error"), 1e-3);
+  EXPECT_EQ(rod.Number("trust_horizon"), 0.5);
+  EXPECT_DOUBLE_EQ(rod.Number("model_rhs_ratio"),
+                   rod.Number("rhs_evaluations") / whole.Number("rhs_evaluations"));
+  EXPECT_GT(rod.Number("model_wall_ratio"), 0.0);
+  ExpectEnding(Call("table s --kind models --where 'model_error>1e-9' --format csv --columns "
+                    "model,model_error,model_accepts,model_verdict,model_wall_ratio"),
+               0, {"light-links,", "refused at 1e-09 m"});
+  ExpectEnding(Call("table s --format latex"), 0, {"light-links"});
+}
+
+TEST_F(SimplifyTest, ExactModelsCauseNothing) {
+  // the hall's portal is made ground: its points stay where they are
+  ExpectEnding(Call("simplify hall.json --errors 0.2 --accept 1e-12 --store s"), 0, {});
+  std::size_t exact = 0;
+  for (const Record& record : ReadRecords(folder_ / "s")) {
+    if (record.Text("model_motion") != "the same" || record.Text("model") == "full") continue;
+    EXPECT_LE(record.Number("model_error"), 1e-13) << record.Text("model");  // lengths of some m
+    EXPECT_EQ(record.Text("model_verdict"), "accepted at 1e-12 m") << record.Text("model");
+    ++exact;
+  }
+  EXPECT_GE(exact, 4u) << "welds, immovable and two islands";
+}
+
+TEST_F(SimplifyTest, AsksForWhatAVerdictNeeds) {
+  ExpectEnding(Call("simplify hall.json --store s"), 2, {"--store requires --accept"});
+  ExpectEnding(Call("simplify hall.json --store s --accept 1e-3"), 2, {"requires --errors"});
+  ExpectEnding(Call("simplify hall.json --errors 1 --accept nan --store s"), 2, {"--accept"});
+  EXPECT_FALSE(fs::exists(folder_ / "s"));
+}
+
+#endif
 
 }  // namespace cli_simplify_test
 }  // namespace loopbench::harness

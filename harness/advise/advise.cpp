@@ -1,7 +1,5 @@
 #include "harness/advise/advise.h"
 
-#include <fmt/format.h>
-
 #include <algorithm>
 #include <chrono>
 #include <cmath>
@@ -24,6 +22,11 @@ constexpr int kMostTrials = 5;
 constexpr double kRoom = 1.5, kLeastLimit_s = 2e-4;
 /// Of a sweep: trials beyond are cut off.
 constexpr double kHopeless = 20.0, kHopelessLeast_s = 2e-3;
+/// Steps go with rtol^(-1/p) for a method of order p; p is near six.
+constexpr double kOrder = 6.0;
+/// Of a budget: what finalists aim at, and are content with, and trials that this may take.
+constexpr double kSpent = 0.97, kFull = 0.94;
+constexpr int kSqueezes = 5;
 /// Pairs of method and level that all formulations are tried in, and runs that decide.
 constexpr std::size_t kBestPairs = 4, kFinalists = 6;
 constexpr int kRepeats = 7;
@@ -51,6 +54,9 @@ class Pilot {
       }
     }
     advice_.finalists = Finalists();
+    for (Trial& trial : advice_.finalists) {
+      if (request_.budget) SpendBudget(&trial);
+    }
     return Decide(doubts);
   }
 
@@ -95,8 +101,9 @@ class Pilot {
         // twenty times the best is no candidate, and low orders at 1e-13 would take hours
         const double limit =
             best_ ? std::max(kHopeless * best_->wall_s, kHopelessLeast_s) : request_.cpu_s / 10;
-        const Trial trial = bench_.Try(choice, limit);
+        Trial trial = bench_.Try(choice, limit);
         ++advice_.trials;
+        if (request_.budget && trial.outcome == Outcome::kFinished) bench_.Settle(&trial);
         if (Keeps(trial) && (!best_ || Better(trial, *best_))) best_ = trial;
         if (!best || Better(trial, *best)) best = trial;
       };
@@ -146,6 +153,7 @@ class Pilot {
   Trial Try(const Choice& choice) {
     Trial trial = bench_.Try(choice, Limit());
     ++advice_.trials;
+    if (request_.budget && trial.outcome == Outcome::kFinished) bench_.Settle(&trial);
     if (Keeps(trial) && (!best_ || Better(trial, *best_))) best_ = trial;
     return trial;
   }
@@ -159,8 +167,9 @@ class Pilot {
       Choice choice;
       choice.column = {.formulation = row.name, .enforcement = Enforcement::kVelocity};
       choice.rtol = 1e-5;
-      const Trial trial = bench_.Try(choice, request_.cpu_s / 10);
+      Trial trial = bench_.Try(choice, request_.cpu_s / 10);
       ++advice_.trials;
+      if (trial.outcome == Outcome::kFinished) bench_.Settle(&trial);
       const double cost =
           trial.wall_s / static_cast<double>(std::max<std::int64_t>(trial.rhs_evaluations, 1));
       if (trial.outcome != Outcome::kFinished && !fastest.empty()) continue;
@@ -219,8 +228,7 @@ class Pilot {
       if (trial.outcome != Outcome::kFinished && trial.outcome != Outcome::kTimeLimit) return;
       const double used = trial.wall_s / Budget();
       if (Keeps(trial) && used > kAim) return;
-      // a method of order p takes rtol^(-1/p) steps; p is near six
-      const double factor = std::clamp(std::pow(used / 0.9, 6.0), 1e-5, 1e5);
+      const double factor = std::clamp(std::pow(used / 0.9, kOrder), 1e-5, 1e5);
       const double next = Tolerance(choice.rtol * factor);
       if (next == choice.rtol) return;
       choice.rtol = next;
@@ -246,11 +254,22 @@ class Pilot {
     }
   }
 
+  /// The most promising of them. With a budget, columns of one method err alike at one tolerance,
+  /// and the cheaper ones have room left: what counts is the error they would have with all of it.
+  void Shorten(std::vector<Trial>* trials, std::size_t count) const {
+    Sort(trials);
+    if (request_.budget) {
+      std::ranges::stable_sort(*trials, {}, [this](const Trial& trial) {
+        return trial.error * std::pow(trial.wall_s / Budget(), kOrder);
+      });
+    }
+    if (trials->size() > count) trials->resize(count);
+  }
+
   /// The best pairs of method and level in all formulations and coordinates.
   std::vector<Trial> Finalists() {
     std::vector<Trial> pairs = advice_.looked_at;
-    Sort(&pairs);
-    if (pairs.size() > kBestPairs) pairs.resize(kBestPairs);
+    Shorten(&pairs, kBestPairs);
     std::vector<Trial> finalists = pairs;
     for (const Trial& pair : pairs) {
       for (const FormulationRow& row : Formulations()) {
@@ -265,9 +284,33 @@ class Pilot {
         }
       }
     }
-    Sort(&finalists);
-    if (finalists.size() > kFinalists) finalists.resize(kFinalists);
+    Shorten(&finalists, kFinalists);
     return finalists;
+  }
+
+  /// Finalists have the tolerance or step that suited the fastest formulation, or a search that was
+  /// content with part of the budget; errors fall with a high power of the time. Brings one near
+  /// to all of it.
+  void SpendBudget(Trial* trial) {
+    double order = kOrder;
+    for (int i = 0; i < kSqueezes && !OutOfTime(); ++i) {
+      bench_.Settle(trial);
+      const double used = trial->wall_s / Budget();
+      if (used > kFull && used <= 1.0) return;
+      Choice choice = trial->choice;
+      if (choice.step > 0.0) {
+        choice.step *= std::clamp(used / kSpent, 0.1, 10.0);
+      } else {
+        const double factor = std::clamp(std::pow(used / kSpent, order), 1e-5, 1e5);
+        choice.rtol = Tolerance(choice.rtol * factor);
+      }
+      if (choice == trial->choice) return;
+      const Trial next = Try(choice);
+      const double longer = std::log(next.wall_s / trial->wall_s);
+      if (std::abs(longer) < 0.02) return;
+      order = std::clamp(std::log(trial->choice.rtol / choice.rtol) / longer, 1.0, 12.0);
+      if (Better(next, *trial)) *trial = next;
+    }
   }
 
   /// Looks at the best until one is without doubts, and puts it first.
@@ -302,20 +345,6 @@ Advice Advise(const AdviceRequest& request, TrialBench& bench, double horizon, d
 Advice Sweep(const AdviceRequest& request, TrialBench& bench, double horizon, double length,
              const std::function<std::string(const Choice&)>& doubts) {
   return Pilot(request, bench, horizon, length).FindInAll(doubts);
-}
-
-std::string WhatLimits(const Trial& trial, double reference_error) {
-  if (!std::isfinite(trial.error)) return "it did not finish";
-  if (trial.error <= 10 * reference_error) {
-    return "the reference is not certified to much more than this error";
-  }
-  if (trial.shape < 0.2 * trial.error) {
-    return fmt::format(
-        "time on the way: it is {:.1e} s late or early, and keeps to the way to {:.1e} m",
-        trial.late, trial.shape);
-  }
-  return fmt::format("the way itself: {:.1e} m off it, {:.1e} s late or early on it", trial.shape,
-                     trial.late);
 }
 
 }  // namespace loopbench::harness

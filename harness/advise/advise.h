@@ -43,7 +43,4 @@ Advice Advise(const AdviceRequest& request, TrialBench& bench, double horizon, d
 Advice Sweep(const AdviceRequest& request, TrialBench& bench, double horizon, double length,
              const std::function<std::string(const Choice&)>& doubts);
 
-/// What the winner's error is made of, as a sentence.
-std::string WhatLimits(const Trial& trial, double reference_error);
-
 }  // namespace loopbench::harness

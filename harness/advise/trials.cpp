@@ -3,6 +3,7 @@
 #include <fmt/format.h>
 
 #include <algorithm>
+#include <cmath>
 #include <stdexcept>
 
 #include "harness/integrator/arkode.h"
@@ -13,6 +14,7 @@
 namespace loopbench::harness {
 namespace {
 
+/// Of a longer run a disturbance is a small part.
 constexpr double kShort_s = 2e-3;
 
 /// One part, so that its energy and its steps are those of all.
@@ -112,6 +114,15 @@ class BenchIn final : public TrialBench {
 
 }  // namespace
 
+void TrialBench::Settle(Trial* trial) {
+  constexpr int kSame = 3, kMostTimings = 12;
+  for (int same = 0, i = 0; same < kSame && i < kMostTimings && trial->wall_s < kShort_s; ++i) {
+    const double before = trial->wall_s;
+    TimeAgain(trial);
+    same = trial->wall_s < 0.97 * before ? 0 : same + 1;
+  }
+}
+
 std::string ToString(const Choice& choice) {
   const std::string how = choice.step > 0.0 ? fmt::format("in steps of {:.3g} s", choice.step)
                                             : fmt::format("at rtol {:.2g}", choice.rtol);
@@ -126,6 +137,20 @@ std::unique_ptr<TrialBench> MakeTrialBench(const TrialScene& scene) {
     return std::make_unique<BenchIn<Planar>>(scene, std::move(compiled));
   }
   return std::make_unique<BenchIn<Spatial>>(scene, std::move(compiled));
+}
+
+std::string WhatLimits(const Trial& trial, double reference_error) {
+  if (!std::isfinite(trial.error)) return "it did not finish";
+  if (trial.error <= 10 * reference_error) {
+    return "the reference is not certified to much more than this error";
+  }
+  if (trial.shape < 0.2 * trial.error) {
+    return fmt::format(
+        "time on the way: it is {:.1e} s late or early, and keeps to the way to {:.1e} m",
+        trial.late, trial.shape);
+  }
+  return fmt::format("the way itself: {:.1e} m off it, {:.1e} s late or early on it", trial.shape,
+                     trial.late);
 }
 
 }  // namespace loopbench::harness

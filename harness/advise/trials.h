@@ -54,10 +54,15 @@ class TrialBench {
   virtual Trial Try(const Choice& choice, double cpu_s) = 0;
   /// Another bare run: lowers the trial's wall_s if it was faster.
   virtual void TimeAgain(Trial* trial) = 0;
+  /// The time of a short run is soon disturbed: it is timed again until it falls no more.
+  void Settle(Trial* trial);
 };
 
 /// The mechanism as runs have it by default, in one piece. `scene` and what it refers to must
 /// outlive the bench. Throws std::runtime_error where the start cannot be assembled.
 std::unique_ptr<TrialBench> MakeTrialBench(const TrialScene& scene);
+
+/// What a trial's error is made of, as a sentence.
+std::string WhatLimits(const Trial& trial, double reference_error);
 
 }  // namespace loopbench::harness

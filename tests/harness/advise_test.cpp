@@ -4,7 +4,10 @@
 
 #include <gtest/gtest.h>
 
+#include <algorithm>
+#include <cmath>
 #include <string>
+#include <vector>
 
 #include "harness/analysis/link_length.h"
 #include "harness/config/experiment_reader.h"
@@ -17,6 +20,61 @@
 
 namespace loopbench::harness {
 namespace advise_test {
+
+/// Times and errors by a law: methods of orders 3 to 8, in formulations that differ in cost. The
+/// first run of a choice is disturbed.
+class LawfulBench final : public TrialBench {
+ public:
+  Trial Try(const Choice& choice, double) override {
+    Trial trial;
+    trial.choice = choice;
+    const double order = OrderOf(choice);
+    trial.wall_s = (1.0 + 0.8 * (++tries_ % 3)) * WallOf(choice);
+    trial.error = choice.step > 0.0 ? 1e3 * std::pow(choice.step, order) : 10 * choice.rtol;
+    trial.rhs_evaluations = 100;
+    return trial;
+  }
+  void TimeAgain(Trial* trial) override {
+    trial->wall_s = std::min(trial->wall_s, WallOf(trial->choice));
+  }
+  /// The least error of any way within so many seconds, tolerances only.
+  static double BestWithin(double wall_s) {
+    double best = 1.0;
+    for (const std::string& profile : ProfileNames()) {
+      const double order = OrderOf({.column = {}, .integrator = profile});
+      best = std::min(best, 10 * std::pow(kUnit_s / wall_s, order));
+    }
+    return best;
+  }
+
+ private:
+  static constexpr double kUnit_s = 2e-5;
+  static double OrderOf(const Choice& choice) {
+    const std::vector<std::string> names = ProfileNames();
+    return 3.0 +
+           static_cast<double>((std::ranges::find(names, choice.integrator) - names.begin()) % 6);
+  }
+  static double WallOf(const Choice& choice) {
+    const double dear = choice.column.formulation == "lagrange" ? 1.0 : 1.5;
+    if (choice.step > 0.0) return dear * 3 * kUnit_s / choice.step;
+    return dear * kUnit_s * std::pow(choice.rtol, -1 / OrderOf(choice));
+  }
+  int tries_ = 0;
+};
+
+TEST(AdviceByLaw, SpendsTheWholeBudgetWhateverTheOrder) {
+  for (const double budget : {1e-4, 3e-4, 1e-3}) {
+    LawfulBench bench;
+    const Advice advice = Advise({.error = {}, .budget = budget, .cpu_s = 60.0}, bench, 1.0, 1.0,
+                                 [](const Choice&) { return std::string(); });
+    ASSERT_TRUE(advice.reached);
+    const Trial& best = advice.finalists.front();
+    EXPECT_LE(best.wall_s, budget);
+    // 0.94 of the budget at order 8 is an error 1.64 times the least, and tolerances have two
+    // digits
+    EXPECT_LE(best.error, 1.8 * LawfulBench::BestWithin(budget)) << ToString(best.choice);
+  }
+}
 
 #ifdef LOOPBENCH_PRECISIONS
 

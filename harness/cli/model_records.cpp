@@ -19,7 +19,7 @@
 namespace loopbench::harness {
 namespace {
 
-constexpr int kRepeats = 7;  ///< timed runs of each model; the fastest counts
+constexpr int kRepeats = 20;  ///< timed runs of each model; the fastest counts
 
 Choice Alike() {
   return {.column = {.formulation = "odca", .enforcement = Enforcement::kPosition}, .rtol = 1e-8};

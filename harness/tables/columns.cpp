@@ -188,7 +188,8 @@ const std::vector<TableColumn>& ModelColumns() {
                                                             "rhs_evaluations",
                                                             "model_rhs_ratio",
                                                             "wall_s",
-                                                            "model_wall_ratio"});
+                                                            "model_wall_ratio",
+                                                            "noise"});
   return kColumns;
 }
 

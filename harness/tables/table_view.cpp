@@ -184,7 +184,7 @@ std::vector<std::string> NoiseWarnings(std::span<const Record> rows) {
   double spread = 0, load = 0;
   std::string where_spread, processors, governor;
   for (const Record& row : rows) {
-    if (row.Text("kind") != "timing") continue;
+    if (row.Text("kind") != "timing" && row.Text("kind") != "model") continue;
     ++timed;
     if (row.Text("noise").empty()) continue;
     ++noisy;

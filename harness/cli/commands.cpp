@@ -113,14 +113,13 @@ int Merge(const MergeCommand& command) {
     }
   }
   const std::vector<Record> merged = MergeStores(parts);
-  // those that stand where the store will be are one more part
   std::vector<std::filesystem::path> files;
   for (const auto& store : command.stores) files.push_back(StoreFile(store));
-  files.push_back(StoreFile(command.out));
-  const MergedReferences references = MergeReferences(files);
+  // references that stand where the store will be are one more part
+  std::vector<std::filesystem::path> with_target = files;
+  with_target.push_back(StoreFile(command.out));
+  const MergedReferences references = MergeReferences(with_target);
   ResultStore target(command.out);
-  std::vector<std::filesystem::path> files;
-  for (const auto& store : command.stores) files.push_back(StoreFile(store));
   for (const std::string& name : CopyTrajectories(merged, files, target.file())) {
     PrintError("warning: no store has trajectories/{}\n", name);
   }

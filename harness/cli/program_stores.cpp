@@ -111,7 +111,8 @@ void StoreOptions::AddTable(CLI::App& app) {
   table_app_
       ->add_option("--kind", table_.view.kind,
                    "What the rows are (default: drift, or what the store has)")
-      ->check(CLI::IsMember({"drift", "precision", "timing", "factorial", "models", "all"}));
+      ->check(CLI::IsMember(
+          {"drift", "precision", "timing", "factorial", "models", "references", "all"}));
   table_app_->add_option("--format", table_.format, "How they are written")
       ->check(CLI::IsMember({"text", "csv", "markdown", "json", "latex"}))
       ->capture_default_str();

@@ -1,5 +1,7 @@
 #include "harness/precision/witness.h"
 
+#include <fmt/format.h>
+
 #include <algorithm>
 #include <concepts>
 #include <limits>
@@ -156,6 +158,7 @@ Witness<Space, S> Follow(const MechanismDescription& description, const WitnessO
     return witness;
   }
   std::int64_t most_steps = 0;
+  double reached = 0.0;  // [s]
   for (const Stop& stop : StopsOf(times, start.mechanism->stop_times())) {
     const S end = S(stop.t);
     last = stop.is_knot ? end * (S(1) - std::numeric_limits<S>::epsilon()) : end;
@@ -171,6 +174,7 @@ Witness<Space, S> Follow(const MechanismDescription& description, const WitnessO
     most_steps = std::max(most_steps, result.steps);
     witness.rhs_evaluations += result.rhs_evaluations;
     witness.outcome = result.outcome;
+    reached = result.t_reached;
     if (result.outcome != Outcome::kFinished) break;
     if (stop.is_time) keep(end);
     if (witness.outcome != Outcome::kFinished) break;
@@ -178,8 +182,7 @@ Witness<Space, S> Follow(const MechanismDescription& description, const WitnessO
     steps.first_step = S(result.next_step);
   }
   if (witness.outcome != Outcome::kFinished) {
-    witness.message =
-        std::string(options.formulation) + " ends at " + std::to_string(double(steps.begin)) + " s";
+    witness.message = fmt::format("{} ends at {:.6g} s", options.formulation, reached);
   }
   witness.cpu_s = time.cpu_s();
   return witness;

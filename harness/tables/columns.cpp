@@ -203,6 +203,26 @@ const std::vector<TableColumn>& CompactModelColumns() {
   return kColumns;
 }
 
+const std::vector<TableColumn>& ReferenceColumns() {
+  static const std::vector<TableColumn> kColumns =
+      Columns({"experiment", "mechanism", "horizon", "outcome", "reference", "trust_horizon",
+               "reference_error", "reference_witnesses", "cpu_s", "rhs_evaluations", "message"});
+  return kColumns;
+}
+
+const std::vector<TableColumn>& CompactReferenceColumns() {
+  static const std::vector<TableColumn> kColumns = {
+      Short("mechanism", "mechanism"),
+      Short("horizon", "T/s"),
+      Short("outcome", "outcome"),
+      Short("reference", "reference"),
+      Short("trust_horizon", "certified until/s", {}, kAnswer),
+      Short("reference_error", "to/m", {}, kAnswer),
+      Short("cpu_s", "CPU/s"),
+      Short("message", "why no further")};
+  return kColumns;
+}
+
 const std::vector<TableColumn>& CompactDriftColumns() {
   static const std::vector<TableColumn> kColumns =
       Join(CompactCaseColumns(),

@@ -37,6 +37,9 @@ const std::vector<TableColumn>& CompactPrecisionColumns();
 /// it that fits a terminal.
 const std::vector<TableColumn>& ModelColumns();
 const std::vector<TableColumn>& CompactModelColumns();
+/// The columns of certified and published references.
+const std::vector<TableColumn>& ReferenceColumns();
+const std::vector<TableColumn>& CompactReferenceColumns();
 
 /// The part of DriftColumns() that fits a terminal of some 100 columns, with shortened words.
 const std::vector<TableColumn>& CompactDriftColumns();

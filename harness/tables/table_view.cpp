@@ -20,12 +20,31 @@ bool HasKind(std::span<const Record> records, std::string_view kind) {
                              [&](const Record& record) { return record.Text("kind") == kind; });
 }
 
+/// A table of the records of one kind.
+struct KindOfTable {
+  std::string_view name, records, title;
+  const std::vector<TableColumn>& (*columns)();
+  const std::vector<TableColumn>& (*compact)();
+};
+/// What a store has first is shown unless another one is asked for.
+constexpr KindOfTable kKinds[] = {
+    {"drift", "accuracy", "Drift", DriftColumns, CompactDriftColumns},
+    {"precision", "precision", "Precision", PrecisionColumns, CompactPrecisionColumns},
+    {"models", "model", "Models", ModelColumns, CompactModelColumns},
+    {"timing", "timing", "Timing", TimingColumns, CompactTimingColumns},
+    {"references", "reference", "References", ReferenceColumns, CompactReferenceColumns}};
+
+/// None for `factorial` and `all`.
+const KindOfTable* FindKind(std::string_view name) {
+  const auto kind = std::ranges::find(kKinds, name, &KindOfTable::name);
+  return kind == std::end(kKinds) ? nullptr : &*kind;
+}
+
 std::string KindOf(const TableView& view, std::span<const Record> records) {
   if (!view.kind.empty()) return view.kind;
-  if (HasKind(records, "accuracy")) return "drift";
-  if (HasKind(records, "precision")) return "precision";
-  if (HasKind(records, "model")) return "models";
-  return HasKind(records, "timing") ? "timing" : "all";
+  const auto first = std::ranges::find_if(
+      kKinds, [&](const KindOfTable& kind) { return HasKind(records, kind.records); });
+  return std::string(first == std::end(kKinds) ? "all" : first->name);
 }
 
 // `rows` are what the table shows: records, or for the factorial table its own rows.
@@ -45,10 +64,9 @@ std::vector<TableColumn> AllColumns(std::span<const Record> rows) {
 }
 
 const std::vector<TableColumn>& ColumnsOfKind(const std::string& kind, bool compact) {
-  if (kind == "timing") return compact ? CompactTimingColumns() : TimingColumns();
-  if (kind == "precision") return compact ? CompactPrecisionColumns() : PrecisionColumns();
-  if (kind == "models") return compact ? CompactModelColumns() : ModelColumns();
-  return compact ? CompactDriftColumns() : DriftColumns();
+  const KindOfTable* known = FindKind(kind);
+  const KindOfTable& shown = known == nullptr ? kKinds[0] : *known;
+  return compact ? shown.compact() : shown.columns();
 }
 
 std::vector<TableColumn> DefaultColumns(const std::string& kind, bool compact,
@@ -113,10 +131,8 @@ std::vector<std::string> WhatColumnsHide(const Table& table) {
 }
 
 std::string TitleOf(const std::string& kind) {
-  if (kind == "drift") return "Drift";
-  if (kind == "precision") return "Precision";
-  if (kind == "models") return "Models";
-  return kind == "timing" ? "Timing" : "Records";
+  const KindOfTable* known = FindKind(kind);
+  return std::string(known == nullptr ? "Records" : known->title);
 }
 
 Table Factorial(const std::vector<Record>& rows) {
@@ -139,9 +155,11 @@ Table MakeTable(std::span<const Record> records, const TableView& view) {
   RequireConditions("--where", view.where, records);
   const std::string kind = KindOf(view, records);
   Selection selection = view.where;
-  if (kind == "timing" || kind == "precision") selection.push_back({"kind", {kind}});
-  if (kind == "models") selection.push_back({"kind", {"model"}});
-  if (kind == "drift" || kind == "factorial") selection.push_back({"kind", {"accuracy"}});
+  if (const KindOfTable* known = FindKind(kind)) {
+    selection.push_back({"kind", {std::string(known->records)}});
+  } else if (kind == "factorial") {
+    selection.push_back({"kind", {"accuracy"}});
+  }
   std::vector<Record> rows = Filter(records, selection);
   SortRows(&rows);
   if (kind == "precision") SortRungs(&rows);

@@ -245,5 +245,20 @@ TEST(TableView, NoisyTimingsWarnWithTheWorstNumbersAndQuietOnesDoNot) {
   EXPECT_NE(loaded[1].find("below 2 %"), std::string::npos) << loaded[1];
 }
 
+TEST(TableView, ReferencesAreAKindOfTheirOwn) {
+  std::vector<Record> records(2);
+  records[0].Set("kind", std::string("reference"));
+  records[0].Set("mechanism", std::string("kite"));
+  records[0].Set("message", std::string("lagrange ends at 21 s"));
+  records[1].Set("kind", std::string("accuracy"));
+  records[1].Set("mechanism", std::string("four-bar"));
+  const Table table = MakeTable(records, {.kind = "references", .compact = true});
+  ASSERT_EQ(table.rows.size(), 1u);
+  EXPECT_EQ(table.title, "References");
+  EXPECT_NE(ToText(table).find("lagrange ends at 21 s"), std::string::npos);
+  // of a store with runs the runs are shown unless asked otherwise
+  EXPECT_EQ(MakeTable(records, {.compact = true}).title, "Drift");
+}
+
 }  // namespace table_view_test
 }  // namespace loopbench::harness

@@ -97,8 +97,9 @@ int PrintTable(const TableCommand& command, const std::string& typed);
 
 struct PlotCommand {
   std::filesystem::path store;
-  std::filesystem::path out;  ///< folder, or for a free figure a file
-  std::string format;         ///< svg or pdf; "" for the file's ending, else svg
+  std::filesystem::path out;        ///< folder, or for a free figure a file
+  std::string format;               ///< svg or pdf; "" for the file's ending, else svg
+  std::string size = "two-column";  ///< a name of a FigureSize
   Selection where;
   FreeFigure free;  ///< without x and y the standard figures
 };
@@ -111,9 +112,10 @@ int PrintVerdicts(const VerdictCommand& command, const std::string& typed);
 
 struct MapCommand {
   std::filesystem::path store, rules;
-  std::filesystem::path out;   ///< folder; nothing is written when empty
-  std::string format = "svg";  ///< of the picture: svg or pdf
-  bool gate = false;           ///< 1 if a cell that must hold does not
+  std::filesystem::path out;        ///< folder; nothing is written when empty
+  std::string format = "svg";       ///< of the picture: svg or pdf
+  std::string size = "two-column";  ///< a name of a FigureSize
+  bool gate = false;                ///< 1 if a cell that must hold does not
 };
 int PrintMap(const MapCommand& command, const std::string& typed);
 

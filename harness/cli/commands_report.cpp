@@ -9,6 +9,7 @@
 #include "harness/figures/failure_map_figure.h"
 #include "harness/figures/figure_recipes.h"
 #include "harness/figures/precision_figures.h"
+#include "harness/judge/failure_map_csv.h"
 #include "harness/judge/failure_map_reader.h"
 #include "harness/judge/failure_map_report.h"
 #include "harness/record/provenance.h"
@@ -44,7 +45,7 @@ int DrawFree(const std::vector<Record>& records, const PlotCommand& command) {
   const std::filesystem::path path = FileOf(command);
   const FreeFigureResult result = MakeFreeFigure(records, command.free);
   for (const std::string& remark : result.remarks) PrintError("note: {}\n", remark);
-  if (const auto error = WriteFigure(path, result.figure)) {
+  if (const auto error = WriteFigure(path, result.figure, FigureSizes().at(command.size))) {
     PrintError("{}\n", Lines{*error});
     return 2;
   }
@@ -60,10 +61,28 @@ int WriteMap(const FailureMap& map, const MapCommand& command, const std::string
   WriteFileAtomically(stem.string() + ".csv", RenderKept(cells, "csv"));
   WriteFileAtomically(stem.string() + ".md", MapMarkdown(map, Provenance(typed)));
   const std::string picture = stem.string() + "." + command.format;
-  const auto error = WriteMapFigure(picture, map);
+  const auto error = WriteMapFigure(picture, map, FigureSizes().at(command.size));
   if (error) PrintError("{}\n", Lines{*error});
   Print("wrote {0}.csv, {0}.md{1}\n", stem.string(), error ? "" : ", " + picture);
   return error ? 2 : 0;
+}
+
+/// The picture alone, of a map's own CSV.
+int RedrawMap(const MapRules& rules, const MapCommand& command) {
+  if (command.gate || command.out.empty()) {
+    throw ConfigError(
+        fmt::format("{}: found a CSV, expected --out and no --gate (only the picture is drawn "
+                    "of it), or a store",
+                    command.store.string()));
+  }
+  const FailureMap map = MapFromCsv(rules, ReadTextFile(command.store), command.store.string());
+  const std::string picture = (command.out / ("failure-map." + command.format)).string();
+  if (const auto error = WriteMapFigure(picture, map, FigureSizes().at(command.size))) {
+    PrintError("{}\n", Lines{*error});
+    return 2;
+  }
+  Print("wrote {}\n", picture);
+  return 0;
 }
 
 /// Without a demand a gate could not fail, and its success would say nothing.
@@ -90,12 +109,18 @@ std::string RenderKept(Table table, const std::string& format) {
   return Render(table, format);
 }
 
+const std::map<std::string, FigureSize>& FigureSizes() {
+  static const std::map<std::string, FigureSize> sizes = {{"one-column", FigureSize::kOneColumn},
+                                                          {"two-column", FigureSize::kTwoColumn}};
+  return sizes;
+}
+
 int DrawAll(const std::vector<NamedFigure>& figures, const std::filesystem::path& folder,
-            const std::string& format) {
+            const std::string& format, FigureSize size) {
   std::size_t written = 0;
   for (const NamedFigure& figure : figures) {
     const auto path = folder / (FileName(figure.name) + "." + format);
-    const auto error = WriteFigure(path, figure.figure);
+    const auto error = WriteFigure(path, figure.figure, size);
     if (error) PrintError("{}\n", Lines{*error});
     written += error ? 0 : 1;
   }
@@ -190,11 +215,13 @@ int Plot(const PlotCommand& command) {
         command.store.string());
     return 2;
   }
-  return DrawAll(figures, command.out, command.format.empty() ? "svg" : command.format);
+  return DrawAll(figures, command.out, command.format.empty() ? "svg" : command.format,
+                 FigureSizes().at(command.size));
 }
 
 int PrintMap(const MapCommand& command, const std::string& typed) {
   const MapRules rules = ReadMapRules(command.rules);
+  if (command.store.extension() == ".csv") return RedrawMap(rules, command);
   const std::vector<Record> records = LoadRecords(command.store);
   if (records.empty()) {
     PrintError("{}: no records\n", command.store.string());

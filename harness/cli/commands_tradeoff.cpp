@@ -69,7 +69,8 @@ int PrintTradeoff(const TradeoffCommand& command, const std::string& typed) {
     PrintText(RenderKept(rows, command.format));
   }
   if (command.figures.empty()) return 0;
-  return DrawAll(TradeoffFigures(tradeoff), folder / "figures", command.figures);
+  return DrawAll(TradeoffFigures(tradeoff), folder / "figures", command.figures,
+                 FigureSizes().at(command.size));
 }
 
 }  // namespace loopbench::harness

@@ -1,6 +1,7 @@
 #include "harness/cli/program_stores.h"
 
 #include "harness/cli/options.h"
+#include "harness/cli/report.h"
 #include "harness/text/numeric_option.h"
 
 namespace loopbench::harness {
@@ -129,6 +130,18 @@ void StoreOptions::AddTable(CLI::App& app) {
   table_app_->footer(kTableFooter);
 }
 
+namespace {
+
+void AddSize(CLI::App* app, std::string* size) {
+  std::vector<std::string> names;
+  for (const auto& [name, value] : FigureSizes()) names.push_back(name);
+  app->add_option("--size", *size, "Width of figures: 85 mm or 178 mm, letters of 8 pt")
+      ->check(CLI::IsMember(names))
+      ->capture_default_str();
+}
+
+}  // namespace
+
 void StoreOptions::AddPlot(CLI::App& app) {
   plot_app_ = app.add_subcommand(
       "plot", "Draw the standard figures of stored records, or one value against another");
@@ -139,6 +152,7 @@ void StoreOptions::AddPlot(CLI::App& app) {
       ->required();
   plot_app_->add_option("--format", plot_.format, "svg (default) or pdf")
       ->check(CLI::IsMember({"svg", "pdf"}));
+  AddSize(plot_app_, &plot_.size);
   plot_app_->add_option("--where", conditions_,
                         "Only records with key=value[,value] (or !=, <, <=, >, >=)");
   plot_app_->add_option("--x", plot_.free.x, "Key of the horizontal axis");
@@ -184,6 +198,7 @@ void StoreOptions::AddTradeoff(CLI::App& app) {
       ->check(CLI::IsMember({"svg", "pdf"}))
       ->needs(figures)
       ->capture_default_str();
+  AddSize(tradeoff_app_, &tradeoff_.size);
   tradeoff_app_->footer(kTradeoffFooter);
 }
 
@@ -216,12 +231,16 @@ void StoreOptions::AddTrajectory(CLI::App& app) {
 void StoreOptions::AddMap(CLI::App& app) {
   map_app_ =
       app.add_subcommand("map", "Show which method survives which extreme, and the number why");
-  map_app_->add_option("store", map_.store, "Folder of a run, or a .jsonl file")->required();
+  map_app_
+      ->add_option("store", map_.store,
+                   "Folder of a run, a .jsonl file, or failure-map.csv to draw it again")
+      ->required();
   map_app_->add_option("--rules", map_.rules, "Rows, columns and limits (JSON)")->required();
   map_app_->add_option("--out", map_.out, "Folder for failure-map.csv, .md and the picture");
   map_app_->add_option("--format", map_.format, "Of the picture")
       ->check(CLI::IsMember({"svg", "pdf"}))
       ->capture_default_str();
+  AddSize(map_app_, &map_.size);
   map_app_->add_flag("--gate", map_.gate, "Exit with 1 if a cell that must hold does not");
   AddWide(map_app_);
   map_app_->footer(kMapFooter);

@@ -2,6 +2,7 @@
 #pragma once
 
 #include <filesystem>
+#include <map>
 #include <string>
 #include <vector>
 
@@ -19,6 +20,9 @@ std::string RenderKept(Table table, const std::string& format);
 /// Draws those that can be drawn into a folder, as svg or pdf; the reasons of the others are
 /// printed, and the exit code is 2.
 int DrawAll(const std::vector<NamedFigure>& figures, const std::filesystem::path& folder,
-            const std::string& format);
+            const std::string& format, FigureSize size);
+
+/// By name: "one-column", "two-column".
+const std::map<std::string, FigureSize>& FigureSizes();
 
 }  // namespace loopbench::harness

@@ -16,39 +16,37 @@ namespace {
 
 /// A peer's states are looked at through O-DCA.
 FormulationRow PeerRow(std::string name, std::string sentence, Enforcement like,
-                       std::string integrator, FormulationLook look, bool is_soft = false) {
-  FormulationRow row = Row<odca::Odca>(std::move(name), std::move(sentence), std::move(look));
+                       std::string integrator, std::string color, bool is_soft = false) {
+  FormulationRow row = Row<odca::Odca>(std::move(name), std::move(sentence), std::move(color));
   row.levels = {like};
   row.integrator = std::move(integrator);
   row.is_soft = is_soft;
   return row;
 }
 
-/// Those that come with Loopbench, peers last. Colours are Okabe and Ito's, and a green; of peers
-/// dark red and violet, whose weak ones nothing has: they have joint coordinates only.
+/// Those that come with Loopbench, peers last. Colours differ in lightness too: Tol's for high
+/// contrast, and others of his.
 std::deque<FormulationRow> BuiltIn() {
   return {Row<odca::Odca>("odca",
                           "orthogonal complement divide and conquer. Bodies are joined pair by "
                           "pair; the loops' forces are found on the way.",
-                          {"#0072B2", "#56B4E9", 2.0}),
+                          "#004488"),
           Row<lagrange::Lagrange>("lagrange", "one multiplier per constraint, all solved at once.",
-                                  {"#D55E00", "#E69F00", 5.0}),
-          Row<reduction::Reduction>("reduction",
-                                    "independent speeds only; the others follow from the loops.",
-                                    {"#009E73", "#999933", 2.0}),
+                                  "#BB5566"),
+          Row<reduction::Reduction>(
+              "reduction", "independent speeds only; the others follow from the loops.", "#DDAA33"),
           PeerRow("peer/simbody",
                   "the library Simbody with its own integrator; after each step it projects "
                   "positions and speeds, to a tenth of the tolerance.",
-                  Enforcement::kPosition, "simbody-merson", {"#661100", "#AA4466", 2.0}),
+                  Enforcement::kPosition, "simbody-merson", "#117733"),
           PeerRow("peer/mujoco",
                   "the library MuJoCo with steps of one length, made from the tolerance; its "
                   "closing constraints are springs and dampers.",
-                  Enforcement::kBaumgarte, "mujoco-rk4", {"#AA4499", "#DDAACC", 2.0}, true)};
+                  Enforcement::kBaumgarte, "mujoco-rk4", "#88CCEE", true)};
 }
 
-/// For rows without colours, in turn.
-constexpr std::array<std::array<const char*, 2>, 3> kFreeColors = {
-    {{"#882255", "#CC79A7"}, {"#332288", "#AA99DD"}, {"#000000", "#777777"}}};
+/// For rows without a colour, in turn.
+constexpr std::array kFreeColors = {"#AA4499", "#332288", "#999933"};
 
 std::deque<FormulationRow>& Rows() {
   static std::deque<FormulationRow> rows = BuiltIn();
@@ -75,15 +73,11 @@ void RegisterFormulation(FormulationRow row, int alignment) {
                 .has_sentence = !row.sentence.empty(),
                 .has_factories = row.planar && row.spatial,
                 .alignment = alignment});
-  std::string &joint = row.look.joint, &absolute = row.look.absolute;
-  if (joint.empty() && absolute.empty()) {
-    const std::size_t turn = (Rows().size() - BuiltIn().size()) % kFreeColors.size();
-    joint = kFreeColors[turn][0];
-    absolute = kFreeColors[turn][1];
+  if (row.color.empty()) {
+    row.color = kFreeColors[(Rows().size() - BuiltIn().size()) % kFreeColors.size()];
   }
-  if (!IsColor(joint) || !IsColor(absolute)) {
-    RefuseRow(kKind, row.name, fmt::format("colours \"{}\" and \"{}\"", joint, absolute),
-              "#RRGGBB twice, or none");
+  if (!IsColor(row.color)) {
+    RefuseRow(kKind, row.name, fmt::format("colour \"{}\"", row.color), "#RRGGBB, or none");
   }
   Rows().push_back(std::move(row));
 }

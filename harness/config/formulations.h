@@ -27,15 +27,6 @@ template <class Space>
 using SolverFactory = std::function<std::unique_ptr<ConstraintSolver<Space, double>>(
     const Mechanism<Space, double>&, const FormulationOptions&)>;
 
-/// How figures draw a formulation: "#RRGGBB", strong in joint coordinates and weak in absolute
-/// ones. Without colours the row is given the next free pair.
-struct FormulationLook {
-  std::string joint, absolute;
-  /// Of its curves [px]. Wide ones are drawn first, so that those which agree with them to
-  /// round-off are seen on them.
-  double width = 3.5;
-};
-
 /// All that the harness knows of a formulation.
 struct FormulationRow {
   /// A word in files, tables and names: a-z, 0-9, '-' and '_'; of peers "peer/" and a word.
@@ -44,7 +35,8 @@ struct FormulationRow {
   SolverFactory<Planar> planar;
   SolverFactory<Spatial> spatial;
   std::vector<Enforcement> levels = {};  ///< those it has; empty: all there are
-  FormulationLook look = {};
+  /// Of its curves in figures, "#RRGGBB". Without one the row is given the next free one.
+  std::string color = {};
   /// Of a peer (harness/run/peers.h), somebody else's program, the name of its own integrator,
   /// which tables show in the place of the experiment's; empty for formulations. The factories are
   /// then those of the solver that the peer's states are looked at through.
@@ -59,7 +51,7 @@ struct FormulationRow {
 
 /// The row of a class template such as odca::Odca, made from a mechanism and options.
 template <template <class Space, class S> class Solver>
-FormulationRow Row(std::string name, std::string sentence, FormulationLook look = {}) {
+FormulationRow Row(std::string name, std::string sentence, std::string color = {}) {
   const auto make = []<class Space>(const Mechanism<Space, double>& mechanism,
                                     const FormulationOptions& options) {
     return std::unique_ptr<ConstraintSolver<Space, double>>(
@@ -69,11 +61,11 @@ FormulationRow Row(std::string name, std::string sentence, FormulationLook look 
           .sentence = std::move(sentence),
           .planar = make,
           .spatial = make,
-          .look = std::move(look)};
+          .color = std::move(color)};
 }
 
 /// Adds a row; not while experiments run. Throws std::invalid_argument for one that is not sound
-/// (mechanism/description/registration.h), or colours of which one is missing or none.
+/// (mechanism/description/registration.h), or a colour that is none.
 void RegisterFormulation(FormulationRow row, int alignment = EIGEN_MAX_STATIC_ALIGN_BYTES);
 
 /// All rows: the built-in ones, then the others in the order of their registration. Rows stay where

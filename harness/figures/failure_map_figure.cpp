@@ -3,6 +3,7 @@
 #include <fmt/format.h>
 
 #include <algorithm>
+#include <cmath>
 #include <string_view>
 
 #include "harness/text/escape.h"
@@ -10,212 +11,253 @@
 namespace loopbench::harness {
 namespace {
 
-// All lengths in pixels from the upper left corner.
-constexpr double kTextSize = 11.0, kLine = 14.0,
-                 kLetter = 6.3;  // of text: size, distance, mean width
-constexpr double kMargin = 12.0, kCellPadding = 8.0, kTitleHeight = 34.0, kHeading = 24.0;
-constexpr std::size_t kRowLetters = 46, kColumnLetters = 18;  // where labels are wrapped
+// All lengths in points from the lower left corner.
+constexpr double kMargin = 6.0, kRoom = 4.0;
+constexpr double kShareWidth = 26.0;   // of the numbers at the right
+constexpr double kPageHeight = 680.0;  // 240 mm, what a page has
 
-// What a state looks like. Blues and oranges stay apart for every kind of colour blindness, and no
-// two of these have the same lightness.
-struct Look {
-  const char *fill, *text, *meaning;
+// From all rows hold to none does. Letters are white on the last two.
+constexpr std::array kShades = {"#ffffff", "#dfe5ec", "#b7c4d3", "#8599b0", "#4b6384", "#16294a"};
+
+std::size_t ShadeOf(const FoldedCell& cell) {
+  if (cell.judged == 0 || cell.holding == cell.judged) return 0;
+  return 1 + static_cast<std::size_t>(std::floor((1.0 - cell.Share()) * 4.0));
+}
+
+/// A point type of gnuplot, or a text.
+struct Glyph {
+  int point = 0;
+  double size = 0.0;
+  const char* text = "";
+  const char* meaning = "";
 };
 
-Look LookOf(CellState state) {
+Glyph GlyphOf(CellState state) {
   switch (state) {
     case CellState::kHolds:
-      return {"#a9d3ee", "#000000", "holds: ended as it should, all measures within their limits"};
+      return {7, 0.25, "", "holds"};
     case CellState::kStopped:
-      return {"#f7f0a8", "#000000", "stopped early and said why"};
+      return {8, 0.6, "", "stopped and said why"};
     case CellState::kLimit:
-      return {"#c79bc4", "#000000", "did not end by itself"};
+      return {6, 0.55, "", "did not end by itself"};
     case CellState::kInaccurate:
-      return {"#e08214", "#000000", "inaccurate: ended as if all were well"};
+      return {2, 0.55, "", "wrong without a word"};
     case CellState::kBroken:
-      return {"#3a3a3a", "#ffffff", "broken: crashed, or no result"};
+      return {3, 0.6, "", "crashed, or no result"};
     case CellState::kNotApplicable:
-      return {"#e2e2e2", "#000000", "not applicable"};
+      return {0, 0.0, "–", "not applicable"};
     case CellState::kNotMeasured:
       break;
   }
-  return {"#ffffff", "#606060", "not measured"};
-}
-
-std::size_t Letters(std::string_view text) {
-  return static_cast<std::size_t>(std::ranges::count_if(
-      text, [](char c) { return (static_cast<unsigned char>(c) & 0xC0u) != 0x80u; }));
-}
-
-// Lines of at most `most` letters, broken at spaces; a longer word stays whole.
-std::vector<std::string> Wrapped(const std::string& text, std::size_t most) {
-  std::vector<std::string> lines(1);
-  for (std::size_t start = 0; start < text.size();) {
-    const std::size_t end = std::min(text.find(' ', start), text.size());
-    const std::string word = text.substr(start, end - start);
-    if (!lines.back().empty() && Letters(lines.back()) + 1 + Letters(word) > most) {
-      lines.emplace_back();
-    }
-    lines.back() += (lines.back().empty() ? "" : " ") + word;
-    start = end + 1;
-  }
-  return lines;
-}
-
-double WidthOf(const std::vector<std::string>& lines) {
-  std::size_t longest = 0;
-  for (const std::string& line : lines) longest = std::max(longest, Letters(line));
-  return kLetter * static_cast<double>(longest);
-}
-
-// Class with count, and number.
-std::vector<std::string> CellLines(const MapCell& cell) {
-  const std::string count = HoldingCount(cell), number = DecidingNumber(cell);
-  std::vector<std::string> lines = {ClassText(cell) + (count.empty() ? "" : " " + count)};
-  if (!number.empty()) lines.push_back(number);
-  return lines;
+  return {0, 0.0, "?", "not measured"};
 }
 
 class MapPainter {
  public:
-  MapPainter(const FailureMap& map, double point) : map_(map), point_(point) {
-    for (const MapColumn& column : map.rules.columns) {
-      const auto lines = Wrapped(column.label, kColumnLetters);
-      head_lines_ = std::max(head_lines_, lines.size());
-      cell_width_ = std::max(cell_width_, WidthOf(lines));
+  MapPainter(const FailureMap& map, FigureSize size) : map_(map), groups_(Folded(map)) {
+    page_.width = std::round(PointsOf(size == FigureSize::kOneColumn ? 85.0 : 178.0));
+    const auto columns = static_cast<double>(map.rules.columns.size());
+    label_width_ = 0.34 * page_.width;
+    const double room = page_.width - 2 * kMargin - label_width_ - kShareWidth;
+    cell_width_ = std::min(room / columns, 40.0);
+    label_letters_ = static_cast<std::size_t>((label_width_ - kRoom) / kLetterWidth);
+    std::size_t head = 1, lines = 1;
+    for (const MapColumn& column : map.rules.columns) head = std::max(head, Letters(column.label));
+    for (const FoldedGroup& group : groups_) {
+      lines = std::max(lines, Wrapped(group.label, label_letters_).size());
     }
-    for (std::size_t g = 0; g < map.cells.size(); ++g) {
-      for (std::size_t r = 0; r < map.cells[g].size(); ++r) {
-        const auto label = Wrapped(map.rules.groups[g].rows[r].label, kRowLetters);
-        row_lines_ = std::max(row_lines_, label.size());
-        label_width_ = std::max(label_width_, WidthOf(label));
-        for (const MapCell& cell : map.cells[g][r]) {
-          cell_width_ = std::max(cell_width_, WidthOf(CellLines(cell)));
-        }
-      }
+    head_height_ = kLetterWidth * static_cast<double>(head) + kRoom;
+    cell_height_ =
+        std::max({kLineHeight * static_cast<double>(lines) + 1.0, 0.8 * cell_width_, 11.0});
+    const double foot = kLineHeight * (size == FigureSize::kOneColumn ? 6.0 : 4.0) + kRoom;
+    const auto height = [&] {
+      return 2 * kMargin + 2 * kLineHeight + head_height_ + foot +
+             cell_height_ * static_cast<double>(groups_.size());
+    };
+    if (height() > kPageHeight && !groups_.empty()) {
+      cell_height_ -= (height() - kPageHeight) / static_cast<double>(groups_.size());
+      cell_height_ = std::max(cell_height_, kLineHeight);
     }
-    cell_width_ += kCellPadding;
-    label_width_ += kCellPadding;
+    page_.height = std::round(height());
   }
 
   MapDrawing Draw() {
-    y_ = kMargin;
-    Text({map_.rules.title}, kMargin, y_ + kTitleHeight / 2, "left", "#000000", 16.0);
-    y_ += kTitleHeight;
-    DrawHead();
-    for (std::size_t g = 0; g < map_.cells.size(); ++g) DrawGroup(g);
-    DrawLegend();
-    const GnuplotPage page{static_cast<int>(Width()), static_cast<int>(y_ + kMargin),
-                           static_cast<int>(kTextSize * point_ + 0.5)};
-    return {page,
-            fmt::format("set encoding utf8\nset margins 0,0,0,0\nunset border\nunset tics\n"
-                        "unset key\nset xrange [0:{}]\nset yrange [{}:0]\n{}plot -1 notitle\n",
-                        page.width, page.height, commands_)};
+    double y = page_.height - kMargin - 0.5 * kLineHeight;
+    Text(map_.rules.title, kMargin, y, "left");
+    y -= 0.5 * kLineHeight + head_height_;
+    for (std::size_t c = 0; c < map_.rules.columns.size(); ++c) {
+      Text(map_.rules.columns[c].label, Left(c) + 0.5 * cell_width_, y + 0.5 * kRoom,
+           "left rotate by 90");
+    }
+    Text("hold", Left(map_.rules.columns.size()) + kRoom, y + 0.5 * kLineHeight, "left");
+    for (const FoldedGroup& group : groups_) {
+      y -= cell_height_;
+      DrawGroup(group, y);
+    }
+    DrawLegend(y - kRoom - 0.5 * kLineHeight);
+    return {page_, fmt::format("set encoding utf8\nset margins 0,0,0,0\nunset border\nunset tics\n"
+                               "unset key\nset xrange [0:1]\nset yrange [0:1]\n{}plot -1 notitle\n",
+                               commands_)};
   }
 
  private:
-  double Width() const {
-    const double grid =
-        2 * kMargin + label_width_ + cell_width_ * static_cast<double>(map_.rules.columns.size());
-    return std::max({grid, 2 * kMargin + 1.4 * WidthOf({map_.rules.title}), 480.0});
-  }
   double Left(std::size_t column) const {
     return kMargin + label_width_ + cell_width_ * static_cast<double>(column);
   }
 
-  // Lines of text around a middle.
-  void Text(const std::vector<std::string>& lines, double x, double y, std::string_view align,
-            std::string_view colour, double size = kTextSize) {
-    y -= 0.5 * kLine * static_cast<double>(lines.size() - 1);
-    for (const std::string& line : lines) {
-      commands_ +=
-          fmt::format("set label {} at {:.1f},{:.1f} {} front tc rgb '{}' font ',{:.3g}'\n",
-                      QuoteGnuplot(line), x, y, align, colour, size * point_);
-      y += kLine;
-    }
+  void Text(const std::string& text, double x, double y, std::string_view options) {
+    commands_ += TextAt(page_, text, x, y, fmt::format("{} front", options));
   }
 
-  void Box(double x, double y, double width, double height, std::string_view fill,
-           std::string_view border, double line) {
+  void Box(double x, double y, double width, double height, std::string_view look) {
     commands_ += fmt::format(
-        "set object rect from {:.1f},{:.1f} to {:.1f},{:.1f} fc rgb '{}' fs solid border rgb '{}' "
-        "lw {:.3g}\n",
-        x, y, x + width, y + height, fill, border, line);
+        "set object rect from screen {:.5f}, screen {:.5f} to screen {:.5f}, screen {:.5f} {}\n",
+        x / page_.width, y / page_.height, (x + width) / page_.width, (y + height) / page_.height,
+        look);
   }
 
-  void DrawHead() {
-    const double height = kLine * static_cast<double>(head_lines_) + kCellPadding;
-    for (std::size_t c = 0; c < map_.rules.columns.size(); ++c) {
-      Text(Wrapped(map_.rules.columns[c].label, kColumnLetters), Left(c) + cell_width_ / 2,
-           y_ + height / 2, "center", "#000000");
+  void Shade(double x, double y, double width, double height, std::size_t shade) {
+    Box(x, y, width, height,
+        fmt::format("fc rgb '{}' fs solid border rgb '#9aa5b1' lw 0.4", kShades[shade]));
+  }
+
+  void Draw(const Glyph& glyph, bool hollow, double x, double y, std::string_view color) {
+    if (glyph.point == 0) {
+      Text(glyph.text, x, y, fmt::format("center tc rgb '{}'", color));
+      return;
     }
-    y_ += height;
+    // hollow circles are points of the type before that of filled ones
+    commands_ += TextAt(page_, "", x, y,
+                        fmt::format("point pt {} ps {:g} lw 1.1 lc rgb '{}' front",
+                                    hollow ? glyph.point - 1 : glyph.point, glyph.size, color));
   }
 
-  void DrawGroup(std::size_t group) {
-    Text({map_.rules.groups[group].label}, kMargin, y_ + kHeading / 2, "left", "#000000", 13.5);
-    y_ += kHeading;
-    const double height = kLine * static_cast<double>(std::max<std::size_t>(2, row_lines_)) + 6.0;
-    for (std::size_t r = 0; r < map_.cells[group].size(); ++r) {
-      Text(Wrapped(map_.rules.groups[group].rows[r].label, kRowLetters), kMargin, y_ + height / 2,
-           "left", "#000000");
-      for (std::size_t c = 0; c < map_.cells[group][r].size(); ++c) {
-        const MapCell& cell = map_.cells[group][r][c];
-        const Look look = LookOf(cell.state);
-        Box(Left(c), y_, cell_width_, height, look.fill,
-            cell.state == CellState::kNotMeasured ? "#b0b0b0" : "#ffffff", 1.0);
-        if (cell.demanded && cell.state != CellState::kHolds) {
-          commands_ += fmt::format(
-              "set object rect from {:.1f},{:.1f} to {:.1f},{:.1f} front fs empty border rgb "
-              "'#000000' lw 2.5\n",
-              Left(c) + 2, y_ + 2, Left(c) + cell_width_ - 2, y_ + height - 2);
-          framed_ = true;
-        }
-        Text(CellLines(cell), Left(c) + cell_width_ / 2, y_ + height / 2, "center", look.text);
+  void DrawGroup(const FoldedGroup& group, double y) {
+    const std::vector<std::string> lines = Wrapped(group.label, label_letters_);
+    double at = y + 0.5 * cell_height_ + 0.5 * kLineHeight * static_cast<double>(lines.size() - 1);
+    for (const std::string& line : lines) {
+      Text(line, kMargin, at, "left");
+      at -= kLineHeight;
+    }
+    for (std::size_t c = 0; c < group.cells.size(); ++c) {
+      const FoldedCell& cell = group.cells[c];
+      const std::size_t shade = ShadeOf(cell);
+      Shade(Left(c), y, cell_width_, cell_height_, shade);
+      const bool hollow = cell.worst == CellState::kHolds && cell.in_doubt;
+      doubts_ = doubts_ || hollow;
+      Draw(GlyphOf(cell.worst), hollow, Left(c) + 0.5 * cell_width_, y + 0.5 * cell_height_,
+           shade + 2 >= kShades.size() ? "#ffffff" : "#000000");
+      if (!cell.fails_demand) continue;
+      framed_ = true;
+      Box(Left(c) + 1.0, y + 1.0, cell_width_ - 2.0, cell_height_ - 2.0,
+          "front fs empty border rgb '#000000' lw 1.6");
+    }
+    Text(fmt::format("{:.0f} %", 100.0 * group.Share()), Left(group.cells.size()) + kRoom,
+         y + 0.5 * cell_height_, "left");
+  }
+
+  // In rows: shades, then glyphs that occur.
+  void DrawLegend(double y) {
+    const double left = kMargin;
+    double x = left;
+    const auto place = [&](const std::string& text, double sample) {
+      const double width = sample + WidthOf(text) + 10.0;
+      if (x > left && x + width > page_.width) {
+        x = left;
+        y -= kLineHeight;
       }
-      y_ += height;
+      const double at = x;
+      x += width;
+      return at;
+    };
+    const auto words = [&](const std::string& text) { Text(text, place(text, 0.0), y, "left"); };
+    words("rows of the extreme that hold:");
+    constexpr const char* kShares[] = {"all", "3/4 and more", "1/2", "1/4", "fewer", "none"};
+    for (std::size_t shade = 0; shade < kShades.size(); ++shade) {
+      const double at = place(kShares[shade], 13.0);
+      Shade(at, y - 4.0, 10.0, 8.0, shade);
+      Text(kShares[shade], at + 13.0, y, "left");
     }
-  }
-
-  void DrawLegend() {
-    y_ += kHeading;
-    constexpr double kSwatch = 14.0, kRow = 20.0;
+    x = left;
+    y -= kLineHeight;
+    words("the worst of them:");
     for (const CellState state : kCellStates) {
-      const Look look = LookOf(state);
-      Box(kMargin, y_ - kSwatch / 2, kSwatch, kSwatch, look.fill, "#808080", 1.0);
-      Text({look.meaning}, kMargin + kSwatch + 8.0, y_, "left", "#000000");
-      y_ += kRow;
+      const bool occurs = std::ranges::any_of(groups_, [state](const FoldedGroup& group) {
+        return std::ranges::find(group.cells, state, &FoldedCell::worst) != group.cells.end();
+      });
+      if (!occurs) continue;
+      const Glyph glyph = GlyphOf(state);
+      const double at = place(glyph.meaning, 12.0);
+      Draw(glyph, false, at + 5.0, y, "#000000");
+      Text(glyph.meaning, at + 12.0, y, "left");
     }
-    std::vector<std::string> remarks = {
-        "Number: the measure that decided, or when a run ended. k/n: of n runs k hold, the worst "
-        "is "
-        "shown."};
-    if (framed_) remarks.push_back("Frame: must hold and does not.");
-    for (const std::string& remark : remarks) {
-      for (const std::string& line :
-           Wrapped(remark, static_cast<std::size_t>((Width() - 2 * kMargin) / kLetter))) {
-        Text({line}, kMargin, y_, "left", "#000000");
-        y_ += kRow;
-      }
+    if (doubts_) {
+      const double at = place("holds, in doubt", 12.0);
+      Draw(GlyphOf(CellState::kHolds), true, at + 5.0, y, "#000000");
+      Text("holds, in doubt", at + 12.0, y, "left");
     }
+    if (framed_) words("frame: must hold and does not");
   }
 
   const FailureMap& map_;
-  double point_;
-  std::size_t head_lines_ = 1, row_lines_ = 1;
-  double cell_width_ = 0.0, label_width_ = 0.0, y_ = 0.0;
-  bool framed_ = false;
+  std::vector<FoldedGroup> groups_;
+  GnuplotPage page_;
+  double label_width_ = 0.0, cell_width_ = 0.0, cell_height_ = 0.0, head_height_ = 0.0;
+  std::size_t label_letters_ = 0;
+  bool framed_ = false, doubts_ = false;
   std::string commands_;
 };
 
+/// How bad a state is, for the worst of several: what is not applicable says nothing.
+int Badness(CellState state) {
+  return state == CellState::kNotApplicable ? -1 : static_cast<int>(state);
+}
+
 }  // namespace
 
-MapDrawing DrawMap(const FailureMap& map, double point) { return MapPainter(map, point).Draw(); }
+double FoldedCell::Share() const {
+  return judged == 0 ? 1.0 : static_cast<double>(holding) / static_cast<double>(judged);
+}
+
+double FoldedGroup::Share() const {
+  FoldedCell all;
+  for (const FoldedCell& cell : cells) {
+    all.holding += cell.holding;
+    all.judged += cell.judged;
+  }
+  return all.Share();
+}
+
+std::vector<FoldedGroup> Folded(const FailureMap& map) {
+  std::vector<FoldedGroup> groups;
+  for (std::size_t g = 0; g < map.cells.size(); ++g) {
+    const MapGroup& rules = map.rules.groups[g];
+    FoldedGroup& group = groups.emplace_back();
+    group.label = rules.short_label.empty() ? rules.label : rules.short_label;
+    group.rows = map.cells[g].size();
+    group.cells.resize(map.rules.columns.size());
+    for (const std::vector<MapCell>& row : map.cells[g]) {
+      for (std::size_t c = 0; c < row.size(); ++c) {
+        FoldedCell& folded = group.cells[c];
+        const MapCell& cell = row[c];
+        if (Badness(cell.state) > Badness(folded.worst)) folded.worst = cell.state;
+        folded.judged += cell.state == CellState::kNotApplicable ? 0 : 1;
+        folded.holding += cell.state == CellState::kHolds ? 1 : 0;
+        folded.in_doubt = folded.in_doubt || HoldsInDoubt(cell);
+        folded.fails_demand =
+            folded.fails_demand || (cell.demanded && cell.state != CellState::kHolds);
+      }
+    }
+  }
+  std::ranges::stable_sort(groups, {}, &FoldedGroup::Share);
+  return groups;
+}
+
+MapDrawing DrawMap(const FailureMap& map, FigureSize size) { return MapPainter(map, size).Draw(); }
 
 std::optional<std::string> WriteMapFigure(const std::filesystem::path& path, const FailureMap& map,
-                                          const std::string& gnuplot) {
-  constexpr double kPdfPoint = 1.1;  // with the terminal's own scale of fonts
-  const MapDrawing drawing = DrawMap(map, path.extension() == ".pdf" ? kPdfPoint : 1.0);
+                                          FigureSize size, const std::string& gnuplot) {
+  const MapDrawing drawing = DrawMap(map, size);
   return DrawWithGnuplot(path, drawing.page, drawing.script, gnuplot);
 }
 

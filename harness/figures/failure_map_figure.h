@@ -1,14 +1,41 @@
-// The failure map as a picture: a grid of coloured cells, each with its class and number in words.
+// The failure map as a picture: a small heat map that is read at arm's length.
 #pragma once
 
+#include <array>
+#include <cstddef>
 #include <filesystem>
 #include <optional>
 #include <string>
+#include <vector>
 
+#include "harness/figures/figures.h"
 #include "harness/figures/gnuplot.h"
 #include "harness/judge/failure_map.h"
 
 namespace loopbench::harness {
+
+/// What became of a method in all rows of a group.
+struct FoldedCell {
+  CellState worst = CellState::kNotApplicable;  ///< of the rows that are applicable
+  std::size_t holding = 0, judged = 0;          ///< of the rows that are applicable
+  bool in_doubt = false;                        ///< a row holds in doubt (HoldsInDoubt)
+  bool fails_demand = false;                    ///< a row must hold and does not
+
+  /// 1 where all hold.
+  double Share() const;
+};
+
+/// A group with a cell for each method.
+struct FoldedGroup {
+  std::string label;  ///< the short one of the rules where there is one
+  std::size_t rows = 0;
+  std::vector<FoldedCell> cells;
+
+  double Share() const;  ///< of all its rows and methods
+};
+
+/// The groups of a map, those of which the least holds first.
+std::vector<FoldedGroup> Folded(const FailureMap& map);
 
 /// A drawing: gnuplot's commands and the page they are for.
 struct MapDrawing {
@@ -16,16 +43,17 @@ struct MapDrawing {
   std::string script;
 };
 
-/// Rows of groups from top to bottom, methods from left to right, a legend below. Colours are told
-/// apart by colour-blind readers and in grey; every cell says in words what its colour says. Cells
-/// that must hold and do not have a frame. `point` is the size of a pixel of text in the unit of
-/// the terminal's fonts, 1 for SVG.
-MapDrawing DrawMap(const FailureMap& map, double point);
+/// Groups from top to bottom, methods from left to right, a legend below. The darker a cell, the
+/// fewer of its group's rows hold; its glyph says how the worst of them ended. There are no hues.
+/// Cells in which a row must hold and does not have a frame. Rows, numbers and reasons stand in
+/// failure-map.md and .csv.
+MapDrawing DrawMap(const FailureMap& map, FigureSize size = FigureSize::kTwoColumn);
 
 /// Draws into `path`, as PDF when its extension is ".pdf", else as SVG; returns what
 /// DrawWithGnuplot() does.
 [[nodiscard]] std::optional<std::string> WriteMapFigure(const std::filesystem::path& path,
                                                         const FailureMap& map,
+                                                        FigureSize size = FigureSize::kTwoColumn,
                                                         const std::string& gnuplot = "gnuplot");
 
 }  // namespace loopbench::harness

@@ -3,118 +3,89 @@
 #include <fmt/format.h>
 
 #include <algorithm>
-#include <array>
 #include <cmath>
-#include <functional>
+#include <limits>
 #include <map>
 #include <string_view>
 #include <tuple>
 
 #include "harness/analysis/doubts.h"
 #include "harness/config/experiment.h"
-#include "harness/config/formulations.h"
+#include "harness/figures/axis.h"
+#include "harness/figures/channels.h"
 #include "harness/record/select.h"
 #include "harness/tables/columns.h"
 
 namespace loopbench::harness {
 namespace {
 
-// Formulation by hue, coordinates by its strength.
-std::string ColorOf(const Record& record) {
-  const bool absolute = record.Text("coordinates") == "absolute";
-  const FormulationRow* row = FindFormulation(record.Text("formulation"));
-  if (row == nullptr) return "#000000";  // of another program
-  return absolute ? row->look.absolute : row->look.joint;
-}
-
-double CurveWidth(const Record& record) {
-  const FormulationRow* row = FindFormulation(record.Text("formulation"));
-  return row == nullptr ? 2.0 : row->look.width;
-}
-
-Shape ShapeOf(const Record& record) {
-  constexpr std::array kShapes = {Shape::kCircle, Shape::kTriangle, Shape::kSquare, Shape::kDiamond,
-                                  Shape::kTriangleDown};
-  const auto level = Parse<Enforcement>(record.Text("enforcement"));
-  return kShapes[static_cast<std::size_t>(level.value_or(Enforcement())) % kShapes.size()];
-}
-
-bool Varies(std::span<const Record> records, std::string_view key) {
-  return std::ranges::any_of(
-      records, [&](const Record& record) { return record.Text(key) != records[0].Text(key); });
-}
-
 bool Failed(const Record& record) {
   const std::string outcome = record.Text("outcome");
   return !outcome.empty() && outcome != "finished";
 }
 
-// "odca, joint: t^1.97 +- 0.05", with a "?" if that is not resolved; keys that are the same in all
-// curves go into the title.
-std::string LabelOf(const Record& record, std::span<const Record> all, bool with_fit) {
-  std::string label = record.Text("formulation");
-  for (const char* key : {"enforcement", "coordinates", "solver", "integrator", "experiment"}) {
-    if (Varies(all, key)) label += ", " + record.Text(key);
-  }
-  for (const TableColumn& parameter : WithParameters({}, all)) {
-    if (Varies(all, parameter.key)) {
-      label += fmt::format(", {} {}", parameter.key, record.Text(parameter.key));
-    }
-  }
+// "1.97 ± 0.05", with a "?" if that is not resolved.
+std::string FittedPower(const Record& record) {
   const double exponent = record.Number("growth_exponent");
-  if (with_fit && std::isfinite(exponent)) {
-    label += fmt::format(": t^{:.2f}", exponent);
-    const double spread = record.Number("growth_spread");
-    if (std::isfinite(spread)) label += fmt::format(" +- {:.1g}", spread);
-    if (record.Text("growth_resolved") != "true") label += "?";
-  }
-  if (Failed(record)) {
-    label += fmt::format(" ({} at {:.3g} s)", record.Text("outcome"), record.Number("t_reached"));
-  }
-  return label;
+  if (!std::isfinite(exponent)) return "";
+  std::string text = fmt::format("{:.2f}", exponent);
+  const double spread = record.Number("growth_spread");
+  if (std::isfinite(spread)) text += fmt::format(" ± {:.1g}", spread);
+  return record.Text("growth_resolved") == "true" ? text : text + "?";
 }
 
-// What decides a run's steps: "rtol 1e-08", or "step 0.001 s".
+// What decides a run's steps: "rtol 10⁻⁸", or "step 0.001 s".
 std::string StepsOf(const Record& record) {
-  const std::string step = record.Text("step");
-  return step.empty() ? "rtol " + record.Text("rtol") : fmt::format("step {} s", step);
+  if (record.Text("step").empty()) return "rtol " + NumberText(record.Number("rtol"));
+  return fmt::format("step {} s", NumberText(record.Number("step")));
 }
 
 std::string TitleOf(std::span<const Record> records, std::string_view what) {
   if (records.empty()) return std::string(what);
   std::string title = fmt::format("{}: {}", records[0].Text("mechanism"), what);
-  for (const char* key : {"coordinates", "solver"}) {
+  for (const char* key : {"enforcement", "coordinates", "solver"}) {
     if (!Varies(records, key)) title += ", " + records[0].Text(key);
   }
   if (!Varies(records, "rtol") && !Varies(records, "step")) title += ", " + StepsOf(records[0]);
   return title;
 }
 
-std::vector<Curve> DriftCurves(std::span<const Record> records, bool with_fit) {
-  std::vector<Record> ordered(records.begin(), records.end());
-  std::ranges::stable_sort(ordered, std::greater(), CurveWidth);
-  std::vector<Curve> curves;
-  for (const Record& record : ordered) {
-    Curve curve;
-    curve.label = LabelOf(record, records, with_fit);
-    curve.x = record.Numbers("series.drift_t");
-    curve.y = record.Numbers("series.drift");
-    curve.style = StyleOf(record);
+Figure FigureOfDrift(std::span<const Record> records, std::string_view what, bool with_fit) {
+  Figure figure{.title = TitleOf(records, what),
+                .x_label = "time [s]",
+                .y_label = "position drift, running maximum [m]",
+                .log_x = with_fit,
+                .log_y = true,
+                .curves = {}};
+  if (!records.empty()) figure.legend = ChannelLegend(records);
+  for (const Record& record : records) {
+    Curve curve{.label = MethodLabel(record, records),
+                .x = record.Numbers("series.drift_t"),
+                .y = record.Numbers("series.drift"),
+                .style = StyleOf(record)};
     curve.ends_early = Failed(record);
-    const double exponent = record.Number("growth_exponent");
-    if (with_fit && std::isfinite(exponent)) curve.slope = exponent;
-    curves.push_back(std::move(curve));
+    if (with_fit) curve.remark = FittedPower(record);
+    if (curve.ends_early) {
+      curve.remark += fmt::format("{}{} at {} s", curve.remark.empty() ? "" : ", ",
+                                  record.Text("outcome"), NumberText(record.Number("t_reached")));
+    }
+    if (with_fit && record.Text("growth_resolved") == "true") {
+      curve.guide = {record.Number("growth_exponent"), record.Number("growth_from"),
+                     record.Number("growth_to")};
+    }
+    figure.curves.push_back(std::move(curve));
   }
-  return curves;
+  return figure;
 }
 
-// Joint coordinates of one kind: what their series are called and drawn as.
+// Joint coordinates of one kind: what their series are called and drawn as. Angles and lengths
+// have no axis in common.
 struct CoordinateKind {
-  const char *name, *prefix, *opening_prefix, *axis;
+  const char *prefix, *opening_prefix, *axis;
 };
 constexpr CoordinateKind kCoordinateKinds[] = {
-    {"angles", "series.angle.", "series.opening.angle.", "angle [rad]"},
-    {"displacements", "series.displacement.", "series.opening.displacement.", "displacement [m]"}};
+    {"series.angle.", "series.opening.angle.", "angle [rad]"},
+    {"series.displacement.", "series.opening.displacement.", "displacement [m]"}};
 
 bool HasSeries(const Record& record, std::string_view prefix) {
   return std::ranges::any_of(record.items(),
@@ -128,15 +99,22 @@ bool PassesSingularPosition(const Record& record) {
   return record.Number("singularity_distance_min") < kNear;  // not when it is NaN
 }
 
+// Larger for smaller values, least where there is none.
+double Smallness(const Record& record, const char* key) {
+  const double value = record.Number(key);
+  return std::isnan(value) ? -std::numeric_limits<double>::infinity() : -value;
+}
+
 // Larger is the better choice of the run whose motion is shown: one that ended well and is not in
-// doubt; whose loops are closed to the last; then the finest tolerance.
+// doubt; whose loops are closed to the last; then the finest tolerance, the smallest error of
+// energy and the smallest drift.
 auto MotionRank(const Record& record) {
   const double energy = record.Number("energy_error_relative");
   constexpr double kTrusted = 1e-2;
   return std::tuple(!Failed(record), !HasDoubt(record) && !(energy > kTrusted),
-                    GrowthAt(record) == DriftGrowth::kNone, -record.Number("rtol"),
-                    record.Text("formulation") == "odca", record.Text("coordinates") == "joint",
-                    record.Text("solver") == "rank-revealing");
+                    GrowthAt(record) == DriftGrowth::kNone, Smallness(record, "rtol"),
+                    Smallness(record, "energy_error_relative"),
+                    Smallness(record, "drift_position_max"));
 }
 
 // All that names the run, for a figure that shows one of several.
@@ -153,76 +131,73 @@ std::string RunOf(const Record& record) {
   return text;
 }
 
-Figure CoordinateFigure(const Record& record, const CoordinateKind& kind) {
-  // where the points of the whole run are too few for its motion, the record has those of its start
-  const bool opening = record.Find("series.opening_t") != nullptr;
-  const std::string_view prefix = opening ? kind.opening_prefix : kind.prefix;
-  const std::vector<double> t = record.Numbers(opening ? "series.opening_t" : "series.t");
-  Figure figure;
-  figure.title = fmt::format("{}: {}{}", record.Text("mechanism"), kind.name, RunOf(record));
-  if (opening && !t.empty()) {
-    figure.title +=
-        fmt::format(" (the first {:.3g} of {:.4g} s)", t.back(), record.Number("t_reached"));
+// Runs that agree in all that no channel tells: integrator, experiment, parameters, as far as these
+// differ among `records`. The first are the values, "mass 5".
+std::map<std::vector<std::string>, std::vector<Record>> ByOtherKeys(
+    std::span<const Record> records) {
+  std::vector<std::string> keys = {"integrator", "experiment"};
+  for (const TableColumn& parameter : WithParameters({}, records)) keys.push_back(parameter.key);
+  std::erase_if(keys,
+                [&](const std::string& key) { return key == "step" || !Varies(records, key); });
+  std::map<std::vector<std::string>, std::vector<Record>> groups;
+  for (const Record& record : records) {
+    std::vector<std::string> texts;
+    for (const std::string& key : keys)
+      texts.push_back(fmt::format("{} {}", key, record.Text(key)));
+    groups[texts].push_back(record);
   }
-  figure.x_label = "time [s]";
-  figure.y_label = kind.axis;
+  return groups;
+}
+
+Figure PanelOf(const Record& record, const CoordinateKind& kind, const std::vector<double>& t,
+               bool opening) {
+  const std::string_view prefix = opening ? kind.opening_prefix : kind.prefix;
+  Figure panel{.title = "", .x_label = "time [s]", .y_label = kind.axis, .curves = {}};
   for (const auto& [key, value] : record.items()) {
     if (!key.starts_with(prefix)) continue;
-    const std::size_t index = figure.curves.size();
-    Curve curve;
-    curve.label = key.substr(prefix.size());
-    curve.x = t;
-    curve.y = record.Numbers(key);
-    curve.style = DistinctStyle(index);
+    Curve curve{.label = key.substr(prefix.size()),
+                .x = t,
+                .y = record.Numbers(key),
+                .style = DistinctStyle(panel.curves.size())};
+    curve.style.shape = Shape::kNone;
     curve.style.doubtful = HasDoubt(record);
     curve.ends_early = Failed(record) && !opening;
-    figure.curves.push_back(std::move(curve));
+    panel.curves.push_back(std::move(curve));
   }
-  // later ones lie on top and are thinner: those that coincide are all seen
-  const double count = static_cast<double>(figure.curves.size());
-  for (std::size_t i = 0; i < figure.curves.size(); ++i) {
-    figure.curves[i].style.width = 4.0 - 2.5 * static_cast<double>(i) / count;
-  }
-  return figure;
+  panel.names_at_ends = true;
+  return panel;
 }
 
 }  // namespace
 
-CurveStyle StyleOf(const Record& record) {
-  return {.color = ColorOf(record),
-          .width = CurveWidth(record),
-          .shape = ShapeOf(record),
-          .filled = record.Text("solver") != "as-published",
-          .doubtful = HasDoubt(record)};
-}
-
-Figure AnglesFigure(const Record& record) { return CoordinateFigure(record, kCoordinateKinds[0]); }
-
-Figure DisplacementsFigure(const Record& record) {
-  return CoordinateFigure(record, kCoordinateKinds[1]);
+Figure MotionFigure(const Record& record) {
+  // where the points of the whole run are too few for its motion, the record has those of its start
+  const bool opening = record.Find("series.opening_t") != nullptr;
+  const std::vector<double> t = record.Numbers(opening ? "series.opening_t" : "series.t");
+  Figure figure;
+  for (const CoordinateKind& kind : kCoordinateKinds) {
+    Figure panel = PanelOf(record, kind, t, opening);
+    if (panel.curves.empty()) continue;
+    if (figure.curves.empty()) {
+      figure = std::move(panel);
+    } else {
+      figure.below.push_back(std::move(panel));
+    }
+  }
+  figure.title = fmt::format("{}{}", record.Text("mechanism"), RunOf(record));
+  if (opening && !t.empty()) {
+    figure.title += fmt::format(" (the first {} of {} s)", NumberText(t.back()),
+                                NumberText(record.Number("t_reached")));
+  }
+  return figure;
 }
 
 Figure DriftFigure(std::span<const Record> records) {
-  const bool has_unresolved = std::ranges::any_of(records, [](const Record& record) {
-    return std::isfinite(record.Number("growth_exponent")) &&
-           record.Text("growth_resolved") != "true";
-  });
-  return {.title = TitleOf(records, "drift"),
-          .x_label = "time [s]",
-          .y_label = "position drift, running maximum [m]",
-          .log_x = true,
-          .log_y = true,
-          .curves = DriftCurves(records, true),
-          .legend_title = has_unresolved ? "?: exponent not resolved" : ""};
+  return FigureOfDrift(records, "drift", true);
 }
 
 Figure SingularFigure(std::span<const Record> records) {
-  return {.title = TitleOf(records, "drift through singular positions"),
-          .x_label = "time [s]",
-          .y_label = "position drift, running maximum [m]",
-          .log_x = false,
-          .log_y = true,
-          .curves = DriftCurves(records, false)};
+  return FigureOfDrift(records, "drift through singular positions", false);
 }
 
 std::vector<NamedFigure> AllFigures(std::span<const Record> records) {
@@ -234,9 +209,10 @@ std::vector<NamedFigure> AllFigures(std::span<const Record> records) {
   for (const Record& record : sorted) {
     const std::string scene =
         fmt::format("{}-{}s", record.Text("mechanism"), record.Text("horizon"));
-    for (const CoordinateKind& kind : kCoordinateKinds) {
-      if (!HasSeries(record, kind.prefix)) continue;
-      const auto [it, is_new] = motions.try_emplace(fmt::format("{}-{}", kind.name, scene), record);
+    const bool moves = std::ranges::any_of(
+        kCoordinateKinds, [&](const auto& kind) { return HasSeries(record, kind.prefix); });
+    if (moves) {
+      const auto [it, is_new] = motions.try_emplace("motion-" + scene, record);
       if (!is_new && MotionRank(record) > MotionRank(it->second)) it->second = record;
     }
     if (record.Find("series.drift") != nullptr) {
@@ -247,14 +223,16 @@ std::vector<NamedFigure> AllFigures(std::span<const Record> records) {
     }
   }
   std::vector<NamedFigure> figures;
-  for (const auto& [name, record] : motions) {
-    const bool angles = name.starts_with(kCoordinateKinds[0].name);
-    figures.push_back({name, angles ? AnglesFigure(record) : DisplacementsFigure(record)});
-  }
+  for (const auto& [name, record] : motions) figures.push_back({name, MotionFigure(record)});
   for (const auto& [name, group] : drift) {
     const bool singular = std::ranges::any_of(group, PassesSingularPosition);
-    figures.push_back({(singular ? "singular-" : "drift-") + name,
-                       singular ? SingularFigure(group) : DriftFigure(group)});
+    for (auto& [others, own] : ByOtherKeys(group)) {
+      Figure figure = singular ? SingularFigure(own) : DriftFigure(own);
+      for (const std::string& text : others) figure.title += ", " + text;
+      figures.push_back({fmt::format("{}-{}{}{}", singular ? "singular" : "drift", name,
+                                     others.empty() ? "" : "-", fmt::join(others, "-")),
+                         std::move(figure)});
+    }
   }
   return figures;
 }

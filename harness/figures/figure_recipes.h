@@ -1,5 +1,5 @@
-// Which figures are made of records: joint coordinates, drift, and drift through singular
-// positions.
+// Which figures are made of records: motion, drift, and drift through singular positions. What
+// they contain decides, never a name.
 #pragma once
 
 #include <span>
@@ -17,36 +17,27 @@ struct NamedFigure {
   Figure figure;
 };
 
-/// How figures draw a run: hue by formulation, its strength by coordinates, marks by level, filled
-/// for a rank-revealing solver, dashed where it is in doubt.
-CurveStyle StyleOf(const Record& record);
-
-/// Angles [rad] of the joints of one run against time: "series.angle.JOINT" against "series.t", or
-/// those of the run's opening where it has them (harness/observers/observer.h); the title says so,
+/// Joint coordinates of one run against time: angles [rad], "series.angle.JOINT" against
+/// "series.t", and displacements [m], "series.displacement.JOINT", in a panel of their own; or
+/// those of the run's opening where it has them (harness/observers/observer.h). The title says so,
 /// and names the run.
-Figure AnglesFigure(const Record& record);
-
-/// The same of displacements [m], "series.displacement.JOINT".
-Figure DisplacementsFigure(const Record& record);
+Figure MotionFigure(const Record& record);
 
 /// Drift [m] of several runs of one mechanism against time on logarithmic axes: "series.drift", the
-/// running maximum, against "series.drift_t". The legend gives the fitted exponent with its spread
-/// (and a '?' when it is not resolved);
-/// a grey line shows its slope. Hue tells the formulation, its strength the coordinates, marks the
-/// level (circle acceleration, triangle velocity, square position, diamond baumgarte), filled ones
-/// a rank-revealing solver; dashes a doubtful run. Formulations that agree to round-off hide each
-/// other; so multipliers are drawn first and wide, and the others lie on them (FormulationLook). A
-/// run that failed ends in a cross and is named in the legend.
+/// running maximum, against "series.drift_t", each run as channels.h has it. At its end stands the
+/// fitted power with its spread, and a '?' when it is not resolved; a thin line through the data
+/// shows a resolved one over the window that it was fitted in. A run that failed ends in a cross,
+/// with its outcome.
 Figure DriftFigure(std::span<const Record> records);
 
 /// The same on a linear time axis, without fits: what a passage through a singular position does.
 Figure SingularFigure(std::span<const Record> records);
 
-/// All figures of the records that have series: for each mechanism and horizon one of angles and
-/// one of displacements, as far as there are any, of one run (that finished and is not in doubt, at
-/// level position, at the finest tolerance, as far as there is one), and for each mechanism,
-/// horizon and tolerance one of drift; through singular positions where a run of them came near
-/// one.
+/// All figures of the records that have series: for each mechanism and horizon the motion of one
+/// run (that finished and is not in doubt, at level position, at the finest tolerance, as far as
+/// there is one), and for each mechanism, horizon and tolerance one of drift; through singular
+/// positions where a run of them came near one. Runs that differ in integrator, experiment or a
+/// parameter have figures of their own, with its value in their names.
 std::vector<NamedFigure> AllFigures(std::span<const Record> records);
 
 }  // namespace loopbench::harness

@@ -10,6 +10,8 @@
 #include <string_view>
 
 #include "harness/analysis/doubts.h"
+#include "harness/figures/axis.h"
+#include "harness/figures/channels.h"
 #include "harness/record/select.h"
 #include "harness/tables/columns.h"
 #include "harness/tables/table.h"
@@ -17,6 +19,13 @@
 
 namespace loopbench::harness {
 namespace {
+
+/// Numbers as figures have them.
+std::string ValueText(const Record& record, const std::string& key) {
+  const Value* value = record.Find(key);
+  const auto* number = value == nullptr ? nullptr : std::get_if<double>(value);
+  return number == nullptr ? record.Text(key) : NumberText(*number);
+}
 
 // What names a case, in the order of titles.
 constexpr std::array<const char*, 7> kCaseKeys = {
@@ -79,11 +88,6 @@ std::string AxisLabel(const std::string& key, std::span<const Record> rows) {
   return unit.empty() ? key : fmt::format("{} [{}]", key, unit);
 }
 
-bool Varies(std::span<const Record> rows, const std::string& key) {
-  return std::ranges::any_of(rows,
-                             [&](const Record& row) { return row.Text(key) != rows[0].Text(key); });
-}
-
 std::string TitleOf(std::span<const Record> rows, const FreeFigure& wanted) {
   if (!wanted.title.empty()) return wanted.title;
   std::string common;
@@ -91,7 +95,7 @@ std::string TitleOf(std::span<const Record> rows, const FreeFigure& wanted) {
     if (key == wanted.x || Varies(rows, key) || rows[0].Text(key).empty()) continue;
     const bool is_text = IsText(rows[0], key);
     common += fmt::format("{}{}{}", common.empty() ? ": " : ", ", is_text ? "" : key + " ",
-                          rows[0].Text(key));
+                          ValueText(rows[0], key));
     if (key == "horizon") common += " s";
   }
   return fmt::format("{} over {}{}", wanted.y, wanted.x, common);
@@ -119,16 +123,30 @@ class Positions {
   std::vector<std::string> categories_;
 };
 
-Curve NewCurve(const std::string& label, std::size_t index) {
-  Curve curve;
-  curve.label = label;
-  curve.style = DistinctStyle(index);
-  return curve;
+/// Whether all keys have a channel (channels.h), which then tells curves apart as in all figures.
+bool HaveChannels(const std::vector<std::string>& keys) {
+  return !keys.empty() && std::ranges::all_of(keys, [](const std::string& key) {
+    return std::ranges::find(kChannelKeys, key) != std::end(kChannelKeys);
+  });
+}
+
+Record Only(const std::vector<std::string>& keys, const Record& row) {
+  Record shown;
+  for (const std::string& key : keys) shown.Set(key, row.Text(key));
+  return shown;
+}
+
+/// The look of a run by these keys alone, those that have a channel; or that of the index-th curve.
+CurveStyle StyleBy(const std::vector<std::string>& keys, const Record& row, std::size_t index) {
+  if (!HaveChannels(keys)) return DistinctStyle(index);
+  CurveStyle style = StyleOf(Only(keys, row));
+  if (std::ranges::find(keys, "formulation") == keys.end()) style.color = "#000000";
+  return style;
 }
 
 Curve SeriesCurve(const Record& row, const FreeFigure& wanted, const std::string& label,
                   std::size_t index) {
-  Curve curve = NewCurve(label, index);
+  Curve curve{.label = label, .style = StyleBy(Split(wanted.group), row, index)};
   curve.x = row.Numbers(wanted.x);
   curve.y = row.Numbers(wanted.y);
   curve.ends_early = HasFailed(row);
@@ -139,32 +157,27 @@ Curve SeriesCurve(const Record& row, const FreeFigure& wanted, const std::string
 // `rows` in order of x.
 Curve ValueCurve(const std::vector<Record>& rows, const FreeFigure& wanted, const Positions& x,
                  const std::string& label, std::size_t index) {
-  Curve curve = NewCurve(label, index);
-  curve.points = true;
+  Curve curve{
+      .label = label, .style = StyleBy(Split(wanted.group), rows.front(), index), .points = true};
   for (const Record& row : rows) {
-    curve.style.doubtful = curve.style.doubtful || HasDoubt(row);
     if (HasFailed(row)) {
       curve.crosses.push_back({x.Of(row), row.Number(wanted.y)});
     } else {
       curve.x.push_back(x.Of(row));
       curve.y.push_back(row.Number(wanted.y));
+      if (HasDoubt(row)) curve.hollow.emplace_back(curve.x.back(), curve.y.back());
     }
   }
   return curve;
 }
 
-// Later curves are thinner: curves that coincide stay visible. Lines join points only where no
-// curve has two of them at one x.
-void StyleCurves(Figure& figure) {
+// Lines join points only where no curve has two of them at one x.
+void JoinPoints(Figure& figure) {
   const bool joins =
       figure.x_ticks.empty() && std::ranges::none_of(figure.curves, [](const Curve& curve) {
         return curve.points && std::ranges::adjacent_find(curve.x) != curve.x.end();
       });
-  const double count = static_cast<double>(figure.curves.size());
-  for (std::size_t i = 0; i < figure.curves.size(); ++i) {
-    figure.curves[i].style.width = 5.0 - 3.0 * (static_cast<double>(i) + 1.0) / count;
-    figure.curves[i].line = joins || !figure.curves[i].points;
-  }
+  for (Curve& curve : figure.curves) curve.line = joins || !curve.points;
 }
 
 struct Range {
@@ -222,7 +235,7 @@ FreeFigureResult MakeFreeFigure(std::span<const Record> records, const FreeFigur
   std::vector<std::pair<std::string, std::vector<Record>>> groups;
   for (const Record& row : rows) {
     std::vector<std::string> values;
-    for (const std::string& key : group_keys) values.push_back(row.Text(key));
+    for (const std::string& key : group_keys) values.push_back(ValueText(row, key));
     const std::string label = fmt::format("{}", fmt::join(values, ", "));
     if (groups.empty() || groups.back().first != label) groups.push_back({label, {}});
     groups.back().second.push_back(row);
@@ -233,6 +246,13 @@ FreeFigureResult MakeFreeFigure(std::span<const Record> records, const FreeFigur
   figure.title = TitleOf(rows, wanted);
   figure.x_label = AxisLabel(wanted.x, rows);
   figure.y_label = AxisLabel(wanted.y, rows);
+  if (HaveChannels(group_keys) && groups.size() > kLegendRows) {
+    std::vector<Record> shown;
+    for (const auto& [label, members] : groups) {
+      shown.push_back(Only(group_keys, members.front()));
+    }
+    figure.legend = ChannelLegend(shown);
+  }
   if (!group_keys.empty()) {
     figure.legend_title = fmt::format("curves by {}", fmt::join(group_keys, ", "));
   }
@@ -252,7 +272,7 @@ FreeFigureResult MakeFreeFigure(std::span<const Record> records, const FreeFigur
       if (key != wanted.x && key != wanted.y && Varies(members, key)) mixed.insert(key);
     }
   }
-  StyleCurves(figure);
+  JoinPoints(figure);
   ChooseScales(figure, wanted, is_series);
   // a joined curve may well run through tolerances; a cloud of points calls for a choice
   const bool is_cloud = std::ranges::any_of(
@@ -273,7 +293,7 @@ FreeFigureResult MakeFreeFigure(std::span<const Record> records, const FreeFigur
   if (doubted > 0) {
     result.remarks.push_back(
         fmt::format("{} of {} runs finished with doubts (column doubts of "
-                    "tables); curves with such runs are dashed",
+                    "tables); their marks are hollow",
                     doubted, rows.size()));
   }
   return result;

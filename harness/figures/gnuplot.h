@@ -4,15 +4,35 @@
 #include <filesystem>
 #include <optional>
 #include <string>
+#include <string_view>
+#include <vector>
 
 namespace loopbench::harness {
 
-/// The size of a drawing in pixels (SVG) or hundredths of an inch (PDF) and of its font in pixels
-/// or points.
+/// Letters of all drawings [pt], the distance of their lines and their mean width.
+inline constexpr double kLetterSize = 8.0, kLineHeight = 10.0, kLetterWidth = 4.2;
+
+/// The size of a drawing [pt].
 struct GnuplotPage {
-  int width = 960, height = 500;
-  int font = 13;
+  double width = 504.0, height = 260.0;
 };
+
+/// Points of 1/72 inch.
+constexpr double PointsOf(double millimetres) { return millimetres * 72.0 / 25.4; }
+
+/// Characters of UTF-8.
+std::size_t Letters(std::string_view text);
+
+/// About how wide it is [pt].
+double WidthOf(std::string_view text);
+
+/// Lines of at most `most` letters, broken at spaces; a longer word stays whole.
+std::vector<std::string> Wrapped(const std::string& text, std::size_t most);
+
+/// A text at a place of the page [pt] from its lower left corner; `options` are gnuplot's of
+/// labels.
+std::string TextAt(const GnuplotPage& page, std::string_view text, double x, double y,
+                   std::string_view options);
 
 /// Runs `script`, which sets neither terminal nor output and whose texts are QuoteGnuplot()'s, and
 /// writes `path`, as PDF when its

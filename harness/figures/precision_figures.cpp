@@ -12,24 +12,37 @@
 namespace loopbench::harness {
 namespace {
 
-Curve CurveOf(std::span<const Record> rungs, Scalar scalar, const char* key, bool drift) {
-  constexpr const char* kColors[] = {"#E69F00", "#0072B2", "#009E73", "#CC79A7"};
-  Curve curve;
-  curve.label = fmt::format("{}, {}", drift ? "drift" : "error", ToString(scalar));
-  curve.style = {.color = kColors[static_cast<std::size_t>(scalar)], .width = drift ? 1.0 : 2.5};
-  curve.points = !drift;
+Curve CurveOf(std::span<const Record> rungs, Scalar scalar, const char* key) {
+  Curve curve{.label = std::string(ToString(scalar)),
+              .style = DistinctStyle(static_cast<std::size_t>(scalar)),
+              .points = true};
+  // scalars agree where truncation rules: each is seen on those before it
+  curve.style.width = 2.6 - 0.7 * static_cast<double>(scalar);
   for (const Record& rung : rungs) {
     if (rung.Text("scalar") != ToString(scalar) || IsReferenceRung(rung)) continue;
     if (HasFailed(rung)) {
-      if (!drift) {
-        curve.crosses.emplace_back(rung.Number("rtol"), std::numeric_limits<double>::quiet_NaN());
-      }
+      curve.crosses.emplace_back(rung.Number("rtol"), std::numeric_limits<double>::quiet_NaN());
       continue;
     }
     curve.x.push_back(rung.Number("rtol"));
     curve.y.push_back(rung.Number(key));
   }
   return curve;
+}
+
+/// A curve for each scalar that has runs.
+Figure PanelOf(std::span<const Record> rungs, const char* key, const char* axis) {
+  Figure panel{.title = "",
+               .x_label = "tolerance",
+               .y_label = axis,
+               .log_x = true,
+               .log_y = true,
+               .curves = {}};
+  for (std::size_t i = 0; i < kNames<Scalar>.size(); ++i) {
+    Curve curve = CurveOf(rungs, static_cast<Scalar>(i), key);
+    if (!curve.x.empty() || !curve.crosses.empty()) panel.curves.push_back(std::move(curve));
+  }
+  return panel;
 }
 
 NamedFigure FigureOf(std::span<const Record> rungs) {
@@ -42,6 +55,8 @@ NamedFigure FigureOf(std::span<const Record> rungs) {
     if (in_name) named.name += "-" + first.Text(key);
   }
   Figure& figure = named.figure;
+  figure = PanelOf(rungs, "error_final", "error at the end [m]");
+  figure.below = {PanelOf(rungs, "drift_position_max", "largest drift [m]")};
   figure.title =
       fmt::format("{}: {}, {}, {}, {}, after {} s", first.Text("mechanism"),
                   first.Text("formulation"), first.Text("enforcement"), first.Text("coordinates"),
@@ -50,15 +65,10 @@ NamedFigure FigureOf(std::span<const Record> rungs) {
     named.name += fmt::format("-{}-{}", parameter.key, first.Text(parameter.key));
     figure.title += fmt::format(", {} {}", parameter.key, first.Text(parameter.key));
   }
-  figure.x_label = "tolerance";
-  figure.y_label = "error at the end, largest drift [m]";
-  figure.log_x = figure.log_y = true;
-  for (std::size_t i = 0; i < kNames<Scalar>.size(); ++i) {
-    const auto scalar = static_cast<Scalar>(i);
-    for (const bool drift : {false, true}) {
-      Curve curve = CurveOf(rungs, scalar, drift ? "drift_position_max" : "error_final", drift);
-      if (!curve.x.empty() || !curve.crosses.empty()) figure.curves.push_back(std::move(curve));
-    }
+  for (const Curve& curve : figure.curves) {
+    LegendItem item{curve.label, curve.style};
+    if (figure.legend.empty()) figure.legend.emplace_back();
+    figure.legend.front().push_back(std::move(item));
   }
   return named;
 }

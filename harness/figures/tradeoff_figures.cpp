@@ -3,13 +3,15 @@
 #include <fmt/format.h>
 
 #include <algorithm>
-#include <array>
 #include <cmath>
 #include <limits>
 #include <map>
 #include <set>
+#include <span>
 #include <utility>
 
+#include "harness/figures/axis.h"
+#include "harness/figures/channels.h"
 #include "harness/tables/columns.h"
 #include "harness/tables/table.h"
 
@@ -18,31 +20,27 @@ namespace {
 
 constexpr double kNowhere = std::numeric_limits<double>::quiet_NaN();
 
-/// Rows of one formulation and level, in order of cost.
-struct MethodRows {
-  std::string name;
-  std::vector<const TradeoffRow*> rows;
-  std::size_t formulation = 0;  ///< its place among those of the figure
-};
+using Rows = std::vector<const TradeoffRow*>;
 
-std::vector<MethodRows> RowsByMethod(const std::vector<const TradeoffRow*>& rows) {
-  std::map<std::string, std::vector<const TradeoffRow*>> methods;
+/// Rows that agree in these keys, in the order of the figure's.
+std::map<std::string, Rows> RowsBy(std::span<const char* const> keys, const Rows& rows) {
+  std::map<std::string, Rows> groups;
   for (const TradeoffRow* row : rows) {
-    methods[row->record.Text("formulation") + ", " + row->record.Text("enforcement")].push_back(
-        row);
+    std::string name;
+    for (const char* key : keys) name += row->record.Text(key) + '\n';
+    groups[name].push_back(row);
   }
-  std::vector<MethodRows> result;
-  std::set<std::string> formulations;
-  for (auto& [name, own] : methods) {
-    formulations.insert(own.front()->record.Text("formulation"));
-    result.push_back({name, std::move(own), formulations.size() - 1});
-  }
-  return result;
+  return groups;
 }
 
-std::vector<const TradeoffRow*> RowsWith(const TradeoffProblem& problem,
-                                         const std::string& integrator) {
-  std::vector<const TradeoffRow*> rows;
+std::vector<Record> RecordsOf(const Rows& rows) {
+  std::vector<Record> records;
+  for (const TradeoffRow* row : rows) records.push_back(row->record);
+  return records;
+}
+
+Rows RowsWith(const TradeoffProblem& problem, const std::string& integrator) {
+  Rows rows;
   for (const TradeoffRow& row : problem.rows) {
     const bool is_one = integrator.empty() || row.record.Text("integrator") == integrator;
     if (is_one) rows.push_back(&row);
@@ -52,19 +50,6 @@ std::vector<const TradeoffRow*> RowsWith(const TradeoffProblem& problem,
 
 bool IsDoubted(const TradeoffRow& row) {
   return !HasFailed(row.record) && !row.record.Text("doubts").empty();
-}
-
-/// The look of a formulation and level, whichever coordinates and solver.
-CurveStyle StyleOfMethod(const MethodRows& method) {
-  Record record = method.rows.front()->record;
-  record.Set("coordinates", std::string("joint"));
-  record.Set("solver", std::string("rank-revealing"));
-  record.Set("doubts", std::string());
-  CurveStyle style = StyleOf(record);
-  // formulations differ in the width of lines and the size of marks too, for those who see no hues
-  constexpr std::array<double, 5> kWidths = {3.0, 1.8, 1.0, 0.7, 0.5};
-  style.width = kWidths[std::min(method.formulation, kWidths.size() - 1)];
-  return style;
 }
 
 std::string LabelOfAxis(const std::string& key) {
@@ -78,45 +63,57 @@ double SpentBy(const TradeoffRow& row) {
   return row.record.Number("cpu_s");
 }
 
-/// Marks of the sound rows, a line through those that no other of them beats, marks and dashes of
-/// the doubtful ones, crosses of those that failed.
+/// A run's error over `x`; failed runs are crosses there, or where they had come to.
 template <class X>
-void AddMethod(const MethodRows& method, bool only_best, X x, double x_of_crosses, Figure* figure) {
-  Curve sound{.label = method.name, .style = StyleOfMethod(method)};
-  sound.points = sound.own_marks = true;
-  sound.line = !only_best;
-  Curve doubted = sound, best;
-  doubted.label = "";
-  doubted.style.filled = false;
-  doubted.style.doubtful = doubted.line = only_best;
-  best.style = sound.style;
-  best.style.shape = Shape::kNone;
-  double least = std::numeric_limits<double>::infinity();
-  for (const TradeoffRow* row : method.rows) {
-    if (HasFailed(row->record)) {
-      sound.crosses.emplace_back(std::isnan(x_of_crosses) ? SpentBy(*row) : x(*row), kNowhere);
-      continue;
-    }
-    Curve& curve = IsDoubted(*row) ? doubted : sound;
-    curve.x.push_back(x(*row));
-    curve.y.push_back(row->error);
-    if (!row->reason.empty() || !(row->error < least)) continue;
-    least = row->error;
-    best.x.push_back(x(*row));
-    best.y.push_back(row->error);
+void AddPoint(const TradeoffRow& row, X x, Curve* sound, Curve* doubted) {
+  if (HasFailed(row.record)) {
+    const double at = x(row);
+    sound->crosses.emplace_back(std::isfinite(at) ? at : SpentBy(row), kNowhere);
+    return;
   }
-  // several runs at one place are a cloud, through which no line goes
-  std::vector<double> places = sound.x;
-  std::ranges::sort(places);
-  if (std::ranges::adjacent_find(places) != places.end()) sound.line = false;
+  Curve& curve = IsDoubted(row) ? *doubted : *sound;
+  curve.x.push_back(x(row));
+  curve.y.push_back(row.error);
+}
+
+/// All runs of a formulation in one coordinate set as marks, the doubtful ones hollow.
+void AddCloud(const Rows& rows, Figure* figure) {
+  Curve sound{.style = StyleOf(rows.front()->record), .points = true, .line = false};
+  sound.style.doubtful = false;
+  Curve doubted = sound;
+  doubted.style.doubtful = true;
+  for (const TradeoffRow* row : rows) {
+    AddPoint(
+        *row, [](const TradeoffRow& one) { return one.cost; }, &sound, &doubted);
+  }
   if (!doubted.x.empty()) figure->curves.push_back(std::move(doubted));
-  if (only_best && best.x.size() > 1) figure->curves.push_back(std::move(best));
   figure->curves.push_back(std::move(sound));
 }
 
+/// A line through the compared runs of a formulation and level that no other of them beats.
+void AddBest(const Rows& rows, Figure* figure) {
+  const Record& first = rows.front()->record;
+  Curve best{.label = first.Text("formulation") + ", " + first.Text("enforcement"),
+             .style = StyleOf(first)};
+  best.style.shape = Shape::kNone;
+  best.style.width = 1.2;
+  best.style.doubtful = false;
+  double least = std::numeric_limits<double>::infinity();
+  for (const TradeoffRow* row : rows) {
+    if (HasFailed(row->record) || !row->reason.empty() || !(row->error < least)) continue;
+    least = row->error;
+    best.x.push_back(row->cost);
+    best.y.push_back(row->error);
+  }
+  if (best.x.size() > 1) figure->curves.push_back(std::move(best));
+}
+
+/// A row for what a line of its own means.
+LegendRow RowOf(const Curve& line) { return {{line.label, line.style}}; }
+
 /// From one row of the front to the next the cheaper one serves.
 Curve Stairs(const TradeoffProblem& problem) {
-  Curve stairs{.label = "Pareto front", .style = {.width = 1.0}};
+  Curve stairs{.label = "Pareto front", .style = {.width = 0.6}, .merges = false};
   for (const TradeoffRow& row : problem.rows) {
     if (!row.on_front) continue;
     if (!stairs.y.empty()) {
@@ -129,10 +126,6 @@ Curve Stairs(const TradeoffProblem& problem) {
   return stairs;
 }
 
-bool HasDoubtedRow(const std::vector<const TradeoffRow*>& rows) {
-  return std::ranges::any_of(rows, [](const TradeoffRow* row) { return IsDoubted(*row); });
-}
-
 std::vector<std::string> IntegratorsOfRows(const TradeoffProblem& problem) {
   std::set<std::string> names;
   for (const TradeoffRow& row : problem.rows) names.insert(row.record.Text("integrator"));
@@ -140,8 +133,7 @@ std::vector<std::string> IntegratorsOfRows(const TradeoffProblem& problem) {
 }
 
 /// Upright, at the end of what can be trusted: the least and, where runs differ, the largest.
-std::vector<Curve> TrustLines(const std::vector<const TradeoffRow*>& rows,
-                              const std::vector<Curve>& curves) {
+std::vector<Curve> TrustLines(const Rows& rows, const std::vector<Curve>& curves) {
   double low = std::numeric_limits<double>::infinity(), high = 0.0;
   for (const Curve& curve : curves) {
     for (const double value : curve.y) {
@@ -160,7 +152,8 @@ std::vector<Curve> TrustLines(const std::vector<const TradeoffRow*>& rows,
     lines.push_back({.label = lines.empty() ? "trust horizon" : "",
                      .x = {end, end},
                      .y = {low, high},
-                     .style = {.color = "#606060", .width = 1.5}});
+                     .style = {.color = "#606060", .width = 1.0},
+                     .merges = false});
   }
   return lines;
 }
@@ -194,13 +187,15 @@ Figure WorkPrecisionFigure(const Tradeoff& tradeoff, const TradeoffProblem& prob
                 .log_x = true,
                 .log_y = true,
                 .curves = {}};
-  const auto rows = RowsWith(problem, "");
-  const auto cost = [](const TradeoffRow& row) { return row.cost; };
-  for (const MethodRows& method : RowsByMethod(rows)) {
-    AddMethod(method, true, cost, kNowhere, &figure);
-  }
+  const Rows rows = RowsWith(problem, "");
+  const std::vector<Record> records = RecordsOf(rows);
+  figure.legend = ChannelLegend(records);
+  constexpr const char* kHueAndMark[] = {"formulation", "coordinates"};
+  constexpr const char* kHueAndDash[] = {"formulation", "enforcement"};
+  for (const auto& [name, own] : RowsBy(kHueAndMark, rows)) AddCloud(own, &figure);
+  for (const auto& [name, own] : RowsBy(kHueAndDash, rows)) AddBest(own, &figure);
   figure.curves.push_back(Stairs(problem));
-  if (HasDoubtedRow(rows)) figure.legend_title = "open marks";  // "; dashed: doubtful"
+  figure.legend.push_back(RowOf(figure.curves.back()));
   return figure;
 }
 
@@ -213,31 +208,49 @@ Figure ToleranceFigure(const Tradeoff& tradeoff, const TradeoffProblem& problem,
       .log_x = true,
       .log_y = true,
       .curves = {}};
-  std::vector<const TradeoffRow*> rows = RowsWith(problem, integrator);
+  Rows rows = RowsWith(problem, integrator);
   std::erase_if(rows,
                 [](const TradeoffRow* row) { return std::isnan(row->record.Number("rtol")); });
   if (rows.empty()) return figure;
   const auto rtol = [](const TradeoffRow& row) { return row.record.Number("rtol"); };
   std::ranges::stable_sort(rows, std::less(), [&](const TradeoffRow* row) { return rtol(*row); });
-  for (const MethodRows& method : RowsByMethod(rows)) AddMethod(method, false, rtol, 0.0, &figure);
+  const std::vector<Record> records = RecordsOf(rows);
+  figure.legend = ChannelLegend(records);
+  for (const auto& [name, own] : RowsBy(kChannelKeys, rows)) {
+    Curve sound{.label = MethodLabel(own.front()->record, records),
+                .style = StyleOf(own.front()->record),
+                .points = true};
+    sound.style.doubtful = false;
+    Curve doubted = sound;
+    doubted.label = "";
+    doubted.line = false;
+    doubted.style.doubtful = true;
+    for (const TradeoffRow* row : own) AddPoint(*row, rtol, &sound, &doubted);
+    // several runs at one tolerance are a cloud, through which no line goes
+    std::vector<double> places = sound.x;
+    sound.line = std::ranges::adjacent_find(places) == places.end();
+    if (!doubted.x.empty()) figure.curves.push_back(std::move(doubted));
+    figure.curves.push_back(std::move(sound));
+  }
   const bool is_length =
       IsErrorOfPositions(tradeoff.error) || UnitOf(ColumnOf(tradeoff.error, {})) == "m";
   const double length = rows.front()->record.Number("link_length");
   const double scale = is_length && length > 0.0 ? length : 1.0;
   Curve honoured{.label = is_length ? "error = tolerance x link" : "error = tolerance"};
-  honoured.style.width = 1.0;
+  honoured.style.width = 0.6;
+  honoured.merges = false;
   for (const TradeoffRow* row : {rows.front(), rows.back()}) {
     honoured.x.push_back(rtol(*row));
     honoured.y.push_back(scale * rtol(*row));
   }
+  figure.legend.push_back(RowOf(honoured));
   figure.curves.push_back(std::move(honoured));
-  if (HasDoubtedRow(rows)) figure.legend_title = "open marks: doubtful";
   return figure;
 }
 
 Figure ErrorOverTimeFigure(const TradeoffProblem& problem, const std::string& integrator) {
   double finest = std::numeric_limits<double>::infinity();
-  std::vector<const TradeoffRow*> rows;
+  Rows rows;
   for (const TradeoffRow* row : RowsWith(problem, integrator)) {
     const double rtol = row->record.Number("rtol");
     if (row->record.Numbers("series.error").empty() || !(rtol <= finest)) continue;
@@ -246,29 +259,26 @@ Figure ErrorOverTimeFigure(const TradeoffProblem& problem, const std::string& in
     rows.push_back(row);
   }
   Figure figure{.title = fmt::format("{}, {}, rtol {}: error over time", problem.name, integrator,
-                                     rows.empty() ? "" : rows.front()->record.Text("rtol")),
+                                     NumberText(finest)),
                 .x_label = "time [s]",
                 .y_label = "error of positions [m]",
                 .log_x = false,
                 .log_y = true,
                 .curves = {}};
-  std::set<std::string> labels;
-  for (const TradeoffRow* row : rows) {
-    Curve curve;
-    curve.label = fmt::format("{}, {}, {}", row->record.Text("formulation"),
-                              row->record.Text("enforcement"), row->record.Text("coordinates"));
-    // of several solvers the second has the same look but for its marks
-    if (!labels.insert(curve.label).second) curve.label += ", " + row->record.Text("solver");
-    curve.x = row->record.Numbers("series.error_t");
-    curve.y = row->record.Numbers("series.error");
-    curve.style = StyleOf(row->record);
-    curve.ends_early = HasFailed(row->record);
+  const std::vector<Record> records = RecordsOf(rows);
+  if (!records.empty()) figure.legend = ChannelLegend(records);
+  for (const Record& record : records) {
+    Curve curve{.label = MethodLabel(record, records),
+                .x = record.Numbers("series.error_t"),
+                .y = record.Numbers("series.error"),
+                .style = StyleOf(record)};
+    curve.ends_early = HasFailed(record);
     figure.curves.push_back(std::move(curve));
   }
-  // wide ones first: those that agree with them are seen on them
-  std::ranges::stable_sort(figure.curves, std::greater(),
-                           [](const Curve& curve) { return curve.style.width; });
-  for (Curve& line : TrustLines(rows, figure.curves)) figure.curves.push_back(std::move(line));
+  for (Curve& line : TrustLines(rows, figure.curves)) {
+    if (!line.label.empty()) figure.legend.push_back(RowOf(line));
+    figure.curves.push_back(std::move(line));
+  }
   return figure;
 }
 
@@ -278,7 +288,7 @@ std::vector<NamedFigure> TradeoffFigures(const Tradeoff& tradeoff) {
   const auto add = [&](const std::string& kind, const std::string& what, Figure figure) {
     // a failed run alone has no error that an axis could show, nor have stairs or lines a meaning
     const bool anything = std::ranges::any_of(figure.curves, [](const Curve& curve) {
-      return curve.style.color != "#000000" && HasPoint(curve);
+      return (curve.merges || !curve.line) && HasPoint(curve);
     });
     if (!anything) return;
     std::string name = kind + Slug(what);

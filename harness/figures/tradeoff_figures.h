@@ -8,11 +8,11 @@
 
 namespace loopbench::harness {
 
-/// Error over cost on logarithmic axes. Hue tells the formulation, marks the level; a line joins
-/// what no other run of the same formulation and level beats, black stairs are the Pareto front of
-/// all. Runs with doubts have open marks and dashes; those that failed are crosses on the lower
-/// edge, where their cost is known (for times of simulations, of which a failed run has none, their
-/// CPU time).
+/// Error over cost on logarithmic axes. Marks are the runs, in the hue of their formulation and the
+/// shape of their coordinates, hollow for those with doubts; a line, dashed by level, joins what no
+/// other run of the same formulation and level beats, and thin black stairs are the Pareto front of
+/// all. Runs that failed are crosses on the lower edge, where their cost is known (for times of
+/// simulations, of which a failed run has none, their CPU time).
 Figure WorkPrecisionFigure(const Tradeoff& tradeoff, const TradeoffProblem& problem);
 
 /// Error over tolerance of the runs with one integrator, beside the line on which the error is the

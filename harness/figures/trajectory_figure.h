@@ -6,13 +6,14 @@
 #include <span>
 #include <string>
 
+#include "harness/figures/figures.h"
 #include "harness/trajectory/compare.h"
 
 namespace loopbench::harness {
 
-/// The gnuplot commands of both panels. `columns` have one unit.
-std::string TrajectoryScript(const Trajectory& ours, const Trajectory& theirs,
-                             std::span<const SharedColumn> columns, const std::string& title);
+/// Both panels; columns that coincide are one curve. `columns` have one unit.
+Figure TrajectoryFigure(const Trajectory& ours, const Trajectory& theirs,
+                        std::span<const SharedColumn> columns, const std::string& title);
 
 /// Draws them; nothing on success, else the reason (figures.h).
 [[nodiscard]] std::optional<std::string> DrawTrajectories(const std::filesystem::path& path,

@@ -35,6 +35,7 @@ struct MapRow {
 
 struct MapGroup {
   std::string label;
+  std::string short_label;  ///< for pictures, or ""
   std::vector<MapRow> rows;
 };
 

@@ -230,6 +230,8 @@ const Fields<GroupOfMap>& MapGroupFields() {
       "where a row has none.",
       WithShared<GroupOfMap>({{"", By(Json::object(), ReadCommon)},
                               {"label", Text(&MapGroup::label), "Its name.", kAnyText},
+                              {"short", Text(&MapGroup::short_label),
+                               "A shorter one for pictures, default the label."},
                               {"rows", By(ArraySchema(RowFields().Schema(), 1), ReadMapRows),
                                "Extremes.", "an array of rows"}}));
   return fields;

@@ -17,20 +17,20 @@ TEST_F(FiguresOfAStore, OneThatCannotBeDrawnDoesNotStopTheOthers) {
                {"drift-pendulum-0.5s-rtol-1e-06.svg: no curve has a point to draw",
                 "wrote 3 of 4 figures to figures"});
   for (const char* name :
-       {"angles-four-bar-0.5s", "angles-pendulum-0.5s", "drift-four-bar-0.5s-rtol-1e-06"}) {
+       {"motion-four-bar-0.5s", "motion-pendulum-0.5s", "drift-four-bar-0.5s-rtol-1e-06"}) {
     EXPECT_TRUE(fs::exists(folder_ / "figures" / (std::string(name) + ".svg"))) << name;
   }
 }
 
-TEST_F(FiguresOfAStore, AnglesAreThoseOfLevelPositionWhereItIsStored) {
+TEST_F(FiguresOfAStore, MotionIsThatOfLevelPositionWhereItIsStored) {
   const std::string levels = R"("enforcement": ["acceleration", "position"])";
   std::string text = kTinyExperiment;
   const std::string one = R"("enforcement": "acceleration")";
   Write("tiny.json", text.replace(text.find(one), one.size(), levels));
   ExpectEnding(Call("run tiny.json --out out"), 0, {});
   ExpectEnding(Call("plot out --out figures"), 0, {"wrote 2 figures"});
-  const std::string svg = ReadFile(folder_ / "figures/angles-four-bar-0.5s.svg");
-  EXPECT_NE(svg.find("four-bar: angles, odca, position, joint, rank-revealing, rtol 1e-06"),
+  const std::string svg = ReadFile(folder_ / "figures/motion-four-bar-0.5s.svg");
+  EXPECT_NE(svg.find("four-bar, odca, position, joint, rank-revealing, rtol 10⁻⁶"),
             std::string::npos);
 }
 

@@ -1,14 +1,18 @@
 // A failure map as a whole: table, page, gate and picture of planted records.
 #include "harness/judge/failure_map_report.h"
 
+#include <fmt/format.h>
 #include <gtest/gtest.h>
 
+#include <algorithm>
 #include <filesystem>
 #include <string>
 #include <vector>
 
 #include "harness/figures/failure_map_figure.h"
+#include "harness/judge/failure_map_csv.h"
 #include "harness/judge/failure_map_reader.h"
+#include "harness/text/config_error.h"
 #include "harness/text/files.h"
 #include "tests/harness/failure_map_runs.h"
 
@@ -98,25 +102,85 @@ TEST(FailureMapReport, RemarksOnKeysThatNoRecordHas) {
             "no record has the key \"formulatoin\" (did you mean \"formulation\"?)");
 }
 
-TEST(FailureMapFigure, SaysEveryClassInWordsAndIsDrawn) {
+TEST(FailureMapFigure, FoldsRowsOfAnExtremeWorstFirst) {
+  MapRules rules = ParseMapRules(kRules, "map.json");
+  MapGroup better = rules.groups[0];
+  better.label = "a long name";
+  better.short_label = "better";
+  better.rows.pop_back();
+  better.rows[0].decides.clear();  // what ends well holds
+  rules.groups.push_back(better);
+  std::vector<FoldedGroup> groups = Folded(MakeFailureMap(rules, SmallRecords()));
+  ASSERT_EQ(groups.size(), 2u);
+  // one row holds and one is not measured; one is inaccurate and one not applicable
+  EXPECT_EQ(groups[0].label, "singular");
+  EXPECT_EQ(groups[0].cells[0].worst, CellState::kNotMeasured);
+  EXPECT_EQ(groups[0].cells[0].Share(), 0.5);
+  EXPECT_TRUE(groups[0].cells[0].fails_demand);
+  EXPECT_EQ(groups[0].cells[1].worst, CellState::kInaccurate);
+  EXPECT_EQ(groups[0].cells[1].judged, 1u);
+  EXPECT_EQ(groups[0].cells[1].Share(), 0.0);
+  EXPECT_EQ(groups[1].label, "better");
+  EXPECT_EQ(groups[1].Share(), 1.0);
+  std::ranges::reverse(rules.groups);
+  EXPECT_EQ(Folded(MakeFailureMap(rules, SmallRecords()))[0].label, "singular");
+}
+
+TEST(FailureMapFigure, HasAGlyphAndShadeForEachCell) {
   const FailureMap map = SmallMap(SmallRecords());
-  const MapDrawing drawing = DrawMap(map, 1.0);
-  for (const char* word :
-       {"\"holds\"", "\"branch 2.5e-07 rad\"", "\"inaccurate\"", "\"not measured\"",
-        "\"not applicable\"", "\"O-DCA\"", "\"one, \\0421e-8\\042\"", "\"Two methods\""}) {
-    EXPECT_TRUE(Contains(drawing.script, word));
+  const MapDrawing drawing = DrawMap(map);
+  for (const char* text :
+       {"\"O-DCA\"", "\"singular\"", "\"Two methods\"", "\"33 %\"", "\"?\"", "\"not measured\"",
+        "\"wrong without a word\"", "\"frame: must hold and does not\""}) {
+    EXPECT_TRUE(Contains(drawing.script, text));
   }
+  EXPECT_EQ(drawing.script.find("holds, in doubt"), std::string::npos);
   const auto path = std::filesystem::path(testing::TempDir()) / "loopbench-failure-map.svg";
   std::filesystem::remove(path);
   const auto error = WriteMapFigure(path, map);
   ASSERT_FALSE(error.has_value()) << *error;
   const std::string svg = ReadFile(path);
-  EXPECT_TRUE(Contains(svg, "not applicable"));
+  EXPECT_TRUE(Contains(svg, "not measured"));
+  EXPECT_TRUE(Contains(svg, "width=\"178.15mm\""));
   EXPECT_TRUE(Contains(svg, "</svg>"));
   std::filesystem::remove(path);
-  EXPECT_TRUE(WriteMapFigure(path, map, "no-such-gnuplot")->find("install gnuplot") !=
-              std::string::npos);
+  EXPECT_TRUE(WriteMapFigure(path, map, FigureSize::kOneColumn, "no-such-gnuplot")
+                  ->find("install gnuplot") != std::string::npos);
   EXPECT_FALSE(std::filesystem::exists(path));
+}
+
+TEST(FailureMapFigure, IsAtMostAPageTall) {
+  MapRules rules = ParseMapRules(kRules, "map.json");
+  const MapGroup one = rules.groups[0];
+  for (int i = 0; i < 40; ++i) {
+    rules.groups.push_back(one);
+    rules.groups.back().label = fmt::format("group {} with a name that is as long as two lines", i);
+  }
+  EXPECT_LE(DrawMap(MakeFailureMap(rules, {})).page.height, PointsOf(240.0));
+}
+
+TEST(FailureMapFigure, IsTheSameOfItsCsv) {
+  MapRules rules = ParseMapRules(kRules, "map.json");
+  rules.groups[0].label = "=\"a, b\"\n#";  // as much as CSV escapes
+  const FailureMap map = MakeFailureMap(rules, SmallRecords());
+  const std::string csv = "# a note\n" + ToCsv(MapCellTable(map));
+  EXPECT_EQ(DrawMap(MapFromCsv(rules, csv, "map.csv")).script, DrawMap(map).script);
+  const auto refusal = [&](const std::string& text) -> std::string {
+    try {
+      MapFromCsv(rules, text, "map.csv");
+    } catch (const ConfigError& error) {
+      return error.what();
+    }
+    return "accepted";
+  };
+  EXPECT_TRUE(Contains(refusal(""), "map.csv: found no"));
+  EXPECT_TRUE(Contains(refusal("a,b\n1,2\n"), "map.csv:2: found no column \"group\""));
+  EXPECT_TRUE(Contains(refusal(csv + "one,two\n"), "map.csv:7: found 2 fields"));
+  std::string twice = csv, other = csv;
+  twice += csv.substr(csv.rfind('\n', csv.size() - 2) + 1);
+  EXPECT_TRUE(Contains(refusal(twice), "expected each cell of the rules once"));
+  other.replace(other.find(",holds,"), 7, ",hold,");
+  EXPECT_TRUE(Contains(refusal(other), "map.csv:3: found state \"hold\""));
 }
 
 }  // namespace failure_map_report_test

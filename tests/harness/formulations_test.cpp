@@ -67,10 +67,10 @@ TEST(FormulationsTest, ARowThatCannotBeIsRefused) {
   row.sentence.clear();
   refuses(row);
   row = Echo();
-  row.look = {"#123456", "", 2.0};
-  refuses(row);
-  row.look = {"#123456", "red", 2.0};
-  refuses(row);
+  for (const char* color : {"red", "#12345", "#12345g"}) {
+    row.color = color;
+    refuses(row);
+  }
   EXPECT_THROW(RegisterFormulation(Echo(), EIGEN_MAX_STATIC_ALIGN_BYTES / 2),
                std::invalid_argument);
   EXPECT_EQ(FormulationNames(), kBuiltIn);
@@ -97,10 +97,10 @@ TEST(FormulationsTest, ANewNameIsValidWhereverTheOthersAre) {
     EXPECT_EQ(records[1].Text("state_hash"), records[0].Text("state_hash"));
 
     const Figure figure = DriftFigure(records);
-    ASSERT_EQ(figure.curves.size(), 2u);  // the widest first
-    EXPECT_EQ(figure.curves[0].style.color, "#D55E00");
-    EXPECT_EQ(figure.curves[1].style.color, FindFormulation("echo")->look.joint);
-    EXPECT_LT(figure.curves[1].style.width, figure.curves[0].style.width);
+    ASSERT_EQ(figure.curves.size(), 2u);
+    EXPECT_EQ(figure.curves[0].style.color, FindFormulation("lagrange")->color);
+    EXPECT_EQ(figure.curves[1].style.color, FindFormulation("echo")->color);
+    EXPECT_NE(figure.curves[1].style.color, figure.curves[0].style.color);
 
     const Table table = FactorialTable(records, {.rtol = 1e-6, .horizon = 0.2});
     ASSERT_FALSE(table.rows.empty());
@@ -119,10 +119,7 @@ TEST(FormulationsTest, ColoursAreGivenInTurn) {
     RegisterFormulation(other);
     EXPECT_EQ(FormulationNames().size(), kBuiltIn.size() + 2);
     EXPECT_EQ(FormulationNames().back(), "other");
-    const FormulationLook &one = FindFormulation("echo")->look,
-                          &two = FindFormulation("other")->look;
-    EXPECT_NE(one.joint, two.joint);
-    EXPECT_NE(one.joint, one.absolute);
+    EXPECT_NE(FindFormulation("echo")->color, FindFormulation("other")->color);
   });
 }
 

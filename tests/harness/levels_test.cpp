@@ -138,7 +138,7 @@ TEST(LevelsTest, ANewNameIsValidWhereverTheOthersAre) {
     const Figure figure = DriftFigure(records);
     ASSERT_EQ(figure.curves.size(), 3u);
     for (const int other : {0, 2}) {
-      EXPECT_NE(figure.curves[1].style.shape, figure.curves[other].style.shape);
+      EXPECT_NE(figure.curves[1].style.dash, figure.curves[other].style.dash);
     }
     std::string schema = SchemaOfKind("experiment");
     std::erase_if(schema, [](char c) { return c == ' ' || c == '\n'; });

@@ -62,12 +62,15 @@ TEST(PrecisionReportTest, OneFigurePerLadderWithErrorAndDriftOfEachScalar) {
   ASSERT_EQ(figures.size(), 1u);
   EXPECT_EQ(figures[0].name, "precision-four-bar-odca-velocity-joint-rank-revealing");
   const Figure& figure = figures[0].figure;
-  ASSERT_EQ(figure.curves.size(), 6u);
-  EXPECT_EQ(figure.curves[0].label, "error, float");
-  EXPECT_EQ(figure.curves[1].label, "drift, float");
-  EXPECT_EQ(figure.curves[4].label, "error, float128");
+  ASSERT_EQ(figure.curves.size(), 3u);
+  EXPECT_EQ(figure.y_label, "error at the end [m]");
+  EXPECT_EQ(figure.curves[0].label, "float");
+  EXPECT_EQ(figure.curves[2].label, "float128");
+  ASSERT_EQ(figure.below.size(), 1u);
+  EXPECT_EQ(figure.below[0].y_label, "largest drift [m]");
+  EXPECT_EQ(figure.below[0].curves[2].y, (std::vector<double>{1e-4, 1e-8}));
   // the reference is no point; a run that failed is a cross without a height
-  EXPECT_EQ(figure.curves[4].x, (std::vector<double>{1e-4, 1e-8}));
+  EXPECT_EQ(figure.curves[2].x, (std::vector<double>{1e-4, 1e-8}));
   EXPECT_EQ(figure.curves[0].x, (std::vector<double>{1e-4}));
   ASSERT_EQ(figure.curves[0].crosses.size(), 1u);
   EXPECT_EQ(figure.curves[0].crosses[0].first, 1e-8);

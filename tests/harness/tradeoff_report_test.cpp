@@ -149,6 +149,18 @@ TEST(TradeoffFigures, TheLineOfTolerancesIsTheirMultipleByTheLink) {
   }
 }
 
+TEST(TradeoffFigures, MarksAreRunsAndDashesJoinWhatIsBestAtALevel) {
+  const Tradeoff tradeoff = MakeTradeoff(Store({1e-3, 1e-2, 1e-6, 1e-7}, {0.1, 0.2, 0.3, 0.4}), {});
+  const Figure figure = WorkPrecisionFigure(tradeoff, tradeoff.problems.front());
+  std::size_t marks = 0;
+  for (const Curve& curve : figure.curves) {
+    EXPECT_NE(curve.points, curve.line) << "marks, or a line";
+    marks += curve.points ? curve.x.size() : 0;
+  }
+  EXPECT_EQ(marks, 4u);
+  EXPECT_LE(GnuplotScript(figure, FigureSize::kOneColumn).legend_rows, kLegendRows);
+}
+
 TEST(TradeoffFigures, ErrorsOverTimeHaveTheTrustHorizon) {
   std::vector<Record> records = Store({1e-3, 1e-6}, {0.1, 0.2});
   EXPECT_EQ(TradeoffFigures(MakeTradeoff(records, {})).size(), 2u) << "no series, no third";

@@ -1,0 +1,256 @@
+#include "harness/figures/panel.h"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <string_view>
+
+#include "harness/figures/legend.h"
+#include "harness/text/escape.h"
+
+namespace loopbench::harness {
+namespace {
+
+std::string DataBlock(const std::string& name, const std::vector<Point>& points) {
+  std::string block = fmt::format("${} << EOD\n", name);
+  for (const auto& [x, y] : points) block += fmt::format("{:.6g} {:.6g}\n", x, y);
+  return block + "EOD\n";
+}
+
+// Where the marks of curve `index` of `count` lie: the points next to some places evenly spaced
+// over the axis, between those of the other curves, so that marks of near curves are all seen.
+std::vector<Point> Marks(const PlotArea& area, const std::vector<Point>& points, std::size_t index,
+                         std::size_t count) {
+  constexpr int kMarks = 5;
+  std::vector<Point> marks;
+  const double phase = (static_cast<double>(index) + 0.5) / static_cast<double>(count);
+  for (int i = 0; i < kMarks; ++i) {
+    const auto at =
+        std::ranges::lower_bound(points, (i + phase) / kMarks, {},
+                                 [&](const Point& point) { return area.x.Place(point.first); });
+    if (at != points.end() && (marks.empty() || marks.back() != *at)) marks.push_back(*at);
+  }
+  if (marks.empty()) marks.push_back(points.back());
+  return marks;
+}
+
+// y ~ x^exponent at the height of the points between its ends.
+std::string GuideElement(const Guide& guide, const std::vector<Point>& points) {
+  double sum = 0.0;
+  int count = 0;
+  for (const auto& [x, y] : points) {
+    if (x < guide.from || x > guide.to) continue;
+    sum += std::log(y) - guide.exponent * std::log(x);
+    ++count;
+  }
+  if (count < 2) return "";
+  return fmt::format(
+      "[{0:.6g}:{1:.6g}] {2:.6g}*(x/{0:.6g})**({3:.4g}) with lines lc rgb '#808080' dt solid lw "
+      "0.7 notitle",
+      guide.from, guide.to, std::exp(sum / count + guide.exponent * std::log(guide.from)),
+      guide.exponent);
+}
+
+// Failed runs as labels with a point and no text: unlike plot elements these may lie on the edge.
+std::string Crosses(const PlotArea& area, const Curve& curve, const std::vector<Point>& points) {
+  std::vector<Point> places = curve.crosses;
+  if (curve.ends_early && !points.empty()) places.push_back(points.back());
+  std::string commands;
+  for (const auto& [x, y] : places) {
+    if (!area.x.CanShow(x)) continue;
+    commands += fmt::format("set label '' at first {:.6g}, {} point {} lc rgb '{}' front\n", x,
+                            area.y.CanShow(y) ? fmt::format("first {:.6g}", y) : "graph 0.03",
+                            kCrossLook, curve.style.color);
+  }
+  return commands;
+}
+
+std::string TicksCommand(char axis, const std::vector<Tick>& ticks, bool has_labels) {
+  std::string list;
+  for (const Tick& tick : ticks) {
+    list += fmt::format("{}{} {:.10g}{}", list.empty() ? "" : ", ",
+                        QuoteGnuplotTick(has_labels ? tick.label : ""), tick.at,
+                        tick.label.empty() ? " 1" : "");
+  }
+  return fmt::format("set {}tics scale 0.5,0.25 ({})\n", axis, list);
+}
+
+std::vector<Tick> NamedTicks(const std::vector<std::string>& names) {
+  std::vector<Tick> ticks;
+  for (std::size_t i = 0; i < names.size(); ++i)
+    ticks.push_back({static_cast<double>(i + 1), names[i]});
+  return ticks;
+}
+
+// Heights at least a line apart, each as near as it can be to where it is wanted.
+std::vector<double> Spread(std::vector<double> wanted, double low, double high) {
+  std::vector<std::size_t> order(wanted.size());
+  for (std::size_t i = 0; i < order.size(); ++i) order[i] = i;
+  std::ranges::stable_sort(order, {}, [&](std::size_t i) { return wanted[i]; });
+  constexpr double kDistance = 0.9 * kLineHeight;
+  constexpr int kSweeps = 200;
+  for (int sweep = 0; sweep < kSweeps; ++sweep) {
+    for (std::size_t k = 1; k < order.size(); ++k) {
+      double &lower = wanted[order[k - 1]], &upper = wanted[order[k]];
+      const double push = 0.5 * std::max(0.0, lower + kDistance - upper);
+      lower -= push;
+      upper += push;
+    }
+    for (double& height : wanted) height = std::clamp(height, low, high);
+  }
+  return wanted;
+}
+
+// Texts right of the panel, each with a thin line to the end of its curve.
+std::string EndLabels(const PlotArea& area, const std::vector<std::vector<Point>>& points,
+                      const std::vector<std::string>& texts, const GnuplotPage& page,
+                      const PanelPlace& place) {
+  constexpr double kLeader = 8.0;
+  const double height = place.top - place.bottom;
+  const std::size_t room = static_cast<std::size_t>(height / (0.9 * kLineHeight));
+  std::vector<std::size_t> shown;
+  std::vector<double> wanted;
+  std::size_t left_out = 0;
+  for (std::size_t i = 0; i < texts.size(); ++i) {
+    if (texts[i].empty() || points[i].empty()) continue;
+    if (shown.size() + 1 >= room) {
+      ++left_out;
+      continue;
+    }
+    shown.push_back(i);
+    wanted.push_back(place.bottom + height * area.y.Place(points[i].back().second));
+  }
+  const std::vector<double> heights =
+      Spread(wanted, place.bottom + (left_out > 0 ? kLineHeight : 0.0), place.top);
+  std::string commands;
+  for (std::size_t k = 0; k < shown.size(); ++k) {
+    const Point& end = points[shown[k]].back();
+    commands += TextAt(page, texts[shown[k]], place.right + kLeader + 2.0, heights[k], "left");
+    commands += fmt::format(
+        "set arrow from first {:.6g}, first {:.6g} to screen {:.5f}, screen {:.5f} nohead "
+        "lc rgb '#808080' dt solid lw 0.4\n",
+        end.first, end.second, (place.right + kLeader) / page.width, heights[k] / page.height);
+  }
+  if (left_out > 0) {
+    commands += TextAt(page, fmt::format("and {} more", left_out), place.right + kLeader,
+                       place.bottom, "left");
+  }
+  return commands;
+}
+
+}  // namespace
+
+double WidthOfPage(FigureSize size) {
+  return std::round(PointsOf(size == FigureSize::kOneColumn ? 85.0 : 178.0));
+}
+
+double HeightOfPanel(FigureSize size, std::size_t panels) {
+  const double alone = size == FigureSize::kOneColumn ? 135.0 : 200.0;
+  return panels == 1 ? alone : 0.7 * alone;
+}
+
+PlotArea AreaOf(const Figure& panel, FigureSize size) {
+  AxisRange x(panel.log_x), y(panel.log_y);
+  for (const Curve& curve : panel.curves) {
+    for (std::size_t i = 0; i < std::min(curve.x.size(), curve.y.size()); ++i) {
+      if (!Axis{.logarithmic = panel.log_x}.CanShow(curve.x[i]) ||
+          !Axis{.logarithmic = panel.log_y}.CanShow(curve.y[i])) {
+        continue;
+      }
+      x.Include(curve.x[i]);
+      y.Include(curve.y[i]);
+    }
+    for (const Point& cross : curve.crosses) {
+      x.Include(cross.first);
+      y.Include(cross.second);
+    }
+  }
+  const bool has_points = std::ranges::any_of(
+      panel.curves, [](const Curve& curve) { return curve.points || !curve.crosses.empty(); });
+  PlotArea area{.x = x.WithMargin(has_points ? 0.04 : 0.0),
+                .y = y.WithMargin(has_points ? 0.08 : 0.04),
+                .width = WidthOfPage(size) - 80.0,
+                .height = HeightOfPanel(size, 1)};
+  if (!panel.x_ticks.empty()) {
+    area.x = {.low = 0.5, .high = static_cast<double>(panel.x_ticks.size()) + 0.5};
+  }
+  return area;
+}
+
+std::vector<Point> Drawable(const PlotArea& area, const Curve& curve) {
+  std::vector<Point> points;
+  for (std::size_t i = 0; i < std::min(curve.x.size(), curve.y.size()); ++i) {
+    const Point point{curve.x[i], curve.y[i]};
+    if (area.CanShow(point)) points.push_back(point);
+  }
+  return points;
+}
+
+double WidthOfLabels(const PlotArea& area) {
+  double widest = 0.0;
+  for (const Tick& tick : Ticks(area.y, 6)) widest = std::max(widest, WidthOf(tick.label));
+  return widest;
+}
+
+std::string PanelScript(const Figure& panel, const std::vector<Curve>& curves,
+                        const std::vector<std::string>& texts, const PlotArea& area,
+                        const GnuplotPage& page, const PanelPlace& place, const std::string& name,
+                        bool has_x_labels) {
+  const int most = page.width < 300.0 ? 4 : 7;
+  std::string script = fmt::format(
+      "set lmargin at screen {:.5f}\nset rmargin at screen {:.5f}\nset bmargin at screen {:.5f}\n"
+      "set tmargin at screen {:.5f}\nunset key\nset border lw 0.5\nset grid lc rgb '#d0d0d0' dt "
+      "solid lw 0.3\n",
+      place.left / page.width, place.right / page.width, place.bottom / page.height,
+      place.top / page.height);
+  if (area.x.logarithmic) script += "set logscale x\n";
+  if (area.y.logarithmic) script += "set logscale y\n";
+  script += fmt::format("set xrange [{:.10g}:{:.10g}]\nset yrange [{:.10g}:{:.10g}]\n", area.x.low,
+                        area.x.high, area.y.low, area.y.high);
+  script += TicksCommand(
+      'x', panel.x_ticks.empty() ? Ticks(area.x, most) : NamedTicks(panel.x_ticks), has_x_labels);
+  script += TicksCommand('y', Ticks(area.y, 6), true);
+  script +=
+      TextAt(page, panel.y_label, 7.0, 0.5 * (place.bottom + place.top), "center rotate by 90");
+  std::string plot;
+  const auto add = [&plot](const std::string& element) {
+    if (!element.empty()) plot += (plot.empty() ? "plot " : ", \\\n  ") + element;
+  };
+  std::vector<std::vector<Point>> points;
+  for (std::size_t i = 0; i < curves.size(); ++i) {
+    const Curve& curve = curves[i];
+    const std::vector<Point> all = Drawable(area, curve);
+    points.push_back(curve.line ? Decimated(area, all) : all);
+    const std::vector<Point>& own = points.back();
+    script += Crosses(area, curve, own);
+    if (own.empty()) continue;
+    script += DataBlock(fmt::format("{}{}", name, i), own);
+    if (curve.line) add(fmt::format("${}{} with lines {} notitle", name, i, LineLook(curve.style)));
+    const bool marked = curve.style.shape != Shape::kNone || curve.style.doubtful || curve.points;
+    if (curve.points) {
+      add(fmt::format("${}{} with points {} notitle", name, i, MarkLook(curve.style)));
+    } else if (marked) {
+      script += DataBlock(fmt::format("{}{}m", name, i), Marks(area, own, i, curves.size()));
+      add(fmt::format("${}{}m with points {} notitle", name, i, MarkLook(curve.style)));
+    }
+    if (!curve.hollow.empty()) {
+      // white ones first, over the curve's own marks
+      CurveStyle inner = curve.style, outer = curve.style;
+      inner.color = "#ffffff";
+      outer.doubtful = true;
+      script += DataBlock(fmt::format("{}{}h", name, i), curve.hollow);
+      for (const CurveStyle& style : {inner, outer}) {
+        add(fmt::format("${}{}h with points {} notitle", name, i, MarkLook(style)));
+      }
+    }
+    if (curve.guide && area.x.logarithmic && area.y.logarithmic) {
+      add(GuideElement(*curve.guide, own));
+    }
+  }
+  if (plot.empty()) add("NaN notitle");
+  return script + EndLabels(area, points, texts, page, place) + plot + '\n';
+}
+
+}  // namespace loopbench::harness

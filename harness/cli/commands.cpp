@@ -15,6 +15,7 @@
 #include "harness/store/contents.h"
 #include "harness/store/merge_stores.h"
 #include "harness/store/result_store.h"
+#include "harness/suite/kept_files.h"
 #include "harness/suite/precision_cases.h"
 #include "harness/suite/reference_cases.h"
 #include "harness/tables/fit.h"
@@ -123,6 +124,7 @@ int Merge(const MergeCommand& command) {
   for (const std::string& name : CopyTrajectories(merged, files, target.file())) {
     PrintError("warning: no store has trajectories/{}\n", name);
   }
+  CopyMechanisms(merged, files, target.file());
   target.Fill(merged);
   WriteReferences(references, target.file());
   for (const std::string& note : references.notes) PrintError("{}\n", note);

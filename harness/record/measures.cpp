@@ -153,6 +153,7 @@ constexpr Measure kMeasures[] = {
 
     // distance from what is known
     {"reference", kText, {"reference"}},
+    {"reference_file", kText},
     {"reference_error", kNumber, {"reference's error", "m", kScientific}},
     {"reference_witnesses", kText, {"witnesses"}},
     {"reference_error_*", kNumber, {"reference's error, *", "", kScientific}},

@@ -21,6 +21,7 @@
 #include "harness/run/case_identity.h"
 #include "harness/run/run_case.h"
 #include "harness/suite/estimate.h"
+#include "harness/suite/kept_files.h"
 #include "harness/suite/precision_cases.h"
 #include "harness/suite/progress.h"
 #include "harness/suite/reference_cases.h"
@@ -64,8 +65,11 @@ Piece AccuracyPiece(const Experiment& experiment, const Case& one,
   if (experiment.output) trajectory = TrajectoryPath(store, RunId(one.keys));
   const auto work = [&experiment, one, store, trajectory] {
     const std::optional<Reference> reference = FindReference(experiment, one, store);
-    return std::vector<Record>{
-        RunCase(experiment, one, reference ? &*reference : nullptr, trajectory)};
+    Record record = RunCase(experiment, one, reference ? &*reference : nullptr, trajectory);
+    if (reference && !reference->snapshots.empty()) {
+      record.Set("reference_file", ReferenceOf(experiment, one, store).id);
+    }
+    return std::vector<Record>{std::move(record)};
   };
   return {.owed = {one.keys},
           .work = work,
@@ -315,6 +319,7 @@ SuiteCount RunSuite(const std::vector<Experiment>& experiments, const SuiteOptio
     number = 0;
   };
   if (options.accuracy) {
+    KeepMechanisms(experiments, store.file());
     std::vector<Piece> references;
     for (std::size_t e = 0; e < experiments.size(); ++e) {
       for (const Case& one : SelectCases(experiments[e], options.filter)) {

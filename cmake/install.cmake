@@ -73,6 +73,10 @@ config/selection_reader|cli/(options|program_)|text/numeric_option)" EXCLUDE)
 if(TARGET loopbench_contract)
   install(FILES tests/contract/check.h DESTINATION ${CMAKE_INSTALL_INCLUDEDIR}/loopbench/tests/contract)
 endif()
+if(LOOPBENCH_REPORT)
+  install(FILES ${CMAKE_BINARY_DIR}/web/node_modules/uplot/LICENSE
+    DESTINATION ${CMAKE_INSTALL_DATADIR}/doc/loopbench RENAME LICENSE.uPlot)
+endif()
 install(DIRECTORY configs/schema configs/mechanisms DESTINATION ${CMAKE_INSTALL_DATADIR}/loopbench)
 
 # What makes code of others comparable in time and bits: optimisation, assertions and -march as here.

@@ -5,6 +5,7 @@
 
 #include "harness/cli/program_compare.h"
 #include "harness/cli/program_files.h"
+#include "harness/cli/program_report.h"
 #include "harness/cli/program_shell.h"
 #include "harness/cli/program_stores.h"
 #include "harness/cli/program_view.h"
@@ -30,6 +31,7 @@ Examples: (paths from the root of the repository)
   loopbench plot results/runs/paper --out results/runs/paper/figures
   loopbench run configs/experiments/precision.json --precision-only --jobs 2
   loopbench tradeoff results/runs/tradeoff --figures
+  loopbench report results/runs/tradeoff
   loopbench verdict results/runs/paper --claims configs/experiments/paper/claims.json
   loopbench map results/runs/extremes --rules configs/experiments/extremes/map.json
 
@@ -53,6 +55,7 @@ int RunProgram(int argc, char** argv) {
   FileOptions files(app);
   ViewOptions view(app);
   StoreOptions stores(app);
+  ReportCommandOptions report(app);
   ComparisonOptions comparison(app);
   ShellOptions shell(app);
   try {
@@ -65,6 +68,7 @@ int RunProgram(int argc, char** argv) {
     if (const auto code = files.Run(typed, ShellLine(argc, argv))) return *code;
     if (const auto code = view.Run()) return *code;
     if (const auto code = stores.Run(typed)) return *code;
+    if (const auto code = report.Run(typed)) return *code;
     if (const auto code = comparison.Run(typed)) return *code;
     return shell.Run();
   } catch (const std::exception& error) {

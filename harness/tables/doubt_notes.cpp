@@ -65,42 +65,14 @@ const Reason kReasons[] = {
      }},
 };
 
-// The keys of cases in which rows differ. Absolute tolerances go with relative ones.
-std::vector<std::string> TellingKeys(std::span<const Record> rows) {
-  std::vector<std::string> keys;
-  for (const std::string& key : CaseKeysOf(rows)) {
-    if (key == "atol") continue;
-    const bool differs = std::ranges::any_of(
-        rows, [&](const Record& row) { return row.Text(key) != rows.front().Text(key); });
-    if (differs) keys.push_back(key);
-  }
-  return keys;
-}
-
-// "odca/velocity/joint rtol 1e-08": texts as they are, numbers with their key.
-std::string NameOf(const Record& row, const std::vector<std::string>& keys) {
-  std::string words, numbers;
-  for (const std::string& key : keys) {
-    const Value* value = row.Find(key);
-    if (value == nullptr) continue;
-    if (std::holds_alternative<std::string>(*value)) {
-      words += (words.empty() ? "" : "/") + row.Text(key);
-    } else {
-      numbers += fmt::format("{}{} {}", numbers.empty() ? "" : " ", key, row.Text(key));
-    }
-  }
-  const std::string name = words + (words.empty() || numbers.empty() ? "" : " ") + numbers;
-  return name.empty() ? row.Text("mechanism") : name;
-}
-
 std::string NoteOf(const Reason& reason, std::span<const Record> rows,
                    const std::vector<std::string>& keys) {
   std::string names;
   std::size_t count = 0;
   for (const Record& row : rows) {
     if (!HasDoubt(row, reason.code) || ++count > kRowsNamed) continue;
-    names +=
-        fmt::format("{}{} ({})", names.empty() ? "" : "; ", NameOf(row, keys), reason.number(row));
+    names += fmt::format("{}{} ({})", names.empty() ? "" : "; ", NameOfRow(row, keys),
+                         reason.number(row));
   }
   if (count == 0) return "";
   if (count > kRowsNamed) names += fmt::format("; and {} more", count - kRowsNamed);
@@ -140,7 +112,7 @@ std::string NoteOfScene(const std::vector<Record>& runs) {
   std::string text, alone;
   for (const auto& [number, members] : clusters) {
     std::vector<std::string> names;
-    for (const Record& run : members) names.push_back(NameOf(run, keys));
+    for (const Record& run : members) names.push_back(NameOfRow(run, keys));
     const PoseDifference off = DifferenceOf(clusters.begin()->second.front(), members.front());
     if (off.largest > worst.largest) worst = off;
     const bool cleared = !HasDoubt(members.front(), kDisagreementDoubt);
@@ -161,6 +133,39 @@ std::string NoteOfScene(const std::vector<Record>& runs) {
 }
 
 }  // namespace
+
+std::vector<std::string> TellingKeys(std::span<const Record> rows) {
+  std::vector<std::string> keys;
+  for (const std::string& key : CaseKeysOf(rows)) {
+    if (key == "atol") continue;
+    const bool differs = std::ranges::any_of(
+        rows, [&](const Record& row) { return row.Text(key) != rows.front().Text(key); });
+    if (differs) keys.push_back(key);
+  }
+  return keys;
+}
+
+std::string NameOfRow(const Record& row, const std::vector<std::string>& keys) {
+  std::string words, numbers;
+  for (const std::string& key : keys) {
+    const Value* value = row.Find(key);
+    if (value == nullptr) continue;
+    if (std::holds_alternative<std::string>(*value)) {
+      words += (words.empty() ? "" : "/") + row.Text(key);
+    } else {
+      numbers += fmt::format("{}{} {}", numbers.empty() ? "" : " ", key, row.Text(key));
+    }
+  }
+  const std::string name = words + (words.empty() || numbers.empty() ? "" : " ") + numbers;
+  return name.empty() ? row.Text("mechanism") : name;
+}
+
+std::vector<std::pair<std::string, std::string>> MeaningsOfDoubts() {
+  std::vector<std::pair<std::string, std::string>> meanings;
+  for (const Reason& reason : kReasons) meanings.emplace_back(reason.code, reason.sentence);
+  meanings.emplace_back(kDisagreementDoubt, "other runs of the scene end elsewhere");
+  return meanings;
+}
 
 std::vector<std::string> DoubtNotes(std::span<const Record> rows, std::span<const Record> records) {
   if (std::ranges::none_of(rows, [](const Record& row) { return HasDoubt(row); })) return {};

@@ -31,12 +31,12 @@ std::string_view NameOf(ItemKind kind) {
 }
 
 /// JSON knows no number that is not finite.
-std::string Number(double value) {
-  return std::isfinite(value) ? fmt::format("{:.10g}", value + 0.0) : "0";
+std::string Number(double value, int digits = 10) {
+  return std::isfinite(value) ? fmt::format("{:.{}g}", value + 0.0, digits) : "0";
 }
 
-std::string Numbers(const Vector3d& v) {
-  return Number(v.x()) + "," + Number(v.y()) + "," + Number(v.z());
+std::string Numbers(const Vector3d& v, int digits = 10) {
+  return Number(v.x(), digits) + "," + Number(v.y(), digits) + "," + Number(v.z(), digits);
 }
 
 /// "[a,b]" of what `write` makes of each.
@@ -105,15 +105,16 @@ std::string ScriptString(std::string_view text) {
   return escaped + "\"";
 }
 
-std::string PosesJson(const Poses& poses, bool planar) {
-  return ListOf(poses, [planar](const Frame& X) {
+std::string PosesJson(const Poses& poses, bool planar, int digits) {
+  const auto number = [digits](double value) { return Number(value, digits); };
+  return ListOf(poses, [&](const Frame& X) {
     if (planar) {
-      return fmt::format("{},{},{}", Number(X.p.x()), Number(X.p.y()),
-                         Number(std::atan2(X.R(1, 0), X.R(0, 0))));
+      return fmt::format("{},{},{}", number(X.p.x()), number(X.p.y()),
+                         number(std::atan2(X.R(1, 0), X.R(0, 0))));
     }
     const Eigen::Quaterniond q(X.R);
-    return fmt::format("{},{},{},{},{}", Numbers(X.p), Number(q.w()), Number(q.x()), Number(q.y()),
-                       Number(q.z()));
+    return fmt::format("{},{},{},{},{}", Numbers(X.p, digits), number(q.w()), number(q.x()),
+                       number(q.y()), number(q.z()));
   });
 }
 

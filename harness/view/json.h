@@ -15,7 +15,7 @@ std::string ScriptString(std::string_view text);
 /// Numbers have ten digits, poses are as scene.js describes them.
 std::string ToJson(const Picture& picture);
 
-/// Poses alone, for what is drawn with the picture of the same mechanism.
-std::string PosesJson(const Poses& poses, bool planar);
+/// Poses alone, for what is drawn with the picture of the same mechanism, in so many digits.
+std::string PosesJson(const Poses& poses, bool planar, int digits = 10);
 
 }  // namespace loopbench::harness

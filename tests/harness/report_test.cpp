@@ -1,0 +1,289 @@
+// Reports: what a page holds is what the records and the other commands say, whoever named things
+// and however many there are.
+#include <gtest/gtest.h>
+
+#include <algorithm>
+#include <cmath>
+#include <filesystem>
+#include <limits>
+#include <random>
+
+#include "harness/judge/failure_map_reader.h"
+#include "harness/report/curves.h"
+#include "harness/report/decimate.h"
+#include "harness/report/html.h"
+#include "harness/report/json.h"
+#include "harness/tables/table_view.h"
+#include "tests/harness/cli_fixture.h"
+#include "tests/harness/tradeoff_records.h"
+
+namespace loopbench::harness {
+namespace report_test {
+
+constexpr double kNaN = std::numeric_limits<double>::quiet_NaN();
+constexpr const char* kHostile =
+    "</script><script>alert(1)</script>\"'<b>&`$/\n\xe2\x80\xa8\xff{}\\";
+
+/// Runs with series and timings; the last but one failed, the last is doubted.
+std::vector<Record> SomeRecords() {
+  std::vector<Record> records =
+      tradeoff_records::Store({1e-3, 1e-4, 1e-5, 1e-6, 1e-7}, {1, 2, 3, 4, 5});
+  for (Record& record : records) {
+    if (record.Text("kind") != "accuracy") continue;
+    record.Set("series.drift_t", std::vector<double>{0.0, 1.0, 10.0});
+    record.Set("series.drift", std::vector<double>{0.0, 1e-9, 1e-7});
+  }
+  records[6].Set("outcome", std::string("singular"));
+  records[6].Set("message", std::string("rank lost"));
+  records[8].Set("doubts", std::string("drift"));
+  return records;
+}
+
+std::string PageOf(const std::vector<Record>& records, ReportOptions options = {.store = "here"}) {
+  return ToHtml(MakeReport(records, options));
+}
+
+std::size_t Count(const std::string& text, const std::string& word) {
+  std::size_t count = 0;
+  for (std::size_t at = text.find(word); at != std::string::npos; at = text.find(word, at + 1)) {
+    ++count;
+  }
+  return count;
+}
+
+// An independent look at the buckets: no value between two kept neighbours is beyond the extremes
+// that were kept of the whole, and each bucket's own are there.
+TEST(Decimation, KeepsExtremesAndEnds) {
+  std::mt19937 random(1);
+  std::uniform_real_distribution<double> uniform(-1.0, 1.0);
+  for (const std::size_t n : {1u, 2u, 4u, 5u, 17u, 1000u, 12345u}) {
+    std::vector<double> values(n);
+    for (double& value : values) value = uniform(random);
+    values[n / 2] = 1e6;
+    values[n / 3] = -1e6;
+    for (const std::size_t most : {4u, 10u, 64u, 101u}) {
+      const std::vector<std::size_t> kept = KeepExtremes(values, most);
+      EXPECT_LE(kept.size(), std::max<std::size_t>(most, 4));
+      EXPECT_TRUE(std::ranges::is_sorted(kept));
+      EXPECT_EQ(std::ranges::adjacent_find(kept), kept.end());
+      EXPECT_EQ(kept.front(), 0u);
+      EXPECT_EQ(kept.back(), n - 1);
+      const auto has = [&](std::size_t i) { return std::ranges::binary_search(kept, i); };
+      EXPECT_TRUE(has(static_cast<std::size_t>(std::ranges::max_element(values) - values.begin())));
+      EXPECT_TRUE(has(static_cast<std::size_t>(std::ranges::min_element(values) - values.begin())));
+      if (n <= most) {
+        EXPECT_EQ(kept.size(), n);
+      }
+    }
+  }
+}
+
+// A spike of one point in a million is on the page, wherever it is.
+TEST(Decimation, NoSpikeIsLost) {
+  std::vector<double> values(1'000'000, 0.0);
+  for (const std::size_t at : {1u, 499'999u, 999'998u}) {
+    values[at] = 1.0;
+    const std::vector<std::size_t> kept = KeepExtremes(values, 50);
+    EXPECT_TRUE(std::ranges::binary_search(kept, at)) << at;
+    EXPECT_LE(kept.size(), 50u);
+    values[at] = 0.0;
+  }
+}
+
+TEST(Decimation, GapsStayGaps) {
+  std::vector<double> values(1000, 1.0);
+  std::fill(values.begin() + 400, values.begin() + 700, kNaN);
+  values[450] = 7.0;
+  const std::vector<std::size_t> kept = KeepExtremes(values, 20);
+  EXPECT_TRUE(std::ranges::binary_search(kept, 450u));
+  EXPECT_TRUE(std::ranges::any_of(kept, [&](std::size_t i) { return std::isnan(values[i]); }));
+  EXPECT_EQ(KeepEvenly(5, 10), (std::vector<std::size_t>{0, 1, 2, 3, 4}));
+  EXPECT_EQ(KeepEvenly(101, 3), (std::vector<std::size_t>{0, 50, 100}));
+  EXPECT_TRUE(KeepEvenly(0, 3).empty());
+}
+
+TEST(Report, CountsAreThoseOfTheTables) {
+  const std::vector<Record> records = SomeRecords();
+  const ReportData data = MakeReport(records, {.store = "here"});
+  EXPECT_EQ(data.runs, 5u);
+  EXPECT_EQ(data.failed, 1u);
+  EXPECT_EQ(data.doubted, 1u);
+  ASSERT_EQ(data.tables.size(), 2u);
+  for (const ReportTable& table : data.tables) {
+    EXPECT_EQ(table.rows.size(), MakeTable(records, {.kind = table.kind}).rows.size());
+    EXPECT_EQ(table.names.size(), table.rows.size());
+  }
+  ASSERT_EQ(data.findings.size(), 2u);
+  EXPECT_TRUE(data.findings[0].failed);
+  EXPECT_NE(data.findings[0].text.find("rank lost"), std::string::npos);
+  EXPECT_EQ(data.findings[0].filter, "outcome=singular");
+  EXPECT_EQ(data.findings[1].filter, "doubts~drift");
+  ASSERT_EQ(data.costs.size(), 1u);
+  const Tradeoff judged = MakeTradeoff(records, {.error = "error_position_max"});
+  ASSERT_EQ(data.costs[0].tradeoff.problems.size(), judged.problems.size());
+  for (std::size_t i = 0; i < judged.problems[0].rows.size(); ++i) {
+    EXPECT_EQ(data.costs[0].tradeoff.problems[0].rows[i].on_front,
+              judged.problems[0].rows[i].on_front);
+  }
+}
+
+// Rows are told apart by what differs, and every row is of a scene.
+TEST(Report, NamesSayWhatDiffers) {
+  std::vector<Record> records = SomeRecords();
+  const ReportData data = MakeReport(records, {.store = "here"});
+  for (const std::string& scene : data.tables[0].scenes) EXPECT_EQ(scene, "four-bar, 10 s");
+  std::vector<std::string> names = data.tables[0].names;
+  std::ranges::sort(names);
+  EXPECT_EQ(std::ranges::adjacent_find(names), names.end());
+  // equal names, other mechanisms: two scenes
+  records[0].Set("scene_id", std::string("another"));
+  const ReportData two = MakeReport(records, {.store = "here"});
+  EXPECT_EQ(two.scenes.size(), 2u);
+}
+
+TEST(Report, WithoutMotionSaysHowToGetOne) {
+  const ReportData data = MakeReport(SomeRecords(), {.store = "nowhere"});
+  ASSERT_EQ(data.scenes.size(), 1u);
+  EXPECT_FALSE(data.scenes[0].picture.has_value());
+  EXPECT_NE(data.scenes[0].missing.find("\"output\""), std::string::npos);
+  EXPECT_NE(data.scenes[0].missing.find("\"reference\""), std::string::npos);
+}
+
+// What is drawn is stated where it is less than what there is.
+TEST(Report, StatesWhatWasDecimated) {
+  std::vector<Record> records = SomeRecords();
+  std::vector<double> t(5000), y(5000, 1e-9);
+  for (std::size_t i = 0; i < t.size(); ++i) t[i] = static_cast<double>(i);
+  y[1234] = 1.0;
+  records[0].Set("series.drift_t", t);
+  records[0].Set("series.drift", y);
+  const ReportData data = MakeReport(records, {.store = "here", .most_points = 200});
+  ASSERT_EQ(data.plots.size(), 1u);
+  EXPECT_EQ(data.plots[0].points, 5012u);
+  EXPECT_LE(data.plots[0].shown, 200u);
+  double largest = 0.0;
+  for (const ReportCurve& curve : data.plots[0].curves) {
+    largest = std::max(largest, *std::ranges::max_element(curve.y));
+  }
+  EXPECT_EQ(largest, 1.0);
+  ASSERT_EQ(data.remarks.size(), 1u);
+  EXPECT_NE(data.remarks[0].find("of 5012 points"), std::string::npos);
+}
+
+TEST(Report, HostileNamesAreText) {
+  std::vector<Record> records = SomeRecords();
+  for (Record& record : records) {
+    record.Set("mechanism", std::string(kHostile));
+    record.Set("experiment", std::string(kHostile));
+    record.Set("machine", std::string(kHostile));
+    if (record.Text("outcome") != "finished") record.Set("message", std::string(kHostile));
+    record.Set("scene_id", std::string("../../../../etc/passwd"));
+    record.Set("reference_file", std::string("../../x"));
+    record.Set("trajectory", std::string("../../../etc/passwd"));
+  }
+  const std::size_t elements = Count(PageOf(SomeRecords()), "<script");
+  for (const std::string store : {"here", kHostile}) {
+    const std::string page = PageOf(records, {.store = store});
+    EXPECT_EQ(Count(page, "<script"), elements);
+    EXPECT_EQ(Count(page, "</script"), elements);
+    EXPECT_EQ(Count(page, "alert(1)</"), 0u);
+    EXPECT_EQ(Count(page, "<b>&`"), 0u);
+    EXPECT_EQ(Count(page, "\xe2\x80\xa8"), 0u);
+  }
+  const ReportData data = MakeReport(records, {.store = "here"});
+  for (const ReportScene& scene : data.scenes) EXPECT_FALSE(scene.picture.has_value());
+}
+
+TEST(Report, NumbersThatAreNoneAreGaps) {
+  std::vector<Record> records = SomeRecords();
+  records[0].Set("drift_position_max", kNaN);
+  records[2].Set("drift_position_max", std::numeric_limits<double>::infinity());
+  records[4].Set("drift_position_max", 1e-300);
+  records[0].Set("series.drift", std::vector<double>{kNaN, INFINITY, 1e-300});
+  for (const DataElement& element : ToJson(MakeReport(records, {.store = "here"}))) {
+    for (const char* bad : {",nan", "[nan", ",inf", "[inf", "-nan"}) {
+      EXPECT_EQ(Count(element.json, bad), 0u) << element.id << " " << bad;
+    }
+  }
+}
+
+TEST(Report, EmptyAndOtherStores) {
+  std::vector<Record> timings = SomeRecords();
+  std::erase_if(timings, [](const Record& one) { return one.Text("kind") != "timing"; });
+  const ReportData data = MakeReport(timings, {.store = "here"});
+  EXPECT_EQ(data.runs, 0u);
+  EXPECT_EQ(data.tables.size(), 1u);
+  EXPECT_NE(ToHtml(data).find("no accuracy runs"), std::string::npos);
+  Record odd;
+  odd.Set("kind", std::string("else"));
+  EXPECT_TRUE(MakeReport({odd}, {.store = "here"}).tables.empty());
+}
+
+TEST(Report, TheMapIsTheJudges) {
+  const MapRules rules = ParseMapRules(
+      R"({"title": "T", "columns": [{"label": "O", "select": {"formulation": "odca"}},
+          {"label": "L", "select": {"formulation": "lagrange"}}],
+          "groups": [{"label": "g", "why": "because", "decides": [{"measure": "error_position_max", "limit": 1e-4}],
+          "rows": [{"label": "r", "select": {"mechanism": "four-bar"}}]}]})",
+      "rules");
+  const std::vector<Record> records = SomeRecords();
+  const ReportData data = MakeReport(records, {.store = "here", .rules = rules});
+  ASSERT_TRUE(data.map.has_value());
+  const FailureMap judged = MakeFailureMap(rules, records);
+  for (std::size_t c = 0; c < 2; ++c) {
+    EXPECT_EQ(data.map->cells[0][0][c].state, judged.cells[0][0][c].state);
+    EXPECT_EQ(data.map->cells[0][0][c].reason, judged.cells[0][0][c].reason);
+  }
+}
+
+class ReportCommand : public CommandLineTest {};
+
+// The page of a run: its motions come from what the run has kept, and a damaged file is named.
+TEST_F(ReportCommand, MotionsComeFromTheStore) {
+  Write("moving.json", R"({"name": "moving", "tolerances": [1e-6],
+    "scenes": [{"mechanism": "four-bar.json", "horizon": 0.5}],
+    "columns": [{"formulation": ["odca", "lagrange"], "enforcement": "position"}],
+    "output": {"step": 0.05, "quantities": ["bodies"]}, "timing": {"repeats": 0}})");
+  ASSERT_EQ(Call("run moving.json --out out").code, 0);
+  const Ending made = Call("report out");
+  if (made.text.find("built without") != std::string::npos) GTEST_SKIP() << made.text;
+  ASSERT_EQ(made.code, 0) << made.text;
+  const std::string page = ReadFile(folder_ / "out/report.html");
+  EXPECT_EQ(Count(page, "\"times\":[0,0.05,"), 2u);
+  for (const auto& entry : fs::directory_iterator(folder_ / "out/mechanisms")) {
+    EXPECT_EQ(Call("view " + entry.path().string() + " --out kept.html").code, 0);
+  }
+  for (const auto& entry : fs::directory_iterator(folder_ / "out/trajectories")) {
+    WriteFileAtomically(entry.path(), "no trajectory\n");
+  }
+  const Ending damaged = Call("report out --out damaged.html");
+  EXPECT_EQ(damaged.code, 0) << damaged.text;
+  EXPECT_NE(damaged.text.find("no motion"), std::string::npos) << damaged.text;
+  EXPECT_EQ(Count(ReadFile(folder_ / "damaged.html"), "\"times\":[0,"), 0u);
+}
+
+// What is merged moves as its parts did.
+TEST_F(ReportCommand, MergedStoresKeepTheirMechanisms) {
+  Write("moving.json", R"({"name": "moving", "tolerances": [1e-6],
+    "scenes": [{"mechanism": "four-bar.json", "horizon": 0.5}],
+    "columns": [{"formulation": ["odca", "lagrange"], "enforcement": "position"}],
+    "output": {"number": 3, "quantities": ["bodies"]}, "timing": {"repeats": 0}})");
+  ASSERT_EQ(Call("run moving.json --shard 1/2 --out one").code, 0);
+  ASSERT_EQ(Call("run moving.json --shard 2/2 --out two").code, 0);
+  ASSERT_EQ(Call("merge one two --out both").code, 0);
+  const auto count = [&](const char* folder) {
+    return std::distance(fs::directory_iterator(folder_ / "both" / folder), {});
+  };
+  EXPECT_EQ(count("mechanisms"), 1);
+  EXPECT_EQ(count("trajectories"), 2);
+}
+
+TEST_F(ReportCommand, RefusesWhatItCannotRead) {
+  EXPECT_EQ(Call("report nowhere").code, 2);
+  Write("odd.jsonl", "no record\n");
+  EXPECT_EQ(Call("report odd.jsonl --out odd.html").code, 2);
+  EXPECT_FALSE(fs::exists(folder_ / "odd.html"));
+}
+
+}  // namespace report_test
+}  // namespace loopbench::harness

@@ -250,6 +250,8 @@ TEST_F(ReportCommand, MotionsComeFromTheStore) {
   ASSERT_EQ(made.code, 0) << made.text;
   const std::string page = ReadFile(folder_ / "out/report.html");
   EXPECT_EQ(Count(page, "\"times\":[0,0.05,"), 2u);
+  EXPECT_EQ(Count(page, "Permission is hereby granted"), 1u);  // uPlot's licence goes with it
+  EXPECT_EQ(Count(page, " src=") + Count(page, "href=\"http") + Count(page, "@import"), 0u);
   for (const auto& entry : fs::directory_iterator(folder_ / "out/mechanisms")) {
     EXPECT_EQ(Call("view " + entry.path().string() + " --out kept.html").code, 0);
   }

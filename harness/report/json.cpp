@@ -93,7 +93,7 @@ std::string LooksText() {
     std::string text;
     for (const FormulationRow& row : Formulations()) {
       text += fmt::format("{}{}:[{},{}]", text.empty() ? "" : ",", ScriptString(row.name),
-                          ScriptString(row.look.joint), ScriptString(row.look.absolute));
+                          ScriptString(row.color), ScriptString(row.color + "80"));
     }
     return text;
   }() + "}";

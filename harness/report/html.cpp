@@ -11,10 +11,6 @@
 namespace loopbench::harness {
 namespace {
 
-/// Nothing may be loaded or sent, whatever a name tries.
-constexpr std::string_view kPolicy =
-    "default-src 'none'; style-src 'unsafe-inline'; script-src 'unsafe-inline'; img-src data:";
-
 std::string List(const std::vector<std::string>& lines) {
   if (lines.empty()) return "";
   std::string text = "<ul>\n";
@@ -118,13 +114,7 @@ std::string SourcesOf(const ReportData& data) {
 
 std::string ToHtml(const ReportData& data) {
   const std::string title = EscapeXml(data.store);
-  std::string page = "<!doctype html>\n<html lang=\"en\">\n<head>\n<meta charset=\"utf-8\">\n";
-  page += fmt::format(
-      "<meta http-equiv=\"Content-Security-Policy\" content=\"{}\">\n"
-      "<meta name=\"viewport\" content=\"width=device-width, initial-scale=1\">\n"
-      "<link rel=\"icon\" href=\"data:,\">\n<title>Report of {}</title>\n<style>\n",
-      kPolicy, title);
-  page += kSceneStyle;
+  std::string page = PageHead("Report of " + title);
   page += kReportStyle;
   page += "</style>\n</head>\n<body>\n";
   page += fmt::format(

@@ -24,21 +24,6 @@ std::string Moment(double value) {
   return std::isfinite(value) ? fmt::format("{:.9g}", value) : "null";
 }
 
-/// "[a,b]" of what `write` makes of each.
-template <class List, class Write>
-std::string ListOf(const List& list, Write write) {
-  std::string text = "[";
-  for (const auto& one : list) {
-    if (text.size() > 1) text += ',';
-    text += write(one);
-  }
-  return text + "]";
-}
-
-std::string Strings(const std::vector<std::string>& list) {
-  return ListOf(list, [](const std::string& one) { return ScriptString(one); });
-}
-
 /// Cells as the tables print them, each text once; numbers besides, for sorting and conditions.
 std::string ColumnText(const ReportTable& table, const TableColumn& column, bool is_brief) {
   std::map<std::string, std::size_t> numbers;

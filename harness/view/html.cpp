@@ -8,10 +8,6 @@
 namespace loopbench::harness {
 namespace {
 
-/// Nothing may be loaded or sent, whatever a name tries.
-constexpr std::string_view kPolicy =
-    "default-src 'none'; style-src 'unsafe-inline'; script-src 'unsafe-inline'; img-src data:";
-
 // 0 title, 1 subtitle, 2 failure, 3 whether the ghost is shown
 constexpr const char* kBody = R"(<header>
 <h1>{0}</h1>
@@ -55,6 +51,18 @@ std::string Plural(std::size_t count, const char* one, const char* many) {
 
 }  // namespace
 
+std::string PageHead(std::string_view title) {
+  std::string head = fmt::format(
+      "<!doctype html>\n<html lang=\"en\">\n<head>\n<meta charset=\"utf-8\">\n"
+      "<meta http-equiv=\"Content-Security-Policy\" content=\"default-src 'none'; style-src "
+      "'unsafe-inline'; script-src 'unsafe-inline'; img-src data:\">\n"
+      "<meta name=\"viewport\" content=\"width=device-width, initial-scale=1\">\n"
+      "<link rel=\"icon\" href=\"data:,\">\n<title>{}</title>\n<style>\n",
+      title);
+  head += kSceneStyle;
+  return head;
+}
+
 std::string ToHtml(const Picture& picture) {
   const std::string title = EscapeXml(picture.name);
   const std::string subtitle = EscapeXml(fmt::format(
@@ -68,13 +76,7 @@ std::string ToHtml(const Picture& picture) {
           : "<p class=\"failed\" role=\"alert\">Not assembled, drawn as the file says "
             "it: " +
                 EscapeXml(picture.message) + "</p>\n";
-  std::string page = "<!doctype html>\n<html lang=\"en\">\n<head>\n<meta charset=\"utf-8\">\n";
-  page += fmt::format(
-      "<meta http-equiv=\"Content-Security-Policy\" content=\"{}\">\n"
-      "<meta name=\"viewport\" content=\"width=device-width, initial-scale=1\">\n"
-      "<link rel=\"icon\" href=\"data:,\">\n<title>{}</title>\n<style>\n",
-      kPolicy, title);
-  page += kSceneStyle;
+  std::string page = PageHead(title);
   page += "</style>\n</head>\n<body>\n";
   page += fmt::format(kBody, title, subtitle, failure, picture.assembled ? "" : " checked");
   page += "<script type=\"application/json\" id=\"picture\">" + ToJson(picture) + "</script>\n";

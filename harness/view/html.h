@@ -12,6 +12,10 @@ namespace loopbench::harness {
 /// web/view.js (the page of one mechanism), as they were when the program was built.
 extern const std::string_view kSceneScript, kSceneStyle, kViewScript;
 
+/// A page from its first line into its style element, which is left open, with kSceneStyle in it.
+/// Nothing may be loaded or sent from there, whatever a name tries. `title` is safe for XML.
+std::string PageHead(std::string_view title);
+
 std::string ToHtml(const Picture& picture);
 
 }  // namespace loopbench::harness

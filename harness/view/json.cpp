@@ -39,20 +39,6 @@ std::string Numbers(const Vector3d& v, int digits = 10) {
   return Number(v.x(), digits) + "," + Number(v.y(), digits) + "," + Number(v.z(), digits);
 }
 
-/// "[a,b]" of what `write` makes of each.
-template <class List, class Write>
-std::string ListOf(const List& list, Write write) {
-  std::string text = "[";
-  for (const auto& one : list) {
-    if (text.size() > 1) text += ',';
-    text += write(one);
-  }
-  return text + "]";
-}
-
-std::string Strings(const std::vector<std::string>& list) {
-  return ListOf(list, [](const std::string& one) { return ScriptString(one); });
-}
 std::string Indices(const std::vector<int>& list) {
   return ListOf(list, [](int one) { return std::to_string(one); });
 }

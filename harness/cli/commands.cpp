@@ -2,6 +2,9 @@
 
 #include <fmt/format.h>
 
+#include <algorithm>
+#include <fstream>
+#include <iterator>
 #include <map>
 
 #include "harness/analysis/doubts.h"
@@ -20,6 +23,7 @@
 #include "harness/suite/reference_cases.h"
 #include "harness/tables/fit.h"
 #include "harness/tables/table_view.h"
+#include "harness/text/config_error.h"
 #include "harness/text/files.h"
 #include "harness/text/terminal.h"
 #include "harness/timing/time_cases.h"
@@ -38,6 +42,12 @@ std::vector<Record> LoadRecords(const std::filesystem::path& store) {
 
 namespace {
 
+std::size_t CountLines(const std::filesystem::path& file) {
+  std::ifstream lines(file, std::ios::binary);
+  return static_cast<std::size_t>(
+      std::count(std::istreambuf_iterator<char>(lines), std::istreambuf_iterator<char>(), '\n'));
+}
+
 /// The records of these cases, as they were asked for: what the store holds besides is another
 /// command's.
 std::vector<Record> RecordsOf(const std::vector<std::string>& ids,
@@ -49,13 +59,12 @@ std::vector<Record> RecordsOf(const std::vector<std::string>& ids,
   return WithContents(std::move(asked));
 }
 
-void PrintInterrupted(const RunCommand& command, const ResultStore& store, std::size_t before) {
-  const std::size_t kept = ReadRecords(store.file()).size();
+void PrintInterrupted(const RunCommand& command, const ResultStore& store) {
   PrintError(
       "interrupted: {} records are kept in {}, {} of them of this run; cases under way were "
       "stopped "
       "and left nothing, tables were not written\n",
-      kept, store.file().string(), kept - before);
+      CountLines(store.file()), store.file().string(), store.appended());
   if (command.suite.rerun == Rerun::kAll) {
     PrintError("to go on, without those that were run again: the same command with --rerun none\n");
   } else {
@@ -67,31 +76,46 @@ void PrintInterrupted(const RunCommand& command, const ResultStore& store, std::
 
 int Run(const RunCommand& command, const std::string& typed) {
   // read everything first: a mistake in the last file must not cost the runs of the first
-  const std::vector<Experiment> experiments =
-      ReadSelected({command.experiments, command.settings, command.suite.filter, command.threads});
-  RequirePeers(experiments);
+  Workload workload({command.experiments, command.settings, command.suite.filter, command.threads},
+                    command.suite.shard);
+  if (workload.is_long() && !command.gate.empty()) {
+    throw ConfigError(fmt::format(
+        "--gate {}: found a sweep of more than {} combinations, whose records are not held at "
+        "once; judge parts of it: loopbench table STORE --where ... --gate {}",
+        command.gate, kLongSweep, command.gate));
+  }
+  RequirePeers(workload.some());
   if (command.suite.precision) {
-    for (const Experiment& experiment : experiments) RequireLadders(experiment);
+    for (const Experiment& experiment : workload.some()) RequireLadders(experiment);
   }
   if (command.suite.accuracy) {
-    for (const Experiment& experiment : experiments) RequireReferences(experiment);
+    for (const Experiment& experiment : workload.some()) RequireReferences(experiment);
   }
-  const std::filesystem::path out = command.out.empty() ? std::filesystem::path("results/runs") /
-                                                              FileName(experiments.front().name)
-                                                        : command.out;
+  const std::filesystem::path out =
+      command.out.empty() ? std::filesystem::path("results/runs") / FileName(workload.first().name)
+                          : command.out;
   SuiteCount count;
   {
     ResultStore store(out);
-    const std::vector<Record> before = ReadRecords(out);
+    FinishedRuns finished(out);
     try {
-      count = RunSuite(experiments, command.suite, before, store);
+      count = RunSuite(workload, command.suite, finished, store);
     } catch (const Interrupted& interrupted) {
-      PrintInterrupted(command, store, before.size());
+      PrintInterrupted(command, store);
       return interrupted.exit_code();
     }
-    PrintError("{} run now{}, {} were done before\n", count.run,
-               count.failed > 0 ? fmt::format(" ({} not finished)", count.failed) : "",
-               count.skipped);
+    PrintError(
+        "{} run now{}{}, {} were done before\n", count.run,
+        count.failed > 0 ? fmt::format(" ({} not finished)", count.failed) : "",
+        count.processes < count.pieces ? fmt::format(" in {} processes", count.processes) : "",
+        count.skipped);
+  }
+  if (workload.is_long()) {
+    Print(
+        "results in {}\nNo tables were written: a long sweep's are chosen from it, as by\n"
+        "  loopbench table {} --where mechanism={}\n",
+        out.string(), out.string(), workload.first().scenes.front().name);
+    return 0;
   }
   std::vector<Record> records = RecordsOf(count.ids, ReadRecords(out));
   SetDoubts(&records);

@@ -48,18 +48,6 @@ struct MergeCommand {
 /// Shards into one store: every case once. Throws when two stores disagree about a case.
 int Merge(const MergeCommand& command);
 
-/// Experiment files and what is changed and chosen of them.
-struct ExperimentFiles {
-  std::vector<std::filesystem::path> paths;
-  std::vector<Setting> settings;
-  Selection filter;
-  int threads = 0;  ///< of all columns; 0: as the files say
-};
-
-/// The experiments of the files, each combination of a sweep one, of which at least one case passes
-/// the filter. Throws ConfigError as the reader does, and when no case of a file passes.
-std::vector<Experiment> ReadSelected(const ExperimentFiles& files);
-
 /// `json`, here and below: one document on standard output (docs/using.md has its keys).
 int List(const ExperimentFiles& files, bool json);
 

@@ -16,6 +16,7 @@
 #include "harness/run/run_case.h"
 #include "harness/suite/precision_cases.h"
 #include "harness/suite/start_check.h"
+#include "harness/suite/workload.h"
 #include "harness/tables/fit.h"
 #include "harness/text/config_error.h"
 #include "harness/text/terminal.h"
@@ -24,34 +25,6 @@
 namespace loopbench::harness {
 
 namespace {
-
-/// A condition on a key that no case has would silently match nothing.
-void RequireKeys(const std::vector<Experiment>& experiments, const Selection& filter) {
-  if (filter.empty()) return;
-  std::vector<std::string> known;
-  for (const Experiment& experiment : experiments) {
-    for (const Case& one : Expand(experiment)) {
-      for (const auto& [key, value] : one.keys.items()) {
-        if (std::ranges::find(known, key) == known.end()) known.push_back(key);
-      }
-    }
-  }
-  for (const Condition& condition : filter) {
-    if (std::ranges::find(known, condition.key) != known.end()) continue;
-    const bool is_measured = FindMeasure(condition.key) != nullptr;
-    throw ConfigError(fmt::format(
-        "--filter {}: no such key{}; cases have {}", condition.key,
-        is_measured ? " before a run, which measures it (table, plot and tradeoff choose by it: "
-                      "--where)"
-                    : "",
-        fmt::join(known, ", ")));
-  }
-}
-
-bool Passes(const Experiment& experiment, const Selection& filter) {
-  return std::ranges::any_of(Expand(experiment),
-                             [&](const Case& one) { return Matches(one.keys, filter); });
-}
 
 /// The cases that pass, each with "runs".
 std::vector<Record> CaseRows(const std::vector<Experiment>& experiments, const Selection& filter) {
@@ -66,33 +39,55 @@ std::vector<Record> CaseRows(const std::vector<Experiment>& experiments, const S
   return rows;
 }
 
-/// Runs that are no cases.
+/// Runs that are no cases: of a long sweep, as many of each combination as of those that are shown.
 struct OtherRuns {
-  explicit OtherRuns(const std::vector<Experiment>& experiments) {
-    for (const Experiment& experiment : experiments) {
+  explicit OtherRuns(const Overview& overview) {
+    for (const Experiment& experiment : overview.experiments) {
       timings += CountTimings(experiment);
       rungs += CountRungs(experiment);
     }
+    timings = timings * overview.combinations / overview.experiments.size();
+    rungs = rungs * overview.combinations / overview.experiments.size();
   }
   std::size_t timings = 0, rungs = 0;
 };
 
-JsonObject CaseDocument(const std::filesystem::path& path,
-                        const std::vector<Experiment>& experiments, const Selection& filter) {
-  const OtherRuns others(experiments);
-  std::vector<JsonObject> cases;
-  for (const Record& row : CaseRows(experiments, filter)) cases.emplace_back(row);
-  return JsonObject()
-      .Add("file", path.string())
-      .Add("name", experiments.front().name)
-      .Add("comment", experiments.front().comment)
-      .Add("combinations", Count(experiments.size()))
-      .Add("timings", Count(others.timings))
-      .Add("runs_in_several_scalars", Count(others.rungs))
-      .Add("cases", cases);
+/// All cases, one a line and group after group: a long sweep is never held at once.
+void PrintCaseDocument(const Overview& overview, const ExperimentFiles& files) {
+  const OtherRuns others(overview);
+  std::string head = JsonObject()
+                         .Add("file", files.paths.front().string())
+                         .Add("name", overview.experiments.front().name)
+                         .Add("comment", overview.experiments.front().comment)
+                         .Add("combinations", Count(overview.combinations))
+                         .Add("timings", Count(others.timings))
+                         .Add("runs_in_several_scalars", Count(others.rungs))
+                         .Text();
+  head.pop_back();
+  PrintText(head + ",\"cases\":[");
+  Workload workload(files);
+  bool is_first = true;
+  for (std::size_t group = 0; group < workload.groups(); ++group) {
+    std::string text;
+    for (const Record& row : CaseRows(workload.Read(group).experiments, files.filter)) {
+      text += (is_first ? "" : ",") + JsonObject(row).Text();
+      is_first = false;
+    }
+    PrintText(text);
+  }
+  PrintText("]}");
 }
 
-Table CaseTable(const std::vector<Experiment>& experiments, const Selection& filter) {
+/// Combinations of a long sweep that a table shows.
+constexpr std::size_t kShown = 16;
+
+Table CaseTable(const Overview& overview, const Selection& filter) {
+  const std::size_t step =
+      overview.is_sample ? std::max<std::size_t>(1, overview.experiments.size() / kShown) : 1;
+  std::vector<Experiment> experiments;
+  for (std::size_t i = 0; i < overview.experiments.size(); i += step) {
+    experiments.push_back(overview.experiments[i]);
+  }
   Table table;
   table.title = experiments.front().name;
   if (!experiments.front().comment.empty()) table.title += ": " + experiments.front().comment;
@@ -121,13 +116,19 @@ Table CaseTable(const std::vector<Experiment>& experiments, const Selection& fil
   table.columns.push_back({"horizon", "horizon [s]", Format::kShortest, {}});
   table.columns.push_back({"runs", "runs", Format::kInteger, {}});
   table.rows = CaseRows(experiments, filter);
-  const OtherRuns others(experiments);
-  table.notes = {fmt::format("{} cases and {} timings", table.rows.size(), others.timings)};
+  const OtherRuns others(overview);
+  table.notes = {fmt::format("{} cases and {} timings", overview.cases(), others.timings)};
   if (others.rungs > 0) {
     table.notes.front() += fmt::format(", {} runs in several scalars", others.rungs);
   }
-  if (experiments.size() > 1) {
-    table.notes.front() += fmt::format(" in {} combinations", experiments.size());
+  if (overview.combinations > 1) {
+    table.notes.front() += fmt::format(" in {} combinations", overview.combinations);
+  }
+  if (overview.is_sample) {
+    table.notes.push_back(fmt::format(
+        "Shown are the cases of {} combinations spread over all; --filter chooses others, --json "
+        "lists every case",
+        experiments.size()));
   }
   return table;
 }
@@ -159,25 +160,28 @@ void RefuseFaults(const std::filesystem::path& path, const std::vector<std::stri
 }
 
 Checked CheckExperiment(const std::filesystem::path& path, const CheckCommand& command) {
-  const std::vector<Experiment> experiments = ReadExperiments(path, command.files.settings);
+  const Overview overview = MakeOverview(path, {{path}, command.files.settings, {}});
+  const std::vector<Experiment>& experiments = overview.experiments;
   Checked checked;
   for (const ExperimentScene& scene : experiments.front().scenes) {
     AddUnitWarnings(path, scene.mechanism.description, &checked);
   }
-  std::size_t cases = 0;
-  for (const Experiment& experiment : experiments) {
-    cases += Expand(experiment).size();
-    CheckLadders(experiment);
-  }
+  for (const Experiment& experiment : experiments) CheckLadders(experiment);
   if (command.assembly) RefuseFaults(path, StartFaults(experiments));
   const std::string& name = experiments.front().name;
-  checked.sentence = fmt::format(
-      "experiment \"{}\", {} cases{}", name, cases,
-      experiments.size() > 1 ? fmt::format(" in {} combinations", experiments.size()) : "");
+  checked.sentence = fmt::format("experiment \"{}\", {} cases", name, overview.cases());
+  if (overview.combinations > 1) {
+    checked.sentence += fmt::format(" in {} combinations", overview.combinations);
+  }
+  if (overview.is_sample) {
+    checked.sentence += fmt::format(
+        "; each value of each axis was read, and the starts of {} combinations assembled",
+        command.assembly ? experiments.size() : 0);
+  }
   checked.document.Add("kind", std::string("experiment"))
       .Add("name", name)
-      .Add("cases", Count(cases))
-      .Add("combinations", Count(experiments.size()));
+      .Add("cases", Count(overview.cases()))
+      .Add("combinations", Count(overview.combinations));
   return checked;
 }
 
@@ -244,37 +248,22 @@ Checked CheckFile(const std::filesystem::path& path, const CheckCommand& command
 
 }  // namespace
 
-std::vector<Experiment> ReadSelected(const ExperimentFiles& files) {
-  std::vector<Experiment> selected;
-  for (const auto& path : files.paths) {
-    const std::size_t before = selected.size();
-    std::vector<Experiment> experiments = ReadExperiments(path, files.settings);
-    if (files.threads > 0) {
-      for (Experiment& experiment : experiments) UseThreads(files.threads, experiment);
-    }
-    RequireKeys(experiments, files.filter);
-    for (Experiment& experiment : experiments) {
-      if (Passes(experiment, files.filter)) selected.push_back(std::move(experiment));
-    }
-    if (selected.size() > before) continue;
-    throw ConfigError(fmt::format("{}: no case matches {}", path.string(), ToText(files.filter)));
-  }
-  return selected;
-}
-
 int List(const ExperimentFiles& files, bool json) {
-  std::vector<JsonObject> documents;
+  if (json) PrintText("{\"experiments\":[");
+  bool is_first = true;
   for (const auto& path : files.paths) {
-    const std::vector<Experiment> experiments =
-        ReadSelected({{path}, files.settings, files.filter, files.threads});
-    for (const Experiment& experiment : experiments) CheckLadders(experiment);
+    const ExperimentFiles one = {{path}, files.settings, files.filter, files.threads};
+    const Overview overview = MakeOverview(path, one);
+    for (const Experiment& experiment : overview.experiments) CheckLadders(experiment);
     if (json) {
-      documents.push_back(CaseDocument(path, experiments, files.filter));
+      PrintText(is_first ? "" : ",\n");
+      PrintCaseDocument(overview, one);
     } else {
-      PrintText(ToScreen(CaseTable(experiments, files.filter)) + "\n");
+      PrintText(ToScreen(CaseTable(overview, files.filter)) + "\n");
     }
+    is_first = false;
   }
-  if (json) PrintText(JsonObject().Add("experiments", documents).Text() + "\n");
+  if (json) PrintText("]}\n");
   return 0;
 }
 

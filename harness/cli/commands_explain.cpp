@@ -12,6 +12,7 @@
 #include "harness/json/file_kind.h"
 #include "harness/observers/registry.h"
 #include "harness/suite/precision_cases.h"
+#include "harness/suite/workload.h"
 #include "harness/text/config_error.h"
 #include "harness/text/terminal.h"
 #include "harness/timing/time_cases.h"
@@ -181,27 +182,33 @@ void ExplainMeasures(const Experiment& experiment) {
                               : fmt::format("at tolerance {}", experiment.timing.tolerance));
 }
 
-void ExplainSweep(const std::vector<Experiment>& experiments) {
-  const Experiment& first = experiments.front();
+/// The values of an axis that are there, each once, in their order.
+std::vector<std::string> ValuesOf(const std::string& axis,
+                                  const std::vector<Experiment>& experiments) {
+  std::vector<std::string> values;
+  std::set<std::string> known;
+  for (const Experiment& one : experiments) {
+    if (known.insert(one.parameters.Text(axis)).second) values.push_back(one.parameters.Text(axis));
+  }
+  return values;
+}
+
+void ExplainSweep(const Overview& overview) {
+  const Experiment& first = overview.experiments.front();
   if (!first.parameters.items().empty()) {
     Print("\nSweep: {} of values; what follows is the first\n",
-          Plural(experiments.size(), "combination"));
-    for (const auto& [name, value] : first.parameters.items()) {
-      std::vector<std::string> values;
-      std::set<std::string> known;
-      for (const Experiment& one : experiments) {
-        if (known.insert(one.parameters.Text(name)).second)
-          values.push_back(one.parameters.Text(name));
-      }
+          Plural(overview.combinations, "combination"));
+    for (const auto& [name, number] : overview.axes) {
+      std::vector<std::string> values = ValuesOf(name, overview.experiments);
       constexpr std::size_t kMostShown = 12;
-      const std::size_t count = values.size();
-      if (count > kMostShown) {
+      if (values.size() > kMostShown) {
         const std::string last = values.back();
         values.resize(kMostShown - 2);
         values.push_back("...");
         values.push_back(last);
       }
-      Print("  {}: {}\n", name, fmt::join(values, ", "));
+      Print("  {}: {}", name, fmt::join(values, ", "));
+      Print("{}", overview.is_sample ? fmt::format(" ({} values, some shown)\n", number) : "\n");
     }
     Print("  Every record carries these values, for --filter {}=...\n",
           first.parameters.items().front().first);
@@ -214,20 +221,16 @@ void ExplainSweep(const std::vector<Experiment>& experiments) {
 }
 
 void ExplainExperiment(const std::filesystem::path& path, const ExperimentFiles& files) {
-  const std::vector<Experiment> experiments = ReadSelected({{path}, files.settings, files.filter});
-  const Experiment& first = experiments.front();
-  std::size_t cases = 0;
-  for (const Experiment& one : experiments) {
-    cases += SelectCases(one, files.filter).size();
-    CheckLadders(one);
-  }
+  const Overview overview = MakeOverview(path, {{path}, files.settings, files.filter});
+  const Experiment& first = overview.experiments.front();
+  for (const Experiment& one : overview.experiments) CheckLadders(one);
   Print("{} ({})\n", first.name, path.string());
   if (!first.comment.empty()) Print("  {}\n", first.comment);
   Print(
       "  {}: each is one mechanism, column, tolerance and horizon. Units are SI, angles "
       "in rad.\n",
-      Plural(cases, "case"));
-  ExplainSweep(experiments);
+      Plural(overview.cases(), "case"));
+  ExplainSweep(overview);
   ExplainScenes(first);
   ExplainFormulations(first);
   ExplainChoices(first);
@@ -240,15 +243,16 @@ void ExplainExperiment(const std::filesystem::path& path, const ExperimentFiles&
 }
 
 JsonObject ExperimentDocument(const std::filesystem::path& path, const ExperimentFiles& files) {
-  const std::vector<Experiment> experiments = ReadSelected({{path}, files.settings, files.filter});
-  const Experiment& first = experiments.front();
-  std::size_t cases = 0, timings = 0, rungs = 0;
-  for (const Experiment& one : experiments) {
-    cases += SelectCases(one, files.filter).size();
+  const Overview overview = MakeOverview(path, {{path}, files.settings, files.filter});
+  const Experiment& first = overview.experiments.front();
+  std::size_t timings = 0, rungs = 0;
+  for (const Experiment& one : overview.experiments) {
     timings += CountTimings(one);
     CheckLadders(one);
     rungs += CountRungs(one);
   }
+  timings = timings * overview.combinations / overview.experiments.size();
+  rungs = rungs * overview.combinations / overview.experiments.size();
   std::vector<JsonObject> scenes, sweep;
   for (const ExperimentScene& scene : first.scenes) {
     const MechanismDescription& description = scene.mechanism.description;
@@ -261,13 +265,11 @@ JsonObject ExperimentDocument(const std::filesystem::path& path, const Experimen
                          .Add("joints", Count(description.joints.size()))
                          .Add("horizons", scene.horizons));
   }
-  for (const auto& [name, value] : first.parameters.items()) {
-    std::vector<std::string> values;
-    for (const Experiment& one : experiments) {
-      const std::string text = one.parameters.Text(name);
-      if (std::ranges::find(values, text) == values.end()) values.push_back(text);
-    }
-    sweep.push_back(JsonObject().Add("name", name).Add("values", values));
+  for (const auto& [name, number] : overview.axes) {
+    sweep.push_back(JsonObject()
+                        .Add("name", name)
+                        .Add("count", Count(number))
+                        .Add("values", ValuesOf(name, overview.experiments)));
   }
   std::vector<std::string> columns;
   for (const Column& column : first.columns) columns.push_back(ToString(column));
@@ -276,8 +278,8 @@ JsonObject ExperimentDocument(const std::filesystem::path& path, const Experimen
       .Add("kind", std::string("experiment"))
       .Add("name", first.name)
       .Add("comment", first.comment)
-      .Add("cases", Count(cases))
-      .Add("combinations", Count(experiments.size()))
+      .Add("cases", Count(overview.cases()))
+      .Add("combinations", Count(overview.combinations))
       .Add("timings", Count(timings))
       .Add("runs_in_several_scalars", Count(rungs))
       .Add("references", first.reference.has_value())

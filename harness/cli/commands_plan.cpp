@@ -13,6 +13,7 @@
 #include "harness/store/result_store.h"
 #include "harness/suite/estimate.h"
 #include "harness/suite/progress.h"
+#include "harness/suite/workload.h"
 #include "harness/tables/fit.h"
 #include "harness/text/terminal.h"
 #include "harness/timing/time_cases.h"
@@ -53,15 +54,9 @@ std::string Duration(double seconds) {
 }
 
 /// One line of the plan: the cases of a scene and column, over all combinations.
-struct Line {
-  std::string mechanism, column;
-  std::size_t cases = 0, runs = 0;
+struct Line : CaseLine {
   double seconds = 0.0;
 };
-
-std::size_t RunsOf(const Case& one) {
-  return one.ensemble > 1 ? static_cast<std::size_t>(one.ensemble) + 1 : 1;
-}
 
 struct Plan {
   std::vector<Line> lines;
@@ -69,26 +64,38 @@ struct Plan {
   double seconds = 0.0, reference_seconds = 0.0, ladder_seconds = 0.0, timing_seconds = 0.0;
 };
 
-/// @param seconds  of all runs of the case
-void Add(const Case& one, double seconds, Plan* plan, std::map<std::string, std::size_t>* places) {
-  const std::string column = ToString(one.column);
-  const auto [place, fresh] = places->emplace(one.mechanism + "\n" + column, plan->lines.size());
-  if (fresh) plan->lines.push_back({one.mechanism, column, 0, 0, 0.0});
-  Line& line = plan->lines[place->second];
-  const std::size_t runs = RunsOf(one);
-  ++line.cases;
-  line.runs += runs;
-  line.seconds += seconds;
-  ++plan->cases;
-  plan->runs += runs;
-  plan->seconds += seconds;
-}
+/// Times of cases as they were looked at, by line: of all, or of some of a long sweep.
+class Times {
+ public:
+  void Add(const Case& one, double seconds) {
+    Sum& sum = sums_[one.mechanism + "\n" + ToString(one.column)];
+    sum.seconds += seconds;
+    ++sum.cases;
+  }
 
-Plan MakePlan(const std::vector<Experiment>& experiments, const PlanCommand& command,
-              Estimate* estimate) {
+  /// [s] of the whole line.
+  double Of(const CaseLine& line) const {
+    const auto sum = sums_.find(line.mechanism + "\n" + line.column);
+    if (sum == sums_.end()) return 0.0;
+    return sum->second.seconds * static_cast<double>(line.cases) /
+           static_cast<double>(sum->second.cases);
+  }
+
+ private:
+  struct Sum {
+    double seconds = 0.0;
+    std::size_t cases = 0;
+  };
+  std::map<std::string, Sum> sums_;
+};
+
+/// Of a long sweep some combinations are looked at, and stand for all.
+Plan MakePlan(const Overview& overview, const PlanCommand& command, Estimate* estimate) {
   Plan plan;
-  std::map<std::string, std::size_t> places;
+  Times times;
+  const std::vector<Experiment>& experiments = overview.experiments;
   std::set<std::string> references;
+  std::size_t asked_references = 0;
   const std::map<std::string, double> earlier = EarlierTimes(command.from);
   Progress progress("plan", {experiments.size(), {"", 0.0}}, 1);
   for (std::size_t i = 0; i < experiments.size(); ++i) {
@@ -98,9 +105,9 @@ Plan MakePlan(const std::vector<Experiment>& experiments, const PlanCommand& com
       const auto known = earlier.find(SameRun(Identified(experiment, one).keys));
       plan.known += known != earlier.end() ? 1 : 0;
       const auto runs = static_cast<double>(RunsOf(one));
-      Add(one, known != earlier.end() ? runs * known->second : estimate->OfCase(i, one), &plan,
-          &places);
+      times.Add(one, known != earlier.end() ? runs * known->second : estimate->OfCase(i, one));
       if (!experiment.reference) continue;
+      ++asked_references;
       const ReferenceCase reference = ReferenceOf(experiment, one, "results.jsonl");
       if (!references.insert(reference.id).second) continue;
       plan.reference_seconds += estimate->OfReference(i, reference);
@@ -116,24 +123,39 @@ Plan MakePlan(const std::vector<Experiment>& experiments, const PlanCommand& com
     progress.Done(i);
   }
   plan.references = references.size();
+  for (const CaseLine& line : overview.lines) {
+    plan.lines.push_back({line, times.Of(line)});
+    plan.cases += line.cases;
+    plan.runs += line.runs;
+    plan.seconds += plan.lines.back().seconds;
+  }
+  if (overview.is_sample) {
+    const double all =
+        static_cast<double>(overview.combinations) / static_cast<double>(experiments.size());
+    const auto scale = [all](std::size_t* count, double* seconds) {
+      *count = static_cast<std::size_t>(std::llround(all * static_cast<double>(*count)));
+      *seconds *= all;
+    };
+    scale(&plan.rungs, &plan.ladder_seconds);
+    scale(&plan.timings, &plan.timing_seconds);
+    // combinations of one motion share their reference: then there are no more than were found
+    const bool is_one_each = plan.references >= std::min(asked_references, experiments.size());
+    if (is_one_each) scale(&plan.references, &plan.reference_seconds);
+  }
   return plan;
 }
 
-void PrintAxes(const std::vector<Experiment>& experiments) {
-  if (experiments.front().parameters.items().empty()) return;
-  for (const auto& [name, value] : experiments.front().parameters.items()) {
-    std::set<std::string> values;
-    for (const Experiment& one : experiments) values.insert(one.parameters.Text(name));
-    Print("  axis {}: {} values\n", name, values.size());
-  }
-  Print("  {} combinations\n", experiments.size());
+void PrintAxes(const Overview& overview) {
+  if (overview.axes.empty()) return;
+  for (const auto& [name, values] : overview.axes) Print("  axis {}: {} values\n", name, values);
+  Print("  {} combinations\n", overview.combinations);
 }
 
-void PrintPlan(const std::vector<Experiment>& experiments, const Plan& plan,
-               const PlanCommand& command, const Estimate& estimate) {
-  const Experiment& first = experiments.front();
+void PrintPlan(const Overview& overview, const Plan& plan, const PlanCommand& command,
+               const Estimate& estimate) {
+  const Experiment& first = overview.experiments.front();
   Print("{}{}{}\n", first.name, first.comment.empty() ? "" : ": ", first.comment);
-  PrintAxes(experiments);
+  PrintAxes(overview);
   Print("  {} scenes, {} columns, {} tolerances", first.scenes.size(), first.columns.size(),
         first.tolerances.size());
   if (!first.fixed_steps.empty()) Print(", {} fixed steps", first.fixed_steps.size());
@@ -179,13 +201,15 @@ void PrintPlan(const std::vector<Experiment>& experiments, const Plan& plan,
         source.empty() ? "" : ", the rest from ", estimate.pilots(),
         first.fixed_steps.empty() ? "" : ", or the longest fixed step");
   }
+  if (overview.is_sample) {
+    source += fmt::format("; {} combinations stand for all", overview.experiments.size());
+  }
   Print("An estimate, from {}. Each run ends at {:g} s of CPU time at the latest.\n", source,
         first.limits.cpu_s);
 }
 
-JsonObject PlanDocument(const std::filesystem::path& path,
-                        const std::vector<Experiment>& experiments, const Plan& plan,
-                        const Estimate& estimate) {
+JsonObject PlanDocument(const std::filesystem::path& path, const Overview& overview,
+                        const Plan& plan, const Estimate& estimate) {
   std::vector<JsonObject> lines;
   for (const Line& line : plan.lines) {
     lines.push_back(JsonObject()
@@ -197,8 +221,8 @@ JsonObject PlanDocument(const std::filesystem::path& path,
   }
   return JsonObject()
       .Add("file", path.string())
-      .Add("name", experiments.front().name)
-      .Add("combinations", Count(experiments.size()))
+      .Add("name", overview.experiments.front().name)
+      .Add("combinations", Count(overview.combinations))
       .Add("cases", Count(plan.cases))
       .Add("runs", Count(plan.runs))
       .Add("accuracy_seconds", plan.seconds)
@@ -220,16 +244,16 @@ int PrintPlans(const PlanCommand& command) {
   std::vector<JsonObject> documents;
   for (const auto& path : command.files.paths) {
     const double begin = ThreadCpuSeconds();
-    const std::vector<Experiment> experiments =
-        ReadSelected({{path}, command.files.settings, command.files.filter});
-    RequirePeers(experiments);
-    Estimate estimate(experiments, Estimate::Budget());
-    Plan plan = MakePlan(experiments, command, &estimate);
+    const Overview overview =
+        MakeOverview(path, {{path}, command.files.settings, command.files.filter});
+    RequirePeers(overview.experiments);
+    Estimate estimate(overview.experiments, Estimate::Budget());
+    Plan plan = MakePlan(overview, command, &estimate);
     plan.seconds += ThreadCpuSeconds() - begin;  // a run reads and expands the file too
     if (command.json) {
-      documents.push_back(PlanDocument(path, experiments, plan, estimate));
+      documents.push_back(PlanDocument(path, overview, plan, estimate));
     } else {
-      PrintPlan(experiments, plan, command, estimate);
+      PrintPlan(overview, plan, command, estimate);
     }
   }
   if (command.json) PrintText(JsonObject().Add("experiments", documents).Text() + "\n");

@@ -106,6 +106,8 @@ void FileOptions::AddRun(CLI::App& app) {
   AddWide(run_app_);
   run_app_->add_option("--shard", shard_, "k/n: the k-th of n parts, to be merged later")
       ->capture_default_str();
+  run_app_->add_flag("--isolate", run_.suite.isolate,
+                     "Every case in a process of its own; else short ones share processes");
   run_app_->add_option("--rerun", rerun_, "Cases to run although the store has them")
       ->check(CLI::IsMember({"none", "failed", "all"}))
       ->capture_default_str();

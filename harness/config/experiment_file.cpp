@@ -128,7 +128,7 @@ const Fields<ExperimentFile>& ExperimentFileFields() {
        {"ensembles", By(EnsemblesSchema(), ReadEnsembles), "Perturbed repetitions of cases."},
        {"sweep", SweepSchema(),
         "Axes that are crossed, the first one slowest; each combination of values is run as if "
-        "the values stood in this file. Axes in a zip go in step. At most 100000 combinations."},
+        "the values stood in this file. Axes in a zip go in step. At most 10000000 combinations."},
        {"exclude", ExclusionsSchema(),
         "Cases that match all conditions of a rule are left out. Keys are mechanism, formulation, "
         "enforcement, coordinates, solver, integrator, rtol, atol, step, horizon and the names of "

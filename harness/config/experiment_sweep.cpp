@@ -6,7 +6,7 @@
 #include <cmath>
 #include <set>
 
-#include "harness/config/experiment_reader.h"
+#include "harness/config/experiment_source.h"
 #include "harness/record/measures.h"
 
 namespace loopbench::harness {
@@ -260,6 +260,27 @@ Record Sweep::Parameters(std::size_t combination) const {
     }
   }
   return parameters;
+}
+
+std::vector<std::pair<std::string, std::size_t>> Sweep::Axes() const {
+  std::vector<std::pair<std::string, std::size_t>> axes;
+  for (const SweepGroup& group : groups_) {
+    for (const SweepAxis& axis : group.axes) axes.emplace_back(axis.name, axis.values.size());
+  }
+  return axes;
+}
+
+std::vector<std::size_t> Sweep::EachValue(std::size_t most) const {
+  std::set<std::size_t> combinations = {0, count_ - 1};
+  std::size_t stride = 1;  // between neighbouring values of the group
+  for (std::size_t i = groups_.size(); i-- > 0;) {
+    const std::size_t count = groups_[i].count(), taken = std::min(count, most);
+    for (std::size_t k = 1; k < taken; ++k) {
+      combinations.insert(stride * (k * (count - 1) / (taken - 1)));
+    }
+    stride *= count;
+  }
+  return {combinations.begin(), combinations.end()};
 }
 
 void Sweep::Note(Origins* origins) const {

@@ -8,6 +8,7 @@
 
 #include <cstddef>
 #include <string>
+#include <utility>
 #include <vector>
 
 #include "harness/config/experiment_fields.h"
@@ -45,6 +46,12 @@ class Sweep {
 
   /// Its values by name.
   Record Parameters(std::size_t combination) const;
+
+  /// Names and numbers of values.
+  std::vector<std::pair<std::string, std::size_t>> Axes() const;
+
+  /// As ExperimentSource::EachValue().
+  std::vector<std::size_t> EachValue(std::size_t most) const;
 
   /// Notes where values come from, for messages.
   void Note(Origins* origins) const;

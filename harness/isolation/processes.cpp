@@ -244,19 +244,20 @@ bool LimitsMemory() {
 #endif
 }
 
-void RunInProcesses(std::size_t count, int jobs,
+void RunInProcesses(const std::function<std::optional<std::size_t>()>& next, int jobs,
                     const std::function<std::string(std::size_t)>& work,
                     const std::function<ProcessLimits(std::size_t)>& limits,
                     const std::function<void(std::size_t, const ProcessResult&)>& done,
                     const ProcessNews& news) {
   Children children;
-  std::size_t next = 0;
-  while (next < count || children.size() > 0) {
-    while (next < count && children.size() < static_cast<std::size_t>(jobs)) {
-      children.Start(next, limits(next), [&work, next] { return work(next); });
-      if (news.started) news.started(next);
-      ++next;
+  for (;;) {
+    while (children.size() < static_cast<std::size_t>(jobs)) {
+      const std::optional<std::size_t> piece = next();
+      if (!piece) break;
+      children.Start(*piece, limits(*piece), [&work, piece] { return work(*piece); });
+      if (news.started) news.started(*piece);
     }
+    if (children.size() == 0) return;
     for (Child& child : children.Wait()) {
       const std::size_t piece = child.piece;
       done(piece, ResultOf(std::move(child)));
@@ -264,6 +265,17 @@ void RunInProcesses(std::size_t count, int jobs,
     Interruption::Check();
     if (news.waited) news.waited();
   }
+}
+
+void RunInProcesses(std::size_t count, int jobs,
+                    const std::function<std::string(std::size_t)>& work,
+                    const std::function<ProcessLimits(std::size_t)>& limits,
+                    const std::function<void(std::size_t, const ProcessResult&)>& done,
+                    const ProcessNews& news) {
+  const auto next = [i = std::size_t{0}, count]() mutable {
+    return i < count ? std::optional(i++) : std::nullopt;
+  };
+  RunInProcesses(next, jobs, work, limits, done, news);
 }
 
 }  // namespace loopbench::harness

@@ -9,6 +9,7 @@
 
 #include <cstddef>
 #include <functional>
+#include <optional>
 #include <string>
 #include <string_view>
 
@@ -41,13 +42,21 @@ struct ProcessNews {
   std::function<void()> waited = {};  ///< four times a second at least
 };
 
-/// Runs work(0) .. work(count - 1), at most `jobs` at once, started in order. `done` is called here
-/// in the parent as pieces end, one at a time. No piece outlives this process. Throws
-/// std::runtime_error when a process cannot be started, what `done` throws, and Interrupted
-/// (interruption.h) when all pieces that have ended are done; pieces still under way are killed
-/// then.
+/// Runs work(i) for each i that `next` gives, at most `jobs` at once, started in order. `next`
+/// gives nothing while there is nothing to start; it is asked again whenever a piece has ended, and
+/// when it gives nothing with no piece under way all is done. `done` is called here in the parent
+/// as pieces end, one at a time. No piece outlives this process. Throws std::runtime_error when a
+/// process cannot be started, what `done` throws, and Interrupted (interruption.h) when all pieces
+/// that have ended are done; pieces still under way are killed then.
 ///
 /// Sanitizers reserve the whole address space, so memory limits are not set under them.
+void RunInProcesses(const std::function<std::optional<std::size_t>()>& next, int jobs,
+                    const std::function<std::string(std::size_t)>& work,
+                    const std::function<ProcessLimits(std::size_t)>& limits,
+                    const std::function<void(std::size_t, const ProcessResult&)>& done,
+                    const ProcessNews& news = {});
+
+/// The same with work(0) .. work(count - 1).
 void RunInProcesses(std::size_t count, int jobs,
                     const std::function<std::string(std::size_t)>& work,
                     const std::function<ProcessLimits(std::size_t)>& limits,

@@ -4,6 +4,7 @@
 #include <unistd.h>
 
 #include <algorithm>
+#include <fstream>
 #include <map>
 #include <stdexcept>
 #include <string_view>
@@ -49,10 +50,29 @@ Lines ReadLines(const std::string& text, const std::filesystem::path& file) {
   return lines;
 }
 
+/// The end of a large file, from the beginning of a line: its last megabyte, or as much as its last
+/// two lines are.
+std::string LastLines(const std::filesystem::path& file, std::uintmax_t size) {
+  std::ifstream in(file, std::ios::binary);
+  for (std::uintmax_t length = 1 << 20;; length *= 4) {
+    const std::uintmax_t taken = std::min(length, size);
+    std::string text(static_cast<std::size_t>(taken), '\0');
+    in.seekg(static_cast<std::streamoff>(size - taken));
+    in.read(text.data(), static_cast<std::streamsize>(text.size()));
+    if (!in) FailOn("read", file);
+    const std::size_t begin = text.find('\n');
+    if (taken == size) return text;
+    if (begin != std::string::npos && text.find('\n', begin + 1) != std::string::npos) {
+      return text.substr(begin + 1);
+    }
+  }
+}
+
 /// Ends the file with a line end: a complete record gets its own, a torn one goes. What is no store
 /// stays as it is.
 void MendLastLine(const std::filesystem::path& file, int descriptor) {
-  const std::string text = ReadFile(file);
+  const std::uintmax_t size = std::filesystem::file_size(file);
+  const std::string text = IsLarge(file) ? LastLines(file, size) : ReadFile(file);
   Lines lines;
   try {
     lines = ReadLines(text, file);
@@ -67,7 +87,8 @@ void MendLastLine(const std::filesystem::path& file, int descriptor) {
                     file.string()));
   }
   if (!lines.warning.empty()) {
-    if (::ftruncate(descriptor, static_cast<off_t>(lines.whole)) != 0) {
+    const std::uintmax_t whole = size - (text.size() - lines.whole);
+    if (::ftruncate(descriptor, static_cast<off_t>(whole)) != 0) {
       FailOn("mend the last line of", file);
     }
   } else if (!lines.is_ended) {
@@ -79,6 +100,13 @@ void MendLastLine(const std::filesystem::path& file, int descriptor) {
 
 std::filesystem::path StoreFile(const std::filesystem::path& path) {
   return path.extension() == ".jsonl" ? path : path / "results.jsonl";
+}
+
+bool IsLarge(const std::filesystem::path& file) {
+  constexpr std::uintmax_t kLarge = 32u << 20;
+  std::error_code error;
+  const std::uintmax_t size = std::filesystem::file_size(file, error);
+  return !error && size >= kLarge;
 }
 
 ResultStore::ResultStore(const std::filesystem::path& path) : file_(StoreFile(path)) {
@@ -100,8 +128,9 @@ void ResultStore::LeaveToParent() {
   descriptor_ = -1;
 }
 
-void ResultStore::Append(const Record& record) {
-  const std::string line = ToJsonLine(record) + '\n';
+void ResultStore::Append(const std::vector<Record>& records) {
+  std::string text;
+  for (const Record& record : records) text += ToJsonLine(record) + '\n';
   const std::lock_guard lock(mutex_);
   if (!IsStillNamed(descriptor_, file_)) {
     throw std::runtime_error(fmt::format(
@@ -110,8 +139,9 @@ void ResultStore::Append(const Record& record) {
   }
   const off_t before = ::lseek(descriptor_, 0, SEEK_END);
   try {
-    WriteAll(descriptor_, line, file_);
+    WriteAll(descriptor_, text, file_);
     if (::fsync(descriptor_) != 0) FailOn("write to the disk", file_);
+    appended_ += records.size();
   } catch (...) {
     // what cannot be kept whole is not kept: the next run finds complete records only
     [[maybe_unused]] const int failed = ::ftruncate(descriptor_, before);

@@ -15,6 +15,10 @@ namespace loopbench::harness {
 /// The file of a store: `path` itself if it ends in ".jsonl", else results.jsonl in that folder.
 std::filesystem::path StoreFile(const std::filesystem::path& path);
 
+/// Whether the file of a store is so large (32 MiB and more) that nobody should hold all of it:
+/// what can be told from a part of it is.
+bool IsLarge(const std::filesystem::path& file);
+
 /// Appends records to a file of JSON Lines. Lines are never changed, and a record is on the disk
 /// when Append() returns: a crash or a power failure loses at most the line that was being written.
 ///
@@ -27,7 +31,7 @@ class ResultStore {
   /// by a crash, is removed first: the next record would otherwise continue it. Throws
   /// std::runtime_error that names the file, and the process that has the store open. A file that
   /// holds anything but records (and the beginning of one as its last line) is refused with its
-  /// line, and stays as it is.
+  /// line, and stays as it is; of a large one only the end is looked at.
   explicit ResultStore(const std::filesystem::path& path);
   ~ResultStore();
 
@@ -37,7 +41,10 @@ class ResultStore {
   /// Writes one line and waits until it is on the disk. Throws std::runtime_error when it could not
   /// be written in full (a full disk, a limit of file sizes); the file is then as it was before.
   /// Throws as well when the file was removed or replaced meanwhile. From any thread.
-  void Append(const Record& record);
+  void Append(const Record& record) { Append(std::vector<Record>{record}); }
+
+  /// The same with several, all of them or none.
+  void Append(const std::vector<Record>& records);
 
   /// The records of an empty store, all of them or none. Throws std::runtime_error when it has
   /// some. Nothing can be appended afterwards.
@@ -47,10 +54,13 @@ class ResultStore {
   void LeaveToParent();
 
   const std::filesystem::path& file() const { return file_; }
+  /// Number of records appended.
+  std::size_t appended() const { return appended_; }
 
  private:
   std::filesystem::path file_;
   int descriptor_ = -1;
+  std::size_t appended_ = 0;
   std::mutex mutex_;
 };
 

@@ -37,6 +37,8 @@ double Longest(const Experiment& experiment, std::size_t scene) {
   return std::ranges::max(experiment.scenes[scene].horizons);
 }
 
+double NumberOfRuns(const Case& one) { return static_cast<double>(RunsOf(one)); }
+
 template <class Spent>
 Rate Next(const Rate& before, const Spent& spent) {
   const double reached = std::max(spent.reached, 1e-9), mean = spent.running_s / reached;
@@ -50,8 +52,6 @@ Rate Next(const Rate& before, const Spent& spent) {
           .ends_at = spent.failed ? reached : 1.0,
           .most_s = spent.most_s};
 }
-
-double RunsOf(const Case& one) { return one.ensemble > 1 ? one.ensemble + 1.0 : 1.0; }
 
 }  // namespace
 
@@ -137,7 +137,7 @@ const Rate* Estimate::RateOfCase(std::size_t experiment, const Case& one, double
   return Known(fmt::format("case/{}/{}/{}/{}/{}/{}", experiment, scene, column, one.integrator,
                            rtol, one.step > 0.0),
                fmt::format("{} {}", like.scenes[scene].name, column),
-               LimitsOfRuns(one.limits, one.column.threads), RunsOf(one), run);
+               LimitsOfRuns(one.limits, one.column.threads), NumberOfRuns(one), run);
 }
 
 double Estimate::OfCase(std::size_t experiment, const Case& one) {
@@ -146,7 +146,8 @@ double Estimate::OfCase(std::size_t experiment, const Case& one) {
   const double part = one.horizon / Longest(like, std::min(one.scene, like.scenes.size() - 1));
   const auto total = [&](const Rate& rate, double scale) {
     const double running = rate.Running(part) * scale;
-    return rate.process_s + RunsOf(one) * (rate.fixed_s + std::min(running, one.limits.cpu_s));
+    return rate.process_s +
+           NumberOfRuns(one) * (rate.fixed_s + std::min(running, one.limits.cpu_s));
   };
   if (one.step > 0.0) {
     const Rate* rate = RateOfCase(near, one, 0.0);
@@ -159,7 +160,7 @@ double Estimate::OfCase(std::size_t experiment, const Case& one) {
   const Rate* at_loose = RateOfCase(near, one, loose);
   if (at_loose == nullptr) return kUnknown;
   const double usual = std::pow(one.rtol / loose, -0.2);  // of methods of order 5
-  if (RunsOf(one) * at_loose->Running(1.0) * std::pow(fine / loose, -0.2) < kShort_s) {
+  if (NumberOfRuns(one) * at_loose->Running(1.0) * std::pow(fine / loose, -0.2) < kShort_s) {
     return total(*at_loose, usual);
   }
   const Rate* at_fine = RateOfCase(near, one, fine);

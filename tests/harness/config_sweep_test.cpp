@@ -230,9 +230,14 @@ TEST(Sweep, ThatCannotBeMeantIsRefused) {
   ExpectWords(error(R"([{"name": "a", "field": "/limits", "values": [{}]},
                         {"name": "b", "field": "/limits/wall_s", "values": [1]}])"),
               {"/sweep: found \"a\" and \"b\" both setting /limits/wall_s"});
-  ExpectWords(error(R"([{"name": "a", "field": "/limits/wall_s", "values": {"lin": [1, 2, 1000]}},
-                        {"name": "b", "field": "/limits/steps", "values": {"lin": [1, 1000, 1000]}}])"),
-              {"/sweep: found 1000000 combinations, expected at most 100000"});
+  const std::string many =
+      R"({"name": "a", "field": "/limits/wall_s", "values": {"lin": [1, 2, 1000]}},
+                        {"name": "b", "field": "/limits/steps", "values": {"lin": [1, 1000, 1000]}})";
+  ExpectWords(error("[" + many + R"(, {"name": "c", "field": "/limits/memory_mb",
+                                  "values": {"lin": [1, 2, 20]}}])"),
+              {"/sweep: found 20000000 combinations, expected at most 10000000"});
+  ExpectWords(error("[" + many + "]"),
+              {"/sweep: found 1000000 combinations, expected at most 100000 to be held at once"});
 }
 
 TEST(Exclude, LeavesOutCasesThatMatchAllConditions) {

@@ -15,6 +15,7 @@
 #include <vector>
 
 #include "harness/integrator/cpu_time.h"
+#include "harness/isolation/shared_processes.h"
 
 namespace loopbench::harness {
 namespace processes_test {
@@ -165,6 +166,64 @@ TEST(ProcessesTest, WhatDoneThrowsEndsEverything) {
   EXPECT_EQ(calls, 1);
   // the hanging ones were killed and reaped: no child is left to wait for
   EXPECT_EQ(::waitpid(-1, nullptr, WNOHANG), -1);
+}
+
+/// Results by task, and how many processes there were.
+std::pair<std::map<std::size_t, ProcessResult>, std::size_t> Share(
+    std::size_t count, const std::function<std::string(std::size_t)>& work,
+    const ProcessLimits& limits = {}) {
+  std::map<std::size_t, ProcessResult> results;
+  const std::size_t processes = RunInSharedProcesses(
+      count, 2, work, [&](std::size_t) { return limits; },
+      [&](const std::vector<TaskResult>& ended) {
+        for (const TaskResult& one : ended) {
+          EXPECT_TRUE(results.emplace(one.task, one.result).second) << one.task << " ended twice";
+        }
+      });
+  return {results, processes};
+}
+
+TEST(SharedProcessesTest, AnswerEveryTaskInFewProcesses) {
+  const auto [results, processes] = Share(500, [](std::size_t i) {
+    return std::string(i % 7, 'x') + "\n" + std::to_string(i) + (i % 3 == 0 ? "\n" : "");
+  });
+  ASSERT_EQ(results.size(), 500u);
+  for (const auto& [i, result] : results) {
+    EXPECT_EQ(result.ending, ProcessEnding::kAnswered);
+    EXPECT_EQ(result.text,
+              std::string(i % 7, 'x') + "\n" + std::to_string(i) + (i % 3 == 0 ? "\n" : ""));
+  }
+  EXPECT_LT(processes, 100u);
+}
+
+TEST(SharedProcessesTest, LongTasksHaveTheirOwn) {
+  const auto [results, processes] = Share(6, [](std::size_t) { return Compute(0.11); });
+  EXPECT_EQ(results.size(), 6u);
+  EXPECT_EQ(processes, 6u);
+}
+
+TEST(SharedProcessesTest, WhatEndsAProcessEndsOneTaskOnly) {
+  const auto work = [](std::size_t i) -> std::string {
+    if (i == 50) std::raise(SIGSEGV);
+    if (i == 100) throw std::runtime_error("no");
+    if (i == 150) return Hoard();
+    if (i == 200) return Compute(10.0);
+    return std::to_string(i);
+  };
+  const bool limits_memory = LimitsMemory();
+  const auto [results, processes] =
+      Share(limits_memory ? 250 : 150, work, {.cpu_s = 0.5, .memory_mb = 64.0});
+  ASSERT_EQ(results.size(), limits_memory ? 250u : 150u);
+  for (const auto& [i, result] : results) {
+    const auto expected = i == 50    ? ProcessEnding::kCrashed
+                          : i == 100 ? ProcessEnding::kThrew
+                          : i == 150 ? ProcessEnding::kOverMemory
+                          : i == 200 ? ProcessEnding::kOverTime
+                                     : ProcessEnding::kAnswered;
+    EXPECT_EQ(result.ending, expected) << i << ": " << result.text;
+    if (expected == ProcessEnding::kAnswered) EXPECT_EQ(result.text, std::to_string(i));
+  }
+  EXPECT_EQ(results.at(100).text, "no");
 }
 
 }  // namespace processes_test

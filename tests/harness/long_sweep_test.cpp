@@ -1,0 +1,140 @@
+// Sweeps of more combinations than are held at once, through the program.
+#include <gtest/gtest.h>
+
+#include <map>
+#include <set>
+#include <string>
+#include <vector>
+
+#include "harness/store/result_store.h"
+#include "tests/harness/cli_fixture.h"
+
+namespace loopbench::harness {
+namespace long_sweep_test {
+
+constexpr const char* kPendulum = R"({
+  "name": "pendulum", "space": "planar", "gravity": [0, -9.81],
+  "ground": {"points": {"O": [0, 0]}},
+  "bodies": [{"name": "bar", "mass": 1, "inertia": 0.1, "com": [0.5, 0], "points": {"A": [0, 0]}}],
+  "joints": [{"name": "OA", "type": "revolute", "from": {"body": "ground", "at": "O"},
+              "to": {"body": "bar", "at": "A"}}],
+  "initial": {"coordinates": {"OA": 0}, "held": ["OA"]}
+})";
+
+/// 2 formulations, 45 x 45 = 2025 combinations; some are excluded.
+std::string LongSweepText(const std::string& masses = R"({"lin": [1, 2, 45]})") {
+  return R"({"name": "long", "scenes": [{"mechanism": "pendulum.json", "horizon": 0.001}],
+  "columns": [{"formulation": ["odca", "lagrange"], "enforcement": "acceleration"}],
+  "timing": {"repeats": 0}, "tolerances": [1e-6], "series": {"points": 2},
+  "sweep": [
+    {"name": "mass", "field": "/scenes/0/mechanism/bodies/0/mass", "values": )" +
+         masses + R"(},
+    {"name": "inertia", "field": "/scenes/0/mechanism/bodies/0/inertia",
+     "values": {"lin": [0.1, 1, 45]}}],
+  "exclude": [{"mass": 1, "formulation": "lagrange"}, {"inertia": 1}]})";
+}
+// of 45 masses and 44 inertias that are left, all with O-DCA, all but one mass with multipliers
+constexpr std::size_t kAll = 44 * 45 + 44 * 44;
+
+class LongSweeps : public CommandLineTest {
+ protected:
+  void SetUp() override {
+    CommandLineTest::SetUp();
+    Write("pendulum.json", kPendulum);
+    Write("long.json", LongSweepText());
+  }
+
+  std::map<std::string, std::string> HashesOf(const std::string& store) const {
+    std::map<std::string, std::string> hashes;
+    for (const Record& one : ReadRecords(folder_ / store)) {
+      EXPECT_TRUE(hashes.emplace(one.Text("case_id"), one.Text("state_hash")).second);
+    }
+    return hashes;
+  }
+};
+
+TEST_F(LongSweeps, AreCountedWithoutBeingRead) {
+  const std::string cases = std::to_string(kAll) + " cases";
+  ExpectEnding(
+      Call("plan long.json"), 0,
+      {"axis mass: 45 values", "2025 combinations", cases, "64 combinations stand for all"});
+  ExpectEnding(Call("check long.json"), 0, {cases, "each value of each axis was read"});
+  ExpectEnding(Call("explain long.json"), 0, {"2025 combinations", "(45 values, some shown)"});
+  ExpectEnding(Call("list long.json"), 0, {cases, "--json lists every case"});
+  const std::string listed = Call("list long.json --json").text;
+  std::size_t count = 0;
+  for (std::size_t at = 0; (at = listed.find("\"kind\":", at)) != std::string::npos; ++at) ++count;
+  EXPECT_EQ(count, kAll);
+  ExpectEnding(Call("plan long.json --filter 'mass<1.5' --filter formulation=odca"), 0,
+               {std::to_string(22 * 44) + " cases"});
+  ExpectEnding(Call("plan long.json --filter mass=7"), 2, {"no case matches mass=7"});
+  ExpectEnding(Call("plan long.json --filter mas=1"), 2, {"no such key"});
+}
+
+TEST_F(LongSweeps, RunInGroupsGoOnAndAreSharded) {
+  const std::string all = std::to_string(kAll);
+  ExpectEnding(Call("run long.json --out whole --jobs 2"), 0,
+               {all + " run now in", "No tables were written"});
+  const auto whole = HashesOf("whole");
+  EXPECT_EQ(whole.size(), kAll);
+  ExpectEnding(Call("run long.json --out whole"), 0, {"0 run now, " + all + " were done before"});
+  EXPECT_TRUE(fs::exists(folder_ / "whole/results.groups"));
+  // without marks, and with marks of a store that is another one by now
+  fs::remove(folder_ / "whole/results.groups");
+  ExpectEnding(Call("run long.json --out whole"), 0, {"0 run now, " + all + " were done before"});
+  std::string text = ReadFile(folder_ / "whole/results.jsonl");
+  const std::size_t lines = 100;
+  std::size_t end = 0;
+  for (std::size_t i = 0; i < lines; ++i) end = text.find('\n', end) + 1;
+  Write("whole/results.jsonl", text.substr(0, end));
+  ExpectEnding(Call("run long.json --out whole"), 0,
+               {std::to_string(kAll - lines) + " run now", "100 were done before"});
+  EXPECT_EQ(HashesOf("whole"), whole);
+
+  std::string parts;
+  for (const std::string k : {"1", "2", "3"}) {
+    ExpectEnding(Call("run long.json --shard " + k + "/3 --out part" + k), 0, {});
+    parts += " part" + k;
+  }
+  ExpectEnding(Call("merge" + parts + " --out merged"), 0, {"of 3 stores are " + all + " cases"});
+  EXPECT_EQ(HashesOf("merged"), whole);
+}
+
+TEST_F(LongSweeps, GiveTheSameBitsInProcessesOfTheirOwn) {
+  const std::string some = " long.json --filter 'mass<1.1' --out ";
+  ExpectEnding(Call("run" + some + "shared"), 0, {" run now in "});
+  const Ending alone = Call("run --isolate" + some + "alone");
+  ExpectEnding(alone, 0, {" run now, 0 were"});
+  EXPECT_EQ(HashesOf("shared"), HashesOf("alone"));
+}
+
+TEST_F(LongSweeps, AFaultIsOneCasesOutcome) {
+  const std::string fault = "env LOOPBENCH_FAULT='crash:mass=1.5'";
+  ExpectEnding(Call("run long.json --filter formulation=odca --out faulty", fault), 0,
+               {"(44 not finished)"});
+  std::set<std::string> outcomes;
+  std::size_t crashed = 0;
+  for (const Record& one : ReadRecords(folder_ / "faulty")) {
+    const bool is_planted = one.Number("mass") == 1.5;
+    EXPECT_EQ(one.Text("outcome"), is_planted ? "crashed" : "finished");
+    crashed += is_planted;
+  }
+  EXPECT_EQ(crashed, 44u);
+  ExpectEnding(Call("run long.json --filter formulation=odca --out faulty --rerun failed"), 0,
+               {"44 run now"});
+}
+
+TEST_F(LongSweeps, AValueThatCannotBeIsRefusedBeforeAnythingRuns) {
+  std::string masses = "[";
+  for (int i = 1; i < 45; ++i) masses += std::to_string(i) + ", ";
+  Write("long.json", LongSweepText(masses + "-45]"));
+  ExpectEnding(Call("run long.json --out none"), 2,
+               {"found -45, expected a number > 0", "combination 1981 of 2025"});
+  EXPECT_FALSE(fs::exists(folder_ / "none"));
+  ExpectEnding(Call("run long.json --out none --gate doubts"), 2, {"found -45"});
+  Write("long.json", LongSweepText());
+  ExpectEnding(Call("run long.json --out none --gate doubts"), 2, {"--gate doubts", "a sweep of"});
+}
+
+}  // namespace long_sweep_test
+}  // namespace loopbench::harness

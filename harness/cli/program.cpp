@@ -41,7 +41,7 @@ Formulations: {}.
 Levels of enforcement: {}.
 Exit codes: 0 done, 1 a gate failed, 2 could not measure or bad input, 130 run was interrupted.)";
 
-int RunProgram(int argc, char** argv) {
+int RunCommandLine(int argc, char** argv) {
   CLI::App app{
       "Measures constraint drift and time of formulations of closed-loop multibody dynamics.",
       "loopbench"};
@@ -82,7 +82,7 @@ int RunProgram(int argc, char** argv) {
 
 int Main(int argc, char** argv) {
   harness::PrepareStreams();
-  return harness::FinishOutput(harness::RunProgram(argc, argv));
+  return harness::FinishOutput(harness::RunCommandLine(argc, argv));
 }
 
 }  // namespace loopbench

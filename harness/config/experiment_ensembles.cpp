@@ -158,7 +158,7 @@ void ReadEnsembles(const JsonNode& node, ExperimentFile& experiment) {
     node.Fail(fmt::format("at most {} ensemble rules", kMaxRules));
     return;
   }
-  if (CountCases(experiment) > kMaxCases) return;  // reported where it is counted
+  if (CountCases(experiment) > kMaxHeldCases) return;  // reported where it is counted
   const std::vector<Case> cases = Expand(experiment);
   for (const JsonNode& element : elements) {
     RuleOfExperiment rule;

@@ -120,7 +120,8 @@ class ExperimentSource::Document {
     for (std::size_t i = 0; i < sweep_->count(); ++i) {
       experiments.push_back(Read(i));
       cases += CountCases(experiments.back());
-      RefuseCases(static_cast<double>(cases), " so far");
+      Refuse(cases > kMaxHeldCases, "", fmt::format("{} cases so far", cases),
+             fmt::format("at most {} to be held at once", kMaxHeldCases));
       for (const ExperimentScene& scene : experiments.back().scenes) {
         bodies += scene.mechanism.description.bodies.size();
       }
@@ -129,11 +130,6 @@ class ExperimentSource::Document {
              fmt::format("at most {} in all combinations", kMaxAllBodies));
     }
     return WithoutExcluded(std::move(experiments));
-  }
-
-  void RefuseCases(double cases, const char* which) const {
-    Refuse(cases > static_cast<double>(kMaxCases), "", fmt::format("{:.0f} cases{}", cases, which),
-           fmt::format("at most {} in one file", kMaxCases));
   }
 
   /// A rule that excludes nothing is a mistake, as is a set of rules that excludes everything.

@@ -29,8 +29,9 @@ struct Setting {
 Setting ParseSetting(std::string_view text);
 
 inline constexpr std::size_t kMaxCombinations = 10'000'000;  ///< of a sweep
-inline constexpr std::size_t kMaxCases = 10'000'000;  ///< of a file, all combinations together
-inline constexpr std::size_t kMaxInMemory = 100'000;  ///< combinations that are held at once
+inline constexpr std::size_t kMaxCases = 10'000'000;     ///< of a file, all combinations together
+inline constexpr std::size_t kMaxInMemory = 100'000;     ///< combinations that are held at once
+inline constexpr std::size_t kMaxHeldCases = 1'000'000;  ///< and cases of them
 
 class ExperimentSource {
  public:

@@ -15,6 +15,7 @@ namespace {
 constexpr std::size_t kSome = 64;             ///< combinations that stand for all
 constexpr std::size_t kEachValue = 2000;      ///< values of an axis that are tried
 constexpr std::size_t kMostBodies = 200'000;  ///< of a group: some 100 MB
+constexpr std::size_t kMostCases = 100'000;   ///< of a group: some 100 MB of records, too
 
 bool IsOn(const Condition& condition,
           const std::vector<std::pair<std::string, std::size_t>>& axes) {
@@ -99,16 +100,24 @@ LongSweep::LongSweep(ExperimentSource source, const ExperimentFiles& files)
   const std::vector<std::size_t> sample = source_.EachValue(kEachValue);
   const Experiment first = source_.Read(0);
   const std::string keys = KeysWithoutParameters(first);
-  std::size_t bodies = 1;
+  std::size_t bodies = 1, cases = 1;
   for (const std::size_t combination : sample) {
     const Experiment one = source_.Read(combination);
     std::size_t all = 0;
+    cases = std::max(cases, Expand(one).size());
     for (const ExperimentScene& scene : one.scenes)
       all += scene.mechanism.description.bodies.size();
     bodies = std::max(bodies, all);
     are_alike_ = are_alike_ && KeysWithoutParameters(one) == keys;
   }
-  group_size_ = std::clamp<std::size_t>(kMostBodies / bodies, 1, kLongSweep);
+  if (count() > kMaxCases / cases) {
+    throw ConfigError(
+        fmt::format("{}: found {} combinations of up to {} cases, expected at most {} "
+                    "cases in one file",
+                    source_.path().string(), count(), cases, kMaxCases));
+  }
+  group_size_ =
+      std::clamp<std::size_t>(std::min(kMostBodies / bodies, kMostCases / cases), 1, kLongSweep);
   RequireKeys({first}, filter_);
   source_.CheckExclusions(sample);
   const double step = static_cast<double>(count() - 1) / (kSome - 1);

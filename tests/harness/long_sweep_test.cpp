@@ -55,9 +55,8 @@ class LongSweeps : public CommandLineTest {
 
 TEST_F(LongSweeps, AreCountedWithoutBeingRead) {
   const std::string cases = std::to_string(kAll) + " cases";
-  ExpectEnding(
-      Call("plan long.json"), 0,
-      {"axis mass: 45 values", "2025 combinations", cases, "64 combinations stand for all"});
+  ExpectEnding(Call("plan long.json"), 0,
+               {"axis mass: 45 values", "2025 combinations", cases, "combinations stand for all"});
   ExpectEnding(Call("check long.json"), 0, {cases, "each value of each axis was read"});
   ExpectEnding(Call("explain long.json"), 0, {"2025 combinations", "(45 values, some shown)"});
   ExpectEnding(Call("list long.json"), 0, {cases, "--json lists every case"});

@@ -221,7 +221,9 @@ TEST(SharedProcessesTest, WhatEndsAProcessEndsOneTaskOnly) {
                           : i == 200 ? ProcessEnding::kOverTime
                                      : ProcessEnding::kAnswered;
     EXPECT_EQ(result.ending, expected) << i << ": " << result.text;
-    if (expected == ProcessEnding::kAnswered) EXPECT_EQ(result.text, std::to_string(i));
+    if (expected == ProcessEnding::kAnswered) {
+      EXPECT_EQ(result.text, std::to_string(i));
+    }
   }
   EXPECT_EQ(results.at(100).text, "no");
 }

@@ -3,6 +3,7 @@
 #include <CLI/CLI.hpp>
 #include <exception>
 
+#include "harness/cli/program_baseline.h"
 #include "harness/cli/program_compare.h"
 #include "harness/cli/program_files.h"
 #include "harness/cli/program_report.h"
@@ -57,6 +58,7 @@ int RunCommandLine(int argc, char** argv) {
   StoreOptions stores(app);
   ReportCommandOptions report(app);
   ComparisonOptions comparison(app);
+  BaselineOptions baseline(app);
   ShellOptions shell(app);
   try {
     app.parse(argc, argv);
@@ -70,6 +72,7 @@ int RunCommandLine(int argc, char** argv) {
     if (const auto code = stores.Run(typed)) return *code;
     if (const auto code = report.Run(typed)) return *code;
     if (const auto code = comparison.Run(typed)) return *code;
+    if (const auto code = baseline.Run(typed)) return *code;
     return shell.Run();
   } catch (const std::exception& error) {
     PrintError("{}\n", Lines{error.what()});

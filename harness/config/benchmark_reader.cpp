@@ -218,16 +218,18 @@ const Fields<BenchmarkSet>& BenchmarkFields() {
       "What loopbench_bench and loopbench_count measure. Every combination of a group's members, "
       "measures and columns is a benchmark. The program checks more than this schema: that "
       "mechanism files exist and are valid, and that benchmarks are different.",
-      {{"$schema", TextSchema(), "Address of this schema, for editors."},
-       {"name", Text(&BenchmarkSet::name), "Of the set.", "a name"},
-       {"comment", Text(&BenchmarkSet::comment), "Free text for readers."},
-       {"states", By(TextSchema(), ReadNamedStates),
-        "File of state hashes, relative to this file; loopbench_bench --save-states writes it."},
-       {"integrator", Choice(&BenchmarkSet::integrator, ProfileNames(), "an integrator profile"),
-        "Profile whose step is measured."},
-       {"step", Number(&BenchmarkSet::step, kPositive), "Length of the step [s]."},
-       {"groups", By(ArraySchema(GroupFields().Schema(), 1), ReadGroups), "What is measured.",
-        "an array of groups"}});
+      DocumentRows<BenchmarkSet>(
+          {{"name", Text(&BenchmarkSet::name), "Of the set.", "a name"},
+           {"comment", Text(&BenchmarkSet::comment), "Free text for readers."},
+           {"states", By(TextSchema(), ReadNamedStates),
+            "File of state hashes, relative to this file; loopbench_bench --save-states writes "
+            "it."},
+           {"integrator",
+            Choice(&BenchmarkSet::integrator, ProfileNames(), "an integrator profile"),
+            "Profile whose step is measured."},
+           {"step", Number(&BenchmarkSet::step, kPositive), "Length of the step [s]."},
+           {"groups", By(ArraySchema(GroupFields().Schema(), 1), ReadGroups), "What is measured.",
+            "an array of groups"}}));
   return fields;
 }
 

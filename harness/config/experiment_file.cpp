@@ -6,6 +6,7 @@
 #include "harness/config/experiment_sections.h"
 #include "harness/config/file_schemas.h"
 #include "harness/config/options.h"
+#include "harness/json/document_kind.h"
 
 namespace loopbench::harness {
 
@@ -98,42 +99,47 @@ const Fields<ExperimentFile>& ExperimentFileFields() {
       "product. The program checks more than this schema: that mechanism files exist and are "
       "valid, that scenes and columns are different, that fields of a sweep exist, that ranges "
       "have two different ends, and that every ensemble and exclusion matches a case.",
-      {{"$schema", TextSchema(), "Address of this schema, for editors."},
-       {"name", Text(&File::name), "Of the suite.", "a name"},
-       {"comment", Text(&File::comment), "Free text for readers."},
-       {"scenes", ScenesValue(), "What moves.", "an array of scenes"},
-       {"columns", By(ColumnsSchema(), ReadAllColumns), "How the loops are imposed.",
-        "an array of columns"},
-       {"tolerances", By(some_or_none, ReadAnyTolerances),
-        "rtol = atol of the integrator; above the spacing of doubles. May be left out, or be [], "
-        "beside fixed_steps."},
-       {"fixed_steps", NumberList(&File::fixed_steps, kPositive),
-        "Lengths of steps [s]: each makes cases whose steps all have this length (the last is "
-        "clipped), without error test, besides those of the tolerances. Not for peers."},
-       {"", By(one_of_both, RequireSteps)},
-       {"", By(Json::object(), RequireNoPeerOfFixedSteps)},
-       {"integrator", Integrators(),
-        "The profile, a Runge-Kutta pair with its norm and controller, or several, crossed with "
-        "all else."},
-       {"jacobian", Choice(&File::jacobian, NamesOf<JacobianKind>(), "a kind of Jacobian"),
-        "Where implicit profiles have their Jacobians from; explicit ones have none."},
-       {"limits", Object(&File::limits, LimitsFields())},
-       {"compile", Object(&File::compile, CompileFields())},
-       {"series", Section(SeriesFields())},
-       {"timing", Object(&File::timing, TimingFields())},
-       {"precision", By(PrecisionFields().Schema(), ReadPrecision)},
-       {"reference", By(ReferenceFields().Schema(), ReadReferenceOptions)},
-       {"output", By(OutputFields().Schema(), ReadOutputOptions)},
-       {"", By(Json::object(), RequireOutput)},
-       {"ensembles", By(EnsemblesSchema(), ReadEnsembles), "Perturbed repetitions of cases."},
-       {"sweep", SweepSchema(),
-        "Axes that are crossed, the first one slowest; each combination of values is run as if "
-        "the values stood in this file. Axes in a zip go in step. At most 10000000 combinations."},
-       {"exclude", ExclusionsSchema(),
-        "Cases that match all conditions of a rule are left out. Keys are mechanism, formulation, "
-        "enforcement, coordinates, solver, integrator, rtol, atol, step, horizon and the names of "
-        "axes."},
-       {"", By(Json::object(), RequireDerivatives)}});
+      DocumentRows<File>(
+          {{"name", Text(&File::name), "Of the suite.", "a name"},
+           {"comment", Text(&File::comment), "Free text for readers."},
+           {"scenes", ScenesValue(), "What moves.", "an array of scenes"},
+           {"columns", By(ColumnsSchema(), ReadAllColumns), "How the loops are imposed.",
+            "an array of columns"},
+           {"tolerances", By(some_or_none, ReadAnyTolerances),
+            "rtol = atol of the integrator; above the spacing of doubles. May be left out, or be "
+            "[], "
+            "beside fixed_steps."},
+           {"fixed_steps", NumberList(&File::fixed_steps, kPositive),
+            "Lengths of steps [s]: each makes cases whose steps all have this length (the last is "
+            "clipped), without error test, besides those of the tolerances. Not for peers."},
+           {"", By(one_of_both, RequireSteps)},
+           {"", By(Json::object(), RequireNoPeerOfFixedSteps)},
+           {"integrator", Integrators(),
+            "The profile, a Runge-Kutta pair with its norm and controller, or several, crossed "
+            "with "
+            "all else."},
+           {"jacobian", Choice(&File::jacobian, NamesOf<JacobianKind>(), "a kind of Jacobian"),
+            "Where implicit profiles have their Jacobians from; explicit ones have none."},
+           {"limits", Object(&File::limits, LimitsFields())},
+           {"compile", Object(&File::compile, CompileFields())},
+           {"series", Section(SeriesFields())},
+           {"timing", Object(&File::timing, TimingFields())},
+           {"precision", By(PrecisionFields().Schema(), ReadPrecision)},
+           {"reference", By(ReferenceFields().Schema(), ReadReferenceOptions)},
+           {"output", By(OutputFields().Schema(), ReadOutputOptions)},
+           {"", By(Json::object(), RequireOutput)},
+           {"ensembles", By(EnsemblesSchema(), ReadEnsembles), "Perturbed repetitions of cases."},
+           {"sweep", SweepSchema(),
+            "Axes that are crossed, the first one slowest; each combination of values is run as if "
+            "the values stood in this file. Axes in a zip go in step. At most 10000000 "
+            "combinations."},
+           {"exclude", ExclusionsSchema(),
+            "Cases that match all conditions of a rule are left out. Keys are mechanism, "
+            "formulation, "
+            "enforcement, coordinates, solver, integrator, rtol, atol, step, horizon and the names "
+            "of "
+            "axes."},
+           {"", By(Json::object(), RequireDerivatives)}}));
   return fields;
 }
 

@@ -90,23 +90,25 @@ const Fields<Draft>& MechanismFileFields() {
       "Bodies, joints, forces and initial values; SI units, angles in rad. The program checks "
       "more than this schema: that names exist, that inertias are positive definite and those of "
       "a body, that each joint gets as many values as it has coordinates.",
-      {{"$schema", TextSchema(), "Address of this schema, for editors."},
-       {"name", Text(&Draft::name), "Of the scene.", "a name"},
-       {"comment", By(TextSchema(), ReadComment, WriteComment), "Free text for readers."},
-       {"space", Choice(&Draft::space, {"planar", "spatial"}, "a space"),
-        "Planar: everything moves in the x-y plane, third components are 0."},
-       {"gravity", By(VectorSchema(), ReadGravity, WriteGravity),
-        "Acceleration of gravity [m/s^2] in ground axes.", "an array of 2 or 3 numbers [m/s^2]"},
-       {"ground", GroundValue()},
-       {"bodies", BodiesValue(), "All that moves.", "an array of bodies", HasNoBodies},
-       {"joints", JointsValue(), "What holds bodies together, and lets them move.",
-        "an array of joints"},
-       {"forces", ForcesValue(), "Besides gravity."},
-       {"initial", Section(InitialFields())},
-       {"independent", IndependentValue(),
-        "Speeds that the fixed coordinate reduction takes as independent: joint names for joint "
-        "coordinates, \"<body>.angle\", \"<body>.x\", ... for absolute ones."},
-       {"observe", Section(ObservationFields())}});
+      DocumentRows<Draft>(
+          {{"name", Text(&Draft::name), "Of the scene.", "a name"},
+           {"comment", By(TextSchema(), ReadComment, WriteComment), "Free text for readers."},
+           {"space", Choice(&Draft::space, {"planar", "spatial"}, "a space"),
+            "Planar: everything moves in the x-y plane, third components are 0."},
+           {"gravity", By(VectorSchema(), ReadGravity, WriteGravity),
+            "Acceleration of gravity [m/s^2] in ground axes.",
+            "an array of 2 or 3 numbers [m/s^2]"},
+           {"ground", GroundValue()},
+           {"bodies", BodiesValue(), "All that moves.", "an array of bodies", HasNoBodies},
+           {"joints", JointsValue(), "What holds bodies together, and lets them move.",
+            "an array of joints"},
+           {"forces", ForcesValue(), "Besides gravity."},
+           {"initial", Section(InitialFields())},
+           {"independent", IndependentValue(),
+            "Speeds that the fixed coordinate reduction takes as independent: joint names for "
+            "joint "
+            "coordinates, \"<body>.angle\", \"<body>.x\", ... for absolute ones."},
+           {"observe", Section(ObservationFields())}}));
   return fields;
 }
 

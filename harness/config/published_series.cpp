@@ -189,15 +189,15 @@ const Fields<SeriesDraft>& SeriesFileFields() {
       "Published numbers of a mechanism's motion, for \"reference\" in an experiment. The program "
       "checks more than this schema: that times rise, that there are as many values, that bodies, "
       "points and joints are the mechanism's.",
-      {{"$schema", TextSchema(), "Address of this schema, for editors."},
-       {"name", Text(&SeriesDraft::name), "Of the series, for tables.", "a name"},
-       {"source", Text(&SeriesDraft::source), "Where the numbers were published, and by what.",
-        "where the numbers were published"},
-       {"comment", Text(&SeriesDraft::comment), "Free text for readers."},
-       {"times", By(ArraySchema(NumberSchema(kNotNegative), 1, kMostTimes), ReadTimes),
-        "Rising [s].", "a list of rising numbers >= 0 [s]"},
-       {"quantities", By(ArraySchema(QuantityFields().Schema(), 1), ReadQuantities),
-        "What is known at these times.", "a list of quantities"}});
+      DocumentRows<SeriesDraft>(
+          {{"name", Text(&SeriesDraft::name), "Of the series, for tables.", "a name"},
+           {"source", Text(&SeriesDraft::source), "Where the numbers were published, and by what.",
+            "where the numbers were published"},
+           {"comment", Text(&SeriesDraft::comment), "Free text for readers."},
+           {"times", By(ArraySchema(NumberSchema(kNotNegative), 1, kMostTimes), ReadTimes),
+            "Rising [s].", "a list of rising numbers >= 0 [s]"},
+           {"quantities", By(ArraySchema(QuantityFields().Schema(), 1), ReadQuantities),
+            "What is known at these times.", "a list of quantities"}}));
   return fields;
 }
 

@@ -8,21 +8,25 @@
 #include <vector>
 
 #include "harness/json/document_kind.h"
+#include "harness/text/file_format.h"
 
 namespace loopbench::harness {
 namespace {
+
+/// What every file may have.
+bool IsCommon(std::string_view key) { return key == "$schema" || key == "format"; }
 
 /// A kind by what every file of it has and may have at its top level.
 struct Kind {
   FileKind kind;
   std::string_view name;
   std::vector<std::string> own;  ///< what it is known by; without any of these a file is not of it
-  NameList keys;                 ///< all, "$schema" last
+  NameList keys;                 ///< all, those of every file last
 
   std::ptrdiff_t CountKnown(const Json& document) const {
     std::ptrdiff_t known = 0;
     for (const auto& [key, value] : document.items()) {
-      if (key != "$schema" && keys.Find(key)) ++known;
+      if (!IsCommon(key) && keys.Find(key)) ++known;
     }
     return known;
   }
@@ -34,26 +38,26 @@ const std::array<Kind, 6>& Kinds() {
        "a mechanism",
        {"bodies", "joints"},
        {"name", "comment", "space", "gravity", "bodies", "ground", "joints", "forces", "initial",
-        "independent", "observe", "$schema"}},
+        "independent", "observe", "$schema", "format"}},
       {FileKind::kExperiment,
        "an experiment",
        {"scenes", "columns"},
-       {"name", "comment", "scenes", "columns", "tolerances", "fixed_steps", "integrator",
-        "jacobian", "ensembles", "limits", "compile", "series", "timing", "precision", "reference",
-        "output", "sweep", "exclude", "$schema"}},
-      {FileKind::kClaims, "claims", {"claims"}, {"claims", "$schema"}},
+       {"name",      "comment",   "scenes", "columns", "tolerances", "fixed_steps", "integrator",
+        "jacobian",  "ensembles", "limits", "compile", "series",     "timing",      "precision",
+        "reference", "output",    "sweep",  "exclude", "$schema",    "format"}},
+      {FileKind::kClaims, "claims", {"claims"}, {"claims", "$schema", "format"}},
       {FileKind::kMap,
        "a failure map",
        {"columns", "groups"},
-       {"title", "comment", "columns", "groups", "$schema"}},
+       {"title", "comment", "columns", "groups", "$schema", "format"}},
       {FileKind::kBenchmarks,
        "benchmarks",
        {"groups"},
-       {"name", "comment", "states", "integrator", "step", "groups", "$schema"}},
+       {"name", "comment", "states", "integrator", "step", "groups", "$schema", "format"}},
       {FileKind::kSeries,
        "a published series",
        {"times", "quantities"},
-       {"name", "comment", "source", "times", "quantities", "$schema"}},
+       {"name", "comment", "source", "times", "quantities", "$schema", "format"}},
   }};
   return kinds;
 }
@@ -95,7 +99,7 @@ void ReportAmbiguous(const JsonNode& root, const std::vector<const Kind*>& kinds
   std::vector<std::string> found, expected;
   for (const Kind* kind : kinds) {
     found.push_back(WithKeys(*kind, kind->keys.all(), [&](const std::string& key) {
-      return key != "$schema" && root.value().contains(key);
+      return !IsCommon(key) && root.value().contains(key);
     }));
   }
   for (const Kind& kind : Kinds()) {
@@ -121,6 +125,11 @@ bool ExpectDocument(const JsonNode& root, FileKind kind) {
       root.FailAs(fmt::format("{} (it has \"{}\")", likeliest.name, *own), wanted.name);
       return false;
     }
+  }
+  // first of all: keys of a later format are no mistakes of spelling
+  if (const auto format = root.Optional("format"); format && format->value() != kFileFormat) {
+    format->Fail(fmt::format(kExpectedFormat, kFileFormat));
+    return false;
   }
   if (!root.ExpectObject(wanted.keys)) return false;
   if (const auto schema = root.Optional("$schema")) schema->Text();

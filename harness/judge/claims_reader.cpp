@@ -142,9 +142,8 @@ const Fields<ClaimsFile>& ClaimsFields() {
       "claims",
       "Rules that turn stored records into verdicts (loopbench verdict). The program checks more "
       "than this schema: that ids, and labels of one claim, are different.",
-      {{"$schema", TextSchema(), "Address of this schema, for editors."},
-       {"claims", By(ArraySchema(RuleFields().Schema()), ReadRules), "One after the other.",
-        "an array of claims"}});
+      DocumentRows<ClaimsFile>({{"claims", By(ArraySchema(RuleFields().Schema()), ReadRules),
+                                 "One after the other.", "an array of claims"}}));
   return fields;
 }
 

@@ -276,13 +276,13 @@ const Fields<MapRules>& MapFields() {
       "The program checks more than this schema: that labels are different, that \"must_hold\" and "
       "\"not_applicable\" name columns, and that a row, with its group, selects records and says "
       "what decides about a run that ends as it should.",
-      {{"$schema", TextSchema(), "Address of this schema, for editors."},
-       {"title", Text(&MapRules::title), "Of the map.", kAnyText},
-       {"comment", Text(&MapRules::comment), "Free text for readers."},
-       {"columns", By(ArraySchema(MethodFields().Schema(), 1), ReadMapColumns), "Methods.",
-        "an array of columns"},
-       {"groups", By(ArraySchema(MapGroupFields().Schema(), 1), ReadMapGroups), "Rows, in groups.",
-        "an array of groups of rows"}});
+      DocumentRows<MapRules>(
+          {{"title", Text(&MapRules::title), "Of the map.", kAnyText},
+           {"comment", Text(&MapRules::comment), "Free text for readers."},
+           {"columns", By(ArraySchema(MethodFields().Schema(), 1), ReadMapColumns), "Methods.",
+            "an array of columns"},
+           {"groups", By(ArraySchema(MapGroupFields().Schema(), 1), ReadMapGroups),
+            "Rows, in groups.", "an array of groups of rows"}}));
   return fields;
 }
 

@@ -40,6 +40,7 @@ constexpr Measure kMeasures[] = {
     {"version", kText, {"version"}},
     {"experiment_index", kNumber},
     {"checksum", kText},
+    {"format", kNumber},
 
     // how it ended
     {"outcome", kText, {"outcome"}, {kOfEnding}, kOutcome},

@@ -1,5 +1,7 @@
 #include "harness/record/record_json.h"
 
+#include <fmt/format.h>
+
 #include <cmath>
 #include <nlohmann/json.hpp>
 #include <type_traits>
@@ -7,6 +9,7 @@
 #include <vector>
 
 #include "harness/record/record_checksum.h"
+#include "harness/text/file_format.h"
 #include "harness/text/hash.h"
 
 namespace loopbench::harness {
@@ -47,7 +50,12 @@ std::string Dump(const Record& record) {
 
 std::string ToJsonObject(const Record& record) { return Dump<nlohmann::ordered_json>(record); }
 
-std::string ToJsonLine(const Record& record) { return WithChecksum(ToJsonObject(record)); }
+std::string ToJsonLine(const Record& record) {
+  std::string object = ToJsonObject(record);
+  const bool is_empty = record.items().empty();
+  object.replace(0, 1, fmt::format("{{\"format\":{}{}", kFileFormat, is_empty ? "" : ","));
+  return WithChecksum(std::move(object));
+}
 
 std::string CaseId(const Record& canonical_keys) {
   // nlohmann::json keeps its keys sorted.

@@ -8,8 +8,8 @@
 
 namespace loopbench::harness {
 
-/// The record as one JSON object without line breaks, keys in the record's order, and behind them
-/// its checksum.
+/// The record as one JSON object without line breaks: "format" (file_format.h), keys in the
+/// record's order, and behind them its checksum.
 ///
 /// JSON has no NaN and no infinity. A non-finite double is written as null, which reads back as
 /// monostate ("not measured"); inside a series it reads back as NaN. Every other value comes back
@@ -20,14 +20,15 @@ namespace loopbench::harness {
 /// this. It finds whatever changes a line by accident, a flipped bit with certainty; it is no
 /// signature.
 std::string ToJsonLine(const Record& record);
-/// The same object without a checksum: a row of a table, not of a store.
+/// The same object without format and checksum: a row of a table, not of a store.
 std::string ToJsonObject(const Record& record);
 
-/// The record that `line` describes, without its checksum. A line without one (made by hand) is
-/// read as it is. Throws std::runtime_error that says what was found and what was expected: for a
-/// checksum that is not that of the line, for anything but one flat JSON object of null, bool,
-/// number, string or array of numbers, for a key that occurs twice, and for a value of another type
-/// than its key has (measures.h). Linear in the length of the line, whatever it holds.
+/// The record that `line` describes, without its format and checksum. A line without them (made by
+/// hand) is read as it is. Throws std::runtime_error that says what was found and what was
+/// expected: for another format, a checksum that is not that of the line, anything but one flat
+/// JSON object of null, bool, number, string or array of numbers, for a key that occurs twice, and
+/// for a value of another type than its key has (measures.h). Linear in the length of the line,
+/// whatever it holds.
 Record FromJsonLine(std::string_view line);
 
 /// Whether `line` is the beginning of a line that ToJsonLine() wrote of a run's record, and no

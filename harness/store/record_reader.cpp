@@ -2,6 +2,8 @@
 // depth nor length of a line costs more than its bytes.
 #include <fmt/format.h>
 
+#include <algorithm>
+#include <array>
 #include <cstdint>
 #include <limits>
 #include <nlohmann/json.hpp>
@@ -17,13 +19,16 @@
 #include "harness/record/measures.h"
 #include "harness/record/record_checksum.h"
 #include "harness/record/record_json.h"
+#include "harness/text/file_format.h"
 
 namespace loopbench::harness {
 namespace {
 
 using LineJson = nlohmann::ordered_json;
 
-constexpr std::string_view kBeginning = "{\"kind\":\"";
+/// Of a run's line; before 1.0 it had no format.
+const std::array<std::string, 2> kBeginnings = {
+    fmt::format("{{\"format\":{},\"kind\":\"", kFileFormat), "{\"kind\":\""};
 
 class RecordReader final : public nlohmann::json_sax<LineJson> {
  public:
@@ -117,7 +122,10 @@ class RecordReader final : public nlohmann::json_sax<LineJson> {
     if (place_ != Place::kObject || (key_type_ != type && key_type_ != ValueType::kAny)) {
       return Reject(Expected(), shown);
     }
-    if (key_ != "checksum") record_.Append(std::move(key_), std::move(value));
+    if (key_ == "format" && value != Value(std::int64_t{kFileFormat})) {
+      return Reject(fmt::format(kExpectedFormat, kFileFormat), shown);
+    }
+    if (key_ != "checksum" && key_ != "format") record_.Append(std::move(key_), std::move(value));
     return true;
   }
 
@@ -157,8 +165,10 @@ Record FromJsonLine(std::string_view line) {
 }
 
 bool IsTornRecord(std::string_view line) {
-  const std::size_t common = std::min(line.size(), kBeginning.size());
-  return line.substr(0, common) == kBeginning.substr(0, common) && RecordReader(line).ends_early();
+  const bool begins = std::ranges::any_of(kBeginnings, [line](std::string_view beginning) {
+    return line.starts_with(beginning) || beginning.starts_with(line);
+  });
+  return begins && RecordReader(line).ends_early();
 }
 
 }  // namespace loopbench::harness

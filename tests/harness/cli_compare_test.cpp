@@ -123,6 +123,22 @@ TEST_F(ComparisonCommands, ExportNamesTheCasesThatFailed) {
   Expect("fit b.json", 0, {"a/N", "2.00"});
 }
 
+TEST_F(ComparisonCommands, ABaselineIsRenewedHeldAgainstAndTested) {
+  const std::string tiny = " --experiments tiny.json --dir kept";
+  Expect("baseline check" + tiny, 2, {"kept/results.jsonl: no such file", "baseline renew"});
+  Expect("baseline renew" + tiny, 0, {"renewed kept/results.jsonl: 2 records"});
+  Expect("baseline check" + tiny, 0, {"SAME"});
+  Expect("baseline selftest" + tiny, 0,
+         {"same: ", "caught: 3 times the drift", "caught: one step more",
+          "caught: a run that fails", "caught: a case that is gone"});
+  EditMechanism("\"mass\": 1.0,", "\"mass\": 1.01,");
+  Expect("baseline check" + tiny, 2, {"ran another mechanism"});
+  Expect("baseline check" + tiny + " --counts tiny.json --counter ./none", 2,
+         {"--counts tiny.json: ", "not found"});
+  Expect("baseline chekc" + tiny, 2, {"check"});
+  Expect("baseline check --dir kept", 2, {"--experiments is required"});
+}
+
 TEST_F(ComparisonCommands, BaselineSaysWhatToBuildFirst) {
   fs::create_directories(folder_ / "tools");
   fs::copy_file(fs::path(LOOPBENCH_SOURCE_DIR) / "tools/baseline", folder_ / "tools/baseline");

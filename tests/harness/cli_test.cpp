@@ -93,7 +93,7 @@ TEST_F(BadInput, EmptyStoreIsNamed) {
 TEST_F(CommandLineTest, HelpEndsWithZeroAndShowsExamples) {
   ExpectEnding(Call("--help"), 0, {"Examples:", "Exit codes: 0 done"});
   ExpectEnding(Call("run --help"), 0, {"--filter"});
-  ExpectEnding(Call("--version"), 0, {"loopbench 0.", "commit: ", "compiler: ", "SUNDIALS "});
+  ExpectEnding(Call("--version"), 0, {"loopbench 1.", "commit: ", "compiler: ", "SUNDIALS "});
 }
 
 TEST_F(CommandLineTest, UnreachableAssemblyIsARowAndNoError) {

@@ -94,7 +94,7 @@ TEST(MapRules, AllMistakesAreReportedAtOnce) {
   for (std::string line; std::getline(lines, line);) found.push_back(line);
   const std::vector<std::string> expected = {
       "map.json:2: /titel: found unknown key \"titel\", expected one of \"title\", \"comment\", "
-      "\"columns\", \"groups\", \"$schema\" (did you mean \"title\"?)",
+      "\"columns\", \"groups\", \"$schema\", \"format\" (did you mean \"title\"?)",
       "map.json:1: (top level): found no \"title\", expected a string that is not empty",
       "map.json:3: /columns/0/select: found an empty object, expected at least one key",
   };

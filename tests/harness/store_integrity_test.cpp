@@ -150,6 +150,20 @@ TEST_F(StoreIntegrity, AFileAsStoreHasItsTablesBesideIt) {
   EXPECT_FALSE(fs::exists(folder_ / "new/drift.csv")) << "which may be somebody's";
 }
 
+TEST_F(StoreIntegrity, AnotherFormatIsRefusedByNameAndNoneIsThatOfBefore) {
+  EXPECT_EQ(Complaint("{\"format\":1,\"kind\":\"timing\",\"bodies\":3}\n"), "");
+  EXPECT_EQ(FromJsonLine("{\"format\":1,\"kind\":\"timing\"}").Find("format"), nullptr);
+  for (const char* other : {"2", "0", "1.0", "\"1\"", "null", "[1]"}) {
+    const std::string said =
+        Complaint(std::string("{\"format\":") + other + ",\"kind\":\"timing\"}\n");
+    EXPECT_NE(said.find("key 'format': expected "), std::string::npos) << said;
+  }
+  const std::string later = Complaint("{\"format\":2,\"kind\":\"timing\",\"more\":{}}\n");
+  EXPECT_NE(later.find("expected 1, the format that this version reads, found 2"),
+            std::string::npos)
+      << later;
+}
+
 TEST_F(StoreIntegrity, ATornLineStopsAMerge) {
   Write("torn.jsonl", text_.substr(0, text_.size() - 30));
   ExpectEnding(Call("merge torn.jsonl --out merged"), 2,

@@ -79,7 +79,7 @@ TEST(RecordJson, NonFiniteNumbersBecomeNull) {
   record.Set("series.drift", std::vector<double>{1.0, kNan, kInf});
   const std::string line = ToJsonLine(record);
   EXPECT_TRUE(line.starts_with(
-      R"({"drift":null,"energy":null,"series.drift":[1.0,null,null],"checksum":")"))
+      R"({"format":1,"drift":null,"energy":null,"series.drift":[1.0,null,null],"checksum":")"))
       << line;
   const Record back = FromJsonLine(line);
   EXPECT_TRUE(std::holds_alternative<std::monostate>(*back.Find("drift")));

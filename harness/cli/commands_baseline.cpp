@@ -1,0 +1,249 @@
+#include "harness/cli/commands_baseline.h"
+
+#include <fmt/format.h>
+#include <unistd.h>
+
+#include <algorithm>
+#include <cmath>
+#include <cstdlib>
+#include <functional>
+
+#include "harness/cli/commands_compare.h"
+#include "harness/isolation/interruption.h"
+#include "harness/judge/compare.h"
+#include "harness/judge/rules.h"
+#include "harness/run/peers.h"
+#include "harness/store/contents.h"
+#include "harness/store/finished_runs.h"
+#include "harness/store/measurements.h"
+#include "harness/suite/precision_cases.h"
+#include "harness/suite/reference_cases.h"
+#include "harness/suite/workload.h"
+#include "harness/text/config_error.h"
+#include "harness/text/files.h"
+#include "harness/text/run_program.h"
+#include "harness/text/terminal.h"
+
+namespace loopbench::harness {
+namespace {
+
+constexpr const char* kResults = "results.jsonl";
+
+/// A folder that goes with its owner, unless it was asked for.
+class WorkFolder {
+ public:
+  explicit WorkFolder(const std::filesystem::path& kept) : path_(kept), is_kept_(!kept.empty()) {
+    if (is_kept_) return;
+    std::string name = (std::filesystem::temp_directory_path() / "loopbench-XXXXXX").string();
+    if (::mkdtemp(name.data()) == nullptr) FailOn("make", name);
+    path_ = name;
+  }
+  ~WorkFolder() {
+    std::error_code ignored;
+    if (!is_kept_) std::filesystem::remove_all(path_, ignored);
+  }
+  WorkFolder(const WorkFolder&) = delete;
+  WorkFolder& operator=(const WorkFolder&) = delete;
+
+  const std::filesystem::path& path() const { return path_; }
+
+ private:
+  std::filesystem::path path_;
+  bool is_kept_;
+};
+
+std::string CounterOf(const BaselineCommand& command) {
+  if (!command.counter.empty()) return command.counter.string();
+  const auto beside =
+      std::filesystem::read_symlink("/proc/self/exe").parent_path() / "loopbench_count";
+  return std::filesystem::exists(beside) ? beside.string() : "loopbench_count";
+}
+
+void RequirePrograms(const BaselineCommand& command) {
+  if (command.counts.empty()) return;
+  const std::string counter = CounterOf(command);
+  for (const std::string& program : {std::string("valgrind"), counter}) {
+    const ProgramResult tried = RunProgram({program, "--version"});
+    if (tried.error == 0) continue;
+    throw ConfigError(fmt::format("--counts {}: {}{}", command.counts.string(),
+                                  tried.Failure(program),
+                                  program == "valgrind" ? "; install it: apt-get install valgrind"
+                                                        : "; --counter says where it is"));
+  }
+}
+
+/// Runs a program for what it leaves. Throws with what it said when it fails.
+void MustRun(std::vector<std::string> words, const std::string& name) {
+  const ProgramResult result = RunProgram(std::move(words));
+  if (const std::string failure = result.Failure(name); !failure.empty()) {
+    throw std::runtime_error(failure + result.output);
+  }
+}
+
+/// 20 evaluations per case, and `planted` more that are not reported.
+void CountInstructions(const BaselineCommand& command, const std::filesystem::path& out,
+                       int planted) {
+  const std::string counter = CounterOf(command);
+  const std::string dump = out.string() + ".callgrind";
+  // without environment and, where that may be switched off, address randomisation: the same
+  // instructions every time
+  std::vector<std::string> words = {"env", "-i"};
+  if (RunProgram({"setarch", "-R", "true"}).status == 0)
+    words.insert(words.end(), {"setarch", "-R"});
+  words.insert(words.end(),
+               {"valgrind", "-q", "--tool=callgrind", "--callgrind-out-file=" + dump,
+                "--toggle-collect=CountedEvaluations", "--dump-after=CountedEvaluations", counter,
+                command.counts.string(), "--planted", std::to_string(planted)});
+  MustRun(std::move(words), "valgrind");
+  MustRun({counter, command.counts.string(), "--callgrind", dump, "--out", out.string()}, counter);
+}
+
+/// All measurements into work/results.jsonl; the exit code of an interruption, or 0.
+int MeasureAll(const BaselineCommand& command, const std::filesystem::path& work) {
+  Workload workload({command.experiments, {}, {}, 0}, {});
+  if (workload.is_long()) {
+    throw ConfigError(
+        fmt::format("found a sweep of more than {} combinations, expected a baseline "
+                    "of cases that are worth a look each",
+                    kLongSweep));
+  }
+  RequirePeers(workload.some());
+  for (const Experiment& experiment : workload.some()) {
+    RequireLadders(experiment);
+    RequireReferences(experiment);
+  }
+  std::filesystem::remove_all(work / "run");
+  {
+    ResultStore store(work / "run");
+    FinishedRuns finished(work / "run");
+    SuiteOptions options;
+    options.jobs = command.jobs;
+    options.timing = false;  // times belong to one machine: loopbench history
+    try {
+      RunSuite(workload, options, finished, store);
+    } catch (const Interrupted& interrupted) {
+      PrintError("interrupted: nothing was compared and nothing renewed\n");
+      return interrupted.exit_code();
+    }
+  }
+  std::string text = ReadFile(work / "run" / kResults);
+  if (!command.counts.empty()) {
+    CountInstructions(command, work / "counts.jsonl", 0);
+    text += ReadFile(work / "counts.jsonl");
+  }
+  WriteFileAtomically(work / kResults, text);
+  return 0;
+}
+
+std::vector<Record> Load(const std::filesystem::path& path) {
+  std::vector<std::string> warnings;
+  return ReadMeasurements(path, &warnings);
+}
+
+/// A change of measured values that the comparison must catch.
+struct Plant {
+  std::string what, measure;
+  /// True when the record has what it changes, and was changed.
+  std::function<bool(Record*)> change;
+};
+
+bool Scale(Record* record, std::string_view key, double factor, double floor) {
+  if (record->Find(key) == nullptr || !(record->Number(key) > floor)) return false;
+  record->Set(std::string(key), factor * record->Number(key));
+  return true;
+}
+
+std::vector<Plant> Plants(const CompareOptions& options) {
+  const auto add_one = [](const char* key) {
+    return [key](Record* record) {
+      if (record->Find(key) == nullptr) return false;
+      record->Set(key, static_cast<std::int64_t>(record->Number(key)) + 1);
+      return true;
+    };
+  };
+  return {{"3 times the drift", "drift_position_max",
+           [&options](Record* record) {
+             return Scale(record, "drift_position_max", 3.0, options.error_floor);
+           }},
+          {"one step more", "steps", add_one("steps")},
+          {"a bit of a final state", "state_hash",
+           [](Record* record) {
+             if (record->Find("state_hash") == nullptr) return false;
+             record->Set("state_hash", std::string("0000000000000000"));
+             return true;
+           }},
+          {"a run that fails", "outcome", [](Record* record) {
+             if (record->Text("outcome") != "finished") return false;
+             record->Set("outcome", std::string("failed"));
+             return true;
+           }}};
+}
+
+bool IsCaught(const ComparisonReport& report, const CompareOptions& options,
+              const std::string& measure) {
+  return report.ExitCode(options) == 1 &&
+         std::ranges::any_of(report.findings, [&measure](const Finding& finding) {
+           const bool is_bad =
+               finding.judgement == Judgement::kWorse || finding.judgement == Judgement::kDifferent;
+           return is_bad && finding.measure.key == measure;
+         });
+}
+
+/// Plants each change into one record after the other's kind; 1 when one is not caught.
+int SelfTest(const BaselineCommand& command, const std::filesystem::path& work) {
+  const CompareOptions options;
+  const std::vector<Record> base = Load(work / kResults);
+  int missed = 0;
+  const auto tell = [&missed](const std::string& what, bool is_caught) {
+    Print("{}: {}\n", is_caught ? "caught" : "NOT CAUGHT", what);
+    missed += !is_caught;
+  };
+  const bool is_same = Compare(base, base, options).ExitCode(options) == 0;
+  Print("{}: measurements held against themselves\n", is_same ? "same" : "NOT THE SAME");
+  missed += !is_same;
+  for (const Plant& plant : Plants(options)) {
+    std::vector<Record> changed = base;
+    if (std::ranges::none_of(changed, [&](Record& one) { return plant.change(&one); })) {
+      Print("not planted: {}: no run has such a {}\n", plant.what, plant.measure);
+      continue;
+    }
+    tell(plant.what, IsCaught(Compare(base, changed, options), options, plant.measure));
+  }
+  const std::vector<Record> fewer(base.begin(), base.end() - 1);
+  tell("a case that is gone", Compare(base, fewer, options).ExitCode(options) == 2);
+  if (!command.counts.empty()) {
+    CountInstructions(command, work / "planted.jsonl", 1);
+    std::vector<Record> changed = Load(work / "run");
+    for (Record& one : Load(work / "planted.jsonl")) changed.push_back(std::move(one));
+    tell("5 % more instructions",
+         IsCaught(Compare(base, changed, options), options, "instructions"));
+  }
+  return missed == 0 ? 0 : 1;
+}
+
+}  // namespace
+
+int Baseline(const BaselineCommand& command, const std::string& typed) {
+  const auto baseline = command.dir / kResults;
+  if (command.action == "check" && !std::filesystem::exists(baseline)) {
+    throw ConfigError(
+        fmt::format("{}: no such file, expected the baseline; the first one is made by loopbench "
+                    "baseline renew",
+                    baseline.string()));
+  }
+  RequirePrograms(command);
+  const WorkFolder work(command.keep);
+  if (const int code = MeasureAll(command, work.path()); code != 0) return code;
+  if (command.action == "selftest") return SelfTest(command, work.path());
+  if (command.action == "check") {
+    CompareCommand compare;
+    compare.base = command.dir;
+    compare.fresh = work.path() / kResults;
+    return PrintComparison(compare, typed);
+  }
+  WriteFileAtomically(baseline, ReadFile(work.path() / kResults));
+  Print("renewed {}: {} records\n", baseline.string(), Load(baseline).size());
+  return 0;
+}
+
+}  // namespace loopbench::harness

@@ -12,6 +12,8 @@ if(LOOPBENCH_SANITIZE)
 endif()
 include(GNUInstallDirs)
 include(CMakePackageConfigHelpers)
+# What runs is one Debian package, what others build with another (cmake/package.cmake).
+set(CMAKE_INSTALL_DEFAULT_COMPONENT_NAME development)
 
 # What Eigen's types look like in memory depends on -march: 32-byte alignment with AVX, 16 without. The
 # libraries are built with the default of their -march, and this says it to whoever includes their
@@ -48,7 +50,10 @@ foreach(library ${installed})
 endforeach()
 set_target_properties(loopbench_harness PROPERTIES EXPORT_NAME loopbench)
 install(TARGETS ${installed} EXPORT loopbench)
-install(TARGETS loopbench RUNTIME)
+install(TARGETS loopbench RUNTIME COMPONENT runtime)
+if(TARGET loopbench_count)
+  install(TARGETS loopbench_count RUNTIME COMPONENT runtime)  # for loopbench baseline --counts
+endif()
 
 # The program itself knows its options: it writes its manual page and what shells complete.
 set(shell_files ${CMAKE_BINARY_DIR}/shell)
@@ -60,10 +65,10 @@ add_custom_command(OUTPUT ${shell_files}/loopbench.1 ${shell_files}/loopbench ${
   COMMAND loopbench completion fish > ${shell_files}/loopbench.fish
   DEPENDS loopbench VERBATIM)
 add_custom_target(loopbench_shell ALL DEPENDS ${shell_files}/loopbench.1)
-install(FILES ${shell_files}/loopbench.1 DESTINATION ${CMAKE_INSTALL_MANDIR}/man1)
-install(FILES ${shell_files}/loopbench DESTINATION ${CMAKE_INSTALL_DATADIR}/bash-completion/completions)
-install(FILES ${shell_files}/_loopbench DESTINATION ${CMAKE_INSTALL_DATADIR}/zsh/site-functions)
-install(FILES ${shell_files}/loopbench.fish DESTINATION ${CMAKE_INSTALL_DATADIR}/fish/vendor_completions.d)
+install(FILES ${shell_files}/loopbench.1 DESTINATION ${CMAKE_INSTALL_MANDIR}/man1 COMPONENT runtime)
+install(FILES ${shell_files}/loopbench DESTINATION ${CMAKE_INSTALL_DATADIR}/bash-completion/completions COMPONENT runtime)
+install(FILES ${shell_files}/_loopbench DESTINATION ${CMAKE_INSTALL_DATADIR}/zsh/site-functions COMPONENT runtime)
+install(FILES ${shell_files}/loopbench.fish DESTINATION ${CMAKE_INSTALL_DATADIR}/fish/vendor_completions.d COMPONENT runtime)
 
 # Headers that need what is private here (JSON, SUNDIALS, CLI11) stay here.
 install(DIRECTORY mechanism ${LOOPBENCH_FORMULATIONS} harness
@@ -75,9 +80,11 @@ if(TARGET loopbench_contract)
 endif()
 if(LOOPBENCH_REPORT)
   install(FILES ${CMAKE_BINARY_DIR}/web/node_modules/uplot/LICENSE
-    DESTINATION ${CMAKE_INSTALL_DATADIR}/doc/loopbench RENAME LICENSE.uPlot)
+    DESTINATION ${CMAKE_INSTALL_DATADIR}/doc/loopbench RENAME LICENSE.uPlot COMPONENT runtime)
 endif()
-install(DIRECTORY configs/schema configs/mechanisms DESTINATION ${CMAKE_INSTALL_DATADIR}/loopbench)
+install(DIRECTORY configs/schema configs/mechanisms DESTINATION ${CMAKE_INSTALL_DATADIR}/loopbench COMPONENT runtime)
+install(FILES LICENSE DESTINATION ${CMAKE_INSTALL_DOCDIR} RENAME copyright COMPONENT runtime)
+install(FILES LICENSE DESTINATION ${CMAKE_INSTALL_DATADIR}/doc/loopbench-dev RENAME copyright)
 
 # What makes code of others comparable in time and bits: optimisation, assertions and -march as here.
 string(TOUPPER "${CMAKE_BUILD_TYPE}" build_type)

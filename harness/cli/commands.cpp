@@ -6,6 +6,7 @@
 #include <fstream>
 #include <iterator>
 #include <map>
+#include <unordered_map>
 
 #include "harness/analysis/doubts.h"
 #include "harness/isolation/interruption.h"
@@ -59,6 +60,17 @@ std::vector<Record> RecordsOf(const std::vector<std::string>& ids,
   return WithContents(std::move(asked));
 }
 
+std::vector<Record> InOrder(std::vector<Record> records, const std::vector<std::string>& order) {
+  if (order.empty()) return records;
+  std::unordered_map<std::string, std::size_t> places;
+  for (const std::string& id : order) places.emplace(id, places.size());
+  std::ranges::stable_sort(records, {}, [&places](const Record& record) {
+    const auto at = places.find(record.Text("id"));
+    return at == places.end() ? places.size() : at->second;
+  });
+  return records;
+}
+
 void PrintInterrupted(const RunCommand& command, const ResultStore& store) {
   PrintError(
       "interrupted: {} records are kept in {}, {} of them of this run; cases under way were "
@@ -96,7 +108,7 @@ int Run(const RunCommand& command, const std::string& typed) {
                           : command.out;
   SuiteCount count;
   {
-    ResultStore store(out);
+    ResultStore store(out, command.wait);
     FinishedRuns finished(out);
     try {
       count = RunSuite(workload, command.suite, finished, store);
@@ -137,7 +149,7 @@ int Merge(const MergeCommand& command) {
           warnings.front(), store.string()));
     }
   }
-  const std::vector<Record> merged = MergeStores(parts);
+  const std::vector<Record> merged = InOrder(MergeStores(parts), command.order);
   std::vector<std::filesystem::path> files;
   for (const auto& store : command.stores) files.push_back(StoreFile(store));
   // references that stand where the store will be are one more part

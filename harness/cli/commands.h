@@ -35,6 +35,7 @@ struct RunCommand {
   SuiteOptions suite;
   int threads = 0;    ///< as of ExperimentFiles
   std::string gate;   ///< "doubts" or ""
+  bool wait = false;  ///< while another process writes to the store
   std::string again;  ///< the command as a shell takes it, for who goes on later
 };
 /// Runs what the store does not have yet, then writes its tables. Interrupted, it says what is
@@ -44,6 +45,8 @@ int Run(const RunCommand& command, const std::string& typed);
 struct MergeCommand {
   std::vector<std::filesystem::path> stores;
   std::filesystem::path out;  ///< a new store
+  /// "id"s in the order in which their records are to stand; others come behind them.
+  std::vector<std::string> order = {};
 };
 /// Shards into one store: every case once. Throws when two stores disagree about a case.
 int Merge(const MergeCommand& command);

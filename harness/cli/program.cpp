@@ -4,6 +4,7 @@
 #include <exception>
 
 #include "harness/cli/program_baseline.h"
+#include "harness/cli/program_cluster.h"
 #include "harness/cli/program_compare.h"
 #include "harness/cli/program_files.h"
 #include "harness/cli/program_report.h"
@@ -59,6 +60,7 @@ int RunCommandLine(int argc, char** argv) {
   ReportCommandOptions report(app);
   ComparisonOptions comparison(app);
   BaselineOptions baseline(app);
+  ClusterOptions cluster(app);
   ShellOptions shell(app);
   try {
     app.parse(argc, argv);
@@ -67,12 +69,13 @@ int RunCommandLine(int argc, char** argv) {
   }
   try {
     const std::string typed = CommandLine(argc, argv);
-    if (const auto code = files.Run(typed, ShellLine(argc, argv))) return *code;
+    if (const auto code = files.Run(typed, ShellLine({argv, argv + argc}))) return *code;
     if (const auto code = view.Run()) return *code;
     if (const auto code = stores.Run(typed)) return *code;
     if (const auto code = report.Run(typed)) return *code;
     if (const auto code = comparison.Run(typed)) return *code;
     if (const auto code = baseline.Run(typed)) return *code;
+    if (const auto code = cluster.Run()) return *code;
     return shell.Run();
   } catch (const std::exception& error) {
     PrintError("{}\n", Lines{error.what()});

@@ -108,6 +108,8 @@ void FileOptions::AddRun(CLI::App& app) {
       ->capture_default_str();
   run_app_->add_flag("--isolate", run_.suite.isolate,
                      "Every case in a process of its own; else short ones share processes");
+  run_app_->add_flag("--wait", run_.wait,
+                     "Wait while another process writes to the store, then go on with it");
   run_app_->add_option("--rerun", rerun_, "Cases to run although the store has them")
       ->check(CLI::IsMember({"none", "failed", "all"}))
       ->capture_default_str();

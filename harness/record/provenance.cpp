@@ -50,13 +50,12 @@ const std::string& CodeVersion() {
   return version;
 }
 
-std::string ShellLine(int argc, const char* const* argv) {
+std::string ShellLine(const std::vector<std::string>& words) {
   constexpr std::string_view kPlain =
       "abcdefghijklmnopqrstuvwxyzABCDEFGHIJKLMNOPQRSTUVWXYZ0123456789_-+./:=,@%";
   std::string line;
-  for (int i = 0; i < argc; ++i) {
-    const std::string_view word = argv[i];
-    if (i > 0) line += ' ';
+  for (const std::string& word : words) {
+    if (!line.empty()) line += ' ';
     if (!word.empty() && word.find_first_not_of(kPlain) == std::string_view::npos) {
       line += word;
       continue;

@@ -20,6 +20,6 @@ const std::string& CodeVersion();
 std::string CommandLine(int argc, const char* const* argv);
 
 /// The same as a shell takes it, with the program as it was called.
-std::string ShellLine(int argc, const char* const* argv);
+std::string ShellLine(const std::vector<std::string>& words);
 
 }  // namespace loopbench::harness

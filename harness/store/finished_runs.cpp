@@ -19,15 +19,14 @@ std::optional<std::uint64_t> NumberOfId(std::string_view id) {
   return is_whole ? std::optional(number) : std::nullopt;
 }
 
-/// The text under a key of a record's line: a flat object, in whose texts no quote stands bare.
+}  // namespace
+
 std::string_view TextUnder(std::string_view quoted_key, std::string_view line) {
   const std::size_t key = line.find(quoted_key);
   if (key == std::string_view::npos) return {};
   const std::size_t begin = key + quoted_key.size(), end = line.find('"', begin);
   return end == std::string_view::npos ? std::string_view() : line.substr(begin, end - begin);
 }
-
-}  // namespace
 
 std::optional<bool> FinishedRuns::Find(const std::string& id) {
   if (!is_read_) Read();

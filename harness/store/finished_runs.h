@@ -5,9 +5,15 @@
 #include <filesystem>
 #include <optional>
 #include <string>
+#include <string_view>
 #include <unordered_map>
 
 namespace loopbench::harness {
+
+/// The text under a key of a record's line, read without the rest: it is a flat object in whose
+/// texts no quote stands bare. "" when there is none.
+/// @param quoted_key  "\"id\":\""
+std::string_view TextUnder(std::string_view quoted_key, std::string_view line);
 
 class FinishedRuns {
  public:

@@ -109,9 +109,9 @@ bool IsLarge(const std::filesystem::path& file) {
   return !error && size >= kLarge;
 }
 
-ResultStore::ResultStore(const std::filesystem::path& path) : file_(StoreFile(path)) {
+ResultStore::ResultStore(const std::filesystem::path& path, bool waits) : file_(StoreFile(path)) {
   MakeFolderOf(file_);
-  descriptor_ = OpenLocked(file_);
+  descriptor_ = OpenLocked(file_, waits);
   try {
     MendLastLine(file_, descriptor_);
     SyncFolderOf(file_);

@@ -32,7 +32,8 @@ class ResultStore {
   /// std::runtime_error that names the file, and the process that has the store open. A file that
   /// holds anything but records (and the beginning of one as its last line) is refused with its
   /// line, and stays as it is; of a large one only the end is looked at.
-  explicit ResultStore(const std::filesystem::path& path);
+  /// @param waits  while another process has the store open
+  explicit ResultStore(const std::filesystem::path& path, bool waits = false);
   ~ResultStore();
 
   ResultStore(const ResultStore&) = delete;

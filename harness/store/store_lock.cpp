@@ -42,7 +42,8 @@ std::string Holder(int descriptor) {
 constexpr int kTries = 10;
 constexpr std::chrono::milliseconds kBetweenTries{20};
 
-bool TryLock(int descriptor, const std::filesystem::path& file) {
+bool TryLock(int descriptor, const std::filesystem::path& file, bool waits) {
+  if (waits && ::flock(descriptor, LOCK_EX) == 0) return true;
   for (int i = 0; i < kTries; ++i) {
     if (::flock(descriptor, LOCK_EX | LOCK_NB) == 0) return true;
     if (errno != EWOULDBLOCK && errno != EINTR) FailOn("lock", file);
@@ -53,7 +54,7 @@ bool TryLock(int descriptor, const std::filesystem::path& file) {
 
 }  // namespace
 
-int OpenLocked(const std::filesystem::path& file) {
+int OpenLocked(const std::filesystem::path& file, bool waits) {
   constexpr int kMode = 0644;
   for (int i = 0; i < kTries; ++i) {
     // without blocking: a pipe of that name would wait for its other end
@@ -67,9 +68,9 @@ int OpenLocked(const std::filesystem::path& file) {
         throw std::runtime_error(
             fmt::format("'{}': expected a regular file for a store", file.string()));
       }
-      if (!TryLock(descriptor, file)) {
+      if (!TryLock(descriptor, file, waits)) {
         throw std::runtime_error(
-            fmt::format("'{}' is in use by {}; wait for it, or write to another --out",
+            fmt::format("'{}' is in use by {}; wait for it (--wait), or write to another --out",
                         file.string(), Holder(descriptor)));
       }
       if (IsStillNamed(descriptor, file)) return descriptor;
@@ -81,6 +82,14 @@ int OpenLocked(const std::filesystem::path& file) {
   }
   throw std::runtime_error(fmt::format(
       "'{}' is another file each time it is opened, expected one that stays", file.string()));
+}
+
+bool IsLocked(const std::filesystem::path& file) {
+  const int descriptor = ::open(file.c_str(), O_RDONLY | O_CLOEXEC | O_NONBLOCK);
+  if (descriptor < 0) return false;
+  const bool is_locked = ::flock(descriptor, LOCK_SH | LOCK_NB) != 0 && errno == EWOULDBLOCK;
+  ::close(descriptor);
+  return is_locked;
 }
 
 bool IsStillNamed(int descriptor, const std::filesystem::path& file) {

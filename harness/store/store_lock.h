@@ -10,7 +10,11 @@ namespace loopbench::harness {
 /// symbolic link or a hard one, it meets the lock. The lock ends when all copies of the descriptor
 /// are closed, those of forked children too. Throws std::runtime_error that names the file, and the
 /// process that holds the lock.
-int OpenLocked(const std::filesystem::path& file);
+/// @param waits  for the lock, however long another process holds it
+int OpenLocked(const std::filesystem::path& file, bool waits = false);
+
+/// Whether a process has the store `file` open for writing.
+bool IsLocked(const std::filesystem::path& file);
 
 /// Whether `file` still names what the descriptor is open on: no one deleted or replaced it.
 bool IsStillNamed(int descriptor, const std::filesystem::path& file);

@@ -1,0 +1,10 @@
+#!/bin/sh
+# A run in parts under GNU parallel, on this machine or on others that see the same folder:
+#   sh parallel.sh EXPERIMENT.json DIR PARTS [options of parallel, e.g. --sshlogin node1,node2]
+# Killed, give it again: parts go on where they stopped.
+set -eu
+experiment=$1 dir=$2 parts=$3
+shift 3
+[ -f "$dir/cluster.json" ] || loopbench submit "$experiment" --tasks "$parts" --out "$dir" --no-queue --no-timing
+seq "$parts" | parallel "$@" --will-cite sh "$(realpath "$dir")/part.sh" {} '>>' "$(realpath "$dir")/logs/{}.log" '2>&1'
+loopbench collect "$dir"

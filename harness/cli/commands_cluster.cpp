@@ -1,0 +1,262 @@
+#include "harness/cli/commands_cluster.h"
+
+#include <fmt/chrono.h>
+#include <fmt/format.h>
+#include <fmt/ranges.h>
+
+#include <algorithm>
+#include <chrono>
+#include <cmath>
+#include <map>
+#include <set>
+
+#include "harness/cli/commands.h"
+#include "harness/cluster/progress.h"
+#include "harness/cluster/slurm.h"
+#include "harness/record/json_object.h"
+#include "harness/run/case_identity.h"
+#include "harness/store/finished_runs.h"
+#include "harness/suite/workload.h"
+#include "harness/tables/fit.h"
+#include "harness/text/config_error.h"
+#include "harness/text/files.h"
+#include "harness/text/terminal.h"
+
+namespace loopbench::harness {
+namespace {
+
+std::vector<int> PartsNotDone(const ClusterRun& run, const std::filesystem::path& folder) {
+  std::vector<int> parts;
+  for (int part = 1; part <= run.parts; ++part) {
+    if (!IsDone(folder, part)) parts.push_back(part);
+  }
+  return parts;
+}
+
+/// Submits the array of `parts` and the job behind it, and writes down their numbers.
+void Queue(const std::vector<int>& parts, const std::filesystem::path& folder, ClusterRun* run) {
+  WriteFileAtomically(folder / "array.sh", ArrayScript(*run, folder, parts));
+  run->array_job = SubmitJob(folder / "array.sh", {});
+  WriteClusterRun(*run, folder);
+  run->collect_job = SubmitJob(folder / "collect.sh", {"--dependency=afterany:" + run->array_job});
+  WriteClusterRun(*run, folder);
+  Print("submitted {} of {} parts as job {}, and the merge behind them as job {}\n", parts.size(),
+        run->parts, run->array_job, run->collect_job);
+  Print("  loopbench status {}\n", folder.string());
+}
+
+int SubmitAgain(const SubmitCommand& command) {
+  ClusterRun run = ReadClusterRun(command.folder);
+  std::vector<int> parts = PartsNotDone(run, command.folder);
+  std::string problem;
+  const auto queued = QueuedTasks(run.array_job, &problem);
+  if (!queued) throw std::runtime_error("which parts run cannot be asked: " + problem);
+  std::erase_if(parts, [&queued](int part) { return queued->contains(part); });
+  if (parts.empty()) {
+    Print("{}: every part is done or in the queue\n", command.folder.string());
+    return 0;
+  }
+  if (command.dry_run) {
+    PrintText(ArrayScript(run, command.folder, parts));
+    return 0;
+  }
+  // parts of the last array that are still in the queue keep their job: the merge waits for both
+  if (!queued->empty()) {
+    throw std::runtime_error(fmt::format(
+        "{}: {} parts are still in the queue as job {}; wait for them, or scancel them first",
+        command.folder.string(), queued->size(), run.array_job));
+  }
+  Queue(parts, command.folder, &run);
+  return 0;
+}
+
+/// "id"s of the accuracy cases, in the order of the experiments, and in which part each is.
+std::vector<std::string> OrderOfCases(const ClusterRun& run) {
+  const ExperimentFiles files = FilesOf(run);
+  Workload workload(files);
+  std::vector<std::string> ids;
+  for (std::size_t group = 0; group < workload.groups(); ++group) {
+    for (const Experiment& experiment : workload.Read(group).experiments) {
+      for (const Case& one : SelectCases(experiment, files.filter)) {
+        ids.push_back(RunId(Identified(experiment, one).keys));
+      }
+    }
+  }
+  return ids;
+}
+
+double Now() {
+  return std::chrono::duration<double>(std::chrono::system_clock::now().time_since_epoch()).count();
+}
+
+Table StatusTable(const ClusterRun& run, const std::vector<PartProgress>& parts) {
+  Table table;
+  table.title = fmt::format("{} in {} parts", run.name, run.parts);
+  table.columns = {{"part", "part"},
+                   {"state", "state"},
+                   {"cases", "cases", Format::kInteger},
+                   {"done", "done", Format::kInteger},
+                   {"failed", "failed", Format::kInteger},
+                   {"to_do", "to do", Format::kInteger}};
+  std::size_t done = 0, failed = 0;
+  const auto add = [&table](const std::string& name, const std::string& state, double cases,
+                            std::size_t finished, std::size_t other) {
+    const double left = cases - static_cast<double>(finished + other);
+    const auto number = [](double value) {
+      return std::isfinite(value) ? Value(static_cast<std::int64_t>(value)) : Value();
+    };
+    AddRow({name, state, number(cases), Count(finished), Count(other), number(left)}, &table);
+  };
+  for (const PartProgress& part : parts) {
+    add(std::to_string(part.part), part.state, part.cases, part.done, part.failed);
+    done += part.done;
+    failed += part.failed;
+  }
+  std::map<std::string, int> states;
+  for (const PartProgress& part : parts) ++states[part.state];
+  std::vector<std::string> words;
+  for (const auto& [state, number] : states) words.push_back(fmt::format("{} {}", number, state));
+  add("all", fmt::format("{}", fmt::join(words, ", ")), static_cast<double>(run.all_cases), done,
+      failed);
+  return table;
+}
+
+JsonObject StatusDocument(const ClusterRun& run, const std::vector<PartProgress>& parts,
+                          double seconds_left) {
+  std::vector<JsonObject> rows;
+  std::size_t done = 0, failed = 0, running = 0;
+  for (const PartProgress& part : parts) {
+    rows.push_back(JsonObject()
+                       .Add("part", std::int64_t{part.part})
+                       .Add("state", part.state)
+                       .Add("cases", part.cases)
+                       .Add("done", Count(part.done))
+                       .Add("failed", Count(part.failed)));
+    done += part.done;
+    failed += part.failed;
+    running += part.state == "running";
+  }
+  return JsonObject()
+      .Add("name", run.name)
+      .Add("cases", run.all_cases)
+      .Add("done", Count(done))
+      .Add("failed", Count(failed))
+      .Add("to_do", run.all_cases - static_cast<std::int64_t>(done + failed))
+      .Add("running_parts", Count(running))
+      .Add("array_job", run.array_job)
+      .Add("collect_job", run.collect_job)
+      .Add("seconds_left", seconds_left)
+      .Add("parts", rows);
+}
+
+}  // namespace
+
+int Submit(SubmitCommand command) {
+  command.folder = std::filesystem::absolute(command.folder).lexically_normal();
+  if (!command.folder.has_filename()) command.folder = command.folder.parent_path();
+  if (command.again) return SubmitAgain(command);
+  ClusterRun& run = command.run;
+  for (auto& path : run.experiments) path = std::filesystem::absolute(path).lexically_normal();
+  run.program = std::filesystem::read_symlink("/proc/self/exe").string();
+  CountCases(&run);
+  std::vector<int> parts;
+  for (int part = 1; part <= run.parts; ++part) parts.push_back(part);
+  const auto& folder = command.folder;
+  if (command.dry_run) {
+    for (const auto& [name, text] : {std::pair{"part.sh", PartScript(run, folder)},
+                                     {"array.sh", ArrayScript(run, folder, parts)},
+                                     {"collect.sh", CollectScript(run, folder)}}) {
+      PrintText(fmt::format("==> {} <==\n{}\n", (folder / name).string(), text));
+    }
+    Print("{} cases in {} parts; nothing was written, nothing submitted\n", run.all_cases,
+          run.parts);
+    return 0;
+  }
+  if (std::filesystem::exists(folder / "cluster.json")) {
+    throw ConfigError(
+        fmt::format("{}: found the folder of a submit, expected a new one; to go on with it: "
+                    "loopbench submit --again --out {}",
+                    folder.string(), folder.string()));
+  }
+  MakeFolderOf(folder / "logs" / "x");
+  WriteFileAtomically(folder / "part.sh", PartScript(run, folder));
+  WriteFileAtomically(folder / "collect.sh", CollectScript(run, folder));
+  WriteClusterRun(run, folder);
+  Print("{} cases in {} parts in {}\n", run.all_cases, run.parts, folder.string());
+  if (command.queue) {
+    Queue(parts, folder, &run);
+  } else {
+    Print("each part: sh {}/part.sh K; then: loopbench collect {}\n", folder.string(),
+          folder.string());
+  }
+  return 0;
+}
+
+int PrintStatus(const std::filesystem::path& folder, bool json) {
+  const ClusterRun run = ReadClusterRun(folder);
+  std::string problem;
+  const auto queued = QueuedTasks(run.array_job, &problem);
+  std::vector<PartProgress> parts;
+  for (int part = 1; part <= run.parts; ++part) {
+    parts.push_back(ProgressOfPart(run, folder, part, Now()));
+    PartProgress& progress = parts.back();
+    // a part that ran to its end is done, whatever is still queued for it
+    if (progress.state == "done" || !queued) continue;
+    if (const auto task = queued->find(part); task != queued->end()) progress.state = task->second;
+  }
+  const double left = SecondsLeft(run, parts);
+  if (json) {
+    PrintText(StatusDocument(run, parts, left).Text() + "\n");
+    return 0;
+  }
+  Table table = StatusTable(run, parts);
+  if (!problem.empty()) table.notes.push_back("states from the stores alone: " + problem);
+  const bool is_whole = std::filesystem::exists(folder / "whole" / "results.jsonl");
+  if (is_whole) {
+    table.notes.push_back(fmt::format("merged: {}", (folder / "whole").string()));
+  } else if (left > 0.0) {
+    table.notes.push_back(fmt::format("about {:.0f} s left, until {:%H:%M}", left,
+                                      fmt::localtime(static_cast<std::time_t>(Now() + left))));
+  }
+  const bool is_stuck =
+      !is_whole && queued && queued->empty() && !PartsNotDone(run, folder).empty();
+  if (is_stuck && !run.array_job.empty()) {
+    table.notes.push_back(
+        fmt::format("no part is queued; the others go on with loopbench submit --again --out {}",
+                    folder.string()));
+  }
+  PrintText(ToScreen(table) + "\n");
+  return 0;
+}
+
+int Collect(const std::filesystem::path& folder) {
+  const ClusterRun run = ReadClusterRun(folder);
+  if (const std::vector<int> open = PartsNotDone(run, folder); !open.empty()) {
+    PrintError("{}: {} of {} parts are not done: {}; nothing was merged\n", folder.string(),
+               open.size(), run.parts, fmt::join(open, ", "));
+    return 1;
+  }
+  MergeCommand merge;
+  merge.out = folder / "whole";
+  merge.order = OrderOfCases(run);
+  std::set<std::string> missing(merge.order.begin(), merge.order.end());
+  for (int part = 1; part <= run.parts; ++part) {
+    merge.stores.push_back(PartFolder(folder, part));
+    FinishedRuns finished(merge.stores.back());
+    std::erase_if(missing, [&finished](const std::string& id) { return finished.Find(id); });
+  }
+  if (!missing.empty()) {
+    PrintError(
+        "{}: {} of {} cases are in no part, {} among them; nothing was merged. The experiment, its "
+        "mechanisms or the program are not what they were when the parts ran\n",
+        folder.string(), missing.size(), merge.order.size(), *missing.begin());
+    return 1;
+  }
+  if (std::filesystem::exists(merge.out / "results.jsonl")) {
+    Print("{} is there already\n", merge.out.string());
+    return 0;
+  }
+  return Merge(merge);
+}
+
+}  // namespace loopbench::harness

@@ -37,6 +37,12 @@ std::vector<std::string> Texts(const std::vector<std::filesystem::path>& paths) 
   return texts;
 }
 
+const Value& Required(const Record& record, const std::string& key) {
+  const Value* value = record.Find(key);
+  if (value == nullptr) throw ConfigError(fmt::format("found no \"{}\"", key));
+  return *value;
+}
+
 /// The command that runs a part, before --shard.
 std::vector<std::string> RunWords(const ClusterRun& run) {
   std::vector<std::string> words = {run.program, "run"};
@@ -151,17 +157,21 @@ ClusterRun ReadClusterRun(const std::filesystem::path& folder) {
     }
     run.settings = Unlisted(record.Text("settings"));
     run.conditions = Unlisted(record.Text("conditions"));
-    run.parts = static_cast<int>(record.Number("parts"));
-    run.jobs = static_cast<int>(record.Number("jobs"));
-    run.timing = std::get<bool>(*record.Find("with_timing"));
-    run.isolate = std::get<bool>(*record.Find("isolate"));
+    run.parts = static_cast<int>(std::get<std::int64_t>(Required(record, "parts")));
+    run.jobs = static_cast<int>(std::get<std::int64_t>(Required(record, "jobs")));
+    run.timing = std::get<bool>(Required(record, "with_timing"));
+    run.isolate = std::get<bool>(Required(record, "isolate"));
     run.batch_options = Unlisted(record.Text("batch_options"));
     run.program = record.Text("program");
     run.name = record.Text("experiment");
-    run.all_cases = static_cast<std::int64_t>(record.Number("all_cases"));
-    run.cases = std::get<std::vector<double>>(*record.Find("cases_of_parts"));
+    run.all_cases = std::get<std::int64_t>(Required(record, "all_cases"));
+    run.cases = std::get<std::vector<double>>(Required(record, "cases_of_parts"));
     run.array_job = record.Text("array_job");
     run.collect_job = record.Text("collect_job");
+    if (run.cases.size() != static_cast<std::size_t>(run.parts)) {
+      throw ConfigError(fmt::format("\"cases_of_parts\": found {} numbers, expected {}",
+                                    run.cases.size(), run.parts));
+    }
   } catch (const std::exception& error) {
     throw ConfigError(fmt::format("{}: {}", file.string(), error.what()));
   }

@@ -1,0 +1,134 @@
+// Runs in parts, by the folder alone: what a cluster's engine calls, and what is known without one.
+#include <gtest/gtest.h>
+
+#include <algorithm>
+#include <fstream>
+#include <string>
+
+#include "harness/store/result_store.h"
+#include "tests/harness/cli_fixture.h"
+
+namespace loopbench::harness {
+namespace cluster_test {
+
+class Cluster : public CommandLineTest {
+ protected:
+  /// The deterministic part of a store: its records without times.
+  std::vector<std::string> Lines(const std::string& store) const {
+    std::vector<std::string> lines;
+    for (const Record& record : ReadRecords(folder_ / store)) {
+      Record kept;
+      for (const auto& [key, value] : record.items()) {
+        if (key != "wall_s" && key != "cpu_s") kept.Set(key, value);
+      }
+      lines.push_back(ToJsonLine(kept));
+    }
+    return lines;
+  }
+  Ending Part(const std::string& k) const {
+    return Call("", "sh parts/part.sh " + k + " 2>&1; exit $?;");
+  }
+};
+
+/// The first key of two lines that is not the same.
+std::string Difference(const std::string& line, const std::string& other) {
+  const Record one = FromJsonLine(line), two = FromJsonLine(other);
+  for (const auto& [key, value] : one.items()) {
+    if (one.Text(key) != two.Text(key)) {
+      return key + ": " + one.Text(key) + " and " + two.Text(key);
+    }
+  }
+  return "a series, or the order of keys";
+}
+
+constexpr const char* kSix = R"({
+  "name": "six", "tolerances": [1e-6, 1e-8],
+  "scenes": [{"mechanism": "four-bar.json", "horizon": 0.5}],
+  "columns": [{"formulation": ["odca", "lagrange", "reduction"], "enforcement": "acceleration"}],
+  "timing": {"repeats": 0}
+})";
+
+TEST_F(Cluster, PartsAreMergedToWhatOneRunGives) {
+  Write("six.json", kSix);
+  ExpectEnding(Call("run six.json --no-timing --out whole"), 0, {"6 run now"});
+  ExpectEnding(Call("submit six.json --tasks 4 --no-timing --no-queue --out parts"), 0,
+               {"6 cases in 4 parts", "part.sh K"});
+  ExpectEnding(Call("status parts"), 0, {"six in 4 parts", "4 waiting"});
+  for (const char* k : {"4", "2", "1"}) EXPECT_EQ(Part(k).code, 0);
+  ExpectEnding(Call("status parts"), 0, {"3 done, 1 waiting"});
+  ExpectEnding(Call("collect parts"), 1, {"1 of 4 parts are not done: 3; nothing was merged"});
+  EXPECT_FALSE(fs::exists(folder_ / "parts/whole"));
+  EXPECT_EQ(Part("3").code, 0);
+  ExpectEnding(Part("3"), 0, {"0 run now"});  // a second time: nothing is left
+  ExpectEnding(Call("collect parts"), 0, {"6 records of 4 stores are 6 cases"});
+  // a run writes cases as they end, long ones first; a merge in the order of the experiment
+  std::vector<std::string> merged = Lines("parts/whole"), whole = Lines("whole");
+  EXPECT_NE(merged.front().find("odca"), std::string::npos);
+  EXPECT_NE(merged.back().find("reduction"), std::string::npos);
+  std::ranges::sort(merged);
+  std::ranges::sort(whole);
+  ASSERT_EQ(merged.size(), whole.size());
+  for (std::size_t i = 0; i < whole.size(); ++i) {
+    EXPECT_TRUE(merged[i] == whole[i]) << Difference(merged[i], whole[i]);
+  }
+  ExpectEnding(Call("collect parts"), 0, {"is there already"});
+  const Ending status = Call("status parts --json");
+  ExpectEnding(status, 0, {"\"cases\":6", "\"done\":6", "\"failed\":0", "\"to_do\":0"});
+}
+
+TEST_F(Cluster, FailedCasesAreCountedAsSuch) {
+  Write("six.json", kSix);
+  ExpectEnding(Call("submit six.json --tasks 2 --no-timing --no-queue --out parts"), 0, {});
+  setenv("LOOPBENCH_FAULT", "crash:formulation=lagrange", 1);
+  for (const char* k : {"1", "2"}) EXPECT_EQ(Part(k).code, 0);
+  unsetenv("LOOPBENCH_FAULT");
+  ExpectEnding(Call("status parts --json"), 0, {"\"done\":4", "\"failed\":2", "\"to_do\":0"});
+}
+
+TEST_F(Cluster, AChangedMechanismIsNotMerged) {
+  Write("six.json", kSix);
+  ExpectEnding(Call("submit six.json --tasks 2 --no-timing --no-queue --out parts"), 0, {});
+  EXPECT_EQ(Part("1").code, 0);
+  EditMechanism("\"mass\": 1.0,", "\"mass\": 1.01,");
+  EXPECT_EQ(Part("2").code, 0);
+  ExpectEnding(Call("collect parts"), 1, {"3 of 6 cases are in no part", "nothing was merged"});
+  EXPECT_FALSE(fs::exists(folder_ / "parts/whole"));
+}
+
+TEST_F(Cluster, ScriptsSayWhatWasAsked) {
+  Write("six.json", kSix);
+  const Ending dry = Call(
+      "submit six.json --tasks 3 --jobs 2 --time 1:00:00 --partition cpu --sbatch=--account=a "
+      "--filter 'formulation!=odca' --set /limits/cpu_s=5 --out parts --dry-run");
+  ExpectEnding(dry, 0,
+               {"#SBATCH --array=1-3", "#SBATCH --requeue", "#SBATCH --cpus-per-task=2",
+                "#SBATCH --time=1:00:00", "#SBATCH --partition=cpu", "#SBATCH --account=a",
+                "--filter 'formulation!=odca'", "--set /limits/cpu_s=5", "--jobs 2 --wait",
+                "--shard \"$part/3\"", " collect ", "4 cases in 3 parts; nothing was written"});
+  EXPECT_FALSE(fs::exists(folder_ / "parts"));
+}
+
+TEST_F(Cluster, WhatCannotRunIsRefusedBeforeAnythingIsWritten) {
+  Write("six.json", kSix);
+  ExpectEnding(Call("submit six.json --tasks 7 --no-queue --out parts"), 2,
+               {"--tasks: found 7, expected at most 6"});
+  ExpectEnding(Call("submit none.json --tasks 2 --no-queue --out parts"), 2, {"none.json"});
+  ExpectEnding(Call("submit six.json --filter mas=1 --tasks 2 --no-queue --out parts"), 2,
+               {"no such key"});
+  ExpectEnding(Call("submit --tasks 2 --out parts"), 2, {"found no experiment"});
+  ExpectEnding(Call("submit six.json --again --out parts"), 2, {"found experiments beside it"});
+  ExpectEnding(Call("submit --again --out parts"), 2, {"parts/cluster.json: no such file"});
+  ExpectEnding(Call("submit six.json --sbatch=account --out parts"), 2,
+               {"found 'account', expected an option that begins with --"});
+  EXPECT_FALSE(fs::exists(folder_ / "parts"));
+  ExpectEnding(Call("status nowhere"), 2, {"nowhere/cluster.json: no such file"});
+  ExpectEnding(Call("submit six.json --tasks 2 --no-queue --out parts"), 0, {});
+  ExpectEnding(Call("submit six.json --tasks 2 --no-queue --out parts"), 2,
+               {"expected a new one", "--again"});
+  std::ofstream(folder_ / "parts/cluster.json", std::ios::app) << "x";
+  Write("parts/cluster.json", "{\"kind\":\"cluster\"}\n");
+  ExpectEnding(Call("status parts"), 2, {"parts/cluster.json: "});
+}
+
+}  // namespace cluster_test
+}  // namespace loopbench::harness

@@ -4,9 +4,13 @@
 
 #include <algorithm>
 #include <cmath>
+#include <optional>
 #include <ranges>
 #include <set>
 
+#include "harness/history/compare_summary.h"
+#include "harness/history/history.h"
+#include "harness/history/history_branch.h"
 #include "harness/judge/fit.h"
 #include "harness/judge/statistics.h"
 #include "harness/judge/track.h"
@@ -17,6 +21,7 @@
 #include "harness/store/measurements.h"
 #include "harness/tables/columns.h"
 #include "harness/tables/fit.h"
+#include "harness/text/config_error.h"
 #include "harness/text/files.h"
 #include "harness/text/terminal.h"
 
@@ -190,6 +195,25 @@ void Choose(const Selection& where, std::vector<Record>& base, std::vector<Recor
   fresh = Filter(fresh, where);
 }
 
+/// The base that was named, or the last good state of the history, which `name` then says.
+std::vector<Record> LoadBase(const CompareCommand& command, const std::vector<Record>& fresh,
+                             std::string* name) {
+  if (command.history.empty() && command.branch.empty()) return LoadMeasurements(command.base);
+  std::optional<HistoryBranch> branch;
+  if (!command.branch.empty()) branch.emplace(command.branch);
+  const std::filesystem::path folder = branch ? branch->folder() : command.history;
+  const std::string machine = fresh.empty() ? "" : OriginOf(fresh.front()).machine;
+  const std::optional<HistoryEntry> good = LastGood(ReadHistory(folder), machine);
+  if (!good) {
+    throw ConfigError(
+        fmt::format("{}: every commit is marked bad, expected a good one", folder.string()));
+  }
+  *name = fmt::format("BASE: the history's last good state, commit {} of {}{}",
+                      ShortCommit(good->commit), good->date,
+                      good->mark.empty() ? "" : fmt::format(", marked {}", good->mark));
+  return LoadMeasurements(good->results);
+}
+
 JsonObject ComparisonDocument(const ComparisonReport& comparison, int code,
                               const std::vector<std::string>& notes) {
   std::vector<JsonObject> groups, findings;
@@ -221,22 +245,32 @@ JsonObject ComparisonDocument(const ComparisonReport& comparison, int code,
 }  // namespace
 
 int PrintComparison(const CompareCommand& command, const std::string& typed) {
-  std::vector<Record> base = LoadMeasurements(command.base);
   std::vector<Record> fresh = LoadMeasurements(command.fresh);
+  std::string base_name;
+  std::vector<Record> base = LoadBase(command, fresh, &base_name);
   Choose(command.where, base, fresh);
   ShareContents(&base, &fresh);
   const ComparisonReport comparison = Compare(base, fresh, command.options);
   const int code = comparison.ExitCode(command.options);
 
   std::vector<std::string> notes;
+  if (!base_name.empty()) notes.push_back(base_name);
   NoteCommonShift(comparison, notes);
   NoteOrigins("BASE", base, notes);
   NoteOrigins("NEW", fresh, notes);
+  if (!command.markdown.empty()) {
+    WriteFileAtomically(command.markdown,
+                        ComparisonMarkdown(comparison, Conclusion(comparison, code), notes));
+  }
+  if (!command.junit.empty()) {
+    WriteFileAtomically(command.junit, ComparisonJunit(comparison, command.options.subset));
+  }
   if (command.json) {
     PrintText(ComparisonDocument(comparison, code, notes).Text() + "\n");
     return code;
   }
   notes = ReasonNotes(comparison);
+  if (!base_name.empty()) notes.push_back(base_name);
   NoteCases("cases only in BASE", comparison.only_base, notes);
   NoteCases("cases only in NEW", comparison.only_fresh, notes);
   NoteCases("cases there more than once, not compared", comparison.ambiguous, notes);

@@ -15,6 +15,10 @@ struct CompareCommand {
   CompareOptions options;
   Selection where = {};  ///< only such records of both sides
   bool json = false;     ///< one document on standard output, with every measure
+  /// The base instead: the last good state of a history.
+  std::filesystem::path history = {};
+  std::string branch = {};
+  std::filesystem::path markdown = {}, junit = {};  ///< files besides; none when empty
 };
 /// 0 the same or better, 1 something is worse or different, 2 could not measure.
 int PrintComparison(const CompareCommand& command, const std::string& typed);

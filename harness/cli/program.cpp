@@ -7,6 +7,7 @@
 #include "harness/cli/program_cluster.h"
 #include "harness/cli/program_compare.h"
 #include "harness/cli/program_files.h"
+#include "harness/cli/program_history.h"
 #include "harness/cli/program_report.h"
 #include "harness/cli/program_shell.h"
 #include "harness/cli/program_stores.h"
@@ -61,6 +62,7 @@ int RunCommandLine(int argc, char** argv) {
   ComparisonOptions comparison(app);
   BaselineOptions baseline(app);
   ClusterOptions cluster(app);
+  HistoryOptions history(app);
   ShellOptions shell(app);
   try {
     app.parse(argc, argv);
@@ -76,6 +78,7 @@ int RunCommandLine(int argc, char** argv) {
     if (const auto code = comparison.Run(typed)) return *code;
     if (const auto code = baseline.Run(typed)) return *code;
     if (const auto code = cluster.Run()) return *code;
+    if (const auto code = history.Run(typed)) return *code;
     return shell.Run();
   } catch (const std::exception& error) {
     PrintError("{}\n", Lines{error.what()});

@@ -1,6 +1,7 @@
 #include "harness/cli/program_compare.h"
 
 #include "harness/cli/options.h"
+#include "harness/text/config_error.h"
 #include "harness/text/numeric_option.h"
 
 namespace loopbench::harness {
@@ -16,6 +17,7 @@ A value that one side lacks, or that is none (null, a text for a number), is a d
 Examples:
   loopbench compare results/baselines results/runs/now
   loopbench compare old.json new.json --only times
+  loopbench compare --history bench/history results/runs/now --markdown summary.md --junit junit.xml
   loopbench compare results/runs/before results/runs/after --only counts --only hashes
 
 Exit codes: 0 the same or better, 1 something is worse or different, 2 could not measure.)";
@@ -42,8 +44,20 @@ ComparisonOptions::ComparisonOptions(CLI::App& app) {
 
   compare_app_ = app.add_subcommand("compare", "Hold new measurements against a base");
   compare_app_->footer(kCompareFooter);
-  compare_app_->add_option("base", compare_.base, what)->required();
-  compare_app_->add_option("new", compare_.fresh, what)->required();
+  compare_app_->add_option("base", files_, what + "; left out beside --history and --branch")
+      ->required()
+      ->expected(1, 2)
+      ->option_text("BASE NEW");
+  CLI::Option* history = compare_app_->add_option(
+      "--history", compare_.history, "Take the last good state of this history as BASE");
+  compare_app_
+      ->add_option("--branch", compare_.branch,
+                   "The same of a history on a branch of the repository here")
+      ->excludes(history);
+  compare_app_->add_option("--markdown", compare_.markdown,
+                           "Write a summary for a pull request to this file too");
+  compare_app_->add_option("--junit", compare_.junit,
+                           "Write JUnit XML for a CI server to this file too");
   compare_app_->add_option("--only", compare_.options.only, "Only this group (repeatable)")
       ->check(CLI::IsMember(GroupNames()));
   compare_app_->add_option("--where", conditions_,
@@ -80,8 +94,20 @@ ComparisonOptions::ComparisonOptions(CLI::App& app) {
   export_app_->add_option("--out", export_.out, "File (default: the terminal)");
 }
 
+void ComparisonOptions::TakeFiles() {
+  const bool has_history = !compare_.history.empty() || !compare_.branch.empty();
+  if (files_.size() != (has_history ? 1u : 2u)) {
+    throw ConfigError(has_history
+                          ? "compare: found BASE beside a history, expected NEW alone"
+                          : "compare: found NEW missing, expected BASE NEW, or NEW and --history");
+  }
+  compare_.fresh = files_.back();
+  if (!has_history) compare_.base = files_.front();
+}
+
 std::optional<int> ComparisonOptions::Run(const std::string& typed) {
   compare_.where = ParseSelection(conditions_);
+  if (*compare_app_) TakeFiles();
   if (*compare_app_) return PrintComparison(compare_, typed);
   if (*fit_app_) return PrintFits(fit_, typed);
   if (*export_app_) return ExportMeasurements(export_);

@@ -19,6 +19,10 @@ class ComparisonOptions {
   std::optional<int> Run(const std::string& typed);
 
  private:
+  /// BASE and NEW of compare.
+  void TakeFiles();
+
+  std::vector<std::filesystem::path> files_;
   CLI::App *compare_app_, *fit_app_, *export_app_;
   std::vector<std::string> conditions_;  ///< --where, as typed
   CompareCommand compare_;

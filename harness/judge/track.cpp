@@ -2,6 +2,7 @@
 
 #include <fmt/format.h>
 
+#include <algorithm>
 #include <map>
 
 #include "harness/judge/rules.h"
@@ -18,16 +19,16 @@ bool IsTracked(Rule rule) {
 }
 
 TrackedValue Tracked(const std::string& one, const Measure& measure, const Record& record) {
-  TrackedValue value{one, std::string(measure.key), std::string(measure.heading.unit), 0.0, 0.0,
-                     0.0};
+  TrackedValue value{one, std::string(measure.key), std::string(measure.heading.unit)};
   if (measure.rule == Rule::kTime) {
     const std::vector<double>& sample = record.Numbers(measure.key);
     value.measure = value.measure.substr(value.measure.find('.') + 1);
     value.value = Median(sample);
     value.lower = Quantile(sample, 0.1);
     value.upper = Quantile(sample, 0.9);
+    value.least = *std::ranges::min_element(sample);
   } else {
-    value.value = value.lower = value.upper = record.Number(measure.key);
+    value.value = value.lower = value.upper = value.least = record.Number(measure.key);
   }
   return value;
 }

@@ -8,9 +8,10 @@ namespace loopbench::harness {
 
 /// One number to be tracked; smaller is better.
 struct TrackedValue {
-  std::string benchmark, measure, unit;
+  std::string benchmark, measure, unit = {};
   double value = 0.0;
   double lower = 0.0, upper = 0.0;  ///< spread; equal to value where there is none
+  double least = 0.0;               ///< of a sample, which other work on the machine disturbs least
 };
 
 /// github-action-benchmark, tool "customSmallerIsBetter":

@@ -1,0 +1,222 @@
+#include "harness/cli/commands_history.h"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <cmath>
+#include <optional>
+
+#include "harness/history/history_branch.h"
+#include "harness/history/history_page.h"
+#include "harness/history/history_series.h"
+#include "harness/record/json_object.h"
+#include "harness/record/provenance.h"
+#include "harness/store/measurements.h"
+#include "harness/tables/fit.h"
+#include "harness/text/config_error.h"
+#include "harness/text/files.h"
+#include "harness/text/terminal.h"
+
+namespace loopbench::harness {
+namespace {
+
+/// The folder of a place while it is used.
+class OpenPlace {
+ public:
+  explicit OpenPlace(const HistoryPlace& place) : folder_(place.store) {
+    if (place.store.empty() == place.branch.empty()) {
+      throw ConfigError("history: expected one of --store DIR and --branch NAME");
+    }
+    if (place.branch.empty()) return;
+    branch_.emplace(place.branch);
+    folder_ = branch_->folder();
+  }
+  const std::filesystem::path& folder() const { return folder_; }
+  void Keep(const std::string& message) {
+    if (branch_) branch_->Commit(message);
+  }
+
+ private:
+  std::filesystem::path folder_;
+  std::optional<HistoryBranch> branch_;
+};
+
+HistoryFindings Chosen(HistoryFindings found, const HistoryShowCommand& command) {
+  const auto is_other = [&command](const auto& row) {
+    return row.one.find(command.one) == std::string::npos ||
+           row.measure.find(command.measure) == std::string::npos;
+  };
+  const bool has_any = !found.series.empty();
+  std::erase_if(found.series, is_other);
+  std::erase_if(found.endings, is_other);
+  if (has_any && found.series.empty() && found.endings.empty()) {
+    throw ConfigError(
+        fmt::format("found no series with \"{}\" in its case and \"{}\" in its measure",
+                    command.one, command.measure));
+  }
+  return found;
+}
+
+Table StepTable(const History& history, const HistoryFindings& found) {
+  Table table;
+  table.title = "Steps";
+  table.columns = {{"commit", "first commit"},
+                   {"date", "date"},
+                   {"case", "case"},
+                   {"measure", "measure"},
+                   {"before", "before", Format::kSeconds},
+                   {"after", "after", Format::kSeconds},
+                   {"ratio", "ratio", Format::kSeconds},
+                   {"confidence", "confidence", Format::kSeconds}};
+  std::vector<std::pair<std::size_t, std::vector<Value>>> rows;
+  const auto add = [&](std::size_t place, const std::string& one, const std::string& measure,
+                       std::vector<Value> rest) {
+    const HistoryEntry& entry = history.entries[place];
+    std::vector<Value> row = {ShortCommit(entry.commit), entry.date, one, measure};
+    row.insert(row.end(), rest.begin(), rest.end());
+    rows.push_back({place, std::move(row)});
+  };
+  for (const EndingChange& change : found.endings) {
+    add(change.entry, change.one, change.measure, {change.before, change.after, {}, {}});
+  }
+  for (const HistorySeries& one : found.series) {
+    for (const LevelChange& change : one.changes) {
+      add(one.entries[change.at], one.one, one.measure,
+          {change.before, change.after, change.after / change.before, change.Confidence()});
+    }
+  }
+  std::ranges::stable_sort(rows, std::greater<>(), [](const auto& row) { return row.first; });
+  for (const auto& [place, row] : rows) AddRow(row, &table);
+  table.notes.push_back(
+      fmt::format("{} series over {} entries; confidence: 1 less the number of such steps that "
+                  "the noise of all series together would show, at most {}",
+                  found.series.size(), history.entries.size(), kFalseAlarms));
+  return table;
+}
+
+Table CommitTable(const History& history) {
+  Table table;
+  table.title = "Last commits";
+  table.columns = {{"commit", "commit"},
+                   {"date", "date"},
+                   {"machine", "machine"},
+                   {"mark", "mark"},
+                   {"note", "note"}};
+  constexpr std::size_t kLastShown = 10;
+  const std::size_t n = history.entries.size();
+  for (std::size_t i = n > kLastShown ? n - kLastShown : 0; i < n; ++i) {
+    const HistoryEntry& entry = history.entries[i];
+    AddRow({ShortCommit(entry.commit), entry.date, entry.machine, entry.mark, entry.note}, &table);
+  }
+  if (n > kLastShown) table.notes.push_back(fmt::format("{} earlier ones", n - kLastShown));
+  return table;
+}
+
+JsonObject FindingsDocument(const History& history, const HistoryFindings& found) {
+  std::vector<JsonObject> all, endings;
+  for (const EndingChange& change : found.endings) {
+    endings.push_back(JsonObject()
+                          .Add("machine", change.machine)
+                          .Add("case", change.one)
+                          .Add("measure", change.measure)
+                          .Add("commit", history.entries[change.entry].commit)
+                          .Add("before", change.before)
+                          .Add("after", change.after));
+  }
+  for (const HistorySeries& one : found.series) {
+    std::vector<std::string> commits;
+    for (const std::size_t entry : one.entries) commits.push_back(history.entries[entry].commit);
+    std::vector<JsonObject> steps;
+    for (const LevelChange& change : one.changes) {
+      steps.push_back(JsonObject()
+                          .Add("commit", commits[change.at])
+                          .Add("before", change.before)
+                          .Add("after", change.after)
+                          .Add("confidence", change.Confidence()));
+    }
+    all.push_back(JsonObject()
+                      .Add("machine", one.machine)
+                      .Add("case", one.one)
+                      .Add("measure", one.measure)
+                      .Add("unit", one.unit)
+                      .Add("commits", commits)
+                      .Add("values", one.values)
+                      .Add("steps", steps));
+  }
+  return JsonObject().Add("series", all).Add("endings", endings);
+}
+
+}  // namespace
+
+int HistoryAdd(const HistoryAddCommand& command) {
+  std::vector<std::string> warnings;
+  const std::vector<Record> records = ReadMeasurements(command.results, &warnings);
+  for (const std::string& warning : warnings) PrintError("warning: {}\n", warning);
+  HistoryEntry entry;
+  entry.commit = command.commit;
+  entry.date = command.date;
+  if (entry.commit.empty() || entry.date.empty()) {
+    const CheckedOut found = FindCommit(entry.commit.empty() ? "HEAD" : entry.commit);
+    if (found.commit.empty()) {
+      throw ConfigError(
+          "history add: found no such commit in a git repository here, expected --commit "
+          "and --date");
+    }
+    entry.commit = found.commit;
+    if (entry.date.empty()) entry.date = found.date;
+  }
+  OpenPlace place(command.place);
+  const HistoryEntry added = AddToHistory(place.folder(), entry, records, command.replaces);
+  place.Keep("Measurements of " + ShortCommit(entry.commit));
+  Print("added {} records of commit {} ({}) on {}\n", records.size(), ShortCommit(added.commit),
+        added.date, added.machine);
+  return 0;
+}
+
+int HistoryShow(const HistoryShowCommand& command, const std::string& typed) {
+  const OpenPlace place(command.place);
+  const History history = ReadHistory(place.folder());
+  const HistoryFindings found = Chosen(FindingsOf(history), command);
+  if (command.json) {
+    PrintText(FindingsDocument(history, found).Text() + "\n");
+    return 0;
+  }
+  Table steps = StepTable(history, found);
+  if (command.format != "text") {
+    for (const std::string& line : Provenance(typed)) steps.notes.push_back(line);
+    PrintText(Render(steps, command.format));
+    return 0;
+  }
+  if (steps.rows.empty()) {
+    Print("no steps in {} series over {} entries\n\n", found.series.size(), history.entries.size());
+  } else {
+    PrintText(ToScreen(steps) + "\n");
+  }
+  PrintText(ToScreen(CommitTable(history)) + "\n");
+  return 0;
+}
+
+int HistoryReport(const HistoryReportCommand& command, const std::string& typed) {
+  const OpenPlace place(command.place);
+  const History history = ReadHistory(place.folder());
+  const HistoryFindings found = FindingsOf(history);
+  const std::string page = HistoryPage(history, found, command.title, Provenance(typed));
+  const auto out = !command.out.empty()          ? command.out
+                   : command.place.store.empty() ? std::filesystem::path("history.html")
+                                                 : command.place.store / "history.html";
+  WriteFileAtomically(out, page);
+  Print("wrote {}: {} series over {} entries, {} steps, {} kB\n", out.string(), found.series.size(),
+        history.entries.size(), found.Steps(), (page.size() + 999) / 1000);
+  return 0;
+}
+
+int HistoryMark(const HistoryMarkCommand& command) {
+  OpenPlace place(command.place);
+  const std::string commit =
+      MarkInHistory(place.folder(), command.commit, command.mark, command.note);
+  place.Keep(fmt::format("{} is {}", ShortCommit(commit), command.mark));
+  Print("{} is {}\n", commit, command.mark);
+  return 0;
+}
+
+}  // namespace loopbench::harness

@@ -1,0 +1,48 @@
+// The subcommand history: measurements of one commit after the other. As commands.h.
+#pragma once
+
+#include <filesystem>
+#include <string>
+#include <vector>
+
+#include "harness/record/select.h"
+
+namespace loopbench::harness {
+
+/// A folder, or a branch of the repository that the program is called in: one of both.
+struct HistoryPlace {
+  std::filesystem::path store;
+  std::string branch;
+};
+
+struct HistoryAddCommand {
+  HistoryPlace place;
+  std::filesystem::path results;
+  std::string commit, date;  ///< "": those that are checked out
+  bool replaces = false;
+};
+int HistoryAdd(const HistoryAddCommand& command);
+
+struct HistoryShowCommand {
+  HistoryPlace place;
+  std::string one, measure;  ///< parts of the names of cases and measures; "": all
+  std::string format = "text";
+  bool json = false;
+};
+/// Steps, newest first, and the commits. 0.
+int HistoryShow(const HistoryShowCommand& command, const std::string& typed);
+
+struct HistoryReportCommand {
+  HistoryPlace place;
+  std::filesystem::path out;
+  std::string title;
+};
+int HistoryReport(const HistoryReportCommand& command, const std::string& typed);
+
+struct HistoryMarkCommand {
+  HistoryPlace place;
+  std::string commit, mark, note;
+};
+int HistoryMark(const HistoryMarkCommand& command);
+
+}  // namespace loopbench::harness

@@ -1,0 +1,81 @@
+#include "harness/cli/program_history.h"
+
+#include "harness/cli/options.h"
+
+namespace loopbench::harness {
+
+namespace {
+
+constexpr const char* kHistoryFooter = R"(
+A history is a folder (--store) or a branch of the repository that you are in (--branch, made when it is not
+there). Steps are found in the logarithms of each measure of each case on each machine, by the least penalised
+cost with a bounded loss (Fearnhead and Rigaill 2019), so that single slow runs are none; docs/history.md.
+
+Examples:
+  loopbench history add results/runs/bench --branch loopbench-history
+  loopbench history show --branch loopbench-history --measure wall_s
+  loopbench history report --branch loopbench-history --out history.html
+  loopbench history mark 1a2b3c accepted --note 'exact mass matrix, slower' --branch loopbench-history
+  loopbench compare --branch loopbench-history results/runs/bench --markdown summary.md)";
+
+void AddPlace(CLI::App* app, HistoryPlace* place) {
+  CLI::Option* store = app->add_option("--store", place->store, "Folder of the history");
+  app->add_option("--branch", place->branch,
+                  "Branch of the git repository here, instead of a folder")
+      ->excludes(store);
+}
+
+}  // namespace
+
+HistoryOptions::HistoryOptions(CLI::App& app) {
+  app_ = app.add_subcommand("history", "Follow measurements over commits, find where they change");
+  app_->footer(kHistoryFooter);
+  app_->require_subcommand(1);
+
+  add_app_ = app_->add_subcommand("add", "Add the results of a commit");
+  add_app_
+      ->add_option("results", add_.results, "Folder of a run, .jsonl, or JSON of Google Benchmark")
+      ->required();
+  add_app_->add_option("--commit", add_.commit, "Whose they are (default: the one checked out)");
+  add_app_->add_option("--date", add_.date,
+                       "ISO 8601, by which commits are ordered (default: the commit's)");
+  add_app_->add_flag("--replace", add_.replaces, "Take the place of an earlier measurement");
+  AddPlace(add_app_, &place_);
+
+  show_app_ = app_->add_subcommand("show", "Steps, newest first, and the last commits");
+  show_app_->add_option("--case", show_.one, "Only cases whose name has this in it");
+  show_app_->add_option("--measure", show_.measure, "Only measures whose name has this in it");
+  show_app_->add_option("--format", show_.format, "Of the steps")
+      ->check(CLI::IsMember({"text", "csv", "markdown", "json"}))
+      ->capture_default_str();
+  AddPlace(show_app_, &place_);
+  AddJson(show_app_, &show_.json);
+  AddWide(show_app_);
+
+  report_app_ =
+      app_->add_subcommand("report", "One page with all steps and a chart of each series");
+  report_app_->add_option("--out", report_.out, "The page (default: history.html in the folder)");
+  report_app_->add_option("--title", report_.title, "Of the page")
+      ->default_val("Measurements over commits");
+  AddPlace(report_app_, &place_);
+
+  mark_app_ = app_->add_subcommand("mark", "Say that a commit is good, bad, or accepted as it is");
+  mark_app_->add_option("commit", mark_.commit, "Or the beginning of its name")->required();
+  mark_app_
+      ->add_option("mark", mark_.mark, "good and accepted: compare takes it as base; bad: never")
+      ->required()
+      ->check(CLI::IsMember({"good", "accepted", "bad"}));
+  mark_app_->add_option("--note", mark_.note, "Why");
+  AddPlace(mark_app_, &place_);
+}
+
+std::optional<int> HistoryOptions::Run(const std::string& typed) {
+  if (!*app_) return std::nullopt;
+  add_.place = show_.place = report_.place = mark_.place = place_;
+  if (*add_app_) return HistoryAdd(add_);
+  if (*show_app_) return HistoryShow(show_, typed);
+  if (*report_app_) return HistoryReport(report_, typed);
+  return HistoryMark(mark_);
+}
+
+}  // namespace loopbench::harness

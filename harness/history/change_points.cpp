@@ -1,0 +1,252 @@
+#include "harness/history/change_points.h"
+
+#include <algorithm>
+#include <cmath>
+#include <limits>
+#include <numbers>
+
+#include "harness/judge/statistics.h"
+
+namespace loopbench::harness {
+namespace {
+
+/// a mu^2 + b mu + c on [from, to]: the least cost of all segmentations whose last level is mu, and
+/// where their last segment begins.
+struct Piece {
+  double from, to, a, b, c;
+  std::size_t begin;
+
+  double At(double mu) const { return (a * mu + b) * mu + c; }
+  double Lowest() const {
+    return a > 0.0 ? std::clamp(-b / (2.0 * a), from, to) : from;  // a == 0: constant
+  }
+};
+
+/// The smaller of the piece and the constant `level`, which stands for a segment that begins at
+/// `begin`. Pieces that meet in a constant of one begin are joined.
+void AddCapped(const Piece& piece, double level, std::size_t begin, std::vector<Piece>* pieces) {
+  const auto add = [pieces](const Piece& one) {
+    if (!(one.to > one.from)) return;
+    const bool joins = !pieces->empty() && pieces->back().a == 0.0 && one.a == 0.0 &&
+                       pieces->back().begin == one.begin && pieces->back().c == one.c;
+    if (joins) {
+      pieces->back().to = one.to;
+    } else {
+      pieces->push_back(one);
+    }
+  };
+  const auto constant = [&](double from, double to) {
+    return Piece{from, to, 0.0, 0.0, level, begin};
+  };
+  if (piece.a == 0.0) {
+    add(piece.c <= level ? piece : constant(piece.from, piece.to));
+    return;
+  }
+  // piece <= level between the roots
+  const double middle = -piece.b / (2.0 * piece.a);
+  const double depth = (level - piece.At(middle)) / piece.a;
+  if (depth <= 0.0) {
+    add(constant(piece.from, piece.to));
+    return;
+  }
+  const double left = std::clamp(middle - std::sqrt(depth), piece.from, piece.to);
+  const double right = std::clamp(middle + std::sqrt(depth), piece.from, piece.to);
+  add(constant(piece.from, left));
+  add({left, right, piece.a, piece.b, piece.c, piece.begin});
+  add(constant(right, piece.to));
+}
+
+/// The piece with min((x - mu)^2, bound^2) added.
+void AddLoss(const Piece& piece, double x, double bound, std::vector<Piece>* pieces) {
+  const double left = std::clamp(x - bound, piece.from, piece.to);
+  const double right = std::clamp(x + bound, piece.from, piece.to);
+  const auto add = [pieces](const Piece& one) {
+    if (one.to > one.from) pieces->push_back(one);
+  };
+  add({piece.from, left, piece.a, piece.b, piece.c + bound * bound, piece.begin});
+  add({left, right, piece.a + 1.0, piece.b - 2.0 * x, piece.c + x * x, piece.begin});
+  add({right, piece.to, piece.a, piece.b, piece.c + bound * bound, piece.begin});
+}
+
+/// Outliers are few: where more than a quarter of the differences seem to be made by them, they are
+/// what the series is like, such as times of a machine with two speeds.
+constexpr double kFewest = 0.75;
+
+/// Mean square of x[i+lag] - x[i] without steps and outliers: the median tells which these are.
+double VarianceOfDifferences(std::span<const double> x, std::size_t lag) {
+  std::vector<double> differences;
+  for (std::size_t i = lag; i < x.size(); ++i) differences.push_back(std::abs(x[i] - x[i - lag]));
+  // of a normal variable the median of |.| is 0.6745 standard deviations, one in 2000 is above 3.5
+  const double most = 3.5 * Median(differences) / 0.6745;
+  double sum = 0.0, all = 0.0, count = 0.0;
+  for (const double one : differences) {
+    all += one * one;
+    if (one > most) continue;
+    sum += one * one;
+    count += 1.0;
+  }
+  const auto n = static_cast<double>(differences.size());
+  return count < kFewest * n ? all / n : sum / count;
+}
+
+/// Probability that half of n values or more, which decide the level, are outliers.
+double HalfAreOutliers(std::size_t n, double share) {
+  if (share >= 1.0) return 1.0;
+  double sum = 0.0;
+  for (std::size_t k = (n + 1) / 2; k <= n; ++k) {
+    const auto all = static_cast<double>(n), some = static_cast<double>(k);
+    sum +=
+        std::exp(std::lgamma(all + 1.0) - std::lgamma(some + 1.0) - std::lgamma(all - some + 1.0) +
+                 some * std::log(share) + (all - some) * std::log1p(-share));
+  }
+  return std::min(1.0, sum);
+}
+
+/// Segments of a series and how sure the changes between them are.
+class Segments {
+ public:
+  Segments(std::span<const double> x, const Resolution& resolution)
+      : x_(x), resolution_(resolution) {
+    const Noise noise = NoiseOf(x);
+    const auto n = static_cast<double>(x.size());
+    const double sigma = std::max(noise.sigma, resolution.noise);
+    const double long_run = std::max(noise.LongRun(), resolution.noise);
+    bound_ = 3.0 * sigma;
+    edges_ = RobustSegments(x, bound_, 2.0 * long_run * long_run * std::log(n));
+    edges_.insert(edges_.begin(), 0);
+    edges_.push_back(x.size());
+    // a root mean square of n differences of neighbours has a standard error of 0.87 / sqrt(n) of
+    // itself
+    noise_ = noise.sigma == 0.0 ? 0.0 : long_run * (1.0 + 2.0 * 0.87 / std::sqrt(n));
+  }
+
+  std::vector<LevelChange> Sure() {
+    for (;;) {
+      std::vector<LevelChange> changes;
+      std::size_t worst = 0;
+      double most = 0.0;
+      outliers_ = ShareOfOutliers();
+      for (std::size_t i = 1; i + 1 < edges_.size(); ++i) {
+        changes.push_back(ChangeAt(i));
+        const LevelChange& change = changes.back();
+        const bool is_small = std::abs(change.after - change.before) < resolution_.least;
+        const double doubt = is_small ? std::numeric_limits<double>::infinity() : change.expected;
+        if (doubt > most) {
+          most = doubt;
+          worst = i;
+        }
+      }
+      if (most <= kFalseAlarms) return changes;
+      edges_.erase(edges_.begin() + static_cast<std::ptrdiff_t>(worst));
+    }
+  }
+
+ private:
+  struct Level {
+    double median = 0.0, mean = 0.0;  ///< mean: without outliers
+  };
+  Level LevelOf(std::size_t segment) const {
+    const std::size_t from = edges_[segment], to = edges_[segment + 1];
+    Level level{Median(x_.subspan(from, to - from))};
+    for (std::size_t i = from; i < to; ++i) {
+      level.mean += std::clamp(x_[i] - level.median, -bound_, bound_);
+    }
+    level.mean = level.median + level.mean / static_cast<double>(to - from);
+    return level;
+  }
+
+  /// Share of the values that are outliers, with one more than are seen.
+  double ShareOfOutliers() const {
+    double outliers = 1.0;
+    for (std::size_t segment = 0; segment + 1 < edges_.size(); ++segment) {
+      const double level = LevelOf(segment).median;
+      for (std::size_t i = edges_[segment]; i < edges_[segment + 1]; ++i) {
+        outliers += std::abs(x_[i] - level) > bound_;
+      }
+    }
+    return std::min(1.0, outliers / static_cast<double>(x_.size()));
+  }
+
+  /// How often noise alone is expected to show a difference of `step` between means of n and m
+  /// values, or half of the fewer ones to be outliers.
+  double ExpectedByNoise(double step, std::size_t n, std::size_t m) const {
+    if (noise_ == 0.0) return 0.0;
+    const double fewer = static_cast<double>(std::min(n, m));
+    const double more = static_cast<double>(std::max(n, m));
+    const double error = noise_ * std::sqrt(1.0 / fewer + 1.0 / more);
+    return resolution_.places * (std::erfc(std::abs(step) / error / std::numbers::sqrt2) +
+                                 HalfAreOutliers(std::min(n, m), outliers_));
+  }
+
+  LevelChange ChangeAt(std::size_t i) const {
+    const Level before = LevelOf(i - 1), after = LevelOf(i);
+    return {edges_[i], before.median, after.median,
+            ExpectedByNoise(after.mean - before.mean, edges_[i] - edges_[i - 1],
+                            edges_[i + 1] - edges_[i])};
+  }
+
+  std::span<const double> x_;
+  Resolution resolution_;
+  std::vector<std::size_t> edges_;
+  double bound_ = 0.0, noise_ = 0.0, outliers_ = 0.0;
+};
+
+}  // namespace
+
+std::vector<std::size_t> RobustSegments(std::span<const double> x, double bound, double penalty) {
+  if (x.size() < 2) return {};
+  const auto [least, most] = std::ranges::minmax(x);
+  // wider than the values by a little, so that equal ones have an interval too
+  const double margin = std::max(bound, 1e-12 * std::max(std::abs(least), std::abs(most)));
+  // values near 0 keep the squares of logarithms far from 1 exact
+  const double shift = 0.5 * (least + most);
+  std::vector<Piece> costs = {{least - shift - margin, most - shift + margin, 0.0, 0.0, 0.0, 0}};
+  std::vector<std::size_t> begins(x.size());
+  double best = 0.0;
+  for (std::size_t t = 0; t < x.size(); ++t) {
+    std::vector<Piece> next;
+    if (t > 0) {
+      std::vector<Piece> capped;
+      for (const Piece& piece : costs) AddCapped(piece, best + penalty, t, &capped);
+      costs.swap(capped);
+    }
+    for (const Piece& piece : costs) AddLoss(piece, x[t] - shift, bound, &next);
+    costs.swap(next);
+    best = std::numeric_limits<double>::infinity();
+    for (const Piece& piece : costs) {
+      const double lowest = piece.At(piece.Lowest());
+      if (lowest >= best) continue;
+      best = lowest;
+      begins[t] = piece.begin;
+    }
+  }
+  std::vector<std::size_t> changes;
+  for (std::size_t begin = begins.back(); begin > 0; begin = begins[begin - 1]) {
+    changes.push_back(begin);
+  }
+  std::ranges::reverse(changes);
+  return changes;
+}
+
+double Noise::LongRun() const {
+  return sigma * std::sqrt((1.0 + correlation) / (1.0 - correlation));
+}
+
+Noise NoiseOf(std::span<const double> x) {
+  if (x.size() < 4) return {};
+  double variances[3];  // of differences over k values: 2 sigma^2 (1 - correlation^k)
+  for (std::size_t lag = 1; lag <= 3; ++lag) variances[lag - 1] = VarianceOfDifferences(x, lag);
+  if (variances[0] == 0.0) return {};
+  const double two = variances[1] / variances[0] - 1.0;    // the correlation r
+  const double three = variances[2] / variances[0] - 1.0;  // r + r^2
+  const double mean = 0.5 * (two + 0.5 * (std::sqrt(std::max(0.0, 1.0 + 4.0 * three)) - 1.0));
+  const double correlation = std::clamp(mean, 0.0, 0.9);
+  return {std::sqrt(variances[0] / (2.0 * (1.0 - correlation))), correlation};
+}
+
+std::vector<LevelChange> FindChanges(std::span<const double> x, const Resolution& resolution) {
+  if (x.size() < 2) return {};
+  return Segments(x, resolution).Sure();
+}
+
+}  // namespace loopbench::harness

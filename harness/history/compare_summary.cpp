@@ -1,0 +1,108 @@
+#include "harness/history/compare_summary.h"
+
+#include <fmt/format.h>
+
+#include <cmath>
+
+#include "harness/judge/rules.h"
+#include "harness/text/escape.h"
+#include "harness/view/svg.h"
+
+namespace loopbench::harness {
+namespace {
+
+bool IsFailure(const Finding& finding) {
+  return finding.judgement == Judgement::kWorse || finding.judgement == Judgement::kDifferent;
+}
+
+std::string Named(const Finding& finding) {
+  const auto& [key, unit] = std::pair(finding.measure.key, finding.measure.heading.unit);
+  return unit.empty() ? std::string(key) : fmt::format("{} [{}]", key, unit);
+}
+
+struct Missing {
+  const std::vector<std::string>* cases;
+  const char* why;
+};
+
+std::vector<Missing> MissingCases(const ComparisonReport& report, bool subset) {
+  std::vector<Missing> missing = {
+      {&report.ambiguous, "is there more than once"},
+      {&report.other_content, "ran another mechanism, limits or ensemble under equal keys"}};
+  if (!subset) missing.push_back({&report.only_base, "is only in the base"});
+  return missing;
+}
+
+}  // namespace
+
+std::string ComparisonMarkdown(const ComparisonReport& report, const std::string& conclusion,
+                               const std::vector<std::string>& notes) {
+  constexpr int kMostRows = 50;
+  std::string text = "### Loopbench: " + EscapeMarkdown(conclusion) + "\n\n";
+  std::string rows;
+  int failures = 0;
+  for (const Judgement judgement : {Judgement::kWorse, Judgement::kDifferent}) {
+    for (const Finding& finding : report.findings) {
+      if (finding.judgement != judgement || ++failures > kMostRows) continue;
+      rows += fmt::format("| {} | {} | {} | {} | {} | {} | {} |\n", ToString(judgement),
+                          EscapeMarkdown(finding.one), EscapeMarkdown(Named(finding)),
+                          EscapeMarkdown(finding.base), EscapeMarkdown(finding.fresh),
+                          std::isfinite(finding.ratio) ? fmt::format("{:.3f}", finding.ratio) : "",
+                          EscapeMarkdown(finding.why));
+    }
+  }
+  if (!rows.empty()) {
+    text += "| | case | measure | base | new | ratio | why |\n|---|---|---|---|---|---|---|\n" +
+            rows + "\n";
+  }
+  if (failures > kMostRows) text += fmt::format("and {} more\n\n", failures - kMostRows);
+  for (const auto& [cases, why] : MissingCases(report, false)) {
+    if (!cases->empty()) {
+      text += fmt::format("- {} {} {}, `{}` first\n", cases->size(),
+                          cases->size() == 1 ? "case" : "cases", why, cases->front());
+    }
+  }
+  text +=
+      fmt::format("\n{} measures the same, {} better, {} worse, {} different, {} not measured\n",
+                  report.Count(Judgement::kSame), report.Count(Judgement::kBetter),
+                  report.Count(Judgement::kWorse), report.Count(Judgement::kDifferent),
+                  report.Count(Judgement::kNotMeasured));
+  for (const std::string& note : notes) text += "\n" + EscapeMarkdownParagraph(note) + "\n";
+  return text;
+}
+
+std::string ComparisonJunit(const ComparisonReport& report, bool subset) {
+  std::string cases;
+  int tests = 0, failures = 0, skipped = 0;
+  for (const Finding& finding : report.findings) {
+    ++tests;
+    cases += fmt::format("  <testcase classname=\"{}\" name=\"{}\">", EscapeXml(finding.one),
+                         EscapeXml(Named(finding)));
+    if (IsFailure(finding)) {
+      ++failures;
+      cases +=
+          fmt::format("<failure message=\"{}: base {}, new {}; {}\"/>", ToString(finding.judgement),
+                      EscapeXml(finding.base), EscapeXml(finding.fresh), EscapeXml(finding.why));
+    } else if (finding.judgement == Judgement::kNotMeasured) {
+      ++skipped;
+      cases += fmt::format("<skipped message=\"{}\"/>", EscapeXml(finding.why));
+    }
+    cases += "</testcase>\n";
+  }
+  for (const auto& [names, why] : MissingCases(report, subset)) {
+    for (const std::string& name : *names) {
+      ++tests;
+      ++failures;
+      cases += fmt::format(
+          "  <testcase classname=\"{}\" name=\"case\"><failure message=\"{}\"/></testcase>\n",
+          EscapeXml(name), why);
+    }
+  }
+  return fmt::format(
+      "<?xml version=\"1.0\" encoding=\"UTF-8\"?>\n<testsuites>\n<testsuite name=\"loopbench "
+      "compare\" "
+      "tests=\"{}\" failures=\"{}\" skipped=\"{}\" errors=\"0\">\n{}</testsuite>\n</testsuites>\n",
+      tests, failures, skipped, cases);
+}
+
+}  // namespace loopbench::harness

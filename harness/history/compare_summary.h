@@ -1,0 +1,21 @@
+// What a comparison found, for those who do not read terminals: a pull request and a CI server.
+#pragma once
+
+#include <string>
+#include <vector>
+
+#include "harness/judge/compare.h"
+
+namespace loopbench::harness {
+
+/// Markdown: the conclusion, what is worse or different (at most 50 rows, with a sentence about the
+/// rest), how many measures were compared. `notes` stand below.
+std::string ComparisonMarkdown(const ComparisonReport& report, const std::string& conclusion,
+                               const std::vector<std::string>& notes);
+
+/// JUnit XML, as Jenkins and GitLab read it: a test case for each measure of each case. Failures
+/// are what is worse or different, and cases that are missing; skipped is what could not be
+/// measured.
+std::string ComparisonJunit(const ComparisonReport& report, bool subset);
+
+}  // namespace loopbench::harness

@@ -1,0 +1,233 @@
+#include "harness/history/history_page.h"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <cmath>
+
+#include "harness/view/html.h"
+#include "harness/view/svg.h"
+
+namespace loopbench::harness {
+namespace {
+
+constexpr std::size_t kMostCharts = 200;
+constexpr double kWidth = 760, kHeight = 190, kLeft = 92, kRight = 16, kTop = 12, kBottom = 46;
+
+constexpr const char* kStyle = R"(
+main { display: block; max-width: 1180px; margin: 0 auto; }
+table { border-collapse: collapse; margin: 6px 0 14px; font-size: 14px; }
+th, td { text-align: left; padding: 3px 10px 3px 0; border-bottom: 1px solid var(--rule); vertical-align: top; }
+td.n { text-align: right; font-variant-numeric: tabular-nums; }
+.wide { overflow-x: auto; }
+figure { margin: 0 0 18px; overflow-x: auto; }
+figcaption { font-weight: 600; overflow-wrap: anywhere; }
+svg { background: var(--paper); border: 1px solid var(--rule); max-width: 100%; height: auto; }
+svg text { font: 12px system-ui, 'DejaVu Sans', sans-serif; fill: var(--text); }
+.axis { stroke: var(--soft); } .grid { stroke: var(--guide); } .dot { fill: var(--drive); }
+.spread { stroke: var(--drive); stroke-opacity: 0.35; } .level { stroke: var(--text); stroke-width: 1.5; }
+.step { stroke: var(--gap); stroke-dasharray: 5 3; }
+.worse { color: var(--gap); font-weight: 600; }
+)";
+
+/// About `most` round values within [from, to].
+std::vector<double> Ticks(double from, double to, bool logarithmic, int most) {
+  std::vector<double> ticks;
+  if (logarithmic) {
+    const int first = static_cast<int>(std::ceil(std::log10(from) - 1e-9));
+    const int last = static_cast<int>(std::floor(std::log10(to) + 1e-9));
+    const int by = std::max(1, (last - first + most) / most);
+    for (int power = first; power <= last; power += by) ticks.push_back(std::pow(10.0, power));
+    if (ticks.size() >= 2) return ticks;
+    ticks.clear();
+  }
+  const double raw = (to - from) / most;
+  const double power = std::pow(10.0, std::floor(std::log10(raw)));
+  const double step = power * (raw / power <= 1.0   ? 1.0
+                               : raw / power <= 2.0 ? 2.0
+                               : raw / power <= 5.0 ? 5.0
+                                                    : 10.0);
+  for (double tick = std::ceil(from / step) * step; tick <= to + 1e-9 * step; tick += step) {
+    ticks.push_back(tick);
+  }
+  return ticks;
+}
+
+struct Chart {
+  const History& history;
+  const HistorySeries& series;
+  double low, high;
+  bool logarithmic;
+
+  Chart(const History& entries, const HistorySeries& one) : history(entries), series(one) {
+    low = *std::ranges::min_element(series.values);
+    high = *std::ranges::max_element(series.upper);
+    logarithmic = low > 0.0 && high / low > 20.0;
+    if (high <= low) {
+      const double room = high == 0.0 ? 1.0 : 0.1 * std::abs(high);
+      low -= room;
+      high += room;
+    } else if (!logarithmic) {
+      const double room = 0.06 * (high - low);
+      low -= room;
+      high += room;
+    }
+  }
+
+  double X(std::size_t i) const {
+    const double n = std::max<double>(1.0, static_cast<double>(series.values.size()) - 1.0);
+    return kLeft + 8 + (kWidth - kLeft - kRight - 16) * static_cast<double>(i) / n;
+  }
+  double Y(double value) const {
+    const double share = logarithmic ? std::log(std::max(value, low) / low) / std::log(high / low)
+                                     : (value - low) / (high - low);
+    return kTop + (kHeight - kTop - kBottom) * (1.0 - share);
+  }
+  const HistoryEntry& Entry(std::size_t i) const { return history.entries[series.entries[i]]; }
+
+  std::string Text() const {
+    const std::string unit = series.unit.empty() ? "" : fmt::format(" [{}]", series.unit);
+    std::string svg = fmt::format(
+        "<svg viewBox=\"0 0 {0} {1}\" width=\"{0}\" height=\"{1}\" role=\"img\" aria-label=\"{2} "
+        "of {3} over {4} "
+        "commits\">\n",
+        kWidth, kHeight, EscapeXml(series.measure), EscapeXml(series.one), series.values.size());
+    for (const double tick : Ticks(low, high, logarithmic, 5)) {
+      svg += fmt::format(
+          "<line class=\"grid\" x1=\"{}\" x2=\"{}\" y1=\"{:.1f}\" y2=\"{:.1f}\"/><text x=\"{}\" "
+          "y=\"{:.1f}\" "
+          "text-anchor=\"end\">{:.4g}</text>\n",
+          kLeft, kWidth - kRight, Y(tick), Y(tick), kLeft - 6, Y(tick) + 4, tick);
+    }
+    const double bottom = kHeight - kBottom;
+    svg += fmt::format(
+        "<line class=\"axis\" x1=\"{0}\" x2=\"{0}\" y1=\"{1}\" y2=\"{2}\"/>"
+        "<line class=\"axis\" x1=\"{0}\" x2=\"{3}\" y1=\"{2}\" y2=\"{2}\"/>\n",
+        kLeft, kTop, bottom, kWidth - kRight);
+    const std::size_t by = std::max<std::size_t>(1, (series.values.size() + 6) / 7);
+    for (std::size_t i = 0; i < series.values.size(); i += by) {
+      svg += fmt::format("<text x=\"{:.1f}\" y=\"{:.1f}\" text-anchor=\"middle\">{}</text>\n", X(i),
+                         bottom + 16, EscapeXml(ShortCommit(Entry(i).commit)));
+    }
+    svg += fmt::format("<text x=\"{:.1f}\" y=\"{:.1f}\" text-anchor=\"middle\">commit</text>\n",
+                       0.5 * (kLeft + kWidth - kRight), kHeight - 8);
+    svg += fmt::format(
+        "<text x=\"14\" y=\"{0:.1f}\" text-anchor=\"middle\" transform=\"rotate(-90 14 "
+        "{0:.1f})\">{1}</text>\n",
+        0.5 * (kTop + bottom), EscapeXml(series.measure + unit));
+    std::size_t begin = 0;
+    for (std::size_t k = 0; k <= series.changes.size() && !series.changes.empty(); ++k) {
+      const bool is_last = k == series.changes.size();
+      const std::size_t end = is_last ? series.values.size() : series.changes[k].at;
+      const double level = is_last ? series.changes.back().after : series.changes[k].before;
+      svg += fmt::format(
+          "<line class=\"level\" x1=\"{:.1f}\" x2=\"{:.1f}\" y1=\"{:.1f}\" y2=\"{:.1f}\"/>\n",
+          X(begin), X(end - 1), Y(level), Y(level));
+      begin = end;
+    }
+    for (const LevelChange& change : series.changes) {
+      const double x = 0.5 * (X(change.at - 1) + X(change.at));
+      svg += fmt::format(
+          "<line class=\"step\" x1=\"{0:.1f}\" x2=\"{0:.1f}\" y1=\"{1}\" y2=\"{2}\"/>"
+          "<text x=\"{3:.1f}\" y=\"{4}\">x {5:.3g}</text>\n",
+          x, kTop, bottom, x + 3, kTop + 12, change.after / change.before);
+    }
+    for (std::size_t i = 0; i < series.values.size(); ++i) {
+      if (series.upper[i] > series.values[i]) {
+        svg += fmt::format(
+            "<line class=\"spread\" x1=\"{0:.1f}\" x2=\"{0:.1f}\" y1=\"{1:.1f}\" y2=\"{2:.1f}\"/>",
+            X(i), Y(series.values[i]), Y(series.upper[i]));
+      }
+      svg += fmt::format(
+          "<circle class=\"dot\" cx=\"{:.1f}\" cy=\"{:.1f}\" r=\"2.6\"><title>{} {}: "
+          "{:.6g}{}</title></circle>\n",
+          X(i), Y(series.values[i]), EscapeXml(ShortCommit(Entry(i).commit)),
+          EscapeXml(Entry(i).date), series.values[i], EscapeXml(unit));
+    }
+    return svg + "</svg>\n";
+  }
+};
+
+std::string StepRow(const HistoryEntry& entry, const std::string& one, const std::string& measure,
+                    const std::string& before, const std::string& after, const std::string& more) {
+  return fmt::format(
+      "<tr><td>{}</td><td>{}</td><td>{}</td><td>{}</td><td class=\"n\">{}</td><td "
+      "class=\"n\">{}</td>{}</tr>\n",
+      EscapeXml(ShortCommit(entry.commit)), EscapeXml(entry.date), EscapeXml(one),
+      EscapeXml(measure), EscapeXml(before), EscapeXml(after), more);
+}
+
+std::string StepTable(const History& history, const HistoryFindings& found) {
+  std::string rows;
+  for (const EndingChange& change : found.endings) {
+    rows += StepRow(history.entries[change.entry], change.one, change.measure, change.before,
+                    change.after, "<td></td><td></td>");
+  }
+  for (const HistorySeries& one : found.series) {
+    for (const LevelChange& change : one.changes) {
+      rows += StepRow(history.entries[one.entries[change.at]], one.one, one.measure,
+                      fmt::format("{:.4g}", change.before), fmt::format("{:.4g}", change.after),
+                      fmt::format("<td class=\"n {}\">{:.4g}</td><td class=\"n\">{:.3f}</td>",
+                                  change.after > change.before ? "worse" : "",
+                                  change.after / change.before, change.Confidence()));
+    }
+  }
+  if (rows.empty()) {
+    return "<p>No step found: every series keeps its level, every case its ending.</p>\n";
+  }
+  return "<div class=\"wide\"><table><thead><tr><th>first "
+         "commit</th><th>date</th><th>case</th><th>measure</th><th>before</th>"
+         "<th>after</th><th>ratio</th><th>confidence</th></tr></thead><tbody>\n" +
+         rows + "</tbody></table></div>\n";
+}
+
+}  // namespace
+
+std::string HistoryPage(const History& history, const HistoryFindings& found,
+                        const std::string& title, const std::vector<std::string>& provenance) {
+  std::vector<const HistorySeries*> order;
+  for (const HistorySeries& one : found.series) order.push_back(&one);
+  std::ranges::stable_sort(order, [](const HistorySeries* a, const HistorySeries* b) {
+    return !a->changes.empty() && b->changes.empty();
+  });
+  std::string page = PageHead(EscapeXml(title));
+  page += kStyle;
+  page += fmt::format(
+      "</style>\n</head>\n<body>\n<header><h1>{}</h1><p class=\"soft\">{} entries, {} series, {} "
+      "steps "
+      "(other endings, and changes of level that noise would show {} times in "
+      "all)</p></header>\n<main>\n"
+      "<h2>Steps</h2>\n",
+      EscapeXml(title), history.entries.size(), found.series.size(), found.Steps(), kFalseAlarms);
+  page += StepTable(history, found);
+  page +=
+      "<h2>Series</h2>\n<p class=\"soft\">Dots: a commit each; of times the least, with a line up "
+      "to the 90th percentile. "
+      "Lines: levels. Broken lines: steps, with the ratio of the levels.</p>\n";
+  for (std::size_t i = 0; i < std::min(order.size(), kMostCharts); ++i) {
+    page += fmt::format(
+        "<figure><figcaption>{}: {}</figcaption><p class=\"soft\">{}</p>\n{}</figure>\n",
+        EscapeXml(order[i]->one), EscapeXml(order[i]->measure), EscapeXml(order[i]->machine),
+        Chart(history, *order[i]).Text());
+  }
+  if (order.size() > kMostCharts) {
+    page +=
+        fmt::format("<p>{} more series, without steps or after {} with them, are not drawn.</p>\n",
+                    order.size() - kMostCharts, kMostCharts);
+  }
+  page +=
+      "<h2>Commits</h2>\n<div "
+      "class=\"wide\"><table><thead><tr><th>commit</th><th>date</th><th>machine</th><th>mark</th>"
+      "<th>note</th></tr></thead><tbody>\n";
+  for (const HistoryEntry& entry : history.entries) {
+    page += fmt::format("<tr><td>{}</td><td>{}</td><td>{}</td><td>{}</td><td>{}</td></tr>\n",
+                        EscapeXml(entry.commit), EscapeXml(entry.date), EscapeXml(entry.machine),
+                        EscapeXml(entry.mark), EscapeXml(entry.note));
+  }
+  page += "</tbody></table></div>\n";
+  for (const std::string& line : provenance)
+    page += "<p class=\"soft\">" + EscapeXml(line) + "</p>\n";
+  return page + "</main>\n</body>\n</html>\n";
+}
+
+}  // namespace loopbench::harness

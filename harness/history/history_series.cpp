@@ -1,0 +1,185 @@
+#include "harness/history/history_series.h"
+
+#include <algorithm>
+#include <cmath>
+#include <limits>
+#include <map>
+#include <tuple>
+
+#include "harness/judge/rules.h"
+#include "harness/judge/statistics.h"
+#include "harness/judge/track.h"
+#include "harness/store/measurements.h"
+
+namespace loopbench::harness {
+namespace {
+
+/// What a change of each kind of measure must be at least, as `compare` has it (compare.h), and the
+/// noise that is assumed where a series has none: a third of it, so that one value that far off is
+/// just no outlier.
+Resolution ResolutionOf(Rule rule, double places) {
+  switch (rule) {
+    case Rule::kTime:
+      // below the 2 % that one comparison of two runs can see: many runs see more
+      return {.noise = 0.002, .least = 0.01, .places = places};
+    case Rule::kInstructions:
+      return {.noise = std::log(1.02) / 3.0, .least = std::log(1.02), .places = places};
+    case Rule::kCount:
+      return {.noise = 1e-7, .least = 1e-6, .places = places};  // any change below a million
+    default:
+      return {.noise = std::log(1.05) / 3.0, .least = std::log(1.05), .places = places};
+  }
+}
+
+/// What all cases share is taken from a series that has less noise than this share without it.
+constexpr double kQuieter = 0.7;
+
+/// Errors below are round-off and equal (CompareOptions::error_floor).
+constexpr double kErrorFloor = 1e-11;
+
+Rule RuleOfTracked(const std::string& measure) {
+  for (const std::string& key : {measure, "series." + measure}) {
+    const Measure* row = FindMeasure(key);
+    if (row != nullptr && row->rule != Rule::kNone) return row->rule;
+  }
+  return Rule::kNone;
+}
+
+HistorySeries Pooled(const std::vector<const HistorySeries*>& cases) {
+  HistorySeries pooled;
+  pooled.machine = cases.front()->machine;
+  pooled.one = kAllCases;
+  pooled.measure = cases.front()->measure;
+  pooled.rule = Rule::kTime;
+  pooled.unit = "of the median";
+  std::map<std::size_t, std::vector<double>> ratios;
+  for (const HistorySeries* one : cases) {
+    const double middle = Median(one->values);
+    for (std::size_t i = 0; i < one->values.size(); ++i) {
+      ratios[one->entries[i]].push_back(one->values[i] / middle);
+    }
+  }
+  for (const auto& [entry, values] : ratios) {
+    pooled.entries.push_back(entry);
+    pooled.values.push_back(Median(values));
+  }
+  pooled.upper = pooled.values;
+  return pooled;
+}
+
+using Key = std::tuple<std::string, std::string, std::string>;  ///< machine, case, measure
+
+void AddValues(const std::string& machine, std::size_t entry, const std::vector<Record>& records,
+               std::map<Key, std::size_t>* places, std::vector<HistorySeries>* all) {
+  for (const TrackedValue& value : TrackRecords(records).values) {
+    const auto [at, is_new] =
+        places->try_emplace({machine, value.benchmark, value.measure}, all->size());
+    if (is_new) {
+      HistorySeries& fresh = all->emplace_back();
+      fresh.machine = machine;
+      fresh.one = value.benchmark;
+      fresh.measure = value.measure;
+      fresh.unit = value.unit;
+      fresh.rule = RuleOfTracked(value.measure);
+    }
+    HistorySeries& series = (*all)[at->second];
+    series.entries.push_back(entry);
+    series.values.push_back(value.least);
+    series.upper.push_back(value.upper);
+  }
+}
+
+/// Outcomes and doubts as they were last.
+class Endings {
+ public:
+  void Add(const std::string& machine, std::size_t entry, const std::vector<Record>& records,
+           std::vector<EndingChange>* changes) {
+    for (const Record& record : records) {
+      const std::string one = CaseText(record);
+      for (const char* measure : {"outcome", "doubts"}) {
+        if (record.Find(measure) == nullptr) continue;
+        std::string now = record.Text(measure);
+        const auto [at, is_new] = last_.try_emplace({machine, one, measure}, now);
+        if (!is_new && at->second != now) {
+          changes->push_back({machine, one, measure, entry, at->second, now});
+        }
+        at->second = std::move(now);
+      }
+    }
+  }
+
+ private:
+  std::map<Key, std::string> last_;
+};
+
+/// Finds the changes of a series. Levels are compared as logarithms; a value of 0 counts as the
+/// smallest positive one of the series.
+void FindChangesOf(HistorySeries* series, double places) {
+  double smallest = std::numeric_limits<double>::infinity();
+  for (const double value : series->values) {
+    if (value > 0.0) smallest = std::min(smallest, value);
+  }
+  if (!std::isfinite(smallest)) return;
+  if (series->rule == Rule::kError) smallest = std::max(smallest, kErrorFloor);
+  std::vector<double> logarithms, without;
+  for (std::size_t i = 0; i < series->values.size(); ++i) {
+    logarithms.push_back(std::log(std::max(series->values[i], smallest)));
+    if (!series->common.empty()) without.push_back(logarithms[i] - std::log(series->common[i]));
+  }
+  // where cases vary on their own, what a few of them do would only be added to the others
+  const bool is_shared =
+      NoiseOf(without).LongRun() < kQuieter * NoiseOf(logarithms).LongRun() && !without.empty();
+  if (is_shared) logarithms.swap(without);
+  for (LevelChange change : FindChanges(logarithms, ResolutionOf(series->rule, places))) {
+    change.before = std::exp(change.before);
+    change.after = std::exp(change.after);
+    series->changes.push_back(change);
+  }
+}
+
+/// Pools times where there are many cases of one machine, and tells the cases what they share.
+std::vector<HistorySeries> PoolTimes(std::vector<HistorySeries>* all) {
+  constexpr std::size_t kMany = 5;
+  std::map<std::pair<std::string, std::string>, std::vector<HistorySeries*>> times;
+  for (HistorySeries& one : *all) {
+    if (one.rule == Rule::kTime) times[{one.machine, one.measure}].push_back(&one);
+  }
+  std::vector<HistorySeries> pooled;
+  for (const auto& [key, cases] : times) {
+    if (cases.size() < kMany) continue;
+    const HistorySeries& pool = pooled.emplace_back(Pooled({cases.begin(), cases.end()}));
+    std::map<std::size_t, double> common;
+    for (std::size_t i = 0; i < pool.entries.size(); ++i) common[pool.entries[i]] = pool.values[i];
+    for (HistorySeries* one : cases) {
+      for (const std::size_t entry : one->entries) one->common.push_back(common[entry]);
+    }
+  }
+  return pooled;
+}
+
+}  // namespace
+
+std::size_t HistoryFindings::Steps() const {
+  std::size_t steps = endings.size();
+  for (const HistorySeries& one : series) steps += one.changes.size();
+  return steps;
+}
+
+HistoryFindings FindingsOf(const History& history) {
+  HistoryFindings found;
+  Endings endings;
+  std::map<Key, std::size_t> places;
+  for (std::size_t e = 0; e < history.entries.size(); ++e) {
+    const std::vector<Record> records = ReadMeasurements(history.entries[e].results);
+    AddValues(history.entries[e].machine, e, records, &places, &found.series);
+    endings.Add(history.entries[e].machine, e, records, &found.endings);
+  }
+  const std::vector<HistorySeries> pooled = PoolTimes(&found.series);
+  found.series.insert(found.series.begin(), pooled.begin(), pooled.end());
+  double values = 0.0;
+  for (const HistorySeries& one : found.series) values += static_cast<double>(one.values.size());
+  for (HistorySeries& one : found.series) FindChangesOf(&one, values);
+  return found;
+}
+
+}  // namespace loopbench::harness

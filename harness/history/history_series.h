@@ -1,0 +1,48 @@
+// Measures over commits, and where they change.
+#pragma once
+
+#include <string>
+#include <vector>
+
+#include "harness/history/change_points.h"
+#include "harness/history/history.h"
+#include "harness/record/measures.h"
+
+namespace loopbench::harness {
+
+/// One measure of one case on one machine.
+struct HistorySeries {
+  std::string machine, one;  ///< one: the case, or kAllCases
+  std::string measure, unit;
+  Rule rule = Rule::kNone;
+  std::vector<std::size_t> entries;   ///< of the history
+  std::vector<double> values, upper;  ///< of times the least and the 90th percentile
+  std::vector<LevelChange> changes;   ///< at: place in `values`; levels as measured
+  /// Of times: by what all cases of the entry were slower than usual; 1 where there are few cases.
+  std::vector<double> common;
+};
+
+/// The case of the series that pools times: the median over all cases of their ratios to their own
+/// medians, for changes that all cases have and none shows by itself.
+inline constexpr const char* kAllCases = "all cases";
+
+/// How a case ended, or why it was doubted, where that is other than at the commit before.
+struct EndingChange {
+  std::string machine, one, measure;  ///< measure: "outcome" or "doubts"
+  std::size_t entry = 0;              ///< of the history
+  std::string before, after;
+};
+
+struct HistoryFindings {
+  std::vector<HistorySeries> series;
+  std::vector<EndingChange> endings;
+
+  std::size_t Steps() const;  ///< of both
+};
+
+/// All series with their changes, times of five and more cases pooled too. What these cases have in
+/// common is then a matter of the pooled series alone: a machine that is slower for a week is one
+/// step and not one in every case. Throws std::runtime_error when a file of results cannot be read.
+HistoryFindings FindingsOf(const History& history);
+
+}  // namespace loopbench::harness

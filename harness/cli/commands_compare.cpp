@@ -185,11 +185,14 @@ std::string Conclusion(const ComparisonReport& comparison, int code) {
   return better > 0 ? fmt::format("BETTER: {} measures, none worse", better) : "SAME";
 }
 
-/// Leaves the records of both sides that match. A key that neither side has would choose nothing.
-void Choose(const Selection& where, std::vector<Record>& base, std::vector<Record>& fresh) {
-  if (where.empty()) return;
+/// Leaves the records of both sides that match. A key that neither side has would choose nothing,
+/// and tell nothing apart.
+void Choose(const Selection& where, const std::vector<std::string>& match,
+            std::vector<Record>& base, std::vector<Record>& fresh) {
   std::vector<Record> both = base;
   both.insert(both.end(), fresh.begin(), fresh.end());
+  for (const std::string& key : match) RequireKey("--match", key, both);
+  if (where.empty()) return;
   RequireConditions("--where", where, both);
   base = Filter(base, where);
   fresh = Filter(fresh, where);
@@ -200,10 +203,17 @@ std::vector<Record> LoadBase(const CompareCommand& command, const std::vector<Re
                              std::string* name) {
   if (command.history.empty() && command.branch.empty()) return LoadMeasurements(command.base);
   std::optional<HistoryBranch> branch;
-  if (!command.branch.empty()) branch.emplace(command.branch);
+  if (!command.branch.empty()) branch.emplace(command.branch, false);
   const std::filesystem::path folder = branch ? branch->folder() : command.history;
+  const History history = ReadHistory(folder);
   const std::string machine = fresh.empty() ? "" : OriginOf(fresh.front()).machine;
-  const std::optional<HistoryEntry> good = LastGood(ReadHistory(folder), machine);
+  // Only times need a base of this machine. For all else the last good state counts, wherever it
+  // was measured: one of this machine may be older than what was accepted since.
+  const bool only_times = command.options.only == std::vector<std::string>{"times"};
+  std::optional<HistoryEntry> good = LastGood(history, only_times ? machine : "");
+  for (const HistoryEntry& entry : history.entries) {
+    if (good && entry.commit == good->commit && entry.machine == machine) good = entry;
+  }
   if (!good) {
     throw ConfigError(
         fmt::format("{}: every commit is marked bad, expected a good one", folder.string()));
@@ -239,6 +249,7 @@ JsonObject ComparisonDocument(const ComparisonReport& comparison, int code,
       .Add("only_in_new", comparison.only_fresh)
       .Add("more_than_once", comparison.ambiguous)
       .Add("other_content", comparison.other_content)
+      .Add("other_settings", comparison.other_settings)
       .Add("notes", notes);
 }
 
@@ -248,7 +259,7 @@ int PrintComparison(const CompareCommand& command, const std::string& typed) {
   std::vector<Record> fresh = LoadMeasurements(command.fresh);
   std::string base_name;
   std::vector<Record> base = LoadBase(command, fresh, &base_name);
-  Choose(command.where, base, fresh);
+  Choose(command.where, command.options.match, base, fresh);
   ShareContents(&base, &fresh);
   const ComparisonReport comparison = Compare(base, fresh, command.options);
   const int code = comparison.ExitCode(command.options);
@@ -276,6 +287,8 @@ int PrintComparison(const CompareCommand& command, const std::string& typed) {
   NoteCases("cases there more than once, not compared", comparison.ambiguous, notes);
   NoteCases("cases that ran another mechanism, limits or ensemble under equal keys, not compared",
             comparison.other_content, notes);
+  NoteCases("cases compared although they ran with other settings", comparison.other_settings,
+            notes);
   NoteCommonShift(comparison, notes);
   NoteOrigins("BASE", base, notes);
   NoteOrigins("NEW", fresh, notes);

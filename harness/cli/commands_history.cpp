@@ -23,12 +23,12 @@ namespace {
 /// The folder of a place while it is used.
 class OpenPlace {
  public:
-  explicit OpenPlace(const HistoryPlace& place) : folder_(place.store) {
+  OpenPlace(const HistoryPlace& place, bool writes) : folder_(place.store) {
     if (place.store.empty() == place.branch.empty()) {
       throw ConfigError("history: expected one of --store DIR and --branch NAME");
     }
     if (place.branch.empty()) return;
-    branch_.emplace(place.branch);
+    branch_.emplace(place.branch, writes);
     folder_ = branch_->folder();
   }
   const std::filesystem::path& folder() const { return folder_; }
@@ -165,7 +165,7 @@ int HistoryAdd(const HistoryAddCommand& command) {
     entry.commit = found.commit;
     if (entry.date.empty()) entry.date = found.date;
   }
-  OpenPlace place(command.place);
+  OpenPlace place(command.place, true);
   const HistoryEntry added = AddToHistory(place.folder(), entry, records, command.replaces);
   place.Keep("Measurements of " + ShortCommit(entry.commit));
   Print("added {} records of commit {} ({}) on {}\n", records.size(), ShortCommit(added.commit),
@@ -174,7 +174,7 @@ int HistoryAdd(const HistoryAddCommand& command) {
 }
 
 int HistoryShow(const HistoryShowCommand& command, const std::string& typed) {
-  const OpenPlace place(command.place);
+  const OpenPlace place(command.place, false);
   const History history = ReadHistory(place.folder());
   const HistoryFindings found = Chosen(FindingsOf(history), command);
   if (command.json) {
@@ -197,7 +197,7 @@ int HistoryShow(const HistoryShowCommand& command, const std::string& typed) {
 }
 
 int HistoryReport(const HistoryReportCommand& command, const std::string& typed) {
-  const OpenPlace place(command.place);
+  const OpenPlace place(command.place, false);
   const History history = ReadHistory(place.folder());
   const HistoryFindings found = FindingsOf(history);
   const std::string page = HistoryPage(history, found, command.title, Provenance(typed));
@@ -211,7 +211,7 @@ int HistoryReport(const HistoryReportCommand& command, const std::string& typed)
 }
 
 int HistoryMark(const HistoryMarkCommand& command) {
-  OpenPlace place(command.place);
+  OpenPlace place(command.place, true);
   const std::string commit =
       MarkInHistory(place.folder(), command.commit, command.mark, command.note);
   place.Keep(fmt::format("{} is {}", ShortCommit(commit), command.mark));

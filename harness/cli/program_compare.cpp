@@ -19,6 +19,7 @@ Examples:
   loopbench compare old.json new.json --only times
   loopbench compare --history bench/history results/runs/now --markdown summary.md --junit junit.xml
   loopbench compare results/runs/before results/runs/after --only counts --only hashes
+  loopbench compare before after --match mechanism,formulation   # with other tolerances, masses, ...
 
 Exit codes: 0 the same or better, 1 something is worse or different, 2 could not measure.)";
 
@@ -62,6 +63,12 @@ ComparisonOptions::ComparisonOptions(CLI::App& app) {
       ->check(CLI::IsMember(GroupNames()));
   compare_app_->add_option("--where", conditions_,
                            "Only records of both with key=value[,value] (or !=, <, <=, >, >=)");
+  compare_app_
+      ->add_option("--match", compare_.options.match,
+                   "KEY[,KEY]: cases meet by these keys, whatever else they were run with "
+                   "(default: all keys, and equal mechanisms and limits)")
+      ->delimiter(',')
+      ->allow_extra_args(false);
   compare_app_->add_flag("--subset", compare_.options.subset, "NEW may lack cases of BASE");
   compare_app_
       ->add_option("--error-ratio", compare_.options.error_ratio, "Allowed on the same build")

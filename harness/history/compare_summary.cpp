@@ -3,6 +3,7 @@
 #include <fmt/format.h>
 
 #include <cmath>
+#include <ranges>
 
 #include "harness/judge/rules.h"
 #include "harness/text/escape.h"
@@ -14,6 +15,18 @@ namespace {
 bool IsFailure(const Finding& finding) {
   return finding.judgement == Judgement::kWorse || finding.judgement == Judgement::kDifferent;
 }
+
+/// Nobody is called by an "@name" in a comment.
+std::string Quiet(const std::string& markdown) {
+  std::string quiet;
+  for (const char c : markdown) {
+    quiet += c;
+    if (c == '@') quiet += "&#8203;";  // a space without width
+  }
+  return quiet;
+}
+
+std::string Cell(const std::string& text) { return Quiet(EscapeMarkdown(text)); }
 
 std::string Named(const Finding& finding) {
   const auto& [key, unit] = std::pair(finding.measure.key, finding.measure.heading.unit);
@@ -27,10 +40,23 @@ struct Missing {
 
 std::vector<Missing> MissingCases(const ComparisonReport& report, bool subset) {
   std::vector<Missing> missing = {
-      {&report.ambiguous, "is there more than once"},
-      {&report.other_content, "ran another mechanism, limits or ensemble under equal keys"}};
-  if (!subset) missing.push_back({&report.only_base, "is only in the base"});
+      {&report.ambiguous, "there more than once, not compared"},
+      {&report.other_content,
+       "ran another mechanism, limits or ensemble under equal keys, not compared"}};
+  if (!subset) missing.push_back({&report.only_base, "only in the base"});
   return missing;
+}
+
+/// A list of cases, named as far as one looks at them.
+std::string Listed(const std::string& what, const std::vector<std::string>& cases) {
+  constexpr std::size_t kMostNamed = 20;
+  if (cases.empty()) return "";
+  std::string text = fmt::format("{} {}:\n\n", cases.size(), what);
+  for (const std::string& one : cases | std::views::take(kMostNamed)) {
+    text += "- " + Quiet(EscapeMarkdownParagraph(one)) + "\n";
+  }
+  if (cases.size() > kMostNamed) text += fmt::format("- {} more\n", cases.size() - kMostNamed);
+  return text + "\n";
 }
 
 }  // namespace
@@ -45,10 +71,10 @@ std::string ComparisonMarkdown(const ComparisonReport& report, const std::string
     for (const Finding& finding : report.findings) {
       if (finding.judgement != judgement || ++failures > kMostRows) continue;
       rows += fmt::format("| {} | {} | {} | {} | {} | {} | {} |\n", ToString(judgement),
-                          EscapeMarkdown(finding.one), EscapeMarkdown(Named(finding)),
-                          EscapeMarkdown(finding.base), EscapeMarkdown(finding.fresh),
+                          Cell(finding.one), Cell(Named(finding)), Cell(finding.base),
+                          Cell(finding.fresh),
                           std::isfinite(finding.ratio) ? fmt::format("{:.3f}", finding.ratio) : "",
-                          EscapeMarkdown(finding.why));
+                          Cell(finding.why));
     }
   }
   if (!rows.empty()) {
@@ -56,18 +82,13 @@ std::string ComparisonMarkdown(const ComparisonReport& report, const std::string
             rows + "\n";
   }
   if (failures > kMostRows) text += fmt::format("and {} more\n\n", failures - kMostRows);
-  for (const auto& [cases, why] : MissingCases(report, false)) {
-    if (!cases->empty()) {
-      text += fmt::format("- {} {} {}, `{}` first\n", cases->size(),
-                          cases->size() == 1 ? "case" : "cases", why, cases->front());
-    }
-  }
-  text +=
-      fmt::format("\n{} measures the same, {} better, {} worse, {} different, {} not measured\n",
-                  report.Count(Judgement::kSame), report.Count(Judgement::kBetter),
-                  report.Count(Judgement::kWorse), report.Count(Judgement::kDifferent),
-                  report.Count(Judgement::kNotMeasured));
-  for (const std::string& note : notes) text += "\n" + EscapeMarkdownParagraph(note) + "\n";
+  for (const auto& [cases, why] : MissingCases(report, false)) text += Listed(why, *cases);
+  text += Listed("ran with other settings, compared all the same", report.other_settings);
+  text += fmt::format("{} measures the same, {} better, {} worse, {} different, {} not measured\n",
+                      report.Count(Judgement::kSame), report.Count(Judgement::kBetter),
+                      report.Count(Judgement::kWorse), report.Count(Judgement::kDifferent),
+                      report.Count(Judgement::kNotMeasured));
+  for (const std::string& note : notes) text += "\n" + Quiet(EscapeMarkdownParagraph(note)) + "\n";
   return text;
 }
 

@@ -1,11 +1,13 @@
 #include "harness/history/history_branch.h"
 
+#include <fmt/format.h>
 #include <stdlib.h>
 
 #include <stdexcept>
 #include <utility>
 #include <vector>
 
+#include "harness/text/config_error.h"
 #include "harness/text/files.h"
 #include "harness/text/run_program.h"
 
@@ -29,7 +31,13 @@ bool HasBranch(const std::string& branch) {
 
 }  // namespace
 
-HistoryBranch::HistoryBranch(std::string branch) : branch_(std::move(branch)) {
+HistoryBranch::HistoryBranch(std::string branch, bool writes) : branch_(std::move(branch)) {
+  if (!writes && !HasBranch(branch_)) {
+    throw ConfigError(fmt::format(
+        "found no branch \"{0}\" in a git repository here, expected a history; loopbench history "
+        "add begins one, git fetch origin {0}:{0} brings that of a server",
+        branch_));
+  }
   std::string name = (std::filesystem::temp_directory_path() / "loopbench-history-XXXXXX").string();
   if (::mkdtemp(name.data()) == nullptr) FailOn("make", name);
   folder_ = std::filesystem::path(name) / "branch";
@@ -39,7 +47,9 @@ HistoryBranch::HistoryBranch(std::string branch) : branch_(std::move(branch)) {
     const std::string root = Git({"commit-tree", tree, "-m", "A history of measurements"});
     Git({"update-ref", "refs/heads/" + branch_, root});
   }
-  Git({"worktree", "add", "--quiet", folder_.string(), branch_});
+  std::vector<std::string> words = {"worktree", "add", "--quiet", folder_.string(), branch_};
+  if (!writes) words.insert(words.begin() + 2, "--detach");
+  Git(std::move(words));
 }
 
 HistoryBranch::~HistoryBranch() {
@@ -51,7 +61,8 @@ HistoryBranch::~HistoryBranch() {
 void HistoryBranch::Commit(const std::string& message) {
   Git({"-C", folder_.string(), "add", "--all"});
   if (Git({"-C", folder_.string(), "status", "--porcelain"}).empty()) return;
-  Git({"-C", folder_.string(), "commit", "--quiet", "-m", message});
+  // hooks are made for the code, which this branch has nothing of
+  Git({"-C", folder_.string(), "commit", "--quiet", "--no-verify", "-m", message});
 }
 
 CheckedOut FindCommit(const std::string& commit) {

@@ -7,11 +7,14 @@
 namespace loopbench::harness {
 
 /// The branch's files in a temporary folder (git worktree), of the repository that the program was
-/// called in. A branch that is not there yet begins empty.
+/// called in.
 class HistoryBranch {
  public:
-  /// Throws std::runtime_error with what git said.
-  explicit HistoryBranch(std::string branch);
+  /// Throws std::runtime_error with what git said, and ConfigError when there is no such branch and
+  /// it may not begin.
+  /// @param writes  a branch that is not there begins empty; else nothing of the repository
+  ///                changes, and several may read at once
+  explicit HistoryBranch(std::string branch, bool writes = true);
   ~HistoryBranch();
   HistoryBranch(const HistoryBranch&) = delete;
   HistoryBranch& operator=(const HistoryBranch&) = delete;

@@ -25,6 +25,7 @@ struct Pair {
   const Record& base;
   const Record& fresh;
   bool same_arithmetic, same_machine;
+  bool same_settings;  ///< else equal bits are not expected
 };
 
 /// A judgement with its reason.
@@ -139,6 +140,7 @@ std::string Obstacle(const Measure& measure, const Pair& pair) {
   if (measure.needs_same_arithmetic && !pair.same_arithmetic) {
     return "another compiler, flags or mathematical library";
   }
+  if (measure.rule == Rule::kHash && !pair.same_settings) return "ran with other settings";
   if (measure.rule == Rule::kTime &&
       pair.base.Text("start_hash") != pair.fresh.Text("start_hash")) {
     return "measured at another state";
@@ -207,12 +209,17 @@ std::vector<Record> WithOwnDoubts(std::vector<Record> records) {
   return records;
 }
 
+std::string NameOf(const Record& record, const CompareOptions& options) {
+  return options.match.empty() ? CaseText(record) : CaseText(record, options.match);
+}
+
 /// Records by case; cases that occur twice go to `ambiguous`.
 std::map<std::string, const Record*> ByCase(const std::vector<Record>& records,
+                                            const CompareOptions& options,
                                             std::vector<std::string>& ambiguous) {
   std::map<std::string, const Record*> cases;
   for (const Record& record : records) {
-    const std::string one = CaseText(record);
+    const std::string one = NameOf(record, options);
     if (!cases.emplace(one, &record).second && std::ranges::count(ambiguous, one) == 0) {
       ambiguous.push_back(one);
     }
@@ -246,23 +253,28 @@ ComparisonReport Compare(const std::vector<Record>& given_base,
                          const std::vector<Record>& given_fresh, const CompareOptions& options) {
   ComparisonReport comparison;
   const std::vector<Record> base = WithOwnDoubts(given_base), fresh = WithOwnDoubts(given_fresh);
-  const auto in_base = ByCase(base, comparison.ambiguous);
-  const auto in_fresh = ByCase(fresh, comparison.ambiguous);
+  const auto in_base = ByCase(base, options, comparison.ambiguous);
+  const auto in_fresh = ByCase(fresh, options, comparison.ambiguous);
   for (const Record& record : base) {
-    const std::string one = CaseText(record);
+    const std::string one = NameOf(record, options);
     if (in_base.at(one) != &record || std::ranges::count(comparison.ambiguous, one) > 0) continue;
     const auto other = in_fresh.find(one);
     if (other == in_fresh.end()) {
       comparison.only_base.push_back(one);
       continue;
     }
-    if (record.Text("case_id") != other->second->Text("case_id")) {
+    const bool same_settings = record.Text("case_id") == other->second->Text("case_id");
+    if (!same_settings && options.match.empty()) {
       comparison.other_content.push_back(one);
       continue;
     }
+    if (!same_settings) {
+      comparison.other_settings.push_back(
+          fmt::format("{}: {}", one, OtherSettings(record, *other->second)));
+    }
     const Origin base_origin = OriginOf(record), fresh_origin = OriginOf(*other->second);
     const Pair pair{record, *other->second, base_origin.SameArithmetic(fresh_origin),
-                    base_origin.SameMachine(fresh_origin)};
+                    base_origin.SameMachine(fresh_origin), same_settings};
     for (const Measure& measure : Measures()) {
       const bool chosen =
           measure.rule != Rule::kNone &&
@@ -273,7 +285,7 @@ ComparisonReport Compare(const std::vector<Record>& given_base,
     }
   }
   for (const Record& record : fresh) {
-    const std::string one = CaseText(record);
+    const std::string one = NameOf(record, options);
     if (!in_base.contains(one)) comparison.only_fresh.push_back(one);
   }
   DecideTimes(options, &comparison.findings);

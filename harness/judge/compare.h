@@ -28,6 +28,9 @@ struct CompareOptions {
   double alpha = 0.05;              ///< probability of any false alarm among all times
   std::vector<std::string> only;    ///< groups (GroupNames()); empty: all
   bool subset = false;              ///< NEW may lack cases of BASE
+  /// Keys by which cases of BASE and NEW meet, whatever else they were run with. Empty: by all keys
+  /// and the content.
+  std::vector<std::string> match;
 };
 
 enum class Judgement {
@@ -59,6 +62,8 @@ struct ComparisonReport {
   /// Cases of equal keys that ran something else (case_id: mechanism, limits, ensemble, ...), so
   /// not compared.
   std::vector<std::string> other_content;
+  /// Compared all the same, by options.match: the case and what differs (OtherSettings).
+  std::vector<std::string> other_settings;
 
   int Count(Judgement judgement, std::string_view group = "") const;
   /// 1: something is worse or different. 2: nothing was measured on both sides, or cases are

@@ -44,6 +44,14 @@ Facts FactsOf(Rule rule) {
   return {};
 }
 
+void AppendKey(const Record& record, const std::string& key, std::string* text) {
+  const std::string shown = record.Text(key);
+  if (shown.empty()) return;
+  // names speak for themselves, numbers do not
+  const bool is_name = std::holds_alternative<std::string>(*record.Find(key));
+  *text += (text->empty() ? "" : " ") + (is_name ? shown : key + " " + shown);
+}
+
 bool IsNumber(const Value& value) {
   return std::holds_alternative<double>(value) || std::holds_alternative<std::int64_t>(value);
 }
@@ -95,11 +103,36 @@ std::string CaseText(const Record& record) {
   std::string text;
   for (const auto& [key, value] : record.items()) {
     if (EndsCase(key)) break;
-    const std::string shown = record.Text(key);
-    if (shown.empty()) continue;
-    // names speak for themselves, numbers do not
-    const bool is_name = std::holds_alternative<std::string>(value);
-    text += (text.empty() ? "" : " ") + (is_name ? shown : key + " " + shown);
+    AppendKey(record, key, &text);
+  }
+  return text;
+}
+
+std::string CaseText(const Record& record, const std::vector<std::string>& keys) {
+  std::string text;
+  AppendKey(record, "kind", &text);
+  for (const std::string& key : keys) {
+    if (key != "kind") AppendKey(record, key, &text);
+  }
+  return text;
+}
+
+std::string OtherSettings(const Record& base, const Record& fresh) {
+  std::vector<std::string> keys;
+  for (const Record* record : {&base, &fresh}) {
+    for (const auto& [key, value] : record->items()) {
+      if (EndsCase(key)) break;
+      if (std::ranges::count(keys, key) == 0) keys.push_back(key);
+    }
+  }
+  if (std::ranges::count(keys, "content") == 0) keys.emplace_back("content");
+  const auto shown = [](const std::string& text) { return text.empty() ? "none" : text; };
+  std::string text;
+  for (const std::string& key : keys) {
+    const std::string before = base.Text(key), now = fresh.Text(key);
+    if (before == now) continue;
+    text += fmt::format("{}{} {} before, {} now", text.empty() ? "" : ", ", key, shown(before),
+                        shown(now));
   }
   return text;
 }

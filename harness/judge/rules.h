@@ -35,4 +35,12 @@ std::string Shown(const Record& record, std::string_view key);
 /// before "case_id" or "outcome".
 std::string CaseText(const Record& record);
 
+/// The same of these keys alone, and of "kind", for runs and timings never stand for each other.
+std::string CaseText(const Record& record, const std::vector<std::string>& keys);
+
+/// What two records that are compared were run with that differs, "" when nothing does: "rtol 1e-09
+/// before, 1e-06 now, content ...". Content is the mechanism, limits and ensemble
+/// (harness/run/case_identity.h).
+std::string OtherSettings(const Record& base, const Record& fresh);
+
 }  // namespace loopbench::harness

@@ -20,15 +20,16 @@ def run(words, **more):
 
 
 class Rendered(html.parser.HTMLParser):
-    """Rows of the tables of a page, items of its lists, and the tags it has."""
+    """Rows of the tables of a page, items of its lists, its text but for code, and the tags it has."""
 
     def __init__(self, text):
         super().__init__()
-        self.rows, self.items, self.tags, self.at = [], [], set(), None
+        self.rows, self.items, self.tags, self.at, self.text, self.in_code = [], [], set(), None, "", False
         self.feed(text)
 
     def handle_starttag(self, tag, attributes):
         self.tags.add(tag)
+        self.in_code |= tag == "code"
         if tag == "tr":
             self.rows.append([])
         if tag in ("td", "th", "li"):
@@ -36,10 +37,12 @@ class Rendered(html.parser.HTMLParser):
             self.at.append("")
 
     def handle_endtag(self, tag):
+        self.in_code &= tag != "code"
         if tag in ("td", "th", "li"):
             self.at = None
 
     def handle_data(self, data):
+        self.text += "" if self.in_code else data
         if self.at is not None:
             self.at[-1] += data.replace("\u200b", "")
 
@@ -48,7 +51,7 @@ def check_summary(text):
     """The table of a summary as another implementation renders it: no markup of names has become any."""
     page = Rendered(run(["cmark-gfm", "--unsafe", "--extension", "table", "--extension", "autolink"], input=text))
     strange = page.tags - set("h3 p table thead tbody tr th td ul li pre code".split())
-    if strange or re.search(r"(^|\s)@\w", text) or any(len(row) != 7 for row in page.rows):
+    if strange or re.search(r"(^|\s)@\w", page.text) or any(len(row) != 7 for row in page.rows):
         fail(f"the summary has tags {strange}, a name that is called or a row of another length:\n{text}")
     return {(row[1], row[2]) for row in page.rows[1:]} | {(item, "case") for item in page.items if ": " not in item}
 

@@ -108,7 +108,7 @@ class Service:
         shutil.rmtree(place, ignore_errors=True)
         (place / "home").mkdir(parents=True)
         remote = f"file://{self.work}/remote.git"
-        lines = ["[safe]\n  directory = *\n[init]\n  defaultBranch = main\n"]
+        lines = ["[init]\n  defaultBranch = main\n"]
         for url in self.urls(event):
             lines.append(f'[url "{remote}"]\n  insteadOf = {url}\n')
             if url not in allowed:
@@ -184,6 +184,9 @@ class GitHub(Service):
             elif step["uses"] == "actions/checkout@v4":
                 shutil.rmtree(workspace)
                 self.clone(self.URL, ref, event.sha, 1, place, inside=True)
+                if os.getuid() == 0:  # the runner's user, which the container's is not
+                    for path in (workspace, *workspace.rglob("*")):
+                        os.chown(path, 1001, 1001)
             elif step["uses"] == "actions/upload-artifact@v4":
                 result.folder = workspace / step["with"]["path"]
                 code = 0 if any(result.folder.iterdir()) else 1

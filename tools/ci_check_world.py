@@ -90,7 +90,10 @@ class World:
     def push(self, message, files=None, **more):
         """The same with its job."""
         sha = self.commit(message, files or {})
-        return sha, self.service.run(Event("push", sha, variables=more or self.match), "refs/heads/main")
+        return sha, self.again(sha, **more)
+
+    def again(self, sha, **more):
+        return self.service.run(Event("push", sha, variables=more or self.match), "refs/heads/main")
 
     def pull(self, message, files, fork=False, token="secret", labels=(), **more):
         """A pull request with one commit; GitHub measures its merge with main, GitLab the commit."""

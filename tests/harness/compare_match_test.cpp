@@ -13,7 +13,7 @@
 namespace loopbench::harness {
 namespace compare_match_test {
 
-Record Run(const std::string& formulation, double rtol, double drift) {
+Record OneRun(const std::string& formulation, double rtol, double drift) {
   Record record;
   record.Set("kind", std::string("accuracy"));
   record.Set("mechanism", std::string("feeder"));
@@ -38,7 +38,8 @@ CompareOptions By(std::vector<std::string> keys) {
 }
 
 TEST(CompareMatch, MeetsCasesOfOtherSettings) {
-  const std::vector<Record> base = {Run("odca", 1e-8, 1e-7)}, fresh = {Run("odca", 1e-3, 3e-7)};
+  const std::vector<Record> base = {OneRun("odca", 1e-8, 1e-7)},
+                            fresh = {OneRun("odca", 1e-3, 3e-7)};
   EXPECT_EQ(Compare(base, fresh, {}).ExitCode({}), 2);
   const CompareOptions options = By({"mechanism", "formulation"});
   const ComparisonReport report = Compare(base, fresh, options);
@@ -53,29 +54,30 @@ TEST(CompareMatch, MeetsCasesOfOtherSettings) {
 
 TEST(CompareMatch, StillWantsTheBitsOfEqualSettings) {
   const CompareOptions options = By({"mechanism", "formulation"});
-  std::vector<Record> fresh = {Run("odca", 1e-8, 1e-7)};
-  EXPECT_EQ(Compare({Run("odca", 1e-8, 1e-7)}, fresh, options).ExitCode(options), 0);
+  std::vector<Record> fresh = {OneRun("odca", 1e-8, 1e-7)};
+  EXPECT_EQ(Compare({OneRun("odca", 1e-8, 1e-7)}, fresh, options).ExitCode(options), 0);
   fresh[0].Set("state_hash", std::string("other"));
-  const ComparisonReport report = Compare({Run("odca", 1e-8, 1e-7)}, fresh, options);
+  const ComparisonReport report = Compare({OneRun("odca", 1e-8, 1e-7)}, fresh, options);
   EXPECT_EQ(report.Count(Judgement::kWorse, "hashes"), 1);
   EXPECT_TRUE(report.other_settings.empty());
 }
 
 TEST(CompareMatch, ChoosesNoneOfSeveralAndMixesNoKinds) {
   const CompareOptions options = By({"mechanism"});
-  const ComparisonReport report = Compare(
-      {Run("odca", 1e-8, 1e-7)}, {Run("odca", 1e-8, 1e-7), Run("lagrange", 1e-8, 1e-7)}, options);
+  const ComparisonReport report =
+      Compare({OneRun("odca", 1e-8, 1e-7)},
+              {OneRun("odca", 1e-8, 1e-7), OneRun("lagrange", 1e-8, 1e-7)}, options);
   EXPECT_EQ(report.ambiguous, std::vector<std::string>{"accuracy feeder"});
   EXPECT_EQ(report.ExitCode(options), 2);
-  Record timing = Run("odca", 1e-8, 1e-7);
+  Record timing = OneRun("odca", 1e-8, 1e-7);
   timing.Set("kind", std::string("timing"));
-  const ComparisonReport kinds = Compare({Run("odca", 1e-8, 1e-7)}, {timing}, options);
+  const ComparisonReport kinds = Compare({OneRun("odca", 1e-8, 1e-7)}, {timing}, options);
   EXPECT_EQ(kinds.only_base.size(), 1u);
   EXPECT_EQ(kinds.only_fresh.size(), 1u);
 }
 
 TEST(OtherSettings, NamesKeysThatOneSideLacksAndTheContent) {
-  Record base = Run("odca", 1e-8, 1e-7), fresh;
+  Record base = OneRun("odca", 1e-8, 1e-7), fresh;
   for (const auto& [key, value] : base.items()) {
     fresh.Set(key, value);
     if (key == "rtol") fresh.Set("mass", 2.5);

@@ -1,16 +1,22 @@
-// A model in a peer's own program. C++17, as model.h.
+// A model in a peer's own program. C++17, as harness/exchange/model.h.
 #pragma once
 
 #include <cstdint>
+#include <stdexcept>
 
 namespace loopbench::peers {
+
+/// Thrown by a step that was not accepted however short it became.
+class StepTooSmall : public std::runtime_error {
+  using std::runtime_error::runtime_error;
+};
 
 /// What the program counted since Start().
 struct Counts {
   std::int64_t steps = 0, rejected = 0, derivatives = 0, projections = 0;
 };
 
-/// Made from a Model, by whose order coordinates q [num_q] and speeds u [num_u] are.
+/// Made from an exchange::Model, by whose order coordinates q [num_q] and speeds u [num_u] are.
 class Program {
  public:
   virtual ~Program() = default;

@@ -6,8 +6,8 @@
 #include <cmath>
 #include <exception>
 
+#include "harness/exchange/model_of_mechanism.h"
 #include "harness/integrator/cpu_time.h"
-#include "peers/make_model.h"
 
 namespace loopbench::peers {
 namespace {
@@ -21,7 +21,7 @@ std::string OneLine(const std::string& text) {
 
 class ProgramPeer final : public harness::Peer {
  public:
-  ProgramPeer(std::string name, std::unique_ptr<Program> program, const Model& model)
+  ProgramPeer(std::string name, std::unique_ptr<Program> program, const exchange::Model& model)
       : name_(std::move(name)),
         program_(std::move(program)),
         num_q_(model.num_q),
@@ -99,9 +99,9 @@ class ProgramPeer final : public harness::Peer {
 std::unique_ptr<harness::Peer> MakeProgramPeer(const std::string& name, const ProgramFactory& make,
                                                const MechanismDescription& description) {
   try {
-    const Model model = MakeModel(description);
+    const exchange::Model model = exchange::MakeModel(description);
     return std::make_unique<ProgramPeer>(name, make(model), model);
-  } catch (const NotThere& missing) {
+  } catch (const exchange::NotThere& missing) {
     throw harness::Inexpressible(fmt::format("{} does not have: {}", name, missing.what()));
   } catch (const std::exception& error) {
     throw harness::Inexpressible(

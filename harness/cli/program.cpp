@@ -6,6 +6,7 @@
 #include "harness/cli/program_baseline.h"
 #include "harness/cli/program_cluster.h"
 #include "harness/cli/program_compare.h"
+#include "harness/cli/program_convert.h"
 #include "harness/cli/program_files.h"
 #include "harness/cli/program_history.h"
 #include "harness/cli/program_report.h"
@@ -57,6 +58,7 @@ int RunCommandLine(int argc, char** argv) {
   });
   FileOptions files(app);
   ViewOptions view(app);
+  ConvertOptions convert(app);
   StoreOptions stores(app);
   ReportCommandOptions report(app);
   ComparisonOptions comparison(app);
@@ -73,6 +75,7 @@ int RunCommandLine(int argc, char** argv) {
     const std::string typed = CommandLine(argc, argv);
     if (const auto code = files.Run(typed, ShellLine({argv, argv + argc}))) return *code;
     if (const auto code = view.Run()) return *code;
+    if (const auto code = convert.Run()) return *code;
     if (const auto code = stores.Run(typed)) return *code;
     if (const auto code = report.Run(typed)) return *code;
     if (const auto code = comparison.Run(typed)) return *code;

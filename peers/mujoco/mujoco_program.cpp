@@ -7,10 +7,13 @@
 #include <cstring>
 #include <stdexcept>
 
-#include "peers/mujoco/mujoco_model.h"
+#include "harness/exchange/export_mjcf.h"
 
 namespace loopbench::peers {
 namespace {
+
+using exchange::MjcfClosure;
+using exchange::MjcfCoordinate;
 
 /// Without these two, errors end the process after a key is pressed, and warnings go to a file.
 void Throw(const char* message) { throw std::runtime_error(message); }
@@ -39,8 +42,8 @@ struct Delete {
 
 class MujocoProgram final : public Program {
  public:
-  explicit MujocoProgram(const Model& model)
-      : made_(MakeMujocoModel(model)), model_(Load(made_.document)) {
+  explicit MujocoProgram(const exchange::Model& model)
+      : made_(exchange::MakeMjcf(model)), model_(Load(made_.document)) {
     if (model_->njnt != static_cast<int>(made_.coordinates.size()) ||
         model_->neq != static_cast<int>(made_.closures.size())) {
       Throw("joints or closures were lost");
@@ -48,9 +51,6 @@ class MujocoProgram final : public Program {
     SetClosures();
     data_.reset(mj_makeData(model_.get()));
     SetTimeStep(1e-3);
-    for (int j = 0; j < model_->njnt; ++j) {
-      data_->qfrc_applied[model_->jnt_dofadr[j]] = At(j).constant_effort;
-    }
   }
 
   void Derivative(const double* q, const double* u, double* qdot, double* udot) override {
@@ -58,7 +58,7 @@ class MujocoProgram final : public Program {
     mj_forward(model_.get(), data_.get());
     ToOurs(data_->qacc, udot);
     for (int j = 0; j < model_->njnt; ++j) {
-      const MujocoCoordinate& one = At(j);
+      const MjcfCoordinate& one = At(j);
       if (one.ball) {
         QuaternionRate(q + one.q, u + one.u, qdot + one.q);
       } else {
@@ -92,10 +92,12 @@ class MujocoProgram final : public Program {
 
   void State(double* q, double* u) const override {
     for (int j = 0; j < model_->njnt; ++j) {
-      const MujocoCoordinate& one = At(j);
+      const MjcfCoordinate& one = At(j);
       const double* own = data_->qpos + model_->jnt_qposadr[j];
       q[one.q] = one.ball ? own[0] : one.sign * own[0];
-      for (int i = 1; one.ball && i < 4; ++i) q[one.q + i] = one.sign * own[i];
+      if (!one.ball) continue;
+      mju_rotVecMatT(q + one.q + 1, own + 1, one.axes.data());
+      for (int i = 1; i < 4; ++i) q[one.q + i] *= one.sign;
     }
     ToOurs(data_->qvel, u);
   }
@@ -103,12 +105,12 @@ class MujocoProgram final : public Program {
   Counts counts() const override { return {step_, 0, 4 * step_, 0}; }
 
  private:
-  const MujocoCoordinate& At(int j) const { return made_.coordinates[static_cast<std::size_t>(j)]; }
+  const MjcfCoordinate& At(int j) const { return made_.coordinates[static_cast<std::size_t>(j)]; }
 
   /// MuJoCo has put the second points where the closures hold in its reference pose.
   void SetClosures() {
     for (int e = 0; e < model_->neq; ++e) {
-      const MujocoClosure& closure = made_.closures[static_cast<std::size_t>(e)];
+      const MjcfClosure& closure = made_.closures[static_cast<std::size_t>(e)];
       double* data = model_->eq_data + e * mjNEQDATA;
       if (closure.rod >= 0.0) {
         data[0] = closure.rod - model_->tendon_length0[model_->eq_obj1id[e]];
@@ -134,7 +136,7 @@ class MujocoProgram final : public Program {
 
   void Set(const double* q, const double* u) {
     for (int j = 0; j < model_->njnt; ++j) {
-      const MujocoCoordinate& one = At(j);
+      const MjcfCoordinate& one = At(j);
       double* own = data_->qpos + model_->jnt_qposadr[j];
       double* speed = data_->qvel + model_->jnt_dofadr[j];
       if (!one.ball) {
@@ -142,17 +144,18 @@ class MujocoProgram final : public Program {
         speed[0] = one.sign * u[one.u];
         continue;
       }
-      own[0] = q[one.q];
-      for (int i = 1; i < 4; ++i) own[i] = one.sign * q[one.q + i];
-      mju_normalize4(own);
+      double turn[4] = {q[one.q]}, w[3];
+      for (int i = 1; i < 4; ++i) turn[i] = one.sign * q[one.q + i];
+      mju_normalize4(turn);
+      own[0] = turn[0];
+      mju_rotVecMat(own + 1, turn + 1, one.axes.data());
       // MuJoCo's speeds are in axes of the body that moves
+      for (int i = 0; i < 3; ++i) w[i] = one.sign * u[one.u + i];
       if (one.sign > 0.0) {
-        double back[4];
-        mju_negQuat(back, own);
-        mju_rotVecQuat(speed, u + one.u, back);
-      } else {
-        for (int i = 0; i < 3; ++i) speed[i] = -u[one.u + i];
+        mju_negQuat(turn, turn);
+        mju_rotVecQuat(w, u + one.u, turn);
       }
+      mju_rotVecMat(speed, w, one.axes.data());
     }
   }
 
@@ -160,15 +163,19 @@ class MujocoProgram final : public Program {
   /// w x w = 0.
   void ToOurs(const double* own, double* ours) const {
     for (int j = 0; j < model_->njnt; ++j) {
-      const MujocoCoordinate& one = At(j);
+      const MjcfCoordinate& one = At(j);
       const double* value = own + model_->jnt_dofadr[j];
       if (!one.ball) {
         ours[one.u] = one.sign * value[0];
-      } else if (one.sign > 0.0) {
-        mju_rotVecQuat(ours + one.u, value, data_->qpos + model_->jnt_qposadr[j]);
-      } else {
-        for (int i = 0; i < 3; ++i) ours[one.u + i] = -value[i];
+        continue;
       }
+      double w[3];
+      if (one.sign > 0.0) {
+        mju_rotVecQuat(w, value, data_->qpos + model_->jnt_qposadr[j]);
+      } else {
+        mju_scl3(w, value, -1.0);
+      }
+      mju_rotVecMatT(ours + one.u, w, one.axes.data());
     }
   }
 
@@ -178,7 +185,7 @@ class MujocoProgram final : public Program {
     mju_mulQuat(qdot, half, q);
   }
 
-  MujocoModel made_;
+  exchange::Mjcf made_;
   std::unique_ptr<mjModel, Delete> model_;
   std::unique_ptr<mjData, Delete> data_;
   double t_end_ = 0.0;
@@ -187,7 +194,7 @@ class MujocoProgram final : public Program {
 
 }  // namespace
 
-std::unique_ptr<Program> MakeMujocoProgram(const Model& model) {
+std::unique_ptr<Program> MakeMujocoProgram(const exchange::Model& model) {
   return std::make_unique<MujocoProgram>(model);
 }
 

@@ -5,7 +5,7 @@
 
 #include <vector>
 
-#include "peers/model.h"
+#include "harness/exchange/export_simbody_parts.h"
 
 namespace loopbench::peers {
 
@@ -22,13 +22,14 @@ struct SimbodyModel {
   SimTK::GeneralForceSubsystem forces{system};
   std::vector<Mobilizer> mobilizers;  ///< in the order of Model::tree
 
-  explicit SimbodyModel(const Model& model);
+  explicit SimbodyModel(const exchange::Model& model);
   SimbodyModel(const SimbodyModel&) = delete;
   SimbodyModel& operator=(const SimbodyModel&) = delete;
 
  private:
-  void AddTree(const Model& model);
-  void AddForces(const Model& model);
+  void Add(const exchange::SimbodyMobilizer& mobilizer, const exchange::Joint& joint);
+  void Add(const exchange::SimbodyConstraint& constraint, const exchange::Joint& joint);
+  void Add(const exchange::SimbodyForce& force);
   SimTK::MobilizedBody& BodyAt(int body) {
     return matter.updMobilizedBody(mobilized_[static_cast<std::size_t>(body)]);
   }

@@ -7,7 +7,7 @@ namespace {
 
 class SimbodyProgram final : public Program {
  public:
-  explicit SimbodyProgram(const Model& model) : model_(model) {
+  explicit SimbodyProgram(const exchange::Model& model) : model_(model) {
     state_ = model_.system.realizeTopology();
     model_.system.realizeModel(state_);
   }
@@ -88,7 +88,7 @@ class SimbodyProgram final : public Program {
 
 }  // namespace
 
-std::unique_ptr<Program> MakeSimbodyProgram(const Model& model) {
+std::unique_ptr<Program> MakeSimbodyProgram(const exchange::Model& model) {
   return std::make_unique<SimbodyProgram>(model);
 }
 

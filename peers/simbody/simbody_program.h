@@ -4,7 +4,7 @@
 
 #include <memory>
 
-#include "peers/model.h"
+#include "harness/exchange/model.h"
 #include "peers/program.h"
 
 namespace loopbench::peers {
@@ -16,6 +16,6 @@ namespace loopbench::peers {
 /// Steps are those of RungeKuttaMersonIntegrator at `accuracy` = tolerance (|W yerr|_RMS, its own
 /// weights) and a constraint tolerance of a tenth of it, which is Simbody's default: positions and
 /// speeds are projected, and the error estimate too, where they miss it.
-std::unique_ptr<Program> MakeSimbodyProgram(const Model& model);
+std::unique_ptr<Program> MakeSimbodyProgram(const exchange::Model& model);
 
 }  // namespace loopbench::peers

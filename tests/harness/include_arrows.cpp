@@ -39,6 +39,7 @@ constexpr std::string_view kRooms[] = {"mechanism/algebra",
                                        "harness/judge",
                                        "harness/figures",
                                        "harness/view",
+                                       "harness/exchange",
                                        "harness/report",
                                        "harness/history",
                                        "harness/cli",
@@ -99,9 +100,9 @@ std::string_view WhyNotForeign(std::string_view path, std::string_view header) {
     return path.starts_with("tests/") ? "" : "GoogleTest is for tests";
   }
   if (header == "Simbody.h" || header.starts_with("mujoco/")) {
-    return StartsWithOneOf(path, {"peers/simbody/", "peers/mujoco/"})
+    return StartsWithOneOf(path, {"peers/simbody/", "peers/mujoco/", "tests/peers/"})
                ? ""
-               : "peers are for the folders of peers/";
+               : "peers are for the folders of peers/ and their tests";
   }
   if (header.starts_with("boost/")) {
     const bool allowed =

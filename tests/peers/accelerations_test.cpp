@@ -2,47 +2,17 @@
 // frames, joints, closures, signs of speeds and forces, to round-off.
 #include <gtest/gtest.h>
 
-#include <limits>
-#include <random>
-
 #include "harness/run/compiled_scene.h"
 #include "harness/run/peers.h"
 #include "mechanism/start/assembly.h"
 #include "tests/peers/registered.h"
+#include "tests/peers/sensitivity.h"
 #include "tests/reference/cases.h"
 
 namespace loopbench::harness {
 namespace peers_accelerations_test {
 
-constexpr double kEps = std::numeric_limits<double>::epsilon();
-
-double LargestDifference(std::span<const double> a, std::span<const double> b) {
-  double largest = 0.0;
-  for (std::size_t i = 0; i < a.size(); ++i) {
-    // written so that a NaN stays
-    if (!(std::abs(a[i] - b[i]) <= largest)) largest = std::abs(a[i] - b[i]);
-  }
-  return largest;
-}
-
-/// How far the derivative moves when the state does in its last bits: what round-off in a state,
-/// and in sums of forces that nearly cancel, does to accelerations.
-template <class Space>
-double Sensitivity(System<Space, double>& system, std::span<const double> y,
-                   std::span<const double> ydot) {
-  std::mt19937 random(1);
-  std::uniform_real_distribution<double> bits(-kEps, kEps);
-  std::vector<double> near(y.size()), other(y.size());
-  double largest = 0.0;
-  for (int draw = 0; draw < 16; ++draw) {
-    for (std::size_t i = 0; i < y.size(); ++i) {
-      near[i] = y[i] + bits(random) * std::max(1.0, std::abs(y[i]));
-    }
-    EXPECT_EQ(system.Examine(0.0, near, other), Outcome::kFinished);
-    largest = std::max(largest, LargestDifference(ydot, other));
-  }
-  return largest;
-}
+using peers_test::kEps;
 
 /// At the start, and after `t` of O-DCA's run at level position.
 template <class Space>
@@ -64,15 +34,19 @@ void Compare(const MechanismDescription& description, double t) {
   const auto peer = MakePeer("peer/simbody", description);
   ASSERT_EQ(peer->Derivative(t, y, theirs), Outcome::kFinished);
   ASSERT_EQ(system->Examine(t, y, ours), Outcome::kFinished);
-  double largest = 0.0;
-  for (const double value : ours) largest = std::max(largest, std::abs(value));
+  const auto derivative = [&](const std::vector<double>& state) {
+    std::vector<double> other(y.size());
+    EXPECT_EQ(system->Examine(t, state, other), Outcome::kFinished);
+    return other;
+  };
+  const double largest = peers_test::Largest(ours);
   const double rcond = system->diagnostics().rcond;
   // Both sum some 100 rounded terms in another order, and solve for the loops' forces, which
   // magnifies that by the condition of the loops; in singular positions, where nothing is known of
   // it, the shipped mechanisms have one lost direction and all others well conditioned.
   const double condition = rcond > kEps ? 1.0 / rcond : 1.0;
-  EXPECT_LE(LargestDifference(ours, theirs),
-            100 * (kEps * condition * largest + Sensitivity(*system, y, ours)))
+  EXPECT_LE(peers_test::LargestDifference(ours, theirs),
+            100 * (kEps * condition * largest + peers_test::Sensitivity(y, ours, derivative)))
       << "at " << t << " s, of " << largest;
 }
 

@@ -1,4 +1,5 @@
-// A mechanism in plain numbers: what peers build their own models from.
+// A mechanism in plain numbers: what documents and programs for others are written from, and what
+// peers build their own models from.
 //
 // A forest of tree joints from Ground and the joints that close its loops, bodies about their
 // centres of mass, all in three dimensions (a planar mechanism lies in z = 0). No Eigen and nothing
@@ -9,9 +10,10 @@
 #include <array>
 #include <stdexcept>
 #include <string>
+#include <utility>
 #include <vector>
 
-namespace loopbench::peers {
+namespace loopbench::exchange {
 
 using Vec = std::array<double, 3>;
 /// Row by row.
@@ -27,6 +29,8 @@ struct Body {
   std::string name;
   double mass = 0.0;    ///< [kg]
   Matrix inertia = {};  ///< about the centre of mass, in body axes [kg m^2]
+  Vec com = {};         ///< centre of mass from the user's origin of the body, in body axes [m]
+  std::vector<std::pair<std::string, Vec>> points;  ///< named ones, from the centre of mass [m]
 };
 
 /// From P to Q, with frame F on P and M on Q, as mechanism/model/joint.h has it: its kinds, axes,
@@ -39,11 +43,15 @@ struct Joint {
   Frame F, M;
   // of tree joints:
   int num_q = 0, num_u = 0, q = -1, u = -1;  ///< sizes, and place among all coordinates and speeds
+  std::vector<std::string> coordinates;      ///< their names: "angle"
   bool from_is_child = false;                ///< P hangs on Q
   /// Of a joint in space that closes a loop and of which some directions say nothing that the loop
   /// does not say already (mechanism/simplify/redundancy.h): the others, as components of a motion
   /// [w; v] in axes of F. Empty: all that its kind constrains.
   std::vector<int> imposed;
+
+  int parent() const { return from_is_child ? to : from; }
+  int child() const { return from_is_child ? from : to; }
 };
 
 /// constant - stiffness (q - rest) - damping u along the one coordinate of a tree joint.
@@ -58,10 +66,11 @@ struct Point {
   Vec at = {};
 };
 
-/// A constant force [N] in ground axes.
+/// A constant force [N] in ground axes, or in those of the body.
 struct PointForce {
   Point point;
   Vec force = {};
+  bool in_body_axes = false;
 };
 
 /// The tension preload + stiffness (d - length) + damping d' between points at distance d.
@@ -71,6 +80,7 @@ struct SpringDamper {
 };
 
 struct Model {
+  std::string name;
   bool planar = false;
   Vec gravity = {};
   std::vector<Body> bodies;  ///< [0] is Ground
@@ -80,16 +90,35 @@ struct Model {
   std::vector<PointForce> point_forces;
   std::vector<SpringDamper> spring_dampers;
   int num_q = 0, num_u = 0;
+  /// Where the model is put first, in the order of the tree: zero, turns as quaternions of one, or
+  /// the assembled start.
+  std::vector<double> q, u;
+  /// What the mechanism has and a Model has not, each with the name of its joint or body.
+  std::vector<std::string> missing;
 };
 
-/// Thrown for a part of a model that a peer does not have.
+/// What a format says in other words: with the same motion, or with a loss.
+struct Note {
+  bool loss = false;
+  std::string text;
+};
+
+/// Thrown for parts of a model that a format or peer does not have; what() has all of them.
 class NotThere : public std::runtime_error {
-  using std::runtime_error::runtime_error;
+ public:
+  explicit NotThere(std::vector<std::string> parts)
+      : std::runtime_error(Joined(parts)), parts_(std::move(parts)) {}
+
+  const std::vector<std::string>& parts() const { return parts_; }
+
+ private:
+  static std::string Joined(const std::vector<std::string>& parts) {
+    std::string text;
+    for (const std::string& part : parts) text += (text.empty() ? "" : "; ") + part;
+    return text;
+  }
+
+  std::vector<std::string> parts_;
 };
 
-/// Thrown by a step that was not accepted however short it became.
-class StepTooSmall : public std::runtime_error {
-  using std::runtime_error::runtime_error;
-};
-
-}  // namespace loopbench::peers
+}  // namespace loopbench::exchange

@@ -1,13 +1,13 @@
-#include "peers/make_model.h"
+#include "harness/exchange/model_of_mechanism.h"
 
 #include <fmt/format.h>
 
 #include <algorithm>
 #include <variant>
 
-#include "mechanism/model/mechanism.h"
+#include "mechanism/start/assembly.h"
 
-namespace loopbench::peers {
+namespace loopbench::exchange {
 namespace {
 
 Vec ToVec(const Eigen::Vector3d& v) { return {v[0], v[1], v[2]}; }
@@ -28,8 +28,9 @@ class Maker {
   explicit Maker(const MechanismDescription& description) : description_(description) {}
 
   template <class Space>
-  Model Make() {
+  Model Make(bool at_start) {
     const Mechanism<Space, double> mechanism(description_, Coordinates::kJoint);
+    model_.name = description_.name;
     model_.planar = description_.space == SpaceKind::kPlanar;
     model_.gravity = ToVec(description_.gravity);
     model_.num_q = mechanism.num_q();
@@ -49,6 +50,7 @@ class Maker {
     for (const ForceDescription& force : description_.forces) {
       std::visit([this](const auto& one) { Add(one); }, force);
     }
+    at_start ? PutAtStart(mechanism) : PutAtZero();
     return std::move(model_);
   }
 
@@ -57,23 +59,25 @@ class Maker {
     Body& made = model_.bodies.emplace_back();
     made.name = body.name;
     made.mass = body.mass;
+    made.com = ToVec(body.com);
+    for (const auto& [name, at] : body.points) made.points.emplace_back(name, ToVec(at - body.com));
     for (int i = 0; i < 3; ++i) {
       for (int j = 0; j < 3; ++j) made.inertia[3 * i + j] = body.inertia(i, j);
     }
   }
 
   template <class Space>
-  Joint MakeJoint(const Mechanism<Space, double>& mechanism, int index) const {
+  Joint MakeJoint(const Mechanism<Space, double>& mechanism, int index) {
     const auto& joint = mechanism.joints()[index];
     Joint made;
     made.name = mechanism.joint_names()[index];
     JointType type = JointType::kFree;  // a virtual one
     if (joint.description >= 0) type = description_.joints[joint.description].type;
     if (joint.num_drives > 0) {
-      throw NotThere(fmt::format("joint \"{}\": a prescribed motion", made.name));
+      Miss("joint \"{}\": a prescribed motion", made.name);
+    } else if (!IsBuiltIn(type)) {
+      Miss("joint \"{}\": {}", made.name, ToString(type));
     }
-    if (!IsBuiltIn(type))
-      throw NotThere(fmt::format("joint \"{}\": {}", made.name, ToString(type)));
     made.kind = ToString(type);
     made.parameter = joint.kind->parameter;
     made.from = joint.from;
@@ -84,6 +88,9 @@ class Maker {
     made.num_u = joint.num_u();
     made.q = joint.q_offset;
     made.u = joint.u_offset;
+    for (const ValueWord& word : ValueWords(type, description_.space, false)) {
+      made.coordinates.emplace_back(word.name);
+    }
     // where directions are no axes of F, all of them are imposed
     if (!joint.in_tree() && joint.num_released > 0 && joint.kind->basis == nullptr) {
       const std::vector<int>& released = description_.joints[joint.description].released;
@@ -99,45 +106,69 @@ class Maker {
     return {point.body, ToVec(point.at - description_.bodies[point.body].com)};
   }
 
-  JointForce& AddJointForce(int joint, const char* force) {
+  template <class... Values>
+  void Miss(fmt::format_string<const Values&...> format, const Values&... values) {
+    model_.missing.push_back(fmt::format(format, values...));
+  }
+
+  std::string NameOf(int joint) const { return description_.joints[joint].name; }
+
+  void Add(const JointForce& force, int joint, const char* kind) {
     const int tree = tree_of_[static_cast<std::size_t>(joint)];
     if (tree < 0) {
-      throw NotThere(fmt::format("{} along joint \"{}\", which closes a loop", force,
-                                 description_.joints[joint].name));
+      Miss("{} along joint \"{}\", which closes a loop", kind, NameOf(joint));
+      return;
     }
-    JointForce& made = model_.joint_forces.emplace_back();
-    made.joint = tree;
-    return made;
+    model_.joint_forces.push_back(force);
+    model_.joint_forces.back().joint = tree;
   }
 
   void Add(const JointTorque& force) {
     const auto* polynomial = std::get_if<Polynomial>(&force.value);
     if (polynomial == nullptr || polynomial->coefficients.size() != 1) {
-      throw NotThere("joint_torque that depends on time");
+      Miss("joint_torque along joint \"{}\", which depends on time", NameOf(force.joint));
+      return;
     }
-    AddJointForce(force.joint, "joint_torque").constant = polynomial->coefficients.front();
+    Add({.constant = polynomial->coefficients.front()}, force.joint, "joint_torque");
   }
   void Add(const JointSpring& force) {
-    JointForce& made = AddJointForce(force.joint, "joint_spring");
-    made.constant = force.preload;
-    made.stiffness = force.stiffness;
-    made.rest = force.rest;
+    Add({.constant = force.preload, .stiffness = force.stiffness, .rest = force.rest}, force.joint,
+        "joint_spring");
   }
   void Add(const JointDamper& force) {
-    AddJointForce(force.joint, "joint_damper").damping = force.damping;
+    Add({.damping = force.damping}, force.joint, "joint_damper");
   }
   void Add(const loopbench::PointForce& force) {
-    if (force.in_body_axes) throw NotThere("point_force in body axes");
-    model_.point_forces.push_back({ToPoint(force.point), ToVec(force.force)});
+    model_.point_forces.push_back({ToPoint(force.point), ToVec(force.force), force.in_body_axes});
   }
   void Add(const loopbench::SpringDamper& force) {
     model_.spring_dampers.push_back({ToPoint(force.from), ToPoint(force.to), force.stiffness,
                                      force.damping, force.length, force.preload});
   }
-  void Add(const Drag&) { throw NotThere("drag"); }
+  void Add(const Drag& force) {
+    Miss("drag on body \"{}\"", description_.bodies[force.point.body].name);
+  }
   void Add(const OtherForce& force) {
     OtherForce copy = force;
-    throw NotThere(std::string(PartsOf(copy).name));
+    Miss("{}", PartsOf(copy).name);
+  }
+
+  void PutAtZero() {
+    model_.q.assign(static_cast<std::size_t>(model_.num_q), 0.0);
+    model_.u.assign(static_cast<std::size_t>(model_.num_u), 0.0);
+    for (const Joint& joint : model_.tree) {
+      if (joint.num_q > joint.num_u) model_.q[static_cast<std::size_t>(joint.q)] = 1.0;
+    }
+  }
+
+  template <class Space>
+  void PutAtStart(const Mechanism<Space, double>& mechanism) {
+    const Start<double> start = Assemble<Space>(description_, mechanism);
+    if (start.outcome != Outcome::kFinished) {
+      throw std::runtime_error("its start cannot be assembled: " + start.message);
+    }
+    model_.q.assign(start.q.begin(), start.q.end());
+    model_.u.assign(start.u.begin(), start.u.end());
   }
 
   const MechanismDescription& description_;
@@ -145,11 +176,16 @@ class Maker {
   std::vector<int> tree_of_;  ///< by joint of the description: index into the tree, or -1
 };
 
-}  // namespace
-
-Model MakeModel(const MechanismDescription& description) {
+Model Make(const MechanismDescription& description, bool at_start) {
   Maker maker(description);
-  return description.space == SpaceKind::kPlanar ? maker.Make<Planar>() : maker.Make<Spatial>();
+  return description.space == SpaceKind::kPlanar ? maker.Make<Planar>(at_start)
+                                                 : maker.Make<Spatial>(at_start);
 }
 
-}  // namespace loopbench::peers
+}  // namespace
+
+Model MakeModel(const MechanismDescription& description) { return Make(description, false); }
+
+Model MakeModelAtStart(const MechanismDescription& description) { return Make(description, true); }
+
+}  // namespace loopbench::exchange

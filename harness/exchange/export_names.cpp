@@ -63,7 +63,7 @@ std::string CommentLines(const std::string& begin, std::string_view text) {
     // a backslash at the end of a line would go on in the next one
     std::string part = line.substr(from, end - from);
     if (part.ends_with('\\')) part += '.';
-    made += begin + part + "\n";
+    made += (from == 0 ? begin : begin + "  ") + part + "\n";
     from = end + 1;
   }
   return made;

@@ -6,11 +6,11 @@ namespace loopbench::exchange {
 namespace {
 
 constexpr const char* kHead = R"(//
-//   g++ -std=c++17 -O2 -isystem /usr/include/simbody mechanism.cpp -o mechanism
-//       -lSimTKsimbody -lSimTKmath -lSimTKcommon      (on one line; Debian: libsimbody-dev)
-//   ./mechanism              JSON: the start with its accelerations
-//   ./mechanism 1            the same after 1 s
-//   ./mechanism 1 1e-10      by a smaller error of a step (1e-8 where it is not said)
+// Debian's libsimbody-dev has Simbody. To compile and run:
+//   g++ -std=c++17 -O2 -isystem /usr/include/simbody FILE.cpp -o FILE -lSimTKsimbody -lSimTKmath -lSimTKcommon
+//   ./FILE              JSON: the start with its accelerations
+//   ./FILE 1            the same after 1 s
+//   ./FILE 1 1e-10      by a smaller error of a step (1e-8 where it is not said)
 //
 )";
 

@@ -19,6 +19,7 @@
 #include "mechanism/simplify/structure.h"
 #include "tests/harness/cli_fixture.h"
 #include "tests/harness/places.h"
+#include "tests/harness/xml_fault.h"
 
 namespace loopbench::harness {
 namespace view_test {
@@ -43,34 +44,6 @@ std::size_t Count(const std::string& text, const std::string& word) {
     ++count;
   }
   return count;
-}
-
-/// What is no XML: tags that do not close, ampersands and control characters of their own.
-std::string FaultOfXml(const std::string& text) {
-  std::vector<std::string> open;
-  for (std::size_t i = 0; i < text.size(); ++i) {
-    const char c = text[i];
-    if (static_cast<unsigned char>(c) < ' ' && c != '\n') return "a control character";
-    if (c == '&') {
-      const std::string entity = text.substr(i, text.find(';', i) - i + 1);
-      static const std::regex known("&(amp|lt|gt|quot|#39);");
-      if (!std::regex_match(entity, known)) return "the entity " + entity;
-    }
-    if (c != '<') continue;
-    const std::size_t end = text.find('>', i);
-    if (end == std::string::npos) return "an open tag";
-    const std::string tag = text.substr(i + 1, end - i - 1);
-    if (tag.find('<') != std::string::npos) return "a tag within a tag";
-    const std::string name = tag.substr(0, tag.find_first_of(" /\n", 1));
-    if (tag.front() == '/') {
-      if (open.empty() || "/" + open.back() != tag) return "the end of " + tag;
-      open.pop_back();
-    } else if (tag.back() != '/' && tag.front() != '?') {
-      open.push_back(name);
-    }
-    i = end;
-  }
-  return open.empty() ? "" : "no end of " + open.back();
 }
 
 bool HasBadNumber(const std::string& text) {

@@ -9,9 +9,12 @@
 #include <filesystem>
 
 #include "harness/exchange/export_mechanism.h"
+#include "harness/exchange/export_names.h"
 #include "harness/exchange/model_of_mechanism.h"
 #include "harness/text/files.h"
+#include "mechanism/description/library.h"
 #include "tests/peers/at_start.h"
+#include "tests/peers/hostile_names.h"
 #include "tests/reference/cases.h"
 
 namespace loopbench::harness {
@@ -92,9 +95,9 @@ void ExpectBodies(const AtStart& ours, Loaded& loaded) {
   }
 }
 
-class ExportedMjcf : public testing::TestWithParam<std::string> {};
+class ShippedMjcf : public testing::TestWithParam<std::string> {};
 
-TEST_P(ExportedMjcf, HasOurAccelerationsAtTheStart) {
+TEST_P(ShippedMjcf, HasOurAccelerationsAtTheStart) {
   const MechanismDescription description = reference::Shipped(GetParam()).description;
   std::string text;
   try {
@@ -139,8 +142,36 @@ TEST_P(ExportedMjcf, HasOurAccelerationsAtTheStart) {
                                                      std::max(Largest(ours.udot), 1e-6)));
 }
 
-INSTANTIATE_TEST_SUITE_P(All, ExportedMjcf, testing::ValuesIn(reference::ShippedNames()),
+INSTANTIATE_TEST_SUITE_P(All, ShippedMjcf, testing::ValuesIn(reference::ShippedNames()),
                          [](const auto& name) { return reference::WithoutDashes(name.param); });
+
+TEST(ExportedMjcf, HasNamesThatAreOnlyNames) {
+  MechanismDescription mechanism = Ladder(2, 1.0, 0.5);
+  const std::vector<std::string> names = peers_test::HostileNames();
+  ASSERT_GE(names.size(), mechanism.bodies.size());
+  mechanism.name = "--><mujoco/>]]>\n<!-- \?\?/";
+  for (std::size_t i = 1; i < mechanism.bodies.size(); ++i) {
+    mechanism.bodies[i].name = names[i - 1];
+    mechanism.bodies[i].points[names[i]] = {0.25, 0.0, 0.0};
+  }
+  for (std::size_t i = 0; i < mechanism.joints.size(); ++i) mechanism.joints[i].name = names[i];
+  const exchange::ExportedFile file = exchange::Export(mechanism, kMjcf);
+  Loaded loaded(Write("hostile", file.text));
+  EXPECT_EQ(static_cast<std::size_t>(loaded.model().nbody), mechanism.bodies.size());
+  for (std::size_t i = 1; i < mechanism.bodies.size(); ++i) {
+    std::string name = exchange::XmlText(names[i - 1]);
+    if (name == "world") name += "_2";  // MuJoCo's own
+    EXPECT_GE(mj_name2id(&loaded.model(), mjOBJ_BODY, name.c_str()), 0) << name;
+    const std::string point = names[i - 1] + "." + names[i];
+    EXPECT_GE(mj_name2id(&loaded.model(), mjOBJ_SITE, exchange::XmlText(point).c_str()), 0)
+        << point;
+    // what is called otherwise is said
+    const bool said = std::ranges::any_of(file.notes, [&](const exchange::Note& note) {
+      return note.text == fmt::format("body \"{}\" is called \"{}\".", names[i - 1], name);
+    });
+    EXPECT_EQ(said, name != names[i - 1]) << name;
+  }
+}
 
 }  // namespace peers_export_mjcf_test
 }  // namespace loopbench::harness

@@ -1,0 +1,227 @@
+// convert: documents that stand on their own, names as they are, refusals by name.
+#include <gtest/gtest.h>
+
+#include <algorithm>
+
+#include "harness/config/mechanism_reader.h"
+#include "harness/exchange/export_mechanism.h"
+#include "harness/exchange/export_names.h"
+#include "mechanism/description/library.h"
+#include "tests/harness/cli_fixture.h"
+#include "tests/harness/xml_fault.h"
+
+namespace loopbench::harness {
+namespace export_test {
+
+using exchange::ExportedFile;
+using exchange::ExportFormat;
+using exchange::ExportFormats;
+
+MechanismDescription Shipped(const std::string& name) {
+  return ReadMechanism(kConfigs / "mechanisms" / (name + ".json")).description;
+}
+
+std::vector<std::string> ShippedNames() {
+  std::vector<std::string> names;
+  for (const auto& entry : fs::directory_iterator(kConfigs / "mechanisms")) {
+    if (entry.path().extension() == ".json") names.push_back(entry.path().stem().string());
+  }
+  std::ranges::sort(names);
+  return names;
+}
+
+/// What `format` does not have of a mechanism.
+std::vector<std::string> Missing(const MechanismDescription& mechanism,
+                                 const ExportFormat& format) {
+  try {
+    exchange::Export(mechanism, format);
+  } catch (const exchange::NotThere& missing) {
+    return missing.parts();
+  }
+  return {};
+}
+
+bool Says(const std::vector<exchange::Note>& notes, const std::string& words) {
+  return std::ranges::any_of(
+      notes, [&](const auto& note) { return note.text.find(words) != std::string::npos; });
+}
+
+TEST(Export, OfShippedMechanismsIsWholeAndTheSameEachTime) {
+  for (const std::string& name : ShippedNames()) {
+    const MechanismDescription mechanism = Shipped(name);
+    for (const ExportFormat& format : ExportFormats()) {
+      if (!Missing(mechanism, format).empty()) continue;
+      const ExportedFile file = exchange::Export(mechanism, format);
+      EXPECT_EQ(file.text, exchange::Export(mechanism, format).text) << name;
+      EXPECT_EQ(file.text.find("nan"), std::string::npos) << name;
+      EXPECT_EQ(file.text.find("inf,"), std::string::npos) << name;
+      if (format.name == "mjcf") EXPECT_EQ(FaultOfXml(file.text), "") << name;
+      // each body, joint and point by its name; those of the shipped ones need no escape
+      for (const BodyDescription& body : mechanism.bodies) {
+        EXPECT_NE(file.text.find(body.name), std::string::npos) << name << body.name;
+        for (const auto& [point, at] : body.points) {
+          const std::string words = format.name == "mjcf" ? "\"" + body.name + "." + point + "\""
+                                                          : "\\\"name\\\":\\\"" + point + "\\\"";
+          EXPECT_NE(file.text.find(words), std::string::npos) << name << words;
+        }
+      }
+      for (const JointDescription& joint : mechanism.joints) {
+        EXPECT_NE(file.text.find("\"" + joint.name), std::string::npos) << name << joint.name;
+      }
+    }
+  }
+}
+
+TEST(Export, NamesAllThatAFormatDoesNotHave) {
+  const ExportFormat &mjcf = ExportFormats().front(), &simbody = ExportFormats().back();
+  EXPECT_EQ(Missing(Shipped("driven-four-bar"), mjcf),
+            std::vector<std::string>{"joint \"OA\": a prescribed motion"});
+  EXPECT_EQ(Missing(Shipped("screw-jack"), mjcf),
+            (std::vector<std::string>{"joint_torque along joint \"bearing\", which depends on time",
+                                      "joint \"thread\": helical",
+                                      "joint \"guide\": prismatic, which closes a loop"}));
+  MechanismDescription mechanism = Shipped("four-bar");
+  const std::string cut = mechanism.joints.back().name;
+  mechanism.joints.back().cut = true;
+  const int last = static_cast<int>(mechanism.joints.size()) - 1;
+  mechanism.forces = {JointDamper{.joint = last, .damping = 1.0},
+                      Drag{.point = {.body = 1}, .linear = 1.0},
+                      JointTorque{.joint = 0, .value = Polynomial{{0.0, 1.0}}},
+                      PointForce{.point = {.body = 1}, .force = {1, 0, 0}, .in_body_axes = true}};
+  std::vector<std::string> expected = {
+      "joint_damper along joint \"" + cut + "\", which closes a loop",
+      "drag on body \"" + mechanism.bodies[1].name + "\"",
+      "joint_torque along joint \"" + mechanism.joints[0].name + "\", which depends on time"};
+  EXPECT_EQ(Missing(mechanism, mjcf), expected);
+  expected.push_back("point_force on body \"" + mechanism.bodies[1].name + "\", in its axes");
+  EXPECT_EQ(Missing(mechanism, simbody), expected);
+}
+
+TEST(Export, NamesBodiesThatOtherProgramsRefuse) {
+  MechanismDescription mechanism = Shipped("spatial-four-bar");
+  mechanism.bodies[1].inertia = Eigen::Vector3d(1.0, 1.0, 3.0).asDiagonal();
+  for (const ExportFormat& format : ExportFormats()) {
+    const std::vector<std::string> missing = Missing(mechanism, format);
+    ASSERT_EQ(missing.size(), 1u);
+    EXPECT_EQ(missing[0],
+              "body \"" + mechanism.bodies[1].name +
+                  "\": principal moments of inertia 1, 1 and 3 kg m^2, which no body has: the "
+                  "largest is above the sum of the others");
+  }
+  // a plate is one, whatever rounding says of its principal moments
+  const Eigen::Matrix3d turn =
+      Eigen::AngleAxisd(0.7, Eigen::Vector3d(1, 2, 3).normalized()).toRotationMatrix();
+  const Eigen::Matrix3d plate = Eigen::Vector3d(0.1, 0.2, 0.1 + 0.2).asDiagonal();
+  mechanism.bodies[1].inertia = turn * plate * turn.transpose();
+  mechanism.bodies[1].inertia = 0.5 * (mechanism.bodies[1].inertia +
+                                       Eigen::Matrix3d(mechanism.bodies[1].inertia.transpose()));
+  for (const ExportFormat& format : ExportFormats()) {
+    EXPECT_TRUE(Missing(mechanism, format).empty());
+  }
+  mechanism.bodies[1].mass = 1e-16;
+  EXPECT_EQ(Missing(mechanism, ExportFormats().front()).size(), 1u);
+  // nested deeper than MuJoCo's parser goes
+  const std::vector<std::string> deep = Missing(Chain(200), ExportFormats().front());
+  ASSERT_EQ(deep.size(), 1u);
+  EXPECT_NE(deep[0].find("more than 89 bodies between it and Ground"), std::string::npos);
+  EXPECT_TRUE(Missing(Chain(200), ExportFormats().back()).empty());
+}
+
+TEST(Export, SaysWhatIsSaidInOtherWords) {
+  const ExportFormat &mjcf = ExportFormats().front(), &simbody = ExportFormats().back();
+  const ExportedFile soft = exchange::Export(Shipped("slider-crank"), mjcf);
+  EXPECT_TRUE(Says(soft.notes, "joint \"A\" (revolute) closes a loop: a pair of points"));
+  EXPECT_TRUE(Says(soft.notes, "joints \"S.shift\", \"S.angle\" of one body"));
+  EXPECT_TRUE(Says(soft.notes, "The plane is z = 0 of space"));
+  EXPECT_EQ(std::ranges::count(soft.notes, true, &exchange::Note::loss), 1);
+  for (const exchange::Note& note : soft.notes) {
+    // in the file too, where lines are broken
+    EXPECT_NE(soft.text.find(note.text.substr(0, 40)), std::string::npos) << note.text;
+  }
+  const ExportedFile welded = exchange::Export(Shipped("welded-four-bar"), mjcf);
+  EXPECT_EQ(std::ranges::count(welded.notes, true, &exchange::Note::loss), 1);
+  // a tree loses nothing
+  const ExportedFile tree = exchange::Export(Shipped("pendulum"), mjcf);
+  EXPECT_EQ(std::ranges::count(tree.notes, true, &exchange::Note::loss), 0);
+  const ExportedFile released = exchange::Export(Shipped("bennett"), simbody);
+  EXPECT_TRUE(Says(released.notes, "follows from the others"));
+  EXPECT_EQ(std::ranges::count(released.notes, true, &exchange::Note::loss), 0);
+}
+
+TEST(Export, EscapesWhatWouldAct) {
+  EXPECT_EQ(exchange::QuoteCpp("a\"b\\c\nd\?\?/\xc3\xbc"), R"("a\"b\\c\012d\?\?/\303\274")");
+  EXPECT_EQ(exchange::QuoteCpp(std::string(1, '\0') + "1"), R"("\0001")");
+  EXPECT_EQ(exchange::EscapeXmlAttribute("<\"&'>\n\t\x01"),
+            R"(&lt;&quot;&amp;&#39;&gt;&#10;&#9;\x01)");
+  for (const std::string text : {"a--b---c", "*/", "ends with \\", "\?\?/", "line\nline", "-"}) {
+    const std::string line = exchange::EscapeComment(text);
+    for (const char* bad : {"--", "*/", "\?\?", "\n"}) {
+      EXPECT_EQ(line.find(bad), std::string::npos) << line;
+    }
+    EXPECT_NE(line.back(), '\\');
+    EXPECT_NE(line.back(), '-');
+  }
+  EXPECT_EQ(exchange::NumberText(0.1), "0.1");
+  EXPECT_EQ(exchange::NumberText(1.0), "1.0");
+  EXPECT_EQ(exchange::NumberText(1e300), "1e+300");
+  EXPECT_EQ(exchange::NumberText(4e-320), "0.0");
+  exchange::UniqueNames names({"world"});
+  EXPECT_EQ(names.Take("world"), "world_2");
+  EXPECT_EQ(names.Take(""), "unnamed");
+  EXPECT_EQ(names.Take(""), "unnamed_2");
+}
+
+TEST(Export, KeepsHostileNamesOutOfDocuments) {
+  MechanismDescription mechanism = Shipped("four-bar");
+  for (const std::string name : {"--><evil a='", "\"/>&", "*/ \\", "\x01\n#error", "world"}) {
+    mechanism.name = name;
+    mechanism.bodies[1].name = name;
+    mechanism.bodies[1].points[name] = Eigen::Vector3d::Zero();
+    mechanism.joints[0].name = name;
+    const std::string document = exchange::Export(mechanism, ExportFormats().front()).text;
+    EXPECT_EQ(FaultOfXml(document), "") << document;
+    EXPECT_EQ(document.find("<evil"), std::string::npos);
+    // a program of lines of ASCII, in which none but its own begin with #
+    const std::string program = exchange::Export(mechanism, ExportFormats().back()).text;
+    EXPECT_EQ(program.find("\n#error"), std::string::npos);
+    EXPECT_EQ(program.find("\\\n"), std::string::npos);
+  }
+}
+
+using ConvertTest = CommandLineTest;
+
+TEST_F(ConvertTest, WritesTheFileAndSaysWhatItSays) {
+  ExpectEnding(Call("convert four-bar.json --to mjcf"), 0,
+               {"wrote four-bar.xml: 3 bodies, 4 joints", "closes a loop", "With a loss: "});
+  EXPECT_EQ(FaultOfXml(ReadFile(folder_ / "four-bar.xml")), "");
+  ExpectEnding(Call("convert four-bar.json --to mjcf --step 1e-5 --out deep/er.xml --json"), 0,
+               {R"({"file":"four-bar.json","name":"four-bar","to":"mjcf","out":"deep/er.xml",)",
+                R"("missing":[],"notes":[{"loss":false,)", R"({"loss":true,"text":"MuJoCo's)"});
+  EXPECT_NE(ReadFile(folder_ / "deep/er.xml").find("timestep=\"1e-05\""), std::string::npos);
+  ExpectEnding(Call("convert four-bar.json --to simbody"), 0, {"wrote four-bar.cpp"});
+  EXPECT_NE(ReadFile(folder_ / "four-bar.cpp").find("int main("), std::string::npos);
+}
+
+TEST_F(ConvertTest, RefusesByNameAndWritesNothing) {
+  Write("jack.json", ReadFile(kConfigs / "mechanisms/screw-jack.json"));
+  ExpectEnding(Call("convert jack.json --to simbody"), 2,
+               {"jack.json: found what simbody does not have, so nothing is written:",
+                "joint_torque along joint \"bearing\", which depends on time"});
+  ExpectEnding(Call("convert jack.json --to mjcf --json"), 2,
+               {R"("missing":["joint_torque along joint \"bearing\", which depends on time",)"});
+  EXPECT_FALSE(fs::exists(folder_ / "jack.cpp"));
+  EXPECT_FALSE(fs::exists(folder_ / "jack.xml"));
+  ExpectEnding(Call("convert four-bar.json --to urdf"), 2, {"urdf", "mjcf"});
+  ExpectEnding(Call("convert none.json --to mjcf"), 2, {"none.json"});
+  ExpectEnding(Call("convert four-bar.json --to mjcf --out ./four-bar.json"), 2,
+               {"found the mechanism file"});
+  EXPECT_EQ(ReadFile(folder_ / "four-bar.json"), mechanism_);
+  // bars that do not reach each other
+  EditMechanism("\"C\": [1.5, 0.0]", "\"C\": [9.0, 0.0]");
+  ExpectEnding(Call("convert four-bar.json --to mjcf"), 2,
+               {"four-bar.json: its start cannot be assembled: four-bar: "});
+  EXPECT_FALSE(fs::exists(folder_ / "four-bar.xml"));
+}
+
+}  // namespace export_test
+}  // namespace loopbench::harness

@@ -13,7 +13,8 @@ namespace {
 
 /// MuJoCo regularises redundant constraints, and gets all of them.
 ExportedFile WriteMjcf(const MechanismDescription& description, const ExportOptions& options) {
-  const Mjcf made = MakeMjcf(MakeModelAtStart(description), {.time_step = options.time_step});
+  const Mjcf made =
+      MakeMjcf(MakeModelAtStart(description), {.time_step = options.time_step, .shapes = true});
   return {"<!--\n" +
               CommentLines("  ", "\"" + description.name +
                                      "\", a mechanism of Loopbench at its assembled start, for "

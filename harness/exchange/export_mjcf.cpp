@@ -4,6 +4,7 @@
 #include <array>
 
 #include "harness/exchange/export_body.h"
+#include "harness/exchange/export_mjcf_shapes.h"
 #include "harness/exchange/export_mjcf_writer.h"
 
 namespace loopbench::exchange {
@@ -24,7 +25,9 @@ MjcfWriter::MjcfWriter(const Model& model, const MjcfOptions& options)
     : model_(model),
       options_(options),
       children_(model.bodies.size()),
-      sites_(model.bodies.size()) {
+      sites_(model.bodies.size()),
+      shapes_(options.shapes ? ShapesOf(model)
+                             : std::vector<std::vector<std::string>>(model.bodies.size())) {
   for (std::size_t i = 0; i < model.tree.size(); ++i) {
     children_[At(model.tree[i].parent())].push_back(i);
   }
@@ -42,6 +45,9 @@ Mjcf MjcfWriter::Write() {
   const double h = options_.time_step;
   const std::string closures = Attribute("solref", std::array{2.0 * h, 1.0}) +
                                Attribute("solimp", std::array{kHardest, kHardest, 1e-3});
+  const std::string shapes =
+      options_.shapes ? "    <geom contype=\"0\" conaffinity=\"0\" rgba=\"0.55 0.6 0.7 1\"/>\n"
+                      : "";
   made_.document =
       "<mujoco" + Named("model", Renamed("model", model_.name, XmlText(model_.name))) +
       ">\n  <compiler angle=\"radian\" autolimits=\"false\"/>\n  <option" +
@@ -49,7 +55,7 @@ Mjcf MjcfWriter::Write() {
       " integrator=\"RK4\" solver=\"Newton\" cone=\"elliptic\" jacobian=\"auto\" "
       "tolerance=\"1e-15\">\n    <flag contact=\"disable\" warmstart=\"disable\"/>\n  </option>\n" +
       fmt::format("  <size njmax=\"{}\" nconmax=\"1\"/>\n", 12 * (made_.closures.size() + 1)) +
-      Section("default", "    <equality" + closures + "/>\n") +
+      Section("default", "    <equality" + closures + "/>\n" + shapes) +
       Section("worldbody", world + bodies) + Section("tendon", tendons_) +
       Section("equality", equalities_) + Section("actuator", actuators_) +
       Section("keyframe", "    <key name=\"start\"" + Attribute("qpos", qpos_) +
@@ -99,6 +105,7 @@ void MjcfWriter::AddBody(std::size_t index, int depth, std::string& text) {
                       Attribute("pos", ToVec(chain.pose.p)),
                       Attribute("quat", QuaternionOf(chain.pose.R)), within + Inertial(child));
   AddJoint(index, chain, within, text);
+  for (const std::string& shape : shapes_[At(child)]) text += within + shape;
   for (const std::string& site : sites_[At(child)]) text += within + site;
   for (const std::size_t next : children_[At(child)]) AddBody(next, depth + 1, text);
   text += indent + "</body>\n";
@@ -183,6 +190,10 @@ void MjcfWriter::AddCoordinate(const Joint& joint, const MjcfChain& chain, const
 }
 
 void MjcfWriter::SayParts(const Joint& joint, const std::vector<std::string>& names) {
+  if (names.empty()) {
+    Say(fmt::format("joint \"{}\" (weld) is body \"{}\" without a joint.", joint.name,
+                    model_.bodies[At(joint.child())].name));
+  }
   if (names.size() > 1) {
     Say(fmt::format("joint \"{}\" ({}) is written as joints \"{}\" of one body.", joint.name,
                     joint.kind, fmt::join(names, "\", \"")));

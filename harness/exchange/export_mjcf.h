@@ -34,6 +34,7 @@ struct MjcfClosure {
 
 struct MjcfOptions {
   double time_step = 1e-3;  ///< [s], of which closures are as stiff as they may be
+  bool shapes = false;      ///< for viewers; they cost time in every step
 };
 
 struct Mjcf {

@@ -73,8 +73,8 @@ class MjcfWriter {
 
   const Model& model_;
   const MjcfOptions options_;
-  std::vector<std::vector<std::size_t>> children_;  ///< tree joints below each body
-  std::vector<std::vector<std::string>> sites_;     ///< by body
+  std::vector<std::vector<std::size_t>> children_;        ///< tree joints below each body
+  std::vector<std::vector<std::string>> sites_, shapes_;  ///< by body
   std::vector<std::string> body_names_;
   UniqueNames site_names_, joint_names_, closure_names_;
   std::string tendons_, equalities_, actuators_;

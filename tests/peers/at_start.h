@@ -24,6 +24,10 @@ struct AtStart {
   /// out what comes with speed: J udot = 0 in place of J udot = gamma.
   std::vector<double> udot_open, udot_without_bias;
   double bound = 0.0, bound_open = 0.0;  ///< of the round-off of udot and udot_open
+
+  /// Of accelerations, of whatever would move if its closures were open.
+  double Scale() const { return std::max(Largest(udot), Largest(udot_open)); }
+
   double position_residual = 0.0, speed_residual = 0.0, length = 0.0;
   std::map<std::string, JointAtStart> joints;      ///< of the tree, by name
   std::map<std::string, Eigen::Vector3d> origins;  ///< of bodies [m]

@@ -31,6 +31,19 @@ inline void KeepExpressible(MechanismDescription& description) {
   }
 }
 
+/// Adds constant efforts along the joints of a tree that have one coordinate, and a force that
+/// turns with a body.
+inline void AddConstantForces(MechanismDescription& tree, bool in_body_axes) {
+  double effort = 0.5;
+  for (std::size_t j = 0; j < tree.joints.size(); ++j, effort = -1.5 * effort) {
+    if (NumValues(tree.joints[j].type, tree.space, true) != 1) continue;
+    tree.forces.push_back(JointTorque{.joint = static_cast<int>(j), .value = Polynomial{{effort}}});
+  }
+  tree.forces.push_back(PointForce{.point = {.body = 1, .at = {0.3, -0.2, 0.0}},
+                                   .force = {0.7, 1.1, 0.0},
+                                   .in_body_axes = in_body_axes});
+}
+
 /// Of max |udot|, and what is allowed (Sample::Bound()).
 struct AccelerationError {
   double relative = 0.0, bound = 0.0;

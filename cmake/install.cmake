@@ -74,7 +74,7 @@ install(FILES ${shell_files}/loopbench.fish DESTINATION ${CMAKE_INSTALL_DATADIR}
 install(DIRECTORY mechanism ${LOOPBENCH_FORMULATIONS} harness
   DESTINATION ${CMAKE_INSTALL_INCLUDEDIR}/loopbench FILES_MATCHING PATTERN "*.h"
   REGEX "/(json/json_|json/document_kind|integrator/arkode_|config/.*_(sections|fields|sweep)\\.h|\
-config/selection_reader|cli/(options|program_)|text/numeric_option)" EXCLUDE)
+config/selection_reader|cli/(options|program_)|exchange/(xml_|import_)|text/numeric_option)" EXCLUDE)
 if(TARGET loopbench_contract)
   install(FILES tests/contract/check.h DESTINATION ${CMAKE_INSTALL_INCLUDEDIR}/loopbench/tests/contract)
 endif()

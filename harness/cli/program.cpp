@@ -9,6 +9,7 @@
 #include "harness/cli/program_convert.h"
 #include "harness/cli/program_files.h"
 #include "harness/cli/program_history.h"
+#include "harness/cli/program_import.h"
 #include "harness/cli/program_report.h"
 #include "harness/cli/program_shell.h"
 #include "harness/cli/program_stores.h"
@@ -28,6 +29,7 @@ Examples: (paths from the root of the repository)
   loopbench plan configs/experiments/paper/paper.json --set /limits/cpu_s=5
   loopbench run configs/experiments/paper/paper.json --jobs 2 --filter mechanism=four-bar
   loopbench view configs/mechanisms/double-wishbone.json
+  loopbench import arm.urdf --loops arm-loops.json --out arm.json
   loopbench simplify configs/experiments/models/hall.json --errors 2
   loopbench run big.json --shard 1/2 --out part1   (and 2/2 elsewhere)
   loopbench merge part1 part2 --out whole
@@ -59,6 +61,7 @@ int RunCommandLine(int argc, char** argv) {
   FileOptions files(app);
   ViewOptions view(app);
   ConvertOptions convert(app);
+  ImportCommandOptions import(app);
   StoreOptions stores(app);
   ReportCommandOptions report(app);
   ComparisonOptions comparison(app);
@@ -76,6 +79,7 @@ int RunCommandLine(int argc, char** argv) {
     if (const auto code = files.Run(typed, ShellLine({argv, argv + argc}))) return *code;
     if (const auto code = view.Run()) return *code;
     if (const auto code = convert.Run()) return *code;
+    if (const auto code = import.Run()) return *code;
     if (const auto code = stores.Run(typed)) return *code;
     if (const auto code = report.Run(typed)) return *code;
     if (const auto code = comparison.Run(typed)) return *code;

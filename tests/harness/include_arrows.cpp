@@ -104,6 +104,9 @@ std::string_view WhyNotForeign(std::string_view path, std::string_view header) {
                ? ""
                : "peers are for the folders of peers/ and their tests";
   }
+  if (header == "tinyxml2.h") {
+    return path == "harness/exchange/xml_file.cpp" ? "" : "XML is for harness/exchange/xml_file.cpp";
+  }
   if (header.starts_with("boost/")) {
     const bool allowed =
         OneOf(path, {"harness/observers/pendulum.cpp", "tests/reference/rigid_motions.cpp"});

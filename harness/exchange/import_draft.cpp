@@ -1,0 +1,132 @@
+#include "harness/exchange/import_draft.h"
+
+#include <fmt/format.h>
+
+#include <Eigen/Eigenvalues>
+#include <algorithm>
+#include <cmath>
+
+namespace loopbench::harness {
+
+ImportDraft::ImportDraft(const XmlFile& file, const ImportOptions& options)
+    : at_rest(1), file_(file), options_(options), elements_{file.root()}, lines_{0} {
+  description.space = SpaceKind::kSpatial;
+  description.bodies[kGround].name = "ground";
+}
+
+int ImportDraft::AddBody(const XmlElement& element, const std::string& name) {
+  const int index = static_cast<int>(description.bodies.size());
+  BodyDescription body;
+  body.name = name.empty() ? fmt::format("body{}", index) : name;
+  if (name.empty()) {
+    while (bodies_.contains(body.name)) body.name += "_";
+  } else if (const auto known = bodies_.find(name); known != bodies_.end()) {
+    element.Fail("a second body of this name",
+                 fmt::format("one that is not in use (line {} has it)", LineOf(known->second)));
+  }
+  bodies_.emplace(body.name, index);
+  if (body.name == description.bodies[kGround].name) {
+    body.name += "_";
+    while (bodies_.contains(body.name)) body.name += "_";
+    Note(element, fmt::format("called \"{}\": \"ground\" is what does not move", body.name));
+    bodies_.emplace(body.name, index);
+  }
+  description.bodies.push_back(body);
+  at_rest.emplace_back();
+  elements_.push_back(element);
+  lines_.push_back(element.line());
+  return index;
+}
+
+int ImportDraft::BodyNamed(const XmlValue& value, const std::set<std::string>& also) const {
+  const std::string name = value.Name();
+  if (also.contains(name)) return kGround;
+  const auto found = bodies_.find(name);
+  if (found == bodies_.end()) value.Fail("the name of a body in this file");
+  return found->second;
+}
+
+int ImportDraft::BodyNamed(const std::string& name, const XmlElement& user) const {
+  const auto found = bodies_.find(name);
+  if (found == bodies_.end()) user.Fail('"' + name + '"', "the name of a body in this file");
+  return found->second;
+}
+
+std::string ImportDraft::NewJointName(const XmlElement& element, const std::string& name) {
+  if (!joints_.insert(name).second) {
+    element.Fail(fmt::format("a second joint \"{}\"", name), "a name that is not in use");
+  }
+  return name;
+}
+
+std::string ImportDraft::UnusedJointName(std::string stem) {
+  while (!joints_.insert(stem).second) stem += "_";
+  return stem;
+}
+
+JointDescription& ImportDraft::AddJoint(const std::string& name, JointType type, int from,
+                                        const Placement& X_PF, int to, const Placement& X_QM) {
+  JointDescription joint;
+  joint.name = name;
+  joint.type = type;
+  joint.from = {from, X_PF.p, RotationVector(X_PF.q)};
+  joint.to = {to, X_QM.p, RotationVector(X_QM.q)};
+  description.joints.push_back(joint);
+  return description.joints.back();
+}
+
+void ImportDraft::CheckMass(int index) const {
+  constexpr double kPrinted = 0.01;  // as mechanism files allow (mechanism_bodies.cpp)
+  const XmlElement& element = elements_[static_cast<std::size_t>(index)];
+  const BodyDescription& body = description.bodies[static_cast<std::size_t>(index)];
+  if (!(body.mass > 0.0)) element.Fail("a mass of 0 beside an inertia", "a mass > 0");
+  if (!std::isfinite(body.mass) || !body.com.allFinite() || !body.inertia.allFinite()) {
+    element.Fail("numbers too large for its mass and inertia", "a body of finite mass and size");
+  }
+  const Eigen::Vector3d moments =
+      Eigen::SelfAdjointEigenSolver<Eigen::Matrix3d>(body.inertia, Eigen::EigenvaluesOnly)
+          .eigenvalues();
+  const std::string shown = fmt::format("principal moments {:.4g}, {:.4g}, {:.4g} kg m^2",
+                                        moments[0], moments[1], moments[2]);
+  if (!(moments[0] > 0.0)) element.Fail(shown, "three that are > 0");
+  if (moments[2] > (1.0 + kPrinted) * (moments[0] + moments[1])) {
+    element.Fail(shown, "none larger than the sum of the other two, as no body's is");
+  }
+}
+
+void ImportDraft::AddLift(int body, double share) { lifts_.emplace_back(body, share); }
+
+void ImportDraft::Note(const XmlElement& element, std::string reason, bool changes_motion) {
+  notes_.push_back({element.line(), element.Shown(), std::move(reason), changes_motion});
+}
+
+void ImportDraft::Note(const XmlElement& element, const std::string& attribute, std::string reason,
+                       bool changes_motion) {
+  notes_.push_back(
+      {element.line(), element.Shown() + " " + attribute, std::move(reason), changes_motion});
+}
+
+void ImportDraft::NoteUnread(const std::vector<DroppedReason>& reasons) {
+  file_.Unread([&](const XmlElement& element, const std::string& attribute) {
+    const auto find = [&](const std::string& what) {
+      return std::ranges::find(reasons, what, &DroppedReason::what);
+    };
+    auto known = reasons.end();
+    if (attribute.empty()) {
+      known = find(element.tag());
+    } else {
+      known = find(element.tag() + "@" + attribute);
+      if (known == reasons.end()) known = find("@" + attribute);
+    }
+    if (known == reasons.end()) {
+      const std::string reason = "dropped: not known to this reader";
+      attribute.empty() ? Note(element, reason, true) : Note(element, attribute, reason, true);
+    } else if (!known->reason.empty()) {
+      const std::string reason = fmt::format("dropped: {}", known->reason);
+      attribute.empty() ? Note(element, reason, known->changes_motion)
+                        : Note(element, attribute, reason, known->changes_motion);
+    }
+  });
+}
+
+}  // namespace loopbench::harness

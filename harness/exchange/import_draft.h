@@ -1,0 +1,85 @@
+// A mechanism while it is imported, in whatever format: what the readers of the formats fill, and
+// what is done with it afterwards.
+#pragma once
+
+#include <functional>
+#include <map>
+#include <optional>
+#include <set>
+#include <string>
+#include <string_view>
+#include <vector>
+
+#include "harness/exchange/import.h"
+#include "harness/exchange/import_placement.h"
+#include "harness/exchange/xml_file.h"
+
+namespace loopbench::harness {
+
+/// Why what nobody read has no place in a mechanism, by attribute ("@armature") or tag
+/// ("visual"). Without a reason nothing is noted: it says nothing about the motion.
+struct DroppedReason {
+  std::string_view what, reason;
+  bool changes_motion = false;
+};
+
+class ImportDraft {
+ public:
+  ImportDraft(const XmlFile& file, const ImportOptions& options);
+
+  MechanismDescription description;
+  std::vector<Placement> at_rest;  ///< of bodies in ground axes where all coordinates are 0
+
+  /// A body of that name, or of the next free number where it is "". Refuses one that is taken.
+  /// Mass 0 until it is set.
+  int AddBody(const XmlElement& element, const std::string& name);
+  /// The index of a body that must be there; `also` are further names of Ground.
+  int BodyNamed(const XmlValue& value, const std::set<std::string>& also = {}) const;
+  int BodyNamed(const std::string& name, const XmlElement& user) const;
+  int LineOf(int body) const { return lines_[static_cast<std::size_t>(body)]; }
+
+  /// A name that no joint has.
+  std::string NewJointName(const XmlElement& element, const std::string& name);
+  /// The same for a joint that the file does not name: `stem`, if that is not in use.
+  std::string UnusedJointName(std::string stem);
+  /// From X_PF on `from` to X_QM on `to`. The joint stays where it is until the next one is added.
+  JointDescription& AddJoint(const std::string& name, JointType type, int from,
+                             const Placement& X_PF, int to, const Placement& X_QM);
+  int last_joint() const { return static_cast<int>(description.joints.size()) - 1; }
+
+  /// Refuses mass and inertia that no body has.
+  void CheckMass(int body) const;
+  /// As many times its weight, upwards: what a body without gravity feels.
+  void AddLift(int body, double share);
+
+  void Note(const XmlElement& element, std::string reason, bool changes_motion = false);
+  void Note(const XmlElement& element, const std::string& attribute, std::string reason,
+            bool changes_motion = false);
+  /// A note for all that was not read.
+  void NoteUnread(const std::vector<DroppedReason>& reasons);
+
+  /// Sidecar, bodies without mass, floating parts, plane; then it is a mechanism.
+  Imported Finish(const std::string& format);
+
+ private:
+  void MergeMassless();
+  void RefuseMassless(int body) const;
+  void HoldFloatingParts();
+  void GoToPlane();
+
+  const XmlFile& file_;
+  const ImportOptions& options_;
+  std::vector<XmlElement> elements_;  ///< of bodies; the root element for Ground
+  std::vector<int> lines_;
+  std::map<std::string, int> bodies_;
+  std::set<std::string> joints_;
+  std::vector<ImportNote> notes_;
+  std::vector<std::pair<int, double>> lifts_;
+};
+
+/// The readers of the formats; each fills the draft from the root element.
+void ReadMjcf(const XmlElement& root, ImportDraft* draft);
+void ReadUrdf(const XmlElement& root, const ImportOptions& options, ImportDraft* draft);
+void ReadSdf(const XmlElement& root, ImportDraft* draft);
+
+}  // namespace loopbench::harness

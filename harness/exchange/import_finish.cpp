@@ -1,0 +1,185 @@
+// What is done with an imported mechanism whatever its format.
+#include <fmt/format.h>
+
+#include <algorithm>
+
+#include "harness/config/sidecar.h"
+#include "harness/exchange/import_draft.h"
+#include "harness/text/config_error.h"
+#include "mechanism/description/islands.h"
+#include "mechanism/simplify/attach.h"
+#include "mechanism/simplify/plane.h"
+
+namespace loopbench::harness {
+
+namespace {
+
+bool IsMassless(const BodyDescription& body) { return body.mass == 0.0; }
+
+/// The bodies that welds hold to `root` through bodies without mass, with the root's carrier: the
+/// ground if it is among them, else the first with a mass.
+class Cluster {
+ public:
+  Cluster(const MechanismDescription& description, int root) : d_(description) {
+    poses_[root] = Frame();
+    std::vector<int> queue = {root};
+    for (std::size_t k = 0; k < queue.size(); ++k) {
+      for (const JointDescription& joint : d_.joints) {
+        if (joint.type != JointType::kWeld) continue;
+        for (const auto& [here, there] :
+             {std::pair{&joint.from, &joint.to}, {&joint.to, &joint.from}}) {
+          if (here->body != queue[k] || poses_.contains(there->body)) continue;
+          poses_[there->body] = poses_[here->body] * PoseOf(*here) * PoseOf(*there).Inverse();
+          if (there->body == kGround || (carrier_ < 0 && !IsMasslessBody(there->body))) {
+            carrier_ = there->body;
+          }
+          if (IsMasslessBody(there->body)) queue.push_back(there->body);
+        }
+      }
+    }
+    massless_ = std::move(queue);
+  }
+
+  int carrier() const { return carrier_; }
+  const std::vector<int>& massless() const { return massless_; }
+  Attachment AttachmentOf(int body) const {
+    Attachment at;
+    at.carrier = carrier_;
+    at.attached = true;
+    at.X = poses_.at(carrier_).Inverse() * poses_.at(body);
+    return at;
+  }
+
+ private:
+  bool IsMasslessBody(int body) const {
+    return body != kGround && IsMassless(d_.bodies[static_cast<std::size_t>(body)]);
+  }
+
+  const MechanismDescription& d_;
+  std::map<int, Frame> poses_;
+  std::vector<int> massless_;
+  int carrier_ = -1;
+};
+
+/// z of ground onto n.
+Eigen::Quaterniond ZOnto(const Eigen::Vector3d& n) { return Eigen::Quaterniond(AxesWithNormal(n)); }
+
+}  // namespace
+
+void ImportDraft::RefuseMassless(int body) const {
+  elements_[static_cast<std::size_t>(body)].Fail(
+      "a body without mass that moves",
+      "a mass > 0, or a joint that fixes it to a body with one: nothing could accelerate it");
+}
+
+void ImportDraft::MergeMassless() {
+  const std::size_t count = description.bodies.size();
+  std::vector<Attachment> attachments(count);
+  bool any = false;
+  for (std::size_t i = 1; i < count; ++i) {
+    if (!IsMassless(description.bodies[i]) || attachments[i].attached) continue;
+    const Cluster cluster(description, static_cast<int>(i));
+    if (cluster.carrier() < 0) RefuseMassless(static_cast<int>(i));
+    for (const int body : cluster.massless()) {
+      const auto index = static_cast<std::size_t>(body);
+      attachments[index] = cluster.AttachmentOf(body);
+      const auto carrier = static_cast<std::size_t>(cluster.carrier());
+      Note(elements_[index],
+           fmt::format("without mass and fixed: merged with \"{}\", its points "
+                       "are called \"{}.POINT\" there",
+                       description.bodies[carrier].name, description.bodies[index].name));
+    }
+    any = true;
+  }
+  if (!any) return;
+  Renumbering renumbering;
+  description = Attach(description, attachments, &renumbering);
+  std::vector<Placement> rest(description.bodies.size());
+  for (std::size_t i = 0; i < count; ++i) {
+    if (renumbering.bodies[i] >= 0) {
+      rest[static_cast<std::size_t>(renumbering.bodies[i])] = at_rest[i];
+    }
+  }
+  at_rest = std::move(rest);
+}
+
+void ImportDraft::HoldFloatingParts() {
+  for (const Island& island : FindIslands(description, Connection::kJoints)) {
+    if (island.grounded) continue;
+    const int root = island.bodies.front();
+    const auto index = static_cast<std::size_t>(root);
+    const std::string name = UnusedJointName(description.bodies[index].name);
+    AddJoint(name, JointType::kFree, kGround, {}, root, {});
+    const Placement& X = at_rest[index];
+    description.initial.coordinates.push_back(
+        {last_joint(), {X.q.w(), X.q.x(), X.q.y(), X.q.z(), X.p.x(), X.p.y(), X.p.z()}});
+  }
+}
+
+void ImportDraft::GoToPlane() {
+  const auto turns = std::ranges::find_if(description.joints, [](const JointDescription& joint) {
+    return TraitsOf(joint.type).flat.turns;
+  });
+  const auto in_ground = [&](const JointSide& side) {
+    return at_rest[static_cast<std::size_t>(side.body)].q;
+  };
+  if (turns != description.joints.end()) {
+    const Eigen::Vector3d n = in_ground(turns->from) * PoseOf(turns->from).R *
+                              AxisAlignment(*turns) * Eigen::Vector3d::UnitZ();
+    for (JointDescription& joint : description.joints) {
+      if (joint.type != JointType::kSpherical) continue;
+      joint.type = JointType::kRevolute;  // all that a ball can do in a plane
+      for (JointSide* side : {&joint.from, &joint.to}) {
+        side->rotation = RotationVector(in_ground(*side).conjugate() * ZOnto(n));
+      }
+      const int index = static_cast<int>(&joint - description.joints.data());
+      for (auto* list : {&description.initial.coordinates, &description.initial.speeds}) {
+        std::erase_if(*list, [&](const JointValues& one) { return one.joint == index; });
+      }
+    }
+  }
+  std::string why;
+  const std::optional<InPlane> plane = ExpressInPlane(description, &why);
+  if (!plane) {
+    throw ConfigError(
+        fmt::format("{}: --planar: found that {}, expected a mechanism that moves in one plane",
+                    file_.name(), why));
+  }
+  description = plane->description;
+  if (plane->gravity_dropped != 0.0) {
+    Note(elements_[kGround], fmt::format("gravity of {:.6g} m/s^2 along the normal of the plane "
+                                         "dropped: it moves nothing",
+                                         plane->gravity_dropped));
+  }
+}
+
+Imported ImportDraft::Finish(const std::string& format) {
+  Imported imported;
+  imported.format = format;
+  if (options_.gravity) description.gravity = *options_.gravity;
+  for (const auto& [body, share] : lifts_) {
+    const BodyDescription& lifted = description.bodies[static_cast<std::size_t>(body)];
+    if (!(lifted.mass > 0.0) || description.gravity.isZero(0.0)) continue;
+    description.forces.emplace_back(
+        PointForce{{body, lifted.com}, -share * lifted.mass * description.gravity, false});
+  }
+  if (!options_.sidecar.empty()) {
+    std::vector<Frame> rest;
+    for (const Placement& X : at_rest) rest.push_back(X.AsFrame());
+    ReadSidecar(options_.sidecar, rest, &description, &imported.observe);
+  }
+  if (description.bodies.size() < 2) {
+    elements_[kGround].Fail("no body", "at least one that is not the ground");
+  }
+  MergeMassless();
+  HoldFloatingParts();
+  if (options_.planar) GoToPlane();
+  const std::string fault = Validate(description);
+  if (!fault.empty()) throw ConfigError(fmt::format("{}: {}", file_.name(), fault));
+  std::ranges::stable_sort(notes_, {}, &ImportNote::line);
+  imported.description = std::move(description);
+  imported.notes = std::move(notes_);
+  return imported;
+}
+
+}  // namespace loopbench::harness

@@ -1,0 +1,150 @@
+// MJCF, the format of MuJoCo (mujoco.readthedocs.io, "XML reference"): what its parts share.
+//
+// Internal to import_mjcf*.cpp.
+#pragma once
+
+#include <map>
+#include <optional>
+#include <string>
+#include <utility>
+#include <vector>
+
+#include "harness/exchange/import_draft.h"
+
+namespace loopbench::harness {
+
+/// An element with what its classes say where it is silent: itself first, then the nearest class.
+class MjcfElement {
+ public:
+  MjcfElement(XmlElement own, std::vector<XmlElement> classes)
+      : own_(std::move(own)), classes_(std::move(classes)) {}
+
+  const XmlElement& own() const { return own_; }
+  std::optional<XmlValue> Attribute(const std::string& name) const;
+  double Number(const std::string& name, double otherwise, const Range& range = {}) const;
+  /// Itself and its classes, nearest first.
+  std::vector<XmlElement> Layers() const;
+
+ private:
+  XmlElement own_;
+  std::vector<XmlElement> classes_;
+};
+
+/// <default> and the classes nested in it.
+class MjcfDefaults {
+ public:
+  void Read(const XmlElement& element, const std::string& parent);
+  /// `childclass`: of the bodies around the element.
+  MjcfElement Of(const XmlElement& element, const std::string& childclass) const;
+  /// Refuses a class that nobody has described.
+  void CheckClass(const XmlValue& value) const;
+  /// What no element took counts as read.
+  void IgnoreUnused() const;
+
+ private:
+  struct Class {
+    std::string parent;
+    std::map<std::string, XmlElement> elements;  ///< by tag
+  };
+  std::map<std::string, Class> classes_;
+  mutable std::set<std::pair<std::string, std::string>> used_;  ///< class, tag
+};
+
+/// Attributes of <compiler> and <option> that matter.
+struct MjcfSettings {
+  bool degrees = true;
+  std::string euler = "xyz";
+  enum { kFromInertial, kFromGeoms, kAuto } inertia = kAuto;
+  bool balances_inertia = false, limits_by_range = true;
+  double least_mass = 0.0, least_inertia = 0.0, total_mass = -1.0;
+  int first_group = 0, last_group = 5;
+  bool has_contact = true, has_equality = true, has_springs = true, has_dampers = true;
+
+  double Angle(double value) const { return degrees ? value * kDegree : value; }
+};
+
+enum class MjcfKind { kHinge, kSlide, kBall, kFree };
+
+/// A joint of MuJoCo: with others on the same body it is part of one of ours.
+struct MjcfJoint {
+  explicit MjcfJoint(MjcfElement element_) : element(std::move(element_)) {}
+
+  MjcfElement element;
+  MjcfKind kind = MjcfKind::kHinge;
+  std::string name;
+  Eigen::Vector3d position = Eigen::Vector3d::Zero();  ///< in body axes [m]
+  Eigen::Vector3d axis = Eigen::Vector3d::UnitZ();     ///< of unit length
+  double reference = 0.0;                              ///< its coordinate where the file draws it
+  int joint = -1;                                      ///< ours that it became a part of
+  bool alone = true;                                   ///< it is all of it
+
+  int num_q() const { return kind == MjcfKind::kFree ? 7 : kind == MjcfKind::kBall ? 4 : 1; }
+  int num_u() const { return kind == MjcfKind::kFree ? 6 : kind == MjcfKind::kBall ? 3 : 1; }
+};
+
+/// The joints of a body, from the outermost, and what they are for us.
+struct MjcfChain {
+  std::vector<std::size_t> parts;  ///< in MjcfModel::joints
+  int joint = -1;
+  bool from_is_child = false;  ///< ours leads from the child to its parent
+  Placement X_BJ;              ///< our frame on the child, in its axes
+};
+
+class MjcfModel {
+ public:
+  explicit MjcfModel(ImportDraft* draft_) : draft(draft_) {}
+
+  ImportDraft* draft;
+  MjcfSettings settings;
+  MjcfDefaults defaults;
+  std::vector<MjcfJoint> joints;  ///< in the order of qpos
+  std::vector<MjcfChain> chains;  ///< of bodies with joints, in that order
+  std::map<std::string, BodyPoint> sites;
+  std::map<std::string, std::size_t> joint_names;
+
+  /// The orientation that the element says, in whichever way; the class's if it says none.
+  Eigen::Quaterniond OrientationOf(const MjcfElement& element) const;
+  Placement PlacementOf(const MjcfElement& element) const;
+  /// A site's place in ground axes where all coordinates are 0.
+  Eigen::Vector3d AtRest(const BodyPoint& point) const;
+  const BodyPoint& SiteNamed(const XmlValue& value) const;
+  MjcfJoint& JointNamed(const XmlValue& value);
+};
+
+/// A geom of a body, its class, and the frame around it.
+struct MjcfGeom {
+  MjcfElement element;
+  Placement X;
+};
+
+/// Mass, centre of mass and inertia of the geoms [kg, m, kg m^2], body axes.
+struct MassProperties {
+  double mass = 0.0;
+  Eigen::Vector3d com = Eigen::Vector3d::Zero();
+  Eigen::Matrix3d inertia = Eigen::Matrix3d::Zero();
+};
+MassProperties MassOfGeoms(const MjcfModel& model, const std::vector<MjcfGeom>& geoms);
+
+/// Refuses children that stand for other parts of a model.
+void RefuseMjcfMacros(const XmlElement& element);
+/// <worldbody>.
+void ReadMjcfWorld(const XmlElement& world, MjcfModel* model);
+/// Total mass, bounds: what <compiler> does to all bodies.
+void AdjustMasses(MjcfModel* model);
+/// A <joint> or <freejoint>, with its springs and dampers still unread.
+MjcfJoint ReadMjcfJoint(const MjcfModel& model, const XmlElement& element,
+                        const std::string& childclass);
+/// Makes one joint of ours of those of a body; X_PB is where the file draws the body.
+void AddMjcfChain(MjcfModel* model, const XmlElement& body, int parent, int child,
+                  const Placement& X_PB, const std::vector<MjcfJoint>& joints);
+/// Coordinates (or with speeds, speeds too) of our joints from those of MuJoCo.
+void SetMjcfStart(MjcfModel* model, const std::vector<double>& qpos,
+                  const std::vector<double>& qvel);
+void ReadMjcfEquality(const XmlElement& section, MjcfModel* model);
+/// Spatial tendons between two sites; `held`: names of tendons that keep their length, which become
+/// rods.
+void ReadMjcfTendons(const XmlElement& section, const std::map<std::string, XmlElement>& held,
+                     MjcfModel* model);
+void ReadMjcfKeys(const XmlElement& root, MjcfModel* model);
+
+}  // namespace loopbench::harness

@@ -1,0 +1,162 @@
+// Classes of defaults, and orientations.
+#include <fmt/format.h>
+
+#include "harness/exchange/import_mjcf.h"
+
+namespace loopbench::harness {
+
+namespace {
+
+constexpr const char* kMain = "main";  // the class of elements without one
+
+}  // namespace
+
+void RefuseMjcfMacros(const XmlElement& element) {
+  for (const char* tag : {"include", "composite", "flexcomp", "replicate", "attach"}) {
+    for (const XmlElement& child : element.Children(tag)) {
+      child.Fail("an element that stands for other parts of a model",
+                 "the whole model in one file, as MuJoCo saves it (mj_saveLastXML)");
+    }
+  }
+}
+
+std::optional<XmlValue> MjcfElement::Attribute(const std::string& name) const {
+  std::optional<XmlValue> found = own_.Attribute(name);
+  for (const XmlElement& layer : classes_) {
+    auto value = layer.Attribute(name);
+    if (!found) found = std::move(value);
+  }
+  return found;
+}
+
+double MjcfElement::Number(const std::string& name, double otherwise, const Range& range) const {
+  const auto value = Attribute(name);
+  return value ? value->Number(range) : otherwise;
+}
+
+std::vector<XmlElement> MjcfElement::Layers() const {
+  std::vector<XmlElement> layers = {own_};
+  layers.insert(layers.end(), classes_.begin(), classes_.end());
+  return layers;
+}
+
+void MjcfDefaults::Read(const XmlElement& element, const std::string& parent) {
+  const auto given = element.Attribute("class");
+  if (!given && !parent.empty()) element.Fail("no \"class\"", "a name: it is a nested class");
+  const std::string name = given ? given->Name() : kMain;
+  if (parent.empty() && classes_.contains(name)) {
+    // a second <default> at the top adds to the first
+  } else if (classes_.contains(name)) {
+    given->Fail("a class that is not described yet");
+  }
+  classes_[name].parent = parent;
+  for (const XmlElement& child : element.Children()) {
+    if (child.tag() == "default") {
+      Read(child, name);
+    } else {
+      classes_[name].elements.insert_or_assign(child.tag(), child);
+    }
+  }
+}
+
+void MjcfDefaults::CheckClass(const XmlValue& value) const {
+  if (!classes_.contains(value.text()) && value.text() != kMain) {
+    value.Fail("a class described in <default>");
+  }
+}
+
+MjcfElement MjcfDefaults::Of(const XmlElement& element, const std::string& childclass) const {
+  std::string name = childclass.empty() ? kMain : childclass;
+  if (const auto given = element.Attribute("class")) {
+    CheckClass(*given);
+    name = given->text();
+  }
+  std::vector<XmlElement> layers;
+  for (auto found = classes_.find(name); found != classes_.end();
+       found = classes_.find(found->second.parent)) {
+    const auto defaults = found->second.elements.find(element.tag());
+    if (defaults == found->second.elements.end()) continue;
+    layers.push_back(defaults->second);
+    used_.emplace(found->first, element.tag());
+  }
+  return {element, std::move(layers)};
+}
+
+void MjcfDefaults::IgnoreUnused() const {
+  for (const auto& [name, one] : classes_) {
+    for (const auto& [tag, element] : one.elements) {
+      if (!used_.contains({name, tag})) element.Ignore();
+    }
+  }
+}
+
+Eigen::Quaterniond MjcfModel::OrientationOf(const MjcfElement& element) const {
+  constexpr const char* kWays[] = {"quat", "axisangle", "euler", "xyaxes", "zaxis"};
+  std::optional<XmlValue> found;
+  std::string way;
+  for (const XmlElement& layer : element.Layers()) {
+    std::string here;
+    for (const char* one : kWays) {
+      auto value = layer.Attribute(one);
+      if (!value) continue;
+      if (!here.empty()) value->Fail(fmt::format("one orientation: there is \"{}\" too", here));
+      here = one;
+      if (way.empty()) found = std::move(value);
+    }
+    if (way.empty()) way = here;
+  }
+  if (!found) return Eigen::Quaterniond::Identity();
+  const auto unit = [&](const Eigen::Vector3d& v) -> Eigen::Vector3d {
+    if (!(v.norm() > 0.0)) found->Fail("axes that are not zero");
+    return v.normalized();
+  };
+  if (way == "quat") {
+    const std::vector<double> q = found->Numbers(4, 4);
+    const Eigen::Quaterniond quaternion(q[0], q[1], q[2], q[3]);
+    if (!(quaternion.norm() > 0.0)) found->Fail("a quaternion that is not zero");
+    return quaternion.normalized();
+  }
+  if (way == "euler") {
+    const Eigen::Vector3d angles = found->Vector();
+    return FromEuler(settings.euler,
+                     angles.unaryExpr([&](double angle) { return settings.Angle(angle); }));
+  }
+  if (way == "axisangle") {
+    const std::vector<double> a = found->Numbers(4, 4);
+    return Eigen::Quaterniond(Eigen::AngleAxisd(settings.Angle(a[3]), unit({a[0], a[1], a[2]})));
+  }
+  if (way == "zaxis") {
+    return Eigen::Quaterniond::FromTwoVectors(Eigen::Vector3d::UnitZ(), unit(found->Vector()));
+  }
+  const std::vector<double> a = found->Numbers(6, 6);
+  const Eigen::Vector3d x = unit({a[0], a[1], a[2]}), y_given(a[3], a[4], a[5]);
+  const Eigen::Vector3d y = unit(y_given - x.dot(y_given) * x);
+  Eigen::Matrix3d R;
+  R << x, y, x.cross(y);
+  return Eigen::Quaterniond(R);
+}
+
+Placement MjcfModel::PlacementOf(const MjcfElement& element) const {
+  Placement X;
+  if (const auto position = element.Attribute("pos")) X.p = position->Vector();
+  X.q = OrientationOf(element);
+  return X;
+}
+
+Eigen::Vector3d MjcfModel::AtRest(const BodyPoint& point) const {
+  return draft->at_rest[static_cast<std::size_t>(point.body)].At(point.at);
+}
+
+const BodyPoint& MjcfModel::SiteNamed(const XmlValue& value) const {
+  const auto found = sites.find(value.Name());
+  if (found == sites.end()) value.Fail("the name of a site");
+  return found->second;
+}
+
+MjcfJoint& MjcfModel::JointNamed(const XmlValue& value) {
+  const auto found = joint_names.find(value.Name());
+  if (found == joint_names.end()) value.Fail("the name of a joint");
+  return joints[found->second];
+}
+
+}  // namespace loopbench::harness

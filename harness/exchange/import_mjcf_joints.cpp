@@ -1,0 +1,284 @@
+// Joints of MuJoCo: one at a time, and several on a body as one of ours.
+//
+// MuJoCo's joints of a body act one after the other, each in the axes that those before it have
+// moved: with X_i(q_i) the motion of joint i in body axes, the body stands in its parent at
+// X_PB X_1 .. X_n. What such a product can reach decides which of our kinds it is.
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <cmath>
+
+#include "harness/exchange/import_mjcf.h"
+
+namespace loopbench::harness {
+
+namespace {
+
+using Eigen::Vector3d;
+
+/// Axes are parallel, perpendicular or through one point when rounding of 1e-9 (a file with nine
+/// digits) says so.
+constexpr double kAligned = 1e-9;
+
+void RefuseOrNote(const MjcfModel& model, const MjcfJoint& joint) {
+  ImportDraft* draft = model.draft;
+  const XmlElement& own = joint.element.own();
+  if (joint.element.Number("armature", 0.0, kNotNegative) > 0.0) {
+    draft->Note(own, "armature", "dropped: rotors have no inertia beside that of the bodies", true);
+  }
+  if (joint.element.Number("frictionloss", 0.0, kNotNegative) > 0.0) {
+    draft->Note(own, "frictionloss", "dropped: dry friction is no force of mechanism files", true);
+  }
+  const auto limited = joint.element.Attribute("limited");
+  const std::size_t choice = limited ? limited->Choice({"false", "true", "auto"}) : 2;
+  const auto range = joint.element.Attribute("range");
+  const bool has_range = range && model.settings.limits_by_range;
+  if (choice == 1 || (choice == 2 && has_range)) {
+    draft->Note(own, "range", "dropped: joints turn and slide without ends", true);
+  }
+}
+
+/// Where the axes of hinges meet; nothing when they do not.
+std::optional<Vector3d> MeetingPoint(const std::vector<MjcfJoint>& hinges) {
+  // least squares of the distances to all axes
+  Eigen::Matrix3d A = Eigen::Matrix3d::Zero();
+  Vector3d b = Vector3d::Zero();
+  double arms = 1.0;
+  for (const MjcfJoint& hinge : hinges) {
+    const Eigen::Matrix3d across =
+        Eigen::Matrix3d::Identity() - hinge.axis * hinge.axis.transpose();
+    A += across;
+    b += across * hinge.position;
+    arms += hinge.position.norm();
+    if (hinge.position == hinges[0].position && &hinge == &hinges.back()) {
+      const bool all = std::ranges::all_of(
+          hinges, [&](const MjcfJoint& other) { return other.position == hinges[0].position; });
+      if (all) return hinges[0].position;
+    }
+  }
+  const Vector3d point = A.fullPivLu().solve(b);
+  for (const MjcfJoint& hinge : hinges) {
+    const Vector3d way = point - hinge.position;
+    if ((way - way.dot(hinge.axis) * hinge.axis).norm() > kAligned * arms) return std::nullopt;
+  }
+  return point;
+}
+
+bool Parallel(const Vector3d& a, const Vector3d& b) { return a.cross(b).norm() <= kAligned; }
+bool Perpendicular(const Vector3d& a, const Vector3d& b) { return std::abs(a.dot(b)) <= kAligned; }
+
+/// Axes x, y, z with these two, which are perpendicular up to rounding.
+Eigen::Quaterniond Axes(const Vector3d& x, const Vector3d& z_near) {
+  const Vector3d z = (z_near - x.dot(z_near) * x).normalized();
+  Eigen::Matrix3d R;
+  R << x, z.cross(x), z;
+  return Eigen::Quaterniond(R);
+}
+
+struct Composed {
+  JointType type;
+  Placement X_BJ;
+  bool from_is_child = false;
+};
+
+struct Sorted {
+  std::vector<MjcfJoint> hinges, slides, balls;
+};
+
+std::optional<Composed> ComposeTwo(const std::vector<MjcfJoint>& joints, const Sorted& sorted) {
+  if (sorted.hinges.size() == 2) {
+    const Vector3d &a = joints[0].axis, &b = joints[1].axis;
+    const auto point = Perpendicular(a, b) ? MeetingPoint(joints) : std::nullopt;
+    // about x of F, then about y of M
+    if (point) return Composed{JointType::kUniversal, {Axes(a, a.cross(b)), *point}};
+  }
+  if (sorted.hinges.size() != 1 || sorted.slides.size() != 1) return std::nullopt;
+  const MjcfJoint &hinge = sorted.hinges[0], &slide = sorted.slides[0];
+  if (Parallel(hinge.axis, slide.axis)) {
+    const Eigen::Quaterniond q = Eigen::Quaterniond::FromTwoVectors(Vector3d::UnitZ(), hinge.axis);
+    return Composed{JointType::kCylindrical, {q, hinge.position}};
+  }
+  if (!Perpendicular(hinge.axis, slide.axis)) return std::nullopt;
+  // the slot is on the parent when the slide comes first, else on the child
+  return Composed{JointType::kPinInSlot,
+                  {Axes(slide.axis, hinge.axis), hinge.position},
+                  joints[0].kind == MjcfKind::kHinge};
+}
+
+bool Independent(const std::vector<MjcfJoint>& joints) {
+  Eigen::Matrix3d axes;
+  axes << joints[0].axis, joints[1].axis, joints[2].axis;
+  return std::abs(axes.determinant()) > kAligned;
+}
+
+std::optional<Composed> ComposeMore(const Sorted& sorted) {
+  const std::size_t hinges = sorted.hinges.size(), slides = sorted.slides.size();
+  if (slides == 2 && hinges == 1) {
+    const Vector3d& z = sorted.hinges[0].axis;
+    const Vector3d &a = sorted.slides[0].axis, &b = sorted.slides[1].axis;
+    const bool in_plane = Perpendicular(z, a) && Perpendicular(z, b) && !Parallel(a, b);
+    if (in_plane) {
+      return Composed{JointType::kPlanar, {Axes(a, z), sorted.hinges[0].position}};
+    }
+  }
+  std::optional<Vector3d> centre;
+  if (sorted.balls.size() == 1 && hinges == 0) centre = sorted.balls[0].position;
+  if (sorted.balls.empty() && hinges == 3 && Independent(sorted.hinges)) {
+    centre = MeetingPoint(sorted.hinges);
+  }
+  if (!centre) return std::nullopt;
+  if (slides == 0) return Composed{JointType::kSpherical, {{}, *centre}};
+  if (slides == 3 && Independent(sorted.slides)) return Composed{JointType::kFree, {{}, *centre}};
+  return std::nullopt;
+}
+
+Composed Compose(const XmlElement& body, const std::vector<MjcfJoint>& joints) {
+  if (joints.size() == 1) {
+    const MjcfJoint& joint = joints[0];
+    const JointType type = joint.kind == MjcfKind::kHinge   ? JointType::kRevolute
+                           : joint.kind == MjcfKind::kSlide ? JointType::kPrismatic
+                           : joint.kind == MjcfKind::kBall  ? JointType::kSpherical
+                                                            : JointType::kFree;
+    return {type, {{}, joint.position}};
+  }
+  Sorted sorted;
+  std::vector<std::string> words;
+  bool has_free = false;
+  for (const MjcfJoint& joint : joints) {
+    const bool turns = joint.kind == MjcfKind::kHinge;
+    if (turns) sorted.hinges.push_back(joint);
+    if (joint.kind == MjcfKind::kSlide) sorted.slides.push_back(joint);
+    if (joint.kind == MjcfKind::kBall) sorted.balls.push_back(joint);
+    has_free = has_free || joint.kind == MjcfKind::kFree;
+    words.emplace_back(turns ? "hinge" : joint.kind == MjcfKind::kSlide ? "slide" : "ball");
+  }
+  std::optional<Composed> composed;
+  if (!has_free) composed = joints.size() == 2 ? ComposeTwo(joints, sorted) : ComposeMore(sorted);
+  if (composed) return *composed;
+  body.Fail(fmt::format("{} joints on one body ({}) that are none of ours together", joints.size(),
+                        has_free ? "one of them free" : fmt::format("{}", fmt::join(words, ", "))),
+            "a body with mass between them, or axes of a universal, cylindrical, planar, spherical "
+            "or free joint or a pin in a slot");
+}
+
+/// Springs and dampers of a joint that is all of ours; others are dropped.
+void AddJointForces(MjcfModel* model, const MjcfJoint& joint) {
+  ImportDraft* draft = model->draft;
+  const MjcfElement& element = joint.element;
+  const double k = element.Number("stiffness", 0.0, kNotNegative);
+  const double c = element.Number("damping", 0.0, kNotNegative);
+  double rest = element.Number("springref", 0.0);
+  if (joint.kind == MjcfKind::kHinge) rest = model->settings.Angle(rest);
+  const bool has_one = joint.num_q() == 1 && joint.alone;
+  const auto drop = [&](const char* name) {
+    draft->Note(element.own(), name, "dropped: only joints with one coordinate have forces", true);
+  };
+  if (k > 0.0 && model->settings.has_springs) {
+    if (has_one) {
+      draft->description.forces.emplace_back(
+          JointSpring{joint.joint, k, rest - joint.reference, 0.0});
+    } else {
+      drop("stiffness");
+    }
+  }
+  if (c > 0.0 && model->settings.has_dampers) {
+    if (has_one) {
+      draft->description.forces.emplace_back(JointDamper{joint.joint, c});
+    } else {
+      drop("damping");
+    }
+  }
+}
+
+}  // namespace
+
+MjcfJoint ReadMjcfJoint(const MjcfModel& model, const XmlElement& element,
+                        const std::string& childclass) {
+  MjcfJoint joint(model.defaults.Of(element, childclass));
+  if (const auto name = element.Attribute("name")) joint.name = name->Name();
+  if (element.tag() == "freejoint") {
+    joint.kind = MjcfKind::kFree;
+    return joint;
+  }
+  if (const auto type = joint.element.Attribute("type")) {
+    constexpr MjcfKind kKinds[] = {MjcfKind::kHinge, MjcfKind::kSlide, MjcfKind::kBall,
+                                   MjcfKind::kFree};
+    joint.kind = kKinds[type->Choice({"hinge", "slide", "ball", "free"})];
+  }
+  const auto position = joint.element.Attribute("pos");
+  if (position && joint.kind != MjcfKind::kFree) joint.position = position->Vector();
+  if (const auto axis = joint.element.Attribute("axis")) {
+    joint.axis = axis->Vector();
+    const bool matters = joint.kind == MjcfKind::kHinge || joint.kind == MjcfKind::kSlide;
+    if (matters && !(joint.axis.norm() > 0.0)) axis->Fail("an axis that is not zero");
+    if (std::abs(joint.axis.squaredNorm() - 1.0) > 0.0) joint.axis.normalize();
+  }
+  joint.reference = joint.element.Number("ref", 0.0);
+  if (joint.kind == MjcfKind::kHinge) joint.reference = model.settings.Angle(joint.reference);
+  RefuseOrNote(model, joint);
+  return joint;
+}
+
+void AddMjcfChain(MjcfModel* model, const XmlElement& body, int parent, int child,
+                  const Placement& X_PB, const std::vector<MjcfJoint>& joints) {
+  ImportDraft* draft = model->draft;
+  const std::string& body_name = draft->description.bodies[static_cast<std::size_t>(child)].name;
+  if (joints.empty()) {
+    draft->AddJoint(draft->UnusedJointName(body_name + " fixed"), JointType::kWeld, parent, X_PB,
+                    child, {});
+    return;
+  }
+  MjcfChain chain;
+  const Composed composed = Compose(body, joints);
+  chain.X_BJ = composed.X_BJ;
+  chain.from_is_child = composed.from_is_child;
+  std::vector<std::string> names;
+  for (const MjcfJoint& joint : joints) {
+    if (!joint.name.empty()) names.push_back(joint.name);
+  }
+  const std::string name =
+      names.empty() ? draft->UnusedJointName(body_name)
+                    : draft->NewJointName(body, fmt::format("{}", fmt::join(names, "+")));
+  const bool is_free = joints[0].kind == MjcfKind::kFree;
+  if (is_free && parent != kGround) {
+    joints[0].element.own().Fail("a free joint of a body within another",
+                                 "a free joint in a body of <worldbody>");
+  }
+  const Placement X_PF = is_free ? Placement{} : X_PB * chain.X_BJ;
+  if (chain.from_is_child) {
+    draft->AddJoint(name, composed.type, child, chain.X_BJ, parent, X_PF);
+  } else {
+    draft->AddJoint(name, composed.type, parent, X_PF, child, chain.X_BJ);
+  }
+  chain.joint = draft->last_joint();
+  if (joints.size() == 1 && joints[0].num_q() == 1) {
+    JointDescription& ours = draft->description.joints.back();
+    const bool own = joints[0].axis ==
+                     (joints[0].kind == MjcfKind::kHinge ? Vector3d::UnitZ() : Vector3d::UnitX());
+    if (!own) ours.axis = joints[0].axis;
+  }
+  if (joints.size() > 1) {
+    draft->Note(body, fmt::format("{} joints are one here: \"{}\", {}", joints.size(), name,
+                                  ToString(composed.type)));
+  }
+  if (composed.type == JointType::kFree) {
+    const Placement X = is_free ? X_PB : Placement{};
+    draft->description.initial.coordinates.push_back(
+        {chain.joint, {X.q.w(), X.q.x(), X.q.y(), X.q.z(), X.p.x(), X.p.y(), X.p.z()}});
+  }
+  for (MjcfJoint joint : joints) {
+    joint.joint = chain.joint;
+    joint.alone = joints.size() == 1;
+    const std::size_t index = model->joints.size();
+    if (!joint.name.empty() && !model->joint_names.emplace(joint.name, index).second) {
+      joint.element.own().Fail(fmt::format("a second joint \"{}\"", joint.name),
+                               "a name that is not in use");
+    }
+    chain.parts.push_back(index);
+    AddJointForces(model, joint);
+    model->joints.push_back(std::move(joint));
+  }
+  model->chains.push_back(std::move(chain));
+}
+
+}  // namespace loopbench::harness

@@ -1,0 +1,191 @@
+// <keyframe>: coordinates and speeds of MuJoCo's joints as those of ours, and constant controls.
+#include <fmt/format.h>
+
+#include "harness/exchange/import_mjcf.h"
+#include "mechanism/model/joint.h"
+
+namespace loopbench::harness {
+
+namespace {
+
+using Eigen::Quaterniond;
+using Eigen::Vector3d;
+
+/// The motion of a chain's joints at their coordinates, in body axes as the file draws them.
+struct ChainMotion {
+  Placement X;                    ///< the product of their motions
+  Vector3d w = Vector3d::Zero();  ///< angular velocity
+  Vector3d v = Vector3d::Zero();  ///< of the point that is `at` in the moved body
+};
+
+Placement MotionOf(const MjcfJoint& joint, const double* q) {
+  if (joint.kind == MjcfKind::kSlide) return {{}, (q[0] - joint.reference) * joint.axis};
+  Placement X;
+  X.q = joint.kind == MjcfKind::kBall
+            ? Quaterniond(q[0], q[1], q[2], q[3]).normalized()
+            : Quaterniond(Eigen::AngleAxisd(q[0] - joint.reference, joint.axis));
+  X.p = joint.position - X.q * joint.position;
+  return X;
+}
+
+ChainMotion Move(const MjcfModel& model, const MjcfChain& chain, const double* q, const double* u) {
+  std::vector<Placement> before;
+  ChainMotion motion;
+  const double* position = q;
+  for (const std::size_t part : chain.parts) {
+    before.push_back(motion.X);
+    motion.X = motion.X * MotionOf(model.joints[part], position);
+    position += model.joints[part].num_q();
+  }
+  const Vector3d Mo = motion.X.At(chain.X_BJ.p);
+  for (std::size_t i = 0; i < chain.parts.size(); ++i) {
+    const MjcfJoint& joint = model.joints[chain.parts[i]];
+    const Placement& after = i + 1 < before.size() ? before[i + 1] : motion.X;
+    if (joint.kind == MjcfKind::kSlide) {
+      motion.v += before[i].q * joint.axis * u[0];
+    } else {
+      const Vector3d w = joint.kind == MjcfKind::kBall ? after.q * Vector3d(u[0], u[1], u[2])
+                                                       : before[i].q * joint.axis * u[0];
+      motion.w += w;
+      motion.v += w.cross(Mo - before[i].At(joint.position));
+    }
+    u += joint.num_u();
+  }
+  return motion;
+}
+
+/// Several joints as one: its coordinates are those of the pose they make, its speeds what is left
+/// of the velocity along the free directions, which is all of it.
+void SetComposed(const MjcfModel& model, const MjcfChain& chain, JointType type, const double* q,
+                 const double* u, std::vector<double>* coordinates, std::vector<double>* speeds) {
+  const ChainMotion motion = Move(model, chain, q, u);
+  const JointKind<Spatial, double>& kind = KindOf<Spatial, double>(type);
+  Placement X_FM = chain.X_BJ.Inverse() * motion.X * chain.X_BJ;
+  Vector3d w = chain.X_BJ.q.conjugate() * motion.w, v = chain.X_BJ.q.conjugate() * motion.v;
+  if (chain.from_is_child) {
+    // seen from the other side: of the origin of the parent's frame, in axes of the child's
+    const Placement X_MF = X_FM.Inverse();
+    v = X_MF.q * Vector3d(-(v + w.cross(-X_FM.p)));
+    w = X_MF.q * Vector3d(-w);
+    X_FM = X_MF;
+  }
+  Pose<Spatial, double> pose;
+  pose.R = X_FM.q.toRotationMatrix();
+  pose.p = X_FM.p;
+  coordinates->resize(static_cast<std::size_t>(kind.num_q));
+  kind.coordinates(pose, coordinates->data(), 0.0);
+  speeds->resize(static_cast<std::size_t>(kind.num_u));
+  Basis<Spatial, double> basis;
+  if (kind.basis != nullptr) kind.basis(pose, basis, 0.0);
+  for (int i = 0; i < kind.num_u; ++i) {
+    double& speed = (*speeds)[static_cast<std::size_t>(i)];
+    if (kind.basis != nullptr) {
+      const auto column = basis[static_cast<std::size_t>(i)];
+      speed = 0.0;
+      for (int k = 0; k < 3; ++k) speed += column.angular[k] * w[k] + column.linear[k] * v[k];
+    } else {
+      const int axis = kind.axes[static_cast<std::size_t>(i)];
+      speed = axis < 3 ? w[axis] : v[axis - 3];
+    }
+  }
+}
+
+}  // namespace
+
+void SetMjcfStart(MjcfModel* model, const std::vector<double>& qpos,
+                  const std::vector<double>& qvel) {
+  InitialDescription& initial = model->draft->description.initial;
+  initial.coordinates.clear();
+  const double *q = qpos.data(), *u = qvel.data();
+  for (const MjcfChain& chain : model->chains) {
+    const MjcfJoint& first = model->joints[chain.parts[0]];
+    const JointType type =
+        model->draft->description.joints[static_cast<std::size_t>(chain.joint)].type;
+    std::vector<double> coordinates, speeds;
+    if (first.alone && first.kind == MjcfKind::kFree) {
+      // a place in ground axes, an angular velocity in those of the body
+      coordinates = {q[3], q[4], q[5], q[6], q[0], q[1], q[2]};
+      const Vector3d w =
+          Quaterniond(q[3], q[4], q[5], q[6]).normalized() * Vector3d(u[3], u[4], u[5]);
+      speeds = {w.x(), w.y(), w.z(), u[0], u[1], u[2]};
+    } else if (first.alone && first.num_q() == 1) {
+      coordinates = {q[0] - first.reference};
+      speeds = {u[0]};
+    } else {
+      SetComposed(*model, chain, type, q, u, &coordinates, &speeds);
+    }
+    initial.coordinates.push_back({chain.joint, coordinates});
+    initial.speeds.push_back({chain.joint, speeds});
+    for (const std::size_t part : chain.parts) {
+      q += model->joints[part].num_q();
+      u += model->joints[part].num_u();
+    }
+  }
+}
+
+namespace {
+
+/// A motor on a joint with one coordinate, under a control that stays: a constant effort.
+void AddMotors(const XmlElement& root, const std::vector<double>& controls, MjcfModel* model) {
+  std::size_t index = 0;
+  for (const XmlElement& section : root.Children("actuator")) {
+    for (const XmlElement& element : section.Children()) {
+      const double control = index < controls.size() ? controls[index] : 0.0;
+      ++index;
+      const bool is_motor = element.tag() == "motor";
+      const auto name = is_motor ? element.Attribute("joint") : std::nullopt;
+      if (!name || control == 0.0) {
+        element.Ignore();
+        model->draft->Note(element,
+                           is_motor ? "dropped: its control is 0 in the start that is read"
+                                    : "dropped: there are no actuators but motors under a constant "
+                                      "control (<key ctrl=...>)",
+                           !is_motor);
+        continue;
+      }
+      const MjcfJoint& joint = model->JointNamed(*name);
+      const MjcfElement motor = model->defaults.Of(element, "");
+      const auto gear = motor.Attribute("gear");
+      if (joint.num_q() != 1 || !joint.alone) name->Fail("a joint with one coordinate");
+      const double ratio = gear ? gear->Numbers(1, 6)[0] : 1.0;
+      model->draft->description.forces.emplace_back(
+          JointTorque{joint.joint, Polynomial{{ratio * control}}});
+      element.Ignore();
+      model->draft->Note(element, "a constant effort here, with the control of the start");
+    }
+  }
+}
+
+}  // namespace
+
+void ReadMjcfKeys(const XmlElement& root, MjcfModel* model) {
+  std::vector<XmlElement> keys;
+  for (const XmlElement& section : root.Children("keyframe")) {
+    for (const XmlElement& key : section.Children("key")) keys.push_back(key);
+  }
+  std::vector<double> controls;
+  if (!keys.empty()) {
+    std::vector<double> qpos, qvel;
+    for (const MjcfJoint& joint : model->joints) {
+      qpos.insert(qpos.end(), static_cast<std::size_t>(joint.num_q()), 0.0);
+      qvel.insert(qvel.end(), static_cast<std::size_t>(joint.num_u()), 0.0);
+    }
+    const auto positions = keys[0].Attribute("qpos");
+    const auto speeds = keys[0].Attribute("qvel");
+    if (speeds && !positions) keys[0].Fail("qvel without qpos", "both");
+    if (speeds) qvel = speeds->Numbers(qvel.size(), qvel.size());
+    if (positions) {
+      SetMjcfStart(model, positions->Numbers(qpos.size(), qpos.size()), qvel);
+    }
+    if (const auto ctrl = keys[0].Attribute("ctrl")) controls = ctrl->Numbers(0, 100000);
+    keys[0].Attribute("name");
+    keys[0].Attribute("time");
+  }
+  for (std::size_t i = 1; i < keys.size(); ++i) {
+    keys[i].Ignore();
+    model->draft->Note(keys[i], "dropped: the first <key> is the start");
+  }
+  AddMotors(root, controls, model);
+}
+
+}  // namespace loopbench::harness

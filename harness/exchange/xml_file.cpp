@@ -1,0 +1,281 @@
+#include "harness/exchange/xml_file.h"
+
+#include <fmt/format.h>
+#include <tinyxml2.h>
+
+#include <algorithm>
+#include <charconv>
+#include <cmath>
+#include <unordered_set>
+
+#include "harness/text/config_error.h"
+
+namespace loopbench::harness {
+
+/// The parsed text; `read` has elements and attributes.
+struct XmlDocument {
+  tinyxml2::XMLDocument xml;
+  std::string file;
+  std::unordered_set<const void*> read;
+};
+
+namespace {
+
+constexpr std::size_t kLongestShown = 60;  // characters of a value in a message
+
+std::string Shortened(std::string text) {
+  if (text.size() <= kLongestShown) return text;
+  std::size_t end = kLongestShown;  // not within a character of UTF-8
+  while (end > 0 && (static_cast<unsigned char>(text[end]) & 0xC0u) == 0x80u) --end;
+  return text.substr(0, end) + "...";
+}
+
+std::string Quoted(const std::string& text) { return '"' + Shortened(text) + '"'; }
+
+/// What is no UTF-8 would garble messages and cannot be written as JSON: numeric references of XML
+/// can make it of a file that is.
+bool IsText(std::string_view text) { return EncodingFault(text).empty(); }
+
+std::string ShownElement(const tinyxml2::XMLElement& element) {
+  const char* name = element.Attribute("name");
+  std::string shown = "<" + Shortened(element.Name());
+  if (name != nullptr && IsText(name)) shown += " name=" + Quoted(name);
+  return shown + ">";
+}
+
+[[noreturn]] void FailAt(const XmlDocument& document, const tinyxml2::XMLElement& element,
+                         const std::string& attribute, std::string_view found,
+                         std::string_view expected) {
+  const std::string where = attribute.empty() ? "" : " " + Shortened(attribute);
+  throw ConfigError(
+      Printable(fmt::format("{}:{}: {}{}: found {}, expected {}", document.file,
+                            element.GetLineNum(), ShownElement(element), where, found, expected)));
+}
+
+std::string_view Trimmed(std::string_view text) {
+  constexpr std::string_view kBlanks = " \t\r\n";
+  const std::size_t start = text.find_first_not_of(kBlanks);
+  if (start == std::string_view::npos) return {};
+  return text.substr(start, text.find_last_not_of(kBlanks) - start + 1);
+}
+
+std::vector<std::string_view> Words(std::string_view text) {
+  std::vector<std::string_view> words;
+  for (text = Trimmed(text); !text.empty(); text = Trimmed(text)) {
+    const std::size_t end = std::min(text.find_first_of(" \t\r\n"), text.size());
+    words.push_back(text.substr(0, end));
+    text.remove_prefix(end);
+  }
+  return words;
+}
+
+void RefuseDocumentTypes(const XmlDocument& document) {
+  for (const auto* node = document.xml.FirstChild(); node != nullptr; node = node->NextSibling()) {
+    if (node->ToUnknown() == nullptr) continue;
+    throw ConfigError(fmt::format(
+        "{}:{}: found a document type or declaration of entities, expected none: they are not read",
+        document.file, node->GetLineNum()));
+  }
+}
+
+}  // namespace
+
+XmlValue::XmlValue(const XmlElement& element, std::string attribute, std::string text)
+    : document_(element.document_),
+      element_(element.element_),
+      attribute_(std::move(attribute)),
+      text_(Trimmed(text)) {}
+
+void XmlValue::Fail(std::string_view expected) const {
+  FailAt(*document_, *element_, attribute_,
+         IsText(text_) ? Quoted(text_) : "a text that is not UTF-8", expected);
+}
+
+std::string XmlValue::Name() const {
+  if (text_.empty()) Fail("a name that is not empty");
+  if (!IsText(text_)) Fail("a name in UTF-8, without zero bytes");
+  return text_;
+}
+
+double XmlValue::OneNumber(std::string_view word) const {
+  double number = 0.0;
+  if (word.starts_with('+')) word.remove_prefix(1);
+  const auto [end, error] = std::from_chars(word.data(), word.data() + word.size(), number);
+  const bool whole = error == std::errc() && end == word.data() + word.size();
+  if (!whole || word.empty() || !std::isfinite(number)) Fail("finite numbers only");
+  return number;
+}
+
+double XmlValue::Number(const Range& range) const {
+  const std::vector<std::string_view> words = Words(text_);
+  if (words.size() != 1) Fail("a number" + range.Text());
+  const double number = OneNumber(words[0]);
+  if (!range.Contains(number)) Fail("a number" + range.Text());
+  return number;
+}
+
+std::vector<double> XmlValue::Numbers(std::size_t least, std::size_t most) const {
+  const std::vector<std::string_view> words = Words(text_);
+  if (words.size() < least || words.size() > most) {
+    Fail(least == most ? fmt::format("{} number{}", least, least == 1 ? "" : "s")
+                       : fmt::format("{} to {} numbers", least, most));
+  }
+  std::vector<double> numbers;
+  for (const std::string_view word : words) numbers.push_back(OneNumber(word));
+  return numbers;
+}
+
+Eigen::Vector3d XmlValue::Vector() const {
+  const std::vector<double> numbers = Numbers(3, 3);
+  return {numbers[0], numbers[1], numbers[2]};
+}
+
+bool XmlValue::Bool() const {
+  if (text_ == "true" || text_ == "1") return true;
+  if (text_ != "false" && text_ != "0") Fail("true or false");
+  return false;
+}
+
+std::size_t XmlValue::Choice(const std::vector<std::string>& words) const {
+  const auto found = std::ranges::find(words, text_);
+  if (found == words.end()) Fail(fmt::format("one of {}", fmt::join(words, ", ")));
+  return static_cast<std::size_t>(found - words.begin());
+}
+
+XmlElement::XmlElement(std::shared_ptr<XmlDocument> document, const tinyxml2::XMLElement* element)
+    : document_(std::move(document)), element_(element) {
+  document_->read.insert(element_);
+}
+
+std::string XmlElement::tag() const { return element_->Name(); }
+int XmlElement::line() const { return element_->GetLineNum(); }
+std::string XmlElement::Shown() const { return ShownElement(*element_); }
+
+void XmlElement::Fail(std::string_view found, std::string_view expected) const {
+  FailAt(*document_, *element_, "", found, expected);
+}
+
+std::vector<XmlElement> XmlElement::Children() const {
+  std::vector<XmlElement> children;
+  for (const auto* child = element_->FirstChildElement(); child != nullptr;
+       child = child->NextSiblingElement()) {
+    children.emplace_back(document_, child);
+  }
+  return children;
+}
+
+std::vector<XmlElement> XmlElement::Children(std::string_view tag) const {
+  std::vector<XmlElement> children;
+  for (const auto* child = element_->FirstChildElement(); child != nullptr;
+       child = child->NextSiblingElement()) {
+    if (child->Name() == tag) children.emplace_back(document_, child);
+  }
+  return children;
+}
+
+std::optional<XmlElement> XmlElement::Child(std::string_view tag) const {
+  const std::vector<XmlElement> children = Children(tag);
+  if (children.empty()) return std::nullopt;
+  if (children.size() > 1) {
+    children[1].Fail(fmt::format("a second <{}> in {}", tag, Shown()), "one");
+  }
+  return children[0];
+}
+
+XmlElement XmlElement::RequiredChild(std::string_view tag) const {
+  const auto child = Child(tag);
+  if (!child) Fail(fmt::format("no <{}>", tag), "one");
+  return *child;
+}
+
+std::optional<XmlValue> XmlElement::Attribute(const std::string& name) const {
+  const tinyxml2::XMLAttribute* attribute = element_->FindAttribute(name.c_str());
+  if (attribute == nullptr) return std::nullopt;
+  document_->read.insert(attribute);
+  return XmlValue(*this, name, attribute->Value());
+}
+
+XmlValue XmlElement::Required(const std::string& name, std::string_view expected) const {
+  auto value = Attribute(name);
+  if (!value) FailAt(*document_, *element_, "", fmt::format("no \"{}\"", name), expected);
+  return *std::move(value);
+}
+
+XmlValue XmlElement::Content() const {
+  const char* text = element_->GetText();
+  return XmlValue(*this, "", text == nullptr ? "" : text);
+}
+
+bool XmlElement::HasAttribute(const std::string& name) const {
+  return element_->FindAttribute(name.c_str()) != nullptr;
+}
+
+void XmlElement::Ignore() const {
+  IgnoreAttributes();
+  for (const XmlElement& child : Children()) child.Ignore();
+}
+
+void XmlElement::IgnoreAttributes() const {
+  for (const auto* attribute = element_->FirstAttribute(); attribute != nullptr;
+       attribute = attribute->Next()) {
+    document_->read.insert(attribute);
+  }
+}
+
+XmlFile::XmlFile(std::string_view text, const std::string& file)
+    : document_(std::make_shared<XmlDocument>()) {
+  constexpr std::string_view kByteOrderMark = "\xEF\xBB\xBF";
+  if (text.starts_with(kByteOrderMark)) text.remove_prefix(kByteOrderMark.size());
+  document_->file = file;
+  if (const std::string fault = EncodingFault(text); !fault.empty()) {
+    throw ConfigError(file + ":" + fault);
+  }
+  const auto error = document_->xml.Parse(text.data(), text.size());
+  if (error == tinyxml2::XML_ELEMENT_DEPTH_EXCEEDED) {
+    throw ConfigError(
+        fmt::format("{}:{}: found more than {} elements within each other, expected "
+                    "fewer",
+                    file, document_->xml.ErrorLineNum(), TINYXML2_MAX_ELEMENT_DEPTH));
+  }
+  if (error != tinyxml2::XML_SUCCESS) {
+    throw ConfigError(fmt::format("{}:{}: found a fault of syntax ({}), expected well-formed XML",
+                                  file, std::max(1, document_->xml.ErrorLineNum()),
+                                  tinyxml2::XMLDocument::ErrorIDToName(error)));
+  }
+  RefuseDocumentTypes(*document_);
+  if (document_->xml.RootElement() == nullptr) {
+    throw ConfigError(file + ":1: found no element, expected <mujoco>, <robot> or <sdf>");
+  }
+}
+
+XmlElement XmlFile::root() const { return XmlElement(document_, document_->xml.RootElement()); }
+const std::string& XmlFile::name() const { return document_->file; }
+
+namespace {
+
+using See = std::function<void(const XmlElement&, const std::string&)>;
+
+void SeeUnread(const std::shared_ptr<XmlDocument>& document, const tinyxml2::XMLElement* element,
+               const See& see) {
+  if (!document->read.contains(element)) {
+    see(XmlElement(document, element), "");
+    return;
+  }
+  for (const auto* attribute = element->FirstAttribute(); attribute != nullptr;
+       attribute = attribute->Next()) {
+    if (document->read.contains(attribute)) continue;
+    see(XmlElement(document, element), IsText(attribute->Name()) ? attribute->Name() : "?");
+  }
+  for (const auto* child = element->FirstChildElement(); child != nullptr;
+       child = child->NextSiblingElement()) {
+    SeeUnread(document, child, see);
+  }
+}
+
+}  // namespace
+
+void XmlFile::Unread(const See& see) const {
+  SeeUnread(document_, document_->xml.RootElement(), see);
+}
+
+}  // namespace loopbench::harness

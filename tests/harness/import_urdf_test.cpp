@@ -1,0 +1,272 @@
+// What becomes of each element of URDF, and of a sidecar.
+#include <gtest/gtest.h>
+
+#include <filesystem>
+
+#include "harness/text/files.h"
+#include "tests/harness/import_texts.h"
+
+namespace loopbench::harness {
+namespace import_urdf_test {
+
+const std::string kMass =
+    "<inertial><mass value=\"2\"/><inertia ixx=\"1\" iyy=\"1\" izz=\"1\"/></inertial>";
+
+std::string Link(const std::string& name, const std::string& inside = kMass) {
+  return "<link name=\"" + name + "\">" + inside + "</link>";
+}
+
+std::string Joint(const std::string& name, const std::string& type, const std::string& parent,
+                  const std::string& child, const std::string& inside = "") {
+  return "<joint name=\"" + name + "\" type=\"" + type + "\"><parent link=\"" + parent +
+         "\"/><child link=\"" + child + "\"/>" + inside + "</joint>";
+}
+
+std::string Robot(const std::string& inside) {
+  return "<robot name=\"r\">\n" + inside + "</robot>";
+}
+
+const JointDescription& JointNamed(const Imported& imported, const std::string& name) {
+  const auto& joints = imported.description.joints;
+  return *std::ranges::find(joints, name, &JointDescription::name);
+}
+
+TEST(ImportUrdf, JointsAreTheKindsOfOurs) {
+  const std::vector<std::pair<std::string, std::string>> kinds = {
+      {"revolute", "revolute"}, {"continuous", "revolute"}, {"prismatic", "prismatic"},
+      {"fixed", "weld"},        {"floating", "free"},       {"planar", "planar"}};
+  for (const auto& [theirs, ours] : kinds) {
+    const Imported imported =
+        ImportText(Robot(Link("world", "") + Link("a") +
+                         Joint("j", theirs, "world", "a",
+                               "<origin xyz=\"1 2 3\" rpy=\"0 0 0.5\"/><axis xyz=\"0 0 2\"/>")),
+                   "file.urdf");
+    const JointDescription& joint = JointNamed(imported, "j");
+    EXPECT_EQ(ToString(joint.type), ours);
+    EXPECT_EQ(joint.from.position, Eigen::Vector3d(1, 2, 3));
+    EXPECT_NEAR(joint.from.rotation.z(), 0.5, 1e-15);
+    EXPECT_EQ(joint.from.body, kGround);
+    const bool has_axis = TraitsOf(joint.type).own_axis != '-';
+    EXPECT_EQ(joint.axis, has_axis ? Eigen::Vector3d(0, 0, 2) : Eigen::Vector3d(0, 0, 0));
+  }
+  // the axis that URDF takes where none is said
+  const Imported plain = ImportText(
+      Robot(Link("world", "") + Link("a") + Joint("j", "continuous", "world", "a")), "file.urdf");
+  EXPECT_EQ(JointNamed(plain, "j").axis, Eigen::Vector3d::UnitX());
+}
+
+TEST(ImportUrdf, RollPitchYawAreAboutFixedAxes) {
+  const Imported imported =
+      ImportText(Robot(Link("world", "") + Link("a") +
+                       Joint("j", "fixed", "world", "a", "<origin rpy=\"0.3 0.4 0.5\"/>")),
+                 "file.urdf");
+  const Eigen::Matrix3d expected = (Eigen::AngleAxisd(0.5, Eigen::Vector3d::UnitZ()) *
+                                    Eigen::AngleAxisd(0.4, Eigen::Vector3d::UnitY()) *
+                                    Eigen::AngleAxisd(0.3, Eigen::Vector3d::UnitX()))
+                                       .toRotationMatrix();
+  EXPECT_LE((PoseOf(JointNamed(imported, "j").from).R - expected).norm(), 1e-15);
+}
+
+TEST(ImportUrdf, InertiaIsTurnedIntoTheAxesOfTheLink) {
+  const Imported imported = ImportText(
+      Robot(
+          Link("world", "") +
+          Link("a",
+               "<inertial><origin xyz=\"1 0 0\" rpy=\"0 0 1.5707963267948966\"/><mass value=\"2\"/>"
+               "<inertia ixx=\"1\" ixy=\"0.1\" ixz=\"0\" iyy=\"2\" iyz=\"0\" "
+               "izz=\"2.5\"/></inertial>") +
+          Joint("j", "continuous", "world", "a")),
+      "file.urdf");
+  const BodyDescription& body = imported.description.bodies[1];
+  EXPECT_EQ(body.com, Eigen::Vector3d::UnitX());
+  EXPECT_NEAR(body.inertia(0, 0), 2.0, 1e-15);
+  EXPECT_NEAR(body.inertia(1, 1), 1.0, 1e-15);
+  EXPECT_NEAR(body.inertia(0, 1), -0.1, 1e-15);
+}
+
+TEST(ImportUrdf, LinksWithoutMassAreMergedOrRefused) {
+  // base - (fixed) - hub - (hinge) - arm - (fixed) - tool, and a sensor frame on a frame on it
+  const std::string tree =
+      Link("base", "") + Link("arm") + Link("tool", "") + Link("eye", "") +
+      Joint("shoulder", "continuous", "base", "arm", "<origin xyz=\"0 0 1\"/>") +
+      Joint("wrist", "fixed", "arm", "tool", "<origin xyz=\"1 0 0\"/>") +
+      Joint("mount", "fixed", "tool", "eye", "<origin xyz=\"0 1 0\"/>");
+  const Imported imported = ImportText(Robot(tree), "file.urdf");
+  ASSERT_EQ(imported.description.bodies.size(), 2u);
+  EXPECT_EQ(imported.description.bodies[1].name, "arm");
+  EXPECT_EQ(imported.description.joints.size(), 1u);
+  EXPECT_EQ(JointNamed(imported, "shoulder").from.body, kGround);
+  EXPECT_EQ(JointNamed(imported, "shoulder").from.position, Eigen::Vector3d(0, 0, 1));
+  ExpectNote(imported, "<link name=\"tool\">", "merged with \"arm\"");
+  ExpectNote(imported, "<link name=\"base\">", "merged with \"ground\"");
+  // a moving one that carries the mass behind a fixed joint is that mass
+  const Imported carried =
+      ImportText(Robot(Link("world", "") + Link("hub", "") + Link("load") +
+                       Joint("turn", "continuous", "world", "hub", "<axis xyz=\"0 0 1\"/>") +
+                       Joint("bolt", "fixed", "hub", "load", "<origin xyz=\"0 2 0\"/>")),
+                 "file.urdf");
+  ASSERT_EQ(carried.description.bodies.size(), 2u);
+  EXPECT_EQ(JointNamed(carried, "turn").to.position, Eigen::Vector3d(0, -2, 0));
+  ExpectRefusal(Robot(Link("world", "") + "\n" + Link("hub", "") + Link("load") +
+                      Joint("turn", "continuous", "world", "hub") +
+                      Joint("swing", "continuous", "hub", "load")),
+                {"file.xml:3: <link name=\"hub\">: found a body without mass that moves"});
+}
+
+TEST(ImportUrdf, TheRootIsFixedUnlessItFloats) {
+  const std::string robot = Robot(Link("a") + Link("b") + Joint("j", "continuous", "a", "b"));
+  const Imported fixed = ImportText(robot, "file.urdf");
+  EXPECT_EQ(JointNamed(fixed, "a to ground").type, JointType::kWeld);
+  ExpectNote(fixed, "<link name=\"a\">", "--floating");
+  ImportOptions options;
+  options.floats = true;
+  const Imported floating = ImportText(robot, "file.urdf", options);
+  EXPECT_EQ(JointNamed(floating, "a").type, JointType::kFree);
+  EXPECT_EQ(floating.description.bodies.size(), 3u);
+}
+
+TEST(ImportUrdf, GravityIsSaidByTheOption) {
+  const std::string robot =
+      Robot(Link("world", "") + Link("a") + Joint("j", "continuous", "world", "a"));
+  const Imported standard = ImportText(robot, "file.urdf");
+  EXPECT_EQ(standard.description.gravity, Eigen::Vector3d(0, 0, -9.81));
+  ExpectNote(standard, "<robot name=\"r\">", "--gravity");
+  ImportOptions moon;
+  moon.gravity = Eigen::Vector3d(0, 0, -1.62);
+  const Imported there = ImportText(robot, "file.urdf", moon);
+  EXPECT_EQ(there.description.gravity, *moon.gravity);
+  EXPECT_FALSE(HasNote(there, "<robot", "--gravity"));
+}
+
+TEST(ImportUrdf, EveryKindOfDroppedElementHasItsNote) {
+  const Imported imported = ImportText(
+      Robot(Link("world", "") +
+            Link("a", kMass + "<visual><geometry/></visual><collision/><odd/>") + Link("b") +
+            Joint("j", "continuous", "world", "a",
+                  "<limit effort=\"1\"/><dynamics damping=\"0.5\" friction=\"0.1\"/><calibration/>"
+                  "<safety_controller/>") +
+            Joint("k", "floating", "a", "b", "<dynamics damping=\"1\"/><mimic joint=\"j\"/>") +
+            "<transmission/><gazebo/><material name=\"m\"/><sensor/>"),
+      "file.urdf");
+  ExpectNote(imported, "<visual>", "shapes");
+  ExpectNote(imported, "<collision>", "no contact");
+  ExpectNote(imported, "<odd>", "not known");
+  ExpectNote(imported, "<limit>", "without ends");
+  ExpectNote(imported, "<dynamics> friction", "dry friction");
+  ExpectNote(imported, "<calibration>", "sensor's zero");
+  ExpectNote(imported, "<safety_controller>", "no controller");
+  ExpectNote(imported, "<dynamics> damping", "one coordinate");
+  ExpectNote(imported, "<mimic>", "a freedom more");
+  ExpectNote(imported, "<transmission>", "no actuators");
+  ExpectNote(imported, "<gazebo>", "sidecar");
+  ExpectNote(imported, "<sensor>", "no sensors");
+  ASSERT_EQ(ForcesOf<JointDamper>(imported).size(), 1u);
+  EXPECT_EQ(ForcesOf<JointDamper>(imported)[0].damping, 0.5);
+}
+
+TEST(ImportUrdf, WhatIsNoTreeIsRefusedWithItsLine) {
+  const std::string a = Link("a") + "\n", b = Link("b") + "\n", c = Link("c") + "\n";
+  ExpectRefusal(Robot(a + a), {"file.xml:3: <link name=\"a\">", "line 2 has it"});
+  ExpectRefusal(Robot(a + Joint("j", "continuous", "a", "z")),
+                {"<child> link: found \"z\"", "name of a body"});
+  ExpectRefusal(Robot(a + b), {"2 links without a parent"});
+  ExpectRefusal(Robot(a + b + c + Joint("j", "continuous", "b", "c") + "\n" +
+                      Joint("k", "continuous", "c", "b")),
+                {"file.xml:5: <joint name=\"j\">: found a joint of a cycle", "--loops"});
+  ExpectRefusal(Robot(a + b + c + Joint("j", "continuous", "a", "b") +
+                      Joint("k", "continuous", "a", "c") + Joint("l", "continuous", "b", "c")),
+                {"<joint name=\"l\">: found a second joint that leads to this child"});
+  ExpectRefusal(
+      Robot(a + b + Joint("j", "continuous", "a", "b") + Joint("j", "continuous", "a", "b")),
+      {"second joint"});
+  ExpectRefusal(Robot(a + b + Joint("j", "screw", "a", "b")), {"\"screw\"", "one of revolute"});
+  ExpectRefusal(Robot(Link("world", "") + Link("a",
+                                               "<inertial><mass value=\"-1\"/><inertia ixx=\"1\" "
+                                               "iyy=\"1\" izz=\"1\"/></inertial>")),
+                {"<mass> value: found \"-1\"", ">= 0"});
+  ExpectRefusal(Robot(Link("world", "") + Link("a",
+                                               "<inertial><mass value=\"1\"/><inertia ixx=\"1\" "
+                                               "iyy=\"-1\" izz=\"1\"/></inertial>")),
+                {"principal moments -1"});
+  ExpectRefusal("<robot name=\"r\"/>", {"no link without a parent"});
+  ImportOptions sdf;
+  sdf.format = "sdf";
+  ExpectRefusal(Robot(a), {"found urdf, expected sdf"}, sdf);
+  ExpectRefusal("<html/>", {"file.xml:1: <html>", "<mujoco> (MJCF), <robot> (URDF) or <sdf>"});
+}
+
+/// A sidecar beside a chain of two links of 1 m along x at rest.
+class Sidecar : public testing::Test {
+ protected:
+  Sidecar() { std::filesystem::create_directories(folder_); }
+  ~Sidecar() override { std::filesystem::remove_all(folder_); }
+
+  Imported Read(const std::string& json) const {
+    ImportOptions options;
+    options.sidecar = folder_ / "loops.json";
+    WriteFileAtomically(options.sidecar, json);
+    return ImportText(
+        Robot(Link("world", "") + Link("a") + Link("b") +
+              Joint("j", "continuous", "world", "a", "<axis xyz=\"0 0 1\"/>") +
+              Joint("k", "continuous", "a", "b",
+                    "<origin xyz=\"1 0 0\" rpy=\"0 0 1.5707963267948966\"/><axis xyz=\"0 0 1\"/>")),
+        "file.urdf", options);
+  }
+  std::string Message(const std::string& json) const {
+    try {
+      Read(json);
+    } catch (const ConfigError& error) {
+      return error.what();
+    }
+    return "";
+  }
+
+  const std::filesystem::path folder_ =
+      std::filesystem::path(testing::TempDir()) / "loopbench-sidecar";
+};
+
+TEST_F(Sidecar, LoopsCloseWhereTheFileDrawsThem) {
+  const Imported imported = Read(
+      R"({"loops": [{"name": "l", "type": "revolute", "from": "b", "to": "ground", "at": [2, 0, 0],
+                     "axis": [0, 0, 1]}]})");
+  const JointDescription& loop = JointNamed(imported, "l");
+  EXPECT_TRUE(loop.cut);
+  // b stands at (1, 0, 0), turned by a quarter
+  EXPECT_LE((loop.to.position - Eigen::Vector3d(1, 2, 0)).norm(), 1e-15);
+  EXPECT_NEAR(loop.to.rotation.z(), 1.5707963267948966, 1e-15);
+}
+
+TEST_F(Sidecar, JointsForcesAndStartAreThoseOfMechanismFiles) {
+  const Imported imported = Read(R"({
+    "gravity": [0, -1, 0],
+    "joints": [{"name": "r", "type": "rod", "length": 3, "from": {"body": "b"}, "to": {"body": "ground"}}],
+    "forces": [{"type": "joint_torque", "joint": "j", "value": 2}],
+    "initial": {"coordinates": {"j": 0.5}, "speeds": {"k": 1}, "held": ["j"]},
+    "observe": {"length": 2}})");
+  EXPECT_EQ(imported.description.gravity.y(), -1.0);
+  EXPECT_EQ(JointNamed(imported, "r").parameter, 3.0);
+  EXPECT_EQ(ForcesOf<JointTorque>(imported).size(), 1u);
+  EXPECT_EQ(imported.description.initial.held.size(), 1u);
+  EXPECT_EQ(imported.observe.length, 2.0);
+}
+
+TEST_F(Sidecar, MistakesHaveTheirPlace) {
+  const auto expect = [&](const std::string& json, const std::string& words) {
+    EXPECT_NE(Message(json).find(words), std::string::npos) << words << " in " << Message(json);
+  };
+  expect(R"({"loop": []})", "unknown key \"loop\"");
+  expect(R"({"loop": []})", "did you mean \"loops\"");
+  expect(R"({"loops": [{"name": "l", "type": "revolute", "from": "c", "to": "a", "at": [0,0,0]}]})",
+         "/loops/0/from: found \"c\"");
+  expect(R"({"loops": [{"name": "j", "type": "revolute", "from": "b", "to": "a", "at": [0,0,0]}]})",
+         "/loops/0/name: found \"j\"");
+  expect(R"({"loops": [{"name": "l", "type": "rod", "from": "b", "to": "a", "at": [0,0,0]}]})",
+         "/loops/0/type");
+  expect(R"({"loops": [{"name": "l", "type": "revolute", "from": "b", "to": "b", "at": [0,0,0]}]})",
+         "/loops/0/to");
+  expect(R"({"initial": {"held": ["j"]}})", "/initial/held/0");
+  expect("{", "file");
+}
+
+}  // namespace import_urdf_test
+}  // namespace loopbench::harness

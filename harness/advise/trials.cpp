@@ -15,7 +15,7 @@ namespace loopbench::harness {
 namespace {
 
 /// Of a longer run a disturbance is a small part.
-constexpr double kShort_s = 2e-3;
+constexpr double kShortTrial_s = 2e-3;
 
 /// One part, so that its energy and its steps are those of all.
 CompileOptions InOnePiece() { return {.islands = false}; }
@@ -47,7 +47,7 @@ class BenchIn final : public TrialBench {
     trial.rhs_evaluations = bare.rhs_evaluations + bare.jacobian_rhs_evaluations;
     if (bare.outcome != Outcome::kFinished) return trial;
     // a short run is soon disturbed, and searches go by its time
-    if (bare.wall_s < kShort_s) TimeAgain(&trial);
+    if (bare.wall_s < kShortTrial_s) TimeAgain(&trial);
     ErrorMeter meter({scene_.user, compiled_, scene_.points}, 0, scene_.reference);
     // interpolation doubles what a run costs
     if (Run(choice, 10 * cpu_s, &meter).outcome != Outcome::kFinished) return trial;
@@ -116,7 +116,7 @@ class BenchIn final : public TrialBench {
 
 void TrialBench::Settle(Trial* trial) {
   // twice and more what is short by itself: it may be short and disturbed
-  constexpr double kMaybeShort_s = 2.5 * kShort_s;
+  constexpr double kMaybeShort_s = 2.5 * kShortTrial_s;
   constexpr int kSame = 3, kMostTimings = 12;
   for (int same = 0, i = 0; same < kSame && i < kMostTimings && trial->wall_s < kMaybeShort_s;
        ++i) {

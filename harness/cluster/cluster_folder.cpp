@@ -18,7 +18,7 @@
 namespace loopbench::harness {
 namespace {
 
-constexpr const char* kFile = "cluster.json";
+constexpr const char* kRunFile = "cluster.json";
 
 std::string Listed(const std::vector<std::string>& texts) {
   return fmt::format("{}", fmt::join(texts, "\n"));
@@ -140,11 +140,11 @@ void WriteClusterRun(const ClusterRun& run, const std::filesystem::path& folder)
   record.Set("cases_of_parts", run.cases);
   record.Set("array_job", run.array_job);
   record.Set("collect_job", run.collect_job);
-  WriteFileAtomically(folder / kFile, ToJsonLine(record) + '\n');
+  WriteFileAtomically(folder / kRunFile, ToJsonLine(record) + '\n');
 }
 
 ClusterRun ReadClusterRun(const std::filesystem::path& folder) {
-  const auto file = folder / kFile;
+  const auto file = folder / kRunFile;
   if (!std::filesystem::exists(file)) {
     throw ConfigError(
         fmt::format("{}: no such file, expected the folder of a loopbench submit", file.string()));

@@ -12,7 +12,7 @@ namespace {
 
 /// a mu^2 + b mu + c on [from, to]: the least cost of all segmentations whose last level is mu, and
 /// where their last segment begins.
-struct Piece {
+struct CostPiece {
   double from, to, a, b, c;
   std::size_t begin;
 
@@ -24,8 +24,9 @@ struct Piece {
 
 /// The smaller of the piece and the constant `level`, which stands for a segment that begins at
 /// `begin`. Pieces that meet in a constant of one begin are joined.
-void AddCapped(const Piece& piece, double level, std::size_t begin, std::vector<Piece>* pieces) {
-  const auto add = [pieces](const Piece& one) {
+void AddCapped(const CostPiece& piece, double level, std::size_t begin,
+               std::vector<CostPiece>* pieces) {
+  const auto add = [pieces](const CostPiece& one) {
     if (!(one.to > one.from)) return;
     const bool joins = !pieces->empty() && pieces->back().a == 0.0 && one.a == 0.0 &&
                        pieces->back().begin == one.begin && pieces->back().c == one.c;
@@ -36,7 +37,7 @@ void AddCapped(const Piece& piece, double level, std::size_t begin, std::vector<
     }
   };
   const auto constant = [&](double from, double to) {
-    return Piece{from, to, 0.0, 0.0, level, begin};
+    return CostPiece{from, to, 0.0, 0.0, level, begin};
   };
   if (piece.a == 0.0) {
     add(piece.c <= level ? piece : constant(piece.from, piece.to));
@@ -57,10 +58,10 @@ void AddCapped(const Piece& piece, double level, std::size_t begin, std::vector<
 }
 
 /// The piece with min((x - mu)^2, bound^2) added.
-void AddLoss(const Piece& piece, double x, double bound, std::vector<Piece>* pieces) {
+void AddLoss(const CostPiece& piece, double x, double bound, std::vector<CostPiece>* pieces) {
   const double left = std::clamp(x - bound, piece.from, piece.to);
   const double right = std::clamp(x + bound, piece.from, piece.to);
-  const auto add = [pieces](const Piece& one) {
+  const auto add = [pieces](const CostPiece& one) {
     if (one.to > one.from) pieces->push_back(one);
   };
   add({piece.from, left, piece.a, piece.b, piece.c + bound * bound, piece.begin});
@@ -200,20 +201,21 @@ std::vector<std::size_t> RobustSegments(std::span<const double> x, double bound,
   const double margin = std::max(bound, 1e-12 * std::max(std::abs(least), std::abs(most)));
   // values near 0 keep the squares of logarithms far from 1 exact
   const double shift = 0.5 * (least + most);
-  std::vector<Piece> costs = {{least - shift - margin, most - shift + margin, 0.0, 0.0, 0.0, 0}};
+  std::vector<CostPiece> costs = {
+      {least - shift - margin, most - shift + margin, 0.0, 0.0, 0.0, 0}};
   std::vector<std::size_t> begins(x.size());
   double best = 0.0;
   for (std::size_t t = 0; t < x.size(); ++t) {
-    std::vector<Piece> next;
+    std::vector<CostPiece> next;
     if (t > 0) {
-      std::vector<Piece> capped;
-      for (const Piece& piece : costs) AddCapped(piece, best + penalty, t, &capped);
+      std::vector<CostPiece> capped;
+      for (const CostPiece& piece : costs) AddCapped(piece, best + penalty, t, &capped);
       costs.swap(capped);
     }
-    for (const Piece& piece : costs) AddLoss(piece, x[t] - shift, bound, &next);
+    for (const CostPiece& piece : costs) AddLoss(piece, x[t] - shift, bound, &next);
     costs.swap(next);
     best = std::numeric_limits<double>::infinity();
-    for (const Piece& piece : costs) {
+    for (const CostPiece& piece : costs) {
       const double lowest = piece.At(piece.Lowest());
       if (lowest >= best) continue;
       best = lowest;

@@ -51,7 +51,7 @@ Ink InkOf(const PictureItem& item, ShapeStyle style) {
   return {"#000", "none", 1.0};
 }
 
-std::string Number(double value) {
+std::string Decimal(double value) {
   std::string text = fmt::format("{:.2f}", value);
   text.erase(text.find_last_not_of('0') + 1);
   if (text.back() == '.') text.pop_back();
@@ -61,13 +61,13 @@ std::string Number(double value) {
 std::string PathOf(const Spots& spots, bool closed) {
   std::string path;
   for (const Spot& spot : spots) {
-    path += fmt::format("{}{} {}", path.empty() ? "M" : "L", Number(spot.x), Number(spot.y));
+    path += fmt::format("{}{} {}", path.empty() ? "M" : "L", Decimal(spot.x), Decimal(spot.y));
   }
   return closed ? path + "Z" : path;
 }
 
 std::string Stroke(const Ink& ink) {
-  return fmt::format(" stroke=\"{}\" stroke-width=\"{}\"{}", ink.stroke, Number(ink.width),
+  return fmt::format(" stroke=\"{}\" stroke-width=\"{}\"{}", ink.stroke, Decimal(ink.width),
                      *ink.dash == '\0' ? "" : fmt::format(" stroke-dasharray=\"{}\"", ink.dash));
 }
 
@@ -86,7 +86,7 @@ std::string Thick(const Spots& spots, bool closed, double radius, const Ink& ink
     return fmt::format(
         "<path d=\"{}\" fill=\"{}\" stroke=\"{}\" stroke-width=\"{}\" "
         "stroke-linecap=\"round\" stroke-linejoin=\"round\"/>\n",
-        d, closed ? fill : "none", colour, Number(width));
+        d, closed ? fill : "none", colour, Decimal(width));
   };
   const double inner = std::max(0.5, 2.0 * radius - ink.width);
   return stroked(ink.stroke, ink.stroke, 2.0 * radius + ink.width) +
@@ -148,15 +148,15 @@ std::string Arrow(const Spots& spots, double size, const Ink& ink) {
 }
 
 std::string Disc(const Spot& c, double radius, const Ink& ink) {
-  return fmt::format("<circle cx=\"{}\" cy=\"{}\" r=\"{}\" fill=\"{}\"{}/>\n", Number(c.x),
-                     Number(c.y), Number(radius), ink.fill, Stroke(ink));
+  return fmt::format("<circle cx=\"{}\" cy=\"{}\" r=\"{}\" fill=\"{}\"{}/>\n", Decimal(c.x),
+                     Decimal(c.y), Decimal(radius), ink.fill, Stroke(ink));
 }
 
 /// A circle, two opposite quarters of it black.
 std::string Centre(const Spot& c, double r, const Ink& ink) {
-  const std::string x = Number(c.x), y = Number(c.y), left = Number(c.x - r),
-                    right = Number(c.x + r), top = Number(c.y - r), bottom = Number(c.y + r),
-                    radius = Number(r);
+  const std::string x = Decimal(c.x), y = Decimal(c.y), left = Decimal(c.x - r),
+                    right = Decimal(c.x + r), top = Decimal(c.y - r), bottom = Decimal(c.y + r),
+                    radius = Decimal(r);
   return Disc(c, r, ink) +
          fmt::format(
              "<path d=\"M{0} {1}L{0} {2}A{3} {3} 0 0 1 {4} {1}ZM{0} {1}L{0} {5}A{3} {3} 0 "

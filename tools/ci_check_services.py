@@ -119,9 +119,10 @@ class Service:
     def call(self, words, cwd, environment, place, inside=True):
         """Exit code and both streams, in the order of their lines; of a command in the job's container, or beside."""
         environment = {"PATH": self.path, "HOME": str(place / "home"), "LC_ALL": "C.UTF-8", "CI": "true",
-                       "CI_CHECK": str(self.work / "server"), "DEBIAN_FRONTEND": "noninteractive", **environment}
-        words = [*(self.enter if inside else ()), "env", "-i", "-C", str(cwd), *(f"{k}={v}" for k, v in environment.items()), *words]
-        done = subprocess.run(words, stdout=subprocess.PIPE, stderr=subprocess.STDOUT, text=True)
+                       "CI_CHECK": str(self.work / "server"), **environment}
+        clean = ["env", "-i", "-C", str(cwd), *(f"{key}={value}" for key, value in environment.items())]
+        done = subprocess.run([*(self.enter if inside else ()), *clean, *words], stdin=subprocess.DEVNULL,
+                              stdout=subprocess.PIPE, stderr=subprocess.STDOUT, text=True)
         return done.returncode, done.stdout
 
     def clone(self, url, ref, sha, depth, place, inside):
@@ -183,6 +184,8 @@ class GitHub(Service):
                 code, log = self.call([*SHELLS[shell], str(files["script"])], workspace, {**environment, **own}, place)
             elif step["uses"] == "actions/checkout@v4":
                 shutil.rmtree(workspace)
+                if not self.enter and "git" not in (place / "home/packages").read_text().split():
+                    raise ValueError("found no git before the checkout, which then makes no repository")
                 self.clone(self.URL, ref, event.sha, 1, place, inside=True)
                 if os.getuid() == 0:  # the runner's user, which the container's is not
                     for path in (workspace, *workspace.rglob("*")):

@@ -5,6 +5,8 @@ from ci_check_outputs import fail, run
 from ci_check_services import Event, GitHub
 
 HOSTILE = "lift|`<img src=x>`\n# @here [x](http://evil.example) $1$ &lt; \"q\" ]]>"
+STRANGERS = {"id": 100, "url": "https://api.example/comments/100", "user": {"login": "stranger"},
+             "body": "<!-- loopbench -->"}
 MATCH = "--match experiment,mechanism,formulation"
 
 
@@ -75,6 +77,8 @@ class World:
         shutil.rmtree(work, ignore_errors=True)
         self.server = work / "server"
         self.server.mkdir(parents=True)
+        # somebody's comment that begins as the recipes' do
+        (self.server / "comments.json").write_text(json.dumps([STRANGERS]))
         (self.server / "package.deb").write_bytes(package.read_bytes() if package else b"")
         self.kind, self.path = kind, path
         self.service = kind(recipe, work, path, enter)

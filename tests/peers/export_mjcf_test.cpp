@@ -64,7 +64,10 @@ class Loaded {
       double w[3];  // in axes of the moved joint frame
       mju_rotVecMatT(w, own, one.axes.data());
       if (one.sign > 0.0) {
-        mju_rotVecQuat(&udot[u], w, ours.q.data() + one.q);
+        double turn[4];  // a state's quaternion may have any length
+        mju_copy(turn, ours.q.data() + one.q, 4);
+        mju_normalize4(turn);
+        mju_rotVecQuat(&udot[u], w, turn);
       } else {
         for (std::size_t i = 0; i < 3; ++i) udot[u + i] = -w[i];
       }
@@ -78,7 +81,7 @@ class Loaded {
 };
 
 std::filesystem::path Write(const std::string& name, const std::string& text) {
-  const auto path = std::filesystem::path(testing::TempDir()) / ("exported-" + name + ".xml");
+  const auto path = std::filesystem::path(::testing::TempDir()) / ("exported-" + name + ".xml");
   WriteFileAtomically(path, text);
   return path;
 }
@@ -96,7 +99,7 @@ void ExpectBodies(const AtStart& ours, Loaded& loaded) {
   }
 }
 
-class ShippedMjcf : public testing::TestWithParam<std::string> {};
+class ShippedMjcf : public ::testing::TestWithParam<std::string> {};
 
 TEST_P(ShippedMjcf, HasOurAccelerationsAtTheStart) {
   const MechanismDescription description = reference::Shipped(GetParam()).description;
@@ -145,7 +148,7 @@ TEST_P(ShippedMjcf, HasOurAccelerationsAtTheStart) {
   record("all", LargestDifference(theirs, ours.udot));
 }
 
-INSTANTIATE_TEST_SUITE_P(All, ShippedMjcf, testing::ValuesIn(reference::ShippedNames()),
+INSTANTIATE_TEST_SUITE_P(All, ShippedMjcf, ::testing::ValuesIn(reference::ShippedNames()),
                          [](const auto& name) { return reference::WithoutDashes(name.param); });
 
 /// Trees of joints of every kind, reversed ones among them, put at random coordinates, with forces
@@ -154,10 +157,10 @@ template <class Space>
 int CompareTrees(SpaceKind space) {
   int compared = 0;
   for (std::uint64_t seed = 1; seed <= 40; ++seed) {
-    MechanismDescription tree = loopbench::testing::AnyMechanism(6, 0, 0, space, seed);
-    loopbench::testing::KeepExpressible(tree);
-    loopbench::testing::AddConstantForces(tree, true);
-    const loopbench::testing::Sample<Space> sample(tree, seed);
+    MechanismDescription tree = testing::AnyMechanism(6, 0, 0, space, seed);
+    testing::KeepExpressible(tree);
+    testing::AddConstantForces(tree, true);
+    const testing::Sample<Space> sample(tree, seed);
     const auto& state = sample.state(Coordinates::kJoint);
     exchange::Model model = exchange::MakeModel(tree);
     model.q.assign(state.q.begin(), state.q.end());
@@ -166,8 +169,7 @@ int CompareTrees(SpaceKind space) {
       const exchange::Mjcf made = exchange::MakeMjcf(model);
       const std::vector<double> udot = Loaded(Write("tree", made.document)).Udot(model, made);
       const VectorX<double> theirs = Eigen::Map<const VectorX<double>>(udot.data(), state.u.size());
-      EXPECT_LE(loopbench::testing::RelativeError(theirs, sample.udot(Coordinates::kJoint)),
-                sample.Bound())
+      EXPECT_LE(testing::RelativeError(theirs, sample.udot(Coordinates::kJoint)), sample.Bound())
           << tree.name;
       ++compared;
     } catch (const NotThere& missing) {

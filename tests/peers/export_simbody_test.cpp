@@ -33,7 +33,7 @@ const exchange::ExportFormat& kSimbody = exchange::ExportFormats().back();
 
 /// A new folder of this test.
 fs::path Folder(const std::string& name) {
-  const fs::path folder = fs::path(testing::TempDir()) / ("loopbench-exported-" + name);
+  const fs::path folder = fs::path(::testing::TempDir()) / ("loopbench-exported-" + name);
   fs::remove_all(folder);
   fs::create_directories(folder);
   return folder;
@@ -186,10 +186,10 @@ struct Drawn {
 
 template <class Space>
 Drawn Draw(MechanismDescription description, std::uint64_t seed) {
-  loopbench::testing::KeepExpressible(description);
+  testing::KeepExpressible(description);
   const bool is_tree = BuildTopology(description, Coordinates::kJoint).constraints.empty();
-  if (is_tree) loopbench::testing::AddConstantForces(description, false);
-  const loopbench::testing::Sample<Space> sample(description, seed);
+  if (is_tree) testing::AddConstantForces(description, false);
+  const testing::Sample<Space> sample(description, seed);
   const auto& state = sample.state(Coordinates::kJoint);
   Drawn drawn{exchange::MakeModel(description), {}, sample.Bound()};
   drawn.model.q.assign(state.q.begin(), state.q.end());
@@ -203,8 +203,7 @@ TEST(ExportedSimbody, OfJointsOfEveryKindHasTheOraclesAccelerations) {
   for (std::uint64_t seed = 1; seed <= 5; ++seed) {
     for (const SpaceKind space : {SpaceKind::kPlanar, SpaceKind::kSpatial}) {
       for (const MechanismDescription& one :
-           {loopbench::testing::AnyMechanism(6, 0, 0, space, seed),
-            loopbench::testing::MixedGraph(2, space, seed)}) {
+           {testing::AnyMechanism(6, 0, 0, space, seed), testing::MixedGraph(2, space, seed)}) {
         const bool planar = space == SpaceKind::kPlanar;
         drawn.emplace("m" + std::to_string(drawn.size()),
                       planar ? Draw<Planar>(one, seed) : Draw<Spatial>(one, seed));

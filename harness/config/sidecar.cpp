@@ -13,6 +13,7 @@ namespace {
 /// The mechanism so far, and where its bodies stand.
 struct Sidecar : Draft {
   const std::vector<Frame>* at_rest = nullptr;
+  bool has_gravity = false;
 };
 
 /// A joint given on one side: at rest the other is at the same place.
@@ -92,6 +93,7 @@ void ReadLoops(const JsonNode& node, Sidecar& sidecar) {
 
 void ReadGravityOfSidecar(const JsonNode& node, Sidecar& sidecar) {
   sidecar.gravity = ReadVector(node, sidecar.space);
+  sidecar.has_gravity = true;
 }
 
 const Fields<Sidecar>& SidecarFields() {
@@ -110,8 +112,8 @@ const Fields<Sidecar>& SidecarFields() {
 
 }  // namespace
 
-void ReadSidecar(const std::filesystem::path& path, const std::vector<Frame>& at_rest,
-                 MechanismDescription* description, SceneObservation* observe) {
+SidecarFacts ReadSidecar(const std::filesystem::path& path, const std::vector<Frame>& at_rest,
+                         MechanismDescription* description) {
   const std::string text = ReadTextFile(path);
   const Json document = ParseDocument(text, path.string());
   ErrorList errors(path.string(), text);
@@ -123,7 +125,7 @@ void ReadSidecar(const std::filesystem::path& path, const std::vector<Frame>& at
   SidecarFields().Read(JsonNode(document, "", errors), &sidecar);
   errors.ThrowIfAny();
   *description = static_cast<MechanismDescription&>(sidecar);
-  *observe = sidecar.observe;
+  return {sidecar.observe, sidecar.has_gravity};
 }
 
 }  // namespace loopbench::harness

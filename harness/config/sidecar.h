@@ -10,10 +10,15 @@
 
 namespace loopbench::harness {
 
+struct SidecarFacts {
+  SceneObservation observe;
+  bool has_gravity = false;
+};
+
 /// Adds to `description` what the file says; its start takes the place of the description's.
 /// `at_rest` has the bodies in ground axes where all coordinates are 0: loops that are given on one
 /// side close there. Throws ConfigError with all mistakes, one per line.
-void ReadSidecar(const std::filesystem::path& path, const std::vector<Frame>& at_rest,
-                 MechanismDescription* description, SceneObservation* observe);
+SidecarFacts ReadSidecar(const std::filesystem::path& path, const std::vector<Frame>& at_rest,
+                         MechanismDescription* description);
 
 }  // namespace loopbench::harness

@@ -96,6 +96,11 @@ void ImportDraft::CheckMass(int index) const {
 
 void ImportDraft::AddLift(int body, double share) { lifts_.emplace_back(body, share); }
 
+void ImportDraft::AssumeGravity(const XmlElement& element, double gravity) {
+  description.gravity = {0.0, 0.0, -gravity};
+  assumed_gravity_ = element;
+}
+
 void ImportDraft::Note(const XmlElement& element, std::string reason, bool changes_motion) {
   notes_.push_back({element.line(), element.Shown(), std::move(reason), changes_motion});
 }

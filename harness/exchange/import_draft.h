@@ -52,6 +52,9 @@ class ImportDraft {
   /// As many times its weight, upwards: what a body without gravity feels.
   void AddLift(int body, double share);
 
+  /// What the format takes where the file says nothing [m/s^2], along -z.
+  void AssumeGravity(const XmlElement& element, double gravity);
+
   void Note(const XmlElement& element, std::string reason, bool changes_motion = false);
   void Note(const XmlElement& element, const std::string& attribute, std::string reason,
             bool changes_motion = false);
@@ -75,6 +78,7 @@ class ImportDraft {
   std::set<std::string> joints_;
   std::vector<ImportNote> notes_;
   std::vector<std::pair<int, double>> lifts_;
+  std::optional<XmlElement> assumed_gravity_;  ///< who would have had to say it
 };
 
 /// The readers of the formats; each fills the draft from the root element.

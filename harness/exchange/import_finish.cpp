@@ -2,6 +2,7 @@
 #include <fmt/format.h>
 
 #include <algorithm>
+#include <cmath>
 
 #include "harness/config/sidecar.h"
 #include "harness/exchange/import_draft.h"
@@ -20,12 +21,15 @@ bool IsMassless(const BodyDescription& body) { return body.mass == 0.0; }
 /// ground if it is among them, else the first with a mass.
 class Cluster {
  public:
-  Cluster(const MechanismDescription& description, int root) : d_(description) {
+  /// `welds`: numbers of the welds at each body.
+  Cluster(const MechanismDescription& description, const std::vector<std::vector<int>>& welds,
+          int root)
+      : d_(description) {
     poses_[root] = Frame();
     std::vector<int> queue = {root};
     for (std::size_t k = 0; k < queue.size(); ++k) {
-      for (const JointDescription& joint : d_.joints) {
-        if (joint.type != JointType::kWeld) continue;
+      for (const int weld : welds[static_cast<std::size_t>(queue[k])]) {
+        const JointDescription& joint = d_.joints[static_cast<std::size_t>(weld)];
         for (const auto& [here, there] :
              {std::pair{&joint.from, &joint.to}, {&joint.to, &joint.from}}) {
           if (here->body != queue[k] || poses_.contains(there->body)) continue;
@@ -61,6 +65,18 @@ class Cluster {
   int carrier_ = -1;
 };
 
+std::vector<std::vector<int>> WeldsAtBodies(const MechanismDescription& description) {
+  std::vector<std::vector<int>> welds(description.bodies.size());
+  for (std::size_t j = 0; j < description.joints.size(); ++j) {
+    const JointDescription& joint = description.joints[j];
+    if (joint.type != JointType::kWeld) continue;
+    for (const int body : {joint.from.body, joint.to.body}) {
+      welds[static_cast<std::size_t>(body)].push_back(static_cast<int>(j));
+    }
+  }
+  return welds;
+}
+
 /// z of ground onto n.
 Eigen::Quaterniond ZOnto(const Eigen::Vector3d& n) { return Eigen::Quaterniond(AxesWithNormal(n)); }
 
@@ -75,19 +91,21 @@ void ImportDraft::RefuseMassless(int body) const {
 void ImportDraft::MergeMassless() {
   const std::size_t count = description.bodies.size();
   std::vector<Attachment> attachments(count);
+  const std::vector<std::vector<int>> welds = WeldsAtBodies(description);
   bool any = false;
   for (std::size_t i = 1; i < count; ++i) {
     if (!IsMassless(description.bodies[i]) || attachments[i].attached) continue;
-    const Cluster cluster(description, static_cast<int>(i));
+    const Cluster cluster(description, welds, static_cast<int>(i));
     if (cluster.carrier() < 0) RefuseMassless(static_cast<int>(i));
     for (const int body : cluster.massless()) {
       const auto index = static_cast<std::size_t>(body);
       attachments[index] = cluster.AttachmentOf(body);
       const auto carrier = static_cast<std::size_t>(cluster.carrier());
-      Note(elements_[index],
-           fmt::format("without mass and fixed: merged with \"{}\", its points "
-                       "are called \"{}.POINT\" there",
-                       description.bodies[carrier].name, description.bodies[index].name));
+      const BodyDescription& merged = description.bodies[index];
+      std::string reason = fmt::format("without mass and fixed: merged with \"{}\"",
+                                       description.bodies[carrier].name);
+      if (!merged.points.empty()) reason += fmt::format(", points are \"{}.POINT\"", merged.name);
+      Note(elements_[index], reason);
     }
     any = true;
   }
@@ -146,7 +164,8 @@ void ImportDraft::GoToPlane() {
                     file_.name(), why));
   }
   description = plane->description;
-  if (plane->gravity_dropped != 0.0) {
+  const double rounding = 1e-12 * plane->description.gravity.norm();  // as axes are level to
+  if (std::abs(plane->gravity_dropped) > rounding) {
     Note(elements_[kGround], fmt::format("gravity of {:.6g} m/s^2 along the normal of the plane "
                                          "dropped: it moves nothing",
                                          plane->gravity_dropped));
@@ -156,17 +175,25 @@ void ImportDraft::GoToPlane() {
 Imported ImportDraft::Finish(const std::string& format) {
   Imported imported;
   imported.format = format;
+  bool gravity_is_said = options_.gravity.has_value() || !assumed_gravity_;
+  if (!options_.sidecar.empty()) {
+    std::vector<Frame> rest;
+    for (const Placement& X : at_rest) rest.push_back(X.AsFrame());
+    const SidecarFacts facts = ReadSidecar(options_.sidecar, rest, &description);
+    imported.observe = facts.observe;
+    gravity_is_said = gravity_is_said || facts.has_gravity;
+  }
+  if (!gravity_is_said) {
+    Note(*assumed_gravity_, fmt::format("no gravity is said: {} m/s^2 along -z (--gravity x,y,z "
+                                        "says another)",
+                                        -description.gravity.z()));
+  }
   if (options_.gravity) description.gravity = *options_.gravity;
   for (const auto& [body, share] : lifts_) {
     const BodyDescription& lifted = description.bodies[static_cast<std::size_t>(body)];
     if (!(lifted.mass > 0.0) || description.gravity.isZero(0.0)) continue;
     description.forces.emplace_back(
         PointForce{{body, lifted.com}, -share * lifted.mass * description.gravity, false});
-  }
-  if (!options_.sidecar.empty()) {
-    std::vector<Frame> rest;
-    for (const Placement& X : at_rest) rest.push_back(X.AsFrame());
-    ReadSidecar(options_.sidecar, rest, &description, &imported.observe);
   }
   if (description.bodies.size() < 2) {
     elements_[kGround].Fail("no body", "at least one that is not the ground");

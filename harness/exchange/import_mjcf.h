@@ -137,9 +137,6 @@ MjcfJoint ReadMjcfJoint(const MjcfModel& model, const XmlElement& element,
 /// Makes one joint of ours of those of a body; X_PB is where the file draws the body.
 void AddMjcfChain(MjcfModel* model, const XmlElement& body, int parent, int child,
                   const Placement& X_PB, const std::vector<MjcfJoint>& joints);
-/// Coordinates (or with speeds, speeds too) of our joints from those of MuJoCo.
-void SetMjcfStart(MjcfModel* model, const std::vector<double>& qpos,
-                  const std::vector<double>& qvel);
 void ReadMjcfEquality(const XmlElement& section, MjcfModel* model);
 /// Spatial tendons between two sites; `held`: names of tendons that keep their length, which become
 /// rods.

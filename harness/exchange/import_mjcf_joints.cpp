@@ -127,8 +127,9 @@ std::optional<Composed> ComposeMore(const Sorted& sorted) {
     centre = MeetingPoint(sorted.hinges);
   }
   if (!centre) return std::nullopt;
-  if (slides == 0) return Composed{JointType::kSpherical, {{}, *centre}};
-  if (slides == 3 && Independent(sorted.slides)) return Composed{JointType::kFree, {{}, *centre}};
+  if (slides == 0) return Composed{JointType::kSpherical, Placement(*centre)};
+  if (slides == 3 && Independent(sorted.slides))
+    return Composed{JointType::kFree, Placement(*centre)};
   return std::nullopt;
 }
 
@@ -139,7 +140,7 @@ Composed Compose(const XmlElement& body, const std::vector<MjcfJoint>& joints) {
                            : joint.kind == MjcfKind::kSlide ? JointType::kPrismatic
                            : joint.kind == MjcfKind::kBall  ? JointType::kSpherical
                                                             : JointType::kFree;
-    return {type, {{}, joint.position}};
+    return {type, Placement(joint.position)};
   }
   Sorted sorted;
   std::vector<std::string> words;

@@ -30,7 +30,7 @@ std::optional<Ends> EndsAtSites(const MjcfModel& model, const MjcfElement& equal
   if (!site1) return std::nullopt;
   if (!site2) equality.own().Fail("no \"site2\"", "a site of the other body");
   const BodyPoint &a = model.SiteNamed(*site1), &b = model.SiteNamed(*site2);
-  return Ends{a.body, b.body, {{}, a.at}, {{}, b.at}};
+  return Ends{a.body, b.body, Placement(a.at), Placement(b.at)};
 }
 
 Ends EndsOnBodies(const MjcfModel& model, const MjcfElement& equality) {
@@ -151,7 +151,7 @@ void AddRod(const std::string& name, const std::pair<BodyPoint, BodyPoint>& ends
   const auto& [a, b] = ends;
   ImportDraft* draft = model->draft;
   JointDescription& rod = draft->AddJoint(draft->UnusedJointName(name), JointType::kRod, a.body,
-                                          {{}, a.at}, b.body, {{}, b.at});
+                                          Placement(a.at), b.body, Placement(b.at));
   rod.parameter = length;
 }
 

@@ -19,7 +19,7 @@ struct ChainMotion {
 };
 
 Placement MotionOf(const MjcfJoint& joint, const double* q) {
-  if (joint.kind == MjcfKind::kSlide) return {{}, (q[0] - joint.reference) * joint.axis};
+  if (joint.kind == MjcfKind::kSlide) return Placement((q[0] - joint.reference) * joint.axis);
   Placement X;
   X.q = joint.kind == MjcfKind::kBall
             ? Quaterniond(q[0], q[1], q[2], q[3]).normalized()
@@ -90,10 +90,9 @@ void SetComposed(const MjcfModel& model, const MjcfChain& chain, JointType type,
   }
 }
 
-}  // namespace
-
+/// Coordinates of our joints, and speeds if there are any, from those of MuJoCo.
 void SetMjcfStart(MjcfModel* model, const std::vector<double>& qpos,
-                  const std::vector<double>& qvel) {
+                  const std::vector<double>& qvel, bool has_speeds) {
   InitialDescription& initial = model->draft->description.initial;
   initial.coordinates.clear();
   const double *q = qpos.data(), *u = qvel.data();
@@ -115,15 +114,13 @@ void SetMjcfStart(MjcfModel* model, const std::vector<double>& qpos,
       SetComposed(*model, chain, type, q, u, &coordinates, &speeds);
     }
     initial.coordinates.push_back({chain.joint, coordinates});
-    initial.speeds.push_back({chain.joint, speeds});
+    if (has_speeds) initial.speeds.push_back({chain.joint, speeds});
     for (const std::size_t part : chain.parts) {
       q += model->joints[part].num_q();
       u += model->joints[part].num_u();
     }
   }
 }
-
-namespace {
 
 /// A motor on a joint with one coordinate, under a control that stays: a constant effort.
 void AddMotors(const XmlElement& root, const std::vector<double>& controls, MjcfModel* model) {
@@ -175,7 +172,7 @@ void ReadMjcfKeys(const XmlElement& root, MjcfModel* model) {
     if (speeds && !positions) keys[0].Fail("qvel without qpos", "both");
     if (speeds) qvel = speeds->Numbers(qvel.size(), qvel.size());
     if (positions) {
-      SetMjcfStart(model, positions->Numbers(qpos.size(), qpos.size()), qvel);
+      SetMjcfStart(model, positions->Numbers(qpos.size(), qpos.size()), qvel, speeds.has_value());
     }
     if (const auto ctrl = keys[0].Attribute("ctrl")) controls = ctrl->Numbers(0, 100000);
     keys[0].Attribute("name");

@@ -15,6 +15,10 @@ namespace loopbench::harness {
 inline constexpr double kDegree = std::numbers::pi / 180.0;  ///< [rad]
 
 struct Placement {
+  Placement() = default;
+  explicit Placement(const Eigen::Vector3d& origin) : p(origin) {}
+  Placement(const Eigen::Quaterniond& turn, const Eigen::Vector3d& origin) : q(turn), p(origin) {}
+
   Eigen::Quaterniond q = Eigen::Quaterniond::Identity();
   Eigen::Vector3d p = Eigen::Vector3d::Zero();
 

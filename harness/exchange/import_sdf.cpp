@@ -9,6 +9,7 @@ namespace loopbench::harness {
 namespace {
 
 constexpr int kFirstVersion = 4, kLastVersion = 12;
+constexpr double kSdfGravity = 9.8;  // [m/s^2]
 
 const std::vector<DroppedReason>& ReasonsOfSdf() {
   static const std::vector<DroppedReason> reasons = {
@@ -185,12 +186,10 @@ void ReadSdf(const XmlElement& root, ImportDraft* draft) {
   }
   const std::vector<XmlElement> models = top.Children("model");
   if (models.empty()) top.Fail("no <model>", "at least one");
-  draft->description.gravity = {0.0, 0.0, -9.8};
-  const auto gravity = world ? world->Child("gravity") : std::nullopt;
-  if (gravity) {
+  if (const auto gravity = world ? world->Child("gravity") : std::nullopt) {
     draft->description.gravity = gravity->Content().Vector();
   } else {
-    draft->Note(top, "gravity: not said, taken as 9.8 m/s^2 along -z, the default of SDF");
+    draft->AssumeGravity(top, kSdfGravity);
   }
   SdfScope scope(top, "", false);
   ReadNames(&scope, version);

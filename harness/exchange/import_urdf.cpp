@@ -232,12 +232,7 @@ void ReadUrdf(const XmlElement& root, const ImportOptions& options, ImportDraft*
   }
   for (const UrdfJoint& joint : tree.joints()) AddJoint(joint, draft);
   HoldRoots(roots, options, draft);
-  draft->description.gravity = {0.0, 0.0, -kGravity};
-  if (!options.gravity) {
-    draft->Note(root, fmt::format("gravity: URDF says none, taken as {} m/s^2 along -z (--gravity "
-                                  "x,y,z says another)",
-                                  kGravity));
-  }
+  draft->AssumeGravity(root, kGravity);
   if (!options.floats && roots[0] != kGround) {
     draft->Note(of_body[static_cast<std::size_t>(roots[0])],
                 "the root link is taken as fixed to the ground (--floating leaves it free)");

@@ -3,8 +3,9 @@
 //
 // What nobody reads is told at the end (XmlFile::Unread), so that nothing is left out without a
 // word. All errors are ConfigError, "FILE:LINE: <element name="...">: found ..., expected ...".
-// Hostile files are refused: larger than kMaxConfigBytes, deeper than the parser's 500 elements,
-// with a document type (which is where entities are declared, and none is ever expanded), no UTF-8.
+// Hostile files are refused: larger than kMaxConfigBytes, deeper than the parser's limit of
+// elements, with a document type (which is where entities are declared, and none is ever expanded),
+// no UTF-8.
 #pragma once
 
 #include <Eigen/Core>

@@ -3,11 +3,14 @@
 
 #include <gtest/gtest.h>
 
+#include <Eigen/Geometry>
 #include <algorithm>
 #include <string>
+#include <vector>
 
 #include "harness/exchange/import.h"
 #include "harness/text/config_error.h"
+#include "mechanism/description/joint_frames.h"
 
 namespace loopbench::harness {
 

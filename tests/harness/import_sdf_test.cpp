@@ -1,0 +1,242 @@
+// What becomes of each element of SDF, by version.
+#include <gtest/gtest.h>
+
+#include <numbers>
+
+#include "tests/harness/import_texts.h"
+
+namespace loopbench::harness {
+namespace import_sdf_test {
+
+constexpr double kPi = std::numbers::pi;
+
+const std::string kInertial =
+    "<inertial><mass>2</mass><inertia><ixx>1</ixx><iyy>1</iyy><izz>1</izz></inertia></inertial>";
+
+std::string Sdf(const std::string& inside, const std::string& version = "1.9") {
+  return "<sdf version=\"" + version + "\">\n<model name=\"m\">\n" + inside + "</model></sdf>";
+}
+
+std::string Link(const std::string& name, const std::string& pose = "0 0 0 0 0 0") {
+  return "<link name=\"" + name + "\"><pose>" + pose + "</pose>" + kInertial + "</link>\n";
+}
+
+std::string Joint(const std::string& name, const std::string& type, const std::string& parent,
+                  const std::string& child, const std::string& inside = "<axis/>") {
+  return "<joint name=\"" + name + "\" type=\"" + type + "\"><parent>" + parent +
+         "</parent><child>" + child + "</child>" + inside + "</joint>\n";
+}
+
+Imported Read(const std::string& inside, const std::string& version = "1.9") {
+  return ImportText(Sdf(inside, version), "file.sdf");
+}
+
+const JointDescription& JointNamed(const Imported& imported, const std::string& name) {
+  const auto& joints = imported.description.joints;
+  return *std::ranges::find(joints, name, &JointDescription::name);
+}
+
+/// The axis of a joint in axes of its child.
+Eigen::Vector3d AxisOnChild(const JointDescription& joint) {
+  return PoseOf(joint.to).R * AxisAlignment(joint) *
+         (joint.type == JointType::kPrismatic ? Eigen::Vector3d::UnitX()
+                                              : Eigen::Vector3d::UnitZ());
+}
+
+TEST(ImportSdf, JointsAreTheKindsOfOurs) {
+  const std::string axis2 = "<axis><xyz>1 0 0</xyz></axis><axis2><xyz>0 1 0</xyz></axis2>";
+  const std::vector<std::array<std::string, 3>> kinds = {
+      {"revolute", "revolute", "<axis/>"},
+      {"continuous", "revolute", "<axis/>"},
+      {"prismatic", "prismatic", "<axis/>"},
+      {"ball", "spherical", ""},
+      {"fixed", "weld", ""},
+      {"universal", "universal", axis2},
+      {"revolute2", "universal", axis2},
+      {"screw", "helical", "<axis/><screw_thread_pitch>1</screw_thread_pitch>"}};
+  for (const auto& [theirs, ours, inside] : kinds) {
+    const Imported imported = Read(Link("a") + Joint("j", theirs, "world", "a", inside));
+    EXPECT_EQ(ToString(JointNamed(imported, "j").type), ours);
+  }
+  ExpectNote(Read(Link("a") + Joint("j", "gearbox", "world", "a")), "<joint name=\"j\">",
+             "a freedom more");
+  ExpectRefusal(
+      Sdf(Link("a") + Joint("j", "universal", "world", "a",
+                            "<axis><xyz>1 0 0</xyz></axis><axis2><xyz>1 1 0</xyz></axis2>")),
+      {"file.xml:4: <joint name=\"j\">: found axes 45 degrees apart", "perpendicular"});
+}
+
+TEST(ImportSdf, PosesAreRelativeToWhatTheyName) {
+  const Imported imported =
+      Read("<pose>10 0 0 0 0 1.5707963267948966</pose>" + Link("a", "1 0 0 0 0 0") +
+           "<frame name=\"f\" attached_to=\"a\"><pose>0 2 0 0 0 0</pose></frame>"
+           "<link name=\"b\"><pose relative_to=\"f\" degrees=\"true\">0 0 3 0 0 90</pose>" +
+           kInertial + "</link>" + Joint("w", "fixed", "world", "a", "") +
+           Joint("j", "revolute", "f", "b", "<pose>0 0 1 0 0 0</pose><axis/>"));
+  // the model is turned by a quarter and stands at (10, 0, 0): a is 1 along its x, the ground's y
+  const JointDescription& w = JointNamed(imported, "w");
+  EXPECT_LE((w.from.position - Eigen::Vector3d(10, 1, 0)).norm(), 1e-14);
+  EXPECT_NEAR(w.from.rotation.z(), kPi / 2, 1e-15);
+  const JointDescription& j = JointNamed(imported, "j");
+  EXPECT_EQ(imported.description.bodies[static_cast<std::size_t>(j.from.body)].name, "a");
+  EXPECT_LE((j.from.position - Eigen::Vector3d(0, 2, 4)).norm(), 1e-14);
+  EXPECT_EQ(j.to.position, Eigen::Vector3d(0, 0, 1));
+  EXPECT_NEAR(j.from.rotation.z(), kPi / 2, 1e-15);
+}
+
+TEST(ImportSdf, QuaternionsOfPosesHaveTheirScalarLast) {
+  const Imported imported =
+      Read("<link name=\"a\"><pose rotation_format=\"quat_xyzw\">0 0 0 0 0 1 1</pose>" + kInertial +
+           "</link>" + Joint("w", "fixed", "world", "a", ""));
+  EXPECT_NEAR(JointNamed(imported, "w").from.rotation.z(), kPi / 2, 1e-15);
+}
+
+TEST(ImportSdf, AxesAreInTheFrameThatTheVersionSays) {
+  const auto axis = [](const std::string& version, const std::string& inside) {
+    const Imported imported =
+        Read(Link("a", "0 0 0 1.5707963267948966 0 0") +
+                 Joint("j", "revolute", "world", "a", "<axis><xyz" + inside + "</axis>"),
+             version);
+    return AxisOnChild(JointNamed(imported, "j"));
+  };
+  const Eigen::Vector3d z = Eigen::Vector3d::UnitZ(), minus_y(0, -1, 0), y(0, 1, 0);
+  // the child is turned about x by a quarter: the model's z is its y
+  EXPECT_LE((axis("1.4", ">0 0 1</xyz>") - y).norm(), 1e-15);
+  EXPECT_LE((axis("1.5", ">0 0 1</xyz>") - z).norm(), 1e-15);
+  EXPECT_LE(
+      (axis("1.6", ">0 0 1</xyz><use_parent_model_frame>1</use_parent_model_frame>") - y).norm(),
+      1e-15);
+  EXPECT_LE((axis("1.7", " expressed_in=\"__model__\">0 0 1</xyz>") - y).norm(), 1e-15);
+  EXPECT_LE((axis("1.7", " expressed_in=\"a\">0 -1 0</xyz>") - minus_y).norm(), 1e-15);
+}
+
+TEST(ImportSdf, PitchesOfScrewsHaveTheirSignByName) {
+  const auto pitch = [](const std::string& inside) {
+    return JointNamed(Read(Link("a") + Joint("j", "screw", "world", "a", "<axis/>" + inside)), "j")
+        .parameter;
+  };
+  // the two of sdformat's own test: 0.5 m per turn, right-handed, is -12.566 rad/m
+  EXPECT_NEAR(pitch("<screw_thread_pitch>0.5</screw_thread_pitch>"), 0.5 / (2 * kPi), 1e-15);
+  EXPECT_NEAR(pitch("<thread_pitch>-12.566370614359172</thread_pitch>"), 0.5 / (2 * kPi), 1e-15);
+  ExpectRefusal(Sdf(Link("a") + Joint("j", "screw", "world", "a")), {"found no pitch"});
+}
+
+TEST(ImportSdf, BodiesWithTwoParentsCloseLoops) {
+  const Imported imported =
+      Read(Link("a") + Link("b") + Joint("j", "revolute", "world", "a") +
+           Joint("k", "revolute", "a", "b") + Joint("l", "revolute", "world", "b") +
+           Joint("n", "ball", "world", "b",
+                 "<physics><simbody><must_be_loop_joint>true"
+                 "</must_be_loop_joint></simbody></physics>"));
+  EXPECT_EQ(imported.description.joints.size(), 4u);
+  EXPECT_TRUE(JointNamed(imported, "n").cut);
+}
+
+TEST(ImportSdf, SpringsDampersAndTheStartAreThoseOfTheAxis) {
+  const Imported imported =
+      Read(Link("a") + Joint("j", "revolute", "world", "a",
+                             "<axis><initial_position>0.5</initial_position><dynamics><damping>1"
+                             "</damping><spring_stiffness>2</spring_stiffness><spring_reference>3"
+                             "</spring_reference><friction>4</friction></dynamics></axis>"),
+           "1.6");
+  EXPECT_EQ(ForcesOf<JointDamper>(imported)[0].damping, 1.0);
+  EXPECT_EQ(ForcesOf<JointSpring>(imported)[0].stiffness, 2.0);
+  EXPECT_EQ(ForcesOf<JointSpring>(imported)[0].rest, 3.0);
+  EXPECT_EQ(imported.description.initial.coordinates[0].values[0], 0.5);
+  ExpectNote(imported, "<dynamics> friction", "dry friction");
+}
+
+TEST(ImportSdf, FloatingStaticAndWeightlessBodies) {
+  const Imported floating = Read(
+      "<link name=\"a\"><pose>1 2 3 0 0 0</pose><gravity>false</gravity>" + kInertial + "</link>");
+  EXPECT_EQ(JointNamed(floating, "a").type, JointType::kFree);
+  EXPECT_EQ(floating.description.initial.coordinates[0].values,
+            (std::vector<double>{1, 0, 0, 0, 1, 2, 3}));
+  EXPECT_NEAR(ForcesOf<PointForce>(floating)[0].force.z(), 2 * 9.8, 1e-14);
+  const Imported base = ImportText(
+      "<sdf version=\"1.9\"><world name=\"w\"><gravity>0 0 -1</gravity>"
+      "<model name=\"table\"><static>true</static><link name=\"top\"><pose>0 0 1 0 0 "
+      "0</pose></link>"
+      "</model><model name=\"arm\"><pose relative_to=\"table\">0 0 2 0 0 0</pose>" +
+          Link("a") + "</model>" + Joint("j", "revolute", "table::top", "arm::a") +
+          "</world></sdf>",
+      "file.sdf");
+  ASSERT_EQ(base.description.bodies.size(), 2u);
+  EXPECT_EQ(base.description.bodies[1].name, "arm::a");
+  EXPECT_EQ(base.description.gravity.z(), -1.0);
+  EXPECT_EQ(JointNamed(base, "j").from.position, Eigen::Vector3d(0, 0, 2));
+}
+
+TEST(ImportSdf, NestedModelsHaveTheirNames) {
+  const Imported imported =
+      Read(Link("a") + "<model name=\"hand\"><pose>1 0 0 0 0 0</pose>" + Link("palm") +
+           Link("tip") + Joint("bend", "revolute", "palm", "tip") + "</model>" +
+           Joint("j", "revolute", "world", "a") + Joint("k", "fixed", "a", "hand::palm", ""));
+  EXPECT_EQ(imported.description.bodies[2].name, "hand::palm");
+  EXPECT_EQ(JointNamed(imported, "hand::bend").type, JointType::kRevolute);
+  EXPECT_EQ(JointNamed(imported, "k").from.position, Eigen::Vector3d(1, 0, 0));
+}
+
+TEST(ImportSdf, EveryKindOfDroppedElementHasItsNote) {
+  const Imported imported = ImportText(
+      "<sdf version=\"1.6\"><world name=\"w\"><physics/><scene/><state/><plugin/><wind/><strange/>"
+      "<model name=\"m\"><self_collide>0</self_collide><plugin/><link name=\"a\">"
+      "<kinematic>true</kinematic><velocity_decay/><visual name=\"v\"/><collision name=\"c\"/>"
+      "<sensor name=\"s\"/></link>" +
+          Joint("j", "revolute", "world", "a",
+                "<axis><limit><lower>-1</lower><upper>inf</upper></limit><odd/></axis>") +
+          "</model></world></sdf>",
+      "file.sdf");
+  ExpectNote(imported, "<physics>", "their own integrator");
+  ExpectNote(imported, "<state>", "the start is");
+  ExpectNote(imported, "<plugin>", "no plugins");
+  ExpectNote(imported, "<wind>", "no medium");
+  ExpectNote(imported, "<strange>", "not known");
+  ExpectNote(imported, "<kinematic>", "as forces make them");
+  ExpectNote(imported, "<velocity_decay>", "no medium");
+  ExpectNote(imported, "<visual name=\"v\">", "shapes");
+  ExpectNote(imported, "<collision name=\"c\">", "no contact");
+  ExpectNote(imported, "<sensor name=\"s\">", "no sensors");
+  ExpectNote(imported, "<limit>", "without ends");
+  ExpectNote(imported, "<odd>", "not known");
+  ExpectNote(imported, "<link name=\"a\">", "defaults of SDF");
+  ExpectNote(imported, "<world name=\"w\">", "9.8");
+  // limits that are none are no news
+  EXPECT_FALSE(HasNote(Read(Link("a") + Joint("j", "revolute", "world", "a",
+                                              "<axis><limit><lower>-1e16</lower><upper>inf</upper>"
+                                              "</limit></axis>")),
+                       "<limit>", ""));
+}
+
+TEST(ImportSdf, WhatCannotBeSaidIsRefusedWithItsLine) {
+  const std::string a = Link("a"), j = Joint("j", "revolute", "world", "a");
+  ExpectRefusal("<sdf><model name=\"m\"/></sdf>", {"found no \"version\""});
+  for (const char* version : {"1.3", "1.13", "2.0", "1.x", "1.", "one"}) {
+    ExpectRefusal(Sdf(a, version), {"<sdf> version: found", "1.4 to 1.12"});
+  }
+  ExpectRefusal(Sdf(a + a), {"file.xml:4: <link name=\"a\">", "line 3 has it"});
+  ExpectRefusal(Sdf(a + Joint("a", "ball", "world", "a")), {"a second \"a\""});
+  ExpectRefusal(Sdf(a + Joint("j", "ball", "world", "b")), {"\"b\", which is not there"});
+  ExpectRefusal(Sdf(a + Joint("j", "ball", "a", "a")), {"one body"});
+  ExpectRefusal(Sdf(a + Joint("j", "revolute", "world", "a", "")), {"found no <axis>"});
+  ExpectRefusal(Sdf("<include><uri>model://x</uri></include>"), {"a model in another file"});
+  ExpectRefusal(Sdf("<frame name=\"f\"><pose relative_to=\"g\"/></frame><frame name=\"g\"><pose "
+                    "relative_to=\"f\"/></frame><link name=\"a\"><pose relative_to=\"f\"/></link>"),
+                {"relative to each other", "no cycle"});
+  ExpectRefusal(
+      Sdf(a + "<frame name=\"f\" attached_to=\"g\"/><frame name=\"g\" attached_to=\"f\"/>" +
+          Joint("j", "ball", "f", "a", "")),
+      {"no cycle"});
+  ExpectRefusal(Sdf("<link name=\"a\"><pose frame=\"x\">0 0 0 0 0 0</pose></link>", "1.6"),
+                {"only from 1.7 on"});
+  ExpectRefusal(Sdf("<link name=\"a\"><pose>0 0 0</pose></link>"),
+                {"<pose>: found \"0 0 0\"", "6 numbers"});
+  ExpectRefusal(Sdf("<link name=\"a\"><inertial><mass>0</mass></inertial></link>"),
+                {"a mass of 0 kg", "> 0"});
+  ExpectRefusal(Sdf("<link name=\"a\"><inertial auto=\"true\"/></link>"),
+                {"not found from shapes"});
+  ExpectRefusal("<sdf version=\"1.9\"/>", {"found no <model>"});
+}
+
+}  // namespace import_sdf_test
+}  // namespace loopbench::harness

@@ -33,8 +33,8 @@ MechanismDescription Shipped(const std::string& name) {
   return ReadMechanism(kConfigs / "mechanisms" / (name + ".json")).description;
 }
 
-Simulation Run(const MechanismDescription& description, const Column& column, double horizon,
-               const Watch& watch = {}) {
+Simulation RunTo(const MechanismDescription& description, const Column& column, double horizon,
+                 const Watch& watch = {}) {
   const Simulation run =
       Simulate(description, column, Options("ode45", kTolerance), horizon, watch);
   EXPECT_EQ(run.result.outcome, Outcome::kFinished) << run.result.message;
@@ -94,7 +94,7 @@ TEST_P(Imports, PendulumOfMjcfFollowsItsClosedForm) {
   const MechanismDescription pendulum = Import("pendulum.xml");
   const double l = 0.5, r = 0.05, w2 = 9.81 * l / (l * l + 0.4 * r * r);
   double worst = 0.0;
-  const Simulation run = Run(pendulum, GetParam(), 5.0, [&](const Snapshot& snapshot) {
+  const Simulation run = RunTo(pendulum, GetParam(), 5.0, [&](const Snapshot& snapshot) {
     const double up = PendulumAngle(w2, -kPi / 3, 0.0, snapshot.t) + kPi;
     const Eigen::Vector3d exact(l * std::sin(up), 0.0, 0.6 + l * std::cos(up));
     const Eigen::Vector3d tip = Point(pendulum, snapshot, "pole", {0.0, 0.0, l});
@@ -120,7 +120,7 @@ TEST_P(Imports, AcrobotOfMjcfFollowsSuttonsEquations) {
     return std::array{-(d2 * a2 + phi1) / d1, a2};
   };
   const State exact = Integrate({0.8L, -0.4L, 0.5L, 1.0L}, sutton, 3.0);
-  const Simulation run = Run(acrobot, GetParam(), 3.0);
+  const Simulation run = RunTo(acrobot, GetParam(), 3.0);
   const double q1 = static_cast<double>(exact[0]), q2 = static_cast<double>(exact[0] + exact[1]);
   const Eigen::Vector3d tip(std::sin(q1) + std::sin(q2), 0.0, 2.0 - std::cos(q1) - std::cos(q2));
   const double error = (Point(acrobot, run.last, "lower", {0.0, 0.0, -1.0}) - tip).norm();
@@ -139,7 +139,7 @@ TEST_P(Imports, CartPoleOfMjcfFollowsTheEquationsOf1983) {
     return std::array{(F + m * l * (s[3] * s[3] * sine - turn * cosine)) / M, turn};
   };
   const State exact = Integrate({0, 0.2L, 0, 0}, barto, 1.0);
-  const Simulation run = Run(cart, GetParam(), 1.0);
+  const Simulation run = RunTo(cart, GetParam(), 1.0);
   const double x = static_cast<double>(exact[0]), q = static_cast<double>(exact[1]);
   const Eigen::Vector3d top(x + std::sin(q), 0.0, std::cos(q));
   const double error = (Point(cart, run.last, "pole", {0.0, 0.0, 1.0}) - top).norm();
@@ -150,20 +150,21 @@ TEST_P(Imports, CartPoleOfMjcfFollowsTheEquationsOf1983) {
 /// What the published angles are for: crank and its speed, in the plane and in space.
 TEST_P(Imports, AndrewsSqueezerOfMjcfIsThatOfA03) {
   const MechanismDescription shipped = Shipped("andrews-squeezer");
-  const Simulation ours = Run(shipped, GetParam(), 0.03);
+  const Simulation ours = RunTo(shipped, GetParam(), 0.03);
   for (const bool planar : {false, true}) {
+    // nine redundant constraints: dense ones of absolute coordinates take fifteen seconds
+    if (!planar && GetParam().coordinates == Coordinates::kAbsolute) continue;
     const MechanismDescription squeezer = Import("andrews-squeezer.xml", "", planar);
     EXPECT_EQ(squeezer.space, planar ? SpaceKind::kPlanar : SpaceKind::kSpatial);
-    const Simulation run = Run(squeezer, GetParam(), 0.03);
+    const Simulation run = RunTo(squeezer, GetParam(), 0.03);
     const BodyState& crank = run.last.bodies[BodyNamed(squeezer, "K1")];
     const double beta = std::atan2(crank.R(1, 0), crank.R(0, 0));
     const double angle = std::abs(std::remainder(beta - kA03Verified.q[0], 2 * kPi));
     const double speed = std::abs(crank.w.z() / kA03Verified.v[0] - 1.0);
-    // an error of the angle is one of the time at 1000 rad/s, and grows as the crank turns 16 rad
-    EXPECT_LE(angle, 100 * Bound(run));
-    EXPECT_LE(speed, 100 * Bound(run));
+    EXPECT_LE(angle, Bound(run));
+    EXPECT_LE(speed, Bound(run));
     const double apart = Difference(squeezer, run.last, shipped, ours.last) / kA03Verified.v[0];
-    EXPECT_LE(apart, 100 * Bound(run));
+    EXPECT_LE(apart, Bound(run));
     std::cout << "crank " << angle << " rad, speed " << speed << ", to the shipped one " << apart
               << ", " << run.result.steps << " steps\n";
   }
@@ -189,11 +190,11 @@ TEST_P(Imports, OneFourBarOfUrdfIsThatOfA02) {
   const A02Angle& exact = kA02DerivedAtHalfSecond[0];
   for (const bool planar : {false, true}) {
     const MechanismDescription bars = Import("one-four-bar.urdf", "one-four-bar-loop.json", planar);
-    const Simulation run = Run(bars, GetParam(), 0.5);
-    // in the plane the axes of the bodies are others; the middle of the coupler is 1/2 beside the
-    // tip
+    const Simulation run = RunTo(bars, GetParam(), 0.5);
+    // the plane has axes of its own: up is against gravity. The middle of the coupler is as high as
+    // the tips of the cranks, and as fast
     const BodyState& coupler = run.last.bodies[BodyNamed(bars, "coupler")];
-    const double up = planar ? std::max(coupler.p.x(), coupler.p.y()) : coupler.p.z();
+    const double up = -coupler.p.dot(bars.gravity.normalized());
     const double error = std::abs(up - std::cos(exact.phi));
     EXPECT_LE(error, Bound(run));
     EXPECT_NEAR(coupler.v.norm(), run.last.bodies[BodyNamed(bars, "left")].w.norm(), Bound(run));
@@ -204,8 +205,8 @@ TEST_P(Imports, OneFourBarOfUrdfIsThatOfA02) {
 TEST_P(Imports, BennettOfUrdfMovesAsTheShippedOne) {
   const MechanismDescription shipped = Shipped("bennett");
   const MechanismDescription linkage = Import("bennett.urdf", "bennett-loop.json", false);
-  const Simulation ours = Run(shipped, GetParam(), 2.0);
-  const Simulation run = Run(linkage, GetParam(), 2.0);
+  const Simulation ours = RunTo(shipped, GetParam(), 2.0);
+  const Simulation run = RunTo(linkage, GetParam(), 2.0);
   const double apart = Difference(linkage, run.last, shipped, ours.last);
   EXPECT_LE(apart, Bound(run) + Bound(ours));
   std::cout << "apart " << apart << ", " << run.result.steps << " steps\n";
@@ -216,7 +217,7 @@ TEST_P(Imports, SliderCrankOfUrdfIsThatOfSundials) {
     const MechanismDescription crank =
         Import("slider-crank.urdf", "slider-crank-loop.json", planar);
     const SliderCrankState& exact = kSliderCrankVerified.back();
-    const Simulation run = Run(crank, GetParam(), exact.t);
+    const Simulation run = RunTo(crank, GetParam(), exact.t);
     const Eigen::Vector3d middle = Point(crank, run.last, "rod", {1.0, 0.0, 0.0});
     const double error = (middle - Eigen::Vector3d(exact.x, 0.0, 0.0)).norm();
     const double speed = run.last.bodies[BodyNamed(crank, "crank")].w.z();
@@ -231,7 +232,7 @@ TEST_P(Imports, NFourBarOfSdfIsThatOfA02) {
   const MechanismDescription bars = Import("n-four-bar.sdf", "n-four-bar-start.json");
   const double w2 = 3.5 * 9.81 / 3.0;
   double worst = 0.0;
-  Run(bars, GetParam(), 0.70, [&](const Snapshot& snapshot) {
+  RunTo(bars, GetParam(), 0.70, [&](const Snapshot& snapshot) {
     const double theta = PendulumAngle(w2, kPi, -1.0, snapshot.t);
     const Eigen::Vector3d exact(std::cos(theta - kPi / 2), std::sin(theta - kPi / 2), 0.0);
     worst = std::max(worst, (Point(bars, snapshot, "crank0", {0.0, 1.0, 0.0}) - exact).norm());
@@ -258,7 +259,7 @@ TEST_P(Imports, FurutaPendulumOfSdfFollowsItsEquations) {
     return std::array{(d * r1 - b * r2) / det, (a * r2 - b * r1) / det};
   };
   const State exact = Integrate({0, static_cast<long double>(kPi / 2), 2, 0}, cazzolato, 3.0);
-  const Simulation run = Run(furuta, GetParam(), 3.0);
+  const Simulation run = RunTo(furuta, GetParam(), 3.0);
   const double q1 = static_cast<double>(exact[0]), q2 = static_cast<double>(exact[1]);
   const Eigen::Vector3d x(std::cos(q1), std::sin(q1), 0.0), y(-std::sin(q1), std::cos(q1), 0.0);
   const Eigen::Vector3d com =

@@ -59,9 +59,17 @@ std::string ImportDraft::NewJointName(const XmlElement& element, const std::stri
   return name;
 }
 
-std::string ImportDraft::UnusedJointName(std::string stem) {
-  while (!joints_.insert(stem).second) stem += "_";
-  return stem;
+std::string ImportDraft::NameLater(const std::string& stem) {
+  stems_.emplace_back(description.joints.size(), stem);
+  return "";
+}
+
+void ImportDraft::NameJoints() {
+  for (auto& [joint, stem] : stems_) {
+    while (!joints_.insert(stem).second) stem += "_";
+    description.joints[joint].name = stem;
+  }
+  stems_.clear();
 }
 
 JointDescription& ImportDraft::AddJoint(const std::string& name, JointType type, int from,
@@ -111,11 +119,15 @@ void ImportDraft::Note(const XmlElement& element, const std::string& attribute, 
       {element.line(), element.Shown() + " " + attribute, std::move(reason), changes_motion});
 }
 
-void ImportDraft::NoteUnread(const std::vector<DroppedReason>& reasons) {
+void ImportDraft::NoteUnread(std::span<const DroppedReason> reasons) {
   file_.Unread([&](const XmlElement& element, const std::string& attribute) {
     const auto find = [&](const std::string& what) {
       return std::ranges::find(reasons, what, &DroppedReason::what);
     };
+    if (element.tag().starts_with("xacro:")) {
+      element.Fail("an element of xacro", "plain XML, as `xacro FILE` writes it");
+    }
+    if (attribute.starts_with("xmlns")) return;
     auto known = reasons.end();
     if (attribute.empty()) {
       known = find(element.tag());

@@ -6,6 +6,7 @@
 #include <map>
 #include <optional>
 #include <set>
+#include <span>
 #include <string>
 #include <string_view>
 #include <vector>
@@ -40,8 +41,9 @@ class ImportDraft {
 
   /// A name that no joint has.
   std::string NewJointName(const XmlElement& element, const std::string& name);
-  /// The same for a joint that the file does not name: `stem`, if that is not in use.
-  std::string UnusedJointName(std::string stem);
+  /// For the joint that is added next, which the file does not name: it is called `stem`, or nearly
+  /// so where the file has a joint of that name. "" until all joints are read.
+  std::string NameLater(const std::string& stem);
   /// From X_PF on `from` to X_QM on `to`. The joint stays where it is until the next one is added.
   JointDescription& AddJoint(const std::string& name, JointType type, int from,
                              const Placement& X_PF, int to, const Placement& X_QM);
@@ -59,12 +61,13 @@ class ImportDraft {
   void Note(const XmlElement& element, const std::string& attribute, std::string reason,
             bool changes_motion = false);
   /// A note for all that was not read.
-  void NoteUnread(const std::vector<DroppedReason>& reasons);
+  void NoteUnread(std::span<const DroppedReason> reasons);
 
   /// Sidecar, bodies without mass, floating parts, plane; then it is a mechanism.
   Imported Finish(const std::string& format);
 
  private:
+  void NameJoints();
   void MergeMassless();
   void RefuseMassless(int body) const;
   void HoldFloatingParts();
@@ -76,6 +79,7 @@ class ImportDraft {
   std::vector<int> lines_;
   std::map<std::string, int> bodies_;
   std::set<std::string> joints_;
+  std::vector<std::pair<std::size_t, std::string>> stems_;  ///< of joints without names
   std::vector<ImportNote> notes_;
   std::vector<std::pair<int, double>> lifts_;
   std::optional<XmlElement> assumed_gravity_;  ///< who would have had to say it

@@ -126,12 +126,12 @@ void ImportDraft::HoldFloatingParts() {
     if (island.grounded) continue;
     const int root = island.bodies.front();
     const auto index = static_cast<std::size_t>(root);
-    const std::string name = UnusedJointName(description.bodies[index].name);
-    AddJoint(name, JointType::kFree, kGround, {}, root, {});
+    AddJoint(NameLater(description.bodies[index].name), JointType::kFree, kGround, {}, root, {});
     const Placement& X = at_rest[index];
     description.initial.coordinates.push_back(
         {last_joint(), {X.q.w(), X.q.x(), X.q.y(), X.q.z(), X.p.x(), X.p.y(), X.p.z()}});
   }
+  NameJoints();
 }
 
 void ImportDraft::GoToPlane() {
@@ -175,6 +175,7 @@ void ImportDraft::GoToPlane() {
 Imported ImportDraft::Finish(const std::string& format) {
   Imported imported;
   imported.format = format;
+  NameJoints();
   bool gravity_is_said = options_.gravity.has_value() || !assumed_gravity_;
   if (!options_.sidecar.empty()) {
     std::vector<Frame> rest;

@@ -75,6 +75,7 @@ struct MjcfJoint {
   Eigen::Vector3d position = Eigen::Vector3d::Zero();  ///< in body axes [m]
   Eigen::Vector3d axis = Eigen::Vector3d::UnitZ();     ///< of unit length
   double reference = 0.0;                              ///< its coordinate where the file draws it
+  double spring_reference = 0.0;                       ///< and where its spring is free
   int joint = -1;                                      ///< ours that it became a part of
   bool alone = true;                                   ///< it is all of it
 
@@ -84,7 +85,9 @@ struct MjcfJoint {
 
 /// The joints of a body, from the outermost, and what they are for us.
 struct MjcfChain {
-  std::vector<std::size_t> parts;  ///< in MjcfModel::joints
+  int parent = kGround, child = kGround;
+  Placement X_PB;                  ///< where the file draws the body in its parent
+  std::vector<std::size_t> parts;  ///< in MjcfModel::joints; none of a body that is fixed
   int joint = -1;
   bool from_is_child = false;  ///< ours leads from the child to its parent
   Placement X_BJ;              ///< our frame on the child, in its axes
@@ -98,15 +101,16 @@ class MjcfModel {
   MjcfSettings settings;
   MjcfDefaults defaults;
   std::vector<MjcfJoint> joints;  ///< in the order of qpos
-  std::vector<MjcfChain> chains;  ///< of bodies with joints, in that order
+  std::vector<MjcfChain> chains;  ///< of all bodies, in that order
   std::map<std::string, BodyPoint> sites;
   std::map<std::string, std::size_t> joint_names;
 
   /// The orientation that the element says, in whichever way; the class's if it says none.
   Eigen::Quaterniond OrientationOf(const MjcfElement& element) const;
   Placement PlacementOf(const MjcfElement& element) const;
-  /// A site's place in ground axes where all coordinates are 0.
-  Eigen::Vector3d AtRest(const BodyPoint& point) const;
+  /// Bodies in ground axes where the springs of joints are free: tendons that do not say their
+  /// free length are free there.
+  std::vector<Placement> WhereSpringsAreFree() const;
   const BodyPoint& SiteNamed(const XmlValue& value) const;
   MjcfJoint& JointNamed(const XmlValue& value);
 };

@@ -143,10 +143,6 @@ Placement MjcfModel::PlacementOf(const MjcfElement& element) const {
   return X;
 }
 
-Eigen::Vector3d MjcfModel::AtRest(const BodyPoint& point) const {
-  return draft->at_rest[static_cast<std::size_t>(point.body)].At(point.at);
-}
-
 const BodyPoint& MjcfModel::SiteNamed(const XmlValue& value) const {
   const auto found = sites.find(value.Name());
   if (found == sites.end()) value.Fail("the name of a site");

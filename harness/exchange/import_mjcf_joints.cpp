@@ -40,7 +40,11 @@ void RefuseOrNote(const MjcfModel& model, const MjcfJoint& joint) {
 
 /// Where the axes of hinges meet; nothing when they do not.
 std::optional<Vector3d> MeetingPoint(const std::vector<MjcfJoint>& hinges) {
-  // least squares of the distances to all axes
+  const auto at_first = [&](const MjcfJoint& hinge) {
+    return hinge.position == hinges[0].position;
+  };
+  if (std::ranges::all_of(hinges, at_first)) return hinges[0].position;
+  // the point of the least squares of the distances to all axes
   Eigen::Matrix3d A = Eigen::Matrix3d::Zero();
   Vector3d b = Vector3d::Zero();
   double arms = 1.0;
@@ -50,16 +54,11 @@ std::optional<Vector3d> MeetingPoint(const std::vector<MjcfJoint>& hinges) {
     A += across;
     b += across * hinge.position;
     arms += hinge.position.norm();
-    if (hinge.position == hinges[0].position && &hinge == &hinges.back()) {
-      const bool all = std::ranges::all_of(
-          hinges, [&](const MjcfJoint& other) { return other.position == hinges[0].position; });
-      if (all) return hinges[0].position;
-    }
   }
   const Vector3d point = A.fullPivLu().solve(b);
   for (const MjcfJoint& hinge : hinges) {
     const Vector3d way = point - hinge.position;
-    if ((way - way.dot(hinge.axis) * hinge.axis).norm() > kAligned * arms) return std::nullopt;
+    if (!((way - way.dot(hinge.axis) * hinge.axis).norm() <= kAligned * arms)) return std::nullopt;
   }
   return point;
 }
@@ -168,8 +167,6 @@ void AddJointForces(MjcfModel* model, const MjcfJoint& joint) {
   const MjcfElement& element = joint.element;
   const double k = element.Number("stiffness", 0.0, kNotNegative);
   const double c = element.Number("damping", 0.0, kNotNegative);
-  double rest = element.Number("springref", 0.0);
-  if (joint.kind == MjcfKind::kHinge) rest = model->settings.Angle(rest);
   const bool has_one = joint.num_q() == 1 && joint.alone;
   const auto drop = [&](const char* name) {
     draft->Note(element.own(), name, "dropped: only joints with one coordinate have forces", true);
@@ -177,7 +174,7 @@ void AddJointForces(MjcfModel* model, const MjcfJoint& joint) {
   if (k > 0.0 && model->settings.has_springs) {
     if (has_one) {
       draft->description.forces.emplace_back(
-          JointSpring{joint.joint, k, rest - joint.reference, 0.0});
+          JointSpring{joint.joint, k, joint.spring_reference - joint.reference, 0.0});
     } else {
       drop("stiffness");
     }
@@ -188,6 +185,38 @@ void AddJointForces(MjcfModel* model, const MjcfJoint& joint) {
     } else {
       drop("damping");
     }
+  }
+}
+
+/// The joint of ours, and where it stands on the child.
+void AddComposed(const XmlElement& body, const std::vector<MjcfJoint>& joints,
+                 const Composed& composed, ImportDraft* draft, MjcfChain* chain) {
+  std::vector<std::string> names;
+  for (const MjcfJoint& joint : joints) {
+    if (!joint.name.empty()) names.push_back(joint.name);
+  }
+  const auto child = static_cast<std::size_t>(chain->child);
+  const std::string name =
+      names.empty() ? draft->NameLater(draft->description.bodies[child].name)
+                    : draft->NewJointName(body, fmt::format("{}", fmt::join(names, "+")));
+  const bool is_free = joints[0].kind == MjcfKind::kFree;
+  if (is_free && chain->parent != kGround) {
+    joints[0].element.own().Fail("a free joint of a body within another",
+                                 "a free joint in a body of <worldbody>");
+  }
+  chain->X_BJ = composed.X_BJ;
+  chain->from_is_child = composed.from_is_child;
+  const Placement X_PF = is_free ? Placement() : chain->X_PB * chain->X_BJ;
+  if (chain->from_is_child) {
+    draft->AddJoint(name, composed.type, chain->child, chain->X_BJ, chain->parent, X_PF);
+  } else {
+    draft->AddJoint(name, composed.type, chain->parent, X_PF, chain->child, chain->X_BJ);
+  }
+  chain->joint = draft->last_joint();
+  if (composed.type == JointType::kFree) {
+    const Placement X = is_free ? chain->X_PB : Placement();
+    draft->description.initial.coordinates.push_back(
+        {chain->joint, {X.q.w(), X.q.x(), X.q.y(), X.q.z(), X.p.x(), X.p.y(), X.p.z()}});
   }
 }
 
@@ -215,7 +244,11 @@ MjcfJoint ReadMjcfJoint(const MjcfModel& model, const XmlElement& element,
     if (std::abs(joint.axis.squaredNorm() - 1.0) > 0.0) joint.axis.normalize();
   }
   joint.reference = joint.element.Number("ref", 0.0);
-  if (joint.kind == MjcfKind::kHinge) joint.reference = model.settings.Angle(joint.reference);
+  joint.spring_reference = joint.element.Number("springref", 0.0);
+  if (joint.kind == MjcfKind::kHinge) {
+    joint.reference = model.settings.Angle(joint.reference);
+    joint.spring_reference = model.settings.Angle(joint.spring_reference);
+  }
   RefuseOrNote(model, joint);
   return joint;
 }
@@ -223,49 +256,25 @@ MjcfJoint ReadMjcfJoint(const MjcfModel& model, const XmlElement& element,
 void AddMjcfChain(MjcfModel* model, const XmlElement& body, int parent, int child,
                   const Placement& X_PB, const std::vector<MjcfJoint>& joints) {
   ImportDraft* draft = model->draft;
-  const std::string& body_name = draft->description.bodies[static_cast<std::size_t>(child)].name;
+  MjcfChain chain;
+  chain.parent = parent;
+  chain.child = child;
+  chain.X_PB = X_PB;
   if (joints.empty()) {
-    draft->AddJoint(draft->UnusedJointName(body_name + " fixed"), JointType::kWeld, parent, X_PB,
-                    child, {});
+    const std::string& name = draft->description.bodies[static_cast<std::size_t>(child)].name;
+    draft->AddJoint(draft->NameLater(name + " fixed"), JointType::kWeld, parent, X_PB, child, {});
+    model->chains.push_back(std::move(chain));
     return;
   }
-  MjcfChain chain;
   const Composed composed = Compose(body, joints);
-  chain.X_BJ = composed.X_BJ;
-  chain.from_is_child = composed.from_is_child;
-  std::vector<std::string> names;
-  for (const MjcfJoint& joint : joints) {
-    if (!joint.name.empty()) names.push_back(joint.name);
-  }
-  const std::string name =
-      names.empty() ? draft->UnusedJointName(body_name)
-                    : draft->NewJointName(body, fmt::format("{}", fmt::join(names, "+")));
-  const bool is_free = joints[0].kind == MjcfKind::kFree;
-  if (is_free && parent != kGround) {
-    joints[0].element.own().Fail("a free joint of a body within another",
-                                 "a free joint in a body of <worldbody>");
-  }
-  const Placement X_PF = is_free ? Placement{} : X_PB * chain.X_BJ;
-  if (chain.from_is_child) {
-    draft->AddJoint(name, composed.type, child, chain.X_BJ, parent, X_PF);
-  } else {
-    draft->AddJoint(name, composed.type, parent, X_PF, child, chain.X_BJ);
-  }
-  chain.joint = draft->last_joint();
-  if (joints.size() == 1 && joints[0].num_q() == 1) {
-    JointDescription& ours = draft->description.joints.back();
-    const bool own = joints[0].axis ==
-                     (joints[0].kind == MjcfKind::kHinge ? Vector3d::UnitZ() : Vector3d::UnitX());
-    if (!own) ours.axis = joints[0].axis;
-  }
+  AddComposed(body, joints, composed, draft, &chain);
   if (joints.size() > 1) {
-    draft->Note(body, fmt::format("{} joints are one here: \"{}\", {}", joints.size(), name,
-                                  ToString(composed.type)));
-  }
-  if (composed.type == JointType::kFree) {
-    const Placement X = is_free ? X_PB : Placement{};
-    draft->description.initial.coordinates.push_back(
-        {chain.joint, {X.q.w(), X.q.x(), X.q.y(), X.q.z(), X.p.x(), X.p.y(), X.p.z()}});
+    draft->Note(body,
+                fmt::format("{} joints are one here: {}", joints.size(), ToString(composed.type)));
+  } else if (joints[0].num_q() == 1) {
+    const bool turns = joints[0].kind == MjcfKind::kHinge;
+    const Vector3d own = turns ? Vector3d::UnitZ() : Vector3d::UnitX();
+    if (joints[0].axis != own) draft->description.joints.back().axis = joints[0].axis;
   }
   for (MjcfJoint joint : joints) {
     joint.joint = chain.joint;

@@ -55,7 +55,7 @@ void AddConnect(const MjcfElement& equality, MjcfModel* model) {
   const auto name = equality.own().Attribute("name");
   ImportDraft* draft = model->draft;
   draft
-      ->AddJoint(draft->UnusedJointName(name ? name->Name() : "connect"), JointType::kSpherical,
+      ->AddJoint(draft->NameLater(name ? name->Name() : "connect"), JointType::kSpherical,
                  ends->first, ends->X_first, ends->second, ends->X_second)
       .cut = true;
 }
@@ -78,7 +78,7 @@ void AddWeld(const MjcfElement& equality, MjcfModel* model) {
   const auto name = equality.own().Attribute("name");
   ImportDraft* draft = model->draft;
   draft
-      ->AddJoint(draft->UnusedJointName(name ? name->Name() : "weld"), JointType::kWeld, ends.first,
+      ->AddJoint(draft->NameLater(name ? name->Name() : "weld"), JointType::kWeld, ends.first,
                  relative, ends.second, {})
       .cut = true;
 }
@@ -150,18 +150,18 @@ void AddRod(const std::string& name, const std::pair<BodyPoint, BodyPoint>& ends
             MjcfModel* model) {
   const auto& [a, b] = ends;
   ImportDraft* draft = model->draft;
-  JointDescription& rod = draft->AddJoint(draft->UnusedJointName(name), JointType::kRod, a.body,
+  JointDescription& rod = draft->AddJoint(draft->NameLater(name), JointType::kRod, a.body,
                                           Placement(a.at), b.body, Placement(b.at));
   rod.parameter = length;
 }
 
 void AddSpring(const MjcfElement& tendon, const std::pair<BodyPoint, BodyPoint>& ends,
-               double length, MjcfModel* model) {
+               double free_length, MjcfModel* model) {
   SpringDamper spring;
   std::tie(spring.from, spring.to) = ends;
   spring.stiffness = tendon.Number("stiffness", 0.0, kNotNegative);
   spring.damping = tendon.Number("damping", 0.0, kNotNegative);
-  spring.length = length;
+  spring.length = free_length;
   if (const auto given = tendon.Attribute("springlength")) {
     const std::vector<double> rest = given->Numbers(1, 2);
     if (rest.size() == 2 && rest[0] != rest[1]) {
@@ -176,8 +176,15 @@ void AddSpring(const MjcfElement& tendon, const std::pair<BodyPoint, BodyPoint>&
   }
 }
 
+double LengthOf(const std::pair<BodyPoint, BodyPoint>& ends, const std::vector<Placement>& poses) {
+  const auto place = [&](const BodyPoint& point) {
+    return poses[static_cast<std::size_t>(point.body)].At(point.at);
+  };
+  return (place(ends.first) - place(ends.second)).norm();
+}
+
 void ReadTendon(const XmlElement& element, const std::map<std::string, XmlElement>& held,
-                MjcfModel* model) {
+                const std::vector<Placement>& free_poses, MjcfModel* model) {
   const MjcfElement tendon = model->defaults.Of(element, "");
   const auto name = element.Attribute("name");
   const auto ends = element.tag() == "spatial" ? StraightEnds(element, *model) : std::nullopt;
@@ -189,8 +196,7 @@ void ReadTendon(const XmlElement& element, const std::map<std::string, XmlElemen
                        true);
     return;
   }
-  const double drawn = (model->AtRest(ends->first) - model->AtRest(ends->second)).norm();
-  AddSpring(tendon, *ends, drawn, model);
+  AddSpring(tendon, *ends, LengthOf(*ends, free_poses), model);
   const auto limited = tendon.Attribute("limited");
   const auto range = tendon.Attribute("range");
   const std::size_t choice = limited ? limited->Choice({"false", "true", "auto"}) : 2;
@@ -205,6 +211,7 @@ void ReadTendon(const XmlElement& element, const std::map<std::string, XmlElemen
   const MjcfElement equality = model->defaults.Of(held.at(name->text()), "");
   const auto coefficients = equality.Attribute("polycoef");
   const double offset = coefficients ? coefficients->Numbers(1, 5)[0] : 0.0;
+  const double drawn = LengthOf(*ends, model->draft->at_rest);
   if (!(drawn + offset > 0.0)) element.Fail("a length that is not > 0", "one that is");
   AddRod(name->Name(), *ends, drawn + offset, model);
   model->draft->Note(equality.own(), "a rod here, exactly of its length");
@@ -214,7 +221,10 @@ void ReadTendon(const XmlElement& element, const std::map<std::string, XmlElemen
 
 void ReadMjcfTendons(const XmlElement& section, const std::map<std::string, XmlElement>& held,
                      MjcfModel* model) {
-  for (const XmlElement& element : section.Children()) ReadTendon(element, held, model);
+  const std::vector<Placement> free_poses = model->WhereSpringsAreFree();
+  for (const XmlElement& element : section.Children()) {
+    ReadTendon(element, held, free_poses, model);
+  }
 }
 
 }  // namespace loopbench::harness

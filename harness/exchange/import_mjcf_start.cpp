@@ -97,6 +97,7 @@ void SetMjcfStart(MjcfModel* model, const std::vector<double>& qpos,
   initial.coordinates.clear();
   const double *q = qpos.data(), *u = qvel.data();
   for (const MjcfChain& chain : model->chains) {
+    if (chain.parts.empty()) continue;
     const MjcfJoint& first = model->joints[chain.parts[0]];
     const JointType type =
         model->draft->description.joints[static_cast<std::size_t>(chain.joint)].type;
@@ -154,6 +155,19 @@ void AddMotors(const XmlElement& root, const std::vector<double>& controls, Mjcf
 }
 
 }  // namespace
+
+std::vector<Placement> MjcfModel::WhereSpringsAreFree() const {
+  std::vector<Placement> poses(draft->at_rest.size());
+  for (const MjcfChain& chain : chains) {
+    Placement X = poses[static_cast<std::size_t>(chain.parent)] * chain.X_PB;
+    for (const std::size_t part : chain.parts) {
+      const MjcfJoint& one = joints[part];
+      if (one.num_q() == 1) X = X * MotionOf(one, &one.spring_reference);
+    }
+    poses[static_cast<std::size_t>(chain.child)] = X;
+  }
+  return poses;
+}
 
 void ReadMjcfKeys(const XmlElement& root, MjcfModel* model) {
   std::vector<XmlElement> keys;

@@ -11,43 +11,40 @@ namespace {
 constexpr int kFirstVersion = 4, kLastVersion = 12;
 constexpr double kSdfGravity = 9.8;  // [m/s^2]
 
-const std::vector<DroppedReason>& ReasonsOfSdf() {
-  static const std::vector<DroppedReason> reasons = {
-      {"visual", "shapes do not move anything"},
-      {"collision", "there is no contact"},
-      {"sensor", "there are no sensors"},
-      {"audio_source", ""},
-      {"audio_sink", ""},
-      {"light", ""},
-      {"projector", ""},
-      {"particle_emitter", ""},
-      {"battery", ""},
-      {"scene", ""},
-      {"gui", ""},
-      {"audio", ""},
-      {"physics", "runs choose their own integrator and steps"},
-      {"atmosphere", "there is no medium"},
-      {"wind", "there is no medium", true},
-      {"magnetic_field", ""},
-      {"spherical_coordinates", ""},
-      {"self_collide", ""},
-      {"allow_auto_disable", ""},
-      {"enable_wind", "there is no medium"},
-      {"must_be_base_link", ""},
-      {"velocity_decay", "there is no medium: a force would have to say it", true},
-      {"kinematic", "bodies move as forces make them", true},
-      {"fluid_added_mass", "there is no medium", true},
-      {"mimic", "no joint follows another: a freedom more than in the file", true},
-      {"plugin", "there are no plugins", true},
-      {"state", "the start is that of the poses", true},
-      {"actor", "actors are no mechanism"},
-      {"road", ""},
-      {"population", "it makes models while it runs", true},
-      {"gripper", "", true},
-      {"link@name", ""},
-      {"sdf@version", ""}};
-  return reasons;
-}
+constexpr DroppedReason kSdfReasons[] = {
+    {"visual", "shapes do not move anything"},
+    {"collision", "there is no contact"},
+    {"sensor", "there are no sensors"},
+    {"audio_source", ""},
+    {"audio_sink", ""},
+    {"light", ""},
+    {"projector", ""},
+    {"particle_emitter", ""},
+    {"battery", ""},
+    {"scene", ""},
+    {"gui", ""},
+    {"audio", ""},
+    {"physics", "runs choose their own integrator and steps"},
+    {"atmosphere", "there is no medium"},
+    {"wind", "there is no medium", true},
+    {"magnetic_field", ""},
+    {"spherical_coordinates", ""},
+    {"self_collide", ""},
+    {"allow_auto_disable", ""},
+    {"enable_wind", "there is no medium"},
+    {"must_be_base_link", ""},
+    {"velocity_decay", "there is no medium: a force would have to say it", true},
+    {"kinematic", "bodies move as forces make them", true},
+    {"fluid_added_mass", "there is no medium", true},
+    {"mimic", "no joint follows another: a freedom more than in the file", true},
+    {"plugin", "there are no plugins", true},
+    {"state", "the start is that of the poses", true},
+    {"actor", "actors are no mechanism"},
+    {"road", ""},
+    {"population", "it makes models while it runs", true},
+    {"gripper", "", true},
+    {"link@name", ""},
+    {"sdf@version", ""}};
 
 SdfVersion ReadVersion(const XmlElement& root) {
   const XmlValue value = root.Required("version", "1.4 to 1.12");
@@ -114,8 +111,7 @@ void ReadLinks(SdfScope* scope, ImportDraft* draft) {
     ReadSdfLink(child, body, scope->is_static, draft);
     if (!scope->is_static) continue;
     const std::string& body_name = draft->description.bodies[static_cast<std::size_t>(body)].name;
-    draft->AddJoint(draft->UnusedJointName(body_name + " fixed"), JointType::kWeld, kGround, X,
-                    body, {});
+    draft->AddJoint(draft->NameLater(body_name + " fixed"), JointType::kWeld, kGround, X, body, {});
   }
   for (auto& [name, model] : scope->models) {
     model->at_rest = scope->at_rest * scope->Resolve(name, model->element);
@@ -209,7 +205,7 @@ void ReadSdf(const XmlElement& root, ImportDraft* draft) {
   if (world) world->Attribute("name");
   ReadLinks(&scope, draft);
   ReadJoints(scope, version, draft);
-  draft->NoteUnread(ReasonsOfSdf());
+  draft->NoteUnread(kSdfReasons);
 }
 
 }  // namespace loopbench::harness

@@ -9,23 +9,21 @@ namespace {
 
 constexpr double kGravity = 9.81;  // [m/s^2]: URDF does not say any
 
-const std::vector<DroppedReason>& ReasonsOfUrdf() {
-  static const std::vector<DroppedReason> reasons = {
-      {"visual", "shapes do not move anything"},
-      {"collision", "there is no contact"},
-      {"material", ""},
-      {"robot@version", ""},
-      {"link@type", ""},
-      {"limit", "joints turn and slide without ends", true},
-      {"mimic", "no joint follows another: this is a freedom more than in the file", true},
-      {"safety_controller", "there is no controller"},
-      {"calibration", "it says where a sensor's zero is"},
-      {"transmission", "there are no actuators"},
-      {"gazebo", "it is for another program; loops in it belong in a sidecar (--loops)", true},
-      {"sensor", "there are no sensors"},
-      {"dynamics@friction", "dry friction is no force of mechanism files", true}};
-  return reasons;
-}
+constexpr DroppedReason kUrdfReasons[] = {
+    {"visual", "shapes do not move anything"},
+    {"collision", "there is no contact"},
+    {"material", ""},
+    {"robot@version", ""},
+    {"mujoco", "it is for another program"},
+    {"link@type", ""},
+    {"limit", "joints turn and slide without ends", true},
+    {"mimic", "no joint follows another: this is a freedom more than in the file", true},
+    {"safety_controller", "there is no controller"},
+    {"calibration", "it says where a sensor's zero is"},
+    {"transmission", "there are no actuators"},
+    {"gazebo", "it is for another program; loops in it belong in a sidecar (--loops)", true},
+    {"sensor", "there are no sensors"},
+    {"dynamics@friction", "dry friction is no force of mechanism files", true}};
 
 Placement OriginOf(const XmlElement& element) {
   Placement X;
@@ -200,8 +198,7 @@ void HoldRoots(const std::vector<int>& roots, const ImportOptions& options, Impo
   for (const int root : roots) {
     if (root == kGround || options.floats) continue;
     const std::string& link = draft->description.bodies[static_cast<std::size_t>(root)].name;
-    draft->AddJoint(draft->UnusedJointName(link + " to ground"), JointType::kWeld, kGround, {},
-                    root, {});
+    draft->AddJoint(draft->NameLater(link + " to ground"), JointType::kWeld, kGround, {}, root, {});
   }
 }
 
@@ -237,7 +234,7 @@ void ReadUrdf(const XmlElement& root, const ImportOptions& options, ImportDraft*
     draft->Note(of_body[static_cast<std::size_t>(roots[0])],
                 "the root link is taken as fixed to the ground (--floating leaves it free)");
   }
-  draft->NoteUnread(ReasonsOfUrdf());
+  draft->NoteUnread(kUrdfReasons);
 }
 
 }  // namespace loopbench::harness

@@ -189,6 +189,10 @@ TEST(ImportUrdf, WhatIsNoTreeIsRefusedWithItsLine) {
                                                "iyy=\"-1\" izz=\"1\"/></inertial>")),
                 {"principal moments -1"});
   ExpectRefusal("<robot name=\"r\"/>", {"no link without a parent"});
+  ExpectRefusal("<robot name=\"r\" xmlns:xacro=\"http://ros.org/wiki/xacro\">" + Link("world", "") +
+                    Link("b") + Joint("j", "fixed", "world", "b") +
+                    "<xacro:include filename=\"x\"/></robot>",
+                {"an element of xacro"});
   ImportOptions sdf;
   sdf.format = "sdf";
   ExpectRefusal(Robot(a), {"found urdf, expected sdf"}, sdf);

@@ -1,9 +1,9 @@
 #include "odca/odca.h"
 
 #include <algorithm>
-#include <type_traits>
 
 #include "mechanism/algebra/instantiate.h"
+#include "odca/arm_sweep.h"
 #include "odca/path_sweep.h"
 
 namespace loopbench::odca {
@@ -46,9 +46,9 @@ Odca<Space, S>::Odca(const Mechanism<Space, S>& mechanism, const FormulationOpti
       sweep_(mechanism, plan_, options.solver),
       equations_(mechanism),
       change_(VectorX<S>::Zero(mechanism.num_u())) {
-  if constexpr (std::is_same_v<Space, Planar> && std::is_same_v<S, double>) {
+  if constexpr (std::is_same_v<S, double>) {
     if (options.solver == SolverKind::kRankRevealing) {
-      paths_ = pins::PathSweep::Make(mechanism, options.threads);
+      short_cut_ = ShortCut<Space>::Make(mechanism, options.threads);
     }
   }
 }
@@ -59,7 +59,7 @@ Odca<Space, S>::~Odca() = default;
 template <class Space, class S>
 Outcome Odca<Space, S>::Factor(const Kinematics<Space, S>& kinematics) {
   kinematics_ = &kinematics;
-  by_paths_ = false;
+  by_short_cut_ = false;
   const Outcome outcome = sweep_.Assemble(kinematics);
   const Joins<Space, S>& joins = sweep_.joins();
   this->conditioning_ = {.rank = LoopRank(mechanism_, joins.dependent_rows()),
@@ -97,9 +97,9 @@ bool Odca<Space, S>::RightHandSide([[maybe_unused]] SpeedsUsed speeds,
                                    [[maybe_unused]] std::span<const S> u,
                                    [[maybe_unused]] std::span<S> qdot,
                                    [[maybe_unused]] std::span<S> udot) {
-  if constexpr (std::is_same_v<Space, Planar> && std::is_same_v<S, double>) {
-    by_paths_ = paths_ != nullptr && paths_->Evaluate(speeds, q, u, qdot, udot);
-    return by_paths_;
+  if constexpr (std::is_same_v<S, double>) {
+    by_short_cut_ = short_cut_ != nullptr && short_cut_->Evaluate(speeds, q, u, qdot, udot);
+    return by_short_cut_;
   }
   return false;
 }
@@ -109,7 +109,7 @@ std::optional<Correction<S>> Odca<Space, S>::Project([[maybe_unused]] std::span<
                                                      [[maybe_unused]] std::span<S> u,
                                                      [[maybe_unused]] S goal) {
   if constexpr (std::is_same_v<Space, Planar> && std::is_same_v<S, double>) {
-    if (paths_ != nullptr) return paths_->Project(q, u, goal);
+    if (short_cut_ != nullptr) return short_cut_->Project(q, u, goal);
   }
   return std::nullopt;
 }
@@ -128,7 +128,7 @@ template <class Space, class S>
 std::vector<NamedCount> Odca<Space, S>::Counters() const {
   return {{"plan_depth", plan_.depth()},
           {"plan_largest_join", plan_.largest_join()},
-          {"rhs_operations", by_paths_ ? paths_->operations() : sweep_.operations()}};
+          {"rhs_operations", by_short_cut_ ? short_cut_->operations() : sweep_.operations()}};
 }
 
 template <class Space, class S>

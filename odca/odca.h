@@ -2,6 +2,8 @@
 // The mathematics and the paper's equation numbers are in README.md beside this file.
 #pragma once
 
+#include <type_traits>
+
 #include "mechanism/formulation/constraint_solver.h"
 #include "mechanism/loops/body_equations.h"
 #include "odca/sweep.h"
@@ -19,6 +21,12 @@ Plan MakePlan(const Mechanism<Space, S>& mechanism, const PlanOptions& options =
 namespace pins {
 class PathSweep;
 }
+namespace arms {
+class ArmSweep;
+}
+/// What some mechanisms' right-hand sides take instead of the general sweep.
+template <class Space>
+using ShortCut = std::conditional_t<std::is_same_v<Space, Planar>, pins::PathSweep, arms::ArmSweep>;
 
 template <class Space, class S>
 class Odca final : public ConstraintSolver<Space, S> {
@@ -40,7 +48,8 @@ class Odca final : public ConstraintSolver<Space, S> {
   bool CompleteSpeeds(Kinematics<Space, S>& kinematics, VectorX<S>& u) override;
   bool Accelerate(const Kinematics<Space, S>& kinematics, const VectorX<S>& feedback,
                   VectorX<S>& udot, VectorX<S>* lambda) override;
-  /// For paths of pins in double, unless as published (path_sweep.h).
+  /// In double, unless as published: for paths of pins (path_sweep.h) and arms of revolute joints
+  /// in space (arm_sweep.h).
   bool RightHandSide(SpeedsUsed speeds, std::span<const S> q, std::span<const S> u,
                      std::span<S> qdot, std::span<S> udot) override;
   /// Likewise.
@@ -60,8 +69,8 @@ class Odca final : public ConstraintSolver<Space, S> {
   const Mechanism<Space, S>& mechanism_;
   Plan plan_;
   Sweep<Space, S> sweep_;
-  std::unique_ptr<pins::PathSweep> paths_;            ///< null where there are none
-  bool by_paths_ = false;                             ///< the last evaluation was
+  std::unique_ptr<ShortCut<Space>> short_cut_;        ///< null where there is none
+  bool by_short_cut_ = false;                         ///< the last evaluation was
   const Kinematics<Space, S>* kinematics_ = nullptr;  ///< of the last Factor()
   BodyEquations<Space, S> equations_;
   VectorX<S> change_;

@@ -33,7 +33,7 @@ void PathSweep::TurnPacks(Group& group) {
   Lanes speed_before = {}, inverse_before = {}, largest = {};
   for (int i = 0; i < path.packs; ++i) {
     const int pack = group.pack + i, place = group.place + i * kLanes;
-    const Link<Lanes>& link = pack_kinds_[kind_of_pack_[pack]];
+    const Link<Lanes>& link = packs_[pack];
     const Lanes speed = Load<Lanes>(&speed_[place]);
     const Lanes angle = Load<Lanes>(&angle_[place]);
     room = Min(room, kLargestAngle - Magnitude(angle));
@@ -81,8 +81,7 @@ PathSweep::At PathSweep::Body(const PathPlaces& path, int k) const {
     return {singles_[single], turned_singles_[single], speed_[path.first + k]};
   }
   const int pack = path.first_pack + path.pack(k), lane = path.lane(k);
-  return {LaneOf(pack_kinds_[kind_of_pack_[pack]], lane), LaneOf(turned_packs_[pack], lane),
-          speed_[path.place(k)]};
+  return {LaneOf(packs_[pack], lane), LaneOf(turned_packs_[pack], lane), speed_[path.place(k)]};
 }
 void PathSweep::Set(const PathPlaces& path, int k, const TurnedLink<double>& turned) {
   if (k >= path.packed) {
@@ -181,14 +180,14 @@ void PathSweep::UpGroup(Group& group) {
   const int packs = paths_[group.path].packs;
   const auto leaf = [&](int i) {
     const int pack = group.pack + i;
-    return Leaf<kPass>(pack_kinds_[kind_of_pack_[pack]], turned_packs_[pack],
+    return Leaf<kPass>(packs_[pack], turned_packs_[pack],
                        Load<Lanes>(&speed_[group.place + i * kLanes]));
   };
   Lanes slack = {};
   TwoHandle<Lanes> all = leaf(0);
   for (int i = 1; i < packs; ++i) {
     const int pack = group.pack + i;
-    const Lanes limit = pack_kinds_[kind_of_pack_[pack]].limit;
+    const Lanes limit = packs_[pack].limit;
     all = Join(all, leaf(i), limit, cuts_[pack], slack);
   }
   group.assemblies = all;
@@ -211,7 +210,7 @@ double PathSweep::Up(PathPlaces& path) {
   for (int g = path.first_group; g < path.first_group + path.groups; ++g) {
     const Group& group = groups_[g];
     slack = Min(slack, group.slack);
-    const Lanes limits = pack_kinds_[kind_of_pack_[group.pack]].limit;
+    const Lanes limits = packs_[group.pack].limit;
     for (int lane = 0; lane < kLanes; ++lane) join(LaneOf(group.assemblies, lane), limits[lane]);
   }
   for (int k = 0; k < path.singles(); ++k) {
@@ -258,7 +257,7 @@ void PathSweep::DownGroup(const Group& group) {
     const int pack = group.pack + i;
     const Vector2<Lanes> F1 = i == 0 ? group.F1 : ForceIn(cuts_[pack], group.F1, F2);
     const Lanes alpha = AngularAcceleration<kPass>(turned_packs_[pack], F1, F2);
-    Store(alpha / pack_kinds_[kind_of_pack_[pack]].radius, &alpha_[group.place + i * kLanes]);
+    Store(alpha / packs_[pack].radius, &alpha_[group.place + i * kLanes]);
     F2 = -F1;
   }
 }

@@ -25,6 +25,7 @@
 
 #include "mechanism/algebra/worker_pool.h"
 #include "mechanism/formulation/constraint_solver.h"
+#include "odca/pack_kinds.h"
 #include "odca/path_links.h"
 #include "odca/tree_angles.h"
 
@@ -138,8 +139,7 @@ class PathSweep {
   std::vector<PathPlaces> paths_;
   std::vector<Group> groups_;
   std::vector<Piece> pieces_;
-  std::vector<Link<Lanes>> pack_kinds_;  ///< equal packs share one
-  std::vector<int> kind_of_pack_;
+  PackKinds<Link> packs_;
   std::vector<Closure<Lanes>> pack_closures_;
   std::vector<TurnedLink<Lanes>> turned_packs_;
   std::vector<Cut<Lanes>> cuts_;

@@ -1,7 +1,5 @@
 // Where bodies of paths stand in the lists of a PathSweep, and their constants.
 #include <algorithm>
-#include <map>
-#include <string>
 
 #include "mechanism/loops/loop_solver.h"
 #include "odca/odca.h"
@@ -123,7 +121,7 @@ void PathSweep::Add(const Mechanism<Planar, double>& mechanism, PathLinks links,
   path.first = num_places_;
   path.first_group = static_cast<int>(groups_.size());
   path.first_piece = static_cast<int>(pieces_.size());
-  path.first_pack = static_cast<int>(kind_of_pack_.size());
+  path.first_pack = packs_.size();
   path.first_single = static_cast<int>(singles_.size());
   path.first_cut = static_cast<int>(end_cuts_.size());
   path.has_loops = links.has_loops;
@@ -160,7 +158,6 @@ void PathSweep::AddPieces(PathPlaces& path, std::vector<Closure<double>>& closur
 }
 
 void PathSweep::AddPacks(const PathPlaces& path, const PathLinks& links) {
-  std::map<std::string, int> kinds;
   for (int g = 0; g < path.groups; ++g) {
     Group group{};
     group.path = static_cast<int>(paths_.size());
@@ -175,15 +172,12 @@ void PathSweep::AddPacks(const PathPlaces& path, const PathLinks& links) {
         SetLane(pack, lane, links.links[k]);
         SetLane(closure, lane, links.closures[k]);
       }
-      const std::string bytes(reinterpret_cast<const char*>(&pack), sizeof(pack));
-      const auto [kind, is_new] = kinds.try_emplace(bytes, static_cast<int>(pack_kinds_.size()));
-      if (is_new) pack_kinds_.push_back(pack);
-      kind_of_pack_.push_back(kind->second);
+      packs_.Add(pack);
       pack_closures_.push_back(closure);
     }
   }
-  turned_packs_.resize(kind_of_pack_.size());
-  cuts_.resize(kind_of_pack_.size());
+  turned_packs_.resize(packs_.size());
+  cuts_.resize(packs_.size());
 }
 
 }  // namespace loopbench::odca::pins

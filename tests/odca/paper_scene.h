@@ -36,6 +36,9 @@ class Scene {
   const Mechanism<Space, double>& mechanism() const { return mechanism_; }
   const Kinematics<Space, double>& kinematics() const { return kinematics_; }
 
+  double coordinate(int i) const { return state_.q[i]; }
+  double speed(int i) const { return state_.u[i]; }
+
   /// The place of the user's joint `description` in the mechanism.
   int JointIndex(int description) const {
     int j = 0;

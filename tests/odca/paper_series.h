@@ -213,4 +213,16 @@ std::vector<Response> Responses(const Odca<Space, double>& odca) {
   return responses;
 }
 
+/// Bodies 1..n between two joints to Ground; joint i leads to body i + 1, the last one to Ground.
+inline MechanismDescription ChainOf(const std::vector<JointType>& kinds, Builder& b) {
+  const int n = static_cast<int>(kinds.size()) - 1;
+  for (int i = 0; i < n; ++i) {
+    const int body = b.AddBody(1.0);
+    b.AddJoint(kinds[i], body - 1, Tip(b), body, b.random.Vector(0.2, b.spatial),
+               b.random.Uniform(-2.0, 2.0));
+  }
+  b.Close(kinds[n], 0, n, Tip(b), b.random.Uniform(-1.0, 1.0));
+  return b.Finish();
+}
+
 }  // namespace loopbench::odca::paper

@@ -6,23 +6,10 @@
 #include <vector>
 
 #include "mechanism/description/library.h"
-#include "odca/path_links.h"
 #include "tests/odca/paper_series.h"
 
 namespace loopbench::odca::paper {
 namespace {
-
-/// Bodies 1..n between two joints to Ground; joint i leads to body i + 1, the last one to Ground.
-MechanismDescription ChainOf(const std::vector<JointType>& kinds, Builder& b) {
-  const int n = static_cast<int>(kinds.size()) - 1;
-  for (int i = 0; i < n; ++i) {
-    const int body = b.AddBody(1.0);
-    b.AddJoint(kinds[i], body - 1, Tip(b), body, b.random.Vector(0.2, b.spatial),
-               b.random.Uniform(-2.0, 2.0));
-  }
-  b.Close(kinds[n], 0, n, Tip(b), b.random.Uniform(-1.0, 1.0));
-  return b.Finish();
-}
 
 MechanismDescription ChainOfKinds(int n, SpaceKind space, std::uint64_t seed) {
   Builder b("paper-chain", space, seed);
@@ -113,88 +100,6 @@ TEST(PaperTest, ChainsClosedOnGroundInSpace) {
   tally.Print("space, chains");
   EXPECT_LE(3 * tally.left_out, tally.scenes);
   EXPECT_GE(tally.assemblies, tally.scenes);
-}
-
-/// Of the kernels' numbers, which are projected on the D of pins.
-RealMatrix ToReal(const pins::Matrix2<double>& A) {
-  RealMatrix real(2, 2);
-  real << A.xx, A.xy, A.yx, A.yy;
-  return real;
-}
-RealMatrix ToReal(const pins::Symmetric2<double>& A) {
-  return ToReal(pins::Matrix2<double>{A.xx, A.xy, A.xy, A.yy});
-}
-RealMatrix ToReal(const pins::Vector2<double>& a) {
-  RealMatrix real(2, 1);
-  real << a.x, a.y;
-  return real;
-}
-/// The largest difference between a two-handle kernel's numbers and those of printed equations.
-Deviation Difference(const pins::TwoHandle<double>& kernel, const TwoHandles& printed) {
-  Deviation deviation;
-  deviation.Note(ToReal(kernel.zeta11), printed.z11.bottomRightCorner(2, 2));
-  deviation.Note(ToReal(kernel.zeta22), printed.z22.bottomRightCorner(2, 2));
-  deviation.Note(ToReal(kernel.zeta12), printed.z12.bottomRightCorner(2, 2));
-  deviation.Note(ToReal(kernel.zeta13), printed.z13.tail(2));
-  deviation.Note(ToReal(kernel.zeta23), printed.z23.tail(2));
-  return deviation;
-}
-
-/// Free bodies of chains of pins, by the kernels of two_handle.h: leaves (1-4), and joins of one
-/// after another (15-17), (26-30).
-TEST(PaperTest, TwoHandleKernelsAreThePrintedFormulas) {
-  constexpr int n = 7;
-  Tally tally;
-  for (std::uint64_t seed = 1; seed <= 20; ++seed) {
-    Builder b("paper-pins", SpaceKind::kPlanar, seed);
-    MechanismDescription chain = ChainOf(std::vector(n + 1, JointType::kRevolute), b);
-    chain.forces.clear();
-    const Scene<Planar> scene(chain, seed);
-    const auto links = pins::MeasurePath(scene.mechanism(),
-                                         FindPaths(n + 1, PlanJoints(scene.mechanism())).front())
-                           .value();
-    pins::TwoHandle<double> all;
-    TwoHandles printed;
-    double rcond = 1.0;
-    for (int k = 1; k < n; ++k) {
-      const PathBody& at = links.path[k];
-      const pins::Link<double>& link = links.links[k];
-      ASSERT_GT(link.mobility, 0.0) << "not pinned by a joint of the tree";
-      const double angle = scene.kinematics().poses()[at.body].angle + links.axes[k];
-      const double speed = scene.kinematics().motions()[at.body].angular[0];
-      const auto leaf =
-          pins::Leaf<pins::Pass::kAccelerations>(link, pins::Turn(link, angle), speed);
-      const int after = k + 1 < n ? links.path[k + 1].before : at.ground;
-      const TwoHandles body = scene.Body(at.body, at.before, after);
-      tally.Hold("leaf", Difference(leaf, body), kMargin * kEps);
-      if (k == 1) {
-        all = leaf;
-        printed = body;
-        continue;
-      }
-      pins::Cut<double> cut;
-      double slack = 0.0;
-      const auto joined = pins::Join(all, leaf, 0.0, cut, slack);
-      const Cut joint = scene.JointTo(at.body, at.before);
-      const SeriesJoin join(printed, body, joint);
-      rcond = std::min(rcond, Rcond(join.X));
-      const double bound = kMargin * n * kEps / rcond;
-      const pins::Vector2<double> F1 = {0.3, -0.7}, F2 = {1.1, 0.4};
-      RealVector F_k = RealVector::Zero(3), F_k1 = F_k;
-      F_k.tail(2) = ToReal(F1);
-      F_k1.tail(2) = ToReal(F2);
-      Deviation force;
-      force.Note(ToReal(pins::ForceIn(cut, F1, F2)),
-                 MeasureNumbers(printed, body, joint, join, F_k, F_k1));
-      tally.Hold("force", force, bound);
-      all = joined;
-      printed = Assemble(printed, body, join);
-      tally.Hold("Upsilon", Difference(all, printed), bound);
-      ++tally.assemblies;
-    }
-    ++tally.scenes;
-  }
-  tally.Print("plane, kernels for pins");
 }
 
 /// What stands in (7) beside H udot, less Hdot u with H differentiated in ground axes: where the

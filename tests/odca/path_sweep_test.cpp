@@ -12,10 +12,9 @@
 
 #include "lagrange/lagrange.h"
 #include "mechanism/description/library.h"
-#include "odca/odca.h"
 #include "tests/contract/allocations.h"
 #include "tests/contract/builder.h"
-#include "tests/contract/system_with.h"
+#include "tests/odca/short_cut.h"
 
 namespace loopbench::odca::pins {
 namespace {
@@ -24,15 +23,6 @@ constexpr double kEps = std::numeric_limits<double>::epsilon();
 
 using testing::Builder;
 using testing::Random;
-using Numbers = VectorX<double>;
-
-std::span<const double> In(const Numbers& numbers) {
-  return {numbers.data(), static_cast<std::size_t>(numbers.size())};
-}
-std::span<double> In(Numbers& numbers) {
-  return {numbers.data(), static_cast<std::size_t>(numbers.size())};
-}
-
 JointDescription Pin(Random& random, int from, int to) {
   const auto side = [&](int body) {
     return JointSide{body,
@@ -78,49 +68,10 @@ MechanismDescription RandomPath(int n, std::uint64_t seed, bool in_halves = fals
   return b.description;
 }
 
-Numbers RandomNumbers(Random& random, int n, double size) {
-  Numbers numbers(n);
-  for (double& x : numbers) x = random.Uniform(-size, size);
-  return numbers;
-}
-
-/// What both make of a state, loops closed or not, at a level with these speeds.
-struct Both {
-  Outcome outcome = Outcome::kFinished;
-  Diagnostics general;
-  bool evaluated = false;
-  /// Over the largest speed or acceleration of those that were added up: where loops leave no
-  /// freedom, nothing is left of them.
-  double difference = 0.0;
-};
 Both Compare(const Mechanism<Planar, double>& mechanism, SpeedsUsed speeds, const Numbers& q,
              const Numbers& u, int bodies_of_group = PathSweep::kBodiesOfGroup) {
-  const auto level =
-      speeds == SpeedsUsed::kGiven ? Enforcement::kAcceleration : Enforcement::kVelocity;
-  testing::SystemWith<Odca, Planar, double> odca(mechanism, {.enforcement = level});
-  Both both;
-  both.outcome = odca->Start(0.0, q, u);
-  const Eigen::Index n = q.size();
-  Numbers y(2 * n), general(y), own = Numbers::Zero(2 * n);
-  odca->ToState(q, u, In(y));
-  both.outcome = odca->Examine(0.0, In(y), In(general));
-  both.general = odca->diagnostics();
-  const auto sweep = PathSweep::Make(mechanism, 3, bodies_of_group);
-  const std::span<double> rates = In(own);
-  both.evaluated =
-      sweep != nullptr && sweep->Evaluate(speeds, In(q), In(u), rates.first(n), rates.last(n));
-  const auto largest = [](const Numbers& numbers) { return numbers.cwiseAbs().maxCoeff(); };
-  const double speed = std::max(largest(general.head(n)), largest(u));
-  const double acceleration =
-      std::max({largest(general.tail(n)), mechanism.gravity().norm(), speed * speed});
-  both.difference = std::max(largest(own.head(n) - general.head(n)) / speed,
-                             largest(own.tail(n) - general.tail(n)) / acceleration);
-  return both;
-}
-
-/// The contract's bound: sums along n bodies, magnified by the condition of what is inverted.
-double Bound(int n, double rcond) {
-  return 100.0 * std::numeric_limits<double>::epsilon() * n / rcond;
+  return odca::Compare(mechanism, PathSweep::Make(mechanism, 3, bodies_of_group).get(), speeds, q,
+                       u);
 }
 
 /// Both right-hand sides.

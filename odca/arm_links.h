@@ -1,0 +1,57 @@
+// Arms of a spatial mechanism (arm_sweep.h), and their bodies as the links of revolute_handles.h.
+#pragma once
+
+#include <vector>
+
+#include "mechanism/model/mechanism.h"
+#include "odca/revolute_handles.h"
+
+namespace loopbench::odca::arms {
+
+/// A body of an arm. The angle of its joint outwards from Ground is `sign` times its coordinate.
+struct ArmBody {
+  int u = 0;  ///< of the joint that it hangs by, in q and u
+  double sign = 1.0;
+  Link<double> link;
+};
+
+/// The last body of an arm that a cut joint holds: all of the motion of handle 2.
+struct ArmTip {
+  Response<double, kAll> response;
+  double about12[kAll];  ///< as of Link, for all forces on handle 2
+};
+
+struct Arm {
+  std::vector<ArmBody> bodies;   ///< from Ground outwards
+  Pose<Spatial, double> ground;  ///< of the first joint's side on Ground
+  int last = 0;                  ///< the mechanism's body at its end
+  int closing = -1;              ///< the cut joint there, -1 for an open arm
+  ArmTip tip;                    ///< of that
+};
+
+/// A cut joint between two arms, or one and Ground.
+struct ArmClosing {
+  int arm_P = -1, arm_Q = -1;    ///< -1: Ground
+  Pose<Spatial, double> ground;  ///< of its side there
+  JointKind<Spatial, double> kind;
+
+  int rows() const { return kind.num_constraints(); }
+  /// Constrained direction i, in axes of P.
+  Direction<Spatial, double> D(int i) const {
+    return Direction<Spatial, double>::Unit(kind.axes[kind.num_u + i]);
+  }
+};
+
+struct Arms {
+  std::vector<Arm> arms;
+  std::vector<ArmClosing> closings;
+  Linear<Spatial, double> gravity;
+};
+
+/// None where the mechanism is more than arms of revolute joints under gravity: with a tree joint
+/// of another kind, bodies that carry two others or hang freely, other forces, prescribed or
+/// released coordinates, a cut joint anywhere but at ends of arms, or one whose directions are no
+/// constant axes.
+Arms FindArms(const Mechanism<Spatial, double>& mechanism);
+
+}  // namespace loopbench::odca::arms

@@ -1,0 +1,189 @@
+// Where bodies of arms stand in the lists of an ArmSweep, their constants, and how numbers come to
+// their places and back.
+#include <algorithm>
+#include <cmath>
+#include <utility>
+
+#include "mechanism/loops/loop_solver.h"
+#include "odca/arm_sweep.h"
+
+namespace loopbench::odca::arms {
+
+namespace {
+
+/// Shorter pieces are no faster than one body after another.
+constexpr int kShortestPiece = 2;
+
+/// Bodies of an arm that may be in pieces: the tip of a closed one is asked for more.
+int Inner(const Arm& arm) {
+  return static_cast<int>(arm.bodies.size()) - (arm.closing >= 0 ? 1 : 0);
+}
+
+/// The longest length of pieces of which there are as many as fill these groups, 0 for none.
+int LengthOfPieces(const std::vector<Arm>& arms, int groups) {
+  int bodies = 0;
+  for (const Arm& arm : arms) bodies += Inner(arm);
+  for (int length = bodies / (groups * kLanes); length >= kShortestPiece; --length) {
+    int pieces = 0;
+    for (const Arm& arm : arms) pieces += Inner(arm) / length;
+    if (pieces >= groups * kLanes) return length;
+  }
+  return 0;
+}
+
+/// Acceleration of a side on Ground, all being less that of gravity: rows of forces.
+void SetRise(const Pose<Spatial, double>& side, const Linear<Spatial, double>& gravity,
+             double* zeta23) {
+  const Linear<Spatial, double> rise = -(side.R.transpose() * gravity);
+  for (int i = 0; i < 3; ++i) zeta23[2 + i] = rise[i];
+}
+
+}  // namespace
+
+std::unique_ptr<ArmSweep> ArmSweep::Make(const Mechanism<Spatial, double>& mechanism, int threads,
+                                         int bodies_of_group) {
+  const Arms arms = FindArms(mechanism);
+  if (arms.arms.empty()) return nullptr;
+  std::unique_ptr<ArmSweep> sweep(new ArmSweep);
+  sweep->num_u_ = mechanism.num_u();
+  sweep->size_ = mechanism.length();
+  sweep->Lay(arms, bodies_of_group);
+  const int useful = static_cast<int>(sweep->groups_.size());
+  sweep->pool_ = std::make_unique<WorkerPool>(std::clamp(useful, 1, std::max(1, threads)));
+  return sweep->Serves() ? std::move(sweep) : nullptr;
+}
+
+bool ArmSweep::Serves() {
+  constexpr int kTrials = 3;
+  constexpr double kGoldenAngle = 2.399963229728653;
+  if (closings_.empty()) return true;
+  for (int trial = 1; trial <= kTrials; ++trial) {
+    for (int i = 0; i < num_u_; ++i)
+      moved_[i] = std::remainder(kGoldenAngle * trial * (i + 1), 6.0);
+    if (Evaluate(SpeedsUsed::kGiven, {moved_.data(), moved_.data() + num_u_},
+                 {speeds_.data(), speeds_.data() + num_u_}, {back_.data(), back_.data() + num_u_},
+                 {step_.data(), step_.data() + num_u_})) {
+      return true;
+    }
+  }
+  return false;
+}
+
+void ArmSweep::Lay(const Arms& arms, int bodies_of_group) {
+  const int num_groups = std::max(1, num_u_ / bodies_of_group);
+  length_ = LengthOfPieces(arms.arms, num_groups);
+  num_pieces_ = length_ > 0 ? num_groups * kLanes : 0;
+  packed_ = num_pieces_ * length_;
+  groups_.resize(length_ > 0 ? num_groups : 0);
+  sign_.setZero(num_u_);
+  angle_ = speed_ = sine_ = cosine_ = rate_ = moved_ = back_ = speeds_ = step_ = sign_;
+  index_.assign(num_u_, 0);
+  std::vector<Link<Lanes>> packs(packed_ / kLanes);
+  std::vector<const ArmBody*> singles, tips;
+  int piece = 0;
+  for (const Arm& arm : arms.arms) {
+    ArmPlaces places;
+    places.first_piece = piece;
+    places.first_single = static_cast<int>(singles.size());
+    const ArmBody* body = arm.bodies.data();
+    const ArmBody* inner = body + Inner(arm);
+    for (; length_ > 0 && inner - body >= length_ && piece < num_pieces_; ++piece) {
+      for (int i = 0; i < length_; ++i, ++body) {
+        const int place = place_of_piece(piece) + i * kLanes;
+        index_[place] = body->u;
+        sign_[place] = body->sign;
+        SetLane(packs[place / kLanes], piece % kLanes, body->link);
+      }
+      ++places.pieces;
+    }
+    for (; body != inner; ++body) singles.push_back(body);
+    places.singles = static_cast<int>(singles.size()) - places.first_single;
+    if (arm.closing >= 0) {
+      places.tip = static_cast<int>(tips_.size());
+      tips.push_back(body);
+      TipState& tip = tips_.emplace_back();
+      tip.link = body->link;
+      tip.constants = arm.tip;
+      tip.ground = arm.ground;
+    }
+    SetRise(arm.ground, arms.gravity, places.ground);
+    arms_.push_back(places);
+  }
+  for (const Link<Lanes>& pack : packs) links_.Add(pack);
+  for (std::size_t g = 0; g < groups_.size(); ++g) groups_[g].pack = static_cast<int>(g) * length_;
+  int place = packed_;
+  for (const auto* list : {&singles, &tips}) {
+    for (const ArmBody* body : *list) {
+      index_[place] = body->u;
+      sign_[place++] = body->sign;
+    }
+  }
+  for (const ArmBody* body : singles) singles_.push_back(body->link);
+  cuts_.resize(packs.size());
+  about1_.resize(packs.size());
+  about2_.resize(packs.size());
+  free_.resize(singles_.size());
+  end_cuts_.resize(num_pieces_ + singles_.size());
+  end_about2_.resize(end_cuts_.size());
+  LayClosings(arms);
+}
+
+void ArmSweep::LayClosings(const Arms& arms) {
+  for (TipState& tip : tips_) tip.side.alone = &tip.constants.response.zeta22;
+  for (const ArmClosing& joint : arms.closings) {
+    int bodies = num_u_;
+    const auto tip_of = [&](int arm) {
+      if (arm < 0) return -1;
+      bodies = std::min(bodies, static_cast<int>(arms.arms[arm].bodies.size()));
+      return arms_[arm].tip;
+    };
+    const int P = tip_of(joint.arm_P), Q = tip_of(joint.arm_Q);
+    const double limit = LoopSolver<double>::kSuspicious * ShareOfLimit(bodies);
+    PlacedClosing& at = closings_.emplace_back(Closing(joint, limit), P, Q);
+    at.ground.pose = joint.ground;
+    SetRise(joint.ground, arms.gravity, at.ground.assembly.zeta23);
+  }
+}
+
+void ArmSweep::TakeIn(std::span<const double> q, std::span<const double> u, int first, int last) {
+  for (int place = first; place < last; ++place) {
+    angle_[place] = sign_[place] * q[index_[place]];
+    speed_[place] = sign_[place] * u[index_[place]];
+  }
+}
+
+bool ArmSweep::TakeIn(std::span<const double> q, std::span<const double> u) {
+  const int places = length_ * kLanes;
+  pool_->ForEach(static_cast<int>(groups_.size()), [&](int g) {
+    TakeIn(q, u, g * places, (g + 1) * places);
+    Lanes room = Lanes{} + kLargestAngle;
+    for (int place = g * places; place < (g + 1) * places; place += kLanes) {
+      const Lanes angle = Load<Lanes>(&angle_[place]);
+      room = Min(room, kLargestAngle - Magnitude(angle));
+      Lanes s, c;
+      SinCos(angle, s, c);
+      Store(s, &sine_[place]);
+      Store(c, &cosine_[place]);
+    }
+    groups_[g].in_range = Smallest(room) >= 0.0;
+  });
+  bool in_range = std::ranges::all_of(groups_, &Group::in_range);
+  TakeIn(q, u, packed_, num_u_);
+  for (int place = packed_; place < num_u_; ++place) {
+    in_range = in_range && kLargestAngle - Magnitude(angle_[place]) >= 0.0;
+    SinCos(angle_[place], sine_[place], cosine_[place]);
+  }
+  return in_range;
+}
+
+void ArmSweep::PutOut(const VectorX<double>& of_places, std::span<double> to) {
+  constexpr int kPart = 4096;
+  pool_->ForEach((num_u_ + kPart - 1) / kPart, [&](int part) {
+    const int last = std::min(num_u_, (part + 1) * kPart);
+    for (int place = part * kPart; place < last; ++place) {
+      to[index_[place]] = sign_[place] * of_places[place];
+    }
+  });
+}
+
+}  // namespace loopbench::odca::arms

@@ -1,0 +1,375 @@
+// The sweep along arms against the general one, which the contract suite holds to an oracle.
+#include "odca/arm_sweep.h"
+
+#include <gtest/gtest.h>
+
+#include <array>
+#include <cstdio>
+#include <limits>
+
+#include "lagrange/lagrange.h"
+#include "mechanism/description/in_space.h"
+#include "mechanism/description/library.h"
+#include "tests/contract/allocations.h"
+#include "tests/contract/builder.h"
+#include "tests/odca/short_cut.h"
+
+namespace loopbench::odca::arms {
+namespace {
+
+constexpr double kEps = std::numeric_limits<double>::epsilon();
+
+using testing::Builder;
+using testing::Random;
+
+/// Bodies in a row from Ground, in any order of numbers, joints in any frames and either way round;
+/// closed on Ground by one more joint, of which one is cut, with this kind.
+void AddPath(Builder& b, int n, bool closed, JointType cut_kind) {
+  auto& joints = b.description.joints;
+  std::vector<int> row;
+  for (int k = 0; k < n; ++k) row.push_back(b.AddBody(1.0));
+  for (int k = n - 1; k > 0; --k) std::swap(row[k], row[b.random.Below(k + 1)]);
+  row.push_back(kGround);
+  const int cut = closed ? b.random.Below(n + 1) : -1;
+  for (int k = 0; k < n + (closed ? 1 : 0); ++k) {
+    JointDescription& joint = joints.emplace_back();
+    joint.name = "j" + std::to_string(joints.size());
+    joint.from = {k == 0 ? kGround : row[k - 1], b.random.Vector(1.0, true), b.RandomTurn()};
+    joint.to = {row[k], b.random.Vector(1.0, true), b.RandomTurn()};
+    if (b.random.Chance(0.5)) std::swap(joint.from, joint.to);
+    joint.cut = k == cut;
+    if (joint.cut) joint.type = cut_kind;
+  }
+}
+
+struct Paths {
+  int open = 0, closed = 0, also_closed = 0;  ///< bodies of three paths, 0 for none
+  JointType cut = JointType::kRevolute;
+};
+MechanismDescription RandomArms(const Paths& paths, std::uint64_t seed) {
+  Builder b("arms", SpaceKind::kSpatial, seed);
+  if (paths.closed > 0) AddPath(b, paths.closed, true, paths.cut);
+  if (paths.open > 0) AddPath(b, paths.open, false, paths.cut);
+  if (paths.also_closed > 0) AddPath(b, paths.also_closed, true, paths.cut);
+  return b.description;
+}
+
+Both Compare(const Mechanism<Spatial, double>& mechanism, SpeedsUsed speeds, const Numbers& q,
+             const Numbers& u, int bodies_of_group = ArmSweep::kBodiesOfGroup) {
+  return odca::Compare(mechanism, ArmSweep::Make(mechanism, 3, bodies_of_group).get(), speeds, q,
+                       u);
+}
+
+/// Both right-hand sides.
+class ArmSweepTest : public ::testing::TestWithParam<SpeedsUsed> {};
+INSTANTIATE_TEST_SUITE_P(Speeds, ArmSweepTest,
+                         ::testing::Values(SpeedsUsed::kGiven, SpeedsUsed::kCompleted));
+
+/// Angles are drawn at random, so cut joints are as far apart as the bodies are long.
+TEST_P(ArmSweepTest, AgreesWithTheGeneralSweepWhereverJointsHaveDrifted) {
+  std::vector<Paths> shapes = {{.open = 1000}, {.closed = 1000}};
+  for (const int n : {1, 2, 3, 7, 8, 9, 16, 17, 33, 64, 100}) {
+    shapes.push_back({.open = n});
+    shapes.push_back({.open = n, .closed = 11, .also_closed = n});
+    if (n < 7) continue;  // fewer bodies have no freedom, a test of its own
+    for (const JointType cut : {JointType::kRevolute, JointType::kSpherical, JointType::kPrismatic,
+                                JointType::kCylindrical, JointType::kWeld}) {
+      shapes.push_back({.closed = n, .cut = cut});
+    }
+  }
+  int states = 0, refused = 0;
+  double worst = 0.0;
+  for (const Paths& shape : shapes) {
+    const int bodies = shape.open + shape.closed + shape.also_closed;
+    for (std::uint64_t seed = 1; seed <= (bodies < 1000 ? 12u : 2u); ++seed) {
+      const MechanismDescription arms = RandomArms(shape, 100 * seed + bodies);
+      const Mechanism<Spatial, double> mechanism(arms, Coordinates::kJoint);
+      Random random(seed);
+      const Numbers q = RandomNumbers(random, mechanism.num_q(), 4.0);
+      const Numbers u = RandomNumbers(random, mechanism.num_u(), 2.0);
+      const Both both = seed % 2 == 0 ? Compare(mechanism, GetParam(), q, u, 4 * kLanes)
+                                      : Compare(mechanism, GetParam(), q, u);
+      ASSERT_EQ(both.outcome, Outcome::kFinished);
+      ++states;
+      EXPECT_TRUE(!both.evaluated || both.general.smallest_weight == 1.0) << arms.name;
+      if (!both.evaluated) {
+        // The bound on the least eigenvalue is at most six times smaller than that, and so is the
+        // smallest pivot at least: 1e-4 of six rows.
+        ++refused;
+        EXPECT_LT(both.general.rcond, 0.01) << arms.name;
+        continue;
+      }
+      const double of_bound = both.difference / Bound(bodies, both.general.rcond);
+      EXPECT_LE(of_bound, 1.0) << arms.name << " rcond " << both.general.rcond;
+      worst = std::max(worst, of_bound);
+    }
+  }
+  std::printf("%d states, %d refused, worst %.2g of the bound\n", states, refused, worst);
+  EXPECT_LE(20 * refused, states);
+}
+
+/// Two to five bodies between pins on Ground have no freedom, and one redundant row or more.
+TEST_P(ArmSweepTest, LeavesLoopsWithoutFreedomToTheGeneralSweep) {
+  int refused = 0;
+  for (int n = 1; n <= 4; ++n) {
+    for (std::uint64_t seed = 1; seed <= 10; ++seed) {
+      const Mechanism<Spatial, double> mechanism(RandomArms({.closed = n}, seed),
+                                                 Coordinates::kJoint);
+      EXPECT_EQ(ArmSweep::Make(mechanism), nullptr);
+      ++refused;
+    }
+  }
+  std::printf("%d refused\n", refused);
+}
+
+/// Against long double, at consistent states of closed loops; the general sweep beside it.
+TEST(ArmSweep, AgreesWithTheOracle) {
+  double worst = 0.0, worst_general = 0.0;
+  for (const int n : {7, 8, 12, 20}) {
+    for (std::uint64_t seed = 1; seed <= 8; ++seed) {
+      const MechanismDescription chain = testing::RandomChain(n, SpaceKind::kSpatial, seed);
+      MechanismDescription free = chain;
+      free.forces.clear();
+      const Mechanism<Spatial, double> mechanism(free, Coordinates::kJoint);
+      const testing::State state = testing::ConsistentState(free, mechanism, seed);
+      const auto sweep = ArmSweep::Make(mechanism);
+      ASSERT_NE(sweep, nullptr) << chain.name;
+      Numbers qdot(state.u.size()), own(state.u.size()), general;
+      const testing::Answer exact =
+          testing::Oracle(free, testing::LayoutOf(mechanism))
+              .Solve(state.q.cast<testing::Real>(), state.u.cast<testing::Real>());
+      if (!sweep->Evaluate(SpeedsUsed::kGiven, In(state.q), In(state.u), In(qdot), In(own))) {
+        EXPECT_LT(exact.rcond, 0.01) << chain.name;
+        continue;
+      }
+      testing::SystemWith<Odca, Spatial, double> odca(mechanism, {});
+      ASSERT_EQ(odca->Evaluate(0.0, state.q, state.u, general), Outcome::kFinished);
+      const Numbers udot = exact.udot.cast<double>();
+      const double size =
+          std::max({udot.cwiseAbs().maxCoeff(), mechanism.gravity().norm(), state.u.squaredNorm()});
+      const auto of_bound = [&](const Numbers& own_udot) {
+        return (own_udot - udot).cwiseAbs().maxCoeff() / size / Bound(n, exact.rcond);
+      };
+      EXPECT_LE(of_bound(own), 1.0) << chain.name << " rcond " << exact.rcond;
+      worst = std::max(worst, of_bound(own));
+      worst_general = std::max(worst_general, of_bound(general));
+    }
+  }
+  std::printf("worst %.2g of the bound, general sweep %.2g\n", worst, worst_general);
+  EXPECT_GT(worst, 0.0) << "else this test says nothing";
+}
+
+/// Several groups, of which threads take shares.
+TEST_P(ArmSweepTest, HasTheSameBitsForAnyNumberOfThreads) {
+  for (const Paths& shape : {Paths{.open = 900}, Paths{.open = 300, .closed = 500}}) {
+    const Mechanism<Spatial, double> mechanism(RandomArms(shape, 5), Coordinates::kJoint);
+    Random random(1);
+    const Numbers q = RandomNumbers(random, mechanism.num_q(), 1.0);
+    const Numbers u = RandomNumbers(random, mechanism.num_u(), 1.0);
+    const auto rates = [&](int threads) {
+      const auto sweep = ArmSweep::Make(mechanism, threads, 200);
+      EXPECT_EQ(sweep->threads(), std::min(threads, 4)) << "no more than groups";
+      Numbers qdot = Numbers::Zero(u.size()), udot = qdot;
+      for (int round = 0; round < 3; ++round) {
+        EXPECT_TRUE(sweep->Evaluate(GetParam(), In(q), In(u), In(qdot), In(udot)));
+      }
+      Numbers moved = q, speeds = u;
+      sweep->Project(In(moved), In(speeds), 1e-12);
+      return std::array{qdot, udot, moved, speeds};
+    };
+    const auto alone = rates(1);
+    EXPECT_FALSE(alone[1].isZero(0.0));
+    for (const int threads : {2, 3, 7}) EXPECT_TRUE(rates(threads) == alone) << threads;
+  }
+}
+
+/// A chain that hangs from a body of another one.
+MechanismDescription Branching() {
+  Builder b("branching", SpaceKind::kSpatial, 1);
+  AddPath(b, 5, false, JointType::kRevolute);
+  AddPath(b, 3, false, JointType::kRevolute);
+  for (JointSide* side : {&b.description.joints[5].from, &b.description.joints[5].to}) {
+    if (side->body == kGround) side->body = 3;
+  }
+  return b.description;
+}
+
+TEST(ArmSweep, LeavesOthersToTheGeneralSweep) {
+  const auto make = [](const MechanismDescription& description,
+                       Coordinates coordinates = Coordinates::kJoint) {
+    return ArmSweep::Make(Mechanism<Spatial, double>(description, coordinates));
+  };
+  const MechanismDescription loop = RandomArms({.closed = 9}, 1);
+  EXPECT_NE(make(loop), nullptr);
+  EXPECT_EQ(make(loop, Coordinates::kAbsolute), nullptr);
+  MechanismDescription sprung = loop;
+  sprung.forces.push_back(JointSpring{.joint = 1, .stiffness = 2.0});
+  EXPECT_EQ(make(sprung), nullptr);
+  MechanismDescription slides = RandomArms({.open = 5}, 1);
+  EXPECT_NE(make(slides), nullptr);
+  slides.joints[2].type = JointType::kPrismatic;
+  EXPECT_EQ(make(slides), nullptr);
+  MechanismDescription cross = RandomArms({.closed = 9}, 1);
+  for (JointDescription& joint : cross.joints) {
+    if (joint.cut) joint.type = JointType::kUniversal;
+  }
+  EXPECT_EQ(make(cross), nullptr) << "directions that depend on the position";
+  EXPECT_EQ(make(Branching()), nullptr) << "a body that carries two";
+  EXPECT_EQ(make(InSpace(Ladder(2, 1.0, 0.5), {0.1, 0.2, 0.3})), nullptr)
+      << "two loops share a body";
+  EXPECT_EQ(make(InSpace(Chain(6), {0.1, 0.2, 0.3})), nullptr)
+      << "parallel axes: three rows redundant everywhere";
+  EXPECT_EQ(make(testing::SphericalChain(6, 1)), nullptr) << "axes through one point, likewise";
+  const Mechanism<Spatial, double> mechanism(loop, Coordinates::kJoint);
+  Odca<Spatial, double> published(mechanism, {.solver = SolverKind::kAsPublished});
+  Numbers q = Numbers::Zero(9), u = q, qdot = q, udot = q;
+  EXPECT_FALSE(published.RightHandSide(SpeedsUsed::kGiven, In(q), In(u), In(qdot), In(udot)));
+}
+
+TEST_P(ArmSweepTest, RefusesWhatItCannotJudge) {
+  const Mechanism<Spatial, double> mechanism(RandomArms({.closed = 9}, 1), Coordinates::kJoint);
+  const auto sweep = ArmSweep::Make(mechanism);
+  Numbers u = Numbers::Ones(9), qdot = u, udot = u, q = Numbers::Constant(9, 1.1);
+  const auto evaluate = [&] {
+    return sweep->Evaluate(GetParam(), In(q), In(u), In(qdot), In(udot));
+  };
+  EXPECT_TRUE(evaluate());
+  q[1] = 2.0 * kLargestAngle;
+  EXPECT_FALSE(evaluate());
+  q[1] = std::numeric_limits<double>::quiet_NaN();
+  EXPECT_FALSE(evaluate());
+  q[1] = 1.1;
+  u[2] = std::numeric_limits<double>::infinity();
+  EXPECT_FALSE(evaluate());
+}
+
+TEST_P(ArmSweepTest, AllocatesNothing) {
+  if (testing::CountAllocations() < 0) GTEST_SKIP() << "the sanitizer owns malloc";
+  for (const int n : {9, 100}) {
+    const Mechanism<Spatial, double> mechanism(RandomArms({.open = n, .closed = n}, 3),
+                                               Coordinates::kJoint);
+    const auto sweep = ArmSweep::Make(mechanism, 2, 40);
+    Random random(1);
+    Numbers q = RandomNumbers(random, mechanism.num_q(), 1.0), u = q, qdot = q, udot = q;
+    const long before = testing::CountAllocations();
+    EXPECT_TRUE(sweep->Evaluate(GetParam(), In(q), In(u), In(qdot), In(udot)));
+    sweep->Project(In(q), In(u), 0.0);
+    EXPECT_EQ(testing::CountAllocations(), before);
+  }
+}
+
+TEST(ArmSweep, IsTheDerivativeOfTheSystemWhereItServes) {
+  const Mechanism<Spatial, double> mechanism(RandomArms({.closed = 20}, 2), Coordinates::kJoint);
+  Random random(1);
+  const Numbers q = RandomNumbers(random, 20, 1.0), u = RandomNumbers(random, 20, 1.0);
+  Numbers y(40), shortest(y), examined(y), own(y);
+  for (const Enforcement level : {Enforcement::kAcceleration, Enforcement::kPosition,
+                                  Enforcement::kVelocity, Enforcement::kBaumgarte}) {
+    testing::SystemWith<Odca, Spatial, double> odca(mechanism, {.enforcement = level});
+    ASSERT_EQ(odca->Start(0.0, q, u), Outcome::kFinished);
+    odca->ToState(q, u, In(y));
+    ASSERT_EQ(odca->Derivative(0.0, In(y), In(shortest)), Outcome::kFinished);
+    ASSERT_EQ(odca->Examine(0.0, In(y), In(examined)), Outcome::kFinished);
+    const bool completed = level == Enforcement::kVelocity;
+    const bool serves = level != Enforcement::kBaumgarte;
+    ASSERT_TRUE(
+        ArmSweep::Make(mechanism)->Evaluate(completed ? SpeedsUsed::kCompleted : SpeedsUsed::kGiven,
+                                            In(q), In(u), In(own).first(20), In(own).last(20)));
+    EXPECT_EQ(shortest == own, serves) << ToString(level);
+    EXPECT_EQ(shortest == examined, !serves) << ToString(level);
+  }
+}
+
+/// What level position makes of an accepted step, by the short cut and in all generality:
+/// multipliers have no short cut, and their Newton steps are as long.
+TEST(ArmSweep, ProjectsAsTheGeneralWayDoes) {
+  int projected = 0, refused = 0;
+  double worst = 0.0;
+  for (const int n : {7, 8, 9, 12, 16, 30, 60}) {
+    for (std::uint64_t seed = 1; seed <= 12; ++seed) {
+      MechanismDescription chain = testing::RandomChain(n, SpaceKind::kSpatial, seed);
+      chain.forces.clear();
+      const Mechanism<Spatial, double> mechanism(chain, Coordinates::kJoint);
+      const testing::State state = testing::ConsistentState(chain, mechanism, seed);
+      Random random(seed);
+      testing::SystemWith<lagrange::Lagrange, Spatial, double> general(
+          mechanism, {.enforcement = Enforcement::kPosition});
+      const auto half = static_cast<std::size_t>(mechanism.num_q());
+      Numbers y(2 * mechanism.num_q());
+      y << state.q, state.u;
+      ASSERT_EQ(general->Start(0.0, state.q, state.u), Outcome::kFinished);
+      y += RandomNumbers(random, static_cast<int>(y.size()), 1e-6);
+      Numbers expected = y, own = y;
+      if (!general->BeginStep(0.0, In(expected))) continue;
+      const Correction<double> by_parts = general->level().correction();
+      const double rcond = general->diagnostics().rcond;
+      if (general->diagnostics().smallest_weight < 1.0) continue;
+      const auto sweep = ArmSweep::Make(mechanism, 2, 2 * kLanes);
+      const double goal = 4.0 * kEps * mechanism.num_bodies() * mechanism.length();
+      const auto correction = sweep->Project(In(own).first(half), In(own).subspan(half), goal);
+      if (!correction) {
+        ++refused;
+        EXPECT_EQ(own, y) << chain.name << ": refused, so left alone";
+        continue;
+      }
+      ++projected;
+      EXPECT_NEAR(correction->shift, by_parts.shift, 1e-3 * by_parts.shift + goal);
+      EXPECT_NEAR(correction->rotation, by_parts.rotation, 1e-3 * by_parts.rotation + goal);
+      EXPECT_GE(correction->iterations, 1);
+      // both stop within some round-offs of the mismatch; what that leaves in q is its inverse
+      const double size = std::max(1.0, expected.tail(mechanism.num_u()).cwiseAbs().maxCoeff());
+      const double of_bound = (own - expected).cwiseAbs().maxCoeff() / size / Bound(n, rcond);
+      EXPECT_LE(of_bound, 1.0) << chain.name << " rcond " << rcond;
+      worst = std::max(worst, of_bound);
+    }
+  }
+  std::printf("%d states, %d refused, worst %.2g of the bound\n", projected, refused, worst);
+  EXPECT_GT(projected, 50) << "else this test says little";
+  EXPECT_LE(5 * refused, projected);
+}
+
+/// A number that counts its products.
+struct Counted {
+  double value = 0.0;
+  inline static int products = 0;
+  Counted() = default;
+  Counted(double number) : value(number) {}
+  friend Counted operator+(Counted a, Counted b) { return a.value + b.value; }
+  friend Counted operator-(Counted a, Counted b) { return a.value - b.value; }
+  friend Counted operator-(Counted a) { return -a.value; }
+  friend Counted operator*(Counted a, Counted b) { return ++products, a.value * b.value; }
+  friend Counted operator/(Counted a, Counted b) { return ++products, a.value / b.value; }
+  friend bool operator<(Counted a, Counted b) { return a.value < b.value; }
+};
+
+TEST(RevoluteKernels, TakeAsManyOperationsAsTheySay) {
+  const auto products = [](auto call) {
+    Counted::products = 0;
+    call();
+    return Counted::products;
+  };
+  Response<Counted, kRows> B;
+  Response<Counted, kAll> tip;
+  Free<Counted> free;
+  Cut<Counted> cut;
+  EndCut<Counted, kRows> end_cut;
+  EndCut<Counted, kAll> tip_cut;
+  OneHandle<Counted> end;
+  Piece<Counted> piece;
+  Turn<Counted> turn;
+  Counted slack, F[kAll], force[kAll], zeta[kAll], row[kRows], all[kAll];
+  EXPECT_EQ(products([&] { Join(piece, turn, B, free, cut, slack); }), Operations::kJoin);
+  EXPECT_EQ(products([&] { Join(end, turn, B, zeta, zeta, end_cut, slack); }),
+            Operations::EndJoin(kRows));
+  EXPECT_EQ(products([&] { Join(end, turn, tip, zeta, zeta, tip_cut, slack); }),
+            Operations::EndJoin(kAll));
+  EXPECT_EQ(products([&] { ForceIn(cut, B.zeta12, F, F, force); }), Operations::kForceIn);
+  EXPECT_EQ(products([&] { ForceIn(end_cut, F, force); }), Operations::ForceInEnd(kRows));
+  EXPECT_EQ(products([&] { ForceIn(tip_cut, F, force); }), Operations::ForceInEnd(kAll));
+  EXPECT_EQ(products([&] { About(slack, row, row, F, F); }), Operations::About(kRows));
+  EXPECT_EQ(products([&] { About(slack, row, all, F, F); }), Operations::About(kAll));
+  EXPECT_EQ(products([&] { OppositeBefore(turn, F, force); }), Operations::kOpposite);
+}
+
+}  // namespace
+}  // namespace loopbench::odca::arms

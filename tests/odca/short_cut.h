@@ -1,0 +1,69 @@
+// Short cuts of right-hand sides held against the general sweep.
+#pragma once
+
+#include <algorithm>
+#include <limits>
+#include <span>
+
+#include "odca/odca.h"
+#include "tests/contract/generators.h"
+#include "tests/contract/system_with.h"
+
+namespace loopbench::odca {
+
+using Numbers = VectorX<double>;
+
+inline std::span<const double> In(const Numbers& numbers) {
+  return {numbers.data(), static_cast<std::size_t>(numbers.size())};
+}
+inline std::span<double> In(Numbers& numbers) {
+  return {numbers.data(), static_cast<std::size_t>(numbers.size())};
+}
+
+inline Numbers RandomNumbers(testing::Random& random, int n, double size) {
+  Numbers numbers(n);
+  for (double& x : numbers) x = random.Uniform(-size, size);
+  return numbers;
+}
+
+/// The contract's bound: sums along n bodies, magnified by the condition of what is inverted.
+inline double Bound(int n, double rcond) {
+  return 100.0 * std::numeric_limits<double>::epsilon() * n / rcond;
+}
+
+/// What both make of a state, loops closed or not, at a level with these speeds.
+struct Both {
+  Outcome outcome = Outcome::kFinished;
+  Diagnostics general;
+  bool evaluated = false;
+  /// Over the largest speed or acceleration of those that were added up: where loops leave no
+  /// freedom, nothing is left of them.
+  double difference = 0.0;
+};
+/// `sweep` may be null.
+template <class Space, class Sweep>
+Both Compare(const Mechanism<Space, double>& mechanism, Sweep* sweep, SpeedsUsed speeds,
+             const Numbers& q, const Numbers& u) {
+  const auto level =
+      speeds == SpeedsUsed::kGiven ? Enforcement::kAcceleration : Enforcement::kVelocity;
+  testing::SystemWith<Odca, Space, double> odca(mechanism, {.enforcement = level});
+  Both both;
+  both.outcome = odca->Start(0.0, q, u);
+  const Eigen::Index n = q.size();
+  Numbers y(2 * n), general(y), own = Numbers::Zero(2 * n);
+  odca->ToState(q, u, In(y));
+  both.outcome = odca->Examine(0.0, In(y), In(general));
+  both.general = odca->diagnostics();
+  const std::span<double> rates = In(own);
+  both.evaluated =
+      sweep != nullptr && sweep->Evaluate(speeds, In(q), In(u), rates.first(n), rates.last(n));
+  const auto largest = [](const Numbers& numbers) { return numbers.cwiseAbs().maxCoeff(); };
+  const double speed = std::max(largest(general.head(n)), largest(u));
+  const double acceleration =
+      std::max({largest(general.tail(n)), mechanism.gravity().norm(), speed * speed});
+  both.difference = std::max(largest(own.head(n) - general.head(n)) / speed,
+                             largest(own.tail(n) - general.tail(n)) / acceleration);
+  return both;
+}
+
+}  // namespace loopbench::odca

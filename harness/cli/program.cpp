@@ -60,10 +60,10 @@ int RunCommandLine(int argc, char** argv) {
   });
   FileOptions files(app);
   ViewOptions view(app);
-  ConvertOptions convert(app);
-  ImportCommandOptions import(app);
   StoreOptions stores(app);
   ReportCommandOptions report(app);
+  ImportCommandOptions import(app);
+  ConvertOptions convert(app);
   ComparisonOptions comparison(app);
   BaselineOptions baseline(app);
   ClusterOptions cluster(app);
@@ -78,10 +78,10 @@ int RunCommandLine(int argc, char** argv) {
     const std::string typed = CommandLine(argc, argv);
     if (const auto code = files.Run(typed, ShellLine({argv, argv + argc}))) return *code;
     if (const auto code = view.Run()) return *code;
-    if (const auto code = convert.Run()) return *code;
-    if (const auto code = import.Run()) return *code;
     if (const auto code = stores.Run(typed)) return *code;
     if (const auto code = report.Run(typed)) return *code;
+    if (const auto code = import.Run()) return *code;
+    if (const auto code = convert.Run()) return *code;
     if (const auto code = comparison.Run(typed)) return *code;
     if (const auto code = baseline.Run(typed)) return *code;
     if (const auto code = cluster.Run()) return *code;

@@ -3,7 +3,6 @@
 #include <charconv>
 #include <cmath>
 
-#include "harness/cli/options.h"
 #include "harness/text/config_error.h"
 #include "harness/text/numeric_option.h"
 
@@ -56,7 +55,8 @@ ImportCommandOptions::ImportCommandOptions(CLI::App& app) {
   app_->add_flag("--planar", options.planar, "As a planar mechanism, which it must be");
   app_->add_flag("--floating", options.floats, "URDF: the root link is free, not fixed");
   app_->add_option("--gravity", gravity_, "x,y,z in place of the file's [m/s^2]");
-  AddJson(app_, &import_.json);
+  app_->add_flag("--json", import_.json,
+                 "One JSON document instead (docs/exchange.md has its keys)");
   app_->add_option("--cpu", import_.limits.cpu_s, "CPU time [s]")
       ->check(NumberFrom(0.001, 1e9))
       ->capture_default_str();

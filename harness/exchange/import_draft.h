@@ -71,6 +71,7 @@ class ImportDraft {
   void MergeMassless();
   void RefuseMassless(int body) const;
   void HoldFloatingParts();
+  void MakeBallsPins(const Eigen::Vector3d& n);
   void GoToPlane();
 
   const XmlFile& file_;

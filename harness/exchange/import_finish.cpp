@@ -2,14 +2,12 @@
 #include <fmt/format.h>
 
 #include <algorithm>
-#include <cmath>
 
 #include "harness/config/sidecar.h"
 #include "harness/exchange/import_draft.h"
 #include "harness/text/config_error.h"
 #include "mechanism/description/islands.h"
 #include "mechanism/simplify/attach.h"
-#include "mechanism/simplify/plane.h"
 
 namespace loopbench::harness {
 
@@ -77,9 +75,6 @@ std::vector<std::vector<int>> WeldsAtBodies(const MechanismDescription& descript
   return welds;
 }
 
-/// z of ground onto n.
-Eigen::Quaterniond ZOnto(const Eigen::Vector3d& n) { return Eigen::Quaterniond(AxesWithNormal(n)); }
-
 }  // namespace
 
 void ImportDraft::RefuseMassless(int body) const {
@@ -132,44 +127,6 @@ void ImportDraft::HoldFloatingParts() {
         {last_joint(), {X.q.w(), X.q.x(), X.q.y(), X.q.z(), X.p.x(), X.p.y(), X.p.z()}});
   }
   NameJoints();
-}
-
-void ImportDraft::GoToPlane() {
-  const auto turns = std::ranges::find_if(description.joints, [](const JointDescription& joint) {
-    return TraitsOf(joint.type).flat.turns;
-  });
-  const auto in_ground = [&](const JointSide& side) {
-    return at_rest[static_cast<std::size_t>(side.body)].q;
-  };
-  if (turns != description.joints.end()) {
-    const Eigen::Vector3d n = in_ground(turns->from) * PoseOf(turns->from).R *
-                              AxisAlignment(*turns) * Eigen::Vector3d::UnitZ();
-    for (JointDescription& joint : description.joints) {
-      if (joint.type != JointType::kSpherical) continue;
-      joint.type = JointType::kRevolute;  // all that a ball can do in a plane
-      for (JointSide* side : {&joint.from, &joint.to}) {
-        side->rotation = RotationVector(in_ground(*side).conjugate() * ZOnto(n));
-      }
-      const int index = static_cast<int>(&joint - description.joints.data());
-      for (auto* list : {&description.initial.coordinates, &description.initial.speeds}) {
-        std::erase_if(*list, [&](const JointValues& one) { return one.joint == index; });
-      }
-    }
-  }
-  std::string why;
-  const std::optional<InPlane> plane = ExpressInPlane(description, &why);
-  if (!plane) {
-    throw ConfigError(
-        fmt::format("{}: --planar: found that {}, expected a mechanism that moves in one plane",
-                    file_.name(), why));
-  }
-  description = plane->description;
-  const double rounding = 1e-12 * plane->description.gravity.norm();  // as axes are level to
-  if (std::abs(plane->gravity_dropped) > rounding) {
-    Note(elements_[kGround], fmt::format("gravity of {:.6g} m/s^2 along the normal of the plane "
-                                         "dropped: it moves nothing",
-                                         plane->gravity_dropped));
-  }
 }
 
 Imported ImportDraft::Finish(const std::string& format) {

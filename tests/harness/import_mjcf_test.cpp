@@ -313,6 +313,34 @@ TEST(ImportMjcf, MotorsUnderAConstantControlAreTorques) {
   ExpectNote(Two("<actuator><position joint=\"j\"/></actuator>"), "<position>", "no actuators");
 }
 
+TEST(ImportMjcf, PlanarMechanismsHaveGravityAlongMinusY) {
+  ImportOptions options;
+  options.planar = true;
+  const Imported imported = ImportText(R"(<mujoco><worldbody>
+      <site name="w" pos="1 0 0.5"/>
+      <body name="b" pos="0 0.25 0"><joint name="j" axis="0 1 0" stiffness="1" springref="30"/>
+        <geom size="0.1" pos="0 0 1"/><site name="s" pos="0 -0.25 1"/></body>
+      <body name="c" pos="2 0 0"><joint name="k" axis="0 -1 0"/><geom size="0.1" pos="0 0 1"/></body>
+    </worldbody>
+    <equality><connect body1="b" body2="c" anchor="0 0 1"/></equality>
+    <tendon><spatial stiffness="2"><site site="w"/><site site="s"/></spatial></tendon>
+    <keyframe><key qpos="0.5 -0.5"/></keyframe></mujoco>)",
+                                       "file.xml", options);
+  const MechanismDescription& planar = imported.description;
+  EXPECT_EQ(planar.space, SpaceKind::kPlanar);
+  EXPECT_LE((planar.gravity - Eigen::Vector3d(0, -9.81, 0)).norm(), 1e-14);
+  // z is the ground's y, y its z, and so x its -x
+  const Eigen::Vector3d& w = planar.bodies[kGround].points.at("w");
+  EXPECT_LE((w - Eigen::Vector3d(-1, 0.5, 0)).norm(), 10 * kEps);
+  EXPECT_LE((ForcesOf<SpringDamper>(imported)[0].from.at - w).norm(), 10 * kEps);
+  EXPECT_EQ(planar.joints.back().type, JointType::kRevolute);
+  EXPECT_TRUE(planar.joints.back().cut);
+  EXPECT_EQ(planar.initial.coordinates[0].values[0], 0.5);
+  // a joint about the other way turns as seen from the other body
+  EXPECT_EQ(planar.initial.coordinates[1].values[0], -0.5);
+  EXPECT_EQ(planar.joints[1].to.body, kGround);
+}
+
 TEST(ImportMjcf, EveryKindOfDroppedElementHasItsNote) {
   const Imported imported = ImportText(R"(<mujoco>
   <option timestep="0.1" density="1.2" integrator="RK4"/>

@@ -13,7 +13,7 @@ lost, stands in its first comment and is printed. What a format does not have is
 is written: prescribed motions, forces that depend on time, drag, forces along a joint that closes a loop; docs/exchange-out.md.
 
   loopbench convert my.json --to mjcf                  # my.xml: python3 -m mujoco.viewer --mjcf=my.xml
-  loopbench convert my.json --to mjcf --step 1e-4      # loops that come apart less
+  loopbench convert my.json --to mjcf --step 1e-4      # stiff springs, and loops that come apart less
   loopbench convert my.json --to simbody --out my.cpp
   g++ -std=c++17 -O2 -isystem /usr/include/simbody my.cpp -o my -lSimTKsimbody -lSimTKmath -lSimTKcommon
   ./my                                                 # JSON: coordinates, speeds, accelerations, places

@@ -1,30 +1,31 @@
 #include "odca/arm_closing.h"
 
-#include <Eigen/Cholesky>
 #include <algorithm>
-#include <numeric>
 #include <utility>
 
 namespace loopbench::odca::arms {
 
 namespace {
 
-using Square = Eigen::Matrix<double, Eigen::Dynamic, Eigen::Dynamic, 0, kAll, kAll>;
-using Column = Eigen::Matrix<double, Eigen::Dynamic, 1, 0, kAll, 1>;
 using V3 = Linear<Spatial, double>;
 
-/// X += C zeta C^T, rows of C being `count` forces on the handle. The lower triangle.
-void AddResponse(const Symmetric<double, kAll>& zeta, const double (*C)[kAll], int count,
-                 Square& X) {
-  for (int a = 0; a < count; ++a) {
+/// X += C zeta C^T, rows of C being forces on the handle.
+template <int n>
+void AddResponse(const Symmetric<double, kAll>& zeta, const double (&C)[n][kAll],
+                 Symmetric<double, n>& X) {
+  for (int a = 0; a < n; ++a) {
     double response[kAll] = {};
+    LOOPBENCH_UNROLL
     for (int i = 0; i < kAll; ++i) {
-      for (int j = 0; j <= i; ++j) {
-        response[i] += zeta(i, j) * C[a][j];
-        if (j < i) response[j] += zeta(i, j) * C[a][i];
-      }
+      LOOPBENCH_UNROLL
+      for (int j = 0; j < kAll; ++j) response[i] += (j <= i ? zeta(i, j) : zeta(j, i)) * C[a][j];
     }
-    for (int b = a; b < count; ++b) X(b, a) += std::inner_product(C[b], C[b] + kAll, response, 0.0);
+    for (int b = a; b < n; ++b) {
+      double sum = X(b, a);
+      LOOPBENCH_UNROLL
+      for (int i = 0; i < kAll; ++i) sum += C[b][i] * response[i];
+      X(b, a) = sum;
+    }
   }
 }
 
@@ -76,29 +77,53 @@ Acceleration<Spatial, double> Closing::Missing(const ClosingSide& P, const Closi
 
 /// X = D^T (S zeta S^T of both) D as (16), or one of them at Ground (33, 34). The least eigenvalue
 /// of X over X_alone is at least 1 / tr(X^-1 X_alone).
-template <Sought kSought>
-double Closing::Close(ClosingSide& P, ClosingSide& Q) const {
-  const int n = joint_.rows();
-  Square X = Square::Zero(n, n), X_alone = X;
+template <Sought kSought, int n>
+double Closing::CloseRows(ClosingSide& P, ClosingSide& Q) const {
+  Factors<double, n> X = {};
+  Symmetric<double, n> X_alone = {};
   for (const auto& [side, way] : {std::pair(&P, &from_P_), std::pair(&Q, &from_Q_)}) {
     if (side->alone == nullptr) continue;
-    double C[kAll][kAll];
+    double C[n][kAll];
     for (int a = 0; a < n; ++a) way->Back(joint_.D(a), C[a]);
-    AddResponse(side->assembly.zeta22, C, n, X);
-    AddResponse(*side->alone, C, n, X_alone);
+    AddResponse(side->assembly.zeta22, C, X.L);
+    AddResponse(*side->alone, C, X_alone);
   }
+  double slack = 1.0, phi[n], trace = 0.0;
+  Factor(X, slack);
   const Acceleration<Spatial, double> missing = Missing<kSought>(P, Q);
-  Column phi(n);
   for (int a = 0; a < n; ++a) phi[a] = joint_.D(a).dot(missing);
-  const Eigen::LLT<Square> factors(X);
-  if (factors.info() != Eigen::Success) return -1.0;
-  factors.solveInPlace(phi);
+  X.Forward(phi);
+  X.Backward(phi);
   auto force = Direction<Spatial, double>::Zero();
   for (int a = 0; a < n; ++a) force += joint_.D(a) * phi[a];  // (13)
   from_Q_.Back(force, Q.F2);
   from_P_.Back(-force, P.F2);
-  const Square all = X_alone.template selfadjointView<Eigen::Lower>();
-  return 1.0 - limit_ * factors.solve(all).trace();
+  for (int a = 0; a < n; ++a) {
+    double column[n];
+    for (int b = 0; b < n; ++b) column[b] = b < a ? X_alone(a, b) : X_alone(b, a);
+    X.Forward(column);
+    X.Backward(column);
+    trace += column[a];
+  }
+  return Min(slack, 1.0 - limit_ * trace);
+}
+
+template <Sought kSought>
+double Closing::Close(ClosingSide& P, ClosingSide& Q) const {
+  switch (joint_.rows()) {
+    case 1:
+      return CloseRows<kSought, 1>(P, Q);
+    case 2:
+      return CloseRows<kSought, 2>(P, Q);
+    case 3:
+      return CloseRows<kSought, 3>(P, Q);
+    case 4:
+      return CloseRows<kSought, 4>(P, Q);
+    case 5:
+      return CloseRows<kSought, 5>(P, Q);
+    default:
+      return CloseRows<kSought, 6>(P, Q);
+  }
 }
 
 template double Closing::Close<Sought::kAccelerations>(ClosingSide&, ClosingSide&) const;

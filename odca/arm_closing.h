@@ -41,6 +41,8 @@ class Closing {
     /// A force at Mo as one on the side, in its rows.
     void Back(const Wrench<Spatial, double>& F, double* rows) const;
   };
+  template <Sought kSought, int n>
+  double CloseRows(ClosingSide& P, ClosingSide& Q) const;
   template <Sought kSought>
   Acceleration<Spatial, double> Missing(const ClosingSide& P, const ClosingSide& Q) const;
 

@@ -32,7 +32,7 @@ namespace loopbench::odca::arms {
 class ArmSweep {
  public:
   /// Enough work for a thread to wait for the others after it.
-  static constexpr int kBodiesOfGroup = 512;
+  static constexpr int kBodiesOfGroup = 1024;
 
   /// Null where FindArms() finds none, or loops lose rank wherever bodies stand. The mechanism need
   /// not outlive the sweep. Up to `threads` threads work on it, one for every `bodies_of_group`

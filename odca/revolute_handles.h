@@ -44,14 +44,14 @@ struct OneHandle {
 };
 
 /// X = L d L^T of a join, L having ones on its diagonal, which is where `inverse` 1 / d stands.
-template <class T>
+template <class T, int n = kRows>
 struct Factors {
-  Symmetric<T, kRows> L;
+  Symmetric<T, n> L;
 
   /// v := L^-1 v.
   LOOPBENCH_INLINE void Forward(T* v, int stride = 1) const {
     LOOPBENCH_UNROLL
-    for (int i = 1; i < kRows; ++i) {
+    for (int i = 1; i < n; ++i) {
       LOOPBENCH_UNROLL
       for (int j = 0; j < i; ++j) v[i * stride] = v[i * stride] - L(i, j) * v[j * stride];
     }
@@ -59,31 +59,31 @@ struct Factors {
   /// v := L^-T d^-1 v.
   LOOPBENCH_INLINE void Backward(T* v) const {
     LOOPBENCH_UNROLL
-    for (int i = kRows - 1; i >= 0; --i) {
+    for (int i = n - 1; i >= 0; --i) {
       v[i] = v[i] * L(i, i);
       LOOPBENCH_UNROLL
-      for (int j = i + 1; j < kRows; ++j) v[i] = v[i] - L(j, i) * v[j];
+      for (int j = i + 1; j < n; ++j) v[i] = v[i] - L(j, i) * v[j];
     }
   }
 };
 
 /// X in place (16). `slack` becomes negative where a pivot is.
-template <class T>
-LOOPBENCH_INLINE void Factor(Factors<T>& X, T& slack) {
-  Symmetric<T, kRows>& L = X.L;
+template <class T, int n>
+LOOPBENCH_INLINE void Factor(Factors<T, n>& X, T& slack) {
+  Symmetric<T, n>& L = X.L;
   LOOPBENCH_UNROLL
-  for (int j = 0; j < kRows; ++j) {
+  for (int j = 0; j < n; ++j) {
     slack = Min(slack, L(j, j));
     const T inverse = 1.0 / L(j, j);
     L(j, j) = inverse;
-    T column[kRows];
+    T column[n];
     LOOPBENCH_UNROLL
-    for (int i = j + 1; i < kRows; ++i) {
+    for (int i = j + 1; i < n; ++i) {
       column[i] = L(i, j);
       L(i, j) = column[i] * inverse;
     }
     LOOPBENCH_UNROLL
-    for (int i = j + 1; i < kRows; ++i) {
+    for (int i = j + 1; i < n; ++i) {
       LOOPBENCH_UNROLL
       for (int l = j + 1; l <= i; ++l) L(i, l) = L(i, l) - L(i, j) * column[l];
     }

@@ -87,6 +87,9 @@ class ArmSweep {
   };
   ArmSweep() = default;
   void Lay(const Arms& arms, int bodies_of_group);
+  /// From `piece` on, which becomes the next one.
+  void LayInner(const Arm& arm, int& piece, std::vector<Link<Lanes>>& packs, ArmPlaces& places);
+  void SetPlace(int place, const ArmBody& body);
   void LayClosings(const Arms& arms);
   /// Whether some position, however far from being closed, is none that Evaluate() refuses. There
   /// is none where axes of loops are parallel or meet in a point, which costs rank everywhere.

@@ -19,16 +19,25 @@ int Inner(const Arm& arm) {
   return static_cast<int>(arm.bodies.size()) - (arm.closing >= 0 ? 1 : 0);
 }
 
-/// The longest length of pieces of which there are as many as fill these groups, 0 for none.
-int LengthOfPieces(const std::vector<Arm>& arms, int groups) {
-  int bodies = 0;
+struct Pieces {
+  int length = 0, groups = 0;
+};
+/// The longest pieces that, in full groups, hold most of the bodies; else those that hold as many
+/// as can be. No fewer groups than are asked for, if there are any.
+Pieces ChoosePieces(const std::vector<Arm>& arms, int groups) {
+  int bodies = 0, most = 0;
   for (const Arm& arm : arms) bodies += Inner(arm);
+  Pieces best;
   for (int length = bodies / (groups * kLanes); length >= kShortestPiece; --length) {
     int pieces = 0;
     for (const Arm& arm : arms) pieces += Inner(arm) / length;
-    if (pieces >= groups * kLanes) return length;
+    const int held = pieces / kLanes * kLanes * length;
+    if (held <= most) continue;
+    most = held;
+    best = {length, pieces / kLanes};
+    if (8 * held >= 7 * bodies) break;
   }
-  return 0;
+  return best;
 }
 
 /// Acceleration of a side on Ground, all being less that of gravity: rows of forces.
@@ -58,8 +67,9 @@ bool ArmSweep::Serves() {
   constexpr double kGoldenAngle = 2.399963229728653;
   if (closings_.empty()) return true;
   for (int trial = 1; trial <= kTrials; ++trial) {
-    for (int i = 0; i < num_u_; ++i)
+    for (int i = 0; i < num_u_; ++i) {
       moved_[i] = std::remainder(kGoldenAngle * trial * (i + 1), 6.0);
+    }
     if (Evaluate(SpeedsUsed::kGiven, {moved_.data(), moved_.data() + num_u_},
                  {speeds_.data(), speeds_.data() + num_u_}, {back_.data(), back_.data() + num_u_},
                  {step_.data(), step_.data() + num_u_})) {
@@ -70,55 +80,33 @@ bool ArmSweep::Serves() {
 }
 
 void ArmSweep::Lay(const Arms& arms, int bodies_of_group) {
-  const int num_groups = std::max(1, num_u_ / bodies_of_group);
-  length_ = LengthOfPieces(arms.arms, num_groups);
-  num_pieces_ = length_ > 0 ? num_groups * kLanes : 0;
+  const Pieces pieces = ChoosePieces(arms.arms, std::max(1, num_u_ / bodies_of_group));
+  length_ = pieces.length;
+  num_pieces_ = pieces.groups * kLanes;
   packed_ = num_pieces_ * length_;
-  groups_.resize(length_ > 0 ? num_groups : 0);
   sign_.setZero(num_u_);
   angle_ = speed_ = sine_ = cosine_ = rate_ = moved_ = back_ = speeds_ = step_ = sign_;
   index_.assign(num_u_, 0);
   std::vector<Link<Lanes>> packs(packed_ / kLanes);
-  std::vector<const ArmBody*> singles, tips;
   int piece = 0;
   for (const Arm& arm : arms.arms) {
-    ArmPlaces places;
-    places.first_piece = piece;
-    places.first_single = static_cast<int>(singles.size());
-    const ArmBody* body = arm.bodies.data();
-    const ArmBody* inner = body + Inner(arm);
-    for (; length_ > 0 && inner - body >= length_ && piece < num_pieces_; ++piece) {
-      for (int i = 0; i < length_; ++i, ++body) {
-        const int place = place_of_piece(piece) + i * kLanes;
-        index_[place] = body->u;
-        sign_[place] = body->sign;
-        SetLane(packs[place / kLanes], piece % kLanes, body->link);
-      }
-      ++places.pieces;
-    }
-    for (; body != inner; ++body) singles.push_back(body);
-    places.singles = static_cast<int>(singles.size()) - places.first_single;
-    if (arm.closing >= 0) {
-      places.tip = static_cast<int>(tips_.size());
-      tips.push_back(body);
-      TipState& tip = tips_.emplace_back();
-      tip.link = body->link;
-      tip.constants = arm.tip;
-      tip.ground = arm.ground;
-    }
+    ArmPlaces& places = arms_.emplace_back();
     SetRise(arm.ground, arms.gravity, places.ground);
-    arms_.push_back(places);
+    LayInner(arm, piece, packs, places);
+  }
+  for (std::size_t i = 0; i < arms_.size(); ++i) {
+    const Arm& arm = arms.arms[i];
+    if (arm.closing < 0) continue;
+    arms_[i].tip = static_cast<int>(tips_.size());
+    TipState& tip = tips_.emplace_back();
+    tip.link = arm.bodies.back().link;
+    tip.constants = arm.tip;
+    tip.ground = arm.ground;
+    SetPlace(place_of_tip(arms_[i].tip), arm.bodies.back());
   }
   for (const Link<Lanes>& pack : packs) links_.Add(pack);
+  groups_.resize(pieces.groups);
   for (std::size_t g = 0; g < groups_.size(); ++g) groups_[g].pack = static_cast<int>(g) * length_;
-  int place = packed_;
-  for (const auto* list : {&singles, &tips}) {
-    for (const ArmBody* body : *list) {
-      index_[place] = body->u;
-      sign_[place++] = body->sign;
-    }
-  }
-  for (const ArmBody* body : singles) singles_.push_back(body->link);
   cuts_.resize(packs.size());
   about1_.resize(packs.size());
   about2_.resize(packs.size());
@@ -126,6 +114,33 @@ void ArmSweep::Lay(const Arms& arms, int bodies_of_group) {
   end_cuts_.resize(num_pieces_ + singles_.size());
   end_about2_.resize(end_cuts_.size());
   LayClosings(arms);
+}
+
+/// Bodies into pieces as long as there are any left to fill, and those left over behind all pieces.
+void ArmSweep::LayInner(const Arm& arm, int& piece, std::vector<Link<Lanes>>& packs,
+                        ArmPlaces& places) {
+  places.first_piece = piece;
+  places.first_single = static_cast<int>(singles_.size());
+  const ArmBody* body = arm.bodies.data();
+  const ArmBody* end = body + Inner(arm);
+  for (; piece < num_pieces_ && end - body >= length_; ++piece) {
+    for (int i = 0; i < length_; ++i, ++body) {
+      const int place = place_of_piece(piece) + i * kLanes;
+      SetPlace(place, *body);
+      SetLane(packs[place / kLanes], piece % kLanes, body->link);
+    }
+  }
+  for (; body != end; ++body) {
+    SetPlace(packed_ + static_cast<int>(singles_.size()), *body);
+    singles_.push_back(body->link);
+  }
+  places.pieces = piece - places.first_piece;
+  places.singles = static_cast<int>(singles_.size()) - places.first_single;
+}
+
+void ArmSweep::SetPlace(int place, const ArmBody& body) {
+  index_[place] = body.u;
+  sign_[place] = body.sign;
 }
 
 void ArmSweep::LayClosings(const Arms& arms) {

@@ -424,26 +424,7 @@ TEST(PathSweep, LeavesWhatIsSoftenedToTheGeneralSweep) {
   }
 }
 
-/// A number that counts its products.
-struct Counted {
-  double value = 0.0;
-  inline static int products = 0;
-  Counted() = default;
-  Counted(double number) : value(number) {}
-  friend Counted operator+(Counted a, Counted b) { return a.value + b.value; }
-  friend Counted operator-(Counted a, Counted b) { return a.value - b.value; }
-  friend Counted operator-(Counted a) { return -a.value; }
-  friend Counted operator*(Counted a, Counted b) { return ++products, a.value * b.value; }
-  friend Counted operator/(Counted a, Counted b) { return ++products, a.value / b.value; }
-  friend bool operator<(Counted a, Counted b) { return a.value < b.value; }
-};
-
 TEST(TwoHandleKernels, TakeAsManyOperationsAsTheySay) {
-  const auto products = [](auto call) {
-    Counted::products = 0;
-    call();
-    return Counted::products;
-  };
   Link<Counted> link;
   TurnedLink<Counted> at;
   TwoHandle<Counted> A, B;
@@ -452,17 +433,17 @@ TEST(TwoHandleKernels, TakeAsManyOperationsAsTheySay) {
   EndCut<Counted> end_cut;
   Vector2<Counted> F;
   Counted speed, slack;
-  EXPECT_EQ(products([&] { Leaf<Pass::kAccelerations>(link, at, speed); }),
+  EXPECT_EQ(ProductsOf([&] { Leaf<Pass::kAccelerations>(link, at, speed); }),
             Operations::Leaf(Pass::kAccelerations));
-  EXPECT_EQ(products([&] { Leaf<Pass::kSpeeds>(link, at, speed); }),
+  EXPECT_EQ(ProductsOf([&] { Leaf<Pass::kSpeeds>(link, at, speed); }),
             Operations::Leaf(Pass::kSpeeds));
-  EXPECT_EQ(products([&] { Leaf<Pass::kCompleted>(link, at, speed); }),
+  EXPECT_EQ(ProductsOf([&] { Leaf<Pass::kCompleted>(link, at, speed); }),
             Operations::Leaf(Pass::kCompleted));
-  EXPECT_EQ(products([&] { Join(A, B, Counted(0.0), cut, slack); }), Operations::kJoin);
-  EXPECT_EQ(products([&] { Join(end, B, Counted(0.0), end_cut, slack); }), Operations::kEndJoin);
-  EXPECT_EQ(products([&] { ForceIn(cut, F, F); }), Operations::kForceIn);
-  EXPECT_EQ(products([&] { ForceIn(end_cut, F); }), Operations::kForceInEnd);
-  EXPECT_EQ(products([&] { AngularAcceleration<Pass::kCompleted>(at, F, F); }),
+  EXPECT_EQ(ProductsOf([&] { Join(A, B, Counted(0.0), cut, slack); }), Operations::kJoin);
+  EXPECT_EQ(ProductsOf([&] { Join(end, B, Counted(0.0), end_cut, slack); }), Operations::kEndJoin);
+  EXPECT_EQ(ProductsOf([&] { ForceIn(cut, F, F); }), Operations::kForceIn);
+  EXPECT_EQ(ProductsOf([&] { ForceIn(end_cut, F); }), Operations::kForceInEnd);
+  EXPECT_EQ(ProductsOf([&] { AngularAcceleration<Pass::kCompleted>(at, F, F); }),
             Operations::kAngularAcceleration);
 }
 

@@ -66,4 +66,24 @@ Both Compare(const Mechanism<Space, double>& mechanism, Sweep* sweep, SpeedsUsed
   return both;
 }
 
+/// A number that counts its products.
+struct Counted {
+  double value = 0.0;
+  inline static int products = 0;
+  Counted() = default;
+  Counted(double number) : value(number) {}
+  friend Counted operator+(Counted a, Counted b) { return a.value + b.value; }
+  friend Counted operator-(Counted a, Counted b) { return a.value - b.value; }
+  friend Counted operator-(Counted a) { return -a.value; }
+  friend Counted operator*(Counted a, Counted b) { return ++products, a.value * b.value; }
+  friend Counted operator/(Counted a, Counted b) { return ++products, a.value / b.value; }
+  friend bool operator<(Counted a, Counted b) { return a.value < b.value; }
+};
+
+inline int ProductsOf(auto call) {
+  Counted::products = 0;
+  call();
+  return Counted::products;
+}
+
 }  // namespace loopbench::odca

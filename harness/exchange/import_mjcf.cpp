@@ -184,7 +184,7 @@ std::map<std::string, XmlElement> HeldTendons(const XmlElement& root, MjcfModel*
   std::map<std::string, XmlElement> held;
   for (const XmlElement& section : root.Children("equality")) {
     for (const XmlElement& element : section.Children("tendon")) {
-      const MjcfElement equality = model->defaults.Of(element, "");
+      const MjcfElement equality = model->defaults.Of(element, "", "equality");
       const auto active = equality.Attribute("active");
       const auto first = equality.Attribute("tendon1");
       if (!first || equality.Attribute("tendon2") || (active && !active->Bool())) continue;

@@ -13,6 +13,9 @@
 
 namespace loopbench::harness {
 
+/// Why springs, dampers and efforts of a joint of several coordinates are dropped.
+inline constexpr const char* kNeedsOneCoordinate = "only joints with one coordinate have forces";
+
 /// An element with what its classes say where it is silent: itself first, then the nearest class.
 class MjcfElement {
  public:
@@ -34,8 +37,10 @@ class MjcfElement {
 class MjcfDefaults {
  public:
   void Read(const XmlElement& element, const std::string& parent);
-  /// `childclass`: of the bodies around the element.
-  MjcfElement Of(const XmlElement& element, const std::string& childclass) const;
+  /// `childclass`: of the bodies around the element; `tag`: that of its defaults, if it is not its
+  /// own.
+  MjcfElement Of(const XmlElement& element, const std::string& childclass,
+                 const std::string& tag = "") const;
   /// Refuses a class that nobody has described.
   void CheckClass(const XmlValue& value) const;
   /// What no element took counts as read.

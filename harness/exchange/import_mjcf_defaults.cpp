@@ -65,7 +65,9 @@ void MjcfDefaults::CheckClass(const XmlValue& value) const {
   }
 }
 
-MjcfElement MjcfDefaults::Of(const XmlElement& element, const std::string& childclass) const {
+MjcfElement MjcfDefaults::Of(const XmlElement& element, const std::string& childclass,
+                             const std::string& tag) const {
+  const std::string wanted = tag.empty() ? element.tag() : tag;
   std::string name = childclass.empty() ? kMain : childclass;
   if (const auto given = element.Attribute("class")) {
     CheckClass(*given);
@@ -74,10 +76,10 @@ MjcfElement MjcfDefaults::Of(const XmlElement& element, const std::string& child
   std::vector<XmlElement> layers;
   for (auto found = classes_.find(name); found != classes_.end();
        found = classes_.find(found->second.parent)) {
-    const auto defaults = found->second.elements.find(element.tag());
+    const auto defaults = found->second.elements.find(wanted);
     if (defaults == found->second.elements.end()) continue;
     layers.push_back(defaults->second);
-    used_.emplace(found->first, element.tag());
+    used_.emplace(found->first, wanted);
   }
   return {element, std::move(layers)};
 }

@@ -169,7 +169,7 @@ void AddJointForces(MjcfModel* model, const MjcfJoint& joint) {
   const double c = element.Number("damping", 0.0, kNotNegative);
   const bool has_one = joint.num_q() == 1 && joint.alone;
   const auto drop = [&](const char* name) {
-    draft->Note(element.own(), name, "dropped: only joints with one coordinate have forces", true);
+    draft->Note(element.own(), name, fmt::format("dropped: {}", kNeedsOneCoordinate), true);
   };
   if (k > 0.0 && model->settings.has_springs) {
     if (has_one) {

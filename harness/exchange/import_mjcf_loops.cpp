@@ -110,7 +110,7 @@ void ReadSolverOptions(const MjcfElement& element) {
 
 void ReadMjcfEquality(const XmlElement& section, MjcfModel* model) {
   for (const XmlElement& element : section.Children()) {
-    const MjcfElement equality = model->defaults.Of(element, "");
+    const MjcfElement equality = model->defaults.Of(element, "", "equality");
     const auto active = equality.Attribute("active");
     ReadSolverOptions(equality);
     const std::string tag = element.tag();
@@ -185,7 +185,7 @@ double LengthOf(const std::pair<BodyPoint, BodyPoint>& ends, const std::vector<P
 
 void ReadTendon(const XmlElement& element, const std::map<std::string, XmlElement>& held,
                 const std::vector<Placement>& free_poses, MjcfModel* model) {
-  const MjcfElement tendon = model->defaults.Of(element, "");
+  const MjcfElement tendon = model->defaults.Of(element, "", "tendon");
   const auto name = element.Attribute("name");
   const auto ends = element.tag() == "spatial" ? StraightEnds(element, *model) : std::nullopt;
   if (!ends || ends->first.body == ends->second.body) {
@@ -208,7 +208,7 @@ void ReadTendon(const XmlElement& element, const std::map<std::string, XmlElemen
   }
   for (const XmlElement& layer : tendon.Layers()) layer.IgnoreAttributes();
   if (!name || !held.contains(name->text()) || !model->settings.has_equality) return;
-  const MjcfElement equality = model->defaults.Of(held.at(name->text()), "");
+  const MjcfElement equality = model->defaults.Of(held.at(name->text()), "", "equality");
   const auto coefficients = equality.Attribute("polycoef");
   const double offset = coefficients ? coefficients->Numbers(1, 5)[0] : 0.0;
   const double drawn = LengthOf(*ends, model->draft->at_rest);

@@ -124,32 +124,32 @@ void SetMjcfStart(MjcfModel* model, const std::vector<double>& qpos,
 }
 
 /// A motor on a joint with one coordinate, under a control that stays: a constant effort.
+void AddMotor(const XmlElement& element, double control, MjcfModel* model) {
+  const auto drop = [&](const char* why, bool changes_motion) {
+    element.Ignore();
+    model->draft->Note(element, fmt::format("dropped: {}", why), changes_motion);
+  };
+  const bool is_motor = element.tag() == "motor";
+  const auto name = is_motor ? element.Attribute("joint") : std::nullopt;
+  if (is_motor && control == 0.0) return drop("its control is 0 in the start that is read", false);
+  if (!name) return drop("there are no actuators but motors of joints (<key ctrl=...>)", true);
+  const MjcfJoint& joint = model->JointNamed(*name);
+  if (joint.num_q() != 1 || !joint.alone) return drop(kNeedsOneCoordinate, true);
+  const MjcfElement motor = model->defaults.Of(element, "");
+  const auto gear = motor.Attribute("gear");
+  const double ratio = gear ? gear->Numbers(1, 6)[0] : 1.0;
+  model->draft->description.forces.emplace_back(
+      JointTorque{joint.joint, Polynomial{{ratio * control}}});
+  for (const XmlElement& layer : motor.Layers()) layer.IgnoreAttributes();
+  model->draft->Note(element, "a constant effort here, with the control of the start");
+}
+
 void AddMotors(const XmlElement& root, const std::vector<double>& controls, MjcfModel* model) {
   std::size_t index = 0;
   for (const XmlElement& section : root.Children("actuator")) {
     for (const XmlElement& element : section.Children()) {
-      const double control = index < controls.size() ? controls[index] : 0.0;
+      AddMotor(element, index < controls.size() ? controls[index] : 0.0, model);
       ++index;
-      const bool is_motor = element.tag() == "motor";
-      const auto name = is_motor ? element.Attribute("joint") : std::nullopt;
-      if (!name || control == 0.0) {
-        element.Ignore();
-        model->draft->Note(element,
-                           is_motor ? "dropped: its control is 0 in the start that is read"
-                                    : "dropped: there are no actuators but motors under a constant "
-                                      "control (<key ctrl=...>)",
-                           !is_motor);
-        continue;
-      }
-      const MjcfJoint& joint = model->JointNamed(*name);
-      const MjcfElement motor = model->defaults.Of(element, "");
-      const auto gear = motor.Attribute("gear");
-      if (joint.num_q() != 1 || !joint.alone) name->Fail("a joint with one coordinate");
-      const double ratio = gear ? gear->Numbers(1, 6)[0] : 1.0;
-      model->draft->description.forces.emplace_back(
-          JointTorque{joint.joint, Polynomial{{ratio * control}}});
-      element.Ignore();
-      model->draft->Note(element, "a constant effort here, with the control of the start");
     }
   }
 }

@@ -258,6 +258,10 @@ TEST(ImportMjcf, TendonsBetweenTwoSitesAreSpringsOrRods) {
           "</spatial></tendon>");
   EXPECT_EQ(rod.description.joints.back().type, JointType::kRod);
   EXPECT_NEAR(rod.description.joints.back().parameter, std::sqrt(11.0), 10 * kEps);
+  // classes call both kinds of tendon so
+  const Imported of_class = Two("<default><tendon damping=\"4\"/></default><tendon><spatial>" +
+                                sites + "</spatial></tendon>");
+  EXPECT_EQ(ForcesOf<SpringDamper>(of_class)[0].damping, 4.0);
   const Imported wrapped = Two("<tendon><spatial name=\"t\" stiffness=\"3\">" + sites +
                                "<site site=\"s0\"/></spatial></tendon>");
   ExpectNote(wrapped, "<spatial name=\"t\">", "only spatial tendons straight");

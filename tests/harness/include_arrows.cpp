@@ -8,44 +8,25 @@ namespace loopbench::architecture {
 namespace {
 
 // From the ground floor up: files of a room include those of rooms above it in this list only.
-constexpr std::string_view kRooms[] = {"mechanism/algebra",
-                                       "mechanism/description",
-                                       "mechanism/model",
-                                       "mechanism/loops",
-                                       "mechanism/start",
-                                       "mechanism/formulation",
-                                       "mechanism/simplify",
-                                       "odca",
-                                       "lagrange",
-                                       "reduction",
-                                       "harness/text",
-                                       "harness/json",
-                                       "harness/record",
-                                       "harness/store",
-                                       "harness/config",
-                                       "harness/analysis",
-                                       "harness/integrator",
-                                       "harness/reference",
-                                       "harness/trajectory",
-                                       "harness/observers",
-                                       "harness/run",
-                                       "harness/precision",
-                                       "harness/isolation",
-                                       "harness/timing",
-                                       "harness/suite",
-                                       "harness/cluster",
-                                       "harness/advise",
-                                       "harness/tables",
-                                       "harness/judge",
-                                       "harness/figures",
-                                       "harness/view",
-                                       "harness/exchange",
-                                       "harness/report",
-                                       "harness/history",
-                                       "harness/cli",
-                                       "peers",
-                                       "examples/own-parts",
-                                       "tests"};
+constexpr std::string_view kRooms[] = {"mechanism/algebra",  "mechanism/description",
+                                       "mechanism/model",    "mechanism/loops",
+                                       "mechanism/start",    "mechanism/formulation",
+                                       "mechanism/simplify", "odca",
+                                       "lagrange",           "reduction",
+                                       "harness/text",       "harness/json",
+                                       "harness/record",     "harness/store",
+                                       "harness/config",     "harness/analysis",
+                                       "harness/integrator", "harness/reference",
+                                       "harness/trajectory", "harness/observers",
+                                       "harness/run",        "harness/precision",
+                                       "harness/isolation",  "harness/timing",
+                                       "harness/suite",      "harness/cluster",
+                                       "harness/advise",     "harness/tables",
+                                       "harness/judge",      "harness/figures",
+                                       "harness/view",       "harness/exchange",
+                                       "harness/report",     "harness/history",
+                                       "harness/cli",        "peers",
+                                       "examples/own-parts", "tests"};
 // The build writes these headers, and one room reads them.
 constexpr std::string_view kGenerated = "harness/build_";
 
@@ -105,7 +86,8 @@ std::string_view WhyNotForeign(std::string_view path, std::string_view header) {
                : "peers are for the folders of peers/ and their tests";
   }
   if (header == "tinyxml2.h") {
-    return path == "harness/exchange/xml_file.cpp" ? "" : "XML is for harness/exchange/xml_file.cpp";
+    return path == "harness/exchange/xml_file.cpp" ? ""
+                                                   : "XML is for harness/exchange/xml_file.cpp";
   }
   if (header.starts_with("boost/")) {
     const bool allowed =

@@ -39,7 +39,7 @@ void ArmSweep::Start(const ArmPlaces& arm) {
   }
   if (arm.tip < 0) return;
   TipState& tip = tips_[arm.tip];
-  const int place = packed_ + static_cast<int>(singles_.size()) + arm.tip;
+  const int place = place_of_tip(arm.tip);
   const auto w = Pass<Follow::kPoints>(tip.link.shape, turn(place), speed_[place], along);
   Free<double> free;
   FreeMotion<kSought>(tip.link.shape, w, speed_[place], free);
@@ -53,9 +53,8 @@ void ArmSweep::Start(const ArmPlaces& arm) {
 
 template <Sought kSought>
 void ArmSweep::Up(Group& group) {
-  Vector3<Lanes> w = group.w;
   Lanes slack = {};
-  Passage<Lanes> along;
+  Passage<Lanes> along;  // of which only w is followed
   along.w = group.w;
   Free<Lanes> free;
   for (int pack = group.pack; pack < group.pack + length_; ++pack) {
@@ -63,7 +62,7 @@ void ArmSweep::Up(Group& group) {
     const Link<Lanes>& link = links_[pack];
     const Turn<Lanes> turn = {Load<Lanes>(&cosine_[place]), Load<Lanes>(&sine_[place])};
     const Lanes speed = Load<Lanes>(&speed_[place]);
-    w = Pass<Follow::kSpeeds>(link.shape, turn, speed, along);
+    const auto w = Pass<Follow::kSpeeds>(link.shape, turn, speed, along);
     FreeMotion<kSought>(link.shape, w, speed, free);
     about1_[pack] = free.about1;
     about2_[pack] = free.about2;
@@ -178,8 +177,9 @@ template <Sought kSought>
 void ArmSweep::Move(Correction<double>* largest) {
   if (closings_.empty()) return MoveFollowing<kSought, Follow::kSpeeds>();
   MoveFollowing<kSought, Follow::kPoints>();
-  for (PlacedClosing& at : closings_)
+  for (PlacedClosing& at : closings_) {
     at.closing.Place(Side(at, at.tip_P), Side(at, at.tip_Q), largest);
+  }
 }
 
 long ArmSweep::OperationsOfSweep() const {

@@ -111,8 +111,10 @@ class ArmSweep {
   bool Solve();
   /// The largest mismatch at moved_, or nothing.
   std::optional<Correction<double>> Gap();
+  /// Passages of the group's pieces.
   template <Follow kFollow>
   void Travel(Group& group) const;
+  /// Where pieces begin, free motions of single bodies, the pose and speed of the tip.
   template <Sought kSought, Follow kFollow>
   void Start(const ArmPlaces& arm);
   template <Sought kSought>

@@ -209,6 +209,7 @@ void ReadTendon(const XmlElement& element, const std::map<std::string, XmlElemen
   for (const XmlElement& layer : tendon.Layers()) layer.IgnoreAttributes();
   if (!name || !held.contains(name->text()) || !model->settings.has_equality) return;
   const MjcfElement equality = model->defaults.Of(held.at(name->text()), "", "equality");
+  equality.own().Attribute("name");  // the tendon's is the rod's
   const auto coefficients = equality.Attribute("polycoef");
   const double offset = coefficients ? coefficients->Numbers(1, 5)[0] : 0.0;
   const double drawn = LengthOf(*ends, model->draft->at_rest);

@@ -123,23 +123,46 @@ void SetMjcfStart(MjcfModel* model, const std::vector<double>& qpos,
   }
 }
 
-/// A motor on a joint with one coordinate, under a control that stays: a constant effort.
+/// Of `general`, what it gives under a control: gain times it and a bias, where both are constants.
+std::optional<double> ConstantEffort(const MjcfElement& actuator, double control) {
+  const auto numbers = [&actuator](const char* key, double first) {
+    const auto given = actuator.Attribute(key);
+    return given ? given->Numbers(1, 10) : std::vector<double>{first};
+  };
+  const auto type = [&actuator](const char* key) {
+    const auto given = actuator.Attribute(key);
+    return given ? given->text() : std::string();
+  };
+  const std::vector<double> gain = numbers("gainprm", 1.0), bias = numbers("biasprm", 0.0);
+  const std::string gains = type("gaintype"), biases = type("biastype"), dynamics = type("dyntype");
+  const bool has_bias = biases == "affine";
+  const bool varies = std::any_of(bias.begin() + 1, bias.end(), [](double x) { return x != 0.0; });
+  if ((!gains.empty() && gains != "fixed") || (!dynamics.empty() && dynamics != "none") ||
+      (!has_bias && !biases.empty() && biases != "none") || (has_bias && varies)) {
+    return std::nullopt;
+  }
+  return gain[0] * control + (has_bias ? bias[0] : 0.0);
+}
+
+/// An actuator on a joint with one coordinate, under a control that stays: a constant effort.
 void AddMotor(const XmlElement& element, double control, MjcfModel* model) {
   const auto drop = [&](const char* why, bool changes_motion) {
     element.Ignore();
     model->draft->Note(element, fmt::format("dropped: {}", why), changes_motion);
   };
-  const bool is_motor = element.tag() == "motor";
-  const auto name = is_motor ? element.Attribute("joint") : std::nullopt;
+  const bool is_general = element.tag() == "general", is_motor = element.tag() == "motor";
+  const auto name = is_motor || is_general ? element.Attribute("joint") : std::nullopt;
   if (is_motor && control == 0.0) return drop("its control is 0 in the start that is read", false);
   if (!name) return drop("there are no actuators but motors of joints (<key ctrl=...>)", true);
   const MjcfJoint& joint = model->JointNamed(*name);
   if (joint.num_q() != 1 || !joint.alone) return drop(kNeedsOneCoordinate, true);
   const MjcfElement motor = model->defaults.Of(element, "");
+  const auto effort = is_general ? ConstantEffort(motor, control) : std::optional(control);
+  if (!effort) return drop("its effort is no constant", true);
   const auto gear = motor.Attribute("gear");
   const double ratio = gear ? gear->Numbers(1, 6)[0] : 1.0;
   model->draft->description.forces.emplace_back(
-      JointTorque{joint.joint, Polynomial{{ratio * control}}});
+      JointTorque{joint.joint, Polynomial{{ratio * *effort}}});
   for (const XmlElement& layer : motor.Layers()) layer.IgnoreAttributes();
   model->draft->Note(element, "a constant effort here, with the control of the start");
 }

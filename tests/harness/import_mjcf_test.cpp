@@ -311,6 +311,11 @@ TEST(ImportMjcf, MotorsUnderAConstantControlAreTorques) {
   const std::string motor = "<actuator><motor joint=\"j\" gear=\"2\"/></actuator>";
   const Imported on = Two(motor + "<keyframe><key ctrl=\"3\"/></keyframe>");
   EXPECT_EQ(std::get<Polynomial>(ForcesOf<JointTorque>(on)[0].value).coefficients[0], 6.0);
+  const std::string general =
+      "<actuator><general joint=\"j\" gear=\"2\" gainprm=\"5\" biastype=\"affine\" biasprm=\"";
+  const Imported biased = Two(general + "0.5 0 0\"/></actuator>");  // 2 (5 0 + 0.5)
+  EXPECT_EQ(std::get<Polynomial>(ForcesOf<JointTorque>(biased)[0].value).coefficients[0], 1.0);
+  ExpectNote(Two(general + "0.5 1 0\"/></actuator>"), "<general>", "no constant");
   const Imported off = Two(motor);
   EXPECT_TRUE(ForcesOf<JointTorque>(off).empty());
   ExpectNote(off, "<motor>", "control is 0");

@@ -102,7 +102,7 @@ std::string_view WhyNotForeign(std::string_view path, std::string_view header) {
     return path.starts_with("tests/") ? "" : "GoogleTest is for tests";
   }
   if (header == "Simbody.h" || header.starts_with("mujoco/")) {
-    return StartsWithOneOf(path, {"peers/simbody/", "peers/mujoco/"})
+    return StartsWithOneOf(path, {"peers/simbody/", "peers/mujoco/", "tests/peers/"})
                ? ""
                : "peers are for the folders of peers/";
   }

@@ -144,6 +144,8 @@ std::optional<double> ConstantEffort(const MjcfElement& actuator, double control
   return gain[0] * control + (has_bias ? bias[0] : 0.0);
 }
 
+constexpr const char* kNoControl = "its control is 0 in the start that is read";
+
 /// An actuator on a joint with one coordinate, under a control that stays: a constant effort.
 void AddMotor(const XmlElement& element, double control, MjcfModel* model) {
   const auto drop = [&](const char* why, bool changes_motion) {
@@ -152,13 +154,14 @@ void AddMotor(const XmlElement& element, double control, MjcfModel* model) {
   };
   const bool is_general = element.tag() == "general", is_motor = element.tag() == "motor";
   const auto name = is_motor || is_general ? element.Attribute("joint") : std::nullopt;
-  if (is_motor && control == 0.0) return drop("its control is 0 in the start that is read", false);
+  if (is_motor && control == 0.0) return drop(kNoControl, false);
   if (!name) return drop("there are no actuators but motors of joints (<key ctrl=...>)", true);
   const MjcfJoint& joint = model->JointNamed(*name);
   if (joint.num_q() != 1 || !joint.alone) return drop(kNeedsOneCoordinate, true);
   const MjcfElement motor = model->defaults.Of(element, "");
   const auto effort = is_general ? ConstantEffort(motor, control) : std::optional(control);
   if (!effort) return drop("its effort is no constant", true);
+  if (*effort == 0.0) return drop(kNoControl, false);
   const auto gear = motor.Attribute("gear");
   const double ratio = gear ? gear->Numbers(1, 6)[0] : 1.0;
   model->draft->description.forces.emplace_back(

@@ -398,7 +398,7 @@ TEST(ImportMjcf, EveryKindOfDroppedElementHasItsNote) {
   ExpectNote(imported, "<deformable>", "rigid");
   ExpectNote(imported, "<flex>", "no constraint of this kind");
   ExpectNote(imported, "<fixed name=\"f\">", "straight between two sites");
-  ExpectNote(imported, "<general>", "no actuators");
+  ExpectNote(imported, "<general>", "control is 0");
   ExpectNote(imported, "<key name=\"later\">", "first <key>");
   ExpectNote(imported, "<surprise>", "not known");
   // in the order of the file, each with its line

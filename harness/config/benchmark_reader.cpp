@@ -19,7 +19,7 @@
 namespace loopbench::harness {
 namespace {
 
-const std::vector<std::string> kFamilies = {"chain", "ladder", "grid", "tree"};
+const std::vector<std::string> kFamilies = {"chain", "ladder", "grid", "tree", "arm", "ring"};
 
 std::vector<BenchmarkMember> ReadBenchmarkMechanisms(const JsonNode& node,
                                                      const std::filesystem::path& folder,
@@ -47,8 +47,8 @@ std::vector<BenchmarkMember> ReadBenchmarkFamily(const JsonNode& node, const Jso
   const auto sizes = owner.Required("sizes", "a list of integers");
   if (!index || !sizes) return members;
   const std::string& family = kFamilies[static_cast<std::size_t>(*index)];
-  // the smallest closed chain has three bars
-  const int smallest = family == "chain" ? 3 : 1;
+  // the smallest loops that move have three bars in the plane and six in space
+  const int smallest = family == "chain" ? 3 : family == "ring" ? 6 : 1;
   const int largest = family == "grid" ? kLargestGrid : kLargestMember;
   for (const JsonNode& size : sizes->OneOrMore("sizes")) {
     BenchmarkMember member;

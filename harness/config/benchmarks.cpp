@@ -14,6 +14,11 @@ MechanismDescription BenchmarkMember::Make() const {
     chain.initial.speeds.push_back({0, {std::min(1.0, 1000.0 / size)}});
     return chain;
   }
+  if (family == "arm" || family == "ring") {
+    MechanismDescription arm = Arm(size, family == "ring");
+    arm.initial.speeds.push_back({0, {std::min(1.0, 1000.0 / size)}});
+    return arm;
+  }
   if (family == "ladder") return Ladder(size, 1.0, 1.0);
   if (family == "tree") return Tree(size, 0.1);
   // storeys from 0.4 rad on: with kLargestGrid of them the last stands at 2.8 rad, short of pi

@@ -44,6 +44,34 @@ MechanismDescription Chain(int num_bars) {
   return chain;
 }
 
+MechanismDescription Arm(int num_bars, bool closed) {
+  const int n = num_bars;
+  const Eigen::Vector3d tip = Eigen::Vector3d::UnitX();
+  const double turn = 2.0 * std::numbers::pi / (n + 1);
+  MechanismDescription arm;
+  arm.name = (closed ? "ring-" : "arm-") + std::to_string(n);
+  arm.space = SpaceKind::kSpatial;
+  arm.gravity = {0.0, -9.81, 0.0};
+  // a joint at the start of side k, whose frames are turned to it from side k - 1
+  const auto add = [&](int k, int from, int to, double turned) {
+    const double roll = 2.4 * k;
+    const Eigen::Vector3d start = Eigen::Vector3d::Zero();
+    arm.joints.push_back(Revolute("J" + std::to_string(k), from, k == 1 ? start : tip, to,
+                                  to == kGround ? tip : start));
+    arm.joints.back().from.rotation = {0.0, 0.0, turned};
+    arm.joints.back().axis = Eigen::Vector3d(0.3, std::cos(roll), std::sin(roll)).normalized();
+  };
+  for (int k = 1; k <= n; ++k) {
+    BodyDescription bar = Bar("bar" + std::to_string(k), 1.0, 1.0, 0.31);
+    bar.inertia = Eigen::Vector3d(0.02, 0.3, 0.31).asDiagonal();
+    arm.bodies.push_back(std::move(bar));
+    add(k, k - 1, k, k == 1 ? turn - std::numbers::pi : turn);
+  }
+  // Ground's own axes: a whole turn and a half, less the n turns so far
+  if (closed) add(n + 1, n, kGround, std::numbers::pi - n * turn);
+  return arm;
+}
+
 MechanismDescription Ladder(int num_windows, double angle, double speed) {
   const Eigen::Vector3d origin = Eigen::Vector3d::Zero(), tip = Eigen::Vector3d::UnitX();
   MechanismDescription ladder;

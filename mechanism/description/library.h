@@ -8,6 +8,8 @@
 //   Tree(n)       n bars below a ground pin, two on the tip of each: no loop, log2(n) deep
 //   Hub(m, n)     a disc on a ground pin, m arms of n bars around it; arms may end on ground pins,
 //                 then each closes a loop through the disc
+//   Arm(n)        n bars in space, each joint's axis turned against the one before; open, or closed
+//                 on Ground: a loop with n - 5 degrees of freedom
 #pragma once
 
 #include "mechanism/description/description.h"
@@ -37,6 +39,14 @@ MechanismDescription Tree(int num_bars, double speed);
 /// those whose tips are pinned to Ground (`closed`, bars >= 2) 1 + arms x (bars - 2). Speeds are
 /// left to the caller.
 MechanismDescription Hub(int num_arms, int num_bars, bool closed);
+
+/// `num_bars` bars of 1 m and 1 kg with moments of inertia of 0.02, 0.3 and 0.31 kg m^2, along the
+/// sides of a regular polygon with one corner more, gravity along -y. Axes of joints are across the
+/// bars and out of the polygon's plane, each turned by 2.4 rad (the golden angle) about the bar
+/// against that before it, so that no three of them are alike. `closed` (bars >= 6) adds the side
+/// that is left as Ground; its last joint is the one to cut. Coordinates start at 0, speeds are
+/// left to the caller.
+MechanismDescription Arm(int num_bars, bool closed);
 
 /// A unit bar from its origin A to B = (length, 0): com in the middle.
 BodyDescription Bar(const std::string& name, double length, double mass, double inertia);

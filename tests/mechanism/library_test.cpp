@@ -14,9 +14,10 @@ struct Shape {
   int loops, freedom;
 };
 
+template <class Space = Planar>
 Shape ShapeOf(const MechanismDescription& description) {
-  const Mechanism<Planar, double> mechanism(description, Coordinates::kJoint);
-  const Start<double> start = Assemble<Planar>(description, mechanism);
+  const Mechanism<Space, double> mechanism(description, Coordinates::kJoint);
+  const Start<double> start = Assemble<Space>(description, mechanism);
   EXPECT_EQ(start.outcome, Outcome::kFinished) << description.name << ": " << start.message;
   const auto formulation = MakeSystem<odca::Odca>(mechanism);
   VectorX<double> udot;
@@ -76,6 +77,16 @@ TEST(LibraryTest, AGridStartsWhereItSays) {
     EXPECT_NEAR(kinematics.poses()[body].angle, crank ? -1.0 + 0.1 * (storey - 1) : 0.0, 1e-14);
     EXPECT_NEAR(kinematics.motions()[body][0], crank ? 0.5 * storey : 0.0, 1e-13) << name;
   }
+}
+
+TEST(LibraryTest, ArmsAreOpenAndRingsHaveOneLoopThatTakesSixSpeeds) {
+  const Shape open = ShapeOf<Spatial>(Arm(9, false));
+  EXPECT_EQ(open.loops, 0);
+  EXPECT_EQ(open.freedom, 9);
+  const Shape closed = ShapeOf<Spatial>(Arm(9, true));
+  EXPECT_EQ(closed.loops, 1);
+  EXPECT_EQ(closed.freedom, 4);  // nine speeds, five constraints of the joint that is cut
+  EXPECT_EQ(ShapeOf<Spatial>(Arm(6, true)).freedom, 1);
 }
 
 }  // namespace

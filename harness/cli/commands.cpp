@@ -32,9 +32,9 @@
 
 namespace loopbench::harness {
 
-std::vector<Record> LoadRecords(const std::filesystem::path& store) {
+std::vector<Record> LoadRecords(const std::filesystem::path& store, const Selection& where) {
   std::vector<std::string> warnings;
-  std::vector<Record> records = LatestRecords(ReadRecords(store, &warnings), CodeVersion());
+  std::vector<Record> records = LatestRecords(ReadRecords(store, where, &warnings), CodeVersion());
   SortRows(&records);  // in the store they stand as they ended
   SetDoubts(&records);
   for (const std::string& warning : warnings) PrintError("warning: {}\n", warning);

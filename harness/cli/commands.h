@@ -17,7 +17,7 @@ namespace loopbench::harness {
 
 /// The records of a store, the last of each case, in the order of tables, with their doubts as they
 /// stand beside each other; warnings about it go to standard error.
-std::vector<Record> LoadRecords(const std::filesystem::path& store);
+std::vector<Record> LoadRecords(const std::filesystem::path& store, const Selection& where = {});
 
 /// drift.csv, drift.md and so on of precision and timing in the folder of a store, or beside a
 /// store that is a file, named after it; their short forms on the terminal.

@@ -171,7 +171,7 @@ int PrintTable(const TableCommand& command, const std::string& typed) {
   const bool on_terminal = command.format == "text" && command.out.empty();
   // a page is no wider than a terminal
   view.compact = on_terminal || (command.format == "latex" && view.columns.empty());
-  Table table = MakeTable(LoadRecords(command.store), view);
+  Table table = MakeTable(LoadRecords(command.store, view.where), view);
   if (table.rows.empty()) {
     PrintError("{}: no {} records match{}{}\n", command.store.string(),
                view.kind.empty() ? "drift" : view.kind, view.where.empty() ? "" : " ",

@@ -4,12 +4,14 @@
 #include <unistd.h>
 
 #include <algorithm>
+#include <charconv>
 #include <fstream>
 #include <map>
 #include <stdexcept>
 #include <string_view>
 
 #include "harness/record/excerpt.h"
+#include "harness/record/measures.h"
 #include "harness/record/record_json.h"
 #include "harness/store/contents.h"
 #include "harness/store/store_lock.h"
@@ -176,6 +178,65 @@ std::vector<Record> LatestRecords(const std::vector<Record>& records, std::strin
     if (!is_known_preferred || record.Text("version") == version) known = record;
   }
   return WithContents(std::move(latest));
+}
+
+namespace {
+
+/// Conditions on parameters, each with the text that stands before its value in a line.
+std::vector<std::pair<std::string, Condition>> OnParameters(const Selection& where) {
+  std::vector<std::pair<std::string, Condition>> conditions;
+  for (const Condition& condition : where) {
+    const bool is_plain = condition.key.find_first_of("\"\\") == std::string::npos;
+    if (FindMeasure(condition.key) != nullptr || !is_plain) continue;
+    conditions.push_back({"\"" + condition.key + "\":", condition});
+  }
+  return conditions;
+}
+
+/// Whether a number that stands among the keys of the case says that the record does not match.
+bool IsExcluded(std::string_view line,
+                const std::vector<std::pair<std::string, Condition>>& conditions) {
+  const std::string_view keys = line.substr(0, line.find("\"case_id\":"));
+  for (const auto& [before, condition] : conditions) {
+    const std::size_t at = keys.find(before);
+    if (at == std::string_view::npos) continue;
+    double value = 0.0;
+    const char* begin = keys.data() + at + before.size();
+    const auto [end, fault] = std::from_chars(begin, keys.data() + keys.size(), value);
+    if (fault != std::errc() || end == keys.data() + keys.size() || *end != ',') continue;
+    Record record;
+    record.Set(condition.key, value);
+    if (!Matches(record, {condition})) return true;
+  }
+  return false;
+}
+
+}  // namespace
+
+std::vector<Record> ReadRecords(const std::filesystem::path& path, const Selection& where,
+                                std::vector<std::string>* warnings) {
+  const std::filesystem::path file = StoreFile(path);
+  const auto conditions = OnParameters(where);
+  if (conditions.empty() || !IsLarge(file)) return ReadRecords(path, warnings);
+  std::ifstream in(file, std::ios::binary);
+  std::string kept, rest, block(std::size_t{4} << 20, '\0');
+  while (in.read(block.data(), static_cast<std::streamsize>(block.size())) || in.gcount() > 0) {
+    std::string_view text(block.data(), static_cast<std::size_t>(in.gcount()));
+    for (std::size_t end; (end = text.find('\n')) != std::string_view::npos;
+         text.remove_prefix(end + 1)) {
+      std::string_view line = text.substr(0, end + 1);
+      if (!rest.empty()) line = rest.append(line);
+      if (kept.empty() || !IsExcluded(line, conditions)) kept += line;
+      rest.clear();
+    }
+    rest += text;
+  }
+  try {
+    Lines lines = ReadLines(kept + rest, file);
+    if (lines.warning.empty()) return std::move(lines.records);
+  } catch (const std::runtime_error&) {
+  }
+  return ReadRecords(path, warnings);  // which knows the line's number
 }
 
 std::vector<Record> ReadRecords(const std::filesystem::path& path,

@@ -9,6 +9,7 @@
 
 #include "harness/record/record.h"
 #include "harness/record/record_json.h"
+#include "harness/record/select.h"
 
 namespace loopbench::harness {
 
@@ -78,5 +79,12 @@ std::vector<Record> LatestRecords(const std::vector<Record>& records,
 /// `warnings` (when given).
 std::vector<Record> ReadRecords(const std::filesystem::path& path,
                                 std::vector<std::string>* warnings = nullptr);
+
+/// The same of a store that is too large to be held, without records that conditions on parameters
+/// of a sweep exclude: what such a line says besides is not looked at. Parameters are the keys that
+/// are nobody else's (FindMeasure() knows none), so that records that decide about each other, of
+/// one scene at other tolerances or in other columns, stay or go together. The first record stays.
+std::vector<Record> ReadRecords(const std::filesystem::path& path, const Selection& where,
+                                std::vector<std::string>* warnings);
 
 }  // namespace loopbench::harness

@@ -256,5 +256,37 @@ TEST_F(StoreIntegrity, ALimitOfFileSizesIsAnErrorAndLeavesWholeRecords) {
   ExpectEnding(Call("run many.json --out out"), 0, {"10 "});
 }
 
+// A store of 40 MB, of which a table wants a tenth.
+TEST_F(StoreIntegrity, OfALargeStoreOnlyChosenParametersAreRead) {
+  Record record;
+  const auto line = [&record](int i) {
+    record.Set("kind", std::string("accuracy"));
+    record.Set("mass", 0.5 * (i % 10));
+    record.Set("case_id", std::to_string(i));
+    record.Set("outcome", std::string("finished"));
+    record.Set("message", std::string(2000, 'x') + "\"mass\":1.5,");  // behind the keys: no key
+    return ToJsonLine(record) + '\n';
+  };
+  std::string text;
+  for (int i = 0; i < 20'000; ++i) text += line(i);
+  const fs::path file = folder_ / "large.jsonl";
+  WriteFileAtomically(file, text);
+  const auto chosen = [&](const std::string& condition) {
+    return ReadRecords(file, {ParseCondition(condition)}, nullptr);
+  };
+  const std::vector<Record> some = chosen("mass=1.5");
+  ASSERT_EQ(some.size(), 2001u);  // the first one stays
+  EXPECT_EQ(some[1].Text("case_id"), "3");
+  EXPECT_EQ(some.back().Text("case_id"), "19993");
+  EXPECT_EQ(chosen("mass<1").size(), 4000u);
+  // what is measured, and what tells columns of a scene apart, is chosen later
+  EXPECT_EQ(chosen("outcome=crashed").size(), 20'000u);
+  // damage in what is read is named by its line, all else is as in a small store
+  text[text.find("\"mass\":1.5") + 7] = '2';
+  WriteFileAtomically(file, text);
+  EXPECT_TRUE(Contains(ErrorOf([&] { chosen("mass=2.5"); }), "large.jsonl:4:"));
+  EXPECT_EQ(chosen("mass=1.5").size(), 2000u);
+}
+
 }  // namespace store_integrity_test
 }  // namespace loopbench::harness

@@ -106,8 +106,11 @@ struct Chart {
         kLeft, kTop, bottom, kWidth - kRight);
     const std::size_t by = std::max<std::size_t>(1, (series.values.size() + 6) / 7);
     for (std::size_t i = 0; i < series.values.size(); i += by) {
-      svg += fmt::format("<text x=\"{:.1f}\" y=\"{:.1f}\" text-anchor=\"middle\">{}</text>\n", X(i),
-                         bottom + 16, EscapeXml(ShortCommit(Entry(i).commit)));
+      constexpr double kHalfLabel = 44;  // twelve digits
+      const bool is_last = X(i) + kHalfLabel > kWidth;
+      svg += fmt::format("<text x=\"{:.1f}\" y=\"{:.1f}\" text-anchor=\"{}\">{}</text>\n",
+                         is_last ? kWidth - 2 : X(i), bottom + 16, is_last ? "end" : "middle",
+                         EscapeXml(ShortCommit(Entry(i).commit)));
     }
     svg += fmt::format("<text x=\"{:.1f}\" y=\"{:.1f}\" text-anchor=\"middle\">commit</text>\n",
                        0.5 * (kLeft + kWidth - kRight), kHeight - 8);

@@ -6,7 +6,7 @@
 #include <fstream>
 #include <iterator>
 #include <map>
-#include <unordered_map>
+#include <set>
 
 #include "harness/analysis/doubts.h"
 #include "harness/isolation/interruption.h"
@@ -58,17 +58,6 @@ std::vector<Record> RecordsOf(const std::vector<std::string>& ids,
   std::vector<Record> asked;
   for (const std::string& id : ids) asked.push_back(*last.at(id));
   return WithContents(std::move(asked));
-}
-
-std::vector<Record> InOrder(std::vector<Record> records, const std::vector<std::string>& order) {
-  if (order.empty()) return records;
-  std::unordered_map<std::string, std::size_t> places;
-  for (const std::string& id : order) places.emplace(id, places.size());
-  std::ranges::stable_sort(records, {}, [&places](const Record& record) {
-    const auto at = places.find(record.Text("id"));
-    return at == places.end() ? places.size() : at->second;
-  });
-  return records;
 }
 
 void PrintInterrupted(const RunCommand& command, const ResultStore& store) {
@@ -137,19 +126,7 @@ int Run(const RunCommand& command, const std::string& typed) {
 }
 
 int Merge(const MergeCommand& command) {
-  std::vector<PartOfStore> parts;
-  std::size_t read = 0;
-  for (const auto& store : command.stores) {
-    std::vector<std::string> warnings;
-    parts.push_back({store, ReadRecords(store, &warnings)});
-    read += parts.back().records.size();
-    if (!warnings.empty()) {
-      throw std::runtime_error(fmt::format(
-          "{}\n{} was interrupted: give its command again, which completes it, and merge then",
-          warnings.front(), store.string()));
-    }
-  }
-  const std::vector<Record> merged = InOrder(MergeStores(parts), command.order);
+  const MergedStores merged(command.stores, command.order);
   std::vector<std::filesystem::path> files;
   for (const auto& store : command.stores) files.push_back(StoreFile(store));
   // references that stand where the store will be are one more part
@@ -157,15 +134,21 @@ int Merge(const MergeCommand& command) {
   with_target.push_back(StoreFile(command.out));
   const MergedReferences references = MergeReferences(with_target);
   ResultStore target(command.out);
-  for (const std::string& name : CopyTrajectories(merged, files, target.file())) {
-    PrintError("warning: no store has trajectories/{}\n", name);
-  }
-  CopyMechanisms(merged, files, target.file());
-  target.Fill(merged);
+  std::set<std::string> scenes;
+  target.Fill(merged.size(), [&](std::size_t i) {
+    Record record = merged[i];
+    for (const std::string& name : CopyTrajectories({record}, files, target.file())) {
+      PrintError("warning: no store has trajectories/{}\n", name);
+    }
+    if (scenes.insert(record.Text("scene_id")).second) {
+      CopyMechanisms({record}, files, target.file());
+    }
+    return record;
+  });
   WriteReferences(references, target.file());
   for (const std::string& note : references.notes) PrintError("{}\n", note);
-  Print("{} records of {} stores are {} cases in {}\n", read, command.stores.size(), merged.size(),
-        target.file().string());
+  Print("{} records of {} stores are {} cases in {}\n", merged.read(), command.stores.size(),
+        merged.size(), target.file().string());
   if (!references.texts.empty()) {
     Print("{} references beside it\n", references.texts.size());
   }

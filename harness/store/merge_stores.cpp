@@ -1,16 +1,20 @@
 #include "harness/store/merge_stores.h"
 
+#include <fcntl.h>
 #include <fmt/format.h>
+#include <unistd.h>
 
 #include <algorithm>
 #include <array>
 #include <cmath>
-#include <map>
 #include <stdexcept>
 #include <string_view>
+#include <unordered_map>
 #include <utility>
 
 #include "harness/record/record_json.h"
+#include "harness/store/result_store.h"
+#include "harness/text/files.h"
 
 namespace loopbench::harness {
 namespace {
@@ -67,11 +71,6 @@ std::string Difference(const Record& one, const Record& other) {
   return "";
 }
 
-struct Kept {
-  std::size_t place;
-  const std::filesystem::path* file;
-};
-
 void RequireEqual(const Record& known, const std::filesystem::path& known_file, const Record& fresh,
                   const std::filesystem::path& fresh_file) {
   const std::string key = Difference(known, fresh);
@@ -87,27 +86,69 @@ void RequireEqual(const Record& known, const std::filesystem::path& known_file, 
 
 }  // namespace
 
-std::vector<Record> MergeStores(const std::vector<PartOfStore>& parts) {
-  std::vector<Record> merged;
-  std::map<std::string, Kept> kept;
-  for (const PartOfStore& part : parts) {
-    for (const Record& record : part.records) {
-      const std::string id = record.Text("id");
-      const auto [at, is_new] = kept.try_emplace(id, Kept{merged.size(), &part.file});
-      if (id.empty() || is_new) {
-        merged.push_back(record);
-        continue;
-      }
-      Record& known = merged[at->second.place];
-      if (WasCutShort(record) && !WasCutShort(known)) continue;
-      if (!WasCutShort(record) && !WasCutShort(known)) {
-        RequireEqual(known, *at->second.file, record, part.file);
-      }
-      known = record;
-      at->second.file = &part.file;
+MergedStores::~MergedStores() {
+  for (const auto& [part, descriptor] : open_) ::close(descriptor);
+}
+
+int MergedStores::Open(std::size_t part) const {
+  const auto found = std::ranges::find(open_, part, &std::pair<std::size_t, int>::first);
+  if (found != open_.end()) return found->second;
+  constexpr std::size_t kMostOpen = 256;  // of the 1024 that a process usually may have
+  const std::filesystem::path file = StoreFile(stores_[part]);
+  const int descriptor = ::open(file.c_str(), O_RDONLY | O_CLOEXEC);
+  if (descriptor < 0) FailOn("read", file);
+  if (open_.size() == kMostOpen) {
+    ::close(open_.front().second);
+    open_.pop_front();
+  }
+  open_.emplace_back(part, descriptor);
+  return descriptor;
+}
+
+Record MergedStores::Read(const Kept& kept) const {
+  std::string line(kept.place.length, '\0');
+  const ssize_t length =
+      ::pread(Open(kept.part), line.data(), line.size(), static_cast<off_t>(kept.place.offset));
+  if (length != static_cast<ssize_t>(line.size())) FailOn("read", StoreFile(stores_[kept.part]));
+  return FromJsonLine(line);
+}
+
+Record MergedStores::operator[](std::size_t i) const { return Read(kept_[i]); }
+
+void MergedStores::Keep(const Record& record, const Kept& fresh, Kept* known) const {
+  if (known->part != kNowhere) {
+    if (fresh.was_cut_short && !known->was_cut_short) return;
+    if (!fresh.was_cut_short && !known->was_cut_short) {
+      RequireEqual(Read(*known), stores_[known->part], record, stores_[fresh.part]);
     }
   }
-  return merged;
+  *known = fresh;
+}
+
+MergedStores::MergedStores(const std::vector<std::filesystem::path>& stores,
+                           const std::vector<std::string>& order)
+    : stores_(stores) {
+  std::unordered_map<std::string, std::size_t> places;
+  for (const std::string& id : order) places.emplace(id, places.size());
+  kept_.resize(places.size());
+  for (std::size_t part = 0; part < stores.size(); ++part) {
+    const auto take = [&](const Record& record, const LinePlace& place) {
+      ++read_;
+      const std::string id = record.Text("id");
+      std::size_t at = kept_.size();
+      if (!id.empty()) at = places.try_emplace(id, at).first->second;
+      if (at == kept_.size()) kept_.emplace_back();
+      Keep(record, {part, place, WasCutShort(record)}, &kept_[at]);
+    };
+    std::vector<std::string> warnings;
+    ForEachRecord(stores[part], take, &warnings);
+    if (!warnings.empty()) {
+      throw std::runtime_error(fmt::format(
+          "{}\n{} was interrupted: give its command again, which completes it, and merge then",
+          warnings.front(), stores[part].string()));
+    }
+  }
+  std::erase_if(kept_, [](const Kept& kept) { return kept.part == kNowhere; });
 }
 
 }  // namespace loopbench::harness

@@ -1,26 +1,58 @@
 // Several stores of one experiment into one: every case once.
 #pragma once
 
+#include <deque>
 #include <filesystem>
 #include <string>
+#include <utility>
 #include <vector>
 
 #include "harness/record/record.h"
+#include "harness/store/record_lines.h"
 
 namespace loopbench::harness {
-
-struct PartOfStore {
-  std::filesystem::path file;  ///< for messages
-  std::vector<Record> records;
-};
 
 /// One record per "id", at the place of its first; records without one all stay. Of a case that was
 /// run more than once a record whose ending the clock or the machine decided (time-limit, crashed,
 /// ...) gives way to one that was not, and else to the last.
 ///
-/// Records of one id come from one program and one case: two that were not cut short agree in all
-/// but times, noise and origin. Throws std::runtime_error that names both files, the case, the key
-/// and both values where they do not.
-std::vector<Record> MergeStores(const std::vector<PartOfStore>& parts);
+/// Of each record its place is kept, some hundred bytes: a million of them are merged as well as
+/// ten.
+class MergedStores {
+ public:
+  /// Reads all of the stores once. Records of one id come from one program and one case: two that
+  /// were not cut short agree in all but times, noise and origin. Throws std::runtime_error that
+  /// names both files, the case, the key and both values where they do not, as ReadRecords() does,
+  /// and for a store whose last line is torn.
+  /// @param order  "id"s: these first, in this order
+  MergedStores(const std::vector<std::filesystem::path>& stores,
+               const std::vector<std::string>& order = {});
+  ~MergedStores();
+  MergedStores(const MergedStores&) = delete;
+  MergedStores& operator=(const MergedStores&) = delete;
+
+  std::size_t read() const { return read_; }         ///< records of all stores
+  std::size_t size() const { return kept_.size(); }  ///< that are left
+
+  /// Reads the record from its store.
+  Record operator[](std::size_t i) const;
+
+ private:
+  static constexpr std::size_t kNowhere = static_cast<std::size_t>(-1);
+  struct Kept {
+    std::size_t part = kNowhere;
+    LinePlace place = {};
+    bool was_cut_short = false;
+  };
+  void Keep(const Record& record, const Kept& fresh, Kept* known) const;
+  Record Read(const Kept& kept) const;
+  int Open(std::size_t part) const;
+
+  std::vector<std::filesystem::path> stores_;
+  mutable std::deque<std::pair<std::size_t, int>>
+      open_;  ///< parts and their descriptors, oldest first
+  std::vector<Kept> kept_;
+  std::size_t read_ = 0;
+};
 
 }  // namespace loopbench::harness

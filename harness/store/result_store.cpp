@@ -10,47 +10,15 @@
 #include <stdexcept>
 #include <string_view>
 
-#include "harness/record/excerpt.h"
 #include "harness/record/measures.h"
 #include "harness/record/record_json.h"
 #include "harness/store/contents.h"
+#include "harness/store/record_lines.h"
 #include "harness/store/store_lock.h"
 #include "harness/text/files.h"
 
 namespace loopbench::harness {
 namespace {
-
-/// What the text of a store holds.
-struct Lines {
-  std::vector<Record> records;
-  std::string warning;    ///< about a torn last line
-  std::size_t whole = 0;  ///< bytes before a torn last line
-  bool is_ended = true;   ///< the last record has its line end
-};
-
-Lines ReadLines(const std::string& text, const std::filesystem::path& file) {
-  Lines lines;
-  lines.whole = text.size();
-  int number = 0;
-  for (std::size_t start = 0; start < text.size();) {
-    const std::size_t end = text.find('\n', start);
-    lines.is_ended = end != std::string::npos;
-    const std::string_view line =
-        std::string_view(text).substr(start, lines.is_ended ? end - start : std::string::npos);
-    ++number;
-    try {
-      if (!line.empty() && line != "\r") lines.records.push_back(FromJsonLine(line));
-    } catch (const std::runtime_error& error) {
-      const std::string message =
-          fmt::format("{}:{}: {}: '{}'", file.string(), number, error.what(), Excerpt(line));
-      if (lines.is_ended || !IsTornRecord(line)) throw std::runtime_error(message);
-      lines.warning = message + " (torn last line, skipped)";
-      lines.whole = start;
-    }
-    start = lines.is_ended ? end + 1 : text.size();
-  }
-  return lines;
-}
 
 /// The end of a large file, from the beginning of a line: its last megabyte, or as much as its last
 /// two lines are.
@@ -75,25 +43,25 @@ std::string LastLines(const std::filesystem::path& file, std::uintmax_t size) {
 void MendLastLine(const std::filesystem::path& file, int descriptor) {
   const std::uintmax_t size = std::filesystem::file_size(file);
   const std::string text = IsLarge(file) ? LastLines(file, size) : ReadFile(file);
-  Lines lines;
+  LineReader lines(file, [&file](const Record& record, const LinePlace&) {
+    if (!record.Text("kind").empty()) return;
+    throw std::runtime_error(
+        fmt::format("{}: found a line without \"kind\", expected records", file.string()));
+  });
   try {
-    lines = ReadLines(text, file);
-    if (std::ranges::any_of(lines.records,
-                            [](const Record& one) { return one.Text("kind").empty(); })) {
-      throw std::runtime_error(
-          fmt::format("{}: found a line without \"kind\", expected records", file.string()));
-    }
+    lines.Feed(text);
+    lines.End();
   } catch (const std::runtime_error& error) {
     throw std::runtime_error(
         fmt::format("{}\n'{}' is no store, or a damaged one: nothing was changed", error.what(),
                     file.string()));
   }
-  if (!lines.warning.empty()) {
-    const std::uintmax_t whole = size - (text.size() - lines.whole);
+  if (!lines.warning().empty()) {
+    const std::uintmax_t whole = size - (text.size() - lines.whole());
     if (::ftruncate(descriptor, static_cast<off_t>(whole)) != 0) {
       FailOn("mend the last line of", file);
     }
-  } else if (!lines.is_ended) {
+  } else if (!lines.is_ended()) {
     WriteAll(descriptor, "\n", file);
   }
 }
@@ -151,16 +119,17 @@ void ResultStore::Append(const std::vector<Record>& records) {
   }
 }
 
-void ResultStore::Fill(const std::vector<Record>& records) {
+void ResultStore::Fill(std::size_t count, const std::function<Record(std::size_t)>& record) {
   if (::lseek(descriptor_, 0, SEEK_END) > 0) {
     throw std::runtime_error(
         fmt::format("{}: found records, expected a new store; name it among the "
                     "stores to merge and write to another",
                     file_.string()));
   }
-  std::string text;
-  for (const Record& record : records) text += ToJsonLine(record) + '\n';
-  WriteFileAtomically(std::filesystem::canonical(file_), text);  // a link stays one
+  // a link stays one
+  WriteFileAtomically(std::filesystem::canonical(file_), [&](const auto& write) {
+    for (std::size_t i = 0; i < count; ++i) write(ToJsonLine(record(i)) + '\n');
+  });
 }
 
 std::vector<Record> LatestRecords(const std::vector<Record>& records, std::string_view version) {
@@ -215,36 +184,23 @@ bool IsExcluded(std::string_view line,
 
 std::vector<Record> ReadRecords(const std::filesystem::path& path, const Selection& where,
                                 std::vector<std::string>* warnings) {
-  const std::filesystem::path file = StoreFile(path);
   const auto conditions = OnParameters(where);
-  if (conditions.empty() || !IsLarge(file)) return ReadRecords(path, warnings);
-  std::ifstream in(file, std::ios::binary);
-  std::string kept, rest, block(std::size_t{4} << 20, '\0');
-  while (in.read(block.data(), static_cast<std::streamsize>(block.size())) || in.gcount() > 0) {
-    std::string_view text(block.data(), static_cast<std::size_t>(in.gcount()));
-    for (std::size_t end; (end = text.find('\n')) != std::string_view::npos;
-         text.remove_prefix(end + 1)) {
-      std::string_view line = text.substr(0, end + 1);
-      if (!rest.empty()) line = rest.append(line);
-      if (kept.empty() || !IsExcluded(line, conditions)) kept += line;
-      rest.clear();
-    }
-    rest += text;
-  }
-  try {
-    Lines lines = ReadLines(kept + rest, file);
-    if (lines.warning.empty()) return std::move(lines.records);
-  } catch (const std::runtime_error&) {
-  }
-  return ReadRecords(path, warnings);  // which knows the line's number
+  if (conditions.empty() || !IsLarge(StoreFile(path))) return ReadRecords(path, warnings);
+  std::vector<Record> records;
+  ForEachRecord(
+      path, [&records](Record record, const LinePlace&) { records.push_back(std::move(record)); },
+      warnings,
+      [&](std::string_view line) { return records.empty() || !IsExcluded(line, conditions); });
+  return records;
 }
 
 std::vector<Record> ReadRecords(const std::filesystem::path& path,
                                 std::vector<std::string>* warnings) {
-  const std::filesystem::path file = StoreFile(path);
-  Lines lines = ReadLines(ReadFile(file), file);
-  if (warnings != nullptr && !lines.warning.empty()) warnings->push_back(lines.warning);
-  return std::move(lines.records);
+  std::vector<Record> records;
+  ForEachRecord(
+      path, [&records](Record record, const LinePlace&) { records.push_back(std::move(record)); },
+      warnings);
+  return records;
 }
 
 }  // namespace loopbench::harness

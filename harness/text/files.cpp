@@ -39,6 +39,12 @@ void MakeFolderOf(const std::filesystem::path& path) {
 }
 
 void WriteFileAtomically(const std::filesystem::path& path, std::string_view text) {
+  WriteFileAtomically(path, [text](const auto& write) { write(text); });
+}
+
+void WriteFileAtomically(
+    const std::filesystem::path& path,
+    const std::function<void(const std::function<void(std::string_view)>& write)>& fill) {
   MakeFolderOf(path);
   std::error_code error;
   const std::filesystem::path temporary = TemporaryBeside(path);
@@ -46,7 +52,7 @@ void WriteFileAtomically(const std::filesystem::path& path, std::string_view tex
   const int descriptor = ::open(temporary.c_str(), O_WRONLY | O_CREAT | O_TRUNC | O_CLOEXEC, kMode);
   if (descriptor < 0) FailOn("write", path);
   try {
-    WriteAll(descriptor, text, path);
+    fill([descriptor, &path](std::string_view text) { WriteAll(descriptor, text, path); });
     if (::fsync(descriptor) != 0) FailOn("write", path);
   } catch (...) {
     ::close(descriptor);

@@ -2,6 +2,7 @@
 #pragma once
 
 #include <filesystem>
+#include <functional>
 #include <string>
 #include <string_view>
 
@@ -12,6 +13,11 @@ namespace loopbench::harness {
 /// the disk when this returns. Missing parent folders are made. Throws std::runtime_error that
 /// names the path and the system's reason.
 void WriteFileAtomically(const std::filesystem::path& path, std::string_view text);
+
+/// The same with a text that comes in parts: `fill` calls what it is given with each.
+void WriteFileAtomically(
+    const std::filesystem::path& path,
+    const std::function<void(const std::function<void(std::string_view)>& write)>& fill);
 
 /// Makes the folder that `path` is in, with all above it. Throws std::runtime_error that names the
 /// folder and the system's reason.

@@ -108,7 +108,7 @@ template <class Space, class S>
 std::optional<Correction<S>> Odca<Space, S>::Project([[maybe_unused]] std::span<S> q,
                                                      [[maybe_unused]] std::span<S> u,
                                                      [[maybe_unused]] S goal) {
-  if constexpr (std::is_same_v<Space, Planar> && std::is_same_v<S, double>) {
+  if constexpr (std::is_same_v<S, double>) {
     if (short_cut_ != nullptr) return short_cut_->Project(q, u, goal);
   }
   return std::nullopt;

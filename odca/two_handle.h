@@ -224,14 +224,32 @@ LOOPBENCH_INLINE T AngularAcceleration(const TurnedLink<T>& at, const Vector2<T>
   return kPass == Pass::kSpeeds ? moment : at.alpha + moment;
 }
 
-/// X^-1 of (16). `slack` becomes negative where the smallest eigenvalue of X, which is at least
-/// det / trace, is below `limit`: whether a loop has lost rank is then for loop_solver.h to say.
+/// X = L D L^T of (16), by D^-1 and the l below L's ones. What it solves has residuals of some
+/// round-offs of X whatever the condition of X, as cofactors over det have not: where a light body
+/// hangs between heavy ones their forces on it must be right to far more than its own weight.
 template <class T>
-LOOPBENCH_INLINE Symmetric2<T> InverseOf(const Symmetric2<T>& X, const T& limit, T& slack) {
+struct Factored2 {
+  T first, l, second;
+
+  Vector2<T> Solve(const T& x, const T& y) const {
+    const T last = (y - l * x) * second;
+    return {x * first - l * last, last};
+  }
+  friend Vector2<T> operator*(const Factored2& X, const Vector2<T>& b) { return X.Solve(b.x, b.y); }
+  friend Matrix2<T> operator*(const Factored2& X, const Matrix2<T>& B) {
+    const Vector2<T> left = X.Solve(B.xx, B.yx), right = X.Solve(B.xy, B.yy);
+    return {left.x, right.x, left.y, right.y};
+  }
+};
+
+/// `slack` becomes negative where the smallest eigenvalue of X, which is at least det / trace, is
+/// below `limit`: whether a loop has lost rank is then for loop_solver.h to say.
+template <class T>
+LOOPBENCH_INLINE Factored2<T> InverseOf(const Symmetric2<T>& X, const T& limit, T& slack) {
   const T det = X.xx * X.yy - X.xy * X.xy;
   slack = Min(slack, det - limit * (X.xx + X.yy));
-  const T inverse = 1.0 / det;
-  return {X.yy * inverse, -(X.xy * inverse), X.xx * inverse};
+  const T inverse = 1.0 / (X.xx * det), first = det * inverse;
+  return {first, X.xy * first, X.xx * X.xx * inverse};
 }
 
 /// What a series join keeps for the way down: the force in it, on the second assembly at its handle
@@ -246,7 +264,7 @@ struct Cut {
 template <class T>
 LOOPBENCH_INLINE TwoHandle<T> Join(const TwoHandle<T>& A, const TwoHandle<T>& B, const T& limit,
                                    Cut<T>& cut, T& slack) {
-  const Symmetric2<T> inverse = InverseOf(A.zeta22 + B.zeta11, limit, slack);  // (16)
+  const Factored2<T> inverse = InverseOf(A.zeta22 + B.zeta11, limit, slack);  // (16)
   cut.U = inverse * Transpose(A.zeta12);
   cut.W = inverse * B.zeta12;
   cut.y = inverse * (A.zeta23 - B.zeta13);                                        // (21)
@@ -279,7 +297,7 @@ struct EndCut {
 template <class T>
 LOOPBENCH_INLINE OneHandle<T> Join(const OneHandle<T>& A, const TwoHandle<T>& B, const T& limit,
                                    EndCut<T>& cut, T& slack) {
-  const Symmetric2<T> inverse = InverseOf(A.zeta22 + B.zeta11, limit, slack);
+  const Factored2<T> inverse = InverseOf(A.zeta22 + B.zeta11, limit, slack);
   cut.W = inverse * B.zeta12;
   cut.y = inverse * (A.zeta23 - B.zeta13);
   return {MinusSymmetricProduct(B.zeta22, B.zeta12, cut.W),
@@ -296,7 +314,7 @@ struct Operations {
   static constexpr int Leaf(Pass pass) {
     return pass == Pass::kSpeeds ? 12 : pass == Pass::kAccelerations ? 22 : 20;
   }
-  static constexpr int kJoin = 55, kEndJoin = 29, kForceIn = 8, kForceInEnd = 4,
+  static constexpr int kJoin = 57, kEndJoin = 31, kForceIn = 8, kForceInEnd = 4,
                        kAngularAcceleration = 4;
 };
 

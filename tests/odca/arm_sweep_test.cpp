@@ -11,47 +11,10 @@
 
 #include "mechanism/description/in_space.h"
 #include "mechanism/description/library.h"
-#include "tests/contract/allocations.h"
-#include "tests/contract/builder.h"
-#include "tests/odca/short_cut.h"
+#include "tests/odca/served.h"
 
 namespace loopbench::odca::arms {
 namespace {
-
-using testing::Builder;
-using testing::Random;
-
-/// Bodies in a row from Ground, in any order of numbers, joints in any frames and either way round;
-/// closed on Ground by one more joint, of which one is cut, with this kind.
-void AddPath(Builder& b, int n, bool closed, JointType cut_kind) {
-  auto& joints = b.description.joints;
-  std::vector<int> row;
-  for (int k = 0; k < n; ++k) row.push_back(b.AddBody(1.0));
-  for (int k = n - 1; k > 0; --k) std::swap(row[k], row[b.random.Below(k + 1)]);
-  row.push_back(kGround);
-  const int cut = closed ? b.random.Below(n + 1) : -1;
-  for (int k = 0; k < n + (closed ? 1 : 0); ++k) {
-    JointDescription& joint = joints.emplace_back();
-    joint.name = "j" + std::to_string(joints.size());
-    joint.from = {k == 0 ? kGround : row[k - 1], b.random.Vector(1.0, true), b.RandomTurn()};
-    joint.to = {row[k], b.random.Vector(1.0, true), b.RandomTurn()};
-    if (b.random.Chance(0.5)) std::swap(joint.from, joint.to);
-    joint.cut = k == cut;
-    if (joint.cut) joint.type = cut_kind;
-  }
-}
-
-struct Paths {
-  int open = 0, closed = 0, also_closed = 0;  ///< bodies of three paths, 0 for none
-  JointType cut = JointType::kRevolute;
-};
-MechanismDescription RandomArms(const Paths& paths, std::uint64_t seed) {
-  Builder b("arms", SpaceKind::kSpatial, seed);
-  if (paths.closed > 0) AddPath(b, paths.closed, true, paths.cut);
-  if (paths.open > 0) AddPath(b, paths.open, false, paths.cut);
-  if (paths.also_closed > 0) AddPath(b, paths.also_closed, true, paths.cut);
-  return b.description;
-}
 
 Both Compare(const Mechanism<Spatial, double>& mechanism, SpeedsUsed speeds, const Numbers& q,
              const Numbers& u, int bodies_of_group = ArmSweep::kBodiesOfGroup) {
@@ -158,53 +121,6 @@ TEST(ArmSweep, AgreesWithTheOracle) {
   EXPECT_GT(worst, 0.0) << "else this test says nothing";
 }
 
-/// Masses over eight decades: a force that is right to eps of the heavy body is not for the light
-/// one, so neither sweep has more digits than the ratio of masses leaves, and which one has more in
-/// a given state is chance. Along many states they must be alike: the median and the worst error
-/// against long double within ten times.
-TEST(ArmSweep, LosesNoMoreAtExtremesThanTheGeneralSweep) {
-  std::vector<double> errors, errors_general;
-  for (int n = 2; n <= 24; ++n) {
-    for (std::uint64_t seed = 1; seed <= 8; ++seed) {
-      MechanismDescription arms = RandomArms(
-          n >= 7 && seed % 2 == 0 ? Paths{.closed = n} : Paths{.open = n}, 1000 * seed + n);
-      Random random(seed);
-      for (BodyDescription& body : arms.bodies) {
-        const double times = std::pow(10.0, random.Uniform(-4.0, 4.0));
-        body.mass *= times;
-        body.inertia *= times;
-      }
-      const Mechanism<Spatial, double> mechanism(arms, Coordinates::kJoint);
-      const Numbers q = RandomNumbers(random, mechanism.num_q(), 4.0);
-      const Numbers u = RandomNumbers(random, mechanism.num_u(), 2.0);
-      Numbers qdot(u.size()), own(u.size()), general;
-      const auto sweep = ArmSweep::Make(mechanism);
-      if (sweep == nullptr ||
-          !sweep->Evaluate(SpeedsUsed::kGiven, In(q), In(u), In(qdot), In(own))) {
-        continue;
-      }
-      testing::SystemWith<Odca, Spatial, double> odca(mechanism, {});
-      ASSERT_EQ(odca->Evaluate(0.0, q, u, general), Outcome::kFinished) << arms.name;
-      const Numbers exact = testing::Oracle(arms, testing::LayoutOf(mechanism))
-                                .Solve(q.cast<testing::Real>(), u.cast<testing::Real>())
-                                .udot.cast<double>();
-      const auto error = [&](const Numbers& udot) {
-        return (udot - exact).cwiseAbs().maxCoeff() / exact.cwiseAbs().maxCoeff();
-      };
-      errors.push_back(error(own));
-      errors_general.push_back(error(general));
-    }
-  }
-  std::ranges::sort(errors);
-  std::ranges::sort(errors_general);
-  const std::size_t middle = errors.size() / 2;
-  std::printf("%zu answered, median %.2g (general sweep %.2g), worst %.2g (%.2g)\n", errors.size(),
-              errors[middle], errors_general[middle], errors.back(), errors_general.back());
-  EXPECT_GT(errors.size(), 90u) << "else this test says little";
-  EXPECT_LE(errors[middle], 10.0 * errors_general[middle]);
-  EXPECT_LE(errors.back(), 10.0 * errors_general.back());
-}
-
 /// Several groups, of which threads take shares.
 TEST_P(ArmSweepTest, HasTheSameBitsForAnyNumberOfThreads) {
   for (const Paths& shape : {Paths{.open = 900}, Paths{.open = 300, .closed = 500}}) {
@@ -270,60 +186,6 @@ TEST(ArmSweep, LeavesOthersToTheGeneralSweep) {
   Odca<Spatial, double> published(mechanism, {.solver = SolverKind::kAsPublished});
   Numbers q = Numbers::Zero(9), u = q, qdot = q, udot = q;
   EXPECT_FALSE(published.RightHandSide(SpeedsUsed::kGiven, In(q), In(u), In(qdot), In(udot)));
-}
-
-TEST_P(ArmSweepTest, RefusesWhatItCannotJudge) {
-  const Mechanism<Spatial, double> mechanism(RandomArms({.closed = 9}, 1), Coordinates::kJoint);
-  const auto sweep = ArmSweep::Make(mechanism);
-  Numbers u = Numbers::Ones(9), qdot = u, udot = u, q = Numbers::Constant(9, 1.1);
-  const auto evaluate = [&] {
-    return sweep->Evaluate(GetParam(), In(q), In(u), In(qdot), In(udot));
-  };
-  EXPECT_TRUE(evaluate());
-  q[1] = 2.0 * kLargestAngle;
-  EXPECT_FALSE(evaluate());
-  q[1] = std::numeric_limits<double>::quiet_NaN();
-  EXPECT_FALSE(evaluate());
-  q[1] = 1.1;
-  u[2] = std::numeric_limits<double>::infinity();
-  EXPECT_FALSE(evaluate());
-}
-
-TEST_P(ArmSweepTest, AllocatesNothing) {
-  if (testing::CountAllocations() < 0) GTEST_SKIP() << "the sanitizer owns malloc";
-  for (const int n : {9, 100}) {
-    const Mechanism<Spatial, double> mechanism(RandomArms({.open = n, .closed = n}, 3),
-                                               Coordinates::kJoint);
-    const auto sweep = ArmSweep::Make(mechanism, 2, 40);
-    Random random(1);
-    Numbers q = RandomNumbers(random, mechanism.num_q(), 1.0), u = q, qdot = q, udot = q;
-    const long before = testing::CountAllocations();
-    EXPECT_TRUE(sweep->Evaluate(GetParam(), In(q), In(u), In(qdot), In(udot)));
-    sweep->Project(In(q), In(u), 0.0);
-    EXPECT_EQ(testing::CountAllocations(), before);
-  }
-}
-
-TEST(ArmSweep, IsTheDerivativeOfTheSystemWhereItServes) {
-  const Mechanism<Spatial, double> mechanism(RandomArms({.closed = 20}, 2), Coordinates::kJoint);
-  Random random(1);
-  const Numbers q = RandomNumbers(random, 20, 1.0), u = RandomNumbers(random, 20, 1.0);
-  Numbers y(40), shortest(y), examined(y), own(y);
-  for (const Enforcement level : {Enforcement::kAcceleration, Enforcement::kPosition,
-                                  Enforcement::kVelocity, Enforcement::kBaumgarte}) {
-    testing::SystemWith<Odca, Spatial, double> odca(mechanism, {.enforcement = level});
-    ASSERT_EQ(odca->Start(0.0, q, u), Outcome::kFinished);
-    odca->ToState(q, u, In(y));
-    ASSERT_EQ(odca->Derivative(0.0, In(y), In(shortest)), Outcome::kFinished);
-    ASSERT_EQ(odca->Examine(0.0, In(y), In(examined)), Outcome::kFinished);
-    const bool completed = level == Enforcement::kVelocity;
-    const bool serves = level != Enforcement::kBaumgarte;
-    ASSERT_TRUE(
-        ArmSweep::Make(mechanism)->Evaluate(completed ? SpeedsUsed::kCompleted : SpeedsUsed::kGiven,
-                                            In(q), In(u), In(own).first(20), In(own).last(20)));
-    EXPECT_EQ(shortest == own, serves) << ToString(level);
-    EXPECT_EQ(shortest == examined, !serves) << ToString(level);
-  }
 }
 
 TEST(RevoluteKernels, TakeAsManyOperationsAsTheySay) {

@@ -10,63 +10,14 @@
 #include <numbers>
 #include <numeric>
 
-#include "lagrange/lagrange.h"
 #include "mechanism/description/library.h"
 #include "tests/contract/allocations.h"
-#include "tests/contract/builder.h"
-#include "tests/odca/short_cut.h"
+#include "tests/odca/served.h"
 
 namespace loopbench::odca::pins {
 namespace {
 
 constexpr double kEps = std::numeric_limits<double>::epsilon();
-
-using testing::Builder;
-using testing::Random;
-JointDescription Pin(Random& random, int from, int to) {
-  const auto side = [&](int body) {
-    return JointSide{body,
-                     random.Vector(1.0, false),
-                     {0.0, 0.0, random.Uniform(-std::numbers::pi, std::numbers::pi)}};
-  };
-  JointDescription pin;
-  pin.from = side(from);
-  pin.to = side(to);
-  if (random.Chance(0.5)) std::swap(pin.from, pin.to);
-  return pin;
-}
-
-/// Bodies in a row, in any order of numbers, some of them pinned to Ground, no two neighbours, so
-/// that they can move; where that closes a loop the joint before such a body is cut, or the pin of
-/// the last one. Half of them may be a path of its own.
-MechanismDescription RandomPath(int n, std::uint64_t seed, bool in_halves = false) {
-  Builder b("path", SpaceKind::kPlanar, seed);
-  std::vector<int> row;
-  for (int k = 0; k < n; ++k) row.push_back(b.AddBody(1.0));
-  for (int k = n - 1; k > 0; --k) std::swap(row[k], row[b.random.Below(k + 1)]);
-  const double share = b.random.Uniform(0.0, 1.0);
-  bool pinned_before = false, neighbour = false;
-  auto& joints = b.description.joints;
-  const int middle = in_halves ? n / 2 : 0;
-  for (int k = 0; k < n; ++k) {
-    const bool first = k == 0 || k == middle, last = k + 1 == n || k + 1 == middle;
-    if (first) pinned_before = neighbour = false;
-    const bool pinned = (b.random.Chance(share) && !neighbour) || (last && !pinned_before);
-    const bool cut_pin = pinned && pinned_before && last && b.random.Chance(0.5);
-    if (!first) {
-      joints.push_back(Pin(b.random, row[k - 1], row[k]));
-      joints.back().cut = pinned && pinned_before && !cut_pin;
-    }
-    if (pinned) {
-      joints.push_back(Pin(b.random, kGround, row[k]));
-      joints.back().cut = cut_pin;
-    }
-    pinned_before = pinned_before || pinned;
-    neighbour = pinned;
-  }
-  for (std::size_t j = 0; j < joints.size(); ++j) joints[j].name = "j" + std::to_string(j);
-  return b.description;
-}
 
 Both Compare(const Mechanism<Planar, double>& mechanism, SpeedsUsed speeds, const Numbers& q,
              const Numbers& u, int bodies_of_group = PathSweep::kBodiesOfGroup) {
@@ -115,66 +66,6 @@ TEST_P(PathSweepTest, AgreesWithTheGeneralSweepWhereverJointsHaveDrifted) {
   // of either half; long ones have three times as many joints that may be near their limit
   EXPECT_LE(20 * refused, states);
   EXPECT_LE(20 * refused_long, 3 * states);
-}
-
-/// Masses over eight decades, several pins in one point of a body, a pin at its centre of mass: a
-/// force that is right to eps of the heavy body is not for the light one, so neither sweep has more
-/// digits than the ratio of masses leaves, and which one has more in a given state is chance. Along
-/// many states they must be alike: the median and the worst error against long double within ten
-/// times (measured: 2.0 and 1.7), for hundred states spread over seven decades.
-TEST(PathSweep, LosesNoMoreAtExtremesThanTheGeneralSweep) {
-  int states = 0;
-  std::vector<double> errors, errors_general;
-  for (int n = 2; n <= 24; ++n) {
-    for (std::uint64_t seed = 1; seed <= 12; ++seed) {
-      MechanismDescription path = RandomPath(n, 1000 * seed + n);
-      Random random(seed);
-      double lightest = 1.0, heaviest = 1.0;
-      for (std::size_t body = 1; body < path.bodies.size(); ++body) {
-        const double times = std::pow(10.0, random.Uniform(-4.0, 4.0));
-        lightest = std::min(lightest, times);
-        heaviest = std::max(heaviest, times);
-        path.bodies[body].mass *= times;
-        path.bodies[body].inertia *= times;
-        for (JointDescription& joint : path.joints) {
-          for (JointSide* side : {&joint.from, &joint.to}) {
-            if (side->body != static_cast<int>(body)) continue;
-            if (body % 4 == 0) side->position = {0.3, 0.4, 0.0};
-            if (body % 4 == 1 && random.Chance(0.5)) side->position = path.bodies[body].com;
-          }
-        }
-      }
-      const Mechanism<Planar, double> mechanism(path, Coordinates::kJoint);
-      const Numbers q = RandomNumbers(random, mechanism.num_q(), 4.0);
-      const Numbers u = RandomNumbers(random, mechanism.num_u(), 2.0);
-      ++states;
-      Numbers qdot(u.size()), own(u.size()), general;
-      if (!PathSweep::Make(mechanism)->Evaluate(SpeedsUsed::kGiven, In(q), In(u), In(qdot),
-                                                In(own))) {
-        continue;
-      }
-      testing::SystemWith<Odca, Planar, double> odca(mechanism, {});
-      ASSERT_EQ(odca->Evaluate(0.0, q, u, general), Outcome::kFinished) << path.name;
-      const Numbers exact = testing::Oracle(path, testing::LayoutOf(mechanism))
-                                .Solve(q.cast<testing::Real>(), u.cast<testing::Real>())
-                                .udot.cast<double>();
-      const auto error = [&](const Numbers& udot) {
-        return (udot - exact).cwiseAbs().maxCoeff() / exact.cwiseAbs().maxCoeff();
-      };
-      errors.push_back(error(own));
-      errors_general.push_back(error(general));
-      EXPECT_LE(errors.back(), Bound(n, lightest / heaviest)) << path.name;
-    }
-  }
-  std::sort(errors.begin(), errors.end());
-  std::sort(errors_general.begin(), errors_general.end());
-  const std::size_t middle = errors.size() / 2;
-  std::printf("%d states, %zu answered, median %.2g (general sweep %.2g), worst %.2g (%.2g)\n",
-              states, errors.size(), errors[middle], errors_general[middle], errors.back(),
-              errors_general.back());
-  EXPECT_GT(errors.size(), 90u) << "else this test says little";
-  EXPECT_LE(errors[middle], 10.0 * errors_general[middle]);
-  EXPECT_LE(errors.back(), 10.0 * errors_general.back());
 }
 
 TEST_P(PathSweepTest, AgreesOnChainsAndLadders) {
@@ -284,85 +175,6 @@ TEST_P(PathSweepTest, RefusesWhatItCannotJudge) {
   q[1] = 1.1;
   u[2] = std::numeric_limits<double>::infinity();
   EXPECT_FALSE(evaluate());
-}
-
-TEST(PathSweep, IsTheDerivativeOfTheSystemWhereItServes) {
-  const MechanismDescription ladder = Ladder(6, 1.0, 0.5);
-  const Mechanism<Planar, double> mechanism(ladder, Coordinates::kJoint);
-  Numbers q = Numbers::Zero(mechanism.num_q()), u = Numbers::Ones(mechanism.num_u());
-  for (const JointValues& start : ladder.initial.coordinates) {
-    q[mechanism.joints()[start.joint].q_offset] = start.values[0];
-  }
-  std::vector<double> y(2 * mechanism.num_q()), shortest(y), examined(y), own(y);
-  const auto n = static_cast<std::size_t>(mechanism.num_q());
-  for (const Enforcement level : {Enforcement::kAcceleration, Enforcement::kPosition,
-                                  Enforcement::kVelocity, Enforcement::kBaumgarte}) {
-    testing::SystemWith<Odca, Planar, double> odca(mechanism, {.enforcement = level});
-    ASSERT_EQ(odca->Start(0.0, q, u), Outcome::kFinished);
-    odca->ToState(q, u, y);
-    ASSERT_EQ(odca->Derivative(0.0, y, shortest), Outcome::kFinished);
-    ASSERT_EQ(odca->Examine(0.0, y, examined), Outcome::kFinished);
-    const bool completed = level == Enforcement::kVelocity;
-    const bool serves = level != Enforcement::kBaumgarte;
-    ASSERT_TRUE(PathSweep::Make(mechanism)->Evaluate(
-        completed ? SpeedsUsed::kCompleted : SpeedsUsed::kGiven, In(q), In(u),
-        std::span(own).first(n), std::span(own).last(n)));
-    EXPECT_EQ(shortest == own, serves) << ToString(level);
-    EXPECT_EQ(shortest == examined, !serves) << ToString(level);
-  }
-}
-
-/// What level position makes of an accepted step, by the short cut and in all generality:
-/// multipliers have no short cut, and their Newton steps are as long.
-TEST(PathSweep, ProjectsAsTheGeneralWayDoes) {
-  int projected = 0, refused = 0;
-  double worst = 0.0;
-  for (int n = 2; n <= 60; ++n) {
-    for (std::uint64_t seed = 1; seed <= 12; ++seed) {
-      const MechanismDescription path = RandomPath(n, 100 * seed + n, n > 40);
-      const Mechanism<Planar, double> mechanism(path, Coordinates::kJoint);
-      if (mechanism.num_rows() == 0) continue;
-      // a state with closed loops, found by the general way, and what a step of 1e-6 leaves of it
-      Random random(seed);
-      testing::SystemWith<lagrange::Lagrange, Planar, double> general(
-          mechanism, {.enforcement = Enforcement::kPosition});
-      Numbers y(2 * mechanism.num_u());
-      y << RandomNumbers(random, mechanism.num_q(), 4.0),
-          RandomNumbers(random, mechanism.num_u(), 2.0);
-      const auto q = [&](const Numbers& state) { return Numbers(state.head(mechanism.num_q())); };
-      const auto u = [&](const Numbers& state) { return Numbers(state.tail(mechanism.num_u())); };
-      ASSERT_EQ(general->Start(0.0, q(y), u(y)), Outcome::kFinished);
-      if (!general->BeginStep(0.0, In(y))) continue;  // no such position was found
-      y += RandomNumbers(random, static_cast<int>(y.size()), 1e-6);
-      Numbers expected = y, own = y;
-      if (!general->BeginStep(0.0, In(expected))) continue;
-      const Correction<double> by_parts = general->level().correction();
-      const double rcond = general->diagnostics().rcond;
-      if (general->diagnostics().smallest_weight < 1.0) continue;
-      const auto sweep = PathSweep::Make(mechanism, 2, n > 40 ? 2 * kLanes : n);
-      const double goal = 4.0 * kEps * mechanism.num_bodies() * mechanism.length();
-      const std::span<double> state = In(own);
-      const auto half = static_cast<std::size_t>(mechanism.num_q());
-      const auto correction = sweep->Project(state.first(half), state.subspan(half), goal);
-      if (!correction) {
-        ++refused;
-        EXPECT_EQ(own, y) << path.name << ": refused, so left alone";
-        continue;
-      }
-      ++projected;
-      EXPECT_NEAR(correction->shift, by_parts.shift, 1e-3 * by_parts.shift + goal);
-      EXPECT_GE(correction->iterations, by_parts.iterations > 0 ? 1 : 0);
-      // both stop within some round-offs of the mismatch; what that leaves in q is its inverse
-      const double bound = 100.0 * kEps * mechanism.num_bodies() / rcond;
-      const double size = std::max(1.0, u(expected).cwiseAbs().maxCoeff());
-      const double difference = (own - expected).cwiseAbs().maxCoeff() / size / bound;
-      EXPECT_LE(difference, 1.0) << path.name << " rcond " << rcond;
-      worst = std::max(worst, difference);
-    }
-  }
-  std::printf("%d states, %d refused, worst %.2g of the bound\n", projected, refused, worst);
-  EXPECT_GT(projected, 100) << "else this test says little";
-  EXPECT_LE(5 * refused, projected);
 }
 
 TEST(PathSweep, ProjectsNothingNearADegeneratePosition) {

@@ -45,7 +45,9 @@ void MjcfDefaults::Read(const XmlElement& element, const std::string& parent) {
   const std::string name = parent.empty() ? kMain : given->Name();
   if (parent.empty()) {
     // a second <default> at the top adds to the first
-    if (given) names_of_main_.insert(given->Name());
+    const std::string also = given ? given->Name() : kMain;
+    if (also != kMain && classes_.contains(also)) given->Fail("a class that is not described yet");
+    names_of_main_.insert(also);
   } else if (classes_.contains(Known(name))) {
     given->Fail("a class that is not described yet");
   }

@@ -165,6 +165,9 @@ TEST(ImportMjcf, DefaultsAtTheTopAreThoseOfAllWhateverTheirName) {
             2u);
   ExpectRefusal(Model("<joint/>", "<default class=\"base\">\n<default class=\"base\"/></default>"),
                 {"file.xml:2: <default> class: found \"base\"", "not described yet"});
+  ExpectRefusal(
+      Model("<joint/>", "<default><default class=\"base\"/></default>\n<default class=\"base\"/>"),
+      {"file.xml:2: <default> class: found \"base\"", "not described yet"});
 }
 
 TEST(ImportMjcf, OtherFilesAreRefusedWhereverTheyAreIncluded) {

@@ -104,8 +104,12 @@ std::string NumberText(double value) {
 
 std::string UniqueNames::Take(const std::string& wanted) {
   const std::string name = wanted.empty() ? "unnamed" : wanted;
-  std::string free = name;
-  for (int i = 2; !taken_.insert(free).second; ++i) free = fmt::format("{}_{}", name, i);
+  if (Add(name)) return name;
+  int& number = next_.try_emplace(name, 2).first->second;
+  std::string free;
+  do {
+    free = fmt::format("{}_{}", name, number++);
+  } while (!Add(free));
   return free;
 }
 

@@ -2,6 +2,7 @@
 // never an instruction.
 #pragma once
 
+#include <map>
 #include <set>
 #include <string>
 #include <string_view>
@@ -42,11 +43,14 @@ class UniqueNames {
  public:
   explicit UniqueNames(std::set<std::string> taken = {}) : taken_(std::move(taken)) {}
 
+  /// False if it is taken already.
+  bool Add(const std::string& name) { return taken_.insert(name).second; }
   /// `wanted`, or that with "_2", "_3" .. behind it where it is taken; "unnamed" for "".
   std::string Take(const std::string& wanted);
 
  private:
   std::set<std::string> taken_;
+  std::map<std::string, int> next_;  ///< number of a name that was wanted before
 };
 
 }  // namespace loopbench::exchange

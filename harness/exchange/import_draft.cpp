@@ -8,6 +8,14 @@
 
 namespace loopbench::harness {
 
+Eigen::Quaterniond UnitQuaternion(const XmlValue& value, const Eigen::Quaterniond& q) {
+  const double length = q.norm();
+  if (!(length > 0.0 && std::isfinite(length))) {
+    value.Fail("a quaternion of finite length that is not zero");
+  }
+  return q.normalized();
+}
+
 ImportDraft::ImportDraft(const XmlFile& file, const ImportOptions& options)
     : at_rest(1), file_(file), options_(options), elements_{file.root()}, lines_{0} {
   description.space = SpaceKind::kSpatial;
@@ -53,7 +61,7 @@ int ImportDraft::BodyNamed(const std::string& name, const XmlElement& user) cons
 }
 
 std::string ImportDraft::NewJointName(const XmlElement& element, const std::string& name) {
-  if (!joints_.insert(name).second) {
+  if (!joints_.Add(name)) {
     element.Fail(fmt::format("a second joint \"{}\"", name), "a name that is not in use");
   }
   return name;
@@ -65,9 +73,8 @@ std::string ImportDraft::NameLater(const std::string& stem) {
 }
 
 void ImportDraft::NameJoints() {
-  for (auto& [joint, stem] : stems_) {
-    while (!joints_.insert(stem).second) stem += "_";
-    description.joints[joint].name = stem;
+  for (const auto& [joint, stem] : stems_) {
+    description.joints[joint].name = joints_.Take(stem);
   }
   stems_.clear();
 }

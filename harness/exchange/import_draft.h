@@ -11,6 +11,7 @@
 #include <string_view>
 #include <vector>
 
+#include "harness/exchange/export_names.h"
 #include "harness/exchange/import.h"
 #include "harness/exchange/import_placement.h"
 #include "harness/exchange/xml_file.h"
@@ -79,12 +80,15 @@ class ImportDraft {
   std::vector<XmlElement> elements_;  ///< of bodies; the root element for Ground
   std::vector<int> lines_;
   std::map<std::string, int> bodies_;
-  std::set<std::string> joints_;
+  exchange::UniqueNames joints_;
   std::vector<std::pair<std::size_t, std::string>> stems_;  ///< of joints without names
   std::vector<ImportNote> notes_;
   std::vector<std::pair<int, double>> lifts_;
   std::optional<XmlElement> assumed_gravity_;  ///< who would have had to say it
 };
+
+/// Of length 1; refuses one that is zero, which `value` says.
+Eigen::Quaterniond UnitQuaternion(const XmlValue& value, const Eigen::Quaterniond& q);
 
 /// The readers of the formats; each fills the draft from the root element.
 void ReadMjcf(const XmlElement& root, ImportDraft* draft);

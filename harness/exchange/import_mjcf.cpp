@@ -23,28 +23,24 @@ constexpr DroppedReason kMjcfReasons[] = {
     {"deformable", "bodies are rigid", true},
     {"joint@armature", "rotors have no inertia beside that of the bodies", true},
     {"joint@frictionloss", "dry friction is no force of mechanism files", true},
-    {"joint@group", ""},
-    {"joint@user", ""},
-    {"joint@margin", ""},
-    {"joint@solimplimit", ""},
-    {"joint@solreflimit", ""},
-    {"joint@solimpfriction", ""},
-    {"joint@solreffriction", ""},
-    {"joint@actuatorfrcrange", ""},
-    {"joint@actuatorfrclimited", ""},
-    {"joint@actuatorgravcomp", ""},
+    {"@group", ""},
+    {"@user", ""},
+    {"@margin", ""},
+    {"@solimplimit", ""},
+    {"@solreflimit", ""},
+    {"@solimpfriction", ""},
+    {"@solreffriction", ""},
+    {"@actuatorfrcrange", ""},
+    {"@actuatorfrclimited", ""},
     {"joint@springdamper", "stiffness and damping by frequency depend on masses of the start",
      true},
-    {"freejoint@group", ""},
     {"freejoint@align", ""},
     {"site@type", ""},
     {"site@size", ""},
-    {"site@rgba", ""},
-    {"site@material", ""},
-    {"site@group", ""},
-    {"site@user", ""},
+    {"@rgba", ""},
+    {"@material", ""},
+    {"@width", ""},
     {"site@fromto", "a site is taken as the point at its `pos`"},
-    {"body@user", ""},
     {"body@sleep", ""},
     {"option@timestep", "runs choose their own steps"},
     {"option@integrator", "runs choose their own integrator"},
@@ -74,7 +70,6 @@ constexpr DroppedReason kMjcfReasons[] = {
     {"option@collision", ""},
     {"option@sdf_iterations", ""},
     {"option@sdf_initpoints", ""},
-    {"option@actuatorgroupdisable", ""},
     {"@warmstart", ""},
     {"@filterparent", ""},
     {"@multiccd", ""},
@@ -92,9 +87,6 @@ constexpr DroppedReason kMjcfReasons[] = {
     {"@refsafe", ""},
     {"@frictionloss", ""},
     {"@limit", ""},
-    {"@clampctrl", ""},
-    {"@actuation", ""},
-    {"@constraint", "loops are always imposed", true},
     {"compiler@strippath", ""},
     {"compiler@meshdir", ""},
     {"compiler@texturedir", ""},
@@ -107,6 +99,23 @@ constexpr DroppedReason kMjcfReasons[] = {
     {"compiler@fitaabb", ""},
     {"compiler@saveinertial", ""},
     {"compiler@alignfree", ""}};
+
+constexpr std::size_t kActuatorGroups = 31;  // that can be switched off
+
+/// Refuses elements that stand for other parts of a model, wherever something is read.
+void RefuseMacros(const XmlElement& root) {
+  const std::vector<std::string_view> macros = {"include", "composite", "flexcomp", "replicate",
+                                                "attach"};
+  std::vector<XmlElement> found = root.ChildrenOf(macros);
+  for (const XmlElement& section :
+       root.ChildrenOf({"compiler", "option", "default", "worldbody", "equality", "tendon",
+                        "actuator", "keyframe"})) {
+    if (const auto macro = section.Within(macros)) found.push_back(*macro);
+  }
+  if (found.empty()) return;
+  found[0].Fail("an element that stands for other parts of a model",
+                "the whole model in one file, as MuJoCo saves it (mj_saveLastXML)");
+}
 
 void ReadCompiler(const XmlElement& element, MjcfSettings* settings) {
   const auto flag = [&](const char* name, bool* value) {
@@ -162,6 +171,14 @@ void ReadOption(const XmlElement& element, MjcfModel* model) {
   for (const char* name : {"density", "viscosity", "wind"}) {
     if (has_medium(name)) model->draft->Note(element, name, "dropped: there is no medium", true);
   }
+  if (const auto groups = element.Attribute("actuatorgroupdisable")) {
+    for (const double group : groups->Numbers(0, kActuatorGroups)) {
+      if (!(group >= 0.0 && group < kActuatorGroups) || group != std::floor(group)) {
+        groups->Fail("whole numbers from 0 to 30");
+      }
+      settings.silent_groups.insert(static_cast<int>(group));
+    }
+  }
   for (const XmlElement& flag : element.Children("flag")) {
     const auto on = [&](const char* name, bool* value) {
       const auto given = flag.Attribute(name);
@@ -172,9 +189,14 @@ void ReadOption(const XmlElement& element, MjcfModel* model) {
     on("passive", &has_passive);
     on("spring", &settings.has_springs);
     on("damper", &settings.has_dampers);
+    bool has_constraints = true;
     on("equality", &settings.has_equality);
+    on("constraint", &has_constraints);
+    on("actuation", &settings.has_actuation);
+    on("clampctrl", &settings.clamps_controls);
     on("contact", &settings.has_contact);
     if (!has_gravity) model->draft->description.gravity.setZero();
+    if (!has_constraints) settings.has_equality = false;
     if (!has_passive) settings.has_springs = settings.has_dampers = false;
   }
 }
@@ -184,7 +206,7 @@ std::map<std::string, XmlElement> HeldTendons(const XmlElement& root, MjcfModel*
   std::map<std::string, XmlElement> held;
   for (const XmlElement& section : root.Children("equality")) {
     for (const XmlElement& element : section.Children("tendon")) {
-      const MjcfElement equality = model->defaults.Of(element, "", "equality");
+      const MjcfElement equality = model->defaults.Peek(element, "", "equality");
       const auto active = equality.Attribute("active");
       const auto first = equality.Attribute("tendon1");
       if (!first || equality.Attribute("tendon2") || (active && !active->Bool())) continue;
@@ -200,7 +222,7 @@ void ReadMjcf(const XmlElement& root, ImportDraft* draft) {
   MjcfModel model(draft);
   if (const auto name = root.Attribute("model")) draft->description.name = name->Name();
   draft->description.gravity = {0.0, 0.0, -9.81};
-  RefuseMjcfMacros(root);
+  RefuseMacros(root);
   for (const XmlElement& element : root.Children("compiler")) {
     ReadCompiler(element, &model.settings);
   }
@@ -211,9 +233,7 @@ void ReadMjcf(const XmlElement& root, ImportDraft* draft) {
   for (const XmlElement& world : worlds) ReadMjcfWorld(world, &model);
   AdjustMasses(&model);
   const auto held = HeldTendons(root, &model);
-  if (model.settings.has_equality) {
-    for (const XmlElement& section : root.Children("equality")) ReadMjcfEquality(section, &model);
-  }
+  for (const XmlElement& section : root.Children("equality")) ReadMjcfEquality(section, &model);
   for (const XmlElement& section : root.Children("tendon")) {
     ReadMjcfTendons(section, held, &model);
   }

@@ -5,6 +5,7 @@
 
 #include <map>
 #include <optional>
+#include <set>
 #include <string>
 #include <utility>
 #include <vector>
@@ -15,6 +16,9 @@ namespace loopbench::harness {
 
 /// Why springs, dampers and efforts of a joint of several coordinates are dropped.
 inline constexpr const char* kNeedsOneCoordinate = "only joints with one coordinate have forces";
+
+/// What limits the efforts of all actuators of a joint.
+inline constexpr const char *kEffortFlag = "actuatorfrclimited", *kEffortRange = "actuatorfrcrange";
 
 /// An element with what its classes say where it is silent: itself first, then the nearest class.
 class MjcfElement {
@@ -33,7 +37,8 @@ class MjcfElement {
   std::vector<XmlElement> classes_;
 };
 
-/// <default> and the classes nested in it.
+/// <default> and the classes nested in it. The class at the top is "main", which elements without
+/// a class have; it may have another name too.
 class MjcfDefaults {
  public:
   void Read(const XmlElement& element, const std::string& parent);
@@ -41,6 +46,9 @@ class MjcfDefaults {
   /// own.
   MjcfElement Of(const XmlElement& element, const std::string& childclass,
                  const std::string& tag = "") const;
+  /// The same, of an element that may be dropped yet: its classes do not count as in use.
+  MjcfElement Peek(const XmlElement& element, const std::string& childclass,
+                   const std::string& tag = "") const;
   /// Refuses a class that nobody has described.
   void CheckClass(const XmlValue& value) const;
   /// What no element took counts as read.
@@ -49,10 +57,19 @@ class MjcfDefaults {
  private:
   struct Class {
     std::string parent;
-    std::map<std::string, XmlElement> elements;  ///< by tag
+    /// By what they describe: actuators of all tags have one default. In the order of the file.
+    std::map<std::string, std::vector<XmlElement>> elements;
   };
+  using Use = std::pair<std::string, std::string>;  ///< a class, and what it describes
+
+  /// The name under which a class is described.
+  std::string Known(const std::string& name) const;
+  std::vector<XmlElement> Layers(const XmlElement& element, const std::string& childclass,
+                                 const std::string& tag, std::set<Use>* used) const;
+
   std::map<std::string, Class> classes_;
-  mutable std::set<std::pair<std::string, std::string>> used_;  ///< class, tag
+  std::set<std::string> names_of_main_;
+  mutable std::set<Use> used_;
 };
 
 /// Attributes of <compiler> and <option> that matter.
@@ -64,11 +81,18 @@ struct MjcfSettings {
   double least_mass = 0.0, least_inertia = 0.0, total_mass = -1.0;
   int first_group = 0, last_group = 5;
   bool has_contact = true, has_equality = true, has_springs = true, has_dampers = true;
+  bool has_actuation = true, clamps_controls = true;
+  std::set<int> silent_groups;  ///< of actuators
 
+  /// Springs, dampers, and gravity compensation while one of them acts.
+  bool has_passive() const { return has_springs || has_dampers; }
   double Angle(double value) const { return degrees ? value * kDegree : value; }
 };
 
 enum class MjcfKind { kHinge, kSlide, kBall, kFree };
+
+/// Least and largest value.
+using MjcfLimits = std::pair<double, double>;
 
 /// A joint of MuJoCo: with others on the same body it is part of one of ours.
 struct MjcfJoint {
@@ -113,6 +137,10 @@ class MjcfModel {
   /// The orientation that the element says, in whichever way; the class's if it says none.
   Eigen::Quaterniond OrientationOf(const MjcfElement& element) const;
   Placement PlacementOf(const MjcfElement& element) const;
+  /// What the element says in `range`, where `flag` or, without it, the range itself makes it
+  /// count.
+  std::optional<MjcfLimits> LimitsOf(const MjcfElement& element, const std::string& flag,
+                                     const std::string& range) const;
   /// Bodies in ground axes where the springs of joints are free: tendons that do not say their
   /// free length are free there.
   std::vector<Placement> WhereSpringsAreFree() const;
@@ -134,14 +162,13 @@ struct MassProperties {
 };
 MassProperties MassOfGeoms(const MjcfModel& model, const std::vector<MjcfGeom>& geoms);
 
-/// Refuses children that stand for other parts of a model.
-void RefuseMjcfMacros(const XmlElement& element);
 /// <worldbody>.
 void ReadMjcfWorld(const XmlElement& world, MjcfModel* model);
 /// Total mass, bounds: what <compiler> does to all bodies.
 void AdjustMasses(MjcfModel* model);
-/// A <joint> or <freejoint>, with its springs and dampers still unread.
-MjcfJoint ReadMjcfJoint(const MjcfModel& model, const XmlElement& element,
+/// A <joint> or <freejoint>, with its springs and dampers still unread; X is the frame around it in
+/// its body.
+MjcfJoint ReadMjcfJoint(const MjcfModel& model, const XmlElement& element, const Placement& X,
                         const std::string& childclass);
 /// Makes one joint of ours of those of a body; X_PB is where the file draws the body.
 void AddMjcfChain(MjcfModel* model, const XmlElement& body, int parent, int child,
@@ -152,5 +179,8 @@ void ReadMjcfEquality(const XmlElement& section, MjcfModel* model);
 void ReadMjcfTendons(const XmlElement& section, const std::map<std::string, XmlElement>& held,
                      MjcfModel* model);
 void ReadMjcfKeys(const XmlElement& root, MjcfModel* model);
+/// Constant efforts of actuators under these controls; without any, under 0.
+void ReadMjcfActuators(const XmlElement& root, const std::optional<XmlValue>& controls,
+                       MjcfModel* model);
 
 }  // namespace loopbench::harness

@@ -29,20 +29,23 @@ std::string ClassWithin(const MjcfModel& model, const XmlElement& element,
   return given->text();
 }
 
+/// In the order of the file, within frames and beside them: it is that of qpos.
 void Gather(const MjcfModel& model, const XmlElement& element, const Placement& X,
             const std::string& childclass, Contents* contents) {
-  RefuseMjcfMacros(element);
-  for (const auto& [tag, list] : {std::pair{"body", &contents->bodies},
-                                  {"geom", &contents->geoms},
-                                  {"site", &contents->sites},
-                                  {"joint", &contents->joints},
-                                  {"freejoint", &contents->joints}}) {
-    for (const XmlElement& child : element.Children(tag)) list->push_back({child, X, childclass});
-  }
-  for (const XmlElement& frame : element.Children("frame")) {
-    frame.Attribute("name");
-    const Placement within = X * model.PlacementOf({frame, {}});
-    Gather(model, frame, within, ClassWithin(model, frame, childclass), contents);
+  const std::map<std::string, std::vector<Placed>*> lists = {{"body", &contents->bodies},
+                                                             {"geom", &contents->geoms},
+                                                             {"site", &contents->sites},
+                                                             {"joint", &contents->joints},
+                                                             {"freejoint", &contents->joints}};
+  for (const XmlElement& child :
+       element.ChildrenOf({"body", "geom", "site", "joint", "freejoint", "frame"})) {
+    if (const auto list = lists.find(child.tag()); list != lists.end()) {
+      list->second->push_back({child, X, childclass});
+      continue;
+    }
+    child.Attribute("name");
+    const Placement within = X * model.PlacementOf({child, {}});
+    Gather(model, child, within, ClassWithin(model, child, childclass), contents);
   }
 }
 
@@ -130,14 +133,15 @@ void ReadBody(const Placed& placed, int parent, MjcfModel* model) {
   ReadMasses(element, contents, body, model);
   ReadSites(contents.sites, body, model);
   if (const auto lift = element.Attribute("gravcomp")) {
-    if (const double share = lift->Number(); share != 0.0) draft->AddLift(body, share);
+    const double share = lift->Number();
+    if (share != 0.0 && model->settings.has_passive()) draft->AddLift(body, share);
   }
   if (const auto mocap = element.Attribute("mocap")) {
     if (mocap->Bool()) draft->Note(element, "mocap", "stays where the file draws it", true);
   }
   std::vector<MjcfJoint> joints;
   for (const Placed& joint : contents.joints) {
-    joints.push_back(ReadMjcfJoint(*model, joint.element, joint.childclass));
+    joints.push_back(ReadMjcfJoint(*model, joint.element, joint.X, joint.childclass));
   }
   AddMjcfChain(model, element, parent, body, X_PB, joints);
   for (const Placed& child : contents.bodies) ReadBody(child, body, model);

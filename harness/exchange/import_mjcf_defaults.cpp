@@ -9,16 +9,15 @@ namespace {
 
 constexpr const char* kMain = "main";  // the class of elements without one
 
-}  // namespace
-
-void RefuseMjcfMacros(const XmlElement& element) {
-  for (const char* tag : {"include", "composite", "flexcomp", "replicate", "attach"}) {
-    for (const XmlElement& child : element.Children(tag)) {
-      child.Fail("an element that stands for other parts of a model",
-                 "the whole model in one file, as MuJoCo saves it (mj_saveLastXML)");
-    }
-  }
+/// What an element of a class describes: its tag, or "actuator".
+std::string DescribedBy(const std::string& tag) {
+  static const std::set<std::string> kActuators = {"general",     "motor",  "position", "velocity",
+                                                   "intvelocity", "damper", "cylinder", "muscle",
+                                                   "adhesion",    "plugin"};
+  return kActuators.contains(tag) ? "actuator" : tag;
 }
+
+}  // namespace
 
 std::optional<XmlValue> MjcfElement::Attribute(const std::string& name) const {
   std::optional<XmlValue> found = own_.Attribute(name);
@@ -43,10 +42,13 @@ std::vector<XmlElement> MjcfElement::Layers() const {
 void MjcfDefaults::Read(const XmlElement& element, const std::string& parent) {
   const auto given = element.Attribute("class");
   if (!given && !parent.empty()) element.Fail("no \"class\"", "a name: it is a nested class");
-  const std::string name = given ? given->Name() : kMain;
-  if (parent.empty() && classes_.contains(name)) {
+  const std::string name = parent.empty() ? kMain : given->Name();
+  if (parent.empty()) {
     // a second <default> at the top adds to the first
-  } else if (classes_.contains(name)) {
+    const std::string also = given ? given->Name() : kMain;
+    if (also != kMain && classes_.contains(also)) given->Fail("a class that is not described yet");
+    names_of_main_.insert(also);
+  } else if (classes_.contains(Known(name))) {
     given->Fail("a class that is not described yet");
   }
   classes_[name].parent = parent;
@@ -54,40 +56,56 @@ void MjcfDefaults::Read(const XmlElement& element, const std::string& parent) {
     if (child.tag() == "default") {
       Read(child, name);
     } else {
-      classes_[name].elements.insert_or_assign(child.tag(), child);
+      classes_[name].elements[DescribedBy(child.tag())].push_back(child);
     }
   }
 }
 
-void MjcfDefaults::CheckClass(const XmlValue& value) const {
-  if (!classes_.contains(value.text()) && value.text() != kMain) {
-    value.Fail("a class described in <default>");
-  }
+std::string MjcfDefaults::Known(const std::string& name) const {
+  return names_of_main_.contains(name) ? kMain : name;
 }
 
-MjcfElement MjcfDefaults::Of(const XmlElement& element, const std::string& childclass,
-                             const std::string& tag) const {
-  const std::string wanted = tag.empty() ? element.tag() : tag;
+void MjcfDefaults::CheckClass(const XmlValue& value) const {
+  const std::string name = Known(value.text());
+  if (!classes_.contains(name) && name != kMain) value.Fail("a class described in <default>");
+}
+
+std::vector<XmlElement> MjcfDefaults::Layers(const XmlElement& element,
+                                             const std::string& childclass, const std::string& tag,
+                                             std::set<Use>* used) const {
+  const std::string wanted = DescribedBy(tag.empty() ? element.tag() : tag);
   std::string name = childclass.empty() ? kMain : childclass;
   if (const auto given = element.Attribute("class")) {
     CheckClass(*given);
     name = given->text();
   }
   std::vector<XmlElement> layers;
-  for (auto found = classes_.find(name); found != classes_.end();
+  for (auto found = classes_.find(Known(name)); found != classes_.end();
        found = classes_.find(found->second.parent)) {
     const auto defaults = found->second.elements.find(wanted);
     if (defaults == found->second.elements.end()) continue;
-    layers.push_back(defaults->second);
-    used_.emplace(found->first, wanted);
+    // of several in one class the last one has the last word
+    layers.insert(layers.end(), defaults->second.rbegin(), defaults->second.rend());
+    if (used != nullptr) used->emplace(found->first, wanted);
   }
-  return {element, std::move(layers)};
+  return layers;
+}
+
+MjcfElement MjcfDefaults::Of(const XmlElement& element, const std::string& childclass,
+                             const std::string& tag) const {
+  return {element, Layers(element, childclass, tag, &used_)};
+}
+
+MjcfElement MjcfDefaults::Peek(const XmlElement& element, const std::string& childclass,
+                               const std::string& tag) const {
+  return {element, Layers(element, childclass, tag, nullptr)};
 }
 
 void MjcfDefaults::IgnoreUnused() const {
   for (const auto& [name, one] : classes_) {
-    for (const auto& [tag, element] : one.elements) {
-      if (!used_.contains({name, tag})) element.Ignore();
+    for (const auto& [what, elements] : one.elements) {
+      if (used_.contains({name, what})) continue;
+      for (const XmlElement& element : elements) element.Ignore();
     }
   }
 }
@@ -114,9 +132,7 @@ Eigen::Quaterniond MjcfModel::OrientationOf(const MjcfElement& element) const {
   };
   if (way == "quat") {
     const std::vector<double> q = found->Numbers(4, 4);
-    const Eigen::Quaterniond quaternion(q[0], q[1], q[2], q[3]);
-    if (!(quaternion.norm() > 0.0)) found->Fail("a quaternion that is not zero");
-    return quaternion.normalized();
+    return UnitQuaternion(*found, {q[0], q[1], q[2], q[3]});
   }
   if (way == "euler") {
     const Eigen::Vector3d angles = found->Vector();
@@ -143,6 +159,19 @@ Placement MjcfModel::PlacementOf(const MjcfElement& element) const {
   if (const auto position = element.Attribute("pos")) X.p = position->Vector();
   X.q = OrientationOf(element);
   return X;
+}
+
+std::optional<MjcfLimits> MjcfModel::LimitsOf(const MjcfElement& element, const std::string& flag,
+                                              const std::string& range) const {
+  const auto limited = element.Attribute(flag);
+  const auto given = element.Attribute(range);
+  const std::size_t choice = limited ? limited->Choice({"false", "true", "auto"}) : 2;
+  if (choice == 0 || (choice == 2 && !(given && settings.limits_by_range))) return std::nullopt;
+  if (!given) element.own().Fail(fmt::format("\"{}\" without \"{}\"", flag, range), "both");
+  const std::vector<double> ends = given->Numbers(2, 2);
+  if (ends[0] < ends[1]) return MjcfLimits{ends[0], ends[1]};
+  if (choice == 1) given->Fail("two numbers, the first below the second");
+  return std::nullopt;  // as MuJoCo has it, and its default: 0 0
 }
 
 const BodyPoint& MjcfModel::SiteNamed(const XmlValue& value) const {

@@ -29,12 +29,13 @@ void RefuseOrNote(const MjcfModel& model, const MjcfJoint& joint) {
   if (joint.element.Number("frictionloss", 0.0, kNotNegative) > 0.0) {
     draft->Note(own, "frictionloss", "dropped: dry friction is no force of mechanism files", true);
   }
-  const auto limited = joint.element.Attribute("limited");
-  const std::size_t choice = limited ? limited->Choice({"false", "true", "auto"}) : 2;
-  const auto range = joint.element.Attribute("range");
-  const bool has_range = range && model.settings.limits_by_range;
-  if (choice == 1 || (choice == 2 && has_range)) {
+  if (model.LimitsOf(joint.element, "limited", "range")) {
     draft->Note(own, "range", "dropped: joints turn and slide without ends", true);
+  }
+  const auto by_actuators = joint.element.Attribute("actuatorgravcomp");
+  if (by_actuators && by_actuators->Bool() &&
+      (!model.settings.has_actuation || model.LimitsOf(joint.element, kEffortFlag, kEffortRange))) {
+    draft->Note(own, "actuatorgravcomp", "dropped: gravcomp acts whatever actuators may do", true);
   }
 }
 
@@ -222,7 +223,7 @@ void AddComposed(const XmlElement& body, const std::vector<MjcfJoint>& joints,
 
 }  // namespace
 
-MjcfJoint ReadMjcfJoint(const MjcfModel& model, const XmlElement& element,
+MjcfJoint ReadMjcfJoint(const MjcfModel& model, const XmlElement& element, const Placement& X,
                         const std::string& childclass) {
   MjcfJoint joint(model.defaults.Of(element, childclass));
   if (const auto name = element.Attribute("name")) joint.name = name->Name();
@@ -237,12 +238,14 @@ MjcfJoint ReadMjcfJoint(const MjcfModel& model, const XmlElement& element,
   }
   const auto position = joint.element.Attribute("pos");
   if (position && joint.kind != MjcfKind::kFree) joint.position = position->Vector();
+  if (joint.kind != MjcfKind::kFree) joint.position = X.At(joint.position);
   if (const auto axis = joint.element.Attribute("axis")) {
     joint.axis = axis->Vector();
     const bool matters = joint.kind == MjcfKind::kHinge || joint.kind == MjcfKind::kSlide;
     if (matters && !(joint.axis.norm() > 0.0)) axis->Fail("an axis that is not zero");
     if (std::abs(joint.axis.squaredNorm() - 1.0) > 0.0) joint.axis.normalize();
   }
+  joint.axis = X.q * joint.axis;
   joint.reference = joint.element.Number("ref", 0.0);
   joint.spring_reference = joint.element.Number("springref", 0.0);
   if (joint.kind == MjcfKind::kHinge) {

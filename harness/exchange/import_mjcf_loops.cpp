@@ -71,7 +71,8 @@ void AddWeld(const MjcfElement& equality, MjcfModel* model) {
   if (const auto pose = equality.Attribute("relpose")) {
     const std::vector<double> p = pose->Numbers(7, 7);
     const Eigen::Quaterniond q(p[3], p[4], p[5], p[6]);
-    if (q.norm() > 0.0) relative = {q.normalized(), {p[0], p[1], p[2]}};
+    // a quaternion of zeros asks for the poses that the file draws
+    if (q.norm() > 0.0) relative = {UnitQuaternion(*pose, q), {p[0], p[1], p[2]}};
   }
   equality.Attribute("anchor");  // where the two are held together: a weld holds them everywhere
   equality.Attribute("torquescale");
@@ -83,8 +84,8 @@ void AddWeld(const MjcfElement& equality, MjcfModel* model) {
       .cut = true;
 }
 
-/// A joint of one coordinate at a constant value; couplings of two are dropped.
-void AddConstantJoint(const MjcfElement& equality, MjcfModel* model) {
+/// A joint of one coordinate at a constant value. False for a coupling of two, which is dropped.
+bool AddConstantJoint(const MjcfElement& equality, MjcfModel* model) {
   const auto joint1 = equality.Attribute("joint1");
   if (!joint1) equality.own().Fail("no \"joint1\"", "the name of a joint");
   const MjcfJoint& joint = model->JointNamed(*joint1);
@@ -95,11 +96,12 @@ void AddConstantJoint(const MjcfElement& equality, MjcfModel* model) {
     model->draft->Note(equality.own(),
                        "dropped: no joint follows another: this is a freedom more than in the file",
                        true);
-    return;
+    return false;
   }
   // MuJoCo: q1 - q1_0 = a_0, with q1_0 the coordinate where the file draws the joint
   JointDescription& ours = model->draft->description.joints[static_cast<std::size_t>(joint.joint)];
   ours.motions = {{0, Polynomial{{a[0]}}}};
+  return true;
 }
 
 void ReadSolverOptions(const MjcfElement& element) {
@@ -110,19 +112,20 @@ void ReadSolverOptions(const MjcfElement& element) {
 
 void ReadMjcfEquality(const XmlElement& section, MjcfModel* model) {
   for (const XmlElement& element : section.Children()) {
-    const MjcfElement equality = model->defaults.Of(element, "", "equality");
-    const auto active = equality.Attribute("active");
-    ReadSolverOptions(equality);
-    const std::string tag = element.tag();
-    if (active && !active->Bool()) {
+    const auto active = model->defaults.Peek(element, "", "equality").Attribute("active");
+    if (!model->settings.has_equality || (active && !active->Bool())) {
       element.Ignore();
       model->draft->Note(element, "dropped: it is not active");
       continue;
     }
+    const MjcfElement equality = model->defaults.Of(element, "", "equality");
+    ReadSolverOptions(equality);
+    const std::string tag = element.tag();
+    bool is_exact = tag == "connect" || tag == "weld";
     if (tag == "connect") AddConnect(equality, model);
     if (tag == "weld") AddWeld(equality, model);
-    if (tag == "joint") AddConstantJoint(equality, model);
-    if (tag == "connect" || tag == "weld") {
+    if (tag == "joint") is_exact = AddConstantJoint(equality, model);
+    if (is_exact) {
       model->draft->Note(element, "imposed exactly here; MuJoCo lets it give way");
     } else if (tag != "joint" && tag != "tendon") {
       element.Ignore();
@@ -185,7 +188,6 @@ double LengthOf(const std::pair<BodyPoint, BodyPoint>& ends, const std::vector<P
 
 void ReadTendon(const XmlElement& element, const std::map<std::string, XmlElement>& held,
                 const std::vector<Placement>& free_poses, MjcfModel* model) {
-  const MjcfElement tendon = model->defaults.Of(element, "", "tendon");
   const auto name = element.Attribute("name");
   const auto ends = element.tag() == "spatial" ? StraightEnds(element, *model) : std::nullopt;
   if (!ends || ends->first.body == ends->second.body) {
@@ -196,17 +198,17 @@ void ReadTendon(const XmlElement& element, const std::map<std::string, XmlElemen
                        true);
     return;
   }
+  const MjcfElement tendon = model->defaults.Of(element, "", "tendon");
   AddSpring(tendon, *ends, LengthOf(*ends, free_poses), model);
-  const auto limited = tendon.Attribute("limited");
-  const auto range = tendon.Attribute("range");
-  const std::size_t choice = limited ? limited->Choice({"false", "true", "auto"}) : 2;
-  if (choice == 1 || (choice == 2 && range && model->settings.limits_by_range)) {
+  if (model->LimitsOf(tendon, "limited", "range")) {
     model->draft->Note(element, "range", "dropped: tendons do not end", true);
   }
   if (tendon.Number("frictionloss", 0.0, kNotNegative) > 0.0) {
     model->draft->Note(element, "frictionloss", "dropped: there is no dry friction", true);
   }
-  for (const XmlElement& layer : tendon.Layers()) layer.IgnoreAttributes();
+  if (tendon.Number("armature", 0.0, kNotNegative) > 0.0) {
+    model->draft->Note(element, "armature", "dropped: tendons have no inertia", true);
+  }
   if (!name || !held.contains(name->text()) || !model->settings.has_equality) return;
   const MjcfElement equality = model->defaults.Of(held.at(name->text()), "", "equality");
   equality.own().Attribute("name");  // the tendon's is the rod's

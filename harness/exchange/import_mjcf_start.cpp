@@ -1,4 +1,4 @@
-// <keyframe>: coordinates and speeds of MuJoCo's joints as those of ours, and constant controls.
+// <keyframe>: coordinates and speeds of MuJoCo's joints as those of ours.
 #include <fmt/format.h>
 
 #include "harness/exchange/import_mjcf.h"
@@ -90,8 +90,31 @@ void SetComposed(const MjcfModel& model, const MjcfChain& chain, JointType type,
   }
 }
 
+/// The value at which an <equality> holds the joint, if one does.
+std::optional<double> HeldAt(const JointDescription& joint) {
+  if (joint.motions.empty()) return std::nullopt;
+  return std::get<Polynomial>(joint.motions[0].value).coefficients[0];
+}
+
+/// A start that a joint cannot have is dropped.
+void NoteHeld(const XmlElement& key, const std::string& name, double held, double coordinate,
+              double speed, ImportDraft* draft) {
+  const std::string reason =
+      fmt::format("of joint \"{}\" dropped: an <equality> holds it at {:.6g}", name, held);
+  if (coordinate != held) draft->Note(key, "qpos", reason, true);
+  if (speed != 0.0) draft->Note(key, "qvel", reason, true);
+}
+
+void RefuseZeroQuaternions(const MjcfModel& model, const XmlValue& qpos, const double* q) {
+  for (const MjcfJoint& joint : model.joints) {
+    const double* turn = q + (joint.kind == MjcfKind::kFree ? 3 : 0);
+    if (joint.num_q() > 1) UnitQuaternion(qpos, {turn[0], turn[1], turn[2], turn[3]});
+    q += joint.num_q();
+  }
+}
+
 /// Coordinates of our joints, and speeds if there are any, from those of MuJoCo.
-void SetMjcfStart(MjcfModel* model, const std::vector<double>& qpos,
+void SetMjcfStart(MjcfModel* model, const XmlElement& key, const std::vector<double>& qpos,
                   const std::vector<double>& qvel, bool has_speeds) {
   InitialDescription& initial = model->draft->description.initial;
   initial.coordinates.clear();
@@ -99,8 +122,8 @@ void SetMjcfStart(MjcfModel* model, const std::vector<double>& qpos,
   for (const MjcfChain& chain : model->chains) {
     if (chain.parts.empty()) continue;
     const MjcfJoint& first = model->joints[chain.parts[0]];
-    const JointType type =
-        model->draft->description.joints[static_cast<std::size_t>(chain.joint)].type;
+    const JointDescription& ours =
+        model->draft->description.joints[static_cast<std::size_t>(chain.joint)];
     std::vector<double> coordinates, speeds;
     if (first.alone && first.kind == MjcfKind::kFree) {
       // a place in ground axes, an angular velocity in those of the body
@@ -112,70 +135,17 @@ void SetMjcfStart(MjcfModel* model, const std::vector<double>& qpos,
       coordinates = {q[0] - first.reference};
       speeds = {u[0]};
     } else {
-      SetComposed(*model, chain, type, q, u, &coordinates, &speeds);
+      SetComposed(*model, chain, ours.type, q, u, &coordinates, &speeds);
     }
-    initial.coordinates.push_back({chain.joint, coordinates});
-    if (has_speeds) initial.speeds.push_back({chain.joint, speeds});
+    if (const auto held = HeldAt(ours)) {
+      NoteHeld(key, ours.name, *held, coordinates[0], speeds[0], model->draft);
+    } else {
+      initial.coordinates.push_back({chain.joint, coordinates});
+      if (has_speeds) initial.speeds.push_back({chain.joint, speeds});
+    }
     for (const std::size_t part : chain.parts) {
       q += model->joints[part].num_q();
       u += model->joints[part].num_u();
-    }
-  }
-}
-
-/// Of `general`, what it gives under a control: gain times it and a bias, where both are constants.
-std::optional<double> ConstantEffort(const MjcfElement& actuator, double control) {
-  const auto numbers = [&actuator](const char* key, double first) {
-    const auto given = actuator.Attribute(key);
-    return given ? given->Numbers(1, 10) : std::vector<double>{first};
-  };
-  const auto type = [&actuator](const char* key) {
-    const auto given = actuator.Attribute(key);
-    return given ? given->text() : std::string();
-  };
-  const std::vector<double> gain = numbers("gainprm", 1.0), bias = numbers("biasprm", 0.0);
-  const std::string gains = type("gaintype"), biases = type("biastype"), dynamics = type("dyntype");
-  const bool has_bias = biases == "affine";
-  const bool varies = std::any_of(bias.begin() + 1, bias.end(), [](double x) { return x != 0.0; });
-  if ((!gains.empty() && gains != "fixed") || (!dynamics.empty() && dynamics != "none") ||
-      (!has_bias && !biases.empty() && biases != "none") || (has_bias && varies)) {
-    return std::nullopt;
-  }
-  return gain[0] * control + (has_bias ? bias[0] : 0.0);
-}
-
-constexpr const char* kNoControl = "its control is 0 in the start that is read";
-
-/// An actuator on a joint with one coordinate, under a control that stays: a constant effort.
-void AddMotor(const XmlElement& element, double control, MjcfModel* model) {
-  const auto drop = [&](const char* why, bool changes_motion) {
-    element.Ignore();
-    model->draft->Note(element, fmt::format("dropped: {}", why), changes_motion);
-  };
-  const bool is_general = element.tag() == "general", is_motor = element.tag() == "motor";
-  const auto name = is_motor || is_general ? element.Attribute("joint") : std::nullopt;
-  if (is_motor && control == 0.0) return drop(kNoControl, false);
-  if (!name) return drop("there are no actuators but motors of joints (<key ctrl=...>)", true);
-  const MjcfJoint& joint = model->JointNamed(*name);
-  if (joint.num_q() != 1 || !joint.alone) return drop(kNeedsOneCoordinate, true);
-  const MjcfElement motor = model->defaults.Of(element, "");
-  const auto effort = is_general ? ConstantEffort(motor, control) : std::optional(control);
-  if (!effort) return drop("its effort is no constant", true);
-  if (*effort == 0.0) return drop(kNoControl, false);
-  const auto gear = motor.Attribute("gear");
-  const double ratio = gear ? gear->Numbers(1, 6)[0] : 1.0;
-  model->draft->description.forces.emplace_back(
-      JointTorque{joint.joint, Polynomial{{ratio * *effort}}});
-  for (const XmlElement& layer : motor.Layers()) layer.IgnoreAttributes();
-  model->draft->Note(element, "a constant effort here, with the control of the start");
-}
-
-void AddMotors(const XmlElement& root, const std::vector<double>& controls, MjcfModel* model) {
-  std::size_t index = 0;
-  for (const XmlElement& section : root.Children("actuator")) {
-    for (const XmlElement& element : section.Children()) {
-      AddMotor(element, index < controls.size() ? controls[index] : 0.0, model);
-      ++index;
     }
   }
 }
@@ -200,7 +170,7 @@ void ReadMjcfKeys(const XmlElement& root, MjcfModel* model) {
   for (const XmlElement& section : root.Children("keyframe")) {
     for (const XmlElement& key : section.Children("key")) keys.push_back(key);
   }
-  std::vector<double> controls;
+  std::optional<XmlValue> controls;
   if (!keys.empty()) {
     std::vector<double> qpos, qvel;
     for (const MjcfJoint& joint : model->joints) {
@@ -212,9 +182,11 @@ void ReadMjcfKeys(const XmlElement& root, MjcfModel* model) {
     if (speeds && !positions) keys[0].Fail("qvel without qpos", "both");
     if (speeds) qvel = speeds->Numbers(qvel.size(), qvel.size());
     if (positions) {
-      SetMjcfStart(model, positions->Numbers(qpos.size(), qpos.size()), qvel, speeds.has_value());
+      qpos = positions->Numbers(qpos.size(), qpos.size());
+      RefuseZeroQuaternions(*model, *positions, qpos.data());
+      SetMjcfStart(model, keys[0], qpos, qvel, speeds.has_value());
     }
-    if (const auto ctrl = keys[0].Attribute("ctrl")) controls = ctrl->Numbers(0, 100000);
+    controls = keys[0].Attribute("ctrl");
     keys[0].Attribute("name");
     keys[0].Attribute("time");
   }
@@ -222,7 +194,7 @@ void ReadMjcfKeys(const XmlElement& root, MjcfModel* model) {
     keys[i].Ignore();
     model->draft->Note(keys[i], "dropped: the first <key> is the start");
   }
-  AddMotors(root, controls, model);
+  ReadMjcfActuators(root, controls, model);
 }
 
 }  // namespace loopbench::harness

@@ -82,12 +82,15 @@ void ImportDraft::GoToPlane() {
         fmt::format("{}: --planar: found that {}, expected a mechanism that moves in one plane",
                     file_.name(), why));
   }
-  if (std::abs(plane->gravity_dropped) > kRounding * description.gravity.norm()) {
+  const double least = kRounding * description.gravity.norm();
+  if (std::abs(plane->gravity_dropped) > least) {
     Note(elements_[kGround], fmt::format("gravity of {:.6g} m/s^2 along the normal of the plane "
                                          "dropped: it moves nothing",
                                          plane->gravity_dropped));
   }
   description = plane->description;
+  description.gravity =
+      description.gravity.unaryExpr([=](double g) { return std::abs(g) <= least ? 0.0 : g; });
 }
 
 }  // namespace loopbench::harness

@@ -44,6 +44,7 @@ constexpr DroppedReason kSdfReasons[] = {
     {"population", "it makes models while it runs", true},
     {"gripper", "", true},
     {"link@name", ""},
+    {"model@canonical_link", ""},
     {"sdf@version", ""}};
 
 SdfVersion ReadVersion(const XmlElement& root) {
@@ -66,6 +67,15 @@ void RefuseIncludes(const XmlElement& element) {
   }
 }
 
+/// What a joint moves.
+XmlValue ReadChild(const XmlElement& joint) {
+  const XmlValue child = joint.RequiredChild("child").Content();
+  if (child.Name() == "world") {
+    child.Fail("a link, frame or nested model: the world is no child, it can be the <parent>");
+  }
+  return child;
+}
+
 /// All names of a world or model, models within it included.
 void ReadNames(SdfScope* scope, SdfVersion version) {
   const XmlElement& element = scope->element;
@@ -78,7 +88,7 @@ void ReadNames(SdfScope* scope, SdfVersion version) {
           frame.attached_to = attached->text();
         }
       } else if (child.tag() == "joint") {
-        frame.attached_to = child.RequiredChild("child").Content().Name();
+        frame.attached_to = ReadChild(child).text();
       }
       if (frame.relative_to.empty()) {
         frame.relative_to = frame.attached_to;
@@ -102,20 +112,20 @@ void ReadNames(SdfScope* scope, SdfVersion version) {
 }
 
 /// Where models and links stand; links become bodies.
-void ReadLinks(SdfScope* scope, ImportDraft* draft) {
+void ReadLinks(SdfScope* scope, SdfVersion version, ImportDraft* draft) {
   for (const XmlElement& child : scope->element.Children("link")) {
     const std::string name = child.Required("name", "a name").Name();
     const int body = draft->AddBody(child, scope->prefix + name);
     const Placement X = scope->at_rest * scope->Resolve(name, child);
     draft->at_rest[static_cast<std::size_t>(body)] = X;
-    ReadSdfLink(child, body, scope->is_static, draft);
+    ReadSdfLink(child, body, scope->is_static, version, draft);
     if (!scope->is_static) continue;
     const std::string& body_name = draft->description.bodies[static_cast<std::size_t>(body)].name;
     draft->AddJoint(draft->NameLater(body_name + " fixed"), JointType::kWeld, kGround, X, body, {});
   }
   for (auto& [name, model] : scope->models) {
     model->at_rest = scope->at_rest * scope->Resolve(name, model->element);
-    ReadLinks(model.get(), draft);
+    ReadLinks(model.get(), version, draft);
   }
 }
 
@@ -129,7 +139,8 @@ void ReadJoints(const SdfScope& scope, SdfVersion version, ImportDraft* draft) {
 
 }  // namespace
 
-void ReadSdfLink(const XmlElement& element, int index, bool is_static, ImportDraft* draft) {
+void ReadSdfLink(const XmlElement& element, int index, bool is_static, SdfVersion version,
+                 ImportDraft* draft) {
   BodyDescription& body = draft->description.bodies[static_cast<std::size_t>(index)];
   if (const auto gravity = element.Child("gravity")) {
     if (!gravity->Content().Bool() && !is_static) draft->AddLift(index, 1.0);
@@ -166,7 +177,12 @@ void ReadSdfLink(const XmlElement& element, int index, bool is_static, ImportDra
                                    number(*inertia, "izz", 1.0), number(*inertia, "ixy", 0.0),
                                    number(*inertia, "ixz", 0.0), number(*inertia, "iyz", 0.0));
   }
-  const SdfFrame pose = ReadSdfPose(*inertial, SdfVersion{kFirstVersion});
+  const SdfFrame pose = ReadSdfPose(*inertial, version);
+  if (!pose.relative_to.empty()) {
+    inertial->RequiredChild("pose")
+        .Required("relative_to", "")
+        .Fail("none: an inertial stands in its link");
+  }
   body.com = pose.raw.p;
   body.inertia = InTurnedAxes(pose.raw.q, body.inertia);
   draft->CheckMass(index);
@@ -203,7 +219,7 @@ void ReadSdf(const XmlElement& root, ImportDraft* draft) {
     if (const auto name = world->Attribute("name")) draft->description.name = name->Name();
   }
   if (world) world->Attribute("name");
-  ReadLinks(&scope, draft);
+  ReadLinks(&scope, version, draft);
   ReadJoints(scope, version, draft);
   draft->NoteUnread(kSdfReasons);
 }

@@ -18,7 +18,7 @@ struct SdfFrame {
   Placement raw;                 ///< as the file says it
   std::string relative_to;       ///< a name in the same scope; "" for the scope's own frame
   std::string attached_to;       ///< of a frame and of a joint: what it moves with
-  bool is_raw_to_child = false;  ///< of a joint: raw is in axes of its child
+  bool is_raw_to_child = false;  ///< of a joint: raw is in the frame of its child
 };
 
 /// A world or a model: what it has by name, each in its own frame.
@@ -54,6 +54,7 @@ SdfFrame ReadSdfPose(const XmlElement& element, SdfVersion version);
 void ReadSdfJoint(const XmlElement& element, const std::string& name, const SdfScope& scope,
                   SdfVersion version, ImportDraft* draft);
 /// <inertial>, and what else a link says about itself.
-void ReadSdfLink(const XmlElement& element, int body, bool is_static, ImportDraft* draft);
+void ReadSdfLink(const XmlElement& element, int body, bool is_static, SdfVersion version,
+                 ImportDraft* draft);
 
 }  // namespace loopbench::harness

@@ -53,9 +53,7 @@ SdfFrame ReadSdfPose(const XmlElement& element, SdfVersion version) {
   const std::vector<double> p = content.Numbers(count, count);
   frame.raw.p = {p[0], p[1], p[2]};
   if (quaternion) {
-    const Eigen::Quaterniond q(p[6], p[3], p[4], p[5]);
-    if (!(q.norm() > 0.0)) content.Fail("a quaternion that is not zero");
-    frame.raw.q = q.normalized();
+    frame.raw.q = UnitQuaternion(content, {p[6], p[3], p[4], p[5]});
   } else {
     frame.raw.q = FromRollPitchYaw(unit * Eigen::Vector3d(p[3], p[4], p[5]));
   }

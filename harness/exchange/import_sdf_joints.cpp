@@ -1,6 +1,7 @@
 // Joints of SDF.
 #include <fmt/format.h>
 
+#include <algorithm>
 #include <cmath>
 #include <numbers>
 
@@ -53,16 +54,26 @@ void NoteLimits(const XmlElement& axis, ImportDraft* draft) {
   if (ends) draft->Note(*limit, "dropped: joints turn and slide without ends", true);
 }
 
-/// Spring, damper and start of one axis; `has_one`: the joint has no other.
+/// Where a joint starts: a coordinate for each of its own axes, 0 where the file says none.
+void ReadStart(const std::vector<XmlElement>& axes, std::size_t num_own, ImportDraft* draft) {
+  std::vector<double> values(num_own);
+  for (std::size_t i = 0; i < axes.size(); ++i) {
+    const auto start = axes[i].Child("initial_position");
+    const double value = start ? start->Content().Number() : 0.0;
+    if (i < num_own) {
+      values[i] = value;
+    } else if (value != 0.0) {
+      draft->Note(*start, "dropped: the joint has no coordinate of this axis", true);
+    }
+  }
+  const bool moves = std::ranges::any_of(values, [](double value) { return value != 0.0; });
+  if (moves) draft->description.initial.coordinates.push_back({draft->last_joint(), values});
+}
+
+/// Spring and damper of one axis; `has_one`: it is the only one of the joint.
 void ReadDynamics(const XmlElement& axis, bool has_one, ImportDraft* draft) {
   NoteLimits(axis, draft);
   const int joint = draft->last_joint();
-  if (const auto start = axis.Child("initial_position")) {
-    const double value = start->Content().Number();
-    if (has_one && value != 0.0) {
-      draft->description.initial.coordinates.push_back({joint, {value}});
-    }
-  }
   const auto dynamics = axis.Child("dynamics");
   if (!dynamics) return;
   const auto number = [&](const char* name, const Range& range) {
@@ -82,6 +93,20 @@ void ReadDynamics(const XmlElement& axis, bool has_one, ImportDraft* draft) {
   }
   if (k > 0.0) draft->description.forces.emplace_back(JointSpring{joint, k, rest, 0.0});
   if (c > 0.0) draft->description.forces.emplace_back(JointDamper{joint, c});
+}
+
+/// What both axes say but for their directions. Those that are the joint's own stand first:
+/// `num_own` is 1 of most, 2 of universal joints, 0 of balls.
+void ReadAxisForces(const std::optional<XmlElement>& axis, const std::optional<XmlElement>& axis2,
+                    std::size_t num_own, ImportDraft* draft) {
+  std::vector<XmlElement> axes;
+  for (const auto& one : {axis, axis2}) {
+    if (one) axes.push_back(*one);
+  }
+  for (std::size_t i = 0; i < axes.size(); ++i) {
+    ReadDynamics(axes[i], num_own == 1 && i == 0, draft);
+  }
+  ReadStart(axes, num_own, draft);
 }
 
 /// Advance per angle [m/rad]. thread_pitch is in rad/m, and positive for a left-handed thread;
@@ -158,7 +183,10 @@ void ReadSdfJoint(const XmlElement& element, const std::string& name, const SdfS
   const SdfFrame& frame = scope.frames.at(element.Required("name", "a name").Name());
   const Placement X_model_joint = scope.Resolve(element.Required("name", "a name").Name(), element);
   const Placement X_rest = scope.at_rest * X_model_joint;
-  const bool is_raw = frame.is_raw_to_child && Q.body != kGround;
+  // as the file says it, to the last bit, where the child is a link and no frame on one
+  const auto named = scope.frames.find(frame.attached_to);
+  const bool is_raw = frame.is_raw_to_child && Q.body != kGround && named != scope.frames.end() &&
+                      named->second.element.tag() == "link";
   Placement X_QM = is_raw ? frame.raw : Q.at_rest.Inverse() * X_rest;
   const JointType type = TypeOfSdf(index);
   Placement X_PF = P.at_rest.Inverse() * (is_raw ? Q.at_rest * X_QM : X_rest);
@@ -184,9 +212,7 @@ void ReadSdfJoint(const XmlElement& element, const std::string& name, const SdfS
     if (loop) joint.cut = loop->Content().Bool();
     physics->Ignore();
   }
-  const bool has_one = NumValues(type, SpaceKind::kSpatial, true) == 1;
-  if (axis) ReadDynamics(*axis, has_one, draft);
-  if (axis2) ReadDynamics(*axis2, false, draft);
+  ReadAxisForces(axis, axis2, type == JointType::kUniversal ? 2 : has_axis ? 1 : 0, draft);
 }
 
 }  // namespace loopbench::harness

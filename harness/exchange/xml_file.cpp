@@ -78,6 +78,20 @@ void RefuseDocumentTypes(const XmlDocument& document) {
   }
 }
 
+bool IsOneOf(const tinyxml2::XMLElement& element, const std::vector<std::string_view>& tags) {
+  return std::ranges::find(tags, std::string_view(element.Name())) != tags.end();
+}
+
+const tinyxml2::XMLElement* FirstWithin(const tinyxml2::XMLElement& element,
+                                        const std::vector<std::string_view>& tags) {
+  for (const auto* child = element.FirstChildElement(); child != nullptr;
+       child = child->NextSiblingElement()) {
+    if (IsOneOf(*child, tags)) return child;
+    if (const auto* within = FirstWithin(*child, tags)) return within;
+  }
+  return nullptr;
+}
+
 }  // namespace
 
 XmlValue::XmlValue(const XmlElement& element, std::string attribute, std::string text)
@@ -165,12 +179,22 @@ std::vector<XmlElement> XmlElement::Children() const {
 }
 
 std::vector<XmlElement> XmlElement::Children(std::string_view tag) const {
+  return ChildrenOf({tag});
+}
+
+std::vector<XmlElement> XmlElement::ChildrenOf(const std::vector<std::string_view>& tags) const {
   std::vector<XmlElement> children;
   for (const auto* child = element_->FirstChildElement(); child != nullptr;
        child = child->NextSiblingElement()) {
-    if (child->Name() == tag) children.emplace_back(document_, child);
+    if (IsOneOf(*child, tags)) children.emplace_back(document_, child);
   }
   return children;
+}
+
+std::optional<XmlElement> XmlElement::Within(const std::vector<std::string_view>& tags) const {
+  const auto* found = FirstWithin(*element_, tags);
+  if (found == nullptr) return std::nullopt;
+  return XmlElement(document_, found);
 }
 
 std::optional<XmlElement> XmlElement::Child(std::string_view tag) const {

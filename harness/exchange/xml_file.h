@@ -69,6 +69,8 @@ class XmlElement {
   /// Its children, which count as read, in the order of the file.
   std::vector<XmlElement> Children() const;
   std::vector<XmlElement> Children(std::string_view tag) const;
+  /// Those of one of these tags, in the order of the file.
+  std::vector<XmlElement> ChildrenOf(const std::vector<std::string_view>& tags) const;
   /// The only child of this tag; a second one is refused.
   std::optional<XmlElement> Child(std::string_view tag) const;
   /// The same; refused where it is absent.
@@ -80,6 +82,9 @@ class XmlElement {
   /// The text of the element itself.
   XmlValue Content() const;
   bool HasAttribute(const std::string& name) const;
+
+  /// The first element of one of these tags within it, at whatever depth; it alone counts as read.
+  std::optional<XmlElement> Within(const std::vector<std::string_view>& tags) const;
 
   /// Counts as read, with all that is in it.
   void Ignore() const;

@@ -4,6 +4,7 @@
 
 #include <filesystem>
 #include <random>
+#include <set>
 
 #include "harness/config/mechanism_writer.h"
 #include "harness/json/json_document.h"
@@ -155,6 +156,22 @@ TEST(ImportHostile, HugeFilesAreRefusedUnread) {
   WriteFileAtomically(file, "<mujoco>" + std::string(kMaxConfigBytes, ' ') + "</mujoco>");
   EXPECT_THROW(ImportMechanism(file), ConfigError);
   fs::remove(file);
+}
+
+TEST(ImportHostile, ManyThingsWithoutNamesHaveShortOnes) {
+  const std::string body =
+      "<body><joint/><inertial pos=\"0 0 0\" mass=\"1\" diaginertia=\"1 1 1\"/>";
+  const Imported imported =
+      ImportText("<mujoco><worldbody>" + body + "</body>" + body + "</body></worldbody><equality>" +
+                     Repeated("<connect body1=\"body1\" body2=\"body2\" anchor=\"0 0 0\"/>", 3000) +
+                     "</equality></mujoco>",
+                 "file.xml");
+  std::set<std::string> names;
+  for (const JointDescription& joint : imported.description.joints) {
+    names.insert(joint.name);
+    EXPECT_LE(joint.name.size(), std::string("connect_3000").size());
+  }
+  EXPECT_EQ(names.size(), 3002u);
 }
 
 }  // namespace import_hostile_test

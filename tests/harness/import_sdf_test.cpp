@@ -110,6 +110,33 @@ TEST(ImportSdf, AxesAreInTheFrameThatTheVersionSays) {
   EXPECT_LE((axis("1.7", " expressed_in=\"a\">0 -1 0</xyz>") - minus_y).norm(), 1e-15);
 }
 
+/// Where a joint whose parent is the world stands, and its axis there.
+void ExpectAt(const Imported& imported, const std::string& name, const Eigen::Vector3d& place,
+              const Eigen::Vector3d& axis) {
+  const JointDescription& joint = JointNamed(imported, name);
+  // a few units of rounding: lengths of order one, two turns by a quarter
+  EXPECT_LE((joint.from.position - place).norm(), 1e-15);
+  const Eigen::Matrix3d R = PoseOf(joint.from).R * AxisAlignment(joint);
+  EXPECT_LE((R * Eigen::Vector3d::UnitZ() - axis).norm(), 1e-15);
+}
+
+TEST(ImportSdf, JointsStandAtTheirChildBeItAFrameOrAModel) {
+  const std::string x = "<axis><xyz>1 0 0</xyz></axis>", turned = " 0 0 1.5707963267948966";
+  const std::string link = Link("a", "0 0 1 0 0 0");
+  const Imported frame = Read(link + "<frame name=\"f\" attached_to=\"a\"><pose>0.5 0 0" + turned +
+                              "</pose></frame>" + Joint("j", "revolute", "world", "f", x));
+  ExpectAt(frame, "j", {0.5, 0, 1}, Eigen::Vector3d::UnitY());
+  EXPECT_EQ(JointNamed(frame, "j").to.position, Eigen::Vector3d(0.5, 0, 0));
+  const std::string arm =
+      "<model name=\"arm\"><pose>1 0 0 0 0 0</pose>" + Link("a", "0 2 0" + turned) + "</model>";
+  const Imported model = Read(arm + Joint("j", "revolute", "world", "arm", x));
+  ExpectAt(model, "j", {1, 0, 0}, Eigen::Vector3d::UnitX());
+  // the link stands at (1, 2, 0) and is turned: 2 m behind it, which is its -x
+  EXPECT_LE((JointNamed(model, "j").to.position - Eigen::Vector3d(-2, 0, 0)).norm(), 1e-15);
+  const Imported within = Read(arm + Joint("j", "revolute", "world", "arm::a", x));
+  ExpectAt(within, "j", {1, 2, 0}, Eigen::Vector3d::UnitY());
+}
+
 TEST(ImportSdf, PitchesOfScrewsHaveTheirSignByName) {
   const auto pitch = [](const std::string& inside) {
     return JointNamed(Read(Link("a") + Joint("j", "screw", "world", "a", "<axis/>" + inside)), "j")
@@ -146,6 +173,23 @@ TEST(ImportSdf, SpringsDampersAndTheStartAreThoseOfTheAxis) {
   ExpectNote(imported, "<dynamics> friction", "dry friction");
 }
 
+TEST(ImportSdf, JointsOfTwoAxesStartWhereBothSay) {
+  const std::string axes =
+      "<axis><xyz>1 0 0</xyz><initial_position>0.5</initial_position></axis>"
+      "<axis2><xyz>0 1 0</xyz><initial_position>0.25</initial_position></axis2>";
+  const Imported imported = Read(Link("a") + Joint("j", "universal", "world", "a", axes), "1.6");
+  ASSERT_EQ(imported.description.initial.coordinates.size(), 1u);
+  EXPECT_EQ(imported.description.initial.coordinates[0].values, (std::vector<double>{0.5, 0.25}));
+  const Imported ball = Read(Link("a") + Joint("j", "ball", "world", "a", axes), "1.6");
+  EXPECT_TRUE(ball.description.initial.coordinates.empty());
+  ExpectNote(ball, "<initial_position>", "no coordinate of this axis");
+  // a second axis that is none of the joint's takes nothing from the first
+  const Imported revolute = Read(Link("a") + Joint("j", "revolute", "world", "a", axes), "1.6");
+  ASSERT_EQ(revolute.description.initial.coordinates.size(), 1u);
+  EXPECT_EQ(revolute.description.initial.coordinates[0].values, (std::vector<double>{0.5}));
+  ExpectNote(revolute, "<initial_position>", "no coordinate of this axis");
+}
+
 TEST(ImportSdf, FloatingStaticAndWeightlessBodies) {
   const Imported floating = Read(
       "<link name=\"a\"><pose>1 2 3 0 0 0</pose><gravity>false</gravity>" + kInertial + "</link>");
@@ -175,6 +219,13 @@ TEST(ImportSdf, NestedModelsHaveTheirNames) {
   EXPECT_EQ(imported.description.bodies[2].name, "hand::palm");
   EXPECT_EQ(JointNamed(imported, "hand::bend").type, JointType::kRevolute);
   EXPECT_EQ(JointNamed(imported, "k").from.position, Eigen::Vector3d(1, 0, 0));
+}
+
+TEST(ImportSdf, ACanonicalLinkIsNoNews) {
+  const Imported imported = ImportText(
+      "<sdf version=\"1.9\"><model name=\"m\" canonical_link=\"a\">" + Link("a") + "</model></sdf>",
+      "file.sdf");
+  EXPECT_FALSE(HasNote(imported, "canonical_link", ""));
 }
 
 TEST(ImportSdf, EveryKindOfDroppedElementHasItsNote) {
@@ -235,6 +286,10 @@ TEST(ImportSdf, WhatCannotBeSaidIsRefusedWithItsLine) {
                 {"a mass of 0 kg", "> 0"});
   ExpectRefusal(Sdf("<link name=\"a\"><inertial auto=\"true\"/></link>"),
                 {"not found from shapes"});
+  ExpectRefusal(Sdf("<link name=\"a\"><inertial><pose relative_to=\"a\"/></inertial></link>"),
+                {"<pose> relative_to: found \"a\"", "stands in its link"});
+  ExpectRefusal(Sdf(a + Joint("j", "ball", "a", "world", "")),
+                {"file.xml:4: <child>: found \"world\"", "can be the <parent>"});
   ExpectRefusal("<sdf version=\"1.9\"/>", {"found no <model>"});
 }
 

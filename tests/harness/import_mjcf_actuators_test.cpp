@@ -1,0 +1,122 @@
+// Actuators of MJCF under a control that stays.
+#include <gtest/gtest.h>
+
+#include "tests/harness/import_mjcf_texts.h"
+
+namespace loopbench::harness {
+namespace import_mjcf_actuators_test {
+
+using namespace import_mjcf_texts;
+
+TEST(ImportMjcf, MotorsUnderAConstantControlAreTorques) {
+  const std::string motor = "<actuator><motor joint=\"j\" gear=\"2\"/></actuator>";
+  const Imported on = Two(motor + "<keyframe><key ctrl=\"3\"/></keyframe>");
+  EXPECT_EQ(std::get<Polynomial>(ForcesOf<JointTorque>(on)[0].value).coefficients[0], 6.0);
+  const std::string general =
+      "<actuator><general joint=\"j\" gear=\"2\" gainprm=\"5\" biastype=\"affine\" biasprm=\"";
+  const Imported biased = Two(general + "0.5 0 0\"/></actuator>");  // 2 (5 0 + 0.5)
+  EXPECT_EQ(std::get<Polynomial>(ForcesOf<JointTorque>(biased)[0].value).coefficients[0], 1.0);
+  ExpectNote(Two(general + "0.5 1 0\"/></actuator>"), "<general>", "no constant");
+  const Imported off = Two(motor);
+  EXPECT_TRUE(ForcesOf<JointTorque>(off).empty());
+  ExpectNote(off, "<motor>", "control is 0");
+  ExpectNote(Two("<actuator><position joint=\"j\"/></actuator>"), "<position>", "no actuators");
+}
+
+/// The efforts on joint "j", which stands alone.
+std::vector<double> Efforts(const std::string& before, const std::string& actuators,
+                            const std::string& ctrl, const std::string& joint = "") {
+  const Imported imported = Read(
+      "<joint name=\"j\" " + joint + "/>", before,
+      "<actuator>" + actuators + "</actuator><keyframe><key ctrl=\"" + ctrl + "\"/></keyframe>");
+  std::vector<double> efforts;
+  for (const JointTorque& torque : ForcesOf<JointTorque>(imported)) {
+    efforts.push_back(std::get<Polynomial>(torque.value).coefficients[0]);
+  }
+  return efforts;
+}
+using Values = std::vector<double>;
+
+TEST(ImportMjcf, EffortsEndWhereControlsAndForcesDo) {
+  const auto motor = [](const std::string& attributes, const std::string& ctrl,
+                        const std::string& before = "", const std::string& joint = "") {
+    return Efforts(before, "<motor joint=\"j\" gear=\"3\" " + attributes + "/>", ctrl, joint);
+  };
+  EXPECT_EQ(motor("ctrlrange=\"-2 2\"", "9"), Values{6});
+  EXPECT_EQ(motor("ctrlrange=\"-2 2\" ctrllimited=\"false\"", "9"), Values{27});
+  EXPECT_EQ(motor("ctrlrange=\"0 0\"", "9"), Values{27});  // no range, for MuJoCo
+  // under a control of 0 too
+  EXPECT_EQ(motor("ctrlrange=\"1 2\"", "0"), Values{3});
+  // the force is that before the gear; as MuJoCo 2.2.2 has it
+  EXPECT_EQ(motor("ctrlrange=\"-2 2\" forcerange=\"-1 1\"", "9"), Values{3});
+  EXPECT_EQ(motor("forcerange=\"-1 1\"", "-9"), Values{-3});
+  const std::string no_limits = "<compiler autolimits=\"false\"/>";
+  EXPECT_EQ(motor("ctrlrange=\"-2 2\"", "9", no_limits), Values{27});
+  EXPECT_EQ(motor("ctrlrange=\"-2 2\" ctrllimited=\"true\"", "9", no_limits), Values{6});
+  EXPECT_EQ(motor("ctrlrange=\"-2 2\"", "9", "<option><flag clampctrl=\"disable\"/></option>"),
+            Values{27});
+  // the joint's range is behind the gear, and of all of its actuators together
+  EXPECT_EQ(motor("", "9", "", "actuatorfrcrange=\"-5 5\""), Values{5});
+  EXPECT_EQ(motor("", "9", "", "actuatorfrcrange=\"-5 5\" actuatorfrclimited=\"false\""),
+            Values{27});
+  EXPECT_EQ(
+      Efforts("", "<motor joint=\"j\"/><motor joint=\"j\"/>", "3 4", "actuatorfrcrange=\"-5 5\""),
+      Values{5});
+  EXPECT_EQ(
+      Efforts("", "<motor joint=\"j\"/><motor joint=\"j\"/>", "9 -5", "actuatorfrcrange=\"-5 5\""),
+      Values{4});
+  ExpectRefusal(Model("<joint name=\"j\"/>", "",
+                      "\n<actuator><motor joint=\"j\" ctrllimited=\"true\" ctrlrange=\"2 1\"/>"
+                      "</actuator>"),
+                {"file.xml:2: <motor> ctrlrange: found \"2 1\"", "the first below the second"});
+}
+
+TEST(ImportMjcf, ActuatorsThatAreSwitchedOffGiveNothing) {
+  const std::string motors = "<motor joint=\"j\" group=\"1\"/><motor joint=\"j\"/>";
+  EXPECT_EQ(Efforts("", motors, "1 10"), Values{11});
+  EXPECT_EQ(Efforts("<option actuatorgroupdisable=\"1 3\"/>", motors, "1 10"), Values{10});
+  EXPECT_EQ(Efforts("<option actuatorgroupdisable=\"0\"/>", motors, "1 10"), Values{1});
+  const std::string off = "<option><flag actuation=\"disable\"/></option>";
+  EXPECT_EQ(Efforts(off, motors, "1 10"), Values{});
+  const Imported imported =
+      Two(off +
+          "<actuator><motor name=\"m\" joint=\"j\"/></actuator><keyframe><key ctrl=\"1\"/>"
+          "</keyframe>");
+  ExpectNote(imported, "<motor name=\"m\">", "switched off");
+  ExpectRefusal(Model("<joint/>", "\n<option actuatorgroupdisable=\"31\"/>"),
+                {"file.xml:2: <option> actuatorgroupdisable: found \"31\"", "0 to 30"});
+  // weight that actuators carry ends with them
+  const Imported lifted =
+      Read("<joint name=\"j\" actuatorgravcomp=\"true\"/>", off, "", "gravcomp=\"1\"");
+  ExpectNote(lifted, "<joint name=\"j\"> actuatorgravcomp", "dropped");
+}
+
+TEST(ImportMjcf, WhatActuatorsSayAndNobodyReadsHasANote) {
+  const Imported imported = Two(
+      "<actuator><motor name=\"m\" joint=\"j\" group=\"2\" user=\"1\" strange=\"4\"/></actuator>"
+      "<keyframe><key ctrl=\"1\"/></keyframe>");
+  ExpectNote(imported, "<motor name=\"m\"> strange", "not known");
+  EXPECT_FALSE(HasNote(imported, "<motor name=\"m\"> group", ""));
+  EXPECT_FALSE(HasNote(imported, "<motor name=\"m\"> user", ""));
+}
+
+TEST(ImportMjcf, ActuatorsOfAllKindsHaveOneDefault) {
+  // efforts of MuJoCo 2.2.2 for the same model
+  const std::string classes =
+      "<default><motor gear=\"2\" ctrlrange=\"-1 1\"/><general gainprm=\"5\"/>"
+      "<default class=\"x\"><position kp=\"7\"/></default>"
+      "<default class=\"y\"><motor/></default></default>";
+  EXPECT_EQ(Efforts(classes, "<motor joint=\"j\"/>", "3"), Values{2});
+  EXPECT_EQ(Efforts(classes, "<general joint=\"j\"/>", "3"), Values{10});
+  EXPECT_EQ(Efforts(classes, "<motor joint=\"j\" class=\"x\"/>", "3"), Values{2});
+  EXPECT_EQ(Efforts(classes, "<general joint=\"j\" class=\"y\"/>", "3"), Values{2});
+  // a spring with the gain of the class, which is no constant
+  EXPECT_EQ(Efforts(classes, "<general joint=\"j\" class=\"x\"/>", "3"), Values{});
+  const Imported kept = Two(classes +
+                            "<actuator><motor joint=\"j\" class=\"x\"/></actuator>"
+                            "<keyframe><key ctrl=\"1\"/></keyframe>");
+  EXPECT_FALSE(HasNote(kept, "<position>", ""));
+}
+
+}  // namespace import_mjcf_actuators_test
+}  // namespace loopbench::harness

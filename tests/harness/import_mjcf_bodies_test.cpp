@@ -1,0 +1,229 @@
+// Bodies of MJCF: where they stand, their joints, masses and weights.
+#include <gtest/gtest.h>
+
+#include <numbers>
+
+#include "tests/harness/import_mjcf_texts.h"
+
+namespace loopbench::harness {
+namespace import_mjcf_bodies_test {
+
+using namespace import_mjcf_texts;
+
+constexpr double kPi = std::numbers::pi;
+
+TEST(ImportMjcf, AnglesAreDegreesUnlessTheCompilerSaysRadians) {
+  for (const bool degrees : {true, false}) {
+    const std::string compiler = degrees ? "" : "<compiler angle=\"radian\"/>";
+    const std::string quarter = degrees ? "90" : "1.5707963267948966";
+    const Imported imported =
+        Read("<joint ref=\"" + quarter + "\" springref=\"" + quarter + "\" stiffness=\"2\"/>",
+             compiler, "", "euler=\"0 0 " + quarter + "\"");
+    const JointDescription& joint = imported.description.joints[0];
+    EXPECT_NEAR(joint.from.rotation.z(), kPi / 2, kEps);
+    EXPECT_EQ(joint.from.rotation.x(), 0.0);
+    // where the file draws it, its coordinate is `ref` and ours 0
+    EXPECT_NEAR(ForcesOf<JointSpring>(imported)[0].rest, 0.0, kEps);
+    EXPECT_EQ(ForcesOf<JointSpring>(imported)[0].stiffness, 2.0);
+  }
+}
+
+TEST(ImportMjcf, OrientationsAreTheSameInAllForms) {
+  // a turn by 120 degrees about (1, 1, 1): x to y, y to z, z to x
+  for (const char* form : {"quat=\"1 1 1 1\"", "axisangle=\"1 1 1 120\"", "xyaxes=\"0 1 0 0 0 1\"",
+                           "euler=\"90 0 90\""}) {
+    const Imported imported = Read("<joint/>", "<compiler eulerseq=\"XYZ\"/>", "", form);
+    const Frame F = PoseOf(imported.description.joints[0].from);
+    Eigen::Matrix3d expected;
+    expected << 0, 0, 1, 1, 0, 0, 0, 1, 0;
+    EXPECT_LE((F.R - expected).norm(), 10 * kEps) << form;
+  }
+  const Imported z = Read("<joint/>", "", "", "zaxis=\"1 0 0\"");
+  EXPECT_LE((PoseOf(z.description.joints[0].from).R.col(2) - Eigen::Vector3d::UnitX()).norm(),
+            10 * kEps);
+  ExpectRefusal(Model("", "", "", "quat=\"1 0 0 0\" euler=\"0 0 0\""), {"one orientation"});
+}
+
+/// The type that joints on one body become; "" when they are refused.
+std::string TypeOfChain(const std::string& joints) {
+  try {
+    return std::string(ToString(Read(joints).description.joints[0].type));
+  } catch (const ConfigError&) {
+    return "";
+  }
+}
+
+TEST(ImportMjcf, JointsOnOneBodyAreOneOfOurs) {
+  const std::string x = "<joint type=\"slide\" axis=\"1 0 0\"/>",
+                    y = "<joint type=\"slide\" axis=\"0 1 0\"/>",
+                    z = "<joint type=\"slide\" axis=\"0 0 1\"/>", a = "<joint axis=\"1 0 0\"/>",
+                    b = "<joint axis=\"0 1 0\"/>", c = "<joint axis=\"0 0 1\"/>",
+                    ball = "<joint type=\"ball\"/>", skew = "<joint axis=\"0 1 1\"/>",
+                    away = "<joint axis=\"0 1 0\" pos=\"0 0 1\"/>";
+  EXPECT_EQ(TypeOfChain(c), "revolute");
+  EXPECT_EQ(TypeOfChain(x), "prismatic");
+  EXPECT_EQ(TypeOfChain(ball), "spherical");
+  EXPECT_EQ(TypeOfChain("<freejoint/>"), "free");
+  EXPECT_EQ(TypeOfChain(c + z), "cylindrical");
+  EXPECT_EQ(TypeOfChain(z + c), "cylindrical");
+  EXPECT_EQ(TypeOfChain(x + c), "pin-in-slot");
+  EXPECT_EQ(TypeOfChain(c + x), "pin-in-slot");
+  EXPECT_EQ(TypeOfChain(a + b), "universal");
+  EXPECT_EQ(TypeOfChain(x + y + c), "planar");
+  EXPECT_EQ(TypeOfChain(c + y + x), "planar");
+  EXPECT_EQ(TypeOfChain(a + b + c), "spherical");
+  EXPECT_EQ(TypeOfChain(x + y + z + ball), "free");
+  EXPECT_EQ(TypeOfChain(x + y + z + a + b + c), "free");
+  EXPECT_EQ(TypeOfChain(""), "weld");
+  // no kind of ours: axes that are not perpendicular or do not meet, two slides
+  EXPECT_EQ(TypeOfChain(b + skew), "");
+  EXPECT_EQ(TypeOfChain(a + away), "");
+  EXPECT_EQ(TypeOfChain(x + y), "");
+  EXPECT_EQ(TypeOfChain("<freejoint/>" + c), "");
+  ExpectRefusal(Model(x + y), {"file.xml:1", "2 joints on one body", "slide, slide"});
+}
+
+TEST(ImportMjcf, ShapesHaveTheMassesOfSolids) {
+  const auto body = [](const std::string& geom) {
+    return ImportText("<mujoco><worldbody><body><joint/>" + geom + "</body></worldbody></mujoco>",
+                      "file.xml")
+        .description.bodies[1];
+  };
+  const BodyDescription sphere = body("<geom size=\"0.1\"/>");
+  EXPECT_NEAR(sphere.mass, 4.0 / 3.0 * kPi * 1e-3 * 1000, 1e-14);
+  EXPECT_NEAR(sphere.inertia(0, 0), 0.4 * sphere.mass * 0.01, 1e-16);
+  const BodyDescription box = body("<geom type=\"box\" size=\"0.1 0.2 0.3\" mass=\"3\"/>");
+  EXPECT_NEAR(box.inertia(0, 0), 3.0 / 3.0 * (0.04 + 0.09), 1e-15);
+  const BodyDescription cylinder =
+      body("<geom type=\"cylinder\" size=\"0.1\" fromto=\"0 0 0 1 0 0\" density=\"500\"/>");
+  EXPECT_NEAR(cylinder.mass, 500 * kPi * 0.01, 1e-14);
+  EXPECT_NEAR(cylinder.com.x(), 0.5, kEps);
+  EXPECT_NEAR(cylinder.inertia(0, 0), cylinder.mass * 0.005, 1e-14);
+  EXPECT_NEAR(cylinder.inertia(1, 1), cylinder.mass * (0.01 / 4 + 1.0 / 12), 1e-14);
+  const BodyDescription ellipsoid =
+      body("<geom type=\"ellipsoid\" size=\"0.1 0.2 0.3\" mass=\"5\"/>");
+  EXPECT_NEAR(ellipsoid.inertia(2, 2), 0.01 + 0.04, 1e-15);
+  // two geoms: parallel axes
+  const BodyDescription two = body(
+      "<geom size=\"0.1\" mass=\"1\" pos=\"1 0 0\"/><geom size=\"0.1\" mass=\"1\" pos=\"-1 0 "
+      "0\"/>");
+  EXPECT_EQ(two.mass, 2.0);
+  EXPECT_NEAR(two.inertia(2, 2), 2 * (0.4 * 0.01 + 1.0), 1e-14);
+}
+
+TEST(ImportMjcf, CapsulesAreWhatSumsOfDiscsSay) {
+  const BodyDescription capsule =
+      ImportText(
+          "<mujoco><worldbody><body><joint/><geom type=\"capsule\" size=\"0.2 0.5\"/>"
+          "</body></worldbody></mujoco>",
+          "file.xml")
+          .description.bodies[1];
+  // discs of thickness h: errors of the midpoint rule are of h^2 (h^1.5 at the round ends)
+  constexpr int kDiscs = 400000;
+  const double h = 1.4 / kDiscs;
+  double mass = 0.0, along = 0.0, across = 0.0;
+  for (int i = 0; i < kDiscs; ++i) {
+    const double z = -0.7 + (i + 0.5) * h, beyond = std::max(0.0, std::abs(z) - 0.5);
+    const double r2 = 0.04 - beyond * beyond, m = 1000 * kPi * r2 * h;
+    mass += m;
+    along += m * r2 / 2;
+    across += m * (r2 / 4 + z * z);
+  }
+  EXPECT_NEAR(capsule.mass, mass, 1e-8 * mass);
+  EXPECT_NEAR(capsule.inertia(2, 2), along, 1e-8 * along);
+  EXPECT_NEAR(capsule.inertia(0, 0), across, 1e-8 * across);
+}
+
+TEST(ImportMjcf, TheCompilerChangesMasses) {
+  const Imported total = Read("<joint/>", "<compiler settotalmass=\"10\"/>");
+  EXPECT_EQ(total.description.bodies[1].mass, 10.0);
+  EXPECT_EQ(total.description.bodies[1].inertia(0, 0), 10.0);
+  const Imported bound = Read("<joint/>", "<compiler boundmass=\"3\" boundinertia=\"2\"/>");
+  EXPECT_EQ(bound.description.bodies[1].mass, 3.0);
+  EXPECT_NEAR(bound.description.bodies[1].inertia(1, 1), 2.0, kEps);
+  const std::string flat =
+      "<worldbody><body><joint/><inertial pos=\"0 0 0\" mass=\"1\" diaginertia=\"1 1 4\"/></body>"
+      "</worldbody></mujoco>";
+  ExpectRefusal("<mujoco>" + flat, {"principal moments 1, 1, 4", "sum of the other two"});
+  const Imported balanced =
+      ImportText("<mujoco><compiler balanceinertia=\"true\"/>" + flat, "file.xml");
+  EXPECT_NEAR(balanced.description.bodies[1].inertia(2, 2), 2.0, kEps);
+}
+
+TEST(ImportMjcf, GravityIsThatOfTheOptionAndOfFlags) {
+  EXPECT_EQ(Read("<joint/>").description.gravity.z(), -9.81);
+  EXPECT_EQ(Read("<joint/>", "<option gravity=\"1 2 3\"/>").description.gravity.y(), 2.0);
+  EXPECT_TRUE(Read("<joint/>", "<option><flag gravity=\"disable\"/></option>")
+                  .description.gravity.isZero());
+  // a body without weight is pushed up by it
+  const Imported light = Read("<joint/>", "", "", "gravcomp=\"0.5\"");
+  EXPECT_NEAR(ForcesOf<PointForce>(light)[0].force.z(), 0.5 * 9.81, 1e-15);
+}
+
+/// Where a joint stands in the body that it moves, which the file draws at the origin, and its
+/// axis.
+void ExpectAt(const JointDescription& joint, const Eigen::Vector3d& place,
+              const Eigen::Vector3d& axis) {
+  EXPECT_LE((joint.to.position - place).norm(), 10 * kEps);
+  const Eigen::Matrix3d R = PoseOf(joint.to).R * AxisAlignment(joint);
+  EXPECT_LE((R * Eigen::Vector3d::UnitZ() - axis).norm(), 10 * kEps);
+}
+
+TEST(ImportMjcf, JointsWithinFramesStandAndTurnWithThem) {
+  const std::string hinge = "<joint axis=\"1 0 0\" pos=\"0 0 3\"/>";
+  const std::string turned = "<frame pos=\"1 2 0\" euler=\"0 0 90\">";
+  const auto joint = [](const std::string& inside) { return Read(inside).description.joints[0]; };
+  ExpectAt(joint(turned + hinge + "</frame>"), {1, 2, 3}, Eigen::Vector3d::UnitY());
+  // (1, 2, 3) of the inner frame, a quarter further: (1 - 2, 2 + 1, 3), and -x
+  ExpectAt(joint(turned + turned + hinge + "</frame></frame>"), {-1, 3, 3},
+           -Eigen::Vector3d::UnitX());
+  EXPECT_EQ(joint(turned + "<joint type=\"ball\" pos=\"0 0 3\"/></frame>").to.position,
+            Eigen::Vector3d(1, 2, 3));
+  // a free joint is that of the body, wherever it stands in the file
+  const Imported free = Read(turned + "<freejoint/></frame>", "", "", "pos=\"4 5 6\"");
+  EXPECT_EQ(free.description.joints[0].to.position, Eigen::Vector3d::Zero());
+  EXPECT_EQ(free.description.initial.coordinates[0].values,
+            (std::vector<double>{1, 0, 0, 0, 4, 5, 6}));
+}
+
+TEST(ImportMjcf, FramesLeaveBodiesAndJointsInTheOrderOfTheFile) {
+  const auto body = [](const std::string& name) {
+    return "<body name=\"" + name + "\">" + kInertial + "<joint name=\"" + name + "\"/></body>";
+  };
+  const Imported bodies =
+      ImportText("<mujoco><compiler angle=\"radian\"/><worldbody><frame><frame>" + body("a") +
+                     "</frame>" + body("b") + "</frame>" + body("c") + "<frame>" + body("d") +
+                     "</frame></worldbody><keyframe><key qpos=\"1 2 3 4\" qvel=\"5 6 7 8\"/>"
+                     "</keyframe></mujoco>",
+                 "file.xml");
+  ASSERT_EQ(bodies.description.joints.size(), 4u);
+  for (std::size_t i = 0; i < 4; ++i) {
+    EXPECT_EQ(bodies.description.joints[i].name, std::string(1, static_cast<char>('a' + i)));
+    EXPECT_EQ(bodies.description.initial.coordinates[i].values[0], 1.0 + static_cast<double>(i));
+    EXPECT_EQ(bodies.description.initial.speeds[i].values[0], 5.0 + static_cast<double>(i));
+  }
+  // the slide comes first, so that the slot is on the parent
+  const Imported slot =
+      Read("<frame><joint type=\"slide\" axis=\"1 0 0\"/></frame><joint axis=\"0 0 1\"/><unknown/>",
+           "<compiler angle=\"radian\"/>", "<keyframe><key qpos=\"2 0.5\"/></keyframe>");
+  EXPECT_EQ(slot.description.joints[0].from.body, kGround);
+  EXPECT_NEAR(slot.description.initial.coordinates[0].values[0], 0.5, kEps);
+  EXPECT_NEAR(slot.description.initial.coordinates[0].values[1], 2.0, 10 * kEps);
+  ExpectNote(slot, "<unknown>", "not known");
+}
+
+TEST(ImportMjcf, WeightIsCarriedWhilePassiveForcesAct) {
+  const auto lifts = [](const std::string& flags) {
+    const Imported imported =
+        Read("<joint/>", "<option><flag " + flags + "/></option>", "", "gravcomp=\"1\"");
+    return ForcesOf<PointForce>(imported).size();
+  };
+  EXPECT_EQ(lifts("spring=\"disable\""), 1u);
+  EXPECT_EQ(lifts("damper=\"disable\""), 1u);
+  // MuJoCo's mj_passive returns before all passive forces, of which gravcomp is one
+  EXPECT_EQ(lifts("passive=\"disable\""), 0u);
+  EXPECT_EQ(lifts("spring=\"disable\" damper=\"disable\""), 0u);
+}
+
+}  // namespace import_mjcf_bodies_test
+}  // namespace loopbench::harness

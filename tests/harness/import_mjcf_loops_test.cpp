@@ -1,0 +1,100 @@
+// What closes loops in MJCF, and tendons.
+#include <gtest/gtest.h>
+
+#include <numbers>
+
+#include "tests/harness/import_mjcf_texts.h"
+
+namespace loopbench::harness {
+namespace import_mjcf_loops_test {
+
+using namespace import_mjcf_texts;
+
+constexpr double kPi = std::numbers::pi;
+
+TEST(ImportMjcf, EqualitiesCloseLoopsWhereTheFileDrawsThem) {
+  const Imported connect =
+      Two("<equality><connect name=\"c\" body1=\"a\" body2=\"b\" anchor=\"1 1 1\"/></equality>");
+  const JointDescription& ball = connect.description.joints.back();
+  EXPECT_EQ(ball.type, JointType::kSpherical);
+  EXPECT_TRUE(ball.cut);
+  // (2, 1, 1) in ground axes; b stands at (0, 2, 0) and is turned by a quarter
+  EXPECT_LE((ball.to.position - Eigen::Vector3d(-1, -2, 1)).norm(), 10 * kEps);
+  ExpectNote(connect, "<connect name=\"c\">", "imposed exactly");
+
+  const Imported weld = Two("<equality><weld body1=\"a\" body2=\"b\"/></equality>");
+  const JointDescription& fixed = weld.description.joints.back();
+  EXPECT_EQ(fixed.type, JointType::kWeld);
+  EXPECT_LE((fixed.from.position - Eigen::Vector3d(-1, 2, 0)).norm(), 10 * kEps);
+  EXPECT_NEAR(fixed.from.rotation.z(), kPi / 2, kEps);
+  const Imported posed = Two("<equality><weld body1=\"a\" relpose=\"1 2 3 1 0 0 0\"/></equality>");
+  EXPECT_EQ(posed.description.joints.back().from.position, Eigen::Vector3d(1, 2, 3));
+
+  const Imported held = Two("<equality><joint joint1=\"j\" polycoef=\"0.5 0 0 0 0\"/></equality>");
+  EXPECT_EQ(std::get<Polynomial>(held.description.joints[0].motions[0].value).coefficients[0], 0.5);
+  const Imported coupled = Two("<equality><joint joint1=\"j\" joint2=\"k\"/></equality>");
+  ExpectNote(coupled, "<joint>", "a freedom more");
+  const Imported off = Two("<equality><weld body1=\"a\" active=\"false\"/></equality>");
+  ExpectNote(off, "<weld>", "not active");
+  EXPECT_EQ(off.description.joints.size(), 2u);
+}
+
+TEST(ImportMjcf, TendonsBetweenTwoSitesAreSpringsOrRods) {
+  const std::string sites = "<site site=\"s1\"/><site site=\"s2\"/>";
+  const Imported spring =
+      Two("<tendon><spatial name=\"t\" stiffness=\"3\" damping=\"2\" springlength=\"0.5\">" +
+          sites + "</spatial></tendon>");
+  const auto springs = ForcesOf<SpringDamper>(spring);
+  ASSERT_EQ(springs.size(), 1u);
+  EXPECT_EQ(springs[0].stiffness, 3.0);
+  EXPECT_EQ(springs[0].damping, 2.0);
+  EXPECT_EQ(springs[0].length, 0.5);
+  // s1 at (1, 0, 1), s2 at (0, 3, 0): free as the file draws it
+  const Imported drawn = Two("<tendon><spatial stiffness=\"3\">" + sites + "</spatial></tendon>");
+  EXPECT_NEAR(ForcesOf<SpringDamper>(drawn)[0].length, std::sqrt(11.0), 10 * kEps);
+  const Imported rod =
+      Two("<equality><tendon tendon1=\"t\"/></equality><tendon><spatial name=\"t\">" + sites +
+          "</spatial></tendon>");
+  EXPECT_EQ(rod.description.joints.back().type, JointType::kRod);
+  EXPECT_NEAR(rod.description.joints.back().parameter, std::sqrt(11.0), 10 * kEps);
+  // classes call both kinds of tendon so
+  const Imported of_class = Two("<default><tendon damping=\"4\"/></default><tendon><spatial>" +
+                                sites + "</spatial></tendon>");
+  EXPECT_EQ(ForcesOf<SpringDamper>(of_class)[0].damping, 4.0);
+  const Imported wrapped = Two("<tendon><spatial name=\"t\" stiffness=\"3\">" + sites +
+                               "<site site=\"s0\"/></spatial></tendon>");
+  ExpectNote(wrapped, "<spatial name=\"t\">", "only spatial tendons straight");
+}
+
+TEST(ImportMjcf, CoordinatesThatStayAreImposedExactlyToo) {
+  const Imported held = Two("<equality><joint name=\"e\" joint1=\"j\"/></equality>");
+  ExpectNote(held, "<joint name=\"e\">", "imposed exactly");
+  const Imported coupled = Two("<equality><joint joint1=\"j\" joint2=\"k\"/></equality>");
+  EXPECT_FALSE(HasNote(coupled, "<joint>", "imposed exactly"));
+}
+
+TEST(ImportMjcf, EqualitiesThatAreSwitchedOffSaySo) {
+  for (const char* flag : {"equality", "constraint"}) {
+    const Imported off = Two("<option><flag " + std::string(flag) +
+                             "=\"disable\"/></option><equality><weld body1=\"a\"/></equality>");
+    EXPECT_EQ(off.description.joints.size(), 2u);
+    ExpectNote(off, "<weld>", "not active");
+  }
+}
+
+TEST(ImportMjcf, WhatTendonsSayAndNobodyReadsHasANote) {
+  const auto tendon = [](const std::string& attributes, const std::string& of_class = "") {
+    return Two("<default><tendon width=\"1\" " + of_class +
+               "/></default><tendon><spatial name=\"t\" "
+               "stiffness=\"3\" rgba=\"1 1 1 1\" " +
+               attributes + "><site site=\"s1\"/><site site=\"s2\"/></spatial></tendon>");
+  };
+  ExpectNote(tendon("armature=\"0.5\""), "<spatial name=\"t\"> armature", "no inertia");
+  ExpectNote(tendon("", "armature=\"0.5\""), "<spatial name=\"t\"> armature", "no inertia");
+  ExpectNote(tendon("strange=\"1\""), "<spatial name=\"t\"> strange", "not known");
+  ExpectNote(tendon("range=\"0 1\""), "<spatial name=\"t\"> range", "do not end");
+  EXPECT_TRUE(tendon("armature=\"0\"").notes.empty());
+}
+
+}  // namespace import_mjcf_loops_test
+}  // namespace loopbench::harness

@@ -1,0 +1,89 @@
+// The start of MJCF: keys.
+#include <gtest/gtest.h>
+
+#include <numbers>
+
+#include "tests/harness/import_mjcf_texts.h"
+
+namespace loopbench::harness {
+namespace import_mjcf_start_test {
+
+using namespace import_mjcf_texts;
+
+constexpr double kPi = std::numbers::pi;
+
+/// The start that a key gives to the joints of one body.
+InitialDescription Start(const std::string& joints, const std::string& key) {
+  return Read(joints, "<compiler angle=\"radian\"/>", "<keyframe><key " + key + "/></keyframe>")
+      .description.initial;
+}
+
+TEST(ImportMjcf, KeysBecomeTheStartOfJointsOfOurs) {
+  const auto hinge = Start("<joint ref=\"0.25\"/>", "qpos=\"1\" qvel=\"3\"");
+  EXPECT_EQ(hinge.coordinates[0].values[0], 0.75);
+  EXPECT_EQ(hinge.speeds[0].values[0], 3.0);
+  const auto free = Start("<freejoint/>", "qpos=\"1 2 3 0 1 0 0\" qvel=\"4 5 6 0 7 0\"");
+  EXPECT_EQ(free.coordinates[0].values, (std::vector<double>{0, 1, 0, 0, 1, 2, 3}));
+  // half a turn about x: the body's y is the ground's -y
+  EXPECT_EQ(free.speeds[0].values, (std::vector<double>{0, -7, 0, 4, 5, 6}));
+  const auto planar = Start(
+      "<joint axis=\"0 0 1\"/><joint type=\"slide\" axis=\"1 0 0\"/><joint type=\"slide\" axis=\"0 "
+      "1 "
+      "0\"/>",
+      "qpos=\"1.5707963267948966 2 3\" qvel=\"1 0 0\"");
+  // the slides turn with the hinge before them: x of the body is y of the ground
+  const std::vector<double>& p = planar.coordinates[0].values;
+  EXPECT_NEAR(p[0], kPi / 2, kEps);
+  EXPECT_NEAR(p[1], -3.0, 10 * kEps);
+  EXPECT_NEAR(p[2], 2.0, 10 * kEps);
+  EXPECT_NEAR(planar.speeds[0].values[1], -2.0, 10 * kEps);
+  EXPECT_NEAR(planar.speeds[0].values[2], -3.0, 10 * kEps);
+  const auto slot = Start("<joint axis=\"0 0 1\"/><joint type=\"slide\" axis=\"1 0 0\"/>",
+                          "qpos=\"0.5 2\" qvel=\"0.25 -1\"");
+  // the slot is on the body: seen from there, the parent turns and slides the other way
+  EXPECT_NEAR(slot.coordinates[0].values[0], -0.5, kEps);
+  EXPECT_NEAR(slot.coordinates[0].values[1], -2.0, 10 * kEps);
+  EXPECT_NEAR(slot.speeds[0].values[0], -0.25, kEps);
+  EXPECT_NEAR(slot.speeds[0].values[1], 1.0, 10 * kEps);
+  const auto universal =
+      Start("<joint axis=\"1 0 0\"/><joint axis=\"0 1 0\"/>", "qpos=\"0.5 0.25\" qvel=\"2 3\"");
+  EXPECT_NEAR(universal.coordinates[0].values[1], 0.25, kEps);
+  EXPECT_NEAR(universal.speeds[0].values[0], 2.0, 10 * kEps);
+  EXPECT_NEAR(universal.speeds[0].values[1], 3.0, 10 * kEps);
+}
+
+TEST(ImportMjcf, JointsThatAnEqualityHoldsStartWhereItHoldsThem) {
+  const std::string held = "<equality><joint joint1=\"j\" polycoef=\"0.5 0 0 0 0\"/></equality>";
+  const Imported away = Two(held + "<keyframe><key qpos=\"1 2\" qvel=\"3 4\"/></keyframe>");
+  ASSERT_EQ(away.description.initial.coordinates.size(), 1u);
+  EXPECT_EQ(away.description.initial.coordinates[0].joint, 1);
+  EXPECT_EQ(away.description.initial.coordinates[0].values[0], 2.0);
+  ASSERT_EQ(away.description.initial.speeds.size(), 1u);
+  EXPECT_EQ(away.description.initial.speeds[0].values[0], 4.0);
+  ExpectNote(away, "<key> qpos", "\"j\" dropped: an <equality> holds it at 0.5");
+  ExpectNote(away, "<key> qvel", "\"j\" dropped: an <equality> holds it at 0.5");
+  const Imported there = Two(held + "<keyframe><key qpos=\"0.5 2\" qvel=\"0 4\"/></keyframe>");
+  EXPECT_FALSE(HasNote(there, "<key>", ""));
+}
+
+TEST(ImportMjcf, KeysHaveAsManyNumbersAsTheModel) {
+  const std::string motors =
+      "\n<actuator><motor joint=\"j\"/><position joint=\"k\"/></actuator>\n<keyframe>";
+  const std::string two = "<mujoco>" + std::string(kTwoBodies) + motors;
+  const std::string end = "</keyframe></mujoco>";
+  for (const char* ctrl : {"1", "1 2 3"}) {
+    ExpectRefusal(two + "<key ctrl=\"" + ctrl + "\"/>" + end,
+                  {"file.xml:9: <key> ctrl: found \"" + std::string(ctrl) + '"', "2 numbers"});
+  }
+  EXPECT_EQ(ForcesOf<JointTorque>(ImportText(two + "<key ctrl=\"1 2\"/>" + end, "f.xml")).size(),
+            1u);
+  ExpectRefusal(two + "<key qpos=\"1\"/>" + end, {"file.xml:9: <key> qpos: found \"1\"", "2 numb"});
+  for (const char* joint : {"<freejoint/>", "<joint type=\"ball\"/>"}) {
+    const std::string zeros = joint[1] == 'f' ? "0 0 0 0 0 0 0" : "0 0 0 0";
+    ExpectRefusal(Model(joint, "", "\n<keyframe><key qpos=\"" + zeros + "\"/></keyframe>"),
+                  {"file.xml:2: <key> qpos: found \"" + zeros, "quaternion", "not zero"});
+  }
+}
+
+}  // namespace import_mjcf_start_test
+}  // namespace loopbench::harness

@@ -81,7 +81,7 @@ Table StepTable(const History& history, const HistoryFindings& found) {
   }
   for (const HistorySeries& one : found.series) {
     for (const LevelChange& change : one.changes) {
-      add(one.entries[change.at], one.one, one.measure,
+      add(one.values[change.at].entry, one.one, one.measure,
           {change.before, change.after, change.after / change.before, change.Confidence()});
     }
   }
@@ -91,6 +91,16 @@ Table StepTable(const History& history, const HistoryFindings& found) {
       fmt::format("{} series over {} entries; confidence: 1 less the number of such steps that "
                   "the noise of all series together would show, at most {}",
                   found.series.size(), history.entries.size(), kFalseAlarms));
+  std::size_t times = 0, unsteady = 0;
+  for (const HistorySeries& one : found.series) {
+    unsteady += one.Unsteady();
+    times += one.rule == Rule::kTime && one.one != kAllCases ? one.values.size() : 0;
+  }
+  if (unsteady > 0) {
+    table.notes.push_back(fmt::format(
+        "{} of {} times decide nothing: the machine had another speed than usual (yardstick_ns)",
+        unsteady, times));
+  }
   return table;
 }
 
@@ -124,8 +134,13 @@ JsonObject FindingsDocument(const History& history, const HistoryFindings& found
                           .Add("after", change.after));
   }
   for (const HistorySeries& one : found.series) {
-    std::vector<std::string> commits;
-    for (const std::size_t entry : one.entries) commits.push_back(history.entries[entry].commit);
+    std::vector<std::string> commits, unsteady;
+    std::vector<double> values;
+    for (const HistoryValue& value : one.values) {
+      commits.push_back(history.entries[value.entry].commit);
+      values.push_back(value.value);
+      if (!value.is_steady) unsteady.push_back(commits.back());
+    }
     std::vector<JsonObject> steps;
     for (const LevelChange& change : one.changes) {
       steps.push_back(JsonObject()
@@ -140,7 +155,8 @@ JsonObject FindingsDocument(const History& history, const HistoryFindings& found
                       .Add("measure", one.measure)
                       .Add("unit", one.unit)
                       .Add("commits", commits)
-                      .Add("values", one.values)
+                      .Add("values", values)
+                      .Add("at_another_speed", unsteady)
                       .Add("steps", steps));
   }
   return JsonObject().Add("series", all).Add("endings", endings);

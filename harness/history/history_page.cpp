@@ -24,7 +24,7 @@ figure { margin: 0 0 18px; overflow-x: auto; }
 figcaption { font-weight: 600; overflow-wrap: anywhere; }
 svg { background: var(--paper); border: 1px solid var(--rule); max-width: 100%; height: auto; }
 svg text { font: 12px system-ui, 'DejaVu Sans', sans-serif; fill: var(--text); }
-.axis { stroke: var(--soft); } .grid { stroke: var(--guide); } .dot { fill: var(--drive); }
+.axis { stroke: var(--soft); } .grid { stroke: var(--guide); } .dot { fill: var(--drive); } .other { fill: var(--paper); stroke: var(--drive); }
 .spread { stroke: var(--drive); stroke-opacity: 0.35; } .level { stroke: var(--text); stroke-width: 1.5; }
 .step { stroke: var(--gap); stroke-dasharray: 5 3; }
 .worse { color: var(--gap); font-weight: 600; }
@@ -60,8 +60,8 @@ struct Chart {
   bool logarithmic;
 
   Chart(const History& entries, const HistorySeries& one) : history(entries), series(one) {
-    low = *std::ranges::min_element(series.values);
-    high = *std::ranges::max_element(series.upper);
+    low = std::ranges::min_element(series.values, {}, &HistoryValue::value)->value;
+    high = std::ranges::max_element(series.values, {}, &HistoryValue::upper)->upper;
     logarithmic = low > 0.0 && high / low > 20.0;
     if (high <= low) {
       const double room = high == 0.0 ? 1.0 : 0.1 * std::abs(high);
@@ -83,7 +83,7 @@ struct Chart {
                                      : (value - low) / (high - low);
     return kTop + (kHeight - kTop - kBottom) * (1.0 - share);
   }
-  const HistoryEntry& Entry(std::size_t i) const { return history.entries[series.entries[i]]; }
+  const HistoryEntry& Entry(std::size_t i) const { return history.entries[series.values[i].entry]; }
 
   std::string Text() const {
     const std::string unit = series.unit.empty() ? "" : fmt::format(" [{}]", series.unit);
@@ -136,16 +136,18 @@ struct Chart {
           x, kTop, bottom, x + 3, kTop + 12, change.after / change.before);
     }
     for (std::size_t i = 0; i < series.values.size(); ++i) {
-      if (series.upper[i] > series.values[i]) {
+      const HistoryValue& one = series.values[i];
+      if (one.upper > one.value) {
         svg += fmt::format(
             "<line class=\"spread\" x1=\"{0:.1f}\" x2=\"{0:.1f}\" y1=\"{1:.1f}\" y2=\"{2:.1f}\"/>",
-            X(i), Y(series.values[i]), Y(series.upper[i]));
+            X(i), Y(one.value), Y(one.upper));
       }
       svg += fmt::format(
-          "<circle class=\"dot\" cx=\"{:.1f}\" cy=\"{:.1f}\" r=\"2.6\"><title>{} {}: "
-          "{:.6g}{}</title></circle>\n",
-          X(i), Y(series.values[i]), EscapeXml(ShortCommit(Entry(i).commit)),
-          EscapeXml(Entry(i).date), series.values[i], EscapeXml(unit));
+          "<circle class=\"dot{}\" cx=\"{:.1f}\" cy=\"{:.1f}\" r=\"2.6\"><title>{} {}: "
+          "{:.6g}{}{}</title></circle>\n",
+          one.is_steady ? "" : " other", X(i), Y(one.value),
+          EscapeXml(ShortCommit(Entry(i).commit)), EscapeXml(Entry(i).date), one.value,
+          EscapeXml(unit), one.is_steady ? "" : ", the machine had another speed");
     }
     return svg + "</svg>\n";
   }
@@ -168,7 +170,7 @@ std::string StepTable(const History& history, const HistoryFindings& found) {
   }
   for (const HistorySeries& one : found.series) {
     for (const LevelChange& change : one.changes) {
-      rows += StepRow(history.entries[one.entries[change.at]], one.one, one.measure,
+      rows += StepRow(history.entries[one.values[change.at].entry], one.one, one.measure,
                       fmt::format("{:.4g}", change.before), fmt::format("{:.4g}", change.after),
                       fmt::format("<td class=\"n {}\">{:.4g}</td><td class=\"n\">{:.3f}</td>",
                                   change.after > change.before ? "worse" : "",
@@ -206,6 +208,7 @@ std::string HistoryPage(const History& history, const HistoryFindings& found,
   page +=
       "<h2>Series</h2>\n<p class=\"soft\">Dots: a commit each; of times the least, with a line up "
       "to the 90th percentile. "
+      "Hollow dots: the machine had another speed than usual, so that they decide nothing. "
       "Lines: levels. Broken lines: steps, with the ratio of the levels.</p>\n";
   for (std::size_t i = 0; i < std::min(order.size(), kMostCharts); ++i) {
     page += fmt::format(

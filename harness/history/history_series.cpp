@@ -9,6 +9,7 @@
 #include "harness/judge/rules.h"
 #include "harness/judge/statistics.h"
 #include "harness/judge/track.h"
+#include "harness/record/noise.h"
 #include "harness/store/measurements.h"
 
 namespace loopbench::harness {
@@ -54,16 +55,18 @@ HistorySeries Pooled(const std::vector<const HistorySeries*>& cases) {
   pooled.unit = "of the median";
   std::map<std::size_t, std::vector<double>> ratios;
   for (const HistorySeries* one : cases) {
-    const double middle = Median(one->values);
-    for (std::size_t i = 0; i < one->values.size(); ++i) {
-      ratios[one->entries[i]].push_back(one->values[i] / middle);
+    std::vector<double> steady;
+    for (const HistoryValue& value : one->values) {
+      if (value.is_steady) steady.push_back(value.value);
+    }
+    for (const HistoryValue& value : one->values) {
+      if (value.is_steady) ratios[value.entry].push_back(value.value / Median(steady));
     }
   }
   for (const auto& [entry, values] : ratios) {
-    pooled.entries.push_back(entry);
-    pooled.values.push_back(Median(values));
+    const double middle = Median(values);
+    pooled.values.push_back({.entry = entry, .value = middle, .upper = middle});
   }
-  pooled.upper = pooled.values;
   return pooled;
 }
 
@@ -83,9 +86,7 @@ void AddValues(const std::string& machine, std::size_t entry, const std::vector<
       fresh.rule = RuleOfTracked(value.measure);
     }
     HistorySeries& series = (*all)[at->second];
-    series.entries.push_back(entry);
-    series.values.push_back(value.least);
-    series.upper.push_back(value.upper);
+    series.values.push_back({entry, value.least, value.upper, value.yardstick});
   }
 }
 
@@ -116,24 +117,62 @@ class Endings {
 /// smallest positive one of the series.
 void FindChangesOf(HistorySeries* series, double places) {
   double smallest = std::numeric_limits<double>::infinity();
-  for (const double value : series->values) {
-    if (value > 0.0) smallest = std::min(smallest, value);
+  for (const HistoryValue& one : series->values) {
+    if (one.value > 0.0) smallest = std::min(smallest, one.value);
   }
   if (!std::isfinite(smallest)) return;
   if (series->rule == Rule::kError) smallest = std::max(smallest, kErrorFloor);
+  std::vector<std::size_t> steady;  // their places
   std::vector<double> logarithms, without;
   for (std::size_t i = 0; i < series->values.size(); ++i) {
-    logarithms.push_back(std::log(std::max(series->values[i], smallest)));
-    if (!series->common.empty()) without.push_back(logarithms[i] - std::log(series->common[i]));
+    const HistoryValue& one = series->values[i];
+    if (!one.is_steady) continue;
+    steady.push_back(i);
+    logarithms.push_back(std::log(std::max(one.value, smallest)));
+    without.push_back(logarithms.back() - std::log(one.common));
   }
   // where cases vary on their own, what a few of them do would only be added to the others
-  const bool is_shared =
-      NoiseOf(without).LongRun() < kQuieter * NoiseOf(logarithms).LongRun() && !without.empty();
-  if (is_shared) logarithms.swap(without);
+  if (NoiseOf(without).LongRun() < kQuieter * NoiseOf(logarithms).LongRun()) {
+    logarithms.swap(without);
+  }
   for (LevelChange change : FindChanges(logarithms, ResolutionOf(series->rule, places))) {
+    change.at = steady[change.at];
     change.before = std::exp(change.before);
     change.after = std::exp(change.after);
     series->changes.push_back(change);
+  }
+}
+
+/// Marks times at which the machine had another speed than usual about then: that of the fastest
+/// quarter of the entries up to twenty before and behind, so that a machine that is slow for most
+/// of a month has its speed still, and one that was changed for good has its new one soon.
+void MarkUnsteady(std::vector<HistorySeries>* all) {
+  constexpr std::size_t kAround = 20;
+  std::map<std::string, std::map<std::size_t, std::vector<double>>> by_machine;
+  for (const HistorySeries& one : *all) {
+    for (const HistoryValue& value : one.values) {
+      if (value.yardstick > 0.0) by_machine[one.machine][value.entry].push_back(value.yardstick);
+    }
+  }
+  std::map<std::pair<std::string, std::size_t>, double> usual;
+  for (const auto& [machine, entries] : by_machine) {
+    std::vector<double> speeds;
+    for (const auto& [entry, yardsticks] : entries) speeds.push_back(Median(yardsticks));
+    std::size_t i = 0;
+    for (const auto& [entry, yardsticks] : entries) {
+      const std::size_t from = i < kAround ? 0 : i - kAround;
+      const std::size_t to = std::min(speeds.size(), ++i + kAround);
+      usual[{machine, entry}] = Quantile({speeds.begin() + static_cast<std::ptrdiff_t>(from),
+                                          speeds.begin() + static_cast<std::ptrdiff_t>(to)},
+                                         0.25);
+    }
+  }
+  for (HistorySeries& one : *all) {
+    for (HistoryValue& value : one.values) {
+      if (!(value.yardstick > 0.0)) continue;
+      const double speed = value.yardstick / usual[{one.machine, value.entry}];
+      value.is_steady = speed < kOtherSpeed && speed > 1.0 / kOtherSpeed;
+    }
   }
 }
 
@@ -149,15 +188,21 @@ std::vector<HistorySeries> PoolTimes(std::vector<HistorySeries>* all) {
     if (cases.size() < kMany) continue;
     const HistorySeries& pool = pooled.emplace_back(Pooled({cases.begin(), cases.end()}));
     std::map<std::size_t, double> common;
-    for (std::size_t i = 0; i < pool.entries.size(); ++i) common[pool.entries[i]] = pool.values[i];
+    for (const HistoryValue& value : pool.values) common[value.entry] = value.value;
     for (HistorySeries* one : cases) {
-      for (const std::size_t entry : one->entries) one->common.push_back(common[entry]);
+      for (HistoryValue& value : one->values) {
+        if (value.is_steady) value.common = common[value.entry];
+      }
     }
   }
   return pooled;
 }
 
 }  // namespace
+
+std::size_t HistorySeries::Unsteady() const {
+  return static_cast<std::size_t>(std::ranges::count(values, false, &HistoryValue::is_steady));
+}
 
 std::size_t HistoryFindings::Steps() const {
   std::size_t steps = endings.size();
@@ -174,6 +219,7 @@ HistoryFindings FindingsOf(const History& history) {
     AddValues(history.entries[e].machine, e, records, &places, &found.series);
     endings.Add(history.entries[e].machine, e, records, &found.endings);
   }
+  MarkUnsteady(&found.series);
   const std::vector<HistorySeries> pooled = PoolTimes(&found.series);
   found.series.insert(found.series.begin(), pooled.begin(), pooled.end());
   double values = 0.0;

@@ -10,16 +10,27 @@
 
 namespace loopbench::harness {
 
+/// A commit's value in a series.
+struct HistoryValue {
+  std::size_t entry = 0;            ///< of the history
+  double value = 0.0, upper = 0.0;  ///< of times the least and the 90th percentile
+  double yardstick = 0.0;           ///< of times [ns], NaN where not known
+  /// Of times: the machine was as fast as it usually is about then, or it is not known how fast it
+  /// was. What it did at another speed says nothing of levels.
+  bool is_steady = true;
+  /// Of times: by what all cases of the entry were slower than usual; 1 where there are few cases.
+  double common = 1.0;
+};
+
 /// One measure of one case on one machine.
 struct HistorySeries {
   std::string machine, one;  ///< one: the case, or kAllCases
   std::string measure, unit;
   Rule rule = Rule::kNone;
-  std::vector<std::size_t> entries;   ///< of the history
-  std::vector<double> values, upper;  ///< of times the least and the 90th percentile
-  std::vector<LevelChange> changes;   ///< at: place in `values`; levels as measured
-  /// Of times: by what all cases of the entry were slower than usual; 1 where there are few cases.
-  std::vector<double> common;
+  std::vector<HistoryValue> values;
+  std::vector<LevelChange> changes;  ///< at: place in `values`; levels as measured
+
+  std::size_t Unsteady() const;  ///< values at another speed of the machine
 };
 
 /// The case of the series that pools times: the median over all cases of their ratios to their own
@@ -40,7 +51,8 @@ struct HistoryFindings {
   std::size_t Steps() const;  ///< of both
 };
 
-/// All series with their changes, times of five and more cases pooled too. What these cases have in
+/// All series with their changes, those of times among values that are steady, times of five and
+/// more cases pooled too. What these cases have in
 /// common is then a matter of the pooled series alone: a machine that is slower for a week is one
 /// step and not one in every case. Throws std::runtime_error when a file of results cannot be read.
 HistoryFindings FindingsOf(const History& history);

@@ -13,6 +13,7 @@
 #include "harness/analysis/doubts.h"
 #include "harness/judge/demand.h"
 #include "harness/judge/statistics.h"
+#include "harness/record/noise.h"
 #include "harness/record/origin.h"
 #include "harness/tables/table.h"
 
@@ -136,6 +137,10 @@ std::string Obstacle(const Measure& measure, const Pair& pair) {
     return OriginOf(pair.base).machine.empty() || OriginOf(pair.fresh).machine.empty()
                ? "machine not known"
                : "another machine";
+  }
+  const double speed = YardstickOf(pair.fresh, measure) / YardstickOf(pair.base, measure);
+  if (speed > kOtherSpeed || speed < 1.0 / kOtherSpeed) {  // not where it is not known
+    return fmt::format("the machine took {:.3g} of the time for equal work", speed);
   }
   if (measure.needs_same_arithmetic && !pair.same_arithmetic) {
     return "another compiler, flags or mathematical library";

@@ -4,6 +4,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <limits>
 
 namespace loopbench::harness {
 
@@ -97,6 +98,11 @@ std::string Shown(const Record& record, std::string_view key) {
   const auto unfit = std::ranges::count_if(*series, [](double time) { return !IsTime(time); });
   return fmt::format("{} values{}", series->size(),
                      unfit > 0 ? fmt::format(" ({} null or negative)", unfit) : "");
+}
+
+double YardstickOf(const Record& record, const Measure& measure) {
+  if (measure.rule != Rule::kTime) return std::numeric_limits<double>::quiet_NaN();
+  return record.Number(measure.key == "series.wall_s" ? "yardstick_wall_ns" : "yardstick_ns");
 }
 
 std::string CaseText(const Record& record) {

@@ -1,6 +1,7 @@
 // Measurements in the JSON that trackers of continuous benchmarking take.
 #pragma once
 
+#include <limits>
 #include <string>
 #include <vector>
 
@@ -12,6 +13,8 @@ struct TrackedValue {
   double value = 0.0;
   double lower = 0.0, upper = 0.0;  ///< spread; equal to value where there is none
   double least = 0.0;               ///< of a sample, which other work on the machine disturbs least
+  /// Of times [ns], NaN where not known: how fast the machine was.
+  double yardstick = std::numeric_limits<double>::quiet_NaN();
 };
 
 /// github-action-benchmark, tool "customSmallerIsBetter":

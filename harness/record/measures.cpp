@@ -254,6 +254,8 @@ constexpr Measure kMeasures[] = {
     {"aa_spread", kNumber, {"A/A spread, rhs", "", kSeconds}},
     {"aa_spread_wall", kNumber, {"A/A spread, wall", "", kSeconds}},
     {"aa_*", kNumber},
+    {"yardstick_ns", kNumber, {"yardstick, rhs", "ns", kFixed}},
+    {"yardstick_wall_ns", kNumber, {"yardstick, wall", "ns", kFixed}},
     {"load1", kNumber, {"load", "", kSeconds}},
     {"load_average", kNumber},
     {"processors", kNumber, {"processors", "", kInteger}},

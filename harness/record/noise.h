@@ -39,6 +39,11 @@ struct NoiseThresholds {
   std::string governor = "performance";
 };
 
+/// Times whose yardsticks (harness/timing/yardstick.h) differ by more than this factor are those of
+/// two machines, as far as times of a program go. Where nothing else runs, medians of the yardstick
+/// differ by less than 1 %; a host that gives less, or a lower clock, takes 5 % and more.
+inline constexpr double kOtherSpeed = 1.03;
+
 /// The reasons why the machine counts as noisy, as one sentence without units to look up, e.g.
 /// "A/A spread 5.1 % (quiet: up to 2 %)"; "" when it counts as quiet. NaN is no reason: what was
 /// not measured is not known to be noisy.

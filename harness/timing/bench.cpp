@@ -21,6 +21,7 @@
 #include "harness/text/terminal.h"
 #include "harness/timing/allocations.h"
 #include "harness/timing/subject.h"
+#include "harness/timing/yardstick.h"
 
 namespace {
 
@@ -180,6 +181,7 @@ void Measure(benchmark::State& state, BenchmarkSubject& subject, BenchmarkKind k
     state.SkipWithError(std::string(ToString(outcome)).c_str());
     return;
   }
+  const double yardstick = YardstickNs();
   const Allocations before = AllocationsSoFar();
   const double begin = Nanoseconds(column);
   for (auto _ : state) {
@@ -191,6 +193,7 @@ void Measure(benchmark::State& state, BenchmarkSubject& subject, BenchmarkKind k
   const double evaluations = static_cast<double>(state.iterations());
   const double bodies = subject.bodies();
   Count(state, "bodies", bodies);
+  Count(state, "yardstick_ns", std::max(yardstick, YardstickNs()));
   // not a rate of the library: it would print nanoseconds with the unit of seconds
   Count(state, "ns_per_body", spent / evaluations / bodies);
   Count(state, "allocations", static_cast<double>(after.count - before.count) / evaluations);

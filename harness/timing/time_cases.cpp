@@ -11,6 +11,7 @@
 #include "harness/record/noise.h"
 #include "harness/run/peers.h"
 #include "harness/run/run_case.h"
+#include "harness/timing/yardstick.h"
 #include "mechanism/start/assembly.h"
 
 namespace loopbench::harness {
@@ -207,6 +208,19 @@ std::unique_ptr<Subject> MakeSubject(const MechanismDescription& description, co
   return std::make_unique<SubjectIn<Spatial>>(description, one, simulate);
 }
 
+/// Rounds of one kind of time, the subjects in turn, and what the yardstick says between them.
+double TimeInTurn(int rounds, const std::vector<std::unique_ptr<Subject>>& subjects,
+                  void (Subject::*time)()) {
+  std::vector<double> yardsticks;
+  for (int round = 0; round < rounds; ++round) {
+    for (const auto& subject : subjects) {
+      yardsticks.push_back(YardstickNs());
+      (*subject.*time)();
+    }
+  }
+  return Quantile(std::move(yardsticks), 0.5);
+}
+
 /// What the A/A pair and the machine say about all times of one mechanism.
 Record NoiseKeys(const MachineState& machine, const Subject& first, const Subject& again) {
   const double rhs = AaSpread(first.rhs_ns(), again.rhs_ns());
@@ -233,13 +247,12 @@ std::vector<Record> TimeTogether(const Experiment& experiment, const TimingGroup
   subjects.push_back(MakeSubject(description, group.cases.front(), group.simulate));
   for (auto& subject : subjects) subject->Prepare();
   const MachineState machine = ReadMachineState();
-  for (int batch = 0; batch < kBatches; ++batch) {
-    for (auto& subject : subjects) subject->TimeDerivative();
-  }
-  for (int repeat = 0; repeat < experiment.timing.repeats; ++repeat) {
-    for (auto& subject : subjects) subject->TimeSimulation();
-  }
-  const Record noise = NoiseKeys(machine, *subjects.front(), *subjects.back());
+  const double yardstick = TimeInTurn(kBatches, subjects, &Subject::TimeDerivative);
+  const double yardstick_wall =
+      TimeInTurn(experiment.timing.repeats, subjects, &Subject::TimeSimulation);
+  Record noise = NoiseKeys(machine, *subjects.front(), *subjects.back());
+  noise.Set("yardstick_ns", yardstick);
+  noise.Set("yardstick_wall_ns", yardstick_wall);
   std::vector<Record> records;
   for (std::size_t i = 0; i < group.cases.size(); ++i) {
     records.push_back(subjects[i]->Finish(group.cases[i].keys));

@@ -275,6 +275,18 @@ TEST(Compare, NeverComparesTimesOfTwoMachines) {
   EXPECT_EQ(Exit(nameless, nameless, times), 2);
 }
 
+TEST(Compare, NeverComparesTimesOfTwoSpeedsOfAMachine) {
+  for (const double speed : {1.02, 1.3, 0.7}) {
+    std::vector<Record> base = Sound(), fresh = Sound();
+    base[0].Set("yardstick_ns", 10'000.0);
+    fresh[0].Set("yardstick_ns", 10'000.0 * speed);
+    fresh[0].Set("series.rhs_ns", Times(5000.0, 3));
+    const ComparisonReport report = Compare(base, fresh, {});
+    EXPECT_EQ(report.Count(Judgement::kNotMeasured, "times"), speed == 1.02 ? 0 : 1) << speed;
+    EXPECT_EQ(report.Count(Judgement::kWorse, "times"), speed == 1.02 ? 1 : 0) << speed;
+  }
+}
+
 TEST(Compare, HoldsWhatRoundOffMovesToOneArithmeticOnly) {
   for (const std::string key : {"compiler", "flags", "libm"}) {
     std::vector<Record> fresh = Sound();

@@ -1,79 +1,27 @@
-// Measurements over commits: what is kept and refused, which state is a base, and planted steps in
-// 200 commits under the noise of a real machine.
+// Measurements over commits: what is kept and refused, and which state is a base.
 #include "harness/history/history.h"
 
 #include <gtest/gtest.h>
 
-#include <algorithm>
-#include <cmath>
-#include <fstream>
-#include <random>
 #include <set>
-#include <sstream>
 #include <string>
 #include <vector>
 
 #include "harness/history/history_page.h"
 #include "harness/history/history_series.h"
-#include "harness/judge/statistics.h"
-#include "harness/record/origin.h"
 #include "harness/store/result_store.h"
 #include "harness/text/config_error.h"
 #include "harness/text/files.h"
+#include "tests/harness/history_of.h"
 
 namespace loopbench::harness {
 namespace history_test {
 
-namespace fs = std::filesystem;
-
-Record Measured(const std::string& mechanism, double drift, std::int64_t steps,
-                const std::vector<double>& times = {}) {
-  Record record;
-  record.Set("kind", std::string("accuracy"));
-  record.Set("mechanism", mechanism);
-  record.Set("outcome", std::string("finished"));
-  record.Set("steps", steps);
-  record.Set("drift_position_max", drift);
-  if (!times.empty()) record.Set("series.wall_s", times);
-  record.Set("series.t", std::vector<double>{0.0, 1.0});
-  record.Set("doubts", std::string());
-  Stamp(record);
-  return record;
+std::vector<double> ValuesOf(const HistorySeries& series) {
+  std::vector<double> values;
+  for (const HistoryValue& one : series.values) values.push_back(one.value);
+  return values;
 }
-
-std::string CommitName(int number) {
-  std::string digits = std::to_string(number);
-  return std::string(40 - digits.size(), '0') + digits;  // as long as git's
-}
-std::string Date(int number) {
-  const auto two = [](int value) { return (value < 10 ? "0" : "") + std::to_string(value); };
-  return "2026-" + two(1 + number / 28) + "-" + two(1 + number % 28) + "T12:00:00Z";
-}
-
-class HistoryOf : public testing::Test {
- protected:
-  void SetUp() override {
-    const auto* test = testing::UnitTest::GetInstance()->current_test_info();
-    folder_ = fs::path(testing::TempDir()) / (std::string("loopbench-history-") + test->name());
-    fs::remove_all(folder_);
-  }
-  void TearDown() override { fs::remove_all(folder_); }
-
-  HistoryEntry Add(int number, const std::vector<Record>& records, bool replaces = false) {
-    return AddToHistory(folder_, {.commit = CommitName(number), .date = Date(number)}, records,
-                        replaces);
-  }
-  std::string Refusal(const HistoryEntry& entry, const std::vector<Record>& records) {
-    try {
-      AddToHistory(folder_, entry, records, false);
-    } catch (const std::exception& error) {
-      return error.what();
-    }
-    return "taken";
-  }
-
-  fs::path folder_;
-};
 
 TEST_F(HistoryOf, CommitsStandInTheOrderOfTheirDates) {
   for (const int number : {3, 1, 2}) Add(number, {Measured("bar", 1e-3 * number, number)});
@@ -83,7 +31,7 @@ TEST_F(HistoryOf, CommitsStandInTheOrderOfTheirDates) {
   const HistoryFindings found = FindingsOf(history);
   for (const HistorySeries& series : found.series) {
     if (series.measure == "steps") {
-      EXPECT_EQ(series.values, (std::vector<double>{1.0, 2.0, 3.0}));
+      EXPECT_EQ(ValuesOf(series), (std::vector<double>{1.0, 2.0, 3.0}));
     }
   }
   // series of a run stay behind, samples of times do not
@@ -131,7 +79,7 @@ TEST_F(HistoryOf, MeasuredAgainTakesThePlaceAndLosesTheMark) {
   EXPECT_EQ(history.entries[0].mark, "");
   for (const HistorySeries& one : FindingsOf(history).series) {
     if (one.measure == "steps") {
-      EXPECT_EQ(one.values, std::vector<double>{11.0});
+      EXPECT_EQ(ValuesOf(one), std::vector<double>{11.0});
     }
   }
 }
@@ -197,7 +145,7 @@ TEST_F(HistoryOf, OneStepOfACountIsASingleOne) {
   for (const HistorySeries& series : FindingsOf(history).series) {
     if (series.measure != "steps") continue;
     ASSERT_EQ(series.changes.size(), 1u);
-    EXPECT_EQ(history.entries[series.entries[series.changes[0].at]].commit, CommitName(21));
+    EXPECT_EQ(history.entries[series.values[series.changes[0].at].entry].commit, CommitName(21));
     EXPECT_EQ(series.changes[0].Confidence(), 1.0);
   }
 }
@@ -211,135 +159,6 @@ TEST_F(HistoryOf, PageSaysNamesAsText) {
   const std::string page = HistoryPage(history, FindingsOf(history), hostile, {hostile});
   EXPECT_EQ(page.find("<img"), std::string::npos);
   EXPECT_NE(page.find("&lt;img"), std::string::npos);
-}
-
-constexpr int kCommits = 200, kCases = 8;
-using NoiseByCase = std::vector<std::vector<double>>;  ///< [case][commit], logarithms
-
-/// What timing-noise.csv says of a machine with two speeds, about the medians.
-NoiseByCase NoiseOfASharedMachine() {
-  std::ifstream file(fs::path(LOOPBENCH_SOURCE_DIR) / "tests/harness/timing-noise.csv");
-  NoiseByCase columns(kCases);
-  for (std::string line; std::getline(file, line);) {
-    if (line.empty() || line[0] == '#') continue;
-    std::istringstream cells(line);
-    std::string cell;
-    for (std::vector<double>& column : columns) {
-      std::getline(cells, cell, ',');
-      column.push_back(std::log(std::stod(cell)));
-    }
-  }
-  for (std::vector<double>& column : columns) {
-    const double middle = Median(column);
-    for (double& value : column) value -= middle;
-  }
-  return columns;
-}
-
-/// One percent, as two runs of one program on a machine of one's own differ (the A/A spread that
-/// timings call quiet is 2 %), and a run in twenty that something disturbed.
-NoiseByCase NoiseOfAQuietMachine() {
-  std::mt19937_64 random(17);
-  std::normal_distribution<double> normal(0.0, 0.01);
-  NoiseByCase noise(kCases, std::vector<double>(kCommits));
-  for (std::vector<double>& column : noise) {
-    for (double& value : column) value = normal(random) + (random() % 20 == 0 ? 0.15 : 0.0);
-  }
-  return noise;
-}
-
-/// A step planted in a case, and whether it was found within five commits of its place: it is three
-/// standard deviations high, so that the noise decides on a commit or two.
-struct Planted {
-  std::string one, measure;
-  double ratio = 1.0;
-  int at = 0;
-  bool found = false;
-};
-
-/// Five steps of 3 % in times and in instructions, five of a factor of 1.5 in drift.
-std::vector<Planted> PlantedSteps() {
-  std::vector<Planted> planted;
-  for (int k = 0; k < 5; ++k) {
-    const std::string one = "case" + std::to_string(k);
-    planted.push_back({one, "wall_s", 1.03, 31 + 33 * k});
-    planted.push_back({one, "instructions", 1.03, 31 + 33 * k});
-    planted.push_back(
-        {"case" + std::to_string((k + 3) % kCases), "drift_position_max", 1.5, 22 + 37 * k});
-  }
-  return planted;
-}
-
-class PlantedHistory : public HistoryOf {
- protected:
-  /// Adds 200 commits of eight cases with the planted steps; what is found is told to `planted_`.
-  void Follow(const NoiseByCase& noise) {
-    for (int commit = 0; commit < kCommits; ++commit) {
-      std::vector<Record> records;
-      for (int k = 0; k < kCases; ++k) {
-        const std::string one = "case" + std::to_string(k);
-        const auto at = [&](const char* measure) { return Level(one, measure, commit); };
-        const double time =
-            1e-3 * (k + 1) * at("wall_s") *
-            std::exp(noise[static_cast<std::size_t>(k)][static_cast<std::size_t>(commit)]);
-        records.push_back(Measured(one, 1e-7 * at("drift_position_max"), 1000 + k,
-                                   {time, 1.1 * time, 1.5 * time}));
-        records.back().Set("instructions", std::round(1e6 * (k + 1) * at("instructions")));
-      }
-      Add(commit, records);
-    }
-    for (const HistorySeries& series : FindingsOf(ReadHistory(folder_)).series) {
-      for (const LevelChange& change : series.changes) Judge(series, change);
-    }
-  }
-  int Found(const std::string& measure) const {
-    return static_cast<int>(std::ranges::count_if(planted_, [&measure](const Planted& step) {
-      return step.found && step.measure == measure;
-    }));
-  }
-
-  std::vector<Planted> planted_ = PlantedSteps();
-  std::vector<std::string> false_alarms_;
-
- private:
-  double Level(const std::string& one, const std::string& measure, int commit) const {
-    double level = 1.0;
-    for (const Planted& step : planted_) {
-      if (step.one == one && step.measure == measure && commit >= step.at) level *= step.ratio;
-    }
-    return level;
-  }
-  void Judge(const HistorySeries& series, const LevelChange& change) {
-    const int at = static_cast<int>(series.entries[change.at]);
-    const auto step = std::ranges::find_if(planted_, [&](const Planted& one) {
-      return series.one.ends_with(one.one) && one.measure == series.measure &&
-             std::abs(one.at - at) <= 5;
-    });
-    if (step == planted_.end()) {
-      false_alarms_.push_back(series.one + " " + series.measure + " at " + std::to_string(at));
-    } else {
-      step->found = true;
-      EXPECT_NEAR(change.after / change.before, step->ratio, 0.02);  // 3 standard errors of medians
-    }
-  }
-};
-
-TEST_F(PlantedHistory, StepsOfThreePercentAreFoundOnAQuietMachine) {
-  Follow(NoiseOfAQuietMachine());
-  EXPECT_EQ(Found("drift_position_max"), 5);
-  EXPECT_EQ(Found("instructions"), 5);
-  EXPECT_GE(Found("wall_s"), 4);
-  EXPECT_LE(false_alarms_.size(), 1u) << testing::PrintToString(false_alarms_);
-}
-
-// A machine that is a third slower for a third of the time hides 3 % in its times. What does not
-// depend on it is found all the same. For 24 commits it is slow, and one case less so than the
-// others: both ends of that are reported, and nothing else.
-TEST_F(PlantedHistory, ASharedMachineHidesThemInTimesOnly) {
-  Follow(NoiseOfASharedMachine());
-  EXPECT_EQ(Found("drift_position_max"), 5);
-  EXPECT_EQ(Found("instructions"), 5);
-  EXPECT_LE(false_alarms_.size(), 2u) << testing::PrintToString(false_alarms_);
 }
 
 }  // namespace history_test

@@ -1,0 +1,71 @@
+// A history in a folder of its own, and what is added to it.
+#pragma once
+
+#include <gtest/gtest.h>
+
+#include <cstdint>
+#include <filesystem>
+#include <string>
+#include <vector>
+
+#include "harness/history/history.h"
+#include "harness/record/origin.h"
+#include "harness/record/record.h"
+#include "harness/text/config_error.h"
+
+namespace loopbench::harness {
+namespace history_test {
+
+namespace fs = std::filesystem;
+
+inline Record Measured(const std::string& mechanism, double drift, std::int64_t steps,
+                       const std::vector<double>& times = {}) {
+  Record record;
+  record.Set("kind", std::string("accuracy"));
+  record.Set("mechanism", mechanism);
+  record.Set("outcome", std::string("finished"));
+  record.Set("steps", steps);
+  record.Set("drift_position_max", drift);
+  if (!times.empty()) record.Set("series.wall_s", times);
+  record.Set("series.t", std::vector<double>{0.0, 1.0});
+  record.Set("doubts", std::string());
+  Stamp(record);
+  return record;
+}
+
+inline std::string CommitName(int number) {
+  std::string digits = std::to_string(number);
+  return std::string(40 - digits.size(), '0') + digits;  // as long as git's
+}
+inline std::string Date(int number) {
+  const auto two = [](int value) { return (value < 10 ? "0" : "") + std::to_string(value); };
+  return "2026-" + two(1 + number / 28) + "-" + two(1 + number % 28) + "T12:00:00Z";
+}
+
+class HistoryOf : public testing::Test {
+ protected:
+  void SetUp() override {
+    const auto* test = testing::UnitTest::GetInstance()->current_test_info();
+    folder_ = fs::path(testing::TempDir()) / (std::string("loopbench-history-") + test->name());
+    fs::remove_all(folder_);
+  }
+  void TearDown() override { fs::remove_all(folder_); }
+
+  HistoryEntry Add(int number, const std::vector<Record>& records, bool replaces = false) {
+    return AddToHistory(folder_, {.commit = CommitName(number), .date = Date(number)}, records,
+                        replaces);
+  }
+  std::string Refusal(const HistoryEntry& entry, const std::vector<Record>& records) {
+    try {
+      AddToHistory(folder_, entry, records, false);
+    } catch (const std::exception& error) {
+      return error.what();
+    }
+    return "taken";
+  }
+
+  fs::path folder_;
+};
+
+}  // namespace history_test
+}  // namespace loopbench::harness

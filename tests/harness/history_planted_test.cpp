@@ -1,0 +1,173 @@
+// Steps planted in 200 commits, on machines as they are.
+#include <gtest/gtest.h>
+
+#include <algorithm>
+#include <cmath>
+#include <cstdio>
+#include <fstream>
+#include <random>
+#include <sstream>
+
+#include "harness/history/history_series.h"
+#include "harness/judge/statistics.h"
+#include "tests/harness/history_of.h"
+
+namespace loopbench::harness {
+namespace history_test {
+
+constexpr std::size_t kCommits = 200, kCases = 8;
+using ByCase = std::vector<std::vector<double>>;  ///< [case][commit]
+/// What a machine does to times that are the same.
+struct Machine {
+  ByCase noise;       ///< of their logarithms
+  ByCase yardsticks;  ///< [ns]; none where it is not known how fast the machine was
+};
+
+/// What timing-noise.csv says of a machine whose cores others share, about the medians: for each
+/// record the times of a right-hand side and of a simulation, then their yardsticks.
+Machine SharedMachine() {
+  std::ifstream file(fs::path(LOOPBENCH_SOURCE_DIR) / "tests/harness/timing-noise.csv");
+  Machine machine{ByCase(kCases), ByCase(kCases)};
+  for (std::string line; std::getline(file, line);) {
+    if (line.empty() || line[0] == '#') continue;
+    std::istringstream cells(line);
+    std::string cell;
+    for (std::size_t record = 0; record < kCases / 2; ++record) {
+      for (ByCase* columns : {&machine.noise, &machine.yardsticks}) {
+        for (const std::size_t one : {2 * record, 2 * record + 1}) {
+          std::getline(cells, cell, ',');
+          (*columns)[one].push_back(std::stod(cell));
+        }
+      }
+    }
+  }
+  for (std::vector<double>& column : machine.noise) {
+    const double middle = Median(column);
+    for (double& value : column) value = std::log(value / middle);
+  }
+  return machine;
+}
+
+/// One percent, as two runs of one program on a machine of one's own differ (the A/A spread that
+/// timings call quiet is 2 %), and a run in twenty that something disturbed.
+Machine QuietMachine() {
+  std::mt19937_64 random(17);
+  std::normal_distribution<double> normal(0.0, 0.01);
+  Machine machine{ByCase(kCases, std::vector<double>(kCommits)), {}};
+  for (std::vector<double>& column : machine.noise) {
+    for (double& value : column) value = normal(random) + (random() % 20 == 0 ? 0.15 : 0.0);
+  }
+  return machine;
+}
+
+/// A step planted in a case, and whether it was found within five commits of its place: it is three
+/// standard deviations high, so that the noise decides on a commit or two.
+struct Planted {
+  std::string one, measure;
+  double ratio = 1.0;
+  int at = 0;
+  bool found = false;
+};
+
+/// Five steps of 3 % in times and in instructions, five of a factor of 1.5 in drift.
+std::vector<Planted> PlantedSteps() {
+  std::vector<Planted> planted;
+  for (int k = 0; k < 5; ++k) {
+    const std::string one = "case" + std::to_string(k);
+    planted.push_back({one, "wall_s", 1.03, 31 + 33 * k});
+    planted.push_back({one, "instructions", 1.03, 31 + 33 * k});
+    planted.push_back({"case" + std::to_string((k + 3) % static_cast<int>(kCases)),
+                       "drift_position_max", 1.5, 22 + 37 * k});
+  }
+  return planted;
+}
+
+class PlantedHistory : public HistoryOf {
+ protected:
+  /// Adds 200 commits of eight cases with the planted steps; what is found is told to `planted_`.
+  void Follow(const Machine& machine) {
+    for (std::size_t commit = 0; commit < kCommits; ++commit) {
+      std::vector<Record> records;
+      for (std::size_t k = 0; k < kCases; ++k) {
+        const std::string one = "case" + std::to_string(k);
+        const auto at = [&](const char* measure) { return Level(one, measure, commit); };
+        const double size = static_cast<double>(k + 1);
+        const double time = 1e-3 * size * at("wall_s") * std::exp(machine.noise[k][commit]);
+        records.push_back(Measured(one, 1e-7 * at("drift_position_max"),
+                                   static_cast<std::int64_t>(1000 + k),
+                                   {time, 1.1 * time, 1.5 * time}));
+        records.back().Set("instructions", std::round(1e6 * size * at("instructions")));
+        if (machine.yardsticks.empty()) continue;
+        records.back().Set("yardstick_wall_ns", machine.yardsticks[k][commit]);
+      }
+      Add(static_cast<int>(commit), records);
+    }
+    for (const HistorySeries& series : FindingsOf(ReadHistory(folder_)).series) {
+      for (const LevelChange& change : series.changes) Judge(series, change);
+    }
+    std::printf("found: drift %d, instructions %d, times %d of 5; %zu false alarms\n",
+                Found("drift_position_max"), Found("instructions"), Found("wall_s"),
+                false_alarms_.size());
+  }
+  int Found(const std::string& measure) const {
+    return static_cast<int>(std::ranges::count_if(planted_, [&measure](const Planted& step) {
+      return step.found && step.measure == measure;
+    }));
+  }
+
+  std::vector<Planted> planted_ = PlantedSteps();
+  std::vector<std::string> false_alarms_;
+
+ private:
+  double Level(const std::string& one, const std::string& measure, std::size_t commit) const {
+    double level = 1.0;
+    for (const Planted& step : planted_) {
+      if (step.one == one && step.measure == measure && static_cast<int>(commit) >= step.at)
+        level *= step.ratio;
+    }
+    return level;
+  }
+  void Judge(const HistorySeries& series, const LevelChange& change) {
+    const int at = static_cast<int>(series.values[change.at].entry);
+    const auto step = std::ranges::find_if(planted_, [&](const Planted& one) {
+      return series.one.ends_with(one.one) && one.measure == series.measure &&
+             std::abs(one.at - at) <= 5;
+    });
+    if (step == planted_.end()) {
+      false_alarms_.push_back(series.one + " " + series.measure + " at " + std::to_string(at));
+    } else {
+      step->found = true;
+      EXPECT_NEAR(change.after / change.before, step->ratio, 0.02);  // 3 standard errors of medians
+    }
+  }
+};
+
+TEST_F(PlantedHistory, StepsOfThreePercentAreFoundOnAQuietMachine) {
+  Follow(QuietMachine());
+  EXPECT_EQ(Found("drift_position_max"), 5);
+  EXPECT_EQ(Found("instructions"), 5);
+  EXPECT_GE(Found("wall_s"), 4);
+  EXPECT_LE(false_alarms_.size(), 1u) << testing::PrintToString(false_alarms_);
+}
+
+TEST_F(PlantedHistory, StepsOfThreePercentAreFoundOnASharedMachine) {
+  Follow(SharedMachine());
+  EXPECT_EQ(Found("drift_position_max"), 5);
+  EXPECT_EQ(Found("instructions"), 5);
+  EXPECT_GE(Found("wall_s"), 4);
+  EXPECT_LE(false_alarms_.size(), 1u) << testing::PrintToString(false_alarms_);
+}
+
+// The same times without the yardstick that was measured beside them: they hide what is in them.
+TEST_F(PlantedHistory, WithoutAYardstickASharedMachineHidesThem) {
+  Machine machine = SharedMachine();
+  machine.yardsticks.clear();
+  Follow(machine);
+  EXPECT_EQ(Found("drift_position_max"), 5);
+  EXPECT_EQ(Found("instructions"), 5);
+  EXPECT_LT(Found("wall_s"), 4) << "then the yardstick is of no use";
+  EXPECT_LE(false_alarms_.size(), 2u) << testing::PrintToString(false_alarms_);
+}
+
+}  // namespace history_test
+}  // namespace loopbench::harness

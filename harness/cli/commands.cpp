@@ -9,6 +9,7 @@
 #include <set>
 
 #include "harness/analysis/doubts.h"
+#include "harness/cli/long_table.h"
 #include "harness/isolation/interruption.h"
 #include "harness/judge/claims_reader.h"
 #include "harness/judge/claims_report.h"
@@ -32,11 +33,17 @@
 
 namespace loopbench::harness {
 
-std::vector<Record> LoadRecords(const std::filesystem::path& store, const Selection& where) {
-  std::vector<std::string> warnings;
-  std::vector<Record> records = LatestRecords(ReadRecords(store, where, &warnings), CodeVersion());
+std::vector<Record> Prepared(std::vector<Record> records) {
+  records = LatestRecords(records, CodeVersion());
   SortRows(&records);  // in the store they stand as they ended
   SetDoubts(&records);
+  return records;
+}
+
+std::vector<Record> LoadRecords(const std::filesystem::path& store, const Selection& where) {
+  RequireRoom(store, where);
+  std::vector<std::string> warnings;
+  std::vector<Record> records = Prepared(ReadRecords(store, where, &warnings));
   for (const std::string& warning : warnings) PrintError("warning: {}\n", warning);
   return records;
 }

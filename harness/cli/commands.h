@@ -19,6 +19,9 @@ namespace loopbench::harness {
 /// stand beside each other; warnings about it go to standard error.
 std::vector<Record> LoadRecords(const std::filesystem::path& store, const Selection& where = {});
 
+/// What LoadRecords() makes of all records of some scenes.
+std::vector<Record> Prepared(std::vector<Record> records);
+
 /// drift.csv, drift.md and so on of precision and timing in the folder of a store, or beside a
 /// store that is a file, named after it; their short forms on the terminal.
 void WriteTables(const std::vector<Record>& records, const std::filesystem::path& store,

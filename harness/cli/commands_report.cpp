@@ -5,6 +5,7 @@
 
 #include "harness/analysis/doubts.h"
 #include "harness/cli/commands.h"
+#include "harness/cli/long_table.h"
 #include "harness/cli/report.h"
 #include "harness/figures/failure_map_figure.h"
 #include "harness/figures/figure_recipes.h"
@@ -14,6 +15,7 @@
 #include "harness/judge/failure_map_report.h"
 #include "harness/record/provenance.h"
 #include "harness/store/contents.h"
+#include "harness/store/result_store.h"
 #include "harness/tables/columns.h"
 #include "harness/tables/fit.h"
 #include "harness/text/config_error.h"
@@ -167,6 +169,10 @@ int DoubtGate(const std::vector<Record>& rows) {
 }
 
 int PrintTable(const TableCommand& command, const std::string& typed) {
+  if (IsLarge(StoreFile(command.store))) {
+    const SceneReader reader(command.store, command.view.where);
+    if (reader.records() > kMostHeld) return WriteLongTable(command, reader, typed);
+  }
   TableView view = command.view;
   const bool on_terminal = command.format == "text" && command.out.empty();
   // a page is no wider than a terminal
@@ -191,7 +197,7 @@ int PrintTable(const TableCommand& command, const std::string& typed) {
 }
 
 int Plot(const PlotCommand& command) {
-  std::vector<Record> records = LoadRecords(command.store);
+  std::vector<Record> records = LoadRecords(command.store, command.where);
   RequireConditions("--where", command.where, records);
   records = Filter(records, command.where);
   if (records.empty()) {

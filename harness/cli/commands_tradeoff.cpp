@@ -49,7 +49,7 @@ void PrintForPeople(const Tradeoff& tradeoff, const TradeoffCommand& command,
 }  // namespace
 
 int PrintTradeoff(const TradeoffCommand& command, const std::string& typed) {
-  const std::vector<Record> records = LoadRecords(command.store);
+  const std::vector<Record> records = LoadRecords(command.store, command.options.where);
   if (records.empty()) {
     PrintError("{}: no records\n", command.store.string());
     return 2;

@@ -88,7 +88,7 @@ std::string NameOf(const Record& record) {
 }
 
 int OfStore(const TrajectoryCommand& command, const std::string& typed) {
-  std::vector<Record> records = LoadRecords(command.source);
+  std::vector<Record> records = LoadRecords(command.source, command.where);
   std::erase_if(records, [&](const Record& record) {
     return record.Text("trajectory").empty() || !Matches(record, command.where);
   });

@@ -37,7 +37,8 @@ void LineReader::End() {
 
 void LineReader::TakeLine(std::string_view line) {
   ++number_;
-  if (line.empty() || line == "\r" || (wanted_ && !wanted_(line))) return;
+  const LinePlace place{offset_, line.size()};
+  if (line.empty() || line == "\r" || (wanted_ && !wanted_(line, place))) return;
   Record record;
   try {
     record = FromJsonLine(line);
@@ -48,7 +49,7 @@ void LineReader::TakeLine(std::string_view line) {
     warning_ = message + " (torn last line, skipped)";
     return;
   }
-  take_(std::move(record), {offset_, line.size()});
+  take_(std::move(record), place);
 }
 
 void ForEachRecord(const std::filesystem::path& path, const LineReader::Take& take,

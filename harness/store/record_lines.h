@@ -23,7 +23,7 @@ class LineReader {
  public:
   using Take = std::function<void(Record, const LinePlace&)>;
   /// Of a line, whether it is read; without one all are. What is passed over is not looked at.
-  using Wanted = std::function<bool(std::string_view)>;
+  using Wanted = std::function<bool(std::string_view, const LinePlace&)>;
 
   /// @param file  for messages
   LineReader(std::filesystem::path file, Take take, Wanted wanted = {});

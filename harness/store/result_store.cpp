@@ -182,15 +182,23 @@ bool IsExcluded(std::string_view line,
 
 }  // namespace
 
+LineReader::Wanted LinesThatMayMatch(const Selection& where) {
+  return [conditions = OnParameters(where)](std::string_view line, const LinePlace&) {
+    return !IsExcluded(line, conditions);
+  };
+}
+
 std::vector<Record> ReadRecords(const std::filesystem::path& path, const Selection& where,
                                 std::vector<std::string>* warnings) {
-  const auto conditions = OnParameters(where);
-  if (conditions.empty() || !IsLarge(StoreFile(path))) return ReadRecords(path, warnings);
+  if (OnParameters(where).empty() || !IsLarge(StoreFile(path))) return ReadRecords(path, warnings);
+  const LineReader::Wanted may_match = LinesThatMayMatch(where);
   std::vector<Record> records;
   ForEachRecord(
       path, [&records](Record record, const LinePlace&) { records.push_back(std::move(record)); },
       warnings,
-      [&](std::string_view line) { return records.empty() || !IsExcluded(line, conditions); });
+      [&](std::string_view line, const LinePlace& place) {
+        return records.empty() || may_match(line, place);
+      });
   return records;
 }
 

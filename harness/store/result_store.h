@@ -11,6 +11,7 @@
 #include "harness/record/record.h"
 #include "harness/record/record_json.h"
 #include "harness/record/select.h"
+#include "harness/store/record_lines.h"
 
 namespace loopbench::harness {
 
@@ -80,6 +81,10 @@ std::vector<Record> LatestRecords(const std::vector<Record>& records,
 /// `warnings` (when given).
 std::vector<Record> ReadRecords(const std::filesystem::path& path,
                                 std::vector<std::string>* warnings = nullptr);
+
+/// Whether a line may be a record that meets the conditions on parameters of a sweep: a line that
+/// does not is passed over without being read.
+LineReader::Wanted LinesThatMayMatch(const Selection& where);
 
 /// The same of a store that is too large to be held, without records that conditions on parameters
 /// of a sweep exclude: what such a line says besides is not looked at. Parameters are the keys that

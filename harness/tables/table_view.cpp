@@ -40,13 +40,6 @@ const KindOfTable* FindKind(std::string_view name) {
   return kind == std::end(kKinds) ? nullptr : &*kind;
 }
 
-std::string KindOf(const TableView& view, std::span<const Record> records) {
-  if (!view.kind.empty()) return view.kind;
-  const auto first = std::ranges::find_if(
-      kKinds, [&](const KindOfTable& kind) { return HasKind(records, kind.records); });
-  return std::string(first == std::end(kKinds) ? "all" : first->name);
-}
-
 // `rows` are what the table shows: records, or for the factorial table its own rows.
 void RequireKeys(const TableView& view, std::span<const Record> rows) {
   if (!view.group.empty()) RequireKey("--group", view.group, rows);
@@ -151,8 +144,14 @@ Table Factorial(const std::vector<Record>& rows) {
 
 }  // namespace
 
-Table MakeTable(std::span<const Record> records, const TableView& view) {
-  RequireConditions("--where", view.where, records);
+std::string KindOf(const TableView& view, std::span<const Record> records) {
+  if (!view.kind.empty()) return view.kind;
+  const auto first = std::ranges::find_if(
+      kKinds, [&](const KindOfTable& kind) { return HasKind(records, kind.records); });
+  return std::string(first == std::end(kKinds) ? "all" : first->name);
+}
+
+std::vector<Record> RowsOf(std::span<const Record> records, const TableView& view) {
   const std::string kind = KindOf(view, records);
   Selection selection = view.where;
   if (const KindOfTable* known = FindKind(kind)) {
@@ -163,6 +162,13 @@ Table MakeTable(std::span<const Record> records, const TableView& view) {
   std::vector<Record> rows = Filter(records, selection);
   SortRows(&rows);
   if (kind == "precision") SortRungs(&rows);
+  return rows;
+}
+
+Table MakeTable(std::span<const Record> records, const TableView& view) {
+  RequireConditions("--where", view.where, records);
+  const std::string kind = KindOf(view, records);
+  std::vector<Record> rows = RowsOf(records, view);
   Table table;
   if (kind == "factorial") {
     table = Factorial(rows);

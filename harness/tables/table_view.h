@@ -30,6 +30,12 @@ struct TableView {
 /// @throws ConfigError when `where`, `group`, `columns` or `sort` name a key that no record has.
 Table MakeTable(std::span<const Record> records, const TableView& view);
 
+/// The kind that the view shows of a store that has these records: its own, else the first.
+std::string KindOf(const TableView& view, std::span<const Record> records);
+
+/// The rows of such a table, in its order before `sort` and `group`: those of its kind that match.
+std::vector<Record> RowsOf(std::span<const Record> records, const TableView& view);
+
 /// Notes ("warning: ...") when timings among the rows come from a noisy machine: how many, the
 /// worst A/A spread, load and governor (harness/record/noise.h has the thresholds). None when all
 /// were quiet.

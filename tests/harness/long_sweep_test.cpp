@@ -1,12 +1,18 @@
 // Sweeps of more combinations than are held at once, through the program.
 #include <gtest/gtest.h>
 
+#include <algorithm>
 #include <map>
 #include <set>
+#include <sstream>
 #include <string>
 #include <vector>
 
+#include "harness/cli/long_table.h"
+#include "harness/record/select.h"
 #include "harness/store/result_store.h"
+#include "harness/text/config_error.h"
+#include "harness/text/files.h"
 #include "tests/harness/cli_fixture.h"
 
 namespace loopbench::harness {
@@ -133,6 +139,48 @@ TEST_F(LongSweeps, AValueThatCannotBeIsRefusedBeforeAnythingRuns) {
   ExpectEnding(Call("run long.json --out none --gate doubts"), 2, {"found -45"});
   Write("long.json", LongSweepText());
   ExpectEnding(Call("run long.json --out none --gate doubts"), 2, {"--gate doubts", "a sweep of"});
+}
+
+std::set<std::string> LinesOf(const std::string& text) {
+  std::istringstream lines(text);
+  std::set<std::string> all;
+  for (std::string line; std::getline(lines, line);) {
+    if (!line.starts_with("# command")) all.insert(line);
+  }
+  return all;
+}
+
+TEST_F(LongSweeps, TablesSceneBySceneHaveTheRowsOfOneThatIsHeld) {
+  Call("run long.json --out held");
+  Call("run long.json --filter 'mass<1.1' --rerun all --out held");  // some cases twice
+  Call("table held --format csv --out held.csv");
+  Call("table held --format json --out held.json");
+  const SceneReader reader(folder_ / "held", {});
+  EXPECT_GT(reader.records(), kAll);
+  for (const std::string format : {"csv", "json"}) {
+    const fs::path file = folder_ / ("long." + format);
+    TableCommand command;
+    command.store = folder_ / "held";
+    command.format = format;
+    command.out = file;
+    EXPECT_EQ(WriteLongTable(command, reader, ""), 0);
+    const std::string rows = ReadFile(file), held = ReadFile(folder_ / ("held." + format));
+    if (format == "csv") {
+      EXPECT_EQ(LinesOf(rows), LinesOf(held));
+    } else {  // where they came from stands in every row, and differs
+      EXPECT_EQ(std::ranges::count(rows, '\n'), std::ranges::count(held, '\n'));
+      EXPECT_TRUE(rows.starts_with("[{") && rows.ends_with("}]\n"));
+    }
+    command.view.where = {Condition{"mass", {"7"}}};
+    EXPECT_EQ(WriteLongTable(command, reader, ""), 2) << "nothing matches";
+  }
+  TableCommand people;
+  people.store = folder_ / "held";
+  EXPECT_THROW(WriteLongTable(people, reader, ""), ConfigError);
+  TableCommand sorted = people;
+  sorted.format = "csv";
+  sorted.view.sort = "steps";
+  EXPECT_THROW(WriteLongTable(sorted, reader, ""), ConfigError);
 }
 
 }  // namespace long_sweep_test

@@ -16,6 +16,8 @@
 #include "harness/record/json_object.h"
 #include "harness/run/case_identity.h"
 #include "harness/store/finished_runs.h"
+#include "harness/store/new_store.h"
+#include "harness/store/store_lock.h"
 #include "harness/suite/workload.h"
 #include "harness/tables/fit.h"
 #include "harness/text/config_error.h"
@@ -31,6 +33,11 @@ std::vector<int> PartsNotDone(const ClusterRun& run, const std::filesystem::path
     if (!IsDone(folder, part)) parts.push_back(part);
   }
   return parts;
+}
+
+/// There when all parts are merged.
+std::filesystem::path WholeFile(const std::filesystem::path& folder) {
+  return StoreFile(folder / "whole");
 }
 
 /// Submits the array of `parts` and the job behind it, and writes down their numbers.
@@ -211,9 +218,12 @@ int PrintStatus(const std::filesystem::path& folder, bool json) {
   }
   Table table = StatusTable(run, parts);
   if (!problem.empty()) table.notes.push_back("states from the stores alone: " + problem);
-  const bool is_whole = std::filesystem::exists(folder / "whole" / "results.jsonl");
+  const auto whole = WholeFile(folder);
+  const bool is_whole = HasRecords(whole);
   if (is_whole) {
-    table.notes.push_back(fmt::format("merged: {}", (folder / "whole").string()));
+    table.notes.push_back(fmt::format("merged: {}", whole.parent_path().string()));
+  } else if (IsLocked(UnderWay(whole))) {
+    table.notes.push_back("the parts are being merged");
   } else if (left > 0.0) {
     table.notes.push_back(fmt::format("about {:.0f} s left, until {:%H:%M}", left,
                                       fmt::localtime(static_cast<std::time_t>(Now() + left))));
@@ -237,7 +247,7 @@ int Collect(const std::filesystem::path& folder) {
     return 1;
   }
   MergeCommand merge;
-  merge.out = folder / "whole";
+  merge.out = WholeFile(folder).parent_path();
   merge.order = OrderOfCases(run);
   std::set<std::string> missing(merge.order.begin(), merge.order.end());
   for (int part = 1; part <= run.parts; ++part) {
@@ -252,7 +262,7 @@ int Collect(const std::filesystem::path& folder) {
         folder.string(), missing.size(), merge.order.size(), *missing.begin());
     return 1;
   }
-  if (std::filesystem::exists(merge.out / "results.jsonl")) {
+  if (HasRecords(WholeFile(folder))) {
     Print("{} is there already\n", merge.out.string());
     return 0;
   }

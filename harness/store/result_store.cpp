@@ -119,19 +119,6 @@ void ResultStore::Append(const std::vector<Record>& records) {
   }
 }
 
-void ResultStore::Fill(std::size_t count, const std::function<Record(std::size_t)>& record) {
-  if (::lseek(descriptor_, 0, SEEK_END) > 0) {
-    throw std::runtime_error(
-        fmt::format("{}: found records, expected a new store; name it among the "
-                    "stores to merge and write to another",
-                    file_.string()));
-  }
-  // a link stays one
-  WriteFileAtomically(std::filesystem::canonical(file_), [&](const auto& write) {
-    for (std::size_t i = 0; i < count; ++i) write(ToJsonLine(record(i)) + '\n');
-  });
-}
-
 std::vector<Record> LatestRecords(const std::vector<Record>& records, std::string_view version) {
   std::vector<Record> latest;
   std::map<std::string, std::size_t> place;

@@ -2,7 +2,6 @@
 #pragma once
 
 #include <filesystem>
-#include <functional>
 #include <mutex>
 #include <string>
 #include <string_view>
@@ -48,10 +47,6 @@ class ResultStore {
 
   /// The same with several, all of them or none.
   void Append(const std::vector<Record>& records);
-
-  /// The records of an empty store, one after the other, all of them or none. Throws
-  /// std::runtime_error when it has some. Nothing can be appended afterwards.
-  void Fill(std::size_t count, const std::function<Record(std::size_t)>& record);
 
   /// In a forked child: lets go of the store, so that the lock ends with the parent.
   void LeaveToParent();

@@ -1,11 +1,13 @@
 // Runs in parts, by the folder alone: what a cluster's engine calls, and what is known without one.
 #include <gtest/gtest.h>
+#include <unistd.h>
 
 #include <algorithm>
 #include <fstream>
 #include <string>
 
 #include "harness/store/result_store.h"
+#include "harness/store/store_lock.h"
 #include "tests/harness/cli_fixture.h"
 
 namespace loopbench::harness {
@@ -74,6 +76,27 @@ TEST_F(Cluster, PartsAreMergedToWhatOneRunGives) {
   ExpectEnding(Call("collect parts"), 0, {"is there already"});
   const Ending status = Call("status parts --json");
   ExpectEnding(status, 0, {"\"cases\":6", "\"done\":6", "\"failed\":0", "\"to_do\":0"});
+}
+
+TEST_F(Cluster, AMergeIsThereWhenItIsWhole) {
+  ExpectEnding(Call("submit tiny.json --tasks 2 --no-timing --no-queue --out parts"), 0, {});
+  for (const char* k : {"1", "2"}) EXPECT_EQ(Part(k).code, 0);
+  ExpectEnding(Call("collect parts", "ulimit -f 1;"), 2, {"File too large"});
+  const auto is_merged = [this] {
+    return Call("status parts").text.find("merged: ") != std::string::npos;
+  };
+  EXPECT_FALSE(is_merged());
+  Write("parts/whole/results.jsonl", "");  // as earlier versions left it
+  EXPECT_FALSE(is_merged());
+  {
+    const int other = OpenLocked(folder_ / "parts/whole/results.jsonl.merging");
+    ExpectEnding(Call("status parts"), 0, {"being merged"});
+    ExpectEnding(Call("collect parts"), 2, {"in use by process "});
+    ::close(other);
+  }
+  ExpectEnding(Call("collect parts"), 0, {"2 records of 2 stores are 2 cases"});
+  EXPECT_TRUE(is_merged());
+  ExpectEnding(Call("collect parts"), 0, {"is there already"});
 }
 
 TEST_F(Cluster, FailedCasesAreCountedAsSuch) {

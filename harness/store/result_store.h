@@ -79,7 +79,8 @@ std::vector<Record> ReadRecords(const std::filesystem::path& path,
 /// The same of a store that is too large to be held, without records that conditions on parameters
 /// of a sweep exclude: what such a line says besides is not looked at. Parameters are the keys that
 /// are nobody else's (FindMeasure() knows none), so that records that decide about each other, of
-/// one scene at other tolerances or in other columns, stay or go together. The first record stays.
+/// one scene at other tolerances or in other columns, stay or go together. The first record stays,
+/// and of each key of the conditions the first that has it: nobody says that no record has it.
 std::vector<Record> ReadRecords(const std::filesystem::path& path, const Selection& where,
                                 std::vector<std::string>* warnings);
 

@@ -6,5 +6,6 @@ set -eu
 experiment=$1 dir=$2 parts=$3
 shift 3
 [ -f "$dir/cluster.json" ] || loopbench submit "$experiment" --tasks "$parts" --out "$dir" --no-queue --no-timing
-seq "$parts" | parallel "$@" --will-cite sh "$(realpath "$dir")/part.sh" {} '>>' "$(realpath "$dir")/logs/{}.log" '2>&1'
+# -q: parallel quotes each word, so that paths may hold spaces
+seq "$parts" | parallel "$@" --will-cite -q sh -c 'sh "$1/part.sh" "$2" >>"$1/logs/$2.log" 2>&1' part "$(realpath "$dir")" {}
 loopbench collect "$dir"

@@ -19,6 +19,7 @@
 #include "harness/run/run_case.h"
 #include "harness/store/contents.h"
 #include "harness/store/merge_stores.h"
+#include "harness/store/new_store.h"
 #include "harness/store/result_store.h"
 #include "harness/suite/kept_files.h"
 #include "harness/suite/precision_cases.h"
@@ -133,26 +134,29 @@ int Run(const RunCommand& command, const std::string& typed) {
 }
 
 int Merge(const MergeCommand& command) {
+  NewStore target(command.out);
   const MergedStores merged(command.stores, command.order);
   std::vector<std::filesystem::path> files;
   for (const auto& store : command.stores) files.push_back(StoreFile(store));
   // references that stand where the store will be are one more part
   std::vector<std::filesystem::path> with_target = files;
-  with_target.push_back(StoreFile(command.out));
+  with_target.push_back(target.file());
   const MergedReferences references = MergeReferences(with_target);
-  ResultStore target(command.out);
   std::set<std::string> scenes;
-  target.Fill(merged.size(), [&](std::size_t i) {
-    Record record = merged[i];
-    for (const std::string& name : CopyTrajectories({record}, files, target.file())) {
-      PrintError("warning: no store has trajectories/{}\n", name);
+  for (std::size_t i = 0; i < merged.size(); ++i) {
+    const Record record = merged[i];
+    std::vector<std::filesystem::path> owners;
+    for (const auto& store : merged.StoresOf(i)) owners.push_back(StoreFile(store));
+    for (const std::string& name : CopyTrajectories({record}, owners, target.file())) {
+      PrintError("warning: no store has trajectories/{} of the run that is kept\n", name);
     }
     if (scenes.insert(record.Text("scene_id")).second) {
       CopyMechanisms({record}, files, target.file());
     }
-    return record;
-  });
+    target.Append(record);
+  }
   WriteReferences(references, target.file());
+  target.Commit();
   for (const std::string& note : references.notes) PrintError("{}\n", note);
   Print("{} records of {} stores are {} cases in {}\n", merged.read(), command.stores.size(),
         merged.size(), target.file().string());

@@ -1,12 +1,11 @@
 #include "harness/cli/commands_baseline.h"
 
 #include <fmt/format.h>
-#include <unistd.h>
 
 #include <algorithm>
 #include <cmath>
-#include <cstdlib>
 #include <functional>
+#include <optional>
 
 #include "harness/cli/commands_compare.h"
 #include "harness/isolation/interruption.h"
@@ -22,6 +21,7 @@
 #include "harness/text/config_error.h"
 #include "harness/text/files.h"
 #include "harness/text/run_program.h"
+#include "harness/text/temporary_folder.h"
 #include "harness/text/terminal.h"
 
 namespace loopbench::harness {
@@ -29,28 +29,26 @@ namespace {
 
 constexpr const char* kResults = "results.jsonl";
 
-/// A folder that goes with its owner, unless it was asked for.
-class WorkFolder {
- public:
-  explicit WorkFolder(const std::filesystem::path& kept) : path_(kept), is_kept_(!kept.empty()) {
-    if (is_kept_) return;
-    std::string name = (std::filesystem::temp_directory_path() / "loopbench-XXXXXX").string();
-    if (::mkdtemp(name.data()) == nullptr) FailOn("make", name);
-    path_ = name;
+/// What is kept is kept in a folder of its own: the files in it are overwritten.
+void RequireNewFolder(const std::filesystem::path& kept, const std::filesystem::path& baseline) {
+  const auto plain = [](const std::filesystem::path& path) {
+    const auto whole = std::filesystem::weakly_canonical(path);
+    return whole.has_filename() ? whole : whole.parent_path();
+  };
+  if (plain(kept) == plain(baseline)) {
+    throw ConfigError(fmt::format(
+        "--keep: found {}, the folder of the baseline, expected another one", kept.string()));
   }
-  ~WorkFolder() {
-    std::error_code ignored;
-    if (!is_kept_) std::filesystem::remove_all(path_, ignored);
+  if (!std::filesystem::exists(kept)) return;
+  if (!std::filesystem::is_directory(kept)) {
+    throw ConfigError(
+        fmt::format("--keep: found {}, which is no folder, expected a new one", kept.string()));
   }
-  WorkFolder(const WorkFolder&) = delete;
-  WorkFolder& operator=(const WorkFolder&) = delete;
-
-  const std::filesystem::path& path() const { return path_; }
-
- private:
-  std::filesystem::path path_;
-  bool is_kept_;
-};
+  if (!std::filesystem::is_empty(kept)) {
+    throw ConfigError(
+        fmt::format("--keep: found {}, which is not empty, expected a new folder", kept.string()));
+  }
+}
 
 std::string CounterOf(const BaselineCommand& command) {
   if (!command.counter.empty()) return command.counter.string();
@@ -112,7 +110,6 @@ int MeasureAll(const BaselineCommand& command, const std::filesystem::path& work
     RequireLadders(experiment);
     RequireReferences(experiment);
   }
-  std::filesystem::remove_all(work / "run");
   {
     ResultStore store(work / "run");
     FinishedRuns finished(work / "run");
@@ -224,6 +221,7 @@ int SelfTest(const BaselineCommand& command, const std::filesystem::path& work) 
 }  // namespace
 
 int Baseline(const BaselineCommand& command, const std::string& typed) {
+  if (!command.keep.empty()) RequireNewFolder(command.keep, command.dir);
   const auto baseline = command.dir / kResults;
   if (command.action == "check" && !std::filesystem::exists(baseline)) {
     throw ConfigError(
@@ -232,16 +230,18 @@ int Baseline(const BaselineCommand& command, const std::string& typed) {
                     baseline.string()));
   }
   RequirePrograms(command);
-  const WorkFolder work(command.keep);
-  if (const int code = MeasureAll(command, work.path()); code != 0) return code;
-  if (command.action == "selftest") return SelfTest(command, work.path());
+  std::optional<TemporaryFolder> temporary;
+  if (command.keep.empty()) temporary.emplace("loopbench");
+  const std::filesystem::path work = temporary ? temporary->path() : command.keep;
+  if (const int code = MeasureAll(command, work); code != 0) return code;
+  if (command.action == "selftest") return SelfTest(command, work);
   if (command.action == "check") {
     CompareCommand compare;
     compare.base = command.dir;
-    compare.fresh = work.path() / kResults;
+    compare.fresh = work / kResults;
     return PrintComparison(compare, typed);
   }
-  WriteFileAtomically(baseline, ReadFile(work.path() / kResults));
+  WriteFileAtomically(baseline, ReadFile(work / kResults));
   Print("renewed {}: {} records\n", baseline.string(), Load(baseline).size());
   return 0;
 }

@@ -11,11 +11,14 @@
 #include <set>
 
 #include "harness/cli/commands.h"
+#include "harness/cluster/cluster_scripts.h"
 #include "harness/cluster/progress.h"
 #include "harness/cluster/slurm.h"
 #include "harness/record/json_object.h"
 #include "harness/run/case_identity.h"
 #include "harness/store/finished_runs.h"
+#include "harness/store/new_store.h"
+#include "harness/store/store_lock.h"
 #include "harness/suite/workload.h"
 #include "harness/tables/fit.h"
 #include "harness/text/config_error.h"
@@ -33,6 +36,11 @@ std::vector<int> PartsNotDone(const ClusterRun& run, const std::filesystem::path
   return parts;
 }
 
+/// There when all parts are merged.
+std::filesystem::path WholeFile(const std::filesystem::path& folder) {
+  return StoreFile(folder / "whole");
+}
+
 /// Submits the array of `parts` and the job behind it, and writes down their numbers.
 void Queue(const std::vector<int>& parts, const std::filesystem::path& folder, ClusterRun* run) {
   WriteFileAtomically(folder / "array.sh", ArrayScript(*run, folder, parts));
@@ -45,9 +53,32 @@ void Queue(const std::vector<int>& parts, const std::filesystem::path& folder, C
   Print("  loopbench status {}\n", folder.string());
 }
 
+/// Those that are not there: a person may have put something of the machines into them.
+void WriteScripts(const ClusterRun& run, const std::filesystem::path& folder) {
+  MakeFolderOf(folder / "logs" / "x");
+  WriteNewFile(folder / "part.sh", PartScript(run, folder));
+  WriteNewFile(folder / "collect.sh", CollectScript(run, folder));
+}
+
+void PrintHowToRun(const std::filesystem::path& folder) {
+  Print("each part: sh {}/part.sh K; then: loopbench collect {}\n", folder.string(),
+        folder.string());
+}
+
 int SubmitAgain(const SubmitCommand& command) {
   ClusterRun run = ReadClusterRun(command.folder);
   std::vector<int> parts = PartsNotDone(run, command.folder);
+  if (!command.dry_run) WriteScripts(run, command.folder);
+  if (!command.queue) {
+    if (parts.empty()) {
+      Print("{}: every part is done\n", command.folder.string());
+    } else {
+      Print("{}: {} of {} parts are not done: {}\n", command.folder.string(), parts.size(),
+            run.parts, fmt::join(parts, ", "));
+    }
+    PrintHowToRun(command.folder);
+    return 0;
+  }
   std::string problem;
   const auto queued = QueuedTasks(run.array_job, &problem);
   if (!queued) throw std::runtime_error("which parts run cannot be asked: " + problem);
@@ -154,6 +185,9 @@ JsonObject StatusDocument(const ClusterRun& run, const std::vector<PartProgress>
 int Submit(SubmitCommand command) {
   command.folder = std::filesystem::absolute(command.folder).lexically_normal();
   if (!command.folder.has_filename()) command.folder = command.folder.parent_path();
+  if (command.folder.string().find('\n') != std::string::npos) {
+    throw ConfigError("--out: found a line end in it, expected a path that a script can name");
+  }
   if (command.again) return SubmitAgain(command);
   ClusterRun& run = command.run;
   for (auto& path : run.experiments) path = std::filesystem::absolute(path).lexically_normal();
@@ -172,22 +206,18 @@ int Submit(SubmitCommand command) {
           run.parts);
     return 0;
   }
-  if (std::filesystem::exists(folder / "cluster.json")) {
+  if (!MakeClusterRun(run, folder)) {
     throw ConfigError(
         fmt::format("{}: found the folder of a submit, expected a new one; to go on with it: "
                     "loopbench submit --again --out {}",
                     folder.string(), folder.string()));
   }
-  MakeFolderOf(folder / "logs" / "x");
-  WriteFileAtomically(folder / "part.sh", PartScript(run, folder));
-  WriteFileAtomically(folder / "collect.sh", CollectScript(run, folder));
-  WriteClusterRun(run, folder);
+  WriteScripts(run, folder);
   Print("{} cases in {} parts in {}\n", run.all_cases, run.parts, folder.string());
   if (command.queue) {
     Queue(parts, folder, &run);
   } else {
-    Print("each part: sh {}/part.sh K; then: loopbench collect {}\n", folder.string(),
-          folder.string());
+    PrintHowToRun(folder);
   }
   return 0;
 }
@@ -211,9 +241,12 @@ int PrintStatus(const std::filesystem::path& folder, bool json) {
   }
   Table table = StatusTable(run, parts);
   if (!problem.empty()) table.notes.push_back("states from the stores alone: " + problem);
-  const bool is_whole = std::filesystem::exists(folder / "whole" / "results.jsonl");
+  const auto whole = WholeFile(folder);
+  const bool is_whole = HasRecords(whole);
   if (is_whole) {
-    table.notes.push_back(fmt::format("merged: {}", (folder / "whole").string()));
+    table.notes.push_back(fmt::format("merged: {}", whole.parent_path().string()));
+  } else if (IsLocked(UnderWay(whole))) {
+    table.notes.push_back("the parts are being merged");
   } else if (left > 0.0) {
     table.notes.push_back(fmt::format("about {:.0f} s left, until {:%H:%M}", left,
                                       fmt::localtime(static_cast<std::time_t>(Now() + left))));
@@ -237,7 +270,7 @@ int Collect(const std::filesystem::path& folder) {
     return 1;
   }
   MergeCommand merge;
-  merge.out = folder / "whole";
+  merge.out = WholeFile(folder).parent_path();
   merge.order = OrderOfCases(run);
   std::set<std::string> missing(merge.order.begin(), merge.order.end());
   for (int part = 1; part <= run.parts; ++part) {
@@ -252,7 +285,7 @@ int Collect(const std::filesystem::path& folder) {
         folder.string(), missing.size(), merge.order.size(), *missing.begin());
     return 1;
   }
-  if (std::filesystem::exists(merge.out / "results.jsonl")) {
+  if (HasRecords(WholeFile(folder))) {
     Print("{} is there already\n", merge.out.string());
     return 0;
   }

@@ -47,6 +47,17 @@ Formulations: {}.
 Levels of enforcement: {}.
 Exit codes: 0 done, 1 a gate failed, 2 could not measure or bad input, 130 run was interrupted.)";
 
+/// An option takes the word behind it and no more: files may stand there. Experiments of a baseline
+/// alone are given as the shell expands them.
+void TakeOneWordEach(CLI::App* app) {
+  for (CLI::Option* option : app->get_options()) {
+    if (!option->get_positional() && !option->check_lname("experiments")) {
+      option->allow_extra_args(false);
+    }
+  }
+  for (CLI::App* command : app->get_subcommands({})) TakeOneWordEach(command);
+}
+
 int RunCommandLine(int argc, char** argv) {
   CLI::App app{
       "Measures constraint drift and time of formulations of closed-loop multibody dynamics.",
@@ -69,6 +80,7 @@ int RunCommandLine(int argc, char** argv) {
   ClusterOptions cluster(app);
   HistoryOptions history(app);
   ShellOptions shell(app);
+  TakeOneWordEach(&app);
   try {
     app.parse(argc, argv);
   } catch (const CLI::ParseError& error) {

@@ -43,7 +43,7 @@ BaselineOptions::BaselineOptions(CLI::App& app) {
   app_->add_option("--jobs", command_.jobs, "Runs at once")
       ->check(NumberFrom(1, 1024))
       ->capture_default_str();
-  app_->add_option("--keep", command_.keep, "Folder for what was measured (default: none)");
+  app_->add_option("--keep", command_.keep, "New folder for what was measured (default: none)");
 }
 
 std::optional<int> BaselineOptions::Run(const std::string& typed) {

@@ -1,5 +1,9 @@
 #include "harness/cli/program_cluster.h"
 
+#include <fmt/format.h>
+
+#include <set>
+
 #include "harness/cli/options.h"
 #include "harness/text/config_error.h"
 #include "harness/text/numeric_option.h"
@@ -20,6 +24,16 @@ Examples:
   loopbench status /shared/sweep
   loopbench submit --again --out /shared/sweep)";
 
+/// All that was asked for once stands in the folder.
+void RequireNothingElse(const CLI::App& submit) {
+  const std::set<std::string> may_stand = {"--again", "--out", "--no-queue", "--dry-run"};
+  for (const CLI::Option* option : submit.get_options()) {
+    if (option->count() == 0 || may_stand.contains(option->get_name())) continue;
+    throw ConfigError(fmt::format("--again: found {} beside it, expected none: the folder knows",
+                                  option->get_name()));
+  }
+}
+
 }  // namespace
 
 ClusterOptions::ClusterOptions(CLI::App& app) {
@@ -30,22 +44,17 @@ ClusterOptions::ClusterOptions(CLI::App& app) {
       ->check(CLI::ExistingFile);
   submit_app_->add_option("--out", submit_.folder, "New folder that all machines see")->required();
   submit_app_->add_option("--tasks", run.parts, "Parts, each a task of the array job")
-      ->check(NumberFrom(1, 100000));
+      ->check(NumberFrom(1, kMostParts));
   submit_app_->add_option("--jobs", run.jobs, "Cases at once in a part, and processors of its task")
-      ->check(NumberFrom(1, 1024))
+      ->check(NumberFrom(1, kMostJobs))
       ->capture_default_str();
   submit_app_->add_option("--time", time_, "Limit of a part, as sbatch takes it");
   submit_app_->add_option("--partition", partition_, "Of the cluster");
-  submit_app_
-      ->add_option("--sbatch", run.batch_options,
-                   "Another option of sbatch, whole: --sbatch=--account=mine (repeatable)")
-      ->allow_extra_args(false);
-  submit_app_
-      ->add_option("--filter", run.conditions,
-                   "Only cases with key=value[,value] (or !=, <, <=, >, >=)")
-      ->allow_extra_args(false);
-  submit_app_->add_option("--set", run.settings, "Set a field before reading: /json/pointer=value")
-      ->allow_extra_args(false);
+  submit_app_->add_option("--sbatch", run.batch_options,
+                          "Another option of sbatch, whole: --sbatch=--account=mine (repeatable)");
+  submit_app_->add_option("--filter", run.conditions,
+                          "Only cases with key=value[,value] (or !=, <, <=, >, >=)");
+  submit_app_->add_option("--set", run.settings, "Set a field before reading: /json/pointer=value");
   submit_app_->add_flag("--no-timing", no_timing_,
                         "Leave the timings out: parts on one machine disturb each other's");
   submit_app_->add_flag("--isolate", run.isolate, "Every case in a process of its own");
@@ -76,6 +85,7 @@ std::optional<int> ClusterOptions::Run() {
                           ? "--again: found experiments beside it, expected none: the folder knows"
                           : "submit: found no experiment, expected at least one, or --again");
   }
+  if (submit_.again) RequireNothingElse(*submit_app_);
   if (!time_.empty()) run.batch_options.push_back("--time=" + time_);
   if (!partition_.empty()) run.batch_options.push_back("--partition=" + partition_);
   for (const std::string& option : run.batch_options) {

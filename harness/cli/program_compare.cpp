@@ -67,8 +67,7 @@ ComparisonOptions::ComparisonOptions(CLI::App& app) {
       ->add_option("--match", compare_.options.match,
                    "KEY[,KEY]: cases meet by these keys, whatever else they were run with "
                    "(default: all keys, and equal mechanisms and limits)")
-      ->delimiter(',')
-      ->allow_extra_args(false);
+      ->delimiter(',');
   compare_app_->add_flag("--subset", compare_.options.subset, "NEW may lack cases of BASE");
   compare_app_
       ->add_option("--error-ratio", compare_.options.error_ratio, "Allowed on the same build")

@@ -20,8 +20,7 @@ std::vector<Setting> ParseSettings(const std::vector<std::string>& texts) {
 
 /// Repeatable, one value each: a second word would be the name of a file.
 void AddSettings(CLI::App* app, std::vector<std::string>* settings) {
-  app->add_option("--set", *settings, "Set a field before reading: /json/pointer=value")
-      ->allow_extra_args(false);
+  app->add_option("--set", *settings, "Set a field before reading: /json/pointer=value");
 }
 
 /// Of work on a mechanism; experiments say their own ("limits").
@@ -158,12 +157,9 @@ void FileOptions::AddSimplify(CLI::App& app) {
   CLI::Option* list = simplify_app_->add_flag("--list", simplify_list_,
                                               "Only list what could be simplified (the default)");
   simplify_app_->add_option("--only", simplify_.only, "Only these ideas: NAME[,NAME]")
-      ->delimiter(',')
-      ->allow_extra_args(false);
-  simplify_app_
-      ->add_option("--threshold", simplify_.thresholds,
-                   "NAME=VALUE: an idea's limit, unless said " + LimitsText())
-      ->allow_extra_args(false);
+      ->delimiter(',');
+  simplify_app_->add_option("--threshold", simplify_.thresholds,
+                            "NAME=VALUE: an idea's limit, unless said " + LimitsText());
   simplify_app_->add_option("--lump", lumping_, "Where the mass of a light link goes")
       ->check(CLI::IsMember(LumpingNames()))
       ->capture_default_str();

@@ -5,14 +5,14 @@
 
 #include <cmath>
 #include <limits>
+#include <set>
 #include <sstream>
 
-#include "harness/record/provenance.h"
 #include "harness/record/record_json.h"
+#include "harness/run/case_identity.h"
 #include "harness/suite/suite.h"
 #include "harness/suite/workload.h"
 #include "harness/text/config_error.h"
-#include "harness/text/escape.h"
 #include "harness/text/files.h"
 
 namespace loopbench::harness {
@@ -37,42 +37,82 @@ std::vector<std::string> Texts(const std::vector<std::filesystem::path>& paths) 
   return texts;
 }
 
-const Value& Required(const Record& record, const std::string& key) {
+/// The value as it stands in the file.
+std::string Shown(const Value& value) {
+  Record record;
+  record.Set("x", value);
+  const std::string text = ToJsonObject(record);  // {"x":VALUE}
+  constexpr std::size_t kBefore = 5;
+  return text.substr(kBefore, text.size() - kBefore - 1);
+}
+
+/// Throws ConfigError that says the key, and what was found and expected.
+template <class T>
+const T& Required(const Record& record, const std::string& key, const std::string& expected) {
   const Value* value = record.Find(key);
-  if (value == nullptr) throw ConfigError(fmt::format("found no \"{}\"", key));
-  return *value;
+  if (const T* held = value == nullptr ? nullptr : std::get_if<T>(value)) return *held;
+  throw ConfigError(fmt::format("\"{}\": found {}, expected {}", key,
+                                value == nullptr ? "nothing" : Shown(*value), expected));
 }
 
-/// The command that runs a part, before --shard.
-std::vector<std::string> RunWords(const ClusterRun& run) {
-  std::vector<std::string> words = {run.program, "run"};
-  for (const auto& path : run.experiments) words.push_back(path.string());
-  for (const std::string& text : run.settings) words.insert(words.end(), {"--set", text});
-  for (const std::string& text : run.conditions) words.insert(words.end(), {"--filter", text});
-  if (!run.timing) words.push_back("--no-timing");
-  if (run.isolate) words.push_back("--isolate");
-  words.insert(words.end(), {"--jobs", std::to_string(run.jobs), "--wait"});
-  return words;
+const std::string& Text(const Record& record, const std::string& key) {
+  return Required<std::string>(record, key, "a text");
 }
 
-/// "1-3,7": as short as an array job takes it.
-std::string Ranges(const std::vector<int>& parts) {
-  std::string text;
-  for (std::size_t i = 0; i < parts.size();) {
-    std::size_t last = i;
-    while (last + 1 < parts.size() && parts[last + 1] == parts[last] + 1) ++last;
-    if (!text.empty()) text += ',';
-    text += last == i ? fmt::format("{}", parts[i]) : fmt::format("{}-{}", parts[i], parts[last]);
-    i = last + 1;
+bool Flag(const Record& record, const std::string& key) {
+  return Required<bool>(record, key, "true or false");
+}
+
+std::int64_t Whole(const Record& record, const std::string& key, std::int64_t least,
+                   std::int64_t most) {
+  const std::int64_t number = Required<std::int64_t>(record, key, "a whole number");
+  if (number >= least && number <= most) return number;
+  throw ConfigError(fmt::format("\"{}\": found {}, expected {} to {}", key, number, least, most));
+}
+
+Record ToRecord(const ClusterRun& run) {
+  Record record;
+  record.Set("kind", std::string("cluster"));
+  record.Set("experiment", run.name);
+  record.Set("experiments", Listed(Texts(run.experiments)));
+  record.Set("settings", Listed(run.settings));
+  record.Set("conditions", Listed(run.conditions));
+  record.Set("parts", std::int64_t{run.parts});
+  record.Set("jobs", std::int64_t{run.jobs});
+  record.Set("with_timing", run.timing);
+  record.Set("isolate", run.isolate);
+  record.Set("batch_options", Listed(run.batch_options));
+  record.Set("program", run.program);
+  record.Set("all_cases", run.all_cases);
+  record.Set("cases_of_parts", run.cases);
+  record.Set("array_job", run.array_job);
+  record.Set("collect_job", run.collect_job);
+  return record;
+}
+
+ClusterRun ToClusterRun(const Record& record) {
+  ClusterRun run;
+  run.name = Text(record, "experiment");
+  for (const std::string& path : Unlisted(Text(record, "experiments"))) {
+    run.experiments.emplace_back(path);
   }
-  return text;
-}
-
-std::string BatchHead(const ClusterRun& run, const std::string& name) {
-  std::string head =
-      fmt::format("#!/bin/sh\n#SBATCH --job-name={}\n#SBATCH --open-mode=append\n", FileName(name));
-  for (const std::string& option : run.batch_options) head += "#SBATCH " + option + '\n';
-  return head;
+  run.settings = Unlisted(Text(record, "settings"));
+  run.conditions = Unlisted(Text(record, "conditions"));
+  run.parts = static_cast<int>(Whole(record, "parts", 1, kMostParts));
+  run.jobs = static_cast<int>(Whole(record, "jobs", 1, kMostJobs));
+  run.timing = Flag(record, "with_timing");
+  run.isolate = Flag(record, "isolate");
+  run.batch_options = Unlisted(Text(record, "batch_options"));
+  run.program = Text(record, "program");
+  run.all_cases = Whole(record, "all_cases", 0, std::numeric_limits<std::int64_t>::max());
+  run.cases = Required<std::vector<double>>(record, "cases_of_parts", "numbers");
+  run.array_job = Text(record, "array_job");
+  run.collect_job = Text(record, "collect_job");
+  if (run.cases.size() != static_cast<std::size_t>(run.parts)) {
+    throw ConfigError(fmt::format("\"cases_of_parts\": found {} numbers, expected {}",
+                                  run.cases.size(), run.parts));
+  }
+  return run;
 }
 
 }  // namespace
@@ -86,6 +126,11 @@ ExperimentFiles FilesOf(const ClusterRun& run) {
 }
 
 void CountCases(ClusterRun* run) {
+  std::set<std::filesystem::path> named;
+  for (const auto& path : run->experiments) {
+    if (named.insert(std::filesystem::weakly_canonical(path)).second) continue;
+    throw ConfigError(fmt::format("{}: found twice, expected each experiment once", path.string()));
+  }
   const ExperimentFiles files = FilesOf(*run);
   const Workload workload(files);
   run->name = workload.first().name;
@@ -93,8 +138,10 @@ void CountCases(ClusterRun* run) {
   std::size_t all = 0, smallest = 0;
   if (!workload.is_long()) {
     run->cases.assign(parts, 0.0);
+    std::set<std::string> ids;  // a case that two files share is one case
     for (const Experiment& experiment : workload.some()) {
-      for (std::size_t i = SelectCases(experiment, files.filter).size(); i > 0; --i) {
+      for (const Case& one : SelectCases(experiment, files.filter)) {
+        if (!ids.insert(RunId(Identified(experiment, one).keys)).second) continue;
         run->cases[all++ % parts] += 1.0;
       }
     }
@@ -123,24 +170,12 @@ void CountCases(ClusterRun* run) {
   }
 }
 
+bool MakeClusterRun(const ClusterRun& run, const std::filesystem::path& folder) {
+  return WriteNewFile(folder / kRunFile, ToJsonLine(ToRecord(run)) + '\n');
+}
+
 void WriteClusterRun(const ClusterRun& run, const std::filesystem::path& folder) {
-  Record record;
-  record.Set("kind", std::string("cluster"));
-  record.Set("experiment", run.name);
-  record.Set("experiments", Listed(Texts(run.experiments)));
-  record.Set("settings", Listed(run.settings));
-  record.Set("conditions", Listed(run.conditions));
-  record.Set("parts", std::int64_t{run.parts});
-  record.Set("jobs", std::int64_t{run.jobs});
-  record.Set("with_timing", run.timing);
-  record.Set("isolate", run.isolate);
-  record.Set("batch_options", Listed(run.batch_options));
-  record.Set("program", run.program);
-  record.Set("all_cases", run.all_cases);
-  record.Set("cases_of_parts", run.cases);
-  record.Set("array_job", run.array_job);
-  record.Set("collect_job", run.collect_job);
-  WriteFileAtomically(folder / kRunFile, ToJsonLine(record) + '\n');
+  WriteFileAtomically(folder / kRunFile, ToJsonLine(ToRecord(run)) + '\n');
 }
 
 ClusterRun ReadClusterRun(const std::filesystem::path& folder) {
@@ -149,33 +184,15 @@ ClusterRun ReadClusterRun(const std::filesystem::path& folder) {
     throw ConfigError(
         fmt::format("{}: no such file, expected the folder of a loopbench submit", file.string()));
   }
-  ClusterRun run;
   try {
-    const Record record = FromJsonLine(Unlisted(ReadFile(file)).at(0));
-    for (const std::string& path : Unlisted(record.Text("experiments"))) {
-      run.experiments.emplace_back(path);
+    const std::vector<std::string> lines = Unlisted(ReadFile(file));
+    if (lines.empty()) {
+      throw ConfigError("found an empty file, expected what loopbench submit writes");
     }
-    run.settings = Unlisted(record.Text("settings"));
-    run.conditions = Unlisted(record.Text("conditions"));
-    run.parts = static_cast<int>(std::get<std::int64_t>(Required(record, "parts")));
-    run.jobs = static_cast<int>(std::get<std::int64_t>(Required(record, "jobs")));
-    run.timing = std::get<bool>(Required(record, "with_timing"));
-    run.isolate = std::get<bool>(Required(record, "isolate"));
-    run.batch_options = Unlisted(record.Text("batch_options"));
-    run.program = record.Text("program");
-    run.name = record.Text("experiment");
-    run.all_cases = std::get<std::int64_t>(Required(record, "all_cases"));
-    run.cases = std::get<std::vector<double>>(Required(record, "cases_of_parts"));
-    run.array_job = record.Text("array_job");
-    run.collect_job = record.Text("collect_job");
-    if (run.cases.size() != static_cast<std::size_t>(run.parts)) {
-      throw ConfigError(fmt::format("\"cases_of_parts\": found {} numbers, expected {}",
-                                    run.cases.size(), run.parts));
-    }
+    return ToClusterRun(FromJsonLine(lines.front()));
   } catch (const std::exception& error) {
     throw ConfigError(fmt::format("{}: {}", file.string(), error.what()));
   }
-  return run;
 }
 
 std::filesystem::path PartFolder(const std::filesystem::path& folder, int part) {
@@ -184,38 +201,6 @@ std::filesystem::path PartFolder(const std::filesystem::path& folder, int part) 
 
 bool IsDone(const std::filesystem::path& folder, int part) {
   return std::filesystem::exists(PartFolder(folder, part) / "done");
-}
-
-std::string PartScript(const ClusterRun& run, const std::filesystem::path& folder) {
-  return fmt::format(R"(#!/bin/sh
-# part.sh K: runs the K-th of {0} parts, or goes on with it where it stopped. Killed, moved to another
-# machine, or started twice (the second waits for the first), it loses and repeats nothing.
-set -eu
-part=${{1:?"expected the number of a part, 1 to {0}"}}
-cd {1}
-mkdir -p "parts/$part"
-lines=0
-[ ! -f "parts/$part/results.jsonl" ] || lines=$(wc -l <"parts/$part/results.jsonl")
-echo "$(date +%s) $lines" >"parts/$part/started"
-{2} --shard "$part/{0}" --out "parts/$part"
-: >"parts/$part/done"
-)",
-                     run.parts, ShellLine({folder.string()}), ShellLine(RunWords(run)));
-}
-
-std::string ArrayScript(const ClusterRun& run, const std::filesystem::path& folder,
-                        const std::vector<int>& parts) {
-  return BatchHead(run, run.name) +
-         fmt::format(
-             "#SBATCH --array={}\n#SBATCH --requeue\n#SBATCH --cpus-per-task={}\n"
-             "#SBATCH --output={}/logs/%a.log\nexec sh {} \"$SLURM_ARRAY_TASK_ID\"\n",
-             Ranges(parts), run.jobs, folder.string(), ShellLine({(folder / "part.sh").string()}));
-}
-
-std::string CollectScript(const ClusterRun& run, const std::filesystem::path& folder) {
-  return BatchHead(run, run.name + "-collect") +
-         fmt::format("#SBATCH --output={}/logs/collect.log\nexec {}\n", folder.string(),
-                     ShellLine({run.program, "collect", folder.string()}));
 }
 
 }  // namespace loopbench::harness

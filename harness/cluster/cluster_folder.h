@@ -17,6 +17,8 @@
 
 namespace loopbench::harness {
 
+inline constexpr int kMostParts = 100'000, kMostJobs = 1024;
+
 /// What runs, in how many parts, and what is known of the jobs.
 struct ClusterRun {
   std::vector<std::filesystem::path> experiments;  ///< absolute
@@ -37,20 +39,18 @@ struct ClusterRun {
 ExperimentFiles FilesOf(const ClusterRun& run);
 
 /// Reads all that runs, and counts it. Throws ConfigError as `run` does, and when there are fewer
-/// cases than parts.
+/// cases than parts, or an experiment is named twice.
 void CountCases(ClusterRun* run);
 
+/// Writes cluster.json where there is none; else false, and nothing is written. Of several who try
+/// at once one gets the folder.
+bool MakeClusterRun(const ClusterRun& run, const std::filesystem::path& folder);
 void WriteClusterRun(const ClusterRun& run, const std::filesystem::path& folder);
-/// Throws ConfigError that names the file when it is missing or not such a file.
+/// Throws ConfigError that names the file, the key, what was found and what was expected when it
+/// is missing or not such a file.
 ClusterRun ReadClusterRun(const std::filesystem::path& folder);
 
 std::filesystem::path PartFolder(const std::filesystem::path& folder, int part);
 bool IsDone(const std::filesystem::path& folder, int part);
-
-/// The scripts, as texts. `parts`: those that are to run, from 1.
-std::string PartScript(const ClusterRun& run, const std::filesystem::path& folder);
-std::string ArrayScript(const ClusterRun& run, const std::filesystem::path& folder,
-                        const std::vector<int>& parts);
-std::string CollectScript(const ClusterRun& run, const std::filesystem::path& folder);
 
 }  // namespace loopbench::harness

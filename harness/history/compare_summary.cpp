@@ -119,11 +119,22 @@ std::string ComparisonJunit(const ComparisonReport& report, bool subset) {
           EscapeXml(name), why);
     }
   }
+  int errors = 0;
+  if (CompareOptions options; failures == 0) {
+    options.subset = subset;
+    errors = report.ExitCode(options) == 2;
+  }
+  if (errors > 0) {
+    ++tests;
+    cases +=
+        "  <testcase classname=\"loopbench compare\" name=\"measured on both sides\"><error "
+        "message=\"could not measure: nothing was compared\"/></testcase>\n";
+  }
   return fmt::format(
       "<?xml version=\"1.0\" encoding=\"UTF-8\"?>\n<testsuites>\n<testsuite name=\"loopbench "
       "compare\" "
-      "tests=\"{}\" failures=\"{}\" skipped=\"{}\" errors=\"0\">\n{}</testsuite>\n</testsuites>\n",
-      tests, failures, skipped, cases);
+      "tests=\"{}\" failures=\"{}\" skipped=\"{}\" errors=\"{}\">\n{}</testsuite>\n</testsuites>\n",
+      tests, failures, skipped, errors, cases);
 }
 
 }  // namespace loopbench::harness

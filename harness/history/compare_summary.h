@@ -15,7 +15,8 @@ std::string ComparisonMarkdown(const ComparisonReport& report, const std::string
 
 /// JUnit XML, as Jenkins and GitLab read it: a test case for each measure of each case. Failures
 /// are what is worse or different, and cases that are missing; skipped is what could not be
-/// measured.
+/// measured. Where nothing was compared at all one error says so: no file without a failure or an
+/// error belongs to a comparison that ended with 1 or 2.
 std::string ComparisonJunit(const ComparisonReport& report, bool subset);
 
 }  // namespace loopbench::harness

@@ -218,15 +218,20 @@ std::string NameOf(const Record& record, const CompareOptions& options) {
   return options.match.empty() ? CaseText(record) : CaseText(record, options.match);
 }
 
+/// Cases that occur twice, in the order of their finding.
+struct Ambiguous {
+  std::vector<std::string> cases;
+  std::set<std::string> known;
+};
+
 /// Records by case; cases that occur twice go to `ambiguous`.
 std::map<std::string, const Record*> ByCase(const std::vector<Record>& records,
-                                            const CompareOptions& options,
-                                            std::vector<std::string>& ambiguous) {
+                                            const CompareOptions& options, Ambiguous* ambiguous) {
   std::map<std::string, const Record*> cases;
   for (const Record& record : records) {
     const std::string one = NameOf(record, options);
-    if (!cases.emplace(one, &record).second && std::ranges::count(ambiguous, one) == 0) {
-      ambiguous.push_back(one);
+    if (!cases.emplace(one, &record).second && ambiguous->known.insert(one).second) {
+      ambiguous->cases.push_back(one);
     }
   }
   return cases;
@@ -258,11 +263,13 @@ ComparisonReport Compare(const std::vector<Record>& given_base,
                          const std::vector<Record>& given_fresh, const CompareOptions& options) {
   ComparisonReport comparison;
   const std::vector<Record> base = WithOwnDoubts(given_base), fresh = WithOwnDoubts(given_fresh);
-  const auto in_base = ByCase(base, options, comparison.ambiguous);
-  const auto in_fresh = ByCase(fresh, options, comparison.ambiguous);
+  Ambiguous ambiguous;
+  const auto in_base = ByCase(base, options, &ambiguous);
+  const auto in_fresh = ByCase(fresh, options, &ambiguous);
+  comparison.ambiguous = ambiguous.cases;
   for (const Record& record : base) {
     const std::string one = NameOf(record, options);
-    if (in_base.at(one) != &record || std::ranges::count(comparison.ambiguous, one) > 0) continue;
+    if (in_base.at(one) != &record || ambiguous.known.contains(one)) continue;
     const auto other = in_fresh.find(one);
     if (other == in_fresh.end()) {
       comparison.only_base.push_back(one);

@@ -114,14 +114,22 @@ Record MergedStores::Read(const Kept& kept) const {
 
 Record MergedStores::operator[](std::size_t i) const { return Read(kept_[i]); }
 
-void MergedStores::Keep(const Record& record, const Kept& fresh, Kept* known) const {
+std::vector<std::filesystem::path> MergedStores::StoresOf(std::size_t i) const {
+  std::vector<std::filesystem::path> stores = {stores_[kept_[i].part]};
+  for (const std::size_t part : kept_[i].equals) stores.push_back(stores_[part]);
+  return stores;
+}
+
+void MergedStores::Keep(const Record& record, Kept fresh, Kept* known) const {
   if (known->part != kNowhere) {
     if (fresh.was_cut_short && !known->was_cut_short) return;
     if (!fresh.was_cut_short && !known->was_cut_short) {
       RequireEqual(Read(*known), stores_[known->part], record, stores_[fresh.part]);
+      fresh.equals = std::move(known->equals);
+      fresh.equals.push_back(known->part);
     }
   }
-  *known = fresh;
+  *known = std::move(fresh);
 }
 
 MergedStores::MergedStores(const std::vector<std::filesystem::path>& stores,

@@ -37,14 +37,19 @@ class MergedStores {
   /// Reads the record from its store.
   Record operator[](std::size_t i) const;
 
+  /// The stores whose run this is, that of the record first: what they keep beside their records
+  /// belongs to it, and what other stores keep of the case is another run's.
+  std::vector<std::filesystem::path> StoresOf(std::size_t i) const;
+
  private:
   static constexpr std::size_t kNowhere = static_cast<std::size_t>(-1);
   struct Kept {
     std::size_t part = kNowhere;
     LinePlace place = {};
     bool was_cut_short = false;
+    std::vector<std::size_t> equals = {};  ///< parts before it with the same run
   };
-  void Keep(const Record& record, const Kept& fresh, Kept* known) const;
+  void Keep(const Record& record, Kept fresh, Kept* known) const;
   Record Read(const Kept& kept) const;
   int Open(std::size_t part) const;
 

@@ -13,8 +13,11 @@
 
 namespace loopbench::harness {
 
-LineReader::LineReader(std::filesystem::path file, Take take, Wanted wanted)
-    : file_(std::move(file)), take_(std::move(take)), wanted_(std::move(wanted)) {}
+LineReader::LineReader(std::filesystem::path file, Take take, Wanted wanted, int lines_before)
+    : file_(std::move(file)),
+      take_(std::move(take)),
+      wanted_(std::move(wanted)),
+      number_(lines_before) {}
 
 void LineReader::Feed(std::string_view text) {
   for (std::size_t end; (end = text.find('\n')) != std::string_view::npos;

@@ -25,8 +25,9 @@ class LineReader {
   /// Of a line, whether it is read; without one all are. What is passed over is not looked at.
   using Wanted = std::function<bool(std::string_view, const LinePlace&)>;
 
-  /// @param file  for messages
-  LineReader(std::filesystem::path file, Take take, Wanted wanted = {});
+  /// @param file          for messages
+  /// @param lines_before  of the file, that are not fed
+  LineReader(std::filesystem::path file, Take take, Wanted wanted = {}, int lines_before = 0);
 
   /// The next part of the text, of any length. Throws std::runtime_error for a line that is no
   /// record: file, line number, what was found. Empty lines are passed over.
@@ -48,7 +49,7 @@ class LineReader {
   Wanted wanted_;
   std::string rest_, warning_;  ///< rest_: a line that has begun
   std::uint64_t offset_ = 0;    ///< of the line that is taken
-  int number_ = 0;
+  int number_;
   bool is_ended_ = true;
 };
 

@@ -5,6 +5,7 @@
 
 #include <algorithm>
 #include <charconv>
+#include <cmath>
 #include <fstream>
 #include <map>
 #include <stdexcept>
@@ -38,24 +39,59 @@ std::string LastLines(const std::filesystem::path& file, std::uintmax_t size) {
   }
 }
 
+/// Line ends among the first bytes of a file.
+int CountLines(const std::filesystem::path& file, std::uintmax_t bytes) {
+  std::ifstream in(file, std::ios::binary);
+  std::string block(std::size_t{4} << 20, '\0');
+  std::ptrdiff_t lines = 0;
+  while (bytes > 0) {
+    block.resize(static_cast<std::size_t>(std::min<std::uintmax_t>(bytes, block.size())));
+    if (!in.read(block.data(), static_cast<std::streamsize>(block.size()))) FailOn("read", file);
+    lines += std::ranges::count(block, '\n');
+    bytes -= block.size();
+  }
+  return static_cast<int>(lines);
+}
+
+/// Feeds the end of a file, and what it says of a line that is no record names the line of the
+/// file: lines before are counted only then.
+LineReader ReadEnd(const std::filesystem::path& file, const std::string& text,
+                   std::uintmax_t before) {
+  const auto feed = [&](int lines_before) {
+    LineReader lines(
+        file,
+        [&file](const Record& record, const LinePlace&) {
+          if (!record.Text("kind").empty()) return;
+          throw std::runtime_error(
+              fmt::format("{}: found a line without \"kind\", expected records", file.string()));
+        },
+        {}, lines_before);
+    lines.Feed(text);
+    lines.End();
+    return lines;
+  };
+  try {
+    return feed(0);
+  } catch (const std::runtime_error&) {
+    if (before == 0) throw;
+  }
+  return feed(CountLines(file, before));
+}
+
 /// Ends the file with a line end: a complete record gets its own, a torn one goes. What is no store
 /// stays as it is.
 void MendLastLine(const std::filesystem::path& file, int descriptor) {
   const std::uintmax_t size = std::filesystem::file_size(file);
   const std::string text = IsLarge(file) ? LastLines(file, size) : ReadFile(file);
-  LineReader lines(file, [&file](const Record& record, const LinePlace&) {
-    if (!record.Text("kind").empty()) return;
-    throw std::runtime_error(
-        fmt::format("{}: found a line without \"kind\", expected records", file.string()));
-  });
-  try {
-    lines.Feed(text);
-    lines.End();
-  } catch (const std::runtime_error& error) {
-    throw std::runtime_error(
-        fmt::format("{}\n'{}' is no store, or a damaged one: nothing was changed", error.what(),
-                    file.string()));
-  }
+  const LineReader lines = [&] {
+    try {
+      return ReadEnd(file, text, size - text.size());
+    } catch (const std::runtime_error& error) {
+      throw std::runtime_error(
+          fmt::format("{}\n'{}' is no store, or a damaged one: nothing was changed", error.what(),
+                      file.string()));
+    }
+  }();
   if (!lines.warning().empty()) {
     const std::uintmax_t whole = size - (text.size() - lines.whole());
     if (::ftruncate(descriptor, static_cast<off_t>(whole)) != 0) {
@@ -119,19 +155,6 @@ void ResultStore::Append(const std::vector<Record>& records) {
   }
 }
 
-void ResultStore::Fill(std::size_t count, const std::function<Record(std::size_t)>& record) {
-  if (::lseek(descriptor_, 0, SEEK_END) > 0) {
-    throw std::runtime_error(
-        fmt::format("{}: found records, expected a new store; name it among the "
-                    "stores to merge and write to another",
-                    file_.string()));
-  }
-  // a link stays one
-  WriteFileAtomically(std::filesystem::canonical(file_), [&](const auto& write) {
-    for (std::size_t i = 0; i < count; ++i) write(ToJsonLine(record(i)) + '\n');
-  });
-}
-
 std::vector<Record> LatestRecords(const std::vector<Record>& records, std::string_view version) {
   std::vector<Record> latest;
   std::map<std::string, std::size_t> place;
@@ -161,6 +184,40 @@ std::vector<std::pair<std::string, Condition>> OnParameters(const Selection& whe
   }
   return conditions;
 }
+
+/// What is asked about and no record that was read has yet, as conditions want it.
+class Missing {
+ public:
+  explicit Missing(const Selection& where) {
+    for (const Condition& condition : where) {
+      const bool is_ordered =
+          condition.op != Operator::kEqual && condition.op != Operator::kUnequal;
+      keys_.push_back({condition.key, "\"" + condition.key + "\":", is_ordered});
+    }
+  }
+
+  bool MayBeIn(std::string_view line) const {
+    return std::ranges::any_of(keys_, [line](const Key& key) {
+      const std::size_t at = line.find(key.before);
+      return at != std::string_view::npos &&
+             !(key.is_ordered && line.substr(at + key.before.size()).starts_with("null"));
+    });
+  }
+
+  void Look(const Record& record) {
+    std::erase_if(keys_, [&record](const Key& key) {
+      return key.is_ordered ? !std::isnan(record.Number(key.name))
+                            : record.Find(key.name) != nullptr;
+    });
+  }
+
+ private:
+  struct Key {
+    std::string name, before;
+    bool is_ordered;  ///< a number is asked for
+  };
+  std::vector<Key> keys_;
+};
 
 /// Whether a number that stands among the keys of the case says that the record does not match.
 bool IsExcluded(std::string_view line,
@@ -193,11 +250,16 @@ std::vector<Record> ReadRecords(const std::filesystem::path& path, const Selecti
   if (OnParameters(where).empty() || !IsLarge(StoreFile(path))) return ReadRecords(path, warnings);
   const LineReader::Wanted may_match = LinesThatMayMatch(where);
   std::vector<Record> records;
+  Missing missing(where);
   ForEachRecord(
-      path, [&records](Record record, const LinePlace&) { records.push_back(std::move(record)); },
+      path,
+      [&](Record record, const LinePlace&) {
+        missing.Look(record);
+        records.push_back(std::move(record));
+      },
       warnings,
       [&](std::string_view line, const LinePlace& place) {
-        return records.empty() || may_match(line, place);
+        return records.empty() || may_match(line, place) || missing.MayBeIn(line);
       });
   return records;
 }

@@ -2,7 +2,6 @@
 #pragma once
 
 #include <filesystem>
-#include <functional>
 #include <mutex>
 #include <string>
 #include <string_view>
@@ -50,10 +49,6 @@ class ResultStore {
   /// The same with several, all of them or none.
   void Append(const std::vector<Record>& records);
 
-  /// The records of an empty store, one after the other, all of them or none. Throws
-  /// std::runtime_error when it has some. Nothing can be appended afterwards.
-  void Fill(std::size_t count, const std::function<Record(std::size_t)>& record);
-
   /// In a forked child: lets go of the store, so that the lock ends with the parent.
   void LeaveToParent();
 
@@ -89,7 +84,8 @@ LineReader::Wanted LinesThatMayMatch(const Selection& where);
 /// The same of a store that is too large to be held, without records that conditions on parameters
 /// of a sweep exclude: what such a line says besides is not looked at. Parameters are the keys that
 /// are nobody else's (FindMeasure() knows none), so that records that decide about each other, of
-/// one scene at other tolerances or in other columns, stay or go together. The first record stays.
+/// one scene at other tolerances or in other columns, stay or go together. The first record stays,
+/// and of each key of the conditions the first that has it: nobody says that no record has it.
 std::vector<Record> ReadRecords(const std::filesystem::path& path, const Selection& where,
                                 std::vector<std::string>* warnings);
 

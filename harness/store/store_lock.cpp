@@ -54,7 +54,7 @@ bool TryLock(int descriptor, const std::filesystem::path& file, bool waits) {
 
 }  // namespace
 
-int OpenLocked(const std::filesystem::path& file, bool waits) {
+int OpenLocked(const std::filesystem::path& file, bool waits, const std::string& cure) {
   constexpr int kMode = 0644;
   for (int i = 0; i < kTries; ++i) {
     // without blocking: a pipe of that name would wait for its other end
@@ -70,8 +70,7 @@ int OpenLocked(const std::filesystem::path& file, bool waits) {
       }
       if (!TryLock(descriptor, file, waits)) {
         throw std::runtime_error(
-            fmt::format("'{}' is in use by {}; wait for it (--wait), or write to another --out",
-                        file.string(), Holder(descriptor)));
+            fmt::format("'{}' is in use by {}; {}", file.string(), Holder(descriptor), cure));
       }
       if (IsStillNamed(descriptor, file)) return descriptor;
     } catch (...) {

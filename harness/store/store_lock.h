@@ -2,6 +2,7 @@
 #pragma once
 
 #include <filesystem>
+#include <string>
 
 namespace loopbench::harness {
 
@@ -11,7 +12,9 @@ namespace loopbench::harness {
 /// are closed, those of forked children too. Throws std::runtime_error that names the file, and the
 /// process that holds the lock.
 /// @param waits  for the lock, however long another process holds it
-int OpenLocked(const std::filesystem::path& file, bool waits = false);
+/// @param cure   what to do when another process has it, for the message
+int OpenLocked(const std::filesystem::path& file, bool waits = false,
+               const std::string& cure = "wait for it (--wait), or write to another --out");
 
 /// Whether a process has the store `file` open for writing.
 bool IsLocked(const std::filesystem::path& file);

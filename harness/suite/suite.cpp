@@ -3,6 +3,7 @@
 #include <fmt/format.h>
 
 #include <algorithm>
+#include <unordered_set>
 #include <utility>
 
 #include "harness/isolation/interruption.h"
@@ -67,21 +68,17 @@ class Group {
     std::vector<Piece> references;
     for (std::size_t e = 0; e < experiments_.size(); ++e) {
       for (const Case& one : SelectCases(experiments_[e], options_.filter)) {
-        Add(
-            e,
-            [&] {
-              if (HasReference(experiments_[e], one)) {
-                const ReferenceCase reference = ReferenceOf(experiments_[e], one, store_.file());
-                references.push_back(ReferencePiece(experiments_[e], reference));
-                references.back().experiment = group_.numbers[e];
-                references.back().seconds = [e, reference](Estimate& estimate) {
-                  return estimate.OfReference(e, reference);
-                };
-              }
-              return AccuracyPiece(experiments_[e], Identified(experiments_[e], one),
-                                   store_.file());
-            },
-            [e, one](Estimate& estimate) { return estimate.OfCase(e, one); });
+        Piece piece =
+            AccuracyPiece(experiments_[e], Identified(experiments_[e], one), store_.file());
+        const bool is_taken = Add(e, std::move(piece),
+                                  [e, one](Estimate& estimate) { return estimate.OfCase(e, one); });
+        if (!is_taken || !HasReference(experiments_[e], one)) continue;
+        const ReferenceCase reference = ReferenceOf(experiments_[e], one, store_.file());
+        references.push_back(ReferencePiece(experiments_[e], reference));
+        references.back().experiment = group_.numbers[e];
+        references.back().seconds = [e, reference](Estimate& estimate) {
+          return estimate.OfReference(e, reference);
+        };
       }
     }
     const std::size_t failed =
@@ -96,8 +93,7 @@ class Group {
     }
     for (std::size_t e = 0; e < experiments_.size(); ++e) {
       for (const LadderGroup& ladder : ladders[e]) {
-        Add(
-            e, [&] { return LadderPiece(experiments_[e], ladder); },
+        Add(e, LadderPiece(experiments_[e], ladder),
             [e, &ladder](Estimate& estimate) { return estimate.OfLadder(e, ladder); });
       }
     }
@@ -109,8 +105,7 @@ class Group {
     for (const Experiment& experiment : experiments_) groups.push_back(TimingGroups(experiment));
     for (std::size_t e = 0; e < experiments_.size(); ++e) {
       for (const TimingGroup& group : groups[e]) {
-        Add(
-            e, [&] { return TimingPiece(experiments_[e], group); },
+        Add(e, TimingPiece(experiments_[e], group),
             [e, &group](Estimate& estimate) { return estimate.OfTiming(e, group); });
       }
     }
@@ -118,12 +113,18 @@ class Group {
   }
 
  private:
-  template <class MakePiece, class Seconds>
-  void Add(std::size_t e, MakePiece make_piece, Seconds seconds) {
-    if (!group_.is_sharded && !options_.shard.Takes(number_++)) return;
-    pieces_.push_back(make_piece());
-    pieces_.back().experiment = group_.numbers[e];
-    pieces_.back().seconds = seconds;
+  /// Whether the piece is this shard's. One whose cases two files share is one piece, of one shard.
+  template <class Seconds>
+  bool Add(std::size_t e, Piece piece, Seconds seconds) {
+    if (!group_.is_sharded) {
+      bool is_new = false;
+      for (const Record& owed : piece.owed) is_new |= dealt_.insert(RunId(owed)).second;
+      if (!is_new || !options_.shard.Takes(number_++)) return false;
+    }
+    piece.experiment = group_.numbers[e];
+    piece.seconds = seconds;
+    pieces_.push_back(std::move(piece));
+    return true;
   }
 
   std::size_t Run(const char* what, int jobs, bool shared) {
@@ -142,7 +143,8 @@ class Group {
   ResultStore& store_;
   Estimate estimate_;
   std::vector<Piece> pieces_;
-  std::size_t number_ = 0;  ///< of the next case, for the shard
+  std::size_t number_ = 0;                 ///< of the next piece, for the shard
+  std::unordered_set<std::string> dealt_;  ///< ids of those that some shard has
 };
 
 }  // namespace

@@ -69,6 +69,26 @@ void WriteFileAtomically(
   SyncFolderOf(path);
 }
 
+bool WriteNewFile(const std::filesystem::path& path, std::string_view text) {
+  MakeFolderOf(path);
+  constexpr int kMode = 0644;
+  const int descriptor = ::open(path.c_str(), O_WRONLY | O_CREAT | O_EXCL | O_CLOEXEC, kMode);
+  if (descriptor < 0 && errno == EEXIST) return false;
+  if (descriptor < 0) FailOn("write", path);
+  try {
+    WriteAll(descriptor, text, path);
+    if (::fsync(descriptor) != 0) FailOn("write", path);
+  } catch (...) {
+    std::error_code ignored;
+    std::filesystem::remove(path, ignored);
+    ::close(descriptor);
+    throw;
+  }
+  ::close(descriptor);
+  SyncFolderOf(path);
+  return true;
+}
+
 void SyncFolderOf(const std::filesystem::path& path) {
   const std::filesystem::path folder = path.has_parent_path() ? path.parent_path() : ".";
   const int descriptor = ::open(folder.c_str(), O_RDONLY | O_DIRECTORY | O_CLOEXEC);

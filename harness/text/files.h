@@ -19,6 +19,10 @@ void WriteFileAtomically(
     const std::filesystem::path& path,
     const std::function<void(const std::function<void(std::string_view)>& write)>& fill);
 
+/// Writes `text` to `path` if nothing is there; else false, and what is there stays. Of several
+/// processes that try at once one succeeds. Throws as WriteFileAtomically does.
+bool WriteNewFile(const std::filesystem::path& path, std::string_view text);
+
 /// Makes the folder that `path` is in, with all above it. Throws std::runtime_error that names the
 /// folder and the system's reason.
 void MakeFolderOf(const std::filesystem::path& path);

@@ -139,6 +139,40 @@ TEST_F(ComparisonCommands, ABaselineIsRenewedHeldAgainstAndTested) {
   Expect("baseline check --dir kept", 2, {"--experiments is required"});
 }
 
+TEST_F(ComparisonCommands, BaselineKeepsWhatItMeasuresInANewFolderOnly) {
+  const std::string tiny = " --experiments tiny.json --dir kept --keep ";
+  Expect("baseline renew" + tiny + "kept", 2, {"--keep: found kept, the folder of the baseline"});
+  EXPECT_FALSE(fs::exists(folder_ / "kept"));
+  Expect("baseline renew" + tiny + "new", 0, {"renewed kept/results.jsonl"});
+  EXPECT_EQ(ReadRecords(folder_ / "new").size(), 2u);
+  const std::string baseline = ReadFile(folder_ / "kept/results.jsonl");
+  Write("mine/run/notes", "mine");
+  Write("mine/results.jsonl", "mine");
+  EditMechanism("\"mass\": 1.0,", "\"mass\": 1.01,");
+  for (const char* action : {"renew", "check", "selftest"}) {
+    Expect("baseline " + std::string(action) + tiny + "mine", 2,
+           {"--keep: found mine, which is not empty, expected a new folder"});
+    Expect("baseline " + std::string(action) + tiny + "./kept/", 2, {"the folder of the baseline"});
+    Expect("baseline " + std::string(action) + tiny + "tiny.json", 2, {"--keep: found tiny.json"});
+  }
+  EXPECT_EQ(ReadFile(folder_ / "mine/run/notes"), "mine");
+  EXPECT_EQ(ReadFile(folder_ / "mine/results.jsonl"), "mine");
+  EXPECT_EQ(ReadFile(folder_ / "kept/results.jsonl"), baseline);
+  fs::create_directory(folder_ / "empty");
+  Expect("baseline check" + tiny + "empty", 2, {"ran another mechanism"});
+  EXPECT_EQ(ReadRecords(folder_ / "empty").size(), 2u);
+}
+
+TEST_F(ComparisonCommands, FilesMayStandBehindAnyOption) {
+  ASSERT_EQ(Call("run tiny.json --out now").code, 0);
+  Expect("compare --only outcomes now now", 0, {"SAME"});
+  Expect("compare --where formulation=odca --only counts now now", 0, {"SAME"});
+  Expect("table --where formulation=odca --columns formulation,steps now", 0, {"odca"});
+  Expect("list --filter formulation=odca tiny.json", 0, {"odca"});
+  Expect("run --filter formulation=odca tiny.json --out some", 0, {"1 run now"});
+  Expect("baseline renew --experiments tiny.json tiny.json --dir kept", 0, {"renewed"});
+}
+
 TEST_F(ComparisonCommands, BaselineSaysWhatToBuildFirst) {
   fs::create_directories(folder_ / "tools");
   fs::copy_file(fs::path(LOOPBENCH_SOURCE_DIR) / "tools/baseline", folder_ / "tools/baseline");

@@ -1,11 +1,12 @@
 // Runs in parts, by the folder alone: what a cluster's engine calls, and what is known without one.
 #include <gtest/gtest.h>
+#include <unistd.h>
 
 #include <algorithm>
-#include <fstream>
 #include <string>
 
 #include "harness/store/result_store.h"
+#include "harness/store/store_lock.h"
 #include "tests/harness/cli_fixture.h"
 
 namespace loopbench::harness {
@@ -76,6 +77,27 @@ TEST_F(Cluster, PartsAreMergedToWhatOneRunGives) {
   ExpectEnding(status, 0, {"\"cases\":6", "\"done\":6", "\"failed\":0", "\"to_do\":0"});
 }
 
+TEST_F(Cluster, AMergeIsThereWhenItIsWhole) {
+  ExpectEnding(Call("submit tiny.json --tasks 2 --no-timing --no-queue --out parts"), 0, {});
+  for (const char* k : {"1", "2"}) EXPECT_EQ(Part(k).code, 0);
+  ExpectEnding(Call("collect parts", "ulimit -f 1;"), 2, {"File too large"});
+  const auto is_merged = [this] {
+    return Call("status parts").text.find("merged: ") != std::string::npos;
+  };
+  EXPECT_FALSE(is_merged());
+  Write("parts/whole/results.jsonl", "");  // as earlier versions left it
+  EXPECT_FALSE(is_merged());
+  {
+    const int other = OpenLocked(folder_ / "parts/whole/results.jsonl.merging");
+    ExpectEnding(Call("status parts"), 0, {"being merged"});
+    ExpectEnding(Call("collect parts"), 2, {"in use by process "});
+    ::close(other);
+  }
+  ExpectEnding(Call("collect parts"), 0, {"2 records of 2 stores are 2 cases"});
+  EXPECT_TRUE(is_merged());
+  ExpectEnding(Call("collect parts"), 0, {"is there already"});
+}
+
 TEST_F(Cluster, FailedCasesAreCountedAsSuch) {
   Write("six.json", kSix);
   ExpectEnding(Call("submit six.json --tasks 2 --no-timing --no-queue --out parts"), 0, {});
@@ -108,6 +130,73 @@ TEST_F(Cluster, ScriptsSayWhatWasAsked) {
   EXPECT_FALSE(fs::exists(folder_ / "parts"));
 }
 
+TEST_F(Cluster, APathMayHoldWhatSlurmAndShellsRead) {
+  Write("six.json", kSix);
+  ExpectEnding(Call("submit six.json --tasks 2 --no-timing --no-queue --out 'a b%j #'"), 0, {});
+  ExpectEnding(Call("", "sh 'a b%j #/part.sh' 1 2>&1; exit $?;"), 0, {"3 run now"});
+  const std::string text = ReadFile(folder_ / "a b%j #/collect.sh");
+  EXPECT_NE(text.find("#SBATCH --output=\"" + folder_.string() + "/a b%%j #/logs/collect.log\"\n"),
+            std::string::npos)
+      << text;
+  ExpectEnding(Call("submit six.json --tasks 2 --out 'a b%j' --dry-run"), 0,
+               {"/a b%%j/logs/%a.log\"", "/a b%%j/logs/collect.log\""});
+  ExpectEnding(Call("submit six.json --tasks 2 --out 'a\nb' --dry-run"), 2,
+               {"--out: found a line end in it"});
+}
+
+TEST_F(Cluster, APartIsANumberOfThem) {
+  Write("six.json", kSix);
+  ExpectEnding(Call("submit six.json --tasks 2 --no-timing --no-queue --out parts"), 0, {});
+  for (const char* k : {"01", "3", "0", "../x", "-1", "''", "1x", "99999999999999999999"}) {
+    ExpectEnding(Part(k), 2, {"part.sh: found '", "expected the number of a part, 1 to 2"});
+    EXPECT_FALSE(fs::exists(folder_ / "parts/parts")) << k;
+  }
+  ExpectEnding(Part(""), 2, {"expected the number of a part, 1 to 2"});
+}
+
+TEST_F(Cluster, AgainTakesWhatTheFolderSays) {
+  Write("six.json", kSix);
+  ExpectEnding(Call("submit six.json --tasks 3 --no-timing --no-queue --out parts"), 0, {});
+  EXPECT_EQ(Part("2").code, 0);
+  for (const char* option : {"--tasks 7", "--jobs 1", "--time 1", "--partition p", "--sbatch=--a",
+                             "--filter a=b", "--set /a=b", "--no-timing", "--isolate"}) {
+    const std::string name = std::string(option).substr(0, std::string(option).find_first_of(" ="));
+    ExpectEnding(Call(std::string("submit --again --out parts ") + option), 2,
+                 {"--again: found " + name + " beside it, expected none: the folder knows"});
+  }
+  fs::remove(folder_ / "parts/part.sh");  // of a submit that was killed
+  ExpectEnding(Call("submit --again --no-queue --out parts"), 0,
+               {"2 of 3 parts are not done: 1, 3", "part.sh K"});
+  EXPECT_FALSE(fs::exists(folder_ / "parts/array.sh"));
+  for (const char* k : {"1", "3"}) EXPECT_EQ(Part(k).code, 0);
+  ExpectEnding(Call("submit --again --no-queue --out parts"), 0, {"every part is done"});
+}
+
+TEST_F(Cluster, ACaseOfTwoFilesIsOneCaseOfOnePart) {
+  Write("six.json", kSix);
+  ExpectEnding(Call("submit six.json ./six.json --tasks 2 --no-queue --out parts"), 2,
+               {"six.json: found twice, expected each experiment once"});
+  std::string other = kSix;
+  other.replace(other.find("[1e-6, 1e-8]"), 12, "[1e-6, 1e-7]");
+  Write("other.json", other);
+  const std::string submit = "submit six.json other.json --tasks 4 --no-timing --no-queue";
+  ExpectEnding(Call(submit + " --out parts"), 0, {"9 cases in 4 parts"});
+  for (const char* k : {"1", "2", "3", "4"}) EXPECT_EQ(Part(k).code, 0);
+  ExpectEnding(Call("status parts --json"), 0, {"\"cases\":9", "\"done\":9", "\"to_do\":0"});
+  ExpectEnding(Call("collect parts"), 0, {"9 records of 4 stores are 9 cases"});
+}
+
+TEST_F(Cluster, OfSubmitsAtOnceOneMakesTheFolder) {
+  Write("six.json", kSix);
+  std::string all;
+  for (int i = 0; i < 8; ++i) {
+    all += "('" LOOPBENCH_BINARY
+           "' submit six.json --tasks 2 --no-queue --out parts >/dev/null 2>&1"
+           " && echo made) & ";
+  }
+  EXPECT_EQ(Call("", all + "wait; exit 0;").text, "made\n");
+}
+
 TEST_F(Cluster, WhatCannotRunIsRefusedBeforeAnythingIsWritten) {
   Write("six.json", kSix);
   ExpectEnding(Call("submit six.json --tasks 7 --no-queue --out parts"), 2,
@@ -125,9 +214,38 @@ TEST_F(Cluster, WhatCannotRunIsRefusedBeforeAnythingIsWritten) {
   ExpectEnding(Call("submit six.json --tasks 2 --no-queue --out parts"), 0, {});
   ExpectEnding(Call("submit six.json --tasks 2 --no-queue --out parts"), 2,
                {"expected a new one", "--again"});
-  std::ofstream(folder_ / "parts/cluster.json", std::ios::app) << "x";
-  Write("parts/cluster.json", "{\"kind\":\"cluster\"}\n");
-  ExpectEnding(Call("status parts"), 2, {"parts/cluster.json: "});
+}
+
+TEST_F(Cluster, DamageIsNamedWithItsKey) {
+  Write("six.json", kSix);
+  ExpectEnding(Call("submit six.json --tasks 2 --no-queue --out parts"), 0, {});
+  const std::string whole = ReadFile(folder_ / "parts/cluster.json");
+  const auto expect = [this](const std::string& text, const std::vector<std::string>& words) {
+    Write("parts/cluster.json", text);
+    const Ending ending = Call("status parts");
+    ExpectEnding(ending, 2, {"parts/cluster.json: "});
+    ExpectEnding(ending, 2, words);
+  };
+  expect("", {"found an empty file, expected what loopbench submit writes"});
+  expect("{\"kind\":\"cluster\"}\n", {"\"experiment\": found nothing, expected a text"});
+  const std::string bare = whole.substr(0, whole.find(",\"checksum\"")) + "}\n";
+  const auto with = [&bare](const std::string& from, const std::string& to) {
+    std::string text = bare;
+    const std::size_t at = text.find(from);
+    EXPECT_NE(at, std::string::npos) << from;
+    return text.replace(at, from.size(), to);
+  };
+  Write("parts/cluster.json", bare);
+  ExpectEnding(Call("status parts"), 0, {"6"});
+  expect(with("\"parts\":2", "\"parts\":\"two\""), {"\"parts\": found \"two\", expected a whole"});
+  expect(with("\"parts\":2", "\"parts\":0"), {"\"parts\": found 0, expected 1 to 100000"});
+  expect(with("\"parts\":2", "\"parts\":3"), {"\"cases_of_parts\": found 2 numbers, expected 3"});
+  expect(with("\"isolate\":false", "\"isolate\":1"), {"\"isolate\": found 1, expected true or"});
+  expect(with("\"cases_of_parts\":[", "\"cases_of_parts\":null,\"x\":["),
+         {"\"cases_of_parts\": found null, expected numbers"});
+  expect(with("\"program\":\"", "\"program\":7,\"x\":\""),
+         {"\"program\": found 7, expected a text"});
+  expect("no JSON\n", {});
 }
 
 }  // namespace cluster_test

@@ -1,0 +1,120 @@
+// What a merge writes, and when it is there.
+#include <gtest/gtest.h>
+#include <unistd.h>
+
+#include <algorithm>
+#include <functional>
+#include <string>
+#include <vector>
+
+#include "harness/store/store_lock.h"
+#include "tests/harness/cli_fixture.h"
+
+namespace loopbench::harness {
+namespace merge_test {
+
+class MergeCommandTest : public CommandLineTest {
+ protected:
+  /// The same store again, its records changed.
+  void CopyStore(const std::string& from, const std::string& to,
+                 const std::function<void(Record*)>& change) const {
+    fs::copy(folder_ / from, folder_ / to, fs::copy_options::recursive);
+    fs::remove(folder_ / to / "results.jsonl");
+    for (Record record : ReadRecords(folder_ / from)) {
+      change(&record);
+      ResultStore(folder_ / to).Append(record);
+    }
+  }
+  std::vector<fs::path> Files(const std::string& folder) const {
+    std::vector<fs::path> files;
+    for (const auto& entry : fs::directory_iterator(folder_ / folder)) {
+      files.push_back(entry.path());
+    }
+    std::ranges::sort(files);
+    return files;
+  }
+  void ExpectTrajectories(const std::string& store, const std::string& wanted) const {
+    const std::vector<fs::path> files = Files(store + "/trajectories");
+    EXPECT_EQ(files.size(), 2u);
+    for (const fs::path& file : files) {
+      const fs::path other = folder_ / wanted / "trajectories" / file.filename();
+      EXPECT_TRUE(ReadFile(file) == ReadFile(other)) << file;
+    }
+  }
+};
+
+TEST_F(MergeCommandTest, TrajectoriesAreThoseOfTheRecordsThatAreKept) {
+  Write("two.json", std::string(kTinyExperiment).insert(1, R"("output": {"number": 3},)"));
+  ExpectEnding(Call("run two.json --out whole"), 0, {"2 run now"});
+  CopyStore("whole", "cut",
+            [](Record* record) { record->Set("outcome", std::string("time-limit")); });
+  for (const fs::path& file : Files("cut/trajectories")) WriteFileAtomically(file, "t [s]\n0\n");
+  ExpectEnding(Call("merge cut whole --out m1"), 0, {"are 2 cases"});
+  ExpectEnding(Call("merge whole cut --out m2"), 0, {"are 2 cases"});
+  ExpectTrajectories("m1", "whole");
+  ExpectTrajectories("m2", "whole");
+
+  // two stores of one run: it is enough that one of them has the file
+  CopyStore("whole", "bare", [](Record*) {});
+  fs::remove_all(folder_ / "bare/trajectories");
+  for (const std::string order : {"whole bare --out m3", "bare whole --out m4"}) {
+    const Ending merged = Call("merge " + order);
+    ExpectEnding(merged, 0, {"are 2 cases"});
+    EXPECT_EQ(merged.text.find("warning"), std::string::npos) << merged.text;
+    ExpectTrajectories(order.substr(order.size() - 2), "whole");
+  }
+  // and another run's is none
+  ExpectEnding(Call("merge cut bare --out m5"), 0,
+               {"no store has trajectories/", "of the run that is kept"});
+  EXPECT_FALSE(fs::exists(folder_ / "m5/trajectories"));
+}
+
+TEST_F(MergeCommandTest, OneThatFailsLeavesNothing) {
+  ExpectEnding(Call("run tiny.json --out a"), 0, {});
+  ExpectEnding(Call("merge a --out deep/m", "ulimit -f 1;"), 2, {"File too large"});
+  EXPECT_FALSE(fs::exists(folder_ / "deep"));
+  fs::create_directory(folder_ / "m");
+  ExpectEnding(Call("merge a --out m", "ulimit -f 1;"), 2, {"File too large"});
+  EXPECT_TRUE(Files("m").empty());
+  // what one that was killed left
+  Write("m/results.jsonl.merging", "{\"kind\":");
+  ExpectEnding(Call("merge a --out m"), 0, {"are 2 cases"});
+  EXPECT_EQ(Files("m").size(), 1u);
+  EXPECT_EQ(ReadRecords(folder_ / "m").size(), 2u);
+}
+
+TEST_F(MergeCommandTest, OneAtATime) {
+  ExpectEnding(Call("run tiny.json --out a"), 0, {});
+  fs::create_directory(folder_ / "m");
+  const int other = OpenLocked(folder_ / "m/results.jsonl.merging");
+  ExpectEnding(Call("merge a --out m"), 2,
+               {"m/results.jsonl.merging", "in use by process " + std::to_string(::getpid())});
+  EXPECT_FALSE(fs::exists(folder_ / "m/results.jsonl"));
+  ::close(other);
+  {
+    const ResultStore run(folder_ / "m");  // that has no record yet
+    ExpectEnding(Call("merge a --out m"), 2, {"m/results.jsonl'", "in use by process "});
+  }
+  ExpectEnding(Call("merge a --out m"), 0, {"are 2 cases"});
+}
+
+TEST_F(MergeCommandTest, TheTargetIsLookedAtBeforeTheStores) {
+  ExpectEnding(Call("run tiny.json --out a"), 0, {});
+  Write("bad.jsonl", "no record\n");
+  ExpectEnding(Call("merge bad.jsonl --out a"), 2,
+               {"a/results.jsonl: found records, expected a new"});
+  ExpectEnding(Call("merge bad.jsonl --out m"), 2, {"bad.jsonl:1:"});
+  EXPECT_FALSE(fs::exists(folder_ / "m"));
+}
+
+TEST_F(MergeCommandTest, ALinkStaysOne) {
+  ExpectEnding(Call("run tiny.json --out a"), 0, {});
+  fs::create_directories(folder_ / "far/away");
+  fs::create_symlink("far/away/m.jsonl", folder_ / "m.jsonl");
+  ExpectEnding(Call("merge a --out m.jsonl"), 0, {"are 2 cases"});
+  EXPECT_TRUE(fs::is_symlink(folder_ / "m.jsonl"));
+  EXPECT_EQ(ReadRecords(folder_ / "far/away/m.jsonl").size(), 2u);
+}
+
+}  // namespace merge_test
+}  // namespace loopbench::harness

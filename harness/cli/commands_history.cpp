@@ -6,7 +6,7 @@
 #include <cmath>
 #include <optional>
 
-#include "harness/history/history_branch.h"
+#include "harness/history/git.h"
 #include "harness/history/history_page.h"
 #include "harness/history/history_series.h"
 #include "harness/record/json_object.h"
@@ -20,26 +20,16 @@
 namespace loopbench::harness {
 namespace {
 
-/// The folder of a place while it is used.
-class OpenPlace {
- public:
-  OpenPlace(const HistoryPlace& place, bool writes) : folder_(place.store) {
-    if (place.store.empty() == place.branch.empty()) {
-      throw ConfigError("history: expected one of --store DIR and --branch NAME");
-    }
-    if (place.branch.empty()) return;
-    branch_.emplace(place.branch, writes);
-    folder_ = branch_->folder();
-  }
-  const std::filesystem::path& folder() const { return folder_; }
-  void Keep(const std::string& message) {
-    if (branch_) branch_->Commit(message);
-  }
-
- private:
-  std::filesystem::path folder_;
-  std::optional<HistoryBranch> branch_;
-};
+/// A history and what is found in it; warnings are printed.
+std::pair<History, HistoryFindings> ReadFindings(const HistoryPlace& place) {
+  History history;
+  HistoryFindings found;
+  ReadPlace(place, [&](const OpenHistory& open) {
+    history = ReadHistory(open.folder);
+    found = FindingsOf(history);
+  });
+  return {history, found};
+}
 
 HistoryFindings Chosen(HistoryFindings found, const HistoryShowCommand& command) {
   const auto is_other = [&command](const auto& row) {
@@ -181,18 +171,19 @@ int HistoryAdd(const HistoryAddCommand& command) {
     entry.commit = found.commit;
     if (entry.date.empty()) entry.date = found.date;
   }
-  OpenPlace place(command.place, true);
-  const HistoryEntry added = AddToHistory(place.folder(), entry, records, command.replaces);
-  place.Keep("Measurements of " + ShortCommit(entry.commit));
+  HistoryEntry added;
+  ChangePlace(command.place, /*may_begin=*/true, [&](const OpenHistory& open) {
+    added = AddToHistory(open.folder, entry, records, command.replaces);
+    return "Measurements of " + ShortCommit(entry.commit);
+  });
   Print("added {} records of commit {} ({}) on {}\n", records.size(), ShortCommit(added.commit),
         added.date, added.machine);
   return 0;
 }
 
 int HistoryShow(const HistoryShowCommand& command, const std::string& typed) {
-  const OpenPlace place(command.place, false);
-  const History history = ReadHistory(place.folder());
-  const HistoryFindings found = Chosen(FindingsOf(history), command);
+  const auto [history, all] = ReadFindings(command.place);
+  const HistoryFindings found = Chosen(all, command);
   if (command.json) {
     PrintText(FindingsDocument(history, found).Text() + "\n");
     return 0;
@@ -213,9 +204,7 @@ int HistoryShow(const HistoryShowCommand& command, const std::string& typed) {
 }
 
 int HistoryReport(const HistoryReportCommand& command, const std::string& typed) {
-  const OpenPlace place(command.place, false);
-  const History history = ReadHistory(place.folder());
-  const HistoryFindings found = FindingsOf(history);
+  const auto [history, found] = ReadFindings(command.place);
   const std::string page = HistoryPage(history, found, command.title, Provenance(typed));
   const auto out = !command.out.empty()          ? command.out
                    : command.place.store.empty() ? std::filesystem::path("history.html")
@@ -227,10 +216,11 @@ int HistoryReport(const HistoryReportCommand& command, const std::string& typed)
 }
 
 int HistoryMark(const HistoryMarkCommand& command) {
-  OpenPlace place(command.place, true);
-  const std::string commit =
-      MarkInHistory(place.folder(), command.commit, command.mark, command.note);
-  place.Keep(fmt::format("{} is {}", ShortCommit(commit), command.mark));
+  std::string commit;
+  ChangePlace(command.place, /*may_begin=*/false, [&](const OpenHistory& open) {
+    commit = MarkInHistory(open.folder, command.commit, command.mark, command.note);
+    return fmt::format("{} is {}", ShortCommit(commit), command.mark);
+  });
   Print("{} is {}\n", commit, command.mark);
   return 0;
 }

@@ -5,15 +5,10 @@
 #include <string>
 #include <vector>
 
+#include "harness/history/history_place.h"
 #include "harness/record/select.h"
 
 namespace loopbench::harness {
-
-/// A folder, or a branch of the repository that the program is called in: one of both.
-struct HistoryPlace {
-  std::filesystem::path store;
-  std::string branch;
-};
 
 struct HistoryAddCommand {
   HistoryPlace place;

@@ -206,21 +206,20 @@ std::vector<Record> LoadBase(const CompareCommand& command, const std::vector<Re
   ReadPlace({command.history, command.branch}, [&](const OpenHistory& open) {
     const History history = ReadHistory(open.folder);
     const std::string machine = fresh.empty() ? "" : OriginOf(fresh.front()).machine;
-    // Only times need a base of this machine. For all else the last good state counts, wherever it
-    // was measured: one of this machine may be older than what was accepted since.
     const bool only_times = command.options.only == std::vector<std::string>{"times"};
-    std::optional<HistoryEntry> good = LastGood(history, only_times ? machine : "");
-    for (const HistoryEntry& entry : history.entries) {
-      if (good && entry.commit == good->commit && entry.machine == machine) good = entry;
-    }
+    const std::optional<HistoryEntry> good =
+        only_times ? LastGoodOfMachine(history, machine) : LastGood(history, machine);
     if (!good) {
       throw ConfigError(
-          fmt::format("{}: every commit is marked bad, expected a good one", open.folder.string()));
+          fmt::format("{}: found {}, expected a good one", open.folder.string(),
+                      history.entries.empty() ? "no commit" : "every commit marked bad"));
     }
     *name = fmt::format("BASE: the history's last good state, commit {} of {}{}",
                         ShortCommit(good->commit), good->date,
                         good->mark.empty() ? "" : fmt::format(", marked {}", good->mark));
-    base = LoadMeasurements(good->results);
+    std::vector<std::string> warnings = history.warnings;
+    base = ReadResults(*good, &warnings);
+    for (const std::string& text : warnings) PrintError("warning: {}\n", open.named(text));
   });
   return base;
 }

@@ -9,6 +9,7 @@
 #include "harness/history/git.h"
 #include "harness/history/history_page.h"
 #include "harness/history/history_series.h"
+#include "harness/history/history_steps.h"
 #include "harness/record/json_object.h"
 #include "harness/record/provenance.h"
 #include "harness/store/measurements.h"
@@ -20,6 +21,10 @@
 namespace loopbench::harness {
 namespace {
 
+void PrintWarnings(const std::vector<std::string>& warnings, const OpenHistory& open) {
+  for (const std::string& text : warnings) PrintError("warning: {}\n", open.named(text));
+}
+
 /// A history and what is found in it; warnings are printed.
 std::pair<History, HistoryFindings> ReadFindings(const HistoryPlace& place) {
   History history;
@@ -27,6 +32,9 @@ std::pair<History, HistoryFindings> ReadFindings(const HistoryPlace& place) {
   ReadPlace(place, [&](const OpenHistory& open) {
     history = ReadHistory(open.folder);
     found = FindingsOf(history);
+    for (const std::vector<std::string>& warnings : {history.warnings, found.warnings}) {
+      PrintWarnings(warnings, open);
+    }
   });
   return {history, found};
 }
@@ -45,53 +53,6 @@ HistoryFindings Chosen(HistoryFindings found, const HistoryShowCommand& command)
                     command.one, command.measure));
   }
   return found;
-}
-
-Table StepTable(const History& history, const HistoryFindings& found) {
-  Table table;
-  table.title = "Steps";
-  table.columns = {{"commit", "first commit"},
-                   {"date", "date"},
-                   {"case", "case"},
-                   {"measure", "measure"},
-                   {"before", "before", Format::kSeconds},
-                   {"after", "after", Format::kSeconds},
-                   {"ratio", "ratio", Format::kSeconds},
-                   {"confidence", "confidence", Format::kSeconds}};
-  std::vector<std::pair<std::size_t, std::vector<Value>>> rows;
-  const auto add = [&](std::size_t place, const std::string& one, const std::string& measure,
-                       std::vector<Value> rest) {
-    const HistoryEntry& entry = history.entries[place];
-    std::vector<Value> row = {ShortCommit(entry.commit), entry.date, one, measure};
-    row.insert(row.end(), rest.begin(), rest.end());
-    rows.push_back({place, std::move(row)});
-  };
-  for (const EndingChange& change : found.endings) {
-    add(change.entry, change.one, change.measure, {change.before, change.after, {}, {}});
-  }
-  for (const HistorySeries& one : found.series) {
-    for (const LevelChange& change : one.changes) {
-      add(one.values[change.at].entry, one.one, one.measure,
-          {change.before, change.after, change.after / change.before, change.Confidence()});
-    }
-  }
-  std::ranges::stable_sort(rows, std::greater<>(), [](const auto& row) { return row.first; });
-  for (const auto& [place, row] : rows) AddRow(row, &table);
-  table.notes.push_back(
-      fmt::format("{} series over {} entries; confidence: 1 less the number of such steps that "
-                  "the noise of all series together would show, at most {}",
-                  found.series.size(), history.entries.size(), kFalseAlarms));
-  std::size_t times = 0, unsteady = 0;
-  for (const HistorySeries& one : found.series) {
-    unsteady += one.Unsteady();
-    times += one.rule == Rule::kTime && one.one != kAllCases ? one.values.size() : 0;
-  }
-  if (unsteady > 0) {
-    table.notes.push_back(fmt::format(
-        "{} of {} times decide nothing: the machine had another speed than usual (yardstick_ns)",
-        unsteady, times));
-  }
-  return table;
 }
 
 Table CommitTable(const History& history) {
@@ -173,7 +134,9 @@ int HistoryAdd(const HistoryAddCommand& command) {
   }
   HistoryEntry added;
   ChangePlace(command.place, /*may_begin=*/true, [&](const OpenHistory& open) {
-    added = AddToHistory(open.folder, entry, records, command.replaces);
+    std::vector<std::string> torn;
+    added = AddToHistory(open.folder, entry, records, command.replaces, &torn);
+    PrintWarnings(torn, open);
     return "Measurements of " + ShortCommit(entry.commit);
   });
   Print("added {} records of commit {} ({}) on {}\n", records.size(), ShortCommit(added.commit),
@@ -216,12 +179,15 @@ int HistoryReport(const HistoryReportCommand& command, const std::string& typed)
 }
 
 int HistoryMark(const HistoryMarkCommand& command) {
-  std::string commit;
+  Mark mark;
   ChangePlace(command.place, /*may_begin=*/false, [&](const OpenHistory& open) {
-    commit = MarkInHistory(open.folder, command.commit, command.mark, command.note);
-    return fmt::format("{} is {}", ShortCommit(commit), command.mark);
+    std::vector<std::string> torn;
+    mark = MarkInHistory(
+        open.folder, {command.commit, command.mark, command.note, command.keeps_accepted}, &torn);
+    PrintWarnings(torn, open);
+    return fmt::format("{} is {}", ShortCommit(mark.commit), mark.mark);
   });
-  Print("{} is {}\n", commit, command.mark);
+  Print("{} is {}\n", mark.commit, mark.mark);
   return 0;
 }
 

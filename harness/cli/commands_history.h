@@ -37,6 +37,7 @@ int HistoryReport(const HistoryReportCommand& command, const std::string& typed)
 struct HistoryMarkCommand {
   HistoryPlace place;
   std::string commit, mark, note;
+  bool keeps_accepted = false;
 };
 int HistoryMark(const HistoryMarkCommand& command);
 

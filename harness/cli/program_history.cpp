@@ -66,6 +66,8 @@ HistoryOptions::HistoryOptions(CLI::App& app) {
       ->required()
       ->check(CLI::IsMember({"good", "accepted", "bad"}));
   mark_app_->add_option("--note", mark_.note, "Why");
+  mark_app_->add_flag("--keep-accepted", mark_.keeps_accepted,
+                      "Leave it as it is where somebody accepted it (for jobs)");
   AddPlace(mark_app_, &place_);
 }
 

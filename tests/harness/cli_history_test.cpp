@@ -86,6 +86,15 @@ TEST_F(CommandLineHistory, OfABranchAndAsABase) {
   EXPECT_EQ(Shell("git worktree list | wc -l | grep -qx 1").code, 0);
 }
 
+TEST_F(CommandLineHistory, CompareNeedsACommit) {
+  fs::create_directory(folder_ / "past");
+  Write("past/history.jsonl", "");
+  ExpectEnding(Call("compare first --history past"), 2, {"past: found no commit"});
+  ExpectEnding(Call("history add first --store past --commit a --date 2026-01-01"), 0, {});
+  ExpectEnding(Call("history mark a bad --store past"), 0, {});
+  ExpectEnding(Call("compare first --history past"), 2, {"past: found every commit marked bad"});
+}
+
 TEST_F(CommandLineHistory, CompareNeedsOneBase) {
   ExpectEnding(Call("compare first"), 2, {"--history"});
   ExpectEnding(Call("compare first first --history past"), 2, {"NEW alone"});

@@ -119,7 +119,7 @@ TEST_F(HistoryBranchTest, ABranchOfCodeIsNoHistory) {
 
 TEST_F(HistoryBranchTest, NothingBeginsBeforeSomethingIsAdded) {
   ExpectEnding(Shell("$lb history mark a good --branch h"), 2, {"found no branch \"h\""});
-  ExpectEnding(Shell("$lb history add first --branch h --date yesterday"), 2, {"yesterday"});
+  ExpectEnding(Shell("$lb history add first --branch h --date 2026-02-30"), 2, {"2026-02-30"});
   EXPECT_EQ(Text("git branch --list h"), "");
   Do("$lb history add first --branch h");
   const Ending twice = Shell("$lb history add first --branch h");
@@ -127,6 +127,19 @@ TEST_F(HistoryBranchTest, NothingBeginsBeforeSomethingIsAdded) {
   EXPECT_EQ(twice.text.find("tmp"), std::string::npos) << twice.text;
   ExpectEnding(Shell("$lb history mark nobody good --branch h"), 2, {"h: found 0 commits"});
   EXPECT_EQ(Text("ls tmp"), "");
+}
+
+TEST_F(HistoryBranchTest, TornLinesAreSaidByTheNameOfTheBranch) {
+  Do("$lb history add first --branch h --commit a --date 2026-01-01 && "
+     "git worktree add --quiet --detach beside h && cd beside && printf '{\"kind\":\"com' >> "
+     "history.jsonl && truncate -s -5 results/*.jsonl && git commit --quiet -a -m torn && "
+     "git branch -f h HEAD");
+  for (const char* command : {"history show", "compare first --subset", "history report"}) {
+    const Ending ending = Shell("$lb " + std::string(command) + " --branch h");
+    EXPECT_NE(ending.text.find("warning: h:history.jsonl:2"), std::string::npos) << ending.text;
+    EXPECT_NE(ending.text.find("warning: h:results/a-"), std::string::npos) << ending.text;
+  }
+  ExpectEnding(Shell("$lb history mark a good --branch h"), 0, {"warning: h:history.jsonl:2"});
 }
 
 TEST_F(HistoryBranchTest, ANameOfACommitIsNoOption) {

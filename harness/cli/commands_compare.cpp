@@ -4,13 +4,11 @@
 
 #include <algorithm>
 #include <cmath>
-#include <optional>
 #include <ranges>
 #include <set>
 
+#include "harness/cli/commands_history.h"
 #include "harness/history/compare_summary.h"
-#include "harness/history/history.h"
-#include "harness/history/history_place.h"
 #include "harness/judge/fit.h"
 #include "harness/judge/statistics.h"
 #include "harness/judge/track.h"
@@ -202,26 +200,9 @@ void Choose(const Selection& where, const std::vector<std::string>& match,
 std::vector<Record> LoadBase(const CompareCommand& command, const std::vector<Record>& fresh,
                              std::string* name) {
   if (command.history.empty() && command.branch.empty()) return LoadMeasurements(command.base);
-  std::vector<Record> base;
-  ReadPlace({command.history, command.branch}, [&](const OpenHistory& open) {
-    const History history = ReadHistory(open.folder);
-    const std::string machine = fresh.empty() ? "" : OriginOf(fresh.front()).machine;
-    const bool only_times = command.options.only == std::vector<std::string>{"times"};
-    const std::optional<HistoryEntry> good =
-        only_times ? LastGoodOfMachine(history, machine) : LastGood(history, machine);
-    if (!good) {
-      throw ConfigError(
-          fmt::format("{}: found {}, expected a good one", open.folder.string(),
-                      history.entries.empty() ? "no commit" : "every commit marked bad"));
-    }
-    *name = fmt::format("BASE: the history's last good state, commit {} of {}{}",
-                        ShortCommit(good->commit), good->date,
-                        good->mark.empty() ? "" : fmt::format(", marked {}", good->mark));
-    std::vector<std::string> warnings = history.warnings;
-    base = ReadResults(*good, &warnings);
-    for (const std::string& text : warnings) PrintError("warning: {}\n", open.named(text));
-  });
-  return base;
+  const std::string machine = fresh.empty() ? "" : OriginOf(fresh.front()).machine;
+  const bool only_times = command.options.only == std::vector<std::string>{"times"};
+  return LastGoodRecords({command.history, command.branch}, machine, only_times, name);
 }
 
 JsonObject ComparisonDocument(const ComparisonReport& comparison, int code,

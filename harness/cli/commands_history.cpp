@@ -191,4 +191,26 @@ int HistoryMark(const HistoryMarkCommand& command) {
   return 0;
 }
 
+std::vector<Record> LastGoodRecords(const HistoryPlace& place, const std::string& machine,
+                                    bool only_times, std::string* name) {
+  std::vector<Record> records;
+  ReadPlace(place, [&](const OpenHistory& open) {
+    const History history = ReadHistory(open.folder);
+    const std::optional<HistoryEntry> good =
+        only_times ? LastGoodOfMachine(history, machine) : LastGood(history, machine);
+    if (!good) {
+      throw ConfigError(
+          fmt::format("{}: found {}, expected a good one", open.folder.string(),
+                      history.entries.empty() ? "no commit" : "every commit marked bad"));
+    }
+    *name = fmt::format("BASE: the history's last good state, commit {} of {}{}",
+                        ShortCommit(good->commit), good->date,
+                        good->mark.empty() ? "" : fmt::format(", marked {}", good->mark));
+    std::vector<std::string> warnings = history.warnings;
+    records = ReadResults(*good, &warnings);
+    PrintWarnings(warnings, open);
+  });
+  return records;
+}
+
 }  // namespace loopbench::harness

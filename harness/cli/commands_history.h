@@ -6,7 +6,7 @@
 #include <vector>
 
 #include "harness/history/history_place.h"
-#include "harness/record/select.h"
+#include "harness/record/record.h"
 
 namespace loopbench::harness {
 
@@ -40,5 +40,10 @@ struct HistoryMarkCommand {
   bool keeps_accepted = false;
 };
 int HistoryMark(const HistoryMarkCommand& command);
+
+/// The last good state for new measurements of a machine, as the base of a comparison; `name` says
+/// which one it is. Throws ConfigError when there is none.
+std::vector<Record> LastGoodRecords(const HistoryPlace& place, const std::string& machine,
+                                    bool only_times, std::string* name);
 
 }  // namespace loopbench::harness

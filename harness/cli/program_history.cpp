@@ -7,8 +7,8 @@ namespace loopbench::harness {
 namespace {
 
 constexpr const char* kHistoryFooter = R"(
-A history is a folder (--store) or a branch of the repository that you are in (--branch, made when it is not
-there). Steps are found in the logarithms of each measure of each case on each machine, by the least penalised
+A history is a folder (--store) or a branch of the repository that you are in (--branch, which add begins when it
+is not there). Steps are found in the logarithms of each measure of each case on each machine, by the least penalised
 cost with a bounded loss (Fearnhead and Rigaill 2019), so that single slow runs are none; docs/history.md.
 
 Examples:

@@ -6,6 +6,7 @@
 #include <map>
 #include <span>
 #include <tuple>
+#include <utility>
 
 #include "harness/judge/rules.h"
 #include "harness/judge/statistics.h"
@@ -228,7 +229,8 @@ std::vector<HistorySeries> PoolTimes(std::vector<HistorySeries>* all) {
   std::vector<HistorySeries> pooled;
   for (const auto& [key, cases] : times) {
     if (cases.size() < kMany) continue;
-    const HistorySeries& pool = pooled.emplace_back(Pooled({cases.begin(), cases.end()}));
+    HistorySeries pool = Pooled({cases.begin(), cases.end()});
+    if (pool.values.empty()) continue;
     std::map<std::size_t, double> common;
     for (const HistoryValue& value : pool.values) common[value.entry] = value.value;
     for (HistorySeries* one : cases) {
@@ -237,6 +239,7 @@ std::vector<HistorySeries> PoolTimes(std::vector<HistorySeries>* all) {
         if (value.is_steady && at != common.end()) value.common = at->second;
       }
     }
+    pooled.push_back(std::move(pool));
   }
   return pooled;
 }

@@ -112,7 +112,7 @@ TEST_F(SeriesOfAHistory, TimesOfZeroAreNotPooled) {
   }
   bool is_pooled = false;
   for (const HistorySeries& series : FindingsOf(ReadHistory(folder_)).series) {
-    is_pooled |= series.one == kAllCases;
+    is_pooled |= series.one == kAllCases && series.values.size() == 5;  // all but the third
     for (const HistoryValue& value : series.values) {
       EXPECT_TRUE(std::isfinite(value.value) && value.common > 0.0) << series.one;
       if (series.one == kAllCases) {

@@ -186,7 +186,8 @@ class GitHub(Service):
                 shutil.rmtree(workspace)
                 if not self.enter and "git" not in (place / "home/packages").read_text().split():
                     raise ValueError("found no git before the checkout, which then makes no repository")
-                self.clone(self.URL, ref, event.sha, 1, place, inside=True)
+                # the commit itself, which need not be the last of its branch any more
+                self.clone(self.URL, event.sha, event.sha, 1, place, inside=True)
                 if os.getuid() == 0:  # the runner's user, which the container's is not
                     for path in (workspace, *workspace.rglob("*")):
                         os.chown(path, 1001, 1001)

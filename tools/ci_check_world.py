@@ -66,7 +66,8 @@ class Repository:
         found = {}
         for line in self.git("show", "FETCH_HEAD:history.jsonl").splitlines():
             record = json.loads(line)
-            found[record["commit"]] = record.get("mark", "")
+            if record["kind"] == "mark" or found.get(record["commit"]) != "accepted":  # measured again: that stays
+                found[record["commit"]] = record.get("mark", "")
         return found
 
 

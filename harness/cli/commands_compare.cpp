@@ -4,13 +4,11 @@
 
 #include <algorithm>
 #include <cmath>
-#include <optional>
 #include <ranges>
 #include <set>
 
+#include "harness/cli/commands_history.h"
 #include "harness/history/compare_summary.h"
-#include "harness/history/history.h"
-#include "harness/history/history_branch.h"
 #include "harness/judge/fit.h"
 #include "harness/judge/statistics.h"
 #include "harness/judge/track.h"
@@ -202,26 +200,9 @@ void Choose(const Selection& where, const std::vector<std::string>& match,
 std::vector<Record> LoadBase(const CompareCommand& command, const std::vector<Record>& fresh,
                              std::string* name) {
   if (command.history.empty() && command.branch.empty()) return LoadMeasurements(command.base);
-  std::optional<HistoryBranch> branch;
-  if (!command.branch.empty()) branch.emplace(command.branch, false);
-  const std::filesystem::path folder = branch ? branch->folder() : command.history;
-  const History history = ReadHistory(folder);
   const std::string machine = fresh.empty() ? "" : OriginOf(fresh.front()).machine;
-  // Only times need a base of this machine. For all else the last good state counts, wherever it
-  // was measured: one of this machine may be older than what was accepted since.
   const bool only_times = command.options.only == std::vector<std::string>{"times"};
-  std::optional<HistoryEntry> good = LastGood(history, only_times ? machine : "");
-  for (const HistoryEntry& entry : history.entries) {
-    if (good && entry.commit == good->commit && entry.machine == machine) good = entry;
-  }
-  if (!good) {
-    throw ConfigError(
-        fmt::format("{}: every commit is marked bad, expected a good one", folder.string()));
-  }
-  *name = fmt::format("BASE: the history's last good state, commit {} of {}{}",
-                      ShortCommit(good->commit), good->date,
-                      good->mark.empty() ? "" : fmt::format(", marked {}", good->mark));
-  return LoadMeasurements(good->results);
+  return LastGoodRecords({command.history, command.branch}, machine, only_times, name);
 }
 
 JsonObject ComparisonDocument(const ComparisonReport& comparison, int code,

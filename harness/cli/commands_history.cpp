@@ -6,9 +6,10 @@
 #include <cmath>
 #include <optional>
 
-#include "harness/history/history_branch.h"
+#include "harness/history/git.h"
 #include "harness/history/history_page.h"
 #include "harness/history/history_series.h"
+#include "harness/history/history_steps.h"
 #include "harness/record/json_object.h"
 #include "harness/record/provenance.h"
 #include "harness/store/measurements.h"
@@ -20,26 +21,23 @@
 namespace loopbench::harness {
 namespace {
 
-/// The folder of a place while it is used.
-class OpenPlace {
- public:
-  OpenPlace(const HistoryPlace& place, bool writes) : folder_(place.store) {
-    if (place.store.empty() == place.branch.empty()) {
-      throw ConfigError("history: expected one of --store DIR and --branch NAME");
-    }
-    if (place.branch.empty()) return;
-    branch_.emplace(place.branch, writes);
-    folder_ = branch_->folder();
-  }
-  const std::filesystem::path& folder() const { return folder_; }
-  void Keep(const std::string& message) {
-    if (branch_) branch_->Commit(message);
-  }
+void PrintWarnings(const std::vector<std::string>& warnings, const OpenHistory& open) {
+  for (const std::string& text : warnings) PrintError("warning: {}\n", open.named(text));
+}
 
- private:
-  std::filesystem::path folder_;
-  std::optional<HistoryBranch> branch_;
-};
+/// A history and what is found in it; warnings are printed.
+std::pair<History, HistoryFindings> ReadFindings(const HistoryPlace& place) {
+  History history;
+  HistoryFindings found;
+  ReadPlace(place, [&](const OpenHistory& open) {
+    history = ReadHistory(open.folder);
+    found = FindingsOf(history);
+    for (const std::vector<std::string>& warnings : {history.warnings, found.warnings}) {
+      PrintWarnings(warnings, open);
+    }
+  });
+  return {history, found};
+}
 
 HistoryFindings Chosen(HistoryFindings found, const HistoryShowCommand& command) {
   const auto is_other = [&command](const auto& row) {
@@ -55,53 +53,6 @@ HistoryFindings Chosen(HistoryFindings found, const HistoryShowCommand& command)
                     command.one, command.measure));
   }
   return found;
-}
-
-Table StepTable(const History& history, const HistoryFindings& found) {
-  Table table;
-  table.title = "Steps";
-  table.columns = {{"commit", "first commit"},
-                   {"date", "date"},
-                   {"case", "case"},
-                   {"measure", "measure"},
-                   {"before", "before", Format::kSeconds},
-                   {"after", "after", Format::kSeconds},
-                   {"ratio", "ratio", Format::kSeconds},
-                   {"confidence", "confidence", Format::kSeconds}};
-  std::vector<std::pair<std::size_t, std::vector<Value>>> rows;
-  const auto add = [&](std::size_t place, const std::string& one, const std::string& measure,
-                       std::vector<Value> rest) {
-    const HistoryEntry& entry = history.entries[place];
-    std::vector<Value> row = {ShortCommit(entry.commit), entry.date, one, measure};
-    row.insert(row.end(), rest.begin(), rest.end());
-    rows.push_back({place, std::move(row)});
-  };
-  for (const EndingChange& change : found.endings) {
-    add(change.entry, change.one, change.measure, {change.before, change.after, {}, {}});
-  }
-  for (const HistorySeries& one : found.series) {
-    for (const LevelChange& change : one.changes) {
-      add(one.values[change.at].entry, one.one, one.measure,
-          {change.before, change.after, change.after / change.before, change.Confidence()});
-    }
-  }
-  std::ranges::stable_sort(rows, std::greater<>(), [](const auto& row) { return row.first; });
-  for (const auto& [place, row] : rows) AddRow(row, &table);
-  table.notes.push_back(
-      fmt::format("{} series over {} entries; confidence: 1 less the number of such steps that "
-                  "the noise of all series together would show, at most {}",
-                  found.series.size(), history.entries.size(), kFalseAlarms));
-  std::size_t times = 0, unsteady = 0;
-  for (const HistorySeries& one : found.series) {
-    unsteady += one.Unsteady();
-    times += one.rule == Rule::kTime && one.one != kAllCases ? one.values.size() : 0;
-  }
-  if (unsteady > 0) {
-    table.notes.push_back(fmt::format(
-        "{} of {} times decide nothing: the machine had another speed than usual (yardstick_ns)",
-        unsteady, times));
-  }
-  return table;
 }
 
 Table CommitTable(const History& history) {
@@ -181,18 +132,21 @@ int HistoryAdd(const HistoryAddCommand& command) {
     entry.commit = found.commit;
     if (entry.date.empty()) entry.date = found.date;
   }
-  OpenPlace place(command.place, true);
-  const HistoryEntry added = AddToHistory(place.folder(), entry, records, command.replaces);
-  place.Keep("Measurements of " + ShortCommit(entry.commit));
+  HistoryEntry added;
+  ChangePlace(command.place, /*may_begin=*/true, [&](const OpenHistory& open) {
+    std::vector<std::string> torn;
+    added = AddToHistory(open.folder, entry, records, command.replaces, &torn);
+    PrintWarnings(torn, open);
+    return "Measurements of " + ShortCommit(entry.commit);
+  });
   Print("added {} records of commit {} ({}) on {}\n", records.size(), ShortCommit(added.commit),
         added.date, added.machine);
   return 0;
 }
 
 int HistoryShow(const HistoryShowCommand& command, const std::string& typed) {
-  const OpenPlace place(command.place, false);
-  const History history = ReadHistory(place.folder());
-  const HistoryFindings found = Chosen(FindingsOf(history), command);
+  const auto [history, all] = ReadFindings(command.place);
+  const HistoryFindings found = Chosen(all, command);
   if (command.json) {
     PrintText(FindingsDocument(history, found).Text() + "\n");
     return 0;
@@ -213,9 +167,7 @@ int HistoryShow(const HistoryShowCommand& command, const std::string& typed) {
 }
 
 int HistoryReport(const HistoryReportCommand& command, const std::string& typed) {
-  const OpenPlace place(command.place, false);
-  const History history = ReadHistory(place.folder());
-  const HistoryFindings found = FindingsOf(history);
+  const auto [history, found] = ReadFindings(command.place);
   const std::string page = HistoryPage(history, found, command.title, Provenance(typed));
   const auto out = !command.out.empty()          ? command.out
                    : command.place.store.empty() ? std::filesystem::path("history.html")
@@ -227,12 +179,38 @@ int HistoryReport(const HistoryReportCommand& command, const std::string& typed)
 }
 
 int HistoryMark(const HistoryMarkCommand& command) {
-  OpenPlace place(command.place, true);
-  const std::string commit =
-      MarkInHistory(place.folder(), command.commit, command.mark, command.note);
-  place.Keep(fmt::format("{} is {}", ShortCommit(commit), command.mark));
-  Print("{} is {}\n", commit, command.mark);
+  Mark mark;
+  ChangePlace(command.place, /*may_begin=*/false, [&](const OpenHistory& open) {
+    std::vector<std::string> torn;
+    mark = MarkInHistory(
+        open.folder, {command.commit, command.mark, command.note, command.keeps_accepted}, &torn);
+    PrintWarnings(torn, open);
+    return fmt::format("{} is {}", ShortCommit(mark.commit), mark.mark);
+  });
+  Print("{} is {}\n", mark.commit, mark.mark);
   return 0;
+}
+
+std::vector<Record> LastGoodRecords(const HistoryPlace& place, const std::string& machine,
+                                    bool only_times, std::string* name) {
+  std::vector<Record> records;
+  ReadPlace(place, [&](const OpenHistory& open) {
+    const History history = ReadHistory(open.folder);
+    const std::optional<HistoryEntry> good =
+        only_times ? LastGoodOfMachine(history, machine) : LastGood(history, machine);
+    if (!good) {
+      throw ConfigError(
+          fmt::format("{}: found {}, expected a good one", open.folder.string(),
+                      history.entries.empty() ? "no commit" : "every commit marked bad"));
+    }
+    *name = fmt::format("BASE: the history's last good state, commit {} of {}{}",
+                        ShortCommit(good->commit), good->date,
+                        good->mark.empty() ? "" : fmt::format(", marked {}", good->mark));
+    std::vector<std::string> warnings = history.warnings;
+    records = ReadResults(*good, &warnings);
+    PrintWarnings(warnings, open);
+  });
+  return records;
 }
 
 }  // namespace loopbench::harness

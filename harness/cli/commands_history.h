@@ -5,15 +5,10 @@
 #include <string>
 #include <vector>
 
-#include "harness/record/select.h"
+#include "harness/history/history_place.h"
+#include "harness/record/record.h"
 
 namespace loopbench::harness {
-
-/// A folder, or a branch of the repository that the program is called in: one of both.
-struct HistoryPlace {
-  std::filesystem::path store;
-  std::string branch;
-};
 
 struct HistoryAddCommand {
   HistoryPlace place;
@@ -42,7 +37,13 @@ int HistoryReport(const HistoryReportCommand& command, const std::string& typed)
 struct HistoryMarkCommand {
   HistoryPlace place;
   std::string commit, mark, note;
+  bool keeps_accepted = false;
 };
 int HistoryMark(const HistoryMarkCommand& command);
+
+/// The last good state for new measurements of a machine, as the base of a comparison; `name` says
+/// which one it is. Throws ConfigError when there is none.
+std::vector<Record> LastGoodRecords(const HistoryPlace& place, const std::string& machine,
+                                    bool only_times, std::string* name);
 
 }  // namespace loopbench::harness

@@ -7,8 +7,8 @@ namespace loopbench::harness {
 namespace {
 
 constexpr const char* kHistoryFooter = R"(
-A history is a folder (--store) or a branch of the repository that you are in (--branch, made when it is not
-there). Steps are found in the logarithms of each measure of each case on each machine, by the least penalised
+A history is a folder (--store) or a branch of the repository that you are in (--branch, which add begins when it
+is not there). Steps are found in the logarithms of each measure of each case on each machine, by the least penalised
 cost with a bounded loss (Fearnhead and Rigaill 2019), so that single slow runs are none; docs/history.md.
 
 Examples:
@@ -66,6 +66,8 @@ HistoryOptions::HistoryOptions(CLI::App& app) {
       ->required()
       ->check(CLI::IsMember({"good", "accepted", "bad"}));
   mark_app_->add_option("--note", mark_.note, "Why");
+  mark_app_->add_flag("--keep-accepted", mark_.keeps_accepted,
+                      "Leave it as it is where somebody accepted it (for jobs)");
   AddPlace(mark_app_, &place_);
 }
 

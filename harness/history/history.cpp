@@ -4,12 +4,17 @@
 #include <fmt/ranges.h>
 
 #include <algorithm>
+#include <chrono>
+#include <cstdlib>
+#include <functional>
 #include <set>
+#include <utility>
 
-#include "harness/judge/track.h"
 #include "harness/record/measures.h"
 #include "harness/record/origin.h"
 #include "harness/record/record_json.h"
+#include "harness/record/select.h"
+#include "harness/store/record_lines.h"
 #include "harness/store/result_store.h"
 #include "harness/text/config_error.h"
 #include "harness/text/escape.h"
@@ -20,6 +25,7 @@ namespace loopbench::harness {
 namespace {
 
 constexpr const char* kFile = "history.jsonl";
+constexpr const char* kAccepted = "accepted";
 
 /// Without the series of a run: those of samples of times stay.
 Record Slim(const Record& record) {
@@ -49,9 +55,17 @@ std::string MachineOf(const std::vector<Record>& records) {
 bool IsDate(const std::string& text) {
   constexpr std::string_view kPattern = "dddd-dd-ddTdd:dd:ddZ";
   if (text.size() != 10 && text.size() != kPattern.size()) return false;
-  return std::ranges::equal(text, kPattern.substr(0, text.size()), [](char found, char wanted) {
+  const auto fits = [](char found, char wanted) {
     return wanted == 'd' ? found >= '0' && found <= '9' : found == wanted;
-  });
+  };
+  if (!std::ranges::equal(text, kPattern.substr(0, text.size()), fits)) return false;
+  const auto number = [&text](std::size_t at, std::size_t digits) {
+    return at < text.size() ? std::atoi(text.substr(at, digits).c_str()) : 0;
+  };
+  const std::chrono::year_month_day day(std::chrono::year(number(0, 4)),
+                                        std::chrono::month(static_cast<unsigned>(number(5, 2))),
+                                        std::chrono::day(static_cast<unsigned>(number(8, 2))));
+  return day.ok() && number(11, 2) < 24 && number(14, 2) < 60 && number(17, 2) < 60;
 }
 
 std::filesystem::path FileOf(const std::filesystem::path& folder) { return folder / kFile; }
@@ -81,9 +95,79 @@ void Apply(const Record& line, const std::filesystem::path& folder, History* his
   });
   if (same == entries.end()) {
     entries.push_back(std::move(entry));
-  } else {
-    *same = std::move(entry);  // measured again
+    return;
   }
+  if (same->mark == kAccepted) {  // measured again: what a person said of the commit stays
+    entry.mark = same->mark;
+    entry.note = same->note;
+  }
+  *same = std::move(entry);
+}
+
+/// A file that is not there yet: what was measured before is what an earlier line points at.
+std::filesystem::path NewResults(const std::filesystem::path& folder, const HistoryEntry& entry) {
+  const std::string stem = FileName(entry.commit + "-" + Fnv1a(entry.machine).substr(0, 6));
+  std::filesystem::path results = "results/" + stem + ".jsonl";
+  for (int i = 2; std::filesystem::exists(folder / results); ++i) {
+    results = fmt::format("results/{}-{}.jsonl", stem, i);
+  }
+  return results;
+}
+
+void RequireSomethingToFollow(const HistoryEntry& entry, const std::vector<Record>& records) {
+  const auto has_ended = [](const Record& record) { return !record.Text("outcome").empty(); };
+  if (std::ranges::none_of(records, has_ended)) {
+    throw ConfigError("found no record with an outcome, expected one to follow");
+  }
+  if (!IsDate(entry.date)) {
+    throw ConfigError(fmt::format(
+        "date of commit {}: found \"{}\", expected one in UTC, 2026-11-24 or 2026-11-24T09:30:00Z",
+        entry.commit, entry.date));
+  }
+}
+
+/// The commit that is called so, or the only one whose name begins so.
+std::string CommitNamed(const History& history, const std::string& name,
+                        const std::filesystem::path& folder) {
+  const auto begins_so = [&name](const std::string& commit) {
+    // not within a letter of UTF-8
+    return !name.empty() && commit.starts_with(name) &&
+           (static_cast<unsigned char>(commit.c_str()[name.size()]) & 0xC0u) != 0x80u;
+  };
+  std::set<std::string> found;
+  for (const HistoryEntry& entry : history.entries) {
+    if (entry.commit == name) return name;
+    if (begins_so(entry.commit)) found.insert(entry.commit);
+  }
+  if (found.size() == 1) return *found.begin();
+  throw ConfigError(fmt::format("{}: found {} commits that begin with \"{}\"{}, expected one",
+                                folder.string(), found.size(), name,
+                                found.empty() ? "" : fmt::format(" ({})", fmt::join(found, ", "))));
+}
+
+using IsWanted = std::function<bool(const HistoryEntry&)>;
+
+/// The last of the entries that are wanted and marked good or accepted.
+std::optional<HistoryEntry> LastMarked(const History& history, const IsWanted& is_wanted) {
+  std::optional<HistoryEntry> last;
+  for (const HistoryEntry& entry : history.entries) {
+    if ((entry.mark == "good" || entry.mark == kAccepted) && is_wanted(entry)) last = entry;
+  }
+  return last;
+}
+
+std::optional<HistoryEntry> LastNotBad(const History& history, const IsWanted& is_wanted) {
+  std::optional<HistoryEntry> last;
+  for (const HistoryEntry& entry : history.entries) {
+    if (entry.mark != "bad" && is_wanted(entry)) last = entry;
+  }
+  return last;
+}
+
+bool IsAny(const HistoryEntry&) { return true; }
+
+IsWanted IsOf(const std::string& machine) {
+  return [machine](const HistoryEntry& entry) { return entry.machine == machine; };
 }
 
 }  // namespace
@@ -102,24 +186,35 @@ History ReadHistory(const std::filesystem::path& folder) {
                     FileOf(folder).string()));
   }
   History history;
-  for (const Record& line : ReadRecords(FileOf(folder))) Apply(line, folder, &history);
+  for (const Record& line : ReadRecords(FileOf(folder), &history.warnings)) {
+    Apply(line, folder, &history);
+  }
   std::ranges::stable_sort(history.entries, {}, &HistoryEntry::date);
   return history;
 }
 
+std::vector<Record> ReadResults(const HistoryEntry& entry, std::vector<std::string>* warnings) {
+  // whatever the file is called: names once had their ending in the middle
+  std::vector<Record> records;
+  LineReader reader(entry.results, [&records](Record record, const LinePlace&) {
+    records.push_back(std::move(record));
+  });
+  reader.Feed(ReadFile(entry.results));
+  reader.End();
+  if (!reader.warning().empty()) warnings->push_back(reader.warning());
+  records = LatestRecords(records);
+  SortRows(&records);
+  return records;
+}
+
 HistoryEntry AddToHistory(const std::filesystem::path& folder, HistoryEntry entry,
-                          const std::vector<Record>& records, bool replaces) {
-  if (TrackRecords(records).values.empty()) {
-    throw ConfigError("found no record that finished with a measure, expected one to follow");
-  }
-  if (!IsDate(entry.date)) {
-    throw ConfigError(fmt::format(
-        "date of commit {}: found \"{}\", expected one in UTC, 2026-11-24 or 2026-11-24T09:30:00Z",
-        entry.commit, entry.date));
-  }
+                          const std::vector<Record>& records, bool replaces,
+                          std::vector<std::string>* warnings) {
+  RequireSomethingToFollow(entry, records);
   entry.machine = MachineOf(records);
-  entry.results =
-      "results/" + FileName(entry.commit + "-" + Fnv1a(entry.machine).substr(0, 6) + ".jsonl");
+  if (warnings != nullptr && std::filesystem::exists(FileOf(folder))) {
+    *warnings = ReadHistory(folder).warnings;  // before the torn line is taken away
+  }
   ResultStore lines(FileOf(folder), /*waits=*/true);  // one writer at a time
   const History history = ReadHistory(folder);
   const bool is_there = std::ranges::any_of(history.entries, [&entry](const HistoryEntry& one) {
@@ -131,6 +226,7 @@ HistoryEntry AddToHistory(const std::filesystem::path& folder, HistoryEntry entr
         "measurements in its place",
         folder.string(), entry.commit));
   }
+  entry.results = NewResults(folder, entry);
   std::string text;
   for (const Record& record : records) text += ToJsonLine(Slim(record)) + '\n';
   MakeFolderOf(folder / entry.results);
@@ -141,42 +237,63 @@ HistoryEntry AddToHistory(const std::filesystem::path& folder, HistoryEntry entr
   line.Set("date", entry.date);
   line.Set("machine", entry.machine);
   line.Set("results", entry.results.string());
-  lines.Append(line);
   entry.results = folder / entry.results;
+  try {
+    lines.Append(line);
+  } catch (...) {
+    std::error_code ignored;
+    std::filesystem::remove(entry.results, ignored);
+    throw;
+  }
   return entry;
 }
 
-std::string MarkInHistory(const std::filesystem::path& folder, const std::string& commit,
-                          const std::string& mark, const std::string& note) {
-  const History history = ReadHistory(folder);
-  std::set<std::string> found;
-  for (const HistoryEntry& entry : history.entries) {
-    if (entry.commit.starts_with(commit)) found.insert(entry.commit);
-  }
-  if (found.size() != 1) {
-    throw ConfigError(fmt::format(
-        "{}: found {} commits that begin with \"{}\"{}, expected one", folder.string(),
-        found.size(), commit, found.empty() ? "" : fmt::format(" ({})", fmt::join(found, ", "))));
+Mark MarkInHistory(const std::filesystem::path& folder, Mark mark,
+                   std::vector<std::string>* warnings) {
+  History history = ReadHistory(folder);  // throws where there is none: a mark begins none
+  if (warnings != nullptr) *warnings = history.warnings;
+  mark.commit = CommitNamed(history, mark.commit, folder);
+  ResultStore lines(FileOf(folder), /*waits=*/true);
+  history = ReadHistory(folder);
+  if (mark.keeps_accepted) {
+    for (const HistoryEntry& entry : history.entries) {
+      if (entry.commit != mark.commit || entry.mark != kAccepted) continue;
+      mark.mark = entry.mark;
+      mark.note = entry.note;
+      return mark;
+    }
   }
   Record line;
   line.Set("kind", std::string("mark"));
-  line.Set("commit", *found.begin());
-  line.Set("mark", mark);
-  line.Set("note", note);
-  ResultStore(FileOf(folder), /*waits=*/true).Append(line);
-  return *found.begin();
+  line.Set("commit", mark.commit);
+  line.Set("mark", mark.mark);
+  line.Set("note", mark.note);
+  lines.Append(line);
+  return mark;
 }
 
 std::optional<HistoryEntry> LastGood(const History& history, const std::string& machine) {
-  const bool knows_machine = std::ranges::any_of(
-      history.entries, [&machine](const HistoryEntry& one) { return one.machine == machine; });
-  std::optional<HistoryEntry> good, last;
-  for (const HistoryEntry& entry : history.entries) {
-    if (knows_machine && entry.machine != machine) continue;
-    if (entry.mark == "good" || entry.mark == "accepted") good = entry;
-    if (entry.mark != "bad") last = entry;
+  std::optional<HistoryEntry> good = LastMarked(history, IsOf(machine));
+  if (good) {
+    bool is_behind = false;
+    for (const HistoryEntry& entry : history.entries) {
+      if (is_behind && entry.mark == kAccepted) good = entry;
+      is_behind |= entry.commit == good->commit && entry.machine == machine;
+    }
   }
-  return good ? good : last;
+  if (!good) good = LastMarked(history, IsAny);
+  if (!good) good = LastNotBad(history, IsOf(machine));
+  if (!good) good = LastNotBad(history, IsAny);
+  for (const HistoryEntry& entry : history.entries) {
+    if (good && entry.commit == good->commit && entry.machine == machine) good = entry;
+  }
+  return good;
+}
+
+std::optional<HistoryEntry> LastGoodOfMachine(const History& history, const std::string& machine) {
+  std::optional<HistoryEntry> good = LastMarked(history, IsOf(machine));
+  if (!good) good = LastNotBad(history, IsOf(machine));
+  return good ? good : LastGood(history, machine);
 }
 
 }  // namespace loopbench::harness

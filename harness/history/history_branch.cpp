@@ -1,77 +1,78 @@
 #include "harness/history/history_branch.h"
 
 #include <fmt/format.h>
-#include <stdlib.h>
 
 #include <stdexcept>
 #include <utility>
-#include <vector>
 
 #include "harness/text/config_error.h"
-#include "harness/text/files.h"
-#include "harness/text/run_program.h"
 
 namespace loopbench::harness {
 namespace {
 
-std::string Git(std::vector<std::string> words) {
-  words.insert(words.begin(), "git");
-  ProgramResult result = RunProgram(std::move(words));
-  if (const std::string failure = result.Failure("git"); !failure.empty()) {
-    throw std::runtime_error(failure);
-  }
-  while (!result.output.empty() && result.output.back() == '\n') result.output.pop_back();
-  return result.output;
+void RequireBranchName(const GitRepository& git, const std::string& branch) {
+  if (git.Try({"check-ref-format", "refs/heads/" + branch}).status == 0) return;
+  throw ConfigError(fmt::format("--branch: found \"{}\", expected the name of a branch", branch));
 }
 
-bool HasBranch(const std::string& branch) {
-  return RunProgram({"git", "rev-parse", "--verify", "--quiet", "refs/heads/" + branch}).status ==
-         0;
+void RequireHistory(const GitRepository& git, const std::string& branch, const std::string& at) {
+  const std::string files = "\n" + git.Get({"ls-tree", "--name-only", at}) + "\n";
+  if (files == "\n\n" || files.find("\nhistory.jsonl\n") != std::string::npos) return;
+  throw ConfigError(
+      fmt::format("--branch: found \"{}\" with files but no history.jsonl, expected a branch of "
+                  "its own for a history; loopbench history add begins one",
+                  branch));
 }
 
 }  // namespace
 
-HistoryBranch::HistoryBranch(std::string branch, bool writes) : branch_(std::move(branch)) {
-  if (!writes && !HasBranch(branch_)) {
+HistoryBranch::HistoryBranch(std::string branch, bool may_begin)
+    : branch_(std::move(branch)),
+      temporary_("loopbench-history"),
+      folder_(temporary_.path() / "branch") {
+  RequireBranchName(git_, branch_);
+  at_ = git_.BranchAt(branch_).value_or("");
+  if (at_.empty() && !may_begin) {
     throw ConfigError(fmt::format(
         "found no branch \"{0}\" in a git repository here, expected a history; loopbench history "
         "add begins one, git fetch origin {0}:{0} brings that of a server",
         branch_));
   }
-  std::string name = (std::filesystem::temp_directory_path() / "loopbench-history-XXXXXX").string();
-  if (::mkdtemp(name.data()) == nullptr) FailOn("make", name);
-  folder_ = std::filesystem::path(name) / "branch";
-  if (!HasBranch(branch_)) {
-    // an empty commit without parents: the history has nothing to do with the code's
-    const std::string tree = Git({"hash-object", "-t", "tree", "-w", "/dev/null"});
-    const std::string root = Git({"commit-tree", tree, "-m", "A history of measurements"});
-    Git({"update-ref", "refs/heads/" + branch_, root});
+  std::filesystem::create_directory(folder_);
+  if (at_.empty()) return;
+  RequireHistory(git_, branch_, at_);
+  const std::vector<std::string> index = {"GIT_INDEX_FILE=" + Index("read")};
+  git_.Get({"read-tree", at_}, index);
+  const std::string tree = folder_.string();
+  git_.Get({"-C", tree, "--work-tree=" + tree, "checkout-index", "--all", "--quiet"}, index);
+}
+
+std::string HistoryBranch::Named(std::string message) const {
+  const std::string folder = folder_.string();
+  for (std::size_t at = 0; (at = message.find(folder, at)) != std::string::npos;) {
+    const bool is_within = message.compare(at + folder.size(), 1, "/") == 0;
+    const std::string name = branch_ + (is_within ? ":" : "");
+    message.replace(at, folder.size() + (is_within ? 1 : 0), name);
+    at += name.size();
   }
-  std::vector<std::string> words = {"worktree", "add", "--quiet", folder_.string(), branch_};
-  if (!writes) words.insert(words.begin() + 2, "--detach");
-  Git(std::move(words));
+  return message;
 }
 
-HistoryBranch::~HistoryBranch() {
-  RunProgram({"git", "worktree", "remove", "--force", folder_.string()});
-  std::error_code ignored;
-  std::filesystem::remove_all(folder_.parent_path(), ignored);
-}
-
-void HistoryBranch::Commit(const std::string& message) {
-  Git({"-C", folder_.string(), "add", "--all"});
-  if (Git({"-C", folder_.string(), "status", "--porcelain"}).empty()) return;
-  // hooks are made for the code, which this branch has nothing of
-  Git({"-C", folder_.string(), "commit", "--quiet", "--no-verify", "-m", message});
-}
-
-CheckedOut FindCommit(const std::string& commit) {
-  // %cI has the committer's time zone: UTC dates can be sorted as texts
-  const ProgramResult result = RunProgram({"env", "TZ=UTC", "git", "show", "-s", "--format=%H %cd",
-                                           "--date=format-local:%Y-%m-%dT%H:%M:%SZ", commit});
-  const std::size_t space = result.output.find(' ');
-  if (result.Failure("git") != "" || space == std::string::npos) return {};
-  return {result.output.substr(0, space), result.output.substr(space + 1, 20)};
+bool HistoryBranch::Commit(const std::string& message) {
+  const std::string commit = git_.Commit(folder_.string(), Index("written"), at_, message);
+  if (commit == at_) return true;
+  if (const std::string where = git_.CheckedOutIn(branch_); !where.empty()) {
+    throw ConfigError(fmt::format(
+        "--branch: found \"{}\" checked out in {}, expected a branch that is in no work tree",
+        branch_, where));
+  }
+  // git refuses when the branch is not at at_ any more; "" is a branch that is not there yet
+  const ProgramResult moved =
+      git_.Try({"update-ref", "-m", message, "refs/heads/" + branch_, commit,
+                at_.empty() ? std::string(commit.size(), '0') : at_});
+  if (moved.Failure("git").empty()) return true;
+  if (git_.BranchAt(branch_).value_or("") != at_) return false;
+  throw std::runtime_error(moved.Failure("git"));
 }
 
 }  // namespace loopbench::harness

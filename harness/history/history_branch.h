@@ -4,36 +4,36 @@
 #include <filesystem>
 #include <string>
 
+#include "harness/history/git.h"
+#include "harness/text/temporary_folder.h"
+
 namespace loopbench::harness {
 
-/// The branch's files in a temporary folder (git worktree), of the repository that the program was
-/// called in.
+/// The branch's files in a temporary folder, of the repository that the program was called in.
+/// Nothing of the repository changes before Commit(), and several may be at work at once.
 class HistoryBranch {
  public:
-  /// Throws std::runtime_error with what git said, and ConfigError when there is no such branch and
-  /// it may not begin.
-  /// @param writes  a branch that is not there begins empty; else nothing of the repository
-  ///                changes, and several may read at once
-  explicit HistoryBranch(std::string branch, bool writes = true);
-  ~HistoryBranch();
-  HistoryBranch(const HistoryBranch&) = delete;
-  HistoryBranch& operator=(const HistoryBranch&) = delete;
+  /// Throws ConfigError when there is no such branch and it may not begin, when it holds anything
+  /// but a history or is checked out somewhere; std::runtime_error with what git said.
+  explicit HistoryBranch(std::string branch, bool may_begin = false);
 
   const std::filesystem::path& folder() const { return folder_; }
 
-  /// Commits all changes to the branch; nothing when there are none. Throws as above.
-  void Commit(const std::string& message);
+  /// The message with the branch's name in the place of the folder's: "measured:history.jsonl".
+  std::string Named(std::string message) const;
+
+  /// Puts all changes onto the branch, which begins here where it is to; nothing when there are
+  /// none. False when somebody else changed the branch meanwhile: the changes are then to be made
+  /// again, to a new HistoryBranch. Throws std::runtime_error with what git said.
+  bool Commit(const std::string& message);
 
  private:
-  std::string branch_;
+  std::string Index(const char* name) const { return (temporary_.path() / name).string(); }
+
+  GitRepository git_;
+  std::string branch_, at_;  ///< at_: the commit that was read, "" where the branch is to begin
+  TemporaryFolder temporary_;
   std::filesystem::path folder_;
 };
-
-/// The commit that is checked out and its date (ISO 8601, UTC); "" and "" outside of a repository.
-struct CheckedOut {
-  std::string commit, date;
-};
-/// @param commit  another one than that which is checked out, by any name git knows
-CheckedOut FindCommit(const std::string& commit = "HEAD");
 
 }  // namespace loopbench::harness

@@ -5,6 +5,7 @@
 #include <algorithm>
 #include <cmath>
 
+#include "harness/history/history_steps.h"
 #include "harness/view/html.h"
 #include "harness/view/svg.h"
 
@@ -47,8 +48,10 @@ std::vector<double> Ticks(double from, double to, bool logarithmic, int most) {
                                : raw / power <= 2.0 ? 2.0
                                : raw / power <= 5.0 ? 5.0
                                                     : 10.0);
-  for (double tick = std::ceil(from / step) * step; tick <= to + 1e-9 * step; tick += step) {
-    ticks.push_back(tick);
+  // counted: a step that is lost in the last digits of a tick would never come to an end
+  const double first = std::ceil(from / step);
+  for (int i = 0; i <= most && (first + i) * step <= to + 1e-9 * step; ++i) {
+    ticks.push_back((first + i) * step);
   }
   return ticks;
 }
@@ -63,7 +66,8 @@ struct Chart {
     low = std::ranges::min_element(series.values, {}, &HistoryValue::value)->value;
     high = std::ranges::max_element(series.values, {}, &HistoryValue::upper)->upper;
     logarithmic = low > 0.0 && high / low > 20.0;
-    if (high <= low) {
+    // what differs in the last bits alone is drawn as equal: an axis needs numbers between
+    if (high - low <= 4e-12 * std::max(std::abs(low), std::abs(high))) {
       const double room = high == 0.0 ? 1.0 : 0.1 * std::abs(high);
       low -= room;
       high += room;
@@ -92,12 +96,16 @@ struct Chart {
         "of {3} over {4} "
         "commits\">\n",
         kWidth, kHeight, EscapeXml(series.measure), EscapeXml(series.one), series.values.size());
+    // as many digits as tell ticks apart
+    const double most = std::max(std::abs(low), std::abs(high));
+    const int digits =
+        std::clamp(2 + static_cast<int>(std::ceil(std::log10(most / (high - low)))), 4, 15);
     for (const double tick : Ticks(low, high, logarithmic, 5)) {
       svg += fmt::format(
           "<line class=\"grid\" x1=\"{}\" x2=\"{}\" y1=\"{:.1f}\" y2=\"{:.1f}\"/><text x=\"{}\" "
           "y=\"{:.1f}\" "
-          "text-anchor=\"end\">{:.4g}</text>\n",
-          kLeft, kWidth - kRight, Y(tick), Y(tick), kLeft - 6, Y(tick) + 4, tick);
+          "text-anchor=\"end\">{:.{}g}</text>\n",
+          kLeft, kWidth - kRight, Y(tick), Y(tick), kLeft - 6, Y(tick) + 4, tick, digits);
     }
     const double bottom = kHeight - kBottom;
     svg += fmt::format(
@@ -130,10 +138,12 @@ struct Chart {
     }
     for (const LevelChange& change : series.changes) {
       const double x = 0.5 * (X(change.at - 1) + X(change.at));
+      const std::string ratio =
+          change.before > 0.0 ? fmt::format("x {:.3g}", change.after / change.before) : "from 0";
       svg += fmt::format(
           "<line class=\"step\" x1=\"{0:.1f}\" x2=\"{0:.1f}\" y1=\"{1}\" y2=\"{2}\"/>"
-          "<text x=\"{3:.1f}\" y=\"{4}\">x {5:.3g}</text>\n",
-          x, kTop, bottom, x + 3, kTop + 12, change.after / change.before);
+          "<text x=\"{3:.1f}\" y=\"{4}\">{5}</text>\n",
+          x, kTop, bottom, x + 3, kTop + 12, ratio);
     }
     for (std::size_t i = 0; i < series.values.size(); ++i) {
       const HistoryValue& one = series.values[i];
@@ -153,37 +163,27 @@ struct Chart {
   }
 };
 
-std::string StepRow(const HistoryEntry& entry, const std::string& one, const std::string& measure,
-                    const std::string& before, const std::string& after, const std::string& more) {
-  return fmt::format(
-      "<tr><td>{}</td><td>{}</td><td>{}</td><td>{}</td><td class=\"n\">{}</td><td "
-      "class=\"n\">{}</td>{}</tr>\n",
-      EscapeXml(ShortCommit(entry.commit)), EscapeXml(entry.date), EscapeXml(one),
-      EscapeXml(measure), EscapeXml(before), EscapeXml(after), more);
-}
-
-std::string StepTable(const History& history, const HistoryFindings& found) {
-  std::string rows;
-  for (const EndingChange& change : found.endings) {
-    rows += StepRow(history.entries[change.entry], change.one, change.measure, change.before,
-                    change.after, "<td></td><td></td>");
-  }
-  for (const HistorySeries& one : found.series) {
-    for (const LevelChange& change : one.changes) {
-      rows += StepRow(history.entries[one.values[change.at].entry], one.one, one.measure,
-                      fmt::format("{:.4g}", change.before), fmt::format("{:.4g}", change.after),
-                      fmt::format("<td class=\"n {}\">{:.4g}</td><td class=\"n\">{:.3f}</td>",
-                                  change.after > change.before ? "worse" : "",
-                                  change.after / change.before, change.Confidence()));
-    }
-  }
-  if (rows.empty()) {
+std::string StepRows(const History& history, const HistoryFindings& found) {
+  const Table table = StepTable(history, found);
+  if (table.rows.empty()) {
     return "<p>No step found: every series keeps its level, every case its ending.</p>\n";
   }
-  return "<div class=\"wide\"><table><thead><tr><th>first "
-         "commit</th><th>date</th><th>case</th><th>measure</th><th>before</th>"
-         "<th>after</th><th>ratio</th><th>confidence</th></tr></thead><tbody>\n" +
-         rows + "</tbody></table></div>\n";
+  std::string text = "<div class=\"wide\"><table><thead><tr>";
+  for (const TableColumn& column : table.columns) text += "<th>" + column.header + "</th>";
+  text += "</tr></thead><tbody>\n";
+  for (const Record& row : table.rows) {
+    text += "<tr>";
+    for (const TableColumn& column : table.columns) {
+      const bool is_worse = column.key == "ratio" && row.Number("ratio") > 1.0;
+      text += fmt::format("<td{}>{}</td>",
+                          is_worse                            ? " class=\"n worse\""
+                          : column.format == Format::kSeconds ? " class=\"n\""
+                                                              : "",
+                          EscapeXml(Cell(row, column)));
+    }
+    text += "</tr>\n";
+  }
+  return text + "</tbody></table></div>\n";
 }
 
 }  // namespace
@@ -204,7 +204,7 @@ std::string HistoryPage(const History& history, const HistoryFindings& found,
       "all)</p></header>\n<main>\n"
       "<h2>Steps</h2>\n",
       EscapeXml(title), history.entries.size(), found.series.size(), found.Steps(), kFalseAlarms);
-  page += StepTable(history, found);
+  page += StepRows(history, found);
   page +=
       "<h2>Series</h2>\n<p class=\"soft\">Dots: a commit each; of times the least, with a line up "
       "to the 90th percentile. "

@@ -4,13 +4,14 @@
 #include <cmath>
 #include <limits>
 #include <map>
+#include <span>
 #include <tuple>
+#include <utility>
 
 #include "harness/judge/rules.h"
 #include "harness/judge/statistics.h"
 #include "harness/judge/track.h"
 #include "harness/record/noise.h"
-#include "harness/store/measurements.h"
 
 namespace loopbench::harness {
 namespace {
@@ -18,15 +19,19 @@ namespace {
 /// What a change of each kind of measure must be at least, as `compare` has it (compare.h), and the
 /// noise that is assumed where a series has none: a third of it, so that one value that far off is
 /// just no outlier.
-Resolution ResolutionOf(Rule rule, double places) {
+/// @param most  largest value of the series
+Resolution ResolutionOf(Rule rule, double most, double places) {
   switch (rule) {
     case Rule::kTime:
       // below the 2 % that one comparison of two runs can see: many runs see more
       return {.noise = 0.002, .least = 0.01, .places = places};
     case Rule::kInstructions:
       return {.noise = std::log(1.02) / 3.0, .least = std::log(1.02), .places = places};
-    case Rule::kCount:
-      return {.noise = 1e-7, .least = 1e-6, .places = places};  // any change below a million
+    case Rule::kCount: {
+      // any: half of what one more is, as long as logarithms can tell the two apart
+      const double least = std::max(0.5 * std::log1p(1.0 / std::max(most, 1.0)), 1e-13);
+      return {.noise = least / 3.0, .least = least, .places = places};
+    }
     default:
       return {.noise = std::log(1.05) / 3.0, .least = std::log(1.05), .places = places};
   }
@@ -46,6 +51,16 @@ Rule RuleOfTracked(const std::string& measure) {
   return Rule::kNone;
 }
 
+/// NaN where none is steady.
+double MedianOfSteady(const HistorySeries& series) {
+  std::vector<double> steady;
+  for (const HistoryValue& value : series.values) {
+    if (value.is_steady) steady.push_back(value.value);
+  }
+  return Median(steady);
+}
+
+/// @param cases  of which each has a median above 0
 HistorySeries Pooled(const std::vector<const HistorySeries*>& cases) {
   HistorySeries pooled;
   pooled.machine = cases.front()->machine;
@@ -55,16 +70,14 @@ HistorySeries Pooled(const std::vector<const HistorySeries*>& cases) {
   pooled.unit = "of the median";
   std::map<std::size_t, std::vector<double>> ratios;
   for (const HistorySeries* one : cases) {
-    std::vector<double> steady;
+    const double usual = MedianOfSteady(*one);
     for (const HistoryValue& value : one->values) {
-      if (value.is_steady) steady.push_back(value.value);
-    }
-    for (const HistoryValue& value : one->values) {
-      if (value.is_steady) ratios[value.entry].push_back(value.value / Median(steady));
+      if (value.is_steady) ratios[value.entry].push_back(value.value / usual);
     }
   }
   for (const auto& [entry, values] : ratios) {
     const double middle = Median(values);
+    if (!(middle > 0.0)) continue;  // a clock that stood still
     pooled.values.push_back({.entry = entry, .value = middle, .upper = middle});
   }
   return pooled;
@@ -95,8 +108,11 @@ class Endings {
  public:
   void Add(const std::string& machine, std::size_t entry, const std::vector<Record>& records,
            std::vector<EndingChange>* changes) {
+    std::map<std::string, int> times_there;
+    for (const Record& record : records) ++times_there[CaseText(record)];
     for (const Record& record : records) {
       const std::string one = CaseText(record);
+      if (times_there[one] > 1) continue;  // nobody knows which it was before
       for (const char* measure : {"outcome", "doubts"}) {
         if (record.Find(measure) == nullptr) continue;
         std::string now = record.Text(measure);
@@ -113,34 +129,60 @@ class Endings {
   std::map<Key, std::string> last_;
 };
 
-/// Finds the changes of a series. Levels are compared as logarithms; a value of 0 counts as the
-/// smallest positive one of the series.
-void FindChangesOf(HistorySeries* series, double places) {
-  double smallest = std::numeric_limits<double>::infinity();
-  for (const HistoryValue& one : series->values) {
-    if (one.value > 0.0) smallest = std::min(smallest, one.value);
+/// Values below count as this one, so that there is a logarithm: NaN where there is nothing to say.
+double FloorOf(const HistorySeries& series) {
+  switch (series.rule) {
+    case Rule::kError:
+      return kErrorFloor;
+    case Rule::kCount:
+    case Rule::kInstructions:
+      return 0.5;  // none is as far from one as one from two
+    default:
+      break;
   }
-  if (!std::isfinite(smallest)) return;
-  if (series->rule == Rule::kError) smallest = std::max(smallest, kErrorFloor);
+  double smallest = std::numeric_limits<double>::quiet_NaN();
+  for (const HistoryValue& one : series.values) {
+    if (one.value > 0.0) smallest = std::fmin(smallest, one.value);
+  }
+  return smallest;
+}
+
+/// Finds the changes of a series. Levels are compared as logarithms.
+void FindChangesOf(HistorySeries* series, double places) {
+  const double floor = FloorOf(*series);
+  if (std::isnan(floor)) return;
+  double most = 0.0;
   std::vector<std::size_t> steady;  // their places
-  std::vector<double> logarithms, without;
+  std::vector<double> values, logarithms, without;
   for (std::size_t i = 0; i < series->values.size(); ++i) {
     const HistoryValue& one = series->values[i];
     if (!one.is_steady) continue;
+    most = std::max(most, one.value);
     steady.push_back(i);
-    logarithms.push_back(std::log(std::max(one.value, smallest)));
+    values.push_back(one.value);
+    logarithms.push_back(std::log(std::max(one.value, floor)));
     without.push_back(logarithms.back() - std::log(one.common));
   }
   // where cases vary on their own, what a few of them do would only be added to the others
   if (NoiseOf(without).LongRun() < kQuieter * NoiseOf(logarithms).LongRun()) {
     logarithms.swap(without);
+    for (std::size_t i = 0; i < steady.size(); ++i) {
+      values[i] /= series->values[steady[i]].common;
+    }
   }
-  for (LevelChange change : FindChanges(logarithms, ResolutionOf(series->rule, places))) {
-    change.at = steady[change.at];
-    change.before = std::exp(change.before);
-    change.after = std::exp(change.after);
-    series->changes.push_back(change);
+  series->changes = FindChanges(logarithms, ResolutionOf(series->rule, most, places));
+  const auto median = [&](std::size_t from, std::size_t to) {
+    return Median(std::span(values).subspan(from, to - from));
+  };
+  std::size_t begin = 0;
+  for (std::size_t k = 0; k < series->changes.size(); ++k) {
+    LevelChange& change = series->changes[k];
+    const bool is_last = k + 1 == series->changes.size();
+    change.before = median(begin, change.at);
+    change.after = median(change.at, is_last ? values.size() : series->changes[k + 1].at);
+    begin = change.at;
   }
+  for (LevelChange& change : series->changes) change.at = steady[change.at];
 }
 
 /// Marks times at which the machine had another speed than usual about then: that of the fastest
@@ -181,19 +223,23 @@ std::vector<HistorySeries> PoolTimes(std::vector<HistorySeries>* all) {
   constexpr std::size_t kMany = 5;
   std::map<std::pair<std::string, std::string>, std::vector<HistorySeries*>> times;
   for (HistorySeries& one : *all) {
-    if (one.rule == Rule::kTime) times[{one.machine, one.measure}].push_back(&one);
+    if (one.rule != Rule::kTime || !(MedianOfSteady(one) > 0.0)) continue;
+    times[{one.machine, one.measure}].push_back(&one);
   }
   std::vector<HistorySeries> pooled;
   for (const auto& [key, cases] : times) {
     if (cases.size() < kMany) continue;
-    const HistorySeries& pool = pooled.emplace_back(Pooled({cases.begin(), cases.end()}));
+    HistorySeries pool = Pooled({cases.begin(), cases.end()});
+    if (pool.values.empty()) continue;
     std::map<std::size_t, double> common;
     for (const HistoryValue& value : pool.values) common[value.entry] = value.value;
     for (HistorySeries* one : cases) {
       for (HistoryValue& value : one->values) {
-        if (value.is_steady) value.common = common[value.entry];
+        const auto at = common.find(value.entry);
+        if (value.is_steady && at != common.end()) value.common = at->second;
       }
     }
+    pooled.push_back(std::move(pool));
   }
   return pooled;
 }
@@ -215,7 +261,7 @@ HistoryFindings FindingsOf(const History& history) {
   Endings endings;
   std::map<Key, std::size_t> places;
   for (std::size_t e = 0; e < history.entries.size(); ++e) {
-    const std::vector<Record> records = ReadMeasurements(history.entries[e].results);
+    const std::vector<Record> records = ReadResults(history.entries[e], &found.warnings);
     AddValues(history.entries[e].machine, e, records, &places, &found.series);
     endings.Add(history.entries[e].machine, e, records, &found.endings);
   }

@@ -18,7 +18,8 @@ struct HistoryValue {
   /// Of times: the machine was as fast as it usually is about then, or it is not known how fast it
   /// was. What it did at another speed says nothing of levels.
   bool is_steady = true;
-  /// Of times: by what all cases of the entry were slower than usual; 1 where there are few cases.
+  /// Of times: by what all cases of the entry were slower than usual; 1 where there are few cases,
+  /// or none that took any time.
   double common = 1.0;
 };
 
@@ -28,7 +29,9 @@ struct HistorySeries {
   std::string measure, unit;
   Rule rule = Rule::kNone;
   std::vector<HistoryValue> values;
-  std::vector<LevelChange> changes;  ///< at: place in `values`; levels as measured
+  /// at: place in `values`; levels: medians of the values, of times without what all cases share
+  /// where it is without it that they are found
+  std::vector<LevelChange> changes;
 
   std::size_t Unsteady() const;  ///< values at another speed of the machine
 };
@@ -47,6 +50,7 @@ struct EndingChange {
 struct HistoryFindings {
   std::vector<HistorySeries> series;
   std::vector<EndingChange> endings;
+  std::vector<std::string> warnings;  ///< torn lines of results
 
   std::size_t Steps() const;  ///< of both
 };

@@ -81,15 +81,25 @@ TEST_F(CommandLineHistory, OfABranchAndAsABase) {
   ExpectEnding(Call("history add second --branch measured"), 0, {});
   ExpectEnding(Call("compare --branch measured second"), 0, {"SAME"});
   ExpectEnding(Call("history mark HEAD bad --branch measured"), 2, {"found 0 commits"});
-  EXPECT_EQ(Shell("git log --format=%s measured | wc -l | grep -qx 3").code, 0);
+  EXPECT_EQ(Shell("git log --format=%s measured | wc -l | grep -qx 2").code, 0);
   // no work tree of the branch is left
   EXPECT_EQ(Shell("git worktree list | wc -l | grep -qx 1").code, 0);
+}
+
+TEST_F(CommandLineHistory, CompareNeedsACommit) {
+  fs::create_directory(folder_ / "past");
+  Write("past/history.jsonl", "");
+  ExpectEnding(Call("compare first --history past"), 2, {"past: found no commit"});
+  ExpectEnding(Call("history add first --store past --commit a --date 2026-01-01"), 0, {});
+  ExpectEnding(Call("history mark a bad --store past"), 0, {});
+  ExpectEnding(Call("compare first --history past"), 2, {"past: found every commit marked bad"});
 }
 
 TEST_F(CommandLineHistory, CompareNeedsOneBase) {
   ExpectEnding(Call("compare first"), 2, {"--history"});
   ExpectEnding(Call("compare first first --history past"), 2, {"NEW alone"});
-  ExpectEnding(Call("compare first --branch nothing-here"), 2, {});
+  ExpectEnding(Call("compare first --branch nothing-here"), 2,
+               {"found no branch \"nothing-here\"", "history add begins one"});
 }
 
 }  // namespace cli_history_test

@@ -7,7 +7,6 @@
 #include <string>
 #include <vector>
 
-#include "harness/history/history_page.h"
 #include "harness/history/history_series.h"
 #include "harness/store/result_store.h"
 #include "harness/text/config_error.h"
@@ -68,11 +67,65 @@ TEST_F(HistoryOf, NamesOfCommitsAreNoPaths) {
   std::set<fs::path> files;
   for (const HistoryEntry& entry : ReadHistory(folder_).entries) files.insert(entry.results);
   EXPECT_EQ(files.size(), 3u);
+  EXPECT_EQ(added.results.extension(), ".jsonl");
+  EXPECT_EQ(FindingsOf(ReadHistory(folder_)).series.size(), 2u);  // steps and drift
+}
+
+// Of a history that an earlier version wrote: the ending stands before the hash.
+TEST_F(HistoryOf, ResultsAreReadWhateverTheirEnding) {
+  const HistoryEntry added = Add(1, {Measured("bar", 1e-3, 7)});
+  const std::string old = "x-00.jsonl-73cea767";
+  fs::rename(added.results, folder_ / "results" / old);
+  Record line = ReadRecords(folder_ / "history.jsonl").front();
+  line.Set("results", "results/" + old);
+  fs::remove(folder_ / "history.jsonl");
+  ResultStore(folder_ / "history.jsonl").Append(line);
+  EXPECT_EQ(FindingsOf(ReadHistory(folder_)).series.size(), 2u);
+}
+
+TEST_F(HistoryOf, CommitsWhoseCasesAllFailAreKept) {
+  std::vector<Record> records = {Measured("bar", 1e-3, 7)};
+  Add(1, records);
+  records[0].Set("outcome", std::string("time limit"));
+  Add(2, records);
+  EXPECT_EQ(FindingsOf(ReadHistory(folder_)).endings.size(), 1u);
+}
+
+TEST_F(HistoryOf, WhatCannotReplaceReplacesNothing) {
+  const HistoryEntry first = Add(1, {Measured("bar", 1e-3, 7)});
+  const std::string before = ReadFile(first.results);
+  const HistoryEntry second = Add(1, {Measured("bar", 1e-3, 8)}, /*replaces=*/true);
+  // what the line of before points at is whole, whether that of now was written or not
+  EXPECT_NE(first.results, second.results);
+  EXPECT_EQ(ReadFile(first.results), before);
+}
+
+TEST_F(HistoryOf, DatesAreThoseOfACalendar) {
+  const std::vector<Record> records = {Measured("bar", 1e-3, 7)};
+  for (const char* date : {"2026-99-99", "2026-02-29", "2026-00-10", "2026-01-01T24:00:00Z",
+                           "2026-01-01T10:60:00Z", "2026-01-01T10:00:60Z"}) {
+    EXPECT_NE(Refusal({.commit = "a", .date = date}, records).find(date), std::string::npos);
+  }
+  EXPECT_EQ(Refusal({.commit = "a", .date = "2028-02-29T23:59:59Z"}, records), "taken");
+}
+
+TEST_F(HistoryOf, AWholeNameIsNoBeginningOfAnother) {
+  const auto add = [&](const char* commit) {
+    AddToHistory(folder_, {.commit = commit, .date = "2026-11-24"}, {Measured("bar", 1, 1)}, false);
+  };
+  add("caf\xc3\xa9");
+  EXPECT_THROW(MarkInHistory(folder_, {"", "good"}), ConfigError);
+  EXPECT_THROW(MarkInHistory(folder_, {"caf\xc3", "good"}), ConfigError);
+  EXPECT_EQ(MarkInHistory(folder_, {"caf", "good"}).commit, "caf\xc3\xa9");
+  add("v1");
+  add("v1.1");
+  EXPECT_EQ(MarkInHistory(folder_, {"v1", "good"}).commit, "v1");
+  EXPECT_THROW(MarkInHistory(folder_, {"v", "good"}), ConfigError);
 }
 
 TEST_F(HistoryOf, MeasuredAgainTakesThePlaceAndLosesTheMark) {
   Add(1, {Measured("bar", 1e-3, 10)});
-  MarkInHistory(folder_, CommitName(1), "bad", "slow disk");
+  MarkInHistory(folder_, {CommitName(1), "bad", "slow disk"});
   Add(1, {Measured("bar", 1e-3, 11)}, /*replaces=*/true);
   const History history = ReadHistory(folder_);
   ASSERT_EQ(history.entries.size(), 1u);
@@ -84,23 +137,65 @@ TEST_F(HistoryOf, MeasuredAgainTakesThePlaceAndLosesTheMark) {
   }
 }
 
+TEST_F(HistoryOf, WhatSomebodyAcceptedStaysAccepted) {
+  Add(1, {Measured("bar", 1e-3, 10)});
+  MarkInHistory(folder_, {CommitName(1), "accepted", "exact mass matrix"});
+  Add(1, {Measured("bar", 1e-3, 11)}, /*replaces=*/true);
+  const Mark mark = MarkInHistory(
+      folder_, {CommitName(1), "bad", "compare ended with 1", /*keeps_accepted=*/true});
+  EXPECT_EQ(mark.mark, "accepted");
+  const History history = ReadHistory(folder_);
+  EXPECT_EQ(history.entries[0].mark, "accepted");
+  EXPECT_EQ(history.entries[0].note, "exact mass matrix");
+  MarkInHistory(folder_, {CommitName(1), "bad", "a person's word"});
+  EXPECT_EQ(ReadHistory(folder_).entries[0].mark, "bad");
+}
+
+TEST_F(HistoryOf, BaseIsOfThisMachineWhereItHasOne) {
+  History history;
+  const auto add = [&](const char* commit, const char* machine, const char* mark) {
+    history.entries.push_back({.commit = commit, .date = "", .machine = machine, .mark = mark});
+  };
+  const auto base = [&](const char* machine) {
+    const HistoryEntry good = *LastGood(history, machine);
+    return good.machine + good.commit;
+  };
+  add("1", "A", "");
+  EXPECT_EQ(base("B"), "A1");  // there is no other
+  add("2", "B", "");
+  EXPECT_EQ(base("A"), "A1");
+  EXPECT_EQ(base("B"), "B2");
+  add("3", "A", "good");
+  add("4", "B", "good");
+  EXPECT_EQ(base("A"), "A3");
+  EXPECT_EQ(base("C"), "B4");
+  add("5", "B", "accepted");  // holds on all machines
+  add("6", "B", "good");
+  EXPECT_EQ(base("A"), "B5");
+  EXPECT_EQ(base("B"), "B6");
+  EXPECT_EQ(LastGoodOfMachine(history, "A")->commit, "3");  // but not for times
+  add("7", "A", "bad");
+  add("8", "A", "good");
+  EXPECT_EQ(base("A"), "A8");
+}
+
 TEST_F(HistoryOf, BaseIsTheLastGoodState) {
   EXPECT_THROW(ReadHistory(folder_), ConfigError);
   for (int number = 1; number <= 4; ++number) Add(number, {Measured("bar", 1e-3, number)});
   const std::string machine = ThisOrigin().machine;
   const auto base = [&] { return LastGood(ReadHistory(folder_), machine)->commit; };
   EXPECT_EQ(base(), CommitName(4));  // nobody said anything: the last one
-  MarkInHistory(folder_, CommitName(4), "bad", "");
+  MarkInHistory(folder_, {CommitName(4), "bad", ""});
   EXPECT_EQ(base(), CommitName(3));
-  MarkInHistory(folder_, CommitName(2), "good", "");
+  MarkInHistory(folder_, {CommitName(2), "good", ""});
   EXPECT_EQ(base(), CommitName(2));  // what somebody looked at comes before what nobody did
-  MarkInHistory(folder_, CommitName(3), "accepted", "new mass matrix");
+  MarkInHistory(folder_, {CommitName(3), "accepted", "new mass matrix"});
   EXPECT_EQ(base(), CommitName(3));
   EXPECT_EQ(ReadHistory(folder_).entries[2].note, "new mass matrix");
-  EXPECT_THROW(MarkInHistory(folder_, "0", "good", ""), ConfigError);   // several begin so
-  EXPECT_THROW(MarkInHistory(folder_, "ff", "good", ""), ConfigError);  // none does
+  EXPECT_THROW(MarkInHistory(folder_, {"0", "good", ""}), ConfigError);   // several begin so
+  EXPECT_THROW(MarkInHistory(folder_, {"ff", "good", ""}), ConfigError);  // none does
   for (int number = 1; number <= 4; ++number) {
-    MarkInHistory(folder_, CommitName(number), "bad", "");
+    MarkInHistory(folder_, {CommitName(number), "bad", ""});
   }
   EXPECT_FALSE(LastGood(ReadHistory(folder_), machine).has_value());
 }
@@ -110,6 +205,13 @@ TEST_F(HistoryOf, DamagedLinesAreNamedAndATornOneIsNot) {
   const std::string whole = ReadFile(folder_ / "history.jsonl");
   WriteFileAtomically(folder_ / "history.jsonl", whole + R"({"kind":"commit","commit":"f)");
   EXPECT_EQ(ReadHistory(folder_).entries.size(), 1u);
+  EXPECT_EQ(ReadHistory(folder_).warnings.size(), 1u);
+  std::vector<std::string> torn;
+  AddToHistory(folder_, {.commit = CommitName(3), .date = Date(3)}, {Measured("bar", 1e-3, 1)},
+               false, &torn);
+  EXPECT_EQ(torn.size(), 1u);  // and not again: it is gone
+  EXPECT_TRUE(ReadHistory(folder_).warnings.empty());
+  WriteFileAtomically(folder_ / "history.jsonl", whole + R"({"kind":"commit","commit":"f)");
   Add(2, {Measured("bar", 1e-3, 1)});  // and the next line does not continue it
   EXPECT_EQ(ReadHistory(folder_).entries.size(), 2u);
   WriteFileAtomically(folder_ / "history.jsonl", whole + "no line\n");
@@ -119,46 +221,6 @@ TEST_F(HistoryOf, DamagedLinesAreNamedAndATornOneIsNot) {
   } catch (const std::exception& error) {
     EXPECT_NE(std::string(error.what()).find("history.jsonl:2"), std::string::npos) << error.what();
   }
-}
-
-TEST_F(HistoryOf, OtherEndingsAreSteps) {
-  std::vector<Record> records = {Measured("bar", 1e-3, 1), Measured("rod", 1e-3, 1)};
-  Add(1, records);
-  Add(2, records);
-  records[1].Set("outcome", std::string("singular"));
-  Add(3, records);
-  records[0].Set("doubts", std::string("energy"));
-  Add(4, records);
-  const HistoryFindings found = FindingsOf(ReadHistory(folder_));
-  ASSERT_EQ(found.endings.size(), 2u);
-  EXPECT_EQ(found.endings[0].entry, 2u);
-  EXPECT_EQ(found.endings[0].after, "singular");
-  EXPECT_EQ(found.endings[1].entry, 3u);
-  EXPECT_EQ(found.endings[1].measure, "doubts");
-}
-
-TEST_F(HistoryOf, OneStepOfACountIsASingleOne) {
-  for (int number = 1; number <= 30; ++number) {
-    Add(number, {Measured("bar", 1e-3, number < 21 ? 100'000 : 100'001)});
-  }
-  const History history = ReadHistory(folder_);
-  for (const HistorySeries& series : FindingsOf(history).series) {
-    if (series.measure != "steps") continue;
-    ASSERT_EQ(series.changes.size(), 1u);
-    EXPECT_EQ(history.entries[series.values[series.changes[0].at].entry].commit, CommitName(21));
-    EXPECT_EQ(series.changes[0].Confidence(), 1.0);
-  }
-}
-
-TEST_F(HistoryOf, PageSaysNamesAsText) {
-  const std::string hostile = "</script><img src=x onerror=alert(1)>\"'&";
-  Add(1, {Measured(hostile, 1e-3, 1)});
-  Add(2, {Measured(hostile, 0.0, 1)});
-  MarkInHistory(folder_, CommitName(2), "accepted", hostile);
-  const History history = ReadHistory(folder_);
-  const std::string page = HistoryPage(history, FindingsOf(history), hostile, {hostile});
-  EXPECT_EQ(page.find("<img"), std::string::npos);
-  EXPECT_NE(page.find("&lt;img"), std::string::npos);
 }
 
 }  // namespace history_test

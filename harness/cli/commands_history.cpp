@@ -158,7 +158,9 @@ int HistoryShow(const HistoryShowCommand& command, const std::string& typed) {
     return 0;
   }
   if (steps.rows.empty()) {
-    Print("no steps in {} series over {} entries\n\n", found.series.size(), history.entries.size());
+    Print("no steps in {} series over {} entries\n", found.series.size(), history.entries.size());
+    if (const auto note = UnsteadyNote(found)) Print("{}\n", *note);
+    Print("\n");
   } else {
     PrintText(ToScreen(steps) + "\n");
   }

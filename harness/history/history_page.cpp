@@ -64,7 +64,11 @@ struct Chart {
 
   Chart(const History& entries, const HistorySeries& one) : history(entries), series(one) {
     low = std::ranges::min_element(series.values, {}, &HistoryValue::value)->value;
-    high = std::ranges::max_element(series.values, {}, &HistoryValue::upper)->upper;
+    // a single slow repetition would press all levels to the floor: its line ends at the frame
+    constexpr double kRoom = 1.25;
+    const double largest = std::ranges::max_element(series.values, {}, &HistoryValue::value)->value;
+    high = std::min(std::ranges::max_element(series.values, {}, &HistoryValue::upper)->upper,
+                    kRoom * largest);
     logarithmic = low > 0.0 && high / low > 20.0;
     // what differs in the last bits alone is drawn as equal: an axis needs numbers between
     if (high - low <= 4e-12 * std::max(std::abs(low), std::abs(high))) {
@@ -150,7 +154,7 @@ struct Chart {
       if (one.upper > one.value) {
         svg += fmt::format(
             "<line class=\"spread\" x1=\"{0:.1f}\" x2=\"{0:.1f}\" y1=\"{1:.1f}\" y2=\"{2:.1f}\"/>",
-            X(i), Y(one.value), Y(one.upper));
+            X(i), Y(one.value), Y(std::min(one.upper, high)));
       }
       svg += fmt::format(
           "<circle class=\"dot{}\" cx=\"{:.1f}\" cy=\"{:.1f}\" r=\"2.6\"><title>{} {}: "

@@ -55,17 +55,20 @@ Table StepTable(const History& history, const HistoryFindings& found) {
       fmt::format("{} series over {} entries; confidence: 1 less the number of such steps that "
                   "the noise of all series together would show, at most {}",
                   found.series.size(), history.entries.size(), kFalseAlarms));
+  if (const auto note = UnsteadyNote(found)) table.notes.push_back(*note);
+  return table;
+}
+
+std::optional<std::string> UnsteadyNote(const HistoryFindings& found) {
   std::size_t times = 0, unsteady = 0;
   for (const HistorySeries& one : found.series) {
     unsteady += one.Unsteady();
     times += one.rule == Rule::kTime && one.one != kAllCases ? one.values.size() : 0;
   }
-  if (unsteady > 0) {
-    table.notes.push_back(fmt::format(
-        "{} of {} times decide nothing: the machine had another speed than usual (yardstick_ns)",
-        unsteady, times));
-  }
-  return table;
+  if (unsteady == 0) return std::nullopt;
+  return fmt::format(
+      "{} of {} times decide nothing: the machine had another speed than usual (yardstick_ns)",
+      unsteady, times);
 }
 
 }  // namespace loopbench::harness

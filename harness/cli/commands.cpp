@@ -41,10 +41,19 @@ std::vector<Record> Prepared(std::vector<Record> records) {
   return records;
 }
 
-std::vector<Record> LoadRecords(const std::filesystem::path& store, const Selection& where) {
-  RequireRoom(store, where);
+std::vector<Record> LoadRecords(const std::filesystem::path& store, const Selection& where,
+                                const ReadWatch& watch) {
+  const std::filesystem::path file = StoreFile(store);
+  const Room room(store);
+  if (IsLarge(file) && !ChoosesLines(where)) {
+    room.Require("all its records", std::filesystem::file_size(file));
+  }
   std::vector<std::string> warnings;
-  std::vector<Record> records = Prepared(ReadRecords(store, where, &warnings));
+  const auto look = [&](std::size_t records, std::uint64_t bytes) {
+    if (watch) watch(records, bytes);
+    room.Require(fmt::format("{} records and more", records), bytes);
+  };
+  std::vector<Record> records = Prepared(ReadRecords(store, where, &warnings, look));
   for (const std::string& warning : warnings) PrintError("warning: {}\n", warning);
   return records;
 }

@@ -17,7 +17,9 @@ namespace loopbench::harness {
 
 /// The records of a store, the last of each case, in the order of tables, with their doubts as they
 /// stand beside each other; warnings about it go to standard error.
-std::vector<Record> LoadRecords(const std::filesystem::path& store, const Selection& where = {});
+/// `watch` as for ReadRecords(). Throws ConfigError where the machine has no room for them.
+std::vector<Record> LoadRecords(const std::filesystem::path& store, const Selection& where = {},
+                                const ReadWatch& watch = {});
 
 /// What LoadRecords() makes of all records of some scenes.
 std::vector<Record> Prepared(std::vector<Record> records);

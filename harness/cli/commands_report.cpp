@@ -169,15 +169,15 @@ int DoubtGate(const std::vector<Record>& rows) {
 }
 
 int PrintTable(const TableCommand& command, const std::string& typed) {
-  if (IsLarge(StoreFile(command.store))) {
-    const SceneReader reader(command.store, command.view.where);
-    if (reader.records() > kMostHeld) return WriteLongTable(command, reader, typed);
+  const auto records = LoadFew(command.store, command.view.where);
+  if (!records) {
+    return WriteLongTable(command, SceneReader(command.store, command.view.where), typed);
   }
   TableView view = command.view;
   const bool on_terminal = command.format == "text" && command.out.empty();
   // a page is no wider than a terminal
   view.compact = on_terminal || (command.format == "latex" && view.columns.empty());
-  Table table = MakeTable(LoadRecords(command.store, view.where), view);
+  Table table = MakeTable(*records, view);
   if (table.rows.empty()) {
     PrintError("{}: no {} records match{}{}\n", command.store.string(),
                view.kind.empty() ? "drift" : view.kind, view.where.empty() ? "" : " ",

@@ -137,23 +137,37 @@ int WriteLongTable(const TableCommand& command, const SceneReader& reader,
   return 2;
 }
 
-void RequireRoom(const std::filesystem::path& store, const Selection& where) {
-  if (!IsLarge(StoreFile(store))) return;
-  constexpr double kGrows = 4.0;  // a record in memory over its line, measured
-  const SceneReader reader(store, where);
-  const double needed = kGrows * static_cast<double>(reader.bytes());
+Room::Room(std::filesystem::path store) : store_(std::move(store)) {
   std::ifstream info("/proc/meminfo");
-  double free = 0.0;
   for (std::string word; info >> word;) {
-    if (word == "MemAvailable:" && info >> free) break;
+    if (word == "MemAvailable:" && info >> free_) break;
   }
-  free *= 1024.0;
-  if (free == 0.0 || needed < 0.9 * free) return;
+  free_ *= 1024.0;
+}
+
+void Room::Require(const std::string& found, std::uint64_t bytes) const {
+  constexpr double kGrows = 4.0;  // a record in memory over its line, measured
+  const double needed = kGrows * static_cast<double>(bytes);
+  if (free_ == 0.0 || needed < 0.9 * free_) return;
   throw ConfigError(
-      fmt::format("{}: found {} records, which take some {:.1f} GB of memory, of which {:.1f} GB "
-                  "are free; expected fewer: choose some with --where PARAMETER=..., or write all "
-                  "with table --format csv",
-                  store.string(), reader.records(), needed * 1e-9, free * 1e-9));
+      fmt::format("{}: found {}, which take some {:.1f} GB of memory, of which {:.1f} GB are free; "
+                  "expected fewer: choose some with --where PARAMETER=..., or write all with table "
+                  "--format csv",
+                  store_.string(), found, needed * 1e-9, free_ * 1e-9));
+}
+
+std::optional<std::vector<Record>> LoadFew(const std::filesystem::path& store,
+                                           const Selection& where) {
+  struct TooMany {};
+  if (!IsLarge(StoreFile(store))) return LoadRecords(store, where);
+  if (!ChoosesLines(where) && SceneReader(store, where).records() > kMostHeld) return std::nullopt;
+  try {
+    return LoadRecords(store, where, [](std::size_t records, std::uint64_t) {
+      if (records > kMostHeld) throw TooMany();
+    });
+  } catch (const TooMany&) {
+    return std::nullopt;
+  }
 }
 
 }  // namespace loopbench::harness

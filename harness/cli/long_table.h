@@ -2,8 +2,11 @@
 #pragma once
 
 #include <cstddef>
+#include <cstdint>
 #include <filesystem>
+#include <optional>
 #include <string>
+#include <vector>
 
 #include "harness/cli/commands.h"
 #include "harness/store/scene_reader.h"
@@ -19,8 +22,22 @@ inline constexpr std::size_t kMostHeld = 50'000;
 int WriteLongTable(const TableCommand& command, const SceneReader& reader,
                    const std::string& typed);
 
-/// Throws ConfigError where the records of a store that meet conditions on its parameters need more
-/// memory than the machine has left.
-void RequireRoom(const std::filesystem::path& store, const Selection& where);
+/// LoadRecords() of a store; nothing where they are more than kMostHeld.
+std::optional<std::vector<Record>> LoadFew(const std::filesystem::path& store,
+                                           const Selection& where);
+
+/// The memory that a store's records may take.
+class Room {
+ public:
+  /// What is free now.
+  explicit Room(std::filesystem::path store);
+  /// Throws ConfigError where records with lines of so many bytes have none; `found`: what they
+  /// are.
+  void Require(const std::string& found, std::uint64_t bytes) const;
+
+ private:
+  std::filesystem::path store_;
+  double free_ = 0.0;  ///< 0 where that is not known
+};
 
 }  // namespace loopbench::harness

@@ -239,6 +239,8 @@ bool IsExcluded(std::string_view line,
 
 }  // namespace
 
+bool ChoosesLines(const Selection& where) { return !OnParameters(where).empty(); }
+
 LineReader::Wanted LinesThatMayMatch(const Selection& where) {
   return [conditions = OnParameters(where)](std::string_view line, const LinePlace&) {
     return !IsExcluded(line, conditions);
@@ -246,16 +248,19 @@ LineReader::Wanted LinesThatMayMatch(const Selection& where) {
 }
 
 std::vector<Record> ReadRecords(const std::filesystem::path& path, const Selection& where,
-                                std::vector<std::string>* warnings) {
-  if (OnParameters(where).empty() || !IsLarge(StoreFile(path))) return ReadRecords(path, warnings);
+                                std::vector<std::string>* warnings, const ReadWatch& watch) {
+  if (!ChoosesLines(where) || !IsLarge(StoreFile(path))) return ReadRecords(path, warnings);
   const LineReader::Wanted may_match = LinesThatMayMatch(where);
   std::vector<Record> records;
+  std::uint64_t bytes = 0;
   Missing missing(where);
   ForEachRecord(
       path,
-      [&](Record record, const LinePlace&) {
+      [&](Record record, const LinePlace& place) {
         missing.Look(record);
         records.push_back(std::move(record));
+        bytes += place.length;
+        if (watch) watch(records.size(), bytes);
       },
       warnings,
       [&](std::string_view line, const LinePlace& place) {

@@ -77,9 +77,15 @@ std::vector<Record> LatestRecords(const std::vector<Record>& records,
 std::vector<Record> ReadRecords(const std::filesystem::path& path,
                                 std::vector<std::string>* warnings = nullptr);
 
+/// Whether conditions choose among the lines of a store: some are on parameters of a sweep.
+bool ChoosesLines(const Selection& where);
+
 /// Whether a line may be a record that meets the conditions on parameters of a sweep: a line that
 /// does not is passed over without being read.
 LineReader::Wanted LinesThatMayMatch(const Selection& where);
+
+/// Told after each record how many there are and how long their lines are together; may throw.
+using ReadWatch = std::function<void(std::size_t records, std::uint64_t bytes)>;
 
 /// The same of a store that is too large to be held, without records that conditions on parameters
 /// of a sweep exclude: what such a line says besides is not looked at. Parameters are the keys that
@@ -87,6 +93,6 @@ LineReader::Wanted LinesThatMayMatch(const Selection& where);
 /// one scene at other tolerances or in other columns, stay or go together. The first record stays,
 /// and of each key of the conditions the first that has it: nobody says that no record has it.
 std::vector<Record> ReadRecords(const std::filesystem::path& path, const Selection& where,
-                                std::vector<std::string>* warnings);
+                                std::vector<std::string>* warnings, const ReadWatch& watch = {});
 
 }  // namespace loopbench::harness

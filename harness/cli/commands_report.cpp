@@ -7,6 +7,7 @@
 #include "harness/cli/commands.h"
 #include "harness/cli/long_table.h"
 #include "harness/cli/report.h"
+#include "harness/figures/distinct_points.h"
 #include "harness/figures/failure_map_figure.h"
 #include "harness/figures/figure_recipes.h"
 #include "harness/figures/precision_figures.h"
@@ -40,10 +41,22 @@ std::filesystem::path FileOf(const PlotCommand& command) {
                   out.string(), ending, command.format));
 }
 
-int DrawFree(const std::vector<Record>& records, const PlotCommand& command) {
-  if (command.free.x.empty() || command.free.y.empty()) {
+bool IsFree(const PlotCommand& command) {
+  const FreeFigure& free = command.free;
+  if ((free.x + free.y + free.group + free.log + free.title).empty()) return false;
+  if (free.x.empty() || free.y.empty()) {
     throw ConfigError("plot: --group, --log and --title need --x KEY and --y KEY");
   }
+  return true;
+}
+
+int NothingMatches(const PlotCommand& command) {
+  PrintError("{}: no records match{}{}\n", command.store.string(), command.where.empty() ? "" : " ",
+             ToText(command.where));
+  return 2;
+}
+
+int DrawFree(const std::vector<Record>& records, const PlotCommand& command) {
   const std::filesystem::path path = FileOf(command);
   const FreeFigureResult result = MakeFreeFigure(records, command.free);
   for (const std::string& remark : result.remarks) PrintError("note: {}\n", remark);
@@ -53,6 +66,29 @@ int DrawFree(const std::vector<Record>& records, const PlotCommand& command) {
   }
   Print("wrote {}\n", path.string());
   return 0;
+}
+
+/// Of a store that is too large to be held.
+int DrawMany(const PlotCommand& command) {
+  DistinctPoints points(command.free, kMostHeld);
+  std::vector<std::string> warnings;
+  SceneReader(command.store, command.where)
+      .ForEach(
+          [&](std::vector<Record> records) {
+            for (const Record& one : Filter(Prepared(std::move(records)), command.where)) {
+              points.Add(one);
+            }
+          },
+          &warnings);
+  for (const std::string& warning : warnings) PrintError("warning: {}\n", warning);
+  if (points.seen() == 0) return NothingMatches(command);
+  if (points.cell() > 0.0) {
+    PrintError(
+        "note: {} of {} records are drawn, and counted below; the others lie within {:.2g} of "
+        "an axis of one of them\n",
+        points.records().size(), points.seen(), points.cell());
+  }
+  return DrawFree(points.records(), command);
 }
 
 /// failure-map.csv, .md and the picture, which alone may fail: the reason is printed.
@@ -197,18 +233,19 @@ int PrintTable(const TableCommand& command, const std::string& typed) {
 }
 
 int Plot(const PlotCommand& command) {
-  std::vector<Record> records = LoadRecords(command.store, command.where);
-  RequireConditions("--where", command.where, records);
-  records = Filter(records, command.where);
-  if (records.empty()) {
-    PrintError("{}: no records match{}{}\n", command.store.string(),
-               command.where.empty() ? "" : " ", ToText(command.where));
-    return 2;
+  const bool is_free = IsFree(command);
+  const auto few = LoadFew(command.store, command.where);
+  if (!few && is_free) return DrawMany(command);
+  if (!few) {
+    throw ConfigError(fmt::format(
+        "{}: found more than {} records, expected fewer for figures of runs: choose some with "
+        "--where PARAMETER=..., or draw single values with --x KEY --y KEY",
+        command.store.string(), kMostHeld));
   }
-  const FreeFigure& free = command.free;
-  if (!(free.x + free.y + free.group + free.log + free.title).empty()) {
-    return DrawFree(records, command);
-  }
+  RequireConditions("--where", command.where, *few);
+  const std::vector<Record> records = Filter(*few, command.where);
+  if (records.empty()) return NothingMatches(command);
+  if (is_free) return DrawFree(records, command);
   std::vector<NamedFigure> figures = AllFigures(Filter(records, {Condition{"kind", {"accuracy"}}}));
   for (NamedFigure& figure :
        PrecisionFigures(Filter(records, {Condition{"kind", {"precision"}}}))) {

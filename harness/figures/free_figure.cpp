@@ -3,7 +3,6 @@
 #include <fmt/format.h>
 
 #include <algorithm>
-#include <array>
 #include <cmath>
 #include <map>
 #include <set>
@@ -25,20 +24,6 @@ std::string ValueText(const Record& record, const std::string& key) {
   const Value* value = record.Find(key);
   const auto* number = value == nullptr ? nullptr : std::get_if<double>(value);
   return number == nullptr ? record.Text(key) : NumberText(*number);
-}
-
-// What names a case, in the order of titles.
-constexpr std::array<const char*, 7> kCaseKeys = {
-    "mechanism", "formulation", "enforcement", "coordinates", "solver", "rtol", "horizon"};
-
-std::vector<std::string> Split(const std::string& list) {
-  std::vector<std::string> parts;
-  for (std::size_t from = 0; from < list.size();) {
-    const std::size_t comma = std::min(list.find(',', from), list.size());
-    if (comma > from) parts.push_back(list.substr(from, comma - from));
-    from = comma + 1;
-  }
-  return parts;
 }
 
 bool IsEmpty(const Record& record, const std::string& key) {
@@ -146,7 +131,7 @@ CurveStyle StyleBy(const std::vector<std::string>& keys, const Record& row, std:
 
 Curve SeriesCurve(const Record& row, const FreeFigure& wanted, const std::string& label,
                   std::size_t index) {
-  Curve curve{.label = label, .style = StyleBy(Split(wanted.group), row, index)};
+  Curve curve{.label = label, .style = StyleBy(KeysIn(wanted.group), row, index)};
   curve.x = row.Numbers(wanted.x);
   curve.y = row.Numbers(wanted.y);
   curve.ends_early = HasFailed(row);
@@ -158,7 +143,7 @@ Curve SeriesCurve(const Record& row, const FreeFigure& wanted, const std::string
 Curve ValueCurve(const std::vector<Record>& rows, const FreeFigure& wanted, const Positions& x,
                  const std::string& label, std::size_t index) {
   Curve curve{
-      .label = label, .style = StyleBy(Split(wanted.group), rows.front(), index), .points = true};
+      .label = label, .style = StyleBy(KeysIn(wanted.group), rows.front(), index), .points = true};
   for (const Record& row : rows) {
     if (HasFailed(row)) {
       curve.crosses.push_back({x.Of(row), row.Number(wanted.y)});
@@ -221,8 +206,18 @@ void ChooseScales(Figure& figure, const FreeFigure& wanted, bool is_series) {
 
 }  // namespace
 
+std::vector<std::string> KeysIn(const std::string& list) {
+  std::vector<std::string> parts;
+  for (std::size_t from = 0; from < list.size();) {
+    const std::size_t comma = std::min(list.find(',', from), list.size());
+    if (comma > from) parts.push_back(list.substr(from, comma - from));
+    from = comma + 1;
+  }
+  return parts;
+}
+
 FreeFigureResult MakeFreeFigure(std::span<const Record> records, const FreeFigure& wanted) {
-  const std::vector<std::string> group_keys = Split(wanted.group);
+  const std::vector<std::string> group_keys = KeysIn(wanted.group);
   RequireKey("--x", wanted.x, records);
   RequireKey("--y", wanted.y, records);
   for (const std::string& key : group_keys) RequireKey("--group", key, records);

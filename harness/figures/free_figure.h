@@ -1,6 +1,7 @@
 // A figure that the user chooses: any value of the records against any other.
 #pragma once
 
+#include <array>
 #include <span>
 #include <string>
 #include <vector>
@@ -18,6 +19,13 @@ struct FreeFigure {
   std::string log;    ///< "x", "y", "xy" or "none"; "" for axes that span two decades and more
   std::string title;  ///< "" for one made of the keys and of what all records have in common
 };
+
+/// The keys in "a,b".
+std::vector<std::string> KeysIn(const std::string& list);
+
+/// What names a case, in the order of titles.
+inline constexpr std::array<const char*, 7> kCaseKeys = {
+    "mechanism", "formulation", "enforcement", "coordinates", "solver", "rtol", "horizon"};
 
 struct FreeFigureResult {
   Figure figure;

@@ -1,0 +1,98 @@
+// Of more records than a picture has points, those that it shows apart.
+#include "harness/figures/distinct_points.h"
+
+#include <gtest/gtest.h>
+
+#include <algorithm>
+#include <cmath>
+#include <limits>
+
+#include "harness/text/config_error.h"
+
+namespace loopbench::harness {
+namespace distinct_points_test {
+
+constexpr std::size_t kMost = 1000;
+
+Record Point(double x, double y, const std::string& formulation = "odca") {
+  Record record;
+  record.Set("kind", std::string("accuracy"));
+  record.Set("formulation", formulation);
+  record.Set("outcome", std::string("finished"));
+  record.Set("steps", x);
+  record.Set("energy_error_max", y);
+  record.Set("drift_position_max", 1.0);  // nobody asks for it
+  record.Set("mass", 2.0);
+  return record;
+}
+
+FreeFigure Wanted() {
+  FreeFigure wanted;
+  wanted.x = "steps";
+  wanted.y = "energy_error_max";
+  wanted.group = "formulation";
+  return wanted;
+}
+
+TEST(DistinctPoints, AreAllOfFewCutDownToWhatIsDrawn) {
+  DistinctPoints points(Wanted(), kMost);
+  for (std::size_t i = 0; i < kMost; ++i) points.Add(Point(1.0, 1.0));
+  EXPECT_EQ(points.records().size(), kMost) << "equal ones too, as of a store that is held";
+  EXPECT_EQ(points.cell(), 0.0);
+  EXPECT_EQ(points.records()[0].Find("drift_position_max"), nullptr);
+  EXPECT_EQ(points.records()[0].Number("mass"), 2.0) << "a parameter";
+}
+
+/// Of a line over a small part of its values, and of one over ten decades: every point has one that
+/// was kept within two cells, linear and logarithmic, for a cell that begins where it was set.
+TEST(DistinctPoints, StandForAllOthersOnEitherAxis) {
+  for (const bool decades : {false, true}) {
+    const auto y_of = [decades](double x) {
+      return decades ? std::pow(10.0, -10.0 * x) : 9.81 + 1e-6 * x;
+    };
+    DistinctPoints points(Wanted(), kMost);
+    constexpr int kAll = 20'000;
+    for (int i = 0; i <= kAll; ++i) points.Add(Point(1.0 * i / kAll, y_of(1.0 * i / kAll)));
+    EXPECT_EQ(points.seen(), kAll + 1u);
+    EXPECT_LE(points.records().size(), kMost);
+    EXPECT_GE(points.records().size(), kMost / 10);
+    double furthest = 0.0, before = 0.0;
+    for (const Record& one : points.records()) {
+      furthest = std::max(furthest, one.Number("steps") - before);
+      before = one.Number("steps");
+    }
+    EXPECT_LE(std::max(furthest, 1.0 - before), 2.0 * points.cell()) << decades;
+  }
+}
+
+TEST(DistinctPoints, LoseNoCurveNoFailureAndNoDoubt) {
+  DistinctPoints points(Wanted(), kMost);
+  for (int i = 0; i < 5000; ++i) points.Add(Point(i, i));
+  Record failed = Point(2500.0, 2500.0), doubted = failed;
+  failed.Set("outcome", std::string("step-limit"));
+  doubted.Set("doubts", std::string("energy"));
+  for (int times = 0; times < 3; ++times) {
+    for (const Record& one : {failed, doubted, Point(2500.0, 2500.0, "lagrange")}) points.Add(one);
+  }
+  const auto count = [&points](const char* key, const std::string& text) {
+    return std::ranges::count_if(points.records(),
+                                 [&](const Record& one) { return one.Text(key) == text; });
+  };
+  EXPECT_EQ(count("outcome", "step-limit"), 1);
+  EXPECT_EQ(count("doubts", "energy"), 1);
+  EXPECT_EQ(count("formulation", "lagrange"), 1);
+}
+
+TEST(DistinctPoints, RefuseWhatCannotBeThinned) {
+  DistinctPoints points(Wanted(), 10);
+  Record series = Point(1.0, 1.0);
+  series.Set("energy_error_max", std::vector<double>{1.0, 2.0});
+  EXPECT_THROW(points.Add(series), ConfigError);
+  const auto add_curves = [&points] {
+    for (int i = 0; i < 12; ++i) points.Add(Point(1.0, 1.0, "method " + std::to_string(i)));
+  };
+  EXPECT_THROW(add_curves(), ConfigError);
+}
+
+}  // namespace distinct_points_test
+}  // namespace loopbench::harness

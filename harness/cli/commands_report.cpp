@@ -72,16 +72,20 @@ int DrawFree(const std::vector<Record>& records, const PlotCommand& command) {
 int DrawMany(const PlotCommand& command) {
   DistinctPoints points(command.free, kMostHeld);
   std::vector<std::string> warnings;
+  std::vector<Record> whole;  // one, for all the keys there are
   SceneReader(command.store, command.where)
       .ForEach(
           [&](std::vector<Record> records) {
             for (const Record& one : Filter(Prepared(std::move(records)), command.where)) {
+              if (whole.empty()) whole.push_back(one);
               points.Add(one);
             }
           },
           &warnings);
   for (const std::string& warning : warnings) PrintError("warning: {}\n", warning);
   if (points.seen() == 0) return NothingMatches(command);
+  whole.insert(whole.end(), points.records().begin(), points.records().end());
+  RequireKeys(command.free, whole);
   if (points.cell() > 0.0) {
     PrintError(
         "note: {} of {} records are drawn, and counted below; the others lie within {:.2g} of "

@@ -216,11 +216,15 @@ std::vector<std::string> KeysIn(const std::string& list) {
   return parts;
 }
 
-FreeFigureResult MakeFreeFigure(std::span<const Record> records, const FreeFigure& wanted) {
-  const std::vector<std::string> group_keys = KeysIn(wanted.group);
+void RequireKeys(const FreeFigure& wanted, std::span<const Record> records) {
   RequireKey("--x", wanted.x, records);
   RequireKey("--y", wanted.y, records);
-  for (const std::string& key : group_keys) RequireKey("--group", key, records);
+  for (const std::string& key : KeysIn(wanted.group)) RequireKey("--group", key, records);
+}
+
+FreeFigureResult MakeFreeFigure(std::span<const Record> records, const FreeFigure& wanted) {
+  const std::vector<std::string> group_keys = KeysIn(wanted.group);
+  RequireKeys(wanted, records);
   std::vector<Record> rows = Participants(records, wanted);
   SortRows(&rows);
   SortRowsBy(&rows, wanted.x, false);

@@ -33,6 +33,9 @@ struct FreeFigureResult {
   std::vector<std::string> remarks;
 };
 
+/// Throws ConfigError when a key is in no record.
+void RequireKeys(const FreeFigure& wanted, std::span<const Record> records);
+
 /// Draws the records that have both values. Points of a curve are joined in the order of x unless
 /// two of them share one. A run that failed is a cross at its value, or at the lower edge when it
 /// has none; it is never left out. Records of other kinds than those with a y value take no part.

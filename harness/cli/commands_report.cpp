@@ -69,27 +69,24 @@ int DrawFree(const std::vector<Record>& records, const PlotCommand& command) {
 }
 
 /// Of a store that is too large to be held.
-int DrawMany(const PlotCommand& command) {
+int DrawMany(const SceneReader& reader, const PlotCommand& command) {
+  RequireConditions("--where", command.where, reader.samples());
+  RequireKeys(command.free, reader.samples());
   DistinctPoints points(command.free, kMostHeld);
   std::vector<std::string> warnings;
-  std::vector<Record> whole;  // one, for all the keys there are
-  SceneReader(command.store, command.where)
-      .ForEach(
-          [&](std::vector<Record> records) {
-            for (const Record& one : Filter(Prepared(std::move(records)), command.where)) {
-              if (whole.empty()) whole.push_back(one);
-              points.Add(one);
-            }
-          },
-          &warnings);
+  reader.ForEach(
+      [&](std::vector<Record> records) {
+        for (const Record& one : Filter(Prepared(std::move(records)), command.where)) {
+          points.Add(one);
+        }
+      },
+      &warnings);
   for (const std::string& warning : warnings) PrintError("warning: {}\n", warning);
   if (points.seen() == 0) return NothingMatches(command);
-  whole.insert(whole.end(), points.records().begin(), points.records().end());
-  RequireKeys(command.free, whole);
   if (points.cell() > 0.0) {
     PrintError(
-        "note: {} of {} records are drawn, and counted below; the others lie within {:.2g} of "
-        "an axis of one of them\n",
+        "note: {} of {} records are drawn, and counted below; the others lie within {:.2g} of an "
+        "axis of one of them\n",
         points.records().size(), points.seen(), points.cell());
   }
   return DrawFree(points.records(), command);
@@ -209,15 +206,13 @@ int DoubtGate(const std::vector<Record>& rows) {
 }
 
 int PrintTable(const TableCommand& command, const std::string& typed) {
-  const auto records = LoadFew(command.store, command.view.where);
-  if (!records) {
-    return WriteLongTable(command, SceneReader(command.store, command.view.where), typed);
-  }
+  const Loaded loaded = LoadOrScan(command.store, command.view.where);
+  if (loaded.many) return WriteLongTable(command, *loaded.many, typed);
   TableView view = command.view;
   const bool on_terminal = command.format == "text" && command.out.empty();
   // a page is no wider than a terminal
   view.compact = on_terminal || (command.format == "latex" && view.columns.empty());
-  Table table = MakeTable(*records, view);
+  Table table = MakeTable(loaded.records, view);
   if (table.rows.empty()) {
     PrintError("{}: no {} records match{}{}\n", command.store.string(),
                view.kind.empty() ? "drift" : view.kind, view.where.empty() ? "" : " ",
@@ -238,16 +233,16 @@ int PrintTable(const TableCommand& command, const std::string& typed) {
 
 int Plot(const PlotCommand& command) {
   const bool is_free = IsFree(command);
-  const auto few = LoadFew(command.store, command.where);
-  if (!few && is_free) return DrawMany(command);
-  if (!few) {
+  const Loaded loaded = LoadOrScan(command.store, command.where);
+  if (loaded.many && is_free) return DrawMany(*loaded.many, command);
+  if (loaded.many) {
     throw ConfigError(fmt::format(
-        "{}: found more than {} records, expected fewer for figures of runs: choose some with "
-        "--where PARAMETER=..., or draw single values with --x KEY --y KEY",
-        command.store.string(), kMostHeld));
+        "{}: found {} records, expected at most {} that fit into memory for figures of runs: "
+        "choose some with --where PARAMETER=..., or draw single values with --x KEY --y KEY",
+        command.store.string(), loaded.many->records(), kMostHeld));
   }
-  RequireConditions("--where", command.where, *few);
-  const std::vector<Record> records = Filter(*few, command.where);
+  RequireConditions("--where", command.where, loaded.records);
+  const std::vector<Record> records = Filter(loaded.records, command.where);
   if (records.empty()) return NothingMatches(command);
   if (is_free) return DrawFree(records, command);
   std::vector<NamedFigure> figures = AllFigures(Filter(records, {Condition{"kind", {"accuracy"}}}));

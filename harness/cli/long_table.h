@@ -13,26 +13,30 @@
 
 namespace loopbench::harness {
 
-/// Records of more than a page of anybody's: some 400 MB of memory.
+/// Records of more than a page of anybody's: of runs of a few hundred steps, some 400 MB of memory.
 inline constexpr std::size_t kMostHeld = 50'000;
 
 /// CSV or JSON, to standard output or `command.out`, scenes in the order of the store, the rows of
-/// each in the usual order. The first scenes decide the columns. Throws ConfigError for what needs
-/// all rows at once, and where later scenes have other parameters.
+/// each in the usual order, columns as of a table of all. Throws ConfigError for what needs all
+/// rows at once.
 int WriteLongTable(const TableCommand& command, const SceneReader& reader,
                    const std::string& typed);
 
-/// LoadRecords() of a store; nothing where they are more than kMostHeld.
-std::optional<std::vector<Record>> LoadFew(const std::filesystem::path& store,
-                                           const Selection& where);
+/// What LoadRecords() makes of a store, or where these are more than kMostHeld, or than the machine
+/// has room for, the store scene by scene.
+struct Loaded {
+  std::vector<Record> records;
+  std::optional<SceneReader> many;
+};
+Loaded LoadOrScan(const std::filesystem::path& store, const Selection& where);
 
 /// The memory that a store's records may take.
 class Room {
  public:
   /// What is free now.
   explicit Room(std::filesystem::path store);
-  /// Throws ConfigError where records with lines of so many bytes have none; `found`: what they
-  /// are.
+  bool Has(std::uint64_t bytes) const;  ///< for records with lines of so many bytes
+  /// Throws ConfigError where it has not; `found`: what they are.
   void Require(const std::string& found, std::uint64_t bytes) const;
 
  private:

@@ -12,6 +12,7 @@
 #include "harness/judge/statistics.h"
 #include "harness/judge/track.h"
 #include "harness/record/noise.h"
+#include "harness/record/origin.h"
 
 namespace loopbench::harness {
 namespace {
@@ -188,15 +189,21 @@ void FindChangesOf(HistorySeries* series, double places) {
 /// Marks times at which the machine had another speed than usual about then: that of the fastest
 /// quarter of the entries up to twenty before and behind, so that a machine that is slow for most
 /// of a month has its speed still, and one that was changed for good has its new one soon.
-void MarkUnsteady(std::vector<HistorySeries>* all) {
+/// @param compilers  by entry: another one may make other instructions of the yardstick
+void MarkUnsteady(const std::vector<std::string>& compilers, std::vector<HistorySeries>* all) {
   constexpr std::size_t kAround = 20;
-  std::map<std::string, std::map<std::size_t, std::vector<double>>> by_machine;
+  using Builder = std::pair<std::string, std::string>;  ///< machine and compiler
+  const auto builder = [&compilers](const HistorySeries& one, const HistoryValue& value) {
+    return Builder(one.machine, compilers[value.entry]);
+  };
+  std::map<Builder, std::map<std::size_t, std::vector<double>>> by_machine;
   for (const HistorySeries& one : *all) {
     for (const HistoryValue& value : one.values) {
-      if (value.yardstick > 0.0) by_machine[one.machine][value.entry].push_back(value.yardstick);
+      if (!(value.yardstick > 0.0)) continue;
+      by_machine[builder(one, value)][value.entry].push_back(value.yardstick);
     }
   }
-  std::map<std::pair<std::string, std::size_t>, double> usual;
+  std::map<std::pair<Builder, std::size_t>, double> usual;
   for (const auto& [machine, entries] : by_machine) {
     std::vector<double> speeds;
     for (const auto& [entry, yardsticks] : entries) speeds.push_back(Median(yardsticks));
@@ -212,7 +219,7 @@ void MarkUnsteady(std::vector<HistorySeries>* all) {
   for (HistorySeries& one : *all) {
     for (HistoryValue& value : one.values) {
       if (!(value.yardstick > 0.0)) continue;
-      const double speed = value.yardstick / usual[{one.machine, value.entry}];
+      const double speed = value.yardstick / usual[{builder(one, value), value.entry}];
       value.is_steady = speed < kOtherSpeed && speed > 1.0 / kOtherSpeed;
     }
   }
@@ -260,12 +267,14 @@ HistoryFindings FindingsOf(const History& history) {
   HistoryFindings found;
   Endings endings;
   std::map<Key, std::size_t> places;
+  std::vector<std::string> compilers;
   for (std::size_t e = 0; e < history.entries.size(); ++e) {
     const std::vector<Record> records = ReadResults(history.entries[e], &found.warnings);
     AddValues(history.entries[e].machine, e, records, &places, &found.series);
     endings.Add(history.entries[e].machine, e, records, &found.endings);
+    compilers.push_back(records.empty() ? "" : OriginOf(records.front()).compiler);
   }
-  MarkUnsteady(&found.series);
+  MarkUnsteady(compilers, &found.series);
   const std::vector<HistorySeries> pooled = PoolTimes(&found.series);
   found.series.insert(found.series.begin(), pooled.begin(), pooled.end());
   double values = 0.0;

@@ -139,7 +139,9 @@ std::string Obstacle(const Measure& measure, const Pair& pair) {
                : "another machine";
   }
   const double speed = YardstickOf(pair.fresh, measure) / YardstickOf(pair.base, measure);
-  if (speed > kOtherSpeed || speed < 1.0 / kOtherSpeed) {  // not where it is not known
+  // not where it is not known; another compiler may make other instructions of it
+  const bool is_equal_work = OriginOf(pair.base).compiler == OriginOf(pair.fresh).compiler;
+  if (is_equal_work && (speed > kOtherSpeed || speed < 1.0 / kOtherSpeed)) {
     return fmt::format("the machine took {:.3g} of the time for equal work", speed);
   }
   if (measure.needs_same_arithmetic && !pair.same_arithmetic) {

@@ -6,11 +6,11 @@
 #include <cstdint>
 #include <filesystem>
 #include <functional>
+#include <string>
 #include <vector>
 
 #include "harness/record/record.h"
 #include "harness/record/select.h"
-#include "harness/store/record_lines.h"
 
 namespace loopbench::harness {
 
@@ -22,7 +22,10 @@ class SceneReader {
   SceneReader(std::filesystem::path path, const Selection& where);
 
   std::size_t records() const { return lines_.size(); }
-  std::uint64_t bytes() const { return bytes_; }
+  std::uint64_t bytes() const { return bytes_; }  ///< of their lines
+  /// The first record of each set of keys in the store, left out or not: what columns and
+  /// conditions can be about.
+  const std::vector<Record>& samples() const { return samples_; }
 
   /// All records of some scenes at a time, a few thousand, scenes in the order in which they begin
   /// in the store. A record without a scene comes with those of its case. Throws
@@ -38,8 +41,12 @@ class SceneReader {
   };
 
   std::filesystem::path file_;
-  std::vector<Line> lines_;  ///< by scene
-  std::uint64_t bytes_ = 0;  ///< of these lines
+  std::vector<Line> lines_;                ///< by scene
+  std::uint64_t bytes_ = 0, last_at_ = 0;  ///< last_at_: offset of the store's last line
+  std::vector<Record> samples_;
 };
+
+/// The names of the keys of a flat JSON object, each behind a '"': what tells kinds of lines apart.
+std::string KeysOfLine(std::string_view line);
 
 }  // namespace loopbench::harness

@@ -204,6 +204,48 @@ void ChooseScales(Figure& figure, const FreeFigure& wanted, bool is_series) {
   figure.log_y = choose('y', y);
 }
 
+using Group = std::pair<std::string, std::vector<Record>>;  // label and members
+
+/// Of rows that are sorted by `keys`.
+std::vector<Group> GroupsOf(std::span<const Record> rows, std::span<const std::string> keys) {
+  std::vector<Group> groups;
+  for (const Record& row : rows) {
+    std::vector<std::string> values;
+    for (const std::string& key : keys) values.push_back(ValueText(row, key));
+    const std::string label = fmt::format("{}", fmt::join(values, ", "));
+    if (groups.empty() || groups.back().first != label) groups.push_back({label, {}});
+    groups.back().second.push_back(row);
+  }
+  return groups;
+}
+
+std::vector<std::string> RemarksOn(std::span<const Record> rows, const Figure& figure,
+                                   const std::set<std::string>& mixed) {
+  std::vector<std::string> remarks;
+  // a joined curve may well run through tolerances; a cloud of points calls for a choice
+  const bool is_cloud = std::ranges::any_of(
+      figure.curves, [](const Curve& curve) { return curve.points && !curve.line; });
+  if (is_cloud && !mixed.empty()) {
+    remarks.push_back(
+        fmt::format("curves mix values of {}; --group KEY,KEY separates and "
+                    "--where KEY=VALUE selects them",
+                    fmt::join(mixed, ", ")));
+  }
+  const auto failed = std::ranges::count_if(rows, HasFailed);
+  if (failed > 0) {
+    remarks.push_back(fmt::format("{} of {} runs failed and {} drawn as {}", failed, rows.size(),
+                                  failed == 1 ? "is" : "are", failed == 1 ? "a cross" : "crosses"));
+  }
+  const auto doubted = std::ranges::count_if(rows, [](const Record& row) { return HasDoubt(row); });
+  if (doubted > 0) {
+    remarks.push_back(
+        fmt::format("{} of {} runs finished with doubts (column doubts of "
+                    "tables); their marks are hollow",
+                    doubted, rows.size()));
+  }
+  return remarks;
+}
+
 }  // namespace
 
 std::vector<std::string> KeysIn(const std::string& list) {
@@ -231,14 +273,7 @@ FreeFigureResult MakeFreeFigure(std::span<const Record> records, const FreeFigur
   for (auto key = group_keys.rbegin(); key != group_keys.rend(); ++key) {
     SortRowsBy(&rows, *key, false);
   }
-  std::vector<std::pair<std::string, std::vector<Record>>> groups;
-  for (const Record& row : rows) {
-    std::vector<std::string> values;
-    for (const std::string& key : group_keys) values.push_back(ValueText(row, key));
-    const std::string label = fmt::format("{}", fmt::join(values, ", "));
-    if (groups.empty() || groups.back().first != label) groups.push_back({label, {}});
-    groups.back().second.push_back(row);
-  }
+  const std::vector<Group> groups = GroupsOf(rows, group_keys);
 
   FreeFigureResult result;
   Figure& figure = result.figure;
@@ -273,28 +308,7 @@ FreeFigureResult MakeFreeFigure(std::span<const Record> records, const FreeFigur
   }
   JoinPoints(figure);
   ChooseScales(figure, wanted, is_series);
-  // a joined curve may well run through tolerances; a cloud of points calls for a choice
-  const bool is_cloud = std::ranges::any_of(
-      figure.curves, [](const Curve& curve) { return curve.points && !curve.line; });
-  if (is_cloud && !mixed.empty()) {
-    result.remarks.push_back(
-        fmt::format("curves mix values of {}; --group KEY,KEY separates and "
-                    "--where KEY=VALUE selects them",
-                    fmt::join(mixed, ", ")));
-  }
-  const auto failed = std::ranges::count_if(rows, HasFailed);
-  if (failed > 0) {
-    result.remarks.push_back(fmt::format("{} of {} runs failed and {} drawn as {}", failed,
-                                         rows.size(), failed == 1 ? "is" : "are",
-                                         failed == 1 ? "a cross" : "crosses"));
-  }
-  const auto doubted = std::ranges::count_if(rows, [](const Record& row) { return HasDoubt(row); });
-  if (doubted > 0) {
-    result.remarks.push_back(
-        fmt::format("{} of {} runs finished with doubts (column doubts of "
-                    "tables); their marks are hollow",
-                    doubted, rows.size()));
-  }
+  result.remarks = RemarksOn(rows, figure, mixed);
   return result;
 }
 

@@ -74,7 +74,7 @@ constexpr int kColumns = std::same_as<S, long double> ? 7 : kMostColumns;
 constexpr int kMostFailures = 40;
 /// What a stretch without a singular position may take: so many steps and so many times those of
 /// the longest one before it. Of the first nothing is known.
-constexpr std::int64_t kFewSteps = 5000, kManyTimes = 100, kFirstStretch = 100'000;
+constexpr std::int64_t kFewSteps = 1000, kManyTimes = 10, kFirstStretch = 100'000;
 
 /// Where a step must end, and what for.
 struct Stop {

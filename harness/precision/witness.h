@@ -54,10 +54,10 @@ struct Witness {
 /// 0, by Gragg's method without softening. Steps end at the times, and where a prescribed motion
 /// or a table has a knot.
 ///
-/// A witness that is put back at steps alone ends where a stretch between two times takes a
-/// hundred times as many as any before, and thousands more: a singular position is in it. One that
-/// is put back at stages tries smaller steps about derivatives that cannot be had, and goes on from
-/// a step that ends in a singular position, as from a start there, with the softened one.
+/// A witness that is put back at steps alone ends where a stretch between two times takes ten times
+/// as many as any before, and a thousand more: a singular position is in it. One that is put back
+/// at stages tries smaller steps about derivatives that cannot be had, and goes on from a step that
+/// ends in a singular position, as from a start there, with the softened one.
 template <class Space, class S>
 Witness<Space, S> Follow(const MechanismDescription& description, const WitnessOptions<S>& options,
                          const std::vector<double>& times);

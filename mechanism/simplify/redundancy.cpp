@@ -69,6 +69,50 @@ bool IsRegular(const Excursion<Space>& position) {
   return true;
 }
 
+/// Walks through positions of the largest rank met; returns the one farthest from losing it.
+template <class Space>
+Excursion<Space> Roam(Excursion<Space> excursion, const Mechanism<Space, double>& mechanism,
+                      Walk& walk) {
+  walk.Add(excursion);
+  Excursion<Space> best = excursion;
+  int rank = excursion.rank();
+  for (int k = 1; k <= Positions(mechanism.num_u()) && rank < mechanism.num_rows(); ++k) {
+    if (excursion.Step(kApart, k) != StepKind::kMoved || excursion.rank() < rank) {
+      walk.Interrupt();
+      continue;
+    }
+    const bool more = excursion.rank() > rank;
+    if (more) walk = Walk();
+    rank = excursion.rank();
+    walk.Add(excursion);
+    if (more || excursion.conditioning() > best.conditioning()) best = excursion;
+  }
+  return best;
+}
+
+/// The directions that may go, so that `rank` of them stay imposed.
+template <class Space>
+std::vector<Released> Release(const Walk& walk, const Mechanism<Space, double>& mechanism,
+                              const MechanismDescription& description, int rank) {
+  const std::vector<int>& constraints = mechanism.constraints();
+  std::vector<Choosable> joints;
+  for (const int joint : constraints) {
+    joints.push_back(ChoiceOf(*mechanism.joints()[joint].kind));
+    // axes of directions are other ones where a coordinate is prescribed: such a joint keeps all
+    joints.back().keeps_all = !description.joints[joint].motions.empty();
+  }
+  std::vector<Released> released;
+  const ReleaseChoice choice = ChooseImposed(walk.positions, walk.follows, joints, rank);
+  for (std::size_t c = 0; c < constraints.size(); ++c) {
+    Released out{constraints[c], {}, choice.force_axes[c]};
+    for (int i = 0; i < joints[c].count; ++i) {
+      if (!choice.imposed[c][i]) out.directions.push_back(i);
+    }
+    if (!out.directions.empty()) released.push_back(std::move(out));
+  }
+  return released;
+}
+
 /// Of one part: bodies that joints connect. `conservative`: gravity is all that acts on it.
 template <class Space>
 Redundancy Find(const MechanismDescription& description, bool conservative) {
@@ -102,45 +146,19 @@ Redundancy Find(const MechanismDescription& description, bool conservative) {
   result.rank = result.rank_at_start = excursion.rank();
   if (result.rank == result.rows) return result;
 
-  // positions of the largest rank met
   Walk walk;
-  walk.Add(excursion);
-  Excursion<Space> best = excursion;
-  for (int k = 1; k <= Positions(mechanism.num_u()) && result.rank < result.rows; ++k) {
-    if (excursion.Step(kApart, k) != StepKind::kMoved || excursion.rank() < result.rank) {
-      walk.Interrupt();
-      continue;
-    }
-    const bool more = excursion.rank() > result.rank;
-    if (more) walk = Walk();
-    result.rank = excursion.rank();
-    walk.Add(excursion);
-    if (more || excursion.conditioning() > best.conditioning()) best = excursion;
-  }
+  excursion = Roam(std::move(excursion), mechanism, walk);
+  result.rank = excursion.rank();
   // what moves has a speed left
   const bool moves = walk.positions.size() > 1;
-  if (!IsRegular(best)) {
+  if (!IsRegular(excursion)) {
     result.rank = std::min(result.rows, mechanism.num_u() - (moves ? 1 : 0));
     return result;
   }
   if (result.rank == result.rows || result.rank == mechanism.num_u()) return result;
 
-  const std::vector<int>& constraints = mechanism.constraints();
-  std::vector<Choosable> joints;
-  for (const int joint : constraints) {
-    joints.push_back(ChoiceOf(*mechanism.joints()[joint].kind));
-    // axes of directions are other ones where a coordinate is prescribed: such a joint keeps all
-    joints.back().keeps_all = !description.joints[joint].motions.empty();
-  }
   if (energy) walk.Confine(*energy);
-  const ReleaseChoice choice = ChooseImposed(walk.positions, walk.follows, joints, result.rank);
-  for (std::size_t c = 0; c < constraints.size(); ++c) {
-    Released out{constraints[c], {}, choice.force_axes[c]};
-    for (int i = 0; i < joints[c].count; ++i) {
-      if (!choice.imposed[c][i]) out.directions.push_back(i);
-    }
-    if (!out.directions.empty()) result.released.push_back(std::move(out));
-  }
+  result.released = Release(walk, mechanism, description, result.rank);
   return result;
 }
 

@@ -98,9 +98,11 @@ class Pilot {
       std::optional<Trial> best;
       const auto take = [&] {
         if (OutOfTime()) return;
-        // twenty times the best is no candidate, and low orders at 1e-13 would take hours
-        const double limit =
-            best_ ? std::max(kHopeless * best_->wall_s, kHopelessLeast_s) : request_.cpu_s / 10;
+        // twenty times the best or the budget is no candidate, and low orders at 1e-13 would take
+        // hours
+        double limit = request_.cpu_s / 10;
+        if (best_) limit = std::max(kHopeless * best_->wall_s, kHopelessLeast_s);
+        if (request_.budget) limit = std::max(kHopeless * Budget(), kHopelessLeast_s);
         Trial trial = bench_.Try(choice, limit);
         ++advice_.trials;
         if (request_.budget && trial.outcome == Outcome::kFinished) bench_.Settle(&trial);

@@ -219,11 +219,11 @@ double PathSweep::Up(PathPlaces& path) {
     join(Leaf<kPass>(link, turned_singles_[path.first_single + k], speed), link.limit);
   }
   if (path.ends_at_ground) {  // Ground has no response (33, 34)
-    const Factored2<double> inverse = InverseOf(all.zeta22, path.end_limit, slack);
+    const Factored2<double> factors = FactorsOf(all.zeta22, path.end_limit, slack);
     Vector2<double> wanted = kNone;  // of the last body, as TwoHandle::zeta13 of Leaf()
     if (kPass == Pass::kSpeeds) wanted = -path.gap_v;
     if (kPass == Pass::kAccelerations) wanted = Cross(2.0 * path.gap_w, path.gap_v);
-    path.end_force = inverse * (all.zeta23 - wanted);
+    path.end_force = factors * (all.zeta23 - wanted);
   }
   return slack;
 }

@@ -13,7 +13,7 @@
 // depends on the mechanism alone, never on their number. The depth is that of one piece and of the
 // sequence of pieces and left-over bodies: work goes before depth here.
 //
-// Pins that close loops must not be degenerate: where InverseOf() sees one that may be, Evaluate()
+// Pins that close loops must not be degenerate: where FactorsOf() sees one that may be, Evaluate()
 // gives up, and the general sweep decides. Its scale is the trace of the free response of the
 // joint's two bodies, which is at least the scale of loop_solver.h.
 #pragma once

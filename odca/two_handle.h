@@ -224,9 +224,10 @@ LOOPBENCH_INLINE T AngularAcceleration(const TurnedLink<T>& at, const Vector2<T>
   return kPass == Pass::kSpeeds ? moment : at.alpha + moment;
 }
 
-/// X = L D L^T of (16), by D^-1 and the l below L's ones. What it solves has residuals of some
-/// round-offs of X whatever the condition of X, as cofactors over det have not: where a light body
-/// hangs between heavy ones their forces on it must be right to far more than its own weight.
+/// X = L D L^T of (16), by D^-1 and the l below L's ones; times b it is the solution of X x = b,
+/// with residuals of some round-offs of X whatever the condition of X, as cofactors over det have
+/// not: where a light body hangs between heavy ones their forces on it must be right to far more
+/// than its own weight.
 template <class T>
 struct Factored2 {
   T first, l, second;
@@ -242,10 +243,10 @@ struct Factored2 {
   }
 };
 
-/// `slack` becomes negative where the smallest eigenvalue of X, which is at least det / trace, is
-/// below `limit`: whether a loop has lost rank is then for loop_solver.h to say.
+/// The factors of X. `slack` becomes negative where the smallest eigenvalue of X, which is at least
+/// det / trace, is below `limit`: whether a loop has lost rank is then for loop_solver.h to say.
 template <class T>
-LOOPBENCH_INLINE Factored2<T> InverseOf(const Symmetric2<T>& X, const T& limit, T& slack) {
+LOOPBENCH_INLINE Factored2<T> FactorsOf(const Symmetric2<T>& X, const T& limit, T& slack) {
   const T det = X.xx * X.yy - X.xy * X.xy;
   slack = Min(slack, det - limit * (X.xx + X.yy));
   const T inverse = 1.0 / (X.xx * det), first = det * inverse;
@@ -264,10 +265,10 @@ struct Cut {
 template <class T>
 LOOPBENCH_INLINE TwoHandle<T> Join(const TwoHandle<T>& A, const TwoHandle<T>& B, const T& limit,
                                    Cut<T>& cut, T& slack) {
-  const Factored2<T> inverse = InverseOf(A.zeta22 + B.zeta11, limit, slack);  // (16)
-  cut.U = inverse * Transpose(A.zeta12);
-  cut.W = inverse * B.zeta12;
-  cut.y = inverse * (A.zeta23 - B.zeta13);                                        // (21)
+  const Factored2<T> factors = FactorsOf(A.zeta22 + B.zeta11, limit, slack);  // (16)
+  cut.U = factors * Transpose(A.zeta12);
+  cut.W = factors * B.zeta12;
+  cut.y = factors * (A.zeta23 - B.zeta13);                                        // (21)
   return {.zeta11 = MinusSymmetricProduct(A.zeta11, Transpose(A.zeta12), cut.U),  // (26)
           .zeta22 = MinusSymmetricProduct(B.zeta22, B.zeta12, cut.W),             // (27)
           .zeta12 = TransposeTimes(Transpose(A.zeta12), cut.W),                   // (28)
@@ -297,9 +298,9 @@ struct EndCut {
 template <class T>
 LOOPBENCH_INLINE OneHandle<T> Join(const OneHandle<T>& A, const TwoHandle<T>& B, const T& limit,
                                    EndCut<T>& cut, T& slack) {
-  const Factored2<T> inverse = InverseOf(A.zeta22 + B.zeta11, limit, slack);
-  cut.W = inverse * B.zeta12;
-  cut.y = inverse * (A.zeta23 - B.zeta13);
+  const Factored2<T> factors = FactorsOf(A.zeta22 + B.zeta11, limit, slack);
+  cut.W = factors * B.zeta12;
+  cut.y = factors * (A.zeta23 - B.zeta13);
   return {MinusSymmetricProduct(B.zeta22, B.zeta12, cut.W),
           B.zeta23 + TransposeTimes(B.zeta12, cut.y)};
 }

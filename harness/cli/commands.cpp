@@ -145,6 +145,14 @@ int Run(const RunCommand& command, const std::string& typed) {
 int Merge(const MergeCommand& command) {
   NewStore target(command.out);
   const MergedStores merged(command.stores, command.order);
+  if (!merged.missing().empty()) {
+    PrintError(
+        "{}: {} of {} cases are in no part, {} among them; nothing was merged. The experiment, its "
+        "mechanisms or the program are not what they were when the parts ran\n",
+        target.file().string(), merged.missing().size(), command.order.size(),
+        merged.missing().front());
+    return 1;
+  }
   std::vector<std::filesystem::path> files;
   for (const auto& store : command.stores) files.push_back(StoreFile(store));
   // references that stand where the store will be are one more part

@@ -50,10 +50,11 @@ int Run(const RunCommand& command, const std::string& typed);
 struct MergeCommand {
   std::vector<std::filesystem::path> stores;
   std::filesystem::path out;  ///< a new store
-  /// "id"s in the order in which their records are to stand; others come behind them.
+  /// "id"s of an experiment in its order, which their records shall have; others come behind them.
   std::vector<std::string> order = {};
 };
-/// Shards into one store: every case once. Throws when two stores disagree about a case.
+/// Shards into one store: every case once. Throws when two stores disagree about a case. Ends with
+/// 1, and merges nothing, when no store has a case of `order`.
 int Merge(const MergeCommand& command);
 
 /// `json`, here and below: one document on standard output (docs/using.md has its keys).

@@ -15,8 +15,8 @@
 #include "harness/cluster/progress.h"
 #include "harness/cluster/slurm.h"
 #include "harness/record/json_object.h"
+#include "harness/record/provenance.h"
 #include "harness/run/case_identity.h"
-#include "harness/store/finished_runs.h"
 #include "harness/store/new_store.h"
 #include "harness/store/store_lock.h"
 #include "harness/suite/workload.h"
@@ -41,6 +41,10 @@ std::filesystem::path WholeFile(const std::filesystem::path& folder) {
   return StoreFile(folder / "whole");
 }
 
+std::string SubmitAgainLine(const std::filesystem::path& folder) {
+  return ShellLine({"loopbench", "submit", "--again", "--out", folder.string()});
+}
+
 /// Submits the array of `parts` and the job behind it, and writes down their numbers.
 void Queue(const std::vector<int>& parts, const std::filesystem::path& folder, ClusterRun* run) {
   WriteFileAtomically(folder / "array.sh", ArrayScript(*run, folder, parts));
@@ -50,7 +54,7 @@ void Queue(const std::vector<int>& parts, const std::filesystem::path& folder, C
   WriteClusterRun(*run, folder);
   Print("submitted {} of {} parts as job {}, and the merge behind them as job {}\n", parts.size(),
         run->parts, run->array_job, run->collect_job);
-  Print("  loopbench status {}\n", folder.string());
+  Print("  {}\n", ShellLine({"loopbench", "status", folder.string()}));
 }
 
 /// Those that are not there: a person may have put something of the machines into them.
@@ -61,8 +65,8 @@ void WriteScripts(const ClusterRun& run, const std::filesystem::path& folder) {
 }
 
 void PrintHowToRun(const std::filesystem::path& folder) {
-  Print("each part: sh {}/part.sh K; then: loopbench collect {}\n", folder.string(),
-        folder.string());
+  Print("each part: {}; then: {}\n", ShellLine({"sh", (folder / "part.sh").string(), "K"}),
+        ShellLine({"loopbench", "collect", folder.string()}));
 }
 
 int SubmitAgain(const SubmitCommand& command) {
@@ -101,15 +105,17 @@ int SubmitAgain(const SubmitCommand& command) {
   return 0;
 }
 
-/// "id"s of the accuracy cases, in the order of the experiments, and in which part each is.
+/// "id"s of the accuracy cases, in the order of the experiments.
 std::vector<std::string> OrderOfCases(const ClusterRun& run) {
   const ExperimentFiles files = FilesOf(run);
   Workload workload(files);
   std::vector<std::string> ids;
+  std::set<std::string> known;  // a case that two files share is one case
   for (std::size_t group = 0; group < workload.groups(); ++group) {
     for (const Experiment& experiment : workload.Read(group).experiments) {
       for (const Case& one : SelectCases(experiment, files.filter)) {
-        ids.push_back(RunId(Identified(experiment, one).keys));
+        const std::string id = RunId(Identified(experiment, one).keys);
+        if (known.insert(id).second) ids.push_back(id);
       }
     }
   }
@@ -209,8 +215,8 @@ int Submit(SubmitCommand command) {
   if (!MakeClusterRun(run, folder)) {
     throw ConfigError(
         fmt::format("{}: found the folder of a submit, expected a new one; to go on with it: "
-                    "loopbench submit --again --out {}",
-                    folder.string(), folder.string()));
+                    "{}",
+                    folder.string(), SubmitAgainLine(folder)));
   }
   WriteScripts(run, folder);
   Print("{} cases in {} parts in {}\n", run.all_cases, run.parts, folder.string());
@@ -255,8 +261,7 @@ int PrintStatus(const std::filesystem::path& folder, bool json) {
       !is_whole && queued && queued->empty() && !PartsNotDone(run, folder).empty();
   if (is_stuck && !run.array_job.empty()) {
     table.notes.push_back(
-        fmt::format("no part is queued; the others go on with loopbench submit --again --out {}",
-                    folder.string()));
+        fmt::format("no part is queued; the others go on with {}", SubmitAgainLine(folder)));
   }
   PrintText(ToScreen(table) + "\n");
   return 0;
@@ -269,26 +274,14 @@ int Collect(const std::filesystem::path& folder) {
                open.size(), run.parts, fmt::join(open, ", "));
     return 1;
   }
+  if (HasRecords(WholeFile(folder))) {
+    Print("{} is there already\n", WholeFile(folder).parent_path().string());
+    return 0;
+  }
   MergeCommand merge;
   merge.out = WholeFile(folder).parent_path();
   merge.order = OrderOfCases(run);
-  std::set<std::string> missing(merge.order.begin(), merge.order.end());
-  for (int part = 1; part <= run.parts; ++part) {
-    merge.stores.push_back(PartFolder(folder, part));
-    FinishedRuns finished(merge.stores.back());
-    std::erase_if(missing, [&finished](const std::string& id) { return finished.Find(id); });
-  }
-  if (!missing.empty()) {
-    PrintError(
-        "{}: {} of {} cases are in no part, {} among them; nothing was merged. The experiment, its "
-        "mechanisms or the program are not what they were when the parts ran\n",
-        folder.string(), missing.size(), merge.order.size(), *missing.begin());
-    return 1;
-  }
-  if (HasRecords(WholeFile(folder))) {
-    Print("{} is there already\n", merge.out.string());
-    return 0;
-  }
+  for (int part = 1; part <= run.parts; ++part) merge.stores.push_back(PartFolder(folder, part));
   return Merge(merge);
 }
 

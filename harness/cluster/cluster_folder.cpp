@@ -8,6 +8,7 @@
 #include <set>
 #include <sstream>
 
+#include "harness/record/provenance.h"
 #include "harness/record/record_json.h"
 #include "harness/run/case_identity.h"
 #include "harness/suite/suite.h"
@@ -187,7 +188,10 @@ ClusterRun ReadClusterRun(const std::filesystem::path& folder) {
   try {
     const std::vector<std::string> lines = Unlisted(ReadFile(file));
     if (lines.empty()) {
-      throw ConfigError("found an empty file, expected what loopbench submit writes");
+      throw ConfigError(fmt::format(
+          "found an empty file, which a submit that was killed leaves, expected what loopbench "
+          "submit writes; submit once more, without --again, after: {}",
+          ShellLine({"rm", file.string()})));
     }
     return ToClusterRun(FromJsonLine(lines.front()));
   } catch (const std::exception& error) {

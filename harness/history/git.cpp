@@ -2,11 +2,13 @@
 
 #include <fmt/format.h>
 
+#include <fstream>
 #include <sstream>
 #include <stdexcept>
 #include <utility>
 
 #include "harness/text/config_error.h"
+#include "harness/text/files.h"
 
 namespace loopbench::harness {
 namespace {
@@ -28,10 +30,8 @@ constexpr const char* kLocal[] = {"GIT_ALTERNATE_OBJECT_DIRECTORIES",
                                   "GIT_COMMON_DIR"};
 
 /// Hooks and settings that are made for the code, and how long git waits for another git.
-constexpr const char* kSettings[] = {
-    "core.hooksPath=/dev/null",      "core.attributesFile=/dev/null", "core.autocrlf=false",
-    "core.sparseCheckout=false",     "core.fsmonitor=false",          "core.splitIndex=false",
-    "core.filesRefLockTimeout=10000"};
+constexpr const char* kSettings[] = {"core.hooksPath=/dev/null", "core.fsmonitor=false",
+                                     "core.splitIndex=false", "core.filesRefLockTimeout=10000"};
 
 std::string WithoutLineEnd(std::string text) {
   while (!text.empty() && text.back() == '\n') text.pop_back();
@@ -42,6 +42,12 @@ std::string WithoutLineEnd(std::string text) {
 ProgramResult PlainGit(std::vector<std::string> words) {
   words.insert(words.begin(), "git");
   return RunProgram(std::move(words));
+}
+
+/// In a folder as work tree, whatever the repository has for one.
+std::vector<std::string> At(const std::filesystem::path& folder, std::vector<std::string> words) {
+  words.insert(words.begin(), {"-C", folder.string(), "--work-tree=" + folder.string()});
+  return words;
 }
 
 /// `who`: AUTHOR or COMMITTER.
@@ -60,19 +66,21 @@ GitRepository::GitRepository() {
 }
 
 ProgramResult GitRepository::Try(const std::vector<std::string>& words,
-                                 const std::vector<std::string>& variables) const {
+                                 const std::vector<std::string>& variables,
+                                 const std::string& input) const {
   std::vector<std::string> all = {"env"};
   for (const char* name : kLocal) all.insert(all.end(), {"-u", name});
   all.insert(all.end(), variables.begin(), variables.end());
   all.insert(all.end(), {"git", "--git-dir=" + folder_});
   for (const char* setting : kSettings) all.insert(all.end(), {"-c", setting});
   all.insert(all.end(), words.begin(), words.end());
-  return RunProgram(std::move(all));
+  return RunProgram(std::move(all), input);
 }
 
 std::string GitRepository::Get(const std::vector<std::string>& words,
-                               const std::vector<std::string>& variables) const {
-  const ProgramResult result = Try(words, variables);
+                               const std::vector<std::string>& variables,
+                               const std::string& input) const {
+  const ProgramResult result = Try(words, variables, input);
   if (const std::string failure = result.Failure("git"); !failure.empty()) {
     throw std::runtime_error(WithoutLineEnd(failure));
   }
@@ -96,10 +104,60 @@ std::string GitRepository::CheckedOutIn(const std::string& branch) const {
   return "";
 }
 
-std::string GitRepository::Commit(const std::string& folder, const std::string& index,
+void GitRepository::Export(const std::string& commit, const std::filesystem::path& folder,
+                           const std::string& index) const {
+  // through an index, which takes no path that leads out of the folder
+  Get({"read-tree", commit}, {"GIT_INDEX_FILE=" + index});
+  const std::string listed =
+      Get(At(folder, {"ls-files", "--stage", "-z"}), {"GIT_INDEX_FILE=" + index});
+  std::vector<std::string> paths;
+  std::string objects;
+  std::istringstream files(listed);  // "MODE OBJECT STAGE\tPATH\0"
+  for (std::string file; std::getline(files, file, '\0');) {
+    const std::size_t path = file.find('\t') + 1, object = file.find(' ') + 1;
+    // a path with a line end is none of a history's, and Commit() could not say it
+    if (!file.starts_with("100") || file.find('\n') != std::string::npos) continue;
+    paths.push_back(file.substr(path));
+    objects += file.substr(object, file.find(' ', object) - object) + '\n';
+  }
+  const ProgramResult read = Try({"cat-file", "--batch"}, {}, objects);
+  if (const std::string failure = read.Failure("git"); !failure.empty()) {
+    throw std::runtime_error(WithoutLineEnd(failure));
+  }
+  std::size_t at = 0;  // "OBJECT blob SIZE\n", the bytes, "\n"
+  for (const std::string& path : paths) {
+    const std::size_t end = read.output.find('\n', at);
+    const std::string head = read.output.substr(at, end - at);
+    if (head.find(" blob ") == std::string::npos) {
+      throw std::runtime_error(fmt::format("git has no bytes of {}: {}", path, head));
+    }
+    const std::size_t size = std::stoull(head.substr(head.rfind(' ') + 1));
+    MakeFolderOf(folder / path);
+    std::ofstream out(folder / path, std::ios::binary);
+    out << std::string_view(read.output).substr(end + 1, size);
+    if (!out.flush()) FailOn("write", folder / path);
+    at = end + 1 + size + 1;
+  }
+}
+
+std::string GitRepository::Commit(const std::filesystem::path& folder, const std::string& index,
                                   const std::string& parent, const std::string& message) const {
-  std::vector<std::string> variables = {"GIT_INDEX_FILE=" + index};
-  Get({"-C", folder, "--work-tree=" + folder, "add", "--all", "--force"}, variables);
+  std::vector<std::string> variables = {"GIT_INDEX_FILE=" + index}, paths;
+  std::string names;
+  for (const auto& file : std::filesystem::recursive_directory_iterator(folder)) {
+    if (!file.is_regular_file()) continue;
+    paths.push_back(file.path().lexically_relative(folder).string());
+    names += "./" + paths.back() + '\n';  // git would unquote a name that begins with a quote
+  }
+  std::istringstream objects(
+      Get(At(folder, {"hash-object", "-w", "--no-filters", "--stdin-paths"}), {}, names));
+  std::string entries;
+  for (const std::string& path : paths) {
+    std::string object;
+    objects >> object;
+    entries += fmt::format("100644 {}\t{}", object, path) + '\0';
+  }
+  Get(At(folder, {"update-index", "-z", "--index-info"}), variables, entries);
   const std::string tree = Get({"write-tree"}, variables);
   if (!parent.empty() && Get({"rev-parse", parent + "^{tree}"}) == tree) return parent;
   for (const char* who : {"AUTHOR", "COMMITTER"}) {

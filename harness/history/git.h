@@ -1,6 +1,7 @@
 // git, called as a program.
 #pragma once
 
+#include <filesystem>
 #include <optional>
 #include <string>
 #include <vector>
@@ -19,12 +20,15 @@ class GitRepository {
   GitRepository();
 
   /// @param variables  "NAME=value", beside the environment
+  /// @param input      what it reads
   ProgramResult Try(const std::vector<std::string>& words,
-                    const std::vector<std::string>& variables = {}) const;
+                    const std::vector<std::string>& variables = {},
+                    const std::string& input = "") const;
 
   /// What it writes, without the line end. Throws std::runtime_error with what git said.
   std::string Get(const std::vector<std::string>& words,
-                  const std::vector<std::string>& variables = {}) const;
+                  const std::vector<std::string>& variables = {},
+                  const std::string& input = "") const;
 
   /// The commit that a branch is at.
   std::optional<std::string> BranchAt(const std::string& branch) const;
@@ -32,12 +36,18 @@ class GitRepository {
   /// The work tree in which a branch is checked out; "" where in none.
   std::string CheckedOutIn(const std::string& branch) const;
 
-  /// A new commit with all files of `folder`, however the user ignores or signs, on top of `parent`
-  /// ("": on none); `parent` itself where it has these files already. Of the user, or of
-  /// "loopbench" where git knows nobody.
-  /// @param index  a file that is not there yet, outside of the folder
-  std::string Commit(const std::string& folder, const std::string& index, const std::string& parent,
-                     const std::string& message) const;
+  /// Writes the files of a commit into `folder`, byte for byte: no attribute, filter or line end of
+  /// the user's has a part in it. What is no regular file stays in the commit alone.
+  /// @param index  a file that is not there yet, outside of the folder: for Commit()
+  void Export(const std::string& commit, const std::filesystem::path& folder,
+              const std::string& index) const;
+
+  /// A new commit on top of `parent` ("": on none) with its files, and with all of `folder` as they
+  /// are, however the user ignores, converts or signs; `parent` itself where it has these files
+  /// already. Of the user, or of "loopbench" where git knows nobody.
+  /// @param index  what Export() made of the parent; where there is none, a file that is not there
+  std::string Commit(const std::filesystem::path& folder, const std::string& index,
+                     const std::string& parent, const std::string& message) const;
 
  private:
   std::string folder_;  ///< .git, of all work trees

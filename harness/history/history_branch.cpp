@@ -41,10 +41,7 @@ HistoryBranch::HistoryBranch(std::string branch, bool may_begin)
   std::filesystem::create_directory(folder_);
   if (at_.empty()) return;
   RequireHistory(git_, branch_, at_);
-  const std::vector<std::string> index = {"GIT_INDEX_FILE=" + Index("read")};
-  git_.Get({"read-tree", at_}, index);
-  const std::string tree = folder_.string();
-  git_.Get({"-C", tree, "--work-tree=" + tree, "checkout-index", "--all", "--quiet"}, index);
+  git_.Export(at_, folder_, Index());
 }
 
 std::string HistoryBranch::Named(std::string message) const {
@@ -59,7 +56,7 @@ std::string HistoryBranch::Named(std::string message) const {
 }
 
 bool HistoryBranch::Commit(const std::string& message) {
-  const std::string commit = git_.Commit(folder_.string(), Index("written"), at_, message);
+  const std::string commit = git_.Commit(folder_, Index(), at_, message);
   if (commit == at_) return true;
   if (const std::string where = git_.CheckedOutIn(branch_); !where.empty()) {
     throw ConfigError(fmt::format(

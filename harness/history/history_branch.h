@@ -13,8 +13,8 @@ namespace loopbench::harness {
 /// Nothing of the repository changes before Commit(), and several may be at work at once.
 class HistoryBranch {
  public:
-  /// Throws ConfigError when there is no such branch and it may not begin, when it holds anything
-  /// but a history or is checked out somewhere; std::runtime_error with what git said.
+  /// Throws ConfigError when there is no such branch and it may not begin, when it is no name of a
+  /// branch, or has files but no history.jsonl; std::runtime_error with what git said.
   explicit HistoryBranch(std::string branch, bool may_begin = false);
 
   const std::filesystem::path& folder() const { return folder_; }
@@ -24,11 +24,12 @@ class HistoryBranch {
 
   /// Puts all changes onto the branch, which begins here where it is to; nothing when there are
   /// none. False when somebody else changed the branch meanwhile: the changes are then to be made
-  /// again, to a new HistoryBranch. Throws std::runtime_error with what git said.
+  /// again, to a new HistoryBranch. Throws ConfigError when the branch is checked out somewhere,
+  /// std::runtime_error with what git said.
   bool Commit(const std::string& message);
 
  private:
-  std::string Index(const char* name) const { return (temporary_.path() / name).string(); }
+  std::string Index() const { return (temporary_.path() / "index").string(); }
 
   GitRepository git_;
   std::string branch_, at_;  ///< at_: the commit that was read, "" where the branch is to begin

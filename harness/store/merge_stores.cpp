@@ -155,6 +155,9 @@ MergedStores::MergedStores(const std::vector<std::filesystem::path>& stores,
           warnings.front(), stores[part].string()));
     }
   }
+  for (const std::string& id : order) {
+    if (kept_[places.at(id)].part == kNowhere) missing_.push_back(id);
+  }
   std::erase_if(kept_, [](const Kept& kept) { return kept.part == kNowhere; });
 }
 

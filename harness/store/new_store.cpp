@@ -33,6 +33,19 @@ fs::path BehindLinks(fs::path file) {
   return file;
 }
 
+/// Throws where it is a link that leads in a circle, or into a folder that is not there: its disk
+/// may be missing, so none is made.
+void RequireTarget(const fs::path& file) {
+  if (!fs::is_symlink(fs::symlink_status(file))) return;
+  const fs::path target = BehindLinks(file);
+  const bool is_circle = fs::is_symlink(fs::symlink_status(target));
+  if (!is_circle && fs::is_directory(fs::absolute(target).parent_path())) return;
+  throw std::runtime_error(
+      fmt::format("{}: found a symbolic link {}, expected a file or a new name", file.string(),
+                  is_circle ? "in a circle of them"
+                            : fmt::format("to {}, whose folder is not there", target.string())));
+}
+
 }  // namespace
 
 fs::path UnderWay(const fs::path& store_file) {
@@ -48,6 +61,7 @@ bool HasRecords(const fs::path& store_file) {
 }
 
 NewStore::NewStore(const fs::path& path) : file_(StoreFile(path)), part_(UnderWay(file_)) {
+  RequireTarget(file_);
   if (fs::exists(file_)) {
     empty_.emplace(file_);
     if (HasRecords(file_)) {

@@ -22,6 +22,28 @@ std::filesystem::path TemporaryBeside(const std::filesystem::path& path) {
   return temporary;
 }
 
+/// The temporary file of a text, all of it on the disk.
+std::filesystem::path WriteTemporary(
+    const std::filesystem::path& path,
+    const std::function<void(const std::function<void(std::string_view)>& write)>& fill) {
+  MakeFolderOf(path);
+  std::filesystem::path temporary = TemporaryBeside(path);
+  constexpr int kMode = 0644;
+  const int descriptor = ::open(temporary.c_str(), O_WRONLY | O_CREAT | O_TRUNC | O_CLOEXEC, kMode);
+  if (descriptor < 0) FailOn("write", path);
+  try {
+    fill([descriptor, &path](std::string_view text) { WriteAll(descriptor, text, path); });
+    if (::fsync(descriptor) != 0) FailOn("write", path);
+  } catch (...) {
+    ::close(descriptor);
+    std::error_code ignored;
+    std::filesystem::remove(temporary, ignored);
+    throw;
+  }
+  ::close(descriptor);
+  return temporary;
+}
+
 }  // namespace
 
 void FailOn(std::string_view verb, const std::filesystem::path& path) {
@@ -34,8 +56,18 @@ void MakeFolderOf(const std::filesystem::path& path) {
   std::error_code error;
   std::filesystem::create_directories(path.parent_path(), error);
   if (!error) return;
+  std::string reason = error.message();
+  std::error_code ignored;
+  for (auto folder = path.parent_path(); folder.has_filename(); folder = folder.parent_path()) {
+    const auto kind = std::filesystem::symlink_status(folder, ignored).type();
+    if (kind != std::filesystem::file_type::symlink || std::filesystem::exists(folder, ignored)) {
+      continue;
+    }
+    reason = fmt::format("'{}' is a symbolic link to '{}', which is not there", folder.string(),
+                         std::filesystem::read_symlink(folder, ignored).string());
+  }
   throw std::runtime_error(
-      fmt::format("cannot make folder '{}': {}", path.parent_path().string(), error.message()));
+      fmt::format("cannot make folder '{}': {}", path.parent_path().string(), reason));
 }
 
 void WriteFileAtomically(const std::filesystem::path& path, std::string_view text) {
@@ -45,21 +77,8 @@ void WriteFileAtomically(const std::filesystem::path& path, std::string_view tex
 void WriteFileAtomically(
     const std::filesystem::path& path,
     const std::function<void(const std::function<void(std::string_view)>& write)>& fill) {
-  MakeFolderOf(path);
+  const std::filesystem::path temporary = WriteTemporary(path, fill);
   std::error_code error;
-  const std::filesystem::path temporary = TemporaryBeside(path);
-  constexpr int kMode = 0644;
-  const int descriptor = ::open(temporary.c_str(), O_WRONLY | O_CREAT | O_TRUNC | O_CLOEXEC, kMode);
-  if (descriptor < 0) FailOn("write", path);
-  try {
-    fill([descriptor, &path](std::string_view text) { WriteAll(descriptor, text, path); });
-    if (::fsync(descriptor) != 0) FailOn("write", path);
-  } catch (...) {
-    ::close(descriptor);
-    std::filesystem::remove(temporary, error);
-    throw;
-  }
-  ::close(descriptor);
   std::filesystem::rename(temporary, path, error);
   if (error) {
     errno = error.value();
@@ -70,21 +89,13 @@ void WriteFileAtomically(
 }
 
 bool WriteNewFile(const std::filesystem::path& path, std::string_view text) {
-  MakeFolderOf(path);
-  constexpr int kMode = 0644;
-  const int descriptor = ::open(path.c_str(), O_WRONLY | O_CREAT | O_EXCL | O_CLOEXEC, kMode);
-  if (descriptor < 0 && errno == EEXIST) return false;
-  if (descriptor < 0) FailOn("write", path);
-  try {
-    WriteAll(descriptor, text, path);
-    if (::fsync(descriptor) != 0) FailOn("write", path);
-  } catch (...) {
-    std::error_code ignored;
-    std::filesystem::remove(path, ignored);
-    ::close(descriptor);
-    throw;
-  }
-  ::close(descriptor);
+  const auto temporary = WriteTemporary(path, [text](const auto& write) { write(text); });
+  const int failure = ::link(temporary.c_str(), path.c_str()) == 0 ? 0 : errno;
+  std::error_code ignored;
+  std::filesystem::remove(temporary, ignored);
+  if (failure == EEXIST) return false;
+  errno = failure;
+  if (failure != 0) FailOn("write", path);
   SyncFolderOf(path);
   return true;
 }

@@ -20,7 +20,9 @@ void WriteFileAtomically(
     const std::function<void(const std::function<void(std::string_view)>& write)>& fill);
 
 /// Writes `text` to `path` if nothing is there; else false, and what is there stays. Of several
-/// processes that try at once one succeeds. Throws as WriteFileAtomically does.
+/// processes that try at once one succeeds, and of one that is killed the file has all of the text
+/// or is not there: a temporary file gets its second name by link(2). Throws as WriteFileAtomically
+/// does.
 bool WriteNewFile(const std::filesystem::path& path, std::string_view text);
 
 /// Makes the folder that `path` is in, with all above it. Throws std::runtime_error that names the

@@ -132,7 +132,13 @@ TEST_F(Cluster, ScriptsSayWhatWasAsked) {
 
 TEST_F(Cluster, APathMayHoldWhatSlurmAndShellsRead) {
   Write("six.json", kSix);
-  ExpectEnding(Call("submit six.json --tasks 2 --no-timing --no-queue --out 'a b%j #'"), 0, {});
+  // what people copy from the terminal too
+  const std::string quoted = "'" + folder_.string() + "/a b%j #";
+  ExpectEnding(
+      Call("submit six.json --tasks 2 --no-timing --no-queue --out 'a b%j #'"), 0,
+      {"each part: sh " + quoted + "/part.sh' K; then: loopbench collect " + quoted + "'\n"});
+  ExpectEnding(Call("submit six.json --tasks 2 --no-queue --out 'a b%j #'"), 2,
+               {"to go on with it: loopbench submit --again --out " + quoted + "'\n"});
   ExpectEnding(Call("", "sh 'a b%j #/part.sh' 1 2>&1; exit $?;"), 0, {"3 run now"});
   const std::string text = ReadFile(folder_ / "a b%j #/collect.sh");
   EXPECT_NE(text.find("#SBATCH --output=\"" + folder_.string() + "/a b%%j #/logs/collect.log\"\n"),
@@ -226,7 +232,7 @@ TEST_F(Cluster, DamageIsNamedWithItsKey) {
     ExpectEnding(ending, 2, {"parts/cluster.json: "});
     ExpectEnding(ending, 2, words);
   };
-  expect("", {"found an empty file, expected what loopbench submit writes"});
+  expect("", {"found an empty file", "submit once more, without --again, after: rm parts/cluster"});
   expect("{\"kind\":\"cluster\"}\n", {"\"experiment\": found nothing, expected a text"});
   const std::string bare = whole.substr(0, whole.find(",\"checksum\"")) + "}\n";
   const auto with = [&bare](const std::string& from, const std::string& to) {

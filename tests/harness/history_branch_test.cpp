@@ -99,6 +99,30 @@ TEST_F(HistoryBranchTest, SettingsOfTheUserTakeNothingAway) {
   EXPECT_EQ(Text("git show h:history.jsonl | tr -dc '\\r' | wc -c"), "0\n");
 }
 
+// Line ends and filters of a repository are for its code: what is stored is what was measured.
+TEST_F(HistoryBranchTest, BytesAreThoseThatWereWritten) {
+  Do("$lb history add first --branch h --commit a --date 2026-01-01 && "
+     "$lb history add first --store folder --commit a --date 2026-01-01 && "
+     "printf '*.jsonl filter=loud text eol=crlf\\n' > .git/info/attributes && "
+     "git config filter.loud.clean 'tr a-z A-Z' && git config filter.loud.smudge 'tr a-z A-Z'");
+  Do("$lb history add first --branch h --commit b --date 2026-01-02 && "
+     "$lb history add first --store folder --commit b --date 2026-01-02 && "
+     "$lb history show --branch h");
+  Do("cd folder && for file in history.jsonl results/*; do "
+     "git cat-file blob h:$file | cmp - $file || exit 1; done");
+}
+
+// What somebody put beside the history stays as it is: links, and names that git quotes.
+TEST_F(HistoryBranchTest, OtherFilesOfTheBranchStay) {
+  Do("$lb history add first --branch h --commit a --date 2026-01-01 && "
+     "git worktree add --quiet --detach beside h && cd beside && ln -s nowhere link && "
+     "echo 1 > '\"quoted' && echo 2 > \"$(printf 'two\\nlines')\" && git add --all && "
+     "git commit --quiet -m more && git branch -f h HEAD");
+  Do("$lb history add first --branch h --commit b --date 2026-01-02");
+  EXPECT_EQ(Text("git diff --stat=200 h~1 h -- . ':!history.jsonl' ':!results'"), "");
+  EXPECT_EQ(Text("git ls-tree -z h | tr -dc '\\0' | wc -c"), "5\n");
+}
+
 TEST_F(HistoryBranchTest, ABranchOfCodeIsNoHistory) {
   Do("git branch code && git branch empty $(git commit-tree -m x $(git mktree < /dev/null))");
   for (const char* command : {"history add first", "history show", "history mark a good",

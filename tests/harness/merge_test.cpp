@@ -116,5 +116,21 @@ TEST_F(MergeCommandTest, ALinkStaysOne) {
   EXPECT_EQ(ReadRecords(folder_ / "far/away/m.jsonl").size(), 2u);
 }
 
+TEST_F(MergeCommandTest, ALinkThatLeadsNowhereIsNamed) {
+  ExpectEnding(Call("run tiny.json --out a"), 0, {});
+  fs::create_symlink("nowhere/m.jsonl", folder_ / "m.jsonl");
+  ExpectEnding(Call("merge a --out m.jsonl"), 2,
+               {"m.jsonl: found a symbolic link to nowhere/m.jsonl, whose folder is not there"});
+  fs::create_symlink("nowhere", folder_ / "m");
+  ExpectEnding(Call("merge a --out m"), 2,
+               {"cannot make folder 'm': 'm' is a symbolic link to 'nowhere', which is not there"});
+  ExpectEnding(Call("merge a --out m/below"), 2, {"'m' is a symbolic link to 'nowhere'"});
+  fs::create_symlink("one.jsonl", folder_ / "two.jsonl");
+  fs::create_symlink("two.jsonl", folder_ / "one.jsonl");
+  ExpectEnding(Call("merge a --out one.jsonl"), 2,
+               {"one.jsonl: found a symbolic link in a circle of them"});
+  EXPECT_TRUE(fs::is_symlink(folder_ / "one.jsonl"));
+}
+
 }  // namespace merge_test
 }  // namespace loopbench::harness

@@ -90,7 +90,12 @@ void WriteFileAtomically(
 
 bool WriteNewFile(const std::filesystem::path& path, std::string_view text) {
   const auto temporary = WriteTemporary(path, [text](const auto& write) { write(text); });
-  const int failure = ::link(temporary.c_str(), path.c_str()) == 0 ? 0 : errno;
+  int failure = ::link(temporary.c_str(), path.c_str()) == 0 ? 0 : errno;
+  if (failure == EPERM || failure == EOPNOTSUPP) {  // a file has one name there
+    const bool done =
+        ::renameat2(AT_FDCWD, temporary.c_str(), AT_FDCWD, path.c_str(), RENAME_NOREPLACE) == 0;
+    failure = done ? 0 : errno;
+  }
   std::error_code ignored;
   std::filesystem::remove(temporary, ignored);
   if (failure == EEXIST) return false;

@@ -95,7 +95,7 @@ int SubmitAgain(const SubmitCommand& command) {
     PrintText(ArrayScript(run, command.folder, parts));
     return 0;
   }
-  // parts of the last array that are still in the queue keep their job: the merge waits for both
+  // the merge waits for one array: what the last one still has must come to its end first
   if (!queued->empty()) {
     throw std::runtime_error(fmt::format(
         "{}: {} parts are still in the queue as job {}; wait for them, or scancel them first",

@@ -84,6 +84,11 @@ void Apply(const Record& line, const std::filesystem::path& folder, History* his
     throw ConfigError(fmt::format("{}: found a line of kind \"{}\", expected commit or mark",
                                   FileOf(folder).string(), line.Text("kind")));
   }
+  for (const char* key : {"date", "machine", "results"}) {
+    if (!line.Text(key).empty()) continue;
+    throw ConfigError(fmt::format("{}: commit {}: \"{}\": found nothing, expected a text",
+                                  FileOf(folder).string(), line.Text("commit"), key));
+  }
   HistoryEntry entry{line.Text("commit"),
                      line.Text("date"),
                      line.Text("machine"),

@@ -56,9 +56,9 @@ struct HistoryFindings {
 };
 
 /// All series with their changes, those of times among values that are steady, times of five and
-/// more cases pooled too. What these cases have in
-/// common is then a matter of the pooled series alone: a machine that is slower for a week is one
-/// step and not one in every case. Throws std::runtime_error when a file of results cannot be read.
+/// more cases pooled too. What these cases have in common is then a matter of the pooled series
+/// alone: a machine that is slower for a week is one step and not one in every case. Throws
+/// std::runtime_error when a file of results cannot be read.
 HistoryFindings FindingsOf(const History& history);
 
 }  // namespace loopbench::harness

@@ -83,6 +83,26 @@ TEST_F(HistoryOf, ResultsAreReadWhateverTheirEnding) {
   EXPECT_EQ(FindingsOf(ReadHistory(folder_)).series.size(), 2u);
 }
 
+TEST_F(HistoryOf, ALineWithoutOneOfItsTextsIsNamed) {
+  const std::string commit = Add(1, {Measured("bar", 1e-3, 7)}).commit;
+  const Record whole = ReadRecords(folder_ / "history.jsonl").front();
+  for (const std::string key : {"date", "machine", "results"}) {
+    Record line = whole;
+    line.Set(key, std::string());
+    fs::remove(folder_ / "history.jsonl");
+    ResultStore(folder_ / "history.jsonl").Append(line);
+    try {
+      ReadHistory(folder_);
+      FAIL() << key;
+    } catch (const ConfigError& error) {
+      const std::string message = error.what();
+      EXPECT_NE(message.find("commit " + commit + ": \"" + key + "\": found nothing"),
+                std::string::npos)
+          << message;
+    }
+  }
+}
+
 TEST_F(HistoryOf, CommitsWhoseCasesAllFailAreKept) {
   std::vector<Record> records = {Measured("bar", 1e-3, 7)};
   Add(1, records);

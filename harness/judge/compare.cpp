@@ -144,7 +144,7 @@ std::string Obstacle(const Measure& measure, const Pair& pair) {
   if (is_equal_work && (speed > kOtherSpeed || speed < 1.0 / kOtherSpeed)) {
     return fmt::format("the machine took {:.3g} of the time for equal work", speed);
   }
-  if (measure.needs_same_arithmetic && !pair.same_arithmetic) {
+  if (measure.repeats == Repeats::kUnderOneArithmetic && !pair.same_arithmetic) {
     return "another compiler, flags or mathematical library";
   }
   if (measure.rule == Rule::kHash && !pair.same_settings) return "ran with other settings";

@@ -9,7 +9,7 @@ using enum Rule;
 using Format::kExponent, Format::kFixed, Format::kInteger, Format::kScientific, Format::kSeconds,
     Format::kShortest;
 
-constexpr bool kSameBits = true;  // needs_same_arithmetic
+constexpr Repeats kSameBits = Repeats::kUnderOneArithmetic, kVaries = Repeats::kNever;
 
 // Accelerations' drift is not compared: at the level of round-off it moves with every change of
 // code. Two units stand in the words, so that reports of comparisons go on without them.
@@ -35,10 +35,10 @@ constexpr Measure kMeasures[] = {
     {"beta", kNumber},
     {"case_id", kText, {"case"}},
     {"content", kText},
-    {"set", kText},
+    {"set", kText, {}, {}, kNone, kVaries},
     {"id", kText, {"id"}},
     {"version", kText, {"version"}},
-    {"experiment_index", kNumber},
+    {"experiment_index", kNumber, {}, {}, kNone, kVaries},
     {"checksum", kText},
     {"format", kNumber},
 
@@ -226,41 +226,41 @@ constexpr Measure kMeasures[] = {
 
     // times
     {"instructions", kNumber, {}, {}, kInstructions, kSameBits},
-    {"series.rhs_ns", kNumbers, {"", "ns"}, {}, kTime},
-    {"series.wall_s", kNumbers, {"", "s"}, {}, kTime},
+    {"series.rhs_ns", kNumbers, {"", "ns"}, {}, kTime, kVaries},
+    {"series.wall_s", kNumbers, {"", "s"}, {}, kTime, kVaries},
     {"series.cpu_ns", kNumbers, {"", "ns"}, {}, kTime},
     {"repeats", kNumber, {"repeats", "", kInteger}},
-    {"rhs_ns_median", kNumber, {"rhs median", "ns", kFixed}},
-    {"rhs_ns_p10", kNumber, {"rhs p10", "ns", kFixed}},
-    {"rhs_ns_p90", kNumber, {"rhs p90", "ns", kFixed}},
-    {"rhs_ns_min", kNumber, {"rhs min", "ns", kFixed}},
+    {"rhs_ns_median", kNumber, {"rhs median", "ns", kFixed}, {}, kNone, kVaries},
+    {"rhs_ns_p10", kNumber, {"rhs p10", "ns", kFixed}, {}, kNone, kVaries},
+    {"rhs_ns_p90", kNumber, {"rhs p90", "ns", kFixed}, {}, kNone, kVaries},
+    {"rhs_ns_min", kNumber, {"rhs min", "ns", kFixed}, {}, kNone, kVaries},
     {"rhs_*", kNumber},
-    {"ns_per_body", kNumber, {"per body", "ns", kFixed}},
-    {"step_us_median", kNumber, {"step median", "us", kSeconds}},
+    {"ns_per_body", kNumber, {"per body", "ns", kFixed}, {}, kNone, kVaries},
+    {"step_us_median", kNumber, {"step median", "us", kSeconds}, {}, kNone, kVaries},
     {"step_longest", kNumber, {"longest step", "s", kSeconds}, {kLargest}},
     {"step_shortest", kNumber, {"shortest step", "s", kSeconds}, {kSmallest}},
     {"step_shortest_t", kNumber, {"at time", "s", kSeconds}, {kWith, "step_shortest"}},
     {"drive_frequency", kNumber, {"fastest drive", "rad/s", kShortest}, {kLargest}},
     {"step_*", kNumber},
-    {"wall_s", kNumber, {"wall", "s", kSeconds}, {kSum}},
-    {"wall_s_median", kNumber, {"wall median", "s", kSeconds}},
-    {"wall_s_min", kNumber, {"wall min", "s", kSeconds}},
-    {"wall_s_p10", kNumber, {"wall p10", "s", kSeconds}},
-    {"wall_s_p90", kNumber, {"wall p90", "s", kSeconds}},
+    {"wall_s", kNumber, {"wall", "s", kSeconds}, {kSum}, kNone, kVaries},
+    {"wall_s_median", kNumber, {"wall median", "s", kSeconds}, {}, kNone, kVaries},
+    {"wall_s_min", kNumber, {"wall min", "s", kSeconds}, {}, kNone, kVaries},
+    {"wall_s_p10", kNumber, {"wall p10", "s", kSeconds}, {}, kNone, kVaries},
+    {"wall_s_p90", kNumber, {"wall p90", "s", kSeconds}, {}, kNone, kVaries},
     {"wall_*", kNumber},
-    {"cpu_s", kNumber, {"CPU", "s", kSeconds}, {kSum}},
+    {"cpu_s", kNumber, {"CPU", "s", kSeconds}, {kSum}, kNone, kVaries},
     {"cpu_*", kNumber},
-    {"realtime_factor", kNumber, {"real-time factor", "", kSeconds}},
-    {"aa_spread", kNumber, {"A/A spread, rhs", "", kSeconds}},
-    {"aa_spread_wall", kNumber, {"A/A spread, wall", "", kSeconds}},
+    {"realtime_factor", kNumber, {"real-time factor", "", kSeconds}, {}, kNone, kVaries},
+    {"aa_spread", kNumber, {"A/A spread, rhs", "", kSeconds}, {}, kNone, kVaries},
+    {"aa_spread_wall", kNumber, {"A/A spread, wall", "", kSeconds}, {}, kNone, kVaries},
     {"aa_*", kNumber},
-    {"yardstick_ns", kNumber, {"yardstick, rhs", "ns", kFixed}},
-    {"yardstick_wall_ns", kNumber, {"yardstick, wall", "ns", kFixed}},
-    {"load1", kNumber, {"load", "", kSeconds}},
+    {"yardstick_ns", kNumber, {"yardstick, rhs", "ns", kFixed}, {}, kNone, kVaries},
+    {"yardstick_wall_ns", kNumber, {"yardstick, wall", "ns", kFixed}, {}, kNone, kVaries},
+    {"load1", kNumber, {"load", "", kSeconds}, {}, kNone, kVaries},
     {"load_average", kNumber},
-    {"processors", kNumber, {"processors", "", kInteger}},
-    {"governor", kText, {"governor"}},
-    {"noise", kText, {"noise"}},
+    {"processors", kNumber, {"processors", "", kInteger}, {}, kNone, kVaries},
+    {"governor", kText, {"governor"}, {}, kNone, kVaries},
+    {"noise", kText, {"noise"}, {}, kNone, kVaries},
 
     // series
     {"series.drift", kNumbers, {"drift, running maximum", "m", kScientific}},
@@ -279,10 +279,10 @@ constexpr Measure kMeasures[] = {
     {"series.*", kNumbers},
 
     // where it comes from
-    {"machine", kText},
+    {"machine", kText, {}, {}, kNone, kVaries},
     {"compiler", kText},
     {"flags", kText},
-    {"libm", kText},
+    {"libm", kText, {}, {}, kNone, kVaries},
     {"commit", kText},
 
     // what decides a run or stands beside records, and may come to stand in them

@@ -69,15 +69,24 @@ enum class Rule {
   kTime,          ///< a sample of times: a test
 };
 
+/// Where a case that is run again gives the same value.
+enum class Repeats {
+  kAlways,
+  /// Depends on the last bits of floating-point numbers, or on what the compiler makes of the code
+  /// (alignment of memory): comparable under one arithmetic only (origin.h).
+  kUnderOneArithmetic,
+  /// Tells of the clock, of the machine and how busy it was, or of how the command was typed: two
+  /// runs of one case by one program may differ in it.
+  kNever,
+};
+
 struct Measure {
   std::string_view key = {};  ///< with a "*" at its end: all keys that begin so
   ValueType type = ValueType::kAny;
   Heading heading = {};
   Merging merging = {};
   Rule rule = Rule::kNone;
-  /// Depends on the last bits of floating-point numbers, or on what the compiler makes of the code
-  /// (alignment of memory): comparable under one arithmetic only (origin.h).
-  bool needs_same_arithmetic = false;
+  Repeats repeats = Repeats::kAlways;
 };
 
 /// All rows, those with a rule in the order of comparisons: the built-in ones (measures.cpp), then

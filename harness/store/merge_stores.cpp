@@ -12,6 +12,7 @@
 #include <unordered_map>
 #include <utility>
 
+#include "harness/record/measures.h"
 #include "harness/record/record_json.h"
 #include "harness/store/result_store.h"
 #include "harness/text/files.h"
@@ -22,16 +23,6 @@ namespace {
 /// How a run ended when it was not by itself.
 constexpr std::array<std::string_view, 5> kCutShort = {"time-limit", "process-time-limit",
                                                        "memory-limit", "crashed", "bad-answer"};
-
-/// What two runs of one case by one program may differ in: times, the machine and how busy it was,
-/// and how the command was typed.
-constexpr std::array<std::string_view, 27> kMayDiffer = {
-    "wall_s",     "cpu_s",           "wall_s_median",   "wall_s_min",        "wall_s_p10",
-    "wall_s_p90", "step_us_median",  "rhs_ns_median",   "rhs_ns_min",        "rhs_ns_p10",
-    "rhs_ns_p90", "ns_per_body",     "realtime_factor", "series.rhs_ns",     "series.wall_s",
-    "aa_spread",  "aa_spread_wall",  "yardstick_ns",    "yardstick_wall_ns", "load1",
-    "processors", "governor",        "noise",           "machine",           "libm",
-    "set",        "experiment_index"};
 
 /// The run, a member of its ensemble, or the reference of its ladder.
 bool WasCutShort(const Record& record) {
@@ -44,7 +35,8 @@ bool WasCutShort(const Record& record) {
 }
 
 bool MayDiffer(std::string_view key) {
-  return std::ranges::find(kMayDiffer, key) != kMayDiffer.end();
+  const Measure* measure = FindMeasure(key);
+  return measure != nullptr && measure->repeats == Repeats::kNever;
 }
 
 std::string Shown(const Record& record, const std::string& key) {

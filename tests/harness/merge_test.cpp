@@ -1,4 +1,5 @@
 // What a merge writes, and when it is there.
+#include <fmt/format.h>
 #include <gtest/gtest.h>
 #include <unistd.h>
 
@@ -7,6 +8,8 @@
 #include <string>
 #include <vector>
 
+#include "harness/record/measures.h"
+#include "harness/store/merge_stores.h"
 #include "harness/store/store_lock.h"
 #include "tests/harness/cli_fixture.h"
 
@@ -105,6 +108,40 @@ TEST_F(MergeCommandTest, TheTargetIsLookedAtBeforeTheStores) {
                {"a/results.jsonl: found records, expected a new"});
   ExpectEnding(Call("merge bad.jsonl --out m"), 2, {"bad.jsonl:1:"});
   EXPECT_FALSE(fs::exists(folder_ / "m"));
+}
+
+// Runs of one case may differ in what the table of measures says varies, and in nothing else.
+TEST_F(MergeCommandTest, WhatVariesStandsInTheTableOfMeasures) {
+  const auto refusal_of = [this](std::string_view key) -> std::string {
+    std::vector<fs::path> stores;
+    for (const char* value : {"1", "2"}) {
+      Record record;
+      record.Set("id", std::string("0123456789abcdef"));
+      record.Set("outcome", std::string("finished"));
+      record.Set(std::string(key), std::string(value));
+      stores.push_back(folder_ / fmt::format("{}-{}.jsonl", key, value));
+      WriteFileAtomically(stores.back(), ToJsonLine(record) + '\n');
+    }
+    try {
+      MergedStores{stores};
+    } catch (const std::exception& error) {
+      return error.what();
+    }
+    return "";
+  };
+  int varying = 0;
+  for (const Measure& measure : Measures()) {
+    const bool is_text = measure.type == ValueType::kText && !measure.key.ends_with('*');
+    if (!is_text || measure.key == "id" || measure.key == "outcome" || measure.key == "checksum") {
+      continue;
+    }
+    const bool varies = measure.repeats == Repeats::kNever;
+    EXPECT_EQ(refusal_of(measure.key).empty(), varies) << measure.key;
+    varying += varies;
+  }
+  EXPECT_GT(varying, 3);
+  EXPECT_NE(refusal_of("of_another_program").find("has of_another_program 1 in the first"),
+            std::string::npos);
 }
 
 TEST_F(MergeCommandTest, ALinkStaysOne) {

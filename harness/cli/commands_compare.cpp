@@ -255,7 +255,7 @@ int PrintComparison(const CompareCommand& command, const std::string& typed) {
                         ComparisonMarkdown(comparison, Conclusion(comparison, code), notes));
   }
   if (!command.junit.empty()) {
-    WriteFileAtomically(command.junit, ComparisonJunit(comparison, command.options.subset));
+    WriteFileAtomically(command.junit, ComparisonJunit(comparison, command.options));
   }
   if (command.json) {
     PrintText(ComparisonDocument(comparison, code, notes).Text() + "\n");

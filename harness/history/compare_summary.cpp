@@ -92,7 +92,7 @@ std::string ComparisonMarkdown(const ComparisonReport& report, const std::string
   return text;
 }
 
-std::string ComparisonJunit(const ComparisonReport& report, bool subset) {
+std::string ComparisonJunit(const ComparisonReport& report, const CompareOptions& options) {
   std::string cases;
   int tests = 0, failures = 0, skipped = 0;
   for (const Finding& finding : report.findings) {
@@ -110,7 +110,7 @@ std::string ComparisonJunit(const ComparisonReport& report, bool subset) {
     }
     cases += "</testcase>\n";
   }
-  for (const auto& [names, why] : MissingCases(report, subset)) {
+  for (const auto& [names, why] : MissingCases(report, options.subset)) {
     for (const std::string& name : *names) {
       ++tests;
       ++failures;
@@ -119,11 +119,7 @@ std::string ComparisonJunit(const ComparisonReport& report, bool subset) {
           EscapeXml(name), why);
     }
   }
-  int errors = 0;
-  if (CompareOptions options; failures == 0) {
-    options.subset = subset;
-    errors = report.ExitCode(options) == 2;
-  }
+  const int errors = failures == 0 && report.ExitCode(options) == 2;
   if (errors > 0) {
     ++tests;
     cases +=

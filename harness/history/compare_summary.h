@@ -17,6 +17,7 @@ std::string ComparisonMarkdown(const ComparisonReport& report, const std::string
 /// are what is worse or different, and cases that are missing; skipped is what could not be
 /// measured. Where nothing was compared at all one error says so: no file without a failure or an
 /// error belongs to a comparison that ended with 1 or 2.
-std::string ComparisonJunit(const ComparisonReport& report, bool subset);
+/// @param options  of the comparison
+std::string ComparisonJunit(const ComparisonReport& report, const CompareOptions& options);
 
 }  // namespace loopbench::harness

@@ -123,8 +123,8 @@ TYPED_TEST(ShortCut, LosesNoMoreAtExtremesThanTheGeneralSweep) {
 /// What level position makes of an accepted step, by the short cut and in all generality:
 /// multipliers have no short cut, and their Newton steps are as long.
 TYPED_TEST(ShortCut, ProjectsAsTheGeneralWayDoes) {
-  int projected = 0, refused = 0;
-  double worst = 0.0;
+  int projected = 0;
+  double worst = 0.0, least_rcond = 1.0;
   for (int n = 2; n <= 60; n += n < 20 ? 1 : 4) {
     for (std::uint64_t seed = 1; seed <= 12; ++seed) {
       const MechanismDescription drawn = TypeParam::Draw(n, seed);
@@ -149,14 +149,14 @@ TYPED_TEST(ShortCut, ProjectsAsTheGeneralWayDoes) {
       const double goal = 4.0 * kEps * model.num_bodies() * model.length();
       const auto sweep = TypeParam::Sweep::Make(model, 2, n > 40 ? 2 * kLanes : n);
       const auto correction = sweep->Project(In(own).first(half), In(own).subspan(half), goal);
-      if (!correction) {
-        ++refused;
-        EXPECT_EQ(own, y) << drawn.name << ": refused, so left alone";
-        continue;
-      }
+      // a short cut is refused near degenerate positions only, and none of these is near one
+      ASSERT_TRUE(correction) << drawn.name << " rcond " << rcond;
       ++projected;
-      EXPECT_NEAR(correction->shift, by_parts.shift, 1e-3 * by_parts.shift + goal);
-      EXPECT_NEAR(correction->rotation, by_parts.rotation, 1e-3 * by_parts.rotation + goal);
+      least_rcond = std::min(least_rcond, rcond);
+      // what was open before: each adds up n bodies and their turns, and the goal is the round-off
+      // of one such sum
+      EXPECT_NEAR(correction->shift, by_parts.shift, 2.0 * goal);
+      EXPECT_NEAR(correction->rotation, by_parts.rotation, 2.0 * goal / model.length());
       EXPECT_GE(correction->iterations, by_parts.iterations > 0 ? 1 : 0);
       // both stop within some round-offs of the mismatch; what that leaves in q is its inverse
       const double size = std::max(1.0, expected.tail(model.num_u()).cwiseAbs().maxCoeff());
@@ -165,9 +165,9 @@ TYPED_TEST(ShortCut, ProjectsAsTheGeneralWayDoes) {
       worst = std::max(worst, of_bound);
     }
   }
-  std::printf("%d states, %d refused, worst %.2g of the bound\n", projected, refused, worst);
+  std::printf("%d states, least rcond %.2g, worst %.2g of the bound\n", projected, least_rcond,
+              worst);
   EXPECT_GT(projected, 50) << "else this test says little";
-  EXPECT_LE(5 * refused, projected);
 }
 
 /// A system by O-DCA goes by the short cut where it serves, for rates and for projections.
@@ -254,6 +254,7 @@ TYPED_TEST(ShortCut, WholeRunsAgreeWithMultipliers) {
                 std::string(ToString(level)).c_str(), runs, refused, runs * kSteps, worst);
     EXPECT_LE(worst, Bound(TypeParam::kOneFreedom, 1e-4));
     EXPECT_EQ(refused > 0, TypeParam::kNearDegenerate) << "else nothing changes on the way";
+    // one in seven hundred is; were it one in ten, these would be runs of the general sweep
     EXPECT_LT(10 * refused, runs * kSteps);
   }
 }

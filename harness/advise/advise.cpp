@@ -97,16 +97,11 @@ class Pilot {
       choice.integrator = profile;
       std::optional<Trial> best;
       const auto take = [&] {
-        if (OutOfTime()) return;
-        // twenty times the best or the budget is no candidate, and low orders at 1e-13 would take
-        // hours
-        double limit = request_.cpu_s / 10;
-        if (best_) limit = std::max(kHopeless * best_->wall_s, kHopelessLeast_s);
-        if (request_.budget) limit = std::max(kHopeless * Budget(), kHopelessLeast_s);
-        Trial trial = bench_.Try(choice, limit);
-        ++advice_.trials;
-        if (request_.budget && trial.outcome == Outcome::kFinished) bench_.Settle(&trial);
-        if (Keeps(trial) && (!best_ || Better(trial, *best_))) best_ = trial;
+        if (OutOfTime()) {
+          ++advice_.untried;
+          return;
+        }
+        const Trial trial = Try(choice, LimitOfSweep());
         if (!best || Better(trial, *best)) best = trial;
       };
       constexpr int kDecades = 13;
@@ -152,8 +147,16 @@ class Pilot {
     return std::min(left, std::max(kLeastLimit_s, kRoom * best_->wall_s));
   }
 
-  Trial Try(const Choice& choice) {
-    Trial trial = bench_.Try(choice, Limit());
+  /// Of a sweep: twenty times the best or the budget is no candidate, and low orders at 1e-13 would
+  /// take hours.
+  double LimitOfSweep() const {
+    if (request_.budget) return std::max(kHopeless * Budget(), kHopelessLeast_s);
+    return best_ ? std::max(kHopeless * best_->wall_s, kHopelessLeast_s) : request_.cpu_s / 10;
+  }
+
+  Trial Try(const Choice& choice) { return Try(choice, Limit()); }
+  Trial Try(const Choice& choice, double limit) {
+    Trial trial = bench_.Try(choice, limit);
     ++advice_.trials;
     if (request_.budget && trial.outcome == Outcome::kFinished) bench_.Settle(&trial);
     if (Keeps(trial) && (!best_ || Better(trial, *best_))) best_ = trial;

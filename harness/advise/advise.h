@@ -29,6 +29,7 @@ struct Advice {
   /// The best trial of each method and level that the pilot looked at, in their order.
   std::vector<Trial> looked_at;
   int trials = 0;
+  int untried = 0;       ///< that a sweep's time left out
   double pilot_s = 0.0;  ///< wall time of all of it [s]
 };
 
@@ -39,7 +40,8 @@ Advice Advise(const AdviceRequest& request, TrialBench& bench, double horizon, d
 
 /// The same from the whole product of formulations, levels, coordinates, profiles and tolerances a
 /// decade apart (and with a budget fixed steps, two a decade): what a pilot is held against.
-/// Nothing is cut off but runs that take more than a tenth of the time.
+/// Nothing is cut off but runs that take twenty times the best or the budget, or a tenth of the
+/// time.
 Advice Sweep(const AdviceRequest& request, TrialBench& bench, double horizon, double length,
              const std::function<std::string(const Choice&)>& doubts);
 

@@ -135,6 +135,15 @@ std::string DoubtsOf(const MechanismFile& file, const Choice& choice, double hor
   return record.Text("outcome") == "finished" ? record.Text("doubts") : record.Text("outcome");
 }
 
+std::string WhatWasTried(const Advice& advice) {
+  std::string text =
+      fmt::format("{} ways of running it in {:.3g} s", advice.trials, advice.pilot_s);
+  if (advice.untried > 0) {
+    text += fmt::format(", {} not tried: the time was over (--cpu)", advice.untried);
+  }
+  return text;
+}
+
 void PrintAdvice(const AdviseCommand& command, const Advice& advice, const Reference& reference,
                  double horizon) {
   const Trial& best = advice.finalists.front();
@@ -177,9 +186,9 @@ void PrintAdvice(const AdviseCommand& command, const Advice& advice, const Refer
   }
   Print(
       "\nreference: {} ({}), certified to {:.1e} m until {:g} s\n"
-      "pilot: {} ways of running it, {:.3g} s\n",
+      "pilot: {}\n",
       reference.scalar, reference.witnesses, reference.Certified().position,
-      reference.trust_horizon, advice.trials, advice.pilot_s);
+      reference.trust_horizon, WhatWasTried(advice));
 }
 
 CertainMotion CertainFor(const AdviseCommand& command, const MechanismDescription& user,
@@ -301,7 +310,7 @@ int AdviseInChild(const AdviseCommand& command, const MechanismFile& file) {
     if (command.simplify) PrintModels(command, file, certain, best.wall_s);
   } else {
     Table table = TableOf(advice.finalists, best, certain.horizon);
-    table.notes = {fmt::format("{} ways in {:.3g} s", advice.trials, advice.pilot_s)};
+    table.notes = {WhatWasTried(advice)};
     PrintText(Render(table, command.format));
   }
   if (!command.out.empty()) {

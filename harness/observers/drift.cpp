@@ -37,9 +37,10 @@ struct Largest {
 
 }  // namespace
 
+/// What is watched besides positions.
 template <class Space>
-struct DriftObserver<Space>::Work {
-  Work(const MechanismDescription& description, const Mechanism<Space, double>& mechanism)
+struct DriftObserver<Space>::Rest {
+  Rest(const MechanismDescription& description, const Mechanism<Space, double>& mechanism)
       : dynamics(mechanism),
         A(mechanism.num_bodies()),
         view(description, mechanism, true),
@@ -54,62 +55,68 @@ struct DriftObserver<Space>::Work {
   JointView<Space> view;
   std::vector<std::pair<int, std::string>> loop_names;
   std::vector<double> loop_max;
-  double shift = 0.0, rotation = 0.0, velocity = 0.0, acceleration = 0.0, closure = 0.0;
-  std::string worst_loop;
+  double velocity = 0.0, acceleration = 0.0, closure = 0.0;
 };
+
+template <class Space>
+DriftObserver<Space>::DriftObserver() = default;
 
 template <class Space>
 DriftObserver<Space>::DriftObserver(const MechanismDescription& description,
                                     const Mechanism<Space, double>& mechanism)
-    : work_(std::make_unique<Work>(description, mechanism)) {}
+    : rest_(std::make_unique<Rest>(description, mechanism)) {}
 
 template <class Space>
 DriftObserver<Space>::~DriftObserver() = default;
 
 template <class Space>
 void DriftObserver<Space>::Observe(const Sample<Space>& sample) {
-  Work& work = *work_;
   const Kinematics<Space, double>& kinematics = sample.formulation.kinematics();
   Largest now;
-  work.dynamics.BodyAccelerations(kinematics, sample.formulation.udot(), work.A);
+  for (int index : kinematics.mechanism().constraints()) now.Add(kinematics, index);
+  if (now.shift > shift_) worst_loop_ = kinematics.mechanism().joint_names()[now.joint];
+  Keep(&shift_, now.shift);
+  Keep(&rotation_, now.rotation);
+  series_.t.push_back(sample.t);
+  series_.value.push_back(now.shift);
+  if (rest_ != nullptr) ObserveRest(sample);
+}
+
+template <class Space>
+void DriftObserver<Space>::ObserveRest(const Sample<Space>& sample) {
+  Rest& rest = *rest_;
+  const Kinematics<Space, double>& kinematics = sample.formulation.kinematics();
+  rest.dynamics.BodyAccelerations(kinematics, sample.formulation.udot(), rest.A);
   for (int index : kinematics.mechanism().constraints()) {
-    now.Add(kinematics, index);
     const JointState<Space, double>& state = kinematics.joints()[index];
     const int all = state.directions();
     const auto shift_of = [&](const Components<Space, double>& rows) {
       return state.Sum(rows, all).linear.norm();
     };
-    Keep(&work.velocity, shift_of(state.Along(state.V_rel, all)));
-    Keep(&work.acceleration, shift_of(JointAcceleration<Space, double>(kinematics, index, work.A)));
+    Keep(&rest.velocity, shift_of(state.Along(state.V_rel, all)));
+    Keep(&rest.acceleration, shift_of(JointAcceleration<Space, double>(kinematics, index, rest.A)));
   }
-  if (now.shift > work.shift) {
-    work.worst_loop = kinematics.mechanism().joint_names()[now.joint];
-  }
-  Keep(&work.shift, now.shift);
-  Keep(&work.rotation, now.rotation);
-  series_.t.push_back(sample.t);
-  series_.value.push_back(now.shift);
-
-  const Kinematics<Space, double>& closure = work.view.At(kinematics);
-  for (const auto& [index, name] : work.loop_names) {
+  const Kinematics<Space, double>& closure = rest.view.At(kinematics);
+  for (const auto& [index, name] : rest.loop_names) {
     Largest loop;
     loop.Add(closure, index);
-    Keep(&work.loop_max[index], loop.shift);
-    Keep(&work.closure, loop.shift);
+    Keep(&rest.loop_max[index], loop.shift);
+    Keep(&rest.closure, loop.shift);
   }
 }
 
 template <class Space>
 void DriftObserver<Space>::Write(Record& record) const {
   if (series_.t.empty()) return;
-  record.Set("drift_position_max", work_->shift);
-  record.Set("drift_rotation_max", work_->rotation);
-  record.Set("drift_velocity_max", work_->velocity);
-  record.Set("drift_acceleration_max", work_->acceleration);
-  record.Set("loop_closure_max", work_->closure);
-  record.Set("worst_loop", work_->worst_loop);
-  for (const auto& [index, name] : work_->loop_names) {
-    record.Set("drift.loop." + name, work_->loop_max[index]);
+  record.Set("drift_position_max", shift_);
+  record.Set("drift_rotation_max", rotation_);
+  if (rest_ == nullptr) return;
+  record.Set("drift_velocity_max", rest_->velocity);
+  record.Set("drift_acceleration_max", rest_->acceleration);
+  record.Set("loop_closure_max", rest_->closure);
+  record.Set("worst_loop", worst_loop_);
+  for (const auto& [index, name] : rest_->loop_names) {
+    record.Set("drift.loop." + name, rest_->loop_max[index]);
   }
 }
 

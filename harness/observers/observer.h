@@ -15,7 +15,8 @@
 
 namespace loopbench::harness {
 
-/// An accepted step. The formulation's kinematics, speeds and accelerations are those of (t, y).
+/// An accepted step. The formulation's kinematics, speeds and, but for members of ensembles,
+/// accelerations are those of (t, y).
 template <class Space>
 struct Sample {
   double t = 0.0;
@@ -49,8 +50,7 @@ struct Watched {
   const MechanismDescription& description;
   const Mechanism<Space, double>& mechanism;  ///< made of the description
   const SceneObservation& scene;
-  int points;        ///< kept of a series
-  bool with_series;  ///< false for members of ensembles, of which series would be many
+  int points;                          ///< kept of a series
   std::span<const double> stops = {};  ///< [s], rising: times at which steps have to end
 };
 
@@ -59,6 +59,11 @@ struct Watched {
 /// (harness/record/measures.cpp), then those of other programs (registry.h).
 template <class Space>
 std::vector<std::unique_ptr<Observer<Space>>> MakeObservers(const Watched<Space>& run);
+
+/// Those of a member of an ensemble, of which largest errors are kept and no more
+/// (harness/run/ensemble.h). They ask for positions and speeds of a sample alone.
+template <class Space>
+std::vector<std::unique_ptr<Observer<Space>>> MakeMemberObservers(const Watched<Space>& run);
 
 /// Drift at position, velocity and acceleration level.
 ///
@@ -75,6 +80,8 @@ std::vector<std::unique_ptr<Observer<Space>>> MakeObservers(const Watched<Space>
 template <class Space>
 class DriftObserver final : public Observer<Space> {
  public:
+  /// Watches position drift alone.
+  DriftObserver();
   DriftObserver(const MechanismDescription& description, const Mechanism<Space, double>& mechanism);
   ~DriftObserver() override;
   void Observe(const Sample<Space>& sample) override;
@@ -82,9 +89,13 @@ class DriftObserver final : public Observer<Space> {
   void Trace(Traces& traces) const override { traces.drift = series_; }
 
  private:
-  struct Work;
-  std::unique_ptr<Work> work_;
+  struct Rest;
+  void ObserveRest(const Sample<Space>& sample);
+
+  double shift_ = 0.0, rotation_ = 0.0;
+  std::string worst_loop_;
   TimeSeries series_;
+  std::unique_ptr<Rest> rest_;  ///< null for position drift alone
 };
 
 /// Energy balance: the largest deviation of

@@ -101,14 +101,26 @@ std::vector<std::unique_ptr<Observer<Space>>> MakeObservers(const Watched<Space>
   all.push_back(std::make_unique<ConditionObserver<Space>>());
   all.push_back(std::make_unique<SingularityObserver<Space>>(run.description, run.mechanism));
   all.push_back(std::make_unique<ExactObserver<Space>>(run.scene, run.mechanism));
-  if (run.with_series) all.push_back(std::make_unique<CoordinateObserver<Space>>(run.points));
+  all.push_back(std::make_unique<CoordinateObserver<Space>>(run.points));
   all.push_back(std::make_unique<CorrectionObserver<Space>>());
   all.push_back(std::make_unique<StepLengthObserver<Space>>(run));
   for (const ObserverRow& row : RegisteredObservers()) all.push_back(row.Make(run));
   return all;
 }
 
+template <class Space>
+std::vector<std::unique_ptr<Observer<Space>>> MakeMemberObservers(const Watched<Space>& run) {
+  std::vector<std::unique_ptr<Observer<Space>>> all;
+  all.push_back(std::make_unique<DriftObserver<Space>>());
+  all.push_back(std::make_unique<EnergyObserver<Space>>(run.points, run.mechanism.has_power()));
+  all.push_back(std::make_unique<ExactObserver<Space>>(run.scene, run.mechanism));
+  return all;
+}
+
 template std::vector<std::unique_ptr<Observer<Planar>>> MakeObservers(const Watched<Planar>&);
 template std::vector<std::unique_ptr<Observer<Spatial>>> MakeObservers(const Watched<Spatial>&);
+template std::vector<std::unique_ptr<Observer<Planar>>> MakeMemberObservers(const Watched<Planar>&);
+template std::vector<std::unique_ptr<Observer<Spatial>>> MakeMemberObservers(
+    const Watched<Spatial>&);
 
 }  // namespace loopbench::harness

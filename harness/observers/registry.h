@@ -4,9 +4,9 @@
 //       "turns", "how far bodies turn.",
 //       {{"turns_max", kNumber, {"largest turn", "rad", kScientific}, {kLargest}, kError}}));
 //
-// It then watches every accuracy run. Its keys are measures like all others (measures.h): they
-// stand in records, with words for a heading in drift.csv, and `compare` judges those that have a
-// rule.
+// It then watches every accuracy run but the members of ensembles. Its keys are measures like all
+// others (measures.h): they stand in records, with words for a heading in drift.csv, and `compare`
+// judges those that have a rule.
 #pragma once
 
 #include <deque>

@@ -41,9 +41,9 @@ struct HeldAgainst {
 template <class Space>
 class Runner {
  public:
-  /// Part `part` of `user`, simplified to `scene`.
+  /// Part `part` of `user`, simplified to `scene`; of a member of an ensemble less is watched.
   Runner(const Experiment& experiment, const Case& one, const MechanismDescription& user,
-         const CompiledScene& scene, int part, bool with_series, const HeldAgainst& held,
+         const CompiledScene& scene, int part, bool is_member, const HeldAgainst& held,
          const TrajectoryTask* trajectory)
       : case_(one),
         user_(user),
@@ -53,7 +53,7 @@ class Runner {
         description_(scene.compiled.parts[static_cast<std::size_t>(part)].description),
         mechanism_(description_, one.column.coordinates),
         stops_(mechanism_.stop_times()),
-        with_series_(with_series) {
+        is_member_(is_member) {
     const Measured measured{user_, compiled_};
     if (held.series != nullptr) {
       errors_ = std::make_unique<SeriesMeter>(measured, part, *held.series, one.horizon);
@@ -61,8 +61,9 @@ class Runner {
       errors_ = std::make_unique<ErrorMeter>(measured, part, *held.reference);
     }
     if (trajectory != nullptr) PrepareRows(*trajectory);
-    observers_ = MakeObservers<Space>(
-        {description_, mechanism_, scene_, experiment.series_points, with_series, stops_});
+    const Watched<Space> watched{description_, mechanism_, scene_, experiment.series_points,
+                                 stops_};
+    observers_ = is_member_ ? MakeMemberObservers<Space>(watched) : MakeObservers<Space>(watched);
   }
 
   Run Execute() {
@@ -91,7 +92,7 @@ class Runner {
     WriteCounts(result, traces.projection_steps, FindProfile(case_.integrator)->is_implicit,
                 run.record);
     run.drift = {traces.drift.t, traces.drift.value};
-    if (with_series_) {
+    if (!is_member_) {
       run.correction = {traces.correction.t, traces.correction.value};
       run.energy = {traces.energy.t, traces.energy.value};
       run.kinetic = traces.kinetic;
@@ -186,7 +187,8 @@ class Runner {
       const bool restart = formulation->BeginStep(t, y);
       // a derivative that fails here fails in the integrator's next call, with its outcome; only
       // what the failing matrix looked like is worth keeping
-      const Outcome outcome = formulation->Examine(t, y, ydot);
+      const Outcome outcome =
+          is_member_ ? formulation->FromState(t, y) : formulation->Examine(t, y, ydot);
       Sample<Space> sample{t, *formulation};
       sample.knows_work = !peer || !mechanism_.has_power();
       if (!work.empty()) sample.supplied = work[0], sample.dissipated = work[1];
@@ -212,7 +214,7 @@ class Runner {
       const std::string why = formulation->solver().WhySingular();
       if (!why.empty()) run.message += ": " + why;
     }
-    if (with_series_ && run.outcome == Outcome::kFinished &&
+    if (!is_member_ && run.outcome == Outcome::kFinished &&
         formulation->Examine(run.t_reached, y_, ydot) == Outcome::kFinished) {
       WriteFinalPoses(user_, compiled_, part_, formulation->kinematics(), final_poses_);
     }
@@ -228,7 +230,7 @@ class Runner {
   Mechanism<Space, double> mechanism_;
   std::vector<std::unique_ptr<Observer<Space>>> observers_;
   std::vector<double> stops_;  ///< [s], at which steps end
-  bool with_series_;
+  bool is_member_;
   std::unique_ptr<Meter> errors_;
   std::optional<Recorder<Space>> recorder_;
   bool by_steps_ = false;                         ///< rows are at the ends of steps
@@ -239,14 +241,14 @@ class Runner {
 };
 
 Run RunOnce(const Experiment& experiment, const Case& one, const MechanismDescription& description,
-            bool with_series, const HeldAgainst& held = {},
+            bool is_member, const HeldAgainst& held = {},
             const TrajectoryTask* trajectory = nullptr) {
   const SceneObservation& observe = experiment.scenes[one.scene].mechanism.observe;
   const CompiledScene scene = CompileScene(description, observe, experiment.compile);
   std::vector<Run> parts;
   for (int part = 0; part < static_cast<int>(scene.compiled.parts.size()); ++part) {
     const auto run = [&]<class Space>() {
-      return Runner<Space>(experiment, one, description, scene, part, with_series, held, trajectory)
+      return Runner<Space>(experiment, one, description, scene, part, is_member, held, trajectory)
           .Execute();
     };
     const auto& own = scene.compiled.parts[static_cast<std::size_t>(part)].description;
@@ -300,7 +302,7 @@ Record RunCase(const Experiment& experiment, const Case& one, const Reference* r
                              SettingOf(one)));
   }
   Run nominal =
-      RunOnce(experiment, one, scene.mechanism.description, true, held, task ? &*task : nullptr);
+      RunOnce(experiment, one, scene.mechanism.description, false, held, task ? &*task : nullptr);
   for (const auto& [key, value] : nominal.record.items()) record.Set(key, value);
 
   std::vector<DriftSeries> runs;
@@ -308,7 +310,7 @@ Record RunCase(const Experiment& experiment, const Case& one, const Reference* r
   int failed = 0;
   for (int member = 0; member < (one.ensemble > 1 ? one.ensemble : 0); ++member) {
     const MechanismDescription start = MemberStart(scene.mechanism.description, one, member);
-    Run run = RunOnce(experiment, one, start, false);
+    Run run = RunOnce(experiment, one, start, true);
     tally.Add(run, start);
     if (run.record.Text("outcome") != ToString(Outcome::kFinished)) {
       ++failed;

@@ -4,6 +4,7 @@
 
 #include "mechanism/algebra/instantiate.h"
 #include "odca/arm_sweep.h"
+#include "odca/path_lane.h"
 #include "odca/path_sweep.h"
 
 namespace loopbench::odca {
@@ -49,6 +50,11 @@ Odca<Space, S>::Odca(const Mechanism<Space, S>& mechanism, const FormulationOpti
   if constexpr (std::is_same_v<S, double>) {
     if (options.solver == SolverKind::kRankRevealing) {
       short_cut_ = ShortCut<Space>::Make(mechanism, options.threads);
+    }
+    if constexpr (std::is_same_v<Space, Planar>) {
+      if (short_cut_ != nullptr && options.beside != nullptr) {
+        lane_ = pins::PathLane::Take(*options.beside, *short_cut_);
+      }
     }
   }
 }
@@ -98,7 +104,9 @@ bool Odca<Space, S>::RightHandSide([[maybe_unused]] SpeedsUsed speeds,
                                    [[maybe_unused]] std::span<S> qdot,
                                    [[maybe_unused]] std::span<S> udot) {
   if constexpr (std::is_same_v<S, double>) {
-    by_short_cut_ = short_cut_ != nullptr && short_cut_->Evaluate(speeds, q, u, qdot, udot);
+    by_short_cut_ = lane_ != nullptr
+                        ? lane_->Evaluate(speeds, q, u, qdot, udot)
+                        : short_cut_ != nullptr && short_cut_->Evaluate(speeds, q, u, qdot, udot);
     return by_short_cut_;
   }
   return false;

@@ -19,8 +19,11 @@ template <class Space, class S>
 Plan MakePlan(const Mechanism<Space, S>& mechanism, const PlanOptions& options = {});
 
 namespace pins {
-class PathSweep;
-}
+template <class T>
+class PathSweepOf;
+using PathSweep = PathSweepOf<double>;
+class PathLane;
+}  // namespace pins
 namespace arms {
 class ArmSweep;
 }
@@ -70,6 +73,7 @@ class Odca final : public ConstraintSolver<Space, S> {
   Plan plan_;
   Sweep<Space, S> sweep_;
   std::unique_ptr<ShortCut<Space>> short_cut_;        ///< null where there is none
+  std::unique_ptr<pins::PathLane> lane_;              ///< null but for paths of runs side by side
   bool by_short_cut_ = false;                         ///< the last evaluation was
   const Kinematics<Space, S>* kinematics_ = nullptr;  ///< of the last Factor()
   BodyEquations<Space, S> equations_;

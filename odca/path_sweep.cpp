@@ -7,11 +7,9 @@ namespace loopbench::odca::pins {
 
 namespace {
 
-constexpr Vector2<double> kNone = {0.0, 0.0};
-
-std::span<double> In(VectorX<double>& numbers) {
-  return {numbers.data(), static_cast<std::size_t>(numbers.size())};
-}
+/// What closures say of all lanes alike.
+bool Says(double truth) { return truth > 0.0; }
+bool Says(const Lanes& truth) { return truth[0] > 0.0; }
 
 /// range(first, size) over parts of `size` numbers.
 template <class Range>
@@ -25,8 +23,9 @@ void ForRanges(WorkerPool& pool, std::size_t size, const Range& range) {
 
 }  // namespace
 
-template <bool kLoops, PathSweep::Gaps kGaps>
-void PathSweep::TurnPacks(Group& group) {
+template <class T>
+template <bool kLoops, PathSweepOf<T>::Gaps kGaps>
+void PathSweepOf<T>::TurnPacks(Group& group) {
   const PathPlaces& path = paths_[group.path];
   Point<Lanes> at_2 = {};
   Lanes room = Lanes{} + kLargestAngle;
@@ -70,40 +69,47 @@ void PathSweep::TurnPacks(Group& group) {
 }
 
 /// What a body's constants and numbers are, wherever it stands.
-struct PathSweep::At {
-  Link<double> link;
-  TurnedLink<double> turned;
-  double speed;
+template <class T>
+struct PathSweepOf<T>::At {
+  Link<T> link;
+  TurnedLink<T> turned;
+  T speed;
 };
-PathSweep::At PathSweep::Body(const PathPlaces& path, int k) const {
-  if (k >= path.packed) {
-    const int single = path.first_single + k - path.packed;
-    return {singles_[single], turned_singles_[single], speed_[path.first + k]};
+template <class T>
+PathSweepOf<T>::At PathSweepOf<T>::Body(const PathPlaces& path, int k) const {
+  if constexpr (kIsOne) {
+    if (k < path.packed) {
+      const int pack = path.first_pack + path.pack(k), lane = path.lane(k);
+      return {LaneOf(packs_[pack], lane), LaneOf(turned_packs_[pack], lane), speed_[path.place(k)]};
+    }
   }
-  const int pack = path.first_pack + path.pack(k), lane = path.lane(k);
-  return {LaneOf(packs_[pack], lane), LaneOf(turned_packs_[pack], lane), speed_[path.place(k)]};
+  const int single = path.first_single + k - path.packed;
+  return {singles_[single], turned_singles_[single], speed_[path.first + k]};
 }
-void PathSweep::Set(const PathPlaces& path, int k, const TurnedLink<double>& turned) {
-  if (k >= path.packed) {
-    turned_singles_[path.first_single + k - path.packed] = turned;
-  } else {
-    SetLane(turned_packs_[path.first_pack + path.pack(k)], path.lane(k), turned);
+template <class T>
+void PathSweepOf<T>::Set(const PathPlaces& path, int k, const TurnedLink<T>& turned) {
+  if constexpr (kIsOne) {
+    if (k < path.packed) {
+      return SetLane(turned_packs_[path.first_pack + path.pack(k)], path.lane(k), turned);
+    }
   }
+  turned_singles_[path.first_single + k - path.packed] = turned;
 }
 
-template <PathSweep::Gaps kGaps>
-void PathSweep::Close(PathPlaces& path, int k, bool here, const Point<double>& gap) {
+template <class T>
+template <PathSweepOf<T>::Gaps kGaps>
+void PathSweepOf<T>::Close(PathPlaces& path, int k, bool here, const Point<T>& gap) {
   const int P = here ? k : k - 1;
   At at_P = Body(path, P);
-  const Vector2<double> to_Q = Scaled(1.0 / at_P.link.radius, gap.p);
+  const Vector2<T> to_Q = Scaled(1.0 / at_P.link.radius, gap.p);
   if (here) {
     at_P.turned.r1 = at_P.turned.r1 + to_Q;
   } else {
     at_P.turned.r2 = at_P.turned.r2 - to_Q;
   }
   Set(path, P, at_P.turned);
-  const Vector2<double> gap_v = kGaps == Gaps::kSpeeds ? RelativeVelocity(at_P.speed, gap) : gap.p;
-  largest_ = std::max(largest_, gap_v.x * gap_v.x + gap_v.y * gap_v.y);
+  const Vector2<T> gap_v = kGaps == Gaps::kSpeeds ? RelativeVelocity(at_P.speed, gap) : gap.p;
+  largest_ = Max<T>(largest_, gap_v.x * gap_v.x + gap_v.y * gap_v.y);
   if (k == path.bodies) {
     path.gap_v = gap_v;
     path.gap_w = at_P.speed;
@@ -115,68 +121,79 @@ void PathSweep::Close(PathPlaces& path, int k, bool here, const Point<double>& g
   Set(path, k, at.turned);
 }
 
-bool PathSweep::TurnSingles(const PathPlaces& path) {
-  double room = kLargestAngle;
+template <class T>
+T PathSweepOf<T>::TurnSingles(const PathPlaces& path) {
+  T room = T{} + kLargestAngle;
   for (int k = path.packed; k < path.bodies; ++k) {
     const int single = path.first_single + k - path.packed;
-    const double angle = angle_[path.first + k];
-    room = Min(room, kLargestAngle - Magnitude(angle));
+    const T angle = angle_[path.first + k];
+    room = Min<T>(room, kLargestAngle - Magnitude(angle));
     turned_singles_[single] = pins::Turn(singles_[single], angle);
   }
-  return room >= 0.0;
+  return room;
 }
 
-template <PathSweep::Gaps kGaps>
-void PathSweep::CloseLoops(PathPlaces& path) {
-  Point<double> at_2 = {};
-  const auto start = [&](int k, const Closure<double>& closure) {
-    if (closure.follows > 0.0) return at_2;
+template <class T>
+template <PathSweepOf<T>::Gaps kGaps>
+void PathSweepOf<T>::CloseLoops(PathPlaces& path) {
+  Point<T> at_2 = {};
+  const auto start = [&](int k, const Closure<T>& closure) {
+    if (Says(closure.follows)) return at_2;
     const At at = Body(path, k);
-    const Point<double> at_pin = AtPin(at.link, at.turned, at.speed, closure);
-    if (IsCut(closure)) Close<kGaps>(path, k, closure.cut_here > 0.0, at_2 - at_pin);
+    const Point<T> at_pin = AtPin(at.link, at.turned, at.speed, closure);
+    const bool cut_here = Says(closure.cut_here);
+    if (cut_here || Says(closure.cut_before)) Close<kGaps>(path, k, cut_here, at_2 - at_pin);
     return at_pin;
   };
-  for (int i = 0; i < path.pieces(); ++i) {
-    const Piece& piece = pieces_[path.first_piece + i];
-    const Point<double> at_1 = start(i * path.packs, piece.start);
-    at_2 = LaneOf(groups_[path.first_group + i / kLanes].ends, i % kLanes);
-    if (!piece.stands_alone) at_2 = at_2 + at_1;
+  if constexpr (kIsOne) {
+    for (int i = 0; i < path.pieces(); ++i) {
+      const Piece& piece = pieces_[path.first_piece + i];
+      const Point<double> at_1 = start(i * path.packs, piece.start);
+      at_2 = LaneOf(groups_[path.first_group + i / kLanes].ends, i % kLanes);
+      if (!piece.stands_alone) at_2 = at_2 + at_1;
+    }
   }
   for (int k = path.packed; k < path.bodies; ++k) {
     const int single = path.first_single + k - path.packed;
-    const TurnedLink<double> own = turned_singles_[single];  // before gaps move its arms
-    const Point<double> at_1 = start(k, single_closures_[single]);
+    const TurnedLink<T> own = turned_singles_[single];  // before gaps move its arms
+    const Point<T> at_1 = start(k, single_closures_[single]);
     at_2 = Across(singles_[single], own, speed_[path.first + k], at_1);
   }
   if (!path.ends_at_ground) return;
-  const Point<double> gap = {at_2.p - path.end, at_2.v};
+  const Point<T> gap = {at_2.p - path.end, at_2.v};
   if (!path.ground_is_P) return Close<kGaps>(path, path.bodies, false, gap);
   path.gap_v = kGaps == Gaps::kSpeeds ? gap.v : gap.p;
-  largest_ = std::max(largest_, gap.p.x * gap.p.x + gap.p.y * gap.p.y);
+  largest_ = Max<T>(largest_, gap.p.x * gap.p.x + gap.p.y * gap.p.y);
 }
 
-template <PathSweep::Gaps kGaps>
-bool PathSweep::Turn() {
-  pool_->ForEach(static_cast<int>(groups_.size()), [&](int i) {
-    if (paths_[groups_[i].path].loops_in_lanes) {
-      TurnPacks<true, kGaps>(groups_[i]);
-    } else {
-      TurnPacks<false, kGaps>(groups_[i]);
+template <class T>
+template <PathSweepOf<T>::Gaps kGaps>
+TruthOf<T> PathSweepOf<T>::Turn() {
+  if constexpr (kIsOne) {
+    pool_->ForEach(static_cast<int>(groups_.size()), [&](int i) {
+      if (paths_[groups_[i].path].loops_in_lanes) {
+        TurnPacks<true, kGaps>(groups_[i]);
+      } else {
+        TurnPacks<false, kGaps>(groups_[i]);
+      }
+    });
+    for (const Group& group : groups_) {
+      if (!(group.room >= 0.0)) return false;
     }
-  });
-  largest_ = 0.0;
-  for (const Group& group : groups_) {
-    if (!(group.room >= 0.0)) return false;
   }
+  largest_ = T{};
+  TruthOf<T> good = T{} >= 0.0;
   for (PathPlaces& path : paths_) {
-    if (!TurnSingles(path)) return false;
+    good &= TurnSingles(path) >= 0.0;
+    if (!Any(good)) break;
     if (path.has_loops) CloseLoops<kGaps>(path);
   }
-  return true;
+  return good;
 }
 
+template <class T>
 template <Pass kPass>
-void PathSweep::UpGroup(Group& group) {
+void PathSweepOf<T>::UpGroup(Group& group) {
   const int packs = paths_[group.path].packs;
   const auto leaf = [&](int i) {
     const int pack = group.pack + i;
@@ -194,12 +211,13 @@ void PathSweep::UpGroup(Group& group) {
   group.slack = Smallest(slack);
 }
 
+template <class T>
 template <Pass kPass>
-double PathSweep::Up(PathPlaces& path) {
-  OneHandle<double> all = {};
-  EndCut<double>* cut = &end_cuts_[path.first_cut];
-  double slack = 0.0;
-  const auto join = [&](const TwoHandle<double>& next, double limit) {
+T PathSweepOf<T>::Up(PathPlaces& path) {
+  OneHandle<T> all = {};
+  EndCut<T>* cut = &end_cuts_[path.first_cut];
+  T slack = {};
+  const auto join = [&](const TwoHandle<T>& next, const T& limit) {
     if (cut == &end_cuts_[path.first_cut]) {
       all = {next.zeta22, next.zeta23};
     } else {
@@ -207,22 +225,24 @@ double PathSweep::Up(PathPlaces& path) {
     }
     ++cut;
   };
-  for (int g = path.first_group; g < path.first_group + path.groups; ++g) {
-    const Group& group = groups_[g];
-    slack = Min(slack, group.slack);
-    const Lanes limits = packs_[group.pack].limit;
-    for (int lane = 0; lane < kLanes; ++lane) join(LaneOf(group.assemblies, lane), limits[lane]);
+  if constexpr (kIsOne) {
+    for (int g = path.first_group; g < path.first_group + path.groups; ++g) {
+      const Group& group = groups_[g];
+      slack = Min(slack, group.slack);
+      const Lanes limits = packs_[group.pack].limit;
+      for (int lane = 0; lane < kLanes; ++lane) join(LaneOf(group.assemblies, lane), limits[lane]);
+    }
   }
   for (int k = 0; k < path.singles(); ++k) {
-    const Link<double>& link = singles_[path.first_single + k];
-    const double speed = speed_[path.first + path.packed + k];
+    const Link<T>& link = singles_[path.first_single + k];
+    const T speed = speed_[path.first + path.packed + k];
     join(Leaf<kPass>(link, turned_singles_[path.first_single + k], speed), link.limit);
   }
   if (path.ends_at_ground) {  // Ground has no response (33, 34)
-    const Factored2<double> factors = FactorsOf(all.zeta22, path.end_limit, slack);
-    Vector2<double> wanted = kNone;  // of the last body, as TwoHandle::zeta13 of Leaf()
+    const Factored2<T> factors = FactorsOf(all.zeta22, path.end_limit, slack);
+    Vector2<T> wanted = {};  // of the last body, as TwoHandle::zeta13 of Leaf()
     if (kPass == Pass::kSpeeds) wanted = -path.gap_v;
-    if (kPass == Pass::kAccelerations) wanted = Cross(2.0 * path.gap_w, path.gap_v);
+    if (kPass == Pass::kAccelerations) wanted = Cross<T>(2.0 * path.gap_w, path.gap_v);
     path.end_force = factors * (all.zeta23 - wanted);
   }
   return slack;
@@ -230,28 +250,32 @@ double PathSweep::Up(PathPlaces& path) {
 
 /// From the path's end: the force in the joint before a body, then the body's angular acceleration.
 /// Forces on pieces are those in the joints between them.
+template <class T>
 template <Pass kPass>
-void PathSweep::Down(const PathPlaces& path) {
-  const EndCut<double>* cuts = &end_cuts_[path.first_cut];
-  Vector2<double> F2 = path.ends_at_ground ? -path.end_force : kNone;
+void PathSweepOf<T>::Down(const PathPlaces& path) {
+  const EndCut<T>* cuts = &end_cuts_[path.first_cut];
+  Vector2<T> F2 = path.ends_at_ground ? -path.end_force : Vector2<T>{};
   for (int k = path.singles() - 1; k >= 0; --k) {
     const int single = path.first_single + k, node = path.pieces() + k;
-    const Vector2<double> F1 = node == 0 ? kNone : ForceIn(cuts[node], F2);
+    const Vector2<T> F1 = node == 0 ? Vector2<T>{} : ForceIn(cuts[node], F2);
     alpha_[path.first + path.packed + k] =
         AngularAcceleration<kPass>(turned_singles_[single], F1, F2) / singles_[single].radius;
     F2 = -F1;
   }
-  for (int piece = path.pieces() - 1; piece >= 0; --piece) {
-    const Vector2<double> F1 = piece == 0 ? kNone : ForceIn(cuts[piece], F2);
-    Group& group = groups_[path.first_group + piece / kLanes];
-    SetLane(group.F1, piece % kLanes, F1);
-    SetLane(group.F2, piece % kLanes, F2);
-    F2 = -F1;
+  if constexpr (kIsOne) {
+    for (int piece = path.pieces() - 1; piece >= 0; --piece) {
+      const Vector2<double> F1 = piece == 0 ? Vector2<double>{} : ForceIn(cuts[piece], F2);
+      Group& group = groups_[path.first_group + piece / kLanes];
+      SetLane(group.F1, piece % kLanes, F1);
+      SetLane(group.F2, piece % kLanes, F2);
+      F2 = -F1;
+    }
   }
 }
 
+template <class T>
 template <Pass kPass>
-void PathSweep::DownGroup(const Group& group) {
+void PathSweepOf<T>::DownGroup(const Group& group) {
   Vector2<Lanes> F2 = group.F2;
   for (int i = paths_[group.path].packs - 1; i >= 0; --i) {
     const int pack = group.pack + i;
@@ -262,46 +286,54 @@ void PathSweep::DownGroup(const Group& group) {
   }
 }
 
+template <class T>
 template <Pass kPass>
-bool PathSweep::Sweep() {
-  const int groups = static_cast<int>(groups_.size());
-  pool_->ForEach(groups, [&](int i) { UpGroup<kPass>(groups_[i]); });
-  double slack = 0.0;
+TruthOf<T> PathSweepOf<T>::Sweep() {
+  [[maybe_unused]] const int groups = static_cast<int>(groups_.size());
+  if constexpr (kIsOne) pool_->ForEach(groups, [&](int i) { UpGroup<kPass>(groups_[i]); });
+  T slack = {};
   for (PathPlaces& path : paths_) {
     constexpr int kOfEach = Operations::Leaf(kPass) + Operations::kAngularAcceleration + 1;
     operations_ += path.packed * (kOfEach + Operations::kJoin + Operations::kForceIn) +
                    path.singles() * (kOfEach + Operations::kEndJoin + Operations::kForceInEnd);
     slack = Min(slack, Up<kPass>(path));
   }
-  if (!(slack >= 0.0)) return false;
+  const TruthOf<T> good = slack >= 0.0;
+  if (!Any(good)) return good;
   for (const PathPlaces& path : paths_) Down<kPass>(path);
-  pool_->ForEach(groups, [&](int i) { DownGroup<kPass>(groups_[i]); });
-  return true;
+  if constexpr (kIsOne) pool_->ForEach(groups, [&](int i) { DownGroup<kPass>(groups_[i]); });
+  return good;
 }
 
-bool PathSweep::Evaluate(SpeedsUsed speeds, std::span<const double> q, std::span<const double> u,
-                         std::span<double> qdot, std::span<double> udot) {
+template <class T>
+TruthOf<T> PathSweepOf<T>::Evaluate(SpeedsUsed speeds, std::span<const T> q, std::span<const T> u,
+                                    std::span<T> qdot, std::span<T> udot) {
   operations_ = 0;
   tree_.ToBodies(q, u, angle_.data(), speed_.data(), *pool_);
-  if (!Turn<Gaps::kSpeeds>()) return false;
+  TruthOf<T> good = Turn<Gaps::kSpeeds>();
+  if (!Any(good)) return good;
   if (speeds == SpeedsUsed::kGiven) {
-    if (!Sweep<Pass::kAccelerations>()) return false;
+    good &= Sweep<Pass::kAccelerations>();
+    if (!Any(good)) return good;
     ForRanges(*pool_, u.size(), [&](std::size_t first, std::size_t size) {
       std::ranges::copy(u.subspan(first, size), qdot.begin() + first);
     });
   } else {
-    if (!Sweep<Pass::kSpeeds>()) return false;
+    good &= Sweep<Pass::kSpeeds>();
+    if (!Any(good)) return good;
     tree_.ToJoints(alpha_.data(), u, qdot, *pool_);
     ForRanges(*pool_, speed_.size(), [&](std::size_t first, std::size_t size) {
-      speed_.segment(first, size) += alpha_.segment(first, size);
+      for (std::size_t i = first; i < first + size; ++i) speed_[i] += alpha_[i];
     });
-    if (!Sweep<Pass::kCompleted>()) return false;
+    good &= Sweep<Pass::kCompleted>();
+    if (!Any(good)) return good;
   }
-  return tree_.ToJoints(alpha_.data(), {}, udot, *pool_);
+  return good & tree_.ToJoints(alpha_.data(), {}, udot, *pool_);
 }
 
-std::optional<double> PathSweep::Gap() {
-  tree_.ToBodies(In(moved_), In(speeds_), angle_.data(), speed_.data(), *pool_);
+template <class T>
+std::optional<double> PathSweepOf<T>::Gap() requires kIsOne {
+  tree_.ToBodies(moved_, speeds_, angle_.data(), speed_.data(), *pool_);
   if (!Turn<Gaps::kPositions>()) return std::nullopt;
   double largest = largest_;
   for (const Group& group : groups_) largest = std::max(largest, group.largest);
@@ -309,8 +341,9 @@ std::optional<double> PathSweep::Gap() {
 }
 
 /// As level_position.cpp does it by parts.
-std::optional<Correction<double>> PathSweep::Project(std::span<double> q, std::span<double> u,
-                                                     double goal) {
+template <class T>
+std::optional<Correction<double>> PathSweepOf<T>::Project(std::span<double> q, std::span<double> u,
+                                                          double goal) requires kIsOne {
   std::ranges::copy(q, moved_.begin());
   std::ranges::copy(u, speeds_.begin());
   std::optional<double> now = Gap();
@@ -321,7 +354,7 @@ std::optional<Correction<double>> PathSweep::Project(std::span<double> q, std::s
     if (!Sweep<Pass::kSpeeds>()) return std::nullopt;
     const double before = *now;
     back_ = moved_;
-    if (!tree_.ToJoints(alpha_.data(), In(back_), In(moved_), *pool_)) return std::nullopt;
+    if (!tree_.ToJoints(alpha_.data(), back_, moved_, *pool_)) return std::nullopt;
     now = Gap();
     if (!now) return std::nullopt;
     ++correction.iterations;
@@ -329,12 +362,15 @@ std::optional<Correction<double>> PathSweep::Project(std::span<double> q, std::s
     moved_ = back_;  // round-off: as it was
     break;
   }
-  tree_.ToBodies(In(moved_), In(speeds_), angle_.data(), speed_.data(), *pool_);
+  tree_.ToBodies(moved_, speeds_, angle_.data(), speed_.data(), *pool_);
   if (!Turn<Gaps::kSpeeds>() || !Sweep<Pass::kSpeeds>()) return std::nullopt;
-  if (!tree_.ToJoints(alpha_.data(), In(speeds_), In(speeds_), *pool_)) return std::nullopt;
+  if (!tree_.ToJoints(alpha_.data(), speeds_, speeds_, *pool_)) return std::nullopt;
   std::ranges::copy(moved_, q.begin());
   std::ranges::copy(speeds_, u.begin());
   return correction;
 }
+
+template class PathSweepOf<double>;
+template class PathSweepOf<Lanes>;
 
 }  // namespace loopbench::odca::pins

@@ -13,6 +13,9 @@
 // depends on the mechanism alone, never on their number. The depth is that of one piece and of the
 // sequence of pieces and left-over bodies: work goes before depth here.
 //
+// Lanes that no pieces fill can be filled by other mechanisms of the same shape: T = Lanes is
+// kLanes of them side by side, each number standing where T = double has that of one.
+//
 // Pins that close loops must not be degenerate: where FactorsOf() sees one that may be, Evaluate()
 // gives up, and the general sweep decides. Its scale is the trace of the free response of the
 // joint's two bodies, which is at least the scale of loop_solver.h.
@@ -21,6 +24,7 @@
 #include <memory>
 #include <optional>
 #include <span>
+#include <type_traits>
 #include <vector>
 
 #include "mechanism/algebra/worker_pool.h"
@@ -31,7 +35,10 @@
 
 namespace loopbench::odca::pins {
 
-class PathSweep {
+template <class T>
+class PathSweepOf {
+  static constexpr bool kIsOne = std::is_same_v<T, double>;
+
  public:
   /// Enough work for a thread to wait for the others after it.
   static constexpr int kBodiesOfGroup = 2048;
@@ -39,15 +46,23 @@ class PathSweep {
   /// Null where the mechanism is none of those, or MeasurePath() has nothing for a path of it. It
   /// need not outlive the sweep. Up to `threads` threads work on it, one for every
   /// `bodies_of_group` bodies.
-  static std::unique_ptr<PathSweep> Make(const Mechanism<Planar, double>& mechanism,
-                                         int threads = 1, int bodies_of_group = kBodiesOfGroup);
+  static std::unique_ptr<PathSweepOf> Make(const Mechanism<Planar, double>& mechanism,
+                                           int threads = 1,
+                                           int bodies_of_group = kBodiesOfGroup) requires kIsOne;
+  /// Of mechanisms like that of `one`, whose constants are in every lane; null where its own pieces
+  /// fill the lanes.
+  static std::unique_ptr<PathSweepOf> Beside(const PathSweepOf<double>& one) requires(!kIsOne);
+  /// Puts the constants of `one` into a lane. False, and nothing is set, where it has another
+  /// shape.
+  bool SetMechanism(int lane, const PathSweepOf<double>& one) requires(!kIsOne);
 
   /// As ConstraintSolver::RightHandSide(). False near a degenerate position, for angles beyond
   /// kLargestAngle, and for numbers that are not finite. Allocates nothing.
-  bool Evaluate(SpeedsUsed speeds, std::span<const double> q, std::span<const double> u,
-                std::span<double> qdot, std::span<double> udot);
+  TruthOf<T> Evaluate(SpeedsUsed speeds, std::span<const T> q, std::span<const T> u,
+                      std::span<T> qdot, std::span<T> udot);
   /// As ConstraintSolver::Project(), where loops are closed; nothing where Evaluate() is false.
-  std::optional<Correction<double>> Project(std::span<double> q, std::span<double> u, double goal);
+  std::optional<Correction<double>> Project(std::span<double> q, std::span<double> u,
+                                            double goal) requires kIsOne;
   /// Multiply-adds of the last evaluation, or what it did of it; angles are not counted.
   long operations() const { return operations_; }
   int threads() const { return pool_->threads(); }
@@ -68,9 +83,9 @@ class PathSweep {
     bool has_loops = false;       ///< points are followed along it
     bool loops_in_lanes = false;  ///< so that closures of packs are asked for
     bool ends_at_ground = false, ground_is_P = false;  ///< as in PathLinks
-    Vector2<double> end, end_force;
-    Vector2<double> gap_v = {0.0, 0.0};  ///< as of TurnedLink, at that joint
-    double gap_w = 0.0, end_limit = 0.0;
+    Vector2<T> end, end_force;
+    Vector2<T> gap_v = {};  ///< as of TurnedLink, at that joint
+    T gap_w = {}, end_limit = {};
 
     int pieces() const { return groups * kLanes; }
     int singles() const { return bodies - packed; }
@@ -94,8 +109,13 @@ class PathSweep {
     Closure<double> start;      ///< of its first body
     bool stands_alone = false;  ///< it has a pin, if the path has loops_in_lanes
   };
-  PathSweep() = default;
-  void Add(const Mechanism<Planar, double>& mechanism, PathLinks path, int bodies_of_group);
+  template <class>
+  friend class PathSweepOf;
+  PathSweepOf() = default;
+  void Resize(int num_u, int threads);
+  void SetConstants(int lane, const PathSweepOf<double>& one) requires(!kIsOne);
+  void Add(const Mechanism<Planar, double>& mechanism, PathLinks path,
+           int bodies_of_group) requires kIsOne;
   /// Closures of pieces' first bodies go there, and out of those of the packs.
   void AddPieces(PathPlaces& path, std::vector<Closure<double>>& closures);
   void AddPacks(const PathPlaces& path, const PathLinks& links);
@@ -107,30 +127,30 @@ class PathSweep {
   /// Bodies at their angles, with what the gaps of cut joints add to them. False for angles beyond
   /// kLargestAngle.
   template <Gaps kGaps>
-  bool Turn();
+  TruthOf<T> Turn();
   /// Sets ends of pieces, seen from where these start unless they stand alone.
   template <bool kLoops, Gaps kGaps>
   void TurnPacks(Group& group);
-  /// What comes after that.
-  bool TurnSingles(const PathPlaces& path);
+  /// What comes after that; what is left up to kLargestAngle.
+  T TurnSingles(const PathPlaces& path);
   template <Gaps kGaps>
   void CloseLoops(PathPlaces& path);
   struct At;
   At Body(const PathPlaces& path, int k) const;
-  void Set(const PathPlaces& path, int k, const TurnedLink<double>& turned);
+  void Set(const PathPlaces& path, int k, const TurnedLink<T>& turned);
   /// The joint before body k, or to Ground after the last one, being cut: `here` if its P is k.
   template <Gaps kGaps>
-  void Close(PathPlaces& path, int k, bool here, const Point<double>& gap);
+  void Close(PathPlaces& path, int k, bool here, const Point<T>& gap);
   /// Turns to positions moved_; the largest gap of a cut joint [m], or nothing.
-  std::optional<double> Gap();
+  std::optional<double> Gap() requires kIsOne;
   /// alpha_, or what is to be added to speeds. False near a degenerate position.
   template <Pass kPass>
-  bool Sweep();
+  TruthOf<T> Sweep();
   template <Pass kPass>
   void UpGroup(Group& group);
   /// Over pieces and single bodies of a path; the least slack of all its joins.
   template <Pass kPass>
-  double Up(PathPlaces& path);
+  T Up(PathPlaces& path);
   template <Pass kPass>
   void Down(const PathPlaces& path);
   template <Pass kPass>
@@ -143,17 +163,19 @@ class PathSweep {
   std::vector<Closure<Lanes>> pack_closures_;
   std::vector<TurnedLink<Lanes>> turned_packs_;
   std::vector<Cut<Lanes>> cuts_;
-  std::vector<Link<double>> singles_;
-  std::vector<Closure<double>> single_closures_;
-  std::vector<TurnedLink<double>> turned_singles_;
-  std::vector<EndCut<double>> end_cuts_;
-  VectorX<double> angle_, speed_, alpha_;  ///< by place; the last one is Ground's
-  VectorX<double> moved_, back_, speeds_;  ///< of Project(): positions, those before, speeds
-  double largest_ = 0.0;                   ///< as Group::largest, of all joints outside of groups
+  std::vector<Link<T>> singles_;
+  std::vector<Closure<T>> single_closures_;
+  std::vector<TurnedLink<T>> turned_singles_;
+  std::vector<EndCut<T>> end_cuts_;
+  std::vector<T> angle_, speed_, alpha_;  ///< by place; the last one is Ground's
+  std::vector<T> moved_, back_, speeds_;  ///< of Project(): positions, those before, speeds
+  T largest_ = {};                        ///< as Group::largest, of all joints outside of groups
   int num_places_ = 0;
-  TreeAngles tree_;
+  TreeAngles<T> tree_;
   std::unique_ptr<WorkerPool> pool_;
   long operations_ = 0;
 };
+
+using PathSweep = PathSweepOf<double>;
 
 }  // namespace loopbench::odca::pins

@@ -78,13 +78,25 @@ void SetLimits(const Mechanism<Planar, double>& mechanism, int pieces, int lengt
 
 }  // namespace
 
-std::unique_ptr<PathSweep> PathSweep::Make(const Mechanism<Planar, double>& mechanism, int threads,
-                                           int bodies_of_group) {
+template <class T>
+void PathSweepOf<T>::Resize(int num_u, int threads) {
+  turned_singles_.resize(singles_.size());
+  angle_.assign(num_places_ + 1, T{});
+  speed_ = alpha_ = angle_;
+  moved_.assign(num_u, T{});
+  back_ = speeds_ = moved_;
+  pool_ = std::make_unique<WorkerPool>(threads);
+}
+
+template <class T>
+std::unique_ptr<PathSweepOf<T>> PathSweepOf<T>::Make(const Mechanism<Planar, double>& mechanism,
+                                                     int threads,
+                                                     int bodies_of_group) requires kIsOne {
   if (mechanism.num_u() == 0 || !mechanism.forces().empty() ||
       !std::ranges::all_of(mechanism.joints(), IsPin)) {
     return nullptr;
   }
-  std::unique_ptr<PathSweep> sweep(new PathSweep);
+  std::unique_ptr<PathSweepOf> sweep(new PathSweepOf);
   std::vector<int> place_of(mechanism.num_bodies(), mechanism.num_bodies() - 1);
   std::vector<double> axes(mechanism.num_bodies(), 0.0);
   for (const Path& path : FindPaths(mechanism.num_bodies(), PlanJoints(mechanism))) {
@@ -97,18 +109,72 @@ std::unique_ptr<PathSweep> PathSweep::Make(const Mechanism<Planar, double>& mech
     }
   }
   if (sweep->paths_.empty()) return nullptr;
-  sweep->tree_ = TreeAngles(mechanism, place_of, axes);
-  sweep->angle_.setZero(sweep->num_places_ + 1);
-  sweep->speed_ = sweep->alpha_ = sweep->angle_;
-  sweep->moved_.setZero(mechanism.num_u());
-  sweep->back_ = sweep->speeds_ = sweep->moved_;
+  sweep->tree_ = TreeAngles<T>(mechanism, place_of, axes);
   const int useful = std::max(1, sweep->num_places_ / bodies_of_group);
-  sweep->pool_ = std::make_unique<WorkerPool>(std::min(threads, useful));
+  sweep->Resize(mechanism.num_u(), std::min(threads, useful));
   return sweep;
 }
 
-void PathSweep::Add(const Mechanism<Planar, double>& mechanism, PathLinks links,
-                    int bodies_of_group) {
+template <class T>
+std::unique_ptr<PathSweepOf<T>> PathSweepOf<T>::Beside(const PathSweepOf<double>& one) requires(
+    !kIsOne) {
+  if (!one.groups_.empty()) return nullptr;
+  std::unique_ptr<PathSweepOf> sweep(new PathSweepOf);
+  for (const auto& path : one.paths_) {
+    PathPlaces like;
+    like.bodies = path.bodies;
+    like.first = path.first;
+    like.first_single = path.first_single;
+    like.first_cut = path.first_cut;
+    like.has_loops = path.has_loops;
+    like.ends_at_ground = path.ends_at_ground;
+    like.ground_is_P = path.ground_is_P;
+    sweep->paths_.push_back(like);
+  }
+  sweep->singles_.resize(one.singles_.size());
+  sweep->single_closures_.resize(one.single_closures_.size());
+  sweep->end_cuts_.resize(one.end_cuts_.size());
+  sweep->num_places_ = one.num_places_;
+  sweep->tree_ = TreeAngles<T>::Like(one.tree_);
+  sweep->Resize(static_cast<int>(one.moved_.size()), 1);
+  for (int lane = 0; lane < kLanes; ++lane) sweep->SetConstants(lane, one);
+  return sweep;
+}
+
+template <class T>
+bool PathSweepOf<T>::SetMechanism(int lane, const PathSweepOf<double>& one) requires(!kIsOne) {
+  const auto same_path = [](const PathPlaces& a, const auto& b) {
+    return a.bodies == b.bodies && a.first == b.first && a.has_loops == b.has_loops &&
+           a.ends_at_ground == b.ends_at_ground && a.ground_is_P == b.ground_is_P;
+  };
+  const auto same_closure = [](const Closure<T>& a, const Closure<double>& b) {
+    return a.follows[0] == b.follows && a.cut_here[0] == b.cut_here &&
+           a.cut_before[0] == b.cut_before;
+  };
+  if (!one.groups_.empty() || !std::ranges::equal(paths_, one.paths_, same_path) ||
+      !std::ranges::equal(single_closures_, one.single_closures_, same_closure) ||
+      !tree_.SetOffsets(lane, one.tree_)) {
+    return false;
+  }
+  SetConstants(lane, one);
+  return true;
+}
+
+template <class T>
+void PathSweepOf<T>::SetConstants(int lane, const PathSweepOf<double>& one) requires(!kIsOne) {
+  for (std::size_t i = 0; i < paths_.size(); ++i) {
+    SetLane(paths_[i].end, lane, one.paths_[i].end);
+    SetLane(paths_[i].end_limit, lane, one.paths_[i].end_limit);
+  }
+  for (std::size_t k = 0; k < singles_.size(); ++k) {
+    SetLane(singles_[k], lane, one.singles_[k]);
+    SetLane(single_closures_[k], lane, one.single_closures_[k]);
+  }
+}
+
+template <class T>
+void PathSweepOf<T>::Add(const Mechanism<Planar, double>& mechanism, PathLinks links,
+                         int bodies_of_group) requires kIsOne {
   PathPlaces path;
   path.bodies = static_cast<int>(links.links.size());
   path.groups = std::clamp(path.bodies / bodies_of_group, 1, kMostGroups);
@@ -136,12 +202,12 @@ void PathSweep::Add(const Mechanism<Planar, double>& mechanism, PathLinks links,
   singles_.insert(singles_.end(), links.links.begin() + path.packed, links.links.end());
   single_closures_.insert(single_closures_.end(), links.closures.begin() + path.packed,
                           links.closures.end());
-  turned_singles_.resize(singles_.size());
   end_cuts_.resize(end_cuts_.size() + path.pieces() + path.singles());
   paths_.push_back(path);
 }
 
-void PathSweep::AddPieces(PathPlaces& path, std::vector<Closure<double>>& closures) {
+template <class T>
+void PathSweepOf<T>::AddPieces(PathPlaces& path, std::vector<Closure<double>>& closures) {
   for (int i = 0; i < path.pieces(); ++i) {
     Closure<double>& start = closures[i * path.packs];
     Piece piece = {.start = start};
@@ -157,7 +223,8 @@ void PathSweep::AddPieces(PathPlaces& path, std::vector<Closure<double>>& closur
   for (int i = 0; i < path.pieces(); ++i) pieces_[path.first_piece + i].stands_alone = false;
 }
 
-void PathSweep::AddPacks(const PathPlaces& path, const PathLinks& links) {
+template <class T>
+void PathSweepOf<T>::AddPacks(const PathPlaces& path, const PathLinks& links) {
   for (int g = 0; g < path.groups; ++g) {
     Group group{};
     group.path = static_cast<int>(paths_.size());
@@ -179,5 +246,9 @@ void PathSweep::AddPacks(const PathPlaces& path, const PathLinks& links) {
   turned_packs_.resize(packs_.size());
   cuts_.resize(packs_.size());
 }
+
+template std::unique_ptr<PathSweep> PathSweep::Make(const Mechanism<Planar, double>&, int, int);
+template std::unique_ptr<PathSweepOf<Lanes>> PathSweepOf<Lanes>::Beside(const PathSweep&);
+template bool PathSweepOf<Lanes>::SetMechanism(int, const PathSweep&);
 
 }  // namespace loopbench::odca::pins

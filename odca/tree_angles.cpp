@@ -12,8 +12,10 @@ constexpr int kLongest = 4096;
 }  // namespace
 
 /// X_PF and X_QM are angles here.
-TreeAngles::TreeAngles(const Mechanism<Planar, double>& mechanism, const std::vector<int>& place_of,
-                       const std::vector<double>& axes) {
+template <class T>
+TreeAngles<T>::TreeAngles(const Mechanism<Planar, double>& mechanism,
+                          const std::vector<int>& place_of,
+                          const std::vector<double>& axes) requires std::is_same_v<T, double> {
   std::vector<std::vector<const TreeStep*>> below(place_of.size());  // by body
   for (const TreeStep& step : mechanism.tree()) below[step.parent].push_back(&step);
   std::vector<int> run_of(place_of.size(), -1);  // by body
@@ -47,11 +49,36 @@ TreeAngles::TreeAngles(const Mechanism<Planar, double>& mechanism, const std::ve
   }
 }
 
+template <class T>
+TreeAngles<T> TreeAngles<T>::Like(const TreeAngles<double>& one) {
+  TreeAngles like;
+  for (const auto& step : one.steps_) {
+    like.steps_.push_back({step.u, step.child, step.parent, step.sign, T{} + step.offset});
+  }
+  for (const auto& run : one.runs_) like.runs_.push_back({run.first, run.steps, run.before});
+  for (const auto& stretch : one.stretches_)
+    like.stretches_.push_back({stretch.first, stretch.last});
+  return like;
+}
+
+template <class T>
+bool TreeAngles<T>::SetOffsets(int lane,
+                               const TreeAngles<double>& one) requires(!std::is_same_v<T, double>) {
+  const auto same = [](const auto& a, const auto& b) {
+    return a.u == b.u && a.child == b.child && a.parent == b.parent && a.sign == b.sign;
+  };
+  if (!std::ranges::equal(steps_, one.steps_, same)) return false;
+  for (std::size_t i = 0; i < steps_.size(); ++i)
+    SetLane(steps_[i].offset, lane, one.steps_[i].offset);
+  return true;
+}
+
 /// The parent's values are at hand: to read them back from memory takes twice as long as all the
 /// rest.
-LOOPBENCH_INLINE void TreeAngles::Walk(const Run& run, double angle, double speed, const double* q,
-                                       const double* u, double* angles, double* speeds) const {
-  double turned = 0.0, gained = 0.0;
+template <class T>
+LOOPBENCH_INLINE void TreeAngles<T>::Walk(const Run& run, T angle, T speed, const T* q, const T* u,
+                                          T* angles, T* speeds) const {
+  T turned = {}, gained = {};
   const Step* step = steps_.data() + run.first;
   for (const Step* end = step + run.steps; step != end; ++step) {
     const double sign = step->sign;
@@ -63,8 +90,9 @@ LOOPBENCH_INLINE void TreeAngles::Walk(const Run& run, double angle, double spee
   }
 }
 
-void TreeAngles::ToBodies(std::span<const double> q, std::span<const double> u, double* angles,
-                          double* speeds, WorkerPool& pool) {
+template <class T>
+void TreeAngles<T>::ToBodies(std::span<const T> q, std::span<const T> u, T* angles, T* speeds,
+                             WorkerPool& pool) {
   const int stretches = static_cast<int>(stretches_.size());
   if (pool.threads() == 1 || stretches < 2) {
     for (const Run& run : runs_) {
@@ -75,7 +103,7 @@ void TreeAngles::ToBodies(std::span<const double> q, std::span<const double> u, 
   }
   pool.ForEach(stretches, [&](int i) {
     for (int run = stretches_[i].first; run < stretches_[i].last; ++run) {
-      Walk(runs_[run], 0.0, 0.0, q.data(), u.data(), angles, speeds);
+      Walk(runs_[run], T{}, T{}, q.data(), u.data(), angles, speeds);
     }
   });
   for (Run& run : runs_) {
@@ -96,30 +124,37 @@ void TreeAngles::ToBodies(std::span<const double> q, std::span<const double> u, 
   });
 }
 
+template <class T>
 template <bool kAdd>
-bool TreeAngles::AlongStretch(const Stretch& stretch, const double* of_bodies, const double* base,
-                              double* rates) const {
+T TreeAngles<T>::AlongStretch(const Stretch& stretch, const T* of_bodies, const T* base,
+                              T* rates) const {
   const Run& last = runs_[stretch.last - 1];
-  double zeros = 0.0;  // or not a number
+  T zeros = {};
   const Step* step = steps_.data() + runs_[stretch.first].first;
   for (const Step* end = steps_.data() + last.first + last.steps; step != end; ++step) {
     const int u = step->u;
-    const double rate = step->sign * (of_bodies[step->child] - of_bodies[step->parent]);
+    const T rate = step->sign * (of_bodies[step->child] - of_bodies[step->parent]);
     rates[u] = kAdd ? base[u] + rate : rate;
     zeros += 0.0 * rate;
   }
+  return zeros;
+}
+
+template <class T>
+TruthOf<T> TreeAngles<T>::ToJoints(const T* of_bodies, std::span<const T> base, std::span<T> rates,
+                                   WorkerPool& pool) {
+  pool.ForEach(static_cast<int>(stretches_.size()), [&](int i) {
+    Stretch& stretch = stretches_[i];
+    stretch.zeros = base.empty()
+                        ? AlongStretch<false>(stretch, of_bodies, nullptr, rates.data())
+                        : AlongStretch<true>(stretch, of_bodies, base.data(), rates.data());
+  });
+  T zeros = {};
+  for (const Stretch& stretch : stretches_) zeros += stretch.zeros;
   return zeros == 0.0;
 }
 
-bool TreeAngles::ToJoints(const double* of_bodies, std::span<const double> base,
-                          std::span<double> rates, WorkerPool& pool) {
-  pool.ForEach(static_cast<int>(stretches_.size()), [&](int i) {
-    Stretch& stretch = stretches_[i];
-    stretch.is_finite = base.empty()
-                            ? AlongStretch<false>(stretch, of_bodies, nullptr, rates.data())
-                            : AlongStretch<true>(stretch, of_bodies, base.data(), rates.data());
-  });
-  return std::ranges::all_of(stretches_, &Stretch::is_finite);
-}
+template class TreeAngles<double>;
+template class TreeAngles<Lanes>;
 
 }  // namespace loopbench::odca::pins

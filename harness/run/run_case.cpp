@@ -19,6 +19,7 @@
 #include "harness/run/merge_parts.h"
 #include "harness/run/peers.h"
 #include "harness/run/run_keys.h"
+#include "harness/run/side_by_side.h"
 #include "harness/text/hash.h"
 #include "harness/trajectory/recorder.h"
 #include "mechanism/start/assembly.h"
@@ -41,9 +42,10 @@ struct HeldAgainst {
 template <class Space>
 class Runner {
  public:
-  /// Part `part` of `user`, simplified to `scene`; of a member of an ensemble less is watched.
+  /// Part `part` of `user`, simplified to `scene`. A member of an ensemble has others `beside` it,
+  /// and less of it is watched.
   Runner(const Experiment& experiment, const Case& one, const MechanismDescription& user,
-         const CompiledScene& scene, int part, bool is_member, const HeldAgainst& held,
+         const CompiledScene& scene, int part, SideBySide* beside, const HeldAgainst& held,
          const TrajectoryTask* trajectory)
       : case_(one),
         user_(user),
@@ -53,7 +55,8 @@ class Runner {
         description_(scene.compiled.parts[static_cast<std::size_t>(part)].description),
         mechanism_(description_, one.column.coordinates),
         stops_(mechanism_.stop_times()),
-        is_member_(is_member) {
+        beside_(beside),
+        is_member_(beside != nullptr) {
     const Measured measured{user_, compiled_};
     if (held.series != nullptr) {
       errors_ = std::make_unique<SeriesMeter>(measured, part, *held.series, one.horizon);
@@ -170,7 +173,7 @@ class Runner {
   }
 
   IntegratorResult Integrate(const Start<double>& start) {
-    const auto formulation = MakeFormulation<Space>(case_.column, mechanism_);
+    const auto formulation = MakeFormulation<Space>(case_.column, mechanism_, beside_);
     IntegratorResult result;
     const auto peer = TryPeer(case_.column.formulation, description_, &result);
     if (result.outcome != Outcome::kFinished) return result;
@@ -188,7 +191,7 @@ class Runner {
       // a derivative that fails here fails in the integrator's next call, with its outcome; only
       // what the failing matrix looked like is worth keeping
       const Outcome outcome =
-          is_member_ ? formulation->FromState(t, y) : formulation->Examine(t, y, ydot);
+          is_member_ ? formulation->Look(t, y) : formulation->Examine(t, y, ydot);
       Sample<Space> sample{t, *formulation};
       sample.knows_work = !peer || !mechanism_.has_power();
       if (!work.empty()) sample.supplied = work[0], sample.dissipated = work[1];
@@ -230,6 +233,7 @@ class Runner {
   Mechanism<Space, double> mechanism_;
   std::vector<std::unique_ptr<Observer<Space>>> observers_;
   std::vector<double> stops_;  ///< [s], at which steps end
+  SideBySide* beside_;
   bool is_member_;
   std::unique_ptr<Meter> errors_;
   std::optional<Recorder<Space>> recorder_;
@@ -241,14 +245,14 @@ class Runner {
 };
 
 Run RunOnce(const Experiment& experiment, const Case& one, const MechanismDescription& description,
-            bool is_member, const HeldAgainst& held = {},
+            SideBySide* beside, const HeldAgainst& held = {},
             const TrajectoryTask* trajectory = nullptr) {
   const SceneObservation& observe = experiment.scenes[one.scene].mechanism.observe;
   const CompiledScene scene = CompileScene(description, observe, experiment.compile);
   std::vector<Run> parts;
   for (int part = 0; part < static_cast<int>(scene.compiled.parts.size()); ++part) {
     const auto run = [&]<class Space>() {
-      return Runner<Space>(experiment, one, description, scene, part, is_member, held, trajectory)
+      return Runner<Space>(experiment, one, description, scene, part, beside, held, trajectory)
           .Execute();
     };
     const auto& own = scene.compiled.parts[static_cast<std::size_t>(part)].description;
@@ -260,6 +264,36 @@ Run RunOnce(const Experiment& experiment, const Case& one, const MechanismDescri
     run.record.Set("compiled", ToString(scene.compiled.done));
   }
   return run;
+}
+
+/// Runs the members of a case's ensemble and hands them over in their order, with their starts.
+template <class Keep>
+void ForEachMember(const Experiment& experiment, const Case& one, int threads, const Keep& keep) {
+  constexpr int kHeld = 1024;  // at most, of which runs wait to be handed over
+  const int members = one.ensemble > 1 ? one.ensemble : 0;
+  struct Member {
+    MechanismDescription start;
+    Run run;
+  };
+  std::vector<Member> held;
+  for (int first = 0; first < members; first += kHeld) {
+    held.assign(static_cast<std::size_t>(std::min(kHeld, members - first)), {});
+    const auto run_member = [&](int i, SideBySide& beside) {
+      Member& member = held[static_cast<std::size_t>(i)];
+      member.start =
+          MemberStart(experiment.scenes[one.scene].mechanism.description, one, first + i);
+      member.run = RunOnce(experiment, one, member.start, &beside);
+    };
+    RunSideBySide(static_cast<int>(held.size()), threads, run_member);
+    for (int i = 0; i < static_cast<int>(held.size()); ++i) {
+      Member& member = held[static_cast<std::size_t>(i)];
+      // its time was also that of those beside it
+      if (member.run.record.Text("outcome") == ToString(Outcome::kTimeLimit)) {
+        RunSideBySide(1, 1, [&](int, SideBySide& alone) { run_member(i, alone); });
+      }
+      keep(std::move(member.run), member.start);
+    }
+  }
 }
 
 }  // namespace
@@ -278,7 +312,7 @@ IntegratorOptions OptionsOf(const Case& one, const std::vector<double>& stop_tim
 }
 
 Record RunCase(const Experiment& experiment, const Case& one, const Reference* reference,
-               const std::filesystem::path& trajectory) {
+               const std::filesystem::path& trajectory, int threads) {
   const ExperimentScene& scene = experiment.scenes[one.scene];
   Record record = one.keys;
   record.Set("scene_id", Fnv1a(scene.mechanism.canonical));
@@ -302,22 +336,20 @@ Record RunCase(const Experiment& experiment, const Case& one, const Reference* r
                              SettingOf(one)));
   }
   Run nominal =
-      RunOnce(experiment, one, scene.mechanism.description, false, held, task ? &*task : nullptr);
+      RunOnce(experiment, one, scene.mechanism.description, nullptr, held, task ? &*task : nullptr);
   for (const auto& [key, value] : nominal.record.items()) record.Set(key, value);
 
   std::vector<DriftSeries> runs;
   EnsembleTally tally(nominal, one.branch_bound);
   int failed = 0;
-  for (int member = 0; member < (one.ensemble > 1 ? one.ensemble : 0); ++member) {
-    const MechanismDescription start = MemberStart(scene.mechanism.description, one, member);
-    Run run = RunOnce(experiment, one, start, true);
+  ForEachMember(experiment, one, threads, [&](Run run, const MechanismDescription& start) {
     tally.Add(run, start);
     if (run.record.Text("outcome") != ToString(Outcome::kFinished)) {
       ++failed;
     } else {
       runs.push_back(std::move(run.drift));
     }
-  }
+  });
   if (one.ensemble <= 1) runs.push_back(nominal.drift);
   std::erase_if(runs, [](const DriftSeries& run) { return run.t.empty(); });
   if (!runs.empty()) {

@@ -20,12 +20,14 @@ namespace loopbench::harness {
 /// The mechanism with the formulation and level that a column names.
 template <class Space>
 std::unique_ptr<System<Space, double>> MakeFormulation(const Column& column,
-                                                       const Mechanism<Space, double>& mechanism) {
+                                                       const Mechanism<Space, double>& mechanism,
+                                                       SideBySide* beside = nullptr) {
   return MakeFormulation<Space>(column.formulation, mechanism,
                                 {.enforcement = column.enforcement,
                                  .solver = column.solver,
                                  .gains = column.gains,
-                                 .threads = column.threads});
+                                 .threads = column.threads,
+                                 .beside = beside});
 }
 
 /// Gives a system, after its start, the Jacobians that a case's Newton iteration asks for: none
@@ -50,8 +52,11 @@ IntegratorOptions OptionsOf(const Case& one, const std::vector<double>& stop_tim
 /// Where the experiment asks for output, the unperturbed run's trajectory is written to
 /// `trajectory` (harness/trajectory/), unless that is empty.
 ///
+/// Members of the ensemble run side by side on `threads` threads (side_by_side.h), which changes no
+/// bit of them.
+///
 /// Whatever goes wrong numerically ends in the record; only misuse throws.
 Record RunCase(const Experiment& experiment, const Case& one, const Reference* reference = nullptr,
-               const std::filesystem::path& trajectory = {});
+               const std::filesystem::path& trajectory = {}, int threads = 1);
 
 }  // namespace loopbench::harness

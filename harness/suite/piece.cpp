@@ -33,9 +33,10 @@ Piece AccuracyPiece(const Experiment& experiment, const Case& one,
   const int runs = one.ensemble > 1 ? one.ensemble + 1 : 1;
   std::filesystem::path trajectory;
   if (experiment.output) trajectory = TrajectoryPath(store, RunId(one.keys));
-  const auto work = [&experiment, one, store, trajectory] {
+  const auto work = [&experiment, one, store, trajectory](int threads) {
     const std::optional<Reference> reference = FindReference(experiment, one, store);
-    Record record = RunCase(experiment, one, reference ? &*reference : nullptr, trajectory);
+    Record record =
+        RunCase(experiment, one, reference ? &*reference : nullptr, trajectory, threads);
     if (reference && !reference->snapshots.empty()) {
       record.Set("reference_file", ReferenceOf(experiment, one, store).id);
     }
@@ -54,7 +55,7 @@ Piece ReferencePiece(const Experiment& experiment, const ReferenceCase& one) {
   if (experiment.reference) limits.cpu_s = experiment.reference->cpu_s;
   constexpr double kWitnesses = 3.0;
   return {.owed = {one.keys},
-          .work = [&experiment, one] { return std::vector<Record>{MakeOne(experiment, one)}; },
+          .work = [&experiment, one](int) { return std::vector<Record>{MakeOne(experiment, one)}; },
           .limits = LimitsOfRuns(limits, kWitnesses),
           .label = fmt::format("{} {} s", one.keys.Text("mechanism"), one.horizon),
           .cost = one.horizon,
@@ -73,7 +74,7 @@ Piece TimingPiece(const Experiment& experiment, const TimingGroup& group) {
   constexpr double kDerivatives_s = 60.0;
   piece.limits = {kPatience * runs * experiment.limits.cpu_s + kDerivatives_s * columns * threads,
                   experiment.limits.memory_mb};
-  piece.work = [&experiment, &group] { return TimeTogether(experiment, group); };
+  piece.work = [&experiment, &group](int) { return TimeTogether(experiment, group); };
   piece.label = group.name;
   return piece;
 }
@@ -84,7 +85,7 @@ Piece LadderPiece(const Experiment& experiment, const LadderGroup& group) {
   piece.owed = group.keys;
   const auto runs = static_cast<double>(group.keys.size() + 1);  // there are two references
   piece.limits = LimitsOfRuns(limits, runs);
-  piece.work = [&experiment, &group] { return ClimbTogether(experiment, group); };
+  piece.work = [&experiment, &group](int) { return ClimbTogether(experiment, group); };
   piece.label =
       fmt::format("{} {}", group.keys.front().Text("mechanism"), ToString(group.task.column));
   return piece;
@@ -93,7 +94,7 @@ Piece LadderPiece(const Experiment& experiment, const LadderGroup& group) {
 std::string AnswerOf(const Piece& piece) {
   if (const auto garbage = PlantedFault(piece.owed.front())) return *garbage;
   std::string text;
-  for (const Record& record : piece.work()) text += ToJsonLine(record) + '\n';
+  for (const Record& record : piece.work(piece.threads)) text += ToJsonLine(record) + '\n';
   return text;
 }
 

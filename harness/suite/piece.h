@@ -14,10 +14,11 @@ namespace loopbench::harness {
 struct Piece {
   std::vector<Record> owed;     ///< keys, case_id and content: known but for their results
   std::int64_t experiment = 0;  ///< which of the command's
-  std::function<std::vector<Record>()> work;
+  std::function<std::vector<Record>(int threads)> work;
   ProcessLimits limits;
   std::string label;
   double cost = 0.0;                      ///< costly ones go first
+  int threads = 1;                        ///< of `work`, which may need fewer
   std::filesystem::path product = {};     ///< a file without which the piece is not done
   std::filesystem::path trajectory = {};  ///< one that its process may leave unfinished
   std::function<double(Estimate&)> seconds = {};

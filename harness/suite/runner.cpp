@@ -64,6 +64,9 @@ std::size_t Runner::Run(const std::string& what, std::vector<Piece> all, int job
     return true;
   });
   if (pieces.empty()) return failed;
+  // jobs that no piece is left for share the ensembles
+  const int free = std::max(1, jobs / static_cast<int>(pieces.size()));
+  for (Piece& piece : pieces) piece.threads = free;
   Progress progress(what, Foreseen(pieces, estimate), jobs);
   const auto work = [&](std::size_t i) {
     store_.LeaveToParent();

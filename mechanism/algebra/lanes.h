@@ -27,6 +27,16 @@ using LaneBits [[gnu::vector_size(kLanes * sizeof(double))]] = std::int64_t;
 template <class T>
 using BitsOf = std::conditional_t<std::is_same_v<T, double>, std::int64_t, LaneBits>;
 
+/// What comparing them gives: bool, or for each lane all ones or none.
+template <class T>
+using TruthOf = std::conditional_t<std::is_same_v<T, double>, bool, LaneBits>;
+inline bool Any(bool truth) { return truth; }
+inline bool Any(const LaneBits& truth) {
+  std::int64_t any = 0;
+  for (int lane = 0; lane < kLanes; ++lane) any |= truth[lane];
+  return any != 0;
+}
+
 /// As many numbers as T has, from and to memory that need not be aligned.
 template <class T>
 inline T Load(const double* from) {
@@ -49,6 +59,7 @@ inline void SetLane(Struct<Lanes>& pack, int lane, const Struct<double>& one) {
                 reinterpret_cast<const char*>(&one) + i * sizeof(double), sizeof(double));
   }
 }
+inline void SetLane(Lanes& pack, int lane, double one) { pack[lane] = one; }
 template <template <class> class Struct>
 inline Struct<double> LaneOf(const Struct<Lanes>& pack, int lane) {
   Struct<double> one;
@@ -65,6 +76,12 @@ inline Struct<double> LaneOf(const Struct<Lanes>& pack, int lane) {
 template <class T>
 inline T Min(const T& a, const T& b) {
   return a < b ? a : b;
+}
+
+/// The larger one, lane by lane.
+template <class T>
+inline T Max(const T& a, const T& b) {
+  return a < b ? b : a;
 }
 
 template <class T>

@@ -81,7 +81,8 @@ class ConstraintSolver {
   /// Short cut for a whole right-hand side without feedback and drives: qdot and udot at (q, u), as
   /// Factor() and Accelerate() would have it but for round-off, after CompleteSpeeds() if asked
   /// for. False, as here, where there is none or the position is one that Factor() should judge.
-  /// Changes neither conditioning() nor what Factor() made.
+  /// Changes neither conditioning() nor what Factor() made. Where it is true, coordinates have
+  /// their speeds for rates, and a step that it ended needs no Review().
   virtual bool RightHandSide(SpeedsUsed speeds, std::span<const S> q, std::span<const S> u,
                              std::span<S> qdot, std::span<S> udot);
 

@@ -21,7 +21,10 @@ namespace {
 template <class Space, class S>
 class AccelerationLevel final : public Level<Space, S> {
  public:
-  AccelerationLevel() { this->right_hand_side_ = SpeedsUsed::kGiven; }
+  AccelerationLevel() {
+    this->right_hand_side_ = SpeedsUsed::kGiven;
+    this->takes_steps_as_they_are_ = true;
+  }
 };
 
 }  // namespace

@@ -69,9 +69,13 @@ class Level {
   /// that leave nothing (DriftGrowth::kNone).
   const Correction<S>& correction() const { return correction_; }
 
+  /// Whether Accept() has nothing to do at any step.
+  bool takes_steps_as_they_are() const { return takes_steps_as_they_are_; }
+
  protected:
   std::optional<SpeedsUsed> right_hand_side_;
   bool changes_speeds_ = false;
+  bool takes_steps_as_they_are_ = false;
   BaumgarteGains gains_;
   Correction<S> correction_;
 

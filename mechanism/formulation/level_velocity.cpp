@@ -15,6 +15,7 @@ class VelocityLevel final : public Level<Space, S> {
         change_(u_),
         violation_(VectorX<S>::Zero(mechanism.num_rows())) {
     this->changes_speeds_ = true;
+    this->takes_steps_as_they_are_ = true;
     this->right_hand_side_ = SpeedsUsed::kCompleted;
   }
 

@@ -9,6 +9,8 @@
 
 namespace loopbench {
 
+class SideBySide;
+
 /// At which level the constraints hold in the right-hand side (docs/design.md D3; level.h). Levels
 /// of other programs follow.
 enum class Enforcement {
@@ -78,6 +80,8 @@ struct FormulationOptions {
   /// That may work on one right-hand side, where a formulation has work for them. The same bits for
   /// any number.
   int threads = 1;
+  /// Runs beside which this one goes on (side_by_side.h), if any; it must outlive the solver.
+  SideBySide* beside = nullptr;
 };
 
 }  // namespace loopbench

@@ -61,6 +61,26 @@ Outcome System<Space, S>::FromState(S t, std::span<const S> y) {
 }
 
 template <class Space, class S>
+Outcome System<Space, S>::Look(S t, std::span<const S> y) {
+  if (!MayTakeShortCut() || level_->right_hand_side() != SpeedsUsed::kCompleted) {
+    return FromState(t, y);
+  }
+  const auto num_q = static_cast<std::size_t>(mechanism_.num_q());
+  const auto num_u = static_cast<std::size_t>(mechanism_.num_u());
+  scratch_.resize(num_q + num_u);
+  const std::span<S> rates(scratch_);
+  if (!solver_->RightHandSide(SpeedsUsed::kCompleted, y.first(num_q), y.subspan(num_q, num_u),
+                              rates.first(num_q), rates.subspan(num_q))) {
+    return FromState(t, y);
+  }
+  at_step_end_ = false;
+  state_.kinematics().SetTime(t);
+  state_.SetPositions(Eigen::Map<const VectorX<S>>(y.data(), mechanism_.num_q()));
+  state_.SetSpeeds(Eigen::Map<const VectorX<S>>(rates.data(), mechanism_.num_u()));
+  return Outcome::kFinished;
+}
+
+template <class Space, class S>
 void System<Space, S>::SolveFormed(VectorX<S>* lambda) {
   dynamics_.Bias(kinematics(), force_);
   dynamics_.JacobianBias(kinematics(), target_);
@@ -99,10 +119,10 @@ Outcome System<Space, S>::Derivative(S t, std::span<const S> y, std::span<S> ydo
   if (MayTakeShortCut()) {
     const auto num_q = static_cast<std::size_t>(mechanism_.num_q());
     const auto num_u = static_cast<std::size_t>(mechanism_.num_u());
-    if (solver_->RightHandSide(*level_->right_hand_side(), y.first(num_q), y.subspan(num_q, num_u),
-                               ydot.first(num_q), ydot.subspan(num_q, num_u))) {
-      return outcome_ = Outcome::kFinished;
-    }
+    by_short_cut_ =
+        solver_->RightHandSide(*level_->right_hand_side(), y.first(num_q), y.subspan(num_q, num_u),
+                               ydot.first(num_q), ydot.subspan(num_q, num_u));
+    if (by_short_cut_) return outcome_ = Outcome::kFinished;
   }
   return Examine(t, y, ydot);
 }
@@ -146,11 +166,21 @@ Outcome System<Space, S>::Evaluate(S t, const VectorX<S>& q, const VectorX<S>& u
   return outcome_;
 }
 
+/// In space measured angles go on from the last step's (Kinematics::AcceptStep()).
+template <class Space, class S>
+bool System<Space, S>::NeedsNoReview() const {
+  return Space::kRot == 1 && by_short_cut_ && MayTakeShortCut() && kinematics().released().empty();
+}
+
 template <class Space, class S>
 bool System<Space, S>::BeginStep(S t, std::span<S> y) {
   const bool is_projected =
       MayTakeShortCut() && level_->Project(*solver_, y.first(mechanism_.num_q()),
                                            y.subspan(mechanism_.num_q(), mechanism_.num_u()));
+  if (NeedsNoReview() && (is_projected || level_->takes_steps_as_they_are())) {
+    accepted_t_ = t;
+    return is_projected;
+  }
   at_step_end_ = true;
   if (FromState(t, y) != Outcome::kFinished) return false;  // the next evaluation will say why
   const S h = t - accepted_t_;

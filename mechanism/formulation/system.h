@@ -91,6 +91,8 @@ class System final : public Ode<S> {
   /// Positions and all speeds of a state at time t; kinematics() is current afterwards. `y` may
   /// have more at its end.
   Outcome FromState(S t, std::span<const S> y);
+  /// The same by the solver's short cut where it has one, so with other rounding of the speeds.
+  Outcome Look(S t, std::span<const S> y);
   const VectorX<S>& q() const { return state_.q(); }
   const VectorX<S>& u() const { return state_.u(); }
   const VectorX<S>& udot() const { return udot_; }
@@ -122,6 +124,9 @@ class System final : public Ode<S> {
   Outcome Accelerate();
   /// udot_ and, unless null, lambda by f and c, for solvers without a short cut.
   void SolveFormed(VectorX<S>* lambda);
+  /// Whether the step that the last Derivative() ended changes nothing, and nothing has to be known
+  /// of it.
+  bool NeedsNoReview() const;
   /// Releases other directions where those released serve badly by now. True when it did.
   bool ChangeReleased(S h);
   /// Whether the last evaluation was the derivative at this (t, y).
@@ -143,6 +148,7 @@ class System final : public Ode<S> {
   /// Set by BeginStep(): the last stage of a step, its projection and the next evaluation have the
   /// same positions and share what is assembled there. Any other evaluation assembles anew.
   bool at_step_end_ = false;
+  bool by_short_cut_ = false;  ///< the last Derivative() was
   S accepted_t_ = S(0);
   Outcome outcome_ = Outcome::kFinished;
   long softened_evaluations_ = 0, mode_changes_ = 0;

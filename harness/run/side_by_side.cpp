@@ -1,0 +1,138 @@
+#include "harness/run/side_by_side.h"
+
+#include <algorithm>
+#include <atomic>
+#include <boost/context/fiber.hpp>
+#include <boost/context/protected_fixedsize_stack.hpp>
+#include <exception>
+#include <memory>
+#include <thread>
+#include <utility>
+#include <vector>
+
+#include "mechanism/algebra/lanes.h"
+
+namespace loopbench::harness {
+namespace {
+
+namespace context = boost::context;
+
+#if defined(__SANITIZE_ADDRESS__)
+constexpr int kMost = 1;
+#else
+constexpr int kMost = kLanes;
+#endif
+
+/// Stacks begin at places of their own within a page: what all runs use at once would else meet in
+/// the same few sets of the nearest cache.
+constexpr std::size_t kApart = 4096 / kLanes;
+
+/// Where one run after another has its stack.
+class Place {
+ public:
+  explicit Place(int number) : memory_(allocator_.allocate()) {
+    const std::size_t away = static_cast<std::size_t>(number) * kApart;
+    top_ = static_cast<char*>(memory_.sp) - away;
+    size_ = memory_.size - away;
+  }
+  ~Place() { allocator_.deallocate(memory_); }
+  Place(const Place&) = delete;
+  Place& operator=(const Place&) = delete;
+
+  bool IsTaken() const { return static_cast<bool>(fiber_); }
+  /// `work(back)` begins, until it goes back.
+  template <class Work>
+  void Begin(Work work) {
+    fiber_ = context::fiber(std::allocator_arg, context::preallocated(top_, size_, memory_), Kept{},
+                            std::move(work));
+    GoOn();
+  }
+  void GoOn() { fiber_ = std::move(fiber_).resume(); }
+
+ private:
+  struct Kept {
+    void deallocate(context::stack_context&) noexcept {}
+  };
+  context::protected_fixedsize_stack allocator_{kStackBytes};
+  context::stack_context memory_;
+  void* top_ = nullptr;
+  std::size_t size_ = 0;
+  context::fiber fiber_;
+};
+
+/// Runs of one thread, in as many places as there are lanes. A place whose run has ended takes the
+/// next one.
+class Places final : public SideBySide {
+ public:
+  /// `start(run)` is called in a place for each run that `next` gives, -1 being none.
+  void Run(const std::function<int()>& next, const std::function<void(int)>& start) {
+    if (kMost == 1) {
+      for (int run = next(); run >= 0; run = next()) start(run);
+      return;
+    }
+    for (int i = 0; i < kMost; ++i) places_.push_back(std::make_unique<Place>(i));
+    bool all_begun = false;
+    for (;;) {
+      for (const std::unique_ptr<Place>& place : places_) {
+        if (place->IsTaken()) place->GoOn();
+        while (!place->IsTaken() && !all_begun) {
+          const int run = next();
+          all_begun = run < 0;
+          if (all_begun) break;
+          place->Begin([&start, run, this](context::fiber&& back) {
+            back_ = std::move(back);
+            start(run);
+            return std::move(back_);
+          });
+        }
+      }
+      if (std::ranges::none_of(places_, [](const auto& place) { return place->IsTaken(); })) return;
+      DoAll();
+    }
+  }
+
+  void Meet() override {
+    if (kMost == 1) return DoAll();
+    back_ = std::move(back_).resume();
+  }
+
+ private:
+  void DoAll() {
+    for (const std::unique_ptr<Together>& work : works) work->Do();
+  }
+
+  std::vector<std::unique_ptr<Place>> places_;
+  context::fiber back_;  ///< to Run(), while a run is at work
+};
+
+}  // namespace
+
+void RunSideBySide(int count, int threads, const std::function<void(int, SideBySide&)>& run) {
+  std::vector<std::exception_ptr> thrown(static_cast<std::size_t>(count));
+  std::atomic<int> begun = 0;
+  const auto next = [&] {
+    const int one = begun++;
+    return one < count ? one : -1;
+  };
+  const auto work = [&] {
+    Places places;
+    places.Run(next, [&](int one) {
+      try {
+        run(one, places);
+      } catch (...) {
+        thrown[static_cast<std::size_t>(one)] = std::current_exception();
+      }
+    });
+  };
+  {
+    std::vector<std::jthread> others;
+    // a thread for fewer runs than it has lanes would leave lanes empty
+    const int useful = std::min(threads, (count + kMost - 1) / kMost);
+    for (int i = 1; i < useful; ++i) others.emplace_back(work);
+    work();
+  }
+  const auto first = std::ranges::find_if(thrown, [](const auto& one) { return one != nullptr; });
+  if (first != thrown.end()) std::rethrow_exception(*first);
+}
+
+}  // namespace loopbench::harness

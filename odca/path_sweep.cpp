@@ -98,7 +98,8 @@ void PathSweepOf<T>::Set(const PathPlaces& path, int k, const TurnedLink<T>& tur
 
 template <class T>
 template <PathSweepOf<T>::Gaps kGaps>
-void PathSweepOf<T>::Close(PathPlaces& path, int k, bool here, const Point<T>& gap) {
+void PathSweepOf<T>::Close(PathPlaces& path, int k, bool here,
+                                             const Point<T>& gap) {
   const int P = here ? k : k - 1;
   At at_P = Body(path, P);
   const Vector2<T> to_Q = Scaled(1.0 / at_P.link.radius, gap.p);

@@ -21,6 +21,8 @@ namespace loopbench::harness {
 struct Estimate::Spent {
   double all_s = 0.0, running_s = 0.0;  ///< CPU time, and what of it grows with the horizon
   double reached = 1.0;                 ///< of the horizon
+  double members_s = 0.0;               ///< CPU time of members of its ensemble beside
+  double member = 1.0;                  ///< as of Rate
   bool failed = false;                  ///< it went no further, and nor will the piece
   double most_s = std::numeric_limits<double>::infinity();  ///< when its limit of steps ends it
 };
@@ -30,6 +32,7 @@ namespace {
 constexpr double kFirst = 0.02, kGrowth = 3.0;  ///< of the horizon
 constexpr double kLeastSlope = 0.2;             ///< of the mean
 constexpr std::size_t kCombinations = 8;        ///< of a sweep; others take the nearest one's
+constexpr int kMembers = 16;                    ///< of an ensemble
 constexpr double kShort_s = 0.1;                ///< too short for a pilot at each tolerance
 constexpr double kUnknown = std::numeric_limits<double>::quiet_NaN();
 
@@ -46,6 +49,7 @@ Rate Next(const Rate& before, const Spent& spent) {
   // clocks are coarse, and one step more or less is much in a short run
   const double slope = grown > 0.0 ? (spent.running_s - before.running_s) / grown : mean;
   return {.fixed_s = std::max(0.0, spent.all_s - spent.running_s),
+          .member = spent.member,
           .running_s = spent.running_s,
           .reached = reached,
           .slope_s = std::clamp(slope, kLeastSlope * mean, mean / kLeastSlope),
@@ -78,12 +82,12 @@ const Rate* Estimate::Known(const std::string& key, const std::string& name,
     for (double fraction = kFirst;; fraction = std::min(1.0, kGrowth * fraction)) {
       const Spent spent = work(fraction);
       rate = Next(rate, spent);
-      worked += spent.all_s;
+      worked += spent.all_s + spent.members_s;
       const double enough = std::clamp(budget_.share * times * (rate.fixed_s + rate.Running(1.0)),
                                        budget_.least_s, budget_.most_s);
       if (spent.failed || fraction >= 1.0 || spent.all_s >= enough) {
-        return fmt::format("{} {} {} {} {} {} {}", rate.fixed_s, rate.running_s, rate.reached,
-                           rate.slope_s, rate.ends_at, rate.most_s, worked);
+        return fmt::format("{} {} {} {} {} {} {} {}", rate.fixed_s, rate.member, rate.running_s,
+                           rate.reached, rate.slope_s, rate.ends_at, rate.most_s, worked);
       }
     }
   };
@@ -95,9 +99,9 @@ const Rate* Estimate::Known(const std::string& key, const std::string& name,
         spent_s_ += result.wall_s;
         double worked = 0.0;
         if (result.ending == ProcessEnding::kAnswered &&
-            std::sscanf(result.text.c_str(), "%lf %lf %lf %lf %lf %lf %lf", &rate.fixed_s,
-                        &rate.running_s, &rate.reached, &rate.slope_s, &rate.ends_at, &rate.most_s,
-                        &worked) == 7) {
+            std::sscanf(result.text.c_str(), "%lf %lf %lf %lf %lf %lf %lf %lf", &rate.fixed_s,
+                        &rate.member, &rate.running_s, &rate.reached, &rate.slope_s, &rate.ends_at,
+                        &rate.most_s, &worked) == 8) {
           // a process costs its parent and itself something before it works
           rate.process_s = std::max(0.0, result.cpu_s - worked) + ThreadCpuSeconds() - before;
           return;
@@ -132,10 +136,18 @@ const Rate* Estimate::RateOfCase(std::size_t experiment, const Case& one, double
       spent.most_s = spent.running_s * static_cast<double>(pilot.limits.steps) / steps;
     }
     spent.failed = ended && record.Text("outcome") != ToString(Outcome::kTimeLimit);
+    if (one.ensemble > 1) {
+      pilot.ensemble = std::min(one.ensemble, kMembers);
+      const CpuLimit with_members(pilot.limits.cpu_s);
+      RunCase(like, pilot);
+      spent.members_s = with_members.cpu_s();
+      const double each_s = (spent.members_s - spent.all_s) / pilot.ensemble;
+      spent.member = std::clamp(each_s / spent.all_s, 0.0, 1.0);
+    }
     return spent;
   };
-  return Known(fmt::format("case/{}/{}/{}/{}/{}/{}", experiment, scene, column, one.integrator,
-                           rtol, one.step > 0.0),
+  return Known(fmt::format("case/{}/{}/{}/{}/{}/{}/{}", experiment, scene, column, one.integrator,
+                           rtol, one.step > 0.0, one.ensemble > 1),
                fmt::format("{} {}", like.scenes[scene].name, column),
                LimitsOfRuns(one.limits, one.column.threads), NumberOfRuns(one), run);
 }
@@ -146,8 +158,8 @@ double Estimate::OfCase(std::size_t experiment, const Case& one) {
   const double part = one.horizon / Longest(like, std::min(one.scene, like.scenes.size() - 1));
   const auto total = [&](const Rate& rate, double scale) {
     const double running = rate.Running(part) * scale;
-    return rate.process_s +
-           NumberOfRuns(one) * (rate.fixed_s + std::min(running, one.limits.cpu_s));
+    const double runs = 1.0 + (NumberOfRuns(one) - 1.0) * rate.member;
+    return rate.process_s + runs * (rate.fixed_s + std::min(running, one.limits.cpu_s));
   };
   if (one.step > 0.0) {
     const Rate* rate = RateOfCase(near, one, 0.0);

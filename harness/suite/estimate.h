@@ -20,6 +20,7 @@ namespace loopbench::harness {
 struct Rate {
   double process_s = 0.0;  ///< CPU time of a process that does nothing [s]
   double fixed_s = 0.0;    ///< of each run, whatever the horizon [s]
+  double member = 1.0;     ///< what a member of an ensemble takes [of the unperturbed run]
   double running_s = 0.0;  ///< of the longest pilot, at its tolerance [s]
   double reached = 1.0;    ///< by it [of the horizon]
   double slope_s = 0.0;    ///< beyond it: CPU time of a whole horizon [s]

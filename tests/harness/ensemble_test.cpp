@@ -146,6 +146,37 @@ TEST(Ensemble, CountsTheRunsThatStayOnTheirBranch) {
   EXPECT_EQ(RunCase(Paper(), one).Number("ensemble_branch_kept"), 0);
 }
 
+/// Right-hand sides of several members are evaluated in lanes, projections of each by itself.
+TEST(Ensemble, IsThatOfItsMembersOneByOneOnAnyNumberOfThreads) {
+  for (const Enforcement level : {Enforcement::kAcceleration, Enforcement::kPosition}) {
+    Column column = Published("odca", Coordinates::kJoint);
+    column.enforcement = level;
+    column.solver = SolverKind::kRankRevealing;
+    Case one = CaseOf(Paper(), "four-bar", column, 1e-7, 2.0);
+    one.ensemble = 21;
+    one.perturb = 0.3;
+    Experiment experiment = Paper();
+    MechanismDescription& description = experiment.scenes[one.scene].mechanism.description;
+    const MechanismDescription nominal = description;
+    double energy = 0.0, drift = 0.0;
+    for (int member = 0; member < one.ensemble; ++member) {
+      description = MemberStart(nominal, one, member);
+      Case alone = one;
+      alone.ensemble = 1;
+      const Record record = RunCase(experiment, alone);
+      ASSERT_EQ(record.Text("outcome"), "finished");
+      energy = std::max(energy, record.Number("energy_error_max"));
+      drift = std::max(drift, record.Number("drift_position_max"));
+    }
+    for (const int threads : {1, 3}) {
+      const Record record = RunCase(Paper(), one, nullptr, {}, threads);
+      EXPECT_EQ(record.Number("ensemble_failed"), 0);
+      EXPECT_EQ(record.Number("ensemble_energy_error_max"), energy) << ToString(level);
+      EXPECT_EQ(record.Number("ensemble_drift_position_max"), drift) << ToString(level);
+    }
+  }
+}
+
 TEST(Ensemble, KnowsNothingOfABranchWhereTheSceneDoesNot) {
   Case one = CaseOf(Paper(), "four-bar", Published("odca", Coordinates::kJoint), 1e-6, 0.1);
   one.ensemble = 2;

@@ -110,6 +110,11 @@ std::string_view WhyNotForeign(std::string_view path, std::string_view header) {
     return path == "harness/exchange/xml_file.cpp" ? ""
                                                    : "XML is for harness/exchange/xml_file.cpp";
   }
+  if (header.starts_with("boost/context/")) {
+    return path == "harness/run/side_by_side.cpp"
+               ? ""
+               : "stacks of runs are for harness/run/side_by_side.cpp";
+  }
   if (header.starts_with("boost/")) {
     const bool allowed =
         OneOf(path, {"harness/observers/pendulum.cpp", "tests/reference/rigid_motions.cpp"});

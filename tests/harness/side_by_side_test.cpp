@@ -1,0 +1,103 @@
+// Runs that take turns on one thread, and on several.
+#include "harness/run/side_by_side.h"
+
+#include <gtest/gtest.h>
+
+#include <algorithm>
+#include <atomic>
+#include <cstring>
+#include <stdexcept>
+#include <vector>
+
+#include "mechanism/algebra/lanes.h"
+
+namespace loopbench::harness {
+namespace side_by_side_test {
+
+/// Counts those that wait for it.
+class Counter final : public Together {
+ public:
+  void Do() override {
+    most = std::max(most, waiting);
+    waiting = 0;
+    ++done;
+  }
+  int waiting = 0, most = 0, done = 0;
+};
+
+Counter& CounterOf(SideBySide& beside) {
+  if (beside.works.empty()) beside.works.push_back(std::make_unique<Counter>());
+  return dynamic_cast<Counter&>(*beside.works[0]);
+}
+
+TEST(SideBySide, BringsEveryRunToItsEndOnce) {
+  for (const int threads : {1, 3}) {
+    for (const int count : {0, 1, 3, 100}) {
+      std::vector<int> ended(static_cast<std::size_t>(count));
+      RunSideBySide(count, threads, [&](int run, SideBySide& beside) {
+        for (int meeting = 0; meeting < run % 7; ++meeting) {
+          Counter& counter = CounterOf(beside);
+          const int before = counter.done;
+          ++counter.waiting;
+          beside.Meet();
+          EXPECT_GT(counter.done, before);
+        }
+        ++ended[static_cast<std::size_t>(run)];
+      });
+      EXPECT_EQ(std::ranges::count(ended, 1), count);
+    }
+  }
+}
+
+TEST(SideBySide, DoesTheWorkOfAllLanesAtOnce) {
+  int most = 0, done = 0;
+  RunSideBySide(4 * kLanes, 1, [&](int, SideBySide& beside) {
+    Counter& counter = CounterOf(beside);
+    for (int meeting = 0; meeting < 10; ++meeting) {
+      ++counter.waiting;
+      beside.Meet();
+    }
+    most = counter.most;
+    done = counter.done;
+  });
+  if (most == 1) GTEST_SKIP() << "one stack under sanitizers";
+  EXPECT_EQ(most, kLanes);
+  EXPECT_EQ(done, 40);
+}
+
+TEST(SideBySide, ThrowsWhatTheFirstRunThrewWhenAllHaveEnded) {
+  for (const int threads : {1, 3}) {
+    std::atomic<int> ended = 0;
+    const auto run = [&](int i, SideBySide& beside) {
+      if (i != 3) beside.Meet();
+      if (i == 3 || i == 2) throw std::runtime_error("run " + std::to_string(i));
+      ++ended;
+    };
+    try {
+      RunSideBySide(20, threads, run);
+      ADD_FAILURE() << "nothing was thrown";
+    } catch (const std::runtime_error& error) {
+      EXPECT_STREQ(error.what(), "run 2");
+    }
+    EXPECT_EQ(ended, 18);
+  }
+}
+
+/// Eigen's workspaces are on the stack, up to a mebibyte each.
+TEST(SideBySide, HasStacksForWorkspaces) {
+  const auto fill = [](int value) {
+    volatile char workspace[std::size_t{4} << 20];
+    for (std::size_t i = 0; i < sizeof(workspace); i += 4096)
+      workspace[i] = static_cast<char>(value);
+    return static_cast<int>(workspace[sizeof(workspace) - 4096]);
+  };
+  int sum = 0;
+  RunSideBySide(3, 1, [&](int run, SideBySide& beside) {
+    beside.Meet();
+    sum += fill(run);
+  });
+  EXPECT_EQ(sum, 3);
+}
+
+}  // namespace side_by_side_test
+}  // namespace loopbench::harness

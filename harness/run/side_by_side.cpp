@@ -30,21 +30,21 @@ constexpr std::size_t kApart = 4096 / kLanes;
 /// Where one run after another has its stack.
 class Place {
  public:
-  explicit Place(int number) : memory_(allocator_.allocate()) {
-    const std::size_t away = static_cast<std::size_t>(number) * kApart;
-    top_ = static_cast<char*>(memory_.sp) - away;
-    size_ = memory_.size - away;
+  explicit Place(int number) : away_(static_cast<std::size_t>(number) * kApart) {}
+  ~Place() {
+    if (memory_.sp != nullptr) allocator_.deallocate(memory_);
   }
-  ~Place() { allocator_.deallocate(memory_); }
   Place(const Place&) = delete;
   Place& operator=(const Place&) = delete;
 
   bool IsTaken() const { return static_cast<bool>(fiber_); }
-  /// `work(back)` begins, until it goes back.
+  /// `work(back)` begins, until it goes back. Only a place that is used takes memory.
   template <class Work>
   void Begin(Work work) {
-    fiber_ = context::fiber(std::allocator_arg, context::preallocated(top_, size_, memory_), Kept{},
-                            std::move(work));
+    if (memory_.sp == nullptr) memory_ = allocator_.allocate();
+    const context::preallocated stack(static_cast<char*>(memory_.sp) - away_, memory_.size - away_,
+                                      memory_);
+    fiber_ = context::fiber(std::allocator_arg, stack, Kept{}, std::move(work));
     GoOn();
   }
   void GoOn() { fiber_ = std::move(fiber_).resume(); }
@@ -54,9 +54,8 @@ class Place {
     void deallocate(context::stack_context&) noexcept {}
   };
   context::protected_fixedsize_stack allocator_{kStackBytes};
+  std::size_t away_;
   context::stack_context memory_;
-  void* top_ = nullptr;
-  std::size_t size_ = 0;
   context::fiber fiber_;
 };
 
@@ -108,28 +107,32 @@ class Places final : public SideBySide {
 }  // namespace
 
 void RunSideBySide(int count, int threads, const std::function<void(int, SideBySide&)>& run) {
-  std::vector<std::exception_ptr> thrown(static_cast<std::size_t>(count));
+  // a thread for fewer runs than it has lanes would leave lanes empty
+  const int useful = std::clamp((count + kMost - 1) / kMost, 1, std::max(1, threads));
+  // of the runs, then of threads that found no memory for them
+  std::vector<std::exception_ptr> thrown(static_cast<std::size_t>(count + useful));
+  const auto guarded = [&](int place, const auto& work) {
+    try {
+      work();
+    } catch (...) {
+      thrown[static_cast<std::size_t>(place)] = std::current_exception();
+    }
+  };
   std::atomic<int> begun = 0;
   const auto next = [&] {
     const int one = begun++;
     return one < count ? one : -1;
   };
-  const auto work = [&] {
-    Places places;
-    places.Run(next, [&](int one) {
-      try {
-        run(one, places);
-      } catch (...) {
-        thrown[static_cast<std::size_t>(one)] = std::current_exception();
-      }
+  const auto work = [&](int thread) {
+    guarded(count + thread, [&] {
+      Places places;
+      places.Run(next, [&](int one) { guarded(one, [&] { run(one, places); }); });
     });
   };
   {
     std::vector<std::jthread> others;
-    // a thread for fewer runs than it has lanes would leave lanes empty
-    const int useful = std::min(threads, (count + kMost - 1) / kMost);
-    for (int i = 1; i < useful; ++i) others.emplace_back(work);
-    work();
+    for (int thread = 1; thread < useful; ++thread) others.emplace_back(work, thread);
+    work(0);
   }
   const auto first = std::ranges::find_if(thrown, [](const auto& one) { return one != nullptr; });
   if (first != thrown.end()) std::rethrow_exception(*first);

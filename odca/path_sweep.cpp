@@ -24,7 +24,7 @@ void ForRanges(WorkerPool& pool, std::size_t size, const Range& range) {
 }  // namespace
 
 template <class T>
-template <bool kLoops, PathSweepOf<T>::Gaps kGaps>
+template <bool kLoops, typename PathSweepOf<T>::Gaps kGaps>
 void PathSweepOf<T>::TurnPacks(Group& group) {
   const PathPlaces& path = paths_[group.path];
   Point<Lanes> at_2 = {};
@@ -76,7 +76,7 @@ struct PathSweepOf<T>::At {
   T speed;
 };
 template <class T>
-PathSweepOf<T>::At PathSweepOf<T>::Body(const PathPlaces& path, int k) const {
+typename PathSweepOf<T>::At PathSweepOf<T>::Body(const PathPlaces& path, int k) const {
   if constexpr (kIsOne) {
     if (k < path.packed) {
       const int pack = path.first_pack + path.pack(k), lane = path.lane(k);
@@ -97,9 +97,8 @@ void PathSweepOf<T>::Set(const PathPlaces& path, int k, const TurnedLink<T>& tur
 }
 
 template <class T>
-template <PathSweepOf<T>::Gaps kGaps>
-void PathSweepOf<T>::Close(PathPlaces& path, int k, bool here,
-                                             const Point<T>& gap) {
+template <typename PathSweepOf<T>::Gaps kGaps>
+void PathSweepOf<T>::Close(PathPlaces& path, int k, bool here, const Point<T>& gap) {
   const int P = here ? k : k - 1;
   At at_P = Body(path, P);
   const Vector2<T> to_Q = Scaled(1.0 / at_P.link.radius, gap.p);
@@ -135,7 +134,7 @@ T PathSweepOf<T>::TurnSingles(const PathPlaces& path) {
 }
 
 template <class T>
-template <PathSweepOf<T>::Gaps kGaps>
+template <typename PathSweepOf<T>::Gaps kGaps>
 void PathSweepOf<T>::CloseLoops(PathPlaces& path) {
   Point<T> at_2 = {};
   const auto start = [&](int k, const Closure<T>& closure) {
@@ -168,7 +167,7 @@ void PathSweepOf<T>::CloseLoops(PathPlaces& path) {
 }
 
 template <class T>
-template <PathSweepOf<T>::Gaps kGaps>
+template <typename PathSweepOf<T>::Gaps kGaps>
 TruthOf<T> PathSweepOf<T>::Turn() {
   if constexpr (kIsOne) {
     pool_->ForEach(static_cast<int>(groups_.size()), [&](int i) {
@@ -333,7 +332,7 @@ TruthOf<T> PathSweepOf<T>::Evaluate(SpeedsUsed speeds, std::span<const T> q, std
 }
 
 template <class T>
-std::optional<double> PathSweepOf<T>::Gap() requires kIsOne {
+std::optional<double> PathSweepOf<T>::Gap() {
   tree_.ToBodies(moved_, speeds_, angle_.data(), speed_.data(), *pool_);
   if (!Turn<Gaps::kPositions>()) return std::nullopt;
   double largest = largest_;
@@ -344,7 +343,7 @@ std::optional<double> PathSweepOf<T>::Gap() requires kIsOne {
 /// As level_position.cpp does it by parts.
 template <class T>
 std::optional<Correction<double>> PathSweepOf<T>::Project(std::span<double> q, std::span<double> u,
-                                                          double goal) requires kIsOne {
+                                                          double goal) {
   std::ranges::copy(q, moved_.begin());
   std::ranges::copy(u, speeds_.begin());
   std::optional<double> now = Gap();
@@ -371,7 +370,12 @@ std::optional<Correction<double>> PathSweepOf<T>::Project(std::span<double> q, s
   return correction;
 }
 
-template class PathSweepOf<double>;
-template class PathSweepOf<Lanes>;
+template bool PathSweep::Evaluate(SpeedsUsed, std::span<const double>, std::span<const double>,
+                                  std::span<double>, std::span<double>);
+template std::optional<Correction<double>> PathSweep::Project(std::span<double>, std::span<double>,
+                                                              double);
+template LaneBits PathSweepOf<Lanes>::Evaluate(SpeedsUsed, std::span<const Lanes>,
+                                               std::span<const Lanes>, std::span<Lanes>,
+                                               std::span<Lanes>);
 
 }  // namespace loopbench::odca::pins

@@ -43,26 +43,25 @@ class PathSweepOf {
   /// Enough work for a thread to wait for the others after it.
   static constexpr int kBodiesOfGroup = 2048;
 
-  /// Null where the mechanism is none of those, or MeasurePath() has nothing for a path of it. It
-  /// need not outlive the sweep. Up to `threads` threads work on it, one for every
+  /// For one mechanism. Null where it is none of those, or MeasurePath() has nothing for a path of
+  /// it. It need not outlive the sweep. Up to `threads` threads work on it, one for every
   /// `bodies_of_group` bodies.
   static std::unique_ptr<PathSweepOf> Make(const Mechanism<Planar, double>& mechanism,
-                                           int threads = 1,
-                                           int bodies_of_group = kBodiesOfGroup) requires kIsOne;
-  /// Of mechanisms like that of `one`, whose constants are in every lane; null where its own pieces
-  /// fill the lanes.
-  static std::unique_ptr<PathSweepOf> Beside(const PathSweepOf<double>& one) requires(!kIsOne);
-  /// Puts the constants of `one` into a lane. False, and nothing is set, where it has another
-  /// shape.
-  bool SetMechanism(int lane, const PathSweepOf<double>& one) requires(!kIsOne);
+                                           int threads = 1, int bodies_of_group = kBodiesOfGroup);
+  /// For lanes, of mechanisms like that of `one`, whose constants are in every lane; null where its
+  /// own pieces fill the lanes.
+  static std::unique_ptr<PathSweepOf> Beside(const PathSweepOf<double>& one);
+  /// For lanes: puts the constants of `one` into one of them. False, and nothing is set, where it
+  /// has another shape.
+  bool SetMechanism(int lane, const PathSweepOf<double>& one);
 
   /// As ConstraintSolver::RightHandSide(). False near a degenerate position, for angles beyond
   /// kLargestAngle, and for numbers that are not finite. Allocates nothing.
   TruthOf<T> Evaluate(SpeedsUsed speeds, std::span<const T> q, std::span<const T> u,
                       std::span<T> qdot, std::span<T> udot);
-  /// As ConstraintSolver::Project(), where loops are closed; nothing where Evaluate() is false.
-  std::optional<Correction<double>> Project(std::span<double> q, std::span<double> u,
-                                            double goal) requires kIsOne;
+  /// For one mechanism, as ConstraintSolver::Project(), where loops are closed; nothing where
+  /// Evaluate() is false.
+  std::optional<Correction<double>> Project(std::span<double> q, std::span<double> u, double goal);
   /// Multiply-adds of the last evaluation, or what it did of it; angles are not counted.
   long operations() const { return operations_; }
   int threads() const { return pool_->threads(); }
@@ -113,9 +112,8 @@ class PathSweepOf {
   friend class PathSweepOf;
   PathSweepOf() = default;
   void Resize(int num_u, int threads);
-  void SetConstants(int lane, const PathSweepOf<double>& one) requires(!kIsOne);
-  void Add(const Mechanism<Planar, double>& mechanism, PathLinks path,
-           int bodies_of_group) requires kIsOne;
+  void SetConstants(int lane, const PathSweepOf<double>& one);
+  void Add(const Mechanism<Planar, double>& mechanism, PathLinks path, int bodies_of_group);
   /// Closures of pieces' first bodies go there, and out of those of the packs.
   void AddPieces(PathPlaces& path, std::vector<Closure<double>>& closures);
   void AddPacks(const PathPlaces& path, const PathLinks& links);
@@ -142,7 +140,7 @@ class PathSweepOf {
   template <Gaps kGaps>
   void Close(PathPlaces& path, int k, bool here, const Point<T>& gap);
   /// Turns to positions moved_; the largest gap of a cut joint [m], or nothing.
-  std::optional<double> Gap() requires kIsOne;
+  std::optional<double> Gap();
   /// alpha_, or what is to be added to speeds. False near a degenerate position.
   template <Pass kPass>
   TruthOf<T> Sweep();

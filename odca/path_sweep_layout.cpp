@@ -90,8 +90,7 @@ void PathSweepOf<T>::Resize(int num_u, int threads) {
 
 template <class T>
 std::unique_ptr<PathSweepOf<T>> PathSweepOf<T>::Make(const Mechanism<Planar, double>& mechanism,
-                                                     int threads,
-                                                     int bodies_of_group) requires kIsOne {
+                                                     int threads, int bodies_of_group) {
   if (mechanism.num_u() == 0 || !mechanism.forces().empty() ||
       !std::ranges::all_of(mechanism.joints(), IsPin)) {
     return nullptr;
@@ -116,8 +115,7 @@ std::unique_ptr<PathSweepOf<T>> PathSweepOf<T>::Make(const Mechanism<Planar, dou
 }
 
 template <class T>
-std::unique_ptr<PathSweepOf<T>> PathSweepOf<T>::Beside(const PathSweepOf<double>& one) requires(
-    !kIsOne) {
+std::unique_ptr<PathSweepOf<T>> PathSweepOf<T>::Beside(const PathSweepOf<double>& one) {
   if (!one.groups_.empty()) return nullptr;
   std::unique_ptr<PathSweepOf> sweep(new PathSweepOf);
   for (const auto& path : one.paths_) {
@@ -142,7 +140,7 @@ std::unique_ptr<PathSweepOf<T>> PathSweepOf<T>::Beside(const PathSweepOf<double>
 }
 
 template <class T>
-bool PathSweepOf<T>::SetMechanism(int lane, const PathSweepOf<double>& one) requires(!kIsOne) {
+bool PathSweepOf<T>::SetMechanism(int lane, const PathSweepOf<double>& one) {
   const auto same_path = [](const PathPlaces& a, const auto& b) {
     return a.bodies == b.bodies && a.first == b.first && a.has_loops == b.has_loops &&
            a.ends_at_ground == b.ends_at_ground && a.ground_is_P == b.ground_is_P;
@@ -161,7 +159,7 @@ bool PathSweepOf<T>::SetMechanism(int lane, const PathSweepOf<double>& one) requ
 }
 
 template <class T>
-void PathSweepOf<T>::SetConstants(int lane, const PathSweepOf<double>& one) requires(!kIsOne) {
+void PathSweepOf<T>::SetConstants(int lane, const PathSweepOf<double>& one) {
   for (std::size_t i = 0; i < paths_.size(); ++i) {
     SetLane(paths_[i].end, lane, one.paths_[i].end);
     SetLane(paths_[i].end_limit, lane, one.paths_[i].end_limit);
@@ -174,7 +172,7 @@ void PathSweepOf<T>::SetConstants(int lane, const PathSweepOf<double>& one) requ
 
 template <class T>
 void PathSweepOf<T>::Add(const Mechanism<Planar, double>& mechanism, PathLinks links,
-                         int bodies_of_group) requires kIsOne {
+                         int bodies_of_group) {
   PathPlaces path;
   path.bodies = static_cast<int>(links.links.size());
   path.groups = std::clamp(path.bodies / bodies_of_group, 1, kMostGroups);

@@ -14,8 +14,7 @@ constexpr int kLongest = 4096;
 /// X_PF and X_QM are angles here.
 template <class T>
 TreeAngles<T>::TreeAngles(const Mechanism<Planar, double>& mechanism,
-                          const std::vector<int>& place_of,
-                          const std::vector<double>& axes) requires std::is_same_v<T, double> {
+                          const std::vector<int>& place_of, const std::vector<double>& axes) {
   std::vector<std::vector<const TreeStep*>> below(place_of.size());  // by body
   for (const TreeStep& step : mechanism.tree()) below[step.parent].push_back(&step);
   std::vector<int> run_of(place_of.size(), -1);  // by body
@@ -36,7 +35,7 @@ TreeAngles<T>::TreeAngles(const Mechanism<Planar, double>& mechanism,
                       .child = place_of[step.child],
                       .parent = place_of[step.parent],
                       .sign = static_cast<double>(step.sign),
-                      .offset = of_bodies + axes[step.child] - axes[step.parent]});
+                      .offset = T{} + (of_bodies + axes[step.child] - axes[step.parent])});
   }
   int steps = kLongest;
   for (int run = 0; run < static_cast<int>(runs_.size()); ++run) {
@@ -62,8 +61,7 @@ TreeAngles<T> TreeAngles<T>::Like(const TreeAngles<double>& one) {
 }
 
 template <class T>
-bool TreeAngles<T>::SetOffsets(int lane,
-                               const TreeAngles<double>& one) requires(!std::is_same_v<T, double>) {
+bool TreeAngles<T>::SetOffsets(int lane, const TreeAngles<double>& one) {
   const auto same = [](const auto& a, const auto& b) {
     return a.u == b.u && a.child == b.child && a.parent == b.parent && a.sign == b.sign;
   };

@@ -24,11 +24,11 @@ class TreeAngles {
   /// `place_of` each body, Ground last, is where its numbers stand in lists; `axes` are the angles
   /// of axes on it whose angles are asked for [rad], in those of the body. All joints are pins.
   TreeAngles(const Mechanism<Planar, double>& mechanism, const std::vector<int>& place_of,
-             const std::vector<double>& axes) requires std::is_same_v<T, double>;
+             const std::vector<double>& axes);
   /// Has the shape of `one`, and its offsets in every lane.
   static TreeAngles Like(const TreeAngles<double>& one);
   /// The offsets of `one` in a lane. False, and nothing is set, where its tree has another shape.
-  bool SetOffsets(int lane, const TreeAngles<double>& one) requires(!std::is_same_v<T, double>);
+  bool SetOffsets(int lane, const TreeAngles<double>& one);
 
   /// Angles and speeds by place. Those of Ground must be there, zero.
   void ToBodies(std::span<const T> q, std::span<const T> u, T* angles, T* speeds, WorkerPool& pool);

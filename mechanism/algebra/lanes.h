@@ -60,6 +60,7 @@ inline void SetLane(Struct<Lanes>& pack, int lane, const Struct<double>& one) {
   }
 }
 inline void SetLane(Lanes& pack, int lane, double one) { pack[lane] = one; }
+inline void SetLane(double& pack, int /*lane*/, double one) { pack = one; }
 template <template <class> class Struct>
 inline Struct<double> LaneOf(const Struct<Lanes>& pack, int lane) {
   Struct<double> one;

@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <array>
+#include <functional>
 #include <utility>
 #include <vector>
 
@@ -29,7 +30,8 @@ void Scatter(const std::vector<Lanes>& all, int lane, std::span<double> one) {
 /// before; what comes of it goes nowhere.
 class PathLane::All final : public Together {
  public:
-  explicit All(const PathSweep& one) : sweep_(PathSweepOf<Lanes>::Beside(one)) {}
+  explicit All(const PathSweep& one)
+      : sweep_(PathSweepOf<Lanes>::Beside(one)), q_(one.num_u()), u_(q_), qdot_(q_), udot_(q_) {}
   bool HasLanes() const { return sweep_ != nullptr; }
 
   /// -1 where none is free, or the mechanism is another one.
@@ -48,18 +50,16 @@ class PathLane::All final : public Together {
   }
   bool WasGood(int lane) const { return good_[lane]; }
 
-  void Do() override {
+  void Do() noexcept override {
     for (const SpeedsUsed speeds : {SpeedsUsed::kGiven, SpeedsUsed::kCompleted}) {
       std::array<bool, kLanes> now{};
       for (int lane = 0; lane < kLanes; ++lane) {
         if (!waits_[lane] || wanted_[lane].speeds != speeds) continue;
         now[lane] = true;
-        q_.resize(wanted_[lane].q.size()), u_.resize(wanted_[lane].u.size());
         Gather(wanted_[lane].q, lane, q_);
         Gather(wanted_[lane].u, lane, u_);
       }
       if (std::ranges::none_of(now, std::identity())) continue;
-      qdot_.resize(q_.size()), udot_.resize(u_.size());
       const LaneBits good = sweep_->Evaluate(speeds, q_, u_, qdot_, udot_);
       for (int lane = 0; lane < kLanes; ++lane) {
         if (!now[lane]) continue;

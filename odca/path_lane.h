@@ -13,7 +13,7 @@ namespace loopbench::odca::pins {
 
 class PathLane {
  public:
-  /// A lane for the mechanism of `own` until this is destroyed; both arguments must outlive it.
+  /// A lane for the mechanism of `own` until this is destroyed; `beside` must outlive it.
   /// Null where `own` fills the lanes by itself.
   static std::unique_ptr<PathLane> Take(SideBySide& beside, const PathSweep& own);
   ~PathLane();

@@ -65,6 +65,7 @@ class PathSweepOf {
   /// Multiply-adds of the last evaluation, or what it did of it; angles are not counted.
   long operations() const { return operations_; }
   int threads() const { return pool_->threads(); }
+  std::size_t num_u() const { return moved_.size(); }
 
  private:
   /// A path's places in the lists. Its body k stands in lane k / packs of pack k % packs of its

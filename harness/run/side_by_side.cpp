@@ -6,6 +6,8 @@
 #include <boost/context/protected_fixedsize_stack.hpp>
 #include <exception>
 #include <memory>
+#include <new>
+#include <system_error>
 #include <thread>
 #include <utility>
 #include <vector>
@@ -38,10 +40,19 @@ class Place {
   Place& operator=(const Place&) = delete;
 
   bool IsTaken() const { return static_cast<bool>(fiber_); }
-  /// `work(back)` begins, until it goes back. Only a place that is used takes memory.
+  /// Only a place that is used takes memory. False where there is none.
+  bool HasStack() noexcept {
+    if (memory_.sp != nullptr) return true;
+    try {
+      memory_ = allocator_.allocate();
+    } catch (const std::bad_alloc&) {
+      return false;
+    }
+    return true;
+  }
+  /// `work(back)` begins, until it goes back.
   template <class Work>
   void Begin(Work work) {
-    if (memory_.sp == nullptr) memory_ = allocator_.allocate();
     const context::preallocated stack(static_cast<char*>(memory_.sp) - away_, memory_.size - away_,
                                       memory_);
     fiber_ = context::fiber(std::allocator_arg, stack, Kept{}, std::move(work));
@@ -65,16 +76,16 @@ class Places final : public SideBySide {
  public:
   /// `start(run)` is called in a place for each run that `next` gives, -1 being none.
   void Run(const std::function<int()>& next, const std::function<void(int)>& start) {
-    if (kMost == 1) {
+    for (int i = 0; i < kMost; ++i) places_.push_back(std::make_unique<Place>(i));
+    if (kMost == 1 || !places_.front()->HasStack()) {  // one after another, on this stack
       for (int run = next(); run >= 0; run = next()) start(run);
       return;
     }
-    for (int i = 0; i < kMost; ++i) places_.push_back(std::make_unique<Place>(i));
     bool all_begun = false;
     for (;;) {
       for (const std::unique_ptr<Place>& place : places_) {
         if (place->IsTaken()) place->GoOn();
-        while (!place->IsTaken() && !all_begun) {
+        while (!place->IsTaken() && !all_begun && place->HasStack()) {
           const int run = next();
           all_begun = run < 0;
           if (all_begun) break;
@@ -91,7 +102,7 @@ class Places final : public SideBySide {
   }
 
   void Meet() override {
-    if (kMost == 1) return DoAll();
+    if (!back_) return DoAll();
     back_ = std::move(back_).resume();
   }
 
@@ -101,7 +112,7 @@ class Places final : public SideBySide {
   }
 
   std::vector<std::unique_ptr<Place>> places_;
-  context::fiber back_;  ///< to Run(), while a run is at work
+  context::fiber back_;  ///< to Run(), while a run is at work on a stack of its own
 };
 
 }  // namespace
@@ -109,7 +120,7 @@ class Places final : public SideBySide {
 void RunSideBySide(int count, int threads, const std::function<void(int, SideBySide&)>& run) {
   // a thread for fewer runs than it has lanes would leave lanes empty
   const int useful = std::clamp((count + kMost - 1) / kMost, 1, std::max(1, threads));
-  // of the runs, then of threads that found no memory for them
+  // of the runs, then of threads
   std::vector<std::exception_ptr> thrown(static_cast<std::size_t>(count + useful));
   const auto guarded = [&](int place, const auto& work) {
     try {
@@ -131,7 +142,10 @@ void RunSideBySide(int count, int threads, const std::function<void(int, SideByS
   };
   {
     std::vector<std::jthread> others;
-    for (int thread = 1; thread < useful; ++thread) others.emplace_back(work, thread);
+    try {
+      for (int thread = 1; thread < useful; ++thread) others.emplace_back(work, thread);
+    } catch (const std::system_error&) {  // no more of them
+    }
     work(0);
   }
   const auto first = std::ranges::find_if(thrown, [](const auto& one) { return one != nullptr; });

@@ -12,8 +12,9 @@ namespace loopbench {
 class Together {
  public:
   virtual ~Together() = default;
-  /// All that its runs have asked for since it was done last.
-  virtual void Do() = 0;
+  /// All that its runs have asked for since it was done last. While runs are suspended nothing may
+  /// be thrown.
+  virtual void Do() noexcept = 0;
 };
 
 class SideBySide {

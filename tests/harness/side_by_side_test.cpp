@@ -2,11 +2,14 @@
 #include "harness/run/side_by_side.h"
 
 #include <gtest/gtest.h>
+#include <sys/resource.h>
+#include <unistd.h>
 
 #include <algorithm>
 #include <atomic>
-#include <cstring>
+#include <fstream>
 #include <stdexcept>
+#include <string>
 #include <vector>
 
 #include "mechanism/algebra/lanes.h"
@@ -17,7 +20,7 @@ namespace side_by_side_test {
 /// Counts those that wait for it.
 class Counter final : public Together {
  public:
-  void Do() override {
+  void Do() noexcept override {
     most = std::max(most, waiting);
     waiting = 0;
     ++done;
@@ -62,7 +65,7 @@ TEST(SideBySide, DoesTheWorkOfAllLanesAtOnce) {
   });
   if (most == 1) GTEST_SKIP() << "one stack under sanitizers";
   EXPECT_EQ(most, kLanes);
-  EXPECT_EQ(done, 40);
+  EXPECT_EQ(done, 40) << "four fillings of the lanes, ten meetings each";
 }
 
 TEST(SideBySide, ThrowsWhatTheFirstRunThrewWhenAllHaveEnded) {
@@ -97,6 +100,33 @@ TEST(SideBySide, HasStacksForWorkspaces) {
     sum += fill(run);
   });
   EXPECT_EQ(sum, 3);
+}
+
+/// What is left once `mebibytes` of address space are all that can be had.
+int EndedWithin(std::size_t mebibytes) {
+  std::size_t pages = 0;
+  std::ifstream("/proc/self/statm") >> pages;
+  const rlim_t most = pages * static_cast<std::size_t>(getpagesize()) + (mebibytes << 20);
+  const rlimit limit{most, most};
+  if (setrlimit(RLIMIT_AS, &limit) != 0) return -1;
+  std::atomic<int> ended = 0;
+  RunSideBySide(20, 3, [&](int, SideBySide& beside) {
+    Counter& counter = CounterOf(beside);
+    ++counter.waiting;
+    beside.Meet();
+    ++ended;
+  });
+  return ended;
+}
+
+TEST(SideBySideDeathTest, GoesOnWithTheStacksThatThereAre) {
+#if defined(__SANITIZE_ADDRESS__)
+  GTEST_SKIP() << "the sanitizer reserves the whole address space";
+#endif
+  // none, two, and more than there are lanes; threads have stacks of 8 MiB as well
+  for (const std::size_t mebibytes : {4, 20, 200}) {
+    EXPECT_EXIT(_exit(EndedWithin(mebibytes)), ::testing::ExitedWithCode(20), "") << mebibytes;
+  }
 }
 
 }  // namespace side_by_side_test

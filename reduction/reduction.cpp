@@ -1,243 +1,134 @@
-// Numbers (1) to (3) are those of reduction.h. Rows of J are components along D of the cut joints
-// at Mo, in ground axes; columns belong to the speeds of the forest.
 #include "reduction/reduction.h"
 
-#include <algorithm>
 #include <limits>
-#include <numeric>
 
-#include "mechanism/algebra/instantiate.h"
+#include "mechanism/model/dense_memory.h"
 
 namespace loopbench::reduction {
 
 namespace {
 
-std::vector<int> Complement(const std::vector<int>& chosen, int n) {
-  std::vector<int> rest;
-  for (int i = 0; i < n; ++i) {
-    if (std::ranges::find(chosen, i) == chosen.end()) rest.push_back(i);
-  }
-  return rest;
+/// Numbers up to which dense matrices are kept ready for positions where rank is in doubt: 160 MB.
+constexpr double kKeptReady = 2e7;
+
+/// Of M, J, B and what the null space adds, roughly.
+template <class Space>
+double DenseNumbers(const Mechanism<Space, double>& mechanism) {
+  const double n = mechanism.num_u(), m = mechanism.num_rows();
+  return 7.0 * n * n + 3.0 * n * m;
 }
 
 }  // namespace
 
-template <class Space, class S>
-Reduction<Space, S>::Reduction(const Mechanism<Space, S>& mechanism,
-                               const FormulationOptions& options)
+template <class Space>
+SparseOrDense<Space>::SparseOrDense(const Mechanism<Space, double>& mechanism,
+                                    const FormulationOptions& options, Matrices matrices)
     : mechanism_(mechanism),
-      kind_(options.solver),
+      options_(options),
       at_velocity_(options.enforcement == Enforcement::kVelocity),
-      dynamics_(mechanism),
-      M_(MatrixX<S>::Zero(mechanism.num_u(), mechanism.num_u())),
-      J_(MatrixX<S>::Zero(mechanism.num_rows(), mechanism.num_u())),
-      zero_(VectorX<S>::Zero(mechanism.num_u())),
-      c_(zero_),
-      residual_(zero_),
-      bias_(VectorX<S>::Zero(mechanism.num_rows())) {
-  if (kind_ == SolverKind::kRankRevealing && !at_velocity_ && mechanism.num_rows() > 0) {
-    null_space_ = std::make_unique<NullSpace<Space, S>>(mechanism);
+      zero_(VectorX<double>::Zero(mechanism.num_u())),
+      bias_(VectorX<double>::Zero(mechanism.num_rows())) {
+  if (options.solver == SolverKind::kRankRevealing) {
+    sparse_ = SparsePartition<Space>::Make(mechanism, matrices == Matrices::kSparse);
   }
+  has_sparse_choice_ = sparse_ != nullptr;
+  if (sparse_ == nullptr || DenseNumbers(mechanism) <= kKeptReady) MakeDense();
 }
 
-template <class Space, class S>
-void Reduction<Space, S>::Start(const Kinematics<Space, S>& kinematics) {
-  dynamics_.Jacobian(kinematics, J_);
-  const int n = mechanism_.num_u(), m = mechanism_.num_rows();
-  const bool fixed = kind_ == SolverKind::kAsPublished;
-  // as published knows no redundancy: as many dependent speeds as constraints
-  const int rank = fixed ? std::min(m, n) : GeometricRank(kinematics, dynamics_, J_);
-  Partition<S> partition = BestPartition(J_, rank);
-  if (fixed) {
-    const std::vector<int>& wanted = mechanism_.independent();
-    if (static_cast<int>(wanted.size()) == n - rank) partition.dependent = Complement(wanted, n);
-    partition.rows.resize(m);
-    std::iota(partition.rows.begin(), partition.rows.end(), 0);
+template <class Space>
+void SparseOrDense<Space>::MakeDense() {
+  if (dense_ != nullptr) return;
+  RequireDense(mechanism_.name() + ": reduction is dense: matrices of " +
+                   std::to_string(mechanism_.num_rows()) + " constraints and " +
+                   std::to_string(mechanism_.num_u()) + " speeds",
+               DenseNumbers(mechanism_));
+  dense_ = std::make_unique<DenseReduction<Space, double>>(mechanism_, options_);
+}
+
+template <class Space>
+void SparseOrDense<Space>::Start(const Kinematics<Space, double>& kinematics) {
+  has_sparse_choice_ =
+      sparse_ != nullptr && sparse_->AreIndependent(kinematics) && sparse_->Choose(kinematics);
+  if (has_sparse_choice_) return;
+  MakeDense();
+  dense_->Start(kinematics);
+}
+
+/// Without a sparse choice a run at another level than velocity may find one later.
+template <class Space>
+bool SparseOrDense<Space>::Review(const Kinematics<Space, double>& kinematics) {
+  constexpr double kReplaceBelow = DenseReduction<Space, double>::kReplaceBelow;
+  if (sparse_ == nullptr || (at_velocity_ && !has_sparse_choice_)) {
+    return dense_->Review(kinematics);
   }
-  SetPartition(partition);
+  if (at_velocity_) return sparse_->ChooseAgain(kinematics, kReplaceBelow);
+  const bool independent = sparse_->AreIndependent(kinematics);
+  if (has_sparse_choice_) return independent && sparse_->ChooseAgain(kinematics, kReplaceBelow);
+  has_sparse_choice_ = independent && sparse_->Choose(kinematics);
+  return has_sparse_choice_ || dense_->Review(kinematics);
 }
 
-template <class Space, class S>
-void Reduction<Space, S>::SetPartition(const Partition<S>& partition) {
-  const int n = mechanism_.num_u();
-  dependent_ = partition.dependent;
-  rows_ = partition.rows;
-  independent_ = Complement(dependent_, n);
-  const int r = static_cast<int>(dependent_.size()), f = n - r;
-  J_D_.setZero(rows_.size(), r);
-  J_I_.setZero(rows_.size(), f);
-  solved_.setZero(r, f);
-  B_.setZero(n, f);
-  MB_.setZero(n, f);
-  reduced_.setZero(f, f);
-  rows_rhs_.setZero(rows_.size());
-  dependent_speeds_.setZero(r);
-  independent_speeds_.setZero(f);
-  lu_ = Eigen::PartialPivLU<MatrixX<S>>(r);
-  if (f > 0) reduced_factor_.compute(MatrixX<S>::Identity(f, f).eval());
-}
-
-/// J_D and J_I of (1) from the chosen rows and columns of J.
-template <class Space, class S>
-S Reduction<Space, S>::FactorPartition() {
-  const int r = static_cast<int>(dependent_.size());
-  if (r == 0) return S(1);
-  for (int k = 0; k < r; ++k) {
-    for (int i = 0; i < r; ++i) J_D_(k, i) = J_(rows_[k], dependent_[i]);
-    for (int i = 0; i < J_I_.cols(); ++i) J_I_(k, i) = J_(rows_[k], independent_[i]);
+template <class Space>
+Outcome SparseOrDense<Space>::Factor(const Kinematics<Space, double>& kinematics) {
+  is_sparse_ = false;
+  if (has_sparse_choice_) {
+    this->conditioning_ = {.rank = LoopRank(mechanism_, 0)};
+    if (at_velocity_ || sparse_->AreIndependent(kinematics)) {
+      this->conditioning_.rcond = sparse_->Factor(kinematics);
+      // a pivot below a few eps of the largest is round-off of the elimination
+      is_sparse_ = this->conditioning_.rcond > 16 * std::numeric_limits<double>::epsilon();
+      if (is_sparse_) return Outcome::kFinished;
+    }
+    if (at_velocity_ || dense_ == nullptr) return Outcome::kSingular;
   }
-  lu_.compute(J_D_);
-  const auto pivots = lu_.matrixLU().diagonal().cwiseAbs();
-  return pivots.minCoeff() / pivots.maxCoeff();
+  const Outcome outcome = dense_->Factor(kinematics);
+  this->conditioning_ = dense_->conditioning();
+  return outcome;
 }
 
-template <class Space, class S>
-void Reduction<Space, S>::FactorNullSpace(const Kinematics<Space, S>& kinematics) {
-  null_space_->Factor(kinematics, dynamics_, J_);
-  uses_null_space_ = true;
-  Conditioning& found = this->conditioning_;
-  found.rank = LoopRank(mechanism_, mechanism_.num_rows() - null_space_->rank());
-  found.rcond = static_cast<double>(null_space_->rcond());
-  found.smallest_weight = static_cast<double>(null_space_->smallest_weight());
+template <class Space>
+std::string SparseOrDense<Space>::WhySingular() const {
+  if (at_velocity_ || dense_ != nullptr) return {};
+  return "rank is in doubt, and the dense matrices that would decide it are too large: " +
+         std::to_string(mechanism_.num_rows()) + " constraints and " +
+         std::to_string(mechanism_.num_u()) + " speeds";
 }
 
-template <class Space, class S>
-Outcome Reduction<Space, S>::Factor(const Kinematics<Space, S>& kinematics) {
-  const int r = static_cast<int>(dependent_.size());
-  Conditioning& found = this->conditioning_;
-  found.rank = LoopRank(mechanism_, mechanism_.num_rows() - r);
-  found.rcond = 0.0;
-  found.smallest_weight = 1.0;
-  kinematics_ = &kinematics;
-  uses_null_space_ = mass_is_current_ = false;
-  // more rows than dependent speeds: redundant constraints, as published; or a rank that has grown
-  const bool fits = static_cast<int>(rows_.size()) == r && !outgrown_;
-  if (!fits && !null_space_) return Outcome::kSingular;
-  dynamics_.Jacobian(kinematics, J_);
-  const bool complete = r == mechanism_.num_rows();
-  const S rcond = null_space_ && !complete ? S(0) : FactorPartition();
-  found.rcond = static_cast<double>(rcond);
-  if (null_space_ && !(rcond >= S(kSuspicious))) {
-    FactorNullSpace(kinematics);
-    return Outcome::kFinished;
-  }
-  // a pivot below a few eps of the largest is round-off of the elimination
-  if (!(rcond > S(16) * std::numeric_limits<S>::epsilon())) return Outcome::kSingular;
-  // B of (2), in the order of u
-  if (J_I_.size() > 0) solved_ = lu_.solve(J_I_);
-  for (int i = 0; i < J_I_.cols(); ++i) B_(independent_[i], i) = S(1);
-  for (int k = 0; k < r; ++k) B_.row(dependent_[k]) = -solved_.row(k);
-  return Outcome::kFinished;
+template <class Space>
+const std::vector<int>& SparseOrDense<Space>::independent() const {
+  return has_sparse_choice_ ? sparse_->choice().independent : dense_->independent();
 }
 
-/// B^T M B of (3) = R R^T.
-template <class Space, class S>
-void Reduction<Space, S>::FactorMass() {
-  if (mass_is_current_) return;
-  mass_is_current_ = true;
-  dynamics_.MassMatrix(*kinematics_, Masses::kPhysical, M_);
-  if (uses_null_space_ || independent_.empty()) return;
-  MB_.noalias() = M_ * B_;
-  reduced_.noalias() = B_.transpose() * MB_;
-  reduced_factor_.compute(reduced_);
+template <class Space>
+const std::vector<int>* SparseOrDense<Space>::CarriedSpeeds() const {
+  return at_velocity_ ? &independent() : nullptr;
 }
 
-/// (1): u = B u_I, less J_D^-1 b where motions are prescribed.
-template <class Space, class S>
-bool Reduction<Space, S>::CompleteSpeeds(Kinematics<Space, S>& kinematics, VectorX<S>& u) {
-  for (std::size_t i = 0; i < independent_.size(); ++i) {
-    independent_speeds_[i] = u[independent_[i]];
-  }
-  u.noalias() = B_ * independent_speeds_;
-  if (mechanism_.drives().empty() || dependent_.empty()) return true;
-  SpeedBias(kinematics, zero_, bias_);
-  for (std::size_t k = 0; k < rows_.size(); ++k) rows_rhs_[k] = bias_[rows_[k]];
-  dependent_speeds_ = lu_.solve(rows_rhs_);
-  for (std::size_t k = 0; k < dependent_.size(); ++k) u[dependent_[k]] -= dependent_speeds_[k];
+template <class Space>
+bool SparseOrDense<Space>::CompleteSpeeds(Kinematics<Space, double>& kinematics,
+                                          VectorX<double>& u) {
+  if (!is_sparse_) return dense_->CompleteSpeeds(kinematics, u);
+  const bool is_driven = !mechanism_.drives().empty();
+  if (is_driven) SpeedBias(kinematics, zero_, bias_);
+  sparse_->CompleteSpeeds(is_driven ? &bias_ : nullptr, u);
   return true;
 }
 
-/// c of (2) with `target` in the place of gamma.
-template <class Space, class S>
-void Reduction<Space, S>::Correct(const VectorX<S>& target, VectorX<S>& x) {
-  if (uses_null_space_) {
-    Solve(zero_, target, x, nullptr);
-    return;
-  }
-  x.setZero();
-  if (dependent_.empty()) return;
-  for (std::size_t k = 0; k < rows_.size(); ++k) rows_rhs_[k] = target[rows_[k]];
-  dependent_speeds_ = lu_.solve(rows_rhs_);
-  for (std::size_t k = 0; k < dependent_.size(); ++k) x[dependent_[k]] = dependent_speeds_[k];
+template <class Space>
+void SparseOrDense<Space>::Correct(const VectorX<double>& target, VectorX<double>& x) {
+  if (!is_sparse_) return dense_->Correct(target, x);
+  sparse_->Dependent(target, x);
 }
 
-/// (2) and (3) with `force` in the place of -h: B^T M B z = B^T (force - M c), x = B z + c.
-template <class Space, class S>
-void Reduction<Space, S>::Solve(const VectorX<S>& given, const VectorX<S>& target, VectorX<S>& x,
-                                VectorX<S>* lambda) {
-  FactorMass();
-  const VectorX<S>& force = given.size() > 0 ? given : zero_;
-  if (uses_null_space_) {
-    residual_ = -force;
-    if (!null_space_->Accelerate(M_, residual_, target, x)) {
-      x.setConstant(std::numeric_limits<S>::quiet_NaN());
-    }
-  } else {
-    Correct(target, c_);
-    x = c_;
-    if (!independent_.empty()) {
-      residual_ = force;
-      residual_.noalias() -= M_ * c_;
-      independent_speeds_.noalias() = B_.transpose() * residual_;
-      reduced_factor_.solveInPlace(independent_speeds_);
-      x.noalias() += B_ * independent_speeds_;
-    }
-  }
-  if (lambda != nullptr) SolveForces(force, x, *lambda);
+template <class Space>
+void SparseOrDense<Space>::Solve(const VectorX<double>& force, const VectorX<double>& target,
+                                 VectorX<double>& x, VectorX<double>* lambda) {
+  if (!is_sparse_) return dense_->Solve(force, target, x, lambda);
+  sparse_->Solve(force, target, x);
+  if (lambda != nullptr) sparse_->Multipliers(force, x, *lambda);
 }
 
-/// From the dependent equations of motion: J_D^T lambda = (M x - force)_D, zero where rows are not
-/// used.
-template <class Space, class S>
-void Reduction<Space, S>::SolveForces(const VectorX<S>& force, const VectorX<S>& x,
-                                      VectorX<S>& lambda) {
-  residual_ = -force;
-  residual_.noalias() += M_ * x;
-  if (uses_null_space_) {
-    null_space_->Multipliers(residual_, lambda);
-    return;
-  }
-  lambda.setZero();
-  if (dependent_.empty()) return;
-  for (std::size_t k = 0; k < dependent_.size(); ++k) rows_rhs_[k] = residual_[dependent_[k]];
-  // lu_.transpose().solve() by its parts: its permutation in place would allocate
-  lu_.matrixLU().template triangularView<Eigen::Upper>().transpose().solveInPlace(rows_rhs_);
-  lu_.matrixLU().template triangularView<Eigen::UnitLower>().transpose().solveInPlace(rows_rhs_);
-  dependent_speeds_.noalias() = lu_.permutationP().transpose() * rows_rhs_;
-  for (std::size_t k = 0; k < rows_.size(); ++k) lambda[rows_[k]] = dependent_speeds_[k];
-}
-
-template <class Space, class S>
-bool Reduction<Space, S>::Review(const Kinematics<Space, S>& kinematics) {
-  if (kind_ == SolverKind::kAsPublished || J_.rows() == 0) return false;
-  dynamics_.Jacobian(kinematics, J_);
-  const int rank = GeometricRank(kinematics, dynamics_, J_);
-  if (null_space_ && rank != static_cast<int>(dependent_.size())) {
-    SetPartition(BestPartition(J_, rank));
-    return true;
-  }
-  // started at a singular position, the partition leaves constraints out that now hold again
-  outgrown_ = rank > static_cast<int>(dependent_.size());
-  if (outgrown_ || dependent_.empty()) return false;
-  const Partition<S> best = BestPartition(J_, static_cast<int>(dependent_.size()));
-  const S current = PartitionCondition(J_, {dependent_, rows_, S(1)});
-  if (current >= S(kReplaceBelow) * best.rcond) return false;
-  SetPartition(best);
-  return true;
-}
-
-#define LOOPBENCH_INSTANTIATE(Space, S) template class Reduction<Space, S>;
-LOOPBENCH_FOR_EACH_SPACE_AND_SCALAR(LOOPBENCH_INSTANTIATE)
-#undef LOOPBENCH_INSTANTIATE
+template class SparseOrDense<Planar>;
+template class SparseOrDense<Spatial>;
 
 }  // namespace loopbench::reduction

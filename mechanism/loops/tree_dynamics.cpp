@@ -125,23 +125,51 @@ void TreeDynamics<Space, S>::MassMatrix(const Kinematics<Space, S>& kinematics, 
 ///   A_child                       =  S(-r_child) (that) + n_child
 ///
 template <class Space, class S>
-void TreeDynamics<Space, S>::BodyAccelerations(const Kinematics<Space, S>& kinematics,
-                                               const VectorX<S>& udot,
-                                               std::span<Acceleration<Space, S>> A) const {
+template <bool kWithBias>
+void TreeDynamics<Space, S>::Outward(const Kinematics<Space, S>& kinematics, const VectorX<S>& udot,
+                                     std::span<Acceleration<Space, S>> A) const {
   const Mechanism<Space, S>& mechanism = kinematics.mechanism();
   A[kGround].setZero();
   for (const TreeStep& step : mechanism.tree()) {
     const JointState<Space, S>& state = kinematics.joints()[step.joint];
     const Joint<Space, S>& joint = mechanism.joints()[step.joint];
     const Arms<Space, S> arms(step, state);
-    Acceleration<Space, S> A_rel = state.g;
+    Acceleration<Space, S> A_rel = kWithBias ? state.g : Acceleration<Space, S>::Zero();
     for (int i = 0; i < joint.num_u(); ++i) A_rel += state.H(i) * udot[joint.u_offset + i];
-    const Acceleration<Space, S> at_joint = ShiftMotion<Space, S>(A[step.parent], arms.parent) +
-                                            kinematics.Centripetal(step.parent, arms.parent) +
-                                            S(step.sign) * A_rel;
-    A[step.child] = ShiftMotion<Space, S>(at_joint, arms.child) +
-                    kinematics.Centripetal(step.child, arms.child);
+    Acceleration<Space, S> at_joint = ShiftMotion<Space, S>(A[step.parent], arms.parent);
+    if constexpr (kWithBias) at_joint += kinematics.Centripetal(step.parent, arms.parent);
+    at_joint += S(step.sign) * A_rel;
+    A[step.child] = ShiftMotion<Space, S>(at_joint, arms.child);
+    if constexpr (kWithBias) A[step.child] += kinematics.Centripetal(step.child, arms.child);
   }
+}
+
+template <class Space, class S>
+void TreeDynamics<Space, S>::BodyAccelerations(const Kinematics<Space, S>& kinematics,
+                                               const VectorX<S>& udot,
+                                               std::span<Acceleration<Space, S>> A) const {
+  Outward<true>(kinematics, udot, A);
+}
+
+template <class Space, class S>
+void TreeDynamics<Space, S>::Motions(const Kinematics<Space, S>& kinematics, const VectorX<S>& udot,
+                                     std::span<Acceleration<Space, S>> A) const {
+  Outward<false>(kinematics, udot, A);
+}
+
+template <class Space, class S>
+void TreeDynamics<Space, S>::MassTimes(const Kinematics<Space, S>& kinematics, const VectorX<S>& x,
+                                       VectorX<S>& force) {
+  const Mechanism<Space, S>& mechanism = kinematics.mechanism();
+  Motions(kinematics, x, A_bias_);
+  F_[kGround] = Wrench<Space, S>::Zero();
+  for (int body = 1; body < mechanism.num_bodies(); ++body) {
+    const Inertia<Space, S>& inertia = mechanism.bodies()[body];
+    F_[body] = {kinematics.RotationalInertia(inertia, body) * A_bias_[body].angular,
+                inertia.mass * A_bias_[body].linear};
+  }
+  force.setZero(mechanism.num_u());
+  AlongForest(kinematics, force);
 }
 
 /// Newton and Euler about the centre of mass: [I alpha + w x I w; m a].

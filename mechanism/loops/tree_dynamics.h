@@ -52,7 +52,18 @@ class TreeDynamics {
   void BodyAccelerations(const Kinematics<Space, S>& kinematics, const VectorX<S>& udot,
                          std::span<Acceleration<Space, S>> A) const;
 
+  /// What udot alone gives to them: the part of these accelerations that is linear in it. The same
+  /// for speeds.
+  void Motions(const Kinematics<Space, S>& kinematics, const VectorX<S>& udot,
+               std::span<Acceleration<Space, S>> A) const;
+  /// M x, in O(n) and without M.
+  void MassTimes(const Kinematics<Space, S>& kinematics, const VectorX<S>& x, VectorX<S>& force);
+
  private:
+  /// Accelerations with what speeds and time add to them, or without.
+  template <bool kWithBias>
+  void Outward(const Kinematics<Space, S>& kinematics, const VectorX<S>& udot,
+               std::span<Acceleration<Space, S>> A) const;
   /// Wrenches that bodies with accelerations A_bias_ need beyond applied forces, in F_.
   void NeededWrenches(const Kinematics<Space, S>& kinematics);
   /// Their components along the coordinates of the forest.

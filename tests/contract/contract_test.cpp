@@ -7,7 +7,9 @@
 
 #include "lagrange/lagrange.h"
 #include "odca/odca.h"
+#include "reduction/reduction.h"
 #include "tests/contract/allocations.h"
+#include "tests/contract/system_with.h"
 
 namespace loopbench::testing {
 namespace {
@@ -232,6 +234,30 @@ TEST(AllocationTest, SofteningDoesNotAllocate) {
   const long before = CountAllocations();
   for (int i = 0; i < 10; ++i) odca->Evaluate(0.0, state.q, state.u, udot);
   EXPECT_EQ(CountAllocations() - before, 0);
+}
+
+TEST(AllocationTest, SparseReductionDoesNotAllocate) {
+  if (CountAllocations() < 0) GTEST_SKIP() << "allocations cannot be counted in this build";
+  const MechanismDescription ladder = RandomLadder(12, SpaceKind::kPlanar, 1);
+  const Mechanism<Planar, double> mechanism(ladder, Coordinates::kJoint);
+  const State state = ConsistentState(ladder, mechanism, 1);
+  for (const Enforcement level : {Enforcement::kAcceleration, Enforcement::kVelocity}) {
+    SystemWith<reduction::Reduction, Planar, double> system(
+        mechanism, {level, SolverKind::kRankRevealing}, reduction::Matrices::kSparse);
+    system->Start(0.0, state.q, state.u);
+    VectorX<double> udot(mechanism.num_u()), q = state.q;
+    ASSERT_EQ(system->Evaluate(0.0, q, state.u, udot), Outcome::kFinished);
+    ASSERT_TRUE(system.solver().is_sparse());
+    system->Multipliers();
+    const long before = CountAllocations();
+    for (int i = 0; i < 10; ++i) {
+      q[0] += 1e-3;  // off the constraints, where pivots may be others
+      system->Evaluate(0.0, q, state.u, udot);
+      system->Multipliers();
+    }
+    EXPECT_EQ(CountAllocations() - before, 0) << ToString(level);
+    EXPECT_TRUE(system.solver().is_sparse());
+  }
 }
 
 INSTANTIATE_TEST_SUITE_P(All, ContractTest, ::testing::ValuesIn(AllCases()), NameOf);

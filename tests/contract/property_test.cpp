@@ -122,7 +122,9 @@ std::unique_ptr<System<Space, double>> Make(const Method& method,
   const FormulationOptions options{method.enforcement, SolverKind::kRankRevealing};
   if (method.name == "odca") return MakeSystem<odca::Odca>(mechanism, options);
   if (method.name == "lagrange") return MakeSystem<lagrange::Lagrange>(mechanism, options);
-  return MakeSystem<reduction::Reduction>(mechanism, options);
+  const auto matrices =
+      method.name == "reduction" ? reduction::Matrices::kLessWork : reduction::Matrices::kSparse;
+  return MakeSystem<reduction::Reduction>(mechanism, options, matrices);
 }
 
 /// Rate of the energy by differences of the oracle's along the motion, against the powers.
@@ -242,7 +244,9 @@ void Examine(int number, Tally& tally) {
     for (const Method& method : {Method{"odca", Enforcement::kAcceleration},
                                  {"lagrange", Enforcement::kAcceleration},
                                  {"reduction", Enforcement::kAcceleration},
-                                 {"reduction", Enforcement::kVelocity}}) {
+                                 {"reduction", Enforcement::kVelocity},
+                                 {"sparse reduction", Enforcement::kAcceleration},
+                                 {"sparse reduction", Enforcement::kVelocity}}) {
       SCOPED_TRACE(method.name + ", " + std::string(ToString(method.enforcement)) + ", " +
                    std::string(ToString(coordinates)));
       const auto formulation = Make(method, truth.mechanism);

@@ -1,0 +1,92 @@
+// Coordinate reduction by dense matrices: the speeds are split into independent u_I and dependent
+// u_D,
+//
+//   J_D u_D = -J_I u_I - b,      J_D udot_D = gamma - J_I udot_I,                   (1)
+//   u = B u_I,  udot = B udot_I + c,  B = [1; -J_D^-1 J_I],  c = [0; J_D^-1 gamma],  (2)
+//   (B^T M B) udot_I = -B^T (h + M c).                                            (3)
+//
+// Velocity level (the paper's): the state carries q and u_I, u_D follows from (1). Acceleration
+// level: the state carries q and all speeds, only accelerations follow from (1).
+//
+// As published: the independent set is fixed (the mechanism's, or chosen at the start) and all rows
+// of J are used; it ends as `singular` when J_D does, also where redundant constraints leave more
+// rows than dependent speeds. Automatic ("rank-revealing"): at the start the rank is taken from the
+// geometric response of loop_solver.h, dependent speeds and as many rows from QR of J with
+// pivoting; at each accepted step a partition whose conditioning has fallen below a tenth of the
+// best one's is replaced, which changes the state and restarts the integrator. The number of
+// dependent speeds stays that of the start; where the rank has grown beyond it (a start in a
+// singular position) the run ends as `singular`. J_D is factored by LU either way.
+//
+// At the other levels the state does not depend on the partition, so that it may change its size.
+// Where it is suspicious, or leaves rows out, a basis of the free directions takes its place
+// (null_space.h). Start() and Review() may allocate.
+#pragma once
+
+#include <memory>
+
+#include "mechanism/algebra/factors.h"
+#include "mechanism/formulation/constraint_solver.h"
+#include "mechanism/formulation/options.h"
+#include "mechanism/loops/tree_dynamics.h"
+#include "reduction/null_space.h"
+#include "reduction/partition.h"
+
+namespace loopbench::reduction {
+
+template <class Space, class S>
+class DenseReduction final : public ConstraintSolver<Space, S> {
+ public:
+  /// An automatic set is replaced when its reciprocal condition is below this part of the best.
+  static constexpr double kReplaceBelow = 0.1;
+  /// Below this ratio of its pivots a partition gives way to the null space.
+  static constexpr double kSuspicious = 0.1;
+
+  /// `mechanism` must outlive the solver.
+  DenseReduction(const Mechanism<Space, S>& mechanism, const FormulationOptions& options);
+
+  /// Indices into u, ascending.
+  const std::vector<int>& independent() const { return independent_; }
+
+  /// LU of J_D and the basis B, or that of the null space.
+  Outcome Factor(const Kinematics<Space, S>& kinematics) override;
+  /// x by (2) and (3), and lambda from that x.
+  void Solve(const VectorX<S>& force, const VectorX<S>& target, VectorX<S>& x,
+             VectorX<S>* lambda) override;
+  /// Independent coordinates and speeds stay; the dependent ones follow. Without a partition: the
+  /// smallest change in the metric M, which does no work along the free directions.
+  void Correct(const VectorX<S>& target, VectorX<S>& x) override;
+  /// At level velocity the independent speeds; the others follow by (1).
+  const std::vector<int>* CarriedSpeeds() const override {
+    return at_velocity_ ? &independent_ : nullptr;
+  }
+  bool CompleteSpeeds(Kinematics<Space, S>& kinematics, VectorX<S>& u) override;
+  /// The partition.
+  void Start(const Kinematics<Space, S>& kinematics) override;
+  bool Review(const Kinematics<Space, S>& kinematics) override;
+
+ private:
+  /// LU of J_D, J being current; the reciprocal condition.
+  S FactorPartition();
+  void FactorNullSpace(const Kinematics<Space, S>& kinematics);
+  /// M, and the factors of (3), once per position; not before they are needed.
+  void FactorMass();
+  void SolveForces(const VectorX<S>& force, const VectorX<S>& x, VectorX<S>& lambda);
+  void SetPartition(const Partition<S>& partition);
+
+  const Mechanism<Space, S>& mechanism_;
+  SolverKind kind_;
+  bool at_velocity_;
+  TreeDynamics<Space, S> dynamics_;
+  const Kinematics<Space, S>* kinematics_ = nullptr;  ///< of the last Factor()
+  std::vector<int> independent_, dependent_, rows_;
+  bool mass_is_current_ = false;
+  bool outgrown_ = false;  ///< the rank exceeds the partition's
+  MatrixX<S> M_, J_, J_D_, J_I_, solved_, B_, MB_, reduced_;
+  VectorX<S> zero_, c_, residual_, rows_rhs_, dependent_speeds_, independent_speeds_, bias_;
+  Eigen::PartialPivLU<MatrixX<S>> lu_;
+  Eigen::LLT<MatrixX<S>> reduced_factor_;
+  std::unique_ptr<NullSpace<Space, S>> null_space_;  ///< null at velocity level and as published
+  bool uses_null_space_ = false;                     ///< since the last Factor()
+};
+
+}  // namespace loopbench::reduction

@@ -1,0 +1,184 @@
+#include "reduction/sparse_lu.h"
+
+#include <Eigen/OrderingMethods>
+#include <Eigen/SparseCore>
+#include <algorithm>
+#include <cmath>
+#include <limits>
+#include <utility>
+
+namespace loopbench::reduction {
+
+namespace {
+
+/// Rows that differ by rounding alone, as those of equal bodies do, are taken in their order: each
+/// counts a little less than the one before, by less than what makes a choice better.
+constexpr double kFromFirstToLast = 1e-3;
+
+/// Column numbers in the order of their elimination.
+std::vector<int> Order(int num_rows, const std::vector<int>& start, const std::vector<int>& rows) {
+  const int columns = static_cast<int>(start.size()) - 1;
+  std::vector<Eigen::Triplet<double>> entries;
+  for (int k = 0; k < columns; ++k) {
+    for (int e = start[k]; e < start[k + 1]; ++e) entries.emplace_back(rows[e], k, 1.0);
+  }
+  Eigen::SparseMatrix<double> A(num_rows, columns);
+  A.setFromTriplets(entries.begin(), entries.end());
+  Eigen::PermutationMatrix<Eigen::Dynamic, Eigen::Dynamic, int> place;
+  Eigen::COLAMDOrdering<int>()(A, place);
+  std::vector<int> order(columns);
+  for (int k = 0; k < columns; ++k) order[place.indices()[k]] = k;
+  return order;
+}
+
+}  // namespace
+
+SparseLu::SparseLu(int num_rows, std::vector<int> start, std::vector<int> rows)
+    : start_(std::move(start)),
+      rows_(std::move(rows)),
+      order_(Order(num_rows, start_, rows_)),
+      L_start_(columns() + 1, 0),
+      U_start_(columns() + 1, 0),
+      diagonal_(columns(), 0.0),
+      pivots_(columns(), -1),
+      step_of_row_(num_rows, -1),
+      x_(num_rows, 0.0),
+      weights_(num_rows),
+      marks_(num_rows, 0) {
+  for (int i = 0; i < num_rows; ++i) weights_[i] = 1.0 - kFromFirstToLast * i / num_rows;
+  for (std::vector<int>* list : {&reached_, &candidates_, &path_, &next_}) list->reserve(num_rows);
+}
+
+/// Depth first from `row`, without recursion: its column of L, and those that this one reaches.
+void SparseLu::Visit(int row) {
+  if (marks_[row] == mark_) return;
+  marks_[row] = mark_;
+  if (step_of_row_[row] < 0) {
+    candidates_.push_back(row);
+    return;
+  }
+  path_.assign(1, step_of_row_[row]);
+  next_.assign(1, L_start_[path_[0]]);
+  while (!path_.empty()) {
+    const int step = path_.back();
+    int& at = next_.back();
+    int deeper = -1;
+    for (; deeper < 0 && at < L_start_[step + 1]; ++at) {
+      const int reached = L_[at].index;
+      if (marks_[reached] == mark_) continue;
+      marks_[reached] = mark_;
+      if (step_of_row_[reached] < 0) {
+        candidates_.push_back(reached);
+      } else {
+        deeper = step_of_row_[reached];
+      }
+    }
+    if (deeper >= 0) {
+      path_.push_back(deeper);
+      next_.push_back(L_start_[deeper]);
+    } else {
+      reached_.push_back(step);
+      path_.pop_back();
+      next_.pop_back();
+    }
+  }
+}
+
+void SparseLu::Reach(int column, std::span<const char> left_out) {
+  ++mark_;
+  reached_.clear();
+  candidates_.clear();
+  for (int e = start_[column]; e < start_[column + 1]; ++e) {
+    if (left_out.empty() || !left_out[rows_[e]]) Visit(rows_[e]);
+  }
+  // a column acts before those that it reaches
+  std::ranges::reverse(reached_);
+}
+
+bool SparseLu::Factor(std::span<const double> values, std::span<const char> left_out) {
+  const bool is_first = L_.capacity() == 0;
+  L_.clear();
+  U_.clear();
+  std::ranges::fill(step_of_row_, -1);
+  rcond_ = operations_ = 0.0;
+  double least = std::numeric_limits<double>::infinity(), most = 0.0;
+  for (int k = 0; k < columns(); ++k) {
+    const int column = order_[k];
+    Reach(column, left_out);
+    for (int e = start_[column]; e < start_[column + 1]; ++e) {
+      if (left_out.empty() || !left_out[rows_[e]]) x_[rows_[e]] = values[e];
+    }
+    for (const int step : reached_) {
+      const double u = std::exchange(x_[pivots_[step]], 0.0);
+      U_.push_back({step, u});
+      for (int e = L_start_[step]; e < L_start_[step + 1]; ++e) x_[L_[e].index] -= L_[e].value * u;
+      operations_ += L_start_[step + 1] - L_start_[step];
+    }
+    int pivot = -1;
+    double best = 0.0;
+    for (const int row : candidates_) {
+      const double size = weights_[row] * std::abs(x_[row]);
+      // of those not finite none is larger, and all must be cleared
+      if (size > best || (size == best && pivot >= 0 && row < pivot)) {
+        best = size;
+        pivot = row;
+      }
+    }
+    const double value = pivot < 0 ? 0.0 : x_[pivot];
+    for (const int row : candidates_) {
+      const double x = std::exchange(x_[row], 0.0);
+      if (row != pivot && pivot >= 0) L_.push_back({row, x / value});
+    }
+    if (pivot < 0 || !std::isfinite(value)) return false;
+    operations_ += static_cast<double>(candidates_.size());
+    pivots_[k] = pivot;
+    step_of_row_[pivot] = k;
+    diagonal_[k] = value;
+    L_start_[k + 1] = static_cast<int>(L_.size());
+    U_start_[k + 1] = static_cast<int>(U_.size());
+    least = std::min(least, std::abs(value));
+    most = std::max(most, std::abs(value));
+  }
+  if (is_first) {
+    L_.reserve(2 * L_.size() + 64);
+    U_.reserve(2 * U_.size() + 64);
+  }
+  rcond_ = columns() == 0 ? 1.0 : least / most;
+  return true;
+}
+
+void SparseLu::SolveTransposed(double* R, double* X, int count) const {
+  const auto subtract = [count](double factor, const double* from, double* to) {
+    for (int i = 0; i < count; ++i) to[i] -= factor * from[i];
+  };
+  // U^T Y = Q^T R: row k of Y in the place of R's row order_[k]
+  for (int k = 0; k < columns(); ++k) {
+    double* y = R + static_cast<std::ptrdiff_t>(order_[k]) * count;
+    for (int e = U_start_[k]; e < U_start_[k + 1]; ++e) {
+      subtract(U_[e].value, R + static_cast<std::ptrdiff_t>(order_[U_[e].index]) * count, y);
+    }
+    for (int i = 0; i < count; ++i) y[i] /= diagonal_[k];
+  }
+  // L^T P X = Y, from the last pivot to the first
+  for (int k = columns() - 1; k >= 0; --k) {
+    double* y = R + static_cast<std::ptrdiff_t>(order_[k]) * count;
+    for (int e = L_start_[k]; e < L_start_[k + 1]; ++e) {
+      subtract(L_[e].value, X + static_cast<std::ptrdiff_t>(L_[e].index) * count, y);
+    }
+    std::copy_n(y, count, X + static_cast<std::ptrdiff_t>(pivots_[k]) * count);
+  }
+}
+
+void SparseLu::Solve(double* y, double* x) const {
+  for (int k = 0; k < columns(); ++k) {
+    const double w = y[pivots_[k]];
+    x[order_[k]] = w;
+    for (int e = L_start_[k]; e < L_start_[k + 1]; ++e) y[L_[e].index] -= L_[e].value * w;
+  }
+  for (int k = columns() - 1; k >= 0; --k) {
+    const double z = x[order_[k]] /= diagonal_[k];
+    for (int e = U_start_[k]; e < U_start_[k + 1]; ++e) x[order_[U_[e].index]] -= U_[e].value * z;
+  }
+}
+
+}  // namespace loopbench::reduction

@@ -1,0 +1,139 @@
+// Factors of random sparse matrices against dense products and solves.
+#include "reduction/sparse_lu.h"
+
+#include <gtest/gtest.h>
+
+#include <Eigen/LU>
+#include <algorithm>
+#include <cmath>
+#include <limits>
+
+#include "mechanism/algebra/factors.h"
+#include "tests/contract/generators.h"
+
+namespace loopbench::reduction {
+namespace {
+
+using testing::Random;
+
+constexpr double kEps = std::numeric_limits<double>::epsilon();
+
+/// A tall matrix with `per_column` entries in each column, by columns.
+struct Sample {
+  Sample(int rows, int columns, int per_column, std::uint64_t seed)
+      : A(MatrixX<double>::Zero(rows, columns)) {
+    Random random(seed);
+    start.push_back(0);
+    for (int k = 0; k < columns; ++k) {
+      std::vector<int> chosen;
+      while (static_cast<int>(chosen.size()) < per_column) {
+        const int row = random.Below(rows);
+        if (std::ranges::find(chosen, row) == chosen.end()) chosen.push_back(row);
+      }
+      for (const int row : chosen) Add(row, k, random.Uniform(-1.0, 1.0));
+      start.push_back(static_cast<int>(index.size()));
+    }
+  }
+  void Add(int row, int column, double value) {
+    index.push_back(row);
+    values.push_back(value);
+    A(row, column) = value;
+  }
+
+  std::vector<int> start, index;
+  std::vector<double> values;
+  MatrixX<double> A;
+};
+
+/// Rows `rows` of A, in that order.
+MatrixX<double> RowsOf(const MatrixX<double>& A, std::span<const int> rows) {
+  MatrixX<double> chosen(rows.size(), A.cols());
+  for (std::size_t i = 0; i < rows.size(); ++i) chosen.row(i) = A.row(rows[i]);
+  return chosen;
+}
+
+TEST(SparseLu, SolvesWithTheRowsThatItChose) {
+  for (std::uint64_t seed = 1; seed <= 40; ++seed) {
+    const int columns = 1 + static_cast<int>(seed), rows = columns + static_cast<int>(seed % 7);
+    const Sample sample(rows, columns, std::min(columns, 3), seed);
+    SparseLu lu(rows, sample.start, sample.index);
+    if (!lu.Factor(sample.values)) {
+      // no pivot is left where rank is lost, be it structural
+      EXPECT_LT(Eigen::FullPivLU<MatrixX<double>>(sample.A).rank(), columns) << seed;
+      continue;
+    }
+    const std::vector<int> pivots(lu.pivots().begin(), lu.pivots().end());
+    std::vector<char> left_out(rows, 1);
+    for (const int pivot : pivots) left_out[pivot] = 0;
+    ASSERT_EQ(std::ranges::count(left_out, 0), columns) << "each column has a pivot of its own";
+    const double rcond = lu.rcond();
+    ASSERT_TRUE(lu.Factor(sample.values, left_out));
+    EXPECT_TRUE(std::ranges::equal(lu.pivots(), pivots)) << "what is left out was not chosen";
+    EXPECT_EQ(lu.rcond(), rcond);
+
+    Random random(seed);
+    const MatrixX<double> A_D = RowsOf(sample.A, pivots);
+    // backward stable but for the growth of pivots, which stays small here: residuals of n terms
+    const auto bound = [&](const MatrixX<double>& x) {
+      return 100.0 * kEps * columns * A_D.norm() * x.norm();
+    };
+    constexpr int kCount = 3;
+    using RowMajor = Eigen::Matrix<double, Eigen::Dynamic, Eigen::Dynamic, Eigen::RowMajor>;
+    RowMajor R(columns, kCount), X = RowMajor::Constant(rows, kCount, 7.0);
+    for (double& r : R.reshaped()) r = random.Uniform(-1.0, 1.0);
+    RowMajor lost = R;
+    lu.SolveTransposed(lost.data(), X.data(), kCount);
+    const MatrixX<double> X_D = RowsOf(X, pivots);
+    EXPECT_LE((A_D.transpose() * X_D - R).norm(), bound(X_D)) << seed;
+    for (int row = 0; row < rows; ++row) {
+      if (left_out[row]) {
+        EXPECT_EQ(X(row, 0), 7.0) << "not a row that was asked for";
+      }
+    }
+
+    VectorX<double> y(rows), x(columns);
+    for (double& value : y) value = random.Uniform(-1.0, 1.0);
+    const MatrixX<double> y_D = RowsOf(y, pivots);
+    lu.Solve(y.data(), x.data());
+    EXPECT_LE((A_D * x - y_D).norm(), bound(x)) << seed;
+  }
+}
+
+/// The pivot is the largest that is left, so that no row not chosen would have been better.
+TEST(SparseLu, TakesTheLargestRow) {
+  const std::vector<double> column = {0.5, -3.0, 2.0, 0.0, 1.0, 2.9};
+  SparseLu lu(6, {0, 6}, {0, 1, 2, 3, 4, 5});
+  ASSERT_TRUE(lu.Factor(column));
+  EXPECT_EQ(lu.pivots()[0], 1);
+  const std::vector<char> left_out = {0, 1, 0, 0, 0, 0};
+  ASSERT_TRUE(lu.Factor(column, left_out));
+  EXPECT_EQ(lu.pivots()[0], 5);
+}
+
+TEST(SparseLu, HasNoFactorsWithoutRank) {
+  Sample sample(8, 3, 4, 5);
+  SparseLu lu(8, sample.start, sample.index);
+  ASSERT_TRUE(lu.Factor(sample.values));
+  std::vector<double> values = sample.values;
+  std::fill_n(values.begin() + 4, 4, 0.0);
+  EXPECT_FALSE(lu.Factor(values)) << "a column of zeros";
+  EXPECT_EQ(lu.rcond(), 0.0);
+  values = sample.values;
+  for (const double bad :
+       {std::numeric_limits<double>::quiet_NaN(), std::numeric_limits<double>::infinity()}) {
+    std::fill_n(values.begin(), 4, bad);
+    EXPECT_FALSE(lu.Factor(values));
+  }
+  std::vector<char> left_out(8, 1);
+  left_out[0] = left_out[1] = 0;
+  EXPECT_FALSE(lu.Factor(sample.values, left_out)) << "fewer rows than columns";
+  ASSERT_TRUE(lu.Factor(sample.values)) << "nothing of that is left behind";
+  const std::vector<int> pivots(lu.pivots().begin(), lu.pivots().end());
+  SparseLu fresh(8, sample.start, sample.index);
+  ASSERT_TRUE(fresh.Factor(sample.values));
+  EXPECT_TRUE(std::ranges::equal(fresh.pivots(), pivots));
+  EXPECT_EQ(fresh.rcond(), lu.rcond());
+}
+
+}  // namespace
+}  // namespace loopbench::reduction

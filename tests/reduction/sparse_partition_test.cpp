@@ -1,0 +1,206 @@
+// Reduction by sparse factors against dense multipliers, where each is taken, and what becomes of
+// positions in doubt.
+#include "reduction/sparse_partition.h"
+
+#include <gtest/gtest.h>
+
+#include <cmath>
+#include <cstdio>
+#include <limits>
+
+#include "lagrange/dense_equations.h"
+#include "mechanism/description/library.h"
+#include "reduction/reduction.h"
+#include "tests/contract/generators.h"
+#include "tests/contract/system_with.h"
+
+namespace loopbench::reduction {
+namespace {
+
+using testing::ConsistentState;
+using testing::Random;
+using testing::State;
+
+constexpr double kEps = std::numeric_limits<double>::epsilon();
+
+VectorX<double> RandomNumbers(Random& random, Eigen::Index count) {
+  VectorX<double> numbers(count);
+  for (double& number : numbers) number = random.Uniform(-1.0, 1.0);
+  return numbers;
+}
+
+/// How many of the mechanisms given could be compared.
+struct Tally {
+  int solved = 0, in_doubt = 0;
+};
+
+/// Random forces and targets; x and lambda of both agree within the contract's bound, sums along n
+/// bodies magnified by the condition of what is inverted.
+template <class Space>
+void ExpectAlike(const MechanismDescription& description, Coordinates coordinates,
+                 std::uint64_t seed, Tally& tally) {
+  SCOPED_TRACE(description.name);
+  const Mechanism<Space, double> joint_set(description, Coordinates::kJoint);
+  const Mechanism<Space, double> mechanism(description, coordinates);
+  State state = ConsistentState(description, joint_set, seed);
+  if (coordinates == Coordinates::kAbsolute) state = StateIn(mechanism, joint_set, state);
+  Kinematics<Space, double> kinematics(mechanism);
+  kinematics.UpdatePosition(state.q);
+  kinematics.UpdateVelocity(state.u);
+  const auto sparse = SparsePartition<Space>::Make(mechanism, true);
+  ASSERT_NE(sparse, nullptr);
+  lagrange::DenseEquations<Space, double> dense(mechanism, SolverKind::kRankRevealing);
+  Conditioning found;
+  ASSERT_EQ(dense.Factor(kinematics, found), Outcome::kFinished);
+  if (!sparse->AreIndependent(kinematics)) {
+    ++tally.in_doubt;
+    EXPECT_LT(found.rcond, 0.1) << "what is in doubt is near that for both";
+    return;
+  }
+  ASSERT_TRUE(sparse->Choose(kinematics));
+  const double rcond = sparse->Factor(kinematics);
+  EXPECT_FALSE(sparse->ChooseAgain(kinematics, 0.99)) << "nothing is better than the best";
+  EXPECT_EQ(static_cast<int>(sparse->choice().dependent.size()), mechanism.num_rows());
+  ++tally.solved;
+  Random random(seed);
+  const VectorX<double> force = RandomNumbers(random, mechanism.num_u());
+  const VectorX<double> target = RandomNumbers(random, mechanism.num_rows());
+  const double bound = 100.0 * kEps * mechanism.num_bodies() / std::min(found.rcond, rcond);
+  for (const VectorX<double>& f : {force, VectorX<double>()}) {
+    VectorX<double> x_dense, lambda_dense, x, lambda;
+    dense.Solve(f, target, x_dense, &lambda_dense);
+    sparse->Solve(f, target, x);
+    sparse->Multipliers(f, x, lambda);
+    EXPECT_LE((x - x_dense).norm(), bound * std::max(1.0, x_dense.norm()));
+    EXPECT_LE((lambda - lambda_dense).norm(), bound * std::max(1.0, lambda_dense.norm()));
+  }
+  MatrixX<double> J;
+  TreeDynamics<Space, double>(mechanism).Jacobian(kinematics, J);
+  VectorX<double> u = force;
+  sparse->CompleteSpeeds(nullptr, u);
+  EXPECT_LE((J * u).norm(), bound * J.norm() * u.norm());
+  for (const int speed : sparse->choice().independent) EXPECT_EQ(u[speed], force[speed]);
+  sparse->Dependent(target, u);
+  EXPECT_LE((J * u - target).norm(), bound * J.norm() * u.norm());
+  for (const int speed : sparse->choice().independent) EXPECT_EQ(u[speed], 0.0);
+}
+
+template <class Space>
+class SparsePartitionTest : public ::testing::Test {};
+using Spaces = ::testing::Types<Planar, Spatial>;
+TYPED_TEST_SUITE(SparsePartitionTest, Spaces);
+
+TYPED_TEST(SparsePartitionTest, SolvesWhatDenseMultipliersSolve) {
+  const SpaceKind space = TypeParam::kRot == 1 ? SpaceKind::kPlanar : SpaceKind::kSpatial;
+  Tally tally;
+  for (const Coordinates coordinates : {Coordinates::kJoint, Coordinates::kAbsolute}) {
+    for (std::uint64_t seed = 1; seed <= 8; ++seed) {
+      const int n = 2 + static_cast<int>(seed);
+      ExpectAlike<TypeParam>(testing::RandomChain(n + 6, space, seed), coordinates, seed, tally);
+      ExpectAlike<TypeParam>(testing::RandomLadder(n, space, seed), coordinates, seed, tally);
+      ExpectAlike<TypeParam>(testing::MixedGraph(n, space, seed, 2), coordinates, seed, tally);
+      ExpectAlike<TypeParam>(testing::TightGraph(24, 2, space, seed), coordinates, seed, tally);
+    }
+  }
+  std::printf("%d solved, %d in doubt\n", tally.solved, tally.in_doubt);
+  EXPECT_GT(tally.solved, 3 * tally.in_doubt);
+}
+
+using InPlane = testing::SystemWith<Reduction, Planar, double>;
+
+/// Cranks of a ladder at `angle`, all speeds zero.
+VectorX<double> LadderAt(const Mechanism<Planar, double>& mechanism, double angle) {
+  VectorX<double> q = VectorX<double>::Zero(mechanism.num_q());
+  for (const TreeStep& step : mechanism.tree()) {
+    const bool is_crank = step.parent == kGround;
+    q[mechanism.joints()[step.joint].q_offset] = is_crank ? angle : -angle;
+  }
+  return q;
+}
+
+struct LadderRun {
+  LadderRun(int windows, Enforcement level, Matrices matrices = Matrices::kSparse)
+      : mechanism(Ladder(windows, 1.0, 0.0), Coordinates::kJoint),
+        system(mechanism, {level, SolverKind::kRankRevealing}, matrices) {}
+  Outcome Start(double angle) {
+    system->Start(0.0, LadderAt(mechanism, angle), zero());
+    return Evaluate(angle);
+  }
+  Outcome Evaluate(double angle) {
+    VectorX<double> udot;
+    return system->Evaluate(0.0, LadderAt(mechanism, angle), zero(), udot);
+  }
+  VectorX<double> zero() const { return VectorX<double>::Zero(mechanism.num_u()); }
+  bool is_sparse() { return system.solver().is_sparse(); }
+
+  const Mechanism<Planar, double> mechanism;
+  InPlane system;
+};
+
+TEST(Reduction, LeavesDoubtfulPositionsToDenseMatrices) {
+  LadderRun run(3, Enforcement::kAcceleration);
+  ASSERT_EQ(run.Start(1.0), Outcome::kFinished);
+  EXPECT_TRUE(run.is_sparse());
+  for (const double angle : {1e-5, 0.0}) {
+    EXPECT_EQ(run.Evaluate(angle), Outcome::kFinished);
+    EXPECT_FALSE(run.is_sparse());
+    EXPECT_LT(run.system->diagnostics().smallest_weight, 0.5);
+  }
+  EXPECT_EQ(run.Evaluate(1.0), Outcome::kFinished);
+  EXPECT_TRUE(run.is_sparse());
+}
+
+TEST(Reduction, StartsDenselyInASingularPositionAndGoesOnSparsely) {
+  LadderRun run(3, Enforcement::kAcceleration);
+  ASSERT_EQ(run.Start(0.0), Outcome::kFinished);
+  EXPECT_FALSE(run.is_sparse());
+  ASSERT_EQ(run.Evaluate(1.0), Outcome::kFinished);
+  EXPECT_FALSE(run.is_sparse()) << "the choice is the start's until an accepted step";
+  std::vector<double> y(run.mechanism.num_q() + run.mechanism.num_u());
+  run.system->ToState(LadderAt(run.mechanism, 1.0), run.zero(), y);
+  run.system->BeginStep(0.0, y);
+  ASSERT_EQ(run.Evaluate(1.0), Outcome::kFinished);
+  EXPECT_TRUE(run.is_sparse());
+}
+
+TEST(Reduction, IsSingularWhereDenseMatricesWouldBeTooLarge) {
+  LadderRun run(2000, Enforcement::kAcceleration, Matrices::kLessWork);
+  ASSERT_EQ(run.Start(1.0), Outcome::kFinished);
+  EXPECT_TRUE(run.is_sparse());
+  EXPECT_EQ(run.Evaluate(0.0), Outcome::kSingular);
+  EXPECT_NE(run.system.solver().WhySingular().find("rank is in doubt"), std::string::npos);
+  EXPECT_NE(run.Evaluate(std::numeric_limits<double>::quiet_NaN()), Outcome::kFinished);
+  EXPECT_EQ(run.Evaluate(1.0), Outcome::kFinished);
+}
+
+TEST(Reduction, TakesWhatIsLessWork) {
+  for (const auto& [windows, sparse] : {std::pair(1, false), std::pair(100, true)}) {
+    LadderRun run(windows, Enforcement::kVelocity, Matrices::kLessWork);
+    ASSERT_EQ(run.Start(1.0), Outcome::kFinished);
+    EXPECT_EQ(run.is_sparse(), sparse) << windows;
+  }
+}
+
+/// One independent speed for all windows, and accelerations of the one degree of freedom: those of
+/// a parallelogram of the same bars, whose cranks all turn alike.
+TEST(Reduction, IsRightForTenThousandWindows) {
+  LadderRun run(10000, Enforcement::kVelocity, Matrices::kLessWork);
+  ASSERT_EQ(run.Start(1.0), Outcome::kFinished);
+  EXPECT_TRUE(run.is_sparse());
+  EXPECT_EQ(run.system.solver().independent().size(), 1u);
+  VectorX<double> udot;
+  run.system->Evaluate(0.0, LadderAt(run.mechanism, 1.0), run.zero(), udot);
+  double least = 1e300, most = -1e300;
+  for (const TreeStep& step : run.mechanism.tree()) {
+    if (step.parent != kGround) continue;
+    const double crank = udot[run.mechanism.joints()[step.joint].u_offset];
+    least = std::min(least, crank);
+    most = std::max(most, crank);
+  }
+  // a chain of 10^4 windows, each of which passes on the round-off of the one before
+  EXPECT_LE(most - least, 10.0 * kEps * 10000 * std::abs(most));
+  EXPECT_GT(std::abs(most), 1.0);
+}
+
+}  // namespace
+}  // namespace loopbench::reduction

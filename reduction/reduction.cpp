@@ -29,10 +29,12 @@ SparseOrDense<Space>::SparseOrDense(const Mechanism<Space, double>& mechanism,
       zero_(VectorX<double>::Zero(mechanism.num_u())),
       bias_(VectorX<double>::Zero(mechanism.num_rows())) {
   if (options.solver == SolverKind::kRankRevealing) {
-    sparse_ = SparsePartition<Space>::Make(mechanism, matrices == Matrices::kSparse);
+    sparse_ = SparsePartition<Space>::Make(mechanism, at_velocity_ ? Choice::kKept : Choice::kFree,
+                                           matrices);
   }
-  has_sparse_choice_ = sparse_ != nullptr;
-  if (sparse_ == nullptr || DenseNumbers(mechanism) <= kKeptReady) MakeDense();
+  may_decline_ = matrices == Matrices::kLessWork && DenseNumbers(mechanism) <= kKeptReady;
+  // for positions in doubt, which a right-hand side meets
+  if (sparse_ == nullptr || (!at_velocity_ && DenseNumbers(mechanism) <= kKeptReady)) MakeDense();
 }
 
 template <class Space>
@@ -46,40 +48,47 @@ void SparseOrDense<Space>::MakeDense() {
 }
 
 template <class Space>
+bool SparseOrDense<Space>::StartsSparsely(const Kinematics<Space, double>& kinematics) {
+  if (sparse_ == nullptr) return false;
+  const bool independent = sparse_->AreIndependent(kinematics);
+  const bool chosen = sparse_->Choose(kinematics);  // what it allocates is there then
+  if (at_velocity_ && !(independent && chosen)) return false;
+  return !chosen || !may_decline_ || sparse_->IsLessWork();
+}
+
+template <class Space>
 void SparseOrDense<Space>::Start(const Kinematics<Space, double>& kinematics) {
-  has_sparse_choice_ =
-      sparse_ != nullptr && sparse_->AreIndependent(kinematics) && sparse_->Choose(kinematics);
-  if (has_sparse_choice_) return;
+  if (StartsSparsely(kinematics)) return;
+  sparse_.reset();
   MakeDense();
   dense_->Start(kinematics);
 }
 
-/// Without a sparse choice a run at another level than velocity may find one later.
 template <class Space>
 bool SparseOrDense<Space>::Review(const Kinematics<Space, double>& kinematics) {
-  constexpr double kReplaceBelow = DenseReduction<Space, double>::kReplaceBelow;
-  if (sparse_ == nullptr || (at_velocity_ && !has_sparse_choice_)) {
-    return dense_->Review(kinematics);
-  }
-  if (at_velocity_) return sparse_->ChooseAgain(kinematics, kReplaceBelow);
-  const bool independent = sparse_->AreIndependent(kinematics);
-  if (has_sparse_choice_) return independent && sparse_->ChooseAgain(kinematics, kReplaceBelow);
-  has_sparse_choice_ = independent && sparse_->Choose(kinematics);
-  return has_sparse_choice_ || dense_->Review(kinematics);
+  if (sparse_ == nullptr) return dense_->Review(kinematics);
+  return at_velocity_ &&
+         sparse_->ChooseAgain(kinematics, DenseReduction<Space, double>::kReplaceBelow);
 }
 
 template <class Space>
 Outcome SparseOrDense<Space>::Factor(const Kinematics<Space, double>& kinematics) {
   is_sparse_ = false;
-  if (has_sparse_choice_) {
-    this->conditioning_ = {.rank = LoopRank(mechanism_, 0)};
+  if (sparse_ != nullptr) {
+    Conditioning& found = this->conditioning_;
+    found = {.rank = LoopRank(mechanism_, 0)};
     if (at_velocity_ || sparse_->AreIndependent(kinematics)) {
-      this->conditioning_.rcond = sparse_->Factor(kinematics);
+      found.rcond = sparse_->Factor(kinematics);
       // a pivot below a few eps of the largest is round-off of the elimination
-      is_sparse_ = this->conditioning_.rcond > 16 * std::numeric_limits<double>::epsilon();
+      is_sparse_ = found.rcond > 16 * std::numeric_limits<double>::epsilon();
       if (is_sparse_) return Outcome::kFinished;
+      if (at_velocity_) return Outcome::kSingular;
     }
-    if (at_velocity_ || dense_ == nullptr) return Outcome::kSingular;
+    if (dense_ == nullptr) {
+      found.rcond = sparse_->response().rcond();
+      found.worst_joint = sparse_->response().worst_joint();
+      return sparse_->response().IsFinite() ? Outcome::kSingular : Outcome::kNonFinite;
+    }
   }
   const Outcome outcome = dense_->Factor(kinematics);
   this->conditioning_ = dense_->conditioning();
@@ -89,19 +98,18 @@ Outcome SparseOrDense<Space>::Factor(const Kinematics<Space, double>& kinematics
 template <class Space>
 std::string SparseOrDense<Space>::WhySingular() const {
   if (at_velocity_ || dense_ != nullptr) return {};
-  return "rank is in doubt, and the dense matrices that would decide it are too large: " +
+  const int joint = this->conditioning_.worst_joint;
+  return "rank is in doubt" +
+         (joint < 0 ? std::string() : " at joint \"" + mechanism_.joint_names()[joint] + '"') +
+         ", and the dense matrices that would decide it are too large: " +
          std::to_string(mechanism_.num_rows()) + " constraints and " +
          std::to_string(mechanism_.num_u()) + " speeds";
 }
 
 template <class Space>
-const std::vector<int>& SparseOrDense<Space>::independent() const {
-  return has_sparse_choice_ ? sparse_->choice().independent : dense_->independent();
-}
-
-template <class Space>
 const std::vector<int>* SparseOrDense<Space>::CarriedSpeeds() const {
-  return at_velocity_ ? &independent() : nullptr;
+  if (!at_velocity_) return nullptr;
+  return sparse_ != nullptr ? &sparse_->independent() : dense_->CarriedSpeeds();
 }
 
 template <class Space>
@@ -114,10 +122,14 @@ bool SparseOrDense<Space>::CompleteSpeeds(Kinematics<Space, double>& kinematics,
   return true;
 }
 
+/// At level velocity the speeds that the state carries stay. Elsewhere it is the smallest change in
+/// the metric M: any other does work along the free directions, and where dependent speeds hardly
+/// follow from the constraints much of it.
 template <class Space>
 void SparseOrDense<Space>::Correct(const VectorX<double>& target, VectorX<double>& x) {
   if (!is_sparse_) return dense_->Correct(target, x);
-  sparse_->Dependent(target, x);
+  if (at_velocity_) return sparse_->Dependent(target, x);
+  sparse_->Solve({}, target, x);
 }
 
 template <class Space>

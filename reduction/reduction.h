@@ -3,8 +3,9 @@
 // redundant constraints, and decide and soften where rank is in doubt.
 //
 // At level velocity the state carries the independent speeds: what the start chose stays sparse or
-// dense for the whole run, and J_D is judged by its pivots alone. At all other levels each position
-// is judged by all joints' pivots before the sparse factors are trusted with it.
+// dense for the whole run, and J_D is judged by its pivots alone. At all other levels nothing hangs
+// on which speeds are dependent: each position is judged by all joints' pivots, and has the choice
+// that is best there, or dense matrices.
 #pragma once
 
 #include <memory>
@@ -14,9 +15,6 @@
 #include "reduction/sparse_partition.h"
 
 namespace loopbench::reduction {
-
-/// kSparse takes sparse factors wherever there are some, for tests.
-enum class Matrices { kLessWork, kSparse };
 
 template <class Space>
 class SparseOrDense final : public ConstraintSolver<Space, double> {
@@ -37,18 +35,18 @@ class SparseOrDense final : public ConstraintSolver<Space, double> {
 
   /// Whether the last Factor() was sparse.
   bool is_sparse() const { return is_sparse_; }
-  /// Indices into u, ascending.
-  const std::vector<int>& independent() const;
 
  private:
   void MakeDense();
+  /// Whether sparse factors leave nothing to dense matrices from the start on.
+  bool StartsSparsely(const Kinematics<Space, double>& kinematics);
 
   const Mechanism<Space, double>& mechanism_;
   FormulationOptions options_;
   bool at_velocity_;
   std::unique_ptr<SparsePartition<Space>> sparse_;        ///< null where it is not less work
-  std::unique_ptr<DenseReduction<Space, double>> dense_;  ///< null where too large to keep ready
-  bool has_sparse_choice_;                                ///< since Start() or Review()
+  std::unique_ptr<DenseReduction<Space, double>> dense_;  ///< null until needed, if too large
+  bool may_decline_ = false;  ///< the fill of sparse factors, for dense matrices
   bool is_sparse_ = false;
   VectorX<double> zero_, bias_;
 };

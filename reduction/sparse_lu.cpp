@@ -46,7 +46,7 @@ SparseLu::SparseLu(int num_rows, std::vector<int> start, std::vector<int> rows)
       weights_(num_rows),
       marks_(num_rows, 0) {
   for (int i = 0; i < num_rows; ++i) weights_[i] = 1.0 - kFromFirstToLast * i / num_rows;
-  for (std::vector<int>* list : {&reached_, &candidates_, &path_, &next_}) list->reserve(num_rows);
+  for (std::vector<int>* list : {&reached_, &open_, &path_, &next_}) list->reserve(num_rows);
 }
 
 /// Depth first from `row`, without recursion: its column of L, and those that this one reaches.
@@ -54,7 +54,7 @@ void SparseLu::Visit(int row) {
   if (marks_[row] == mark_) return;
   marks_[row] = mark_;
   if (step_of_row_[row] < 0) {
-    candidates_.push_back(row);
+    open_.push_back(row);
     return;
   }
   path_.assign(1, step_of_row_[row]);
@@ -68,7 +68,7 @@ void SparseLu::Visit(int row) {
       if (marks_[reached] == mark_) continue;
       marks_[reached] = mark_;
       if (step_of_row_[reached] < 0) {
-        candidates_.push_back(reached);
+        open_.push_back(reached);
       } else {
         deeper = step_of_row_[reached];
       }
@@ -84,19 +84,16 @@ void SparseLu::Visit(int row) {
   }
 }
 
-void SparseLu::Reach(int column, std::span<const char> left_out) {
+void SparseLu::Reach(int column) {
   ++mark_;
   reached_.clear();
-  candidates_.clear();
-  for (int e = start_[column]; e < start_[column + 1]; ++e) {
-    if (left_out.empty() || !left_out[rows_[e]]) Visit(rows_[e]);
-  }
+  open_.clear();
+  for (int e = start_[column]; e < start_[column + 1]; ++e) Visit(rows_[e]);
   // a column acts before those that it reaches
   std::ranges::reverse(reached_);
 }
 
-bool SparseLu::Factor(std::span<const double> values, std::span<const char> left_out) {
-  const bool is_first = L_.capacity() == 0;
+bool SparseLu::Factor(std::span<const double> values, std::span<const char> barred) {
   L_.clear();
   U_.clear();
   std::ranges::fill(step_of_row_, -1);
@@ -104,9 +101,10 @@ bool SparseLu::Factor(std::span<const double> values, std::span<const char> left
   double least = std::numeric_limits<double>::infinity(), most = 0.0;
   for (int k = 0; k < columns(); ++k) {
     const int column = order_[k];
-    Reach(column, left_out);
+    Reach(column);
     for (int e = start_[column]; e < start_[column + 1]; ++e) {
-      if (left_out.empty() || !left_out[rows_[e]]) x_[rows_[e]] = values[e];
+      x_[rows_[e]] = values[e];
+      most = std::max(most, std::abs(values[e]));
     }
     for (const int step : reached_) {
       const double u = std::exchange(x_[pivots_[step]], 0.0);
@@ -116,21 +114,21 @@ bool SparseLu::Factor(std::span<const double> values, std::span<const char> left
     }
     int pivot = -1;
     double best = 0.0;
-    for (const int row : candidates_) {
+    for (const int row : open_) {
+      if (!barred.empty() && barred[row]) continue;
       const double size = weights_[row] * std::abs(x_[row]);
-      // of those not finite none is larger, and all must be cleared
       if (size > best || (size == best && pivot >= 0 && row < pivot)) {
         best = size;
         pivot = row;
       }
     }
     const double value = pivot < 0 ? 0.0 : x_[pivot];
-    for (const int row : candidates_) {
+    for (const int row : open_) {
       const double x = std::exchange(x_[row], 0.0);
       if (row != pivot && pivot >= 0) L_.push_back({row, x / value});
     }
     if (pivot < 0 || !std::isfinite(value)) return false;
-    operations_ += static_cast<double>(candidates_.size());
+    operations_ += static_cast<double>(open_.size());
     pivots_[k] = pivot;
     step_of_row_[pivot] = k;
     diagonal_[k] = value;
@@ -139,7 +137,8 @@ bool SparseLu::Factor(std::span<const double> values, std::span<const char> left
     least = std::min(least, std::abs(value));
     most = std::max(most, std::abs(value));
   }
-  if (is_first) {
+  if (!has_room_) {
+    has_room_ = true;
     L_.reserve(2 * L_.size() + 64);
     U_.reserve(2 * U_.size() + 64);
   }
@@ -147,25 +146,20 @@ bool SparseLu::Factor(std::span<const double> values, std::span<const char> left
   return true;
 }
 
-void SparseLu::SolveTransposed(double* R, double* X, int count) const {
-  const auto subtract = [count](double factor, const double* from, double* to) {
-    for (int i = 0; i < count; ++i) to[i] -= factor * from[i];
-  };
-  // U^T Y = Q^T R: row k of Y in the place of R's row order_[k]
+void SparseLu::SolveTransposed(double* r, double* x) const {
+  // U^T y = Q^T r, y of step k in the place of r's column order_[k]
   for (int k = 0; k < columns(); ++k) {
-    double* y = R + static_cast<std::ptrdiff_t>(order_[k]) * count;
-    for (int e = U_start_[k]; e < U_start_[k + 1]; ++e) {
-      subtract(U_[e].value, R + static_cast<std::ptrdiff_t>(order_[U_[e].index]) * count, y);
-    }
-    for (int i = 0; i < count; ++i) y[i] /= diagonal_[k];
+    double y = r[order_[k]];
+    for (int e = U_start_[k]; e < U_start_[k + 1]; ++e) y -= U_[e].value * r[order_[U_[e].index]];
+    r[order_[k]] = y / diagonal_[k];
   }
-  // L^T P X = Y, from the last pivot to the first
+  // L_D^T x = y, from the last pivot to the first
   for (int k = columns() - 1; k >= 0; --k) {
-    double* y = R + static_cast<std::ptrdiff_t>(order_[k]) * count;
+    double y = r[order_[k]];
     for (int e = L_start_[k]; e < L_start_[k + 1]; ++e) {
-      subtract(L_[e].value, X + static_cast<std::ptrdiff_t>(L_[e].index) * count, y);
+      if (IsPivot(L_[e].index)) y -= L_[e].value * x[L_[e].index];
     }
-    std::copy_n(y, count, X + static_cast<std::ptrdiff_t>(pivots_[k]) * count);
+    x[pivots_[k]] = y;
   }
 }
 
@@ -178,6 +172,24 @@ void SparseLu::Solve(double* y, double* x) const {
   for (int k = columns() - 1; k >= 0; --k) {
     const double z = x[order_[k]] /= diagonal_[k];
     for (int e = U_start_[k]; e < U_start_[k + 1]; ++e) x[order_[U_[e].index]] -= U_[e].value * z;
+  }
+}
+
+/// B_D = -L_D^-T L_I^T, from the last pivot to the first.
+void SparseLu::Dependencies(std::span<const int> place, double* B, int count) const {
+  const auto row_of = [&](int row) { return B + static_cast<std::ptrdiff_t>(row) * count; };
+  for (int k = columns() - 1; k >= 0; --k) {
+    double* b = row_of(pivots_[k]);
+    std::fill_n(b, count, 0.0);
+    for (int e = L_start_[k]; e < L_start_[k + 1]; ++e) {
+      const auto& [row, value] = L_[e];
+      if (!IsPivot(row)) {
+        b[place[row]] -= value;
+        continue;
+      }
+      const double* from = row_of(row);
+      for (int i = 0; i < count; ++i) b[i] -= value * from[i];
+    }
   }
 }
 

@@ -1,11 +1,11 @@
-// P A Q = L U of a tall sparse matrix: which of its rows to solve for, and how.
+// P A Q = L U of a tall sparse matrix: which of its rows all others follow from, and how.
 //
 // A has at least as many rows as columns. Partial pivoting takes one row for each column, the one
 // that the elimination leaves largest, so |L| <= 1 and the pivots are as good a choice of rows as
-// such an elimination knows. Factors of the chosen rows alone come from the same function. Column
-// by column from the left, in time proportional to the multiply-adds: Gilbert and Peierls, SIAM J.
-// Sci. Stat. Comput. 9 (1988) 862. Columns are taken in the order that bounds the fill of A^T A
-// (COLAMD).
+// such an elimination knows; or pivots come from a choice made before. With D the rows of pivots
+// and I all others, A_I = L_I L_D^-1 A_D. Column by column from the left, in time proportional to
+// the multiply-adds: Gilbert and Peierls, SIAM J. Sci. Stat. Comput. 9 (1988) 862. Columns are
+// taken in the order that bounds the fill of A^T A (COLAMD).
 //
 // Eigen's SparseLU has square matrices and allocates for each; KLU could keep a first pivot order,
 // which may pass through zero between two reviews, or allocate for another.
@@ -24,24 +24,31 @@ class SparseLu {
   SparseLu(int num_rows, std::vector<int> start, std::vector<int> rows);
 
   int columns() const { return static_cast<int>(start_.size()) - 1; }
+  /// The pattern as it was given.
+  const std::vector<int>& start() const { return start_; }
+  const std::vector<int>& rows() const { return rows_; }
 
-  /// Factors of A, whose numbers are in the order of the pattern, without the rows that `left_out`
-  /// names by a non-zero (empty: of all rows). False where a column has no pivot, or one that is
-  /// not finite. Allocates only where other pivots need twice the memory that the first ones did.
-  bool Factor(std::span<const double> values, std::span<const char> left_out = {});
+  /// Factors of A, whose numbers are in the order of the pattern. Rows that `barred` names by a
+  /// non-zero are no pivots (empty: all may be). False where a column has no pivot, or one that is
+  /// not finite. Allocates the first time, and where other pivots fill more than twice as much.
+  bool Factor(std::span<const double> values, std::span<const char> barred = {});
 
   /// The row of each pivot, in the order of elimination.
   std::span<const int> pivots() const { return pivots_; }
-  /// Ratio of the extreme pivots, 0 after a failure.
+  bool IsPivot(int row) const { return step_of_row_[row] >= 0; }
+  /// The least pivot as a part of the largest number of A, barred rows included, or of a larger
+  /// pivot; 0 after a failure.
   double rcond() const { return rcond_; }
   /// Multiply-adds of the last Factor().
   double operations() const { return operations_; }
 
-  /// After a Factor() of as many rows as columns, D: A_D^T X = R for `count` right-hand sides side
-  /// by side. R (columns x count, row by row) is lost; of X (rows x count) other rows than D stay.
-  void SolveTransposed(double* R, double* X, int count) const;
-  /// The same of A_D x = y: of `y` (by row) those of D are lost; x by column.
+  /// A_D^T x = r. r (by column) is lost; of x (by row) those of I stay as they are.
+  void SolveTransposed(double* r, double* x) const;
+  /// A_D x = y. y (by row) is lost; x by column.
   void Solve(double* y, double* x) const;
+  /// Rows D of B = -(A_D^T)^-1 A_I^T, of which row `row` is `B[row * count]` and what follows, and
+  /// the column of a row of I is `place[row]`.
+  void Dependencies(std::span<const int> place, double* B, int count) const;
 
  private:
   struct Entry {
@@ -51,7 +58,7 @@ class SparseLu {
 
   /// Columns of L that reach column k, in the order in which they act, and the rows that it may
   /// take its pivot from.
-  void Reach(int column, std::span<const char> left_out);
+  void Reach(int column);
   void Visit(int row);
 
   std::vector<int> start_, rows_, order_;
@@ -60,10 +67,11 @@ class SparseLu {
   std::vector<double> diagonal_;        ///< of U
   std::vector<int> pivots_, step_of_row_;
   std::vector<double> x_, weights_;
-  std::vector<int> reached_, candidates_, path_, next_;
+  std::vector<int> reached_, open_, path_, next_;
   std::vector<long> marks_;
   long mark_ = 0;
   double rcond_ = 0.0, operations_ = 0.0;
+  bool has_room_ = false;
 };
 
 }  // namespace loopbench::reduction

@@ -2,81 +2,120 @@
 #include "reduction/sparse_partition.h"
 
 #include <algorithm>
+#include <limits>
+#include <string>
 #include <utility>
 
 #include "mechanism/loops/loop_speeds.h"
+#include "mechanism/model/dense_memory.h"
 
 namespace loopbench::reduction {
 
 namespace {
 
-/// Which speeds move the two sides of each cut joint against each other, by row of J.
+/// Entries of J beyond which it is not sparse: numbers and places take 2.4 GB.
+constexpr double kMostEntries = 2e8;
+
+/// How many speeds move the two sides of a cut joint against each other.
 template <class Space>
-void Pattern(const Mechanism<Space, double>& mechanism, std::vector<int>* start,
-             std::vector<int>* speeds) {
-  Kinematics<Space, double> anywhere(mechanism);
-  start->assign(1, 0);
+int LengthOfLoop(const Kinematics<Space, double>& anywhere, int index) {
+  int length = 0;
+  ForEachSpeedOfLoop(anywhere, index, [&](int, const Velocity<Space, double>&) { ++length; });
+  return length;
+}
+
+double EntriesOf(const auto& mechanism, const auto& anywhere) {
+  double entries = 0.0;
   for (const int index : mechanism.constraints()) {
-    std::vector<int> of_loop;
-    ForEachSpeedOfLoop(anywhere, index, [&](int speed, const Velocity<Space, double>&) {
-      of_loop.push_back(speed);
-    });
+    entries += static_cast<double>(LengthOfLoop(anywhere, index)) *
+               mechanism.joints()[index].num_constraints();
+  }
+  return entries;
+}
+
+/// The pattern of J^T: a column for each row of J.
+template <class Space>
+SparseLu WithPattern(const Mechanism<Space, double>& mechanism,
+                     const Kinematics<Space, double>& anywhere) {
+  std::vector<int> start(1, 0), speeds;
+  for (const int index : mechanism.constraints()) {
     for (int r = 0; r < mechanism.joints()[index].num_constraints(); ++r) {
-      speeds->insert(speeds->end(), of_loop.begin(), of_loop.end());
-      start->push_back(static_cast<int>(speeds->size()));
+      ForEachSpeedOfLoop(anywhere, index, [&](int speed, const Velocity<Space, double>&) {
+        speeds.push_back(speed);
+      });
+      start.push_back(static_cast<int>(speeds.size()));
     }
   }
+  return {mechanism.num_u(), std::move(start), std::move(speeds)};
 }
 
 /// Multiply-adds of the dense matrices: M, J_D, B and B^T M B.
-double DenseWork(double n, double r, double f) {
+double DenseWork(double n, double r) {
+  const double f = n - r;
   return n * n + r * r * r / 3.0 + r * r * f + n * n * f + n * f * f;
 }
 
-/// The same of sparse ones for so many entries of J, in units of dense ones: measured on ladders,
-/// of which both are as fast at some seven windows.
+/// The same of sparse ones, in units of dense ones: measured on ladders, of which both are as fast
+/// at some eight windows at level velocity and eighteen at the others.
 template <class Space>
-double SparseWork(double entries, double bodies, double f) {
-  return entries * (50.0 + 5.0 * f) + bodies * (50.0 * (1.0 + f) + Space::kDim * f * f);
+double SparseWork(double entries, const JointResponse<Space>* judge, double bodies, double f) {
+  return entries * (25.0 + 2.5 * f) + bodies * (25.0 * (1.0 + f) + Space::kDim * f * f) +
+         (judge != nullptr ? 8.0 * judge->operations() : 0.0);
 }
 
 }  // namespace
 
 template <class Space>
 std::unique_ptr<SparsePartition<Space>> SparsePartition<Space>::Make(
-    const Mechanism<Space, double>& mechanism, bool always) {
-  const int n = mechanism.num_u(), m = mechanism.num_rows();
-  if (m == 0 || m > n) return nullptr;
-  std::vector<int> start, speeds;
-  Pattern(mechanism, &start, &speeds);
-  const double sparse =
-      SparseWork<Space>(static_cast<double>(speeds.size()), mechanism.num_bodies(), n - m);
-  if (!always && sparse > DenseWork(n, m, n - m)) return nullptr;
+    const Mechanism<Space, double>& mechanism, Choice choice, Matrices matrices) {
+  const double n = mechanism.num_u(), m = mechanism.num_rows(), f = n - m;
+  if (m == 0 || f < 0) return nullptr;
+  const Kinematics<Space, double> anywhere(mechanism);
+  const double entries = EntriesOf(mechanism, anywhere), bodies = mechanism.num_bodies();
+  const auto is_less = [&](const JointResponse<Space>* judge) {
+    return matrices == Matrices::kSparse ||
+           SparseWork<Space>(entries, judge, bodies, f) < DenseWork(n, m);
+  };
+  if (entries > kMostEntries || !is_less(nullptr)) return nullptr;
   auto response = JointResponse<Space>::Make(mechanism, kMostOfResponse);
   if (response == nullptr) return nullptr;
-  return std::unique_ptr<SparsePartition>(
-      new SparsePartition(mechanism, std::move(start), std::move(speeds), std::move(response)));
+  // at level velocity it judges the start alone
+  if (choice == Choice::kFree && !is_less(response.get())) return nullptr;
+  RequireDense(mechanism.name() + ": reduction to " +
+                   std::to_string(mechanism.num_u() - mechanism.num_rows()) +
+                   " independent speeds of " + std::to_string(mechanism.num_u()),
+               n * f + Space::kDim * bodies * (2.0 * f + 1.0) + f * f);
+  return std::unique_ptr<SparsePartition>(new SparsePartition(
+      mechanism, WithPattern(mechanism, anywhere), choice, std::move(response)));
 }
 
 template <class Space>
-SparsePartition<Space>::SparsePartition(const Mechanism<Space, double>& mechanism,
-                                        std::vector<int> start, std::vector<int> speeds,
+SparsePartition<Space>::SparsePartition(const Mechanism<Space, double>& mechanism, SparseLu lu,
+                                        Choice choice,
                                         std::unique_ptr<JointResponse<Space>> response)
     : mechanism_(mechanism),
       response_(std::move(response)),
       dynamics_(mechanism),
-      start_(std::move(start)),
-      speeds_(std::move(speeds)),
-      J_(speeds_.size()),
-      best_(mechanism.num_u(), start_, speeds_),
-      lu_(best_),
-      is_independent_(mechanism.num_u()),
+      J_(lu.rows().size()),
+      lu_(std::move(lu)),
+      is_independent_(choice == Choice::kKept ? mechanism.num_u() : 0),
       place_(mechanism.num_u()),
       motions_(mechanism.num_bodies()),
       c_(VectorX<double>::Zero(mechanism.num_u())),
       column_(c_),
       residual_(c_),
-      rows_(mechanism.num_rows()) {}
+      rows_(mechanism.num_rows()) {
+  if (choice == Choice::kKept) best_ = std::make_unique<SparseLu>(lu_);
+  const Eigen::Index n = mechanism.num_u(), f = n - mechanism.num_rows();
+  const Eigen::Index motions = Space::kDim * mechanism.num_bodies();
+  independent_.reserve(f);
+  B_.setZero(n, f);
+  V_.setZero(motions, f + 1);
+  MV_.setZero(motions, f);
+  reduced_.setZero(f, f);
+  z_.setZero(f);
+  if (f > 0) reduced_factor_.compute(MatrixX<double>::Identity(f, f).eval());
+}
 
 /// Rows of J as TreeDynamics::Jacobian() has them, in the order of the pattern.
 template <class Space>
@@ -87,40 +126,30 @@ void SparsePartition<Space>::FillJacobian(const Kinematics<Space, double>& kinem
     const int count = joint.num_constraints();
     int entry = 0;
     ForEachSpeedOfLoop(kinematics, index, [&](int, const Velocity<Space, double>& V) {
-      for (int r = 0; r < count; ++r) J_[start_[joint.row + r] + entry] = state.D(r).dot(V);
+      for (int r = 0; r < count; ++r) J_[lu_.start()[joint.row + r] + entry] = state.D(r).dot(V);
       ++entry;
     });
   }
 }
 
 template <class Space>
-void SparsePartition<Space>::Adopt(std::span<const int> pivots) {
-  choice_.dependent.assign(pivots.begin(), pivots.end());
-  std::ranges::sort(choice_.dependent);
-  std::ranges::fill(is_independent_, 1);
-  for (const int speed : choice_.dependent) is_independent_[speed] = 0;
-  choice_.independent.clear();
+void SparsePartition<Space>::SetIndependent() {
+  independent_.clear();
   for (int speed = 0; speed < mechanism_.num_u(); ++speed) {
-    if (!is_independent_[speed]) continue;
-    place_[speed] = static_cast<int>(choice_.independent.size());
-    choice_.independent.push_back(speed);
+    if (lu_.IsPivot(speed)) continue;
+    place_[speed] = static_cast<int>(independent_.size());
+    independent_.push_back(speed);
   }
-  const Eigen::Index n = mechanism_.num_u(), f = n - mechanism_.num_rows();
-  const Eigen::Index motions = Space::kDim * mechanism_.num_bodies();
-  B_.setZero(n, f);
-  right_.setZero(mechanism_.num_rows(), f);
-  V_.setZero(motions, f + 1);
-  MV_.setZero(motions, f);
-  reduced_.setZero(f, f);
-  z_.setZero(f);
-  if (f > 0) reduced_factor_.compute(MatrixX<double>::Identity(f, f).eval());
 }
 
 template <class Space>
 bool SparsePartition<Space>::Choose(const Kinematics<Space, double>& kinematics) {
   FillJacobian(kinematics);
-  if (!best_.Factor(J_)) return false;
-  Adopt(best_.pivots());
+  std::ranges::fill(is_independent_, 0);
+  if (!lu_.Factor(J_)) return false;
+  SetIndependent();
+  if (best_ == nullptr) return true;
+  for (const int speed : independent_) is_independent_[speed] = 1;
   return true;
 }
 
@@ -128,10 +157,15 @@ template <class Space>
 bool SparsePartition<Space>::ChooseAgain(const Kinematics<Space, double>& kinematics,
                                          double share) {
   FillJacobian(kinematics);
-  if (!best_.Factor(J_)) return false;
-  if (lu_.Factor(J_, is_independent_) && lu_.rcond() >= share * best_.rcond()) return false;
-  Adopt(best_.pivots());
-  return true;
+  if (!best_->Factor(J_)) return false;
+  if (lu_.Factor(J_, is_independent_) && lu_.rcond() >= share * best_->rcond()) return false;
+  return Choose(kinematics);
+}
+
+template <class Space>
+bool SparsePartition<Space>::IsLessWork() const {
+  // as in SparseWork(): what stands beside the entries themselves
+  return 5.0 * lu_.operations() < DenseWork(mechanism_.num_u(), mechanism_.num_rows());
 }
 
 template <class Space>
@@ -140,17 +174,15 @@ double SparsePartition<Space>::Factor(const Kinematics<Space, double>& kinematic
   mass_is_current_ = false;
   FillJacobian(kinematics);
   if (!lu_.Factor(J_, is_independent_)) return 0.0;
-  const int f = static_cast<int>(choice_.independent.size());
-  if (f == 0) return lu_.rcond();
+  if (best_ == nullptr) SetIndependent();
   // B of (2), in the order of u
-  right_.setZero();
-  for (int row = 0; row < mechanism_.num_rows(); ++row) {
-    for (int e = start_[row]; e < start_[row + 1]; ++e) {
-      if (is_independent_[speeds_[e]]) right_(row, place_[speeds_[e]]) = -J_[e];
-    }
+  const int f = static_cast<int>(independent_.size());
+  if (f == 0) return lu_.rcond();
+  lu_.Dependencies(place_, B_.data(), f);
+  for (int i = 0; i < f; ++i) {
+    B_.row(independent_[i]).setZero();
+    B_(independent_[i], i) = 1.0;
   }
-  lu_.SolveTransposed(right_.data(), B_.data(), f);
-  for (int i = 0; i < f; ++i) B_(choice_.independent[i], i) = 1.0;
   return lu_.rcond();
 }
 
@@ -158,12 +190,12 @@ template <class Space>
 void SparsePartition<Space>::Dependent(const VectorX<double>& target, VectorX<double>& x) {
   rows_ = target;
   x.setZero(mechanism_.num_u());
-  lu_.SolveTransposed(rows_.data(), x.data(), 1);
+  lu_.SolveTransposed(rows_.data(), x.data());
 }
 
 template <class Space>
 void SparsePartition<Space>::CompleteSpeeds(const VectorX<double>* bias, VectorX<double>& u) {
-  for (std::size_t i = 0; i < choice_.independent.size(); ++i) z_[i] = u[choice_.independent[i]];
+  for (std::size_t i = 0; i < independent_.size(); ++i) z_[i] = u[independent_[i]];
   u.noalias() = B_ * z_;
   if (bias == nullptr) return;
   Dependent(*bias, c_);
@@ -182,7 +214,7 @@ template <class Space>
 void SparsePartition<Space>::FactorMass() {
   if (mass_is_current_) return;
   mass_is_current_ = true;
-  const int f = static_cast<int>(choice_.independent.size());
+  const int f = static_cast<int>(independent_.size());
   for (int i = 0; i < f; ++i) {
     column_ = B_.col(i);
     SetMotions(column_, i);
@@ -204,9 +236,13 @@ void SparsePartition<Space>::Solve(const VectorX<double>& force, const VectorX<d
                                    VectorX<double>& x) {
   Dependent(target, c_);
   x = c_;
-  const int f = static_cast<int>(choice_.independent.size());
+  const int f = static_cast<int>(independent_.size());
   if (f == 0) return;
   FactorMass();
+  if (reduced_factor_.info() != Eigen::Success) {
+    x.setConstant(std::numeric_limits<double>::quiet_NaN());
+    return;
+  }
   SetMotions(c_, f);
   z_.setZero();
   z_.noalias() -= MV_.transpose() * V_.col(f);

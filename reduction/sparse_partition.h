@@ -23,19 +23,23 @@
 
 namespace loopbench::reduction {
 
-/// Speeds by what becomes of them, indices into u, ascending.
-struct Choice {
-  std::vector<int> dependent, independent;
-};
+/// kSparse takes sparse factors wherever there are some, for tests.
+enum class Matrices { kLessWork, kSparse };
+
+/// Which speeds are dependent: the choice of the last Choose() or ChooseAgain(), or the best at
+/// each position, where nothing hangs on the choice.
+enum class Choice { kKept, kFree };
 
 template <class Space>
 class SparsePartition {
  public:
-  /// Null where constraints must be dependent, or dense matrices are less work (unless `always`).
-  /// `mechanism` must outlive this.
+  /// Null where constraints must be dependent, or dense matrices are less work. `mechanism` must
+  /// outlive this. Throws TooDense (dense_memory.h).
   static std::unique_ptr<SparsePartition> Make(const Mechanism<Space, double>& mechanism,
-                                               bool always);
+                                               Choice choice, Matrices matrices);
 
+  /// The judge of positions.
+  JointResponse<Space>& response() { return *response_; }
   /// Whether all constraints are independent at this position, beyond doubt.
   bool AreIndependent(const Kinematics<Space, double>& kinematics) {
     return response_->Factor(kinematics, Masses::kGeometric);
@@ -44,10 +48,13 @@ class SparsePartition {
   /// Takes the dependent speeds that are best at these positions. False where there are none for
   /// each constraint.
   bool Choose(const Kinematics<Space, double>& kinematics);
-  /// The same where the present ones have a reciprocal condition below `share` of the best; whether
+  /// The same where the kept ones have a reciprocal condition below `share` of the best; whether
   /// they were replaced.
   bool ChooseAgain(const Kinematics<Space, double>& kinematics, double share);
-  const Choice& choice() const { return choice_; }
+  /// Whether it is, with the fill of the last choice, which nobody knows before.
+  bool IsLessWork() const;
+  /// Indices into u, ascending.
+  const std::vector<int>& independent() const { return independent_; }
 
   /// J_D = factors, and B. Its reciprocal condition, 0 where it has no factors.
   double Factor(const Kinematics<Space, double>& kinematics);
@@ -55,7 +62,8 @@ class SparsePartition {
   void Dependent(const VectorX<double>& target, VectorX<double>& x);
   /// (1): u = B u_I, less J_D^-1 b where `bias` is not null.
   void CompleteSpeeds(const VectorX<double>* bias, VectorX<double>& u);
-  /// (2) and (3) with `force` (empty: zero) in the place of -h and `target` in that of gamma.
+  /// (2) and (3) with `force` (empty: zero) in the place of -h and `target` in that of gamma; not
+  /// finite where B^T M B is not positive definite.
   void Solve(const VectorX<double>& force, const VectorX<double>& target, VectorX<double>& x);
   /// lambda of J_D^T lambda = (M x - force)_D.
   void Multipliers(const VectorX<double>& force, const VectorX<double>& x, VectorX<double>& lambda);
@@ -63,11 +71,12 @@ class SparsePartition {
  private:
   using Columns = Eigen::Matrix<double, Eigen::Dynamic, Eigen::Dynamic, Eigen::RowMajor>;
 
-  SparsePartition(const Mechanism<Space, double>& mechanism, std::vector<int> start,
-                  std::vector<int> speeds, std::unique_ptr<JointResponse<Space>> response);
+  SparsePartition(const Mechanism<Space, double>& mechanism, SparseLu lu, Choice choice,
+                  std::unique_ptr<JointResponse<Space>> response);
 
   void FillJacobian(const Kinematics<Space, double>& kinematics);
-  void Adopt(std::span<const int> pivots);
+  /// The lists of what is independent, from the pivots of lu_.
+  void SetIndependent();
   /// B^T M B of (3), once per position.
   void FactorMass();
   /// Motions of all bodies for the speeds x, in column `index` of V_.
@@ -77,13 +86,13 @@ class SparsePartition {
   std::unique_ptr<JointResponse<Space>> response_;
   TreeDynamics<Space, double> dynamics_;
   const Kinematics<Space, double>* kinematics_ = nullptr;  ///< of the last Factor()
-  std::vector<int> start_, speeds_;                        ///< pattern of J by constraint
-  std::vector<double> J_;
-  SparseLu best_, lu_;
-  Choice choice_;
-  std::vector<char> is_independent_;  ///< by speed
+  std::vector<double> J_;                                  ///< in the order of lu_'s pattern
+  SparseLu lu_;
+  std::unique_ptr<SparseLu> best_;  ///< null where the choice is free: lu_ is it
+  std::vector<int> independent_;
+  std::vector<char> is_independent_;  ///< by speed, of the choice that is kept
   std::vector<int> place_;            ///< of a speed among the independent ones
-  Columns B_, right_;                 ///< num_u x f, num_rows x f
+  Columns B_;                         ///< num_u x f
   MatrixX<double> V_, MV_, reduced_;  ///< a column for each of B and one for c
   Eigen::LLT<MatrixX<double>> reduced_factor_;
   bool mass_is_current_ = false;

@@ -155,7 +155,7 @@ std::string WhyNoReference(const MechanismDescription& user, const ReferenceOpti
 }
 
 Reference MakeReference(const MechanismDescription& user, double horizon, double length,
-                        const ReferenceOptions& options) {
+                        const ReferenceOptions& options, WaysTried tried) {
   Reference empty;
   empty.scalar = options.scalar;
   for (int k = 0; k < options.points; ++k) {
@@ -170,7 +170,10 @@ Reference MakeReference(const MechanismDescription& user, double horizon, double
   const Measured measured{user, compiled};
   std::optional<Reference> furthest;
   double cpu_s = 0.0;
-  for (const Way& way : WaysOf(measured, options)) {
+  std::vector<Way> ways = WaysOf(measured, options);
+  if (tried == WaysTried::kCheapest) ways.resize(1);
+  if (tried == WaysTried::kFurthest) ways.erase(ways.begin(), ways.end() - 1);
+  for (const Way& way : ways) {
     Reference reference = empty;
     way(&reference);
     reference.trust_horizon = TrustHorizonOf(reference, length);

@@ -63,12 +63,12 @@ TEST(SparseLu, SolvesWithTheRowsThatItChose) {
       continue;
     }
     const std::vector<int> pivots(lu.pivots().begin(), lu.pivots().end());
-    std::vector<char> left_out(rows, 1);
-    for (const int pivot : pivots) left_out[pivot] = 0;
-    ASSERT_EQ(std::ranges::count(left_out, 0), columns) << "each column has a pivot of its own";
+    std::vector<char> barred(rows, 1);
+    for (const int pivot : pivots) barred[pivot] = 0;
+    ASSERT_EQ(std::ranges::count(barred, 0), columns) << "each column has a pivot of its own";
     const double rcond = lu.rcond();
-    ASSERT_TRUE(lu.Factor(sample.values, left_out));
-    EXPECT_TRUE(std::ranges::equal(lu.pivots(), pivots)) << "what is left out was not chosen";
+    ASSERT_TRUE(lu.Factor(sample.values, barred));
+    EXPECT_TRUE(std::ranges::equal(lu.pivots(), pivots)) << "what is barred was not chosen";
     EXPECT_EQ(lu.rcond(), rcond);
 
     Random random(seed);
@@ -77,19 +77,27 @@ TEST(SparseLu, SolvesWithTheRowsThatItChose) {
     const auto bound = [&](const MatrixX<double>& x) {
       return 100.0 * kEps * columns * A_D.norm() * x.norm();
     };
-    constexpr int kCount = 3;
-    using RowMajor = Eigen::Matrix<double, Eigen::Dynamic, Eigen::Dynamic, Eigen::RowMajor>;
-    RowMajor R(columns, kCount), X = RowMajor::Constant(rows, kCount, 7.0);
-    for (double& r : R.reshaped()) r = random.Uniform(-1.0, 1.0);
-    RowMajor lost = R;
-    lu.SolveTransposed(lost.data(), X.data(), kCount);
-    const MatrixX<double> X_D = RowsOf(X, pivots);
-    EXPECT_LE((A_D.transpose() * X_D - R).norm(), bound(X_D)) << seed;
+    VectorX<double> r(columns), solved = VectorX<double>::Constant(rows, 7.0);
+    for (double& value : r) value = random.Uniform(-1.0, 1.0);
+    VectorX<double> lost = r;
+    lu.SolveTransposed(lost.data(), solved.data());
+    const MatrixX<double> x_D = RowsOf(solved, pivots);
+    EXPECT_LE((A_D.transpose() * x_D - r).norm(), bound(x_D)) << seed;
+    std::vector<int> others, place(rows, -1);
     for (int row = 0; row < rows; ++row) {
-      if (left_out[row]) {
-        EXPECT_EQ(X(row, 0), 7.0) << "not a row that was asked for";
-      }
+      if (!barred[row]) continue;
+      EXPECT_EQ(solved[row], 7.0) << "not a row that was asked for";
+      place[row] = static_cast<int>(others.size());
+      others.push_back(row);
     }
+    const int count = static_cast<int>(others.size());
+    using RowMajor = Eigen::Matrix<double, Eigen::Dynamic, Eigen::Dynamic, Eigen::RowMajor>;
+    RowMajor B = RowMajor::Constant(rows, count, 7.0);
+    lu.Dependencies(place, B.data(), count);
+    const MatrixX<double> B_D = RowsOf(B, pivots);
+    EXPECT_LE((A_D.transpose() * B_D + RowsOf(sample.A, others).transpose()).norm(),
+              bound(B_D) + 100.0 * kEps * sample.A.norm())
+        << seed;
 
     VectorX<double> y(rows), x(columns);
     for (double& value : y) value = random.Uniform(-1.0, 1.0);
@@ -105,9 +113,10 @@ TEST(SparseLu, TakesTheLargestRow) {
   SparseLu lu(6, {0, 6}, {0, 1, 2, 3, 4, 5});
   ASSERT_TRUE(lu.Factor(column));
   EXPECT_EQ(lu.pivots()[0], 1);
-  const std::vector<char> left_out = {0, 1, 0, 0, 0, 0};
-  ASSERT_TRUE(lu.Factor(column, left_out));
+  const std::vector<char> barred = {0, 1, 0, 0, 0, 0};
+  ASSERT_TRUE(lu.Factor(column, barred));
   EXPECT_EQ(lu.pivots()[0], 5);
+  EXPECT_DOUBLE_EQ(lu.rcond(), 2.9 / 3.0) << "as a part of what it could be";
 }
 
 TEST(SparseLu, HasNoFactorsWithoutRank) {
@@ -124,9 +133,9 @@ TEST(SparseLu, HasNoFactorsWithoutRank) {
     std::fill_n(values.begin(), 4, bad);
     EXPECT_FALSE(lu.Factor(values));
   }
-  std::vector<char> left_out(8, 1);
-  left_out[0] = left_out[1] = 0;
-  EXPECT_FALSE(lu.Factor(sample.values, left_out)) << "fewer rows than columns";
+  std::vector<char> barred(8, 1);
+  barred[0] = barred[1] = 0;
+  EXPECT_FALSE(lu.Factor(sample.values, barred)) << "fewer rows than columns";
   ASSERT_TRUE(lu.Factor(sample.values)) << "nothing of that is left behind";
   const std::vector<int> pivots(lu.pivots().begin(), lu.pivots().end());
   SparseLu fresh(8, sample.start, sample.index);

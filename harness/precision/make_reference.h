@@ -19,8 +19,8 @@ namespace loopbench::harness {
 /// "" or why there can be no reference of this mechanism in that scalar, as a sentence's end.
 std::string WhyNoReference(const MechanismDescription& user, const ReferenceOptions& options);
 
-/// The cheapest way is tried first; another one, which gets further, where that one is not certified
-/// to the end.
+/// The cheapest way is tried first; another one, which gets further, where that one is not
+/// certified to the end.
 enum class WaysTried { kAll, kCheapest, kFurthest };
 
 /// The reference of a user's mechanism from 0 to `horizon` [s]. `length` [m] is what

@@ -47,7 +47,7 @@ class Estimate {
   struct Budget {
     double share = 0.1, least_s = 0.003, most_s = 2.0;  ///< of one pilot
     double usual_s = 4.0;  ///< of all pilots [s]: beyond it each may take less than most_s
-    double all_s = 1e9;  ///< wall time of all pilots [s]; what is asked for later is not known
+    double all_s = 1e9;    ///< wall time of all pilots [s]; what is asked for later is not known
   };
   /// `experiments` must outlive this.
   Estimate(const std::vector<Experiment>& experiments, const Budget& budget);

@@ -32,6 +32,7 @@ SparseOrDense<Space>::SparseOrDense(const Mechanism<Space, double>& mechanism,
     sparse_ = SparsePartition<Space>::Make(mechanism, at_velocity_ ? Choice::kKept : Choice::kFree,
                                            matrices);
   }
+  uses_sparse_ = sparse_ != nullptr;
   may_decline_ = matrices == Matrices::kLessWork && DenseNumbers(mechanism) <= kKeptReady;
   // for positions in doubt, which a right-hand side meets
   if (sparse_ == nullptr || (!at_velocity_ && DenseNumbers(mechanism) <= kKeptReady)) MakeDense();
@@ -58,15 +59,15 @@ bool SparseOrDense<Space>::StartsSparsely(const Kinematics<Space, double>& kinem
 
 template <class Space>
 void SparseOrDense<Space>::Start(const Kinematics<Space, double>& kinematics) {
-  if (StartsSparsely(kinematics)) return;
-  sparse_.reset();
+  uses_sparse_ = StartsSparsely(kinematics);
+  if (uses_sparse_) return;
   MakeDense();
   dense_->Start(kinematics);
 }
 
 template <class Space>
 bool SparseOrDense<Space>::Review(const Kinematics<Space, double>& kinematics) {
-  if (sparse_ == nullptr) return dense_->Review(kinematics);
+  if (!uses_sparse_) return dense_->Review(kinematics);
   return at_velocity_ &&
          sparse_->ChooseAgain(kinematics, DenseReduction<Space, double>::kReplaceBelow);
 }
@@ -74,7 +75,7 @@ bool SparseOrDense<Space>::Review(const Kinematics<Space, double>& kinematics) {
 template <class Space>
 Outcome SparseOrDense<Space>::Factor(const Kinematics<Space, double>& kinematics) {
   is_sparse_ = false;
-  if (sparse_ != nullptr) {
+  if (uses_sparse_) {
     Conditioning& found = this->conditioning_;
     found = {.rank = LoopRank(mechanism_, 0)};
     if (at_velocity_ || sparse_->AreIndependent(kinematics)) {
@@ -109,7 +110,7 @@ std::string SparseOrDense<Space>::WhySingular() const {
 template <class Space>
 const std::vector<int>* SparseOrDense<Space>::CarriedSpeeds() const {
   if (!at_velocity_) return nullptr;
-  return sparse_ != nullptr ? &sparse_->independent() : dense_->CarriedSpeeds();
+  return uses_sparse_ ? &sparse_->independent() : dense_->CarriedSpeeds();
 }
 
 template <class Space>

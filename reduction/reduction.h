@@ -46,6 +46,7 @@ class SparseOrDense final : public ConstraintSolver<Space, double> {
   bool at_velocity_;
   std::unique_ptr<SparsePartition<Space>> sparse_;        ///< null where it is not less work
   std::unique_ptr<DenseReduction<Space, double>> dense_;  ///< null until needed, if too large
+  bool uses_sparse_ = false;                              ///< since Start()
   bool may_decline_ = false;  ///< the fill of sparse factors, for dense matrices
   bool is_sparse_ = false;
   VectorX<double> zero_, bias_;

@@ -220,6 +220,8 @@ TEST(Reduction, StartsInASingularPositionAndGoesOnSparsely) {
   at_velocity.Start(0.0);
   EXPECT_EQ(at_velocity.Evaluate(1.0), Outcome::kFinished);
   EXPECT_FALSE(at_velocity.is_sparse()) << "the speeds that the state carries are the start's";
+  ASSERT_EQ(at_velocity.Start(1.0), Outcome::kFinished);
+  EXPECT_TRUE(at_velocity.is_sparse()) << "and another start has its own";
 }
 
 TEST(Reduction, IsSingularWhereDenseMatricesWouldBeTooLarge) {

@@ -9,10 +9,6 @@ namespace loopbench::lagrange {
 
 namespace {
 
-/// Numbers up to which dense matrices are kept ready for positions where sparse pivots leave rank
-/// in doubt: 160 MB.
-constexpr double kKeptReady = 2e7;
-
 /// Whether sparse factors take less time. Multiply-adds of the dense ones are of M, W, S and S's
 /// own. Measured on chains and ladders: one in small blocks costs four to ten in
 /// large matrices, which take 2000 to begin with.
@@ -67,13 +63,7 @@ Outcome Lagrange<Space, S>::Factor(const Kinematics<Space, S>& kinematics) {
 
 template <class Space, class S>
 std::string Lagrange<Space, S>::WhySingular() const {
-  if (dense_ != nullptr) return {};
-  const int joint = this->conditioning_.worst_joint;
-  return "rank is in doubt" +
-         (joint < 0 ? std::string() : " at joint \"" + mechanism_.joint_names()[joint] + '"') +
-         ", and the dense equations that would decide it are too large: " +
-         std::to_string(mechanism_.num_rows()) + " constraints and " +
-         std::to_string(mechanism_.num_u()) + " speeds";
+  return dense_ != nullptr ? std::string() : TooLargeToDecide(mechanism_, this->conditioning_);
 }
 
 template <class Space, class S>

@@ -8,9 +8,6 @@ namespace loopbench::reduction {
 
 namespace {
 
-/// Numbers up to which dense matrices are kept ready for positions where rank is in doubt: 160 MB.
-constexpr double kKeptReady = 2e7;
-
 /// Of M, J, B and what the null space adds, roughly.
 template <class Space>
 double DenseNumbers(const Mechanism<Space, double>& mechanism) {
@@ -98,13 +95,8 @@ Outcome SparseOrDense<Space>::Factor(const Kinematics<Space, double>& kinematics
 
 template <class Space>
 std::string SparseOrDense<Space>::WhySingular() const {
-  if (at_velocity_ || dense_ != nullptr) return {};
-  const int joint = this->conditioning_.worst_joint;
-  return "rank is in doubt" +
-         (joint < 0 ? std::string() : " at joint \"" + mechanism_.joint_names()[joint] + '"') +
-         ", and the dense matrices that would decide it are too large: " +
-         std::to_string(mechanism_.num_rows()) + " constraints and " +
-         std::to_string(mechanism_.num_u()) + " speeds";
+  const bool decides = at_velocity_ || dense_ != nullptr;
+  return decides ? std::string() : TooLargeToDecide(mechanism_, this->conditioning_);
 }
 
 template <class Space>

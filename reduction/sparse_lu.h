@@ -19,8 +19,7 @@ namespace loopbench::reduction {
 class SparseLu {
  public:
   SparseLu() = default;
-  /// The pattern of A by columns: those of column k are `rows[start[k]]` to `rows[start[k + 1] -
-  /// 1]`.
+  /// The pattern of A by columns: that of column k begins at `rows[start[k]]`.
   SparseLu(int num_rows, std::vector<int> start, std::vector<int> rows);
 
   int columns() const { return static_cast<int>(start_.size()) - 1; }
@@ -52,12 +51,12 @@ class SparseLu {
 
  private:
   struct Entry {
-    int index = 0;  ///< in L a row of A, in U a column in the order of elimination
+    int index = 0;  ///< in L a row of A, in U a step of the elimination
     double value = 0.0;
   };
 
-  /// Columns of L that reach column k, in the order in which they act, and the rows that it may
-  /// take its pivot from.
+  /// Columns of L that reach this column of A, in the order in which they act, and the other rows
+  /// that it has then.
   void Reach(int column);
   void Visit(int row);
 

@@ -219,10 +219,7 @@ void SparsePartition<Space>::FactorMass() {
     column_ = B_.col(i);
     SetMotions(column_, i);
     for (int body = 1; body < mechanism_.num_bodies(); ++body) {
-      const Inertia<Space, double>& inertia = mechanism_.bodies()[body];
-      const Wrench<Space, double> momentum(
-          kinematics_->RotationalInertia(inertia, body) * motions_[body].angular,
-          inertia.mass * motions_[body].linear);
+      const auto momentum = InertiaTimes<Space, double>(*kinematics_, body, motions_[body]);
       for (int k = 0; k < Space::kDim; ++k) MV_(body * Space::kDim + k, i) = momentum[k];
     }
   }

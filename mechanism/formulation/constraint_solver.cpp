@@ -50,9 +50,20 @@ int LoopRank(const Mechanism<Space, S>& mechanism, int dependent_rows) {
   return mechanism.num_rows() - user_tree_rows - dependent_rows;
 }
 
-#define LOOPBENCH_INSTANTIATE(Space, S)      \
-  template class ConstraintSolver<Space, S>; \
-  template int LoopRank(const Mechanism<Space, S>&, int);
+template <class Space, class S>
+std::string TooLargeToDecide(const Mechanism<Space, S>& mechanism, const Conditioning& found) {
+  const int joint = found.worst_joint;
+  return "rank is in doubt" +
+         (joint < 0 ? std::string() : " at joint \"" + mechanism.joint_names()[joint] + '"') +
+         ", and the dense equations that would decide it are too large: " +
+         std::to_string(mechanism.num_rows()) + " constraints and " +
+         std::to_string(mechanism.num_u()) + " speeds";
+}
+
+#define LOOPBENCH_INSTANTIATE(Space, S)                   \
+  template class ConstraintSolver<Space, S>;              \
+  template int LoopRank(const Mechanism<Space, S>&, int); \
+  template std::string TooLargeToDecide(const Mechanism<Space, S>&, const Conditioning&);
 LOOPBENCH_FOR_EACH_SPACE_AND_SCALAR(LOOPBENCH_INSTANTIATE)
 #undef LOOPBENCH_INSTANTIATE
 

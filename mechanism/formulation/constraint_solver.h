@@ -125,4 +125,8 @@ class ConstraintSolver {
 template <class Space, class S>
 int LoopRank(const Mechanism<Space, S>& mechanism, int dependent_rows);
 
+/// WhySingular() where rank is in doubt and the dense equations that would decide it are too large.
+template <class Space, class S>
+std::string TooLargeToDecide(const Mechanism<Space, S>& mechanism, const Conditioning& found);
+
 }  // namespace loopbench

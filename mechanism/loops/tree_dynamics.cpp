@@ -164,12 +164,17 @@ void TreeDynamics<Space, S>::MassTimes(const Kinematics<Space, S>& kinematics, c
   Motions(kinematics, x, A_bias_);
   F_[kGround] = Wrench<Space, S>::Zero();
   for (int body = 1; body < mechanism.num_bodies(); ++body) {
-    const Inertia<Space, S>& inertia = mechanism.bodies()[body];
-    F_[body] = {kinematics.RotationalInertia(inertia, body) * A_bias_[body].angular,
-                inertia.mass * A_bias_[body].linear};
+    F_[body] = InertiaTimes<Space, S>(kinematics, body, A_bias_[body]);
   }
   force.setZero(mechanism.num_u());
   AlongForest(kinematics, force);
+}
+
+template <class Space, class S>
+Wrench<Space, S> InertiaTimes(const Kinematics<Space, S>& kinematics, int body,
+                              const Acceleration<Space, S>& A) {
+  const Inertia<Space, S>& inertia = kinematics.mechanism().bodies()[body];
+  return {kinematics.RotationalInertia(inertia, body) * A.angular, inertia.mass * A.linear};
 }
 
 /// Newton and Euler about the centre of mass: [I alpha + w x I w; m a].
@@ -336,6 +341,8 @@ JointMatrix<S> FreeResponse(const Kinematics<Space, S>& kinematics, Masses masse
 
 #define LOOPBENCH_INSTANTIATE(Space, S)                                                     \
   template class TreeDynamics<Space, S>;                                                    \
+  template Wrench<Space, S> InertiaTimes(const Kinematics<Space, S>&, int,                  \
+                                         const Acceleration<Space, S>&);                    \
   template Wrench<Space, S> InertialForce(const Kinematics<Space, S>&, int,                 \
                                           const Acceleration<Space, S>&);                   \
   template void SpeedBias(Kinematics<Space, S>&, const VectorX<S>&, VectorX<S>&);           \

@@ -74,6 +74,12 @@ class TreeDynamics {
   std::vector<Block<Space, S>> composite_;
 };
 
+/// M of a body times A: the wrench behind an acceleration from rest, the momentum of a velocity.
+/// All are at its centre of mass.
+template <class Space, class S>
+Wrench<Space, S> InertiaTimes(const Kinematics<Space, S>& kinematics, int body,
+                              const Acceleration<Space, S>& A);
+
 /// Wrench at its centre of mass that gives a body the acceleration A there.
 template <class Space, class S>
 Wrench<Space, S> InertialForce(const Kinematics<Space, S>& kinematics, int body,

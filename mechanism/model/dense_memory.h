@@ -16,6 +16,10 @@ class TooDense : public std::bad_alloc {
   std::string message_;
 };
 
+/// Numbers up to which solvers keep dense matrices ready for positions that their sparse factors
+/// leave in doubt: 160 MB.
+inline constexpr double kKeptReady = 2e7;
+
 /// Asks for the memory of so many numbers in one piece and gives it back untouched. A process that
 /// may not have it learns so now, by name, and not hours later in the middle of its work. Throws
 /// TooDense with "`what` asks for N GB".

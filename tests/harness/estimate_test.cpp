@@ -3,6 +3,12 @@
 
 #include <gtest/gtest.h>
 
+#include <algorithm>
+#include <utility>
+
+#include "harness/config/experiment_reader.h"
+#include "harness/suite/suite.h"
+
 namespace loopbench::harness {
 namespace estimate_test {
 
@@ -18,6 +24,23 @@ TEST(Estimate, ARateGoesOnWithItsSlopeToWhereRunsEnd) {
   limited.most_s = 2.0;
   EXPECT_DOUBLE_EQ(limited.Running(1.0), 2.0);
 }
+
+#ifdef LOOPBENCH_PRECISIONS
+/// The parallelogram passes positions in line, where long double is not enough.
+TEST(Estimate, AReferenceThatTakesAWiderScalarHasAPilotOfThatToo) {
+  const std::vector<Experiment> experiments = {
+      ReadExperiment(LOOPBENCH_SOURCE_DIR "/configs/experiments/examples/report.json")};
+  for (const auto& [mechanism, pilots] : {std::pair("four-bar", 1u), {"parallelogram", 2u}}) {
+    const std::vector<Case> cases = SelectCases(experiments[0], {});
+    const auto one = std::ranges::find_if(
+        cases, [&](const Case& any) { return experiments[0].scenes[any.scene].name == mechanism; });
+    ASSERT_NE(one, cases.end());
+    Estimate estimate(experiments, {});
+    EXPECT_GT(estimate.OfReference(0, ReferenceOf(experiments[0], *one, "results.jsonl")), 0.0);
+    EXPECT_EQ(estimate.pilots(), pilots) << mechanism;
+  }
+}
+#endif
 
 }  // namespace estimate_test
 }  // namespace loopbench::harness

@@ -11,7 +11,7 @@
 #include "mechanism/description/library.h"
 #include "odca/odca.h"
 #include "tests/contract/extremes.h"
-#include "tests/contract/generators.h"
+#include "tests/contract/placed.h"
 #include "tests/contract/system_with.h"
 
 namespace loopbench {
@@ -19,29 +19,20 @@ namespace {
 
 using testing::ConsistentState;
 using testing::Random;
+using testing::RandomNumbers;
 using testing::State;
 
 constexpr double kEps = std::numeric_limits<double>::epsilon();
 constexpr double kNoLimit = 1e9;
-
-VectorX<double> RandomNumbers(Random& random, Eigen::Index count) {
-  VectorX<double> numbers(count);
-  for (double& number : numbers) number = random.Uniform(-1.0, 1.0);
-  return numbers;
-}
 
 /// Random forces and targets on both; solutions agree within the contract's bound, sums along n
 /// bodies magnified by the condition of what is inverted.
 template <class Space>
 void ExpectAlike(const MechanismDescription& description, Coordinates coordinates,
                  std::uint64_t seed) {
-  const Mechanism<Space, double> joint_set(description, Coordinates::kJoint);
-  const Mechanism<Space, double> mechanism(description, coordinates);
-  State state = ConsistentState(description, joint_set, seed);
-  if (coordinates == Coordinates::kAbsolute) state = StateIn(mechanism, joint_set, state);
-  Kinematics<Space, double> kinematics(mechanism);
-  kinematics.UpdatePosition(state.q);
-  kinematics.UpdateVelocity(state.u);
+  const testing::Placed<Space> placed(description, coordinates, seed);
+  const auto& mechanism = placed.mechanism;
+  const auto& kinematics = placed.kinematics;
   const auto sparse = JointResponse<Space>::Make(mechanism, kNoLimit);
   ASSERT_NE(sparse, nullptr);
   lagrange::DenseEquations<Space, double> dense(mechanism, SolverKind::kRankRevealing);

@@ -131,6 +131,12 @@ TEST(Certificate, TakesTheWiderScalarWhereItMust) {
   EXPECT_EQ(wide.scalar, "float128");
   EXPECT_EQ(wide.trust_horizon, 3.0);
   EXPECT_LE(narrow.trust_horizon, wide.trust_horizon);
+  const Reference cheap = MakeReference(flat, 3.0, length, {.points = 31}, WaysTried::kCheapest);
+  EXPECT_EQ(cheap.scalar, "long-double");
+  EXPECT_LT(cheap.trust_horizon, 3.0);
+  const Reference far = MakeReference(flat, 3.0, length, {.points = 31}, WaysTried::kFurthest);
+  EXPECT_EQ(far.scalar, "float128");
+  EXPECT_EQ(far.rhs_evaluations, wide.rhs_evaluations) << "of the way that was taken";
   // where both are certified they are the same
   for (std::size_t k = 0; k < narrow.NumTrusted(); ++k) {
     for (std::size_t i = 1; i < flat.bodies.size(); ++i) {

@@ -11,7 +11,7 @@
 #include "lagrange/lagrange.h"
 #include "mechanism/description/library.h"
 #include "reduction/reduction.h"
-#include "tests/contract/generators.h"
+#include "tests/contract/placed.h"
 #include "tests/contract/system_with.h"
 #include "tests/mechanism/shipped.h"
 
@@ -20,15 +20,10 @@ namespace {
 
 using testing::ConsistentState;
 using testing::Random;
+using testing::RandomNumbers;
 using testing::State;
 
 constexpr double kEps = std::numeric_limits<double>::epsilon();
-
-VectorX<double> RandomNumbers(Random& random, Eigen::Index count) {
-  VectorX<double> numbers(count);
-  for (double& number : numbers) number = random.Uniform(-1.0, 1.0);
-  return numbers;
-}
 
 /// How many of the mechanisms given could be compared.
 struct Tally {
@@ -41,13 +36,9 @@ template <class Space>
 void ExpectAlike(const MechanismDescription& description, Coordinates coordinates, Choice choice,
                  std::uint64_t seed, Tally& tally) {
   SCOPED_TRACE(description.name);
-  const Mechanism<Space, double> joint_set(description, Coordinates::kJoint);
-  const Mechanism<Space, double> mechanism(description, coordinates);
-  State state = ConsistentState(description, joint_set, seed);
-  if (coordinates == Coordinates::kAbsolute) state = StateIn(mechanism, joint_set, state);
-  Kinematics<Space, double> kinematics(mechanism);
-  kinematics.UpdatePosition(state.q);
-  kinematics.UpdateVelocity(state.u);
+  const testing::Placed<Space> placed(description, coordinates, seed);
+  const auto& mechanism = placed.mechanism;
+  const auto& kinematics = placed.kinematics;
   const auto sparse = SparsePartition<Space>::Make(mechanism, choice, Matrices::kSparse);
   ASSERT_NE(sparse, nullptr);
   lagrange::DenseEquations<Space, double> dense(mechanism, SolverKind::kRankRevealing);

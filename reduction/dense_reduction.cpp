@@ -79,7 +79,7 @@ void DenseReduction<Space, S>::SetPartition(const Partition<S>& partition) {
 
 /// J_D and J_I of (1) from the chosen rows and columns of J.
 template <class Space, class S>
-S DenseReduction<Space, S>::FactorPartition() {
+S DenseReduction<Space, S>::FactorDependencies() {
   const int r = static_cast<int>(dependent_.size());
   if (r == 0) return S(1);
   for (int k = 0; k < r; ++k) {
@@ -102,7 +102,7 @@ void DenseReduction<Space, S>::FactorNullSpace(const Kinematics<Space, S>& kinem
 }
 
 template <class Space, class S>
-Outcome DenseReduction<Space, S>::Factor(const Kinematics<Space, S>& kinematics) {
+bool DenseReduction<Space, S>::FactorPartition(const Kinematics<Space, S>& kinematics) {
   const int r = static_cast<int>(dependent_.size());
   Conditioning& found = this->conditioning_;
   found.rank = LoopRank(mechanism_, mechanism_.num_rows() - r);
@@ -112,21 +112,27 @@ Outcome DenseReduction<Space, S>::Factor(const Kinematics<Space, S>& kinematics)
   uses_null_space_ = mass_is_current_ = false;
   // more rows than dependent speeds: redundant constraints, as published; or a rank that has grown
   const bool fits = static_cast<int>(rows_.size()) == r && !outgrown_;
-  if (!fits && !null_space_) return Outcome::kSingular;
+  if (!fits && !null_space_) return false;
   dynamics_.Jacobian(kinematics, J_);
-  const bool complete = r == mechanism_.num_rows();
-  const S rcond = null_space_ && !complete ? S(0) : FactorPartition();
+  // what leaves rows out does so where they hold again, too
+  if (null_space_ && r != mechanism_.num_rows()) return false;
+  const S rcond = FactorDependencies();
   found.rcond = static_cast<double>(rcond);
-  if (null_space_ && !(rcond >= S(kSuspicious))) {
-    FactorNullSpace(kinematics);
-    return Outcome::kFinished;
-  }
   // a pivot below a few eps of the largest is round-off of the elimination
-  if (!(rcond > S(16) * std::numeric_limits<S>::epsilon())) return Outcome::kSingular;
+  const S least = null_space_ ? S(kSuspicious) : S(16) * std::numeric_limits<S>::epsilon();
+  if (!(rcond >= least)) return false;
   // B of (2), in the order of u
   if (J_I_.size() > 0) solved_ = lu_.solve(J_I_);
   for (int i = 0; i < J_I_.cols(); ++i) B_(independent_[i], i) = S(1);
   for (int k = 0; k < r; ++k) B_.row(dependent_[k]) = -solved_.row(k);
+  return true;
+}
+
+template <class Space, class S>
+Outcome DenseReduction<Space, S>::Factor(const Kinematics<Space, S>& kinematics) {
+  if (FactorPartition(kinematics)) return Outcome::kFinished;
+  if (null_space_ == nullptr) return Outcome::kSingular;
+  FactorNullSpace(kinematics);
   return Outcome::kFinished;
 }
 
@@ -157,18 +163,19 @@ bool DenseReduction<Space, S>::CompleteSpeeds(Kinematics<Space, S>& kinematics, 
   return true;
 }
 
-/// c of (2) with `target` in the place of gamma.
 template <class Space, class S>
-void DenseReduction<Space, S>::Correct(const VectorX<S>& target, VectorX<S>& x) {
-  if (uses_null_space_) {
-    Solve(zero_, target, x, nullptr);
-    return;
-  }
+void DenseReduction<Space, S>::Dependent(const VectorX<S>& target, VectorX<S>& x) {
   x.setZero();
   if (dependent_.empty()) return;
   for (std::size_t k = 0; k < rows_.size(); ++k) rows_rhs_[k] = target[rows_[k]];
   dependent_speeds_ = lu_.solve(rows_rhs_);
   for (std::size_t k = 0; k < dependent_.size(); ++k) x[dependent_[k]] = dependent_speeds_[k];
+}
+
+template <class Space, class S>
+void DenseReduction<Space, S>::Correct(const VectorX<S>& target, VectorX<S>& x) {
+  if (at_velocity_) return Dependent(target, x);
+  ConstraintSolver<Space, S>::Correct(target, x);
 }
 
 /// (2) and (3) with `force` in the place of -h: B^T M B z = B^T (force - M c), x = B z + c.
@@ -183,7 +190,7 @@ void DenseReduction<Space, S>::Solve(const VectorX<S>& given, const VectorX<S>& 
       x.setConstant(std::numeric_limits<S>::quiet_NaN());
     }
   } else {
-    Correct(target, c_);
+    Dependent(target, c_);
     x = c_;
     if (!independent_.empty()) {
       residual_ = force;

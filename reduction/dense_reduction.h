@@ -19,7 +19,8 @@
 //
 // At the other levels the state does not depend on the partition, so that it may change its size.
 // Where it is suspicious, or leaves rows out, a basis of the free directions takes its place
-// (null_space.h). Start() and Review() may allocate.
+// (null_space.h), and projections are those of the other formulations. Start() and Review() may
+// allocate.
 #pragma once
 
 #include <memory>
@@ -47,13 +48,15 @@ class DenseReduction final : public ConstraintSolver<Space, S> {
   /// Indices into u, ascending.
   const std::vector<int>& independent() const { return independent_; }
 
-  /// LU of J_D and the basis B, or that of the null space.
+  /// LU of J_D and the basis B. False where it is singular or, the null space being there to take
+  /// its place, suspicious.
+  bool FactorPartition(const Kinematics<Space, S>& kinematics);
+  /// FactorPartition(), or the basis of the null space.
   Outcome Factor(const Kinematics<Space, S>& kinematics) override;
   /// x by (2) and (3), and lambda from that x.
   void Solve(const VectorX<S>& force, const VectorX<S>& target, VectorX<S>& x,
              VectorX<S>* lambda) override;
-  /// Independent coordinates and speeds stay; the dependent ones follow. Without a partition: the
-  /// smallest change in the metric M, which does no work along the free directions.
+  /// At level velocity what the state carries stays and the dependent ones follow.
   void Correct(const VectorX<S>& target, VectorX<S>& x) override;
   /// At level velocity the independent speeds; the others follow by (1).
   const std::vector<int>* CarriedSpeeds() const override {
@@ -66,7 +69,9 @@ class DenseReduction final : public ConstraintSolver<Space, S> {
 
  private:
   /// LU of J_D, J being current; the reciprocal condition.
-  S FactorPartition();
+  S FactorDependencies();
+  /// c of (2) with `target` in the place of gamma.
+  void Dependent(const VectorX<S>& target, VectorX<S>& x);
   void FactorNullSpace(const Kinematics<Space, S>& kinematics);
   /// M, and the factors of (3), once per position; not before they are needed.
   void FactorMass();

@@ -25,14 +25,15 @@ SparseOrDense<Space>::SparseOrDense(const Mechanism<Space, double>& mechanism,
       at_velocity_(options.enforcement == Enforcement::kVelocity),
       zero_(VectorX<double>::Zero(mechanism.num_u())),
       bias_(VectorX<double>::Zero(mechanism.num_rows())) {
+  const bool fits = DenseNumbers(mechanism) <= kKeptReady;
+  may_decline_ = matrices == Matrices::kLessWork && fits;
   if (options.solver == SolverKind::kRankRevealing) {
-    sparse_ = SparsePartition<Space>::Make(mechanism, at_velocity_ ? Choice::kKept : Choice::kFree,
-                                           matrices);
+    sparse_ =
+        SparsePartition<Space>::Make(mechanism, at_velocity_ ? Choice::kKept : Choice::kFree,
+                                     matrices == Matrices::kSparse || (!at_velocity_ && fits));
   }
-  uses_sparse_ = sparse_ != nullptr;
-  may_decline_ = matrices == Matrices::kLessWork && DenseNumbers(mechanism) <= kKeptReady;
   // for positions in doubt, which a right-hand side meets
-  if (sparse_ == nullptr || (!at_velocity_ && DenseNumbers(mechanism) <= kKeptReady)) MakeDense();
+  if (sparse_ == nullptr || (!at_velocity_ && fits)) MakeDense();
 }
 
 template <class Space>
@@ -51,7 +52,7 @@ bool SparseOrDense<Space>::StartsSparsely(const Kinematics<Space, double>& kinem
   const bool independent = sparse_->AreIndependent(kinematics);
   const bool chosen = sparse_->Choose(kinematics);  // what it allocates is there then
   if (at_velocity_ && !(independent && chosen)) return false;
-  return !chosen || !may_decline_ || sparse_->IsLessWork();
+  return !may_decline_ || sparse_->IsWorthwhile();
 }
 
 template <class Space>
@@ -70,27 +71,35 @@ bool SparseOrDense<Space>::Review(const Kinematics<Space, double>& kinematics) {
 }
 
 template <class Space>
-Outcome SparseOrDense<Space>::Factor(const Kinematics<Space, double>& kinematics) {
-  is_sparse_ = false;
-  if (uses_sparse_) {
-    Conditioning& found = this->conditioning_;
-    found = {.rank = LoopRank(mechanism_, 0)};
-    if (at_velocity_ || sparse_->AreIndependent(kinematics)) {
-      found.rcond = sparse_->Factor(kinematics);
-      // a pivot below a few eps of the largest is round-off of the elimination
-      is_sparse_ = found.rcond > 16 * std::numeric_limits<double>::epsilon();
-      if (is_sparse_) return Outcome::kFinished;
-      if (at_velocity_) return Outcome::kSingular;
-    }
-    if (dense_ == nullptr) {
-      found.rcond = sparse_->response().rcond();
-      found.worst_joint = sparse_->response().worst_joint();
-      return sparse_->response().IsFinite() ? Outcome::kSingular : Outcome::kNonFinite;
-    }
-  }
+Outcome SparseOrDense<Space>::FactorDense(const Kinematics<Space, double>& kinematics) {
   const Outcome outcome = dense_->Factor(kinematics);
   this->conditioning_ = dense_->conditioning();
   return outcome;
+}
+
+template <class Space>
+Outcome SparseOrDense<Space>::Factor(const Kinematics<Space, double>& kinematics) {
+  Conditioning& found = this->conditioning_;
+  is_sparse_ = false;
+  if (!uses_sparse_) {
+    if (at_velocity_ || sparse_ == nullptr) return FactorDense(kinematics);
+    if (dense_->FactorPartition(kinematics)) {
+      found = dense_->conditioning();
+      return Outcome::kFinished;
+    }
+  }
+  found = {.rank = LoopRank(mechanism_, 0)};
+  if (at_velocity_ || sparse_->AreIndependent(kinematics)) {
+    found.rcond = sparse_->Factor(kinematics);
+    // a pivot below a few eps of the largest is round-off of the elimination
+    is_sparse_ = found.rcond > 16 * std::numeric_limits<double>::epsilon();
+    if (is_sparse_) return Outcome::kFinished;
+    if (at_velocity_) return Outcome::kSingular;
+  }
+  if (dense_ != nullptr) return FactorDense(kinematics);
+  found.rcond = sparse_->response().rcond();
+  found.worst_joint = sparse_->response().worst_joint();
+  return sparse_->response().IsFinite() ? Outcome::kSingular : Outcome::kNonFinite;
 }
 
 template <class Space>
@@ -115,14 +124,11 @@ bool SparseOrDense<Space>::CompleteSpeeds(Kinematics<Space, double>& kinematics,
   return true;
 }
 
-/// At level velocity the speeds that the state carries stay. Elsewhere it is the smallest change in
-/// the metric M: any other does work along the free directions, and where dependent speeds hardly
-/// follow from the constraints much of it.
 template <class Space>
 void SparseOrDense<Space>::Correct(const VectorX<double>& target, VectorX<double>& x) {
   if (!is_sparse_) return dense_->Correct(target, x);
   if (at_velocity_) return sparse_->Dependent(target, x);
-  sparse_->Solve({}, target, x);
+  ConstraintSolver<Space, double>::Correct(target, x);
 }
 
 template <class Space>

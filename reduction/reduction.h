@@ -16,6 +16,9 @@
 
 namespace loopbench::reduction {
 
+/// kSparse takes sparse factors wherever there are some, for tests.
+enum class Matrices { kLessWork, kSparse };
+
 template <class Space>
 class SparseOrDense final : public ConstraintSolver<Space, double> {
  public:
@@ -38,15 +41,16 @@ class SparseOrDense final : public ConstraintSolver<Space, double> {
 
  private:
   void MakeDense();
+  Outcome FactorDense(const Kinematics<Space, double>& kinematics);
   /// Whether sparse factors leave nothing to dense matrices from the start on.
   bool StartsSparsely(const Kinematics<Space, double>& kinematics);
 
   const Mechanism<Space, double>& mechanism_;
   FormulationOptions options_;
   bool at_velocity_;
-  std::unique_ptr<SparsePartition<Space>> sparse_;        ///< null where it is not less work
+  std::unique_ptr<SparsePartition<Space>> sparse_;        ///< null where it never serves
   std::unique_ptr<DenseReduction<Space, double>> dense_;  ///< null until needed, if too large
-  bool uses_sparse_ = false;                              ///< since Start()
+  bool uses_sparse_ = false;  ///< since Start(), before dense matrices are asked
   bool may_decline_ = false;  ///< the fill of sparse factors, for dense matrices
   bool is_sparse_ = false;
   VectorX<double> zero_, bias_;

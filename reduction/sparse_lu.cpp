@@ -58,7 +58,7 @@ void SparseLu::Visit(int row) {
     return;
   }
   path_.assign(1, step_of_row_[row]);
-  next_.assign(1, L_start_[path_[0]]);
+  next_.assign(1, L_start_[path_[0]] + 1);
   while (!path_.empty()) {
     const int step = path_.back();
     int& at = next_.back();
@@ -75,7 +75,7 @@ void SparseLu::Visit(int row) {
     }
     if (deeper >= 0) {
       path_.push_back(deeper);
-      next_.push_back(L_start_[deeper]);
+      next_.push_back(L_start_[deeper] + 1);
     } else {
       reached_.push_back(step);
       path_.pop_back();
@@ -93,47 +93,73 @@ void SparseLu::Reach(int column) {
   std::ranges::reverse(reached_);
 }
 
+void SparseLu::SetL(int k) {
+  L_.resize(L_start_[k]);
+  for (const int row : open_) L_.push_back({row});
+  L_start_[k + 1] = static_cast<int>(L_.size());
+}
+
+void SparseLu::SetU(int k) {
+  U_.resize(U_start_[k]);
+  for (const int step : reached_) U_.push_back({step});
+  U_start_[k + 1] = static_cast<int>(U_.size());
+}
+
+int SparseLu::Largest(int k, std::span<const char> barred) const {
+  int place = -1;
+  double best = 0.0;
+  for (int e = L_start_[k]; e < L_start_[k + 1]; ++e) {
+    const int row = L_[e].index;
+    if (!barred.empty() && barred[row]) continue;
+    const double size = weights_[row] * std::abs(x_[row]);
+    if (size > best || (size == best && place >= 0 && row < L_[place].index)) {
+      best = size;
+      place = e;
+    }
+  }
+  return place;
+}
+
 bool SparseLu::Factor(std::span<const double> values, std::span<const char> barred) {
-  L_.clear();
-  U_.clear();
   std::ranges::fill(step_of_row_, -1);
   rcond_ = operations_ = 0.0;
   double least = std::numeric_limits<double>::infinity(), most = 0.0;
   for (int k = 0; k < columns(); ++k) {
     const int column = order_[k];
-    Reach(column);
+    if (k >= num_known_) {
+      Reach(column);
+      SetU(k);
+      SetL(k);
+    }
     for (int e = start_[column]; e < start_[column + 1]; ++e) {
       x_[rows_[e]] = values[e];
       most = std::max(most, std::abs(values[e]));
     }
-    for (const int step : reached_) {
-      const double u = std::exchange(x_[pivots_[step]], 0.0);
-      U_.push_back({step, u});
-      for (int e = L_start_[step]; e < L_start_[step + 1]; ++e) x_[L_[e].index] -= L_[e].value * u;
-      operations_ += L_start_[step + 1] - L_start_[step];
+    for (int e = U_start_[k]; e < U_start_[k + 1]; ++e) {
+      const int step = U_[e].index, first = L_start_[step] + 1;
+      const double u = U_[e].value = std::exchange(x_[pivots_[step]], 0.0);
+      for (int l = first; l < L_start_[step + 1]; ++l) x_[L_[l].index] -= L_[l].value * u;
+      operations_ += L_start_[step + 1] - first;
     }
-    int pivot = -1;
-    double best = 0.0;
-    for (const int row : open_) {
-      if (!barred.empty() && barred[row]) continue;
-      const double size = weights_[row] * std::abs(x_[row]);
-      if (size > best || (size == best && pivot >= 0 && row < pivot)) {
-        best = size;
-        pivot = row;
-      }
+    int place = Largest(k, barred);
+    if (k < num_known_ && (place < 0 || L_[place].index != pivots_[k])) {
+      num_known_ = k;
+      Reach(column);
+      SetL(k);  // in the order that it has without a pivot
+      place = Largest(k, barred);
     }
+    const int pivot = place < 0 ? -1 : L_[place].index;
     const double value = pivot < 0 ? 0.0 : x_[pivot];
-    for (const int row : open_) {
-      const double x = std::exchange(x_[row], 0.0);
-      if (row != pivot && pivot >= 0) L_.push_back({row, x / value});
+    if (place >= 0) std::rotate(&L_[L_start_[k]], &L_[place], &L_[place] + 1);
+    for (int e = L_start_[k]; e < L_start_[k + 1]; ++e) {
+      L_[e].value = std::exchange(x_[L_[e].index], 0.0) / value;
     }
     if (pivot < 0 || !std::isfinite(value)) return false;
-    operations_ += static_cast<double>(open_.size());
+    operations_ += L_start_[k + 1] - L_start_[k];
     pivots_[k] = pivot;
     step_of_row_[pivot] = k;
     diagonal_[k] = value;
-    L_start_[k + 1] = static_cast<int>(L_.size());
-    U_start_[k + 1] = static_cast<int>(U_.size());
+    num_known_ = std::max(num_known_, k + 1);
     least = std::min(least, std::abs(value));
     most = std::max(most, std::abs(value));
   }
@@ -156,7 +182,7 @@ void SparseLu::SolveTransposed(double* r, double* x) const {
   // L_D^T x = y, from the last pivot to the first
   for (int k = columns() - 1; k >= 0; --k) {
     double y = r[order_[k]];
-    for (int e = L_start_[k]; e < L_start_[k + 1]; ++e) {
+    for (int e = L_start_[k] + 1; e < L_start_[k + 1]; ++e) {
       if (IsPivot(L_[e].index)) y -= L_[e].value * x[L_[e].index];
     }
     x[pivots_[k]] = y;
@@ -167,7 +193,7 @@ void SparseLu::Solve(double* y, double* x) const {
   for (int k = 0; k < columns(); ++k) {
     const double w = y[pivots_[k]];
     x[order_[k]] = w;
-    for (int e = L_start_[k]; e < L_start_[k + 1]; ++e) y[L_[e].index] -= L_[e].value * w;
+    for (int e = L_start_[k] + 1; e < L_start_[k + 1]; ++e) y[L_[e].index] -= L_[e].value * w;
   }
   for (int k = columns() - 1; k >= 0; --k) {
     const double z = x[order_[k]] /= diagonal_[k];
@@ -181,7 +207,7 @@ void SparseLu::Dependencies(std::span<const int> place, double* B, int count) co
   for (int k = columns() - 1; k >= 0; --k) {
     double* b = row_of(pivots_[k]);
     std::fill_n(b, count, 0.0);
-    for (int e = L_start_[k]; e < L_start_[k + 1]; ++e) {
+    for (int e = L_start_[k] + 1; e < L_start_[k + 1]; ++e) {
       const auto& [row, value] = L_[e];
       if (!IsPivot(row)) {
         b[place[row]] -= value;

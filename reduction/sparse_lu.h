@@ -38,8 +38,9 @@ class SparseLu {
   /// The least pivot as a part of the largest number of A, barred rows included, or of a larger
   /// pivot; 0 after a failure.
   double rcond() const { return rcond_; }
-  /// Multiply-adds of the last Factor().
+  /// Multiply-adds of the last Factor(), and entries of L.
   double operations() const { return operations_; }
+  double fill() const { return static_cast<double>(L_.size()); }
 
   /// A_D^T x = r. r (by column) is lost; of x (by row) those of I stay as they are.
   void SolveTransposed(double* r, double* x) const;
@@ -59,11 +60,18 @@ class SparseLu {
   /// that it has then.
   void Reach(int column);
   void Visit(int row);
+  /// The pattern of column k in the order of elimination, from what Reach() found.
+  void SetL(int k);
+  void SetU(int k);
+  /// The place in L of the pivot that column k gets; -1: none.
+  int Largest(int k, std::span<const char> barred) const;
 
   std::vector<int> start_, rows_, order_;
-  std::vector<Entry> L_, U_;
+  std::vector<Entry> L_, U_;            ///< a column of L begins with its pivot
   std::vector<int> L_start_, U_start_;  ///< by column in the order of elimination
-  std::vector<double> diagonal_;        ///< of U
+  /// As long as pivots are those of the last time, so is the pattern of this many columns.
+  int num_known_ = 0;
+  std::vector<double> diagonal_;  ///< of U
   std::vector<int> pivots_, step_of_row_;
   std::vector<double> x_, weights_;
   std::vector<int> reached_, open_, path_, next_;

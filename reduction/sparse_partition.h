@@ -23,9 +23,6 @@
 
 namespace loopbench::reduction {
 
-/// kSparse takes sparse factors wherever there are some, for tests.
-enum class Matrices { kLessWork, kSparse };
-
 /// Which speeds are dependent: the choice of the last Choose() or ChooseAgain(), or the best at
 /// each position, where nothing hangs on the choice.
 enum class Choice { kKept, kFree };
@@ -33,10 +30,10 @@ enum class Choice { kKept, kFree };
 template <class Space>
 class SparsePartition {
  public:
-  /// Null where constraints must be dependent, or dense matrices are less work. `mechanism` must
-  /// outlive this. Throws TooDense (dense_memory.h).
+  /// Null where constraints must be dependent and, unless `anyway`, where dense matrices are less
+  /// work. `mechanism` must outlive this. Throws TooDense (dense_memory.h).
   static std::unique_ptr<SparsePartition> Make(const Mechanism<Space, double>& mechanism,
-                                               Choice choice, Matrices matrices);
+                                               Choice choice, bool anyway);
 
   /// The judge of positions.
   JointResponse<Space>& response() { return *response_; }
@@ -51,8 +48,9 @@ class SparsePartition {
   /// The same where the kept ones have a reciprocal condition below `share` of the best; whether
   /// they were replaced.
   bool ChooseAgain(const Kinematics<Space, double>& kinematics, double share);
-  /// Whether it is, with the fill of the last choice, which nobody knows before.
-  bool IsLessWork() const;
+  /// Whether it saves work over dense matrices, with the fill of the last choice, which nobody
+  /// knows before; at level velocity half of it.
+  bool IsWorthwhile() const;
   /// Indices into u, ascending.
   const std::vector<int>& independent() const { return independent_; }
 

@@ -144,5 +144,43 @@ TEST(SparseLu, HasNoFactorsWithoutRank) {
   EXPECT_EQ(fresh.rcond(), lu.rcond());
 }
 
+/// What is remembered of the last pattern leaves no trace in the numbers.
+TEST(SparseLu, IsTheSameAfterOtherPivots) {
+  int others = 0, found = 0;
+  for (std::uint64_t seed = 1; seed <= 30; ++seed) {
+    const Sample sample(30, 20, 4, seed);
+    SparseLu lu(30, sample.start, sample.index);
+    Random random(seed);
+    std::vector<int> pivots;
+    for (int k = 0; k < 12; ++k) {
+      std::vector<double> values = sample.values;
+      for (double& value : values) value *= random.Uniform(k % 3 == 0 ? 1.0 : 0.2, 1.0);
+      const bool is_spoilt = k % 4 == 3;
+      if (is_spoilt) values[random.Below(80)] = std::numeric_limits<double>::infinity();
+      std::vector<char> barred(30, 0);
+      if (k % 5 == 4) barred[random.Below(30)] = 1;
+      SparseLu fresh(30, sample.start, sample.index);
+      const bool factored = fresh.Factor(values, barred);
+      ASSERT_EQ(lu.Factor(values, barred), factored);
+      ASSERT_EQ(lu.rcond(), fresh.rcond());
+      if (!factored || is_spoilt) continue;
+      ++found;
+      ASSERT_EQ(lu.operations(), fresh.operations());
+      ASSERT_TRUE(std::ranges::equal(lu.pivots(), fresh.pivots()));
+      others += !pivots.empty() && !std::ranges::equal(lu.pivots(), pivots);
+      pivots.assign(lu.pivots().begin(), lu.pivots().end());
+      VectorX<double> r(20);
+      for (double& value : r) value = random.Uniform(-1.0, 1.0);
+      VectorX<double> lost = r, x = VectorX<double>::Zero(30), expected = x;
+      lu.SolveTransposed(lost.data(), x.data());
+      lost = r;
+      fresh.SolveTransposed(lost.data(), expected.data());
+      EXPECT_EQ(x, expected) << "to the last bit";
+    }
+  }
+  EXPECT_GT(others, 50) << "of " << found;
+  EXPECT_GT(found - others, 20);
+}
+
 }  // namespace
 }  // namespace loopbench::reduction

@@ -39,7 +39,7 @@ void ExpectAlike(const MechanismDescription& description, Coordinates coordinate
   const testing::Placed<Space> placed(description, coordinates, seed);
   const auto& mechanism = placed.mechanism;
   const auto& kinematics = placed.kinematics;
-  const auto sparse = SparsePartition<Space>::Make(mechanism, choice, Matrices::kSparse);
+  const auto sparse = SparsePartition<Space>::Make(mechanism, choice, true);
   ASSERT_NE(sparse, nullptr);
   lagrange::DenseEquations<Space, double> dense(mechanism, SolverKind::kRankRevealing);
   Conditioning found;
@@ -146,7 +146,7 @@ TEST(SparsePartition, OneConstraintChangesItsDependentSpeed) {
     q << 0.0, std::cos(angle), std::sin(angle);
     kinematics.UpdatePosition(q);
   };
-  const auto partition = SparsePartition<Planar>::Make(mechanism, Choice::kKept, Matrices::kSparse);
+  const auto partition = SparsePartition<Planar>::Make(mechanism, Choice::kKept, true);
   ASSERT_NE(partition, nullptr);
   at(0.0);
   ASSERT_TRUE(partition->Choose(kinematics));
@@ -224,6 +224,58 @@ TEST(Reduction, IsSingularWhereDenseMatricesWouldBeTooLarge) {
             std::string::npos);
   EXPECT_EQ(run.Evaluate(std::numeric_limits<double>::quiet_NaN()), Outcome::kNonFinite);
   EXPECT_EQ(run.Evaluate(1.0), Outcome::kFinished);
+}
+
+/// Pivots below a tenth of each other say little of loops that hang together: where these are
+/// independent beyond doubt, sparse factors cost less than the null space.
+TEST(Reduction, LeavesSuspiciousPartitionsToSparseFactors) {
+  const MechanismDescription graph = testing::TightGraph(24, 8, SpaceKind::kPlanar, 1);
+  const testing::Placed<Planar> placed(graph, Coordinates::kJoint, 1);
+  const auto& [mechanism, kinematics, state] = placed;
+  const FormulationOptions options{Enforcement::kAcceleration, SolverKind::kRankRevealing};
+  testing::SystemWith<DenseReduction, Planar, double> dense(mechanism, options);
+  InPlane system(mechanism, options);
+  VectorX<double> udot, expected;
+  dense->Start(0.0, state.q, state.u);
+  system->Start(0.0, state.q, state.u);
+  ASSERT_EQ(dense->Evaluate(0.0, state.q, state.u, expected), Outcome::kFinished);
+  ASSERT_EQ(system->Evaluate(0.0, state.q, state.u, udot), Outcome::kFinished);
+  EXPECT_TRUE(system.solver().is_sparse());
+  EXPECT_EQ(system->diagnostics().smallest_weight, 1.0);
+  EXPECT_LE((udot - expected).norm(),
+            100.0 * kEps * mechanism.num_bodies() /
+                std::min(system->diagnostics().rcond, dense->diagnostics().rcond) *
+                expected.norm());
+}
+
+/// Whatever has made the factors, a projection at the other levels is that of multipliers.
+TEST(Reduction, ChangesLeastInTheMetricOfMasses) {
+  for (std::uint64_t seed = 1; seed <= 10; ++seed) {
+    const testing::Placed<Planar> placed(testing::RandomLadder(4, SpaceKind::kPlanar, seed),
+                                         Coordinates::kJoint, seed);
+    const auto& mechanism = placed.mechanism;
+    lagrange::DenseEquations<Planar, double> multipliers(mechanism, SolverKind::kRankRevealing);
+    Conditioning found;
+    ASSERT_EQ(multipliers.Factor(placed.kinematics, found), Outcome::kFinished);
+    Random random(seed);
+    const VectorX<double> target = RandomNumbers(random, mechanism.num_rows());
+    VectorX<double> least, x(mechanism.num_u());
+    multipliers.Solve(VectorX<double>(), target, least, nullptr);
+    for (const Enforcement level : {Enforcement::kPosition, Enforcement::kVelocity}) {
+      DenseReduction<Planar, double> reduction(mechanism, {level, SolverKind::kRankRevealing});
+      reduction.Start(placed.kinematics);
+      ASSERT_EQ(reduction.Factor(placed.kinematics), Outcome::kFinished);
+      reduction.Correct(target, x);
+      const double bound = 100.0 * kEps * mechanism.num_bodies() /
+                           std::min(found.rcond, reduction.conditioning().rcond) * least.norm();
+      if (level == Enforcement::kPosition) {
+        EXPECT_LE((x - least).norm(), bound);
+      } else {
+        EXPECT_GT((x - least).norm(), bound) << "what the state carries stays";
+        for (const int speed : reduction.independent()) EXPECT_EQ(x[speed], 0.0);
+      }
+    }
+  }
 }
 
 TEST(Reduction, TakesWhatIsLessWork) {

@@ -85,10 +85,9 @@ class BenchIn final : public TrialBench {
       const double before = YardstickNs();
       const IntegratorResult one = Run(choice, cpu_s, nullptr);
       const double slower = std::max(before, YardstickNs());
-      alone_ns_ = std::min({alone_ns_, before, slower});
       if (i == 0 || one.wall_s < fastest.wall_s) fastest = one;
       if (one.outcome != Outcome::kFinished || one.wall_s > kLongTrial_s ||
-          slower < kOtherSpeed * alone_ns_) {
+          slower < kOtherSpeed * YardstickAloneNs()) {
         break;
       }
     }
@@ -133,7 +132,6 @@ class BenchIn final : public TrialBench {
   Compiled compiled_;
   const MechanismDescription& description_;
   Coordinated joint_, absolute_;
-  double alone_ns_ = std::numeric_limits<double>::infinity();  ///< least time by the yardstick
 };
 
 }  // namespace

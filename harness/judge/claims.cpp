@@ -9,6 +9,8 @@
 #include <numeric>
 #include <string_view>
 
+#include "harness/judge/rules.h"
+#include "harness/record/noise.h"
 #include "harness/tables/table.h"
 
 namespace loopbench::harness {
@@ -112,12 +114,33 @@ bool HoldsOfNumbers(const Check& check, const Sample& sample, std::string* measu
   return holds;
 }
 
+/// By how much times of these rows differ for the machine's sake alone; 1 of what is no time.
+double OtherSpeed(const Check& check, const Sample& above, const Sample& below) {
+  double least = std::numeric_limits<double>::infinity(), most = 0.0;
+  for (const Sample* sample : {&above, &below}) {
+    for (const Record& row : sample->rows) {
+      const double yardstick = YardstickOf(row, check.demand.measure);
+      if (!(yardstick > 0.0)) continue;
+      least = std::min(least, yardstick);
+      most = std::max(most, yardstick);
+    }
+  }
+  return most > kOtherSpeed * least ? most / least : 1.0;
+}
+
 bool HoldsOfRatio(const Check& check, const Sample& above, const Sample& below,
-                  std::string* measured) {
+                  std::string* measured, std::string* uncertain) {
   const double numerator = Apply(check.statistic, above.values);
   const double denominator = Apply(check.statistic, below.values);
   const double ratio = numerator / denominator;
   *measured = fmt::format("{:.3g} ({:.3g} / {:.3g})", ratio, numerator, denominator);
+  const double speed = OtherSpeed(check, above, below);
+  if (Meets(check.demand, ratio * speed) != Meets(check.demand, ratio / speed)) {
+    *uncertain = fmt::format(
+        "the machine's speed changed by a factor of {:.3g} in between (yardstick_ns): time again "
+        "with run --timing-only --rerun all",
+        speed);
+  }
   return Meets(check.demand, ratio);
 }
 
@@ -139,12 +162,17 @@ CheckResult Evaluate(const Check& check, std::span<const Record> records) {
         "no record of " + ToText(sample.rows.empty() ? check.select : check.relative_to);
     return result;
   }
-  const bool holds = is_ratio                ? HoldsOfRatio(check, sample, base, &result.measured)
+  std::string uncertain;
+  const bool holds = is_ratio ? HoldsOfRatio(check, sample, base, &result.measured, &uncertain)
                      : check.demand.IsText() ? HoldsOfTexts(check, sample, &result.measured)
                                              : HoldsOfNumbers(check, sample, &result.measured);
   const std::string defect = Defect(check, sample);
   result.reason = defect.empty() ? Defect(check, base) : defect;
   result.state = holds && result.reason.empty() ? CheckState::kHolds : CheckState::kFails;
+  if (result.reason.empty() && !uncertain.empty()) {
+    result.reason = uncertain;
+    result.state = CheckState::kNotMeasured;
+  }
   return result;
 }
 

@@ -77,7 +77,8 @@ struct ClaimResult {
 /// state is kNotMeasured, never kHolds. A run that did not finish (an "outcome" other than
 /// "finished"), a value that is not finite, or a record that misses `require` makes the check fail;
 /// failed runs are admitted where the check measures or selects the outcome, or where
-/// failed_runs_hold.
+/// failed_runs_hold. A ratio of times is kNotMeasured where a change of the machine's speed between
+/// them, which the yardstick tells, may decide it.
 CheckResult Evaluate(const Check& check, std::span<const Record> records);
 
 /// Examines all checks of a rule. All hold: reproduced. None holds and at least one fails: not

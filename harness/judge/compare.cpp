@@ -138,7 +138,7 @@ std::string Obstacle(const Measure& measure, const Pair& pair) {
                ? "machine not known"
                : "another machine";
   }
-  const double speed = YardstickOf(pair.fresh, measure) / YardstickOf(pair.base, measure);
+  const double speed = YardstickOf(pair.fresh, measure.key) / YardstickOf(pair.base, measure.key);
   // not where it is not known; another compiler may make other instructions of it
   const bool is_equal_work = OriginOf(pair.base).compiler == OriginOf(pair.fresh).compiler;
   if (is_equal_work && (speed > kOtherSpeed || speed < 1.0 / kOtherSpeed)) {

@@ -100,9 +100,13 @@ std::string Shown(const Record& record, std::string_view key) {
                      unfit > 0 ? fmt::format(" ({} null or negative)", unfit) : "");
 }
 
-double YardstickOf(const Record& record, const Measure& measure) {
-  if (measure.rule != Rule::kTime) return std::numeric_limits<double>::quiet_NaN();
-  return record.Number(measure.key == "series.wall_s" ? "yardstick_wall_ns" : "yardstick_ns");
+double YardstickOf(const Record& record, std::string_view key) {
+  const auto is_any = [key](const auto&... parts) {
+    return ((key.find(parts) != std::string_view::npos) || ...);
+  };
+  if (is_any("wall_s", "step_us", "realtime_factor")) return record.Number("yardstick_wall_ns");
+  if (is_any("rhs_ns", "cpu_ns", "ns_per_body")) return record.Number("yardstick_ns");
+  return std::numeric_limits<double>::quiet_NaN();
 }
 
 std::string CaseText(const Record& record) {

@@ -31,9 +31,9 @@ std::string_view Expected(Rule rule);
 /// series how many values it has, and how many of them are unfit for a sample of times.
 std::string Shown(const Record& record, std::string_view key);
 
-/// How fast the machine was when a time was measured: that of the yardstick [ns]
-/// (harness/timing/yardstick.h), NaN where it is not known and of measures that are no times.
-double YardstickOf(const Record& record, const Measure& measure);
+/// How fast the machine was when the time under `key` was measured: that of the yardstick [ns]
+/// (harness/timing/yardstick.h), NaN where it is not known and of what is no time.
+double YardstickOf(const Record& record, std::string_view key);
 
 /// What tells cases of one store apart, as one line of text: the keys that stand first in a record,
 /// before "case_id" or "outcome".

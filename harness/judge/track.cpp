@@ -27,7 +27,7 @@ TrackedValue Tracked(const std::string& one, const Measure& measure, const Recor
     value.lower = Quantile(sample, 0.1);
     value.upper = Quantile(sample, 0.9);
     value.least = *std::ranges::min_element(sample);
-    value.yardstick = YardstickOf(record, measure);
+    value.yardstick = YardstickOf(record, measure.key);
   } else {
     value.value = value.lower = value.upper = value.least = record.Number(measure.key);
   }

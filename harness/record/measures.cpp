@@ -256,6 +256,7 @@ constexpr Measure kMeasures[] = {
     {"aa_*", kNumber},
     {"yardstick_ns", kNumber, {"yardstick, rhs", "ns", kFixed}, {}, kNone, kVaries},
     {"yardstick_wall_ns", kNumber, {"yardstick, wall", "ns", kFixed}, {}, kNone, kVaries},
+    {"disturbed_rounds", kNumber, {"disturbed rounds", "", kInteger}, {}, kNone, kVaries},
     {"load1", kNumber, {"load", "", kSeconds}, {}, kNone, kVaries},
     {"load_average", kNumber},
     {"processors", kNumber, {"processors", "", kInteger}, {}, kNone, kVaries},

@@ -6,6 +6,7 @@
 #include <cmath>
 #include <fstream>
 #include <limits>
+#include <numeric>
 #include <thread>
 
 namespace loopbench::harness {
@@ -38,6 +39,17 @@ double Quantile(std::vector<double> sample, double fraction) {
 double AaSpread(const std::vector<double>& first, const std::vector<double>& second) {
   const double a = Quantile(first, 0.5), b = Quantile(second, 0.5);
   return std::abs(a - b) / std::min(a, b);
+}
+
+std::vector<std::size_t> QuietRounds(const std::vector<double>& slowest, double alone,
+                                     std::size_t wanted) {
+  std::vector<std::size_t> rounds(slowest.size());
+  std::iota(rounds.begin(), rounds.end(), 0);
+  std::ranges::stable_sort(
+      rounds, {}, [&](std::size_t round) { return std::max(slowest[round], kOtherSpeed * alone); });
+  rounds.resize(std::min(wanted, rounds.size()));
+  std::ranges::sort(rounds);
+  return rounds;
 }
 
 std::string NoiseReasons(const MachineState& machine, double aa_spread_rhs, double aa_spread_wall,

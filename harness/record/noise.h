@@ -44,6 +44,14 @@ struct NoiseThresholds {
 /// differ by less than 1 %; a host that gives less, or a lower clock, takes 5 % and more.
 inline constexpr double kOtherSpeed = 1.03;
 
+/// As many of some rounds of measurements as are `wanted`, ascending: those during which no
+/// yardstick took longer than on a machine that has nothing else to do, the first of them, and then
+/// the least disturbed.
+/// @param slowest  by round: the longest yardstick [ns]
+/// @param alone    of the machine alone [ns]
+std::vector<std::size_t> QuietRounds(const std::vector<double>& slowest, double alone,
+                                     std::size_t wanted);
+
 /// The reasons why the machine counts as noisy, as one sentence without units to look up, e.g.
 /// "A/A spread 5.1 % (quiet: up to 2 %)"; "" when it counts as quiet. NaN is no reason: what was
 /// not measured is not known to be noisy.

@@ -7,6 +7,7 @@
 #include "harness/run/case_identity.h"
 #include "harness/run/run_case.h"
 #include "harness/suite/progress.h"
+#include "harness/timing/yardstick.h"
 #include "harness/trajectory/trajectory_writer.h"
 
 namespace loopbench::harness {
@@ -72,7 +73,10 @@ std::size_t Runner::Run(const std::string& what, std::vector<Piece> all, int job
     store_.LeaveToParent();
     return AnswerOf(pieces[i]);
   };
-  const auto limits = [&](std::size_t i) { return pieces[i].limits; };
+  const auto limits = [&](std::size_t i) {
+    YardstickNs();  // before the fork, so that the child knows how fast the machine has been
+    return pieces[i].limits;
+  };
   const auto keep = [&](const std::vector<TaskResult>& ended) {
     std::vector<Record> records;
     for (const auto& [i, result] : ended) {

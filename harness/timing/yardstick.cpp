@@ -1,6 +1,7 @@
 #include "harness/timing/yardstick.h"
 
 #include <algorithm>
+#include <atomic>
 #include <chrono>
 #include <cmath>
 #include <limits>
@@ -39,6 +40,8 @@ LOOPBENCH_ONE_CODE void Pass(double* numbers) {
   for (int i = 0; i + 8 < kNumbers; ++i) numbers[i] = 0.5 * numbers[i] + 0.5 * numbers[i + 8];
 }
 
+std::atomic<double> alone = std::numeric_limits<double>::infinity();
+
 }  // namespace
 
 double YardstickNs() {
@@ -55,7 +58,11 @@ double YardstickNs() {
   }
   volatile double kept = matrix[1][0] + numbers[0];  // or there would be nothing to do
   static_cast<void>(kept);
+  for (double known = alone; least < known && !alone.compare_exchange_weak(known, least);) {
+  }
   return least;
 }
+
+double YardstickAloneNs() { return alone; }
 
 }  // namespace loopbench::harness

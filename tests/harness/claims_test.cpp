@@ -172,6 +172,29 @@ TEST(Claims, ARatioComparesTwoSelections) {
   EXPECT_EQ(Evaluate(check, records).state, CheckState::kNotMeasured);
 }
 
+TEST(Claims, AMachineOfTwoSpeedsDecidesNoRatioOfTimes) {
+  Check check = DriftCheck("ladder-1000");
+  check.relative_to = {{"mechanism", {"ladder-100"}}};
+  check.demand.measure = "rhs_ns_median";
+  check.demand.number = 12.0;
+  const auto state = [&](double slower, double ratio, double yardstick) {
+    std::vector<Record> records = {RunOf("ladder-100", "rhs_ns_median", 1e5 * slower),
+                                   RunOf("ladder-1000", "rhs_ns_median", 1e5 * ratio)};
+    records[0].Set("yardstick_ns", 7000.0 * yardstick);
+    records[1].Set("yardstick_ns", 7000.0);
+    const CheckResult result = Evaluate(check, records);
+    EXPECT_EQ(result.state == CheckState::kNotMeasured, Contains(result.reason, "yardstick_ns"));
+    return result.state;
+  };
+  EXPECT_EQ(state(1.0, 11.0, 1.0), CheckState::kHolds);
+  EXPECT_EQ(state(1.0, 13.0, 1.02), CheckState::kFails)
+      << "equal speeds but for the yardstick's own spread";
+  EXPECT_EQ(state(1.5, 13.0, 1.5), CheckState::kNotMeasured) << "of one machine it is 13";
+  EXPECT_EQ(state(1.5, 11.0, 1.5), CheckState::kHolds) << "at any of the two speeds";
+  EXPECT_EQ(state(1.5, 30.0, 1.5), CheckState::kFails);
+  EXPECT_EQ(state(1.0, 11.0, std::numeric_limits<double>::quiet_NaN()), CheckState::kHolds);
+}
+
 TEST(ClaimsReport, EveryCheckShowsNumbersThresholdAndRows) {
   const std::vector<ClaimResult> results = {
       Evaluate(TwoScenes(), std::vector<Record>{RunOf("square", "drift", 1e-14)})};

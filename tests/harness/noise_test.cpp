@@ -10,6 +10,7 @@
 
 #include "harness/config/experiment_reader.h"
 #include "harness/timing/time_cases.h"
+#include "harness/timing/yardstick.h"
 
 namespace loopbench::harness {
 namespace noise_test {
@@ -72,6 +73,25 @@ TEST(Noise, QuantilesAreMembersOfTheSample) {
   EXPECT_TRUE(std::isnan(Quantile({}, 0.5)));
 }
 
+TEST(Noise, QuietRoundsAreTheFirstUndisturbedAndThenTheLeastDisturbed) {
+  using Rounds = std::vector<std::size_t>;
+  EXPECT_EQ(QuietRounds({100, 150, 101, 100.5, 102}, 100.0, 3), (Rounds{0, 2, 3}));
+  EXPECT_EQ(QuietRounds({150, 102, 180, 140, 100}, 100.0, 3), (Rounds{1, 3, 4}));
+  EXPECT_EQ(QuietRounds({150, 140, 160}, 100.0, 3), (Rounds{0, 1, 2})) << "there are no others";
+  EXPECT_EQ(QuietRounds({150, 140}, 100.0, 3), (Rounds{0, 1}));
+}
+
+TEST(Noise, TheYardstickKnowsItsLeast) {
+  const double one = YardstickNs();
+  EXPECT_LE(YardstickAloneNs(), one);
+  const double known = YardstickAloneNs();
+  for (int i = 0; i < 10; ++i) {
+    const double again = YardstickNs();
+    EXPECT_GE(again, YardstickAloneNs());
+  }
+  EXPECT_LE(YardstickAloneNs(), known);
+}
+
 TEST(Noise, TheMachineHasProcessorsAndALoad) {
   const MachineState machine = ReadMachineState();
   EXPECT_GE(machine.processors, 1);
@@ -108,6 +128,7 @@ TEST(TimeTogether, RecordsHoldOrderedStatisticsAndTheAaPair) {
       EXPECT_EQ(record.Number(yardstick), records[0].Number(yardstick));
     }
     EXPECT_EQ(record.Number("repeats"), 3);
+    EXPECT_GE(record.Number("disturbed_rounds"), 0.0);
     const MachineState machine{.load1 = record.Number("load1"),
                                .processors = static_cast<int>(record.Number("processors")),
                                .governor = record.Text("governor")};

@@ -174,7 +174,7 @@ void DenseReduction<Space, S>::Dependent(const VectorX<S>& target, VectorX<S>& x
 
 template <class Space, class S>
 void DenseReduction<Space, S>::Correct(const VectorX<S>& target, VectorX<S>& x) {
-  if (at_velocity_) return Dependent(target, x);
+  if (!uses_null_space_) return Dependent(target, x);
   ConstraintSolver<Space, S>::Correct(target, x);
 }
 

@@ -19,7 +19,7 @@
 //
 // At the other levels the state does not depend on the partition, so that it may change its size.
 // Where it is suspicious, or leaves rows out, a basis of the free directions takes its place
-// (null_space.h), and projections are those of the other formulations. Start() and Review() may
+// (null_space.h). Start() and Review() may
 // allocate.
 #pragma once
 
@@ -56,7 +56,8 @@ class DenseReduction final : public ConstraintSolver<Space, S> {
   /// x by (2) and (3), and lambda from that x.
   void Solve(const VectorX<S>& force, const VectorX<S>& target, VectorX<S>& x,
              VectorX<S>* lambda) override;
-  /// At level velocity what the state carries stays and the dependent ones follow.
+  /// Independent coordinates and speeds stay, and the dependent ones follow; without a partition
+  /// the smallest change in the metric M.
   void Correct(const VectorX<S>& target, VectorX<S>& x) override;
   /// At level velocity the independent speeds; the others follow by (1).
   const std::vector<int>* CarriedSpeeds() const override {

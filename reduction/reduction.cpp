@@ -93,6 +93,8 @@ Outcome SparseOrDense<Space>::Factor(const Kinematics<Space, double>& kinematics
     found.rcond = sparse_->Factor(kinematics);
     // a pivot below a few eps of the largest is round-off of the elimination
     is_sparse_ = found.rcond > 16 * std::numeric_limits<double>::epsilon();
+    // far from the constraints, where a trial step may end, bodies have arms of any length
+    if (!at_velocity_ && dense_ != nullptr) is_sparse_ = is_sparse_ && sparse_->HasMass();
     if (is_sparse_) return Outcome::kFinished;
     if (at_velocity_) return Outcome::kSingular;
   }

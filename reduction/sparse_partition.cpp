@@ -244,6 +244,15 @@ void SparsePartition<Space>::FactorMass() {
   reduced_factor_.compute(reduced_);
 }
 
+template <class Space>
+bool SparsePartition<Space>::HasMass() {
+  if (independent_.empty()) return true;
+  FactorMass();
+  // a factorisation does not stop at what is no number
+  return reduced_factor_.info() == Eigen::Success &&
+         reduced_factor_.matrixLLT().diagonal().allFinite();
+}
+
 /// B^T M B z = B^T (force - M c), x = B z + c.
 template <class Space>
 void SparsePartition<Space>::Solve(const VectorX<double>& force, const VectorX<double>& target,
@@ -252,8 +261,7 @@ void SparsePartition<Space>::Solve(const VectorX<double>& force, const VectorX<d
   x = c_;
   const int f = static_cast<int>(independent_.size());
   if (f == 0) return;
-  FactorMass();
-  if (reduced_factor_.info() != Eigen::Success) {
+  if (!HasMass()) {
     x.setConstant(std::numeric_limits<double>::quiet_NaN());
     return;
   }

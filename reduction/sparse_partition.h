@@ -56,12 +56,14 @@ class SparsePartition {
 
   /// J_D = factors, and B. Its reciprocal condition, 0 where it has no factors.
   double Factor(const Kinematics<Space, double>& kinematics);
+  /// Whether B^T M B of the last Factor() is positive definite: wherever that is no round-off.
+  bool HasMass();
   /// x_D = J_D^-1 target, x_I = 0.
   void Dependent(const VectorX<double>& target, VectorX<double>& x);
   /// (1): u = B u_I, less J_D^-1 b where `bias` is not null.
   void CompleteSpeeds(const VectorX<double>* bias, VectorX<double>& u);
   /// (2) and (3) with `force` (empty: zero) in the place of -h and `target` in that of gamma; not
-  /// finite where B^T M B is not positive definite.
+  /// finite where HasMass() is false.
   void Solve(const VectorX<double>& force, const VectorX<double>& target, VectorX<double>& x);
   /// lambda of J_D^T lambda = (M x - force)_D.
   void Multipliers(const VectorX<double>& force, const VectorX<double>& x, VectorX<double>& lambda);

@@ -13,8 +13,8 @@ namespace loopbench::harness {
 /// three, which take some 20 us together.
 double YardstickNs();
 
-/// The least that YardstickNs() found in this process and before it was forked: how fast the machine
-/// is for whoever has it alone, as far as is known. Infinite before the first.
+/// The least that YardstickNs() found in this process and before it was forked: how fast the
+/// machine is for whoever has it alone, as far as is known. Infinite before the first.
 double YardstickAloneNs();
 
 }  // namespace loopbench::harness

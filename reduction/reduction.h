@@ -4,8 +4,9 @@
 //
 // At level velocity the state carries the independent speeds: what the start chose stays sparse or
 // dense for the whole run, and J_D is judged by its pivots alone. At all other levels nothing hangs
-// on which speeds are dependent: each position is judged by all joints' pivots, and has the choice
-// that is best there, or dense matrices.
+// on which speeds are dependent, and sparse factors have the choice that is best at each position,
+// if all joints' pivots leave no doubt there. Where a dense partition is less work, they take its
+// place as soon as it is suspicious; the dense null space has what is left.
 #pragma once
 
 #include <memory>

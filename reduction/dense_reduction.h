@@ -19,8 +19,7 @@
 //
 // At the other levels the state does not depend on the partition, so that it may change its size.
 // Where it is suspicious, or leaves rows out, a basis of the free directions takes its place
-// (null_space.h). Start() and Review() may
-// allocate.
+// (null_space.h). Start() and Review() may allocate.
 #pragma once
 
 #include <memory>

@@ -135,13 +135,14 @@ bool HoldsOfRatio(const Check& check, const Sample& above, const Sample& below,
   const double ratio = numerator / denominator;
   *measured = fmt::format("{:.3g} ({:.3g} / {:.3g})", ratio, numerator, denominator);
   const double speed = OtherSpeed(check, above, below);
-  if (Meets(check.demand, ratio * speed) != Meets(check.demand, ratio / speed)) {
+  const bool holds = Meets(check.demand, ratio);
+  if (Meets(check.demand, ratio * speed) != holds || Meets(check.demand, ratio / speed) != holds) {
     *uncertain = fmt::format(
         "the machine's speed changed by a factor of {:.3g} in between (yardstick_ns): time again "
         "with run --timing-only --rerun all",
         speed);
   }
-  return Meets(check.demand, ratio);
+  return holds;
 }
 
 }  // namespace

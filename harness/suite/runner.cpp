@@ -73,10 +73,7 @@ std::size_t Runner::Run(const std::string& what, std::vector<Piece> all, int job
     store_.LeaveToParent();
     return AnswerOf(pieces[i]);
   };
-  const auto limits = [&](std::size_t i) {
-    YardstickNs();  // before the fork, so that the child knows how fast the machine has been
-    return pieces[i].limits;
-  };
+  const auto limits = [&](std::size_t i) { return pieces[i].limits; };
   const auto keep = [&](const std::vector<TaskResult>& ended) {
     std::vector<Record> records;
     for (const auto& [i, result] : ended) {
@@ -99,7 +96,11 @@ std::size_t Runner::Run(const std::string& what, std::vector<Piece> all, int job
                                             {.started = started, .waited = waited});
   } else {
     count.processes += pieces.size();
-    RunInProcesses(pieces.size(), jobs, work, limits,
+    const auto before_fork = [&](std::size_t i) {
+      YardstickNs();  // timings know by it how fast the machine has been
+      return limits(i);
+    };
+    RunInProcesses(pieces.size(), jobs, work, before_fork,
                    [&](std::size_t i, const ProcessResult& result) {
                      keep({{i, result}});
                    },

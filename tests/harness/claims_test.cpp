@@ -193,6 +193,11 @@ TEST(Claims, AMachineOfTwoSpeedsDecidesNoRatioOfTimes) {
   EXPECT_EQ(state(1.5, 11.0, 1.5), CheckState::kHolds) << "at any of the two speeds";
   EXPECT_EQ(state(1.5, 30.0, 1.5), CheckState::kFails);
   EXPECT_EQ(state(1.0, 11.0, std::numeric_limits<double>::quiet_NaN()), CheckState::kHolds);
+  check.demand.relation = Relation::kWithin;
+  check.demand.number = 10.0;
+  check.demand.tolerance = 1.0;
+  EXPECT_EQ(state(1.0, 10.0, 1.0), CheckState::kHolds);
+  EXPECT_EQ(state(1.2, 12.0, 1.2), CheckState::kNotMeasured) << "what holds between both ends";
 }
 
 TEST(ClaimsReport, EveryCheckShowsNumbersThresholdAndRows) {

@@ -1,8 +1,8 @@
 // "ground" and "bodies" of a mechanism file.
 #include <Eigen/Cholesky>
-#include <Eigen/Eigenvalues>
 
 #include "harness/config/mechanism_sections.h"
+#include "mechanism/algebra/symmetric_eigen.h"
 
 namespace loopbench::harness {
 namespace {
@@ -59,8 +59,7 @@ void ReadInertia(const JsonNode& node, Body& body) {
   if (!positive || body.draft->space == SpaceKind::kPlanar) return;
   // Three significant digits, as data sheets print them, are off by up to 0.5 % in each moment.
   constexpr double kPrinted = 0.01;
-  const Eigen::Vector3d moments =
-      Eigen::SelfAdjointEigenSolver<Eigen::Matrix3d>(inertia, Eigen::EigenvaluesOnly).eigenvalues();
+  const Eigen::Vector3d moments = SymmetricEigenvalues(inertia);
   if (moments[2] > (1.0 + kPrinted) * (moments[0] + moments[1])) {
     node.Fail(
         "principal moments of which none exceeds the sum of the other two, as no body's does");

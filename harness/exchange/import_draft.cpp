@@ -2,9 +2,10 @@
 
 #include <fmt/format.h>
 
-#include <Eigen/Eigenvalues>
 #include <algorithm>
 #include <cmath>
+
+#include "mechanism/algebra/symmetric_eigen.h"
 
 namespace loopbench::harness {
 
@@ -98,9 +99,7 @@ void ImportDraft::CheckMass(int index) const {
   if (!std::isfinite(body.mass) || !body.com.allFinite() || !body.inertia.allFinite()) {
     element.Fail("numbers too large for its mass and inertia", "a body of finite mass and size");
   }
-  const Eigen::Vector3d moments =
-      Eigen::SelfAdjointEigenSolver<Eigen::Matrix3d>(body.inertia, Eigen::EigenvaluesOnly)
-          .eigenvalues();
+  const Eigen::Vector3d moments = SymmetricEigenvalues(body.inertia);
   const std::string shown = fmt::format("principal moments {:.4g}, {:.4g}, {:.4g} kg m^2",
                                         moments[0], moments[1], moments[2]);
   if (!(moments[0] > 0.0)) element.Fail(shown, "three that are > 0");

@@ -1,9 +1,8 @@
 // <worldbody>: bodies, their masses and their sites.
 #include <fmt/format.h>
 
-#include <Eigen/Eigenvalues>
-
 #include "harness/exchange/import_mjcf.h"
+#include "mechanism/algebra/symmetric_eigen.h"
 
 namespace loopbench::harness {
 
@@ -149,19 +148,20 @@ void ReadBody(const Placed& placed, int parent, MjcfModel* model) {
 
 /// As MuJoCo's compiler: A + B >= C by taking the mean of the three.
 void Balance(Eigen::Matrix3d* inertia) {
-  const Eigen::Vector3d moments =
-      Eigen::SelfAdjointEigenSolver<Eigen::Matrix3d>(*inertia, Eigen::EigenvaluesOnly)
-          .eigenvalues();
+  const Eigen::Vector3d moments = SymmetricEigenvalues(*inertia);
   if (moments[0] + moments[1] < moments[2]) {
     *inertia = moments.mean() * Eigen::Matrix3d::Identity();
   }
 }
 
 void BoundBelow(double least, Eigen::Matrix3d* inertia) {
-  const Eigen::SelfAdjointEigenSolver<Eigen::Matrix3d> solver(*inertia);
-  if (solver.eigenvalues().minCoeff() >= least) return;
-  *inertia = solver.eigenvectors() * solver.eigenvalues().cwiseMax(least).asDiagonal() *
-             solver.eigenvectors().transpose();
+  MatrixX<double> A = *inertia, U(3, 3);
+  VectorX<double> moments(3);
+  SymmetricEigen<double>(A, U, moments);
+  if (moments[0] >= least) return;
+  const Eigen::Matrix3d axes = U;
+  const Eigen::Vector3d bounded = moments.cwiseMax(least);
+  *inertia = axes * bounded.asDiagonal() * axes.transpose();
 }
 
 }  // namespace

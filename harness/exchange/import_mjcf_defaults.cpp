@@ -144,7 +144,7 @@ Eigen::Quaterniond MjcfModel::OrientationOf(const MjcfElement& element) const {
     return Eigen::Quaterniond(Eigen::AngleAxisd(settings.Angle(a[3]), unit({a[0], a[1], a[2]})));
   }
   if (way == "zaxis") {
-    return Eigen::Quaterniond::FromTwoVectors(Eigen::Vector3d::UnitZ(), unit(found->Vector()));
+    return TurnOfZ(unit(found->Vector()));
   }
   const std::vector<double> a = found->Numbers(6, 6);
   const Eigen::Vector3d x = unit({a[0], a[1], a[2]}), y_given(a[3], a[4], a[5]);

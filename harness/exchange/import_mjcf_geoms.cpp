@@ -77,7 +77,7 @@ std::vector<double> PlaceAndSize(const MjcfModel& model, const MjcfElement& geom
   if (!(length > 0.0)) along->Fail("two different points");
   X->p = 0.5 * (from + to);
   // z along the line, from the second end to the first as MuJoCo has it: the shapes are symmetric
-  X->q = Eigen::Quaterniond::FromTwoVectors(Eigen::Vector3d::UnitZ(), to - from);
+  X->q = TurnOfZ(to - from);
   if (type == 1 || type == 2) return {sizes[0], 0.5 * length, 0.0};
   return {sizes[0], sizes[0], 0.5 * length};
 }

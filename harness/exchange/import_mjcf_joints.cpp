@@ -9,6 +9,7 @@
 #include <cmath>
 
 #include "harness/exchange/import_mjcf.h"
+#include "mechanism/algebra/symmetric_eigen.h"
 
 namespace loopbench::harness {
 
@@ -46,7 +47,8 @@ std::optional<Vector3d> MeetingPoint(const std::vector<MjcfJoint>& hinges) {
   };
   if (std::ranges::all_of(hinges, at_first)) return hinges[0].position;
   // the point of the least squares of the distances to all axes
-  Eigen::Matrix3d A = Eigen::Matrix3d::Zero();
+  MatrixX<double> A = MatrixX<double>::Zero(3, 3), U(3, 3);
+  VectorX<double> lambda(3);
   Vector3d b = Vector3d::Zero();
   double arms = 1.0;
   for (const MjcfJoint& hinge : hinges) {
@@ -56,7 +58,12 @@ std::optional<Vector3d> MeetingPoint(const std::vector<MjcfJoint>& hinges) {
     b += across * hinge.position;
     arms += hinge.position.norm();
   }
-  const Vector3d point = A.fullPivLu().solve(b);
+  SymmetricEigen<double>(A, U, lambda);
+  Vector3d point = Vector3d::Zero();
+  for (Eigen::Index k = 0; k < 3; ++k) {
+    const Vector3d u = U.col(k);
+    if (lambda[k] > kAligned) point += u.dot(b) / lambda[k] * u;  // else all axes are parallel
+  }
   for (const MjcfJoint& hinge : hinges) {
     const Vector3d way = point - hinge.position;
     if (!((way - way.dot(hinge.axis) * hinge.axis).norm() <= kAligned * arms)) return std::nullopt;
@@ -95,7 +102,7 @@ std::optional<Composed> ComposeTwo(const std::vector<MjcfJoint>& joints, const S
   if (sorted.hinges.size() != 1 || sorted.slides.size() != 1) return std::nullopt;
   const MjcfJoint &hinge = sorted.hinges[0], &slide = sorted.slides[0];
   if (Parallel(hinge.axis, slide.axis)) {
-    const Eigen::Quaterniond q = Eigen::Quaterniond::FromTwoVectors(Vector3d::UnitZ(), hinge.axis);
+    const Eigen::Quaterniond q = TurnOfZ(hinge.axis);
     return Composed{JointType::kCylindrical, {q, hinge.position}};
   }
   if (!Perpendicular(hinge.axis, slide.axis)) return std::nullopt;

@@ -38,6 +38,20 @@ Eigen::Quaterniond FromEuler(const std::string& sequence, const Eigen::Vector3d&
   return q;
 }
 
+/// Eigen's FromTwoVectors takes the compiler eight seconds.
+Eigen::Quaterniond TurnOfZ(const Eigen::Vector3d& to) {
+  const Eigen::Vector3d z = to.normalized();
+  if (z.z() < 0.0) {
+    const double across = std::hypot(z.x(), z.y());
+    const Eigen::Vector3d axis = across > 0.0
+                                     ? Eigen::Vector3d(-z.y() / across, z.x() / across, 0.0)
+                                     : Eigen::Vector3d::UnitX();
+    return Eigen::Quaterniond(Eigen::AngleAxisd(std::atan2(across, z.z()), axis));
+  }
+  const double root = std::sqrt(2.0 * (1.0 + z.z())), inverse = 1.0 / root;
+  return {0.5 * root, -z.y() * inverse, z.x() * inverse, 0.0};
+}
+
 Eigen::Matrix3d InTurnedAxes(const Eigen::Quaterniond& q, const Eigen::Matrix3d& inertia) {
   if (q.vec().isZero(0.0)) return inertia;
   const Eigen::Matrix3d R = q.toRotationMatrix();

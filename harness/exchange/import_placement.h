@@ -42,6 +42,9 @@ Eigen::Quaterniond FromRollPitchYaw(const Eigen::Vector3d& angles);
 /// about those that stand still (MJCF's eulerseq) [rad].
 Eigen::Quaterniond FromEuler(const std::string& sequence, const Eigen::Vector3d& angles);
 
+/// The shortest turn that takes z there; half a turn about x to the other side, as MuJoCo's.
+Eigen::Quaterniond TurnOfZ(const Eigen::Vector3d& to);
+
 /// An inertia in axes B, in axes A; q is R_AB. The same bits where they are parallel.
 Eigen::Matrix3d InTurnedAxes(const Eigen::Quaterniond& q, const Eigen::Matrix3d& inertia);
 

@@ -7,6 +7,8 @@
 #include <numbers>
 
 #include "mechanism/algebra/decompositions.h"
+#include "mechanism/algebra/factors.h"
+#include "mechanism/algebra/singular_values.h"
 #include "mechanism/loops/direction_rows.h"
 #include "mechanism/loops/scaled_loops.h"
 
@@ -106,7 +108,8 @@ class Follower {
       Eigen::CompleteOrthogonalDecomposition<MatrixXd> solver;
       solver.setThreshold(1e-9);
       solver.compute(here.rows);
-      const VectorXd back = here.mass.matrixU().solve(VectorXd(solver.solve(-here.mismatch)));
+      const VectorXd back =
+          here.mass.matrixU().solve(VectorXd(solver.solve(VectorXd(-here.mismatch))));
       if (!(Size(back) < 1.0)) return false;
       Shift(back);
     }
@@ -162,19 +165,20 @@ std::vector<Beginning> Beginnings(const Follower<Space>& start, std::size_t most
   bool good = static_cast<Eigen::Index>(chosen.size()) == count;
   if (good) {
     take();
-    const Eigen::VectorXd values = Eigen::JacobiSVD<MatrixXd>(own).singularValues();
-    good = values[count - 1] > kIndependent * values[0];
+    SingularValues<double> values;
+    values.ComputeValues(own);
+    good = values.sigma()[count - 1] > kIndependent * values.sigma()[0];
   }
   if (!good) {
     // a motion is better called by a pin than by one of the three speeds of a ball
-    const Eigen::ColPivHouseholderQR<MatrixXd> qr(
-        (scaled.transpose() * Clearness(mechanism).asDiagonal()).eval());
+    const MatrixXd clear = scaled.transpose() * Clearness(mechanism).asDiagonal();
+    const Eigen::ColPivHouseholderQR<MatrixXd> qr(clear);
     const auto& order = qr.colsPermutation().indices();
     chosen.assign(order.data(), order.data() + count);
     std::ranges::sort(chosen);
     take();
   }
-  const MatrixXd basis = permitted * own.fullPivLu().inverse();
+  const MatrixXd basis = permitted * Eigen::PartialPivLU<MatrixXd>(own).inverse();
   for (Eigen::Index i = 0; i < count && all.size() < most; ++i) {
     all.push_back({chosen[static_cast<std::size_t>(i)], basis.col(i)});
   }

@@ -1,5 +1,6 @@
 #include "mechanism/algebra/singular_values.h"
 
+#include <Eigen/Jacobi>
 #include <algorithm>
 #include <cmath>
 #include <limits>
@@ -25,25 +26,14 @@ S Product(const MatrixX<S>& A, Index p, Index q) {
   return A.col(p).dot(A.col(q));
 }
 
-/// Columns p and q of A times [c s; -s c].
-template <class S>
-void Turn(MatrixX<S>& A, Index p, Index q, const S& c, const S& s) {
-  S *first = &A(0, p), *second = &A(0, q);
-  for (Index i = 0; i < A.rows(); ++i) {
-    const S a = first[i], b = second[i];
-    first[i] = c * a - s * b;
-    second[i] = s * a + c * b;
-  }
-}
-
-/// A column from row `first` on, times the reflection I - tau v v^T, v[0] = 1.
+/// A column from some row on, times the reflection I - tau v v^T, v[0] = 1.
 template <class S>
 void Reflect(const S* v, const S& tau, Index size, S* column) {
-  S along = column[0];
-  for (Index i = 1; i < size; ++i) along += v[i] * column[i];
-  along *= tau;
+  const Eigen::Map<const VectorX<S>> rest(v + 1, size - 1);
+  Eigen::Map<VectorX<S>> below(column + 1, size - 1);
+  const S along = tau * (column[0] + rest.dot(below));
   column[0] -= along;
-  for (Index i = 1; i < size; ++i) column[i] -= along * v[i];
+  below -= along * rest;
 }
 
 }  // namespace
@@ -150,8 +140,9 @@ void SingularValues<S>::Rotate(Index p, Index q, const S& product, bool vectors)
   const S root = size * std::numeric_limits<S>::epsilon() > S(1) ? size : sqrt(1 + zeta * zeta);
   const S t = (zeta < S(0) ? S(-1) : S(1)) / (size + root);
   const S c = 1 / sqrt(1 + t * t), s = c * t;
-  Turn(W_, p, q, c, s);
-  if (vectors) Turn(J_, p, q, c, s);
+  const Eigen::JacobiRotation<S> rotation(c, s);  // columns p and q times [c s; -s c]
+  W_.applyOnTheRight(p, q, rotation);
+  if (vectors) J_.applyOnTheRight(p, q, rotation);
   squares_[p] = Product(W_, p, p);
   squares_[q] = Product(W_, q, q);
 }

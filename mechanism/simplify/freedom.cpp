@@ -1,10 +1,10 @@
 #include "mechanism/simplify/freedom.h"
 
 #include <Eigen/Cholesky>
-#include <Eigen/Eigenvalues>
 #include <algorithm>
 #include <cmath>
 
+#include "mechanism/algebra/symmetric_eigen.h"
 #include "mechanism/loops/excursion.h"
 #include "mechanism/loops/scaled_loops.h"
 #include "mechanism/start/assembly.h"
@@ -109,9 +109,7 @@ class Measuring {
   double Share(int body) const {
     MatrixXd scaled = whole_.matrixL().solve(Energies(body));
     scaled = whole_.matrixL().solve(MatrixXd(scaled.transpose()));
-    return Eigen::SelfAdjointEigenSolver<MatrixXd>(scaled, Eigen::EigenvaluesOnly)
-        .eigenvalues()
-        .maxCoeff();
+    return SymmetricEigenvalues(scaled).maxCoeff();
   }
 
   double Mobility(const ForceDescription& force) const {

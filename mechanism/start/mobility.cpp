@@ -79,10 +79,8 @@ bool IsRigidToSecondOrder(const Mechanism<Space, double>& mechanism, const Vecto
   // the start closes to some 1e-10 of its size, and the self-stresses are as good
   constexpr double kDefinite = 1e-8;
   const double least = kDefinite * largest;
-  MatrixX<double> directions(free, free);
-  VectorX<double> values(free);
   return largest > 0.0 && std::ranges::any_of(forms, [&](Eigen::MatrixXd& form) {
-           SymmetricEigen<double>(form, directions, values);
+           const VectorX<double> values = SymmetricEigenvalues(form);
            return values[0] > least || values[free - 1] < -least;
          });
 }

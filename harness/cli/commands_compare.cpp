@@ -311,7 +311,7 @@ int PrintFits(const FitCommand& command, const std::string& typed) {
                    {"failed", "failed", Format::kInteger}};
   table.rows = FitFamilies(benchmarks, command.from);
   if (table.rows.empty()) {
-    PrintError("{}: no family of benchmarks with two sizes or more\n", command.file.string());
+    PrintError("{}: no family of right-hand sides with two sizes or more\n", command.file.string());
     return 2;
   }
   if (command.format != "text" || !command.out.empty()) {

@@ -27,7 +27,8 @@ constexpr const char* kFitFooter = R"(
 Examples:
   loopbench_bench --benchmark_filter=/chain/ --benchmark_out=chain.json
   loopbench fit chain.json
-  loopbench fit chain.json --from 30 --format markdown --out chain.md)";
+  loopbench fit chain.json --from 30 --format markdown --out chain.md
+  loopbench fit results/runs/paper                     # timings of "chain-3", "chain-10", ...)";
 
 constexpr const char* kExportFooter = R"(
 Examples:
@@ -80,9 +81,12 @@ ComparisonOptions::ComparisonOptions(CLI::App& app) {
   AddWide(compare_app_);
   AddJson(compare_app_, &compare_.json);
 
-  fit_app_ = app.add_subcommand("fit", "Fit exponents of time over size to benchmarks");
+  fit_app_ = app.add_subcommand("fit", "Fit exponents of time over size to right-hand sides");
   fit_app_->footer(kFitFooter);
-  fit_app_->add_option("file", fit_.file, "JSON of Google Benchmark")->required();
+  fit_app_
+      ->add_option("file", fit_.file,
+                   "JSON of Google Benchmark, or a result store with timings of families")
+      ->required();
   fit_app_->add_option("--from", fit_.from, "Leave out sizes below [bodies]")
       ->check(NumberFrom(0.0, 1e9));
   fit_app_->add_option("--format", fit_.format, "How the table is written")

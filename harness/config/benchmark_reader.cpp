@@ -11,6 +11,7 @@
 #include "harness/config/formulations.h"
 #include "harness/config/mechanism_reader.h"
 #include "harness/config/options.h"
+#include "harness/config/sized_family.h"
 #include "harness/json/document_kind.h"
 #include "harness/text/config_error.h"
 #include "mechanism/description/in_space.h"
@@ -18,8 +19,6 @@
 
 namespace loopbench::harness {
 namespace {
-
-const std::vector<std::string> kFamilies = {"chain", "ladder", "grid", "tree", "arm", "ring"};
 
 std::vector<BenchmarkMember> ReadBenchmarkMechanisms(const JsonNode& node,
                                                      const std::filesystem::path& folder,
@@ -43,18 +42,15 @@ std::vector<BenchmarkMember> ReadBenchmarkMechanisms(const JsonNode& node,
 
 std::vector<BenchmarkMember> ReadBenchmarkFamily(const JsonNode& node, const JsonNode& owner) {
   std::vector<BenchmarkMember> members;
-  const auto index = node.Choice(kFamilies, "a family");
+  const auto index = node.Choice(NamesOfSizedFamilies(), "a family");
   const auto sizes = owner.Required("sizes", "a list of integers");
   if (!index || !sizes) return members;
-  const std::string& family = kFamilies[static_cast<std::size_t>(*index)];
-  // the smallest loops that move have three bars in the plane and six in space
-  const int smallest = family == "chain" ? 3 : family == "ring" ? 6 : 1;
-  const int largest = family == "grid" ? kLargestGrid : kLargestMember;
+  const SizedFamily& family = SizedFamilies()[static_cast<std::size_t>(*index)];
   for (const JsonNode& size : sizes->OneOrMore("sizes")) {
     BenchmarkMember member;
-    member.family = family;
-    member.size = static_cast<int>(size.Integer(smallest, largest));
-    member.name = fmt::format("{}/{}", family, member.size);
+    member.family = family.name;
+    member.size = static_cast<int>(size.Integer(family.smallest, family.largest));
+    member.name = fmt::format("{}/{}", family.name, member.size);
     members.push_back(std::move(member));
   }
   return members;
@@ -125,10 +121,8 @@ const Fields<GroupInFile>& GroupFields() {
       "group", "Mechanisms, or members of a family, and what is measured of them.",
       {{"mechanisms", OneOrMoreSchema(TextSchema()),
         "Paths of mechanism files, relative to this file."},
-       {"family", ChoiceSchema(kFamilies),
-        "Bars in a closed chain, windows in a row, storeys of as many windows, bars in a binary "
-        "tree."},
-       {"sizes", OneOrMoreSchema(IntegerSchema(1, kLargestMember)), "Of the family's members."},
+       {"family", ChoiceSchema(NamesOfSizedFamilies()), "What grows."},
+       {"sizes", OneOrMoreSchema(IntegerSchema(1, kMaxCount)), TextOfSizedFamilies()},
        {"", By(one_of_two, ReadMembers)},
        {"in_space", Bool(&GroupInFile::in_space),
         "The planar members, described in a tilted plane in space."},

@@ -24,11 +24,10 @@ inline constexpr std::array<std::string_view, 2> kNames<BenchmarkKind> = {"rhs",
 /// One mechanism that is measured, made when it is needed: members of families may be large.
 struct BenchmarkMember {
   std::string name;    ///< "four-bar", or "chain/10" for the member of size 10 of a family
-  std::string family;  ///< "chain", "ladder", "grid", or "" for a mechanism of its own
-  int size = 0;        ///< bars of a chain, windows of a ladder, storeys and windows of a grid
+  std::string family;  ///< a SizedFamily, or "" for a mechanism of its own
+  int size = 0;        ///< of the family's member
   MechanismDescription description;  ///< of a mechanism of its own
 
-  /// The mechanism with its start: families get speeds, so that no term of the equations vanishes.
   MechanismDescription Make() const;
 };
 
@@ -54,10 +53,5 @@ struct BenchmarkSet {
 
 /// "rhs/chain/10/odca/acceleration/joint/rank-revealing".
 std::string BenchmarkName(BenchmarkKind kind, const BenchmarkMember& member, const Column& column);
-
-/// Largest member of each family the readers accept. A grid's storeys stand at angles that grow by
-/// 0.1 rad; beyond 25 the last would fold flat.
-inline constexpr int kLargestGrid = 25;
-inline constexpr int kLargestMember = 1'000'000;
 
 }  // namespace loopbench::harness

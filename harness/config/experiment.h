@@ -126,8 +126,8 @@ struct Limits {
 /// A family of mechanisms of growing size (mechanism/description/library.h), timed per right-hand
 /// side only.
 struct TimingFamily {
-  std::string family;      ///< "chain" or "ladder"
-  std::vector<int> sizes;  ///< bars of a chain, windows of a ladder
+  std::string family;      ///< a SizedFamily (harness/config/sized_family.h)
+  std::vector<int> sizes;  ///< of its members
   std::vector<Column> columns;
 };
 

@@ -3,6 +3,7 @@
 
 #include "harness/config/experiment_sections.h"
 #include "harness/config/limits_record.h"
+#include "harness/config/sized_family.h"
 
 namespace loopbench::harness {
 namespace {
@@ -23,9 +24,9 @@ void CheckOneCpuLimit(const JsonNode& node, Limits&) {
 void ReadFormerName(const JsonNode& node, Limits& limits) { limits.cpu_s = node.Number(kPositive); }
 
 void ReadSizes(const JsonNode& node, TimingFamily& family) {
-  // the smallest closed chain has three bars
-  const int smallest = family.family == "chain" ? 3 : 1;
-  for (const std::int64_t size : node.IntegerList(smallest, kMaxCount)) {
+  if (family.family.empty()) return;  // which has been said
+  const SizedFamily& of = SizedFamilyOf(family.family);
+  for (const std::int64_t size : node.IntegerList(of.smallest, of.largest)) {
     family.sizes.push_back(static_cast<int>(size));
   }
 }
@@ -50,17 +51,22 @@ Json CasesAloneSchema() {
 }
 
 const Fields<TimingFamily>& TimingFamilyFields() {
-  static const Json chains_from_three = {
-      {"if", {{"properties", {{"family", ChoiceSchema({"chain"})}}}}},
-      {"then", {{"properties", {{"sizes", IntegerListSchema(3, kMaxCount)}}}}}};
+  Json ranges = Json::array();
+  for (const SizedFamily& family : SizedFamilies()) {
+    if (family.smallest == 1 && family.largest == kMaxCount) continue;
+    ranges.push_back(
+        {{"if", {{"properties", {{"family", ChoiceSchema({family.name})}}}}},
+         {"then",
+          {{"properties", {{"sizes", IntegerListSchema(family.smallest, family.largest)}}}}}});
+  }
   static const Fields<TimingFamily> fields(
       "timingFamily", "Mechanisms of growing size, timed per right-hand side only.",
-      {{"family", Choice(&TimingFamily::family, {"chain", "ladder"}, "a family"), "What grows.",
+      {{"family", Choice(&TimingFamily::family, NamesOfSizedFamilies(), "a family"), "What grows.",
         "a family"},
-       {"sizes", By(IntegerListSchema(1, kMaxCount), ReadSizes),
-        "Bars of a chain (from 3), windows of a ladder (from 1).", "a list of integers"},
+       {"sizes", By(IntegerListSchema(1, kMaxCount), ReadSizes), TextOfSizedFamilies(),
+        "a list of integers"},
        {"columns", Columns(&TimingFamily::columns), "Timed.", "an array of columns"},
-       {"", chains_from_three}});
+       {"", Json::object({{"allOf", ranges}})}});
   return fields;
 }
 

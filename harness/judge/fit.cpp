@@ -39,6 +39,24 @@ FamilyName Split(const std::string& benchmark) {
   return family;
 }
 
+/// Of a benchmark its own; of a timing the name that a benchmark of it would have, with the number
+/// at the end of its mechanism's name as a part ("chain-10" is "chain/10").
+std::string BenchmarkNameOf(const Record& record) {
+  if (record.Find("benchmark") != nullptr) return record.Text("benchmark");
+  if (record.Text("kind") != "timing") return "";
+  std::string name = record.Text("mechanism");
+  const std::size_t digits = name.find_last_not_of("0123456789") + 1;
+  if (digits == 0 || digits == name.size() || name[digits - 1] != '-') return "";
+  name[digits - 1] = '/';
+  name = "rhs/" + name;
+  for (const char* key : {"formulation", "enforcement", "coordinates", "solver", "integrator"}) {
+    if (const std::string word = record.Text(key); !word.empty()) name += "/" + word;
+  }
+  const std::string threads = record.Text("threads");
+  if (!threads.empty()) name += "/" + threads + "-threads";
+  return name;
+}
+
 struct Points {
   std::vector<double> sizes, times;
   std::int64_t failed = 0;
@@ -46,17 +64,18 @@ struct Points {
 
 }  // namespace
 
-std::vector<Record> FitFamilies(const std::vector<Record>& benchmarks, double from) {
+std::vector<Record> FitFamilies(const std::vector<Record>& measured, double from) {
   std::vector<std::string> order;
   std::map<std::string, Points> families;
-  for (const Record& record : benchmarks) {
-    const FamilyName family = Split(record.Text("benchmark"));
+  for (const Record& record : measured) {
+    const FamilyName family = Split(BenchmarkNameOf(record));
     if (family.name.empty()) continue;
     const auto [at, is_new] = families.try_emplace(family.name);
     if (is_new) order.push_back(family.name);
     const double bodies = record.Number("bodies");
     const double size = std::isnan(bodies) ? family.size : bodies;
-    const double time = Median(record.Numbers("series.cpu_ns"));
+    const double time = Median(record.Numbers(
+        record.Find("series.cpu_ns") != nullptr ? "series.cpu_ns" : "series.rhs_ns"));
     if (record.Text("outcome") != "finished" || std::isnan(time)) {
       ++at->second.failed;
     } else if (size >= from) {

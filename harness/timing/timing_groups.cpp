@@ -1,10 +1,10 @@
 // What is timed together: the columns of a scene, or of a member of a family.
 #include <fmt/format.h>
 
+#include "harness/config/sized_family.h"
 #include "harness/run/case_identity.h"
 #include "harness/run/compiled_scene.h"
 #include "harness/timing/time_cases.h"
-#include "mechanism/description/library.h"
 
 namespace loopbench::harness {
 
@@ -16,13 +16,6 @@ MechanismDescription OneSystem(const Experiment& experiment, std::size_t scene) 
   options.islands = false;
   const MechanismFile& file = experiment.scenes[scene].mechanism;
   return CompileScene(file.description, file.observe, options).compiled.parts.front().description;
-}
-
-MechanismDescription MakeFamilyMember(const TimingFamily& family, int size) {
-  if (family.family == "ladder") return Ladder(size, 1.0, 1.0);
-  MechanismDescription chain = Chain(size);
-  chain.initial.speeds.push_back({0, {1.0}});  // a moving chain: the other speeds follow
-  return chain;
 }
 
 void SetTimingId(const std::string& content, Record* keys) {
@@ -51,7 +44,7 @@ std::vector<TimingGroup> TimingGroups(const Experiment& experiment) {
   for (const TimingFamily& family : experiment.timing.families) {
     for (const int size : family.sizes) {
       TimingGroup group{fmt::format("{}-{}", family.family, size),
-                        [&family, size] { return MakeFamilyMember(family, size); },
+                        [make = SizedFamilyOf(family.family).make, size] { return make(size); },
                         {},
                         false};
       for (const Column& column : family.columns) {

@@ -47,7 +47,7 @@ TEST_F(ComparisonCommands, RefuseWhatIsNotThere) {
   Expect("compare b.json text.json", 2, {"text.json:1:"});
   Expect("compare b.json b.json", 2, {"COULD NOT MEASURE"});
   Expect("compare b.json b.json --only speed", 2, {"--only"});
-  Expect("fit b.json", 2, {"no family of benchmarks"});
+  Expect("fit b.json", 2, {"no family of right-hand sides"});
   Expect("export b.json", 2, {"nothing to export"});
   Expect("compare --help", 0, {"Examples:", "Exit codes:"});
 }

@@ -91,5 +91,33 @@ TEST(FitFamilies, GroupsByTheNumberInTheName) {
   EXPECT_EQ(FitFamilies({Benchmark("a/inf/1", 1, 1), Benchmark("a/inf/2", 2, 2)}, 0.0).size(), 1u);
 }
 
+TEST(FitFamilies, TakesTheTimingsOfAStore) {
+  std::vector<Record> records;
+  for (const double n : {10.0, 100.0}) {
+    for (const char* formulation : {"odca", "peer/simbody"}) {
+      Record timing;
+      timing.Set("kind", std::string("timing"));
+      timing.Set("mechanism", "crooked-chain-" + std::to_string(static_cast<int>(n)));
+      timing.Set("formulation", std::string(formulation));
+      timing.Set("enforcement", std::string("position"));
+      timing.Set("outcome", std::string("finished"));
+      timing.Set("bodies", n);
+      timing.Set("series.rhs_ns",
+                 std::vector<double>{std::string(formulation) == "odca" ? 3.0 * n : n * n});
+      records.push_back(timing);
+    }
+  }
+  records.push_back(records.front());
+  records.back().Set("mechanism", std::string("four-bar"));  // has no size
+  records.push_back(records.front());
+  records.back().Set("kind", std::string("case"));
+  const std::vector<Record> rows = FitFamilies(records, 0.0);
+  ASSERT_EQ(rows.size(), 2u);
+  EXPECT_EQ(rows[0].Text("family"), "rhs/crooked-chain/N/odca/position");
+  EXPECT_NEAR(rows[0].Number("exponent"), 1.0, 1e-13);
+  EXPECT_EQ(rows[1].Text("family"), "rhs/crooked-chain/N/peer/simbody/position");
+  EXPECT_NEAR(rows[1].Number("exponent"), 2.0, 1e-13);
+}
+
 }  // namespace scaling_test
 }  // namespace loopbench::harness

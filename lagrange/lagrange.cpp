@@ -51,6 +51,7 @@ Outcome Lagrange<Space, S>::Factor(const Kinematics<Space, S>& kinematics) {
                              .rcond = joints_->rcond(),
                              .smallest_weight = 1.0,
                              .worst_joint = joints_->worst_joint()};
+      if (dense_ == nullptr) is_sparse_ = joints_->has_rank();  // with the digits that there are
       if (is_sparse_) return Outcome::kFinished;
       if (dense_ == nullptr) {
         return joints_->IsFinite() ? Outcome::kSingular : Outcome::kNonFinite;

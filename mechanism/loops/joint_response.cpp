@@ -1,10 +1,54 @@
 #include "mechanism/loops/joint_response.h"
 
 #include <algorithm>
+#include <limits>
 
 #include "mechanism/loops/loop_solver.h"
 
 namespace loopbench {
+
+namespace {
+
+/// By joint: whether its bodies are connected in another way too. A joint that alone holds what
+/// hangs on it bears no self-stress, however small its pivot is beside what it holds.
+template <class Space>
+std::vector<bool> OnLoops(const Mechanism<Space, double>& mechanism) {
+  struct Step {
+    int depth = 0, joint = -1;  ///< towards Ground
+    int up = kGround;           ///< the next body whose step is not known to be on a loop
+  };
+  std::vector<Step> steps(static_cast<std::size_t>(mechanism.num_bodies()));
+  for (std::size_t body = 0; body < steps.size(); ++body) steps[body].up = static_cast<int>(body);
+  std::vector<int> parents(steps.size(), kGround);
+  for (const TreeStep& step : mechanism.tree()) {
+    steps[step.child].depth = steps[step.parent].depth + 1;
+    steps[step.child].joint = step.joint;
+    parents[step.child] = step.parent;
+  }
+  const auto find = [&](int body) {
+    while (steps[body].up != body) {
+      steps[body].up = steps[steps[body].up].up;  // halves the way of the next ones
+      body = steps[body].up;
+    }
+    return body;
+  };
+  std::vector<bool> on_loops(mechanism.joints().size(), false);
+  for (std::size_t j = 0; j < on_loops.size(); ++j) {
+    const Joint<Space, double>& joint = mechanism.joints()[j];
+    if (joint.in_tree()) continue;
+    on_loops[j] = true;
+    int one = find(joint.from), other = find(joint.to);
+    while (one != other) {
+      if (steps[one].depth < steps[other].depth) std::swap(one, other);
+      on_loops[static_cast<std::size_t>(steps[one].joint)] = true;
+      steps[one].up = parents[one];
+      one = find(one);
+    }
+  }
+  return on_loops;
+}
+
+}  // namespace
 
 template <class Space>
 std::unique_ptr<JointResponse<Space>> JointResponse<Space>::Make(
@@ -45,26 +89,26 @@ std::unique_ptr<JointResponse<Space>> JointResponse<Space>::Make(
   }
   BlockCholesky X(std::move(rows), pairs, most);
   if (X.numbers() > most) return nullptr;
-  return std::unique_ptr<JointResponse>(
-      new JointResponse(std::move(sides), std::move(joints), std::move(X),
-                        static_cast<int>(mechanism.joints().size()), sides_of_body));
+  return std::unique_ptr<JointResponse>(new JointResponse(
+      std::move(sides), std::move(joints), std::move(X), OnLoops(mechanism), sides_of_body));
 }
 
 template <class Space>
 JointResponse<Space>::JointResponse(std::vector<Side> sides, std::vector<int> joints,
-                                    BlockCholesky X, int all_joints,
+                                    BlockCholesky X, const std::vector<bool>& on_loops,
                                     const std::vector<std::vector<int>>& sides_of_body)
     : sides_(std::move(sides)),
       joints_(std::move(joints)),
       X_(std::move(X)),
       x_(static_cast<std::size_t>(X_.size()), 0.0),
-      phi_(all_joints, Components<Space, double>::Zero()) {
+      phi_(on_loops.size(), Components<Space, double>::Zero()) {
   int rows = 0;
   for (const Side& side : sides_) rows += side.rows;
   c_.assign(rows, Wrench<Space, double>::Zero());
   Mc_.assign(rows, Acceleration<Space, double>::Zero());
   for (int block = 0; block < static_cast<int>(joints_.size()); ++block) {
     inverse_shares_.push_back(1.0 / ShareOfLimit(X_.eliminated(block)));
+    on_loops_.push_back(on_loops[static_cast<std::size_t>(joints_[block])]);
   }
   for (const std::vector<int>& on_body : sides_of_body) {
     for (std::size_t a = 0; a < on_body.size(); ++a) {
@@ -108,14 +152,19 @@ bool JointResponse<Space>::Factor(const Kinematics<Space, double>& kinematics, M
   const bool is_positive = X_.Factor();
   rcond_ = 1.0;
   worst_joint_ = -1;
-  double worst = 1.0;
+  double worst = 1.0, worst_on_loops = 1.0;
   for (int block = 0; block < static_cast<int>(joints_.size()); ++block) {
     const double ratio = X_.ratio(block), of_limit = ratio * inverse_shares_[block];
     rcond_ = std::min(rcond_, ratio);
+    // not so for what is not a number
+    if (on_loops_[static_cast<std::size_t>(block)] && !(of_limit >= worst_on_loops)) {
+      worst_on_loops = of_limit;
+    }
     if (of_limit >= worst) continue;
     worst = of_limit;
     worst_joint_ = joints_[block];
   }
+  has_rank_ = is_positive && worst_on_loops >= LoopSolver<double>::kSuspicious;
   return is_positive && worst >= LoopSolver<double>::kSuspicious;
 }
 

@@ -30,13 +30,17 @@ class JointResponse {
   static std::unique_ptr<JointResponse> Make(const Mechanism<Space, double>& mechanism,
                                              double most);
 
-  /// False where rank is in doubt, or a number is not finite. Equations are solved with physical
-  /// masses.
+  /// False where rank or digits are in doubt, or a number is not finite. Equations are solved with
+  /// physical masses.
   bool Factor(const Kinematics<Space, double>& kinematics, Masses masses = Masses::kPhysical);
   /// A of all bodies, and phi().
   void Solve(std::span<const Acceleration<Space, double>> b,
              std::span<const Components<Space, double>> c0,
              std::span<Acceleration<Space, double>> A);
+
+  /// Whether the rank of the last Factor() was not in doubt: pivots of joints on no loop tell of
+  /// digits alone, lost where a light body holds many.
+  bool has_rank() const { return has_rank_; }
 
   std::span<const Components<Space, double>> phi() const { return phi_; }
   /// The least pivot of the last Factor(), and the joint nearest to its limit, -1 where all are 1.
@@ -61,12 +65,15 @@ class JointResponse {
     double* block = nullptr;
   };
 
-  JointResponse(std::vector<Side> sides, std::vector<int> joints, BlockCholesky X, int all_joints,
+  JointResponse(std::vector<Side> sides, std::vector<int> joints, BlockCholesky X,
+                const std::vector<bool>& on_loops,
                 const std::vector<std::vector<int>>& sides_of_body);
 
   std::vector<Side> sides_;
   std::vector<int> joints_;             ///< with constrained directions, in the order of blocks
   std::vector<double> inverse_shares_;  ///< of the limit (ShareOfLimit()), by block
+  std::vector<bool> on_loops_;          ///< by block
+  bool has_rank_ = false;
   BlockCholesky X_;
   std::vector<Pair> pairs_;
   std::vector<Wrench<Space, double>> c_;

@@ -6,7 +6,9 @@
 #include <cmath>
 #include <cstdio>
 #include <limits>
+#include <memory>
 #include <numbers>
+#include <string>
 
 #include "mechanism/description/library.h"
 #include "odca/odca.h"
@@ -81,6 +83,62 @@ TEST(JointResponse, SolvesTheEquationsOfTheForestInThePlane) {
 
 TEST(JointResponse, SolvesTheEquationsOfTheForestInSpace) {
   ExpectAlikeInAll<Spatial>(SpaceKind::kSpatial);
+}
+
+/// The factors at the description's own coordinates.
+struct Factored {
+  explicit Factored(const MechanismDescription& description, double angle)
+      : mechanism(description, Coordinates::kJoint),
+        kinematics(mechanism),
+        response(JointResponse<Planar>::Make(mechanism, kNoLimit)) {
+    VectorX<double> q = VectorX<double>::Zero(mechanism.num_q());
+    for (const TreeStep& step : mechanism.tree()) {
+      q[mechanism.joints()[step.joint].q_offset] = step.parent == kGround ? angle : -angle;
+    }
+    kinematics.UpdatePosition(q);
+    is_certain = response->Factor(kinematics);
+  }
+
+  const Mechanism<Planar, double> mechanism;
+  Kinematics<Planar, double> kinematics;
+  std::unique_ptr<JointResponse<Planar>> response;
+  bool is_certain = false;
+};
+
+/// Body `light` and its inertia 1e-9 times as large.
+MechanismDescription With(MechanismDescription description, std::size_t light) {
+  description.bodies[light].mass *= 1e-9;
+  description.bodies[light].inertia *= 1e-9;
+  return description;
+}
+
+TEST(JointResponse, TellsLostRankFromLostDigits) {
+  const Factored flat(Ladder(3, 1.0, 0.0), 0.0);
+  EXPECT_FALSE(flat.is_certain);
+  EXPECT_FALSE(flat.response->has_rank());
+  const Factored open(Tree(7, 0.0), 0.5);
+  EXPECT_TRUE(open.is_certain);
+  EXPECT_TRUE(open.response->has_rank());
+  // bodies hang on a light one
+  const Factored heavy(With(Tree(7, 0.0), 2), 0.5);
+  EXPECT_FALSE(heavy.is_certain);
+  EXPECT_TRUE(heavy.response->has_rank());
+  // the same on a ladder: what hangs there is on no loop, whatever the loops do
+  MechanismDescription both = Ladder(3, 1.0, 0.0);
+  const std::size_t coupler = both.bodies.size() - 1;
+  for (int i = 0; i < 2; ++i) {
+    both.bodies.push_back(both.bodies[coupler]);
+    both.bodies.back().name = "hung" + std::to_string(i);
+    JointDescription pin = both.joints.front();
+    pin.name = "H" + std::to_string(i);
+    pin.from.body = i == 0 ? static_cast<int>(coupler) : static_cast<int>(both.bodies.size()) - 2;
+    pin.to.body = static_cast<int>(both.bodies.size()) - 1;
+    both.joints.push_back(pin);
+  }
+  both = With(both, both.bodies.size() - 2);
+  EXPECT_FALSE(Factored(both, 1.0).is_certain);
+  EXPECT_TRUE(Factored(both, 1.0).response->has_rank());
+  EXPECT_FALSE(Factored(both, 0.0).response->has_rank());
 }
 
 using Sparse = testing::SystemWith<lagrange::Lagrange, Planar, double>;

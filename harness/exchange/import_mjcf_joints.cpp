@@ -7,6 +7,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <limits>
 
 #include "harness/exchange/import_mjcf.h"
 #include "mechanism/algebra/symmetric_eigen.h"
@@ -59,10 +60,12 @@ std::optional<Vector3d> MeetingPoint(const std::vector<MjcfJoint>& hinges) {
     arms += hinge.position.norm();
   }
   SymmetricEigen<double>(A, U, lambda);
+  // axes 2e-7 rad apart have an eigenvalue of 2e-14; that of parallel ones is round-off
+  const double least = 16.0 * std::numeric_limits<double>::epsilon() * lambda[2];
   Vector3d point = Vector3d::Zero();
   for (Eigen::Index k = 0; k < 3; ++k) {
     const Vector3d u = U.col(k);
-    if (lambda[k] > kAligned) point += u.dot(b) / lambda[k] * u;  // else all axes are parallel
+    if (lambda[k] > least) point += u.dot(b) / lambda[k] * u;
   }
   for (const MjcfJoint& hinge : hinges) {
     const Vector3d way = point - hinge.position;

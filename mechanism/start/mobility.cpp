@@ -79,7 +79,7 @@ bool IsRigidToSecondOrder(const Mechanism<Space, double>& mechanism, const Vecto
   // the start closes to some 1e-10 of its size, and the self-stresses are as good
   constexpr double kDefinite = 1e-8;
   const double least = kDefinite * largest;
-  return largest > 0.0 && std::ranges::any_of(forms, [&](Eigen::MatrixXd& form) {
+  return largest > 0.0 && std::ranges::any_of(forms, [&](const Eigen::MatrixXd& form) {
            const VectorX<double> values = SymmetricEigenvalues(form);
            return values[0] > least || values[free - 1] < -least;
          });

@@ -39,10 +39,7 @@ MatrixX<S> WithEigenvalues(const std::vector<double>& lambda) {
 /// Entries of U go through n reflections and some 2 n steps, which turn each column twice: sums
 /// of some 5 n roundings of numbers up to one, of which 8 (n + 1) leaves room for sums that do not
 /// cancel.
-template <class S>
-double Roundings(Eigen::Index n) {
-  return 8.0 * static_cast<double>(n + 1);
-}
+double Roundings(Eigen::Index n) { return 8.0 * static_cast<double>(n + 1); }
 
 /// @return the eigenvalues
 template <class S>
@@ -52,7 +49,7 @@ VectorX<S> ExpectDecomposed(const MatrixX<S>& A) {
   MatrixX<S> destroyed = A, U(n, n);
   VectorX<S> lambda(n);
   SymmetricEigen<S>(destroyed, U, lambda);
-  EXPECT_LE(Skewness<S>(U), Roundings<S>(n));
+  EXPECT_LE(Skewness<S>(U), Roundings(n));
   MatrixX<S> diagonal = MatrixX<S>::Zero(n, n);
   double largest = 0.0;
   for (Eigen::Index i = 0; i < n; ++i) {
@@ -62,7 +59,7 @@ VectorX<S> ExpectDecomposed(const MatrixX<S>& A) {
   }
   const MatrixX<S> product = Times<S>(Times<S>(U, diagonal), U.transpose());
   EXPECT_LE(Distance<S>(product, A),
-            Roundings<S>(n) * largest * static_cast<double>(std::numeric_limits<S>::epsilon()));
+            Roundings(n) * largest * static_cast<double>(std::numeric_limits<S>::epsilon()));
   return lambda;
 }
 
@@ -94,7 +91,7 @@ TYPED_TEST(SymmetricEigenTest, FindsTheEigenvaluesOfEverySpectrum) {
     for (std::size_t i = 0; i < expected.size(); ++i) {
       // twice, for A itself is rounded, and once for a spectrum that a float has not
       EXPECT_NEAR(static_cast<double>(lambda[static_cast<Eigen::Index>(i)]), expected[i],
-                  3.0 * Roundings<S>(lambda.size()) * largest *
+                  3.0 * Roundings(lambda.size()) * largest *
                       static_cast<double>(std::numeric_limits<S>::epsilon()));
     }
   }
@@ -109,7 +106,7 @@ TYPED_TEST(SymmetricEigenTest, HasTheSameDigitsAtEverySize) {
     const VectorX<S> scaled = ExpectDecomposed<S>(Scaled<S>(factor, A));
     for (Eigen::Index i = 0; i < lambda.size(); ++i) {
       EXPECT_NEAR(static_cast<double>(scaled[i] / factor), static_cast<double>(lambda[i]),
-                  Roundings<S>(5) * static_cast<double>(std::numeric_limits<S>::epsilon()) * 2.0);
+                  Roundings(5) * static_cast<double>(std::numeric_limits<S>::epsilon()) * 2.0);
     }
   }
 }

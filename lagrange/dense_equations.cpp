@@ -6,19 +6,6 @@
 
 namespace loopbench::lagrange {
 
-namespace {
-
-template <class Space, class S>
-std::vector<int> RowsOfConstraints(const Mechanism<Space, S>& mechanism) {
-  std::vector<int> rows;
-  for (int index : mechanism.constraints()) {
-    rows.push_back(mechanism.joints()[index].num_constraints());
-  }
-  return rows;
-}
-
-}  // namespace
-
 template <class Space, class S>
 DenseEquations<Space, S>::DenseEquations(const Mechanism<Space, S>& mechanism, SolverKind kind)
     : mechanism_(mechanism),
@@ -30,7 +17,7 @@ DenseEquations<Space, S>::DenseEquations(const Mechanism<Space, S>& mechanism, S
       zero_(VectorX<S>::Zero(mechanism.num_u())),
       missed_(lambda_),
       change_(zero_),
-      loop_(RowsOfConstraints(mechanism)) {
+      loop_(mechanism.RowsOfConstraints()) {
   const int n = mechanism.num_u(), m = mechanism.num_rows();
   if (kind_ == SolverKind::kAsPublished) {
     augmented_.setZero(n + m, n + m);

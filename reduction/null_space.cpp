@@ -4,7 +4,6 @@
 
 #include <algorithm>
 #include <cmath>
-#include <limits>
 
 #include "mechanism/algebra/instantiate.h"
 
@@ -15,13 +14,16 @@ NullSpace<Space, S>::NullSpace(const Mechanism<Space, S>& mechanism)
     : mechanism_(mechanism),
       K_(mechanism.constraints().size()),
       B_(MatrixX<S>::Zero(mechanism.num_rows(), mechanism.num_u())),
+      response_(MatrixX<S>::Zero(mechanism.num_rows(), mechanism.num_rows())),
+      work_(response_),
       M_g_(MatrixX<S>::Zero(mechanism.num_u(), mechanism.num_u())),
       Mh_(M_g_),
       basis_(M_g_),
       reduced_(M_g_),
-      weights_(VectorX<S>::Zero(std::min(mechanism.num_rows(), mechanism.num_u()))),
-      rows_(VectorX<S>::Zero(mechanism.num_rows())),
-      c_(weights_),
+      weights_(mechanism.RowsOfConstraints()),
+      lambda_(VectorX<S>::Zero(mechanism.num_rows())),
+      rows_(lambda_),
+      c_(VectorX<S>::Zero(std::min(mechanism.num_rows(), mechanism.num_u()))),
       z_(VectorX<S>::Zero(mechanism.num_u())),
       speeds_(z_),
       column_(z_) {}
@@ -31,7 +33,6 @@ NullSpace<Space, S>::NullSpace(const Mechanism<Space, S>& mechanism)
 template <class Space, class S>
 void NullSpace<Space, S>::Factor(const Kinematics<Space, S>& kinematics,
                                  TreeDynamics<Space, S>& dynamics, const MatrixX<S>& J) {
-  using std::expm1;
   using std::sqrt;
   dynamics.MassMatrix(kinematics, Masses::kGeometric, M_g_);
   L_.compute(M_g_);
@@ -52,19 +53,16 @@ void NullSpace<Space, S>::Factor(const Kinematics<Space, S>& kinematics,
   }
   svd_.Compute(B_);
   const auto& sigma = svd_.sigma();
-  const S largest = std::max(sigma[0] * sigma[0], S(LoopSolver<S>::kLeastResponse));
-  // as in loop_solver.cpp, a narrow scalar's round-off counts
-  const S theta =
-      std::max(S(LoopSolver<S>::kTheta), S(64) * std::numeric_limits<S>::epsilon()) * largest;
-  num_dependent_ = rank_ = 0;
+  response_.noalias() = B_ * B_.transpose();
+  weights_.FindPivots(response_, work_);
+  lambda_.setZero();
+  lambda_.tail(sigma.size()) = sigma.reverse().cwiseAbs2();
+  weights_.Weigh(lambda_);
+  num_dependent_ = 0;
   for (Eigen::Index i = 0; i < sigma.size(); ++i) {
-    const S ratio = sigma[i] * sigma[i] / theta;
-    weights_[i] = -expm1(-ratio * ratio);
-    if (weights_[i] >= S(1) / S(2)) ++rank_;
-    if (S(1) - weights_[i] < S(kHard)) ++num_dependent_;
+    if (S(1) - WeightOf(i) < S(kHard)) ++num_dependent_;
   }
-  smallest_weight_ = weights_.size() > 0 ? weights_.minCoeff() : S(1);
-  rcond_ = num_dependent_ > 0 ? sigma[num_dependent_ - 1] / sqrt(largest) : S(1);
+  rcond_ = num_dependent_ > 0 ? sigma[num_dependent_ - 1] / sqrt(weights_.largest()) : S(1);
 }
 
 /// K is block-diagonal, a block per cut joint.
@@ -104,12 +102,12 @@ bool NullSpace<Space, S>::Accelerate(const MatrixX<S>& M, const VectorX<S>& h,
   z_.tail(f).noalias() -= V.rightCols(f).transpose() * column_;  // zero so far
   bool factored = false;
   for (Eigen::Index i = d; i < c_.size(); ++i) {
-    if (!(weights_[i] >= S(1e-16))) continue;
+    if (IsLeftOut(i)) continue;
     if (!factored) Mh_factor_.compute(Mh_);
     factored = true;
     column_ = V.col(i);
     Mh_factor_.solveInPlace(column_);
-    const S stiffness = weights_[i] / ((S(1) - weights_[i]) * V.col(i).dot(column_));
+    const S stiffness = WeightOf(i) / ((S(1) - WeightOf(i)) * V.col(i).dot(column_));
     reduced_(i - d, i - d) += stiffness;
     z_[i] += stiffness * c_[i] / sigma[i];
   }
@@ -131,7 +129,7 @@ void NullSpace<Space, S>::Multipliers(const VectorX<S>& force, VectorX<S>& lambd
   L_.matrixL().solveInPlace(column_);
   c_.noalias() = svd_.V().leftCols(c_.size()).transpose() * column_;
   for (Eigen::Index i = 0; i < c_.size(); ++i) {
-    c_[i] = weights_[i] >= S(1e-16) ? S(c_[i] / svd_.sigma()[i]) : S(0);
+    c_[i] = IsLeftOut(i) ? S(0) : S(c_[i] / svd_.sigma()[i]);
   }
   lambda.noalias() = svd_.U().leftCols(c_.size()) * c_;
   for (std::size_t k = 0; k < K_.size(); ++k) {

@@ -4,10 +4,11 @@
 //
 // With the mass matrix of unit bodies M_g = L L^T and the free responses K K^T of loop_solver.h,
 //
-//   K^-1 J L^-T = U diag(sigma) V^T,    w_i = 1 - exp(-(sigma_i^2 / theta)^2),               (4)
+//   B = K^-1 J L^-T = U diag(sigma) V^T,                                                     (4)
 //
-// the speeds are u = L^-T V z. A direction with w_i = 1 but for kHard is dependent, its z_i given:
-// sigma_i z_i = (U^T K^-1 gamma)_i =: c_i. All others are independent,
+// and weights w_i from B B^T (direction_weights.h), the speeds are u = L^-T V z. A direction with
+// w_i = 1 but for kHard is dependent, its z_i given: sigma_i z_i = (U^T K^-1 gamma)_i =: c_i. All
+// others are independent,
 //
 //   (V_N^T Mh V_N + diag(k)) z_N = -V_N^T (L^-1 h + Mh V_D z_D) + diag(k) c_N / sigma_N,      (5)
 //   Mh = L^-1 M L^-T,   k_i = w_i / ((1 - w_i) v_i^T Mh^-1 v_i),
@@ -23,6 +24,7 @@
 
 #include "mechanism/algebra/factors.h"
 #include "mechanism/algebra/singular_values.h"
+#include "mechanism/loops/direction_weights.h"
 #include "mechanism/loops/tree_dynamics.h"
 
 namespace loopbench::reduction {
@@ -47,23 +49,27 @@ class NullSpace {
   /// lambda for which J^T lambda is nearest to `force`.
   void Multipliers(const VectorX<S>& force, VectorX<S>& lambda);
 
-  int rank() const { return rank_; }
-  S smallest_weight() const { return smallest_weight_; }
+  int rank() const { return weights_.rank(); }
+  S smallest_weight() const { return weights_.smallest(); }
   /// Ratio of the extreme singular values of the dependent directions.
   S rcond() const { return rcond_; }
 
  private:
+  /// Singular values descend, eigenvalues of B B^T ascend, and there may be more of them.
+  S WeightOf(Eigen::Index i) const { return weights_[lambda_.size() - 1 - i]; }
+  bool IsLeftOut(Eigen::Index i) const { return weights_.IsLeftOut(lambda_.size() - 1 - i); }
   /// c = U^T K^-1 rows.
   void ToDirections(const VectorX<S>& rows);
 
   const Mechanism<Space, S>& mechanism_;
-  int num_dependent_ = 0, rank_ = 0;
-  S smallest_weight_ = S(1), rcond_ = S(1);
+  int num_dependent_ = 0;
+  S rcond_ = S(1);
   std::vector<JointMatrix<S>> K_;  ///< Cholesky factors, by constraint
-  MatrixX<S> B_, M_g_, Mh_, basis_, reduced_;
+  MatrixX<S> B_, response_, work_, M_g_, Mh_, basis_, reduced_;
   Eigen::LLT<MatrixX<S>> L_, Mh_factor_, reduced_factor_;
   SingularValues<S> svd_;
-  VectorX<S> weights_, rows_, c_, z_, speeds_, column_;
+  DirectionWeights<S> weights_;
+  VectorX<S> lambda_, rows_, c_, z_, speeds_, column_;
 };
 
 }  // namespace loopbench::reduction

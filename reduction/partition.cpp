@@ -35,13 +35,9 @@ template <class Space, class S>
 int GeometricRank(const Kinematics<Space, S>& kinematics, TreeDynamics<Space, S>& dynamics,
                   const MatrixX<S>& J) {
   const Mechanism<Space, S>& mechanism = kinematics.mechanism();
-  std::vector<int> rows;
-  for (int index : mechanism.constraints()) {
-    rows.push_back(mechanism.joints()[index].num_constraints());
-  }
-  LoopSolver<S> loop(rows);
+  LoopSolver<S> loop(mechanism.RowsOfConstraints());
   if (loop.size() == 0 || mechanism.num_u() == 0) return 0;
-  for (int j = 0; j < static_cast<int>(rows.size()); ++j) {
+  for (int j = 0; j < static_cast<int>(mechanism.constraints().size()); ++j) {
     loop.SetScale(j, FreeResponse(kinematics, Masses::kGeometric, mechanism.constraints()[j]));
   }
   MatrixX<S> M;

@@ -29,6 +29,12 @@ namespace {
 constexpr Estimate::Budget kForProgress = {
     .share = 0.01, .least_s = 0.003, .most_s = 0.25, .all_s = 2.0};
 
+Estimate::Budget ForProgress(double pilots_s) {
+  Estimate::Budget budget = kForProgress;
+  budget.all_s = pilots_s;
+  return budget;
+}
+
 /// Limits of time are of CPU time, so that too many jobs change no outcome. They gain nothing.
 void WarnOfJobs(int jobs, const std::vector<Experiment>& experiments) {
   const int processors = ReadMachineState().processors;
@@ -58,8 +64,7 @@ class Group {
         options_(options),
         runner_(runner),
         store_(store),
-        estimate_(experiments_,
-                  {kForProgress.share, kForProgress.least_s, kForProgress.most_s, pilots_s}) {}
+        estimate_(experiments_, ForProgress(pilots_s)) {}
 
   /// Each runs all of its kind and returns how many of their records are of runs that did not
   /// finish.

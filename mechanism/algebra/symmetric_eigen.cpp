@@ -16,12 +16,14 @@ using Index = Eigen::Index;
 
 template <class S>
 using Square = Eigen::Ref<MatrixX<S>>;
+template <class S>
+using Column = Eigen::Ref<VectorX<S>>;
 
 /// A = Q T Q^T with T tridiagonal. Leaves T's diagonal in `diagonal` and what is above it in place;
 /// below, column k has the v and A(k, k) the tau of its reflection I - tau v v^T of the rows from
 /// k + 1 on. `work` has room for a column.
 template <class S>
-void MakeTridiagonal(Square<S> A, VectorX<S>& diagonal, Eigen::Ref<VectorX<S>> work) {
+void MakeTridiagonal(Square<S> A, Column<S> diagonal, Column<S> work) {
   using std::sqrt;
   const Index n = A.rows();
   for (Index k = 0; k + 1 < n; ++k) {
@@ -53,7 +55,7 @@ void MakeTridiagonal(Square<S> A, VectorX<S>& diagonal, Eigen::Ref<VectorX<S>> w
 
 /// The product of the reflections.
 template <class S>
-void FormQ(const Square<S>& A, MatrixX<S>& Q) {
+void FormQ(const Square<S>& A, Square<S> Q) {
   const Index n = A.rows();
   Q.setIdentity();
   for (Index k = n - 2; k >= 0; --k) {
@@ -79,7 +81,7 @@ S Shift(const S& a, const S& b, const S& c) {
 /// T := G^T T G and U := U G for a product G of rotations, which takes the shift's eigenvalue out
 /// of rows `first` to `last` of T.
 template <class S>
-void QrStep(VectorX<S>& d, Eigen::Ref<VectorX<S>> e, Index first, Index last, MatrixX<S>& U) {
+void QrStep(Column<S> d, Column<S> e, Index first, Index last, Square<S> U) {
   using std::sqrt;
   S x = d[first] - Shift(d[last - 1], e[last - 1], d[last]), z = e[first];
   for (Index k = first; k < last; ++k) {
@@ -104,7 +106,7 @@ void QrStep(VectorX<S>& d, Eigen::Ref<VectorX<S>> e, Index first, Index last, Ma
 /// Diagonalises T of diagonal d, beside it e, with U := U G. Gives up after thirty steps for each
 /// eigenvalue, of which two are usual.
 template <class S>
-void Diagonalise(VectorX<S>& d, Eigen::Ref<VectorX<S>> e, MatrixX<S>& U) {
+void Diagonalise(Column<S> d, Column<S> e, Square<S> U) {
   using std::abs;
   const auto is_split = [&](Index k) {
     return abs(e[k]) <= std::numeric_limits<S>::epsilon() * (abs(d[k]) + abs(d[k + 1])) ||
@@ -123,7 +125,7 @@ void Diagonalise(VectorX<S>& d, Eigen::Ref<VectorX<S>> e, MatrixX<S>& U) {
 }  // namespace
 
 template <class S>
-void SymmetricEigen(Square<S> A, MatrixX<S>& U, VectorX<S>& lambda) {
+void SymmetricEigen(Square<S> A, Square<S> U, Column<S> lambda) {
   const Index n = A.rows();
   if (n == 0) return;
   const S scale = A.cwiseAbs().maxCoeff();  // squares shall not overflow
@@ -154,8 +156,7 @@ VectorX<double> SymmetricEigenvalues(MatrixX<double> A) {
 }
 #endif
 
-#define LOOPBENCH_INSTANTIATE(S) \
-  template void SymmetricEigen<S>(Square<S>, MatrixX<S>&, VectorX<S>&);
+#define LOOPBENCH_INSTANTIATE(S) template void SymmetricEigen<S>(Square<S>, Square<S>, Column<S>);
 LOOPBENCH_FOR_EACH_SCALAR(LOOPBENCH_INSTANTIATE)
 #undef LOOPBENCH_INSTANTIATE
 

@@ -12,7 +12,8 @@ namespace loopbench {
 /// the largest eigenvalue. A is destroyed; all sizes must be set. What is not finite yields what is
 /// not finite.
 template <class S>
-void SymmetricEigen(Eigen::Ref<MatrixX<S>> A, MatrixX<S>& U, VectorX<S>& lambda);
+void SymmetricEigen(Eigen::Ref<MatrixX<S>> A, Eigen::Ref<MatrixX<S>> U,
+                    Eigen::Ref<VectorX<S>> lambda);
 
 /// The eigenvalues alone, with an allocation.
 VectorX<double> SymmetricEigenvalues(MatrixX<double> A);

@@ -55,7 +55,7 @@ void Excursion<Space>::Factor() {
   }
   // between rigid parts all is round-off
   const double largest = here_.rows.colwise().norm().maxCoeff();
-  const double counts = std::max(largest, std::sqrt(LoopSolver<double>::kLeastResponse));
+  const double counts = std::max(largest, std::sqrt(DirectionWeights<double>::kLeastResponse));
   if (!(largest > kRankRatio * counts)) here_.rows.setZero();  // nothing is constrained
   solver_.setThreshold(std::min(0.5, kRankRatio * counts / largest));
   solver_.compute(here_.rows);

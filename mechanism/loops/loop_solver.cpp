@@ -4,7 +4,6 @@
 
 #include <algorithm>
 #include <cmath>
-#include <limits>
 
 #include "mechanism/algebra/instantiate.h"
 #include "mechanism/algebra/symmetric_eigen.h"
@@ -13,7 +12,7 @@ namespace loopbench {
 
 template <class S>
 LoopSolver<S>::LoopSolver(std::span<const int> rows, std::shared_ptr<LoopScratch<S>> scratch)
-    : scratch_(std::move(scratch)) {
+    : weights_(rows), scratch_(std::move(scratch)) {
   int numbers = 0;
   for (int r : rows) {
     parts_.push_back({size_, r, numbers});
@@ -26,9 +25,7 @@ LoopSolver<S>::LoopSolver(std::span<const int> rows, std::shared_ptr<LoopScratch
   if (size_ > 0) cholesky_.compute(MatrixX<S>::Identity(size_, size_).eval());
   directions_.setIdentity(size_, size_);
   eigenvalues_.setZero(size_);
-  weights_.setOnes(size_);
   inverse_norms_.setOnes(size_);
-  rank_ = size_;
 }
 
 template <class S>
@@ -77,8 +74,6 @@ auto LoopSolver<S>::Scaled(const ConstRef& X) {
 template <class S>
 bool LoopSolver<S>::FactorPlain(const ConstRef& X, S scale, S tolerance) {
   form_ = Form::kPlain;
-  rank_ = size_;
-  smallest_weight_ = S(1);
   rcond_ = S(0);
   cholesky_.compute(X);
   // a factorisation that broke off has no smallest pivot: it met one that is not positive
@@ -92,8 +87,6 @@ bool LoopSolver<S>::FactorPlain(const ConstRef& X, S scale, S tolerance) {
 template <class S>
 bool LoopSolver<S>::FactorScaled(const ConstRef& X) {
   form_ = Form::kScaled;
-  rank_ = size_;
-  smallest_weight_ = S(1);
   cholesky_.compute(Scaled(X));
   rcond_ = S(0);
   if (cholesky_.info() != Eigen::Success) return false;
@@ -106,24 +99,18 @@ bool LoopSolver<S>::FactorScaled(const ConstRef& X) {
 /// sqrt(w_i / lambda_i), so that T = diag(inverse_norms_) U^T K_g^-1.
 template <class S>
 void LoopSolver<S>::FactorGeometric(const ConstRef& X_geometric) {
-  using std::expm1;
   using std::sqrt;
   form_ = Form::kGeometric;
-  SymmetricEigen<S>(Scaled(X_geometric), directions_, eigenvalues_);
-  const S largest = std::max(eigenvalues_[size_ - 1], S(kLeastResponse));
-  // a narrow scalar's eigenvalues are round-off already above kTheta
-  const S theta = std::max(S(kTheta), S(64) * std::numeric_limits<S>::epsilon()) * largest;
-  rank_ = 0;
+  const auto scaled = Scaled(X_geometric);
+  auto work = scratch_->work.topLeftCorner(size_, size_);
+  work = scaled;
+  weights_.FindPivots(work, scratch_->rotated.topLeftCorner(size_, size_));
+  SymmetricEigen<S>(scaled, directions_, eigenvalues_);
+  weights_.Weigh(eigenvalues_);
   for (int i = 0; i < size_; ++i) {
-    const S lambda = std::max(eigenvalues_[i], S(0));
-    const S ratio = lambda / theta;
-    // expm1 keeps the weight's relative accuracy where it is small
-    weights_[i] = -expm1(-ratio * ratio);
-    if (weights_[i] >= S(1) / S(2)) ++rank_;
-    inverse_norms_[i] = weights_[i] < S(1e-16) ? S(0) : S(sqrt(weights_[i] / lambda));
+    inverse_norms_[i] = weights_.IsLeftOut(i) ? S(0) : S(sqrt(weights_[i] / eigenvalues_[i]));
   }
-  smallest_weight_ = weights_.minCoeff();
-  rcond_ = std::max(eigenvalues_[0], S(0)) / largest;
+  rcond_ = std::max(eigenvalues_[0], S(0)) / weights_.largest();
 }
 
 /// "softened": U and w_i stay from the geometry. The diagonal of R + diag(R_ii (1 / w_i - 1)) is
@@ -139,7 +126,7 @@ bool LoopSolver<S>::FactorSoftened(const ConstRef& X) {
   work.noalias() = scaled * directions_;
   rotated.noalias() = directions_.transpose() * work;
   for (int i = 0; i < size_; ++i) {
-    const bool kept = weights_[i] >= S(1e-16) && rotated(i, i) > S(0);
+    const bool kept = !weights_.IsLeftOut(i) && rotated(i, i) > S(0);
     inverse_norms_[i] = kept ? S(sqrt(weights_[i] / rotated(i, i))) : S(0);
   }
   // unit diagonal before factoring; directions left out become rows of the identity
@@ -156,7 +143,7 @@ bool LoopSolver<S>::FactorSoftened(const ConstRef& X) {
 template <class S>
 void LoopSolver<S>::Apply(Eigen::Ref<MatrixX<S>> B) const {
   if (form_ != Form::kPlain) ScaleRows(B);
-  if (form_ == Form::kGeometric || form_ == Form::kSoftened) {
+  if (IsGeometric()) {
     auto vector = scratch_->vector.head(size_);
     for (Eigen::Index c = 0; c < B.cols(); ++c) {
       vector.noalias() = directions_.transpose() * B.col(c);
@@ -170,7 +157,7 @@ void LoopSolver<S>::Apply(Eigen::Ref<MatrixX<S>> B) const {
 template <class S>
 void LoopSolver<S>::ApplyTransposed(Eigen::Ref<VectorX<S>> v) const {
   if (form_ != Form::kGeometric) cholesky_.matrixU().solveInPlace(v);
-  if (form_ == Form::kGeometric || form_ == Form::kSoftened) {
+  if (IsGeometric()) {
     auto vector = scratch_->vector.head(size_);
     vector = inverse_norms_.cwiseProduct(v);
     v.noalias() = directions_ * vector;

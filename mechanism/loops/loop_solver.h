@@ -18,15 +18,14 @@
 //
 //     K^-1 X K^-T = L L^T,      T = L^-1 K^-1
 //
-// *Geometric*, for X_g, the response of the same mechanism with unit masses. lambda_max counts as
-// 1e-2 at least, because within a rigid part all of X_g is round-off.
+// *Geometric*, for X_g, the response of the same mechanism with unit masses, and weights w_i
+// (direction_weights.h).
 //
 //     K_g^-1 X_g K_g^-T = U diag(lambda) U^T
-//     w_i = 1 - exp(-(lambda_i / theta)^2),      theta = (2e-4)^2 lambda_max
 //     T = diag(sqrt(w_i / lambda_i)) U^T K_g^-1
 //
 // *Softened*, the physical X with directions U and weights w from the geometry. A degenerating
-// direction grows soft, and directions with w < 1e-16 are left out.
+// direction grows soft, and the least are left out.
 //
 //     R = U^T K_g^-1 X K_g^-T U
 //     R + diag(R_ii (1 / w_i - 1)) = N L L^T N,      N_i^2 = R_ii / w_i
@@ -42,6 +41,7 @@
 
 #include "mechanism/algebra/factors.h"
 #include "mechanism/algebra/space.h"
+#include "mechanism/loops/direction_weights.h"
 
 namespace loopbench {
 
@@ -70,13 +70,6 @@ class LoopSolver {
   static constexpr double kSuspicious = 1e-4;
   using ConstRef = Eigen::Ref<const MatrixX<S>>;
 
-  /// Softening threshold relative to the largest geometric eigenvalue: (2e-4)^2, or 64 eps if more.
-  /// docs/numerics.md, section 3, has the trials.
-  static constexpr double kTheta = 4e-8;
-  /// The largest geometric eigenvalue is taken as no smaller. Free bodies give one, and round-off
-  /// of some 100 eps stays far below kTheta times this.
-  static constexpr double kLeastResponse = 1e-2;
-
   /// Joints contribute `rows[k]` rows each, in order. Without a scratch it has one of its own.
   explicit LoopSolver(std::span<const int> rows, std::shared_ptr<LoopScratch<S>> scratch = nullptr);
 
@@ -102,9 +95,9 @@ class LoopSolver {
   void ApplyTransposed(Eigen::Ref<VectorX<S>> v) const;
 
   /// Directions enforced with a weight of at least one half; size() unless geometric.
-  int rank() const { return rank_; }
+  int rank() const { return IsGeometric() ? weights_.rank() : size_; }
   /// Smallest weight; 1 unless geometric or softened.
-  S smallest_weight() const { return smallest_weight_; }
+  S smallest_weight() const { return IsGeometric() ? weights_.smallest() : S(1); }
   /// Smallest pivot over the scale, or the ratio of extreme geometric eigenvalues.
   S rcond() const { return rcond_; }
 
@@ -114,6 +107,7 @@ class LoopSolver {
     int scale = 0;  ///< first number in inverse_scales_
   };
   enum class Form { kNone, kPlain, kScaled, kGeometric, kSoftened };
+  bool IsGeometric() const { return form_ == Form::kGeometric || form_ == Form::kSoftened; }
   auto K_inverse(std::size_t joint) const;
   /// K^-1 X K^-T, in the scratch.
   auto Scaled(const ConstRef& X);
@@ -125,10 +119,10 @@ class LoopSolver {
   std::vector<S> inverse_scales_;  ///< K^-1 of each joint, by columns
   Eigen::LLT<MatrixX<S>> cholesky_;
   MatrixX<S> directions_;  ///< U
-  VectorX<S> eigenvalues_, weights_, inverse_norms_;
+  VectorX<S> eigenvalues_, inverse_norms_;
+  DirectionWeights<S> weights_;
   std::shared_ptr<LoopScratch<S>> scratch_;
-  int rank_ = 0;
-  S smallest_weight_ = S(1), rcond_ = S(1);
+  S rcond_ = S(1);
 };
 
 }  // namespace loopbench

@@ -189,6 +189,13 @@ void Mechanism<Space, S>::AddJoints(const MechanismDescription& description,
 }
 
 template <class Space, class S>
+std::vector<int> Mechanism<Space, S>::RowsOfConstraints() const {
+  std::vector<int> rows;
+  for (const int index : constraints_) rows.push_back(joints_[index].num_constraints());
+  return rows;
+}
+
+template <class Space, class S>
 void Mechanism<Space, S>::AddGeometry(const MechanismDescription& description) {
   using Point = Linear<Space, S>;
   std::vector<std::vector<Point>> joints_of(bodies_.size());

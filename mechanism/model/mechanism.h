@@ -105,6 +105,7 @@ class Mechanism {
   }
   const std::vector<TreeStep>& tree() const { return tree_; }
   const std::vector<int>& constraints() const { return constraints_; }  ///< joint indices
+  std::vector<int> RowsOfConstraints() const;  ///< of each, scalar constraints
   /// Directions that constraints do not impose at first, by joint; mostly none at all.
   const std::vector<Released>& released() const { return released_; }
   const ForceElements<Space, S>& forces() const { return forces_; }

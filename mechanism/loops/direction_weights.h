@@ -1,0 +1,64 @@
+// How far each direction of the loops' constraints is enforced, from geometry alone.
+//
+// For the geometric response of loop_solver.h, with eigenvalues lambda_1 <= lambda_2 <= ...,
+//
+//   K_g^-1 X_g K_g^-T = U diag(lambda) U^T
+//   w_i = 1 - exp(-r_i^2),      r_i = min(p_i / theta, (lambda_i / lambda_least)^2)
+//
+// with theta = (2e-4)^2 and lambda_least = (2e-6)^2 of the largest eigenvalue, which counts as 1e-2
+// at least, because within a rigid part all of X_g is round-off.
+//
+// The p_1 <= p_2 <= ... are what each joint could respond once the joints before it are closed: the
+// eigenvalues of its block in the Cholesky factorisation by blocks. They fall with the square of
+// the distance from a singular position as the lambda do, p_i >= lambda_i, but they know nothing of
+// the number of loops: a row of n windows has an eigenvalue of 2 / n^2 in its best position, and by
+// that 40 windows would be softened twenty times as far away as one. A joint by itself has
+// p_i = lambda_i. Where a small eigenvalue hides behind moderate p_i, lambda_least softens it while
+// a hundredth of it is known.
+#pragma once
+
+#include <span>
+#include <vector>
+
+#include "mechanism/algebra/space.h"
+
+namespace loopbench {
+
+template <class S>
+class DirectionWeights {
+ public:
+  /// theta, or 64 eps if more: a narrow scalar's eigenvalues are round-off already above 4e-8.
+  /// docs/numerics.md, section 3, has the trials.
+  static constexpr double kTheta = 4e-8;
+  /// lambda_least, or 4 eps if more.
+  static constexpr double kLeastEigenvalue = 4e-12;
+  /// Free bodies respond with one, and round-off of some 100 eps stays far below kTheta of this.
+  static constexpr double kLeastResponse = 1e-2;
+  /// Directions of less weight are left out: their eigenvalues are round-off.
+  static constexpr double kLeast = 1e-16;
+
+  /// Joints contribute `rows[k]` rows each, in order.
+  explicit DirectionWeights(std::span<const int> rows);
+
+  /// Finds the p_i of the scaled geometric response in `X`, which is destroyed; `work` has its
+  /// size. No allocation.
+  void FindPivots(Eigen::Ref<MatrixX<S>> X, Eigen::Ref<MatrixX<S>> work);
+  /// The weights, after FindPivots; `lambda` ascends.
+  void Weigh(const VectorX<S>& lambda);
+
+  S operator[](Eigen::Index i) const { return weights_[i]; }
+  bool IsLeftOut(Eigen::Index i) const { return !(weights_[i] >= S(kLeast)); }
+  /// Directions enforced with a weight of at least one half.
+  int rank() const { return rank_; }
+  S smallest() const { return smallest_; }
+  /// The largest eigenvalue, or what it counts as.
+  S largest() const { return largest_; }
+
+ private:
+  std::vector<int> rows_;
+  VectorX<S> pivots_, weights_;
+  int rank_ = 0;
+  S smallest_ = S(1), largest_ = S(1);
+};
+
+}  // namespace loopbench

@@ -11,6 +11,7 @@
 #include "harness/integrator/cpu_time.h"
 #include "harness/run/run_case.h"
 #include "harness/suite/suite.h"
+#include "harness/text/temporary_folder.h"
 #ifdef LOOPBENCH_PRECISIONS
 #include "harness/precision/make_reference.h"
 #endif
@@ -62,6 +63,8 @@ Rate Next(const Rate& before, const Spent& spent) {
 
 Estimate::Estimate(const std::vector<Experiment>& experiments, const Budget& budget)
     : experiments_(experiments), budget_(budget) {}
+
+Estimate::~Estimate() = default;
 
 std::size_t Estimate::Nearest(std::size_t experiment) const {
   const std::size_t count = experiments_.size();
@@ -121,6 +124,10 @@ const Rate* Estimate::RateOfCase(std::size_t experiment, const Case& one, double
   const Experiment& like = experiments_[experiment];
   const std::size_t scene = std::min(one.scene, like.scenes.size() - 1);  // a sweep's may differ
   const std::string column = ToString(one.column);
+  if (like.output && written_ == nullptr) {
+    written_ = std::make_unique<TemporaryFolder>("loopbench-plan");
+  }
+  const auto rows = like.output ? written_->path() / "rows.csv" : std::filesystem::path();
   const auto run = [&](double fraction) {
     Case pilot = one;
     pilot.scene = scene;
@@ -130,10 +137,12 @@ const Rate* Estimate::RateOfCase(std::size_t experiment, const Case& one, double
     pilot.horizon = fraction * Longest(like, scene);
     pilot.limits.cpu_s = std::min(budget_.most_s, one.limits.cpu_s);
     const CpuLimit all(pilot.limits.cpu_s);
-    const Record record = RunCase(like, pilot);
+    const Record record = RunCase(like, pilot, nullptr, rows);
     const double reached = record.Number("t_reached"), running = record.Number("cpu_s");
     const bool ended = record.Text("outcome") != ToString(Outcome::kFinished);
     Spent spent = {.all_s = all.cpu_s(), .running_s = std::isnan(running) ? 0.0 : running};
+    // rows of a fixed distance are more in a longer run, of a fixed number they are not
+    if (like.output && like.output->number == 0) spent.running_s = spent.all_s;
     spent.reached = std::isnan(reached) ? 0.0 : fraction * reached / pilot.horizon;
     const double steps = record.Number("steps");
     if (steps > 0.0) {

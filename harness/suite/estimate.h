@@ -5,6 +5,7 @@
 #include <functional>
 #include <limits>
 #include <map>
+#include <memory>
 #include <string>
 #include <vector>
 
@@ -15,6 +16,8 @@
 #include "harness/timing/time_cases.h"
 
 namespace loopbench::harness {
+
+class TemporaryFolder;
 
 /// What pilots over a part of the horizon took, and with it the whole.
 struct Rate {
@@ -51,6 +54,7 @@ class Estimate {
   };
   /// `experiments` must outlive this.
   Estimate(const std::vector<Experiment>& experiments, const Budget& budget);
+  ~Estimate();
 
   /// CPU time of a piece of the experiment [s], NaN where it is not known. Of a case: of its
   /// unperturbed run and its ensemble.
@@ -73,6 +77,7 @@ class Estimate {
   const std::vector<Experiment>& experiments_;
   Budget budget_;
   double spent_s_ = 0.0;
+  std::unique_ptr<TemporaryFolder> written_;  ///< for trajectories of pilots
   std::map<std::string, Rate> rates_;
   std::vector<std::string> cut_off_;
 };

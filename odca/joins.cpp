@@ -5,7 +5,7 @@
 #include <limits>
 
 #include "mechanism/algebra/instantiate.h"
-#include "mechanism/loops/tree_dynamics.h"
+#include "mechanism/algebra/lower_triangle.h"
 
 namespace loopbench::odca {
 
@@ -97,8 +97,7 @@ bool Joins<Space, S>::AssembleAll(const Kinematics<Space, S>& kinematics, Pass p
     }
     FillJoints(kinematics, masses, node);
     FormResponse(node, place);
-    const bool ok =
-        node.closes_loop ? FactorLoop(kinematics, node, place, pass) : FactorFloating(node, place);
+    const bool ok = node.closes_loop ? FactorLoop(node, place, pass) : FactorFloating(node, place);
     if (!ok) return false;
     ApplyToKept(node, place);
     Eliminate(node, place);
@@ -149,6 +148,7 @@ void Joins<Space, S>::FormResponse(const PlanNode& node, const Place& place) {
   for (int e = 0; e < static_cast<int>(node.handles.size()); ++e) {
     const Handle& handle = node.handles[e];
     const Place& child = places_[node.children[handle.child]];
+    const bool is_leaf = node.children[handle.child] < plan_.num_leaves();
     Acceleration<Space, S>* Y = &Y_[place.y + e * n];
     for (const NodeJoint& joint : node.joints) {
       for (int i = 0; i < joint.rows; ++i) Y[i].setZero();
@@ -157,26 +157,34 @@ void Joins<Space, S>::FormResponse(const PlanNode& node, const Place& place) {
         if (f < 0 || node.handles[f].child != handle.child) continue;
         const Block<Space, S>& Z = Z_[child.z + handle.place + child.kept * node.handles[f].place];
         const Wrench<Space, S>* c = direction(joint, which);
-        for (int i = 0; i < joint.rows; ++i)
-          Y[i] += loopbench::Apply<Acceleration<Space, S>>(Z, c[i]);  // (67)
+        for (int i = 0; i < joint.rows; ++i) {  // (67)
+          Y[i] += is_leaf ? ApplyDiagonal<Acceleration<Space, S>>(Z, c[i])
+                          : loopbench::Apply<Acceleration<Space, S>>(Z, c[i]);
+        }
         operations_ += joint.rows * Space::kDim * Space::kDim;
       }
       Y += joint.rows;
     }
   }
-  int row = 0;
+  S* X = &X_[place.x];
+  std::fill_n(X, n * n, S(0));
+  int first = 0;
   for (const NodeJoint& joint : node.joints) {
-    for (int i = 0; i < joint.rows; ++i, ++row) {
-      for (int l = 0; l <= row; ++l) {
-        S sum = S(0);
-        for (int which = 0; which < 2; ++which) {
-          const int f = side(joint, which);
-          if (f >= 0) sum += direction(joint, which)[i].dot(Y_[place.y + f * n + l]);
-        }
-        X_[place.x + row + l * n] = X_[place.x + l + row * n] = sum;  // (16, 42, 66)
+    for (int which = 0; which < 2; ++which) {
+      const int f = side(joint, which);
+      if (f < 0) continue;
+      const Wrench<Space, S>* c = direction(joint, which);
+      const Acceleration<Space, S>* Y = &Y_[place.y + f * n];
+      for (int i = 0; i < joint.rows; ++i) {
+        for (int l = 0; l <= first + i; ++l)
+          X[first + i + l * n] += c[i].dot(Y[l]);  // (16, 42, 66)
       }
-      operations_ += 2 * Space::kDim * (row + 1);
     }
+    operations_ += Space::kDim * joint.rows * (2 * first + joint.rows + 1);
+    first += joint.rows;
+  }
+  for (int j = 0; j < n; ++j) {
+    for (int i = 0; i < j; ++i) X[i + j * n] = X[j + i * n];
   }
 }
 
@@ -184,34 +192,35 @@ void Joins<Space, S>::FormResponse(const PlanNode& node, const Place& place) {
 /// because one side floats.
 template <class Space, class S>
 bool Joins<Space, S>::FactorFloating(const PlanNode& node, const Place& place) {
-  using std::sqrt;
   const int n = node.rows;
-  S* X = &X_[place.x];
-  for (int j = 0; j < n; ++j) {
-    S pivot = X[j + j * n];
-    for (int k = 0; k < j; ++k) pivot -= X[j + k * n] * X[j + k * n];
-    if (!(pivot > S(0))) {
-      rcond_ = pivot;
-      return false;
-    }
-    pivot = sqrt(pivot);
-    X[j + j * n] = pivot;
-    for (int i = j + 1; i < n; ++i) {
-      S value = X[i + j * n];
-      for (int k = 0; k < j; ++k) value -= X[i + k * n] * X[j + k * n];
-      X[i + j * n] = value / pivot;
+  operations_ += static_cast<long>(n) * n * n / 6 + n;
+  const S least = FactorLower(&X_[place.x], n, n);
+  if (least > S(0)) return true;
+  rcond_ = least;
+  return false;
+}
+
+/// Across a joint, of its two bodies alone: the X of a series join of two leaves.
+template <class Space, class S>
+JointMatrix<S> Joins<Space, S>::FreeResponseAt(const PlanNode& node, const NodeJoint& joint) const {
+  JointMatrix<S> X = JointMatrix<S>::Zero(joint.rows, joint.rows);
+  for (const bool at_Q : {true, false}) {
+    const int handle = at_Q ? joint.to : joint.from;
+    if (handle < 0) continue;
+    const Block<Space, S>& Z = LeafZ(node.handles[handle].body - 1);
+    const Wrench<Space, S>* c = at_Q ? c_Q(joint) : c_P(joint);
+    for (int a = 0; a < joint.rows; ++a) {
+      const auto A = ApplyDiagonal<Acceleration<Space, S>>(Z, c[a]);
+      for (int b = 0; b < joint.rows; ++b) X(b, a) += c[b].dot(A);
     }
   }
-  operations_ += static_cast<long>(n) * n * n / 6 + n;
-  return true;
+  return X;
 }
 
 /// T of a node that closes loops, with T^T T = chi^-1 of (42) or the paper's X of (66). The matrix
 /// is only semidefinite here, and its rank is decided as loop_solver.h says.
 template <class Space, class S>
-bool Joins<Space, S>::FactorLoop(const Kinematics<Space, S>& kinematics, const PlanNode& node,
-                                 const Place& place, Pass pass) {
-  const Masses masses = pass == Pass::kGeometric ? Masses::kGeometric : Masses::kPhysical;
+bool Joins<Space, S>::FactorLoop(const PlanNode& node, const Place& place, Pass pass) {
   LoopSolver<S>& loop = loops_[place.loop];
   const Eigen::Map<const MatrixX<S>> X(&X_[place.x], node.rows, node.rows);
   operations_ += static_cast<long>(node.rows) * node.rows * node.rows / 6 + node.rows;
@@ -221,7 +230,7 @@ bool Joins<Space, S>::FactorLoop(const Kinematics<Space, S>& kinematics, const P
     // ladders in space, whose pivots are zero, leave at most 0.6 eps per body. 64 is a margin.
     S scale = S(0);
     for (const NodeJoint& joint : node.joints) {
-      const auto free = FreeResponse(kinematics, masses, joint.index);
+      const auto free = FreeResponseAt(node, joint);
       scale = std::max(scale, free.diagonal().maxCoeff());
     }
     const S eps = std::numeric_limits<S>::epsilon();
@@ -231,7 +240,7 @@ bool Joins<Space, S>::FactorLoop(const Kinematics<Space, S>& kinematics, const P
   }
   if (pass != Pass::kSoftened) {
     for (int j = 0; j < static_cast<int>(node.joints.size()); ++j) {
-      loop.SetScale(j, FreeResponse(kinematics, masses, node.joints[j].index));
+      loop.SetScale(j, FreeResponseAt(node, node.joints[j]));
     }
   }
   if (pass == Pass::kPhysical) {
@@ -263,14 +272,7 @@ template <class Space, class S>
 void Joins<Space, S>::ApplyToKept(const PlanNode& node, const Place& place) {
   const int rows = node.rows;
   if (!node.closes_loop) {
-    const S* L = &X_[place.x];
-    for (int e : node.kept) {
-      Acceleration<Space, S>* Y = &Y_[place.y + e * rows];
-      for (int i = 0; i < rows; ++i) {
-        for (int k = 0; k < i; ++k) Y[i] -= L[i + k * rows] * Y[k];
-        Y[i] /= L[i + i * rows];
-      }
-    }
+    for (int e : node.kept) SolveLower(&X_[place.x], rows, rows, &Y_[place.y + e * rows]);
   } else if (!node.kept.empty()) {
     const int width = Space::kDim * static_cast<int>(node.kept.size());
     auto B = columns_.topLeftCorner(rows, width);
@@ -324,11 +326,7 @@ void Joins<Space, S>::Apply(const PlanNode& node, int n, S* v) const {
     loops_[place.loop].Apply(Eigen::Map<MatrixX<S>>(v, node.rows, 1));
     return;
   }
-  const S* L = &X_[place.x];
-  for (int i = 0; i < node.rows; ++i) {
-    for (int k = 0; k < i; ++k) v[i] -= L[i + k * node.rows] * v[k];
-    v[i] /= L[i + i * node.rows];
-  }
+  SolveLower(&X_[place.x], node.rows, node.rows, v);
 }
 
 /// Backward substitution with L^T, or as the loop solver has it.
@@ -339,11 +337,7 @@ void Joins<Space, S>::ApplyTransposed(const PlanNode& node, int n, S* v) const {
     loops_[place.loop].ApplyTransposed(Eigen::Map<VectorX<S>>(v, node.rows));
     return;
   }
-  const S* L = &X_[place.x];
-  for (int i = node.rows - 1; i >= 0; --i) {
-    for (int k = i + 1; k < node.rows; ++k) v[i] -= L[k + i * node.rows] * v[k];
-    v[i] /= L[i + i * node.rows];
-  }
+  SolveLowerTransposed(&X_[place.x], node.rows, node.rows, v);
 }
 
 #define LOOPBENCH_INSTANTIATE(Space, S) template class Joins<Space, S>;

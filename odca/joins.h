@@ -107,8 +107,8 @@ class Joins {
   void FillJoints(const Kinematics<Space, S>& kinematics, Masses masses, const PlanNode& node);
   void FormResponse(const PlanNode& node, const Place& place);
   bool FactorFloating(const PlanNode& node, const Place& place);
-  bool FactorLoop(const Kinematics<Space, S>& kinematics, const PlanNode& node, const Place& place,
-                  Pass pass);
+  JointMatrix<S> FreeResponseAt(const PlanNode& node, const NodeJoint& joint) const;
+  bool FactorLoop(const PlanNode& node, const Place& place, Pass pass);
   void ApplyToKept(const PlanNode& node, const Place& place);
   void Eliminate(const PlanNode& node, const Place& place);
   void NoteDiagnostics(const PlanNode& node, const LoopSolver<S>& loop);

@@ -6,6 +6,7 @@
 #include <cmath>
 
 #include "mechanism/algebra/instantiate.h"
+#include "mechanism/algebra/lower_triangle.h"
 #include "mechanism/algebra/symmetric_eigen.h"
 
 namespace loopbench {
@@ -21,39 +22,32 @@ LoopSolver<S>::LoopSolver(std::span<const int> rows, std::shared_ptr<LoopScratch
   }
   inverse_scales_.assign(numbers, S(0));
   if (scratch_ == nullptr) scratch_ = std::make_shared<LoopScratch<S>>(size_);
-  // an LLT that has computed nothing has no valid state to copy
-  if (size_ > 0) cholesky_.compute(MatrixX<S>::Identity(size_, size_).eval());
+  if (size_ <= kSmallTriangle) {
+    small_.setIdentity(size_, size_);
+  } else {  // an LLT that has computed nothing has no valid state to copy
+    cholesky_.compute(MatrixX<S>::Identity(size_, size_).eval());
+  }
   directions_.setIdentity(size_, size_);
   eigenvalues_.setZero(size_);
   inverse_norms_.setOnes(size_);
-}
-
-template <class S>
-auto LoopSolver<S>::K_inverse(std::size_t joint) const {
-  const Part& part = parts_[joint];
-  return Eigen::Map<const MatrixX<S>>(&inverse_scales_[part.scale], part.rows, part.rows);
 }
 
 /// X_free = K K^T by Cholesky; what is kept is K^-1, lower triangular.
 template <class S>
 void LoopSolver<S>::SetScale(int joint, const JointMatrix<S>& free_response) {
   const Part& part = parts_[joint];
-  Eigen::Map<MatrixX<S>> inverse(&inverse_scales_[part.scale], part.rows, part.rows);
-  const Eigen::LLT<JointMatrix<S>> K(free_response);
-  inverse.setIdentity();
-  K.matrixL().solveInPlace(inverse);
+  S* inverse = &inverse_scales_[part.scale];
+  std::copy_n(free_response.data(), part.rows * part.rows, inverse);
+  FactorLower(inverse, part.rows, part.rows);
+  InvertLower(inverse, part.rows, part.rows);
 }
 
 /// B := K^-1 B, K being block-diagonal: a block per joint.
 template <class S>
 void LoopSolver<S>::ScaleRows(Eigen::Ref<MatrixX<S>> B) const {
-  for (std::size_t j = 0; j < parts_.size(); ++j) {
-    const auto K = K_inverse(j);
-    // K^-1 is lower triangular: work from the last row up, in place.
-    for (Eigen::Index r = K.rows() - 1; r >= 0; --r) {
-      const Eigen::Index row = parts_[j].row + r;
-      B.row(row) *= K(r, r);
-      for (Eigen::Index c = 0; c < r; ++c) B.row(row) += K(r, c) * B.row(parts_[j].row + c);
+  for (Eigen::Index column = 0; column < B.cols(); ++column) {
+    for (const Part& part : parts_) {
+      MultiplyLower(&inverse_scales_[part.scale], part.rows, B.col(column).data() + part.row);
     }
   }
 }
@@ -70,16 +64,24 @@ auto LoopSolver<S>::Scaled(const ConstRef& X) {
   return scaled;
 }
 
+template <class S>
+S LoopSolver<S>::Cholesky(const ConstRef& A) {
+  if (size_ <= kSmallTriangle) {
+    small_ = A;
+    return std::max(S(0), FactorLower(small_.data(), size_, size_));  // 0 for what is not a number
+  }
+  cholesky_.compute(A);
+  // a factorisation that broke off has no smallest pivot: it met one that is not positive
+  if (cholesky_.info() != Eigen::Success) return S(0);
+  const S smallest = cholesky_.matrixLLT().diagonal().minCoeff();
+  return smallest * smallest;
+}
+
 /// "plain": X = L L^T, T = L^-1, which takes the place of the paper's inverses in (17), (42), (66).
 template <class S>
 bool LoopSolver<S>::FactorPlain(const ConstRef& X, S scale, S tolerance) {
   form_ = Form::kPlain;
-  rcond_ = S(0);
-  cholesky_.compute(X);
-  // a factorisation that broke off has no smallest pivot: it met one that is not positive
-  if (cholesky_.info() != Eigen::Success) return false;
-  const S smallest = cholesky_.matrixLLT().diagonal().minCoeff();
-  rcond_ = smallest * smallest / scale;
+  rcond_ = Cholesky(X) / scale;
   return rcond_ > tolerance;
 }
 
@@ -87,11 +89,7 @@ bool LoopSolver<S>::FactorPlain(const ConstRef& X, S scale, S tolerance) {
 template <class S>
 bool LoopSolver<S>::FactorScaled(const ConstRef& X) {
   form_ = Form::kScaled;
-  cholesky_.compute(Scaled(X));
-  rcond_ = S(0);
-  if (cholesky_.info() != Eigen::Success) return false;
-  const S smallest = cholesky_.matrixLLT().diagonal().minCoeff();
-  rcond_ = smallest * smallest;
+  rcond_ = Cholesky(Scaled(X));
   return rcond_ >= S(kSuspicious);
 }
 
@@ -135,8 +133,7 @@ bool LoopSolver<S>::FactorSoftened(const ConstRef& X) {
       rotated(i, j) = i == j ? S(1) : rotated(i, j) * inverse_norms_[i] * inverse_norms_[j];
     }
   }
-  cholesky_.compute(rotated);
-  return cholesky_.info() == Eigen::Success;
+  return Cholesky(rotated) > S(0);
 }
 
 /// K^-1 first, then U^T and the inverse norms, then L^-1, as far as the form has them.
@@ -150,27 +147,30 @@ void LoopSolver<S>::Apply(Eigen::Ref<MatrixX<S>> B) const {
       B.col(c) = inverse_norms_.cwiseProduct(vector);
     }
   }
-  if (form_ != Form::kGeometric) cholesky_.matrixL().solveInPlace(B);
+  if (form_ == Form::kGeometric) return;
+  if (size_ > kSmallTriangle) return cholesky_.matrixL().solveInPlace(B);
+  for (Eigen::Index c = 0; c < B.cols(); ++c)
+    SolveLower(small_.data(), size_, size_, B.col(c).data());
 }
 
 /// The same factors transposed, in the opposite order.
 template <class S>
 void LoopSolver<S>::ApplyTransposed(Eigen::Ref<VectorX<S>> v) const {
-  if (form_ != Form::kGeometric) cholesky_.matrixU().solveInPlace(v);
+  if (form_ != Form::kGeometric) {
+    if (size_ > kSmallTriangle) {
+      cholesky_.matrixU().solveInPlace(v);
+    } else {
+      SolveLowerTransposed(small_.data(), size_, size_, v.data());
+    }
+  }
   if (IsGeometric()) {
     auto vector = scratch_->vector.head(size_);
     vector = inverse_norms_.cwiseProduct(v);
     v.noalias() = directions_ * vector;
   }
   if (form_ == Form::kPlain) return;
-  for (std::size_t j = 0; j < parts_.size(); ++j) {
-    const auto K = K_inverse(j);
-    const int row = parts_[j].row;
-    for (Eigen::Index c = 0; c < K.cols(); ++c) {
-      S sum = S(0);
-      for (Eigen::Index r = c; r < K.rows(); ++r) sum += K(r, c) * v[row + r];
-      v[row + c] = sum;
-    }
+  for (const Part& part : parts_) {
+    MultiplyLowerTransposed(&inverse_scales_[part.scale], part.rows, v.data() + part.row);
   }
 }
 

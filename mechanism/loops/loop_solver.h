@@ -108,17 +108,19 @@ class LoopSolver {
   };
   enum class Form { kNone, kPlain, kScaled, kGeometric, kSoftened };
   bool IsGeometric() const { return form_ == Form::kGeometric || form_ == Form::kSoftened; }
-  auto K_inverse(std::size_t joint) const;
   /// K^-1 X K^-T, in the scratch.
   auto Scaled(const ConstRef& X);
+  /// A = L L^T; its smallest pivot, the square of the smallest diagonal, or 0 where it has none.
+  S Cholesky(const ConstRef& A);
   void ScaleRows(Eigen::Ref<MatrixX<S>> B) const;
 
   int size_ = 0;
   Form form_ = Form::kNone;
-  std::vector<Part> parts_;        ///< the joints
-  std::vector<S> inverse_scales_;  ///< K^-1 of each joint, by columns
-  Eigen::LLT<MatrixX<S>> cholesky_;
-  MatrixX<S> directions_;  ///< U
+  std::vector<Part> parts_;          ///< the joints
+  std::vector<S> inverse_scales_;    ///< K^-1 of each joint, by columns
+  MatrixX<S> small_;                 ///< L as lower_triangle.h has it, where that serves
+  Eigen::LLT<MatrixX<S>> cholesky_;  ///< L elsewhere
+  MatrixX<S> directions_;            ///< U
   VectorX<S> eigenvalues_, inverse_norms_;
   DirectionWeights<S> weights_;
   std::shared_ptr<LoopScratch<S>> scratch_;

@@ -5,6 +5,7 @@
 #include <gtest/gtest.h>
 
 #include <Eigen/LU>
+#include <algorithm>
 #include <limits>
 
 #include "lagrange/lagrange.h"
@@ -58,6 +59,36 @@ TEST(LoopSolverTest, AtFullRankEveryFormIsTheInverse) {
     EXPECT_EQ(solver.smallest_weight(), 1.0);
     ASSERT_TRUE(solver.FactorSoftened(X));
     EXPECT_LE((Inverse(solver) - inverse).norm(), bound);
+  }
+}
+
+/// On both sides of where Eigen's blocks take over (lower_triangle.h), with joints of all sizes.
+TEST(LoopSolverTest, EverySizeIsInverted) {
+  for (const int size : {1, 2, 3, 5, 6, 15, 16, 17, 21, 40}) {
+    std::vector<int> rows;
+    for (int left = size; left > 0; left -= rows.back()) {
+      rows.push_back(std::min<int>(left, 1 + static_cast<int>(rows.size()) % 6));
+    }
+    const MatrixX<double> A = RandomMatrix(size, 2 * size, static_cast<std::uint64_t>(size));
+    const MatrixX<double> X = A * A.transpose(), inverse = X.inverse();
+    LoopSolver<double> solver(rows);
+    int first = 0;
+    for (std::size_t j = 0; j < rows.size(); ++j) {
+      solver.SetScale(static_cast<int>(j), 2.0 * X.block(first, first, rows[j], rows[j]));
+      first += rows[j];
+    }
+    ASSERT_TRUE(solver.FactorScaled(X)) << size;
+    // inverting loses cond(X) eps of its largest entry
+    const double bound = 100 * kEps * X.norm() * inverse.norm() * inverse.norm();
+    EXPECT_LE((Inverse(solver) - inverse).norm(), bound) << size;
+    MatrixX<double> T = MatrixX<double>::Identity(size, size);
+    solver.Apply(T);
+    VectorX<double> v = VectorX<double>::LinSpaced(size, -1.0, 2.0);
+    const VectorX<double> expected = T.transpose() * v;
+    solver.ApplyTransposed(v);
+    EXPECT_LE((v - expected).norm(), 100 * kEps * T.norm() * size) << size;
+    ASSERT_TRUE(solver.FactorPlain(X, X.diagonal().maxCoeff(), 1e-14));
+    EXPECT_LE((Inverse(solver) - inverse).norm(), bound) << size;
   }
 }
 

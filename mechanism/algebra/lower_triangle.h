@@ -1,0 +1,109 @@
+// Cholesky factors of matrices of a few rows, A = L L^T, where Eigen's general forms take longer to
+// find out how small they are than to work. Numbers stand by columns, `stride` apart; only lower
+// triangles are read and written, and diagonals of L hold their reciprocals.
+#pragma once
+
+#include <algorithm>
+#include <cmath>
+#include <type_traits>
+
+namespace loopbench {
+
+/// Up to this size these loops are faster than Eigen's blocks.
+inline constexpr int kSmallTriangle = 16;
+
+/// `call` with n, as a constant where that is common: rows of a pin in the plane and in space.
+template <class Call>
+[[gnu::always_inline]] inline auto WithSize(int n, const Call& call) {
+  if (n == 2) return call(std::integral_constant<int, 2>());
+  if (n == 5) return call(std::integral_constant<int, 5>());
+  return call(n);
+}
+
+/// L in A's place; returns the smallest pivot, the square of the smallest diagonal. Ends at a pivot
+/// that is not positive, and returns that.
+template <class S>
+S FactorLower(S* A, int size, int stride) {
+  return WithSize(size, [=](auto n) {
+    using std::sqrt;
+    S least = n > 0 ? A[0] : S(1);
+    for (int j = 0; j < n; ++j) {
+      S pivot = A[j + j * stride];
+      for (int k = 0; k < j; ++k) pivot -= A[j + k * stride] * A[j + k * stride];
+      if (!(pivot > S(0))) return pivot;
+      least = std::min(least, pivot);
+      const S reciprocal = S(1) / sqrt(pivot);
+      A[j + j * stride] = reciprocal;
+      for (int i = j + 1; i < n; ++i) {
+        S value = A[i + j * stride];
+        for (int k = 0; k < j; ++k) value -= A[i + k * stride] * A[j + k * stride];
+        A[i + j * stride] = value * reciprocal;
+      }
+    }
+    return least;
+  });
+}
+
+/// x := L^-1 x, of numbers or vectors.
+template <class S, class T>
+void SolveLower(const S* L, int size, int stride, T* x) {
+  WithSize(size, [=](auto n) {
+    for (int i = 0; i < n; ++i) {
+      T value = x[i];
+      for (int k = 0; k < i; ++k) value -= x[k] * L[i + k * stride];
+      x[i] = value * L[i + i * stride];
+    }
+  });
+}
+
+/// x := L^-T x.
+template <class S, class T>
+void SolveLowerTransposed(const S* L, int size, int stride, T* x) {
+  WithSize(size, [=](auto n) {
+    for (int i = n - 1; i >= 0; --i) {
+      T value = x[i];
+      for (int k = i + 1; k < n; ++k) value -= x[k] * L[k + i * stride];
+      x[i] = value * L[i + i * stride];
+    }
+  });
+}
+
+/// x := L x, L being as it is: an inverse, for instance.
+template <class S>
+void MultiplyLower(const S* L, int size, S* x) {
+  WithSize(size, [=](auto n) {
+    for (int r = n - 1; r >= 0; --r) {
+      S sum = L[r + r * n] * x[r];
+      for (int c = 0; c < r; ++c) sum += L[r + c * n] * x[c];
+      x[r] = sum;
+    }
+  });
+}
+
+/// x := L^T x.
+template <class S>
+void MultiplyLowerTransposed(const S* L, int size, S* x) {
+  WithSize(size, [=](auto n) {
+    for (int c = 0; c < n; ++c) {
+      S sum = S(0);
+      for (int r = c; r < n; ++r) sum += L[r + c * n] * x[r];
+      x[c] = sum;
+    }
+  });
+}
+
+/// L^-1 in L's place, with the diagonal that it has.
+template <class S>
+void InvertLower(S* L, int size, int stride) {
+  WithSize(size, [=](auto n) {
+    for (int j = 0; j < n; ++j) {
+      for (int i = j + 1; i < n; ++i) {
+        S sum = S(0);
+        for (int k = j; k < i; ++k) sum += L[i + k * stride] * L[k + j * stride];
+        L[i + j * stride] = -sum * L[i + i * stride];
+      }
+    }
+  });
+}
+
+}  // namespace loopbench

@@ -194,7 +194,7 @@ template <class Space, class S>
 bool Joins<Space, S>::FactorFloating(const PlanNode& node, const Place& place) {
   const int n = node.rows;
   operations_ += static_cast<long>(n) * n * n / 6 + n;
-  const S least = FactorLower(&X_[place.x], n, n);
+  const S least = FactorLower(&X_[place.x], n);
   if (least > S(0)) return true;
   rcond_ = least;
   return false;
@@ -272,7 +272,7 @@ template <class Space, class S>
 void Joins<Space, S>::ApplyToKept(const PlanNode& node, const Place& place) {
   const int rows = node.rows;
   if (!node.closes_loop) {
-    for (int e : node.kept) SolveLower(&X_[place.x], rows, rows, &Y_[place.y + e * rows]);
+    for (int e : node.kept) SolveLower(&X_[place.x], rows, &Y_[place.y + e * rows]);
   } else if (!node.kept.empty()) {
     const int width = Space::kDim * static_cast<int>(node.kept.size());
     auto B = columns_.topLeftCorner(rows, width);
@@ -326,7 +326,7 @@ void Joins<Space, S>::Apply(const PlanNode& node, int n, S* v) const {
     loops_[place.loop].Apply(Eigen::Map<MatrixX<S>>(v, node.rows, 1));
     return;
   }
-  SolveLower(&X_[place.x], node.rows, node.rows, v);
+  SolveLower(&X_[place.x], node.rows, v);
 }
 
 /// Backward substitution with L^T, or as the loop solver has it.
@@ -337,7 +337,7 @@ void Joins<Space, S>::ApplyTransposed(const PlanNode& node, int n, S* v) const {
     loops_[place.loop].ApplyTransposed(Eigen::Map<VectorX<S>>(v, node.rows));
     return;
   }
-  SolveLowerTransposed(&X_[place.x], node.rows, node.rows, v);
+  SolveLowerTransposed(&X_[place.x], node.rows, v);
 }
 
 #define LOOPBENCH_INSTANTIATE(Space, S) template class Joins<Space, S>;

@@ -7,6 +7,7 @@
 
 #include "harness/cli/commands.h"
 #include "harness/integrator/cpu_time.h"
+#include "harness/isolation/interruption.h"
 #include "harness/record/json_object.h"
 #include "harness/run/case_identity.h"
 #include "harness/run/peers.h"
@@ -240,7 +241,8 @@ JsonObject PlanDocument(const std::filesystem::path& path, const Overview& overv
 
 }  // namespace
 
-int PrintPlans(const PlanCommand& command) {
+int PrintPlans(const PlanCommand& command) try {
+  const Interruption interruption;  // pilots leave nothing behind
   std::vector<JsonObject> documents;
   for (const auto& path : command.files.paths) {
     const double begin = ThreadCpuSeconds();
@@ -258,6 +260,8 @@ int PrintPlans(const PlanCommand& command) {
   }
   if (command.json) PrintText(JsonObject().Add("experiments", documents).Text() + "\n");
   return 0;
+} catch (const Interrupted& interrupted) {
+  return interrupted.exit_code();
 }
 
 }  // namespace loopbench::harness

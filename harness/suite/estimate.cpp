@@ -5,6 +5,7 @@
 #include <algorithm>
 #include <cmath>
 #include <cstdio>
+#include <exception>
 #include <limits>
 
 #include "harness/analysis/link_length.h"
@@ -119,15 +120,22 @@ const Rate* Estimate::Known(const std::string& key, const std::string& name,
   return &rate;
 }
 
+/// Empty where there is none: an estimate without what rows take is better than none.
+std::filesystem::path Estimate::PlaceForRows() {
+  try {
+    if (written_ == nullptr) written_ = std::make_unique<TemporaryFolder>("loopbench-plan");
+    return written_->path() / "rows.csv";
+  } catch (const std::exception&) {
+    return {};
+  }
+}
+
 /// @param rtol  0 with fixed steps, of which the longest is tried
 const Rate* Estimate::RateOfCase(std::size_t experiment, const Case& one, double rtol) {
   const Experiment& like = experiments_[experiment];
   const std::size_t scene = std::min(one.scene, like.scenes.size() - 1);  // a sweep's may differ
   const std::string column = ToString(one.column);
-  if (like.output && written_ == nullptr) {
-    written_ = std::make_unique<TemporaryFolder>("loopbench-plan");
-  }
-  const auto rows = like.output ? written_->path() / "rows.csv" : std::filesystem::path();
+  const auto rows = like.output ? PlaceForRows() : std::filesystem::path();
   const auto run = [&](double fraction) {
     Case pilot = one;
     pilot.scene = scene;

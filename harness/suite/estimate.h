@@ -2,6 +2,7 @@
 #pragma once
 
 #include <algorithm>
+#include <filesystem>
 #include <functional>
 #include <limits>
 #include <map>
@@ -72,6 +73,7 @@ class Estimate {
   std::size_t Nearest(std::size_t experiment) const;
   const Rate* Known(const std::string& key, const std::string& name, const ProcessLimits& limits,
                     double times, const std::function<Spent(double fraction)>& work);
+  std::filesystem::path PlaceForRows();
   const Rate* RateOfCase(std::size_t experiment, const Case& one, double rtol);
 
   const std::vector<Experiment>& experiments_;

@@ -1,6 +1,6 @@
 // Cholesky factors of matrices of a few rows, A = L L^T, where Eigen's general forms take longer to
-// find out how small they are than to work. Numbers stand by columns, `stride` apart; only lower
-// triangles are read and written, and diagonals of L hold their reciprocals.
+// find out how small they are than to work. Numbers stand by columns; only lower triangles are read
+// and written, and diagonals of L hold their reciprocals.
 #pragma once
 
 #include <algorithm>
@@ -23,21 +23,21 @@ template <class Call>
 /// L in A's place; returns the smallest pivot, the square of the smallest diagonal. Ends at a pivot
 /// that is not positive, and returns that.
 template <class S>
-S FactorLower(S* A, int size, int stride) {
+S FactorLower(S* A, int size) {
   return WithSize(size, [=](auto n) {
     using std::sqrt;
     S least = n > 0 ? A[0] : S(1);
     for (int j = 0; j < n; ++j) {
-      S pivot = A[j + j * stride];
-      for (int k = 0; k < j; ++k) pivot -= A[j + k * stride] * A[j + k * stride];
+      S pivot = A[j + j * n];
+      for (int k = 0; k < j; ++k) pivot -= A[j + k * n] * A[j + k * n];
       if (!(pivot > S(0))) return pivot;
       least = std::min(least, pivot);
       const S reciprocal = S(1) / sqrt(pivot);
-      A[j + j * stride] = reciprocal;
+      A[j + j * n] = reciprocal;
       for (int i = j + 1; i < n; ++i) {
-        S value = A[i + j * stride];
-        for (int k = 0; k < j; ++k) value -= A[i + k * stride] * A[j + k * stride];
-        A[i + j * stride] = value * reciprocal;
+        S value = A[i + j * n];
+        for (int k = 0; k < j; ++k) value -= A[i + k * n] * A[j + k * n];
+        A[i + j * n] = value * reciprocal;
       }
     }
     return least;
@@ -46,24 +46,24 @@ S FactorLower(S* A, int size, int stride) {
 
 /// x := L^-1 x, of numbers or vectors.
 template <class S, class T>
-void SolveLower(const S* L, int size, int stride, T* x) {
+void SolveLower(const S* L, int size, T* x) {
   WithSize(size, [=](auto n) {
     for (int i = 0; i < n; ++i) {
       T value = x[i];
-      for (int k = 0; k < i; ++k) value -= x[k] * L[i + k * stride];
-      x[i] = value * L[i + i * stride];
+      for (int k = 0; k < i; ++k) value -= x[k] * L[i + k * n];
+      x[i] = value * L[i + i * n];
     }
   });
 }
 
 /// x := L^-T x.
 template <class S, class T>
-void SolveLowerTransposed(const S* L, int size, int stride, T* x) {
+void SolveLowerTransposed(const S* L, int size, T* x) {
   WithSize(size, [=](auto n) {
     for (int i = n - 1; i >= 0; --i) {
       T value = x[i];
-      for (int k = i + 1; k < n; ++k) value -= x[k] * L[k + i * stride];
-      x[i] = value * L[i + i * stride];
+      for (int k = i + 1; k < n; ++k) value -= x[k] * L[k + i * n];
+      x[i] = value * L[i + i * n];
     }
   });
 }
@@ -94,13 +94,13 @@ void MultiplyLowerTransposed(const S* L, int size, S* x) {
 
 /// L^-1 in L's place, with the diagonal that it has.
 template <class S>
-void InvertLower(S* L, int size, int stride) {
+void InvertLower(S* L, int size) {
   WithSize(size, [=](auto n) {
     for (int j = 0; j < n; ++j) {
       for (int i = j + 1; i < n; ++i) {
         S sum = S(0);
-        for (int k = j; k < i; ++k) sum += L[i + k * stride] * L[k + j * stride];
-        L[i + j * stride] = -sum * L[i + i * stride];
+        for (int k = j; k < i; ++k) sum += L[i + k * n] * L[k + j * n];
+        L[i + j * n] = -sum * L[i + i * n];
       }
     }
   });

@@ -18,9 +18,9 @@
 // How often a measured angle has turned round (Kinematics::AcceptStep) is of no consequence here: a
 // moment along H changes with H only along D, which lambda takes up.
 //
-// What is left out: the derivative of softening weights (loop_solver.h), and at velocity level that
-// of the metric of the projection, whose effect is as small as the change of speeds it makes. The
-// derivative is exact where nothing is softened and speeds satisfy the constraints.
+// What is left out: the derivative of softening weights (direction_weights.h), and at velocity
+// level that of the metric of the projection, whose effect is as small as the change of speeds it
+// makes. The derivative is exact where nothing is softened and speeds satisfy the constraints.
 #pragma once
 
 #include "mechanism/algebra/dual.h"

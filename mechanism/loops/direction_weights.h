@@ -10,11 +10,12 @@
 //
 // The p_1 <= p_2 <= ... are what each joint could respond once the joints before it are closed: the
 // eigenvalues of its block in the Cholesky factorisation by blocks. They fall with the square of
-// the distance from a singular position as the lambda do, p_i >= lambda_i, but they know nothing of
-// the number of loops: a row of n windows has an eigenvalue of 2 / n^2 in its best position, and by
-// that 40 windows would be softened twenty times as far away as one. A joint by itself has
-// p_i = lambda_i. Where a small eigenvalue hides behind moderate p_i, lambda_least softens it while
-// a hundredth of it is known.
+// the distance from a singular position, as the lambda do, and have the same product, but lie
+// closer together: a row of n windows has an eigenvalue of 2 / n^2 in its best position, and by
+// that 40 windows would be softened twenty times as far away as one. Closed along the row, its p
+// know nothing of n; in an order drawn by chance the least fall with 1 / n. A joint by itself has
+// p_1 .. = lambda_1 .. . Where a small eigenvalue hides behind moderate p, lambda_least softens it
+// while a hundredth of it is known.
 #pragma once
 
 #include <span>

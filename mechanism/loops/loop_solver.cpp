@@ -38,8 +38,8 @@ void LoopSolver<S>::SetScale(int joint, const JointMatrix<S>& free_response) {
   const Part& part = parts_[joint];
   S* inverse = &inverse_scales_[part.scale];
   std::copy_n(free_response.data(), part.rows * part.rows, inverse);
-  FactorLower(inverse, part.rows, part.rows);
-  InvertLower(inverse, part.rows, part.rows);
+  FactorLower(inverse, part.rows);
+  InvertLower(inverse, part.rows);
 }
 
 /// B := K^-1 B, K being block-diagonal: a block per joint.
@@ -68,7 +68,7 @@ template <class S>
 S LoopSolver<S>::Cholesky(const ConstRef& A) {
   if (size_ <= kSmallTriangle) {
     small_ = A;
-    return std::max(S(0), FactorLower(small_.data(), size_, size_));  // 0 for what is not a number
+    return std::max(S(0), FactorLower(small_.data(), size_));  // 0 for what is not a number
   }
   cholesky_.compute(A);
   // a factorisation that broke off has no smallest pivot: it met one that is not positive
@@ -149,8 +149,7 @@ void LoopSolver<S>::Apply(Eigen::Ref<MatrixX<S>> B) const {
   }
   if (form_ == Form::kGeometric) return;
   if (size_ > kSmallTriangle) return cholesky_.matrixL().solveInPlace(B);
-  for (Eigen::Index c = 0; c < B.cols(); ++c)
-    SolveLower(small_.data(), size_, size_, B.col(c).data());
+  for (Eigen::Index c = 0; c < B.cols(); ++c) SolveLower(small_.data(), size_, B.col(c).data());
 }
 
 /// The same factors transposed, in the opposite order.
@@ -160,7 +159,7 @@ void LoopSolver<S>::ApplyTransposed(Eigen::Ref<VectorX<S>> v) const {
     if (size_ > kSmallTriangle) {
       cholesky_.matrixU().solveInPlace(v);
     } else {
-      SolveLowerTransposed(small_.data(), size_, size_, v.data());
+      SolveLowerTransposed(small_.data(), size_, v.data());
     }
   }
   if (IsGeometric()) {

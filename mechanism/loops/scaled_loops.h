@@ -15,7 +15,8 @@
 
 namespace loopbench {
 
-/// Where the softening weight of loop_solver.h is one half: 2e-4 sqrt(sqrt(ln 2)).
+/// Where the softening weight of direction_weights.h is one half for one joint: 2e-4 sqrt(sqrt(ln
+/// 2)).
 inline constexpr double kRankRatio = 1.825e-4;
 
 /// The loops' constraints of one position, scaled.

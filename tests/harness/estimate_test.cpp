@@ -4,6 +4,8 @@
 #include <gtest/gtest.h>
 
 #include <algorithm>
+#include <cstdlib>
+#include <string>
 #include <utility>
 
 #include "harness/config/experiment_reader.h"
@@ -23,6 +25,21 @@ TEST(Estimate, ARateGoesOnWithItsSlopeToWhereRunsEnd) {
   Rate limited = rate;
   limited.most_s = 2.0;
   EXPECT_DOUBLE_EQ(limited.Running(1.0), 2.0);
+}
+
+/// Pilots write rows where an experiment asks for them, and go without where they cannot.
+TEST(Estimate, NeedsNoPlaceForRows) {
+  const std::vector<Experiment> experiments = {
+      ReadExperiment(LOOPBENCH_SOURCE_DIR "/configs/experiments/examples/trajectories.json")};
+  const std::vector<Case> cases = SelectCases(experiments[0], {});
+  const char* before = std::getenv("TMPDIR");
+  const std::string kept = before != nullptr ? before : "";
+  ::setenv("TMPDIR", "/nowhere", 1);
+  Estimate estimate(experiments, {});
+  const double seconds = estimate.OfCase(0, cases[0]);
+  before != nullptr ? ::setenv("TMPDIR", kept.c_str(), 1) : ::unsetenv("TMPDIR");
+  EXPECT_GT(seconds, 0.0);
+  EXPECT_TRUE(estimate.cut_off().empty());
 }
 
 #ifdef LOOPBENCH_PRECISIONS

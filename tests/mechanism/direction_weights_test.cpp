@@ -10,7 +10,7 @@
 
 #include "mechanism/algebra/symmetric_eigen.h"
 #include "mechanism/description/library.h"
-#include "mechanism/loops/tree_dynamics.h"
+#include "mechanism/loops/scaled_loops.h"
 #include "mechanism/start/assembly.h"
 #include "tests/contract/comparison.h"
 
@@ -26,29 +26,22 @@ DirectionWeights<double> WeightsOf(MatrixX<double> X, std::span<const int> rows)
   return weights;
 }
 
-/// The geometric response of a row of windows, `distance` [rad] from all bars in line.
+/// The scaled geometric response of a row of windows, `distance` [rad] from all bars in line.
 MatrixX<double> ResponseOfLadder(int windows, double distance, std::vector<int>* rows) {
   const MechanismDescription description = Ladder(windows, distance, 0.0);
   const Mechanism<Planar, double> mechanism(description, Coordinates::kJoint);
   Kinematics<Planar, double> kinematics(mechanism);
   kinematics.UpdatePosition(Assemble<Planar>(description, mechanism).q);
-  TreeDynamics<Planar, double> dynamics(mechanism);
-  MatrixX<double> M, J, K = MatrixX<double>::Zero(mechanism.num_rows(), mechanism.num_rows());
-  dynamics.MassMatrix(kinematics, Masses::kGeometric, M);
-  dynamics.Jacobian(kinematics, J);
   *rows = mechanism.RowsOfConstraints();
-  for (const int index : mechanism.constraints()) {
-    const Joint<Planar, double>& joint = mechanism.joints()[index];
-    const JointMatrix<double> free = FreeResponse(kinematics, Masses::kGeometric, index);
-    K.block(joint.row, joint.row, 2, 2) = free.llt().matrixL();
-  }
-  const MatrixX<double> B = K.triangularView<Eigen::Lower>().solve(J);
-  return B * M.llt().solve(B.transpose());
+  const MatrixX<double> B = ScaleLoops(kinematics).B;
+  return B * B.transpose();
 }
 
 class WindowsTest : public ::testing::TestWithParam<int> {};
 
 /// The least eigenvalue falls like one over the square of their number, in the best position too.
+/// The pivots that vanish are 0.33 to 1 times the square of the distance whatever the number: at
+/// least 8 theta at 1e-3, at most theta / 40 at 3e-5.
 TEST_P(WindowsTest, SoftenWhereOneWindowDoes) {
   std::vector<int> rows;
   const auto weights_at = [&](double distance) {

@@ -5,7 +5,6 @@
 #include <limits>
 
 #include "mechanism/algebra/instantiate.h"
-#include "mechanism/algebra/lower_triangle.h"
 
 namespace loopbench::odca {
 
@@ -95,12 +94,17 @@ bool Joins<Space, S>::AssembleAll(const Kinematics<Space, S>& kinematics, Pass p
         FillLeaf(kinematics, inertias[child + 1], child);
       }
     }
-    FillJoints(kinematics, masses, node);
-    FormResponse(node, place);
-    const bool ok = node.closes_loop ? FactorLoop(node, place, pass) : FactorFloating(node, place);
+    const bool ok = WithRows<Space>(node, [&](auto rows) {
+      FillJoints(kinematics, masses, node, rows);
+      FormResponse(node, place, rows);
+      if (!(node.closes_loop ? FactorLoop(node, place, pass) : FactorFloating(place, rows))) {
+        return false;
+      }
+      ApplyToKept(node, place, rows);
+      Eliminate(node, place, rows);
+      return true;
+    });
     if (!ok) return false;
-    ApplyToKept(node, place);
-    Eliminate(node, place);
   }
   return true;
 }
@@ -118,16 +122,18 @@ void Joins<Space, S>::FillLeaf(const Kinematics<Space, S>& kinematics,
 /// handles, which removes udot (12, 37-38, 57-58). That c_P and c_Q have opposite signs is Newton's
 /// third law (51-52). Rows of one joint after those of another make the block-diagonal D (69).
 template <class Space, class S>
+template <class Rows>
 void Joins<Space, S>::FillJoints(const Kinematics<Space, S>& kinematics, Masses masses,
-                                 const PlanNode& node) {
+                                 const PlanNode& node, Rows rows) {
   for (const NodeJoint& joint : node.joints) {
     const JointState<Space, S>& state = kinematics.joints()[joint.index];
     const Linear<Space, S> r_P = kinematics.ArmP(joint.index, masses);
     const Linear<Space, S> r_Q = kinematics.ArmQ(joint.index, masses);
     Wrench<Space, S>* c = &c_[c_offset_[joint.index]];
-    for (int i = 0; i < joint.rows; ++i) {
+    const int count = RowsOf(joint, rows);
+    for (int i = 0; i < count; ++i) {
       c[i] = -ShiftForce<Space, S>(state.D(i), r_P);
-      c[joint.rows + i] = ShiftForce<Space, S>(state.D(i), r_Q);
+      c[count + i] = ShiftForce<Space, S>(state.D(i), r_Q);
     }
   }
 }
@@ -137,8 +143,9 @@ void Joins<Space, S>::FillJoints(const Kinematics<Space, S>& kinematics, Masses 
 /// chi where base and terminal joint close (42), with the block rows (40) and (41); and in a
 /// coupled loop it has the block rows (61) and (63), and the paper writes X for its inverse (66).
 template <class Space, class S>
-void Joins<Space, S>::FormResponse(const PlanNode& node, const Place& place) {
-  const int n = node.rows;
+template <class Rows>
+void Joins<Space, S>::FormResponse(const PlanNode& node, const Place& place, Rows rows) {
+  const int n = rows;
   const auto side = [&](const NodeJoint& joint, int which) {
     return which == 0 ? joint.from : joint.to;
   };
@@ -151,37 +158,39 @@ void Joins<Space, S>::FormResponse(const PlanNode& node, const Place& place) {
     const bool is_leaf = node.children[handle.child] < plan_.num_leaves();
     Acceleration<Space, S>* Y = &Y_[place.y + e * n];
     for (const NodeJoint& joint : node.joints) {
-      for (int i = 0; i < joint.rows; ++i) Y[i].setZero();
+      const int count = RowsOf(joint, rows);
+      for (int i = 0; i < count; ++i) Y[i].setZero();
       for (int which = 0; which < 2; ++which) {
         const int f = side(joint, which);
         if (f < 0 || node.handles[f].child != handle.child) continue;
         const Block<Space, S>& Z = Z_[child.z + handle.place + child.kept * node.handles[f].place];
         const Wrench<Space, S>* c = direction(joint, which);
-        for (int i = 0; i < joint.rows; ++i) {  // (67)
+        for (int i = 0; i < count; ++i) {  // (67)
           Y[i] += is_leaf ? ApplyDiagonal<Acceleration<Space, S>>(Z, c[i])
                           : loopbench::Apply<Acceleration<Space, S>>(Z, c[i]);
         }
-        operations_ += joint.rows * Space::kDim * Space::kDim;
+        operations_ += count * Space::kDim * Space::kDim;
       }
-      Y += joint.rows;
+      Y += count;
     }
   }
   S* X = &X_[place.x];
   std::fill_n(X, n * n, S(0));
   int first = 0;
   for (const NodeJoint& joint : node.joints) {
+    const int count = RowsOf(joint, rows);
     for (int which = 0; which < 2; ++which) {
       const int f = side(joint, which);
       if (f < 0) continue;
       const Wrench<Space, S>* c = direction(joint, which);
       const Acceleration<Space, S>* Y = &Y_[place.y + f * n];
-      for (int i = 0; i < joint.rows; ++i) {
+      for (int i = 0; i < count; ++i) {
         for (int l = 0; l <= first + i; ++l)
           X[first + i + l * n] += c[i].dot(Y[l]);  // (16, 42, 66)
       }
     }
-    operations_ += Space::kDim * joint.rows * (2 * first + joint.rows + 1);
-    first += joint.rows;
+    operations_ += Space::kDim * count * (2 * first + count + 1);
+    first += count;
   }
   for (int j = 0; j < n; ++j) {
     for (int i = 0; i < j; ++i) X[i + j * n] = X[j + i * n];
@@ -191,10 +200,10 @@ void Joins<Space, S>::FormResponse(const PlanNode& node, const Place& place) {
 /// X = L L^T in place of X's lower triangle, T = L^-1: what (17) inverts. X is positive definite,
 /// because one side floats.
 template <class Space, class S>
-bool Joins<Space, S>::FactorFloating(const PlanNode& node, const Place& place) {
-  const int n = node.rows;
-  operations_ += static_cast<long>(n) * n * n / 6 + n;
-  const S least = FactorLower(&X_[place.x], n);
+template <class Rows>
+bool Joins<Space, S>::FactorFloating(const Place& place, Rows rows) {
+  operations_ += static_cast<long>(rows) * rows * rows / 6 + rows;
+  const S least = FactorLower(&X_[place.x], rows);
   if (least > S(0)) return true;
   rcond_ = least;
   return false;
@@ -269,8 +278,8 @@ void Joins<Space, S>::NoteDiagnostics(const PlanNode& node, const LoopSolver<S>&
 
 /// V = T Y in Y's place, for the handles that stay: the X Y of (64) is -T^T V.
 template <class Space, class S>
-void Joins<Space, S>::ApplyToKept(const PlanNode& node, const Place& place) {
-  const int rows = node.rows;
+template <class Rows>
+void Joins<Space, S>::ApplyToKept(const PlanNode& node, const Place& place, Rows rows) {
   if (!node.closes_loop) {
     for (int e : node.kept) SolveLower(&X_[place.x], rows, &Y_[place.y + e * rows]);
   } else if (!node.kept.empty()) {
@@ -297,8 +306,9 @@ void Joins<Space, S>::ApplyToKept(const PlanNode& node, const Place& place) {
 /// child are Upsilon_11 (26) and Upsilon_22 (27), those across, with Z = 0 between the children,
 /// Upsilon_12 (28); where body 2 alone stays of a coupled loop, the block is zeta^asm (71).
 template <class Space, class S>
-void Joins<Space, S>::Eliminate(const PlanNode& node, const Place& place) {
-  const int n = node.rows;
+template <class Rows>
+void Joins<Space, S>::Eliminate(const PlanNode& node, const Place& place, Rows rows) {
+  const int n = rows;
   for (int f = 0; f < place.kept; ++f) {
     const Handle& at_f = node.handles[node.kept[f]];
     const Acceleration<Space, S>* V_f = &Y_[place.y + node.kept[f] * n];
@@ -316,28 +326,6 @@ void Joins<Space, S>::Eliminate(const PlanNode& node, const Place& place) {
       operations_ += static_cast<long>(n) * Space::kDim * Space::kDim;
     }
   }
-}
-
-/// Forward substitution with L, or as the loop solver has it.
-template <class Space, class S>
-void Joins<Space, S>::Apply(const PlanNode& node, int n, S* v) const {
-  const Place& place = places_[n];
-  if (node.closes_loop) {
-    loops_[place.loop].Apply(Eigen::Map<MatrixX<S>>(v, node.rows, 1));
-    return;
-  }
-  SolveLower(&X_[place.x], node.rows, v);
-}
-
-/// Backward substitution with L^T, or as the loop solver has it.
-template <class Space, class S>
-void Joins<Space, S>::ApplyTransposed(const PlanNode& node, int n, S* v) const {
-  const Place& place = places_[n];
-  if (node.closes_loop) {
-    loops_[place.loop].ApplyTransposed(Eigen::Map<VectorX<S>>(v, node.rows));
-    return;
-  }
-  SolveLowerTransposed(&X_[place.x], node.rows, v);
 }
 
 #define LOOPBENCH_INSTANTIATE(Space, S) template class Joins<Space, S>;

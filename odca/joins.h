@@ -34,8 +34,10 @@
 #pragma once
 
 #include <memory>
+#include <type_traits>
 #include <vector>
 
+#include "mechanism/algebra/lower_triangle.h"
 #include "mechanism/description/outcome.h"
 #include "mechanism/formulation/options.h"
 #include "mechanism/loops/loop_solver.h"
@@ -43,6 +45,22 @@
 #include "odca/plan.h"
 
 namespace loopbench::odca {
+
+/// `call` with the rows of a node; where they are those of one pin in the plane, or one revolute
+/// joint in space, as a constant, by which the loops over them are unrolled.
+template <class Space, class Call>
+[[gnu::always_inline]] inline auto WithRows(const PlanNode& node, const Call& call) {
+  constexpr int kPin = Space::kDim - 1;
+  if (node.rows == kPin && node.joints.size() == 1)
+    return call(std::integral_constant<int, kPin>());
+  return call(node.rows);
+}
+/// Rows of a joint of a node with so many rows.
+inline int RowsOf(const NodeJoint& joint, int /*rows*/) { return joint.rows; }
+template <int rows>
+constexpr int RowsOf(const NodeJoint&, std::integral_constant<int, rows>) {
+  return rows;
+}
 
 template <class Space, class S>
 class Joins {
@@ -72,9 +90,23 @@ class Joins {
   const Acceleration<Space, S>* V(const PlanNode& node, int n, int handle) const {
     return &Y_[places_[n].y + handle * node.rows];
   }
-  /// v := T v and v := T^T v for the rows of an inner node.
-  void Apply(const PlanNode& node, int n, S* v) const;
-  void ApplyTransposed(const PlanNode& node, int n, S* v) const;
+  /// v := T v for the rows of an inner node, and v := T^T v.
+  template <class Rows>
+  void Apply(const PlanNode& node, int n, Rows rows, S* v) const {
+    if (node.closes_loop) {
+      loops_[places_[n].loop].Apply(Eigen::Map<MatrixX<S>>(v, rows, 1));
+    } else {
+      SolveLower(&X_[places_[n].x], rows, v);
+    }
+  }
+  template <class Rows>
+  void ApplyTransposed(const PlanNode& node, int n, Rows rows, S* v) const {
+    if (node.closes_loop) {
+      loops_[places_[n].loop].ApplyTransposed(Eigen::Map<VectorX<S>>(v, rows));
+    } else {
+      SolveLowerTransposed(&X_[places_[n].x], rows, v);
+    }
+  }
 
   /// Whether Assemble() left out or softened a direction: solutions are then refined (sweep.h).
   bool softened() const { return softened_; }
@@ -104,13 +136,19 @@ class Joins {
 
   bool AssembleAll(const Kinematics<Space, S>& kinematics, Pass pass);
   void FillLeaf(const Kinematics<Space, S>& kinematics, const Inertia<Space, S>& inertia, int n);
-  void FillJoints(const Kinematics<Space, S>& kinematics, Masses masses, const PlanNode& node);
-  void FormResponse(const PlanNode& node, const Place& place);
-  bool FactorFloating(const PlanNode& node, const Place& place);
+  template <class Rows>
+  void FillJoints(const Kinematics<Space, S>& kinematics, Masses masses, const PlanNode& node,
+                  Rows rows);
+  template <class Rows>
+  void FormResponse(const PlanNode& node, const Place& place, Rows rows);
+  template <class Rows>
+  bool FactorFloating(const Place& place, Rows rows);
   JointMatrix<S> FreeResponseAt(const PlanNode& node, const NodeJoint& joint) const;
   bool FactorLoop(const PlanNode& node, const Place& place, Pass pass);
-  void ApplyToKept(const PlanNode& node, const Place& place);
-  void Eliminate(const PlanNode& node, const Place& place);
+  template <class Rows>
+  void ApplyToKept(const PlanNode& node, const Place& place, Rows rows);
+  template <class Rows>
+  void Eliminate(const PlanNode& node, const Place& place, Rows rows);
   void NoteDiagnostics(const PlanNode& node, const LoopSolver<S>& loop);
 
   const Mechanism<Space, S>& mechanism_;

@@ -43,10 +43,16 @@ template <class Space, class S>
 void Sweep<Space, S>::Correct(std::span<const Components<Space, S>> c0,
                               std::span<Acceleration<Space, S>> A) {
   const int leaves = plan_.num_leaves();
-  for (int n = leaves; n < plan_.num_nodes(); ++n) Up(plan_.nodes()[n - leaves], n, c0);
+  for (int n = leaves; n < plan_.num_nodes(); ++n) {
+    const PlanNode& node = plan_.nodes()[n - leaves];
+    WithRows<Space>(node, [&](auto rows) { Up(node, n, rows, c0); });
+  }
   // a root's boundary is empty; a body without joints is a root whose one handle feels no force
   for (int n = 0; n < leaves; ++n) F_[joins_.first_handle(n)].setZero();
-  for (int n = plan_.num_nodes() - 1; n >= leaves; --n) Down(plan_.nodes()[n - leaves], n);
+  for (int n = plan_.num_nodes() - 1; n >= leaves; --n) {
+    const PlanNode& node = plan_.nodes()[n - leaves];
+    WithRows<Space>(node, [&](auto rows) { Down(node, n, rows); });
+  }
   for (int n = 0; n < leaves; ++n) {
     const int handle = joins_.first_handle(n);
     A[n + 1] += b_[handle];
@@ -78,7 +84,9 @@ void Sweep<Space, S>::Residual(std::span<const Components<Space, S>> c0,
 /// Upsilon_i3 (29-30) and zeta^asm_i3 (72). The zero that c0 + c_P^T A_P + c_Q^T A_Q must be is
 /// (37-38) at joints to Ground and (57-58) in a coupled loop.
 template <class Space, class S>
-void Sweep<Space, S>::Up(const PlanNode& node, int n, std::span<const Components<Space, S>> c0) {
+template <class Rows>
+void Sweep<Space, S>::Up(const PlanNode& node, int n, Rows rows,
+                         std::span<const Components<Space, S>> c0) {
   S* s = &s_[joins_.first_row(n)];
   int row = 0;
   const auto b_of = [&](int f) -> const Acceleration<Space, S>& {
@@ -86,21 +94,22 @@ void Sweep<Space, S>::Up(const PlanNode& node, int n, std::span<const Components
     return b_[joins_.first_handle(node.children[handle.child]) + handle.place];
   };
   for (const NodeJoint& joint : node.joints) {
-    for (int i = 0; i < joint.rows; ++i, ++row) {
+    const int count = RowsOf(joint, rows);
+    for (int i = 0; i < count; ++i, ++row) {
       s[row] = c0[joint.index][i];  // (15, 42, 68)
       if (joint.from >= 0) s[row] += joins_.c_P(joint)[i].dot(b_of(joint.from));
       if (joint.to >= 0) s[row] += joins_.c_Q(joint)[i].dot(b_of(joint.to));
     }
   }
-  joins_.Apply(node, n, s);  // (21)
+  joins_.Apply(node, n, rows, s);  // (21)
   const int kept = joins_.kept(n);
   for (int e = 0; e < kept; ++e) {
     Acceleration<Space, S> b = b_of(node.kept[e]);
     const Acceleration<Space, S>* V = joins_.V(node, n, node.kept[e]);
-    for (int i = 0; i < node.rows; ++i) b -= V[i] * s[i];  // (29-30, 72)
+    for (int i = 0; i < rows; ++i) b -= V[i] * s[i];  // (29-30, 72)
     b_[joins_.first_handle(n) + e] = b;
   }
-  operations_ += node.rows * (2 * Space::kDim + Space::kDim * kept + node.rows / 2);
+  operations_ += rows * (2 * Space::kDim + Space::kDim * kept + rows / 2);
 }
 
 /// phi = -T^T (s + V F) are the measure numbers of a series join (17), of the base and terminal
@@ -108,16 +117,17 @@ void Sweep<Space, S>::Up(const PlanNode& node, int n, std::span<const Components
 /// what comes from outside, F^ext of (47-48), and c phi, the D phi of (13, 18, 39, 59, 65) moved
 /// from Mo to the centre of mass.
 template <class Space, class S>
-void Sweep<Space, S>::Down(const PlanNode& node, int n) {
+template <class Rows>
+void Sweep<Space, S>::Down(const PlanNode& node, int n, Rows rows) {
   const int kept = joins_.kept(n);
   const Wrench<Space, S>* F_kept = F_.data() + joins_.first_handle(n);
   S* phi = forces_.data();
-  for (int i = 0; i < node.rows; ++i) phi[i] = -s_[joins_.first_row(n) + i];
+  for (int i = 0; i < rows; ++i) phi[i] = -s_[joins_.first_row(n) + i];
   for (int e = 0; e < kept; ++e) {
     const Acceleration<Space, S>* V = joins_.V(node, n, node.kept[e]);
-    for (int i = 0; i < node.rows; ++i) phi[i] -= V[i].dot(F_kept[e]);
+    for (int i = 0; i < rows; ++i) phi[i] -= V[i].dot(F_kept[e]);
   }
-  joins_.ApplyTransposed(node, n, phi);  // (17, 42, 64)
+  joins_.ApplyTransposed(node, n, rows, phi);  // (17, 42, 64)
   const auto force_on = [&](int f) -> Wrench<Space, S>& {
     const Handle& handle = node.handles[f];
     return F_[joins_.first_handle(node.children[handle.child]) + handle.place];
@@ -132,13 +142,14 @@ void Sweep<Space, S>::Down(const PlanNode& node, int n) {
   }
   int row = 0;
   for (const NodeJoint& joint : node.joints) {
-    for (int i = 0; i < joint.rows; ++i, ++row) {
+    const int count = RowsOf(joint, rows);
+    for (int i = 0; i < count; ++i, ++row) {
       phi_[joint.index][i] += phi[row];
       if (joint.from >= 0) force_on(joint.from) += joins_.c_P(joint)[i] * phi[row];
       if (joint.to >= 0) force_on(joint.to) += joins_.c_Q(joint)[i] * phi[row];  // (18, 39, 65)
     }
   }
-  operations_ += node.rows * (2 * Space::kDim + Space::kDim * kept + node.rows / 2);
+  operations_ += rows * (2 * Space::kDim + Space::kDim * kept + rows / 2);
 }
 
 #define LOOPBENCH_INSTANTIATE(Space, S) template class Sweep<Space, S>;

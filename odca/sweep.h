@@ -48,8 +48,10 @@ class Sweep {
 
  private:
   /// One node on the way up, and on the way down.
-  void Up(const PlanNode& node, int n, std::span<const Components<Space, S>> c0);
-  void Down(const PlanNode& node, int n);
+  template <class Rows>
+  void Up(const PlanNode& node, int n, Rows rows, std::span<const Components<Space, S>> c0);
+  template <class Rows>
+  void Down(const PlanNode& node, int n, Rows rows);
   /// Up and down over what stands in b_; adds to A and phi_.
   void Correct(std::span<const Components<Space, S>> c0, std::span<Acceleration<Space, S>> A);
   /// r = C A + c0 of every joint, in residual_.

@@ -45,7 +45,7 @@ struct RackAndPinion {
     using std::cos;
     using std::sin;
     if constexpr (Space::kRot == 1) {
-      X_FM.SetAngle(q[0]);
+      X_FM.angle = q[0];
       X_FM.p = {r * q[0], S(0)};
     } else {
       const S c = cos(q[0]), s = sin(q[0]);

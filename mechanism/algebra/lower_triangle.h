@@ -19,11 +19,16 @@ template <class Call>
   if (n == 5) return call(std::integral_constant<int, 5>());
   return call(n);
 }
+/// The same of a size that is a constant already.
+template <int n, class Call>
+[[gnu::always_inline]] inline auto WithSize(std::integral_constant<int, n> size, const Call& call) {
+  return call(size);
+}
 
 /// L in A's place; returns the smallest pivot, the square of the smallest diagonal. Ends at a pivot
 /// that is not positive, and returns that.
-template <class S>
-S FactorLower(S* A, int size) {
+template <class S, class Size>
+S FactorLower(S* A, Size size) {
   return WithSize(size, [=](auto n) {
     using std::sqrt;
     S least = n > 0 ? A[0] : S(1);
@@ -45,8 +50,8 @@ S FactorLower(S* A, int size) {
 }
 
 /// x := L^-1 x, of numbers or vectors.
-template <class S, class T>
-void SolveLower(const S* L, int size, T* x) {
+template <class S, class Size, class T>
+void SolveLower(const S* L, Size size, T* x) {
   WithSize(size, [=](auto n) {
     for (int i = 0; i < n; ++i) {
       T value = x[i];
@@ -57,8 +62,8 @@ void SolveLower(const S* L, int size, T* x) {
 }
 
 /// x := L^-T x.
-template <class S, class T>
-void SolveLowerTransposed(const S* L, int size, T* x) {
+template <class S, class Size, class T>
+void SolveLowerTransposed(const S* L, Size size, T* x) {
   WithSize(size, [=](auto n) {
     for (int i = n - 1; i >= 0; --i) {
       T value = x[i];

@@ -71,9 +71,8 @@ Velocity<Space, S> Mismatch(const JointKind<Space, S>& kind, const Pose<Space, S
     return {Angular<Space, S>::Zero(), X_FM.p * (S(1) - kind.parameter / X_FM.p.norm())};
   }
   S q[7];
-  Pose<Space, S> nearest;
   kind.coordinates(X_FM, q, kind.parameter);
-  kind.transform(q, nearest, kind.parameter);
+  const Pose<Space, S> nearest = PoseAt(kind, q);
   Velocity<Space, S> mismatch(RotationVector(Compose(X_FM, Inverse(nearest))), X_FM.p - nearest.p);
   // A loop may wind: planar angles along it then differ by whole turns that are no mismatch.
   if constexpr (Space::kRot == 1) {

@@ -63,6 +63,7 @@ struct JointKind {
   /// It is 1 in every built-in kind but the helical, whose H is [z; pitch z]; found from `basis`.
   S inverse_H_squared = S(1);
 
+  /// X_FM; in the plane the angle and the shift suffice (PoseAt() has the matrix, too).
   void (*transform)(const S* q, Pose<Space, S>& X_FM, S parameter) = nullptr;
   void (*coordinates)(const Pose<Space, S>& X_FM, S* q, S parameter) = nullptr;
   void (*rates)(const S* q, const S* u, S* qdot) = nullptr;
@@ -83,6 +84,15 @@ const JointKind<Space, S>& KindOf(JointType type);
 /// The same for one joint, with its own parameter.
 template <class Space, class S>
 JointKind<Space, S> KindWith(JointType type, S parameter);
+
+/// X_FM at q, all of it.
+template <class Space, class S>
+Pose<Space, S> PoseAt(const JointKind<Space, S>& kind, const S* q) {
+  Pose<Space, S> X_FM;
+  kind.transform(q, X_FM, kind.parameter);
+  if constexpr (Space::kRot == 1) X_FM.SetAngle(X_FM.angle);
+  return X_FM;
+}
 
 /// What keeps M from its nearest admissible pose, in F axes: [rotation vector; shift], the way that
 /// a velocity goes in unit time. Its components along D are the joint's mismatch, in rad and m.

@@ -11,10 +11,10 @@ template <class Space, class S>
 Velocity<Space, S> Kinematics<Space, S>::ConstraintMismatch(int index) const {
   const Joint<Space, S>& joint = mechanism_->joints()[index];
   Velocity<Space, S> mismatch = Rotate<Space, S>(poses_[joint.from].R * joint.X_PF.R,
-                                                 Mismatch(*joint.kind, measured_[index]));
+                                                 Mismatch(*joint.kind, joint_poses_[index]));
   if (joint.num_drives == 0) return mismatch;
   S q[7];
-  joint.kind->coordinates(measured_[index], q, joint.kind->parameter);
+  joint.kind->coordinates(joint_poses_[index], q, joint.kind->parameter);
   for (int k = 0; k < joint.num_drives; ++k) {
     const int drive = joint.first_drive + k, coordinate = mechanism_->drives()[drive].coordinate;
     S miss = q[coordinate] - drives_[drive].value;
@@ -45,7 +45,7 @@ S Kinematics<Space, S>::JointCoordinate(int index) const {
     return joint.num_drives > 0 ? drives_[joint.first_drive].value : q_[joint.q_offset];
   }
   S q;
-  joint.kind->coordinates(measured_[index], &q, joint.kind->parameter);
+  joint.kind->coordinates(joint_poses_[index], &q, joint.kind->parameter);
   if (joint.kind->parameter != S(0)) return q;  // a helix tells its turns
   // Space measures an angle modulo a turn; take the one next to the last accepted.
   if (Space::kRot == 3 && joint.kind->axes[0] < 3) {

@@ -16,7 +16,7 @@ struct Kinds {
             .rotation_invariant = true,
             .transform =
                 [](const S* q, P& X, S) {
-                  X.SetAngle(q[0]);
+                  X.angle = q[0];
                   X.p.setZero();
                 },
             .coordinates = [](const P& X, S* q, S) { q[0] = X.angle; },
@@ -29,7 +29,7 @@ struct Kinds {
             .rotation_invariant = false,
             .transform =
                 [](const S* q, P& X, S) {
-                  X.SetAngle(S(0));
+                  X.angle = S(0);
                   X.p = {q[0], S(0)};
                 },
             .coordinates = [](const P& X, S* q, S) { q[0] = X.p[0]; },
@@ -51,7 +51,7 @@ struct Kinds {
             .rotation_invariant = false,
             .transform =
                 [](const S* q, P& X, S) {
-                  X.SetAngle(q[0]);
+                  X.angle = q[0];
                   X.p = {q[1], q[2]};
                 },
             .coordinates =
@@ -69,7 +69,7 @@ struct Kinds {
             .rotation_invariant = false,
             .transform =
                 [](const S* q, P& X, S) {
-                  X.SetAngle(q[0]);
+                  X.angle = q[0];
                   X.p = {q[1], S(0)};
                 },
             .coordinates =

@@ -4,21 +4,40 @@
 #include "mechanism/model/kinematics.h"
 
 #include <algorithm>
+#include <cmath>
+#include <span>
+#include <type_traits>
 
 #include "mechanism/algebra/instantiate.h"
+#include "mechanism/algebra/lanes.h"
 
 namespace loopbench {
 
 namespace {
 
-/// A planar pose accumulates its matrix by products; one sine and cosine bring it back to its
-/// angle.
+/// Matrices of planar poses from their angles, in double as many at once as there are lanes. A pose
+/// has the same bits wherever it stands.
 template <class S>
-void Refresh(Pose<Planar, S>& X) {
-  X.SetAngle(X.angle);
+void SetMatrices(std::span<Pose<Planar, S>> poses) {
+  if constexpr (std::is_same_v<S, double>) {
+    while (!poses.empty()) {
+      const std::size_t count = std::min<std::size_t>(kLanes, poses.size());
+      Lanes angle{}, s, c;
+      for (std::size_t i = 0; i < count; ++i) angle[i] = poses[i].angle;
+      SinCos(angle, s, c);
+      for (std::size_t i = 0; i < count; ++i) {
+        if (std::abs(angle[i]) <= kLargestAngle) {
+          poses[i].R = {c[i], -s[i], s[i], c[i]};
+        } else {
+          poses[i].SetAngle(angle[i]);
+        }
+      }
+      poses = poses.subspan(count);
+    }
+  } else {
+    for (Pose<Planar, S>& X : poses) X.SetAngle(X.angle);
+  }
 }
-template <class S>
-void Refresh(Pose<Spatial, S>&) {}
 
 /// [H D] in ground axes, F having the axes R = R_WF. Each column is a rotation about one axis of F
 /// or a shift along one, all different, so D^T H = 0 holds as it is (9). The plane has one axis to
@@ -64,7 +83,7 @@ Kinematics<Space, S>::Kinematics(const Mechanism<Space, S>& mechanism)
       poses_(mechanism.num_bodies()),
       motions_(mechanism.num_bodies(), Velocity<Space, S>::Zero()),
       joints_(mechanism.joints().size()),
-      measured_(joints_.size()),
+      joint_poses_(joints_.size()),
       drives_(mechanism.drives().size()),
       accepted_(joints_.size(), S(0)),
       q_(VectorX<S>::Zero(mechanism.num_q())),
@@ -89,7 +108,7 @@ void Kinematics<Space, S>::Release(const std::vector<Released>& released) {
   for (int j = 0; j < static_cast<int>(joints_.size()); ++j) {
     const Joint<Space, S>& joint = mechanism_->joints()[j];
     if (joint.kind->basis != nullptr) continue;
-    SetDirections(j, AnyAxes(joint) ? Rotation<Space, S>::Identity() : joint.X_PF.R, {});
+    SetDirections(j, AnyAxes(joint) ? Rotation<Space, S>::Identity() : joint.X_PF.R);
   }
 }
 
@@ -131,15 +150,14 @@ const S* Kinematics<Space, S>::JointCoordinates(const Joint<Space, S>& joint, co
 /// [H D] in ground axes; directions of prescribed coordinates go from H to the head of D, released
 /// ones to its end.
 template <class Space, class S>
-void Kinematics<Space, S>::SetDirections(int index, const Rotation<Space, S>& R_WF,
-                                         const Pose<Space, S>& X_FM) {
+void Kinematics<Space, S>::SetDirections(int index, const Rotation<Space, S>& R_WF) {
   const Joint<Space, S>& joint = mechanism_->joints()[index];
   JointState<Space, S>& state = joints_[index];
   const auto released = joint.num_released > 0
                             ? std::ranges::find(released_, index, &Released::joint)
                             : released_.end();
   if (joint.kind->basis != nullptr) {
-    SetBasisAt<Space, S>(*joint.kind, R_WF, X_FM, state.basis);
+    SetBasisAt<Space, S>(*joint.kind, R_WF, joint_poses_[index], state.basis);
   } else if (released == released_.end()) {
     SetBasis<Space, S>(*joint.kind, R_WF, R_WF, state.basis);
   } else {
@@ -165,49 +183,87 @@ void Kinematics<Space, S>::SetDirections(int index, const Rotation<Space, S>& R_
 }
 
 /// First half of the paper's first two sweeps, as a walk along the spanning tree: each body after
-/// its parent, outwards from Ground. Forward along a joint (the child is Q)
-///
-///   X_WF = X_WP X_PF,    X_WM = X_WF X_FM(q),    X_WQ = X_WM X_QM^-1,
-///
-/// and backward the same solved for X_WP. A cut joint's X_FM is what the two bodies leave. The
-/// point of every joint is Mo, and its arms r_P and r_Q lead there from the centres of mass.
+/// its parent, outwards from Ground. In the plane the angles go first, so that all sines and
+/// cosines are taken at once.
 template <class Space, class S>
 void Kinematics<Space, S>::UpdatePosition(const VectorX<S>& q) {
   q_ = q;
   ++position_version_;
-  Pose<Space, S> X_WF, X_WM, X_FM;
-  const auto finish = [&](int index, const Joint<Space, S>& joint) {
-    JointState<Space, S>& state = joints_[index];
-    state.r_P = X_WM.p - poses_[joint.from].p;
-    state.r_Q = X_WM.p - poses_[joint.to].p;
-    if (joint.kind->basis != nullptr) measured_[index] = X_FM;
-    if (joint.kind->basis != nullptr || (!AnyAxes(joint) && joint.from != kGround)) {
-      SetDirections(index, X_WF.R, X_FM);
-    }
-  };
   S room[7];
   for (const TreeStep& step : mechanism_->tree()) {
     const Joint<Space, S>& joint = mechanism_->joints()[step.joint];
+    Pose<Space, S>& X_FM = joint_poses_[step.joint];
     joint.kind->transform(JointCoordinates(joint, q, room), X_FM, joint.kind->parameter);
-    if (step.sign > 0) {
-      X_WF = Compose(poses_[step.parent], joint.X_PF);
-      X_WM = Compose(X_WF, X_FM);
-      poses_[step.child] = Compose(X_WM, Inverse(joint.X_QM));
-    } else {
-      X_WM = Compose(poses_[step.parent], joint.X_QM);
-      X_WF = Compose(X_WM, Inverse(X_FM));
-      poses_[step.child] = Compose(X_WF, Inverse(joint.X_PF));
+    if constexpr (Space::kRot == 1) {
+      const S parent = poses_[step.parent].angle;
+      poses_[step.child].angle = step.sign > 0
+                                     ? parent + joint.X_PF.angle + X_FM.angle - joint.X_QM.angle
+                                     : parent + joint.X_QM.angle - X_FM.angle - joint.X_PF.angle;
     }
-    Refresh(poses_[step.child]);
-    finish(step.joint, joint);
   }
-  for (int index : mechanism_->constraints()) {
-    const Joint<Space, S>& joint = mechanism_->joints()[index];
-    X_WF = Compose(poses_[joint.from], joint.X_PF);
-    X_WM = Compose(poses_[joint.to], joint.X_QM);
-    X_FM = Compose(Inverse(X_WF), X_WM);
-    measured_[index] = X_FM;
-    finish(index, joint);
+  if constexpr (Space::kRot == 1) SetMatrices(std::span(poses_).subspan(1));
+  for (const TreeStep& step : mechanism_->tree()) PlaceChild(step);
+  for (const int index : mechanism_->constraints()) MeasureCut(index);
+}
+
+/// Along a tree joint
+///
+///   R_WQ = R_WP R_PF R_FM R_QM^T                       in the plane from the angle
+///   r_P = R_WP p_PF + R_WF p_FM,   r_Q = R_WQ p_QM     the arms of Mo from the centres of mass
+///   p_Q = p_P + r_P - r_Q                              forward, and backward the same for P
+template <class Space, class S>
+void Kinematics<Space, S>::PlaceChild(const TreeStep& step) {
+  const Joint<Space, S>& joint = mechanism_->joints()[step.joint];
+  JointState<Space, S>& state = joints_[step.joint];
+  Pose<Space, S>&X_WP = poses_[joint.from], &X_WQ = poses_[joint.to];
+  const Pose<Space, S>& X_FM = joint_poses_[step.joint];
+  const bool forward = step.sign > 0;
+  Rotation<Space, S> R_WF;
+  if (forward || Space::kRot == 1) {
+    R_WF = X_WP.R * joint.X_PF.R;
+    if constexpr (Space::kRot > 1) X_WQ.R = R_WF * X_FM.R * joint.X_QM.R.transpose();
+  } else {
+    R_WF = X_WQ.R * joint.X_QM.R * X_FM.R.transpose();
+    X_WP.R = R_WF * joint.X_PF.R.transpose();
+  }
+  state.r_P = X_WP.R * joint.X_PF.p + R_WF * X_FM.p;
+  state.r_Q = X_WQ.R * joint.X_QM.p;
+  if (forward) {
+    X_WQ.p = X_WP.p + state.r_P - state.r_Q;
+  } else {
+    X_WP.p = X_WQ.p + state.r_Q - state.r_P;
+  }
+  FollowDirections(step.joint, R_WF);
+}
+
+/// A cut joint's X_FM is what the two bodies leave; its point Mo is that of Q.
+template <class Space, class S>
+void Kinematics<Space, S>::MeasureCut(int index) {
+  const Joint<Space, S>& joint = mechanism_->joints()[index];
+  JointState<Space, S>& state = joints_[index];
+  const Pose<Space, S>&X_WP = poses_[joint.from], &X_WQ = poses_[joint.to];
+  Pose<Space, S>& X_FM = joint_poses_[index];
+  const Rotation<Space, S> R_WF = X_WP.R * joint.X_PF.R;
+  state.r_Q = X_WQ.R * joint.X_QM.p;
+  state.r_P = X_WQ.p + state.r_Q - X_WP.p;
+  X_FM.p = R_WF.transpose() * (state.r_P - X_WP.R * joint.X_PF.p);
+  if constexpr (Space::kRot == 1) {
+    X_FM.angle = X_WQ.angle + joint.X_QM.angle - (X_WP.angle + joint.X_PF.angle);
+  } else {
+    X_FM.R = R_WF.transpose() * (X_WQ.R * joint.X_QM.R);
+  }
+  FollowDirections(index, R_WF);
+}
+
+/// [H D] of a joint whose directions move.
+template <class Space, class S>
+void Kinematics<Space, S>::FollowDirections(int index, const Rotation<Space, S>& R_WF) {
+  const Joint<Space, S>& joint = mechanism_->joints()[index];
+  if (joint.kind->basis != nullptr) {
+    if constexpr (Space::kRot == 1) joint_poses_[index].SetAngle(joint_poses_[index].angle);
+    SetDirections(index, R_WF);
+  } else if (!AnyAxes(joint) && joint.from != kGround) {
+    SetDirections(index, R_WF);
   }
 }
 
@@ -267,7 +323,7 @@ void Kinematics<Space, S>::AddBias(int index, const Joint<Space, S>& joint,
                                    JointState<Space, S>& state) const {
   const Rotation<Space, S> R = poses_[joint.from].R * joint.X_PF.R;
   const Velocity<Space, S> in_F = Rotate<Space, S>(R.transpose(), state.V_rel);
-  state.g += Rotate(R, joint.kind->bias(measured_[index], in_F));
+  state.g += Rotate(R, joint.kind->bias(joint_poses_[index], in_F));
 }
 
 /// n of (7) on centres of mass: A at c + r is S(r) A + n.

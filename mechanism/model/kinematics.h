@@ -132,14 +132,19 @@ class Kinematics {
   void AddBias(int index, const Joint<Space, S>& joint, JointState<Space, S>& state) const;
   /// Coordinates of a tree joint, prescribed ones among them, in `room`.
   const S* JointCoordinates(const Joint<Space, S>& joint, const VectorX<S>& q, S* room) const;
-  void SetDirections(int index, const Rotation<Space, S>& R_WF, const Pose<Space, S>& X_FM);
+  void PlaceChild(const TreeStep& step);
+  void MeasureCut(int index);
+  void FollowDirections(int index, const Rotation<Space, S>& R_WF);
+  void SetDirections(int index, const Rotation<Space, S>& R_WF);
   Pose<Space, S> MeasuredPose(const Joint<Space, S>& joint) const;
 
   const Mechanism<Space, S>* mechanism_;
   std::vector<Pose<Space, S>> poses_;
   std::vector<Velocity<Space, S>> motions_;
   std::vector<JointState<Space, S>> joints_;
-  std::vector<Pose<Space, S>> measured_;  ///< X_FM of constraints and of kinds with a basis
+  /// X_FM, of tree joints as q says, of constraints as the bodies stand. In the plane the matrix is
+  /// that of the angle only for kinds with a basis.
+  std::vector<Pose<Space, S>> joint_poses_;
   std::vector<TimeValue<S>> drives_;
   std::vector<S> accepted_;  ///< last accepted coordinate of each joint
   std::vector<Released> released_;

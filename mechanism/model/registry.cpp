@@ -99,10 +99,8 @@ class KindCheck {
       kind_.rates(q, unit, qdot);
       for (int i = 0; i < kind_.num_q; ++i) along[i].SetPartial(k, qdot[i]);
     }
-    Pose<Space, Dual> moving;
-    Pose<Space, double> X;
-    dual_.transform(along, moving, dual_.parameter);
-    kind_.transform(q, X, kind_.parameter);
+    const Pose<Space, Dual> moving = PoseAt(dual_, along);
+    const Pose<Space, double> X = PoseAt(kind_, q);
     const Basis<Space, double> basis = BasisAt(kind_, X);
     Orthogonal(basis);
     Motions(basis, moving);

@@ -66,14 +66,12 @@ void Hold(const MechanismDescription& description, const JointSpring& spring,
           JointDescription* joint) {
   const double q = FreeCoordinate(spring);
   if (description.space == SpaceKind::kPlanar) {
-    Pose<Planar, double> X;
-    KindWith<Planar, double>(joint->type, joint->parameter).transform(&q, X, joint->parameter);
+    const auto X = PoseAt(KindWith<Planar, double>(joint->type, joint->parameter), &q);
     const Eigen::Vector3d shift(X.p[0], X.p[1], 0.0);
     joint->from.position += PoseOf(joint->from).R * AxisAlignment(*joint) * shift;
     joint->from.rotation.z() += X.angle;
   } else {
-    Pose<Spatial, double> X;
-    KindWith<Spatial, double>(joint->type, joint->parameter).transform(&q, X, joint->parameter);
+    const auto X = PoseAt(KindWith<Spatial, double>(joint->type, joint->parameter), &q);
     const Eigen::Matrix3d A = AxisAlignment(*joint), R_PF = PoseOf(joint->from).R;
     joint->from.position += R_PF * A * X.p.eigen();
     const Eigen::AngleAxisd turn(Eigen::Matrix3d(R_PF * A * X.R.eigen() * A.transpose()));

@@ -81,8 +81,7 @@ Matrix<Space> BasisAt(const JointKind<Space, double>& kind, const VectorX<double
   Matrix<Space> basis = Matrix<Space>::Zero();
   for (int i = 0; i < Space::kDim; ++i) basis(kind.axes[i], i) = 1.0;
   if (kind.basis == nullptr) return basis;
-  Pose<Space, double> X;
-  kind.transform(q.data(), X, kind.parameter);
+  const auto X = PoseAt(kind, q.data());
   return BasisAt(kind, X);
 }
 
@@ -115,8 +114,7 @@ TYPED_TEST(JointTest, TransformIsTheOracles) {
     const auto kind = KindWith<TypeParam, double>(type, kParameter);
     for (int seed = 0; seed < 5; ++seed) {
       const VectorX<double> q = Coordinates(kind, seed);
-      Pose<TypeParam, double> X;
-      kind.transform(q.data(), X, kind.parameter);
+      const auto X = PoseAt(kind, q.data());
       std::vector<Jet> jets(kind.num_q + 1);
       for (int i = 0; i < kind.num_q; ++i) jets[i] = Jet(q[i]);
       const JetPose Y = testing::Transform(type, TypeParam::kRot == 3, jets.data(), kParameter);
@@ -174,8 +172,7 @@ TYPED_TEST(JointTest, BasesAreOrthogonalAndTheirRateIsTheBias) {
         return BasisAt<Space>(kind, VectorX<double>(q + t * qdot)).leftCols(kind.num_u) * u;
       };
       const Vector<Space> rate = (motion(step) - motion(-step)) / (2 * step);
-      Pose<Space, double> X;
-      kind.transform(q.data(), X, kind.parameter);
+      const auto X = PoseAt(kind, q.data());
       const auto bias = kind.bias(X, Velocity<Space, double>(motion(0.0)));
       EXPECT_LE((rate - bias.eigen()).norm(), 1e-9) << ToString(type);
     }
@@ -187,12 +184,11 @@ TYPED_TEST(JointTest, AdmissiblePosesHaveNoMismatchAndGiveTheirCoordinatesBack) 
     const auto kind = KindWith<TypeParam, double>(type, kParameter);
     for (int seed = 0; seed < 5; ++seed) {
       const VectorX<double> q = Coordinates(kind, seed);
-      Pose<TypeParam, double> X, again;
-      kind.transform(q.data(), X, kind.parameter);
+      const auto X = PoseAt(kind, q.data());
       EXPECT_LE((Mismatch(kind, X).eigen().template lpNorm<Eigen::Infinity>()), 32 * kEps);
       VectorX<double> measured(kind.num_q);
       kind.coordinates(X, measured.data(), kind.parameter);
-      kind.transform(measured.data(), again, kind.parameter);
+      const auto again = PoseAt(kind, measured.data());
       EXPECT_LE((again.R - X.R).eigen().template lpNorm<Eigen::Infinity>(), 32 * kEps);
       EXPECT_LE((again.p - X.p).norm(), 4 * kEps) << "an angle of a helix: one rounding";
     }
@@ -201,9 +197,8 @@ TYPED_TEST(JointTest, AdmissiblePosesHaveNoMismatchAndGiveTheirCoordinatesBack) 
 
 TYPED_TEST(JointTest, MismatchAlongConstrainedAxesIsMeasured) {
   const auto& kind = KindOf<TypeParam, double>(JointType::kRevolute);
-  Pose<TypeParam, double> X;
   const double q = 0.7;
-  kind.transform(&q, X, kind.parameter);
+  auto X = PoseAt(kind, &q);
   X.p[1] += 1e-3;
   const Velocity<TypeParam, double> mismatch = Mismatch(kind, X);
   EXPECT_NEAR(mismatch[TypeParam::kRot + 1], 1e-3, 8 * kEps);
@@ -237,9 +232,8 @@ TYPED_TEST(JointTest, RodMeasuresADistance) {
 TEST(HelixTest, TurnsAreCounted) {
   const auto kind = KindWith<Spatial, double>(JointType::kHelical, 0.01);
   for (double angle : {-20.0, -3.2, 0.1, 3.2, 7.0, 100.0}) {
-    Pose<Spatial, double> X;
+    const auto X = PoseAt(kind, &angle);
     double measured = 0.0;
-    kind.transform(&angle, X, kind.parameter);
     kind.coordinates(X, &measured, kind.parameter);
     EXPECT_NEAR(measured, angle, 8 * kEps * (1 + std::abs(angle)));
   }

@@ -3,8 +3,10 @@
 
 #include <gtest/gtest.h>
 
+#include <cmath>
 #include <limits>
 
+#include "mechanism/description/library.h"
 #include "mechanism/loops/tree_dynamics.h"
 #include "tests/mechanism/samples.h"
 
@@ -68,6 +70,35 @@ TYPED_TEST(KinematicsTest, PosesAgreeWithTheOracle) {
 
 /// One answer of the oracle holds the speeds' accelerations: G udot + A_0, with A_0 from second
 /// derivatives of the poses. BodyAccelerations() adds up H udot and g along the tree instead.
+/// Matrices of planar bodies are made several at once: of every number of bodies, and of angles
+/// that are too large for it beside others that are not.
+TEST(PlanarKinematicsTest, MatricesAreThoseOfTheAnglesOfAnyNumberOfBodiesAndTurns) {
+  for (const int bodies : {1, 2, 3, 5, 8, 9, 16, 19}) {
+    const Mechanism<Planar, double> mechanism(Chain(bodies), Coordinates::kAbsolute);
+    Kinematics<Planar, double> kinematics(mechanism), turned(mechanism);
+    VectorX<double> q = VectorX<double>::Zero(mechanism.num_q());
+    for (const bool far : {false, true}) {
+      for (int b = 0; b < bodies; ++b) q[3 * b] = 1.3 * b - 7.0 + (far && b % 3 == 1 ? 3e6 : 0.0);
+      kinematics.UpdatePosition(q);
+      for (int b = 0; b < bodies; ++b) {
+        const auto& X = kinematics.poses()[b + 1];
+        // 1.1 units in the last place (lanes.h), half a unit of the other
+        EXPECT_NEAR(X.R(0, 0), std::cos(X.angle), 2 * kEps) << bodies << ' ' << b;
+        EXPECT_NEAR(X.R(1, 0), std::sin(X.angle), 2 * kEps) << bodies << ' ' << b;
+        EXPECT_EQ(X.R(0, 1), -X.R(1, 0));
+        EXPECT_EQ(X.R(1, 1), X.R(0, 0));
+      }
+      // the same angles on other bodies have the same bits
+      for (int b = 0; b < bodies && !far; ++b) {
+        VectorX<double> alone = VectorX<double>::Zero(mechanism.num_q());
+        alone[3 * (bodies - 1 - b)] = q[3 * b];
+        turned.UpdatePosition(alone);
+        EXPECT_EQ(turned.poses()[bodies - b].R(1, 0), kinematics.poses()[b + 1].R(1, 0));
+      }
+    }
+  }
+}
+
 TYPED_TEST(KinematicsTest, AccelerationsOfBodiesAreSecondDerivativesOfTheirPoses) {
   ForAll<TypeParam>(
       [](const auto& d, const auto& mechanism, const State& at, const auto& kinematics) {

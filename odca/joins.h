@@ -34,9 +34,9 @@
 #pragma once
 
 #include <memory>
-#include <type_traits>
 #include <vector>
 
+#include "mechanism/algebra/known_size.h"
 #include "mechanism/algebra/lower_triangle.h"
 #include "mechanism/description/outcome.h"
 #include "mechanism/formulation/options.h"
@@ -46,20 +46,17 @@
 
 namespace loopbench::odca {
 
-/// `call` with the rows of a node; where they are those of one pin in the plane, or one revolute
-/// joint in space, as a constant, by which the loops over them are unrolled.
+/// `call` with the rows of a node, as a constant where they are those of one pin in the plane or
+/// one revolute joint in space.
 template <class Space, class Call>
 [[gnu::always_inline]] inline auto WithRows(const PlanNode& node, const Call& call) {
-  constexpr int kPin = Space::kDim - 1;
-  if (node.rows == kPin && node.joints.size() == 1)
-    return call(std::integral_constant<int, kPin>());
-  return call(node.rows);
+  return node.joints.size() == 1 ? WithSize<Space::kDim - 1>(node.rows, call) : call(node.rows);
 }
-/// Rows of a joint of a node with so many rows.
-inline int RowsOf(const NodeJoint& joint, int /*rows*/) { return joint.rows; }
-template <int rows>
-constexpr int RowsOf(const NodeJoint&, std::integral_constant<int, rows>) {
-  return rows;
+/// Rows of a joint of a node, given those of the node.
+template <class Rows>
+int RowsOf(const NodeJoint& joint, Rows) {
+  constexpr int kRows = kKnownSize<Rows>;
+  return kRows > 0 ? kRows : joint.rows;
 }
 
 template <class Space, class S>

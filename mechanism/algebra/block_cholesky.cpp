@@ -6,6 +6,8 @@
 #include <array>
 #include <cmath>
 
+#include "mechanism/algebra/known_size.h"
+
 namespace loopbench {
 
 namespace {
@@ -225,23 +227,10 @@ bool BlockCholesky::FactorColumn(int j) {
   return true;
 }
 
-namespace {
-
-/// `call` with a number of rows that the compiler knows, if these are common; 0 otherwise.
-template <class Call>
-auto WithRows(int rows, const Call& call) {
-  if (rows == 2) return call.template operator()<2>();
-  if (rows == 3) return call.template operator()<3>();
-  if (rows == 5) return call.template operator()<5>();
-  return call.template operator()<0>();
-}
-
-}  // namespace
-
 bool BlockCholesky::Factor() {
-  return WithRows(uniform_, [&]<int kRows>() {
+  return WithSize<2, 3, 5>(uniform_, [&](auto rows) {
     for (int j = 0; j < static_cast<int>(columns_.size()); ++j) {
-      if (FactorColumn<kRows>(j)) continue;
+      if (FactorColumn<kKnownSize<decltype(rows)>>(j)) continue;
       std::fill(ratios_.begin() + j + 1, ratios_.end(), 1.0);
       return false;
     }
@@ -297,7 +286,7 @@ void BlockCholesky::SolveColumns(double* all) const {
 }
 
 void BlockCholesky::Solve(double* x) const {
-  WithRows(uniform_, [&]<int kRows>() { SolveColumns<kRows>(x); });
+  WithSize<2, 3, 5>(uniform_, [&](auto rows) { SolveColumns<kKnownSize<decltype(rows)>>(x); });
 }
 
 }  // namespace loopbench

@@ -1,0 +1,31 @@
+// Sizes that are known before they are met: a loop over a constant number of rows is unrolled.
+#pragma once
+
+#include <type_traits>
+
+namespace loopbench {
+
+/// `call` with n, as a constant if it is one of `known`.
+template <int first, int... others, class Call>
+[[gnu::always_inline]] inline auto WithSize(int n, const Call& call) {
+  if (n == first) return call(std::integral_constant<int, first>());
+  if constexpr (sizeof...(others) > 0) {
+    return WithSize<others...>(n, call);
+  } else {
+    return call(n);
+  }
+}
+
+/// The same of a size that is a constant already.
+template <int... known, int n, class Call>
+[[gnu::always_inline]] inline auto WithSize(std::integral_constant<int, n> size, const Call& call) {
+  return call(size);
+}
+
+/// What `call` was given, if it was a constant, else 0.
+template <class Size>
+inline constexpr int kKnownSize = 0;
+template <int n>
+inline constexpr int kKnownSize<std::integral_constant<int, n>> = n;
+
+}  // namespace loopbench

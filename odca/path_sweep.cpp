@@ -133,6 +133,58 @@ T PathSweepOf<T>::TurnSingles(const PathPlaces& path) {
   return room;
 }
 
+/// As TurnPacks() closes the loops between; only that the body before each first one stands a lane
+/// before it, in the last pack, or ends the group before.
+template <class T>
+template <typename PathSweepOf<T>::Gaps kGaps>
+void PathSweepOf<T>::CloseStarts(Group& group, Point<double>& at_2) {
+  const Closure<Lanes>& starts = group.starts;
+  TurnedLink<Lanes>& turned = turned_packs_[group.pack];
+  const Lanes speed = Load<Lanes>(&speed_[group.place]);
+  const Point<Lanes> at_pin = AtPin(packs_[group.pack], turned, speed, starts);
+  Point<Lanes> reached;
+  if (group.in_turn) {
+    for (int lane = 0; lane < kLanes; ++lane) {
+      SetLane(reached, lane, at_2);
+      const Point<double> at_1 = starts.follows[lane] > 0.0 ? at_2 : LaneOf(at_pin, lane);
+      const double leads = group.leads[lane];
+      at_2 = LaneOf(group.ends, lane) + Point<double>{Scaled(leads, at_1.p), Scaled(leads, at_1.v)};
+    }
+  } else {
+    const Point<Lanes> ends =
+        group.ends + Point<Lanes>{Scaled(group.leads, at_pin.p), Scaled(group.leads, at_pin.v)};
+    reached = {{LaneAfter(ends.p.x, at_2.p.x), LaneAfter(ends.p.y, at_2.p.y)},
+               {LaneAfter(ends.v.x, at_2.v.x), LaneAfter(ends.v.y, at_2.v.y)}};
+    at_2 = LaneOf(ends, kLanes - 1);
+  }
+  if (!group.cuts_starts) return;
+  const PathPlaces& path = paths_[group.path];
+  const bool is_first = group.pack == path.first_pack;
+  const int last = group.pack + path.packs - 1;
+  const Point<Lanes> gap = reached - at_pin;
+  turned.r1 = turned.r1 + Scaled(starts.cut_here * starts.inverse_radius, gap.p);
+  if constexpr (kGaps == Gaps::kSpeeds) {
+    const Lanes speed_before =
+        LaneAfter(Load<Lanes>(&speed_[group.place + (path.packs - 1) * kLanes]),
+                  is_first ? 0.0 : speed_[group.place - 1]);
+    turned.gap_w = starts.cut_here * speed + starts.cut_before * speed_before;
+    turned.gap_v = Scaled(starts.cut_here + starts.cut_before, RelativeVelocity(turned.gap_w, gap));
+  } else {
+    turned.gap_v = Scaled(starts.cut_here + starts.cut_before, gap.p);
+    const Lanes squares = turned.gap_v.x * turned.gap_v.x + turned.gap_v.y * turned.gap_v.y;
+    group.largest = std::max(group.largest, -Smallest(-squares));
+  }
+  const Vector2<Lanes> to_Q = Scaled(starts.cut_before, gap.p);
+  Vector2<Lanes>& r2 = turned_packs_[last].r2;
+  r2 = r2 -
+       Scaled<Lanes>(pack_closures_[last].inverse_radius, {LaneBefore(to_Q.x), LaneBefore(to_Q.y)});
+  if (is_first) return;
+  const double inverse_radius = pack_closures_[group.pack - 1].inverse_radius[kLanes - 1];
+  Vector2<Lanes>& of_group_before = turned_packs_[group.pack - 1].r2;
+  of_group_before.x[kLanes - 1] -= inverse_radius * to_Q.x[0];
+  of_group_before.y[kLanes - 1] -= inverse_radius * to_Q.y[0];
+}
+
 template <class T>
 template <typename PathSweepOf<T>::Gaps kGaps>
 void PathSweepOf<T>::CloseLoops(PathPlaces& path) {
@@ -146,11 +198,8 @@ void PathSweepOf<T>::CloseLoops(PathPlaces& path) {
     return at_pin;
   };
   if constexpr (kIsOne) {
-    for (int i = 0; i < path.pieces(); ++i) {
-      const Piece& piece = pieces_[path.first_piece + i];
-      const Point<double> at_1 = start(i * path.packs, piece.start);
-      at_2 = LaneOf(groups_[path.first_group + i / kLanes].ends, i % kLanes);
-      if (!piece.stands_alone) at_2 = at_2 + at_1;
+    for (int g = path.first_group; g < path.first_group + path.groups; ++g) {
+      CloseStarts<kGaps>(groups_[g], at_2);
     }
   }
   for (int k = path.packed; k < path.bodies; ++k) {

@@ -76,7 +76,6 @@ class PathSweepOf {
     int packed = 0;               ///< bodies in packs
     int first = 0;                ///< place of its first body
     int first_group = 0;          ///< in groups_
-    int first_piece = 0;          ///< in pieces_
     int first_pack = 0;           ///< in lists by pack
     int first_single = 0;         ///< in lists by single body
     int first_cut = 0;            ///< in end_cuts_: one for each piece and for each single body
@@ -97,17 +96,16 @@ class PathSweepOf {
   /// kLanes pieces of a path side by side.
   struct Group {
     int path = 0;
-    int pack = 0, place = 0;      ///< its first ones
-    Point<Lanes> ends;            ///< of its pieces (TurnPacks())
+    int pack = 0, place = 0;   ///< its first ones
+    Closure<Lanes> starts;     ///< of its pieces' first bodies, which those of packs leave open
+    bool cuts_starts = false;  ///< any of these joints is cut
+    Lanes leads;               ///< 1 where ends are seen from where a piece starts, 0 from its pin
+    bool in_turn = false;      ///< any piece starts and ends where the one before has put it
+    Point<Lanes> ends;         ///< of its pieces (TurnPacks())
     TwoHandle<Lanes> assemblies;  ///< they are joined to these
     double room = 0.0, slack = 0.0;
     double largest = 0.0;   ///< square of the largest gap in it, of Gaps::kPositions
     Vector2<Lanes> F1, F2;  ///< on these
-  };
-  /// Bodies of a path one after the other.
-  struct Piece {
-    Closure<double> start;      ///< of its first body
-    bool stands_alone = false;  ///< it has a pin, if the path has loops_in_lanes
   };
   template <class>
   friend class PathSweepOf;
@@ -115,8 +113,6 @@ class PathSweepOf {
   void Resize(int num_u, int threads);
   void SetConstants(int lane, const PathSweepOf<double>& one);
   void Add(const Mechanism<Planar, double>& mechanism, PathLinks path, int bodies_of_group);
-  /// Closures of pieces' first bodies go there, and out of those of the packs.
-  void AddPieces(PathPlaces& path, std::vector<Closure<double>>& closures);
   void AddPacks(const PathPlaces& path, const PathLinks& links);
 
   /// Which mismatch of cut joints stands in gap_v, for Pass::kSpeeds to take it away: in each case
@@ -134,6 +130,10 @@ class PathSweepOf {
   T TurnSingles(const PathPlaces& path);
   template <Gaps kGaps>
   void CloseLoops(PathPlaces& path);
+  /// Along the pieces of a group, at the first bodies of which loops are closed: `at_2` leads from
+  /// the body before the group to its last one.
+  template <Gaps kGaps>
+  void CloseStarts(Group& group, Point<double>& at_2);
   struct At;
   At Body(const PathPlaces& path, int k) const;
   void Set(const PathPlaces& path, int k, const TurnedLink<T>& turned);
@@ -157,7 +157,6 @@ class PathSweepOf {
 
   std::vector<PathPlaces> paths_;
   std::vector<Group> groups_;
-  std::vector<Piece> pieces_;
   PackKinds<Link> packs_;
   std::vector<Closure<Lanes>> pack_closures_;
   std::vector<TurnedLink<Lanes>> turned_packs_;

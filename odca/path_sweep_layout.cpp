@@ -184,7 +184,6 @@ void PathSweepOf<T>::Add(const Mechanism<Planar, double>& mechanism, PathLinks l
   path.packed = path.packs * path.pieces();
   path.first = num_places_;
   path.first_group = static_cast<int>(groups_.size());
-  path.first_piece = static_cast<int>(pieces_.size());
   path.first_pack = packs_.size();
   path.first_single = static_cast<int>(singles_.size());
   path.first_cut = static_cast<int>(end_cuts_.size());
@@ -195,7 +194,9 @@ void PathSweepOf<T>::Add(const Mechanism<Planar, double>& mechanism, PathLinks l
   num_places_ += path.bodies;
   SetLimits(mechanism, path.pieces(), path.packs, links);
   path.end_limit = links.end_limit;
-  AddPieces(path, links.closures);
+  for (int k = 0; k < path.packed; ++k) {
+    if (k % path.packs > 0 && links.closures[k].follows == 0.0) path.loops_in_lanes = true;
+  }
   AddPacks(path, links);
   singles_.insert(singles_.end(), links.links.begin() + path.packed, links.links.end());
   single_closures_.insert(single_closures_.end(), links.closures.begin() + path.packed,
@@ -205,30 +206,13 @@ void PathSweepOf<T>::Add(const Mechanism<Planar, double>& mechanism, PathLinks l
 }
 
 template <class T>
-void PathSweepOf<T>::AddPieces(PathPlaces& path, std::vector<Closure<double>>& closures) {
-  for (int i = 0; i < path.pieces(); ++i) {
-    Closure<double>& start = closures[i * path.packs];
-    Piece piece = {.start = start};
-    start.cut_here = start.cut_before = 0.0;  // CloseLoops() sees to these
-    for (int k = i * path.packs; k < (i + 1) * path.packs; ++k) {
-      const bool pinned = closures[k].follows == 0.0;
-      piece.stands_alone = piece.stands_alone || pinned;
-      if (pinned && k > i * path.packs) path.loops_in_lanes = true;
-    }
-    pieces_.push_back(piece);
-  }
-  if (path.loops_in_lanes) return;
-  for (int i = 0; i < path.pieces(); ++i) pieces_[path.first_piece + i].stands_alone = false;
-}
-
-template <class T>
 void PathSweepOf<T>::AddPacks(const PathPlaces& path, const PathLinks& links) {
   for (int g = 0; g < path.groups; ++g) {
     Group group{};
+    group.leads = Lanes{} + 1.0;
     group.path = static_cast<int>(paths_.size());
     group.pack = path.first_pack + g * path.packs;
     group.place = path.first + g * path.packs * kLanes;
-    groups_.push_back(group);
     for (int i = 0; i < path.packs; ++i) {
       Link<Lanes> pack;
       Closure<Lanes> closure;
@@ -236,10 +220,18 @@ void PathSweepOf<T>::AddPacks(const PathPlaces& path, const PathLinks& links) {
         const int k = (g * kLanes + lane) * path.packs + i;
         SetLane(pack, lane, links.links[k]);
         SetLane(closure, lane, links.closures[k]);
+        if (path.loops_in_lanes && links.closures[k].follows == 0.0) group.leads[lane] = 0.0;
+        if (i == 0 && IsCut(links.closures[k])) group.cuts_starts = true;
+      }
+      if (i == 0) {
+        group.starts = closure;
+        closure.cut_here = closure.cut_before = Lanes{};
       }
       packs_.Add(pack);
       pack_closures_.push_back(closure);
     }
+    group.in_turn = Any(group.leads * group.starts.follows > 0.0);
+    groups_.push_back(group);
   }
   turned_packs_.resize(packs_.size());
   cuts_.resize(packs_.size());

@@ -7,6 +7,7 @@
 #include <cstdint>
 #include <cstring>
 #include <type_traits>
+#include <utility>
 
 #include "mechanism/algebra/small_matrix.h"
 
@@ -71,6 +72,20 @@ inline Struct<double> LaneOf(const Struct<Lanes>& pack, int lane) {
                 sizeof(double));
   }
   return one;
+}
+
+/// kLanes of the numbers of `a` and then `b`, from one of them on.
+template <int from, int... lane>
+inline Lanes From(const Lanes& a, const Lanes& b, std::integer_sequence<int, lane...>) {
+  return __builtin_shufflevector(a, b, (from + lane)...);
+}
+/// Each number a lane further on, the last one left out, behind `first`.
+inline Lanes LaneAfter(const Lanes& numbers, double first) {
+  return From<kLanes - 1>(Lanes{} + first, numbers, std::make_integer_sequence<int, kLanes>());
+}
+/// Each number a lane before, the first one left out, 0 in the last one.
+inline Lanes LaneBefore(const Lanes& numbers) {
+  return From<1>(numbers, Lanes{}, std::make_integer_sequence<int, kLanes>());
 }
 
 /// The smaller one, lane by lane.

@@ -260,7 +260,9 @@ template <class Space, class S>
 void Kinematics<Space, S>::FollowDirections(int index, const Rotation<Space, S>& R_WF) {
   const Joint<Space, S>& joint = mechanism_->joints()[index];
   if (joint.kind->basis != nullptr) {
-    if constexpr (Space::kRot == 1) joint_poses_[index].SetAngle(joint_poses_[index].angle);
+    if constexpr (Space::kRot == 1) {
+      joint_poses_[index].R = R_WF.transpose() * (poses_[joint.to].R * joint.X_QM.R);
+    }
     SetDirections(index, R_WF);
   } else if (!AnyAxes(joint) && joint.from != kGround) {
     SetDirections(index, R_WF);

@@ -1,4 +1,4 @@
-// Sines and cosines of lanes against long double.
+// Lanes: sines and cosines against long double, moves from lane to lane.
 #include "mechanism/algebra/lanes.h"
 
 #include <gtest/gtest.h>
@@ -62,6 +62,16 @@ TEST(Lanes, HaveTheBitsOfOneNumber) {
       ASSERT_EQ(std::bit_cast<std::int64_t>(s[lane]), std::bit_cast<std::int64_t>(sine));
       ASSERT_EQ(std::bit_cast<std::int64_t>(c[lane]), std::bit_cast<std::int64_t>(cosine));
     }
+  }
+}
+
+TEST(Lanes, MoveOnAndBack) {
+  Lanes numbers;
+  for (int lane = 0; lane < kLanes; ++lane) numbers[lane] = 1.0 + lane;
+  const Lanes after = LaneAfter(numbers, -7.0), before = LaneBefore(numbers);
+  for (int lane = 0; lane < kLanes; ++lane) {
+    EXPECT_EQ(after[lane], lane == 0 ? -7.0 : 1.0 * lane);
+    EXPECT_EQ(before[lane], lane == kLanes - 1 ? 0.0 : 2.0 + lane);
   }
 }
 

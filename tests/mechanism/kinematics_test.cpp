@@ -68,8 +68,6 @@ TYPED_TEST(KinematicsTest, PosesAgreeWithTheOracle) {
       });
 }
 
-/// One answer of the oracle holds the speeds' accelerations: G udot + A_0, with A_0 from second
-/// derivatives of the poses. BodyAccelerations() adds up H udot and g along the tree instead.
 /// Matrices of planar bodies are made several at once: of every number of bodies, and of angles
 /// that are too large for it beside others that are not.
 TEST(PlanarKinematicsTest, MatricesAreThoseOfTheAnglesOfAnyNumberOfBodiesAndTurns) {
@@ -82,9 +80,9 @@ TEST(PlanarKinematicsTest, MatricesAreThoseOfTheAnglesOfAnyNumberOfBodiesAndTurn
       kinematics.UpdatePosition(q);
       for (int b = 0; b < bodies; ++b) {
         const auto& X = kinematics.poses()[b + 1];
-        // 1.1 units in the last place (lanes.h), half a unit of the other
-        EXPECT_NEAR(X.R(0, 0), std::cos(X.angle), 2 * kEps) << bodies << ' ' << b;
-        EXPECT_NEAR(X.R(1, 0), std::sin(X.angle), 2 * kEps) << bodies << ' ' << b;
+        // 1.1 units in the last place (lanes.h) and half a unit of the other, of kEps / 2 each
+        EXPECT_NEAR(X.R(0, 0), std::cos(X.angle), kEps) << bodies << ' ' << b;
+        EXPECT_NEAR(X.R(1, 0), std::sin(X.angle), kEps) << bodies << ' ' << b;
         EXPECT_EQ(X.R(0, 1), -X.R(1, 0));
         EXPECT_EQ(X.R(1, 1), X.R(0, 0));
       }
@@ -99,6 +97,8 @@ TEST(PlanarKinematicsTest, MatricesAreThoseOfTheAnglesOfAnyNumberOfBodiesAndTurn
   }
 }
 
+/// One answer of the oracle holds the speeds' accelerations: G udot + A_0, with A_0 from second
+/// derivatives of the poses. BodyAccelerations() adds up H udot and g along the tree instead.
 TYPED_TEST(KinematicsTest, AccelerationsOfBodiesAreSecondDerivativesOfTheirPoses) {
   ForAll<TypeParam>(
       [](const auto& d, const auto& mechanism, const State& at, const auto& kinematics) {

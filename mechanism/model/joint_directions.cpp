@@ -1,0 +1,132 @@
+// Directions H and D of the joints at the current poses, and which of them are imposed. Frames and
+// letters are those of kinematics.cpp.
+#include <algorithm>
+
+#include "mechanism/algebra/instantiate.h"
+#include "mechanism/model/kinematics.h"
+
+namespace loopbench {
+
+namespace {
+
+/// [H D] in ground axes, F having the axes R = R_WF. Each column is a rotation about one axis of F
+/// or a shift along one, all different, so D^T H = 0 holds as it is (9). The plane has one axis to
+/// rotate about, which is normal to it. Forces are counted along the columns of R_forces, which are
+/// those of R unless some are released.
+template <class Space, class S>
+void SetBasis(const JointKind<Space, S>& kind, const Rotation<Space, S>& R,
+              const Rotation<Space, S>& R_forces, Basis<Space, S>& basis) {
+  for (int i = 0; i < Space::kDim; ++i) {
+    const int axis = kind.axes[i];
+    basis[i].setZero();
+    if (axis >= Space::kRot) {
+      basis[i].linear = R_forces.col(axis - Space::kRot);
+    } else if constexpr (Space::kRot == 1) {
+      basis[i].angular[0] = S(1);
+    } else {
+      basis[i].angular = R.col(axis);
+    }
+  }
+}
+
+/// [H D] in ground axes of a kind whose directions depend on its pose: the kind gives them in F
+/// axes, and R = R_WF turns both halves, angular and linear.
+template <class Space, class S>
+void SetBasisAt(const JointKind<Space, S>& kind, const Rotation<Space, S>& R,
+                const Pose<Space, S>& X_FM, Basis<Space, S>& basis) {
+  kind.basis(X_FM, basis, kind.parameter);
+  for (Direction<Space, S>& direction : basis) direction = Rotate(R, direction);
+}
+
+/// Ground axes serve for H and D where their spans do not depend on axes: nothing is prescribed or
+/// released of them.
+template <class Space, class S>
+bool AnyAxes(const Joint<Space, S>& joint) {
+  return joint.kind->rotation_invariant && joint.num_drives == 0 && joint.num_released == 0;
+}
+
+}  // namespace
+
+/// Directions that stand still are set once and for all: those whose span needs no axes, and those
+/// of joints on Ground, for which F stands where X_PF puts it. UpdatePosition() sets the others.
+template <class Space, class S>
+void Kinematics<Space, S>::Release(const std::vector<Released>& released) {
+  released_ = released;
+  for (int j = 0; j < static_cast<int>(joints_.size()); ++j) {
+    const Joint<Space, S>& joint = mechanism_->joints()[j];
+    if (joint.kind->basis != nullptr) continue;
+    SetDirections(j, AnyAxes(joint) ? Rotation<Space, S>::Identity() : joint.X_PF.R);
+  }
+}
+
+/// Rows count prescribed coordinates, then the kind's D without the released directions, then the
+/// released ones; each released direction before the row moves it one place on.
+template <class Space, class S>
+int Kinematics<Space, S>::DirectionOf(int index, int row) const {
+  const Joint<Space, S>& joint = mechanism_->joints()[index];
+  int direction = row - joint.num_drives;
+  const auto out = std::ranges::find(released_, index, &Released::joint);
+  if (out == released_.end()) return direction;
+  const int kept = joint.num_constraints() - joint.num_drives;
+  if (direction >= kept) return out->directions[direction - kept];
+  for (const int released : out->directions) direction += released <= direction;
+  return direction;
+}
+
+/// [H D] in ground axes; directions of prescribed coordinates go from H to the head of D, released
+/// ones to its end.
+template <class Space, class S>
+void Kinematics<Space, S>::SetDirections(int index, const Rotation<Space, S>& R_WF) {
+  const Joint<Space, S>& joint = mechanism_->joints()[index];
+  JointState<Space, S>& state = joints_[index];
+  const auto released = joint.num_released > 0
+                            ? std::ranges::find(released_, index, &Released::joint)
+                            : released_.end();
+  if (joint.kind->basis != nullptr) {
+    SetBasisAt<Space, S>(*joint.kind, R_WF, joint_poses_[index], state.basis);
+  } else if (released == released_.end()) {
+    SetBasis<Space, S>(*joint.kind, R_WF, R_WF, state.basis);
+  } else {
+    Rotation<Space, S> force_axes;
+    for (int i = 0; i < Space::kLin; ++i) {
+      for (int k = 0; k < Space::kLin; ++k) force_axes(i, k) = S(released->force_axes(i, k));
+    }
+    SetBasis<Space, S>(*joint.kind, R_WF, R_WF * force_axes, state.basis);
+  }
+  if (joint.num_drives == 0 && joint.num_released == 0) return;
+  const Basis<Space, S> all = state.basis;
+  int free = 0, driven = joint.num_u();
+  for (int i = 0; i < joint.kind->num_u; ++i) {
+    state.basis[mechanism_->DriveOf(joint, i) >= 0 ? driven++ : free++] = all[i];
+  }
+  if (joint.num_released == 0) return;
+  const std::vector<int>& out = released->directions;
+  int kept = joint.kind->num_u, last = Space::kDim - joint.num_released;
+  for (int i = 0; i < joint.kind->num_constraints(); ++i) {
+    const bool is_out = std::ranges::binary_search(out, i);
+    state.basis[is_out ? last++ : kept++] = all[joint.kind->num_u + i];
+  }
+}
+
+/// [H D] of a joint whose directions move.
+template <class Space, class S>
+void Kinematics<Space, S>::FollowDirections(int index, const Rotation<Space, S>& R_WF) {
+  const Joint<Space, S>& joint = mechanism_->joints()[index];
+  if (joint.kind->basis != nullptr) {
+    if constexpr (Space::kRot == 1) {
+      joint_poses_[index].R = R_WF.transpose() * (poses_[joint.to].R * joint.X_QM.R);
+    }
+    SetDirections(index, R_WF);
+  } else if (!AnyAxes(joint) && joint.from != kGround) {
+    SetDirections(index, R_WF);
+  }
+}
+
+#define LOOPBENCH_INSTANTIATE(Space, S)                                      \
+  template void Kinematics<Space, S>::Release(const std::vector<Released>&); \
+  template int Kinematics<Space, S>::DirectionOf(int, int) const;            \
+  template void Kinematics<Space, S>::FollowDirections(int, const Rotation<Space, S>&);
+LOOPBENCH_FOR_EACH_SPACE_AND_MODEL_SCALAR(LOOPBENCH_INSTANTIATE)
+#undef LOOPBENCH_INSTANTIATE
+
+}  // namespace loopbench

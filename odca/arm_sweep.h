@@ -26,10 +26,11 @@
 #include "odca/arm_closing.h"
 #include "odca/arm_links.h"
 #include "odca/pack_kinds.h"
+#include "odca/short_cut.h"
 
 namespace loopbench::odca::arms {
 
-class ArmSweep {
+class ArmSweep final : public ShortCut {
  public:
   /// Enough work for a thread to wait for the others after it.
   static constexpr int kBodiesOfGroup = 1024;
@@ -40,15 +41,12 @@ class ArmSweep {
   static std::unique_ptr<ArmSweep> Make(const Mechanism<Spatial, double>& mechanism,
                                         int threads = 1, int bodies_of_group = kBodiesOfGroup);
 
-  /// As ConstraintSolver::RightHandSide(). False near a degenerate position, for angles beyond
-  /// kLargestAngle, and for numbers that are not finite. Allocates nothing.
   bool Evaluate(SpeedsUsed speeds, std::span<const double> q, std::span<const double> u,
-                std::span<double> qdot, std::span<double> udot);
-  /// As ConstraintSolver::Project(), where loops are closed; nothing where Evaluate() is false.
-  std::optional<Correction<double>> Project(std::span<double> q, std::span<double> u, double goal);
-  /// Multiply-adds of the last evaluation, or what it did of it; as in the general sweep, without
-  /// kinematics and zeta_i3.
-  long operations() const { return operations_; }
+                std::span<double> qdot, std::span<double> udot) override;
+  std::optional<Correction<double>> Project(std::span<double> q, std::span<double> u,
+                                            double goal) override;
+  /// As in the general sweep, without kinematics and zeta_i3.
+  long operations() const override { return operations_; }
   int threads() const { return pool_->threads(); }
 
  private:

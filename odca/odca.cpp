@@ -4,6 +4,7 @@
 
 #include "mechanism/algebra/instantiate.h"
 #include "odca/arm_sweep.h"
+#include "odca/assembly_sweep.h"
 #include "odca/path_lane.h"
 #include "odca/path_sweep.h"
 
@@ -47,15 +48,20 @@ Odca<Space, S>::Odca(const Mechanism<Space, S>& mechanism, const FormulationOpti
       sweep_(mechanism, plan_, options.solver),
       equations_(mechanism),
       change_(VectorX<S>::Zero(mechanism.num_u())) {
-  if constexpr (std::is_same_v<S, double>) {
-    if (options.solver == SolverKind::kRankRevealing) {
-      short_cut_ = ShortCut<Space>::Make(mechanism, options.threads);
-    }
-    if constexpr (std::is_same_v<Space, Planar>) {
-      if (short_cut_ != nullptr && options.beside != nullptr) {
-        lane_ = pins::PathLane::Take(*options.beside, *short_cut_);
-      }
-    }
+  if (options.solver == SolverKind::kRankRevealing) MakeShortCut(options);
+}
+
+template <class Space, class S>
+void Odca<Space, S>::MakeShortCut([[maybe_unused]] const FormulationOptions& options) {
+  if constexpr (!std::is_same_v<S, double>) {
+    return;
+  } else if constexpr (std::is_same_v<Space, Spatial>) {
+    short_cut_ = arms::ArmSweep::Make(mechanism_, options.threads);
+  } else if (auto path = pins::PathSweep::Make(mechanism_, options.threads)) {
+    if (options.beside != nullptr) lane_ = pins::PathLane::Take(*options.beside, *path);
+    short_cut_ = std::move(path);
+  } else {
+    short_cut_ = pins::AssemblySweep::Make(mechanism_, plan_);
   }
 }
 
@@ -104,9 +110,9 @@ bool Odca<Space, S>::RightHandSide([[maybe_unused]] SpeedsUsed speeds,
                                    [[maybe_unused]] std::span<S> qdot,
                                    [[maybe_unused]] std::span<S> udot) {
   if constexpr (std::is_same_v<S, double>) {
-    by_short_cut_ = lane_ != nullptr
-                        ? lane_->Evaluate(speeds, q, u, qdot, udot)
-                        : short_cut_ != nullptr && short_cut_->Evaluate(speeds, q, u, qdot, udot);
+    by_short_cut_ = lane_ != nullptr ? lane_->Evaluate(speeds, q, u, qdot, udot)
+                                     : short_cut_ != nullptr && tries_short_cut_ &&
+                                           short_cut_->Evaluate(speeds, q, u, qdot, udot);
     return by_short_cut_;
   }
   return false;
@@ -117,9 +123,22 @@ std::optional<Correction<S>> Odca<Space, S>::Project([[maybe_unused]] std::span<
                                                      [[maybe_unused]] std::span<S> u,
                                                      [[maybe_unused]] S goal) {
   if constexpr (std::is_same_v<S, double>) {
-    if (short_cut_ != nullptr) return short_cut_->Project(q, u, goal);
+    if (short_cut_ != nullptr && tries_short_cut_) return short_cut_->Project(q, u, goal);
   }
   return std::nullopt;
+}
+
+template <class Space, class S>
+void Odca<Space, S>::Start([[maybe_unused]] const Kinematics<Space, S>& kinematics) {
+  if constexpr (std::is_same_v<Space, Planar> && std::is_same_v<S, double>) {
+    tries_short_cut_ = short_cut_ != nullptr && short_cut_->Serves(kinematics);
+  }
+}
+
+template <class Space, class S>
+bool Odca<Space, S>::Review(const Kinematics<Space, S>& kinematics) {
+  Start(kinematics);
+  return false;
 }
 
 /// What the speeds miss, joint by joint: no vector of rows is needed between.

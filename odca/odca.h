@@ -2,10 +2,11 @@
 // The mathematics and the paper's equation numbers are in README.md beside this file.
 #pragma once
 
-#include <type_traits>
+#include <memory>
 
 #include "mechanism/formulation/constraint_solver.h"
 #include "mechanism/loops/body_equations.h"
+#include "odca/short_cut.h"
 #include "odca/sweep.h"
 
 namespace loopbench::odca {
@@ -19,17 +20,8 @@ template <class Space, class S>
 Plan MakePlan(const Mechanism<Space, S>& mechanism, const PlanOptions& options = {});
 
 namespace pins {
-template <class T>
-class PathSweepOf;
-using PathSweep = PathSweepOf<double>;
 class PathLane;
-}  // namespace pins
-namespace arms {
-class ArmSweep;
 }
-/// What some mechanisms' right-hand sides take instead of the general sweep.
-template <class Space>
-using ShortCut = std::conditional_t<std::is_same_v<Space, Planar>, pins::PathSweep, arms::ArmSweep>;
 
 template <class Space, class S>
 class Odca final : public ConstraintSolver<Space, S> {
@@ -51,12 +43,15 @@ class Odca final : public ConstraintSolver<Space, S> {
   bool CompleteSpeeds(Kinematics<Space, S>& kinematics, VectorX<S>& u) override;
   bool Accelerate(const Kinematics<Space, S>& kinematics, const VectorX<S>& feedback,
                   VectorX<S>& udot, VectorX<S>* lambda) override;
-  /// In double, unless as published: for paths of pins (path_sweep.h) and arms of revolute joints
-  /// in space (arm_sweep.h).
+  /// In double, unless as published: for pins in the plane (path_sweep.h, assembly_sweep.h) and
+  /// arms of revolute joints in space (arm_sweep.h).
   bool RightHandSide(SpeedsUsed speeds, std::span<const S> q, std::span<const S> u,
                      std::span<S> qdot, std::span<S> udot) override;
   /// Likewise.
   std::optional<Correction<S>> Project(std::span<S> q, std::span<S> u, S goal) override;
+  /// Whether the short cut is tried.
+  void Start(const Kinematics<Space, S>& kinematics) override;
+  bool Review(const Kinematics<Space, S>& kinematics) override;
   /// Size of the plan, and multiply-adds since Factor() began.
   std::vector<NamedCount> Counters() const override;
 
@@ -66,14 +61,16 @@ class Odca final : public ConstraintSolver<Space, S> {
   Wrench<Space, S> JointForce(int joint) const;
 
  private:
+  void MakeShortCut(const FormulationOptions& options);
   /// The equations as they are set: x and multipliers.
   void SweepTo(VectorX<S>& x, VectorX<S>* lambda);
 
   const Mechanism<Space, S>& mechanism_;
   Plan plan_;
   Sweep<Space, S> sweep_;
-  std::unique_ptr<ShortCut<Space>> short_cut_;        ///< null where there is none
+  std::unique_ptr<ShortCut> short_cut_;               ///< null where there is none
   std::unique_ptr<pins::PathLane> lane_;              ///< null but for paths of runs side by side
+  bool tries_short_cut_ = true;                       ///< in this step
   bool by_short_cut_ = false;                         ///< the last evaluation was
   const Kinematics<Space, S>* kinematics_ = nullptr;  ///< of the last Factor()
   BodyEquations<Space, S> equations_;

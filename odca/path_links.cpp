@@ -110,6 +110,15 @@ std::optional<PathLinks> MeasurePath(const Mechanism<Planar, double>& mechanism,
   return all ? all : MeasureInOrder(mechanism, Reversed(path));
 }
 
+bool IsPinsUnderGravity(const Mechanism<Planar, double>& mechanism) {
+  const auto is_pin = [](const Joint<Planar, double>& joint) {
+    return joint.kind == &KindOf<Planar, double>(JointType::kRevolute) && joint.num_drives == 0 &&
+           joint.num_released == 0;
+  };
+  return mechanism.num_u() > 0 && mechanism.forces().empty() &&
+         std::ranges::all_of(mechanism.joints(), is_pin);
+}
+
 double LimitOf(const Mechanism<Planar, double>& mechanism, int index) {
   const Joint<Planar, double>& joint = mechanism.joints()[index];
   double trace = 0.0;

@@ -160,42 +160,16 @@ TruthOf<T> PathSweepOf<T>::Evaluate(SpeedsUsed speeds, std::span<const T> q, std
 }
 
 template <class T>
-std::optional<double> PathSweepOf<T>::Gap() {
-  tree_.ToBodies(moved_, speeds_, angle_.data(), speed_.data(), *pool_);
-  if (!Turn<Gaps::kPositions>()) return std::nullopt;
+double PathSweepOf<T>::LargestGap() const {
   double largest = largest_;
   for (const Group& group : groups_) largest = std::max(largest, group.largest);
   return std::sqrt(largest);
 }
 
-/// As level_position.cpp does it by parts.
 template <class T>
 std::optional<Correction<double>> PathSweepOf<T>::Project(std::span<double> q, std::span<double> u,
                                                           double goal) {
-  std::ranges::copy(q, moved_.begin());
-  std::ranges::copy(u, speeds_.begin());
-  std::optional<double> now = Gap();
-  if (!now) return std::nullopt;
-  Correction<double> correction;
-  correction.shift = *now;
-  for (int i = 0; i<kMostProjections&& * now> goal; ++i) {
-    if (!Sweep<Pass::kSpeeds>()) return std::nullopt;
-    const double before = *now;
-    back_ = moved_;
-    if (!tree_.ToJoints(alpha_.data(), back_, moved_, *pool_)) return std::nullopt;
-    now = Gap();
-    if (!now) return std::nullopt;
-    ++correction.iterations;
-    if (*now < before) continue;
-    moved_ = back_;  // round-off: as it was
-    break;
-  }
-  tree_.ToBodies(moved_, speeds_, angle_.data(), speed_.data(), *pool_);
-  if (!Turn<Gaps::kSpeeds>() || !Sweep<Pass::kSpeeds>()) return std::nullopt;
-  if (!tree_.ToJoints(alpha_.data(), speeds_, speeds_, *pool_)) return std::nullopt;
-  std::ranges::copy(moved_, q.begin());
-  std::ranges::copy(speeds_, u.begin());
-  return correction;
+  return PinProjection::Of(*this, q, u, goal);
 }
 
 template bool PathSweep::Evaluate(SpeedsUsed, std::span<const double>, std::span<const double>,

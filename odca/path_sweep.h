@@ -31,12 +31,17 @@
 #include "mechanism/formulation/constraint_solver.h"
 #include "odca/pack_kinds.h"
 #include "odca/path_links.h"
+#include "odca/pin_projection.h"
+#include "odca/short_cut.h"
 #include "odca/tree_angles.h"
 
 namespace loopbench::odca::pins {
 
+struct NoShortCut {};
+
 template <class T>
-class PathSweepOf {
+class PathSweepOf final
+    : public std::conditional_t<std::is_same_v<T, double>, ShortCut, NoShortCut> {
   static constexpr bool kIsOne = std::is_same_v<T, double>;
 
  public:
@@ -55,14 +60,12 @@ class PathSweepOf {
   /// has another shape.
   bool SetMechanism(int lane, const PathSweepOf<double>& one);
 
-  /// As ConstraintSolver::RightHandSide(). False near a degenerate position, for angles beyond
-  /// kLargestAngle, and for numbers that are not finite. Allocates nothing.
+  /// As of ShortCut, of each lane.
   TruthOf<T> Evaluate(SpeedsUsed speeds, std::span<const T> q, std::span<const T> u,
                       std::span<T> qdot, std::span<T> udot);
-  /// For one mechanism, as ConstraintSolver::Project(), where loops are closed; nothing where
-  /// Evaluate() is false.
+  /// For one mechanism.
   std::optional<Correction<double>> Project(std::span<double> q, std::span<double> u, double goal);
-  /// Multiply-adds of the last evaluation, or what it did of it; angles are not counted.
+  /// Angles are not counted.
   long operations() const { return operations_; }
   int threads() const { return pool_->threads(); }
   std::size_t num_u() const { return moved_.size(); }
@@ -140,8 +143,9 @@ class PathSweepOf {
   /// The joint before body k, or to Ground after the last one, being cut: `here` if its P is k.
   template <Gaps kGaps>
   void Close(PathPlaces& path, int k, bool here, const Point<T>& gap);
-  /// Turns to positions moved_; the largest gap of a cut joint [m], or nothing.
-  std::optional<double> Gap();
+  friend PinProjection;
+  bool FindChange() { return Sweep<Pass::kSpeeds>(); }
+  double LargestGap() const;
   /// alpha_, or what is to be added to speeds. False near a degenerate position.
   template <Pass kPass>
   TruthOf<T> Sweep();

@@ -12,11 +12,6 @@ namespace {
 /// Shorter pieces are no faster than one body after another (measured with lanes of one).
 constexpr int kShortestPiece = 2;
 
-bool IsPin(const Joint<Planar, double>& joint) {
-  return joint.kind == &KindOf<Planar, double>(JointType::kRevolute) && joint.num_drives == 0 &&
-         joint.num_released == 0;
-}
-
 /// Their pieces are joined one after another.
 constexpr int kMostGroups = 128;
 
@@ -91,10 +86,7 @@ void PathSweepOf<T>::Resize(int num_u, int threads) {
 template <class T>
 std::unique_ptr<PathSweepOf<T>> PathSweepOf<T>::Make(const Mechanism<Planar, double>& mechanism,
                                                      int threads, int bodies_of_group) {
-  if (mechanism.num_u() == 0 || !mechanism.forces().empty() ||
-      !std::ranges::all_of(mechanism.joints(), IsPin)) {
-    return nullptr;
-  }
+  if (!IsPinsUnderGravity(mechanism)) return nullptr;
   std::unique_ptr<PathSweepOf> sweep(new PathSweepOf);
   std::vector<int> place_of(mechanism.num_bodies(), mechanism.num_bodies() - 1);
   std::vector<double> axes(mechanism.num_bodies(), 0.0);

@@ -1,7 +1,7 @@
 // Cholesky factors of matrices of a few rows, A = L L^T, where Eigen's general forms take longer to
 // find out how small they are than to work. Numbers stand by columns; only lower triangles are read
-// and written, and diagonals of L hold their reciprocals. The sizes 2 and 5, rows of a pin in the
-// plane and in space, are constants.
+// and written, and diagonals of L hold their reciprocals. The sizes 2, 4 and 5, rows of one pin or
+// two in the plane and of one in space, are constants.
 #pragma once
 
 #include <algorithm>
@@ -18,7 +18,7 @@ inline constexpr int kSmallTriangle = 16;
 /// that is not positive, and returns that.
 template <class S, class Size>
 S FactorLower(S* A, Size size) {
-  return WithSize<2, 5>(size, [=](auto n) {
+  return WithSize<2, 4, 5>(size, [=](auto n) {
     using std::sqrt;
     S least = n > 0 ? A[0] : S(1);
     for (int j = 0; j < n; ++j) {
@@ -41,7 +41,7 @@ S FactorLower(S* A, Size size) {
 /// x := L^-1 x, of numbers or vectors.
 template <class S, class Size, class T>
 void SolveLower(const S* L, Size size, T* x) {
-  WithSize<2, 5>(size, [=](auto n) {
+  WithSize<2, 4, 5>(size, [=](auto n) {
     for (int i = 0; i < n; ++i) {
       T value = x[i];
       for (int k = 0; k < i; ++k) value -= x[k] * L[i + k * n];
@@ -53,7 +53,7 @@ void SolveLower(const S* L, Size size, T* x) {
 /// x := L^-T x.
 template <class S, class Size, class T>
 void SolveLowerTransposed(const S* L, Size size, T* x) {
-  WithSize<2, 5>(size, [=](auto n) {
+  WithSize<2, 4, 5>(size, [=](auto n) {
     for (int i = n - 1; i >= 0; --i) {
       T value = x[i];
       for (int k = i + 1; k < n; ++k) value -= x[k] * L[k + i * n];
@@ -65,7 +65,7 @@ void SolveLowerTransposed(const S* L, Size size, T* x) {
 /// x := L x, L being as it is: an inverse, for instance.
 template <class S>
 void MultiplyLower(const S* L, int size, S* x) {
-  WithSize<2, 5>(size, [=](auto n) {
+  WithSize<2, 4, 5>(size, [=](auto n) {
     for (int r = n - 1; r >= 0; --r) {
       S sum = L[r + r * n] * x[r];
       for (int c = 0; c < r; ++c) sum += L[r + c * n] * x[c];
@@ -77,7 +77,7 @@ void MultiplyLower(const S* L, int size, S* x) {
 /// x := L^T x.
 template <class S>
 void MultiplyLowerTransposed(const S* L, int size, S* x) {
-  WithSize<2, 5>(size, [=](auto n) {
+  WithSize<2, 4, 5>(size, [=](auto n) {
     for (int c = 0; c < n; ++c) {
       S sum = S(0);
       for (int r = c; r < n; ++r) sum += L[r + c * n] * x[r];
@@ -89,7 +89,7 @@ void MultiplyLowerTransposed(const S* L, int size, S* x) {
 /// L^-1 in L's place, with the diagonal that it has.
 template <class S>
 void InvertLower(S* L, int size) {
-  WithSize<2, 5>(size, [=](auto n) {
+  WithSize<2, 4, 5>(size, [=](auto n) {
     for (int j = 0; j < n; ++j) {
       for (int i = j + 1; i < n; ++i) {
         S sum = S(0);

@@ -8,6 +8,7 @@
 #include <vector>
 
 #include "odca/arm_sweep.h"
+#include "odca/assembly_sweep.h"
 #include "odca/path_sweep.h"
 #include "tests/contract/builder.h"
 #include "tests/odca/short_cut.h"
@@ -62,6 +63,31 @@ inline MechanismDescription RandomPath(int n, std::uint64_t seed, bool in_halves
   return b.description;
 }
 
+/// Bodies that hang from any other one or from Ground, in any order of numbers; with freedom left,
+/// cut pins close loops.
+inline MechanismDescription RandomBranches(int n, std::uint64_t seed) {
+  Builder b("branches", SpaceKind::kPlanar, seed);
+  std::vector<int> row;
+  for (int k = 0; k < n; ++k) row.push_back(b.AddBody(1.0));
+  for (int k = n - 1; k > 0; --k) std::swap(row[k], row[b.random.Below(k + 1)]);
+  auto& joints = b.description.joints;
+  for (int k = 0; k < n; ++k) {
+    const bool on_ground = k == 0 || b.random.Chance(0.15);
+    // not far back, so that bodies have some pins and none has all
+    const int other = on_ground ? kGround : row[k - 1 - b.random.Below(std::min(k, 4))];
+    joints.push_back(Pin(b.random, other, row[k]));
+  }
+  const int loops = n > 3 ? b.random.Below((n - 1) / 3 + 1) : 0;
+  for (int loop = 0; loop < loops; ++loop) {
+    const int k = b.random.Below(n), other = b.random.Below(n + 1);
+    if (other == k) continue;
+    joints.push_back(Pin(b.random, other == n ? kGround : row[other], row[k]));
+    joints.back().cut = true;
+  }
+  for (std::size_t j = 0; j < joints.size(); ++j) joints[j].name = "j" + std::to_string(j);
+  return b.description;
+}
+
 /// Bodies in a row from Ground, in any order of numbers, joints in any frames and either way round;
 /// closed on Ground by one more joint, of which one is cut, with this kind.
 inline void AddPath(Builder& b, int n, bool closed, JointType cut_kind) {
@@ -97,7 +123,14 @@ inline MechanismDescription RandomArms(const Paths& paths, std::uint64_t seed) {
 /// The sweep along planar paths of pins.
 struct AlongPaths {
   using Space = Planar;
-  using Sweep = pins::PathSweep;
+  static constexpr auto kName = "Paths";
+  static auto Make(const Mechanism<Planar, double>& mechanism, int threads = 1,
+                   int group = pins::PathSweep::kBodiesOfGroup) {
+    return pins::PathSweep::Make(mechanism, threads, group);
+  }
+  static MechanismDescription Closed(int n, std::uint64_t seed) {
+    return testing::RandomChain(n, SpaceKind::kPlanar, seed);
+  }
   static constexpr SpaceKind kSpace = SpaceKind::kPlanar;
   static constexpr int kOneFreedom = 3;           ///< bodies of a closed chain
   static constexpr bool kNearDegenerate = false;  ///< such chains come near degenerate positions
@@ -106,10 +139,44 @@ struct AlongPaths {
   }
 };
 
+/// The sweep over assemblies of pins in the plane.
+struct OverAssemblies {
+  using Space = Planar;
+  static constexpr auto kName = "Assemblies";
+  static auto Make(const Mechanism<Planar, double>& mechanism, int /*threads*/ = 1,
+                   int /*group*/ = 0) {
+    return pins::AssemblySweep::Make(mechanism, MakePlan(mechanism));
+  }
+  static constexpr SpaceKind kSpace = SpaceKind::kPlanar;
+  static constexpr int kOneFreedom = 3;
+  static constexpr bool kNearDegenerate = false;
+  static MechanismDescription Draw(int n, std::uint64_t seed) {
+    return RandomBranches(n, 100 * seed + n);
+  }
+  /// A closed chain, and a bar that hangs from one of its bars.
+  static MechanismDescription Closed(int n, std::uint64_t seed) {
+    MechanismDescription chain = testing::RandomChain(n, kSpace, seed);
+    chain.bodies.push_back(chain.bodies.back());
+    chain.bodies.back().name = "pendulum";
+    JointDescription& pin = chain.joints.emplace_back();
+    pin.name = "hook";
+    pin.from = {2, {0.3, 0.1, 0.0}, {0.0, 0.0, 0.0}};
+    pin.to = {static_cast<int>(chain.bodies.size()) - 1, {0.0, 0.2, 0.0}, {0.0, 0.0, 0.0}};
+    return chain;
+  }
+};
+
 /// The sweep along arms of revolute joints in space.
 struct AlongArms {
   using Space = Spatial;
-  using Sweep = arms::ArmSweep;
+  static constexpr auto kName = "Arms";
+  static auto Make(const Mechanism<Spatial, double>& mechanism, int threads = 1,
+                   int group = arms::ArmSweep::kBodiesOfGroup) {
+    return arms::ArmSweep::Make(mechanism, threads, group);
+  }
+  static MechanismDescription Closed(int n, std::uint64_t seed) {
+    return testing::RandomChain(n, SpaceKind::kSpatial, seed);
+  }
   static constexpr SpaceKind kSpace = SpaceKind::kSpatial;
   static constexpr int kOneFreedom = 6;
   static constexpr bool kNearDegenerate = true;

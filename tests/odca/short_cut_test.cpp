@@ -16,7 +16,7 @@ namespace {
 constexpr double kEps = std::numeric_limits<double>::epsilon();
 
 template <class Served>
-class ShortCut : public ::testing::Test {
+class ShortCutTest : public ::testing::Test {
  public:
   using Space = typename Served::Space;
   using Model = Mechanism<Space, double>;
@@ -25,7 +25,7 @@ class ShortCut : public ::testing::Test {
     return Model(description, Coordinates::kJoint);
   }
   static MechanismDescription Chain(int n, std::uint64_t seed) {
-    MechanismDescription chain = testing::RandomChain(n, Served::kSpace, seed);
+    MechanismDescription chain = Served::Closed(n, seed);
     chain.forces.clear();
     return chain;
   }
@@ -54,11 +54,11 @@ class ShortCut : public ::testing::Test {
 struct Names {
   template <class Served>
   static std::string GetName(int) {
-    return Served::kSpace == SpaceKind::kPlanar ? "Paths" : "Arms";
+    return Served::kName;
   }
 };
-using All = ::testing::Types<AlongPaths, AlongArms>;
-TYPED_TEST_SUITE(ShortCut, All, Names);
+using All = ::testing::Types<AlongPaths, OverAssemblies, AlongArms>;
+TYPED_TEST_SUITE(ShortCutTest, All, Names);
 
 /// Masses over eight decades, several pins in one point of a body, a pin at its centre of mass: a
 /// force that is right to eps of the heavy body is not for the light one, so neither sweep has more
@@ -66,7 +66,7 @@ TYPED_TEST_SUITE(ShortCut, All, Names);
 /// many states they must be alike: the median and the worst error against long double within ten
 /// times, for hundreds of states spread over seven decades. A join that divides cofactors by det
 /// has errors ten thousand times as large in one of a hundred.
-TYPED_TEST(ShortCut, LosesNoMoreAtExtremesThanTheGeneralSweep) {
+TYPED_TEST(ShortCutTest, LosesNoMoreAtExtremesThanTheGeneralSweep) {
   std::vector<double> errors, errors_general;
   for (int n = 2; n <= 24; ++n) {
     for (std::uint64_t seed = 1; seed <= 60; ++seed) {
@@ -92,7 +92,7 @@ TYPED_TEST(ShortCut, LosesNoMoreAtExtremesThanTheGeneralSweep) {
       if (!state) continue;
       const Numbers &q = state->q, &u = state->u;
       Numbers qdot(u.size()), own(u.size()), general;
-      const auto sweep = TypeParam::Sweep::Make(model);
+      const auto sweep = TypeParam::Make(model);
       if (!sweep || !sweep->Evaluate(SpeedsUsed::kGiven, In(q), In(u), In(qdot), In(own))) continue;
       testing::SystemWith<Odca, typename TypeParam::Space, double> odca(model, {});
       ASSERT_EQ(odca->Evaluate(0.0, q, u, general), Outcome::kFinished) << drawn.name;
@@ -136,7 +136,7 @@ double RoundOff(const Mechanism<Space, double>& model, const Numbers& y) {
 
 /// What level position makes of an accepted step, by the short cut and in all generality:
 /// multipliers have no short cut, and their Newton steps are as long.
-TYPED_TEST(ShortCut, ProjectsAsTheGeneralWayDoes) {
+TYPED_TEST(ShortCutTest, ProjectsAsTheGeneralWayDoes) {
   int projected = 0;
   double worst = 0.0, least_rcond = 1.0;
   for (int n = 2; n <= 60; n += n < 20 ? 1 : 4) {
@@ -161,7 +161,7 @@ TYPED_TEST(ShortCut, ProjectsAsTheGeneralWayDoes) {
       const double rcond = general->diagnostics().rcond;
       if (general->diagnostics().smallest_weight < 1.0) continue;
       const double goal = 4.0 * kEps * model.num_bodies() * model.length();
-      const auto sweep = TypeParam::Sweep::Make(model, 2, n > 40 ? 2 * kLanes : n);
+      const auto sweep = TypeParam::Make(model, 2, n > 40 ? 2 * kLanes : n);
       const auto correction = sweep->Project(In(own).first(half), In(own).subspan(half), goal);
       // a short cut is refused near degenerate positions only, and none of these is near one
       ASSERT_TRUE(correction) << drawn.name << " rcond " << rcond;
@@ -185,11 +185,11 @@ TYPED_TEST(ShortCut, ProjectsAsTheGeneralWayDoes) {
 }
 
 /// A system by O-DCA goes by the short cut where it serves, for rates and for projections.
-TYPED_TEST(ShortCut, IsWhatTheSystemGoesByWhereItServes) {
+TYPED_TEST(ShortCutTest, IsWhatTheSystemGoesByWhereItServes) {
   const MechanismDescription chain = TestFixture::Chain(2 * TypeParam::kOneFreedom, 2);
   const auto model = TestFixture::Make(chain);
   const auto [q, u] = testing::ConsistentState(chain, model, 2);
-  const auto sweep = TypeParam::Sweep::Make(model);
+  const auto sweep = TypeParam::Make(model);
   const auto n = static_cast<std::size_t>(model.num_q());
   Numbers y(2 * model.num_q()), shortest(y), examined(y), own(y);
   for (const Enforcement level : {Enforcement::kAcceleration, Enforcement::kPosition,
@@ -221,7 +221,7 @@ Numbers WholeRun(const Mechanism<typename Served::Space, double>& model, Enforce
                  const testing::State& start, int steps, double h, int* refused = nullptr) {
   testing::SystemWith<Solver, typename Served::Space, double> system(model, {.enforcement = level});
   EXPECT_EQ(system->Start(0.0, start.q, start.u), Outcome::kFinished);
-  const auto sweep = Served::Sweep::Make(model);
+  const auto sweep = Served::Make(model);
   Numbers y(start.q.size() + start.u.size()), k[4], out_of_use = y;
   y << start.q, start.u;
   const auto n = static_cast<std::size_t>(start.q.size());
@@ -248,7 +248,7 @@ Numbers WholeRun(const Mechanism<typename Served::Space, double>& model, Enforce
 /// Whole runs by O-DCA and by multipliers, which have no short cut. Of chains with one freedom some
 /// come near degenerate positions, where O-DCA changes to the general sweep and back. Rounding
 /// differs by 100 eps n / rcond per evaluation, and the least rcond is the limit of 1e-4.
-TYPED_TEST(ShortCut, WholeRunsAgreeWithMultipliers) {
+TYPED_TEST(ShortCutTest, WholeRunsAgreeWithMultipliers) {
   constexpr int kSteps = 250;
   for (const Enforcement level :
        {Enforcement::kAcceleration, Enforcement::kVelocity, Enforcement::kPosition}) {
@@ -273,9 +273,9 @@ TYPED_TEST(ShortCut, WholeRunsAgreeWithMultipliers) {
   }
 }
 
-TYPED_TEST(ShortCut, RefusesWhatItCannotJudge) {
+TYPED_TEST(ShortCutTest, RefusesWhatItCannotJudge) {
   const auto model = TestFixture::Make(TestFixture::Chain(2 * TypeParam::kOneFreedom, 1));
-  const auto sweep = TypeParam::Sweep::Make(model);
+  const auto sweep = TypeParam::Make(model);
   const Numbers ones = Numbers::Ones(model.num_q());
   for (const SpeedsUsed speeds : {SpeedsUsed::kGiven, SpeedsUsed::kCompleted}) {
     Numbers q = 1.1 * ones, u = ones, qdot = ones, udot = ones;
@@ -291,11 +291,11 @@ TYPED_TEST(ShortCut, RefusesWhatItCannotJudge) {
   }
 }
 
-TYPED_TEST(ShortCut, AllocatesNothing) {
+TYPED_TEST(ShortCutTest, AllocatesNothing) {
   if (testing::CountAllocations() < 0) GTEST_SKIP() << "the sanitizer owns malloc";
   for (const int n : {8, 9, 100, 500}) {
     const auto model = TestFixture::Make(TestFixture::Chain(n, 3));
-    const auto sweep = TypeParam::Sweep::Make(model, 2, 40);
+    const auto sweep = TypeParam::Make(model, 2, 40);
     Random random(1);
     Numbers q = RandomNumbers(random, model.num_q(), 1.0), u = q, qdot = q, udot = q;
     const long before = testing::CountAllocations();

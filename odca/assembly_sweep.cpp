@@ -1,0 +1,371 @@
+#include "odca/assembly_sweep.h"
+
+#include <algorithm>
+#include <cmath>
+
+#include "mechanism/algebra/lower_triangle.h"
+
+namespace loopbench::odca::pins {
+
+namespace {
+
+using Map = Eigen::Map<MatrixX<double>>;
+
+/// A moment of F about the point that the arm leads from.
+double Moment(const Vector2<double>& arm, const Vector2<double>& F) {
+  return arm.x * F.y - arm.y * F.x;
+}
+
+}  // namespace
+
+template <AssemblySweep::Gaps kGaps>
+bool AssemblySweep::Turn() {
+  Lanes room = Lanes{} + kLargestAngle;
+  for (std::size_t i = 0; i < sine_.size(); i += kLanes) {
+    const Lanes angle = Load<Lanes>(&angle_[i]);
+    room = Min(room, kLargestAngle - Magnitude(angle));
+    Lanes s, c;
+    SinCos(angle, s, c);
+    Store(s, &sine_[i]);
+    Store(c, &cosine_[i]);
+  }
+  if (!(Smallest(room) >= 0.0)) return false;
+  for (std::size_t i = 0; i < bodies_.size(); ++i) {
+    const Body& body = bodies_[i];
+    const double s = sine_[i], c = cosine_[i];
+    for (int h = body.first_handle; h < body.first_handle + body.handles; ++h) {
+      const Vector& arm = handles_[h];
+      arm_[h] = {arm.x * c - arm.y * s, arm.x * s + arm.y * c};
+    }
+  }
+  if (!cuts_.empty()) Close<kGaps>();
+  return true;
+}
+
+/// A cut joint is imposed at one point, that of Q, and there the arm of P ends (two_handle.h).
+template <AssemblySweep::Gaps kGaps>
+void AssemblySweep::Close() {
+  const auto leads = [&](int body, int handle) {
+    const Vector r = Scaled(bodies_[body].radius, arm_[handle]);
+    return Point<double>{r, Cross(speed_[body], r)};
+  };
+  for (const Step& step : steps_) {
+    reference_[step.child] = reference_[step.parent] + leads(step.parent, step.parent_handle) -
+                             leads(step.child, step.child_handle);
+  }
+  for (CutJoint& cut : cuts_) {
+    const auto at = [&](int body, int handle) {
+      return body < 0 ? Point<double>{cut.ground, {}} : reference_[body] + leads(body, handle);
+    };
+    const Point<double> gap = at(cut.body_Q, cut.Q) - at(cut.body_P, cut.P);
+    cut.w_P = cut.body_P < 0 ? 0.0 : speed_[cut.body_P];
+    cut.v = kGaps == Gaps::kSpeeds ? RelativeVelocity(cut.w_P, gap) : gap.p;
+    if (cut.body_P >= 0) {
+      arm_[cut.P] = arm_[cut.P] + Scaled(1.0 / bodies_[cut.body_P].radius, gap.p);
+    }
+  }
+}
+
+bool AssemblySweep::Assemble() {
+  operations_ += of_matrices_;
+  for (std::size_t i = 0; i < bodies_.size(); ++i) {
+    const Body& body = bodies_[i];
+    const Vector* arm = &arm_[body.first_handle];
+    Matrix* zeta = &zeta_[body.first_block];
+    for (int k = 0; k < body.handles; ++k) {
+      for (int j = 0; j < body.handles; ++j) {  // (1-4): 1/m + t t^T / I, t = z x r
+        *zeta++ = {body.mobility + arm[j].y * arm[k].y, -(arm[j].y * arm[k].x),
+                   -(arm[j].x * arm[k].y), body.mobility + arm[j].x * arm[k].x};
+      }
+    }
+  }
+  for (const Node& node : nodes_) {
+    if (!(node.pins == 1 ? JoinOne(node) : JoinSeveral(node))) return false;
+  }
+  return true;
+}
+
+/// X = zeta_QQ + zeta_PP (16), and Y a block of zeta for each handle that stays (67); where both
+/// sides are on one assembly, with their cross responses.
+bool AssemblySweep::JoinOne(const Node& node) {
+  const Pin& pin = pins_[node.first_pin];
+  const auto block = [&](const Side& row, int child, int column) -> const Matrix& {
+    return zeta_[node.blocks[child] + row.place + node.handles[child] * column];
+  };
+  const bool P = pin.P.place >= 0, Q = pin.Q.place >= 0;
+  Symmetric2<double> X = {0.0, 0.0, 0.0};
+  if (Q) {
+    const Matrix& QQ = block(pin.Q, pin.Q.child, pin.Q.place);
+    X = {QQ.xx, QQ.xy, QQ.yy};
+  }
+  if (P) {
+    const Matrix& PP = block(pin.P, pin.P.child, pin.P.place);
+    X = X + Symmetric2<double>{PP.xx, PP.xy, PP.yy};
+  }
+  if (P && Q && pin.P.child == pin.Q.child) {
+    const Matrix& QP = block(pin.Q, pin.P.child, pin.P.place);
+    X = X + Symmetric2<double>{-(QP.xx + QP.xx), -(QP.xy + QP.yx), -(QP.yy + QP.yy)};
+  }
+  double slack = 0.0;
+  const Factored2<double> factors = FactorsOf(X, node.limit, slack);
+  if (!(slack >= 0.0)) return false;
+  factors_[node.factors] = factors;
+  const Side* kept = &kept_[node.first_kept];
+  Matrix* W = &W_[node.matrix];
+  for (int e = 0; e < node.kept; ++e) {
+    Matrix Y = {0.0, 0.0, 0.0, 0.0};
+    if (Q && pin.Q.child == kept[e].child) Y = block(pin.Q, kept[e].child, kept[e].place);
+    if (P && pin.P.child == kept[e].child) {
+      const Matrix& PE = block(pin.P, kept[e].child, kept[e].place);
+      Y = {Y.xx - PE.xx, Y.xy - PE.xy, Y.yx - PE.yx, Y.yy - PE.yy};
+    }
+    Y_[e] = Y;
+    W[e] = factors * Y;
+  }
+  Matrix* zeta = &zeta_[node.first_block];
+  for (int f = 0; f < node.kept; ++f) {
+    for (int e = f; e < node.kept; ++e) {  // (26-28)
+      Matrix Z = {0.0, 0.0, 0.0, 0.0};
+      if (kept[e].child == kept[f].child) Z = block(kept[e], kept[f].child, kept[f].place);
+      const Matrix product = TransposeTimes(Y_[e], W[f]);
+      Z = {Z.xx - product.xx, Z.xy - product.xy, Z.yx - product.yx, Z.yy - product.yy};
+      if (e == f) {
+        Z.yx = Z.xy;
+      } else {
+        zeta[f + node.kept * e] = Transpose(Z);
+      }
+      zeta[e + node.kept * f] = Z;
+    }
+  }
+  return true;
+}
+
+/// Of the two bodies of a pin.
+JointMatrix<double> AssemblySweep::FreeResponse(const FreeBody* bodies) const {
+  JointMatrix<double> X = JointMatrix<double>::Zero(2, 2);
+  for (const FreeBody* free = bodies; free != bodies + 2; ++free) {
+    if (free->body < 0) continue;
+    const double s = sine_[free->body], c = cosine_[free->body];
+    const Vector r = {free->arm.x * c - free->arm.y * s, free->arm.x * s + free->arm.y * c};
+    X(0, 0) += free->mobility + free->inverse_inertia * (r.y * r.y);
+    X(1, 0) -= free->inverse_inertia * (r.x * r.y);
+    X(1, 1) += free->mobility + free->inverse_inertia * (r.x * r.x);
+  }
+  X(0, 1) = X(1, 0);
+  return X;
+}
+
+/// X of several pins (66), and V = T Y.
+bool AssemblySweep::JoinSeveral(const Node& node) {
+  const int n = 2 * node.pins;
+  const Pin* pins = &pins_[node.first_pin];
+  const Side* kept = &kept_[node.first_kept];
+  LoopSolver<double>& loop = loops_[node.factors];
+  Map V(&V_[node.matrix], n, 2 * node.kept);
+  auto X = X_.topLeftCorner(n, n);
+  X.setZero();
+  V.setZero();
+  const auto add = [](auto&& to, double sign, const Matrix& block) {
+    to(0, 0) += sign * block.xx;
+    to(0, 1) += sign * block.xy;
+    to(1, 0) += sign * block.yx;
+    to(1, 1) += sign * block.yy;
+  };
+  for (int i = 0; i < node.pins; ++i) {
+    loop.SetScale(i, FreeResponse(&free_[node.first_free + 2 * i]));
+    for (const bool at_Q : {true, false}) {
+      const Side& row = at_Q ? pins[i].Q : pins[i].P;
+      if (row.place < 0) continue;
+      const auto block = [&](int place) -> const Matrix& {
+        return zeta_[node.blocks[row.child] + row.place + node.handles[row.child] * place];
+      };
+      for (int j = 0; j < node.pins; ++j) {
+        for (const bool to_Q : {true, false}) {
+          const Side& column = to_Q ? pins[j].Q : pins[j].P;
+          if (column.place < 0 || column.child != row.child) continue;
+          add(X.block<2, 2>(2 * i, 2 * j), at_Q == to_Q ? 1.0 : -1.0, block(column.place));
+        }
+      }
+      for (int e = 0; e < node.kept; ++e) {
+        if (kept[e].child != row.child) continue;
+        add(V.block<2, 2>(2 * i, 2 * e), at_Q ? 1.0 : -1.0, block(kept[e].place));
+      }
+    }
+  }
+  if (!loop.FactorScaled(X) && !(loop.rcond() >= node.limit)) return false;
+  if (node.kept == 0) return true;
+  loop.Apply(V);
+  auto product = product_.topLeftCorner(V.cols(), V.cols());
+  if (V.cols() > kSmallTriangle) {
+    product.noalias() = V.transpose() * V;
+  } else {
+    for (Eigen::Index c = 0; c < V.cols(); ++c) {
+      for (Eigen::Index r = 0; r < V.cols(); ++r) {
+        double sum = 0.0;
+        for (int k = 0; k < n; ++k) sum += V(k, r) * V(k, c);
+        product(r, c) = sum;
+      }
+    }
+  }
+  Matrix* zeta = &zeta_[node.first_block];
+  for (int f = 0; f < node.kept; ++f) {
+    for (int e = 0; e < node.kept; ++e) {  // (71)
+      Matrix Z = {0.0, 0.0, 0.0, 0.0};
+      const int child = kept[e].child;
+      if (child == kept[f].child) {
+        Z = zeta_[node.blocks[child] + kept[e].place + node.handles[child] * kept[f].place];
+      }
+      zeta[e + node.kept * f] = {Z.xx - product(2 * e, 2 * f), Z.xy - product(2 * e, 2 * f + 1),
+                                 Z.yx - product(2 * e + 1, 2 * f),
+                                 Z.yy - product(2 * e + 1, 2 * f + 1)};
+    }
+  }
+  return true;
+}
+
+/// C b + c0 of each pin; for one of them then X^-1 of it, for several T of it (21, 68).
+template <Pass kPass>
+void AssemblySweep::Up(const Node& node) {
+  double* s = &s_[node.first_row];
+  for (int i = 0; i < node.pins; ++i) {
+    const Pin& pin = pins_[node.first_pin + i];
+    Vector sum = {0.0, 0.0};
+    if (pin.cut >= 0) {
+      const CutJoint& cut = cuts_[pin.cut];
+      if constexpr (kPass == Pass::kSpeeds) sum = cut.v;
+      if constexpr (kPass == Pass::kAccelerations) sum = -Cross(cut.w_P + cut.w_P, cut.v);  // (7)
+    }
+    if (pin.Q.place >= 0) sum = sum + b_[pin.Q.slot];
+    if (pin.P.place >= 0) sum = sum - b_[pin.P.slot];
+    s[2 * i] = sum.x;
+    s[2 * i + 1] = sum.y;
+  }
+  const Side* kept = &kept_[node.first_kept];
+  Vector* b = &b_[node.first_slot];
+  if (node.pins == 1) {
+    const Vector sum = {s[0], s[1]};
+    const Matrix* W = &W_[node.matrix];
+    for (int e = 0; e < node.kept; ++e) {  // (29-30)
+      b[e] = b_[kept[e].slot] - TransposeTimes(W[e], sum);
+    }
+    const Vector y = factors_[node.factors] * sum;
+    s[0] = y.x;
+    s[1] = y.y;
+    return;
+  }
+  const int n = 2 * node.pins;
+  loops_[node.factors].Apply(Map(s, n, 1));
+  const double* V = &V_[node.matrix];
+  for (int e = 0; e < node.kept; ++e, V += 2 * n) {  // (72)
+    Vector sum = b_[kept[e].slot];
+    for (int i = 0; i < n; ++i) {
+      sum.x -= V[i] * s[i];
+      sum.y -= V[n + i] * s[i];
+    }
+    b[e] = sum;
+  }
+}
+
+/// phi (17, 64), and forces on the handles of the children.
+void AssemblySweep::Down(const Node& node) {
+  const double* s = &s_[node.first_row];
+  const Vector* F = &F_[node.first_slot];
+  const Side* kept = &kept_[node.first_kept];
+  double* phi = phi_.data();
+  const int n = 2 * node.pins;
+  for (int i = 0; i < n; ++i) phi[i] = -s[i];
+  if (node.pins == 1) {
+    const Matrix* W = &W_[node.matrix];
+    Vector sum = {phi[0], phi[1]};
+    for (int e = 0; e < node.kept; ++e) sum = sum - W[e] * F[e];
+    phi[0] = sum.x;
+    phi[1] = sum.y;
+  } else {
+    const double* V = &V_[node.matrix];
+    for (int e = 0; e < node.kept; ++e, V += 2 * n) {
+      for (int i = 0; i < n; ++i) phi[i] -= V[i] * F[e].x + V[n + i] * F[e].y;
+    }
+    loops_[node.factors].ApplyTransposed(Eigen::Map<VectorX<double>>(phi, n));
+  }
+  for (int e = 0; e < node.kept; ++e) F_[kept[e].slot] = F[e];
+  for (int i = 0; i < node.pins; ++i) {
+    const Pin& pin = pins_[node.first_pin + i];
+    const Vector force = {phi[2 * i], phi[2 * i + 1]};
+    if (pin.Q.place >= 0) F_[pin.Q.slot] = force;
+    if (pin.P.place >= 0) F_[pin.P.slot] = -force;
+  }
+}
+
+template <Pass kPass>
+void AssemblySweep::Solve() {
+  operations_ += of_vectors_;
+  for (std::size_t i = 0; i < bodies_.size(); ++i) {
+    const Body& body = bodies_[i];
+    const double a = body.cosine * cosine_[i] + body.sine * sine_[i];
+    const double w2 = speed_[i] * speed_[i] * body.radius;
+    alpha_[i] = kPass == Pass::kSpeeds ? 0.0 : a;
+    for (int h = body.first_handle; h < body.first_handle + body.handles; ++h) {
+      const Vector& r = arm_[h];
+      b_[h] = kPass == Pass::kSpeeds
+                  ? Vector{0.0, 0.0}
+                  : Vector{body.gx - a * r.y - w2 * r.x, body.gy + a * r.x - w2 * r.y};
+    }
+  }
+  for (const Node& node : nodes_) Up<kPass>(node);
+  for (std::size_t n = nodes_.size(); n-- > 0;) Down(nodes_[n]);
+  for (std::size_t i = 0; i < bodies_.size(); ++i) {
+    const Body& body = bodies_[i];
+    double alpha = alpha_[i];
+    for (int h = body.first_handle; h < body.first_handle + body.handles; ++h) {
+      alpha += Moment(arm_[h], F_[h]);
+    }
+    alpha_[i] = alpha / body.radius;
+  }
+}
+
+bool AssemblySweep::Evaluate(SpeedsUsed speeds, std::span<const double> q,
+                             std::span<const double> u, std::span<double> qdot,
+                             std::span<double> udot) {
+  operations_ = 0;
+  tree_.ToBodies(q, u, angle_.data(), speed_.data(), *pool_);
+  if (!Turn<Gaps::kSpeeds>() || !Assemble()) return false;
+  if (speeds == SpeedsUsed::kGiven) {
+    Solve<Pass::kAccelerations>();
+    std::ranges::copy(u, qdot.begin());
+  } else {
+    Solve<Pass::kSpeeds>();
+    if (!tree_.ToJoints(alpha_.data(), u, qdot, *pool_)) return false;
+    for (std::size_t i = 0; i < bodies_.size(); ++i) speed_[i] += alpha_[i];
+    Solve<Pass::kCompleted>();
+  }
+  return tree_.ToJoints(alpha_.data(), {}, udot, *pool_);
+}
+
+bool AssemblySweep::Serves(const Kinematics<Planar, double>& kinematics) {
+  for (std::size_t i = 0; i < bodies_.size(); ++i) {
+    angle_[i] = kinematics.poses()[i + 1].angle;
+    speed_[i] = 0.0;
+  }
+  return Turn<Gaps::kSpeeds>() && Assemble();
+}
+
+bool AssemblySweep::FindChange() {
+  if (!Assemble()) return false;
+  Solve<Pass::kSpeeds>();
+  return true;
+}
+
+double AssemblySweep::LargestGap() const {
+  double largest = 0.0;
+  for (const CutJoint& cut : cuts_) {
+    largest = std::max(largest, cut.v.x * cut.v.x + cut.v.y * cut.v.y);
+  }
+  return std::sqrt(largest);
+}
+
+std::optional<Correction<double>> AssemblySweep::Project(std::span<double> q, std::span<double> u,
+                                                         double goal) {
+  return PinProjection::Of(*this, q, u, goal);
+}
+
+}  // namespace loopbench::odca::pins

@@ -1,0 +1,284 @@
+// Where handles, zeta and joins stand in the lists of an AssemblySweep, and their constants.
+#include <algorithm>
+#include <cmath>
+
+#include "odca/assembly_sweep.h"
+#include "odca/path_links.h"
+
+namespace loopbench::odca::pins {
+
+namespace {
+
+/// A pin of the tree on Ground: a property of its body.
+bool HoldsBody(const Joint<Planar, double>& joint) {
+  return joint.in_tree() && (joint.from == kGround || joint.to == kGround);
+}
+
+/// From the centre of mass of a body, or from Ground's origin, to one of its joints.
+Vector2<double> ArmOf(const Joint<Planar, double>& joint, bool at_Q) {
+  const Linear<Planar, double>& p = at_Q ? joint.X_QM.p : joint.X_PF.p;
+  return {p[0], p[1]};
+}
+
+}  // namespace
+
+struct AssemblySweep::Layout {
+  /// A body or what is joined, while joins are laid out.
+  struct Assembly {
+    int handles = 0, first_slot = 0, first_block = 0, bodies = 1;
+    std::vector<int> pins;  ///< of each handle the joint, twice its index, and one more at its Q
+  };
+
+  AssemblySweep& sweep;
+  const Mechanism<Planar, double>& mechanism;
+  const Plan& plan;
+  std::vector<int> handle_of = std::vector<int>(2 * mechanism.joints().size(), -1);  ///< as pins
+  std::vector<int> cut_of = std::vector<int>(mechanism.joints().size(), -1);
+  std::vector<Assembly> assemblies = std::vector<Assembly>(plan.num_nodes());
+  std::vector<int> several = {};  ///< pins of joins of more than one
+  double most_work = static_cast<double>(plan.operations(Planar::kDim));
+  int slots = 0, rows = 0, W = 0, widest = 0, most_rows = 0, most_kept = 0;
+  double blocks = 0.0, V = 0.0, work = 0.0, vectors = 0.0;  ///< perhaps too many for an int
+
+  void AddBodies();
+  void AddBody(int index, const std::vector<int>& joints);
+  void AddSteps();
+  /// False where the general sweep is less work.
+  bool AddNodes();
+  bool AddNode(const PlanNode& planned, Assembly& all);
+  Pin MakePin(const PlanNode& planned, const NodeJoint& closed) const;
+  void Keep(const PlanNode& planned, Node& node, Assembly& all);
+  void AddFree(const Joint<Planar, double>& joint);
+  void Count(const Node& node);
+  void Resize();
+};
+
+void AssemblySweep::Layout::AddBodies() {
+  std::vector<std::vector<int>> joints_of_body(mechanism.num_bodies());
+  for (int j = 0; j < static_cast<int>(mechanism.joints().size()); ++j) {
+    const Joint<Planar, double>& joint = mechanism.joints()[j];
+    joints_of_body[joint.from].push_back(2 * j);
+    joints_of_body[joint.to].push_back(2 * j + 1);
+  }
+  for (int body = 1; body < mechanism.num_bodies(); ++body) AddBody(body, joints_of_body[body]);
+}
+
+void AssemblySweep::Layout::AddBody(int index, const std::vector<int>& joints) {
+  const auto joint = [&](int side) -> const Joint<Planar, double>& {
+    return mechanism.joints()[side / 2];
+  };
+  const Inertia<Planar, double>& inertia = mechanism.bodies()[index];
+  Body body;
+  Vector origin = {0.0, 0.0};
+  const auto held = std::ranges::find_if(joints, [&](int side) { return HoldsBody(joint(side)); });
+  if (held != joints.end()) {
+    origin = ArmOf(joint(*held), *held % 2 == 1);
+    body.pin = ArmOf(joint(*held), *held % 2 == 0);
+  }
+  const double m = inertia.mass, gx = mechanism.gravity()[0], gy = mechanism.gravity()[1];
+  const Vector com = -origin;
+  body.radius = std::sqrt(inertia.rotational(0, 0) + m * (com.x * com.x + com.y * com.y));
+  if (held == joints.end()) {
+    body.mobility = 1.0 / m;
+    body.gx = gx;
+    body.gy = gy;
+  }
+  body.cosine = m / body.radius * (com.x * gy - com.y * gx);
+  body.sine = -m / body.radius * (com.y * gy + com.x * gx);
+  body.first_handle = slots;
+  body.first_block = static_cast<int>(blocks);
+  Assembly& assembly = assemblies[index - 1];
+  for (const int side : joints) {
+    if (HoldsBody(joint(side))) continue;
+    handle_of[side] = slots++;
+    assembly.pins.push_back(side);
+    sweep.handles_.push_back(Scaled(1.0 / body.radius, ArmOf(joint(side), side % 2 == 1) - origin));
+  }
+  body.handles = assembly.handles = slots - body.first_handle;
+  assembly.first_slot = body.first_handle;
+  assembly.first_block = body.first_block;
+  blocks += static_cast<double>(body.handles) * body.handles;
+  work += 4.0 * body.handles * body.handles;
+  sweep.bodies_.push_back(body);
+}
+
+void AssemblySweep::Layout::AddSteps() {
+  for (const TreeStep& step : mechanism.tree()) {
+    if (step.parent == kGround) continue;
+    const int parent_is_Q = mechanism.joints()[step.joint].from == step.parent ? 0 : 1;
+    sweep.steps_.push_back({.parent = step.parent - 1,
+                            .child = step.child - 1,
+                            .parent_handle = handle_of[2 * step.joint + parent_is_Q],
+                            .child_handle = handle_of[2 * step.joint + 1 - parent_is_Q]});
+  }
+  for (const int j : mechanism.constraints()) {
+    const Joint<Planar, double>& joint = mechanism.joints()[j];
+    cut_of[j] = static_cast<int>(sweep.cuts_.size());
+    sweep.cuts_.push_back({.P = handle_of[2 * j],
+                           .Q = handle_of[2 * j + 1],
+                           .body_P = joint.from - 1,
+                           .body_Q = joint.to - 1,
+                           .ground = ArmOf(joint, joint.to == kGround)});
+  }
+}
+
+AssemblySweep::Pin AssemblySweep::Layout::MakePin(const PlanNode& planned,
+                                                  const NodeJoint& closed) const {
+  const auto side = [&](int handle, int pin) {
+    if (handle < 0) return Side{};
+    const int child = planned.handles[handle].child;
+    const Assembly& assembly = assemblies[planned.children[child]];
+    const auto place = std::ranges::find(assembly.pins, pin) - assembly.pins.begin();
+    return Side{child, static_cast<int>(place), assembly.first_slot + static_cast<int>(place)};
+  };
+  return {side(closed.from, 2 * closed.index), side(closed.to, 2 * closed.index + 1),
+          cut_of[closed.index]};
+}
+
+/// Handles that stay, those of the first child first.
+void AssemblySweep::Layout::Keep(const PlanNode& planned, Node& node, Assembly& all) {
+  std::vector<int> closed;
+  for (const NodeJoint& joint : planned.joints) {
+    closed.insert(closed.end(), {2 * joint.index, 2 * joint.index + 1});
+  }
+  std::ranges::sort(closed);
+  all.bodies = 0;
+  for (const int c : {0, 1}) {
+    if (planned.children[c] < 0) continue;
+    const Assembly& child = assemblies[planned.children[c]];
+    all.bodies += child.bodies;
+    node.blocks[c] = child.first_block;
+    node.handles[c] = child.handles;
+    for (int place = 0; place < child.handles; ++place) {
+      if (std::ranges::binary_search(closed, child.pins[place])) continue;
+      all.pins.push_back(child.pins[place]);
+      sweep.kept_.push_back({c, place, child.first_slot + place});
+    }
+  }
+  node.kept = all.handles = static_cast<int>(all.pins.size());
+}
+
+/// Multiply-adds and room of a join.
+void AssemblySweep::Layout::Count(const Node& node) {
+  const double n = 2.0 * node.pins, d = 2.0 * node.kept;
+  slots += node.kept;
+  rows += 2 * node.pins;
+  blocks += static_cast<double>(node.kept) * node.kept;
+  work += n * n * n / 6.0 + n * n * d / 2.0 + n * d * d / 2.0;
+  vectors += 2.0 * n * (n + d);
+  most_kept = std::max(most_kept, node.kept);
+  if (node.pins == 1) {
+    W += node.kept;
+    return;
+  }
+  V += n * d;
+  several.push_back(node.pins);
+  widest = std::max(widest, 2 * node.kept);
+  most_rows = std::max(most_rows, 2 * node.pins);
+}
+
+void AssemblySweep::Layout::AddFree(const Joint<Planar, double>& joint) {
+  for (const bool at_Q : {false, true}) {
+    FreeBody& free = sweep.free_.emplace_back();
+    const int body = at_Q ? joint.to : joint.from;
+    if (body == kGround) continue;
+    const Inertia<Planar, double>& inertia = mechanism.bodies()[body];
+    free = {.body = body - 1,
+            .arm = ArmOf(joint, at_Q),
+            .mobility = 1.0 / inertia.mass,
+            .inverse_inertia = inertia.rotational_inverse(0, 0)};
+  }
+}
+
+bool AssemblySweep::Layout::AddNode(const PlanNode& planned, Assembly& all) {
+  Node node;
+  node.first_pin = static_cast<int>(sweep.pins_.size());
+  node.first_kept = static_cast<int>(sweep.kept_.size());
+  node.first_free = static_cast<int>(sweep.free_.size());
+  std::vector<int> joints;
+  for (const NodeJoint& closed : planned.joints) {
+    if (HoldsBody(mechanism.joints()[closed.index])) continue;
+    sweep.pins_.push_back(MakePin(planned, closed));
+    joints.push_back(closed.index);
+  }
+  node.pins = static_cast<int>(joints.size());
+  if (node.pins == 0) {  // a body that is held already
+    all = std::move(assemblies[planned.children[0]]);
+    return true;
+  }
+  Keep(planned, node, all);
+  node.first_slot = all.first_slot = slots;
+  node.first_block = all.first_block = static_cast<int>(blocks);
+  node.first_row = rows;
+  if (node.pins == 1) {
+    node.matrix = W;
+    node.factors = static_cast<int>(sweep.factors_.size());
+    sweep.factors_.emplace_back();
+    int lighter = all.bodies;
+    if (planned.children[1] >= 0) {
+      lighter =
+          std::min(assemblies[planned.children[0]].bodies, assemblies[planned.children[1]].bodies);
+    }
+    if (planned.closes_loop) {
+      node.limit = ShareOfLimit(lighter) * LimitOf(mechanism, joints.front());
+    }
+  } else {
+    node.matrix = static_cast<int>(V);
+    node.factors = static_cast<int>(several.size());
+    node.limit = LoopSolver<double>::kSuspicious * ShareOfLimit(all.bodies);
+    for (const int joint : joints) AddFree(mechanism.joints()[joint]);
+  }
+  Count(node);
+  sweep.nodes_.push_back(node);
+  return work <= most_work;
+}
+
+bool AssemblySweep::Layout::AddNodes() {
+  for (int n = plan.num_leaves(); n < plan.num_nodes(); ++n) {
+    if (!AddNode(plan.nodes()[n - plan.num_leaves()], assemblies[n])) return false;
+  }
+  return true;
+}
+
+void AssemblySweep::Layout::Resize() {
+  const auto places = static_cast<std::size_t>(mechanism.num_bodies() + kLanes - 1) / kLanes;
+  sweep.angle_.assign(places * kLanes, 0.0);
+  sweep.speed_ = sweep.alpha_ = sweep.sine_ = sweep.cosine_ = sweep.angle_;
+  sweep.arm_ = sweep.handles_;
+  for (const Body& body : sweep.bodies_) sweep.reference_.push_back({body.pin, {0.0, 0.0}});
+  sweep.moved_.assign(static_cast<std::size_t>(mechanism.num_u()), 0.0);
+  sweep.back_ = sweep.speeds_ = sweep.moved_;
+  const auto scratch = std::make_shared<LoopScratch<double>>(most_rows);
+  sweep.loops_.reserve(several.size());
+  for (const int pins : several) sweep.loops_.emplace_back(std::vector<int>(pins, 2), scratch);
+  sweep.zeta_.resize(static_cast<std::size_t>(blocks));
+  sweep.W_.resize(static_cast<std::size_t>(W));
+  sweep.Y_.resize(static_cast<std::size_t>(most_kept));
+  sweep.V_.resize(static_cast<std::size_t>(V));
+  sweep.X_.setZero(most_rows, most_rows);
+  sweep.product_.setZero(widest, widest);
+  sweep.b_.assign(static_cast<std::size_t>(slots), {0.0, 0.0});
+  sweep.F_ = sweep.b_;
+  sweep.s_.assign(static_cast<std::size_t>(rows), 0.0);
+  sweep.phi_.assign(static_cast<std::size_t>(std::max(most_rows, 2)), 0.0);
+  sweep.of_matrices_ = static_cast<long>(work);
+  sweep.of_vectors_ = static_cast<long>(vectors + 8.0 * static_cast<double>(sweep.handles_.size()));
+}
+
+std::unique_ptr<AssemblySweep> AssemblySweep::Make(const Mechanism<Planar, double>& mechanism,
+                                                   const Plan& plan) {
+  if (!IsPinsUnderGravity(mechanism)) return nullptr;
+  std::unique_ptr<AssemblySweep> sweep(new AssemblySweep);
+  Layout layout{*sweep, mechanism, plan};
+  layout.AddBodies();
+  layout.AddSteps();
+  if (!layout.AddNodes()) return nullptr;
+  layout.Resize();
+  std::vector<int> place_of(mechanism.num_bodies(), mechanism.num_bodies() - 1);
+  for (int body = 1; body < mechanism.num_bodies(); ++body) place_of[body] = body - 1;
+  sweep->tree_ =
+      TreeAngles<double>(mechanism, place_of, std::vector<double>(mechanism.num_bodies(), 0.0));
+  return sweep;
+}
+
+}  // namespace loopbench::odca::pins

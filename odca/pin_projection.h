@@ -1,0 +1,64 @@
+// What level position does to accepted steps of mechanisms of pins, as level_position.cpp does it
+// by parts: of PathSweep and AssemblySweep, which both are here `Sweep`.
+#pragma once
+
+#include <algorithm>
+#include <optional>
+#include <span>
+
+#include "mechanism/formulation/constraint_solver.h"
+
+namespace loopbench::odca::pins {
+
+struct PinProjection {
+  /// As ConstraintSolver::Project().
+  template <class Sweep>
+  static std::optional<Correction<double>> Of(Sweep& sweep, std::span<double> q,
+                                              std::span<double> u, double goal) {
+    using Gaps = typename Sweep::Gaps;
+    auto &moved = sweep.moved_, &speeds = sweep.speeds_;
+    std::ranges::copy(q, moved.begin());
+    std::ranges::copy(u, speeds.begin());
+    std::optional<double> now = GapOf(sweep);
+    if (!now) return std::nullopt;
+    Correction<double> correction;
+    correction.shift = *now;
+    for (int i = 0; i<kMostProjections&& * now> goal; ++i) {
+      if (!sweep.FindChange()) return std::nullopt;
+      const double before = *now;
+      sweep.back_ = moved;
+      if (!AddChange(sweep, sweep.back_, moved)) return std::nullopt;
+      now = GapOf(sweep);
+      if (!now) return std::nullopt;
+      ++correction.iterations;
+      if (*now < before) continue;
+      moved = sweep.back_;  // round-off: as it was
+      break;
+    }
+    if (!TurnTo<Gaps::kSpeeds>(sweep) || !sweep.FindChange()) return std::nullopt;
+    if (!AddChange(sweep, speeds, speeds)) return std::nullopt;
+    std::ranges::copy(moved, q.begin());
+    std::ranges::copy(speeds, u.begin());
+    return correction;
+  }
+
+ private:
+  template <auto kGaps, class Sweep>
+  static bool TurnTo(Sweep& sweep) {
+    sweep.tree_.ToBodies(sweep.moved_, sweep.speeds_, sweep.angle_.data(), sweep.speed_.data(),
+                         *sweep.pool_);
+    return sweep.template Turn<kGaps>();
+  }
+  /// The largest gap of a cut joint at the positions moved [m], or nothing.
+  template <class Sweep>
+  static std::optional<double> GapOf(Sweep& sweep) {
+    if (!TurnTo<Sweep::Gaps::kPositions>(sweep)) return std::nullopt;
+    return sweep.LargestGap();
+  }
+  template <class Sweep>
+  static bool AddChange(Sweep& sweep, std::span<const double> base, std::span<double> sum) {
+    return sweep.tree_.ToJoints(sweep.alpha_.data(), base, sum, *sweep.pool_);
+  }
+};
+
+}  // namespace loopbench::odca::pins

@@ -1,0 +1,145 @@
+// The sweep over assemblies of pins against the general one, which the contract suite holds to an
+// oracle. What every short cut must do is in short_cut_test.cpp.
+#include "odca/assembly_sweep.h"
+
+#include <gtest/gtest.h>
+
+#include <cstdio>
+
+#include "mechanism/description/library.h"
+#include "tests/odca/served.h"
+
+namespace loopbench::odca::pins {
+namespace {
+
+using Model = Mechanism<Planar, double>;
+
+std::unique_ptr<AssemblySweep> Make(const Model& mechanism, const PlanOptions& options = {}) {
+  return AssemblySweep::Make(mechanism, MakePlan(mechanism, options));
+}
+
+struct Tally {
+  int states = 0, refused = 0, softened = 0;
+  double worst = 0.0;
+};
+/// Joints may have drifted apart by as much as they please. The general sweep goes by the plan of
+/// no options; along another one other joins are in doubt.
+void Hold(const Model& mechanism, const PlanOptions& options, const Numbers& q, const Numbers& u,
+          Tally& tally, bool same_plan = true) {
+  for (const SpeedsUsed speeds : {SpeedsUsed::kGiven, SpeedsUsed::kCompleted}) {
+    const auto sweep = Make(mechanism, options);
+    const Both both = Compare<Planar>(mechanism, sweep.get(), speeds, q, u);
+    ++tally.states;
+    const bool softened = both.outcome != Outcome::kFinished || both.general.smallest_weight < 1.0;
+    tally.softened += softened;
+    EXPECT_FALSE(same_plan && both.evaluated && softened) << mechanism.name();
+    if (softened) continue;
+    if (!both.evaluated) {
+      // as along paths, 0.004 at most for these arms and radii
+      EXPECT_LT(both.general.rcond, 0.01) << mechanism.name();
+      ++tally.refused;
+      continue;
+    }
+    const double of_bound = both.difference / Bound(mechanism.num_bodies(), both.general.rcond);
+    EXPECT_LE(of_bound, 1.0) << mechanism.name() << " rcond " << both.general.rcond;
+    tally.worst = std::max(tally.worst, of_bound);
+  }
+}
+
+TEST(AssemblySweep, AgreesWithTheGeneralSweepWhereverJointsHaveDrifted) {
+  for (const Grounding grounding : {Grounding::kEager, Grounding::kAtRoot}) {
+    for (const Closing closing : {Closing::kTogether, Closing::kOneByOne}) {
+      Tally tally;
+      int made = 0;
+      for (int n = 1; n <= 40; ++n) {
+        for (std::uint64_t seed = 1; seed <= 12; ++seed) {
+          const MechanismDescription drawn = RandomBranches(n, 100 * seed + n);
+          const Model mechanism(drawn, Coordinates::kJoint);
+          const PlanOptions options = {.grounding = grounding, .closing = closing};
+          if (Make(mechanism, options) == nullptr) continue;
+          ++made;
+          Random random(seed);
+          const Numbers q = RandomNumbers(random, mechanism.num_q(), 4.0);
+          const Numbers u = RandomNumbers(random, mechanism.num_u(), 2.0);
+          const bool same_plan = grounding == Grounding::kEager && closing == Closing::kTogether;
+          Hold(mechanism, options, q, u, tally, same_plan);
+        }
+      }
+      std::printf("%d mechanisms, %d states, %d softened, %d more refused, worst %.2g\n", made,
+                  tally.states, tally.softened, tally.refused, tally.worst);
+      EXPECT_GT(made, 400) << "it has less to multiply but for a few";
+      EXPECT_LE(20 * tally.refused, tally.states);
+      EXPECT_LE(2 * tally.softened, tally.states);
+    }
+  }
+}
+
+TEST(AssemblySweep, AgreesOnTreesAndGrids) {
+  Tally tally;
+  const auto hold = [&](const MechanismDescription& description) {
+    const Model mechanism(description, Coordinates::kJoint);
+    Random random(1);
+    Numbers q = RandomNumbers(random, mechanism.num_q(), 1e-4);
+    for (const JointValues& start : description.initial.coordinates) {
+      q[mechanism.joints()[start.joint].q_offset] += start.values[0];
+    }
+    Hold(mechanism, {}, q, RandomNumbers(random, mechanism.num_u(), 1.0), tally);
+  };
+  for (const int n : {3, 10, 63, 1000}) hold(Tree(n, 1.0));
+  for (const int n : {1, 2, 3, 6}) hold(Grid(n, n, 1.1, -0.7));
+  for (const int n : {2, 9}) hold(Grid(2, n, 1.1, -0.7));
+  hold(Hub(3, 2, false));
+  hold(Hub(3, 3, true));
+  EXPECT_EQ(tally.softened, 0);
+  EXPECT_EQ(tally.refused, 0);
+}
+
+/// Redundant pins where they stand: refused each time, so not tried, until a step ends elsewhere.
+TEST(AssemblySweep, IsNotTriedWhereItWouldBeRefused) {
+  const MechanismDescription grid = Grid(2, 2, 1e-6, 0.5);
+  const Model mechanism(grid, Coordinates::kJoint);
+  const auto sweep = Make(mechanism);
+  ASSERT_NE(sweep, nullptr);
+  Kinematics<Planar, double> kinematics(mechanism);
+  Numbers q = Numbers::Zero(mechanism.num_q()), qdot = q, udot = q;
+  for (const double angle : {1e-6, 1.1}) {
+    for (const JointValues& start : Grid(2, 2, angle, 0.5).initial.coordinates) {
+      q[mechanism.joints()[start.joint].q_offset] = start.values[0];
+    }
+    kinematics.UpdatePosition(q);
+    EXPECT_EQ(sweep->Serves(kinematics), angle > 1.0);
+    testing::SystemWith<Odca, Planar, double> odca(mechanism, {});
+    ASSERT_EQ(odca->Start(0.0, q, Numbers::Zero(q.size())), Outcome::kFinished);
+    const Numbers elsewhere = q + Numbers::Constant(q.size(), angle > 1.0 ? 0.0 : 0.2);
+    const Numbers still = Numbers::Zero(q.size());
+    const auto answers = [&] {
+      return odca->solver().RightHandSide(SpeedsUsed::kGiven, In(elsewhere), In(still), In(qdot),
+                                          In(udot));
+    };
+    EXPECT_EQ(answers(), angle > 1.0);
+    Numbers y(2 * q.size());
+    y << elsewhere, still;
+    odca->BeginStep(0.1, In(y));
+    EXPECT_TRUE(answers());
+  }
+}
+
+TEST(AssemblySweep, LeavesOthersToTheGeneralSweep) {
+  const auto make = [](const MechanismDescription& description,
+                       Coordinates coordinates = Coordinates::kJoint) {
+    return Make(Model(description, coordinates));
+  };
+  const MechanismDescription grid = Grid(2, 2, 1.0, 0.5);
+  EXPECT_NE(make(grid), nullptr);
+  EXPECT_EQ(make(grid, Coordinates::kAbsolute), nullptr);
+  EXPECT_EQ(make(Hub(300, 1, false)), nullptr) << "300 handles on one body";
+  MechanismDescription sprung = grid;
+  sprung.forces.push_back(JointSpring{.joint = 1, .stiffness = 2.0});
+  EXPECT_EQ(make(sprung), nullptr);
+  MechanismDescription slides = grid;
+  slides.joints[2].type = JointType::kPrismatic;
+  EXPECT_EQ(make(slides), nullptr);
+}
+
+}  // namespace
+}  // namespace loopbench::odca::pins

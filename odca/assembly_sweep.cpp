@@ -3,8 +3,6 @@
 #include <algorithm>
 #include <cmath>
 
-#include "mechanism/algebra/lower_triangle.h"
-
 namespace loopbench::odca::pins {
 
 namespace {
@@ -14,6 +12,18 @@ using Map = Eigen::Map<MatrixX<double>>;
 /// A moment of F about the point that the arm leads from.
 double Moment(const Vector2<double>& arm, const Vector2<double>& F) {
   return arm.x * F.y - arm.y * F.x;
+}
+
+/// No product of Eigen's: what of it is compiled here, with products and sums as one instruction,
+/// others would be linked with.
+double Dot(const double* a, const double* b, int n) {
+  Lanes sums = {};
+  int i = 0;
+  for (; i + kLanes <= n; i += kLanes) sums += Load<Lanes>(a + i) * Load<Lanes>(b + i);
+  double sum = 0.0;
+  for (int lane = 0; lane < (i > 0 ? kLanes : 0); ++lane) sum += sums[lane];
+  for (; i < n; ++i) sum += a[i] * b[i];
+  return sum;
 }
 
 }  // namespace
@@ -70,8 +80,8 @@ bool AssemblySweep::Assemble() {
   operations_ += of_matrices_;
   for (std::size_t i = 0; i < bodies_.size(); ++i) {
     const Body& body = bodies_[i];
-    const Vector* arm = &arm_[body.first_handle];
-    Matrix* zeta = &zeta_[body.first_block];
+    const Vector* arm = arm_.data() + body.first_handle;
+    Matrix* zeta = zeta_.data() + body.first_block;
     for (int k = 0; k < body.handles; ++k) {
       for (int j = 0; j < body.handles; ++j) {  // (1-4): 1/m + t t^T / I, t = z x r
         *zeta++ = {body.mobility + arm[j].y * arm[k].y, -(arm[j].y * arm[k].x),
@@ -110,8 +120,8 @@ bool AssemblySweep::JoinOne(const Node& node) {
   const Factored2<double> factors = FactorsOf(X, node.limit, slack);
   if (!(slack >= 0.0)) return false;
   factors_[node.factors] = factors;
-  const Side* kept = &kept_[node.first_kept];
-  Matrix* W = &W_[node.matrix];
+  const Side* kept = kept_.data() + node.first_kept;
+  Matrix* W = W_.data() + node.matrix;
   for (int e = 0; e < node.kept; ++e) {
     Matrix Y = {0.0, 0.0, 0.0, 0.0};
     if (Q && pin.Q.child == kept[e].child) Y = block(pin.Q, kept[e].child, kept[e].place);
@@ -122,7 +132,7 @@ bool AssemblySweep::JoinOne(const Node& node) {
     Y_[e] = Y;
     W[e] = factors * Y;
   }
-  Matrix* zeta = &zeta_[node.first_block];
+  Matrix* zeta = zeta_.data() + node.first_block;
   for (int f = 0; f < node.kept; ++f) {
     for (int e = f; e < node.kept; ++e) {  // (26-28)
       Matrix Z = {0.0, 0.0, 0.0, 0.0};
@@ -158,10 +168,10 @@ JointMatrix<double> AssemblySweep::FreeResponse(const FreeBody* bodies) const {
 /// X of several pins (66), and V = T Y.
 bool AssemblySweep::JoinSeveral(const Node& node) {
   const int n = 2 * node.pins;
-  const Pin* pins = &pins_[node.first_pin];
-  const Side* kept = &kept_[node.first_kept];
+  const Pin* pins = pins_.data() + node.first_pin;
+  const Side* kept = kept_.data() + node.first_kept;
   LoopSolver<double>& loop = loops_[node.factors];
-  Map V(&V_[node.matrix], n, 2 * node.kept);
+  Map V(V_.data() + node.matrix, n, 2 * node.kept);
   auto X = X_.topLeftCorner(n, n);
   X.setZero();
   V.setZero();
@@ -172,7 +182,7 @@ bool AssemblySweep::JoinSeveral(const Node& node) {
     to(1, 1) += sign * block.yy;
   };
   for (int i = 0; i < node.pins; ++i) {
-    loop.SetScale(i, FreeResponse(&free_[node.first_free + 2 * i]));
+    loop.SetScale(i, FreeResponse(free_.data() + (node.first_free + 2 * i)));
     for (const bool at_Q : {true, false}) {
       const Side& row = at_Q ? pins[i].Q : pins[i].P;
       if (row.place < 0) continue;
@@ -195,29 +205,24 @@ bool AssemblySweep::JoinSeveral(const Node& node) {
   if (!loop.FactorScaled(X) && !(loop.rcond() >= node.limit)) return false;
   if (node.kept == 0) return true;
   loop.Apply(V);
-  auto product = product_.topLeftCorner(V.cols(), V.cols());
-  if (V.cols() > kSmallTriangle) {
-    product.noalias() = V.transpose() * V;
-  } else {
-    for (Eigen::Index c = 0; c < V.cols(); ++c) {
-      for (Eigen::Index r = 0; r < V.cols(); ++r) {
-        double sum = 0.0;
-        for (int k = 0; k < n; ++k) sum += V(k, r) * V(k, c);
-        product(r, c) = sum;
-      }
-    }
-  }
-  Matrix* zeta = &zeta_[node.first_block];
+  Matrix* zeta = zeta_.data() + node.first_block;
   for (int f = 0; f < node.kept; ++f) {
-    for (int e = 0; e < node.kept; ++e) {  // (71)
+    const double *fx = V.col(2 * f).data(), *fy = fx + n;
+    for (int e = f; e < node.kept; ++e) {  // (71)
+      const double *ex = V.col(2 * e).data(), *ey = ex + n;
       Matrix Z = {0.0, 0.0, 0.0, 0.0};
       const int child = kept[e].child;
       if (child == kept[f].child) {
         Z = zeta_[node.blocks[child] + kept[e].place + node.handles[child] * kept[f].place];
       }
-      zeta[e + node.kept * f] = {Z.xx - product(2 * e, 2 * f), Z.xy - product(2 * e, 2 * f + 1),
-                                 Z.yx - product(2 * e + 1, 2 * f),
-                                 Z.yy - product(2 * e + 1, 2 * f + 1)};
+      Z = {Z.xx - Dot(ex, fx, n), Z.xy - Dot(ex, fy, n), Z.yx - Dot(ey, fx, n),
+           Z.yy - Dot(ey, fy, n)};
+      if (e == f) {
+        Z.yx = Z.xy;
+      } else {
+        zeta[f + node.kept * e] = Transpose(Z);
+      }
+      zeta[e + node.kept * f] = Z;
     }
   }
   return true;
@@ -226,7 +231,7 @@ bool AssemblySweep::JoinSeveral(const Node& node) {
 /// C b + c0 of each pin; for one of them then X^-1 of it, for several T of it (21, 68).
 template <Pass kPass>
 void AssemblySweep::Up(const Node& node) {
-  double* s = &s_[node.first_row];
+  double* s = s_.data() + node.first_row;
   for (int i = 0; i < node.pins; ++i) {
     const Pin& pin = pins_[node.first_pin + i];
     Vector sum = {0.0, 0.0};
@@ -240,11 +245,11 @@ void AssemblySweep::Up(const Node& node) {
     s[2 * i] = sum.x;
     s[2 * i + 1] = sum.y;
   }
-  const Side* kept = &kept_[node.first_kept];
-  Vector* b = &b_[node.first_slot];
+  const Side* kept = kept_.data() + node.first_kept;
+  Vector* b = b_.data() + node.first_slot;
   if (node.pins == 1) {
     const Vector sum = {s[0], s[1]};
-    const Matrix* W = &W_[node.matrix];
+    const Matrix* W = W_.data() + node.matrix;
     for (int e = 0; e < node.kept; ++e) {  // (29-30)
       b[e] = b_[kept[e].slot] - TransposeTimes(W[e], sum);
     }
@@ -255,7 +260,7 @@ void AssemblySweep::Up(const Node& node) {
   }
   const int n = 2 * node.pins;
   loops_[node.factors].Apply(Map(s, n, 1));
-  const double* V = &V_[node.matrix];
+  const double* V = V_.data() + node.matrix;
   for (int e = 0; e < node.kept; ++e, V += 2 * n) {  // (72)
     Vector sum = b_[kept[e].slot];
     for (int i = 0; i < n; ++i) {
@@ -268,20 +273,20 @@ void AssemblySweep::Up(const Node& node) {
 
 /// phi (17, 64), and forces on the handles of the children.
 void AssemblySweep::Down(const Node& node) {
-  const double* s = &s_[node.first_row];
-  const Vector* F = &F_[node.first_slot];
-  const Side* kept = &kept_[node.first_kept];
+  const double* s = s_.data() + node.first_row;
+  const Vector* F = F_.data() + node.first_slot;
+  const Side* kept = kept_.data() + node.first_kept;
   double* phi = phi_.data();
   const int n = 2 * node.pins;
   for (int i = 0; i < n; ++i) phi[i] = -s[i];
   if (node.pins == 1) {
-    const Matrix* W = &W_[node.matrix];
+    const Matrix* W = W_.data() + node.matrix;
     Vector sum = {phi[0], phi[1]};
     for (int e = 0; e < node.kept; ++e) sum = sum - W[e] * F[e];
     phi[0] = sum.x;
     phi[1] = sum.y;
   } else {
-    const double* V = &V_[node.matrix];
+    const double* V = V_.data() + node.matrix;
     for (int e = 0; e < node.kept; ++e, V += 2 * n) {
       for (int i = 0; i < n; ++i) phi[i] -= V[i] * F[e].x + V[n + i] * F[e].y;
     }

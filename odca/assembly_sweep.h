@@ -54,7 +54,7 @@ class AssemblySweep final : public ShortCut {
     double mobility = 0.0, gx = 0.0, gy = 0.0, cosine = 0.0, sine = 0.0, radius = 1.0;
     int first_handle = 0, handles = 0;
     int first_block = 0;  ///< of zeta
-    Vector pin = {};      ///< on Ground, where the point of reference stands still
+    Vector stand = {};    ///< where the point of reference stands still, if it does
   };
   /// A joint of the tree between two bodies: where the child stands.
   struct Step {
@@ -142,7 +142,7 @@ class AssemblySweep final : public ShortCut {
   std::vector<double> V_;
   std::vector<Factored2<double>> factors_;
   std::vector<LoopSolver<double>> loops_;
-  MatrixX<double> X_, product_;
+  MatrixX<double> X_;
   std::vector<Vector> b_, F_;  ///< by slot: handles of bodies first, then those of nodes
   std::vector<double> s_, phi_;
   std::vector<double> moved_, back_, speeds_;  ///< as in path_sweep.h

@@ -26,6 +26,7 @@ struct AssemblySweep::Layout {
   /// A body or what is joined, while joins are laid out.
   struct Assembly {
     int handles = 0, first_slot = 0, first_block = 0, bodies = 1;
+    bool held = false;      ///< by Ground
     std::vector<int> pins;  ///< of each handle the joint, twice its index, and one more at its Q
   };
 
@@ -37,33 +38,38 @@ struct AssemblySweep::Layout {
   std::vector<Assembly> assemblies = std::vector<Assembly>(plan.num_nodes());
   std::vector<int> several = {};  ///< pins of joins of more than one
   double most_work = static_cast<double>(plan.operations(Planar::kDim));
-  int slots = 0, rows = 0, W = 0, widest = 0, most_rows = 0, most_kept = 0;
-  double blocks = 0.0, V = 0.0, work = 0.0, vectors = 0.0;  ///< perhaps too many for an int
+  int slots = 0, rows = 0, W = 0, most_rows = 0, most_kept = 0;
+  double blocks = 0.0, V = 0.0, work = 0.0, vectors = 0.0;
 
-  void AddBodies();
-  void AddBody(int index, const std::vector<int>& joints);
+  /// False where the general sweep is less work, or places are too many for an int.
+  bool Fits() const { return work + vectors <= most_work && blocks < 5e8 && V < 5e8; }
+  bool AddBodies();
+  bool AddBody(int index, const std::vector<int>& joints);
   void AddSteps();
-  /// False where the general sweep is less work.
   bool AddNodes();
   bool AddNode(const PlanNode& planned, Assembly& all);
   Pin MakePin(const PlanNode& planned, const NodeJoint& closed) const;
   void Keep(const PlanNode& planned, Node& node, Assembly& all);
+  void SetLimit(const PlanNode& planned, int joint, Node& node) const;
   void AddFree(const Joint<Planar, double>& joint);
   void Count(const Node& node);
   void Resize();
 };
 
-void AssemblySweep::Layout::AddBodies() {
+bool AssemblySweep::Layout::AddBodies() {
   std::vector<std::vector<int>> joints_of_body(mechanism.num_bodies());
   for (int j = 0; j < static_cast<int>(mechanism.joints().size()); ++j) {
     const Joint<Planar, double>& joint = mechanism.joints()[j];
     joints_of_body[joint.from].push_back(2 * j);
     joints_of_body[joint.to].push_back(2 * j + 1);
   }
-  for (int body = 1; body < mechanism.num_bodies(); ++body) AddBody(body, joints_of_body[body]);
+  for (int body = 1; body < mechanism.num_bodies(); ++body) {
+    if (!AddBody(body, joints_of_body[body])) return false;
+  }
+  return true;
 }
 
-void AssemblySweep::Layout::AddBody(int index, const std::vector<int>& joints) {
+bool AssemblySweep::Layout::AddBody(int index, const std::vector<int>& joints) {
   const auto joint = [&](int side) -> const Joint<Planar, double>& {
     return mechanism.joints()[side / 2];
   };
@@ -71,9 +77,11 @@ void AssemblySweep::Layout::AddBody(int index, const std::vector<int>& joints) {
   Body body;
   Vector origin = {0.0, 0.0};
   const auto held = std::ranges::find_if(joints, [&](int side) { return HoldsBody(joint(side)); });
+  Assembly& assembly = assemblies[index - 1];
   if (held != joints.end()) {
+    assembly.held = true;
     origin = ArmOf(joint(*held), *held % 2 == 1);
-    body.pin = ArmOf(joint(*held), *held % 2 == 0);
+    body.stand = ArmOf(joint(*held), *held % 2 == 0);
   }
   const double m = inertia.mass, gx = mechanism.gravity()[0], gy = mechanism.gravity()[1];
   const Vector com = -origin;
@@ -87,7 +95,6 @@ void AssemblySweep::Layout::AddBody(int index, const std::vector<int>& joints) {
   body.sine = -m / body.radius * (com.y * gy + com.x * gx);
   body.first_handle = slots;
   body.first_block = static_cast<int>(blocks);
-  Assembly& assembly = assemblies[index - 1];
   for (const int side : joints) {
     if (HoldsBody(joint(side))) continue;
     handle_of[side] = slots++;
@@ -100,16 +107,17 @@ void AssemblySweep::Layout::AddBody(int index, const std::vector<int>& joints) {
   blocks += static_cast<double>(body.handles) * body.handles;
   work += 4.0 * body.handles * body.handles;
   sweep.bodies_.push_back(body);
+  return Fits();
 }
 
 void AssemblySweep::Layout::AddSteps() {
   for (const TreeStep& step : mechanism.tree()) {
     if (step.parent == kGround) continue;
-    const int parent_is_Q = mechanism.joints()[step.joint].from == step.parent ? 0 : 1;
+    const int parent_side = mechanism.joints()[step.joint].from == step.parent ? 0 : 1;
     sweep.steps_.push_back({.parent = step.parent - 1,
                             .child = step.child - 1,
-                            .parent_handle = handle_of[2 * step.joint + parent_is_Q],
-                            .child_handle = handle_of[2 * step.joint + 1 - parent_is_Q]});
+                            .parent_handle = handle_of[2 * step.joint + parent_side],
+                            .child_handle = handle_of[2 * step.joint + 1 - parent_side]});
   }
   for (const int j : mechanism.constraints()) {
     const Joint<Planar, double>& joint = mechanism.joints()[j];
@@ -147,6 +155,7 @@ void AssemblySweep::Layout::Keep(const PlanNode& planned, Node& node, Assembly& 
     if (planned.children[c] < 0) continue;
     const Assembly& child = assemblies[planned.children[c]];
     all.bodies += child.bodies;
+    all.held = all.held || child.held;
     node.blocks[c] = child.first_block;
     node.handles[c] = child.handles;
     for (int place = 0; place < child.handles; ++place) {
@@ -155,6 +164,9 @@ void AssemblySweep::Layout::Keep(const PlanNode& planned, Node& node, Assembly& 
       sweep.kept_.push_back({c, place, child.first_slot + place});
     }
   }
+  const auto on_ground = [](const Pin& pin) { return pin.P.place < 0 || pin.Q.place < 0; };
+  all.held =
+      all.held || std::any_of(sweep.pins_.begin() + node.first_pin, sweep.pins_.end(), on_ground);
   node.kept = all.handles = static_cast<int>(all.pins.size());
 }
 
@@ -173,7 +185,6 @@ void AssemblySweep::Layout::Count(const Node& node) {
   }
   V += n * d;
   several.push_back(node.pins);
-  widest = std::max(widest, 2 * node.kept);
   most_rows = std::max(most_rows, 2 * node.pins);
 }
 
@@ -188,6 +199,22 @@ void AssemblySweep::Layout::AddFree(const Joint<Planar, double>& joint) {
             .mobility = 1.0 / inertia.mass,
             .inverse_inertia = inertia.rotational_inverse(0, 0)};
   }
+}
+
+/// A pin closes a loop where Ground holds both its sides, or both are on one assembly. The lighter
+/// side is what answers.
+void AssemblySweep::Layout::SetLimit(const PlanNode& planned, int joint, Node& node) const {
+  const Assembly& one = assemblies[planned.children[0]];
+  const Pin& pin = sweep.pins_[node.first_pin];
+  const bool on_ground = pin.P.place < 0 || pin.Q.place < 0;
+  bool closes = on_ground ? one.held : true;
+  int lighter = one.bodies;
+  if (planned.children[1] >= 0) {
+    const Assembly& other = assemblies[planned.children[1]];
+    closes = one.held && other.held;
+    lighter = std::min(lighter, other.bodies);
+  }
+  if (closes) node.limit = ShareOfLimit(lighter) * LimitOf(mechanism, joint);
 }
 
 bool AssemblySweep::Layout::AddNode(const PlanNode& planned, Assembly& all) {
@@ -214,14 +241,7 @@ bool AssemblySweep::Layout::AddNode(const PlanNode& planned, Assembly& all) {
     node.matrix = W;
     node.factors = static_cast<int>(sweep.factors_.size());
     sweep.factors_.emplace_back();
-    int lighter = all.bodies;
-    if (planned.children[1] >= 0) {
-      lighter =
-          std::min(assemblies[planned.children[0]].bodies, assemblies[planned.children[1]].bodies);
-    }
-    if (planned.closes_loop) {
-      node.limit = ShareOfLimit(lighter) * LimitOf(mechanism, joints.front());
-    }
+    SetLimit(planned, joints.front(), node);
   } else {
     node.matrix = static_cast<int>(V);
     node.factors = static_cast<int>(several.size());
@@ -230,7 +250,7 @@ bool AssemblySweep::Layout::AddNode(const PlanNode& planned, Assembly& all) {
   }
   Count(node);
   sweep.nodes_.push_back(node);
-  return work <= most_work;
+  return Fits();
 }
 
 bool AssemblySweep::Layout::AddNodes() {
@@ -245,7 +265,7 @@ void AssemblySweep::Layout::Resize() {
   sweep.angle_.assign(places * kLanes, 0.0);
   sweep.speed_ = sweep.alpha_ = sweep.sine_ = sweep.cosine_ = sweep.angle_;
   sweep.arm_ = sweep.handles_;
-  for (const Body& body : sweep.bodies_) sweep.reference_.push_back({body.pin, {0.0, 0.0}});
+  for (const Body& body : sweep.bodies_) sweep.reference_.push_back({body.stand, {0.0, 0.0}});
   sweep.moved_.assign(static_cast<std::size_t>(mechanism.num_u()), 0.0);
   sweep.back_ = sweep.speeds_ = sweep.moved_;
   const auto scratch = std::make_shared<LoopScratch<double>>(most_rows);
@@ -256,7 +276,6 @@ void AssemblySweep::Layout::Resize() {
   sweep.Y_.resize(static_cast<std::size_t>(most_kept));
   sweep.V_.resize(static_cast<std::size_t>(V));
   sweep.X_.setZero(most_rows, most_rows);
-  sweep.product_.setZero(widest, widest);
   sweep.b_.assign(static_cast<std::size_t>(slots), {0.0, 0.0});
   sweep.F_ = sweep.b_;
   sweep.s_.assign(static_cast<std::size_t>(rows), 0.0);
@@ -267,10 +286,10 @@ void AssemblySweep::Layout::Resize() {
 
 std::unique_ptr<AssemblySweep> AssemblySweep::Make(const Mechanism<Planar, double>& mechanism,
                                                    const Plan& plan) {
-  if (!IsPinsUnderGravity(mechanism)) return nullptr;
+  if (!HasOnlyPinsUnderGravity(mechanism)) return nullptr;
   std::unique_ptr<AssemblySweep> sweep(new AssemblySweep);
   Layout layout{*sweep, mechanism, plan};
-  layout.AddBodies();
+  if (!layout.AddBodies()) return nullptr;
   layout.AddSteps();
   if (!layout.AddNodes()) return nullptr;
   layout.Resize();

@@ -135,12 +135,6 @@ void Odca<Space, S>::Start([[maybe_unused]] const Kinematics<Space, S>& kinemati
   }
 }
 
-template <class Space, class S>
-bool Odca<Space, S>::Review(const Kinematics<Space, S>& kinematics) {
-  Start(kinematics);
-  return false;
-}
-
 /// What the speeds miss, joint by joint: no vector of rows is needed between.
 template <class Space, class S>
 bool Odca<Space, S>::CompleteSpeeds(Kinematics<Space, S>& kinematics, VectorX<S>& u) {

@@ -49,9 +49,8 @@ class Odca final : public ConstraintSolver<Space, S> {
                      std::span<S> qdot, std::span<S> udot) override;
   /// Likewise.
   std::optional<Correction<S>> Project(std::span<S> q, std::span<S> u, S goal) override;
-  /// Whether the short cut is tried.
+  /// Whether the short cut is tried from now on.
   void Start(const Kinematics<Space, S>& kinematics) override;
-  bool Review(const Kinematics<Space, S>& kinematics) override;
   /// Size of the plan, and multiply-adds since Factor() began.
   std::vector<NamedCount> Counters() const override;
 
@@ -70,7 +69,7 @@ class Odca final : public ConstraintSolver<Space, S> {
   Sweep<Space, S> sweep_;
   std::unique_ptr<ShortCut> short_cut_;               ///< null where there is none
   std::unique_ptr<pins::PathLane> lane_;              ///< null but for paths of runs side by side
-  bool tries_short_cut_ = true;                       ///< in this step
+  bool tries_short_cut_ = true;                       ///< since Start()
   bool by_short_cut_ = false;                         ///< the last evaluation was
   const Kinematics<Space, S>* kinematics_ = nullptr;  ///< of the last Factor()
   BodyEquations<Space, S> equations_;

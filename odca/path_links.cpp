@@ -110,7 +110,7 @@ std::optional<PathLinks> MeasurePath(const Mechanism<Planar, double>& mechanism,
   return all ? all : MeasureInOrder(mechanism, Reversed(path));
 }
 
-bool IsPinsUnderGravity(const Mechanism<Planar, double>& mechanism) {
+bool HasOnlyPinsUnderGravity(const Mechanism<Planar, double>& mechanism) {
   const auto is_pin = [](const Joint<Planar, double>& joint) {
     return joint.kind == &KindOf<Planar, double>(JointType::kRevolute) && joint.num_drives == 0 &&
            joint.num_released == 0;

@@ -28,7 +28,7 @@ std::optional<PathLinks> MeasurePath(const Mechanism<Planar, double>& mechanism,
 
 /// Whether gravity is the only force, and all joints are pins with coordinates or constraints of
 /// their own: what sweeps over pins are made for.
-bool IsPinsUnderGravity(const Mechanism<Planar, double>& mechanism);
+bool HasOnlyPinsUnderGravity(const Mechanism<Planar, double>& mechanism);
 
 /// Least response of a joint that closes a loop: what loop_solver.h calls suspicious times the
 /// trace of the response of its two bodies alone. For Link::limit.

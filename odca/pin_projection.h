@@ -16,6 +16,7 @@ struct PinProjection {
   static std::optional<Correction<double>> Of(Sweep& sweep, std::span<double> q,
                                               std::span<double> u, double goal) {
     using Gaps = typename Sweep::Gaps;
+    sweep.operations_ = 0;
     auto &moved = sweep.moved_, &speeds = sweep.speeds_;
     std::ranges::copy(q, moved.begin());
     std::ranges::copy(u, speeds.begin());

@@ -12,14 +12,14 @@ class ShortCut {
  public:
   virtual ~ShortCut() = default;
   /// As ConstraintSolver::RightHandSide(). False near a degenerate position, for angles beyond
-  /// kLargestAngle, and for numbers that are not finite. Allocates nothing.
+  /// kLargestAngle, and where accelerations are not finite. Allocates nothing.
   virtual bool Evaluate(SpeedsUsed speeds, std::span<const double> q, std::span<const double> u,
                         std::span<double> qdot, std::span<double> udot) = 0;
   /// As ConstraintSolver::Project(), where loops are closed; nothing where Evaluate() is false.
   virtual std::optional<Correction<double>> Project(std::span<double> q, std::span<double> u,
                                                     double goal) = 0;
-  /// Whether Evaluate() is to be tried in the step that begins at these positions: where
-  /// constraints are redundant all along, it would be refused each time.
+  /// Whether Evaluate() is to be tried in a run that starts at these positions: where constraints
+  /// are redundant all along, it would be refused each time.
   virtual bool Serves(const Kinematics<Planar, double>& /*kinematics*/) { return true; }
   /// Multiply-adds of the last evaluation, or what it did of it.
   virtual long operations() const = 0;

@@ -19,20 +19,19 @@ std::unique_ptr<AssemblySweep> Make(const Model& mechanism, const PlanOptions& o
 }
 
 struct Tally {
-  int states = 0, refused = 0, softened = 0;
+  int states = 0, refused = 0, softened = 0, answered_though_softened = 0;
   double worst = 0.0;
 };
-/// Joints may have drifted apart by as much as they please. The general sweep goes by the plan of
-/// no options; along another one other joins are in doubt.
+/// Joints may have drifted apart by as much as they please.
 void Hold(const Model& mechanism, const PlanOptions& options, const Numbers& q, const Numbers& u,
-          Tally& tally, bool same_plan = true) {
+          Tally& tally) {
   for (const SpeedsUsed speeds : {SpeedsUsed::kGiven, SpeedsUsed::kCompleted}) {
     const auto sweep = Make(mechanism, options);
-    const Both both = Compare<Planar>(mechanism, sweep.get(), speeds, q, u);
+    const Both both = Compare<Planar>(mechanism, sweep.get(), speeds, q, u, options);
     ++tally.states;
     const bool softened = both.outcome != Outcome::kFinished || both.general.smallest_weight < 1.0;
     tally.softened += softened;
-    EXPECT_FALSE(same_plan && both.evaluated && softened) << mechanism.name();
+    tally.answered_though_softened += both.evaluated && softened;
     if (softened) continue;
     if (!both.evaluated) {
       // as along paths, 0.004 at most for these arms and radii
@@ -61,12 +60,15 @@ TEST(AssemblySweep, AgreesWithTheGeneralSweepWhereverJointsHaveDrifted) {
           Random random(seed);
           const Numbers q = RandomNumbers(random, mechanism.num_q(), 4.0);
           const Numbers u = RandomNumbers(random, mechanism.num_u(), 2.0);
-          const bool same_plan = grounding == Grounding::kEager && closing == Closing::kTogether;
-          Hold(mechanism, options, q, u, tally, same_plan);
+          Hold(mechanism, options, q, u, tally);
         }
       }
       std::printf("%d mechanisms, %d states, %d softened, %d more refused, worst %.2g\n", made,
                   tally.states, tally.softened, tally.refused, tally.worst);
+      // where a body's pins on Ground close one by one, those of the tree are no joins here, and
+      // another pin of the loop is the one that is judged
+      EXPECT_LE(100 * tally.answered_though_softened,
+                closing == Closing::kOneByOne ? tally.states : 0);
       EXPECT_GT(made, 400) << "it has less to multiply but for a few";
       EXPECT_LE(20 * tally.refused, tally.states);
       EXPECT_LE(2 * tally.softened, tally.states);
@@ -94,33 +96,51 @@ TEST(AssemblySweep, AgreesOnTreesAndGrids) {
   EXPECT_EQ(tally.refused, 0);
 }
 
-/// Redundant pins where they stand: refused each time, so not tried, until a step ends elsewhere.
-TEST(AssemblySweep, IsNotTriedWhereItWouldBeRefused) {
-  const MechanismDescription grid = Grid(2, 2, 1e-6, 0.5);
-  const Model mechanism(grid, Coordinates::kJoint);
-  const auto sweep = Make(mechanism);
-  ASSERT_NE(sweep, nullptr);
-  Kinematics<Planar, double> kinematics(mechanism);
-  Numbers q = Numbers::Zero(mechanism.num_q()), qdot = q, udot = q;
+/// A bar with two pins on Ground, whichever of them is cut: it stands still, and X has rank one.
+TEST(AssemblySweep, RefusesABodyThatIsHeldTwice) {
+  for (const Grounding grounding : {Grounding::kEager, Grounding::kAtRoot}) {
+    for (const Closing closing : {Closing::kTogether, Closing::kOneByOne}) {
+      for (std::uint64_t seed = 1; seed <= 20; ++seed) {
+        Builder b("held", SpaceKind::kPlanar, seed);
+        const int body = b.AddBody(1.0);
+        for (const int j : {0, 1}) {
+          b.description.joints.push_back(Pin(b.random, kGround, body));
+          b.description.joints.back().name = "j" + std::to_string(j);
+          b.description.joints.back().cut = j == static_cast<int>(seed % 2);
+        }
+        const Model mechanism(b.description, Coordinates::kJoint);
+        const auto sweep = Make(mechanism, {.grounding = grounding, .closing = closing});
+        if (sweep == nullptr) continue;
+        const Numbers q = Numbers::Constant(1, 0.3), u = Numbers::Ones(1);
+        Numbers qdot = q, udot = q;
+        EXPECT_FALSE(sweep->Evaluate(SpeedsUsed::kGiven, In(q), In(u), In(qdot), In(udot)));
+      }
+    }
+  }
+}
+
+/// Redundant pins where a run starts: refused each time, so not tried.
+TEST(AssemblySweep, IsNotTriedInRunsThatStartWhereItIsRefused) {
   for (const double angle : {1e-6, 1.1}) {
+    const bool serves = angle > 1.0;
+    const Model mechanism(Grid(2, 2, angle, 0.5), Coordinates::kJoint);
+    const auto sweep = Make(mechanism);
+    ASSERT_NE(sweep, nullptr);
+    Numbers q = Numbers::Zero(mechanism.num_q()), qdot = q, udot = q;
     for (const JointValues& start : Grid(2, 2, angle, 0.5).initial.coordinates) {
       q[mechanism.joints()[start.joint].q_offset] = start.values[0];
     }
-    kinematics.UpdatePosition(q);
-    EXPECT_EQ(sweep->Serves(kinematics), angle > 1.0);
-    testing::SystemWith<Odca, Planar, double> odca(mechanism, {});
-    ASSERT_EQ(odca->Start(0.0, q, Numbers::Zero(q.size())), Outcome::kFinished);
-    const Numbers elsewhere = q + Numbers::Constant(q.size(), angle > 1.0 ? 0.0 : 0.2);
     const Numbers still = Numbers::Zero(q.size());
-    const auto answers = [&] {
-      return odca->solver().RightHandSide(SpeedsUsed::kGiven, In(elsewhere), In(still), In(qdot),
-                                          In(udot));
-    };
-    EXPECT_EQ(answers(), angle > 1.0);
-    Numbers y(2 * q.size());
-    y << elsewhere, still;
-    odca->BeginStep(0.1, In(y));
-    EXPECT_TRUE(answers());
+    Kinematics<Planar, double> kinematics(mechanism);
+    kinematics.UpdatePosition(q);
+    EXPECT_EQ(sweep->Serves(kinematics), serves);
+    testing::SystemWith<Odca, Planar, double> odca(mechanism, {});
+    ASSERT_EQ(odca->Start(0.0, q, still), Outcome::kFinished);
+    q.array() += 0.2;
+    EXPECT_TRUE(sweep->Evaluate(SpeedsUsed::kGiven, In(q), In(still), In(qdot), In(udot)));
+    EXPECT_EQ(
+        odca->solver().RightHandSide(SpeedsUsed::kGiven, In(q), In(still), In(qdot), In(udot)),
+        serves);
   }
 }
 

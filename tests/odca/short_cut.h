@@ -40,13 +40,13 @@ struct Both {
   /// freedom, nothing is left of them.
   double difference = 0.0;
 };
-/// `sweep` may be null.
-template <class Space, class Sweep>
+/// `sweep` may be null. The general sweep is made with `plan`, if given.
+template <class Space, class Sweep, class... Plan>
 Both Compare(const Mechanism<Space, double>& mechanism, Sweep* sweep, SpeedsUsed speeds,
-             const Numbers& q, const Numbers& u) {
+             const Numbers& q, const Numbers& u, const Plan&... plan) {
   const auto level =
       speeds == SpeedsUsed::kGiven ? Enforcement::kAcceleration : Enforcement::kVelocity;
-  testing::SystemWith<Odca, Space, double> odca(mechanism, {.enforcement = level});
+  testing::SystemWith<Odca, Space, double> odca(mechanism, {.enforcement = level}, plan...);
   Both both;
   both.outcome = odca->Start(0.0, q, u);
   const Eigen::Index n = q.size();

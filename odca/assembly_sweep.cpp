@@ -1,7 +1,6 @@
 #include "odca/assembly_sweep.h"
 
 #include <algorithm>
-#include <cmath>
 
 namespace loopbench::odca::pins {
 
@@ -28,54 +27,6 @@ double Dot(const double* a, const double* b, int n) {
 
 }  // namespace
 
-template <AssemblySweep::Gaps kGaps>
-bool AssemblySweep::Turn() {
-  Lanes room = Lanes{} + kLargestAngle;
-  for (std::size_t i = 0; i < sine_.size(); i += kLanes) {
-    const Lanes angle = Load<Lanes>(&angle_[i]);
-    room = Min(room, kLargestAngle - Magnitude(angle));
-    Lanes s, c;
-    SinCos(angle, s, c);
-    Store(s, &sine_[i]);
-    Store(c, &cosine_[i]);
-  }
-  if (!(Smallest(room) >= 0.0)) return false;
-  for (std::size_t i = 0; i < bodies_.size(); ++i) {
-    const Body& body = bodies_[i];
-    const double s = sine_[i], c = cosine_[i];
-    for (int h = body.first_handle; h < body.first_handle + body.handles; ++h) {
-      const Vector& arm = handles_[h];
-      arm_[h] = {arm.x * c - arm.y * s, arm.x * s + arm.y * c};
-    }
-  }
-  if (!cuts_.empty()) Close<kGaps>();
-  return true;
-}
-
-/// A cut joint is imposed at one point, that of Q, and there the arm of P ends (two_handle.h).
-template <AssemblySweep::Gaps kGaps>
-void AssemblySweep::Close() {
-  const auto leads = [&](int body, int handle) {
-    const Vector r = Scaled(bodies_[body].radius, arm_[handle]);
-    return Point<double>{r, Cross(speed_[body], r)};
-  };
-  for (const Step& step : steps_) {
-    reference_[step.child] = reference_[step.parent] + leads(step.parent, step.parent_handle) -
-                             leads(step.child, step.child_handle);
-  }
-  for (CutJoint& cut : cuts_) {
-    const auto at = [&](int body, int handle) {
-      return body < 0 ? Point<double>{cut.ground, {}} : reference_[body] + leads(body, handle);
-    };
-    const Point<double> gap = at(cut.body_Q, cut.Q) - at(cut.body_P, cut.P);
-    cut.w_P = cut.body_P < 0 ? 0.0 : speed_[cut.body_P];
-    cut.v = kGaps == Gaps::kSpeeds ? RelativeVelocity(cut.w_P, gap) : gap.p;
-    if (cut.body_P >= 0) {
-      arm_[cut.P] = arm_[cut.P] + Scaled(1.0 / bodies_[cut.body_P].radius, gap.p);
-    }
-  }
-}
-
 bool AssemblySweep::Assemble() {
   operations_ += of_matrices_;
   for (std::size_t i = 0; i < bodies_.size(); ++i) {
@@ -84,8 +35,8 @@ bool AssemblySweep::Assemble() {
     Matrix* zeta = zeta_.data() + body.first_block;
     for (int k = 0; k < body.handles; ++k) {
       for (int j = 0; j < body.handles; ++j) {  // (1-4): 1/m + t t^T / I, t = z x r
-        *zeta++ = {body.mobility + arm[j].y * arm[k].y, -(arm[j].y * arm[k].x),
-                   -(arm[j].x * arm[k].y), body.mobility + arm[j].x * arm[k].x};
+        *zeta++ = {body.link.mobility + arm[j].y * arm[k].y, -(arm[j].y * arm[k].x),
+                   -(arm[j].x * arm[k].y), body.link.mobility + arm[j].x * arm[k].x};
       }
     }
   }
@@ -93,6 +44,30 @@ bool AssemblySweep::Assemble() {
     if (!(node.pins == 1 ? JoinOne(node) : JoinSeveral(node))) return false;
   }
   return true;
+}
+
+/// zeta of the handles that stay: what they had, less product(e, f).
+template <class Product>
+void AssemblySweep::Eliminate(const Node& node, const Product& product) {
+  const Side* kept = kept_.data() + node.first_kept;
+  Matrix* zeta = zeta_.data() + node.first_block;
+  for (int f = 0; f < node.kept; ++f) {
+    for (int e = f; e < node.kept; ++e) {
+      Matrix Z = {0.0, 0.0, 0.0, 0.0};
+      const int child = kept[e].child;
+      if (child == kept[f].child) {
+        Z = zeta_[node.blocks[child] + kept[e].place + node.handles[child] * kept[f].place];
+      }
+      const Matrix less = product(e, f);
+      Z = {Z.xx - less.xx, Z.xy - less.xy, Z.yx - less.yx, Z.yy - less.yy};
+      if (e == f) {
+        Z.yx = Z.xy;
+      } else {
+        zeta[f + node.kept * e] = Transpose(Z);
+      }
+      zeta[e + node.kept * f] = Z;
+    }
+  }
 }
 
 /// X = zeta_QQ + zeta_PP (16), and Y a block of zeta for each handle that stays (67); where both
@@ -132,21 +107,7 @@ bool AssemblySweep::JoinOne(const Node& node) {
     Y_[e] = Y;
     W[e] = factors * Y;
   }
-  Matrix* zeta = zeta_.data() + node.first_block;
-  for (int f = 0; f < node.kept; ++f) {
-    for (int e = f; e < node.kept; ++e) {  // (26-28)
-      Matrix Z = {0.0, 0.0, 0.0, 0.0};
-      if (kept[e].child == kept[f].child) Z = block(kept[e], kept[f].child, kept[f].place);
-      const Matrix product = TransposeTimes(Y_[e], W[f]);
-      Z = {Z.xx - product.xx, Z.xy - product.xy, Z.yx - product.yx, Z.yy - product.yy};
-      if (e == f) {
-        Z.yx = Z.xy;
-      } else {
-        zeta[f + node.kept * e] = Transpose(Z);
-      }
-      zeta[e + node.kept * f] = Z;
-    }
-  }
+  Eliminate(node, [&](int e, int f) { return TransposeTimes(Y_[e], W[f]); });  // (26-28)
   return true;
 }
 
@@ -205,26 +166,11 @@ bool AssemblySweep::JoinSeveral(const Node& node) {
   if (!loop.FactorScaled(X) && !(loop.rcond() >= node.limit)) return false;
   if (node.kept == 0) return true;
   loop.Apply(V);
-  Matrix* zeta = zeta_.data() + node.first_block;
-  for (int f = 0; f < node.kept; ++f) {
+  Eliminate(node, [&](int e, int f) {  // (71)
+    const double *ex = V.col(2 * e).data(), *ey = ex + n;
     const double *fx = V.col(2 * f).data(), *fy = fx + n;
-    for (int e = f; e < node.kept; ++e) {  // (71)
-      const double *ex = V.col(2 * e).data(), *ey = ex + n;
-      Matrix Z = {0.0, 0.0, 0.0, 0.0};
-      const int child = kept[e].child;
-      if (child == kept[f].child) {
-        Z = zeta_[node.blocks[child] + kept[e].place + node.handles[child] * kept[f].place];
-      }
-      Z = {Z.xx - Dot(ex, fx, n), Z.xy - Dot(ex, fy, n), Z.yx - Dot(ey, fx, n),
-           Z.yy - Dot(ey, fy, n)};
-      if (e == f) {
-        Z.yx = Z.xy;
-      } else {
-        zeta[f + node.kept * e] = Transpose(Z);
-      }
-      zeta[e + node.kept * f] = Z;
-    }
-  }
+    return Matrix{Dot(ex, fx, n), Dot(ex, fy, n), Dot(ey, fx, n), Dot(ey, fy, n)};
+  });
   return true;
 }
 
@@ -306,14 +252,14 @@ void AssemblySweep::Solve() {
   operations_ += of_vectors_;
   for (std::size_t i = 0; i < bodies_.size(); ++i) {
     const Body& body = bodies_[i];
-    const double a = body.cosine * cosine_[i] + body.sine * sine_[i];
-    const double w2 = speed_[i] * speed_[i] * body.radius;
+    const double a = body.link.cosine * cosine_[i] + body.link.sine * sine_[i];
+    const double w2 = speed_[i] * speed_[i] * body.link.radius;
     alpha_[i] = kPass == Pass::kSpeeds ? 0.0 : a;
     for (int h = body.first_handle; h < body.first_handle + body.handles; ++h) {
       const Vector& r = arm_[h];
       b_[h] = kPass == Pass::kSpeeds
                   ? Vector{0.0, 0.0}
-                  : Vector{body.gx - a * r.y - w2 * r.x, body.gy + a * r.x - w2 * r.y};
+                  : Vector{body.link.gx - a * r.y - w2 * r.x, body.link.gy + a * r.x - w2 * r.y};
     }
   }
   for (const Node& node : nodes_) Up<kPass>(node);
@@ -324,7 +270,7 @@ void AssemblySweep::Solve() {
     for (int h = body.first_handle; h < body.first_handle + body.handles; ++h) {
       alpha += Moment(arm_[h], F_[h]);
     }
-    alpha_[i] = alpha / body.radius;
+    alpha_[i] = alpha / body.link.radius;
   }
 }
 
@@ -358,14 +304,6 @@ bool AssemblySweep::FindChange() {
   if (!Assemble()) return false;
   Solve<Pass::kSpeeds>();
   return true;
-}
-
-double AssemblySweep::LargestGap() const {
-  double largest = 0.0;
-  for (const CutJoint& cut : cuts_) {
-    largest = std::max(largest, cut.v.x * cut.v.x + cut.v.y * cut.v.y);
-  }
-  return std::sqrt(largest);
 }
 
 std::optional<Correction<double>> AssemblySweep::Project(std::span<double> q, std::span<double> u,

@@ -49,9 +49,8 @@ class AssemblySweep final : public ShortCut {
   using Vector = Vector2<double>;
   using Matrix = Matrix2<double>;
 
-  /// A body about its point of reference, centre of mass or pin on Ground: as Link.
   struct Body {
-    double mobility = 0.0, gx = 0.0, gy = 0.0, cosine = 0.0, sine = 0.0, radius = 1.0;
+    Link<double> link;  ///< its arms are those of handles
     int first_handle = 0, handles = 0;
     int first_block = 0;  ///< of zeta
     Vector stand = {};    ///< where the point of reference stands still, if it does
@@ -114,6 +113,8 @@ class AssemblySweep final : public ShortCut {
   bool Assemble();
   bool JoinOne(const Node& node);
   bool JoinSeveral(const Node& node);
+  template <class Product>
+  void Eliminate(const Node& node, const Product& product);
   JointMatrix<double> FreeResponse(const FreeBody* bodies) const;
   /// alpha_, or what is to be added to speeds.
   template <Pass kPass>

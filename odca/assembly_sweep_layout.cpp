@@ -1,6 +1,5 @@
 // Where handles, zeta and joins stand in the lists of an AssemblySweep, and their constants.
 #include <algorithm>
-#include <cmath>
 
 #include "odca/assembly_sweep.h"
 #include "odca/path_links.h"
@@ -73,33 +72,25 @@ bool AssemblySweep::Layout::AddBody(int index, const std::vector<int>& joints) {
   const auto joint = [&](int side) -> const Joint<Planar, double>& {
     return mechanism.joints()[side / 2];
   };
-  const Inertia<Planar, double>& inertia = mechanism.bodies()[index];
   Body body;
+  Assembly& assembly = assemblies[index - 1];
   Vector origin = {0.0, 0.0};
   const auto held = std::ranges::find_if(joints, [&](int side) { return HoldsBody(joint(side)); });
-  Assembly& assembly = assemblies[index - 1];
-  if (held != joints.end()) {
-    assembly.held = true;
+  assembly.held = held != joints.end();
+  if (assembly.held) {
     origin = ArmOf(joint(*held), *held % 2 == 1);
     body.stand = ArmOf(joint(*held), *held % 2 == 0);
   }
-  const double m = inertia.mass, gx = mechanism.gravity()[0], gy = mechanism.gravity()[1];
-  const Vector com = -origin;
-  body.radius = std::sqrt(inertia.rotational(0, 0) + m * (com.x * com.x + com.y * com.y));
-  if (held == joints.end()) {
-    body.mobility = 1.0 / m;
-    body.gx = gx;
-    body.gy = gy;
-  }
-  body.cosine = m / body.radius * (com.x * gy - com.y * gx);
-  body.sine = -m / body.radius * (com.y * gy + com.x * gx);
+  body.link = MeasureLink(mechanism.bodies()[index], mechanism.gravity(),
+                          assembly.held ? &origin : nullptr);
   body.first_handle = slots;
   body.first_block = static_cast<int>(blocks);
   for (const int side : joints) {
     if (HoldsBody(joint(side))) continue;
     handle_of[side] = slots++;
     assembly.pins.push_back(side);
-    sweep.handles_.push_back(Scaled(1.0 / body.radius, ArmOf(joint(side), side % 2 == 1) - origin));
+    sweep.handles_.push_back(
+        Scaled(1.0 / body.link.radius, ArmOf(joint(side), side % 2 == 1) - origin));
   }
   body.handles = assembly.handles = slots - body.first_handle;
   assembly.first_slot = body.first_handle;

@@ -24,40 +24,12 @@ Vector Turned(const Vector& r, double angle) {
   return {c * r.x - s * r.y, s * r.x + c * r.y};
 }
 
-/// The body between the joints `before` and `after` (null: none), with or without a pin on Ground.
-Link<double> MeasureLink(const Inertia<Planar, double>& inertia,
-                         const Linear<Planar, double>& gravity, const Vector* pin,
-                         const Vector* before, const Vector* after, double& axes) {
-  const Vector origin = pin == nullptr ? kNone : *pin;
-  const Vector r1 = before == nullptr ? kNone : *before - origin;
-  axes = std::atan2(r1.y, r1.x);
-  const Vector r2 = after == nullptr ? kNone : Turned(*after - origin, -axes);
-  const Vector com = Turned(-origin, -axes);
-  const double m = inertia.mass, gx = gravity[0], gy = gravity[1];
-  const double radius = std::sqrt(inertia.rotational(0, 0) + m * (com.x * com.x + com.y * com.y));
-  const bool moves = pin == nullptr;
-  return {.x1 = std::hypot(r1.x, r1.y) / radius,
-          .x2 = r2.x / radius,
-          .y2 = r2.y / radius,
-          .mobility = moves ? 1.0 / m : 0.0,
-          .gx = moves ? gx : 0.0,
-          .gy = moves ? gy : 0.0,
-          .cosine = m / radius * (com.x * gy - com.y * gx),
-          .sine = -m / radius * (com.y * gy + com.x * gx),
-          .radius = radius,
-          .limit = 0.0};
-}
-
 Path Reversed(Path path) {
   std::ranges::reverse(path);
   for (std::size_t k = path.size() - 1; k > 0; --k) path[k].before = path[k - 1].before;
   path.front().before = -1;
   return path;
 }
-
-}  // namespace
-
-namespace {
 
 std::optional<PathLinks> MeasureInOrder(const Mechanism<Planar, double>& mechanism, Path path) {
   const auto joint = [&](int index) { return index < 0 ? nullptr : &mechanism.joints()[index]; };
@@ -88,7 +60,7 @@ std::optional<PathLinks> MeasureInOrder(const Mechanism<Planar, double>& mechani
     double axes = 0.0;
     all.links.push_back(MeasureLink(
         mechanism.bodies()[at.body], mechanism.gravity(), pin == nullptr ? nullptr : &at_pin,
-        before == nullptr ? nullptr : &at_before, after == nullptr ? nullptr : &at_after, axes));
+        before == nullptr ? nullptr : &at_before, after == nullptr ? nullptr : &at_after, &axes));
     all.axes.push_back(axes);
     const bool cut = is_cut(before), cut_here = cut && before->from == at.body;
     all.closures.push_back({.follows = pin == nullptr ? 1.0 : 0.0,
@@ -104,6 +76,30 @@ std::optional<PathLinks> MeasureInOrder(const Mechanism<Planar, double>& mechani
 }
 
 }  // namespace
+
+Link<double> MeasureLink(const Inertia<Planar, double>& inertia,
+                         const Linear<Planar, double>& gravity, const Vector* pin,
+                         const Vector* before, const Vector* after, double* axes_found) {
+  const Vector origin = pin == nullptr ? kNone : *pin;
+  const Vector r1 = before == nullptr ? kNone : *before - origin;
+  const double axes = std::atan2(r1.y, r1.x);
+  if (axes_found != nullptr) *axes_found = axes;
+  const Vector r2 = after == nullptr ? kNone : Turned(*after - origin, -axes);
+  const Vector com = Turned(-origin, -axes);
+  const double m = inertia.mass, gx = gravity[0], gy = gravity[1];
+  const double radius = std::sqrt(inertia.rotational(0, 0) + m * (com.x * com.x + com.y * com.y));
+  const bool moves = pin == nullptr;
+  return {.x1 = std::hypot(r1.x, r1.y) / radius,
+          .x2 = r2.x / radius,
+          .y2 = r2.y / radius,
+          .mobility = moves ? 1.0 / m : 0.0,
+          .gx = moves ? gx : 0.0,
+          .gy = moves ? gy : 0.0,
+          .cosine = m / radius * (com.x * gy - com.y * gx),
+          .sine = -m / radius * (com.y * gy + com.x * gx),
+          .radius = radius,
+          .limit = 0.0};
+}
 
 std::optional<PathLinks> MeasurePath(const Mechanism<Planar, double>& mechanism, const Path& path) {
   std::optional<PathLinks> all = MeasureInOrder(mechanism, path);

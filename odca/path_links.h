@@ -26,6 +26,13 @@ struct PathLinks {
 /// links are zero. All joints must be pins.
 std::optional<PathLinks> MeasurePath(const Mechanism<Planar, double>& mechanism, const Path& path);
 
+/// The body between the joints `before` and `after` (null: none), with or without a pin on Ground,
+/// all seen from the centre of mass; `axes`, if asked for, as in PathLinks. The limit is zero.
+Link<double> MeasureLink(const Inertia<Planar, double>& inertia,
+                         const Linear<Planar, double>& gravity, const Vector2<double>* pin,
+                         const Vector2<double>* before = nullptr,
+                         const Vector2<double>* after = nullptr, double* axes = nullptr);
+
 /// Whether gravity is the only force, and all joints are pins with coordinates or constraints of
 /// their own: what sweeps over pins are made for.
 bool HasOnlyPinsUnderGravity(const Mechanism<Planar, double>& mechanism);

@@ -212,8 +212,8 @@ bool ArmSweep::Solve() {
   return true;
 }
 
-bool ArmSweep::Evaluate(SpeedsUsed speeds, std::span<const double> q, std::span<const double> u,
-                        std::span<double> qdot, std::span<double> udot) {
+bool ArmSweep::Evaluate(SpeedsUsed speeds, Kinematics<Spatial, double>*, std::span<const double> q,
+                        std::span<const double> u, std::span<double> qdot, std::span<double> udot) {
   operations_ = 0;
   if (!TakeIn(q, u)) return false;
   if (speeds == SpeedsUsed::kCompleted && !closings_.empty()) {

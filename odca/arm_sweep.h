@@ -30,7 +30,7 @@
 
 namespace loopbench::odca::arms {
 
-class ArmSweep final : public ShortCut {
+class ArmSweep final : public ShortCut<Spatial> {
  public:
   /// Enough work for a thread to wait for the others after it.
   static constexpr int kBodiesOfGroup = 1024;
@@ -41,8 +41,8 @@ class ArmSweep final : public ShortCut {
   static std::unique_ptr<ArmSweep> Make(const Mechanism<Spatial, double>& mechanism,
                                         int threads = 1, int bodies_of_group = kBodiesOfGroup);
 
-  bool Evaluate(SpeedsUsed speeds, std::span<const double> q, std::span<const double> u,
-                std::span<double> qdot, std::span<double> udot) override;
+  bool Evaluate(SpeedsUsed speeds, Kinematics<Spatial, double>*, std::span<const double> q,
+                std::span<const double> u, std::span<double> qdot, std::span<double> udot) override;
   std::optional<Correction<double>> Project(std::span<double> q, std::span<double> u,
                                             double goal) override;
   /// As in the general sweep, without kinematics and zeta_i3.

@@ -70,7 +70,7 @@ bool ArmSweep::Serves() {
     for (int i = 0; i < num_u_; ++i) {
       moved_[i] = std::remainder(kGoldenAngle * trial * (i + 1), 6.0);
     }
-    if (Evaluate(SpeedsUsed::kGiven, {moved_.data(), moved_.data() + num_u_},
+    if (Evaluate(SpeedsUsed::kGiven, nullptr, {moved_.data(), moved_.data() + num_u_},
                  {speeds_.data(), speeds_.data() + num_u_}, {back_.data(), back_.data() + num_u_},
                  {step_.data(), step_.data() + num_u_})) {
       return true;

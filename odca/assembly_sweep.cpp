@@ -247,19 +247,32 @@ void AssemblySweep::Down(const Node& node) {
   }
 }
 
+void AssemblySweep::SetApplied(const Kinematics<Planar, double>& kinematics) {
+  ForcesBesideGravity<Planar, double>(kinematics, wrenches_);
+  for (std::size_t i = 0; i < bodies_.size(); ++i) {
+    const Body& body = bodies_[i];
+    const double s = sine_[i], c = cosine_[i];
+    const Vector r = {body.centre.x * c - body.centre.y * s, body.centre.x * s + body.centre.y * c};
+    const Vector F = {wrenches_[i + 1].linear[0], wrenches_[i + 1].linear[1]};
+    applied_[i] = {Scaled(body.link.mobility, F),
+                   (wrenches_[i + 1].angular[0] + Moment(r, F)) / body.link.radius};
+  }
+}
+
 template <Pass kPass>
 void AssemblySweep::Solve() {
   operations_ += of_vectors_;
   for (std::size_t i = 0; i < bodies_.size(); ++i) {
     const Body& body = bodies_[i];
-    const double a = body.link.cosine * cosine_[i] + body.link.sine * sine_[i];
+    const Applied applied = applied_.empty() ? Applied{} : applied_[i];
+    const double a = body.link.cosine * cosine_[i] + body.link.sine * sine_[i] + applied.alpha;
+    const double gx = body.link.gx + applied.a.x, gy = body.link.gy + applied.a.y;
     const double w2 = speed_[i] * speed_[i] * body.link.radius;
     alpha_[i] = kPass == Pass::kSpeeds ? 0.0 : a;
     for (int h = body.first_handle; h < body.first_handle + body.handles; ++h) {
       const Vector& r = arm_[h];
-      b_[h] = kPass == Pass::kSpeeds
-                  ? Vector{0.0, 0.0}
-                  : Vector{body.link.gx - a * r.y - w2 * r.x, body.link.gy + a * r.x - w2 * r.y};
+      b_[h] = kPass == Pass::kSpeeds ? Vector{0.0, 0.0}
+                                     : Vector{gx - a * r.y - w2 * r.x, gy + a * r.x - w2 * r.y};
     }
   }
   for (const Node& node : nodes_) Up<kPass>(node);
@@ -274,19 +287,28 @@ void AssemblySweep::Solve() {
   }
 }
 
-bool AssemblySweep::Evaluate(SpeedsUsed speeds, std::span<const double> q,
-                             std::span<const double> u, std::span<double> qdot,
-                             std::span<double> udot) {
+bool AssemblySweep::Evaluate(SpeedsUsed speeds, Kinematics<Planar, double>* kinematics,
+                             std::span<const double> q, std::span<const double> u,
+                             std::span<double> qdot, std::span<double> udot) {
+  using Numbers = Eigen::Map<const VectorX<double>>;
   operations_ = 0;
   tree_.ToBodies(q, u, angle_.data(), speed_.data(), *pool_);
   if (!Turn<Gaps::kSpeeds>() || !Assemble()) return false;
+  const auto take_forces = [&] {
+    if (applied_.empty()) return;
+    kinematics->UpdatePosition(Numbers(q.data(), std::ssize(q)));
+    kinematics->UpdateVelocity(Numbers(qdot.data(), std::ssize(qdot)));
+    SetApplied(*kinematics);
+  };
   if (speeds == SpeedsUsed::kGiven) {
-    Solve<Pass::kAccelerations>();
     std::ranges::copy(u, qdot.begin());
+    take_forces();
+    Solve<Pass::kAccelerations>();
   } else {
     Solve<Pass::kSpeeds>();
     if (!tree_.ToJoints(alpha_.data(), u, qdot, *pool_)) return false;
     for (std::size_t i = 0; i < bodies_.size(); ++i) speed_[i] += alpha_[i];
+    take_forces();
     Solve<Pass::kCompleted>();
   }
   return tree_.ToJoints(alpha_.data(), {}, udot, *pool_);

@@ -1,6 +1,6 @@
-// O-DCA for planar mechanisms of pins under gravity whose bodies branch: trees, several loops on
-// one body, grids. From joint coordinates and speeds to their rates at once, as path_sweep.h does
-// it for paths, along a plan (plan.h).
+// O-DCA for planar mechanisms of pins whose bodies branch, trees, several loops on one body, grids,
+// and for those on which forces other than gravity act. From joint coordinates and speeds to their
+// rates at once, as path_sweep.h does it for paths, along a plan (plan.h).
 //
 //   angles and speeds of bodies   along the spanning tree (tree_angles.h)
 //   gaps of cut joints            along the same tree
@@ -31,15 +31,16 @@
 
 namespace loopbench::odca::pins {
 
-class AssemblySweep final : public ShortCut {
+class AssemblySweep final : public ShortCut<Planar> {
  public:
   /// Along `plan`, which need not outlive it, no more than the mechanism. Null for other
   /// mechanisms, and where the general sweep has less to multiply, as with many pins on one body.
   static std::unique_ptr<AssemblySweep> Make(const Mechanism<Planar, double>& mechanism,
                                              const Plan& plan);
 
-  bool Evaluate(SpeedsUsed speeds, std::span<const double> q, std::span<const double> u,
-                std::span<double> qdot, std::span<double> udot) override;
+  bool Evaluate(SpeedsUsed speeds, Kinematics<Planar, double>* kinematics,
+                std::span<const double> q, std::span<const double> u, std::span<double> qdot,
+                std::span<double> udot) override;
   std::optional<Correction<double>> Project(std::span<double> q, std::span<double> u,
                                             double goal) override;
   bool Serves(const Kinematics<Planar, double>& kinematics) override;
@@ -54,6 +55,12 @@ class AssemblySweep final : public ShortCut {
     int first_handle = 0, handles = 0;
     int first_block = 0;  ///< of zeta
     Vector stand = {};    ///< where the point of reference stands still, if it does
+    Vector centre = {};   ///< of mass, from the point of reference, in axes of the body
+  };
+  /// What forces other than gravity do to a body alone.
+  struct Applied {
+    Vector a = {};       ///< acceleration of the point of reference
+    double alpha = 0.0;  ///< sqrt(I) times angular acceleration
   };
   /// A joint of the tree between two bodies: where the child stands.
   struct Step {
@@ -116,6 +123,8 @@ class AssemblySweep final : public ShortCut {
   template <class Product>
   void Eliminate(const Node& node, const Product& product);
   JointMatrix<double> FreeResponse(const FreeBody* bodies) const;
+  /// applied_ at the positions and speeds of `kinematics`.
+  void SetApplied(const Kinematics<Planar, double>& kinematics);
   /// alpha_, or what is to be added to speeds.
   template <Pass kPass>
   void Solve();
@@ -138,7 +147,9 @@ class AssemblySweep final : public ShortCut {
   std::vector<double> angle_, speed_, alpha_;  ///< by body, Ground's last, and what fills lanes
   std::vector<double> sine_, cosine_;          ///< likewise
   std::vector<Vector> arm_;                    ///< of handles, in ground axes, by radius
-  std::vector<Point<double>> reference_;       ///< of bodies
+  std::vector<Applied> applied_;               ///< of bodies; none where only gravity acts
+  std::vector<Wrench<Planar, double>> wrenches_;
+  std::vector<Point<double>> reference_;  ///< of bodies
   std::vector<Matrix> zeta_, W_, Y_;
   std::vector<double> V_;
   std::vector<Factored2<double>> factors_;

@@ -80,6 +80,7 @@ bool AssemblySweep::Layout::AddBody(int index, const std::vector<int>& joints) {
   if (assembly.held) {
     origin = ArmOf(joint(*held), *held % 2 == 1);
     body.stand = ArmOf(joint(*held), *held % 2 == 0);
+    body.centre = -origin;
   }
   body.link = MeasureLink(mechanism.bodies()[index], mechanism.gravity(),
                           assembly.held ? &origin : nullptr);
@@ -257,6 +258,10 @@ void AssemblySweep::Layout::Resize() {
   sweep.speed_ = sweep.alpha_ = sweep.sine_ = sweep.cosine_ = sweep.angle_;
   sweep.arm_ = sweep.handles_;
   for (const Body& body : sweep.bodies_) sweep.reference_.push_back({body.stand, {0.0, 0.0}});
+  if (!mechanism.forces().empty()) {
+    sweep.applied_.resize(sweep.bodies_.size());
+    sweep.wrenches_.resize(mechanism.num_bodies());
+  }
   sweep.moved_.assign(static_cast<std::size_t>(mechanism.num_u()), 0.0);
   sweep.back_ = sweep.speeds_ = sweep.moved_;
   const auto scratch = std::make_shared<LoopScratch<double>>(most_rows);
@@ -277,7 +282,7 @@ void AssemblySweep::Layout::Resize() {
 
 std::unique_ptr<AssemblySweep> AssemblySweep::Make(const Mechanism<Planar, double>& mechanism,
                                                    const Plan& plan) {
-  if (!HasOnlyPinsUnderGravity(mechanism)) return nullptr;
+  if (!HasOnlyPins(mechanism)) return nullptr;
   std::unique_ptr<AssemblySweep> sweep(new AssemblySweep);
   Layout layout{*sweep, mechanism, plan};
   if (!layout.AddBodies()) return nullptr;

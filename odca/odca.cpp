@@ -105,14 +105,16 @@ bool Odca<Space, S>::Accelerate(const Kinematics<Space, S>& kinematics, const Ve
 
 template <class Space, class S>
 bool Odca<Space, S>::RightHandSide([[maybe_unused]] SpeedsUsed speeds,
+                                   [[maybe_unused]] Kinematics<Space, S>& kinematics,
                                    [[maybe_unused]] std::span<const S> q,
                                    [[maybe_unused]] std::span<const S> u,
                                    [[maybe_unused]] std::span<S> qdot,
                                    [[maybe_unused]] std::span<S> udot) {
   if constexpr (std::is_same_v<S, double>) {
-    by_short_cut_ = lane_ != nullptr ? lane_->Evaluate(speeds, q, u, qdot, udot)
-                                     : short_cut_ != nullptr && tries_short_cut_ &&
-                                           short_cut_->Evaluate(speeds, q, u, qdot, udot);
+    by_short_cut_ = lane_ != nullptr
+                        ? lane_->Evaluate(speeds, q, u, qdot, udot)
+                        : short_cut_ != nullptr && tries_short_cut_ &&
+                              short_cut_->Evaluate(speeds, &kinematics, q, u, qdot, udot);
     return by_short_cut_;
   }
   return false;
@@ -130,7 +132,7 @@ std::optional<Correction<S>> Odca<Space, S>::Project([[maybe_unused]] std::span<
 
 template <class Space, class S>
 void Odca<Space, S>::Start([[maybe_unused]] const Kinematics<Space, S>& kinematics) {
-  if constexpr (std::is_same_v<Space, Planar> && std::is_same_v<S, double>) {
+  if constexpr (std::is_same_v<S, double>) {
     tries_short_cut_ = short_cut_ != nullptr && short_cut_->Serves(kinematics);
   }
 }

@@ -45,8 +45,8 @@ class Odca final : public ConstraintSolver<Space, S> {
                   VectorX<S>& udot, VectorX<S>* lambda) override;
   /// In double, unless as published: for pins in the plane (path_sweep.h, assembly_sweep.h) and
   /// arms of revolute joints in space (arm_sweep.h).
-  bool RightHandSide(SpeedsUsed speeds, std::span<const S> q, std::span<const S> u,
-                     std::span<S> qdot, std::span<S> udot) override;
+  bool RightHandSide(SpeedsUsed speeds, Kinematics<Space, S>& kinematics, std::span<const S> q,
+                     std::span<const S> u, std::span<S> qdot, std::span<S> udot) override;
   /// Likewise.
   std::optional<Correction<S>> Project(std::span<S> q, std::span<S> u, S goal) override;
   /// Whether the short cut is tried from now on.
@@ -67,7 +67,7 @@ class Odca final : public ConstraintSolver<Space, S> {
   const Mechanism<Space, S>& mechanism_;
   Plan plan_;
   Sweep<Space, S> sweep_;
-  std::unique_ptr<ShortCut> short_cut_;               ///< null where there is none
+  std::unique_ptr<ShortCut<Space>> short_cut_;        ///< null where there is none
   std::unique_ptr<pins::PathLane> lane_;              ///< null but for paths of runs side by side
   bool tries_short_cut_ = true;                       ///< since Start()
   bool by_short_cut_ = false;                         ///< the last evaluation was

@@ -60,7 +60,7 @@ class PathLane::All final : public Together {
         Gather(wanted_[lane].u, lane, u_);
       }
       if (std::ranges::none_of(now, std::identity())) continue;
-      const LaneBits good = sweep_->Evaluate(speeds, q_, u_, qdot_, udot_);
+      const LaneBits good = sweep_->Evaluate(speeds, nullptr, q_, u_, qdot_, udot_);
       for (int lane = 0; lane < kLanes; ++lane) {
         if (!now[lane]) continue;
         waits_[lane] = false;

@@ -33,9 +33,9 @@ Link<double> MeasureLink(const Inertia<Planar, double>& inertia,
                          const Vector2<double>* before = nullptr,
                          const Vector2<double>* after = nullptr, double* axes = nullptr);
 
-/// Whether gravity is the only force, and all joints are pins with coordinates or constraints of
-/// their own: what sweeps over pins are made for.
-bool HasOnlyPinsUnderGravity(const Mechanism<Planar, double>& mechanism);
+/// Whether all joints are pins with coordinates or constraints of their own: what sweeps over pins
+/// are made for.
+bool HasOnlyPins(const Mechanism<Planar, double>& mechanism);
 
 /// Least response of a joint that closes a loop: what loop_solver.h calls suspicious times the
 /// trace of the response of its two bodies alone. For Link::limit.

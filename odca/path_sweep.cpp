@@ -134,8 +134,9 @@ TruthOf<T> PathSweepOf<T>::Sweep() {
 }
 
 template <class T>
-TruthOf<T> PathSweepOf<T>::Evaluate(SpeedsUsed speeds, std::span<const T> q, std::span<const T> u,
-                                    std::span<T> qdot, std::span<T> udot) {
+TruthOf<T> PathSweepOf<T>::Evaluate(SpeedsUsed speeds, Kinematics<Planar, double>*,
+                                    std::span<const T> q, std::span<const T> u, std::span<T> qdot,
+                                    std::span<T> udot) {
   operations_ = 0;
   tree_.ToBodies(q, u, angle_.data(), speed_.data(), *pool_);
   TruthOf<T> good = Turn<Gaps::kSpeeds>();
@@ -172,12 +173,12 @@ std::optional<Correction<double>> PathSweepOf<T>::Project(std::span<double> q, s
   return PinProjection::Of(*this, q, u, goal);
 }
 
-template bool PathSweep::Evaluate(SpeedsUsed, std::span<const double>, std::span<const double>,
-                                  std::span<double>, std::span<double>);
+template bool PathSweep::Evaluate(SpeedsUsed, Kinematics<Planar, double>*, std::span<const double>,
+                                  std::span<const double>, std::span<double>, std::span<double>);
 template std::optional<Correction<double>> PathSweep::Project(std::span<double>, std::span<double>,
                                                               double);
-template LaneBits PathSweepOf<Lanes>::Evaluate(SpeedsUsed, std::span<const Lanes>,
-                                               std::span<const Lanes>, std::span<Lanes>,
-                                               std::span<Lanes>);
+template LaneBits PathSweepOf<Lanes>::Evaluate(SpeedsUsed, Kinematics<Planar, double>*,
+                                               std::span<const Lanes>, std::span<const Lanes>,
+                                               std::span<Lanes>, std::span<Lanes>);
 
 }  // namespace loopbench::odca::pins

@@ -41,7 +41,7 @@ struct NoShortCut {};
 
 template <class T>
 class PathSweepOf final
-    : public std::conditional_t<std::is_same_v<T, double>, ShortCut, NoShortCut> {
+    : public std::conditional_t<std::is_same_v<T, double>, ShortCut<Planar>, NoShortCut> {
   static constexpr bool kIsOne = std::is_same_v<T, double>;
 
  public:
@@ -61,8 +61,8 @@ class PathSweepOf final
   bool SetMechanism(int lane, const PathSweepOf<double>& one);
 
   /// As of ShortCut, of each lane.
-  TruthOf<T> Evaluate(SpeedsUsed speeds, std::span<const T> q, std::span<const T> u,
-                      std::span<T> qdot, std::span<T> udot);
+  TruthOf<T> Evaluate(SpeedsUsed speeds, Kinematics<Planar, double>*, std::span<const T> q,
+                      std::span<const T> u, std::span<T> qdot, std::span<T> udot);
   /// For one mechanism.
   std::optional<Correction<double>> Project(std::span<double> q, std::span<double> u, double goal);
   /// Angles are not counted.

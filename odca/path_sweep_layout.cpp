@@ -86,7 +86,7 @@ void PathSweepOf<T>::Resize(int num_u, int threads) {
 template <class T>
 std::unique_ptr<PathSweepOf<T>> PathSweepOf<T>::Make(const Mechanism<Planar, double>& mechanism,
                                                      int threads, int bodies_of_group) {
-  if (!HasOnlyPinsUnderGravity(mechanism)) return nullptr;
+  if (!HasOnlyPins(mechanism) || !mechanism.forces().empty()) return nullptr;
   std::unique_ptr<PathSweepOf> sweep(new PathSweepOf);
   std::vector<int> place_of(mechanism.num_bodies(), mechanism.num_bodies() - 1);
   std::vector<double> axes(mechanism.num_bodies(), 0.0);

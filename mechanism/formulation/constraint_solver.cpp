@@ -11,8 +11,9 @@ bool ConstraintSolver<Space, S>::Accelerate(const Kinematics<Space, S>&, const V
 }
 
 template <class Space, class S>
-bool ConstraintSolver<Space, S>::RightHandSide(SpeedsUsed, std::span<const S>, std::span<const S>,
-                                               std::span<S>, std::span<S>) {
+bool ConstraintSolver<Space, S>::RightHandSide(SpeedsUsed, Kinematics<Space, S>&,
+                                               std::span<const S>, std::span<const S>, std::span<S>,
+                                               std::span<S>) {
   return false;
 }
 

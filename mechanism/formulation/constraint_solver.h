@@ -81,10 +81,13 @@ class ConstraintSolver {
   /// Short cut for a whole right-hand side without feedback and drives: qdot and udot at (q, u), as
   /// Factor() and Accelerate() would have it but for round-off, after CompleteSpeeds() if asked
   /// for. False, as here, where there is none or the position is one that Factor() should judge.
-  /// Changes neither conditioning() nor what Factor() made. Where it is true, coordinates have
-  /// their speeds for rates, and a step that it ended needs no Review().
-  virtual bool RightHandSide(SpeedsUsed speeds, std::span<const S> q, std::span<const S> u,
-                             std::span<S> qdot, std::span<S> udot);
+  /// Does not change conditioning(). Where it is true, coordinates have their speeds for rates, and
+  /// a step that it ended needs no Review(). `kinematics` has the time, and is brought to q and the
+  /// speeds used where forces other than gravity act, which puts what Factor() made out of use;
+  /// elsewhere both stand as they were.
+  virtual bool RightHandSide(SpeedsUsed speeds, Kinematics<Space, S>& kinematics,
+                             std::span<const S> q, std::span<const S> u, std::span<S> qdot,
+                             std::span<S> udot);
 
   /// Short cut for what level position does to an accepted (q, u), in place and by Correct():
   /// Newton steps until mismatches are at most `goal` [m], one at least where they are more, or no
@@ -99,7 +102,7 @@ class ConstraintSolver {
   /// Speeds that a state carries, indices into u; null, as here, where it carries all.
   virtual const std::vector<int>* CarriedSpeeds() const { return nullptr; }
   /// Level velocity: short cut that makes all speeds satisfy the constraints, J u + b = 0, from
-  /// those that the state carries; the others are out of date. The motions of `kinematics` may be
+  /// those that the state carries; the others are out of date. The speeds of `kinematics` may be
   /// changed. False, as here: then Correct() has what u misses. To be written with CarriedSpeeds().
   virtual bool CompleteSpeeds(Kinematics<Space, S>& kinematics, VectorX<S>& u);
 

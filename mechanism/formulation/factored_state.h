@@ -1,7 +1,7 @@
 // A mechanism at one time, position and speed, with a solver's factors of that position.
 //
-// The one owner of (q, u): levels and the right-hand side read and change the state here, and with
-// it the kinematics. Factors are made when somebody needs them, once per position.
+// (q, u) have one owner, its kinematics: levels and the right-hand side read and change them here,
+// solvers where they are let. Factors are made when somebody needs them, once per position.
 #pragma once
 
 #include "mechanism/formulation/constraint_solver.h"
@@ -13,23 +13,13 @@ class FactoredState {
  public:
   /// Both must outlive the object.
   FactoredState(const Mechanism<Space, S>& mechanism, ConstraintSolver<Space, S>& solver)
-      : kinematics_(mechanism),
-        solver_(solver),
-        q_(VectorX<S>::Zero(mechanism.num_q())),
-        u_(VectorX<S>::Zero(mechanism.num_u())),
-        target_(VectorX<S>::Zero(mechanism.num_rows())) {}
+      : kinematics_(mechanism), solver_(solver), target_(VectorX<S>::Zero(mechanism.num_rows())) {}
 
-  const VectorX<S>& q() const { return q_; }
-  const VectorX<S>& u() const { return u_; }
-  void SetPositions(const Eigen::Ref<const VectorX<S>>& q) {
-    q_ = q;
-    kinematics_.UpdatePosition(q_);
-  }
+  const VectorX<S>& q() const { return kinematics_.q(); }
+  const VectorX<S>& u() const { return kinematics_.u(); }
+  void SetPositions(const Eigen::Ref<const VectorX<S>>& q) { kinematics_.UpdatePosition(q); }
   /// Positions must be current.
-  void SetSpeeds(const Eigen::Ref<const VectorX<S>>& u) {
-    u_ = u;
-    kinematics_.UpdateVelocity(u_);
-  }
+  void SetSpeeds(const Eigen::Ref<const VectorX<S>>& u) { kinematics_.UpdateVelocity(u); }
 
   Kinematics<Space, S>& kinematics() { return kinematics_; }
   const Kinematics<Space, S>& kinematics() const { return kinematics_; }
@@ -48,7 +38,7 @@ class FactoredState {
   Kinematics<Space, S> kinematics_;
   ConstraintSolver<Space, S>& solver_;
   long factored_version_ = -1;  ///< of the kinematics' positions
-  VectorX<S> q_, u_, target_;
+  VectorX<S> target_;
 };
 
 /// D^T mismatch of all constraints by row, and its largest parts in `largest`.

@@ -52,9 +52,9 @@ Outcome System<Space, S>::FromState(S t, std::span<const S> y) {
   Kinematics<Space, S>& kinematics = state_.kinematics();
   const Eigen::Map<const VectorX<S>> q(y.data(), mechanism_.num_q());
   const Eigen::Map<const VectorX<S>> speeds(y.data() + q.size(), num_state_speeds());
-  const bool known = at_step_end_ && kinematics.position_version() > 0 && t == kinematics.time() &&
+  const bool known = step_end_version_ == kinematics.position_version() && t == kinematics.time() &&
                      std::equal(q.begin(), q.end(), this->q().begin());
-  at_step_end_ = false;
+  step_end_version_ = -1;
   kinematics.SetTime(t);
   if (!known) state_.SetPositions(q);
   return level_->SetSpeeds(state_, speeds);
@@ -69,12 +69,12 @@ Outcome System<Space, S>::Look(S t, std::span<const S> y) {
   const auto num_u = static_cast<std::size_t>(mechanism_.num_u());
   scratch_.resize(num_q + num_u);
   const std::span<S> rates(scratch_);
-  if (!solver_->RightHandSide(SpeedsUsed::kCompleted, y.first(num_q), y.subspan(num_q, num_u),
-                              rates.first(num_q), rates.subspan(num_q))) {
+  state_.kinematics().SetTime(t);
+  if (!solver_->RightHandSide(SpeedsUsed::kCompleted, state_.kinematics(), y.first(num_q),
+                              y.subspan(num_q, num_u), rates.first(num_q), rates.subspan(num_q))) {
     return FromState(t, y);
   }
-  at_step_end_ = false;
-  state_.kinematics().SetTime(t);
+  step_end_version_ = -1;
   state_.SetPositions(Eigen::Map<const VectorX<S>>(y.data(), mechanism_.num_q()));
   state_.SetSpeeds(Eigen::Map<const VectorX<S>>(rates.data(), mechanism_.num_u()));
   return Outcome::kFinished;
@@ -110,7 +110,7 @@ Outcome System<Space, S>::Accelerate() {
 /// Jacobians are made from what Examine() leaves behind.
 template <class Space, class S>
 bool System<Space, S>::MayTakeShortCut() const {
-  return level_->right_hand_side() && drives_ == nullptr && !integrates_work() &&
+  return level_->right_hand_side() && drives_ == nullptr && mechanism_.num_q() > 0 &&
          jacobian_ == nullptr && solver_->CarriedSpeeds() == nullptr;
 }
 
@@ -119,12 +119,24 @@ Outcome System<Space, S>::Derivative(S t, std::span<const S> y, std::span<S> ydo
   if (MayTakeShortCut()) {
     const auto num_q = static_cast<std::size_t>(mechanism_.num_q());
     const auto num_u = static_cast<std::size_t>(mechanism_.num_u());
-    by_short_cut_ =
-        solver_->RightHandSide(*level_->right_hand_side(), y.first(num_q), y.subspan(num_q, num_u),
-                               ydot.first(num_q), ydot.subspan(num_q, num_u));
-    if (by_short_cut_) return outcome_ = Outcome::kFinished;
+    state_.kinematics().SetTime(t);
+    by_short_cut_ = solver_->RightHandSide(*level_->right_hand_side(), state_.kinematics(),
+                                           y.first(num_q), y.subspan(num_q, num_u),
+                                           ydot.first(num_q), ydot.subspan(num_q, num_u));
+    if (by_short_cut_) {
+      PutPower(ydot.subspan(num_q + num_u));
+      return outcome_ = Outcome::kFinished;
+    }
   }
   return Examine(t, y, ydot);
+}
+
+template <class Space, class S>
+void System<Space, S>::PutPower(std::span<S> rates) {
+  if (rates.empty()) return;
+  const Power<S> power = TotalPower();
+  rates[0] = power.supplied;
+  rates[1] = power.dissipated;
 }
 
 template <class Space, class S>
@@ -140,11 +152,7 @@ Outcome System<Space, S>::Examine(S t, std::span<const S> y, std::span<S> ydot) 
   } else {
     std::copy(udot_.begin(), udot_.end(), ydot.begin() + num_q);
   }
-  if (std::ssize(ydot) > n) {
-    const Power<S> power = TotalPower();
-    ydot[n] = power.supplied;
-    ydot[n + 1] = power.dissipated;
-  }
+  PutPower(ydot.subspan(n));
   if (jacobian_ != nullptr) {
     derivative_version_ = kinematics().position_version();
     derivative_t_ = t;
@@ -156,7 +164,7 @@ Outcome System<Space, S>::Examine(S t, std::span<const S> y, std::span<S> ydot) 
 template <class Space, class S>
 Outcome System<Space, S>::Evaluate(S t, const VectorX<S>& q, const VectorX<S>& u,
                                    VectorX<S>& udot) {
-  at_step_end_ = false;
+  step_end_version_ = -1;
   derivative_version_ = -1;
   state_.kinematics().SetTime(t);
   state_.SetPositions(q);
@@ -181,7 +189,7 @@ bool System<Space, S>::BeginStep(S t, std::span<S> y) {
     accepted_t_ = t;
     return is_projected;
   }
-  at_step_end_ = true;
+  step_end_version_ = kinematics().position_version();
   if (FromState(t, y) != Outcome::kFinished) return false;  // the next evaluation will say why
   const S h = t - accepted_t_;
   const Accepted accepted = is_projected ? Accepted::kProjected : level_->Accept(state_, h);
@@ -194,7 +202,7 @@ bool System<Space, S>::BeginStep(S t, std::span<S> y) {
   if (changed_solver) state_.ForgetFactors();
   const bool changed = changed_released || changed_solver || accepted == Accepted::kModeChanged;
   if (changed) ++mode_changes_;
-  at_step_end_ = true;
+  step_end_version_ = kinematics.position_version();
   if (!changed && accepted != Accepted::kProjected) return false;
   ToState(q(), u(), y);
   return true;

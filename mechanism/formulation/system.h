@@ -46,7 +46,8 @@ class System final : public Ode<S> {
   const Mechanism<Space, S>& mechanism() const { return mechanism_; }
   const FormulationOptions& options() const { return options_; }
   const ConstraintSolver<Space, S>& solver() const { return *solver_; }
-  /// To solve with the factors of the last evaluation, which this changes nothing of.
+  /// To solve with the factors of the last Examine() or Evaluate(), as long as nothing else is
+  /// asked.
   ConstraintSolver<Space, S>& solver() { return *solver_; }
   const Level<Space, S>& level() const { return *level_; }
 
@@ -74,8 +75,8 @@ class System final : public Ode<S> {
   int num_quadratures() const override { return with_work_ && state_size() > 0 ? 2 : 0; }
 
   /// dy/dt, with that of the works where `ydot` has room for them. On failure it is unspecified.
-  /// Where the solver has a short cut, nothing else is known of (t, y) afterwards: kinematics() and
-  /// all that follows from it are as they were.
+  /// Where the solver has a short cut, nothing else is known of (t, y) afterwards, and what
+  /// kinematics() and all that follows from it are of is not said.
   Outcome Derivative(S t, std::span<const S> y, std::span<S> ydot) override;
   /// The same without a short cut, so with other rounding: kinematics(), udot(), diagnostics(),
   /// multipliers and powers are then those of (t, y).
@@ -103,12 +104,11 @@ class System final : public Ode<S> {
   /// must restart. After a projection that failed `y` is as it was; the next evaluation says why.
   bool BeginStep(S t, std::span<S> y);
 
-  /// Of all constraint rows at the last Evaluate() or Examine() that succeeded: D lambda is the
-  /// force on Q.
+  /// Of all constraint rows at the last Evaluate() or Examine(), which succeeded and which no
+  /// Derivative() followed: D lambda is the force on Q.
   const VectorX<S>& Multipliers();
 
-  /// Power [W] that prescribed motions supply there. O(n); 0 without
-  /// them.
+  /// Power [W] that prescribed motions supply there. O(n); 0 without them.
   S DrivePower();
   /// Power [W] that enters and leaves the mechanism there: of whatever does work without a
   /// potential, prescribed motions included.
@@ -122,6 +122,8 @@ class System final : public Ode<S> {
   bool integrates_work() const { return with_work_ || state_size() == 0; }
   /// udot_ at the current state, and whether prescribed motions can be followed.
   Outcome Accelerate();
+  /// Rates of the works, if they are asked for, at the kinematics' speeds.
+  void PutPower(std::span<S> rates);
   /// udot_ and, unless null, lambda by f and c, for solvers without a short cut.
   void SolveFormed(VectorX<S>* lambda);
   /// Whether the step that the last Derivative() ended changes nothing, and nothing has to be known
@@ -145,9 +147,10 @@ class System final : public Ode<S> {
   VectorX<S> force_, target_;             ///< f and c of the accelerations
   const VectorX<S>* feedback_ = nullptr;  ///< of the last evaluation, the level's
   bool lambda_is_current_ = false;
-  /// Set by BeginStep(): the last stage of a step, its projection and the next evaluation have the
-  /// same positions and share what is assembled there. Any other evaluation assembles anew.
-  bool at_step_end_ = false;
+  /// Of the kinematics' positions, set by BeginStep(): the last stage of a step, its projection and
+  /// the next evaluation have the same positions and share what is assembled there. Any other
+  /// evaluation assembles anew.
+  long step_end_version_ = -1;
   bool by_short_cut_ = false;  ///< the last Derivative() was
   S accepted_t_ = S(0);
   Outcome outcome_ = Outcome::kFinished;

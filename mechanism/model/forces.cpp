@@ -5,6 +5,14 @@
 namespace loopbench {
 
 template <class Space, class S>
+void ForcesBesideGravity(const Kinematics<Space, S>& kinematics,
+                         std::span<Wrench<Space, S>> wrenches) {
+  for (Wrench<Space, S>& wrench : wrenches) wrench.setZero();
+  kinematics.mechanism().forces().ForEach(
+      [&](const auto& element) { element.AddWrenches(kinematics, wrenches); });
+}
+
+template <class Space, class S>
 void AppliedForces(const Kinematics<Space, S>& kinematics, std::span<Wrench<Space, S>> wrenches) {
   const Mechanism<Space, S>& mechanism = kinematics.mechanism();
   wrenches[kGround].setZero();
@@ -43,9 +51,10 @@ Power<S> AppliedPower(const Kinematics<Space, S>& kinematics) {
   return power;
 }
 
-#define LOOPBENCH_INSTANTIATE(Space, S)                                                  \
-  template void AppliedForces(const Kinematics<Space, S>&, std::span<Wrench<Space, S>>); \
-  template Energy<S> ComputeEnergy(const Kinematics<Space, S>&);                         \
+#define LOOPBENCH_INSTANTIATE(Space, S)                                                        \
+  template void ForcesBesideGravity(const Kinematics<Space, S>&, std::span<Wrench<Space, S>>); \
+  template void AppliedForces(const Kinematics<Space, S>&, std::span<Wrench<Space, S>>);       \
+  template Energy<S> ComputeEnergy(const Kinematics<Space, S>&);                               \
   template Power<S> AppliedPower(const Kinematics<Space, S>&);
 LOOPBENCH_FOR_EACH_SPACE_AND_MODEL_SCALAR(LOOPBENCH_INSTANTIATE)
 #undef LOOPBENCH_INSTANTIATE

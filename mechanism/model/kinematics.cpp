@@ -74,9 +74,8 @@ void Kinematics<Space, S>::SetTime(S t) {
 
 /// Free coordinates come from q, prescribed ones from their drives at time().
 template <class Space, class S>
-const S* Kinematics<Space, S>::JointCoordinates(const Joint<Space, S>& joint, const VectorX<S>& q,
-                                                S* room) const {
-  const S* given = q.data() + joint.q_offset;
+const S* Kinematics<Space, S>::JointCoordinates(const Joint<Space, S>& joint, S* room) const {
+  const S* given = q_.data() + joint.q_offset;
   if (joint.num_drives == 0) return given;
   for (int i = 0; i < joint.kind->num_q; ++i) {
     const int drive = mechanism_->DriveOf(joint, i);
@@ -89,14 +88,14 @@ const S* Kinematics<Space, S>::JointCoordinates(const Joint<Space, S>& joint, co
 /// its parent, outwards from Ground. In the plane the angles go first, so that all sines and
 /// cosines are taken at once.
 template <class Space, class S>
-void Kinematics<Space, S>::UpdatePosition(const VectorX<S>& q) {
+void Kinematics<Space, S>::UpdatePosition(const Eigen::Ref<const VectorX<S>>& q) {
   q_ = q;
   ++position_version_;
   S room[7];
   for (const TreeStep& step : mechanism_->tree()) {
     const Joint<Space, S>& joint = mechanism_->joints()[step.joint];
     Pose<Space, S>& X_FM = joint_poses_[step.joint];
-    joint.kind->transform(JointCoordinates(joint, q, room), X_FM, joint.kind->parameter);
+    joint.kind->transform(JointCoordinates(joint, room), X_FM, joint.kind->parameter);
     if constexpr (Space::kRot == 1) {
       const S parent = poses_[step.parent].angle;
       poses_[step.child].angle = step.sign > 0
@@ -169,7 +168,7 @@ void Kinematics<Space, S>::MeasureCut(int index) {
 /// another one because Mo slides along P. The same lines serve joints to Ground, one side of
 /// which stands still (33-34), and both joints of a coupled loop (49-50).
 template <class Space, class S>
-void Kinematics<Space, S>::UpdateVelocity(const VectorX<S>& u) {
+void Kinematics<Space, S>::UpdateVelocity(const Eigen::Ref<const VectorX<S>>& u) {
   u_ = u;
   const auto finish = [&](int index, const Joint<Space, S>& joint) {
     JointState<Space, S>& state = joints_[index];

@@ -60,9 +60,12 @@ class Kinematics {
   const std::vector<TimeValue<S>>& drives() const { return drives_; }
 
   /// Poses, joint points and directions from q.
-  void UpdatePosition(const VectorX<S>& q);
+  void UpdatePosition(const Eigen::Ref<const VectorX<S>>& q);
   /// Motions and g from u; positions must be current.
-  void UpdateVelocity(const VectorX<S>& u);
+  void UpdateVelocity(const Eigen::Ref<const VectorX<S>>& u);
+
+  const VectorX<S>& q() const { return q_; }  ///< of the last UpdatePosition()
+  const VectorX<S>& u() const { return u_; }  ///< of the last UpdateVelocity()
 
   /// Counts UpdatePosition() calls: what was computed from positions is good while it stands.
   long position_version() const { return position_version_; }
@@ -131,7 +134,7 @@ class Kinematics {
   }
   void AddBias(int index, const Joint<Space, S>& joint, JointState<Space, S>& state) const;
   /// Coordinates of a tree joint, prescribed ones among them, in `room`.
-  const S* JointCoordinates(const Joint<Space, S>& joint, const VectorX<S>& q, S* room) const;
+  const S* JointCoordinates(const Joint<Space, S>& joint, S* room) const;
   void PlaceChild(const TreeStep& step);
   void MeasureCut(int index);
   void FollowDirections(int index, const Rotation<Space, S>& R_WF);
@@ -158,6 +161,10 @@ class Kinematics {
 /// body.
 template <class Space, class S>
 void AppliedForces(const Kinematics<Space, S>& kinematics, std::span<Wrench<Space, S>> wrenches);
+/// The same without gravity.
+template <class Space, class S>
+void ForcesBesideGravity(const Kinematics<Space, S>& kinematics,
+                         std::span<Wrench<Space, S>> wrenches);
 
 /// Energies [J] at the current position and speed; potential is zero for centres of mass in the
 /// ground origin and springs at rest. Constant forces on points (ground axes) and joints, preloads

@@ -132,6 +132,9 @@ class Inspection {
   Outcome Derivative(const Bits& at) {
     return own_->Derivative(0.0, std::span<const double>(at), std::span<double>(ydot_));
   }
+  Outcome Examine(const Bits& at) {
+    return own_->Examine(0.0, std::span<const double>(at), std::span<double>(ydot_));
+  }
   RealVector q() const { return ToReal(own_->q()); }
   RealVector u() const { return ToReal(own_->u()); }
 
@@ -148,16 +151,24 @@ class Inspection {
     return outcome == Outcome::kFinished;
   }
 
+  /// By whatever way is the shortest, and with all that can be asked afterwards.
   void CheckAccelerations() {
     Derivative(y_);
+    const Bits shortest = ydot_;
+    Examine(y_);
     ExpectBelow(RelativeError(own_->udot(), truth_.udot), Bound(), "accelerations");
+    const auto as_vector = [](const Bits& bits) {
+      return Eigen::Map<const VectorX<double>>(bits.data(), std::ssize(bits));
+    };
+    ExpectBelow(RelativeError(as_vector(shortest), ToReal(VectorX<double>(as_vector(ydot_)))),
+                2.0 * Bound(), "accelerations");
     const int rank = own_->diagnostics().rank, expected = truth_.sample.answer().rank;
     Expect(rank == expected, "rank", fmt::format("{} where {} is right", rank, expected));
   }
 
   /// J^T lambda is what the oracle's masses take beyond the forces applied.
   void CheckForces() {
-    Derivative(y_);
+    Examine(y_);
     const Equations e = oracle_.Form(q(), u());
     const RealVector needed = e.M * ToReal(own_->udot()) + e.h;
     MatrixX<double> J = MatrixX<double>::Zero(mechanism_.num_rows(), mechanism_.num_u());
@@ -181,7 +192,7 @@ class Inspection {
 
   /// The energy's rate by differences of the oracle's along the motion.
   void CheckEnergy() {
-    Derivative(y_);
+    Examine(y_);
     const RealVector at = q(), speeds = u(), udot = ToReal(own_->udot());
     const RealVector qdot = ToReal(Eigen::Map<const VectorX<double>>(ydot_.data(), at.size()));
     const Real step = 1e-6L;  // long double: truncation 1e-12, round-off 1e-13
@@ -233,7 +244,7 @@ class Inspection {
     for (std::size_t i = static_cast<std::size_t>(mechanism_.num_q()); i < off.size(); ++i) {
       off[i] += 0.1;
     }
-    Derivative(off);
+    Examine(off);
     const RealMatrix J = oracle_.Form(q(), u()).J;
     const Real row = J.size() == 0 ? Real(0) : J.cwiseAbs().rowwise().sum().maxCoeff();
     const Real scale = Largest(oracle_.ClosureRates(q(), 0 * u())) + row * Largest(u());

@@ -74,6 +74,9 @@ struct Bench {
   Outcome Derivative(std::vector<double>& at) {
     return formulation->Derivative(0.0, std::span<const double>(at), std::span<double>(ydot));
   }
+  Outcome Examine(std::vector<double>& at) {
+    return formulation->Examine(0.0, std::span<const double>(at), std::span<double>(ydot));
+  }
   /// 100 eps N / rcond with the size N of the dense system: elimination of N unknowns.
   double Bound() const {
     return 100 * kEps * (mechanism.num_u() + mechanism.num_rows()) / sample.answer().rcond;

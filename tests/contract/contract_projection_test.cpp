@@ -32,7 +32,7 @@ TEST_P(VelocityContractTest, SpeedsSatisfyTheLoops) {
   Run(Description(6), 6, [&](auto bench) {
     std::vector<double> off = bench.y;
     for (std::size_t i = bench.mechanism.num_q(); i < off.size(); ++i) off[i] += 0.1;
-    ASSERT_EQ(bench.Derivative(off), Outcome::kFinished);
+    ASSERT_EQ(bench.Examine(off), Outcome::kFinished);
     Oracle oracle(bench.sample.description(), LayoutOf(bench.mechanism));
     const RealVector q = ToReal(bench.formulation->q()), u = ToReal(bench.formulation->u());
     const RealMatrix J = oracle.Form(q, u).J;

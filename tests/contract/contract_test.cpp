@@ -18,7 +18,7 @@ TEST_P(ContractTest, AccelerationsAgreeWithTheOracle) {
   double worst = 0.0;
   for (std::uint64_t seed = 1; seed <= 4; ++seed) {
     Run(Description(seed), seed, [&](auto bench) {
-      ASSERT_EQ(bench.Derivative(bench.y), Outcome::kFinished);
+      ASSERT_EQ(bench.Examine(bench.y), Outcome::kFinished);
       const double error =
           RelativeError(bench.formulation->udot(), bench.sample.udot(GetParam().coordinates));
       EXPECT_LE(error, bench.Bound()) << "rcond " << bench.sample.answer().rcond;
@@ -109,11 +109,11 @@ TEST_P(ContractTest, DerivativeDoesNotAllocate) {
 TEST_P(ContractTest, PowerDoesNotAllocate) {
   if (CountAllocations() < 0) GTEST_SKIP() << "allocations cannot be counted in this build";
   Run(Description(10), 10, [&](auto bench) {
-    bench.Derivative(bench.y);
+    bench.Examine(bench.y);
     double sum = bench.formulation->DrivePower();
     const long before = CountAllocations();
     for (int i = 0; i < 10; ++i) {
-      bench.Derivative(bench.y);
+      bench.Examine(bench.y);
       sum += bench.formulation->DrivePower() +
              AppliedPower(bench.formulation->kinematics()).dissipated;
     }
@@ -177,7 +177,7 @@ TEST_P(ContractTest, EnergyChangesByThePowerOfForcesAndDrives) {
        {driven, Conservative(driven), Description(11), Conservative(Description(12))}) {
     Run(description, 10, [&](auto bench) {
       SCOPED_TRACE(description.name);
-      ASSERT_EQ(bench.Derivative(bench.y), Outcome::kFinished);
+      ASSERT_EQ(bench.Examine(bench.y), Outcome::kFinished);
       Oracle oracle(bench.sample.description(), LayoutOf(bench.mechanism));
       const RealVector q = ToReal(bench.formulation->q()), u = ToReal(bench.formulation->u());
       const RealVector udot = ToReal(bench.formulation->udot());

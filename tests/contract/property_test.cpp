@@ -253,7 +253,7 @@ void Examine(int number, Tally& tally) {
       formulation->Start(0.0, truth.state.q, truth.state.u);
       std::vector<double> y(formulation->state_size()), ydot(y.size());
       formulation->ToState(truth.state.q, truth.state.u, y);
-      const Outcome outcome = formulation->Derivative(0.0, std::span<const double>(y), ydot);
+      const Outcome outcome = formulation->Examine(0.0, std::span<const double>(y), ydot);
       ++tally.outcomes[std::string(ToString(outcome))];
       if (ambiguous) {
         EXPECT_TRUE(outcome != Outcome::kFinished || formulation->udot().allFinite());

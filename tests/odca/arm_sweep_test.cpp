@@ -100,7 +100,8 @@ TEST(ArmSweep, AgreesWithTheOracle) {
       const testing::Answer exact =
           testing::Oracle(free, testing::LayoutOf(mechanism))
               .Solve(state.q.cast<testing::Real>(), state.u.cast<testing::Real>());
-      if (!sweep->Evaluate(SpeedsUsed::kGiven, In(state.q), In(state.u), In(qdot), In(own))) {
+      if (!sweep->Evaluate(SpeedsUsed::kGiven, nullptr, In(state.q), In(state.u), In(qdot),
+                           In(own))) {
         EXPECT_LT(exact.rcond, 0.01) << chain.name;
         continue;
       }
@@ -133,7 +134,7 @@ TEST_P(ArmSweepTest, HasTheSameBitsForAnyNumberOfThreads) {
       EXPECT_EQ(sweep->threads(), std::min(threads, 4)) << "no more than groups";
       Numbers qdot = Numbers::Zero(u.size()), udot = qdot;
       for (int round = 0; round < 3; ++round) {
-        EXPECT_TRUE(sweep->Evaluate(GetParam(), In(q), In(u), In(qdot), In(udot)));
+        EXPECT_TRUE(sweep->Evaluate(GetParam(), nullptr, In(q), In(u), In(qdot), In(udot)));
       }
       Numbers moved = q, speeds = u;
       sweep->Project(In(moved), In(speeds), 1e-12);
@@ -183,9 +184,11 @@ TEST(ArmSweep, LeavesOthersToTheGeneralSweep) {
       << "parallel axes: three rows redundant everywhere";
   EXPECT_EQ(make(testing::SphericalChain(6, 1)), nullptr) << "axes through one point, likewise";
   const Mechanism<Spatial, double> mechanism(loop, Coordinates::kJoint);
+  Kinematics<Spatial, double> kinematics(mechanism);
   Odca<Spatial, double> published(mechanism, {.solver = SolverKind::kAsPublished});
   Numbers q = Numbers::Zero(9), u = q, qdot = q, udot = q;
-  EXPECT_FALSE(published.RightHandSide(SpeedsUsed::kGiven, In(q), In(u), In(qdot), In(udot)));
+  EXPECT_FALSE(
+      published.RightHandSide(SpeedsUsed::kGiven, kinematics, In(q), In(u), In(qdot), In(udot)));
 }
 
 TEST(RevoluteKernels, TakeAsManyOperationsAsTheySay) {

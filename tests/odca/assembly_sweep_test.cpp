@@ -7,6 +7,7 @@
 #include <cstdio>
 
 #include "mechanism/description/library.h"
+#include "tests/contract/allocations.h"
 #include "tests/odca/served.h"
 
 namespace loopbench::odca::pins {
@@ -52,7 +53,8 @@ TEST(AssemblySweep, AgreesWithTheGeneralSweepWhereverJointsHaveDrifted) {
       int made = 0;
       for (int n = 1; n <= 40; ++n) {
         for (std::uint64_t seed = 1; seed <= 12; ++seed) {
-          const MechanismDescription drawn = RandomBranches(n, 100 * seed + n);
+          const MechanismDescription drawn =
+              RandomBranches(n, 100 * seed + n, seed % 2 == 0 ? n : 0);
           const Model mechanism(drawn, Coordinates::kJoint);
           const PlanOptions options = {.grounding = grounding, .closing = closing};
           if (Make(mechanism, options) == nullptr) continue;
@@ -113,7 +115,8 @@ TEST(AssemblySweep, RefusesABodyThatIsHeldTwice) {
         if (sweep == nullptr) continue;
         const Numbers q = Numbers::Constant(1, 0.3), u = Numbers::Ones(1);
         Numbers qdot = q, udot = q;
-        EXPECT_FALSE(sweep->Evaluate(SpeedsUsed::kGiven, In(q), In(u), In(qdot), In(udot)));
+        EXPECT_FALSE(
+            sweep->Evaluate(SpeedsUsed::kGiven, nullptr, In(q), In(u), In(qdot), In(udot)));
       }
     }
   }
@@ -137,11 +140,56 @@ TEST(AssemblySweep, IsNotTriedInRunsThatStartWhereItIsRefused) {
     testing::SystemWith<Odca, Planar, double> odca(mechanism, {});
     ASSERT_EQ(odca->Start(0.0, q, still), Outcome::kFinished);
     q.array() += 0.2;
-    EXPECT_TRUE(sweep->Evaluate(SpeedsUsed::kGiven, In(q), In(still), In(qdot), In(udot)));
-    EXPECT_EQ(
-        odca->solver().RightHandSide(SpeedsUsed::kGiven, In(q), In(still), In(qdot), In(udot)),
-        serves);
+    EXPECT_TRUE(sweep->Evaluate(SpeedsUsed::kGiven, nullptr, In(q), In(still), In(qdot), In(udot)));
+    EXPECT_EQ(odca->solver().RightHandSide(SpeedsUsed::kGiven, kinematics, In(q), In(still),
+                                           In(qdot), In(udot)),
+              serves);
   }
+}
+
+/// By Derivative(), whether or not the work that forces do is integrated with the motion.
+TEST(AssemblySweep, ServesRunsWhoseWorkIsCounted) {
+  int served = 0, with_power = 0;
+  for (std::uint64_t seed = 1; seed <= 20; ++seed) {
+    const MechanismDescription drawn = RandomBranches(8, seed, 8);
+    const Model mechanism(drawn, Coordinates::kJoint);
+    const testing::State state = testing::ConsistentState(drawn, mechanism, seed);
+    for (const Enforcement level : {Enforcement::kAcceleration, Enforcement::kVelocity}) {
+      testing::SystemWith<Odca, Planar, double> odca(mechanism, {.enforcement = level});
+      ASSERT_EQ(odca->Start(0.0, state.q, state.u), Outcome::kFinished);
+      const auto derivative = [&](Numbers& rates, bool examine) {
+        Numbers y(odca->size());
+        odca->ToState(state.q, state.u, In(y));
+        rates.setZero(odca->size());
+        const long before = testing::CountAllocations();
+        const Outcome outcome = examine ? odca->Examine(0.3, In(y), In(rates))
+                                        : odca->Derivative(0.3, In(y), In(rates));
+        EXPECT_EQ(testing::CountAllocations(), before);
+        ASSERT_EQ(outcome, Outcome::kFinished) << seed;
+      };
+      Numbers alone, own, general;
+      derivative(alone, false);
+      odca->IntegrateWork(true);
+      derivative(own, false);
+      derivative(general, true);
+      EXPECT_EQ(alone, own.head(alone.size())) << "the motion has the same bits";
+      served += own != general;
+      const double size = std::max(1.0, general.cwiseAbs().maxCoeff());
+      EXPECT_LE((own - general).cwiseAbs().maxCoeff() / size,
+                Bound(mechanism.num_bodies(), odca->diagnostics().rcond));
+      const double bound =
+          Bound(mechanism.num_bodies(), odca->diagnostics().rcond) * std::max(1.0, state.u.norm());
+      Numbers y(odca->size());
+      odca->ToState(state.q, state.u, In(y));
+      ASSERT_EQ(odca->Look(0.3, In(y)), Outcome::kFinished);
+      const Numbers seen = odca->u();
+      ASSERT_EQ(odca->FromState(0.3, In(y)), Outcome::kFinished);
+      EXPECT_LE((seen - odca->u()).cwiseAbs().maxCoeff(), bound);
+      with_power += own.tail(2).cwiseAbs().maxCoeff() > 1e-3;
+    }
+  }
+  EXPECT_GT(with_power, 20);
+  EXPECT_GT(served, 30) << "but where bodies are held more than once";
 }
 
 TEST(AssemblySweep, LeavesOthersToTheGeneralSweep) {
@@ -153,9 +201,6 @@ TEST(AssemblySweep, LeavesOthersToTheGeneralSweep) {
   EXPECT_NE(make(grid), nullptr);
   EXPECT_EQ(make(grid, Coordinates::kAbsolute), nullptr);
   EXPECT_EQ(make(Hub(300, 1, false)), nullptr) << "300 handles on one body";
-  MechanismDescription sprung = grid;
-  sprung.forces.push_back(JointSpring{.joint = 1, .stiffness = 2.0});
-  EXPECT_EQ(make(sprung), nullptr);
   MechanismDescription slides = grid;
   slides.joints[2].type = JointType::kPrismatic;
   EXPECT_EQ(make(slides), nullptr);

@@ -65,11 +65,11 @@ TEST_P(PathLaneTest, HasTheBitsOfOneAlone) {
       if (seed % 4 == 0) q[1][0] = std::numeric_limits<double>::quiet_NaN();  // its own affair
       const std::vector<Lanes> all_q = Lane(q), all_u = Lane(u);
       std::vector<Lanes> qdot(all_q.size()), udot = qdot;
-      const LaneBits good = lanes->Evaluate(GetParam(), all_q, all_u, qdot, udot);
+      const LaneBits good = lanes->Evaluate(GetParam(), nullptr, all_q, all_u, qdot, udot);
       for (int lane = 0; lane < kLanes; ++lane) {
         Numbers own_qdot = Numbers::Zero(n), own_udot = own_qdot;
-        const bool evaluated =
-            alone[lane]->Evaluate(GetParam(), In(q[lane]), In(u[lane]), In(own_qdot), In(own_udot));
+        const bool evaluated = alone[lane]->Evaluate(GetParam(), nullptr, In(q[lane]), In(u[lane]),
+                                                     In(own_qdot), In(own_udot));
         ++states;
         refused += !evaluated;
         ASSERT_EQ(good[lane] != 0, evaluated) << n << " bodies, seed " << seed;
@@ -113,13 +113,14 @@ struct OneAfterAnother final : SideBySide {
 TEST_P(PathLaneTest, ServesSolversOfRunsSideBySide) {
   const Mechanism<Planar, double> mechanism(Ladder(2, 1.1, -0.7), Coordinates::kJoint);
   const Mechanism<Planar, double> other(Chain(4), Coordinates::kJoint);
+  Kinematics<Planar, double> kinematics(mechanism);
   Random random(1);
   Numbers q = RandomNumbers(random, mechanism.num_q(), 0.1);
   q.array() += 1.1;
   const Numbers u = RandomNumbers(random, mechanism.num_u(), 1.0);
   const auto rates = [&](Odca<Planar, double>& solver) {
     Numbers qdot = Numbers::Zero(u.size()), udot = qdot;
-    EXPECT_TRUE(solver.RightHandSide(GetParam(), In(q), In(u), In(qdot), In(udot)));
+    EXPECT_TRUE(solver.RightHandSide(GetParam(), kinematics, In(q), In(u), In(qdot), In(udot)));
     Numbers all(2 * u.size());
     all << qdot, udot;
     return all;
@@ -148,7 +149,7 @@ TEST_P(PathLaneTest, ServesSolversOfRunsSideBySide) {
   if (testing::CountAllocations() < 0) return;
   Numbers qdot = u, udot = u;
   const long before = testing::CountAllocations();
-  EXPECT_TRUE(solvers[0]->RightHandSide(GetParam(), In(q), In(u), In(qdot), In(udot)));
+  EXPECT_TRUE(solvers[0]->RightHandSide(GetParam(), kinematics, In(q), In(u), In(qdot), In(udot)));
   EXPECT_EQ(testing::CountAllocations(), before);
 }
 

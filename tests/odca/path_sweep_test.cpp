@@ -103,7 +103,8 @@ TEST_P(PathSweepTest, HasTheSameBitsForAnyNumberOfThreads) {
       EXPECT_EQ(sweep->threads(), std::min(threads, 4)) << "no more than groups";
       Numbers qdot = Numbers::Zero(u.size()), udot = qdot;
       for (int round = 0; round < 3; ++round) {
-        EXPECT_EQ(sweep->Evaluate(GetParam(), In(q), In(u), In(qdot), In(udot)), evaluates);
+        EXPECT_EQ(sweep->Evaluate(GetParam(), nullptr, In(q), In(u), In(qdot), In(udot)),
+                  evaluates);
       }
       Numbers moved = q, speeds = u;
       EXPECT_EQ(sweep->Project(In(moved), In(speeds), 1e-12).has_value(), evaluates);
@@ -151,9 +152,11 @@ TEST(PathSweep, LeavesOthersToTheGeneralSweep) {
   elsewhere.joints[2].cut = true;
   EXPECT_EQ(make(elsewhere, Coordinates::kJoint), nullptr) << "cut where no pinned body follows";
   const Mechanism<Planar, double> mechanism(chain, Coordinates::kJoint);
+  Kinematics<Planar, double> kinematics(mechanism);
   Odca<Planar, double> published(mechanism, {.solver = SolverKind::kAsPublished});
   Numbers q = Numbers::Zero(5), u = q, qdot = q, udot = q;
-  EXPECT_FALSE(published.RightHandSide(SpeedsUsed::kGiven, In(q), In(u), In(qdot), In(udot)));
+  EXPECT_FALSE(
+      published.RightHandSide(SpeedsUsed::kGiven, kinematics, In(q), In(u), In(qdot), In(udot)));
 }
 
 TEST_P(PathSweepTest, RefusesAChainThatIsStretchedOut) {
@@ -162,7 +165,7 @@ TEST_P(PathSweepTest, RefusesAChainThatIsStretchedOut) {
   Numbers u = Numbers::Ones(4), qdot = u, udot = u;
   for (const double angle : {1.1, 0.0}) {  // no force along it moves the last pin
     const Numbers q = Numbers::Constant(4, angle);
-    EXPECT_EQ(sweep->Evaluate(GetParam(), In(q), In(u), In(qdot), In(udot)), angle > 0.0);
+    EXPECT_EQ(sweep->Evaluate(GetParam(), nullptr, In(q), In(u), In(qdot), In(udot)), angle > 0.0);
   }
 }
 
@@ -193,7 +196,7 @@ TEST_P(PathSweepTest, AllocatesNothing) {
     const Numbers u = Numbers::Ones(mechanism.num_u());
     Numbers qdot = u, udot = u;
     const long before = testing::CountAllocations();
-    EXPECT_TRUE(sweep->Evaluate(GetParam(), In(q), In(u), In(qdot), In(udot)));
+    EXPECT_TRUE(sweep->Evaluate(GetParam(), nullptr, In(q), In(u), In(qdot), In(udot)));
     EXPECT_TRUE(sweep->Project(In(q), In(qdot), 0.0));
     EXPECT_EQ(testing::CountAllocations(), before);
   }

@@ -64,8 +64,8 @@ inline MechanismDescription RandomPath(int n, std::uint64_t seed, bool in_halves
 }
 
 /// Bodies that hang from any other one or from Ground, in any order of numbers; with freedom left,
-/// cut pins close loops.
-inline MechanismDescription RandomBranches(int n, std::uint64_t seed) {
+/// cut pins close loops. Forces are of all kinds.
+inline MechanismDescription RandomBranches(int n, std::uint64_t seed, int forces = 0) {
   Builder b("branches", SpaceKind::kPlanar, seed);
   std::vector<int> row;
   for (int k = 0; k < n; ++k) row.push_back(b.AddBody(1.0));
@@ -84,6 +84,7 @@ inline MechanismDescription RandomBranches(int n, std::uint64_t seed) {
     joints.push_back(Pin(b.random, other == n ? kGround : row[other], row[k]));
     joints.back().cut = true;
   }
+  b.AddForces(forces);
   for (std::size_t j = 0; j < joints.size(); ++j) joints[j].name = "j" + std::to_string(j);
   return b.description;
 }
@@ -134,6 +135,7 @@ struct AlongPaths {
   static constexpr SpaceKind kSpace = SpaceKind::kPlanar;
   static constexpr int kOneFreedom = 3;           ///< bodies of a closed chain
   static constexpr bool kNearDegenerate = false;  ///< such chains come near degenerate positions
+  static constexpr bool kTakesForces = false;     ///< other than gravity
   static MechanismDescription Draw(int n, std::uint64_t seed) {
     return RandomPath(n, 100 * seed + n, n > 40);
   }
@@ -150,6 +152,7 @@ struct OverAssemblies {
   static constexpr SpaceKind kSpace = SpaceKind::kPlanar;
   static constexpr int kOneFreedom = 3;
   static constexpr bool kNearDegenerate = false;
+  static constexpr bool kTakesForces = true;
   static MechanismDescription Draw(int n, std::uint64_t seed) {
     return RandomBranches(n, 100 * seed + n);
   }
@@ -180,6 +183,7 @@ struct AlongArms {
   static constexpr SpaceKind kSpace = SpaceKind::kSpatial;
   static constexpr int kOneFreedom = 6;
   static constexpr bool kNearDegenerate = true;
+  static constexpr bool kTakesForces = false;
   static MechanismDescription Draw(int n, std::uint64_t seed) {
     const bool closed = n > kOneFreedom && seed % 2 == 0;
     return RandomArms({.open = closed ? 0 : n, .closed = closed ? n : 0}, 100 * seed + n);

@@ -52,13 +52,17 @@ Both Compare(const Mechanism<Space, double>& mechanism, Sweep* sweep, SpeedsUsed
   const Eigen::Index n = q.size();
   Numbers y(2 * n), general(y), own = Numbers::Zero(2 * n);
   odca->ToState(q, u, In(y));
-  both.outcome = odca->Examine(0.0, In(y), In(general));
+  constexpr double kTime = 0.7;  // functions of it are forces of some
+  both.outcome = odca->Examine(kTime, In(y), In(general));
   both.general = odca->diagnostics();
   const std::span<double> rates = In(own);
-  both.evaluated =
-      sweep != nullptr && sweep->Evaluate(speeds, In(q), In(u), rates.first(n), rates.last(n));
+  Kinematics<Space, double> kinematics(mechanism);
+  kinematics.SetTime(kTime);
+  both.evaluated = sweep != nullptr && sweep->Evaluate(speeds, &kinematics, In(q), In(u),
+                                                       rates.first(n), rates.last(n));
   const auto largest = [](const Numbers& numbers) { return numbers.cwiseAbs().maxCoeff(); };
   const double speed = std::max(largest(general.head(n)), largest(u));
+  // forces of a newton or some, on bodies of a kilogram or so, as gravity
   const double acceleration =
       std::max({largest(general.tail(n)), mechanism.gravity().norm(), speed * speed});
   both.difference = std::max(largest(own.head(n) - general.head(n)) / speed,

@@ -22,7 +22,7 @@ class WithIntegrals final : public Ode {
   int num_quadratures() const override { return formulation_.state_size() > 0 ? 2 : 0; }
   Outcome Derivative(double t, std::span<const double> y, std::span<double> ydot) override {
     const std::size_t n = y.size() - 2;
-    const Outcome outcome = formulation_.Derivative(t, y.first(n), ydot.first(n));
+    const Outcome outcome = formulation_.Examine(t, y.first(n), ydot.first(n));
     const Power<double> power = formulation_.TotalPower();
     ydot[n] = ComputeEnergy(formulation_.kinematics()).kinetic;
     ydot[n + 1] = power.supplied - power.dissipated;

@@ -50,6 +50,15 @@ class Followed {
     return system_->BeginStep(t, y);
   }
 
+  /// For IntegrateSystem(), whose derivatives see no time after `last`. Both must outlive it.
+  Problem<S> Until(const S& last) {
+    return {system_->state_size(),
+            [&](S t, std::span<const S> y, std::span<S> rates) {
+              return Derivative(std::min(t, last), y, rates);
+            },
+            [&](S t, std::span<S> y) { return Accept(t, y); }};
+  }
+
  private:
   Outcome Softened(S t, std::span<const S> y, std::span<S> rates) {
     if (softened_ == nullptr) {
@@ -107,9 +116,28 @@ std::vector<Stop> StopsOf(const std::vector<double>& times, const std::vector<do
   return stops;
 }
 
+template <class S>
+OneStepOptions<S> StepsOf(const WitnessOptions<S>& options, S horizon) {
+  const bool at_stages = options.put_back == PutBack::kAtStages;
+  return {.method = OneStepMethod::kGragg,
+          .tolerance = options.tolerance,
+          .columns = kColumns<S> - options.fewer,
+          .longest_step = horizon / S(10),
+          .most_failures = at_stages ? kMostFailures : 7,
+          .steps_around_failures = at_stages};
+}
+
 template <class Space, class S>
 Moment<Space, S> MomentOf(const Kinematics<Space, S>& kinematics) {
   return {kinematics.poses(), kinematics.motions(), ComputeEnergy(kinematics).total()};
+}
+
+/// The state at a time that is asked for.
+template <class Space, class S>
+void Keep(System<Space, S>& system, S t, const std::vector<S>& y, Witness<Space, S>& witness) {
+  witness.outcome = system.FromState(t, y);
+  witness.positions.push_back(system.q());
+  witness.moments.push_back(MomentOf(system.kinematics()));
 }
 
 }  // namespace
@@ -133,28 +161,13 @@ Witness<Space, S> Follow(const MechanismDescription& description, const WitnessO
   std::vector<S> y(static_cast<std::size_t>(system.state_size()));
   system.ToState(start.system->q(), start.system->u(), y);
   S last = S(times.back());  // the last time that derivatives of the stretch see
-  const Problem<S> problem{system.state_size(),
-                           [&](S t, std::span<const S> state, std::span<S> rates) {
-                             return followed.Derivative(std::min(t, last), state, rates);
-                           },
-                           [&](S t, std::span<S> state) { return followed.Accept(t, state); }};
-  const auto keep = [&](S t) {
-    witness.outcome = system.FromState(t, y);
-    witness.positions.push_back(system.q());
-    witness.moments.push_back(MomentOf(system.kinematics()));
-  };
-  const bool at_stages = options.put_back == PutBack::kAtStages;
-  OneStepOptions<S> steps{.method = OneStepMethod::kGragg,
-                          .tolerance = options.tolerance,
-                          .columns = kColumns<S> - options.fewer,
-                          .longest_step = S(times.back()) / S(10),
-                          .most_failures = at_stages ? kMostFailures : 7,
-                          .steps_around_failures = at_stages};
+  const Problem<S> problem = followed.Until(last);
+  OneStepOptions<S> steps = StepsOf(options, S(times.back()));
   followed.Accept(S(0), y);
-  keep(S(0));
+  Keep(system, S(0), y, witness);
   if (y.empty()) {  // prescribed motions leave nothing to integrate
     for (std::size_t i = 1; i < times.size() && witness.outcome == Outcome::kFinished; ++i) {
-      keep(S(times[i]));
+      Keep(system, S(times[i]), y, witness);
     }
     return witness;
   }
@@ -168,7 +181,7 @@ Witness<Space, S> Follow(const MechanismDescription& description, const WitnessO
       witness.outcome = Outcome::kTimeLimit;
       break;
     }
-    if (!at_stages) {
+    if (!steps.steps_around_failures) {
       steps.step_limit = most_steps == 0 ? kFirstStretch : kFewSteps + kManyTimes * most_steps;
     }
     const OneStepResult result = IntegrateSystem<S>(problem, end, y, steps);
@@ -176,8 +189,7 @@ Witness<Space, S> Follow(const MechanismDescription& description, const WitnessO
     witness.rhs_evaluations += result.rhs_evaluations;
     witness.outcome = result.outcome;
     reached = result.t_reached;
-    if (result.outcome != Outcome::kFinished) break;
-    if (stop.is_time) keep(end);
+    if (result.outcome == Outcome::kFinished && stop.is_time) Keep(system, end, y, witness);
     if (witness.outcome != Outcome::kFinished) break;
     steps.begin = end;
     steps.first_step = S(result.next_step);

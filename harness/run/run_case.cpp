@@ -311,6 +311,24 @@ IntegratorOptions OptionsOf(const Case& one, const std::vector<double>& stop_tim
   return options;
 }
 
+namespace {
+
+/// What the case's errors are measured against, and in the record what that is certified to.
+HeldAgainst WriteCertificateOf(const ExperimentScene& scene, const Case& one,
+                               const Reference* reference, Record& record) {
+  HeldAgainst held;
+  if (scene.series) {
+    WriteCertificate(scene.mechanism.description, *scene.series, one.horizon, record);
+    if (scene.series->NumWithin(one.horizon) > 0) held.series = &*scene.series;
+  } else if (reference != nullptr) {
+    WriteCertificate(*reference, record);
+    if (reference->NumTrusted() > 0) held.reference = reference;
+  }
+  return held;
+}
+
+}  // namespace
+
 Record RunCase(const Experiment& experiment, const Case& one, const Reference* reference,
                const std::filesystem::path& trajectory, int threads) {
   const ExperimentScene& scene = experiment.scenes[one.scene];
@@ -321,14 +339,7 @@ Record RunCase(const Experiment& experiment, const Case& one, const Reference* r
   record.Set("position_goal",
              4 * std::numeric_limits<double>::epsilon() * link *
                  static_cast<double>(scene.mechanism.description.bodies.size() - 1));
-  HeldAgainst held;
-  if (scene.series) {
-    WriteCertificate(scene.mechanism.description, *scene.series, one.horizon, record);
-    if (scene.series->NumWithin(one.horizon) > 0) held.series = &*scene.series;
-  } else if (reference != nullptr) {
-    WriteCertificate(*reference, record);
-    if (reference->NumTrusted() > 0) held.reference = reference;
-  }
+  const HeldAgainst held = WriteCertificateOf(scene, one, reference, record);
   std::optional<TrajectoryTask> task;
   if (experiment.output && !trajectory.empty()) {
     task.emplace(*experiment.output, trajectory,

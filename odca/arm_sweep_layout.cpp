@@ -6,6 +6,7 @@
 
 #include "mechanism/loops/loop_solver.h"
 #include "odca/arm_sweep.h"
+#include "odca/sines.h"
 
 namespace loopbench::odca::arms {
 
@@ -170,17 +171,9 @@ void ArmSweep::TakeIn(std::span<const double> q, std::span<const double> u, int 
 bool ArmSweep::TakeIn(std::span<const double> q, std::span<const double> u) {
   const int places = length_ * kLanes;
   pool_->ForEach(static_cast<int>(groups_.size()), [&](int g) {
-    TakeIn(q, u, g * places, (g + 1) * places);
-    Lanes room = Lanes{} + kLargestAngle;
-    for (int place = g * places; place < (g + 1) * places; place += kLanes) {
-      const Lanes angle = Load<Lanes>(&angle_[place]);
-      room = Min(room, kLargestAngle - Magnitude(angle));
-      Lanes s, c;
-      SinCos(angle, s, c);
-      Store(s, &sine_[place]);
-      Store(c, &cosine_[place]);
-    }
-    groups_[g].in_range = Smallest(room) >= 0.0;
+    const int first = g * places;
+    TakeIn(q, u, first, first + places);
+    groups_[g].in_range = SinesAndCosines(&angle_[first], places, &sine_[first], &cosine_[first]);
   });
   bool in_range = std::ranges::all_of(groups_, &Group::in_range);
   TakeIn(q, u, packed_, num_u_);

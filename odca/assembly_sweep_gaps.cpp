@@ -4,21 +4,14 @@
 #include <cmath>
 
 #include "odca/assembly_sweep.h"
+#include "odca/sines.h"
 
 namespace loopbench::odca::pins {
 
 template <AssemblySweep::Gaps kGaps>
 bool AssemblySweep::Turn() {
-  Lanes room = Lanes{} + kLargestAngle;
-  for (std::size_t i = 0; i < sine_.size(); i += kLanes) {
-    const Lanes angle = Load<Lanes>(&angle_[i]);
-    room = Min(room, kLargestAngle - Magnitude(angle));
-    Lanes s, c;
-    SinCos(angle, s, c);
-    Store(s, &sine_[i]);
-    Store(c, &cosine_[i]);
-  }
-  if (!(Smallest(room) >= 0.0)) return false;
+  const int places = static_cast<int>(angle_.size());
+  if (!SinesAndCosines(angle_.data(), places, sine_.data(), cosine_.data())) return false;
   for (std::size_t i = 0; i < bodies_.size(); ++i) {
     const Body& body = bodies_[i];
     const double s = sine_[i], c = cosine_[i];

@@ -108,6 +108,9 @@ const Fields<Draft>& MechanismFileFields() {
             "Speeds that the fixed coordinate reduction takes as independent: joint names for "
             "joint "
             "coordinates, \"<body>.angle\", \"<body>.x\", ... for absolute ones."},
+           {"accuracy", Number(&Draft::accuracy, kPositive),
+            "Accuracy of points, axes and initial values [rad, or lengths of the mechanism]. Loops "
+            "that close within it are closed; constraints that differ by less are redundant."},
            {"observe", Section(ObservationFields())}}));
   return fields;
 }

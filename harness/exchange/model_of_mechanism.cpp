@@ -92,11 +92,12 @@ class Maker {
       made.coordinates.emplace_back(word.name);
     }
     // where directions are no axes of F, all of them are imposed
-    if (!joint.in_tree() && joint.num_released > 0 && joint.kind->basis == nullptr) {
+    const JointKind<Space, double>& kind = KindOf<Space, double>(type);
+    if (!joint.in_tree() && joint.num_released > 0 && kind.basis == nullptr) {
       const std::vector<int>& released = description_.joints[joint.description].released;
-      for (int i = 0; i < joint.kind->num_constraints(); ++i) {
+      for (int i = 0; i < kind.num_constraints(); ++i) {
         if (std::ranges::find(released, i) != released.end()) continue;
-        made.imposed.push_back(joint.kind->axes[joint.kind->num_u + i]);
+        made.imposed.push_back(kind.axes[kind.num_u + i]);
       }
     }
     return made;

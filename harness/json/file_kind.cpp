@@ -38,7 +38,7 @@ const std::array<Kind, 6>& Kinds() {
        "a mechanism",
        {"bodies", "joints"},
        {"name", "comment", "space", "gravity", "bodies", "ground", "joints", "forces", "initial",
-        "independent", "observe", "$schema", "format"}},
+        "independent", "accuracy", "observe", "$schema", "format"}},
       {FileKind::kExperiment,
        "an experiment",
        {"scenes", "columns"},

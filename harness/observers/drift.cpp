@@ -14,6 +14,14 @@ void Keep(double* largest, double value) {
   if (!std::isnan(*largest) && !(value <= *largest)) *largest = value;
 }
 
+/// Directions that a joint holds: what it leaves free is no mismatch, what it releases because
+/// others hold it is, unless they do so within the accuracy of the input only.
+template <class Space>
+int HeldDirections(const Kinematics<Space, double>& kinematics, int index) {
+  const JointState<Space, double>& state = kinematics.joints()[index];
+  return kinematics.mechanism().is_redundant() ? state.directions() : state.rows();
+}
+
 /// Largest mismatch of some joints: points and rotations apart, and whose points are worst.
 struct Largest {
   double shift = 0.0, rotation = 0.0;
@@ -21,9 +29,8 @@ struct Largest {
 
   template <class Space>
   void Add(const Kinematics<Space, double>& kinematics, int index) {
-    // what a joint leaves free is no mismatch; what it releases because others hold it is
     const JointState<Space, double>& state = kinematics.joints()[index];
-    const int all = state.directions();
+    const int all = HeldDirections(kinematics, index);
     const Direction<Space, double> mismatch =
         state.Sum(state.Along(kinematics.ConstraintMismatch(index), all), all);
     Keep(&rotation, mismatch.angular.norm());
@@ -89,7 +96,7 @@ void DriftObserver<Space>::ObserveRest(const Sample<Space>& sample) {
   rest.dynamics.BodyAccelerations(kinematics, sample.formulation.udot(), rest.A);
   for (int index : kinematics.mechanism().constraints()) {
     const JointState<Space, double>& state = kinematics.joints()[index];
-    const int all = state.directions();
+    const int all = HeldDirections(kinematics, index);
     const auto shift_of = [&](const Components<Space, double>& rows) {
       return state.Sum(rows, all).linear.norm();
     };

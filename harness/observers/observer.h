@@ -103,7 +103,9 @@ class DriftObserver final : public Observer<Space> {
 /// from its first value [J], and its series. Without power, that of the total energy. The relative
 /// error compares it with the largest kinetic energy. The energy that moves is the largest of
 /// kinetic energy, span of the potential, and work supplied or dissipated: slow motions have little
-/// of the first; not below what rounding does to the potential, so that rest is no error.
+/// of the first; not below what rounding does to the potential, so that rest is no error. The
+/// sensitivity is the energy that errors of 1 m and 1 rad, or of 1 m/s and 1 rad/s, of all bodies
+/// change at most, to first order: the largest sum of applied wrenches, or of momenta.
 template <class Space>
 class EnergyObserver final : public Observer<Space> {
  public:
@@ -121,7 +123,8 @@ class EnergyObserver final : public Observer<Space> {
   bool started_ = false;
   double first_ = 0.0, largest_ = 0.0, kinetic_ = 0.0;
   double supplied_ = 0.0, dissipated_ = 0.0, work_ = 0.0;
-  double potential_low_ = 0.0, potential_high_ = 0.0;
+  double potential_low_ = 0.0, potential_high_ = 0.0, sensitivity_ = 0.0;
+  std::vector<Wrench<Space, double>> wrenches_;
   TimeSeries series_;
 };
 

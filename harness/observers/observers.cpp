@@ -11,7 +11,8 @@ void EnergyObserver<Space>::Observe(const Sample<Space>& sample) {
   if (!sample.knows_work) return;  // and no balance
   supplied_ = sample.supplied;
   dissipated_ = sample.dissipated;
-  const auto parts = ComputeEnergy(sample.formulation.kinematics());
+  const Kinematics<Space, double>& kinematics = sample.formulation.kinematics();
+  const auto parts = ComputeEnergy(kinematics);
   const double energy = parts.total() - supplied_ + dissipated_;
   kinetic_ = std::max(kinetic_, parts.kinetic);
   work_ = std::max({work_, std::abs(supplied_), std::abs(dissipated_)});
@@ -21,6 +22,18 @@ void EnergyObserver<Space>::Observe(const Sample<Space>& sample) {
   }
   potential_low_ = std::min(potential_low_, parts.potential);
   potential_high_ = std::max(potential_high_, parts.potential);
+  const Mechanism<Space, double>& mechanism = kinematics.mechanism();
+  wrenches_.resize(static_cast<std::size_t>(mechanism.num_bodies()));
+  AppliedForces<Space, double>(kinematics, wrenches_);
+  double forces = 0.0, momenta = 0.0;
+  for (int body = 1; body < mechanism.num_bodies(); ++body) {
+    const auto& inertia = mechanism.bodies()[body];
+    const auto& V = kinematics.motions()[body];
+    forces += wrenches_[static_cast<std::size_t>(body)].norm();
+    momenta += inertia.mass * V.linear.norm() +
+               (kinematics.RotationalInertia(inertia, body) * V.angular).norm();
+  }
+  sensitivity_ = std::max({sensitivity_, forces, momenta});
   started_ = true;
   // written so that an energy that overflowed stays
   const double error = std::abs(energy - first_);
@@ -39,6 +52,7 @@ void EnergyObserver<Space>::Write(Record& record) const {
   record.Set("energy_scale",
              std::max({kinetic_, work_, potential_high_ - potential_low_,
                        kLeast * std::max(std::abs(potential_low_), std::abs(potential_high_))}));
+  record.Set("energy_sensitivity", sensitivity_);
   if (has_power_) {
     record.Set("energy_supplied", supplied_);
     record.Set("energy_dissipated", dissipated_);

@@ -37,6 +37,8 @@ class Passages {
     t_[num_] = t;
     size_[num_++] = size;
   }
+  /// The next value is of another quantity.
+  void Forget() { num_ = 0; }
   std::int64_t count() const { return count_; }
 
  private:
@@ -56,6 +58,7 @@ struct SingularityObserver<Space>::Work {
   /// Of each singular value, the largest first: its smallest ratio to the largest and when.
   std::vector<double> smallest, when;
   int generic_rank = 0;
+  std::vector<Released> released;  ///< of the last sample
   Passages passages;
 };
 
@@ -86,6 +89,11 @@ void SingularityObserver<Space>::Observe(const Sample<Space>& sample) {
   }
   if (now.rank > work.generic_rank) work.passages = {};  // another quantity from here on
   work.generic_rank = std::max(work.generic_rank, now.rank);
+  const std::vector<Released>& released = sample.formulation.kinematics().released();
+  if (work.released != released) {
+    work.passages.Forget();
+    work.released = released;
+  }
   if (work.generic_rank == 0) return;
   const auto last = static_cast<Eigen::Index>(work.generic_rank) - 1;
   work.passages.Add(sample.t, now.singular_values[last] / now.largest);

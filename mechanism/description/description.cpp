@@ -144,10 +144,10 @@ std::string Validate(const MechanismDescription& description) {
 }
 
 MechanismDescription Unreleased(const MechanismDescription& description) {
+  if (description.rounded) return description;
   MechanismDescription result = description;
   for (JointDescription& joint : result.joints) {
     joint.released.clear();
-    joint.force_axes.setIdentity();
   }
   return result;
 }

@@ -53,9 +53,6 @@ struct JointDescription {
   /// Constrained directions, counted in the order of joint.h's D from 0, that the joint does not
   /// impose because the others do (redundancy.h). Of cut joints only; none of a user's file.
   std::vector<int> released;
-  /// Where directions are released: the axes (columns, in frame F) along which forces are counted,
-  /// in place of x, y and z. Forces only; in the plane the first two.
-  Eigen::Matrix3d force_axes = Eigen::Matrix3d::Identity();
   std::vector<PrescribedMotion> motions;  ///< at most one per coordinate; none with a quaternion
 };
 
@@ -84,9 +81,14 @@ struct MechanismDescription {
   /// coordinates ("OA"), "<body>.angle", "<body>.x", ... for absolute ones. Those that do not
   /// belong to the coordinate set in use are skipped; none at all means: chosen at the start.
   std::vector<std::string> independent;
+  /// Accuracy of points, axes and initial values [rad, or lengths of the mechanism]: loops that
+  /// close within it are closed, and constraints that differ by less depend on each other.
+  double accuracy = 1e-5;
+  /// Whether released directions hold within `accuracy` only, so that they are no constraints.
+  bool rounded = false;
 };
 
-/// The same with every constrained direction imposed.
+/// The same with every constrained direction imposed, apart from those of a rounded description.
 MechanismDescription Unreleased(const MechanismDescription& description);
 
 /// First thing that makes the description unusable, as text ("" when it is usable): masses and

@@ -52,10 +52,13 @@ std::vector<JointValues> KeptValues(const std::vector<JointValues>& old, const R
 MechanismDescription Select(const MechanismDescription& description,
                             const Renumbering& renumbering) {
   // A new member of the description must be thought about here: this line stops compiling.
-  const auto& [name, space, gravity, bodies, joints, forces, initial, independent] = description;
+  const auto& [name, space, gravity, bodies, joints, forces, initial, independent, accuracy,
+               rounded] = description;
   MechanismDescription part;
   part.name = name;
   part.space = space;
+  part.accuracy = accuracy;
+  part.rounded = rounded;
   part.gravity = gravity;
   part.bodies.clear();
   for (std::size_t i = 0; i < bodies.size(); ++i) {
@@ -64,10 +67,8 @@ MechanismDescription Select(const MechanismDescription& description,
   for (std::size_t j = 0; j < joints.size(); ++j) {
     if (renumbering.joints[j] < 0) continue;
     // And a new member of a joint: what it says must survive a change of the frames' bodies.
-    const auto& [joint_name, type, from, to, axis, parameter, cut, released, force_axes, motions] =
-        joints[j];
-    JointDescription joint{joint_name, type, from,     to,         axis,
-                           parameter,  cut,  released, force_axes, motions};
+    const auto& [joint_name, type, from, to, axis, parameter, cut, released, motions] = joints[j];
+    JointDescription joint{joint_name, type, from, to, axis, parameter, cut, released, motions};
     joint.from.body = renumbering.bodies[from.body];
     joint.to.body = renumbering.bodies[to.body];
     part.joints.push_back(joint);

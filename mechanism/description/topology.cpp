@@ -30,20 +30,21 @@ class DisjointSets {
   std::vector<int> parent_;
 };
 
-/// Low numbers want to stay in the tree. -1: follows a given motion or a thread exactly there, 0:
-/// carries a force or an initial value, 1: neutral, 2: marked "cut".
+/// Low numbers want to stay in the tree. 0: follows a given motion or a thread exactly there, 1:
+/// held, 2: guessed, 3: carries a force or a speed, 4: neutral, 5: marked "cut".
 std::vector<int> CutPreference(const MechanismDescription& description) {
-  std::vector<int> preference(description.joints.size(), 1);
-  const auto keep = [&](int joint) { preference[joint] = 0; };
+  std::vector<int> preference(description.joints.size(), 4);
+  const auto keep = [&](int joint) { preference[joint] = 3; };
   for (ForceDescription force : description.forces) {
     if (const int* joint = PartsOf(force).joint; joint != nullptr) keep(*joint);
   }
-  for (const JointValues& values : description.initial.coordinates) keep(values.joint);
   for (const JointValues& values : description.initial.speeds) keep(values.joint);
+  for (const JointValues& values : description.initial.coordinates) preference[values.joint] = 2;
+  for (int joint : description.initial.held) preference[joint] = 1;
   for (std::size_t i = 0; i < preference.size(); ++i) {
     const JointDescription& joint = description.joints[i];
-    if (!joint.motions.empty() || TraitsOf(joint.type).cut_last) preference[i] = -1;
-    if (joint.cut) preference[i] = 2;
+    if (!joint.motions.empty() || TraitsOf(joint.type).cut_last) preference[i] = 0;
+    if (joint.cut) preference[i] = 5;
   }
   return preference;
 }

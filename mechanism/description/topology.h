@@ -11,8 +11,8 @@
 // Properties: every body but Ground is reached by exactly one edge, parents before children; edges
 // keep the order of the user's joints as far as that allows; the result is a function of the
 // description alone. Which joint of a loop is cut: rods, then joints marked "cut", then joints
-// without force and initial value, then others, helical and driven ones at last; among equals the
-// one listed last.
+// without force and initial value, then those with a force or a speed, guessed, held, and at last
+// helical and driven ones; among equals the one listed last.
 #pragma once
 
 #include <vector>

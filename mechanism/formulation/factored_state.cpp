@@ -23,15 +23,38 @@ Outcome FactoredState<Space, S>::Correct(const VectorX<S>& violation, VectorX<S>
 }
 
 template <class Space, class S>
+void FactoredState<Space, S>::SetPositions(const Eigen::Ref<const VectorX<S>>& q) {
+  const bool changed = stress_ != nullptr && kinematics_.released() != released_;
+  if (changed) kinematics_.Release(released_);
+  kinematics_.UpdatePosition(q);
+  if (stress_ == nullptr) return;
+  stress_->Factor(kinematics_);
+  if (!stress_->ServesBadly()) return;
+  kinematics_.Release(stress_->Choose(kinematics_));
+  const VectorX<S> here = kinematics_.q();
+  kinematics_.UpdatePosition(here);
+  stress_->Factor(kinematics_);
+}
+
+template <class Space, class S>
+void FactoredState<Space, S>::ShareSpeeds(VectorX<S>& u) {
+  if (stress_ == nullptr) return;
+  SetSpeeds(u);
+  solver_.Correct(stress_->ShareOfSpeeds(kinematics_), change_);
+  u += change_;
+}
+
+template <class Space, class S>
 void PositionViolation(const Kinematics<Space, S>& kinematics, VectorX<S>& violation,
                        Correction<S>& largest) {
   largest.shift = largest.rotation = S(0);
   for (int index : kinematics.mechanism().constraints()) {
     const Joint<Space, S>& joint = kinematics.mechanism().joints()[index];
     const JointState<Space, S>& state = kinematics.joints()[index];
-    const Components<Space, S> e = state.Along(kinematics.ConstraintMismatch(index), state.rows());
+    const int count = kinematics.mechanism().is_redundant() ? state.directions() : state.rows();
+    const Components<Space, S> e = state.Along(kinematics.ConstraintMismatch(index), count);
     violation.segment(joint.row, state.rows()) = e.head(state.rows());
-    const Direction<Space, S> constrained = state.Sum(e, state.rows());
+    const Direction<Space, S> constrained = state.Sum(e, count);
     largest.rotation = std::max(largest.rotation, constrained.angular.norm());
     largest.shift = std::max(largest.shift, constrained.linear.norm());
   }

@@ -4,7 +4,10 @@
 // solvers where they are let. Factors are made when somebody needs them, once per position.
 #pragma once
 
+#include <memory>
+
 #include "mechanism/formulation/constraint_solver.h"
+#include "mechanism/loops/self_stress.h"
 
 namespace loopbench {
 
@@ -13,11 +16,19 @@ class FactoredState {
  public:
   /// Both must outlive the object.
   FactoredState(const Mechanism<Space, S>& mechanism, ConstraintSolver<Space, S>& solver)
-      : kinematics_(mechanism), solver_(solver), target_(VectorX<S>::Zero(mechanism.num_rows())) {}
+      : kinematics_(mechanism),
+        solver_(solver),
+        target_(VectorX<S>::Zero(mechanism.num_rows())),
+        change_(VectorX<S>::Zero(mechanism.num_u())),
+        stress_(mechanism.is_redundant() ? std::make_unique<SelfStress<Space, S>>(mechanism)
+                                         : nullptr),
+        released_(mechanism.released()) {}
 
   const VectorX<S>& q() const { return kinematics_.q(); }
   const VectorX<S>& u() const { return kinematics_.u(); }
-  void SetPositions(const Eigen::Ref<const VectorX<S>>& q) { kinematics_.UpdatePosition(q); }
+  /// Where directions released by AcceptReleased() serve badly, others are released at this
+  /// position.
+  void SetPositions(const Eigen::Ref<const VectorX<S>>& q);
   /// Positions must be current.
   void SetSpeeds(const Eigen::Ref<const VectorX<S>>& u) { kinematics_.UpdateVelocity(u); }
 
@@ -34,14 +45,25 @@ class FactoredState {
   /// A change of speeds with J change = -violation at the current positions.
   Outcome Correct(const VectorX<S>& violation, VectorX<S>& change);
 
+  /// Self-stresses at the current positions; null without redundant constraints.
+  SelfStress<Space, S>* stress() { return stress_.get(); }
+  /// Adds to speeds the share of the released directions (self_stress.h), after Factor().
+  void ShareSpeeds(VectorX<S>& u);
+  /// Keeps the directions released at the current positions. The equations stay the same, apart
+  /// from round-off.
+  void AcceptReleased() { released_ = kinematics_.released(); }
+
  private:
   Kinematics<Space, S> kinematics_;
   ConstraintSolver<Space, S>& solver_;
   long factored_version_ = -1;  ///< of the kinematics' positions
-  VectorX<S> target_;
+  VectorX<S> target_, change_;
+  std::unique_ptr<SelfStress<Space, S>> stress_;
+  std::vector<Released> released_;  ///< by AcceptReleased()
 };
 
-/// D^T mismatch of all constraints by row, and its largest parts in `largest`.
+/// D^T mismatch of all constraints by row, and its largest parts in `largest`, released directions
+/// included.
 template <class Space, class S>
 void PositionViolation(const Kinematics<Space, S>& kinematics, VectorX<S>& violation,
                        Correction<S>& largest);

@@ -1,5 +1,6 @@
 // Level velocity: speeds of the state are projected inside the right-hand side, or completed where
-// the state carries independent ones only.
+// the state carries independent ones only. A state that carries all speeds gets the projected ones
+// after each accepted step: the difference of the two would grow exponentially.
 #include "mechanism/algebra/instantiate.h"
 #include "mechanism/formulation/level.h"
 
@@ -15,7 +16,6 @@ class VelocityLevel final : public Level<Space, S> {
         change_(u_),
         violation_(VectorX<S>::Zero(mechanism.num_rows())) {
     this->changes_speeds_ = true;
-    this->takes_steps_as_they_are_ = true;
     this->right_hand_side_ = SpeedsUsed::kCompleted;
   }
 
@@ -31,6 +31,11 @@ class VelocityLevel final : public Level<Space, S> {
     return outcome;
   }
 
+  Accepted Accept(FactoredState<Space, S>& state, S) override {
+    const bool carries_all = state.solver().CarriedSpeeds() == nullptr;
+    return carries_all && violation_.size() > 0 ? Accepted::kProjected : Accepted::kAsItWas;
+  }
+
  private:
   Outcome Complete(FactoredState<Space, S>& state) {
     if (const Outcome outcome = state.Factor(); outcome != Outcome::kFinished) return outcome;
@@ -43,6 +48,7 @@ class VelocityLevel final : public Level<Space, S> {
       }
       u_ += change_;
     }
+    state.ShareSpeeds(u_);
     return u_.allFinite() ? Outcome::kFinished : Outcome::kNonFinite;
   }
 

@@ -21,6 +21,9 @@ System<Space, S>::System(const Mechanism<Space, S>& mechanism,
       drives_(mechanism.drives().empty() ? nullptr : std::make_unique<Drives<Space, S>>(mechanism)),
       udot_(VectorX<S>::Zero(mechanism.num_u())),
       lambda_(VectorX<S>::Zero(mechanism.num_rows())),
+      change_(udot_),
+      lambda_change_(lambda_),
+      A_(mechanism.released().empty() ? 0 : static_cast<std::size_t>(mechanism.num_bodies())),
       force_(udot_),
       target_(lambda_) {}
 
@@ -35,6 +38,7 @@ Outcome System<Space, S>::Start(S t, const VectorX<S>& q, const VectorX<S>& u) {
   state_.SetSpeeds(u);
   kinematics.AcceptStep();
   accepted_t_ = t;
+  state_.AcceptReleased();
   solver_->Start(kinematics);
   state_.ForgetFactors();
   return Outcome::kFinished;
@@ -90,28 +94,43 @@ void System<Space, S>::SolveFormed(VectorX<S>* lambda) {
 }
 
 template <class Space, class S>
+void System<Space, S>::SolveAccelerations(VectorX<S>* lambda) {
+  VectorX<S>* multipliers = shares_ && lambda == nullptr ? &lambda_change_ : lambda;
+  if (!solver_->Accelerate(kinematics(), *feedback_, udot_, multipliers)) SolveFormed(multipliers);
+  if (!shares_) return;
+  SelfStress<Space, S>& stress = *state_.stress();
+  const VectorX<S>& force = stress.ForceOfStress(*multipliers);
+  dynamics_.BodyAccelerations(kinematics(), udot_, A_);
+  const VectorX<S>& share = stress.ShareOfAccelerations(kinematics(), A_);
+  solver_->Solve(force, share, change_, lambda != nullptr ? &lambda_change_ : nullptr);
+  udot_ += change_;
+  if (lambda != nullptr) *lambda += lambda_change_;
+}
+
+template <class Space, class S>
 Outcome System<Space, S>::Accelerate() {
   feedback_ = &level_->Feedback(kinematics());
+  shares_ = mechanism_.is_redundant() && feedback_->size() == 0 && !level_->changes_speeds() &&
+            options_.enforcement != Enforcement::kPosition;
+  if (shares_) feedback_ = &state_.stress()->Feedback(kinematics());
   const bool is_free = mechanism_.num_u() > 0;
   VectorX<S>* lambda = drives_ != nullptr && integrates_work() ? &lambda_ : nullptr;
   lambda_is_current_ = lambda != nullptr || !is_free;
   if (is_free) {
     if (const Outcome outcome = state_.Factor(); outcome != Outcome::kFinished) return outcome;
-    if (!solver_->Accelerate(kinematics(), *feedback_, udot_, lambda)) SolveFormed(lambda);
+    SolveAccelerations(lambda);
     if (!udot_.allFinite()) return Outcome::kNonFinite;
     if (solver_->conditioning().smallest_weight < 1.0) ++softened_evaluations_;
   }
-  if (drives_ == nullptr || drives_->Followed(kinematics(), udot_, *feedback_)) {
-    return Outcome::kFinished;
-  }
-  return Outcome::kInconsistentMotion;
+  return drives_ == nullptr ? Outcome::kFinished : JudgeDrives();
 }
 
 /// Jacobians are made from what Examine() leaves behind.
 template <class Space, class S>
 bool System<Space, S>::MayTakeShortCut() const {
+  const bool shares = mechanism_.is_redundant() && options_.enforcement != Enforcement::kPosition;
   return level_->right_hand_side() && drives_ == nullptr && mechanism_.num_q() > 0 &&
-         jacobian_ == nullptr && solver_->CarriedSpeeds() == nullptr;
+         jacobian_ == nullptr && solver_->CarriedSpeeds() == nullptr && !shares;
 }
 
 template <class Space, class S>
@@ -190,17 +209,18 @@ bool System<Space, S>::BeginStep(S t, std::span<S> y) {
     return is_projected;
   }
   step_end_version_ = kinematics().position_version();
-  if (FromState(t, y) != Outcome::kFinished) return false;  // the next evaluation will say why
+  if (Look(t, y) != Outcome::kFinished) return false;  // the next evaluation will say why
   const S h = t - accepted_t_;
   const Accepted accepted = is_projected ? Accepted::kProjected : level_->Accept(state_, h);
   if (accepted == Accepted::kFailed) return false;  // likewise
   Kinematics<Space, S>& kinematics = state_.kinematics();
   kinematics.AcceptStep();
   accepted_t_ = t;
-  const bool changed_released = ChangeReleased(h);
+  state_.AcceptReleased();
   const bool changed_solver = solver_->Review(kinematics);
   if (changed_solver) state_.ForgetFactors();
-  const bool changed = changed_released || changed_solver || accepted == Accepted::kModeChanged;
+  if (drives_ != nullptr && IsOffBranch()) drives_->LeaveBranch();
+  const bool changed = changed_solver || accepted == Accepted::kModeChanged;
   if (changed) ++mode_changes_;
   step_end_version_ = kinematics.position_version();
   if (!changed && accepted != Accepted::kProjected) return false;
@@ -209,22 +229,10 @@ bool System<Space, S>::BeginStep(S t, std::span<S> y) {
 }
 
 template <class Space, class S>
-bool System<Space, S>::ChangeReleased(S h) {
-  Kinematics<Space, S>& kinematics = state_.kinematics();
-  if (kinematics.released().empty()) return false;
-  const std::vector<Released>* better = review_.Review(kinematics, h);
-  if (better == nullptr) return false;
-  kinematics.Release(*better);
-  state_.SetPositions(q());
-  state_.SetSpeeds(u());
-  return true;
-}
-
-template <class Space, class S>
 const VectorX<S>& System<Space, S>::Multipliers() {
   if (lambda_is_current_) return lambda_;
   lambda_is_current_ = true;
-  if (!solver_->Accelerate(kinematics(), *feedback_, udot_, &lambda_)) SolveFormed(&lambda_);
+  SolveAccelerations(&lambda_);
   return lambda_;
 }
 

@@ -18,7 +18,6 @@
 
 #include "mechanism/formulation/level.h"
 #include "mechanism/formulation/ode.h"
-#include "mechanism/formulation/release_review.h"
 #include "mechanism/loops/drives.h"
 
 namespace loopbench {
@@ -115,6 +114,8 @@ class System final : public Ode<S> {
   Power<S> TotalPower();
 
   Diagnostics diagnostics() const;
+  /// More of the outcome of the last evaluation, for messages: configuration and cure; may be "".
+  std::string Why() const;
 
  private:
   /// Whether the right-hand side is what a solver may have a short cut for.
@@ -122,15 +123,24 @@ class System final : public Ode<S> {
   bool integrates_work() const { return with_work_ || state_size() == 0; }
   /// udot_ at the current state, and whether prescribed motions can be followed.
   Outcome Accelerate();
+  /// The latter. At level position, whose accepted steps end on the constraints, inertia carries a
+  /// mechanism across singular configurations; what trial stages miss there is not judged.
+  Outcome JudgeDrives();
+  /// Whether constraints depend on each other that usually do not.
+  bool IsSingular() const;
+  int FirmRank(const Kinematics<Space, S>& at) const;
+  void NoteRankAhead();
+  /// Below level position, at an accepted step: whether closure errors decide the branch.
+  bool IsOffBranch() const;
   /// Rates of the works, if they are asked for, at the kinematics' speeds.
   void PutPower(std::span<S> rates);
-  /// udot_ and, unless null, lambda by f and c, for solvers without a short cut.
+  /// udot_ and, unless null, lambda at the current state, with the shares of released directions.
+  void SolveAccelerations(VectorX<S>* lambda);
+  /// The same without shares by f and c, for solvers without a short cut.
   void SolveFormed(VectorX<S>* lambda);
   /// Whether the step that the last Derivative() ended changes nothing, and nothing has to be known
   /// of it.
   bool NeedsNoReview() const;
-  /// Releases other directions where those released serve badly by now. True when it did.
-  bool ChangeReleased(S h);
   /// Whether the last evaluation was the derivative at this (t, y).
   bool IsAt(S t, std::span<const S> y) const;
 
@@ -141,12 +151,14 @@ class System final : public Ode<S> {
   FactoredState<Space, S> state_;
   TreeDynamics<Space, S> dynamics_;
   std::unique_ptr<Drives<Space, S>> drives_;  ///< null without prescribed motions
-  ReleaseReview<Space, S> review_;
 
   VectorX<S> udot_, lambda_;
+  VectorX<S> change_, lambda_change_;  ///< shares of released directions
+  std::vector<Acceleration<Space, S>> A_;
   VectorX<S> force_, target_;             ///< f and c of the accelerations
   const VectorX<S>* feedback_ = nullptr;  ///< of the last evaluation, the level's
   bool lambda_is_current_ = false;
+  bool shares_ = false;  ///< whether released directions drift unless self_stress.h corrects udot
   /// Of the kinematics' positions, set by BeginStep(): the last stage of a step, its projection and
   /// the next evaluation have the same positions and share what is assembled there. Any other
   /// evaluation assembles anew.

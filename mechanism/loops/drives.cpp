@@ -1,6 +1,7 @@
 #include "mechanism/loops/drives.h"
 
 #include <algorithm>
+#include <cmath>
 
 #include "mechanism/algebra/instantiate.h"
 
@@ -12,50 +13,100 @@ Drives<Space, S>::Drives(const Mechanism<Space, S>& mechanism)
       A_(mechanism.num_bodies(), Acceleration<Space, S>::Zero()),
       F_(mechanism.num_bodies(), Wrench<Space, S>::Zero()) {}
 
-/// `left` is D^T (A_Q - A_P - g) at Mo, the paper's (7) without udot, for the accelerations that
-/// udot gives the bodies. `alone` is M^-1 times each body's wrench at its centre of mass.
+namespace {
+
+/// Largest part of a motion, in turns [rad] and mechanism lengths.
+template <class Space, class S, class Motion>
+S SizeOf(const Kinematics<Space, S>& kinematics, const Motion& A) {
+  return std::max(S(A.angular.norm()), S(A.linear.norm() / kinematics.mechanism().length()));
+}
+
+/// The same of the fastest body.
+template <class Space, class S>
+S SpeedOf(const Kinematics<Space, S>& kinematics) {
+  S speed = S(0);
+  for (const Velocity<Space, S>& V : kinematics.motions()) {
+    speed = std::max(speed, SizeOf(kinematics, V));
+  }
+  return speed;
+}
+
+}  // namespace
+
+/// (7) at Mo of a joint is the sum of A_Q, A_P, their centripetal parts and g. `left` is D^T of it
+/// for the accelerations that udot gives the bodies. `alone` is M^-1 times each body's wrench at
+/// its centre of mass.
 template <class Space, class S>
 bool Drives<Space, S>::Followed(const Kinematics<Space, S>& kinematics, const VectorX<S>& udot,
                                 const VectorX<S>& feedback) {
+  const Mechanism<Space, S>& mechanism = kinematics.mechanism();
   dynamics_.BodyAccelerations(kinematics, udot, A_);
-  S worst = S(0), size = S(0);
-  for (int index : kinematics.mechanism().constraints()) {
-    const Joint<Space, S>& joint = kinematics.mechanism().joints()[index];
+  acceleration_ = worst_ = S(0);
+  for (const Acceleration<Space, S>& A : A_) {
+    acceleration_ = std::max(acceleration_, SizeOf(kinematics, A));
+  }
+  size_ = acceleration_;
+  for (std::size_t j = 0; j < mechanism.joints().size(); ++j) {
+    const Joint<Space, S>& joint = mechanism.joints()[j];
+    const JointState<Space, S>& state = kinematics.joints()[j];
+    size_ = std::max({size_, SizeOf(kinematics, state.g),
+                      SizeOf(kinematics, kinematics.Centripetal(joint.from, state.r_P)),
+                      SizeOf(kinematics, kinematics.Centripetal(joint.to, state.r_Q))});
+  }
+  for (int index : mechanism.constraints()) {
+    const Joint<Space, S>& joint = mechanism.joints()[index];
+    const JointState<Space, S>& state = kinematics.joints()[index];
     Components<Space, S> left = JointAcceleration<Space, S>(kinematics, index, A_);
     if (feedback.size() > 0) {
-      left.head(joint.num_constraints()) += feedback.segment(joint.row, joint.num_constraints());
+      left.head(state.rows()) += feedback.segment(joint.row, state.rows());
     }
-    worst = std::max(worst, S(left.head(joint.num_constraints()).norm()));  // released ones follow
-    size = std::max(
-        {size, A_[joint.from].norm(), A_[joint.to].norm(), kinematics.joints()[index].g.norm()});
+    const S missed = SizeOf(kinematics, state.Sum(left, state.rows()));  // released ones follow
+    if (missed <= worst_) continue;
+    worst_ = missed;
+    worst_joint_ = index;
   }
   AppliedForces<Space, S>(kinematics, F_);
   S alone = S(0);
-  for (int body = 1; body < kinematics.mechanism().num_bodies(); ++body) {
-    const Inertia<Space, S>& inertia = kinematics.mechanism().bodies()[body];
-    const auto inverse = kinematics.RotationalInverse(inertia, body);
-    alone = std::max(
-        {alone, (inverse * F_[body].angular).norm(), S(F_[body].linear.norm() / inertia.mass)});
+  for (int body = 1; body < mechanism.num_bodies(); ++body) {
+    const Inertia<Space, S>& inertia = mechanism.bodies()[body];
+    const Acceleration<Space, S> A(kinematics.RotationalInverse(inertia, body) * F_[body].angular,
+                                   F_[body].linear / inertia.mass);
+    alone = std::max(alone, SizeOf(kinematics, A));
   }
-  if (worst <= S(kFollowed) * size + S(kRoundOff) * alone) return true;
-  const S mismatch = RelativeMismatch(kinematics);
-  return mismatch <= S(kMostDrift) && worst <= S(kOfMismatch) * mismatch * size;
+  fastest_ = std::max(fastest_, SpeedOf(kinematics));
+  return worst_ <= S(kFollowed) * size_ + S(kRoundOff) * alone || IsDrift(kinematics);
+}
+
+/// At the speed v a width x takes x / v, in which an acceleration a adds up to a (x / v)^2 / 2.
+template <class Space, class S>
+bool Drives<Space, S>::DecidesBranch(const Kinematics<Space, S>& kinematics) const {
+  const S speed = SpeedOf(kinematics);
+  const double x = std::sqrt(DirectionWeights<double>::kTheta);
+  return worst_ <= S(kLeftOnBranch) * size_ &&
+         S(x / 2) * acceleration_ <= S(kTurned) * speed * speed;
+}
+
+template <class Space, class S>
+bool Drives<Space, S>::NoteRank(int rank) {
+  const bool has_grown = usual_rank_ > 0 && rank > usual_rank_;
+  usual_rank_ = std::max(usual_rank_, rank);
+  return has_grown;
 }
 
 /// Of joints that have come apart, accelerations are inconsistent by as much as their positions
-/// are, or their speeds.
+/// are, or as the products of speeds with what these miss. Where a drive rests, that is as much as
+/// the speeds themselves, and little beside those before.
 template <class Space, class S>
-S Drives<Space, S>::RelativeMismatch(const Kinematics<Space, S>& kinematics) {
-  const Mechanism<Space, S>& mechanism = kinematics.mechanism();
-  S position = S(0), speed = S(0), size = S(0);
-  for (int index : mechanism.constraints()) {
-    const Velocity<Space, S> mismatch = kinematics.ConstraintMismatch(index);
-    position = std::max(
-        {position, mismatch.angular.norm(), S(mismatch.linear.norm() / mechanism.length())});
-    speed = std::max(speed, kinematics.ConstraintSpeed(index).norm());
+bool Drives<Space, S>::IsDrift(const Kinematics<Space, S>& kinematics) {
+  S position = S(0), missed = S(0);
+  for (int index : kinematics.mechanism().constraints()) {
+    const JointState<Space, S>& state = kinematics.joints()[index];
+    position = std::max(position, SizeOf(kinematics, kinematics.ConstraintMismatch(index)));
+    missed = std::max(
+        missed, SizeOf(kinematics, state.Sum(kinematics.ConstraintSpeed(index), state.rows())));
   }
-  for (const Velocity<Space, S>& V : kinematics.motions()) size = std::max(size, V.norm());
-  return position + (size > S(0) ? speed / size : S(0));
+  return position * fastest_ + missed <= S(kMostDrift) * fastest_ &&
+         worst_ <= S(kOfMismatch) * (position * size_ + missed * SpeedOf(kinematics));
 }
 
 /// The directions of prescribed coordinates are columns H_k of the kind's motion map that stand in

@@ -15,13 +15,33 @@ class Drives {
   explicit Drives(const Mechanism<Space, S>& mechanism);
 
   /// Whether accelerations `udot` satisfy every constraint. What is left may be kFollowed of the
-  /// largest acceleration in the sum, plus kRoundOff of the largest that forces would give a body
-  /// by itself (in a loop that stands still all others are zero), plus as much as drift explains:
-  /// redundant constraints of joints that have drifted apart contradict each other by that much.
-  /// `feedback`, where not empty, is what constraint accelerations were asked to miss (Baumgarte),
-  /// by row. Speeds must be current.
+  /// largest term in the sum (accelerations, and products of speeds, which stand alone where shafts
+  /// turn evenly), plus kRoundOff of the largest that forces would give a body by itself (in a loop
+  /// that stands still all others are zero), plus as much as drift explains: redundant constraints
+  /// of joints that have drifted apart contradict each other by that much. `feedback`, where not
+  /// empty, is what constraint accelerations were asked to miss (Baumgarte), by row. Speeds must be
+  /// current.
   bool Followed(const Kinematics<Space, S>& kinematics, const VectorX<S>& udot,
                 const VectorX<S>& feedback);
+
+  /// Whether the motion decides the branch in a singular configuration, after Followed() there. No
+  /// more may be left than errors of speeds leave on a branch, and inertia must outweigh forces:
+  /// softened directions have accelerations of their own for as long as the mechanism takes across
+  /// the width of softening, and must not be turned by much of it.
+  bool DecidesBranch(const Kinematics<Space, S>& kinematics) const;
+
+  /// Notes the rank of the loops' constraints at an accepted step. True where it has grown: a run
+  /// that began in a singular configuration has left that.
+  bool NoteRank(int rank);
+  /// The largest so far.
+  int usual_rank() const { return usual_rank_; }
+
+  /// From an accepted step on whose branch closure errors have decided.
+  void LeaveBranch() { has_left_branch_ = true; }
+  bool has_left_branch() const { return has_left_branch_; }
+
+  /// The constraint that the last Followed() found missed by most.
+  int worst_joint() const { return worst_joint_; }
 
   /// Power [W] that drives put into the mechanism: force along each times its prescribed rate.
   /// Those of cut joints are multipliers (`lambda`, rows as in TreeDynamics::Jacobian()); those of
@@ -39,11 +59,23 @@ class Drives {
   /// one missed by less than 1e-2, none by less than this.
   static constexpr double kMostDrift = 1e-3;
 
-  static S RelativeMismatch(const Kinematics<Space, S>& kinematics);
+  /// Of the largest term, left in a singular configuration. Accepted steps leave up to 0.02 at
+  /// rtol 1e-4.
+  static constexpr double kLeftOnBranch = 0.1;
+  /// Of the width of softening, turned on the way across.
+  static constexpr double kTurned = 0.1;
+
+  /// Whether what is left is explained by joints that have come apart.
+  bool IsDrift(const Kinematics<Space, S>& kinematics);
 
   TreeDynamics<Space, S> dynamics_;
   std::vector<Acceleration<Space, S>> A_;
   std::vector<Wrench<Space, S>> F_;
+  S worst_ = S(0), size_ = S(0);  ///< what is left, and the largest term, of the last Followed()
+  S acceleration_ = S(0);         ///< largest of bodies there
+  S fastest_ = S(0);              ///< largest speed of bodies so far
+  int worst_joint_ = -1, usual_rank_ = 0;
+  bool has_left_branch_ = false;
 };
 
 }  // namespace loopbench

@@ -10,7 +10,8 @@
 namespace loopbench {
 
 template <class Space>
-Excursion<Space>::Excursion(const Mechanism<Space, double>& mechanism, const VectorX<double>& q)
+Excursion<Space>::Excursion(const Mechanism<Space, double>& mechanism, const VectorX<double>& q,
+                            double accuracy)
     : mechanism_(&mechanism),
       kinematics_(mechanism),
       q_(q),
@@ -30,7 +31,7 @@ Excursion<Space>::Excursion(const Mechanism<Space, double>& mechanism, const Vec
     farthest = std::max({farthest, state.r_P.norm(), state.r_Q.norm()});
   }
   const double eps = std::numeric_limits<double>::epsilon();
-  closed_ = std::max(1e-11 * mechanism.length(), 100 * eps * farthest);
+  closed_ = std::max(std::max(1e-11, accuracy) * mechanism.length(), 100 * eps * farthest);
   Factor();
 }
 
@@ -61,6 +62,9 @@ void Excursion<Space>::Factor() {
   solver_.compute(here_.rows);
   factored_ = true;
   rank_ = static_cast<int>(solver_.rank());
+  excess_ = rank_ < std::min(here_.rows.rows(), here_.rows.cols())
+                ? std::abs(solver_.matrixQTZ()(rank_, rank_)) / counts
+                : 0.0;
   conditioning_ = rank_ > 0 ? std::abs(solver_.matrixQTZ()(rank_ - 1, rank_ - 1)) / counts : 1.0;
 }
 
@@ -76,6 +80,53 @@ VectorX<double> Excursion<Space>::Moved(const VectorX<double>& q, const VectorX<
   VectorX<double> moved = q + rate;
   mechanism_->Normalise(moved);
   return moved;
+}
+
+/// Newton's method from q_ moved by u, with a rank of at most `rank`. True when the loops close.
+template <class Space>
+bool Excursion<Space>::Close(int rank, double distance, const VectorX<double>& u,
+                             VectorX<double>& q, VectorX<double>& travelled) {
+  q = Moved(q_, u);
+  travelled = u;
+  // quadratic where the loops are regular; where they are not, the way left halves each time, and
+  // too long a step back may miss by more than before
+  constexpr int kMostIterations = 60, kMostHalvings = 8;
+  kinematics_.UpdatePosition(q);
+  DirectionRows here = RowsOfDirections(kinematics_);
+  bool closed = here.mismatch.norm() < closed_;
+  for (int i = 0; i < kMostIterations && !closed; ++i) {
+    // far below the least singular value on the way to a singular position
+    double threshold = 1e-9;
+    if (rank > 0 && rank < std::min(here.rows.rows(), here.rows.cols())) {
+      const auto pivots = Eigen::ColPivHouseholderQR<Eigen::MatrixXd>(here.rows)
+                              .matrixQR()
+                              .diagonal()
+                              .cwiseAbs()
+                              .eval();
+      threshold = std::max(threshold, std::sqrt(pivots[rank - 1] * pivots[rank]) / pivots[0]);
+    }
+    Eigen::CompleteOrthogonalDecomposition<Eigen::MatrixXd> solver;
+    solver.setThreshold(threshold);
+    solver.compute(here.rows);
+    VectorX<double> back = solver.solve(VectorX<double>(-here.mismatch));
+    here.mass.matrixU().solveInPlace(back);
+    const double before = here.mismatch.norm();
+    bool nearer = false;
+    for (int halving = 0; halving < kMostHalvings && !nearer; ++halving, back *= 0.5) {
+      if (Size(back) > distance) continue;
+      const VectorX<double> trial = Moved(q, back);
+      kinematics_.UpdatePosition(trial);
+      DirectionRows there = RowsOfDirections(kinematics_);
+      nearer = there.mismatch.norm() < before;
+      if (!nearer) continue;
+      q = trial;
+      here = std::move(there);
+      travelled += back;
+    }
+    if (!nearer) break;
+    closed = here.mismatch.norm() < closed_;
+  }
+  return closed;
 }
 
 template <class Space>
@@ -96,35 +147,11 @@ StepKind Excursion<Space>::Step(double distance, int seed) {
   const double along = distance / Size(u);
   u *= along;
   y *= along;
-  VectorX<double> q = Moved(q_, u), travelled = u;
-  // quadratic where the loops are regular; where they are not, the way left halves each time, and
-  // too long a step back may miss by more than before
-  constexpr int kMostIterations = 60, kMostHalvings = 8;
-  kinematics_.UpdatePosition(q);
-  DirectionRows here = RowsOfDirections(kinematics_);
-  bool closed = here.mismatch.norm() < closed_;
-  for (int i = 0; i < kMostIterations && !closed; ++i) {
-    Eigen::CompleteOrthogonalDecomposition<Eigen::MatrixXd> solver;
-    solver.setThreshold(1e-9);  // far below what is left on the way to a singular position
-    solver.compute(here.rows);
-    VectorX<double> back = solver.solve(VectorX<double>(-here.mismatch));
-    here.mass.matrixU().solveInPlace(back);
-    const double before = here.mismatch.norm();
-    bool nearer = false;
-    for (int halving = 0; halving < kMostHalvings && !nearer; ++halving, back *= 0.5) {
-      if (Size(back) > distance) continue;
-      const VectorX<double> trial = Moved(q, back);
-      kinematics_.UpdatePosition(trial);
-      DirectionRows there = RowsOfDirections(kinematics_);
-      nearer = there.mismatch.norm() < before;
-      if (!nearer) continue;
-      q = trial;
-      here = std::move(there);
-      travelled += back;
-    }
-    if (!nearer) break;
-    closed = here.mismatch.norm() < closed_;
-  }
+  VectorX<double> q, travelled;
+  // off the loops redundant rows are independent, and lead anywhere: they follow the known rank,
+  // unless the rank is larger nearby
+  const bool closed =
+      Close(rank_, distance, u, q, travelled) || Close(n, distance, u, q, travelled);
   bend_ = (travelled - u).cwiseQuotient(units_).norm() / u.cwiseQuotient(units_).norm();
   // a way that keeps its direction is a motion; one that comes back to a tenth was none
   const bool moved = closed && Size(travelled) > 0.1 * distance;

@@ -25,8 +25,9 @@ template <class Space>
 class Excursion {
  public:
   /// From the position q of a mechanism in joint coordinates without prescribed motions, which must
-  /// outlive this.
-  Excursion(const Mechanism<Space, double>& mechanism, const VectorX<double>& q);
+  /// outlive this. Loops count as closed within `accuracy` [rad or lengths], or within round-off.
+  Excursion(const Mechanism<Space, double>& mechanism, const VectorX<double>& q,
+            double accuracy = 0.0);
 
   /// Moves by `distance` (largest coordinate, angles in rad, lengths in mechanism lengths) along a
   /// mixture of all permitted speeds, another one for each `seed` but mostly the last step's
@@ -49,6 +50,8 @@ class Excursion {
   int rank() const { return rank_; }
   /// Smallest pivot that counts over the largest: how far this position is from losing rank.
   double conditioning() const { return conditioning_; }
+  /// Largest pivot that does not count, likewise: how far redundant constraints are independent.
+  double excess() const { return excess_; }
   int freedom() const { return mechanism_->num_u() - rank_; }
 
  private:
@@ -56,6 +59,8 @@ class Excursion {
   void Factor();
   /// Largest of u over its units: rad, or lengths of the mechanism.
   double Size(const VectorX<double>& u) const;
+  bool Close(int rank, double distance, const VectorX<double>& u, VectorX<double>& q,
+             VectorX<double>& travelled);
   VectorX<double> Moved(const VectorX<double>& q, const VectorX<double>& u) const;
 
   const Mechanism<Space, double>* mechanism_;
@@ -67,7 +72,7 @@ class Excursion {
   VectorX<double> course_;  ///< L^T u of the last step that moved
   bool factored_ = false;   ///< solver_ has here_.rows
   int rank_ = 0;
-  double conditioning_ = 1.0, bend_ = 0.0;
+  double conditioning_ = 1.0, excess_ = 0.0, bend_ = 0.0;
 };
 
 }  // namespace loopbench

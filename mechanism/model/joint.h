@@ -73,6 +73,13 @@ struct JointKind {
   /// And Hdot u in F axes, for a relative velocity V in F axes; null where it is zero.
   Acceleration<Space, S> (*bias)(const Pose<Space, S>& X_FM, const Velocity<Space, S>& V) = nullptr;
 
+  /// `basis` and `bias` of a constraint whose mismatch may be more than round-off: components of
+  /// D^T V and their rates are then the first and second derivatives of the mismatch to first order
+  /// in it. Null where those above are, as for constraints on shifts or on all rotations.
+  void (*exact_basis)(const Pose<Space, S>& X_FM, Basis<Space, S>& basis_F, S parameter) = nullptr;
+  Acceleration<Space, S> (*exact_bias)(const Pose<Space, S>& X_FM,
+                                       const Velocity<Space, S>& V) = nullptr;
+
   bool has_quaternion() const { return num_q > num_u; }
   int num_constraints() const { return Space::kDim - num_u; }
 };

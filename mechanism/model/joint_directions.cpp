@@ -11,16 +11,15 @@ namespace {
 
 /// [H D] in ground axes, F having the axes R = R_WF. Each column is a rotation about one axis of F
 /// or a shift along one, all different, so D^T H = 0 holds as it is (9). The plane has one axis to
-/// rotate about, which is normal to it. Forces are counted along the columns of R_forces, which are
-/// those of R unless some are released.
+/// rotate about, which is normal to it.
 template <class Space, class S>
 void SetBasis(const JointKind<Space, S>& kind, const Rotation<Space, S>& R,
-              const Rotation<Space, S>& R_forces, Basis<Space, S>& basis) {
+              Basis<Space, S>& basis) {
   for (int i = 0; i < Space::kDim; ++i) {
     const int axis = kind.axes[i];
     basis[i].setZero();
     if (axis >= Space::kRot) {
-      basis[i].linear = R_forces.col(axis - Space::kRot);
+      basis[i].linear = R.col(axis - Space::kRot);
     } else if constexpr (Space::kRot == 1) {
       basis[i].angular[0] = S(1);
     } else {
@@ -36,6 +35,24 @@ void SetBasisAt(const JointKind<Space, S>& kind, const Rotation<Space, S>& R,
                 const Pose<Space, S>& X_FM, Basis<Space, S>& basis) {
   kind.basis(X_FM, basis, kind.parameter);
   for (Direction<Space, S>& direction : basis) direction = Rotate(R, direction);
+}
+
+/// Of central differences: errors of rounding and of truncation are alike, 4e-11.
+constexpr double kRelativeStep = 6e-6;
+
+/// A pose that moves with V (in F axes) for a short time.
+template <class Space, class S>
+Pose<Space, S> Moved(Pose<Space, S> X, const Velocity<Space, S>& V, S time) {
+  if constexpr (Space::kRot == 1) {
+    X.SetAngle(X.angle + time * V.angular[0]);
+  } else {
+    for (int j = 0; j < 3; ++j) {
+      const Linear<Space, S> turn = V.angular.cross(X.R.col(j)) * time;
+      for (int i = 0; i < 3; ++i) X.R(i, j) += turn[i];
+    }
+  }
+  X.p += V.linear * time;
+  return X;
 }
 
 /// Ground axes serve for H and D where their spans do not depend on axes: nothing is prescribed or
@@ -73,39 +90,58 @@ int Kinematics<Space, S>::DirectionOf(int index, int row) const {
   return direction;
 }
 
-/// [H D] in ground axes; directions of prescribed coordinates go from H to the head of D, released
-/// ones to its end.
+/// Directions of prescribed coordinates go from H to the head of D, released ones to its end.
 template <class Space, class S>
-void Kinematics<Space, S>::SetDirections(int index, const Rotation<Space, S>& R_WF) {
+void Kinematics<Space, S>::OrderDirections(int index, Basis<Space, S>& basis) const {
   const Joint<Space, S>& joint = mechanism_->joints()[index];
-  JointState<Space, S>& state = joints_[index];
-  const auto released = joint.num_released > 0
-                            ? std::ranges::find(released_, index, &Released::joint)
-                            : released_.end();
-  if (joint.kind->basis != nullptr) {
-    SetBasisAt<Space, S>(*joint.kind, R_WF, joint_poses_[index], state.basis);
-  } else if (released == released_.end()) {
-    SetBasis<Space, S>(*joint.kind, R_WF, R_WF, state.basis);
-  } else {
-    Rotation<Space, S> force_axes;
-    for (int i = 0; i < Space::kLin; ++i) {
-      for (int k = 0; k < Space::kLin; ++k) force_axes(i, k) = S(released->force_axes(i, k));
-    }
-    SetBasis<Space, S>(*joint.kind, R_WF, R_WF * force_axes, state.basis);
-  }
   if (joint.num_drives == 0 && joint.num_released == 0) return;
-  const Basis<Space, S> all = state.basis;
+  const Basis<Space, S> all = basis;
   int free = 0, driven = joint.num_u();
   for (int i = 0; i < joint.kind->num_u; ++i) {
-    state.basis[mechanism_->DriveOf(joint, i) >= 0 ? driven++ : free++] = all[i];
+    basis[mechanism_->DriveOf(joint, i) >= 0 ? driven++ : free++] = all[i];
   }
   if (joint.num_released == 0) return;
-  const std::vector<int>& out = released->directions;
+  const std::vector<int>& out = std::ranges::find(released_, index, &Released::joint)->directions;
   int kept = joint.kind->num_u, last = Space::kDim - joint.num_released;
   for (int i = 0; i < joint.kind->num_constraints(); ++i) {
     const bool is_out = std::ranges::binary_search(out, i);
-    state.basis[is_out ? last++ : kept++] = all[joint.kind->num_u + i];
+    basis[is_out ? last++ : kept++] = all[joint.kind->num_u + i];
   }
+}
+
+/// [H D] in ground axes.
+template <class Space, class S>
+void Kinematics<Space, S>::SetDirections(int index, const Rotation<Space, S>& R_WF) {
+  const Joint<Space, S>& joint = mechanism_->joints()[index];
+  Basis<Space, S>& basis = joints_[index].basis;
+  if (joint.kind->basis != nullptr) {
+    SetBasisAt<Space, S>(*joint.kind, R_WF, joint_poses_[index], basis);
+  } else {
+    SetBasis<Space, S>(*joint.kind, R_WF, basis);
+  }
+  OrderDirections(index, basis);
+}
+
+template <class Space, class S>
+void Kinematics<Space, S>::BasisRate(int index, int count, Basis<Space, S>& rate) const {
+  const Joint<Space, S>& joint = mechanism_->joints()[index];
+  const JointState<Space, S>& state = joints_[index];
+  const Angular<Space, S>& w_P = motions_[joint.from].angular;
+  for (int i = 0; i < count; ++i) {
+    rate[i].angular = CrossAngular<S>(w_P, state.basis[i].angular);
+    rate[i].linear = Cross<S>(w_P, state.basis[i].linear);
+  }
+  const S speed = state.V_rel.angular.norm() + state.V_rel.linear.norm() / mechanism_->length();
+  if (joint.kind->basis == nullptr || !(speed > S(0))) return;
+  const S step = S(kRelativeStep) / speed;
+  const Rotation<Space, S> R_WF = poses_[joint.from].R * joint.X_PF.R;
+  const Velocity<Space, S> V = Rotate<Space, S>(R_WF.transpose(), state.V_rel);
+  Basis<Space, S> ahead, behind;
+  joint.kind->basis(Moved(joint_poses_[index], V, step), ahead, joint.kind->parameter);
+  joint.kind->basis(Moved(joint_poses_[index], V, -step), behind, joint.kind->parameter);
+  for (int i = 0; i < Space::kDim; ++i) ahead[i] -= behind[i];
+  OrderDirections(index, ahead);
+  for (int i = 0; i < count; ++i) rate[i] += Rotate(R_WF, ahead[i] / (S(2) * step));
 }
 
 /// [H D] of a joint whose directions move.
@@ -122,9 +158,10 @@ void Kinematics<Space, S>::FollowDirections(int index, const Rotation<Space, S>&
   }
 }
 
-#define LOOPBENCH_INSTANTIATE(Space, S)                                      \
-  template void Kinematics<Space, S>::Release(const std::vector<Released>&); \
-  template int Kinematics<Space, S>::DirectionOf(int, int) const;            \
+#define LOOPBENCH_INSTANTIATE(Space, S)                                            \
+  template void Kinematics<Space, S>::Release(const std::vector<Released>&);       \
+  template int Kinematics<Space, S>::DirectionOf(int, int) const;                  \
+  template void Kinematics<Space, S>::BasisRate(int, int, Basis<Space, S>&) const; \
   template void Kinematics<Space, S>::FollowDirections(int, const Rotation<Space, S>&);
 LOOPBENCH_FOR_EACH_SPACE_AND_MODEL_SCALAR(LOOPBENCH_INSTANTIATE)
 #undef LOOPBENCH_INSTANTIATE

@@ -39,6 +39,13 @@ struct Kinds {
       second = normal.cross(first);
     }
   };
+  static void CrossBasis(const P& X, Basis<Spatial, S>& basis_F, S) {
+    const Cross axes(X);
+    basis_F = Axes();
+    basis_F[0] = Turn(axes.first);
+    basis_F[1] = Turn(axes.second);
+    basis_F[2] = Turn(axes.normal);
+  }
   static Direction<Spatial, S> Turn(const Angular<Spatial, S>& axis) {
     return {axis, Linear<Spatial, S>::Zero()};
   }
@@ -49,6 +56,37 @@ struct Kinds {
     Basis<Spatial, S> basis;
     for (int i = 0; i < Spatial::kDim; ++i) basis[i] = Direction<Spatial, S>::Unit(i);
     return basis;
+  }
+  /// Exact directions of a joint that turns about z. Its tilts -y_F . z_M and x_F . z_M have the
+  /// rates (y_F x z_M) . w and (z_M x x_F) . w; no tilt changes by a turn about z_M.
+  struct Tilt {
+    Angular<Spatial, S> about_x, about_y, z_M;
+    explicit Tilt(const P& X)
+        : about_x(Angular<Spatial, S>::Unit(1).cross(X.R.col(2))),
+          about_y(X.R.col(2).cross(Angular<Spatial, S>::Unit(0))),
+          z_M(X.R.col(2)) {}
+  };
+  /// [H D] of a kind with these `axes`, with exact tilts.
+  template <int... kAxes>
+  static void TiltBasis(const P& X, Basis<Spatial, S>& basis_F, S) {
+    const Tilt tilt(X);
+    const int axes[] = {kAxes...};
+    for (int i = 0; i < Spatial::kDim; ++i) {
+      basis_F[i] = axes[i] == 0   ? Turn(tilt.about_x)
+                   : axes[i] == 1 ? Turn(tilt.about_y)
+                   : axes[i] == 2 ? Turn(tilt.z_M)
+                                  : Direction<Spatial, S>::Unit(axes[i]);
+    }
+  }
+  /// Second derivatives of the tilts, less the part that is linear in the accelerations:
+  /// d/dt (y_F x z_M) . w = w^2 (y_F . z_M) - (w . z_M) (w . y_F), likewise about y.
+  static Acceleration<Spatial, S> TiltBias(const P& X, const Velocity<Spatial, S>& V) {
+    const Tilt tilt(X);
+    const Angular<Spatial, S>& w = V.angular;
+    const S square = w.dot(w), spin = w.dot(tilt.z_M);
+    return {tilt.about_x * (spin * w[1] - square * tilt.z_M[1]) -
+                tilt.about_y * (spin * w[0] - square * tilt.z_M[0]),
+            Linear<Spatial, S>::Zero()};
   }
 
   static JointKind<Spatial, S> Revolute() {
@@ -62,7 +100,9 @@ struct Kinds {
                   X.p.setZero();
                 },
             .coordinates = [](const P& X, S* q, S) { q[0] = AngleAboutZ(X); },
-            .rates = SameRates<S, 1>};
+            .rates = SameRates<S, 1>,
+            .exact_basis = TiltBasis<2, 0, 1, 3, 4, 5>,
+            .exact_bias = TiltBias};
   }
   static JointKind<Spatial, S> Prismatic() {
     return {.num_q = 1,
@@ -121,7 +161,9 @@ struct Kinds {
                   q[0] = AngleAboutZ(X);
                   q[1] = X.p[0];
                 },
-            .rates = SameRates<S, 2>};
+            .rates = SameRates<S, 2>,
+            .exact_basis = TiltBasis<2, 3, 0, 1, 4, 5>,
+            .exact_bias = TiltBias};
   }
   static JointKind<Spatial, S> Cylindrical() {
     return {.num_q = 2,
@@ -137,7 +179,9 @@ struct Kinds {
                   q[0] = AngleAboutZ(X);
                   q[1] = X.p[2];
                 },
-            .rates = SameRates<S, 2>};
+            .rates = SameRates<S, 2>,
+            .exact_basis = TiltBasis<2, 5, 0, 1, 3, 4>,
+            .exact_bias = TiltBias};
   }
   /// The paper's example: H = [1; 0], D = [0; 1] in blocks of three (8).
   static JointKind<Spatial, S> Spherical() {
@@ -167,7 +211,9 @@ struct Kinds {
                   q[1] = X.p[0];
                   q[2] = X.p[1];
                 },
-            .rates = SameRates<S, 3>};
+            .rates = SameRates<S, 3>,
+            .exact_basis = TiltBasis<2, 3, 4, 0, 1, 5>,
+            .exact_bias = TiltBias};
   }
   static JointKind<Spatial, S> Universal() {
     return {.num_q = 2,
@@ -188,20 +234,22 @@ struct Kinds {
                   q[1] = atan2(X.R(0, 2), X.R(0, 0));
                 },
             .rates = SameRates<S, 2>,
-            .basis =
-                [](const P& X, Basis<Spatial, S>& basis_F, S) {
-                  const Cross axes(X);
-                  basis_F = Axes();
-                  basis_F[0] = Turn(axes.first);
-                  basis_F[1] = Turn(axes.second);
-                  basis_F[2] = Turn(axes.normal);
-                },
+            .basis = CrossBasis,
             // the second axis turns about the first: d/dt y' = u0 (x cross y')
             .bias =
                 [](const P& X, const Velocity<Spatial, S>& V) {
                   const Cross axes(X);
                   const S turn = axes.first.dot(V.angular) * axes.second.dot(V.angular);
                   return Acceleration<Spatial, S>(turn * axes.normal, Linear<Spatial, S>::Zero());
+                },
+            .exact_basis = CrossBasis,
+            // d/dt (x_F x y_M) . w = w^2 (x_F . y_M) - (w . y_M) (w . x_F)
+            .exact_bias =
+                [](const P& X, const Velocity<Spatial, S>& V) {
+                  const Angular<Spatial, S>& w = V.angular;
+                  const S rate = w.dot(X.R.col(1)) * w[0] - w.dot(w) * X.R.col(1)[0];
+                  return Acceleration<Spatial, S>(rate * Cross(X).normal,
+                                                  Linear<Spatial, S>::Zero());
                 }};
   }
 
@@ -254,7 +302,17 @@ struct Kinds {
                     basis_F[3 + i] = Shift(Linear<Spatial, S>::Unit(i));
                   }
                   basis_F[5] = {-pitch / length * z, z / length};
-                }};
+                },
+            .exact_basis =
+                [](const P& X, Basis<Spatial, S>& basis_F, S pitch) {
+                  using std::sqrt;
+                  const S length = sqrt(S(1) + pitch * pitch);
+                  const Linear<Spatial, S> z = Linear<Spatial, S>::Unit(2);
+                  TiltBasis<2, 0, 1, 3, 4, 5>(X, basis_F, pitch);
+                  basis_F[0].linear = pitch * z;
+                  basis_F[5] = {-pitch / length * z, z / length};
+                },
+            .exact_bias = TiltBias};
   }
 };
 

@@ -118,6 +118,11 @@ class Kinematics {
   /// coordinate).
   int DirectionOf(int joint, int row) const;
 
+  /// Rates of the first `count` columns [H D] of a joint, in axes that turn with F and as
+  /// components along ground axes. Motions must be current. Those of a basis that depends on the
+  /// pose are central differences, with relative errors of 1e-10.
+  void BasisRate(int joint, int count, Basis<Space, S>& rate) const;
+
   /// Remembers the coordinates of cut joints, so that the next angles are unwrapped from here.
   /// Called at accepted steps only (the one memory of this class, part of the mode).
   void AcceptStep();
@@ -139,6 +144,7 @@ class Kinematics {
   void MeasureCut(int index);
   void FollowDirections(int index, const Rotation<Space, S>& R_WF);
   void SetDirections(int index, const Rotation<Space, S>& R_WF);
+  void OrderDirections(int index, Basis<Space, S>& basis) const;
   Pose<Space, S> MeasuredPose(const Joint<Space, S>& joint) const;
 
   const Mechanism<Space, S>* mechanism_;

@@ -78,6 +78,7 @@ Mechanism<Space, S>::Mechanism(const MechanismDescription& description, Coordina
   gravity_ = ToLinear<Space, S>(description.gravity);
   const Topology joint_topology = BuildTopology(description, Coordinates::kJoint);
   num_loops_ = static_cast<int>(joint_topology.constraints.size());
+  rounded_ = description.rounded;
   for (const TreeEdge& edge : joint_topology.edges) {
     const JointType type = edge.joint < 0 ? JointType::kFree : description.joints[edge.joint].type;
     num_joint_speeds_ += KindOf<Space, S>(type).num_u;
@@ -176,11 +177,20 @@ void Mechanism<Space, S>::AddJoints(const MechanismDescription& description,
     step_of_body_[edge.child] = static_cast<int>(tree_.size());
     tree_.push_back({index, edge.parent, edge.child, joint.to == edge.child ? 1 : -1});
   }
+  const bool is_redundant = std::ranges::any_of(
+      description.joints, [](const JointDescription& user) { return !user.released.empty(); });
   for (int index : topology.constraints) {
     Joint<Space, S>& joint = joints_[index];
+    if (is_redundant && joint.kind->exact_basis != nullptr) {
+      JointKind<Space, S> exact = *joint.kind;
+      exact.basis = exact.exact_basis;
+      exact.bias = exact.exact_bias;
+      own_kinds_.push_back(std::make_shared<const JointKind<Space, S>>(exact));
+      joint.kind = own_kinds_.back().get();
+    }
     if (const std::vector<int>& released = description.joints[index].released; !released.empty()) {
       joint.num_released = static_cast<int>(released.size());
-      released_.push_back({index, released, description.joints[index].force_axes});
+      released_.push_back({index, released});
     }
     joint.row = num_rows_;
     num_rows_ += joint.num_constraints();

@@ -58,7 +58,6 @@ struct Drive {
 struct Released {
   int joint = 0;
   std::vector<int> directions;
-  Eigen::Matrix3d force_axes = Eigen::Matrix3d::Identity();  ///< of JointDescription
 
   friend bool operator==(const Released&, const Released&) = default;
 };
@@ -108,6 +107,8 @@ class Mechanism {
   std::vector<int> RowsOfConstraints() const;  ///< of each, scalar constraints
   /// Directions that constraints do not impose at first, by joint; mostly none at all.
   const std::vector<Released>& released() const { return released_; }
+  /// Whether released directions are constraints that drift (self_stress.h): not of rounded input.
+  bool is_redundant() const { return !released_.empty() && !rounded_; }
   const ForceElements<Space, S>& forces() const { return forces_; }
   const Linear<Space, S>& gravity() const { return gravity_; }
   /// Whether something supplies or dissipates power: else the total energy stays.
@@ -165,6 +166,7 @@ class Mechanism {
   std::vector<TreeStep> tree_;
   std::vector<int> constraints_, step_of_body_;
   std::vector<Released> released_;
+  bool rounded_ = false;
   ForceElements<Space, S> forces_;
   Linear<Space, S> gravity_;
   S length_ = S(1);

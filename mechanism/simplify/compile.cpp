@@ -175,11 +175,15 @@ class Compiler {
 
   void ReleaseRedundant(MechanismDescription& description) {
     const Redundancy redundancy = FindRedundancy(description);
+    const std::string where =
+        redundancy.rounding > 0.0
+            ? "within " + NumberText(redundancy.rounding, 2) + " lengths, the accuracy of the input"
+            : "at every position";
     for (const Released& out : redundancy.released) {
       for (const int direction : out.directions) {
         result_.report.push_back("joint \"" + description.joints[out.joint].name +
                                  "\": " + NameOfDirection(description, out, direction) +
-                                 " is released: the other constraints hold it at every position");
+                                 " is released: the other constraints hold it " + where);
       }
     }
     if (redundancy.released.empty()) return;

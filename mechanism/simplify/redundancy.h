@@ -1,16 +1,10 @@
-// Constraints that say at every position what the others say, and which of them are not imposed.
+// Redundant constraints: rows of J that depend on the others at every position.
 //
-// Bennett's linkage, a planar loop described in space, three cranks on one rod: their constraints
-// depend on each other wherever they stand. Imposed all the same, and shared out by a solver that
-// reveals rank at each position anew, the neglected combination turns with the position, and a
-// mismatch e of it obeys e'' = k(t) e: drift grows exponentially below level `position`. So as many
-// directions as are redundant at generic positions are *released*: left out of the equations, in
-// the joint's own axes, where each of them stays one and the same function of the coordinates. What
-// is left is the same mechanism with its redundancy modelled away, and its drift grows as t^2.
-// Released directions are observed as all others are.
-//
-// A choice that is well conditioned at one position may be badly conditioned at another. Of several
-// positions the worst counts; the best choice is reviewed at accepted steps (release_review.h).
+// Bennett's linkage, a planar loop described in space and three cranks on one rod have such
+// constraints. Their number is structural: the largest rank of J at admissible positions subtracted
+// from the number of rows. Runs keep that rank at all positions (self_stress.h); as many rows as
+// are redundant are *released*, so that every solver has independent rows. Which rows are released
+// changes no result beyond round-off.
 #pragma once
 
 #include <string>
@@ -31,6 +25,10 @@ struct Redundancy {
   /// coordinates would have to give them.
   std::vector<Released> released;
   std::vector<int> cut;  ///< joints that close loops: only these release
+  /// How far released constraints are independent at the start [rad or lengths], where they depend
+  /// on the others within the accuracy of the input only: they are no constraints then. Otherwise
+  /// 0.
+  double rounding = 0.0;
 };
 
 /// The sum over the parts of a description, each looked at by itself. Of parts whose start cannot

@@ -66,6 +66,7 @@ class Analysis {
     result_.rank = here.rank;
     result_.singular_values = here.singular_values;
     const Redundancy redundancy = FindRedundancy(description_);
+    result_.rounding = redundancy.rounding;
     for (const Released& out : redundancy.released) {
       for (const int direction : out.directions) {
         result_.redundant.push_back(

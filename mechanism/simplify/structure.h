@@ -55,6 +55,7 @@ struct Structure {
   Eigen::VectorXd singular_values;
   /// Constraints that can be dropped together; loop_rows - rank_nearby.
   std::vector<RedundantDirection> redundant;
+  double rounding = 0.0;  ///< of Redundancy [lengths]
 
   /// Of parts that are analysed by themselves, where one of them cannot move and others can.
   std::optional<int> freedom_of_parts;

@@ -1,14 +1,13 @@
 // Consistent starts: positions and speeds that satisfy every loop, from partial initial data.
 //
-// Positions: Levenberg-Marquardt on the mismatch e(q) of the cut joints in joint coordinates, over
-// the coordinates that are not held; near a solution the damping vanishes and convergence is
-// quadratic. Speeds: the smallest change of the speeds not given that makes J u = 0. Both work at
-// singular positions (least squares with rank decision), where they leave consistent data as they
-// are.
+// Positions: those nearest to the guesses at which all loops close (closure.h). Speeds: the
+// smallest change of the speeds not given that makes J u = 0. Both work at singular positions
+// (least squares with rank decision), where they leave consistent data as they are.
 #pragma once
 
 #include <cstdint>
 #include <string>
+#include <vector>
 
 #include "mechanism/description/outcome.h"
 #include "mechanism/model/mechanism.h"
@@ -25,12 +24,33 @@ struct Start {
   double speed_residual = 0.0;     ///< largest component of J u left [rad/s or m/s]
 };
 
+/// Guesses and held values of the coordinates of a mechanism in joint coordinates; 0 for others.
+template <class Space>
+VectorX<double> GuessedPositions(const MechanismDescription& description,
+                                 const Mechanism<Space, double>& mechanism);
+
 /// Assembles the description's initial data at time 0. `mechanism` must be compiled from the same
 /// description, in either coordinate set: the result is in its coordinates. The matrices of the
 /// loops are dense; throws TooDense (dense_memory.h) before it begins with some that cannot be had.
 template <class Space>
 Start<double> Assemble(const MechanismDescription& description,
                        const Mechanism<Space, double>& mechanism);
+
+/// Distance from a guess beyond which it counts as missed [rad, or mean lengths of links].
+inline constexpr double kFarGuess = 0.5;
+
+/// A coordinate that starts further than kFarGuess from its guess.
+struct MissedGuess {
+  int joint = 0;       ///< of the description
+  int coordinate = 0;  ///< of its kind; -1 for the orientation that a quaternion describes
+  double guess = 0.0;  ///< [rad or m]; 0 for an orientation
+  double by = 0.0;     ///< start less guess [rad or m]
+};
+
+/// Of positions q in the joint coordinates of the description, in its order. Values of angles of
+/// cut joints count modulo a turn, but for those on which a force depends.
+std::vector<MissedGuess> FindMissedGuesses(const MechanismDescription& description,
+                                           const VectorX<double>& q);
 
 /// The description with each held coordinate moved by a uniform random amount in
 /// [-amplitude, amplitude]; the same (seed, member) gives the same start everywhere.

@@ -2,20 +2,24 @@
 #pragma once
 
 #include <string>
-#include <utility>
 #include <vector>
 
 #include "mechanism/model/kinematics.h"
 
 namespace loopbench {
 
+/// A free coordinate of a joint that is not in the tree.
+struct OfCutJoint {
+  int joint, component;
+};
+
 /// What an assembly could not bring to zero: a number per constraint row and, below them, one per
 /// entry of `extra`.
 struct Unmet {
-  VectorX<double> rows;                         ///< in units
-  VectorX<double> units;                        ///< [m] or [rad] each
-  bool speeds = false;                          ///< of speeds: all of it per second
-  std::vector<std::pair<int, int>> extra = {};  ///< held or given: cut joint, its free coordinate
+  VectorX<double> rows;                ///< in units
+  VectorX<double> units;               ///< [m] or [rad] each
+  bool speeds = false;                 ///< of speeds: all of it per second
+  std::vector<OfCutJoint> extra = {};  ///< held or given
 };
 
 /// Names the joints in conflict with the residual of each and its unit, rods first, then the

@@ -11,6 +11,8 @@ namespace {
 
 /// Entries of J up to which dense factors are made at once: some 10 ms.
 constexpr double kSmall = 1e5;
+/// The same for rough solutions: below it sparse factors are no faster.
+constexpr double kTiny = 1e3;
 /// Least pivot of J J^T over the entry that it began as: solutions keep six digits at least.
 constexpr double kLeastPivot = 1e-10;
 /// What a step of an iteration may leave of r, which takes the rest in its next step.
@@ -26,8 +28,11 @@ double Numbers(const SparseRows& J) {
 
 }  // namespace
 
-LeastSquares::LeastSquares(SparseRows J, std::string owner)
-    : J_(std::move(J)), owner_(std::move(owner)), is_small_(Numbers(J_) <= kSmall) {
+LeastSquares::LeastSquares(SparseRows J, std::string owner, Care care)
+    : J_(std::move(J)),
+      owner_(std::move(owner)),
+      care_(care),
+      is_small_(Numbers(J_) <= (care == Care::kRough ? kTiny : kSmall)) {
   if (is_small_) return;
   JJt_ = Eigen::SparseMatrix<double>(J_ * J_.transpose()).triangularView<Eigen::Lower>();
   factors_.analyzePattern(JJt_);
@@ -39,6 +44,7 @@ bool LeastSquares::Factor(double damping) {
   factors_.setShift(shift);
   factors_.factorize(JJt_);
   if (factors_.info() != Eigen::Success) return false;
+  if (care_ == Care::kRough) return true;
   const Eigen::VectorXd before = factors_.permutationP() * Eigen::VectorXd(JJt_.diagonal());
   return (factors_.vectorD().array() >= kLeastPivot * (before.array() + shift)).all();
 }
@@ -59,8 +65,10 @@ Eigen::MatrixXd LeastSquares::Dense(double numbers) const {
 Eigen::VectorXd LeastSquares::Damped(const Eigen::VectorXd& r, double damping) {
   if (Factor(damping)) {
     const Eigen::VectorXd y = factors_.solve(r), d = J_.transpose() * y;
+    if (care_ == Care::kRough) return d;
     if ((r - J_ * d - damping * damping * y).norm() <= kStepLeaves * r.norm()) return d;
   }
+  if (care_ == Care::kRough && !is_small_) return Eigen::VectorXd::Zero(J_.cols());
   const Eigen::Index rank = std::min(J_.rows(), J_.cols());
   // J, the factors of its transpose, Q, and the square problem with its factors
   const Eigen::MatrixXd J = Dense(2.0 * Numbers(J_) + static_cast<double>(J_.cols() * rank) +

@@ -14,8 +14,13 @@ using SparseRows = Eigen::SparseMatrix<double, Eigen::RowMajor>;
 
 class LeastSquares {
  public:
+  /// How Damped() is solved where J is close to losing rank.
+  enum class Care {
+    kFull,   ///< by dense factors
+    kRough,  ///< sparsely all the same, d = 0 without factors: for a step that is tried
+  };
   /// `owner` begins the message where dense factors cannot be had.
-  LeastSquares(SparseRows J, std::string owner);
+  LeastSquares(SparseRows J, std::string owner, Care care = Care::kFull);
 
   /// argmin |J d - r|^2 + damping^2 |d|^2. Throws TooDense (dense_memory.h).
   Eigen::VectorXd Damped(const Eigen::VectorXd& r, double damping);
@@ -30,6 +35,7 @@ class LeastSquares {
 
   SparseRows J_;
   std::string owner_;
+  Care care_;
   bool is_small_;
   Eigen::SparseMatrix<double> JJt_;  ///< lower triangle
   Eigen::SimplicialLDLT<Eigen::SparseMatrix<double>> factors_;

@@ -19,6 +19,9 @@ namespace {
 /// A motion that few mixtures lead to is missed by some of them, not by all. [rad or lengths]
 constexpr int kTrials = 12;
 constexpr double kTrialDistance = 0.02;
+/// A tenth of it counts as moved, and opens loops that are singular by 1e-4 lengths: ten times what
+/// rounded input leaves.
+constexpr double kRoundedDistance = 0.15;
 
 /// Self-stresses and speeds that constraints leave, above which nobody tries: both are squared.
 constexpr Eigen::Index kMostTried = 64;
@@ -87,7 +90,8 @@ bool IsRigidToSecondOrder(const Mechanism<Space, double>& mechanism, const Vecto
 
 /// Of a mechanism of one part, as the end of a sentence.
 template <class Space>
-std::string WhyStuck(const Mechanism<Space, double>& mechanism, const VectorX<double>& q) {
+std::string WhyStuck(const Mechanism<Space, double>& mechanism, const VectorX<double>& q,
+                     double accuracy) {
   if (!mechanism.drives().empty()) return "";
   if (mechanism.num_u() == 0) return "no joint leaves a speed free";
   if (mechanism.num_rows() == 0) return "";
@@ -110,6 +114,11 @@ std::string WhyStuck(const Mechanism<Space, double>& mechanism, const VectorX<do
     fell_back += step == StepKind::kFellBack;
   }
   if (fell_back < kTrials && !IsRigidToSecondOrder(mechanism, q, rank)) return "";
+  // redundant constraints of rounded input leave a motion that closes within its accuracy
+  Excursion<Space> rounded(mechanism, q, accuracy);
+  for (int trial = 1; trial <= kTrials; ++trial) {
+    if (rounded.Step(kRoundedDistance, trial) == StepKind::kMoved) return "";
+  }
   return "this position is singular, the " + std::to_string(first_order) +
          (first_order == 1 ? " speed that its" : " independent speeds that its") +
          " constraints leave lead" + (first_order == 1 ? "s" : "") +
@@ -125,7 +134,7 @@ std::string WhyLocked(const MechanismDescription& description,
   const bool analysed = mechanism.num_u() <= kMostAnalysedSpeeds;
   const std::vector<Part> parts = analysed ? SplitByJoints(description) : std::vector<Part>();
   if (parts.size() < 2) {
-    const std::string why = WhyStuck(mechanism, q);
+    const std::string why = WhyStuck(mechanism, q, description.accuracy);
     return why.empty() ? "" : nothing + why;
   }
   std::string first, stuck;
@@ -133,8 +142,9 @@ std::string WhyLocked(const MechanismDescription& description,
   for (const Part& part : parts) {
     const Mechanism<Space, double> own(part.description, Coordinates::kJoint);
     const Start<double> start = Assemble<Space>(part.description, own);
-    const std::string why =
-        start.outcome == Outcome::kLocked ? WhyStuck(own, start.q) : std::string();
+    const std::string why = start.outcome == Outcome::kLocked
+                                ? WhyStuck(own, start.q, description.accuracy)
+                                : std::string();
     moves = moves || why.empty();
     if (first.empty()) first = why;
     if (!why.empty() && stuck.empty() && Excursion<Space>(own, start.q).freedom() > 0) {

@@ -36,6 +36,16 @@ TEST(TopologyTest, JointsWithForceOrInitialValueAreKept) {
   EXPECT_EQ(BuildTopology(d, Coordinates::kJoint).constraints, std::vector<int>{1});
 }
 
+TEST(TopologyTest, HeldJointsAreKeptRatherThanGuessedOnesAndTheseRatherThanForces) {
+  MechanismDescription d = FourBar();
+  d.initial.coordinates = {{0, {0.1}}, {1, {0.1}}, {2, {0.1}}, {3, {0.1}}};
+  d.initial.held = {3};
+  EXPECT_EQ(BuildTopology(d, Coordinates::kJoint).constraints, std::vector<int>{2});
+  d.forces.push_back(JointTorque{1, Polynomial{{1.0}}});
+  d.initial.coordinates = {{0, {0.1}}, {2, {0.1}}, {3, {0.1}}};
+  EXPECT_EQ(BuildTopology(d, Coordinates::kJoint).constraints, std::vector<int>{1});
+}
+
 TEST(TopologyTest, ACutMarkInATreeHasNoLoopToOpen) {
   MechanismDescription d = FourBar();
   d.joints.pop_back();

@@ -185,6 +185,85 @@ TEST_P(Driven, ArmWithAllJointsDrivenHasNothingToIntegrate) {
   EXPECT_LE(run.energy_error, 1e4 * kRtol);
 }
 
+template <class Test>
+void AtAllLevels(Column column, const Test& test) {
+  for (const Enforcement level :
+       {Enforcement::kAcceleration, Enforcement::kVelocity, Enforcement::kPosition}) {
+    column.enforcement = level;
+    test(column);
+  }
+}
+
+/// Nothing accelerates, no force acts: discs about one axis with their centres of mass on it, and a
+/// rod between them.
+TEST_P(Driven, DiscsTurnTogether) {
+  const Eigen::Vector3d zero = Eigen::Vector3d::Zero();
+  MechanismDescription d;
+  d.name = "discs";
+  d.bodies.push_back(Bar("a", 1.0, 1.0, 0.1));
+  d.bodies.push_back(Bar("b", 1.0, 2.0, 0.3));
+  for (BodyDescription& body : d.bodies) body.com.setZero();
+  const Eigen::Vector3d on_a(0.2, 0.1, 0.0), on_b(-0.1, 0.4, 0.0);
+  JointDescription rod = Revolute("R", 1, on_a, 2, on_b);
+  rod.type = JointType::kRod;
+  rod.parameter = (on_a - on_b).norm();
+  d.joints = {Revolute("O", kGround, zero, 1, zero), Revolute("Q", kGround, zero, 2, zero), rod};
+  for (const double speed : {-40.0, 0.07}) {
+    d.joints[0].motions = {{0, Polynomial{{0.0, speed}}}};
+    AtAllLevels(GetParam(), [&](const Column& column) {
+      const Simulation run = Simulate(d, column, Options("dormand-prince", 1e-9), 3.0, {});
+      ASSERT_EQ(run.result.outcome, Outcome::kFinished) << ToString(column);
+      EXPECT_NEAR(run.last.bodies[2].w.z() / speed, 1.0, 1e-7) << ToString(column);
+      const Eigen::Matrix3d& R = run.last.bodies[2].R;
+      const double miss = std::atan2(R(1, 0), R(0, 0)) - 3.0 * speed;
+      EXPECT_NEAR(std::remainder(miss, 2 * M_PI), 0.0, 1e-6) << ToString(column);
+    });
+  }
+}
+
+/// Cardan's joint between shafts at an angle b: speeds in the ratio cos b / (1 - sin^2 b cos^2 a)
+/// where the driving fork has turned by a out of the plane of the shafts.
+TEST_P(Driven, CardansJointHasItsLaw) {
+  const Eigen::Vector3d zero = Eigen::Vector3d::Zero();
+  for (const double b : {0.3, -0.9}) {
+    const Eigen::Vector3d axis(std::cos(b), std::sin(b), 0.0);
+    MechanismDescription d;
+    d.name = "cardan";
+    d.space = SpaceKind::kSpatial;
+    for (const double sign : {-1.0, 1.0}) {
+      BodyDescription shaft = Bar(sign < 0.0 ? "in" : "out", 1.0, 1.0, 0.02);
+      shaft.com = {0.2 * sign, 0.0, 0.0};
+      shaft.inertia = Eigen::Vector3d(0.01, 0.02, 0.02).asDiagonal();
+      d.bodies.push_back(shaft);
+    }
+    const Eigen::Vector3d along_x = Eigen::Vector3d::UnitX();
+    JointDescription in = Revolute("in", kGround, -0.4 * along_x, 1, -0.4 * along_x);
+    JointDescription out = Revolute("out", kGround, 0.4 * axis, 2, 0.4 * along_x);
+    in.axis = out.axis = along_x;
+    in.motions = {{0, Polynomial{{0.0, 5.0}}}};
+    out.from.rotation = {0.0, 0.0, b};
+    out.cut = true;
+    JointDescription fork = Revolute("U", 1, zero, 2, zero);
+    fork.type = JointType::kUniversal;
+    // x to y, y to z: the first axis is the driving shaft's y, the second the other's z
+    fork.from.rotation = fork.to.rotation =
+        Eigen::Vector3d::Constant(2 * M_PI / 3 / std::sqrt(3.0));
+    d.joints = {in, fork, out};
+    d.initial.coordinates = {{1, {0.0, b}}};
+    AtAllLevels(GetParam(), [&](const Column& column) {
+      double worst = 0.0;
+      const Simulation run =
+          Simulate(d, column, Options("dormand-prince", 1e-9), 2.0, [&](const Snapshot& at) {
+            const double law =
+                5.0 * std::cos(b) / (1.0 - std::pow(std::sin(b) * std::cos(5.0 * at.t), 2));
+            worst = std::max(worst, std::abs(std::abs(at.bodies[2].w.dot(axis)) - law));
+          });
+      ASSERT_EQ(run.result.outcome, Outcome::kFinished) << ToString(column);
+      EXPECT_LE(worst, 1e-5) << ToString(column);
+    });
+  }
+}
+
 INSTANTIATE_TEST_SUITE_P(Columns, Driven, testing::ValuesIn(RankRevealingColumns()), NameOfParam);
 
 }  // namespace driven_test

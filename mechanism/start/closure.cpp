@@ -1,0 +1,326 @@
+#include "mechanism/start/closure.h"
+
+#include <algorithm>
+#include <limits>
+#include <numbers>
+#include <random>
+
+#include "mechanism/start/guesses.h"
+
+namespace loopbench {
+
+namespace {
+
+constexpr double kPi = std::numbers::pi;
+constexpr int kMaxIterations = 200;
+/// Positions whose guesses are all missed by less [rad or lengths] are taken for the nearest.
+constexpr double kNear = 0.1;
+
+/// The search ends when so many starts in a row have found nothing nearer: a branch that every
+/// fourth start leads to is missed by one search in 1e6. Positions count as nearer beyond round-off
+/// of their distance, which the end of the iteration leaves.
+constexpr int kStarts = 48;
+constexpr double kNearer = 1e-6;
+/// Work after which no further start is tried, about a second, and after which the last one is
+/// given up; of a step, of an entry of J, and of a product in J J^T.
+constexpr double kMostWork = 1e6, kLastWork = 1e8;
+constexpr double kWorkOfStep = 10.0, kWorkOfEntry = 1.0, kWorkOfProduct = 0.02;
+/// Values of mu, and iterations at each; iterations of a closure from the last.
+constexpr double kPulls[] = {1.0, 0.3, 0.1, 0.03, 0.01};
+constexpr int kPullIterations = 8, kTrialIterations = 40;
+/// Longest step of the search [rad or lengths]: linearised loops mean nothing further away.
+constexpr double kLongestStep = 0.5;
+/// Weight of changes of a coordinate without a guess; of a guessed one it is 1.
+constexpr double kFree = 0.03;
+
+template <class Space>
+class Closure {
+  using Vector = VectorX<double>;
+
+ public:
+  Closure(const MechanismDescription& description, Kinematics<Space, double>& kinematics,
+          const AssemblyUnits<Space>& units, const Vector& guess)
+      : description_(description),
+        mechanism_(kinematics.mechanism()),
+        kinematics_(kinematics),
+        units_(units),
+        guesses_(description, mechanism_, units),
+        guess_(guess),
+        pull_units_(units) {
+    // what rounding leaves of a closure that passes through every body
+    const double eps = std::numeric_limits<double>::epsilon(), extent = Extent(mechanism_, units);
+    goal_ = 16 * eps * extent;
+    // A thousand times the goal is far below any drift worth measuring. Along many joints angles up
+    // to pi add up with eps pi / 2 each, which turns all that is outward: no closure is known
+    // better.
+    closed_ = std::max(1e3 * goal_, kPi * eps * Depth() * extent);
+    for (int i = 0; i < mechanism_.num_u(); ++i) {
+      if (!guesses_.guessed()[i]) pull_units_.columns[i] /= kFree;
+    }
+  }
+
+  void Run(Start<double>* start) {
+    Vector q = guess_, e = Residual(q);
+    if (e.size() > 0) {
+      bool closed = Close(kMaxIterations, &q, &e);
+      Vector nearest = q;
+      if (closed) Unwind(&nearest);
+      Place(nearest);
+      const bool near = closed && guesses_.Farthest(kinematics_) <= kNear;
+      const bool free = std::ranges::find(guesses_.fixed(), false) != guesses_.fixed().end();
+      if (!near && free && Search(closed, &nearest)) closed = true;
+      e = Residual(closed ? q = nearest : q);
+      const Vector row_units = units_.With(kinematics_, guesses_.held());
+      start->position_residual = InSi(e, row_units);
+      closed = closed || IsRounded(e);
+      if (!closed) {
+        start->outcome = Outcome::kInconsistentStart;
+        start->message =
+            mechanism_.name() + ": " +
+            DescribeConflict(description_, kinematics_, {e, row_units, false, guesses_.held()});
+      }
+    }
+    start->q = q;
+  }
+
+ private:
+  /// Whether a residual is within the accuracy of the input: in rad, or parts of the arms of the
+  /// joints that close the loops.
+  bool IsRounded(const Vector& e) const {
+    Vector most = Vector::Zero(e.size());
+    for (int index : mechanism_.constraints()) {
+      const Joint<Space, double>& joint = mechanism_.joints()[index];
+      const JointState<Space, double>& state = kinematics_.joints()[index];
+      const double arm = std::max(state.r_P.norm(), state.r_Q.norm());
+      for (int i = 0; i < joint.num_constraints(); ++i) {
+        const bool turns = state.D(i).angular.squaredNorm() > 0.0;
+        most[joint.row + i] = (turns ? 1.0 : std::min(mechanism_.length(), arm) / units_.length);
+      }
+    }
+    return (e.cwiseAbs().array() <= description_.accuracy * most.array()).all();
+  }
+
+  void Place(const Vector& q) {
+    if (kinematics_.q() != q) kinematics_.UpdatePosition(q);
+  }
+
+  /// e in units, with a row per held coordinate of a cut joint.
+  Vector Residual(const Vector& q) {
+    Place(q);
+    Vector e(mechanism_.num_rows() + static_cast<Eigen::Index>(guesses_.held().size()));
+    for (int index : mechanism_.constraints()) {
+      const Joint<Space, double>& joint = mechanism_.joints()[index];
+      const int rows = joint.num_constraints();
+      const Velocity<Space, double> mismatch = kinematics_.ConstraintMismatch(index);
+      e.segment(joint.row, rows) = kinematics_.joints()[index].Along(mismatch, rows).head(rows);
+    }
+    e.head(mechanism_.num_rows()) = e.head(mechanism_.num_rows()).cwiseQuotient(units_.rows);
+    e.tail(guesses_.held().size()) = guesses_.HeldApart(kinematics_);
+    return e;
+  }
+
+  /// q moved by the speeds d, in units, for unit time (quaternions renormalised).
+  Vector Move(const Vector& q, Vector d) const {
+    ClearFixed(guesses_.fixed(), &d);
+    Vector step(q.size());
+    mechanism_.Rates(q, d.cwiseProduct(units_.columns), step);
+    Vector moved = q + step;
+    mechanism_.Normalise(moved);
+    return moved;
+  }
+
+  /// Levenberg-Marquardt from q, with the residual e, to a closed position: whether it gets there.
+  bool Close(int iterations, Vector* q, Vector* e) {
+    double damping = 1e-3;
+    const VectorX<double> row_units = units_.With(kinematics_, guesses_.held());
+    // where every coordinate is prescribed there is nothing to move
+    if (mechanism_.num_u() == 0) iterations = 0;
+    for (int i = 0; i < iterations && e->template lpNorm<Eigen::Infinity>() > goal_; ++i) {
+      if (searching_ && work_ > kLastWork) break;
+      Place(*q);
+      LeastSquares steps =
+          Solver(LoopRows(kinematics_, units_, row_units, guesses_.held(), guesses_.fixed()));
+      bool improved = false;
+      for (; damping < 1e8 && !improved; damping *= 10) {
+        const Vector trial = Move(*q, -steps.Damped(*e, damping));
+        const Vector e_trial = Residual(trial);
+        if (!(e_trial.norm() < e->norm())) continue;
+        improved = true;
+        *q = trial;
+        *e = e_trial;
+        damping *= 1e-3;  // the loop's own step multiplies by ten
+      }
+      if (!improved) break;
+      damping = std::max(damping, 1e-16);
+    }
+    return e->template lpNorm<Eigen::Infinity>() <= closed_;
+  }
+
+  LeastSquares Solver(SparseRows J) {
+    Vector in_column = Vector::Zero(J.cols());
+    for (Eigen::Index i = 0; i < J.nonZeros(); ++i) in_column[J.innerIndexPtr()[i]] += 1.0;
+    work_ +=
+        kWorkOfStep + kWorkOfEntry * in_column.sum() + kWorkOfProduct * in_column.squaredNorm();
+    return LeastSquares(std::move(J), mechanism_.name(),
+                        searching_ ? LeastSquares::Care::kRough : LeastSquares::Care::kFull);
+  }
+
+  /// |e|^2 + mu^2 |q - guess|^2
+  double Pulled(const Vector& q, double mu) {
+    const double open = Residual(q).squaredNorm();
+    return open + mu * mu *
+                      (guesses_.GuessedApart(q).squaredNorm() +
+                       guesses_.LooseApart(kinematics_).squaredNorm());
+  }
+
+  /// The step d to the minimum of Pulled(), with e linearised. In z = (d + g) / s, where g is
+  /// q - guess, 0 without a guess, and s is 1 or 1 / kFree, it is a damped least-squares problem:
+  ///
+  ///   min |J s z - (J g - e)|^2 + mu^2 |z|^2       guesses of cut joints are rows of J, times mu
+  Vector PullStep(const Vector& q, double mu) {
+    const Vector e = Residual(q), g = guesses_.GuessedApart(q);
+    std::vector<OfCutJoint> cut = guesses_.held();
+    cut.insert(cut.end(), guesses_.loose().begin(), guesses_.loose().end());
+    Vector row_units = units_.With(kinematics_, cut), r(row_units.size());
+    row_units.tail(guesses_.loose().size()) /= mu;
+    SparseRows J = LoopRows(kinematics_, pull_units_, row_units, cut, guesses_.fixed());
+    r << -e, -mu * guesses_.LooseApart(kinematics_);
+    r += J * g;
+    const Vector z = Solver(std::move(J)).Damped(r, mu);
+    const Vector d = z.cwiseProduct(pull_units_.columns).cwiseQuotient(units_.columns) - g;
+    return d * std::min(1.0, kLongestStep / d.template lpNorm<Eigen::Infinity>());
+  }
+
+  void Pull(std::size_t first, Vector* q) {
+    for (std::size_t k = first; k < std::size(kPulls); ++k) {
+      const double mu = kPulls[k];
+      double value = Pulled(*q, mu);
+      for (int i = 0; i < kPullIterations && work_ < kLastWork; ++i) {
+        const double before = value;
+        const Vector d = PullStep(*q, mu);
+        for (double part = 1.0; part > 1e-2 && value >= before; part *= 0.5) {
+          const Vector trial = Move(*q, part * d);
+          const double next = Pulled(trial, mu);
+          if (!(next < before)) continue;
+          *q = trial;
+          value = next;
+        }
+        if (value > 0.99 * before) break;
+      }
+    }
+  }
+
+  /// Takes whole turns off angles, unless cut joints are measured further from their guesses then.
+  void Unwind(Vector* q) {
+    Vector turned = guesses_.Unwound(*q);
+    if (turned == *q) return;
+    Vector e = Residual(turned);
+    if (Close(kTrialIterations, &turned, &e) && Distance(turned) < Distance(*q)) *q = turned;
+  }
+
+  double Distance(const Vector& q) {
+    Place(q);
+    return guesses_.SquaredDistance(kinematics_);
+  }
+
+  /// Speeds of all joints of a loop.
+  std::vector<int> ColumnsOfLoop(int cut_joint) const {
+    std::vector<int> columns;
+    ForEachSpeedOfLoop(kinematics_, cut_joint, [&](int column, const Velocity<Space, double>&) {
+      columns.push_back(column);
+    });
+    return columns;
+  }
+
+  /// Closes the loops from the guesses, from random positions about them, and with the joints of
+  /// one loop moved from the best position so far. False where no start closes.
+  bool Search(bool closed, Vector* best) {
+    std::mt19937_64 generator;
+    // 53 random bits: the same number with every standard library
+    const auto random = [&] { return static_cast<double>(generator() >> 11) * 0x1p-53; };
+    double least = closed ? Distance(*best) : std::numeric_limits<double>::infinity();
+    const std::vector<int>& loops = mechanism_.constraints();
+    work_ = 0.0;
+    searching_ = true;
+    for (int start = 0, in_vain = 0; in_vain < kStarts && work_ < kMostWork; ++start, ++in_vain) {
+      Vector d = Vector::Zero(mechanism_.num_u()), q = guess_;
+      const double most = kPi * random();
+      const auto draw = [&](int column) {
+        d[column] = (guesses_.guessed()[column] ? most : kPi) * (2.0 * random() - 1.0);
+      };
+      if (start > 0 && start % 2 == 0 && least < std::numeric_limits<double>::infinity()) {
+        q = *best;
+        for (int column : ColumnsOfLoop(loops[generator() % loops.size()])) draw(column);
+      } else if (start > 0) {
+        for (int column = 0; column < d.size(); ++column) draw(column);
+      }
+      q = Move(q, d);
+      Pull(start == 0 ? 0 : static_cast<std::size_t>(start) % std::size(kPulls), &q);
+      Vector e = Residual(q);
+      if (!Close(kTrialIterations, &q, &e)) continue;
+      Unwind(&q);
+      const double distance = Distance(q);
+      if (distance >= (1.0 - kNearer) * least) continue;
+      least = distance;
+      *best = q;
+      in_vain = 0;
+    }
+    return least < std::numeric_limits<double>::infinity();
+  }
+
+  /// Joints of the longest way through the tree.
+  double Depth() const {
+    int deepest = 0;
+    std::vector<int> depth(static_cast<std::size_t>(mechanism_.num_bodies()), 0);
+    for (const TreeStep& step : mechanism_.tree()) {
+      depth[step.child] = depth[step.parent] + 1;
+      deepest = std::max(deepest, depth[step.child]);
+    }
+    return deepest;
+  }
+
+  const MechanismDescription& description_;
+  const Mechanism<Space, double>& mechanism_;
+  Kinematics<Space, double>& kinematics_;
+  const AssemblyUnits<Space>& units_;
+  const Guesses<Space> guesses_;
+  const Vector guess_;
+  AssemblyUnits<Space> pull_units_;  ///< of speeds: longer without a guess
+  double goal_, closed_;             ///< of residuals: to reach, and good enough
+  double work_ = 0.0;
+  bool searching_ = false;
+};
+
+}  // namespace
+
+template <class Space>
+void ClosePositions(const MechanismDescription& description, Kinematics<Space, double>& kinematics,
+                    const AssemblyUnits<Space>& units, Start<double>* start) {
+  Closure<Space>(description, kinematics, units, start->q).Run(start);
+}
+
+template <class Space>
+double Extent(const Mechanism<Space, double>& mechanism, const AssemblyUnits<Space>& units) {
+  const auto longer = [&](int index) {
+    const Joint<Space, double>& joint = mechanism.joints()[index];
+    return std::max({mechanism.length(), joint.X_PF.p.norm(), joint.X_QM.p.norm()});
+  };
+  double farthest = mechanism.length(), last = 0.0;
+  std::vector<double> reach(static_cast<std::size_t>(mechanism.num_bodies()), 0.0);
+  for (const TreeStep& step : mechanism.tree()) {
+    reach[step.child] = reach[step.parent] + longer(step.joint);
+    farthest = std::max(farthest, reach[step.child]);
+  }
+  for (int index : mechanism.constraints()) last = std::max(last, longer(index));
+  return (farthest + last) / units.length;
+}
+
+#define LOOPBENCH_INSTANTIATE(Space)                                                    \
+  template void ClosePositions(const MechanismDescription&, Kinematics<Space, double>&, \
+                               const AssemblyUnits<Space>&, Start<double>*);            \
+  template double Extent(const Mechanism<Space, double>&, const AssemblyUnits<Space>&);
+LOOPBENCH_INSTANTIATE(Planar)
+LOOPBENCH_INSTANTIATE(Spatial)
+#undef LOOPBENCH_INSTANTIATE
+
+}  // namespace loopbench

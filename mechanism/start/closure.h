@@ -1,0 +1,32 @@
+// Positions at which all loops are closed, as near as possible to the guesses of a description.
+//
+// With e(q) the mismatch of the cut joints, the coordinates that are not held first go from the
+// guesses to e = 0 by Levenberg-Marquardt: damping vanishes near a solution, and convergence is
+// quadratic. Steps that reach a position next to the guesses are all that is done. Otherwise
+// another branch may be nearer, or angles may have wound: a search then starts from the guesses and
+// from random positions about them and minimises
+//
+//   |e(q)|^2 + mu^2 |q - guess|^2        over the guessed coordinates, for mu falling to 1e-2
+//
+// so that guesses are kept first, coordinates without a guess adapt to them, and guesses give way
+// at last. Of all closed positions found, the one nearest to the guesses is the start. Angles are
+// counted within half a turn of their guesses, since whole turns change no pose.
+#pragma once
+
+#include "mechanism/start/assembly.h"
+#include "mechanism/start/assembly_units.h"
+
+namespace loopbench {
+
+/// From the guesses in `start->q`, sets positions and their residual, or outcome and
+/// message where the loops do not close. `units` are of `kinematics`.
+template <class Space>
+void ClosePositions(const MechanismDescription& description, Kinematics<Space, double>& kinematics,
+                    const AssemblyUnits<Space>& units, Start<double>* start);
+
+/// A length that no position exceeds much, in units: all arms of the longest way through the
+/// tree, each at least as long as the mechanism's own length, and those of cut joints.
+template <class Space>
+double Extent(const Mechanism<Space, double>& mechanism, const AssemblyUnits<Space>& units);
+
+}  // namespace loopbench

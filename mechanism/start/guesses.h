@@ -1,0 +1,72 @@
+// Guesses of a description, and how far positions are from them.
+//
+// Tree joints differ from their guesses by coordinates, counted with their turns; where there is a
+// quaternion, by the rotation vector from one to the other. Joints that close loops are measured,
+// angles modulo a turn: in the plane they have turns, which count where a force depends on them.
+#pragma once
+
+#include "mechanism/start/assembly.h"
+#include "mechanism/start/assembly_units.h"
+
+namespace loopbench {
+
+template <class Space>
+class Guesses {
+ public:
+  /// `mechanism` is in joint coordinates. All are kept by reference.
+  Guesses(const MechanismDescription& description, const Mechanism<Space, double>& mechanism,
+          const AssemblyUnits<Space>& units);
+
+  /// Speeds of held joints; and of others with a guess.
+  const std::vector<bool>& fixed() const { return fixed_; }
+  const std::vector<bool>& guessed() const { return guessed_; }
+  /// Free coordinates of cut joints that have values: held ones, and others.
+  const std::vector<OfCutJoint>& held() const { return held_.free; }
+  const std::vector<OfCutJoint>& loose() const { return loose_.free; }
+
+  /// q less GuessedPositions(), by speed, in units.
+  VectorX<double> Apart(const VectorX<double>& q) const;
+  /// The same with 0 for all that is not guessed.
+  VectorX<double> GuessedApart(const VectorX<double>& q) const;
+  /// held() and loose() as measured less their values, in units.
+  VectorX<double> HeldApart(const Kinematics<Space, double>& at) const { return Apart(held_, at); }
+  VectorX<double> LooseApart(const Kinematics<Space, double>& at) const {
+    return Apart(loose_, at);
+  }
+
+  /// Sum of squares in units. Coordinates without a guess have a weight that decides only between
+  /// positions which are equally far from all guesses.
+  double SquaredDistance(const Kinematics<Space, double>& at) const;
+  /// The largest difference from a guess, in units.
+  double Farthest(const Kinematics<Space, double>& at) const;
+  std::vector<MissedGuess> Missed(const Kinematics<Space, double>& at) const;
+
+  /// q with whole turns taken off angles that are more than half a turn from their guesses.
+  VectorX<double> Unwound(VectorX<double> q) const;
+
+ private:
+  /// Cut joints with values.
+  struct CutJoints {
+    struct Values {
+      int joint;
+      const double* values;
+      bool turns_count;
+    };
+    std::vector<Values> values;
+    std::vector<OfCutJoint> free;  ///< of all of them, in order
+  };
+
+  void SetColumns(const Joint<Space, double>& joint, std::vector<bool>* columns) const;
+  bool IsAngle(const Joint<Space, double>& joint, int coordinate) const;
+  VectorX<double> Apart(const CutJoints& cut, const Kinematics<Space, double>& at) const;
+
+  const MechanismDescription& description_;
+  const Mechanism<Space, double>& mechanism_;
+  const AssemblyUnits<Space>& units_;
+  VectorX<double> guess_;
+  std::vector<bool> is_held_;          ///< by joint
+  std::vector<bool> fixed_, guessed_;  ///< by speed
+  CutJoints held_, loose_;
+};
+
+}  // namespace loopbench

@@ -1,0 +1,177 @@
+// Redundant constraints off the loops: rows are derivatives of their mismatch, and accelerations do
+// not depend on the released rows.
+#include "mechanism/loops/self_stress.h"
+
+#include <gtest/gtest.h>
+
+#include "lagrange/lagrange.h"
+#include "mechanism/description/library.h"
+#include "mechanism/formulation/system.h"
+#include "mechanism/simplify/redundancy.h"
+#include "mechanism/start/assembly.h"
+#include "odca/odca.h"
+#include "reduction/reduction.h"
+#include "tests/mechanism/shipped.h"
+
+namespace loopbench {
+namespace {
+
+using testing::Shipped;
+
+/// A body on two joints of a kind on one axis, of which the second releases everything.
+MechanismDescription Door(JointType type) {
+  MechanismDescription d;
+  d.name = "door";
+  d.space = SpaceKind::kSpatial;
+  d.bodies.push_back(Bar("door", 1.0, 1.0, 1.0));
+  for (const double z : {0.0, 2.0}) {
+    const Eigen::Vector3d at(0.0, 0.0, z);
+    d.joints.push_back(Revolute("hinge" + std::to_string(static_cast<int>(z)), 0, at, 1, at));
+    d.joints.back().type = type;
+    if (type == JointType::kHelical) d.joints.back().parameter = 0.3;
+  }
+  d.joints[1].cut = true;
+  const int rows = KindOf<Spatial, double>(type).num_constraints();
+  for (int i = 0; i < rows; ++i) d.joints[1].released.push_back(i);
+  return d;
+}
+
+/// The mismatch of the first joint by row, its rate and its second rate for udot = 0.
+struct Rows {
+  Components<Spatial, double> e, rate, second;
+};
+
+Rows RowsAt(Kinematics<Spatial, double>& kinematics, const VectorX<double>& q,
+            const VectorX<double>& u) {
+  kinematics.UpdatePosition(q);
+  kinematics.UpdateVelocity(u);
+  const Mechanism<Spatial, double>& mechanism = kinematics.mechanism();
+  std::vector<Acceleration<Spatial, double>> A(2, Acceleration<Spatial, double>::Zero());
+  TreeDynamics<Spatial, double>(mechanism).BodyAccelerations(
+      kinematics, VectorX<double>::Zero(mechanism.num_u()), A);
+  const JointState<Spatial, double>& joint = kinematics.joints()[0];
+  return {joint.Along(kinematics.ConstraintMismatch(0), joint.rows()),
+          joint.Along(joint.V_rel, joint.rows()),
+          JointAcceleration<Spatial, double>(kinematics, 0, A)};
+}
+
+/// q after a time with constant speeds, by the classical method of order four.
+VectorX<double> After(const Mechanism<Spatial, double>& mechanism, const VectorX<double>& q,
+                      const VectorX<double>& u, double time) {
+  VectorX<double> k1(q.size()), k2(q.size()), k3(q.size()), k4(q.size());
+  mechanism.Rates(q, u, k1);
+  mechanism.Rates(q + 0.5 * time * k1, u, k2);
+  mechanism.Rates(q + 0.5 * time * k2, u, k3);
+  mechanism.Rates(q + time * k3, u, k4);
+  return q + time / 6.0 * (k1 + 2.0 * k2 + 2.0 * k3 + k4);
+}
+
+class ExactRows : public ::testing::TestWithParam<JointType> {};
+
+TEST_P(ExactRows, AreDerivativesOfTheMismatchToFirstOrder) {
+  const Mechanism<Spatial, double> mechanism(Door(GetParam()), Coordinates::kAbsolute);
+  Kinematics<Spatial, double> kinematics(mechanism);
+  constexpr double kTilt = 1e-3, kStep = 1e-3;
+  VectorX<double> q(7), u(6);
+  // turned about a free axis
+  const int axis = GetParam() == JointType::kUniversal ? 0 : 2;
+  q << 1.0, 0.4 * kTilt, -0.7 * kTilt, 0.3 * kTilt, 0.2 * kTilt, 0.5 * kTilt, -0.6 * kTilt;
+  u << 0.3 * kTilt, -0.2 * kTilt, 0.2 * kTilt, 0.5 * kTilt, 0.1 * kTilt, -0.4 * kTilt;
+  q[1 + axis] = 0.3;
+  u[axis] = 2.0;
+  mechanism.Normalise(q);
+  const Rows at = RowsAt(kinematics, q, u);
+  const Rows ahead = RowsAt(kinematics, After(mechanism, q, u, kStep), u);
+  const Rows behind = RowsAt(kinematics, After(mechanism, q, u, -kStep), u);
+  // terms of second order in the tilt, times the square of the speed, and the differences' own
+  // error
+  const double bound = 20.0 * kTilt * kTilt * 4.0 + kStep * kStep * kTilt * 16.0;
+  for (int i = 0; i < kinematics.joints()[0].rows(); ++i) {
+    EXPECT_NEAR((ahead.e[i] - behind.e[i]) / (2.0 * kStep), at.rate[i], bound) << i;
+    EXPECT_NEAR((ahead.e[i] - 2.0 * at.e[i] + behind.e[i]) / (kStep * kStep), at.second[i], bound)
+        << i;
+  }
+}
+
+INSTANTIATE_TEST_SUITE_P(Kinds, ExactRows,
+                         ::testing::Values(JointType::kRevolute, JointType::kCylindrical,
+                                           JointType::kPinInSlot, JointType::kPlanar,
+                                           JointType::kUniversal, JointType::kHelical),
+                         [](const auto& one) {
+                           std::string name(ToString(one.param));
+                           std::erase(name, '-');
+                           return name;
+                         });
+
+using Solver = std::unique_ptr<System<Spatial, double>> (*)(const Mechanism<Spatial, double>&,
+                                                            const FormulationOptions&);
+
+struct Off {
+  const char* mechanism;
+  Coordinates coordinates;
+};
+
+class ReleasedRows : public ::testing::TestWithParam<Off> {};
+
+/// Accelerations at a state that misses the loops by about `off`, for each choice of three of the
+/// five rows of the joint that closes the loop; the largest difference between two choices.
+double Spread(const Off& scene, Solver make, Enforcement level, double off) {
+  MechanismDescription description = Shipped(scene.mechanism);
+  const Redundancy redundancy = FindRedundancy(description);
+  description = Release(description, redundancy);
+  const int cut = redundancy.released[0].joint;
+  const auto count = redundancy.released[0].directions.size();
+  VectorX<double> first;
+  double spread = 0.0;
+  for (unsigned rows = 0; rows < 32; ++rows) {
+    std::vector<int>& released = description.joints[cut].released;
+    released.clear();
+    for (int i = 0; i < 5; ++i) {
+      if (rows >> i & 1) released.push_back(i);
+    }
+    if (released.size() != count) continue;
+    const Mechanism<Spatial, double> mechanism(description, scene.coordinates);
+    Start<double> start = Assemble<Spatial>(description, mechanism);
+    for (int i = 0; i < start.q.size(); ++i) start.q[i] += off * std::sin(1.0 + 2.3 * i);
+    for (int i = 0; i < start.u.size(); ++i) start.u[i] += off * std::cos(1.0 + 1.7 * i);
+    mechanism.Normalise(start.q);
+    FormulationOptions options;
+    options.solver = SolverKind::kRankRevealing;
+    options.enforcement = level;
+    const auto system = make(mechanism, options);
+    // a choice that is lost here is replaced
+    EXPECT_EQ(system->Start(0.0, start.q, start.u), Outcome::kFinished);
+    VectorX<double> udot;
+    EXPECT_EQ(system->Evaluate(0.0, start.q, start.u, udot), Outcome::kFinished);
+    if (first.size() == 0) first = udot;
+    spread = std::max(spread, (udot - first).lpNorm<Eigen::Infinity>());
+  }
+  return spread;
+}
+
+TEST_P(ReleasedRows, ChangeAccelerationsToSecondOrderInTheMismatchAlone) {
+  const std::vector<Solver> solvers = {
+      [](const auto& m, const auto& o) { return MakeSystem<odca::Odca>(m, o); },
+      [](const auto& m, const auto& o) { return MakeSystem<lagrange::Lagrange>(m, o); },
+      [](const auto& m, const auto& o) { return MakeSystem<reduction::Reduction>(m, o); }};
+  for (const Solver make : solvers) {
+    const double coarse = Spread(GetParam(), make, Enforcement::kAcceleration, 1e-3);
+    const double fine = Spread(GetParam(), make, Enforcement::kAcceleration, 1e-5);
+    // a factor of 1e4 but for third order and round-off
+    EXPECT_LT(fine, 2e-4 * coarse + 1e-10);
+    // imposed rows alone are of first order: a factor of 100
+    EXPECT_GT(Spread(GetParam(), make, Enforcement::kPosition, 1e-5), 30.0 * fine);
+  }
+}
+
+INSTANTIATE_TEST_SUITE_P(
+    Linkages, ReleasedRows,
+    ::testing::Values(Off{"bennett", Coordinates::kJoint}, Off{"goldberg", Coordinates::kJoint}),
+    [](const auto& one) {
+      std::string name(one.param.mechanism);
+      std::erase(name, '-');
+      return name + (one.param.coordinates == Coordinates::kJoint ? "Joint" : "Absolute");
+    });
+
+}  // namespace
+}  // namespace loopbench

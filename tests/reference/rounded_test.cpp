@@ -1,0 +1,104 @@
+// Files with few digits: loops close within their accuracy, and what differs by less is redundant.
+#include <gtest/gtest.h>
+
+#include <cmath>
+#include <numbers>
+
+#include "mechanism/simplify/redundancy.h"
+#include "mechanism/start/assembly.h"
+#include "tests/reference/cases.h"
+
+namespace loopbench::harness::reference {
+namespace rounded_test {
+
+constexpr double kQuarter = std::numbers::pi / 2;
+
+/// A planar four-bar described in space. The crank's axis and that of the joint which closes the
+/// loop stand at `angle` from z, a quarter turn in a file with enough digits.
+MechanismFile FourBar(double angle) {
+  const auto text = [](double a) { return std::to_string(a) + ", 0, 0"; };
+  std::string rotation = text(angle);
+  if (angle == kQuarter) rotation = "1.5707963267948966, 0, 0";
+  return ParseMechanism(R"({
+    "name": "rounded", "space": "spatial", "gravity": [0, 0, -9.81],
+    "bodies": [
+      {"name": "crank", "mass": 1.0, "inertia": [0.0075, 0.001, 0.0075], "com": [0, 0.15, 0]},
+      {"name": "coupler", "mass": 1.5, "inertia": [0.001, 0.08, 0.08], "com": [0.4, 0, 0]},
+      {"name": "rocker", "mass": 1.2, "inertia": [0.025, 0.025, 0.001], "com": [0, 0, 0.25]}],
+    "joints": [
+      {"name": "A", "type": "revolute", "from": {"body": "ground", "rotation": [)" +
+                            rotation + R"(]},
+       "to": {"body": "crank"}, "axis": [0, 0, 1]},
+      {"name": "B", "type": "revolute", "from": {"body": "crank", "at": [0, 0.3, 0]},
+       "to": {"body": "coupler"}, "axis": [0, 0, 1]},
+      {"name": "D", "type": "revolute", "from": {"body": "ground", "at": [0.8, 0, -0.2]},
+       "to": {"body": "rocker"}, "axis": [0, -1, 0]},
+      {"name": "C", "type": "revolute", "from": {"body": "coupler", "at": [0.8, 0, 0]},
+       "to": {"body": "rocker", "at": [0, 0, 0.5], "rotation": [)" +
+                            rotation + R"(]}, "axis": [0, 0, 1], "cut": true}],
+    "initial": {"coordinates": {"A": 0.3, "B": -0.2, "D": 0.2}, "held": ["A"]}
+  })",
+                        "rounded.json");
+}
+
+class Lean : public ::testing::TestWithParam<double> {};
+
+TEST_P(Lean, IsNamedAndLeavesTheMechanismFreeToMove) {
+  const MechanismFile file = FourBar(kQuarter + GetParam());
+  const Redundancy found = FindRedundancy(file.description);
+  EXPECT_EQ(found.rank, 2);
+  ASSERT_EQ(found.released.size(), 1u);
+  EXPECT_EQ(found.released[0].directions.size(), 3u);
+  // within a factor that the arms of the linkage explain
+  EXPECT_GT(found.rounding, 0.1 * GetParam());
+  EXPECT_LT(found.rounding, 10.0 * GetParam());
+}
+
+TEST_P(Lean, ChangesAMotionByItsOwnSize) {
+  const MechanismFile exact = FourBar(kQuarter), leaning = FourBar(kQuarter + GetParam());
+  for (const std::string formulation : {"odca", "lagrange", "reduction"}) {
+    for (const Coordinates set : {Coordinates::kJoint, Coordinates::kAbsolute}) {
+      for (const Enforcement level : {Enforcement::kVelocity, Enforcement::kPosition}) {
+        const auto end = [&](const MechanismFile& file) {
+          Experiment experiment = Single(file);
+          experiment.compile.planar = false;
+          const Column column{.formulation = formulation,
+                              .enforcement = level,
+                              .coordinates = set,
+                              .solver = SolverKind::kRankRevealing};
+          return RunCase(experiment, CaseOf(experiment, file.description.name, column, 1e-9, 1.0));
+        };
+        const Record expected = end(exact), record = end(leaning);
+        EXPECT_EQ(record.Text("outcome"), "finished");
+        // loops close: what lean is left over belongs to rows that are not imposed
+        if (level == Enforcement::kPosition) {
+          EXPECT_LT(record.Number("drift_position_max"), 1e-13);
+        }
+        // some 200 steps with errors of the tolerance
+        EXPECT_LT(std::abs(record.Number("energy_error_relative")), 1e-7);
+        EXPECT_NEAR(record.Number("steps"), expected.Number("steps"), 5);
+      }
+    }
+  }
+}
+
+INSTANTIATE_TEST_SUITE_P(Leans, Lean, ::testing::Values(3.7e-6, 1e-5),
+                         [](const auto& one) { return one.param < 5e-6 ? "SixDigits" : "Most"; });
+
+TEST(RoundedInput, AnExactLinkageStaysExact) {
+  const Redundancy found = FindRedundancy(FourBar(kQuarter).description);
+  EXPECT_EQ(found.rank, 2);
+  EXPECT_EQ(found.rounding, 0.0);
+}
+
+TEST(RoundedInput, ALeanBeyondTheAccuracyIsNoRounding) {
+  MechanismFile file = FourBar(kQuarter + 1e-4);
+  const Mechanism<Spatial, double> mechanism(file.description, Coordinates::kJoint);
+  EXPECT_NE(Assemble<Spatial>(file.description, mechanism).outcome, Outcome::kFinished);
+  // unless the file is less accurate
+  file.description.accuracy = 1e-3;
+  EXPECT_EQ(Assemble<Spatial>(file.description, mechanism).outcome, Outcome::kFinished);
+}
+
+}  // namespace rounded_test
+}  // namespace loopbench::harness::reference

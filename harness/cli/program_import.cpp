@@ -54,6 +54,8 @@ ImportCommandOptions::ImportCommandOptions(CLI::App& app) {
                    "Sidecar (JSON): loops, joints, forces, initial, gravity, observe");
   app_->add_flag("--planar", options.planar, "As a planar mechanism, which it must be");
   app_->add_flag("--floating", options.floats, "URDF: the root link is free, not fixed");
+  app_->add_flag("--keep-digits", options.keeps_digits,
+                 "Keep rounded angles and directions (1.5708) as written");
   app_->add_option("--gravity", gravity_, "x,y,z in place of the file's [m/s^2]");
   app_->add_flag("--json", import_.json,
                  "One JSON document instead (docs/exchange.md has its keys)");

@@ -17,6 +17,7 @@ struct ImportOptions {
   std::filesystem::path sidecar;           ///< loops, forces and a start beside the file; "": none
   bool planar = false;                     ///< as a planar mechanism, which it must be
   bool floats = false;                     ///< URDF: the root link is free, not fixed to the ground
+  bool keeps_digits = false;               ///< rounded angles and directions stay as written
   std::optional<Eigen::Vector3d> gravity;  ///< in place of the file's or the format's [m/s^2]
 };
 

@@ -5,8 +5,6 @@
 #include <algorithm>
 #include <cmath>
 
-#include "mechanism/algebra/symmetric_eigen.h"
-
 namespace loopbench::harness {
 
 Eigen::Quaterniond UnitQuaternion(const XmlValue& value, const Eigen::Quaterniond& q) {
@@ -91,23 +89,6 @@ JointDescription& ImportDraft::AddJoint(const std::string& name, JointType type,
   return description.joints.back();
 }
 
-void ImportDraft::CheckMass(int index) const {
-  constexpr double kPrinted = 0.01;  // as mechanism files allow (mechanism_bodies.cpp)
-  const XmlElement& element = elements_[static_cast<std::size_t>(index)];
-  const BodyDescription& body = description.bodies[static_cast<std::size_t>(index)];
-  if (!(body.mass > 0.0)) element.Fail("a mass of 0 beside an inertia", "a mass > 0");
-  if (!std::isfinite(body.mass) || !body.com.allFinite() || !body.inertia.allFinite()) {
-    element.Fail("numbers too large for its mass and inertia", "a body of finite mass and size");
-  }
-  const Eigen::Vector3d moments = SymmetricEigenvalues(body.inertia);
-  const std::string shown = fmt::format("principal moments {:.4g}, {:.4g}, {:.4g} kg m^2",
-                                        moments[0], moments[1], moments[2]);
-  if (!(moments[0] > 0.0)) element.Fail(shown, "three that are > 0");
-  if (moments[2] > (1.0 + kPrinted) * (moments[0] + moments[1])) {
-    element.Fail(shown, "none larger than the sum of the other two, as no body's is");
-  }
-}
-
 void ImportDraft::AddLift(int body, double share) { lifts_.emplace_back(body, share); }
 
 void ImportDraft::AssumeGravity(const XmlElement& element, double gravity) {
@@ -121,8 +102,9 @@ void ImportDraft::Note(const XmlElement& element, std::string reason, bool chang
 
 void ImportDraft::Note(const XmlElement& element, const std::string& attribute, std::string reason,
                        bool changes_motion) {
-  notes_.push_back(
-      {element.line(), element.Shown() + " " + attribute, std::move(reason), changes_motion});
+  std::string shown = element.Shown();
+  if (!attribute.empty()) shown += " " + attribute;
+  notes_.push_back({element.line(), std::move(shown), std::move(reason), changes_motion});
 }
 
 void ImportDraft::NoteUnread(std::span<const DroppedReason> reasons) {
@@ -142,12 +124,9 @@ void ImportDraft::NoteUnread(std::span<const DroppedReason> reasons) {
       if (known == reasons.end()) known = find("@" + attribute);
     }
     if (known == reasons.end()) {
-      const std::string reason = "dropped: not known to this reader";
-      attribute.empty() ? Note(element, reason, true) : Note(element, attribute, reason, true);
+      Note(element, attribute, "dropped: not known to this reader", true);
     } else if (!known->reason.empty()) {
-      const std::string reason = fmt::format("dropped: {}", known->reason);
-      attribute.empty() ? Note(element, reason, known->changes_motion)
-                        : Note(element, attribute, reason, known->changes_motion);
+      Note(element, attribute, fmt::format("dropped: {}", known->reason), known->changes_motion);
     }
   });
 }

@@ -50,13 +50,19 @@ class ImportDraft {
                              const Placement& X_PF, int to, const Placement& X_QM);
   int last_joint() const { return static_cast<int>(description.joints.size()) - 1; }
 
-  /// Refuses mass and inertia that no body has.
-  void CheckMass(int body) const;
+  /// The body's mass stands in what is not read: refused, with the value that says so, if it moves.
+  void LeaveMass(int body, const XmlValue& value) { without_mass_.emplace_back(body, value); }
   /// As many times its weight, upwards: what a body without gravity feels.
   void AddLift(int body, double share);
 
   /// What the format takes where the file says nothing [m/s^2], along -z.
   void AssumeGravity(const XmlElement& element, double gravity);
+
+  /// The numbers of a value by their `kinds`: 'a' an angle [rad], 'd' the 3 of a direction, 'q' the
+  /// 4 of a quaternion, 'r' with its scalar last, 'n' others. Rounded ones are exact, and noted.
+  std::vector<double> Numbers(const XmlValue& value, std::string_view kinds);
+  /// 3 of them.
+  Eigen::Vector3d Vector(const XmlValue& value, std::string_view kinds);
 
   void Note(const XmlElement& element, std::string reason, bool changes_motion = false);
   void Note(const XmlElement& element, const std::string& attribute, std::string reason,
@@ -64,14 +70,18 @@ class ImportDraft {
   /// A note for all that was not read.
   void NoteUnread(std::span<const DroppedReason> reasons);
 
-  /// Sidecar, bodies without mass, floating parts, plane; then it is a mechanism.
+  /// Sidecar, floating parts, bodies that are fixed together, plane; then it is a mechanism.
   Imported Finish(const std::string& format);
 
  private:
   void NameJoints();
-  void MergeMassless();
-  void RefuseMassless(int body) const;
   void HoldFloatingParts();
+  void CheckUnreadMasses() const;
+  /// Merges bodies that are none by themselves with those that welds fix them to; with `whole`, all
+  /// bodies that are fixed together with one of them.
+  void MergeFixed(bool whole);
+  /// Refuses masses and inertias of bodies that move, with all that was merged.
+  void CheckMasses() const;
   void MakeBallsPins(const Eigen::Vector3d& n);
   void GoToPlane();
 
@@ -83,7 +93,9 @@ class ImportDraft {
   exchange::UniqueNames joints_;
   std::vector<std::pair<std::size_t, std::string>> stems_;  ///< of joints without names
   std::vector<ImportNote> notes_;
+  std::size_t rounded_ = 0, rounded_note_ = 0;  ///< values that were rounded; the note of the first
   std::vector<std::pair<int, double>> lifts_;
+  std::vector<std::pair<int, XmlValue>> without_mass_;
   std::optional<XmlElement> assumed_gravity_;  ///< who would have had to say it
 };
 

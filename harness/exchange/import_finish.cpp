@@ -2,10 +2,13 @@
 #include <fmt/format.h>
 
 #include <algorithm>
+#include <cmath>
+#include <limits>
 
 #include "harness/config/sidecar.h"
 #include "harness/exchange/import_draft.h"
 #include "harness/text/config_error.h"
+#include "mechanism/algebra/symmetric_eigen.h"
 #include "mechanism/description/islands.h"
 #include "mechanism/simplify/attach.h"
 
@@ -13,17 +16,44 @@ namespace loopbench::harness {
 
 namespace {
 
-bool IsMassless(const BodyDescription& body) { return body.mass == 0.0; }
+/// Why a body cannot move by itself, and what it needs; "" where it can.
+struct MassFault {
+  std::string found, expected;
+};
 
-/// The bodies that welds hold to `root` through bodies without mass, with the root's carrier: the
-/// ground if it is among them, else the first with a mass.
+MassFault MassFaultOf(const BodyDescription& body) {
+  constexpr double kPrinted = 0.01;  // as mechanism files allow (mechanism_bodies.cpp)
+  // elements of a sum of turned inertias carry some rounding errors of its largest moment each
+  constexpr double kRoundOff = 64.0 * std::numeric_limits<double>::epsilon();
+  if (!std::isfinite(body.mass) || !body.com.allFinite() || !body.inertia.allFinite()) {
+    return {"numbers too large for its mass and inertia", "a body of finite mass and size"};
+  }
+  if (body.mass == 0.0) {
+    return {"a body without mass that moves",
+            "a mass > 0, or a joint that fixes it to a body with one: nothing could accelerate it"};
+  }
+  const Eigen::Vector3d moments = SymmetricEigenvalues(body.inertia);
+  const std::string shown =
+      fmt::format("principal moments {:.4g}, {:.4g}, {:.4g} kg m^2, with all that is fixed to it",
+                  moments[0], moments[1], moments[2]);
+  if (!(moments[0] > kRoundOff * moments[2])) return {shown, "three that are > 0"};
+  if (moments[2] > (1.0 + kPrinted) * (moments[0] + moments[1])) {
+    return {shown, "none larger than the sum of the other two, as no body's is"};
+  }
+  return {};
+}
+
+/// Bodies that welds hold to `root`, and the one of them or beside them that carries the others:
+/// the ground if it is there, else the first that is sound, else the first with a mass.
 class Cluster {
  public:
-  /// `welds`: numbers of the welds at each body.
+  /// `welds`: numbers of the welds at each body. Bodies that are sound end the cluster and carry
+  /// it, unless it is the `whole` of what is fixed together.
   Cluster(const MechanismDescription& description, const std::vector<std::vector<int>>& welds,
-          int root)
-      : d_(description) {
+          const std::vector<bool>& sound, bool whole, int root)
+      : d_(description), sound_(sound) {
     poses_[root] = Frame();
+    Consider(root);
     std::vector<int> queue = {root};
     for (std::size_t k = 0; k < queue.size(); ++k) {
       for (const int weld : welds[static_cast<std::size_t>(queue[k])]) {
@@ -32,18 +62,18 @@ class Cluster {
              {std::pair{&joint.from, &joint.to}, {&joint.to, &joint.from}}) {
           if (here->body != queue[k] || poses_.contains(there->body)) continue;
           poses_[there->body] = poses_[here->body] * PoseOf(*here) * PoseOf(*there).Inverse();
-          if (there->body == kGround || (carrier_ < 0 && !IsMasslessBody(there->body))) {
-            carrier_ = there->body;
-          }
-          if (IsMasslessBody(there->body)) queue.push_back(there->body);
+          Consider(there->body);
+          const bool ends = there->body == kGround || (IsSound(there->body) && !whole);
+          if (!ends) queue.push_back(there->body);
         }
       }
     }
-    massless_ = std::move(queue);
+    members_ = std::move(queue);
   }
 
+  /// -1: none has a mass.
   int carrier() const { return carrier_; }
-  const std::vector<int>& massless() const { return massless_; }
+  const std::vector<int>& members() const { return members_; }
   Attachment AttachmentOf(int body) const {
     Attachment at;
     at.carrier = carrier_;
@@ -53,14 +83,22 @@ class Cluster {
   }
 
  private:
-  bool IsMasslessBody(int body) const {
-    return body != kGround && IsMassless(d_.bodies[static_cast<std::size_t>(body)]);
+  bool IsSound(int body) const { return sound_[static_cast<std::size_t>(body)]; }
+  void Consider(int body) {
+    const int rank = body == kGround                                        ? 3
+                     : IsSound(body)                                        ? 2
+                     : d_.bodies[static_cast<std::size_t>(body)].mass > 0.0 ? 1
+                                                                            : 0;
+    if (rank <= rank_) return;
+    rank_ = rank;
+    carrier_ = body;
   }
 
   const MechanismDescription& d_;
+  const std::vector<bool>& sound_;
   std::map<int, Frame> poses_;
-  std::vector<int> massless_;
-  int carrier_ = -1;
+  std::vector<int> members_;
+  int carrier_ = -1, rank_ = 0;
 };
 
 std::vector<std::vector<int>> WeldsAtBodies(const MechanismDescription& description) {
@@ -77,43 +115,70 @@ std::vector<std::vector<int>> WeldsAtBodies(const MechanismDescription& descript
 
 }  // namespace
 
-void ImportDraft::RefuseMassless(int body) const {
-  elements_[static_cast<std::size_t>(body)].Fail(
-      "a body without mass that moves",
-      "a mass > 0, or a joint that fixes it to a body with one: nothing could accelerate it");
+void ImportDraft::CheckUnreadMasses() const {
+  if (without_mass_.empty()) return;
+  const std::vector<bool> sound(description.bodies.size(), true);
+  const Cluster fixed(description, WeldsAtBodies(description), sound, true, kGround);
+  const std::set<int> members(fixed.members().begin(), fixed.members().end());
+  for (const auto& [body, value] : without_mass_) {
+    if (!members.contains(body)) value.Fail("false: masses are not found from shapes");
+  }
 }
 
-void ImportDraft::MergeMassless() {
+void ImportDraft::MergeFixed(bool whole) {
   const std::size_t count = description.bodies.size();
+  std::vector<bool> sound(count), seen(count);
+  for (std::size_t i = 0; i < count; ++i) {
+    sound[i] = i == kGround || MassFaultOf(description.bodies[i]).found.empty();
+  }
   std::vector<Attachment> attachments(count);
   const std::vector<std::vector<int>> welds = WeldsAtBodies(description);
   bool any = false;
   for (std::size_t i = 1; i < count; ++i) {
-    if (!IsMassless(description.bodies[i]) || attachments[i].attached) continue;
-    const Cluster cluster(description, welds, static_cast<int>(i));
-    if (cluster.carrier() < 0) RefuseMassless(static_cast<int>(i));
-    for (const int body : cluster.massless()) {
+    if (sound[i] || seen[i]) continue;
+    const Cluster cluster(description, welds, sound, whole, static_cast<int>(i));
+    for (const int body : cluster.members()) {
       const auto index = static_cast<std::size_t>(body);
+      seen[index] = true;
+      if (body == cluster.carrier() || cluster.carrier() < 0) continue;
       attachments[index] = cluster.AttachmentOf(body);
       const auto carrier = static_cast<std::size_t>(cluster.carrier());
       const BodyDescription& merged = description.bodies[index];
-      std::string reason = fmt::format("without mass and fixed: merged with \"{}\"",
-                                       description.bodies[carrier].name);
+      const char* why = merged.mass == 0.0 ? "without mass and fixed"
+                        : sound[index]     ? "fixed to a body without an inertia of its own"
+                                           : "without an inertia of its own and fixed";
+      std::string reason =
+          fmt::format("{}: merged with \"{}\"", why, description.bodies[carrier].name);
       if (!merged.points.empty()) reason += fmt::format(", points are \"{}.POINT\"", merged.name);
       Note(elements_[index], reason);
+      any = true;
     }
-    any = true;
   }
   if (!any) return;
   Renumbering renumbering;
-  description = Attach(description, attachments, &renumbering);
-  std::vector<Placement> rest(description.bodies.size());
-  for (std::size_t i = 0; i < count; ++i) {
-    if (renumbering.bodies[i] >= 0) {
-      rest[static_cast<std::size_t>(renumbering.bodies[i])] = at_rest[i];
-    }
+  MechanismDescription merged_description = Attach(description, attachments, &renumbering);
+  for (std::size_t j = 0; j < description.joints.size(); ++j) {
+    const JointDescription& joint = description.joints[j];
+    if (renumbering.joints[j] >= 0 || joint.type == JointType::kWeld) continue;
+    Note(elements_[static_cast<std::size_t>(joint.to.body)],
+         fmt::format("joint \"{}\" dropped: it leads from a body to what is fixed to it",
+                     joint.name));
   }
-  at_rest = std::move(rest);
+  description = std::move(merged_description);
+  for (std::size_t i = 0; i < count; ++i) {
+    if (renumbering.bodies[i] < 0) continue;
+    const auto kept = static_cast<std::size_t>(renumbering.bodies[i]);  // never above i
+    at_rest[kept] = at_rest[i];
+    elements_[kept] = elements_[i];
+  }
+  at_rest.resize(description.bodies.size());
+}
+
+void ImportDraft::CheckMasses() const {
+  for (std::size_t i = 1; i < description.bodies.size(); ++i) {
+    const MassFault fault = MassFaultOf(description.bodies[i]);
+    if (!fault.found.empty()) elements_[i].Fail(fault.found, fault.expected);
+  }
 }
 
 void ImportDraft::HoldFloatingParts() {
@@ -153,11 +218,18 @@ Imported ImportDraft::Finish(const std::string& format) {
     description.forces.emplace_back(
         PointForce{{body, lifted.com}, -share * lifted.mass * description.gravity, false});
   }
-  if (description.bodies.size() < 2) {
-    elements_[kGround].Fail("no body", "at least one that is not the ground");
+  if (rounded_ > 0) {
+    notes_[rounded_note_].reason += fmt::format(
+        "; values with rounded angles or directions: {} (--keep-digits keeps them)", rounded_);
   }
-  MergeMassless();
   HoldFloatingParts();
+  CheckUnreadMasses();
+  MergeFixed(false);
+  MergeFixed(true);
+  CheckMasses();
+  if (description.bodies.size() < 2) {
+    elements_[kGround].Fail("no body", "at least one that is not fixed to the ground");
+  }
   if (options_.planar) GoToPlane();
   const std::string fault = Validate(description);
   if (!fault.empty()) throw ConfigError(fmt::format("{}: {}", file_.name(), fault));

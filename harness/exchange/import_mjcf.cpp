@@ -234,9 +234,7 @@ void ReadMjcf(const XmlElement& root, ImportDraft* draft) {
   AdjustMasses(&model);
   const auto held = HeldTendons(root, &model);
   for (const XmlElement& section : root.Children("equality")) ReadMjcfEquality(section, &model);
-  for (const XmlElement& section : root.Children("tendon")) {
-    ReadMjcfTendons(section, held, &model);
-  }
+  ReadMjcfTendons(root, held, &model);
   ReadMjcfKeys(root, &model);
   model.defaults.IgnoreUnused();
   for (const char* silent : {"visual", "statistic", "size", "custom"}) {

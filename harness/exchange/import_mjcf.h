@@ -141,6 +141,8 @@ class MjcfModel {
   /// count.
   std::optional<MjcfLimits> LimitsOf(const MjcfElement& element, const std::string& flag,
                                      const std::string& range) const;
+  /// Notes that a joint or tendon is limited, whatever its range: limits are dropped.
+  void NoteLimits(const MjcfElement& element, const char* reason) const;
   /// Bodies in ground axes where the springs of joints are free: tendons that do not say their
   /// free length are free there.
   std::vector<Placement> WhereSpringsAreFree() const;
@@ -160,7 +162,9 @@ struct MassProperties {
   Eigen::Vector3d com = Eigen::Vector3d::Zero();
   Eigen::Matrix3d inertia = Eigen::Matrix3d::Zero();
 };
-MassProperties MassOfGeoms(const MjcfModel& model, const std::vector<MjcfGeom>& geoms);
+/// Refuses meshes, whose files are not read, unless they count as nothing.
+MassProperties MassOfGeoms(const MjcfModel& model, const std::vector<MjcfGeom>& geoms,
+                           bool drops_meshes);
 
 /// <worldbody>.
 void ReadMjcfWorld(const XmlElement& world, MjcfModel* model);
@@ -176,7 +180,7 @@ void AddMjcfChain(MjcfModel* model, const XmlElement& body, int parent, int chil
 void ReadMjcfEquality(const XmlElement& section, MjcfModel* model);
 /// Spatial tendons between two sites; `held`: names of tendons that keep their length, which become
 /// rods.
-void ReadMjcfTendons(const XmlElement& section, const std::map<std::string, XmlElement>& held,
+void ReadMjcfTendons(const XmlElement& root, const std::map<std::string, XmlElement>& held,
                      MjcfModel* model);
 void ReadMjcfKeys(const XmlElement& root, MjcfModel* model);
 /// Constant efforts of actuators under these controls; without any, under 0.

@@ -138,14 +138,15 @@ void ReadMjcfActuators(const XmlElement& root, const std::optional<XmlValue>& co
   std::vector<double> ctrl(actuators.size(), 0.0);
   if (controls) ctrl = controls->Numbers(ctrl.size(), ctrl.size());
   std::vector<Effort> efforts;  // of each joint together, in the order of their first actuators
+  std::map<std::size_t, std::size_t> index_of;
   for (std::size_t i = 0; i < actuators.size(); ++i) {
     const auto effort = ReadActuator(actuators[i], ctrl[i], model);
     if (!effort) continue;
-    const auto known = std::ranges::find(efforts, effort->joint, &Effort::joint);
-    if (known == efforts.end()) {
+    const auto [known, is_new] = index_of.emplace(effort->joint, efforts.size());
+    if (is_new) {
       efforts.push_back(*effort);
     } else {
-      known->value += effort->value;
+      efforts[known->second].value += effort->value;
     }
   }
   for (const Effort& effort : efforts) {

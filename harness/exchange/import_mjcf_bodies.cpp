@@ -76,49 +76,53 @@ void ReadInertial(const XmlElement& element, int body, MjcfModel* model) {
     inertia = SymmetricMatrix(I[0], I[1], I[2], I[3], I[4], I[5]);
   } else if (diagonal) {
     inertia.diagonal() = diagonal->Vector();
-  } else {
-    element.Fail("no inertia", "\"diaginertia\" or \"fullinertia\"");
-  }
-  if (mass == 0.0 && inertia.isZero(0.0)) return;
+  }  // else a point, as MuJoCo has it
   BodyDescription& described = model->draft->description.bodies[static_cast<std::size_t>(body)];
   described.mass = mass;
   described.com = X.p;
   described.inertia = InTurnedAxes(X.q, inertia);
 }
 
-void ReadMasses(const XmlElement& element, const Contents& contents, int body, MjcfModel* model) {
+/// `is_fixed`: to the ground, where masses move nothing unless they count in a total.
+void ReadMasses(const XmlElement& element, const Contents& contents, int body, bool is_fixed,
+                MjcfModel* model) {
   const auto inertial = element.Child("inertial");
-  const auto mode = model->settings.inertia;
+  const MjcfSettings& settings = model->settings;
   std::vector<MjcfGeom> geoms;
   for (const Placed& geom : contents.geoms) {
     geoms.push_back({model->defaults.Of(geom.element, geom.childclass), geom.X});
   }
-  const bool from_geoms =
-      mode == MjcfSettings::kFromGeoms || (mode == MjcfSettings::kAuto && !inertial);
-  if (from_geoms && inertial) {
-    model->draft->Note(*inertial, "dropped: inertiafromgeom asks for the geoms' masses");
-    inertial->Ignore();
+  const bool wants_geoms = settings.inertia == MjcfSettings::kFromGeoms ||
+                           (settings.inertia == MjcfSettings::kAuto && !inertial);
+  MassProperties of_geoms;
+  if (wants_geoms) {
+    of_geoms = MassOfGeoms(*model, geoms, is_fixed && settings.total_mass <= 0.0);
   }
+  const bool from_geoms = of_geoms.mass > 0.0;  // as in MuJoCo: else <inertial> stays
   if (from_geoms) {
-    const MassProperties all = MassOfGeoms(*model, geoms);
     BodyDescription& described = model->draft->description.bodies[static_cast<std::size_t>(body)];
-    described.mass = all.mass;
-    described.com = all.com;
-    described.inertia = all.inertia;
+    described.mass = of_geoms.mass;
+    described.com = of_geoms.com;
+    described.inertia = of_geoms.inertia;
+    if (inertial) {
+      model->draft->Note(*inertial, "dropped: inertiafromgeom asks for the geoms' masses");
+      inertial->Ignore();
+    }
   } else if (inertial) {
     ReadInertial(*inertial, body, model);
   }
   for (const MjcfGeom& geom : geoms) {
     geom.element.own().Ignore();
     for (const XmlElement& layer : geom.element.Layers()) layer.Ignore();
-    if (!model->settings.has_contact) continue;
+    if (!settings.has_contact) continue;
     model->draft->Note(geom.element.own(), from_geoms
                                                ? "no shape here, only its mass: there is no contact"
                                                : "dropped: there is no contact");
   }
 }
 
-void ReadBody(const Placed& placed, int parent, MjcfModel* model) {
+/// `is_fixed`: the parent is fixed to the ground, or is it.
+void ReadBody(const Placed& placed, int parent, bool is_fixed, MjcfModel* model) {
   const XmlElement& element = placed.element;
   ImportDraft* draft = model->draft;
   const std::string childclass = ClassWithin(*model, element, placed.childclass);
@@ -129,7 +133,8 @@ void ReadBody(const Placed& placed, int parent, MjcfModel* model) {
       draft->at_rest[static_cast<std::size_t>(parent)] * X_PB;
   Contents contents;
   Gather(*model, element, {}, childclass, &contents);
-  ReadMasses(element, contents, body, model);
+  is_fixed = is_fixed && contents.joints.empty();
+  ReadMasses(element, contents, body, is_fixed, model);
   ReadSites(contents.sites, body, model);
   if (const auto lift = element.Attribute("gravcomp")) {
     const double share = lift->Number();
@@ -143,7 +148,7 @@ void ReadBody(const Placed& placed, int parent, MjcfModel* model) {
     joints.push_back(ReadMjcfJoint(*model, joint.element, joint.X, joint.childclass));
   }
   AddMjcfChain(model, element, parent, body, X_PB, joints);
-  for (const Placed& child : contents.bodies) ReadBody(child, body, model);
+  for (const Placed& child : contents.bodies) ReadBody(child, body, is_fixed, model);
 }
 
 /// As MuJoCo's compiler: A + B >= C by taking the mean of the three.
@@ -181,7 +186,7 @@ void ReadMjcfWorld(const XmlElement& world, MjcfModel* model) {
     joint.element.Fail("a joint of the world", "joints in bodies");
   }
   ReadSites(contents.sites, kGround, model);
-  for (const Placed& body : contents.bodies) ReadBody(body, kGround, model);
+  for (const Placed& body : contents.bodies) ReadBody(body, kGround, true, model);
 }
 
 void AdjustMasses(MjcfModel* model) {
@@ -201,11 +206,6 @@ void AdjustMasses(MjcfModel* model) {
       bodies[i].mass *= factor;
       bodies[i].inertia *= factor;
     }
-  }
-  for (std::size_t i = 1; i < bodies.size(); ++i) {
-    const BodyDescription body = bodies[i];
-    const bool massless = body.mass == 0.0 && body.inertia.isZero(0.0);
-    if (!massless) model->draft->CheckMass(static_cast<int>(i));
   }
 }
 

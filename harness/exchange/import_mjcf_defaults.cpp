@@ -7,7 +7,8 @@ namespace loopbench::harness {
 
 namespace {
 
-constexpr const char* kMain = "main";  // the class of elements without one
+constexpr const char* kMain = "main";     // the class of elements without one
+constexpr std::size_t kMostLayers = 100;  // each of many elements looks at all of its defaults
 
 /// What an element of a class describes: its tag, or "actuator".
 std::string DescribedBy(const std::string& tag) {
@@ -87,6 +88,9 @@ std::vector<XmlElement> MjcfDefaults::Layers(const XmlElement& element,
     // of several in one class the last one has the last word
     layers.insert(layers.end(), defaults->second.rbegin(), defaults->second.rend());
     if (used != nullptr) used->emplace(found->first, wanted);
+    if (layers.size() > kMostLayers) {
+      element.Fail(fmt::format("more than {} defaults of its kind", kMostLayers), "fewer");
+    }
   }
   return layers;
 }
@@ -131,22 +135,22 @@ Eigen::Quaterniond MjcfModel::OrientationOf(const MjcfElement& element) const {
     return v.normalized();
   };
   if (way == "quat") {
-    const std::vector<double> q = found->Numbers(4, 4);
+    const std::vector<double> q = draft->Numbers(*found, "q");
     return UnitQuaternion(*found, {q[0], q[1], q[2], q[3]});
   }
   if (way == "euler") {
-    const Eigen::Vector3d angles = found->Vector();
+    const Eigen::Vector3d angles = draft->Vector(*found, settings.degrees ? "nnn" : "aaa");
     return FromEuler(settings.euler,
                      angles.unaryExpr([&](double angle) { return settings.Angle(angle); }));
   }
   if (way == "axisangle") {
-    const std::vector<double> a = found->Numbers(4, 4);
+    const std::vector<double> a = draft->Numbers(*found, settings.degrees ? "dn" : "da");
     return Eigen::Quaterniond(Eigen::AngleAxisd(settings.Angle(a[3]), unit({a[0], a[1], a[2]})));
   }
   if (way == "zaxis") {
-    return TurnOfZ(unit(found->Vector()));
+    return TurnOfZ(unit(draft->Vector(*found, "d")));
   }
-  const std::vector<double> a = found->Numbers(6, 6);
+  const std::vector<double> a = draft->Numbers(*found, "dd");
   const Eigen::Vector3d x = unit({a[0], a[1], a[2]}), y_given(a[3], a[4], a[5]);
   const Eigen::Vector3d y = unit(y_given - x.dot(y_given) * x);
   Eigen::Matrix3d R;
@@ -172,6 +176,13 @@ std::optional<MjcfLimits> MjcfModel::LimitsOf(const MjcfElement& element, const 
   if (ends[0] < ends[1]) return MjcfLimits{ends[0], ends[1]};
   if (choice == 1) given->Fail("two numbers, the first below the second");
   return std::nullopt;  // as MuJoCo has it, and its default: 0 0
+}
+
+void MjcfModel::NoteLimits(const MjcfElement& element, const char* reason) const {
+  const auto flag = element.Attribute("limited"), range = element.Attribute("range");
+  if ((flag && flag->text() == "true") || LimitsOf(element, "limited", "range")) {
+    draft->Note(element.own(), range ? "range" : "limited", reason, true);
+  }
 }
 
 const BodyPoint& MjcfModel::SiteNamed(const XmlValue& value) const {

@@ -13,6 +13,9 @@ namespace {
 using std::numbers::pi;
 
 constexpr double kDensity = 1000.0;  // [kg/m^3], MuJoCo's default
+/// Shapes of less [m^3] have no mass that is given, and masses of less [kg] do not count: mjEPS in
+/// MuJoCo's src/user/user_objects.cc.
+constexpr double kLeast = 1e-14;
 
 /// Volume [m^3], and moments of inertia per mass [m^2] about its own axes; z is its axis.
 struct Shape {
@@ -91,7 +94,8 @@ Shape ShapeOf(std::size_t type, const std::vector<double>& size) {
 }
 
 /// False for one that has no mass.
-bool ReadGeom(const MjcfModel& model, const MjcfGeom& geom, BodyDescription* read, Placement* X) {
+bool ReadGeom(const MjcfModel& model, const MjcfGeom& geom, bool drops_meshes,
+              BodyDescription* read, Placement* X) {
   const MjcfElement& element = geom.element;
   const auto given = element.Attribute("type");
   const auto mesh = element.Attribute("mesh");
@@ -103,6 +107,7 @@ bool ReadGeom(const MjcfModel& model, const MjcfGeom& geom, BodyDescription* rea
   if (group < model.settings.first_group || group > model.settings.last_group) return false;
   if (kg == 0.0 || (kg < 0.0 && density == 0.0)) return false;
   if (mesh || Types()[type] == "mesh" || Types()[type] == "sdf") {
+    if (drops_meshes) return false;
     element.own().Fail("the mass of a mesh, whose file is not read",
                        "an <inertial> in the body, or another shape");
   }
@@ -116,20 +121,30 @@ bool ReadGeom(const MjcfModel& model, const MjcfGeom& geom, BodyDescription* rea
     if (!(size[i] > 0.0)) element.own().Fail("a size that is not > 0", "sizes > 0");
   }
   const Shape shape = ShapeOf(type, size);
+  if (kg > 0.0 && !(shape.volume > kLeast)) {
+    model.draft->Note(element.own(), "mass",
+                      fmt::format("dropped, as in MuJoCo: its shape has {:.2g} m^3, not more than "
+                                  "{:.0e}",
+                                  shape.volume, kLeast),
+                      true);
+    return false;
+  }
   read->mass = kg > 0.0 ? kg : density * shape.volume;
+  if (!(read->mass > kLeast)) return false;
   read->inertia = (read->mass * shape.moments).asDiagonal();
   return true;
 }
 
 }  // namespace
 
-MassProperties MassOfGeoms(const MjcfModel& model, const std::vector<MjcfGeom>& geoms) {
+MassProperties MassOfGeoms(const MjcfModel& model, const std::vector<MjcfGeom>& geoms,
+                           bool drops_meshes) {
   std::vector<std::pair<BodyDescription, Placement>> all;
   MassProperties sum;
   for (const MjcfGeom& geom : geoms) {
     BodyDescription part;
     Placement X;
-    if (!ReadGeom(model, geom, &part, &X)) continue;
+    if (!ReadGeom(model, geom, drops_meshes, &part, &X)) continue;
     X = geom.X * X;
     sum.mass += part.mass;
     sum.com += part.mass * X.p;

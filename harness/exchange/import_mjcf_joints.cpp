@@ -25,15 +25,13 @@ constexpr double kAligned = 1e-9;
 void RefuseOrNote(const MjcfModel& model, const MjcfJoint& joint) {
   ImportDraft* draft = model.draft;
   const XmlElement& own = joint.element.own();
-  if (joint.element.Number("armature", 0.0, kNotNegative) > 0.0) {
+  if (joint.element.Number("armature", 0.0) != 0.0) {
     draft->Note(own, "armature", "dropped: rotors have no inertia beside that of the bodies", true);
   }
-  if (joint.element.Number("frictionloss", 0.0, kNotNegative) > 0.0) {
+  if (joint.element.Number("frictionloss", 0.0) != 0.0) {
     draft->Note(own, "frictionloss", "dropped: dry friction is no force of mechanism files", true);
   }
-  if (model.LimitsOf(joint.element, "limited", "range")) {
-    draft->Note(own, "range", "dropped: joints turn and slide without ends", true);
-  }
+  model.NoteLimits(joint.element, "dropped: joints turn and slide without ends");
   const auto by_actuators = joint.element.Attribute("actuatorgravcomp");
   if (by_actuators && by_actuators->Bool() &&
       (!model.settings.has_actuation || model.LimitsOf(joint.element, kEffortFlag, kEffortRange))) {
@@ -250,7 +248,7 @@ MjcfJoint ReadMjcfJoint(const MjcfModel& model, const XmlElement& element, const
   if (position && joint.kind != MjcfKind::kFree) joint.position = position->Vector();
   if (joint.kind != MjcfKind::kFree) joint.position = X.At(joint.position);
   if (const auto axis = joint.element.Attribute("axis")) {
-    joint.axis = axis->Vector();
+    joint.axis = model.draft->Vector(*axis, "d");
     const bool matters = joint.kind == MjcfKind::kHinge || joint.kind == MjcfKind::kSlide;
     if (matters && !(joint.axis.norm() > 0.0)) axis->Fail("an axis that is not zero");
     if (std::abs(joint.axis.squaredNorm() - 1.0) > 0.0) joint.axis.normalize();

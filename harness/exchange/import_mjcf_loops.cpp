@@ -69,7 +69,7 @@ void AddWeld(const MjcfElement& equality, MjcfModel* model) {
   if (ends.first == ends.second) equality.own().Fail("one body twice", "two different bodies");
   Placement relative = AtRestOn(*model, ends.second, {}, ends.first);
   if (const auto pose = equality.Attribute("relpose")) {
-    const std::vector<double> p = pose->Numbers(7, 7);
+    const std::vector<double> p = model->draft->Numbers(*pose, "nnnq");
     const Eigen::Quaterniond q(p[3], p[4], p[5], p[6]);
     // a quaternion of zeros asks for the poses that the file draws
     if (q.norm() > 0.0) relative = {UnitQuaternion(*pose, q), {p[0], p[1], p[2]}};
@@ -200,13 +200,11 @@ void ReadTendon(const XmlElement& element, const std::map<std::string, XmlElemen
   }
   const MjcfElement tendon = model->defaults.Of(element, "", "tendon");
   AddSpring(tendon, *ends, LengthOf(*ends, free_poses), model);
-  if (model->LimitsOf(tendon, "limited", "range")) {
-    model->draft->Note(element, "range", "dropped: tendons do not end", true);
-  }
-  if (tendon.Number("frictionloss", 0.0, kNotNegative) > 0.0) {
+  model->NoteLimits(tendon, "dropped: tendons do not end");
+  if (tendon.Number("frictionloss", 0.0) != 0.0) {
     model->draft->Note(element, "frictionloss", "dropped: there is no dry friction", true);
   }
-  if (tendon.Number("armature", 0.0, kNotNegative) > 0.0) {
+  if (tendon.Number("armature", 0.0) != 0.0) {
     model->draft->Note(element, "armature", "dropped: tendons have no inertia", true);
   }
   if (!name || !held.contains(name->text()) || !model->settings.has_equality) return;
@@ -222,11 +220,13 @@ void ReadTendon(const XmlElement& element, const std::map<std::string, XmlElemen
 
 }  // namespace
 
-void ReadMjcfTendons(const XmlElement& section, const std::map<std::string, XmlElement>& held,
+void ReadMjcfTendons(const XmlElement& root, const std::map<std::string, XmlElement>& held,
                      MjcfModel* model) {
   const std::vector<Placement> free_poses = model->WhereSpringsAreFree();
-  for (const XmlElement& element : section.Children()) {
-    ReadTendon(element, held, free_poses, model);
+  for (const XmlElement& section : root.Children("tendon")) {
+    for (const XmlElement& element : section.Children()) {
+      ReadTendon(element, held, free_poses, model);
+    }
   }
 }
 

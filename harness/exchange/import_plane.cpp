@@ -50,6 +50,7 @@ void TurnGround(const Quaterniond& q, MechanismDescription* description) {
 }  // namespace
 
 void ImportDraft::MakeBallsPins(const Vector3d& n) {
+  std::set<int> balls;
   for (std::size_t j = 0; j < description.joints.size(); ++j) {
     JointDescription& joint = description.joints[j];
     if (joint.type != JointType::kSpherical) continue;
@@ -58,10 +59,10 @@ void ImportDraft::MakeBallsPins(const Vector3d& n) {
       const Quaterniond& q = at_rest[static_cast<std::size_t>(side->body)].q;
       side->rotation = RotationVector(q.conjugate() * Quaterniond(AxesWithNormal(n)));
     }
-    for (auto* list : {&description.initial.coordinates, &description.initial.speeds}) {
-      std::erase_if(
-          *list, [&](const JointValues& one) { return static_cast<std::size_t>(one.joint) == j; });
-    }
+    balls.insert(static_cast<int>(j));
+  }
+  for (auto* list : {&description.initial.coordinates, &description.initial.speeds}) {
+    std::erase_if(*list, [&](const JointValues& one) { return balls.contains(one.joint); });
   }
 }
 

@@ -77,12 +77,12 @@ XmlValue ReadChild(const XmlElement& joint) {
 }
 
 /// All names of a world or model, models within it included.
-void ReadNames(SdfScope* scope, SdfVersion version) {
+void ReadNames(SdfScope* scope, SdfVersion version, ImportDraft* draft) {
   const XmlElement& element = scope->element;
   RefuseIncludes(element);
   for (const char* tag : {"link", "frame", "joint"}) {
     for (const XmlElement& child : element.Children(tag)) {
-      SdfFrame frame = ReadSdfPose(child, version);
+      SdfFrame frame = ReadSdfPose(child, version, draft);
       if (child.tag() == "frame") {
         if (const auto attached = child.Attribute("attached_to")) {
           frame.attached_to = attached->text();
@@ -104,9 +104,9 @@ void ReadNames(SdfScope* scope, SdfVersion version) {
     }
     const auto fixed = child.Child("static");
     const bool is_static = scope->is_static || (fixed && fixed->Content().Bool());
-    scope->Add(name, ReadSdfPose(child, version));
+    scope->Add(name, ReadSdfPose(child, version, draft));
     auto model = std::make_unique<SdfScope>(child, scope->prefix + name + "::", is_static);
-    ReadNames(model.get(), version);
+    ReadNames(model.get(), version, draft);
     scope->models.emplace(name, std::move(model));
   }
 }
@@ -161,31 +161,28 @@ void ReadSdfLink(const XmlElement& element, int index, bool is_static, SdfVersio
     return;
   }
   if (const auto automatic = inertial->Attribute("auto"); automatic && automatic->Bool()) {
-    automatic->Fail("false: masses are not found from shapes");
+    draft->LeaveMass(index, *automatic);
+    inertial->Ignore();
+    return;
   }
   const auto number = [](const XmlElement& of, const char* name, double otherwise) {
     const auto child = of.Child(name);
     return child ? child->Content().Number() : otherwise;
   };
-  body.mass = number(*inertial, "mass", 1.0);
-  if (!(body.mass > 0.0)) {
-    inertial->Fail(fmt::format("a mass of {} kg", body.mass), "a mass > 0");
-  }
+  const auto mass = inertial->Child("mass");
+  body.mass = mass ? mass->Content().Number(kNotNegative) : 1.0;
   body.inertia.setIdentity();
   if (const auto inertia = inertial->Child("inertia")) {
     body.inertia = SymmetricMatrix(number(*inertia, "ixx", 1.0), number(*inertia, "iyy", 1.0),
                                    number(*inertia, "izz", 1.0), number(*inertia, "ixy", 0.0),
                                    number(*inertia, "ixz", 0.0), number(*inertia, "iyz", 0.0));
   }
-  const SdfFrame pose = ReadSdfPose(*inertial, version);
-  if (!pose.relative_to.empty()) {
-    inertial->RequiredChild("pose")
-        .Required("relative_to", "")
-        .Fail("none: an inertial stands in its link");
+  const SdfFrame pose = ReadSdfPose(*inertial, version, draft);
+  if (!pose.relative_to.empty() && pose.relative_to != element.Required("name", "a name").text()) {
+    inertial->RequiredChild("pose").Required("relative_to", "").Fail("none, or its own link");
   }
   body.com = pose.raw.p;
   body.inertia = InTurnedAxes(pose.raw.q, body.inertia);
-  draft->CheckMass(index);
 }
 
 void ReadSdf(const XmlElement& root, ImportDraft* draft) {
@@ -204,7 +201,7 @@ void ReadSdf(const XmlElement& root, ImportDraft* draft) {
     draft->AssumeGravity(top, kSdfGravity);
   }
   SdfScope scope(top, "", false);
-  ReadNames(&scope, version);
+  ReadNames(&scope, version, draft);
   if (models.size() == 1) {
     // names within the only model need not say whose they are
     SdfScope& only = *scope.models.begin()->second;

@@ -34,14 +34,21 @@ class SdfScope {
   std::map<std::string, std::unique_ptr<SdfScope>> models;  ///< nested; each has a frame too
   Placement at_rest;                                        ///< in ground axes
 
+  /// A link's scope and its name there; no scope for the world.
+  using Link = std::pair<const SdfScope*, std::string>;
+
   /// Refuses a name that is in use here.
   void Add(const std::string& name, SdfFrame frame);
   /// Where the frame of that name is, in this scope's. `user` is who asks.
   Placement Resolve(const std::string& name, const XmlElement& user) const;
-  /// The scope and the name in it of the link that a link, frame or model moves with.
-  std::pair<const SdfScope*, std::string> LinkOf(const std::string& name,
-                                                 const XmlElement& user) const;
+  /// The link that a link, frame or model moves with.
+  Link LinkOf(const std::string& name, const XmlElement& user) const;
   bool is_world() const { return element.tag() != "model"; }
+
+ private:
+  // answers, so that a chain of frames is followed once
+  mutable std::map<std::string, Placement> resolved_;
+  mutable std::map<std::string, Link> links_;
 };
 
 struct SdfVersion {
@@ -49,7 +56,7 @@ struct SdfVersion {
 };
 
 /// <pose> of an element, and what it is relative to.
-SdfFrame ReadSdfPose(const XmlElement& element, SdfVersion version);
+SdfFrame ReadSdfPose(const XmlElement& element, SdfVersion version, ImportDraft* draft);
 /// A <joint> between links that are bodies already, with their numbers by full name.
 void ReadSdfJoint(const XmlElement& element, const std::string& name, const SdfScope& scope,
                   SdfVersion version, ImportDraft* draft);

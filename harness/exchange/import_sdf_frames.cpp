@@ -32,7 +32,7 @@ const SdfScope* NestedScope(const SdfScope& scope, const std::string& name, std:
 
 }  // namespace
 
-SdfFrame ReadSdfPose(const XmlElement& element, SdfVersion version) {
+SdfFrame ReadSdfPose(const XmlElement& element, SdfVersion version, ImportDraft* draft) {
   SdfFrame frame{element, {}, "", ""};
   const auto pose = element.Child("pose");
   if (!pose) return frame;
@@ -44,18 +44,20 @@ SdfFrame ReadSdfPose(const XmlElement& element, SdfVersion version) {
     frame.relative_to = relative->Name();
   }
   const auto degrees = pose->Attribute("degrees");
-  const double unit = degrees && degrees->Bool() ? kDegree : 1.0;
+  const bool in_degrees = degrees && degrees->Bool();
   const auto format = pose->Attribute("rotation_format");
   const bool quaternion = format && format->Choice({"euler_rpy", "quat_xyzw"}) == 1;
   const XmlValue content = pose->Content();
   if (content.text().empty()) return frame;
-  const std::size_t count = quaternion ? 7 : 6;
-  const std::vector<double> p = content.Numbers(count, count);
+  const std::vector<double> p = draft->Numbers(content, quaternion   ? "nnnr"
+                                                        : in_degrees ? "nnnnnn"
+                                                                     : "nnnaaa");
   frame.raw.p = {p[0], p[1], p[2]};
   if (quaternion) {
     frame.raw.q = UnitQuaternion(content, {p[6], p[3], p[4], p[5]});
   } else {
-    frame.raw.q = FromRollPitchYaw(unit * Eigen::Vector3d(p[3], p[4], p[5]));
+    frame.raw.q =
+        FromRollPitchYaw((in_degrees ? kDegree : 1.0) * Eigen::Vector3d(p[3], p[4], p[5]));
   }
   return frame;
 }
@@ -71,49 +73,77 @@ void SdfScope::Add(const std::string& name, SdfFrame frame) {
 }
 
 Placement SdfScope::Resolve(const std::string& name, const XmlElement& user) const {
+  // frames that stand in each other, up to one that is known
+  std::vector<std::pair<std::string, Placement>> chain;
   Placement X;
   std::string here = name;
-  // no chain without a cycle is longer than all frames
-  for (std::size_t steps = 0; !IsOwn(here, *this); ++steps) {
-    if (steps > frames.size()) user.Fail("frames that are relative to each other", "no cycle");
-    std::string rest;
-    if (const SdfScope* nested = NestedScope(*this, here, &rest)) {
-      X = nested->Resolve(rest, user) * X;
-      here = here.substr(0, here.find(kWithin));
+  while (!IsOwn(here, *this)) {
+    if (const auto known = resolved_.find(here); known != resolved_.end()) {
+      X = known->second;
+      break;
     }
-    const auto found = frames.find(here);
-    if (found == frames.end()) FailToFind(here, user);
-    X = found->second.raw * X;
-    here = found->second.relative_to;
+    // no chain without a cycle has more than each frame and a name within each model
+    if (chain.size() > 2 * frames.size()) {
+      user.Fail("frames that are relative to each other", "no cycle");
+    }
+    std::string rest, next = here.substr(0, here.find(kWithin));
+    if (const SdfScope* nested = NestedScope(*this, here, &rest)) {
+      chain.emplace_back(here, nested->Resolve(rest, user));
+    } else {
+      const auto found = frames.find(here);
+      if (found == frames.end()) FailToFind(here, user);
+      chain.emplace_back(here, found->second.raw);
+      next = found->second.relative_to;
+    }
+    here = next;
+  }
+  for (auto link = chain.rbegin(); link != chain.rend(); ++link) {
+    X = X * link->second;
+    resolved_.emplace(link->first, X);
   }
   return X;
 }
 
-std::pair<const SdfScope*, std::string> SdfScope::LinkOf(const std::string& name,
-                                                         const XmlElement& user) const {
+SdfScope::Link SdfScope::LinkOf(const std::string& name, const XmlElement& user) const {
+  std::vector<std::string> chain;  // each attached to the next
   std::string here = name;
-  for (std::size_t steps = 0;; ++steps) {
-    if (steps > frames.size()) user.Fail("frames that are attached to each other", "no cycle");
+  std::optional<Link> link;
+  while (!link) {
+    if (const auto known = links_.find(here); known != links_.end()) {
+      link = known->second;
+      break;
+    }
+    if (chain.size() > frames.size() + 1) {
+      user.Fail("frames that are attached to each other", "no cycle");
+    }
+    chain.push_back(here);
     std::string rest;
-    if (const SdfScope* nested = NestedScope(*this, here, &rest)) return nested->LinkOf(rest, user);
-    if (IsOwn(here, *this)) {
-      if (is_world()) return {nullptr, ""};
+    if (const SdfScope* nested = NestedScope(*this, here, &rest)) {
+      link = nested->LinkOf(rest, user);
+    } else if (IsOwn(here, *this) && is_world()) {
+      link = Link{nullptr, ""};
+    } else if (IsOwn(here, *this)) {
       // a model moves with its canonical link, the first one unless it names another
       const auto canonical = element.Attribute("canonical_link");
+      const std::vector<XmlElement> links = element.Children("link");
       if (canonical && !canonical->text().empty()) {
         here = canonical->text();
-        continue;
+      } else if (links.empty()) {
+        user.Fail(fmt::format("the model of \"{}\" without a link", name), "one");
+      } else {
+        here = links[0].Required("name", "a name").Name();
       }
-      const std::vector<XmlElement> links = element.Children("link");
-      if (links.empty()) user.Fail(fmt::format("the model of \"{}\" without a link", name), "one");
-      here = links[0].Required("name", "a name").Name();
+    } else {
+      const auto found = frames.find(here);
+      if (found == frames.end()) FailToFind(here, user);
+      const std::string tag = found->second.element.tag();
+      if (tag == "link") link = Link{this, here};
+      if (tag == "model") link = models.at(here)->LinkOf("", user);
+      here = found->second.attached_to;
     }
-    const auto found = frames.find(here);
-    if (found == frames.end()) FailToFind(here, user);
-    if (found->second.element.tag() == "link") return {this, here};
-    if (found->second.element.tag() == "model") return models.at(here)->LinkOf("", user);
-    here = found->second.attached_to;
   }
+  for (const std::string& attached : chain) links_.emplace(attached, *link);
+  return *link;
 }
 
 }  // namespace loopbench::harness

@@ -18,12 +18,12 @@ constexpr double kNoLimit = 1e15;        // the defaults are 1e16 and infinity
 
 /// The axis in the joint's frame. Before 1.5 it was in the model's.
 Vector3d ReadAxis(const XmlElement& axis, const SdfScope& scope, const Placement& X_model_joint,
-                  SdfVersion version) {
+                  SdfVersion version, ImportDraft* draft) {
   Vector3d xyz = Vector3d::UnitZ();
   std::string frame;
   bool in_joint = version.minor >= 5;
   if (const auto given = axis.Child("xyz")) {
-    xyz = given->Content().Vector();
+    xyz = draft->Vector(given->Content(), "d");
     if (!(xyz.norm() > 0.0)) given->Fail("an axis of length 0", "one that is not zero");
     if (const auto expressed = given->Attribute("expressed_in")) {
       if (!expressed->text().empty()) {
@@ -194,11 +194,11 @@ void ReadSdfJoint(const XmlElement& element, const std::string& name, const SdfS
   const bool has_axis = TraitsOf(type).own_axis != '-' || type == JointType::kUniversal;
   if (has_axis && !axis) element.Fail("no <axis>", "one");
   Vector3d own = Vector3d::Zero();
-  if (axis && has_axis) own = ReadAxis(*axis, scope, X_model_joint, version);
+  if (axis && has_axis) own = ReadAxis(*axis, scope, X_model_joint, version, draft);
   if (type == JointType::kUniversal) {
     if (!axis2) element.Fail("no <axis2>", "one");
     const Eigen::Quaterniond q =
-        UniversalAxes(element, own, ReadAxis(*axis2, scope, X_model_joint, version));
+        UniversalAxes(element, own, ReadAxis(*axis2, scope, X_model_joint, version, draft));
     X_QM.q = X_QM.q * q;
     X_PF.q = X_PF.q * q;
   }

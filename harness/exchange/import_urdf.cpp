@@ -25,19 +25,19 @@ constexpr DroppedReason kUrdfReasons[] = {
     {"sensor", "there are no sensors"},
     {"dynamics@friction", "dry friction is no force of mechanism files", true}};
 
-Placement OriginOf(const XmlElement& element) {
+Placement OriginOf(const XmlElement& element, ImportDraft* draft) {
   Placement X;
   const auto origin = element.Child("origin");
   if (!origin) return X;
   if (const auto xyz = origin->Attribute("xyz")) X.p = xyz->Vector();
-  if (const auto rpy = origin->Attribute("rpy")) X.q = FromRollPitchYaw(rpy->Vector());
+  if (const auto rpy = origin->Attribute("rpy")) X.q = FromRollPitchYaw(draft->Vector(*rpy, "aaa"));
   return X;
 }
 
 void ReadInertial(const XmlElement& link, int body, ImportDraft* draft) {
   const auto inertial = link.Child("inertial");
   if (!inertial) return;
-  const Placement X = OriginOf(*inertial);
+  const Placement X = OriginOf(*inertial, draft);
   const XmlElement mass = inertial->RequiredChild("mass");
   const XmlElement inertia = inertial->RequiredChild("inertia");
   const double kg = mass.Required("value", "a number [kg]").Number(kNotNegative);
@@ -50,13 +50,10 @@ void ReadInertial(const XmlElement& link, int body, ImportDraft* draft) {
   };
   const Eigen::Matrix3d I = SymmetricMatrix(moment("ixx"), moment("iyy"), moment("izz"),
                                             product("ixy"), product("ixz"), product("iyz"));
-  if (kg == 0.0 && I.isZero(0.0)) return;
-  if (kg == 0.0) mass.Fail("0 kg beside an inertia that is not zero", "a mass > 0");
   BodyDescription& described = draft->description.bodies[static_cast<std::size_t>(body)];
   described.mass = kg;
   described.com = X.p;
   described.inertia = InTurnedAxes(X.q, I);
-  draft->CheckMass(body);
 }
 
 /// A joint as the file says it, before poses are known.
@@ -86,7 +83,7 @@ void AddJoint(const UrdfJoint& read, ImportDraft* draft) {
   const std::string name = draft->NewJointName(element, element.Required("name", "a name").Name());
   JointDescription& joint = draft->AddJoint(name, type, read.parent, read.X_PC, read.child, {});
   if (const auto axis = element.Child("axis")) {
-    const Eigen::Vector3d xyz = axis->Required("xyz", "3 numbers").Vector();
+    const Eigen::Vector3d xyz = draft->Vector(axis->Required("xyz", "3 numbers"), "d");
     if (TraitsOf(type).own_axis != '-') {
       if (xyz.isZero()) axis->Fail("an axis of length 0", "one that is not zero");
       joint.axis = xyz;
@@ -104,24 +101,23 @@ void AddJoint(const UrdfJoint& read, ImportDraft* draft) {
                 true);
   }
   const auto friction = dynamics ? dynamics->Attribute("friction") : std::nullopt;
-  if (friction && friction->Number(kNotNegative) > 0.0) {
+  if (friction && friction->Number() != 0.0) {
     draft->Note(*dynamics, "friction", "dropped: dry friction is no force of mechanism files",
                 true);
   }
 }
 
-std::vector<UrdfJoint> ReadJoints(const XmlElement& root, bool has_world,
-                                  const ImportDraft& draft) {
+std::vector<UrdfJoint> ReadJoints(const XmlElement& root, bool has_world, ImportDraft* draft) {
   std::vector<UrdfJoint> joints;
   const std::set<std::string> ground =
       has_world ? std::set<std::string>{"world"} : std::set<std::string>{};
   const auto link = [&](const XmlElement& element, const char* side) {
-    return draft.BodyNamed(element.RequiredChild(side).Required("link", "the name of a link"),
-                           ground);
+    return draft->BodyNamed(element.RequiredChild(side).Required("link", "the name of a link"),
+                            ground);
   };
   for (const XmlElement& element : root.Children("joint")) {
     UrdfJoint joint{element, "", link(element, "parent"), link(element, "child"),
-                    OriginOf(element)};
+                    OriginOf(element, draft)};
     const XmlValue type = element.Required("type", "a joint type");
     joint.type = UrdfTypes()[type.Choice(UrdfTypes())];
     if (joint.child == kGround) element.Fail("\"world\" as a child", "a link that can move");
@@ -219,7 +215,7 @@ void ReadUrdf(const XmlElement& root, const ImportOptions& options, ImportDraft*
     of_body.push_back(link);
     ReadInertial(link, draft->AddBody(link, name.Name()), draft);
   }
-  const UrdfTree tree(ReadJoints(root, has_world, *draft), draft->at_rest.size());
+  const UrdfTree tree(ReadJoints(root, has_world, draft), draft->at_rest.size());
   std::vector<int> roots = tree.Roots();
   if (has_world) roots.insert(roots.begin(), kGround);
   PlaceLinks(tree, roots, draft);

@@ -78,6 +78,31 @@ void RefuseDocumentTypes(const XmlDocument& document) {
   }
 }
 
+/// Before parsing: the parser compares each attribute with all before it in its element.
+void RefuseManyAttributes(std::string_view text, const std::string& file) {
+  constexpr int kMost = 1000;
+  constexpr std::string_view kEndOfComment = "-->", kEndOfData = "]]>";
+  for (std::size_t at = text.find('<'); at < text.size(); at = text.find('<', at)) {
+    const std::string_view rest = text.substr(at);
+    if (rest.starts_with("<!--") || rest.starts_with("<![CDATA[")) {
+      at = text.find(rest[2] == '-' ? kEndOfComment : kEndOfData, at);
+      continue;
+    }
+    int count = 0;
+    char quote = '\0';
+    for (; at < text.size() && (quote != '\0' || text[at] != '>'); ++at) {
+      const char c = text[at];
+      if (c != '"' && c != '\'') continue;
+      if (quote == '\0') ++count;
+      if (quote == '\0' || quote == c) quote = quote == c ? '\0' : c;
+    }
+    if (count <= kMost) continue;
+    const auto line = 1 + std::ranges::count(text.substr(0, at), '\n');
+    throw ConfigError(fmt::format("{}:{}: found an element with {} attributes, expected at most {}",
+                                  file, line, count, kMost));
+  }
+}
+
 bool IsOneOf(const tinyxml2::XMLElement& element, const std::vector<std::string_view>& tags) {
   return std::ranges::find(tags, std::string_view(element.Name())) != tags.end();
 }
@@ -99,6 +124,8 @@ XmlValue::XmlValue(const XmlElement& element, std::string attribute, std::string
       element_(element.element_),
       attribute_(std::move(attribute)),
       text_(Trimmed(text)) {}
+
+XmlElement XmlValue::element() const { return XmlElement(document_, element_); }
 
 void XmlValue::Fail(std::string_view expected) const {
   FailAt(*document_, *element_, attribute_,
@@ -254,6 +281,7 @@ XmlFile::XmlFile(std::string_view text, const std::string& file)
   if (const std::string fault = EncodingFault(text); !fault.empty()) {
     throw ConfigError(file + ":" + fault);
   }
+  RefuseManyAttributes(text, file);
   const auto error = document_->xml.Parse(text.data(), text.size());
   if (error == tinyxml2::XML_ELEMENT_DEPTH_EXCEEDED) {
     throw ConfigError(

@@ -35,6 +35,8 @@ class XmlValue {
 
   /// Without blanks around it; may be empty.
   const std::string& text() const { return text_; }
+  const std::string& attribute() const { return attribute_; }
+  XmlElement element() const;
   /// A text that is not empty and can be printed: UTF-8 without zero bytes.
   std::string Name() const;
   /// A finite number, with a point whatever the locale, and nothing behind it.

@@ -34,6 +34,51 @@ TEST_F(ImportCommandLine, PrintsJsonForPrograms) {
   EXPECT_EQ(ReadMechanism(folder_ / "acrobot.json").description.gravity.z(), -1.62);
 }
 
+TEST_F(ImportCommandLine, KeepsRoundedAnglesWhereAsked) {
+  Write("turned.urdf",
+        "<robot name=\"r\"><link name=\"world\"/><link name=\"a\"><inertial><mass "
+        "value=\"1\"/><inertia "
+        "ixx=\"1\" iyy=\"1\" izz=\"1\"/></inertial></link><joint name=\"j\" "
+        "type=\"continuous\"><parent "
+        "link=\"world\"/><child link=\"a\"/><origin rpy=\"1.5708 0 0\"/></joint></robot>");
+  const auto angle = [&] {
+    return ReadMechanism(folder_ / "turned.json").description.joints[0].from.rotation.x();
+  };
+  ExpectEnding(Call("import turned.urdf"), 0,
+               {"1.5708 is taken as 1.5707963267948966", "--keep-digits"});
+  EXPECT_NEAR(angle(), 1.5707963267948966, 1e-15);
+  ExpectEnding(Call("import turned.urdf --keep-digits"), 0, {"1 notes"});
+  EXPECT_NEAR(angle(), 1.5708, 1e-15);
+}
+
+TEST_F(ImportCommandLine, RoundedQuarterTurnsLeaveAFourBarItsFreedom) {
+  const auto link = [](const std::string& name, const std::string& com, const std::string& mass) {
+    return "<link name=\"" + name + "\"><inertial><origin xyz=\"" + com + "\"/><mass value=\"" +
+           mass + "\"/><inertia ixx=\"0.08\" iyy=\"0.08\" izz=\"0.08\"/></inertial></link>";
+  };
+  const auto joint = [](const std::string& name, const std::string& parent,
+                        const std::string& child, const std::string& origin,
+                        const std::string& axis) {
+    return "<joint name=\"" + name + "\" type=\"continuous\"><parent link=\"" + parent +
+           "\"/><child link=\"" + child + "\"/><origin " + origin + "/><axis xyz=\"" + axis +
+           "\"/></joint>";
+  };
+  // a planar four-bar in the plane of x and z; the crank's side is turned into it, the rocker's is
+  // not
+  Write("bars.urdf",
+        "<robot name=\"bars\"><link name=\"world\"/>" + link("crank", "0 0.15 0", "1") +
+            link("coupler", "0.4 0 0", "1.5") + link("rocker", "0 0 0.25", "1.2") +
+            joint("A", "world", "crank", "rpy=\"1.5708 0 0\"", "0 0 1") +
+            joint("B", "crank", "coupler", "xyz=\"0 0.3 0\"", "0 0 1") +
+            joint("D", "world", "rocker", "xyz=\"0.8 0 -0.2\"", "0 -1 0") + "</robot>");
+  Write("loop.json",
+        R"({"loops": [{"name": "C", "type": "revolute", "from": "coupler", "to": "rocker",
+                         "at": [0.8, 0, 0], "axis": [0, 0, 1]}], "initial": {"speeds": {"A": 1.0}}})");
+  ExpectEnding(Call("import bars.urdf --loops loop.json"), 0, {"values with rounded angles"});
+  // to round-off: one freedom is left, and 3 of its 5 constraints are redundant
+  ExpectEnding(Call("explain bars.json"), 0, {"1 by rank", "Redundant constraints: 3"});
+}
+
 TEST_F(ImportCommandLine, WritesNothingWhenItRefuses) {
   Write("bad.xml",
         "<mujoco>\n<worldbody>\n<body name=\"b\"><joint damping=\"x\"/></body>\n"

@@ -2,6 +2,7 @@
 // or refused with a message, and never anything else.
 #include <gtest/gtest.h>
 
+#include <ctime>
 #include <filesystem>
 #include <random>
 #include <set>
@@ -122,6 +123,76 @@ TEST(ImportHostile, ManyFramesInARowAreResolved) {
                      "<link name=\"a\"><pose relative_to=\"f2999\"/></link></model></sdf>",
                  "file.xml");
   EXPECT_NEAR(imported.description.initial.coordinates[0].values[4], 2999.0, 1e-9);
+}
+
+/// A second for time in proportion to the size; where each part looks at all others it takes ten
+/// and more.
+void ExpectQuick(const std::string& text) {
+  const std::clock_t begin = std::clock();
+  ReadOrRefuse(text);
+  EXPECT_LT(std::clock() - begin, 5 * CLOCKS_PER_SEC) << text.substr(0, 200);
+}
+
+TEST(ImportHostile, ManyPartsTakeTimeInProportion) {
+  const auto repeat = [](int times, auto&& part) {
+    std::string all;
+    for (int i = 0; i < times; ++i) all += part(std::to_string(i), std::to_string(i + 1));
+    return all;
+  };
+  const std::string inertial = "<inertial pos=\"0 0 0\" mass=\"1\" diaginertia=\"1 1 1\"/>";
+  const auto mujoco = [&](const std::string& in_body, const std::string& in_joint = "",
+                          const std::string& rest = "") {
+    return "<mujoco><worldbody><site name=\"s\"/><body><joint " + in_joint + "/>" + inertial +
+           in_body + "</body></worldbody>" + rest + "</mujoco>";
+  };
+  ExpectQuick(mujoco(repeat(
+      50000, [](const std::string& i, const auto&) { return "<site name=\"s" + i + "\"/>"; })));
+  ExpectQuick("<sdf version=\"1.9\"><model name=\"m\">" +
+              repeat(10000,
+                     [](const std::string& i, const std::string& next) {
+                       return "<link name=\"l" + i + "\"><pose relative_to=\"l" + next +
+                              "\">0 0 1 0 0 0</pose></link>";
+                     }) +
+              "<link name=\"l10000\"/></model></sdf>");
+  // joints on frames that are attached to each other
+  ExpectQuick("<sdf version=\"1.9\"><model name=\"m\"><link name=\"a\"/><frame name=\"f0\"/>" +
+              repeat(10000,
+                     [](const std::string& i, const std::string& next) {
+                       return "<frame name=\"f" + next + "\" attached_to=\"f" + i +
+                              "\"/><link name=\"l" + i + "\"/><joint name=\"j" + i +
+                              "\" type=\"ball\"><parent>f" + next + "</parent><child>l" + i +
+                              "</child></joint>";
+                     }) +
+              "</model></sdf>");
+  // springs, each in a section of its own
+  ExpectQuick(mujoco(repeat(10000,
+                            [&](const std::string& i, const auto&) {
+                              return "<body>" + inertial + "<joint/><site name=\"s" + i +
+                                     "\"/></body>";
+                            }),
+                     "", repeat(10000, [](const std::string& i, const auto&) {
+                       return "<tendon><spatial stiffness=\"1\"><site site=\"s\"/><site site=\"s" +
+                              i + "\"/></spatial></tendon>";
+                     })));
+}
+
+TEST(ImportHostile, ManyAttributesAndDefaultsAreRefused) {
+  std::string attributes;
+  for (int i = 0; i < 1000; ++i) attributes += " a" + std::to_string(i) + "='\"'";
+  const auto joint = [&](const std::string& inside) {
+    return "<!-- a=\"\" -->\n<mujoco><worldbody><body><joint" + inside + "/>" +
+           "<inertial pos=\"0 0 0\" mass=\"1\" diaginertia=\"1 1 1\"/></body></worldbody></mujoco>";
+  };
+  EXPECT_EQ(Refusal(joint(attributes)), "");
+  ExpectRefusal(joint(attributes + " b=\"\""), {"file.xml:2", "1001 attributes", "at most 1000"});
+  const auto defaults = [](int count) {
+    return "<mujoco><default>" + Repeated("<joint/>", count) +
+           "</default><worldbody><body><joint/><inertial pos=\"0 0 0\" mass=\"1\" diaginertia=\"1 "
+           "1 1\"/>"
+           "</body></worldbody></mujoco>";
+  };
+  EXPECT_EQ(Refusal(defaults(100)), "");
+  ExpectRefusal(defaults(101), {"<joint>", "more than 100 defaults"});
 }
 
 TEST(ImportHostile, EntitiesAndDocumentTypesAreRefused) {

@@ -283,11 +283,13 @@ TEST(ImportSdf, WhatCannotBeSaidIsRefusedWithItsLine) {
   ExpectRefusal(Sdf("<link name=\"a\"><pose>0 0 0</pose></link>"),
                 {"<pose>: found \"0 0 0\"", "6 numbers"});
   ExpectRefusal(Sdf("<link name=\"a\"><inertial><mass>0</mass></inertial></link>"),
-                {"a mass of 0 kg", "> 0"});
+                {"<link name=\"a\">: found a body without mass that moves"});
+  ExpectRefusal(Sdf("<link name=\"a\"><inertial><mass>-1</mass></inertial></link>"),
+                {"<mass>: found \"-1\"", ">= 0"});
   ExpectRefusal(Sdf("<link name=\"a\"><inertial auto=\"true\"/></link>"),
                 {"not found from shapes"});
-  ExpectRefusal(Sdf("<link name=\"a\"><inertial><pose relative_to=\"a\"/></inertial></link>"),
-                {"<pose> relative_to: found \"a\"", "stands in its link"});
+  ExpectRefusal(Sdf(a + "<link name=\"b\"><inertial><pose relative_to=\"a\"/></inertial></link>"),
+                {"<pose> relative_to: found \"a\"", "its own link"});
   ExpectRefusal(Sdf(a + Joint("j", "ball", "a", "world", "")),
                 {"file.xml:4: <child>: found \"world\"", "can be the <parent>"});
   ExpectRefusal("<sdf version=\"1.9\"/>", {"found no <model>"});

@@ -184,9 +184,11 @@ TEST(ImportUrdf, WhatIsNoTreeIsRefusedWithItsLine) {
                                                "<inertial><mass value=\"-1\"/><inertia ixx=\"1\" "
                                                "iyy=\"1\" izz=\"1\"/></inertial>")),
                 {"<mass> value: found \"-1\"", ">= 0"});
-  ExpectRefusal(Robot(Link("world", "") + Link("a",
-                                               "<inertial><mass value=\"1\"/><inertia ixx=\"1\" "
-                                               "iyy=\"-1\" izz=\"1\"/></inertial>")),
+  ExpectRefusal(Robot(Link("world", "") +
+                      Link("a",
+                           "<inertial><mass value=\"1\"/><inertia ixx=\"1\" "
+                           "iyy=\"-1\" izz=\"1\"/></inertial>") +
+                      Joint("j", "continuous", "world", "a")),
                 {"principal moments -1"});
   ExpectRefusal("<robot name=\"r\"/>", {"no link without a parent"});
   ExpectRefusal("<robot name=\"r\" xmlns:xacro=\"http://ros.org/wiki/xacro\">" + Link("world", "") +

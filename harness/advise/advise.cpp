@@ -40,9 +40,11 @@ double Tolerance(double wanted) {
 class Pilot {
  public:
   Pilot(const AdviceRequest& request, TrialBench& bench, double horizon, double length)
-      : request_(request), bench_(bench), horizon_(horizon), length_(length) {}
+      : request_(request), bench_(bench), horizon_(horizon), length_(length) {
+    if (request_.error) *request_.error *= kErrorShare;
+  }
 
-  Advice Find(const std::function<std::string(const Choice&)>& doubts) {
+  Advice Find(const std::function<void(Trial&)>& examine) {
     fastest_ = FastestFormulation();
     for (const bool implicit : {false, true}) {
       for (const std::string& profile : ProfileNames()) {
@@ -57,10 +59,10 @@ class Pilot {
     for (Trial& trial : advice_.finalists) {
       if (request_.budget) SpendBudget(&trial);
     }
-    return Decide(doubts);
+    return Decide(examine);
   }
 
-  Advice FindInAll(const std::function<std::string(const Choice&)>& doubts) {
+  Advice FindInAll(const std::function<void(Trial&)>& examine) {
     for (const FormulationRow& row : Formulations()) {
       if (row.is_peer()) continue;
       for (const std::string& profile : ProfileNames()) {
@@ -73,16 +75,16 @@ class Pilot {
     Sort(&advice_.looked_at);
     advice_.finalists = advice_.looked_at;
     if (advice_.finalists.size() > kFinalists) advice_.finalists.resize(kFinalists);
-    return Decide(doubts);
+    return Decide(examine);
   }
 
  private:
-  Advice Decide(const std::function<std::string(const Choice&)>& doubts) {
+  Advice Decide(const std::function<void(Trial&)>& examine) {
     for (int i = 0; i < kRepeats; ++i) {
       for (Trial& trial : advice_.finalists) bench_.TimeAgain(&trial);
     }
     Sort(&advice_.finalists);
-    Doubt(doubts);
+    Examine(examine);
     advice_.reached = !advice_.finalists.empty() && Keeps(advice_.finalists.front());
     advice_.pilot_s = Elapsed();
     return advice_;
@@ -318,20 +320,21 @@ class Pilot {
     }
   }
 
-  /// Looks at the best until one is without doubts, and puts it first.
-  void Doubt(const std::function<std::string(const Choice&)>& doubts) {
+  /// Looks at the best until one is without doubts and keeps what was asked for, and puts it first.
+  void Examine(const std::function<void(Trial&)>& examine) {
     for (std::size_t i = 0; i < advice_.finalists.size(); ++i) {
       Trial& trial = advice_.finalists[i];
-      trial.doubts = doubts(trial.choice);
+      examine(trial);
       if (!trial.doubts.empty() || !Keeps(trial)) continue;
       std::rotate(advice_.finalists.begin(),
                   advice_.finalists.begin() + static_cast<std::ptrdiff_t>(i),
                   advice_.finalists.begin() + static_cast<std::ptrdiff_t>(i) + 1);
       return;
     }
+    Sort(&advice_.finalists);
   }
 
-  const AdviceRequest& request_;
+  AdviceRequest request_;
   TrialBench& bench_;
   double horizon_, length_;
   Clock::time_point begin_ = Clock::now();
@@ -343,13 +346,13 @@ class Pilot {
 }  // namespace
 
 Advice Advise(const AdviceRequest& request, TrialBench& bench, double horizon, double length,
-              const std::function<std::string(const Choice&)>& doubts) {
-  return Pilot(request, bench, horizon, length).Find(doubts);
+              const std::function<void(Trial&)>& examine) {
+  return Pilot(request, bench, horizon, length).Find(examine);
 }
 
 Advice Sweep(const AdviceRequest& request, TrialBench& bench, double horizon, double length,
-             const std::function<std::string(const Choice&)>& doubts) {
-  return Pilot(request, bench, horizon, length).FindInAll(doubts);
+             const std::function<void(Trial&)>& examine) {
+  return Pilot(request, bench, horizon, length).FindInAll(examine);
 }
 
 }  // namespace loopbench::harness

@@ -17,6 +17,10 @@
 
 namespace loopbench::harness {
 
+/// Trials must keep this share of the error that is asked for: between a reference's times errors
+/// may be larger, and the last bits of another machine change them.
+inline constexpr double kErrorShare = 0.7;
+
 struct AdviceRequest {
   std::optional<double> error;   ///< that must be kept [m]; else
   std::optional<double> budget;  ///< wall seconds per simulated second
@@ -33,16 +37,17 @@ struct Advice {
   double pilot_s = 0.0;  ///< wall time of all of it [s]
 };
 
-/// `length` [m] is that of a link. `doubts` runs a choice with all observers and says what speaks
-/// against it; a finalist with doubts is no advice unless all have some.
+/// `length` [m] is that of a link. `examine` runs a choice with all observers, enters what speaks
+/// against it and the error that this run had; a finalist with doubts is no advice unless all have
+/// some.
 Advice Advise(const AdviceRequest& request, TrialBench& bench, double horizon, double length,
-              const std::function<std::string(const Choice&)>& doubts);
+              const std::function<void(Trial&)>& examine);
 
 /// The same from the whole product of formulations, levels, coordinates, profiles and tolerances a
 /// decade apart (and with a budget fixed steps, two a decade): what a pilot is held against.
 /// Nothing is cut off but runs that take twenty times the best or the budget, or a tenth of the
 /// time.
 Advice Sweep(const AdviceRequest& request, TrialBench& bench, double horizon, double length,
-             const std::function<std::string(const Choice&)>& doubts);
+             const std::function<void(Trial&)>& examine);
 
 }  // namespace loopbench::harness

@@ -30,8 +30,8 @@ const std::vector<double>* PoseOf(const std::string& key, const Value& value) {
 }
 
 /// What component i of a pose is measured in: lengths of a link, or rad.
-double UnitOf(const Record& record, std::size_t size, std::size_t i) {
-  return i < (size == 3 ? 2u : 3u) ? record.Number("link_length") : 1.0;
+double UnitOf(double link_length, std::size_t size, std::size_t i) {
+  return i < (size == 3 ? 2u : 3u) ? link_length : 1.0;
 }
 
 bool IsSoft(const Record& record) {
@@ -43,7 +43,8 @@ bool EndAlike(const Record& a, const Record& b, double rtol) {
   return DifferenceOf(a, b).largest <= kMostTolerances * rtol;
 }
 
-/// Final poses of a set of runs: of each component the least and the largest.
+/// Final poses of a set of runs: of each component the least and the largest. A number that is not
+/// finite, or is not there, is as far as can be from all others.
 class Bounds {
  public:
   /// Whether `run` ends like each of the runs taken so far.
@@ -54,29 +55,45 @@ class Bounds {
       const auto known = bounds_.find(key);
       if (known == bounds_.end()) continue;  // simplified away there
       const auto& [low, high] = known->second;
-      if (low.size() < pose->size()) return false;
+      if (low.size() != pose->size()) return false;
       for (std::size_t i = 0; i < pose->size(); ++i) {
         const double off = std::max((*pose)[i] - low[i], high[i] - (*pose)[i]);
-        if (!(off / UnitOf(run, pose->size(), i) <= kMostTolerances * rtol)) return false;
+        if (!(off / UnitOf(length_, pose->size(), i) <= kMostTolerances * rtol)) return false;
       }
     }
     return true;
   }
   void Take(const Record& run) {
+    if (length_ == 0.0) length_ = run.Number("link_length");
     for (const auto& [key, value] : run.items()) {
       const auto* pose = PoseOf(key, value);
-      if (pose == nullptr) continue;
-      const auto [known, is_new] = bounds_.try_emplace(key, *pose, *pose);
-      auto& [low, high] = known->second;
+      if (pose == nullptr || pose->empty()) continue;
+      auto& [low, high] = bounds_.try_emplace(key, *pose, *pose).first->second;
+      if (low.size() != pose->size()) low[0] = -kFar, high[0] = kFar;
       for (std::size_t i = 0; i < std::min(low.size(), pose->size()); ++i) {
-        low[i] = std::min(low[i], (*pose)[i]);
-        high[i] = std::max(high[i], (*pose)[i]);
+        const double number = (*pose)[i];
+        low[i] = std::isfinite(number) ? std::min(low[i], number) : -kFar;
+        high[i] = std::isfinite(number) ? std::max(high[i], number) : kFar;
       }
     }
   }
+  PoseDifference Widest() const {
+    PoseDifference widest;
+    for (const auto& [key, bounds] : bounds_) {
+      const auto& [low, high] = bounds;
+      for (std::size_t i = 0; i < low.size(); ++i) {
+        double off = (high[i] - low[i]) / UnitOf(length_, low.size(), i);
+        if (std::isnan(off)) off = kFar;
+        if (off > widest.largest) widest = {off, key.substr(kPrefix.size())};
+      }
+    }
+    return widest;
+  }
 
  private:
+  static constexpr double kFar = std::numeric_limits<double>::infinity();
   std::map<std::string, std::pair<std::vector<double>, std::vector<double>>> bounds_;
+  double length_ = 0.0;
 };
 
 Clusters ClustersOf(std::span<const Record> records, const std::vector<std::size_t>& runs,
@@ -106,11 +123,6 @@ bool Decides(std::span<const Record> records, const Clusters& clusters) {
     ways.insert(records[run].Text("enforcement") + " " + records[run].Text("coordinates"));
   }
   return ways.size() > 1;
-}
-
-bool IsPeer(const Record& record) {
-  const FormulationRow* row = FindFormulation(record.Text("formulation"));
-  return row != nullptr && row->is_peer();
 }
 
 /// Whether its level puts the branch back at every step.
@@ -143,22 +155,22 @@ const Record* DecidedBy(std::span<const Record> records, const std::vector<std::
 
 }  // namespace
 
+bool IsPeer(const Record& record) {
+  const FormulationRow* row = FindFormulation(record.Text("formulation"));
+  return row != nullptr && row->is_peer();
+}
+
+PoseDifference LargestDifference(std::span<const Record> runs) {
+  Bounds bounds;
+  for (const Record& run : runs) bounds.Take(run);
+  return bounds.Widest();
+}
+
 PoseDifference DifferenceOf(const Record& a, const Record& b) {
-  PoseDifference difference;
-  for (const auto& [key, value] : a.items()) {
-    const auto* pose = PoseOf(key, value);
-    if (pose == nullptr) continue;
-    const std::vector<double>& other = b.Numbers(key);
-    if (other.empty()) continue;  // simplified away there
-    for (std::size_t i = 0; i < pose->size(); ++i) {
-      const double unit = UnitOf(a, pose->size(), i);
-      double off = i < other.size() ? std::abs((*pose)[i] - other[i]) / unit : NAN;
-      if (std::isnan(off)) off = std::numeric_limits<double>::infinity();
-      if (off <= difference.largest) continue;
-      difference = {off, key.substr(kPrefix.size())};
-    }
-  }
-  return difference;
+  Bounds bounds;
+  bounds.Take(a);
+  bounds.Take(b);
+  return bounds.Widest();
 }
 
 std::vector<Agreement> CompareFinalPoses(std::span<const Record> records,

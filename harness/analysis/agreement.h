@@ -42,13 +42,18 @@ std::vector<Agreement> CompareFinalPoses(std::span<const Record> records,
 /// All testify.
 std::vector<Agreement> CompareFinalPoses(std::span<const Record> records);
 
-/// The largest difference of the final poses that two records both have: lengths over the link
-/// length, angles in rad, axes as they are; and the body that has it. Infinite where a number is
-/// missing.
+/// Whether another program made the run.
+bool IsPeer(const Record& record);
+
+/// The largest difference of final poses, and the body that has it: lengths over the link length,
+/// angles in rad, axes as they are. Infinite where a number is missing or not finite.
 struct PoseDifference {
   double largest = 0.0;
   std::string body;
 };
+/// Of the bodies that two records both have.
 PoseDifference DifferenceOf(const Record& a, const Record& b);
+/// Of any two of `runs` of one scene, whatever their order.
+PoseDifference LargestDifference(std::span<const Record> runs);
 
 }  // namespace loopbench::harness

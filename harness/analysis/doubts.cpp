@@ -20,6 +20,8 @@ namespace {
 /// Energy balance: a hundredth of the energy that moves is no error of integration at any tolerance
 /// that deserves the name; regular runs at 1e-6 have 1e-3 and less.
 constexpr double kMostEnergyError = 1e-2;
+/// Rounding of an evaluation, which adds to a tolerance.
+constexpr double kEvaluation = 100 * std::numeric_limits<double>::epsilon();
 
 /// Factors of n^2 and n in the promised drift. Over 20 s at 1e-6 and 1e-9 the regular shipped
 /// mechanisms stay below 0.004 and 0.03 (the crank-rocker driven at 3 rad/s has both), Bennett's
@@ -63,6 +65,20 @@ double StepsRemembered(const Record& record) {
   return gain > 0.0 ? 2.0 / gain * per_second : record.Number("steps");
 }
 
+/// Tolerances that drift may add up to at the record's level.
+double TolerancesOfDrift(const Record& record) {
+  const double steps = record.Number("steps");
+  const auto growth = GrowthAt(record);
+  double tolerances = kFewSteps;
+  if (growth == DriftGrowth::kSquare) tolerances += kAcceleration * steps * steps;
+  if (growth == DriftGrowth::kLinear) tolerances += kVelocity * steps;
+  if (growth == DriftGrowth::kForgotten) {
+    const double remembered = std::min(steps, StepsRemembered(record));
+    tolerances += kAcceleration * remembered * remembered;
+  }
+  return tolerances;
+}
+
 /// What moves is a millionth of what the absolute tolerance lets pass, with masses near 1 kg: what
 /// feedback makes of rounding in a mechanism at rest.
 bool IsAtRest(const Record& record) {
@@ -78,6 +94,13 @@ bool PassedSingularPosition(const Record& record) {
   const double distance = record.Number("singularity_distance_min");
   if (std::isnan(distance)) return record.Number("softened_evaluations") > 0;
   return distance < kRankRatio;
+}
+
+/// Regularized, which bends the motion by more than tolerances, although no position at which steps
+/// ended was near a singular one.
+bool WasSoftenedElsewhere(const Record& record) {
+  return record.Number("softened_evaluations") > 0 && record.Number("singularity_passages") == 0 &&
+         record.Number("singularity_distance_min") >= kRankRatio;
 }
 
 void Add(std::string* codes, bool on, const char* code) {
@@ -109,11 +132,17 @@ constexpr OtherError kOtherErrors[] = {
     {"error_rotation_max", "reference_error_rotation", false},
     {"error_displacement_max", "reference_error_displacement", true}};
 
+/// Where steps are fixed no tolerance says what is near: a hundredth of a link or rad is then no
+/// error of integration, as for the energy.
+constexpr double kMostFixedError = 1e-2;
+
 /// Within as many tolerances as runs may be apart. The reference has an error of its own, and
 /// rounding is no fault of a tolerance.
 bool IsNear(const Record& record, const char* error, const char* accuracy, double length) {
   const double certain = record.Number(accuracy) / length + kRoundOffShare;
-  return record.Number(error) / length <= kMostTolerances * record.Number("rtol") + certain;
+  const double expected =
+      record.Number("step") > 0.0 ? kMostFixedError : kMostTolerances * record.Number("rtol");
+  return record.Number(error) / length <= expected + certain;
 }
 
 /// Of all errors that are known.
@@ -143,6 +172,16 @@ std::optional<DriftGrowth> GrowthAt(const Record& record) {
   return TraitsOf(*level).growth;
 }
 
+double ExpectedEnergyShare(const Record& record) {
+  const double rtol = record.Number("rtol");
+  if (!(rtol > 0.0) || IsPeer(record)) return kMostEnergyError;
+  // no level puts the energy back, so that errors of all steps add up
+  const double tolerances = TolerancesOfDrift(record) + kVelocity * record.Number("steps");
+  const double scale = record.Number("energy_scale");
+  const double per_tolerance = std::fmax(1.0, record.Number("energy_sensitivity") / scale);
+  return std::min(kMostEnergyError, tolerances * (rtol + kEvaluation) * per_tolerance);
+}
+
 double EnergyErrorShare(const Record& record) {
   if (record.Find("energy_scale") == nullptr) return record.Number("energy_error_relative");
   const double error = record.Number("energy_error_max");
@@ -157,22 +196,14 @@ double DriftShare(const Record& record) {
 }
 
 double PromisedDriftShare(const Record& record) {
-  const double rtol = record.Number("rtol"), steps = record.Number("steps");
+  const double rtol = record.Number("rtol");
   const double goal = kProjection * record.Number("position_goal") / record.Number("link_length");
   const auto growth = GrowthAt(record);
-  double tolerances = kFewSteps;
-  if (growth == DriftGrowth::kSquare) tolerances += kAcceleration * steps * steps;
-  if (growth == DriftGrowth::kLinear) tolerances += kVelocity * steps;
-  if (growth == DriftGrowth::kForgotten) {
-    const double remembered = std::min(steps, StepsRemembered(record));
-    tolerances += kAcceleration * remembered * remembered;
-  }
   // nothing is left but of softened directions, and what peers, which project to a part of their
   // tolerance, leave
-  const FormulationRow* row = FindFormulation(record.Text("formulation"));
-  const bool left = record.Number("softened_evaluations") > 0 || (row && row->is_peer());
+  const bool left = record.Number("softened_evaluations") > 0 || IsPeer(record);
   const bool is_fixed = record.Number("step") > 0.0;
-  double promised = is_fixed ? kOpenLoop : tolerances * rtol;
+  double promised = is_fixed ? kOpenLoop : TolerancesOfDrift(record) * rtol;
   if (growth == DriftGrowth::kNone && !left) promised = 0.0;
   return record.Find("position_goal") == nullptr ? promised : std::max(promised, goal);
 }
@@ -198,15 +229,16 @@ std::string OwnDoubts(const Record& record) {
   const auto has = [&](const char* key) { return record.Find(key) != nullptr; };
   Add(&codes,
       (has("energy_scale") || has("energy_error_relative")) &&
-          !(EnergyErrorShare(record) <= kMostEnergyError) && !IsAtRest(record),
+          !(EnergyErrorShare(record) <= ExpectedEnergyShare(record)) && !IsAtRest(record),
       kEnergyDoubt);
   // where the reference knows the way, who kept to it did
   Add(&codes, PassedSingularPosition(record) && !IsCertified(record), kSingularDoubt);
+  Add(&codes, WasSoftenedElsewhere(record) && !IsCertified(record), kSoftenedDoubt);
   Add(&codes,
       has("drift_position_max") && has("link_length") &&
           !(DriftShare(record) <= PromisedDriftShare(record)),
       kDriftDoubt);
-  Add(&codes, record.Number("rtol") > 0.0 && !IsNearReference(record), kErrorDoubt);
+  Add(&codes, !IsNearReference(record), kErrorDoubt);
   Add(&codes, PeriodsPerStep(record) > kMostPeriods, kDriveDoubt);
   Add(&codes, StepsStruggle(record), kStepsDoubt);
   Add(&codes, record.Number("ensemble_failed") > 0, kMembersDoubt);

@@ -14,6 +14,7 @@ namespace loopbench::harness {
 /// The codes of `doubts`, which docs/design.md section 6 explains; programs may rely on them.
 inline constexpr const char* kEnergyDoubt = "energy";
 inline constexpr const char* kSingularDoubt = "singular-passage";
+inline constexpr const char* kSoftenedDoubt = "softened";
 inline constexpr const char* kDriftDoubt = "drift";
 inline constexpr const char* kMembersDoubt = "members-failed";
 inline constexpr const char* kExponentDoubt = "exponent";
@@ -28,8 +29,10 @@ inline constexpr const char* kStepsDoubt = "steps";
 std::optional<DriftGrowth> GrowthAt(const Record& record);
 
 /// Largest error of the energy balance over the energy that moves (`energy_scale`; in records
-/// without it the largest kinetic energy). NaN where it was not measured.
+/// without it the largest kinetic energy), and what tolerance and steps explain of it. NaN where it
+/// was not measured.
 double EnergyErrorShare(const Record& record);
+double ExpectedEnergyShare(const Record& record);
 
 /// Drift of a run over the length of a link, or in rad where a rotation has drifted further, and
 /// what its level of enforcement promises of it. NaN where it was not measured.

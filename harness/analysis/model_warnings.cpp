@@ -34,6 +34,20 @@ void AddRankWarnings(const MechanismDescription& description, const Structure& s
              structure.joint_u, kMostAnalysedSpeeds)});
     return;
   }
+  if (structure.rounding > 0.0) {
+    std::string joints;
+    for (const RedundantDirection& one : structure.redundant) {
+      const std::string& name = description.joints[one.joint].name;
+      if (joints.find('"' + name + '"') != std::string::npos) continue;
+      joints += (joints.empty() ? "\"" : ", \"") + name + '"';
+    }
+    warnings->push_back(
+        {WarningKind::kRounded,
+         fmt::format(
+             "{} constraints of {} lean against the others by {:.2g} rad or lengths, within "
+             "the accuracy {:g} of the input: runs leave them out",
+             structure.redundant.size(), joints, structure.rounding, description.accuracy)});
+  }
   const bool driven = std::ranges::any_of(
       description.joints, [](const JointDescription& joint) { return !joint.motions.empty(); });
   const bool locked = structure.locked() && structure.bodies > 0 && !driven;
@@ -117,11 +131,33 @@ std::vector<Warning> FindUnitWarnings(const MechanismDescription& description) {
   return {{WarningKind::kDegrees, angles.Text()}};
 }
 
+std::vector<Warning> FindGuessWarnings(const MechanismDescription& description,
+                                       const VectorX<double>& q) {
+  std::vector<Warning> warnings;
+  for (const MissedGuess& guess : FindMissedGuesses(description, q)) {
+    const JointDescription& joint = description.joints[guess.joint];
+    std::string text = fmt::format("the guess of joint \"{}\" is missed: ", joint.name);
+    if (guess.coordinate < 0) {
+      text += fmt::format("its orientation starts {:.4g} rad away", guess.by);
+    } else {
+      const auto words = ValueWords(joint.type, description.space, false);
+      const ValueWord& word = words[static_cast<std::size_t>(guess.coordinate)];
+      text += fmt::format("its {} starts at {:.6g} {}, guessed {:.6g} {}", word.name,
+                          guess.guess + guess.by, word.unit, guess.guess, word.unit);
+    }
+    warnings.push_back({WarningKind::kMissedGuess, text});
+  }
+  return warnings;
+}
+
 std::vector<Warning> FindWarnings(const MechanismDescription& description,
                                   const Structure& structure) {
   std::vector<Warning> warnings = FindUnitWarnings(description);
   if (structure.start.outcome == Outcome::kInconsistentStart) {
     warnings.push_back({WarningKind::kInconsistentStart, structure.start.message});
+  } else {
+    std::ranges::move(FindGuessWarnings(description, structure.start.q),
+                      std::back_inserter(warnings));
   }
   AddRankWarnings(description, structure, &warnings);
   for (const Island& island : structure.islands) {

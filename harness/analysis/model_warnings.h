@@ -17,6 +17,8 @@ enum class WarningKind {
   kMassRatio,          ///< masses further apart than their equations can resolve well
   kFarCentre,          ///< a centre of mass so far from its joints that poses lose digits
   kNotAnalysed,        ///< too large for an analysis of rank
+  kRounded,            ///< constraints are redundant within the accuracy of the input only
+  kMissedGuess,        ///< a joint starts far from its guess
   kDegrees,            ///< angles of more than a turn, which may have been meant in degrees
 };
 
@@ -41,6 +43,10 @@ inline constexpr double kFarthestCentre = 1e3;
 /// initial coordinates, frames and rests of springs. All in one warning, as sure as a guess can be:
 /// such an angle may be meant.
 std::vector<Warning> FindUnitWarnings(const MechanismDescription& description);
+
+/// A warning for each guess that a start q in joint coordinates misses.
+std::vector<Warning> FindGuessWarnings(const MechanismDescription& description,
+                                       const VectorX<double>& q);
 
 /// All of them.
 std::vector<Warning> FindWarnings(const MechanismDescription& description,

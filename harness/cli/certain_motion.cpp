@@ -14,16 +14,23 @@ namespace loopbench::harness {
 
 CertainMotion MakeCertainMotion(const MechanismDescription& user, double horizon, double cpu_s,
                                 const std::string&) {
-  // enough to see the largest error, few against a run's steps
-  constexpr int kTimes = 41;
-  const auto until = [&](double end) {
-    return MakeReference(user, end, LinkLength(user),
-                         {.scalar = "long-double", .points = kTimes, .cpu_s = cpu_s});
+  CertainMotion certain{.options = {.scalar = "long-double", .cpu_s = cpu_s}, .horizon = horizon};
+  const int all = certain.options.points;
+  const auto make = [&] {
+    certain.reference = MakeReference(user, certain.horizon, LinkLength(user), certain.options);
+    return certain.reference.trust_horizon;
   };
-  CertainMotion certain{until(horizon), horizon};
-  if (certain.reference.trust_horizon == horizon) return certain;
-  certain.horizon = certain.reference.trust_horizon;
-  if (certain.horizon > 0.0) certain.reference = until(certain.horizon);
+  // at the same times the same is certified; other times, which a few of these are too far apart
+  // for, may be certified less far
+  constexpr int kFewest = 41, kMostEnds = 8;
+  double end = make();
+  for (int i = 0; i < kMostEnds && end > 0.0 && end < certain.horizon; ++i) {
+    const int trusted = static_cast<int>(certain.reference.NumTrusted());
+    certain.options.points = trusted < kFewest ? all : trusted;
+    certain.horizon = end;
+    end = make();
+  }
+  certain.horizon = end;
   return certain;
 }
 

@@ -6,13 +6,14 @@
 namespace loopbench::harness {
 
 struct CertainMotion {
-  Reference reference;
-  double horizon = 0.0;  ///< [s], not beyond the one asked for; 0: there is none
+  ReferenceOptions options = {};  ///< of an experiment that makes the same reference
+  Reference reference = {};
+  double horizon = 0.0;  ///< [s], its trust horizon, which errors are taken up to; 0: there is none
 };
 
-/// At some forty times up to `horizon`; each of the witnesses may take `cpu_s`. Where certification
-/// ends earlier the times are spread up to there. Throws ConfigError in a program that was built
-/// without wide scalars; `what` needs them.
+/// Each of the witnesses may take `cpu_s`. Where certification ends before `horizon` the reference
+/// is made again up to there, until it is certified to its end. Throws ConfigError in a program
+/// that was built without wide scalars; `what` needs them.
 CertainMotion MakeCertainMotion(const MechanismDescription& user, double horizon, double cpu_s,
                                 const std::string& what);
 

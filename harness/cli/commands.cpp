@@ -165,7 +165,7 @@ int Merge(const MergeCommand& command) {
     std::vector<std::filesystem::path> owners;
     for (const auto& store : merged.StoresOf(i)) owners.push_back(StoreFile(store));
     for (const std::string& name : CopyTrajectories({record}, owners, target.file())) {
-      PrintError("warning: no store has trajectories/{} of the run that is kept\n", name);
+      PrintError("warning: no store has trajectories/{} as the run that is kept wrote it\n", name);
     }
     if (scenes.insert(record.Text("scene_id")).second) {
       CopyMechanisms({record}, files, target.file());

@@ -74,6 +74,7 @@ int CheckFiles(const CheckCommand& command);
 struct PlanCommand {
   ExperimentFiles files;
   std::filesystem::path from;  ///< store of earlier results; times of cases it has come from there
+  bool timing = true;          ///< timings too
   bool json = false;
 };
 int PrintPlans(const PlanCommand& command);

@@ -17,6 +17,7 @@
 #include "harness/tables/fit.h"
 #include "harness/text/config_error.h"
 #include "harness/text/files.h"
+#include "harness/text/output_file.h"
 #include "harness/text/terminal.h"
 
 namespace loopbench::harness {
@@ -94,7 +95,9 @@ Table TableOf(const std::vector<Trial>& trials, const Trial& best, double horizo
 }
 
 /// The experiment that runs one choice and times it.
-std::string ExperimentOf(const AdviseCommand& command, const Choice& choice, double horizon) {
+std::string ExperimentOf(const AdviseCommand& command, const Choice& choice, double horizon,
+                         ReferenceOptions reference) {
+  reference.cpu_s *= 2;  // as far on a machine that is busier
   const auto folder = std::filesystem::absolute(command.out).parent_path();
   return ExperimentText(
       {.name = "advice for " + command.mechanism.stem().string(),
@@ -104,7 +107,8 @@ std::string ExperimentOf(const AdviseCommand& command, const Choice& choice, dou
        .column = choice.column,
        .integrator = choice.integrator,
        .rtol = choice.rtol,
-       .step = choice.step});
+       .step = choice.step,
+       .reference = reference});
 }
 
 Experiment SingleOf(const MechanismFile& file, double horizon) {
@@ -118,10 +122,12 @@ Experiment SingleOf(const MechanismFile& file, double horizon) {
   return experiment;
 }
 
-/// What a run with all observers says against a choice.
-std::string DoubtsOf(const MechanismFile& file, const Choice& choice, double horizon,
-                     const Reference& reference) {
+/// Enters what the run of the experiment that is written has: its doubts and, of all points, its
+/// error.
+void Examine(const MechanismFile& file, double horizon, const Reference& reference,
+             bool has_all_points, Trial& trial) {
   const Experiment experiment = SingleOf(file, horizon);
+  const Choice& choice = trial.choice;
   Case one;
   one.mechanism = file.description.name;
   one.column = choice.column;
@@ -132,7 +138,30 @@ std::string DoubtsOf(const MechanismFile& file, const Choice& choice, double hor
   one.limits.cpu_s = 60.0;
   one.keys = CaseKeys(experiment, one);
   const Record record = RunCase(experiment, one, &reference);
-  return record.Text("outcome") == "finished" ? record.Text("doubts") : record.Text("outcome");
+  const bool finished = record.Text("outcome") == "finished";
+  trial.doubts = finished ? record.Text("doubts") : record.Text("outcome");
+  if (finished && has_all_points) trial.error = record.Number("error_position_max");
+}
+
+/// Throws where the points that errors are taken of stay where they are: every method is then
+/// right.
+void RequireMotion(const std::string& name, const MechanismDescription& user,
+                   const CertainMotion& certain, const std::vector<MeasuredPoint>& points) {
+  const Reference& reference = certain.reference;
+  const Compiled compiled = Compile(user, {.islands = false});
+  const Measured measured{user, compiled, points};
+  bool turns = false;
+  for (std::size_t k = 0; k < reference.NumTrusted(); ++k) {
+    const Distance way = DistanceOf(measured, -1, reference.snapshots[k], reference.snapshots[0]);
+    const Distance &bound = reference.bounds[k], &first = reference.bounds[0];
+    if (way.position > bound.position + first.position) return;
+    turns = turns || way.rotation > bound.rotation + first.rotation;
+  }
+  throw std::runtime_error(fmt::format(
+      "{}: {} within {:g} s, so any method is exact there, and there is no advice for a motion: "
+      "{}",
+      name, turns ? "none of the measured points moves" : "no joint moves", certain.horizon,
+      turns ? "name others with --points" : "give the mechanism a speed or a force that moves it"));
 }
 
 std::string WhatWasTried(const Advice& advice) {
@@ -152,7 +181,9 @@ void PrintAdvice(const AdviseCommand& command, const Advice& advice, const Refer
     Print("Take {}:\n  error {:.1e} m, {:.3g} s of wall time ({:.3g} simulated seconds a second)\n",
           ToString(best.choice), best.error, best.wall_s, horizon / best.wall_s);
   } else {
-    Print("None reached it. The nearest is {}:\n  error {:.1e} m, {:.3g} s of wall time\n",
+    Print("None reached it{}. The nearest is {}:\n  error {:.1e} m, {:.3g} s of wall time\n",
+          command.budget > 0.0 ? ""
+                               : fmt::format(" with a margin of {:.0f} %", 100 * (1 - kErrorShare)),
           ToString(best.choice), best.error, best.wall_s);
   }
   if (!best.doubts.empty()) Print("  doubtful: {}\n", best.doubts);
@@ -206,10 +237,9 @@ Advice AdviceFor(const AdviseCommand& command, const MechanismFile& file,
                          .points = points};
   const auto bench = MakeTrialBench(scene);
   const auto find = command.exhaustive ? &Sweep : static_cast<decltype(&Sweep)>(&Advise);
-  return find(request, *bench, certain.horizon, LinkLength(file.description),
-              [&](const Choice& choice) {
-                return DoubtsOf(file, choice, certain.horizon, certain.reference);
-              });
+  return find(request, *bench, certain.horizon, LinkLength(file.description), [&](Trial& trial) {
+    Examine(file, certain.horizon, certain.reference, points.empty(), trial);
+  });
 }
 
 /// What a model causes and saves, as a row; `whole` is what the whole model takes [s].
@@ -290,9 +320,13 @@ int AdviseInChild(const AdviseCommand& command, const MechanismFile& file) {
     throw std::runtime_error(fmt::format("{}: there is no certified reference to advise by: {}",
                                          name, certain.reference.message));
   }
-  if (certain.horizon < command.horizon && command.format == "text") {
-    Print("The motion is certified until {:g} s only. Advice is for that.\n", certain.horizon);
+  RequireMotion(name, user, certain, points);
+  std::string shorter;
+  if (certain.horizon < command.horizon) {
+    shorter = fmt::format("The motion is certified until {:g} s only. Advice is for that.",
+                          certain.horizon);
   }
+  if (!shorter.empty() && command.format == "text") Print("{}\n", shorter);
   AdviceRequest request;
   if (command.budget > 0.0) {
     request.budget = command.budget;
@@ -311,10 +345,12 @@ int AdviseInChild(const AdviseCommand& command, const MechanismFile& file) {
   } else {
     Table table = TableOf(advice.finalists, best, certain.horizon);
     table.notes = {WhatWasTried(advice)};
+    if (!shorter.empty()) table.notes.push_back(shorter);
     PrintText(Render(table, command.format));
   }
   if (!command.out.empty()) {
-    WriteFileAtomically(command.out, ExperimentOf(command, best.choice, certain.horizon));
+    WriteFileAtomically(command.out,
+                        ExperimentOf(command, best.choice, certain.horizon, certain.options));
     PrintError("the experiment that reproduces it: {}\n", command.out.string());
   }
   return advice.reached ? 0 : 1;
@@ -324,6 +360,7 @@ int AdviseInChild(const AdviseCommand& command, const MechanismFile& file) {
 
 int Advise(const AdviseCommand& command, const std::string&) {
   const MechanismFile file = ReadMechanism(command.mechanism);
+  if (!command.out.empty()) RequireOutput(command.out);
   return PrintFromChild(command.mechanism.string(), command.limits,
                         [&] { return AdviseInChild(command, file); });
 }

@@ -20,6 +20,7 @@
 #include "harness/suite/workload.h"
 #include "harness/text/config_error.h"
 #include "harness/text/files.h"
+#include "harness/text/output_file.h"
 #include "harness/text/run_program.h"
 #include "harness/text/temporary_folder.h"
 #include "harness/text/terminal.h"
@@ -229,6 +230,7 @@ int Baseline(const BaselineCommand& command, const std::string& typed) {
                     "baseline renew",
                     baseline.string()));
   }
+  if (command.action == "renew") RequireOutput(baseline);
   RequirePrograms(command);
   std::optional<TemporaryFolder> temporary;
   if (command.keep.empty()) temporary.emplace("loopbench");

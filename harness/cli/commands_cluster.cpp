@@ -186,13 +186,25 @@ JsonObject StatusDocument(const ClusterRun& run, const std::vector<PartProgress>
       .Add("parts", rows);
 }
 
+/// A line end would end a comment line of a script, which tells Slurm its options.
+void RequireOneLine(const std::string& option, const std::string& text) {
+  if (text.find_first_of("\n\r") == std::string::npos) return;
+  throw ConfigError(
+      fmt::format("{}: found a line end in '{}', expected a text of one line", option, text));
+}
+
 }  // namespace
 
 int Submit(SubmitCommand command) {
   command.folder = std::filesystem::absolute(command.folder).lexically_normal();
   if (!command.folder.has_filename()) command.folder = command.folder.parent_path();
-  if (command.folder.string().find('\n') != std::string::npos) {
-    throw ConfigError("--out: found a line end in it, expected a path that a script can name");
+  RequireOneLine("--out", command.folder.string());
+  for (const auto& path : command.run.experiments) RequireOneLine("experiment", path.string());
+  for (const auto& [option, texts] :
+       {std::pair{"--set", command.run.settings},
+        {"--filter", command.run.conditions},
+        {"--time, --partition or --sbatch", command.run.batch_options}}) {
+    for (const std::string& text : texts) RequireOneLine(option, text);
   }
   if (command.again) return SubmitAgain(command);
   ClusterRun& run = command.run;

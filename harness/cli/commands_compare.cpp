@@ -17,6 +17,7 @@
 #include "harness/record/provenance.h"
 #include "harness/store/contents.h"
 #include "harness/store/measurements.h"
+#include "harness/store/result_store.h"
 #include "harness/tables/columns.h"
 #include "harness/tables/fit.h"
 #include "harness/text/config_error.h"
@@ -172,15 +173,18 @@ void NoteCommonShift(const ComparisonReport& comparison, std::vector<std::string
                   shift));
 }
 
-std::string Conclusion(const ComparisonReport& comparison, int code) {
+std::string Conclusion(const ComparisonReport& comparison, const CompareOptions& options) {
+  const int code = comparison.ExitCode(options);
   const int worse = comparison.Count(Judgement::kWorse);
   const int different = comparison.Count(Judgement::kDifferent);
   if (code == 1 && different == 0) return fmt::format("WORSE: {} measures", worse);
   if (code == 1 && worse == 0) return fmt::format("DIFFERENT: {} measures", different);
   if (code == 1) return fmt::format("WORSE: {} measures, {} more different", worse, different);
-  if (code == 2) return "COULD NOT MEASURE: too little in common";
+  if (code == 2) return "COULD NOT MEASURE: " + comparison.Obstacle(options);
   const int better = comparison.Count(Judgement::kBetter);
-  return better > 0 ? fmt::format("BETTER: {} measures, none worse", better) : "SAME";
+  const int undecided = comparison.Count(Judgement::kNotMeasured, "times");
+  return (better > 0 ? fmt::format("BETTER: {} measures, none worse", better) : "SAME") +
+         (undecided > 0 ? fmt::format("; {} times not compared", undecided) : "");
 }
 
 /// Leaves the records of both sides that match. A key that neither side has would choose nothing,
@@ -199,13 +203,23 @@ void Choose(const Selection& where, const std::vector<std::string>& match,
 /// The base that was named, or the last good state of the history, which `name` then says.
 std::vector<Record> LoadBase(const CompareCommand& command, const std::vector<Record>& fresh,
                              std::string* name) {
-  if (command.history.empty() && command.branch.empty()) return LoadMeasurements(command.base);
+  if (command.history.empty() && command.branch.empty()) {
+    const auto file = [](const std::filesystem::path& path) {
+      return std::filesystem::is_directory(path) ? StoreFile(path) : path;
+    };
+    std::error_code none;
+    if (std::filesystem::equivalent(file(command.base), file(command.fresh), none)) {
+      throw ConfigError(fmt::format("compare: found '{}' as BASE and as NEW, expected two files",
+                                    file(command.base).string()));
+    }
+    return LoadMeasurements(command.base);
+  }
   const std::string machine = fresh.empty() ? "" : OriginOf(fresh.front()).machine;
   const bool only_times = command.options.only == std::vector<std::string>{"times"};
   return LastGoodRecords({command.history, command.branch}, machine, only_times, name);
 }
 
-JsonObject ComparisonDocument(const ComparisonReport& comparison, int code,
+JsonObject ComparisonDocument(const ComparisonReport& comparison, const CompareOptions& options,
                               const std::vector<std::string>& notes) {
   std::vector<JsonObject> groups, findings;
   for (const Record& row : SummaryTable(comparison).rows) groups.emplace_back(row);
@@ -222,8 +236,8 @@ JsonObject ComparisonDocument(const ComparisonReport& comparison, int code,
                            .Add("why", finding.why));
   }
   return JsonObject()
-      .Add("conclusion", Conclusion(comparison, code))
-      .Add("exit_code", std::int64_t{code})
+      .Add("conclusion", Conclusion(comparison, options))
+      .Add("exit_code", std::int64_t{comparison.ExitCode(options)})
       .Add("groups", groups)
       .Add("findings", findings)
       .Add("only_in_base", comparison.only_base)
@@ -242,8 +256,10 @@ int PrintComparison(const CompareCommand& command, const std::string& typed) {
   std::vector<Record> base = LoadBase(command, fresh, &base_name);
   Choose(command.where, command.options.match, base, fresh);
   ShareContents(&base, &fresh);
-  const ComparisonReport comparison = Compare(base, fresh, command.options);
-  const int code = comparison.ExitCode(command.options);
+  CompareOptions options = command.options;
+  options.added |= !base_name.empty();  // a history grows, and loses nothing
+  const ComparisonReport comparison = Compare(base, fresh, options);
+  const int code = comparison.ExitCode(options);
 
   std::vector<std::string> notes;
   if (!base_name.empty()) notes.push_back(base_name);
@@ -252,13 +268,13 @@ int PrintComparison(const CompareCommand& command, const std::string& typed) {
   NoteOrigins("NEW", fresh, notes);
   if (!command.markdown.empty()) {
     WriteFileAtomically(command.markdown,
-                        ComparisonMarkdown(comparison, Conclusion(comparison, code), notes));
+                        ComparisonMarkdown(comparison, Conclusion(comparison, options), notes));
   }
   if (!command.junit.empty()) {
-    WriteFileAtomically(command.junit, ComparisonJunit(comparison, command.options));
+    WriteFileAtomically(command.junit, ComparisonJunit(comparison, options));
   }
   if (command.json) {
-    PrintText(ComparisonDocument(comparison, code, notes).Text() + "\n");
+    PrintText(ComparisonDocument(comparison, options, notes).Text() + "\n");
     return code;
   }
   notes = ReasonNotes(comparison);
@@ -280,7 +296,7 @@ int PrintComparison(const CompareCommand& command, const std::string& typed) {
     AddCases("more than once", comparison.ambiguous, findings);
     AddCases("other content", comparison.other_content, findings);
     PrintText(ToCsv(findings));
-    PrintError("{}\n", Conclusion(comparison, code));
+    PrintError("{}\n", Conclusion(comparison, options));
     return code;
   }
   if (command.format == "markdown") notes.push_back(fmt::format("command: {}", typed));
@@ -291,7 +307,7 @@ int PrintComparison(const CompareCommand& command, const std::string& typed) {
   Table summary = SummaryTable(comparison);
   summary.notes = notes;
   print(summary);
-  Print("{}\n", Conclusion(comparison, code));
+  Print("{}\n", Conclusion(comparison, options));
   return code;
 }
 

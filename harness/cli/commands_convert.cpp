@@ -46,10 +46,6 @@ int ConvertHere(const ConvertCommand& command) {
   if (out.empty()) {
     out = FileName(command.mechanism.stem().string()) + std::string(format.ending);
   }
-  std::error_code none;
-  if (std::filesystem::equivalent(command.mechanism, out, none)) {
-    throw ConfigError("--out " + out.string() + ": found the mechanism file, expected another one");
-  }
   exchange::ExportedFile file;
   try {
     file = exchange::Export(mechanism, format, command.options);

@@ -41,9 +41,9 @@ std::vector<Record> CaseRows(const std::vector<Experiment>& experiments, const S
 
 /// Runs that are no cases: of a long sweep, as many of each combination as of those that are shown.
 struct OtherRuns {
-  explicit OtherRuns(const Overview& overview) {
+  OtherRuns(const Overview& overview, const Selection& filter) {
     for (const Experiment& experiment : overview.experiments) {
-      timings += CountTimings(experiment);
+      timings += CountTimings(experiment, filter);
       rungs += CountRungs(experiment);
     }
     timings = timings * overview.combinations / overview.experiments.size();
@@ -54,7 +54,7 @@ struct OtherRuns {
 
 /// All cases, one a line and group after group: a long sweep is never held at once.
 void PrintCaseDocument(const Overview& overview, const ExperimentFiles& files) {
-  const OtherRuns others(overview);
+  const OtherRuns others(overview, files.filter);
   std::string head = JsonObject()
                          .Add("file", files.paths.front().string())
                          .Add("name", overview.experiments.front().name)
@@ -116,7 +116,7 @@ Table CaseTable(const Overview& overview, const Selection& filter) {
   table.columns.push_back({"horizon", "horizon [s]", Format::kShortest, {}});
   table.columns.push_back({"runs", "runs", Format::kInteger, {}});
   table.rows = CaseRows(experiments, filter);
-  const OtherRuns others(overview);
+  const OtherRuns others(overview, filter);
   table.notes = {fmt::format("{} cases and {} timings", overview.cases(), others.timings)};
   if (others.rungs > 0) {
     table.notes.front() += fmt::format(", {} runs in several scalars", others.rungs);
@@ -140,20 +140,25 @@ struct Checked {
   std::vector<std::string> warnings = {};
 };
 
+void AddWarning(const std::filesystem::path& path, const std::string& text, Checked* checked) {
+  PrintError("warning: {}: {}\n", path.string(), text);
+  checked->warnings.push_back(text);
+}
+
 /// What looks wrong about sound numbers; no reason to refuse them.
 void AddUnitWarnings(const std::filesystem::path& path, const MechanismDescription& description,
                      Checked* checked) {
   for (const Warning& warning : FindUnitWarnings(description)) {
-    PrintError("warning: {}: {}: {}\n", path.string(), description.name, warning.text);
-    checked->warnings.push_back(fmt::format("{}: {}", description.name, warning.text));
+    AddWarning(path, fmt::format("{}: {}", description.name, warning.text), checked);
   }
 }
 
-/// Throws ConfigError with all faults of starts, each with the file and the way around.
-void RefuseFaults(const std::filesystem::path& path, const std::vector<std::string>& faults) {
+/// Adds the warnings. Throws ConfigError with all faults of starts, each with the file and the way
+/// around.
+void AddStarts(const std::filesystem::path& path, const StartReport& report, Checked* checked) {
+  for (const std::string& warning : report.warnings) AddWarning(path, warning, checked);
   std::string text;
-  for (const std::string& fault : faults) {
-    if (fault.empty()) continue;
+  for (const std::string& fault : report.faults) {
     text += fmt::format("{}{}: {}", text.empty() ? "" : "\n", path.string(), fault);
   }
   if (!text.empty()) throw ConfigError(text + "\n(--no-assembly leaves this check out)");
@@ -167,7 +172,7 @@ Checked CheckExperiment(const std::filesystem::path& path, const CheckCommand& c
     AddUnitWarnings(path, scene.mechanism.description, &checked);
   }
   for (const Experiment& experiment : experiments) CheckLadders(experiment);
-  if (command.assembly) RefuseFaults(path, StartFaults(experiments));
+  if (command.assembly) AddStarts(path, CheckStarts(experiments), &checked);
   const std::string& name = experiments.front().name;
   checked.sentence = fmt::format("experiment \"{}\", {} cases", name, overview.cases());
   if (overview.combinations > 1) {
@@ -192,7 +197,11 @@ Checked CheckMechanism(const std::filesystem::path& path, const CheckCommand& co
   const MechanismFile file = ReadMechanism(path);
   Checked checked;
   AddUnitWarnings(path, file.description, &checked);
-  if (command.assembly) RefuseFaults(path, {StartFault(file.description, command.limits)});
+  if (command.assembly) {
+    StartReport report = CheckStart(file.description, command.limits);
+    for (std::string& warning : report.warnings) warning = file.description.name + ": " + warning;
+    AddStarts(path, report, &checked);
+  }
   const auto& [name, bodies, joints] =
       std::tie(file.description.name, file.description.bodies, file.description.joints);
   checked.sentence =

@@ -13,6 +13,7 @@
 #include "harness/observers/registry.h"
 #include "harness/suite/precision_cases.h"
 #include "harness/suite/workload.h"
+#include "harness/tables/table.h"
 #include "harness/text/config_error.h"
 #include "harness/text/terminal.h"
 #include "harness/timing/time_cases.h"
@@ -32,7 +33,7 @@ std::string Listed(const std::vector<std::string>& words) {
 
 std::string Numbers(const std::vector<double>& numbers) {
   std::vector<std::string> words;
-  for (const double number : numbers) words.push_back(fmt::format("{}", number));
+  for (const double number : numbers) words.push_back(NumberCell(number));
   return Listed(words);
 }
 
@@ -154,7 +155,7 @@ void ExplainRuns(const Experiment& experiment) {
       limits.cpu_s, limits.steps, limits.memory_mb);
 }
 
-void ExplainMeasures(const Experiment& experiment) {
+void ExplainMeasures(const Experiment& experiment, const Selection& filter) {
   Print(
       "\nMeasured at every accepted step\n"
       "  drift [m, rad]: how far the joints that ought to hold have come apart, and the "
@@ -169,7 +170,7 @@ void ExplainMeasures(const Experiment& experiment) {
         "whether truncation or round-off rules them.\n",
         Plural(rungs, "run"));
   }
-  const std::size_t timings = CountTimings(experiment);
+  const std::size_t timings = CountTimings(experiment, filter);
   if (timings == 0) {
     Print("  There are no timings.\n");
     return;
@@ -235,7 +236,7 @@ void ExplainExperiment(const std::filesystem::path& path, const ExperimentFiles&
   ExplainFormulations(first);
   ExplainChoices(first);
   ExplainRuns(first);
-  ExplainMeasures(first);
+  ExplainMeasures(first, files.filter);
   Print(
       "\nloopbench list {0} shows every case, loopbench plan {0} the time they will "
       "take.\n",
@@ -247,7 +248,7 @@ JsonObject ExperimentDocument(const std::filesystem::path& path, const Experimen
   const Experiment& first = overview.experiments.front();
   std::size_t timings = 0, rungs = 0;
   for (const Experiment& one : overview.experiments) {
-    timings += CountTimings(one);
+    timings += CountTimings(one, files.filter);
     CheckLadders(one);
     rungs += CountRungs(one);
   }

@@ -94,11 +94,15 @@ void PrintRedundant(const MechanismDescription& description, const Structure& st
     released = released || one.released;
   }
   if (!released) return;
-  Say(view,
-      "  All of these can be dropped at once; the loops then stay closed as they do now.\n"
-      "  They are redundant at every position: a run imposes the others and observes all, and\n"
-      "  drops others of the same joints where those serve better (\"compile\": "
-      "\"redundancy\").\n");
+  Say(view, "  All of these can be dropped at once; the loops then stay closed as they do now.\n");
+  if (structure.rounding > 0.0) {
+    Say(view, "  They are redundant within {:.2g} lengths: a run leaves them out (\"accuracy\").\n",
+        structure.rounding);
+  } else {
+    Say(view,
+        "  They are redundant at every position: a run keeps the rank of the constraints and "
+        "observes all\n  (\"compile\": \"redundancy\").\n");
+  }
 }
 
 void PrintIslands(const MechanismDescription& description, const Structure& structure,

@@ -37,7 +37,8 @@ int WriteReport(const ReportCommand& command, const std::string& typed) {
   Print("wrote {}: {} runs, {} of them failed and {} doubtful, {} kB\n", out.string(), data.runs,
         data.failed, data.doubted, (page.size() + 999) / 1000);
   for (const std::string& remark : data.remarks) Print("  {}\n", remark);
-  return 0;
+  for (const std::string& file : data.changed) PrintError("{}\n", file);
+  return data.changed.empty() ? 0 : 2;
 }
 
 }  // namespace loopbench::harness

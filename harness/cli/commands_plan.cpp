@@ -2,8 +2,10 @@
 #include <fmt/format.h>
 
 #include <cmath>
+#include <functional>
 #include <map>
 #include <set>
+#include <utility>
 
 #include "harness/cli/commands.h"
 #include "harness/integrator/cpu_time.h"
@@ -98,29 +100,45 @@ Plan MakePlan(const Overview& overview, const PlanCommand& command, Estimate* es
   std::set<std::string> references;
   std::size_t asked_references = 0;
   const std::map<std::string, double> earlier = EarlierTimes(command.from);
-  Progress progress("plan", {experiments.size(), {"", 0.0}}, 1);
+  std::vector<std::function<void()>> work;
+  std::vector<Progress::Piece> pieces;
+  const auto add = [&](const std::string& label, std::function<void()> one) {
+    work.push_back(std::move(one));
+    pieces.push_back({label, 0.0});
+  };
   for (std::size_t i = 0; i < experiments.size(); ++i) {
     const Experiment& experiment = experiments[i];
-    progress.Start(i);
     for (const Case& one : SelectCases(experiment, command.files.filter)) {
-      const auto known = earlier.find(SameRun(Identified(experiment, one).keys));
-      plan.known += known != earlier.end() ? 1 : 0;
-      const auto runs = static_cast<double>(RunsOf(one));
-      times.Add(one, known != earlier.end() ? runs * known->second : estimate->OfCase(i, one));
-      if (!experiment.reference) continue;
-      ++asked_references;
-      const ReferenceCase reference = ReferenceOf(experiment, one, "results.jsonl");
-      if (!references.insert(reference.id).second) continue;
-      plan.reference_seconds += estimate->OfReference(i, reference);
+      add(fmt::format("{} {}", one.mechanism, ToString(one.column)), [&, i, one] {
+        const auto known = earlier.find(SameRun(Identified(experiments[i], one).keys));
+        plan.known += known != earlier.end() ? 1 : 0;
+        const auto runs = static_cast<double>(RunsOf(one));
+        times.Add(one, known != earlier.end() ? runs * known->second : estimate->OfCase(i, one));
+        if (!experiments[i].reference) return;
+        ++asked_references;
+        const ReferenceCase reference = ReferenceOf(experiments[i], one, "results.jsonl");
+        if (!references.insert(reference.id).second) return;
+        plan.reference_seconds += estimate->OfReference(i, reference);
+      });
     }
     for (const LadderGroup& ladder : LadderGroups(experiment, command.files.filter)) {
-      plan.ladder_seconds += estimate->OfLadder(i, ladder);
-      plan.rungs += ladder.keys.size();
+      add("in several scalars", [&, i, ladder] {
+        plan.ladder_seconds += estimate->OfLadder(i, ladder);
+        plan.rungs += ladder.keys.size();
+      });
     }
-    for (const TimingGroup& group : TimingGroups(experiment)) {
-      plan.timing_seconds += estimate->OfTiming(i, group);
+    if (!command.timing) continue;
+    for (const TimingGroup& group : TimingGroups(experiment, command.files.filter)) {
+      add("timings of " + group.name, [&, i, group] {
+        plan.timing_seconds += estimate->OfTiming(i, group);
+        plan.timings += group.cases.size();
+      });
     }
-    plan.timings += CountTimings(experiment);
+  }
+  Progress progress("plan", std::move(pieces), 1);
+  for (std::size_t i = 0; i < work.size(); ++i) {
+    progress.Start(i);
+    work[i]();
     progress.Done(i);
   }
   plan.references = references.size();
@@ -190,7 +208,8 @@ void PrintPlan(const Overview& overview, const Plan& plan, const PlanCommand& co
   if (plan.rungs > 0) {
     Print(", {} runs in several scalars {}", plan.rungs, Duration(plan.ladder_seconds));
   }
-  Print(", timings {}\n", Duration(plan.timing_seconds));
+  if (plan.timings > 0) Print(", timings {}", Duration(plan.timing_seconds));
+  Print("\n");
   std::string source;
   if (!command.from.empty()) {
     source = fmt::format("{} of {} cases from {}", plan.known, plan.cases, command.from.string());
@@ -198,7 +217,7 @@ void PrintPlan(const Overview& overview, const Plan& plan, const PlanCommand& co
   if (estimate.pilots() > 0) {
     source += fmt::format(
         "{}{} pilots over the first part of the longest horizon, at the loosest and the finest "
-        "tolerance{}",
+        "tolerance that is asked for{}",
         source.empty() ? "" : ", the rest from ", estimate.pilots(),
         first.fixed_steps.empty() ? "" : ", or the longest fixed step");
   }
@@ -249,7 +268,7 @@ int PrintPlans(const PlanCommand& command) try {
     const Overview overview =
         MakeOverview(path, {{path}, command.files.settings, command.files.filter});
     RequirePeers(overview.experiments);
-    Estimate estimate(overview.experiments, Estimate::Budget());
+    Estimate estimate(overview.experiments, Estimate::Budget(), command.files.filter);
     Plan plan = MakePlan(overview, command, &estimate);
     plan.seconds += ThreadCpuSeconds() - begin;  // a run reads and expands the file too
     if (command.json) {

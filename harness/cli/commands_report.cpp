@@ -43,7 +43,7 @@ std::filesystem::path FileOf(const PlotCommand& command) {
 
 bool IsFree(const PlotCommand& command) {
   const FreeFigure& free = command.free;
-  if ((free.x + free.y + free.group + free.log + free.title).empty()) return false;
+  if ((free.x + free.y + free.group + free.log).empty() && !free.title) return false;
   if (free.x.empty() || free.y.empty()) {
     throw ConfigError("plot: --group, --log and --title need --x KEY and --y KEY");
   }
@@ -211,7 +211,7 @@ int PrintTable(const TableCommand& command, const std::string& typed) {
   TableView view = command.view;
   const bool on_terminal = command.format == "text" && command.out.empty();
   // a page is no wider than a terminal
-  view.compact = on_terminal || (command.format == "latex" && view.columns.empty());
+  view.compact = on_terminal || command.format == "latex";
   Table table = MakeTable(loaded.records, view);
   if (table.rows.empty()) {
     PrintError("{}: no {} records match{}{}\n", command.store.string(),

@@ -2,11 +2,13 @@
 
 #include <algorithm>
 #include <cmath>
+#include <utility>
 
 #include "harness/cli/commands.h"
 #include "harness/cli/report.h"
 #include "harness/config/mechanism_reader.h"
 #include "harness/figures/trajectory_figure.h"
+#include "harness/record/json_object.h"
 #include "harness/store/result_store.h"
 #include "harness/tables/columns.h"
 #include "harness/tables/fit.h"
@@ -49,16 +51,18 @@ std::vector<std::size_t> Chosen(const TrajectoryReader& reader, const Trajectory
                                 command.columns[unused - used.begin()], known));
 }
 
-/// Row by row, whatever the size. Gives the number of rows.
+/// Copies row by row, whatever the size, with `notes` above those of the file. Returns the number
+/// of rows.
 std::int64_t Copy(const std::filesystem::path& from, const std::filesystem::path& to,
-                  const TrajectoryCommand& command) {
+                  const TrajectoryCommand& command, std::vector<std::string> notes) {
   TrajectoryReader reader(from);
   const std::vector<std::size_t> chosen = Chosen(reader, command);
   std::vector<TrajectoryColumn> columns;
   for (const std::size_t i : chosen) columns.push_back(reader.columns()[i]);
   const auto format =
       command.format == "jsonl" ? TrajectoryFormat::kJsonLines : TrajectoryFormat::kCsv;
-  TrajectoryWriter writer(to, columns, reader.notes(), format);
+  notes.insert(notes.end(), reader.notes().begin(), reader.notes().end());
+  TrajectoryWriter writer(to, columns, notes, format);
   std::int64_t number = 0;
   for (std::vector<double> row, kept; reader.Next(&row);) {
     if (number++ % command.every != 0) continue;
@@ -70,20 +74,43 @@ std::int64_t Copy(const std::filesystem::path& from, const std::filesystem::path
   return writer.rows();
 }
 
+/// Whether the file is as its run wrote it; else the reason is printed.
+bool IsVerified(const Record& record, const std::filesystem::path& file) try {
+  VerifyTrajectory(record, file);
+  return true;
+} catch (const ChangedFile& changed) {
+  PrintError("{}\n", changed.what());
+  return false;
+}
+
 int ExportOne(const std::filesystem::path& from, const std::filesystem::path& to,
-              const TrajectoryCommand& command) {
-  const std::int64_t rows = Copy(from, to, command);
+              const TrajectoryCommand& command, const std::vector<std::string>& notes = {}) {
+  const std::int64_t rows = Copy(from, to, command, notes);
   Print("wrote {}: {} rows\n", to.string(), rows);
   return 0;
 }
 
-/// What names a case, as the name of a file.
-std::string NameOf(const Record& record) {
+/// The parameters of a sweep that a case has, and their values.
+std::vector<std::pair<std::string, std::string>> ParametersOf(const Record& record,
+                                                              const std::vector<Record>& records) {
+  std::vector<std::pair<std::string, std::string>> parameters;
+  for (const TableColumn& parameter : WithParameters({}, records)) {
+    const std::string text = record.Text(parameter.key);
+    if (parameter.key != "step" && !text.empty()) parameters.emplace_back(parameter.key, text);
+  }
+  return parameters;
+}
+
+/// The name of a case's file.
+std::string NameOf(const Record& record,
+                   const std::vector<std::pair<std::string, std::string>>& parameters) {
   std::string name;
   for (const char* key : {"mechanism", "formulation", "enforcement", "coordinates", "solver",
-                          "integrator", "rtol", "step", "horizon", "content"}) {
+                          "integrator", "rtol", "step", "horizon"}) {
     if (!record.Text(key).empty()) name += (name.empty() ? "" : "-") + record.Text(key);
   }
+  for (const auto& [key, value] : parameters) name += fmt::format("-{}-{}", key, value);
+  if (const std::string content = record.Text("content"); !content.empty()) name += "-" + content;
   return FileName(name);
 }
 
@@ -104,6 +131,7 @@ int OfStore(const TrajectoryCommand& command, const std::string& typed) {
                           "trajectory_interpolation_max", "trajectory_open", "trajectory"}) {
     table.columns.push_back(ColumnOf(key, records));
   }
+  table.columns = TellingApart(WithParameters(std::move(table.columns), records), records);
   table.rows = records;
   int code = 0;
   for (const Record& record : records) {
@@ -112,8 +140,15 @@ int OfStore(const TrajectoryCommand& command, const std::string& typed) {
       PrintError("{}: it is gone; run --rerun all makes it again\n",
                  (file.parent_path() / "trajectories" / record.Text("trajectory")).string());
       code = 2;
+    } else if (!IsVerified(record, from)) {
+      code = 2;
     } else if (!command.out.empty()) {
-      ExportOne(from, command.out / (NameOf(record) + "." + command.format), command);
+      const auto parameters = ParametersOf(record, records);
+      std::vector<std::string> notes;
+      for (const auto& [key, value] : parameters)
+        notes.push_back(fmt::format("{}: {}", key, value));
+      ExportOne(from, command.out / (NameOf(record, parameters) + "." + command.format), command,
+                notes);
     }
   }
   if (command.out.empty()) {
@@ -182,15 +217,33 @@ int LayBeside(const TrajectoryCommand& command, const std::string& typed) {
                    {"largest", "largest difference", kScientific},
                    {"t", "at [s]", kSeconds},
                    {"compared", "rows", kInteger}};
+  std::size_t most = 0;
   for (const SharedColumn& column : shared) {
     LargestAt largest;
-    std::int64_t compared = 0;
+    std::size_t compared = 0;
     const std::vector<double> apart = Differences(ours, theirs, column);
     for (std::size_t row = 0; row < apart.size(); ++row) {
-      compared += std::isfinite(apart[row]);
-      largest.Add(std::abs(apart[row]), theirs.At(row, theirs.time));
+      const double t = theirs.At(row, theirs.time), number = theirs.At(row, column.in_theirs);
+      if (!std::isfinite(number) && std::isfinite(ValueAt(ours, column.in_ours, t))) {
+        throw std::runtime_error(
+            fmt::format("{}: found {} in \"{}\" at t = {}, expected a finite "
+                        "number, as in {}",
+                        command.source.string(), number, column.label, t, command.ours.string()));
+      }
+      if (!std::isfinite(apart[row])) continue;
+      ++compared;
+      largest.Add(std::abs(apart[row]), t);
     }
-    AddRow({column.label, Maybe(largest), When(largest), compared}, &table);
+    most = std::max(most, compared);
+    AddRow({column.label, Maybe(largest), When(largest), Count(compared)}, &table);
+  }
+  if (most == 0) {
+    throw std::runtime_error(fmt::format("{}: found no row to compare, expected times of {}",
+                                         command.source.string(), command.ours.string()));
+  }
+  if (most < theirs.rows()) {
+    table.notes.push_back(fmt::format("{} of {} rows are not compared: {} has no such times",
+                                      theirs.rows() - most, theirs.rows(), command.ours.string()));
   }
   AppendProvenance(table, typed);
   PrintText(ToScreen(table) + "\n");

@@ -1,6 +1,8 @@
 #include "harness/cli/long_table.h"
 
 #include <fmt/format.h>
+#include <sys/resource.h>
+#include <unistd.h>
 
 #include <algorithm>
 #include <fstream>
@@ -139,13 +141,22 @@ Loaded LoadOrScan(const std::filesystem::path& store, const Selection& where) {
   return {LoadRecords(store, where), {}};
 }
 
-Room::Room(std::filesystem::path store) : store_(std::move(store)) {
+double FreeMemory(bool with_own) {
+  double free = 0.0, pages = 0.0;
   std::ifstream info("/proc/meminfo");
   for (std::string word; info >> word;) {
-    if (word == "MemAvailable:" && info >> free_) break;
+    if (word == "MemAvailable:" && info >> free) break;
   }
-  free_ *= 1024.0;
+  free *= 1024.0;
+  rlimit allowed{};
+  if (::getrlimit(RLIMIT_AS, &allowed) != 0 || allowed.rlim_cur == RLIM_INFINITY) return free;
+  std::ifstream("/proc/self/statm") >> pages;
+  const double own = with_own ? 0.0 : pages * static_cast<double>(::getpagesize());
+  const double left = std::max(1.0, static_cast<double>(allowed.rlim_cur) - own);
+  return free == 0.0 ? left : std::min(free, left);
 }
+
+Room::Room(std::filesystem::path store) : store_(std::move(store)), free_(FreeMemory()) {}
 
 namespace {
 constexpr double kGrows = 4.0;  // a record in memory over its line, measured

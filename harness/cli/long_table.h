@@ -30,6 +30,10 @@ struct Loaded {
 };
 Loaded LoadOrScan(const std::filesystem::path& store, const Selection& where);
 
+/// The memory that this process may still take [bytes], by the machine and by its own limit, or
+/// with the part that it has already; 0 if it is not known.
+double FreeMemory(bool with_own = false);
+
 /// The memory that a store's records may take.
 class Room {
  public:

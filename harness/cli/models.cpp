@@ -14,6 +14,7 @@
 #include "harness/text/config_error.h"
 #include "harness/text/escape.h"
 #include "harness/text/files.h"
+#include "harness/text/temporary_folder.h"
 
 namespace loopbench::harness {
 
@@ -130,15 +131,6 @@ std::string PageOf(const SceneModels& ladder, double horizon, const std::string&
   return page;
 }
 
-/// Removes a folder that was not finished.
-struct Unfinished {
-  fs::path folder;
-  ~Unfinished() {
-    std::error_code ignored;
-    fs::remove_all(folder, ignored);
-  }
-};
-
 bool IsThere(const fs::path& folder) {
   std::error_code error;
   const bool there = fs::exists(fs::symlink_status(folder, error));
@@ -249,14 +241,14 @@ void WriteModels(const SceneModels& ladder, double horizon, const std::string& t
   fs::path target = folder;
   if (!target.has_filename()) target = target.parent_path();  // "out/"
   const Unfinished fresh{fs::path(target).concat(fmt::format(".new-{}", ::getpid()))};
-  for (const auto& [name, text] : files) WriteFileAtomically(fresh.folder / name, text);
-  ReadExperiments(fresh.folder / run);
+  for (const auto& [name, text] : files) WriteFileAtomically(fresh.path() / name, text);
+  ReadExperiments(fresh.path() / run);
   if (is_there) {
     for (const auto& [name, text] : files) WriteFileAtomically(folder / name, text);
     return;
   }
   std::error_code error;
-  fs::rename(fresh.folder, target, error);
+  fs::rename(fresh.path(), target, error);
   if (error) {
     throw std::runtime_error(fmt::format("cannot make '{}': {}", target.string(), error.message()));
   }

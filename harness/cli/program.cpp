@@ -1,8 +1,15 @@
 #include "harness/cli/program.h"
 
+#include <fmt/format.h>
+
 #include <CLI/CLI.hpp>
 #include <exception>
+#include <filesystem>
+#include <new>
+#include <string>
+#include <vector>
 
+#include "harness/cli/long_table.h"
 #include "harness/cli/program_baseline.h"
 #include "harness/cli/program_cluster.h"
 #include "harness/cli/program_compare.h"
@@ -16,7 +23,10 @@
 #include "harness/cli/program_view.h"
 #include "harness/config/formulations.h"
 #include "harness/record/provenance.h"
+#include "harness/store/result_store.h"
+#include "harness/text/output_file.h"
 #include "harness/text/terminal.h"
+#include "mechanism/model/dense_memory.h"
 
 namespace loopbench {
 namespace harness {
@@ -58,6 +68,29 @@ void TakeOneWordEach(CLI::App* app) {
   for (CLI::App* command : app->get_subcommands({})) TakeOneWordEach(command);
 }
 
+/// Names the largest input of a command that ran out of memory, and the memory it may use.
+std::string OutOfMemory(const std::bad_alloc& error, const std::vector<std::string>& words) {
+  std::string largest;
+  std::uintmax_t bytes = 0;
+  for (const std::string& word : words) {
+    std::error_code fault;
+    std::filesystem::path file = word;
+    if (std::filesystem::is_directory(file, fault)) file = StoreFile(file);
+    if (!std::filesystem::is_regular_file(file, fault)) continue;
+    const std::uintmax_t size = std::filesystem::file_size(file, fault);
+    if (fault || size < bytes) continue;
+    bytes = size;
+    largest = file.string();
+  }
+  std::string message = "out of memory";
+  if (const auto* known = dynamic_cast<const TooDense*>(&error)) {
+    message += fmt::format(": {}", known->what());
+  }
+  if (!largest.empty())
+    message += fmt::format(": {} has {:.0f} MB", largest, 1e-6 * static_cast<double>(bytes));
+  return message + fmt::format(", and this process may use {:.0f} MB", 1e-6 * FreeMemory(true));
+}
+
 int RunCommandLine(int argc, char** argv) {
   CLI::App app{
       "Measures constraint drift and time of formulations of closed-loop multibody dynamics.",
@@ -86,6 +119,7 @@ int RunCommandLine(int argc, char** argv) {
   } catch (const CLI::ParseError& error) {
     return app.exit(error) == 0 ? 0 : 2;
   }
+  const CommandInputs inputs;
   try {
     const std::string typed = CommandLine(argc, argv);
     if (const auto code = files.Run(typed, ShellLine({argv, argv + argc}))) return *code;
@@ -99,6 +133,9 @@ int RunCommandLine(int argc, char** argv) {
     if (const auto code = cluster.Run()) return *code;
     if (const auto code = history.Run(typed)) return *code;
     return shell.Run();
+  } catch (const std::bad_alloc& error) {
+    PrintError("{}\n", Lines{OutOfMemory(error, {argv + 1, argv + argc})});
+    return 2;
   } catch (const std::exception& error) {
     PrintError("{}\n", Lines{error.what()});
     return 2;

@@ -89,7 +89,7 @@ std::optional<int> ClusterOptions::Run() {
   if (!time_.empty()) run.batch_options.push_back("--time=" + time_);
   if (!partition_.empty()) run.batch_options.push_back("--partition=" + partition_);
   for (const std::string& option : run.batch_options) {
-    if (option.starts_with("--") && option.find('\n') == std::string::npos) continue;
+    if (option.starts_with("--")) continue;
     throw ConfigError("--sbatch: found '" + option + "', expected an option that begins with --");
   }
   run.timing = !no_timing_;

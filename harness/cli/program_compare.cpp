@@ -11,6 +11,7 @@ namespace {
 constexpr const char* kCompareFooter = R"(
 Counts, hashes and outcomes are compared exactly; errors and instructions by their ratio; times by a
 Mann-Whitney test for effects beyond 2 % (Holm's correction over all times), on one machine only.
+Samples that lie a factor of 1.5 apart differ, however few they are.
 What depends on round-off is compared under one compiler, flags and mathematical library only.
 A value that one side lacks, or that is none (null, a text for a number), is a difference.
 
@@ -21,7 +22,8 @@ Examples:
   loopbench compare results/runs/before results/runs/after --only counts --only hashes
   loopbench compare before after --match mechanism,formulation   # with other tolerances, masses, ...
 
-Exit codes: 0 the same or better, 1 something is worse or different, 2 could not measure.)";
+Exit codes: 0 the same or better, 1 something is worse or different, 2 could not measure: no time of
+those on both sides could be compared, or a case is missing on one side.)";
 
 constexpr const char* kFitFooter = R"(
 Examples:
@@ -70,6 +72,8 @@ ComparisonOptions::ComparisonOptions(CLI::App& app) {
                    "(default: all keys, and equal mechanisms and limits)")
       ->delimiter(',');
   compare_app_->add_flag("--subset", compare_.options.subset, "NEW may lack cases of BASE");
+  compare_app_->add_flag("--added", compare_.options.added,
+                         "NEW may have cases that BASE lacks (always with a history)");
   compare_app_
       ->add_option("--error-ratio", compare_.options.error_ratio, "Allowed on the same build")
       ->check(NumberFrom(1.0, 1e9))

@@ -75,6 +75,7 @@ FileOptions::FileOptions(CLI::App& app) {
                         "Earlier results whose times are used, not a pilot's");
   plan_app_->add_option("--filter", conditions_,
                         "Only cases with key=value[,value] (or !=, <, <=, >, >=)");
+  plan_app_->add_flag("--no-timing", no_timing_, "Leave the timings out");
   AddSettings(plan_app_, &settings_);
   AddWide(plan_app_);
   AddJson(plan_app_, &json_);
@@ -100,7 +101,7 @@ void FileOptions::AddRun(CLI::App& app) {
                    "Allowed on one right-hand side, where O-DCA has long paths: same results")
       ->check(NumberFrom(1, kMostThreads));
   run_app_->add_option("--filter", conditions_,
-                       "Only accuracy cases with key=value[,value] (or !=, <, <=, >, >=)");
+                       "Only cases with key=value[,value] (or !=, <, <=, >, >=)");
   AddSettings(run_app_, &settings_);
   AddWide(run_app_);
   run_app_->add_option("--shard", shard_, "k/n: the k-th of n parts, to be merged later")
@@ -277,6 +278,7 @@ std::optional<int> FileOptions::Run(const std::string& typed, const std::string&
   if (*plan_app_) {
     plan_.files = files_;
     plan_.json = json_;
+    plan_.timing = !no_timing_;
     return PrintPlans(plan_);
   }
   if (*explain_app_) return Explain(files_, explain_all_, json_, explain_limits_);

@@ -28,7 +28,7 @@ Examples:
 
 Without --x and --y: angles and displacements of the run that is trusted most (finished, at level
 position, at the finest tolerance), drift with its fitted exponents, and of runs in several scalars
-error and drift against tolerance. Runs that failed are crosses, doubtful ones dashed. A figure that
+error and drift against tolerance. Runs that failed are crosses, doubtful ones hollow marks. A figure that
 cannot be drawn is reported with its reason, and the exit code is 2 after all others are drawn.)";
 
 constexpr const char* kTradeoffFooter = R"(
@@ -162,7 +162,9 @@ void StoreOptions::AddPlot(CLI::App& app) {
       ->add_option("--log", plot_.free.log,
                    "Logarithmic axes (default: those that span two decades)")
       ->check(CLI::IsMember({"x", "y", "xy", "none"}));
-  plot_app_->add_option("--title", plot_.free.title, "Title (default: what the records share)");
+  plot_app_->add_option_function<std::string>(
+      "--title", [this](const std::string& title) { plot_.free.title = title; },
+      "Title, \"\" for none (default: values that all records share)");
   plot_app_->footer(kPlotFooter);
 }
 

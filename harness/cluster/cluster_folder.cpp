@@ -15,6 +15,7 @@
 #include "harness/suite/workload.h"
 #include "harness/text/config_error.h"
 #include "harness/text/files.h"
+#include "harness/text/output_file.h"
 
 namespace loopbench::harness {
 namespace {
@@ -176,7 +177,9 @@ bool MakeClusterRun(const ClusterRun& run, const std::filesystem::path& folder) 
 }
 
 void WriteClusterRun(const ClusterRun& run, const std::filesystem::path& folder) {
-  WriteFileAtomically(folder / kRunFile, ToJsonLine(ToRecord(run)) + '\n');
+  OutputFile file(folder / kRunFile, Onto::kAnyFile);
+  file.Write(ToJsonLine(ToRecord(run)) + '\n');
+  file.Finish();
 }
 
 ClusterRun ReadClusterRun(const std::filesystem::path& folder) {

@@ -16,7 +16,10 @@ std::string ExperimentText(const SingleRun& run) {
       {"columns", Json::array({column})},
       {"integrator", run.integrator},
       {"timing", {{"cases", true}}},
-      {"reference", Json::object()}};
+      {"reference",
+       {{"scalar", run.reference.scalar},
+        {"points", run.reference.points},
+        {"cpu_s", run.reference.cpu_s}}}};
   if (run.step > 0.0) {
     experiment["fixed_steps"] = Json::array({run.step});
   } else {

@@ -16,6 +16,7 @@ struct SingleRun {
   std::string integrator = "ode45";
   double rtol = 1e-8;
   double step = 0.0;  ///< [s]; fixed where it is positive
+  ReferenceOptions reference;
 };
 
 /// With a certified reference, and timed as it is.

@@ -16,7 +16,9 @@ void ReadPoints(const JsonNode& node, SpaceKind space, BodyDescription* body) {
 
 Json WritePoints(const BodyDescription& body, SpaceKind space) {
   Json points = Json::object();
-  for (const auto& [name, position] : body.points) points[name] = WriteVector(position, space);
+  // names differ: at the end of the list, where points[name] would look through all of them
+  auto& list = points.get_ref<Json::object_t&>();
+  for (const auto& [name, at] : body.points) list.emplace_back(name, WriteVector(at, space));
   return points.empty() ? Json() : points;
 }
 

@@ -4,6 +4,7 @@
 
 #include <algorithm>
 #include <string_view>
+#include <utility>
 
 namespace loopbench::harness {
 namespace {
@@ -47,6 +48,41 @@ std::vector<Tick> EvenTicks(double low, double high, int most) {
   return ticks;
 }
 
+/// The longest part of an axis without a label, as a share of it.
+double WidestGap(const Axis& axis, const std::vector<Tick>& ticks) {
+  double widest = 0.0, last = 0.0;
+  for (const Tick& tick : ticks) {
+    if (tick.label.empty()) continue;
+    widest = std::max(widest, axis.Place(tick.at) - last);
+    last = axis.Place(tick.at);
+  }
+  return std::max(widest, 1.0 - last);
+}
+
+/// For a logarithmic axis with too few powers of ten to read it by: labels at some digits of each
+/// decade, or even ones, whichever leave the shortest gaps.
+std::vector<Tick> TicksBetweenDecades(const Axis& axis, int first, int last, int most) {
+  constexpr std::string_view kDigits[] = {"123456789", "12357", "125", "13", "1"};
+  std::vector<Tick> best = EvenTicks(axis.low, axis.high, most);
+  for (const std::string_view labelled : kDigits) {
+    std::vector<Tick> ticks;
+    int labels = 0;
+    for (int decade = first; decade <= last; ++decade) {
+      for (int digit = 1; digit < 10; ++digit) {
+        const double at = digit * std::pow(10.0, decade);
+        if (at < axis.low * (1.0 - 1e-9) || at > axis.high * (1.0 + 1e-9)) continue;
+        Tick& tick = ticks.emplace_back(Tick{at, ""});
+        if (labelled.find(static_cast<char>('0' + digit)) == std::string_view::npos) continue;
+        ++labels;
+        tick.label =
+            IsPlain(axis.high) ? fmt::format("{:.{}f}", at, std::max(0, -decade)) : NumberText(at);
+      }
+    }
+    if (labels <= most && WidestGap(axis, ticks) < WidestGap(axis, best)) best = std::move(ticks);
+  }
+  return best;
+}
+
 }  // namespace
 
 std::string NumberText(double value) {
@@ -80,7 +116,7 @@ std::vector<Tick> Ticks(const Axis& axis, int most) {
   if (!axis.logarithmic) return EvenTicks(axis.low, axis.high, most);
   const int first = static_cast<int>(std::ceil(std::log10(axis.low) - 1e-9));
   const int last = static_cast<int>(std::floor(std::log10(axis.high) + 1e-9));
-  if (last <= first) return EvenTicks(axis.low, axis.high, most);
+  if (last - first < 2) return TicksBetweenDecades(axis, first - 1, last, most);
   const int step = (last - first) / most + 1;
   std::vector<Tick> ticks;
   for (int decade = first - 1; decade <= last; ++decade) {

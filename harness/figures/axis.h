@@ -50,8 +50,9 @@ struct Tick {
   std::string label;  ///< "" for a small one
 };
 
-/// At most some `most` labelled ticks and the small ones between: powers of ten on a logarithmic
-/// axis of a decade and more, else multiples of 1, 2 or 5.
+/// About `most` labelled ticks and the small ones between them: powers of ten on a logarithmic axis
+/// that has three of them, else 1, 2 and 5 or other digits of each decade; multiples of 1, 2 or 5
+/// of a power of ten on a linear axis.
 std::vector<Tick> Ticks(const Axis& axis, int most);
 
 }  // namespace loopbench::harness

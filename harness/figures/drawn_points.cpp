@@ -24,14 +24,15 @@ std::vector<Point> Placed(const PlotArea& area, std::span<const Point> points) {
   return placed;
 }
 
-/// Whether all points lie on the line; both in places.
-bool LieOn(std::span<const Point> points, std::span<const Point> line, double distance) {
+/// Whether all points lie on the line, or on its points; both in places.
+bool LieOn(std::span<const Point> points, std::span<const Point> line, bool joined) {
+  constexpr double kDistance = kDrawnWidth;
   return std::ranges::all_of(points, [&](const Point& point) {
-    auto at = std::ranges::lower_bound(line, point.first - distance, {}, &Point::first);
+    auto at = std::ranges::lower_bound(line, point.first - kDistance, {}, &Point::first);
     if (at != line.begin()) --at;
-    for (; at != line.end() && at->first <= point.first + distance; ++at) {
-      const auto next = at + 1 == line.end() ? at : at + 1;
-      if (DistanceToSegment(point, *at, *next) <= distance) return true;
+    for (; at != line.end() && at->first <= point.first + kDistance; ++at) {
+      const auto next = !joined || at + 1 == line.end() ? at : at + 1;
+      if (DistanceToSegment(point, *at, *next) <= kDistance) return true;
     }
     return false;
   });
@@ -61,10 +62,10 @@ std::vector<Point> Decimated(const PlotArea& area, std::span<const Point> points
 }
 
 bool Coincide(const PlotArea& area, std::span<const Point> one, std::span<const Point> other,
-              double distance) {
+              bool joined) {
   if (one.empty() || other.empty()) return false;
   const std::vector<Point> a = Placed(area, one), b = Placed(area, other);
-  return LieOn(a, b, distance) && LieOn(b, a, distance);
+  return LieOn(a, b, joined) && LieOn(b, a, joined);
 }
 
 }  // namespace loopbench::harness

@@ -33,9 +33,9 @@ inline constexpr double kDrawnWidth = 1.0;
 /// highest: what is left out lies between points that are kept. Points need not be in order of x.
 std::vector<Point> Decimated(const PlotArea& area, std::span<const Point> points);
 
-/// Whether every point of each lies within `distance` [pt] of the other's line. Points in the order
-/// of x.
+/// Whether every point of each lies within a drawn width of the other's line, or of its points if
+/// no line joins them. Points in the order of x.
 bool Coincide(const PlotArea& area, std::span<const Point> one, std::span<const Point> other,
-              double distance = kDrawnWidth);
+              bool joined = true);
 
 }  // namespace loopbench::harness

@@ -64,6 +64,10 @@ Figure FigureOfDrift(std::span<const Record> records, std::string_view what, boo
                 .y = record.Numbers("series.drift"),
                 .style = StyleOf(record)};
     curve.ends_early = Failed(record);
+    if (curve.ends_early && curve.x.empty()) {  // it has a time alone
+      curve.x = {record.Number("t_reached")};
+      curve.y = {std::numeric_limits<double>::quiet_NaN()};
+    }
     if (with_fit) curve.remark = FittedPower(record);
     if (curve.ends_early) {
       curve.remark += fmt::format("{}{} at {} s", curve.remark.empty() ? "" : ", ",

@@ -68,25 +68,38 @@ FigureScript GnuplotScript(const Figure& figure, FigureSize size) {
   for (const Panel& panel : panels) all.insert(all.end(), panel.curves.begin(), panel.curves.end());
   const bool names = std::ranges::any_of(
       panels, [&](const Panel& panel) { return NamesAtEnds(figure, panel.curves); });
-  std::vector<std::string> texts = EndTexts(figure, all, names);
-  double labels = 0.0, ends = 0.0;
-  for (Panel& panel : panels) {
-    labels = std::max(labels, WidthOfLabels(panel.area));
-    panel.texts.assign(texts.begin(),
-                       texts.begin() + static_cast<std::ptrdiff_t>(panel.curves.size()));
-    texts.erase(texts.begin(), texts.begin() + static_cast<std::ptrdiff_t>(panel.curves.size()));
-    for (const std::string& text : panel.texts) ends = std::max(ends, WidthOf(text));
-  }
   Figure named = figure;
   named.names_at_ends = names;
-  const std::vector<LegendRow> legend = LegendOf(named, all, page.width - 16.0);
-  const std::vector<std::string> title =
-      Wrapped(figure.title, static_cast<std::size_t>((page.width - 16.0) / kLetterWidth));
+  std::vector<bool> is_drawn;
+  std::vector<std::string> failures;  // of runs without a curve
+  for (const Panel& panel : panels) {
+    for (const Curve& curve : panel.curves) {
+      is_drawn.push_back(!Drawable(panel.area, curve).empty());
+      if (is_drawn.back() || curve.remark.empty()) continue;
+      const bool is_new = std::ranges::find(failures, curve.remark) == failures.end();
+      if (is_new && curve.ends_early) failures.push_back(curve.remark);
+    }
+  }
+  const Legend legend = LegendOf(named, all, size, failures);
+  const std::vector<std::string> texts = EndTexts(figure, all, names, legend.letters);
+  double labels = 0.0, ends = 0.0;
+  std::size_t next = 0;
+  for (Panel& panel : panels) {
+    labels = std::max(labels, WidthOfLabels(panel.area));
+    for (std::size_t i = 0; i < panel.curves.size(); ++i, ++next) {
+      panel.texts.push_back(is_drawn[next] ? texts[next] : "");
+      ends = std::max(ends, WidthOf(panel.texts.back()));
+    }
+  }
+  std::vector<std::string> title;
+  if (!figure.title.empty()) {
+    title = Wrapped(figure.title, static_cast<std::size_t>((page.width - 16.0) / kLetterWidth));
+  }
 
   const double line = kLineHeight, height = HeightOfPanel(size, panels.size());
   constexpr double kEdge = 5.0, kGap = 8.0;
   const double head = kEdge + line * static_cast<double>(title.size());
-  const double foot = 3.0 * line + kGap + line * static_cast<double>(legend.size()) + kEdge;
+  const double foot = 3.0 * line + kGap + line * static_cast<double>(legend.rows.size()) + kEdge;
   const double count = static_cast<double>(panels.size());
   page.height = std::round(head + count * (height + kGap) + foot);
   std::string commands = "set encoding utf8\n";
@@ -95,7 +108,7 @@ FigureScript GnuplotScript(const Figure& figure, FigureSize size) {
     commands += TextAt(page, words, 0.5 * page.width, y, "center");
     y -= line;
   }
-  commands += DrawLegend(legend, page, foot - 3.0 * line - kGap);
+  commands += DrawLegend(legend.rows, page, foot - 3.0 * line - kGap);
   commands += TextAt(page, figure.x_label, 0.5 * page.width, foot - 2.5 * line, "center");
   if (panels.size() > 1) commands += "set multiplot\n";
   PanelPlace place{.left = 16.0 + labels + 4.0,
@@ -110,7 +123,7 @@ FigureScript GnuplotScript(const Figure& figure, FigureSize size) {
     place.top = place.bottom - kGap;
   }
   if (panels.size() > 1) commands += "unset multiplot\n";
-  return {commands, page.height, legend.size()};
+  return {commands, page.height, legend.rows.size()};
 }
 
 std::optional<std::string> WriteFigure(const std::filesystem::path& path, const Figure& figure,

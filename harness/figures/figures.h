@@ -82,7 +82,7 @@ struct Figure {
                                    ///< `y_label` and `log_y` of them count
 };
 
-/// Legends have no more rows.
+/// Curves that a legend names at most, and rows of a legend in one column at most.
 inline constexpr std::size_t kLegendRows = 6;
 
 /// The width of a drawing: one or two columns of a journal, 85 mm or 178 mm. Letters have 8 pt.
@@ -90,8 +90,9 @@ enum class FigureSize { kOneColumn, kTwoColumn };
 
 /// Curves of a panel as they are drawn: those that coincide (drawn_points.h) as one, in black,
 /// solid and unmarked where they differ in colour, dash or mark, labelled "odca = lagrange, joint";
-/// "all" stands for all the values that the panel has.
-/// Doubtful ones are not drawn as one with others, and failed ones with none.
+/// "all" stands for all the values that the panel has. Doubtful curves are not drawn as one with
+/// others, and curves that end early with none. Points keep hollow marks, and crosses their
+/// colours.
 std::vector<Curve> MergedCurves(const Figure& panel, FigureSize size);
 
 /// The gnuplot commands and data of a figure, without terminal and output, so that any terminal can

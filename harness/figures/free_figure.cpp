@@ -74,7 +74,7 @@ std::string AxisLabel(const std::string& key, std::span<const Record> rows) {
 }
 
 std::string TitleOf(std::span<const Record> rows, const FreeFigure& wanted) {
-  if (!wanted.title.empty()) return wanted.title;
+  if (wanted.title) return *wanted.title;
   std::string common;
   for (const std::string key : kCaseKeys) {
     if (key == wanted.x || Varies(rows, key) || rows[0].Text(key).empty()) continue;
@@ -135,6 +135,10 @@ Curve SeriesCurve(const Record& row, const FreeFigure& wanted, const std::string
   curve.x = row.Numbers(wanted.x);
   curve.y = row.Numbers(wanted.y);
   curve.ends_early = HasFailed(row);
+  if (curve.ends_early && curve.x.empty() && wanted.x.ends_with('t')) {  // a series of times
+    curve.x = {row.Number("t_reached")};
+    curve.y = {NAN};
+  }
   curve.style.doubtful = HasDoubt(row);
   return curve;
 }

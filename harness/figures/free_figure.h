@@ -2,6 +2,7 @@
 #pragma once
 
 #include <array>
+#include <optional>
 #include <span>
 #include <string>
 #include <vector>
@@ -17,7 +18,8 @@ struct FreeFigure {
   std::string x, y;
   std::string group;  ///< keys "a,b": one curve per combination of values; "" for a single curve
   std::string log;    ///< "x", "y", "xy" or "none"; "" for axes that span two decades and more
-  std::string title;  ///< "" for one made of the keys and of what all records have in common
+  /// Unless set, the title has the keys and the values that all records share.
+  std::optional<std::string> title = std::nullopt;
 };
 
 /// The keys in "a,b".

@@ -5,7 +5,9 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
+#include <utility>
 
+#include "harness/figures/panel.h"
 #include "harness/text/escape.h"
 
 namespace loopbench::harness {
@@ -30,14 +32,15 @@ double WidthOfItem(const LegendItem& item) {
 
 LegendItem TextItem(const std::string& text) { return {.text = text, .line = false}; }
 
-LegendRow SignsOf(const std::vector<Curve>& curves) {
+LegendRow SignsOf(const std::vector<Curve>& curves, const std::vector<std::string>& failures) {
   const auto any = [&](const auto& is) { return std::ranges::any_of(curves, is); };
   LegendRow row;
   if (any([](const Curve& curve) { return curve.style.doubtful || !curve.hollow.empty(); })) {
     row.push_back({"doubtful", {.shape = Shape::kCircle, .doubtful = true}, false});
   }
   if (any([](const Curve& curve) { return curve.ends_early || !curve.crosses.empty(); })) {
-    row.push_back(TextItem("×: failed run"));
+    row.push_back(TextItem(fmt::format("×: failed run{}{}{}", failures.empty() ? "" : " (",
+                                       fmt::join(failures, "; "), failures.empty() ? "" : ")")));
   }
   if (any([](const Curve& curve) { return curve.guide.has_value(); })) {
     row.push_back(TextItem("numbers: fitted power of time"));
@@ -98,20 +101,21 @@ bool NamesAtEnds(const Figure& figure, const std::vector<Curve>& merged) {
 }
 
 std::vector<std::string> EndTexts(const Figure& figure, const std::vector<Curve>& merged,
-                                  bool names) {
+                                  bool names, std::size_t letters) {
   std::vector<std::string> texts;
-  std::size_t letters = 0;
+  std::size_t next = 0;
   for (const Curve& curve : merged) {
     std::string text = names && curve.merges ? curve.label : "";
-    if (!figure.legend.empty() && curve.several) text = Letter(letters++);
+    if (!figure.legend.empty() && curve.several && next++ < letters) text = Letter(next - 1);
     if (!curve.remark.empty()) text += (text.empty() ? "" : " ") + curve.remark;
     texts.push_back(text);
   }
   return texts;
 }
 
-std::vector<LegendRow> LegendOf(const Figure& figure, const std::vector<Curve>& merged,
-                                double width) {
+Legend LegendOf(const Figure& figure, const std::vector<Curve>& merged, FigureSize size,
+                const std::vector<std::string>& failures) {
+  const double width = WidthOfPage(size) - 16.0;
   std::vector<LegendRow> rows;
   if (!figure.legend_title.empty()) rows.push_back({TextItem(figure.legend_title)});
   for (const LegendRow& row : figure.legend) Append(Broken(row, width), &rows);
@@ -120,36 +124,34 @@ std::vector<LegendRow> LegendOf(const Figure& figure, const std::vector<Curve>& 
     for (const LegendRow& row : rows) all.insert(all.end(), row.begin(), row.end());
     rows = Broken(all, width);
   }
-  LegendRow named, several;
+  LegendRow named;
+  std::vector<std::string> several;
   const bool at_ends = NamesAtEnds(figure, merged);
   for (const Curve& curve : merged) {
     if (curve.label.empty()) continue;
     if (!figure.legend.empty()) {
       if (curve.several) {
-        several.push_back(TextItem(Letter(several.size()) + ": " + curve.label));
+        several.push_back(Letter(several.size()) + ": " + curve.label);
       }
     } else if (!at_ends || !curve.merges) {
       named.push_back({curve.label, curve.style, curve.line || !curve.points});
     }
   }
   Append(Broken(named, width), &rows);
-  Append(Broken(SignsOf(merged), width), &rows);
-  std::string words;
-  for (const LegendItem& item : several) words += (words.empty() ? "" : ";  ") + item.text;
-  if (!words.empty()) {
-    for (const std::string& line :
-         Wrapped("coincide: " + words, static_cast<std::size_t>(width / kLetterWidth))) {
-      rows.push_back({TextItem(line)});
-    }
+  Append(Broken(SignsOf(merged, failures), width), &rows);
+  std::size_t letters = several.size();
+  const auto list = [&] {
+    std::string words = "coincide: ";
+    for (std::size_t i = 0; i < letters; ++i) words += (i == 0 ? "" : ";  ") + several[i];
+    if (letters < several.size()) words += letters == 0 ? "…" : ";  …";
+    return Wrapped(words, static_cast<std::size_t>(width / kLetterWidth));
+  };
+  const auto has_room = [&] { return rows.size() + list().size() <= kLegendRows; };
+  while (size == FigureSize::kOneColumn && letters > 0 && !has_room()) --letters;
+  if (!several.empty()) {
+    for (const std::string& line : list()) rows.push_back({TextItem(line)});
   }
-  if (rows.size() > kLegendRows) {
-    rows.resize(kLegendRows);
-    LegendItem& last = rows.back().back();
-    last.text.erase(last.text.find_last_of(' ') == std::string::npos ? 0
-                                                                     : last.text.find_last_of(' '));
-    last.text += " …";
-  }
-  return rows;
+  return {std::move(rows), letters};
 }
 
 std::string DrawLegend(const std::vector<LegendRow>& rows, const GnuplotPage& page, double top) {

@@ -14,12 +14,18 @@ std::string LineLook(const CurveStyle& style);
 std::string MarkLook(const CurveStyle& style);
 inline constexpr const char* kCrossLook = "pt 2 ps 0.45 lw 1.2";
 
+struct Legend {
+  std::vector<LegendRow> rows;
+  std::size_t letters = 0;  ///< curves that stand for several and are listed
+};
+
 /// The legend of a figure whose curves are drawn as in `merged`: its own rows, or else the curves'
-/// labels; then what hollow marks, crosses and question marks mean, as far as there are any; then
-/// which curves are several, by the letters at their ends. Rows are broken at `width` [pt], and
-/// none stands beyond kLegendRows: the last then ends in "…".
-std::vector<LegendRow> LegendOf(const Figure& figure, const std::vector<Curve>& merged,
-                                double width);
+/// labels; then the meaning of hollow marks, crosses and question marks, with `failures`, remarks
+/// on crosses that have no curve; then a list of the curves that stand for several, by the letters
+/// at their ends. Rows are broken at the width of the page; in one column the list ends in "…" if
+/// it would take the legend beyond kLegendRows.
+Legend LegendOf(const Figure& figure, const std::vector<Curve>& merged, FigureSize size,
+                const std::vector<std::string>& failures);
 
 /// Draws rows below `top` [pt from the lower edge of the page].
 std::string DrawLegend(const std::vector<LegendRow>& rows, const GnuplotPage& page, double top);
@@ -27,9 +33,9 @@ std::string DrawLegend(const std::vector<LegendRow>& rows, const GnuplotPage& pa
 /// Whether curves are named at their ends, and not in the legend.
 bool NamesAtEnds(const Figure& figure, const std::vector<Curve>& merged);
 
-/// What stands beside the end of each curve: its name or the letter by which the legend lists what
-/// it is, and its remark.
+/// The text beside the end of each curve: its name or, for the first `letters` that stand for
+/// several, its letter in the legend; and its remark.
 std::vector<std::string> EndTexts(const Figure& figure, const std::vector<Curve>& merged,
-                                  bool names);
+                                  bool names, std::size_t letters);
 
 }  // namespace loopbench::harness

@@ -1,6 +1,8 @@
 // Curves that coincide, drawn as one.
 #include <algorithm>
+#include <set>
 #include <string>
+#include <utility>
 #include <vector>
 
 #include "harness/figures/drawn_points.h"
@@ -25,39 +27,76 @@ std::string Joined(const std::vector<std::string>& words, const char* between) {
   return text;
 }
 
-// The different parts of labels at each place; empty where labels have different numbers of them.
-std::vector<std::vector<std::string>> ValuesOf(const std::vector<std::string>& labels) {
-  std::vector<std::vector<std::string>> values;
-  for (const std::string& label : labels) {
-    const std::vector<std::string> parts = PartsOf(label);
-    if (values.empty()) values.resize(parts.size());
-    if (parts.size() != values.size()) return {};
-    for (std::size_t i = 0; i < parts.size(); ++i) {
-      if (std::ranges::find(values[i], parts[i]) == values[i].end()) values[i].push_back(parts[i]);
-    }
+/// The values of each property: {{"odca", "lagrange"}, {"joint"}} is "odca = lagrange, joint".
+using Product = std::vector<std::vector<std::string>>;
+
+/// The only property in which both differ; the number of properties if there is none or several.
+std::size_t PlaceApart(const Product& one, const Product& other) {
+  std::size_t place = one.size();
+  if (one.size() != other.size()) return place;
+  for (std::size_t i = 0; i < one.size(); ++i) {
+    if (one[i] == other[i]) continue;
+    if (place != one.size()) return one.size();
+    place = i;
   }
-  return values;
+  return place;
 }
 
-// "odca = lagrange, joint" where the labels are all combinations, else one after the other. `all`
-// are those of the panel.
+/// As few products as possible that contain all `labels`, and no others.
+std::vector<Product> ProductsOf(const std::vector<std::string>& labels) {
+  std::vector<Product> products;
+  for (const std::string& label : labels) {
+    Product& product = products.emplace_back();
+    for (const std::string& part : PartsOf(label)) product.push_back({part});
+  }
+  for (std::size_t i = 0; i < products.size();) {
+    const auto other = std::find_if(
+        products.begin() + static_cast<std::ptrdiff_t>(i) + 1, products.end(),
+        [&](const Product& one) { return PlaceApart(products[i], one) < products[i].size(); });
+    if (other == products.end()) {
+      ++i;
+      continue;
+    }
+    const std::size_t place = PlaceApart(products[i], *other);
+    for (const std::string& value : (*other)[place]) products[i][place].push_back(value);
+    products.erase(other);
+    i = 0;
+  }
+  return products;
+}
+
+std::size_t NumberOfValues(const std::vector<std::string>& labels, std::size_t place) {
+  std::set<std::string> values;
+  for (const std::string& label : labels) {
+    const std::vector<std::string> parts = PartsOf(label);
+    if (place < parts.size()) values.insert(parts[place]);
+  }
+  return values.size();
+}
+
+// "odca = lagrange, joint"; `all` are the labels of the panel.
 std::string LabelOfSeveral(const std::vector<std::string>& labels,
                            const std::vector<std::string>& all) {
-  const auto values = ValuesOf(labels), possible = ValuesOf(all);
-  std::size_t combinations = values.empty() ? 0 : 1;
-  std::vector<std::string> texts;
-  for (std::size_t i = 0; i < values.size(); ++i) {
-    combinations *= values[i].size();
-    const bool is_any = i > 0 && values[i].size() > 1 && i < possible.size() &&
-                        values[i].size() == possible[i].size();
-    texts.push_back(is_any ? "all" : Joined(values[i], " = "));
+  std::vector<std::string> products;
+  for (const Product& product : ProductsOf(labels)) {
+    std::vector<std::string> texts;
+    for (std::size_t i = 0; i < product.size(); ++i) {
+      const bool is_any =
+          i > 0 && product[i].size() > 1 && product[i].size() == NumberOfValues(all, i);
+      texts.push_back(is_any ? "all" : Joined(product[i], " = "));
+    }
+    products.push_back(Joined(texts, ", "));
   }
-  return combinations == labels.size() ? Joined(texts, ", ") : Joined(labels, " = ");
+  return Joined(products, " and ");
 }
 
 bool MayMerge(const Curve& curve) {
-  return curve.merges && curve.line && !curve.label.empty() && !curve.ends_early &&
-         curve.crosses.empty() && curve.hollow.empty();
+  return curve.merges && !curve.label.empty() && !curve.ends_early;
+}
+
+/// The failed runs of a curve alone, which keep its colour if it is drawn as one with others.
+Curve FailuresOf(Curve* curve) {
+  return {.style = curve->style, .merges = false, .crosses = std::exchange(curve->crosses, {})};
 }
 
 /// The look of `one` where `other` has the same, else black, solid, unmarked.
@@ -76,13 +115,15 @@ std::vector<Curve> MergedCurves(const Figure& panel, FigureSize size) {
   std::vector<Curve> merged;
   std::vector<std::vector<Point>> points;
   std::vector<std::vector<std::string>> labels;
-  for (const Curve& curve : panel.curves) {
-    const std::vector<Point> own = Decimated(area, Drawable(area, curve));
+  std::vector<Curve> failures;
+  for (Curve curve : panel.curves) {
+    const std::vector<Point> all = Drawable(area, curve);
+    const std::vector<Point> own = curve.line ? Decimated(area, all) : all;
     std::size_t i = 0;
     for (; i < merged.size(); ++i) {
-      const bool alike = MayMerge(curve) && MayMerge(merged[i]) &&
+      const bool alike = MayMerge(curve) && MayMerge(merged[i]) && curve.line == merged[i].line &&
                          curve.style.doubtful == merged[i].style.doubtful;
-      if (alike && Coincide(area, own, points[i])) break;
+      if (alike && Coincide(area, own, points[i], curve.line)) break;
     }
     if (i == merged.size()) {
       merged.push_back(curve);
@@ -90,7 +131,13 @@ std::vector<Curve> MergedCurves(const Figure& panel, FigureSize size) {
       labels.push_back({curve.label});
       continue;
     }
-    if (curve.label != labels[i].front()) labels[i].push_back(curve.label);
+    if (std::ranges::find(labels[i], curve.label) == labels[i].end()) {
+      labels[i].push_back(curve.label);
+    }
+    for (Curve* one : {&merged[i], &curve}) {
+      if (!one->crosses.empty()) failures.push_back(FailuresOf(one));
+    }
+    merged[i].hollow.insert(merged[i].hollow.end(), curve.hollow.begin(), curve.hollow.end());
     KeepCommon(curve.style, &merged[i].style);
     if (merged[i].remark.ends_with('?') && !curve.remark.ends_with('?')) {
       merged[i].remark = curve.remark;  // the one that is resolved
@@ -105,6 +152,7 @@ std::vector<Curve> MergedCurves(const Figure& panel, FigureSize size) {
     merged[i].several = labels[i].size() > 1;
     if (merged[i].several) merged[i].label = LabelOfSeveral(labels[i], all);
   }
+  merged.insert(merged.end(), failures.begin(), failures.end());
   return merged;
 }
 

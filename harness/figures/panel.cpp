@@ -5,6 +5,7 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
+#include <map>
 #include <string_view>
 
 #include "harness/figures/legend.h"
@@ -53,19 +54,42 @@ std::string GuideElement(const Guide& guide, const std::vector<Point>& points) {
       guide.exponent);
 }
 
-// Failed runs as labels with a point and no text: unlike plot elements these may lie on the edge.
-std::string Crosses(const PlotArea& area, const Curve& curve, const std::vector<Point>& points) {
-  std::vector<Point> places = curve.crosses;
-  if (curve.ends_early && !points.empty()) places.push_back(points.back());
-  std::string commands;
-  for (const auto& [x, y] : places) {
-    if (!area.x.CanShow(x)) continue;
-    commands += fmt::format("set label '' at first {:.6g}, {} point {} lc rgb '{}' front\n", x,
-                            area.y.CanShow(y) ? fmt::format("first {:.6g}", y) : "graph 0.03",
-                            kCrossLook, curve.style.color);
+/// Failed runs as labels with a point and no text, which may lie on the edges, unlike plot
+/// elements: on the lower one without a value, on the left one at a time that a logarithmic axis
+/// lacks. Crosses of several colours at one place on the lower edge stand above each other.
+class Crosses {
+ public:
+  explicit Crosses(const PlotArea& area) : area_(area) {}
+
+  std::string Of(const Curve& curve) {
+    std::string commands;
+    for (const Point& cross : curve.crosses) commands += At(cross, curve.style.color);
+    if (curve.ends_early && !curve.x.empty() && curve.x.size() == curve.y.size()) {
+      commands += At({curve.x.back(), curve.y.back()}, curve.style.color);
+    }
+    return commands;
   }
-  return commands;
-}
+
+ private:
+  std::string At(const Point& cross, const std::string& color) {
+    constexpr double kDistance = 0.03;  // of the height
+    const auto& [x, y] = cross;
+    if (!std::isfinite(x)) return "";
+    const std::string at = area_.x.CanShow(x) ? fmt::format("first {:.6g}", x) : "graph 0";
+    std::string height = fmt::format("first {:.6g}", y);
+    if (!area_.y.CanShow(y)) {
+      std::vector<std::string>& colors = on_edge_[at];
+      if (std::ranges::find(colors, color) != colors.end()) return "";
+      colors.push_back(color);
+      height = fmt::format("graph {:.4g}", kDistance * static_cast<double>(colors.size()));
+    }
+    return fmt::format("set label '' at {}, {} point {} lc rgb '{}' front\n", at, height,
+                       kCrossLook, color);
+  }
+
+  const PlotArea& area_;
+  std::map<std::string, std::vector<std::string>> on_edge_;  ///< colours by place
+};
 
 std::string TicksCommand(char axis, const std::vector<Tick>& ticks, bool has_labels) {
   std::string list;
@@ -162,6 +186,7 @@ PlotArea AreaOf(const Figure& panel, FigureSize size) {
       x.Include(curve.x[i]);
       y.Include(curve.y[i]);
     }
+    if (curve.ends_early && !curve.x.empty()) x.Include(curve.x.back());
     for (const Point& cross : curve.crosses) {
       x.Include(cross.first);
       y.Include(cross.second);
@@ -219,12 +244,13 @@ std::string PanelScript(const Figure& panel, const std::vector<Curve>& curves,
     if (!element.empty()) plot += (plot.empty() ? "plot " : ", \\\n  ") + element;
   };
   std::vector<std::vector<Point>> points;
+  Crosses crosses(area);
   for (std::size_t i = 0; i < curves.size(); ++i) {
     const Curve& curve = curves[i];
     const std::vector<Point> all = Drawable(area, curve);
     points.push_back(curve.line ? Decimated(area, all) : all);
     const std::vector<Point>& own = points.back();
-    script += Crosses(area, curve, own);
+    script += crosses.Of(curve);
     if (own.empty()) continue;
     script += DataBlock(fmt::format("{}{}", name, i), own);
     if (curve.line) add(fmt::format("${}{} with lines {} notitle", name, i, LineLook(curve.style)));

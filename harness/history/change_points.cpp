@@ -91,11 +91,11 @@ double VarianceOfDifferences(std::span<const double> x, std::size_t lag) {
   return count < kFewest * n ? all / n : sum / count;
 }
 
-/// Probability that half of n values or more, which decide the level, are outliers.
-double HalfAreOutliers(std::size_t n, double share) {
+/// Probability that at least `least` of n values are outliers.
+double AreOutliers(std::size_t n, std::size_t least, double share) {
   if (share >= 1.0) return 1.0;
   double sum = 0.0;
-  for (std::size_t k = (n + 1) / 2; k <= n; ++k) {
+  for (std::size_t k = least; k <= n; ++k) {
     const auto all = static_cast<double>(n), some = static_cast<double>(k);
     sum +=
         std::exp(std::lgamma(all + 1.0) - std::lgamma(some + 1.0) - std::lgamma(all - some + 1.0) +
@@ -127,7 +127,6 @@ class Segments {
       std::vector<LevelChange> changes;
       std::size_t worst = 0;
       double most = 0.0;
-      outliers_ = ShareOfOutliers();
       for (std::size_t i = 1; i + 1 < edges_.size(); ++i) {
         changes.push_back(ChangeAt(i));
         const LevelChange& change = changes.back();
@@ -157,40 +156,53 @@ class Segments {
     return level;
   }
 
-  /// Share of the values that are outliers, with one more than are seen.
-  double ShareOfOutliers() const {
-    double outliers = 1.0;
+  std::size_t SizeOf(std::size_t segment) const { return edges_[segment + 1] - edges_[segment]; }
+
+  /// Values of a segment that lie further from a level than `far`, on the side of its sign.
+  std::size_t Beyond(std::size_t segment, double level, double far) const {
+    return static_cast<std::size_t>(std::ranges::count_if(
+        x_.subspan(edges_[segment], SizeOf(segment)),
+        [=](double value) { return (value - level) * std::copysign(1.0, far) > std::abs(far); }));
+  }
+
+  /// Probability that the values of the segment `fewer` are outliers of `level`, which is that of
+  /// its neighbour: as many as lie beyond half of the step, and at least half of them, for they
+  /// decide the median. The share of outliers is that of the series, beyond the bound, with one
+  /// more than seen.
+  double AreOutliersOf(double level, std::size_t fewer) const {
+    const double step = LevelOf(fewer).median - level;
+    const double far = std::copysign(std::max(bound_, 0.5 * std::abs(step)), step);
+    std::size_t outliers = 1;
     for (std::size_t segment = 0; segment + 1 < edges_.size(); ++segment) {
-      const double level = LevelOf(segment).median;
-      for (std::size_t i = edges_[segment]; i < edges_[segment + 1]; ++i) {
-        outliers += std::abs(x_[i] - level) > bound_;
-      }
+      const double median = LevelOf(segment).median;
+      outliers += Beyond(segment, median, bound_) + Beyond(segment, median, -bound_);
     }
-    return std::min(1.0, outliers / static_cast<double>(x_.size()));
+    const std::size_t n = SizeOf(fewer);
+    const std::size_t half = (n + 1) / 2;
+    // where several are seen, they come in bursts: more of them are no less likely than half
+    const std::size_t least = outliers > 2 ? half : std::max(half, Beyond(fewer, level, far));
+    return AreOutliers(n, least, static_cast<double>(outliers) / static_cast<double>(x_.size()));
   }
 
-  /// How often noise alone is expected to show a difference of `step` between means of n and m
-  /// values, or half of the fewer ones to be outliers.
-  double ExpectedByNoise(double step, std::size_t n, std::size_t m) const {
-    if (noise_ == 0.0) return 0.0;
-    const double fewer = static_cast<double>(std::min(n, m));
-    const double more = static_cast<double>(std::max(n, m));
-    const double error = noise_ * std::sqrt(1.0 / fewer + 1.0 / more);
-    return resolution_.places * (std::erfc(std::abs(step) / error / std::numbers::sqrt2) +
-                                 HalfAreOutliers(std::min(n, m), outliers_));
-  }
-
+  /// How often noise alone is expected to show the difference of the means, or outliers the change.
   LevelChange ChangeAt(std::size_t i) const {
     const Level before = LevelOf(i - 1), after = LevelOf(i);
-    return {edges_[i], before.median, after.median,
-            ExpectedByNoise(after.mean - before.mean, edges_[i] - edges_[i - 1],
-                            edges_[i + 1] - edges_[i])};
+    LevelChange change{edges_[i], before.median, after.median};
+    if (noise_ == 0.0) return change;
+    const auto n = static_cast<double>(SizeOf(i - 1)), m = static_cast<double>(SizeOf(i));
+    const double error = noise_ * std::sqrt(1.0 / n + 1.0 / m);
+    const double by_outliers =
+        m <= n ? AreOutliersOf(before.median, i) : AreOutliersOf(after.median, i - 1);
+    change.expected =
+        resolution_.places *
+        (std::erfc(std::abs(after.mean - before.mean) / error / std::numbers::sqrt2) + by_outliers);
+    return change;
   }
 
   std::span<const double> x_;
   Resolution resolution_;
   std::vector<std::size_t> edges_;
-  double bound_ = 0.0, noise_ = 0.0, outliers_ = 0.0;
+  double bound_ = 0.0, noise_ = 0.0;
 };
 
 }  // namespace
@@ -243,7 +255,9 @@ Noise NoiseOf(std::span<const double> x) {
   const double two = variances[1] / variances[0] - 1.0;    // the correlation r
   const double three = variances[2] / variances[0] - 1.0;  // r + r^2
   const double mean = 0.5 * (two + 0.5 * (std::sqrt(std::max(0.0, 1.0 + 4.0 * three)) - 1.0));
-  const double correlation = std::clamp(mean, 0.0, 0.9);
+  const auto n = static_cast<double>(x.size());
+  constexpr double kPrior = 15.0;
+  const double correlation = std::clamp(mean, 0.0, 0.9) * n * n / (n * n + kPrior * kPrior);
   return {std::sqrt(variances[0] / (2.0 * (1.0 - correlation))), correlation};
 }
 

@@ -30,10 +30,11 @@ struct Noise {
 };
 
 /// From the mean squares of x[i+k] - x[i] for k = 1, 2, 3, without the few that steps and outliers
-/// make: a quarter at most, above 3.5 times what the median says of normal noise. The growth with k
-/// tells the correlation. Such estimates: G. Romano, G. Rigaill, V. Runge, P. Fearnhead,
-/// "Detecting abrupt changes in the presence of local fluctuations and autocorrelated noise",
-/// Journal of the American Statistical Association 117 (2022) 2147-2162. Nothing below four values.
+/// make: a quarter at most, above 3.5 times what the median says of normal noise. Their growth with
+/// k gives the correlation, which is reduced by n^2 / (n^2 + 15^2): a few values may seem to have
+/// any. Such estimates: G. Romano, G. Rigaill, V. Runge, P. Fearnhead, "Detecting abrupt changes in
+/// the presence of local fluctuations and autocorrelated noise", Journal of the American
+/// Statistical Association 117 (2022) 2147-2162. Nothing below four values.
 Noise NoiseOf(std::span<const double> x);
 
 /// A change of level, in a series of logarithms: a ratio.
@@ -56,13 +57,17 @@ struct Resolution {
 /// The most changes by noise alone that are accepted, at all places together.
 inline constexpr double kFalseAlarms = 0.01;
 
-/// The changes of a series, from RobustSegments() with bound 3 sigma (the authors') and penalty
-/// 2 log(n) times the long-run variance (the usual one, with which a series without change keeps
-/// its one segment with a probability that tends to 1). Of these the least sure one is taken away
-/// until all are at least resolution.least and expected at most kFalseAlarms times by noise: means
-/// of the segments on both sides against their standard error, whose estimate is taken two of its
-/// own standard errors larger than it is, by the normal tail times the number of places
-/// (Bonferroni).
+/// The changes of a series. Candidates come from RobustSegments() with bound 3 sigma (the authors')
+/// and penalty 2 log(n) times the long-run variance, the usual one. The least sure candidate is
+/// removed until all are at least resolution.least, and noise is expected to make at most
+/// kFalseAlarms of them at all places together (Bonferroni). Noise makes a change in two ways,
+/// whose probabilities are added:
+///   - The means of the segments on both sides differ: the normal tail of their standard error,
+///   from
+///     the long-run standard deviation, taken two of its own standard errors larger than estimated.
+///   - The values of the shorter segment are outliers of its neighbour: the binomial tail of as
+///   many
+///     values as lie beyond half of the step, with the share beyond 3 sigma in the series.
 std::vector<LevelChange> FindChanges(std::span<const double> x, const Resolution& resolution);
 
 }  // namespace loopbench::harness

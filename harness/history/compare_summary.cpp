@@ -38,12 +38,13 @@ struct Missing {
   const char* why;
 };
 
-std::vector<Missing> MissingCases(const ComparisonReport& report, bool subset) {
+std::vector<Missing> MissingCases(const ComparisonReport& report, const CompareOptions& options) {
   std::vector<Missing> missing = {
       {&report.ambiguous, "there more than once, not compared"},
       {&report.other_content,
        "ran another mechanism, limits or ensemble under equal keys, not compared"}};
-  if (!subset) missing.push_back({&report.only_base, "only in the base"});
+  if (!options.subset) missing.push_back({&report.only_base, "only in the base"});
+  if (!options.added) missing.push_back({&report.only_fresh, "only in the new measurements"});
   return missing;
 }
 
@@ -82,7 +83,7 @@ std::string ComparisonMarkdown(const ComparisonReport& report, const std::string
             rows + "\n";
   }
   if (failures > kMostRows) text += fmt::format("and {} more\n\n", failures - kMostRows);
-  for (const auto& [cases, why] : MissingCases(report, false)) text += Listed(why, *cases);
+  for (const auto& [cases, why] : MissingCases(report, {})) text += Listed(why, *cases);
   text += Listed("ran with other settings, compared all the same", report.other_settings);
   text += fmt::format("{} measures the same, {} better, {} worse, {} different, {} not measured\n",
                       report.Count(Judgement::kSame), report.Count(Judgement::kBetter),
@@ -110,7 +111,7 @@ std::string ComparisonJunit(const ComparisonReport& report, const CompareOptions
     }
     cases += "</testcase>\n";
   }
-  for (const auto& [names, why] : MissingCases(report, options.subset)) {
+  for (const auto& [names, why] : MissingCases(report, options)) {
     for (const std::string& name : *names) {
       ++tests;
       ++failures;
@@ -122,9 +123,10 @@ std::string ComparisonJunit(const ComparisonReport& report, const CompareOptions
   const int errors = failures == 0 && report.ExitCode(options) == 2;
   if (errors > 0) {
     ++tests;
-    cases +=
+    cases += fmt::format(
         "  <testcase classname=\"loopbench compare\" name=\"measured on both sides\"><error "
-        "message=\"could not measure: nothing was compared\"/></testcase>\n";
+        "message=\"could not measure: {}\"/></testcase>\n",
+        EscapeXml(report.Obstacle(options)));
   }
   return fmt::format(
       "<?xml version=\"1.0\" encoding=\"UTF-8\"?>\n<testsuites>\n<testsuite name=\"loopbench "

@@ -173,6 +173,7 @@ CheckedOut FindCommit(const std::string& commit) {
   // in the user's environment: HEAD is that of the work tree that a hook runs in
   const auto parse = [](const std::string& name) {
     const ProgramResult found = PlainGit({"rev-parse", "--verify", "--end-of-options", name});
+    if (found.error != 0) throw ConfigError(found.Failure("git") + ", which finds commits");
     return found.Failure("git").empty() ? WithoutLineEnd(found.output) : "";
   };
   const std::string object = parse(commit);

@@ -58,6 +58,7 @@ struct CheckedOut {
   std::string commit, date;
 };
 /// @param commit  another one than that which is checked out, by any name git knows
+/// Throws ConfigError where there is no git.
 CheckedOut FindCommit(const std::string& commit = "HEAD");
 
 }  // namespace loopbench::harness

@@ -70,6 +70,18 @@ bool IsDate(const std::string& text) {
 
 std::filesystem::path FileOf(const std::filesystem::path& folder) { return folder / kFile; }
 
+/// A file of results by its name in a line, which may come from anywhere: it stays in the history,
+/// links followed.
+std::filesystem::path ResultsIn(const std::filesystem::path& folder, const std::string& name) {
+  const std::filesystem::path path = name, whole = std::filesystem::weakly_canonical(folder);
+  const std::filesystem::path end = std::filesystem::weakly_canonical(folder / path);
+  const bool is_within = std::ranges::mismatch(whole, end).in1 == whole.end() && whole != end;
+  if (path.is_relative() && std::ranges::find(path, "..") == path.end() && is_within)
+    return folder / path;
+  throw ConfigError(fmt::format("{}: \"results\": found \"{}\", expected a path within the history",
+                                FileOf(folder).string(), name));
+}
+
 void Apply(const Record& line, const std::filesystem::path& folder, History* history) {
   auto& entries = history->entries;
   if (line.Text("kind") == "mark") {
@@ -92,7 +104,7 @@ void Apply(const Record& line, const std::filesystem::path& folder, History* his
   HistoryEntry entry{line.Text("commit"),
                      line.Text("date"),
                      line.Text("machine"),
-                     folder / line.Text("results"),
+                     ResultsIn(folder, line.Text("results")),
                      "",
                      ""};
   const auto same = std::ranges::find_if(entries, [&entry](const HistoryEntry& one) {
@@ -206,7 +218,9 @@ std::vector<Record> ReadResults(const HistoryEntry& entry, std::vector<std::stri
   });
   reader.Feed(ReadFile(entry.results));
   reader.End();
-  if (!reader.warning().empty()) warnings->push_back(reader.warning());
+  for (const std::string& warning : {reader.warning(), reader.Unsealed()}) {
+    if (!warning.empty()) warnings->push_back(warning);
+  }
   records = LatestRecords(records);
   SortRows(&records);
   return records;
@@ -234,8 +248,7 @@ HistoryEntry AddToHistory(const std::filesystem::path& folder, HistoryEntry entr
   entry.results = NewResults(folder, entry);
   std::string text;
   for (const Record& record : records) text += ToJsonLine(Slim(record)) + '\n';
-  MakeFolderOf(folder / entry.results);
-  WriteFileAtomically(folder / entry.results, text);
+  WriteFileAtomically(ResultsIn(folder, entry.results.string()), text);
   Record line;
   line.Set("kind", std::string("commit"));
   line.Set("commit", entry.commit);

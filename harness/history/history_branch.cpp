@@ -11,7 +11,9 @@ namespace loopbench::harness {
 namespace {
 
 void RequireBranchName(const GitRepository& git, const std::string& branch) {
-  if (git.Try({"check-ref-format", "refs/heads/" + branch}).status == 0) return;
+  // "--branch" refuses "-x" and "HEAD" as `git branch` does, and takes "@{-1}" for another name
+  const ProgramResult checked = git.Try({"check-ref-format", "--branch", branch});
+  if (checked.status == 0 && checked.output == branch + "\n") return;
   throw ConfigError(fmt::format("--branch: found \"{}\", expected the name of a branch", branch));
 }
 

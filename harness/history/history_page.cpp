@@ -5,6 +5,7 @@
 #include <algorithm>
 #include <cmath>
 
+#include "harness/figures/axis.h"
 #include "harness/history/history_steps.h"
 #include "harness/view/html.h"
 #include "harness/view/svg.h"
@@ -26,35 +27,18 @@ figcaption { font-weight: 600; overflow-wrap: anywhere; }
 svg { background: var(--paper); border: 1px solid var(--rule); max-width: 100%; height: auto; }
 svg text { font: 12px system-ui, 'DejaVu Sans', sans-serif; fill: var(--text); }
 .axis { stroke: var(--soft); } .grid { stroke: var(--guide); } .dot { fill: var(--drive); } .other { fill: var(--paper); stroke: var(--drive); }
-.spread { stroke: var(--drive); stroke-opacity: 0.35; } .level { stroke: var(--text); stroke-width: 1.5; }
+.spread { stroke: var(--drive); stroke-opacity: 0.65; } .level { stroke: var(--text); stroke-width: 1.5; }
 .step { stroke: var(--gap); stroke-dasharray: 5 3; }
 .worse { color: var(--gap); font-weight: 600; }
 )";
 
-/// About `most` round values within [from, to].
-std::vector<double> Ticks(double from, double to, bool logarithmic, int most) {
-  std::vector<double> ticks;
-  if (logarithmic) {
-    const int first = static_cast<int>(std::ceil(std::log10(from) - 1e-9));
-    const int last = static_cast<int>(std::floor(std::log10(to) + 1e-9));
-    const int by = std::max(1, (last - first + most) / most);
-    for (int power = first; power <= last; power += by) ticks.push_back(std::pow(10.0, power));
-    if (ticks.size() >= 2) return ticks;
-    ticks.clear();
-  }
-  const double raw = (to - from) / most;
-  const double power = std::pow(10.0, std::floor(std::log10(raw)));
-  const double step = power * (raw / power <= 1.0   ? 1.0
-                               : raw / power <= 2.0 ? 2.0
-                               : raw / power <= 5.0 ? 5.0
-                                                    : 10.0);
-  // counted: a step that is lost in the last digits of a tick would never come to an end
-  const double first = std::ceil(from / step);
-  for (int i = 0; i <= most && (first + i) * step <= to + 1e-9 * step; ++i) {
-    ticks.push_back((first + i) * step);
-  }
-  return ticks;
-}
+/// Light or dark as the system is.
+constexpr const char* kThemeScript =
+    "const dark = matchMedia('(prefers-color-scheme: dark)');\n"
+    "const paint = () => { document.documentElement.dataset.theme = dark.matches ? 'dark' : "
+    "'light'; };\n"
+    "paint();\n"
+    "dark.addEventListener('change', paint);";
 
 struct Chart {
   const History& history;
@@ -100,16 +84,13 @@ struct Chart {
         "of {3} over {4} "
         "commits\">\n",
         kWidth, kHeight, EscapeXml(series.measure), EscapeXml(series.one), series.values.size());
-    // as many digits as tell ticks apart
-    const double most = std::max(std::abs(low), std::abs(high));
-    const int digits =
-        std::clamp(2 + static_cast<int>(std::ceil(std::log10(most / (high - low)))), 4, 15);
-    for (const double tick : Ticks(low, high, logarithmic, 5)) {
+    for (const Tick& tick : Ticks({low, high, logarithmic}, 5)) {
+      if (tick.label.empty()) continue;
       svg += fmt::format(
           "<line class=\"grid\" x1=\"{}\" x2=\"{}\" y1=\"{:.1f}\" y2=\"{:.1f}\"/><text x=\"{}\" "
           "y=\"{:.1f}\" "
-          "text-anchor=\"end\">{:.{}g}</text>\n",
-          kLeft, kWidth - kRight, Y(tick), Y(tick), kLeft - 6, Y(tick) + 4, tick, digits);
+          "text-anchor=\"end\">{}</text>\n",
+          kLeft, kWidth - kRight, Y(tick.at), Y(tick.at), kLeft - 6, Y(tick.at) + 4, tick.label);
     }
     const double bottom = kHeight - kBottom;
     svg += fmt::format(
@@ -202,12 +183,14 @@ std::string HistoryPage(const History& history, const HistoryFindings& found,
   std::string page = PageHead(EscapeXml(title));
   page += kStyle;
   page += fmt::format(
-      "</style>\n</head>\n<body>\n<header><h1>{}</h1><p class=\"soft\">{} entries, {} series, {} "
+      "</style>\n<script>{}</script>\n</head>\n<body>\n<header><h1>{}</h1><p class=\"soft\">{} "
+      "entries, {} series, {} "
       "steps "
       "(other endings, and changes of level that noise would show {} times in "
       "all)</p></header>\n<main>\n"
       "<h2>Steps</h2>\n",
-      EscapeXml(title), history.entries.size(), found.series.size(), found.Steps(), kFalseAlarms);
+      kThemeScript, EscapeXml(title), history.entries.size(), found.series.size(), found.Steps(),
+      kFalseAlarms);
   page += StepRows(history, found);
   page +=
       "<h2>Series</h2>\n<p class=\"soft\">Dots: a commit each; of times the least, with a line up "

@@ -72,8 +72,9 @@ struct Stepper::Arkode {
                   profile_.is_ode45 ? Weights<true> : Weights<false>);
     if (profile_.is_implicit) {
       Require(ARKStepSetTableName(memory(), profile_.table, "ARKODE_ERK_NONE"), "the table");
-      newton_ = std::make_unique<Newton>(
-          memory(), y_.get(), static_cast<Eigen::Index>(ode_.Controlled()), context_.get());
+      newton_ =
+          std::make_unique<Newton>(memory(), y_.get(), static_cast<Eigen::Index>(ode_.Controlled()),
+                                   ode_.options().fixed_step > 0, context_.get());
       // the other interpolant evaluates a derivative at the end of every step
       LOOPBENCH_SET_IMPLICIT(SetInterpolantType, memory(), ARK_INTERP_LAGRANGE);
     } else {

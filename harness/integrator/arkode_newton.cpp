@@ -2,6 +2,7 @@
 
 #include "harness/integrator/arkode_vectors.h"
 #include "harness/integrator/guarded_ode.h"
+#include "harness/integrator/stepper.h"
 
 namespace loopbench::harness {
 namespace {
@@ -33,7 +34,8 @@ SUNLinearSolver_Type IsDirect(SUNLinearSolver) { return SUNLINEARSOLVER_DIRECT; 
 
 }  // namespace
 
-Newton::Newton(void* memory, N_Vector y, Eigen::Index controlled, SUNContext context)
+Newton::Newton(void* memory, N_Vector y, Eigen::Index controlled, bool fixed_step,
+               SUNContext context)
     : controlled_(controlled),
       factors_(controlled),
       solution_(controlled),
@@ -56,7 +58,8 @@ Newton::Newton(void* memory, N_Vector y, Eigen::Index controlled, SUNContext con
   LOOPBENCH_SET_IMPLICIT(SetJacEvalFrequency, memory, 1);
   // What Newton leaves over, in units of the tolerance: at ARKODE's 0.1 it rules the global error.
   LOOPBENCH_SET_IMPLICIT(SetNonlinConvCoef, memory, 0.01);
-  LOOPBENCH_SET_IMPLICIT(SetMaxNonlinIters, memory, 8);
+  // A step that may shrink is cheaper shortened than iterated on.
+  LOOPBENCH_SET_IMPLICIT(SetMaxNonlinIters, memory, fixed_step ? Stepper::kMostIterations : 8);
   // A stage starts from the line through the last two states: fewer and less distant iterations
   // than from the last state alone.
   LOOPBENCH_SET_IMPLICIT(SetPredictorMethod, memory, 1);

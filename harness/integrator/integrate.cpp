@@ -29,6 +29,10 @@ bool Fails(const GuardedOde& ode, const Stepper& stepper, int code, IntegratorRe
   } else {
     result.outcome = OutcomeOfReturnCode(code);
     result.message = result.outcome == Outcome::kFinished ? "" : stepper.message();
+    if (result.outcome == Outcome::kNewtonFailure && ode.options().fixed_step > 0) {
+      result.message += " The step is fixed: " + std::to_string(Stepper::kMostIterations) +
+                        " iterations are its limit, and a shorter step needs fewer.";
+    }
   }
   return result.outcome != Outcome::kFinished;
 }

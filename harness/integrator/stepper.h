@@ -15,6 +15,8 @@ namespace loopbench::harness {
 /// this header; Integrate() (arkode.h) is the loop over Step() with limits and observers.
 class Stepper {
  public:
+  static constexpr int kMostIterations = 50;  ///< of Newton in a stage of a step of fixed length
+
   /// The profile, the limits on steps and the stop times are those of `ode.options()`, which must
   /// be valid. May evaluate the derivative at (t0, y0) to choose the first step; requires t0 <
   /// t_end.

@@ -3,7 +3,7 @@
 namespace loopbench::harness {
 namespace {
 
-constexpr int kSignals[] = {SIGINT, SIGTERM};
+constexpr int kSignals[] = {SIGHUP, SIGINT, SIGTERM};
 
 volatile std::sig_atomic_t asked = 0;
 
@@ -15,7 +15,7 @@ Interrupted::Interrupted(int signal) : std::runtime_error("interrupted"), signal
 
 Interruption::Interruption() {
   asked = 0;
-  for (int i = 0; i < 2; ++i) {
+  for (std::size_t i = 0; i < before_.size(); ++i) {
     ::sigaction(kSignals[i], nullptr, &before_[i]);
     if (before_[i].sa_handler == SIG_IGN) continue;
     struct sigaction remember = {};
@@ -28,7 +28,7 @@ Interruption::Interruption() {
 }
 
 Interruption::~Interruption() {
-  for (int i = 0; i < 2; ++i) ::sigaction(kSignals[i], &before_[i], nullptr);
+  for (std::size_t i = 0; i < before_.size(); ++i) ::sigaction(kSignals[i], &before_[i], nullptr);
   asked = 0;
 }
 

@@ -1,6 +1,8 @@
-// Ctrl-C (SIGINT) and SIGTERM while processes work for this one: they end nothing by themselves.
+// Ctrl-C (SIGINT), SIGTERM and SIGHUP while processes work for this one: they end nothing by
+// themselves.
 #pragma once
 
+#include <array>
 #include <csignal>
 #include <stdexcept>
 
@@ -31,7 +33,7 @@ class Interruption {
   static void LeaveToParent();
 
  private:
-  struct sigaction before_[2];
+  std::array<struct sigaction, 3> before_;
 };
 
 }  // namespace loopbench::harness

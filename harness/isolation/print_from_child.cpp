@@ -5,6 +5,7 @@
 #include <cstdio>
 #include <stdexcept>
 
+#include "harness/text/files.h"
 #include "harness/text/memory_file.h"
 #include "harness/text/terminal.h"
 
@@ -17,16 +18,21 @@ int FromChild(const std::string& name, const ProcessLimits& limits,
               const std::function<void(const std::string&)>& deliver) {
   const MemoryFile output("stdout");
   ProcessResult result;
-  RunInProcesses(
-      1, 1,
-      [&](std::size_t) {
-        // line by line, so that what is said before the child is killed is not lost
-        ::dup2(output.descriptor(), STDOUT_FILENO);
-        ::setlinebuf(stdout);
-        return std::to_string(FinishOutput(work()));
-      },
-      [&](std::size_t) { return limits; },
-      [&](std::size_t, const ProcessResult& ended) { result = ended; });
+  try {
+    RunInProcesses(
+        1, 1,
+        [&](std::size_t) {
+          // line by line, so that what is said before the child is killed is not lost
+          ::dup2(output.descriptor(), STDOUT_FILENO);
+          ::setlinebuf(stdout);
+          return std::to_string(FinishOutput(work()));
+        },
+        [&](std::size_t) { return limits; },
+        [&](std::size_t, const ProcessResult& ended) { result = ended; });
+  } catch (const SystemFault&) {
+    deliver(output.Text());
+    throw;
+  }
   deliver(output.Text());
   if (result.ending == ProcessEnding::kThrew) throw std::runtime_error(result.text);
   if (result.ending == ProcessEnding::kAnswered) return std::stoi(result.text);

@@ -21,6 +21,7 @@
 
 #include "harness/isolation/child_watch.h"
 #include "harness/isolation/interruption.h"
+#include "harness/text/files.h"
 #include "mechanism/model/dense_memory.h"
 
 namespace loopbench::harness {
@@ -28,7 +29,8 @@ namespace {
 
 using Clock = std::chrono::steady_clock;
 
-constexpr int kThrewExit = 91, kMemoryExit = 92;  ///< free for any use by this program
+constexpr int kThrewExit = 91, kMemoryExit = 92,
+              kFaultExit = 93;  ///< free for any use by this program
 
 double SecondsSince(Clock::time_point begin) {
   return std::chrono::duration<double>(Clock::now() - begin).count();
@@ -85,6 +87,9 @@ void WriteAll(int descriptor, std::string_view text) {
     ::_exit(kMemoryExit);
   } catch (const std::bad_alloc&) {
     ::_exit(kMemoryExit);
+  } catch (const SystemFault& error) {
+    WriteAll(answer, error.what());
+    ::_exit(kFaultExit);
   } catch (const std::exception& error) {
     WriteAll(answer, error.what());
     ::_exit(kThrewExit);
@@ -203,6 +208,8 @@ ProcessResult ResultOf(Child child) {
   result.cpu_s = Seconds(usage.ru_utime) + Seconds(usage.ru_stime);
   if (WIFEXITED(status) && WEXITSTATUS(status) == EXIT_SUCCESS) {
     result.text = std::move(child.text);
+  } else if (WIFEXITED(status) && WEXITSTATUS(status) == kFaultExit) {
+    throw SystemFault(child.text);
   } else if (WIFEXITED(status) && WEXITSTATUS(status) == kThrewExit) {
     result.ending = ProcessEnding::kThrew;
     result.text = std::move(child.text);

@@ -47,7 +47,8 @@ struct ProcessNews {
 /// when it gives nothing with no piece under way all is done. `done` is called here in the parent
 /// as pieces end, one at a time. No piece outlives this process. Throws std::runtime_error when a
 /// process cannot be started, what `done` throws, and Interrupted (interruption.h) when all pieces
-/// that have ended are done; pieces still under way are killed then.
+/// that have ended are done; pieces still under way are killed then, and where one meets a
+/// SystemFault (files.h), which is thrown here.
 ///
 /// Sanitizers reserve the whole address space, so memory limits are not set under them.
 void RunInProcesses(const std::function<std::optional<std::size_t>()>& next, int jobs,

@@ -11,6 +11,7 @@
 #include "harness/json/json_syntax.h"
 #include "harness/json/json_walker.h"
 #include "harness/text/config_error.h"
+#include "harness/text/output_file.h"
 
 namespace loopbench::harness {
 namespace {
@@ -127,6 +128,7 @@ std::string ReadTextFile(const std::filesystem::path& path) {
                             : fmt::format("no such file, seen from {}", here.string()));
   }
   if (std::filesystem::is_directory(status)) fail("it is a folder");
+  NoteInput(path);
   std::ifstream stream(path, std::ios::binary);
   if (!stream) fail("it cannot be opened");
   // Piece by piece up to the limit: a pipe does not tell its size.

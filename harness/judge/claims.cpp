@@ -7,6 +7,7 @@
 #include <limits>
 #include <map>
 #include <numeric>
+#include <set>
 #include <string_view>
 
 #include "harness/judge/rules.h"
@@ -26,7 +27,7 @@ bool IsQuantified(const Check& check) {
 struct Sample {
   std::vector<Record> rows;
   std::vector<double> values;  // finite measures of the runs that count
-  std::size_t failed = 0, unmet = 0, not_finite = 0;
+  std::size_t failed = 0, unmet = 0, missing = 0;
 };
 
 Sample Take(const Check& check, const Selection& selection, std::span<const Record> records) {
@@ -36,18 +37,25 @@ Sample Take(const Check& check, const Selection& selection, std::span<const Reco
       measure == "outcome" ||
       std::ranges::find(check.select, "outcome", &Condition::key) != check.select.end();
   Sample sample;
+  std::vector<const Record*> selected;
+  std::set<std::string> kinds;  // those whose records may have the measure
   for (const Record& record : records) {
-    const bool failed = HasFailed(record) && !examines_outcome;
     if (!Matches(record, selection)) continue;
-    if (record.Find(measure) == nullptr && !failed) continue;
+    selected.push_back(&record);
+    if (record.Find(measure) != nullptr) kinds.insert(record.Text("kind"));
+  }
+  for (const Record* one : selected) {
+    const Record& record = *one;
+    const bool failed = HasFailed(record) && !examines_outcome;
+    if (!kinds.contains(record.Text("kind")) && !failed) continue;
     sample.rows.push_back(record);
     const double value = record.Number(measure);
     if (failed) {
       ++sample.failed;
     } else if (!Matches(record, check.require)) {
       ++sample.unmet;
-    } else if (!check.demand.IsText() && !std::isfinite(value)) {
-      ++sample.not_finite;
+    } else if (check.demand.IsText() ? record.Text(measure).empty() : !std::isfinite(value)) {
+      ++sample.missing;
     }
     if (!failed && std::isfinite(value)) sample.values.push_back(value);
   }
@@ -63,10 +71,13 @@ std::string Defect(const Check& check, const Sample& sample) {
   if (sample.unmet > 0) {
     return fmt::format("{} of {} rows without {}", sample.unmet, rows, ToText(check.require));
   }
-  if (sample.not_finite > 0) {
-    return fmt::format("{} of {} values missing or not finite", sample.not_finite, rows);
-  }
   return "";
+}
+
+// "1 of 2 values missing or not finite", or "": nothing is decided by a sample that lacks some.
+std::string Missing(const Sample& sample) {
+  if (sample.missing == 0) return "";
+  return fmt::format("{} of {} values missing or not finite", sample.missing, sample.rows.size());
 }
 
 double Apply(Statistic statistic, const std::vector<double>& values) {
@@ -170,6 +181,9 @@ CheckResult Evaluate(const Check& check, std::span<const Record> records) {
   const std::string defect = Defect(check, sample);
   result.reason = defect.empty() ? Defect(check, base) : defect;
   result.state = holds && result.reason.empty() ? CheckState::kHolds : CheckState::kFails;
+  for (const Sample* one : {&sample, &base}) {
+    if (uncertain.empty()) uncertain = Missing(*one);
+  }
   if (result.reason.empty() && !uncertain.empty()) {
     result.reason = uncertain;
     result.state = CheckState::kNotMeasured;

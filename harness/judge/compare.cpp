@@ -1,6 +1,7 @@
 #include "harness/judge/compare.h"
 
 #include <fmt/format.h>
+#include <fmt/ranges.h>
 
 #include <algorithm>
 #include <cmath>
@@ -90,6 +91,17 @@ Ruling OfNumbers(const Pair& pair, const CompareOptions& options, Finding* findi
   return base == fresh ? Ruling{} : Ruling{Judgement::kWorse, "must be equal"};
 }
 
+/// Samples of at least three times that do not overlap, with a gap of half of their size: no rank
+/// test of few repetitions can decide among many times, and no noise of one machine is so large.
+bool AreApart(const std::vector<double>& base, const std::vector<double>& fresh) {
+  constexpr std::size_t kFewest = 3;
+  constexpr double kGap = 1.5;
+  if (std::min(base.size(), fresh.size()) < kFewest) return false;
+  const auto [base_least, base_most] = std::ranges::minmax(base);
+  const auto [fresh_least, fresh_most] = std::ranges::minmax(fresh);
+  return fresh_least > kGap * base_most || base_least > kGap * fresh_most;
+}
+
 /// Leaves the unadjusted p of "different by more than the ratio" in the finding; Holm decides.
 void TestTimes(const Pair& pair, const CompareOptions& options, Finding* finding) {
   const std::vector<double>& base = pair.base.Numbers(finding->measure.key);
@@ -105,6 +117,7 @@ void TestTimes(const Pair& pair, const CompareOptions& options, Finding* finding
   const double faster = MannWhitney(base, lifted_fresh).p_greater;
   finding->p = std::min(1.0, 2.0 * std::min(slower, faster));
   finding->least_p = 2.0 * SmallestP(base.size(), fresh.size());
+  finding->is_apart = AreApart(base, fresh);
 }
 
 /// Of a pair of which a side lacks the measure, or holds what it is not made of; nothing when both
@@ -132,7 +145,7 @@ std::optional<Ruling> OfWhatIsMissing(const Pair& pair, const Measure& measure) 
 }
 
 /// Why values that both sides have cannot be compared; "" when they can.
-std::string Obstacle(const Measure& measure, const Pair& pair) {
+std::string ObstacleOf(const Measure& measure, const Pair& pair) {
   if (measure.rule == Rule::kTime && !pair.same_machine) {
     return OriginOf(pair.base).machine.empty() || OriginOf(pair.fresh).machine.empty()
                ? "machine not known"
@@ -163,11 +176,12 @@ Finding Compared(const std::string& one, const Measure& measure, const Pair& pai
   if (const auto missing = OfWhatIsMissing(pair, measure)) {
     finding.base = Shown(pair.base, measure.key);
     finding.fresh = Shown(pair.fresh, measure.key);
+    finding.on_both = false;
     ruling = *missing;
   } else {
     finding.base = pair.base.Text(measure.key);
     finding.fresh = pair.fresh.Text(measure.key);
-    if (const std::string obstacle = Obstacle(measure, pair); !obstacle.empty()) {
+    if (const std::string obstacle = ObstacleOf(measure, pair); !obstacle.empty()) {
       ruling = {Judgement::kNotMeasured, obstacle};
     } else if (is_time) {
       TestTimes(pair, options, &finding);
@@ -197,9 +211,11 @@ void DecideTimes(const CompareOptions& options, std::vector<Finding>* findings) 
     Finding& finding = *times[i];
     finding.p = adjusted[i];
     // medians that are both zero have no ratio, and no difference
-    if (finding.p <= options.alpha && !std::isnan(finding.ratio)) {
+    const bool is_sure = finding.p <= options.alpha;
+    if ((is_sure || finding.is_apart) && !std::isnan(finding.ratio)) {
       finding.judgement = finding.ratio > 1.0 ? Judgement::kWorse : Judgement::kBetter;
-      finding.why = fmt::format("ratio {:.3f}, p {:.2g}", finding.ratio, finding.p);
+      finding.why = is_sure ? fmt::format("ratio {:.3f}, p {:.2g}", finding.ratio, finding.p)
+                            : fmt::format("ratio {:.3f}, samples far apart", finding.ratio);
     } else if (finding.least_p * tests > options.alpha) {
       finding.judgement = Judgement::kNotMeasured;
       finding.why = fmt::format("too few repetitions to decide among {} times", times.size());
@@ -254,11 +270,32 @@ int ComparisonReport::Count(Judgement judgement, std::string_view group) const {
   }));
 }
 
+std::string ComparisonReport::Obstacle(const CompareOptions& options) const {
+  std::vector<std::string> reasons;
+  const auto count = [&reasons](const std::vector<std::string>& cases, const char* what) {
+    if (!cases.empty()) reasons.push_back(fmt::format("{} cases {}", cases.size(), what));
+  };
+  if (!options.subset) count(only_base, "only in BASE");
+  if (!options.added) count(only_fresh, "only in NEW");
+  count(ambiguous, "there more than once");
+  count(other_content, "of other content");
+  std::vector<const Finding*> times;
+  for (const Finding& finding : findings) {
+    if (finding.measure.rule == Rule::kTime && finding.on_both) times.push_back(&finding);
+  }
+  const bool no_time = std::ranges::all_of(
+      times, [](const Finding* finding) { return finding->judgement == Judgement::kNotMeasured; });
+  if (!times.empty() && no_time) {
+    reasons.push_back(fmt::format("{} times not comparable: {}", times.size(), times.front()->why));
+  }
+  const bool is_any = Count(Judgement::kNotMeasured) < static_cast<int>(findings.size());
+  if (reasons.empty() && !is_any) reasons.emplace_back("too little in common");
+  return fmt::format("{}", fmt::join(reasons, "; "));
+}
+
 int ComparisonReport::ExitCode(const CompareOptions& options) const {
   if (Count(Judgement::kWorse) + Count(Judgement::kDifferent) > 0) return 1;
-  const int compared = Count(Judgement::kSame) + Count(Judgement::kBetter);
-  const bool missing = !options.subset && !only_base.empty();
-  return compared == 0 || missing || !ambiguous.empty() || !other_content.empty() ? 2 : 0;
+  return Obstacle(options).empty() ? 0 : 2;
 }
 
 ComparisonReport Compare(const std::vector<Record>& given_base,

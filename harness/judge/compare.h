@@ -28,6 +28,7 @@ struct CompareOptions {
   double alpha = 0.05;              ///< probability of any false alarm among all times
   std::vector<std::string> only;    ///< groups (GroupNames()); empty: all
   bool subset = false;              ///< NEW may lack cases of BASE
+  bool added = false;               ///< NEW may have cases that BASE lacks
   /// Keys by which cases of BASE and NEW meet, whatever else they were run with. Empty: by all keys
   /// and the content.
   std::vector<std::string> match;
@@ -50,8 +51,10 @@ struct Finding {
   std::string base = {}, fresh = {};  ///< as printed: numbers, medians, hashes
   double ratio = std::numeric_limits<double>::quiet_NaN();  ///< new / base, where it says anything
   double p = std::numeric_limits<double>::quiet_NaN();      ///< of times: adjusted by Holm
-  double least_p = 0.0;  ///< of times: the least that samples of their sizes can give, unadjusted
-  std::string why = {};  ///< the rule it broke, or the reason why it was not measured
+  double least_p = 0.0;   ///< of times: the least that samples of their sizes can give, unadjusted
+  bool is_apart = false;  ///< of times: the samples are too far apart for any chance (compare.cpp)
+  bool on_both = true;    ///< both sides have a value of the measure
+  std::string why = {};   ///< the rule it broke, or the reason why it was not measured
 };
 
 struct ComparisonReport {
@@ -66,8 +69,10 @@ struct ComparisonReport {
   std::vector<std::string> other_settings;
 
   int Count(Judgement judgement, std::string_view group = "") const;
-  /// 1: something is worse or different. 2: nothing was measured on both sides, or cases are
-  /// missing (unless options.subset), ambiguous or of other content. 0: the same or better.
+  /// Why the comparison decides nothing, or "": no value was compared, no time of those that both
+  /// sides have, or cases are missing (unless options allow it), ambiguous or of other content.
+  std::string Obstacle(const CompareOptions& options) const;
+  /// 1: something is worse or different. 2: there is an Obstacle(). 0: the same or better.
   int ExitCode(const CompareOptions& options) const;
 };
 

@@ -25,7 +25,7 @@ std::string_view Describe(ValueType type);
 enum class Format {
   kText,        ///< as it is; left-aligned, all others right-aligned
   kInteger,     ///< 1234
-  kShortest,    ///< shortest form that reads back: 1e-06, 10, 0.25
+  kShortest,    ///< 1e-06, 10, 0.25; four digits of a number that has more than six: 0.006325
   kScientific,  ///< three digits: 2.05e-03
   kExponent,    ///< two decimals: 1.97
   kFixed,       ///< one decimal: 113.2

@@ -9,8 +9,8 @@ namespace loopbench::harness {
 /// `object`, a JSON object in one line, with its checksum as last key.
 std::string WithChecksum(std::string object);
 
-/// Throws std::runtime_error naming the checksum found and the one expected when `line` has one
-/// that is not its own, or its own under a damaged name.
-void VerifyChecksum(std::string_view line);
+/// Whether the line ends with its checksum. Throws std::runtime_error naming the checksum found and
+/// the one expected when it ends with another one, or with its own under a damaged name.
+bool VerifyChecksum(std::string_view line);
 
 }  // namespace loopbench::harness

@@ -9,6 +9,7 @@
 #include "harness/record/record_json.h"
 #include "harness/reference/reference.h"
 #include "harness/text/files.h"
+#include "harness/text/output_file.h"
 
 namespace loopbench::harness {
 namespace {
@@ -95,7 +96,11 @@ MergedReferences MergeReferences(const std::vector<fs::path>& store_files) {
 
 void WriteReferences(const MergedReferences& references, const fs::path& store_file) {
   const fs::path folder = ReferencePath(store_file, "").parent_path();
-  for (const auto& [name, text] : references.texts) WriteFileAtomically(folder / name, text);
+  for (const auto& [name, text] : references.texts) {
+    OutputFile file(folder / name, Onto::kAnyFile);
+    file.Write(text);
+    file.Finish();
+  }
 }
 
 }  // namespace loopbench::harness

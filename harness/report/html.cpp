@@ -2,6 +2,12 @@
 
 #include <fmt/format.h>
 
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <utility>
+
+#include "harness/config/formulations.h"
 #include "harness/judge/claims_report.h"
 #include "harness/report/json.h"
 #include "harness/view/html.h"
@@ -10,6 +16,76 @@
 
 namespace loopbench::harness {
 namespace {
+
+using Rgb = std::array<int, 3>;
+
+Rgb Parsed(const std::string& color) {
+  Rgb rgb{};
+  for (std::size_t i = 0; i < rgb.size(); ++i) {
+    rgb[i] = std::stoi(color.substr(1 + 2 * i, 2), nullptr, 16);
+  }
+  return rgb;
+}
+
+/// Contrast of two colours, from 1 to 21 (WCAG 2.1).
+double Contrast(const Rgb& one, const Rgb& other) {
+  const auto luminance = [](const Rgb& rgb) {
+    constexpr std::array kWeights = {0.2126, 0.7152, 0.0722};
+    double sum = 0.05;
+    for (std::size_t i = 0; i < rgb.size(); ++i) {
+      const double v = rgb[i] / 255.0;
+      sum += kWeights[i] * (v <= 0.03928 ? v / 12.92 : std::pow((v + 0.055) / 1.055, 2.4));
+    }
+    return sum;
+  };
+  const double a = luminance(one), b = luminance(other);
+  return std::max(a, b) / std::min(a, b);
+}
+
+/// From `color` in small steps towards `end`, to the first or the last colour whose contrast to
+/// `paper` is at least `least`.
+Rgb Towards(const Rgb& end, const Rgb& color, const Rgb& paper, double least, bool first) {
+  constexpr int kSteps = 64;
+  Rgb found = color;
+  for (int step = 0; step <= kSteps; ++step) {
+    Rgb mixed{};
+    for (std::size_t i = 0; i < mixed.size(); ++i) {
+      mixed[i] = color[i] + (end[i] - color[i]) * step / kSteps;
+    }
+    const bool is_enough = Contrast(mixed, paper) >= least;
+    if (is_enough == first) return first ? mixed : found;
+    found = mixed;
+  }
+  return found;
+}
+
+/// Colours of formulations on light and on dark paper: --look-N in joint coordinates and, nearer to
+/// the paper, --look-N-weak in absolute ones. Graphics need a contrast of 3.
+std::string LookStyle() {
+  constexpr double kStrong = 5.0, kWeak = 3.0;
+  struct Theme {
+    const char* selector;
+    Rgb paper, end;  ///< --paper of web/scene.css, and the end of the scale of greys opposite to it
+  };
+  const Theme themes[] = {{":root", {0xff, 0xff, 0xff}, {0, 0, 0}},
+                          {":root[data-theme='dark']", {0x14, 0x17, 0x1c}, {0xff, 0xff, 0xff}}};
+  std::string style;
+  for (const auto& [selector, paper, end] : themes) {
+    style += fmt::format("{} {{", selector);
+    std::size_t number = 0;
+    for (const FormulationRow& row : Formulations()) {
+      const Rgb strong = Towards(end, Parsed(row.color), paper, kStrong, true);
+      const Rgb weak = Towards(paper, strong, paper, kWeak, false);
+      for (const auto& [ending, rgb] : {std::pair{"", strong}, {"-weak", weak}}) {
+        style += fmt::format(" --look-{}{}: #{:02x}{:02x}{:02x};", number, ending, rgb[0], rgb[1],
+                             rgb[2]);
+      }
+      ++number;
+    }
+    style += " }\n";
+  }
+  return style;
+}
 
 std::string List(const std::vector<std::string>& lines) {
   if (lines.empty()) return "";
@@ -116,6 +192,7 @@ std::string ToHtml(const ReportData& data) {
   const std::string title = EscapeXml(data.store);
   std::string page = PageHead("Report of " + title);
   page += kReportStyle;
+  page += LookStyle();
   page += "</style>\n</head>\n<body>\n";
   page += fmt::format(
       "<header><h1>Report of {}</h1>\n<nav aria-label=\"Sections\">{} <button type=\"button\" "

@@ -73,15 +73,16 @@ std::string TableText(const ReportTable& table) {
       ListOf(table.rows, text("message")), ListOf(table.columns, column));
 }
 
+/// The CSS variables of each formulation's colours in joint and in absolute coordinates
+/// (LookStyle() in html.cpp).
 std::string LooksText() {
-  return "{" + [] {
-    std::string text;
-    for (const FormulationRow& row : Formulations()) {
-      text += fmt::format("{}{}:[{},{}]", text.empty() ? "" : ",", ScriptString(row.name),
-                          ScriptString(row.color), ScriptString(row.color + "80"));
-    }
-    return text;
-  }() + "}";
+  std::string text;
+  std::size_t number = 0;
+  for (const std::string& name : FormulationNames()) {
+    text += fmt::format(R"({0}{1}:["--look-{2}","--look-{2}-weak"])", text.empty() ? "" : ",",
+                        ScriptString(name), number++);
+  }
+  return "{" + text + "}";
 }
 
 std::string DoubtsText() {

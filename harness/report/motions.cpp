@@ -7,7 +7,6 @@
 #include <set>
 #include <stdexcept>
 
-#include "harness/config/mechanism_reader.h"
 #include "harness/reference/reference.h"
 #include "harness/report/decimate.h"
 #include "harness/suite/kept_files.h"
@@ -92,7 +91,7 @@ std::vector<std::string> ReferencesOf(const Work& work) {
 }
 
 void AddPaths(const Work& work, const MechanismDescription& user, ReportScene* scene,
-              std::vector<std::string>* remarks) {
+              std::vector<std::string>* remarks, std::vector<std::string>* changed) {
   std::vector<std::size_t> with_file;
   for (const std::size_t row : work.rows) {
     const auto path = TrajectoryOf(work.records[row], work.store_file);
@@ -129,18 +128,24 @@ void AddPaths(const Work& work, const MechanismDescription& user, ReportScene* s
   for (const std::size_t row : with_file) {
     try {
       const double count = work.records[row].Number("trajectory_rows");
-      ReportPath path = PathOf(TrajectoryOf(work.records[row], work.store_file), user,
-                               count > 0 ? static_cast<std::size_t>(count) : most, most);
+      const auto file = TrajectoryOf(work.records[row], work.store_file);
+      VerifyTrajectory(work.records[row], file);
+      ReportPath path =
+          PathOf(file, user, count > 0 ? static_cast<std::size_t>(count) : most, most);
       path.label = work.names[row];
       path.row = row;
       add(std::move(path), work.names[row]);
+    } catch (const ChangedFile& error) {
+      changed->emplace_back(error.what());
+      fail(work.names[row], error);
     } catch (const std::runtime_error& error) {
       fail(work.names[row], error);
     }
   }
 }
 
-void Fill(const Work& work, ReportScene* scene, std::vector<std::string>* remarks) {
+void Fill(const Work& work, ReportScene* scene, std::vector<std::string>* remarks,
+          std::vector<std::string>* changed) {
   const auto file = MechanismOf(work.records[work.rows.front()], work.store_file);
   if (file.empty() || !std::filesystem::exists(file)) {
     scene->missing =
@@ -149,10 +154,14 @@ void Fill(const Work& work, ReportScene* scene, std::vector<std::string>* remark
     return;
   }
   try {
-    const MechanismDescription user = ReadMechanism(file).description;
+    const MechanismDescription user = ReadKeptMechanism(file);
     scene->picture = MakePicture(user, "mechanisms/" + file.filename().string());
     scene->picture->motions.clear();  // those of degrees of freedom are for `view`
-    AddPaths(work, user, scene, remarks);
+    AddPaths(work, user, scene, remarks, changed);
+  } catch (const ChangedFile& error) {
+    changed->emplace_back(error.what());
+    scene->missing = error.what();
+    return;
   } catch (const std::exception& error) {
     scene->missing = error.what();
     return;
@@ -170,7 +179,8 @@ std::vector<ReportScene> FindScenes(const std::vector<Record>& rows,
                                     const std::vector<std::string>& names,
                                     const std::vector<std::string>& scenes,
                                     const std::filesystem::path& store_file,
-                                    std::vector<std::string>* remarks) {
+                                    std::vector<std::string>* remarks,
+                                    std::vector<std::string>* changed) {
   std::vector<ReportScene> found;
   std::vector<std::vector<std::size_t>> members;
   for (std::size_t row = 0; row < rows.size(); ++row) {
@@ -191,7 +201,7 @@ std::vector<ReportScene> FindScenes(const std::vector<Record>& rows,
           kMostScenes);
       continue;
     }
-    Fill({rows, names, store_file, members[i], kMostPlaces / shown}, &found[i], remarks);
+    Fill({rows, names, store_file, members[i], kMostPlaces / shown}, &found[i], remarks, changed);
   }
   return found;
 }

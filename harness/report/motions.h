@@ -30,12 +30,14 @@ struct ReportScene {
       {};  ///< why there is no motion, and what to write into the experiment; or empty
 };
 
-/// Scenes in the order of the rows, whose names and scenes are given beside them.
+/// Scenes in the order of the rows, whose names and scenes are given beside them. `changed` gets
+/// the messages of files that are not as their run wrote them.
 std::vector<ReportScene> FindScenes(const std::vector<Record>& rows,
                                     const std::vector<std::string>& names,
                                     const std::vector<std::string>& scenes,
                                     const std::filesystem::path& store_file,
-                                    std::vector<std::string>* remarks);
+                                    std::vector<std::string>* remarks,
+                                    std::vector<std::string>* changed);
 
 /// Above so many scenes none is drawn any more, above so many motions none of a scene; and places
 /// of bodies in all motions of a page.

@@ -227,8 +227,8 @@ ReportData MakeReport(const std::vector<Record>& records, const ReportOptions& o
   data.findings = FindingsOf(runs, data.doubts);
   AddPlots(runs, options, &data);
   data.costs = MakeCosts(records, store, &data.remarks);
-  data.scenes =
-      FindScenes(runs.rows, runs.names, runs.scenes, StoreFile(options.store), &data.remarks);
+  data.scenes = FindScenes(runs.rows, runs.names, runs.scenes, StoreFile(options.store),
+                           &data.remarks, &data.changed);
   return data;
 }
 

@@ -75,6 +75,7 @@ struct ReportData {
   std::optional<FailureMap> map = {};
   std::vector<ReportScene> scenes = {};
   std::vector<std::string> remarks = {};     ///< what was decimated or left out
+  std::vector<std::string> changed = {};     ///< files of the store that no run wrote so
   std::vector<std::string> origins = {};     ///< of the records: machine, compiler, commit, ...
   std::vector<std::string> provenance = {};  ///< of the page
   std::string map_command = {}, claims_command = {}, plot_command = {};

@@ -198,8 +198,8 @@ class Runner {
              : harness::Integrate(*formulation, 0.0, case_.horizon, y_, options, observe,
                                   dense.times.empty() ? nullptr : &dense);
     y_.resize(n);
-    if (run.outcome == Outcome::kSingular) {
-      const std::string why = formulation->solver().WhySingular();
+    if (run.outcome != Outcome::kFinished) {
+      const std::string why = formulation->Why();
       if (!why.empty()) run.message += ": " + why;
     }
     if (!IsMember() && run.outcome == Outcome::kFinished &&

@@ -142,9 +142,11 @@ MergedStores::MergedStores(const std::vector<std::filesystem::path>& stores,
     std::vector<std::string> warnings;
     ForEachRecord(stores[part], take, &warnings);
     if (!warnings.empty()) {
-      throw std::runtime_error(fmt::format(
-          "{}\n{} was interrupted: give its command again, which completes it, and merge then",
-          warnings.front(), stores[part].string()));
+      throw std::runtime_error(
+          fmt::format("{}\n{}: expected a store as a run leaves it; if the run was interrupted, "
+                      "give its command "
+                      "again, which completes it, and merge then",
+                      warnings.front(), stores[part].string()));
     }
   }
   for (const std::string& id : order) {

@@ -8,6 +8,7 @@
 #include "harness/record/record_json.h"
 #include "harness/store/store_lock.h"
 #include "harness/text/files.h"
+#include "harness/text/output_file.h"
 
 namespace loopbench::harness {
 namespace {
@@ -22,15 +23,6 @@ fs::path FirstMissingAbove(const fs::path& file) {
     missing = folder;
   }
   return missing;
-}
-
-/// What a link leads to, whether that is there or not: a link stays one.
-fs::path BehindLinks(fs::path file) {
-  constexpr int kMostLinks = 40;  // as the system has it
-  for (int i = 0; i < kMostLinks && fs::is_symlink(fs::symlink_status(file)); ++i) {
-    file = file.parent_path() / fs::read_symlink(file);
-  }
-  return file;
 }
 
 /// Throws where it is a link that leads in a circle, or into a folder that is not there: its disk

@@ -10,6 +10,7 @@
 #include "harness/record/record_json.h"
 #include "harness/store/result_store.h"
 #include "harness/text/files.h"
+#include "harness/text/output_file.h"
 
 namespace loopbench::harness {
 
@@ -43,8 +44,9 @@ void LineReader::TakeLine(std::string_view line) {
   const LinePlace place{offset_, line.size()};
   if (line.empty() || line == "\r" || (wanted_ && !wanted_(line, place))) return;
   Record record;
+  bool is_unsealed = false;
   try {
-    record = FromJsonLine(line);
+    record = FromJsonLine(line, &is_unsealed);
   } catch (const std::runtime_error& error) {
     const std::string message =
         fmt::format("{}:{}: {}: '{}'", file_.string(), number_, error.what(), Excerpt(line));
@@ -52,7 +54,16 @@ void LineReader::TakeLine(std::string_view line) {
     warning_ = message + " (torn last line, skipped)";
     return;
   }
+  if (is_unsealed && ++unsealed_ == 1) first_unsealed_ = number_;
   take_(std::move(record), place);
+}
+
+std::string LineReader::Unsealed() const {
+  if (unsealed_ == 0) return "";
+  return fmt::format(
+      "{}:{}: found a line without its checksum, expected one: it may have been changed ({} such "
+      "lines)",
+      file_.string(), first_unsealed_, unsealed_);
 }
 
 void ForEachRecord(const std::filesystem::path& path, const LineReader::Take& take,
@@ -62,6 +73,7 @@ void ForEachRecord(const std::filesystem::path& path, const LineReader::Take& ta
   if (!IsLarge(file)) {
     reader.Feed(ReadFile(file));
   } else {
+    NoteInput(file);
     std::ifstream in(file, std::ios::binary);
     std::string block(std::size_t{4} << 20, '\0');
     while (in.read(block.data(), static_cast<std::streamsize>(block.size())) || in.gcount() > 0) {
@@ -70,7 +82,9 @@ void ForEachRecord(const std::filesystem::path& path, const LineReader::Take& ta
     if (!in.eof()) FailOn("read", file);
   }
   reader.End();
-  if (warnings != nullptr && !reader.warning().empty()) warnings->push_back(reader.warning());
+  for (const std::string& warning : {reader.warning(), reader.Unsealed()}) {
+    if (warnings != nullptr && !warning.empty()) warnings->push_back(warning);
+  }
 }
 
 }  // namespace loopbench::harness

@@ -38,6 +38,8 @@ class LineReader {
   void End();
 
   const std::string& warning() const { return warning_; }
+  /// Of lines whose checksum is missing, or "".
+  std::string Unsealed() const;
   std::uint64_t whole() const { return offset_; }  ///< bytes before a torn last line
   bool is_ended() const { return is_ended_; }      ///< the last record has its line end
 
@@ -50,12 +52,13 @@ class LineReader {
   std::string rest_, warning_;  ///< rest_: a line that has begun
   std::uint64_t offset_ = 0;    ///< of the line that is taken
   int number_;
+  int unsealed_ = 0, first_unsealed_ = 0;  ///< lines without a checksum; number of the first
   bool is_ended_ = true;
 };
 
 /// All of a store's, in its order, never more than a few megabytes at once. `path` as for
 /// ResultStore. Throws as LineReader does, and when the file cannot be read; a torn last line is
-/// told in `warnings` (when given).
+/// told in `warnings` (when given), and lines whose checksum is missing.
 void ForEachRecord(const std::filesystem::path& path, const LineReader::Take& take,
                    std::vector<std::string>* warnings, const LineReader::Wanted& wanted = {});
 

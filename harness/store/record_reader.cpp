@@ -39,6 +39,7 @@ class RecordReader final : public nlohmann::json_sax<LineJson> {
   const std::string& error() const { return error_; }
   /// Nothing is wrong but that it stops too early.
   bool ends_early() const { return ends_early_; }
+  bool Has(const std::string& key) const { return keys_.contains(key); }
   Record Take() { return std::move(record_); }
 
   bool null() override {
@@ -153,14 +154,20 @@ class RecordReader final : public nlohmann::json_sax<LineJson> {
 
 }  // namespace
 
-Record FromJsonLine(std::string_view line) {
+Record FromJsonLine(std::string_view line, bool* is_unsealed) {
   if (line.ends_with('\r')) line.remove_suffix(1);
-  VerifyChecksum(line);
+  const bool is_sealed = VerifyChecksum(line);
   if (const std::string fault = EncodingFault(line); !fault.empty()) {
     throw std::runtime_error("column " + fault.substr(fault.find(':') + 1));
   }
   RecordReader reader(line);
   if (!reader.error().empty()) throw std::runtime_error(reader.error());
+  if (!is_sealed && reader.Has("checksum")) {
+    throw std::runtime_error(
+        "the line was changed after it was written: found a checksum that does not end the line as "
+        "it was written, expected ,\"checksum\":\"...\"} without blanks");
+  }
+  if (is_unsealed != nullptr) *is_unsealed = !is_sealed && reader.Has("format");
   return reader.Take();
 }
 

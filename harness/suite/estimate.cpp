@@ -62,8 +62,9 @@ Rate Next(const Rate& before, const Spent& spent) {
 
 }  // namespace
 
-Estimate::Estimate(const std::vector<Experiment>& experiments, const Budget& budget)
-    : experiments_(experiments), budget_(budget) {}
+Estimate::Estimate(const std::vector<Experiment>& experiments, const Budget& budget,
+                   const Selection& filter)
+    : experiments_(experiments), budget_(budget), filter_(filter) {}
 
 Estimate::~Estimate() = default;
 
@@ -73,6 +74,19 @@ std::size_t Estimate::Nearest(std::size_t experiment) const {
   const double step = static_cast<double>(count - 1) / (kCombinations - 1);
   return static_cast<std::size_t>(
       std::round(std::round(static_cast<double>(experiment) / step) * step));
+}
+
+/// The finest and the loosest tolerance of the cases that pass the filter; {1, 0} without any.
+const std::pair<double, double>& Estimate::Tolerances(std::size_t experiment) {
+  const auto [known, is_new] = tolerances_.try_emplace(experiment, 1.0, 0.0);
+  if (!is_new) return known->second;
+  auto& [fine, loose] = known->second;
+  for (const Case& one : Expand(experiments_[experiment])) {
+    if (one.step > 0.0 || !Matches(one.keys, filter_)) continue;
+    fine = std::min(fine, one.rtol);
+    loose = std::max(loose, one.rtol);
+  }
+  return known->second;
 }
 
 /// @param times  how often the piece does what the pilot does once
@@ -173,12 +187,13 @@ const Rate* Estimate::RateOfCase(std::size_t experiment, const Case& one, double
                LimitsOfRuns(one.limits, one.column.threads), NumberOfRuns(one), run);
 }
 
-double Estimate::OfCase(std::size_t experiment, const Case& one) {
+double Estimate::OfCase(std::size_t experiment, const Case& one, double simulations) {
   const std::size_t near = Nearest(experiment);
   const Experiment& like = experiments_[near];
   const double part = one.horizon / Longest(like, std::min(one.scene, like.scenes.size() - 1));
   const auto total = [&](const Rate& rate, double scale) {
     const double running = rate.Running(part) * scale;
+    if (simulations > 0.0) return rate.fixed_s + simulations * std::min(running, one.limits.cpu_s);
     const double runs = 1.0 + (NumberOfRuns(one) - 1.0) * rate.member;
     return rate.process_s + runs * (rate.fixed_s + std::min(running, one.limits.cpu_s));
   };
@@ -186,10 +201,10 @@ double Estimate::OfCase(std::size_t experiment, const Case& one) {
     const Rate* rate = RateOfCase(near, one, 0.0);
     return rate == nullptr ? kUnknown : total(*rate, std::ranges::max(like.fixed_steps) / one.step);
   }
-  const auto [fine, loose] =
-      like.tolerances.empty()  // then it is that of the timings
-          ? std::pair(one.rtol, one.rtol)
-          : std::pair(std::ranges::min(like.tolerances), std::ranges::max(like.tolerances));
+  const auto& range = Tolerances(near);
+  const auto [fine, loose] = range.first > range.second  // then it is that of the timings
+                                 ? std::pair(one.rtol, one.rtol)
+                                 : range;
   const Rate* at_loose = RateOfCase(near, one, loose);
   if (at_loose == nullptr) return kUnknown;
   const double usual = std::pow(one.rtol / loose, -0.2);  // of methods of order 5
@@ -260,32 +275,37 @@ double Estimate::OfLadder(std::size_t experiment, const LadderGroup& group) {
                          : rate->fixed_s + std::min(rate->Running(1.0), runs * own.limits.cpu_s);
 }
 
+/// Simulations are those of the accuracy runs; right-hand sides of families have pilots of one
+/// batch.
 double Estimate::OfTiming(std::size_t experiment, const TimingGroup& group) {
   const Experiment& own = experiments_[experiment];
-  const double runs = own.timing.repeats + 1.0;  // the first one warms up
-  const auto run = [&](double fraction) -> Spent {
-    Experiment once = own;
-    once.timing.repeats = 1;
-    TimingGroup part = group;
-    for (Case& one : part.cases) one.horizon *= fraction;
-    const CpuLimit all(budget_.most_s);
-    double each = 0.0;
-    const std::vector<Record> records = TimeTogether(once, part);
-    for (const Record& record : records) {
-      // the first column is timed twice (noise.h)
-      const double wall = record.Number("wall_s_median");
-      if (!std::isnan(wall)) each += (&record == &records.front() ? 2.0 : 1.0) * wall;
-    }
-    return {.all_s = all.cpu_s(),
-            // of CPU time like the rest, whatever else the machine does
-            .running_s = 2.0 * each * all.cpu_s() / all.wall_s(),
-            .reached = group.simulate ? fraction : 1.0,
-            .failed = !group.simulate};
+  const auto sum = [](const auto& rows, const auto& seconds) {
+    double all = seconds(rows.front());  // the first column is timed twice (noise.h)
+    for (const auto& row : rows) all += seconds(row);
+    return all;
   };
-  const Rate* rate = Known(
-      "timing/" + group.cases.front().keys.Text("case_id"), group.name,
-      LimitsOfRuns(own.limits, 2.0 * static_cast<double>(group.cases.size() + 1)), runs / 2.0, run);
-  return rate == nullptr ? kUnknown : rate->fixed_s + 0.5 * runs * rate->Running(1.0);
+  if (group.simulate) {
+    return sum(group.cases, [&](const Case& one) {
+      const double runs = own.timing.repeats + 1.0;  // the first one warms up
+      return OfCase(experiment, one, runs) + kBatches * kBatchSeconds;
+    });
+  }
+  const auto run = [&](double) -> Spent {
+    const CpuLimit all(budget_.most_s);
+    const std::vector<Record> records = TimeTogether(own, group, 1);
+    return {.all_s = all.cpu_s(),
+            .running_s = sum(records,
+                             [](const Record& record) {
+                               const double rhs_s = 1e-9 * record.Number("rhs_ns_median");
+                               return kBatches *
+                                      (rhs_s > 0.0 ? std::max(kBatchSeconds, 4.0 * rhs_s) : 0.0);
+                             }),
+            .failed = true};
+  };
+  const Rate* rate =
+      Known("timing/" + group.cases.front().keys.Text("case_id"), group.name,
+            LimitsOfRuns(own.limits, 2.0 * static_cast<double>(group.cases.size() + 1)), 1.0, run);
+  return rate == nullptr ? kUnknown : rate->fixed_s + rate->Running(1.0);
 }
 
 }  // namespace loopbench::harness

@@ -8,6 +8,7 @@
 #include <map>
 #include <memory>
 #include <string>
+#include <utility>
 #include <vector>
 
 #include "harness/config/experiment.h"
@@ -53,13 +54,14 @@ class Estimate {
     double usual_s = 4.0;  ///< of all pilots [s]: beyond it each may take less than most_s
     double all_s = 1e9;    ///< wall time of all pilots [s]; what is asked for later is not known
   };
-  /// `experiments` must outlive this.
-  Estimate(const std::vector<Experiment>& experiments, const Budget& budget);
+  /// `experiments` must outlive this. Pilots are of tolerances at which a case passes `filter`.
+  Estimate(const std::vector<Experiment>& experiments, const Budget& budget,
+           const Selection& filter = {});
   ~Estimate();
 
   /// CPU time of a piece of the experiment [s], NaN where it is not known. Of a case: of its
-  /// unperturbed run and its ensemble.
-  double OfCase(std::size_t experiment, const Case& one);
+  /// unperturbed run and its ensemble; or, if it is to be timed, of `simulations` in one process.
+  double OfCase(std::size_t experiment, const Case& one, double simulations = 0.0);
   double OfReference(std::size_t experiment, const ReferenceCase& one);
   double OfLadder(std::size_t experiment, const LadderGroup& group);
   double OfTiming(std::size_t experiment, const TimingGroup& group);
@@ -71,6 +73,7 @@ class Estimate {
  private:
   struct Spent;
   std::size_t Nearest(std::size_t experiment) const;
+  const std::pair<double, double>& Tolerances(std::size_t experiment);
   const Rate* Known(const std::string& key, const std::string& name, const ProcessLimits& limits,
                     double times, const std::function<Spent(double fraction)>& work);
   std::filesystem::path PlaceForRows();
@@ -78,6 +81,8 @@ class Estimate {
 
   const std::vector<Experiment>& experiments_;
   Budget budget_;
+  Selection filter_;
+  std::map<std::size_t, std::pair<double, double>> tolerances_;  ///< the finest and the loosest
   double spent_s_ = 0.0;
   std::unique_ptr<TemporaryFolder> written_;  ///< for trajectories of pilots
   std::map<std::string, Rate> rates_;

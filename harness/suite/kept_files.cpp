@@ -1,10 +1,16 @@
 #include "harness/suite/kept_files.h"
 
+#include <fmt/format.h>
+
+#include <string_view>
+
+#include "harness/config/mechanism_reader.h"
 #include "harness/config/mechanism_writer.h"
 #include "harness/reference/reference.h"
 #include "harness/text/config_error.h"
 #include "harness/text/files.h"
 #include "harness/text/hash.h"
+#include "harness/trajectory/store_files.h"
 
 namespace loopbench::harness {
 namespace {
@@ -19,7 +25,29 @@ std::filesystem::path MechanismPath(const std::filesystem::path& store_file,
   return store_file.parent_path() / "mechanisms" / (scene_id + ".json");
 }
 
+/// In the comment of a file stands the hash of all its bytes, with zeros in the place of the hash.
+constexpr std::string_view kChecksum = "Kept by a run; checksum ", kZeros = "0000000000000000";
+
+std::string WithOwnHash(std::string text) {
+  const std::size_t at = text.find(kChecksum);
+  if (at == std::string::npos) return text;  // of version 1.0
+  text.replace(at + kChecksum.size(), kZeros.size(), kZeros);
+  return text.replace(at + kChecksum.size(), kZeros.size(), Fnv1a(text));
+}
+
+bool IsAsWritten(const std::string& text) { return WithOwnHash(text) == text; }
+
 }  // namespace
+
+MechanismDescription ReadKeptMechanism(const std::filesystem::path& file) {
+  if (!IsAsWritten(ReadFile(file))) {
+    throw ChangedFile(fmt::format(
+        "{}: the file was changed after its run wrote it: its checksum is not that of the file; "
+        "remove it: the same run writes it again",
+        file.string()));
+  }
+  return ReadMechanism(file).description;
+}
 
 std::filesystem::path MechanismOf(const Record& record, const std::filesystem::path& store_file) {
   const std::string id = record.Text("scene_id");
@@ -39,8 +67,9 @@ void KeepMechanisms(const std::vector<Experiment>& experiments,
       const auto path = MechanismPath(store_file, Fnv1a(scene.mechanism.canonical));
       if (std::filesystem::exists(path)) continue;
       try {
-        WriteFileAtomically(path,
-                            MechanismText(scene.mechanism.description, scene.mechanism.observe));
+        WriteFileAtomically(
+            path, WithOwnHash(MechanismText(scene.mechanism.description, scene.mechanism.observe,
+                                            fmt::format("{}{}.", kChecksum, kZeros))));
       } catch (const ConfigError&) {
       }
     }
@@ -56,7 +85,9 @@ void CopyMechanisms(const std::vector<Record>& records,
     for (const std::filesystem::path& store : stores) {
       const std::filesystem::path from = MechanismOf(record, store);
       if (!std::filesystem::exists(from)) continue;
-      WriteFileAtomically(to, ReadFile(from));
+      const std::string text = ReadFile(from);
+      if (!IsAsWritten(text)) continue;
+      WriteFileAtomically(to, text);
       break;
     }
   }

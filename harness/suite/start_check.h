@@ -9,13 +9,18 @@
 
 namespace loopbench::harness {
 
-/// "" if the loops of the mechanism can be closed from its initial data, else what was found and
-/// expected. Assembled in a child process; one that the limits cut off says so.
-std::string StartFault(const MechanismDescription& description, const ProcessLimits& limits);
+/// Sentences about starts: faults of those that cannot be assembled, what was found and expected,
+/// and guesses that are missed.
+struct StartReport {
+  std::vector<std::string> faults, warnings;
+};
+
+/// Assembles the mechanism in a child process; limits that cut it off are a fault.
+StartReport CheckStart(const MechanismDescription& description, const ProcessLimits& limits);
 
 /// The same for the scenes of an experiment's combinations as they are run, under the limits of
-/// their cases: a sentence for each scene, of the first combination that has any fault. Scenes that
-/// combinations share are assembled once; members of ensembles are not looked at.
-std::vector<std::string> StartFaults(const std::vector<Experiment>& experiments);
+/// their cases, up to the first combination that has any fault. Scenes that combinations share are
+/// assembled once; members of ensembles are not looked at.
+StartReport CheckStarts(const std::vector<Experiment>& experiments);
 
 }  // namespace loopbench::harness

@@ -64,7 +64,7 @@ class Group {
         options_(options),
         runner_(runner),
         store_(store),
-        estimate_(experiments_, ForProgress(pilots_s)) {}
+        estimate_(experiments_, ForProgress(pilots_s), options.filter) {}
 
   /// Each runs all of its kind and returns how many of their records are of runs that did not
   /// finish.
@@ -107,7 +107,9 @@ class Group {
 
   std::size_t Timings() {
     std::vector<std::vector<TimingGroup>> groups;  // pieces refer to them
-    for (const Experiment& experiment : experiments_) groups.push_back(TimingGroups(experiment));
+    for (const Experiment& experiment : experiments_) {
+      groups.push_back(TimingGroups(experiment, options_.filter));
+    }
     for (std::size_t e = 0; e < experiments_.size(); ++e) {
       for (const TimingGroup& group : groups[e]) {
         Add(e, TimingPiece(experiments_[e], group),

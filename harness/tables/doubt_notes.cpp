@@ -24,20 +24,31 @@ struct Reason {
 };
 
 const Reason kReasons[] = {
-    {kEnergyDoubt, "error of the energy balance above 1 % of the energy that moves",
-     [](const Record& row) { return fmt::format("{:.2g} %", 100 * EnergyErrorShare(row)); }},
+    {kEnergyDoubt,
+     "error of the energy balance above 1 % of the energy that moves, or more than steps and "
+     "tolerance explain",
+     [](const Record& row) {
+       return fmt::format("{:.2g} %, at most {:.2g} % expected", 100 * EnergyErrorShare(row),
+                          100 * ExpectedEnergyShare(row));
+     }},
     {kSingularDoubt,
      "passes singular positions, where this level has nothing to keep the branch by",
      [](const Record& row) {
        return fmt::format("distance {:.1g} at {:.4g} s", row.Number("singularity_distance_min"),
                           row.Number("singularity_distance_min_t"));
      }},
+    {kSoftenedDoubt, "constraints were softened away from singular positions",
+     [](const Record& row) {
+       return fmt::format("{} of {} evaluations, distance {:.1g}", row.Text("softened_evaluations"),
+                          row.Text("rhs_evaluations"), row.Number("singularity_distance_min"));
+     }},
     {kDriftDoubt, "more drift than steps and tolerance explain at this level",
      [](const Record& row) {
        return fmt::format("{:.1e} of a link or rad, at most {:.1e} expected", DriftShare(row),
                           PromisedDriftShare(row));
      }},
-    {kErrorDoubt, "further from the reference than 1000 tolerances",
+    {kErrorDoubt,
+     "further from the reference than 1000 tolerances, or with fixed steps than 1 % of a link",
      [](const Record& row) {
        const bool only_points = row.Text("reference") != kPublished;
        return fmt::format("{:.1e} of a link{}", TrueErrorShare(row), only_points ? "" : " or rad");
@@ -86,9 +97,15 @@ SceneKey SceneOf(const Record& record) {
   return {record.Text("scene_id"), {record.Number("horizon"), record.Number("rtol")}};
 }
 
-std::string NameOfScene(const Record& record) {
-  return fmt::format("{}: {} rtol {} horizon {}", kDisagreementDoubt, record.Text("mechanism"),
-                     record.Text("rtol"), record.Text("horizon"));
+/// The name has the parameters in which `records`, those of the store, differ.
+std::string NameOfScene(const Record& record, std::span<const Record> records) {
+  std::vector<std::string> keys = {"rtol", "horizon"};
+  const std::vector<std::string> telling = TellingKeys(records);
+  for (const TableColumn& parameter : WithParameters({}, records)) {
+    if (std::ranges::find(telling, parameter.key) != telling.end()) keys.push_back(parameter.key);
+  }
+  return fmt::format("{}: {} {}", kDisagreementDoubt, record.Text("mechanism"),
+                     NameOfRow(record, keys));
 }
 
 // What decides about runs that end differently (harness/analysis/agreement.h).
@@ -101,20 +118,17 @@ std::string Deciding(const std::vector<Record>& runs) {
 }
 
 // Which of the runs agree with each other; `runs` have a cluster each.
-std::string NoteOfScene(const std::vector<Record>& runs) {
+std::string NoteOfScene(const std::vector<Record>& runs, std::span<const Record> records) {
   const std::string deciding = Deciding(runs);
   const std::vector<std::string> keys = TellingKeys(runs);
   std::map<std::int64_t, std::vector<Record>> clusters;
   for (const Record& run : runs) {
     clusters[static_cast<std::int64_t>(run.Number("agreement"))].push_back(run);
   }
-  PoseDifference worst;
   std::string text, alone;
   for (const auto& [number, members] : clusters) {
     std::vector<std::string> names;
     for (const Record& run : members) names.push_back(NameOfRow(run, keys));
-    const PoseDifference off = DifferenceOf(clusters.begin()->second.front(), members.front());
-    if (off.largest > worst.largest) worst = off;
     const bool cleared = !HasDoubt(members.front(), kDisagreementDoubt);
     if (members.size() > 1) {
       text += fmt::format("; {} agree{}", fmt::join(names, ", "),
@@ -125,8 +139,9 @@ std::string NoteOfScene(const std::vector<Record>& runs) {
     }
   }
   text += alone;
-  const std::string scene = NameOfScene(runs.front());
+  const std::string scene = NameOfScene(runs.front(), records);
   if (clusters.size() == 1) return scene + " does not end as with " + deciding + text;
+  const PoseDifference worst = LargestDifference(runs);
   return fmt::format(
       "{} ends {:.2g} links or rad apart ({}), {:.0f} tolerances are expected at most{}", scene,
       worst.largest, worst.body, kMostTolerances, text);
@@ -148,12 +163,12 @@ std::vector<std::string> TellingKeys(std::span<const Record> rows) {
 std::string NameOfRow(const Record& row, const std::vector<std::string>& keys) {
   std::string words, numbers;
   for (const std::string& key : keys) {
-    const Value* value = row.Find(key);
-    if (value == nullptr) continue;
-    if (std::holds_alternative<std::string>(*value)) {
-      words += (words.empty() ? "" : "/") + row.Text(key);
+    const std::string text = Cell(row, {.key = key, .header = "", .format = Format::kShortest});
+    if (text.empty()) continue;
+    if (std::holds_alternative<std::string>(*row.Find(key))) {
+      words += (words.empty() ? "" : "/") + text;
     } else {
-      numbers += fmt::format("{}{} {}", numbers.empty() ? "" : " ", key, row.Text(key));
+      numbers += fmt::format("{}{} {}", numbers.empty() ? "" : " ", key, text);
     }
   }
   const std::string name = words + (words.empty() || numbers.empty() ? "" : " ") + numbers;
@@ -169,7 +184,7 @@ std::vector<std::pair<std::string, std::string>> MeaningsOfDoubts() {
 
 std::vector<std::string> DoubtNotes(std::span<const Record> rows, std::span<const Record> records) {
   if (std::ranges::none_of(rows, [](const Record& row) { return HasDoubt(row); })) return {};
-  std::vector<std::string> notes = {"ok? marks runs that finished, but (column doubts):"};
+  std::vector<std::string> notes = {"doubtful runs finished, but (column doubts):"};
   const std::vector<std::string> keys = TellingKeys(rows);
   for (const Reason& reason : kReasons) {
     if (const std::string note = NoteOf(reason, rows, keys); !note.empty()) notes.push_back(note);
@@ -186,12 +201,12 @@ std::vector<std::string> DoubtNotes(std::span<const Record> rows, std::span<cons
     });
     // a run with nobody beside it at its own tolerance has no cluster
     if (!runs.empty()) {
-      notes.push_back(NoteOfScene(runs));
+      notes.push_back(NoteOfScene(runs, records));
       continue;
     }
     const auto alone =
         std::ranges::find_if(rows, [&](const Record& row) { return SceneOf(row) == scenes[i]; });
-    notes.push_back(NameOfScene(*alone) + " does not end as with finer tolerances");
+    notes.push_back(NameOfScene(*alone, records) + " does not end as with finer tolerances");
   }
   if (scenes.size() > kScenesNamed) {
     notes.push_back(fmt::format("{}: {} scenes more; column agreement has the sets that agree",

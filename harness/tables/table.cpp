@@ -29,7 +29,7 @@ std::string FormatNumber(double number, Format format) {
     case Format::kShortest:
       break;
   }
-  return fmt::format("{}", number);
+  return NumberCell(number);
 }
 
 // Every digit, for CSV: absent and NaN values are empty as in the other writers.
@@ -51,6 +51,21 @@ std::string FullPrecision(const Record& row, const std::string& key) {
 
 }  // namespace
 
+std::string NumberCell(double number) {
+  // a number with more digits than people write is a computed one
+  const std::string text = fmt::format("{}", number);
+  const std::size_t first = std::min(text.find_first_not_of("-0."), text.size());
+  constexpr int kWritten = 6, kLeast = 4;
+  const auto digits = std::count_if(
+      text.begin() + static_cast<std::ptrdiff_t>(first),
+      text.begin() + static_cast<std::ptrdiff_t>(std::min(text.find('e'), text.size())),
+      [](char c) { return c != '.'; });
+  if (digits <= kWritten) return text;
+  const double size = std::abs(number);
+  const int before_point = size < 1e15 && size >= 1.0 ? static_cast<int>(std::log10(size)) + 1 : 0;
+  return fmt::format("{:.{}g}", number, std::max(kLeast, before_point));
+}
+
 bool IsDoubtful(const Record& row, const std::string& key) {
   const Value* value = row.Find(key);
   if (value == nullptr || std::holds_alternative<std::monostate>(*value)) return false;
@@ -64,8 +79,9 @@ bool IsDoubtful(const Record& row, const std::string& key) {
 
 std::string Cell(const Record& row, const TableColumn& column) {
   const Value* value = row.Find(column.key);
-  if (value == nullptr) return "";
-  const char* mark = IsDoubtful(row, column.key) ? "?" : "";
+  std::string mark = value != nullptr && IsDoubtful(row, column.key) ? "?" : "";
+  if (column.marks_doubts && IsDoubtful(row, "outcome")) mark += '*';
+  if (value == nullptr) return mark;
   if (const auto* number = std::get_if<double>(value)) {
     return FormatNumber(*number, column.format) + mark;
   }

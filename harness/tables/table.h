@@ -22,6 +22,7 @@ struct TableColumn {
   /// Where a terminal is too narrow the least goes first, of equals the one furthest to the right.
   int importance = 0;
   std::size_t most_cells = 0;  ///< a text is broken into lines of so many cells; 0: it is not
+  bool marks_doubts = false;   ///< '*' behind the cells of doubtful runs
 };
 
 /// Red for the outcome of a run that failed, yellow for one with doubts.
@@ -62,11 +63,13 @@ bool HasFailed(const Record& row);
 /// corrections come from one run, which resolves none.
 bool IsDoubtful(const Record& row, const std::string& key);
 
-/// The cell as the text, Markdown and LaTeX writers print it, with '?' behind what is doubtful:
-/// such a value must not look like one that is, whichever columns are chosen. Absent and NaN values
-/// are empty, never zero; a value that is not a number is printed as it is, whatever the format; a
-/// series joins its numbers with ';'.
+/// The cell as the text, Markdown and LaTeX writers print it, with '?' behind a doubtful value,
+/// which must not look like a sound one. Absent and NaN values are empty, never zero; a value that
+/// is not a number is printed as it is, whatever the format; a series joins its numbers with ';'.
 std::string Cell(const Record& row, const TableColumn& column);
+
+/// A number as tables for people have it (Format::kShortest).
+std::string NumberCell(double number);
 
 /// The columns under a group's heading: without the group's key, which stands there.
 std::vector<TableColumn> ColumnsUnderHeading(const Table& table);
@@ -92,8 +95,8 @@ std::string ToMarkdown(const Table& table);
 /// of every row, "provenance", a text of as many lines.
 std::string ToJson(const Table& table);
 
-/// A LaTeX table (booktabs; no other package): a tabular per group, numbers in math mode, 2.05e-03
-/// as 2.05 x 10^-3, notes as comments at the end.
+/// A LaTeX table (array, booktabs, longtable): a longtable per group, numbers in math
+/// mode, 2.05e-03 as 2.05 x 10^-3, notes below it; from "command: " on they are comments.
 std::string ToLatex(const Table& table);
 
 /// The format's name ("text", "csv", "markdown", "json" or "latex") chooses the writer.

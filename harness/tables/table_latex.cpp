@@ -88,20 +88,24 @@ std::optional<Setting> SettingFor(const std::vector<LatexColumn>& columns) {
   return std::nullopt;
 }
 
-// "2.05e-03" as $2.05 \times 10^{-3}$, "113.2" as $113.2$; a text stays a text.
+// "2.05e-03?" as $2.05 \times 10^{-3}?$, "113.2" as $113.2$; a text stays a text.
 std::string LatexCell(const Record& row, const LatexColumn& shown) {
-  const std::string cell = Cell(row, shown.column);
+  std::string cell = Cell(row, shown.column);
   if (cell.empty() || !IsNumber(row, shown.column)) {
     return shown.is_broken ? BreakableLatex(cell) : EscapeLatex(cell);
   }
+  const std::size_t end = std::min(cell.find_first_of("?*"), cell.size());
+  const std::string marks = cell.substr(end);
+  cell.resize(end);
+  if (cell.empty()) return EscapeLatex(marks);
   if (cell.find("inf") != std::string::npos)
-    return "$" + cell.substr(0, cell[0] == '-') + "\\infty$";
+    return "$" + cell.substr(0, cell[0] == '-') + "\\infty" + marks + "$";
   const std::size_t e = cell.find('e');
-  if (e == std::string::npos) return "$" + cell + "$";
+  if (e == std::string::npos) return "$" + cell + marks + "$";
   const std::string mantissa = cell.substr(0, e);
   const int exponent = std::stoi(cell.substr(e + 1));
-  if (mantissa == "1") return fmt::format("$10^{{{}}}$", exponent);
-  return fmt::format("${} \\times 10^{{{}}}$", mantissa, exponent);
+  if (mantissa == "1") return fmt::format("$10^{{{}}}{}$", exponent, marks);
+  return fmt::format("${} \\times 10^{{{}}}{}$", mantissa, exponent, marks);
 }
 
 std::string LatexRow(const std::vector<std::string>& cells) {
@@ -176,8 +180,17 @@ std::string ToLatex(const Table& table) {
     }
     out += "\\end{longtable}}\n";
   }
+  // remarks belong to the document, the origin of the numbers to its source
+  bool is_origin = false;
+  for (const std::string& note : table.notes) {
+    is_origin = is_origin || note.starts_with("command: ");
+    if (is_origin) {
+      out += fmt::format("% {}\n", EscapeTerminal(note));
+    } else if (!note.empty()) {
+      out += fmt::format("{{\\footnotesize\\noindent {}\\par}}\n", BreakableLatex(note));
+    }
+  }
   if (setting.landscape) out += "\\end{landscape}\n";
-  for (const std::string& note : table.notes) out += fmt::format("% {}\n", EscapeTerminal(note));
   return out;
 }
 

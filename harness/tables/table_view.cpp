@@ -197,8 +197,15 @@ Table MakeTable(std::span<const Record> records, const TableView& view) {
   const auto doubtful = std::ranges::count_if(
       table.rows, [](const Record& row) { return IsDoubtful(row, "outcome"); });
   if (doubtful > 0 && !table.title.empty()) {
-    table.title += fmt::format(" - {} of {} rows are doubtful (marked ?, reasons below)", doubtful,
-                               table.rows.size());
+    const bool shows_outcome = Shows(table, "outcome");
+    const auto first = std::ranges::find_if(
+        table.columns, [&](const TableColumn& column) { return column.key != table.group; });
+    if (!shows_outcome && first != table.columns.end()) first->marks_doubts = true;
+    table.title += fmt::format(" - {} of {} rows are doubtful (marked {}, {})", doubtful,
+                               table.rows.size(), shows_outcome ? "? in outcome" : "*",
+                               view.compact             ? "reasons below"
+                               : Shows(table, "doubts") ? "reasons in column doubts"
+                                                        : "column doubts has the reasons");
   }
   return table;
 }

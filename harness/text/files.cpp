@@ -4,51 +4,18 @@
 #include <fmt/format.h>
 #include <unistd.h>
 
-#include <atomic>
 #include <cerrno>
 #include <cstring>
 #include <fstream>
 #include <iterator>
 #include <stdexcept>
 
+#include "harness/text/output_file.h"
+
 namespace loopbench::harness {
-namespace {
-
-// Unique among the threads and processes that write into the same folder.
-std::filesystem::path TemporaryBeside(const std::filesystem::path& path) {
-  static std::atomic<int> counter{0};
-  std::filesystem::path temporary = path;
-  temporary += fmt::format(".{}-{}.tmp", ::getpid(), counter++);
-  return temporary;
-}
-
-/// The temporary file of a text, all of it on the disk.
-std::filesystem::path WriteTemporary(
-    const std::filesystem::path& path,
-    const std::function<void(const std::function<void(std::string_view)>& write)>& fill) {
-  MakeFolderOf(path);
-  std::filesystem::path temporary = TemporaryBeside(path);
-  constexpr int kMode = 0644;
-  const int descriptor = ::open(temporary.c_str(), O_WRONLY | O_CREAT | O_TRUNC | O_CLOEXEC, kMode);
-  if (descriptor < 0) FailOn("write", path);
-  try {
-    fill([descriptor, &path](std::string_view text) { WriteAll(descriptor, text, path); });
-    if (::fsync(descriptor) != 0) FailOn("write", path);
-  } catch (...) {
-    ::close(descriptor);
-    std::error_code ignored;
-    std::filesystem::remove(temporary, ignored);
-    throw;
-  }
-  ::close(descriptor);
-  return temporary;
-}
-
-}  // namespace
 
 void FailOn(std::string_view verb, const std::filesystem::path& path) {
-  throw std::runtime_error(
-      fmt::format("cannot {} '{}': {}", verb, path.string(), std::strerror(errno)));
+  throw SystemFault(fmt::format("cannot {} '{}': {}", verb, path.string(), std::strerror(errno)));
 }
 
 void MakeFolderOf(const std::filesystem::path& path) {
@@ -77,32 +44,16 @@ void WriteFileAtomically(const std::filesystem::path& path, std::string_view tex
 void WriteFileAtomically(
     const std::filesystem::path& path,
     const std::function<void(const std::function<void(std::string_view)>& write)>& fill) {
-  const std::filesystem::path temporary = WriteTemporary(path, fill);
-  std::error_code error;
-  std::filesystem::rename(temporary, path, error);
-  if (error) {
-    errno = error.value();
-    std::filesystem::remove(temporary, error);
-    FailOn("write", path);
-  }
-  SyncFolderOf(path);
+  OutputFile file(path);
+  fill([&file](std::string_view text) { file.Write(text); });
+  file.Finish();
 }
 
 bool WriteNewFile(const std::filesystem::path& path, std::string_view text) {
-  const auto temporary = WriteTemporary(path, [text](const auto& write) { write(text); });
-  int failure = ::link(temporary.c_str(), path.c_str()) == 0 ? 0 : errno;
-  if (failure == EPERM || failure == EOPNOTSUPP) {  // a file has one name there
-    const bool done =
-        ::renameat2(AT_FDCWD, temporary.c_str(), AT_FDCWD, path.c_str(), RENAME_NOREPLACE) == 0;
-    failure = done ? 0 : errno;
-  }
-  std::error_code ignored;
-  std::filesystem::remove(temporary, ignored);
-  if (failure == EEXIST) return false;
-  errno = failure;
-  if (failure != 0) FailOn("write", path);
-  SyncFolderOf(path);
-  return true;
+  if (std::filesystem::exists(std::filesystem::symlink_status(path))) return false;
+  OutputFile file(path);
+  file.Write(text);
+  return file.FinishIfNew();
 }
 
 void SyncFolderOf(const std::filesystem::path& path) {
@@ -124,12 +75,13 @@ void WriteAll(int descriptor, std::string_view text, const std::filesystem::path
 
 std::string ReadFile(const std::filesystem::path& path) {
   std::error_code error;
-  const auto kind = std::filesystem::status(path, error).type();
-  if (kind != std::filesystem::file_type::regular &&
-      (std::filesystem::exists(path, error) && kind != std::filesystem::file_type::directory)) {
-    throw std::runtime_error(
-        fmt::format("cannot read '{}': expected a regular file", path.string()));
+  const auto status = std::filesystem::status(path, error);
+  if (std::filesystem::exists(status) && !std::filesystem::is_regular_file(status)) {
+    throw std::runtime_error(fmt::format(
+        "cannot read '{}': found {}, expected a regular file", path.string(),
+        std::filesystem::is_directory(status) ? "a folder" : "a device, a pipe or a socket"));
   }
+  NoteInput(path);
   errno = 0;
   std::ifstream in(path, std::ios::binary);
   if (!in) FailOn("read", path);

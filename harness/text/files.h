@@ -3,15 +3,22 @@
 
 #include <filesystem>
 #include <functional>
+#include <stdexcept>
 #include <string>
 #include <string_view>
 
 namespace loopbench::harness {
 
-/// Writes `text` to `path` so that a reader finds the old file or the new one, never a part: the
-/// text goes to a temporary file beside `path`, which then takes its name by rename(2). It is on
-/// the disk when this returns. Missing parent folders are made. Throws std::runtime_error that
-/// names the path and the system's reason.
+/// The system refuses what a program needs: a full disk, a limit, a missing file. It says nothing
+/// about a method, so that no record is made of it (processes.h).
+class SystemFault : public std::runtime_error {
+ public:
+  using std::runtime_error::runtime_error;
+};
+
+/// Writes `text` to `path` as output goes (output_file.h): of a regular file a reader finds the old
+/// contents or the new ones, never a part. Missing parent folders are made. Throws
+/// std::runtime_error that names the path and the system's reason.
 void WriteFileAtomically(const std::filesystem::path& path, std::string_view text);
 
 /// The same with a text that comes in parts: `fill` calls what it is given with each.
@@ -29,7 +36,7 @@ bool WriteNewFile(const std::filesystem::path& path, std::string_view text);
 /// folder and the system's reason.
 void MakeFolderOf(const std::filesystem::path& path);
 
-/// Throws std::runtime_error: "cannot VERB 'PATH': " and what errno says.
+/// Throws SystemFault: "cannot VERB 'PATH': " and what errno says.
 [[noreturn]] void FailOn(std::string_view verb, const std::filesystem::path& path);
 
 /// All of `text` to an open file; `path` names it in the error. One write(2) in the usual case;
@@ -39,8 +46,8 @@ void WriteAll(int descriptor, std::string_view text, const std::filesystem::path
 /// Waits until the names in the folder of `path` are on the disk, where the file system can.
 void SyncFolderOf(const std::filesystem::path& path);
 
-/// The bytes of `path`, a regular file: a device might never end. Throws std::runtime_error that
-/// names the path and the reason.
+/// The bytes of `path`, a regular file: a device might never end. It is an input (output_file.h).
+/// Throws std::runtime_error that names the path and the reason.
 std::string ReadFile(const std::filesystem::path& path);
 
 }  // namespace loopbench::harness

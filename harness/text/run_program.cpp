@@ -5,13 +5,20 @@
 #include <sys/wait.h>
 #include <unistd.h>
 
+#include <atomic>
 #include <cerrno>
+#include <csignal>
 #include <cstring>
 
 #include "harness/text/files.h"
 #include "harness/text/memory_file.h"
 
 namespace loopbench::harness {
+namespace {
+
+std::atomic<pid_t> under_way = 0;
+
+}  // namespace
 
 std::string ProgramResult::Failure(const std::string& name) const {
   if (error == ENOENT) return fmt::format("'{}' not found", name);
@@ -38,13 +45,23 @@ ProgramResult RunProgram(std::vector<std::string> words, const std::string& inpu
   result.error = ::posix_spawnp(&child, arguments[0], &streams, nullptr, arguments.data(), environ);
   ::posix_spawn_file_actions_destroy(&streams);
   if (result.error != 0) return result;
+  under_way = child;
   int status = 0;
   while (::waitpid(child, &status, 0) < 0 && errno == EINTR) {
   }
+  under_way = 0;
   result.status = WIFEXITED(status) ? WEXITSTATUS(status) : 128 + WTERMSIG(status);
   result.output = out.Text();
   result.messages = messages.Text();
   return result;
+}
+
+void EndProgram() {
+  const pid_t child = under_way;
+  if (child <= 0) return;
+  ::kill(child, SIGTERM);
+  while (::waitpid(child, nullptr, 0) < 0 && errno == EINTR) {
+  }
 }
 
 }  // namespace loopbench::harness

@@ -19,4 +19,7 @@ struct ProgramResult {
 /// input, and waits for it. Throws std::runtime_error only when no memory file can be made.
 ProgramResult RunProgram(std::vector<std::string> words, const std::string& input = "");
 
+/// Ends the program that RunProgram() waits for, if there is one. Async-signal-safe.
+void EndProgram();
+
 }  // namespace loopbench::harness

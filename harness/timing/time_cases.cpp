@@ -19,9 +19,7 @@ namespace loopbench::harness {
 
 namespace {
 
-constexpr int kStates = 16;             ///< states a batch goes through
-constexpr double kBatchSeconds = 1e-3;  ///< long against the clock's resolution
-constexpr int kBatches = 15;            ///< enough for a 10th and a 90th percentile
+constexpr int kStates = 16;  ///< states a batch goes through
 
 using Clock = std::chrono::steady_clock;
 
@@ -265,7 +263,8 @@ Record NoiseKeys(const MachineState& machine, const Subject& first, const Subjec
 
 }  // namespace
 
-std::vector<Record> TimeTogether(const Experiment& experiment, const TimingGroup& group) {
+std::vector<Record> TimeTogether(const Experiment& experiment, const TimingGroup& group,
+                                 int batches) {
   const MechanismDescription description = group.describe();
   std::vector<std::unique_ptr<Subject>> subjects;
   for (const Case& one : group.cases) {
@@ -275,7 +274,8 @@ std::vector<Record> TimeTogether(const Experiment& experiment, const TimingGroup
   subjects.push_back(MakeSubject(description, group.cases.front(), group.simulate));
   for (auto& subject : subjects) subject->Prepare();
   const MachineState machine = ReadMachineState();
-  const Rounds rhs = TimeInTurn(kBatches, subjects, &Subject::TimeDerivative, &Subject::rhs_ns);
+  const Rounds rhs = TimeInTurn(static_cast<std::size_t>(batches), subjects,
+                                &Subject::TimeDerivative, &Subject::rhs_ns);
   const Rounds wall = TimeInTurn(static_cast<std::size_t>(experiment.timing.repeats), subjects,
                                  &Subject::TimeSimulation, &Subject::wall_s);
   Record noise = NoiseKeys(machine, *subjects.front(), *subjects.back());

@@ -17,6 +17,7 @@
 
 #include "harness/config/experiment.h"
 #include "harness/record/record.h"
+#include "harness/record/select.h"
 
 namespace loopbench::harness {
 
@@ -29,15 +30,19 @@ struct TimingGroup {
   bool simulate = true;     ///< whole simulations too; families have right-hand sides alone
 };
 
-/// The timings of an experiment, which must outlive them: a group per scene (with `timing.cases`
-/// per scene and horizon), then one per member of a family.
-std::vector<TimingGroup> TimingGroups(const Experiment& experiment);
+/// The timings of an experiment that pass `filter`: a group per scene (with `timing.cases` per
+/// scene and horizon), then one per member of a family. The experiment must outlive them.
+std::vector<TimingGroup> TimingGroups(const Experiment& experiment, const Selection& filter = {});
+
+inline constexpr double kBatchSeconds = 1e-3;  ///< long against the clock's resolution
+inline constexpr int kBatches = 15;            ///< enough for a 10th and a 90th percentile
 
 /// One record per case, in order. A case whose simulation fails keeps its row with outcome and,
-/// where it got so far, its right-hand side's time.
-std::vector<Record> TimeTogether(const Experiment& experiment, const TimingGroup& group);
+/// where it got so far, its right-hand side's time. Right-hand sides are timed in `batches`.
+std::vector<Record> TimeTogether(const Experiment& experiment, const TimingGroup& group,
+                                 int batches = kBatches);
 
 /// Number of records of all groups.
-std::size_t CountTimings(const Experiment& experiment);
+std::size_t CountTimings(const Experiment& experiment, const Selection& filter = {});
 
 }  // namespace loopbench::harness

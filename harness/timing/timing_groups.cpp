@@ -25,10 +25,11 @@ void SetTimingId(const std::string& content, Record* keys) {
 
 }  // namespace
 
-std::vector<TimingGroup> TimingGroups(const Experiment& experiment) {
+std::vector<TimingGroup> TimingGroups(const Experiment& experiment, const Selection& filter) {
   std::vector<TimingGroup> groups;
   // cases come scene by scene and, in a scene, horizon by horizon
   for (const Case& one : ExpandTiming(experiment)) {
+    if (!Matches(one.keys, filter)) continue;
     const bool is_next = groups.empty() || groups.back().cases.back().scene != one.scene ||
                          groups.back().cases.back().horizon != one.horizon;
     if (is_next) {
@@ -56,21 +57,19 @@ std::vector<TimingGroup> TimingGroups(const Experiment& experiment) {
         for (const char* key : {"integrator", "rtol", "atol", "horizon"}) {
           one.keys.Set(key, Value());
         }
+        if (!Matches(one.keys, filter)) continue;
         SetTimingId(FamilyTimingContent(experiment), &one.keys);
         group.cases.push_back(one);
       }
-      groups.push_back(std::move(group));
+      if (!group.cases.empty()) groups.push_back(std::move(group));
     }
   }
   return groups;
 }
 
-std::size_t CountTimings(const Experiment& experiment) {
-  std::size_t count = ExpandTiming(experiment).size();
-  if (experiment.timing.repeats == 0) return count;
-  for (const TimingFamily& family : experiment.timing.families) {
-    count += family.sizes.size() * family.columns.size();
-  }
+std::size_t CountTimings(const Experiment& experiment, const Selection& filter) {
+  std::size_t count = 0;
+  for (const TimingGroup& group : TimingGroups(experiment, filter)) count += group.cases.size();
   return count;
 }
 

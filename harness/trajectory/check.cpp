@@ -1,9 +1,12 @@
 #include "harness/trajectory/check.h"
 
+#include <fmt/format.h>
+
 #include <algorithm>
 #include <array>
 #include <cmath>
 #include <numbers>
+#include <stdexcept>
 
 namespace loopbench::harness {
 namespace {
@@ -70,15 +73,19 @@ class Checker {
  public:
   Checker(TrajectoryReader& reader, const MechanismDescription& user, const std::string& file)
       : reader_(reader),
+        file_(file),
         user_(user),
         motion_(user, reader.columns(), file),
         mechanism_(user),
         pairs_(PairsOf(reader.columns())) {
     OutputOptions all;
     const auto known = TrajectoryColumns(user, all);
-    for (const TrajectoryColumn& column : reader.columns()) {
+    for (std::size_t i = 0; i < reader.columns().size(); ++i) {
+      const TrajectoryColumn& column = reader.columns()[i];
       if (std::ranges::find(known, column) == known.end()) {
         check_.unknown.push_back(column.kind.empty() ? column.component : column.Label());
+      } else if (column.kind == "joint" || column.kind == "body" || column.kind == "point") {
+        motions_.push_back(i);
       }
     }
     check_.source = motion_.from_joints() ? "joint coordinates" : "body poses";
@@ -106,7 +113,13 @@ class Checker {
   }
 
   TrajectoryCheck Run() {
-    for (std::vector<double> row; reader_.Next(&row);) Add(row[reader_.time()], row);
+    for (std::vector<double> row; reader_.Next(&row);) {
+      reader_.RequireNumbers(row, motions_);
+      Add(row[reader_.time()], row);
+    }
+    if (check_.rows == 0) {
+      throw std::runtime_error(fmt::format("{}: found no row, expected a motion", file_));
+    }
     for (Pair& pair : pairs_) {
       if (pair.check.apart.is_known) check_.speeds.push_back(std::move(pair.check));
     }
@@ -138,6 +151,7 @@ class Checker {
       if (check_.rows == 1) first_energy_ = balance;
       check_.energy.Add(std::abs(balance - first_energy_), t);
       check_.kinetic = std::max(check_.kinetic, energy.kinetic);
+      if (!std::isfinite(balance)) check_.no_energy = fmt::format("it is {} J at {} s", balance, t);
     }
     window_.Add(t, row, pairs_);
   }
@@ -174,10 +188,12 @@ class Checker {
   }
 
   TrajectoryReader& reader_;
+  std::string file_;
   const MechanismDescription& user_;
   MotionReader motion_;
   UserMechanism<Space> mechanism_;
   std::vector<Pair> pairs_;
+  std::vector<std::size_t> motions_;             ///< columns of the mechanism's motion
   std::vector<std::vector<std::size_t>> given_;  ///< columns of joints, by the user's joint
   std::size_t supplied_ = kNowhere, dissipated_ = kNowhere;
   double first_energy_ = 0.0;

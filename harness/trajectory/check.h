@@ -16,9 +16,9 @@ struct LargestAt {
   double value = 0.0, t = 0.0;
   bool is_known = false;
 
-  /// What is no number says nothing.
+  /// The first that is no number stays.
   void Add(double other, double time) {
-    if (!(other > value) && (is_known || other != other)) return;
+    if (is_known && (other <= value || value != value)) return;
     value = other, t = time, is_known = true;
   }
 };
@@ -72,7 +72,8 @@ class MotionReader {
   std::unique_ptr<Work> work_;
 };
 
-/// Row by row, in memory of a fixed size. Throws what TrajectoryReader and MotionReader throw.
+/// Row by row, in memory of a fixed size. Throws what TrajectoryReader and MotionReader throw, and
+/// std::runtime_error for no row, or one without a finite number in a column of the motion.
 TrajectoryCheck CheckTrajectory(const std::filesystem::path& path,
                                 const MechanismDescription& user);
 

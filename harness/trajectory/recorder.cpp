@@ -129,8 +129,9 @@ void Recorder<Space>::Finish(Record& record) {
     notes.push_back(fmt::format(kOpen, at->second, rows, labels));
     at = end;
   }
-  file_->Finish(notes);
+  const std::string hash = file_->Finish(notes);
   record.Set("trajectory", task_.path.filename().string());
+  record.Set("trajectory_hash", hash);
   record.Set("trajectory_output", std::string(HowOf(task_.output)));
   record.Set("trajectory_rows", rows);
   if (open > 0) record.Set("trajectory_open", open);

@@ -2,6 +2,7 @@
 #pragma once
 
 #include <filesystem>
+#include <stdexcept>
 #include <string>
 #include <vector>
 
@@ -13,8 +14,18 @@ namespace loopbench::harness {
 /// Only a name within the folder of trajectories is one.
 std::filesystem::path TrajectoryOf(const Record& record, const std::filesystem::path& store_file);
 
+/// A file beside a store that is not as a run wrote it.
+class ChangedFile : public std::runtime_error {
+ public:
+  using std::runtime_error::runtime_error;
+};
+
+/// Throws ChangedFile unless the file has the "trajectory_hash" of its record, or the record has
+/// none (of version 1.0).
+void VerifyTrajectory(const Record& record, const std::filesystem::path& file);
+
 /// Copies those of `records` from the first of the `stores` that has them to beside `target`, each
-/// whole or not at all. Gives the names of those that none has.
+/// whole or not at all. Gives the names of those that none has as its run wrote it.
 std::vector<std::string> CopyTrajectories(const std::vector<Record>& records,
                                           const std::vector<std::filesystem::path>& stores,
                                           const std::filesystem::path& target);

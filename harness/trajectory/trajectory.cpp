@@ -10,6 +10,7 @@
 #include <stdexcept>
 
 #include "harness/text/files.h"
+#include "harness/text/output_file.h"
 #include "mechanism/algebra/space.h"
 
 namespace loopbench::harness {
@@ -68,6 +69,7 @@ TrajectoryReader::TrajectoryReader(const std::filesystem::path& path) : path_(pa
     throw std::runtime_error(
         fmt::format("cannot read '{}': expected a regular file", path.string()));
   }
+  NoteInput(path);
   errno = 0;
   in_.open(path, std::ios::binary);
   if (!in_) FailOn("read", path);
@@ -125,6 +127,15 @@ bool TrajectoryReader::Next(std::vector<double>* row) {
   last_t_ = t;
   has_row_ = true;
   return true;
+}
+
+void TrajectoryReader::RequireNumbers(const std::vector<double>& row,
+                                      std::span<const std::size_t> columns) const {
+  for (const std::size_t i : columns) {
+    if (std::isfinite(row[i])) continue;
+    const std::string label = columns_[i].Label();
+    Refuse(fmt::format("{} in \"{}\" at t = {}", row[i], label, row[time_]), "a finite number");
+  }
 }
 
 void TrajectoryReader::Refuse(const std::string& found, const std::string& expected) const {

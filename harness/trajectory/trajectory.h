@@ -9,6 +9,7 @@
 #include <filesystem>
 #include <fstream>
 #include <optional>
+#include <span>
 #include <string>
 #include <vector>
 
@@ -34,6 +35,8 @@ class TrajectoryReader {
 
   /// The next row, a number per column; false at the end. Times rise.
   bool Next(std::vector<double>* row);
+  /// Throws where one of `columns` has no finite number in `row`, the last one read.
+  void RequireNumbers(const std::vector<double>& row, std::span<const std::size_t> columns) const;
 
  private:
   bool NextLine();

@@ -1,8 +1,6 @@
 #include "harness/trajectory/trajectory_writer.h"
 
-#include <fcntl.h>
 #include <fmt/format.h>
-#include <unistd.h>
 
 #include <charconv>
 #include <cmath>
@@ -10,26 +8,20 @@
 
 #include "harness/json/json_document.h"
 #include "harness/text/escape.h"
-#include "harness/text/files.h"
 #include "harness/trajectory/trajectory.h"
 
 namespace loopbench::harness {
 namespace {
 
 constexpr std::size_t kBuffer = 1 << 20;
-
-std::filesystem::path PartOf(std::filesystem::path path) { return path += ".part"; }
+constexpr const char* kPart = ".part";
 
 }  // namespace
 
-TrajectoryWriter::TrajectoryWriter(std::filesystem::path path,
+TrajectoryWriter::TrajectoryWriter(const std::filesystem::path& path,
                                    const std::vector<TrajectoryColumn>& columns,
                                    const std::vector<std::string>& notes, TrajectoryFormat format)
-    : path_(std::move(path)), part_(PartOf(path_)), format_(format) {
-  MakeFolderOf(part_);
-  constexpr int kMode = 0644;
-  descriptor_ = ::open(part_.c_str(), O_WRONLY | O_CREAT | O_TRUNC | O_CLOEXEC, kMode);
-  if (descriptor_ < 0) FailOn("write", path_);
+    : file_(path, Onto::kNoInput, kPart), format_(format) {
   buffer_.reserve(kBuffer);
   if (format_ == TrajectoryFormat::kJsonLines) {
     for (const TrajectoryColumn& column : columns) labels_.push_back(Json(column.Label()).dump());
@@ -40,12 +32,6 @@ TrajectoryWriter::TrajectoryWriter(std::filesystem::path path,
     buffer_ += (i == 0 ? "" : ",") + EscapeCsv(columns[i].Label());
   }
   buffer_ += '\n';
-}
-
-TrajectoryWriter::~TrajectoryWriter() {
-  if (descriptor_ < 0) return;
-  ::close(descriptor_);
-  RemovePart(path_);
 }
 
 void TrajectoryWriter::Note(const std::string& note) {
@@ -76,24 +62,23 @@ void TrajectoryWriter::Write(std::span<const double> row) {
 }
 
 void TrajectoryWriter::Flush() {
-  WriteAll(descriptor_, buffer_, part_);
+  file_.Write(buffer_);
+  hash_.Add(buffer_);
   buffer_.clear();
 }
 
-void TrajectoryWriter::Finish(const std::vector<std::string>& notes) {
+std::string TrajectoryWriter::Finish(const std::vector<std::string>& notes) {
   for (const std::string& note : notes) {
     if (format_ == TrajectoryFormat::kCsv) Note(note);
   }
   Flush();
-  if (::fsync(descriptor_) != 0) FailOn("write", path_);
-  std::filesystem::rename(part_, path_);
-  ::close(std::exchange(descriptor_, -1));
-  SyncFolderOf(path_);
+  file_.Finish();
+  return hash_.Text();
 }
 
 void RemovePart(const std::filesystem::path& path) {
   std::error_code error;
-  std::filesystem::remove(PartOf(path), error);
+  std::filesystem::remove(path.string() + kPart, error);
 }
 
 void RemoveParts(const std::filesystem::path& store_file) {
@@ -101,7 +86,7 @@ void RemoveParts(const std::filesystem::path& store_file) {
   const std::filesystem::path folder = TrajectoryPath(store_file, "any").parent_path();
   std::vector<std::filesystem::path> parts;
   for (const auto& entry : std::filesystem::directory_iterator(folder, error)) {
-    if (entry.path().extension() == ".part") parts.push_back(entry.path());
+    if (entry.path().extension() == kPart) parts.push_back(entry.path());
   }
   for (const auto& part : parts) std::filesystem::remove(part, error);
 }

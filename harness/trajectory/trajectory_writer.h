@@ -10,6 +10,8 @@
 #include <string>
 #include <vector>
 
+#include "harness/text/hash.h"
+#include "harness/text/output_file.h"
 #include "harness/trajectory/columns.h"
 
 namespace loopbench::harness {
@@ -20,10 +22,9 @@ class TrajectoryWriter {
  public:
   /// Makes missing folders. `notes` become lines with "#", of CSV alone. Throws std::runtime_error,
   /// here and below, where the system refuses.
-  TrajectoryWriter(std::filesystem::path path, const std::vector<TrajectoryColumn>& columns,
+  TrajectoryWriter(const std::filesystem::path& path, const std::vector<TrajectoryColumn>& columns,
                    const std::vector<std::string>& notes,
                    TrajectoryFormat format = TrajectoryFormat::kCsv);
-  ~TrajectoryWriter();
   TrajectoryWriter(const TrajectoryWriter&) = delete;
   TrajectoryWriter& operator=(const TrajectoryWriter&) = delete;
 
@@ -31,19 +32,19 @@ class TrajectoryWriter {
   void Write(std::span<const double> row);
   std::int64_t rows() const { return rows_; }
 
-  /// Once, at the end: the file is on the disk.
-  void Finish(const std::vector<std::string>& notes = {});
+  /// Once, at the end: the file is on the disk. Returns the hash of all its bytes.
+  std::string Finish(const std::vector<std::string>& notes = {});
 
  private:
   void Note(const std::string& note);
   void Flush();
 
-  std::filesystem::path path_, part_;
+  OutputFile file_;
+  FnvHash hash_;
   TrajectoryFormat format_;
   std::vector<std::string> labels_;  ///< of JSON, as it has them
   std::string buffer_;
   std::int64_t rows_ = 0;
-  int descriptor_ = -1;
 };
 
 /// What killed runs have left in the folder of trajectories beside a store's `file`, or one of

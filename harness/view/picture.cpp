@@ -6,6 +6,7 @@
 #include <algorithm>
 #include <cmath>
 
+#include "harness/analysis/model_warnings.h"
 #include "harness/view/motions.h"
 #include "harness/view/shapes.h"
 #include "mechanism/loops/excursion.h"
@@ -95,25 +96,6 @@ void MarkGone(const MechanismDescription& description, Picture* picture) {
   }
 }
 
-/// Coordinates as a file says them, of the joints of the tree; zero where it says nothing.
-template <class Space>
-VectorX<double> GivenCoordinates(const MechanismDescription& description,
-                                 const Mechanism<Space, double>& mechanism) {
-  VectorX<double> q = VectorX<double>::Zero(mechanism.num_q());
-  for (const TreeStep& step : mechanism.tree()) {
-    const Joint<Space, double>& joint = mechanism.joints()[static_cast<std::size_t>(step.joint)];
-    if (joint.kind->has_quaternion()) q[joint.q_offset] = 1.0;
-  }
-  for (const JointValues& values : description.initial.coordinates) {
-    const Joint<Space, double>& joint = mechanism.joints()[static_cast<std::size_t>(values.joint)];
-    for (int i = 0, next = joint.q_offset; joint.in_tree() && i < joint.kind->num_q; ++i) {
-      if (mechanism.DriveOf(joint, i) < 0) q[next++] = values.values[static_cast<std::size_t>(i)];
-    }
-  }
-  mechanism.Normalise(q);
-  return q;
-}
-
 /// How open a cut joint is: about [rad] and along [m] what it should hold, in ground axes.
 template <class Space>
 Direction<Space, double> OpennessOf(const Kinematics<Space, double>& kinematics, int joint) {
@@ -189,13 +171,16 @@ class Maker {
     picture_->assembled = start.outcome != Outcome::kInconsistentStart;
     picture_->message = start.message;
     if (picture_->assembled && !start.message.empty()) picture_->notes.push_back(start.message);
-    kinematics_.UpdatePosition(GivenCoordinates(description_, mechanism_));
+    kinematics_.UpdatePosition(GuessedPositions(description_, mechanism_));
     picture_->given = PosesOf(description_, kinematics_);
     AddLoops(structure);
     picture_->start = picture_->given;
     if (picture_->assembled) {
       kinematics_.UpdatePosition(start.q);
       picture_->start = PosesOf(description_, kinematics_);
+      for (const Warning& warning : FindGuessWarnings(description_, start.q)) {
+        picture_->notes.push_back(warning.text);
+      }
       for (PictureLoop& loop : picture_->loops) {
         loop.left = OpennessOf(kinematics_, loop.cut_joint).linear.norm();
       }

@@ -129,8 +129,10 @@ TEST_F(CaseIdentity, ComparisonsPairEqualContentsOnly) {
   ExpectEnding(Call(std::string("run tiny.json --out both") + kMass1), 0, {});
   ExpectEnding(Call(std::string("run tiny.json --out both") + kMass5), 0, {});
   ExpectEnding(Call("compare five one"), 2, {"2 cases that ran another mechanism"});
-  ExpectEnding(Call("compare five both"), 0, {"2 cases only in NEW", "SAME"});
-  ExpectEnding(Call("compare both both"), 0, {"SAME"});
+  ExpectEnding(Call("compare five both"), 2, {"COULD NOT MEASURE: 2 cases only in NEW"});
+  ExpectEnding(Call("compare five both --added"), 0, {"2 cases only in NEW", "SAME"});
+  fs::copy(folder_ / "both", folder_ / "copy", fs::copy_options::recursive);
+  ExpectEnding(Call("compare both copy"), 0, {"SAME"});
   ExpectEnding(Call("export both"), 0, {"bodies/0/mass=5", "bodies/0/mass=1"});
 }
 

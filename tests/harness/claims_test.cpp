@@ -76,7 +76,7 @@ TEST(Claims, AMissingConditionIsNeverSilentlyTrue) {
   EXPECT_EQ(bad.text, "not reproduced. Not measured: general scene");
 }
 
-TEST(Claims, AFailedRunOrAValueThatIsNotFiniteFailsTheCheck) {
+TEST(Claims, AFailedRunFailsTheCheckAndAMissingValueLeavesItUndecided) {
   const Check check = DriftCheck("square");
   std::vector<Record> records = {RunOf("square", "drift", 1e-14), RunOf("square", "drift", 1e-14)};
   EXPECT_EQ(Evaluate(check, records).state, CheckState::kHolds);
@@ -84,10 +84,37 @@ TEST(Claims, AFailedRunOrAValueThatIsNotFiniteFailsTheCheck) {
   CheckResult result = Evaluate(check, records);
   EXPECT_EQ(result.state, CheckState::kFails);
   EXPECT_EQ(result.reason, "1 of 2 runs did not finish");
-  records[1] = RunOf("square", "drift", std::numeric_limits<double>::quiet_NaN());
-  result = Evaluate(check, records);
-  EXPECT_EQ(result.state, CheckState::kFails);
-  EXPECT_EQ(result.reason, "1 of 2 values missing or not finite");
+  Record without;
+  without.Set("mechanism", std::string("square"));
+  without.Set("outcome", std::string("finished"));
+  Record null = without;
+  null.Set("drift", Value());
+  for (const Record& other :
+       {RunOf("square", "drift", std::numeric_limits<double>::quiet_NaN()),
+        RunOf("square", "drift", std::numeric_limits<double>::infinity()), null, without}) {
+    records[1] = other;
+    for (const Statistic statistic : {Statistic::kMax, Statistic::kAll, Statistic::kAny}) {
+      Check one = check;
+      one.statistic = statistic;
+      result = Evaluate(one, records);
+      EXPECT_EQ(result.state, CheckState::kNotMeasured);
+      EXPECT_EQ(result.reason, "1 of 2 values missing or not finite");
+    }
+    // of either side of a ratio
+    records[1].Set("mechanism", std::string("base"));
+    Check ratio = check;
+    ratio.relative_to = {{"mechanism", {"base"}}};
+    records.push_back(RunOf("base", "drift", 1e-14));
+    EXPECT_EQ(Evaluate(ratio, records).reason, "1 of 2 values missing or not finite");
+    records.pop_back();
+  }
+  // words may be missing too
+  Check word = check;
+  word.statistic = Statistic::kAll;
+  word.demand = {.measure = "growth_regime", .relation = Relation::kIsNot, .word = "truncation"};
+  records = {RunOf("square", "drift", 1.0), RunOf("square", "drift", 1.0)};
+  records[0].Set("growth_regime", std::string("round-off"));
+  EXPECT_EQ(Evaluate(word, records).state, CheckState::kNotMeasured);
 }
 
 TEST(Claims, ARunThatFailedBeforeItsFirstMeasureStillFailsTheCheck) {

@@ -45,20 +45,61 @@ TEST_F(ComparisonCommands, RefuseWhatIsNotThere) {
   Write("text.json", "nothing");
   Expect("compare none.json b.json", 2, {"none.json: cannot be read: no such file"});
   Expect("compare b.json text.json", 2, {"text.json:1:"});
-  Expect("compare b.json b.json", 2, {"COULD NOT MEASURE"});
-  Expect("compare b.json b.json --only speed", 2, {"--only"});
+  Write("c.json", R"({"benchmarks": []})");
+  Expect("compare b.json c.json", 2, {"COULD NOT MEASURE"});
+  Expect("compare b.json c.json --only speed", 2, {"--only"});
   Expect("fit b.json", 2, {"no family of right-hand sides"});
   Expect("export b.json", 2, {"nothing to export"});
   Expect("compare --help", 0, {"Examples:", "Exit codes:"});
 }
 
+TEST_F(ComparisonCommands, APathIsNotComparedWithItself) {
+  ASSERT_EQ(Call("run tiny.json --out out").code, 0);
+  fs::create_symlink("out", folder_ / "link");
+  fs::create_hard_link(folder_ / "out/results.jsonl", folder_ / "hard.jsonl");
+  for (const char* other : {"out", "out/", "./out/results.jsonl", "link", "hard.jsonl"}) {
+    Expect(std::string("compare out ") + other, 2,
+           {"found 'out/results.jsonl' as BASE and as NEW, expected two files"});
+  }
+  fs::copy(folder_ / "out", folder_ / "copy", fs::copy_options::recursive);
+  Expect("compare out copy", 0, {"SAME"});
+}
+
+// Files of Google Benchmark name a machine only where the program wrote it.
+TEST_F(ComparisonCommands, TimesOfNoOrAnotherMachineAreNotComparable) {
+  const auto write = [this](const std::string& name, const std::string& machine, int time) {
+    std::string runs;
+    for (int i = 0; i < 20; ++i) {
+      const std::string ns = std::to_string(time * (100 + i % 3));
+      runs += (i > 0 ? "," : "") + std::string(R"({"name":"a","cpu_time":)") + ns +
+              ",\"real_time\":" + ns + "}";
+    }
+    Write(name, "{\"context\":{" + (machine.empty() ? "" : "\"machine\":\"" + machine + "\"") +
+                    "},\"benchmarks\":[" + runs + "]}");
+  };
+  write("none.json", "", 1);
+  write("slow-none.json", "", 10);
+  write("here.json", "here", 1);
+  write("same-here.json", "here", 1);
+  write("slow-here.json", "here", 10);
+  write("slow-there.json", "there", 10);
+  const std::string unknown = "COULD NOT MEASURE: 1 times not comparable: machine not known";
+  Expect("compare none.json slow-none.json", 2, {unknown});
+  Expect("compare none.json slow-here.json --junit j.xml", 2, {unknown});
+  EXPECT_NE(ReadFile(folder_ / "j.xml").find("errors=\"1\""), std::string::npos);
+  Expect("compare here.json slow-there.json", 2, {"1 times not comparable: another machine"});
+  Expect("compare here.json slow-here.json", 1, {"WORSE: 1 measures"});
+  Expect("compare here.json same-here.json", 0, {"SAME"});
+}
+
 TEST_F(ComparisonCommands, RefuseNumbersThatSwitchGatesOff) {
   ASSERT_EQ(Call("run tiny.json --out out").code, 0);
+  fs::copy(folder_ / "out", folder_ / "copy", fs::copy_options::recursive);
   for (const char* ratio :
        {"nan", "-nan", "inf", "-inf", "0", "0.99", "-2", "1e400", "0x2", "2x", "''"}) {
-    Expect(std::string("compare out out --error-ratio=") + ratio, 2, {"--error-ratio"});
+    Expect(std::string("compare out copy --error-ratio=") + ratio, 2, {"--error-ratio"});
   }
-  Expect("compare out out --error-ratio 1.5", 0, {"SAME"});
+  Expect("compare out copy --error-ratio 1.5", 0, {"SAME"});
   for (const char* from : {"nan", "inf", "-1", "1e400", "x"}) {
     Expect(std::string("fit b.json --from=") + from, 2, {"--from"});
   }
@@ -92,13 +133,15 @@ TEST_F(ComparisonCommands, NameEveryDifference) {
          {"worse", "drift_position_max", "null", "expected a finite number >= 0", "WORSE: 2",
           "new doubts"});
   Expect("compare null base", 1, {"different", "drift_position_max", "DIFFERENT: 1"});
-  Expect("compare null null", 1, {"different", "in BASE and NEW", "DIFFERENT: 1"});
+  fs::copy(folder_ / "null", folder_ / "null2", fs::copy_options::recursive);
+  Expect("compare null null2", 1, {"different", "in BASE and NEW", "DIFFERENT: 1"});
   Expect("export null --out b.json", 1,
          {"not exported: accuracy tiny four-bar odca", "drift_position_max: found null"});
   ASSERT_EQ(Call("run tiny.json --out half --filter formulation=odca").code, 0);
   const std::string missing = "  accuracy tiny four-bar lagrange";
   Expect("compare base half", 2, {"1 cases only in BASE:", missing});
-  Expect("compare half base", 0, {"1 cases only in NEW:", missing});
+  Expect("compare half base", 2, {"1 cases only in NEW:", missing, "1 cases only in NEW"});
+  Expect("compare half base --added", 0, {"1 cases only in NEW:", missing, "SAME"});
   Expect("compare base half --format csv", 2, {"only in BASE,accuracy tiny four-bar lagrange"});
 }
 
@@ -107,7 +150,8 @@ TEST_F(ComparisonCommands, NullSamplesEndTheComparison) {
         R"({"kind":"timing","mechanism":"a","case_id":"1","outcome":"finished",)"
         R"("series.wall_s":[null],"machine":"m","compiler":"c","flags":"f","libm":"l"})"
         "\n");
-  Expect("compare null.jsonl null.jsonl", 1,
+  fs::copy_file(folder_ / "null.jsonl", folder_ / "null2.jsonl");
+  Expect("compare null.jsonl null2.jsonl", 1,
          {"different", "series.wall_s", "1 values (1 null or negative)", "expected finite times"});
   Expect("export null.jsonl", 2, {"series.wall_s: found 1 values (1 null", "nothing to export"});
 }
@@ -165,8 +209,9 @@ TEST_F(ComparisonCommands, BaselineKeepsWhatItMeasuresInANewFolderOnly) {
 
 TEST_F(ComparisonCommands, FilesMayStandBehindAnyOption) {
   ASSERT_EQ(Call("run tiny.json --out now").code, 0);
-  Expect("compare --only outcomes now now", 0, {"SAME"});
-  Expect("compare --where formulation=odca --only counts now now", 0, {"SAME"});
+  ASSERT_EQ(Call("run tiny.json --out again").code, 0);
+  Expect("compare --only outcomes now again", 0, {"SAME"});
+  Expect("compare --where formulation=odca --only counts now again", 0, {"SAME"});
   Expect("table --where formulation=odca --columns formulation,steps now", 0, {"odca"});
   Expect("list --filter formulation=odca tiny.json", 0, {"odca"});
   Expect("run --filter formulation=odca tiny.json --out some", 0, {"1 run now"});
@@ -235,7 +280,8 @@ TEST_F(BenchmarkProgram, WritesJsonThatTheCommandsTake) {
   EXPECT_EQ(failed, 2);
 
   Expect("fit out.json", 0, {"rhs/chain/N/odca/acceleration/joint/rank-revealing", "exponent"});
-  Expect("compare out.json out.json", 0, {"times not measured: too few repetitions", "SAME"});
+  Write("same.json", text);
+  Expect("compare out.json same.json", 2, {"times not measured: too few repetitions"});
   Expect("export out.json", 1, {"\"unit\": \"ns\"", "not exported: benchmark rhs/chain/3/odca"});
   // nothing is said of how the library was built, but how this program was
   const Ending list = bench("--benchmark_filter=rhs/chain/6 --benchmark_min_time=0.001");

@@ -46,6 +46,24 @@ TEST_F(CommandLineTest, SweptValuesAreInRecordsAndFilters) {
   ExpectEnding(Call("table out --where mass=2"), 0, {"odca"});
 }
 
+TEST_F(CommandLineTest, SweptValuesAreInNamesOfTrajectories) {
+  std::string text = Swept();
+  text.insert(text.find("\"timing\""), R"("output": {"step": 0.25}, )");
+  Write("sweep.json", text);
+  ExpectEnding(Call("run sweep.json --out out"), 0, {"results in out"});
+  const std::string list = Call("trajectory out").text;
+  EXPECT_NE(list.substr(0, list.find('\n')).find("  mass  "), std::string::npos) << list;
+  ExpectEnding(Call("trajectory out --out csv"), 0, {"-mass-1-", "-mass-2-"});
+  std::size_t heavy = 0;
+  for (const auto& entry : fs::directory_iterator(folder_ / "csv")) {
+    const std::string name = entry.path().filename().string();
+    const std::string mass = name.find("-mass-2-") != std::string::npos ? "2" : "1";
+    EXPECT_TRUE(ReadFile(entry.path()).starts_with("# mass: " + mass + "\n")) << name;
+    heavy += mass == "2" ? 1 : 0;
+  }
+  EXPECT_EQ(heavy, 1u);
+}
+
 TEST_F(CommandLineTest, KeysOfStoredRecordsAreNoNamesForAxes) {
   ExpectEnding(Call("run tiny.json --set /timing/repeats=1 --out out"), 0, {});
   std::set<std::string> keys;
@@ -84,7 +102,14 @@ TEST_F(CommandLineTest, PlanCountsCasesRunsAndTimings) {
   ExpectEnding(Call("plan sweep.json"), 0,
                {"axis mass: 2 values", "2 combinations", "3 cases, 9 runs", "3 timings", "pilot",
                 "An estimate"});
-  ExpectEnding(Call("plan sweep.json --filter formulation=lagrange"), 0, {"1 cases, 1 runs"});
+  ExpectEnding(Call("plan sweep.json --filter formulation=lagrange"), 0,
+               {"1 cases, 1 runs", "1 timings"});
+  const Ending untimed = Call("plan sweep.json --no-timing");
+  ExpectEnding(untimed, 0, {"3 cases, 9 runs", " 0 timings"});
+  EXPECT_EQ(untimed.text.find(", timings"), std::string::npos) << untimed.text;
+  ExpectEnding(Call("list sweep.json --filter formulation=lagrange"), 0, {"1 cases and 1 timings"});
+  ExpectEnding(Call("run sweep.json --filter formulation=lagrange --out few"), 0, {});
+  EXPECT_EQ(ReadRecords(folder_ / "few").size(), 2u) << "a run and its timing";
   ExpectEnding(Call("run sweep.json --no-timing --out out"), 0, {});
   ExpectEnding(Call("plan sweep.json --set /timing/repeats=0 --from out"), 0,
                {"3 of 3 cases from out"});

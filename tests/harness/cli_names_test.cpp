@@ -63,7 +63,8 @@ TEST_F(Names, WithAnythingInThemAreOnlyShown) {
         "explain four-bar.json", "plan tiny.json", "run tiny.json --out out", "table out",
         "table out --format csv", "table out --format markdown", "table out --format latex",
         "table out --format json", "plot out --out figures", "run tiny.json",
-        "table out --where mechanism=none", "compare out out", "export out --format bmf"}) {
+        "table out --where mechanism=none", "run tiny.json --out copy", "compare out copy",
+        "export out --format bmf"}) {
     const Ending ending = Call(call);
     EXPECT_EQ(ending.code, call.find("none") != std::string::npos ? 2 : 0) << call << ending.text;
     const auto acts = [](char c) { return (c >= 0 && c < ' ' && c != '\n') || c == 0x7f; };

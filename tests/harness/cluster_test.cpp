@@ -146,8 +146,18 @@ TEST_F(Cluster, APathMayHoldWhatSlurmAndShellsRead) {
       << text;
   ExpectEnding(Call("submit six.json --tasks 2 --out 'a b%j' --dry-run"), 0,
                {"/a b%%j/logs/%a.log\"", "/a b%%j/logs/collect.log\""});
-  ExpectEnding(Call("submit six.json --tasks 2 --out 'a\nb' --dry-run"), 2,
-               {"--out: found a line end in it"});
+  // a line end would end a comment line, and begin a command
+  const std::string refused = "found a line end in '", submit = "submit six.json --tasks 2 ";
+  for (const char* end : {"\n", "\r"}) {
+    for (const std::string option :
+         {"--out 'a", "--out x --set '/name=\"a", "--out x --filter 'rtol=1", "--out x --time '1",
+          "--out x --sbatch '--comment=a"}) {
+      ExpectEnding(Call(submit + option + end + "touch pwned' --dry-run"), 2, {refused});
+    }
+  }
+  Write("a\nb.json", kSix);
+  ExpectEnding(Call("submit 'a\nb.json' --tasks 2 --out x --dry-run"), 2,
+               {"experiment: " + refused});
 }
 
 TEST_F(Cluster, APartIsANumberOfThem) {

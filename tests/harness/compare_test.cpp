@@ -250,10 +250,45 @@ TEST(Compare, CatchesSlowerTimesBeyondTwoPercentOnly) {
 TEST(Compare, SaysWhenSamplesAreTooSmall) {
   std::vector<Record> base = Sound(), fresh = Sound();
   base[0].Set("series.rhs_ns", Times(500.0, 1, 3));
-  fresh[0].Set("series.rhs_ns", Times(900.0, 2, 3));
+  fresh[0].Set("series.rhs_ns", Times(700.0, 2, 3));
   const Finding finding = Only(Compare(base, fresh, {}), Judgement::kNotMeasured);
   EXPECT_EQ(finding.measure.key, "series.rhs_ns");
   EXPECT_NE(finding.why.find("too few repetitions"), std::string::npos);
+}
+
+/// Sixteen timings, one of them `factor` times as long in NEW.
+ComparisonReport OneOfSixteen(double factor, int repeats) {
+  std::vector<Record> base, fresh;
+  for (unsigned i = 0; i < 16; ++i) {
+    base.push_back(SoundRecord("m" + std::to_string(i), 100 + i));
+    fresh.push_back(base.back());
+    base.back().Set("series.rhs_ns", Times(500.0, 200 + i, repeats));
+    fresh.back().Set("series.rhs_ns", Times(i == 3 ? factor * 500.0 : 500.0, 300 + i, repeats));
+  }
+  return Compare(base, fresh, {});
+}
+
+// No rank test of five repetitions can decide among sixteen times: 16 * 2 / 252 > 0.05.
+TEST(Compare, ATimeFarApartDecidesHoweverFewRepetitionsThereAre) {
+  for (const int repeats : {3, 5, 7}) {
+    for (const double factor : {10.0, 2.0, 0.5, 0.1}) {
+      const ComparisonReport report = OneOfSixteen(factor, repeats);
+      const Finding found = Only(report, factor > 1.0 ? Judgement::kWorse : Judgement::kBetter);
+      EXPECT_NE(found.one.find("m3"), std::string::npos) << factor << " " << repeats;
+      EXPECT_EQ(report.ExitCode({}), factor > 1.0 ? 1 : 0) << factor << " " << repeats;
+    }
+  }
+  // nothing can be decided about any time: that is not "the same"
+  const ComparisonReport undecided = OneOfSixteen(1.3, 5);
+  EXPECT_EQ(undecided.ExitCode({}), 2);
+  EXPECT_EQ(undecided.Obstacle({}),
+            "16 times not comparable: too few repetitions to decide among 16 times");
+  EXPECT_EQ(OneOfSixteen(1.0, 15).ExitCode({}), 0);
+  // samples that overlap are not apart, whatever their medians
+  std::vector<Record> base = Sound(), fresh = Sound();
+  base[0].Set("series.rhs_ns", std::vector<double>{500.0, 510.0, 5000.0});
+  fresh[0].Set("series.rhs_ns", std::vector<double>{4900.0, 5000.0, 5100.0});
+  EXPECT_EQ(Compare(base, fresh, {}).Count(Judgement::kWorse), 0);
 }
 
 TEST(Compare, NeverComparesTimesOfTwoMachines) {
@@ -265,7 +300,11 @@ TEST(Compare, NeverComparesTimesOfTwoMachines) {
   const ComparisonReport report = Compare(Sound(), fresh, {});
   EXPECT_EQ(report.Count(Judgement::kNotMeasured, "times"), 2);
   EXPECT_EQ(report.Count(Judgement::kSame, "hashes"), 2);  // bits do not depend on the machine
-  EXPECT_EQ(report.ExitCode({}), 0);
+  EXPECT_EQ(report.ExitCode({}), 2);  // times that both have, and none could be compared
+  EXPECT_EQ(report.Obstacle({}), "2 times not comparable: another machine");
+  CompareOptions without;
+  without.only = {"outcomes", "hashes", "counts"};
+  EXPECT_EQ(Exit(Sound(), fresh, without), 0);
   CompareOptions times;
   times.only = {"times"};
   EXPECT_EQ(Exit(Sound(), fresh, times), 2);  // nothing was measured
@@ -318,7 +357,10 @@ TEST(Compare, SaysWhatIsMissing) {
   subset.subset = true;
   EXPECT_EQ(report.ExitCode(subset), 0);
   EXPECT_EQ(Compare(one, Sound(), {}).only_fresh.size(), 1u);
-  EXPECT_EQ(Exit(one, Sound()), 0);
+  EXPECT_EQ(Exit(one, Sound()), 2);  // a base that has lost cases is none
+  CompareOptions added;
+  added.added = true;
+  EXPECT_EQ(Exit(one, Sound(), added), 0);
   EXPECT_EQ(Exit({}, {}), 2);
   EXPECT_EQ(Exit(one, {SoundRecord("toggle", 1)}), 2);
 }

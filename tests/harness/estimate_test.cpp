@@ -9,6 +9,7 @@
 #include <utility>
 
 #include "harness/config/experiment_reader.h"
+#include "harness/record/select.h"
 #include "harness/suite/suite.h"
 
 namespace loopbench::harness {
@@ -40,6 +41,26 @@ TEST(Estimate, NeedsNoPlaceForRows) {
   before != nullptr ? ::setenv("TMPDIR", kept.c_str(), 1) : ::unsetenv("TMPDIR");
   EXPECT_GT(seconds, 0.0);
   EXPECT_TRUE(estimate.cut_off().empty());
+}
+
+/// A pilot for each column, at the one tolerance that the filter leaves; timings need no more.
+TEST(Estimate, PilotsAreOfWhatIsAskedForAndServeTimings) {
+  const std::vector<Experiment> experiments = {
+      ReadExperiment(LOOPBENCH_SOURCE_DIR "/configs/experiments/examples/report.json")};
+  const Selection filter = {ParseCondition("rtol=1e-8"), ParseCondition("mechanism=four-bar"),
+                            ParseCondition("formulation=odca")};
+  Estimate estimate(experiments, {}, filter);
+  const std::vector<Case> cases = SelectCases(experiments[0], filter);
+  ASSERT_EQ(cases.size(), 6u);
+  double seconds = 0.0;
+  for (const Case& one : cases) seconds += estimate.OfCase(0, one);
+  EXPECT_EQ(estimate.pilots(), cases.size());
+  const std::vector<TimingGroup> groups = TimingGroups(experiments[0], filter);
+  ASSERT_EQ(groups.size(), 1u);
+  EXPECT_EQ(groups[0].cases.size(), cases.size());
+  EXPECT_GT(estimate.OfTiming(0, groups[0]), 0.0);
+  EXPECT_EQ(estimate.pilots(), cases.size());
+  EXPECT_GT(seconds, 0.0);
 }
 
 #ifdef LOOPBENCH_PRECISIONS

@@ -217,7 +217,7 @@ TEST_F(ConvertTest, RefusesByNameAndWritesNothing) {
   ExpectEnding(Call("convert four-bar.json --to urdf"), 2, {"urdf", "mjcf"});
   ExpectEnding(Call("convert none.json --to mjcf"), 2, {"none.json"});
   ExpectEnding(Call("convert four-bar.json --to mjcf --out ./four-bar.json"), 2,
-               {"found the mechanism file"});
+               {"found an input of this command"});
   EXPECT_EQ(ReadFile(folder_ / "four-bar.json"), mechanism_);
   // bars that do not reach each other
   EditMechanism("\"C\": [1.5, 0.0]", "\"C\": [9.0, 0.0]");

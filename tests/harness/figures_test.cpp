@@ -9,6 +9,7 @@
 #include <limits>
 #include <map>
 #include <set>
+#include <span>
 #include <string>
 #include <vector>
 
@@ -142,6 +143,33 @@ TEST_F(FiguresTest, AFailedRunEndsInACrossAndIsNamed) {
   EXPECT_TRUE(Contains(svg, "xlink:href='#gpPt1'"));
   EXPECT_TRUE(Contains(svg, "×: failed run"));
   EXPECT_FALSE(Contains(svg, "fitted powers"));
+}
+
+TEST_F(FiguresTest, ARunThatFailsAtItsStartHasACrossOnTheAxisAndTakesNoWidth) {
+  std::vector<Record> records = {RunOf("odca", "joint", 2.0), RunOf("lagrange", "joint", 2.0),
+                                 RunOf("reduction", "joint", 2.0)};
+  for (std::size_t i = 1; i < records.size(); ++i) {
+    records[i].Set("outcome", std::string("singular"));
+    records[i].Set("t_reached", 0.0);
+    records[i].Set("series.drift_t", std::vector<double>{});
+    records[i].Set("series.drift", std::vector<double>{});
+  }
+  const std::string right = GnuplotScript(SingularFigure(std::span(records).first(1))).commands;
+  const std::string script = GnuplotScript(SingularFigure(records)).commands;
+  // in the colours of both, one above the other
+  EXPECT_TRUE(
+      Contains(script, "at first 0, graph 0.03 point pt 2 ps 0.45 lw 1.2 lc rgb '#BB5566'"));
+  EXPECT_TRUE(
+      Contains(script, "at first 0, graph 0.06 point pt 2 ps 0.45 lw 1.2 lc rgb '#DDAA33'"));
+  EXPECT_TRUE(Contains(script, "failed run (singular at 0 s)"));
+  const auto margin = [](const std::string& text) {
+    const std::size_t at = text.find("set rmargin");
+    return text.substr(at, text.find('\n', at) - at);
+  };
+  EXPECT_EQ(margin(script), margin(right));
+  // a logarithmic axis of time has no zero: there the cross is in the corner
+  EXPECT_TRUE(
+      Contains(GnuplotScript(DriftFigure(records)).commands, "at graph 0, graph 0.03 point"));
 }
 
 TEST_F(FiguresTest, LongSeriesKeepTheirExtremes) {
@@ -318,14 +346,31 @@ TEST(FigureRecipes, FormulationsDifferInGrey) {
   EXPECT_GT(reduction - lagrange, 0.125);
 }
 
-TEST_F(FiguresTest, NoLegendHasMoreThanSixRows) {
+TEST_F(FiguresTest, EveryLetterHasItsMeaningInTheLegend) {
   std::vector<Record> records = AllMethods();
-  for (std::size_t i = 0; i < records.size(); i += 3) {
-    records[i].Set("series.drift", records[0].Numbers("series.drift"));  // these coincide
+  // pairs that coincide and differ in all but the solver: lists that cannot be shortened
+  for (std::size_t i = 0; i < records.size() / 2; ++i) {
+    records[records.size() - 1 - i].Set("series.drift", records[i].Numbers("series.drift"));
   }
+  const Figure figure = DriftFigure(records);
+  const auto is_letter = [](const Curve& curve) { return curve.several; };
+  ASSERT_GT(std::ranges::count_if(MergedCurves(figure, FigureSize::kTwoColumn), is_letter), 12);
   for (const FigureSize size : {FigureSize::kOneColumn, FigureSize::kTwoColumn}) {
-    const FigureScript script = GnuplotScript(DriftFigure(records), size);
-    EXPECT_LE(script.legend_rows, kLegendRows);
+    ASSERT_EQ(WriteFigure(folder_ / "figure.svg", figure, size), std::nullopt);
+    const std::string svg = ReadFile(folder_ / "figure.svg");
+    std::size_t letters = 0;
+    for (char letter = 'A'; letter <= 'Z'; ++letter) {
+      if (svg.find(fmt::format("<text>{} ", letter)) == std::string::npos) continue;
+      ++letters;
+      EXPECT_NE(svg.find(fmt::format("{}: ", letter)), std::string::npos) << letter;
+    }
+    const FigureScript script = GnuplotScript(figure, size);
+    if (size == FigureSize::kOneColumn) {
+      EXPECT_LE(script.legend_rows, kLegendRows);
+    } else {
+      EXPECT_GT(letters, 12u) << "the wider size has them all";
+      EXPECT_FALSE(Contains(svg, "…"));
+    }
     EXPECT_GE(script.legend_rows, 4u) << "formulations, levels, coordinates, what coincides";
   }
   Figure many;
@@ -385,7 +430,32 @@ TEST(Axes, HaveNumbersAsAllFiguresHaveThem) {
   EXPECT_EQ(labels({1e-16, 1e-4, true}, 6), "10⁻¹⁵ 10⁻¹² 10⁻⁹ 10⁻⁶ ");
   EXPECT_EQ(labels({2, 7, true}, 6), "2 3 4 5 6 7 ");
   EXPECT_EQ(labels({-1.5, 1.5, false}, 6), "-1.5 -1.0 -0.5 0 0.5 1.0 1.5 ");
+  EXPECT_EQ(labels({1.8e-3, 0.08, true}, 7), "0.002 0.005 0.01 0.02 0.05 ");
+  EXPECT_EQ(labels({3e-7, 6e-6, true}, 6), "5·10⁻⁷ 10⁻⁶ 2·10⁻⁶ 5·10⁻⁶ ");
+  EXPECT_EQ(labels({0.011, 9.9, true}, 4), "0.1 1 ");
   EXPECT_EQ(labels({0, 3e-7, false}, 4), "0 1·10⁻⁷ 2·10⁻⁷ 3·10⁻⁷ ");
+}
+
+TEST(Axes, HaveNumbersAllAlong) {
+  // no logarithmic axis, however long and wherever it begins, has them on one side alone
+  for (int i = 0; i < 400; ++i) {
+    for (const double decades : {0.25, 0.5, 0.9, 1.2, 1.5, 1.9, 2.4, 2.9, 3.5, 6.0, 12.0}) {
+      const double low = std::pow(10.0, 0.013 * i - 9.0);
+      const Axis axis{low, low * std::pow(10.0, decades), true};
+      for (const int most : {4, 6, 7}) {
+        if (most == 4 && decades < 0.9) continue;  // room for a single number at times
+        std::vector<double> places = {0.0};
+        for (const Tick& tick : Ticks(axis, most)) {
+          if (!tick.label.empty()) places.push_back(axis.Place(tick.at));
+        }
+        places.push_back(1.0);
+        for (std::size_t k = 1; k < places.size(); ++k) {
+          EXPECT_LT(places[k] - places[k - 1], 0.6) << low << ' ' << decades << ' ' << most;
+        }
+        EXPECT_LE(places.size(), static_cast<std::size_t>(most) + 3);
+      }
+    }
+  }
 }
 
 TEST_F(FiguresTest, SizesAreThoseOfColumnsWithLettersOfEightPoints) {

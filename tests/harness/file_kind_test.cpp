@@ -46,9 +46,13 @@ TEST_F(FileKindTest, EveryShippedFileIsOfTheKindOfItsFolder) {
     for (const auto& entry : fs::recursive_directory_iterator(kConfigs / folder)) {
       const std::string name = entry.path().filename().string();
       if (entry.path().extension() != ".json" || name.find("states") != std::string::npos) continue;
-      // experiments/models/ has models and for each of them a folder with its ladder
-      const bool is_model = entry.path().string().find("/experiments/models/") != name.npos &&
-                            name.find("-ladder.json") == name.npos;
+      // experiments/models/ has models and for each of them a folder with its ladder,
+      // experiments/overconstrained/ the linkages of one experiment and its claims
+      const std::string path = entry.path().string();
+      const bool is_model =
+          (path.find("/experiments/models/") != path.npos &&
+           name.find("-ladder.json") == name.npos) ||
+          (path.find("/experiments/overconstrained/") != path.npos && name != "claims.json");
       const FileKind expected = folder == std::string("mechanisms")   ? FileKind::kMechanism
                                 : is_model                            ? FileKind::kMechanism
                                 : folder == std::string("benchmarks") ? FileKind::kBenchmarks

@@ -37,7 +37,7 @@ std::vector<Record> Runs() {
 }
 
 FreeFigure DriftOverTolerance() {
-  return {.x = "rtol", .y = "drift_position_max", .group = "formulation", .log = "", .title = ""};
+  return {.x = "rtol", .y = "drift_position_max", .group = "formulation", .log = ""};
 }
 
 std::string Refusal(const std::vector<Record>& records, const FreeFigure& wanted) {
@@ -119,10 +119,67 @@ TEST(FreeFigure, DoubtedRunsAreHollowAndCounted) {
   ASSERT_EQ(values.remarks.size(), 1u);
   EXPECT_EQ(values.remarks[0].find("1 of 5 runs finished with doubts"), 0u) << values.remarks[0];
   const FreeFigureResult series = MakeFreeFigure(
-      runs, {.x = "series.drift_t", .y = "series.drift", .group = "rtol", .log = "", .title = ""});
+      runs, {.x = "series.drift_t", .y = "series.drift", .group = "rtol", .log = ""});
   EXPECT_EQ(std::ranges::count_if(series.figure.curves,
                                   [](const Curve& curve) { return curve.style.doubtful; }),
             1);
+}
+
+std::vector<std::string> LabelsDrawn(const Figure& figure) {
+  std::vector<std::string> labels;
+  for (const Curve& curve : MergedCurves(figure, FigureSize::kTwoColumn)) {
+    if (!curve.label.empty()) labels.push_back(curve.label);
+  }
+  return labels;
+}
+
+TEST(FreeFigure, CurvesThatCoincideAreOneBlackCurveWithBothNames) {
+  std::vector<Record> runs;
+  for (const char* formulation : {"odca", "lagrange", "reduction"}) {
+    for (const double rtol : {1e-6, 1e-8, 1e-10}) {
+      const double apart = formulation[0] == 'r' ? 10.0 : 1.0;
+      runs.push_back(RunOf(formulation, rtol, apart * 100.0 * rtol));
+    }
+  }
+  const std::vector<std::string> names = {"lagrange = odca", "reduction"};
+  const Figure joined = MakeFreeFigure(runs, DriftOverTolerance()).figure;
+  EXPECT_EQ(LabelsDrawn(joined), names);
+  EXPECT_EQ(MergedCurves(joined, FigureSize::kTwoColumn)[0].style.color, "#000000");
+  EXPECT_NE(GnuplotScript(joined).commands.find("\"lagrange = odca\""), std::string::npos);
+  // doubtful runs keep their hollow marks, failed ones their crosses, in the colour of each
+  runs[0].Set("doubts", std::string("energy"));
+  runs[4].Set("doubts", std::string("energy"));
+  for (const std::size_t failed : {2u, 5u}) {
+    runs[failed].Set("outcome", std::string("singular"));
+    runs[failed].Set("drift_position_max", Value());
+  }
+  const Figure marked = MakeFreeFigure(runs, DriftOverTolerance()).figure;
+  EXPECT_EQ(LabelsDrawn(marked), names);
+  const std::vector<Curve> drawn = MergedCurves(marked, FigureSize::kTwoColumn);
+  EXPECT_EQ(drawn[0].hollow.size(), 2u);
+  EXPECT_TRUE(drawn[0].crosses.empty());
+  std::vector<std::string> colors;
+  for (const Curve& curve : drawn) {
+    if (!curve.crosses.empty()) colors.push_back(curve.style.color);
+  }
+  EXPECT_EQ(colors,
+            (std::vector<std::string>{marked.curves[0].style.color, marked.curves[1].style.color}));
+  // clouds of points too
+  for (const std::size_t again : {1u, 4u}) runs.push_back(runs[again]);
+  const Figure cloud = MakeFreeFigure(runs, DriftOverTolerance()).figure;
+  ASSERT_FALSE(cloud.curves[0].line);
+  EXPECT_EQ(LabelsDrawn(cloud), names);
+  runs.back().Set("drift_position_max", 1e-4);
+  EXPECT_EQ(LabelsDrawn(MakeFreeFigure(runs, DriftOverTolerance()).figure).size(), 3u);
+}
+
+TEST(FreeFigure, AnEmptyTitleIsNone) {
+  FreeFigure wanted = DriftOverTolerance();
+  const double titled = GnuplotScript(MakeFreeFigure(Runs(), wanted).figure).height;
+  wanted.title = "";
+  const Figure figure = MakeFreeFigure(Runs(), wanted).figure;
+  EXPECT_EQ(figure.title, "");
+  EXPECT_LT(GnuplotScript(figure).height, titled) << "nor does it take a line";
 }
 
 TEST(FreeFigure, PointsThatShareAnXAreNotJoinedAndTheRemarkSaysWhatIsMixed) {

@@ -139,6 +139,14 @@ TEST_F(HistoryBranchTest, ABranchOfCodeIsNoHistory) {
   Do("$lb history show --branch empty");
   ExpectEnding(Shell("$lb history add first --branch 'a b'"), 2, {"\"a b\"", "name of a branch"});
   ExpectEnding(Shell("$lb history show --branch 'empty^'"), 2, {"\"empty^\""});
+  // what `git branch` refuses, and names that mean another branch
+  Do("git checkout --quiet -b there && git checkout --quiet -");
+  for (const char* name : {"-x", "HEAD", "@{-1}", "a..b", "a.lock", "a/", "/a", ".a", "a\nb"}) {
+    ExpectEnding(Shell("$lb history add first '--branch=" + std::string(name) + "'"), 2,
+                 {"expected the name of a branch"});
+  }
+  EXPECT_EQ(Text("git for-each-ref --format='%(refname:short)' | sort | tr '\n' ' '"),
+            "code empty main there ");
 }
 
 TEST_F(HistoryBranchTest, NothingBeginsBeforeSomethingIsAdded) {
@@ -150,6 +158,64 @@ TEST_F(HistoryBranchTest, NothingBeginsBeforeSomethingIsAdded) {
   ExpectEnding(twice, 2, {"h: found commit"});
   EXPECT_EQ(twice.text.find("tmp"), std::string::npos) << twice.text;
   ExpectEnding(Shell("$lb history mark nobody good --branch h"), 2, {"h: found 0 commits"});
+  EXPECT_EQ(Text("ls tmp"), "");
+}
+
+// A branch may come from anywhere: its lines name files of their own history and no others.
+TEST_F(HistoryBranchTest, ResultsOutsideOfTheHistoryAreRefusedUnread) {
+  Do("$lb history add first --store past --commit a --date 2026-01-01");
+  Write("secret", "root:x:0\n");
+  fs::create_symlink(folder_ / "secret", folder_ / "past/results/link.jsonl");
+  const Record line = ReadRecords(folder_ / "past/history.jsonl").front();
+  const std::vector<std::string> outside = {
+      "../secret", "results/../../secret", (folder_ / "secret").string(), "results/link.jsonl", ".",
+      "results/.."};
+  for (const std::string& name : outside) {
+    fs::remove(folder_ / "past/history.jsonl");
+    Record changed = line;
+    changed.Set("results", name);
+    ResultStore(folder_ / "past/history.jsonl").Append(changed);
+    for (const char* command : {"history show --store past", "compare first --history past"}) {
+      const Ending refused = Shell("$lb " + std::string(command));
+      ExpectEnding(refused, 2,
+                   {"\"results\": found \"" + name + "\", expected a path within the history"});
+      EXPECT_EQ(refused.text.find("root:"), std::string::npos) << refused.text;
+    }
+  }
+  // a folder in the place of a file is named
+  fs::remove(folder_ / "past/history.jsonl");
+  Record folder = line;
+  folder.Set("results", std::string("results"));
+  ResultStore(folder_ / "past/history.jsonl").Append(folder);
+  ExpectEnding(Shell("$lb history show --store past"), 2, {"past/results'", "found a folder"});
+}
+
+TEST_F(HistoryBranchTest, AProgramOrFolderThatIsNotThereIsNamed) {
+  ExpectEnding(Shell("TMPDIR=/nowhere $lb history add first --branch h"), 2,
+               {"TMPDIR: found '/nowhere', expected a folder"});
+  fs::create_directory(folder_ / "none");
+  for (const char* place : {"--branch h", "--store past"}) {
+    ExpectEnding(Shell("PATH=$PWD/none \"$lb\" history add first " + std::string(place)), 2,
+                 {"'git' not found"});
+  }
+}
+
+// Signals that a process can hear leave no temporary folder, and the next command removes those of
+// a process that was killed.
+TEST_F(HistoryBranchTest, SignalsLeaveNoTemporaryFolder) {
+  for (const std::string signal : {"TERM", "HUP", "INT", "KILL"}) {
+    // the signal comes while git works for it
+    StandIn(
+        "case \"$*\" in *hash-object*) ls \"$TMPDIR\" > ../seen || ls $TMPDIR > $TMPDIR/../seen; "
+        "kill -" +
+        signal + " $PPID; sleep 1;; esac");
+    Shell(with_stand_in_ + "(trap - INT; $lb history add first --branch h --commit " + signal +
+          " --date 2026-01-01); true");
+    EXPECT_NE(Text("cat seen"), "") << signal;
+    EXPECT_EQ(Text("ls tmp | wc -l"), signal == "KILL" ? "1\n" : "0\n") << signal;
+    fs::remove(folder_ / "seen");
+  }
+  Do("$lb history add first --branch h --commit a --date 2026-01-01");
   EXPECT_EQ(Text("ls tmp"), "");
 }
 

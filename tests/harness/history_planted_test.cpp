@@ -142,6 +142,48 @@ class PlantedHistory : public HistoryOf {
   }
 };
 
+/// In how many series a step of the times of all eight cases is found at its place, `after` commits
+/// from the end. Expects no other step.
+std::size_t FoundNearTheEnd(const fs::path& folder, std::size_t before, std::size_t after,
+                            double ratio, unsigned seed) {
+  fs::remove_all(folder);
+  std::mt19937_64 random(seed);
+  std::normal_distribution<double> normal(0.0, 0.01);
+  for (std::size_t commit = 0; commit < before + after; ++commit) {
+    std::vector<Record> records;
+    for (std::size_t k = 0; k < kCases; ++k) {
+      const double time = 1e-3 * (commit < before ? 1.0 : ratio) * (1.0 + normal(random));
+      records.push_back(Measured("case" + std::to_string(k), 1e-7, 1000, {time, 1.1 * time}));
+    }
+    AddToHistory(
+        folder,
+        {.commit = CommitName(static_cast<int>(commit)), .date = Date(static_cast<int>(commit))},
+        records, false);
+  }
+  std::size_t found = 0;
+  for (const HistorySeries& series : FindingsOf(ReadHistory(folder)).series) {
+    for (const LevelChange& change : series.changes) found += change.at == before;
+    EXPECT_LE(series.changes.size(), ratio == 1.0 ? 0u : 1u) << series.one;
+  }
+  return found;
+}
+
+// People look at a history when something has just become slow, not twenty commits later.
+TEST_F(PlantedHistory, StepsNearTheEndAreFound) {
+  for (unsigned seed = 0; seed < 3; ++seed) {
+    // nine series have the step: eight cases, and all of them together
+    EXPECT_EQ(FoundNearTheEnd(folder_, 20, 5, 2.0, seed), 9u) << seed;
+    EXPECT_EQ(FoundNearTheEnd(folder_, 20, 5, 0.5, seed), 9u) << seed;
+    // in one short series of twenty the noise seems to last: 8 of 9 and more, 7 by chance
+    EXPECT_GE(FoundNearTheEnd(folder_, 20, 8, 1.1, seed), 7u) << seed;
+    EXPECT_GE(FoundNearTheEnd(folder_, 100, 8, 1.1, seed), 9u) << seed;
+  }
+}
+
+TEST_F(PlantedHistory, TwoHundredQuietCommitsRaiseNoAlarm) {
+  for (unsigned seed = 0; seed < 2; ++seed) FoundNearTheEnd(folder_, 200, 0, 1.0, seed);
+}
+
 TEST_F(PlantedHistory, StepsOfThreePercentAreFoundOnAQuietMachine) {
   Follow(QuietMachine());
   EXPECT_EQ(Found("drift_position_max"), 5);

@@ -179,6 +179,8 @@ TEST_F(HistoryOf, PageSaysNamesAsText) {
   const std::string page = HistoryPage(history, FindingsOf(history), hostile, {hostile});
   EXPECT_EQ(page.find("<img"), std::string::npos);
   EXPECT_NE(page.find("&lt;img"), std::string::npos);
+  // dark where the system is
+  EXPECT_NE(page.find("dataset.theme = dark.matches"), std::string::npos);
 }
 
 }  // namespace history_test

@@ -191,6 +191,20 @@ TEST_P(EveryImplicitProfile, EquationsWithoutSolutionEndAsNewtonFailure) {
   EXPECT_EQ(y[0], 1);
 }
 
+// A pendulum that turns by 0.2 to 0.5 rad a step: Newton's iteration, with one Jacobian a stage,
+// takes more than the few iterations after which a step of variable length would be shortened.
+TEST_P(EveryImplicitProfile, LongFixedStepsConverge) {
+  for (const double step : {0.02, 0.03, 0.04, 0.05}) {
+    TestOde ode = Pendulum();
+    IntegratorOptions options = WithTolerance(GetParam(), 1e-9);
+    options.fixed_step = step;
+    State y{1, 0, 0, 10};
+    const IntegratorResult result = Integrate(ode, 0, 0.6, y, options);
+    EXPECT_EQ(result.outcome, Outcome::kFinished) << step << ": " << result.message;
+    EXPECT_EQ(result.newton_failures, 0);
+  }
+}
+
 // A derivative that fails in a difference quotient, and only there: away from the motion y_1 = 0.
 TEST(IntegratorImplicit, FailureInADifferenceQuotientIsTheOutcome) {
   TestOde ode(2, [](double, auto y, auto ydot) {

@@ -52,7 +52,8 @@ std::string TextOf(const Eigen::Vector3d& v) {
 /// joints that follow a given motion in their only coordinate say nothing, and are left out.
 std::string Everything(const MechanismDescription& d) {
   // a new member must be thought about here: this line stops compiling
-  const auto& [name, space, gravity, bodies, joints, forces, initial, independent] = d;
+  const auto& [name, space, gravity, bodies, joints, forces, initial, independent, accuracy,
+               rounded] = d;
   std::string text = fmt::format("{} {} {}\n", name, ToString(space), TextOf(gravity));
   for (std::size_t i = 0; i < bodies.size(); ++i) {
     const auto& [body_name, mass, com, inertia, points] = bodies[i];
@@ -97,7 +98,9 @@ std::string Everything(const MechanismDescription& d) {
     }
   }
   for (const int held : initial.held) text += follows(held) ? "" : fmt::format("held {}\n", held);
-  return text + fmt::format("{}", fmt::join(independent, " "));
+  // files release nothing, and so nothing that is rounded
+  EXPECT_FALSE(rounded);
+  return text + fmt::format("{} accuracy {}", fmt::join(independent, " "), accuracy);
 }
 
 std::string Everything(const SceneObservation& observe) {

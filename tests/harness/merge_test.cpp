@@ -68,7 +68,7 @@ TEST_F(MergeCommandTest, TrajectoriesAreThoseOfTheRecordsThatAreKept) {
   }
   // and another run's is none
   ExpectEnding(Call("merge cut bare --out m5"), 0,
-               {"no store has trajectories/", "of the run that is kept"});
+               {"no store has trajectories/", "as the run that is kept wrote it"});
   EXPECT_FALSE(fs::exists(folder_ / "m5/trajectories"));
 }
 

@@ -68,6 +68,18 @@ TEST_F(ExplainMechanismTest, StartThatDoesNotCloseIsSaidAfterAllElse) {
                {"OC OA AB BC", "Plan of O-DCA", "closed by joint \"OC\" does not close"});
 }
 
+TEST_F(ExplainMechanismTest, MissedGuessesAreNamed) {
+  EditMechanism("\"AB\": 0.841188", "\"AB\": 0.2");
+  const std::string missed =
+      "the guess of joint \"AB\" is missed: its angle starts at 0.841188 rad, guessed 0.2 rad";
+  const Ending explained = Call("explain four-bar.json"), checked = Call("check four-bar.json");
+  ExpectEnding(explained, 0, {missed});
+  ExpectEnding(checked, 0, {"warning: four-bar.json: four-bar: " + missed});
+  EXPECT_EQ(explained.text.find("\"BC\" is missed"), std::string::npos);
+  EditMechanism("\"AB\": 0.841188", "\"AB\": 0.4");  // 0.44 rad away
+  EXPECT_EQ(Call("check four-bar.json").text.find("missed"), std::string::npos);
+}
+
 TEST_F(ExplainMechanismTest, ExperimentOptionsAreRefused) {
   ExpectEnding(Call("explain four-bar.json --filter mechanism=a"), 2, {"are for experiments"});
 }

@@ -8,6 +8,7 @@
 #include <limits>
 #include <random>
 
+#include "harness/config/formulations.h"
 #include "harness/judge/failure_map_reader.h"
 #include "harness/report/curves.h"
 #include "harness/report/decimate.h"
@@ -100,6 +101,44 @@ TEST(Decimation, GapsStayGaps) {
   EXPECT_EQ(KeepEvenly(5, 10), (std::vector<std::size_t>{0, 1, 2, 3, 4}));
   EXPECT_EQ(KeepEvenly(101, 3), (std::vector<std::size_t>{0, 50, 100}));
   EXPECT_TRUE(KeepEvenly(0, 3).empty());
+}
+
+double Luminance(const std::string& color) {
+  const auto part = [&](std::size_t at) {
+    const double v = std::stoi(color.substr(at, 2), nullptr, 16) / 255.0;
+    return v <= 0.03928 ? v / 12.92 : std::pow((v + 0.055) / 1.055, 2.4);
+  };
+  return 0.2126 * part(1) + 0.7152 * part(3) + 0.0722 * part(5);
+}
+
+TEST(Report, ColoursOfFormulationsAreSeenOnLightAndOnDarkPaper) {
+  const std::string page = PageOf(SomeRecords());
+  // values of variables in the rules of a selector, by the start of their names
+  const auto values = [&](const std::string& selector, const std::string& name) {
+    std::vector<std::string> found;
+    for (std::size_t at = page.find(selector + " {"); at != std::string::npos;
+         at = page.find(selector + " {", at + 1)) {
+      const std::string rule = page.substr(at, page.find('}', at) - at);
+      for (std::size_t k = rule.find(name); k != std::string::npos; k = rule.find(name, k + 1)) {
+        found.push_back(rule.substr(rule.find('#', k), 7));
+      }
+    }
+    return found;
+  };
+  for (const char* selector : {"\n:root", ":root[data-theme='dark']"}) {
+    const std::vector<std::string> paper = values(selector, "--paper:");
+    ASSERT_EQ(paper.size(), 1u) << selector;
+    const std::vector<std::string> looks = values(selector, "--look-");
+    ASSERT_EQ(looks.size(), 2 * FormulationNames().size());
+    for (std::size_t i = 0; i < looks.size(); ++i) {
+      const double a = Luminance(paper[0]) + 0.05, b = Luminance(looks[i]) + 0.05;
+      EXPECT_GE(std::max(a, b) / std::min(a, b), 3.0) << selector << ' ' << looks[i];
+      if (i % 2 == 1) {
+        EXPECT_NE(looks[i], looks[i - 1]) << "joint and absolute coordinates";
+      }
+    }
+  }
+  EXPECT_NE(page.find("\"odca\":[\"--look-0\",\"--look-0-weak\"]"), std::string::npos);
 }
 
 TEST(Report, CountsAreThoseOfTheTables) {
@@ -259,9 +298,44 @@ TEST_F(ReportCommand, MotionsComeFromTheStore) {
     WriteFileAtomically(entry.path(), "no trajectory\n");
   }
   const Ending damaged = Call("report out --out damaged.html");
-  EXPECT_EQ(damaged.code, 0) << damaged.text;
+  EXPECT_EQ(damaged.code, 2) << damaged.text;
   EXPECT_NE(damaged.text.find("no motion"), std::string::npos) << damaged.text;
   EXPECT_EQ(Count(ReadFile(folder_ / "damaged.html"), "\"times\":[0,"), 0u);
+}
+
+// A mechanism or a motion that was changed beside the store is not shown as that of the run.
+TEST_F(ReportCommand, FilesBesideTheStoreAreVerified) {
+  Write("moving.json", R"({"name": "moving", "tolerances": [1e-6],
+    "scenes": [{"mechanism": "four-bar.json", "horizon": 0.5}],
+    "columns": [{"formulation": "odca", "enforcement": "position"}],
+    "output": {"step": 0.05, "quantities": ["bodies"]}, "timing": {"repeats": 0}})");
+  ASSERT_EQ(Call("run moving.json --out out").code, 0);
+  const auto only = [this](const char* kind) {
+    return fs::directory_iterator(folder_ / "out" / kind)->path();
+  };
+  const auto change = [](const fs::path& file, const std::string& from, const std::string& to) {
+    std::string text = ReadFile(file);
+    const std::size_t at = text.rfind(from);
+    ASSERT_NE(at, std::string::npos) << from;
+    WriteFileAtomically(file, text.replace(at, from.size(), to));
+  };
+  const fs::path trajectory = only("trajectories"), mechanism = only("mechanisms");
+  const std::string sound = ReadFile(trajectory), whole = ReadFile(mechanism);
+  ExpectEnding(Call("trajectory out --out csv"), 0, {"wrote csv/"});
+  change(trajectory, "\n0.5,", "\n0.6,");
+  ExpectEnding(Call("trajectory out --out csv2"), 2, {"trajectories/", "the file was changed"});
+  EXPECT_FALSE(fs::exists(folder_ / "csv2"));
+  ExpectEnding(Call("merge out --out merged"), 0, {"as the run that is kept wrote it"});
+  EXPECT_FALSE(fs::exists(folder_ / "merged/trajectories"));
+  const Ending moved = Call("report out --out page.html");
+  if (moved.text.find("built without") != std::string::npos) GTEST_SKIP() << moved.text;
+  ExpectEnding(moved, 2, {"wrote page.html", "the file was changed"});
+  WriteFileAtomically(trajectory, sound);
+  ExpectEnding(Call("report out --out page.html"), 0, {});
+  change(mechanism, "1.5", "1.7");
+  ExpectEnding(Call("report out --out page.html"), 2, {"mechanisms/", "the file was changed"});
+  WriteFileAtomically(mechanism, whole);
+  ExpectEnding(Call("report out --out page.html"), 0, {});
 }
 
 // What is merged moves as its parts did.

@@ -202,6 +202,22 @@ TEST_F(Interruption, ByAFullDiskLeavesCompleteRecordsAndIsSaid) {
   ::umount(disk.c_str());
 }
 
+// A disk that is full, or a file that may not grow, says nothing about a method.
+TEST_F(Interruption, AFaultOfTheMachineIsTheOutcomeOfNoCase) {
+  Write("long.json", R"({"name": "long", "tolerances": [1e-6],
+    "scenes": [{"mechanism": "four-bar.json", "horizon": 1}],
+    "columns": [{"formulation": ["odca", "lagrange"], "enforcement": "position"}],
+    "series": {"points": 2}, "output": {"step": 0.001}, "timing": {"repeats": 0}})");
+  for (const char* isolate : {"", " --isolate"}) {
+    fs::remove_all(folder_ / "out");
+    const std::string run = std::string("run long.json --out out") + isolate;
+    ExpectEnding(Call(run, "ulimit -f 200;"), 2, {"cannot write", ".csv", "File too large"});
+    EXPECT_EQ(ReadFile(folder_ / "out/results.jsonl"), "");
+    EXPECT_TRUE(fs::is_empty(folder_ / "out/trajectories")) << "no part of a trajectory is left";
+    ExpectEnding(Call(run), 0, {"2 run now, 0 were done before"});
+  }
+}
+
 TEST(FullDisk, TakesBackWhatCouldNotBeWrittenWhole) {
   const fs::path store = fs::path(testing::TempDir()) / "loopbench-full-disk";
   fs::remove_all(store);

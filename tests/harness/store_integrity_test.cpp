@@ -79,6 +79,35 @@ TEST_F(StoreIntegrity, AnEditedValueIsNamedWithBothChecksums) {
   }
 }
 
+// Another program that reads and writes the lines spells them otherwise: Python's json.dumps puts
+// blanks in, sorts keys, or ends a line with blanks.
+TEST_F(StoreIntegrity, AWrongChecksumIsRefusedInEverySpelling) {
+  const std::string line = text_.substr(0, text_.find('\n'));
+  const auto with = [](std::string text, const std::string& from, const std::string& to) {
+    for (std::size_t at = 0; (at = text.find(from, at)) != std::string::npos; at += to.size()) {
+      text.replace(at, from.size(), to);
+    }
+    return text;
+  };
+  const std::string edited = with(line, "1.25e-07", "1.25e-15");
+  ASSERT_NE(edited, line);
+  const std::size_t end = edited.find(",\"checksum\"");
+  const std::string checksum = edited.substr(end + 1, edited.size() - end - 2);
+  for (const std::string& changed :
+       {edited, with(with(edited, ":", ": "), ",", ", "), edited + " ", with(edited, "\":", "\" :"),
+        "{" + checksum + "," + edited.substr(1, end - 1) + "}",
+        with(edited, "checksum", "\\u0063hecksum"),
+        with(edited, "\"checksum\":", "\"checksum\":\t")}) {
+    EXPECT_TRUE(Contains(Complaint(changed + "\n"), "the line was changed")) << changed;
+  }
+  // without one nothing can be told; it is read, and said
+  const std::string bare = edited.substr(0, end) + "}\n";
+  EXPECT_TRUE(
+      Contains(Complaint(text_ + bare), "changed.jsonl:3: found a line without its checksum"));
+  ExpectEnding(Call("table changed.jsonl"), 0, {"warning: ", "without its checksum"});
+  ExpectEnding(Call("merge changed.jsonl --out m"), 2, {"without its checksum"});
+}
+
 TEST_F(StoreIntegrity, LinesMadeByHandNeedNoChecksum) {
   EXPECT_EQ(Complaint("{\"kind\":\"timing\",\"bodies\":3}\n"), "");
   EXPECT_EQ(Complaint("{\"kind\":\"timing\",\"bodies\":3}\r\n\r\n\n"), "");
@@ -151,7 +180,8 @@ TEST_F(StoreIntegrity, AFileAsStoreHasItsTablesBesideIt) {
 }
 
 TEST_F(StoreIntegrity, AnotherFormatIsRefusedByNameAndNoneIsThatOfBefore) {
-  EXPECT_EQ(Complaint("{\"format\":1,\"kind\":\"timing\",\"bodies\":3}\n"), "");
+  EXPECT_TRUE(Contains(Complaint("{\"format\":1,\"kind\":\"timing\",\"bodies\":3}\n"),
+                       "found a line without its checksum"));
   EXPECT_EQ(FromJsonLine("{\"format\":1,\"kind\":\"timing\"}").Find("format"), nullptr);
   for (const char* other : {"2", "0", "1.0", "\"1\"", "null", "[1]"}) {
     const std::string said =

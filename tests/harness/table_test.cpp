@@ -4,7 +4,9 @@
 #include <gtest/gtest.h>
 
 #include <algorithm>
+#include <cmath>
 #include <limits>
+#include <map>
 #include <stdexcept>
 #include <string>
 #include <vector>
@@ -145,7 +147,8 @@ TEST(Table, LatexIsBooktabsWithEscapesAndMathematicalNumbers) {
             "50\\%\\_\\allowbreak{}of \\#1 \\& \\{x\\} \\textasciitilde{}\\textasciicircum{}"
             "\\textbackslash{} \\$ & singular & $1.00 \\times 10^{-6}$ & $-0.50$ &  \\\\\n"
             "\\end{longtable}}\n"
-            "% flags 100 %\\n\\end{tabular}\n");
+            "{\\footnotesize\\noindent flags 100 \\%\\textbackslash{}n\\textbackslash{}end\\{"
+            "\\allowbreak{}tabular\\}\\allowbreak{}\\par}\n");
 }
 
 TEST(Table, GroupsAreTablesUnderHeadingsAndColumnsInListsForMachines) {
@@ -182,13 +185,24 @@ TEST(Table, EachFormatPrintsItsDigits) {
   row.Set("x", 1234.5678);
   const auto print = [&](Format format) { return Cell(row, {"x", "x", format, {}}); };
   EXPECT_EQ(print(Format::kInteger), "1235");
-  EXPECT_EQ(print(Format::kShortest), "1234.5678");
+  EXPECT_EQ(print(Format::kShortest), "1235");
   EXPECT_EQ(print(Format::kScientific), "1.23e+03");
   EXPECT_EQ(print(Format::kExponent), "1234.57");
   EXPECT_EQ(print(Format::kFixed), "1234.6");
   EXPECT_EQ(print(Format::kSeconds), "1235");
   row.Set("x", std::vector<double>{0.5, 1e-9});
   EXPECT_EQ(print(Format::kText), "0.5;1e-09");
+  // as people write them, and four digits of what was computed
+  for (const auto& [number, text] :
+       std::map<double, std::string>{{0.02 * std::pow(0.1, 0.5), "0.006325"},
+                                     {1e-6, "1e-06"},
+                                     {0.841188, "0.841188"},
+                                     {-0.25, "-0.25"},
+                                     {1e6, "1000000"},
+                                     {12345.678, "12346"},
+                                     {1e-7 * std::sqrt(10.0), "3.162e-07"}}) {
+    EXPECT_EQ(NumberCell(number), text);
+  }
 }
 
 std::string Keys(const std::vector<TableColumn>& columns) {

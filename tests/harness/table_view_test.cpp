@@ -199,6 +199,28 @@ TEST(TableView, WhatChosenColumnsHideIsSaidInEveryFormat) {
       MakeTable(std::vector<Record>{Ensemble()}, {.columns = {"growth_exponent"}}).notes.empty());
 }
 
+TEST(TableView, DoubtfulRowsHaveTheMarkOfTheCaptionAndTheirReasonsInTheDocument) {
+  Record doubtful = SingleRun();
+  doubtful.Set("doubts", std::string("energy"));
+  doubtful.Set("energy_error_relative", 0.03);
+  const std::vector<Record> records = {Ensemble(), doubtful};
+  const TableView bare{.compact = true, .columns = {"formulation", "growth_exponent"}};
+  const std::string text = ToLatex(MakeTable(records, bare));
+  EXPECT_NE(text.find("1 of 2 rows"), std::string::npos) << text;
+  EXPECT_NE(text.find("odca* & $9.68?$"), std::string::npos) << text;
+  EXPECT_NE(text.find("odca & $2.03$"), std::string::npos) << text;
+  const std::size_t reason = text.find("error of the energy");
+  ASSERT_NE(reason, std::string::npos) << text;
+  EXPECT_NE(text[text.rfind('\n', reason) + 1], '%');
+  const auto title = [&](const TableView& view) { return MakeTable(records, view).title; };
+  const std::string start = "Drift - 1 of 2 rows are doubtful (marked ";
+  EXPECT_EQ(title(bare), start + "*, reasons below)");
+  EXPECT_EQ(title({.compact = true, .columns = {"outcome", "growth_exponent"}}),
+            start + "? in outcome, reasons below)");
+  EXPECT_EQ(title({.columns = {"mechanism"}}), start + "*, column doubts has the reasons)");
+  EXPECT_EQ(title({}), start + "? in outcome, reasons in column doubts)");
+}
+
 TEST(TableView, ShortTablesTellRowsApart) {
   // as runs of several scalars, whose short table had no column for the coordinates
   const auto rung = [](const std::string& coordinates, const std::string& integrator) {

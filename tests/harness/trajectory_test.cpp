@@ -388,6 +388,43 @@ TEST_F(Command, WhatIsMissingIsNamed) {
   EXPECT_FALSE(fs::exists(folder_ / "y.csv"));
 }
 
+TEST_F(Command, AMotionWithoutNumbersIsAnError) {
+  WriteExperiment(R"({"number": 5, "quantities": ["joints", "bodies"]})", "four-bar.json");
+  ExpectEnding(Call("run out.json --out out"), 0, {});
+  fs::copy_file(Files("out/trajectories").at(0), folder_ / "ours.csv");
+  const Trajectory ours = ReadTrajectory(folder_ / "ours.csv");
+  const auto write = [&](std::size_t from, const std::string& cell, std::size_t rows = 5) {
+    std::string text;
+    for (const TrajectoryColumn& column : ours.columns) text += "," + column.Label();
+    for (std::size_t row = 0; row < rows; ++row) {
+      text += fmt::format("\n{}", ours.At(row, ours.time));
+      for (std::size_t i = 1; i < ours.columns.size(); ++i) {
+        text += "," + (row < from ? fmt::format("{}", ours.At(row, i)) : cell);
+      }
+    }
+    Write("theirs.csv", text.substr(1) + "\n");
+  };
+  ASSERT_EQ(ours.time, 0u);
+  for (const char* command : {"trajectory theirs.csv --mechanism four-bar.json",
+                              "trajectory theirs.csv --ours ours.csv"}) {
+    write(5, "");
+    ExpectEnding(Call(command), 0, {});
+    for (const char* cell : {"nan", "inf", "-inf", ""}) {
+      for (const std::size_t from : {0u, 1u, 4u}) {
+        write(from, cell);
+        ExpectEnding(Call(command), 2, {"theirs.csv:", "expected a finite number"});
+      }
+    }
+    write(5, "", 0);
+    ExpectEnding(Call(command), 2, {"theirs.csv: found no row"});
+  }
+  // numbers whose energy is none
+  write(1, "1e300");
+  ExpectEnding(Call("trajectory theirs.csv --mechanism four-bar.json"), 0, {"energy: not known"});
+  Write("early.csv", "t [s],joint:OA:angle [rad]\n-1,0\n0,0\n");
+  ExpectEnding(Call("trajectory early.csv --ours ours.csv"), 0, {"1 of 2 rows are not compared"});
+}
+
 TEST_F(Command, MergeCarriesTrajectoriesAndAResumedRunLeavesNoParts) {
   Write("two.json", std::string(kTinyExperiment).insert(1, R"("output": {"number": 3},)"));
   ExpectEnding(Call("run two.json --out one --shard 1/2"), 0, {});

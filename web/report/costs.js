@@ -67,8 +67,8 @@ const LoopbenchCosts = (() => {
       const kinds = new Map();
       for (const row of this.rows) {
         const name = row.formulation + (row.absolute ? ', absolute' : '') + (row.reason ? ', not compared' : '');
-        const look = looks[row.formulation] || ['#888888', '#888888'];
-        if (!kinds.has(name)) kinds.set(name, {name, colour: look[row.absolute ? 1 : 0], out: !!row.reason, of: new Set()});
+        const colour = LoopbenchPlots.colourOf(looks, row.formulation, row.absolute);
+        if (!kinds.has(name)) kinds.set(name, {name, colour, out: !!row.reason, of: new Set()});
         kinds.get(name).of.add(row);
       }
       const list = [...kinds.values()];
@@ -80,13 +80,13 @@ const LoopbenchCosts = (() => {
         axes: [axis(this.cost.cost, this.logX, {}), axis(this.cost.error, this.logY, {size: 72})],
         series: [{}, {label: 'front', stroke: () => styleOf('--text'), width: 1.5, spanGaps: true, points: {show: false},
                       paths: uPlot.paths.stepped({align: 1})},
-                 ...list.map((kind) => ({label: kind.name, stroke: kind.colour, width: 0, paths: () => null,
-                                         points: {show: true, size: 9, width: 2, fill: kind.out ? 'transparent' : kind.colour}}))],
+                 ...list.map((kind) => ({label: kind.name, stroke: () => styleOf(kind.colour), width: 0, paths: () => null,
+                                         points: {show: true, size: 9, width: 2, fill: () => (kind.out ? 'transparent' : styleOf(kind.colour))}}))],
         hooks: {setCursor: [() => this.hover()], draw: [() => this.drawChosen()]}},
       [x, front, ...list.map((kind) => this.rows.map((row) => (kind.of.has(row) ? row.y : undefined)))], this.stage);
       LoopbenchPlots.attach(this, this.u, () => this.choose(this.near < 0 ? -1 : this.problem.rows.indexOf(this.rows[this.near])));
       this.legend.replaceChildren(...list.map((kind) => make('span', {}, make('span', {class: kind.out ? 'ring' : 'dot',
-          style: 'border-color:' + kind.colour + (kind.out ? '' : ';background:' + kind.colour)}), ' ' + kind.name)),
+          style: 'border-color:var(' + kind.colour + ')' + (kind.out ? '' : ';background:var(' + kind.colour + ')')}), ' ' + kind.name)),
           make('span', {}, make('span', {class: 'stroke'}), ' Pareto front'),
           ...(left ? [make('span', {class: 'soft'}, left + ' runs have no place on these axes')] : []));
     }

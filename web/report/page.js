@@ -71,10 +71,10 @@
     const looks = data('tables').looks, kinds = new Map();
     for (const row of rows) {
       const name = view.runs.formulations[row] + (view.runs.absolute[row] ? ', absolute' : '');
-      kinds.set(name, LoopbenchPlots.colourOf(view.runs, looks, row));
+      kinds.set(name, LoopbenchPlots.colourOf(looks, view.runs.formulations[row], view.runs.absolute[row]));
     }
     view.legend.replaceChildren(...[...kinds].map(([name, colour]) =>
-      make('span', {}, make('span', {class: 'stroke', style: 'border-color:' + colour}), ' ' + name)));
+      make('span', {}, make('span', {class: 'stroke', style: 'border-color:var(' + colour + ')'}), ' ' + name)));
     const ends = view.plots.map((plot) => plot.end());
     const paths = view.scenes[view.scene].paths.map((path) => path.times[path.times.length - 1]);
     clock.end = Math.max(1e-12, ...ends, ...paths);

@@ -4,20 +4,23 @@ const LoopbenchPlots = (() => {
   const {make, button, check, number, styleOf} = LoopbenchParts;
   const MOST_CURVES = 40;
 
-  // A run's colour is its formulation's, strong in joint coordinates and weak in absolute ones.
-  function colourOf(table, looks, row) {
-    const look = looks[table.formulations[row]];
-    return look ? look[table.absolute[row] ? 1 : 0] || look[0] : '#888888';
+  // The name of a run's colour: that of its formulation, strong in joint coordinates, weak in absolute ones.
+  function colourOf(looks, formulation, absolute) {
+    const look = looks[formulation];
+    return look ? look[absolute ? 1 : 0] : '--soft';
   }
 
   // Of logarithmic axes over more than four decades lines are at the decades alone, and words at every few of them.
   const isDecade = (value) => Math.abs(Math.log10(value) - Math.round(Math.log10(value))) < 1e-6;
   const spanOf = (splits) => Math.log10(splits[splits.length - 1] / splits[0]);
   const decades = (u, splits) => (spanOf(splits) > 4 ? splits.map((value) => (isDecade(value) ? value : null)) : splits);
+  // Fewer than three decades have words at 1, 2 and 5 too.
   const everyFew = (u, splits) => {
     const step = Math.ceil(spanOf(splits) / 7);
-    const some = splits.map((value) => (isDecade(value) && Math.round(Math.log10(value)) % step === 0 ? value : null));
-    return spanOf(splits) < 1 || some.every((value) => value === null) ? splits : some;
+    const only = (is) => splits.map((value) => (is(value) ? value : null)), count = (list) => list.filter((value) => value !== null).length;
+    const some = only((value) => isDecade(value) && Math.round(Math.log10(value)) % step === 0);
+    const more = only((value) => [1, 2, 5].some((digit) => isDecade(value / digit)));
+    return count(some) > 2 ? some : count(more) > 2 ? more : splits;
   };
   // uPlot's axes in the colours of the page.
   const axis = (label, log, more) => ({
@@ -87,6 +90,7 @@ const LoopbenchPlots = (() => {
     }
     scaleBy(factor, px, py) {
       const u = this.u, next = {};
+      if (!u) return;  // nothing to draw, nothing to zoom
       const w = u.over.clientWidth, h = u.over.clientHeight;
       for (const [scale, size, p] of [['x', w, px === undefined ? w / 2 : px], ['y', h, py === undefined ? h / 2 : py]]) {
         const ends = [u.posToVal(p - factor * p, scale), u.posToVal(p + factor * (size - p), scale)].sort((a, b) => a - b);
@@ -178,7 +182,7 @@ const LoopbenchPlots = (() => {
         return;
       }
       const series = this.rows.map((row) => ({
-        label: table.names[row], stroke: colourOf(table, looks, row), width: 1.8, spanGaps: false, points: {show: false},
+        label: table.names[row], stroke: () => styleOf(colourOf(looks, table.formulations[row], table.absolute[row])), width: 1.8, spanGaps: false, points: {show: false},
         dash: table.doubts[row] || table.failed[row] ? [6, 4] : undefined,
         alpha: 1}));
       this.u = new uPlot({

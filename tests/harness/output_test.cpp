@@ -1,0 +1,263 @@
+// Where output goes: into devices and pipes, through links, never onto what was read; and what is
+// left of files under way when a signal ends their process.
+#include <fcntl.h>
+#include <gtest/gtest.h>
+#include <sys/stat.h>
+#include <sys/wait.h>
+#include <unistd.h>
+
+#include <csignal>
+#include <cstdlib>
+#include <functional>
+#include <set>
+#include <string>
+#include <thread>
+#include <vector>
+
+#include "harness/text/output_file.h"
+#include "harness/text/temporary_folder.h"
+#include "tests/harness/cli_fixture.h"
+
+namespace loopbench::harness {
+namespace output_test {
+
+std::string ErrorOf(const auto& action) {
+  try {
+    action();
+  } catch (const std::runtime_error& error) {
+    return error.what();
+  }
+  return "no error";
+}
+
+void ExpectPart(const std::string& text, const std::string& part) {
+  EXPECT_NE(text.find(part), std::string::npos) << "no <" << part << "> in\n" << text;
+}
+
+class OutputFiles : public CommandLineTest {
+ protected:
+  fs::path At(const std::string& name) const { return folder_ / name; }
+  void ExpectNothingElse(const std::set<std::string>& names) const {
+    for (const auto& entry : fs::directory_iterator(folder_)) {
+      EXPECT_TRUE(names.contains(entry.path().filename().string())) << entry.path();
+    }
+  }
+  const std::set<std::string> files_ = {"four-bar.json", "tiny.json", "claims.json"};
+};
+
+TEST_F(OutputFiles, GoesThroughLinks) {
+  Write("target", "old");
+  fs::create_symlink("target", At("link"));
+  fs::create_symlink("link", At("second"));
+  WriteFileAtomically(At("second"), "new");
+  EXPECT_EQ(ReadFile(At("target")), "new");
+  EXPECT_TRUE(fs::is_symlink(At("second")) && fs::is_symlink(At("link")));
+  // to what is not there yet, and into a folder elsewhere
+  fs::create_directory(At("folder"));
+  fs::create_symlink("folder/new", At("dangling"));
+  WriteFileAtomically(At("dangling"), "made");
+  EXPECT_TRUE(fs::is_symlink(At("dangling")));
+  EXPECT_EQ(ReadFile(At("folder/new")), "made");
+  fs::create_symlink("circle", At("circle"));
+  ExpectPart(ErrorOf([&] { WriteFileAtomically(At("circle"), "x"); }), "symbolic links");
+  fs::create_symlink("nowhere/x", At("lost"));
+  ExpectPart(ErrorOf([&] { WriteFileAtomically(At("lost"), "x"); }), "No such file");
+}
+
+TEST_F(OutputFiles, GoesIntoDevicesAndPipes) {
+  ASSERT_EQ(::mkfifo(At("pipe").c_str(), 0600), 0);
+  std::string read;
+  std::thread reader([&] {
+    const int pipe = ::open(At("pipe").c_str(), O_RDONLY);
+    char buffer[64];
+    for (ssize_t n; (n = ::read(pipe, buffer, sizeof buffer)) > 0;) {
+      read.append(buffer, static_cast<std::size_t>(n));
+    }
+    ::close(pipe);
+  });
+  WriteFileAtomically(At("pipe"), "through");
+  reader.join();
+  EXPECT_EQ(read, "through");
+  EXPECT_TRUE(fs::is_fifo(At("pipe")));
+  // by links: a mistake here then costs a link, and no device
+  fs::create_symlink("/dev/null", At("null"));
+  fs::create_symlink("/dev/full", At("full"));
+  WriteFileAtomically(At("null"), "gone");
+  EXPECT_TRUE(fs::is_character_file(At("null")));
+  EXPECT_THROW(WriteFileAtomically(At("full"), "x"), SystemFault);
+  EXPECT_TRUE(fs::is_symlink(At("full")));
+  ExpectPart(ErrorOf([&] { WriteFileAtomically(folder_, "x"); }), "found a folder");
+}
+
+TEST_F(OutputFiles, GoesToStandardOutputBehindWhatWasPrinted) {
+  ExpectEnding(Call("run tiny.json --out out"), 0, {});
+  for (const std::string out : {"/dev/stdout", "/dev/fd/1", "/proc/self/fd/1"}) {
+    const std::string table = "table out --format csv --out " + out;
+    ExpectEnding(Call("", "'" LOOPBENCH_BINARY "' " + table + " > text; exit $?;"), 0, {});
+    const std::string text = ReadFile(At("text"));
+    EXPECT_TRUE(text.starts_with("experiment,mechanism,")) << text;
+    ExpectPart(text, "wrote " + out);
+    ExpectEnding(Call(table), 0, {"experiment,mechanism,", "wrote " + out});  // a pipe
+  }
+  ExpectEnding(Call("view four-bar.json --format svg --out /dev/stdout"), 0, {"<svg", "wrote"});
+}
+
+TEST_F(OutputFiles, KeepsWhatAFileMayBe) {
+  Write("private", "old");
+  fs::permissions(At("private"), fs::perms::owner_read | fs::perms::owner_write);
+  WriteFileAtomically(At("private"), "new");
+  EXPECT_EQ(fs::status(At("private")).permissions(),
+            fs::perms::owner_read | fs::perms::owner_write);
+}
+
+TEST_F(OutputFiles, OntoAnInputIsRefused) {
+  Write("input", "text");
+  fs::create_symlink("input", At("link"));
+  fs::create_hard_link(At("input"), At("hard"));
+  {
+    const CommandInputs inputs;
+    EXPECT_EQ(ReadFile(At("link")), "text");
+    for (const char* name : {"input", "link", "hard", "./input"}) {
+      ExpectPart(ErrorOf([&] { WriteFileAtomically(At(name), "x"); }), "an input of this command");
+      ExpectPart(ErrorOf([&] { RequireOutput(At(name)); }), "an input of this command");
+    }
+    WriteFileAtomically(At("other"), "x");
+  }
+  EXPECT_EQ(ReadFile(At("input")), "text");
+  WriteFileAtomically(At("input"), "x");  // the command is over
+  std::set<std::string> names = files_;
+  names.insert({"input", "link", "hard", "other"});
+  ExpectNothingElse(names);
+}
+
+/// Commands that write one file, each with its output last, and the inputs that it must not be.
+struct Writer {
+  std::string command;
+  std::vector<std::string> inputs;
+};
+
+// Each option that names a file, of each command that has one.
+TEST_F(OutputFiles, OfEveryCommandGoesTheSameWay) {
+  Write("moving.json", R"({"name": "moving", "tolerances": [1e-6],
+    "scenes": [{"mechanism": "four-bar.json", "horizon": 0.5}],
+    "columns": [{"formulation": ["odca", "lagrange"], "enforcement": "position"}],
+    "output": {"step": 0.1}, "timing": {"repeats": 0}})");
+  ExpectEnding(Call("run moving.json --out store"), 0, {});
+  fs::copy(At("store"), At("copy"), fs::copy_options::recursive);
+  ExpectEnding(Call("trajectory store --where formulation=odca --out csv"), 0, {});
+  ExpectEnding(Call("trajectory store --where formulation=lagrange --out csv"), 0, {});
+  std::vector<std::string> motions;
+  for (const auto& entry : fs::directory_iterator(At("csv"))) {
+    motions.push_back("csv/" + entry.path().filename().string());
+  }
+  ASSERT_EQ(motions.size(), 2u);
+  ExpectEnding(Call("history add store --store past --commit a --date 2026-01-01"), 0, {});
+  Write(
+      "b.json",
+      R"({"benchmarks": [{"name": "rhs/chain/3/odca/acceleration/joint/rank-revealing", "cpu_time": 1, "real_time": 1},
+    {"name": "rhs/chain/30/odca/acceleration/joint/rank-revealing", "cpu_time": 10, "real_time": 10}]})");
+  const std::string store = "store/results.jsonl";
+  for (const Writer& writer :
+       std::vector<Writer>{{"table store --format csv --out ", {store}},
+                           {"view four-bar.json --format html --out ", {"four-bar.json"}},
+                           {"view four-bar.json --format svg --out ", {"four-bar.json"}},
+                           {"export store --out ", {store}},
+                           {"fit b.json --out ", {"b.json"}},
+                           {"convert four-bar.json --to mjcf --out ", {"four-bar.json"}},
+                           {"compare store copy --markdown ", {store, "copy/results.jsonl"}},
+                           {"compare store copy --junit ", {store, "copy/results.jsonl"}},
+                           {"verdict store --claims claims.json --out ", {store, "claims.json"}},
+                           {"history report --store past --out ", {"past/history.jsonl"}},
+                           {"trajectory " + motions[0] + " --out ", {motions[0]}}}) {
+    SCOPED_TRACE(writer.command);
+    Write("target", "old");
+    fs::remove(At("there"));
+    fs::create_symlink("target", At("there"));
+    ExpectEnding(Call(writer.command + "there"), 0, {});
+    EXPECT_TRUE(fs::is_symlink(At("there")));
+    EXPECT_NE(ReadFile(At("target")), "old");
+    fs::remove(At("there"));
+    ASSERT_EQ(::mkfifo(At("there").c_str(), 0600), 0);
+    ExpectEnding(Call(writer.command + "there", "{ timeout 60 cat there > read & } &&"), 0, {});
+    EXPECT_TRUE(fs::is_fifo(At("there")));
+    fs::remove(At("there"));
+    for (const std::string& input : writer.inputs) {
+      const std::string before = ReadFile(At(input));
+      fs::create_symlink(input, At("there"));
+      for (const std::string& path : {input, std::string("there")}) {
+        ExpectEnding(Call(writer.command + path), 2, {"found an input of this command"});
+      }
+      fs::remove(At("there"));
+      EXPECT_EQ(ReadFile(At(input)), before) << input;
+    }
+  }
+}
+
+TEST_F(OutputFiles, IsAskedForBeforeAnythingIsMeasured) {
+  Write("file", "no folder");
+  const Ending refused = Call("baseline renew --experiments tiny.json --dir file/dir");
+  ExpectEnding(refused, 2, {"cannot write 'file/dir/results.jsonl'", "Not a directory"});
+  EXPECT_EQ(refused.text.find("runs"), std::string::npos) << refused.text;
+  ExpectEnding(Call("advise four-bar.json --out file/x"), 2, {"cannot write 'file/x'"});
+  ExpectEnding(Call("advise four-bar.json --out four-bar.json"), 2, {"an input of this command"});
+}
+
+/// Forks a process that calls `work`, waits until it says that it is ready, and ends it.
+int EndedBy(int signal, const std::function<void()>& work) {
+  int ready[2];
+  EXPECT_EQ(::pipe(ready), 0);
+  const pid_t child = ::fork();
+  if (child == 0) {
+    std::signal(signal, SIG_DFL);
+    work();
+    EXPECT_EQ(::write(ready[1], "x", 1), 1);
+    for (;;) ::pause();
+  }
+  char byte = 0;
+  EXPECT_EQ(::read(ready[0], &byte, 1), 1);
+  ::kill(child, signal);
+  int status = 0;
+  ::waitpid(child, &status, 0);
+  for (const int end : ready) ::close(end);
+  return WIFSIGNALED(status) ? WTERMSIG(status) : 0;
+}
+
+std::size_t Count(const fs::path& folder) {
+  return static_cast<std::size_t>(std::distance(fs::directory_iterator(folder), {}));
+}
+
+TEST_F(OutputFiles, UnderWayIsRemovedBySignals) {
+  const fs::path tmp = At("tmp");
+  fs::create_directory(tmp);
+  const char* before = std::getenv("TMPDIR");
+  const std::string kept = before == nullptr ? "" : before;
+  ::setenv("TMPDIR", tmp.c_str(), 1);
+  const auto work = [&] {
+    auto* folder = new TemporaryFolder("gone");
+    WriteFileAtomically(folder->path() / "a/b", "x");
+    auto* file = new OutputFile(tmp / "out");
+    file->Write("half of it");
+  };
+  for (const int signal : {SIGTERM, SIGHUP, SIGINT}) {
+    EXPECT_EQ(EndedBy(signal, work), signal);
+    EXPECT_EQ(Count(tmp), 0u) << signal;
+  }
+  // no process hears this one: the next folder of the name removes what it left
+  EXPECT_EQ(EndedBy(SIGKILL, [] { new TemporaryFolder("gone"); }), SIGKILL);
+  EXPECT_EQ(Count(tmp), 1u);
+  fs::create_directory(tmp / "gone.tmp-mine-is-longer");
+  {
+    const TemporaryFolder living("gone"), another("gone"), other("other");
+    EXPECT_TRUE(fs::exists(living.path())) << "its lock keeps it";
+    EXPECT_EQ(Count(tmp), 4u);
+  }
+  EXPECT_EQ(Count(tmp), 1u);
+  if (kept.empty()) {
+    ::unsetenv("TMPDIR");
+  } else {
+    ::setenv("TMPDIR", kept.c_str(), 1);
+  }
+}
+
+}  // namespace output_test
+}  // namespace loopbench::harness

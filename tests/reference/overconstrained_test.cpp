@@ -102,8 +102,8 @@ TEST_P(BennettsFrames, AtAnyAngleCostAFewTimesTheDriftOfRedundancyModelledAway) 
       const bool worst = set == Coordinates::kJoint && level == Enforcement::kVelocity;
       const double bound = worst ? 20.0 : 5.0;
       for (const double rtol : {1e-6, 1e-9, 1e-12}) {
-        // Not held over 100 s in joint coordinates at 1e-6: 5.2 and 6.8 times, at 0.4 and 0.8 rad. The
-        // rule is of first order in the drift, which is millimetres by then (docs/numerics.md).
+        // Not held over 100 s in joint coordinates at 1e-6: 5.2 and 6.8 times, at 0.4 and 0.8 rad.
+        // The rule is of first order in the drift, which is millimetres by then (docs/numerics.md).
         const bool drifts_far = rtol == 1e-6 && level == Enforcement::kAcceleration;
         const double horizon = drifts_far && set == Coordinates::kJoint ? 30.0 : 100.0;
         const Record away = RunScene(ModelledAway(), At("odca", level, set), rtol, horizon);

@@ -14,14 +14,6 @@ void Keep(double* largest, double value) {
   if (!std::isnan(*largest) && !(value <= *largest)) *largest = value;
 }
 
-/// Directions that a joint holds: what it leaves free is no mismatch, what it releases because
-/// others hold it is, unless they do so within the accuracy of the input only.
-template <class Space>
-int HeldDirections(const Kinematics<Space, double>& kinematics, int index) {
-  const JointState<Space, double>& state = kinematics.joints()[index];
-  return kinematics.mechanism().is_redundant() ? state.directions() : state.rows();
-}
-
 /// Largest mismatch of some joints: points and rotations apart, and whose points are worst.
 struct Largest {
   double shift = 0.0, rotation = 0.0;
@@ -29,10 +21,8 @@ struct Largest {
 
   template <class Space>
   void Add(const Kinematics<Space, double>& kinematics, int index) {
-    const JointState<Space, double>& state = kinematics.joints()[index];
-    const int all = HeldDirections(kinematics, index);
     const Direction<Space, double> mismatch =
-        state.Sum(state.Along(kinematics.ConstraintMismatch(index), all), all);
+        kinematics.Constrained(index, kinematics.ConstraintMismatch(index));
     Keep(&rotation, mismatch.angular.norm());
     const double s = mismatch.linear.norm();
     if (joint < 0 || !(s <= shift)) {
@@ -95,13 +85,12 @@ void DriftObserver<Space>::ObserveRest(const Sample<Space>& sample) {
   const Kinematics<Space, double>& kinematics = sample.formulation.kinematics();
   rest.dynamics.BodyAccelerations(kinematics, sample.formulation.udot(), rest.A);
   for (int index : kinematics.mechanism().constraints()) {
-    const JointState<Space, double>& state = kinematics.joints()[index];
-    const int all = HeldDirections(kinematics, index);
-    const auto shift_of = [&](const Components<Space, double>& rows) {
-      return state.Sum(rows, all).linear.norm();
+    const auto shift_of = [&](const auto& V) {
+      return kinematics.Constrained(index, V).linear.norm();
     };
-    Keep(&rest.velocity, shift_of(state.Along(state.V_rel, all)));
-    Keep(&rest.acceleration, shift_of(JointAcceleration<Space, double>(kinematics, index, rest.A)));
+    Keep(&rest.velocity, shift_of(kinematics.joints()[index].V_rel));
+    Keep(&rest.acceleration,
+         shift_of(RelativeAcceleration<Space, double>(kinematics, index, rest.A)));
   }
   const Kinematics<Space, double>& closure = rest.view.At(kinematics);
   for (const auto& [index, name] : rest.loop_names) {

@@ -28,8 +28,7 @@ void FactoredState<Space, S>::SetPositions(const Eigen::Ref<const VectorX<S>>& q
   if (changed) kinematics_.Release(released_);
   kinematics_.UpdatePosition(q);
   if (stress_ == nullptr) return;
-  stress_->Factor(kinematics_);
-  if (!stress_->ServesBadly()) return;
+  if (stress_->Factor(kinematics_)) return;
   kinematics_.Release(stress_->Choose(kinematics_));
   const VectorX<S> here = kinematics_.q();
   kinematics_.UpdatePosition(here);
@@ -37,8 +36,13 @@ void FactoredState<Space, S>::SetPositions(const Eigen::Ref<const VectorX<S>>& q
 }
 
 template <class Space, class S>
+void FactoredState<Space, S>::AcceptReleased() {
+  if (stress_ != nullptr) released_ = stress_->Choose(kinematics_);
+}
+
+template <class Space, class S>
 void FactoredState<Space, S>::ShareSpeeds(VectorX<S>& u) {
-  if (stress_ == nullptr) return;
+  if (stress_ == nullptr || stress_->is_exact()) return;
   SetSpeeds(u);
   solver_.Correct(stress_->ShareOfSpeeds(kinematics_), change_);
   u += change_;
@@ -51,10 +55,10 @@ void PositionViolation(const Kinematics<Space, S>& kinematics, VectorX<S>& viola
   for (int index : kinematics.mechanism().constraints()) {
     const Joint<Space, S>& joint = kinematics.mechanism().joints()[index];
     const JointState<Space, S>& state = kinematics.joints()[index];
-    const int count = kinematics.mechanism().is_redundant() ? state.directions() : state.rows();
-    const Components<Space, S> e = state.Along(kinematics.ConstraintMismatch(index), count);
-    violation.segment(joint.row, state.rows()) = e.head(state.rows());
-    const Direction<Space, S> constrained = state.Sum(e, count);
+    const Velocity<Space, S> mismatch = kinematics.ConstraintMismatch(index);
+    violation.segment(joint.row, state.rows()) =
+        state.Along(mismatch, state.rows()).head(state.rows());
+    const Direction<Space, S> constrained = kinematics.Constrained(index, mismatch);
     largest.rotation = std::max(largest.rotation, constrained.angular.norm());
     largest.shift = std::max(largest.shift, constrained.linear.norm());
   }

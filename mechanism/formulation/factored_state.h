@@ -46,12 +46,14 @@ class FactoredState {
   Outcome Correct(const VectorX<S>& violation, VectorX<S>& change);
 
   /// Self-stresses at the current positions; null without redundant constraints.
-  SelfStress<Space, S>* stress() { return stress_.get(); }
+  SelfStress<Space, S>* stress() const { return stress_.get(); }
   /// Adds to speeds the share of the released directions (self_stress.h), after Factor().
   void ShareSpeeds(VectorX<S>& u);
-  /// Keeps the directions released at the current positions. The equations stay the same, apart
-  /// from round-off.
-  void AcceptReleased() { released_ = kinematics_.released(); }
+  /// Releases the directions that serve best at the current positions from now on. The equations
+  /// stay the same to first order in the drift.
+  void AcceptReleased();
+  /// Releases the mechanism's choice again: runs do not depend on runs before.
+  void ForgetReleased() { released_ = mechanism().released(); }
 
  private:
   Kinematics<Space, S> kinematics_;

@@ -49,6 +49,7 @@ void ForwardJacobian<Space>::Evaluate(Eigen::Ref<MatrixX<double>> jacobian) {
     const int count = std::min(Dual::kWidth, size - first);
     Seed(first, count);
     kinematics_.UpdatePosition(q_);
+    if (const auto* stress = system_.stress()) stress->Turn(kinematics_);
     kinematics_.UpdateVelocity(u_);
     if (system_.level().changes_speeds()) ProjectSpeeds(count);
     if (mechanism_.num_u() > 0) Accelerate(count);

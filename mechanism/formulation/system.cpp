@@ -34,6 +34,7 @@ template <class Space, class S>
 Outcome System<Space, S>::Start(S t, const VectorX<S>& q, const VectorX<S>& u) {
   Kinematics<Space, S>& kinematics = state_.kinematics();
   kinematics.SetTime(t);
+  state_.ForgetReleased();
   state_.SetPositions(q);
   state_.SetSpeeds(u);
   kinematics.AcceptStep();
@@ -113,6 +114,7 @@ Outcome System<Space, S>::Accelerate() {
   shares_ = mechanism_.is_redundant() && feedback_->size() == 0 && !level_->changes_speeds() &&
             options_.enforcement != Enforcement::kPosition;
   if (shares_) feedback_ = &state_.stress()->Feedback(kinematics());
+  shares_ = shares_ && !state_.stress()->is_exact();
   const bool is_free = mechanism_.num_u() > 0;
   VectorX<S>* lambda = drives_ != nullptr && integrates_work() ? &lambda_ : nullptr;
   lambda_is_current_ = lambda != nullptr || !is_free;

@@ -97,6 +97,8 @@ class System final : public Ode<S> {
   const VectorX<S>& u() const { return state_.u(); }
   const VectorX<S>& udot() const { return udot_; }
   const Kinematics<Space, S>& kinematics() const { return state_.kinematics(); }
+  /// Self-stresses at the last positions; null without redundant constraints.
+  const SelfStress<Space, S>* stress() const { return state_.stress(); }
 
   /// Accepts the step that ended in `y` at time t. True when the state was projected or the mode
   /// changed, and with it perhaps the state's meaning: then `y` is rewritten and the integrator

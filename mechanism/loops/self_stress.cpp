@@ -1,4 +1,4 @@
-// Names are those of self_stress.h. Columns of J_ are the speeds a, then b.
+// Names are those of self_stress.h. Columns of J are the speeds a along H, then b along D.
 #include "mechanism/loops/self_stress.h"
 
 #include <algorithm>
@@ -29,11 +29,15 @@ void SolveBoth(const MatrixX<S>& L, S* x) {
   SolveLowerTransposed(L.data(), static_cast<int>(L.rows()), x);
 }
 
-/// Velocity of Mo, as a point of Q.
-template <class Space, class S>
-Linear<Space, S> SpeedOfPoint(const Kinematics<Space, S>& kinematics, int joint) {
-  const int body = kinematics.mechanism().joints()[joint].to;
-  return ShiftMotion<Space, S>(kinematics.motions()[body], kinematics.joints()[joint].r_Q).linear;
+/// Of columns i of A and j of B. Eigen's products of a few numbers take longer to start than to
+/// work.
+template <class S>
+S Dot(const MatrixX<S>& A, int i, const MatrixX<S>& B, int j) {
+  const auto size = A.rows();
+  const S *a = A.data() + i * size, *b = B.data() + j * size;
+  S sum(0);
+  for (Eigen::Index k = 0; k < size; ++k) sum += a[k] * b[k];
+  return sum;
 }
 
 /// Rotations count as lengths.
@@ -48,14 +52,12 @@ template <class Space, class S>
 SelfStress<Space, S>::SelfStress(const Mechanism<Space, S>& mechanism) : mechanism_(&mechanism) {
   Span();
   const int m = r_ + d_;
-  J_.setZero(m, H_ + D_);
-  J_rate_.setZero(m, H_ + D_);
+  rows_.setZero(H_, m);
   row_scale_.setOnes(m);
   column_scale_.setOnes(H_ + D_);
   gram_.setIdentity(r_, r_);
   T_.setZero(r_, d_);
   C_.setIdentity(d_, d_);
-  W_c_.setZero(m, d_);
   W_t_.setZero(D_, d_);
   e_t_.setZero(D_);
   z_t_ = e_t_;
@@ -68,6 +70,7 @@ SelfStress<Space, S>::SelfStress(const Mechanism<Space, S>& mechanism) : mechani
   feedback_.setZero(mechanism.num_rows());
   share_ = feedback_;
   if (D_ == 0) force_.setZero(mechanism.num_u());
+  is_exact_ = D_ == 0 && loops_.size() == 1 && loops_.front().num_drives == 0;
 }
 
 /// In joint coordinates the forest is that of the mechanism, in absolute ones a forest of joints
@@ -98,22 +101,33 @@ void SelfStress<Space, S>::Span() {
         if (reached[child]) continue;
         reached[child] = spans[j] = true;
         bodies.push_back(child);
-        edges_[child] = {j,
-                         parent,
-                         joints[j].to == child ? 1 : -1,
-                         edges_[parent].depth + 1,
-                         H_,
-                         in_joints ? -1 : D_};
-        H_ += joints[j].num_u();
-        if (in_joints) continue;
-        D_ += joints[j].num_constraints();
+        edges_[child] = {.joint = j,
+                         .parent = parent,
+                         .sign = joints[j].to == child ? 1 : -1,
+                         .depth = edges_[parent].depth + 1,
+                         .column = in_joints ? joints[j].u_offset : H_,
+                         .D_column = in_joints ? -1 : D_,
+                         .num_u = joints[j].num_u(),
+                         .num_columns = in_joints ? joints[j].num_u() : Space::kDim,
+                         .rate = {}};
         forest_.push_back(child);
+        H_ += joints[j].num_u();
+        if (!in_joints) D_ += joints[j].num_constraints();
       }
     }
   }
   for (const int j : mechanism_->constraints()) {
     if (spans[j]) continue;
-    loops_.push_back({j, r_, d_});
+    loops_.push_back({.joint = j,
+                      .imposed = r_,
+                      .released = d_,
+                      .num_u = joints[j].num_u(),
+                      .num_imposed = joints[j].num_constraints(),
+                      .num_released = joints[j].num_released,
+                      .num_drives = joints[j].num_drives,
+                      .links = LinksOf(j),
+                      .basis = {},
+                      .rate = {}});
     r_ += joints[j].num_constraints();
     d_ += joints[j].num_released;
   }
@@ -121,104 +135,101 @@ void SelfStress<Space, S>::Span() {
 }
 
 template <class Space, class S>
-template <class Sink>
-void SelfStress<Space, S>::ForEachEdge(const Loop& loop, const Sink& sink) const {
-  int to_Q = mechanism_->joints()[loop.joint].to, to_P = mechanism_->joints()[loop.joint].from;
+auto SelfStress<Space, S>::LinksOf(int joint) const -> std::vector<Link> {
+  std::vector<Link> links;
+  int to_Q = mechanism_->joints()[joint].to, to_P = mechanism_->joints()[joint].from;
   while (to_Q != to_P) {
     const bool on_Q = edges_[to_Q].depth >= edges_[to_P].depth;
     int& body = on_Q ? to_Q : to_P;
     const Edge& edge = edges_[body];
-    sink(edge, S(on_Q ? edge.sign : -edge.sign));
+    links.push_back({body, S(on_Q ? edge.sign : -edge.sign), {}, {}});
     body = edge.parent;
   }
+  return links;
 }
 
-/// D^T S(p - p_j) [H_j D_j] of all joints j between the two sides of the loop's joint at p.
+/// D^T S(p - p_j) H_j of all joints j between the two sides of the loop's joint at p.
 template <class Space, class S>
-void SelfStress<Space, S>::FillRows(const Kinematics<Space, S>& kinematics, const Loop& loop) {
+void SelfStress<Space, S>::FillRows(const Kinematics<Space, S>& kinematics, Loop& loop) {
   const S length = mechanism_->length();
-  const JointState<Space, S>& cut = kinematics.joints()[loop.joint];
   const Linear<Space, S> p = kinematics.JointPoint(loop.joint);
-  for (int k = 0; k < cut.directions(); ++k) {
-    row_scale_[RowOf(loop, k)] = ScaleOf<Space, S>(cut.D(k), length);
+  loop.basis = kinematics.joints()[loop.joint].basis;
+  const auto D = std::span(loop.basis).subspan(static_cast<std::size_t>(loop.num_u));
+  for (int k = 0; k < loop.directions(); ++k) {
+    row_scale_[loop.row(k)] = ScaleOf<Space, S>(D[k], length);
   }
-  ForEachEdge(loop, [&](const Edge& edge, S sign) {
+  for (Link& link : loop.links) {
+    const Edge& edge = edges_[link.child];
     const JointState<Space, S>& state = kinematics.joints()[edge.joint];
-    const Linear<Space, S> arm = p - kinematics.JointPoint(edge.joint);
-    const int columns = edge.D_column < 0 ? state.num_u : Space::kDim;
-    for (int i = 0; i < columns; ++i) {
-      const int column = i < state.num_u ? edge.column + i : H_ + edge.D_column + i - state.num_u;
-      const S scale = column_scale_[column] = ScaleOf<Space, S>(state.basis[i], length);
+    link.arm = p - kinematics.JointPoint(edge.joint);
+    for (int i = 0; i < edge.num_columns; ++i) {
+      const int column = ColumnOf(edge, i);
+      const S scale = column_scale_[column] = S(1) / ScaleOf<Space, S>(state.basis[i], length);
+      if (i >= edge.num_u) continue;
       const Velocity<Space, S> V =
-          ShiftMotion<Space, S>(Velocity<Space, S>(state.basis[i] * (sign / scale)), arm);
-      for (int k = 0; k < cut.directions(); ++k) {
-        const int row = RowOf(loop, k);
-        J_(row, column) = row_scale_[row] * cut.D(k).dot(V);
+          ShiftMotion<Space, S>(Velocity<Space, S>(state.basis[i] * (link.sign * scale)), link.arm);
+      for (int k = 0; k < loop.directions(); ++k) {
+        const int row = loop.row(k);
+        rows_(column, row) = row_scale_[row] * D[k].dot(V);
       }
     }
-  });
-}
-
-/// Rates of the same, in axes that turn with P of each joint.
-template <class Space, class S>
-void SelfStress<Space, S>::FillRates(const Kinematics<Space, S>& kinematics, const Loop& loop) {
-  const JointState<Space, S>& cut = kinematics.joints()[loop.joint];
-  const Linear<Space, S> p = kinematics.JointPoint(loop.joint);
-  const Linear<Space, S> p_rate = SpeedOfPoint(kinematics, loop.joint);
-  Basis<Space, S> D_rate, rate;
-  kinematics.BasisRate(loop.joint, Space::kDim, D_rate);
-  ForEachEdge(loop, [&](const Edge& edge, S sign) {
-    const JointState<Space, S>& state = kinematics.joints()[edge.joint];
-    const Linear<Space, S> arm = p - kinematics.JointPoint(edge.joint);
-    const Linear<Space, S> arm_rate = p_rate - SpeedOfPoint(kinematics, edge.joint);
-    const int columns = edge.D_column < 0 ? state.num_u : Space::kDim;
-    kinematics.BasisRate(edge.joint, columns, rate);
-    for (int i = 0; i < columns; ++i) {
-      const int column = i < state.num_u ? edge.column + i : H_ + edge.D_column + i - state.num_u;
-      const S factor = sign / column_scale_[column];
-      const Velocity<Space, S> V_j(state.basis[i] * factor);
-      const Velocity<Space, S> V = ShiftMotion<Space, S>(V_j, arm);
-      Velocity<Space, S> V_rate = ShiftMotion<Space, S>(Velocity<Space, S>(rate[i] * factor), arm);
-      V_rate.linear += Cross<S>(V_j.angular, arm_rate);
-      for (int k = 0; k < cut.directions(); ++k) {
-        const int row = RowOf(loop, k);
-        const S sum = D_rate[cut.num_u + k].dot(V) + cut.D(k).dot(V_rate);
-        J_rate_(row, column) = row_scale_[row] * sum;
-      }
-    }
-  });
-}
-
-template <class Space, class S>
-void SelfStress<Space, S>::Factor(const Kinematics<Space, S>& kinematics) {
-  for (const Loop& loop : loops_) FillRows(kinematics, loop);
-  if (r_ > 0) {
-    const auto J_HR = J_.topLeftCorner(r_, H_);
-    gram_.noalias() = J_HR.lazyProduct(J_HR.transpose());
-    // at a singular position T is that of regularised rows
-    const S trace = gram_.trace();
-    gram_.diagonal().array() += S(64) * std::numeric_limits<S>::epsilon() * trace;
-    pivot_ = FactorInPlace(gram_) / trace;
-    T_.noalias() = J_HR.lazyProduct(J_.block(r_, 0, d_, H_).transpose());
-    for (int k = 0; k < d_; ++k) SolveBoth(gram_, T_.col(k).data());
-    // stages of a step are off the loops by more than steps, and terms of second order count there
-    if (T_.cwiseAbs().maxCoeff() > S(2.5)) pivot_ = S(0);
   }
-  W_c_.topRows(r_) = -T_;
-  W_c_.bottomRows(d_).setIdentity();
-  C_.noalias() = W_c_.transpose().lazyProduct(W_c_);
-  if (D_ > 0) {
-    W_t_.noalias() = -J_.rightCols(D_).transpose().lazyProduct(W_c_);
-    C_.noalias() += W_t_.transpose().lazyProduct(W_t_);
+}
+
+/// Rates of directions, in axes that turn with P of each joint, and of arms.
+template <class Space, class S>
+void SelfStress<Space, S>::FillRates(const Kinematics<Space, S>& kinematics) {
+  /// of Mo, as a point of Q
+  const auto speed = [&](int joint) {
+    const int body = mechanism_->joints()[joint].to;
+    return ShiftMotion<Space, S>(kinematics.motions()[body], kinematics.joints()[joint].r_Q).linear;
+  };
+  for (const int child : forest_) {
+    Edge& edge = edges_[child];
+    kinematics.BasisRate(edge.joint, kinematics.joints()[edge.joint].basis, edge.num_columns,
+                         edge.rate);
+  }
+  for (Loop& loop : loops_) {
+    kinematics.BasisRate(loop.joint, loop.basis, Space::kDim, loop.rate);
+    const Linear<Space, S> p_rate = speed(loop.joint);
+    for (Link& link : loop.links) link.arm_rate = p_rate - speed(edges_[link.child].joint);
+  }
+}
+
+template <class Space, class S>
+S SelfStress<Space, S>::FactorRows() {
+  for (int j = 0; j < r_; ++j) {
+    for (int i = j; i < r_; ++i) gram_(i, j) = Dot(rows_, i, rows_, j);
+  }
+  // at a singular position T is that of regularised rows
+  const S trace = gram_.trace();
+  gram_.diagonal().array() += S(64) * std::numeric_limits<S>::epsilon() * trace;
+  const S pivot = FactorInPlace(gram_) / trace;
+  for (int q = 0; q < d_; ++q) {
+    for (int k = 0; k < r_; ++k) T_(k, q) = Dot(rows_, k, rows_, r_ + q);
+    SolveBoth(gram_, T_.col(q).data());
+  }
+  return pivot;
+}
+
+template <class Space, class S>
+bool SelfStress<Space, S>::Factor(Kinematics<Space, S>& kinematics) {
+  for (Loop& loop : loops_) FillRows(kinematics, loop);
+  const S pivot = r_ > 0 ? FactorRows() : S(1);
+  for (int q = 0; q < d_ && D_ > 0; ++q) {
+    z_c_.head(r_) = -T_.col(q);
+    z_c_.tail(d_) = VectorX<S>::Unit(d_, q);
+    TransposedTimes<false>(kinematics, z_c_, y_);
+    W_t_.col(q) = -y_.tail(D_);
+  }
+  for (int j = 0; j < d_; ++j) {
+    for (int i = j; i < d_; ++i) {
+      C_(i, j) = S(i == j) + Dot(T_, i, T_, j) + Dot(W_t_, i, W_t_, j);
+    }
   }
   FactorInPlace(C_);
-  // W := W C^-T
-  for (MatrixX<S>* W : {&W_c_, &W_t_}) {
-    for (int j = 0; j < d_; ++j) {
-      for (int k = 0; k < j; ++k) W->col(j) -= C_(j, k) * W->col(k);
-      W->col(j) *= C_(j, j);
-    }
-  }
+  Turn(kinematics);
+  return T_.size() == 0 || (pivot >= S(1e-4) && T_.cwiseAbs().maxCoeff() <= S(10));
 }
 
 template <class Space, class S>
@@ -228,11 +239,10 @@ std::vector<Released> SelfStress<Space, S>::Choose(const Kinematics<Space, S>& k
   std::vector<int> joints;
   int next = 0;
   for (const Loop& loop : loops_) {
-    const Joint<Space, S>& joint = mechanism_->joints()[loop.joint];
-    quotas.push_back({next, joint.num_directions(), joint.num_drives, joint.num_constraints()});
+    quotas.push_back({next, loop.directions(), loop.num_drives, loop.num_imposed});
     joints.push_back(loop.joint);
-    for (int k = 0; k < joint.num_directions(); ++k) {
-      rows.row(next++) = J_.row(RowOf(loop, k)).head(H_).template cast<double>();
+    for (int k = 0; k < loop.directions(); ++k) {
+      rows.row(next++) = rows_.col(loop.row(k)).transpose().template cast<double>();
     }
   }
   RowChoice choice(rows, quotas);
@@ -251,55 +261,124 @@ std::vector<Released> SelfStress<Space, S>::Choose(const Kinematics<Space, S>& k
 }
 
 template <class Space, class S>
-void SelfStress<Space, S>::Measure(const Kinematics<Space, S>& kinematics) {
+template <bool kRates>
+void SelfStress<Space, S>::Times(const Kinematics<Space, S>& kinematics, const VectorX<S>& x,
+                                 VectorX<S>& rows) const {
   for (const Loop& loop : loops_) {
-    const JointState<Space, S>& state = kinematics.joints()[loop.joint];
-    const Velocity<Space, S> mismatch = kinematics.ConstraintMismatch(loop.joint);
-    for (int k = 0; k < state.directions(); ++k) {
-      const int row = RowOf(loop, k);
-      e_c_[row] = row_scale_[row] * state.D(k).dot(mismatch);
+    Velocity<Space, S> V = Velocity<Space, S>::Zero(), V_rate = V;
+    for (const Link& link : loop.links) {
+      const Edge& edge = edges_[link.child];
+      const Basis<Space, S>& basis = kinematics.joints()[edge.joint].basis;
+      Velocity<Space, S> at = Velocity<Space, S>::Zero(), at_rate = at;
+      for (int i = 0; i < edge.num_columns; ++i) {
+        const int column = ColumnOf(edge, i);
+        const S speed = link.sign * x[column] * column_scale_[column];
+        at += basis[i] * speed;
+        if constexpr (kRates) at_rate += edge.rate[i] * speed;
+      }
+      V += ShiftMotion<Space, S>(at, link.arm);
+      if constexpr (!kRates) continue;
+      V_rate += ShiftMotion<Space, S>(at_rate, link.arm);
+      V_rate.linear += Cross<S>(at.angular, link.arm_rate);
     }
-  }
-  for (const int child : forest_) {
-    const Edge& edge = edges_[child];
-    const JointState<Space, S>& state = kinematics.joints()[edge.joint];
-    const Velocity<Space, S> mismatch = kinematics.ConstraintMismatch(edge.joint);
-    for (int k = 0; k < state.rows(); ++k) {
-      const int row = edge.D_column + k;
-      e_t_[row] = column_scale_[H_ + row] * state.D(k).dot(mismatch);
+    for (int k = 0; k < loop.directions(); ++k) {
+      const int row = loop.row(k), i = loop.num_u + k;
+      rows[row] = row_scale_[row] *
+                  (kRates ? loop.rate[i].dot(V) + loop.basis[i].dot(V_rate) : loop.basis[i].dot(V));
     }
   }
 }
 
 template <class Space, class S>
+template <bool kRates>
+void SelfStress<Space, S>::TransposedTimes(const Kinematics<Space, S>& kinematics,
+                                           const VectorX<S>& z, VectorX<S>& columns) const {
+  columns.setZero();
+  for (const Loop& loop : loops_) {
+    Wrench<Space, S> F = Wrench<Space, S>::Zero(), F_rate = F;
+    for (int k = 0; k < loop.directions(); ++k) {
+      const S force = row_scale_[loop.row(k)] * z[loop.row(k)];
+      F += Wrench<Space, S>(loop.basis[loop.num_u + k] * force);
+      if constexpr (kRates) F_rate += Wrench<Space, S>(loop.rate[loop.num_u + k] * force);
+    }
+    for (const Link& link : loop.links) {
+      const Edge& edge = edges_[link.child];
+      const Basis<Space, S>& basis = kinematics.joints()[edge.joint].basis;
+      const Wrench<Space, S> at = ShiftForce<Space, S>(F, link.arm);
+      Wrench<Space, S> at_rate = ShiftForce<Space, S>(F_rate, link.arm);
+      if constexpr (kRates) at_rate.angular += Moment<S>(link.arm_rate, F.linear);
+      for (int i = 0; i < edge.num_columns; ++i) {
+        const int column = ColumnOf(edge, i);
+        const S part = kRates ? edge.rate[i].dot(at) + basis[i].dot(at_rate) : basis[i].dot(at);
+        columns[column] += link.sign * column_scale_[column] * part;
+      }
+    }
+  }
+}
+
+template <class Space, class S>
+void SelfStress<Space, S>::Measure(const Kinematics<Space, S>& kinematics) {
+  for (const Loop& loop : loops_) {
+    const Velocity<Space, S> mismatch = kinematics.ConstraintMismatch(loop.joint);
+    for (int k = 0; k < loop.directions(); ++k) {
+      const int row = loop.row(k);
+      e_c_[row] = row_scale_[row] * loop.basis[loop.num_u + k].dot(mismatch);
+    }
+  }
+  for (const int child : forest_) {
+    const Edge& edge = edges_[child];
+    if (edge.D_column < 0) continue;
+    const JointState<Space, S>& state = kinematics.joints()[edge.joint];
+    const Velocity<Space, S> mismatch = kinematics.ConstraintMismatch(edge.joint);
+    for (int k = 0; k < state.rows(); ++k) {
+      const int row = edge.D_column + k;
+      e_t_[row] = state.D(k).dot(mismatch) / column_scale_[H_ + row];
+    }
+  }
+}
+
+template <class Space, class S>
+void SelfStress<Space, S>::ProjectOnStress(VectorX<S>& z_t, VectorX<S>& z_c) {
+  along_ = z_c.tail(d_);
+  along_.noalias() -= T_.transpose().lazyProduct(z_c.head(r_));
+  if (D_ > 0) along_.noalias() += W_t_.transpose().lazyProduct(z_t);
+  SolveBoth(C_, along_.data());
+  z_c.tail(d_) = along_;
+  z_c.head(r_).noalias() = -T_.lazyProduct(along_);
+  if (D_ > 0) z_t.noalias() = W_t_.lazyProduct(along_);
+}
+
+template <class Space, class S>
 const VectorX<S>& SelfStress<Space, S>::Feedback(const Kinematics<Space, S>& kinematics) {
-  for (const Loop& loop : loops_) FillRates(kinematics, loop);
+  FillRates(kinematics);
   Measure(kinematics);
-  const auto J_HR = J_.topLeftCorner(r_, H_);
-  const auto J_D = J_.rightCols(D_);
   // J [a; b] = e
-  z_c_ = e_c_;
-  if (D_ > 0) z_c_.noalias() -= J_D.lazyProduct(e_t_);
-  SolveBoth(gram_, z_c_.data());
-  x_.head(H_).noalias() = J_HR.transpose().lazyProduct(z_c_.head(r_));
+  x_.head(H_).setZero();
   x_.tail(D_) = e_t_;
-  // -W'^T e, by the rates of loops alone: those of J_t vanish
-  z_c_.noalias() = J_rate_.lazyProduct(x_);
-  along_.noalias() = W_c_.transpose().lazyProduct(z_c_);
+  if (D_ > 0) {
+    Times<false>(kinematics, x_, z_c_);
+    e_c_ -= z_c_;
+  }
+  SolveBoth(gram_, e_c_.data());
+  x_.head(H_).noalias() = rows_.leftCols(r_).lazyProduct(e_c_.head(r_));
+  // W (-W'^T e), by the rates of loops alone: those of J_t vanish
+  Times<true>(kinematics, x_, z_c_);
+  z_t_.setZero();
+  ProjectOnStress(z_t_, z_c_);
   // z = W' W'^T e: J^T z = J'^T W (-W'^T e) and W^T z = 0
-  z_c_.noalias() = W_c_.lazyProduct(along_);
-  y_.noalias() = J_rate_.transpose().lazyProduct(z_c_);
-  z_c_.head(r_).noalias() = J_HR.lazyProduct(y_.head(H_));
+  TransposedTimes<true>(kinematics, z_c_, y_);
+  z_c_.head(r_).noalias() = rows_.leftCols(r_).transpose().lazyProduct(y_.head(H_));
   z_c_.tail(d_).setZero();
   SolveBoth(gram_, z_c_.data());
-  along_.noalias() = W_c_.transpose().lazyProduct(z_c_);
   if (D_ > 0) {
-    z_t_ = y_.tail(D_);
-    z_t_.noalias() -= J_D.transpose().lazyProduct(z_c_);
-    along_.noalias() += W_t_.transpose().lazyProduct(z_t_);
-    z_t_.noalias() -= W_t_.lazyProduct(along_);
+    TransposedTimes<false>(kinematics, z_c_, x_);
+    z_t_ = y_.tail(D_) - x_.tail(D_);
   }
-  z_c_.noalias() -= W_c_.lazyProduct(along_);
+  e_c_ = z_c_;
+  e_t_ = z_t_;
+  ProjectOnStress(z_t_, z_c_);
+  z_c_ = e_c_ - z_c_;
+  z_t_ = e_t_ - z_t_;
   ToRows(z_t_, z_c_, feedback_);
   return feedback_;
 }
@@ -307,10 +386,10 @@ const VectorX<S>& SelfStress<Space, S>::Feedback(const Kinematics<Space, S>& kin
 template <class Space, class S>
 const VectorX<S>& SelfStress<Space, S>::ShareOfSpeeds(const Kinematics<Space, S>& kinematics) {
   for (const Loop& loop : loops_) {
-    const JointState<Space, S>& state = kinematics.joints()[loop.joint];
-    for (int k = state.rows(); k < state.directions(); ++k) {
-      const int row = RowOf(loop, k);
-      missed_[row - r_] = row_scale_[row] * state.D(k).dot(state.V_rel);
+    const Velocity<Space, S>& V = kinematics.joints()[loop.joint].V_rel;
+    for (int q = 0; q < loop.num_released; ++q) {
+      const int row = loop.released + q;
+      missed_[row - r_] = row_scale_[row] * loop.basis[loop.num_u + loop.num_imposed + q].dot(V);
     }
   }
   return Share();
@@ -320,12 +399,11 @@ template <class Space, class S>
 const VectorX<S>& SelfStress<Space, S>::ShareOfAccelerations(
     const Kinematics<Space, S>& kinematics, std::span<const Acceleration<Space, S>> A) {
   for (const Loop& loop : loops_) {
-    const Joint<Space, S>& joint = mechanism_->joints()[loop.joint];
-    if (joint.num_released == 0) continue;
+    if (loop.num_released == 0) continue;
     const Components<Space, S> left = JointAcceleration<Space, S>(kinematics, loop.joint, A);
-    for (int k = joint.num_constraints(); k < joint.num_directions(); ++k) {
-      const int row = RowOf(loop, k);
-      missed_[row - r_] = row_scale_[row] * left[k] + z_c_[row];
+    for (int q = 0; q < loop.num_released; ++q) {
+      const int row = loop.released + q;
+      missed_[row - r_] = row_scale_[row] * left[loop.num_imposed + q] + z_c_[row];
     }
   }
   return Share();
@@ -336,41 +414,60 @@ const VectorX<S>& SelfStress<Space, S>::ForceOfStress(const VectorX<S>& lambda) 
   if (D_ > 0) return force_;
   e_c_.setZero();
   for (const Loop& loop : loops_) {
-    const Joint<Space, S>& joint = mechanism_->joints()[loop.joint];
-    for (int k = 0; k < joint.num_constraints(); ++k) {
-      e_c_[loop.imposed + k] = lambda[joint.row + k] / row_scale_[loop.imposed + k];
+    for (int k = 0; k < loop.num_imposed; ++k) {
+      const int row = loop.imposed + k;
+      e_c_[row] = lambda[mechanism_->joints()[loop.joint].row + k] / row_scale_[row];
+      if (k < loop.num_drives) continue;
+      for (int q = loop.released; q < loop.released + loop.num_released; ++q) {
+        e_c_[q] += T_(row, q - r_) * e_c_[row];
+      }
     }
   }
-  along_.noalias() = W_c_.transpose().lazyProduct(e_c_);
-  e_c_.noalias() = W_c_.lazyProduct(along_);
-  force_.noalias() = -J_.transpose().lazyProduct(e_c_);
-  force_ = force_.cwiseProduct(column_scale_);
+  ProjectOnStress(e_t_, e_c_);
+  force_.setZero();
+  for (int k = 0; k < r_ + d_; ++k) force_ -= rows_.col(k) * e_c_[k];
+  force_ = force_.cwiseQuotient(column_scale_);
   return force_;
 }
 
 template <class Space, class S>
 const VectorX<S>& SelfStress<Space, S>::Share() {
-  along_.noalias() = W_c_.bottomRows(d_).transpose().lazyProduct(missed_);
-  y_.tail(D_).noalias() = W_t_.lazyProduct(along_);
-  e_c_.noalias() = W_c_.lazyProduct(along_);
-  ToRows(y_.tail(D_), e_c_, share_);
+  // of W^T rho, rho = [-T_b; 1] missed
+  e_c_.tail(d_) = missed_;
+  e_c_.head(r_).setZero();
+  for (const Loop& loop : loops_) {
+    for (int k = loop.num_drives; k < loop.num_imposed; ++k) {
+      for (int q = loop.released; q < loop.released + loop.num_released; ++q) {
+        e_c_[loop.imposed + k] -= T_(loop.imposed + k, q - r_) * e_c_[q];
+      }
+    }
+  }
+  e_t_.setZero();
+  ProjectOnStress(e_t_, e_c_);
+  ToRows(e_t_, e_c_, share_);
   return share_;
 }
 
 template <class Space, class S>
-void SelfStress<Space, S>::ToRows(const Eigen::Ref<const VectorX<S>>& forest,
-                                  const VectorX<S>& loops, VectorX<S>& rows) const {
+void SelfStress<Space, S>::ToRows(const VectorX<S>& forest, const VectorX<S>& loops,
+                                  VectorX<S>& rows) const {
   for (const Loop& loop : loops_) {
-    const Joint<Space, S>& joint = mechanism_->joints()[loop.joint];
-    for (int k = 0; k < joint.num_constraints(); ++k) {
-      rows[joint.row + k] = loops[loop.imposed + k] / row_scale_[loop.imposed + k];
+    for (int k = 0; k < loop.num_imposed; ++k) {
+      const int row = loop.imposed + k;
+      S sum = loops[row];
+      for (int q = loop.released; k >= loop.num_drives && q < loop.released + loop.num_released;
+           ++q) {
+        sum += T_(row, q - r_) * loops[q];
+      }
+      rows[mechanism_->joints()[loop.joint].row + k] = sum / row_scale_[row];
     }
   }
   for (const int child : forest_) {
     const Edge& edge = edges_[child];
+    if (edge.D_column < 0) continue;
     const Joint<Space, S>& joint = mechanism_->joints()[edge.joint];
     for (int k = 0; k < joint.num_constraints(); ++k) {
-      rows[joint.row + k] = forest[edge.D_column + k] / column_scale_[H_ + edge.D_column + k];
+      rows[joint.row + k] = forest[edge.D_column + k] * column_scale_[H_ + edge.D_column + k];
     }
   }
 }

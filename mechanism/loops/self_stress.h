@@ -14,20 +14,22 @@
 // and eta grows as t^2. Without the term it grows exponentially where W keeps turning. Speeds of
 // level `velocity` satisfy U^T (J u + b) = 0, so that eta' = 0.
 //
-// Solvers impose r rows; d rows Q of the cut joints are released. A solution x0 that has the target
-// c in the imposed rows misses it by J_Q x0 - c_Q in the others, whereas a solution of (1) misses c
-// along W alone. It is x0 + y with J y = W W_Q^T (J_Q x0 - c_Q) in the imposed rows. Multipliers of
-// the imposed rows have a part along W, whose force J^T W W^T lambda is of first order in e, too.
-// In joint coordinates it is taken away, and results depend on the released rows in second order
-// only. In absolute coordinates it stays: without it, Bennett's linkage drifted three times as far.
+// Solvers impose r rows, and d rows Q of the joints that close loops are released. With R the other
+// rows of these joints, J_H their columns H of a spanning forest and T = J_HQ J_HR^+ transposed,
 //
-// Rows t of joints in a spanning forest are independent; in joint coordinates there are none. With
-// speeds a along H and b along D of these joints, J_t is the identity of b, and loops have the rows
-// J_H a + J_D b. With T = J_HQ J_HR^+,
+//   W ~ [-J_D^T W_c; W_c],      W_c = [-T; 1],      U ~ [1; T^T] if nothing but W_c is there.
 //
-//   W ~ [-J_D^T W_c; W_c],      W_c = [-T^T; 1],
+// D are the directions that joints of the forest constrain; in joint coordinates there are none.
+// Each joint imposes its part of U: direction k becomes D_k + sum_q T_kq D_q over directions q that
+// it releases. For one loop in joint coordinates that is all, and solvers solve (1). Otherwise a
+// solution x0 misses c by rho = J x0 - c in the range of [-T_b; 1], T_b the blocks of T that belong
+// to one joint, and rho has to lie along W. It is x0 + y with U_b^T J y = U_b^T W W^T rho.
+// Multipliers have a part along W then, whose force J^T W W^T lambda is of first order in e, too.
+// In joint coordinates it is taken away. In absolute ones it stays: without it, Bennett's linkage
+// drifted three times as far.
 //
-// and the rates follow from J^T W = 0: W'^T e = -W^T J' J^+ e, W' x = -(J^+)^T J'^T W x.
+// Rates of W follow from J^T W = 0: W'^T e = -W^T J' J^+ e, W' x = -(J^+)^T J'^T W x.
+// Multiplication by J' and its transpose are sums along the loops, not matrices.
 //
 // All this holds to first order in e, for rows that are derivatives of e to that order
 // (JointKind::exact_basis). Rotations are multiplied by the mechanism's length, so that all rows
@@ -46,23 +48,35 @@ class SelfStress {
   /// `mechanism` releases directions, and must outlive this.
   explicit SelfStress(const Mechanism<Space, S>& mechanism);
 
-  /// J, T and W at the positions of `kinematics`; no other call may come first. No allocation.
-  void Factor(const Kinematics<Space, S>& kinematics);
-  /// Whether other released directions may serve better here: elements of T, by which a mismatch of
-  /// imposed rows is found in released ones, exceed ten, which costs a digit; or the imposed rows
-  /// are nearly dependent, where T does not show it.
-  bool ServesBadly() const {
-    return d_ > 0 && (pivot_ < S(1e-4) || T_.cwiseAbs().maxCoeff() > S(10));
-  }
+  /// J, T and W at the positions of `kinematics`, and its imposed directions turned as above. No
+  /// other call may come first. No allocation. False if other released directions serve better
+  /// here: elements of T exceed ten, which costs a digit, or imposed rows are nearly dependent.
+  bool Factor(Kinematics<Space, S>& kinematics);
   /// The released directions that serve best here, as many of each joint as the mechanism releases.
   /// Allocates.
   std::vector<Released> Choose(const Kinematics<Space, S>& kinematics) const;
+  /// Turns imposed directions of other kinematics at the same positions.
+  template <class Any>
+  void Turn(Kinematics<Space, Any>& kinematics) const {
+    for (const Loop& loop : loops_) {
+      for (int k = loop.num_drives; k < loop.num_imposed; ++k) {
+        Basis<Space, Any>& basis = kinematics.basis(loop.joint);
+        for (int q = 0; q < loop.num_released; ++q) {
+          const S share = T_(loop.imposed + k, loop.released - r_ + q) *
+                          row_scale_[loop.released + q] / row_scale_[loop.imposed + k];
+          basis[loop.num_u + k] += basis[loop.num_u + loop.num_imposed + q] * Any(share);
+        }
+      }
+    }
+  }
 
   /// W' W'^T e for the imposed rows; speeds must be current.
   const VectorX<S>& Feedback(const Kinematics<Space, S>& kinematics);
-  /// W W_Q^T (J u + b)_Q for the imposed rows, at the speeds of `kinematics`.
+  /// Whether solvers of the imposed rows solve (1). Otherwise the following have to be asked.
+  bool is_exact() const { return is_exact_; }
+  /// U_b^T W W^T rho of speeds, rho = J u + b, for the imposed rows.
   const VectorX<S>& ShareOfSpeeds(const Kinematics<Space, S>& kinematics);
-  /// The same of (J udot - gamma + feedback)_Q for accelerations A of the centres of mass, after
+  /// The same of rho = J udot - gamma + W' W'^T e for accelerations A of the centres of mass, after
   /// Feedback().
   const VectorX<S>& ShareOfAccelerations(const Kinematics<Space, S>& kinematics,
                                          std::span<const Acceleration<Space, S>> A);
@@ -75,40 +89,63 @@ class SelfStress {
   struct Edge {
     int joint = -1, parent = kGround, sign = 1, depth = 0;
     int column = 0, D_column = -1;  ///< first columns of J_H and J_D; -1 in joint coordinates
+    int num_u = 0, num_columns = 0;
+    Basis<Space, S> rate;  ///< of its directions
+  };
+  /// A joint of the forest between the two sides of one that closes a loop.
+  struct Link {
+    int child = 0;
+    S sign = S(1);
+    Linear<Space, S> arm, arm_rate;  ///< from it to the point of the loop's joint
   };
   /// A joint that closes a loop. Rows of loops are imposed ones, then released ones.
   struct Loop {
     int joint = 0, imposed = 0, released = 0;  ///< first rows
+    int num_u = 0, num_imposed = 0, num_released = 0, num_drives = 0;
+    std::vector<Link> links;
+    Basis<Space, S> basis, rate;  ///< as UpdatePosition() has it
+
+    int row(int direction) const {
+      return direction < num_imposed ? imposed + direction : released + direction - num_imposed;
+    }
+    int directions() const { return num_imposed + num_released; }
   };
   void Span();
-  int RowOf(const Loop& loop, int direction) const {
-    const int rows = mechanism_->joints()[loop.joint].num_constraints();
-    return direction < rows ? loop.imposed + direction : loop.released + direction - rows;
+  std::vector<Link> LinksOf(int joint) const;
+  /// Column of J for column i of a joint's [H D].
+  int ColumnOf(const Edge& edge, int i) const {
+    return i < edge.num_u ? edge.column + i : H_ + edge.D_column + i - edge.num_u;
   }
-  /// Calls sink(edge, sign) for each joint of the forest between the two sides of a loop's joint.
-  template <class Sink>
-  void ForEachEdge(const Loop& loop, const Sink& sink) const;
-  /// Rows of J_ and of J_rate_.
-  void FillRows(const Kinematics<Space, S>& kinematics, const Loop& loop);
-  void FillRates(const Kinematics<Space, S>& kinematics, const Loop& loop);
+  void FillRows(const Kinematics<Space, S>& kinematics, Loop& loop);
+  void FillRates(const Kinematics<Space, S>& kinematics);
+  /// gram_ and T_; the least pivot over the trace.
+  S FactorRows();
+  /// J x by the rows of loops, or J' x.
+  template <bool kRates>
+  void Times(const Kinematics<Space, S>& kinematics, const VectorX<S>& x, VectorX<S>& rows) const;
+  /// J^T z, or J'^T z.
+  template <bool kRates>
+  void TransposedTimes(const Kinematics<Space, S>& kinematics, const VectorX<S>& z,
+                       VectorX<S>& columns) const;
+  /// a = (W^T W)^-1 W^T [z_t; z_c], then W a in their place.
+  void ProjectOnStress(VectorX<S>& z_t, VectorX<S>& z_c);
   /// e of the forest's rows and of the loops'.
   void Measure(const Kinematics<Space, S>& kinematics);
-  /// W W_Q^T missed_, in the rows of the mechanism.
+  /// U_b^T W W^T rho, in the rows of the mechanism, for what released rows miss.
   const VectorX<S>& Share();
-  /// Numbers of forest and loops by the mechanism's rows, out of scale.
-  void ToRows(const Eigen::Ref<const VectorX<S>>& forest, const VectorX<S>& loops,
-              VectorX<S>& rows) const;
+  /// U_b^T of numbers of forest and loops, by the mechanism's rows, out of scale.
+  void ToRows(const VectorX<S>& forest, const VectorX<S>& loops, VectorX<S>& rows) const;
 
   const Mechanism<Space, S>* mechanism_;
   std::vector<Edge> edges_;  ///< by child body
-  std::vector<int> forest_;  ///< children of the forest's joints that have rows
+  std::vector<int> forest_;  ///< children of the forest's joints
   std::vector<Loop> loops_;
-  int r_ = 0, d_ = 0;      ///< imposed and released rows of loops
-  S pivot_ = S(1);         ///< least pivot of the imposed rows, over the trace
-  int H_ = 0, D_ = 0;      ///< columns of J_H and J_D
-  MatrixX<S> J_, J_rate_;  ///< [J_H J_D] of the loops; rows and columns in scale
-  VectorX<S> row_scale_, column_scale_;
-  MatrixX<S> gram_, T_, C_, W_c_, W_t_;  ///< gram_ and C_ hold Cholesky factors, T_ holds T^T
+  bool is_exact_ = false;
+  int r_ = 0, d_ = 0;                    ///< imposed and released rows of loops
+  int H_ = 0, D_ = 0;                    ///< columns of J_H and J_D
+  MatrixX<S> rows_;                      ///< J_H transposed; rows and columns in scale
+  VectorX<S> row_scale_, column_scale_;  ///< factors of rows, and of columns: 1 / length
+  MatrixX<S> gram_, T_, C_, W_t_;        ///< gram_ and C_ = W^T W hold Cholesky factors
   VectorX<S> e_t_, e_c_, x_, y_, z_t_, z_c_, missed_, along_, feedback_, share_, force_;
 };
 

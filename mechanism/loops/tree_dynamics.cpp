@@ -303,15 +303,22 @@ void TreeDynamics<Space, S>::JacobianBias(const Kinematics<Space, S>& kinematics
 
 /// D^T of (7), both sides at Mo; H udot drops out because D^T H = 0 (9).
 template <class Space, class S>
-Components<Space, S> JointAcceleration(const Kinematics<Space, S>& kinematics, int index,
-                                       std::span<const Acceleration<Space, S>> A) {
+Acceleration<Space, S> RelativeAcceleration(const Kinematics<Space, S>& kinematics, int index,
+                                            std::span<const Acceleration<Space, S>> A) {
   const Joint<Space, S>& joint = kinematics.mechanism().joints()[index];
   const JointState<Space, S>& state = kinematics.joints()[index];
   const Acceleration<Space, S> A_Q =
       ShiftMotion<Space, S>(A[joint.to], state.r_Q) + kinematics.Centripetal(joint.to, state.r_Q);
   const Acceleration<Space, S> A_P = ShiftMotion<Space, S>(A[joint.from], state.r_P) +
                                      kinematics.Centripetal(joint.from, state.r_P);
-  return state.Along(A_Q - A_P - state.g, joint.num_directions());
+  return A_Q - A_P - state.g;
+}
+
+template <class Space, class S>
+Components<Space, S> JointAcceleration(const Kinematics<Space, S>& kinematics, int index,
+                                       std::span<const Acceleration<Space, S>> A) {
+  return kinematics.joints()[index].Along(RelativeAcceleration<Space, S>(kinematics, index, A),
+                                          kinematics.joints()[index].directions());
 }
 
 /// X of (16) for two bodies that nothing else holds: the sum over both sides of
@@ -339,15 +346,17 @@ JointMatrix<S> FreeResponse(const Kinematics<Space, S>& kinematics, Masses masse
   return X;
 }
 
-#define LOOPBENCH_INSTANTIATE(Space, S)                                                     \
-  template class TreeDynamics<Space, S>;                                                    \
-  template Wrench<Space, S> InertiaTimes(const Kinematics<Space, S>&, int,                  \
-                                         const Acceleration<Space, S>&);                    \
-  template Wrench<Space, S> InertialForce(const Kinematics<Space, S>&, int,                 \
-                                          const Acceleration<Space, S>&);                   \
-  template void SpeedBias(Kinematics<Space, S>&, const VectorX<S>&, VectorX<S>&);           \
-  template Components<Space, S> JointAcceleration(const Kinematics<Space, S>&, int,         \
-                                                  std::span<const Acceleration<Space, S>>); \
+#define LOOPBENCH_INSTANTIATE(Space, S)                                                          \
+  template class TreeDynamics<Space, S>;                                                         \
+  template Wrench<Space, S> InertiaTimes(const Kinematics<Space, S>&, int,                       \
+                                         const Acceleration<Space, S>&);                         \
+  template Wrench<Space, S> InertialForce(const Kinematics<Space, S>&, int,                      \
+                                          const Acceleration<Space, S>&);                        \
+  template void SpeedBias(Kinematics<Space, S>&, const VectorX<S>&, VectorX<S>&);                \
+  template Acceleration<Space, S> RelativeAcceleration(const Kinematics<Space, S>&, int,         \
+                                                       std::span<const Acceleration<Space, S>>); \
+  template Components<Space, S> JointAcceleration(const Kinematics<Space, S>&, int,              \
+                                                  std::span<const Acceleration<Space, S>>);      \
   template JointMatrix<S> FreeResponse(const Kinematics<Space, S>&, Masses, int, bool);
 LOOPBENCH_FOR_EACH_SPACE_AND_MODEL_SCALAR(LOOPBENCH_INSTANTIATE)
 #undef LOOPBENCH_INSTANTIATE

@@ -90,8 +90,13 @@ Wrench<Space, S> InertialForce(const Kinematics<Space, S>& kinematics, int body,
 template <class Space, class S>
 void SpeedBias(Kinematics<Space, S>& kinematics, const VectorX<S>& zero, VectorX<S>& bias);
 
-/// D^T (A_Q - A_P - g) of one joint from the accelerations of all centres of mass: zero when the
-/// joint is satisfied at acceleration level. A number per direction, imposed ones first.
+/// A_Q - A_P - g of one joint from the accelerations A of all centres of mass. Its components D^T
+/// of it vanish when the joint is satisfied at acceleration level.
+template <class Space, class S>
+Acceleration<Space, S> RelativeAcceleration(const Kinematics<Space, S>& kinematics, int joint,
+                                            std::span<const Acceleration<Space, S>> A);
+
+/// Those components, one per direction, imposed ones first.
 template <class Space, class S>
 Components<Space, S> JointAcceleration(const Kinematics<Space, S>& kinematics, int joint,
                                        std::span<const Acceleration<Space, S>> A);

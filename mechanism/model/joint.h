@@ -80,6 +80,13 @@ struct JointKind {
   Acceleration<Space, S> (*exact_bias)(const Pose<Space, S>& X_FM,
                                        const Velocity<Space, S>& V) = nullptr;
 
+  /// The rate of `basis` [H D] for a relative velocity V, both in F axes, where angular parts alone
+  /// move; null where they do not, or it is not known.
+  void (*basis_rate)(const Pose<Space, S>& X_FM, const Velocity<Space, S>& V,
+                     Basis<Space, S>& rate_F) = nullptr;
+  void (*exact_basis_rate)(const Pose<Space, S>& X_FM, const Velocity<Space, S>& V,
+                           Basis<Space, S>& rate_F) = nullptr;
+
   bool has_quaternion() const { return num_q > num_u; }
   int num_constraints() const { return Space::kDim - num_u; }
 };

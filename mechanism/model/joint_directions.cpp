@@ -123,20 +123,30 @@ void Kinematics<Space, S>::SetDirections(int index, const Rotation<Space, S>& R_
 }
 
 template <class Space, class S>
-void Kinematics<Space, S>::BasisRate(int index, int count, Basis<Space, S>& rate) const {
+void Kinematics<Space, S>::BasisRate(int index, const Basis<Space, S>& basis, int count,
+                                     Basis<Space, S>& rate) const {
   const Joint<Space, S>& joint = mechanism_->joints()[index];
   const JointState<Space, S>& state = joints_[index];
   const Angular<Space, S>& w_P = motions_[joint.from].angular;
   for (int i = 0; i < count; ++i) {
-    rate[i].angular = CrossAngular<S>(w_P, state.basis[i].angular);
-    rate[i].linear = Cross<S>(w_P, state.basis[i].linear);
+    rate[i].angular = CrossAngular<S>(w_P, basis[i].angular);
+    rate[i].linear = Cross<S>(w_P, basis[i].linear);
   }
-  const S speed = state.V_rel.angular.norm() + state.V_rel.linear.norm() / mechanism_->length();
-  if (joint.kind->basis == nullptr || !(speed > S(0))) return;
-  const S step = S(kRelativeStep) / speed;
+  if (joint.kind->basis == nullptr) return;
   const Rotation<Space, S> R_WF = poses_[joint.from].R * joint.X_PF.R;
   const Velocity<Space, S> V = Rotate<Space, S>(R_WF.transpose(), state.V_rel);
   Basis<Space, S> ahead, behind;
+  if (joint.kind->basis_rate != nullptr) {
+    joint.kind->basis_rate(joint_poses_[index], V, ahead);
+    OrderDirections(index, ahead);
+    if constexpr (Space::kRot == 3) {
+      for (int i = 0; i < count; ++i) rate[i].angular += R_WF * ahead[i].angular;
+    }
+    return;
+  }
+  const S speed = state.V_rel.angular.norm() + state.V_rel.linear.norm() / mechanism_->length();
+  if (!(speed > S(0))) return;
+  const S step = S(kRelativeStep) / speed;
   joint.kind->basis(Moved(joint_poses_[index], V, step), ahead, joint.kind->parameter);
   joint.kind->basis(Moved(joint_poses_[index], V, -step), behind, joint.kind->parameter);
   for (int i = 0; i < Space::kDim; ++i) ahead[i] -= behind[i];
@@ -153,15 +163,16 @@ void Kinematics<Space, S>::FollowDirections(int index, const Rotation<Space, S>&
       joint_poses_[index].R = R_WF.transpose() * (poses_[joint.to].R * joint.X_QM.R);
     }
     SetDirections(index, R_WF);
-  } else if (!AnyAxes(joint) && joint.from != kGround) {
+  } else if (!AnyAxes(joint) && (joint.from != kGround || joint.num_released > 0)) {
     SetDirections(index, R_WF);
   }
 }
 
-#define LOOPBENCH_INSTANTIATE(Space, S)                                            \
-  template void Kinematics<Space, S>::Release(const std::vector<Released>&);       \
-  template int Kinematics<Space, S>::DirectionOf(int, int) const;                  \
-  template void Kinematics<Space, S>::BasisRate(int, int, Basis<Space, S>&) const; \
+#define LOOPBENCH_INSTANTIATE(Space, S)                                           \
+  template void Kinematics<Space, S>::Release(const std::vector<Released>&);      \
+  template int Kinematics<Space, S>::DirectionOf(int, int) const;                 \
+  template void Kinematics<Space, S>::BasisRate(int, const Basis<Space, S>&, int, \
+                                                Basis<Space, S>&) const;          \
   template void Kinematics<Space, S>::FollowDirections(int, const Rotation<Space, S>&);
 LOOPBENCH_FOR_EACH_SPACE_AND_MODEL_SCALAR(LOOPBENCH_INSTANTIATE)
 #undef LOOPBENCH_INSTANTIATE

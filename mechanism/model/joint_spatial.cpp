@@ -61,27 +61,36 @@ struct Kinds {
   /// rates (y_F x z_M) . w and (z_M x x_F) . w; no tilt changes by a turn about z_M.
   struct Tilt {
     Angular<Spatial, S> about_x, about_y, z_M;
-    explicit Tilt(const P& X)
-        : about_x(Angular<Spatial, S>::Unit(1).cross(X.R.col(2))),
-          about_y(X.R.col(2).cross(Angular<Spatial, S>::Unit(0))),
-          z_M(X.R.col(2)) {}
+    explicit Tilt(const Angular<Spatial, S>& z)
+        : about_x(Angular<Spatial, S>::Unit(1).cross(z)),
+          about_y(z.cross(Angular<Spatial, S>::Unit(0))),
+          z_M(z) {}
   };
-  /// [H D] of a kind with these `axes`, with exact tilts.
+  /// [H D] of a kind with these `axes`, with exact tilts; other axes have this length. Linear in
+  /// z_M and the length.
   template <int... kAxes>
-  static void TiltBasis(const P& X, Basis<Spatial, S>& basis_F, S) {
-    const Tilt tilt(X);
+  static void TiltAxes(const Angular<Spatial, S>& z_M, S length, Basis<Spatial, S>& basis_F) {
+    const Tilt tilt(z_M);
     const int axes[] = {kAxes...};
     for (int i = 0; i < Spatial::kDim; ++i) {
       basis_F[i] = axes[i] == 0   ? Turn(tilt.about_x)
                    : axes[i] == 1 ? Turn(tilt.about_y)
                    : axes[i] == 2 ? Turn(tilt.z_M)
-                                  : Direction<Spatial, S>::Unit(axes[i]);
+                                  : Direction<Spatial, S>::Unit(axes[i]) * length;
     }
+  }
+  template <int... kAxes>
+  static void TiltBasis(const P& X, Basis<Spatial, S>& basis_F, S) {
+    TiltAxes<kAxes...>(X.R.col(2), S(1), basis_F);
+  }
+  template <int... kAxes>
+  static void TiltRate(const P& X, const Velocity<Spatial, S>& V, Basis<Spatial, S>& rate_F) {
+    TiltAxes<kAxes...>(V.angular.cross(X.R.col(2)), S(0), rate_F);
   }
   /// Second derivatives of the tilts, less the part that is linear in the accelerations:
   /// d/dt (y_F x z_M) . w = w^2 (y_F . z_M) - (w . z_M) (w . y_F), likewise about y.
   static Acceleration<Spatial, S> TiltBias(const P& X, const Velocity<Spatial, S>& V) {
-    const Tilt tilt(X);
+    const Tilt tilt(X.R.col(2));
     const Angular<Spatial, S>& w = V.angular;
     const S square = w.dot(w), spin = w.dot(tilt.z_M);
     return {tilt.about_x * (spin * w[1] - square * tilt.z_M[1]) -
@@ -102,7 +111,8 @@ struct Kinds {
             .coordinates = [](const P& X, S* q, S) { q[0] = AngleAboutZ(X); },
             .rates = SameRates<S, 1>,
             .exact_basis = TiltBasis<2, 0, 1, 3, 4, 5>,
-            .exact_bias = TiltBias};
+            .exact_bias = TiltBias,
+            .exact_basis_rate = TiltRate<2, 0, 1, 3, 4, 5>};
   }
   static JointKind<Spatial, S> Prismatic() {
     return {.num_q = 1,
@@ -163,7 +173,8 @@ struct Kinds {
                 },
             .rates = SameRates<S, 2>,
             .exact_basis = TiltBasis<2, 3, 0, 1, 4, 5>,
-            .exact_bias = TiltBias};
+            .exact_bias = TiltBias,
+            .exact_basis_rate = TiltRate<2, 3, 0, 1, 4, 5>};
   }
   static JointKind<Spatial, S> Cylindrical() {
     return {.num_q = 2,
@@ -181,7 +192,8 @@ struct Kinds {
                 },
             .rates = SameRates<S, 2>,
             .exact_basis = TiltBasis<2, 5, 0, 1, 3, 4>,
-            .exact_bias = TiltBias};
+            .exact_bias = TiltBias,
+            .exact_basis_rate = TiltRate<2, 5, 0, 1, 3, 4>};
   }
   /// The paper's example: H = [1; 0], D = [0; 1] in blocks of three (8).
   static JointKind<Spatial, S> Spherical() {
@@ -213,7 +225,8 @@ struct Kinds {
                 },
             .rates = SameRates<S, 3>,
             .exact_basis = TiltBasis<2, 3, 4, 0, 1, 5>,
-            .exact_bias = TiltBias};
+            .exact_bias = TiltBias,
+            .exact_basis_rate = TiltRate<2, 3, 4, 0, 1, 5>};
   }
   static JointKind<Spatial, S> Universal() {
     return {.num_q = 2,
@@ -312,7 +325,8 @@ struct Kinds {
                   basis_F[0].linear = pitch * z;
                   basis_F[5] = {-pitch / length * z, z / length};
                 },
-            .exact_bias = TiltBias};
+            .exact_bias = TiltBias,
+            .exact_basis_rate = TiltRate<2, 0, 1, 3, 4, 5>};
   }
 };
 

@@ -74,6 +74,8 @@ class Kinematics {
   const std::vector<Pose<Space, S>>& poses() const { return poses_; }          ///< at the com
   const std::vector<Velocity<Space, S>>& motions() const { return motions_; }  ///< at the com
   const std::vector<JointState<Space, S>>& joints() const { return joints_; }
+  /// [H D] of a joint, to be changed until the next UpdatePosition().
+  Basis<Space, S>& basis(int joint) { return joints_[joint].basis; }
 
   /// Classical acceleration of the point of `body` at r from its centre of mass minus that of the
   /// centre of mass, for zero angular acceleration: [0; w x (w x r)].
@@ -102,6 +104,19 @@ class Kinematics {
   /// constraint function whose Jacobian is tree_dynamics.h's J.
   Velocity<Space, S> ConstraintMismatch(int joint) const;
 
+  /// The part of a relative motion that a constraint forbids, with directions released because
+  /// others forbid them, but without those released for the accuracy of the input only.
+  template <class Kind>
+  Direction<Space, S> Constrained(int joint, const SpatialVector<Space, S, Kind>& V) const {
+    const JointState<Space, S>& state = joints_[joint];
+    if (!mechanism_->is_redundant()) return state.Sum(state.Along(V, state.rows()), state.rows());
+    Direction<Space, S> part(V.angular, V.linear);
+    for (int i = 0; i < state.num_u; ++i) {
+      part -= state.H(i) * (state.H(i).dot(V) / state.H(i).squaredNorm());
+    }
+    return part;
+  }
+
   /// D^T V_rel less the rates of prescribed coordinates: zero when a constraint holds at velocity
   /// level. joints()[joint].rows() numbers, the others zero.
   Components<Space, S> ConstraintSpeed(int joint) const;
@@ -118,10 +133,10 @@ class Kinematics {
   /// coordinate).
   int DirectionOf(int joint, int row) const;
 
-  /// Rates of the first `count` columns [H D] of a joint, in axes that turn with F and as
-  /// components along ground axes. Motions must be current. Those of a basis that depends on the
-  /// pose are central differences, with relative errors of 1e-10.
-  void BasisRate(int joint, int count, Basis<Space, S>& rate) const;
+  /// Rates of the first `count` columns of a joint's `basis` [H D] as UpdatePosition() has it, in
+  /// axes that turn with F and as components along ground axes. Motions must be current. Without
+  /// JointKind::basis_rate they are central differences, with relative errors of 1e-10.
+  void BasisRate(int joint, const Basis<Space, S>& basis, int count, Basis<Space, S>& rate) const;
 
   /// Remembers the coordinates of cut joints, so that the next angles are unwrapped from here.
   /// Called at accepted steps only (the one memory of this class, part of the mode).

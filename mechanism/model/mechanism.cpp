@@ -185,6 +185,7 @@ void Mechanism<Space, S>::AddJoints(const MechanismDescription& description,
       JointKind<Space, S> exact = *joint.kind;
       exact.basis = exact.exact_basis;
       exact.bias = exact.exact_bias;
+      exact.basis_rate = exact.exact_basis_rate;
       own_kinds_.push_back(std::make_shared<const JointKind<Space, S>>(exact));
       joint.kind = own_kinds_.back().get();
     }

@@ -51,9 +51,10 @@ TEST(DriftOfBennettsLinkage, GrowsQuadraticallyAtAccelerationLevel) {
 }
 
 TEST(DriftOfBennettsLinkage, GrowsLinearlyAtVelocityLevel) {
+  // the part that comes back with each turn hides the growth for 100 s in reduction (t^0.81)
   for (const std::string formulation : {"odca", "lagrange", "reduction"}) {
     const Record record =
-        RunScene(Shipped("bennett"), At(formulation, Enforcement::kVelocity), 1e-8, 100.0, 8);
+        RunScene(Shipped("bennett"), At(formulation, Enforcement::kVelocity), 1e-8, 400.0, 8);
     EXPECT_EQ(record.Number("ensemble_failed"), 0);
     EXPECT_NEAR(record.Number("growth_exponent"), 1.0, 0.15);
   }
@@ -97,22 +98,15 @@ TEST_P(BennettsFrames, AtAnyAngleCostAFewTimesTheDriftOfRedundancyModelledAway) 
   const MechanismFile bennett = WithTurnedFrames(Shipped("bennett"), GetParam());
   for (const Coordinates set : {Coordinates::kJoint, Coordinates::kAbsolute}) {
     for (const Enforcement level : {Enforcement::kAcceleration, Enforcement::kVelocity}) {
-      // in joint coordinates at velocity level the coefficients of the choice show in full (12 to
-      // 16 times, where ten were hoped for), elsewhere a fraction; and a quarter to spare
-      const bool worst = set == Coordinates::kJoint && level == Enforcement::kVelocity;
-      const double bound = worst ? 20.0 : 5.0;
       for (const double rtol : {1e-6, 1e-9, 1e-12}) {
-        // Not held over 100 s in joint coordinates at 1e-6: 5.2 and 6.8 times, at 0.4 and 0.8 rad.
-        // The rule is of first order in the drift, which is millimetres by then (docs/numerics.md).
-        const bool drifts_far = rtol == 1e-6 && level == Enforcement::kAcceleration;
-        const double horizon = drifts_far && set == Coordinates::kJoint ? 30.0 : 100.0;
-        const Record away = RunScene(ModelledAway(), At("odca", level, set), rtol, horizon);
-        const Record record = RunScene(bennett, At("odca", level, set), rtol, horizon);
+        const Record away = RunScene(ModelledAway(), At("odca", level, set), rtol, 100.0);
+        const Record record = RunScene(bennett, At("odca", level, set), rtol, 100.0);
         ASSERT_EQ(away.Text("outcome"), "finished");
         EXPECT_EQ(record.Text("outcome"), "finished");
         const double ratio =
             record.Number("drift_position_max") / away.Number("drift_position_max");
-        EXPECT_LE(ratio, bound);
+        // rows of another joint in another scale: measured 0.7 to 3.6, at every angle the same
+        EXPECT_LE(ratio, 5.0);
         std::cout << ToString(level) << " " << ToString(set) << " " << rtol << ": "
                   << record.Number("drift_position_max") << " m, " << ratio
                   << " times that modelled away\n";

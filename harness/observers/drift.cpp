@@ -14,8 +14,8 @@ void Keep(double* largest, double value) {
   if (!std::isnan(*largest) && !(value <= *largest)) *largest = value;
 }
 
-/// Directions that a joint holds: what it leaves free is no mismatch, what it releases because
-/// others hold it is, unless they do so within the accuracy of the input only.
+/// Directions that a joint holds. A free direction has no mismatch. A direction released because
+/// other joints hold it has one, unless they do so within the accuracy of the input only.
 template <class Space>
 int HeldDirections(const Kinematics<Space, double>& kinematics, int index) {
   const JointState<Space, double>& state = kinematics.joints()[index];

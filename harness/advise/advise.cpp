@@ -320,7 +320,7 @@ class Pilot {
     }
   }
 
-  /// Looks at the best until one is without doubts and keeps what was asked for, and puts it first.
+  /// Examines the best until one has no doubts and keeps the requested error, and puts it first.
   void Examine(const std::function<void(Trial&)>& examine) {
     for (std::size_t i = 0; i < advice_.finalists.size(); ++i) {
       Trial& trial = advice_.finalists[i];

@@ -17,8 +17,8 @@
 
 namespace loopbench::harness {
 
-/// Trials must keep this share of the error that is asked for: between a reference's times errors
-/// may be larger, and the last bits of another machine change them.
+/// Trials must stay below this share of the requested error. Errors may be larger between a
+/// reference's times, and the last bits of another machine change them.
 inline constexpr double kErrorShare = 0.7;
 
 struct AdviceRequest {
@@ -37,9 +37,8 @@ struct Advice {
   double pilot_s = 0.0;  ///< wall time of all of it [s]
 };
 
-/// `length` [m] is that of a link. `examine` runs a choice with all observers, enters what speaks
-/// against it and the error that this run had; a finalist with doubts is no advice unless all have
-/// some.
+/// `length` [m] is the length of a link. `examine` runs a choice with all observers and enters its
+/// warnings and its error. A finalist with doubts is no advice unless all have some.
 Advice Advise(const AdviceRequest& request, TrialBench& bench, double horizon, double length,
               const std::function<void(Trial&)>& examine);
 

@@ -53,7 +53,7 @@ struct PoseDifference {
 };
 /// Of the bodies that two records both have.
 PoseDifference DifferenceOf(const Record& a, const Record& b);
-/// Of any two of `runs` of one scene, whatever their order.
+/// The largest between any two of `runs` of one scene, in any order.
 PoseDifference LargestDifference(std::span<const Record> runs);
 
 }  // namespace loopbench::harness

@@ -132,8 +132,8 @@ constexpr OtherError kOtherErrors[] = {
     {"error_rotation_max", "reference_error_rotation", false},
     {"error_displacement_max", "reference_error_displacement", true}};
 
-/// Where steps are fixed no tolerance says what is near: a hundredth of a link or rad is then no
-/// error of integration, as for the energy.
+/// Fixed steps have no tolerance: errors up to a hundredth of a link or rad are then accepted, as
+/// for the energy.
 constexpr double kMostFixedError = 1e-2;
 
 /// Within as many tolerances as runs may be apart. The reference has an error of its own, and

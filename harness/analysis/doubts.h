@@ -29,8 +29,8 @@ inline constexpr const char* kStepsDoubt = "steps";
 std::optional<DriftGrowth> GrowthAt(const Record& record);
 
 /// Largest error of the energy balance over the energy that moves (`energy_scale`; in records
-/// without it the largest kinetic energy), and what tolerance and steps explain of it. NaN where it
-/// was not measured.
+/// without it the largest kinetic energy), and the share that tolerance and steps explain. NaN
+/// where it was not measured.
 double EnergyErrorShare(const Record& record);
 double ExpectedEnergyShare(const Record& record);
 

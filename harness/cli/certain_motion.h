@@ -13,7 +13,7 @@ struct CertainMotion {
 
 /// Each of the witnesses may take `cpu_s`. Where certification ends before `horizon` the reference
 /// is made again up to there, until it is certified to its end. Throws ConfigError in a program
-/// that was built without wide scalars; `what` needs them.
+/// that was built without wide scalars, which `what` needs.
 CertainMotion MakeCertainMotion(const MechanismDescription& user, double horizon, double cpu_s,
                                 const std::string& what);
 

@@ -122,8 +122,7 @@ Experiment SingleOf(const MechanismFile& file, double horizon) {
   return experiment;
 }
 
-/// Enters what the run of the experiment that is written has: its doubts and, of all points, its
-/// error.
+/// Enters the doubts of the written experiment's run and its largest error over all points.
 void Examine(const MechanismFile& file, double horizon, const Reference& reference,
              bool has_all_points, Trial& trial) {
   const Experiment experiment = SingleOf(file, horizon);

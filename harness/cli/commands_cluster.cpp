@@ -186,7 +186,7 @@ JsonObject StatusDocument(const ClusterRun& run, const std::vector<PartProgress>
       .Add("parts", rows);
 }
 
-/// A line end would end a comment line of a script, which tells Slurm its options.
+/// Slurm reads its options from comment lines of the script, which a line end would cut.
 void RequireOneLine(const std::string& option, const std::string& text) {
   if (text.find_first_of("\n\r") == std::string::npos) return;
   throw ConfigError(

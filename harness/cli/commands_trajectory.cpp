@@ -51,7 +51,7 @@ std::vector<std::size_t> Chosen(const TrajectoryReader& reader, const Trajectory
                                 command.columns[unused - used.begin()], known));
 }
 
-/// Copies row by row, whatever the size, with `notes` above those of the file. Returns the number
+/// Copies files of any size row by row, with `notes` above the file's own notes. Returns the number
 /// of rows.
 std::int64_t Copy(const std::filesystem::path& from, const std::filesystem::path& to,
                   const TrajectoryCommand& command, std::vector<std::string> notes) {

@@ -7,6 +7,7 @@
 #include <filesystem>
 #include <new>
 #include <string>
+#include <string_view>
 #include <vector>
 
 #include "harness/cli/long_table.h"
@@ -24,6 +25,7 @@
 #include "harness/config/formulations.h"
 #include "harness/record/provenance.h"
 #include "harness/store/result_store.h"
+#include "harness/text/out_of_memory.h"
 #include "harness/text/output_file.h"
 #include "harness/text/terminal.h"
 #include "mechanism/model/dense_memory.h"
@@ -146,8 +148,15 @@ int RunCommandLine(int argc, char** argv) {
 }  // namespace harness
 
 int Main(int argc, char** argv) {
+  constexpr std::string_view kNoMemory = "out of memory: too little is left for a longer message\n";
   harness::PrepareStreams();
-  return harness::FinishOutput(harness::RunCommandLine(argc, argv));
+  harness::ExitWithoutMemory(2, kNoMemory);
+  try {
+    return harness::FinishOutput(harness::RunCommandLine(argc, argv));
+  } catch (const std::bad_alloc&) {  // while the options were set up, or a message was written
+    harness::PrintErrorText(kNoMemory);
+    return 2;
+  }
 }
 
 }  // namespace loopbench

@@ -50,7 +50,7 @@ class ImportDraft {
                              const Placement& X_PF, int to, const Placement& X_QM);
   int last_joint() const { return static_cast<int>(description.joints.size()) - 1; }
 
-  /// The body's mass stands in what is not read: refused, with the value that says so, if it moves.
+  /// The body's mass stands in a file that is not read: if the body moves, `value` is rejected.
   void LeaveMass(int body, const XmlValue& value) { without_mass_.emplace_back(body, value); }
   /// As many times its weight, upwards: what a body without gravity feels.
   void AddLift(int body, double share);

@@ -16,7 +16,7 @@ namespace loopbench::harness {
 
 namespace {
 
-/// Why a body cannot move by itself, and what it needs; "" where it can.
+/// Why a body cannot move by itself, and the values that it needs; "" if it can.
 struct MassFault {
   std::string found, expected;
 };
@@ -43,12 +43,12 @@ MassFault MassFaultOf(const BodyDescription& body) {
   return {};
 }
 
-/// Bodies that welds hold to `root`, and the one of them or beside them that carries the others:
-/// the ground if it is there, else the first that is sound, else the first with a mass.
+/// Bodies that welds hold to `root`, and the body in or beside the cluster that carries them. The
+/// carrier is the ground if it is there, else the first sound body, else the first with a mass.
 class Cluster {
  public:
   /// `welds`: numbers of the welds at each body. Bodies that are sound end the cluster and carry
-  /// it, unless it is the `whole` of what is fixed together.
+  /// it, unless it is the `whole` of all parts fixed together.
   Cluster(const MechanismDescription& description, const std::vector<std::vector<int>>& welds,
           const std::vector<bool>& sound, bool whole, int root)
       : d_(description), sound_(sound) {

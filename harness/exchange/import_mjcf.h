@@ -141,7 +141,7 @@ class MjcfModel {
   /// count.
   std::optional<MjcfLimits> LimitsOf(const MjcfElement& element, const std::string& flag,
                                      const std::string& range) const;
-  /// Notes that a joint or tendon is limited, whatever its range: limits are dropped.
+  /// Notes that a joint or tendon is limited, with any range or none: limits are dropped.
   void NoteLimits(const MjcfElement& element, const char* reason) const;
   /// Bodies in ground axes where the springs of joints are free: tendons that do not say their
   /// free length are free there.

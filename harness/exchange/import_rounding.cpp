@@ -45,7 +45,7 @@ bool Rounds(double number, double unit, double exact) {
   return cut_off >= -kHalf * unit && cut_off < unit;
 }
 
-/// A multiple of pi/12, which those of pi/4 and pi/6 are.
+/// A multiple of pi/12, hence also of pi/4 and pi/6.
 double NearestAngle(double angle) { return std::round(12.0 * angle / pi) / 6.0 * (0.5 * pi); }
 
 /// Of length 1, with squared elements that are twelfths: at multiples of pi/4 and pi/6 in a plane

@@ -50,9 +50,9 @@ struct Tick {
   std::string label;  ///< "" for a small one
 };
 
-/// About `most` labelled ticks and the small ones between them: powers of ten on a logarithmic axis
-/// that has three of them, else 1, 2 and 5 or other digits of each decade; multiples of 1, 2 or 5
-/// of a power of ten on a linear axis.
+/// About `most` labelled ticks and the small ones between them. A logarithmic axis with three
+/// powers of ten has these, a shorter one 1, 2 and 5 or other digits of each decade. A linear axis
+/// has multiples of 1, 2 or 5 of a power of ten.
 std::vector<Tick> Ticks(const Axis& axis, int most);
 
 }  // namespace loopbench::harness

@@ -88,9 +88,9 @@ inline constexpr std::size_t kLegendRows = 6;
 /// The width of a drawing: one or two columns of a journal, 85 mm or 178 mm. Letters have 8 pt.
 enum class FigureSize { kOneColumn, kTwoColumn };
 
-/// Curves of a panel as they are drawn: those that coincide (drawn_points.h) as one, in black,
-/// solid and unmarked where they differ in colour, dash or mark, labelled "odca = lagrange, joint";
-/// "all" stands for all the values that the panel has. Doubtful curves are not drawn as one with
+/// Curves of a panel as they are drawn. Curves that coincide (drawn_points.h) are one curve, black,
+/// and solid and unmarked where they differ in colour, dash or mark. Its label is "odca = lagrange,
+/// joint", with "all" for all values of the panel. Doubtful curves are not drawn as one with
 /// others, and curves that end early with none. Points keep hollow marks, and crosses their
 /// colours.
 std::vector<Curve> MergedCurves(const Figure& panel, FigureSize size);

@@ -19,11 +19,11 @@ struct Legend {
   std::size_t letters = 0;  ///< curves that stand for several and are listed
 };
 
-/// The legend of a figure whose curves are drawn as in `merged`: its own rows, or else the curves'
-/// labels; then the meaning of hollow marks, crosses and question marks, with `failures`, remarks
-/// on crosses that have no curve; then a list of the curves that stand for several, by the letters
-/// at their ends. Rows are broken at the width of the page; in one column the list ends in "…" if
-/// it would take the legend beyond kLegendRows.
+/// The legend of a figure whose curves are drawn as in `merged`. First come its own rows, or else
+/// the curves' labels. Then follow the meaning of hollow marks, crosses and question marks, with
+/// `failures`, remarks on crosses that have no curve. Last is a list of the curves that stand for
+/// several, by the letters at their ends. Rows are broken at the width of the page; in one column
+/// the list ends in "…" if it would take the legend beyond kLegendRows.
 Legend LegendOf(const Figure& figure, const std::vector<Curve>& merged, FigureSize size,
                 const std::vector<std::string>& failures);
 

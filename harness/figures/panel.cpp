@@ -54,9 +54,9 @@ std::string GuideElement(const Guide& guide, const std::vector<Point>& points) {
       guide.exponent);
 }
 
-/// Failed runs as labels with a point and no text, which may lie on the edges, unlike plot
-/// elements: on the lower one without a value, on the left one at a time that a logarithmic axis
-/// lacks. Crosses of several colours at one place on the lower edge stand above each other.
+/// Failed runs as labels with a point and no text. Unlike plot elements they may lie on the edges:
+/// on the lower one without a value, on the left one at a time that a logarithmic axis lacks.
+/// Crosses of several colours at one place on the lower edge stand above each other.
 class Crosses {
  public:
   explicit Crosses(const PlotArea& area) : area_(area) {}

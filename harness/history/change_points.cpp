@@ -165,10 +165,10 @@ class Segments {
         [=](double value) { return (value - level) * std::copysign(1.0, far) > std::abs(far); }));
   }
 
-  /// Probability that the values of the segment `fewer` are outliers of `level`, which is that of
-  /// its neighbour: as many as lie beyond half of the step, and at least half of them, for they
-  /// decide the median. The share of outliers is that of the series, beyond the bound, with one
-  /// more than seen.
+  /// Probability that the values of the segment `fewer` are outliers of `level`, the level of its
+  /// neighbour. Outliers are as many as lie beyond half of the step, and at least half of the
+  /// values, for they decide the median. Their share is the share in the series beyond the bound,
+  /// with one more than seen.
   double AreOutliersOf(double level, std::size_t fewer) const {
     const double step = LevelOf(fewer).median - level;
     const double far = std::copysign(std::max(bound_, 0.5 * std::abs(step)), step);

@@ -30,11 +30,11 @@ struct Noise {
 };
 
 /// From the mean squares of x[i+k] - x[i] for k = 1, 2, 3, without the few that steps and outliers
-/// make: a quarter at most, above 3.5 times what the median says of normal noise. Their growth with
-/// k gives the correlation, which is reduced by n^2 / (n^2 + 15^2): a few values may seem to have
-/// any. Such estimates: G. Romano, G. Rigaill, V. Runge, P. Fearnhead, "Detecting abrupt changes in
-/// the presence of local fluctuations and autocorrelated noise", Journal of the American
-/// Statistical Association 117 (2022) 2147-2162. Nothing below four values.
+/// make: a quarter at most, above 3.5 times the value that the median implies for normal noise.
+/// Their growth with k gives the correlation, which is reduced by n^2 / (n^2 + 15^2): a few values
+/// may seem to have any. Such estimates: G. Romano, G. Rigaill, V. Runge, P. Fearnhead, "Detecting
+/// abrupt changes in the presence of local fluctuations and autocorrelated noise", Journal of the
+/// American Statistical Association 117 (2022) 2147-2162. Nothing below four values.
 Noise NoiseOf(std::span<const double> x);
 
 /// A change of level, in a series of logarithms: a ratio.

@@ -57,7 +57,7 @@ class GitRepository {
 struct CheckedOut {
   std::string commit, date;
 };
-/// @param commit  another one than that which is checked out, by any name git knows
+/// @param commit  another commit than the one checked out, by any name that git resolves
 /// Throws ConfigError where there is no git.
 CheckedOut FindCommit(const std::string& commit = "HEAD");
 

@@ -218,9 +218,7 @@ std::vector<Record> ReadResults(const HistoryEntry& entry, std::vector<std::stri
   });
   reader.Feed(ReadFile(entry.results));
   reader.End();
-  for (const std::string& warning : {reader.warning(), reader.Unsealed()}) {
-    if (!warning.empty()) warnings->push_back(warning);
-  }
+  if (!reader.warning().empty()) warnings->push_back(reader.warning());
   records = LatestRecords(records);
   SortRows(&records);
   return records;

@@ -22,7 +22,7 @@ int FromChild(const std::string& name, const ProcessLimits& limits,
     RunInProcesses(
         1, 1,
         [&](std::size_t) {
-          // line by line, so that what is said before the child is killed is not lost
+          // line by line, so that a killed child loses no line
           ::dup2(output.descriptor(), STDOUT_FILENO);
           ::setlinebuf(stdout);
           return std::to_string(FinishOutput(work()));

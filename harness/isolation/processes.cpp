@@ -22,6 +22,7 @@
 #include "harness/isolation/child_watch.h"
 #include "harness/isolation/interruption.h"
 #include "harness/text/files.h"
+#include "harness/text/out_of_memory.h"
 #include "mechanism/model/dense_memory.h"
 
 namespace loopbench::harness {
@@ -80,6 +81,7 @@ void WriteAll(int descriptor, std::string_view text) {
   ::prctl(PR_SET_PDEATHSIG, SIGKILL);
   if (::getppid() != parent) ::_exit(EXIT_FAILURE);  // it died before the line above
   SetLimits(limits);
+  ExitWithoutMemory(kMemoryExit, "");
   try {
     WriteAll(answer, work());
   } catch (const TooDense& error) {

@@ -43,12 +43,12 @@ struct ProcessNews {
 };
 
 /// Runs work(i) for each i that `next` gives, at most `jobs` at once, started in order. `next`
-/// gives nothing while there is nothing to start; it is asked again whenever a piece has ended, and
-/// when it gives nothing with no piece under way all is done. `done` is called here in the parent
+/// gives nothing while there is nothing to start, and is called again whenever a piece has ended.
+/// If it gives nothing and no piece is under way, all is done. `done` is called here in the parent
 /// as pieces end, one at a time. No piece outlives this process. Throws std::runtime_error when a
-/// process cannot be started, what `done` throws, and Interrupted (interruption.h) when all pieces
-/// that have ended are done; pieces still under way are killed then, and where one meets a
-/// SystemFault (files.h), which is thrown here.
+/// process cannot be started, any exception of `done`, and Interrupted (interruption.h) when all
+/// pieces that have ended are done. It rethrows a SystemFault (files.h) of a piece. Pieces still
+/// under way are killed then.
 ///
 /// Sanitizers reserve the whole address space, so memory limits are not set under them.
 void RunInProcesses(const std::function<std::optional<std::size_t>()>& next, int jobs,

@@ -75,10 +75,10 @@ struct ClaimResult {
 /// Examines one check. Records of a kind of which none that matches `select` has the measure
 /// (timing next to drift) do not count, unless their run failed. With no record left the state is
 /// kNotMeasured, never kHolds. A run that did not finish (an "outcome" other than "finished") or a
-/// record that misses `require` makes the check fail; failed runs are admitted where the check
+/// record that misses `require` makes the check fail. Failed runs are admitted where the check
 /// measures or selects the outcome, or where failed_runs_hold. Otherwise a value that is missing or
-/// not finite leaves the check kNotMeasured: it may decide. A ratio of times is kNotMeasured where
-/// a change of the machine's speed between them, which the yardstick tells, may decide it.
+/// not finite leaves the check kNotMeasured: it may decide. A ratio of times is kNotMeasured if a
+/// change of the machine's speed between them, measured by the yardstick, may decide it.
 CheckResult Evaluate(const Check& check, std::span<const Record> records);
 
 /// Examines all checks of a rule. All hold: reproduced. None holds and at least one fails: not

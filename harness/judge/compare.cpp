@@ -91,7 +91,7 @@ Ruling OfNumbers(const Pair& pair, const CompareOptions& options, Finding* findi
   return base == fresh ? Ruling{} : Ruling{Judgement::kWorse, "must be equal"};
 }
 
-/// Samples of at least three times that do not overlap, with a gap of half of their size: no rank
+/// Samples of at least three times that do not overlap, with a gap of half of their size. No rank
 /// test of few repetitions can decide among many times, and no noise of one machine is so large.
 bool AreApart(const std::vector<double>& base, const std::vector<double>& fresh) {
   constexpr std::size_t kFewest = 3;

@@ -29,7 +29,7 @@ struct CompareOptions {
   std::vector<std::string> only;    ///< groups (GroupNames()); empty: all
   bool subset = false;              ///< NEW may lack cases of BASE
   bool added = false;               ///< NEW may have cases that BASE lacks
-  /// Keys by which cases of BASE and NEW meet, whatever else they were run with. Empty: by all keys
+  /// Keys by which cases of BASE and NEW meet; all other settings may differ. Empty: by all keys
   /// and the content.
   std::vector<std::string> match;
 };

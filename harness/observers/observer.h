@@ -100,12 +100,13 @@ class DriftObserver final : public Observer<Space> {
 
 /// Energy balance: the largest deviation of
 ///   kinetic + potential - work supplied + work dissipated
-/// from its first value [J], and its series. Without power, that of the total energy. The relative
-/// error compares it with the largest kinetic energy. The energy that moves is the largest of
-/// kinetic energy, span of the potential, and work supplied or dissipated: slow motions have little
-/// of the first; not below what rounding does to the potential, so that rest is no error. The
-/// sensitivity is the energy that errors of 1 m and 1 rad, or of 1 m/s and 1 rad/s, of all bodies
-/// change at most, to first order: the largest sum of applied wrenches, or of momenta.
+/// from its first value [J], and its series. Without power, the deviation of the total energy. The
+/// relative error compares it with the largest kinetic energy. The energy that moves is the largest
+/// of kinetic energy, span of the potential, and work supplied or dissipated, since slow motions
+/// have little kinetic energy. It is at least the rounding error of the potential, so that rest is
+/// no error. The sensitivity is the largest change of energy, to first order, by errors of 1 m and
+/// 1 rad, or of 1 m/s and 1 rad/s, of all bodies. It is the largest sum of applied wrenches, or of
+/// momenta.
 template <class Space>
 class EnergyObserver final : public Observer<Space> {
  public:

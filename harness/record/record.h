@@ -11,8 +11,21 @@
 namespace loopbench::harness {
 
 /// A value of a record. `monostate` is "not measured"; it prints as an empty cell, never as zero.
-using Value =
-    std::variant<std::monostate, bool, std::int64_t, double, std::string, std::vector<double>>;
+///
+/// The copy constructor of std::variant in libstdc++ 12 crashes if memory runs out while it copies
+/// a string or a vector: it destroys an alternative that does not exist yet. A copy is assigned
+/// here.
+struct Value
+    : std::variant<std::monostate, bool, std::int64_t, double, std::string, std::vector<double>> {
+  using variant::variant;
+  using variant::operator=;
+  Value() = default;
+  Value(const Value& other) : variant() { variant::operator=(other); }
+  Value(Value&&) noexcept = default;
+  Value& operator=(const Value&) = default;
+  Value& operator=(Value&&) noexcept = default;
+  ~Value() = default;
+};
 
 /// Ordered (key, value) pairs. Keys are the column names of docs/design.md section 6, with dots for
 /// nested values such as "series.t". Order of first insertion is the order of writing.

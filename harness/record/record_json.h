@@ -23,14 +23,13 @@ std::string ToJsonLine(const Record& record);
 /// The same object without format and checksum: a row of a table, not of a store.
 std::string ToJsonObject(const Record& record);
 
-/// The record that `line` describes, without its format and checksum. A line without them (made by
-/// hand) is read as it is; `is_unsealed` tells of one with a format and no checksum, which may have
-/// been changed. Throws std::runtime_error that says what was found and what was
-/// expected: for another format, a checksum that is not that of the line, anything but one flat
-/// JSON object of null, bool, number, string or array of numbers, for a key that occurs twice, and
-/// for a value of another type than its key has (measures.h). Linear in the length of the line,
-/// whatever it holds.
-Record FromJsonLine(std::string_view line, bool* is_unsealed = nullptr);
+/// The record that `line` describes, without its format and checksum. A line without both (made by
+/// hand) is accepted, and `is_sealed` is false then. Throws std::runtime_error with the value found
+/// and the value expected for another format, a format without a checksum, and a wrong checksum. It
+/// also throws unless the line is one flat JSON object of null, bool, number, string or array of
+/// numbers, whose keys occur once and whose values have the types of their keys (measures.h).
+/// Linear in the length of any line.
+Record FromJsonLine(std::string_view line, bool* is_sealed = nullptr);
 
 /// Whether `line` is the beginning of a line that ToJsonLine() wrote of a run's record, and no
 /// more: what a crash leaves.

@@ -7,6 +7,7 @@
 #include <utility>
 
 #include "harness/record/excerpt.h"
+#include "harness/record/record_checksum.h"
 #include "harness/record/record_json.h"
 #include "harness/store/result_store.h"
 #include "harness/text/files.h"
@@ -44,9 +45,9 @@ void LineReader::TakeLine(std::string_view line) {
   const LinePlace place{offset_, line.size()};
   if (line.empty() || line == "\r" || (wanted_ && !wanted_(line, place))) return;
   Record record;
-  bool is_unsealed = false;
+  bool is_sealed = false;
   try {
-    record = FromJsonLine(line, &is_unsealed);
+    record = FromJsonLine(line, &is_sealed);
   } catch (const std::runtime_error& error) {
     const std::string message =
         fmt::format("{}:{}: {}: '{}'", file_.string(), number_, error.what(), Excerpt(line));
@@ -54,16 +55,13 @@ void LineReader::TakeLine(std::string_view line) {
     warning_ = message + " (torn last line, skipped)";
     return;
   }
-  if (is_unsealed && ++unsealed_ == 1) first_unsealed_ = number_;
+  has_sealed_ = has_sealed_ || is_sealed;
+  if (!is_sealed && first_bare_ == 0) first_bare_ = number_;
+  if (has_sealed_ && first_bare_ > 0) {
+    throw std::runtime_error(fmt::format("{}:{}: {} (other lines have one)", file_.string(),
+                                         first_bare_, kWithoutChecksum));
+  }
   take_(std::move(record), place);
-}
-
-std::string LineReader::Unsealed() const {
-  if (unsealed_ == 0) return "";
-  return fmt::format(
-      "{}:{}: found a line without its checksum, expected one: it may have been changed ({} such "
-      "lines)",
-      file_.string(), first_unsealed_, unsealed_);
 }
 
 void ForEachRecord(const std::filesystem::path& path, const LineReader::Take& take,
@@ -82,9 +80,7 @@ void ForEachRecord(const std::filesystem::path& path, const LineReader::Take& ta
     if (!in.eof()) FailOn("read", file);
   }
   reader.End();
-  for (const std::string& warning : {reader.warning(), reader.Unsealed()}) {
-    if (warnings != nullptr && !warning.empty()) warnings->push_back(warning);
-  }
+  if (warnings != nullptr && !reader.warning().empty()) warnings->push_back(reader.warning());
 }
 
 }  // namespace loopbench::harness

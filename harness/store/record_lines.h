@@ -30,7 +30,8 @@ class LineReader {
   LineReader(std::filesystem::path file, Take take, Wanted wanted = {}, int lines_before = 0);
 
   /// The next part of the text, of any length. Throws std::runtime_error for a line that is no
-  /// record: file, line number, what was found. Empty lines are passed over.
+  /// record, and for a line without a checksum beside lines that have one: file, line number, text
+  /// found. Empty lines are passed over.
   void Feed(std::string_view text);
 
   /// Behind the last part: a line without an end may be a record, or the beginning of one that a
@@ -38,8 +39,8 @@ class LineReader {
   void End();
 
   const std::string& warning() const { return warning_; }
-  /// Of lines whose checksum is missing, or "".
-  std::string Unsealed() const;
+  /// Whether lines were made by hand: without a checksum.
+  bool is_handmade() const { return first_bare_ > 0; }
   std::uint64_t whole() const { return offset_; }  ///< bytes before a torn last line
   bool is_ended() const { return is_ended_; }      ///< the last record has its line end
 
@@ -52,13 +53,14 @@ class LineReader {
   std::string rest_, warning_;  ///< rest_: a line that has begun
   std::uint64_t offset_ = 0;    ///< of the line that is taken
   int number_;
-  int unsealed_ = 0, first_unsealed_ = 0;  ///< lines without a checksum; number of the first
+  int first_bare_ = 0;  ///< number of the first line without a checksum, or 0
+  bool has_sealed_ = false;
   bool is_ended_ = true;
 };
 
 /// All of a store's, in its order, never more than a few megabytes at once. `path` as for
 /// ResultStore. Throws as LineReader does, and when the file cannot be read; a torn last line is
-/// told in `warnings` (when given), and lines whose checksum is missing.
+/// told in `warnings` (when given).
 void ForEachRecord(const std::filesystem::path& path, const LineReader::Take& take,
                    std::vector<std::string>* warnings, const LineReader::Wanted& wanted = {});
 

@@ -154,20 +154,21 @@ class RecordReader final : public nlohmann::json_sax<LineJson> {
 
 }  // namespace
 
-Record FromJsonLine(std::string_view line, bool* is_unsealed) {
+Record FromJsonLine(std::string_view line, bool* is_sealed) {
   if (line.ends_with('\r')) line.remove_suffix(1);
-  const bool is_sealed = VerifyChecksum(line);
+  const bool has_checksum = VerifyChecksum(line);
   if (const std::string fault = EncodingFault(line); !fault.empty()) {
     throw std::runtime_error("column " + fault.substr(fault.find(':') + 1));
   }
   RecordReader reader(line);
   if (!reader.error().empty()) throw std::runtime_error(reader.error());
-  if (!is_sealed && reader.Has("checksum")) {
+  if (!has_checksum && reader.Has("checksum")) {
     throw std::runtime_error(
         "the line was changed after it was written: found a checksum that does not end the line as "
         "it was written, expected ,\"checksum\":\"...\"} without blanks");
   }
-  if (is_unsealed != nullptr) *is_unsealed = !is_sealed && reader.Has("format");
+  if (!has_checksum && reader.Has("format")) throw std::runtime_error(kWithoutChecksum);
+  if (is_sealed != nullptr) *is_sealed = has_checksum;
   return reader.Take();
 }
 

@@ -12,6 +12,7 @@
 #include <string_view>
 
 #include "harness/record/measures.h"
+#include "harness/record/record_checksum.h"
 #include "harness/record/record_json.h"
 #include "harness/store/contents.h"
 #include "harness/store/record_lines.h"
@@ -68,6 +69,9 @@ LineReader ReadEnd(const std::filesystem::path& file, const std::string& text,
         {}, lines_before);
     lines.Feed(text);
     lines.End();
+    if (lines.is_handmade()) {  // lines with a checksum are to follow
+      throw std::runtime_error(fmt::format("{}: {}", file.string(), kWithoutChecksum));
+    }
     return lines;
   };
   try {

@@ -77,14 +77,7 @@ void SceneReader::ForEach(const std::function<void(std::vector<Record>)>& take,
       FailOn("read", file_);
     }
     try {
-      bool is_unsealed = false;
-      records.push_back(FromJsonLine(text, &is_unsealed));
-      if (is_unsealed && warnings->empty()) {
-        warnings->push_back(fmt::format(
-            "{}: at byte {}: found a line without its checksum, expected one: it may have been "
-            "changed",
-            file_.string(), line.offset));
-      }
+      records.push_back(FromJsonLine(text));
     } catch (const std::runtime_error& error) {
       const std::string message = fmt::format("{}: at byte {}: {}: '{}'", file_.string(),
                                               line.offset, error.what(), Excerpt(text));

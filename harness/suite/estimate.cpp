@@ -202,7 +202,7 @@ double Estimate::OfCase(std::size_t experiment, const Case& one, double simulati
     return rate == nullptr ? kUnknown : total(*rate, std::ranges::max(like.fixed_steps) / one.step);
   }
   const auto& range = Tolerances(near);
-  const auto [fine, loose] = range.first > range.second  // then it is that of the timings
+  const auto [fine, loose] = range.first > range.second  // then it is the tolerance of the timings
                                  ? std::pair(one.rtol, one.rtol)
                                  : range;
   const Rate* at_loose = RateOfCase(near, one, loose);
@@ -275,7 +275,7 @@ double Estimate::OfLadder(std::size_t experiment, const LadderGroup& group) {
                          : rate->fixed_s + std::min(rate->Running(1.0), runs * own.limits.cpu_s);
 }
 
-/// Simulations are those of the accuracy runs; right-hand sides of families have pilots of one
+/// Simulations take as long as the accuracy runs; right-hand sides of families have pilots of one
 /// batch.
 double Estimate::OfTiming(std::size_t experiment, const TimingGroup& group) {
   const Experiment& own = experiments_[experiment];

@@ -25,7 +25,7 @@ std::filesystem::path MechanismPath(const std::filesystem::path& store_file,
   return store_file.parent_path() / "mechanisms" / (scene_id + ".json");
 }
 
-/// In the comment of a file stands the hash of all its bytes, with zeros in the place of the hash.
+/// The comment of a file holds the hash of all its bytes, with zeros instead of the hash.
 constexpr std::string_view kChecksum = "Kept by a run; checksum ", kZeros = "0000000000000000";
 
 std::string WithOwnHash(std::string text) {

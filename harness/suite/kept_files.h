@@ -15,8 +15,8 @@ namespace loopbench::harness {
 /// none, or one that no run has written.
 std::filesystem::path MechanismOf(const Record& record, const std::filesystem::path& store_file);
 
-/// Reads such a file. Throws ChangedFile (trajectory/store_files.h) where its checksum is not that
-/// of the file, and as ReadMechanism() does.
+/// Reads such a file. Throws ChangedFile (trajectory/store_files.h) if its checksum is wrong, and
+/// as ReadMechanism() does.
 MechanismDescription ReadKeptMechanism(const std::filesystem::path& file);
 
 /// Writes those of all scenes whose motion is kept, in a reference or in trajectories, and that are

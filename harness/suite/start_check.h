@@ -9,7 +9,7 @@
 
 namespace loopbench::harness {
 
-/// Sentences about starts: faults of those that cannot be assembled, what was found and expected,
+/// Sentences about starts: faults of starts that cannot be assembled, values found and expected,
 /// and guesses that are missed.
 struct StartReport {
   std::vector<std::string> faults, warnings;

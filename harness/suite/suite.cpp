@@ -16,6 +16,7 @@
 #include "harness/suite/reference_cases.h"
 #include "harness/suite/runner.h"
 #include "harness/text/config_error.h"
+#include "harness/text/output_file.h"
 #include "harness/text/terminal.h"
 #include "harness/timing/time_cases.h"
 #include "harness/trajectory/trajectory_writer.h"
@@ -170,6 +171,9 @@ SuiteCount RunSuite(Workload& workload, const SuiteOptions& options, FinishedRun
                     ResultStore& store) {
   WarnOfJobs(options.jobs, workload.some());
   RemoveParts(store.file());
+  for (const char* folder : {".", "references", "mechanisms"}) {
+    RemoveAbandoned(store.file().parent_path() / folder);
+  }
   const Interruption interruption;
   Runner runner(options, finished, store);
   GroupMarks marks(store.file(), workload.content());

@@ -97,7 +97,7 @@ SceneKey SceneOf(const Record& record) {
   return {record.Text("scene_id"), {record.Number("horizon"), record.Number("rtol")}};
 }
 
-/// The name has the parameters in which `records`, those of the store, differ.
+/// The name has the parameters in which the store's `records` differ.
 std::string NameOfScene(const Record& record, std::span<const Record> records) {
   std::vector<std::string> keys = {"rtol", "horizon"};
   const std::vector<std::string> telling = TellingKeys(records);

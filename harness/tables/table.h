@@ -64,8 +64,8 @@ bool HasFailed(const Record& row);
 bool IsDoubtful(const Record& row, const std::string& key);
 
 /// The cell as the text, Markdown and LaTeX writers print it, with '?' behind a doubtful value,
-/// which must not look like a sound one. Absent and NaN values are empty, never zero; a value that
-/// is not a number is printed as it is, whatever the format; a series joins its numbers with ';'.
+/// which must not look like a sound one. Absent and NaN values are empty, never zero. A value that
+/// is not a number is printed as it is in every format; a series joins its numbers with ';'.
 std::string Cell(const Record& row, const TableColumn& column);
 
 /// A number as tables for people have it (Format::kShortest).

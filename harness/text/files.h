@@ -9,8 +9,8 @@
 
 namespace loopbench::harness {
 
-/// The system refuses what a program needs: a full disk, a limit, a missing file. It says nothing
-/// about a method, so that no record is made of it (processes.h).
+/// The system rejects an operation that a program needs: a full disk, a limit, a missing file. It
+/// is no result of a method, so that no record is made of it (processes.h).
 class SystemFault : public std::runtime_error {
  public:
   using std::runtime_error::runtime_error;
@@ -36,7 +36,7 @@ bool WriteNewFile(const std::filesystem::path& path, std::string_view text);
 /// folder and the system's reason.
 void MakeFolderOf(const std::filesystem::path& path);
 
-/// Throws SystemFault: "cannot VERB 'PATH': " and what errno says.
+/// Throws SystemFault: "cannot VERB 'PATH': " and the reason in errno.
 [[noreturn]] void FailOn(std::string_view verb, const std::filesystem::path& path);
 
 /// All of `text` to an open file; `path` names it in the error. One write(2) in the usual case;

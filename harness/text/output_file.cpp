@@ -2,16 +2,20 @@
 
 #include <fcntl.h>
 #include <fmt/format.h>
+#include <sys/file.h>
 #include <sys/stat.h>
 #include <unistd.h>
 
+#include <algorithm>
 #include <atomic>
 #include <cerrno>
+#include <csignal>
 #include <cstdio>
 #include <mutex>
 #include <set>
 #include <stdexcept>
 #include <utility>
+#include <vector>
 
 #include "harness/text/files.h"
 
@@ -41,7 +45,7 @@ Inputs inputs;
 
 /// Where output to a path goes.
 struct Destination {
-  fs::path target = {};  ///< behind links; "" where it goes into what is there
+  fs::path target = {};  ///< behind links; "" if it goes into the existing file
   int stream = -1;       ///< a standard stream that the path leads to
   mode_t mode = 0;       ///< of a file that is there
 };
@@ -80,6 +84,17 @@ fs::path PartBeside(fs::path target, std::string_view ending) {
   return target;
 }
 
+/// Whether PartBeside() made the name in a process of this machine that has ended, or elsewhere.
+bool IsOfEndedProcess(const std::string& name) {
+  const std::size_t begin = name.rfind('.', name.size() - std::min<std::size_t>(name.size(), 5));
+  int pid = 0, number = 0, length = 0;
+  if (begin == std::string::npos) return false;
+  const char* ending = name.c_str() + begin;
+  const int found = std::sscanf(ending, ".%d-%d.tmp%n", &pid, &number, &length);
+  return found == 2 && begin + static_cast<std::size_t>(length) == name.size() && pid > 0 &&
+         ::kill(pid, 0) != 0 && errno == ESRCH;
+}
+
 }  // namespace
 
 CommandInputs::CommandInputs() { inputs.are_noted = true; }
@@ -112,6 +127,20 @@ fs::path BehindLinks(fs::path file) {
   return file;
 }
 
+void RemoveAbandoned(const fs::path& folder) {
+  std::error_code ignored;
+  std::vector<fs::path> found;
+  for (const auto& entry : fs::directory_iterator(folder, ignored)) {
+    if (IsOfEndedProcess(entry.path().filename().string())) found.push_back(entry.path());
+  }
+  for (const fs::path& path : found) {
+    const int descriptor = ::open(path.c_str(), O_RDONLY | O_NOFOLLOW | O_NONBLOCK | O_CLOEXEC);
+    if (descriptor < 0) continue;
+    if (::flock(descriptor, LOCK_EX | LOCK_NB) == 0) fs::remove(path, ignored);
+    ::close(descriptor);
+  }
+}
+
 OutputFile::OutputFile(const fs::path& path, Onto onto, std::string_view ending) : path_(path) {
   MakeFolderOf(path);
   Destination destination = DestinationOf(path, onto);
@@ -126,6 +155,7 @@ OutputFile::OutputFile(const fs::path& path, Onto onto, std::string_view ending)
     part_.emplace(PartBeside(target_, ending));
     descriptor_ = ::open(part_->path().c_str(), O_WRONLY | O_CREAT | O_TRUNC | O_CLOEXEC, kMode);
     if (descriptor_ >= 0 && destination.mode != 0) ::fchmod(descriptor_, destination.mode);
+    if (descriptor_ >= 0) ::flock(descriptor_, LOCK_EX | LOCK_NB);  // for RemoveAbandoned()
   }
   if (descriptor_ < 0) FailOn("write", path_);
 }

@@ -38,6 +38,10 @@ void RequireOutput(const std::filesystem::path& path);
 /// Symbolic links followed to their end, which may be missing.
 std::filesystem::path BehindLinks(std::filesystem::path file);
 
+/// Removes the temporary files of OutputFile in `folder` whose process was killed: it is gone, and
+/// no process of another machine holds the lock of the file.
+void RemoveAbandoned(const std::filesystem::path& folder);
+
 /// Output under way. A reader of a regular file finds the old contents or the new ones.
 class OutputFile {
  public:

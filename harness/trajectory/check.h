@@ -72,7 +72,7 @@ class MotionReader {
   std::unique_ptr<Work> work_;
 };
 
-/// Row by row, in memory of a fixed size. Throws what TrajectoryReader and MotionReader throw, and
+/// Row by row, in memory of a fixed size. Throws as TrajectoryReader and MotionReader do, and
 /// std::runtime_error for no row, or one without a finite number in a column of the motion.
 TrajectoryCheck CheckTrajectory(const std::filesystem::path& path,
                                 const MechanismDescription& user);

@@ -24,8 +24,9 @@ class ChangedFile : public std::runtime_error {
 /// none (of version 1.0).
 void VerifyTrajectory(const Record& record, const std::filesystem::path& file);
 
-/// Copies those of `records` from the first of the `stores` that has them to beside `target`, each
-/// whole or not at all. Gives the names of those that none has as its run wrote it.
+/// Copies the trajectories of `records` from the first of the `stores` that has them to beside
+/// `target`, each whole or not at all. Returns the names of those that no store has as its run
+/// wrote them.
 std::vector<std::string> CopyTrajectories(const std::vector<Record>& records,
                                           const std::vector<std::filesystem::path>& stores,
                                           const std::filesystem::path& target);

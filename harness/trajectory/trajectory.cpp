@@ -9,6 +9,7 @@
 #include <set>
 #include <stdexcept>
 
+#include "harness/record/excerpt.h"
 #include "harness/text/files.h"
 #include "harness/text/output_file.h"
 #include "mechanism/algebra/space.h"
@@ -82,7 +83,8 @@ TrajectoryReader::TrajectoryReader(const std::filesystem::path& path) : path_(pa
     const auto cell = NextCell(line_, &at, &room);
     if (!cell) Refuse("a quotation mark without its end", "labels, quoted as RFC 4180 says");
     const std::string label(Trimmed(*cell));
-    if (!seen.insert(label).second) Refuse(fmt::format("\"{}\" twice", label), "each label once");
+    if (!seen.insert(label).second)
+      Refuse(fmt::format("\"{}\" twice", Excerpt(label)), "each label once");
     columns_.push_back(ParseLabel(label).value_or(TrajectoryColumn{"", "", label, ""}));
     if (label != "t [s]") continue;
     has_time = true;
@@ -113,7 +115,8 @@ bool TrajectoryReader::Next(std::vector<double>* row) {
     const auto cell = NextCell(line_, &at, &room);
     const auto value = cell ? NumberIn(*cell) : std::nullopt;
     if (!value) {
-      Refuse(fmt::format("\"{}\" in column {}", cell.value_or("\""), row->size() + 1), "a number");
+      Refuse(fmt::format("\"{}\" in column {}", Excerpt(cell.value_or("\"")), row->size() + 1),
+             "a number");
     }
     row->push_back(*value);
   }
@@ -133,7 +136,7 @@ void TrajectoryReader::RequireNumbers(const std::vector<double>& row,
                                       std::span<const std::size_t> columns) const {
   for (const std::size_t i : columns) {
     if (std::isfinite(row[i])) continue;
-    const std::string label = columns_[i].Label();
+    const std::string label = Excerpt(columns_[i].Label());
     Refuse(fmt::format("{} in \"{}\" at t = {}", row[i], label, row[time_]), "a finite number");
   }
 }

@@ -171,7 +171,8 @@ Simplified LightenLinks(const MechanismDescription& description, const ShortRun&
   std::string why;
   const BodyStarts starts = AssembledStart(description, &why);
   MechanismDescription& model = result.parts.front();
-  for (const auto& [share, name] : order) {
+  for (const auto& entry : order) {
+    const std::string& name = entry.second;
     const std::vector<Link> links = FindLinks(model);
     const auto link = std::ranges::find_if(
         links, [&](const Link& one) { return model.bodies[one.body].name == name; });

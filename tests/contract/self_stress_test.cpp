@@ -16,20 +16,12 @@
 namespace loopbench {
 namespace {
 
+using testing::Door;
 using testing::Shipped;
 
-/// A body on two joints of a kind on one axis, of which the second releases everything.
-MechanismDescription Door(JointType type) {
-  MechanismDescription d;
-  d.name = "door";
-  d.space = SpaceKind::kSpatial;
-  d.bodies.push_back(Bar("door", 1.0, 1.0, 1.0));
-  for (const double z : {0.0, 2.0}) {
-    const Eigen::Vector3d at(0.0, 0.0, z);
-    d.joints.push_back(Revolute("hinge" + std::to_string(static_cast<int>(z)), 0, at, 1, at));
-    d.joints.back().type = type;
-    if (type == JointType::kHelical) d.joints.back().parameter = 0.3;
-  }
+/// A door whose second joint releases everything.
+MechanismDescription ReleasedDoor(JointType type) {
+  MechanismDescription d = Door(type);
   d.joints[1].cut = true;
   const int rows = KindOf<Spatial, double>(type).num_constraints();
   for (int i = 0; i < rows; ++i) d.joints[1].released.push_back(i);
@@ -69,7 +61,7 @@ VectorX<double> After(const Mechanism<Spatial, double>& mechanism, const VectorX
 class ExactRows : public ::testing::TestWithParam<JointType> {};
 
 TEST_P(ExactRows, AreDerivativesOfTheMismatchToFirstOrder) {
-  const Mechanism<Spatial, double> mechanism(Door(GetParam()), Coordinates::kAbsolute);
+  const Mechanism<Spatial, double> mechanism(ReleasedDoor(GetParam()), Coordinates::kAbsolute);
   Kinematics<Spatial, double> kinematics(mechanism);
   constexpr double kTilt = 1e-3, kStep = 1e-3;
   VectorX<double> q(7), u(6);

@@ -13,12 +13,15 @@
 #include "harness/config/benchmark_reader.h"
 #include "harness/config/experiment_reader.h"
 #include "harness/config/mechanism_reader.h"
+#include "harness/config/published_series.h"
+#include "harness/exchange/import.h"
 #include "harness/judge/claims_reader.h"
 #include "harness/judge/failure_map_reader.h"
 #include "harness/record/record_json.h"
 #include "harness/store/measurements.h"
 #include "harness/store/result_store.h"
 #include "harness/text/config_error.h"
+#include "harness/trajectory/trajectory.h"
 
 namespace loopbench::fuzz {
 namespace {
@@ -58,14 +61,20 @@ void Call(Read read) {
   }
 }
 
-void CallStoreReader(std::string_view bytes) {
+/// `bytes` as a file, for readers that take its path.
+template <class Refusal, class Read>
+void CallOnFile(std::string_view bytes, std::string_view extension, Read read) {
   const std::filesystem::path file =
-      std::filesystem::temp_directory_path() / fmt::format("fuzzed-{}.jsonl", ::getpid());
+      std::filesystem::temp_directory_path() / fmt::format("fuzzed-{}{}", ::getpid(), extension);
   std::ofstream(file, std::ios::binary) << bytes;
-  std::vector<std::string> warnings;
-  Call<std::runtime_error>([&] { harness::LatestRecords(harness::ReadRecords(file, &warnings)); });
-  for (const std::string& warning : warnings) CheckMessage(warning);
+  Call<Refusal>([&] { read(file); });
   std::filesystem::remove(file);
+}
+
+void ReadStore(const std::filesystem::path& file) {
+  std::vector<std::string> warnings;
+  harness::LatestRecords(harness::ReadRecords(file, &warnings));
+  for (const std::string& warning : warnings) CheckMessage(warning);
 }
 
 }  // namespace
@@ -89,7 +98,21 @@ void CallReader(std::string_view kind, std::string_view bytes) {
     Call<std::runtime_error>([bytes] { harness::FromJsonLine(bytes); });
     harness::IsTornRecord(bytes);
   } else if (kind == "store") {
-    CallStoreReader(bytes);
+    CallOnFile<std::runtime_error>(bytes, ".jsonl", ReadStore);
+  } else if (kind == "import") {
+    Call<ConfigError>([bytes] { harness::ImportText(bytes, "m.xml"); });
+  } else if (kind == "sidecar") {
+    CallOnFile<ConfigError>(bytes, ".json", [](const std::filesystem::path& file) {
+      harness::ImportOptions options;
+      options.sidecar = file;
+      harness::ImportMechanism("configs/imports/furuta.sdf", options);
+    });
+  } else if (kind == "series") {
+    CallOnFile<ConfigError>(bytes, ".json", [](const std::filesystem::path& file) {
+      harness::ReadPublishedSeries(file);
+    });
+  } else if (kind == "trajectory") {
+    CallOnFile<std::runtime_error>(bytes, ".csv", harness::ReadTrajectory);
   } else {
     throw std::logic_error("no reader of this kind");
   }

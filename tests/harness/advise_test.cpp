@@ -167,7 +167,7 @@ TEST(AdviceByLaw, KeepsAMarginInARunWithAllObserversToo) {
   int asked = 0;
   const Advice advice = Advise(request, bench, 1.0, 1.0, [&](Trial& trial) {
     EXPECT_LE(trial.error, kErrorShare * 1e-5);
-    if (++asked == 1) trial.error = 0.9e-5;  // less than asked for, with no margin
+    if (++asked == 1) trial.error = 0.9e-5;  // less than requested, with no margin
   });
   ASSERT_TRUE(advice.reached);
   EXPECT_EQ(asked, 2);

@@ -7,6 +7,7 @@
 
 #include <cstdio>
 #include <filesystem>
+#include <stdexcept>
 #include <string>
 #include <vector>
 
@@ -80,6 +81,16 @@ class CommandLineTest : public testing::Test {
   fs::path folder_;
   std::string mechanism_;
 };
+
+/// The message of the std::runtime_error that `action` throws.
+inline std::string ErrorOf(const auto& action) {
+  try {
+    action();
+  } catch (const std::runtime_error& error) {
+    return error.what();
+  }
+  return "no error";
+}
 
 inline void ExpectEnding(const Ending& ending, int code, const std::vector<std::string>& words) {
   EXPECT_EQ(ending.code, code) << ending.text;

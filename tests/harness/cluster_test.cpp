@@ -5,6 +5,7 @@
 #include <algorithm>
 #include <string>
 
+#include "harness/record/record_checksum.h"
 #include "harness/store/result_store.h"
 #include "harness/store/store_lock.h"
 #include "tests/harness/cli_fixture.h"
@@ -244,15 +245,14 @@ TEST_F(Cluster, DamageIsNamedWithItsKey) {
   };
   expect("", {"found an empty file", "submit once more, without --again, after: rm parts/cluster"});
   expect("{\"kind\":\"cluster\"}\n", {"\"experiment\": found nothing, expected a text"});
-  const std::string bare = whole.substr(0, whole.find(",\"checksum\"")) + "}\n";
+  const std::string bare = whole.substr(0, whole.find(",\"checksum\"")) + "}";
   const auto with = [&bare](const std::string& from, const std::string& to) {
     std::string text = bare;
     const std::size_t at = text.find(from);
     EXPECT_NE(at, std::string::npos) << from;
-    return text.replace(at, from.size(), to);
+    return WithChecksum(text.replace(at, from.size(), to)) + "\n";
   };
-  Write("parts/cluster.json", bare);
-  ExpectEnding(Call("status parts"), 0, {"6"});
+  expect(bare + "\n", {"found a line without its checksum"});
   expect(with("\"parts\":2", "\"parts\":\"two\""), {"\"parts\": found \"two\", expected a whole"});
   expect(with("\"parts\":2", "\"parts\":0"), {"\"parts\": found 0, expected 1 to 100000"});
   expect(with("\"parts\":2", "\"parts\":3"), {"\"cases_of_parts\": found 2 numbers, expected 3"});

@@ -284,7 +284,7 @@ TEST(Compare, ATimeFarApartDecidesHoweverFewRepetitionsThereAre) {
   EXPECT_EQ(undecided.Obstacle({}),
             "16 times not comparable: too few repetitions to decide among 16 times");
   EXPECT_EQ(OneOfSixteen(1.0, 15).ExitCode({}), 0);
-  // samples that overlap are not apart, whatever their medians
+  // samples that overlap are not apart, even if their medians are
   std::vector<Record> base = Sound(), fresh = Sound();
   base[0].Set("series.rhs_ns", std::vector<double>{500.0, 510.0, 5000.0});
   fresh[0].Set("series.rhs_ns", std::vector<double>{4900.0, 5000.0, 5100.0});

@@ -20,6 +20,7 @@ namespace loopbench::fuzz {
 namespace config_fuzz_test {
 
 namespace fs = std::filesystem;
+using harness::kConfigs;
 using harness::kRoot;
 
 /// The lines of the stored baseline, as they are and without their checksums.
@@ -66,19 +67,35 @@ std::vector<std::string> Measurements() {
           R"({"context": {}, "benchmarks": []})"};
 }
 
+/// Trajectories as they are written for other programs.
+std::vector<std::string> Trajectories() {
+  return {
+      "# loopbench\nt [s],body:rod:x [m],body:rod:y [m],body:rod:angle [rad]\n"
+      "0,0,1,0\n0.1,1e-3,1,nan\n",
+      "t [s],joint:A:angle [rad],\"energy:kinetic [J]\",note\r\n0,0.5,,\r\n# "
+      "later\r\n1,-0.5,2,\r\n",
+      "t [s]\n0\n1\n2\n"};
+}
+
 std::vector<std::string> Inputs(const std::string& kind) {
   if (kind == "record") return RecordLines();
   if (kind == "store") return Stores();
   if (kind == "measurement") return Measurements();
+  if (kind == "trajectory") return Trajectories();
+  const std::string folder_name = kind == "sidecar"  ? "imports"
+                                  : kind == "series" ? "references"
+                                                     : kind + "s";
   std::vector<fs::path> files;
   for (const fs::path& folder :
        {kRoot / "tests/fuzz/seeds" / kind, kRoot / "tests/broken" / (kind + "s"),
-        kRoot / "configs" / (kind + "s")}) {
+        kRoot / "tests/broken" / kind, kConfigs / folder_name}) {
     if (!fs::exists(folder)) continue;
     for (const auto& entry : fs::recursive_directory_iterator(folder)) {
-      if (entry.is_regular_file() && entry.path().extension() != ".expected") {
-        files.push_back(entry.path());
-      }
+      const std::string extension = entry.path().extension();
+      if (!entry.is_regular_file() || extension == ".expected") continue;
+      const bool is_json = extension == ".json";  // beside an import, it is a sidecar
+      if (folder_name == "imports" && is_json != (kind == "sidecar")) continue;
+      files.push_back(entry.path());
     }
   }
   std::sort(files.begin(), files.end());

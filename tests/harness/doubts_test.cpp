@@ -96,7 +96,7 @@ TEST(Doubts, EnergyIsComparedWithStepsAndTolerance) {
                               {"energy_sensitivity", 53.0},
                               {"steps", std::int64_t{2987}}}),
             "");
-  // what hardly moves errs by an absolute tolerance of position or speed
+  // slow motion errs by an absolute tolerance of position or speed
   EXPECT_EQ(With("position", {{"energy_error_max", 1e-6}, {"energy_scale", 1e-6}}), "energy");
   EXPECT_EQ(
       With("position",
@@ -474,9 +474,8 @@ TEST(Doubts, RedundantRowsThatDriftedApartAreNoSingularPosition) {
   }
 }
 
-/// A rhombus whose ground is longer by 3e-7: its smallest singular value is 1.9 times what
-/// softening begins at. The end is that of an independent integration in absolute coordinates at
-/// 1e-12.
+/// A rhombus whose ground is longer by 3e-7: its smallest singular value is 1.9 times the limit of
+/// softening. The end is from an independent integration in absolute coordinates at 1e-12.
 TEST(Doubts, ARunAloneIsNearTheTruthOrInDoubt) {
   const auto bar = [](const std::string& name, const std::string& mass) {
     return R"({"com": [0.5, 0], "points": {"p": [0, 0], "q": [1, 0]}, "name": ")" + name +

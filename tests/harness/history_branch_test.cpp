@@ -139,7 +139,7 @@ TEST_F(HistoryBranchTest, ABranchOfCodeIsNoHistory) {
   Do("$lb history show --branch empty");
   ExpectEnding(Shell("$lb history add first --branch 'a b'"), 2, {"\"a b\"", "name of a branch"});
   ExpectEnding(Shell("$lb history show --branch 'empty^'"), 2, {"\"empty^\""});
-  // what `git branch` refuses, and names that mean another branch
+  // names that `git branch` rejects, and names that mean another branch
   Do("git checkout --quiet -b there && git checkout --quiet -");
   for (const char* name : {"-x", "HEAD", "@{-1}", "a..b", "a.lock", "a/", "/a", ".a", "a\nb"}) {
     ExpectEnding(Shell("$lb history add first '--branch=" + std::string(name) + "'"), 2,
@@ -182,7 +182,7 @@ TEST_F(HistoryBranchTest, ResultsOutsideOfTheHistoryAreRefusedUnread) {
       EXPECT_EQ(refused.text.find("root:"), std::string::npos) << refused.text;
     }
   }
-  // a folder in the place of a file is named
+  // a folder instead of a file is named
   fs::remove(folder_ / "past/history.jsonl");
   Record folder = line;
   folder.Set("results", std::string("results"));
@@ -200,8 +200,8 @@ TEST_F(HistoryBranchTest, AProgramOrFolderThatIsNotThereIsNamed) {
   }
 }
 
-// Signals that a process can hear leave no temporary folder, and the next command removes those of
-// a process that was killed.
+// Signals that a process can handle leave no temporary folder, and the next command removes the
+// folders of a killed process.
 TEST_F(HistoryBranchTest, SignalsLeaveNoTemporaryFolder) {
   for (const std::string signal : {"TERM", "HUP", "INT", "KILL"}) {
     // the signal comes while git works for it

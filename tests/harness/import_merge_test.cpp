@@ -1,4 +1,4 @@
-// What is fixed together is one body: its sum has mass and inertia, its parts need not.
+// Parts fixed together are one body: the sum has mass and inertia, the parts need not.
 #include <gtest/gtest.h>
 
 #include "tests/harness/import_texts.h"
@@ -31,7 +31,7 @@ std::string Joint(const std::string& name, const std::string& type, const std::s
          "\"/><axis xyz=\"0 1 0\"/></joint>\n";
 }
 
-/// An arm of 2 kg on a pin, and what is fixed to it.
+/// An arm of 2 kg on a pin, and parts fixed to it.
 std::string Arm(const std::string& rest) {
   return "<robot name=\"r\">" + Link("world") +
          Link("arm", Inertial(2, "0.2 0.2 0.01", "0 0 -0.5")) +
@@ -111,7 +111,7 @@ TEST(ImportMerge, MasslessLinksBetweenRealOnesVanish) {
 }
 
 TEST(ImportMerge, NotTheSumOfTwoButOfAllDecides) {
-  // -0.5 about x with the arm's 0.2 is no inertia yet; with that of the wheel it is
+  // -0.5 about x with the arm's 0.2 is no inertia yet; with the wheel's it is
   const std::string odd =
       Link("odd", Inertial(1, "-0.5 0.1 0.1")) + Joint("o", "fixed", "arm", "odd", "0 0 -0.5");
   const Imported imported = Read(Arm(odd + Link("wheel", Inertial(1, "1 1 1")) +
@@ -193,7 +193,7 @@ TEST(ImportMerge, PartsOfOneFloatingBodyStandWhereTheFileDrawsThem) {
             (std::vector<double>{1, 0, 0, 0, 1, 2, 3}));
 }
 
-/// A body of MuJoCo on a pin, and what is in it.
+/// A body of MuJoCo on a pin, and its elements.
 std::string Mjcf(const std::string& inside, const std::string& before = "") {
   return "<mujoco>" + before + "<worldbody><body name=\"arm\"><joint axis=\"0 1 0\"/>" + inside +
          "</body></worldbody></mujoco>";
@@ -206,7 +206,7 @@ TEST(ImportMerge, PointLoadsAndStaticChildrenOfMjcfAddUp) {
   const BodyDescription body = Only(
       Read(Mjcf(kInertial + "<body pos=\"0 0 -1\"><inertial pos=\"0 0 0\" mass=\"3\"/></body>")));
   ExpectBody(body, 5, {0, 0, -0.8}, {0.5, 0.5, 0.01});
-  // a body without geoms or inertial on a joint is that of its child
+  // a body without geoms or inertial on a joint is part of its child
   const BodyDescription carried = Only(Read(Mjcf("<body><body>" + kInertial + "</body></body>")));
   ExpectBody(carried, 2, {0, 0, -0.5}, {0.2, 0.2, 0.01});
   ExpectRefusal(Mjcf("<inertial pos=\"0 0 0\" mass=\"3\"/>"), {"principal moments 0, 0, 0"});
@@ -229,7 +229,7 @@ TEST(ImportMerge, MeshesOfWhatCannotMoveAreNotRead) {
   ExpectBody(Only(Read(wall(mesh))), 2, {0, 0, -0.5}, {0.2, 0.2, 0.01});
   ExpectRefusal(wall(mesh + "<joint/>"), {"the mass of a mesh"});
   ExpectRefusal(wall(mesh, "<compiler settotalmass=\"3\"/>"), {"the mass of a mesh"});
-  // MuJoCo's total has the masses of what cannot move in it: 1 and 2 kg
+  // MuJoCo's total includes parts that cannot move: 1 and 2 kg
   const Imported total = Read(wall(sphere, "<compiler settotalmass=\"6\"/>"));
   EXPECT_NEAR(total.description.bodies.back().mass, 4.0, kRounding);
 }

@@ -71,7 +71,7 @@ TEST(ImportRounding, TheNoteCountsThemAndShowsTheFirst) {
                                   }),
             1);
   EXPECT_FALSE(HasNote(Urdf("1.5708 0 0", "0 0 1", kKept), "<origin>", "taken as"));
-  // what is exact, or no such angle, is not worth a word
+  // exact values, and other angles, need no note
   EXPECT_FALSE(HasNote(Urdf("1.5707963267948966 0.3 0", "1 1 0"), "", "taken as"));
 }
 

@@ -1,7 +1,9 @@
-// Where output goes: into devices and pipes, through links, never onto what was read; and what is
-// left of files under way when a signal ends their process.
+// Where output goes: into devices and pipes, through links, never onto an input; and that a signal
+// leaves no temporary file.
 #include <fcntl.h>
+#include <fmt/format.h>
 #include <gtest/gtest.h>
+#include <sys/file.h>
 #include <sys/stat.h>
 #include <sys/wait.h>
 #include <unistd.h>
@@ -20,15 +22,6 @@
 
 namespace loopbench::harness {
 namespace output_test {
-
-std::string ErrorOf(const auto& action) {
-  try {
-    action();
-  } catch (const std::runtime_error& error) {
-    return error.what();
-  }
-  return "no error";
-}
 
 void ExpectPart(const std::string& text, const std::string& part) {
   EXPECT_NE(text.find(part), std::string::npos) << "no <" << part << "> in\n" << text;
@@ -52,7 +45,7 @@ TEST_F(OutputFiles, GoesThroughLinks) {
   WriteFileAtomically(At("second"), "new");
   EXPECT_EQ(ReadFile(At("target")), "new");
   EXPECT_TRUE(fs::is_symlink(At("second")) && fs::is_symlink(At("link")));
-  // to what is not there yet, and into a folder elsewhere
+  // to a name that is new, and into a folder elsewhere
   fs::create_directory(At("folder"));
   fs::create_symlink("folder/new", At("dangling"));
   WriteFileAtomically(At("dangling"), "made");
@@ -202,7 +195,7 @@ TEST_F(OutputFiles, IsAskedForBeforeAnythingIsMeasured) {
   ExpectEnding(Call("advise four-bar.json --out four-bar.json"), 2, {"an input of this command"});
 }
 
-/// Forks a process that calls `work`, waits until it says that it is ready, and ends it.
+/// Forks a process that calls `work`, waits until it is ready, and ends it.
 int EndedBy(int signal, const std::function<void()>& work) {
   int ready[2];
   EXPECT_EQ(::pipe(ready), 0);
@@ -242,7 +235,7 @@ TEST_F(OutputFiles, UnderWayIsRemovedBySignals) {
     EXPECT_EQ(EndedBy(signal, work), signal);
     EXPECT_EQ(Count(tmp), 0u) << signal;
   }
-  // no process hears this one: the next folder of the name removes what it left
+  // no process can handle this one: the next folder of the name removes the leftovers
   EXPECT_EQ(EndedBy(SIGKILL, [] { new TemporaryFolder("gone"); }), SIGKILL);
   EXPECT_EQ(Count(tmp), 1u);
   fs::create_directory(tmp / "gone.tmp-mine-is-longer");
@@ -256,6 +249,40 @@ TEST_F(OutputFiles, UnderWayIsRemovedBySignals) {
     ::unsetenv("TMPDIR");
   } else {
     ::setenv("TMPDIR", kept.c_str(), 1);
+  }
+}
+
+TEST_F(OutputFiles, OfKilledProcessesAreRemovedByTheNextRun) {
+  const fs::path tmp = At("out/references/x.json"), table = At("out/drift.csv");
+  const auto work = [&] {
+    for (const fs::path& path : {tmp, table}) (new OutputFile(path))->Write("half of it");
+  };
+  EXPECT_EQ(EndedBy(SIGKILL, work), SIGKILL);
+  EXPECT_EQ(Count(tmp.parent_path()), 1u);
+  EXPECT_EQ(Count(At("out")), 2u);
+  OutputFile living(table);
+  // names that only look alike
+  const std::set<std::string> kept = {"drift.csv.tmp", "1-2.tmp", "a.0-1.tmp", "b.1-2.tmpx",
+                                      ".tmp"};
+  for (const std::string& name : kept) Write("out/references/" + name, "mine");
+  // locked by a process of another machine: nobody here has its number
+  const pid_t ended = ::fork();
+  if (ended == 0) ::_exit(0);
+  ::waitpid(ended, nullptr, 0);
+  const fs::path far = tmp.parent_path() / fmt::format("y.json.{}-0.tmp", ended);
+  Write("out/references/" + far.filename().string(), "far");
+  const int lock = ::open(far.c_str(), O_RDONLY | O_CLOEXEC);
+  ASSERT_EQ(::flock(lock, LOCK_EX), 0);
+  ExpectEnding(Call("run tiny.json --out out"), 0, {"2 run now"});
+  EXPECT_EQ(Count(tmp.parent_path()), kept.size() + 1);
+  for (const std::string& name : kept) EXPECT_TRUE(fs::exists(tmp.parent_path() / name)) << name;
+  EXPECT_TRUE(fs::exists(far));
+  living.Finish();
+  ::close(lock);
+  ExpectEnding(Call("run tiny.json --out out"), 0, {"2 were done before"});
+  EXPECT_FALSE(fs::exists(far));
+  for (const auto& entry : fs::directory_iterator(At("out"))) {
+    EXPECT_NE(entry.path().extension(), ".tmp") << entry.path();
   }
 }
 

@@ -303,7 +303,7 @@ TEST_F(ReportCommand, MotionsComeFromTheStore) {
   EXPECT_EQ(Count(ReadFile(folder_ / "damaged.html"), "\"times\":[0,"), 0u);
 }
 
-// A mechanism or a motion that was changed beside the store is not shown as that of the run.
+// A mechanism or a motion that was changed beside the store is not shown as the run's.
 TEST_F(ReportCommand, FilesBesideTheStoreAreVerified) {
   Write("moving.json", R"({"name": "moving", "tolerances": [1e-6],
     "scenes": [{"mechanism": "four-bar.json", "horizon": 0.5}],

@@ -202,7 +202,7 @@ TEST_F(Interruption, ByAFullDiskLeavesCompleteRecordsAndIsSaid) {
   ::umount(disk.c_str());
 }
 
-// A disk that is full, or a file that may not grow, says nothing about a method.
+// A disk that is full, or a file that may not grow, is no result of a method.
 TEST_F(Interruption, AFaultOfTheMachineIsTheOutcomeOfNoCase) {
   Write("long.json", R"({"name": "long", "tolerances": [1e-6],
     "scenes": [{"mechanism": "four-bar.json", "horizon": 1}],

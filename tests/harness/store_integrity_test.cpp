@@ -1,5 +1,6 @@
 // Stores that were damaged, edited, torn, shared or are none at all: nothing is lost, nothing is
 // taken for what it is not, and every refusal names its place.
+#include <fmt/format.h>
 #include <sys/stat.h>
 #include <unistd.h>
 
@@ -11,15 +12,6 @@
 
 namespace loopbench::harness {
 namespace store_integrity_test {
-
-std::string ErrorOf(const auto& action) {
-  try {
-    action();
-  } catch (const std::runtime_error& error) {
-    return error.what();
-  }
-  return "no error";
-}
 
 testing::AssertionResult Contains(const std::string& text, const std::string& part) {
   return testing::IsSubstring("part", "text", part, text);
@@ -100,12 +92,65 @@ TEST_F(StoreIntegrity, AWrongChecksumIsRefusedInEverySpelling) {
         with(edited, "\"checksum\":", "\"checksum\":\t")}) {
     EXPECT_TRUE(Contains(Complaint(changed + "\n"), "the line was changed")) << changed;
   }
-  // without one nothing can be told; it is read, and said
-  const std::string bare = edited.substr(0, end) + "}\n";
-  EXPECT_TRUE(
-      Contains(Complaint(text_ + bare), "changed.jsonl:3: found a line without its checksum"));
-  ExpectEnding(Call("table changed.jsonl"), 0, {"warning: ", "without its checksum"});
-  ExpectEnding(Call("merge changed.jsonl --out m"), 2, {"without its checksum"});
+}
+
+// Every command that reads rejects a missing checksum like a wrong one, with or without the format.
+TEST_F(StoreIntegrity, AMissingChecksumIsRefusedByEveryReader) {
+  const std::size_t first = text_.find('\n') + 1;
+  std::string with_format = text_.substr(0, text_.find(",\"checksum\"")) + "}\n";
+  std::string bare = with_format;
+  bare.replace(bare.find("\"format\":1,"), 11, "");
+  const auto expect = [this](const std::string& text, int line) {
+    const std::string named =
+        fmt::format("changed.jsonl:{}: found a line without its checksum, expected one", line);
+    EXPECT_TRUE(Contains(Complaint(text), named)) << text;
+    for (const char* call :
+         {"table changed.jsonl", "compare store changed.jsonl", "merge changed.jsonl --out m",
+          "plot changed.jsonl --out f", "report changed.jsonl", "export changed.jsonl --out e.csv",
+          "history add changed.jsonl --store h --commit a --date 2026-01-01"}) {
+      ExpectEnding(Call(call), 2, {named});
+    }
+    ExpectEnding(Call("run tiny.json --out changed.jsonl"), 2, {"without its checksum", "nothing"});
+  };
+  expect(with_format, 1);
+  expect(text_ + with_format, 3);
+  expect(text_ + bare, 3);
+  expect(bare + text_.substr(first), 1);
+  // lines by hand alone are read, and nothing with a checksum is appended to them
+  EXPECT_EQ(Complaint(bare), "");
+  ExpectEnding(Call("table changed.jsonl"), 0, {"four-bar"});
+  ExpectEnding(Call("run tiny.json --out changed.jsonl"), 2, {"without its checksum", "nothing"});
+  EXPECT_EQ(ReadFile(folder_ / "changed.jsonl"), bare);
+}
+
+// Address space from too little to start with to enough: an exit code and a message, no signal.
+TEST_F(StoreIntegrity, MemoryThatIsTooSmallIsSaid) {
+#if defined(__SANITIZE_ADDRESS__)
+  GTEST_SKIP() << "the sanitizer reserves the whole address space";
+#endif
+  Record record = ReadRecords(folder_ / "store").front();
+  std::vector<Record> records;
+  for (int i = 0; i < 3000; ++i) {
+    record.Set("case_id", fmt::format("{:016x}", i));
+    record.Set("series.drift", std::vector<double>(20, 1e-9 * i));
+    records.push_back(record);
+  }
+  ResultStore(folder_ / "large").Append(records);
+  fs::create_directory(folder_ / "other");
+  fs::copy_file(folder_ / "large/results.jsonl", folder_ / "other/results.jsonl");
+  int refusals = 0;
+  for (const char* call : {"table large", "compare large other", "report large"}) {
+    for (int kilobytes = 26'000; kilobytes < 60'000; kilobytes += 3'000) {
+      const Ending ending = Call(call, fmt::format("ulimit -v {} &&", kilobytes));
+      const bool is_started = ending.text.find("shared libraries") == std::string::npos;
+      const bool is_done = ending.code == 0 || ending.text.find("Compared") != std::string::npos;
+      if (is_done || !is_started) continue;
+      ++refusals;
+      EXPECT_EQ(ending.code, 2) << kilobytes << ' ' << call << ": " << ending.text;
+      EXPECT_TRUE(Contains(ending.text, "memory")) << kilobytes << ' ' << call;
+    }
+  }
+  EXPECT_GT(refusals, 5);
 }
 
 TEST_F(StoreIntegrity, LinesMadeByHandNeedNoChecksum) {
@@ -182,7 +227,7 @@ TEST_F(StoreIntegrity, AFileAsStoreHasItsTablesBesideIt) {
 TEST_F(StoreIntegrity, AnotherFormatIsRefusedByNameAndNoneIsThatOfBefore) {
   EXPECT_TRUE(Contains(Complaint("{\"format\":1,\"kind\":\"timing\",\"bodies\":3}\n"),
                        "found a line without its checksum"));
-  EXPECT_EQ(FromJsonLine("{\"format\":1,\"kind\":\"timing\"}").Find("format"), nullptr);
+  EXPECT_EQ(FromJsonLine(text_.substr(0, text_.find('\n'))).Find("format"), nullptr);
   for (const char* other : {"2", "0", "1.0", "\"1\"", "null", "[1]"}) {
     const std::string said =
         Complaint(std::string("{\"format\":") + other + ",\"kind\":\"timing\"}\n");

@@ -1,9 +1,13 @@
 // The store keeps every value exactly, survives a crash, and names what it cannot read.
 #include <gtest/gtest.h>
+#include <sys/resource.h>
+#include <unistd.h>
 
 #include <cmath>
 #include <filesystem>
+#include <fstream>
 #include <limits>
+#include <new>
 #include <string>
 #include <thread>
 #include <vector>
@@ -127,7 +131,10 @@ TEST_F(StoreTest, ABadLineIsAnErrorWithFileLineAndText) {
 
 TEST_F(StoreTest, ATornLastLineIsSkippedWithAWarningAndRemovedBeforeTheNextAppend) {
   const auto file = folder_ / "torn.jsonl";
-  WriteFileAtomically(file, "{\"kind\":\"a\"}\n{\"kind\":\"a\",\"b\":[1.0,");
+  Record whole;
+  whole.Set("kind", std::string("a"));
+  const std::string line = ToJsonLine(whole) + "\n";
+  WriteFileAtomically(file, line + "{\"format\":1,\"kind\":\"a\",\"b\":[1.0,");
   std::vector<std::string> warnings;
   EXPECT_EQ(ReadRecords(file, &warnings).size(), 1u);
   ASSERT_EQ(warnings.size(), 1u);
@@ -136,15 +143,17 @@ TEST_F(StoreTest, ATornLastLineIsSkippedWithAWarningAndRemovedBeforeTheNextAppen
   Record next;
   next.Set("a", std::int64_t{3});
   ResultStore(file).Append(next);
-  EXPECT_EQ(ReadFile(file), "{\"kind\":\"a\"}\n" + ToJsonLine(next) + "\n");
+  EXPECT_EQ(ReadFile(file), line + ToJsonLine(next) + "\n");
 }
 
 TEST_F(StoreTest, ACompleteLastLineWithoutLineEndIsKept) {
   const auto file = folder_ / "complete.jsonl";
-  WriteFileAtomically(file, "{\"kind\":\"a\"}");
+  Record whole;
+  whole.Set("kind", std::string("a"));
+  WriteFileAtomically(file, ToJsonLine(whole));
   EXPECT_EQ(ReadRecords(file).size(), 1u);
   ResultStore(file).Append(Record{});
-  EXPECT_EQ(ReadFile(file), "{\"kind\":\"a\"}\n" + ToJsonLine(Record{}) + "\n");
+  EXPECT_EQ(ReadFile(file), ToJsonLine(whole) + "\n" + ToJsonLine(Record{}) + "\n");
 }
 
 TEST_F(StoreTest, LinesOfSeveralThreadsDoNotMix) {
@@ -178,6 +187,40 @@ TEST_F(StoreTest, AFileIsReplacedInOnePieceAndNoTemporaryStays) {
   }
   EXPECT_EQ(files, 1);
   EXPECT_THROW(WriteFileAtomically("/proc/none/file", "x"), std::runtime_error);
+}
+
+/// 0 if a copy that does not fit into memory throws and leaves its original as it was.
+int CopiesWithoutMemory() {
+  Record record;
+  record.Set("series.t", std::vector<double>(std::size_t{8} << 20, 1.0));  // 64 MiB
+  record.Set("text", std::string(std::size_t{64} << 20, 'x'));
+  std::size_t pages = 0;
+  std::ifstream("/proc/self/statm") >> pages;
+  const rlim_t most = pages * static_cast<std::size_t>(getpagesize()) + (std::size_t{16} << 20);
+  const rlimit limit{most, most};
+  if (setrlimit(RLIMIT_AS, &limit) != 0) return 1;
+  for (const auto& [key, value] : record.items()) {
+    try {
+      const Value copy = value;
+      return 2;
+    } catch (const std::bad_alloc&) {
+    }
+    Value assigned = 1.0;
+    try {
+      assigned = value;
+      return 3;
+    } catch (const std::bad_alloc&) {
+    }
+    if (assigned != Value(1.0)) return 4;
+  }
+  return std::get<std::string>(*record.Find("text")).size() == std::size_t{64} << 20 ? 0 : 5;
+}
+
+TEST(ValueDeathTest, ACopyThatDoesNotFitIntoMemoryThrows) {
+#if defined(__SANITIZE_ADDRESS__)
+  GTEST_SKIP() << "the sanitizer reserves the whole address space";
+#endif
+  EXPECT_EXIT(_exit(CopiesWithoutMemory()), testing::ExitedWithCode(0), "");
 }
 
 }  // namespace store_test

@@ -192,7 +192,7 @@ TEST(Table, EachFormatPrintsItsDigits) {
   EXPECT_EQ(print(Format::kSeconds), "1235");
   row.Set("x", std::vector<double>{0.5, 1e-9});
   EXPECT_EQ(print(Format::kText), "0.5;1e-09");
-  // as people write them, and four digits of what was computed
+  // as people write them, and four digits of computed values
   for (const auto& [number, text] :
        std::map<double, std::string>{{0.02 * std::pow(0.1, 0.5), "0.006325"},
                                      {1e-6, "1e-06"},

@@ -152,15 +152,7 @@ TEST(RedundancyTest, EachPartHasTheChoiceItWouldHaveAlone) {
 }
 
 TEST(RedundancyTest, TwoHingesOfADoorNeedOne) {
-  MechanismDescription d;
-  d.name = "door";
-  d.space = SpaceKind::kSpatial;
-  d.bodies.push_back(Bar("door", 1.0, 1.0, 1.0));
-  for (const double z : {0.0, 2.0}) {
-    const Eigen::Vector3d at(0.0, 0.0, z);
-    d.joints.push_back(Revolute("hinge" + std::to_string(static_cast<int>(z)), 0, at, 1, at));
-  }
-  const Redundancy found = FindRedundancy(d);
+  const Redundancy found = FindRedundancy(testing::Door());
   EXPECT_EQ(found.rows, 5);
   EXPECT_EQ(found.rank, 0);
   EXPECT_EQ(Count(found.released), 5);

@@ -37,7 +37,12 @@ void FactoredState<Space, S>::SetPositions(const Eigen::Ref<const VectorX<S>>& q
 
 template <class Space, class S>
 void FactoredState<Space, S>::AcceptReleased() {
-  if (stress_ != nullptr) released_ = stress_->Choose(kinematics_);
+  if (stress_ == nullptr) return;
+  released_ = stress_->Choose(kinematics_);
+  if (kinematics_.released() == released_) return;
+  const VectorX<S> q = kinematics_.q(), u = kinematics_.u();
+  SetPositions(q);
+  SetSpeeds(u);
 }
 
 template <class Space, class S>

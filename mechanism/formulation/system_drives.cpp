@@ -17,7 +17,7 @@ int System<Space, S>::FirmRank([[maybe_unused]] const Kinematics<Space, S>& at) 
   if constexpr (std::is_same_v<S, double>) {
     const LoopSpectrum loops = SpectrumOfLoops(at);
     // one loop is softened to twice this width, and loops that are closed one by one to some more
-    const double least = 10.0 * std::sqrt(DirectionWeights<S>::kTheta) * loops.largest;
+    const double least = 10.0 * kSoftening * loops.largest;
     const auto firm = static_cast<int>((loops.singular_values.array() > least).count());
     return LoopRank(mechanism_, mechanism_.num_rows() - firm);
   }
@@ -87,7 +87,8 @@ Outcome System<Space, S>::JudgeDrives() {
     const bool has_left = drives_->NoteRank(found.rank);  // a singular start
     if (is_projected && (has_left || IsSingular())) {
       drives_->Followed(kinematics(), udot_, *feedback_);
-      return drives_->DecidesBranch(kinematics()) ? Outcome::kFinished : Outcome::kSingular;
+      return drives_->DecidesBranch(kinematics(), kinematics().softening()) ? Outcome::kFinished
+                                                                            : Outcome::kSingular;
     }
   }
   return drives_->Followed(kinematics(), udot_, *feedback_) ? Outcome::kFinished

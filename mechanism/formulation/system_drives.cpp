@@ -2,6 +2,7 @@
 // singular configurations (docs/numerics.md, section 3).
 #include <algorithm>
 #include <cmath>
+#include <limits>
 #include <type_traits>
 
 #include "mechanism/algebra/instantiate.h"
@@ -9,6 +10,34 @@
 #include "mechanism/loops/scaled_loops.h"
 
 namespace loopbench {
+
+namespace {
+
+/// The largest mismatch of a constraint [rad, or mechanism lengths].
+template <class Space>
+double ClosureError(const Kinematics<Space, double>& at) {
+  double e = 0.0;
+  for (int index : at.mechanism().constraints()) {
+    const Velocity<Space, double> miss = at.ConstraintMismatch(index);
+    e = std::max({e, miss.angular.norm(), miss.linear.norm() / at.mechanism().length()});
+  }
+  return e;
+}
+
+/// Near a singular position, at the distance sigma on a branch, constraints look like x y = 0. With
+/// a closure error e it is x y = e, which turns off the branch where sigma^2 is of the size of e.
+/// Here sigma^2 / e, sigma being the last of `rank` singular values of the loops.
+template <class Space>
+double MarginOfBranch(const Kinematics<Space, double>& at, int rank) {
+  const Mechanism<Space, double>& mechanism = at.mechanism();
+  const int last = mechanism.num_rows() - LoopRank(mechanism, 0) + rank - 1;
+  if (last < 0) return std::numeric_limits<double>::infinity();
+  const LoopSpectrum loops = SpectrumOfLoops(at);
+  const double sigma = loops.singular_values[last] / loops.largest;
+  return sigma * sigma / ClosureError(at);
+}
+
+}  // namespace
 
 /// Rank as conditioning() counts it, of directions that are not softened at all. Double only: other
 /// scalars have no spectrum.
@@ -50,26 +79,17 @@ void System<Space, S>::NoteRankAhead() {
   drives_->NoteRank(FirmRank(there));
 }
 
-/// Near a singular position, at the distance sigma on a branch, constraints look like x y = 0. With
-/// a closure error e it is x y = e, which turns off the branch where sigma^2 is of the size of e.
+/// Pivots, of the size of sigma or of its square, say when to look.
 template <class Space, class S>
 bool System<Space, S>::IsOffBranch() const {
+  constexpr double kBent = 10.0, kNear = 100.0;
   if (options_.enforcement == Enforcement::kPosition ||
       options_.solver != SolverKind::kRankRevealing) {
     return false;
   }
   if constexpr (std::is_same_v<S, double>) {
-    double e = 0.0;
-    for (int index : mechanism_.constraints()) {
-      const Velocity<Space, S> miss = kinematics().ConstraintMismatch(index);
-      e = std::max({e, miss.angular.norm(), miss.linear.norm() / mechanism_.length()});
-    }
-    const int rank = mechanism_.num_rows() - LoopRank(mechanism_, 0) + drives_->usual_rank();
-    // pivots, of the size of sigma or of its square, say when to look
-    if (rank == 0 || solver_->conditioning().rcond > 100.0 * std::sqrt(e)) return false;
-    const LoopSpectrum loops = SpectrumOfLoops(kinematics());
-    const double sigma = loops.singular_values[rank - 1] / loops.largest;
-    return sigma * sigma < 10.0 * e;
+    if (solver_->conditioning().rcond > kNear * std::sqrt(ClosureError(kinematics()))) return false;
+    return MarginOfBranch(kinematics(), drives_->usual_rank()) < kBent;
   }
   return false;
 }
@@ -110,7 +130,12 @@ std::string System<Space, S>::Why() const {
            "speed too low for inertia to carry bodies across it, or a start without the speeds of "
            "its branch; keep away from the configuration or pass it faster";
   }
-  if (is_singular || IsSingular()) {
+  bool is_passage = is_singular || IsSingular();
+  if constexpr (std::is_same_v<S, double>) {
+    // y = e / sigma across the branch makes accelerations of e / sigma^2, beyond a millionth
+    is_passage = is_passage || MarginOfBranch(kinematics(), drives_->usual_rank()) < 1e6;
+  }
+  if (is_passage) {
     return "the prescribed motions pass a singular configuration or a dead end, where errors of "
            "this level decide the branch; level position keeps it";
   }

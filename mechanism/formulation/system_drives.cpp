@@ -45,7 +45,8 @@ template <class Space, class S>
 int System<Space, S>::FirmRank([[maybe_unused]] const Kinematics<Space, S>& at) const {
   if constexpr (std::is_same_v<S, double>) {
     const LoopSpectrum loops = SpectrumOfLoops(at);
-    // one loop is softened to twice this width, and loops that are closed one by one to some more
+    // at a distance of 2e-3 rounding of positions makes 4 eps / 2e-3^3 = 1e-7 of accelerations, a
+    // tenth of what a followed motion may miss; drift softens 2e-4 and, loop after loop, some more
     const double least = 10.0 * kSoftening * loops.largest;
     const auto firm = static_cast<int>((loops.singular_values.array() > least).count());
     return LoopRank(mechanism_, mechanism_.num_rows() - firm);
@@ -55,8 +56,7 @@ int System<Space, S>::FirmRank([[maybe_unused]] const Kinematics<Space, S>& at) 
 
 template <class Space, class S>
 bool System<Space, S>::IsSingular() const {
-  return solver_->conditioning().smallest_weight < 1.0 &&
-         FirmRank(kinematics()) < drives_->usual_rank();
+  return solver_->conditioning().is_near_singular && FirmRank(kinematics()) < drives_->usual_rank();
 }
 
 /// Steps ahead along the speeds by some widths of softening: constraints that depend on each other
@@ -97,22 +97,23 @@ bool System<Space, S>::IsOffBranch() const {
 template <class Space, class S>
 Outcome System<Space, S>::JudgeDrives() {
   const Conditioning& found = solver_->conditioning();
-  const bool is_softened = found.smallest_weight < 1.0;
   const bool is_accepted = kinematics().time() == accepted_t_;
   const bool is_projected = options_.enforcement == Enforcement::kPosition;
-  if (is_projected && is_softened && !is_accepted) return Outcome::kFinished;
+  if (is_projected && found.is_near_singular && !is_accepted) return Outcome::kFinished;
   if (drives_->has_left_branch()) return Outcome::kSingular;
+  bool is_passage = false, is_start = false;
   if (is_accepted && options_.solver == SolverKind::kRankRevealing && mechanism_.num_u() > 0) {
-    if (is_softened && drives_->usual_rank() == 0) NoteRankAhead();
+    is_start = drives_->usual_rank() == 0;
+    if (is_start && found.smallest_weight < 1.0) NoteRankAhead();
     const bool has_left = drives_->NoteRank(found.rank);  // a singular start
-    if (is_projected && (has_left || IsSingular())) {
-      drives_->Followed(kinematics(), udot_, *feedback_);
-      return drives_->DecidesBranch(kinematics(), kinematics().softening()) ? Outcome::kFinished
-                                                                            : Outcome::kSingular;
-    }
+    is_passage = is_projected && (has_left || IsSingular());
   }
-  return drives_->Followed(kinematics(), udot_, *feedback_) ? Outcome::kFinished
-                                                            : Outcome::kInconsistentMotion;
+  const bool follows = drives_->Followed(kinematics(), udot_, *feedback_);
+  if (!is_passage) return follows ? Outcome::kFinished : Outcome::kInconsistentMotion;
+  // speeds of a start are exact, so that those of a branch leave nothing
+  const bool goes_on =
+      is_start ? follows : drives_->DecidesBranch(kinematics(), kinematics().softening());
+  return goes_on ? Outcome::kFinished : Outcome::kSingular;
 }
 
 template <class Space, class S>
@@ -133,7 +134,8 @@ std::string System<Space, S>::Why() const {
   bool is_passage = is_singular || IsSingular();
   if constexpr (std::is_same_v<S, double>) {
     // y = e / sigma across the branch makes accelerations of e / sigma^2, beyond a millionth
-    is_passage = is_passage || MarginOfBranch(kinematics(), drives_->usual_rank()) < 1e6;
+    is_passage =
+        is_passage || (!is_projected && MarginOfBranch(kinematics(), drives_->usual_rank()) < 1e6);
   }
   if (is_passage) {
     return "the prescribed motions pass a singular configuration or a dead end, where errors of "

@@ -20,14 +20,13 @@ const Eigen::Vector3d kZero = Eigen::Vector3d::Zero();
 std::string NameOfParam(const testing::TestParamInfo<Column>& info) { return NameOf(info.param); }
 
 /// Largest error of an angle that the method allows at accepted steps [rad]. In the width x of
-/// softening, crossed in 2 x / v, forces turn a soft direction by a (2 x / v)^2 / 2. Runs go on
-/// where a x / (2 v^2) <= 0.1 only (Drives::DecidesBranch()): by 0.4 x. The direction is not
-/// projected there, so it keeps errors of some steps as well. x is cbrt(4 eps) where loops are
-/// closed, and outside of it closure errors of n 4 eps give n 4 eps / x.
+/// softening, crossed in 2 x / v, forces turn a soft direction by a (2 x / v)^2 / 2. Here v is 1
+/// rad/s or more, and a, of metre bars under gravity, below 100 rad/s^2. The direction is not
+/// projected there, so it keeps errors of some steps as well. Outside of x closure errors of
+/// e = 4 n eps give e / x. x is 3 cbrt(e), for n <= 8 bodies.
 double MostError(double tolerance) {
-  const double eps = std::numeric_limits<double>::epsilon();
-  const double x = std::cbrt(4 * eps);
-  return 0.4 * x + 10 * tolerance + 8 * 4 * eps / x;
+  const double e = 4 * 8 * std::numeric_limits<double>::epsilon(), x = 3 * std::cbrt(e);
+  return 100.0 * (2 * x) * (2 * x) / 2 + 10 * tolerance + e / x;
 }
 
 double AngleOf(const MechanismDescription& d, const Snapshot& at, const std::string& body) {

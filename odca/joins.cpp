@@ -66,12 +66,12 @@ template <class Space, class S>
 Outcome Joins<Space, S>::Assemble(const Kinematics<Space, S>& kinematics) {
   operations_ = 0;
   softened_ = false;
-  softening_ = kinematics.softening();
   if (AssembleAll(kinematics, Pass::kPhysical)) return Outcome::kFinished;
   if (solver_ == SolverKind::kAsPublished) return Outcome::kSingular;
   if (!std::isfinite(static_cast<double>(rcond_))) return Outcome::kNonFinite;
   // a loop looks degenerate: let geometry say in which directions, then solve the physics
   softened_ = true;
+  softening_ = kinematics.softening();
   AssembleAll(kinematics, Pass::kGeometric);
   if (AssembleAll(kinematics, Pass::kSoftened)) return Outcome::kFinished;
   return std::isfinite(static_cast<double>(rcond_)) ? Outcome::kSingular : Outcome::kNonFinite;

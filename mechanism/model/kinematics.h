@@ -109,7 +109,7 @@ class Kinematics {
   /// Width of softening at these positions, a singular value over the largest
   /// (direction_weights.h): sqrt(10 e), where e is the largest mismatch of a constraint [rad, or
   /// mechanism lengths]. At a distance s from a singular configuration constraints look like x y =
-  /// e, which decides nothing where s^2 < 10 e. At least 3 cbrt(4 n eps): rounding of the
+  /// e, which decides nothing where s^2 < 10 e. At least 6 cbrt(4 n eps): rounding of the
   /// positions of n bodies, 4 n eps / s across the branch, makes 4 n eps / s^3 of accelerations. At
   /// most kSoftening.
   S softening() const;

@@ -23,9 +23,9 @@ std::string NameOfParam(const testing::TestParamInfo<Column>& info) { return Nam
 /// softening, crossed in 2 x / v, forces turn a soft direction by a (2 x / v)^2 / 2. Here v is 1
 /// rad/s or more, and a, of metre bars under gravity, below 100 rad/s^2. The direction is not
 /// projected there, so it keeps errors of some steps as well. Outside of x closure errors of
-/// e = 4 n eps give e / x. x is 3 cbrt(e), for n <= 8 bodies.
+/// e = 4 n eps give e / x. x is 6 cbrt(e), for n <= 8 bodies.
 double MostError(double tolerance) {
-  const double e = 4 * 8 * std::numeric_limits<double>::epsilon(), x = 3 * std::cbrt(e);
+  const double e = 4 * 8 * std::numeric_limits<double>::epsilon(), x = 6 * std::cbrt(e);
   return 100.0 * (2 * x) * (2 * x) / 2 + 10 * tolerance + e / x;
 }
 

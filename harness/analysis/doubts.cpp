@@ -164,6 +164,13 @@ bool IsCertified(const Record& record) {
          IsNearReference(record);
 }
 
+/// By more than runs of one tolerance may be apart (kMostTolerances), if a finer run was asked for.
+bool IsFarFromFinerRun(const Record& record) {
+  const double most = kMostTolerances * record.Number("rtol") + kRoundOffShare;
+  return record.Find("refinement_difference") != nullptr &&
+         !(record.Number("refinement_difference") <= most);
+}
+
 }  // namespace
 
 std::optional<DriftGrowth> GrowthAt(const Record& record) {
@@ -239,6 +246,7 @@ std::string OwnDoubts(const Record& record) {
           !(DriftShare(record) <= PromisedDriftShare(record)),
       kDriftDoubt);
   Add(&codes, !IsNearReference(record), kErrorDoubt);
+  Add(&codes, IsFarFromFinerRun(record) && !IsCertified(record), kRefinementDoubt);
   Add(&codes, PeriodsPerStep(record) > kMostPeriods, kDriveDoubt);
   Add(&codes, StepsStruggle(record), kStepsDoubt);
   Add(&codes, record.Number("ensemble_failed") > 0, kMembersDoubt);
@@ -267,7 +275,8 @@ void SetDoubts(std::vector<Record>* records) {
     // who ends as those do that can keep a branch has kept it
     std::string codes = agreements[i].is_backed ? Without(kSingularDoubt, own[i]) : own[i];
     Add(&codes, agreements[i].doubted && !certified, kDisagreementDoubt);
-    Add(&codes, refinements[i].doubted && !certified, kRefinementDoubt);
+    const bool is_known = own[i].find(kRefinementDoubt) != own[i].npos;
+    Add(&codes, refinements[i].doubted && !certified && !is_known, kRefinementDoubt);
     record.Set("doubts", codes);
     if (agreements[i].cluster > 0) record.Set("agreement", agreements[i].cluster);
   }

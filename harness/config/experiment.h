@@ -204,6 +204,7 @@ struct Experiment {
   std::vector<EnsembleRule> ensembles;               ///< the first that matches a case counts
   Limits limits;
   CompileOptions compile;   ///< what is simplified before a run
+  bool refine = false;      ///< accuracy cases run again at a tenth of their tolerance
   int series_points = 200;  ///< points kept of a time series for figures
   Timing timing;
   Precision precision;

@@ -114,6 +114,10 @@ const Fields<ExperimentFile>& ExperimentFileFields() {
             "clipped), without error test, besides those of the tolerances. Not for peers."},
            {"", By(one_of_both, RequireSteps)},
            {"", By(Json::object(), RequireNoPeerOfFixedSteps)},
+           {"refine", Bool(&File::refine),
+            "Every case with a tolerance runs once more at a tenth of it. Records then contain "
+            "refinement_difference, the largest difference of final poses. More than 1000 "
+            "tolerances set the warning refinement."},
            {"integrator", Integrators(),
             "The profile, a Runge-Kutta pair with its norm and controller, or several, crossed "
             "with "

@@ -154,6 +154,7 @@ constexpr Measure kMeasures[] = {
     {"energy_*", kNumber},
 
     // distance from what is known
+    {"refinement_difference", kNumber, {"distance from the finer run", "", kScientific}},
     {"reference", kText, {"reference"}},
     {"reference_file", kText},
     {"reference_error", kNumber, {"reference's error", "m", kScientific}},

@@ -48,6 +48,7 @@ std::string AccuracyContent(const Experiment& experiment, const Case& one) {
     content.Set("reference_points", std::int64_t{experiment.reference->points});
     content.Set("reference_cpu_s", experiment.reference->cpu_s);
   }
+  if (experiment.refine) content.Set("refine", std::string("true"));
   if (experiment.output) content.Set("output", ToString(*experiment.output));
   return CaseId(content);
 }

@@ -6,6 +6,7 @@
 #include <limits>
 #include <optional>
 
+#include "harness/analysis/agreement.h"
 #include "harness/analysis/doubts.h"
 #include "harness/analysis/link_length.h"
 #include "harness/reference/error_meter.h"
@@ -64,6 +65,20 @@ HeldAgainst WriteCertificateOf(const ExperimentScene& scene, const Case& one,
   return held;
 }
 
+bool HasFinished(const Record& run) { return run.Text("outcome") == ToString(Outcome::kFinished); }
+
+/// The largest difference of final poses from a run at a tenth of the tolerance; infinite where
+/// that run does not finish.
+void WriteRefinement(const Experiment& experiment, Case one, Record& record) {
+  one.rtol /= 10.0;
+  one.atol /= 10.0;
+  const Run finer =
+      RunOnce(experiment, one, experiment.scenes[one.scene].mechanism.description, nullptr);
+  record.Set("refinement_difference", HasFinished(finer.record)
+                                          ? DifferenceOf(record, finer.record).largest
+                                          : std::numeric_limits<double>::infinity());
+}
+
 }  // namespace
 
 IntegratorOptions OptionsOf(const Case& one, const std::vector<double>& stop_times) {
@@ -100,12 +115,16 @@ Record RunCase(const Experiment& experiment, const Case& one, const Reference* r
       RunOnce(experiment, one, scene.mechanism.description, nullptr, held, task ? &*task : nullptr);
   for (const auto& [key, value] : nominal.record.items()) record.Set(key, value);
 
+  if (experiment.refine && one.rtol > 0.0 && !IsPeer(record) && HasFinished(record)) {
+    WriteRefinement(experiment, one, record);
+  }
+
   std::vector<DriftSeries> runs;
   EnsembleTally tally(nominal, one.branch_bound);
   int failed = 0;
   ForEachMember(experiment, one, threads, [&](Run run, const MechanismDescription& start) {
     tally.Add(run, start);
-    if (run.record.Text("outcome") != ToString(Outcome::kFinished)) {
+    if (!HasFinished(run.record)) {
       ++failed;
     } else {
       runs.push_back(std::move(run.drift));
@@ -127,7 +146,7 @@ Record RunCase(const Experiment& experiment, const Case& one, const Reference* r
   const DriftSeries envelope = Envelope(nominal.drift, experiment.series_points);
   record.Set("series.drift_t", envelope.t);
   record.Set("series.drift", envelope.value);
-  if (record.Text("outcome") == ToString(Outcome::kFinished)) {
+  if (HasFinished(record)) {
     record.Set("doubts", OwnDoubts(record));
   }
   return record;

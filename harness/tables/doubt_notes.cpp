@@ -55,6 +55,10 @@ const Reason kReasons[] = {
      }},
     {kRefinementDoubt, "finer tolerances do not bring it nearer to one end",
      [](const Record& row) {
+       if (row.Find("refinement_difference") != nullptr) {
+         return fmt::format("{:.1e} of a link or rad from the run at a tenth of its tolerance",
+                            row.Number("refinement_difference"));
+       }
        return fmt::format("{} steps, state {}", row.Text("steps"), row.Text("state_hash"));
      }},
     {kDriveDoubt, "steps so long that the fastest drive is seen less than twice a period",

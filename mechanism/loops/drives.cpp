@@ -79,11 +79,10 @@ bool Drives<Space, S>::Followed(const Kinematics<Space, S>& kinematics, const Ve
 
 /// At the speed v a width x takes x / v, in which an acceleration a adds up to a (x / v)^2 / 2.
 template <class Space, class S>
-bool Drives<Space, S>::DecidesBranch(const Kinematics<Space, S>& kinematics) const {
+bool Drives<Space, S>::DecidesBranch(const Kinematics<Space, S>& kinematics, S width) const {
   const S speed = SpeedOf(kinematics);
-  const double x = std::sqrt(DirectionWeights<double>::kTheta);
   return worst_ <= S(kLeftOnBranch) * size_ &&
-         S(x / 2) * acceleration_ <= S(kTurned) * speed * speed;
+         width / S(2) * acceleration_ <= S(kTurned) * speed * speed;
 }
 
 template <class Space, class S>

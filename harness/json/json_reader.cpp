@@ -14,7 +14,7 @@ namespace loopbench::harness {
 namespace {
 
 constexpr std::size_t kLongestShown = 60;  ///< characters of a value in a message
-constexpr std::size_t kMostListed = 20;    ///< names in a message
+constexpr std::size_t kMostListed = 32;    ///< names in a message
 
 /// The first letters; a cut inside a UTF-8 character would make the message invalid.
 std::string Cut(const std::string& text) {

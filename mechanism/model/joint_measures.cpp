@@ -38,7 +38,8 @@ S Kinematics<Space, S>::softening() const {
     e = std::max({e, S(miss.angular.norm()), S(miss.linear.norm() / mechanism_->length())});
   }
   const double one = 6.0 * std::cbrt(4.0 * static_cast<double>(std::numeric_limits<S>::epsilon()));
-  const S least(std::min(one * std::cbrt(mechanism_->num_bodies()), std::max(one, kSoftening)));
+  const S least = static_cast<S>(
+      std::min(one * std::cbrt(mechanism_->num_bodies()), std::max(one, kSoftening)));
   return std::max(least, std::min(S(sqrt(S(10) * e)), S(kSoftening)));
 }
 

@@ -38,7 +38,16 @@ std::vector<std::string> FormulationsOf(const CountCommand& command) {
   return names;
 }
 
-void SetCounts(const generate::MethodCounts& counts, Record& row) {
+/// Counts of one right-hand side. They are exact unless a change far below any digit that is
+/// meant, as other libraries and processors make it, leads to others.
+void SetCounts(const generate::RecordingSubject& subject, const generate::RecordingStart& start,
+               Record& row) {
+  constexpr double kRounding = 1e-12;
+  generate::RecordingStart rounded = start;
+  rounded.q.array() += kRounding;
+  rounded.u.array() -= kRounding;
+  const auto counts = generate::CountsOf(generate::RecordDerivative(subject, start));
+  const auto other = generate::CountsOf(generate::RecordDerivative(subject, rounded));
   const generate::OperationCounts& of = counts.result;
   row.Set("flops", of.flops());
   row.Set("additions", of.additions);
@@ -51,6 +60,7 @@ void SetCounts(const generate::MethodCounts& counts, Record& row) {
   row.Set("comparisons", counts.comparisons);
   row.Set("flops_compared", counts.compared.flops());
   row.Set("flops_as_run", counts.as_run.flops());
+  row.Set("exact", std::string(counts == other ? "yes" : "no"));
 }
 
 /// One part of a mechanism in one coordinate set: a row per formulation, level and solver.
@@ -73,13 +83,11 @@ void CountPart(const CountCommand& command, const MechanismDescription& part, Co
           if (state.outcome != Outcome::kFinished) {
             throw generate::NotCovered(std::string(ToString(state.outcome)) + ": " + state.message);
           }
-          SetCounts(generate::CountsOf(generate::RecordDerivative(
-                        {.description = part,
-                         .coordinates = set,
-                         .formulation = formulation,
-                         .options = {.enforcement = level, .solver = solver, .gains = kGains}},
-                        {.q = state.q, .u = state.u})),
-                    row);
+          SetCounts({.description = part,
+                     .coordinates = set,
+                     .formulation = formulation,
+                     .options = {.enforcement = level, .solver = solver, .gains = kGains}},
+                    {.q = state.q, .u = state.u}, row);
         } catch (const std::exception& why) {
           row.Set("not_recorded", std::string(why.what()));
         }
@@ -122,12 +130,8 @@ Table CountTable(std::vector<Record> rows) {
                    {"comparisons", "compared", Format::kInteger},
                    {"flops_compared", "flops with comparisons", Format::kInteger, {}, -2},
                    {"flops_as_run", "flops as run", Format::kInteger, {}, 1},
+                   {"exact", "exact", Format::kText, {}, -1},
                    {"not_recorded", "not recorded", Format::kText, {}, 2}};
-  std::erase_if(table.columns, [&](const TableColumn& column) {
-    return column.key == "not_recorded" && std::ranges::none_of(table.rows, [](const Record& row) {
-             return row.Find("not_recorded") != nullptr;
-           });
-  });
   table.notes = {
       "flops: + - * count 1, / and sqrt 4, other functions 8 (McMahon 1986); depth: operations on "
       "the longest path; zeros and ones of the geometry exploited, as run: not exploited"};
@@ -148,8 +152,11 @@ int CountOperations(const CountCommand& command, const std::string& typed) {
   }
   const bool any =
       std::ranges::any_of(rows, [](const Record& row) { return row.Find("flops") != nullptr; });
+  const bool all = std::ranges::all_of(
+      rows, [](const Record& row) { return row.Find("not_recorded") == nullptr; });
   Table table = CountTable(std::move(rows));
   const bool on_terminal = command.format == "text" && command.out.empty();
+  if (on_terminal && all) table.columns.pop_back();
   if (!on_terminal) AppendProvenance(table, typed);
   if (on_terminal) {
     PrintText(ToScreen(table));

@@ -1,5 +1,7 @@
 #include "harness/generate/generated.h"
 
+#include <fmt/format.h>
+
 #include <algorithm>
 #include <chrono>
 
@@ -14,6 +16,17 @@ namespace {
 // branches change all the time are not worth more compilations.
 constexpr int kMissesBeforeRecording = 8;
 constexpr std::size_t kMostBranches = 8;
+// 24 000 operations take a compiler 3.5 s; factorisations that iterate have hundreds of thousands
+constexpr std::int64_t kMostOperations = 50'000;
+
+void RequireShort(const RecordedDerivative& recorded) {
+  const std::vector<bool> live = recorded.graph.Live(recorded.outputs, true);
+  const std::int64_t operations = std::ranges::count(live, true);
+  if (operations <= kMostOperations) return;
+  throw NotCovered(
+      fmt::format("found {} operations, expected at most {}: they would take a compiler too long",
+                  operations, kMostOperations));
+}
 
 }  // namespace
 
@@ -49,6 +62,7 @@ void GeneratedDerivative<Space>::AddBranch(double t, std::span<const double> y) 
       throw NotCovered("the state carries other speeds in the recorded text than in double");
     }
   }
+  RequireShort(recorded);
   branches_.insert(branches_.begin(), CompileBranch(PrintC(recorded)));
   const auto room = static_cast<std::size_t>(branches_.front().room);
   room_.resize(std::max(room_.size(), room));

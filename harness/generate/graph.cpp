@@ -181,6 +181,7 @@ int Graph::Make(Operation operation, int a, int b) {
 
 void Graph::Compare(Relation relation, int a, int b, bool outcome) {
   if (IsConstant(a) && IsConstant(b)) return;
+  if (a == b && relation == Relation::kLess) return;  // false of any number
   std::uint8_t& known = compared_[Pair(a, b)][static_cast<std::size_t>(relation)];
   if (known != 0) return;  // of the same numbers it comes out the same
   known = 1;

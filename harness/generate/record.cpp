@@ -3,6 +3,7 @@
 #include <fmt/format.h>
 
 #include <bit>
+#include <cmath>
 #include <optional>
 
 #include "harness/generate/recorded.h"
@@ -29,6 +30,12 @@ std::unique_ptr<System<Space, Recorded>> MakeRecorded(const std::string& formula
 
 VectorX<Recorded> Constants(const Eigen::VectorXd& numbers) { return numbers.cast<Recorded>(); }
 
+/// Different numbers between -1e-6 and 1e-6, none of them zero: multiples of the golden ratio.
+double ShiftOf(std::size_t i) {
+  const double multiple = 0.6180339887498949 * static_cast<double>(i + 1);
+  return 2e-6 * (multiple - std::floor(multiple)) - 1e-6;
+}
+
 /// One recording; `casts` as recorded.h has it.
 template <class Space>
 RecordedDerivative RecordOnce(const RecordingSubject& subject, const RecordingStart& start,
@@ -51,9 +58,9 @@ RecordedDerivative RecordOnce(const RecordingSubject& subject, const RecordingSt
     recorded.carried_speeds.push_back(system->state_speed(i));
   }
   const Recording recording(recorded.graph, casts);
-  const Recorded time = Recorded::Input(t);
+  const Recorded time = Recorded::Input(state != nullptr ? t : t + ShiftOf(y.size()));
   for (std::size_t i = 0; i < y.size(); ++i) {
-    y[i] = Recorded::Input(state != nullptr ? (*state)[i] : y[i].number);
+    y[i] = Recorded::Input(state != nullptr ? (*state)[i] : y[i].number + ShiftOf(i));
   }
   std::vector<Recorded> ydot(y.size(), Recorded(0.0));
   const Outcome outcome = system->Examine(time, y, ydot);

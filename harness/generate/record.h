@@ -46,7 +46,9 @@ struct RecordedDerivative {
 RecordedDerivative RecordDerivative(const RecordingSubject& subject, const RecordingStart& start,
                                     double t, const std::vector<double>& state);
 
-/// The same at the start itself.
+/// The same next to the start: time and each number of the state are moved by up to 1e-6, the same
+/// amounts everywhere. At the start itself, numbers that are zero or equal by chance would decide
+/// which operations follow, and rounding whether they are.
 RecordedDerivative RecordDerivative(const RecordingSubject& subject, const RecordingStart& start);
 
 /// Exact counts of a right-hand side.
@@ -56,6 +58,8 @@ struct MethodCounts {
   OperationCounts compared;  ///< the same with the operations for comparisons
   std::int64_t comparisons = 0;
   int depth = 0;  ///< operations on the longest path to dy/dt
+
+  friend bool operator==(const MethodCounts&, const MethodCounts&) = default;
 };
 MethodCounts CountsOf(const RecordedDerivative& recorded);
 

@@ -1,6 +1,9 @@
 #include "harness/generate/recorded.h"
 
+#include <fmt/format.h>
+
 #include "harness/generate/pose_sines.h"
+#include "harness/generate/record.h"
 
 namespace loopbench::generate {
 
@@ -8,6 +11,16 @@ namespace {
 
 thread_local Graph* current = nullptr;
 thread_local CastsAs casts_as = CastsAs::kNumber;
+
+/// Equations of shipped mechanisms have some ten thousand nodes, factorisations that iterate more.
+constexpr std::size_t kMostNodes = 100'000;
+
+void RequireRoom() {
+  if (current->nodes().size() <= kMostNodes) return;
+  throw NotCovered(fmt::format(
+      "found more than {} operations, of a large mechanism or a factorisation that iterates",
+      kMostNodes));
+}
 
 int NodeOf(const Recorded& x) { return x.node >= 0 ? x.node : current->Constant(x.number); }
 
@@ -50,6 +63,7 @@ Recorded Recorded::Make(Operation operation, const Recorded& a, const Recorded& 
   if (current == nullptr) return number;
   current->as_run.Add(operation);
   if (a.node < 0 && b.node < 0) return number;
+  RequireRoom();
   return At(current->Make(operation, NodeOf(a), NodeOf(b)), number);
 }
 

@@ -64,24 +64,30 @@ std::map<std::string, std::string> RowsByKey(const std::string& csv) {
 }
 
 /// The gate without a clock. `loopbench count` writes the file anew (results/methods/README.md).
-TEST_F(CountTest, CountsOfAllMechanismsAreThoseOfTheCommittedTable) {
+/// Rows that are not exact, where rounding decides an iteration or a pivot, are not compared.
+class CountGate : public CountTest, public testing::WithParamInterface<std::string> {};
+
+TEST_P(CountGate, CountsOfAllMechanismsAreThoseOfTheCommittedTable) {
   const fs::path kept = fs::path(LOOPBENCH_SOURCE_DIR) / "results/methods/counts.csv";
   const Ending now = Call("count '" + (kConfigs / "mechanisms").string() +
-                          "'/*.json --format csv --out counts.csv");
+                          "'/*.json --format csv --out counts.csv --coordinates " + GetParam());
   ASSERT_EQ(now.code, 0) << now.text;
   const auto found = RowsByKey(ReadFile(folder_ / "counts.csv"));
   const auto expected = RowsByKey(ReadFile(kept));
-  EXPECT_GT(expected.size(), 500u);
+  int exact = 0;
   for (const auto& [key, counts] : expected) {
+    if (key.find("," + GetParam() + ",") == std::string::npos) continue;
+    if (!counts.ends_with(",yes,")) continue;
+    ++exact;
     const auto row = found.find(key);
-    if (row == found.end()) {
-      ADD_FAILURE() << key << ": found no row, expected " << counts;
-    } else {
-      EXPECT_EQ(row->second, counts) << key;
-    }
+    EXPECT_EQ(row == found.end() ? "no row" : row->second, counts) << key;
   }
+  EXPECT_GT(exact, 300);
   for (const auto& [key, counts] : found) EXPECT_TRUE(expected.contains(key)) << key << " is new";
 }
+
+INSTANTIATE_TEST_SUITE_P(Coordinates, CountGate, testing::Values("joint", "absolute"),
+                         [](const auto& set) { return set.param; });
 
 TEST_F(CountTest, GeneratedExecutionIsAFactorOfExperiments) {
   Write("both.json", R"({

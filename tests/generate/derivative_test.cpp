@@ -12,6 +12,7 @@
 #include "harness/generate/print_c.h"
 #include "harness/run/compiled_scene.h"
 #include "harness/timing/subject.h"
+#include "mechanism/description/library.h"
 
 namespace loopbench::generate {
 namespace {
@@ -109,6 +110,37 @@ class Library {
   std::vector<double> y_;
 };
 
+/// A bar of 2 m on a pin, its centre of mass at r = (c, s) for the angle x, with speed w. By hand:
+///
+///   c, s                  2 sines
+///   w r                   2 *
+///   a = w (w r)           2 *
+///   m r, M = r . m r + I  4 *, 2 +
+///   f = m a - m g         2 *, 1 +      g has one component, and m g is a constant
+///   h = r x f             2 *, 1 +
+///   M = L L^T, -h/L/L     1 sqrt, 2 /
+///
+/// The longest path: s, w s, w (w s), m a, + m g, c f, h, / L, / L.
+TEST(CountsTest, APendulumHasTheOperationsThatAHandCounts) {
+  MechanismDescription pendulum;
+  pendulum.gravity = {0.0, -9.81, 0.0};
+  pendulum.bodies.push_back(Bar("bar", 2.0, 3.0, 0.7));
+  const Eigen::Vector3d pin = Eigen::Vector3d::Zero();
+  pendulum.joints.push_back(Revolute("O", kGround, pin, 1, pin));
+  const RecordingStart start = {.q = Eigen::VectorXd::Constant(1, 0.3),
+                                .u = Eigen::VectorXd::Constant(1, 0.2)};
+  for (const std::string formulation : {"lagrange", "reduction"}) {
+    const MethodCounts counts =
+        CountsOf(RecordDerivative({.description = pendulum, .formulation = formulation}, start));
+    const OperationCounts by_hand = {
+        .additions = 4, .multiplications = 12, .divisions = 2, .roots = 1, .sines = 2};
+    EXPECT_EQ(counts.result, by_hand) << formulation;
+    EXPECT_EQ(counts.result.flops(), 4 + 12 + 4 * 3 + 8 * 2);
+    EXPECT_EQ(counts.depth, 9);
+    EXPECT_GT(counts.as_run.flops(), 4 * counts.result.flops());
+  }
+}
+
 /// O-DCA has no sum whose order Eigen chooses: bits are those of double.
 TEST(RecordedDerivativeTest, ODcaOfTheFourBarHasTheBitsOfTheLibraryElsewhereToo) {
   for (const Enforcement level : kLevels) {
@@ -121,6 +153,57 @@ TEST(RecordedDerivativeTest, ODcaOfTheFourBarHasTheBitsOfTheLibraryElsewhereToo)
     ExpectSameBits(Evaluate(recorded, x, &ok), library.Examine(0.5, y));
     EXPECT_TRUE(ok) << ToString(level);
   }
+}
+
+/// Calls see(library, name) for all shipped mechanisms, formulations and recorded levels.
+void ForAllShipped(Coordinates set, auto see) {
+  for (const auto& entry : std::filesystem::directory_iterator(kMechanisms)) {
+    const std::string name = entry.path().stem();
+    const MechanismDescription description = Shipped(name);
+    for (const std::string& formulation : kFormulations) {
+      for (const Enforcement level : kLevels) {
+        const std::string what = name + " " + formulation + " " + std::string(ToString(level));
+        if (description.space == SpaceKind::kPlanar) {
+          see(Library<Planar>(description, formulation, level, set), what);
+        } else {
+          see(Library<Spatial>(description, formulation, level, set), what);
+        }
+      }
+    }
+  }
+}
+
+/// Elsewhere, where every comparison has its outcome, a graph gives the bits of the text itself.
+void ExpectBitsOfTheText(Coordinates set) {
+  int compared = 0, branched = 0, refused = 0;
+  ForAllShipped(set, [&](auto library, const std::string& what) {
+    SCOPED_TRACE(what);
+    const std::vector<double> y = library.Near(1e-6);
+    std::vector<double> x = {0.01};
+    x.insert(x.end(), y.begin(), y.end());
+    try {
+      const RecordedDerivative recorded = RecordDerivative(library.subject(), library.start());
+      bool ok = true;
+      const std::vector<double> found = Evaluate(recorded, x, &ok);
+      ++(ok ? compared : branched);
+      if (!ok) return;
+      ExpectSameBits(found, RecordDerivative(library.subject(), library.start(), 0.01, y).numbers);
+    } catch (const NotCovered& why) {
+      EXPECT_NE(std::string(why.what()).find("factorisation that iterates"), std::string::npos);
+      ++refused;
+    }
+  });
+  // pivots of equal size, in absolute coordinates above all, change with every state
+  EXPECT_GT(compared, 2 * branched);
+  EXPECT_LT(refused, 12);
+}
+
+TEST(RecordedDerivativeTest, AllShippedMechanismsHaveTheBitsOfTheTextInJointCoordinates) {
+  ExpectBitsOfTheText(Coordinates::kJoint);
+}
+
+TEST(RecordedDerivativeTest, AllShippedMechanismsHaveTheBitsOfTheTextInAbsoluteCoordinates) {
+  ExpectBitsOfTheText(Coordinates::kAbsolute);
 }
 
 TEST(RecordedDerivativeTest, TheTextDoesNotDependOnTheStateWhereItWasRecorded) {

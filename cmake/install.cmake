@@ -38,7 +38,7 @@ target_compile_definitions(loopbench_mechanism INTERFACE
   $<INSTALL_INTERFACE:EIGEN_MAX_STATIC_ALIGN_BYTES=${LOOPBENCH_ALIGNMENT}>)
 target_compile_features(loopbench_mechanism INTERFACE cxx_std_20)
 
-set(installed loopbench_mechanism ${LOOPBENCH_FORMULATION_LIBRARIES} loopbench_harness)
+set(installed loopbench_mechanism ${LOOPBENCH_FORMULATION_LIBRARIES} loopbench_generate loopbench_harness)
 foreach(optional loopbench_precision loopbench_contract)
   if(TARGET ${optional})
     list(APPEND installed ${optional})

@@ -48,7 +48,7 @@ Odca<Space, S>::Odca(const Mechanism<Space, S>& mechanism, const FormulationOpti
       sweep_(mechanism, plan_, options.solver),
       equations_(mechanism),
       change_(VectorX<S>::Zero(mechanism.num_u())) {
-  if (options.solver == SolverKind::kRankRevealing) MakeShortCut(options);
+  if (options.solver == SolverKind::kRankRevealing && !options.general) MakeShortCut(options);
 }
 
 template <class Space, class S>

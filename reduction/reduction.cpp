@@ -27,7 +27,7 @@ SparseOrDense<Space>::SparseOrDense(const Mechanism<Space, double>& mechanism,
       bias_(VectorX<double>::Zero(mechanism.num_rows())) {
   const bool fits = DenseNumbers(mechanism) <= kKeptReady;
   may_decline_ = matrices == Matrices::kLessWork && fits;
-  if (options.solver == SolverKind::kRankRevealing) {
+  if (options.solver == SolverKind::kRankRevealing && !options.general) {
     sparse_ =
         SparsePartition<Space>::Make(mechanism, at_velocity_ ? Choice::kKept : Choice::kFree,
                                      matrices == Matrices::kSparse || (!at_velocity_ && fits));

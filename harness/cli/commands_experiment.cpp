@@ -105,6 +105,12 @@ Table CaseTable(const Overview& overview, const Selection& filter) {
                                [](const Column& column) { return column.threads > 1; });
   });
   if (has_threads) table.columns.push_back({"threads", "threads", Format::kInteger, {}});
+  const bool has_executions = std::ranges::any_of(experiments, [](const Experiment& experiment) {
+    return std::ranges::any_of(experiment.columns, [](const Column& column) {
+      return column.execution == Execution::kGenerated;
+    });
+  });
+  if (has_executions) table.columns.push_back({"execution", "execution", Format::kText, {}});
   const auto any = [&experiments](auto has) { return std::ranges::any_of(experiments, has); };
   const bool has_integrators =
       any([](const Experiment& experiment) { return experiment.integrators.size() > 1; });

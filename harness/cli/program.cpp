@@ -15,6 +15,7 @@
 #include "harness/cli/program_cluster.h"
 #include "harness/cli/program_compare.h"
 #include "harness/cli/program_convert.h"
+#include "harness/cli/program_count.h"
 #include "harness/cli/program_files.h"
 #include "harness/cli/program_history.h"
 #include "harness/cli/program_import.h"
@@ -42,6 +43,7 @@ Examples: (paths from the root of the repository)
   loopbench run configs/experiments/paper/paper.json --jobs 2 --filter mechanism=four-bar
   loopbench view configs/mechanisms/double-wishbone.json
   loopbench import arm.urdf --loops arm-loops.json --out arm.json
+  loopbench count configs/mechanisms/four-bar.json
   loopbench simplify configs/experiments/models/hall.json --errors 2
   loopbench run big.json --shard 1/2 --out part1   (and 2/2 elsewhere)
   loopbench merge part1 part2 --out whole
@@ -110,6 +112,7 @@ int RunCommandLine(int argc, char** argv) {
   ReportCommandOptions report(app);
   ImportCommandOptions import(app);
   ConvertOptions convert(app);
+  CountOptions count(app);
   ComparisonOptions comparison(app);
   BaselineOptions baseline(app);
   ClusterOptions cluster(app);
@@ -130,6 +133,7 @@ int RunCommandLine(int argc, char** argv) {
     if (const auto code = report.Run(typed)) return *code;
     if (const auto code = import.Run()) return *code;
     if (const auto code = convert.Run()) return *code;
+    if (const auto code = count.Run(typed)) return *code;
     if (const auto code = comparison.Run(typed)) return *code;
     if (const auto code = baseline.Run(typed)) return *code;
     if (const auto code = cluster.Run()) return *code;

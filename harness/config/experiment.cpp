@@ -72,8 +72,9 @@ std::string ToString(const Column& column) {
   const std::string gains =
       column.gains ? fmt::format("({}, {})", column.gains->alpha, column.gains->beta) : "";
   const std::string threads = column.threads > 1 ? fmt::format("/{}-threads", column.threads) : "";
-  return fmt::format("{}/{}{}/{}/{}{}", column.formulation, ToString(column.enforcement), gains,
-                     ToString(column.coordinates), ToString(column.solver), threads);
+  const char* execution = column.execution == Execution::kGenerated ? "/generated" : "";
+  return fmt::format("{}/{}{}/{}/{}{}{}", column.formulation, ToString(column.enforcement), gains,
+                     ToString(column.coordinates), ToString(column.solver), threads, execution);
 }
 
 Record CaseKeys(const Experiment& experiment, const Case& one) {
@@ -103,6 +104,9 @@ Record CaseKeys(const Experiment& experiment, const Case& one) {
     keys.Set("beta", one.column.gains->beta);
   }
   if (one.column.threads > 1) keys.Set("threads", std::int64_t{one.column.threads});
+  if (one.column.execution == Execution::kGenerated) {
+    keys.Set("execution", std::string(ToString(one.column.execution)));
+  }
   for (const auto& [name, value] : experiment.parameters.items()) keys.Set(name, value);
   return keys;
 }

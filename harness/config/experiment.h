@@ -24,6 +24,10 @@ namespace loopbench::harness {
 /// Where the Newton iteration of an implicit profile has its Jacobians from.
 enum class JacobianKind { kForward, kFiniteDifference };
 
+/// Who evaluates right-hand sides: the library, or code generated from its text
+/// (harness/generate/).
+enum class Execution { kLibrary, kGenerated };
+
 /// Names in files and tables, by value of the enum.
 template <class Enum>
 inline constexpr std::array<std::string_view, 0> kNames = {};
@@ -36,6 +40,9 @@ template <>
 inline constexpr std::array<std::string_view, 2> kNames<JacobianKind> = {"forward",
                                                                          "finite-difference"};
 
+template <>
+inline constexpr std::array<std::string_view, 2> kNames<Execution> = {"library", "generated"};
+
 /// What a run computes in, narrowest first (harness/precision/).
 enum class Scalar { kFloat, kDouble, kLongDouble, kFloat128 };
 template <>
@@ -44,6 +51,9 @@ inline constexpr std::array<std::string_view, 4> kNames<Scalar> = {"float", "dou
 /// The other enums have theirs beside them, in mechanism/.
 inline std::string_view ToString(Scalar value) {
   return kNames<Scalar>[static_cast<std::size_t>(value)];
+}
+inline std::string_view ToString(Execution value) {
+  return kNames<Execution>[static_cast<std::size_t>(value)];
 }
 
 /// The value with this name, or nothing.
@@ -70,6 +80,7 @@ struct Column {
   /// Of "baumgarte", when the file gives them.
   std::optional<BaumgarteGains> gains = std::nullopt;
   int threads = 1;  ///< that may work on one right-hand side
+  Execution execution = Execution::kLibrary;
 
   friend bool operator==(const Column&, const Column&) = default;
 };

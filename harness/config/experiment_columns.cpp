@@ -15,6 +15,7 @@ struct ColumnLists {
   std::vector<SolverKind> solvers = {Column().solver};
   std::optional<BaumgarteGains> gains;
   std::vector<std::int64_t> threads = {Column().threads};
+  std::vector<Execution> executions = {Column().execution};
 };
 
 /// Reports a level that a formulation does not have.
@@ -48,6 +49,11 @@ void RequirePeersOwn(const JsonNode& node, ColumnLists& lists) {
     }
     for (const std::int64_t threads : lists.threads) {
       if (threads != kOwn.threads) refuse("threads", std::to_string(threads), "1");
+    }
+    for (const Execution execution : lists.executions) {
+      if (execution != kOwn.execution) {
+        refuse("execution", ToString(execution), ToString(kOwn.execution));
+      }
     }
     if (lists.gains) node.FailAs(fmt::format("\"{}\" with gains", formulation), "no gains");
   }
@@ -84,6 +90,9 @@ const Fields<ColumnLists>& ColumnFields() {
         "partition."},
        {"threads", IntegerList(&ColumnLists::threads, 1, kMostThreads),
         "That may work on one right-hand side; results have the same bits for any number."},
+       {"execution", Choices(&ColumnLists::executions, NamesOf<Execution>(), "an execution"),
+        "Right-hand sides by the library, or by C code generated from its text "
+        "(docs/operation-counts.md)."},
        {"alpha", NumberSchema(kNotNegative),
         "Gain on mismatches of speeds [1/s]; baumgarte only, beside beta."},
        {"beta", NumberSchema(kNotNegative),
@@ -104,8 +113,10 @@ std::vector<Column> ReadColumnEntry(const JsonNode& node) {
       for (const Coordinates set : lists.coordinates) {
         for (const SolverKind solver : lists.solvers) {
           for (const std::int64_t threads : lists.threads) {
-            columns.push_back(
-                {formulation, enforcement, set, solver, lists.gains, static_cast<int>(threads)});
+            for (const Execution execution : lists.executions) {
+              columns.push_back({formulation, enforcement, set, solver, lists.gains,
+                                 static_cast<int>(threads), execution});
+            }
           }
         }
       }

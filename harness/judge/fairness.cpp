@@ -37,6 +37,7 @@ constexpr std::array kAspects = {
     Aspect{"tolerance", "rtol", false, "fixed step"},
     Aspect{"step [s]", "step", false, "by tolerance"},
     Aspect{"threads", "threads", false, "1"},
+    Aspect{"execution", "execution", false, "library"},
     Aspect{"machine", "machine", true},
     Aspect{"compiler", "compiler", true},
     Aspect{"flags", "flags", true},

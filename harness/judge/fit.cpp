@@ -54,6 +54,7 @@ std::string BenchmarkNameOf(const Record& record) {
   }
   const std::string threads = record.Text("threads");
   if (!threads.empty()) name += "/" + threads + "-threads";
+  if (const std::string word = record.Text("execution"); !word.empty()) name += "/" + word;
   return name;
 }
 

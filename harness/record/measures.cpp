@@ -31,6 +31,7 @@ constexpr Measure kMeasures[] = {
     {"step", kNumber, {"step", "s", kShortest}},
     {"horizon", kNumber, {"horizon", "s", kShortest}},
     {"threads", kNumber},
+    {"execution", kText, {"execution"}},
     {"alpha", kNumber},
     {"beta", kNumber},
     {"case_id", kText, {"case"}},
@@ -93,6 +94,7 @@ constexpr Measure kMeasures[] = {
     {"singularity_passages", kNumber, {"singular passages", "", kInteger}, {kSum}},
     {"softened_steps", kNumber, {"softened steps", "", kInteger}, {kSum}},
     {"softened_evaluations", kNumber, {"softened evaluations", "", kInteger}, {kSum}},
+    {"library_evaluations", kNumber, {"evaluations in the library", "", kInteger}, {kSum}},
     {"mode_changes", kNumber, {"changes of mode", "", kInteger}, {kSum}},
 
     // work
@@ -251,6 +253,7 @@ constexpr Measure kMeasures[] = {
     {"wall_s_p10", kNumber, {"wall p10", "s", kSeconds}, {}, kNone, kVaries},
     {"wall_s_p90", kNumber, {"wall p90", "s", kSeconds}, {}, kNone, kVaries},
     {"wall_*", kNumber},
+    {"compile_s", kNumber, {"compile", "s", kSeconds}, {kSum}, kNone, kVaries},
     {"cpu_s", kNumber, {"CPU", "s", kSeconds}, {kSum}, kNone, kVaries},
     {"cpu_*", kNumber},
     {"realtime_factor", kNumber, {"real-time factor", "", kSeconds}, {}, kNone, kVaries},

@@ -10,6 +10,8 @@
 #include "harness/config/experiment.h"
 #include "harness/config/formulations.h"
 #include "harness/config/options.h"
+#include "harness/generate/generated.h"
+#include "harness/integrator/arkode.h"
 #include "harness/integrator/ode.h"
 #include "harness/record/record.h"
 #include "harness/reference/reference.h"
@@ -27,6 +29,7 @@ std::unique_ptr<System<Space, double>> MakeFormulation(const Column& column,
                                  .solver = column.solver,
                                  .gains = column.gains,
                                  .threads = column.threads,
+                                 .general = column.execution == Execution::kGenerated,
                                  .beside = beside});
 }
 
@@ -37,6 +40,30 @@ void GiveJacobian(const std::string& integrator, JacobianKind kind,
                   const MechanismDescription& description, System<Space, double>& system) {
   const bool wanted = FindProfile(integrator)->is_implicit && kind == JacobianKind::kForward;
   if (wanted) system.UseJacobian(std::make_unique<ForwardJacobian<Space>>(description, system));
+}
+
+/// Gives a system, after its start and IntegrateWork(), the generated right-hand side that a column
+/// asks for. Throws NotCovered (harness/generate/record.h).
+template <class Space>
+void GiveExecution(const Column& column, const MechanismDescription& description,
+                   System<Space, double>& system) {
+  if (column.execution == Execution::kLibrary) return;
+  system.UseCompiled(std::make_unique<generate::GeneratedDerivative<Space>>(
+      generate::RecordingSubject{description, column.coordinates, column.formulation,
+                                 system.options()},
+      system));
+}
+
+/// The same with NotCovered as outcome and message of `result`, which else is as it was.
+template <class Space>
+void GiveExecution(const Column& column, const MechanismDescription& description,
+                   System<Space, double>& system, IntegratorResult* result) {
+  try {
+    GiveExecution(column, description, system);
+  } catch (const generate::NotCovered& why) {
+    result->outcome = Outcome::kInexpressible;
+    result->message = why.what();
+  }
 }
 
 /// Method, tolerances and limits of a case, and the stop times of its mechanism.

@@ -79,6 +79,10 @@ class Runner {
     for (const auto& observer : observers_) observer->Trace(traces);
     WriteCounts(result, traces.projection_steps, FindProfile(case_.integrator)->is_implicit,
                 run.record);
+    if (case_.column.execution == Execution::kGenerated) {
+      run.record.Set("library_evaluations", library_evaluations_);
+      run.record.Set("compile_s", compile_s_);
+    }
     run.drift = {traces.drift.t, traces.drift.value};
     if (!IsMember()) {
       run.correction = {traces.correction.t, traces.correction.value};
@@ -166,6 +170,8 @@ class Runner {
     if (result.outcome != Outcome::kFinished) return result;
     formulation->IntegrateWork(mechanism_.has_power() && !peer);  // peers integrate none
     GiveJacobian(case_.integrator, case_.jacobian, description_, *formulation);
+    GiveExecution<Space>(case_.column, description_, *formulation, &result);
+    if (result.outcome != Outcome::kFinished) return result;
     const std::size_t n = static_cast<std::size_t>(formulation->state_size());
     y_.assign(static_cast<std::size_t>(formulation->size()), 0.0);
     formulation->ToState(start.q, start.u, y_);
@@ -191,12 +197,19 @@ class Runner {
       }
       return restart ? StepAction::kRestart : StepAction::kContinue;
     };
+    const double compiled_before =
+        formulation->compiled() != nullptr ? formulation->compiled()->seconds() : 0.0;
     const DenseObserver dense = Dense(*formulation);
     const IntegratorOptions options = OptionsOf(case_, stops_);
     IntegratorResult run =
         peer ? peer->Integrate(case_.horizon, y_, options, observe)
              : harness::Integrate(*formulation, 0.0, case_.horizon, y_, options, observe,
                                   dense.times.empty() ? nullptr : &dense);
+    if (const CompiledDerivative* compiled = formulation->compiled()) {
+      run.wall_s -= compiled->seconds() - compiled_before;
+      library_evaluations_ = compiled->misses();
+      compile_s_ = compiled->seconds();
+    }
     y_.resize(n);
     if (run.outcome != Outcome::kFinished) {
       const std::string why = formulation->Why();
@@ -226,6 +239,8 @@ class Runner {
   bool by_steps_ = false;                         ///< rows are at the ends of steps
   std::vector<double> rows_;                      ///< else at these times
   std::int64_t looked_ = 0, looked_by_then_ = 0;  ///< softened, for nobody's step; at the last one
+  std::int64_t library_evaluations_ = 0;          ///< in the place of generated code
+  double compile_s_ = 0.0;                        ///< [s], to record and compile
   Record final_poses_;
   std::vector<double> y_;
 };

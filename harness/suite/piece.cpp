@@ -5,6 +5,7 @@
 #include <algorithm>
 #include <optional>
 
+#include "harness/generate/compile.h"
 #include "harness/isolation/fault.h"
 #include "harness/record/noise.h"
 #include "harness/record/origin.h"
@@ -21,6 +22,11 @@ namespace {
 double CostOf(const Case& one) { return one.ensemble * ExpectedSteps(one); }
 
 constexpr double kPatience = 2.0, kGrace_s = 2.0;  ///< LimitsOfRuns
+
+/// A piece that waits for the compiler of generated code sleeps, and is not ended for that.
+void AllowCompiler(const Column& column, ProcessLimits* limits) {
+  if (column.execution == Execution::kGenerated) limits->idle_s += generate::kCompilerSeconds;
+}
 
 }  // namespace
 
@@ -42,9 +48,11 @@ Piece AccuracyPiece(const Experiment& experiment, const Case& one,
     }
     return std::vector<Record>{std::move(record)};
   };
+  ProcessLimits limits = LimitsOfRuns(one.limits, runs * one.column.threads);
+  AllowCompiler(one.column, &limits);
   return {.owed = {one.keys},
           .work = work,
-          .limits = LimitsOfRuns(one.limits, runs * one.column.threads),
+          .limits = limits,
           .label = fmt::format("{} {} {}", one.mechanism, ToString(one.column), SettingOf(one)),
           .cost = CostOf(one),
           .trajectory = trajectory};
@@ -74,6 +82,7 @@ Piece TimingPiece(const Experiment& experiment, const TimingGroup& group) {
   constexpr double kDerivatives_s = 60.0;
   piece.limits = {kPatience * runs * experiment.limits.cpu_s + kDerivatives_s * columns * threads,
                   experiment.limits.memory_mb};
+  for (const Case& one : group.cases) AllowCompiler(one.column, &piece.limits);
   piece.work = [&experiment, &group](int) { return TimeTogether(experiment, group); };
   piece.label = group.name;
   return piece;

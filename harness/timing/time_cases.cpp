@@ -62,6 +62,8 @@ class SubjectIn final : public Subject {
   void Prepare() override {
     if (result_.outcome != Outcome::kFinished) return;
     Reset();
+    if (result_.outcome != Outcome::kFinished) return;  // nothing is generated
+    compile_s_ = CompileSeconds();
     states_.assign(1, y_);
     if (!simulate_) {
       result_.outcome = ode().Derivative(0.0, y_, ydot_);
@@ -70,6 +72,7 @@ class SubjectIn final : public Subject {
     }
     std::vector<std::vector<double>> all;
     result_ = Simulate([&](std::span<double> y) { all.emplace_back(y.begin(), y.end()); });
+    compile_s_ = CompileSeconds();
     for (int i = 1; i < kStates && !all.empty(); ++i) {
       // a failing run ends near its failure: its last state stays out
       const std::size_t k = i * (all.size() - 1) / kStates;
@@ -90,8 +93,9 @@ class SubjectIn final : public Subject {
   void TimeSimulation() override {
     if (!simulate_ || result_.outcome != Outcome::kFinished) return;
     Reset();
+    const double before = CompileSeconds();
     result_ = Simulate({});
-    wall_s.push_back(result_.wall_s);
+    wall_s.push_back(result_.wall_s - (CompileSeconds() - before));
   }
 
   Record Finish(const Record& keys) override {
@@ -129,6 +133,10 @@ class SubjectIn final : public Subject {
     }
     record.Set("repeats", static_cast<std::int64_t>(simulate_ ? wall_s.size() : rhs_ns.size()));
     if (!formulation_ || peer_) return record;
+    if (const CompiledDerivative* compiled = formulation_->compiled()) {
+      record.Set("compile_s", compile_s_);
+      record.Set("library_evaluations", compiled->misses());
+    }
     for (const auto& [key, count] : formulation_->solver().Counters()) {
       record.Set(std::string(key), count);
     }
@@ -148,6 +156,12 @@ class SubjectIn final : public Subject {
     y_.resize(formulation_->state_size());
     ydot_.resize(y_.size());
     formulation_->ToState(start_.q, start_.u, y_);
+    if (!peer_) GiveExecution<Space>(case_.column, description_, *formulation_, &result_);
+  }
+
+  double CompileSeconds() const {
+    const CompiledDerivative* compiled = formulation_->compiled();
+    return compiled != nullptr ? compiled->seconds() : 0.0;
   }
 
   IntegratorResult Simulate(const std::function<void(std::span<double>)>& keep) {
@@ -193,6 +207,7 @@ class SubjectIn final : public Subject {
   std::vector<double> y_, ydot_;
   std::vector<std::vector<double>> states_;
   int evaluations_ = 0;
+  double compile_s_ = 0.0;  ///< [s], the first time; later ones find what is compiled
   IntegratorResult result_;
 };
 

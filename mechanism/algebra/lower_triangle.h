@@ -19,13 +19,14 @@ inline constexpr int kSmallTriangle = 16;
 template <class S, class Size>
 S FactorLower(S* A, Size size) {
   return WithSize<2, 4, 5>(size, [=](auto n) {
+    using std::min;
     using std::sqrt;
     S least = n > 0 ? A[0] : S(1);
     for (int j = 0; j < n; ++j) {
       S pivot = A[j + j * n];
       for (int k = 0; k < j; ++k) pivot -= A[j + k * n] * A[j + k * n];
       if (!(pivot > S(0))) return pivot;
-      least = std::min(least, pivot);
+      least = min(least, pivot);
       const S reciprocal = S(1) / sqrt(pivot);
       A[j + j * n] = reciprocal;
       for (int i = j + 1; i < n; ++i) {

@@ -80,6 +80,8 @@ struct FormulationOptions {
   /// That may work on one right-hand side, where a formulation has work for them. The same bits for
   /// any number.
   int threads = 1;
+  /// Solvers use the text that serves all scalars alone: no short cuts, no sparse factors.
+  bool general = false;
   /// Runs beside which this one goes on (side_by_side.h), if any; it must outlive the solver.
   SideBySide* beside = nullptr;
 };

@@ -137,6 +137,15 @@ bool System<Space, S>::MayTakeShortCut() const {
 
 template <class Space, class S>
 Outcome System<Space, S>::Derivative(S t, std::span<const S> y, std::span<S> ydot) {
+  if constexpr (std::is_same_v<S, double>) {
+    const bool stays = drives_ == nullptr || !drives_->has_left_branch();
+    if (compiled_ != nullptr && stays) {
+      by_short_cut_ = false;
+      if (!compiled_->Evaluate(t, y, ydot)) return Examine(t, y, ydot);
+      derivative_version_ = -1;
+      return outcome_ = Outcome::kFinished;
+    }
+  }
   if (MayTakeShortCut()) {
     const auto num_q = static_cast<std::size_t>(mechanism_.num_q());
     const auto num_u = static_cast<std::size_t>(mechanism_.num_u());
@@ -233,6 +242,7 @@ bool System<Space, S>::BeginStep(S t, std::span<S> y) {
   if (drives_ != nullptr && IsOffBranch()) drives_->LeaveBranch();
   const bool changed = changed_solver || accepted == Accepted::kModeChanged;
   if (changed) ++mode_changes_;
+  if (changed && compiled_ != nullptr) compiled_->ModeChanged();
   step_end_version_ = kinematics.position_version();
   if (!changed && accepted != Accepted::kProjected) return false;
   ToState(q(), u(), y);

@@ -16,6 +16,7 @@
 #include <memory>
 #include <vector>
 
+#include "mechanism/formulation/compiled_derivative.h"
 #include "mechanism/formulation/level.h"
 #include "mechanism/formulation/ode.h"
 #include "mechanism/loops/drives.h"
@@ -80,6 +81,13 @@ class System final : public Ode<S> {
   /// The same without a short cut, so with other rounding: kinematics(), udot(), diagnostics(),
   /// multipliers and powers are then those of (t, y).
   Outcome Examine(S t, std::span<const S> y, std::span<S> ydot);
+
+  /// Makes Derivative() evaluate `compiled`, and where that has no branch the text of Examine().
+  /// Null: neither. In double only, after Start().
+  void UseCompiled(std::unique_ptr<CompiledDerivative> compiled) {
+    compiled_ = std::move(compiled);
+  }
+  const CompiledDerivative* compiled() const { return compiled_.get(); }
 
   /// The Jacobian that Jacobian() is to give, or null for none. Of this system, after Start().
   void UseJacobian(std::unique_ptr<ForwardJacobian<Space>> jacobian);
@@ -173,6 +181,7 @@ class System final : public Ode<S> {
   long softened_evaluations_ = 0, mode_changes_ = 0;
   bool with_work_ = false;
 
+  std::unique_ptr<CompiledDerivative> compiled_;
   std::unique_ptr<ForwardJacobian<Space>> jacobian_;
   /// Where the last derivative was, for jacobian_: positions' version (-1: nowhere), time, state.
   long derivative_version_ = -1;

@@ -67,8 +67,9 @@ auto LoopSolver<S>::Scaled(const ConstRef& X) {
 template <class S>
 S LoopSolver<S>::Cholesky(const ConstRef& A) {
   if (size_ <= kSmallTriangle) {
+    using std::max;
     small_ = A;
-    return std::max(S(0), FactorLower(small_.data(), size_));  // 0 for what is not a number
+    return max(S(0), FactorLower(small_.data(), size_));  // 0 for what is not a number
   }
   cholesky_.compute(A);
   // a factorisation that broke off has no smallest pivot: it met one that is not positive

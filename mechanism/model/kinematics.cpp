@@ -15,6 +15,15 @@ namespace loopbench {
 
 namespace {
 
+/// Of the angle of a planar pose; a scalar may have its own.
+template <class S>
+void SinesOfPose(const S& angle, S& sine, S& cosine) {
+  using std::cos;
+  using std::sin;
+  sine = sin(angle);
+  cosine = cos(angle);
+}
+
 /// Matrices of planar poses from their angles, in double as many at once as there are lanes. A pose
 /// has the same bits wherever it stands.
 template <class S>
@@ -35,7 +44,11 @@ void SetMatrices(std::span<Pose<Planar, S>> poses) {
       poses = poses.subspan(count);
     }
   } else {
-    for (Pose<Planar, S>& X : poses) X.SetAngle(X.angle);
+    for (Pose<Planar, S>& X : poses) {
+      S s, c;
+      SinesOfPose(X.angle, s, c);
+      X.R = {c, -s, s, c};
+    }
   }
 }
 

@@ -1,0 +1,25 @@
+// count: exact numbers of operations of right-hand sides.
+#pragma once
+
+#include <filesystem>
+#include <string>
+#include <vector>
+
+#include "harness/cli/commands.h"
+
+namespace loopbench::harness {
+
+struct CountCommand {
+  std::vector<std::filesystem::path> mechanisms;
+  /// Names to count; empty: every formulation, every recorded level, both coordinate sets.
+  std::vector<std::string> formulations, levels, coordinates;
+  std::vector<std::string> solvers = {"rank-revealing"};
+  std::string format = "text";  ///< text, csv, markdown, json or latex
+  std::filesystem::path out;    ///< standard output when empty
+  ProcessLimits limits = kFileLimits;
+};
+
+/// Prints one row per right-hand side. Returns 2 if none was recorded.
+int CountOperations(const CountCommand& command, const std::string& typed);
+
+}  // namespace loopbench::harness

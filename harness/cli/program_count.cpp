@@ -1,0 +1,63 @@
+#include "harness/cli/program_count.h"
+
+#include "harness/cli/options.h"
+#include "harness/config/formulations.h"
+#include "harness/text/numeric_option.h"
+
+namespace loopbench::harness {
+
+namespace {
+
+constexpr const char* kCountFooter = R"(
+Each row is one right-hand side, recorded shortly after the mechanism's start. Counts are exact and depend on no clock.
+docs/operation-counts.md explains the columns.
+
+Examples:
+  loopbench count configs/mechanisms/four-bar.json
+  loopbench count configs/mechanisms/*.json --level acceleration --format csv --out counts.csv
+  loopbench count my.json --formulation odca --coordinates joint --solver as-published --format json
+
+Exit codes: 0 done, 2 bad input or no right-hand side was recorded.)";
+
+}  // namespace
+
+CountOptions::CountOptions(CLI::App& app) {
+  app_ = app.add_subcommand("count", "Count the operations of right-hand sides exactly");
+  app_->add_option("mechanisms", count_.mechanisms, "Mechanism files (JSON)")->required();
+  std::vector<std::string> formulations;
+  for (const FormulationRow& row : Formulations()) {
+    if (!row.is_peer()) formulations.push_back(row.name);
+  }
+  app_->add_option("--formulation", count_.formulations, "Formulations (default: all): a,b")
+      ->delimiter(',')
+      ->check(CLI::IsMember(formulations));
+  app_->add_option("--level", count_.levels, "Levels (default: all that are recorded): a,b")
+      ->delimiter(',')
+      ->check(CLI::IsMember(LevelNames()));
+  app_->add_option("--coordinates", count_.coordinates, "Coordinate sets (default: both): a,b")
+      ->delimiter(',')
+      ->check(CLI::IsMember({"joint", "absolute"}));
+  app_->add_option("--solver", count_.solvers, "Solvers: a,b")
+      ->delimiter(',')
+      ->check(CLI::IsMember({"as-published", "rank-revealing"}))
+      ->capture_default_str();
+  app_->add_option("--format", count_.format, "Format of the table")
+      ->check(CLI::IsMember({"text", "csv", "markdown", "json", "latex"}))
+      ->capture_default_str();
+  app_->add_option("--out", count_.out, "File (default: the terminal)");
+  AddWide(app_);
+  app_->add_option("--cpu", count_.limits.cpu_s, "CPU time per mechanism [s]")
+      ->check(NumberFrom(0.001, 1e9))
+      ->capture_default_str();
+  app_->add_option("--memory", count_.limits.memory_mb, "Memory per mechanism [MiB]")
+      ->check(NumberFrom(1.0, 1e9))
+      ->capture_default_str();
+  app_->footer(kCountFooter);
+}
+
+std::optional<int> CountOptions::Run(const std::string& typed) const {
+  if (!*app_) return std::nullopt;
+  return CountOperations(count_, typed);
+}
+
+}  // namespace loopbench::harness

@@ -1,0 +1,34 @@
+// Compiles generated C by the system's compiler and loads it.
+//
+// The compiler is $CC or cc, started without a shell, for at most kCompilerSeconds. Libraries stay
+// in $XDG_CACHE_HOME/loopbench or ~/.cache/loopbench under names made from text, compiler and
+// flags. Folder and files belong to the user, and nobody else may write them: others are refused.
+// A folder that cannot be made is no error: then nothing is kept.
+#pragma once
+
+#include <string>
+
+namespace loopbench::generate {
+
+inline constexpr int kCompilerSeconds = 120;
+
+/// -ffp-contract=off: the same bits as the library's general text.
+inline constexpr const char* kCompilerFlags[] = {
+    "-std=c99",         "-O2", "-fPIC", "-shared", "-ffp-contract=off", "-fno-math-errno",
+#ifdef __AVX2__  // this program needs as much
+    "-march=x86-64-v3",
+#endif
+};
+
+/// The function that a text defines (print_c.h); it stays loaded until the process ends.
+struct CompiledBranch {
+  using Sines = void (*)(double, double*, double*);
+  int (*derivative)(const double* x, double* y, double* w, Sines sines) = nullptr;
+  int room = 0;  ///< numbers that w has room for
+};
+
+/// Throws NotCovered (record.h) without a compiler, or where it fails, and for a cache that
+/// somebody else could write.
+CompiledBranch CompileBranch(const std::string& text);
+
+}  // namespace loopbench::generate

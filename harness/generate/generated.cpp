@@ -1,0 +1,112 @@
+#include "harness/generate/generated.h"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <chrono>
+
+#include "harness/generate/pose_sines.h"
+#include "harness/generate/print_c.h"
+
+namespace loopbench::generate {
+
+namespace {
+
+// Start and first steps, which begin at rest, may take a branch of their own; mechanisms whose
+// branches change all the time are not worth more compilations.
+constexpr int kMissesBeforeRecording = 8;
+constexpr std::size_t kMostBranches = 8;
+// 24 000 operations take a compiler 3.5 s; factorisations that iterate have hundreds of thousands
+constexpr std::int64_t kMostOperations = 50'000;
+
+void RequireShort(const RecordedDerivative& recorded) {
+  const std::vector<bool> live = recorded.graph.Live(recorded.outputs, true);
+  const std::int64_t operations = std::ranges::count(live, true);
+  if (operations <= kMostOperations) return;
+  throw NotCovered(
+      fmt::format("found {} operations, expected at most {}: they would take a compiler too long",
+                  operations, kMostOperations));
+}
+
+}  // namespace
+
+template <class Space>
+GeneratedDerivative<Space>::GeneratedDerivative(const RecordingSubject& subject,
+                                                const System<Space, double>& system)
+    : subject_(subject), system_(system) {
+  subject_.with_work = system.size() > system.state_size();
+  x_.assign(static_cast<std::size_t>(system.size()) + 1, 0.0);
+  NoteStart();
+  std::vector<double> y(x_.size() - 1);
+  system.ToState(start_.q, start_.u, y);
+  AddBranch(start_.t, y);
+}
+
+template <class Space>
+void GeneratedDerivative<Space>::NoteStart() {
+  start_ = {system_.kinematics().time(), system_.q(), system_.u()};
+  subject_.options = system_.options();
+  // gains that the level has chosen meanwhile
+  if (subject_.options.enforcement == Enforcement::kBaumgarte) {
+    subject_.options.gains = system_.level().gains();
+  }
+}
+
+template <class Space>
+void GeneratedDerivative<Space>::AddBranch(double t, std::span<const double> y) {
+  const auto begin = std::chrono::steady_clock::now();
+  const RecordedDerivative recorded =
+      RecordDerivative(subject_, start_, t, std::vector<double>(y.begin(), y.end()));
+  for (int i = 0; i < system_.num_state_speeds(); ++i) {
+    if (system_.state_speed(i) != recorded.carried_speeds[static_cast<std::size_t>(i)]) {
+      throw NotCovered("the state carries other speeds in the recorded text than in double");
+    }
+  }
+  RequireShort(recorded);
+  branches_.insert(branches_.begin(), CompileBranch(PrintC(recorded)));
+  const auto room = static_cast<std::size_t>(branches_.front().room);
+  room_.resize(std::max(room_.size(), room));
+  seconds_ += std::chrono::duration<double>(std::chrono::steady_clock::now() - begin).count();
+}
+
+template <class Space>
+void GeneratedDerivative<Space>::ModeChanged() {
+  branches_.clear();
+  NoteStart();
+  misses_in_a_row_ = kMissesBeforeRecording;  // the next evaluation is recorded
+}
+
+template <class Space>
+bool GeneratedDerivative<Space>::Call(const CompiledBranch& branch, std::span<double> ydot) {
+  return branch.derivative(x_.data(), ydot.data(), room_.data(), &PoseSines) != 0;
+}
+
+template <class Space>
+bool GeneratedDerivative<Space>::Evaluate(double t, std::span<const double> y,
+                                          std::span<double> ydot) {
+  if (y.size() + 1 != x_.size() || ydot.size() < y.size()) return false;
+  x_[0] = t;
+  std::ranges::copy(y, x_.begin() + 1);
+  for (std::size_t i = 0; i < branches_.size(); ++i) {
+    if (!Call(branches_[i], ydot)) continue;
+    if (i > 0) std::swap(branches_[0], branches_[i]);
+    misses_in_a_row_ = 0;
+    return true;
+  }
+  ++misses_;
+  if (misses_in_a_row_++ < kMissesBeforeRecording || branches_.size() >= kMostBranches) {
+    return false;
+  }
+  misses_in_a_row_ = 0;
+  try {
+    AddBranch(t, y);
+  } catch (const NotCovered&) {
+    return false;  // it counts as a miss
+  }
+  return false;
+}
+
+template class GeneratedDerivative<Planar>;
+template class GeneratedDerivative<Spatial>;
+
+}  // namespace loopbench::generate

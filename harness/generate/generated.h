@@ -1,0 +1,49 @@
+// A system's right-hand side as generated code: recorded, compiled, loaded, called.
+//
+// A recording holds where all its comparisons come out as they did (graph.h). Where they do not,
+// the library evaluates; after some such evaluations the branch of the state at hand is recorded
+// too. Compiled branches stay until the mode of the system changes.
+#pragma once
+
+#include <string>
+#include <utility>
+#include <vector>
+
+#include "harness/generate/compile.h"
+#include "harness/generate/record.h"
+#include "mechanism/formulation/system.h"
+
+namespace loopbench::generate {
+
+template <class Space>
+class GeneratedDerivative final : public CompiledDerivative {
+ public:
+  /// Of a system that has started and stays where it is; so does the subject's description.
+  /// Throws NotCovered if the right-hand side at the start cannot be recorded or compiled.
+  GeneratedDerivative(const RecordingSubject& subject, const System<Space, double>& system);
+
+  bool Evaluate(double t, std::span<const double> y, std::span<double> ydot) override;
+  void ModeChanged() override;
+  std::int64_t misses() const override { return misses_; }
+  double seconds() const override { return seconds_; }
+
+  /// Branches that are compiled for the current mode.
+  int branches() const { return static_cast<int>(branches_.size()); }
+
+ private:
+  /// Notes time, positions and speeds of the system, which start the mode of recordings.
+  void NoteStart();
+  void AddBranch(double t, std::span<const double> y);
+  bool Call(const CompiledBranch& branch, std::span<double> ydot);
+
+  RecordingSubject subject_;
+  const System<Space, double>& system_;
+  RecordingStart start_;
+  std::vector<CompiledBranch> branches_;  ///< the one that served last stands first
+  std::vector<double> x_, room_;          ///< time and state; intermediate values
+  std::int64_t misses_ = 0;
+  int misses_in_a_row_ = 0;
+  double seconds_ = 0.0;
+};
+
+}  // namespace loopbench::generate

@@ -1,0 +1,228 @@
+#include "harness/generate/graph.h"
+
+#include <algorithm>
+#include <bit>
+#include <cmath>
+#include <stdexcept>
+
+#include "harness/generate/pose_sines.h"
+
+namespace loopbench::generate {
+
+namespace {
+
+std::uint64_t Pair(int a, int b) {
+  return (static_cast<std::uint64_t>(static_cast<std::uint32_t>(a)) << 32) |
+         static_cast<std::uint32_t>(b);
+}
+
+}  // namespace
+
+bool Counts(Operation operation) { return operation > Operation::kAbs; }
+
+void OperationCounts::Add(Operation operation) {
+  switch (operation) {
+    case Operation::kInput:
+    case Operation::kConstant:
+    case Operation::kNegate:
+    case Operation::kAbs:
+      return;
+    case Operation::kAdd:
+    case Operation::kSubtract:
+      ++additions;
+      return;
+    case Operation::kMultiply:
+      ++multiplications;
+      return;
+    case Operation::kDivide:
+      ++divisions;
+      return;
+    case Operation::kSqrt:
+      ++roots;
+      return;
+    case Operation::kSin:
+    case Operation::kCos:
+    case Operation::kPoseSin:
+    case Operation::kPoseCos:
+      ++sines;
+      return;
+    default:
+      ++other;
+  }
+}
+
+double Value(Operation operation, double a, double b) {
+  double sine, cosine;
+  switch (operation) {
+    case Operation::kNegate:
+      return -a;
+    case Operation::kAbs:
+      return std::abs(a);
+    case Operation::kAdd:
+      return a + b;
+    case Operation::kSubtract:
+      return a - b;
+    case Operation::kMultiply:
+      return a * b;
+    case Operation::kDivide:
+      return a / b;
+    case Operation::kSqrt:
+      return std::sqrt(a);
+    case Operation::kSin:
+      return std::sin(a);
+    case Operation::kCos:
+      return std::cos(a);
+    case Operation::kPoseSin:
+      PoseSines(a, &sine, &cosine);
+      return sine;
+    case Operation::kPoseCos:
+      PoseSines(a, &sine, &cosine);
+      return cosine;
+    case Operation::kAsin:
+      return std::asin(a);
+    case Operation::kAcos:
+      return std::acos(a);
+    case Operation::kAtan2:
+      return std::atan2(a, b);
+    case Operation::kExp:
+      return std::exp(a);
+    case Operation::kExpm1:
+      return std::expm1(a);
+    case Operation::kLog:
+      return std::log(a);
+    case Operation::kPow:
+      return std::pow(a, b);
+    case Operation::kRound:
+      return std::round(a);
+    case Operation::kRemainder:
+      return std::remainder(a, b);
+    case Operation::kMin:
+      return std::min(a, b);
+    case Operation::kMax:
+      return std::max(a, b);
+    case Operation::kInput:
+    case Operation::kConstant:
+      break;
+  }
+  throw std::logic_error("an input has no operands");
+}
+
+int Graph::Input() {
+  ++num_inputs_;
+  nodes_.push_back({Operation::kInput});
+  return static_cast<int>(nodes_.size()) - 1;
+}
+
+int Graph::Constant(double value) {
+  const auto [at, is_new] =
+      constants_.try_emplace(std::bit_cast<std::uint64_t>(value), static_cast<int>(nodes_.size()));
+  if (is_new) nodes_.push_back({Operation::kConstant, -1, -1, value});
+  return at->second;
+}
+
+int Graph::Append(Operation operation, int a, int b) {
+  const bool commutes = operation == Operation::kAdd || operation == Operation::kMultiply;
+  if (commutes && a > b) std::swap(a, b);
+  const auto [at, is_new] =
+      seen_[static_cast<int>(operation)].try_emplace(Pair(a, b), static_cast<int>(nodes_.size()));
+  if (is_new) nodes_.push_back({operation, a, b});
+  return at->second;
+}
+
+int Graph::Make(Operation operation, int a, int b) {
+  if (IsConstant(a) && (b < 0 || IsConstant(b) || operation == Operation::kPoseCos)) {
+    return Constant(Value(operation, nodes_[a].value, b < 0 ? 0.0 : nodes_[b].value));
+  }
+  const auto negated = [&](int node) { return nodes_[node].operation == Operation::kNegate; };
+  const auto inner = [&](int node) { return nodes_[node].a; };
+  switch (operation) {
+    case Operation::kNegate:
+      if (negated(a)) return inner(a);
+      break;
+    case Operation::kAbs:
+      if (negated(a)) return Make(operation, inner(a));
+      break;
+    case Operation::kAdd:
+      if (Is(a, 0.0)) return b;
+      if (Is(b, 0.0)) return a;
+      if (negated(a) && negated(b))
+        return Make(Operation::kNegate, Append(operation, inner(a), inner(b)));
+      if (negated(b)) return Make(Operation::kSubtract, a, inner(b));
+      if (negated(a)) return Make(Operation::kSubtract, b, inner(a));
+      break;
+    case Operation::kSubtract:
+      if (Is(b, 0.0)) return a;
+      if (Is(a, 0.0)) return Make(Operation::kNegate, b);
+      if (negated(a) && negated(b)) return Make(operation, inner(b), inner(a));
+      if (negated(b)) return Make(Operation::kAdd, a, inner(b));
+      if (negated(a)) return Make(Operation::kNegate, Make(Operation::kAdd, inner(a), b));
+      break;
+    case Operation::kMultiply:
+      if (Is(a, 0.0) || Is(b, 0.0)) return Constant(0.0);
+      if (Is(a, 1.0)) return b;
+      if (Is(b, 1.0)) return a;
+      if (Is(a, -1.0)) return Make(Operation::kNegate, b);
+      if (Is(b, -1.0)) return Make(Operation::kNegate, a);
+      if (negated(a)) return Make(Operation::kNegate, Make(operation, inner(a), b));
+      if (negated(b)) return Make(Operation::kNegate, Make(operation, a, inner(b)));
+      break;
+    case Operation::kDivide:
+      if (Is(a, 0.0)) return a;
+      if (Is(b, 1.0)) return a;
+      if (Is(b, -1.0)) return Make(Operation::kNegate, a);
+      if (negated(a)) return Make(Operation::kNegate, Make(operation, inner(a), b));
+      if (negated(b)) return Make(Operation::kNegate, Make(operation, a, inner(b)));
+      break;
+    default:
+      break;
+  }
+  return Append(operation, a, b);
+}
+
+void Graph::Compare(Relation relation, int a, int b, bool outcome) {
+  if (IsConstant(a) && IsConstant(b)) return;
+  if (a == b && relation == Relation::kLess) return;  // false of any number
+  std::uint8_t& known = compared_[Pair(a, b)][static_cast<std::size_t>(relation)];
+  if (known != 0) return;  // of the same numbers it comes out the same
+  known = 1;
+  comparisons_.push_back({relation, a, b, outcome});
+}
+
+std::vector<bool> Graph::Live(const std::vector<int>& outputs, bool compared) const {
+  std::vector<bool> live(nodes_.size());
+  for (const int node : outputs) live[node] = true;
+  if (compared) {
+    for (const Comparison& comparison : comparisons_)
+      live[comparison.a] = live[comparison.b] = true;
+  }
+  for (int node = static_cast<int>(nodes_.size()) - 1; node >= 0; --node) {
+    if (!live[node]) continue;
+    if (nodes_[node].a >= 0) live[nodes_[node].a] = true;
+    if (nodes_[node].b >= 0) live[nodes_[node].b] = true;
+  }
+  return live;
+}
+
+OperationCounts Graph::Count(const std::vector<bool>& live) const {
+  OperationCounts counts;
+  for (std::size_t node = 0; node < nodes_.size(); ++node) {
+    if (live[node]) counts.Add(nodes_[node].operation);
+  }
+  return counts;
+}
+
+int Graph::Depth(const std::vector<bool>& live) const {
+  std::vector<int> depth(nodes_.size());
+  int deepest = 0;
+  for (std::size_t node = 0; node < nodes_.size(); ++node) {
+    const auto& [operation, a, b, value] = nodes_[node];
+    // a cosine waits for the angle, not for the sine beside it
+    const int before =
+        std::max(a >= 0 ? depth[a] : 0, b >= 0 && operation != Operation::kPoseCos ? depth[b] : 0);
+    depth[node] = before + (Counts(operation) ? 1 : 0);
+    if (live[node]) deepest = std::max(deepest, depth[node]);
+  }
+  return deepest;
+}
+
+}  // namespace loopbench::generate

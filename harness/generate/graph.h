@@ -1,0 +1,121 @@
+// The operations of one evaluation as a graph: each node is an operation on earlier nodes.
+//
+// Simplifications are exact in IEEE arithmetic for finite numbers, except for the sign of zeros:
+// constants are folded, x + 0, x * 1 and x / 1 are x, x * 0 is 0, negations move outwards, equal
+// operations on equal operands are one node. No division becomes a multiplication and no sum is
+// reordered. x - x stays: it tests whether x is finite.
+#pragma once
+
+#include <array>
+#include <cstdint>
+#include <string>
+#include <unordered_map>
+#include <vector>
+
+namespace loopbench::generate {
+
+enum class Operation : std::uint8_t {
+  kInput,
+  kConstant,
+  kNegate,
+  kAbs,
+  kAdd,
+  kSubtract,
+  kMultiply,
+  kDivide,
+  kSqrt,
+  kSin,
+  kCos,
+  kPoseSin,  ///< sine of a pose's angle, by the library's own function (lanes.h)
+  kPoseCos,  ///< its cosine, always the node behind its sine, which is its second operand
+  kAsin,
+  kAcos,
+  kAtan2,
+  kExp,
+  kExpm1,
+  kLog,
+  kPow,
+  kRound,
+  kRemainder,
+  kMin,
+  kMax,
+};
+
+enum class Relation : std::uint8_t { kLess, kLessEqual, kEqual };
+
+struct Node {
+  Operation operation;
+  int a = -1, b = -1;  ///< operands, earlier nodes; -1: none
+  double value = 0.0;  ///< of a constant
+};
+
+/// A comparison of nodes, with its outcome where it was recorded.
+struct Comparison {
+  Relation relation;
+  int a, b;
+  bool outcome;
+
+  friend bool operator==(const Comparison&, const Comparison&) = default;
+};
+
+/// Exact numbers of operations. Negations and absolute values, which change a sign bit, are none.
+struct OperationCounts {
+  std::int64_t additions = 0;  ///< and subtractions
+  std::int64_t multiplications = 0;
+  std::int64_t divisions = 0;
+  std::int64_t roots = 0;
+  std::int64_t sines = 0;  ///< and cosines
+  std::int64_t other = 0;  ///< other functions, roundings, minima and maxima
+
+  void Add(Operation operation);
+  /// Weighted sum, weights of F. McMahon, The Livermore Fortran Kernels, 1986: 1 for + - *, 4 for
+  /// divisions and square roots, 8 for other functions.
+  std::int64_t flops() const {
+    return additions + multiplications + 4 * (divisions + roots) + 8 * (sines + other);
+  }
+  friend bool operator==(const OperationCounts&, const OperationCounts&) = default;
+};
+
+class Graph {
+ public:
+  int Input();
+  int Constant(double value);
+  /// The node of an operation after simplification; `b` is -1 for functions of one operand.
+  int Make(Operation operation, int a, int b = -1);
+  void Compare(Relation relation, int a, int b, bool outcome);
+
+  /// A node's value where it is a constant.
+  bool IsConstant(int node) const { return nodes_[node].operation == Operation::kConstant; }
+  bool Is(int node, double value) const { return IsConstant(node) && nodes_[node].value == value; }
+
+  const std::vector<Node>& nodes() const { return nodes_; }
+  const std::vector<Comparison>& comparisons() const { return comparisons_; }
+  int num_inputs() const { return num_inputs_; }
+
+  /// Which nodes the outputs depend on, and with `compared` those of comparisons.
+  std::vector<bool> Live(const std::vector<int>& outputs, bool compared) const;
+  OperationCounts Count(const std::vector<bool>& live) const;
+  /// Operations on the longest path to one of the nodes.
+  int Depth(const std::vector<bool>& live) const;
+
+  /// Operations that the recorded text executed, before any simplification.
+  OperationCounts as_run;
+
+ private:
+  int Append(Operation operation, int a, int b);
+
+  std::vector<Node> nodes_;
+  std::vector<Comparison> comparisons_;
+  int num_inputs_ = 0;
+  std::unordered_map<std::uint64_t, int> constants_;  ///< by bits
+  std::unordered_map<std::uint64_t, int> seen_[static_cast<int>(Operation::kMax) + 1];
+  std::unordered_map<std::uint64_t, std::array<std::uint8_t, 3>> compared_;  ///< outcome + 1
+};
+
+/// The value of an operation on numbers, as the recorded text computes it.
+double Value(Operation operation, double a, double b);
+
+/// Whether an operation counts (OperationCounts).
+bool Counts(Operation operation);
+
+}  // namespace loopbench::generate

@@ -1,0 +1,212 @@
+#include "harness/generate/print_c.h"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <cmath>
+#include <iterator>
+
+namespace loopbench::generate {
+
+namespace {
+
+constexpr int kOperationsOfFunction = 500;
+
+constexpr const char* kHead = R"(#include <math.h>
+typedef void (*loopbench_sines)(double, double*, double*);
+static double least(double a, double b) { return b < a ? b : a; }
+static double most(double a, double b) { return a < b ? b : a; }
+)";
+
+std::string Literal(double value) {
+  if (std::isnan(value)) return "NAN";
+  if (std::isinf(value)) return value > 0.0 ? "INFINITY" : "(-INFINITY)";
+  return value < 0.0 || std::signbit(value) ? fmt::format("({:a})", value)
+                                            : fmt::format("{:a}", value);
+}
+
+const char* FunctionName(Operation operation) {
+  switch (operation) {
+    case Operation::kAbs:
+      return "fabs";
+    case Operation::kSqrt:
+      return "sqrt";
+    case Operation::kSin:
+      return "sin";
+    case Operation::kCos:
+      return "cos";
+    case Operation::kAsin:
+      return "asin";
+    case Operation::kAcos:
+      return "acos";
+    case Operation::kAtan2:
+      return "atan2";
+    case Operation::kExp:
+      return "exp";
+    case Operation::kExpm1:
+      return "expm1";
+    case Operation::kLog:
+      return "log";
+    case Operation::kPow:
+      return "pow";
+    case Operation::kRound:
+      return "round";
+    case Operation::kRemainder:
+      return "remainder";
+    case Operation::kMin:
+      return "least";
+    case Operation::kMax:
+      return "most";
+    default:
+      return "";
+  }
+}
+
+class Printer {
+ public:
+  explicit Printer(const RecordedDerivative& recorded)
+      : graph_(recorded.graph), outputs_(recorded.outputs), function_(graph_.nodes().size(), 0) {
+    live_ = graph_.Live(outputs_, true);
+    results_.resize(graph_.nodes().size());
+    tests_.resize(graph_.nodes().size());
+    for (std::size_t i = 0; i < outputs_.size(); ++i) results_[outputs_[i]].push_back(i);
+    for (const Comparison& comparison : graph_.comparisons()) {
+      tests_[std::max(comparison.a, comparison.b)].push_back(&comparison);
+    }
+    AssignFunctions();
+    AssignRoom();
+  }
+
+  std::string Text() {
+    int input = 0;
+    text_ = kHead;
+    for (int function = 0, node = 0; function < num_functions_; ++function) {
+      Open(function);
+      for (; node < std::ssize(graph_.nodes()) && function_[node] == function; ++node) {
+        Print(node, function, &input);
+      }
+      text_ += "  return ok;\n}\n";
+    }
+    fmt::format_to(std::back_inserter(text_), "const int loopbench_room = {};\n", num_room_);
+    text_ +=
+        "int loopbench_derivative(const double* x, double* y, double* w, loopbench_sines "
+        "sines) {\n  return ";
+    for (int function = 0; function < num_functions_; ++function) {
+      fmt::format_to(std::back_inserter(text_), "{}part{}(x, y, w, sines)",
+                     function > 0 ? " &&\n         " : "", function);
+    }
+    text_ += ";\n}\n";
+    return std::move(text_);
+  }
+
+ private:
+  /// A cosine stays with its sine.
+  void AssignFunctions() {
+    int operations = 0, function = 0;
+    for (std::size_t node = 0; node < graph_.nodes().size(); ++node) {
+      const Operation operation = graph_.nodes()[node].operation;
+      if (operations >= kOperationsOfFunction && operation != Operation::kPoseCos) {
+        operations = 0;
+        ++function;
+      }
+      if (live_[node] && operation > Operation::kConstant) ++operations;
+      function_[node] = function;
+    }
+    num_functions_ = function + 1;
+  }
+
+  bool IsVariable(int node) const { return graph_.nodes()[node].operation > Operation::kConstant; }
+
+  /// A place in w for each value that another function uses.
+  void AssignRoom() {
+    room_.assign(graph_.nodes().size(), -1);
+    const auto use = [&](int node, int by) {
+      if (node < 0 || !IsVariable(node) || function_[node] == function_[by]) return;
+      if (room_[node] < 0) room_[node] = num_room_++;
+    };
+    for (int node = 0; node < std::ssize(graph_.nodes()); ++node) {
+      if (!live_[node]) continue;
+      use(graph_.nodes()[node].a, node);
+      use(graph_.nodes()[node].b, node);
+      for (const Comparison* test : tests_[node]) use(std::min(test->a, test->b), node);
+    }
+  }
+
+  void Open(int function) {
+    fmt::format_to(std::back_inserter(text_),
+                   "static int part{}(const double* x, double* y, double* w, loopbench_sines "
+                   "sines) {{\n  int ok = 1;\n  (void)x, (void)y, (void)w, (void)sines;\n",
+                   function);
+  }
+
+  /// How a node is called in a function.
+  std::string Name(int node, int function) const {
+    const Node& of = graph_.nodes()[node];
+    if (of.operation == Operation::kConstant) return Literal(of.value);
+    if (of.operation == Operation::kInput) return fmt::format("x[{}]", inputs_[node]);
+    if (function_[node] != function) return fmt::format("w[{}]", room_[node]);
+    return fmt::format("v{}", node);
+  }
+
+  void Print(int node, int function, int* input) {
+    const auto out = std::back_inserter(text_);
+    const Node& of = graph_.nodes()[node];
+    inputs_.resize(static_cast<std::size_t>(node) + 1, -1);
+    if (of.operation == Operation::kInput) inputs_[node] = (*input)++;
+    if (!live_[node]) return;
+    const auto a = [&] { return Name(of.a, function); };
+    const auto b = [&] { return Name(of.b, function); };
+    switch (of.operation) {
+      case Operation::kInput:
+      case Operation::kConstant:
+        break;
+      case Operation::kNegate:
+        fmt::format_to(out, "  const double v{} = -{};\n", node, a());
+        break;
+      case Operation::kAdd:
+      case Operation::kSubtract:
+      case Operation::kMultiply:
+      case Operation::kDivide:
+        fmt::format_to(out, "  const double v{} = {} {} {};\n", node, a(),
+                       "+-*/"[static_cast<int>(of.operation) - static_cast<int>(Operation::kAdd)],
+                       b());
+        break;
+      case Operation::kPoseSin:
+        fmt::format_to(out, "  double v{0}, c{0};\n  sines({1}, &v{0}, &c{0});\n", node, a());
+        break;
+      case Operation::kPoseCos:
+        fmt::format_to(out, "  const double v{} = c{};\n", node, of.b);
+        break;
+      default:
+        fmt::format_to(out, "  const double v{} = {}({}", node, FunctionName(of.operation), a());
+        if (of.b >= 0) fmt::format_to(out, ", {}", b());
+        text_ += ");\n";
+    }
+    if (room_[node] >= 0) fmt::format_to(out, "  w[{}] = v{};\n", room_[node], node);
+    for (const std::size_t i : results_[node]) {
+      fmt::format_to(out, "  y[{}] = {};\n", i, Name(node, function));
+    }
+    for (const Comparison* test : tests_[node]) {
+      const char* relation = test->relation == Relation::kLess        ? "<"
+                             : test->relation == Relation::kLessEqual ? "<="
+                                                                      : "==";
+      fmt::format_to(out, "  ok &= {}({} {} {});\n", test->outcome ? "" : "!",
+                     Name(test->a, function), relation, Name(test->b, function));
+    }
+  }
+
+  const Graph& graph_;
+  const std::vector<int>& outputs_;
+  std::vector<bool> live_;
+  std::vector<std::vector<std::size_t>> results_;      ///< indices of outputs, by node
+  std::vector<std::vector<const Comparison*>> tests_;  ///< by their later node
+  std::vector<int> function_, room_, inputs_;          ///< by node
+  int num_functions_ = 0, num_room_ = 0;
+  std::string text_;
+};
+
+}  // namespace
+
+std::string PrintC(const RecordedDerivative& recorded) { return Printer(recorded).Text(); }
+
+}  // namespace loopbench::generate

@@ -1,0 +1,91 @@
+#include "harness/generate/recorded.h"
+
+#include <fmt/format.h>
+
+#include "harness/generate/pose_sines.h"
+#include "harness/generate/record.h"
+
+namespace loopbench::generate {
+
+namespace {
+
+thread_local Graph* current = nullptr;
+thread_local CastsAs casts_as = CastsAs::kNumber;
+
+/// Equations of shipped mechanisms have some ten thousand nodes, factorisations that iterate more.
+constexpr std::size_t kMostNodes = 100'000;
+
+void RequireRoom() {
+  if (current->nodes().size() <= kMostNodes) return;
+  throw NotCovered(fmt::format(
+      "found more than {} operations, of a large mechanism or a factorisation that iterates",
+      kMostNodes));
+}
+
+int NodeOf(const Recorded& x) { return x.node >= 0 ? x.node : current->Constant(x.number); }
+
+/// A node that turned out to be a constant is a constant.
+Recorded At(int node, double number) {
+  return current->IsConstant(node) ? Recorded(current->nodes()[node].value)
+                                   : Recorded(number, node);
+}
+
+}  // namespace
+
+Recording::Recording(Graph& graph, CastsAs casts) {
+  current = &graph;
+  casts_as = casts;
+}
+
+Recording::~Recording() {
+  current = nullptr;
+  casts_as = CastsAs::kNumber;
+}
+
+Recorded Recorded::Input(double number) { return {number, current->Input()}; }
+
+double Recorded::Cast() const {
+  if (node < 0 || casts_as == CastsAs::kNumber) return number;
+  const double infinity = std::numeric_limits<double>::infinity();
+  return casts_as == CastsAs::kInfinity ? infinity : -infinity;
+}
+
+Recorded Recorded::Make(Operation operation, const Recorded& a) {
+  const double number = Value(operation, a.number, 0.0);
+  if (current == nullptr) return number;
+  current->as_run.Add(operation);
+  if (a.node < 0) return number;
+  return At(current->Make(operation, a.node), number);
+}
+
+Recorded Recorded::Make(Operation operation, const Recorded& a, const Recorded& b) {
+  const double number = Value(operation, a.number, b.number);
+  if (current == nullptr) return number;
+  current->as_run.Add(operation);
+  if (a.node < 0 && b.node < 0) return number;
+  RequireRoom();
+  return At(current->Make(operation, NodeOf(a), NodeOf(b)), number);
+}
+
+bool Recorded::Compare(Relation relation, const Recorded& a, const Recorded& b) {
+  const bool outcome = relation == Relation::kLess        ? a.number < b.number
+                       : relation == Relation::kLessEqual ? a.number <= b.number
+                                                          : a.number == b.number;
+  if (current != nullptr && (a.node >= 0 || b.node >= 0)) {
+    current->Compare(relation, NodeOf(a), NodeOf(b), outcome);
+  }
+  return outcome;
+}
+
+void Recorded::PoseSines(const Recorded& angle, Recorded& sine, Recorded& cosine) {
+  generate::PoseSines(angle.number, &sine.number, &cosine.number);
+  sine.node = cosine.node = -1;
+  if (current == nullptr) return;
+  current->as_run.Add(Operation::kPoseSin);
+  current->as_run.Add(Operation::kPoseCos);
+  if (angle.node < 0) return;
+  sine.node = current->Make(Operation::kPoseSin, angle.node);
+  cosine.node = current->Make(Operation::kPoseCos, angle.node, sine.node);
+}
+
+}  // namespace loopbench::generate

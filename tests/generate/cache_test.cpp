@@ -1,0 +1,121 @@
+// The compiler and the folder of compiled code: what is found there is refused unless it is safe.
+#include <gtest/gtest.h>
+#include <sys/stat.h>
+
+#include <cstdlib>
+#include <filesystem>
+#include <fstream>
+
+#include "harness/generate/compile.h"
+#include "harness/generate/record.h"
+#include "harness/text/temporary_folder.h"
+
+namespace loopbench::generate {
+namespace {
+
+namespace fs = std::filesystem;
+
+/// A text of its own for each test: what is loaded stays.
+std::string Text(int number) {
+  return "typedef void (*S)(double, double*, double*);\nconst int loopbench_room = " +
+         std::to_string(number) +
+         ";\nint loopbench_derivative(const double* x, double* y, double* w, S s) {\n"
+         "  (void)w, (void)s;\n  y[0] = 2 * x[0];\n  return 1;\n}\n";
+}
+
+class CacheTest : public ::testing::Test {
+ protected:
+  void SetUp() override {
+    ::setenv("XDG_CACHE_HOME", folder_.path().c_str(), 1);
+    ::unsetenv("CC");
+  }
+  void TearDown() override {
+    ::unsetenv("XDG_CACHE_HOME");
+    ::unsetenv("CC");
+  }
+
+  std::vector<fs::path> Kept() const {
+    std::vector<fs::path> files;
+    for (const auto& entry : fs::directory_iterator(cache_)) files.push_back(entry.path());
+    return files;
+  }
+  static std::string Refusal(const std::string& text) {
+    try {
+      CompileBranch(text);
+    } catch (const NotCovered& why) {
+      return why.what();
+    }
+    return "compiled";
+  }
+
+  harness::TemporaryFolder folder_{"loopbench-cache-test"};
+  fs::path cache_ = folder_.path() / "loopbench";
+};
+
+TEST_F(CacheTest, KeepsOneFileOfTheUserAlone) {
+  EXPECT_EQ(CompileBranch(Text(1)).room, 1);
+  ASSERT_EQ(Kept().size(), 1u);
+  struct stat of = {};
+  ASSERT_EQ(::stat(cache_.c_str(), &of), 0);
+  EXPECT_EQ(of.st_mode & 07777, 0700u);
+  ASSERT_EQ(::stat(Kept().front().c_str(), &of), 0);
+  EXPECT_EQ(of.st_mode & (S_IWGRP | S_IWOTH), 0u);
+}
+
+TEST_F(CacheTest, AFolderThatOthersMayWriteIsRefused) {
+  fs::create_directory(cache_);
+  fs::permissions(cache_, fs::perms::all);
+  EXPECT_NE(Refusal(Text(2)).find("found owner"), std::string::npos);
+  fs::remove_all(cache_);
+  fs::create_directory_symlink(folder_.path(), cache_);
+  EXPECT_NE(Refusal(Text(2)).find("expected a folder"), std::string::npos);
+}
+
+TEST_F(CacheTest, TheCompilerIsPartOfTheName) {
+  CompileBranch(Text(3));
+  ::setenv("CC", "cc -O1", 1);
+  CompileBranch(Text(3));
+  EXPECT_EQ(Kept().size(), 2u);
+}
+
+TEST_F(CacheTest, AFileThatOthersMayWriteOrThatIsNoLibraryIsRefused) {
+  CompileBranch(Text(6));
+  const fs::path name = Kept().front().filename();
+  const fs::path other = folder_.path() / "other";
+  fs::create_directories(other / "loopbench");
+  fs::permissions(other / "loopbench", fs::perms::owner_all);
+  fs::copy_file(cache_ / name, other / "loopbench" / name);
+  fs::permissions(other / "loopbench" / name, fs::perms::all);
+  ::setenv("XDG_CACHE_HOME", other.c_str(), 1);
+  EXPECT_NE(Refusal(Text(6)).find("expected a file of user"), std::string::npos);
+  fs::remove(other / "loopbench" / name);
+  std::ofstream(other / "loopbench" / name) << "no library";
+  fs::permissions(other / "loopbench" / name, fs::perms::owner_all);
+  EXPECT_NE(Refusal(Text(6)).find(name.string()), std::string::npos);
+  fs::remove(other / "loopbench" / name);
+  EXPECT_EQ(Refusal(Text(6)), "compiled");
+}
+
+TEST_F(CacheTest, WithoutAFolderNothingIsKeptAndTheCodeRuns) {
+  std::ofstream(cache_) << "a file in the place of the folder";
+  EXPECT_NE(Refusal(Text(4)).find("expected a folder"), std::string::npos);
+  ::setenv("XDG_CACHE_HOME", "/proc/none", 1);
+  const CompiledBranch branch = CompileBranch(Text(4));
+  const double x = 3.0;
+  double y = 0.0;
+  EXPECT_EQ(branch.derivative(&x, &y, nullptr, nullptr), 1);
+  EXPECT_EQ(y, 6.0);
+}
+
+TEST_F(CacheTest, ACompilerThatIsMissingOrFailsIsNamed) {
+  ::setenv("CC", "no-such-compiler", 1);
+  EXPECT_NE(Refusal(Text(5)).find("'no-such-compiler' not found (CC names another)"),
+            std::string::npos);
+  ::setenv("CC", "false", 1);
+  EXPECT_NE(Refusal(Text(5)).find("false failed with exit code 1"), std::string::npos);
+  ::unsetenv("CC");
+  EXPECT_NE(Refusal("this is no C\n").find("failed with exit code 1"), std::string::npos);
+}
+
+}  // namespace
+}  // namespace loopbench::generate

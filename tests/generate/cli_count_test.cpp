@@ -1,0 +1,128 @@
+// count, and experiments with generated execution, as users call them.
+#include <gtest/gtest.h>
+
+#include <map>
+#include <sstream>
+
+#include "tests/harness/cli_fixture.h"
+
+namespace loopbench::harness {
+namespace {
+
+class CountTest : public CommandLineTest {
+ protected:
+  void SetUp() override {
+    CommandLineTest::SetUp();
+    ::setenv("XDG_CACHE_HOME", folder_.c_str(), 1);
+  }
+  void TearDown() override {
+    ::unsetenv("XDG_CACHE_HOME");
+    CommandLineTest::TearDown();
+  }
+};
+
+TEST_F(CountTest, PrintsARowForEachRightHandSide) {
+  const Ending ending =
+      Call("count four-bar.json --coordinates joint --level acceleration,velocity");
+  ExpectEnding(ending, 0, {"flops", "depth", "odca", "lagrange", "reduction", "McMahon"});
+  const Ending json = Call("count four-bar.json --formulation odca --format json");
+  ExpectEnding(json, 0, {"\"flops\":", "\"additions\":", "\"flops_as_run\":"});
+  EXPECT_EQ(std::ranges::count(json.text, '{'), 6);  // three levels, two coordinate sets
+}
+
+TEST_F(CountTest, BadInputIsNamedWithFileAndExpectation) {
+  ExpectEnding(Call("count absent.json"), 2, {"absent.json"});
+  EditMechanism("\"mass\": 1.0", "\"mass\": \"heavy\"");
+  ExpectEnding(Call("count four-bar.json"), 2,
+               {"four-bar.json", "/bodies/0/mass: found \"heavy\"", "expected a number > 0"});
+  ExpectEnding(Call("count four-bar.json --level postion"), 2, {"--level", "postion"});
+  ExpectEnding(Call("count"), 2, {"mechanisms"});
+}
+
+TEST_F(CountTest, WhatIsNotRecordedIsARowWithTheReason) {
+  ExpectEnding(Call("count four-bar.json --level position"), 2,
+               {"level \"position\" is not recorded"});
+}
+
+TEST_F(CountTest, TheManualPageAndTheCompletionKnowIt) {
+  EXPECT_NE(Call("manual").text.find(".SS loopbench count"), std::string::npos);
+  EXPECT_NE(Call("completion bash").text.find("count"), std::string::npos);
+  ExpectEnding(Call("count --help"), 0, {"Examples:", "--formulation", "docs/operation-counts.md"});
+}
+
+/// Rows of a table in CSV by their keys, without notes.
+std::map<std::string, std::string> RowsByKey(const std::string& csv) {
+  std::map<std::string, std::string> rows;
+  std::istringstream lines(csv);
+  for (std::string line; std::getline(lines, line);) {
+    if (line.starts_with('#')) continue;
+    std::size_t end = 0;
+    for (int i = 0; i < 5; ++i) end = line.find(',', end) + 1;
+    rows[line.substr(0, end - 1)] = line.substr(end);
+  }
+  return rows;
+}
+
+/// The gate without a clock. `loopbench count` writes the file anew (results/methods/README.md).
+/// Rows that are not exact, where rounding decides an iteration or a pivot, are not compared.
+class CountGate : public CountTest, public testing::WithParamInterface<std::string> {};
+
+TEST_P(CountGate, CountsOfAllMechanismsAreThoseOfTheCommittedTable) {
+  const fs::path kept = fs::path(LOOPBENCH_SOURCE_DIR) / "results/methods/counts.csv";
+  const Ending now = Call("count '" + (kConfigs / "mechanisms").string() +
+                          "'/*.json --format csv --out counts.csv --coordinates " + GetParam());
+  ASSERT_EQ(now.code, 0) << now.text;
+  const auto found = RowsByKey(ReadFile(folder_ / "counts.csv"));
+  const auto expected = RowsByKey(ReadFile(kept));
+  int exact = 0;
+  for (const auto& [key, counts] : expected) {
+    if (key.find("," + GetParam() + ",") == std::string::npos) continue;
+    if (!counts.ends_with(",yes,")) continue;
+    ++exact;
+    const auto row = found.find(key);
+    EXPECT_EQ(row == found.end() ? "no row" : row->second, counts) << key;
+  }
+  EXPECT_GT(exact, 300);
+  for (const auto& [key, counts] : found) EXPECT_TRUE(expected.contains(key)) << key << " is new";
+}
+
+INSTANTIATE_TEST_SUITE_P(Coordinates, CountGate, testing::Values("joint", "absolute"),
+                         [](const auto& set) { return set.param; });
+
+TEST_F(CountTest, GeneratedExecutionIsAFactorOfExperiments) {
+  Write("both.json", R"({
+    "name": "both", "tolerances": [1e-6],
+    "scenes": [{"mechanism": "four-bar.json", "horizon": 0.5}],
+    "columns": [{"formulation": ["odca", "reduction"], "enforcement": "velocity",
+                 "execution": ["library", "generated"]}],
+    "timing": {"repeats": 0}})");
+  ExpectEnding(Call("list both.json"), 0, {"execution", "generated"});
+  ExpectEnding(Call("run both.json --out out"), 0, {});
+  const Ending table = Call(
+      "table out --format csv --columns formulation,execution,outcome,library_evaluations,"
+      "rhs_evaluations");
+  EXPECT_NE(table.text.find("odca,generated,finished,0,"), std::string::npos) << table.text;
+  // its first pivots, at rest, are others than those in motion
+  EXPECT_NE(table.text.find("reduction,generated,finished,9,"), std::string::npos) << table.text;
+  EXPECT_NE(table.text.find("odca,,finished,,"), std::string::npos) << table.text;
+}
+
+TEST_F(CountTest, WhatIsNotGeneratedEndsByName) {
+  Write("none.json", R"({
+    "name": "none", "tolerances": [1e-6],
+    "scenes": [{"mechanism": "four-bar.json", "horizon": 0.5}],
+    "columns": [{"formulation": "odca", "enforcement": "position", "execution": "generated"}],
+    "timing": {"repeats": 0}})");
+  Call("run none.json --out out");
+  ExpectEnding(Call("table out --format csv --columns outcome,message"), 0,
+               {"inexpressible", "level \"\"position\"\" is not recorded"});
+  Write("typo.json", R"({
+    "name": "typo", "tolerances": [1e-6],
+    "scenes": [{"mechanism": "four-bar.json", "horizon": 0.5}],
+    "columns": [{"formulation": "odca", "enforcement": "velocity", "execution": "generate"}]})");
+  ExpectEnding(Call("check typo.json"), 2,
+               {"/columns/0/execution", "found \"generate\"", "did you mean \"generated\""});
+}
+
+}  // namespace
+}  // namespace loopbench::harness

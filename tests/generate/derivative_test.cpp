@@ -1,0 +1,279 @@
+// Recorded right-hand sides: their numbers are those of the library's text, whatever the state, and
+// compiled code has the bits of the graph.
+#include <gtest/gtest.h>
+
+#include <filesystem>
+#include <random>
+
+#include "harness/config/formulations.h"
+#include "harness/config/mechanism_reader.h"
+#include "harness/generate/generated.h"
+#include "harness/generate/pose_sines.h"
+#include "harness/generate/print_c.h"
+#include "harness/run/compiled_scene.h"
+#include "harness/timing/subject.h"
+#include "mechanism/description/library.h"
+
+namespace loopbench::generate {
+namespace {
+
+const std::filesystem::path kMechanisms =
+    std::filesystem::path(LOOPBENCH_SOURCE_DIR) / "configs/mechanisms";
+constexpr BaumgarteGains kGains = {.alpha = 5.0, .beta = 5.0};
+constexpr Enforcement kLevels[] = {Enforcement::kAcceleration, Enforcement::kVelocity,
+                                   Enforcement::kBaumgarte};
+const std::string kFormulations[] = {"odca", "lagrange", "reduction"};
+
+/// The description of a shipped mechanism as it is run.
+MechanismDescription Shipped(const std::string& name) {
+  const harness::MechanismFile file = harness::ReadMechanism(kMechanisms / (name + ".json"));
+  return harness::CompileScene(file.description, file.observe, {})
+      .compiled.parts.front()
+      .description;
+}
+
+/// The graph's own arithmetic; `ok` becomes false where a comparison comes out otherwise.
+std::vector<double> Evaluate(const RecordedDerivative& recorded, const std::vector<double>& x,
+                             bool* ok) {
+  const std::vector<Node>& nodes = recorded.graph.nodes();
+  std::vector<double> values(nodes.size());
+  std::size_t input = 0;
+  for (std::size_t i = 0; i < nodes.size(); ++i) {
+    const auto& [operation, a, b, value] = nodes[i];
+    if (operation == Operation::kInput) {
+      values[i] = x[input++];
+    } else if (operation == Operation::kConstant) {
+      values[i] = value;
+    } else {
+      values[i] = Value(operation, values[a], b >= 0 ? values[b] : 0.0);
+    }
+  }
+  for (const auto& [relation, a, b, outcome] : recorded.graph.comparisons()) {
+    const bool now = relation == Relation::kLess        ? values[a] < values[b]
+                     : relation == Relation::kLessEqual ? values[a] <= values[b]
+                                                        : values[a] == values[b];
+    *ok = *ok && now == outcome;
+  }
+  std::vector<double> result;
+  for (const int node : recorded.outputs) result.push_back(values[node]);
+  return result;
+}
+
+/// Equal bits, except for the sign of zeros.
+void ExpectSameBits(const std::vector<double>& found, const std::vector<double>& expected) {
+  ASSERT_EQ(found.size(), expected.size());
+  for (std::size_t i = 0; i < found.size(); ++i) EXPECT_EQ(found[i], expected[i]) << i;
+}
+
+template <class Space>
+class Library {
+ public:
+  Library(const MechanismDescription& description, const std::string& formulation,
+          Enforcement level, Coordinates set = Coordinates::kJoint)
+      : description_(description), mechanism_(description_, set) {
+    const harness::BenchmarkState state = harness::ComputeState(description, set);
+    EXPECT_EQ(state.outcome, Outcome::kFinished) << state.message;
+    system_ = harness::MakeFormulation<Space>(
+        formulation, mechanism_, {.enforcement = level, .gains = kGains, .general = true});
+    EXPECT_EQ(system_->Start(0.0, state.q, state.u), Outcome::kFinished);
+    subject_.emplace(RecordingSubject{description_, set, formulation, system_->options()});
+    start_ = {0.0, state.q, state.u};
+    y_.resize(static_cast<std::size_t>(system_->size()));
+    system_->ToState(state.q, state.u, y_);
+  }
+
+  std::vector<double> Examine(double t, const std::vector<double>& y) {
+    std::vector<double> ydot(y.size());
+    EXPECT_EQ(system_->Examine(t, y, ydot), Outcome::kFinished);
+    return ydot;
+  }
+  /// A state near the start that is off the constraints, as a trial step is.
+  std::vector<double> Near(double size) const {
+    std::mt19937 numbers(1);
+    std::uniform_real_distribution<double> shift(-size, size);
+    std::vector<double> y = y_;
+    for (double& number : y) number += shift(numbers);
+    return y;
+  }
+
+  System<Space, double>& system() { return *system_; }
+  const RecordingSubject& subject() const { return *subject_; }
+  const RecordingStart& start() const { return start_; }
+  const std::vector<double>& y() const { return y_; }
+
+ private:
+  MechanismDescription description_;
+  Mechanism<Space, double> mechanism_;
+  std::unique_ptr<System<Space, double>> system_;
+  std::optional<RecordingSubject> subject_;
+  RecordingStart start_;
+  std::vector<double> y_;
+};
+
+/// A bar of 2 m on a pin, its centre of mass at r = (c, s) for the angle x, with speed w. By hand:
+///
+///   c, s                  2 sines
+///   w r                   2 *
+///   a = w (w r)           2 *
+///   m r, M = r . m r + I  4 *, 2 +
+///   f = m a - m g         2 *, 1 +      g has one component, and m g is a constant
+///   h = r x f             2 *, 1 +
+///   M = L L^T, -h/L/L     1 sqrt, 2 /
+///
+/// The longest path: s, w s, w (w s), m a, + m g, c f, h, / L, / L.
+TEST(CountsTest, APendulumHasTheOperationsThatAHandCounts) {
+  MechanismDescription pendulum;
+  pendulum.gravity = {0.0, -9.81, 0.0};
+  pendulum.bodies.push_back(Bar("bar", 2.0, 3.0, 0.7));
+  const Eigen::Vector3d pin = Eigen::Vector3d::Zero();
+  pendulum.joints.push_back(Revolute("O", kGround, pin, 1, pin));
+  const RecordingStart start = {.q = Eigen::VectorXd::Constant(1, 0.3),
+                                .u = Eigen::VectorXd::Constant(1, 0.2)};
+  for (const std::string formulation : {"lagrange", "reduction"}) {
+    const MethodCounts counts =
+        CountsOf(RecordDerivative({.description = pendulum, .formulation = formulation}, start));
+    const OperationCounts by_hand = {
+        .additions = 4, .multiplications = 12, .divisions = 2, .roots = 1, .sines = 2};
+    EXPECT_EQ(counts.result, by_hand) << formulation;
+    EXPECT_EQ(counts.result.flops(), 4 + 12 + 4 * 3 + 8 * 2);
+    EXPECT_EQ(counts.depth, 9);
+    EXPECT_GT(counts.as_run.flops(), 4 * counts.result.flops());
+  }
+}
+
+/// O-DCA has no sum whose order Eigen chooses: bits are those of double.
+TEST(RecordedDerivativeTest, ODcaOfTheFourBarHasTheBitsOfTheLibraryElsewhereToo) {
+  for (const Enforcement level : kLevels) {
+    Library<Planar> library(Shipped("four-bar"), "odca", level);
+    const RecordedDerivative recorded = RecordDerivative(library.subject(), library.start());
+    const std::vector<double> y = library.Near(1e-3);
+    std::vector<double> x = {0.5};
+    x.insert(x.end(), y.begin(), y.end());
+    bool ok = true;
+    ExpectSameBits(Evaluate(recorded, x, &ok), library.Examine(0.5, y));
+    EXPECT_TRUE(ok) << ToString(level);
+  }
+}
+
+/// Calls see(library, name) for all shipped mechanisms, formulations and recorded levels.
+void ForAllShipped(Coordinates set, auto see) {
+  for (const auto& entry : std::filesystem::directory_iterator(kMechanisms)) {
+    const std::string name = entry.path().stem();
+    const MechanismDescription description = Shipped(name);
+    for (const std::string& formulation : kFormulations) {
+      for (const Enforcement level : kLevels) {
+        const std::string what = name + " " + formulation + " " + std::string(ToString(level));
+        if (description.space == SpaceKind::kPlanar) {
+          see(Library<Planar>(description, formulation, level, set), what);
+        } else {
+          see(Library<Spatial>(description, formulation, level, set), what);
+        }
+      }
+    }
+  }
+}
+
+/// Elsewhere, where every comparison has its outcome, a graph gives the bits of the text itself.
+void ExpectBitsOfTheText(Coordinates set) {
+  int compared = 0, branched = 0, refused = 0;
+  ForAllShipped(set, [&](auto library, const std::string& what) {
+    SCOPED_TRACE(what);
+    const std::vector<double> y = library.Near(1e-6);
+    std::vector<double> x = {0.01};
+    x.insert(x.end(), y.begin(), y.end());
+    try {
+      const RecordedDerivative recorded = RecordDerivative(library.subject(), library.start());
+      bool ok = true;
+      const std::vector<double> found = Evaluate(recorded, x, &ok);
+      ++(ok ? compared : branched);
+      if (!ok) return;
+      ExpectSameBits(found, RecordDerivative(library.subject(), library.start(), 0.01, y).numbers);
+    } catch (const NotCovered& why) {
+      EXPECT_NE(std::string(why.what()).find("factorisation that iterates"), std::string::npos);
+      ++refused;
+    }
+  });
+  // pivots of equal size, in absolute coordinates above all, change with every state
+  EXPECT_GT(compared, 2 * branched);
+  EXPECT_LT(refused, 12);
+}
+
+TEST(RecordedDerivativeTest, AllShippedMechanismsHaveTheBitsOfTheTextInJointCoordinates) {
+  ExpectBitsOfTheText(Coordinates::kJoint);
+}
+
+TEST(RecordedDerivativeTest, AllShippedMechanismsHaveTheBitsOfTheTextInAbsoluteCoordinates) {
+  ExpectBitsOfTheText(Coordinates::kAbsolute);
+}
+
+TEST(RecordedDerivativeTest, TheTextDoesNotDependOnTheStateWhereItWasRecorded) {
+  for (const std::string& formulation : kFormulations) {
+    Library<Planar> library(Shipped("slider-crank"), formulation, Enforcement::kAcceleration);
+    const std::string here = PrintC(RecordDerivative(library.subject(), library.start()));
+    const std::string there =
+        PrintC(RecordDerivative(library.subject(), library.start(), 0.1, library.Near(1e-3)));
+    EXPECT_EQ(here, there) << formulation;
+  }
+}
+
+TEST(RecordedDerivativeTest, WhatIsNotCoveredIsRefusedByName) {
+  Library<Planar> library(Shipped("four-bar"), "odca", Enforcement::kAcceleration);
+  const auto why = [&](RecordingSubject subject) -> std::string {
+    try {
+      RecordDerivative(subject, library.start());
+    } catch (const NotCovered& refused) {
+      return refused.what();
+    }
+    return "recorded";
+  };
+  RecordingSubject subject = library.subject();
+  EXPECT_EQ(why(subject), "recorded");
+  subject.options.enforcement = Enforcement::kPosition;
+  EXPECT_EQ(why(subject),
+            "level \"position\" is not recorded, only acceleration, velocity and baumgarte");
+  RecordingSubject mine = library.subject();
+  mine.formulation = "mine";
+  EXPECT_NE(why(mine).find("formulation \"mine\""), std::string::npos);
+}
+
+TEST(GeneratedDerivativeTest, CompiledCodeHasTheBitsOfTheGraph) {
+  for (const std::string& formulation : kFormulations) {
+    Library<Planar> library(Shipped("four-bar"), formulation, Enforcement::kVelocity);
+    const RecordedDerivative recorded = RecordDerivative(library.subject(), library.start());
+    const CompiledBranch branch = CompileBranch(PrintC(recorded));
+    std::vector<double> x = {0.25};
+    x.insert(x.end(), library.y().begin(), library.y().end());
+    x.back() += 1e-2;
+    std::vector<double> ydot(x.size() - 1), room(static_cast<std::size_t>(branch.room));
+    EXPECT_EQ(branch.derivative(x.data(), ydot.data(), room.data(), &PoseSines), 1);
+    bool ok = true;
+    ExpectSameBits(ydot, Evaluate(recorded, x, &ok));
+    EXPECT_TRUE(ok);
+  }
+}
+
+/// As published, multipliers choose pivots by comparing magnitudes: other masses choose others.
+TEST(GeneratedDerivativeTest, WhereAComparisonFlipsTheLibraryEvaluatesWithEqualResults) {
+  Library<Planar> library(Shipped("four-bar"), "odca", Enforcement::kAcceleration);
+  System<Planar, double>& system = library.system();
+  RecordingSubject subject = library.subject();
+  system.UseCompiled(std::make_unique<GeneratedDerivative<Planar>>(subject, system));
+  const auto derivative = [&](const std::vector<double>& y) {
+    std::vector<double> ydot(y.size());
+    EXPECT_EQ(system.Derivative(0.0, y, ydot), Outcome::kFinished);
+    return ydot;
+  };
+  derivative(library.y());
+  EXPECT_EQ(system.compiled()->misses(), 0);
+  // bars in line: the loop's pivot is lost, and the general text softens a direction
+  std::vector<double> line = library.y();
+  for (int i = 0; i < system.mechanism().num_q(); ++i) line[static_cast<std::size_t>(i)] = 0.0;
+  const std::vector<double> found = derivative(line);
+  EXPECT_EQ(system.compiled()->misses(), 1);
+  ExpectSameBits(found, library.Examine(0.0, line));
+  derivative(library.y());
+  EXPECT_EQ(system.compiled()->misses(), 1);
+}
+
+}  // namespace
+}  // namespace loopbench::generate

@@ -1,0 +1,126 @@
+// The graph of operations: exact simplifications, shared nodes, comparisons, counts.
+#include "harness/generate/graph.h"
+
+#include <gtest/gtest.h>
+
+#include "harness/generate/print_c.h"
+#include "harness/generate/recorded.h"
+
+namespace loopbench::generate {
+namespace {
+
+/// A graph of this thread's recorded numbers with two inputs.
+struct GraphTest : ::testing::Test {
+  Graph graph;
+  Recording recording{graph, CastsAs::kNumber};
+  Recorded x = Recorded::Input(3.0), y = Recorded::Input(-2.0);
+  const Recorded zero = 0.0, one = 1.0;
+
+  OperationCounts CountOf(const Recorded& result) {
+    return graph.Count(graph.Live({result.node}, false));
+  }
+};
+
+TEST_F(GraphTest, ConstantsZerosAndOnesLeaveNoOperation) {
+  EXPECT_EQ((x + zero).node, x.node);
+  EXPECT_EQ((zero + x).node, x.node);
+  EXPECT_EQ((x - zero).node, x.node);
+  EXPECT_EQ((x * one).node, x.node);
+  EXPECT_EQ((x / one).node, x.node);
+  EXPECT_EQ((-(-x)).node, x.node);
+  EXPECT_EQ((x * zero).node, -1);
+  EXPECT_EQ((x * zero).number, 0.0);
+  EXPECT_EQ((Recorded(2.0) * Recorded(3.0)).node, -1);
+}
+
+TEST_F(GraphTest, EqualOperationsAreOneNode) {
+  EXPECT_EQ((x + y).node, (y + x).node);
+  EXPECT_EQ((x * y).node, (y * x).node);
+  EXPECT_NE((x - y).node, (y - x).node);
+  EXPECT_EQ((x + (-y)).node, (x - y).node);
+  EXPECT_EQ(((-x) * y).node, (-(x * y)).node);
+  EXPECT_EQ((x - (-y)).node, (x + y).node);
+}
+
+TEST_F(GraphTest, WhatIsNotExactStays) {
+  EXPECT_NE((x - x).node, -1);  // 0 for finite numbers alone
+  const Recorded third = x / Recorded(3.0);
+  EXPECT_EQ(CountOf(third).divisions, 1);  // not x * (1/3)
+  const Recorded left = (x + y) + Recorded(1.0), right = x + (y + Recorded(1.0));
+  EXPECT_NE(left.node, right.node);
+}
+
+TEST_F(GraphTest, CountsAndDepthAreThoseOfLiveNodes) {
+  [[maybe_unused]] const Recorded dead = x * x * x;
+  const Recorded result = sqrt(x * x + y * y) / (x + y);
+  const OperationCounts counts = CountOf(result);
+  EXPECT_EQ(counts.additions, 2);
+  EXPECT_EQ(counts.multiplications, 2);
+  EXPECT_EQ(counts.roots, 1);
+  EXPECT_EQ(counts.divisions, 1);
+  EXPECT_EQ(counts.flops(), 2 + 2 + 4 + 4);
+  EXPECT_EQ(graph.Depth(graph.Live({result.node}, false)), 4);  // *, +, sqrt, /
+  EXPECT_EQ(graph.as_run.multiplications, 4);                   // dead ones too
+}
+
+TEST_F(GraphTest, ComparisonsOfNodesAreRecordedOnceWithTheirOutcome) {
+  EXPECT_TRUE(y < x);
+  EXPECT_TRUE(x > y);
+  EXPECT_FALSE(x == y);
+  EXPECT_TRUE(Recorded(1.0) < Recorded(2.0));
+  const std::vector<Comparison> expected = {{Relation::kLess, y.node, x.node, true},
+                                            {Relation::kEqual, x.node, y.node, false}};
+  EXPECT_EQ(graph.comparisons(), expected);
+  EXPECT_TRUE(isfinite(x));  // (x - x) == (x - x)
+  EXPECT_EQ(graph.comparisons().size(), 3u);
+}
+
+TEST_F(GraphTest, MinimaAndMagnitudesAreOperationsNotBranches) {
+  EXPECT_EQ(min(x, y).number, -2.0);
+  EXPECT_EQ(max(x, y).number, 3.0);
+  EXPECT_EQ(abs(y).number, 2.0);
+  EXPECT_TRUE(graph.comparisons().empty());
+}
+
+TEST_F(GraphTest, ACastShowsWhatTheRecordingSays) {
+  EXPECT_EQ(static_cast<double>(x), 3.0);
+  {
+    Graph other;
+    const Recording infinite(other, CastsAs::kInfinity);
+    EXPECT_EQ(static_cast<double>(Recorded::Input(1.0)), std::numeric_limits<double>::infinity());
+    EXPECT_EQ(static_cast<double>(Recorded(1.0)), 1.0);  // a constant decides nothing
+  }
+}
+
+TEST(PrintCTest, TheTextOfASmallGraphIsThis) {
+  RecordedDerivative recorded;
+  {
+    const Recording recording(recorded.graph, CastsAs::kNumber);
+    const Recorded t = Recorded::Input(0.0), x = Recorded::Input(1.0);
+    const Recorded rate = -(x * Recorded(0.5)) + t;
+    EXPECT_TRUE(x > t);
+    recorded.outputs = {rate.node, recorded.graph.Constant(0.0)};
+  }
+  EXPECT_EQ(PrintC(recorded), R"(#include <math.h>
+typedef void (*loopbench_sines)(double, double*, double*);
+static double least(double a, double b) { return b < a ? b : a; }
+static double most(double a, double b) { return a < b ? b : a; }
+static int part0(const double* x, double* y, double* w, loopbench_sines sines) {
+  int ok = 1;
+  (void)x, (void)y, (void)w, (void)sines;
+  ok &= (x[0] < x[1]);
+  const double v3 = x[1] * 0x1p-1;
+  const double v5 = x[0] - v3;
+  y[0] = v5;
+  y[1] = 0x0p+0;
+  return ok;
+}
+const int loopbench_room = 0;
+int loopbench_derivative(const double* x, double* y, double* w, loopbench_sines sines) {
+  return part0(x, y, w, sines);
+}
+)");
+}
+
+}  // namespace
+}  // namespace loopbench::generate

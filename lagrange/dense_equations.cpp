@@ -90,7 +90,6 @@ Outcome DenseEquations<Space, S>::FactorResponse(const Kinematics<Space, S>& kin
                                                  Conditioning& found) {
   found.rank = LoopRank(mechanism_, 0);
   found.smallest_weight = 1.0;
-  found.is_near_singular = false;
   FormResponse(kinematics, Masses::kPhysical);
   if (mass_factor_.info() != Eigen::Success) return Outcome::kNonFinite;
   if (loop_.size() == 0) return Outcome::kFinished;
@@ -99,10 +98,9 @@ Outcome DenseEquations<Space, S>::FactorResponse(const Kinematics<Space, S>& kin
     SetScales(kinematics, Masses::kGeometric);
     FormResponse(kinematics, Masses::kGeometric);
     if (!response_.allFinite()) return Outcome::kNonFinite;
-    loop_.FactorGeometric(response_, kinematics.softening());
+    loop_.FactorGeometric(response_);
     found.rank = LoopRank(mechanism_, loop_.size() - loop_.rank());
     found.smallest_weight = static_cast<double>(loop_.smallest_weight());
-    found.is_near_singular = loop_.IsNearSingular();
     FormResponse(kinematics, Masses::kPhysical);
     if (!loop_.FactorSoftened(response_)) return Outcome::kSingular;
   }

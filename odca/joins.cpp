@@ -71,7 +71,6 @@ Outcome Joins<Space, S>::Assemble(const Kinematics<Space, S>& kinematics) {
   if (!std::isfinite(static_cast<double>(rcond_))) return Outcome::kNonFinite;
   // a loop looks degenerate: let geometry say in which directions, then solve the physics
   softened_ = true;
-  softening_ = kinematics.softening();
   AssembleAll(kinematics, Pass::kGeometric);
   if (AssembleAll(kinematics, Pass::kSoftened)) return Outcome::kFinished;
   return std::isfinite(static_cast<double>(rcond_)) ? Outcome::kSingular : Outcome::kNonFinite;
@@ -85,7 +84,6 @@ bool Joins<Space, S>::AssembleAll(const Kinematics<Space, S>& kinematics, Pass p
     dependent_rows_ = 0;
     worst_joint_ = -1;
     rcond_ = smallest_weight_ = S(1);
-    is_near_singular_ = false;
   }
   for (int leaf : lone_leaves_) FillLeaf(kinematics, inertias[leaf + 1], leaf);
   for (int n = plan_.num_leaves(); n < plan_.num_nodes(); ++n) {
@@ -261,7 +259,7 @@ bool Joins<Space, S>::FactorLoop(const PlanNode& node, const Place& place, Pass 
     return ok;
   }
   if (pass == Pass::kGeometric) {
-    loop.FactorGeometric(X, softening_);
+    loop.FactorGeometric(X);
     dependent_rows_ += loop.size() - loop.rank();
     NoteDiagnostics(node, loop);
     return true;
@@ -276,7 +274,6 @@ void Joins<Space, S>::NoteDiagnostics(const PlanNode& node, const LoopSolver<S>&
     worst_joint_ = node.joints.back().index;
   }
   smallest_weight_ = std::min(smallest_weight_, loop.smallest_weight());
-  is_near_singular_ = is_near_singular_ || loop.IsNearSingular();
 }
 
 /// V = T Y in Y's place, for the handles that stay: the X Y of (64) is -T^T V.

@@ -110,7 +110,6 @@ class Joins {
   int dependent_rows() const { return dependent_rows_; }
   S rcond() const { return rcond_; }
   S smallest_weight() const { return smallest_weight_; }
-  bool IsNearSingular() const { return is_near_singular_; }
   int worst_joint() const { return worst_joint_; }
   /// Multiply-adds of the last Assemble(), counted as they were done (an eigen-decomposition as if
   /// it were a Cholesky factorisation).
@@ -165,8 +164,6 @@ class Joins {
   bool softened_ = false;
   int dependent_rows_ = 0, worst_joint_ = -1;
   S rcond_ = S(1), smallest_weight_ = S(1);
-  bool is_near_singular_ = false;
-  S softening_ = S(kSoftening);
   long operations_ = 0;
 };
 

@@ -99,7 +99,6 @@ void DenseReduction<Space, S>::FactorNullSpace(const Kinematics<Space, S>& kinem
   found.rank = LoopRank(mechanism_, mechanism_.num_rows() - null_space_->rank());
   found.rcond = static_cast<double>(null_space_->rcond());
   found.smallest_weight = static_cast<double>(null_space_->smallest_weight());
-  found.is_near_singular = null_space_->IsNearSingular();
 }
 
 template <class Space, class S>
@@ -109,7 +108,6 @@ bool DenseReduction<Space, S>::FactorPartition(const Kinematics<Space, S>& kinem
   found.rank = LoopRank(mechanism_, mechanism_.num_rows() - r);
   found.rcond = 0.0;
   found.smallest_weight = 1.0;
-  found.is_near_singular = false;
   kinematics_ = &kinematics;
   uses_null_space_ = mass_is_current_ = false;
   // more rows than dependent speeds: redundant constraints, as published; or a rank that has grown

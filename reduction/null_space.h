@@ -51,7 +51,6 @@ class NullSpace {
 
   int rank() const { return weights_.rank(); }
   S smallest_weight() const { return weights_.smallest(); }
-  bool IsNearSingular() const { return weights_.IsNearSingular(); }
   /// Ratio of the extreme singular values of the dependent directions.
   S rcond() const { return rcond_; }
 

@@ -31,11 +31,10 @@ namespace loopbench {
 
 /// What Factor() found.
 struct Conditioning {
-  int rank = 0;                   ///< independent loop constraints: rank of J in joint coordinates
-  double rcond = 1.0;             ///< ratio of extreme pivots or eigenvalues of the solver's matrix
-  double smallest_weight = 1.0;   ///< below 1: some direction was softened
-  bool is_near_singular = false;  ///< some direction is within a hundredth of being lost
-  int worst_joint = -1;           ///< index of the joint behind rcond, -1 when not attributable
+  int rank = 0;                  ///< independent loop constraints: rank of J in joint coordinates
+  double rcond = 1.0;            ///< ratio of extreme pivots or eigenvalues of the solver's matrix
+  double smallest_weight = 1.0;  ///< below 1: some direction was softened
+  int worst_joint = -1;          ///< index of the joint behind rcond, -1 when not attributable
 };
 
 /// Newton converges in two or three steps from what one accepted step leaves.

@@ -48,11 +48,7 @@ class Level {
   /// After an accepted step of length h, SetSpeeds() being done.
   virtual Accepted Accept(FactoredState<Space, S>&, S /*h*/) { return Accepted::kAsItWas; }
 
-  /// Before accelerations are evaluated near a singular configuration, factors being current: may
-  /// move the state to the constraints. Does nothing here.
-  virtual Outcome Settle(FactoredState<Space, S>&) { return Outcome::kFinished; }
-
-  /// Accept() by a solver's short cut, of a state that is known by (q, u) alone, which it changes.
+  /// The same by a solver's short cut, of a state that is known by (q, u) alone, which it changes.
   /// False, as here, where there is none: then Accept() is asked.
   virtual bool Project(ConstraintSolver<Space, S>&, std::span<S> /*q*/, std::span<S> /*u*/) {
     return false;

@@ -41,17 +41,6 @@ class PositionLevel final : public Level<Space, S> {
     return outcome == Outcome::kFinished && finite ? Accepted::kProjected : Accepted::kFailed;
   }
 
-  /// Trial stages of a step miss the constraints. Near a singular configuration their accelerations
-  /// do so by one over the square of the distance, and those of the nearest admissible state do
-  /// not.
-  Outcome Settle(FactoredState<Space, S>& state) override {
-    const Correction<S> accepted = this->correction_;
-    Outcome outcome = ProjectPositions(state);
-    if (outcome == Outcome::kFinished) outcome = ProjectSpeeds(state);
-    this->correction_ = accepted;
-    return outcome;
-  }
-
  private:
   bool has_constraints() const { return violation_.size() > 0 && change_.size() > 0; }
 

@@ -162,14 +162,6 @@ Outcome System<Space, S>::Derivative(S t, std::span<const S> y, std::span<S> ydo
 }
 
 template <class Space, class S>
-Outcome System<Space, S>::Settle() {
-  if (mechanism_.num_u() == 0) return Outcome::kFinished;
-  if (const Outcome outcome = state_.Factor(); outcome != Outcome::kFinished) return outcome;
-  if (!solver_->conditioning().is_near_singular) return Outcome::kFinished;
-  return level_->Settle(state_);
-}
-
-template <class Space, class S>
 void System<Space, S>::PutPower(std::span<S> rates) {
   if (rates.empty()) return;
   const Power<S> power = TotalPower();
@@ -181,7 +173,6 @@ template <class Space, class S>
 Outcome System<Space, S>::Examine(S t, std::span<const S> y, std::span<S> ydot) {
   derivative_version_ = -1;
   outcome_ = FromState(t, y);
-  if (outcome_ == Outcome::kFinished) outcome_ = Settle();
   if (outcome_ == Outcome::kFinished) outcome_ = Accelerate();
   if (outcome_ != Outcome::kFinished) return outcome_;
   const int num_q = mechanism_.num_q(), n = state_size();

@@ -136,8 +136,6 @@ class System final : public Ode<S> {
   /// The latter. At level position, whose accepted steps end on the constraints, inertia carries a
   /// mechanism across singular configurations; what trial stages miss there is not judged.
   Outcome JudgeDrives();
-  /// Lets the level move a state near a singular configuration.
-  Outcome Settle();
   /// Whether constraints depend on each other that usually do not.
   bool IsSingular() const;
   int FirmRank(const Kinematics<Space, S>& at) const;

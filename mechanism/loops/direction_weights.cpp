@@ -41,14 +41,13 @@ void DirectionWeights<S>::FindPivots(Eigen::Ref<MatrixX<S>> X, Eigen::Ref<Matrix
 }
 
 template <class S>
-void DirectionWeights<S>::Weigh(const VectorX<S>& lambda, S width) {
+void DirectionWeights<S>::Weigh(const VectorX<S>& lambda) {
   using std::expm1;
   const Eigen::Index size = lambda.size();
   const S eps = std::numeric_limits<S>::epsilon();
   largest_ = std::max(size > 0 ? lambda[size - 1] : S(0), S(kLeastResponse));
-  const S theta = std::max(width * width, S(64) * eps) * largest_;
-  const S least =
-      std::max(std::min(S(kLeastEigenvalue), width * width / 100), S(4) * eps) * largest_;
+  const S theta = std::max(S(kTheta), S(64) * eps) * largest_;
+  const S least = std::max(S(kLeastEigenvalue), S(4) * eps) * largest_;
   if (rows_.size() == 1) pivots_ = lambda;
   rank_ = 0;
   for (Eigen::Index i = 0; i < size; ++i) {
@@ -58,7 +57,6 @@ void DirectionWeights<S>::Weigh(const VectorX<S>& lambda, S width) {
     weights_[i] = -expm1(-ratio * ratio);
     if (weights_[i] >= S(1) / S(2)) ++rank_;
   }
-  is_near_singular_ = size > 0 && !(pivots_[0] >= S(kNear) * largest_);
   smallest_ = size > 0 ? weights_.minCoeff() : S(1);
 }
 

@@ -5,9 +5,8 @@
 //   K_g^-1 X_g K_g^-T = U diag(lambda) U^T
 //   w_i = 1 - exp(-r_i^2),      r_i = min(p_i / theta, (lambda_i / lambda_least)^2)
 //
-// with theta = x^2 and lambda_least = min((2e-6)^2, theta / 100) of the largest eigenvalue, which
-// counts as 1e-2 at least, because within a rigid part all of X_g is round-off. The width x follows
-// from the closure error of the position (Kinematics::softening()): 2e-4 at most.
+// with theta = (2e-4)^2 and lambda_least = (2e-6)^2 of the largest eigenvalue, which counts as 1e-2
+// at least, because within a rigid part all of X_g is round-off.
 //
 // The p_1 <= p_2 <= ... are what each joint could respond once the joints before it are closed: the
 // eigenvalues of its block in the Cholesky factorisation by blocks. They fall with the square of
@@ -23,20 +22,17 @@
 #include <vector>
 
 #include "mechanism/algebra/space.h"
-#include "mechanism/model/kinematics.h"
 
 namespace loopbench {
 
 template <class S>
 class DirectionWeights {
  public:
-  /// theta at the widest; 64 eps at least, because eigenvalues of a narrow scalar are round-off
-  /// already above 4e-8. docs/numerics.md, section 3, has the trials.
-  static constexpr double kTheta = kSoftening * kSoftening;
-  /// lambda_least at most, else a hundredth of theta; 4 eps at least.
+  /// theta, or 64 eps if more: a narrow scalar's eigenvalues are round-off already above 4e-8.
+  /// docs/numerics.md, section 3, has the trials.
+  static constexpr double kTheta = 4e-8;
+  /// lambda_least, or 4 eps if more.
   static constexpr double kLeastEigenvalue = 4e-12;
-  /// A distance of a hundredth, like LoopSolver::kSuspicious.
-  static constexpr double kNear = 1e-4;
   /// Free bodies respond with one, and round-off of some 100 eps stays far below kTheta of this.
   static constexpr double kLeastResponse = 1e-2;
   /// Directions of less weight are left out: their eigenvalues are round-off.
@@ -48,16 +44,14 @@ class DirectionWeights {
   /// Finds the p_i of the scaled geometric response in `X`, which is destroyed; `work` has its
   /// size. No allocation.
   void FindPivots(Eigen::Ref<MatrixX<S>> X, Eigen::Ref<MatrixX<S>> work);
-  /// The weights for the width x, after FindPivots; `lambda` ascends.
-  void Weigh(const VectorX<S>& lambda, S width = S(kSoftening));
+  /// The weights, after FindPivots; `lambda` ascends.
+  void Weigh(const VectorX<S>& lambda);
 
   S operator[](Eigen::Index i) const { return weights_[i]; }
   bool IsLeftOut(Eigen::Index i) const { return !(weights_[i] >= S(kLeast)); }
   /// Directions enforced with a weight of at least one half.
   int rank() const { return rank_; }
   S smallest() const { return smallest_; }
-  /// Whether the least p_i is below kNear of the largest eigenvalue.
-  bool IsNearSingular() const { return is_near_singular_; }
   /// The largest eigenvalue, or what it counts as.
   S largest() const { return largest_; }
 
@@ -66,7 +60,6 @@ class DirectionWeights {
   VectorX<S> pivots_, weights_;
   int rank_ = 0;
   S smallest_ = S(1), largest_ = S(1);
-  bool is_near_singular_ = false;
 };
 
 }  // namespace loopbench

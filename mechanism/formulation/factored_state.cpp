@@ -39,7 +39,7 @@ template <class Space, class S>
 bool FactoredState<Space, S>::AcceptReleased() {
   if (stress_ == nullptr) return false;
   const std::vector<Released> before = released_;
-  released_ = stress_->is_exact() ? kinematics_.released() : stress_->Choose(kinematics_);
+  released_ = stress_->Choose(kinematics_);
   if (kinematics_.released() != released_) {
     const VectorX<S> q = kinematics_.q(), u = kinematics_.u();
     SetPositions(q);

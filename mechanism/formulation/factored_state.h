@@ -49,9 +49,8 @@ class FactoredState {
   SelfStress<Space, S>* stress() const { return stress_.get(); }
   /// Adds to speeds the share of the released directions (self_stress.h), after Factor().
   void ShareSpeeds(VectorX<S>& u);
-  /// Releases the directions that serve best at the current positions from now on, if their choice
-  /// matters: the equations stay the same to first order in the drift. Whether others are released
-  /// than before.
+  /// Releases the directions that serve best at the current positions from now on. The equations
+  /// stay the same to first order in the drift. Whether others are released than before.
   bool AcceptReleased();
   /// Releases the mechanism's choice again: runs do not depend on runs before.
   void ForgetReleased() { released_ = mechanism().released(); }

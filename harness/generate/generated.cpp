@@ -12,9 +12,9 @@ namespace loopbench::generate {
 
 namespace {
 
-// Start and first steps, which begin at rest, may take a branch of their own; mechanisms whose
-// branches change all the time are not worth more compilations.
-constexpr int kMissesBeforeRecording = 8;
+// A first miss may be alone: starts at rest have branches of their own. Each further branch needs
+// twice as many misses as the one before.
+constexpr int kFirstMisses = 2;
 constexpr std::size_t kMostBranches = 8;
 // 24 000 operations take a compiler 3.5 s; factorisations that iterate have hundreds of thousands
 constexpr std::int64_t kMostOperations = 50'000;
@@ -37,6 +37,7 @@ GeneratedDerivative<Space>::GeneratedDerivative(const RecordingSubject& subject,
   subject_.with_work = system.size() > system.state_size();
   x_.assign(static_cast<std::size_t>(system.size()) + 1, 0.0);
   NoteStart();
+  misses_left_ = kFirstMisses;
   std::vector<double> y(x_.size() - 1);
   system.ToState(start_.q, start_.u, y);
   AddBranch(start_.t, y);
@@ -73,7 +74,7 @@ template <class Space>
 void GeneratedDerivative<Space>::ModeChanged() {
   branches_.clear();
   NoteStart();
-  misses_in_a_row_ = kMissesBeforeRecording;  // the next evaluation is recorded
+  misses_left_ = 0;  // the next evaluation is recorded
 }
 
 template <class Space>
@@ -90,14 +91,11 @@ bool GeneratedDerivative<Space>::Evaluate(double t, std::span<const double> y,
   for (std::size_t i = 0; i < branches_.size(); ++i) {
     if (!Call(branches_[i], ydot)) continue;
     if (i > 0) std::swap(branches_[0], branches_[i]);
-    misses_in_a_row_ = 0;
     return true;
   }
   ++misses_;
-  if (misses_in_a_row_++ < kMissesBeforeRecording || branches_.size() >= kMostBranches) {
-    return false;
-  }
-  misses_in_a_row_ = 0;
+  if (--misses_left_ > 0 || branches_.size() >= kMostBranches) return false;
+  misses_left_ = kFirstMisses << branches_.size();
   try {
     AddBranch(t, y);
   } catch (const NotCovered&) {

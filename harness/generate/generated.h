@@ -42,7 +42,7 @@ class GeneratedDerivative final : public CompiledDerivative {
   std::vector<CompiledBranch> branches_;  ///< the one that served last stands first
   std::vector<double> x_, room_;          ///< time and state; intermediate values
   std::int64_t misses_ = 0;
-  int misses_in_a_row_ = 0;
+  int misses_left_ = 0;  ///< until the next branch is recorded
   double seconds_ = 0.0;
 };
 

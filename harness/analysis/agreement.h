@@ -51,7 +51,7 @@ struct PoseDifference {
   double largest = 0.0;
   std::string body;
 };
-/// Of the bodies that two records both have.
+/// Largest differences of the poses of bodies that occur in both records.
 PoseDifference DifferenceOf(const Record& a, const Record& b);
 /// The largest between any two of `runs` of one scene, in any order.
 PoseDifference LargestDifference(std::span<const Record> runs);

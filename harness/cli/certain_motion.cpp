@@ -20,8 +20,7 @@ CertainMotion MakeCertainMotion(const MechanismDescription& user, double horizon
     certain.reference = MakeReference(user, certain.horizon, LinkLength(user), certain.options);
     return certain.reference.trust_horizon;
   };
-  // at the same times the same is certified; other times, which a few of these are too far apart
-  // for, may be certified less far
+  // a reference is certified up to one of its output times, so the run needs the same times
   constexpr int kFewest = 41, kMostEnds = 8;
   double end = make();
   for (int i = 0; i < kMostEnds && end > 0.0 && end < certain.horizon; ++i) {

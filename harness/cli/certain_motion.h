@@ -6,14 +6,14 @@
 namespace loopbench::harness {
 
 struct CertainMotion {
-  ReferenceOptions options = {};  ///< of an experiment that makes the same reference
+  ReferenceOptions options = {};  ///< an experiment with them makes the same reference
   Reference reference = {};
   double horizon = 0.0;  ///< [s], its trust horizon, which errors are taken up to; 0: there is none
 };
 
 /// Each of the witnesses may take `cpu_s`. Where certification ends before `horizon` the reference
 /// is made again up to there, until it is certified to its end. Throws ConfigError in a program
-/// that was built without wide scalars, which `what` needs.
+/// without wide scalars, which `what` needs.
 CertainMotion MakeCertainMotion(const MechanismDescription& user, double horizon, double cpu_s,
                                 const std::string& what);
 

@@ -30,8 +30,8 @@ double UnitOf(const std::string& word) {
 }
 
 constexpr double kRoundOff = 4.0 * std::numeric_limits<double>::epsilon();  // of a few products
-/// Of directions and quaternions that programs computed from turns by 3.1416 and 1.5708, which lean
-/// by 7.4e-6 and 3.7e-6 rad.
+/// Largest error of directions and quaternions that are rounded. Programs compute them from angles
+/// such as 3.1416 and 1.5708, which are wrong by 7.4e-6 and 3.7e-6 rad.
 constexpr double kLean = 1e-5;
 
 /// `unit`: one in its last digit.
@@ -48,8 +48,8 @@ bool Rounds(double number, double unit, double exact) {
 /// A multiple of pi/12, hence also of pi/4 and pi/6.
 double NearestAngle(double angle) { return std::round(12.0 * angle / pi) / 6.0 * (0.5 * pi); }
 
-/// Of length 1, with squared elements that are twelfths: at multiples of pi/4 and pi/6 in a plane
-/// of two axes, and diagonals. The given numbers if there is none.
+/// The nearest unit vector whose squared elements are multiples of 1/12: multiples of pi/4 and pi/6
+/// in a plane of two axes, and diagonals. Returns the given numbers if none is within kLean.
 List NearestDirection(const List& v) {
   List exact;
   double sum = 0.0;
@@ -61,7 +61,7 @@ List NearestDirection(const List& v) {
   return sum == 12.0 ? exact : v;
 }
 
-/// Of turns about x, then y, then z by multiples of pi/12; w, x, y, z.
+/// The nearest quaternion (w, x, y, z) of rotations about x, then y, then z by multiples of pi/12.
 List NearestQuaternion(const List& q) {
   const double w = q[0], x = q[1], y = q[2], z = q[3], norm2 = w * w + x * x + y * y + z * z;
   if (!(norm2 > 0.0)) return q;

@@ -7,6 +7,7 @@
 
 #include <cstdlib>
 #include <filesystem>
+#include <fstream>
 #include <map>
 #include <mutex>
 #include <optional>
@@ -114,12 +115,22 @@ void Compile(const std::string& text, const fs::path& folder, const fs::path& li
   RunCompiler(arguments);
 }
 
+/// A kept library ends with the checksum of the bytes before it, which the loader does not read.
+void RequireWhole(const fs::path& library) {
+  const std::string bytes = harness::ReadFile(library);
+  const std::size_t size = bytes.size() - std::min(bytes.size(), Fnv1a("").size());
+  if (Fnv1a(bytes.substr(0, size)) == bytes.substr(size)) return;
+  throw NotCovered(library.string() + ": found a wrong checksum, expected the file as it was " +
+                   "written; remove it");
+}
+
 CompiledBranch CompileOrFind(const std::string& text, const std::string& name,
                              const std::optional<fs::path>& cache) {
   if (cache) {
     const fs::path kept = *cache / (name + ".so");
     if (fs::exists(fs::symlink_status(kept))) {
       RequireOwn(kept, S_IFREG);
+      RequireWhole(kept);
       return Load(kept);
     }
   }
@@ -127,13 +138,15 @@ CompiledBranch CompileOrFind(const std::string& text, const std::string& name,
   const fs::path library = folder.path() / "derivative.so";
   Compile(text, folder.path(), library);
   if (cache) {
-    // under a name of its own first: of processes that do the same at once each finds whole files
+    // renamed when complete, so that a concurrent process never reads a part of it
     const fs::path own = *cache / fmt::format("{}.{}", name, ::getpid());
     const Unfinished unfinished(own);
+    const std::string bytes = harness::ReadFile(library);
     std::error_code error;
-    fs::copy_file(library, own, fs::copy_options::overwrite_existing, error);
-    if (!error) fs::permissions(own, fs::perms::owner_all, error);
-    if (!error) fs::rename(own, *cache / (name + ".so"), error);
+    if (std::ofstream(own, std::ios::binary) << bytes << Fnv1a(bytes) << std::flush) {
+      fs::permissions(own, fs::perms::owner_all, error);
+      if (!error) fs::rename(own, *cache / (name + ".so"), error);
+    }
   }
   return Load(library);
 }

@@ -2,8 +2,8 @@
 //
 // The compiler is $CC or cc, started without a shell, for at most kCompilerSeconds. Libraries stay
 // in $XDG_CACHE_HOME/loopbench or ~/.cache/loopbench under names made from text, compiler and
-// flags. Folder and files belong to the user, and nobody else may write them: others are refused.
-// A folder that cannot be made is no error: then nothing is kept.
+// flags, each with a checksum at its end. A folder or file that another user owns or can write, and
+// a file with a wrong checksum, is rejected. If the folder cannot be made, nothing is kept.
 #pragma once
 
 #include <string>
@@ -27,8 +27,7 @@ struct CompiledBranch {
   int room = 0;  ///< numbers that w has room for
 };
 
-/// Throws NotCovered (record.h) without a compiler, or where it fails, and for a cache that
-/// somebody else could write.
+/// Throws NotCovered (record.h) if there is no compiler, if it fails, or if the cache is rejected.
 CompiledBranch CompileBranch(const std::string& text);
 
 }  // namespace loopbench::generate

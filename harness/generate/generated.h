@@ -18,7 +18,7 @@ namespace loopbench::generate {
 template <class Space>
 class GeneratedDerivative final : public CompiledDerivative {
  public:
-  /// Of a system that has started and stays where it is; so does the subject's description.
+  /// `system` has started. It and the subject's description must outlive the object.
   /// Throws NotCovered if the right-hand side at the start cannot be recorded or compiled.
   GeneratedDerivative(const RecordingSubject& subject, const System<Space, double>& system);
 

@@ -183,7 +183,7 @@ void Graph::Compare(Relation relation, int a, int b, bool outcome) {
   if (IsConstant(a) && IsConstant(b)) return;
   if (a == b && relation == Relation::kLess) return;  // false of any number
   std::uint8_t& known = compared_[Pair(a, b)][static_cast<std::size_t>(relation)];
-  if (known != 0) return;  // of the same numbers it comes out the same
+  if (known != 0) return;  // recorded before
   known = 1;
   comparisons_.push_back({relation, a, b, outcome});
 }

@@ -92,7 +92,7 @@ class Graph {
   const std::vector<Comparison>& comparisons() const { return comparisons_; }
   int num_inputs() const { return num_inputs_; }
 
-  /// Which nodes the outputs depend on, and with `compared` those of comparisons.
+  /// Nodes on which the outputs depend, or with `compared` the outputs and all comparisons.
   std::vector<bool> Live(const std::vector<int>& outputs, bool compared) const;
   OperationCounts Count(const std::vector<bool>& live) const;
   /// Operations on the longest path to one of the nodes.

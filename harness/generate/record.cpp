@@ -98,7 +98,7 @@ void RequireNoCastDecides(const RecordedDerivative& recorded, auto record_with) 
   }
 }
 
-/// An angle measured in space goes on from the last accepted step, which no graph knows.
+/// A graph does not contain the last accepted step, from which angles in space are counted.
 void RequireNoTurns(const RecordedDerivative& recorded, SpaceKind space) {
   if (space == SpaceKind::kPlanar) return;
   const std::vector<bool> live = recorded.graph.Live(recorded.outputs, true);

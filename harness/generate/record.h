@@ -46,16 +46,16 @@ struct RecordedDerivative {
 RecordedDerivative RecordDerivative(const RecordingSubject& subject, const RecordingStart& start,
                                     double t, const std::vector<double>& state);
 
-/// The same next to the start: time and each number of the state are moved by up to 1e-6, the same
-/// amounts everywhere. At the start itself, numbers that are zero or equal by chance would decide
-/// which operations follow, and rounding whether they are.
+/// Records next to the start: fixed amounts of up to 1e-6 are added to the time and the state. At
+/// the start itself numbers may be zero or equal by chance, and rounding would decide which
+/// operations follow.
 RecordedDerivative RecordDerivative(const RecordingSubject& subject, const RecordingStart& start);
 
 /// Exact counts of a right-hand side.
 struct MethodCounts {
   OperationCounts as_run;    ///< operations of the text as it is
   OperationCounts result;    ///< what is left for dy/dt alone after simplification
-  OperationCounts compared;  ///< the same with the operations for comparisons
+  OperationCounts compared;  ///< including the operations for comparisons
   std::int64_t comparisons = 0;
   int depth = 0;  ///< operations on the longest path to dy/dt
 

@@ -16,10 +16,10 @@
 
 namespace loopbench::generate {
 
-/// What a cast of a recorded number returns.
+/// Result of a cast of a recorded number to another type.
 enum class CastsAs { kNumber, kInfinity, kMinusInfinity };
 
-/// Makes `graph` that of this thread's recorded numbers for the lifetime of the object.
+/// While it lives, numbers of this thread are recorded in `graph`.
 class Recording {
  public:
   Recording(Graph& graph, CastsAs casts);
@@ -98,7 +98,7 @@ struct Recorded {
   friend bool isnan(const Recorded& x) { return !(x == x); }
   friend bool isfinite(const Recorded& x) { return !isnan(x - x); }
   friend bool isinf(const Recorded& x) { return !isfinite(x) && !isnan(x); }
-  /// In the place of the lanes of Kinematics.
+  /// One angle at a time, instead of the vector code of Kinematics.
   friend void SinesOfPose(const Recorded& angle, Recorded& sine, Recorded& cosine) {
     PoseSines(angle, sine, cosine);
   }
@@ -142,7 +142,7 @@ struct NumTraits<loopbench::generate::Recorded> : GenericNumTraits<loopbench::ge
 };
 }  // namespace Eigen
 
-// What mechanism and formulations are compiled for once more (mechanism/algebra/instantiate.h).
+// Scalar for which mechanism and formulations are compiled here (mechanism/algebra/instantiate.h).
 #define LOOPBENCH_FOR_EACH_SCALAR(MACRO) MACRO(::loopbench::generate::Recorded)
 #define LOOPBENCH_FOR_EACH_SPACE_AND_SCALAR(MACRO) \
   MACRO(Planar, ::loopbench::generate::Recorded) MACRO(Spatial, ::loopbench::generate::Recorded)

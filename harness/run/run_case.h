@@ -54,7 +54,7 @@ void GiveExecution(const Column& column, const MechanismDescription& description
       system));
 }
 
-/// The same with NotCovered as outcome and message of `result`, which else is as it was.
+/// Stores NotCovered as outcome and message of `result` instead of throwing it.
 template <class Space>
 void GiveExecution(const Column& column, const MechanismDescription& description,
                    System<Space, double>& system, IntegratorResult* result) {

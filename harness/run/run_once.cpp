@@ -239,7 +239,7 @@ class Runner {
   bool by_steps_ = false;                         ///< rows are at the ends of steps
   std::vector<double> rows_;                      ///< else at these times
   std::int64_t looked_ = 0, looked_by_then_ = 0;  ///< softened, for nobody's step; at the last one
-  std::int64_t library_evaluations_ = 0;          ///< in the place of generated code
+  std::int64_t library_evaluations_ = 0;          ///< instead of generated code
   double compile_s_ = 0.0;                        ///< [s], to record and compile
   Record final_poses_;
   std::vector<double> y_;

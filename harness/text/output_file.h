@@ -58,7 +58,7 @@ class OutputFile {
   void Write(std::string_view text);
   /// Once, at the end: the file is on the disk.
   void Finish();
-  /// The same; false if a file of the name is there by now, which stays.
+  /// Like Finish(), but returns false and keeps the old file if one of the name exists by now.
   bool FinishIfNew();
 
  private:

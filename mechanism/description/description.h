@@ -88,7 +88,7 @@ struct MechanismDescription {
   bool rounded = false;
 };
 
-/// The same with every constrained direction imposed, apart from those of a rounded description.
+/// A copy in which all constrained directions are imposed, unless the description is rounded.
 MechanismDescription Unreleased(const MechanismDescription& description);
 
 /// First thing that makes the description unusable, as text ("" when it is usable): masses and

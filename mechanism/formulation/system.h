@@ -113,8 +113,8 @@ class System final : public Ode<S> {
   /// must restart. After a projection that failed `y` is as it was; the next evaluation says why.
   bool BeginStep(S t, std::span<S> y);
 
-  /// Of all constraint rows at the last Evaluate() or Examine(), which succeeded and which no
-  /// Derivative() followed: D lambda is the force on Q.
+  /// Multipliers lambda of all constraint rows; D lambda is the force on Q. The last call must have
+  /// been a successful Evaluate() or Examine().
   const VectorX<S>& Multipliers();
 
   /// Power [W] that prescribed motions supply there. O(n); 0 without them.
@@ -146,7 +146,7 @@ class System final : public Ode<S> {
   void PutPower(std::span<S> rates);
   /// udot_ and, unless null, lambda at the current state, with the shares of released directions.
   void SolveAccelerations(VectorX<S>* lambda);
-  /// The same without shares by f and c, for solvers without a short cut.
+  /// Solves for accelerations from f and c, for solvers without a short cut.
   void SolveFormed(VectorX<S>* lambda);
   /// Whether the step that the last Derivative() ended changes nothing, and nothing has to be known
   /// of it.

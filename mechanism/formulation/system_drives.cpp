@@ -30,8 +30,8 @@ bool System<Space, S>::IsSingular() const {
          FirmRank(kinematics()) < drives_->usual_rank();
 }
 
-/// Steps ahead along the speeds by some widths of softening: constraints that depend on each other
-/// everywhere do so there but for the square of that, those of a singular start do not.
+/// Steps ahead along the speeds by some widths of softening. Constraints that depend on each other
+/// everywhere do so there to second order; constraints of a singular start do not.
 template <class Space, class S>
 void System<Space, S>::NoteRankAhead() {
   S speed = S(0);

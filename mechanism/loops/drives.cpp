@@ -21,7 +21,7 @@ S SizeOf(const Kinematics<Space, S>& kinematics, const Motion& A) {
   return std::max(S(A.angular.norm()), S(A.linear.norm() / kinematics.mechanism().length()));
 }
 
-/// The same of the fastest body.
+/// Speed of the fastest body.
 template <class Space, class S>
 S SpeedOf(const Kinematics<Space, S>& kinematics) {
   S speed = S(0);

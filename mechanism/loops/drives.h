@@ -59,10 +59,10 @@ class Drives {
   /// one missed by less than 1e-2, none by less than this.
   static constexpr double kMostDrift = 1e-3;
 
-  /// Of the largest term, left in a singular configuration. Accepted steps leave up to 0.02 at
-  /// rtol 1e-4.
+  /// Largest residual in a singular configuration, relative to the largest term. Accepted steps
+  /// leave up to 0.02 at rtol 1e-4.
   static constexpr double kLeftOnBranch = 0.1;
-  /// Of the width of softening, turned on the way across.
+  /// Largest deflection across the width of softening, relative to that width.
   static constexpr double kTurned = 0.1;
 
   /// Whether what is left is explained by joints that have come apart.

@@ -29,7 +29,7 @@ void SolveBoth(const MatrixX<S>& L, S* x) {
   SolveLowerTransposed(L.data(), static_cast<int>(L.rows()), x);
 }
 
-/// Of columns i of A and j of B. Eigen's products of a few numbers take longer to start than to
+/// Scalar product of columns i of A and j of B. For a few numbers Eigen's overhead exceeds the
 /// work.
 template <class S>
 S Dot(const MatrixX<S>& A, int i, const MatrixX<S>& B, int j) {
@@ -73,8 +73,8 @@ SelfStress<Space, S>::SelfStress(const Mechanism<Space, S>& mechanism) : mechani
   is_exact_ = D_ == 0 && loops_.size() == 1 && loops_.front().num_drives == 0;
 }
 
-/// In joint coordinates the forest is that of the mechanism, in absolute ones a forest of joints
-/// that release nothing. All other constraints close loops.
+/// In joint coordinates the forest is the tree of the mechanism, in absolute ones a forest of
+/// joints that release nothing. All other constraints close loops.
 template <class Space, class S>
 void SelfStress<Space, S>::Span() {
   const auto& joints = mechanism_->joints();
@@ -179,7 +179,7 @@ void SelfStress<Space, S>::FillRows(const Kinematics<Space, S>& kinematics, Loop
 /// Rates of directions, in axes that turn with P of each joint, and of arms.
 template <class Space, class S>
 void SelfStress<Space, S>::FillRates(const Kinematics<Space, S>& kinematics) {
-  /// of Mo, as a point of Q
+  // velocity of Mo, as a point of Q
   const auto speed = [&](int joint) {
     const int body = mechanism_->joints()[joint].to;
     return ShiftMotion<Space, S>(kinematics.motions()[body], kinematics.joints()[joint].r_Q).linear;
@@ -361,7 +361,7 @@ const VectorX<S>& SelfStress<Space, S>::Feedback(const Kinematics<Space, S>& kin
   }
   SolveBoth(gram_, e_c_.data());
   x_.head(H_).noalias() = rows_.leftCols(r_).lazyProduct(e_c_.head(r_));
-  // W (-W'^T e), by the rates of loops alone: those of J_t vanish
+  // W (-W'^T e), from the rates of loops; rates of J_t vanish
   Times<true>(kinematics, x_, z_c_);
   z_t_.setZero();
   ProjectOnStress(z_t_, z_c_);

@@ -76,8 +76,8 @@ class SelfStress {
   bool is_exact() const { return is_exact_; }
   /// U_b^T W W^T rho of speeds, rho = J u + b, for the imposed rows.
   const VectorX<S>& ShareOfSpeeds(const Kinematics<Space, S>& kinematics);
-  /// The same of rho = J udot - gamma + W' W'^T e for accelerations A of the centres of mass, after
-  /// Feedback().
+  /// U_b^T W W^T rho with rho = J udot - gamma + W' W'^T e, for accelerations A of the centres of
+  /// mass. Feedback() must have been called.
   const VectorX<S>& ShareOfAccelerations(const Kinematics<Space, S>& kinematics,
                                          std::span<const Acceleration<Space, S>> A);
   /// -J^T W W^T lambda: the generalised force that takes the part along W from multipliers lambda

@@ -37,7 +37,7 @@ void SetBasisAt(const JointKind<Space, S>& kind, const Rotation<Space, S>& R,
   for (Direction<Space, S>& direction : basis) direction = Rotate(R, direction);
 }
 
-/// Of central differences: errors of rounding and of truncation are alike, 4e-11.
+/// Step of central differences: rounding and truncation errors are alike, 4e-11.
 constexpr double kRelativeStep = 6e-6;
 
 /// A pose that moves with V (in F axes) for a short time.

@@ -15,7 +15,7 @@ namespace loopbench {
 
 namespace {
 
-/// Of the angle of a planar pose; a scalar may have its own.
+/// Sine and cosine of the angle of a planar pose; a scalar may overload it.
 template <class S>
 void SinesOfPose(const S& angle, S& sine, S& cosine) {
   using std::cos;

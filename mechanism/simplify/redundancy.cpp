@@ -75,7 +75,7 @@ std::vector<Released> Release(const Excursion<Space>& position,
   return choice.NotTaken(constraints);
 }
 
-/// Of one part: bodies that joints connect.
+/// Redundancy of one part: bodies that joints connect.
 template <class Space>
 Redundancy Find(const MechanismDescription& description) {
   Redundancy result;

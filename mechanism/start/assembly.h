@@ -47,8 +47,8 @@ struct MissedGuess {
   double by = 0.0;     ///< start less guess [rad or m]
 };
 
-/// Of positions q in the joint coordinates of the description, in its order. Values of angles of
-/// cut joints count modulo a turn, but for those on which a force depends.
+/// Guesses missed by positions q, which are joint coordinates in the order of the description.
+/// Angles of cut joints count modulo a turn unless a force depends on them.
 std::vector<MissedGuess> FindMissedGuesses(const MechanismDescription& description,
                                            const VectorX<double>& q);
 

@@ -24,8 +24,8 @@ template <class Space>
 void ClosePositions(const MechanismDescription& description, Kinematics<Space, double>& kinematics,
                     const AssemblyUnits<Space>& units, Start<double>* start);
 
-/// A length that no position exceeds much, in units: all arms of the longest way through the
-/// tree, each at least as long as the mechanism's own length, and those of cut joints.
+/// A length that no position exceeds much, in units: the arms of the longest way through the tree,
+/// each at least as long as the mechanism, and the arms of cut joints.
 template <class Space>
 double Extent(const Mechanism<Space, double>& mechanism, const AssemblyUnits<Space>& units);
 

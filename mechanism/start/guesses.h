@@ -26,7 +26,7 @@ class Guesses {
 
   /// q less GuessedPositions(), by speed, in units.
   VectorX<double> Apart(const VectorX<double>& q) const;
-  /// The same with 0 for all that is not guessed.
+  /// Like Apart(), with 0 for coordinates without a guess.
   VectorX<double> GuessedApart(const VectorX<double>& q) const;
   /// held() and loose() as measured less their values, in units.
   VectorX<double> HeldApart(const Kinematics<Space, double>& at) const { return Apart(held_, at); }

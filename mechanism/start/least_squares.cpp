@@ -11,7 +11,7 @@ namespace {
 
 /// Entries of J up to which dense factors are made at once: some 10 ms.
 constexpr double kSmall = 1e5;
-/// The same for rough solutions: below it sparse factors are no faster.
+/// Entries of J below which rough solutions gain nothing from sparse factors.
 constexpr double kTiny = 1e3;
 /// Least pivot of J J^T over the entry that it began as: solutions keep six digits at least.
 constexpr double kLeastPivot = 1e-10;

@@ -8,6 +8,7 @@
 
 #include "harness/generate/compile.h"
 #include "harness/generate/record.h"
+#include "harness/text/files.h"
 #include "harness/text/temporary_folder.h"
 
 namespace loopbench::generate {
@@ -94,6 +95,19 @@ TEST_F(CacheTest, AFileThatOthersMayWriteOrThatIsNoLibraryIsRefused) {
   EXPECT_NE(Refusal(Text(6)).find(name.string()), std::string::npos);
   fs::remove(other / "loopbench" / name);
   EXPECT_EQ(Refusal(Text(6)), "compiled");
+}
+
+TEST_F(CacheTest, AChangedByteIsRefused) {
+  CompileBranch(Text(7));
+  const fs::path name = Kept().front().filename(), changed = folder_.path() / "changed";
+  fs::create_directories(changed / "loopbench");
+  fs::permissions(changed / "loopbench", fs::perms::owner_all);
+  std::string bytes = harness::ReadFile(cache_ / name);
+  bytes[bytes.size() / 2] ^= 1;
+  std::ofstream(changed / "loopbench" / name) << bytes;
+  fs::permissions(changed / "loopbench" / name, fs::perms::owner_all);
+  ::setenv("XDG_CACHE_HOME", changed.c_str(), 1);
+  EXPECT_NE(Refusal(Text(7)).find("found a wrong checksum"), std::string::npos);
 }
 
 TEST_F(CacheTest, WithoutAFolderNothingIsKeptAndTheCodeRuns) {

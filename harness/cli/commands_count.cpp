@@ -1,10 +1,17 @@
 #include "harness/cli/commands_count.h"
 
+#include <fmt/format.h>
+
+#include <cmath>
+#include <functional>
+#include <map>
+#include <span>
 #include <sstream>
 
 #include "harness/cli/report.h"
 #include "harness/config/formulations.h"
 #include "harness/config/mechanism_reader.h"
+#include "harness/config/sized_family.h"
 #include "harness/generate/record.h"
 #include "harness/isolation/print_from_child.h"
 #include "harness/record/record_json.h"
@@ -38,6 +45,13 @@ std::vector<std::string> FormulationsOf(const CountCommand& command) {
   return names;
 }
 
+std::string Text(const Record& row, const char* key) {
+  return std::get<std::string>(*row.Find(key));
+}
+std::int64_t Number(const Record& row, const char* key) {
+  return std::get<std::int64_t>(*row.Find(key));
+}
+
 /// Counts of one right-hand side. They are exact unless a change far below any digit that is
 /// meant, as other libraries and processors make it, leads to others.
 void SetCounts(const generate::RecordingSubject& subject, const generate::RecordingStart& start,
@@ -46,8 +60,8 @@ void SetCounts(const generate::RecordingSubject& subject, const generate::Record
   generate::RecordingStart rounded = start;
   rounded.q.array() += kRounding;
   rounded.u.array() -= kRounding;
-  const auto counts = generate::CountsOf(generate::RecordDerivative(subject, start));
-  const auto other = generate::CountsOf(generate::RecordDerivative(subject, rounded));
+  const auto counts = generate::CountsOf(generate::RecordFunction(subject, start));
+  const auto other = generate::CountsOf(generate::RecordFunction(subject, rounded));
   const generate::OperationCounts& of = counts.result;
   row.Set("flops", of.flops());
   row.Set("additions", of.additions);
@@ -56,16 +70,26 @@ void SetCounts(const generate::RecordingSubject& subject, const generate::Record
   row.Set("roots", of.roots);
   row.Set("sines", of.sines);
   row.Set("other", of.other);
+  row.Set("kinematics", counts.kinematics.flops());
+  row.Set("forces", counts.forces.flops());
+  row.Set("solve", counts.solve.flops());
   row.Set("depth", std::int64_t{counts.depth});
+  row.Set("solve_depth", std::int64_t{counts.solve_depth});
   row.Set("comparisons", counts.comparisons);
   row.Set("flops_compared", counts.compared.flops());
   row.Set("flops_as_run", counts.as_run.flops());
+  if (subject.options.enforcement == Enforcement::kPosition) {
+    generate::RecordingSubject newton = subject;
+    newton.quantity = generate::Quantity::kCorrection;
+    row.Set("correction",
+            generate::CountsOf(generate::RecordFunction(newton, start)).result.flops());
+  }
   row.Set("exact", std::string(counts == other ? "yes" : "no"));
 }
 
 /// One part of a mechanism in one coordinate set: a row per formulation, level and solver.
 void CountPart(const CountCommand& command, const MechanismDescription& part, Coordinates set,
-               std::vector<Record>& rows) {
+               std::size_t most_nodes, std::vector<Record>& rows) {
   const BenchmarkState state = ComputeState(part, set);
   for (const std::string& formulation : FormulationsOf(command)) {
     for (const Enforcement level : ParseAll<Enforcement>(
@@ -86,7 +110,8 @@ void CountPart(const CountCommand& command, const MechanismDescription& part, Co
           SetCounts({.description = part,
                      .coordinates = set,
                      .formulation = formulation,
-                     .options = {.enforcement = level, .solver = solver, .gains = kGains}},
+                     .options = {.enforcement = level, .solver = solver, .gains = kGains},
+                     .most_nodes = most_nodes},
                     {.q = state.q, .u = state.u}, row);
         } catch (const std::exception& why) {
           row.Set("not_recorded", std::string(why.what()));
@@ -97,18 +122,93 @@ void CountPart(const CountCommand& command, const MechanismDescription& part, Co
 }
 
 /// In a child process: rows as lines of JSON.
-int CountHere(const CountCommand& command, const std::filesystem::path& path) {
-  const MechanismFile file = ReadMechanism(path);
-  const CompiledScene scene = CompileScene(file.description, file.observe, {});
+int CountHere(const CountCommand& command, const MechanismDescription& description,
+              const SceneObservation& observe, std::size_t most_nodes) {
+  const CompiledScene scene = CompileScene(description, observe, {});
   std::vector<Record> rows;
   for (const auto& part : scene.compiled.parts) {
     for (const Coordinates set : ParseAll<Coordinates>(
              command.coordinates, {Coordinates::kJoint, Coordinates::kAbsolute})) {
-      CountPart(command, part.description, set, rows);
+      CountPart(command, part.description, set, most_nodes, rows);
     }
   }
   for (const Record& row : rows) PrintText(ToJsonObject(row) + "\n");
   return 0;
+}
+
+/// Rows of a child process that counts; nothing where it fails, with its exit code in `code`.
+std::vector<Record> RowsOf(const std::string& name, const ProcessLimits& limits,
+                           const std::function<int()>& count, int* code) {
+  std::string text;
+  *code = TextFromChild(name, limits, count, &text);
+  std::vector<Record> rows;
+  std::istringstream lines(text);
+  for (std::string line; *code == 0 && std::getline(lines, line);) {
+    rows.push_back(FromJsonLine(line));
+  }
+  return rows;
+}
+
+void RequireSizes(const SizedFamily& family, const std::vector<int>& sizes) {
+  if (sizes.empty()) {
+    throw ConfigError(fmt::format("--family {}: found no --sizes, expected numbers from {} to {}",
+                                  family.name, family.smallest, family.largest));
+  }
+  for (const int size : sizes) {
+    if (size >= family.smallest && size <= family.largest) continue;
+    throw ConfigError(fmt::format("--sizes: found {}, expected {} to {} of family {} ({})", size,
+                                  family.smallest, family.largest, family.name, family.of_what));
+  }
+}
+
+bool HasCounts(const Record& row) { return row.Find("flops") != nullptr; }
+
+std::string MethodOf(const Record& row) {
+  return Text(row, "formulation") + ", " + Text(row, "coordinates");
+}
+
+/// Sets flops / bodies and, but in the first row of a method, d log(flops) / d log(bodies) from the
+/// row before.
+void AddGrowth(std::span<Record> rows) {
+  std::map<std::string, const Record*> last;
+  for (Record& row : rows) {
+    if (!HasCounts(row)) continue;
+    const Record*& before = last[MethodOf(row) + Text(row, "enforcement") + Text(row, "solver")];
+    if (before != nullptr && Number(row, "bodies") > Number(*before, "bodies")) {
+      const auto ratio = [&](const char* key) {
+        return std::log(static_cast<double>(Number(row, key)) /
+                        static_cast<double>(Number(*before, key)));
+      };
+      row.Set("exponent", ratio("flops") / ratio("bodies"));
+    }
+    row.Set("flops_per_body",
+            static_cast<double>(Number(row, "flops")) / static_cast<double>(Number(row, "bodies")));
+    before = &row;
+  }
+}
+
+/// A sentence for each level and solver: the method with the fewest operations at each size.
+std::vector<std::string> Crossovers(std::span<const Record> rows) {
+  std::map<std::string, std::map<std::int64_t, const Record*>> cheapest;
+  for (const Record& row : rows) {
+    if (!HasCounts(row)) continue;
+    const Record*& best =
+        cheapest[Text(row, "enforcement") + ", " + Text(row, "solver")][Number(row, "bodies")];
+    if (best == nullptr || Number(row, "flops") < Number(*best, "flops")) best = &row;
+  }
+  std::vector<std::string> sentences;
+  for (const auto& [level, sizes] : cheapest) {
+    std::string sentence = "fewest operations at level " + level + ":";
+    std::string method;
+    for (const auto& [bodies, row] : sizes) {
+      if (MethodOf(*row) == method) continue;
+      sentence +=
+          fmt::format("{} from {} bodies {}", method.empty() ? "" : ";", bodies, MethodOf(*row));
+      method = MethodOf(*row);
+    }
+    sentences.push_back(sentence + fmt::format(" (to {})", sizes.rbegin()->first));
+  }
+  return sentences;
 }
 
 Table CountTable(std::vector<Record> rows) {
@@ -120,6 +220,11 @@ Table CountTable(std::vector<Record> rows) {
                    {"solver", "solver"},
                    {"bodies", "bodies", Format::kInteger},
                    {"flops", "flops", Format::kInteger, {}, 2},
+                   {"flops_per_body", "per body", Format::kFixed},
+                   {"exponent", "exponent", Format::kExponent, {}, 2},
+                   {"kinematics", "kinematics", Format::kInteger},
+                   {"forces", "forces", Format::kInteger},
+                   {"solve", "solve", Format::kInteger},
                    {"additions", "+ -", Format::kInteger},
                    {"multiplications", "*", Format::kInteger},
                    {"divisions", "/", Format::kInteger},
@@ -127,6 +232,8 @@ Table CountTable(std::vector<Record> rows) {
                    {"sines", "sin cos", Format::kInteger},
                    {"other", "other", Format::kInteger, {}, -1},
                    {"depth", "depth", Format::kInteger, {}, 1},
+                   {"solve_depth", "depth of solve", Format::kInteger, {}, 1},
+                   {"correction", "Newton step", Format::kInteger},
                    {"comparisons", "compared", Format::kInteger},
                    {"flops_compared", "flops with comparisons", Format::kInteger, {}, -2},
                    {"flops_as_run", "flops as run", Format::kInteger, {}, 1},
@@ -141,32 +248,70 @@ Table CountTable(std::vector<Record> rows) {
 }  // namespace
 
 int CountOperations(const CountCommand& command, const std::string& typed) {
-  std::vector<Record> rows;
-  for (const std::filesystem::path& path : command.mechanisms) {
-    std::string text;
-    const int code = TextFromChild(
-        path.string(), command.limits, [&] { return CountHere(command, path); }, &text);
-    if (code != 0) return code;
-    std::istringstream lines(text);
-    for (std::string line; std::getline(lines, line);) rows.push_back(FromJsonLine(line));
+  constexpr std::size_t kMostOfFiles = 100'000, kMostOfFamilies = 1'000'000;
+  if (command.mechanisms.empty() && command.family.empty()) {
+    throw ConfigError("count: found neither mechanisms nor --family, expected one of them");
   }
-  const bool any =
-      std::ranges::any_of(rows, [](const Record& row) { return row.Find("flops") != nullptr; });
-  const bool all = std::ranges::all_of(
-      rows, [](const Record& row) { return row.Find("not_recorded") == nullptr; });
+  std::vector<Record> rows;
+  const auto add = [&](const std::string& name, const std::function<int()>& count) {
+    int code = 0;
+    const std::vector<Record> more = RowsOf(name, command.limits, count, &code);
+    rows.insert(rows.end(), more.begin(), more.end());
+    return code;
+  };
+  for (const std::filesystem::path& path : command.mechanisms) {
+    const int code = add(path.string(), [&] {
+      const MechanismFile file = ReadMechanism(path);
+      return CountHere(command, file.description, file.observe, kMostOfFiles);
+    });
+    if (code != 0) return code;
+  }
+  const std::size_t num_files = rows.size();
+  std::vector<std::string> crossovers;
+  if (!command.family.empty()) {
+    const SizedFamily& family = SizedFamilyOf(command.family);
+    RequireSizes(family, command.sizes);
+    for (const int size : command.sizes) {
+      const int code = add(fmt::format("{} {}", family.name, size), [&] {
+        MechanismDescription description = family.make(size);
+        description.name = family.name;
+        return CountHere(command, description, {}, kMostOfFamilies);
+      });
+      if (code != 0) return code;
+    }
+    AddGrowth(std::span(rows).subspan(num_files));
+    crossovers = Crossovers(std::span(rows).subspan(num_files));
+  }
+  const int code = std::ranges::any_of(rows, HasCounts) ? 0 : 2;
+  std::string text;
+  if (command.format == "jsonl") {
+    for (const Record& row : rows) text += ToJsonObject(row) + "\n";
+  }
   Table table = CountTable(std::move(rows));
+  table.notes.insert(table.notes.end(), crossovers.begin(), crossovers.end());
   const bool on_terminal = command.format == "text" && command.out.empty();
-  if (on_terminal && all) table.columns.pop_back();
-  if (!on_terminal) AppendProvenance(table, typed);
+  // columns of some rows only; files keep the reasons of missing counts
+  std::erase_if(table.columns, [&](const TableColumn& column) {
+    const bool is_optional = column.key == "exponent" || column.key == "flops_per_body" ||
+                             column.key == "correction" ||
+                             (column.key == "not_recorded" && on_terminal);
+    return is_optional && std::ranges::none_of(table.rows, [&](const Record& row) {
+             return row.Find(column.key) != nullptr;
+           });
+  });
   if (on_terminal) {
     PrintText(ToScreen(table));
-  } else if (command.out.empty()) {
-    PrintText(RenderKept(table, command.format));
+    return code;
+  }
+  AppendProvenance(table, typed);
+  if (text.empty()) text = RenderKept(table, command.format);
+  if (command.out.empty()) {
+    PrintText(text);
   } else {
-    WriteFileAtomically(command.out, RenderKept(table, command.format));
+    WriteFileAtomically(command.out, text);
     Print("wrote {}\n", command.out.string());
   }
-  return any ? 0 : 2;
+  return code;
 }
 
 }  // namespace loopbench::harness

@@ -11,6 +11,8 @@ namespace loopbench::harness {
 
 struct CountCommand {
   std::vector<std::filesystem::path> mechanisms;
+  std::string family;      ///< of mechanisms of any size (sized_family.h), beside the files
+  std::vector<int> sizes;  ///< members of the family
   /// Names to count; empty: every formulation, every recorded level, both coordinate sets.
   std::vector<std::string> formulations, levels, coordinates;
   std::vector<std::string> solvers = {"rank-revealing"};

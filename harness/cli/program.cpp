@@ -10,6 +10,7 @@
 #include <string_view>
 #include <vector>
 
+#include "harness/cli/commands_generate.h"
 #include "harness/cli/long_table.h"
 #include "harness/cli/program_baseline.h"
 #include "harness/cli/program_cluster.h"
@@ -44,6 +45,7 @@ Examples: (paths from the root of the repository)
   loopbench view configs/mechanisms/double-wishbone.json
   loopbench import arm.urdf --loops arm-loops.json --out arm.json
   loopbench count configs/mechanisms/four-bar.json
+  loopbench generate configs/mechanisms/four-bar.json --out four-bar-c
   loopbench simplify configs/experiments/models/hall.json --errors 2
   loopbench run big.json --shard 1/2 --out part1   (and 2/2 elsewhere)
   loopbench merge part1 part2 --out whole
@@ -112,6 +114,7 @@ int RunCommandLine(int argc, char** argv) {
   ReportCommandOptions report(app);
   ImportCommandOptions import(app);
   ConvertOptions convert(app);
+  GenerateOptions generate(app);
   CountOptions count(app);
   ComparisonOptions comparison(app);
   BaselineOptions baseline(app);
@@ -133,6 +136,7 @@ int RunCommandLine(int argc, char** argv) {
     if (const auto code = report.Run(typed)) return *code;
     if (const auto code = import.Run()) return *code;
     if (const auto code = convert.Run()) return *code;
+    if (const auto code = generate.Run()) return *code;
     if (const auto code = count.Run(typed)) return *code;
     if (const auto code = comparison.Run(typed)) return *code;
     if (const auto code = baseline.Run(typed)) return *code;

@@ -2,6 +2,7 @@
 
 #include "harness/cli/options.h"
 #include "harness/config/formulations.h"
+#include "harness/config/sized_family.h"
 #include "harness/text/numeric_option.h"
 
 namespace loopbench::harness {
@@ -15,6 +16,8 @@ docs/operation-counts.md explains the columns.
 Examples:
   loopbench count configs/mechanisms/four-bar.json
   loopbench count configs/mechanisms/*.json --level acceleration --format csv --out counts.csv
+  loopbench count --family chain --sizes $(seq -s, 3 40) --level acceleration --format jsonl --out chain.jsonl
+  loopbench plot chain.jsonl --out chain.svg --x bodies --y flops_per_body --group formulation,coordinates
   loopbench count my.json --formulation odca --coordinates joint --solver as-published --format json
 
 Exit codes: 0 done, 2 bad input or no right-hand side was recorded.)";
@@ -23,7 +26,15 @@ Exit codes: 0 done, 2 bad input or no right-hand side was recorded.)";
 
 CountOptions::CountOptions(CLI::App& app) {
   app_ = app.add_subcommand("count", "Count the operations of right-hand sides exactly");
-  app_->add_option("mechanisms", count_.mechanisms, "Mechanism files (JSON)")->required();
+  app_->add_option("mechanisms", count_.mechanisms, "Mechanism files (JSON)");
+  CLI::Option* family =
+      app_->add_option("--family", count_.family,
+                       "Family of mechanisms of any size; also prints how counts grow with size, "
+                       "and which method is cheapest at which size")
+          ->check(CLI::IsMember(NamesOfSizedFamilies()));
+  app_->add_option("--sizes", count_.sizes, "Sizes of the family's members: a,b")
+      ->delimiter(',')
+      ->needs(family);
   std::vector<std::string> formulations;
   for (const FormulationRow& row : Formulations()) {
     if (!row.is_peer()) formulations.push_back(row.name);
@@ -42,7 +53,7 @@ CountOptions::CountOptions(CLI::App& app) {
       ->check(CLI::IsMember({"as-published", "rank-revealing"}))
       ->capture_default_str();
   app_->add_option("--format", count_.format, "Format of the table")
-      ->check(CLI::IsMember({"text", "csv", "markdown", "json", "latex"}))
+      ->check(CLI::IsMember({"text", "csv", "markdown", "json", "latex", "jsonl"}))
       ->capture_default_str();
   app_->add_option("--out", count_.out, "File (default: the terminal)");
   AddWide(app_);

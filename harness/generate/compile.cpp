@@ -14,6 +14,7 @@
 #include <sstream>
 #include <vector>
 
+#include "harness/generate/pose_sines.h"
 #include "harness/generate/record.h"
 #include "harness/text/files.h"
 #include "harness/text/hash.h"
@@ -35,7 +36,8 @@ std::vector<std::string> Compiler() {
   return {std::istream_iterator<std::string>(words), {}};
 }
 
-/// Output of the compiler. Throws NotCovered.
+}  // namespace
+
 std::string RunCompiler(const std::vector<std::string>& arguments) {
   std::vector<std::string> words = {"timeout", std::to_string(kCompilerSeconds)};
   const std::vector<std::string> compiler = Compiler();
@@ -53,6 +55,8 @@ std::string RunCompiler(const std::vector<std::string>& arguments) {
   if (!failure.empty()) throw NotCovered("C compiler: " + failure);
   return result.output;
 }
+
+namespace {
 
 /// Whether others could have written the file or folder.
 void RequireOwn(const fs::path& path, mode_t kind) {
@@ -92,20 +96,22 @@ std::optional<fs::path> CacheFolder() {
 CompiledBranch Load(const fs::path& library) {
   void* handle = ::dlopen(library.c_str(), RTLD_NOW | RTLD_LOCAL);
   if (handle == nullptr) throw NotCovered(fmt::format("generated code: {}", ::dlerror()));
-  void* function = ::dlsym(handle, "loopbench_derivative");
+  void* function = ::dlsym(handle, "loopbench_function");
+  void* use_sines = ::dlsym(handle, "loopbench_use_sines");
   const void* room = ::dlsym(handle, "loopbench_room");
-  if (function == nullptr || room == nullptr) {
-    throw NotCovered(library.string() + ": found no loopbench_derivative, expected generated code");
+  if (function == nullptr || use_sines == nullptr || room == nullptr) {
+    throw NotCovered(library.string() + ": found no loopbench_function, expected generated code");
   }
+  reinterpret_cast<void (*)(void (*)(double, double*, double*))>(use_sines)(&PoseSines);
   CompiledBranch branch;
-  branch.derivative = reinterpret_cast<decltype(branch.derivative)>(function);
+  branch.function = reinterpret_cast<decltype(branch.function)>(function);
   branch.room = *static_cast<const int*>(room);
   return branch;
 }
 
 /// Compiles `text` to `library`.
 void Compile(const std::string& text, const fs::path& folder, const fs::path& library) {
-  const fs::path source = folder / "derivative.c";
+  const fs::path source = folder / "function.c";
   harness::WriteFileAtomically(source, text);
   std::vector<std::string> arguments(std::begin(kCompilerFlags), std::end(kCompilerFlags));
   for (const std::string& word :
@@ -135,7 +141,7 @@ CompiledBranch CompileOrFind(const std::string& text, const std::string& name,
     }
   }
   const TemporaryFolder folder("loopbench-generated");
-  const fs::path library = folder.path() / "derivative.so";
+  const fs::path library = folder.path() / "function.so";
   Compile(text, folder.path(), library);
   if (cache) {
     // renamed when complete, so that a concurrent process never reads a part of it

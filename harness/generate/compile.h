@@ -7,6 +7,7 @@
 #pragma once
 
 #include <string>
+#include <vector>
 
 namespace loopbench::generate {
 
@@ -20,10 +21,13 @@ inline constexpr const char* kCompilerFlags[] = {
 #endif
 };
 
+/// Output of the compiler with these arguments. Throws NotCovered (record.h) if there is no
+/// compiler or if it fails.
+std::string RunCompiler(const std::vector<std::string>& arguments);
+
 /// The function that a text defines (print_c.h); it stays loaded until the process ends.
 struct CompiledBranch {
-  using Sines = void (*)(double, double*, double*);
-  int (*derivative)(const double* x, double* y, double* w, Sines sines) = nullptr;
+  int (*function)(const double* x, double* y, double* w) = nullptr;
   int room = 0;  ///< numbers that w has room for
 };
 

@@ -5,7 +5,6 @@
 #include <algorithm>
 #include <chrono>
 
-#include "harness/generate/pose_sines.h"
 #include "harness/generate/print_c.h"
 
 namespace loopbench::generate {
@@ -19,7 +18,7 @@ constexpr std::size_t kMostBranches = 8;
 // 24 000 operations take a compiler 3.5 s; factorisations that iterate have hundreds of thousands
 constexpr std::int64_t kMostOperations = 50'000;
 
-void RequireShort(const RecordedDerivative& recorded) {
+void RequireShort(const RecordedFunction& recorded) {
   const std::vector<bool> live = recorded.graph.Live(recorded.outputs, true);
   const std::int64_t operations = std::ranges::count(live, true);
   if (operations <= kMostOperations) return;
@@ -56,15 +55,15 @@ void GeneratedDerivative<Space>::NoteStart() {
 template <class Space>
 void GeneratedDerivative<Space>::AddBranch(double t, std::span<const double> y) {
   const auto begin = std::chrono::steady_clock::now();
-  const RecordedDerivative recorded =
-      RecordDerivative(subject_, start_, t, std::vector<double>(y.begin(), y.end()));
+  const RecordedFunction recorded =
+      RecordFunction(subject_, start_, t, std::vector<double>(y.begin(), y.end()));
   for (int i = 0; i < system_.num_state_speeds(); ++i) {
     if (system_.state_speed(i) != recorded.carried_speeds[static_cast<std::size_t>(i)]) {
       throw NotCovered("the state carries other speeds in the recorded text than in double");
     }
   }
   RequireShort(recorded);
-  branches_.insert(branches_.begin(), CompileBranch(PrintC(recorded)));
+  branches_.insert(branches_.begin(), CompileBranch(PrintLibrary(recorded)));
   const auto room = static_cast<std::size_t>(branches_.front().room);
   room_.resize(std::max(room_.size(), room));
   seconds_ += std::chrono::duration<double>(std::chrono::steady_clock::now() - begin).count();
@@ -79,7 +78,7 @@ void GeneratedDerivative<Space>::ModeChanged() {
 
 template <class Space>
 bool GeneratedDerivative<Space>::Call(const CompiledBranch& branch, std::span<double> ydot) {
-  return branch.derivative(x_.data(), ydot.data(), room_.data(), &PoseSines) != 0;
+  return branch.function(x_.data(), ydot.data(), room_.data()) != 0;
 }
 
 template <class Space>

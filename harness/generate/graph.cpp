@@ -51,6 +51,16 @@ void OperationCounts::Add(Operation operation) {
   }
 }
 
+OperationCounts& OperationCounts::operator+=(const OperationCounts& more) {
+  additions += more.additions;
+  multiplications += more.multiplications;
+  divisions += more.divisions;
+  roots += more.roots;
+  sines += more.sines;
+  other += more.other;
+  return *this;
+}
+
 double Value(Operation operation, double a, double b) {
   double sine, cosine;
   switch (operation) {
@@ -211,7 +221,7 @@ OperationCounts Graph::Count(const std::vector<bool>& live) const {
   return counts;
 }
 
-int Graph::Depth(const std::vector<bool>& live) const {
+int Graph::Depth(const std::vector<bool>& live, const std::vector<bool>& given) const {
   std::vector<int> depth(nodes_.size());
   int deepest = 0;
   for (std::size_t node = 0; node < nodes_.size(); ++node) {
@@ -219,10 +229,44 @@ int Graph::Depth(const std::vector<bool>& live) const {
     // a cosine waits for the angle, not for the sine beside it
     const int before =
         std::max(a >= 0 ? depth[a] : 0, b >= 0 && operation != Operation::kPoseCos ? depth[b] : 0);
-    depth[node] = before + (Counts(operation) ? 1 : 0);
+    const bool is_given = node < given.size() && given[node];
+    depth[node] = is_given ? 0 : before + (Counts(operation) ? 1 : 0);
     if (live[node]) deepest = std::max(deepest, depth[node]);
   }
   return deepest;
+}
+
+void Graph::ForgetZeroTests() {
+  std::erase_if(comparisons_, [this](const Comparison& comparison) {
+    return comparison.relation == Relation::kEqual && !comparison.outcome &&
+           (Is(comparison.a, 0.0) || Is(comparison.b, 0.0));
+  });
+}
+
+std::vector<double> Graph::Values(const std::vector<double>& inputs) const {
+  std::vector<double> values(nodes_.size());
+  std::size_t input = 0;
+  for (std::size_t node = 0; node < nodes_.size(); ++node) {
+    const auto& [operation, a, b, value] = nodes_[node];
+    if (operation == Operation::kInput) {
+      values[node] = inputs[input++];
+    } else if (operation == Operation::kConstant) {
+      values[node] = value;
+    } else {
+      values[node] = Value(operation, values[a], b >= 0 ? values[b] : 0.0);
+    }
+  }
+  return values;
+}
+
+bool Graph::Holds(const std::vector<double>& values) const {
+  return std::ranges::all_of(comparisons_, [&](const Comparison& comparison) {
+    const double a = values[comparison.a], b = values[comparison.b];
+    const bool outcome = comparison.relation == Relation::kLess        ? a < b
+                         : comparison.relation == Relation::kLessEqual ? a <= b
+                                                                       : a == b;
+    return outcome == comparison.outcome;
+  });
 }
 
 }  // namespace loopbench::generate

@@ -73,6 +73,7 @@ struct OperationCounts {
   std::int64_t flops() const {
     return additions + multiplications + 4 * (divisions + roots) + 8 * (sines + other);
   }
+  OperationCounts& operator+=(const OperationCounts& more);
   friend bool operator==(const OperationCounts&, const OperationCounts&) = default;
 };
 
@@ -95,8 +96,17 @@ class Graph {
   /// Nodes on which the outputs depend, or with `compared` the outputs and all comparisons.
   std::vector<bool> Live(const std::vector<int>& outputs, bool compared) const;
   OperationCounts Count(const std::vector<bool>& live) const;
-  /// Operations on the longest path to one of the nodes.
-  int Depth(const std::vector<bool>& live) const;
+  /// Operations on the longest path to one of the nodes, from inputs or `given` nodes on.
+  int Depth(const std::vector<bool>& live, const std::vector<bool>& given = {}) const;
+
+  /// Forgets tests for exactly zero that found another number. Texts skip work or a division there:
+  /// without the test the result is the same but for rounding, or not finite.
+  void ForgetZeroTests();
+
+  /// Numbers of all nodes for these inputs, by the arithmetic of Value().
+  std::vector<double> Values(const std::vector<double>& inputs) const;
+  /// Whether all comparisons of these numbers come out as they were recorded.
+  bool Holds(const std::vector<double>& values) const;
 
   /// Operations that the recorded text executed, before any simplification.
   OperationCounts as_run;

@@ -8,15 +8,14 @@
 
 namespace loopbench::generate {
 
+const char* const kPrintedHelpers =
+    R"(static inline double least(double a, double b) { return b < a ? b : a; }
+static inline double most(double a, double b) { return a < b ? b : a; }
+)";
+
 namespace {
 
 constexpr int kOperationsOfFunction = 500;
-
-constexpr const char* kHead = R"(#include <math.h>
-typedef void (*loopbench_sines)(double, double*, double*);
-static double least(double a, double b) { return b < a ? b : a; }
-static double most(double a, double b) { return a < b ? b : a; }
-)";
 
 std::string Literal(double value) {
   if (std::isnan(value)) return "NAN";
@@ -64,8 +63,11 @@ const char* FunctionName(Operation operation) {
 
 class Printer {
  public:
-  explicit Printer(const RecordedDerivative& recorded)
-      : graph_(recorded.graph), outputs_(recorded.outputs), function_(graph_.nodes().size(), 0) {
+  Printer(const RecordedFunction& recorded, const std::string& name)
+      : graph_(recorded.graph),
+        outputs_(recorded.outputs),
+        name_(name),
+        function_(graph_.nodes().size(), 0) {
     live_ = graph_.Live(outputs_, true);
     results_.resize(graph_.nodes().size());
     tests_.resize(graph_.nodes().size());
@@ -77,9 +79,10 @@ class Printer {
     AssignRoom();
   }
 
+  int room() const { return num_room_; }
+
   std::string Text() {
     int input = 0;
-    text_ = kHead;
     for (int function = 0, node = 0; function < num_functions_; ++function) {
       Open(function);
       for (; node < std::ssize(graph_.nodes()) && function_[node] == function; ++node) {
@@ -87,13 +90,11 @@ class Printer {
       }
       text_ += "  return ok;\n}\n";
     }
-    fmt::format_to(std::back_inserter(text_), "const int loopbench_room = {};\n", num_room_);
-    text_ +=
-        "int loopbench_derivative(const double* x, double* y, double* w, loopbench_sines "
-        "sines) {\n  return ";
+    fmt::format_to(std::back_inserter(text_),
+                   "static int {}(const double* x, double* y, double* w) {{\n  return ", name_);
     for (int function = 0; function < num_functions_; ++function) {
-      fmt::format_to(std::back_inserter(text_), "{}part{}(x, y, w, sines)",
-                     function > 0 ? " &&\n         " : "", function);
+      fmt::format_to(std::back_inserter(text_), "{}{}_part{}(x, y, w)",
+                     function > 0 ? " &&\n         " : "", name_, function);
     }
     text_ += ";\n}\n";
     return std::move(text_);
@@ -134,9 +135,9 @@ class Printer {
 
   void Open(int function) {
     fmt::format_to(std::back_inserter(text_),
-                   "static int part{}(const double* x, double* y, double* w, loopbench_sines "
-                   "sines) {{\n  int ok = 1;\n  (void)x, (void)y, (void)w, (void)sines;\n",
-                   function);
+                   "static int {}_part{}(const double* x, double* y, double* w) {{\n"
+                   "  int ok = 1;\n  (void)x, (void)y, (void)w;\n",
+                   name_, function);
   }
 
   /// How a node is called in a function.
@@ -197,6 +198,7 @@ class Printer {
 
   const Graph& graph_;
   const std::vector<int>& outputs_;
+  const std::string name_;
   std::vector<bool> live_;
   std::vector<std::vector<std::size_t>> results_;      ///< indices of outputs, by node
   std::vector<std::vector<const Comparison*>> tests_;  ///< by their later node
@@ -207,6 +209,22 @@ class Printer {
 
 }  // namespace
 
-std::string PrintC(const RecordedDerivative& recorded) { return Printer(recorded).Text(); }
+std::string PrintFunction(const RecordedFunction& recorded, const std::string& name, int* room) {
+  Printer printer(recorded, name);
+  *room = printer.room();
+  return printer.Text();
+}
+
+std::string PrintLibrary(const RecordedFunction& recorded) {
+  int room = 0;
+  const std::string function = PrintFunction(recorded, "function", &room);
+  return fmt::format(R"(#include <math.h>
+static void (*sines)(double, double*, double*);
+void loopbench_use_sines(void (*of_pose)(double, double*, double*)) {{ sines = of_pose; }}
+{}{}const int loopbench_room = {};
+int loopbench_function(const double* x, double* y, double* w) {{ return function(x, y, w); }}
+)",
+                     kPrintedHelpers, function, room);
+}
 
 }  // namespace loopbench::generate

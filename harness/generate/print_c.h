@@ -8,14 +8,24 @@
 
 namespace loopbench::generate {
 
-/// Names of what the text defines:
+/// Functions that printed text calls; to be printed once before it.
+extern const char* const kPrintedHelpers;
+
+/// A static function
 ///
-///   int loopbench_derivative(const double* x, double* y, double* w, loopbench_sines sines)
+///   int NAME(const double* x, double* y, double* w)
+///
+/// x holds the inputs, y receives the outputs, and w has room for *room numbers. It returns 0 if a
+/// comparison comes out otherwise than it was recorded; y is unspecified then. It calls
+/// `sines(angle, &sine, &cosine)` for the angle of a planar pose, which must be defined before.
+/// The text depends on the graph alone.
+std::string PrintFunction(const RecordedFunction& recorded, const std::string& name, int* room);
+
+/// PrintFunction() as a translation unit for CompileBranch() (compile.h), which defines
+///
+///   void loopbench_use_sines(void (*sines)(double, double*, double*))   to be called first
+///   int loopbench_function(const double* x, double* y, double* w)
 ///   const int loopbench_room
-///
-/// x is time and state, y receives dy/dt, w has room for loopbench_room numbers, and `sines`
-/// computes sine and cosine of the angle of a planar pose. Returns 0 if a comparison comes out
-/// otherwise than it was recorded; y is unspecified then. The text depends on the graph alone.
-std::string PrintC(const RecordedDerivative& recorded);
+std::string PrintLibrary(const RecordedFunction& recorded);
 
 }  // namespace loopbench::generate

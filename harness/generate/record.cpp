@@ -30,52 +30,179 @@ std::unique_ptr<System<Space, Recorded>> MakeRecorded(const std::string& formula
 
 VectorX<Recorded> Constants(const Eigen::VectorXd& numbers) { return numbers.cast<Recorded>(); }
 
-/// Different numbers between -1e-6 and 1e-6, none of them zero: multiples of the golden ratio.
-double ShiftOf(std::size_t i) {
-  const double multiple = 0.6180339887498949 * static_cast<double>(i + 1);
-  return 2e-6 * (multiple - std::floor(multiple)) - 1e-6;
+/// The node of a number in the graph of the current recording.
+int NodeOf(const Recorded& x, Graph& graph) {
+  return x.node >= 0 ? x.node : graph.Constant(x.number);
 }
 
-/// One recording; `casts` as recorded.h has it.
 template <class Space>
-RecordedDerivative RecordOnce(const RecordingSubject& subject, const RecordingStart& start,
-                              double t, const std::vector<double>* state, CastsAs casts) {
-  FormulationOptions options = subject.options;
-  options.general = true;
-  options.beside = nullptr;
-  const Mechanism<Space, Recorded> mechanism(subject.description, subject.coordinates);
-  const auto system = MakeRecorded(subject.formulation, mechanism, options);
-  const VectorX<Recorded> q = Constants(start.q), u = Constants(start.u);
-  if (system->Start(start.t, q, u) != Outcome::kFinished) throw NotCovered("it does not start");
-  system->IntegrateWork(subject.with_work);
-  std::vector<Recorded> y(static_cast<std::size_t>(system->size()), Recorded(0.0));
-  system->ToState(q, u, y);
-  RecordedDerivative recorded;
-  if (state != nullptr && state->size() != y.size()) {
-    throw NotCovered("the state carries other speeds in the recorded text than in double");
+class Recorder {
+ public:
+  Recorder(const RecordingSubject& subject, const RecordingStart& start)
+      : subject_(subject), mechanism_(subject.description, subject.coordinates) {
+    FormulationOptions options = subject.options;
+    options.general = true;
+    options.beside = nullptr;
+    system_ = MakeRecorded(subject.formulation, mechanism_, options);
+    q_ = Constants(start.q);
+    u_ = Constants(start.u);
+    if (system_->Start(start.t, q_, u_) != Outcome::kFinished)
+      throw NotCovered("it does not start");
+    system_->IntegrateWork(subject.with_work);
   }
-  for (int i = 0; i < system->num_state_speeds(); ++i) {
-    recorded.carried_speeds.push_back(system->state_speed(i));
+
+  /// At time t and `state`, or for null next to the start; `casts` as recorded.h has it.
+  RecordedFunction Record(double t, const std::vector<double>* state, CastsAs casts) {
+    std::vector<Recorded> y(static_cast<std::size_t>(system_->size()), Recorded(0.0));
+    system_->ToState(q_, u_, y);
+    if (state != nullptr && state->size() != y.size()) {
+      throw NotCovered("the state carries other speeds in the recorded text than in double");
+    }
+    RecordedFunction recorded;
+    for (int i = 0; i < system_->num_state_speeds(); ++i) {
+      recorded.carried_speeds.push_back(system_->state_speed(i));
+    }
+    Graph& graph = recorded.graph;
+    const Recording recording(graph, casts, subject_.most_nodes);
+    const Recorded time = Recorded::Input(state != nullptr ? t : t + ShiftOf(y.size()));
+    recorded.inputs.push_back(time.node);
+    for (std::size_t i = 0; i < y.size(); ++i) {
+      y[i] = Recorded::Input(state != nullptr ? (*state)[i] : y[i].number + ShiftOf(i));
+      recorded.inputs.push_back(y[i].node);
+    }
+    for (const Recorded& value : Values(time, y)) {
+      recorded.outputs.push_back(NodeOf(value, graph));
+      recorded.numbers.push_back(value.number);
+    }
+    if (subject_.quantity == Quantity::kDerivative) AddStages(recorded);
+    return recorded;
   }
-  const Recording recording(recorded.graph, casts);
-  const Recorded time = Recorded::Input(state != nullptr ? t : t + ShiftOf(y.size()));
-  for (std::size_t i = 0; i < y.size(); ++i) {
-    y[i] = Recorded::Input(state != nullptr ? (*state)[i] : y[i].number + ShiftOf(i));
+
+ private:
+  std::vector<Recorded> Values(const Recorded& t, std::vector<Recorded>& y) {
+    std::vector<Recorded> values;
+    if (subject_.quantity == Quantity::kDerivative) {
+      values.assign(y.size(), Recorded(0.0));
+      Require(system_->Examine(t, y, values));
+      return values;
+    }
+    Require(system_->FromState(t, y));
+    const Kinematics<Space, Recorded>& kinematics = system_->kinematics();
+    switch (subject_.quantity) {
+      case Quantity::kDerivative:
+        break;
+      case Quantity::kEnergy: {
+        const Energy<Recorded> energy = ComputeEnergy(kinematics);
+        return {energy.kinetic, energy.potential};
+      }
+      case Quantity::kPoses:
+        for (int body = 1; body < mechanism_.num_bodies(); ++body) {
+          const Pose<Space, Recorded>& pose = kinematics.poses()[body];
+          values.insert(values.end(), std::begin(pose.p.at), std::end(pose.p.at));
+          if constexpr (Space::kRot == 1) {
+            values.insert(values.end(), {pose.R(0, 0), pose.R(1, 0)});
+          } else {
+            for (int i = 0; i < 9; ++i) values.push_back(pose.R(i / 3, i % 3));
+          }
+        }
+        break;
+      case Quantity::kViolation: {
+        VectorX<Recorded> violation = PositionRows(kinematics);
+        values.assign(violation.begin(), violation.end());
+        SpeedViolation(kinematics, violation);
+        values.insert(values.end(), violation.begin(), violation.end());
+        break;
+      }
+      case Quantity::kCorrection:
+        Correct();
+        values.assign(y.size(), Recorded(0.0));
+        system_->ToState(state_->q(), state_->u(), values);
+        break;
+    }
+    return values;
   }
-  std::vector<Recorded> ydot(y.size(), Recorded(0.0));
-  const Outcome outcome = system->Examine(time, y, ydot);
-  if (outcome != Outcome::kFinished) {
+
+  /// PositionViolation() without the largest parts, whose comparisons are branches.
+  VectorX<Recorded> PositionRows(const Kinematics<Space, Recorded>& kinematics) const {
+    VectorX<Recorded> rows(mechanism_.num_rows());
+    for (const int index : mechanism_.constraints()) {
+      const auto& joint = kinematics.joints()[index];
+      rows.segment(mechanism_.joints()[index].row, joint.rows()) =
+          joint.Along(kinematics.ConstraintMismatch(index), joint.rows()).head(joint.rows());
+    }
+    return rows;
+  }
+
+  /// One Newton step of level position (level_position.cpp) from the system's state.
+  void Correct() {
+    state_.emplace(mechanism_, system_->solver());
+    state_->kinematics().SetTime(system_->kinematics().time());
+    state_->SetPositions(system_->q());
+    state_->SetSpeeds(system_->u());
+    VectorX<Recorded> violation = PositionRows(state_->kinematics());
+    VectorX<Recorded> change = VectorX<Recorded>::Zero(mechanism_.num_u());
+    VectorX<Recorded> q = system_->q(), step = q;
+    const VectorX<Recorded> u = system_->u();
+    if (violation.size() == 0 || change.size() == 0) return;
+    Require(state_->Correct(violation, change));
+    mechanism_.Rates(q, change, step);
+    q += step;
+    mechanism_.Normalise(q);
+    state_->SetPositions(q);
+    state_->SetSpeeds(u);
+    SpeedViolation(state_->kinematics(), violation);
+    Require(state_->Correct(violation, change));
+    state_->SetSpeeds(u + change);
+  }
+
+  static void Require(Outcome outcome) {
+    if (outcome == Outcome::kFinished) return;
     throw NotCovered(
         fmt::format("the right-hand side ends as {} where it is recorded", ToString(outcome)));
   }
-  for (const Recorded& rate : ydot) {
-    recorded.outputs.push_back(rate.node >= 0 ? rate.node : recorded.graph.Constant(rate.number));
-    recorded.numbers.push_back(rate.number);
-  }
-  return recorded;
-}
 
-bool SameGraph(const RecordedDerivative& a, const RecordedDerivative& b) {
+  /// What is computed again here is there already: no node is added that dy/dt depends on.
+  void AddStages(RecordedFunction& recorded) const {
+    Graph& graph = recorded.graph;
+    const OperationCounts as_run = graph.as_run;
+    const auto add = [&graph](const auto& small, std::vector<int>& nodes) {
+      for (const Recorded& number : small.at) nodes.push_back(NodeOf(number, graph));
+    };
+    const auto add_both = [&](const auto& vector, std::vector<int>& nodes) {
+      add(vector.angular, nodes);
+      add(vector.linear, nodes);
+    };
+    const Kinematics<Space, Recorded>& kinematics = system_->kinematics();
+    Stages& stages = recorded.stages;
+    for (const Recorded& speed : kinematics.u()) stages.speeds.push_back(NodeOf(speed, graph));
+    for (const auto& pose : kinematics.poses()) {
+      add(pose.R, stages.positions);
+      add(pose.p, stages.positions);
+    }
+    for (const auto& motion : kinematics.motions()) add_both(motion, stages.motions);
+    for (const auto& joint : kinematics.joints()) {
+      add(joint.r_P, stages.positions);
+      add(joint.r_Q, stages.positions);
+      for (const auto& direction : joint.basis) add_both(direction, stages.positions);
+      add_both(joint.V_rel, stages.motions);
+      add_both(joint.g, stages.motions);
+    }
+    std::vector<Wrench<Space, Recorded>> wrenches(kinematics.poses().size());
+    ForcesBesideGravity(kinematics, std::span(wrenches));
+    for (const auto& wrench : wrenches) add_both(wrench, stages.forces);
+    AppliedForces(kinematics, std::span(wrenches));
+    for (const auto& wrench : wrenches) add_both(wrench, stages.forces);
+    graph.as_run = as_run;
+  }
+
+  const RecordingSubject& subject_;
+  Mechanism<Space, Recorded> mechanism_;
+  std::unique_ptr<System<Space, Recorded>> system_;
+  std::optional<FactoredState<Space, Recorded>> state_;
+  VectorX<Recorded> q_, u_;
+};
+
+bool SameGraph(const RecordedFunction& a, const RecordedFunction& b) {
   const auto same = [](const Node& x, const Node& y) {
     return x.operation == y.operation && x.a == y.a && x.b == y.b &&
            std::bit_cast<std::uint64_t>(x.value) == std::bit_cast<std::uint64_t>(y.value);
@@ -85,9 +212,9 @@ bool SameGraph(const RecordedDerivative& a, const RecordedDerivative& b) {
 }
 
 /// Comparisons behind casts are not recorded: casts to other numbers must lead to the same graph.
-void RequireNoCastDecides(const RecordedDerivative& recorded, auto record_with) {
+void RequireNoCastDecides(const RecordedFunction& recorded, auto record_with) {
   for (const CastsAs casts : {CastsAs::kInfinity, CastsAs::kMinusInfinity}) {
-    std::optional<RecordedDerivative> other;
+    std::optional<RecordedFunction> other;
     try {
       other = record_with(casts);
     } catch (const std::exception&) {
@@ -99,7 +226,7 @@ void RequireNoCastDecides(const RecordedDerivative& recorded, auto record_with) 
 }
 
 /// A graph does not contain the last accepted step, from which angles in space are counted.
-void RequireNoTurns(const RecordedDerivative& recorded, SpaceKind space) {
+void RequireNoTurns(const RecordedFunction& recorded, SpaceKind space) {
   if (space == SpaceKind::kPlanar) return;
   const std::vector<bool> live = recorded.graph.Live(recorded.outputs, true);
   for (std::size_t node = 0; node < live.size(); ++node) {
@@ -111,22 +238,21 @@ void RequireNoTurns(const RecordedDerivative& recorded, SpaceKind space) {
 
 void RequireCovered(const RecordingSubject& subject) {
   const Enforcement level = subject.options.enforcement;
-  if (!IsBuiltIn(level) || level == Enforcement::kPosition) {
-    throw NotCovered(
-        fmt::format("level \"{}\" is not recorded, only acceleration, velocity and baumgarte",
-                    ToString(level)));
+  if (!IsBuiltIn(level)) {
+    throw NotCovered(fmt::format(
+        "level \"{}\" is compiled for double alone: no operations are recorded", ToString(level)));
   }
 }
 
-RecordedDerivative RecordAt(const RecordingSubject& subject, const RecordingStart& start, double t,
-                            const std::vector<double>* state) {
+RecordedFunction RecordAt(const RecordingSubject& subject, const RecordingStart& start, double t,
+                          const std::vector<double>* state) {
   RequireCovered(subject);
   const SpaceKind space = subject.description.space;
   const auto record = [&](CastsAs casts) {
-    return space == SpaceKind::kPlanar ? RecordOnce<Planar>(subject, start, t, state, casts)
-                                       : RecordOnce<Spatial>(subject, start, t, state, casts);
+    return space == SpaceKind::kPlanar ? Recorder<Planar>(subject, start).Record(t, state, casts)
+                                       : Recorder<Spatial>(subject, start).Record(t, state, casts);
   };
-  RecordedDerivative recorded = record(CastsAs::kNumber);
+  RecordedFunction recorded = record(CastsAs::kNumber);
   RequireNoCastDecides(recorded, record);
   RequireNoTurns(recorded, space);
   return recorded;
@@ -134,23 +260,50 @@ RecordedDerivative RecordAt(const RecordingSubject& subject, const RecordingStar
 
 }  // namespace
 
-RecordedDerivative RecordDerivative(const RecordingSubject& subject, const RecordingStart& start,
-                                    double t, const std::vector<double>& state) {
+/// Different numbers between -1e-6 and 1e-6, none of them zero: multiples of the golden ratio.
+double ShiftOf(std::size_t i) {
+  const double multiple = 0.6180339887498949 * static_cast<double>(i + 1);
+  return 2e-6 * (multiple - std::floor(multiple)) - 1e-6;
+}
+
+RecordedFunction RecordFunction(const RecordingSubject& subject, const RecordingStart& start,
+                                double t, const std::vector<double>& state) {
   return RecordAt(subject, start, t, &state);
 }
 
-RecordedDerivative RecordDerivative(const RecordingSubject& subject, const RecordingStart& start) {
+RecordedFunction RecordFunction(const RecordingSubject& subject, const RecordingStart& start) {
   return RecordAt(subject, start, start.t, nullptr);
 }
 
-MethodCounts CountsOf(const RecordedDerivative& recorded) {
+MethodCounts CountsOf(const RecordedFunction& recorded) {
   const Graph& graph = recorded.graph;
   const std::vector<bool> live = graph.Live(recorded.outputs, false);
-  return {.as_run = graph.as_run,
-          .result = graph.Count(live),
-          .compared = graph.Count(graph.Live(recorded.outputs, true)),
-          .comparisons = std::ssize(graph.comparisons()),
-          .depth = graph.Depth(live)};
+  std::vector<bool> before(live.size(), false);
+  MethodCounts counts;
+  counts.as_run = graph.as_run;
+  counts.result = graph.Count(live);
+  counts.compared = graph.Count(graph.Live(recorded.outputs, true));
+  counts.comparisons = std::ssize(graph.comparisons());
+  counts.depth = graph.Depth(live);
+  // operations of one stage that dy/dt depends on and no earlier stage has
+  const auto own = [&](const std::vector<int>& nodes) {
+    std::vector<bool> stage = graph.Live(nodes, false);
+    for (std::size_t i = 0; i < stage.size(); ++i) {
+      stage[i] = stage[i] && live[i] && !before[i];
+      before[i] = before[i] || stage[i];
+    }
+    return stage;
+  };
+  const auto& [positions, speeds, motions, forces] = recorded.stages;
+  counts.kinematics = graph.Count(own(positions));
+  counts.solve = graph.Count(own(speeds));
+  counts.kinematics += graph.Count(own(motions));
+  counts.forces = graph.Count(own(forces));
+  std::vector<bool> rest(live.size());
+  for (std::size_t i = 0; i < live.size(); ++i) rest[i] = live[i] && !before[i];
+  counts.solve += graph.Count(rest);
+  counts.solve_depth = graph.Depth(rest, before);
+  return counts;
 }
 
 }  // namespace loopbench::generate

@@ -18,13 +18,28 @@ class NotCovered : public std::runtime_error {
   using std::runtime_error::runtime_error;
 };
 
-/// A right-hand side. `options.general` is always taken as set.
+/// Results that can be recorded, in the order of a recording's outputs.
+enum class Quantity {
+  kDerivative,  ///< dy/dt
+  kEnergy,      ///< kinetic and potential energy [J]
+  /// Of each body but Ground, of its centre of mass in ground axes: in the plane x, y [m], cosine
+  /// and sine of its angle; in space x, y, z [m] and the rotation matrix by rows.
+  kPoses,
+  kViolation,   ///< of each constraint row: of positions [m, rad], then of speeds [m/s, rad/s]
+  kCorrection,  ///< the state after one Newton step toward the constraints, positions then speeds
+};
+
+/// A formulation of a mechanism. `options.general` is always taken as set.
 struct RecordingSubject {
   const MechanismDescription& description;
   Coordinates coordinates = Coordinates::kJoint;
   std::string formulation = "odca";
   FormulationOptions options = {};
   bool with_work = false;  ///< System::IntegrateWork()
+  Quantity quantity = Quantity::kDerivative;
+  /// Longest recording, in nodes. Equations of shipped mechanisms have some ten thousand,
+  /// factorisations that iterate more.
+  std::size_t most_nodes = 100'000;
 };
 
 /// Time [s], positions and all speeds at which a system starts and chooses its mode.
@@ -33,23 +48,35 @@ struct RecordingStart {
   Eigen::VectorXd q, u;
 };
 
-/// Inputs of the graph: time, then the state.
-struct RecordedDerivative {
-  Graph graph;
-  std::vector<int> outputs;         ///< nodes of dy/dt
-  std::vector<double> numbers;      ///< dy/dt where it was recorded
-  std::vector<int> carried_speeds;  ///< of the state, indices into u
+/// Nodes of intermediate results on the way to dy/dt. A stage depends on earlier ones.
+struct Stages {
+  std::vector<int> positions;  ///< poses of bodies, joint points and directions
+  std::vector<int> speeds;     ///< all speeds, which a level may compute from the state's
+  std::vector<int> motions;    ///< velocities, and accelerations without udot
+  std::vector<int> forces;     ///< applied forces
 };
 
-/// Records dy/dt at time t and `state`: positions, then speeds, and works where these are wanted.
-/// Throws NotCovered.
-RecordedDerivative RecordDerivative(const RecordingSubject& subject, const RecordingStart& start,
-                                    double t, const std::vector<double>& state);
+/// Inputs of the graph: time, then the state.
+struct RecordedFunction {
+  Graph graph;
+  std::vector<int> inputs, outputs;  ///< nodes
+  std::vector<double> numbers;       ///< the outputs where they were recorded
+  std::vector<int> carried_speeds;   ///< of the state, indices into u
+  Stages stages;                     ///< of dy/dt alone
+};
+
+/// Records the subject's quantity at time t and `state`: positions, then speeds, and works where
+/// these are wanted. Throws NotCovered.
+RecordedFunction RecordFunction(const RecordingSubject& subject, const RecordingStart& start,
+                                double t, const std::vector<double>& state);
 
 /// Records next to the start: fixed amounts of up to 1e-6 are added to the time and the state. At
 /// the start itself numbers may be zero or equal by chance, and rounding would decide which
 /// operations follow.
-RecordedDerivative RecordDerivative(const RecordingSubject& subject, const RecordingStart& start);
+RecordedFunction RecordFunction(const RecordingSubject& subject, const RecordingStart& start);
+
+/// The amount that is added to number i of (state, time).
+double ShiftOf(std::size_t i);
 
 /// Exact counts of a right-hand side.
 struct MethodCounts {
@@ -57,10 +84,13 @@ struct MethodCounts {
   OperationCounts result;    ///< what is left for dy/dt alone after simplification
   OperationCounts compared;  ///< including the operations for comparisons
   std::int64_t comparisons = 0;
-  int depth = 0;  ///< operations on the longest path to dy/dt
+  /// Parts of `result`: poses and motions; applied forces; equations of motion and constraints.
+  OperationCounts kinematics, forces, solve;
+  int depth = 0;        ///< operations on the longest path to dy/dt
+  int solve_depth = 0;  ///< the same behind kinematics and forces
 
   friend bool operator==(const MethodCounts&, const MethodCounts&) = default;
 };
-MethodCounts CountsOf(const RecordedDerivative& recorded);
+MethodCounts CountsOf(const RecordedFunction& recorded);
 
 }  // namespace loopbench::generate

@@ -11,15 +11,13 @@ namespace {
 
 thread_local Graph* current = nullptr;
 thread_local CastsAs casts_as = CastsAs::kNumber;
-
-/// Equations of shipped mechanisms have some ten thousand nodes, factorisations that iterate more.
-constexpr std::size_t kMostNodes = 100'000;
+thread_local std::size_t most = 0;
 
 void RequireRoom() {
-  if (current->nodes().size() <= kMostNodes) return;
+  if (current->nodes().size() <= most) return;
   throw NotCovered(fmt::format(
       "found more than {} operations, of a large mechanism or a factorisation that iterates",
-      kMostNodes));
+      most));
 }
 
 int NodeOf(const Recorded& x) { return x.node >= 0 ? x.node : current->Constant(x.number); }
@@ -32,8 +30,9 @@ Recorded At(int node, double number) {
 
 }  // namespace
 
-Recording::Recording(Graph& graph, CastsAs casts) {
+Recording::Recording(Graph& graph, CastsAs casts, std::size_t most_nodes) {
   current = &graph;
+  most = most_nodes;
   casts_as = casts;
 }
 

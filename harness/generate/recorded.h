@@ -19,10 +19,11 @@ namespace loopbench::generate {
 /// Result of a cast of a recorded number to another type.
 enum class CastsAs { kNumber, kInfinity, kMinusInfinity };
 
-/// While it lives, numbers of this thread are recorded in `graph`.
+/// While it lives, numbers of this thread are recorded in `graph`. Beyond `most_nodes` an operation
+/// throws NotCovered (record.h).
 class Recording {
  public:
-  Recording(Graph& graph, CastsAs casts);
+  Recording(Graph& graph, CastsAs casts, std::size_t most_nodes = 100'000);
   ~Recording();
   Recording(const Recording&) = delete;
   Recording& operator=(const Recording&) = delete;

@@ -59,6 +59,7 @@ void FactoredState<Space, S>::ShareSpeeds(VectorX<S>& u) {
 template <class Space, class S>
 void PositionViolation(const Kinematics<Space, S>& kinematics, VectorX<S>& violation,
                        Correction<S>& largest) {
+  using std::max;
   largest.shift = largest.rotation = S(0);
   for (int index : kinematics.mechanism().constraints()) {
     const Joint<Space, S>& joint = kinematics.mechanism().joints()[index];
@@ -67,8 +68,8 @@ void PositionViolation(const Kinematics<Space, S>& kinematics, VectorX<S>& viola
     violation.segment(joint.row, state.rows()) =
         state.Along(mismatch, state.rows()).head(state.rows());
     const Direction<Space, S> constrained = kinematics.Constrained(index, mismatch);
-    largest.rotation = std::max(largest.rotation, constrained.angular.norm());
-    largest.shift = std::max(largest.shift, constrained.linear.norm());
+    largest.rotation = max(largest.rotation, constrained.angular.norm());
+    largest.shift = max(largest.shift, constrained.linear.norm());
   }
 }
 

@@ -11,14 +11,18 @@ template <class Space, class S>
 Drives<Space, S>::Drives(const Mechanism<Space, S>& mechanism)
     : dynamics_(mechanism),
       A_(mechanism.num_bodies(), Acceleration<Space, S>::Zero()),
-      F_(mechanism.num_bodies(), Wrench<Space, S>::Zero()) {}
+      F_(mechanism.num_bodies(), Wrench<Space, S>::Zero()),
+      missed_(mechanism.joints().size(), S(0)) {}
+
+// a scalar's own maximum, where it has one, is no branch of the text
+using std::max;
 
 namespace {
 
 /// Largest part of a motion, in turns [rad] and mechanism lengths.
 template <class Space, class S, class Motion>
 S SizeOf(const Kinematics<Space, S>& kinematics, const Motion& A) {
-  return std::max(S(A.angular.norm()), S(A.linear.norm() / kinematics.mechanism().length()));
+  return max(S(A.angular.norm()), S(A.linear.norm() / kinematics.mechanism().length()));
 }
 
 /// Speed of the fastest body.
@@ -26,7 +30,7 @@ template <class Space, class S>
 S SpeedOf(const Kinematics<Space, S>& kinematics) {
   S speed = S(0);
   for (const Velocity<Space, S>& V : kinematics.motions()) {
-    speed = std::max(speed, SizeOf(kinematics, V));
+    speed = max(speed, SizeOf(kinematics, V));
   }
   return speed;
 }
@@ -43,15 +47,17 @@ bool Drives<Space, S>::Followed(const Kinematics<Space, S>& kinematics, const Ve
   dynamics_.BodyAccelerations(kinematics, udot, A_);
   acceleration_ = worst_ = S(0);
   for (const Acceleration<Space, S>& A : A_) {
-    acceleration_ = std::max(acceleration_, SizeOf(kinematics, A));
+    acceleration_ = max(acceleration_, SizeOf(kinematics, A));
   }
   size_ = acceleration_;
   for (std::size_t j = 0; j < mechanism.joints().size(); ++j) {
     const Joint<Space, S>& joint = mechanism.joints()[j];
     const JointState<Space, S>& state = kinematics.joints()[j];
-    size_ = std::max({size_, SizeOf(kinematics, state.g),
-                      SizeOf(kinematics, kinematics.Centripetal(joint.from, state.r_P)),
-                      SizeOf(kinematics, kinematics.Centripetal(joint.to, state.r_Q))});
+    for (const S& part : {SizeOf(kinematics, state.g),
+                          SizeOf(kinematics, kinematics.Centripetal(joint.from, state.r_P)),
+                          SizeOf(kinematics, kinematics.Centripetal(joint.to, state.r_Q))}) {
+      size_ = max(size_, part);
+    }
   }
   for (int index : mechanism.constraints()) {
     const Joint<Space, S>& joint = mechanism.joints()[index];
@@ -60,10 +66,8 @@ bool Drives<Space, S>::Followed(const Kinematics<Space, S>& kinematics, const Ve
     if (feedback.size() > 0) {
       left.head(state.rows()) += feedback.segment(joint.row, state.rows());
     }
-    const S missed = SizeOf(kinematics, state.Sum(left, state.rows()));  // released ones follow
-    if (missed <= worst_) continue;
-    worst_ = missed;
-    worst_joint_ = index;
+    missed_[index] = SizeOf(kinematics, state.Sum(left, state.rows()));  // released ones follow
+    worst_ = max(worst_, missed_[index]);
   }
   AppliedForces<Space, S>(kinematics, F_);
   S alone = S(0);
@@ -71,9 +75,9 @@ bool Drives<Space, S>::Followed(const Kinematics<Space, S>& kinematics, const Ve
     const Inertia<Space, S>& inertia = mechanism.bodies()[body];
     const Acceleration<Space, S> A(kinematics.RotationalInverse(inertia, body) * F_[body].angular,
                                    F_[body].linear / inertia.mass);
-    alone = std::max(alone, SizeOf(kinematics, A));
+    alone = max(alone, SizeOf(kinematics, A));
   }
-  fastest_ = std::max(fastest_, SpeedOf(kinematics));
+  fastest_ = max(fastest_, SpeedOf(kinematics));
   return worst_ <= S(kFollowed) * size_ + S(kRoundOff) * alone || IsDrift(kinematics);
 }
 
@@ -101,9 +105,9 @@ bool Drives<Space, S>::IsDrift(const Kinematics<Space, S>& kinematics) {
   S position = S(0), missed = S(0);
   for (int index : kinematics.mechanism().constraints()) {
     const JointState<Space, S>& state = kinematics.joints()[index];
-    position = std::max(position, SizeOf(kinematics, kinematics.ConstraintMismatch(index)));
-    missed = std::max(
-        missed, SizeOf(kinematics, state.Sum(kinematics.ConstraintSpeed(index), state.rows())));
+    position = max(position, SizeOf(kinematics, kinematics.ConstraintMismatch(index)));
+    missed =
+        max(missed, SizeOf(kinematics, state.Sum(kinematics.ConstraintSpeed(index), state.rows())));
   }
   return position * fastest_ + missed <= S(kMostDrift) * fastest_ &&
          worst_ <= S(kOfMismatch) * (position * size_ + missed * SpeedOf(kinematics));

@@ -5,6 +5,9 @@
 // over tell.
 #pragma once
 
+#include <algorithm>
+#include <vector>
+
 #include "mechanism/loops/tree_dynamics.h"
 
 namespace loopbench {
@@ -41,7 +44,9 @@ class Drives {
   bool has_left_branch() const { return has_left_branch_; }
 
   /// The constraint that the last Followed() found missed by most.
-  int worst_joint() const { return worst_joint_; }
+  int worst_joint() const {
+    return static_cast<int>(std::ranges::max_element(missed_) - missed_.begin());
+  }
 
   /// Power [W] that drives put into the mechanism: force along each times its prescribed rate.
   /// Those of cut joints are multipliers (`lambda`, rows as in TreeDynamics::Jacobian()); those of
@@ -71,10 +76,11 @@ class Drives {
   TreeDynamics<Space, S> dynamics_;
   std::vector<Acceleration<Space, S>> A_;
   std::vector<Wrench<Space, S>> F_;
-  S worst_ = S(0), size_ = S(0);  ///< what is left, and the largest term, of the last Followed()
+  std::vector<S> missed_;         ///< residual of each joint's constraint at the last Followed()
+  S worst_ = S(0), size_ = S(0);  ///< the largest residual and the largest term there
   S acceleration_ = S(0);         ///< largest of bodies there
   S fastest_ = S(0);              ///< largest speed of bodies so far
-  int worst_joint_ = -1, usual_rank_ = 0;
+  int usual_rank_ = 0;
   bool has_left_branch_ = false;
 };
 

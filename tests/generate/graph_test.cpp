@@ -93,7 +93,7 @@ TEST_F(GraphTest, ACastShowsWhatTheRecordingSays) {
 }
 
 TEST(PrintCTest, TheTextOfASmallGraphIsThis) {
-  RecordedDerivative recorded;
+  RecordedFunction recorded;
   {
     const Recording recording(recorded.graph, CastsAs::kNumber);
     const Recorded t = Recorded::Input(0.0), x = Recorded::Input(1.0);
@@ -101,13 +101,11 @@ TEST(PrintCTest, TheTextOfASmallGraphIsThis) {
     EXPECT_TRUE(x > t);
     recorded.outputs = {rate.node, recorded.graph.Constant(0.0)};
   }
-  EXPECT_EQ(PrintC(recorded), R"(#include <math.h>
-typedef void (*loopbench_sines)(double, double*, double*);
-static double least(double a, double b) { return b < a ? b : a; }
-static double most(double a, double b) { return a < b ? b : a; }
-static int part0(const double* x, double* y, double* w, loopbench_sines sines) {
+  int room = -1;
+  EXPECT_EQ(PrintFunction(recorded, "rates", &room),
+            R"(static int rates_part0(const double* x, double* y, double* w) {
   int ok = 1;
-  (void)x, (void)y, (void)w, (void)sines;
+  (void)x, (void)y, (void)w;
   ok &= (x[0] < x[1]);
   const double v3 = x[1] * 0x1p-1;
   const double v5 = x[0] - v3;
@@ -115,11 +113,11 @@ static int part0(const double* x, double* y, double* w, loopbench_sines sines) {
   y[1] = 0x0p+0;
   return ok;
 }
-const int loopbench_room = 0;
-int loopbench_derivative(const double* x, double* y, double* w, loopbench_sines sines) {
-  return part0(x, y, w, sines);
+static int rates(const double* x, double* y, double* w) {
+  return rates_part0(x, y, w);
 }
 )");
+  EXPECT_EQ(room, 0);
 }
 
 }  // namespace

@@ -1,0 +1,432 @@
+#include "harness/exchange/export_c.h"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <cctype>
+#include <cmath>
+
+#include "harness/exchange/export_names.h"
+#include "harness/generate/differentiate.h"
+#include "harness/generate/print_c.h"
+#include "mechanism/model/mechanism.h"
+
+namespace loopbench::exchange {
+
+namespace {
+
+using fmt::format;
+using generate::Quantity, generate::RecordedFunction;
+
+/// A longer text would take a C compiler minutes.
+constexpr std::int64_t kMostOperations = 50'000;
+
+std::string IdentifierOf(const std::string& name) {
+  std::string identifier;
+  for (const char c : name) {
+    const bool keeps =
+        std::isalnum(static_cast<unsigned char>(c)) != 0 && static_cast<unsigned char>(c) < 0x80;
+    identifier += keeps ? static_cast<char>(std::tolower(c)) : '_';
+  }
+  const bool is_name =
+      !identifier.empty() && std::isalpha(static_cast<unsigned char>(identifier[0])) != 0;
+  return is_name ? identifier : "mechanism_" + identifier;
+}
+
+/// The recordings of one function, a branch each, all of them of the same motion.
+struct Branches {
+  std::vector<RecordedFunction> recorded;
+  std::size_t missed = 0;
+};
+
+std::vector<double> Inputs(const MotionState& state) {
+  std::vector<double> x = {state.t};
+  x.insert(x.end(), state.y.begin(), state.y.end());
+  return x;
+}
+
+/// Whether a branch serves a state: comparisons and a finite result.
+bool Serves(const RecordedFunction& branch, const MotionState& state) {
+  const std::vector<double> values = branch.graph.Values(Inputs(state));
+  return branch.graph.Holds(values) && std::ranges::all_of(branch.outputs, [&](int node) {
+           return std::isfinite(values[static_cast<std::size_t>(node)]);
+         });
+}
+
+Branches RecordAlong(const CodeRequest& request, Quantity quantity) {
+  generate::RecordingSubject subject = request.subject;
+  subject.quantity = quantity;
+  Branches branches;
+  // The mode of a recording, such as its released directions, is chosen where it starts. It starts
+  // earlier than it records: what is said of accepted steps alone shall not become a branch.
+  const auto start_at = [&](const MotionState& state) {
+    const auto num_q = request.start.q.size(), num_u = request.start.u.size();
+    if (std::ssize(state.y) != num_q + num_u) return request.start;  // without some speeds
+    return generate::RecordingStart{
+        .t = state.t - 1e-9,
+        .q = Eigen::Map<const Eigen::VectorXd>(state.y.data(), num_q),
+        .u = Eigen::Map<const Eigen::VectorXd>(state.y.data() + num_q, num_u)};
+  };
+  const auto record = [&](const MotionState& state) {
+    RecordedFunction recorded =
+        generate::RecordFunction(subject, start_at(state), state.t, state.y);
+    recorded.graph.ForgetZeroTests();
+    const auto live = recorded.graph.Live(recorded.outputs, true);
+    const std::int64_t operations = std::ranges::count(live, true);
+    if (operations > kMostOperations) {
+      throw generate::NotCovered(
+          format("found {} operations, expected at most {}: they would take a compiler too long",
+                 operations, kMostOperations));
+    }
+    return recorded;
+  };
+  for (const MotionState& state : request.motion) {
+    const auto serves = [&](const RecordedFunction& branch) { return Serves(branch, state); };
+    if (std::ranges::any_of(branches.recorded, serves)) continue;
+    if (std::ssize(branches.recorded) >= kMostCodeBranches) {
+      ++branches.missed;
+      continue;
+    }
+    // next to the state, where no number is zero by chance
+    MotionState near = state;
+    for (std::size_t i = 0; i < near.y.size(); ++i) near.y[i] += generate::ShiftOf(i);
+    near.t += generate::ShiftOf(near.y.size());
+    branches.recorded.push_back(record(near));
+    if (!serves(branches.recorded.back())) branches.recorded.push_back(record(state));
+  }
+  return branches;
+}
+
+/// The Jacobian with respect to the state, of each branch where it was recorded.
+Branches JacobianOf(const Branches& derivative, const CodeRequest& request) {
+  Branches jacobian = derivative;
+  for (RecordedFunction& branch : jacobian.recorded) {
+    // the numbers decide between operands of minima and maxima alone
+    std::vector<double> values;
+    for (const MotionState& state : request.motion) {
+      values = branch.graph.Values(Inputs(state));
+      if (Serves(branch, state)) break;
+    }
+    branch.outputs = generate::Differentiate(
+        branch.graph, branch.outputs, {branch.inputs.begin() + 1, branch.inputs.end()}, values);
+  }
+  return jacobian;
+}
+
+constexpr const char* kHeaderBegin = R"(
+/* Equations of motion. State y: positions, then speeds. Every function that returns int returns 0,
+   or 1 if the state takes a branch that was not generated; then its results are unspecified. */
+#ifndef @UP@_H
+#define @UP@_H
+
+#ifdef __cplusplus
+extern "C" {
+#endif
+
+enum {
+  @UP@_STATES = @STATES@,
+  @UP@_POSITIONS = @POSITIONS@,
+  @UP@_BODIES = @BODIES@,
+  @UP@_CONSTRAINTS = @CONSTRAINTS@
+};
+
+extern const char* const @ID@_state_names[@UP@_STATES];
+extern const char* const @ID@_state_units[@UP@_STATES];
+extern const char* const @ID@_body_names[@UP@_BODIES];
+
+/* initial state at time *t [s] */
+void @ID@_start(double* t, double* y);
+)";
+
+constexpr const char* kHeaderEnd =
+    R"(/* Newton's method toward the constraints until corrections stop decreasing */
+int @ID@_project(double t, double* y);
+/* a step of length h [s] by the classical Runge-Kutta method of order 4 */
+int @ID@_step(double t, double h, double* y);
+
+#ifdef __cplusplus
+}
+#endif
+
+#endif
+)";
+
+constexpr const char* kCall = R"(
+@HEAD@ {
+  double x[1 + @UP@_STATES], w[@ROOM@];
+  int i;
+  x[0] = t;
+  for (i = 0; i < @UP@_STATES; ++i) x[1 + i] = y[i];
+  if (!(@CALLS@)) return 1;
+  for (i = 0; i < @OUTPUTS@; ++i) {
+    if (!isfinite(@RESULT@[i])) return 1;
+  }
+  return 0;
+}
+
+)";
+
+constexpr const char* kSines = R"(static void sines(double angle, double* sine, double* cosine) {
+  *sine = sin(angle);
+  *cosine = cos(angle);
+}
+)";
+
+constexpr const char* kNoProject = R"(
+int @ID@_project(double t, double* y) {
+  (void)t, (void)y;
+  return 0;
+}
+)";
+
+constexpr const char* kProject = R"(
+int @ID@_project(double t, double* y) {
+  double corrected[@UP@_STATES], largest = INFINITY;
+  int i, step;
+  for (step = 0; step < 10; ++step) {
+    double change = 0.0;
+    if (@ID@_correction(t, y, corrected) != 0) return 1;
+    for (i = 0; i < @UP@_STATES; ++i) change = fmax(change, fabs(corrected[i] - y[i]));
+    if (!(change < largest)) break;
+    largest = change;
+    for (i = 0; i < @UP@_STATES; ++i) y[i] = corrected[i];
+  }
+  return 0;
+}
+)";
+
+constexpr const char* kStep = R"(
+int @ID@_step(double t, double h, double* y) {
+  static const double nodes[4] = {0.0, 0.5, 0.5, 1.0}, weights[4] = {1.0, 2.0, 2.0, 1.0};
+  double at[@UP@_STATES], slope[@UP@_STATES], sum[@UP@_STATES];
+  int i, stage;
+  for (i = 0; i < @UP@_STATES; ++i) slope[i] = sum[i] = 0.0;
+  for (stage = 0; stage < 4; ++stage) {
+    for (i = 0; i < @UP@_STATES; ++i) at[i] = y[i] + nodes[stage] * h * slope[i];
+    if (@ID@_derivative(t + nodes[stage] * h, at, slope) != 0) return 1;
+    for (i = 0; i < @UP@_STATES; ++i) sum[i] += weights[stage] * slope[i];
+  }
+  for (i = 0; i < @UP@_STATES; ++i) y[i] += h / 6.0 * sum[i];
+  return 0;
+}
+)";
+
+constexpr const char* kExample =
+#include "harness/exchange/export_c_example.inc"
+    ;
+
+constexpr const char* kBuild = R"(cmake_minimum_required(VERSION 3.16)
+project(@ID@ C)
+set(CMAKE_C_STANDARD 99)
+set(CMAKE_C_EXTENSIONS OFF)
+if(NOT CMAKE_BUILD_TYPE)
+  set(CMAKE_BUILD_TYPE Release)
+endif()
+add_library(@ID@ @ID@.c)
+set_target_properties(@ID@ PROPERTIES POSITION_INDEPENDENT_CODE ON)
+target_compile_options(@ID@ PRIVATE -ffp-contract=off)
+target_include_directories(@ID@ PUBLIC ${CMAKE_CURRENT_SOURCE_DIR})
+target_link_libraries(@ID@ PUBLIC m)
+add_executable(example example.c)
+target_link_libraries(example PRIVATE @ID@)
+)";
+
+/// Writes the texts of the product.
+class Writer {
+ public:
+  Writer(const CodeRequest& request, Code& code) : request_(request), code_(code) {
+    words_ = WordsOf(code);
+    words_["STATES"] = std::to_string(code.state_names.size());
+    words_["POSITIONS"] = std::to_string(code.num_q);
+    words_["BODIES"] = std::to_string(code.body_names.size());
+    words_["CONSTRAINTS"] = std::to_string(code.num_rows);
+    words_["STEP"] = NumberText(request.step);
+  }
+
+  void Write() {
+    const Branches derivative = RecordAlong(request_, Quantity::kDerivative);
+    Add("derivative", "dy/dt", derivative, "dydt");
+    Add("jacobian", "d(dy/dt)/dy by columns: dfdy[i + STATES * j] = d(dydt[i])/d(y[j])",
+        JacobianOf(derivative, request_), "dfdy");
+    Add("energy", "kinetic and potential energy [J]", RecordAlong(request_, Quantity::kEnergy),
+        "energy");
+    Add("poses",
+        code_.pose_words.size() == 4
+            ? "of each body: centre of mass x, y [m], cosine and sine of the angle"
+            : "of each body: centre of mass x, y, z [m], rotation matrix by rows",
+        RecordAlong(request_, Quantity::kPoses), "poses");
+    if (code_.num_rows > 0) {
+      Add("violation", "constraint violation: positions [m, rad], then speeds [m/s, rad/s]",
+          RecordAlong(request_, Quantity::kViolation), "violation");
+      Add("correction", "y after one Newton step toward the constraints",
+          RecordAlong(request_, Quantity::kCorrection), "corrected");
+    }
+    std::string comment;
+    for (const std::string& line : request_.provenance) comment += CommentLines("// ", line);
+    code_.files = {{code_.identifier + ".h", comment + Fill(kHeaderBegin, words_) + declarations_ +
+                                                 Fill(kHeaderEnd, words_)},
+                   {code_.identifier + ".c", comment + Source()},
+                   {"example.c", comment + Fill(kExample, words_)},
+                   {"CMakeLists.txt", Fill(kBuild, words_)}};
+  }
+
+ private:
+  void Add(const std::string& name, const std::string& meaning, const Branches& branches,
+           const std::string& result) {
+    const RecordedFunction& first = branches.recorded.front();
+    code_.functions.push_back(
+        {.name = name,
+         .branches = static_cast<int>(branches.recorded.size()),
+         .operations = first.graph.Count(first.graph.Live(first.outputs, true)).flops(),
+         .missed = branches.missed});
+    const std::string head =
+        format("int {}_{}(double t, const double* y, double* {})", code_.identifier, name, result);
+    declarations_ += format("/* {} */\n{};\n", meaning, head);
+    std::string calls;
+    int most_room = 1;
+    for (std::size_t i = 0; i < branches.recorded.size(); ++i) {
+      const std::string function = format("{}_{}", name, i);
+      int room = 0;
+      functions_ += generate::PrintFunction(branches.recorded[i], function, &room);
+      most_room = std::max(most_room, room);
+      calls += format("{}{}(x, {}, w)", i == 0 ? "" : " || ", function, result);
+    }
+    std::map<std::string, std::string> words = words_;
+    words["HEAD"] = head;
+    words["ROOM"] = std::to_string(most_room);
+    words["CALLS"] = calls;
+    words["OUTPUTS"] = std::to_string(first.outputs.size());
+    words["RESULT"] = result;
+    functions_ += Fill(kCall, words);
+  }
+
+  std::string Strings(const std::string& name, const std::string& size,
+                      const std::vector<std::string>& strings) const {
+    std::string text = format("const char* const {}_{}[{}_{}] = {{\n", words_.at("ID"), name,
+                              words_.at("UP"), size);
+    for (const std::string& string : strings) text += format("    {},\n", QuoteCpp(string));
+    return text + "};\n";
+  }
+
+  std::string Source() const {
+    const auto calls = [&](const char* function) {
+      return functions_.find(function) != std::string::npos;
+    };
+    std::string text = Fill("\n#include \"@ID@.h\"\n\n#include <math.h>\n\n", words_);
+    // compilers warn about functions that are not called
+    if (calls(" least(") || calls(" most(")) text += generate::kPrintedHelpers;
+    if (calls(" sines(")) text += kSines;
+    text += functions_ + Strings("state_names", "STATES", code_.state_names) +
+            Strings("state_units", "STATES", code_.state_units) +
+            Strings("body_names", "BODIES", code_.body_names);
+    text += Fill("\nvoid @ID@_start(double* t, double* y) {\n", words_) +
+            format("  *t = {:a};\n", request_.motion.front().t);
+    for (std::size_t i = 0; i < code_.start.size(); ++i) {
+      text += format("  y[{}] = {:a}; /* {} */\n", i, code_.start[i], NumberText(code_.start[i]));
+    }
+    return text + "}\n" + Fill(code_.num_rows == 0 ? kNoProject : kProject, words_) +
+           Fill(kStep, words_);
+  }
+
+  const CodeRequest& request_;
+  Code& code_;
+  std::map<std::string, std::string> words_;
+  std::string declarations_, functions_;
+};
+
+/// A name with its unit.
+struct Labelled {
+  std::string name, unit;
+};
+
+/// Names of all positions or all speeds of a mechanism, in order.
+template <class Space>
+std::vector<Labelled> Coordinates(const MechanismDescription& description,
+                                  const Mechanism<Space, double>& mechanism, bool speeds) {
+  std::vector<Labelled> labels(
+      static_cast<std::size_t>(speeds ? mechanism.num_u() : mechanism.num_q()));
+  for (std::size_t i = 0; i < mechanism.joints().size(); ++i) {
+    const loopbench::Joint<Space, double>& joint = mechanism.joints()[i];
+    if (!joint.in_tree()) continue;
+    const JointType type =
+        joint.description < 0
+            ? JointType::kFree
+            : description.joints[static_cast<std::size_t>(joint.description)].type;
+    auto at = static_cast<std::size_t>(speeds ? joint.u_offset : joint.q_offset);
+    int coordinate = 0;
+    for (const ValueWord& word : ValueWords(TraitsOf(type), description.space, speeds)) {
+      if (mechanism.DriveOf(joint, coordinate++) >= 0) continue;
+      const bool is_speed_word = word.name.starts_with('w');  // wx, wy, wz
+      labels[at++] = {format("{}.{}{}", mechanism.joint_names()[i], word.name,
+                             speeds && !is_speed_word ? " speed" : ""),
+                      word.unit.empty() ? "1" : std::string(word.unit)};
+    }
+  }
+  return labels;
+}
+
+/// Sizes and names; speeds as far as the state carries them.
+template <class Space>
+void Describe(const CodeRequest& request, const std::vector<int>& carried_speeds, Code& code) {
+  const MechanismDescription& description = request.subject.description;
+  const Mechanism<Space, double> mechanism(description, request.subject.coordinates);
+  code.start = request.motion.front().y;
+  code.pose_words = {{"x", "m"}, {"y", "m"}};
+  if (Space::kRot == 1) {
+    code.pose_words.insert(code.pose_words.end(), {{"cos", "1"}, {"sin", "1"}});
+  } else {
+    code.pose_words.emplace_back("z", "m");
+    for (int i = 0; i < 9; ++i)
+      code.pose_words.emplace_back(format("R{}{}", i / 3 + 1, i % 3 + 1), "1");
+  }
+  code.num_q = mechanism.num_q();
+  code.num_rows = mechanism.num_rows();
+  code.body_names.assign(mechanism.body_names().begin() + 1, mechanism.body_names().end());
+  std::vector<Labelled> state = Coordinates<Space>(description, mechanism, false);
+  const std::vector<Labelled> speeds = Coordinates<Space>(description, mechanism, true);
+  for (const int i : carried_speeds) state.push_back(speeds[static_cast<std::size_t>(i)]);
+  UniqueNames names;
+  for (const auto& [name, unit] : state) {
+    code.state_names.push_back(names.Take(name));
+    code.state_units.push_back(unit);
+  }
+}
+
+}  // namespace
+
+std::string Fill(std::string text, const std::map<std::string, std::string>& words) {
+  for (const auto& [word, value] : words) {
+    const std::string mark = "@" + word + "@";
+    for (std::size_t at = text.find(mark); at != std::string::npos;
+         at = text.find(mark, at + value.size())) {
+      text.replace(at, mark.size(), value);
+    }
+  }
+  return text;
+}
+
+std::map<std::string, std::string> WordsOf(const Code& code) {
+  std::string upper = code.identifier;
+  std::ranges::transform(upper, upper.begin(),
+                         [](unsigned char c) { return static_cast<char>(std::toupper(c)); });
+  return {{"ID", code.identifier}, {"UP", upper}};
+}
+
+Code MakeCode(const CodeRequest& request) {
+  if (request.motion.front().y.empty() || request.start.q.size() == 0) {
+    throw generate::NotCovered("prescribed motions leave no state to integrate");
+  }
+  Code code;
+  code.identifier = IdentifierOf(request.subject.description.name);
+  const std::vector<int> carried =
+      generate::RecordFunction(request.subject, request.start).carried_speeds;
+  if (request.subject.description.space == SpaceKind::kPlanar) {
+    Describe<Planar>(request, carried, code);
+  } else {
+    Describe<Spatial>(request, carried, code);
+  }
+  Writer(request, code).Write();
+  return code;
+}
+
+}  // namespace loopbench::exchange

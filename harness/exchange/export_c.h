@@ -1,0 +1,63 @@
+// A mechanism's equations of motion as C99 for other programs: recorded (harness/generate/), with
+// names and units of the state, an example and a build file. No heap, no library but math.h.
+#pragma once
+
+#include <map>
+#include <string>
+#include <utility>
+#include <vector>
+
+#include "harness/generate/record.h"
+
+namespace loopbench::exchange {
+
+/// A state of a motion.
+struct MotionState {
+  double t = 0.0;
+  std::vector<double> y;
+};
+
+struct CodeRequest {
+  generate::RecordingSubject subject;    ///< its quantity is set here
+  std::vector<std::string> provenance;   ///< lines of a comment: program, file, method
+  std::vector<MotionState> motion = {};  ///< the first is the start
+  generate::RecordingStart start = {};
+  double step = 1e-3;  ///< of the example's integrator [s]
+};
+
+/// One C function of the product.
+struct CodeFunction {
+  std::string name;
+  int branches = 0;             ///< recorded
+  std::int64_t operations = 0;  ///< of the first branch
+  std::size_t missed = 0;       ///< states of the motion that no branch serves
+};
+
+struct CodeFile {
+  std::string name, text;
+};
+
+/// Of a product: identifier, names, counts, files.
+struct Code {
+  std::string identifier;  ///< prefix of its functions: the mechanism's name as C has names
+  int num_q = 0, num_rows = 0;
+  std::vector<std::string> state_names, state_units, body_names;
+  std::vector<double> start;                                    ///< state at the start
+  std::vector<std::pair<std::string, std::string>> pose_words;  ///< numbers of a pose, with units
+  std::vector<CodeFunction> functions;
+  std::vector<CodeFile> files;  ///< IDENTIFIER.h, IDENTIFIER.c, example.c, CMakeLists.txt
+};
+
+/// Records each function wherever the motion takes a new branch, at most kMostCodeBranches times
+/// and one more. Throws generate::NotCovered.
+Code MakeCode(const CodeRequest& request);
+
+inline constexpr int kMostCodeBranches = 16;
+
+/// A text with @WORD@ replaced by its value.
+std::string Fill(std::string text, const std::map<std::string, std::string>& words);
+
+/// Words of all texts: ID, the identifier, and UP, the same in capitals.
+std::map<std::string, std::string> WordsOf(const Code& code);
+
+}  // namespace loopbench::exchange

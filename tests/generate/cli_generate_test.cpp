@@ -1,0 +1,373 @@
+// generate: C99 that compiles without warnings everywhere, moves as the library does, and an FMU
+// that an importer loads, checks and steps.
+#include <dlfcn.h>
+#include <gtest/gtest.h>
+#include <tinyxml2.h>
+
+#include <cmath>
+#include <map>
+#include <set>
+#include <sstream>
+
+#include "harness/config/mechanism_reader.h"
+#include "harness/integrator/arkode.h"
+#include "harness/run/run_case.h"
+#include "mechanism/start/assembly.h"
+#include "tests/harness/cli_fixture.h"
+
+namespace loopbench::harness {
+namespace {
+
+using Numbers = std::vector<double>;
+
+class GenerateTest : public CommandLineTest {
+ protected:
+  /// Runs a shell command in the folder.
+  Ending Shell(const std::string& command) const {
+    return Call("--version >/dev/null 2>&1; " + command);
+  }
+
+  /// Compiles NAME.c and example.c of `code` with all warnings as errors.
+  void Compile(const std::string& compiler, const std::string& name) const {
+    ExpectEnding(Shell(compiler +
+                       " -std=c99 -pedantic -Wall -Wextra -Werror -O1 -ffp-contract=off "
+                       "-o example code/example.c code/" +
+                       name + ".c -lm"),
+                 0, {});
+  }
+
+  /// The last line of the example's output.
+  Numbers LastRow(const std::string& arguments) const {
+    const Ending ending = Shell("./example " + arguments);
+    EXPECT_EQ(ending.code, 0) << ending.text;
+    std::istringstream lines(ending.text);
+    std::string line, last;
+    while (std::getline(lines, line)) last = line;
+    Numbers numbers;
+    std::istringstream cells(last);
+    for (std::string cell; std::getline(cells, cell, ',');) numbers.push_back(std::stod(cell));
+    return numbers;
+  }
+};
+
+/// The state of a mechanism file after `seconds` by the library at a tight tolerance.
+template <class Space>
+Numbers LibraryState(const fs::path& path, const std::string& formulation, double seconds) {
+  const MechanismDescription description = ReadMechanism(path).description;
+  const Mechanism<Space, double> mechanism(description, Coordinates::kJoint);
+  const Start<double> start = Assemble<Space>(description, mechanism);
+  const auto system = MakeFormulation<Space>(formulation, mechanism, {});
+  EXPECT_EQ(system->Start(0.0, start.q, start.u), Outcome::kFinished);
+  Numbers y(static_cast<std::size_t>(system->size()));
+  system->ToState(start.q, start.u, y);
+  IntegratorOptions options;
+  options.rtol = options.atol = 1e-12;
+  EXPECT_EQ(Integrate(*system, 0.0, seconds, y, options).outcome, Outcome::kFinished);
+  return y;
+}
+
+/// RK4 with steps of 1e-3 of motions at some rad/s leaves h^4 = 1e-12 times a constant; the bound
+/// leaves a factor of 1e4.
+constexpr double kMotion = 1e-8;
+
+void ExpectState(const Numbers& row, const Numbers& expected) {
+  ASSERT_EQ(row.size(), expected.size() + 2);  // time and energy beside it
+  for (std::size_t i = 0; i < expected.size(); ++i) EXPECT_NEAR(row[i + 1], expected[i], kMotion);
+}
+
+TEST_F(GenerateTest, TheExampleMovesAsTheLibraryDoesForEachFormulation) {
+  for (const std::string formulation : {"odca", "lagrange", "reduction"}) {
+    ExpectEnding(Call("generate four-bar.json --out code --formulation " + formulation), 0,
+                 {"four_bar.h", "derivative", "jacobian"});
+    Compile("cc", "four_bar");
+    ExpectState(LastRow("1 1e-3"),
+                LibraryState<Planar>(folder_ / "four-bar.json", formulation, 1.0));
+  }
+}
+
+TEST_F(GenerateTest, MechanismsInSpaceMoveAsTheLibraryDoes) {
+  const fs::path spatial = kConfigs / "mechanisms/spatial-four-bar.json";
+  ExpectEnding(Call("generate '" + spatial.string() + "' --out code --formulation odca"), 0, {});
+  Compile("cc", "spatial_four_bar");
+  ExpectState(LastRow("0.5 1e-3"), LibraryState<Spatial>(spatial, "odca", 0.5));
+}
+
+/// All functions beside dy/dt, called by a program of the user's.
+TEST_F(GenerateTest, JacobianEnergyPosesAndProjectionAreThoseOfTheState) {
+  ExpectEnding(Call("generate four-bar.json --out code"), 0, {});
+  Write("user.c", R"(#include <math.h>
+#include <stdio.h>
+#include <four_bar.h>
+enum { N = FOUR_BAR_STATES };
+int main(void) {
+  double t, y[N], a[N], b[N], J[N * N], e[2], p[4 * FOUR_BAR_BODIES], v[2 * FOUR_BAR_CONSTRAINTS];
+  double worst = 0, off = 0, unit = 0;
+  int i, j;
+  four_bar_start(&t, y);
+  if (four_bar_jacobian(t, y, J)) return 1;
+  for (j = 0; j < N; ++j) {
+    const double kept = y[j], h = 1e-6;
+    y[j] = kept + h;
+    four_bar_derivative(t, y, a);
+    y[j] = kept - h;
+    four_bar_derivative(t, y, b);
+    y[j] = kept;
+    for (i = 0; i < N; ++i) {
+      worst = fmax(worst, fabs(J[i + N * j] - (a[i] - b[i]) / (2 * h)) / (1 + fabs(J[i + N * j])));
+    }
+  }
+  if (four_bar_energy(t, y, e) || four_bar_poses(t, y, p)) return 1;
+  for (i = 0; i < FOUR_BAR_BODIES; ++i) {
+    unit = fmax(unit, fabs(p[4 * i + 2] * p[4 * i + 2] + p[4 * i + 3] * p[4 * i + 3] - 1));
+  }
+  for (i = 0; i < N; ++i) y[i] += 1e-3 * (i + 1);
+  if (four_bar_project(t, y) || four_bar_violation(t, y, v)) return 1;
+  for (i = 0; i < 2 * FOUR_BAR_CONSTRAINTS; ++i) off = fmax(off, fabs(v[i]));
+  printf("%d %d %d %d\n", worst < 1e-6, unit < 1e-15, off < 1e-14, e[0] >= 0);
+  return 0;
+}
+)");
+  const Ending ending = Shell(
+      "cc -std=c99 -pedantic -Wall -Wextra -Werror -Icode -o user user.c code/four_bar.c -lm && ./user");
+  ExpectEnding(ending, 0, {"1 1 1 1"});
+}
+
+TEST_F(GenerateTest, NamesOfUsersNeverBecomeCode) {
+  std::string text = mechanism_;
+  const auto rename = [&](const std::string& from, const std::string& to) {
+    ASSERT_NE(text.find(from), std::string::npos) << from;
+    for (std::size_t at = text.find(from); at != std::string::npos;
+         at = text.find(from, at + to.size())) {
+      text.replace(at, from.size(), to);
+    }
+  };
+  rename("\"name\": \"four-bar\"", R"("name": "2 */ \"; int x??/\n#error")");
+  rename("bar1", R"(c\"\n*/??/ @ID@)");
+  rename("\"OA\"", R"("%s\\")");
+  Write("odd.json", text);
+  ExpectEnding(Call("generate odd.json --out code"), 0, {"mechanism_2"});
+  for (const char* compiler : {"gcc", "clang"}) {
+    if (Shell(std::string("command -v ") + compiler).code != 0) continue;
+    ExpectEnding(Shell(std::string(compiler) +
+                       " -std=c99 -pedantic -Wall -Wextra -Werror -c code/mechanism_*.c"),
+                 0, {});
+  }
+}
+
+TEST_F(GenerateTest, EqualInputGivesEqualFiles) {
+  for (const char* folder : {"code", "again"}) {
+    ExpectEnding(
+        Call(std::string("generate four-bar.json --fmu ") + folder + ".fmu --out " + folder), 0,
+        {});
+  }
+  EXPECT_EQ(Shell("sed -i 's/again/code/g' again/*.c again/*.h; diff -r code again").text, "");
+}
+
+TEST_F(GenerateTest, BadInputIsNamed) {
+  ExpectEnding(Call("generate absent.json --out code"), 2, {"absent.json"});
+  ExpectEnding(Call("generate four-bar.json"), 2, {"--out"});
+  ExpectEnding(Call("generate four-bar.json --out code --fmu x.fmu", "CC=absent"), 2,
+               {"no C compiler", "absent"});
+  EXPECT_FALSE(fs::exists(folder_ / "code"));
+  EXPECT_FALSE(fs::exists(folder_ / "x.fmu"));
+}
+
+// --- the FMU ---
+
+std::uint32_t Little(const std::string& bytes, std::size_t at, int size) {
+  std::uint32_t number = 0;
+  for (int i = size - 1; i >= 0; --i) {
+    number = number << 8 | static_cast<unsigned char>(bytes.at(at + static_cast<std::size_t>(i)));
+  }
+  return number;
+}
+
+/// The files of an archive, by its central directory.
+std::map<std::string, std::string> Unzip(const std::string& bytes) {
+  std::map<std::string, std::string> files;
+  const std::size_t end = bytes.rfind("PK\x05\x06");
+  std::size_t at = Little(bytes, end + 16, 4);
+  for (std::uint32_t i = 0; i < Little(bytes, end + 10, 2); ++i) {
+    EXPECT_EQ(bytes.substr(at, 4), "PK\x01\x02");
+    const std::uint32_t size = Little(bytes, at + 20, 4), name = Little(bytes, at + 28, 2);
+    const std::size_t local = Little(bytes, at + 42, 4);
+    files[bytes.substr(at + 46, name)] = bytes.substr(
+        local + 30 + Little(bytes, local + 26, 2) + Little(bytes, local + 28, 2), size);
+    at += 46 + name + Little(bytes, at + 30, 2) + Little(bytes, at + 32, 2);
+  }
+  return files;
+}
+
+/// Rules of FMI 2.0.4, sections 2.2.1 to 2.2.8, for what a description here has.
+struct Described {
+  std::string guid, identifier;
+  std::vector<std::string> states;
+  std::map<std::string, unsigned> references;
+};
+
+Described Check(const std::string& xml, const std::map<std::string, std::string>& files) {
+  tinyxml2::XMLDocument document;
+  EXPECT_EQ(document.Parse(xml.c_str(), xml.size()), tinyxml2::XML_SUCCESS);
+  const tinyxml2::XMLElement* root = document.FirstChildElement("fmiModelDescription");
+  EXPECT_STREQ(root->Attribute("fmiVersion"), "2.0");
+  Described found{
+      .guid = root->Attribute("guid"), .identifier = {}, .states = {}, .references = {}};
+  for (const char* kind : {"ModelExchange", "CoSimulation"}) {
+    const auto* element = root->FirstChildElement(kind);
+    found.identifier = element->Attribute("modelIdentifier");
+    const auto* sources = element->FirstChildElement("SourceFiles");
+    for (const auto* file = sources->FirstChildElement("File"); file != nullptr;
+         file = file->NextSiblingElement()) {
+      EXPECT_TRUE(files.contains(std::string("sources/") + file->Attribute("name")));
+    }
+  }
+  std::set<std::string> units;
+  for (const auto* unit = root->FirstChildElement("UnitDefinitions")->FirstChildElement("Unit");
+       unit != nullptr; unit = unit->NextSiblingElement()) {
+    EXPECT_TRUE(units.insert(unit->Attribute("name")).second);
+  }
+  std::set<unsigned> references;
+  std::vector<std::string> names, causalities, initials;
+  std::vector<int> derivative_of;
+  for (const auto* variable =
+           root->FirstChildElement("ModelVariables")->FirstChildElement("ScalarVariable");
+       variable != nullptr; variable = variable->NextSiblingElement()) {
+    const std::string name = variable->Attribute("name");
+    names.push_back(name);
+    causalities.emplace_back(variable->Attribute("causality"));
+    initials.emplace_back(variable->Attribute("initial"));
+    const auto* real = variable->FirstChildElement("Real");
+    EXPECT_TRUE(units.contains(real->Attribute("unit"))) << name;
+    EXPECT_EQ(real->Attribute("start") != nullptr, initials.back() == "exact") << name;
+    derivative_of.push_back(real->IntAttribute("derivative", 0));
+    EXPECT_TRUE(
+        found.references.emplace(name, variable->UnsignedAttribute("valueReference")).second);
+    references.insert(variable->UnsignedAttribute("valueReference"));
+  }
+  EXPECT_EQ(references.size(), names.size());
+  const auto* structure = root->FirstChildElement("ModelStructure");
+  const auto unknowns = [&](const char* list) {
+    std::vector<std::size_t> indices;
+    for (const auto* unknown = structure->FirstChildElement(list)->FirstChildElement("Unknown");
+         unknown != nullptr; unknown = unknown->NextSiblingElement()) {
+      indices.push_back(unknown->UnsignedAttribute("index") - 1);
+      EXPECT_LT(indices.back(), names.size());
+    }
+    EXPECT_TRUE(std::ranges::is_sorted(indices));
+    return indices;
+  };
+  std::vector<std::size_t> outputs, initial;
+  for (std::size_t i = 0; i < names.size(); ++i) {
+    if (causalities[i] == "output") outputs.push_back(i);
+    if (initials[i] == "calculated") initial.push_back(i);
+  }
+  EXPECT_EQ(unknowns("Outputs"), outputs);
+  EXPECT_EQ(unknowns("InitialUnknowns"), initial);
+  for (const std::size_t i : unknowns("Derivatives")) {
+    const auto state = static_cast<std::size_t>(derivative_of[i] - 1);
+    found.states.push_back(names.at(state));
+    EXPECT_EQ(names[i], "der(" + names[state] + ")");
+  }
+  return found;
+}
+
+void* Allocate(std::size_t count, std::size_t size) { return std::calloc(count, size); }
+
+/// Functions of FMI 2.0 that are called here.
+class Importer {
+ public:
+  Importer(const fs::path& library, const std::string& guid)
+      : handle_(::dlopen(library.c_str(), RTLD_NOW | RTLD_LOCAL)) {
+    EXPECT_NE(handle_, nullptr) << ::dlerror();
+    const auto make =
+        Get<void* (*)(const char*, int, const char*, const char*, const void*, int, int)>(
+            "fmi2Instantiate");
+    EXPECT_EQ(make("no", 0, "{other}", "", &callbacks_, 0, 0), nullptr);
+    model_ = make("one", 0, guid.c_str(), "", &callbacks_, 0, 0);
+    EXPECT_NE(model_, nullptr);
+    EXPECT_EQ(Call<int (*)(void*, int, double, double, int, double)>("fmi2SetupExperiment", 0, 0.0,
+                                                                     0.0, 0, 0.0),
+              0);
+    EXPECT_EQ(Call<int (*)(void*)>("fmi2EnterInitializationMode"), 0);
+    EXPECT_EQ(Call<int (*)(void*)>("fmi2ExitInitializationMode"), 0);
+  }
+  ~Importer() {
+    Get<void (*)(void*)>("fmi2FreeInstance")(model_);
+    ::dlclose(handle_);
+  }
+  Importer(const Importer&) = delete;
+  Importer& operator=(const Importer&) = delete;
+
+  template <class Function, class... Arguments>
+  int Call(const char* name, Arguments... arguments) {
+    return Get<Function>(name)(model_, arguments...);
+  }
+  double Real(unsigned reference) {
+    double value = 0.0;
+    EXPECT_EQ((Call<int (*)(void*, const unsigned*, std::size_t, double*)>(
+                  "fmi2GetReal", &reference, std::size_t{1}, &value)),
+              0);
+    return value;
+  }
+
+ private:
+  template <class Function>
+  Function Get(const char* name) {
+    void* symbol = ::dlsym(handle_, name);
+    EXPECT_NE(symbol, nullptr) << name;
+    return reinterpret_cast<Function>(symbol);
+  }
+
+  struct {
+    void* logger = nullptr;
+    void* (*allocate)(std::size_t, std::size_t) = &Allocate;
+    void (*release)(void*) = &std::free;
+    void* step_finished = nullptr;
+    void* environment = nullptr;
+  } callbacks_;
+  void* handle_;
+  void* model_ = nullptr;
+};
+
+TEST_F(GenerateTest, TheFmuIsValidAndMovesAsTheLibraryDoes) {
+  ExpectEnding(Call("generate four-bar.json --out code --fmu four-bar.fmu"), 0, {"four-bar.fmu"});
+  const auto files = Unzip(ReadFile(folder_ / "four-bar.fmu"));
+  ASSERT_TRUE(files.contains("modelDescription.xml"));
+  const Described described = Check(files.at("modelDescription.xml"), files);
+  const std::string binary = "binaries/linux64/" + described.identifier + ".so";
+  ASSERT_TRUE(files.contains(binary));
+  Write("model.so", files.at(binary));
+  Importer model(folder_ / "model.so", described.guid);
+
+  const Numbers expected = LibraryState<Planar>(folder_ / "four-bar.json", "reduction", 1.0);
+  ASSERT_EQ(described.states.size(), expected.size());
+  // model exchange: derivatives at the start, and of a state that was set
+  Numbers x(expected.size()), rates(x.size());
+  EXPECT_EQ((model.Call<int (*)(void*, double*, std::size_t)>("fmi2GetContinuousStates", x.data(),
+                                                              x.size())),
+            0);
+  EXPECT_EQ((model.Call<int (*)(void*, double*, std::size_t)>("fmi2GetDerivatives", rates.data(),
+                                                              x.size())),
+            0);
+  for (std::size_t i = 0; i < x.size(); ++i) {
+    EXPECT_EQ(model.Real(described.references.at(described.states[i])), x[i]);
+    EXPECT_EQ(model.Real(described.references.at("der(" + described.states[i] + ")")), rates[i]);
+  }
+  const double energy = model.Real(described.references.at("energy.kinetic")) +
+                        model.Real(described.references.at("energy.potential"));
+  // co-simulation to 1 s in steps that are no multiple of the integrator's
+  for (int i = 0; i < 64; ++i) {
+    ASSERT_EQ(
+        (model.Call<int (*)(void*, double, double, int)>("fmi2DoStep", i / 64.0, 1 / 64.0, 1)), 0);
+  }
+  for (std::size_t i = 0; i < x.size(); ++i) {
+    EXPECT_NEAR(model.Real(described.references.at(described.states[i])), expected[i], kMotion);
+  }
+  EXPECT_NEAR(model.Real(described.references.at("energy.kinetic")) +
+                  model.Real(described.references.at("energy.potential")),
+              energy, kMotion);
+  EXPECT_EQ((model.Call<int (*)(void*, double, double, int)>("fmi2DoStep", 1.0, -1.0, 1)), 3);
+}
+
+}  // namespace
+}  // namespace loopbench::harness

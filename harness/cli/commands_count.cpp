@@ -36,15 +36,6 @@ std::vector<Enum> ParseAll(const std::vector<std::string>& names, std::vector<En
   return all;
 }
 
-std::vector<std::string> FormulationsOf(const CountCommand& command) {
-  if (!command.formulations.empty()) return command.formulations;
-  std::vector<std::string> names;
-  for (const FormulationRow& row : Formulations()) {
-    if (!row.is_peer()) names.push_back(row.name);
-  }
-  return names;
-}
-
 std::string Text(const Record& row, const char* key) {
   return std::get<std::string>(*row.Find(key));
 }
@@ -91,7 +82,9 @@ void SetCounts(const generate::RecordingSubject& subject, const generate::Record
 void CountPart(const CountCommand& command, const MechanismDescription& part, Coordinates set,
                std::size_t most_nodes, std::vector<Record>& rows) {
   const BenchmarkState state = ComputeState(part, set);
-  for (const std::string& formulation : FormulationsOf(command)) {
+  const std::vector<std::string> formulations =
+      command.formulations.empty() ? FormulationNamesWithoutPeers() : command.formulations;
+  for (const std::string& formulation : formulations) {
     for (const Enforcement level : ParseAll<Enforcement>(
              command.levels,
              {Enforcement::kAcceleration, Enforcement::kVelocity, Enforcement::kBaumgarte})) {
@@ -310,6 +303,7 @@ int CountOperations(const CountCommand& command, const std::string& typed) {
   } else {
     WriteFileAtomically(command.out, text);
     Print("wrote {}\n", command.out.string());
+    for (const std::string& sentence : crossovers) Print("{}\n", sentence);
   }
   return code;
 }

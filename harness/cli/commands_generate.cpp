@@ -1,5 +1,7 @@
 #include "harness/cli/commands_generate.h"
 
+#include <algorithm>
+#include <cmath>
 #include <sstream>
 
 #include "harness/cli/options.h"
@@ -45,7 +47,19 @@ struct Motion {
   std::vector<exchange::MotionState> states = {};
   Outcome outcome = Outcome::kFinished;
   double t_reached = 0.0;
+  double step = 0.0;  ///< for fixed steps
 };
+
+/// A quarter of the median step of `states`, at most 1 ms, down to 1, 2 or 5 of its decade.
+double StepOf(const std::vector<exchange::MotionState>& states) {
+  std::vector<double> steps;
+  for (std::size_t i = 1; i < states.size(); ++i) steps.push_back(states[i].t - states[i - 1].t);
+  if (steps.empty()) return 1e-3;
+  std::ranges::nth_element(steps, steps.begin() + std::ssize(steps) / 2);
+  const double step = std::min(1e-3, steps[steps.size() / 2] / 4.0);
+  const double decade = std::pow(10.0, std::floor(std::log10(step) + 1e-9));
+  return decade * (step >= 5.0 * decade ? 5.0 : step >= 2.0 * decade ? 2.0 : 1.0);
+}
 
 /// Accepted steps of the motion from the assembled start; the mode of the start stays, as it does
 /// in generated code.
@@ -74,6 +88,7 @@ Motion Move(const GenerateCommand& command, const generate::RecordingSubject& su
   const IntegratorResult result = Integrate(*system, 0.0, command.horizon, y, options, note);
   motion.outcome = result.outcome;
   motion.t_reached = result.t_reached;
+  motion.step = command.step > 0.0 ? command.step : StepOf(motion.states);
   const std::size_t every = motion.states.size() / kMostStates + 1;
   for (std::size_t i = 0; i * every < motion.states.size(); ++i) {
     std::swap(motion.states[i], motion.states[i * every]);
@@ -98,18 +113,18 @@ int GenerateHere(const GenerateCommand& command) {
       .provenance = {lines.at(0) + ", " + lines.at(1),
                      fmt::format("{}: formulation {}, level {}, {} coordinates, solver {}",
                                  command.mechanism.filename().string(), command.formulation,
-                                 command.level, command.coordinates, command.solver)},
-      .step = command.step};
+                                 command.level, command.coordinates, command.solver)}};
   const Motion motion = description.space == SpaceKind::kPlanar
                             ? Move<Planar>(command, request.subject)
                             : Move<Spatial>(command, request.subject);
   request.start = motion.start;
   request.motion = motion.states;
+  request.step = motion.step;
   exchange::Code code;
   std::string fmu;
   try {
     code = exchange::MakeCode(request);
-    if (!command.fmu.empty()) fmu = exchange::MakeFmu(code, file.description.name, command.step);
+    if (!command.fmu.empty()) fmu = exchange::MakeFmu(code, file.description.name, motion.step);
   } catch (const generate::NotCovered& why) {
     throw ConfigError(command.mechanism.string() + ": cannot be generated: " + why.what());
   }
@@ -168,10 +183,10 @@ GenerateOptions::GenerateOptions(CLI::App& app) {
   app_->add_option("--out,-o", generate_.out, "Folder of the C files")->required();
   app_->add_option("--fmu", generate_.fmu, "File for an FMU (FMI 2.0) of the same code");
   app_->add_option("--formulation", generate_.formulation, "Formulation")
-      ->check(CLI::IsMember(FormulationNames()))
+      ->check(CLI::IsMember(FormulationNamesWithoutPeers()))
       ->capture_default_str();
   app_->add_option("--level", generate_.level, "Level of enforcement")
-      ->check(CLI::IsMember(LevelNames()))
+      ->check(CLI::IsMember({"acceleration", "velocity"}))
       ->capture_default_str();
   app_->add_option("--coordinates", generate_.coordinates, "Coordinate set")
       ->check(CLI::IsMember({"joint", "absolute"}))
@@ -183,9 +198,10 @@ GenerateOptions::GenerateOptions(CLI::App& app) {
                    "Duration of the motion whose branches are generated [s]")
       ->check(NumberFrom(0.0, 1e6))
       ->capture_default_str();
-  app_->add_option("--step", generate_.step, "Step of the example and of co-simulation [s]")
-      ->check(NumberFrom(1e-9, 1e3))
-      ->capture_default_str();
+  app_->add_option("--step", generate_.step,
+                   "Step of the example and of co-simulation [s] (default: a quarter of the "
+                   "median step of ode45 at 1e-6, at most 1e-3)")
+      ->check(NumberFrom(1e-9, 1e3));
   AddJson(app_, &generate_.json);
   app_->add_option("--cpu", generate_.limits.cpu_s, "CPU time [s]")
       ->check(NumberFrom(0.001, 1e9))

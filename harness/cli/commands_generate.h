@@ -16,7 +16,7 @@ struct GenerateCommand {
   std::string formulation = "lagrange", level = "acceleration", coordinates = "joint";
   std::string solver = "rank-revealing";
   double horizon = 10.0;  ///< of the motion whose branches are generated [s]
-  double step = 1e-3;     ///< of the example and of co-simulation [s]
+  double step = 0.0;      ///< of the example and of co-simulation [s]; 0: of the motion
   bool json = false;
   ProcessLimits limits = kFileLimits;
 };

@@ -35,13 +35,9 @@ CountOptions::CountOptions(CLI::App& app) {
   app_->add_option("--sizes", count_.sizes, "Sizes of the family's members: a,b")
       ->delimiter(',')
       ->needs(family);
-  std::vector<std::string> formulations;
-  for (const FormulationRow& row : Formulations()) {
-    if (!row.is_peer()) formulations.push_back(row.name);
-  }
   app_->add_option("--formulation", count_.formulations, "Formulations (default: all): a,b")
       ->delimiter(',')
-      ->check(CLI::IsMember(formulations));
+      ->check(CLI::IsMember(FormulationNamesWithoutPeers()));
   app_->add_option("--level", count_.levels, "Levels (default: all that are recorded): a,b")
       ->delimiter(',')
       ->check(CLI::IsMember(LevelNames()));

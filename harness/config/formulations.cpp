@@ -90,6 +90,14 @@ std::vector<std::string> FormulationNames() {
   return names;
 }
 
+std::vector<std::string> FormulationNamesWithoutPeers() {
+  std::vector<std::string> names;
+  for (const FormulationRow& row : Rows()) {
+    if (!row.is_peer()) names.push_back(row.name);
+  }
+  return names;
+}
+
 const FormulationRow* FindFormulation(std::string_view name) {
   const auto row = std::ranges::find(Rows(), name, &FormulationRow::name);
   return row == Rows().end() ? nullptr : &*row;

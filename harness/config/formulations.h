@@ -72,6 +72,8 @@ void RegisterFormulation(FormulationRow row, int alignment = EIGEN_MAX_STATIC_AL
 /// they are.
 const std::deque<FormulationRow>& Formulations();
 std::vector<std::string> FormulationNames();
+/// Without those of other engines, which have right-hand sides of their own.
+std::vector<std::string> FormulationNamesWithoutPeers();
 /// Null for a name that is not registered: stores may hold records of other programs.
 const FormulationRow* FindFormulation(std::string_view name);
 

@@ -23,6 +23,7 @@ class GeneratedDerivative final : public CompiledDerivative {
   GeneratedDerivative(const RecordingSubject& subject, const System<Space, double>& system);
 
   bool Evaluate(double t, std::span<const double> y, std::span<double> ydot) override;
+  bool Jacobian(double t, std::span<const double> y, std::span<double> jacobian) override;
   void ModeChanged() override;
   std::int64_t misses() const override { return misses_; }
   double seconds() const override { return seconds_; }
@@ -34,15 +35,26 @@ class GeneratedDerivative final : public CompiledDerivative {
   /// Notes time, positions and speeds of the system, which start the mode of recordings.
   void NoteStart();
   void AddBranch(double t, std::span<const double> y);
-  bool Call(const CompiledBranch& branch, std::span<double> ydot);
+  /// Puts time and state where compiled functions read them.
+  void SetInputs(double t, std::span<const double> y);
+  bool Call(const CompiledBranch& function, std::span<double> results);
+  CompiledBranch Compile(const RecordedFunction& recorded);
+
+  struct Branch {
+    RecordedFunction recorded;
+    CompiledBranch derivative;
+    CompiledBranch jacobian = {};  ///< compiled at its first use
+    bool has_no_jacobian = false;  ///< it is too long
+  };
 
   RecordingSubject subject_;
   const System<Space, double>& system_;
   RecordingStart start_;
-  std::vector<CompiledBranch> branches_;  ///< the one that served last stands first
-  std::vector<double> x_, room_;          ///< time and state; intermediate values
+  std::vector<Branch> branches_;  ///< the one that served last stands first
+  std::vector<double> x_, room_;  ///< time and state; intermediate values
   std::int64_t misses_ = 0;
   int misses_left_ = 0;  ///< until the next branch is recorded
+  int attempts_ = 0;     ///< recordings in this mode
   double seconds_ = 0.0;
 };
 

@@ -183,6 +183,18 @@ std::string CostLine(const Tradeoff& tradeoff) {
   return line;
 }
 
+/// Whether formulations of compared rows run as the library's code, which is not alike for all.
+bool ComparesLibraryCode(const Tradeoff& tradeoff) {
+  std::set<std::string> formulations;
+  for (const TradeoffProblem& problem : tradeoff.problems) {
+    for (const TradeoffRow& row : problem.rows) {
+      if (!row.reason.empty() || !row.record.Text("execution").empty()) continue;
+      formulations.insert(row.record.Text("formulation"));
+    }
+  }
+  return formulations.size() > 1 && formulations.contains("odca");
+}
+
 }  // namespace
 
 std::vector<std::string> FairnessStatement(const Tradeoff& tradeoff) {
@@ -215,6 +227,12 @@ std::vector<std::string> FairnessStatement(const Tradeoff& tradeoff) {
     lines.push_back(fmt::format("{} of {} rows are not compared: {}", left_out, all, reasons));
   }
   if (!IsTime(tradeoff.cost)) return lines;
+  if (ComparesLibraryCode(tradeoff)) {
+    lines.emplace_back(
+        "not equal: the library's code. O-DCA has special code (planar pins, arms in space), vector "
+        "instructions and fused multiply-add; other formulations have none. Equal code: execution "
+        "generated; methods without code: loopbench count");
+  }
   if (!one_machine) {
     lines.push_back("warning: the costs are times of more than one machine, which do not compare");
   }

@@ -14,10 +14,14 @@ class CompiledDerivative {
   /// branch that is not compiled; then `ydot` is unspecified and the system evaluates its own text.
   virtual bool Evaluate(double t, std::span<const double> y, std::span<double> ydot) = 0;
 
+  /// Writes d(dy/dt)/dy of the first `jacobian.size() / y.size()` numbers of y, column after
+  /// column. Returns false as Evaluate() does, and if it cannot be compiled.
+  virtual bool Jacobian(double t, std::span<const double> y, std::span<double> jacobian) = 0;
+
   /// Notes that the mode of the system has changed: earlier branches are no longer valid.
   virtual void ModeChanged() = 0;
 
-  /// Evaluations that returned false.
+  /// Calls that returned false.
   virtual std::int64_t misses() const = 0;
   /// Wall time [s] for recording and compiling.
   virtual double seconds() const = 0;

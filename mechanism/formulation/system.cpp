@@ -284,6 +284,9 @@ std::optional<JacobianWork> System<Space, S>::Jacobian(S t, std::span<const S> y
                                                        std::span<S> jacobian) {
   if (jacobian_ == nullptr) return std::nullopt;
   if constexpr (std::is_same_v<S, double>) {
+    if (compiled_ != nullptr && compiled_->Jacobian(t, y, jacobian)) {
+      return JacobianWork{.derivatives = 0, .dual_evaluations = 0};
+    }
     JacobianWork work{.derivatives = 0, .dual_evaluations = jacobian_->evaluations()};
     if (!IsAt(t, y)) {
       if (Examine(t, y, scratch_) != Outcome::kFinished) return std::nullopt;  // it will say why

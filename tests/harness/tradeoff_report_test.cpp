@@ -74,6 +74,13 @@ TEST(Fairness, SaysWhatWasEqualAndWhatWasNot) {
               {"integrator (ode45 1, verner 1)", "1 of 3 rows are not compared: doubts: energy 1"});
 }
 
+TEST(Fairness, TheLibrarysCodeIsNotEqualForAllFormulations) {
+  std::vector<Record> records = Store({1e-3, 1e-6, 1e-9}, {0.1, 0.2, 0.4});
+  ExpectWords(Statement(records), {"not equal: the library's code", "execution generated"});
+  for (Record& record : records) record.Set("execution", std::string("generated"));
+  ExpectWords(Statement(records), {"library's code"}, false);
+}
+
 TEST(Fairness, WarnsOfTimesOfTwoMachinesAndOfANoisyOne) {
   std::vector<Record> records = Store({1e-3, 1e-6}, {0.1, 0.2});
   records[1].Set("machine", std::string("another"));

@@ -185,8 +185,8 @@ std::string MakeFmu(const Code& code, const std::string& model_name, double step
   words["STEP"] = NumberText(step);
   const CodeFile* header = &code.files[0];
   const CodeFile* source = &code.files[1];
-  const std::string all =
-      Fill(kFunctions, words) + header->text + source->text + Description(code, model_name, "", step);
+  const std::string all = Fill(kFunctions, words) + header->text + source->text +
+                          Description(code, model_name, "", step);
   const std::string guid = harness::Fnv1a(all) + harness::Fnv1a(harness::Fnv1a(all) + all);
   words["GUID"] = guid;
   const std::string functions = Fill(kFunctions, words);

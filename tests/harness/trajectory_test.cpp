@@ -448,14 +448,14 @@ TEST_F(Command, OneLineReadsItInGnuplotAndPandas) {
   WriteExperiment(R"({"number": 50})", "four-bar.json");
   ExpectEnding(Call("run out.json --out out"), 0, {});
   fs::copy_file(Files("out/trajectories").at(0), folder_ / "rows.csv");
-  // the lines of docs/using.md
-  const std::string using_md = ReadFile(fs::path(LOOPBENCH_SOURCE_DIR) / "docs/using.md");
+  // the lines of docs/trajectories.md
+  const std::string trajectories_md = ReadFile(fs::path(LOOPBENCH_SOURCE_DIR) / "docs/trajectories.md");
   const std::string plot =
       R"(set datafile separator comma; plot "rows.csv" using "t [s]":"joint:OA:angle [rad]" with lines)";
   const std::string frame =
       R"(import pandas; rows = pandas.read_csv("rows.csv", comment="#", index_col="t [s]"))";
-  EXPECT_NE(using_md.find(plot), std::string::npos);
-  EXPECT_NE(using_md.find(frame), std::string::npos);
+  EXPECT_NE(trajectories_md.find(plot), std::string::npos);
+  EXPECT_NE(trajectories_md.find(frame), std::string::npos);
   const auto run = [&](const std::string& command) {
     return std::system(("cd '" + folder_.string() + "' && " + command + " >log 2>&1").c_str());
   };

@@ -7,7 +7,7 @@ namespace own {
 
 using namespace loopbench;
 
-/// Half of what the speeds miss is mended in every evaluation.
+/// Half of the violation of the speeds is removed in every evaluation.
 template <class Space, class S>
 class HalfVelocity final : public Level<Space, S> {
  public:
@@ -33,7 +33,7 @@ class HalfVelocity final : public Level<Space, S> {
 
 inline LevelRow HalfVelocityRow() {
   return LevelRowOf<HalfVelocity>({.name = "half-velocity",
-                                   .sentence = "half of what the speeds miss is mended.",
+                                   .sentence = "half of the violation of the speeds is removed.",
                                    .growth = DriftGrowth::kSquare,
                                    .abbreviation = "half"});
 }

@@ -24,7 +24,7 @@ namespace loopbench::harness {
 namespace {
 
 constexpr const char* kFooter = R"(
-DIR receives NAME.h, NAME.c, example.c and CMakeLists.txt: C99 without heap or libraries, for controllers, hardware in
+DIR receives NAME.h, NAME.c, NAME_example.c and CMakeLists.txt: C99 without heap or libraries, for controllers, hardware in
 the loop and other languages. docs/generated-code.md describes the functions and calls them from Python.
 
 Code is generated for each branch (pivots, singular values) that the motion takes within the horizon. In a state of
@@ -32,7 +32,7 @@ another branch the functions return 1.
 
 Examples:
   loopbench generate configs/mechanisms/four-bar.json --out four-bar-c
-  cmake -S four-bar-c -B four-bar-c/build && cmake --build four-bar-c/build && four-bar-c/build/example 1 1e-3
+  cmake -S four-bar-c -B four-bar-c/build && cmake --build four-bar-c/build && four-bar-c/build/four_bar_example 1 1e-3
   loopbench generate configs/mechanisms/stewart-platform.json --formulation lagrange --out stewart --fmu stewart.fmu
 
 Exit codes: 0 done, 2 bad input or the mechanism cannot be generated.)";
@@ -151,8 +151,8 @@ int GenerateHere(const GenerateCommand& command) {
     PrintText(document.Text() + "\n");
     return 0;
   }
-  Print("wrote {}.h, {}.c, example.c and CMakeLists.txt to {}{}\n", code.identifier,
-        code.identifier, command.out.string(), fmu.empty() ? "" : ", and " + command.fmu.string());
+  Print("wrote {0}.h, {0}.c, {0}_example.c and CMakeLists.txt to {1}{2}\n", code.identifier,
+        command.out.string(), fmu.empty() ? "" : ", and " + command.fmu.string());
   Print("{} states; weighted operations (branches): ", code.state_names.size());
   bool is_first = true;
   for (const exchange::CodeFunction& function : code.functions) {

@@ -57,8 +57,8 @@ Branches RecordAlong(const CodeRequest& request, Quantity quantity) {
   generate::RecordingSubject subject = request.subject;
   subject.quantity = quantity;
   Branches branches;
-  // The mode of a recording, such as its released directions, is chosen where it starts. It starts
-  // earlier than it records: what is said of accepted steps alone shall not become a branch.
+  // A recording chooses its mode, such as released directions, at its start. It starts earlier than
+  // it records, because checks of accepted steps must not become branches.
   const auto start_at = [&](const MotionState& state) {
     const auto num_q = request.start.q.size(), num_u = request.start.u.size();
     if (std::ssize(state.y) != num_q + num_u) return request.start;  // without some speeds
@@ -91,8 +91,13 @@ Branches RecordAlong(const CodeRequest& request, Quantity quantity) {
     MotionState near = state;
     for (std::size_t i = 0; i < near.y.size(); ++i) near.y[i] += generate::ShiftOf(i);
     near.t += generate::ShiftOf(near.y.size());
-    branches.recorded.push_back(record(near));
-    if (!serves(branches.recorded.back())) branches.recorded.push_back(record(state));
+    try {
+      branches.recorded.push_back(record(near));
+      if (!serves(branches.recorded.back())) branches.recorded.push_back(record(state));
+    } catch (const generate::NotCovered&) {
+      if (branches.recorded.empty()) throw;
+      ++branches.missed;
+    }
   }
   return branches;
 }
@@ -222,13 +227,13 @@ set(CMAKE_C_EXTENSIONS OFF)
 if(NOT CMAKE_BUILD_TYPE)
   set(CMAKE_BUILD_TYPE Release)
 endif()
-add_library(@ID@ @ID@.c)
-set_target_properties(@ID@ PROPERTIES POSITION_INDEPENDENT_CODE ON)
-target_compile_options(@ID@ PRIVATE -ffp-contract=off)
-target_include_directories(@ID@ PUBLIC ${CMAKE_CURRENT_SOURCE_DIR})
-target_link_libraries(@ID@ PUBLIC m)
-add_executable(example example.c)
-target_link_libraries(example PRIVATE @ID@)
+add_library(@ID@_model @ID@.c)
+set_target_properties(@ID@_model PROPERTIES OUTPUT_NAME @ID@ POSITION_INDEPENDENT_CODE ON)
+target_compile_options(@ID@_model PRIVATE -ffp-contract=off)
+target_include_directories(@ID@_model PUBLIC ${CMAKE_CURRENT_SOURCE_DIR})
+target_link_libraries(@ID@_model PUBLIC m)
+add_executable(@ID@_example @ID@_example.c)
+target_link_libraries(@ID@_example PRIVATE @ID@_model)
 )";
 
 /// Writes the texts of the product.
@@ -266,7 +271,7 @@ class Writer {
     code_.files = {{code_.identifier + ".h", comment + Fill(kHeaderBegin, words_) + declarations_ +
                                                  Fill(kHeaderEnd, words_)},
                    {code_.identifier + ".c", comment + Source()},
-                   {"example.c", comment + Fill(kExample, words_)},
+                   {code_.identifier + "_example.c", comment + Fill(kExample, words_)},
                    {"CMakeLists.txt", Fill(kBuild, words_)}};
   }
 

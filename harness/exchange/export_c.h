@@ -45,7 +45,7 @@ struct Code {
   std::vector<double> start;                                    ///< state at the start
   std::vector<std::pair<std::string, std::string>> pose_words;  ///< numbers of a pose, with units
   std::vector<CodeFunction> functions;
-  std::vector<CodeFile> files;  ///< IDENTIFIER.h, IDENTIFIER.c, example.c, CMakeLists.txt
+  std::vector<CodeFile> files;  ///< NAME.h, NAME.c, NAME_example.c, CMakeLists.txt
 };
 
 /// Records each function wherever the motion takes a new branch, at most kMostCodeBranches times

@@ -31,7 +31,7 @@ class GenerateTest : public CommandLineTest {
   void Compile(const std::string& compiler, const std::string& name) const {
     ExpectEnding(Shell(compiler +
                        " -std=c99 -pedantic -Wall -Wextra -Werror -O1 -ffp-contract=off "
-                       "-o example code/example.c code/" +
+                       "-o example code/*_example.c code/" +
                        name + ".c -lm"),
                  0, {});
   }
@@ -128,7 +128,8 @@ int main(void) {
 }
 )");
   const Ending ending = Shell(
-      "cc -std=c99 -pedantic -Wall -Wextra -Werror -Icode -o user user.c code/four_bar.c -lm && ./user");
+      "cc -std=c99 -pedantic -Wall -Wextra -Werror -Icode -o user user.c code/four_bar.c -lm && "
+      "./user");
   ExpectEnding(ending, 0, {"1 1 1 1"});
 }
 
@@ -151,6 +152,17 @@ TEST_F(GenerateTest, NamesOfUsersNeverBecomeCode) {
     ExpectEnding(Shell(std::string(compiler) +
                        " -std=c99 -pedantic -Wall -Wextra -Werror -c code/mechanism_*.c"),
                  0, {});
+  }
+}
+
+/// CMake reserves such names for targets of its own.
+TEST_F(GenerateTest, AMechanismMayBeCalledTestOrExample) {
+  for (const std::string name : {"test", "example"}) {
+    EditMechanism("\"name\": \"four-bar\"", "\"name\": \"" + name + "\"");
+    ExpectEnding(Call("generate four-bar.json --out " + name), 0, {name + "_example.c"});
+    ExpectEnding(Shell("cmake -S " + name + " -B " + name + "/build && cmake --build " + name +
+                       "/build && " + name + "/build/" + name + "_example 0.01"),
+                 0, {"energy [J]"});
   }
 }
 

@@ -154,7 +154,7 @@ TEST(LevelsTest, TheProgramKnowsItInAllCommands) {
     std::filesystem::create_directories(folder);
     const std::string file = folder / "own.json", out = folder / "out";
     WriteFileAtomically(file, Text(R"("velocity", "half-velocity")"));
-    ExpectPart(Printed({"explain", file}), "half-velocity: half of what the speeds miss");
+    ExpectPart(Printed({"explain", file}), "half-velocity: half of the violation of the speeds");
     ExpectPart(Printed({"run", file, "--out", out}), "half");
     ExpectPart(Printed({"table", out, "--where", "enforcement=half-velocity", "--format", "csv"}),
                "lagrange,half-velocity,joint");

@@ -10,6 +10,7 @@
 #include "harness/cli/advise_models.h"
 #include "harness/cli/certain_motion.h"
 #include "harness/config/experiment_writer.h"
+#include "harness/config/formulations.h"
 #include "harness/config/mechanism_reader.h"
 #include "harness/isolation/print_from_child.h"
 #include "harness/run/run_case.h"
@@ -195,6 +196,15 @@ void PrintAdvice(const AdviseCommand& command, const Advice& advice, const Refer
     Print("Runner-up: {}, {:.2f} times the time, error {:.1e} m\n", ToString(next->choice),
           next->wall_s / best.wall_s, next->error);
   }
+  if (advice.generated) {
+    const Column& column = advice.generated->choice.column;
+    Print(
+        "Generated code with the same integrator, level and tolerance: {}, {:.2f} times the time, "
+        "error {:.1e} m\n",
+        column.formulation, advice.generated->wall_s / best.wall_s, advice.generated->error);
+  } else if (command.generated) {
+    Print("Generated code: no formulation could be generated and finished\n");
+  }
   Print("\nFinalists, timed in turn\n\n");
   PrintText(ToScreen(TableOf(advice.finalists, best, horizon)));
   std::vector<Trial> finished;
@@ -227,6 +237,22 @@ CertainMotion CertainFor(const AdviseCommand& command, const MechanismDescriptio
                            command.mechanism.string() + ": advice");
 }
 
+/// Runs generated code of all formulations with the integrator, level and tolerance of `best`.
+std::optional<Trial> FastestGenerated(TrialBench& bench, const Trial& best) {
+  std::optional<Trial> fastest;
+  for (const std::string& formulation : FormulationNamesWithoutPeers()) {
+    Choice choice = best.choice;
+    choice.column.formulation = formulation;
+    choice.column.execution = Execution::kGenerated;
+    constexpr double kCpu_s = 60.0;
+    Trial trial = bench.Try(choice, kCpu_s);
+    if (!std::isfinite(trial.error)) continue;
+    bench.Settle(&trial);
+    if (!fastest || trial.wall_s < fastest->wall_s) fastest = trial;
+  }
+  return fastest;
+}
+
 Advice AdviceFor(const AdviseCommand& command, const MechanismFile& file,
                  const CertainMotion& certain, const std::vector<MeasuredPoint>& points,
                  const AdviceRequest& request) {
@@ -236,9 +262,14 @@ Advice AdviceFor(const AdviseCommand& command, const MechanismFile& file,
                          .points = points};
   const auto bench = MakeTrialBench(scene);
   const auto find = command.exhaustive ? &Sweep : static_cast<decltype(&Sweep)>(&Advise);
-  return find(request, *bench, certain.horizon, LinkLength(file.description), [&](Trial& trial) {
-    Examine(file, certain.horizon, certain.reference, points.empty(), trial);
-  });
+  Advice advice =
+      find(request, *bench, certain.horizon, LinkLength(file.description), [&](Trial& trial) {
+        Examine(file, certain.horizon, certain.reference, points.empty(), trial);
+      });
+  if (command.generated && !advice.finalists.empty()) {
+    advice.generated = FastestGenerated(*bench, advice.finalists.front());
+  }
+  return advice;
 }
 
 /// What a model causes and saves, as a row; `whole` is what the whole model takes [s].

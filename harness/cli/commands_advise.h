@@ -18,6 +18,7 @@ struct AdviseCommand {
   std::filesystem::path out;        ///< file of the experiment that reproduces the advice
   std::string format = "text";      ///< of the table: text, csv, markdown, json, latex
   bool simplify = false;            ///< simpler models of the scene too
+  bool generated = false;           ///< generated code too
   bool exhaustive = false;          ///< the whole product in place of a pilot
   ProcessLimits limits = {.cpu_s = 120.0, .memory_mb = 2048.0};
 };

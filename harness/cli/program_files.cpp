@@ -222,23 +222,22 @@ void FileOptions::AddAdvise(CLI::App& app) {
           ->check(NumberFrom(1e-13, 1e9));
   advise_app_
       ->add_option("--budget", advise_.budget,
-                   "Instead: the most accurate way within so many wall seconds per simulated one")
+                   "Wall-time budget per simulated second; find the most accurate method")
       ->check(NumberFrom(1e-9, 1e6))
       ->excludes(error);
   advise_app_->add_option("--horizon", advise_.horizon, "Simulated time [s]")
       ->check(NumberFrom(1e-9, 1e9))
       ->capture_default_str();
   advise_app_->add_option("--points", advise_.points,
-                          "Whose error counts: BODY.POINT, or BODY for its centre of mass "
-                          "(default: all points)");
+                          "Points that define the error: BODY.POINT or BODY (default: all)");
   advise_app_
       ->add_flag("--simplify", advise_.simplify,
-                 "Try simpler models of the scene too (loopbench simplify), and say what each "
-                 "causes and saves")
+                 "Also try simpler models, with their errors and times (loopbench simplify)")
       ->excludes("--budget");
+  advise_app_->add_flag("--generated", advise_.generated,
+                        "Also time generated code of all formulations with the advice's settings");
   advise_app_->add_flag("--exhaustive", advise_.exhaustive,
-                        "Try the whole product of formulations, levels, methods and tolerances; "
-                        "give it --cpu");
+                        "Try all combinations of formulation, level, integrator and tolerance");
   advise_app_->add_option("--out", advise_.out, "File for the experiment that reproduces it");
   advise_app_->add_option("--format", advise_.format, "Of the finalists' table")
       ->check(CLI::IsMember({"text", "csv", "markdown", "json", "latex"}))

@@ -91,6 +91,7 @@ CompiledBranch GeneratedDerivative<Space>::Compile(const RecordedFunction& recor
 
 template <class Space>
 void GeneratedDerivative<Space>::ModeChanged() {
+  const Timer timer(seconds_);  // graphs are large
   branches_.clear();
   NoteStart();
   attempts_ = misses_left_ = 0;  // the next evaluation is recorded

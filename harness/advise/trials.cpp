@@ -175,15 +175,12 @@ std::unique_ptr<TrialBench> MakeTrialBench(const TrialScene& scene) {
 std::string WhatLimits(const Trial& trial, double reference_error) {
   if (!std::isfinite(trial.error)) return "it did not finish";
   if (trial.error <= 10 * reference_error) {
-    return "the reference is not certified to much more than this error";
+    return "unknown, because the reference is not certified much below it";
   }
   if (trial.shape < 0.2 * trial.error) {
-    return fmt::format(
-        "time on the way: it is {:.1e} s late or early, and keeps to the way to {:.1e} m",
-        trial.late, trial.shape);
+    return fmt::format("phase error {:.1e} s; path error {:.1e} m", trial.late, trial.shape);
   }
-  return fmt::format("the way itself: {:.1e} m off it, {:.1e} s late or early on it", trial.shape,
-                     trial.late);
+  return fmt::format("path error {:.1e} m; phase error {:.1e} s", trial.shape, trial.late);
 }
 
 }  // namespace loopbench::harness

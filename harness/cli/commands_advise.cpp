@@ -187,7 +187,7 @@ void PrintAdvice(const AdviseCommand& command, const Advice& advice, const Refer
           ToString(best.choice), best.error, best.wall_s);
   }
   if (!best.doubts.empty()) Print("  doubtful: {}\n", best.doubts);
-  Print("What limits it is {}.\n", WhatLimits(best, reference.Certified().position));
+  Print("Dominant error: {}.\n", WhatLimits(best, reference.Certified().position));
   const auto next = std::ranges::find_if(advice.finalists, [&](const Trial& trial) {
     return trial.choice.integrator != best.choice.integrator ||
            trial.choice.column.formulation != best.choice.column.formulation;
@@ -218,10 +218,10 @@ void PrintAdvice(const AdviseCommand& command, const Advice& advice, const Refer
       if (std::ranges::find(cut_off, name) == cut_off.end()) cut_off.push_back(name);
     }
   }
-  Print("\nThe best of each method and level, as the pilot had it\n\n");
+  Print("\nThe best of each integrator and level (pilot runs)\n\n");
   PrintText(ToScreen(TableOf(finished, best, horizon)));
   if (!cut_off.empty()) {
-    Print("\nfailed or cut off as dearer, at some level: {}\n",
+    Print("\nfailed, or stopped because slower than the best: {}\n",
           fmt::format("{}", fmt::join(cut_off, ", ")));
   }
   Print(

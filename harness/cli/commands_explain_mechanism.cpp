@@ -77,8 +77,7 @@ void PrintFreedom(const Structure& s, const ExplainView& view) {
   if (s.rank > 0 && s.singular_values.size() == 0) {
     Say(view, "  all constraints are independent at the start, by sparse pivots\n");
   } else if (s.rank > 0) {
-    Say(view,
-        "  scaled singular values at the start: {:.3g} largest, {:.3g} smallest that counts\n",
+    Say(view, "  scaled singular values at the start: {:.3g} largest, {:.3g} smallest nonzero\n",
         s.singular_values[0], s.singular_values[s.rank - 1]);
   }
 }
@@ -246,9 +245,9 @@ int ExplainMechanism(const std::filesystem::path& path, const ExplainView& view)
   PrintIslands(description, structure, view);
   PrintCoordinates(structure, view);
   PrintPlanOfJoins(description, view);
-  Say(view, "\nWhat need not be modelled\n");
+  Say(view, "\nPossible simplifications\n");
   const Compiled compiled = Compile(description, CompileOptions::All());
-  if (compiled.report.empty()) Say(view, "  nothing to save\n");
+  if (compiled.report.empty()) Say(view, "  none\n");
   for (const std::string& line : compiled.report) Say(view, "  {}\n", line);
   if (compiled.done != CompileOptions::None()) {
     Say(view, "  Savings found: {}. By default a run makes: {} (\"compile\" of an experiment).\n",

@@ -180,7 +180,7 @@ int GenerateHere(const GenerateCommand& command) {
 GenerateOptions::GenerateOptions(CLI::App& app) {
   app_ = app.add_subcommand("generate", "Write a mechanism's equations of motion as C99 or FMU");
   app_->add_option("mechanism", generate_.mechanism, "Mechanism file (JSON)")->required();
-  app_->add_option("--out,-o", generate_.out, "Folder of the C files")->required();
+  app_->add_option("-o,--out", generate_.out, "Folder of the C files")->required();
   app_->add_option("--fmu", generate_.fmu, "File for an FMU (FMI 2.0) of the same code");
   app_->add_option("--formulation", generate_.formulation, "Formulation")
       ->check(CLI::IsMember(FormulationNamesWithoutPeers()))

@@ -18,8 +18,7 @@ inline Selection ParseSelection(const std::vector<std::string>& conditions) {
 
 /// For commands that print tables.
 inline void AddWide(CLI::App* app) {
-  app->add_flag_callback("--wide", ShowWide,
-                         "Tables on a terminal as wide as they take, with all columns");
+  app->add_flag_callback("--wide", ShowWide, "Show all columns; do not fit tables to the terminal");
 }
 
 inline CLI::Option* AddJson(CLI::App* app, bool* json) {

@@ -74,6 +74,21 @@ void TakeOneWordEach(CLI::App* app) {
   for (CLI::App* command : app->get_subcommands({})) TakeOneWordEach(command);
 }
 
+/// Headings of `loopbench --help`.
+void GroupCommands(CLI::App& app) {
+  const std::pair<const char*, std::vector<const char*>> groups[] = {
+      {"Mechanisms",
+       {"check", "explain", "view", "simplify", "import", "convert", "count", "generate"}},
+      {"Experiments", {"list", "plan", "run", "merge", "advise"}},
+      {"Results", {"table", "plot", "report", "trajectory", "tradeoff", "map", "verdict"}},
+      {"Regressions", {"compare", "fit", "export", "baseline", "history"}},
+      {"Clusters", {"submit", "status", "collect"}},
+      {"Shell", {"schema", "completion", "manual"}}};
+  for (const auto& [heading, names] : groups) {
+    for (const char* name : names) app.get_subcommand(name)->group(heading);
+  }
+}
+
 /// Names the largest input of a command that ran out of memory, and the memory it may use.
 std::string OutOfMemory(const std::bad_alloc& error, const std::vector<std::string>& words) {
   std::string largest;
@@ -122,6 +137,7 @@ int RunCommandLine(int argc, char** argv) {
   HistoryOptions history(app);
   ShellOptions shell(app);
   TakeOneWordEach(&app);
+  GroupCommands(app);
   try {
     app.parse(argc, argv);
   } catch (const CLI::ParseError& error) {

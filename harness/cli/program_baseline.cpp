@@ -26,9 +26,9 @@ Exit codes: 0 same or better (renewed, all caught), 1 worse (not caught), 2 coul
 }  // namespace
 
 BaselineOptions::BaselineOptions(CLI::App& app) {
-  app_ = app.add_subcommand("baseline", "Keep a repository's own baseline of drift and counts");
+  app_ = app.add_subcommand("baseline", "Keep and check a baseline of drift and counts");
   app_->footer(kBaselineFooter);
-  app_->add_option("action", command_.action, "What to do")
+  app_->add_option("action", command_.action, "Action: renew, check or selftest")
       ->required()
       ->check(CLI::IsMember({"check", "renew", "selftest"}));
   app_->add_option("--experiments", command_.experiments, "Experiment files (JSON)")
@@ -40,7 +40,7 @@ BaselineOptions::BaselineOptions(CLI::App& app) {
       ->check(CLI::ExistingFile);
   app_->add_option("--counter", command_.counter,
                    "The program loopbench_count, where it is not beside this one nor in PATH");
-  app_->add_option("--jobs", command_.jobs, "Runs at once")
+  app_->add_option("-j,--jobs", command_.jobs, "Runs at once")
       ->check(NumberFrom(1, 1024))
       ->capture_default_str();
   app_->add_option("--keep", command_.keep, "New folder for what was measured (default: none)");

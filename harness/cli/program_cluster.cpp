@@ -42,14 +42,16 @@ ClusterOptions::ClusterOptions(CLI::App& app) {
   ClusterRun& run = submit_.run;
   submit_app_->add_option("experiment", run.experiments, "Experiment files (JSON)")
       ->check(CLI::ExistingFile);
-  submit_app_->add_option("--out", submit_.folder, "New folder that all machines see")->required();
+  submit_app_->add_option("-o,--out", submit_.folder, "New folder that all machines see")
+      ->required();
   submit_app_->add_option("--tasks", run.parts, "Parts, each a task of the array job")
       ->check(NumberFrom(1, kMostParts));
-  submit_app_->add_option("--jobs", run.jobs, "Cases at once in a part, and processors of its task")
+  submit_app_
+      ->add_option("-j,--jobs", run.jobs, "Cases at once in a part, and processors of its task")
       ->check(NumberFrom(1, kMostJobs))
       ->capture_default_str();
   submit_app_->add_option("--time", time_, "Limit of a part, as sbatch takes it");
-  submit_app_->add_option("--partition", partition_, "Of the cluster");
+  submit_app_->add_option("--partition", partition_, "Slurm partition");
   submit_app_->add_option("--sbatch", run.batch_options,
                           "Another option of sbatch, whole: --sbatch=--account=mine (repeatable)");
   submit_app_->add_option("--filter", run.conditions,
@@ -63,13 +65,13 @@ ClusterOptions::ClusterOptions(CLI::App& app) {
   submit_app_->add_flag("--no-queue", no_queue_, "Write the folder, submit nothing");
   submit_app_->add_flag("--dry-run", submit_.dry_run, "Print the scripts, write nothing");
 
-  status_app_ = app.add_subcommand("status", "How far the parts of a submitted run are");
-  status_app_->add_option("folder", folder_, "Of the submit")->required();
+  status_app_ = app.add_subcommand("status", "Show the progress of a submitted run");
+  status_app_->add_option("folder", folder_, "Folder created by submit")->required();
   AddJson(status_app_, &json_);
   AddWide(status_app_);
 
   collect_app_ = app.add_subcommand("collect", "Merge the parts of a submitted run");
-  collect_app_->add_option("folder", folder_, "Of the submit")->required();
+  collect_app_->add_option("folder", folder_, "Folder created by submit")->required();
   collect_app_->footer(
       "DIR/whole gets every case once, in the order of the experiments. Exit codes: 0 merged, 1 a "
       "part or a\ncase is missing and nothing was written, 2 bad input.");

@@ -46,7 +46,8 @@ ComparisonOptions::ComparisonOptions(CLI::App& app) {
   const CLI::IsMember formats({"text", "csv", "markdown"});
   const std::string what = "Folder of a run, a .jsonl file, or JSON of Google Benchmark";
 
-  compare_app_ = app.add_subcommand("compare", "Hold new measurements against a base");
+  compare_app_ =
+      app.add_subcommand("compare", "Compare results with a baseline and report regressions");
   compare_app_->footer(kCompareFooter);
   compare_app_->add_option("base", files_, what + "; left out beside --history and --branch")
       ->required()
@@ -55,8 +56,7 @@ ComparisonOptions::ComparisonOptions(CLI::App& app) {
   CLI::Option* history = compare_app_->add_option(
       "--history", compare_.history, "Take the last good state of this history as BASE");
   compare_app_
-      ->add_option("--branch", compare_.branch,
-                   "The same of a history on a branch of the repository here")
+      ->add_option("--branch", compare_.branch, "Last good state of a history on this git branch")
       ->excludes(history);
   compare_app_->add_option("--markdown", compare_.markdown,
                            "Write a summary for a pull request to this file too");
@@ -85,7 +85,8 @@ ComparisonOptions::ComparisonOptions(CLI::App& app) {
   AddWide(compare_app_);
   AddJson(compare_app_, &compare_.json);
 
-  fit_app_ = app.add_subcommand("fit", "Fit exponents of time over size to right-hand sides");
+  fit_app_ =
+      app.add_subcommand("fit", "Fit scaling exponents of right-hand sides against mechanism size");
   fit_app_->footer(kFitFooter);
   fit_app_
       ->add_option("file", fit_.file,
@@ -96,16 +97,17 @@ ComparisonOptions::ComparisonOptions(CLI::App& app) {
   fit_app_->add_option("--format", fit_.format, "How the table is written")
       ->check(formats)
       ->capture_default_str();
-  fit_app_->add_option("--out", fit_.out, "File (default: the terminal)");
+  fit_app_->add_option("-o,--out", fit_.out, "File (default: the terminal)");
   AddWide(fit_app_);
 
-  export_app_ = app.add_subcommand("export", "Write measurements for a tracker of benchmarks");
+  export_app_ = app.add_subcommand("export", "Write measurements for a benchmark tracker");
   export_app_->footer(kExportFooter);
   export_app_->add_option("file", export_.file, what)->required();
-  export_app_->add_option("--format", export_.format, "Of github-action-benchmark, or of Bencher")
+  export_app_
+      ->add_option("--format", export_.format, "Output format: github-action-benchmark or Bencher")
       ->check(CLI::IsMember({"customSmallerIsBetter", "bmf"}))
       ->capture_default_str();
-  export_app_->add_option("--out", export_.out, "File (default: the terminal)");
+  export_app_->add_option("-o,--out", export_.out, "File (default: the terminal)");
 }
 
 void ComparisonOptions::TakeFiles() {

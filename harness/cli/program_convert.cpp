@@ -28,7 +28,7 @@ ConvertOptions::ConvertOptions(CLI::App& app) {
                    "mjcf: a model that MuJoCo loads; simbody: a C++17 program that builds a System")
       ->required()
       ->check(CLI::IsMember(ExportFormatNames()));
-  app_->add_option("--out", convert_.out,
+  app_->add_option("-o,--out", convert_.out,
                    "File (default: the mechanism file's name with .xml or .cpp, here)");
   app_->add_option("--step", convert_.options.time_step,
                    "mjcf: MuJoCo's step [s], of which its closures are as stiff as they may be")

@@ -51,7 +51,7 @@ CountOptions::CountOptions(CLI::App& app) {
   app_->add_option("--format", count_.format, "Format of the table")
       ->check(CLI::IsMember({"text", "csv", "markdown", "json", "latex", "jsonl"}))
       ->capture_default_str();
-  app_->add_option("--out", count_.out, "File (default: the terminal)");
+  app_->add_option("-o,--out", count_.out, "File (default: the terminal)");
   AddWide(app_);
   app_->add_option("--cpu", count_.limits.cpu_s, "CPU time per mechanism [s]")
       ->check(NumberFrom(0.001, 1e9))

@@ -25,7 +25,7 @@ void AddSettings(CLI::App* app, std::vector<std::string>* settings) {
 
 /// Of work on a mechanism; experiments say their own ("limits").
 void AddLimits(CLI::App* app, ProcessLimits* limits) {
-  app->add_option("--cpu", limits->cpu_s, "CPU time for one mechanism file [s]")
+  app->add_option("--cpu", limits->cpu_s, "CPU time limit per mechanism file [s]")
       ->check(NumberFrom(0.001, 1e9))
       ->capture_default_str();
   app->add_option("--memory", limits->memory_mb, "Memory for one mechanism file [MiB]")
@@ -69,7 +69,7 @@ FileOptions::FileOptions(CLI::App& app) {
 
   AddCheck(app);
 
-  plan_app_ = app.add_subcommand("plan", "Count cases and runs, estimate how long they take");
+  plan_app_ = app.add_subcommand("plan", "Count cases and runs, and estimate their time");
   plan_app_->add_option("experiment", files_.paths, "Experiment files (JSON)")->required();
   plan_app_->add_option("--from", plan_.from,
                         "Earlier results whose times are used, not a pilot's");
@@ -88,17 +88,17 @@ FileOptions::FileOptions(CLI::App& app) {
 
 void FileOptions::AddRun(CLI::App& app) {
   run_app_ =
-      app.add_subcommand("run", "Run experiments, or go on with them; write records and tables");
+      app.add_subcommand("run", "Run experiments (resumes an interrupted run) and write results");
   run_app_->add_option("experiment", run_.experiments, "Experiment files (JSON)")->required();
-  run_app_->add_option("--out", run_.out,
+  run_app_->add_option("-o,--out", run_.out,
                        "Folder for results.jsonl, drift.csv and timing.csv "
                        "(default: results/runs/NAME)");
-  run_app_->add_option("--jobs", run_.suite.jobs, "Accuracy cases at once; timings run alone")
+  run_app_->add_option("-j,--jobs", run_.suite.jobs, "Accuracy cases at once; timings run alone")
       ->check(NumberFrom(1, 1024))
       ->capture_default_str();
   run_app_
       ->add_option("--threads", run_.threads,
-                   "Allowed on one right-hand side, where O-DCA has long paths: same results")
+                   "Threads per right-hand side (O-DCA on long chains); same results")
       ->check(NumberFrom(1, kMostThreads));
   run_app_->add_option("--filter", conditions_,
                        "Only cases with key=value[,value] (or !=, <, <=, >, >=)");
@@ -127,9 +127,8 @@ void FileOptions::AddRun(CLI::App& app) {
 }
 
 void FileOptions::AddCheck(CLI::App& app) {
-  check_app_ = app.add_subcommand("check",
-                                  "Read configuration files of any kind, report errors; assemble "
-                                  "the starts of mechanisms and scenes");
+  check_app_ =
+      app.add_subcommand("check", "Validate files and solve for consistent initial conditions");
   check_app_->add_option("file", files_.paths, "Files (JSON)")->required();
   check_app_->add_flag("--no-assembly", no_assembly_, "Read only, assemble no start");
   AddLimits(check_app_, &check_.limits);
@@ -139,7 +138,7 @@ void FileOptions::AddCheck(CLI::App& app) {
 
 void FileOptions::AddExplain(CLI::App& app) {
   explain_app_ = app.add_subcommand(
-      "explain", "Say what experiments run and measure, and what mechanisms are made of");
+      "explain", "Describe an experiment or a mechanism (joints, loops, freedom, redundancy)");
   explain_app_->add_option("file", files_.paths, "Experiment or mechanism files (JSON)")
       ->required();
   explain_app_->add_option("--filter", conditions_,
@@ -153,7 +152,7 @@ void FileOptions::AddExplain(CLI::App& app) {
 
 void FileOptions::AddSimplify(CLI::App& app) {
   simplify_app_ = app.add_subcommand(
-      "simplify", "Models of one mechanism, from the whole one down to the simplest");
+      "simplify", "Generate simpler models of a mechanism and measure their errors");
   simplify_app_->add_option("mechanism", simplify_.mechanism, "Mechanism file (JSON)")->required();
   CLI::Option* list = simplify_app_->add_flag("--list", simplify_list_,
                                               "Only list what could be simplified (the default)");
@@ -185,18 +184,18 @@ void FileOptions::AddSimplify(CLI::App& app) {
                    "Add a record for each model to this store: error against the certified motion "
                    "of the whole one, times, verdict (loopbench table STORE --kind models)")
       ->needs(accept);
-  simplify_app_->add_option("--horizon", simplify_.horizon, "Of the experiment [s]")
+  simplify_app_
+      ->add_option("--horizon", simplify_.horizon, "Simulated time of the written experiment [s]")
       ->check(NumberFrom(1e-9, 1e9))
       ->capture_default_str();
   AddWide(simplify_app_);
   simplify_app_
-      ->add_option("--out", simplify_.out,
+      ->add_option("-o,--out", simplify_.out,
                    "New folder for the models, an experiment that runs them, and ladder.md")
       ->excludes(list);
   simplify_app_->add_flag("--assembled", simplify_.assembled,
                           "Begin from a whole model that says all of its assembled start");
-  simplify_app_->add_flag("--force", simplify_.force,
-                          "Put them into a folder that is there, over files of their names");
+  simplify_app_->add_flag("--force", simplify_.force, "Overwrite files of an existing folder");
   simplify_.limits = kFileLimits;
   AddLimits(simplify_app_, &simplify_.limits);
   simplify_app_->add_flag("--all", simplify_all_, "Every row of long tables");
@@ -204,17 +203,16 @@ void FileOptions::AddSimplify(CLI::App& app) {
 }
 
 void FileOptions::AddSchema(CLI::App& app) {
-  schema_app_ = app.add_subcommand(
-      "schema", "Print what files of a kind may hold, as JSON Schema (draft 07) for editors");
-  schema_app_->add_option("kind", schema_kind_, "Of files")
+  schema_app_ = app.add_subcommand("schema", "Print the JSON Schema (draft 07) of a file type");
+  schema_app_->add_option("kind", schema_kind_, "File type")
       ->required()
       ->check(CLI::IsMember(SchemaKinds()));
   schema_app_->add_flag("--tables", schema_tables_, "Tables of keys in Markdown instead");
 }
 
 void FileOptions::AddAdvise(CLI::App& app) {
-  advise_app_ = app.add_subcommand(
-      "advise", "Find the cheapest way to run a mechanism that keeps an error, by a short pilot");
+  advise_app_ =
+      app.add_subcommand("advise", "Recommend the cheapest method that meets an error bound");
   advise_app_->add_option("mechanism", advise_.mechanism, "Mechanism file (JSON)")->required();
   CLI::Option* error =
       advise_app_
@@ -238,8 +236,8 @@ void FileOptions::AddAdvise(CLI::App& app) {
                         "Also time generated code of all formulations with the advice's settings");
   advise_app_->add_flag("--exhaustive", advise_.exhaustive,
                         "Try all combinations of formulation, level, integrator and tolerance");
-  advise_app_->add_option("--out", advise_.out, "File for the experiment that reproduces it");
-  advise_app_->add_option("--format", advise_.format, "Of the finalists' table")
+  advise_app_->add_option("-o,--out", advise_.out, "File for the experiment that reproduces it");
+  advise_app_->add_option("--format", advise_.format, "Format of the finalists' table")
       ->check(CLI::IsMember({"text", "csv", "markdown", "json", "latex"}))
       ->capture_default_str();
   AddLimits(advise_app_, &advise_.limits);

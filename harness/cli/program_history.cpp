@@ -28,7 +28,7 @@ void AddPlace(CLI::App* app, HistoryPlace* place) {
 }  // namespace
 
 HistoryOptions::HistoryOptions(CLI::App& app) {
-  app_ = app.add_subcommand("history", "Follow measurements over commits, find where they change");
+  app_ = app.add_subcommand("history", "Follow measurements over commits and find change points");
   app_->footer(kHistoryFooter);
   app_->require_subcommand(1);
 
@@ -36,16 +36,17 @@ HistoryOptions::HistoryOptions(CLI::App& app) {
   add_app_
       ->add_option("results", add_.results, "Folder of a run, .jsonl, or JSON of Google Benchmark")
       ->required();
-  add_app_->add_option("--commit", add_.commit, "Whose they are (default: the one checked out)");
+  add_app_->add_option("--commit", add_.commit,
+                       "Commit of the results (default: the one checked out)");
   add_app_->add_option("--date", add_.date,
                        "ISO 8601, by which commits are ordered (default: the commit's)");
-  add_app_->add_flag("--replace", add_.replaces, "Take the place of an earlier measurement");
+  add_app_->add_flag("--replace", add_.replaces, "Replace an earlier measurement of this commit");
   AddPlace(add_app_, &place_);
 
-  show_app_ = app_->add_subcommand("show", "Steps, newest first, and the last commits");
-  show_app_->add_option("--case", show_.one, "Only cases whose name has this in it");
-  show_app_->add_option("--measure", show_.measure, "Only measures whose name has this in it");
-  show_app_->add_option("--format", show_.format, "Of the steps")
+  show_app_ = app_->add_subcommand("show", "List change points and recent commits");
+  show_app_->add_option("--case", show_.one, "Only cases whose name contains this text");
+  show_app_->add_option("--measure", show_.measure, "Only measures whose name contains this text");
+  show_app_->add_option("--format", show_.format, "Output format")
       ->check(CLI::IsMember({"text", "csv", "markdown", "json"}))
       ->capture_default_str();
   AddPlace(show_app_, &place_);
@@ -53,19 +54,20 @@ HistoryOptions::HistoryOptions(CLI::App& app) {
   AddWide(show_app_);
 
   report_app_ =
-      app_->add_subcommand("report", "One page with all steps and a chart of each series");
-  report_app_->add_option("--out", report_.out, "The page (default: history.html in the folder)");
-  report_app_->add_option("--title", report_.title, "Of the page")
+      app_->add_subcommand("report", "Write an HTML page with all change points and charts");
+  report_app_->add_option("-o,--out", report_.out,
+                          "The page (default: history.html in the folder)");
+  report_app_->add_option("--title", report_.title, "Page title")
       ->default_val("Measurements over commits");
   AddPlace(report_app_, &place_);
 
-  mark_app_ = app_->add_subcommand("mark", "Say that a commit is good, bad, or accepted as it is");
-  mark_app_->add_option("commit", mark_.commit, "Or the beginning of its name")->required();
+  mark_app_ = app_->add_subcommand("mark", "Mark a commit as good, bad or accepted");
+  mark_app_->add_option("commit", mark_.commit, "Commit hash or prefix")->required();
   mark_app_
       ->add_option("mark", mark_.mark, "good and accepted: compare takes it as base; bad: never")
       ->required()
       ->check(CLI::IsMember({"good", "accepted", "bad"}));
-  mark_app_->add_option("--note", mark_.note, "Why");
+  mark_app_->add_option("--note", mark_.note, "Reason, stored with the mark");
   mark_app_->add_flag("--keep-accepted", mark_.keeps_accepted,
                       "Leave it as it is where somebody accepted it (for jobs)");
   AddPlace(mark_app_, &place_);

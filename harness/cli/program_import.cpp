@@ -46,9 +46,9 @@ ImportCommandOptions::ImportCommandOptions(CLI::App& app) {
   app_->footer(kImportFooter);
   ImportOptions& options = import_.options;
   app_->add_option("file", import_.file, "The description (XML)")->required();
-  app_->add_option("--out", import_.out,
+  app_->add_option("-o,--out", import_.out,
                    "Mechanism file (default: the file's name with .json, here)");
-  app_->add_option("--format", options.format, "Refuse a file of another one")
+  app_->add_option("--format", options.format, "Expected input format")
       ->check(CLI::IsMember(ImportFormats()));
   app_->add_option("--loops", options.sidecar,
                    "Sidecar (JSON): loops, joints, forces, initial, gravity, observe");

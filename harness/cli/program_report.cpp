@@ -3,10 +3,10 @@
 namespace loopbench::harness {
 
 ReportCommandOptions::ReportCommandOptions(CLI::App& app) {
-  app_ = app.add_subcommand("report", "A whole run as one page for browsers, without network");
+  app_ = app.add_subcommand("report", "Write a self-contained HTML report of a run");
   app_->add_option("store", report_.store, "Folder with results.jsonl, or a .jsonl file")
       ->required();
-  app_->add_option("--out", report_.out, "File (default: report.html in the store)");
+  app_->add_option("-o,--out", report_.out, "File (default: report.html in the store)");
   app_->add_option("--rules", report_.rules, "Rules of a failure map, which the page then has");
   app_->add_option("--claims", report_.claims, "Claims, whose verdicts the page then has");
   app_->footer(

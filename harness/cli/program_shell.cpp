@@ -165,8 +165,8 @@ std::string WhatWasMeant(const CLI::App& app) {
 }
 
 ShellOptions::ShellOptions(CLI::App& app) : app_(app) {
-  completion_app_ = app.add_subcommand("completion", "Print a script that completes commands");
-  completion_app_->add_option("shell", shell_, "Whose")
+  completion_app_ = app.add_subcommand("completion", "Print a completion script");
+  completion_app_->add_option("shell", shell_, "Shell to generate for")
       ->required()
       ->check(CLI::IsMember({"bash", "zsh", "fish"}));
   completion_app_->footer("  eval \"$(loopbench completion bash)\"      # for this shell");

@@ -86,20 +86,20 @@ docs/extremes.md explains them, docs/design.md (section 6) has all keys of the r
 }  // namespace
 
 StoreOptions::StoreOptions(CLI::App& app) {
-  merge_app_ = app.add_subcommand("merge", "Put the stores of shards together");
+  merge_app_ = app.add_subcommand("merge", "Join the stores of shards");
   merge_app_->add_option("store", merge_.stores, "Folders of runs, or .jsonl files")->required();
-  merge_app_->add_option("--out", merge_.out, "Folder of the new store")->required();
+  merge_app_->add_option("-o,--out", merge_.out, "Folder of the new store")->required();
 
   AddTable(app);
   AddPlot(app);
   AddTradeoff(app);
   AddTrajectory(app);
 
-  verdict_app_ = app.add_subcommand("verdict", "Hold claims against stored records");
+  verdict_app_ = app.add_subcommand("verdict", "Compare claims with stored records");
   verdict_app_->add_option("store", verdict_.store, "Folder of a run, or a .jsonl file")
       ->required();
   verdict_app_->add_option("--claims", verdict_.claims, "Rules (JSON)")->required();
-  verdict_app_->add_option("--out", verdict_.out, "Markdown file with all numbers");
+  verdict_app_->add_option("-o,--out", verdict_.out, "Markdown file with all numbers");
 
   AddWide(verdict_app_);
 
@@ -124,7 +124,7 @@ void StoreOptions::AddTable(CLI::App& app) {
   table_app_->add_option("--group", table_.view.group, "One table per value of this key");
   table_app_->add_option("--sort", table_.view.sort, "Order by this key first");
   table_app_->add_flag("--descending", table_.view.descending, "Largest first")->needs("--sort");
-  table_app_->add_option("--out", table_.out, "File (default: the terminal)");
+  table_app_->add_option("-o,--out", table_.out, "File (default: the terminal)");
   AddGate(table_app_, &table_.gate);
   AddWide(table_app_);
   table_app_->footer(kTableFooter);
@@ -143,11 +143,10 @@ void AddSize(CLI::App* app, std::string* size) {
 }  // namespace
 
 void StoreOptions::AddPlot(CLI::App& app) {
-  plot_app_ = app.add_subcommand(
-      "plot", "Draw the standard figures of stored records, or one value against another");
+  plot_app_ = app.add_subcommand("plot", "Draw the standard figures, or one value against another");
   plot_app_->add_option("store", plot_.store, "Folder of a run, or a .jsonl file")->required();
   plot_app_
-      ->add_option("--out", plot_.out,
+      ->add_option("-o,--out", plot_.out,
                    "Folder for the figures; with --x and --y also a file's name")
       ->required();
   plot_app_->add_option("--format", plot_.format, "svg (default) or pdf")
@@ -169,8 +168,7 @@ void StoreOptions::AddPlot(CLI::App& app) {
 }
 
 void StoreOptions::AddTradeoff(CLI::App& app) {
-  tradeoff_app_ =
-      app.add_subcommand("tradeoff", "Show what accuracy costs, and which methods no other beats");
+  tradeoff_app_ = app.add_subcommand("tradeoff", "Compute work-precision tables and Pareto fronts");
   tradeoff_app_->add_option("store", tradeoff_.store, "Folder of a run, or a .jsonl file")
       ->required();
   TradeoffOptions& options = tradeoff_.options;
@@ -189,7 +187,7 @@ void StoreOptions::AddTradeoff(CLI::App& app) {
       ->capture_default_str();
   tradeoff_app_->add_option("--where", conditions_,
                             "Only records with key=value[,value] (or !=, <, <=, >, >=)");
-  tradeoff_app_->add_option("--out", tradeoff_.out, "Folder (default: that of the store)");
+  tradeoff_app_->add_option("-o,--out", tradeoff_.out, "Folder (default: that of the store)");
   tradeoff_app_->add_option("--format", tradeoff_.format, "How it is printed")
       ->check(CLI::IsMember({"text", "csv", "markdown", "json", "latex"}))
       ->capture_default_str();
@@ -206,14 +204,14 @@ void StoreOptions::AddTradeoff(CLI::App& app) {
 
 void StoreOptions::AddTrajectory(CLI::App& app) {
   trajectory_app_ = app.add_subcommand(
-      "trajectory", "List, write and check motions over time, of runs or of other programs");
+      "trajectory", "List, write and check trajectories of runs or other programs");
   TrajectoryCommand& command = trajectory_;
   trajectory_app_->add_option("source", command.source, "Folder of a run, or a trajectory (.csv)")
       ->required();
   trajectory_app_->add_option("--where", conditions_,
                               "Only records with key=value[,value] (or !=, <, <=, >, >=)");
-  trajectory_app_->add_option("--out", command.out, "Folder to write to; of a .csv a file");
-  trajectory_app_->add_option("--format", command.format, "Of what is written")
+  trajectory_app_->add_option("-o,--out", command.out, "Folder to write to; of a .csv a file");
+  trajectory_app_->add_option("--format", command.format, "Output format")
       ->check(CLI::IsMember({"csv", "jsonl"}))
       ->capture_default_str();
   trajectory_app_
@@ -231,15 +229,14 @@ void StoreOptions::AddTrajectory(CLI::App& app) {
 }
 
 void StoreOptions::AddMap(CLI::App& app) {
-  map_app_ =
-      app.add_subcommand("map", "Show which method survives which extreme, and the number why");
+  map_app_ = app.add_subcommand("map", "Tabulate which methods pass which stress tests");
   map_app_
       ->add_option("store", map_.store,
                    "Folder of a run, a .jsonl file, or failure-map.csv to draw it again")
       ->required();
   map_app_->add_option("--rules", map_.rules, "Rows, columns and limits (JSON)")->required();
-  map_app_->add_option("--out", map_.out, "Folder for failure-map.csv, .md and the picture");
-  map_app_->add_option("--format", map_.format, "Of the picture")
+  map_app_->add_option("-o,--out", map_.out, "Folder for failure-map.csv, .md and the picture");
+  map_app_->add_option("--format", map_.format, "Figure format")
       ->check(CLI::IsMember({"svg", "pdf"}))
       ->capture_default_str();
   AddSize(map_app_, &map_.size);

@@ -6,16 +6,16 @@
 namespace loopbench::harness {
 
 ViewOptions::ViewOptions(CLI::App& app) {
-  app_ = app.add_subcommand("view", "Draw a mechanism: a page that moves, or a picture for papers");
+  app_ = app.add_subcommand("view", "Draw a mechanism: interactive HTML, SVG or text");
   app_->add_option("mechanism", view_.mechanism, "Mechanism file (JSON)")->required();
   app_->add_option("--format", view_.format,
                    "html: a page for browsers, without network; svg; text: tables of places "
                    "(default: by the ending of --out, else html)")
       ->check(CLI::IsMember({"html", "svg", "text"}));
-  app_->add_option("--out", view_.out,
+  app_->add_option("-o,--out", view_.out,
                    "File (default: the mechanism file's name with .html or .svg, here; text on "
                    "the terminal)");
-  app_->add_option("--view", view_.svg.view, "Of a spatial mechanism, in svg")
+  app_->add_option("--view", view_.svg.view, "Viewing direction of a spatial mechanism (SVG)")
       ->check(CLI::IsMember(ViewNames()))
       ->capture_default_str();
   app_->add_flag("--plain", view_.svg.plain,

@@ -63,8 +63,7 @@ void ReadInertia(const JsonNode& node, Body& body) {
   constexpr double kPrinted = 0.01;
   const Eigen::Vector3d moments = SymmetricEigenvalues(inertia);
   if (moments[2] > (1.0 + kPrinted) * (moments[0] + moments[1])) {
-    node.Fail(
-        "principal moments of which none exceeds the sum of the other two, as no body's does");
+    node.Fail("principal moments that satisfy the triangle inequality");
   }
 }
 

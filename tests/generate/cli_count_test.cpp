@@ -1,6 +1,7 @@
 // count, and experiments with generated execution, as users call them.
 #include <gtest/gtest.h>
 
+#include <algorithm>
 #include <map>
 #include <sstream>
 

@@ -2,6 +2,7 @@
 // compiled code has the bits of the graph.
 #include <gtest/gtest.h>
 
+#include <algorithm>
 #include <filesystem>
 #include <random>
 

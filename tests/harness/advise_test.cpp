@@ -179,7 +179,7 @@ TEST(AdviceByLaw, KeepsAMarginInARunWithAllObserversToo) {
 TEST_F(CommandLineTest, AdviceIsPrintedAndWritten) {
   const Ending ending = Call("advise four-bar.json --error 1e-5 --horizon 1 --out best.json");
   EXPECT_EQ(ending.code, 0) << ending.text;
-  for (const char* words : {"Take ", "Runner-up", "What limits it", "reference: long-double"}) {
+  for (const char* words : {"Take ", "Runner-up", "Dominant error", "reference: long-double"}) {
     EXPECT_NE(ending.text.find(words), std::string::npos) << words << "\n" << ending.text;
   }
   EXPECT_EQ(Call("check best.json").code, 0);
@@ -264,6 +264,12 @@ TEST_F(CommandLineTest, ThereIsNoAdviceForWhatDoesNotMove) {
   ExpectEnding(Call("advise disc.json --error 1e-5 --horizon 1 --points disc"), 2,
                {"none of the measured points moves", "--points"});
   ExpectEnding(Call("advise disc.json --error 1e-5 --horizon 1 --points disc.rim"), 0, {"Take"});
+}
+
+TEST_F(CommandLineTest, AdviceTimesGeneratedCode) {
+  ExpectEnding(
+      Call("advise four-bar.json --error 1e-5 --horizon 1 --generated"), 0,
+      {"Generated code with the same integrator, level and tolerance: ", "times the time"});
 }
 
 TEST_F(CommandLineTest, AdviceRefusesModelsWhoseErrorIsTooLarge) {

@@ -10,7 +10,6 @@
 #include <string_view>
 #include <vector>
 
-#include "harness/cli/commands_generate.h"
 #include "harness/cli/long_table.h"
 #include "harness/cli/program_baseline.h"
 #include "harness/cli/program_cluster.h"
@@ -18,6 +17,7 @@
 #include "harness/cli/program_convert.h"
 #include "harness/cli/program_count.h"
 #include "harness/cli/program_files.h"
+#include "harness/cli/program_generate.h"
 #include "harness/cli/program_history.h"
 #include "harness/cli/program_import.h"
 #include "harness/cli/program_report.h"

@@ -78,7 +78,8 @@ void GeneratedDerivative<Space>::AddBranch(double t, std::span<const double> y) 
     }
   }
   const CompiledBranch derivative = Compile(recorded);
-  branches_.insert(branches_.begin(), Branch{std::move(recorded), derivative});
+  branches_.insert(branches_.begin(),
+                   Branch{std::make_unique<RecordedFunction>(std::move(recorded)), derivative});
 }
 
 template <class Space>
@@ -137,12 +138,12 @@ bool GeneratedDerivative<Space>::Jacobian(double t, std::span<const double> y,
   SetInputs(t, y);
   for (Branch& branch : branches_) {
     const bool is_known = branch.jacobian.function != nullptr || branch.has_no_jacobian;
-    if (!is_known && branch.recorded.graph.Holds(branch.recorded.graph.Values(x_))) {
+    if (!is_known && branch.recorded->graph.Holds(branch.recorded->graph.Values(x_))) {
       const Timer timer(seconds_);
-      const std::vector<int>& inputs = branch.recorded.inputs;
+      const std::vector<int>& inputs = branch.recorded->inputs;
       const auto columns = static_cast<std::ptrdiff_t>(jacobian.size() / y.size());
-      RecordedFunction function = branch.recorded;
-      function.outputs = Differentiate(function.graph, branch.recorded.outputs,
+      RecordedFunction function = *branch.recorded;
+      function.outputs = Differentiate(function.graph, branch.recorded->outputs,
                                        {inputs.begin() + 1, inputs.begin() + 1 + columns},
                                        function.graph.Values(x_));
       try {

@@ -5,6 +5,7 @@
 // too. Compiled branches stay until the mode of the system changes.
 #pragma once
 
+#include <memory>
 #include <string>
 #include <utility>
 #include <vector>
@@ -41,7 +42,7 @@ class GeneratedDerivative final : public CompiledDerivative {
   CompiledBranch Compile(const RecordedFunction& recorded);
 
   struct Branch {
-    RecordedFunction recorded;
+    std::unique_ptr<const RecordedFunction> recorded;  ///< branches are swapped often
     CompiledBranch derivative;
     CompiledBranch jacobian = {};  ///< compiled at its first use
     bool has_no_jacobian = false;  ///< it is too long

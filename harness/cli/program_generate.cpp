@@ -1,4 +1,4 @@
-#include "harness/cli/commands_generate.h"
+#include "harness/cli/program_generate.h"
 
 #include <algorithm>
 #include <cmath>
@@ -23,7 +23,7 @@
 namespace loopbench::harness {
 namespace {
 
-constexpr const char* kFooter = R"(
+constexpr const char* kGenerateFooter = R"(
 DIR receives NAME.h, NAME.c, NAME_example.c and CMakeLists.txt: C99 without heap or libraries, for controllers, hardware in
 the loop and other languages. docs/generated-code.md describes the functions and calls them from Python.
 
@@ -209,7 +209,7 @@ GenerateOptions::GenerateOptions(CLI::App& app) {
   app_->add_option("--memory", generate_.limits.memory_mb, "Memory [MiB]")
       ->check(NumberFrom(1.0, 1e9))
       ->capture_default_str();
-  app_->footer(kFooter);
+  app_->footer(kGenerateFooter);
 }
 
 std::optional<int> GenerateOptions::Run() const {

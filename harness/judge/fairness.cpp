@@ -229,7 +229,8 @@ std::vector<std::string> FairnessStatement(const Tradeoff& tradeoff) {
   if (!IsTime(tradeoff.cost)) return lines;
   if (ComparesLibraryCode(tradeoff)) {
     lines.emplace_back(
-        "not equal: the library's code. O-DCA has special code (planar pins, arms in space), vector "
+        "not equal: the library's code. O-DCA has special code (planar pins, arms in space), "
+        "vector "
         "instructions and fused multiply-add; other formulations have none. Equal code: execution "
         "generated; methods without code: loopbench count");
   }

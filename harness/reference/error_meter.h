@@ -21,8 +21,9 @@ class ErrorMeter : public Meter {
   /// left out of a simplified model.
   void Add(std::size_t k, const Snapshot& own, const Snapshot& lower) override;
 
-  /// Errors at the end, at most and in the mean (keys error_*, docs/errors-and-costs.md), and series.error.
-  /// The error at the end is left out where the run or the certificate did not get there.
+  /// Errors at the end, at most and in the mean (keys error_*, docs/errors-and-costs.md), and
+  /// series.error. The error at the end is left out where the run or the certificate did not get
+  /// there.
   void Write(Record& record) const override;
 
  private:

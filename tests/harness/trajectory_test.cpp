@@ -449,7 +449,8 @@ TEST_F(Command, OneLineReadsItInGnuplotAndPandas) {
   ExpectEnding(Call("run out.json --out out"), 0, {});
   fs::copy_file(Files("out/trajectories").at(0), folder_ / "rows.csv");
   // the lines of docs/trajectories.md
-  const std::string trajectories_md = ReadFile(fs::path(LOOPBENCH_SOURCE_DIR) / "docs/trajectories.md");
+  const std::string trajectories_md =
+      ReadFile(fs::path(LOOPBENCH_SOURCE_DIR) / "docs/trajectories.md");
   const std::string plot =
       R"(set datafile separator comma; plot "rows.csv" using "t [s]":"joint:OA:angle [rad]" with lines)";
   const std::string frame =

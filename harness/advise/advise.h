@@ -32,8 +32,8 @@ struct Advice {
   std::vector<Trial> finalists;  ///< the best first; where nothing was reached, the nearest first
   /// The best trial of each method and level that the pilot looked at, in their order.
   std::vector<Trial> looked_at;
-  /// Of generated code with the first finalist's integrator, level and tolerance: the fastest
-  /// formulation, if that was asked for and a run finished.
+  /// The fastest generated run with the first finalist's integrator, level and tolerance, if it was
+  /// requested and finished.
   std::optional<Trial> generated;
   int trials = 0;
   int untried = 0;       ///< that a sweep's time left out

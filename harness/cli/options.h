@@ -5,7 +5,9 @@
 #include <string>
 #include <vector>
 
+#include "harness/isolation/processes.h"
 #include "harness/record/select.h"
+#include "harness/text/numeric_option.h"
 #include "harness/text/screen.h"
 
 namespace loopbench::harness {
@@ -19,6 +21,16 @@ inline Selection ParseSelection(const std::vector<std::string>& conditions) {
 /// For commands that print tables.
 inline void AddWide(CLI::App* app) {
   app->add_flag_callback("--wide", ShowWide, "Show all columns; do not fit tables to the terminal");
+}
+
+/// Limits of work on a mechanism; experiments contain their own ("limits").
+inline void AddLimits(CLI::App* app, ProcessLimits* limits) {
+  app->add_option("--cpu", limits->cpu_s, "CPU time limit per mechanism file [s]")
+      ->check(NumberFrom(0.001, 1e9))
+      ->capture_default_str();
+  app->add_option("--memory", limits->memory_mb, "Memory limit per mechanism file [MiB]")
+      ->check(NumberFrom(1.0, 1e9))
+      ->capture_default_str();
 }
 
 inline CLI::Option* AddJson(CLI::App* app, bool* json) {

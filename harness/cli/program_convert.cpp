@@ -35,12 +35,7 @@ ConvertOptions::ConvertOptions(CLI::App& app) {
       ->check(NumberFrom(1e-12, 1e3))
       ->capture_default_str();
   AddJson(app_, &convert_.json);
-  app_->add_option("--cpu", convert_.limits.cpu_s, "CPU time [s]")
-      ->check(NumberFrom(0.001, 1e9))
-      ->capture_default_str();
-  app_->add_option("--memory", convert_.limits.memory_mb, "Memory [MiB]")
-      ->check(NumberFrom(1.0, 1e9))
-      ->capture_default_str();
+  AddLimits(app_, &convert_.limits);
   app_->footer(kConvertFooter);
 }
 

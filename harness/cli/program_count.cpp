@@ -3,7 +3,6 @@
 #include "harness/cli/options.h"
 #include "harness/config/formulations.h"
 #include "harness/config/sized_family.h"
-#include "harness/text/numeric_option.h"
 
 namespace loopbench::harness {
 
@@ -53,12 +52,7 @@ CountOptions::CountOptions(CLI::App& app) {
       ->capture_default_str();
   app_->add_option("-o,--out", count_.out, "File (default: the terminal)");
   AddWide(app_);
-  app_->add_option("--cpu", count_.limits.cpu_s, "CPU time per mechanism [s]")
-      ->check(NumberFrom(0.001, 1e9))
-      ->capture_default_str();
-  app_->add_option("--memory", count_.limits.memory_mb, "Memory per mechanism [MiB]")
-      ->check(NumberFrom(1.0, 1e9))
-      ->capture_default_str();
+  AddLimits(app_, &count_.limits);
   app_->footer(kCountFooter);
 }
 

@@ -23,16 +23,6 @@ void AddSettings(CLI::App* app, std::vector<std::string>* settings) {
   app->add_option("--set", *settings, "Set a field before reading: /json/pointer=value");
 }
 
-/// Of work on a mechanism; experiments say their own ("limits").
-void AddLimits(CLI::App* app, ProcessLimits* limits) {
-  app->add_option("--cpu", limits->cpu_s, "CPU time limit per mechanism file [s]")
-      ->check(NumberFrom(0.001, 1e9))
-      ->capture_default_str();
-  app->add_option("--memory", limits->memory_mb, "Memory for one mechanism file [MiB]")
-      ->check(NumberFrom(1.0, 1e9))
-      ->capture_default_str();
-}
-
 std::string SimplifyFooter() {
   std::string ideas;
   for (const Idea& idea : Ideas()) {

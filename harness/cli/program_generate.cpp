@@ -17,6 +17,7 @@
 #include "harness/text/config_error.h"
 #include "harness/text/files.h"
 #include "harness/text/numeric_option.h"
+#include "harness/text/output_file.h"
 #include "harness/text/terminal.h"
 #include "mechanism/start/assembly.h"
 
@@ -98,6 +99,7 @@ Motion Move(const GenerateCommand& command, const generate::RecordingSubject& su
 }
 
 int GenerateHere(const GenerateCommand& command) {
+  if (!command.fmu.empty()) RequireOutput(command.fmu);
   const MechanismFile file = ReadMechanism(command.mechanism);
   const CompiledScene scene = CompileScene(file.description, file.observe, {});
   const MechanismDescription& description = scene.compiled.parts.front().description;
@@ -203,12 +205,7 @@ GenerateOptions::GenerateOptions(CLI::App& app) {
                    "median step of ode45 at 1e-6, at most 1e-3)")
       ->check(NumberFrom(1e-9, 1e3));
   AddJson(app_, &generate_.json);
-  app_->add_option("--cpu", generate_.limits.cpu_s, "CPU time [s]")
-      ->check(NumberFrom(0.001, 1e9))
-      ->capture_default_str();
-  app_->add_option("--memory", generate_.limits.memory_mb, "Memory [MiB]")
-      ->check(NumberFrom(1.0, 1e9))
-      ->capture_default_str();
+  AddLimits(app_, &generate_.limits);
   app_->footer(kGenerateFooter);
 }
 

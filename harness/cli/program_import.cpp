@@ -3,8 +3,8 @@
 #include <charconv>
 #include <cmath>
 
+#include "harness/cli/options.h"
 #include "harness/text/config_error.h"
-#include "harness/text/numeric_option.h"
 
 namespace loopbench::harness {
 
@@ -59,12 +59,7 @@ ImportCommandOptions::ImportCommandOptions(CLI::App& app) {
   app_->add_option("--gravity", gravity_, "x,y,z in place of the file's [m/s^2]");
   app_->add_flag("--json", import_.json,
                  "One JSON document instead (docs/exchange.md has its keys)");
-  app_->add_option("--cpu", import_.limits.cpu_s, "CPU time [s]")
-      ->check(NumberFrom(0.001, 1e9))
-      ->capture_default_str();
-  app_->add_option("--memory", import_.limits.memory_mb, "Memory [MiB]")
-      ->check(NumberFrom(1.0, 1e9))
-      ->capture_default_str();
+  AddLimits(app_, &import_.limits);
 }
 
 std::optional<int> ImportCommandOptions::Run() {

@@ -1,6 +1,6 @@
 #include "harness/cli/program_view.h"
 
-#include "harness/text/numeric_option.h"
+#include "harness/cli/options.h"
 #include "harness/view/camera.h"
 
 namespace loopbench::harness {
@@ -22,12 +22,7 @@ ViewOptions::ViewOptions(CLI::App& app) {
                  "svg: only the mechanism, without what the file said before the assembly and "
                  "without lines of text");
   app_->add_flag("--all", view_.all, "text: every row of long tables");
-  app_->add_option("--cpu", view_.limits.cpu_s, "CPU time [s]")
-      ->check(NumberFrom(0.001, 1e9))
-      ->capture_default_str();
-  app_->add_option("--memory", view_.limits.memory_mb, "Memory [MiB]")
-      ->check(NumberFrom(1.0, 1e9))
-      ->capture_default_str();
+  AddLimits(app_, &view_.limits);
   app_->footer(
       "The page shows each degree of freedom as a motion, redundant constraints, and what a run\n"
       "leaves out. A mechanism whose loops do not close is drawn as the file says it, with the "

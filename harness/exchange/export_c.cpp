@@ -18,9 +18,6 @@ namespace {
 using fmt::format;
 using generate::Quantity, generate::RecordedFunction;
 
-/// A longer text would take a C compiler minutes.
-constexpr std::int64_t kMostOperations = 50'000;
-
 std::string IdentifierOf(const std::string& name) {
   std::string identifier;
   for (const char c : name) {
@@ -71,13 +68,7 @@ Branches RecordAlong(const CodeRequest& request, Quantity quantity) {
     RecordedFunction recorded =
         generate::RecordFunction(subject, start_at(state), state.t, state.y);
     recorded.graph.ForgetZeroTests();
-    const auto live = recorded.graph.Live(recorded.outputs, true);
-    const std::int64_t operations = std::ranges::count(live, true);
-    if (operations > kMostOperations) {
-      throw generate::NotCovered(
-          format("found {} operations, expected at most {}: they would take a compiler too long",
-                 operations, kMostOperations));
-    }
+    generate::RequireShort(recorded);
     return recorded;
   };
   for (const MotionState& state : request.motion) {
@@ -236,7 +227,7 @@ add_executable(@ID@_example @ID@_example.c)
 target_link_libraries(@ID@_example PRIVATE @ID@_model)
 )";
 
-/// Writes the texts of the product.
+/// Writes the texts of the files.
 class Writer {
  public:
   Writer(const CodeRequest& request, Code& code) : request_(request), code_(code) {

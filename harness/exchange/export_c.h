@@ -25,7 +25,7 @@ struct CodeRequest {
   double step = 1e-3;  ///< of the example's integrator [s]
 };
 
-/// One C function of the product.
+/// One generated C function.
 struct CodeFunction {
   std::string name;
   int branches = 0;             ///< recorded
@@ -37,7 +37,7 @@ struct CodeFile {
   std::string name, text;
 };
 
-/// Of a product: identifier, names, counts, files.
+/// Generated code: identifier, names, counts, files.
 struct Code {
   std::string identifier;  ///< prefix of its functions: the mechanism's name as C has names
   int num_q = 0, num_rows = 0;

@@ -144,7 +144,7 @@ CompiledBranch CompileOrFind(const std::string& text, const std::string& name,
   const fs::path library = folder.path() / "function.so";
   Compile(text, folder.path(), library);
   if (cache) {
-    // renamed when complete, so that a concurrent process never reads a part of it
+    // renamed when complete, so a concurrent process never reads an incomplete file
     const fs::path own = *cache / fmt::format("{}.{}", name, ::getpid());
     const Unfinished unfinished(own);
     const std::string bytes = harness::ReadFile(library);

@@ -1,7 +1,5 @@
 #include "harness/generate/generated.h"
 
-#include <fmt/format.h>
-
 #include <algorithm>
 #include <chrono>
 
@@ -16,17 +14,6 @@ namespace {
 // also after one that failed, needs twice as many misses as the one before.
 constexpr int kFirstMisses = 2, kMostDoublings = 20;
 constexpr std::size_t kMostBranches = 8;
-// 24 000 operations take a compiler 3.5 s; factorisations that iterate have hundreds of thousands
-constexpr std::int64_t kMostOperations = 50'000;
-
-void RequireShort(const RecordedFunction& recorded) {
-  const std::vector<bool> live = recorded.graph.Live(recorded.outputs, true);
-  const std::int64_t operations = std::ranges::count(live, true);
-  if (operations <= kMostOperations) return;
-  throw NotCovered(
-      fmt::format("found {} operations, expected at most {}: they would take a compiler too long",
-                  operations, kMostOperations));
-}
 
 /// Adds the time of its life to a sum [s].
 class Timer {

@@ -99,8 +99,8 @@ class Graph {
   /// Operations on the longest path to one of the nodes, from inputs or `given` nodes on.
   int Depth(const std::vector<bool>& live, const std::vector<bool>& given = {}) const;
 
-  /// Forgets tests for exactly zero that found another number. Texts skip work or a division there:
-  /// without the test the result is the same but for rounding, or not finite.
+  /// Forgets tests for exactly zero that found another number. Texts skip work or a division there.
+  /// Without the test the result is equal except for rounding, or not finite.
   void ForgetZeroTests();
 
   /// Numbers of all nodes for these inputs, by the arithmetic of Value().

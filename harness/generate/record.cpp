@@ -2,6 +2,7 @@
 
 #include <fmt/format.h>
 
+#include <algorithm>
 #include <bit>
 #include <cmath>
 #include <optional>
@@ -107,7 +108,9 @@ class Recorder {
         }
         break;
       case Quantity::kViolation: {
-        VectorX<Recorded> violation = PositionRows(kinematics);
+        Correction<Recorded> largest;
+        VectorX<Recorded> violation = VectorX<Recorded>::Zero(mechanism_.num_rows());
+        PositionViolation(kinematics, violation, largest);
         values.assign(violation.begin(), violation.end());
         SpeedViolation(kinematics, violation);
         values.insert(values.end(), violation.begin(), violation.end());
@@ -122,28 +125,19 @@ class Recorder {
     return values;
   }
 
-  /// PositionViolation() without the largest parts, whose comparisons are branches.
-  VectorX<Recorded> PositionRows(const Kinematics<Space, Recorded>& kinematics) const {
-    VectorX<Recorded> rows(mechanism_.num_rows());
-    for (const int index : mechanism_.constraints()) {
-      const auto& joint = kinematics.joints()[index];
-      rows.segment(mechanism_.joints()[index].row, joint.rows()) =
-          joint.Along(kinematics.ConstraintMismatch(index), joint.rows()).head(joint.rows());
-    }
-    return rows;
-  }
-
   /// One Newton step of level position (level_position.cpp) from the system's state.
   void Correct() {
     state_.emplace(mechanism_, system_->solver());
     state_->kinematics().SetTime(system_->kinematics().time());
     state_->SetPositions(system_->q());
     state_->SetSpeeds(system_->u());
-    VectorX<Recorded> violation = PositionRows(state_->kinematics());
+    Correction<Recorded> largest;
+    VectorX<Recorded> violation = VectorX<Recorded>::Zero(mechanism_.num_rows());
     VectorX<Recorded> change = VectorX<Recorded>::Zero(mechanism_.num_u());
     VectorX<Recorded> q = system_->q(), step = q;
     const VectorX<Recorded> u = system_->u();
     if (violation.size() == 0 || change.size() == 0) return;
+    PositionViolation(state_->kinematics(), violation, largest);
     Require(state_->Correct(violation, change));
     mechanism_.Rates(q, change, step);
     q += step;
@@ -161,7 +155,7 @@ class Recorder {
         fmt::format("the right-hand side ends as {} where it is recorded", ToString(outcome)));
   }
 
-  /// What is computed again here is there already: no node is added that dy/dt depends on.
+  /// Repeats computations of Examine(), so dy/dt depends on no additional node.
   void AddStages(RecordedFunction& recorded) const {
     Graph& graph = recorded.graph;
     const OperationCounts as_run = graph.as_run;
@@ -273,6 +267,16 @@ RecordedFunction RecordFunction(const RecordingSubject& subject, const Recording
 
 RecordedFunction RecordFunction(const RecordingSubject& subject, const RecordingStart& start) {
   return RecordAt(subject, start, start.t, nullptr);
+}
+
+void RequireShort(const RecordedFunction& recorded) {
+  constexpr std::int64_t kMostOperations = 50'000;
+  const std::int64_t operations =
+      std::ranges::count(recorded.graph.Live(recorded.outputs, true), true);
+  if (operations <= kMostOperations) return;
+  throw NotCovered(
+      fmt::format("found {} operations, expected at most {}: they would take a compiler too long",
+                  operations, kMostOperations));
 }
 
 MethodCounts CountsOf(const RecordedFunction& recorded) {

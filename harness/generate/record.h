@@ -22,8 +22,8 @@ class NotCovered : public std::runtime_error {
 enum class Quantity {
   kDerivative,  ///< dy/dt
   kEnergy,      ///< kinetic and potential energy [J]
-  /// Of each body but Ground, of its centre of mass in ground axes: in the plane x, y [m], cosine
-  /// and sine of its angle; in space x, y, z [m] and the rotation matrix by rows.
+  /// Poses of all bodies except Ground: centre of mass [m] in ground axes, then in the plane cosine
+  /// and sine of the angle, in space the rotation matrix by rows.
   kPoses,
   kViolation,   ///< of each constraint row: of positions [m, rad], then of speeds [m/s, rad/s]
   kCorrection,  ///< the state after one Newton step toward the constraints, positions then speeds
@@ -77,6 +77,10 @@ RecordedFunction RecordFunction(const RecordingSubject& subject, const Recording
 
 /// The amount that is added to number i of (state, time).
 double ShiftOf(std::size_t i);
+
+/// Throws NotCovered if a compiler would take too long: 24 000 operations take 3.5 s,
+/// factorisations that iterate have hundreds of thousands.
+void RequireShort(const RecordedFunction& recorded);
 
 /// Exact counts of a right-hand side.
 struct MethodCounts {

@@ -229,10 +229,9 @@ std::vector<std::string> FairnessStatement(const Tradeoff& tradeoff) {
   if (!IsTime(tradeoff.cost)) return lines;
   if (ComparesLibraryCode(tradeoff)) {
     lines.emplace_back(
-        "not equal: the library's code. O-DCA has special code (planar pins, arms in space), "
-        "vector "
-        "instructions and fused multiply-add; other formulations have none. Equal code: execution "
-        "generated; methods without code: loopbench count");
+        "not equal: the library's code. O-DCA has special code, vector instructions and fused "
+        "multiply-add; other formulations have none. Equal code: execution generated; counts: "
+        "loopbench count");
   }
   if (!one_machine) {
     lines.push_back("warning: the costs are times of more than one machine, which do not compare");

@@ -100,6 +100,8 @@ constexpr Measure kMeasures[] = {
     // work
     {"start_hash", kText, {}, {}, kHash},
     {"rhs_operations", kNumber, {"rhs operations", "", kInteger}, {}, kCount},
+    {"flops", kNumber, {"weighted operations", "", kInteger}, {}, kCount},
+    {"flops_per_body", kNumber, {"weighted operations per body", "", kFixed}, {}, kNone},
     {"plan_depth", kNumber, {"plan depth", "", kInteger}, {}, kCount},
     {"plan_largest_join", kNumber, {"largest join", "", kInteger}, {}, kCount},
     {"plan_*", kNumber},

@@ -183,6 +183,7 @@ TEST_F(GenerateTest, BadInputIsNamed) {
   ExpectEnding(Call("generate four-bar.json --out code --level position"), 2, {"--level"});
   ExpectEnding(Call("generate four-bar.json --out code --fmu x.fmu", "CC=absent"), 2,
                {"no C compiler", "absent"});
+  ExpectEnding(Call("generate four-bar.json --out code --fmu ."), 2, {"found a folder"});
   EXPECT_FALSE(fs::exists(folder_ / "code"));
   EXPECT_FALSE(fs::exists(folder_ / "x.fmu"));
 }

@@ -98,11 +98,17 @@ CompiledBranch Load(const fs::path& library) {
   if (handle == nullptr) throw NotCovered(fmt::format("generated code: {}", ::dlerror()));
   void* function = ::dlsym(handle, "loopbench_function");
   void* use_sines = ::dlsym(handle, "loopbench_use_sines");
+  void* use_lane_sines = ::dlsym(handle, "loopbench_use_lane_sines");
   const void* room = ::dlsym(handle, "loopbench_room");
-  if (function == nullptr || use_sines == nullptr || room == nullptr) {
+  if (function == nullptr || (use_sines == nullptr && use_lane_sines == nullptr) ||
+      room == nullptr) {
     throw NotCovered(library.string() + ": found no loopbench_function, expected generated code");
   }
-  reinterpret_cast<void (*)(void (*)(double, double*, double*))>(use_sines)(&PoseSines);
+  if (use_sines != nullptr) {
+    reinterpret_cast<void (*)(decltype(&PoseSines))>(use_sines)(&PoseSines);
+  } else {
+    reinterpret_cast<void (*)(decltype(&PoseLaneSines))>(use_lane_sines)(&PoseLaneSines);
+  }
   CompiledBranch branch;
   branch.function = reinterpret_cast<decltype(branch.function)>(function);
   branch.room = *static_cast<const int*>(room);

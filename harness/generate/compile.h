@@ -19,6 +19,9 @@ inline constexpr const char* kCompilerFlags[] = {
 #ifdef __AVX2__  // this program needs as much
     "-march=x86-64-v3",
 #endif
+#ifdef __AVX512F__
+    "-mavx512f",
+#endif
 };
 
 /// Output of the compiler with these arguments. Throws NotCovered (record.h) if there is no

@@ -1,10 +1,13 @@
 #include "harness/generate/generated.h"
 
 #include <algorithm>
+#include <array>
 #include <chrono>
 
 #include "harness/generate/differentiate.h"
 #include "harness/generate/print_c.h"
+#include "mechanism/algebra/lanes.h"
+#include "mechanism/formulation/side_by_side.h"
 
 namespace loopbench::generate {
 
@@ -30,12 +33,112 @@ class Timer {
   std::chrono::steady_clock::time_point begin_ = std::chrono::steady_clock::now();
 };
 
+/// Calls of compiled functions by runs of one thread, kLanes runs at once.
+class LaneCalls final : public Together {
+ public:
+  static LaneCalls& Of(SideBySide& beside) {
+    for (const std::unique_ptr<Together>& work : beside.works) {
+      if (auto* calls = dynamic_cast<LaneCalls*>(work.get())) return *calls;
+    }
+    auto calls = std::make_unique<LaneCalls>();
+    LaneCalls& found = *calls;
+    beside.works.push_back(std::move(calls));
+    return found;
+  }
+
+  /// -1 if no lane is free.
+  int Take() {
+    const auto free = std::ranges::find(taken_, false);
+    if (free == taken_.end()) return -1;
+    *free = true;
+    return static_cast<int>(free - taken_.begin());
+  }
+  void GiveBack(int lane) { taken_[lane] = false; }
+
+  void Want(int lane, const CompiledBranch& wanted, std::span<const double> x,
+            std::span<double> y) {
+    const auto grow = [](std::vector<Lanes>& numbers, std::size_t size) {
+      if (numbers.size() < size) numbers.resize(size);
+    };
+    grow(x_, x.size());
+    grow(y_, y.size());
+    grow(w_, static_cast<std::size_t>(wanted.room));
+    calls_[lane] = {wanted.function, x, y};
+  }
+  bool Held(int lane) const { return calls_[lane].held; }
+
+  void Do() noexcept override {
+    for (const Call& first : calls_) {
+      const auto function = first.function;
+      if (function == nullptr) continue;
+      for (int lane = 0; lane < kLanes; ++lane) {
+        if (calls_[lane].function != function) continue;
+        for (std::size_t i = 0; i < calls_[lane].x.size(); ++i) x_[i][lane] = calls_[lane].x[i];
+      }
+      const int held =
+          function(reinterpret_cast<const double*>(x_.data()), reinterpret_cast<double*>(y_.data()),
+                   reinterpret_cast<double*>(w_.data()));
+      for (int lane = 0; lane < kLanes; ++lane) {
+        Call& call = calls_[lane];
+        if (call.function != function) continue;
+        call.function = nullptr;
+        call.held = (held >> lane & 1) != 0;
+        for (std::size_t i = 0; i < call.y.size(); ++i) call.y[i] = y_[i][lane];
+      }
+    }
+  }
+
+ private:
+  struct Call {
+    decltype(CompiledBranch::function) function = nullptr;  ///< null if none waits
+    std::span<const double> x;
+    std::span<double> y;
+    bool held = false;  ///< all comparisons, in the last call
+  };
+  std::array<bool, kLanes> taken_{};
+  std::array<Call, kLanes> calls_;
+  std::vector<Lanes> x_, y_, w_;
+};
+
 }  // namespace
+
+/// The lane of one run.
+class Lane {
+ public:
+  /// Null if no run is beside or no lane is free.
+  static std::unique_ptr<Lane> Take(SideBySide* beside) {
+    if (beside == nullptr) return nullptr;
+    LaneCalls& calls = LaneCalls::Of(*beside);
+    const int lane = calls.Take();
+    return lane < 0 ? nullptr : std::unique_ptr<Lane>(new Lane(*beside, calls, lane));
+  }
+  ~Lane() { calls_.GiveBack(lane_); }
+  Lane(const Lane&) = delete;
+  Lane& operator=(const Lane&) = delete;
+
+  /// False if a comparison came out otherwise than it was recorded.
+  bool Call(const CompiledBranch& function, std::span<const double> x, std::span<double> y) {
+    calls_.Want(lane_, function, x, y);
+    beside_.Meet();
+    return calls_.Held(lane_);
+  }
+
+ private:
+  Lane(SideBySide& beside, LaneCalls& calls, int lane)
+      : beside_(beside), calls_(calls), lane_(lane) {}
+
+  SideBySide& beside_;
+  LaneCalls& calls_;
+  int lane_;
+};
+
+template <class Space>
+GeneratedDerivative<Space>::~GeneratedDerivative() = default;
 
 template <class Space>
 GeneratedDerivative<Space>::GeneratedDerivative(const RecordingSubject& subject,
                                                 const System<Space, double>& system)
-    : subject_(subject), system_(system) {
+    : subject_(subject), system_(system), lane_(Lane::Take(system.options().beside)) {
   subject_.with_work = system.size() > system.state_size();
   x_.assign(static_cast<std::size_t>(system.size()) + 1, 0.0);
   NoteStart();
@@ -64,7 +167,9 @@ void GeneratedDerivative<Space>::AddBranch(double t, std::span<const double> y) 
       throw NotCovered("the state carries other speeds in the recorded text than in double");
     }
   }
-  const CompiledBranch derivative = Compile(recorded);
+  RequireShort(recorded);
+  const CompiledBranch derivative =
+      lane_ ? CompileBranch(PrintLanes(recorded, kLanes)) : Compile(recorded);
   branches_.insert(branches_.begin(),
                    Branch{std::make_unique<RecordedFunction>(std::move(recorded)), derivative});
 }
@@ -91,6 +196,12 @@ bool GeneratedDerivative<Space>::Call(const CompiledBranch& function, std::span<
 }
 
 template <class Space>
+bool GeneratedDerivative<Space>::CallDerivative(const CompiledBranch& function,
+                                                std::span<double> ydot) {
+  return lane_ ? lane_->Call(function, x_, ydot.first(x_.size() - 1)) : Call(function, ydot);
+}
+
+template <class Space>
 void GeneratedDerivative<Space>::SetInputs(double t, std::span<const double> y) {
   x_[0] = t;
   std::ranges::copy(y, x_.begin() + 1);
@@ -102,7 +213,7 @@ bool GeneratedDerivative<Space>::Evaluate(double t, std::span<const double> y,
   if (y.size() + 1 != x_.size() || ydot.size() < y.size()) return false;
   SetInputs(t, y);
   for (std::size_t i = 0; i < branches_.size(); ++i) {
-    if (!Call(branches_[i].derivative, ydot)) continue;
+    if (!CallDerivative(branches_[i].derivative, ydot)) continue;
     if (i > 0) std::swap(branches_[0], branches_[i]);
     return true;
   }

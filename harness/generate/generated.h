@@ -2,7 +2,9 @@
 //
 // A recording holds where all its comparisons come out as they did (graph.h). Where they do not,
 // the library evaluates; after some such evaluations the branch of the state at hand is recorded
-// too. Compiled branches stay until the mode of the system changes.
+// too. Compiled branches stay until the mode of the system changes. Runs side by side, the members
+// of an ensemble, call compiled code together: each run has a lane of a function that evaluates
+// kLanes states at once (mechanism/formulation/side_by_side.h), and the bits that it has alone.
 #pragma once
 
 #include <memory>
@@ -16,12 +18,15 @@
 
 namespace loopbench::generate {
 
+class Lane;
+
 template <class Space>
 class GeneratedDerivative final : public CompiledDerivative {
  public:
   /// `system` has started. It and the subject's description must outlive the object.
   /// Throws NotCovered if the right-hand side at the start cannot be recorded or compiled.
   GeneratedDerivative(const RecordingSubject& subject, const System<Space, double>& system);
+  ~GeneratedDerivative() override;
 
   bool Evaluate(double t, std::span<const double> y, std::span<double> ydot) override;
   bool Jacobian(double t, std::span<const double> y, std::span<double> jacobian) override;
@@ -39,17 +44,19 @@ class GeneratedDerivative final : public CompiledDerivative {
   /// Puts time and state where compiled functions read them.
   void SetInputs(double t, std::span<const double> y);
   bool Call(const CompiledBranch& function, std::span<double> results);
+  bool CallDerivative(const CompiledBranch& function, std::span<double> ydot);
   CompiledBranch Compile(const RecordedFunction& recorded);
 
   struct Branch {
     std::unique_ptr<const RecordedFunction> recorded;  ///< branches are swapped often
-    CompiledBranch derivative;
-    CompiledBranch jacobian = {};  ///< compiled at its first use
-    bool has_no_jacobian = false;  ///< it is too long
+    CompiledBranch derivative;                         ///< in lanes if the run has one
+    CompiledBranch jacobian = {};                      ///< compiled at its first use
+    bool has_no_jacobian = false;                      ///< it is too long
   };
 
   RecordingSubject subject_;
   const System<Space, double>& system_;
+  std::unique_ptr<Lane> lane_;  ///< if other runs are beside this one
   RecordingStart start_;
   std::vector<Branch> branches_;  ///< the one that served last stands first
   std::vector<double> x_, room_;  ///< time and state; intermediate values

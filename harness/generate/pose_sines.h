@@ -7,6 +7,7 @@
 
 namespace loopbench::generate {
 
+/// Sine and cosine of one angle [rad].
 inline void PoseSines(double angle, double* sine, double* cosine) {
   if (std::abs(angle) <= kLargestAngle) {
     SinCos(angle, *sine, *cosine);
@@ -14,6 +15,17 @@ inline void PoseSines(double angle, double* sine, double* cosine) {
     *sine = std::sin(angle);
     *cosine = std::cos(angle);
   }
+}
+
+/// The same for kLanes angles.
+inline void PoseLaneSines(const double* angles, double* sines, double* cosines) {
+  const Lanes x = Load<Lanes>(angles);
+  Lanes sine, cosine;
+  SinCos(x, sine, cosine);
+  Store(sine, sines);
+  Store(cosine, cosines);
+  if (!Any(~(Magnitude(x) <= kLargestAngle))) return;
+  for (int lane = 0; lane < kLanes; ++lane) PoseSines(angles[lane], &sines[lane], &cosines[lane]);
 }
 
 }  // namespace loopbench::generate

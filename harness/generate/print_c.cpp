@@ -17,6 +17,37 @@ namespace {
 
 constexpr int kOperationsOfFunction = 500;
 
+/// Before the text of lanes. `number` holds one number of each lane, `holds` all ones or no bits.
+constexpr const char* kLaneHelpers = R"(#include <math.h>
+typedef double number __attribute__((vector_size(8 * LANES)));
+typedef long long holds __attribute__((vector_size(8 * LANES)));
+#define ALL(constant) ((constant) - (number){0})
+#define EACH(f) \
+  static inline number each_##f(number a) { \
+    for (int i = 0; i < LANES; ++i) a[i] = f(a[i]); \
+    return a; \
+  }
+#define EACH2(f) \
+  static inline number each_##f(number a, number b) { \
+    for (int i = 0; i < LANES; ++i) a[i] = f(a[i], b[i]); \
+    return a; \
+  }
+EACH(fabs) EACH(sqrt) EACH(sin) EACH(cos) EACH(asin) EACH(acos) EACH(exp) EACH(expm1) EACH(log)
+EACH(round) EACH2(atan2) EACH2(pow) EACH2(remainder)
+static inline number pick(holds which, number a, number b) {
+  return (number)((which & (holds)a) | (~which & (holds)b));
+}
+static inline number each_least(number a, number b) { return pick(b < a, b, a); }
+static inline number each_most(number a, number b) { return pick(a < b, b, a); }
+static void (*sines_of_lanes)(const double*, double*, double*);
+void loopbench_use_lane_sines(void (*of_pose)(const double*, double*, double*)) {
+  sines_of_lanes = of_pose;
+}
+static inline void sines(number angle, number* sine, number* cosine) {
+  sines_of_lanes((const double*)&angle, (double*)sine, (double*)cosine);
+}
+)";
+
 std::string Literal(double value) {
   if (std::isnan(value)) return "NAN";
   if (std::isinf(value)) return value > 0.0 ? "INFINITY" : "(-INFINITY)";
@@ -63,8 +94,10 @@ const char* FunctionName(Operation operation) {
 
 class Printer {
  public:
-  Printer(const RecordedFunction& recorded, const std::string& name)
-      : graph_(recorded.graph),
+  Printer(const RecordedFunction& recorded, const std::string& name, bool has_lanes = false)
+      : has_lanes_(has_lanes),
+        number_(has_lanes ? "number" : "double"),
+        graph_(recorded.graph),
         outputs_(recorded.outputs),
         name_(name),
         function_(graph_.nodes().size(), 0) {
@@ -91,12 +124,16 @@ class Printer {
       text_ += "  return ok;\n}\n";
     }
     fmt::format_to(std::back_inserter(text_),
-                   "static int {}(const double* x, double* y, double* w) {{\n  return ", name_);
+                   "static {0} {1}(const {2}* x, {2}* y, {2}* w) {{\n  {3}", Truth(), name_,
+                   number_, has_lanes_ ? "holds ok = " : "return ");
     for (int function = 0; function < num_functions_; ++function) {
       fmt::format_to(std::back_inserter(text_), "{}{}_part{}(x, y, w)",
-                     function > 0 ? " &&\n         " : "", name_, function);
+                     function == 0 ? ""
+                     : has_lanes_  ? ";\n  ok &= "
+                                   : " &&\n         ",
+                     name_, function);
     }
-    text_ += ";\n}\n";
+    text_ += has_lanes_ ? ";\n  return ok;\n}\n" : ";\n}\n";
     return std::move(text_);
   }
 
@@ -135,10 +172,12 @@ class Printer {
 
   void Open(int function) {
     fmt::format_to(std::back_inserter(text_),
-                   "static int {}_part{}(const double* x, double* y, double* w) {{\n"
-                   "  int ok = 1;\n  (void)x, (void)y, (void)w;\n",
-                   name_, function);
+                   "static {0} {1}_part{2}(const {3}* x, {3}* y, {3}* w) {{\n"
+                   "  {0} ok = {4};\n  (void)x, (void)y, (void)w;\n",
+                   Truth(), name_, function, number_, has_lanes_ ? "~(holds){0}" : "1");
   }
+
+  const char* Truth() const { return has_lanes_ ? "holds" : "int"; }
 
   /// How a node is called in a function.
   std::string Name(int node, int function) const {
@@ -147,6 +186,13 @@ class Printer {
     if (of.operation == Operation::kInput) return fmt::format("x[{}]", inputs_[node]);
     if (function_[node] != function) return fmt::format("w[{}]", room_[node]);
     return fmt::format("v{}", node);
+  }
+
+  /// The same, where a constant is no number yet.
+  std::string Whole(int node, int function) const {
+    const bool is_constant = graph_.nodes()[node].operation == Operation::kConstant;
+    const std::string name = Name(node, function);
+    return has_lanes_ && is_constant ? fmt::format("ALL({})", name) : name;
   }
 
   void Print(int node, int function, int* input) {
@@ -162,40 +208,46 @@ class Printer {
       case Operation::kConstant:
         break;
       case Operation::kNegate:
-        fmt::format_to(out, "  const double v{} = -{};\n", node, a());
+        fmt::format_to(out, "  const {} v{} = -{};\n", number_, node, a());
         break;
       case Operation::kAdd:
       case Operation::kSubtract:
       case Operation::kMultiply:
       case Operation::kDivide:
-        fmt::format_to(out, "  const double v{} = {} {} {};\n", node, a(),
+        fmt::format_to(out, "  const {} v{} = {} {} {};\n", number_, node, a(),
                        "+-*/"[static_cast<int>(of.operation) - static_cast<int>(Operation::kAdd)],
                        b());
         break;
       case Operation::kPoseSin:
-        fmt::format_to(out, "  double v{0}, c{0};\n  sines({1}, &v{0}, &c{0});\n", node, a());
+        fmt::format_to(out, "  {2} v{0}, c{0};\n  sines({1}, &v{0}, &c{0});\n", node, a(), number_);
         break;
       case Operation::kPoseCos:
-        fmt::format_to(out, "  const double v{} = c{};\n", node, of.b);
+        fmt::format_to(out, "  const {} v{} = c{};\n", number_, node, of.b);
         break;
       default:
-        fmt::format_to(out, "  const double v{} = {}({}", node, FunctionName(of.operation), a());
-        if (of.b >= 0) fmt::format_to(out, ", {}", b());
+        fmt::format_to(out, "  const {} v{} = {}{}({}", number_, node, has_lanes_ ? "each_" : "",
+                       FunctionName(of.operation), Whole(of.a, function));
+        if (of.b >= 0) fmt::format_to(out, ", {}", Whole(of.b, function));
         text_ += ");\n";
     }
     if (room_[node] >= 0) fmt::format_to(out, "  w[{}] = v{};\n", room_[node], node);
     for (const std::size_t i : results_[node]) {
-      fmt::format_to(out, "  y[{}] = {};\n", i, Name(node, function));
+      fmt::format_to(out, "  y[{}] = {};\n", i, Whole(node, function));
     }
     for (const Comparison* test : tests_[node]) {
       const char* relation = test->relation == Relation::kLess        ? "<"
                              : test->relation == Relation::kLessEqual ? "<="
                                                                       : "==";
-      fmt::format_to(out, "  ok &= {}({} {} {});\n", test->outcome ? "" : "!",
+      fmt::format_to(out, "  ok &= {}({} {} {});\n",
+                     test->outcome ? ""
+                     : has_lanes_  ? "~"
+                                   : "!",
                      Name(test->a, function), relation, Name(test->b, function));
     }
   }
 
+  const bool has_lanes_;
+  const char* const number_;  ///< its type in C
   const Graph& graph_;
   const std::vector<int>& outputs_;
   const std::string name_;
@@ -225,6 +277,20 @@ void loopbench_use_sines(void (*of_pose)(double, double*, double*)) {{ sines = o
 int loopbench_function(const double* x, double* y, double* w) {{ return function(x, y, w); }}
 )",
                      kPrintedHelpers, function, room);
+}
+
+std::string PrintLanes(const RecordedFunction& recorded, int lanes) {
+  Printer printer(recorded, "function", true);
+  return fmt::format(R"(#define LANES {}
+{}{}const int loopbench_room = {};
+int loopbench_function(const double* x, double* y, double* w) {{
+  const holds ok = function((const number*)x, (number*)y, (number*)w);
+  int bits = 0;
+  for (int i = 0; i < LANES; ++i) bits |= ok[i] != 0 ? 1 << i : 0;
+  return bits;
+}}
+)",
+                     lanes, kLaneHelpers, printer.Text(), printer.room());
 }
 
 }  // namespace loopbench::generate

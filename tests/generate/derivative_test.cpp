@@ -11,7 +11,9 @@
 #include "harness/generate/generated.h"
 #include "harness/generate/print_c.h"
 #include "harness/run/compiled_scene.h"
+#include "harness/run/side_by_side.h"
 #include "harness/timing/subject.h"
+#include "mechanism/algebra/lanes.h"
 #include "mechanism/description/library.h"
 #include "mechanism/formulation/forward_jacobian.h"
 
@@ -279,6 +281,44 @@ TEST(GeneratedDerivativeTest, WhereAComparisonFlipsTheLibraryEvaluatesWithEqualR
   ExpectSameBits(found, library.Examine(0.0, line));
   derivative(library.y());
   EXPECT_EQ(system.compiled()->misses(), 1);
+}
+
+/// More runs than lanes, of which some take a branch that is not compiled.
+TEST(LanesTest, RunsSideBySideHaveTheBitsThatTheyHaveAlone) {
+  const MechanismDescription description = Shipped("four-bar");
+  const Mechanism<Planar, double> mechanism(description, Coordinates::kJoint);
+  constexpr int kRuns = 2 * kLanes + 3;
+  for (const std::string& formulation : kFormulations) {
+    const auto derivatives = [&](int run, SideBySide* beside, std::int64_t* misses) {
+      const harness::BenchmarkState state = harness::ComputeState(description, Coordinates::kJoint);
+      const auto system = harness::MakeFormulation<Planar>(formulation, mechanism,
+                                                           {.general = true, .beside = beside});
+      EXPECT_EQ(system->Start(0.0, state.q, state.u), Outcome::kFinished);
+      system->UseCompiled(std::make_unique<GeneratedDerivative<Planar>>(
+          RecordingSubject{description, Coordinates::kJoint, formulation, system->options()},
+          *system));
+      std::vector<double> y(static_cast<std::size_t>(system->size())), ydot(y.size()), all;
+      system->ToState(state.q, state.u, y);
+      for (int call = 0; call < 5 + run; ++call) {
+        y.back() += 1e-3 * (run + 1);
+        if (call == 2 && run % 3 == 0) std::fill_n(y.begin(), mechanism.num_q(), 0.0);
+        EXPECT_EQ(system->Derivative(0.0, y, ydot), Outcome::kFinished);
+        all.insert(all.end(), ydot.begin(), ydot.end());
+      }
+      *misses = system->compiled()->misses();
+      return all;
+    };
+    std::vector<std::vector<double>> found(kRuns);
+    std::vector<std::int64_t> misses(kRuns);
+    harness::RunSideBySide(kRuns, 1, [&](int run, SideBySide& beside) {
+      found[run] = derivatives(run, &beside, &misses[run]);
+    });
+    for (int run = 0; run < kRuns; ++run) {
+      std::int64_t alone = 0;
+      ExpectSameBits(found[run], derivatives(run, nullptr, &alone));
+      EXPECT_EQ(misses[run], alone) << formulation << " " << run;
+    }
+  }
 }
 
 }  // namespace

@@ -3,8 +3,12 @@
 
 #include <gtest/gtest.h>
 
+#include <random>
+
+#include "harness/generate/compile.h"
 #include "harness/generate/print_c.h"
 #include "harness/generate/recorded.h"
+#include "mechanism/algebra/lanes.h"
 
 namespace loopbench::generate {
 namespace {
@@ -118,6 +122,66 @@ static int rates(const double* x, double* y, double* w) {
 }
 )");
   EXPECT_EQ(room, 0);
+}
+
+/// Every operation in lanes, with states whose comparisons come out otherwise in some lanes.
+TEST(LanesTest, EachLaneHasTheBitsOfTheGraph) {
+  RecordedFunction recorded;
+  {
+    const Recording recording(recorded.graph, CastsAs::kNumber);
+    const Recorded a = Recorded::Input(0.5), b = Recorded::Input(0.25), half(0.5);
+    Recorded sine, cosine;
+    SinesOfPose(a * Recorded(1e3), sine, cosine);
+    EXPECT_TRUE(b < a);
+    EXPECT_FALSE(a < half * b);
+    for (const Recorded& value : {sqrt(a),
+                                  abs(b),
+                                  sin(a),
+                                  cos(a),
+                                  asin(b),
+                                  acos(b),
+                                  atan2(half, a),
+                                  atan2(a, half),
+                                  exp(a),
+                                  expm1(b),
+                                  log(a),
+                                  pow(a, half),
+                                  round(b * Recorded(3.0)),
+                                  remainder(a, b),
+                                  min(a, half),
+                                  max(half, b),
+                                  sine,
+                                  cosine,
+                                  -a / b,
+                                  half - a,
+                                  half / b}) {
+      recorded.outputs.push_back(value.node);
+    }
+    recorded.outputs.push_back(recorded.graph.Constant(-0.75));
+  }
+  const CompiledBranch lanes = CompileBranch(PrintLanes(recorded, kLanes));
+  std::mt19937 numbers(1);
+  std::uniform_real_distribution<double> unit(0.1, 0.9);
+  std::vector<Lanes> x(2), y(recorded.outputs.size()), w(static_cast<std::size_t>(lanes.room));
+  int others = 0;
+  for (int round = 0; round < 20; ++round) {
+    for (int lane = 0; lane < kLanes; ++lane)
+      x[0][lane] = unit(numbers), x[1][lane] = unit(numbers);
+    if (round == 3) x[0][0] = 4e4;  // angles beyond the quick sines
+    const int held =
+        lanes.function(reinterpret_cast<const double*>(x.data()),
+                       reinterpret_cast<double*>(y.data()), reinterpret_cast<double*>(w.data()));
+    for (int lane = 0; lane < kLanes; ++lane) {
+      const std::vector<double> expected = recorded.graph.Values({x[0][lane], x[1][lane]});
+      const bool holds = recorded.graph.Holds(expected);
+      EXPECT_EQ((held >> lane & 1) != 0, holds);
+      others += holds ? 0 : 1;
+      for (std::size_t i = 0; i < y.size(); ++i) {
+        EXPECT_EQ(y[i][lane], expected[recorded.outputs[i]]) << i;
+      }
+    }
+  }
+  EXPECT_GT(others, 0);
 }
 
 }  // namespace

@@ -107,7 +107,7 @@ Table CaseTable(const Overview& overview, const Selection& filter) {
   if (has_threads) table.columns.push_back({"threads", "threads", Format::kInteger, {}});
   const bool has_executions = std::ranges::any_of(experiments, [](const Experiment& experiment) {
     return std::ranges::any_of(experiment.columns, [](const Column& column) {
-      return column.execution == Execution::kGenerated;
+      return column.execution != Execution::kLibrary;
     });
   });
   if (has_executions) table.columns.push_back({"execution", "execution", Format::kText, {}});

@@ -72,7 +72,8 @@ std::string ToString(const Column& column) {
   const std::string gains =
       column.gains ? fmt::format("({}, {})", column.gains->alpha, column.gains->beta) : "";
   const std::string threads = column.threads > 1 ? fmt::format("/{}-threads", column.threads) : "";
-  const char* execution = column.execution == Execution::kGenerated ? "/generated" : "";
+  const bool is_library = column.execution == Execution::kLibrary;
+  const std::string execution = is_library ? "" : fmt::format("/{}", ToString(column.execution));
   return fmt::format("{}/{}{}/{}/{}{}{}", column.formulation, ToString(column.enforcement), gains,
                      ToString(column.coordinates), ToString(column.solver), threads, execution);
 }
@@ -104,7 +105,7 @@ Record CaseKeys(const Experiment& experiment, const Case& one) {
     keys.Set("beta", one.column.gains->beta);
   }
   if (one.column.threads > 1) keys.Set("threads", std::int64_t{one.column.threads});
-  if (one.column.execution == Execution::kGenerated) {
+  if (one.column.execution != Execution::kLibrary) {
     keys.Set("execution", std::string(ToString(one.column.execution)));
   }
   for (const auto& [name, value] : experiment.parameters.items()) keys.Set(name, value);

@@ -25,8 +25,8 @@ namespace loopbench::harness {
 enum class JacobianKind { kForward, kFiniteDifference };
 
 /// Who evaluates right-hand sides: the library, or code generated from its text
-/// (harness/generate/).
-enum class Execution { kLibrary, kGenerated };
+/// (harness/generate/), without or with fused multiply-add.
+enum class Execution { kLibrary, kGenerated, kGeneratedFma };
 
 /// Names in files and tables, by value of the enum.
 template <class Enum>
@@ -41,7 +41,8 @@ inline constexpr std::array<std::string_view, 2> kNames<JacobianKind> = {"forwar
                                                                          "finite-difference"};
 
 template <>
-inline constexpr std::array<std::string_view, 2> kNames<Execution> = {"library", "generated"};
+inline constexpr std::array<std::string_view, 3> kNames<Execution> = {"library", "generated",
+                                                                      "generated-fma"};
 
 /// What a run computes in, narrowest first (harness/precision/).
 enum class Scalar { kFloat, kDouble, kLongDouble, kFloat128 };

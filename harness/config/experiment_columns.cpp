@@ -91,8 +91,8 @@ const Fields<ColumnLists>& ColumnFields() {
        {"threads", IntegerList(&ColumnLists::threads, 1, kMostThreads),
         "That may work on one right-hand side; results have the same bits for any number."},
        {"execution", Choices(&ColumnLists::executions, NamesOf<Execution>(), "an execution"),
-        "Right-hand sides by the library, or by C code generated from its text "
-        "(docs/operation-counts.md)."},
+        "Right-hand sides by the library, or by C code generated from its text, without or with "
+        "fused multiply-add (docs/operation-counts.md)."},
        {"alpha", NumberSchema(kNotNegative),
         "Gain on mismatches of speeds [1/s]; baumgarte only, beside beta."},
        {"beta", NumberSchema(kNotNegative),

@@ -115,11 +115,18 @@ CompiledBranch Load(const fs::path& library) {
   return branch;
 }
 
+std::vector<std::string> Flags(Contraction contraction) {
+  std::vector<std::string> flags(std::begin(kCompilerFlags), std::end(kCompilerFlags));
+  const bool is_fused = contraction == Contraction::kFused;
+  flags.push_back(is_fused ? "-ffp-contract=fast" : "-ffp-contract=off");
+  return flags;
+}
+
 /// Compiles `text` to `library`.
-void Compile(const std::string& text, const fs::path& folder, const fs::path& library) {
+void Compile(const std::string& text, std::vector<std::string> arguments, const fs::path& folder,
+             const fs::path& library) {
   const fs::path source = folder / "function.c";
   harness::WriteFileAtomically(source, text);
-  std::vector<std::string> arguments(std::begin(kCompilerFlags), std::end(kCompilerFlags));
   for (const std::string& word :
        {source.string(), std::string("-o"), library.string(), std::string("-lm")}) {
     arguments.push_back(word);
@@ -136,8 +143,8 @@ void RequireWhole(const fs::path& library) {
                    "written; remove it");
 }
 
-CompiledBranch CompileOrFind(const std::string& text, const std::string& name,
-                             const std::optional<fs::path>& cache) {
+CompiledBranch CompileOrFind(const std::string& text, const std::vector<std::string>& flags,
+                             const std::string& name, const std::optional<fs::path>& cache) {
   if (cache) {
     const fs::path kept = *cache / (name + ".so");
     if (fs::exists(fs::symlink_status(kept))) {
@@ -148,7 +155,7 @@ CompiledBranch CompileOrFind(const std::string& text, const std::string& name,
   }
   const TemporaryFolder folder("loopbench-generated");
   const fs::path library = folder.path() / "function.so";
-  Compile(text, folder.path(), library);
+  Compile(text, flags, folder.path(), library);
   if (cache) {
     // renamed when complete, so a concurrent process never reads an incomplete file
     const fs::path own = *cache / fmt::format("{}.{}", name, ::getpid());
@@ -165,21 +172,22 @@ CompiledBranch CompileOrFind(const std::string& text, const std::string& name,
 
 }  // namespace
 
-CompiledBranch CompileBranch(const std::string& text) {
+CompiledBranch CompileBranch(const std::string& text, Contraction contraction) {
   static std::mutex mutex;
   static std::map<std::string, CompiledBranch> loaded;
   const std::lock_guard lock(mutex);
   static std::map<std::string, std::string> versions;  // by the compiler's words
   const std::string words = fmt::format("{}", fmt::join(Compiler(), " "));
   if (!versions.contains(words)) versions[words] = RunCompiler({"--version"});
+  const std::vector<std::string> flags = Flags(contraction);
   const std::string all =
-      fmt::format("{}\n{}\n{}\n{}", words, versions[words], fmt::join(kCompilerFlags, " "), text);
+      fmt::format("{}\n{}\n{}\n{}", words, versions[words], fmt::join(flags, " "), text);
   const std::string name = Fnv1a(all) + Fnv1a(Fnv1a(all) + all);
   const std::optional<fs::path> cache = CacheFolder();
   const std::string place = cache ? (*cache / name).string() : name;
   const auto known = loaded.find(place);
   if (known != loaded.end()) return known->second;
-  return loaded[place] = CompileOrFind(text, name, cache);
+  return loaded[place] = CompileOrFind(text, flags, name, cache);
 }
 
 }  // namespace loopbench::generate

@@ -13,9 +13,8 @@ namespace loopbench::generate {
 
 inline constexpr int kCompilerSeconds = 120;
 
-/// -ffp-contract=off: the same bits as the library's general text.
 inline constexpr const char* kCompilerFlags[] = {
-    "-std=c99",         "-O2", "-fPIC", "-shared", "-ffp-contract=off", "-fno-math-errno",
+    "-std=c99",         "-O2", "-fPIC", "-shared", "-fno-math-errno",
 #ifdef __AVX2__  // this program needs as much
     "-march=x86-64-v3",
 #endif
@@ -23,6 +22,10 @@ inline constexpr const char* kCompilerFlags[] = {
     "-mavx512f",
 #endif
 };
+
+/// Whether the compiler may round a product and a sum once, by fused multiply-add. Without it code
+/// has the same bits as the library's general text.
+enum class Contraction { kNone, kFused };
 
 /// Output of the compiler with these arguments. Throws NotCovered (record.h) if there is no
 /// compiler or if it fails.
@@ -35,6 +38,6 @@ struct CompiledBranch {
 };
 
 /// Throws NotCovered (record.h) if there is no compiler, if it fails, or if the cache is rejected.
-CompiledBranch CompileBranch(const std::string& text);
+CompiledBranch CompileBranch(const std::string& text, Contraction contraction = Contraction::kNone);
 
 }  // namespace loopbench::generate

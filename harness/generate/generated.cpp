@@ -137,8 +137,12 @@ GeneratedDerivative<Space>::~GeneratedDerivative() = default;
 
 template <class Space>
 GeneratedDerivative<Space>::GeneratedDerivative(const RecordingSubject& subject,
-                                                const System<Space, double>& system)
-    : subject_(subject), system_(system), lane_(Lane::Take(system.options().beside)) {
+                                                const System<Space, double>& system,
+                                                Contraction contraction)
+    : subject_(subject),
+      contraction_(contraction),
+      system_(system),
+      lane_(Lane::Take(system.options().beside)) {
   subject_.with_work = system.size() > system.state_size();
   x_.assign(static_cast<std::size_t>(system.size()) + 1, 0.0);
   NoteStart();
@@ -169,7 +173,7 @@ void GeneratedDerivative<Space>::AddBranch(double t, std::span<const double> y) 
   }
   RequireShort(recorded);
   const CompiledBranch derivative =
-      lane_ ? CompileBranch(PrintLanes(recorded, kLanes)) : Compile(recorded);
+      lane_ ? CompileBranch(PrintLanes(recorded, kLanes), contraction_) : Compile(recorded);
   branches_.insert(branches_.begin(),
                    Branch{std::make_unique<RecordedFunction>(std::move(recorded)), derivative});
 }
@@ -177,7 +181,7 @@ void GeneratedDerivative<Space>::AddBranch(double t, std::span<const double> y) 
 template <class Space>
 CompiledBranch GeneratedDerivative<Space>::Compile(const RecordedFunction& recorded) {
   RequireShort(recorded);
-  const CompiledBranch function = CompileBranch(PrintLibrary(recorded));
+  const CompiledBranch function = CompileBranch(PrintLibrary(recorded), contraction_);
   room_.resize(std::max(room_.size(), static_cast<std::size_t>(function.room)));
   return function;
 }

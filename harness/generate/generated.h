@@ -25,7 +25,8 @@ class GeneratedDerivative final : public CompiledDerivative {
  public:
   /// `system` has started. It and the subject's description must outlive the object.
   /// Throws NotCovered if the right-hand side at the start cannot be recorded or compiled.
-  GeneratedDerivative(const RecordingSubject& subject, const System<Space, double>& system);
+  GeneratedDerivative(const RecordingSubject& subject, const System<Space, double>& system,
+                      Contraction contraction = Contraction::kNone);
   ~GeneratedDerivative() override;
 
   bool Evaluate(double t, std::span<const double> y, std::span<double> ydot) override;
@@ -55,6 +56,7 @@ class GeneratedDerivative final : public CompiledDerivative {
   };
 
   RecordingSubject subject_;
+  const Contraction contraction_;
   const System<Space, double>& system_;
   std::unique_ptr<Lane> lane_;  ///< if other runs are beside this one
   RecordingStart start_;

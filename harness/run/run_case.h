@@ -29,7 +29,7 @@ std::unique_ptr<System<Space, double>> MakeFormulation(const Column& column,
                                  .solver = column.solver,
                                  .gains = column.gains,
                                  .threads = column.threads,
-                                 .general = column.execution == Execution::kGenerated,
+                                 .general = column.execution != Execution::kLibrary,
                                  .beside = beside});
 }
 
@@ -51,7 +51,9 @@ void GiveExecution(const Column& column, const MechanismDescription& description
   system.UseCompiled(std::make_unique<generate::GeneratedDerivative<Space>>(
       generate::RecordingSubject{description, column.coordinates, column.formulation,
                                  system.options()},
-      system));
+      system,
+      column.execution == Execution::kGeneratedFma ? generate::Contraction::kFused
+                                                   : generate::Contraction::kNone));
 }
 
 /// Stores NotCovered as outcome and message of `result` instead of throwing it.

@@ -79,7 +79,7 @@ class Runner {
     for (const auto& observer : observers_) observer->Trace(traces);
     WriteCounts(result, traces.projection_steps, FindProfile(case_.integrator)->is_implicit,
                 run.record);
-    if (case_.column.execution == Execution::kGenerated) {
+    if (case_.column.execution != Execution::kLibrary) {
       run.record.Set("library_evaluations", library_evaluations_);
       run.record.Set("compile_s", compile_s_);
     }

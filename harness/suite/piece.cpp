@@ -25,7 +25,7 @@ constexpr double kPatience = 2.0, kGrace_s = 2.0;  ///< LimitsOfRuns
 
 /// A piece that waits for the compiler of generated code sleeps, and is not ended for that.
 void AllowCompiler(const Column& column, ProcessLimits* limits) {
-  if (column.execution == Execution::kGenerated) limits->idle_s += generate::kCompilerSeconds;
+  if (column.execution != Execution::kLibrary) limits->idle_s += generate::kCompilerSeconds;
 }
 
 }  // namespace

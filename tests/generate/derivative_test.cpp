@@ -239,6 +239,33 @@ TEST(GeneratedDerivativeTest, CompiledCodeHasTheBitsOfTheGraph) {
   }
 }
 
+/// Some hundred roundings, each of half a unit in the last place: 1e-12 of the largest number.
+TEST(GeneratedDerivativeTest, FusedMultiplyAddChangesRoundingAlone) {
+  bool any = false;
+  for (const std::string& formulation : kFormulations) {
+    Library<Planar> library(Shipped("four-bar"), formulation, Enforcement::kVelocity);
+    const std::string text = PrintLibrary(RecordFunction(library.subject(), library.start()));
+    std::vector<double> x = {0.25}, results[2];
+    x.insert(x.end(), library.y().begin(), library.y().end());
+    for (const Contraction contraction : {Contraction::kNone, Contraction::kFused}) {
+      const CompiledBranch branch = CompileBranch(text, contraction);
+      std::vector<double>& ydot = results[contraction == Contraction::kFused ? 1 : 0];
+      ydot.resize(x.size() - 1);
+      std::vector<double> room(static_cast<std::size_t>(branch.room));
+      EXPECT_EQ(branch.function(x.data(), ydot.data(), room.data()), 1);
+    }
+    double largest = 0.0;
+    for (const double number : results[0]) largest = std::max(largest, std::abs(number));
+    for (std::size_t i = 0; i < results[0].size(); ++i) {
+      EXPECT_NEAR(results[0][i], results[1][i], 1e-12 * largest) << formulation;
+      any |= results[0][i] != results[1][i];
+    }
+  }
+#ifdef __FMA__
+  EXPECT_TRUE(any);
+#endif
+}
+
 /// Against dual numbers: the same rules in another order, so 1e-12 of the largest entry for some
 /// hundred operations.
 TEST(GeneratedDerivativeTest, JacobiansAreThoseOfDualNumbers) {

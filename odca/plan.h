@@ -1,4 +1,5 @@
-// The symbolic half of O-DCA: in which order bodies are joined into assemblies (docs/design.md D4).
+// The symbolic half of O-DCA: in which order bodies are joined into assemblies
+// (docs/decisions/004).
 //
 // The assembly tree stands over the graph of bodies and joints. Its leaves are the bodies. An inner
 // node joins two assemblies, or one assembly with itself or with Ground, through a list of joints,

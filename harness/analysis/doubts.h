@@ -11,7 +11,7 @@
 
 namespace loopbench::harness {
 
-/// The codes of `doubts`, which docs/design.md section 6 explains; programs may rely on them.
+/// The codes of `doubts` (docs/reference/outcomes-and-warnings.md); programs may rely on them.
 inline constexpr const char* kEnergyDoubt = "energy";
 inline constexpr const char* kSingularDoubt = "singular-passage";
 inline constexpr const char* kSoftenedDoubt = "softened";
@@ -37,11 +37,11 @@ double ExpectedEnergyShare(const Record& record);
 /// Drift of a run over the length of a link, or in rad where a rotation has drifted further, and
 /// what its level of enforcement promises of it. NaN where it was not measured.
 ///
-/// A step of tolerance rtol leaves errors of some rtol in positions and speeds (docs/numerics.md,
-/// section 2). At velocity level those of positions add up, n rtol; at acceleration level speeds
-/// keep theirs, n^2 rtol times the angle per step; Baumgarte's feedback forgets all but the last
-/// steps; a projection leaves round-off, and in softened directions some tolerance. A fixed step
-/// promises nothing but, at a level that leaves none, what the projection does.
+/// A step of tolerance rtol leaves errors of some rtol in positions and speeds (docs/theory/
+/// constraints-and-drift.md). At velocity level those of positions add up, n rtol; at acceleration
+/// level speeds keep theirs, n^2 rtol times the angle per step; Baumgarte's feedback forgets all
+/// but the last steps; a projection leaves round-off, and in softened directions some tolerance. A
+/// fixed step promises nothing but, at a level that leaves none, what the projection does.
 double DriftShare(const Record& record);
 double PromisedDriftShare(const Record& record);
 

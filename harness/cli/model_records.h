@@ -1,5 +1,5 @@
 // What simpler models of one mechanism cause and what they take, as records of kind "model"
-// (docs/design.md, section 6).
+// (docs/reference/records.md).
 #pragma once
 
 #include <string>

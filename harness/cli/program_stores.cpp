@@ -16,7 +16,7 @@ Examples:
   loopbench table out --kind timing --sort rhs_ns_median --format csv --out timing.csv
 
 "ok?" is a run that finished with doubts: the lines below the table say why, column doubts has codes
-(docs/design.md, section 6), --gate doubts ends with 1.
+(docs/reference/outcomes-and-warnings.md), --gate doubts exits with status 1.
 Any key of the records may be a column; a wrong one is answered with the list of all.
 Every table ends with the command, machine, compiler, libraries and commit.)";
 
@@ -81,7 +81,7 @@ Of several records that match a cell the worst decides. A cell
   crashed, ...  no result
   ?             not measured: no record, too few ("cases"), or one without the measure
   -             not applicable, with the rules' reason
-docs/extremes.md explains them, docs/design.md (section 6) has all keys of the rules.)";
+docs/robustness-map.md explains cells and lists all keys of the rules.)";
 
 }  // namespace
 

@@ -118,7 +118,7 @@ const Fields<GroupInFile>& GroupFields() {
       {"required": ["mechanisms"], "not": {"anyOf": [{"required": ["family"]}, {"required": ["sizes"]}]}},
       {"required": ["family", "sizes"], "not": {"required": ["mechanisms"]}}]})");
   static const Fields<GroupInFile> fields(
-      "group", "Mechanisms, or members of a family, and what is measured of them.",
+      "benchmark_group", "Mechanisms, or members of a family, and what is measured of them.",
       {{"mechanisms", OneOrMoreSchema(TextSchema()),
         "Paths of mechanism files, relative to this file."},
        {"family", ChoiceSchema(NamesOfSizedFamilies()), "What grows."},

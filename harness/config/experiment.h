@@ -253,7 +253,7 @@ struct Case {
 /// Whether the rule applies to the case (its ensemble fields do not matter).
 bool Matches(const EnsembleRule& rule, const Case& one);
 
-/// The keys that name a case, as they stand in every table row: those of docs/design.md section 6,
+/// The keys that name a case, as they stand in every table row: docs/reference/records.md,
 /// then the experiment's parameters. With a fixed step rtol and atol are empty and "step" is a key.
 Record CaseKeys(const Experiment& experiment, const Case& one);
 

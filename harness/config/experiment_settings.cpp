@@ -60,7 +60,7 @@ const Fields<TimingFamily>& TimingFamilyFields() {
           {{"properties", {{"sizes", IntegerListSchema(family.smallest, family.largest)}}}}}});
   }
   static const Fields<TimingFamily> fields(
-      "timingFamily", "Mechanisms of growing size, timed per right-hand side only.",
+      "timing_family", "Mechanisms of growing size, timed per right-hand side only.",
       {{"family", Choice(&TimingFamily::family, NamesOfSizedFamilies(), "a family"), "What grows.",
         "a family"},
        {"sizes", By(IntegerListSchema(1, kMaxCount), ReadSizes), TextOfSizedFamilies(),

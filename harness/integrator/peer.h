@@ -1,6 +1,6 @@
 // A peer: somebody else's program that moves a whole mechanism by its own equations, integrator and
 // projection. Here it stands where a formulation and ARKODE stand otherwise; what it makes of a
-// mechanism is looked at by the same observers (docs/design.md D19).
+// mechanism is looked at by the same observers (docs/decisions/018).
 #pragma once
 
 #include <stdexcept>

@@ -18,7 +18,7 @@ namespace loopbench::harness {
 
 struct CompareOptions {
   double error_ratio = 1.05;  ///< of errors, under one arithmetic: equal code gives equal bits
-  /// The same under two arithmetics. Different round-off moves steps, and drift with them.
+  /// The same if the arithmetic differs. Different round-off moves steps, and drift with them.
   double error_ratio_other = 1.5;
   /// Errors below it are round-off and equal: above the largest round-off drift of 100 s of the
   /// paper's scenes, 2e-12 m.

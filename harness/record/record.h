@@ -27,7 +27,7 @@ struct Value
   ~Value() = default;
 };
 
-/// Ordered (key, value) pairs. Keys are the column names of docs/design.md section 6, with dots for
+/// Ordered (key, value) pairs. Keys are column names (docs/reference/records.md), with dots for
 /// nested values such as "series.t". Order of first insertion is the order of writing.
 class Record {
  public:

@@ -1,4 +1,5 @@
-// A scene as it is run: simplified descriptions, with what is observed of them (docs/design.md D9).
+// A scene as it is run: simplified descriptions, with what is observed of them
+// (docs/decisions/009).
 #pragma once
 
 #include <string>

@@ -1,4 +1,4 @@
-// The peers of this build (docs/design.md D19): their rows are among the formulations
+// The peers of this build (docs/decisions/018): their rows are among the formulations
 // (harness/config/formulations.h) in every build, the programs themselves only where CMake has
 // LOOPBENCH_PEERS.
 #pragma once

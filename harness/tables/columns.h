@@ -16,7 +16,7 @@ namespace loopbench::harness {
 /// short.
 const std::vector<TableColumn>& CompactCaseColumns();
 
-/// The columns of drift.csv (docs/design.md, section 6): what was run, how it ended, drift at
+/// The columns of drift.csv (docs/reference/records.md): what was run, how it ended, drift at
 /// position [m and rad, never mixed], velocity and acceleration level, energy, growth, counters,
 /// conditioning, then what observers of other programs measure.
 /// `loop_closure_max` differs from the drift in absolute coordinates only, where every joint can

@@ -1,5 +1,5 @@
 // What whoever reads standard output or standard error sees: the one place that decides width and
-// colour (docs/design.md, D25).
+// colour (docs/decisions/024).
 #pragma once
 
 #include <cstddef>

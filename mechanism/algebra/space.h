@@ -1,4 +1,4 @@
-// The plane and space as policies, so that every algorithm is written once (docs/design.md D1).
+// The plane and space as policies, so that every algorithm is written once (docs/decisions/001).
 //
 // Notation (docs/glossary.md): p_WB position of B's centre of mass from the ground origin, R_WB
 // orientation of B, V = [w; v] velocity of a body at a point, F = [moment; force] at a point; all

@@ -1,7 +1,7 @@
 // From the user's graph (bodies and joints, with cycles) to what is computed: a spanning forest
 // rooted in Ground, and the joints left over, which become constraints.
 //
-// Coordinates decide the forest (docs/design.md D2):
+// Coordinates decide the forest (docs/decisions/002):
 //   joint     the forest is made of the user's joints; one joint per independent loop is cut.
 //             A part that does not reach Ground hangs on a virtual free joint.
 //   absolute  every body hangs on a virtual free joint from Ground, and every user joint is a

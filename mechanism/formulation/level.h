@@ -1,5 +1,5 @@
 // Levels of enforcement: what the right-hand side and accepted steps do about constraints beyond
-// accelerations that satisfy them (docs/design.md D3). They are written over any ConstraintSolver.
+// accelerations that satisfy them (docs/decisions/003). They are written over any ConstraintSolver.
 //
 //   acceleration   nothing                                         this class as it is
 //   velocity       speeds of the right-hand side satisfy J u = -b  level_velocity.cpp

@@ -11,7 +11,7 @@ namespace loopbench {
 
 class SideBySide;
 
-/// At which level the constraints hold in the right-hand side (docs/design.md D3; level.h). Levels
+/// At which level the constraints hold in the right-hand side (docs/decisions/003; level.h). Levels
 /// of other programs follow.
 enum class Enforcement {
   kAcceleration,  ///< accelerations satisfy the constraints, speeds are integrated as they come
@@ -75,7 +75,7 @@ struct FormulationOptions {
   /// kBaumgarte only. Without them alpha = beta = 0.05/h with the longest accepted step h so far:
   /// zero while steps still double from one to the next, set again when h has doubled. Gains near
   /// 1/h hold steps back; gains that follow shorter steps magnify round-off by 1/h^2, which makes
-  /// steps shorter still (docs/numerics.md, section 3).
+  /// steps shorter still (docs/theory/constraints-and-drift.md).
   std::optional<BaumgarteGains> gains = std::nullopt;
   /// That may work on one right-hand side, where a formulation has work for them. The same bits for
   /// any number.

@@ -1,5 +1,5 @@
 // Prescribed motions of a system: whether its accelerations follow them, and what they ask of
-// singular configurations (docs/numerics.md, section 3).
+// singular configurations (docs/theory/singular-configurations.md).
 #include <algorithm>
 #include <cmath>
 #include <type_traits>

@@ -29,7 +29,7 @@ template <class S>
 class DirectionWeights {
  public:
   /// theta, or 64 eps if more: a narrow scalar's eigenvalues are round-off already above 4e-8.
-  /// docs/numerics.md, section 3, has the trials.
+  /// docs/theory/singular-configurations.md has the trials.
   static constexpr double kTheta = 4e-8;
   /// lambda_least, or 4 eps if more.
   static constexpr double kLeastEigenvalue = 4e-12;

@@ -1,4 +1,4 @@
-// The one place where loop closures are solved and their rank is decided (docs/design.md D5).
+// The one place where loop closures are solved and their rank is decided (docs/decisions/005).
 //
 // A loop closure is X phi = rhs, X = C Z C^T symmetric positive semidefinite: the response of the
 // mechanism, seen across one or several joints, to forces in those joints. It is X of the paper's

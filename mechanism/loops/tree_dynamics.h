@@ -102,7 +102,7 @@ Components<Space, S> JointAcceleration(const Kinematics<Space, S>& kinematics, i
                                        std::span<const Acceleration<Space, S>> A);
 
 /// Response D^T (S M^-1 S^T) D of the two bodies of a joint when nothing else holds them, the scale
-/// against which the response of the assembled mechanism is judged (docs/design.md D5): of the
+/// against which the response of the assembled mechanism is judged (docs/decisions/005): of the
 /// directions imposed, or of all.
 template <class Space, class S>
 JointMatrix<S> FreeResponse(const Kinematics<Space, S>& kinematics, Masses masses, int joint,

@@ -22,7 +22,7 @@ struct Inertia {
 };
 
 /// Which masses an evaluation uses: the bodies' own, or unit masses in the middle of each body's
-/// joints, for decisions of rank that must depend on geometry alone (docs/design.md D5).
+/// joints, for decisions of rank that must depend on geometry alone (docs/decisions/005).
 enum class Masses { kPhysical, kGeometric };
 
 /// Small on purpose: a long chain streams all of it through the cache at every evaluation.

@@ -1,4 +1,4 @@
-// Models only what a scene requires (docs/design.md D9): a description, simplified before it is
+// Models only what a scene requires (docs/decisions/009): a description, simplified before it is
 // compiled into a Mechanism, and the way back to the user's bodies and joints.
 //
 // Savings, in this order, each with its switch:

@@ -35,7 +35,7 @@ std::vector<double> Off(const std::vector<double>& y, double size) {
 /// Constrained parts of the mismatches of all constraints and of their rates, one motion after the
 /// other, in the axes of their bodies P: there they obey the equation. Of rotations in space that
 /// holds for small relative speeds only, since a rotation vector's rate is not the angular velocity
-/// (docs/numerics.md, section 1): they are left out, zero.
+/// (docs/theory/constraints-and-drift.md): they are left out, zero.
 template <class Space>
 std::pair<VectorX<double>, VectorX<double>> Mismatches(System<Space, double>& formulation,
                                                        const std::vector<double>& y) {

@@ -142,7 +142,7 @@ void CompareAt(const MechanismDescription& description, System<Space, double>& f
   const bool redundant = at.smallest_weight < 1.0;
   const double widest = redundant ? 1e-6 : 1.0 / 16;
   const double rcond = redundant ? LoopSolver<double>::kSuspicious : at.rcond;
-  // round-off of accelerations (docs/numerics.md, section 7)
+  // round-off of accelerations (CONTRIBUTING.md, tolerances)
   const bool is_odca =
       dynamic_cast<const odca::Odca<Space, double>*>(&formulation.solver()) != nullptr;
   const double cancels = is_odca && !redundant ? Slenderness(formulation.mechanism()) : 1.0;

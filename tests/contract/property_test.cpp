@@ -1,6 +1,6 @@
 // What holds for any mechanism whatever: random trees closed at random, seeded.
 //
-// The scaled spectrum of a sample is that of the project's rank decision (docs/design.md D5): the
+// The scaled spectrum of a sample is that of the project's rank decision (docs/decisions/005): the
 // squares of the singular values of K_g^-1 J L_g^-T in joint coordinates, for unit masses with the
 // mechanism's length as radius of gyration. It is geometry alone, since rank is; masses here differ
 // by a factor of e^2 at most. K_g makes it a pure number near one, and it is compared with one. A

@@ -1,10 +1,13 @@
-// Documents: their commands print the output that they show, and their links lead to files.
+// Documents: their commands print the output that they show, and reference pages are complete.
 #include <algorithm>
 #include <regex>
 #include <sstream>
 #include <string>
 #include <vector>
 
+#include "harness/analysis/doubts.h"
+#include "harness/judge/failure_map.h"
+#include "harness/record/measures.h"
 #include "tests/harness/cli_fixture.h"
 #include "tests/harness/places.h"
 
@@ -19,32 +22,6 @@ std::string BlockAfter(const std::string& text, const std::string& words) {
   if (at == std::string::npos) return "";
   const std::size_t begin = text.find('\n', text.find("\n```", at) + 1) + 1;
   return text.substr(begin, text.find("\n```", begin) - begin + 1);
-}
-
-/// The documents that people write: those of the root, of docs/, of the rooms and of
-/// examples/.
-std::vector<fs::path> Documents() {
-  std::vector<fs::path> documents;
-  for (const char* folder :
-       {".", "docs", "mechanism", "odca", "lagrange", "reduction", "examples"}) {
-    for (const auto& entry : fs::directory_iterator(kRoot / folder)) {
-      if (entry.path().extension() == ".md") documents.push_back(entry.path());
-    }
-  }
-  std::ranges::sort(documents);
-  return documents;
-}
-
-/// Without blocks of code, in which brackets and parentheses are no links.
-std::string WithoutCode(const std::string& text) {
-  std::istringstream lines(text);
-  std::string prose;
-  bool code = false;
-  for (std::string line; std::getline(lines, line);) {
-    if (line.starts_with("```")) code = !code;
-    if (!code) prose += line + '\n';
-  }
-  return prose;
 }
 
 /// A line of output without numbers, which differ between machines, and without widths of columns.
@@ -121,8 +98,8 @@ TEST_P(ShownOutput, IsThatOfItsCommands) {
 }
 
 INSTANTIATE_TEST_SUITE_P(Documents, ShownOutput,
-                         testing::Values("docs/quick-start.md", "docs/operation-counts.md",
-                                         "docs/generated-code.md"));
+                         testing::Values("README.md", "docs/quick-start.md",
+                                         "docs/operation-counts.md", "docs/generated-code.md"));
 
 TEST_F(DocumentsTest, AMissingFileIsSaidWithTheFolderItWasLookedForIn) {
   ExpectEnding(Call("verdict out --claims configs/claims.json"), 2, {"out"});
@@ -131,19 +108,27 @@ TEST_F(DocumentsTest, AMissingFileIsSaidWithTheFolderItWasLookedForIn) {
       {"configs/claims.json: cannot be read: no such file, seen from " + folder_.string()});
 }
 
-TEST(Documents, LinksAndPicturesLeadToFilesOfTheRepository) {
-  const std::regex link(R"(\]\(([^)#]+)[^)]*\))");
-  std::size_t links = 0;
-  for (const fs::path& document : Documents()) {
-    const std::string text = WithoutCode(ReadFile(document));
-    for (std::sregex_iterator at(text.begin(), text.end(), link), end; at != end; ++at) {
-      const std::string target = (*at)[1];
-      if (target.find("://") != std::string::npos) continue;
-      EXPECT_TRUE(fs::exists(document.parent_path() / target)) << document << ": " << target;
-      ++links;
-    }
+TEST(Documents, EveryOutcomeAndWarningHasASection) {
+  const std::string text = ReadFile(kRoot / "docs/reference/outcomes-and-warnings.md");
+  std::vector<std::string> names = {kEnergyDoubt,       kSingularDoubt, kSoftenedDoubt,
+                                    kDriftDoubt,        kMembersDoubt,  kExponentDoubt,
+                                    kDisagreementDoubt, kErrorDoubt,    kRefinementDoubt,
+                                    kDriveDoubt,        kStepsDoubt};
+  for (const RunEnding& ending : kRunEndings) names.emplace_back(ending.word);
+  for (const std::string& name : names) {
+    EXPECT_NE(text.find("\n### `" + name + "`\n"), std::string::npos) << name;
   }
-  EXPECT_GE(links, 20u);
+}
+
+TEST(Documents, EveryKeyOfRecordsIsDescribed) {
+  const std::string text = ReadFile(kRoot / "docs/reference/records.md");
+  for (const Measure& measure : BuiltInMeasures()) {
+    // reserved keys, families of keys ("rank_*"), and a key of Google Benchmark's files
+    const std::string key(measure.key);
+    if (measure.type == ValueType::kAny || key == "load_average" || key.ends_with("_*")) continue;
+    const std::string name = key.substr(0, key.find('*'));
+    EXPECT_NE(text.find('`' + name), std::string::npos) << key;
+  }
 }
 
 }  // namespace documents_test

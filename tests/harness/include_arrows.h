@@ -1,4 +1,4 @@
-// Who may include whom (docs/design.md, section 1), as a function of a file's path and text.
+// Who may include whom (docs/architecture.md), as a function of a file's path and text.
 //
 //   mechanism <- {odca, lagrange, reduction} <- harness <- tests
 #pragma once

@@ -139,7 +139,7 @@ TEST_P(ShippedMjcf, HasOurAccelerationsAtTheStart) {
   const double by_loops = LargestDifference(ours.udot_open, ours.udot_without_bias);
   const double soft = LargestDifference(theirs, ours.udot_without_bias);
   EXPECT_LE(soft, 10 * 1e-4 * by_loops + ours.bound);
-  // for docs/exchange-out.md
+  // for results/peers/exports.md
   const auto record = [&](const char* key, double difference) {
     RecordProperty(key, fmt::format("{:.1e}", difference / ours.Scale()));
   };

@@ -172,7 +172,7 @@ TEST(ExportedSimbody, HasOurAccelerationsAndMotion) {
     // little
     const double difference = DifferenceAtEnd(run, start, end);
     EXPECT_LE(difference, 100 * kTolerance);
-    // for docs/exchange-out.md
+    // for results/peers/exports.md
     RecordProperty(name, fmt::format("{:.1e} {:.1e}", accelerations, difference));
   }
 }

@@ -63,8 +63,8 @@ TEST_P(Driven, DriftHoldsWhatTheDriveMisses) {
 TEST_P(Driven, ScrewJackLiftsByItsTorque) {
   const MechanismDescription description = Shipped("screw-jack").description;
   // Multipliers share what redundant constraints contradict each other by among all joints of the
-  // loop; these then come apart as exp(speed t) in absolute coordinates (docs/numerics.md), 30
-  // rad/s and more from 1 s on.
+  // loop; these then come apart as exp(speed t) in absolute coordinates
+  // (docs/theory/constraints-and-drift.md), 30 rad/s and more from 1 s on.
   const bool comes_apart =
       GetParam().formulation == "lagrange" && GetParam().coordinates == Coordinates::kAbsolute;
   const double after = comes_apart ? 0.0 : 2.0;  // [s] beyond the first

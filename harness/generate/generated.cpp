@@ -1,12 +1,182 @@
 #include "harness/generate/generated.h"
 
+#include <dlfcn.h>
+#include <fmt/format.h>
+#include <sys/stat.h>
+#include <unistd.h>
+
 #include <algorithm>
 #include <chrono>
+#include <cstdlib>
+#include <filesystem>
+#include <fstream>
+#include <map>
+#include <mutex>
+#include <optional>
+#include <sstream>
+#include <vector>
 
-#include "harness/generate/differentiate.h"
+#include "harness/generate/graph.h"
 #include "harness/generate/print_c.h"
+#include "harness/generate/record.h"
+#include "harness/text/files.h"
+#include "harness/text/hash.h"
+#include "harness/text/run_program.h"
 
 namespace loopbench::generate {
+
+namespace {
+
+namespace fs = std::filesystem;
+
+using harness::FailOn, harness::Fnv1a, harness::ProgramResult, harness::TemporaryFolder,
+    harness::Unfinished;
+
+std::vector<std::string> Compiler() {
+  const char* named = std::getenv("CC");
+  std::istringstream words(named != nullptr && *named != '\0' ? named : "cc");
+  return {std::istream_iterator<std::string>(words), {}};
+}
+
+}  // namespace
+
+std::string RunCompiler(const std::vector<std::string>& arguments) {
+  std::vector<std::string> words = {"timeout", std::to_string(kCompilerSeconds)};
+  const std::vector<std::string> compiler = Compiler();
+  words.insert(words.end(), compiler.begin(), compiler.end());
+  words.insert(words.end(), arguments.begin(), arguments.end());
+  const ProgramResult result = harness::RunProgram(words);
+  const std::string name = compiler.empty() ? "CC" : compiler.front();
+  if (result.error == 0 && result.status == 127) {
+    throw NotCovered(fmt::format("no C compiler: '{}' not found (CC names another)", name));
+  }
+  if (result.error == 0 && result.status == 124) {
+    throw NotCovered(fmt::format("{} took more than {} s", name, kCompilerSeconds));
+  }
+  const std::string failure = result.Failure(name);
+  if (!failure.empty()) throw NotCovered("C compiler: " + failure);
+  return result.output;
+}
+
+namespace {
+
+/// Whether others could have written the file or folder.
+void RequireOwn(const fs::path& path, mode_t kind) {
+  struct stat found = {};
+  if (::lstat(path.c_str(), &found) != 0) FailOn("look at", path);
+  if ((found.st_mode & S_IFMT) == kind && found.st_uid == ::geteuid() &&
+      (found.st_mode & (S_IWGRP | S_IWOTH)) == 0) {
+    return;
+  }
+  throw NotCovered(fmt::format(
+      "{}: found owner {} and mode {:o}, expected a {} of user {} that others cannot write",
+      path.string(), found.st_uid, found.st_mode & 07777, kind == S_IFDIR ? "folder" : "file",
+      ::geteuid()));
+}
+
+/// The folder of libraries, made where it is missing; nothing where it cannot be made.
+std::optional<fs::path> CacheFolder() {
+  const char* cache = std::getenv("XDG_CACHE_HOME");
+  const char* home = std::getenv("HOME");
+  fs::path folder;
+  if (cache != nullptr && *cache == '/') {
+    folder = cache;
+  } else if (home != nullptr && *home == '/') {
+    folder = fs::path(home) / ".cache";
+  } else {
+    return std::nullopt;
+  }
+  std::error_code error;
+  fs::create_directories(folder, error);
+  folder /= "loopbench";
+  if (::mkdir(folder.c_str(), 0700) != 0 && errno != EEXIST) return std::nullopt;
+  RequireOwn(folder, S_IFDIR);
+  if (::access(folder.c_str(), W_OK | X_OK) != 0) return std::nullopt;
+  return folder;
+}
+
+CompiledBranch Load(const fs::path& library) {
+  void* handle = ::dlopen(library.c_str(), RTLD_NOW | RTLD_LOCAL);
+  if (handle == nullptr) throw NotCovered(fmt::format("generated code: {}", ::dlerror()));
+  void* function = ::dlsym(handle, "loopbench_function");
+  void* use_sines = ::dlsym(handle, "loopbench_use_sines");
+  const void* room = ::dlsym(handle, "loopbench_room");
+  if (function == nullptr || use_sines == nullptr || room == nullptr) {
+    throw NotCovered(library.string() + ": found no loopbench_function, expected generated code");
+  }
+  reinterpret_cast<void (*)(void (*)(double, double*, double*))>(use_sines)(&PoseSines);
+  CompiledBranch branch;
+  branch.function = reinterpret_cast<decltype(branch.function)>(function);
+  branch.room = *static_cast<const int*>(room);
+  return branch;
+}
+
+/// Compiles `text` to `library`.
+void Compile(const std::string& text, const fs::path& folder, const fs::path& library) {
+  const fs::path source = folder / "function.c";
+  harness::WriteFileAtomically(source, text);
+  std::vector<std::string> arguments(std::begin(kCompilerFlags), std::end(kCompilerFlags));
+  for (const std::string& word :
+       {source.string(), std::string("-o"), library.string(), std::string("-lm")}) {
+    arguments.push_back(word);
+  }
+  RunCompiler(arguments);
+}
+
+/// A kept library ends with the checksum of the bytes before it, which the loader does not read.
+void RequireWhole(const fs::path& library) {
+  const std::string bytes = harness::ReadFile(library);
+  const std::size_t size = bytes.size() - std::min(bytes.size(), Fnv1a("").size());
+  if (Fnv1a(bytes.substr(0, size)) == bytes.substr(size)) return;
+  throw NotCovered(library.string() + ": found a wrong checksum, expected the file as it was " +
+                   "written; remove it");
+}
+
+CompiledBranch CompileOrFind(const std::string& text, const std::string& name,
+                             const std::optional<fs::path>& cache) {
+  if (cache) {
+    const fs::path kept = *cache / (name + ".so");
+    if (fs::exists(fs::symlink_status(kept))) {
+      RequireOwn(kept, S_IFREG);
+      RequireWhole(kept);
+      return Load(kept);
+    }
+  }
+  const TemporaryFolder folder("loopbench-generated");
+  const fs::path library = folder.path() / "function.so";
+  Compile(text, folder.path(), library);
+  if (cache) {
+    // renamed when complete, so a concurrent process never reads an incomplete file
+    const fs::path own = *cache / fmt::format("{}.{}", name, ::getpid());
+    const Unfinished unfinished(own);
+    const std::string bytes = harness::ReadFile(library);
+    std::error_code error;
+    if (std::ofstream(own, std::ios::binary) << bytes << Fnv1a(bytes) << std::flush) {
+      fs::permissions(own, fs::perms::owner_all, error);
+      if (!error) fs::rename(own, *cache / (name + ".so"), error);
+    }
+  }
+  return Load(library);
+}
+
+}  // namespace
+
+CompiledBranch CompileBranch(const std::string& text) {
+  static std::mutex mutex;
+  static std::map<std::string, CompiledBranch> loaded;
+  const std::lock_guard lock(mutex);
+  static std::map<std::string, std::string> versions;  // by the compiler's words
+  const std::string words = fmt::format("{}", fmt::join(Compiler(), " "));
+  if (!versions.contains(words)) versions[words] = RunCompiler({"--version"});
+  const std::string all =
+      fmt::format("{}\n{}\n{}\n{}", words, versions[words], fmt::join(kCompilerFlags, " "), text);
+  const std::string name = Fnv1a(all) + Fnv1a(Fnv1a(all) + all);
+  const std::optional<fs::path> cache = CacheFolder();
+  const std::string place = cache ? (*cache / name).string() : name;
+  const auto known = loaded.find(place);
+  if (known != loaded.end()) return known->second;
+  return loaded[place] = CompileOrFind(text, name, cache);
+}
 
 namespace {
 

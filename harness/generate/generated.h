@@ -1,8 +1,4 @@
-// A system's right-hand side as generated code: recorded, compiled, loaded, called.
-//
-// A recording holds where all its comparisons come out as they did (graph.h). Where they do not,
-// the library evaluates; after some such evaluations the branch of the state at hand is recorded
-// too. Compiled branches stay until the mode of the system changes.
+// Right-hand sides as compiled code: printed, compiled, loaded, called.
 #pragma once
 
 #include <memory>
@@ -10,11 +6,46 @@
 #include <utility>
 #include <vector>
 
-#include "harness/generate/compile.h"
 #include "harness/generate/record.h"
 #include "mechanism/formulation/system.h"
 
 namespace loopbench::generate {
+
+// Compiles generated C by the system's compiler and loads it.
+//
+// The compiler is $CC or cc, started without a shell, for at most kCompilerSeconds. Libraries stay
+// in $XDG_CACHE_HOME/loopbench or ~/.cache/loopbench under names made from text, compiler and
+// flags, each with a checksum at its end. A folder or file that another user owns or can write, and
+// a file with a wrong checksum, is rejected. If the folder cannot be made, nothing is kept.
+
+inline constexpr int kCompilerSeconds = 120;
+
+/// -ffp-contract=off: the same bits as the library's general text.
+inline constexpr const char* kCompilerFlags[] = {
+    "-std=c99",         "-O2", "-fPIC", "-shared", "-ffp-contract=off", "-fno-math-errno",
+#ifdef __AVX2__  // this program needs as much
+    "-march=x86-64-v3",
+#endif
+};
+
+/// Output of the compiler with these arguments. Throws NotCovered (record.h) if there is no
+/// compiler or if it fails.
+std::string RunCompiler(const std::vector<std::string>& arguments);
+
+/// The function that a text defines (print_c.h); it stays loaded until the process ends.
+struct CompiledBranch {
+  int (*function)(const double* x, double* y, double* w) = nullptr;
+  int room = 0;  ///< numbers that w has room for
+};
+
+/// Throws NotCovered (record.h) if there is no compiler, if it fails, or if the cache is rejected.
+CompiledBranch CompileBranch(const std::string& text);
+
+// A system's right-hand side as generated code: recorded, compiled, loaded, called.
+//
+// A recording holds where all its comparisons come out as they did (graph.h). Where they do not,
+// the library evaluates; after some such evaluations the branch of the state at hand is recorded
+// too. Compiled branches stay until the mode of the system changes.
 
 template <class Space>
 class GeneratedDerivative final : public CompiledDerivative {

@@ -6,7 +6,7 @@
 #include <cmath>
 #include <exception>
 
-#include "harness/exchange/model_of_mechanism.h"
+#include "harness/exchange/export_mechanism.h"
 #include "harness/integrator/cpu_time.h"
 
 namespace loopbench::peers {

@@ -6,7 +6,7 @@
 #include <string>
 
 #include "harness/exchange/model.h"
-#include "harness/integrator/peer.h"
+#include "harness/integrator/arkode.h"
 #include "mechanism/description/description.h"
 #include "peers/program.h"
 

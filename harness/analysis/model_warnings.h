@@ -1,12 +1,22 @@
-// What looks wrong about a mechanism before anything is run.
+// What is unusual in a model, measured by the length of its links.
 #pragma once
 
 #include <string>
 #include <vector>
 
+#include "mechanism/description/description.h"
 #include "mechanism/simplify/structure.h"
 
 namespace loopbench::harness {
+
+// The length that lengths of one mechanism are compared with.
+
+/// The longest extent [m] of the joints of one moving body, which for two joints is their distance,
+/// or of a rod; where no body has two joints, the longest way from a joint to a centre of mass. 1
+/// where there is none either. Geometry alone: where the scene stands does not matter.
+double LinkLength(const MechanismDescription& description);
+
+// What looks wrong about a mechanism before anything is run.
 
 enum class WarningKind {
   kInconsistentStart,  ///< the start cannot be assembled

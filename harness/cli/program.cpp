@@ -10,25 +10,13 @@
 #include <string_view>
 #include <vector>
 
-#include "harness/cli/long_table.h"
-#include "harness/cli/program_baseline.h"
-#include "harness/cli/program_cluster.h"
-#include "harness/cli/program_compare.h"
-#include "harness/cli/program_convert.h"
-#include "harness/cli/program_count.h"
-#include "harness/cli/program_files.h"
-#include "harness/cli/program_generate.h"
-#include "harness/cli/program_history.h"
-#include "harness/cli/program_import.h"
-#include "harness/cli/program_report.h"
-#include "harness/cli/program_shell.h"
-#include "harness/cli/program_stores.h"
-#include "harness/cli/program_view.h"
+#include "harness/cli/command_line.h"
+#include "harness/cli/commands.h"
 #include "harness/config/formulations.h"
 #include "harness/record/provenance.h"
 #include "harness/store/result_store.h"
-#include "harness/text/out_of_memory.h"
-#include "harness/text/output_file.h"
+#include "harness/text/files.h"
+#include "harness/text/run_program.h"
 #include "harness/text/terminal.h"
 #include "mechanism/model/dense_memory.h"
 
@@ -123,19 +111,14 @@ int RunCommandLine(int argc, char** argv) {
   app.failure_message([](const CLI::App* failed, const CLI::Error& error) {
     return EscapeTerminalLines(CLI::FailureMessage::simple(failed, error) + WhatWasMeant(*failed));
   });
-  FileOptions files(app);
-  ViewOptions view(app);
-  StoreOptions stores(app);
-  ReportCommandOptions report(app);
-  ImportCommandOptions import(app);
-  ConvertOptions convert(app);
-  GenerateOptions generate(app);
-  CountOptions count(app);
-  ComparisonOptions comparison(app);
-  BaselineOptions baseline(app);
-  ClusterOptions cluster(app);
-  HistoryOptions history(app);
-  ShellOptions shell(app);
+  Commands commands(&app);
+  for (const auto add :
+       {AddRun,        AddList,     AddCheck,   AddPlan,    AddExplain, AddSimplify, AddSchema,
+        AddAdvise,     AddView,     AddMerge,   AddTable,   AddPlot,    AddTradeoff, AddTrajectory,
+        AddVerdict,    AddMap,      AddReport,  AddImport,  AddConvert, AddGenerate, AddCount,
+        AddComparison, AddBaseline, AddCluster, AddHistory, AddShell}) {
+    add(commands);
+  }
   TakeOneWordEach(&app);
   GroupCommands(app);
   try {
@@ -145,20 +128,7 @@ int RunCommandLine(int argc, char** argv) {
   }
   const CommandInputs inputs;
   try {
-    const std::string typed = CommandLine(argc, argv);
-    if (const auto code = files.Run(typed, ShellLine({argv, argv + argc}))) return *code;
-    if (const auto code = view.Run()) return *code;
-    if (const auto code = stores.Run(typed)) return *code;
-    if (const auto code = report.Run(typed)) return *code;
-    if (const auto code = import.Run()) return *code;
-    if (const auto code = convert.Run()) return *code;
-    if (const auto code = generate.Run()) return *code;
-    if (const auto code = count.Run(typed)) return *code;
-    if (const auto code = comparison.Run(typed)) return *code;
-    if (const auto code = baseline.Run(typed)) return *code;
-    if (const auto code = cluster.Run()) return *code;
-    if (const auto code = history.Run(typed)) return *code;
-    return shell.Run();
+    return commands.Run({CommandLine(argc, argv), ShellLine({argv, argv + argc})});
   } catch (const std::bad_alloc& error) {
     PrintError("{}\n", Lines{OutOfMemory(error, {argv + 1, argv + argc})});
     return 2;

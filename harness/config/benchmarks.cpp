@@ -1,8 +1,73 @@
 #include "harness/config/benchmarks.h"
 
-#include "harness/config/sized_family.h"
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <set>
+#include <stdexcept>
+#include <system_error>
+
+#include "harness/config/experiment_sections.h"
+#include "harness/config/file_schemas.h"
+#include "harness/config/formulations.h"
+#include "harness/config/mechanism_reader.h"
+#include "harness/config/options.h"
+#include "harness/json/fields.h"
+#include "harness/text/files.h"
+#include "mechanism/description/in_space.h"
+#include "mechanism/description/library.h"
+#include "mechanism/simplify/compile.h"
 
 namespace loopbench::harness {
+namespace {
+
+constexpr int kLargest = 1'000'000;
+
+/// The other speeds follow. Tension grows with length and its square: so slow that steps of a few
+/// milliseconds are short against the waves in it.
+MechanismDescription Started(MechanismDescription description, int size) {
+  description.initial.speeds.push_back({0, {std::min(1.0, 1000.0 / size)}});
+  return description;
+}
+
+}  // namespace
+
+const std::vector<SizedFamily>& SizedFamilies() {
+  // the smallest loops that move have three bars in the plane and six in space
+  static const std::vector<SizedFamily> all = {
+      {"chain", 3, kLargest, "bars of a closed chain", [](int n) { return Started(Chain(n), n); }},
+      {"ladder", 1, kLargest, "windows in a row", [](int n) { return Ladder(n, 1.0, 1.0); }},
+      // storeys stand at angles from 0.4 rad on, a tenth more each: the 25th at 2.8 rad, the 29th
+      // would fold flat
+      {"grid", 1, 25, "storeys of as many windows", [](int n) { return Grid(n, n, 0.4, 0.5); }},
+      {"tree", 1, kLargest, "bars of a binary tree", [](int n) { return Tree(n, 0.1); }},
+      {"arm", 1, kLargest, "bars in space, with axes of all directions",
+       [](int n) { return Started(Arm(n, false), n); }},
+      {"ring", 6, kLargest, "the same in a closed loop",
+       [](int n) { return Started(Arm(n, true), n); }}};
+  return all;
+}
+
+std::vector<std::string> NamesOfSizedFamilies() {
+  std::vector<std::string> names;
+  for (const SizedFamily& family : SizedFamilies()) names.push_back(family.name);
+  return names;
+}
+
+std::string TextOfSizedFamilies() {
+  std::string text = "What a size counts:";
+  for (const SizedFamily& family : SizedFamilies()) {
+    text += fmt::format("{} {} ({}, from {})", &family == &SizedFamilies().front() ? "" : ",",
+                        family.name, family.of_what, family.smallest);
+  }
+  return text + ".";
+}
+
+const SizedFamily& SizedFamilyOf(const std::string& name) {
+  const auto at = std::ranges::find(SizedFamilies(), name, &SizedFamily::name);
+  if (at == SizedFamilies().end()) throw std::invalid_argument("no family \"" + name + "\"");
+  return *at;
+}
 
 MechanismDescription BenchmarkMember::Make() const {
   return family.empty() ? description : SizedFamilyOf(family).make(size);
@@ -11,6 +76,238 @@ MechanismDescription BenchmarkMember::Make() const {
 std::string BenchmarkName(BenchmarkKind kind, const BenchmarkMember& member, const Column& column) {
   return std::string(kNames<BenchmarkKind>[static_cast<std::size_t>(kind)]) + "/" + member.name +
          "/" + ToString(column);
+}
+namespace {
+
+std::vector<BenchmarkMember> ReadBenchmarkMechanisms(const JsonNode& node,
+                                                     const std::filesystem::path& folder,
+                                                     ErrorList* errors) {
+  std::vector<BenchmarkMember> members;
+  for (const JsonNode& element : node.OneOrMore("mechanism files")) {
+    const std::string named = element.Text();
+    const std::filesystem::path path = (folder / named).lexically_normal();
+    if (named.empty() || !ExpectFile(element, path, "a mechanism file")) continue;
+    try {
+      BenchmarkMember member;
+      member.description = ReadMechanism(path).description;
+      member.name = member.description.name;
+      members.push_back(std::move(member));
+    } catch (const ConfigError& mistakes) {
+      errors->AddText(mistakes.what());
+    }
+  }
+  return members;
+}
+
+std::vector<BenchmarkMember> ReadBenchmarkFamily(const JsonNode& node, const JsonNode& owner) {
+  std::vector<BenchmarkMember> members;
+  const auto index = node.Choice(NamesOfSizedFamilies(), "a family");
+  const auto sizes = owner.Required("sizes", "a list of integers");
+  if (!index || !sizes) return members;
+  const SizedFamily& family = SizedFamilies()[static_cast<std::size_t>(*index)];
+  for (const JsonNode& size : sizes->OneOrMore("sizes")) {
+    BenchmarkMember member;
+    member.family = family.name;
+    member.size = static_cast<int>(size.Integer(family.smallest, family.largest));
+    member.name = fmt::format("{}/{}", family.name, member.size);
+    members.push_back(std::move(member));
+  }
+  return members;
+}
+
+/// Planar members, described in a plane tilted against the axes of space.
+void PutInSpace(const JsonNode& node, std::vector<BenchmarkMember>* members) {
+  const Eigen::Vector3d tilt(0.3, -0.4, 0.5);
+  for (BenchmarkMember& member : *members) {
+    member.description = member.Make();
+    member.family.clear();
+    if (member.description.space == SpaceKind::kSpatial) {
+      node.FailAs(fmt::format("\"{}\", spatial already", member.name), "planar mechanisms");
+      return;
+    }
+    member.description = InSpace(member.description, tilt);
+    member.name += "/space";
+  }
+}
+
+/// Each member's simplified parts in its place.
+void CompileMembers(std::vector<BenchmarkMember>* members) {
+  std::vector<BenchmarkMember> compiled;
+  for (const BenchmarkMember& member : *members) {
+    const Compiled all = Compile(member.Make(), CompileOptions::All());
+    for (std::size_t i = 0; i < all.parts.size(); ++i) {
+      BenchmarkMember part;
+      part.name = member.name + "/compiled";
+      if (all.parts.size() > 1) part.name += fmt::format("/{}", i + 1);
+      part.description = all.parts[i].description;
+      compiled.push_back(std::move(part));
+    }
+  }
+  *members = std::move(compiled);
+}
+
+/// A group being read.
+struct GroupInFile : BenchmarkGroup {
+  std::filesystem::path folder;
+  bool in_space = false, compile = false;
+};
+
+/// Mechanisms of files or of a family.
+void ReadMembers(const JsonNode& node, GroupInFile& group) {
+  const auto mechanisms = node.Optional("mechanisms"), family = node.Optional("family");
+  if (mechanisms && family) {
+    family->Fail("no \"family\" beside \"mechanisms\"; make two groups");
+  } else if (mechanisms) {
+    group.members = ReadBenchmarkMechanisms(*mechanisms, group.folder, &node.errors());
+    if (const auto sizes = node.Optional("sizes")) sizes->Fail("no \"sizes\" without a \"family\"");
+  } else if (family) {
+    group.members = ReadBenchmarkFamily(*family, node);
+  } else {
+    node.FailAs("neither \"mechanisms\" nor \"family\"", "one of them");
+  }
+}
+
+void ChangeMembers(const JsonNode& node, GroupInFile& group) {
+  if (group.in_space) PutInSpace(*node.Optional("in_space"), &group.members);
+  if (group.compile) CompileMembers(&group.members);
+}
+
+const Fields<GroupInFile>& GroupFields() {
+  static const Json one_of_two = Json::parse(R"({"oneOf": [
+      {"required": ["mechanisms"], "not": {"anyOf": [{"required": ["family"]}, {"required": ["sizes"]}]}},
+      {"required": ["family", "sizes"], "not": {"required": ["mechanisms"]}}]})");
+  static const Fields<GroupInFile> fields(
+      "benchmark_group", "Mechanisms, or members of a family, and what is measured of them.",
+      {{"mechanisms", OneOrMoreSchema(TextSchema()),
+        "Paths of mechanism files, relative to this file."},
+       {"family", ChoiceSchema(NamesOfSizedFamilies()), "What grows."},
+       {"sizes", OneOrMoreSchema(IntegerSchema(1, kMaxCount)), TextOfSizedFamilies()},
+       {"", By(one_of_two, ReadMembers)},
+       {"in_space", Bool(&GroupInFile::in_space),
+        "The planar members, described in a tilted plane in space."},
+       {"compile", Bool(&GroupInFile::compile),
+        "The members' simplified parts in their place, with all savings."},
+       {"", By(Json::object(), ChangeMembers)},
+       {"measure", Choices(&BenchmarkGroup::kinds, NamesOf<BenchmarkKind>(), "what is measured"),
+        "A right-hand side, an integrator step, or both.", "\"rhs\", \"step\" or both"},
+       {"columns", Columns(&BenchmarkGroup::columns), "How the loops are imposed.",
+        "an array of columns"}});
+  return fields;
+}
+
+/// Reports a peer: its time is measured over whole runs, which benchmarks have none of.
+void ReportPeer(const JsonNode& node, const BenchmarkGroup& group) {
+  for (const Column& column : group.columns) {
+    if (!FindFormulation(column.formulation)->is_peer()) continue;
+    node.FailAs(fmt::format("\"{}\"", column.formulation),
+                "a formulation: peers are timed by experiments");
+    return;
+  }
+}
+
+/// Reports the first benchmark that a group repeats: names must tell results apart.
+void ReportRepeatedBenchmark(const JsonNode& node, const BenchmarkGroup& group,
+                             std::set<std::string>* taken) {
+  for (const BenchmarkMember& member : group.members) {
+    for (const BenchmarkKind kind : group.kinds) {
+      for (const Column& column : group.columns) {
+        const std::string name = BenchmarkName(kind, member, column);
+        if (taken->insert(name).second) continue;
+        node.FailAs(fmt::format("benchmark \"{}\" again", name), "each benchmark once");
+        return;
+      }
+    }
+  }
+}
+
+/// The mistakes of the file of states join the others under its own name.
+StateHashes ReadStates(const std::filesystem::path& path, ErrorList* errors) {
+  StateHashes states;
+  try {
+    const std::string text = ReadTextFile(path);
+    const Json document = ParseDocument(text, path.string());
+    ErrorList own(path.string(), text);
+    for (const auto& [name, node] : JsonNode(document, "", own).Members()) {
+      const std::string hash = node.Text();
+      const bool is_hash =
+          hash.size() == 16 && hash.find_first_not_of("0123456789abcdef") == std::string::npos;
+      if (!hash.empty() && !is_hash) node.Fail("16 hexadecimal digits");
+      states[name] = hash;
+    }
+    own.ThrowIfAny();
+  } catch (const ConfigError& mistakes) {
+    errors->AddText(mistakes.what());
+  }
+  return states;
+}
+
+void ReadNamedStates(const JsonNode& node, BenchmarkSet& set) {
+  const std::string named = node.Text();
+  if (named.empty()) return;
+  // the file itself may be missing: --save-states makes it
+  set.states_path = set.path.parent_path() / named;
+  std::error_code error;
+  if (std::filesystem::exists(set.states_path, error)) {
+    set.states = ReadStates(set.states_path, &node.errors());
+  }
+}
+
+void ReadGroups(const JsonNode& node, BenchmarkSet& set) {
+  std::set<std::string> taken;
+  for (const JsonNode& element : node.Elements("groups")) {
+    GroupInFile group;
+    group.folder = set.path.parent_path();
+    GroupFields().Read(element, &group);
+    set.groups.push_back(group);
+    ReportPeer(element, group);
+    ReportRepeatedBenchmark(element, group, &taken);
+  }
+  if (node.value().is_array() && set.groups.empty()) node.Fail("at least one group");
+}
+
+const Fields<BenchmarkSet>& BenchmarkFields() {
+  static const Fields<BenchmarkSet> fields(
+      "benchmarks",
+      "What loopbench_bench and loopbench_count measure. Every combination of a group's members, "
+      "measures and columns is a benchmark. The program checks more than this schema: that "
+      "mechanism files exist and are valid, and that benchmarks are different.",
+      DocumentRows<BenchmarkSet>(
+          {{"name", Text(&BenchmarkSet::name), "Of the set.", "a name"},
+           {"comment", Text(&BenchmarkSet::comment), "Free text for readers."},
+           {"states", By(TextSchema(), ReadNamedStates),
+            "File of state hashes, relative to this file; loopbench_bench --save-states writes "
+            "it."},
+           {"integrator",
+            Choice(&BenchmarkSet::integrator, ProfileNames(), "an integrator profile"),
+            "Profile whose step is measured."},
+           {"step", Number(&BenchmarkSet::step, kPositive), "Length of the step [s]."},
+           {"groups", By(ArraySchema(GroupFields().Schema(), 1), ReadGroups), "What is measured.",
+            "an array of groups"}}));
+  return fields;
+}
+
+}  // namespace
+
+Json BenchmarksSchema() { return BenchmarkFields().OwnSchema(); }
+
+BenchmarkSet ReadBenchmarks(const std::filesystem::path& path) {
+  return ParseBenchmarks(ReadTextFile(path), path);
+}
+
+BenchmarkSet ParseBenchmarks(std::string_view text, const std::filesystem::path& path) {
+  const Json document = ParseDocument(text, path.string());
+  ErrorList errors(path.string(), text);
+  const JsonNode root(document, "", errors);
+  BenchmarkSet set;
+  set.path = path;
+  if (ExpectDocument(root, FileKind::kBenchmarks)) BenchmarkFields().ReadRows(root, &set);
+  errors.ThrowIfAny();
+  return set;
+}
+
+std::string StatesToJson(const StateHashes& states) {
+  const nlohmann::json document = states;
+  return document.dump(2) + "\n";
 }
 
 }  // namespace loopbench::harness

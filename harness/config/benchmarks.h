@@ -1,5 +1,4 @@
-// What loopbench_bench and loopbench_count measure: mechanisms, families, columns, and the hashes
-// of the states they are measured at. Plain data; benchmark_reader.h fills it.
+// Families of mechanisms by size, and the benchmarks of right-hand sides that a file asks for.
 #pragma once
 
 #include <filesystem>
@@ -12,6 +11,28 @@
 #include "mechanism/description/description.h"
 
 namespace loopbench::harness {
+
+// Families of mechanisms of any size (mechanism/description/library.h), as benchmarks and the
+// timings of experiments take them.
+
+struct SizedFamily {
+  std::string name;
+  int smallest, largest;
+  std::string of_what;  ///< what a size counts: "bars of a closed chain"
+  /// With a start that moves, so that no term of the equations vanishes.
+  MechanismDescription (*make)(int size);
+};
+
+const std::vector<SizedFamily>& SizedFamilies();
+std::vector<std::string> NamesOfSizedFamilies();
+/// All of them, with what their sizes count, in a sentence.
+std::string TextOfSizedFamilies();
+
+/// The family of that name, which must be one.
+const SizedFamily& SizedFamilyOf(const std::string& name);
+
+// What loopbench_bench and loopbench_count measure: mechanisms, families, columns, and the hashes
+// of the states they are measured at. Plain data; benchmarks.h fills it.
 
 enum class BenchmarkKind {
   kRhs,   ///< one right-hand side
@@ -53,5 +74,24 @@ struct BenchmarkSet {
 
 /// "rhs/chain/10/odca/acceleration/joint/rank-revealing".
 std::string BenchmarkName(BenchmarkKind kind, const BenchmarkMember& member, const Column& column);
+
+// Reads what is benchmarked (configs/benchmarks/default.json):
+//   {"name", "comment", "states", "integrator", "step",
+//    "groups": [{"mechanisms": [path, ...]  or  "family": "chain|ladder|grid", "sizes": [...],
+//                "in_space": false, "compile": false,
+//                "measure": ["rhs", "step"], "columns": [...]}]}
+// Paths are relative to the file; columns are those of experiments. "states" names a file of
+// hashes, which loopbench_bench --save-states writes:
+//   {"<member>/<coordinates>": "<16 hexadecimal digits>"}
+
+/// Reads the file, the mechanisms and the states it names. Throws ConfigError with all mistakes,
+/// each with file, JSON Pointer, value found, what was expected and the nearest spelling.
+BenchmarkSet ReadBenchmarks(const std::filesystem::path& path);
+
+/// The same from text; `path` names it in messages and is what relative paths start from.
+BenchmarkSet ParseBenchmarks(std::string_view text, const std::filesystem::path& path);
+
+/// The text of a file of hashes.
+std::string StatesToJson(const StateHashes& states);
 
 }  // namespace loopbench::harness

@@ -11,8 +11,8 @@
 #include <string_view>
 #include <vector>
 
+#include "harness/config/mechanism_reader.h"
 #include "harness/config/published_series.h"
-#include "harness/config/scene.h"
 #include "harness/record/record.h"
 #include "harness/record/select.h"
 #include "mechanism/description/topology.h"
@@ -138,7 +138,7 @@ struct Limits {
 /// A family of mechanisms of growing size (mechanism/description/library.h), timed per right-hand
 /// side only.
 struct TimingFamily {
-  std::string family;      ///< a SizedFamily (harness/config/sized_family.h)
+  std::string family;      ///< a SizedFamily (harness/config/benchmarks.h)
   std::vector<int> sizes;  ///< of its members
   std::vector<Column> columns;
 };
@@ -278,5 +278,10 @@ std::vector<Case> ExpandLadders(const Experiment& experiment);
 /// All cases for timing, in the order scene, column, integrator, without excluded ones, or with
 /// `timing.cases` those for accuracy, each of which is one run; empty when timing is off.
 std::vector<Case> ExpandTiming(const Experiment& experiment);
+
+// Limits as keys and values: what the content of a case says of them.
+
+/// Each limit under its key in files.
+Record RecordOf(const Limits& limits);
 
 }  // namespace loopbench::harness

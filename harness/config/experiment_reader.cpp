@@ -2,10 +2,277 @@
 
 #include <fmt/format.h>
 
+#include <algorithm>
+
 #include "harness/config/experiment_sections.h"
-#include "harness/text/config_error.h"
+#include "harness/config/file_schemas.h"
+#include "harness/config/options.h"
+#include "harness/json/fields.h"
+#include "harness/json/json_document.h"
+#include "harness/text/files.h"
 
 namespace loopbench::harness {
+namespace {
+
+/// One combination, or all there is. Mistakes go to the root's errors.
+Experiment ReadOne(const JsonNode& root, MechanismFiles& files) {
+  ExperimentFile experiment;
+  experiment.files = &files;
+  if (ExpectDocument(root, FileKind::kExperiment))
+    ExperimentFileFields().ReadRows(root, &experiment);
+  return experiment;
+}
+
+/// "mass = 1, damping = 0.5".
+std::string Described(const Record& parameters) {
+  std::string text;
+  for (const auto& [name, value] : parameters.items()) {
+    text += fmt::format("{}{} = {}", text.empty() ? "" : ", ", name, parameters.Text(name));
+  }
+  return text;
+}
+
+}  // namespace
+
+/// Which rules of "exclude" have matched, and whether any case was left.
+class ExclusionUse {
+ public:
+  explicit ExclusionUse(const std::vector<Selection>& rules) : rules_(rules), used_(rules.size()) {}
+
+  /// Whether the experiment has a case that no rule excludes.
+  bool Look(Experiment* experiment) {
+    if (rules_.empty()) return any_left_ = true;
+    std::vector<Selection> own;
+    own.swap(experiment->exclusions);
+    bool any = false;
+    for (const Case& one : Expand(*experiment)) {
+      bool excluded = false;
+      for (std::size_t i = 0; i < rules_.size(); ++i) {
+        if (!Matches(one.keys, rules_[i])) continue;
+        used_[i] = true;
+        excluded = true;
+      }
+      any = any || !excluded;
+    }
+    own.swap(experiment->exclusions);
+    any_left_ = any_left_ || any;
+    return any;
+  }
+
+  bool is_sure() const {
+    return any_left_ && std::ranges::all_of(used_, [](bool used) { return used; });
+  }
+
+  void Report(ErrorList* errors) const {
+    for (std::size_t i = 0; i < rules_.size(); ++i) {
+      if (used_[i]) continue;
+      errors->Add(fmt::format("/exclude/{}", i), "a rule that matches no case",
+                  "conditions that match at least one case");
+    }
+    if (!any_left_) errors->Add("/exclude", "rules that match every case", "at least one case");
+  }
+
+ private:
+  std::vector<Selection> rules_;
+  std::vector<bool> used_;
+  bool any_left_ = false;
+};
+
+/// The file and its sweep.
+class ExperimentSource::Document {
+ public:
+  Document(std::string text, const std::filesystem::path& path,
+           const std::vector<Setting>& settings)
+      : text_(std::move(text)),
+        path_(path),
+        document_(ParseDocument(text_, path.string())),
+        origins_(path.string(), text_),
+        files_(path.parent_path()),
+        fields_(document_, origins_, files_) {
+    Apply(settings);
+    ReadSweep();
+  }
+
+  const std::filesystem::path& path() const { return path_; }
+  const Sweep& sweep() const { return *sweep_; }
+  std::string Text() const {
+    return document_.dump(-1, ' ', false, Json::error_handler_t::replace);
+  }
+
+  Experiment Read(std::size_t index) {
+    sweep_->Apply(index, fields_);
+    ErrorList errors(origins_);
+    const JsonNode root(document_, "", errors);
+    Experiment experiment = ReadOne(root, files_);
+    experiment.path = path_;
+    experiment.parameters = sweep_->Parameters(index);
+    experiment.exclusions = ReadExclusions(root, CaseKeys(experiment, Case()));
+    errors.ThrowIfAny(index == 0 ? ""
+                                 : fmt::format("{}: the above in combination {} of {}: {}",
+                                               path_.string(), index + 1, sweep_->count(),
+                                               Described(experiment.parameters)));
+    return experiment;
+  }
+
+  std::vector<Experiment> ReadAll() {
+    Refuse(sweep_->count() > kMaxInMemory, "/sweep",
+           fmt::format("{} combinations", sweep_->count()),
+           fmt::format("at most {} to be held at once", kMaxInMemory));
+    std::vector<Experiment> experiments;
+    std::size_t cases = 0, bodies = 0;
+    for (std::size_t i = 0; i < sweep_->count(); ++i) {
+      experiments.push_back(Read(i));
+      cases += CountCases(experiments.back());
+      Refuse(cases > kMaxHeldCases, "", fmt::format("{} cases so far", cases),
+             fmt::format("at most {} to be held at once", kMaxHeldCases));
+      for (const ExperimentScene& scene : experiments.back().scenes) {
+        bodies += scene.mechanism.description.bodies.size();
+      }
+      constexpr std::size_t kMaxAllBodies = 2'000'000;  // about 1 GB
+      Refuse(bodies > kMaxAllBodies, "", fmt::format("mechanisms with {} bodies so far", bodies),
+             fmt::format("at most {} in all combinations", kMaxAllBodies));
+    }
+    return WithoutExcluded(std::move(experiments));
+  }
+
+  /// A rule that excludes nothing is a mistake, as is a set of rules that excludes everything.
+  void CheckExclusions(const std::vector<std::size_t>& sample) {
+    ExclusionUse use(Read(0).exclusions);
+    const auto look = [&](std::size_t i) {
+      Experiment experiment = Read(i);
+      use.Look(&experiment);
+    };
+    for (const std::size_t i : sample) look(i);
+    for (std::size_t i = 0; i < sweep_->count() && !use.is_sure(); ++i) look(i);
+    Report(use);
+  }
+
+ private:
+  void Apply(const std::vector<Setting>& settings) {
+    std::string mistakes;
+    for (const Setting& setting : settings) {
+      const FieldTargets found = fields_.Find(setting.pointer);
+      if (found.fault) {
+        mistakes += (mistakes.empty() ? "" : "\n") + Explained(setting, *found.fault);
+        continue;
+      }
+      const Json value = Parsed(setting);
+      for (const std::string& pointer : found.pointers) fields_.Set(pointer, value);
+      for (const std::string& made : found.made) origins_.Note(made, "from --set", "");
+      set_.insert(set_.end(), found.pointers.begin(), found.pointers.end());
+    }
+    if (!mistakes.empty()) throw ConfigError(mistakes);
+  }
+
+  void ReadSweep() {
+    // Mistakes of the sweep itself come with those of the file as it stands.
+    Origins origins = origins_;
+    ErrorList errors(std::move(origins));
+    const JsonNode root(document_, "", errors);
+    sweep_ = std::make_unique<Sweep>(root, fields_, set_);
+    if (!sweep_->sound()) {
+      ErrorList all(origins_);  // with the files that the sweep has taken in
+      const JsonNode again(document_, "", all);
+      Sweep(again, fields_, set_);
+      ReadOne(again, files_);
+      all.ThrowIfAny();
+    }
+    sweep_->Note(&origins_);
+  }
+
+  std::string Explained(const Setting& setting, const FieldFault& fault) const {
+    if (!fault.text.empty()) return fault.text;
+    return fmt::format(
+        "{}: --set {}: found {}, expected {}{}", path_.string(), setting.pointer, fault.found,
+        fault.expected,
+        fault.suggestion.empty() ? "" : fmt::format(" (did you mean \"{}\"?)", fault.suggestion));
+  }
+
+  /// JSON where it is some, else a string: names need no quotes on the command line.
+  static Json Parsed(const Setting& setting) {
+    const std::string where = "--set " + setting.pointer;
+    if (const std::string fault = EncodingFault(setting.value); !fault.empty()) {
+      throw ConfigError(fmt::format("{}: {}", where, fault));
+    }
+    if (Json::accept(setting.value)) return ParseDocument(setting.value, where);
+    return setting.value;
+  }
+
+  void Refuse(bool refused, const std::string& pointer, const std::string& found,
+              const std::string& expected) const {
+    if (!refused) return;
+    ErrorList errors(origins_);
+    errors.Add(pointer, found, expected);
+    errors.ThrowIfAny();
+  }
+
+  void Report(const ExclusionUse& use) const {
+    ErrorList errors(origins_);
+    use.Report(&errors);
+    errors.ThrowIfAny();
+  }
+
+  std::vector<Experiment> WithoutExcluded(std::vector<Experiment> experiments) {
+    ExclusionUse use(experiments.front().exclusions);
+    std::erase_if(experiments, [&use](Experiment& one) { return !use.Look(&one); });
+    Report(use);
+    return experiments;
+  }
+
+  std::string text_;
+  std::filesystem::path path_;
+  Json document_;
+  Origins origins_;
+  MechanismFiles files_;
+  ExperimentFields fields_;
+  std::vector<std::string> set_;
+  std::unique_ptr<Sweep> sweep_;
+};
+
+std::size_t CountCases(const Experiment& experiment) {
+  std::size_t horizons = 0;
+  for (const ExperimentScene& scene : experiment.scenes) horizons += scene.horizons.size();
+  return horizons * experiment.columns.size() * experiment.integrators.size() *
+         (experiment.tolerances.size() + experiment.fixed_steps.size());
+}
+
+Setting ParseSetting(std::string_view text) {
+  const std::size_t equals = text.find('=');
+  if (equals == std::string_view::npos || text.front() != '/') {
+    throw ConfigError(fmt::format(
+        "--set: found \"{}\", expected /json/pointer=value, such as /scenes/0/horizon=20", text));
+  }
+  return {std::string(text.substr(0, equals)), std::string(text.substr(equals + 1))};
+}
+
+ExperimentSource::ExperimentSource(const std::filesystem::path& path,
+                                   const std::vector<Setting>& settings)
+    : ExperimentSource(ReadTextFile(path), path, settings) {}
+
+ExperimentSource::ExperimentSource(std::string text, const std::filesystem::path& path,
+                                   const std::vector<Setting>& settings)
+    : document_(std::make_unique<Document>(std::move(text), path, settings)) {}
+
+ExperimentSource::~ExperimentSource() = default;
+ExperimentSource::ExperimentSource(ExperimentSource&&) noexcept = default;
+
+const std::filesystem::path& ExperimentSource::path() const { return document_->path(); }
+std::size_t ExperimentSource::count() const { return document_->sweep().count(); }
+std::vector<std::pair<std::string, std::size_t>> ExperimentSource::axes() const {
+  return document_->sweep().Axes();
+}
+Record ExperimentSource::Parameters(std::size_t combination) const {
+  return document_->sweep().Parameters(combination);
+}
+Experiment ExperimentSource::Read(std::size_t combination) { return document_->Read(combination); }
+std::vector<std::size_t> ExperimentSource::EachValue(std::size_t most) const {
+  return document_->sweep().EachValue(most);
+}
+std::string ExperimentSource::Text() const { return document_->Text(); }
+std::vector<Experiment> ExperimentSource::ReadAll() { return document_->ReadAll(); }
+void ExperimentSource::CheckExclusions(const std::vector<std::size_t>& sample) {
+  document_->CheckExclusions(sample);
+}
 
 std::vector<Experiment> ReadExperiments(const std::filesystem::path& path,
                                         const std::vector<Setting>& settings) {
@@ -28,6 +295,191 @@ Experiment ParseExperiment(std::string_view text, const std::filesystem::path& p
                                   path.string(), experiments.size()));
   }
   return std::move(experiments.front());
+}
+
+// The top level of an experiment file.
+
+namespace {
+
+using File = ExperimentFile;
+
+void ReadAllColumns(const JsonNode& node, File& file) {
+  file.columns = file.timing.columns = ReadColumns(node);
+}
+
+/// None is as good as no key: RequireSteps() says when that will not do.
+void ReadAnyTolerances(const JsonNode& node, File& file) {
+  const bool is_empty = node.value().is_array() && node.value().empty();
+  if (!is_empty) file.tolerances = node.NumberList(kTolerances);
+}
+
+/// Reports an experiment that has neither tolerances nor steps.
+void RequireSteps(const JsonNode& node, File&) {
+  if (node.Optional("fixed_steps")) return;
+  const auto tolerances = node.Required("tolerances", "a list of numbers, or \"fixed_steps\"");
+  const bool is_empty = tolerances && tolerances->value().is_array() && tolerances->value().empty();
+  if (is_empty) tolerances->Fail("at least one tolerance, or \"fixed_steps\" beside it");
+}
+
+/// Reports peers, which choose their own steps, where steps are fixed.
+void RequireNoPeerOfFixedSteps(const JsonNode& node, File& file) {
+  const auto steps = node.Optional("fixed_steps");
+  if (!steps) return;
+  for (const Column& column : file.columns) {
+    const FormulationRow* row = FindFormulation(column.formulation);
+    if (row == nullptr || !row->is_peer()) continue;
+    steps->FailAs(fmt::format("fixed steps of \"{}\", which has its own integrator", row->name),
+                  "\"tolerances\" alone, or an experiment of its own for peers");
+    return;
+  }
+}
+
+void ReadPrecision(const JsonNode& node, File& file) {
+  file.precision.tolerances = file.tolerances;
+  if (!PrecisionFields().Read(node, &file.precision)) return;
+  if (file.precision.scalars.empty() || !file.precision.tolerances.empty()) return;
+  if (node.Optional("tolerances")) return;  // has been reported
+  node.FailAs("no \"tolerances\", and none in the experiment", "tolerances of the ladders");
+}
+
+FieldValue<File> Integrators() {
+  FieldValue<File> value =
+      RegisteredChoices(&File::integrators, ProfileNames, "an integrator profile");
+  value.show = [](const File& file) { return Json(file.integrators.front()); };
+  return value;
+}
+
+void ReadOutputOptions(const JsonNode& node, File& file) {
+  OutputFields().Read(node, &file.output.emplace());
+}
+
+/// Reports levels whose derivative an implicit profile asks for, and that have none.
+void RequireDerivatives(const JsonNode& node, File& file) {
+  const auto integrator = node.Optional("integrator");
+  if (!integrator || file.jacobian != JacobianKind::kForward) return;
+  const auto implicit = std::ranges::find_if(
+      file.integrators, [](const std::string& name) { return FindProfile(name)->is_implicit; });
+  if (implicit == file.integrators.end()) return;
+  const Profile* profile = FindProfile(*implicit);
+  for (const auto& columns : {file.columns, file.timing.columns}) {
+    for (const Column& column : columns) {
+      const LevelTraits& level = TraitsOf(column.enforcement);
+      if (level.has_derivative) continue;
+      integrator->FailAs(
+          fmt::format("\"{}\" at level \"{}\", which has no derivative", profile->name, level.name),
+          "\"jacobian\": \"finite-difference\" beside it");
+      return;
+    }
+  }
+}
+
+}  // namespace
+
+const Fields<ExperimentFile>& ExperimentFileFields() {
+  static const Json some_or_none = EitherSchema(
+      {NumberListSchema(kTolerances), {{"type", "array"}, {"maxItems", 0}, {"words", "[]"}}});
+  static const Json one_of_both = {
+      {"if", {{"not", Requires({"fixed_steps"})}}},
+      {"then",
+       {{"required", {"tolerances"}}, {"properties", {{"tolerances", {{"minItems", 1}}}}}}}};
+  static const Fields<File> fields(
+      "experiment",
+      "Which mechanisms, columns, tolerances and horizons are run. Lists expand as a cross "
+      "product. The program checks more than this schema: that mechanism files exist and are "
+      "valid, that scenes and columns are different, that fields of a sweep exist, that ranges "
+      "have two different ends, and that every ensemble and exclusion matches a case.",
+      DocumentRows<File>(
+          {{"name", Text(&File::name), "Of the suite.", "a name"},
+           {"comment", Text(&File::comment), "Free text for readers."},
+           {"scenes", ScenesValue(), "What moves.", "an array of scenes"},
+           {"columns", By(ColumnsSchema(), ReadAllColumns), "How the loops are imposed.",
+            "an array of columns"},
+           {"tolerances", By(some_or_none, ReadAnyTolerances),
+            "rtol = atol of the integrator; above the spacing of doubles. May be left out, or be "
+            "[], "
+            "beside fixed_steps."},
+           {"fixed_steps", NumberList(&File::fixed_steps, kPositive),
+            "Lengths of steps [s]: each makes cases whose steps all have this length (the last is "
+            "clipped), without error test, besides those of the tolerances. Not for peers."},
+           {"", By(one_of_both, RequireSteps)},
+           {"", By(Json::object(), RequireNoPeerOfFixedSteps)},
+           {"refine", Bool(&File::refine),
+            "Every case with a tolerance runs once more at a tenth of it. Records then contain "
+            "refinement_difference, the largest difference of final poses. More than 1000 "
+            "tolerances set the warning refinement."},
+           {"integrator", Integrators(),
+            "The profile, a Runge-Kutta pair with its norm and controller, or several, crossed "
+            "with "
+            "all else."},
+           {"jacobian", Choice(&File::jacobian, NamesOf<JacobianKind>(), "a kind of Jacobian"),
+            "Where implicit profiles have their Jacobians from; explicit ones have none."},
+           {"limits", Object(&File::limits, LimitsFields())},
+           {"compile", Object(&File::compile, CompileFields())},
+           {"series", Section(SeriesFields())},
+           {"timing", Object(&File::timing, TimingFields())},
+           {"precision", By(PrecisionFields().Schema(), ReadPrecision)},
+           {"reference", By(ReferenceFields().Schema(), ReadReferenceOptions)},
+           {"output", By(OutputFields().Schema(), ReadOutputOptions)},
+           {"", By(Json::object(), RequireOutput)},
+           {"ensembles", By(EnsemblesSchema(), ReadEnsembles), "Perturbed repetitions of cases."},
+           {"sweep", SweepSchema(),
+            "Axes that are crossed, the first one slowest; each combination of values is run as if "
+            "the values stood in this file. Axes in a zip go in step. At most 10000000 "
+            "combinations."},
+           {"exclude", ExclusionsSchema(),
+            "Cases that match all conditions of a rule are left out. Keys are mechanism, "
+            "formulation, "
+            "enforcement, coordinates, solver, integrator, rtol, atol, step, horizon and the names "
+            "of "
+            "axes."},
+           {"", By(Json::object(), RequireDerivatives)}}));
+  return fields;
+}
+
+Json ExperimentSchema() { return ExperimentFileFields().OwnSchema(); }
+
+std::string ExperimentText(const SingleRun& run) {
+  Json column = {{"formulation", run.column.formulation},
+                 {"enforcement", ToString(run.column.enforcement)},
+                 {"coordinates", ToString(run.column.coordinates)}};
+  Json experiment = {
+      {"name", run.name},
+      {"comment", run.comment},
+      {"scenes",
+       Json::array({{{"mechanism", run.mechanism.generic_string()}, {"horizon", run.horizon}}})},
+      {"columns", Json::array({column})},
+      {"integrator", run.integrator},
+      {"timing", {{"cases", true}}},
+      {"reference",
+       {{"scalar", run.reference.scalar},
+        {"points", run.reference.points},
+        {"cpu_s", run.reference.cpu_s}}}};
+  if (run.step > 0.0) {
+    experiment["fixed_steps"] = Json::array({run.step});
+  } else {
+    experiment["tolerances"] = Json::array({run.rtol});
+  }
+  return experiment.dump(2) + "\n";
+}
+
+std::string LadderText(const LadderFile& ladder) {
+  Json scenes = Json::array();
+  for (const std::string& mechanism : ladder.mechanisms) {
+    scenes.push_back({{"mechanism", mechanism}, {"horizon", ladder.horizon}});
+  }
+  const Json columns = Json::array({{{"formulation", {"odca", "lagrange", "reduction"}},
+                                     {"enforcement", "position"},
+                                     {"coordinates", "joint"}}});
+  const Json file = {
+      {"name", ladder.name},
+      {"comment", ladder.comment},
+      {"scenes", scenes},
+      {"columns", columns},
+      {"tolerances", {1e-6, 1e-9}},
+      {"integrator", "dormand-prince"},
+      {"compile", {{"planar", false}, {"welds", false}, {"immovable", false}, {"islands", false}}},
+      {"timing", {{"repeats", 5}}}};
+  return JsonText(file);
 }
 
 }  // namespace loopbench::harness

@@ -1,18 +1,393 @@
-// "scenes" of an experiment file and the mechanisms they name.
+// Sections of an experiment: scenes, families of mechanisms, ensembles of starts.
 #include <fmt/format.h>
 
 #include <algorithm>
+#include <limits>
+#include <numbers>
 #include <set>
 #include <system_error>
 
+#include "harness/config/experiment_reader.h"
 #include "harness/config/experiment_sections.h"
 #include "harness/config/mechanism_reader.h"
 #include "harness/config/mechanism_sections.h"
-#include "harness/text/config_error.h"
-#include "harness/text/spelling.h"
+#include "harness/text/files.h"
+#include "harness/text/words.h"
+#include "mechanism/description/library.h"
 #include "mechanism/description/similarity.h"
 
 namespace loopbench::harness {
+namespace {
+
+// Farther coordinates [rad or m] start no member: its start is followed in steps of 0.1.
+constexpr Range kFarthest = {.min = -1e4, .max = 1e4};
+constexpr Range kAmplitude = {.min = 0.0, .max = kFarthest.max, .above_min = true};
+
+/// A rule and what it selects from.
+struct RuleOfExperiment : EnsembleRule {
+  const Experiment* experiment = nullptr;
+};
+
+/// Each must be one of `used`: one that is not would match nothing.
+std::vector<double> ReadUsedNumbers(const JsonNode& node, const std::vector<double>& used) {
+  const std::vector<double> numbers = node.NumberList(kPositive);
+  for (const double number : numbers) {
+    if (std::find(used.begin(), used.end(), number) != used.end()) continue;
+    constexpr std::size_t kMostShown = 16;
+    const auto end = used.begin() + static_cast<int>(std::min(used.size(), kMostShown));
+    if (used.empty()) {
+      node.Fail("no such key: the experiment has none");
+      break;
+    }
+    node.Fail(fmt::format("values among those of this experiment: {}{}",
+                          fmt::join(used.begin(), end, ", "), end == used.end() ? "" : ", ..."));
+    break;
+  }
+  return numbers;
+}
+
+void ReadTolerances(const JsonNode& node, RuleOfExperiment& rule) {
+  rule.tolerances = ReadUsedNumbers(node, rule.experiment->tolerances);
+}
+
+void ReadHorizons(const JsonNode& node, RuleOfExperiment& rule) {
+  std::set<double> horizons;
+  for (const ExperimentScene& scene : rule.experiment->scenes) {
+    horizons.insert(scene.horizons.begin(), scene.horizons.end());
+  }
+  rule.horizons = ReadUsedNumbers(node, {horizons.begin(), horizons.end()});
+}
+
+void ReadSceneNames(const JsonNode& node, RuleOfExperiment& rule) {
+  NameList known;
+  for (const ExperimentScene& scene : rule.experiment->scenes) known.Add(scene.name);
+  for (const JsonNode& element : node.OneOrMore("scene names")) {
+    const auto scene = element.Choice(known, "a scene");
+    if (scene) rule.scenes.push_back(known.all()[static_cast<std::size_t>(*scene)]);
+  }
+}
+
+/// {"joint": [from, to]}.
+void ReadBetween(const JsonNode& node, EnsembleRule& rule) {
+  for (const auto& [joint, bounds] : node.Members()) {
+    const std::vector<double> ends = bounds.Numbers(2);
+    const bool is_pair = bounds.value().is_array() && bounds.value().size() == 2;
+    if (is_pair && !(ends[0] < ends[1])) bounds.Fail("two numbers that ascend [rad or m]");
+    if (is_pair && !(kFarthest.Contains(ends[0]) && kFarthest.Contains(ends[1]))) {
+      bounds.Fail(fmt::format("numbers{} [rad or m]", kFarthest.Text()));
+    }
+    rule.between.push_back({joint, ends[0], ends[1]});
+  }
+  if (node.value().is_object() && node.value().empty()) node.Fail("at least one joint");
+}
+
+/// Joints that can be drawn: held, with one coordinate.
+NameList DrawableJoints(const MechanismDescription& description) {
+  NameList names;
+  for (const JointValues& values : description.initial.coordinates) {
+    const std::vector<int>& held = description.initial.held;
+    if (values.values.size() == 1 && std::ranges::find(held, values.joint) != held.end()) {
+      names.Add(description.joints[static_cast<std::size_t>(values.joint)].name);
+    }
+  }
+  return names;
+}
+
+/// Every scene of the rule's cases must have the joints to draw.
+void CheckBetween(const JsonNode& element, const EnsembleRule& rule, const Experiment& experiment,
+                  const std::vector<Case>& cases) {
+  const auto node = element.Optional("between");
+  if (!node) return;
+  for (std::size_t s = 0; s < experiment.scenes.size(); ++s) {
+    const bool used = std::ranges::any_of(
+        cases, [&](const Case& one) { return one.scene == s && Matches(rule, one); });
+    if (!used) continue;
+    const NameList known = DrawableJoints(experiment.scenes[s].mechanism.description);
+    for (const auto& [joint, bounds] : node->Members()) {
+      if (known.Find(joint)) continue;
+      bounds.FailAs(fmt::format("no held joint \"{}\" of one coordinate in scene \"{}\"", joint,
+                                experiment.scenes[s].name),
+                    fmt::format("a joint among: {}", fmt::join(known.all(), ", ")),
+                    NearestSpelling(joint, known.all()));
+    }
+  }
+}
+
+/// One of the two ways to start anew.
+void ReadStart(const JsonNode& node, RuleOfExperiment& rule) {
+  if (const auto between = node.Optional("between")) {
+    if (const auto perturb = node.Optional("perturb")) {
+      perturb->Fail("no \"perturb\" with \"between\"");
+    }
+    ReadBetween(*between, rule);
+    rule.perturb = 0.0;
+  } else if (const auto perturb = node.Required("perturb", "a number > 0, or \"between\"")) {
+    rule.perturb = perturb->Number(kAmplitude);
+  }
+}
+
+const Fields<RuleOfExperiment>& EnsembleFields() {
+  using Rule = RuleOfExperiment;
+  constexpr std::int64_t kMaxSeed = std::numeric_limits<std::int32_t>::max();
+  static const Json bounds = ArraySchema(NumberSchema(kFarthest), 2, 2);
+  static const Json one_start = {{"oneOf", {Requires({"perturb"}), Requires({"between"})}}};
+  static const Fields<Rule> fields(
+      "ensemble",
+      "Perturbed repetitions of the cases that match every given key of a case; the first rule "
+      "that matches counts.",
+      {{"size", Integer(&Rule::size, 2, kMaxCount), "Runs per case.", "an integer from 2"},
+       {"seed", Integer(&Rule::seed, 0, kMaxSeed), "Of the generator of perturbations.",
+        "an integer from 0"},
+       {"perturb", NumberSchema(kAmplitude), "Amplitude on the held coordinates [rad or m]."},
+       {"between", MapSchema(bounds, 1),
+        "Instead of perturb: held joints, each drawn uniformly between two bounds [rad or m]."},
+       {"", By(one_start, ReadStart)},
+       {"branch_bound", Number(&Rule::branch_bound, kPositive),
+        "A run further from its branch has left it [rad]."},
+       {"scenes", By(OneOrMoreSchema(TextSchema()), ReadSceneNames), "Names of scenes."},
+       {"horizons", By(NumberListSchema(kPositive), ReadHorizons), "Of cases [s]."},
+       {"tolerances", By(NumberListSchema(kPositive), ReadTolerances), "Of cases."},
+       {"formulation", FormulationChoices(&Rule::formulations), "Of cases."},
+       {"enforcement", LevelChoices(&Rule::enforcements), "Of cases."},
+       {"coordinates", Choices(&Rule::coordinates, NamesOf<Coordinates>(), "a coordinate set"),
+        "Of cases."},
+       {"solver", Choices(&Rule::solvers, NamesOf<SolverKind>(), "a solver"), "Of cases."}});
+  return fields;
+}
+
+}  // namespace
+
+Json EnsemblesSchema() { return ArraySchema(EnsembleFields().Schema(), 0, kMaxRules); }
+
+void ReadEnsembles(const JsonNode& node, ExperimentFile& experiment) {
+  const std::vector<JsonNode> elements = node.Elements("ensemble rules");
+  if (elements.size() > kMaxRules) {
+    node.Fail(fmt::format("at most {} ensemble rules", kMaxRules));
+    return;
+  }
+  if (CountCases(experiment) > kMaxHeldCases) return;  // reported where it is counted
+  const std::vector<Case> cases = Expand(experiment);
+  for (const JsonNode& element : elements) {
+    RuleOfExperiment rule;
+    rule.experiment = &experiment;
+    EnsembleFields().Read(element, &rule);
+    const bool used = std::any_of(cases.begin(), cases.end(),
+                                  [&rule](const Case& one) { return Matches(rule, one); });
+    // Behind other mistakes this one would only be their consequence.
+    if (!used && node.errors().empty()) {
+      element.FailAs("a rule that matches no case", "keys that match at least one case");
+    }
+    CheckBetween(element, rule, experiment, cases);
+    experiment.ensembles.push_back(rule);
+  }
+}
+
+// Families of mechanisms (mechanism/description/library.h) as scenes: {"family": "chain", "bars":
+// 10}.
+
+namespace {
+
+constexpr std::int64_t kMostUnits = 100'000;  ///< bars, windows, storeys
+
+/// {"family": "chain", ...} and so on; the defaults of cranks are those of timing.
+struct ChainFamily {
+  std::vector<std::int64_t> bars;
+  double speed = 0.0;
+};
+struct LadderFamily {
+  std::vector<std::int64_t> windows;
+  double angle = 1.0, speed = 1.0;
+};
+struct GridFamily : LadderFamily {
+  std::vector<std::int64_t> storeys;
+};
+
+std::string CountsExpected(int least) {
+  return fmt::format("an integer from {}, a list of them or a range", least);
+}
+
+const Fields<ChainFamily>& ChainFields() {
+  static const Fields<ChainFamily> fields(
+      "chain", "Closed chains of bars.",
+      {{"family", ChoiceSchema({"chain"}), "What it is.", "a family"},
+       {"bars", IntegerList(&ChainFamily::bars, 3, kMostUnits), "How many.", CountsExpected(3)},
+       {"speed", Number(&ChainFamily::speed), "Of the first bar [rad/s]."}});
+  return fields;
+}
+
+const Fields<LadderFamily>& LadderFields() {
+  static const Fields<LadderFamily> fields(
+      "ladder", "Parallel cranks, couplers between them: windows in a row.",
+      {{"family", ChoiceSchema({"ladder"}), "What it is.", "a family"},
+       {"windows", IntegerList(&LadderFamily::windows, 1, kMostUnits), "How many.",
+        CountsExpected(1)},
+       {"angle", Number(&LadderFamily::angle), "Of the cranks [rad]."},
+       {"speed", Number(&LadderFamily::speed), "Of the cranks [rad/s]."}});
+  return fields;
+}
+
+const Fields<GridFamily>& GridFields() {
+  static const Fields<GridFamily> fields(
+      "grid", "Storeys of windows.",
+      {{"family", ChoiceSchema({"grid"}), "What it is.", "a family"},
+       {"storeys", IntegerList(&GridFamily::storeys, 1, kMostUnits), "How many.",
+        CountsExpected(1)},
+       {"windows", IntegerList(&GridFamily::windows, 1, kMostUnits), "In each storey.",
+        CountsExpected(1)},
+       {"angle", Number(&GridFamily::angle),
+        "Of the first storey's cranks [rad]; each storey stands 0.1 further."},
+       {"speed", Number(&GridFamily::speed),
+        "Of the first storey's cranks [rad/s]; that of storey r is r times as much."}});
+  return fields;
+}
+
+/// Held joints are what ensembles perturb: as many as there are degrees of freedom.
+void HoldNamed(MechanismDescription* description, std::string_view start, std::size_t count) {
+  for (std::size_t i = 0; i < description->joints.size(); ++i) {
+    if (description->initial.held.size() == count) return;
+    if (description->joints[i].name.starts_with(start)) {
+      description->initial.held.push_back(static_cast<int>(i));
+    }
+  }
+}
+
+/// A member counted against the room before it is built; building a million bodies takes its time.
+class Members {
+ public:
+  Members(const JsonNode& node, std::size_t room) : node_(node), room_(room) {}
+
+  template <class Build>
+  void Add(std::size_t bodies, std::string counts, const Json& canonical, Build build,
+           const SceneObservation& observe = {}) {
+    used_ += bodies;
+    if (used_ > room_) return;
+    FamilyMember member;
+    member.counts = std::move(counts);
+    member.mechanism.description = build();
+    member.mechanism.observe = observe;
+    member.mechanism.canonical = canonical.dump();
+    members_.push_back(std::move(member));
+  }
+
+  std::vector<FamilyMember> Take() {
+    if (used_ > room_) {
+      node_.FailAs(fmt::format("mechanisms with {} bodies", used_),
+                   fmt::format("at most {} in all scenes", kMaxBodies));
+    }
+    return std::move(members_);
+  }
+
+ private:
+  const JsonNode& node_;
+  std::size_t room_, used_ = 0;
+  std::vector<FamilyMember> members_;
+};
+
+std::vector<FamilyMember> MakeMembers(const ChainFamily& family, const JsonNode& node,
+                                      std::size_t room) {
+  Members members(node, room);
+  const double speed = family.speed;
+  for (const std::int64_t bars : family.bars) {
+    members.Add(static_cast<std::size_t>(bars), fmt::format("{}", bars),
+                {{"family", "chain"}, {"bars", bars}, {"speed", speed}}, [&] {
+                  MechanismDescription chain = Chain(static_cast<int>(bars));
+                  if (speed != 0.0) chain.initial.speeds.push_back({0, {speed}});
+                  HoldNamed(&chain, "J", static_cast<std::size_t>(bars) - 2);
+                  return chain;
+                });
+  }
+  return members.Take();
+}
+
+/// The cranks turn as one pendulum: n + 1 cranks and n couplers, which only shift, all of 1 m and
+/// 1 kg, give [(n + 1) / 3 + n] phi'' = -[(n + 1) / 2 + n] g sin(phi).
+PendulumForm PendulumOfLadder(const MechanismDescription& ladder) {
+  const double n = static_cast<double>(ladder.bodies.size() - 2) / 2;  // without Ground
+  return {.body = "crank0",
+          .down_angle = -std::numbers::pi / 2,
+          .frequency_squared = ((n + 1) / 2 + n) * -ladder.gravity.y() / ((n + 1) / 3 + n)};
+}
+
+std::vector<FamilyMember> MakeMembers(const LadderFamily& family, const JsonNode& node,
+                                      std::size_t room) {
+  Members members(node, room);
+  const double angle = family.angle, speed = family.speed;
+  for (const std::int64_t windows : family.windows) {
+    members.Add(static_cast<std::size_t>(2 * windows + 1), fmt::format("{}", windows),
+                {{"family", "ladder"}, {"windows", windows}, {"angle", angle}, {"speed", speed}},
+                [&] {
+                  MechanismDescription ladder = Ladder(static_cast<int>(windows), angle, speed);
+                  HoldNamed(&ladder, "O", 1);
+                  return ladder;
+                });
+  }
+  std::vector<FamilyMember> ladders = members.Take();
+  for (FamilyMember& ladder : ladders) {
+    ladder.mechanism.observe.closed_form = PendulumOfLadder(ladder.mechanism.description);
+  }
+  return ladders;
+}
+
+/// The first crank of each storey moves as it likes: J crank 1.0, J crank 2.0, ...
+void HoldFirstCranks(MechanismDescription* grid) {
+  for (std::size_t i = 0; i < grid->joints.size(); ++i) {
+    const std::string& name = grid->joints[i].name;
+    if (name.starts_with("Jcrank") && name.ends_with(".0")) {
+      grid->initial.held.push_back(static_cast<int>(i));
+    }
+  }
+}
+
+std::vector<FamilyMember> MakeMembers(const GridFamily& family, const JsonNode& node,
+                                      std::size_t room) {
+  Members members(node, room);
+  const double angle = family.angle, speed = family.speed;
+  for (const std::int64_t storeys : family.storeys) {
+    for (const std::int64_t windows : family.windows) {
+      members.Add(static_cast<std::size_t>(storeys * (2 * windows + 1)),
+                  fmt::format("{}x{}", storeys, windows),
+                  {{"family", "grid"},
+                   {"storeys", storeys},
+                   {"windows", windows},
+                   {"angle", angle},
+                   {"speed", speed}},
+                  [&] {
+                    MechanismDescription grid =
+                        Grid(static_cast<int>(storeys), static_cast<int>(windows), angle, speed);
+                    HoldFirstCranks(&grid);
+                    return grid;
+                  });
+    }
+  }
+  return members.Take();
+}
+
+template <class Family>
+std::vector<FamilyMember> ReadFamily(const Fields<Family>& fields, const JsonNode& node,
+                                     std::size_t room) {
+  Family family;
+  if (!fields.Read(node, &family)) return {};
+  return MakeMembers(family, node, room);
+}
+
+}  // namespace
+
+Json FamilySchema() {
+  return Named("family", EitherSchema({ChainFields().Schema(), LadderFields().Schema(),
+                                       GridFields().Schema()}));
+}
+
+std::vector<FamilyMember> ReadFamilyMembers(const JsonNode& node, std::size_t room) {
+  const auto family = node.Required("family", "a family");
+  const auto kind = family ? family->Choice({"chain", "ladder", "grid"}, "a family") : std::nullopt;
+  if (kind == 0) return ReadFamily(ChainFields(), node, room);
+  if (kind == 1) return ReadFamily(LadderFields(), node, room);
+  if (kind == 2) return ReadFamily(GridFields(), node, room);
+  return {};
+}
+
+// "scenes" of an experiment file and the mechanisms they name.
+
 namespace {
 
 /// A file of mechanisms as a scene names it; its own mistakes join those of the experiment.

@@ -5,8 +5,10 @@
 
 #include <algorithm>
 #include <concepts>
+#include <cstddef>
 #include <filesystem>
 #include <map>
+#include <optional>
 #include <string>
 #include <string_view>
 #include <utility>
@@ -97,7 +99,7 @@ void ReadReferenceOptions(const JsonNode& node, ExperimentFile& experiment);
 /// "ensembles", after everything that they select from.
 void ReadEnsembles(const JsonNode& node, ExperimentFile& experiment);
 Json EnsemblesSchema();
-/// "sweep" and "exclude" (experiment_sweep.h).
+/// "sweep" and "exclude" (experiment_sections.h).
 Json SweepSchema();
 Json ExclusionsSchema();
 /// Number of cases before exclusion.
@@ -141,5 +143,113 @@ FieldValue<T> Columns(std::vector<Column> T::*member) {
   return {ColumnsSchema(),
           [=](const JsonNode& node, T& owner) { owner.*member = ReadColumns(node); }};
 }
+
+// Fields of an experiment's document by JSON Pointer, for sweeps and --set.
+//
+// A pointer may go through the path of a scene's mechanism: the file is then taken into the
+// document. "*" as an index goes through all elements of an array. Keys that the file leaves out
+// are made, since they have defaults; what the reader does not know it will refuse. Internal to
+// harness/config.
+
+/// Why a pointer names no field: in the words of a message, or a finished text.
+struct FieldFault {
+  std::string found, expected, suggestion;
+  std::string text;      ///< of a mechanism file that cannot be read; the others are empty then
+  bool of_file = false;  ///< of a mechanism file: who reads the scene will complain as well
+};
+
+/// The fields a pointer stands for, as pointers without "*".
+struct FieldTargets {
+  std::vector<std::string> pointers;
+  std::vector<std::string> made;  ///< for each the outermost part that the file does not have
+  std::optional<FieldFault> fault;
+};
+
+class ExperimentFields {
+ public:
+  /// `document` and `origins` change as files are taken in and values set.
+  ExperimentFields(Json& document, Origins& origins, MechanismFiles& files)
+      : document_(document), origins_(origins), files_(files) {}
+
+  /// Takes in the files on the way. The document is otherwise as before.
+  FieldTargets Find(const std::string& pointer);
+
+  /// Sets one field that Find() gave.
+  void Set(const std::string& pointer, const Json& value);
+
+ private:
+  void Walk(Json& node, const std::vector<std::string>& tokens, std::size_t depth,
+            const std::string& pointer, FieldTargets* found);
+  bool TakeIn(Json& node, const std::string& pointer, FieldTargets* found);
+
+  Json& document_;
+  Origins& origins_;
+  MechanismFiles& files_;
+};
+
+/// The tokens of a JSON Pointer; nothing when it is none (no leading "/", "~" without 0 or 1).
+std::optional<std::vector<std::string>> PointerTokens(const std::string& pointer);
+
+// "sweep" of an experiment file: axes that are crossed, each the values of one field.
+//
+//   "sweep": [{"name": "mass", "field": "/scenes/0/mechanism/bodies/1/mass", "values": [1, 2, 3]},
+//             {"zip": [{"name": "stiffness", ...}, {"name": "damping", ...}]}]
+//
+// makes 3 n combinations: the axes of a zip go in step. Internal to harness/config.
+
+struct SweepAxis {
+  std::string name;
+  std::string source;             ///< pointer of the axis in the experiment file
+  FieldTargets fields;            ///< what each value is set to
+  std::vector<Json> values;       ///< at least one
+  std::vector<Value> parameters;  ///< the same as records hold them
+};
+
+/// Axes in step; a plain axis is alone.
+struct SweepGroup {
+  std::vector<SweepAxis> axes;
+  std::size_t count() const { return axes.front().values.size(); }
+};
+
+class Sweep {
+ public:
+  /// Reads "sweep" and finds the fields; mistakes go to the root's errors. `settings` are the
+  /// fields that --set has set: a sweep over one of them would undo it.
+  Sweep(const JsonNode& root, ExperimentFields& fields, const std::vector<std::string>& settings);
+
+  /// False when there are mistakes in it, or in a mechanism file that it goes through.
+  bool sound() const { return sound_; }
+
+  /// Number of combinations; 1 without a sweep, which is the file as it stands.
+  std::size_t count() const { return count_; }
+
+  /// Sets the fields of one combination; the last group is the fastest.
+  void Apply(std::size_t combination, ExperimentFields& fields) const;
+
+  /// Its values by name.
+  Record Parameters(std::size_t combination) const;
+
+  /// Names and numbers of values.
+  std::vector<std::pair<std::string, std::size_t>> Axes() const;
+
+  /// As ExperimentSource::EachValue().
+  std::vector<std::size_t> EachValue(std::size_t most) const;
+
+  /// Notes where values come from, for messages.
+  void Note(Origins* origins) const;
+
+ private:
+  void Read(const JsonNode& node, ExperimentFields& fields,
+            const std::vector<std::string>& settings);
+  void CheckOverlaps(const JsonNode& node, const std::vector<std::string>& settings) const;
+  std::vector<std::size_t> Indices(std::size_t combination) const;
+
+  std::vector<SweepGroup> groups_;
+  std::size_t count_ = 1;
+  bool sound_ = true;
+};
+
+/// "exclude": conditions on case keys and axis names, as selections that match excluded cases.
+std::vector<Selection> ReadExclusions(const JsonNode& root, const Record& keys);
 
 }  // namespace loopbench::harness

@@ -1,9 +1,18 @@
-// "limits", "compile", "series", "timing" and "precision" of an experiment file.
+// Sections of an experiment: tolerances, limits, output, reference; and fields by pointer.
 #include <fmt/format.h>
 
+#include <algorithm>
+#include <array>
+#include <charconv>
+#include <cmath>
+#include <limits>
+
+#include "harness/config/benchmarks.h"
+#include "harness/config/experiment.h"
 #include "harness/config/experiment_sections.h"
-#include "harness/config/limits_record.h"
-#include "harness/config/sized_family.h"
+#include "harness/config/published_series.h"
+#include "harness/text/files.h"
+#include "harness/text/words.h"
 
 namespace loopbench::harness {
 namespace {
@@ -151,6 +160,368 @@ const Fields<Precision>& PrecisionFields() {
         "Simulated time [s]; default: the shortest of each scene."},
        {"reference", Number(&Precision::reference, kReferences), "Tolerance of the reference."}});
   return fields;
+}
+
+// "output" of an experiment file: which rows a trajectory has.
+
+namespace {
+
+constexpr int kMostRows = 100'000'000;  // some 50 GB of a small mechanism
+constexpr const char* kOneWay =
+    "one of \"step\", \"number\", \"times\" and \"accepted_steps\": true";
+
+int WaysOf(const OutputOptions& output) {
+  return (output.step > 0.0) + (output.number > 0) + !output.times.empty() + output.accepted_steps;
+}
+
+/// Reports times that are said twice or not at all, or do not rise.
+void RequireOneWay(const JsonNode& node, OutputOptions& output) {
+  // a value that is wrong by itself has been reported
+  const bool said = node.Optional("step") || node.Optional("number") || node.Optional("times");
+  if (WaysOf(output) > 1) return node.FailAs("several ways to say times", kOneWay);
+  if (WaysOf(output) == 0 && !said) return node.FailAs("no times", kOneWay);
+  if (!std::ranges::is_sorted(output.times, std::ranges::less_equal())) {
+    node.Optional("times")->FailAs("times that do not rise", "each later than the one before");
+  }
+  if (output.exact && output.accepted_steps) {
+    node.FailAs("\"exact\" beside \"accepted_steps\"",
+                "one of them: the ends of steps are exact as they are");
+  }
+}
+
+Json OneWaySchema() {
+  Json ways = Json::array();
+  for (const char* key : {"step", "number", "times"}) ways.push_back(Requires({key}));
+  ways.push_back(
+      {{"required", {"accepted_steps"}}, {"properties", {{"accepted_steps", {{"const", true}}}}}});
+  return {{"oneOf", ways}};
+}
+
+}  // namespace
+
+const Fields<OutputOptions>& OutputFields() {
+  static const Fields<OutputOptions> fields(
+      "output",
+      "A trajectory of each case, as CSV beside the store. One of step, number, times and "
+      "accepted_steps says when.",
+      {{"step", Number(&OutputOptions::step, kPositive), "From row to row [s], from 0."},
+       {"number", Integer(&OutputOptions::number, 2, kMostRows),
+        "Of rows, evenly from the start to the end."},
+       {"times", NumberList(&OutputOptions::times, {.min = 0.0}),
+        "Rising [s]; those beyond a horizon are left out."},
+       {"accepted_steps", Bool(&OutputOptions::accepted_steps),
+        "A row for the end of each step of the integrator."},
+       {"exact", Bool(&OutputOptions::exact),
+        "Steps end at the times, which makes another run; else rows lie on dense output, and the "
+        "run is the same as without."},
+       {"quantities",
+        Choices(&OutputOptions::quantities, NamesOf<OutputPart>(), "a part of a trajectory"),
+        "What rows hold; default: all."},
+       {"axes", Choice(&OutputOptions::axes, NamesOf<OutputAxes>(), "axes"),
+        "Of reactions: those of the ground, or of each joint's frame on its first body."},
+       {"", By(OneWaySchema(), RequireOneWay)}});
+  return fields;
+}
+
+void RequireOutput(const JsonNode& node, ExperimentFile& file) {
+  const auto output = node.Optional("output");
+  if (!output || !file.output) return;
+  if (file.compile.islands) {
+    output->FailAs("output of parts that run on their own",
+                   "\"islands\": false in \"compile\": rows are of the whole mechanism");
+  }
+  double longest = 0.0;
+  for (const ExperimentScene& scene : file.scenes) {
+    for (const double horizon : scene.horizons) longest = std::max(longest, horizon);
+  }
+  if (file.output->step > 0.0 && longest / file.output->step > kMostRows) {
+    output->FailAs(fmt::format("{:.3g} rows", longest / file.output->step),
+                   fmt::format("at most {}", kMostRows));
+  }
+  for (const Column& column : file.columns) {
+    const FormulationRow* row = FindFormulation(column.formulation);
+    if (row == nullptr || !row->is_peer() || file.output->accepted_steps) continue;
+    return output->FailAs(
+        fmt::format("output at given times of \"{}\", which has its own integrator", row->name),
+        "\"accepted_steps\": true");
+  }
+}
+
+bool OutputOptions::Has(OutputPart part) const {
+  return std::ranges::find(quantities, part) != quantities.end();
+}
+
+std::vector<double> OutputTimes(const OutputOptions& output, double horizon) {
+  std::vector<double> times;
+  if (output.number > 0) {
+    for (int i = 0; i < output.number; ++i) times.push_back(horizon * i / (output.number - 1));
+  } else if (output.step > 0.0) {
+    // a last row that rounding has carried beyond the end is the end
+    const double rows = horizon / output.step;
+    const double last = std::floor(rows * (1 + 4 * std::numeric_limits<double>::epsilon()));
+    for (std::int64_t i = 0; i <= static_cast<std::int64_t>(last); ++i) {
+      times.push_back(std::min(horizon, output.step * static_cast<double>(i)));
+    }
+  } else {
+    for (const double t : output.times) {
+      if (t <= horizon) times.push_back(t);
+    }
+  }
+  return times;
+}
+
+std::string ToString(const OutputOptions& output) {
+  std::string text =
+      fmt::format("{} {} {} {}", output.step, output.number, output.accepted_steps, output.exact);
+  for (const double t : output.times) text += fmt::format(" {}", t);
+  for (const OutputPart part : output.quantities) {
+    text += fmt::format(" {}", kNames<OutputPart>[static_cast<std::size_t>(part)]);
+  }
+  return text + fmt::format(" {}", kNames<OutputAxes>[static_cast<std::size_t>(output.axes)]);
+}
+
+// "reference" of an experiment file: what the motion itself is held against.
+
+namespace {
+
+constexpr std::array<const char*, 3> kOfCertified = {"scalar", "points", "cpu_s"};
+
+/// The file that a node names, for one scene; its own mistakes join those of the experiment.
+void ReadSeriesOf(const JsonNode& node, const MechanismFiles& files, ExperimentScene* scene) {
+  const std::string named = node.Text();
+  if (named.empty()) return;
+  const std::filesystem::path path = files.Resolve(named);
+  if (!ExpectFile(node, path, "a published series")) return;
+  // the names of a mechanism that could not be read are not known
+  const MechanismDescription& mechanism = scene->mechanism.description;
+  try {
+    scene->series = ReadPublishedSeries(path, mechanism.bodies.size() > 1 ? &mechanism : nullptr);
+  } catch (const ConfigError& mistakes) {
+    node.errors().AddText(mistakes.what());
+  }
+}
+
+void ReadSeries(const JsonNode& node, ExperimentFile& experiment) {
+  std::vector<ExperimentScene>& scenes = experiment.scenes;
+  if (node.value().is_string()) {
+    if (scenes.size() == 1) {
+      ReadSeriesOf(node, *experiment.files, &scenes.front());
+    } else if (scenes.size() > 1) {
+      node.FailAs(fmt::format("one file for {} scenes", scenes.size()),
+                  "an object with the file of each scene that has one, by the scene's name");
+    }
+    return;
+  }
+  if (!node.value().is_object()) {
+    node.Fail("the path of a published series, or an object with one for each scene by its name");
+    return;
+  }
+  NameList names;
+  for (const ExperimentScene& scene : scenes) names.Add(scene.name);
+  if (!node.ExpectObject(names)) return;
+  if (node.value().empty()) node.Fail("at least one scene with its file");
+  for (ExperimentScene& scene : scenes) {
+    if (const auto file = node.Optional(scene.name)) {
+      ReadSeriesOf(*file, *experiment.files, &scene);
+    }
+  }
+}
+
+void RequireSeriesAlone(const JsonNode& node, ReferenceOptions&) {
+  if (!node.Optional("series")) return;
+  for (const char* key : kOfCertified) {
+    if (!node.Optional(key)) continue;
+    node.FailAs(fmt::format("\"series\" beside \"{}\"", key),
+                "one of them: what was published is not made");
+  }
+}
+
+Json SeriesAloneSchema() {
+  Json others = Json::array();
+  for (const char* key : kOfCertified) others.push_back(Requires({key}));
+  return {{"if", {{"required", {"series"}}}}, {"then", {{"not", {{"anyOf", others}}}}}};
+}
+
+}  // namespace
+
+const Fields<ReferenceOptions>& ReferenceFields() {
+  static const NameList scalars({"as-needed", "long-double", "float128"});
+  static const Fields<ReferenceOptions> fields(
+      "reference",
+      "Each mechanism and horizon once more at high order in a wide scalar, by two formulations "
+      "and at two tolerances: where these agree, runs are held against them. Kept beside the "
+      "store. Or numbers that others published.",
+      {{"scalar", Choice(&ReferenceOptions::scalar, scalars, "a wide scalar"),
+        "float128 has 33 digits, takes some 50 times as long, and is for planar mechanisms; as "
+        "needed it follows where long-double does not certify to the end."},
+       {"points", Integer(&ReferenceOptions::points, 2, kMostPoints),
+        "Times at which errors are taken, evenly from the start to the end."},
+       {"cpu_s", Number(&ReferenceOptions::cpu_s, kPositive),
+        "CPU time of each integration [s]. One that is cut off certifies as far as it got."},
+       {"series", EitherSchema({TextSchema(), MapSchema(TextSchema(), 1)}),
+        "Instead: path of a published series (series.schema.json), relative to this file; with "
+        "several scenes an object of such paths by the scenes' names. Scenes without one have no "
+        "reference."},
+       {"", By(SeriesAloneSchema(), RequireSeriesAlone)}});
+  return fields;
+}
+
+void ReadReferenceOptions(const JsonNode& node, ExperimentFile& experiment) {
+  ReferenceFields().Read(node, &experiment.reference.emplace());
+  const auto series = node.Optional("series");
+  if (!series) return;
+  experiment.reference.reset();
+  ReadSeries(*series, experiment);
+}
+namespace {
+
+/// An index as a JSON Pointer writes it.
+std::optional<std::size_t> IndexOf(const std::string& token) {
+  std::size_t index = 0;
+  const auto [end, error] = std::from_chars(token.data(), token.data() + token.size(), index);
+  const bool number = error == std::errc() && end == token.data() + token.size();
+  if (!number || (token.size() > 1 && token.front() == '0')) return std::nullopt;
+  return index;
+}
+
+std::string PlaceName(const std::string& pointer) { return pointer.empty() ? "the file" : pointer; }
+
+std::vector<std::string> KeysOf(const Json& object) {
+  std::vector<std::string> keys;
+  for (const auto& [key, value] : object.items()) keys.push_back(key);
+  return keys;
+}
+
+FieldFault NoElement(const Json& array, const std::string& token, const std::string& pointer) {
+  return {fmt::format("no element \"{}\" in {}", token, PlaceName(pointer)),
+          array.empty() ? "another field: the array is empty"
+                        : fmt::format("an index from 0 to {} or \"*\"", array.size() - 1),
+          "", ""};
+}
+
+FieldFault NoKey(const Json& object, const std::string& token, const std::string& pointer) {
+  const std::vector<std::string> keys = KeysOf(object);
+  return {fmt::format("no \"{}\" in {}", token, PlaceName(pointer)),
+          keys.empty() ? "another field: the object is empty"
+                       : fmt::format("one of \"{}\"", fmt::join(keys, "\", \"")),
+          NearestSpelling(token, keys), ""};
+}
+
+/// The name under which "limits" has a field: "cpu_s" was "wall_s" once, and either is accepted.
+std::string NameInLimits(const Json& limits, const std::string& token) {
+  const std::string other = token == "wall_s" ? "cpu_s" : token == "cpu_s" ? "wall_s" : token;
+  return limits.contains(token) || !limits.contains(other) ? token : other;
+}
+
+}  // namespace
+
+std::optional<std::vector<std::string>> PointerTokens(const std::string& pointer) {
+  if (pointer.empty() || pointer.front() != '/') return std::nullopt;
+  std::vector<std::string> tokens;
+  for (std::size_t i = 0; i < pointer.size(); ++i) {
+    if (pointer[i] == '/') {
+      tokens.emplace_back();
+    } else if (pointer[i] != '~') {
+      tokens.back() += pointer[i];
+    } else if (i + 1 < pointer.size() && (pointer[i + 1] == '0' || pointer[i + 1] == '1')) {
+      tokens.back() += pointer[++i] == '0' ? '~' : '/';
+    } else {
+      return std::nullopt;
+    }
+  }
+  return tokens;
+}
+
+bool ExperimentFields::TakeIn(Json& node, const std::string& pointer, FieldTargets* found) {
+  const std::filesystem::path path = files_.Resolve(node.get<std::string>());
+  try {
+    if (!std::filesystem::is_regular_file(path)) {
+      found->fault = {fmt::format("\"{}\" at {}", node.get<std::string>(), pointer),
+                      fmt::format("a mechanism file ({} is none)", path.string()), "", "", true};
+      return false;
+    }
+    Json document = files_.Document(path);
+    node = std::move(document);
+    origins_.TakeIn(pointer, path.string(), files_.Text(path));
+    return true;
+  } catch (const ConfigError& mistakes) {
+    found->fault = FieldFault{"", "", "", mistakes.what(), true};
+    return false;
+  }
+}
+
+void ExperimentFields::Walk(Json& node, const std::vector<std::string>& tokens, std::size_t depth,
+                            const std::string& pointer, FieldTargets* found) {
+  if (found->fault) return;
+  if (depth == tokens.size()) {
+    found->pointers.push_back(pointer);
+    found->made.push_back(pointer);
+    return;
+  }
+  const bool at_mechanism = depth == 3 && tokens[0] == "scenes" && tokens[2] == "mechanism";
+  if (at_mechanism && node.is_string() && !TakeIn(node, pointer, found)) return;
+  const bool of_limits = depth == 1 && tokens[0] == "limits" && node.is_object();
+  const std::string token = of_limits ? NameInLimits(node, tokens[depth]) : tokens[depth];
+  if (node.is_array()) {
+    const auto index = IndexOf(token);
+    if (token == "*" && !node.empty()) {
+      for (std::size_t i = 0; i < node.size(); ++i) {
+        Walk(node[i], tokens, depth + 1, fmt::format("{}/{}", pointer, i), found);
+      }
+    } else if (index && *index < node.size()) {
+      Walk(node[*index], tokens, depth + 1, pointer + "/" + token, found);
+    } else {
+      found->fault = NoElement(node, token, pointer);
+    }
+    return;
+  }
+  if (!node.is_object()) {
+    found->fault = FieldFault{
+        fmt::format("no \"{}\" in {}, which is {}", token, PlaceName(pointer),
+                    node.dump(-1, ' ', false, Json::error_handler_t::replace).substr(0, 60)),
+        "a field of an object or array", "", ""};
+    return;
+  }
+  const std::string below = pointer + "/" + PointerToken(token);
+  if (const auto member = node.find(token); member != node.end()) {
+    Walk(*member, tokens, depth + 1, below, found);
+    return;
+  }
+  // Points may have any name: a misspelt one would be made, and change nothing. And there is no
+  // telling what an array that is not there should hold.
+  const bool free_names = depth > 0 && tokens[depth - 1] == "points";
+  const bool in_array = std::any_of(
+      tokens.begin() + static_cast<std::ptrdiff_t>(depth) + 1, tokens.end(),
+      [](const std::string& later) { return later == "*" || IndexOf(later).has_value(); });
+  if (free_names || in_array) {
+    found->fault = NoKey(node, token, pointer);
+    return;
+  }
+  std::string whole = below;
+  for (std::size_t i = depth + 1; i < tokens.size(); ++i) whole += "/" + PointerToken(tokens[i]);
+  found->pointers.push_back(whole);
+  found->made.push_back(below);
+}
+
+FieldTargets ExperimentFields::Find(const std::string& pointer) {
+  FieldTargets found;
+  const auto tokens = PointerTokens(pointer);
+  if (!tokens) {
+    found.fault = FieldFault{fmt::format("\"{}\"", pointer),
+                             "a JSON Pointer such as /scenes/0/horizon", "", ""};
+    return found;
+  }
+  Walk(document_, *tokens, 0, "", &found);
+  return found;
+}
+
+void ExperimentFields::Set(const std::string& pointer, const Json& value) {
+  Json* node = &document_;
+  const std::vector<std::string> tokens = PointerTokens(pointer).value();
+  for (const std::string& token : tokens) {
+    node = node->is_array() ? &(*node)[*IndexOf(token)] : &(*node)[token];
+  }
+  *node = value;
 }
 
 }  // namespace loopbench::harness

@@ -14,7 +14,7 @@
 #include <utility>
 #include <vector>
 
-#include "harness/config/scene.h"
+#include "harness/config/mechanism_reader.h"
 #include "harness/json/fields.h"
 
 namespace loopbench::harness {

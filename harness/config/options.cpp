@@ -46,14 +46,6 @@ constexpr std::array<Profile, 12> kProfiles{{
     {"kennedy-carpenter-54", "ARKODE_ESDIRK547L2SA_7_4_5", kArkode, false, false, true},
 }};
 
-std::string Joined(const std::vector<std::string>& names) {
-  std::string text;
-  for (const std::string& name : names) {
-    text += (text.empty() ? "" : ", ") + name;
-  }
-  return text;
-}
-
 }  // namespace
 
 const Profile* FindProfile(std::string_view name) {
@@ -73,7 +65,8 @@ std::vector<std::string> ProfileNames() {
 std::string Validate(const IntegratorOptions& options) {
   // Negated comparisons, so that NaN is refused too.
   if (FindProfile(options.profile) == nullptr) {
-    return "profile is \"" + options.profile + "\"; accepted: " + Joined(ProfileNames());
+    return fmt::format("profile is \"{}\"; accepted: {}", options.profile,
+                       fmt::join(ProfileNames(), ", "));
   }
   if (!(options.rtol > kLeastTolerance && options.rtol < 1)) {
     return fmt::format("rtol is {}; it must lie between {:.2g} and 1", options.rtol,

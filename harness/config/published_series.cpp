@@ -5,7 +5,6 @@
 #include <algorithm>
 
 #include "harness/config/file_schemas.h"
-#include "harness/json/document_kind.h"
 #include "harness/json/fields.h"
 #include "mechanism/description/joint_type.h"
 

@@ -7,7 +7,7 @@
 #include <cmath>
 
 #include "harness/exchange/export_names.h"
-#include "harness/generate/differentiate.h"
+#include "harness/generate/graph.h"
 #include "harness/generate/print_c.h"
 #include "mechanism/model/mechanism.h"
 

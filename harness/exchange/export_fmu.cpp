@@ -8,10 +8,9 @@
 #include <set>
 
 #include "harness/exchange/export_names.h"
-#include "harness/generate/compile.h"
+#include "harness/generate/generated.h"
 #include "harness/text/files.h"
 #include "harness/text/hash.h"
-#include "harness/text/temporary_folder.h"
 
 namespace loopbench::exchange {
 

@@ -1,4 +1,4 @@
-// A mechanism as a file for other programs.
+// A mechanism in the terms that other programs share, and as a file of theirs.
 #pragma once
 
 #include <string>
@@ -9,6 +9,19 @@
 #include "mechanism/description/description.h"
 
 namespace loopbench::exchange {
+
+// A mechanism as a model in plain numbers.
+
+/// With the tree and the order of Mechanism(description, Coordinates::kJoint), put where all
+/// coordinates and speeds are zero. Model::missing then names prescribed motions, forces that
+/// depend on time, drag, forces along the coordinate of a joint that closes a loop, joints and
+/// forces of other programs.
+Model MakeModel(const MechanismDescription& description);
+
+/// The same at the assembled start. Throws std::runtime_error where it cannot be assembled.
+Model MakeModelAtStart(const MechanismDescription& description);
+
+// A mechanism as a file for other programs.
 
 struct ExportOptions {
   double time_step = 1e-3;  ///< of MuJoCo [s]

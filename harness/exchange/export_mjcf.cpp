@@ -1,13 +1,131 @@
 #include "harness/exchange/export_mjcf.h"
 
+#include <fmt/format.h>
+
+#include <Eigen/Geometry>
 #include <algorithm>
 #include <array>
+#include <cmath>
+#include <span>
+#include <string>
+#include <vector>
 
-#include "harness/exchange/export_body.h"
-#include "harness/exchange/export_mjcf_shapes.h"
-#include "harness/exchange/export_mjcf_writer.h"
+#include "harness/exchange/export_names.h"
+#include "harness/exchange/model.h"
+#include "mechanism/algebra/space.h"
+#include "mechanism/description/joint_frames.h"
 
 namespace loopbench::exchange {
+// Tree joints as chains of MuJoCo's joints, all of one body.
+
+/// A slide or hinge along or about an axis of the moved body, or a ball.
+struct MjcfPart {
+  char kind = 'h';       ///< 's', 'h', 'b'
+  int coordinate = 0;    ///< the joint's; of a ball the first
+  Eigen::Vector3d axis;  ///< in the axes of the body, as it is put
+  Eigen::Vector3d at;    ///< a point of the axis, from the body's origin
+  double value = 0.0;    ///< where the body is put: MuJoCo's coordinate; 0 of a ball
+};
+
+struct MjcfChain {
+  loopbench::Frame pose;        ///< of the body in its parent, both from their origins
+  std::vector<MjcfPart> parts;  ///< in MuJoCo's order
+  Eigen::Matrix3d turn = Eigen::Matrix3d::Identity();  ///< of a ball, from its fixed frame
+  Eigen::Matrix3d axes = Eigen::Matrix3d::Identity();  ///< of the moved joint frame, in the body
+};
+
+/// Whether MuJoCo has such a joint in a tree.
+bool HasParts(const Joint& joint);
+
+/// A tree joint of the model where Model::q puts it. A joint seen from its other side is its parts
+/// in the other order with opposite coordinates.
+MjcfChain ChainOf(const Model& model, const Joint& joint);
+
+/// Frames of the model from the user's origin of their body.
+loopbench::Frame FromOrigin(const Model& model, int body, const Frame& frame);
+Eigen::Vector3d FromOrigin(const Model& model, int body, const Vec& at);
+
+/// w, x, y, z.
+std::array<double, 4> QuaternionOf(const Eigen::Matrix3d& R);
+// Shapes by which MuJoCo's viewer shows a mechanism; they have no mass and touch nothing.
+
+/// By body, elements `geom`: bars from its first joint to the others, or to its centre of mass
+/// where it has one joint; a ball where that leaves nothing.
+std::vector<std::vector<std::string>> ShapesOf(const Model& model);
+// The writer of MJCF documents; internal to export_mjcf*.cpp.
+
+/// ` name="1.0 2.0"`.
+template <class Range>
+std::string Attribute(const char* name, const Range& values) {
+  std::string text;
+  for (const double value : values) text += (text.empty() ? "" : " ") + NumberText(value);
+  return fmt::format(" {}=\"{}\"", name, text);
+}
+inline std::string Attribute(const char* name, double value) {
+  return Attribute(name, std::array<double, 1>{value});
+}
+/// The same of a name.
+inline std::string Named(const char* attribute, const std::string& name) {
+  return fmt::format(" {}=\"{}\"", attribute, EscapeXmlAttribute(name));
+}
+/// Of an actuator whose force is a constant, whatever is said to it.
+inline std::string Constant(double force) {
+  return R"( gaintype="fixed" gainprm="0.0" biastype="affine")" +
+         Attribute("biasprm", std::array{force, 0.0, 0.0});
+}
+inline Vec ToVec(const Eigen::Vector3d& v) { return {v[0], v[1], v[2]}; }
+
+class MjcfWriter {
+ public:
+  MjcfWriter(const Model& model, const MjcfOptions& options);
+
+  Mjcf Write();
+
+ private:
+  static std::size_t At(int index) { return static_cast<std::size_t>(index); }
+
+  void Say(const std::string& text) { made_.notes.push_back({false, text}); }
+  /// `name`, which stands for the user's `given`: says so where it is another one.
+  std::string Renamed(const char* what, const std::string& given, std::string name);
+
+  void NameBodies();
+  void AddPoints();
+  /// The name of a new site.
+  std::string AddSite(int body, const Eigen::Vector3d& at, const std::string& wanted);
+
+  // bodies and their joints (export_mjcf.cpp)
+  void AddBody(std::size_t index, int depth, std::string& text);
+  std::string Inertial(int index) const;
+  void AddJoint(std::size_t index, const MjcfChain& chain, const std::string& indent,
+                std::string& text);
+  /// Springs and dampers along a tree joint as attributes, constants as an actuator of `name`.
+  std::string AddEfforts(std::size_t index, const std::string& name);
+  void AddCoordinate(const Joint& joint, const MjcfChain& chain, const MjcfPart& part);
+  void SayParts(const Joint& joint, const std::vector<std::string>& names);
+
+  // what holds or acts between bodies (export_mjcf.cpp)
+  /// Points that the joint holds together: one for a pivot, more along its axes for orientations.
+  void AddClosures(const Joint& joint);
+  void AddClosure(const Joint& joint, const Eigen::Vector3d& at, const std::string& name);
+  void AddTendon(const std::string& name, int from, const Eigen::Vector3d& at_from, int to,
+                 const Eigen::Vector3d& at_to, const std::string& attributes);
+  void AddSpringDamper(std::size_t index);
+  void AddPointForce(std::size_t index);
+  void AddNotes();
+
+  const Model& model_;
+  const MjcfOptions options_;
+  std::vector<std::vector<std::size_t>> children_;        ///< tree joints below each body
+  std::vector<std::vector<std::string>> sites_, shapes_;  ///< by body
+  std::vector<std::string> body_names_;
+  UniqueNames site_names_, joint_names_, closure_names_;
+  std::string tendons_, equalities_, actuators_;
+  std::vector<double> qpos_, qvel_;
+  Mjcf made_;
+};
+
+/// Everything of the model that MJCF does not have.
+std::vector<std::string> MissingInMjcf(const Model& model);
 namespace {
 
 using Eigen::Vector3d;
@@ -227,6 +345,281 @@ Mjcf MakeMjcf(const Model& model, const MjcfOptions& options) {
   std::vector<std::string> missing = MissingInMjcf(model);
   if (!missing.empty()) throw NotThere(std::move(missing));
   return MjcfWriter(model, options).Write();
+}
+
+// Joints that close loops, springs between points and forces at points as MJCF; and what it lacks.
+
+namespace {
+
+using Eigen::Vector3d;
+
+/// MuJoCo refuses masses and moments of moving bodies below it (its mjMINVAL).
+constexpr double kLeastMass = 1e-15;
+/// Deeper documents are refused by the parser that MuJoCo has.
+constexpr int kMostNested = 90;
+
+}  // namespace
+
+std::vector<std::string> MissingInMjcf(const Model& model) {
+  std::vector<std::string> missing = model.missing;
+  std::vector<int> depth(model.bodies.size(), 0);
+  for (const Joint& joint : model.tree) {
+    if (!HasParts(joint)) missing.push_back("joint \"" + joint.name + "\": " + joint.kind);
+    const auto child = static_cast<std::size_t>(joint.child());
+    depth[child] = depth[static_cast<std::size_t>(joint.parent())] + 1;
+    if (depth[child] == kMostNested + 1) {
+      missing.push_back(fmt::format("body \"{}\": more than {} bodies between it and Ground",
+                                    model.bodies[child].name, kMostNested - 1));
+    }
+  }
+  for (const Joint& joint : model.cut) {
+    const auto kinds = {"revolute", "weld", "spherical", "rod", "free"};
+    if (std::ranges::find(kinds, joint.kind) == kinds.end()) {
+      missing.push_back("joint \"" + joint.name + "\": " + joint.kind + ", which closes a loop");
+    }
+  }
+  for (std::size_t i = 1; i < model.bodies.size(); ++i) {
+    const Body& body = model.bodies[i];
+    const std::string fault = FaultOfInertia(body, model.planar);
+    if (!fault.empty()) missing.push_back(fault);
+    const Vector3d moments = PrincipalInertiaOf(body, model.planar).moments;
+    const double least = std::min(body.mass, moments.minCoeff());
+    if (least >= kLeastMass) continue;
+    missing.push_back(fmt::format(
+        "body \"{}\": a mass [kg] or moment of inertia [kg m^2] of {:.3g}, below {:.0e}", body.name,
+        least, kLeastMass));
+  }
+  return missing;
+}
+
+void MjcfWriter::AddClosures(const Joint& joint) {
+  const std::string& kind = joint.kind;
+  if (kind == "free") return;
+  std::vector<Vector3d> points = {Vector3d::Zero()};
+  if (kind == "revolute" && !model_.planar) points.push_back(Vector3d::UnitZ());
+  if (kind == "weld") points.push_back(Vector3d::UnitX());
+  if (kind == "weld" && !model_.planar) points.push_back(Vector3d::UnitY());
+  // as far away as the pivot is from its body's centre of mass, a length of the mechanism
+  const Vec& p = joint.M.p;
+  const double reach = std::sqrt(p[0] * p[0] + p[1] * p[1] + p[2] * p[2]);
+  for (std::size_t i = 0; i < points.size(); ++i) {
+    const std::string wanted = i == 0 ? joint.name : fmt::format("{}.{}", joint.name, i + 1);
+    const std::string name = closure_names_.Take(XmlText(wanted));
+    if (i == 0) Renamed("joint", joint.name, name);
+    AddClosure(joint, points[i] * (reach > 0.0 ? reach : 1.0), name);
+  }
+  const std::string pairs = points.size() == 1
+                                ? "a pair of points is"
+                                : fmt::format("{} pairs of points are", points.size());
+  Say(fmt::format("joint \"{}\" ({}) closes a loop: {} held {}.", joint.name, kind, pairs,
+                  kind == "rod" ? "at a distance, by a tendon" : "together"));
+}
+
+void MjcfWriter::AddClosure(const Joint& joint, const Vector3d& at, const std::string& name) {
+  const auto F = FromOrigin(model_, joint.from, joint.F);
+  const auto M = FromOrigin(model_, joint.to, joint.M);
+  const Vector3d first = F.p + F.R * at, second = M.p + M.R * at;
+  MjcfClosure closure{ToVec(first), ToVec(second), -1.0};
+  if (joint.kind == "rod") {
+    closure.rod = joint.parameter;
+    AddTendon(name, joint.from, first, joint.to, second, "");
+    equalities_ += "    <tendon" + Named("name", name) + Named("tendon1", name) + "/>\n";
+  } else {
+    // MuJoCo wants a body other than the world first
+    const bool swap = joint.from == 0;
+    if (swap) std::swap(closure.at_first, closure.at_second);
+    equalities_ += "    <connect" + Named("name", name) +
+                   Named("body1", body_names_[At(swap ? joint.to : joint.from)]) +
+                   Named("body2", body_names_[At(swap ? joint.from : joint.to)]) +
+                   Attribute("anchor", closure.at_first) + "/>\n";
+  }
+  made_.closures.push_back(closure);
+}
+
+void MjcfWriter::AddTendon(const std::string& name, int from, const Vector3d& at_from, int to,
+                           const Vector3d& at_to, const std::string& attributes) {
+  const std::string first = AddSite(from, at_from, name + ".from");
+  const std::string second = AddSite(to, at_to, name + ".to");
+  tendons_ += fmt::format(
+      "    <spatial{} limited=\"false\"{}>\n      <site{}/>\n      <site{}/>\n    </spatial>\n",
+      Named("name", name), attributes, Named("site", first), Named("site", second));
+}
+
+void MjcfWriter::AddSpringDamper(std::size_t index) {
+  const SpringDamper& force = model_.spring_dampers[index];
+  const std::string name = closure_names_.Take(fmt::format("spring_damper {}", index + 1));
+  const auto &from = force.from, &to = force.to;
+  AddTendon(name, from.body, FromOrigin(model_, from.body, from.at), to.body,
+            FromOrigin(model_, to.body, to.at),
+            Attribute("stiffness", force.stiffness) + Attribute("damping", force.damping) +
+                Attribute("springlength", force.length));
+  if (force.preload == 0.0) return;
+  // a tension shortens
+  actuators_ += "    <general" + Named("tendon", name) + Constant(-force.preload) + "/>\n";
+  Say(fmt::format("The preload of {} is an actuator without control.", name));
+}
+
+void MjcfWriter::AddPointForce(std::size_t index) {
+  const PointForce& force = model_.point_forces[index];
+  const int body = force.point.body;
+  const std::string name = fmt::format("point_force {}", index + 1);
+  std::string sites = Named("site", AddSite(body, FromOrigin(model_, body, force.point.at), name));
+  if (!force.in_body_axes) {
+    sites += Named("refsite", AddSite(0, Vector3d::Zero(), name + ".axes"));
+  }
+  const Vec& F = force.force;
+  actuators_ += "    <general" + sites +
+                Attribute("gear", std::array{F[0], F[1], F[2], 0.0, 0.0, 0.0}) + Constant(1.0) +
+                "/>\n";
+  Say(fmt::format("{} on body \"{}\" is an actuator without control.", name,
+                  model_.bodies[At(body)].name));
+}
+namespace {
+
+using Eigen::Matrix3d;
+using Eigen::Vector3d;
+
+struct PartKind {
+  char kind;
+  int axis;  ///< x, y, z
+  int coordinate;
+};
+
+/// What a joint of this kind is made of, from F to M, each part in the axes that those before it
+/// have moved.
+std::vector<PartKind> KindsOf(const Joint& joint) {
+  const std::string& kind = joint.kind;
+  if (kind == "revolute") return {{'h', 2, 0}};
+  if (kind == "prismatic") return {{'s', 0, 0}};
+  if (kind == "cylindrical") return {{'h', 2, 0}, {'s', 2, 1}};
+  if (kind == "pin-in-slot") return {{'s', 0, 1}, {'h', 2, 0}};
+  if (kind == "universal") return {{'h', 0, 0}, {'h', 1, 1}};
+  if (kind == "spherical") return {{'b', 0, 0}};
+  if (kind == "planar" || (kind == "free" && joint.coordinates.size() == 3)) {
+    return {{'s', 0, 1}, {'s', 1, 2}, {'h', 2, 0}};
+  }
+  if (kind == "free") return {{'s', 0, 4}, {'s', 1, 5}, {'s', 2, 6}, {'b', 0, 0}};
+  return {};
+}
+
+Vector3d ToEigen(const Vec& v) { return {v[0], v[1], v[2]}; }
+
+/// What one part does, at these coordinates of its joint.
+loopbench::Frame Motion(const PartKind& part, const double* q, double sign) {
+  loopbench::Frame X;
+  if (part.kind == 's') X.p[part.axis] = sign * q[part.coordinate];
+  if (part.kind == 'h') {
+    X.R = Eigen::AngleAxisd(sign * q[part.coordinate], Vector3d::Unit(part.axis)).matrix();
+  }
+  if (part.kind == 'b') {
+    const Eigen::Quaterniond turn =
+        Eigen::Quaterniond(q[0], sign * q[1], sign * q[2], sign * q[3]).normalized();
+    X.R = turn.toRotationMatrix();
+  }
+  return X;
+}
+
+}  // namespace
+
+bool HasParts(const Joint& joint) { return joint.kind == "weld" || !KindsOf(joint).empty(); }
+
+Vector3d FromOrigin(const Model& model, int body, const Vec& at) {
+  return ToEigen(model.bodies[static_cast<std::size_t>(body)].com) + ToEigen(at);
+}
+
+loopbench::Frame FromOrigin(const Model& model, int body, const Frame& frame) {
+  loopbench::Frame X;
+  for (int i = 0; i < 3; ++i) {
+    for (int j = 0; j < 3; ++j) X.R(i, j) = frame.R[static_cast<std::size_t>(3 * i + j)];
+  }
+  X.p = FromOrigin(model, body, frame.p);
+  return X;
+}
+
+std::array<double, 4> QuaternionOf(const Matrix3d& R) {
+  const Eigen::Quaterniond q = Eigen::Quaterniond(R).normalized();
+  return {q.w(), q.x(), q.y(), q.z()};
+}
+
+MjcfChain ChainOf(const Model& model, const Joint& joint) {
+  std::vector<PartKind> kinds = KindsOf(joint);
+  const double sign = joint.from_is_child ? -1.0 : 1.0;
+  if (joint.from_is_child) std::ranges::reverse(kinds);
+  const double* q = model.q.data() + joint.q;
+  const auto X_PF = FromOrigin(model, joint.from, joint.F);
+  const auto X_QM = FromOrigin(model, joint.to, joint.M);
+  const loopbench::Frame& on_child = joint.from_is_child ? X_PF : X_QM;
+
+  MjcfChain chain;
+  chain.axes = on_child.R;
+  chain.parts.resize(kinds.size());
+  loopbench::Frame moved;  // the frame on the child, in the frame behind part i
+  for (std::size_t i = kinds.size(); i-- > 0;) {
+    const PartKind& kind = kinds[i];
+    // behind part i, seen from the child
+    const loopbench::Frame behind = on_child * moved.Inverse();
+    MjcfPart& part = chain.parts[i];
+    part.kind = kind.kind;
+    part.coordinate = kind.coordinate;
+    part.axis = behind.R * Vector3d::Unit(kind.axis);
+    part.at = behind.p;
+    const loopbench::Frame motion = Motion(kind, q, sign);
+    if (kind.kind == 'b') {
+      chain.turn = motion.R;
+    } else {
+      part.value = sign * q[kind.coordinate];
+    }
+    moved = motion * moved;
+  }
+  chain.pose = (joint.from_is_child ? X_QM : X_PF) * moved * on_child.Inverse();
+  return chain;
+}
+namespace {
+
+using Eigen::Vector3d;
+
+/// Where joints are on each body, from its origin, then its centre of mass.
+std::vector<std::vector<Vector3d>> PlacesOnBodies(const Model& model) {
+  std::vector<std::vector<Vector3d>> places(model.bodies.size());
+  const auto add = [&](int body, const Vec& at) {
+    places[static_cast<std::size_t>(body)].push_back(FromOrigin(model, body, at));
+  };
+  for (const std::vector<Joint>* joints : {&model.tree, &model.cut}) {
+    for (const Joint& joint : *joints) {
+      add(joint.from, joint.F.p);
+      add(joint.to, joint.M.p);
+    }
+  }
+  for (std::size_t b = 0; b < model.bodies.size(); ++b) add(static_cast<int>(b), {});
+  return places;
+}
+
+}  // namespace
+
+std::vector<std::vector<std::string>> ShapesOf(const Model& model) {
+  const auto places = PlacesOnBodies(model);
+  double size = 0.0;  // of the largest body
+  for (std::size_t b = 1; b < places.size(); ++b) {
+    for (const Vector3d& at : places[b]) size = std::max(size, (at - places[b].front()).norm());
+  }
+  const double radius = size > 0.0 ? 0.02 * size : 0.05;
+  std::vector<std::vector<std::string>> shapes(places.size());
+  for (std::size_t b = 1; b < places.size(); ++b) {
+    const Vector3d& first = places[b].front();
+    // the centre of mass of a body with several joints says nothing of its form
+    const std::size_t ends = std::max<std::size_t>(2, places[b].size() - 1);
+    for (std::size_t i = 1; i < std::min(ends, places[b].size()); ++i) {
+      const Vector3d& end = places[b][i];
+      if (!((end - first).norm() > radius)) continue;
+      const std::array both = {first[0], first[1], first[2], end[0], end[1], end[2]};
+      shapes[b].push_back("<geom type=\"capsule\"" + Attribute("fromto", both) +
+                          Attribute("size", radius) + "/>\n");
+    }
+    if (!shapes[b].empty()) continue;
+    shapes[b].push_back("<geom type=\"sphere\"" + Attribute("pos", ToVec(places[b].back())) +
+                        Attribute("size", 2.0 * radius) + "/>\n");
+  }
+  return shapes;
 }
 
 }  // namespace loopbench::exchange

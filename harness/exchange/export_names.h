@@ -1,7 +1,7 @@
-// Names of users in documents and programs for others: the same text where the language has it, and
-// never an instruction.
+// Names and bodies as other programs take them.
 #pragma once
 
+#include <Eigen/Core>
 #include <map>
 #include <set>
 #include <string>
@@ -12,6 +12,9 @@
 #include "harness/exchange/model.h"
 
 namespace loopbench::exchange {
+
+// Names of users in documents and programs for others: the same text where the language has it, and
+// never an instruction.
 
 /// The text as an attribute of XML may have it: what EscapeTerminal() shows is shown, but for tabs
 /// and line ends, which stay.
@@ -52,5 +55,19 @@ class UniqueNames {
   std::set<std::string> taken_;
   std::map<std::string, int> next_;  ///< number of a name that was wanted before
 };
+
+// What programs ask of a body's inertia, and its principal axes.
+
+struct PrincipalInertia {
+  Eigen::Vector3d moments;                             ///< [kg m^2]
+  Eigen::Matrix3d axes = Eigen::Matrix3d::Identity();  ///< in body axes, right-handed
+};
+
+/// Of a planar body the moment about z for all three: of the others the motion says nothing. What
+/// rounding takes from the triangle inequality is given back.
+PrincipalInertia PrincipalInertiaOf(const Body& body, bool planar);
+
+/// "" or: body "rod": moments of inertia 1, 1 and 3 kg m^2, which no body has.
+std::string FaultOfInertia(const Body& body, bool planar);
 
 }  // namespace loopbench::exchange

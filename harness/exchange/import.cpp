@@ -2,10 +2,17 @@
 
 #include <fmt/format.h>
 
+#include <Eigen/Geometry>
 #include <algorithm>
+#include <cmath>
+#include <limits>
 
+#include "harness/config/mechanism_sections.h"
 #include "harness/exchange/import_draft.h"
-#include "harness/text/config_error.h"
+#include "harness/text/files.h"
+#include "mechanism/algebra/symmetric_eigen.h"
+#include "mechanism/description/islands.h"
+#include "mechanism/simplify/attach.h"
 
 namespace loopbench::harness {
 
@@ -51,6 +58,353 @@ Imported ImportText(std::string_view text, const std::string& file, const Import
 
 Imported ImportMechanism(const std::filesystem::path& path, const ImportOptions& options) {
   return ImportText(ReadTextFile(path), path.string(), options);
+}
+
+// What is done with an imported mechanism whatever its format.
+
+namespace {
+
+/// Why a body cannot move by itself, and the values that it needs; "" if it can.
+struct MassFault {
+  std::string found, expected;
+};
+
+MassFault MassFaultOf(const BodyDescription& body) {
+  constexpr double kPrinted = 0.01;  // as mechanism files allow (mechanism_bodies.cpp)
+  // elements of a sum of turned inertias carry some rounding errors of its largest moment each
+  constexpr double kRoundOff = 64.0 * std::numeric_limits<double>::epsilon();
+  if (!std::isfinite(body.mass) || !body.com.allFinite() || !body.inertia.allFinite()) {
+    return {"numbers too large for its mass and inertia", "a body of finite mass and size"};
+  }
+  if (body.mass == 0.0) {
+    return {"a body without mass that moves",
+            "a mass > 0, or a joint that fixes it to a body with one: nothing could accelerate it"};
+  }
+  const Eigen::Vector3d moments = SymmetricEigenvalues(body.inertia);
+  const std::string shown =
+      fmt::format("principal moments {:.4g}, {:.4g}, {:.4g} kg m^2, with all that is fixed to it",
+                  moments[0], moments[1], moments[2]);
+  if (!(moments[0] > kRoundOff * moments[2])) return {shown, "three that are > 0"};
+  if (moments[2] > (1.0 + kPrinted) * (moments[0] + moments[1])) {
+    return {shown, "none larger than the sum of the other two, as no body's is"};
+  }
+  return {};
+}
+
+/// Bodies that welds hold to `root`, and the body in or beside the cluster that carries them. The
+/// carrier is the ground if it is there, else the first sound body, else the first with a mass.
+class Cluster {
+ public:
+  /// `welds`: numbers of the welds at each body. Bodies that are sound end the cluster and carry
+  /// it, unless it is the `whole` of all parts fixed together.
+  Cluster(const MechanismDescription& description, const std::vector<std::vector<int>>& welds,
+          const std::vector<bool>& sound, bool whole, int root)
+      : d_(description), sound_(sound) {
+    poses_[root] = Frame();
+    Consider(root);
+    std::vector<int> queue = {root};
+    for (std::size_t k = 0; k < queue.size(); ++k) {
+      for (const int weld : welds[static_cast<std::size_t>(queue[k])]) {
+        const JointDescription& joint = d_.joints[static_cast<std::size_t>(weld)];
+        for (const auto& [here, there] :
+             {std::pair{&joint.from, &joint.to}, {&joint.to, &joint.from}}) {
+          if (here->body != queue[k] || poses_.contains(there->body)) continue;
+          poses_[there->body] = poses_[here->body] * PoseOf(*here) * PoseOf(*there).Inverse();
+          Consider(there->body);
+          const bool ends = there->body == kGround || (IsSound(there->body) && !whole);
+          if (!ends) queue.push_back(there->body);
+        }
+      }
+    }
+    members_ = std::move(queue);
+  }
+
+  /// -1: none has a mass.
+  int carrier() const { return carrier_; }
+  const std::vector<int>& members() const { return members_; }
+  Attachment AttachmentOf(int body) const {
+    Attachment at;
+    at.carrier = carrier_;
+    at.attached = true;
+    at.X = poses_.at(carrier_).Inverse() * poses_.at(body);
+    return at;
+  }
+
+ private:
+  bool IsSound(int body) const { return sound_[static_cast<std::size_t>(body)]; }
+  void Consider(int body) {
+    const int rank = body == kGround                                        ? 3
+                     : IsSound(body)                                        ? 2
+                     : d_.bodies[static_cast<std::size_t>(body)].mass > 0.0 ? 1
+                                                                            : 0;
+    if (rank <= rank_) return;
+    rank_ = rank;
+    carrier_ = body;
+  }
+
+  const MechanismDescription& d_;
+  const std::vector<bool>& sound_;
+  std::map<int, Frame> poses_;
+  std::vector<int> members_;
+  int carrier_ = -1, rank_ = 0;
+};
+
+std::vector<std::vector<int>> WeldsAtBodies(const MechanismDescription& description) {
+  std::vector<std::vector<int>> welds(description.bodies.size());
+  for (std::size_t j = 0; j < description.joints.size(); ++j) {
+    const JointDescription& joint = description.joints[j];
+    if (joint.type != JointType::kWeld) continue;
+    for (const int body : {joint.from.body, joint.to.body}) {
+      welds[static_cast<std::size_t>(body)].push_back(static_cast<int>(j));
+    }
+  }
+  return welds;
+}
+
+}  // namespace
+
+void ImportDraft::CheckUnreadMasses() const {
+  if (without_mass_.empty()) return;
+  const std::vector<bool> sound(description.bodies.size(), true);
+  const Cluster fixed(description, WeldsAtBodies(description), sound, true, kGround);
+  const std::set<int> members(fixed.members().begin(), fixed.members().end());
+  for (const auto& [body, value] : without_mass_) {
+    if (!members.contains(body)) value.Fail("false: masses are not found from shapes");
+  }
+}
+
+void ImportDraft::MergeFixed(bool whole) {
+  const std::size_t count = description.bodies.size();
+  std::vector<bool> sound(count), seen(count);
+  for (std::size_t i = 0; i < count; ++i) {
+    sound[i] = i == kGround || MassFaultOf(description.bodies[i]).found.empty();
+  }
+  std::vector<Attachment> attachments(count);
+  const std::vector<std::vector<int>> welds = WeldsAtBodies(description);
+  bool any = false;
+  for (std::size_t i = 1; i < count; ++i) {
+    if (sound[i] || seen[i]) continue;
+    const Cluster cluster(description, welds, sound, whole, static_cast<int>(i));
+    for (const int body : cluster.members()) {
+      const auto index = static_cast<std::size_t>(body);
+      seen[index] = true;
+      if (body == cluster.carrier() || cluster.carrier() < 0) continue;
+      attachments[index] = cluster.AttachmentOf(body);
+      const auto carrier = static_cast<std::size_t>(cluster.carrier());
+      const BodyDescription& merged = description.bodies[index];
+      const char* why = merged.mass == 0.0 ? "without mass and fixed"
+                        : sound[index]     ? "fixed to a body without an inertia of its own"
+                                           : "without an inertia of its own and fixed";
+      std::string reason =
+          fmt::format("{}: merged with \"{}\"", why, description.bodies[carrier].name);
+      if (!merged.points.empty()) reason += fmt::format(", points are \"{}.POINT\"", merged.name);
+      Note(elements_[index], reason);
+      any = true;
+    }
+  }
+  if (!any) return;
+  Renumbering renumbering;
+  MechanismDescription merged_description = Attach(description, attachments, &renumbering);
+  for (std::size_t j = 0; j < description.joints.size(); ++j) {
+    const JointDescription& joint = description.joints[j];
+    if (renumbering.joints[j] >= 0 || joint.type == JointType::kWeld) continue;
+    Note(elements_[static_cast<std::size_t>(joint.to.body)],
+         fmt::format("joint \"{}\" dropped: it leads from a body to what is fixed to it",
+                     joint.name));
+  }
+  description = std::move(merged_description);
+  for (std::size_t i = 0; i < count; ++i) {
+    if (renumbering.bodies[i] < 0) continue;
+    const auto kept = static_cast<std::size_t>(renumbering.bodies[i]);  // never above i
+    at_rest[kept] = at_rest[i];
+    elements_[kept] = elements_[i];
+  }
+  at_rest.resize(description.bodies.size());
+}
+
+void ImportDraft::CheckMasses() const {
+  for (std::size_t i = 1; i < description.bodies.size(); ++i) {
+    const MassFault fault = MassFaultOf(description.bodies[i]);
+    if (!fault.found.empty()) elements_[i].Fail(fault.found, fault.expected);
+  }
+}
+
+void ImportDraft::HoldFloatingParts() {
+  for (const Island& island : FindIslands(description, Connection::kJoints)) {
+    if (island.grounded) continue;
+    const int root = island.bodies.front();
+    const auto index = static_cast<std::size_t>(root);
+    AddJoint(NameLater(description.bodies[index].name), JointType::kFree, kGround, {}, root, {});
+    const Placement& X = at_rest[index];
+    description.initial.coordinates.push_back(
+        {last_joint(), {X.q.w(), X.q.x(), X.q.y(), X.q.z(), X.p.x(), X.p.y(), X.p.z()}});
+  }
+  NameJoints();
+}
+
+Imported ImportDraft::Finish(const std::string& format) {
+  Imported imported;
+  imported.format = format;
+  NameJoints();
+  bool gravity_is_said = options_.gravity.has_value() || !assumed_gravity_;
+  if (!options_.sidecar.empty()) {
+    std::vector<Frame> rest;
+    for (const Placement& X : at_rest) rest.push_back(X.AsFrame());
+    const SidecarFacts facts = ReadSidecar(options_.sidecar, rest, &description);
+    imported.observe = facts.observe;
+    gravity_is_said = gravity_is_said || facts.has_gravity;
+  }
+  if (!gravity_is_said) {
+    Note(*assumed_gravity_, fmt::format("no gravity is said: {} m/s^2 along -z (--gravity x,y,z "
+                                        "says another)",
+                                        -description.gravity.z()));
+  }
+  if (options_.gravity) description.gravity = *options_.gravity;
+  for (const auto& [body, share] : lifts_) {
+    const BodyDescription& lifted = description.bodies[static_cast<std::size_t>(body)];
+    if (!(lifted.mass > 0.0) || description.gravity.isZero(0.0)) continue;
+    description.forces.emplace_back(
+        PointForce{{body, lifted.com}, -share * lifted.mass * description.gravity, false});
+  }
+  if (rounded_ > 0) {
+    notes_[rounded_note_].reason += fmt::format(
+        "; values with rounded angles or directions: {} (--keep-digits keeps them)", rounded_);
+  }
+  HoldFloatingParts();
+  CheckUnreadMasses();
+  MergeFixed(false);
+  MergeFixed(true);
+  CheckMasses();
+  if (description.bodies.size() < 2) {
+    elements_[kGround].Fail("no body", "at least one that is not fixed to the ground");
+  }
+  if (options_.planar) GoToPlane();
+  const std::string fault = Validate(description);
+  if (!fault.empty()) throw ConfigError(fmt::format("{}: {}", file_.name(), fault));
+  std::ranges::stable_sort(notes_, {}, &ImportNote::line);
+  imported.description = std::move(description);
+  imported.notes = std::move(notes_);
+  return imported;
+}
+
+namespace {
+
+/// The mechanism so far, and where its bodies stand.
+struct Sidecar : Draft {
+  const std::vector<Frame>* at_rest = nullptr;
+  bool has_gravity = false;
+};
+
+/// A joint given on one side: at rest the other is at the same place.
+struct Loop : JointDescription {};
+using LoopPart = PartOf<Loop>;
+
+void ReadNameOfLoop(const JsonNode& node, LoopPart& loop) {
+  loop.name = ReadNewName(node, loop.draft->joint_names);
+}
+
+void ReadTypeOfLoop(const JsonNode& node, LoopPart& loop) {
+  loop.type = static_cast<JointType>(node.Choice(JointTypeNames(), "a joint type").value_or(0));
+  if (!TraitsOf(loop.type).parameter.key.empty() || loop.type == JointType::kFree) {
+    node.Fail("a type without a number of its own: others stand in \"joints\"");
+  }
+}
+
+void ReadFirst(const JsonNode& node, LoopPart& loop) {
+  loop.from.body = ReadBodyName(node, *loop.draft).value_or(-1);
+}
+
+void ReadSecond(const JsonNode& node, LoopPart& loop) {
+  loop.to.body = ReadBodyName(node, *loop.draft).value_or(-1);
+  if (loop.to.body >= 0 && loop.to.body == loop.from.body) node.Fail("another body");
+}
+
+void ReadPlaceOfLoop(const JsonNode& node, LoopPart& loop) {
+  if (loop.from.body < 0) return;
+  const BodyDescription& body = loop.draft->bodies[static_cast<std::size_t>(loop.from.body)];
+  loop.from.position = ReadPoint(node, body, loop.draft->space);
+}
+
+void ReadAxisOfLoop(const JsonNode& node, LoopPart& loop) {
+  loop.axis = ReadVector(node, loop.draft->space);
+  if (TraitsOf(loop.type).own_axis == '-') {
+    node.Fail(fmt::format("no axis of a {} joint", ToString(loop.type)));
+  } else if (loop.axis.isZero()) {
+    node.Fail("an axis that is not zero");
+  }
+}
+
+const Fields<LoopPart>& LoopFields() {
+  static const Fields<LoopPart> fields(
+      "loop", "A joint given on one side, which closes where all coordinates are 0.",
+      {{"name", By(TextSchema(), ReadNameOfLoop), "One that no other joint has.", "a name"},
+       {"type", By(ChoiceSchema(JointTypeNames().all()), ReadTypeOfLoop), "What it leaves free.",
+        "a joint type"},
+       {"from", By(TextSchema(), ReadFirst), "A body's name or \"ground\".", "the name of a body"},
+       {"to", By(TextSchema(), ReadSecond), "Another.", "the name of a body"},
+       {"at", By(PlaceSchema(), ReadPlaceOfLoop), "The joint in axes of `from` [m].",
+        "a point of `from`, or coordinates in its axes"},
+       {"axis", By(VectorSchema(), ReadAxisOfLoop), "In axes of `from`."}});
+  return fields;
+}
+
+/// The other side, from where the bodies stand.
+void CloseAtRest(const std::vector<Frame>& at_rest, JointDescription* joint) {
+  if (joint->from.body < 0 || joint->to.body < 0) return;
+  const Frame X_QP = at_rest[static_cast<std::size_t>(joint->to.body)].Inverse() *
+                     at_rest[static_cast<std::size_t>(joint->from.body)];
+  joint->to.position = X_QP.R * joint->from.position + X_QP.p;
+  const Eigen::AngleAxisd turn{Eigen::Quaterniond(X_QP.R)};
+  joint->to.rotation = turn.angle() * turn.axis();
+  joint->cut = true;
+}
+
+void ReadLoops(const JsonNode& node, Sidecar& sidecar) {
+  for (const JsonNode& element : node.Elements("loops")) {
+    Loop loop;
+    loop.from.body = loop.to.body = -1;
+    loop = ReadPart(LoopFields(), element, sidecar, loop);
+    CloseAtRest(*sidecar.at_rest, &loop);
+    sidecar.joints.push_back(loop);
+    sidecar.joint_names.Add(loop.name);
+  }
+}
+
+void ReadGravityOfSidecar(const JsonNode& node, Sidecar& sidecar) {
+  sidecar.gravity = ReadVector(node, sidecar.space);
+  sidecar.has_gravity = true;
+}
+
+const Fields<Sidecar>& SidecarFields() {
+  static const Fields<Sidecar> fields(
+      "sidecar", "What a description of another program cannot say.",
+      {{"comment", By<Sidecar>(TextSchema(), [](const JsonNode& node, Sidecar&) { node.Text(); }),
+        "Free text for readers."},
+       {"gravity", By(VectorSchema(), ReadGravityOfSidecar), "In place of the file's [m/s^2]."},
+       {"loops", By(ArraySchema(LoopFields().Schema()), ReadLoops), "Joints given on one side."},
+       {"joints", JointsValue(), "Joints given on both sides."},
+       {"forces", ForcesValue(), "Besides gravity."},
+       {"initial", Section(InitialFields()), "In place of the file's start."},
+       {"observe", Section(ObservationFields()), "Exact facts that observers compare with."}});
+  return fields;
+}
+
+}  // namespace
+
+SidecarFacts ReadSidecar(const std::filesystem::path& path, const std::vector<Frame>& at_rest,
+                         MechanismDescription* description) {
+  const std::string text = ReadTextFile(path);
+  const Json document = ParseDocument(text, path.string());
+  ErrorList errors(path.string(), text);
+  Sidecar sidecar;
+  static_cast<MechanismDescription&>(sidecar) = *description;
+  sidecar.at_rest = &at_rest;
+  for (const BodyDescription& body : sidecar.bodies) sidecar.body_names.Add(body.name);
+  for (const JointDescription& joint : sidecar.joints) sidecar.joint_names.Add(joint.name);
+  SidecarFields().Read(JsonNode(document, "", errors), &sidecar);
+  errors.ThrowIfAny();
+  *description = static_cast<MechanismDescription&>(sidecar);
+  return {sidecar.observe, sidecar.has_gravity};
 }
 
 }  // namespace loopbench::harness

@@ -3,9 +3,77 @@
 #include <fmt/format.h>
 
 #include <algorithm>
+#include <cctype>
 #include <cmath>
+#include <cstdlib>
+#include <limits>
+#include <numbers>
+#include <sstream>
+
+#include "harness/text/files.h"
+#include "mechanism/simplify/plane.h"
 
 namespace loopbench::harness {
+
+namespace {
+
+Eigen::Quaterniond About(int axis, double angle) {
+  Eigen::Quaterniond q(std::cos(0.5 * angle), 0.0, 0.0, 0.0);
+  q.vec()[axis] = std::sin(0.5 * angle);
+  return q;
+}
+
+}  // namespace
+
+Eigen::Vector3d RotationVector(const Eigen::Quaterniond& q) {
+  const double sine = q.vec().norm();
+  if (sine == 0.0) return Eigen::Vector3d::Zero();
+  const double angle = 2.0 * std::atan2(sine, std::abs(q.w()));
+  return (q.w() < 0.0 ? -angle : angle) / sine * q.vec();
+}
+
+Eigen::Quaterniond FromRollPitchYaw(const Eigen::Vector3d& angles) {
+  return About(2, angles.z()) * About(1, angles.y()) * About(0, angles.x());
+}
+
+Eigen::Quaterniond FromEuler(const std::string& sequence, const Eigen::Vector3d& angles) {
+  Eigen::Quaterniond q = Eigen::Quaterniond::Identity();
+  for (int i = 0; i < 3; ++i) {
+    const char letter = sequence[static_cast<std::size_t>(i)];
+    const bool fixed = std::isupper(static_cast<unsigned char>(letter)) != 0;
+    const Eigen::Quaterniond turn =
+        About(std::tolower(static_cast<unsigned char>(letter)) - 'x', angles[i]);
+    q = fixed ? turn * q : q * turn;
+  }
+  return q;
+}
+
+/// Eigen's FromTwoVectors takes the compiler eight seconds.
+Eigen::Quaterniond TurnOfZ(const Eigen::Vector3d& to) {
+  const Eigen::Vector3d z = to.normalized();
+  if (z.z() < 0.0) {
+    const double across = std::hypot(z.x(), z.y());
+    const Eigen::Vector3d axis = across > 0.0
+                                     ? Eigen::Vector3d(-z.y() / across, z.x() / across, 0.0)
+                                     : Eigen::Vector3d::UnitX();
+    return Eigen::Quaterniond(Eigen::AngleAxisd(std::atan2(across, z.z()), axis));
+  }
+  const double root = std::sqrt(2.0 * (1.0 + z.z())), inverse = 1.0 / root;
+  return {0.5 * root, -z.y() * inverse, z.x() * inverse, 0.0};
+}
+
+Eigen::Matrix3d InTurnedAxes(const Eigen::Quaterniond& q, const Eigen::Matrix3d& inertia) {
+  if (q.vec().isZero(0.0)) return inertia;
+  const Eigen::Matrix3d R = q.toRotationMatrix();
+  const Eigen::Matrix3d turned = R * inertia * R.transpose();
+  return 0.5 * (turned + turned.transpose());
+}
+
+Eigen::Matrix3d SymmetricMatrix(double xx, double yy, double zz, double xy, double xz, double yz) {
+  Eigen::Matrix3d matrix;
+  matrix << xx, xy, xz, xy, yy, yz, xz, yz, zz;
+  return matrix;
+}
 
 Eigen::Quaterniond UnitQuaternion(const XmlValue& value, const Eigen::Quaterniond& q) {
   const double length = q.norm();
@@ -110,7 +178,7 @@ void ImportDraft::Note(const XmlElement& element, const std::string& attribute, 
 void ImportDraft::NoteUnread(std::span<const DroppedReason> reasons) {
   file_.Unread([&](const XmlElement& element, const std::string& attribute) {
     const auto find = [&](const std::string& what) {
-      return std::ranges::find(reasons, what, &DroppedReason::what);
+      return std::ranges::find_if(reasons, [&](const DroppedReason& row) { return row.Has(what); });
     };
     if (element.tag().starts_with("xacro:")) {
       element.Fail("an element of xacro", "plain XML, as `xacro FILE` writes it");
@@ -129,6 +197,212 @@ void ImportDraft::NoteUnread(std::span<const DroppedReason> reasons) {
       Note(element, attribute, fmt::format("dropped: {}", known->reason), known->changes_motion);
     }
   });
+}
+
+// --planar: an imported mechanism in its plane, with gravity along -y.
+
+namespace {
+
+using Eigen::Quaterniond;
+using Eigen::Vector3d;
+
+constexpr double kRounding = 1e-12;  // as axes are level to (plane.h)
+
+/// Ground axes with z = n and, where there is gravity across n, y against it: q_WC.
+Quaterniond AxesOfPlane(const Vector3d& n, const Vector3d& gravity) {
+  const Vector3d across = gravity - gravity.dot(n) * n;
+  if (!(across.norm() > kRounding * gravity.norm())) return Quaterniond(AxesWithNormal(n));
+  const Vector3d y = -across.normalized();
+  Eigen::Matrix3d R;
+  R << y.cross(n), y, n;
+  return Quaterniond(R);
+}
+
+/// The same mechanism in other ground axes; q_CW.
+void TurnGround(const Quaterniond& q, MechanismDescription* description) {
+  description->gravity = q * description->gravity;
+  for (auto& [name, point] : description->bodies[kGround].points) point = q * point;
+  for (JointDescription& joint : description->joints) {
+    for (JointSide* side : {&joint.from, &joint.to}) {
+      if (side->body != kGround) continue;
+      side->position = q * side->position;
+      side->rotation = RotationVector(q * Quaterniond(PoseOf(*side).R));
+    }
+  }
+  for (ForceDescription& force : description->forces) {
+    const ForceParts parts = PartsOf(force);
+    for (BodyPoint* point : parts.points) {
+      if (point->body == kGround) point->at = q * point->at;
+    }
+    if (parts.force != nullptr && !*parts.in_body_axes) *parts.force = q * *parts.force;
+  }
+}
+
+}  // namespace
+
+void ImportDraft::MakeBallsPins(const Vector3d& n) {
+  std::set<int> balls;
+  for (std::size_t j = 0; j < description.joints.size(); ++j) {
+    JointDescription& joint = description.joints[j];
+    if (joint.type != JointType::kSpherical) continue;
+    joint.type = JointType::kRevolute;  // all that a ball can do in a plane
+    for (JointSide* side : {&joint.from, &joint.to}) {
+      const Quaterniond& q = at_rest[static_cast<std::size_t>(side->body)].q;
+      side->rotation = RotationVector(q.conjugate() * Quaterniond(AxesWithNormal(n)));
+    }
+    balls.insert(static_cast<int>(j));
+  }
+  for (auto* list : {&description.initial.coordinates, &description.initial.speeds}) {
+    std::erase_if(*list, [&](const JointValues& one) { return balls.contains(one.joint); });
+  }
+}
+
+void ImportDraft::GoToPlane() {
+  const auto turns = std::ranges::find_if(description.joints, [](const JointDescription& joint) {
+    return TraitsOf(joint.type).flat.turns;
+  });
+  if (turns != description.joints.end()) {
+    const Vector3d n = at_rest[static_cast<std::size_t>(turns->from.body)].q *
+                       (PoseOf(turns->from).R * AxisAlignment(*turns) * Vector3d::UnitZ());
+    MakeBallsPins(n);
+    TurnGround(AxesOfPlane(n, description.gravity).conjugate(), &description);
+  }
+  std::string why;
+  const std::optional<InPlane> plane = ExpressInPlane(description, &why);
+  if (!plane) {
+    throw ConfigError(
+        fmt::format("{}: --planar: found that {}, expected a mechanism that moves in one plane",
+                    file_.name(), why));
+  }
+  const double least = kRounding * description.gravity.norm();
+  if (std::abs(plane->gravity_dropped) > least) {
+    Note(elements_[kGround], fmt::format("gravity of {:.6g} m/s^2 along the normal of the plane "
+                                         "dropped: it moves nothing",
+                                         plane->gravity_dropped));
+  }
+  description = plane->description;
+  description.gravity =
+      description.gravity.unaryExpr([=](double g) { return std::abs(g) <= least ? 0.0 : g; });
+}
+
+// Angles and directions that files give with few digits: 1.5708 for a quarter turn.
+//
+// Loops close, and their redundant constraints are found, to round-off only where such numbers are
+// exact. A number stands for an exact one if it is that, rounded or cut off at its last digit.
+
+namespace {
+
+using std::numbers::pi;
+using List = std::vector<double>;
+
+/// One in the last digit of a number.
+double UnitOf(const std::string& word) {
+  const std::size_t end = std::min(word.find_first_of("eE"), word.size());
+  const std::size_t point = word.find('.');
+  const double decimals = point < end ? static_cast<double>(end - point - 1) : 0.0;
+  const double power = end < word.size() ? std::strtod(word.c_str() + end + 1, nullptr) : 0.0;
+  return std::pow(10.0, power - decimals);
+}
+
+constexpr double kRoundOff = 4.0 * std::numeric_limits<double>::epsilon();  // of a few products
+/// Largest error of directions and quaternions that are rounded. Programs compute them from angles
+/// such as 3.1416 and 1.5708, which are wrong by 7.4e-6 and 3.7e-6 rad.
+constexpr double kLean = 1e-5;
+
+/// `unit`: one in its last digit.
+bool Rounds(double number, double unit, double exact) {
+  // Two decimals are enough for right angles (1.57, 3.14), three for others. Numbers of more than
+  // 14 are as exact as doubles.
+  const bool is_right = std::abs(std::remainder(exact, 0.5 * pi)) <= kRoundOff;
+  if (unit > (is_right ? 2e-2 : 2e-3) || unit < 5e-15) return false;
+  const double cut_off = std::copysign(1.0, exact) * (exact - number);
+  constexpr double kHalf = 0.5 + 1e-6;  // both neighbours of a five round it
+  return cut_off >= -kHalf * unit && cut_off < unit;
+}
+
+/// A multiple of pi/12, hence also of pi/4 and pi/6.
+double NearestAngle(double angle) { return std::round(12.0 * angle / pi) / 6.0 * (0.5 * pi); }
+
+/// The nearest unit vector whose squared elements are multiples of 1/12: multiples of pi/4 and pi/6
+/// in a plane of two axes, and diagonals. Returns the given numbers if none is within kLean.
+List NearestDirection(const List& v) {
+  List exact;
+  double sum = 0.0;
+  for (const double element : v) {
+    const double twelfths = std::round(12.0 * element * element);
+    exact.push_back(std::copysign(std::sqrt(twelfths / 12.0), element));
+    sum += twelfths;
+  }
+  return sum == 12.0 ? exact : v;
+}
+
+/// The nearest quaternion (w, x, y, z) of rotations about x, then y, then z by multiples of pi/12.
+List NearestQuaternion(const List& q) {
+  const double w = q[0], x = q[1], y = q[2], z = q[3], norm2 = w * w + x * x + y * y + z * z;
+  if (!(norm2 > 0.0)) return q;
+  const double sine = std::clamp(2.0 * (w * y - z * x) / norm2, -1.0, 1.0);
+  constexpr double kUpright = 0.999;  // there, one of the turns about x and z is free
+  Eigen::Vector3d angles(0.0, std::asin(sine), -std::copysign(2.0, sine) * std::atan2(x, w));
+  if (std::abs(sine) < kUpright) {
+    angles.x() = std::atan2(2.0 * (w * x + y * z), norm2 - 2.0 * (x * x + y * y));
+    angles.z() = std::atan2(2.0 * (w * z + x * y), norm2 - 2.0 * (y * y + z * z));
+  }
+  const Eigen::Quaterniond turn = FromRollPitchYaw(angles.unaryExpr(&NearestAngle));
+  const double dot = turn.w() * w + turn.x() * x + turn.y() * y + turn.z() * z;
+  const double sign = dot < 0.0 ? -1.0 : 1.0;
+  return {sign * turn.w(), sign * turn.x(), sign * turn.y(), sign * turn.z()};
+}
+
+List Nearest(char kind, List v) {
+  if (kind == 'a') return {NearestAngle(v[0])};
+  if (kind == 'd') return NearestDirection(v);
+  if (kind == 'q') return NearestQuaternion(v);
+  if (kind != 'r') return v;
+  std::ranges::rotate(v, v.begin() + 3);
+  v = NearestQuaternion(v);
+  std::ranges::rotate(v, v.begin() + 1);
+  return v;
+}
+
+std::size_t CountOf(char kind) { return kind == 'd' ? 3 : kind == 'q' || kind == 'r' ? 4 : 1; }
+
+}  // namespace
+
+List ImportDraft::Numbers(const XmlValue& value, std::string_view kinds) {
+  std::size_t count = 0;
+  for (const char kind : kinds) count += CountOf(kind);
+  List numbers = value.Numbers(count, count);
+  if (options_.keeps_digits) return numbers;
+  std::istringstream text(value.text());
+  std::optional<std::string> shown;
+  auto at = numbers.begin();
+  for (const char kind : kinds) {
+    const List given(at, at + static_cast<std::ptrdiff_t>(CountOf(kind)));
+    const List exact = Nearest(kind, given);
+    const double least = given.size() > 1 ? kLean : kRoundOff;
+    bool stands = true;
+    std::string word, differs;
+    for (std::size_t i = 0; i < given.size() && text >> word; ++i) {
+      const double off = std::abs(given[i] - exact[i]);
+      stands = stands && (off <= least || Rounds(given[i], UnitOf(word), exact[i]));
+      if (off > kRoundOff && differs.empty()) {
+        differs = fmt::format("{} is taken as {}", given[i], exact[i]);
+      }
+    }
+    stands = stands && !differs.empty();
+    at = std::ranges::copy(stands ? exact : given, at).out;
+    if (stands && !shown) shown = differs;
+  }
+  if (shown && rounded_++ == 0) {
+    rounded_note_ = notes_.size();
+    Note(value.element(), value.attribute(), *shown);
+  }
+  return numbers;
+}
+
+Eigen::Vector3d ImportDraft::Vector(const XmlValue& value, std::string_view kinds) {
+  const List numbers = Numbers(value, kinds);
+  return {numbers[0], numbers[1], numbers[2]};
 }
 
 }  // namespace loopbench::harness

@@ -1,10 +1,72 @@
-#include "harness/exchange/import_sdf.h"
-
 #include <fmt/format.h>
 
+#include <algorithm>
 #include <charconv>
+#include <cmath>
+#include <map>
+#include <memory>
+#include <numbers>
+#include <string>
+#include <vector>
+
+#include "harness/exchange/import_draft.h"
 
 namespace loopbench::harness {
+// SDF (sdformat.org, versions 1.4 to 1.12): what its parts share.
+//
+// Internal to import_sdf*.cpp.
+
+/// Something with a pose: a link, joint, frame or nested model.
+struct SdfFrame {
+  XmlElement element;
+  Placement raw;                 ///< as the file says it
+  std::string relative_to;       ///< a name in the same scope; "" for the scope's own frame
+  std::string attached_to;       ///< of a frame and of a joint: what it moves with
+  bool is_raw_to_child = false;  ///< of a joint: raw is in the frame of its child
+};
+
+/// A world or a model: what it has by name, each in its own frame.
+class SdfScope {
+ public:
+  SdfScope(XmlElement element_, std::string prefix_, bool is_static_)
+      : element(std::move(element_)), prefix(std::move(prefix_)), is_static(is_static_) {}
+
+  XmlElement element;
+  std::string prefix;  ///< of names of bodies and joints: "arm::"
+  bool is_static;
+  std::map<std::string, SdfFrame> frames;
+  std::map<std::string, std::unique_ptr<SdfScope>> models;  ///< nested; each has a frame too
+  Placement at_rest;                                        ///< in ground axes
+
+  /// A link's scope and its name there; no scope for the world.
+  using Link = std::pair<const SdfScope*, std::string>;
+
+  /// Refuses a name that is in use here.
+  void Add(const std::string& name, SdfFrame frame);
+  /// Where the frame of that name is, in this scope's. `user` is who asks.
+  Placement Resolve(const std::string& name, const XmlElement& user) const;
+  /// The link that a link, frame or model moves with.
+  Link LinkOf(const std::string& name, const XmlElement& user) const;
+  bool is_world() const { return element.tag() != "model"; }
+
+ private:
+  // answers, so that a chain of frames is followed once
+  mutable std::map<std::string, Placement> resolved_;
+  mutable std::map<std::string, Link> links_;
+};
+
+struct SdfVersion {
+  int minor = 0;  ///< of 1.x
+};
+
+/// <pose> of an element, and what it is relative to.
+SdfFrame ReadSdfPose(const XmlElement& element, SdfVersion version, ImportDraft* draft);
+/// A <joint> between links that are bodies already, with their numbers by full name.
+void ReadSdfJoint(const XmlElement& element, const std::string& name, const SdfScope& scope,
+                  SdfVersion version, ImportDraft* draft);
+/// <inertial>, and what else a link says about itself.
+void ReadSdfLink(const XmlElement& element, int body, bool is_static, SdfVersion version,
+                 ImportDraft* draft);
 
 namespace {
 
@@ -15,37 +77,21 @@ constexpr DroppedReason kSdfReasons[] = {
     {"visual", "shapes do not move anything"},
     {"collision", "there is no contact"},
     {"sensor", "there are no sensors"},
-    {"audio_source", ""},
-    {"audio_sink", ""},
-    {"light", ""},
-    {"projector", ""},
-    {"particle_emitter", ""},
-    {"battery", ""},
-    {"scene", ""},
-    {"gui", ""},
-    {"audio", ""},
     {"physics", "runs choose their own integrator and steps"},
-    {"atmosphere", "there is no medium"},
-    {"wind", "there is no medium", true},
-    {"magnetic_field", ""},
-    {"spherical_coordinates", ""},
-    {"self_collide", ""},
-    {"allow_auto_disable", ""},
-    {"enable_wind", "there is no medium"},
-    {"must_be_base_link", ""},
+    {"atmosphere enable_wind", "there is no medium"},
+    {"wind fluid_added_mass", "there is no medium", true},
     {"velocity_decay", "there is no medium: a force would have to say it", true},
     {"kinematic", "bodies move as forces make them", true},
-    {"fluid_added_mass", "there is no medium", true},
     {"mimic", "no joint follows another: a freedom more than in the file", true},
     {"plugin", "there are no plugins", true},
     {"state", "the start is that of the poses", true},
     {"actor", "actors are no mechanism"},
-    {"road", ""},
     {"population", "it makes models while it runs", true},
-    {"gripper", "", true},
-    {"link@name", ""},
-    {"model@canonical_link", ""},
-    {"sdf@version", ""}};
+    // nothing to say
+    {"audio_source audio_sink light projector particle_emitter battery scene gui audio "
+     "magnetic_field spherical_coordinates self_collide allow_auto_disable must_be_base_link "
+     "road gripper link@name model@canonical_link sdf@version",
+     ""}};
 
 SdfVersion ReadVersion(const XmlElement& root) {
   const XmlValue value = root.Required("version", "1.4 to 1.12");
@@ -219,6 +265,357 @@ void ReadSdf(const XmlElement& root, ImportDraft* draft) {
   ReadLinks(&scope, version, draft);
   ReadJoints(scope, version, draft);
   draft->NoteUnread(kSdfReasons);
+}
+
+// Frames of SDF: who stands where, and what moves with what.
+
+namespace {
+
+constexpr std::string_view kOwn = "__model__";
+constexpr std::string_view kSdfWorld = "world";
+constexpr std::string_view kWithin = "::";
+
+bool IsOwn(const std::string& name, const SdfScope& scope) {
+  return name.empty() || name == kOwn || (scope.is_world() && name == kSdfWorld);
+}
+
+[[noreturn]] void FailToFind(const std::string& name, const XmlElement& user) {
+  user.Fail(fmt::format("the frame \"{}\", which is not there", name),
+            "a link, joint, frame or nested model of the same model");
+}
+
+/// "arm::hand" as the model "arm" and "hand".
+const SdfScope* NestedScope(const SdfScope& scope, const std::string& name, std::string* rest) {
+  const std::size_t cut = name.find(kWithin);
+  if (cut == std::string::npos) return nullptr;
+  const auto found = scope.models.find(name.substr(0, cut));
+  if (found == scope.models.end()) return nullptr;
+  *rest = name.substr(cut + kWithin.size());
+  return found->second.get();
+}
+
+}  // namespace
+
+SdfFrame ReadSdfPose(const XmlElement& element, SdfVersion version, ImportDraft* draft) {
+  SdfFrame frame{element, {}, "", ""};
+  const auto pose = element.Child("pose");
+  if (!pose) return frame;
+  if (const auto old = pose->Attribute("frame"); old && !old->text().empty()) {
+    old->Fail("none: what it means was said only from 1.7 on, as relative_to");
+  }
+  if (const auto relative = pose->Attribute("relative_to"); relative && !relative->text().empty()) {
+    if (version.minor < 7) relative->Fail("none before version 1.7");
+    frame.relative_to = relative->Name();
+  }
+  const auto degrees = pose->Attribute("degrees");
+  const bool in_degrees = degrees && degrees->Bool();
+  const auto format = pose->Attribute("rotation_format");
+  const bool quaternion = format && format->Choice({"euler_rpy", "quat_xyzw"}) == 1;
+  const XmlValue content = pose->Content();
+  if (content.text().empty()) return frame;
+  const std::vector<double> p = draft->Numbers(content, quaternion   ? "nnnr"
+                                                        : in_degrees ? "nnnnnn"
+                                                                     : "nnnaaa");
+  frame.raw.p = {p[0], p[1], p[2]};
+  if (quaternion) {
+    frame.raw.q = UnitQuaternion(content, {p[6], p[3], p[4], p[5]});
+  } else {
+    frame.raw.q =
+        FromRollPitchYaw((in_degrees ? kDegree : 1.0) * Eigen::Vector3d(p[3], p[4], p[5]));
+  }
+  return frame;
+}
+
+void SdfScope::Add(const std::string& name, SdfFrame frame) {
+  const auto known = frames.find(name);
+  if (known != frames.end()) {
+    frame.element.Fail(
+        fmt::format("a second \"{}\"", name),
+        fmt::format("a name that is not in use (line {} has it)", known->second.element.line()));
+  }
+  frames.emplace(name, std::move(frame));
+}
+
+Placement SdfScope::Resolve(const std::string& name, const XmlElement& user) const {
+  // frames that stand in each other, up to one that is known
+  std::vector<std::pair<std::string, Placement>> chain;
+  Placement X;
+  std::string here = name;
+  while (!IsOwn(here, *this)) {
+    if (const auto known = resolved_.find(here); known != resolved_.end()) {
+      X = known->second;
+      break;
+    }
+    // no chain without a cycle has more than each frame and a name within each model
+    if (chain.size() > 2 * frames.size()) {
+      user.Fail("frames that are relative to each other", "no cycle");
+    }
+    std::string rest, next = here.substr(0, here.find(kWithin));
+    if (const SdfScope* nested = NestedScope(*this, here, &rest)) {
+      chain.emplace_back(here, nested->Resolve(rest, user));
+    } else {
+      const auto found = frames.find(here);
+      if (found == frames.end()) FailToFind(here, user);
+      chain.emplace_back(here, found->second.raw);
+      next = found->second.relative_to;
+    }
+    here = next;
+  }
+  for (auto link = chain.rbegin(); link != chain.rend(); ++link) {
+    X = X * link->second;
+    resolved_.emplace(link->first, X);
+  }
+  return X;
+}
+
+SdfScope::Link SdfScope::LinkOf(const std::string& name, const XmlElement& user) const {
+  std::vector<std::string> chain;  // each attached to the next
+  std::string here = name;
+  std::optional<Link> link;
+  while (!link) {
+    if (const auto known = links_.find(here); known != links_.end()) {
+      link = known->second;
+      break;
+    }
+    if (chain.size() > frames.size() + 1) {
+      user.Fail("frames that are attached to each other", "no cycle");
+    }
+    chain.push_back(here);
+    std::string rest;
+    if (const SdfScope* nested = NestedScope(*this, here, &rest)) {
+      link = nested->LinkOf(rest, user);
+    } else if (IsOwn(here, *this) && is_world()) {
+      link = Link{nullptr, ""};
+    } else if (IsOwn(here, *this)) {
+      // a model moves with its canonical link, the first one unless it names another
+      const auto canonical = element.Attribute("canonical_link");
+      const std::vector<XmlElement> links = element.Children("link");
+      if (canonical && !canonical->text().empty()) {
+        here = canonical->text();
+      } else if (links.empty()) {
+        user.Fail(fmt::format("the model of \"{}\" without a link", name), "one");
+      } else {
+        here = links[0].Required("name", "a name").Name();
+      }
+    } else {
+      const auto found = frames.find(here);
+      if (found == frames.end()) FailToFind(here, user);
+      const std::string tag = found->second.element.tag();
+      if (tag == "link") link = Link{this, here};
+      if (tag == "model") link = models.at(here)->LinkOf("", user);
+      here = found->second.attached_to;
+    }
+  }
+  for (const std::string& attached : chain) links_.emplace(attached, *link);
+  return *link;
+}
+
+// Joints of SDF.
+
+namespace {
+
+using Eigen::Vector3d;
+
+constexpr double kPerpendicular = 1e-9;  // cosine that rounding of nine digits leaves
+constexpr double kNoLimit = 1e15;        // the defaults are 1e16 and infinity
+
+/// The axis in the joint's frame. Before 1.5 it was in the model's.
+Vector3d ReadAxis(const XmlElement& axis, const SdfScope& scope, const Placement& X_model_joint,
+                  SdfVersion version, ImportDraft* draft) {
+  Vector3d xyz = Vector3d::UnitZ();
+  std::string frame;
+  bool in_joint = version.minor >= 5;
+  if (const auto given = axis.Child("xyz")) {
+    xyz = draft->Vector(given->Content(), "d");
+    if (!(xyz.norm() > 0.0)) given->Fail("an axis of length 0", "one that is not zero");
+    if (const auto expressed = given->Attribute("expressed_in")) {
+      if (!expressed->text().empty()) {
+        frame = expressed->Name();
+        in_joint = false;
+      }
+    }
+  }
+  if (const auto flag = axis.Child("use_parent_model_frame")) {
+    if (flag->Content().Bool()) in_joint = false;
+  }
+  if (in_joint) return xyz;
+  return X_model_joint.q.conjugate() * (scope.Resolve(frame, axis).q * xyz);
+}
+
+void NoteLimits(const XmlElement& axis, ImportDraft* draft) {
+  const auto limit = axis.Child("limit");
+  if (!limit) return;
+  bool ends = false;
+  for (const char* name : {"lower", "upper"}) {
+    const auto bound = limit->Child(name);
+    if (!bound) continue;
+    const XmlValue value = bound->Content();
+    const bool is_infinite = value.text().find("inf") != std::string::npos;
+    ends = ends || (!is_infinite && std::abs(value.Number()) < kNoLimit);
+  }
+  limit->Ignore();
+  if (ends) draft->Note(*limit, "dropped: joints turn and slide without ends", true);
+}
+
+/// Where a joint starts: a coordinate for each of its own axes, 0 where the file says none.
+void ReadStart(const std::vector<XmlElement>& axes, std::size_t num_own, ImportDraft* draft) {
+  std::vector<double> values(num_own);
+  for (std::size_t i = 0; i < axes.size(); ++i) {
+    const auto start = axes[i].Child("initial_position");
+    const double value = start ? start->Content().Number() : 0.0;
+    if (i < num_own) {
+      values[i] = value;
+    } else if (value != 0.0) {
+      draft->Note(*start, "dropped: the joint has no coordinate of this axis", true);
+    }
+  }
+  const bool moves = std::ranges::any_of(values, [](double value) { return value != 0.0; });
+  if (moves) draft->description.initial.coordinates.push_back({draft->last_joint(), values});
+}
+
+/// Spring and damper of one axis; `has_one`: it is the only one of the joint.
+void ReadDynamics(const XmlElement& axis, bool has_one, ImportDraft* draft) {
+  NoteLimits(axis, draft);
+  const int joint = draft->last_joint();
+  const auto dynamics = axis.Child("dynamics");
+  if (!dynamics) return;
+  const auto number = [&](const char* name, const Range& range) {
+    const auto child = dynamics->Child(name);
+    return child ? child->Content().Number(range) : 0.0;
+  };
+  const double c = number("damping", kNotNegative), k = number("spring_stiffness", kNotNegative);
+  const double rest = number("spring_reference", {}), friction = number("friction", {});
+  if (friction != 0.0) {
+    draft->Note(*dynamics, "friction", "dropped: dry friction is no force of mechanism files",
+                true);
+  }
+  if (!has_one && (c > 0.0 || k > 0.0)) {
+    draft->Note(*dynamics, "dropped: only joints with one coordinate have springs and dampers",
+                true);
+    return;
+  }
+  if (k > 0.0) draft->description.forces.emplace_back(JointSpring{joint, k, rest, 0.0});
+  if (c > 0.0) draft->description.forces.emplace_back(JointDamper{joint, c});
+}
+
+/// What both axes say but for their directions. Those that are the joint's own stand first:
+/// `num_own` is 1 of most, 2 of universal joints, 0 of balls.
+void ReadAxisForces(const std::optional<XmlElement>& axis, const std::optional<XmlElement>& axis2,
+                    std::size_t num_own, ImportDraft* draft) {
+  std::vector<XmlElement> axes;
+  for (const auto& one : {axis, axis2}) {
+    if (one) axes.push_back(*one);
+  }
+  for (std::size_t i = 0; i < axes.size(); ++i) {
+    ReadDynamics(axes[i], num_own == 1 && i == 0, draft);
+  }
+  ReadStart(axes, num_own, draft);
+}
+
+/// Advance per angle [m/rad]. thread_pitch is in rad/m, and positive for a left-handed thread;
+/// screw_thread_pitch, from 1.10 on, in m per turn, and positive for a right-handed one.
+double ReadPitch(const XmlElement& joint) {
+  const auto old = joint.Child("thread_pitch");
+  if (const auto pitch = joint.Child("screw_thread_pitch")) {
+    if (old) old->Content().Number();
+    return pitch->Content().Number() / (2.0 * std::numbers::pi);
+  }
+  if (!old) joint.Fail("no pitch", "<screw_thread_pitch> or <thread_pitch>");
+  const double turns = old->Content().Number();
+  if (turns == 0.0) old->Fail("a pitch of 0 rad/m", "one that is not 0");
+  return -1.0 / turns;
+}
+
+const std::vector<std::string>& SdfTypes() {
+  static const std::vector<std::string> names = {"revolute",  "continuous", "prismatic",
+                                                 "screw",     "ball",       "fixed",
+                                                 "universal", "revolute2",  "gearbox"};
+  return names;
+}
+
+JointType TypeOfSdf(std::size_t index) {
+  constexpr JointType kTypes[] = {
+      JointType::kRevolute,  JointType::kRevolute, JointType::kPrismatic, JointType::kHelical,
+      JointType::kSpherical, JointType::kWeld,     JointType::kUniversal, JointType::kUniversal};
+  return kTypes[index];
+}
+
+/// The body that a parent or child moves with, and where it stands in ground axes.
+struct JointEnd {
+  int body = kGround;
+  Placement at_rest;
+};
+
+JointEnd EndOf(const XmlElement& side, const SdfScope& scope, const ImportDraft& draft) {
+  const std::string name = side.Content().Name();
+  if (name == "world") return {};
+  const auto [owner, link] = scope.LinkOf(name, side);
+  if (owner == nullptr) return {};
+  const int body = draft.BodyNamed(owner->prefix + link, side);
+  return {body, draft.at_rest[static_cast<std::size_t>(body)]};
+}
+
+/// x along the first axis, y along the second.
+Eigen::Quaterniond UniversalAxes(const XmlElement& joint, Vector3d first, Vector3d second) {
+  first.normalize();
+  second.normalize();
+  if (std::abs(first.dot(second)) > kPerpendicular) {
+    joint.Fail(fmt::format("axes {:.6g} degrees apart",
+                           std::acos(first.dot(second)) * 180.0 / std::numbers::pi),
+               "perpendicular ones: others need a body with mass between them");
+  }
+  Eigen::Matrix3d R;
+  R << first, second, first.cross(second);
+  return Eigen::Quaterniond(R);
+}
+
+}  // namespace
+
+void ReadSdfJoint(const XmlElement& element, const std::string& name, const SdfScope& scope,
+                  SdfVersion version, ImportDraft* draft) {
+  const std::size_t index = element.Required("type", "a joint type").Choice(SdfTypes());
+  const XmlElement parent = element.RequiredChild("parent"), child = element.RequiredChild("child");
+  if (SdfTypes()[index] == "gearbox") {
+    element.Ignore();
+    draft->Note(element, "dropped: no joint follows another: a freedom more than in the file",
+                true);
+    return;
+  }
+  const JointEnd P = EndOf(parent, scope, *draft), Q = EndOf(child, scope, *draft);
+  if (P.body == Q.body) element.Fail("parent and child that are one body", "two different bodies");
+  const SdfFrame& frame = scope.frames.at(element.Required("name", "a name").Name());
+  const Placement X_model_joint = scope.Resolve(element.Required("name", "a name").Name(), element);
+  const Placement X_rest = scope.at_rest * X_model_joint;
+  // as the file says it, to the last bit, where the child is a link and no frame on one
+  const auto named = scope.frames.find(frame.attached_to);
+  const bool is_raw = frame.is_raw_to_child && Q.body != kGround && named != scope.frames.end() &&
+                      named->second.element.tag() == "link";
+  Placement X_QM = is_raw ? frame.raw : Q.at_rest.Inverse() * X_rest;
+  const JointType type = TypeOfSdf(index);
+  Placement X_PF = P.at_rest.Inverse() * (is_raw ? Q.at_rest * X_QM : X_rest);
+  const auto axis = element.Child("axis"), axis2 = element.Child("axis2");
+  const bool has_axis = TraitsOf(type).own_axis != '-' || type == JointType::kUniversal;
+  if (has_axis && !axis) element.Fail("no <axis>", "one");
+  Vector3d own = Vector3d::Zero();
+  if (axis && has_axis) own = ReadAxis(*axis, scope, X_model_joint, version, draft);
+  if (type == JointType::kUniversal) {
+    if (!axis2) element.Fail("no <axis2>", "one");
+    const Eigen::Quaterniond q =
+        UniversalAxes(element, own, ReadAxis(*axis2, scope, X_model_joint, version, draft));
+    X_QM.q = X_QM.q * q;
+    X_PF.q = X_PF.q * q;
+  }
+  JointDescription& joint =
+      draft->AddJoint(draft->NewJointName(element, name), type, P.body, X_PF, Q.body, X_QM);
+  if (TraitsOf(type).own_axis != '-') joint.axis = own;
+  if (type == JointType::kHelical) joint.parameter = ReadPitch(element);
+  if (const auto physics = element.Child("physics")) {
+    const auto simbody = physics->Child("simbody");
+    const auto loop = simbody ? simbody->Child("must_be_loop_joint") : std::nullopt;
+    if (loop) joint.cut = loop->Content().Bool();
+    physics->Ignore();
+  }
+  ReadAxisForces(axis, axis2, type == JointType::kUniversal ? 2 : has_axis ? 1 : 0, draft);
 }
 
 }  // namespace loopbench::harness

@@ -12,10 +12,7 @@ constexpr double kGravity = 9.81;  // [m/s^2]: URDF does not say any
 constexpr DroppedReason kUrdfReasons[] = {
     {"visual", "shapes do not move anything"},
     {"collision", "there is no contact"},
-    {"material", ""},
-    {"robot@version", ""},
     {"mujoco", "it is for another program"},
-    {"link@type", ""},
     {"limit", "joints turn and slide without ends", true},
     {"mimic", "no joint follows another: this is a freedom more than in the file", true},
     {"safety_controller", "there is no controller"},
@@ -23,7 +20,9 @@ constexpr DroppedReason kUrdfReasons[] = {
     {"transmission", "there are no actuators"},
     {"gazebo", "it is for another program; loops in it belong in a sidecar (--loops)", true},
     {"sensor", "there are no sensors"},
-    {"dynamics@friction", "dry friction is no force of mechanism files", true}};
+    {"dynamics@friction", "dry friction is no force of mechanism files", true},
+    // nothing to say
+    {"material robot@version link@type", ""}};
 
 Placement OriginOf(const XmlElement& element, ImportDraft* draft) {
   Placement X;

@@ -8,7 +8,8 @@
 #include <cmath>
 #include <unordered_set>
 
-#include "harness/text/config_error.h"
+#include "harness/text/files.h"
+#include "harness/text/words.h"
 
 namespace loopbench::harness {
 
@@ -21,16 +22,7 @@ struct XmlDocument {
 
 namespace {
 
-constexpr std::size_t kLongestShown = 60;  // characters of a value in a message
-
-std::string Shortened(std::string text) {
-  if (text.size() <= kLongestShown) return text;
-  std::size_t end = kLongestShown;  // not within a character of UTF-8
-  while (end > 0 && (static_cast<unsigned char>(text[end]) & 0xC0u) == 0x80u) --end;
-  return text.substr(0, end) + "...";
-}
-
-std::string Quoted(const std::string& text) { return '"' + Shortened(text) + '"'; }
+std::string Quoted(const std::string& text) { return '"' + Abbreviated(text) + '"'; }
 
 /// What is no UTF-8 would garble messages and cannot be written as JSON: numeric references of XML
 /// can make it of a file that is.
@@ -38,7 +30,7 @@ bool IsText(std::string_view text) { return EncodingFault(text).empty(); }
 
 std::string ShownElement(const tinyxml2::XMLElement& element) {
   const char* name = element.Attribute("name");
-  std::string shown = "<" + Shortened(element.Name());
+  std::string shown = "<" + Abbreviated(element.Name());
   if (name != nullptr && IsText(name)) shown += " name=" + Quoted(name);
   return shown + ">";
 }
@@ -46,7 +38,7 @@ std::string ShownElement(const tinyxml2::XMLElement& element) {
 [[noreturn]] void FailAt(const XmlDocument& document, const tinyxml2::XMLElement& element,
                          const std::string& attribute, std::string_view found,
                          std::string_view expected) {
-  const std::string where = attribute.empty() ? "" : " " + Shortened(attribute);
+  const std::string where = attribute.empty() ? "" : " " + Abbreviated(attribute);
   throw ConfigError(
       Printable(fmt::format("{}:{}: {}{}: found {}, expected {}", document.file,
                             element.GetLineNum(), ShownElement(element), where, found, expected)));
@@ -158,8 +150,7 @@ double XmlValue::Number(const Range& range) const {
 std::vector<double> XmlValue::Numbers(std::size_t least, std::size_t most) const {
   const std::vector<std::string_view> words = Words(text_);
   if (words.size() < least || words.size() > most) {
-    Fail(least == most ? fmt::format("{} number{}", least, least == 1 ? "" : "s")
-                       : fmt::format("{} to {} numbers", least, most));
+    Fail(least == most ? WithCount(least, "number") : fmt::format("{} to {} numbers", least, most));
   }
   std::vector<double> numbers;
   for (const std::string_view word : words) numbers.push_back(OneNumber(word));

@@ -1,13 +1,18 @@
-// A scale of a figure: its range, the places of values on it, and its ticks.
+// Axes, and the points that are drawn along them.
 #pragma once
 
 #include <algorithm>
 #include <cmath>
+#include <cstddef>
 #include <limits>
+#include <span>
 #include <string>
+#include <utility>
 #include <vector>
 
 namespace loopbench::harness {
+
+// A scale of a figure: its range, the places of values on it, and its ticks.
 
 /// Numbers as all figures have them: plain from 0.01 to 99999, else with powers of ten, "2.5·10⁻⁶".
 std::string NumberText(double value);
@@ -54,5 +59,35 @@ struct Tick {
 /// powers of ten has these, a shorter one 1, 2 and 5 or other digits of each decade. A linear axis
 /// has multiples of 1, 2 or 5 of a power of ten.
 std::vector<Tick> Ticks(const Axis& axis, int most);
+
+// What of a curve's points is drawn, and which curves are drawn as one.
+
+/// A place in a drawing [pt], or a pair of values.
+using Point = std::pair<double, double>;
+
+/// Two axes and the size of the rectangle that they span [pt].
+struct PlotArea {
+  Axis x, y;
+  double width = 0.0, height = 0.0;
+
+  bool CanShow(const Point& point) const {
+    return x.CanShow(point.first) && y.CanShow(point.second);
+  }
+  Point Place(const Point& point) const {
+    return {width * x.Place(point.first), height * y.Place(point.second)};
+  }
+};
+
+/// The width of a curve [pt], a third of a millimetre: what is nearer cannot be told apart.
+inline constexpr double kDrawnWidth = 1.0;
+
+/// Of each column as wide as a third of a curve the first and the last point, the lowest and the
+/// highest: what is left out lies between points that are kept. Points need not be in order of x.
+std::vector<Point> Decimated(const PlotArea& area, std::span<const Point> points);
+
+/// Whether every point of each lies within a drawn width of the other's line, or of its points if
+/// no line joins them. Points in the order of x.
+bool Coincide(const PlotArea& area, std::span<const Point> one, std::span<const Point> other,
+              bool joined = true);
 
 }  // namespace loopbench::harness

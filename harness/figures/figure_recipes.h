@@ -1,15 +1,20 @@
-// Which figures are made of records: motion, drift, and drift through singular positions. What
-// they contain decides, never a name.
+// The standard figures of a store, and figures of precision runs and trajectories.
 #pragma once
 
+#include <filesystem>
+#include <optional>
 #include <span>
 #include <string>
 #include <vector>
 
 #include "harness/figures/figures.h"
 #include "harness/record/record.h"
+#include "harness/trajectory/check.h"
 
 namespace loopbench::harness {
+
+// Which figures are made of records: motion, drift, and drift through singular positions. What
+// they contain decides, never a name.
 
 /// A figure and the name of its file without extension.
 struct NamedFigure {
@@ -24,7 +29,7 @@ struct NamedFigure {
 Figure MotionFigure(const Record& record);
 
 /// Drift [m] of several runs of one mechanism against time on logarithmic axes: "series.drift", the
-/// running maximum, against "series.drift_t", each run as channels.h has it. At its end stands the
+/// running maximum, against "series.drift_t", each run as figures.h has it. At its end stands the
 /// fitted power with its spread, and a '?' when it is not resolved; a thin line through the data
 /// shows a resolved one over the window that it was fitted in. A run that failed ends in a cross,
 /// with its outcome.
@@ -39,5 +44,24 @@ Figure SingularFigure(std::span<const Record> records);
 /// positions where a run of them came near one. Runs that differ in integrator, experiment or a
 /// parameter have figures of their own, with its value in their names.
 std::vector<NamedFigure> AllFigures(std::span<const Record> records);
+
+// Error and drift of runs in several scalars, against tolerance.
+
+/// For each ladder error (lines) and drift (dashes) against tolerance, one colour per scalar. Runs
+/// that failed are crosses at the lower edge.
+std::vector<NamedFigure> PrecisionFigures(std::span<const Record> records);
+
+// Two trajectories beside each other: both above, their difference below.
+
+/// Both panels; columns that coincide are one curve. `columns` have one unit.
+Figure TrajectoryFigure(const Trajectory& ours, const Trajectory& theirs,
+                        std::span<const SharedColumn> columns, const std::string& title);
+
+/// Draws them; nothing on success, else the reason (figures.h).
+[[nodiscard]] std::optional<std::string> DrawTrajectories(const std::filesystem::path& path,
+                                                          const Trajectory& ours,
+                                                          const Trajectory& theirs,
+                                                          std::span<const SharedColumn> columns,
+                                                          const std::string& title);
 
 }  // namespace loopbench::harness

@@ -1,13 +1,18 @@
-// Figures as SVG or PDF, drawn by gnuplot in the size in which they are printed.
+// Figures as data, and how methods look in all of them.
 #pragma once
 
 #include <filesystem>
 #include <optional>
+#include <span>
 #include <string>
 #include <utility>
 #include <vector>
 
+#include "harness/record/record.h"
+
 namespace loopbench::harness {
+
+// Figures as SVG or PDF, drawn by gnuplot in the size in which they are printed.
 
 /// Marks on a curve.
 enum class Shape { kNone, kCircle, kTriangle, kSquare, kDiamond, kTriangleDown };
@@ -16,7 +21,7 @@ enum class Shape { kNone, kCircle, kTriangle, kSquare, kDiamond, kTriangleDown }
 /// dashes.
 inline constexpr std::size_t kDashes = 6;
 
-/// How a curve looks, one attribute per property of what it shows (channels.h). The defaults are a
+/// How a curve looks, one attribute per property of what it shows (figures.h). The defaults are a
 /// black line.
 struct CurveStyle {
   std::string color = "#000000";
@@ -88,7 +93,7 @@ inline constexpr std::size_t kLegendRows = 6;
 /// The width of a drawing: one or two columns of a journal, 85 mm or 178 mm. Letters have 8 pt.
 enum class FigureSize { kOneColumn, kTwoColumn };
 
-/// Curves of a panel as they are drawn. Curves that coincide (drawn_points.h) are one curve, black,
+/// Curves of a panel as they are drawn. Curves that coincide (axis.h) are one curve, black,
 /// and solid and unmarked where they differ in colour, dash or mark. Its label is "odca = lagrange,
 /// joint", with "all" for all values of the panel. Doubtful curves are not drawn as one with
 /// others, and curves that end early with none. Points keep hollow marks, and crosses their
@@ -112,5 +117,33 @@ FigureScript GnuplotScript(const Figure& figure, FigureSize size = FigureSize::k
                                                      const Figure& figure,
                                                      FigureSize size = FigureSize::kTwoColumn,
                                                      const std::string& gnuplot = "gnuplot");
+
+// How runs look in all figures: one channel of a curve for each property of a method.
+//
+// | channel | property |
+// |---|---|
+// | colour | formulation (FormulationRow::color) |
+// | dashes | level of enforcement: solid acceleration, long dashes velocity, dots position, ... |
+// | marks | coordinates: circles joint, triangles absolute |
+// | width | solver: thin as published, else thick |
+// | hollow marks | in doubt |
+
+/// The keys of records that have a channel, in the order of labels.
+inline constexpr const char* kChannelKeys[] = {"formulation", "enforcement", "coordinates",
+                                               "solver"};
+
+CurveStyle StyleOf(const Record& record);
+
+/// The values of those channel keys that vary among `all`: "odca, joint". The formulation if none
+/// does.
+std::string MethodLabel(const Record& record, std::span<const Record> all);
+
+/// What colours, dashes, marks and widths mean, of the values that `records` have: a row for
+/// formulations, one for levels, one for coordinates and solvers; of levels, coordinates and
+/// solvers only where they vary.
+std::vector<LegendRow> ChannelLegend(std::span<const Record> records);
+
+/// Whether the values of a key differ.
+bool Varies(std::span<const Record> records, const std::string& key);
 
 }  // namespace loopbench::harness

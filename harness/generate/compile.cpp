@@ -14,12 +14,11 @@
 #include <sstream>
 #include <vector>
 
-#include "harness/generate/pose_sines.h"
+#include "harness/generate/graph.h"
 #include "harness/generate/record.h"
 #include "harness/text/files.h"
 #include "harness/text/hash.h"
 #include "harness/text/run_program.h"
-#include "harness/text/temporary_folder.h"
 
 namespace loopbench::generate {
 

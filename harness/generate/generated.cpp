@@ -4,7 +4,7 @@
 #include <array>
 #include <chrono>
 
-#include "harness/generate/differentiate.h"
+#include "harness/generate/graph.h"
 #include "harness/generate/print_c.h"
 #include "mechanism/algebra/lanes.h"
 #include "mechanism/formulation/side_by_side.h"

@@ -1,18 +1,45 @@
+// The graph of recorded operations, and its derivatives.
+#pragma once
+
+#include <array>
+#include <cmath>
+#include <cstdint>
+#include <string>
+#include <unordered_map>
+#include <vector>
+
+#include "mechanism/algebra/lanes.h"
+
+namespace loopbench::generate {
+
+// Sine and cosine of the angle of a planar pose, with the bits that Kinematics gives it.
+
+inline void PoseSines(double angle, double* sine, double* cosine) {
+  if (std::abs(angle) <= kLargestAngle) {
+    SinCos(angle, *sine, *cosine);
+  } else {
+    *sine = std::sin(angle);
+    *cosine = std::cos(angle);
+  }
+}
+
+/// The same for kLanes angles.
+inline void PoseLaneSines(const double* angles, double* sines, double* cosines) {
+  const Lanes x = Load<Lanes>(angles);
+  Lanes sine, cosine;
+  SinCos(x, sine, cosine);
+  Store(sine, sines);
+  Store(cosine, cosines);
+  if (!Any(~(Magnitude(x) <= kLargestAngle))) return;
+  for (int lane = 0; lane < kLanes; ++lane) PoseSines(angles[lane], &sines[lane], &cosines[lane]);
+}
+
 // The operations of one evaluation as a graph: each node is an operation on earlier nodes.
 //
 // Simplifications are exact in IEEE arithmetic for finite numbers, except for the sign of zeros:
 // constants are folded, x + 0, x * 1 and x / 1 are x, x * 0 is 0, negations move outwards, equal
 // operations on equal operands are one node. No division becomes a multiplication and no sum is
 // reordered. x - x stays: it tests whether x is finite.
-#pragma once
-
-#include <array>
-#include <cstdint>
-#include <string>
-#include <unordered_map>
-#include <vector>
-
-namespace loopbench::generate {
 
 enum class Operation : std::uint8_t {
   kInput,
@@ -127,5 +154,17 @@ double Value(Operation operation, double a, double b);
 
 /// Whether an operation counts (OperationCounts).
 bool Counts(Operation operation);
+
+// Derivatives of a graph's nodes with respect to its inputs, as further nodes of the graph.
+//
+// Forward mode: each node's derivative follows from the derivatives of its operands. Zeros fold
+// away (graph.h), so a sparse Jacobian costs its nonzero entries only.
+
+/// Nodes of d outputs[i] / d inputs[j] at [j * outputs.size() + i]: column after column.
+/// `values` are numbers of all nodes at the point of recording; they decide which operand of a
+/// minimum or maximum is differentiated, and these decisions become comparisons of the graph.
+/// At |0| the derivative is not defined and becomes NaN.
+std::vector<int> Differentiate(Graph& graph, const std::vector<int>& outputs,
+                               const std::vector<int>& inputs, const std::vector<double>& values);
 
 }  // namespace loopbench::generate

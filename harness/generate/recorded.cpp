@@ -2,7 +2,7 @@
 
 #include <fmt/format.h>
 
-#include "harness/generate/pose_sines.h"
+#include "harness/generate/graph.h"
 #include "harness/generate/record.h"
 
 namespace loopbench::generate {

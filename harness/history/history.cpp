@@ -11,15 +11,15 @@
 #include <utility>
 
 #include "harness/record/measures.h"
-#include "harness/record/origin.h"
-#include "harness/record/record_json.h"
+#include "harness/record/provenance.h"
+#include "harness/record/record.h"
 #include "harness/record/select.h"
 #include "harness/store/record_lines.h"
 #include "harness/store/result_store.h"
-#include "harness/text/config_error.h"
 #include "harness/text/escape.h"
 #include "harness/text/files.h"
 #include "harness/text/hash.h"
+#include "harness/text/words.h"
 
 namespace loopbench::harness {
 namespace {
@@ -149,7 +149,7 @@ std::string CommitNamed(const History& history, const std::string& name,
   const auto begins_so = [&name](const std::string& commit) {
     // not within a letter of UTF-8
     return !name.empty() && commit.starts_with(name) &&
-           (static_cast<unsigned char>(commit.c_str()[name.size()]) & 0xC0u) != 0x80u;
+           !ContinuesCharacter(commit.c_str()[name.size()]);
   };
   std::set<std::string> found;
   for (const HistoryEntry& entry : history.entries) {

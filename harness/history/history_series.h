@@ -1,14 +1,18 @@
-// Measures over commits, and where they change.
+// Series of measurements over commits, and their steps.
 #pragma once
 
+#include <optional>
 #include <string>
 #include <vector>
 
 #include "harness/history/change_points.h"
 #include "harness/history/history.h"
 #include "harness/record/measures.h"
+#include "harness/tables/table.h"
 
 namespace loopbench::harness {
+
+// Measures over commits, and where they change.
 
 /// A commit's value in a series.
 struct HistoryValue {
@@ -60,5 +64,14 @@ struct HistoryFindings {
 /// alone: a machine that is slower for a week is one step and not one in every case. Throws
 /// std::runtime_error when a file of results cannot be read.
 HistoryFindings FindingsOf(const History& history);
+
+// The steps of a history as rows.
+
+/// A row for each step, newest first; of one commit other endings first. "ratio" is empty where the
+/// level was 0 or is a text.
+Table StepTable(const History& history, const HistoryFindings& found);
+
+/// How many times were left out; nothing where none was.
+std::optional<std::string> UnsteadyNote(const HistoryFindings& found);
 
 }  // namespace loopbench::harness

@@ -1,19 +1,88 @@
-// Runge-Kutta integration by ARKODE, with named profiles and named endings.
-//
-// SUNDIALS appears only in arkode.cpp and the files arkode_*; this header is what the rest of the
-// harness sees.
+// Integration by ARKODE: the equations, its options, output between steps, peers.
 #pragma once
 
 #include <cstdint>
+#include <functional>
+#include <span>
+#include <stdexcept>
 #include <string>
 #include <vector>
 
 #include "harness/config/options.h"
-#include "harness/integrator/dense_output.h"
-#include "harness/integrator/ode.h"
 #include "mechanism/description/outcome.h"
+#include "mechanism/formulation/ode.h"
 
 namespace loopbench::harness {
+
+// What the integrator needs to know of a problem, and what it tells an observer. No SUNDIALS here.
+
+/// The problem (mechanism/formulation/ode.h), in ARKODE's scalar.
+using Ode = loopbench::Ode<double>;
+
+/// What the run does after an observation.
+enum class StepAction {
+  kContinue,  ///< go on; changes made to y are ignored
+  kRestart,   ///< y, or the meaning of its components, has changed: forget f(t, y), keep the step
+              ///< size
+  kStop,      ///< end the run here, successfully
+};
+
+/// Called with the start point and then with every accepted step, in order of time. The state is
+/// the integrator's own solution there, never an interpolated one: sampling drift at interpolated
+/// points changes it by up to five orders of magnitude. An empty function observes nothing.
+using StepObserver = std::function<StepAction(double t, std::span<double> y)>;
+
+// The solution between the ends of a step.
+//
+// A polynomial of degree 5 through the ends of a step and their derivatives, made better twice by
+// derivatives at its own points (bootstrapping: W. Enright, K. Jackson, S. Norsett, P. Thomsen,
+// Interpolants for Runge-Kutta formulas, ACM Trans. Math. Softw. 12, 1986). Its error is of order
+// h^6, that of one degree less, which stands beside it, of order h^5. ARKODE's own interpolant of
+// that degree is of the same kind, but 6.4 also asks it for the state at every stop time and would
+// then evaluate derivatives there, so that a run would depend on who watches it.
+
+/// f(t, y) to `ydot`; false when it cannot be had.
+using DenseDerivative =
+    std::function<bool(double t, std::span<const double> y, std::span<double> ydot)>;
+
+/// Where the solution is wanted besides the steps' ends.
+struct DenseObserver {
+  std::vector<double> times;  ///< [s], rising
+  /// times[k] with the solution there. `lower` is of one degree less: their difference bounds what
+  /// interpolation adds. At the end of a step both are the step's own end as the observer left it.
+  std::function<void(std::size_t k, std::span<const double> y, std::span<const double> lower)>
+      observe;
+  /// The problem's derivative, where those taken here are to be told from the integrator's; else
+  /// the problem is asked itself.
+  DenseDerivative derivative = nullptr;
+};
+
+class DenseOutput {
+ public:
+  using Derivative = DenseDerivative;
+
+  /// The step from (t0, y0) to (t1, y1), t0 < t1. Five derivatives, of which that at t1 is taken at
+  /// the last time before it: what jumps there is the next step's. False when one cannot be had.
+  bool Prepare(double t0, std::span<const double> y0, double t1, std::span<const double> y1,
+               const Derivative& derivative);
+
+  /// The solution at t in [t0, t1], and the one of a degree less.
+  void At(double t, std::span<double> y, std::span<double> lower) const;
+
+ private:
+  /// The cubic through both ends and their derivatives, at theta = (t - t0) / h.
+  void Cubic(double theta, std::span<double> y) const;
+
+  double t0_ = 0.0, h_ = 0.0;
+  std::vector<double> y0_, y1_, f0_, f1_;  ///< derivatives times h
+  std::vector<double> bump_, flat_,
+      sloping_;  ///< factors of w, of the lower degree and of the full
+};
+
+// Runge-Kutta integration by ARKODE, with named profiles and named endings.
+//
+// SUNDIALS appears only in arkode.cpp and the files arkode_*; this header is what the rest of the
+// harness sees.
 
 /// What happened. Counters refer to the whole run, restarts included.
 struct IntegratorResult {
@@ -60,5 +129,28 @@ IntegratorResult Integrate(Ode& ode, double t0, double t_end, std::vector<double
 /// other code is kIntegratorError. A failure of the derivative (-8 to -11) is reported as what the
 /// derivative returned, and is kIntegratorError here because the code alone does not say.
 Outcome OutcomeOfReturnCode(int code);
+
+// A peer: somebody else's program that moves a whole mechanism by its own equations, integrator and
+// projection. Here it stands where a formulation and ARKODE stand otherwise; what it makes of a
+// mechanism is looked at by the same observers (docs/decisions/018).
+
+/// Made for one mechanism. Its state y = (q, u) has the joint coordinates and speeds of
+/// Mechanism(description, Coordinates::kJoint), in their order; Derivative() gives (N(q) u, udot)
+/// by the peer's equations alone.
+class Peer : public Ode {
+ public:
+  /// As Integrate() of arkode.h, from time 0: `y` is observed at the start and after each step that
+  /// the peer accepts and projects, and is the last such state at the end. Of the options the
+  /// relative tolerance (what the peer makes of it is its own), step and time limits count. An
+  /// observer may stop the run and otherwise changes nothing.
+  virtual IntegratorResult Integrate(double t_end, std::vector<double>& y,
+                                     const IntegratorOptions& options,
+                                     const StepObserver& observe) = 0;
+};
+
+/// Thrown by who makes a peer, with the joint or force that the peer does not have.
+class Inexpressible : public std::runtime_error {
+  using std::runtime_error::runtime_error;
+};
 
 }  // namespace loopbench::harness

@@ -1,15 +1,90 @@
-// One run's integrator, advanced one accepted step at a time.
+// Steps under guard: what a right-hand side may throw, limits, and the loop over steps.
 #pragma once
 
 #include <cstdint>
+#include <exception>
+#include <limits>
 #include <memory>
 #include <span>
 #include <string>
 #include <vector>
 
-#include "harness/integrator/guarded_ode.h"
+#include "harness/config/options.h"
+#include "harness/integrator/arkode.h"
+#include "harness/integrator/cpu_time.h"
+#include "mechanism/description/outcome.h"
 
 namespace loopbench::harness {
+
+// The derivative as the integrator's C library may call it.
+
+/// An Ode behind the checks that ARKODE lacks: a derivative that is not finite (ARKODE would
+/// shorten the step for ever), the CPU clock, and exceptions, which must not travel through C
+/// frames. The first failure is kept for the result and ends every later evaluation. Also computes
+/// the quantities of a profile that need only options, state and derivative.
+class GuardedOde {
+ public:
+  /// Starts the clocks. Both arguments must outlive the object.
+  GuardedOde(Ode& ode, const IntegratorOptions& options);
+
+  /// False if the run must end; `failure()` or `exception()` then says why.
+  bool Evaluate(double t, std::span<const double> y, std::span<double> ydot) noexcept;
+
+  /// Renews jacobian() from the problem's own, or else by forward differences, whose evaluations
+  /// count as jacobian_calls(); f is the derivative at (t, y). False as above.
+  bool EvaluateJacobian(double t, std::span<const double> y, std::span<const double> f) noexcept;
+
+  /// df_i/dy_j at [i + y.size() * j] for all i and for the j that are not quadratures.
+  std::span<const double> jacobian() const { return jacobian_; }
+
+  /// Lets the derivative see only times before `t` from now on; infinity lifts this.
+  void SetStop(double t);
+
+  /// True, and the failure is kTimeLimit, once the CPU time is used up.
+  bool OutOfTime();
+
+  /// The reciprocal of each component's tolerance: 1 / max(rtol |y_i|, atol) for ode45, else
+  /// 1 / (rtol |y_i| + atol). Zero for quadratures.
+  void Weights(std::span<const double> y, std::span<double> weight, bool is_ode45) const;
+
+  /// MATLAB's first step: the time in which the fastest component changes by 0.8 rtol^(1/5) of its
+  /// magnitude (at least atol / rtol), at most `longest` and the interval. Evaluates the
+  /// derivative; if that fails it returns 0, which leaves the choice to ARKODE, which never gets to
+  /// use it.
+  double FirstStepOfOde45(double t0, double t_end, std::span<const double> y0, double longest);
+
+  /// Number of components that are not quadratures.
+  size_t Controlled() const { return static_cast<size_t>(ode_.size() - ode_.num_quadratures()); }
+
+  /// Wall time and the thread's CPU time since construction, s.
+  double wall_s() const { return time_.wall_s(); }
+  double cpu_s() const { return time_.cpu_s(); }
+
+  Outcome failure() const { return failure_; }
+  std::exception_ptr exception() const { return exception_; }
+
+  /// Evaluations of the derivative, the failing one included, without those for Jacobians.
+  std::int64_t calls() const { return calls_ - jacobian_calls_; }
+  std::int64_t jacobian_calls() const { return jacobian_calls_; }  ///< evaluations for Jacobians
+  std::int64_t jacobians() const { return jacobians_; }            ///< Jacobians evaluated
+  /// Evaluations with dual numbers, of a problem with Jacobians of its own.
+  std::int64_t dual_evaluations() const { return dual_evaluations_; }
+  const IntegratorOptions& options() const { return options_; }
+
+ private:
+  bool Differences(double t, std::span<const double> y, std::span<const double> f);
+
+  const IntegratorOptions& options_;
+  Ode& ode_;
+  double latest_ = std::numeric_limits<double>::infinity();  // time that the derivative may see
+  CpuLimit time_;
+  std::int64_t calls_ = 0, jacobian_calls_ = 0, jacobians_ = 0, dual_evaluations_ = 0;
+  std::vector<double> jacobian_, shifted_, shifted_f_;  // empty for explicit profiles
+  Outcome failure_ = Outcome::kFinished;
+  std::exception_ptr exception_;
+};
+
+// One run's integrator, advanced one accepted step at a time.
 
 /// ARKODE set up for one profile and one interval. The private part keeps SUNDIALS types out of
 /// this header; Integrate() (arkode.h) is the loop over Step() with limits and observers.

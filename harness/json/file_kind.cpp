@@ -7,8 +7,9 @@
 #include <string>
 #include <vector>
 
-#include "harness/json/document_kind.h"
-#include "harness/text/file_format.h"
+#include "harness/json/fields.h"
+#include "harness/text/files.h"
+#include "harness/text/words.h"
 
 namespace loopbench::harness {
 namespace {
@@ -75,15 +76,6 @@ std::vector<const Kind*> Likeliest(const Json& document) {
   return best;
 }
 
-/// "a, b and c", or another last word.
-std::string Joined(const std::vector<std::string>& words, std::string_view last) {
-  std::string text;
-  for (std::size_t i = 0; i < words.size(); ++i) {
-    text += (i == 0 ? "" : i + 1 == words.size() ? fmt::format(" {} ", last) : ", ") + words[i];
-  }
-  return text;
-}
-
 /// "a mechanism ("bodies", "joints")", of the keys that `has` holds.
 template <class Has>
 std::string WithKeys(const Kind& kind, const std::vector<std::string>& keys, Has has) {
@@ -107,8 +99,8 @@ void ReportAmbiguous(const JsonNode& root, const std::vector<const Kind*>& kinds
     if (possible) expected.push_back(WithKeys(kind, kind.own, [](const auto&) { return true; }));
   }
   root.FailAs(kinds.empty() ? "no key that tells the kind of a file"
-                            : fmt::format("keys of {}", Joined(found, "and")),
-              fmt::format("those of one kind: {}", Joined(expected, "or")));
+                            : fmt::format("keys of {}", ListInWords(found)),
+              fmt::format("those of one kind: {}", ListInWords(expected, "or")));
 }
 
 }  // namespace

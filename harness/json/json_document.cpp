@@ -3,17 +3,134 @@
 #include <fmt/format.h>
 
 #include <algorithm>
+#include <cstddef>
 #include <fstream>
+#include <iterator>
+#include <set>
+#include <string>
+#include <string_view>
 #include <system_error>
 #include <unordered_set>
+#include <utility>
 #include <vector>
 
-#include "harness/json/json_syntax.h"
-#include "harness/json/json_walker.h"
-#include "harness/text/config_error.h"
-#include "harness/text/output_file.h"
+#include "harness/text/files.h"
+#include "harness/text/words.h"
 
 namespace loopbench::harness {
+// The parser's events with what they lack: the pointer and the line of each value.
+//
+// Internal to harness/config (see json_document.h).
+
+/// How far the parser has read.
+struct Reading {
+  std::size_t line = 1;
+  std::size_t line_before = 1;  ///< without the last character: a number is read one too far
+};
+
+/// Gives the parser its characters and counts their lines.
+class LineCounter {
+ public:
+  using iterator_category = std::input_iterator_tag;
+  using value_type = char;
+  using difference_type = std::ptrdiff_t;
+  using pointer = const char*;
+  using reference = const char&;
+
+  LineCounter(const char* at, Reading* reading) : at_(at), reading_(reading) {}
+  reference operator*() const { return *at_; }
+  LineCounter& operator++() {
+    reading_->line_before = reading_->line;
+    if (*at_ == '\n') ++reading_->line;
+    ++at_;
+    return *this;
+  }
+  LineCounter operator++(int) {
+    LineCounter old = *this;
+    ++*this;
+    return old;
+  }
+  friend bool operator==(const LineCounter& a, const LineCounter& b) { return a.at_ == b.at_; }
+
+ private:
+  const char* at_;
+  Reading* reading_;
+};
+
+/// Follows the parser through the document and knows the pointer and the line of each value.
+class Walker : public nlohmann::json_sax<Json> {
+ public:
+  /// Walks through `text` to its end, or until a callback returns false.
+  void Walk(std::string_view text) {
+    const LineCounter begin(text.data(), &reading_), end(text.data() + text.size(), &reading_);
+    Json::sax_parse(begin, end, this);
+  }
+
+  bool null() final { return Value(Json()); }
+  bool boolean(bool value) final { return Value(Json(value)); }
+  bool number_integer(number_integer_t value) final { return Value(Json(value)); }
+  bool number_unsigned(number_unsigned_t value) final { return Value(Json(value)); }
+  bool number_float(number_float_t value, const string_t& token) final {
+    return CheckNumber(value, token) && Value(Json(value));
+  }
+  bool string(string_t& value) final { return Value(Json(std::move(value))); }
+  bool binary(binary_t&) final { return true; }
+  bool start_object(std::size_t) final { return Open(false); }
+  bool start_array(std::size_t) final { return Open(true); }
+  bool end_object() final { return Close(); }
+  bool end_array() final { return Close(); }
+  bool key(string_t& key) final {
+    levels_.back().key = key;
+    return Key(key);
+  }
+
+ protected:
+  virtual bool Key(const std::string&) { return true; }
+  virtual bool CheckNumber(double, const std::string&) { return true; }
+  /// A value; containers come empty.
+  virtual bool Put(Json value) = 0;
+  /// The last container that was put and not finished is complete.
+  virtual void Finish() {}
+
+  /// Of the value or key that is being reported.
+  std::string Pointer() const {
+    std::string pointer;
+    for (const Level& level : levels_) {
+      pointer += "/" + (level.is_array ? std::to_string(level.index) : PointerToken(level.key));
+    }
+    return pointer;
+  }
+  std::size_t line() const { return reading_.line_before; }
+  std::size_t depth() const { return levels_.size(); }
+  const std::string& current_key() const { return levels_.back().key; }
+
+ private:
+  struct Level {
+    bool is_array = false;
+    std::size_t index = 0;
+    std::string key;
+  };
+
+  bool Value(Json value) {
+    const bool go_on = Put(std::move(value));
+    if (!levels_.empty()) ++levels_.back().index;
+    return go_on;
+  }
+  bool Open(bool is_array) {
+    const bool go_on = Put(is_array ? Json::array() : Json::object());
+    levels_.push_back({is_array, 0, {}});
+    return go_on;
+  }
+  bool Close() {
+    levels_.pop_back();
+    if (!levels_.empty()) ++levels_.back().index;
+    Finish();
+    return true;
+  }
+
+  Reading reading_;
+  std::vector<Level> levels_;
+};
 namespace {
 
 /// Builds the document and notes what the parser would forgive.
@@ -162,9 +279,7 @@ std::string ShownPointer(const std::string& pointer) {
   if (pointer.empty()) return "(top level)";
   if (pointer.size() <= 2 * kEnd) return pointer;
   // whole UTF-8 characters only
-  const auto inside = [&pointer](std::size_t i) {
-    return (static_cast<unsigned char>(pointer[i]) & 0xC0u) == 0x80u;
-  };
+  const auto inside = [&pointer](std::size_t i) { return ContinuesCharacter(pointer[i]); };
   std::size_t head = kEnd, tail = pointer.size() - kEnd;
   while (head > 0 && inside(head)) --head;
   while (tail < pointer.size() && inside(tail)) ++tail;
@@ -197,5 +312,256 @@ std::string PointerToken(std::string_view key) {
   }
   return token;
 }
+
+// EncodingFault: text in other encodings than UTF-8, called by its name.
+
+namespace {
+
+constexpr std::string_view kExpected = "expected UTF-8 text";
+
+/// A byte order mark or the zero bytes of wide characters at the start, or "".
+std::string_view WideEncoding(std::string_view text) {
+  using namespace std::string_view_literals;
+  // the longer marks first: that of UTF-32 begins like that of UTF-16
+  if (text.starts_with("\xFF\xFE\0\0"sv) || text.starts_with("\0\0\xFE\xFF"sv)) return "UTF-32";
+  if (text.starts_with("\xFF\xFE"sv) || text.starts_with("\xFE\xFF"sv)) return "UTF-16";
+  if (text.size() < 2 || (text[0] == '\0') == (text[1] == '\0')) return "";
+  return text.size() >= 4 && text[1] == '\0' && text[2] == '\0' ? "UTF-32" : "UTF-16";
+}
+
+/// Bytes of the UTF-8 character at the start of `text`, or 0 when there is none.
+std::size_t CharacterLength(std::string_view text) {
+  const auto byte = [text](std::size_t i) { return static_cast<unsigned char>(text[i]); };
+  const unsigned first = byte(0);
+  if (first < 0x80) return 1;
+  std::size_t length = 0;
+  if (first >= 0xC2 && first <= 0xDF) length = 2;
+  if (first >= 0xE0 && first <= 0xEF) length = 3;
+  if (first >= 0xF0 && first <= 0xF4) length = 4;
+  if (length == 0 || text.size() < length) return 0;
+  for (std::size_t i = 1; i < length; ++i) {
+    if ((byte(i) & 0xC0u) != 0x80u) return 0;
+  }
+  // overlong forms, surrogates, beyond U+10FFFF
+  const unsigned second = byte(1);
+  const bool refused = (first == 0xE0 && second < 0xA0) || (first == 0xED && second > 0x9F) ||
+                       (first == 0xF0 && second < 0x90) || (first == 0xF4 && second > 0x8F);
+  return refused ? 0 : length;
+}
+
+/// "LINE:COLUMN" of the byte at `position`; columns count bytes, as in the messages of compilers.
+std::string PlaceOf(std::string_view text, std::size_t position) {
+  const std::string_view before = text.substr(0, position);
+  const auto line = std::count(before.begin(), before.end(), '\n') + 1;
+  const std::size_t start = before.rfind('\n');
+  return fmt::format("{}:{}", line,
+                     start == std::string_view::npos ? position + 1 : position - start);
+}
+
+}  // namespace
+
+std::string EncodingFault(std::string_view text) {
+  if (text.starts_with("\xEF\xBB\xBF")) {
+    return fmt::format("1:1: found a UTF-8 byte order mark (EF BB BF), {} without one", kExpected);
+  }
+  if (const std::string_view wide = WideEncoding(text); !wide.empty()) {
+    return fmt::format("1:1: found {} text, {}", wide, kExpected);
+  }
+  for (std::size_t i = 0; i < text.size();) {
+    if (text[i] == '\0') {
+      return fmt::format("{}: found a zero byte, {}", PlaceOf(text, i), kExpected);
+    }
+    const std::size_t length = CharacterLength(text.substr(i, 4));
+    if (length > 0) {
+      i += length;
+      continue;
+    }
+    const auto byte = static_cast<unsigned char>(text[i]);
+    // Latin-1 has letters from C0 on; below are Windows' quotes and dashes
+    return fmt::format("{}: found the byte {:02X}, which is not UTF-8 (it may be {}), {}",
+                       PlaceOf(text, i), byte, byte >= 0xA0 ? "Latin-1" : "Windows-1252",
+                       kExpected);
+  }
+  return "";
+}
+
+// LinesOf: a second pass through the text, made only when there is something to complain about.
+
+namespace {
+
+/// Looks for the lines of some values.
+class LineFinder final : public Walker {
+ public:
+  explicit LineFinder(const std::vector<std::string>& wanted)
+      : wanted_(wanted.begin(), wanted.end()) {}
+
+  const std::map<std::string, std::size_t>& lines() const { return lines_; }
+
+  bool parse_error(std::size_t, const std::string&, const nlohmann::detail::exception&) override {
+    return false;
+  }
+
+ protected:
+  bool Put(Json) override {
+    const std::string pointer = Pointer();
+    if (wanted_.contains(pointer)) lines_.emplace(pointer, line());
+    return lines_.size() < wanted_.size();
+  }
+
+ private:
+  std::set<std::string> wanted_;
+  std::map<std::string, std::size_t> lines_;
+};
+
+}  // namespace
+
+std::map<std::string, std::size_t> LinesOf(std::string_view text,
+                                           const std::vector<std::string>& pointers) {
+  LineFinder finder(pointers);
+  finder.Walk(text);
+  return finder.lines();
+}
+namespace {
+
+bool IsWordCharacter(char c) {
+  return (c >= 'a' && c <= 'z') || (c >= 'A' && c <= 'Z') || (c >= '0' && c <= '9') || c == '+' ||
+         c == '-' || c == '.' || c == '_';
+}
+
+/// The number or bare word that was read last, or the last character when there is none.
+std::string_view LastWord(std::string_view text, std::size_t position) {
+  if (position == 0 || text.empty()) return "";
+  std::size_t begin = std::min(position, text.size()) - 1;
+  if (!IsWordCharacter(text[begin]) && begin > 0 && IsWordCharacter(text[begin - 1])) --begin;
+  std::size_t end = begin + 1;
+  if (!IsWordCharacter(text[begin])) {
+    while (end < text.size() && ContinuesCharacter(text[end])) ++end;
+    return text.substr(begin, end - begin);  // a whole character, of several bytes perhaps
+  }
+  while (begin > 0 && IsWordCharacter(text[begin - 1])) --begin;
+  while (end < text.size() && IsWordCharacter(text[end])) ++end;
+  return text.substr(begin, end - begin);
+}
+
+/// What the characters around a syntax error suggest, as " (...)" or "".
+std::string Hint(std::string_view text, std::size_t position, std::string_view word) {
+  if (position == 0 || position > text.size() || word.empty()) return "";
+  std::size_t at = position - 1;
+  const char offending = text[at];
+  if (offending == '/' || offending == '#') return " (comments are not allowed)";
+  if (offending == '\'') return " (strings stand in double quotes)";
+  const std::string_view number = word.substr(word[0] == '-' || word[0] == '+' ? 1 : 0);
+  if (number.starts_with("NaN") || number.starts_with("nan") || number.starts_with("Inf") ||
+      number.starts_with("inf")) {
+    return " (NaN and Infinity are not allowed)";
+  }
+  if (word[0] == '+') return " (numbers have no leading +)";
+  if (number.starts_with('.')) return " (numbers have a digit before the point)";
+  if (number.starts_with("0x") || number.starts_with("0X")) return " (numbers are decimal)";
+  const bool after_zero =
+      number.size() > 1 && number[0] == '0' && number[1] >= '0' && number[1] <= '9';
+  if (after_zero) return " (numbers have no leading zeros)";
+  if (word == "True" || word == "False") return " (true and false are written small)";
+  if (word == "None") return " (no value is written null, or left out)";
+  if (offending != ']' && offending != '}') return "";
+  while (at > 0 && (text[at - 1] == ' ' || text[at - 1] == '\t' || text[at - 1] == '\n' ||
+                    text[at - 1] == '\r')) {
+    --at;
+  }
+  const bool trailing_comma = at > 0 && text[at - 1] == ',';
+  return trailing_comma ? " (remove the comma before the closing bracket)" : "";
+}
+
+/// What follows `start` in the message, up to `end` or to its end; "" without it.
+std::string Between(const std::string& message, std::string_view start, std::string_view end) {
+  const std::size_t at = message.find(start);
+  if (at == std::string::npos) return "";
+  const std::size_t from = at + start.size();
+  const std::size_t to = end.empty() ? std::string::npos : message.find(end, from);
+  return message.substr(from, to == std::string::npos ? to : to - from);
+}
+
+/// In words for people: the parser knows no "," where it expects a closing bracket.
+std::string Expected(const std::string& parsers, bool in_key) {
+  if (parsers == "'}'") return "',' or '}'";
+  if (parsers == "']'") return "',' or ']'";
+  if (parsers == "end of input") return "the end of the file";
+  if (parsers.starts_with("digit")) return "a digit" + parsers.substr(5);
+  if (in_key || parsers == "string literal") return "a key in double quotes";
+  return parsers.starts_with("'[', '{'") || parsers.empty() ? "a value" : parsers;
+}
+
+}  // namespace
+
+std::string ShortToken(const std::string& token) {
+  constexpr std::size_t kLongest = 40;
+  if (token.size() <= kLongest) return token;
+  std::size_t start = token.size() - kLongest;
+  while (start < token.size() && ContinuesCharacter(token[start])) ++start;
+  return "..." + token.substr(start);
+}
+
+// The message reads "... while parsing WHAT - FOUND; expected EXPECTED; last read: 'TOKEN'"; only
+// FOUND is always there, the others come in any order. TOKEN may be megabytes.
+std::string SyntaxMessage(const std::string& message, std::string_view text, std::size_t position) {
+  const bool in_key = message.find("parsing object key") != std::string::npos;
+  std::string found = Between(message, " - ", "; last read");
+  if (const std::size_t at = found.find("; expected "); at != std::string::npos) found.erase(at);
+  if (found.starts_with("invalid string: ")) {
+    return fmt::format("found an invalid string ({}), expected one as JSON writes it",
+                       found.substr(16));
+  }
+  std::string tail = message.substr(std::min(message.size(), message.find(" - ")));
+  const std::size_t last = tail.rfind("; expected ");
+  const std::string expected = Expected(
+      last == std::string::npos ? "" : Between(tail.substr(last), "; expected ", "; last read"),
+      in_key);
+  const std::string_view word = LastWord(text, position);
+  if (found.starts_with("unexpected ")) found.erase(0, 11);
+  if (found == "end of input") {
+    found = "the end of the file";
+  } else if (found == "string literal") {
+    found = "a string";
+  } else if (found == "invalid literal" || found == "number literal" || found == "invalid number" ||
+             found.ends_with(" literal")) {
+    const bool letters = !word.empty() && IsWordCharacter(word.front());
+    found = letters ? ShortToken(std::string(word)) : fmt::format("'{}'", word);
+  }
+  return fmt::format("found {}, expected {}{}", found, expected, Hint(text, position, word));
+}
+
+namespace {
+
+constexpr std::size_t kWidth = 100;  ///< characters of a line
+
+/// On one line where it fits behind `used` characters, else one element per line.
+std::string Written(const Json& value, std::size_t indent, std::size_t used) {
+  const std::string flat = FlatText(value);
+  if (used + flat.size() < kWidth || !value.is_structured() || value.empty()) return flat;
+  const std::string margin(indent + 2, ' ');
+  std::string text;
+  for (auto child = value.begin(); child != value.end(); ++child) {
+    const std::string key = value.is_object() ? Json(child.key()).dump() + ": " : "";
+    text += (text.empty() ? "\n" : ",\n") + margin + key +
+            Written(*child, indent + 2, margin.size() + key.size());
+  }
+  text += "\n" + std::string(indent, ' ');
+  return value.is_object() ? "{" + text + "}" : "[" + text + "]";
+}
+
+}  // namespace
+
+std::string FlatText(const Json& value) {
+  if (!value.is_structured()) return value.dump();
+  std::string text;
+  for (auto child = value.begin(); child != value.end(); ++child) {
+    text += text.empty() ? "" : ", ";
+    if (value.is_object()) text += Json(child.key()).dump() + ": ";
+    text += FlatText(*child);
+  }
+  return value.is_object() ? "{" + text + "}" : "[" + text + "]";
+}
+
+std::string JsonText(const Json& document) { return Written(document, 0, 0) + "\n"; }
 
 }  // namespace loopbench::harness

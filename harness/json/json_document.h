@@ -1,8 +1,4 @@
-// From bytes to a JSON document, strictly: what the parser would forgive is an error here.
-//
-// For the .cpp files of harness/config and harness/store only, like json_reader.h and the
-// *_sections.h: these headers show nlohmann-json. Every reader of a document begins here, so that
-// all have the same limits of size and depth and the same messages.
+// From bytes to a JSON document, strictly, and from a document to text as people read it.
 #pragma once
 
 #include <cstddef>
@@ -14,6 +10,12 @@
 #include <vector>
 
 namespace loopbench::harness {
+
+// From bytes to a JSON document, strictly: what the parser would forgive is an error here.
+//
+// For the .cpp files of harness/config and harness/store only, like json_reader.h and the
+// *_sections.h: these headers show nlohmann-json. Every reader of a document begins here, so that
+// all have the same limits of size and depth and the same messages.
 
 /// Keeps the order of the file, so that messages come in the order a reader meets their causes.
 using Json = nlohmann::ordered_json;
@@ -59,5 +61,25 @@ std::string Printable(const std::string& text);
 /// "" when the text is UTF-8 without a byte order mark and without zero bytes; else where, what was
 /// found and what was expected, as "LINE:COLUMN: found ..., expected ...".
 std::string EncodingFault(std::string_view text);
+
+// What is wrong where the parser stopped, in the words of our other messages.
+//
+// Internal to harness/config.
+
+/// "found ..., expected ... (hint)" from the parser's message about `text`. `position` is the
+/// number of characters read, so that the offending token ends just before it.
+std::string SyntaxMessage(const std::string& message, std::string_view text, std::size_t position);
+
+/// The last letters of a token, which may be megabytes long.
+std::string ShortToken(const std::string& token);
+
+// Documents as people read them: schemas, and mechanisms and experiments that a command writes.
+
+/// On one line, with a space behind each comma and colon.
+std::string FlatText(const Json& value);
+
+/// A whole file: what fits stands on one line, else one element per line, indented by two. Lines of
+/// at most 100 characters where that is possible. Numbers are read back to the same bits.
+std::string JsonText(const Json& document);
 
 }  // namespace loopbench::harness

@@ -3,25 +3,20 @@
 #include <fmt/format.h>
 
 #include <algorithm>
+#include <charconv>
 #include <cmath>
 #include <cstddef>
 #include <map>
+#include <set>
 
-#include "harness/text/config_error.h"
-#include "harness/text/spelling.h"
+#include "harness/text/files.h"
+#include "harness/text/words.h"
 
 namespace loopbench::harness {
 namespace {
 
-constexpr std::size_t kLongestShown = 60;  ///< characters of a value in a message
+constexpr std::size_t kLongestShown = 60;  ///< bytes of a value in a message
 constexpr std::size_t kMostListed = 32;    ///< names in a message
-
-/// The first letters; a cut inside a UTF-8 character would make the message invalid.
-std::string Cut(const std::string& text) {
-  std::size_t end = kLongestShown;
-  while (end > 0 && (static_cast<unsigned char>(text[end]) & 0xC0u) == 0x80u) --end;
-  return text.substr(0, end);
-}
 
 /// The value as a reader finds it in the file, or its kind where it would be too long.
 std::string Shown(const Json& value) {
@@ -30,12 +25,7 @@ std::string Shown(const Json& value) {
   std::string text = value.dump(-1, ' ', false, Json::error_handler_t::replace);
   if (text.size() <= kLongestShown) return text;
   if (value.is_array()) return fmt::format("an array of {} values", value.size());
-  return Cut(text) + "...";
-}
-
-/// A key as a message shows it: keys have no limit of their own.
-std::string ShortName(const std::string& name) {
-  return name.size() <= kLongestShown ? name : Cut(name) + "...";
+  return Abbreviated(text, kLongestShown);
 }
 
 /// "a", "b", "c" without empty names.
@@ -47,7 +37,7 @@ std::string Listed(const std::vector<std::string>& names) {
       quoted.push_back("...");
       break;
     }
-    quoted.push_back('"' + ShortName(name) + '"');
+    quoted.push_back('"' + Abbreviated(name) + '"');
   }
   return quoted.empty() ? "there is none" : fmt::format("{}", fmt::join(quoted, ", "));
 }
@@ -161,8 +151,8 @@ bool JsonNode::ExpectObject(const NameList& known) const {
       continue;
     }
     Child(value, key)
-        .FailAs(fmt::format("unknown key \"{}\"", ShortName(key)), "one of " + Listed(known.all()),
-                NearestSpelling(key, known.all()));
+        .FailAs(fmt::format("unknown key \"{}\"", Abbreviated(key)),
+                "one of " + Listed(known.all()), NearestSpelling(key, known.all()));
   }
   return true;
 }
@@ -254,7 +244,7 @@ Eigen::Vector3d JsonNode::Vector() const {
 std::vector<double> JsonNode::Numbers(std::size_t count) const {
   std::vector<double> numbers;
   if (!value_->is_array() || value_->size() != count) {
-    Fail(fmt::format("an array of {} number{}", count, count == 1 ? "" : "s"));
+    Fail("an array of " + WithCount(count, "number"));
     return std::vector<double>(count, 0.0);
   }
   for (const JsonNode& element : Elements("numbers")) numbers.push_back(element.Number());
@@ -288,6 +278,124 @@ std::vector<std::size_t> JsonNode::Choices(const NameList& known, std::string_vi
     }
   }
   return indices;
+}
+
+// Lists of numbers in a file: one, several, or a range.
+
+namespace {
+
+/// The number a person would have written, where round-off alone is in its way: 1e-08 for the
+/// 1.0000000000000002e-08 that a power gives.
+double Clean(double value) {
+  const std::string text = fmt::format("{:.13g}", value);
+  double rounded = value;
+  std::from_chars(text.data(), text.data() + text.size(), rounded);
+  constexpr double kRoundOff = 1e-15;  // some ulps: of lerp, log10 and pow
+  return std::abs(rounded - value) <= kRoundOff * std::abs(value) ? rounded : value;
+}
+
+std::vector<double> Spread(double from, double to, int count, bool logarithmic) {
+  std::vector<double> numbers(static_cast<std::size_t>(count));
+  for (int i = 0; i < count; ++i) {
+    const double t = static_cast<double>(i) / (count - 1);
+    numbers[static_cast<std::size_t>(i)] =
+        logarithmic ? std::copysign(std::pow(10.0, std::lerp(std::log10(std::abs(from)),
+                                                             std::log10(std::abs(to)), t)),
+                                    from)
+                    : std::lerp(from, to, t);
+  }
+  for (double& number : numbers) number = Clean(number);
+  numbers.front() = from;
+  numbers.back() = to;
+  return numbers;
+}
+
+}  // namespace
+
+std::vector<double> JsonNode::Spaced(const Range& range) const {
+  if (!ExpectObject({"lin", "log"})) return {};
+  const auto lin = Optional("lin"), log = Optional("log");
+  if (lin.has_value() == log.has_value()) {
+    if (lin || value_->empty()) {
+      FailAs(lin ? "both \"lin\" and \"log\"" : "an empty object",
+             "{\"lin\": [from, to, count]} or {\"log\": [from, to, count]}");
+    }
+    return {};
+  }
+  const JsonNode& ends = lin ? *lin : *log;
+  if (!ends.value().is_array() || ends.value().size() != 3) {
+    ends.Fail("an array of three numbers: from, to, count");
+    return {};
+  }
+  const std::vector<JsonNode> three = ends.Elements("numbers");
+  const double from = three[0].Number(range), to = three[1].Number(range);
+  const auto count = static_cast<int>(three[2].Integer(2, kMostInRange));
+  if (!range.Contains(from) || !range.Contains(to)) return {};
+  if (from == to) {
+    ends.FailAs("a range that ends where it begins", "two different ends");
+    return {};
+  }
+  if (log && !(from < 0.0 && to < 0.0) && !(from > 0.0 && to > 0.0)) {
+    ends.FailAs(fmt::format("logarithms from {} to {}", from, to),
+                "two ends of the same sign, neither of them 0");
+    return {};
+  }
+  return Spread(from, to, count, log.has_value());
+}
+
+std::vector<double> JsonNode::NumberList(const Range& range) const {
+  if (value_->is_object()) return Spaced(range);
+  if (!value_->is_array() && !value_->is_number()) {
+    Fail(
+        fmt::format("a number{}, a list of such numbers, or a range: {{\"lin\" or \"log\": [from, "
+                    "to, count]}}",
+                    range.Text()));
+    return {};
+  }
+  std::vector<double> numbers;
+  std::set<double> known;
+  for (const JsonNode& element : OneOrMore("numbers")) {
+    const double number = element.Number(range);
+    const bool again = !known.insert(number).second;
+    if (again && range.Contains(number)) element.Fail("each value once");
+    numbers.push_back(number);
+  }
+  return numbers;
+}
+
+std::vector<std::int64_t> JsonNode::IntegerList(std::int64_t min, std::int64_t max) const {
+  std::vector<std::int64_t> integers;
+  std::set<std::int64_t> known;
+  if (value_->is_object()) {
+    const Range range = {.min = static_cast<double>(min), .max = static_cast<double>(max)};
+    for (const double number : Spaced(range)) {
+      const std::int64_t integer = std::llround(number);
+      if (!known.insert(integer).second) {
+        FailAs(fmt::format("{} twice after rounding", integer), "a smaller count");
+        break;
+      }
+      integers.push_back(integer);
+    }
+    return integers;
+  }
+  if (!value_->is_array() && !value_->is_number()) {
+    Fail(
+        fmt::format("an integer from {} to {}, a list of them, or a range: {{\"lin\" or \"log\": "
+                    "[from, to, count]}}",
+                    min, max));
+    return {};
+  }
+  for (const JsonNode& element : OneOrMore("integers")) {
+    const std::int64_t integer = element.Integer(min, max);
+    const bool sound = element.value().is_number() &&
+                       element.value().get<double>() == static_cast<double>(integer);
+    if (known.insert(integer).second) {
+      integers.push_back(integer);
+    } else if (sound) {
+      element.Fail("each value once");
+    }
+  }
+  return integers;
 }
 
 }  // namespace loopbench::harness

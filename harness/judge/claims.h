@@ -1,20 +1,25 @@
-// Verdicts on claims, computed from records by rules.
-//
-// A rule (configs/experiments/paper/claims.json) restates one claim as checks. Each check selects
-// records, takes a statistic of one measure and compares it with a threshold. The verdict follows
-// from the checks alone, so that other data turn it and nobody writes it by hand.
+// Claims on stored records: their file, verdicts and report.
 #pragma once
 
 #include <cstddef>
+#include <filesystem>
 #include <span>
 #include <string>
+#include <string_view>
 #include <vector>
 
 #include "harness/judge/demand.h"
 #include "harness/record/record.h"
 #include "harness/record/select.h"
+#include "harness/tables/table.h"
 
 namespace loopbench::harness {
+
+// Verdicts on claims, computed from records by rules.
+//
+// A rule (configs/experiments/paper/claims.json) restates one claim as checks. Each check selects
+// records, takes a statistic of one measure and compares it with a threshold. The verdict follows
+// from the checks alone, so that other data turn it and nobody writes it by hand.
 
 /// What is made of the selected rows: one number (max, min, mean), or a demand on every row or on
 /// at least one.
@@ -90,5 +95,29 @@ ClaimResult Evaluate(const ClaimRule& rule, std::span<const Record> records);
 std::string_view ToString(Verdict verdict);
 /// "holds", "fails", "not measured".
 std::string_view ToString(CheckState state);
+
+// Reads the rules that turn results into verdicts (configs/experiments/paper/claims.json).
+// What such a file may hold: docs/fields.md, claims.
+
+/// Reads a file. Throws ConfigError with all mistakes in it (unknown keys, wrong types, a threshold
+/// missing or out of place, an id or a label used twice), each with file, JSON Pointer, value found
+/// and what was expected.
+std::vector<ClaimRule> ReadClaims(const std::filesystem::path& path);
+
+/// The same from text; `file` is the name used in messages.
+std::vector<ClaimRule> ParseClaims(std::string_view text, const std::string& file);
+
+// Verdicts as a page: every claim with its verdict, and below it the numbers it follows from.
+
+/// One row per claim: id, claim, place in the paper, verdict.
+Table VerdictTable(std::span<const ClaimResult> results);
+
+/// One row per check of a claim: condition, expected, measured, number of rows, result, reason.
+Table CheckTable(const ClaimResult& result);
+
+/// All verdicts as Markdown (results/paper/README.md), `notes` (provenance, the command) at the
+/// end.
+std::string ClaimsMarkdown(std::span<const ClaimResult> results,
+                           const std::vector<std::string>& notes);
 
 }  // namespace loopbench::harness

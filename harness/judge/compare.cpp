@@ -15,7 +15,7 @@
 #include "harness/judge/demand.h"
 #include "harness/judge/statistics.h"
 #include "harness/record/noise.h"
-#include "harness/record/origin.h"
+#include "harness/record/provenance.h"
 #include "harness/tables/table.h"
 
 namespace loopbench::harness {

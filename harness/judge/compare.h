@@ -11,7 +11,7 @@
 #include <string>
 #include <vector>
 
-#include "harness/judge/rules.h"
+#include "harness/judge/demand.h"
 #include "harness/record/record.h"
 
 namespace loopbench::harness {

@@ -2,10 +2,151 @@
 
 #include <fmt/format.h>
 
+#include <algorithm>
 #include <array>
 #include <cmath>
+#include <limits>
 
 namespace loopbench::harness {
+
+namespace {
+
+/// Records begin with what names their case (CaseKeys); one of these ends it.
+bool EndsCase(std::string_view key) {
+  return key == "case_id" || key == "id" || key == "version" || key == "outcome";
+}
+
+bool IsTime(double time) { return std::isfinite(time) && time >= 0.0; }
+
+/// The group that `--only` and the summary name, and what values the rule is for.
+struct Facts {
+  std::string_view group, expected;
+};
+
+Facts FactsOf(Rule rule) {
+  switch (rule) {
+    case Rule::kOutcome:
+    case Rule::kDoubts:
+      return {"outcomes", "a text"};
+    case Rule::kEqual:
+      return {"counts", "a finite number"};
+    case Rule::kCount:
+      return {"counts", "a finite number >= 0"};
+    case Rule::kHash:
+      return {"hashes", "a text"};
+    case Rule::kError:
+      return {"errors", "a finite number >= 0"};
+    case Rule::kInstructions:
+      return {"instructions", "a finite number > 0"};
+    case Rule::kTime:
+      return {"times", "finite times >= 0"};
+    case Rule::kNone:
+      break;
+  }
+  return {};
+}
+
+void AppendKey(const Record& record, const std::string& key, std::string* text) {
+  const std::string shown = record.Text(key);
+  if (shown.empty()) return;
+  // names speak for themselves, numbers do not
+  const bool is_name = std::holds_alternative<std::string>(*record.Find(key));
+  *text += (text->empty() ? "" : " ") + (is_name ? shown : key + " " + shown);
+}
+
+bool IsNumber(const Value& value) {
+  return std::holds_alternative<double>(value) || std::holds_alternative<std::int64_t>(value);
+}
+
+}  // namespace
+
+std::string_view GroupOf(Rule rule) { return FactsOf(rule).group; }
+
+std::string_view Expected(Rule rule) { return FactsOf(rule).expected; }
+
+const std::vector<std::string>& GroupNames() {
+  static const std::vector<std::string> names = {"outcomes", "counts",       "hashes",
+                                                 "errors",   "instructions", "times"};
+  return names;
+}
+
+Held HeldBy(const Record& record, const Measure& measure) {
+  const Value* value = record.Find(measure.key);
+  if (value == nullptr) return Held::kNothing;
+  const Rule rule = measure.rule;
+  bool fits = false;
+  if (const auto* text = std::get_if<std::string>(value)) {
+    const bool is_text = rule == Rule::kOutcome || rule == Rule::kDoubts || rule == Rule::kHash;
+    fits = is_text && (!text->empty() || rule == Rule::kDoubts);
+  } else if (const auto* series = std::get_if<std::vector<double>>(value)) {
+    fits = rule == Rule::kTime && !series->empty() && std::ranges::all_of(*series, IsTime);
+  } else if (IsNumber(*value)) {
+    const double number = record.Number(measure.key);
+    fits = std::isfinite(number) &&
+           (rule == Rule::kEqual || (rule == Rule::kInstructions && number > 0.0) ||
+            ((rule == Rule::kCount || rule == Rule::kError) && number >= 0.0));
+  }
+  return fits ? Held::kFit : Held::kUnfit;
+}
+
+std::string Shown(const Record& record, std::string_view key) {
+  const Value* value = record.Find(key);
+  if (value == nullptr) return "";
+  if (std::holds_alternative<std::monostate>(*value)) return "null";
+  if (std::holds_alternative<std::string>(*value)) return '"' + record.Text(key) + '"';
+  const auto* series = std::get_if<std::vector<double>>(value);
+  if (series == nullptr) return record.Text(key);
+  const auto unfit = std::ranges::count_if(*series, [](double time) { return !IsTime(time); });
+  return fmt::format("{} values{}", series->size(),
+                     unfit > 0 ? fmt::format(" ({} null or negative)", unfit) : "");
+}
+
+double YardstickOf(const Record& record, std::string_view key) {
+  const auto is_any = [key](const auto&... parts) {
+    return ((key.find(parts) != std::string_view::npos) || ...);
+  };
+  if (is_any("wall_s", "step_us", "realtime_factor")) return record.Number("yardstick_wall_ns");
+  if (is_any("rhs_ns", "cpu_ns", "ns_per_body")) return record.Number("yardstick_ns");
+  return std::numeric_limits<double>::quiet_NaN();
+}
+
+std::string CaseText(const Record& record) {
+  std::string text;
+  for (const auto& [key, value] : record.items()) {
+    if (EndsCase(key)) break;
+    AppendKey(record, key, &text);
+  }
+  return text;
+}
+
+std::string CaseText(const Record& record, const std::vector<std::string>& keys) {
+  std::string text;
+  AppendKey(record, "kind", &text);
+  for (const std::string& key : keys) {
+    if (key != "kind") AppendKey(record, key, &text);
+  }
+  return text;
+}
+
+std::string OtherSettings(const Record& base, const Record& fresh) {
+  std::vector<std::string> keys;
+  for (const Record* record : {&base, &fresh}) {
+    for (const auto& [key, value] : record->items()) {
+      if (EndsCase(key)) break;
+      if (std::ranges::count(keys, key) == 0) keys.push_back(key);
+    }
+  }
+  if (std::ranges::count(keys, "content") == 0) keys.emplace_back("content");
+  const auto shown = [](const std::string& text) { return text.empty() ? "none" : text; };
+  std::string text;
+  for (const std::string& key : keys) {
+    const std::string before = base.Text(key), now = fresh.Text(key);
+    if (before == now) continue;
+    text += fmt::format("{}{} {} before, {} now", text.empty() ? "" : ", ", key, shown(before),
+                        shown(now));
+  }
+  return text;
+}
 namespace {
 
 constexpr double kInfinity = std::numeric_limits<double>::infinity();

@@ -1,12 +1,9 @@
-// The failure map: methods against extremes, each cell judged from records by rules.
-//
-// A rules file (configs/experiments/extremes/map.json) names columns (methods), rows (extremes) and
-// for each row the measures that decide. A cell's class and the number that decided it follow from
-// the records alone, so that other data turn it and nobody writes it by hand.
+// Which methods pass which stress tests: rules, their file, cells.
 #pragma once
 
 #include <array>
 #include <cstddef>
+#include <filesystem>
 #include <limits>
 #include <map>
 #include <span>
@@ -19,6 +16,12 @@
 #include "harness/record/select.h"
 
 namespace loopbench::harness {
+
+// The failure map: methods against extremes, each cell judged from records by rules.
+//
+// A rules file (configs/experiments/extremes/map.json) names columns (methods), rows (extremes) and
+// for each row the measures that decide. A cell's class and the number that decided it follow from
+// the records alone, so that other data turn it and nobody writes it by hand.
 
 /// One extreme.
 struct MapRow {
@@ -163,5 +166,16 @@ std::string HoldingCount(const MapCell& cell);
 /// "O-DCA, position / parallelogram: singular at 0.31 s" for every cell that must hold and does
 /// not.
 std::vector<std::string> BrokenDemands(const FailureMap& map);
+
+// Reads the rules of a failure map (configs/experiments/extremes/map.json).
+// What such a file may hold: docs/fields.md, map.
+
+/// Reads a file. Throws ConfigError with all mistakes in it (unknown keys, wrong types, an ending
+/// or a column label that does not exist, a label used twice, a row that nothing decides), each
+/// with file, JSON Pointer, value found and what was expected.
+MapRules ReadMapRules(const std::filesystem::path& path);
+
+/// The same from text; `file` is the name used in messages.
+MapRules ParseMapRules(std::string_view text, const std::string& file);
 
 }  // namespace loopbench::harness

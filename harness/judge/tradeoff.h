@@ -1,8 +1,4 @@
-// What accuracy costs: each accuracy run of a store beside the time that the very same case took,
-// the Pareto front of each problem, and the cheapest method of each formulation for an error.
-//
-// A run that failed, or finished with doubts, is a row with its reason, but stands on no front and
-// is nobody's cheapest: its error is not one to rely on.
+// Work and precision: Pareto fronts, and what was equal among the methods compared.
 #pragma once
 
 #include <limits>
@@ -14,6 +10,12 @@
 #include "harness/record/select.h"
 
 namespace loopbench::harness {
+
+// What accuracy costs: each accuracy run of a store beside the time that the very same case took,
+// the Pareto front of each problem, and the cheapest method of each formulation for an error.
+//
+// A run that failed, or finished with doubts, is a row with its reason, but stands on no front and
+// is nobody's cheapest: its error is not one to rely on.
 
 /// What is compared with what.
 struct TradeoffOptions {
@@ -76,5 +78,14 @@ struct Tradeoff {
 /// @throws ConfigError when no accuracy record passes `where`, no record has the error or the cost,
 /// or an option names a key that no record has.
 Tradeoff MakeTradeoff(std::span<const Record> records, const TradeoffOptions& options);
+
+// Whether rows that are compared differ in more than what the comparison is about: what was equal
+// in all of them and what was not, read from the records.
+
+/// One line each: what was equal among the compared rows of every problem, with its value where all
+/// problems share it; what was not, with its values and how many rows had them; what no record
+/// says; the error and the cost, and what they can be trusted to; how many rows were not compared,
+/// and why; warnings ("warning: ...") where costs are times that do not compare.
+std::vector<std::string> FairnessStatement(const Tradeoff& tradeoff);
 
 }  // namespace loopbench::harness

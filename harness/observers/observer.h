@@ -1,19 +1,35 @@
-// What is watched along a run. Observers see accepted steps only; each keeps maxima and, where a
-// figure needs one, a series, and writes them into the case's record at the end. An observer that
-// saw nothing writes nothing: an empty cell is not a zero.
+// Observers of a run, and the series that they keep.
 #pragma once
 
+#include <cstddef>
 #include <cstdint>
 #include <memory>
 #include <string>
 #include <vector>
 
-#include "harness/config/scene.h"
-#include "harness/observers/time_series.h"
+#include "harness/config/mechanism_reader.h"
 #include "harness/record/record.h"
 #include "mechanism/formulation/system.h"
 
 namespace loopbench::harness {
+
+// Values sampled at accepted steps, and the few of them that records keep.
+
+/// A value sampled at accepted steps.
+struct TimeSeries {
+  std::vector<double> t, value;
+};
+
+/// Of the first `samples` (all, unless said) every k-th, k chosen so that at most `points` >= 2
+/// remain, always with the last one.
+TimeSeries Thin(const TimeSeries& series, int points, std::size_t samples = SIZE_MAX);
+
+/// The largest distance of the first `samples` from the line through those that Thin() keeps.
+double LargestGap(const TimeSeries& series, int points, std::size_t samples);
+
+// What is watched along a run. Observers see accepted steps only; each keeps maxima and, where a
+// figure needs one, a series, and writes them into the case's record at the end. An observer that
+// saw nothing writes nothing: an empty cell is not a zero.
 
 /// An accepted step. The formulation's kinematics, speeds and, but for members of ensembles,
 /// accelerations are those of (t, y).
@@ -209,7 +225,7 @@ class SingularityObserver final : public Observer<Space> {
   std::unique_ptr<Work> work_;
 };
 
-/// Distance from what is known of a scene: branch invariants and closed form (scene.h).
+/// Distance from what is known of a scene: branch invariants and closed form (mechanism_reader.h).
 template <class Space>
 class ExactObserver final : public Observer<Space> {
  public:

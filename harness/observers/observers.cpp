@@ -1,8 +1,11 @@
+// Observers registered, made and asked, and what all of them use.
 #include <algorithm>
 #include <cmath>
 #include <limits>
 
+#include "harness/observers/observer.h"
 #include "harness/observers/registry.h"
+#include "mechanism/description/registration.h"
 
 namespace loopbench::harness {
 
@@ -136,5 +139,93 @@ template std::vector<std::unique_ptr<Observer<Spatial>>> MakeObservers(const Wat
 template std::vector<std::unique_ptr<Observer<Planar>>> MakeMemberObservers(const Watched<Planar>&);
 template std::vector<std::unique_ptr<Observer<Spatial>>> MakeMemberObservers(
     const Watched<Spatial>&);
+
+namespace {
+
+std::deque<ObserverRow>& Rows() {
+  static std::deque<ObserverRow> rows;
+  return rows;
+}
+
+}  // namespace
+
+void RegisterObserver(ObserverRow row, int alignment) {
+  const bool taken = std::ranges::find(Rows(), row.name, &ObserverRow::name) != Rows().end();
+  RequireSound({.kind = "observer",
+                .name = row.name,
+                .is_taken = taken,
+                .has_sentence = !row.sentence.empty(),
+                .has_factories = row.planar && row.spatial,
+                .alignment = alignment});
+  AddMeasures(row.measures);
+  Rows().push_back(std::move(row));
+}
+
+const std::deque<ObserverRow>& RegisteredObservers() { return Rows(); }
+
+template <class Space>
+void WriteFinalPoses(const MechanismDescription& user, const Compiled& compiled, int part,
+                     const Kinematics<Space, double>& kinematics, Record& record) {
+  const std::size_t stride = 1 + user.bodies.size() / kMostFinalBodies;
+  for (std::size_t i = 0; i < user.bodies.size(); i += stride) {
+    const BodyImage& image = compiled.bodies[i];
+    if (image.part != part) continue;
+    const Frame X = UserPose(compiled, static_cast<int>(i), &kinematics);
+    std::vector<double> pose{X.p.x(), X.p.y()};
+    bool planar = false;
+    if constexpr (Space::kRot == 1) planar = user.space == SpaceKind::kPlanar;
+    if (planar) {
+      if constexpr (Space::kRot == 1) {
+        pose.push_back(kinematics.poses()[image.body].angle + image.turn);
+      }
+    } else {
+      pose.push_back(X.p.z());
+      for (const int axis : {0, 1}) {
+        for (const int row : {0, 1, 2}) pose.push_back(X.R(row, axis));
+      }
+    }
+    record.Set("series.final." + user.bodies[i].name, std::move(pose));
+  }
+}
+
+template void WriteFinalPoses(const MechanismDescription&, const Compiled&, int,
+                              const Kinematics<Planar, double>&, Record&);
+template void WriteFinalPoses(const MechanismDescription&, const Compiled&, int,
+                              const Kinematics<Spatial, double>&, Record&);
+
+namespace {
+
+// Which of `n` samples stay: evenly spaced, always with the last one.
+std::vector<std::size_t> Kept(std::size_t n, int points) {
+  const std::size_t count = std::min(n, static_cast<std::size_t>(points));
+  std::vector<std::size_t> kept(count);
+  for (std::size_t i = 0; i < count; ++i) kept[i] = count == n ? i : i * (n - 1) / (count - 1);
+  return kept;
+}
+
+}  // namespace
+
+TimeSeries Thin(const TimeSeries& series, int points, std::size_t samples) {
+  TimeSeries thin;
+  for (const std::size_t k : Kept(std::min(samples, series.t.size()), points)) {
+    thin.t.push_back(series.t[k]);
+    thin.value.push_back(series.value[k]);
+  }
+  return thin;
+}
+
+double LargestGap(const TimeSeries& series, int points, std::size_t samples) {
+  const std::vector<std::size_t> kept = Kept(samples, points);
+  double gap = 0.0;
+  for (std::size_t i = 1; i < kept.size(); ++i) {
+    const std::size_t a = kept[i - 1], b = kept[i];
+    const double slope = (series.value[b] - series.value[a]) / (series.t[b] - series.t[a]);
+    for (std::size_t k = a + 1; k < b; ++k) {
+      const double line = series.value[a] + slope * (series.t[k] - series.t[a]);
+      gap = std::max(gap, std::abs(series.value[k] - line));
+    }
+  }
+  return gap;
+}
 
 }  // namespace loopbench::harness

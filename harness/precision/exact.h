@@ -1,14 +1,31 @@
-// A mechanism in the widest scalar: its start, and what the states of all runs are held against.
+// A mechanism in a wide scalar: its start, and its state held against runs.
 #pragma once
 
+#include <memory>
 #include <string>
 #include <vector>
 
 #include "harness/precision/scalars.h"
 #include "mechanism/description/outcome.h"
+#include "mechanism/formulation/system.h"
 #include "mechanism/model/kinematics.h"
 
 namespace loopbench::harness {
+
+template <class Space, class S>
+struct ClosedStart {
+  Outcome outcome = Outcome::kFinished;
+  std::string message;
+  std::unique_ptr<Mechanism<Space, S>> mechanism;  ///< in joint coordinates
+  std::unique_ptr<System<Space, S>> system;  ///< stands at the start; null where there is none
+};
+
+/// Assembles the start in double and closes its loops in S: positions, then speeds, by the
+/// projection of level `position`.
+template <class Space, class S>
+ClosedStart<Space, S> CloseStart(const MechanismDescription& description);
+
+// A mechanism in the widest scalar: its start, and what the states of all runs are held against.
 
 class Exact {
  public:

@@ -1,3 +1,16 @@
+// Integrators in any scalar: single steps of each method, and their step-size control.
+#pragma once
+
+#include <array>
+#include <cstdint>
+#include <functional>
+#include <span>
+#include <vector>
+
+#include "mechanism/description/outcome.h"
+
+namespace loopbench::harness {
+
 // One-step methods with the step-size control of profile `ode45`, in any scalar.
 //
 // ARKODE computes in double alone. To see what rounding does, the same method must run in narrower
@@ -10,16 +23,6 @@
 // with 2, 4, .., 20 substeps, extrapolated to order 20 by Aitken and Neville (Hairer, Norsett,
 // Wanner, Solving Ordinary Differential Equations I, section II.9), under the same controller. The
 // weights of ten columns add up to 550, and round-off grows as much; those of seven, to 56.
-#pragma once
-
-#include <cstdint>
-#include <functional>
-#include <span>
-#include <vector>
-
-#include "mechanism/description/outcome.h"
-
-namespace loopbench::harness {
 
 /// y' = f(t, y).
 template <class S>
@@ -68,5 +71,45 @@ struct OneStepResult {
 template <class S>
 OneStepResult IntegrateSystem(const Problem<S>& system, S t_end, std::vector<S>& y,
                               const OneStepOptions<S>& options);
+
+/// Room for steps from (t, y, f(t, y)) to t + h.
+template <class S>
+class OneStep {
+ public:
+  /// `columns` of Gragg's extrapolation, kMostColumns at most.
+  OneStep(const Problem<S>& system, OneStepMethod method, int columns);
+
+  /// The error estimate grows with the step as h^estimate_order().
+  int estimate_order() const { return method_ == OneStepMethod::kGragg ? 2 * columns_ - 1 : 5; }
+
+  /// y_new() and error() of a step; f is the derivative at (t, y). kNonFinite when a derivative is
+  /// not finite.
+  Outcome Attempt(S t, const std::vector<S>& y, const std::vector<S>& f, S h);
+
+  const std::vector<S>& y_new() const { return y_new_; }
+  const std::vector<S>& error() const { return error_; }
+  /// f at y_new() where the method knows it (the last stage of Dormand-Prince), else empty.
+  const std::vector<S>& f_new() const { return f_new_; }
+
+  /// f(t, y), counted, and whether it is finite.
+  Outcome Evaluate(S t, const std::vector<S>& y, std::vector<S>& f);
+  std::int64_t evaluations() const { return evaluations_; }
+
+ private:
+  static constexpr int kStages = 7;
+  Outcome DormandPrince(S t, const std::vector<S>& y, const std::vector<S>& f, S h);
+  Outcome Gragg(S t, const std::vector<S>& y, const std::vector<S>& f, S h);
+  /// The modified midpoint rule with n substeps.
+  Outcome Midpoint(S t, const std::vector<S>& y, const std::vector<S>& f, S h, int n,
+                   std::vector<S>& result);
+
+  const Problem<S>& system_;
+  OneStepMethod method_;
+  int columns_;
+  std::vector<S> y_new_, error_, f_new_, stage_, before_;
+  std::array<std::vector<S>, kStages> k_;
+  std::array<std::vector<S>, kMostColumns> table_;  ///< the last row of the extrapolation
+  std::int64_t evaluations_ = 0;
+};
 
 }  // namespace loopbench::harness

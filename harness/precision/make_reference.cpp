@@ -6,7 +6,7 @@
 #include <functional>
 #include <limits>
 
-#include "harness/precision/certify.h"
+#include "harness/precision/witness.h"
 
 namespace loopbench::harness {
 namespace {

@@ -73,7 +73,7 @@ enum class Rule {
 enum class Repeats {
   kAlways,
   /// Depends on the last bits of floating-point numbers, or on what the compiler makes of the code
-  /// (alignment of memory): comparable under one arithmetic only (origin.h).
+  /// (alignment of memory): comparable under one arithmetic only (provenance.h).
   kUnderOneArithmetic,
   /// Tells of the clock, of the machine and how busy it was, or of how the command was typed: two
   /// runs of one case by one program may differ in it.

@@ -1,10 +1,41 @@
-// Where numbers come from: command, machine, compiler, versions, commit. Stands below every table.
+// Where records and tables come from: program, machine, commit, command.
 #pragma once
 
 #include <string>
 #include <vector>
 
+#include "harness/record/record.h"
+
 namespace loopbench::harness {
+
+// Which machine, compiler, flags and mathematical library made a record, and from which commit.
+//
+// Stored with every record, because it decides what may be compared with what: times only on one
+// machine, bits only under one arithmetic.
+
+struct Origin {
+  std::string machine;   ///< processor model and number of logical processors
+  std::string compiler;  ///< name and version
+  std::string flags;     ///< build type, -march and what else changes results
+  std::string libm;  ///< hash of sines, powers, ... at fixed arguments: equal libraries, equal bits
+  std::string commit;  ///< "-dirty" when the tree was changed
+
+  /// Whether equal code gives equal bits: compiler, flags and libm known and the same.
+  bool SameArithmetic(const Origin& other) const;
+  /// Whether times may be compared: the machine known and the same.
+  bool SameMachine(const Origin& other) const;
+};
+
+/// Of this program, here.
+const Origin& ThisOrigin();
+
+/// Sets the keys "machine", "compiler", "flags", "libm" and "commit".
+void Stamp(Record& record);
+
+/// What Stamp() left; unknown parts are empty.
+Origin OriginOf(const Record& record);
+
+// Where numbers come from: command, machine, compiler, versions, commit. Stands below every table.
 
 /// One fact per line, "command: ...". `command` is what the user typed.
 std::vector<std::string> Provenance(const std::string& command);

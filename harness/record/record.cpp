@@ -3,7 +3,18 @@
 #include <fmt/format.h>
 
 #include <algorithm>
+#include <cmath>
 #include <limits>
+#include <nlohmann/json.hpp>
+#include <stdexcept>
+#include <type_traits>
+#include <utility>
+#include <vector>
+
+#include "harness/json/json_document.h"
+#include "harness/text/files.h"
+#include "harness/text/hash.h"
+#include "harness/text/words.h"
 
 namespace loopbench::harness {
 
@@ -46,6 +57,153 @@ const std::vector<double>& Record::Numbers(std::string_view key) const {
   if (value == nullptr) return kEmpty;
   const auto* series = std::get_if<std::vector<double>>(value);
   return series == nullptr ? kEmpty : *series;
+}
+namespace {
+
+template <typename Json>
+Json FromNumber(double number) {
+  return std::isfinite(number) ? Json(number) : Json(nullptr);
+}
+
+template <typename Json>
+Json FromValue(const Value& value) {
+  const auto convert = [](const auto& held) -> Json {
+    using Held = std::decay_t<decltype(held)>;
+    if constexpr (std::is_same_v<Held, std::monostate>) {
+      return nullptr;
+    } else if constexpr (std::is_same_v<Held, double>) {
+      return FromNumber<Json>(held);
+    } else if constexpr (std::is_same_v<Held, std::vector<double>>) {
+      Json series = Json::array();
+      for (const double number : held) series.push_back(FromNumber<Json>(number));
+      return series;
+    } else {
+      return held;
+    }
+  };
+  return std::visit(convert, value);
+}
+
+template <typename Json>
+std::string Dump(const Record& record) {
+  Json object = Json::object();
+  for (const auto& [key, value] : record.items()) object[key] = FromValue<Json>(value);
+  return object.dump(-1, ' ', false, Json::error_handler_t::replace);
+}
+
+}  // namespace
+
+std::string ToJsonObject(const Record& record) { return Dump<nlohmann::ordered_json>(record); }
+
+std::string ToJsonLine(const Record& record) {
+  std::string object = ToJsonObject(record);
+  const bool is_empty = record.items().empty();
+  object.replace(0, 1, fmt::format("{{\"format\":{}{}", kFileFormat, is_empty ? "" : ","));
+  return WithChecksum(std::move(object));
+}
+
+std::string CaseId(const Record& canonical_keys) {
+  // nlohmann::json keeps its keys sorted.
+  return Fnv1a(Dump<nlohmann::json>(canonical_keys));
+}
+namespace {
+
+constexpr std::string_view kKey = "\"checksum\":\"";
+constexpr std::size_t kDigits = 16, kSuffix = kKey.size() + kDigits + 2;  // with "}
+
+}  // namespace
+
+std::string WithChecksum(std::string object) {
+  object.pop_back();
+  if (object.size() > 1) object += ',';
+  const std::string checksum = Fnv1a(object);
+  return object.append(kKey).append(checksum).append("\"}");
+}
+
+bool VerifyChecksum(std::string_view line) {
+  if (line.size() <= kSuffix) return false;
+  const std::string_view object = line.substr(0, line.size() - kSuffix),
+                         end = line.substr(object.size());
+  const std::string expected = Fnv1a(object);
+  const std::string_view found = end.substr(kKey.size(), kDigits);
+  const bool is_named = end.starts_with(kKey);
+  if (is_named && found == expected) return true;
+  constexpr std::string_view kChanged = "the line was changed after it was written: found ";
+  if (is_named) {
+    throw std::runtime_error(
+        fmt::format("{}checksum \"{}\", expected \"{}\"", kChanged, Excerpt(found), expected));
+  }
+  if (found == expected) {
+    throw std::runtime_error(fmt::format("{}the key {}, expected \"checksum\"", kChanged,
+                                         Excerpt(end.substr(0, kKey.size() - 2))));
+  }
+  return false;
+}
+
+std::string Excerpt(std::string_view text) {
+  constexpr std::size_t kMost = 80;
+  std::string_view beginning = text.substr(0, kMost);
+  // whole characters only, where there are any
+  for (std::size_t cut = 0; cut < 4 && beginning.size() < text.size(); ++cut) {
+    if (!ContinuesCharacter(text[beginning.size()])) break;
+    beginning.remove_suffix(1);
+  }
+  if (EncodingFault(beginning).empty()) return Printable(std::string(beginning));
+  std::string shown;
+  for (const char c : beginning) {
+    const auto byte = static_cast<unsigned char>(c);
+    shown += byte >= 0x20 && byte < 0x7F ? std::string(1, c) : fmt::format("\\x{:02X}", byte);
+  }
+  return shown;
+}
+namespace {
+
+/// A value as JSON: what stands behind the key of an object that has no other.
+std::string ValueText(Value value) {
+  Record record;
+  record.Set("", std::move(value));
+  constexpr std::string_view kBefore = "{\"\":", kBehind = "}";
+  const std::string text = ToJsonObject(record);
+  return text.substr(kBefore.size(), text.size() - kBefore.size() - kBehind.size());
+}
+
+}  // namespace
+
+JsonObject::JsonObject(const Record& record) {
+  for (const auto& [key, value] : record.items()) Add(key, value);
+}
+
+void JsonObject::Append(std::string_view key, const std::string& document) {
+  if (!members_.empty()) members_ += ',';
+  members_ += ValueText(std::string(key)) + ':' + document;
+}
+
+JsonObject& JsonObject::Add(std::string_view key, Value value) {
+  Append(key, ValueText(std::move(value)));
+  return *this;
+}
+
+JsonObject& JsonObject::Add(std::string_view key, const std::vector<std::string>& texts) {
+  std::string list;
+  for (const std::string& text : texts) list += (list.empty() ? "" : ",") + ValueText(text);
+  Append(key, "[" + list + "]");
+  return *this;
+}
+
+JsonObject& JsonObject::Add(std::string_view key, const JsonObject& object) {
+  Append(key, object.Text());
+  return *this;
+}
+
+JsonObject& JsonObject::Add(std::string_view key, const std::vector<JsonObject>& objects) {
+  Append(key, JsonList(objects));
+  return *this;
+}
+
+std::string JsonList(const std::vector<JsonObject>& objects) {
+  std::string list;
+  for (const JsonObject& object : objects) list += (list.empty() ? "" : ",\n") + object.Text();
+  return "[" + list + "]";
 }
 
 }  // namespace loopbench::harness

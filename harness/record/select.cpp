@@ -11,7 +11,7 @@
 #include <optional>
 #include <system_error>
 
-#include "harness/text/config_error.h"
+#include "harness/text/files.h"
 
 namespace loopbench::harness {
 namespace {

@@ -1,18 +1,130 @@
-// A reference: what a mechanism does at given times, with the error that it is certified to.
-//
-// harness/precision/make_reference.h makes them; here is what they hold, and the file they are kept
-// in: one line of JSON with a checksum (harness/record/record_json.h).
+// References: snapshots of bodies and joints, kept in files, joined.
 #pragma once
 
+#include <Eigen/Geometry>
 #include <filesystem>
+#include <map>
 #include <optional>
 #include <string>
 #include <vector>
 
 #include "harness/config/experiment.h"
-#include "harness/reference/snapshot.h"
+#include "mechanism/simplify/compile.h"
 
 namespace loopbench::harness {
+
+// What a mechanism does at one time, in the user's terms, whatever it was compiled to; and how far
+// two such pictures are apart.
+
+/// Where a body is and how it moves, in the user's ground axes, at the body's origin.
+struct BodyState {
+  Frame pose;
+  Eigen::Vector3d velocity = Eigen::Vector3d::Zero();          ///< [m/s]
+  Eigen::Vector3d angular_velocity = Eigen::Vector3d::Zero();  ///< [rad/s]
+};
+
+struct Snapshot {
+  std::vector<BodyState> bodies;  ///< by the user's body, Ground included
+  /// By the user's joint: its coordinate [rad or m] where it has one, else NaN.
+  std::vector<double> joints;
+  std::vector<double> rates = {};  ///< of these coordinates; NaN where it was not taken
+  double energy = 0.0;  ///< kinetic and potential [J]; NaN where it is not known of the whole
+};
+
+/// A point of a user's body, in its axes from its origin [m].
+struct MeasuredPoint {
+  std::size_t body = 0;
+  Eigen::Vector3d at = Eigen::Vector3d::Zero();
+};
+
+/// A mechanism that is measured: the user's description and what became of it.
+struct Measured {
+  const MechanismDescription& user;
+  const Compiled& compiled;
+  /// Where distances of points are taken; none: at all of PointsOf().
+  std::vector<MeasuredPoint> points = {};
+};
+
+/// Whether the first coordinate of a joint is a length, not an angle.
+bool IsLength(const MechanismDescription& user, std::size_t joint);
+
+/// Origins, centres of mass and named points of all bodies but Ground.
+std::vector<MeasuredPoint> PointsOf(const MechanismDescription& user);
+
+/// One with room for all bodies and joints: what is fixed to Ground is where it is, all else at the
+/// origin.
+Snapshot EmptySnapshot(const Measured& measured);
+
+/// The same state of one part's body, at its centre of mass in the part's ground axes.
+template <class Space, class S>
+BodyState StateAtCentre(const Pose<Space, S>& pose, const Velocity<Space, S>& motion);
+
+/// Enters a part's body, with all that is fixed to it.
+void EnterBody(const Measured& measured, int part, int body, const BodyState& at_centre,
+               Snapshot* snapshot);
+/// Enters the coordinate of a joint of a part's description and its rate, which may be NaN.
+void EnterJoint(const Measured& measured, int part, int joint, double coordinate, double rate,
+                Snapshot* snapshot);
+
+/// The picture of one part at `kinematics`, rounded to double; other parts stay as they are.
+template <class Space, class S>
+void TakeSnapshot(const Measured& measured, int part, const Kinematics<Space, S>& kinematics,
+                  Snapshot* snapshot) {
+  const Mechanism<Space, S>& mechanism = kinematics.mechanism();
+  for (int body = 1; body < mechanism.num_bodies(); ++body) {
+    const auto index = static_cast<std::size_t>(body);
+    EnterBody(measured, part, body,
+              StateAtCentre<Space, S>(kinematics.poses()[index], kinematics.motions()[index]),
+              snapshot);
+  }
+  for (int j = 0; j < static_cast<int>(mechanism.joints().size()); ++j) {
+    const auto& joint = mechanism.joints()[static_cast<std::size_t>(j)];
+    if (joint.description < 0 || joint.kind->num_u != 1) continue;
+    EnterJoint(measured, part, joint.description,
+               static_cast<double>(kinematics.JointCoordinate(j)),
+               static_cast<double>(kinematics.JointSpeed(j)), snapshot);
+  }
+  snapshot->energy = static_cast<double>(ComputeEnergy(kinematics).total());
+}
+
+/// The largest distances between two pictures of what belongs to one part (-1: to any).
+struct Distance {
+  double position = 0.0;          ///< of named points, origins and centres of mass [m]
+  double rotation = 0.0;          ///< of bodies [rad]
+  double velocity = 0.0;          ///< of the points [m/s]
+  double angular_velocity = 0.0;  ///< [rad/s]
+  double angle = 0.0;             ///< of joint coordinates [rad], without whole turns
+  double displacement = 0.0;      ///< of joint coordinates [m]
+  double energy = 0.0;            ///< [J]; NaN where one is not known
+  /// By how much `a` is late on the way of `b`, to first order: least squares over the points, b's
+  /// speeds as weights [s]; and the largest distance that is left [m]. NaN and the position where
+  /// b stands still.
+  double late = 0.0, shape = 0.0;
+  double speed = 0.0;  ///< of b's points, root of the mean square [m/s]
+};
+Distance DistanceOf(const Measured& measured, int part, const Snapshot& a, const Snapshot& b);
+
+/// The larger of each.
+Distance Larger(const Distance& a, const Distance& b);
+
+template <class Space, class S>
+BodyState StateAtCentre(const Pose<Space, S>& pose, const Velocity<Space, S>& motion) {
+  BodyState state;
+  for (int i = 0; i < Space::kLin; ++i) {
+    state.pose.p[i] = static_cast<double>(pose.p[i]);
+    state.velocity[i] = static_cast<double>(motion.linear[i]);
+    for (int j = 0; j < Space::kLin; ++j) state.pose.R(i, j) = static_cast<double>(pose.R(i, j));
+  }
+  for (int i = 0; i < Space::kRot; ++i) {
+    state.angular_velocity[Space::kRot == 1 ? 2 : i] = static_cast<double>(motion.angular[i]);
+  }
+  return state;
+}
+
+// A reference: what a mechanism does at given times, with the error that it is certified to.
+//
+// harness/precision/make_reference.h makes them; here is what they hold, and the file they are kept
+// in: one line of JSON with a checksum (harness/record/record.h).
 
 /// Errors are held against a reference up to the time where its own exceeds this share of a link:
 /// a tenth of the least error of runs in double that is told from round-off over long horizons.
@@ -51,5 +163,20 @@ void WriteReference(const std::filesystem::path& path, const std::string& id,
 /// that is damaged or another's.
 std::optional<Reference> ReadReference(const std::filesystem::path& path, const std::string& id,
                                        const MechanismDescription& user);
+
+// The certified references beside several stores, put beside one.
+
+struct MergedReferences {
+  std::map<std::string, std::string> texts;  ///< name of a file in references/ and what is in it
+  std::vector<std::string> notes;            ///< of which certificate was kept, where two differ
+};
+
+/// All references of stores (`store_files`: their results.jsonl). Those of one name agree in all
+/// but the time they took, or the one that is certified longer, and then to less, is kept. Throws
+/// std::runtime_error, with the file's name, for one that is damaged or another's.
+MergedReferences MergeReferences(const std::vector<std::filesystem::path>& store_files);
+
+/// Writes them beside the store.
+void WriteReferences(const MergedReferences& references, const std::filesystem::path& store_file);
 
 }  // namespace loopbench::harness

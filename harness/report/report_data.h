@@ -1,20 +1,70 @@
-// What the page of a whole run shows: plain data, computed from records by the same judges, tables
-// and words as the other commands, and no word of HTML. The page (web/report/) shows it and judges
-// nothing.
+// The data of a report: motions, curves, tables.
 #pragma once
 
+#include <cstddef>
 #include <filesystem>
 #include <optional>
+#include <span>
 #include <string>
 #include <vector>
 
 #include "harness/judge/claims.h"
 #include "harness/judge/failure_map.h"
 #include "harness/judge/tradeoff.h"
-#include "harness/report/motions.h"
+#include "harness/record/record.h"
 #include "harness/tables/table.h"
+#include "harness/view/picture.h"
 
 namespace loopbench::harness {
+
+// Fewer points of a curve, without losing its extremes.
+
+/// Which of the points of a curve are kept, ascending: the first and the last, and of each of equal
+/// buckets of points in between the least and the largest value. All of them where there are at
+/// most `most` (at least 4). What is not finite is kept only where a bucket has nothing else: one
+/// point, so that the curve has its gap.
+std::vector<std::size_t> KeepExtremes(std::span<const double> values, std::size_t most);
+
+/// At most `most` (at least 2) of `count` places, evenly, with the first and the last.
+std::vector<std::size_t> KeepEvenly(std::size_t count, std::size_t most);
+
+// Where the bodies of a store's scenes are over time: from trajectories and references that are
+// kept beside it. Nothing is integrated here.
+
+/// The motion of one run, or of a reference.
+struct ReportPath {
+  std::string label = {};
+  std::optional<std::size_t> row = {};  ///< of the run; none for a reference
+  std::vector<double> times = {};       ///< [s], ascending
+  std::vector<Poses> poses = {};        ///< by time
+  std::size_t stored = 0;               ///< times that the file has
+};
+
+/// One mechanism with its motions.
+struct ReportScene {
+  std::string name = {};                ///< as in ReportTable::scenes
+  std::optional<Picture> picture = {};  ///< none: see `missing`
+  std::vector<ReportPath> paths = {};
+  std::string missing =
+      {};  ///< why there is no motion, and what to write into the experiment; or empty
+};
+
+/// Scenes in the order of the rows, whose names and scenes are given beside them. `changed` gets
+/// the messages of files that are not as their run wrote them.
+std::vector<ReportScene> FindScenes(const std::vector<Record>& rows,
+                                    const std::vector<std::string>& names,
+                                    const std::vector<std::string>& scenes,
+                                    const std::filesystem::path& store_file,
+                                    std::vector<std::string>* remarks,
+                                    std::vector<std::string>* changed);
+
+/// Above so many scenes none is drawn any more, above so many motions none of a scene; and places
+/// of bodies in all motions of a page.
+inline constexpr std::size_t kMostScenes = 12, kMostPaths = 60, kMostPlaces = 120'000;
+
+// What the page of a whole run shows: plain data, computed from records by the same judges, tables
+// and words as the other commands, and no word of HTML. The page (web/report/) shows it and judges
+// nothing.
 
 /// A sentence of the page, the rows of the first table that it is about, and the command that
 /// prints what it follows from.
@@ -93,5 +143,11 @@ struct ReportOptions {
 /// `records` as LoadRecords() gives them, at least one. Trajectories, mechanisms and references are
 /// read from beside the store.
 ReportData MakeReport(const std::vector<Record>& records, const ReportOptions& options);
+
+// The series of records as curves against time.
+
+/// Drift, energy error and true error of the rows that have them; together at most `most` points,
+/// shared evenly among the curves, with the extremes of each.
+std::vector<ReportPlot> MakePlots(const std::vector<Record>& rows, std::size_t most);
 
 }  // namespace loopbench::harness

@@ -1,13 +1,38 @@
-// The members of an ensemble: where they start, and how many of them stay on their branch.
+// Runs from perturbed starts, and records of parts as one.
 #pragma once
 
+#include <span>
 #include <string>
 #include <vector>
 
+#include "harness/analysis/growth.h"
 #include "harness/config/experiment.h"
-#include "harness/run/merge_parts.h"
+#include "harness/record/record.h"
 
 namespace loopbench::harness {
+
+// One record from the runs of parts that have nothing to do with each other.
+
+/// What one run leaves behind.
+struct Run {
+  Record record;
+  DriftSeries drift;
+  /// Of the projections [m] and of the energy balance [J], with the largest kinetic energy [J].
+  DriftSeries correction = {}, energy = {};
+  double kinetic = 0.0;
+  /// The scene's branch combinations (mechanism_reader.h) at the assembled start [rad]; empty
+  /// without.
+  std::vector<double> branch_start = {};
+};
+
+/// Each part has its own steps. Work adds up (steps, evaluations, wall time, rank); drift is the
+/// largest of the parts, at each time the largest of what each had last; the worst outcome and the
+/// earliest end count; energy errors and the energies that they are compared with add up, upper
+/// bounds of the whole's. Series of corrections, energy and angles, which belong to one sequence of
+/// steps, stay out.
+Run MergeParts(std::span<const Run> parts);
+
+// The members of an ensemble: where they start, and how many of them stay on their branch.
 
 /// The description of one member: held coordinates moved by uniform random amounts of at most
 /// `perturb`, or those that `between` names drawn uniformly between their bounds. The same seed and

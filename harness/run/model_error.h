@@ -1,13 +1,57 @@
-// How far a simplified model moves from the whole one, and what it takes (mechanism/simplify/).
+// Short runs beside each other: what hardly moves, and errors of simpler models.
 #pragma once
 
 #include <cstdint>
+#include <memory>
 #include <string>
 #include <vector>
 
+#include "harness/run/run_case.h"
 #include "mechanism/simplify/model.h"
+#include "mechanism/start/assembly.h"
 
 namespace loopbench::harness {
+
+// A description made ready to run by itself, without observers: joint coordinates, loops at level
+// position.
+
+template <class Space>
+struct ReadyToRun {
+  std::unique_ptr<System<Space, double>> system;  ///< null where it does not start
+  std::vector<double> y;                          ///< its state at time 0
+  std::string failure;                            ///< why it does not start
+};
+
+/// `mechanism` is the description in joint coordinates and outlives what comes back.
+template <class Space>
+ReadyToRun<Space> StartAtLevelPosition(const MechanismDescription& description,
+                                       const Mechanism<Space, double>& mechanism,
+                                       const std::string& formulation) {
+  ReadyToRun<Space> ready;
+  const Start<double> start = Assemble<Space>(description, mechanism);
+  ready.failure = start.message;
+  if (start.outcome != Outcome::kFinished) return ready;
+  const Column column{.formulation = formulation, .enforcement = Enforcement::kPosition};
+  auto system = MakeFormulation<Space>(column, mechanism);
+  const Outcome outcome = system->Start(0.0, start.q, start.u);
+  if (outcome != Outcome::kFinished) {
+    ready.failure = ToString(outcome);
+    return ready;
+  }
+  ready.y.assign(static_cast<std::size_t>(system->size()), 0.0);
+  system->ToState(start.q, start.u, ready.y);
+  ready.system = std::move(system);
+  return ready;
+}
+
+// A short run of a whole model, to see what hardly moves (mechanism/simplify/model.h).
+
+/// Runs the description for `duration` seconds by O-DCA at level position, ode45 at 1e-6, in joint
+/// coordinates. A run that ends earlier (its CPU time is `cpu_s`) tells what it saw until then, and
+/// why it ended; one that does not begin tells nothing.
+ShortRun MakeShortRun(const MechanismDescription& description, double duration, double cpu_s);
+
+// How far a simplified model moves from the whole one, and what it takes (mechanism/simplify/).
 
 /// Named points of bodies at equal times, ground axes [m].
 struct Track {

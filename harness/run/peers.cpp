@@ -5,7 +5,7 @@
 #include <map>
 
 #include "harness/config/formulations.h"
-#include "harness/text/config_error.h"
+#include "harness/text/files.h"
 #include "mechanism/description/registration.h"
 
 namespace loopbench::harness {

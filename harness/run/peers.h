@@ -9,7 +9,7 @@
 #include <vector>
 
 #include "harness/config/experiment.h"
-#include "harness/integrator/peer.h"
+#include "harness/integrator/arkode.h"
 
 namespace loopbench::harness {
 

@@ -1,4 +1,4 @@
-// Runs one case for accuracy: start, integration, observers, record.
+// One run of one case, and all runs that a case consists of.
 #pragma once
 
 #include <filesystem>
@@ -12,12 +12,31 @@
 #include "harness/config/options.h"
 #include "harness/generate/generated.h"
 #include "harness/integrator/arkode.h"
-#include "harness/integrator/ode.h"
 #include "harness/record/record.h"
+#include "harness/reference/error_meter.h"
 #include "harness/reference/reference.h"
+#include "harness/run/ensemble.h"
+#include "harness/run/side_by_side.h"
+#include "harness/trajectory/recorder.h"
 #include "mechanism/formulation/forward_jacobian.h"
 
 namespace loopbench::harness {
+
+// What a record says of a run besides what its observers have measured.
+
+/// How the run ended and what the integrator counted; a projection's Newton steps are evaluations,
+/// too.
+void WriteCounts(const IntegratorResult& result, std::int64_t projection_steps, bool is_implicit,
+                 Record& record);
+
+/// Growth of drift over an ensemble, of which `failed` did not finish.
+void WriteGrowth(const Growth& growth, int failed, Record& record);
+
+/// Growth of what is no drift, in the one run that it is known of: its exponent, without a verdict.
+void WriteExponent(const std::string& key, const DriftSeries& series, double horizon, double scale,
+                   Record& record);
+
+// Runs one case for accuracy: start, integration, observers, record.
 
 /// The mechanism with the formulation and level that a column names.
 template <class Space>
@@ -87,5 +106,20 @@ IntegratorOptions OptionsOf(const Case& one, const std::vector<double>& stop_tim
 /// Whatever goes wrong numerically ends in the record; only misuse throws.
 Record RunCase(const Experiment& experiment, const Case& one, const Reference* reference = nullptr,
                const std::filesystem::path& trajectory = {}, int threads = 1);
+
+// One motion of a case: start, integration, observers, and what they write.
+
+/// What is known of the motion: one of them, or nothing.
+struct HeldAgainst {
+  const Reference* reference = nullptr;     ///< with snapshots
+  const PublishedSeries* series = nullptr;  ///< with times within the horizon
+};
+
+/// `description` is that of the case or the start of a member of its ensemble, whose run has others
+/// `beside` it and is watched for less; null for the run of the case itself. Parts that are
+/// connected through ground alone run one after another.
+Run RunOnce(const Experiment& experiment, const Case& one, const MechanismDescription& description,
+            SideBySide* beside, const HeldAgainst& held = {},
+            const TrajectoryTask* trajectory = nullptr);
 
 }  // namespace loopbench::harness

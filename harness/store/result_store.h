@@ -1,18 +1,22 @@
-// The append-only store of results: one JSON object per line.
+// A store of records: what a run appends, what readers find, which runs are finished.
 #pragma once
 
+#include <cstdint>
 #include <filesystem>
 #include <mutex>
+#include <optional>
 #include <string>
 #include <string_view>
+#include <unordered_map>
 #include <vector>
 
 #include "harness/record/record.h"
-#include "harness/record/record_json.h"
 #include "harness/record/select.h"
 #include "harness/store/record_lines.h"
 
 namespace loopbench::harness {
+
+// The append-only store of results: one JSON object per line.
 
 /// The file of a store: `path` itself if it ends in ".jsonl", else results.jsonl in that folder.
 std::filesystem::path StoreFile(const std::filesystem::path& path);
@@ -66,7 +70,7 @@ class ResultStore {
 /// The last record of each case ("case_id"), at the place of its first: what tables show when a
 /// case was run again. One of the program `version` comes before those of others, so that going
 /// back to a program shows its numbers again. Records without a case_id all stay. Cases of equal
-/// keys are told apart (contents.h).
+/// keys are told apart (result_store.h).
 std::vector<Record> LatestRecords(const std::vector<Record>& records,
                                   std::string_view version = "");
 
@@ -94,5 +98,46 @@ using ReadWatch = std::function<void(std::size_t records, std::uint64_t bytes)>;
 /// and of each key of the conditions the first that has it: nobody says that no record has it.
 std::vector<Record> ReadRecords(const std::filesystem::path& path, const Selection& where,
                                 std::vector<std::string>* warnings, const ReadWatch& watch = {});
+
+// Cases that share all keys and differ in what they ran: told apart wherever records are read.
+
+/// The records, and in those that share all their keys (what stands before "case_id") with a record
+/// of another case_id "content" and, where one of them has it, "set" (what --set changed) moved
+/// before "case_id", among the keys: tables then show both as columns, labels name them. Records
+/// without a case_id stay as they are.
+std::vector<Record> WithContents(std::vector<Record> records);
+
+/// Tells cases apart in both where one of them has to (WithContents() of each): equal cases then
+/// have equal keys.
+void ShareContents(std::vector<Record>* one, std::vector<Record>* other);
+
+/// Throws std::runtime_error naming the store and one such case: `command` judges all records that
+/// match a rule together, and a rule cannot mean two mechanisms at once.
+void RequireOneContent(const std::vector<Record>& records, const std::filesystem::path& store,
+                       std::string_view command);
+
+// Which runs a store has, and which of them finished: all that going on with it needs to know.
+
+/// The text under a key of a record's line, read without the rest: it is a flat object in whose
+/// texts no quote stands bare. "" when there is none.
+/// @param quoted_key  "\"id\":\""
+std::string_view TextUnder(std::string_view quoted_key, std::string_view line);
+
+class FinishedRuns {
+ public:
+  /// `path` as for ResultStore. The store is read when first asked, a line at a time: a hundred
+  /// bytes are kept of each record. Throws std::runtime_error then, as ReadRecords() does.
+  explicit FinishedRuns(std::filesystem::path path) : path_(std::move(path)) {}
+
+  /// Whether the last run with this "id" finished; nothing when there was none.
+  std::optional<bool> Find(const std::string& id);
+
+ private:
+  void Read();
+
+  std::filesystem::path path_;
+  bool is_read_ = false;
+  std::unordered_map<std::uint64_t, bool> finished_;  ///< by the sixteen digits of the id
+};
 
 }  // namespace loopbench::harness

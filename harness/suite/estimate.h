@@ -1,4 +1,4 @@
-// About how long the pieces of a suite take, from pilots: the same work over a part of its horizon.
+// Before a run: its time, and the starts of its mechanisms.
 #pragma once
 
 #include <algorithm>
@@ -13,11 +13,12 @@
 
 #include "harness/config/experiment.h"
 #include "harness/isolation/processes.h"
-#include "harness/suite/precision_cases.h"
 #include "harness/suite/reference_cases.h"
 #include "harness/timing/time_cases.h"
 
 namespace loopbench::harness {
+
+// About how long the pieces of a suite take, from pilots: the same work over a part of its horizon.
 
 class TemporaryFolder;
 
@@ -88,5 +89,21 @@ class Estimate {
   std::map<std::string, Rate> rates_;
   std::vector<std::string> cut_off_;
 };
+
+// Whether starts can be assembled, asked before anything is run.
+
+/// Sentences about starts: faults of starts that cannot be assembled, values found and expected,
+/// and guesses that are missed.
+struct StartReport {
+  std::vector<std::string> faults, warnings;
+};
+
+/// Assembles the mechanism in a child process; limits that cut it off are a fault.
+StartReport CheckStart(const MechanismDescription& description, const ProcessLimits& limits);
+
+/// The same for the scenes of an experiment's combinations as they are run, under the limits of
+/// their cases, up to the first combination that has any fault. Scenes that combinations share are
+/// assembled once; members of ensembles are not looked at.
+StartReport CheckStarts(const std::vector<Experiment>& experiments);
 
 }  // namespace loopbench::harness

@@ -2,18 +2,184 @@
 
 #include <fmt/format.h>
 
-#include "harness/analysis/link_length.h"
+#include <algorithm>
+#include <cmath>
+#include <set>
+
+#include "harness/analysis/model_warnings.h"
+#include "harness/record/record.h"
 #include "harness/reference/error_meter.h"
-#include "harness/reference/series_meter.h"
 #include "harness/run/case_identity.h"
-#include "harness/text/config_error.h"
+#include "harness/suite/suite.h"
+#include "harness/text/files.h"
 #include "harness/text/hash.h"
 #include "mechanism/description/outcome.h"
+#include "mechanism/model/mechanism.h"
+
 #ifdef LOOPBENCH_PRECISIONS
 #include "harness/precision/make_reference.h"
 #endif
 
 namespace loopbench::harness {
+
+namespace {
+
+/// What the ladder runs of a scene, in one piece.
+MechanismDescription PlanarPart(const Experiment& experiment, const ExperimentScene& scene) {
+  CompileOptions options = experiment.compile;
+  options.islands = false;
+  const MechanismDescription description =
+      CompileScene(scene.mechanism.description, scene.mechanism.observe, options)
+          .compiled.parts.front()
+          .description;
+  const auto refuse = [&](const char* found, const char* expected) {
+    throw ConfigError(fmt::format("{}: /precision: scene \"{}\": found {}, expected {}",
+                                  experiment.path.string(), scene.name, found, expected));
+  };
+  for (const JointDescription& joint : description.joints) {
+    if (!IsBuiltIn(joint.type)) refuse("a joint of another program", "kinds in all scalars");
+  }
+  for (const ForceDescription& force : description.forces) {
+    if (std::holds_alternative<OtherForce>(force)) {
+      refuse("a force of another program", "forces in all scalars");
+    }
+  }
+  if (description.space != SpaceKind::kPlanar) refuse("a spatial mechanism", "planar ones");
+  const Mechanism<Planar, double> mechanism(description, Coordinates::kJoint);
+  if (!mechanism.stop_times().empty()) {
+    refuse("tables of time, at which steps would have to end", "mechanisms without them");
+  }
+  return description;
+}
+
+/// Throws ConfigError for a column whose formulation or level is compiled in double alone.
+void RequireScalars(const Experiment& experiment, const Column& column) {
+  const auto refuse = [&](const std::string& expected) {
+    throw ConfigError(fmt::format("{}: /precision: found {}, expected columns {}",
+                                  experiment.path.string(), ToString(column), expected));
+  };
+  if (std::ranges::find(kLadderFormulations, column.formulation) == kLadderFormulations.end()) {
+    refuse(fmt::format("of formulations in all scalars: {}", fmt::join(kLadderFormulations, ", ")));
+  }
+  if (!IsBuiltIn(column.enforcement)) refuse("at levels that come with Loopbench");
+}
+
+Record RungKeys(const Case& one, Scalar scalar, double tolerance) {
+  Record keys = one.keys;
+  keys.Set("kind", std::string("precision"));
+  keys.Set("rtol", tolerance);
+  keys.Set("atol", tolerance);
+  keys.Set("scalar", std::string(ToString(scalar)));
+  return keys;
+}
+
+void Write(const Rung& rung, Record& record) {
+  record.Set("outcome", std::string(ToString(rung.outcome)));
+  record.Set("t_reached", rung.t_reached);
+  if (!std::isnan(rung.error)) record.Set("error_final", rung.error);
+  record.Set("error_ruled_by", rung.error_ruled_by);
+  record.Set("drift_position_max", rung.drift);
+  record.Set("drift_ruled_by", rung.drift_ruled_by);
+  record.Set("steps", rung.steps);
+  record.Set("rejected", rung.rejected);
+  record.Set("rhs_evaluations", rung.rhs_evaluations);
+  record.Set("restarts", rung.restarts);
+  record.Set("wall_s", rung.wall_s);
+  record.Set("cpu_s", rung.cpu_s);
+}
+
+}  // namespace
+
+std::vector<LadderGroup> LadderGroups(const Experiment& experiment, const Selection& filter) {
+  std::vector<LadderGroup> groups;
+  for (const Case& one : ExpandLadders(experiment)) {
+    LadderGroup group{{.description = {},
+                       .column = one.column,
+                       .horizon = one.horizon,
+                       .precision = experiment.precision,
+                       .limits = one.limits},
+                      one.scene,
+                      {}};
+    const Precision& precision = group.task.precision;
+    bool any = false;
+    for (const Scalar scalar : precision.scalars) {
+      for (const double tolerance : precision.tolerances) {
+        group.keys.push_back(RungKeys(one, scalar, tolerance));
+        any = any || Matches(group.keys.back(), filter);
+      }
+    }
+    if (!any) continue;
+    Record reference = RungKeys(one, Scalar::kFloat128, precision.reference);
+    reference.Set("integrator", std::string("gragg"));
+    group.keys.insert(group.keys.begin(), reference);
+    std::string rungs;
+    for (const Record& keys : group.keys) rungs += CaseId(keys);
+    const std::string content = LadderContent(experiment, one, rungs);
+    for (Record& keys : group.keys) SetCaseId(&keys, content);
+    groups.push_back(std::move(group));
+  }
+  return groups;
+}
+
+std::size_t CountRungs(const Experiment& experiment) {
+  std::size_t count = 0;
+  for (const LadderGroup& group : LadderGroups(experiment)) count += group.keys.size();
+  return count;
+}
+
+void CheckLadders(const Experiment& experiment) {
+  const std::vector<Case> cases = ExpandLadders(experiment);
+  if (cases.empty()) return;
+  for (const Case& one : cases) RequireScalars(experiment, one.column);
+  const auto compile = [&](std::size_t) {
+    std::set<std::size_t> scenes;
+    for (const Case& one : cases) {
+      if (scenes.insert(one.scene).second) PlanarPart(experiment, experiment.scenes[one.scene]);
+    }
+    return std::string();
+  };
+  RunInProcesses(
+      1, 1, compile, [&](std::size_t) { return LimitsOfRuns(experiment.limits, 1); },
+      [&](std::size_t, const ProcessResult& result) {
+        if (result.ending == ProcessEnding::kThrew) throw ConfigError(result.text);
+      });
+}
+
+#ifdef LOOPBENCH_PRECISIONS
+
+void RequireLadders(const Experiment& experiment) { CheckLadders(experiment); }
+
+std::vector<Record> ClimbTogether(const Experiment& experiment, const LadderGroup& group) {
+  LadderTask task = group.task;
+  task.description = PlanarPart(experiment, experiment.scenes[group.scene]);
+  const Ladder ladder = RunLadder(task);
+  std::vector<Record> records = group.keys;
+  for (std::size_t i = 0; i < records.size(); ++i) {
+    if (ladder.start != Outcome::kFinished) {
+      records[i].Set("outcome", std::string(ToString(ladder.start)));
+      records[i].Set("message", ladder.message);
+    } else {
+      Write(i == 0 ? ladder.reference : ladder.rungs[i - 1], records[i]);
+    }
+  }
+  return records;
+}
+
+#else
+
+void RequireLadders(const Experiment& experiment) {
+  if (experiment.precision.scalars.empty()) return;
+  throw ConfigError(
+      fmt::format("{}: /precision: found runs in several scalars, expected none: this program was "
+                  "built without them (cmake -DLOOPBENCH_PRECISIONS=ON)",
+                  experiment.path.string()));
+}
+
+std::vector<Record> ClimbTogether(const Experiment&, const LadderGroup& group) {
+  return group.keys;
+}
+
+#endif
 
 ReferenceCase ReferenceOf(const Experiment& experiment, const Case& one,
                           const std::filesystem::path& store) {

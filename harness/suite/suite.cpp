@@ -3,23 +3,25 @@
 #include <fmt/format.h>
 
 #include <algorithm>
+#include <fstream>
+#include <sstream>
+#include <string_view>
 #include <unordered_set>
 #include <utility>
 
-#include "harness/isolation/interruption.h"
+#include "harness/config/mechanism_reader.h"
+#include "harness/isolation/processes.h"
 #include "harness/record/noise.h"
+#include "harness/reference/reference.h"
 #include "harness/run/case_identity.h"
 #include "harness/suite/estimate.h"
-#include "harness/suite/group_marks.h"
-#include "harness/suite/kept_files.h"
-#include "harness/suite/precision_cases.h"
 #include "harness/suite/reference_cases.h"
 #include "harness/suite/runner.h"
-#include "harness/text/config_error.h"
-#include "harness/text/output_file.h"
+#include "harness/text/files.h"
+#include "harness/text/hash.h"
 #include "harness/text/terminal.h"
 #include "harness/timing/time_cases.h"
-#include "harness/trajectory/trajectory_writer.h"
+#include "harness/trajectory/trajectory.h"
 
 namespace loopbench::harness {
 
@@ -206,6 +208,137 @@ SuiteCount RunSuite(Workload& workload, const SuiteOptions& options, FinishedRun
     }
   }
   return runner.count;
+}
+namespace {
+
+constexpr std::uintmax_t kLast = 512;  ///< bytes, of a record with its checksum
+
+/// Of the bytes before `end`, "" when they cannot be read.
+std::string HashBefore(std::ifstream& store, std::uintmax_t end) {
+  const std::uintmax_t begin = end - std::min(end, kLast);
+  std::string bytes(static_cast<std::size_t>(end - begin), '\0');
+  store.clear();
+  store.seekg(static_cast<std::streamoff>(begin));
+  store.read(bytes.data(), static_cast<std::streamsize>(bytes.size()));
+  return store.gcount() == static_cast<std::streamsize>(bytes.size()) ? Fnv1a(bytes) : "";
+}
+
+}  // namespace
+
+GroupMarks::GroupMarks(const std::filesystem::path& store, std::string content)
+    : store_(store),
+      file_(std::filesystem::path(store).replace_extension(".groups")),
+      content_(std::move(content)) {
+  std::ifstream lines(file_), bytes(store_, std::ios::binary);
+  std::error_code error;
+  const std::uintmax_t size = std::filesystem::file_size(store_, error);
+  if (error) return;
+  for (std::string line; std::getline(lines, line);) {
+    std::istringstream words(line);
+    std::string of, kind, hash, end;
+    std::size_t group = 0;
+    std::uintmax_t length = 0;
+    GroupMark mark;
+    words >> of >> kind >> group >> mark.records >> mark.failed >> length >> hash >> end;
+    // a torn line has no end
+    if (of != content_ || end != "." || length > size) continue;
+    if (HashBefore(bytes, length) == hash) marks_[{kind, group}] = mark;
+  }
+}
+
+std::optional<GroupMark> GroupMarks::Find(const std::string& kind, std::size_t group) const {
+  const auto mark = marks_.find({kind, group});
+  return mark == marks_.end() ? std::nullopt : std::optional(mark->second);
+}
+
+void GroupMarks::Add(const std::string& kind, std::size_t group, const GroupMark& mark) {
+  std::error_code error;
+  const std::uintmax_t size = std::filesystem::file_size(store_, error);
+  std::ifstream bytes(store_, std::ios::binary);
+  if (error || size == 0) return;
+  marks_[{kind, group}] = mark;
+  std::ofstream(file_, std::ios::app)
+      << fmt::format("{} {} {} {} {} {} {} .\n", content_, kind, group, mark.records, mark.failed,
+                     size, HashBefore(bytes, size));
+}
+namespace {
+
+/// Records may have been written by anybody: only what a run calls its files is a name.
+bool IsId(const std::string& text) {
+  return text.size() == 16 && text.find_first_not_of("0123456789abcdef") == std::string::npos;
+}
+
+std::filesystem::path MechanismPath(const std::filesystem::path& store_file,
+                                    const std::string& scene_id) {
+  return store_file.parent_path() / "mechanisms" / (scene_id + ".json");
+}
+
+/// The comment of a file holds the hash of all its bytes, with zeros instead of the hash.
+constexpr std::string_view kChecksum = "Kept by a run; checksum ", kZeros = "0000000000000000";
+
+std::string WithOwnHash(std::string text) {
+  const std::size_t at = text.find(kChecksum);
+  if (at == std::string::npos) return text;  // of version 1.0
+  text.replace(at + kChecksum.size(), kZeros.size(), kZeros);
+  return text.replace(at + kChecksum.size(), kZeros.size(), Fnv1a(text));
+}
+
+bool IsAsWritten(const std::string& text) { return WithOwnHash(text) == text; }
+
+}  // namespace
+
+MechanismDescription ReadKeptMechanism(const std::filesystem::path& file) {
+  if (!IsAsWritten(ReadFile(file))) {
+    throw ChangedFile(fmt::format(
+        "{}: the file was changed after its run wrote it: its checksum is not that of the file; "
+        "remove it: the same run writes it again",
+        file.string()));
+  }
+  return ReadMechanism(file).description;
+}
+
+std::filesystem::path MechanismOf(const Record& record, const std::filesystem::path& store_file) {
+  const std::string id = record.Text("scene_id");
+  return IsId(id) ? MechanismPath(store_file, id) : std::filesystem::path();
+}
+
+std::filesystem::path ReferenceOf(const Record& record, const std::filesystem::path& store_file) {
+  const std::string id = record.Text("reference_file");
+  return IsId(id) ? ReferencePath(store_file, id) : std::filesystem::path();
+}
+
+void KeepMechanisms(const std::vector<Experiment>& experiments,
+                    const std::filesystem::path& store_file) {
+  for (const Experiment& experiment : experiments) {
+    if (!experiment.reference && !experiment.output) continue;
+    for (const ExperimentScene& scene : experiment.scenes) {
+      const auto path = MechanismPath(store_file, Fnv1a(scene.mechanism.canonical));
+      if (std::filesystem::exists(path)) continue;
+      try {
+        WriteFileAtomically(
+            path, WithOwnHash(MechanismText(scene.mechanism.description, scene.mechanism.observe,
+                                            fmt::format("{}{}.", kChecksum, kZeros))));
+      } catch (const ConfigError&) {
+      }
+    }
+  }
+}
+
+void CopyMechanisms(const std::vector<Record>& records,
+                    const std::vector<std::filesystem::path>& stores,
+                    const std::filesystem::path& target) {
+  for (const Record& record : records) {
+    const std::filesystem::path to = MechanismOf(record, target);
+    if (to.empty() || std::filesystem::exists(to)) continue;
+    for (const std::filesystem::path& store : stores) {
+      const std::filesystem::path from = MechanismOf(record, store);
+      if (!std::filesystem::exists(from)) continue;
+      const std::string text = ReadFile(from);
+      if (!IsAsWritten(text)) continue;
+      WriteFileAtomically(to, text);
+      break;
+    }
+  }
 }
 
 }  // namespace loopbench::harness

@@ -1,17 +1,23 @@
-// Runs the cases of experiments in processes of their own, and keeps their records.
+// A run of an experiment: groups of cases, stores, and the files beside them.
 #pragma once
 
+#include <filesystem>
+#include <map>
+#include <optional>
 #include <string>
+#include <utility>
 #include <vector>
 
 #include "harness/config/experiment.h"
 #include "harness/isolation/processes.h"
+#include "harness/record/record.h"
 #include "harness/record/select.h"
-#include "harness/store/finished_runs.h"
 #include "harness/store/result_store.h"
 #include "harness/suite/workload.h"
 
 namespace loopbench::harness {
+
+// Runs the cases of experiments in processes of their own, and keeps their records.
 
 /// Which of the cases that a store already has are run again.
 enum class Rerun { kNone, kFailed, kAll };
@@ -53,16 +59,71 @@ struct SuiteCount {
 ///
 /// A case is done when the store has a record with its id. The id stands for everything that
 /// decides the run and for this very program. `finished` is what the store has when the call
-/// begins. Groups of long sweeps that are done are marked beside the store (group_marks.h), and not
+/// begins. Groups of long sweeps that are done are marked beside the store (suite.h), and not
 /// read again.
 ///
-/// Throws Interrupted (harness/isolation/interruption.h) on Ctrl-C; what is complete by then is in
+/// Throws Interrupted (harness/isolation/processes.h) on Ctrl-C; what is complete by then is in
 /// the store.
 ///
 /// Whatever a case does, it gets a record: outcomes "crashed", "process-time-limit", "memory-limit"
 /// and "bad-answer" are those of its process. Short cases share processes
-/// (harness/isolation/shared_processes.h).
+/// (harness/isolation/processes.h).
 SuiteCount RunSuite(Workload& workload, const SuiteOptions& options, FinishedRuns& finished,
                     ResultStore& store);
+
+// Which groups of a long sweep are done, beside the store: so that a run that goes on need not read
+// a million combinations to find that it has them.
+//
+// A mark is a line of results.groups: what is run (Workload::content()), the kind, the group, how
+// many records, how many of runs that did not finish, and what the store was when it was made: its
+// length and a hash of its last bytes. A store that is not what it was then, in front of that
+// length, has no such mark: the store is the truth, and whoever deletes the marks loses only time.
+
+struct GroupMark {
+  std::size_t records = 0, failed = 0;
+};
+
+class GroupMarks {
+ public:
+  /// Reads the marks of this content that hold for the store.
+  /// @param store  its file
+  GroupMarks(const std::filesystem::path& store, std::string content);
+
+  std::optional<GroupMark> Find(const std::string& kind, std::size_t group) const;
+
+  /// Says that all records of the group are in the store. A mark that cannot be written is
+  /// forgotten.
+  void Add(const std::string& kind, std::size_t group, const GroupMark& mark);
+
+ private:
+  std::filesystem::path store_, file_;
+  std::string content_;
+  std::map<std::pair<std::string, std::size_t>, GroupMark> marks_;
+};
+
+// What a store keeps beside its lines so that motions can be looked at later: the mechanisms of its
+// scenes, as files that every command reads, and their references.
+
+/// mechanisms/ID.json beside a store's `file`, ID being the record's "scene_id"; empty where it has
+/// none, or one that no run has written.
+std::filesystem::path MechanismOf(const Record& record, const std::filesystem::path& store_file);
+
+/// Reads such a file. Throws ChangedFile (trajectory/store_files.h) if its checksum is wrong, and
+/// as ReadMechanism() does.
+MechanismDescription ReadKeptMechanism(const std::filesystem::path& file);
+
+/// Writes those of all scenes whose motion is kept, in a reference or in trajectories, and that are
+/// not there yet. A mechanism that no file can say (parts of other programs) is left out.
+void KeepMechanisms(const std::vector<Experiment>& experiments,
+                    const std::filesystem::path& store_file);
+
+/// The reference of a record, beside the store's `file`; empty where the record has none.
+std::filesystem::path ReferenceOf(const Record& record, const std::filesystem::path& store_file);
+
+/// Copies the mechanisms of `records` from the first of the `stores` that has them to beside
+/// `target`, each whole or not at all.
+void CopyMechanisms(const std::vector<Record>& records,
+                    const std::vector<std::filesystem::path>& stores,
+                    const std::filesystem::path& target);
 
 }  // namespace loopbench::harness

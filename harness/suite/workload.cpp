@@ -3,17 +3,239 @@
 #include <fmt/format.h>
 
 #include <algorithm>
+#include <charconv>
+#include <limits>
+#include <map>
 #include <numeric>
 #include <set>
 #include <utility>
 
+#include "harness/record/measures.h"
 #include "harness/record/provenance.h"
 #include "harness/run/case_identity.h"
 #include "harness/suite/suite.h"
-#include "harness/text/config_error.h"
+#include "harness/text/files.h"
 #include "harness/text/hash.h"
 
 namespace loopbench::harness {
+
+Shard ParseShard(const std::string& text) {
+  Shard shard;
+  const char* const end = text.data() + text.size();
+  const auto index = std::from_chars(text.data(), end, shard.index);
+  const bool has_count = index.ec == std::errc() && index.ptr != end && *index.ptr == '/';
+  const auto count = has_count ? std::from_chars(index.ptr + 1, end, shard.count) : index;
+  if (!has_count || count.ec != std::errc() || count.ptr != end || shard.index < 1 ||
+      shard.index > shard.count) {
+    throw ConfigError(fmt::format("--shard: found \"{}\", expected k/n with 1 <= k <= n <= {}",
+                                  text, std::numeric_limits<int>::max()));
+  }
+  return shard;
+}
+namespace {
+
+constexpr std::size_t kSome = 64;             ///< combinations that stand for all
+constexpr std::size_t kEachValue = 2000;      ///< values of an axis that are tried
+constexpr std::size_t kMostBodies = 200'000;  ///< of a group: some 100 MB
+constexpr std::size_t kMostCases = 100'000;   ///< of a group: some 100 MB of records, too
+
+bool IsOn(const Condition& condition,
+          const std::vector<std::pair<std::string, std::size_t>>& axes) {
+  return std::ranges::any_of(axes, [&](const auto& axis) { return axis.first == condition.key; });
+}
+
+/// What all combinations have in common when they are alike.
+std::string KeysWithoutParameters(const Experiment& experiment) {
+  Experiment bare = experiment;
+  bare.parameters = Record();
+  bare.exclusions.clear();
+  std::string text;
+  for (const Case& one : Expand(bare))
+    text += fmt::format("{} {}\n", CaseId(one.keys), one.ensemble);
+  return text;
+}
+
+/// A rule or filter over combinations that are alike: the conditions on parameters, and which cases
+/// meet the others.
+struct SplitSelection {
+  Selection on_axes;
+  std::vector<bool> cases;
+};
+
+SplitSelection Split(const Selection& selection, const std::vector<Case>& cases,
+                     const std::vector<std::pair<std::string, std::size_t>>& axes) {
+  SplitSelection split;
+  Selection others;
+  for (const Condition& one : selection) (IsOn(one, axes) ? split.on_axes : others).push_back(one);
+  for (const Case& one : cases) split.cases.push_back(Matches(one.keys, others));
+  return split;
+}
+
+}  // namespace
+
+std::size_t RunsOf(const Case& one) {
+  return one.ensemble > 1 ? static_cast<std::size_t>(one.ensemble) + 1 : 1;
+}
+
+void AddTo(std::vector<CaseLine>* lines, const Case& one, std::size_t times) {
+  const std::string column = ToString(one.column);
+  auto line = std::ranges::find_if(*lines, [&](const CaseLine& known) {
+    return known.mechanism == one.mechanism && known.column == column;
+  });
+  if (line == lines->end()) line = lines->insert(line, {one.mechanism, column, 0, 0});
+  line->cases += times;
+  line->runs += times * RunsOf(one);
+}
+
+void RequireKeys(const std::vector<Experiment>& experiments, const Selection& filter) {
+  if (filter.empty()) return;
+  std::vector<std::string> known;
+  for (const Experiment& experiment : experiments) {
+    for (const Case& one : Expand(experiment)) {
+      for (const auto& [key, value] : one.keys.items()) {
+        if (std::ranges::find(known, key) == known.end()) known.push_back(key);
+      }
+    }
+  }
+  for (const Condition& condition : filter) {
+    if (std::ranges::find(known, condition.key) != known.end()) continue;
+    const bool is_measured = FindMeasure(condition.key) != nullptr;
+    throw ConfigError(fmt::format(
+        "--filter {}: no such key{}; cases have {}", condition.key,
+        is_measured ? " before a run, which measures it (table, plot and tradeoff choose by it: "
+                      "--where)"
+                    : "",
+        fmt::join(known, ", ")));
+  }
+}
+
+bool Passes(const Experiment& experiment, const Selection& filter) {
+  return std::ranges::any_of(Expand(experiment),
+                             [&](const Case& one) { return Matches(one.keys, filter); });
+}
+
+LongSweep::LongSweep(ExperimentSource source, const ExperimentFiles& files)
+    : source_(std::move(source)), filter_(files.filter), threads_(files.threads) {
+  for (const Condition& one : filter_) {
+    if (IsOn(one, source_.axes())) on_axes_.push_back(one);
+  }
+  const std::vector<std::size_t> sample = source_.EachValue(kEachValue);
+  const Experiment first = source_.Read(0);
+  const std::string keys = KeysWithoutParameters(first);
+  std::size_t bodies = 1, cases = 1;
+  for (const std::size_t combination : sample) {
+    const Experiment one = source_.Read(combination);
+    std::size_t all = 0;
+    cases = std::max(cases, Expand(one).size());
+    for (const ExperimentScene& scene : one.scenes)
+      all += scene.mechanism.description.bodies.size();
+    bodies = std::max(bodies, all);
+    are_alike_ = are_alike_ && KeysWithoutParameters(one) == keys;
+  }
+  if (count() > kMaxCases / cases) {
+    throw ConfigError(
+        fmt::format("{}: found {} combinations of up to {} cases, expected at most {} "
+                    "cases in one file",
+                    source_.path().string(), count(), cases, kMaxCases));
+  }
+  group_size_ =
+      std::clamp<std::size_t>(std::min(kMostBodies / bodies, kMostCases / cases), 1, kLongSweep);
+  RequireKeys({first}, filter_);
+  source_.CheckExclusions(sample);
+  const double step = static_cast<double>(count() - 1) / (kSome - 1);
+  for (std::size_t k = 0; k < kSome; ++k) {
+    for (Experiment& one : ReadOne(static_cast<std::size_t>(step * static_cast<double>(k) + 0.5))) {
+      some_.push_back(std::move(one));
+    }
+  }
+  // a filter may choose what lies between them
+  for (std::size_t i = 0; i < count() && some_.empty(); ++i) some_ = ReadOne(i);
+  if (some_.empty()) {
+    throw ConfigError(
+        fmt::format("{}: no case matches {}", source_.path().string(), ToText(filter_)));
+  }
+}
+
+bool LongSweep::ParametersPass(std::size_t combination) const {
+  return on_axes_.empty() || Matches(source_.Parameters(combination), on_axes_);
+}
+
+std::vector<Experiment> LongSweep::ReadOne(std::size_t combination) {
+  if (!ParametersPass(combination)) return {};
+  Experiment one = source_.Read(combination);
+  if (threads_ > 0) UseThreads(threads_, one);
+  if (!Passes(one, filter_)) return {};
+  std::vector<Experiment> passing;
+  passing.push_back(std::move(one));
+  return passing;
+}
+
+std::vector<Experiment> LongSweep::Read(std::size_t from, std::size_t to, const Shard& shard,
+                                        std::vector<std::int64_t>* numbers) {
+  std::vector<Experiment> experiments;
+  const auto parts = static_cast<std::size_t>(shard.count);
+  for (std::size_t i = from; i < to; ++i) {
+    const std::size_t combination = i * parts + static_cast<std::size_t>(shard.index - 1);
+    if (combination >= count()) break;
+    for (Experiment& one : ReadOne(combination)) {
+      experiments.push_back(std::move(one));
+      if (numbers != nullptr) numbers->push_back(static_cast<std::int64_t>(combination));
+    }
+  }
+  return experiments;
+}
+
+std::vector<CaseLine> LongSweep::CountAlike(const Experiment& first) const {
+  Experiment whole = first;
+  whole.exclusions.clear();
+  const std::vector<Case> cases = Expand(whole);
+  const auto axes = source_.axes();
+  const SplitSelection filter = Split(filter_, cases, axes);
+  std::vector<SplitSelection> rules;
+  for (const Selection& rule : first.exclusions) rules.push_back(Split(rule, cases, axes));
+  // few combinations of rules occur: how often each does
+  std::map<std::vector<bool>, std::size_t> times;
+  std::vector<bool> met(rules.size());
+  if (filter.on_axes.empty() && rules.empty()) {
+    times[met] = count();
+  } else {
+    for (std::size_t i = 0; i < count(); ++i) {
+      const Record parameters = source_.Parameters(i);
+      if (!Matches(parameters, filter.on_axes)) continue;
+      for (std::size_t r = 0; r < rules.size(); ++r) met[r] = Matches(parameters, rules[r].on_axes);
+      ++times[met];
+    }
+  }
+  std::vector<CaseLine> lines;
+  for (std::size_t k = 0; k < cases.size(); ++k) {
+    if (!filter.cases[k]) continue;
+    std::size_t all = 0;
+    for (const auto& [rules_met, number] : times) {
+      bool excluded = false;
+      for (std::size_t r = 0; r < rules.size(); ++r) {
+        excluded = excluded || (rules_met[r] && rules[r].cases[k]);
+      }
+      if (!excluded) all += number;
+    }
+    if (all > 0) AddTo(&lines, cases[k], all);
+  }
+  return lines;
+}
+
+std::vector<CaseLine> LongSweep::CountCases() {
+  if (are_alike_) {
+    Experiment first = source_.Read(0);
+    if (threads_ > 0) UseThreads(threads_, first);
+    return CountAlike(first);
+  }
+  std::vector<CaseLine> lines;
+  for (std::size_t i = 0; i < count(); ++i) {
+    for (const Experiment& one : ReadOne(i)) {
+      for (const Case& passing : SelectCases(one, filter_)) AddTo(&lines, passing);
+    }
+  }
+  return lines;
+}
 namespace {
 
 /// Of the sweep and what its first and last combinations are made of.

@@ -1,4 +1,4 @@
-// Which columns the tables have, and in which order.
+// Columns of tables of records, and the keys that tell records apart.
 #pragma once
 
 #include <optional>
@@ -11,6 +11,8 @@
 #include "harness/tables/table.h"
 
 namespace loopbench::harness {
+
+// Which columns the tables have, and in which order.
 
 /// What was run and how it ended, for a terminal: words that differ in their first letters are
 /// short.
@@ -33,7 +35,7 @@ const std::vector<TableColumn>& PrecisionColumns();
 /// The part of PrecisionColumns() that fits a terminal.
 const std::vector<TableColumn>& CompactPrecisionColumns();
 
-/// What simpler models of a mechanism cause and take (harness/cli/model_records.h), and the part of
+/// What simpler models of a mechanism cause and take (harness/cli/models.h), and the part of
 /// it that fits a terminal.
 const std::vector<TableColumn>& ModelColumns();
 const std::vector<TableColumn>& CompactModelColumns();

@@ -6,7 +6,6 @@
 #include <map>
 #include <utility>
 
-#include "harness/analysis/agreement.h"
 #include "harness/analysis/doubts.h"
 #include "harness/config/published_series.h"
 #include "harness/tables/columns.h"
@@ -112,7 +111,7 @@ std::string NameOfScene(const Record& record, std::span<const Record> records) {
                      NameOfRow(record, keys));
 }
 
-// What decides about runs that end differently (harness/analysis/agreement.h).
+// What decides about runs that end differently (harness/analysis/doubts.h).
 std::string Deciding(const std::vector<Record>& runs) {
   const bool one_integrator = std::ranges::all_of(runs, [&](const Record& run) {
     return run.Text("integrator") == runs.front().Text("integrator");

@@ -5,8 +5,8 @@
 #include <algorithm>
 #include <numeric>
 
-#include "harness/tables/text_column.h"
-#include "harness/text/screen.h"
+#include "harness/tables/table.h"
+#include "harness/text/terminal.h"
 
 namespace loopbench::harness {
 namespace {

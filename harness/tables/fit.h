@@ -24,7 +24,7 @@ std::string WhatHasLeft(const Table& table, const std::vector<std::size_t>& plac
 Table FitWidth(Table table, std::size_t width);
 
 /// The table as text for standard output, as wide and as coloured as its screen
-/// (harness/text/screen.h); in a file or a pipe the same as ToText().
+/// (harness/text/terminal.h); in a file or a pipe the same as ToText().
 std::string ToScreen(const Table& table);
 
 }  // namespace loopbench::harness

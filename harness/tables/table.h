@@ -1,7 +1,7 @@
-// One table, five writers: terminal text, CSV, Markdown, JSON and LaTeX. Each passes texts through
-// the function of its medium in harness/text/escape.h.
+// A table, and its formats: text, CSV, Markdown, JSON, LaTeX.
 #pragma once
 
+#include <algorithm>
 #include <span>
 #include <string>
 #include <utility>
@@ -9,8 +9,12 @@
 
 #include "harness/record/measures.h"
 #include "harness/record/record.h"
+#include "harness/text/escape.h"
 
 namespace loopbench::harness {
+
+// One table, five writers: terminal text, CSV, Markdown, JSON and LaTeX. Each passes texts through
+// the function of its medium in harness/text/escape.h.
 
 /// One column of a table.
 struct TableColumn {
@@ -75,7 +79,7 @@ std::string NumberCell(double number);
 std::vector<TableColumn> ColumnsUnderHeading(const Table& table);
 
 /// Aligned text: title, heading, rule, rows, notes. Columns are as wide as their widest cell, two
-/// spaces apart, counted in cells of a terminal (harness/text/cells.h). With `colour` cells have
+/// spaces apart, counted in cells of a terminal (harness/text/escape.h). With `colour` cells have
 /// the table's colours; the escape sequences take no place. fit.h makes tables as wide as a
 /// terminal.
 std::string ToText(const Table& table, bool colour = false);
@@ -102,5 +106,33 @@ std::string ToLatex(const Table& table);
 /// The format's name ("text", "csv", "markdown", "json" or "latex") chooses the writer.
 /// @throws std::invalid_argument for any other name.
 std::string Render(const Table& table, const std::string& format);
+
+// A column as text: digits stand below digits, whether a mark follows them or not.
+
+inline constexpr std::size_t kColumnGap = 2;  ///< [cells]
+
+struct TextColumn {
+  TextColumn(const TableColumn& shown, const std::vector<Record>& rows)
+      : column(shown), marked(std::ranges::any_of(rows, [&](const Record& row) {
+          return shown.format != Format::kText && IsDoubtful(row, shown.key);
+        })) {
+    width = CellsOf(EscapeTerminal(column.header));
+    for (const Record& row : rows) {
+      for (const std::string& line : LinesOf(row)) width = std::max(width, CellsOf(line));
+    }
+  }
+
+  /// At least one.
+  std::vector<std::string> LinesOf(const Record& row) const {
+    const std::string cell =
+        EscapeTerminal(Cell(row, column)) + (marked && !IsDoubtful(row, column.key) ? " " : "");
+    if (column.most_cells == 0) return {cell};
+    return BrokenInto(cell, column.most_cells);
+  }
+
+  TableColumn column;
+  bool marked;
+  std::size_t width = 0;  ///< [cells]
+};
 
 }  // namespace loopbench::harness

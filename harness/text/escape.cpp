@@ -1,10 +1,13 @@
 #include "harness/text/escape.h"
 
 #include <fmt/format.h>
+#include <locale.h>
 
 #include <algorithm>
 #include <charconv>
+#include <clocale>
 #include <cstdint>
+#include <cwchar>
 #include <iterator>
 
 #include "harness/text/hash.h"
@@ -210,6 +213,32 @@ std::string BreakableLatex(std::string_view raw) {
   return text;
 }
 
+std::string EscapeXml(std::string_view text) {
+  std::string escaped;
+  for (const char c : EscapeTerminal(text)) {
+    switch (c) {
+      case '&':
+        escaped += "&amp;";
+        break;
+      case '<':
+        escaped += "&lt;";
+        break;
+      case '>':
+        escaped += "&gt;";
+        break;
+      case '"':
+        escaped += "&quot;";
+        break;
+      case '\'':
+        escaped += "&#39;";
+        break;
+      default:
+        escaped += c;
+    }
+  }
+  return escaped;
+}
+
 std::string EscapeCsv(std::string_view raw) {
   const std::string text = (IsFormula(raw) ? "'" : "") + EscapeTerminal(raw);
   if (text.find_first_of(",\"#") == std::string::npos) return text;
@@ -254,6 +283,77 @@ std::string FileName(std::string_view name) {
   slug.resize(std::min(slug.size(), kLongest - kHashDigits - 1));
   slug.erase(slug.find_last_not_of(".-") + 1);
   return slug + (slug.empty() ? "" : "-") + Fnv1a(name).substr(0, kHashDigits);
+}
+namespace {
+
+/// The thread's characters are those of UTF-8 while it lives, whatever the environment says.
+class Utf8 {
+ public:
+  Utf8() {
+    static const locale_t utf8 = ::newlocale(LC_CTYPE_MASK, "C.UTF-8", nullptr);
+    if (utf8 != nullptr) before_ = ::uselocale(utf8);
+  }
+  ~Utf8() {
+    if (before_ != nullptr) ::uselocale(before_);
+  }
+  Utf8(const Utf8&) = delete;
+  Utf8& operator=(const Utf8&) = delete;
+
+ private:
+  locale_t before_ = nullptr;
+};
+
+struct Glyph {
+  std::size_t bytes = 1, cells = 1;
+};
+
+Glyph FirstGlyph(std::string_view text) {
+  wchar_t wide = 0;
+  std::mbstate_t state{};
+  const std::size_t bytes = std::mbrtowc(&wide, text.data(), text.size(), &state);
+  if (bytes == 0 || bytes > text.size()) return {};
+  const int cells = ::wcwidth(wide);
+  return {bytes, cells < 0 ? 1 : static_cast<std::size_t>(cells)};
+}
+
+}  // namespace
+
+std::string_view Beginning(std::string_view text, std::size_t width) {
+  const Utf8 utf8;
+  std::size_t bytes = 0;
+  for (std::size_t cells = 0; bytes < text.size();) {
+    const Glyph glyph = FirstGlyph(text.substr(bytes));
+    cells += glyph.cells;
+    if (cells > width) break;
+    bytes += glyph.bytes;
+  }
+  return text.substr(0, bytes);
+}
+
+std::size_t CellsOf(std::string_view text) {
+  const Utf8 utf8;
+  std::size_t cells = 0;
+  while (!text.empty()) {
+    const Glyph glyph = FirstGlyph(text);
+    cells += glyph.cells;
+    text.remove_prefix(glyph.bytes);
+  }
+  return cells;
+}
+
+std::vector<std::string> BrokenInto(std::string_view text, std::size_t width) {
+  std::vector<std::string> lines;
+  for (;;) {
+    const std::size_t fits = Beginning(text, width).size();
+    if (fits >= text.size()) break;
+    std::size_t end = fits < 2 ? std::string_view::npos : text.rfind(", ", fits - 1);
+    end = end == std::string_view::npos || end == 0 ? text.rfind(' ', fits) : end + 1;
+    if (end == std::string_view::npos || end == 0) end = std::max<std::size_t>(fits, 1);
+    lines.emplace_back(text.substr(0, end));
+    text.remove_prefix(end + (text[end] == ' ' ? 1 : 0));
+  }
+  lines.emplace_back(text);
+  return lines;
 }
 
 }  // namespace loopbench::harness

@@ -1,14 +1,18 @@
+// Texts of users on their way into a terminal, a figure, a table or a file's name, and their room.
+#pragma once
+
+#include <cstddef>
+#include <string>
+#include <string_view>
+#include <vector>
+
+namespace loopbench::harness {
+
 // Names and other texts of users on their way into a terminal, a figure, a table or a file's name.
 //
 // Texts come from files that may have been written by anybody. Every writer passes them through the
 // function of its medium, so that what is drawn or printed is the text and never an instruction.
-// JSON is the exception: its writer (harness/record/record_json.h) keeps every character.
-#pragma once
-
-#include <string>
-#include <string_view>
-
-namespace loopbench::harness {
+// JSON is the exception: its writer (harness/record/record.h) keeps every character.
 
 /// The text with every character shown that would else act: control characters (also U+0080 to
 /// U+009F), marks of writing direction, line separators and bytes that are no UTF-8 become "\n",
@@ -36,6 +40,10 @@ std::string EscapeLatex(std::string_view text);
 /// letters.
 std::string BreakableLatex(std::string_view text);
 
+/// Text of SVG and HTML, in an element or an attribute: no character of it is markup, and control
+/// characters are shown (escape.h).
+std::string EscapeXml(std::string_view text);
+
 /// A field of CSV, quoted where RFC 4180 (or a reader that takes "#" for a comment) needs it. A
 /// text that a spreadsheet would take for a formula (it begins with =, +, - or @ and is no number)
 /// gets an apostrophe before it, which spreadsheets hide; JSON has such texts as they are.
@@ -51,5 +59,20 @@ std::string QuoteGnuplotTick(std::string_view text);
 /// '+' and '-', at most 200 of them, not beginning with '.' or '-'. A name that is not one already
 /// becomes a slug with a hash of the whole name, so that two names never share a file.
 std::string FileName(std::string_view name);
+
+// How much room a text takes on a terminal. One cell holds a letter; a character of Chinese,
+// Japanese or Korean takes two, an accent that combines with the letter before it takes none.
+
+/// Cells of a text in UTF-8 without control characters (EscapeTerminal), by the C library's table.
+/// Characters that it does not know, and bytes that are none, count as one. Terminals agree but for
+/// characters made of several, such as some emoji.
+std::size_t CellsOf(std::string_view text);
+
+/// The longest beginning of at most `width` cells, with the marks that belong to its last letter.
+std::string_view Beginning(std::string_view text, std::size_t width);
+
+/// `text` in lines of at most `width` > 1 cells, broken behind a comma where there is one, else at
+/// a space; a word longer than that is broken too.
+std::vector<std::string> BrokenInto(std::string_view text, std::size_t width);
 
 }  // namespace loopbench::harness

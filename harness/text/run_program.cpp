@@ -2,18 +2,38 @@
 
 #include <fmt/format.h>
 #include <spawn.h>
+#include <sys/mman.h>
 #include <sys/wait.h>
 #include <unistd.h>
 
+#include <array>
 #include <atomic>
 #include <cerrno>
 #include <csignal>
 #include <cstring>
+#include <exception>
+#include <new>
 
 #include "harness/text/files.h"
-#include "harness/text/memory_file.h"
 
 namespace loopbench::harness {
+
+MemoryFile::MemoryFile(const char* what) : descriptor_(::memfd_create(what, MFD_CLOEXEC)) {
+  if (descriptor_ < 0) FailOn("make in memory", what);
+}
+
+MemoryFile::~MemoryFile() { ::close(descriptor_); }
+
+std::string MemoryFile::Text() const {
+  std::string text;
+  std::array<char, 1 << 16> buffer{};
+  for (off_t at = 0;;) {
+    const ssize_t count = ::pread(descriptor_, buffer.data(), buffer.size(), at);
+    if (count <= 0) return text;
+    text.append(buffer.data(), static_cast<std::size_t>(count));
+    at += count;
+  }
+}
 namespace {
 
 std::atomic<pid_t> under_way = 0;
@@ -62,6 +82,34 @@ void EndProgram() {
   ::kill(child, SIGTERM);
   while (::waitpid(child, nullptr, 0) < 0 && errno == EINTR) {
   }
+}
+namespace {
+
+int exit_code = 2;
+std::string_view last_words;
+std::terminate_handler before = nullptr;
+
+void Terminate() {
+  if (std::current_exception() != nullptr) {
+    try {
+      throw;
+    } catch (const std::bad_alloc&) {
+      [[maybe_unused]] const auto written =
+          ::write(STDERR_FILENO, last_words.data(), last_words.size());
+      ::_exit(exit_code);
+    } catch (...) {  // as before
+    }
+  }
+  before();
+}
+
+}  // namespace
+
+void ExitWithoutMemory(int code, std::string_view message) {
+  exit_code = code;
+  last_words = message;
+  const std::terminate_handler known = std::set_terminate(&Terminate);
+  if (known != &Terminate) before = known;
 }
 
 }  // namespace loopbench::harness

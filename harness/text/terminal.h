@@ -1,9 +1,9 @@
-// The standard streams of the programs. All that they print goes through here: text that cannot be
-// written is an error with its reason, and never a signal or a line in somebody else's file.
+// Standard output and error, and what their reader sees.
 #pragma once
 
 #include <fmt/format.h>
 
+#include <cstddef>
 #include <string_view>
 #include <type_traits>
 #include <utility>
@@ -11,6 +11,30 @@
 #include "harness/text/escape.h"
 
 namespace loopbench::harness {
+
+// What whoever reads standard output or standard error sees: the one place that decides width and
+// colour (docs/decisions/024).
+
+bool OutputIsTerminal();
+
+struct Screen {
+  std::size_t width = 0;  ///< [cells]; 0: as wide as it takes, for files and pipes
+  bool colour = false;
+};
+
+/// Of standard output. A terminal that does not know its width has that of the environment's
+/// COLUMNS, else 80. There is colour on a terminal that has it, unless https://no-color.org is
+/// obeyed.
+Screen OutputScreen();
+
+/// Of standard error: where progress is shown, if it is a terminal (width > 0).
+Screen ErrorScreen();
+
+/// From now on standard output is as wide as it takes: --wide.
+void ShowWide();
+
+// The standard streams of the programs. All that they print goes through here: text that cannot be
+// written is an error with its reason, and never a signal or a line in somebody else's file.
 
 /// The first line of main(). Opens those of the descriptors 0, 1 and 2 that are closed: the next
 /// file, a store for example, would get their numbers and with them all that is printed. What was

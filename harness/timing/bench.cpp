@@ -14,8 +14,7 @@
 #include <optional>
 #include <sstream>
 
-#include "harness/config/benchmark_reader.h"
-#include "harness/record/origin.h"
+#include "harness/config/benchmarks.h"
 #include "harness/record/provenance.h"
 #include "harness/text/files.h"
 #include "harness/text/terminal.h"

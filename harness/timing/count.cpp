@@ -12,14 +12,13 @@
 #include <filesystem>
 #include <vector>
 
-#include "harness/config/benchmark_reader.h"
-#include "harness/record/origin.h"
-#include "harness/record/record_json.h"
+#include "harness/config/benchmarks.h"
+#include "harness/record/provenance.h"
+#include "harness/record/record.h"
 #include "harness/text/files.h"
 #include "harness/text/numeric_option.h"
 #include "harness/text/terminal.h"
 #include "harness/timing/allocations.h"
-#include "harness/timing/callgrind.h"
 #include "harness/timing/subject.h"
 
 namespace loopbench::harness {

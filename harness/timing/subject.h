@@ -1,20 +1,23 @@
-// One benchmark's work, ready to be repeated: a right-hand side or an integrator step of one column
-// of one mechanism, always from the same state.
-//
-// States are computed, not stored: the mechanism's start, moved for a short while, so that speeds
-// and all terms of the equations are there. Their hashes are saved (configs/benchmarks/), and a
-// state that comes out differently is refused, because times of different states do not compare.
+// What is timed, and what counts its instructions.
 #pragma once
 
 #include <cstdint>
 #include <memory>
 #include <span>
 #include <string>
+#include <string_view>
 
 #include "harness/config/benchmarks.h"
 #include "mechanism/description/outcome.h"
 
 namespace loopbench::harness {
+
+// One benchmark's work, ready to be repeated: a right-hand side or an integrator step of one column
+// of one mechanism, always from the same state.
+//
+// States are computed, not stored: the mechanism's start, moved for a short while, so that speeds
+// and all terms of the equations are there. Their hashes are saved (configs/benchmarks/), and a
+// state that comes out differently is refused, because times of different states do not compare.
 
 /// Positions and speeds at which a mechanism is measured, the same for all columns of one
 /// coordinate set.
@@ -54,5 +57,11 @@ class BenchmarkSubject {
 std::unique_ptr<BenchmarkSubject> MakeSubject(const MechanismDescription& description,
                                               const Column& column, const BenchmarkState& state,
                                               const std::string& integrator, double step);
+
+// Instruction counts from the files of Callgrind (valgrind --tool=callgrind).
+
+/// Executed instructions in one file of Callgrind: the first number of its "totals:" line, counted
+/// as event "Ir". Throws std::runtime_error that names `file` when there is no such line.
+std::int64_t CallgrindInstructions(std::string_view text, const std::string& file);
 
 }  // namespace loopbench::harness

@@ -1,5 +1,4 @@
-// Holds a trajectory, of whatever program, against a mechanism: are its constraints kept, its
-// energy, and do its speeds belong to its positions?
+// Trajectories held against the equations, and against each other.
 #pragma once
 
 #include <optional>
@@ -10,6 +9,9 @@
 #include "harness/trajectory/user_mechanism.h"
 
 namespace loopbench::harness {
+
+// Holds a trajectory, of whatever program, against a mechanism: are its constraints kept, its
+// energy, and do its speeds belong to its positions?
 
 /// The largest of some number, and when.
 struct LargestAt {
@@ -76,5 +78,24 @@ class MotionReader {
 /// std::runtime_error for no row, or one without a finite number in a column of the motion.
 TrajectoryCheck CheckTrajectory(const std::filesystem::path& path,
                                 const MechanismDescription& user);
+
+// Two trajectories of one mechanism beside each other.
+
+/// A column that both have.
+struct SharedColumn {
+  std::string label, unit;
+  std::size_t in_ours = 0, in_theirs = 0;
+};
+
+/// Columns with the same label, but for the time, in our order.
+std::vector<SharedColumn> SharedColumns(const Trajectory& ours, const Trajectory& theirs);
+
+/// Ours at a time, by the cubic through the four rows around it, or the row itself where it has
+/// that time; NaN outside.
+double ValueAt(const Trajectory& ours, std::size_t column, double t);
+
+/// Theirs minus ours at their times, angles without whole turns; NaN where ours has none.
+std::vector<double> Differences(const Trajectory& ours, const Trajectory& theirs,
+                                const SharedColumn& column);
 
 }  // namespace loopbench::harness

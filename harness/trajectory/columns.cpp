@@ -2,7 +2,12 @@
 
 #include <fmt/format.h>
 
+#include <cmath>
+#include <numbers>
+#include <utility>
+
 #include "harness/text/escape.h"
+#include "harness/trajectory/user_mechanism.h"
 
 namespace loopbench::harness {
 namespace {
@@ -158,6 +163,210 @@ std::vector<TrajectoryColumn> TrajectoryColumns(const MechanismDescription& user
     }
   }
   return columns;
+}
+namespace {
+
+/// `angle` with the whole turns that bring it next to `near`.
+double Unwrapped(double angle, double near) {
+  return near + std::remainder(angle - near, 2 * std::numbers::pi);
+}
+
+/// q or -q, which say the same, whichever is nearer to `last`.
+void KeepSign(const double* last, double* q) {
+  double product = 0.0;
+  for (int i = 0; i < 4; ++i) product += last[i] * q[i];
+  for (int i = 0; product < 0.0 && i < 4; ++i) q[i] = -q[i];
+}
+
+template <class Space>
+class RowOf final : public RowWriter {
+ public:
+  RowOf(const MechanismDescription& user, const OutputOptions& output)
+      : user_(user),
+        output_(output),
+        mechanism_(user),
+        reactions_(mechanism_),
+        A_(user.bodies.size(), Acceleration<Space, double>::Zero()),
+        applied_(user.bodies.size(), Wrench<Space, double>::Zero()) {}
+
+  void Write(const MomentOfRun& moment, std::vector<double>* row) override {
+    row_ = row;
+    row->assign(1, moment.t);
+    mechanism_.Set(moment.t, moment.bodies);
+    if (output_.Has(OutputPart::kJoints)) Joints(moment);
+    for (std::size_t b = 1; b < user_.bodies.size(); ++b) {
+      if (output_.Has(OutputPart::kBodies)) Body(moment.bodies[b]);
+      if (!output_.Has(OutputPart::kPoints)) continue;
+      for (const auto& [name, at] : user_.bodies[b].points) {
+        Push(moment.bodies[b].PointAt(at));
+        Push(moment.bodies[b].VelocityAt(at));
+      }
+    }
+    if (output_.Has(OutputPart::kReactions)) Bearings(moment);
+    if (output_.Has(OutputPart::kForces)) Forces();
+    if (output_.Has(OutputPart::kEnergy)) {
+      const Energy<double> energy = ComputeEnergy(mechanism_.kinematics());
+      for (const double value :
+           {energy.kinetic, energy.potential, moment.supplied, moment.dissipated}) {
+        row->push_back(value);
+      }
+    }
+    last_ = *row;
+  }
+
+  std::vector<std::pair<std::string, std::int64_t>> Open() const override {
+    std::vector<std::pair<std::string, std::int64_t>> open;
+    const std::vector<TrajectoryColumn> columns = TrajectoryColumns(user_, output_);
+    for (std::size_t i = 0; i < open_.size(); ++i) {
+      if (open_[i] > 0) open.emplace_back(columns[i].Label(), open_[i]);
+    }
+    return open;
+  }
+
+ private:
+  void Push(const Eigen::Vector3d& v) {
+    row_->insert(row_->end(), v.data(), v.data() + Space::kLin);
+  }
+
+  void Joints(const MomentOfRun& moment) {
+    for (std::size_t j = 0; j < user_.joints.size(); ++j) {
+      const auto words = ValueWords(user_.joints[j].type, user_.space, false);
+      if (words.empty()) continue;
+      double q[7], u[6];
+      mechanism_.Measure(static_cast<int>(j), q, u);
+      const auto& kind = *mechanism_.mechanism().joints()[j].kind;
+      if (Space::kRot == 3) Continue(words, kind, moment.followed[j], q);
+      row_->insert(row_->end(), q, q + kind.num_q);
+      row_->insert(row_->end(), u, u + kind.num_u);
+    }
+  }
+
+  /// Angles and quaternions of a joint in space go on from the last row.
+  void Continue(const std::vector<ValueWord>& words, const JointKind<Space, double>& kind,
+                double followed, double* q) const {
+    const double* last = last_.empty() ? nullptr : last_.data() + row_->size();
+    if (kind.has_quaternion() && last != nullptr) KeepSign(last, q);
+    for (std::size_t i = 0; i < words.size(); ++i) {
+      // a helix tells its turns
+      if (words[i].unit != "rad" || kind.parameter != 0.0) continue;
+      if (words.size() == 1 && std::isfinite(followed)) {
+        q[i] = Unwrapped(q[i], followed);
+      } else if (last != nullptr) {
+        q[i] = Unwrapped(q[i], last[i]);
+      }
+    }
+  }
+
+  void Body(const BodyMotion& body) {
+    Push(body.pose.p);
+    if (Space::kRot == 1) {
+      row_->push_back(body.angle);
+    } else {
+      double q[4];
+      ToQuaternion(Rotation<Spatial, double>(body.pose.R), q);
+      if (!last_.empty()) KeepSign(last_.data() + row_->size(), q);
+      row_->insert(row_->end(), q, q + 4);
+    }
+    Push(body.velocity);
+    if (Space::kRot == 1) {
+      row_->push_back(body.angular_velocity.z());
+    } else {
+      Push(body.angular_velocity);
+    }
+  }
+
+  void Bearings(const MomentOfRun& moment) {
+    for (std::size_t b = 1; b < user_.bodies.size(); ++b) {
+      const Eigen::Vector3d a = moment.bodies[b].AccelerationAt(user_.bodies[b].com);
+      const Eigen::Vector3d& alpha = moment.bodies[b].angular_acceleration;
+      for (int i = 0; i < Space::kLin; ++i) A_[b].linear[i] = a[i];
+      for (int i = 0; i < Space::kRot; ++i) A_[b].angular[i] = alpha[Space::kRot == 1 ? 2 : i];
+    }
+    AppliedForces<Space, double>(mechanism_.kinematics(), applied_);
+    reactions_.Solve(A_, applied_);
+    for (std::size_t j = 0; j < user_.joints.size(); ++j) {
+      if (user_.joints[j].type != JointType::kFree) Bearing(static_cast<int>(j));
+    }
+  }
+
+  void Bearing(int j) {
+    Rotation<Space, double> axes = Rotation<Space, double>::Identity();
+    const auto& joint = mechanism_.mechanism().joints()[j];
+    if (output_.axes == OutputAxes::kJoint) {
+      axes = mechanism_.kinematics().poses()[joint.from].R * joint.X_PF.R;
+    }
+    const Wrench<Space, double> F = reactions_.Of(j, axes);
+    for (int i = 0; i < Space::kLin; ++i) PushOrOpen(F.linear[i]);
+    for (int i = 0; i < Space::kRot; ++i) PushOrOpen(F.angular[i]);
+    for (const PrescribedMotion& motion : user_.joints[static_cast<std::size_t>(j)].motions) {
+      PushOrOpen(reactions_.DriveOf(j, motion.coordinate));
+    }
+  }
+
+  /// A number of a reaction, counted where there is none.
+  void PushOrOpen(double value) {
+    if (open_.size() <= row_->size()) open_.resize(row_->size() + 1, 0);
+    open_[row_->size()] += std::isnan(value);
+    row_->push_back(value);
+  }
+
+  /// Each force by itself. Only the bodies that it names are touched.
+  void Forces() {
+    std::size_t f = 0;
+    std::ranges::fill(applied_, Wrench<Space, double>::Zero());
+    const Kinematics<Space, double>& kinematics = mechanism_.kinematics();
+    mechanism_.mechanism().forces().ForEach([&](const auto& element) {
+      element.AddWrenches(kinematics, applied_);
+      ForceDescription force = user_.forces[f++];
+      const ForceParts parts = PartsOf(force);
+      if (parts.joint != nullptr) {
+        const auto& joint = mechanism_.mechanism().joints()[*parts.joint];
+        const auto& state = kinematics.joints()[*parts.joint];
+        const Wrench<Space, double> F = ShiftForce<Space, double>(applied_[joint.to], -state.r_Q);
+        row_->push_back(F.dot(mechanism_.DirectionOfSpeed(*parts.joint, 0)));
+        applied_[joint.to].setZero();
+        applied_[joint.from].setZero();
+        return;
+      }
+      const BodyPoint& last = *parts.points.back();
+      const Linear<Space, double> on_last = applied_[last.body].linear;
+      if (parts.points.size() == 2) {
+        row_->push_back(Tension(*parts.points.front(), last, on_last));
+      } else {
+        for (int i = 0; i < Space::kLin; ++i) row_->push_back(on_last[i]);
+      }
+      for (const BodyPoint* point : parts.points) applied_[point->body].setZero();
+    });
+  }
+
+  /// With which a force on the second point pulls it to the first; 0 where the points meet.
+  double Tension(const BodyPoint& first, const BodyPoint& second,
+                 const Linear<Space, double>& on_second) const {
+    const auto at = [&](const BodyPoint& point) {
+      return PointOfBody<Space, double>(point, user_).StateIn(mechanism_.kinematics()).p;
+    };
+    const Linear<Space, double> between = at(first) - at(second);
+    const double distance = between.norm();
+    return distance > 0.0 ? on_second.dot(between) / distance : 0.0;
+  }
+
+  const MechanismDescription& user_;
+  const OutputOptions& output_;
+  UserMechanism<Space> mechanism_;
+  Reactions<Space> reactions_;
+  std::vector<Acceleration<Space, double>> A_;
+  std::vector<Wrench<Space, double>> applied_;
+  std::vector<double>* row_ = nullptr;
+  std::vector<double> last_;        ///< row
+  std::vector<std::int64_t> open_;  ///< by column, how often there was no number
+};
+
+}  // namespace
+
+std::unique_ptr<RowWriter> MakeRowWriter(const MechanismDescription& user,
+                                         const OutputOptions& output) {
+  if (user.space == SpaceKind::kPlanar) return std::make_unique<RowOf<Planar>>(user, output);
+  return std::make_unique<RowOf<Spatial>>(user, output);
 }
 
 }  // namespace loopbench::harness

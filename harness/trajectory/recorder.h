@@ -8,9 +8,9 @@
 #include <vector>
 
 #include "harness/record/record.h"
-#include "harness/reference/snapshot.h"
-#include "harness/trajectory/row.h"
-#include "harness/trajectory/trajectory_writer.h"
+#include "harness/reference/reference.h"
+#include "harness/trajectory/columns.h"
+#include "harness/trajectory/trajectory.h"
 #include "mechanism/formulation/system.h"
 #include "mechanism/loops/tree_dynamics.h"
 

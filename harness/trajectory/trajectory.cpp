@@ -5,13 +5,20 @@
 #include <cerrno>
 #include <charconv>
 #include <cmath>
+#include <fstream>
 #include <limits>
+#include <memory>
 #include <set>
 #include <stdexcept>
+#include <string_view>
+#include <utility>
 
-#include "harness/record/excerpt.h"
+#include "harness/json/json_document.h"
+#include "harness/record/record.h"
+#include "harness/text/escape.h"
 #include "harness/text/files.h"
-#include "harness/text/output_file.h"
+#include "harness/text/hash.h"
+#include "harness/trajectory/check.h"
 #include "mechanism/algebra/space.h"
 
 namespace loopbench::harness {
@@ -203,6 +210,306 @@ std::optional<PoseColumns> FindPose(const std::vector<TrajectoryColumn>& columns
 std::filesystem::path TrajectoryPath(const std::filesystem::path& store_file,
                                      const std::string& id) {
   return store_file.parent_path() / "trajectories" / (id + ".csv");
+}
+namespace {
+
+/// Where columns stand in a file, and which of them do not.
+class Places {
+ public:
+  explicit Places(const std::vector<TrajectoryColumn>& columns) : columns_(columns) {}
+
+  /// The places of all of `wanted`; those that are not there go to `missing`.
+  std::vector<std::size_t> Of(const std::vector<TrajectoryColumn>& wanted,
+                              std::vector<std::string>* missing) const {
+    std::vector<std::size_t> places;
+    for (const TrajectoryColumn& column : wanted) {
+      const auto at = std::ranges::find(columns_, column);
+      if (at == columns_.end()) missing->push_back(column.Label());
+      places.push_back(static_cast<std::size_t>(at - columns_.begin()));
+    }
+    return places;
+  }
+
+ private:
+  const std::vector<TrajectoryColumn>& columns_;
+};
+
+std::string Listed(const std::vector<std::string>& labels) {
+  constexpr std::size_t kMost = 6;
+  std::string text;
+  for (std::size_t i = 0; i < std::min(kMost, labels.size()); ++i) {
+    text += fmt::format("{}\"{}\"", i == 0 ? "" : ", ", labels[i]);
+  }
+  if (labels.size() > kMost) text += fmt::format(" and {} more", labels.size() - kMost);
+  return text;
+}
+
+/// A mechanism that joint coordinates put in place.
+struct ByJoints {
+  virtual ~ByJoints() = default;
+  virtual void Set(double t, const std::vector<double>& row, bool has_speeds,
+                   std::vector<BodyMotion>* bodies) = 0;
+};
+
+template <class Space>
+struct ByJointsIn final : ByJoints {
+  ByJointsIn(const MechanismDescription& user, const Places& places,
+             std::vector<std::string>* missing, std::vector<std::string>* no_speed)
+      : compiled(Compile(user, CompileOptions::None())),
+        mechanism(Unreleased(user), Coordinates::kJoint),
+        kinematics(mechanism),
+        q(VectorX<double>::Zero(mechanism.num_q())),
+        u(VectorX<double>::Zero(mechanism.num_u())) {
+    for (const TreeStep& step : mechanism.tree()) {
+      const Joint<Space, double>& joint = mechanism.joints()[step.joint];
+      if (joint.description < 0) {
+        // nothing but a virtual joint leads there
+        missing->push_back("a joint of body " + mechanism.body_names()[step.child]);
+        continue;
+      }
+      const auto columns = JointColumns(user, static_cast<std::size_t>(joint.description));
+      // prescribed coordinates follow their function, whatever a file says
+      std::vector<TrajectoryColumn> q_of, u_of;
+      for (int i = 0; i < joint.kind->num_q; ++i) {
+        if (mechanism.DriveOf(joint, i) < 0) q_of.push_back(columns[i]);
+      }
+      for (int i = 0; i < joint.kind->num_u; ++i) {
+        if (mechanism.DriveOf(joint, i) < 0) u_of.push_back(columns[joint.kind->num_q + i]);
+      }
+      for (const std::size_t at : places.Of(q_of, missing)) of_q.push_back(at);
+      for (const std::size_t at : places.Of(u_of, no_speed)) of_u.push_back(at);
+    }
+  }
+
+  void Set(double t, const std::vector<double>& row, bool has_speeds,
+           std::vector<BodyMotion>* bodies) override {
+    std::size_t next_q = 0, next_u = 0;
+    for (const TreeStep& step : mechanism.tree()) {
+      const Joint<Space, double>& joint = mechanism.joints()[step.joint];
+      for (int i = 0; i < joint.num_q(); ++i) q[joint.q_offset + i] = row[of_q[next_q++]];
+      for (int i = 0; i < joint.num_u(); ++i) {
+        const std::size_t at = of_u[next_u++];
+        if (has_speeds) u[joint.u_offset + i] = row[at];
+      }
+    }
+    kinematics.SetTime(t);
+    kinematics.UpdatePosition(q);
+    kinematics.UpdateVelocity(u);
+    EnterPart<Space>(compiled, 0, kinematics, {}, bodies);
+  }
+
+  Compiled compiled;
+  Mechanism<Space, double> mechanism;
+  Kinematics<Space, double> kinematics;
+  VectorX<double> q, u;
+  std::vector<std::size_t> of_q, of_u;  ///< columns, in the order of the tree
+};
+
+}  // namespace
+
+struct MotionReader::Work {
+  const MechanismDescription& user;
+  std::vector<BodyMotion> bodies;
+  std::vector<std::vector<std::size_t>> of_body;  ///< pose and speeds; empty: by joints
+  std::unique_ptr<ByJoints> joints;
+  bool has_speeds = false;
+};
+
+MotionReader::MotionReader(const MechanismDescription& user,
+                           const std::vector<TrajectoryColumn>& columns, const std::string& file)
+    : work_(new Work{user, std::vector<BodyMotion>(user.bodies.size()), {}, nullptr, false}) {
+  const Places places(columns);
+  const std::size_t pose = user.space == SpaceKind::kPlanar ? 3 : 7;
+  std::vector<std::string> no_pose, no_speed;
+  work_->of_body.resize(user.bodies.size());
+  for (std::size_t b = 1; b < user.bodies.size(); ++b) {
+    const auto wanted = BodyColumns(user, b);
+    const auto speeds = wanted.begin() + static_cast<std::ptrdiff_t>(pose);
+    work_->of_body[b] = places.Of({wanted.begin(), speeds}, &no_pose);
+    const auto more = places.Of({speeds, wanted.end()}, &no_speed);
+    work_->of_body[b].insert(work_->of_body[b].end(), more.begin(), more.end());
+  }
+  work_->has_speeds = no_speed.empty();
+  if (no_pose.empty()) return;
+  work_->of_body.clear();
+  std::vector<std::string> no_joint;
+  no_speed.clear();
+  if (user.space == SpaceKind::kPlanar) {
+    work_->joints = std::make_unique<ByJointsIn<Planar>>(user, places, &no_joint, &no_speed);
+  } else {
+    work_->joints = std::make_unique<ByJointsIn<Spatial>>(user, places, &no_joint, &no_speed);
+  }
+  work_->has_speeds = no_speed.empty();
+  if (no_joint.empty()) return;
+  throw std::runtime_error(
+      fmt::format("{}: found neither the poses of all bodies nor the coordinates of joints that "
+                  "lead to them, expected {}, or else {}",
+                  file, Listed(no_pose), Listed(no_joint)));
+}
+
+MotionReader::~MotionReader() = default;
+
+bool MotionReader::from_joints() const { return work_->joints != nullptr; }
+bool MotionReader::has_speeds() const { return work_->has_speeds; }
+
+const std::vector<BodyMotion>& MotionReader::Read(double t, const std::vector<double>& row) {
+  Work& work = *work_;
+  if (work.joints) {
+    work.joints->Set(t, row, work.has_speeds, &work.bodies);
+    return work.bodies;
+  }
+  const bool planar = work.user.space == SpaceKind::kPlanar;
+  const std::size_t pose = planar ? 3 : 7;
+  for (std::size_t b = 1; b < work.bodies.size(); ++b) {
+    const std::vector<std::size_t>& at = work.of_body[b];
+    BodyMotion& body = work.bodies[b];
+    body.pose = PoseColumns{at, planar}.At(row.data());
+    if (planar) body.angle = row[at[2]];
+    if (!work.has_speeds) continue;
+    const auto value = [&](std::size_t i) { return row[at[pose + i]]; };
+    body.velocity = {value(0), value(1), planar ? 0.0 : value(2)};
+    body.angular_velocity = planar ? Eigen::Vector3d(0.0, 0.0, value(2))
+                                   : Eigen::Vector3d(value(3), value(4), value(5));
+  }
+  return work.bodies;
+}
+namespace {
+
+constexpr std::size_t kBuffer = 1 << 20;
+constexpr const char* kPart = ".part";
+
+}  // namespace
+
+TrajectoryWriter::TrajectoryWriter(const std::filesystem::path& path,
+                                   const std::vector<TrajectoryColumn>& columns,
+                                   const std::vector<std::string>& notes, TrajectoryFormat format)
+    : file_(path, Onto::kNoInput, kPart), format_(format) {
+  buffer_.reserve(kBuffer);
+  if (format_ == TrajectoryFormat::kJsonLines) {
+    for (const TrajectoryColumn& column : columns) labels_.push_back(Json(column.Label()).dump());
+    return;
+  }
+  for (const std::string& note : notes) Note(note);
+  for (std::size_t i = 0; i < columns.size(); ++i) {
+    buffer_ += (i == 0 ? "" : ",") + EscapeCsv(columns[i].Label());
+  }
+  buffer_ += '\n';
+}
+
+void TrajectoryWriter::Note(const std::string& note) {
+  buffer_ += "# " + EscapeTerminal(note) + '\n';
+}
+
+void TrajectoryWriter::Write(std::span<const double> row) {
+  const bool is_json = format_ == TrajectoryFormat::kJsonLines;
+  constexpr std::size_t kLongest = 32;
+  char digits[kLongest];
+  for (std::size_t i = 0; i < row.size(); ++i) {
+    if (is_json) {
+      buffer_ += i == 0 ? '{' : ',';
+      buffer_ += labels_[i];
+      buffer_ += ':';
+    } else if (i > 0) {
+      buffer_ += ',';
+    }
+    if (std::isfinite(row[i])) {
+      buffer_.append(digits, std::to_chars(digits, digits + kLongest, row[i]).ptr);
+    } else {
+      buffer_ += is_json ? "null" : "nan";
+    }
+  }
+  buffer_ += is_json ? "}\n" : "\n";
+  ++rows_;
+  if (buffer_.size() >= kBuffer) Flush();
+}
+
+void TrajectoryWriter::Flush() {
+  file_.Write(buffer_);
+  hash_.Add(buffer_);
+  buffer_.clear();
+}
+
+std::string TrajectoryWriter::Finish(const std::vector<std::string>& notes) {
+  for (const std::string& note : notes) {
+    if (format_ == TrajectoryFormat::kCsv) Note(note);
+  }
+  Flush();
+  file_.Finish();
+  return hash_.Text();
+}
+
+void RemovePart(const std::filesystem::path& path) {
+  std::error_code error;
+  std::filesystem::remove(path.string() + kPart, error);
+}
+
+void RemoveParts(const std::filesystem::path& store_file) {
+  std::error_code error;
+  const std::filesystem::path folder = TrajectoryPath(store_file, "any").parent_path();
+  std::vector<std::filesystem::path> parts;
+  for (const auto& entry : std::filesystem::directory_iterator(folder, error)) {
+    if (entry.path().extension() == kPart) parts.push_back(entry.path());
+  }
+  for (const auto& part : parts) std::filesystem::remove(part, error);
+}
+
+std::filesystem::path TrajectoryOf(const Record& record, const std::filesystem::path& store_file) {
+  const std::filesystem::path name = record.Text("trajectory");
+  if (name.empty() || name.extension() != ".csv" || name.filename() != name) return {};
+  return TrajectoryPath(store_file, name.stem().string());
+}
+
+void VerifyTrajectory(const Record& record, const std::filesystem::path& file) {
+  const std::string expected = record.Text("trajectory_hash");
+  if (expected.empty()) return;
+  FnvHash hash;
+  std::ifstream in(file, std::ios::binary);
+  std::string block(std::size_t{1} << 20, '\0');
+  while (in.read(block.data(), static_cast<std::streamsize>(block.size())) || in.gcount() > 0) {
+    hash.Add(std::string_view(block).substr(0, static_cast<std::size_t>(in.gcount())));
+  }
+  if (!in.eof()) FailOn("read", file);
+  if (hash.Text() == expected) return;
+  throw ChangedFile(
+      fmt::format("{}: the file was changed after its run wrote it: found hash {}, expected {}; "
+                  "run --rerun all makes it again",
+                  file.string(), hash.Text(), expected));
+}
+
+namespace {
+
+bool IsAsWritten(const Record& record, const std::filesystem::path& file) try {
+  if (!std::filesystem::exists(file)) return false;
+  VerifyTrajectory(record, file);
+  return true;
+} catch (const ChangedFile&) {
+  return false;
+}
+
+}  // namespace
+
+std::vector<std::string> CopyTrajectories(const std::vector<Record>& records,
+                                          const std::vector<std::filesystem::path>& stores,
+                                          const std::filesystem::path& target) {
+  std::vector<std::string> missing;
+  for (const Record& record : records) {
+    const std::filesystem::path to = TrajectoryOf(record, target);
+    if (to.empty()) continue;
+    bool is_there = false;
+    for (const std::filesystem::path& store : stores) {
+      const std::filesystem::path from = TrajectoryOf(record, store);
+      if (!IsAsWritten(record, from)) continue;
+      is_there = true;
+      std::filesystem::path part = to;
+      part += ".part";
+      MakeFolderOf(part);
+      std::filesystem::copy_file(from, part, std::filesystem::copy_options::overwrite_existing);
+      std::filesystem::rename(part, to);
+      break;
+    }
+    if (!is_there) missing.push_back(to.filename().string());
+  }
+  return missing;
 }
 
 }  // namespace loopbench::harness

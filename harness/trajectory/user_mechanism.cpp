@@ -1,8 +1,93 @@
 #include "harness/trajectory/user_mechanism.h"
 
+#include <Eigen/Sparse>
+#include <Eigen/SparseQR>
 #include <algorithm>
+#include <cmath>
+#include <limits>
+
+#include "mechanism/algebra/factors.h"
+#include "mechanism/loops/tree_dynamics.h"
 
 namespace loopbench::harness {
+namespace {
+
+constexpr double kNaN = std::numeric_limits<double>::quiet_NaN();
+
+template <class Space, class Kind>
+Eigen::Vector3d LinearOf(const SpatialVector<Space, double, Kind>& V) {
+  Eigen::Vector3d v = Eigen::Vector3d::Zero();
+  for (int i = 0; i < Space::kLin; ++i) v[i] = V.linear[i];
+  return v;
+}
+template <class Space, class Kind>
+Eigen::Vector3d AngularOf(const SpatialVector<Space, double, Kind>& V) {
+  Eigen::Vector3d w = Eigen::Vector3d::Zero();
+  for (int i = 0; i < Space::kRot; ++i) w[Space::kRot == 1 ? 2 : i] = V.angular[i];
+  return w;
+}
+
+/// At the centre of mass, in the part's ground axes.
+template <class Space>
+BodyMotion AtCentre(const Pose<Space, double>& pose, const Velocity<Space, double>& V) {
+  BodyMotion motion;
+  for (int i = 0; i < Space::kLin; ++i) {
+    motion.pose.p[i] = pose.p[i];
+    for (int j = 0; j < Space::kLin; ++j) motion.pose.R(i, j) = pose.R(i, j);
+  }
+  if constexpr (Space::kRot == 1) motion.angle = pose.angle;
+  motion.velocity = LinearOf(V);
+  motion.angular_velocity = AngularOf(V);
+  motion.acceleration = motion.angular_acceleration = Eigen::Vector3d::Constant(kNaN);
+  return motion;
+}
+
+}  // namespace
+
+std::vector<BodyMotion> AtRest(const Compiled& compiled) {
+  std::vector<BodyMotion> bodies(compiled.bodies.size());
+  for (std::size_t i = 0; i < bodies.size(); ++i) {
+    if (compiled.bodies[i].part >= 0) continue;
+    bodies[i].pose = compiled.bodies[i].X;
+    bodies[i].angle = compiled.bodies[i].turn;
+  }
+  return bodies;
+}
+
+template <class Space>
+void EnterPart(const Compiled& compiled, int part, const Kinematics<Space, double>& kinematics,
+               std::span<const Acceleration<Space, double>> accelerations,
+               std::vector<BodyMotion>* bodies) {
+  const CompiledPart& own = compiled.parts[static_cast<std::size_t>(part)];
+  for (std::size_t i = 0; i < compiled.bodies.size(); ++i) {
+    const BodyImage& image = compiled.bodies[i];
+    if (image.part != part) continue;
+    const auto b = static_cast<std::size_t>(image.body);
+    BodyMotion carrier = AtCentre<Space>(kinematics.poses()[b], kinematics.motions()[b]);
+    if (!accelerations.empty()) {
+      carrier.acceleration = LinearOf(accelerations[b]);
+      carrier.angular_acceleration = AngularOf(accelerations[b]);
+    }
+    Eigen::Vector3d com = own.description.bodies[b].com;
+    if (Space::kRot == 1) com.z() = 0.0;
+    // the user's origin seen from the carrier's centre of mass, in carrier axes
+    const Eigen::Vector3d at = image.X.p - com;
+    BodyMotion& body = (*bodies)[i];
+    body.pose = {own.R_WC * carrier.pose.R * image.X.R, own.R_WC * carrier.PointAt(at)};
+    body.angle = carrier.angle + image.turn;
+    body.velocity = own.R_WC * carrier.VelocityAt(at);
+    body.angular_velocity = own.R_WC * carrier.angular_velocity;
+    body.acceleration = own.R_WC * carrier.AccelerationAt(at);
+    body.angular_acceleration = own.R_WC * carrier.angular_acceleration;
+  }
+}
+
+#define LOOPBENCH_INSTANTIATE(Space)                                              \
+  template void EnterPart(const Compiled&, int, const Kinematics<Space, double>&, \
+                          std::span<const Acceleration<Space, double>>, std::vector<BodyMotion>*);
+LOOPBENCH_INSTANTIATE(Planar)
+LOOPBENCH_INSTANTIATE(Spatial)
+#undef LOOPBENCH_INSTANTIATE
 
 template <class Space>
 UserMechanism<Space>::UserMechanism(const MechanismDescription& user)
@@ -92,5 +177,274 @@ double UserMechanism<Space>::RelativeMismatch() const {
 
 template class UserMechanism<Planar>;
 template class UserMechanism<Spatial>;
+namespace {
+
+constexpr double kEpsilon = std::numeric_limits<double>::epsilon();
+/// Unknowns below which dense QR is the faster, and up to which it may take its time.
+constexpr Eigen::Index kFew = 60, kMost = 900;
+/// Singular directions that positions off by e leave open: below some multiple of e.
+constexpr double kOfMismatch = 10.0;
+
+/// Solutions of G x = w: one, and the columns that lead from it to all others.
+struct Solution {
+  Eigen::VectorXd x;
+  Eigen::MatrixXd open;  ///< empty where x is the only one
+  bool is_known = true;  ///< else nothing is
+};
+
+/// With column pivoting, Q R P^T = G; columns whose pivot is below `limit` of the first are open.
+Solution SolveDense(const Eigen::MatrixXd& G, const Eigen::VectorXd& w, double limit) {
+  Eigen::ColPivHouseholderQR<MatrixX<double>> qr(G);
+  const auto& R = qr.matrixR();
+  const Eigen::Index n = G.cols();
+  Eigen::Index rank = 0;
+  while (rank < std::min(G.rows(), n) && std::abs(R(rank, rank)) > limit * std::abs(R(0, 0))) {
+    ++rank;
+  }
+  const MatrixX<double> R11 = R.topLeftCorner(rank, rank);
+  VectorX<double> y = w;
+  y.applyOnTheLeft(qr.householderQ().setLength(qr.nonzeroPivots()).adjoint());
+  Solution solution;
+  VectorX<double> x = VectorX<double>::Zero(n);
+  x.head(rank) = R11.triangularView<Eigen::Upper>().solve(y.head(rank));
+  solution.x = qr.colsPermutation() * x;
+  if (rank == n) return solution;
+  MatrixX<double> open = MatrixX<double>::Identity(n, n).rightCols(n - rank);
+  open.topRows(rank) =
+      -R11.triangularView<Eigen::Upper>().solve(MatrixX<double>(R.topRightCorner(rank, n - rank)));
+  solution.open = qr.colsPermutation() * open;
+  return solution;
+}
+
+}  // namespace
+
+template <class Space>
+struct Reactions<Space>::Work {
+  using Coefficients = Eigen::Triplet<double>;
+
+  explicit Work(const UserMechanism<Space>& of)
+      : user(of),
+        w(of.mechanism().num_bodies()),
+        total(of.mechanism().joints().size()),
+        open(total.size()),
+        left(w.size()),
+        first(total.size()),
+        joints_of(w.size()) {
+    const auto& joints = user.mechanism().joints();
+    for (int j = 0; j < static_cast<int>(joints.size()); ++j) {
+      if (joints[j].in_tree() || joints[j].num_directions() == 0) continue;
+      bearing.push_back(j);
+      for (const int body : {joints[j].from, joints[j].to}) {
+        if (body != kGround) joints_of[body].push_back(j);
+      }
+    }
+  }
+
+  const JointState<Space, double>& State(int j) const { return user.kinematics().joints()[j]; }
+  const Joint<Space, double>& At(int j) const { return user.mechanism().joints()[j]; }
+
+  /// Takes the joint's wrench from what its bodies still need.
+  void Give(int j) {
+    w[At(j).to] -= ShiftForce<Space, double>(total[j], State(j).r_Q);
+    w[At(j).from] += ShiftForce<Space, double>(total[j], State(j).r_P);
+    for (const int body : {At(j).from, At(j).to}) --left[body];
+    is_done[j] = true;
+  }
+
+  /// Bodies with one joint left, as long as there are some.
+  void Leaves() {
+    std::vector<int> queue;
+    for (int b = 1; b < static_cast<int>(left.size()); ++b) {
+      if (left[b] == 1) queue.push_back(b);
+    }
+    while (!queue.empty()) {
+      const int body = queue.back();
+      queue.pop_back();
+      if (left[body] != 1) continue;
+      const int j = *std::ranges::find_if(joints_of[body], [&](int k) { return !is_done[k]; });
+      const bool is_second = At(j).to == body;
+      const Wrench<Space, double> needed = ShiftForce<Space, double>(
+          is_second ? w[body] : -w[body], is_second ? -State(j).r_Q : -State(j).r_P);
+      total[j].setZero();
+      for (int i = 0; i < State(j).directions(); ++i) {
+        const auto& D = State(j).D(i);
+        total[j] += D * (D.dot(needed) / D.squaredNorm());
+      }
+      Give(j);
+      const int other = is_second ? At(j).from : At(j).to;
+      if (other != kGround && left[other] == 1) queue.push_back(other);
+    }
+  }
+
+  /// Joints that are not done and hang together without Ground, from one of them.
+  std::vector<int> PartOf(int start) {
+    std::vector<int> part = {start};
+    is_done[start] = true;
+    for (std::size_t i = 0; i < part.size(); ++i) {
+      for (const int body : {At(part[i]).from, At(part[i]).to}) {
+        if (body == kGround) continue;
+        for (const int j : joints_of[body]) {
+          if (is_done[j]) continue;
+          is_done[j] = true;
+          part.push_back(j);
+        }
+      }
+    }
+    return part;
+  }
+
+  /// Size of a direction in (*), moments over the mechanism's length.
+  double SizeOf(const Direction<Space, double>& D) const {
+    return std::sqrt(D.angular.squaredNorm() / (length() * length()) + D.linear.squaredNorm());
+  }
+  double length() const { return user.mechanism().length(); }
+
+  void SolvePart(const std::vector<int>& part, double limit) {
+    std::vector<int> place(w.size(), -1);
+    Eigen::Index rows = 0, columns = 0;
+    std::vector<Coefficients> entries;
+    const auto enter = [&](int body, const Direction<Space, double>& at_centre, double sign) {
+      if (body == kGround) return;
+      if (place[body] < 0) {
+        place[body] = static_cast<int>(rows);
+        rows += Space::kDim;
+      }
+      for (int i = 0; i < Space::kDim; ++i) {
+        const double unit = i < Space::kRot ? 1 / length() : 1.0;
+        entries.emplace_back(place[body] + i, columns, sign * unit * at_centre[i]);
+      }
+    };
+    for (const int j : part) {
+      first[j] = columns;
+      for (int i = 0; i < State(j).directions(); ++i, ++columns) {
+        const Direction<Space, double>& D = State(j).D(i);
+        const double scale = 1 / SizeOf(D);
+        enter(At(j).to, ShiftForce<Space, double>(D, State(j).r_Q), scale);
+        enter(At(j).from, ShiftForce<Space, double>(D, State(j).r_P), -scale);
+      }
+    }
+    Eigen::VectorXd needed(rows);
+    for (std::size_t b = 1; b < place.size(); ++b) {
+      for (int i = 0; place[b] >= 0 && i < Space::kDim; ++i) {
+        needed[place[b] + i] = w[b][i] / (i < Space::kRot ? length() : 1.0);
+      }
+    }
+    Enter(part, Solved(entries, needed, columns, limit));
+  }
+
+  static Solution Solved(const std::vector<Coefficients>& entries, const Eigen::VectorXd& needed,
+                         Eigen::Index columns, double limit) {
+    Eigen::SparseMatrix<double> G(needed.size(), columns);
+    G.setFromTriplets(entries.begin(), entries.end());
+    if (columns > kFew) {
+      G.makeCompressed();
+      Eigen::SparseQR<Eigen::SparseMatrix<double>, Eigen::COLAMDOrdering<int>> qr;
+      qr.setPivotThreshold(limit);  // columns are of some length one
+      qr.compute(G);
+      if (qr.info() == Eigen::Success && qr.rank() == columns) return {qr.solve(needed), {}, true};
+    }
+    if (columns > kMost) return {{}, {}, false};
+    return SolveDense(G.toDense(), needed, limit);
+  }
+
+  void Enter(const std::vector<int>& part, const Solution& solution) {
+    for (const int j : part) {
+      total[j].setZero();
+      const int count = State(j).directions();
+      open[j].assign(static_cast<std::size_t>(solution.open.cols()), Wrench<Space, double>::Zero());
+      for (int i = 0; !solution.is_known && i < Space::kDim; ++i) total[j][i] = kNaN;
+      for (int i = 0; solution.is_known && i < count; ++i) {
+        const Wrench<Space, double> D = State(j).D(i) * (1 / SizeOf(State(j).D(i)));
+        total[j] += D * solution.x[first[j] + i];
+        for (std::size_t k = 0; k < open[j].size(); ++k) {
+          open[j][k] += D * solution.open(first[j] + i, static_cast<Eigen::Index>(k));
+        }
+      }
+    }
+  }
+
+  /// Whether no open solution changes the product of the joint's wrench with a motion.
+  bool IsKnown(int j, const Velocity<Space, double>& along) const {
+    const double size = along.angular.norm() * length() + along.linear.norm();
+    return std::ranges::all_of(open[j], [&](const Wrench<Space, double>& change) {
+      return std::abs(change.dot(along)) <= negligible * size;
+    });
+  }
+
+  const UserMechanism<Space>& user;
+  std::vector<Wrench<Space, double>> w;      ///< what bodies still need
+  std::vector<Wrench<Space, double>> total;  ///< of joints on their second body, drives included
+  std::vector<std::vector<Wrench<Space, double>>> open;  ///< by which it may differ
+  std::vector<int> left;                                 ///< joints of a body that are not done
+  std::vector<Eigen::Index> first;                       ///< column of a joint's first direction
+  std::vector<std::vector<int>> joints_of;
+  std::vector<int> bearing;  ///< the user's joints that hold something
+  std::vector<bool> is_done;
+  double negligible = 0.0;
+};
+
+template <class Space>
+Reactions<Space>::Reactions(const UserMechanism<Space>& user)
+    : work_(std::make_unique<Work>(user)) {}
+template <class Space>
+Reactions<Space>::~Reactions() = default;
+
+template <class Space>
+void Reactions<Space>::Solve(std::span<const Acceleration<Space, double>> A,
+                             std::span<const Wrench<Space, double>> applied) {
+  Work& work = *work_;
+  work.w[kGround].setZero();
+  for (int b = 1; b < static_cast<int>(work.w.size()); ++b) {
+    work.w[b] = InertialForce<Space, double>(work.user.kinematics(), b, A[b]) - applied[b];
+    work.left[b] = static_cast<int>(work.joints_of[b].size());
+  }
+  for (auto& open : work.open) open.clear();
+  work.is_done.assign(work.total.size(), false);
+  work.Leaves();
+  const double limit = std::max(100 * kEpsilon * static_cast<double>(work.bearing.size()),
+                                kOfMismatch * work.user.RelativeMismatch());
+  // between what rounding leaves, some multiple of the limit, and a share of the load
+  work.negligible = std::sqrt(limit);
+  for (const int j : work.bearing) {
+    if (!work.is_done[j]) work.SolvePart(work.PartOf(j), limit);
+  }
+}
+
+template <class Space>
+Wrench<Space, double> Reactions<Space>::Of(int joint, const Rotation<Space, double>& axes) const {
+  const JointState<Space, double>& state = work_->State(joint);
+  const auto& given = work_->At(joint);
+  Wrench<Space, double> reaction = work_->total[joint];
+  std::vector<Wrench<Space, double>> open = work_->open[joint];
+  for (int i = 0; i < given.num_drives; ++i) {
+    const Direction<Space, double>& D = state.D(i);
+    const Velocity<Space, double> along = D * (1 / D.squaredNorm());
+    const auto without = [&](Wrench<Space, double>& wrench) {
+      const double part = wrench.dot(along);
+      wrench -= D * part;
+    };
+    without(reaction);
+    std::ranges::for_each(open, without);
+  }
+  const Rotation<Space, double> to_axes = axes.transpose();
+  reaction = Rotate<Space, double>(to_axes, reaction);
+  for (const Wrench<Space, double>& change : open) {
+    const Wrench<Space, double> turned = Rotate<Space, double>(to_axes, change);
+    for (int i = 0; i < Space::kDim; ++i) {
+      const double unit = i < Space::kRot ? work_->length() : 1.0;
+      if (std::abs(turned[i]) > work_->negligible * unit) reaction[i] = kNaN;
+    }
+  }
+  return reaction;
+}
+
+template <class Space>
+double Reactions<Space>::DriveOf(int joint, int coordinate) const {
+  const Velocity<Space, double> along = work_->user.DirectionOfSpeed(joint, coordinate) * 1.0;
+  return work_->IsKnown(joint, along) ? work_->total[joint].dot(along) : kNaN;
+}
+
+template class Reactions<Planar>;
+template class Reactions<Spatial>;
 
 }  // namespace loopbench::harness

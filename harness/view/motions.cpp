@@ -123,7 +123,7 @@ class Follower {
 };
 
 /// One of the directions in which a mechanism can begin to move.
-struct Beginning {
+struct MotionStart {
   int speed = 0;  ///< the one that is one unit in it, and zero in the others
   VectorXd u;
 };
@@ -143,10 +143,10 @@ VectorXd Clearness(const Mechanism<Space, double>& mechanism) {
 
 /// The permitted speeds, each called by one of them; the first `most`.
 template <class Space>
-std::vector<Beginning> Beginnings(const Follower<Space>& start, std::size_t most) {
+std::vector<MotionStart> MotionStarts(const Follower<Space>& start, std::size_t most) {
   const Mechanism<Space, double>& mechanism = start.kinematics().mechanism();
   const Eigen::Index n = mechanism.num_u();
-  std::vector<Beginning> all;
+  std::vector<MotionStart> all;
   if (mechanism.num_rows() == 0) {
     for (int i = 0; i < n && all.size() < most; ++i) all.push_back({i, VectorXd::Unit(n, i)});
     return all;
@@ -193,7 +193,7 @@ std::string SwingText(double from, double to, bool is_length, bool whole) {
 
 template <class Space>
 PictureMotion Swing(const MechanismDescription& description, Follower<Space>* follower,
-                    const Beginning& beginning, int frames) {
+                    const MotionStart& beginning, int frames) {
   const Mechanism<Space, double>& mechanism = follower->kinematics().mechanism();
   const VectorX<double> start = follower->q();
   const Poses at_start = PosesOf(description, follower->kinematics());
@@ -323,8 +323,8 @@ std::vector<PictureMotion> FindMotions(const MechanismDescription& description,
                             bodies - 1, kMostFrames);
     return motions;
   }
-  const std::vector<Beginning> beginnings = Beginnings(follower, most);
-  for (const Beginning& beginning : beginnings) {
+  const std::vector<MotionStart> beginnings = MotionStarts(follower, most);
+  for (const MotionStart& beginning : beginnings) {
     const int aside =
         std::clamp(frames_of(4 * beginnings.size(), kFramesAside), kFewest, kFramesAside);
     motions.push_back(Swing(description, &follower, beginning, aside));

@@ -1,3 +1,14 @@
+// The picture of a mechanism as data, and the camera that sees it.
+#pragma once
+
+#include <Eigen/Core>
+#include <string>
+#include <vector>
+
+#include "mechanism/description/joint_frames.h"
+
+namespace loopbench::harness {
+
 // The picture of a mechanism: plain data, and no word of the medium that it is drawn in.
 //
 // A shape is a list of places, each fixed on a body, with a kind that says how they are joined and
@@ -8,15 +19,6 @@
 //
 // Lengths in m, angles in rad. Poses are those of the user's bodies at their origins, in ground
 // axes, whatever the mechanism is compiled to.
-#pragma once
-
-#include <Eigen/Core>
-#include <string>
-#include <vector>
-
-#include "mechanism/description/joint_frames.h"
-
-namespace loopbench::harness {
 
 /// A pose for each of the user's bodies, Ground included.
 using Poses = std::vector<Frame>;
@@ -137,5 +139,34 @@ inline constexpr std::size_t kMostMotions = 12, kMostFrames = 40000;
 /// Assembles, analyses and draws. `file` is where it came from, for people. Throws
 /// std::invalid_argument for a description that Validate() refuses.
 Picture MakePicture(const MechanismDescription& description, const std::string& file);
+
+// How a picture is seen: orthographic, so that parallel links stay parallel and lengths compare.
+
+/// A point of the paper [px], y downwards, with its height towards the viewer [m].
+struct Spot {
+  double x = 0.0, y = 0.0, depth = 0.0;
+};
+
+struct Camera {
+  Eigen::Matrix3d R = Eigen::Matrix3d::Identity();  ///< rows: right, up, towards the viewer
+  Eigen::Vector3d centre = Eigen::Vector3d::Zero();
+  double scale = 1.0;                     ///< [px/m]
+  double middle_x = 0.0, middle_y = 0.0;  ///< where `centre` is [px]
+
+  Spot See(const Eigen::Vector3d& p) const {
+    const Eigen::Vector3d v = R * (p - centre);
+    return {middle_x + scale * v.x(), middle_y - scale * v.y(), v.z()};
+  }
+};
+
+/// Names of views: of the plane there is one, "front".
+const std::vector<std::string>& ViewNames();
+/// Right, up and towards the viewer of a named view.
+Eigen::Matrix3d ViewNamed(const Picture& picture, const std::string& name);
+
+/// A camera whose paper is `width` wide and just as high as all places of `poses` need it to be,
+/// within limits; they end `margin` before its edges. The height goes to `*height`. [px]
+Camera FitTo(const Picture& picture, const std::vector<const Poses*>& poses,
+             const Eigen::Matrix3d& R, double width, double margin, double* height);
 
 }  // namespace loopbench::harness

@@ -1,14 +1,27 @@
-// Symbols: what stands for a body, a joint or a force, from where others are attached to it.
-//
-// Sizes are multiples of Picture::symbol, half the size of a pin. Whatever reaches from one body to
-// another (a spring, a rod, the guide of a slider) has places on both, so that it follows them.
+// Shapes of bodies, joints and forces, and the hull of a body's points.
 #pragma once
 
+#include <Eigen/Core>
 #include <utility>
+#include <vector>
 
 #include "harness/view/picture.h"
 
 namespace loopbench::harness {
+
+// Outlines of bodies: the convex hull of the points where others are attached.
+
+/// Faces of the convex hull as lists of indices into `points`: none for a single place, one of two
+/// corners where all are in line, one polygon where all are in a plane, else triangles. Points
+/// nearer than `tolerance` [m] are one. Above 24 points in space: the polygons of no volume are not
+/// sought, and there are no faces.
+std::vector<std::vector<int>> HullFaces(const std::vector<Eigen::Vector3d>& points,
+                                        double tolerance);
+
+// Symbols: what stands for a body, a joint or a force, from where others are attached to it.
+//
+// Sizes are multiples of Picture::symbol, half the size of a pin. Whatever reaches from one body to
+// another (a spring, a rod, the guide of a slider) has places on both, so that it follows them.
 
 /// Where a joint's frames are on its bodies, its axis included: in their axes, from their origins.
 struct JointPlaces {

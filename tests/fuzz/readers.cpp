@@ -10,17 +10,17 @@
 #include <string>
 #include <vector>
 
-#include "harness/config/benchmark_reader.h"
+#include "harness/config/benchmarks.h"
 #include "harness/config/experiment_reader.h"
 #include "harness/config/mechanism_reader.h"
 #include "harness/config/published_series.h"
 #include "harness/exchange/import.h"
-#include "harness/judge/claims_reader.h"
-#include "harness/judge/failure_map_reader.h"
-#include "harness/record/record_json.h"
+#include "harness/judge/claims.h"
+#include "harness/judge/failure_map.h"
+#include "harness/record/record.h"
 #include "harness/store/measurements.h"
 #include "harness/store/result_store.h"
-#include "harness/text/config_error.h"
+#include "harness/text/files.h"
 #include "harness/trajectory/trajectory.h"
 
 namespace loopbench::fuzz {

@@ -6,10 +6,9 @@
 #include <filesystem>
 #include <fstream>
 
-#include "harness/generate/compile.h"
+#include "harness/generate/generated.h"
 #include "harness/generate/record.h"
 #include "harness/text/files.h"
-#include "harness/text/temporary_folder.h"
 
 namespace loopbench::generate {
 namespace {

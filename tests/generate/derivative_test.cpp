@@ -10,7 +10,7 @@
 #include "harness/config/mechanism_reader.h"
 #include "harness/generate/generated.h"
 #include "harness/generate/print_c.h"
-#include "harness/run/compiled_scene.h"
+#include "harness/run/case_identity.h"
 #include "harness/run/side_by_side.h"
 #include "harness/timing/subject.h"
 #include "mechanism/algebra/lanes.h"

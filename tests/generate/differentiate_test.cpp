@@ -1,6 +1,4 @@
 // Derivatives of graphs: rules one by one, and Jacobians of right-hand sides against differences.
-#include "harness/generate/differentiate.h"
-
 #include <gtest/gtest.h>
 
 #include <algorithm>
@@ -9,9 +7,10 @@
 #include <functional>
 
 #include "harness/config/mechanism_reader.h"
+#include "harness/generate/graph.h"
 #include "harness/generate/record.h"
 #include "harness/generate/recorded.h"
-#include "harness/run/compiled_scene.h"
+#include "harness/run/case_identity.h"
 #include "harness/timing/subject.h"
 
 namespace loopbench::generate {

@@ -9,7 +9,7 @@
 
 #include "harness/config/experiment_reader.h"
 #include "harness/record/select.h"
-#include "harness/suite/precision_cases.h"
+#include "harness/suite/reference_cases.h"
 #include "harness/timing/time_cases.h"
 #include "tests/harness/cli_fixture.h"
 

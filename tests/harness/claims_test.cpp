@@ -9,9 +9,7 @@
 #include <string>
 #include <vector>
 
-#include "harness/judge/claims_reader.h"
-#include "harness/judge/claims_report.h"
-#include "harness/text/config_error.h"
+#include "harness/text/files.h"
 
 namespace loopbench::harness {
 namespace claims_test {

@@ -5,7 +5,7 @@
 #include <algorithm>
 #include <string>
 
-#include "harness/record/record_checksum.h"
+#include "harness/record/record.h"
 #include "harness/store/result_store.h"
 #include "harness/store/store_lock.h"
 #include "tests/harness/cli_fixture.h"

@@ -5,7 +5,7 @@
 #include <string>
 #include <vector>
 
-#include "harness/history/compare_summary.h"
+#include "harness/history/history_page.h"
 #include "harness/judge/compare.h"
 
 namespace loopbench::harness {

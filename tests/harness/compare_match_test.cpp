@@ -7,7 +7,7 @@
 #include <vector>
 
 #include "harness/judge/compare.h"
-#include "harness/judge/rules.h"
+#include "harness/judge/demand.h"
 #include "tests/harness/cli_fixture.h"
 
 namespace loopbench::harness {

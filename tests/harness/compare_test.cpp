@@ -10,8 +10,8 @@
 #include <utility>
 #include <vector>
 
-#include "harness/record/origin.h"
-#include "harness/store/contents.h"
+#include "harness/record/provenance.h"
+#include "harness/store/result_store.h"
 
 namespace loopbench::harness {
 namespace compare_test {

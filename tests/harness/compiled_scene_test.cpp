@@ -1,11 +1,10 @@
 // Runs of simplified scenes tell the same story as runs of the scenes themselves.
-#include "harness/run/compiled_scene.h"
-
 #include <gtest/gtest.h>
 
 #include <cmath>
 
-#include "harness/run/merge_parts.h"
+#include "harness/run/case_identity.h"
+#include "harness/run/ensemble.h"
 #include "harness/run/run_case.h"
 #include "mechanism/description/in_space.h"
 #include "mechanism/description/library.h"

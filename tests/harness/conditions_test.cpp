@@ -7,7 +7,7 @@
 
 #include "harness/record/select.h"
 #include "harness/tables/columns.h"
-#include "harness/text/config_error.h"
+#include "harness/text/files.h"
 #include "tests/harness/cli_fixture.h"
 
 namespace loopbench::harness {

@@ -6,8 +6,7 @@
 #include <string>
 #include <vector>
 
-#include "harness/config/benchmark_reader.h"
-#include "harness/text/config_error.h"
+#include "harness/config/benchmarks.h"
 #include "harness/text/files.h"
 #include "harness/timing/subject.h"
 #include "mechanism/model/mechanism.h"

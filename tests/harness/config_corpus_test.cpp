@@ -13,9 +13,9 @@
 #include "harness/config/experiment_reader.h"
 #include "harness/config/mechanism_reader.h"
 #include "harness/config/published_series.h"
-#include "harness/judge/claims_reader.h"
-#include "harness/judge/failure_map_reader.h"
-#include "harness/text/config_error.h"
+#include "harness/judge/claims.h"
+#include "harness/judge/failure_map.h"
+#include "harness/text/files.h"
 #include "tests/harness/places.h"
 
 namespace loopbench::harness {

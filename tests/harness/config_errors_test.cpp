@@ -10,8 +10,8 @@
 
 #include "harness/config/experiment_reader.h"
 #include "harness/config/mechanism_reader.h"
-#include "harness/text/config_error.h"
-#include "harness/text/spelling.h"
+#include "harness/text/files.h"
+#include "harness/text/words.h"
 #include "tests/harness/places.h"
 
 namespace loopbench::harness {

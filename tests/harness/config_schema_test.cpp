@@ -11,14 +11,13 @@
 #include <string>
 #include <vector>
 
-#include "harness/config/benchmark_reader.h"
+#include "harness/config/benchmarks.h"
 #include "harness/config/experiment_reader.h"
 #include "harness/config/mechanism_reader.h"
 #include "harness/config/published_series.h"
 #include "harness/json/file_kind.h"
-#include "harness/judge/claims_reader.h"
-#include "harness/judge/failure_map_reader.h"
-#include "harness/text/config_error.h"
+#include "harness/judge/claims.h"
+#include "harness/judge/failure_map.h"
 #include "harness/text/files.h"
 #include "tests/harness/places.h"
 

@@ -9,7 +9,7 @@
 
 #include "harness/config/experiment_reader.h"
 #include "harness/run/run_case.h"
-#include "harness/text/config_error.h"
+#include "harness/text/files.h"
 #include "mechanism/description/library.h"
 #include "tests/harness/places.h"
 

@@ -1,6 +1,4 @@
 // The solution between steps: its orders, what it leaves alone, and the times it is asked for.
-#include "harness/integrator/dense_output.h"
-
 #include <gtest/gtest.h>
 
 #include <array>

@@ -1,13 +1,12 @@
 // Of more records than a picture has points, those that it shows apart.
-#include "harness/figures/distinct_points.h"
-
 #include <gtest/gtest.h>
 
 #include <algorithm>
 #include <cmath>
 #include <limits>
 
-#include "harness/text/config_error.h"
+#include "harness/figures/free_figure.h"
+#include "harness/text/files.h"
 
 namespace loopbench::harness {
 namespace distinct_points_test {

@@ -11,8 +11,7 @@
 #include <string>
 #include <vector>
 
-#include "harness/analysis/agreement.h"
-#include "harness/analysis/link_length.h"
+#include "harness/analysis/model_warnings.h"
 #include "harness/tables/doubt_notes.h"
 #include "harness/tables/table_view.h"
 #include "mechanism/description/library.h"

@@ -9,7 +9,7 @@
 #include <numbers>
 #include <set>
 
-#include "harness/text/config_error.h"
+#include "harness/text/files.h"
 #include "mechanism/start/assembly.h"
 #include "tests/reference/cases.h"
 

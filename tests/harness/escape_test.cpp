@@ -6,7 +6,7 @@
 #include <set>
 #include <string>
 
-#include "harness/figures/gnuplot.h"
+#include "harness/figures/panel.h"
 #include "harness/tables/table.h"
 #include "harness/text/files.h"
 

@@ -1,12 +1,12 @@
 // The factorial table finds the factor that drift was planted with.
-#include "harness/tables/factorial.h"
-
 #include <gtest/gtest.h>
 
 #include <cmath>
 #include <limits>
 #include <string>
 #include <vector>
+
+#include "harness/tables/table_view.h"
 
 namespace loopbench::harness {
 namespace factorial_test {

@@ -1,6 +1,4 @@
 // Rules of failure maps: what a row inherits, and all mistakes at once.
-#include "harness/judge/failure_map_reader.h"
-
 #include <gtest/gtest.h>
 
 #include <algorithm>
@@ -10,7 +8,8 @@
 #include <vector>
 
 #include "harness/json/file_kind.h"
-#include "harness/text/config_error.h"
+#include "harness/judge/failure_map.h"
+#include "harness/text/files.h"
 
 namespace loopbench::harness {
 namespace failure_map_reader_test {

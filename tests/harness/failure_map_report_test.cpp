@@ -1,6 +1,4 @@
 // A failure map as a whole: table, page, gate and picture of planted records.
-#include "harness/judge/failure_map_report.h"
-
 #include <fmt/format.h>
 #include <gtest/gtest.h>
 
@@ -9,10 +7,9 @@
 #include <string>
 #include <vector>
 
-#include "harness/figures/failure_map_figure.h"
-#include "harness/judge/failure_map_csv.h"
-#include "harness/judge/failure_map_reader.h"
-#include "harness/text/config_error.h"
+#include "harness/figures/judge_figures.h"
+#include "harness/judge/failure_map.h"
+#include "harness/judge/reports.h"
 #include "harness/text/files.h"
 #include "tests/harness/failure_map_runs.h"
 

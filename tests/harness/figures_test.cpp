@@ -13,11 +13,9 @@
 #include <string>
 #include <vector>
 
-#include "harness/figures/channels.h"
-#include "harness/figures/drawn_points.h"
+#include "harness/figures/axis.h"
 #include "harness/figures/figure_recipes.h"
-#include "harness/figures/gnuplot.h"
-#include "harness/figures/legend.h"
+#include "harness/figures/panel.h"
 #include "harness/text/files.h"
 
 namespace loopbench::harness {

@@ -7,8 +7,6 @@
 #include <csignal>
 #include <string>
 
-#include "harness/text/temporary_folder.h"
-
 namespace loopbench::harness {
 namespace files_test {
 

@@ -9,7 +9,6 @@
 #include <variant>
 #include <vector>
 
-#include "harness/analysis/agreement.h"
 #include "harness/analysis/doubts.h"
 #include "harness/config/experiment_reader.h"
 #include "harness/run/case_identity.h"

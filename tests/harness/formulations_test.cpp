@@ -6,9 +6,9 @@
 #include <stdexcept>
 
 #include "harness/figures/figure_recipes.h"
-#include "harness/suite/precision_cases.h"
-#include "harness/tables/factorial.h"
-#include "harness/text/config_error.h"
+#include "harness/suite/reference_cases.h"
+#include "harness/tables/table_view.h"
+#include "harness/text/files.h"
 #include "lagrange/lagrange.h"
 #include "tests/harness/in_child.h"
 #include "tests/reference/cases.h"

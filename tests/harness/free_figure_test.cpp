@@ -10,7 +10,6 @@
 #include <string>
 #include <vector>
 
-#include "harness/text/config_error.h"
 #include "harness/text/files.h"
 
 namespace loopbench::harness {

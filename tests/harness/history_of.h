@@ -9,9 +9,9 @@
 #include <vector>
 
 #include "harness/history/history.h"
-#include "harness/record/origin.h"
+#include "harness/record/provenance.h"
 #include "harness/record/record.h"
-#include "harness/text/config_error.h"
+#include "harness/text/files.h"
 
 namespace loopbench::harness {
 namespace history_test {

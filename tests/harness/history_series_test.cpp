@@ -8,7 +8,6 @@
 #include <vector>
 
 #include "harness/history/history_page.h"
-#include "harness/history/history_steps.h"
 #include "harness/text/files.h"
 #include "tests/harness/history_of.h"
 

@@ -9,7 +9,6 @@
 
 #include "harness/history/history_series.h"
 #include "harness/store/result_store.h"
-#include "harness/text/config_error.h"
 #include "harness/text/files.h"
 #include "tests/harness/history_of.h"
 

@@ -1,6 +1,4 @@
 // Which law fits best, on synthetic drifts whose law is known and on the Cartesian pendulum.
-#include "harness/analysis/hypotheses.h"
-
 #include <gtest/gtest.h>
 
 #include <algorithm>

@@ -7,7 +7,7 @@
 #include <random>
 #include <set>
 
-#include "harness/config/mechanism_writer.h"
+#include "harness/config/mechanism_reader.h"
 #include "harness/json/json_document.h"
 #include "harness/text/files.h"
 #include "tests/harness/import_texts.h"

@@ -9,7 +9,7 @@
 #include <vector>
 
 #include "harness/exchange/import.h"
-#include "harness/text/config_error.h"
+#include "harness/text/files.h"
 #include "mechanism/description/joint_frames.h"
 
 namespace loopbench::harness {

@@ -119,7 +119,7 @@ std::string_view WhyNotForeign(std::string_view path, std::string_view header) {
   }
   if (header.starts_with("boost/")) {
     const bool allowed =
-        OneOf(path, {"harness/observers/pendulum.cpp", "harness/exchange/export_fmu.cpp",
+        OneOf(path, {"harness/observers/built_in.cpp", "harness/exchange/export_fmu.cpp",
                      "tests/reference/rigid_motions.cpp"});
     return allowed ? "" : "Boost is for closed forms of motions and checksums of archives";
   }

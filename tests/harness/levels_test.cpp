@@ -5,10 +5,9 @@
 
 #include "examples/own-parts/half_velocity.h"
 #include "harness/analysis/doubts.h"
-#include "harness/cli/commands_schema.h"
+#include "harness/cli/schema.h"
 #include "harness/figures/figure_recipes.h"
-#include "harness/suite/precision_cases.h"
-#include "harness/text/config_error.h"
+#include "harness/suite/reference_cases.h"
 #include "harness/text/files.h"
 #include "lagrange/lagrange.h"
 #include "mechanism/formulation/level.h"

@@ -6,7 +6,6 @@
 #include <string>
 
 #include "harness/config/experiment_reader.h"
-#include "harness/isolation/print_from_child.h"
 #include "harness/isolation/processes.h"
 #include "harness/text/terminal.h"
 #include "harness/timing/time_cases.h"

@@ -8,11 +8,10 @@
 #include <string>
 #include <vector>
 
-#include "harness/cli/long_table.h"
-#include "harness/record/record_json.h"
+#include "harness/cli/commands.h"
+#include "harness/record/record.h"
 #include "harness/record/select.h"
 #include "harness/store/result_store.h"
-#include "harness/text/config_error.h"
 #include "harness/text/files.h"
 #include "tests/harness/cli_fixture.h"
 

@@ -1,6 +1,4 @@
 // A mechanism that is written and read is the same mechanism: every field, and the bits of a run.
-#include "harness/config/mechanism_writer.h"
-
 #include <fmt/format.h>
 #include <gtest/gtest.h>
 
@@ -13,7 +11,7 @@
 #include "harness/config/experiment_reader.h"
 #include "harness/config/mechanism_reader.h"
 #include "harness/run/run_case.h"
-#include "harness/text/config_error.h"
+#include "harness/text/files.h"
 #include "mechanism/simplify/redundancy.h"
 #include "tests/contract/generators.h"
 #include "tests/harness/places.h"

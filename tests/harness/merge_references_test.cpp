@@ -1,6 +1,4 @@
 // Certified references go with the stores that are merged.
-#include "harness/reference/merge_references.h"
-
 #include <gtest/gtest.h>
 
 #include <string>

@@ -9,7 +9,7 @@
 #include <vector>
 
 #include "harness/record/measures.h"
-#include "harness/store/merge_stores.h"
+#include "harness/store/record_lines.h"
 #include "harness/store/store_lock.h"
 #include "tests/harness/cli_fixture.h"
 

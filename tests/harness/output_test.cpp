@@ -16,8 +16,7 @@
 #include <thread>
 #include <vector>
 
-#include "harness/text/output_file.h"
-#include "harness/text/temporary_folder.h"
+#include "harness/text/files.h"
 #include "tests/harness/cli_fixture.h"
 
 namespace loopbench::harness {

@@ -3,7 +3,7 @@
 
 #include <gtest/gtest.h>
 
-#include "harness/text/config_error.h"
+#include "harness/text/files.h"
 #include "tests/harness/cli_fixture.h"
 #include "tests/harness/in_child.h"
 #include "tests/reference/cases.h"

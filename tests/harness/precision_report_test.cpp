@@ -5,8 +5,7 @@
 #include <string>
 #include <vector>
 
-#include "harness/figures/precision_figures.h"
-#include "harness/tables/precision_ladders.h"
+#include "harness/figures/figure_recipes.h"
 #include "harness/tables/table_view.h"
 
 namespace loopbench::harness {

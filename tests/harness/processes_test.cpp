@@ -15,7 +15,6 @@
 #include <vector>
 
 #include "harness/integrator/cpu_time.h"
-#include "harness/isolation/shared_processes.h"
 
 namespace loopbench::harness {
 namespace processes_test {

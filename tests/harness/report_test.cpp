@@ -9,11 +9,9 @@
 #include <random>
 
 #include "harness/config/formulations.h"
-#include "harness/judge/failure_map_reader.h"
-#include "harness/report/curves.h"
-#include "harness/report/decimate.h"
+#include "harness/judge/failure_map.h"
 #include "harness/report/html.h"
-#include "harness/report/json.h"
+#include "harness/report/report_data.h"
 #include "harness/tables/table_view.h"
 #include "tests/harness/cli_fixture.h"
 #include "tests/harness/tradeoff_records.h"

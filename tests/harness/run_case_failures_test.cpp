@@ -7,7 +7,7 @@
 #include <string_view>
 #include <vector>
 
-#include "harness/record/record_json.h"
+#include "harness/record/record.h"
 #include "harness/run/run_case.h"
 #include "tests/reference/cases.h"
 

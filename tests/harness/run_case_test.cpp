@@ -11,7 +11,7 @@
 #include <string_view>
 #include <vector>
 
-#include "harness/record/record_json.h"
+#include "harness/record/record.h"
 #include "harness/run/case_identity.h"
 #include "harness/tables/columns.h"
 #include "mechanism/description/library.h"

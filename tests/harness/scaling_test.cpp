@@ -1,13 +1,12 @@
 // Exponents of cost over size, on costs whose exponents are known, and from benchmark records.
-#include "harness/analysis/scaling.h"
-
 #include <gtest/gtest.h>
 
 #include <cmath>
 #include <string>
 #include <vector>
 
-#include "harness/judge/fit.h"
+#include "harness/analysis/growth.h"
+#include "harness/judge/statistics.h"
 
 namespace loopbench::harness {
 namespace scaling_test {

@@ -8,11 +8,9 @@
 #include <set>
 #include <string>
 
-#include "harness/cli/commands_schema.h"
+#include "harness/cli/schema.h"
 #include "harness/config/file_schemas.h"
-#include "harness/json/document_kind.h"
 #include "harness/json/fields.h"
-#include "harness/text/config_error.h"
 #include "harness/text/files.h"
 #include "tests/harness/cli_fixture.h"
 #include "tests/harness/places.h"

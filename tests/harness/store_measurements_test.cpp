@@ -10,10 +10,9 @@
 #include <tuple>
 
 #include "harness/judge/track.h"
-#include "harness/judge/tracker_json.h"
 #include "harness/store/measurements.h"
-#include "harness/text/config_error.h"
-#include "harness/timing/callgrind.h"
+#include "harness/text/files.h"
+#include "harness/timing/subject.h"
 
 namespace loopbench::harness {
 namespace store_measurements_test {

@@ -13,7 +13,7 @@
 
 #include "harness/record/select.h"
 #include "harness/tables/columns.h"
-#include "harness/text/config_error.h"
+#include "harness/text/files.h"
 
 namespace loopbench::harness {
 namespace table_test {

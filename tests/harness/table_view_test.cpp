@@ -7,7 +7,7 @@
 #include <vector>
 
 #include "harness/tables/columns.h"
-#include "harness/text/config_error.h"
+#include "harness/text/files.h"
 
 namespace loopbench::harness {
 namespace table_view_test {

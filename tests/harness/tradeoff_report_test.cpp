@@ -1,14 +1,13 @@
 // What accuracy costs, as tables, figures and the statement of what was equal.
-#include "harness/judge/tradeoff_report.h"
-
 #include <fmt/format.h>
 #include <gtest/gtest.h>
 
 #include <string>
 #include <vector>
 
-#include "harness/figures/tradeoff_figures.h"
-#include "harness/judge/fairness.h"
+#include "harness/figures/judge_figures.h"
+#include "harness/judge/reports.h"
+#include "harness/judge/tradeoff.h"
 #include "tests/harness/tradeoff_records.h"
 
 namespace loopbench::harness {

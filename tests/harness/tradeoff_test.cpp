@@ -11,7 +11,7 @@
 #include <string>
 #include <vector>
 
-#include "harness/text/config_error.h"
+#include "harness/text/files.h"
 #include "tests/harness/cli_fixture.h"
 #include "tests/harness/tradeoff_records.h"
 

@@ -1,5 +1,7 @@
 // Files of trajectories: labels, what is written and read back, what is refused, whole runs by the
 // command line.
+#include "harness/trajectory/trajectory.h"
+
 #include <fmt/format.h>
 #include <gtest/gtest.h>
 #include <sys/resource.h>
@@ -12,8 +14,6 @@
 #include "harness/config/mechanism_reader.h"
 #include "harness/text/escape.h"
 #include "harness/trajectory/check.h"
-#include "harness/trajectory/compare.h"
-#include "harness/trajectory/trajectory_writer.h"
 #include "tests/harness/cli_fixture.h"
 #include "tests/harness/in_child.h"
 

@@ -7,7 +7,7 @@
 #include <vector>
 
 #include "harness/analysis/doubts.h"
-#include "harness/analysis/link_length.h"
+#include "harness/analysis/model_warnings.h"
 #include "harness/reference/error_meter.h"
 #include "harness/run/case_identity.h"
 #include "harness/text/files.h"

@@ -9,11 +9,8 @@
 
 #include "harness/config/mechanism_reader.h"
 #include "harness/view/html.h"
-#include "harness/view/hull.h"
-#include "harness/view/json.h"
 #include "harness/view/shapes.h"
 #include "harness/view/svg.h"
-#include "harness/view/text.h"
 #include "mechanism/description/library.h"
 #include "mechanism/description/similarity.h"
 #include "mechanism/simplify/structure.h"

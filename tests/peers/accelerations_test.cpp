@@ -2,7 +2,7 @@
 // frames, joints, closures, signs of speeds and forces, to round-off.
 #include <gtest/gtest.h>
 
-#include "harness/run/compiled_scene.h"
+#include "harness/run/case_identity.h"
 #include "harness/run/peers.h"
 #include "mechanism/start/assembly.h"
 #include "tests/peers/registered.h"

@@ -10,7 +10,6 @@
 
 #include "harness/exchange/export_mechanism.h"
 #include "harness/exchange/export_names.h"
-#include "harness/exchange/model_of_mechanism.h"
 #include "harness/text/files.h"
 #include "mechanism/description/library.h"
 #include "tests/peers/at_start.h"

@@ -10,7 +10,6 @@
 #include <sstream>
 
 #include "harness/exchange/export_mechanism.h"
-#include "harness/exchange/model_of_mechanism.h"
 #include "harness/json/json_document.h"
 #include "harness/text/files.h"
 #include "harness/text/run_program.h"

@@ -9,9 +9,9 @@
 #include <iostream>
 #include <limits>
 
-#include "harness/analysis/link_length.h"
+#include "harness/analysis/model_warnings.h"
 #include "harness/config/mechanism_reader.h"
-#include "harness/precision/certify.h"
+#include "harness/precision/witness.h"
 #include "tests/precision/pendulum.h"
 #include "tests/reference/published_numbers.h"
 

@@ -28,7 +28,7 @@ inline Float128 ShiftedSn(const Float128& x, const Float128& k) {
 }
 
 /// The angle at t of a pendulum theta'' = -w^2 sin(theta) that starts at rest at theta0
-/// (harness/observers/pendulum.cpp): sin(theta / 2) = k sn(w t + K(k), k), k = sin(theta0 / 2).
+/// (harness/observers/built_in.cpp): sin(theta / 2) = k sn(w t + K(k), k), k = sin(theta0 / 2).
 inline Float128 PendulumAngle(const Float128& w, const Float128& theta0, const Float128& t) {
   const Float128 k = sin(theta0 / 2);
   return 2 * asin(k * ShiftedSn(w * t, k));

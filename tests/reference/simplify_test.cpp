@@ -8,8 +8,7 @@
 #include <vector>
 
 #include "harness/config/mechanism_reader.h"
-#include "harness/config/mechanism_writer.h"
-#include "harness/run/short_run.h"
+#include "harness/run/model_error.h"
 #include "mechanism/simplify/model.h"
 #include "mechanism/simplify/restart.h"
 #include "tests/harness/places.h"

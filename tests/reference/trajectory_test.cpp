@@ -10,7 +10,7 @@
 #include "harness/observers/observer.h"
 #include "harness/text/files.h"
 #include "harness/trajectory/check.h"
-#include "harness/trajectory/reactions.h"
+#include "harness/trajectory/user_mechanism.h"
 #include "mechanism/start/assembly.h"
 #include "tests/reference/cases.h"
 #include "tests/reference/published_numbers.h"

@@ -1,0 +1,461 @@
+// advise: the cheapest method that meets an error bound.
+#include "harness/advise/advise.h"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <cmath>
+#include <filesystem>
+#include <string>
+#include <vector>
+
+#include "harness/analysis/model_warnings.h"
+#include "harness/cli/command_line.h"
+#include "harness/cli/models.h"
+#include "harness/config/experiment_reader.h"
+#include "harness/config/formulations.h"
+#include "harness/config/mechanism_reader.h"
+#include "harness/isolation/processes.h"
+#include "harness/run/model_error.h"
+#include "harness/run/run_case.h"
+#include "harness/tables/fit.h"
+#include "harness/text/files.h"
+#include "harness/text/terminal.h"
+
+namespace loopbench::harness {
+namespace {
+
+struct AdviseCommand {
+  std::filesystem::path mechanism;
+  double error = 0.0;               ///< to be kept [m]; 0: not given
+  double budget = 0.0;              ///< wall seconds per simulated second; 0: not given
+  double horizon = 10.0;            ///< [s]
+  std::vector<std::string> points;  ///< BODY.POINT or BODY; empty: all
+  std::filesystem::path out;        ///< file of the experiment that reproduces the advice
+  std::string format = "text";      ///< of the table: text, csv, markdown, json, latex
+  bool simplify = false;            ///< simpler models of the scene too
+  bool generated = false;           ///< generated code too
+  bool exhaustive = false;          ///< the whole product in place of a pilot
+  ProcessLimits limits = {.cpu_s = 120.0, .memory_mb = 2048.0};
+};
+
+/// Of all CPU time, what the reference's three witnesses may take each.
+constexpr double kWitnessShare = 0.15, kPilotShare = 0.4;
+
+MeasuredPoint PointNamed(const MechanismDescription& user, const std::string& name) {
+  const std::size_t dot = name.find('.');
+  const std::string body = name.substr(0, dot);
+  std::vector<std::string> known;
+  for (std::size_t i = 1; i < user.bodies.size(); ++i) {
+    known.push_back(user.bodies[i].name);
+    for (const auto& [point, at] : user.bodies[i].points) {
+      known.push_back(user.bodies[i].name + "." + point);
+      if (name == known.back()) return {i, at};
+    }
+    if (name == user.bodies[i].name) return {i, user.bodies[i].com};
+  }
+  throw ConfigError(
+      fmt::format("--points: found \"{}\", expected BODY (its centre of mass) or "
+                  "BODY.POINT, of: {}",
+                  name, fmt::join(known, ", ")));
+}
+
+std::string WhatIsAsked(const AdviseCommand& command) {
+  return command.budget > 0.0
+             ? fmt::format("at most {} s of wall time per simulated second", command.budget)
+             : fmt::format("an error of at most {} m", command.error);
+}
+
+Record RowOf(const Trial& trial, const Trial& best, double horizon) {
+  Record row;
+  row.Set("formulation", trial.choice.column.formulation);
+  row.Set("enforcement", std::string(ToString(trial.choice.column.enforcement)));
+  row.Set("coordinates", std::string(ToString(trial.choice.column.coordinates)));
+  row.Set("integrator", trial.choice.integrator);
+  if (trial.choice.step > 0.0) {
+    row.Set("step", trial.choice.step);
+  } else {
+    row.Set("rtol", trial.choice.rtol);
+  }
+  row.Set("outcome", std::string(ToString(trial.outcome)));
+  row.Set("doubts", trial.doubts);
+  if (std::isfinite(trial.error)) row.Set("error_position_max", trial.error);
+  row.Set("wall_s", trial.wall_s);
+  row.Set("ratio", trial.wall_s / best.wall_s);
+  row.Set("realtime_factor", horizon / trial.wall_s);
+  row.Set("rhs_evaluations", trial.rhs_evaluations);
+  return row;
+}
+
+Table TableOf(const std::vector<Trial>& trials, const Trial& best, double horizon) {
+  Table table;
+  bool adaptive = false, fixed = false;
+  for (const Trial& trial : trials) {
+    (trial.choice.step > 0.0 ? fixed : adaptive) = true;
+  }
+  table.columns = {{"formulation", "formulation", Format::kText},
+                   {"enforcement", "level", Format::kText},
+                   {"coordinates", "coords", Format::kText},
+                   {"integrator", "integrator", Format::kText}};
+  if (adaptive) table.columns.push_back({"rtol", "rtol", Format::kScientific});
+  if (fixed) table.columns.push_back({"step", "step [s]", Format::kScientific});
+  for (const TableColumn& column :
+       {TableColumn{"outcome", "outcome", Format::kText},
+        TableColumn{"error_position_max", "error [m]", Format::kScientific},
+        TableColumn{"wall_s", "wall [s]", Format::kSeconds},
+        TableColumn{"ratio", "ratio", Format::kExponent}}) {
+    table.columns.push_back(column);
+  }
+  for (const Trial& trial : trials) table.rows.push_back(RowOf(trial, best, horizon));
+  return table;
+}
+
+/// The experiment that runs one choice and times it.
+std::string ExperimentOf(const AdviseCommand& command, const Choice& choice, double horizon,
+                         ReferenceOptions reference) {
+  reference.cpu_s *= 2;  // as far on a machine that is busier
+  const auto folder = std::filesystem::absolute(command.out).parent_path();
+  return ExperimentText(
+      {.name = "advice for " + command.mechanism.stem().string(),
+       .comment = "Asked for " + WhatIsAsked(command) + ".",
+       .mechanism = std::filesystem::absolute(command.mechanism).lexically_relative(folder),
+       .horizon = horizon,
+       .column = choice.column,
+       .integrator = choice.integrator,
+       .rtol = choice.rtol,
+       .step = choice.step,
+       .reference = reference});
+}
+
+Experiment SingleOf(const MechanismFile& file, double horizon) {
+  Experiment experiment;
+  experiment.name = "advise";
+  experiment.scenes.push_back({.name = file.description.name,
+                               .path = {},
+                               .mechanism = file,
+                               .horizons = {horizon},
+                               .tags = {}});
+  return experiment;
+}
+
+/// Enters the doubts of the written experiment's run and its largest error over all points.
+void Examine(const MechanismFile& file, double horizon, const Reference& reference,
+             bool has_all_points, Trial& trial) {
+  const Experiment experiment = SingleOf(file, horizon);
+  const Choice& choice = trial.choice;
+  Case one;
+  one.mechanism = file.description.name;
+  one.column = choice.column;
+  one.integrator = choice.integrator;
+  one.rtol = one.atol = choice.step > 0.0 ? 0.0 : choice.rtol;
+  one.step = choice.step;
+  one.horizon = horizon;
+  one.limits.cpu_s = 60.0;
+  one.keys = CaseKeys(experiment, one);
+  const Record record = RunCase(experiment, one, &reference);
+  const bool finished = record.Text("outcome") == "finished";
+  trial.doubts = finished ? record.Text("doubts") : record.Text("outcome");
+  if (finished && has_all_points) trial.error = record.Number("error_position_max");
+}
+
+/// Throws where the points that errors are taken of stay where they are: every method is then
+/// right.
+void RequireMotion(const std::string& name, const MechanismDescription& user,
+                   const CertainMotion& certain, const std::vector<MeasuredPoint>& points) {
+  const Reference& reference = certain.reference;
+  const Compiled compiled = Compile(user, {.islands = false});
+  const Measured measured{user, compiled, points};
+  bool turns = false;
+  for (std::size_t k = 0; k < reference.NumTrusted(); ++k) {
+    const Distance way = DistanceOf(measured, -1, reference.snapshots[k], reference.snapshots[0]);
+    const Distance &bound = reference.bounds[k], &first = reference.bounds[0];
+    if (way.position > bound.position + first.position) return;
+    turns = turns || way.rotation > bound.rotation + first.rotation;
+  }
+  throw std::runtime_error(fmt::format(
+      "{}: {} within {:g} s, so any method is exact there, and there is no advice for a motion: "
+      "{}",
+      name, turns ? "none of the measured points moves" : "no joint moves", certain.horizon,
+      turns ? "name others with --points" : "give the mechanism a speed or a force that moves it"));
+}
+
+std::string WhatWasTried(const Advice& advice) {
+  std::string text =
+      fmt::format("{} ways of running it in {:.3g} s", advice.trials, advice.pilot_s);
+  if (advice.untried > 0) {
+    text += fmt::format(", {} not tried: the time was over (--cpu)", advice.untried);
+  }
+  return text;
+}
+
+void PrintAdvice(const AdviseCommand& command, const Advice& advice, const Reference& reference,
+                 double horizon) {
+  const Trial& best = advice.finalists.front();
+  Print("{} over {} s: {}\n\n", command.mechanism.stem().string(), horizon, WhatIsAsked(command));
+  if (advice.reached) {
+    Print("Take {}:\n  error {:.1e} m, {:.3g} s of wall time ({:.3g} simulated seconds a second)\n",
+          ToString(best.choice), best.error, best.wall_s, horizon / best.wall_s);
+  } else {
+    Print("None reached it{}. The nearest is {}:\n  error {:.1e} m, {:.3g} s of wall time\n",
+          command.budget > 0.0 ? ""
+                               : fmt::format(" with a margin of {:.0f} %", 100 * (1 - kErrorShare)),
+          ToString(best.choice), best.error, best.wall_s);
+  }
+  if (!best.doubts.empty()) Print("  doubtful: {}\n", best.doubts);
+  Print("Dominant error: {}.\n", WhatLimits(best, reference.Certified().position));
+  const auto next = std::ranges::find_if(advice.finalists, [&](const Trial& trial) {
+    return trial.choice.integrator != best.choice.integrator ||
+           trial.choice.column.formulation != best.choice.column.formulation;
+  });
+  if (next != advice.finalists.end()) {
+    Print("Runner-up: {}, {:.2f} times the time, error {:.1e} m\n", ToString(next->choice),
+          next->wall_s / best.wall_s, next->error);
+  }
+  if (advice.generated) {
+    const Column& column = advice.generated->choice.column;
+    Print(
+        "Generated code with the same integrator, level and tolerance: {}, {:.2f} times the time, "
+        "error {:.1e} m\n",
+        column.formulation, advice.generated->wall_s / best.wall_s, advice.generated->error);
+  } else if (command.generated) {
+    Print("Generated code: no formulation could be generated and finished\n");
+  }
+  Print("\nFinalists, timed in turn\n\n");
+  PrintText(ToScreen(TableOf(advice.finalists, best, horizon)));
+  std::vector<Trial> finished;
+  std::vector<std::string> cut_off;
+  for (const Trial& trial : advice.looked_at) {
+    if (std::isfinite(trial.error)) {
+      finished.push_back(trial);
+    } else {
+      const std::string name =
+          fmt::format("{} ({})", trial.choice.integrator, ToString(trial.outcome));
+      if (std::ranges::find(cut_off, name) == cut_off.end()) cut_off.push_back(name);
+    }
+  }
+  Print("\nThe best of each integrator and level (pilot runs)\n\n");
+  PrintText(ToScreen(TableOf(finished, best, horizon)));
+  if (!cut_off.empty()) {
+    Print("\nfailed, or stopped because slower than the best: {}\n",
+          fmt::format("{}", fmt::join(cut_off, ", ")));
+  }
+  Print(
+      "\nreference: {} ({}), certified to {:.1e} m until {:g} s\n"
+      "pilot: {}\n",
+      reference.scalar, reference.witnesses, reference.Certified().position,
+      reference.trust_horizon, WhatWasTried(advice));
+}
+
+CertainMotion CertainFor(const AdviseCommand& command, const MechanismDescription& user,
+                         double horizon) {
+  return MakeCertainMotion(user, horizon, kWitnessShare * command.limits.cpu_s,
+                           command.mechanism.string() + ": advice");
+}
+
+/// Runs generated code of all formulations with the integrator, level and tolerance of `best`.
+std::optional<Trial> FastestGenerated(TrialBench& bench, const Trial& best) {
+  std::optional<Trial> fastest;
+  for (const std::string& formulation : FormulationNamesWithoutPeers()) {
+    Choice choice = best.choice;
+    choice.column.formulation = formulation;
+    choice.column.execution = Execution::kGenerated;
+    constexpr double kCpu_s = 60.0;
+    Trial trial = bench.Try(choice, kCpu_s);
+    if (!std::isfinite(trial.error)) continue;
+    bench.Settle(&trial);
+    if (!fastest || trial.wall_s < fastest->wall_s) fastest = trial;
+  }
+  return fastest;
+}
+
+Advice AdviceFor(const AdviseCommand& command, const MechanismFile& file,
+                 const CertainMotion& certain, const std::vector<MeasuredPoint>& points,
+                 const AdviceRequest& request) {
+  const TrialScene scene{.user = file.description,
+                         .reference = certain.reference,
+                         .horizon = certain.horizon,
+                         .points = points};
+  const auto bench = MakeTrialBench(scene);
+  const auto find = command.exhaustive ? &Sweep : static_cast<decltype(&Sweep)>(&Advise);
+  Advice advice =
+      find(request, *bench, certain.horizon, LinkLength(file.description), [&](Trial& trial) {
+        Examine(file, certain.horizon, certain.reference, points.empty(), trial);
+      });
+  if (command.generated && !advice.finalists.empty()) {
+    advice.generated = FastestGenerated(*bench, advice.finalists.front());
+  }
+  return advice;
+}
+
+/// What a model causes and saves, as a row; `whole` is what the whole model takes [s].
+Record RowOfModel(const AdviseCommand& command, const MechanismFile& file,
+                  const CertainMotion& certain, const SceneModel& model, double whole) {
+  Record row;
+  row.Set("model", model.name);
+  const auto refuse = [&](const std::string& why) {
+    row.Set("verdict", "refused: " + why);
+    return row;
+  };
+  // the same times: those of the whole model
+  const CertainMotion own = CertainFor(command, model.description, certain.horizon);
+  if (own.horizon < certain.horizon) {
+    return refuse(own.reference.message.empty() ? "its motion is not certified so far"
+                                                : own.reference.message);
+  }
+  const CausedError caused =
+      ErrorOfModel(file.description, certain.reference, model, own.reference, command.points);
+  if (caused.points == 0 ||
+      (!command.points.empty() && caused.points < static_cast<int>(command.points.size()))) {
+    return refuse("it does not have the points");
+  }
+  row.Set("caused", caused.largest);
+  row.Set("point", caused.point);
+  // half of the error is left to the integrator
+  if (!(caused.largest <= command.error / 2)) return refuse("its error is too large");
+  const Advice advice = AdviceFor(command, {model.description, model.observe, ""}, own, {},
+                                  {.error = command.error - caused.largest,
+                                   .budget = std::nullopt,
+                                   .cpu_s = kPilotShare * command.limits.cpu_s / 4});
+  if (!advice.reached) return refuse("no method reaches the rest of the error");
+  const Trial& best = advice.finalists.front();
+  row.Set("total", caused.largest + best.error);
+  row.Set("wall_s", best.wall_s);
+  row.Set("ratio", best.wall_s / whole);
+  row.Set("verdict",
+          (best.wall_s < whole ? "saves time: " : "saves none: ") + ToString(best.choice));
+  return row;
+}
+
+void PrintModels(const AdviseCommand& command, const MechanismFile& file,
+                 const CertainMotion& certain, double whole) {
+  std::vector<const Idea*> ideas;
+  for (const Idea& idea : Ideas()) ideas.push_back(&idea);
+  constexpr double kShortRun_s = 1.0;
+  const ShortRun run = MakeShortRun(file.description, std::min(kShortRun_s, certain.horizon),
+                                    kWitnessShare * command.limits.cpu_s);
+  const SceneModels models = MakeModels(file, ideas, run, {});
+  Table table;
+  table.columns = {{"model", "model", Format::kText},
+                   {"caused", "error it causes [m]", Format::kScientific},
+                   {"point", "of", Format::kText},
+                   {"total", "in all [m]", Format::kScientific},
+                   {"wall_s", "wall [s]", Format::kSeconds},
+                   {"ratio", "of the whole's", Format::kExponent},
+                   {"verdict", "", Format::kText}};
+  for (const SceneModel& model : models.models) {
+    if (model.name == "full" || model.name.starts_with("islands")) continue;
+    table.rows.push_back(RowOfModel(command, file, certain, model, whole));
+  }
+  Print("\nSimpler models of it, against the whole one's certified motion\n\n");
+  if (table.rows.empty()) {
+    Print("  none: nothing can be left out (loopbench simplify says why)\n");
+    return;
+  }
+  PrintText(ToScreen(table));
+  Print("\nloopbench simplify {} --out FOLDER writes them.\n", command.mechanism.string());
+}
+
+int AdviseInChild(const AdviseCommand& command, const MechanismFile& file) {
+  const MechanismDescription& user = file.description;
+  const std::string name = command.mechanism.string();
+  std::vector<MeasuredPoint> points;
+  for (const std::string& point : command.points) points.push_back(PointNamed(user, point));
+  const CertainMotion certain = CertainFor(command, user, command.horizon);
+  if (!(certain.horizon > 0.0)) {
+    throw std::runtime_error(fmt::format("{}: there is no certified reference to advise by: {}",
+                                         name, certain.reference.message));
+  }
+  RequireMotion(name, user, certain, points);
+  std::string shorter;
+  if (certain.horizon < command.horizon) {
+    shorter = fmt::format("The motion is certified until {:g} s only. Advice is for that.",
+                          certain.horizon);
+  }
+  if (!shorter.empty() && command.format == "text") Print("{}\n", shorter);
+  AdviceRequest request;
+  if (command.budget > 0.0) {
+    request.budget = command.budget;
+  } else {
+    request.error = command.error;
+  }
+  request.cpu_s = kPilotShare * command.limits.cpu_s;
+  const Advice advice = AdviceFor(command, file, certain, points, request);
+  if (advice.finalists.empty()) {
+    throw std::runtime_error(fmt::format("{}: no way of running it finished", name));
+  }
+  const Trial& best = advice.finalists.front();
+  if (command.format == "text") {
+    PrintAdvice(command, advice, certain.reference, certain.horizon);
+    if (command.simplify) PrintModels(command, file, certain, best.wall_s);
+  } else {
+    Table table = TableOf(advice.finalists, best, certain.horizon);
+    table.notes = {WhatWasTried(advice)};
+    if (!shorter.empty()) table.notes.push_back(shorter);
+    PrintText(Render(table, command.format));
+  }
+  if (!command.out.empty()) {
+    WriteFileAtomically(command.out,
+                        ExperimentOf(command, best.choice, certain.horizon, certain.options));
+    PrintError("the experiment that reproduces it: {}\n", command.out.string());
+  }
+  return advice.reached ? 0 : 1;
+}
+
+/// Prints the cheapest way to run the mechanism that keeps the error, or the most accurate within
+/// the budget, and what that rests on. 1 where nothing reached what was asked for.
+int GiveAdvice(const AdviseCommand& command) {
+  const MechanismFile file = ReadMechanism(command.mechanism);
+  if (!command.out.empty()) RequireOutput(command.out);
+  return PrintFromChild(command.mechanism.string(), command.limits,
+                        [&] { return AdviseInChild(command, file); });
+}
+
+constexpr double kUsualError = 1e-6;
+
+}  // namespace
+
+void AddAdvise(Commands& commands) {
+  auto& command = commands.Keep<AdviseCommand>();
+  CLI::App* app = commands.Add("advise", "Recommend the cheapest method that meets an error bound",
+                               [&](const Typed&) {
+                                 if (command.error == 0.0 && command.budget == 0.0)
+                                   command.error = kUsualError;
+                                 return GiveAdvice(command);
+                               });
+  app->add_option("mechanism", command.mechanism, "Mechanism file (JSON)")->required();
+  CLI::Option* error =
+      app->add_option("--error", command.error, "Largest error of points [m] (default: 1e-6)")
+          ->check(NumberFrom(1e-13, 1e9));
+  app->add_option("--budget", command.budget,
+                  "Wall-time budget per simulated second; find the most accurate method")
+      ->check(NumberFrom(1e-9, 1e6))
+      ->excludes(error);
+  app->add_option("--horizon", command.horizon, "Simulated time [s]")
+      ->check(NumberFrom(1e-9, 1e9))
+      ->capture_default_str();
+  app->add_option("--points", command.points,
+                  "Points that define the error: BODY.POINT or BODY (default: all)");
+  app->add_flag("--simplify", command.simplify,
+                "Also try simpler models, with their errors and times (loopbench simplify)")
+      ->excludes("--budget");
+  app->add_flag("--generated", command.generated,
+                "Also time generated code of all formulations with the advice's settings");
+  app->add_flag("--exhaustive", command.exhaustive,
+                "Try all combinations of formulation, level, integrator and tolerance");
+  app->add_option("-o,--out", command.out, "File for the experiment that reproduces it");
+  app->add_option("--format", command.format, "Format of the finalists' table")
+      ->check(CLI::IsMember({"text", "csv", "markdown", "json", "latex"}))
+      ->capture_default_str();
+  AddLimits(app, &command.limits);
+  AddWide(app);
+  app->footer(
+      "Errors are true ones, against a certified reference; times are of bare runs, one at a "
+      "time.\n"
+      "Exit codes: 0 found, 1 nothing reached what was asked for (the nearest is shown), 2 no "
+      "reference or bad input.\n"
+      "  loopbench advise four-bar.json --error 1e-6\n"
+      "  loopbench advise arm.json --budget 0.001 --horizon 5 --points gripper.tip --out "
+      "best.json");
+}
+
+}  // namespace loopbench::harness

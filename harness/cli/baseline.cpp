@@ -1,0 +1,302 @@
+// baseline: a repository's own baseline, measured again and held against what is committed.
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <filesystem>
+#include <functional>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "harness/cli/command_line.h"
+#include "harness/cli/commands.h"
+#include "harness/isolation/processes.h"
+#include "harness/judge/compare.h"
+#include "harness/run/peers.h"
+#include "harness/store/measurements.h"
+#include "harness/store/result_store.h"
+#include "harness/suite/reference_cases.h"
+#include "harness/suite/workload.h"
+#include "harness/text/files.h"
+#include "harness/text/numeric_option.h"
+#include "harness/text/run_program.h"
+#include "harness/text/terminal.h"
+
+namespace loopbench::harness {
+namespace {
+
+struct BaselineCommand {
+  std::string action;  ///< check, renew or selftest
+  std::vector<std::filesystem::path> experiments;
+  std::filesystem::path dir;      ///< of results.jsonl, which is committed
+  std::filesystem::path counts;   ///< benchmarks whose instructions are counted; none when empty
+  std::filesystem::path counter;  ///< loopbench_count; empty: beside this program, else from PATH
+  std::filesystem::path keep;     ///< folder for what was measured; a temporary one when empty
+  int jobs = 1;
+};
+
+constexpr const char* kResults = "results.jsonl";
+
+/// What is kept is kept in a folder of its own: the files in it are overwritten.
+void RequireNewFolder(const std::filesystem::path& kept, const std::filesystem::path& baseline) {
+  const auto plain = [](const std::filesystem::path& path) {
+    const auto whole = std::filesystem::weakly_canonical(path);
+    return whole.has_filename() ? whole : whole.parent_path();
+  };
+  if (plain(kept) == plain(baseline)) {
+    throw ConfigError(fmt::format(
+        "--keep: found {}, the folder of the baseline, expected another one", kept.string()));
+  }
+  if (!std::filesystem::exists(kept)) return;
+  if (!std::filesystem::is_directory(kept)) {
+    throw ConfigError(
+        fmt::format("--keep: found {}, which is no folder, expected a new one", kept.string()));
+  }
+  if (!std::filesystem::is_empty(kept)) {
+    throw ConfigError(
+        fmt::format("--keep: found {}, which is not empty, expected a new folder", kept.string()));
+  }
+}
+
+std::string CounterOf(const BaselineCommand& command) {
+  if (!command.counter.empty()) return command.counter.string();
+  const auto beside =
+      std::filesystem::read_symlink("/proc/self/exe").parent_path() / "loopbench_count";
+  return std::filesystem::exists(beside) ? beside.string() : "loopbench_count";
+}
+
+void RequirePrograms(const BaselineCommand& command) {
+  if (command.counts.empty()) return;
+  const std::string counter = CounterOf(command);
+  for (const std::string& program : {std::string("valgrind"), counter}) {
+    const ProgramResult tried = RunProgram({program, "--version"});
+    if (tried.error == 0) continue;
+    throw ConfigError(fmt::format("--counts {}: {}{}", command.counts.string(),
+                                  tried.Failure(program),
+                                  program == "valgrind" ? "; install it: apt-get install valgrind"
+                                                        : "; --counter says where it is"));
+  }
+}
+
+/// Runs a program for what it leaves. Throws with what it said when it fails.
+void MustRun(std::vector<std::string> words, const std::string& name) {
+  const ProgramResult result = RunProgram(std::move(words));
+  if (const std::string failure = result.Failure(name); !failure.empty()) {
+    throw std::runtime_error(failure + result.output);
+  }
+}
+
+/// 20 evaluations per case, and `planted` more that are not reported.
+void CountInstructions(const BaselineCommand& command, const std::filesystem::path& out,
+                       int planted) {
+  const std::string counter = CounterOf(command);
+  const std::string dump = out.string() + ".callgrind";
+  // without environment and, where that may be switched off, address randomisation: the same
+  // instructions every time
+  std::vector<std::string> words = {"env", "-i"};
+  if (RunProgram({"setarch", "-R", "true"}).status == 0)
+    words.insert(words.end(), {"setarch", "-R"});
+  words.insert(words.end(),
+               {"valgrind", "-q", "--tool=callgrind", "--callgrind-out-file=" + dump,
+                "--toggle-collect=CountedEvaluations", "--dump-after=CountedEvaluations", counter,
+                command.counts.string(), "--planted", std::to_string(planted)});
+  MustRun(std::move(words), "valgrind");
+  MustRun({counter, command.counts.string(), "--callgrind", dump, "--out", out.string()}, counter);
+}
+
+/// All measurements into work/results.jsonl; the exit code of an interruption, or 0.
+int MeasureAll(const BaselineCommand& command, const std::filesystem::path& work) {
+  Workload workload({command.experiments, {}, {}, 0}, {});
+  if (workload.is_long()) {
+    throw ConfigError(
+        fmt::format("found a sweep of more than {} combinations, expected a baseline "
+                    "of cases that are worth a look each",
+                    kLongSweep));
+  }
+  RequirePeers(workload.some());
+  for (const Experiment& experiment : workload.some()) {
+    RequireLadders(experiment);
+    RequireReferences(experiment);
+  }
+  {
+    ResultStore store(work / "run");
+    FinishedRuns finished(work / "run");
+    SuiteOptions options;
+    options.jobs = command.jobs;
+    options.timing = false;  // times belong to one machine: loopbench history
+    try {
+      RunSuite(workload, options, finished, store);
+    } catch (const Interrupted& interrupted) {
+      PrintError("interrupted: nothing was compared and nothing renewed\n");
+      return interrupted.exit_code();
+    }
+  }
+  std::string text = ReadFile(work / "run" / kResults);
+  if (!command.counts.empty()) {
+    CountInstructions(command, work / "counts.jsonl", 0);
+    text += ReadFile(work / "counts.jsonl");
+  }
+  WriteFileAtomically(work / kResults, text);
+  return 0;
+}
+
+std::vector<Record> Load(const std::filesystem::path& path) {
+  std::vector<std::string> warnings;
+  return ReadMeasurements(path, &warnings);
+}
+
+/// A change of measured values that the comparison must catch.
+struct Plant {
+  std::string what, measure;
+  /// True when the record has what it changes, and was changed.
+  std::function<bool(Record*)> change;
+};
+
+bool Scale(Record* record, std::string_view key, double factor, double floor) {
+  if (record->Find(key) == nullptr || !(record->Number(key) > floor)) return false;
+  record->Set(std::string(key), factor * record->Number(key));
+  return true;
+}
+
+std::vector<Plant> Plants(const CompareOptions& options) {
+  const auto add_one = [](const char* key) {
+    return [key](Record* record) {
+      if (record->Find(key) == nullptr) return false;
+      record->Set(key, static_cast<std::int64_t>(record->Number(key)) + 1);
+      return true;
+    };
+  };
+  return {{"3 times the drift", "drift_position_max",
+           [&options](Record* record) {
+             return Scale(record, "drift_position_max", 3.0, options.error_floor);
+           }},
+          {"one step more", "steps", add_one("steps")},
+          {"a bit of a final state", "state_hash",
+           [](Record* record) {
+             if (record->Find("state_hash") == nullptr) return false;
+             record->Set("state_hash", std::string("0000000000000000"));
+             return true;
+           }},
+          {"a run that fails", "outcome", [](Record* record) {
+             if (record->Text("outcome") != "finished") return false;
+             record->Set("outcome", std::string("failed"));
+             return true;
+           }}};
+}
+
+bool IsCaught(const ComparisonReport& report, const CompareOptions& options,
+              const std::string& measure) {
+  return report.ExitCode(options) == 1 &&
+         std::ranges::any_of(report.findings, [&measure](const Finding& finding) {
+           const bool is_bad =
+               finding.judgement == Judgement::kWorse || finding.judgement == Judgement::kDifferent;
+           return is_bad && finding.measure.key == measure;
+         });
+}
+
+/// Plants each change into one record after the other's kind; 1 when one is not caught.
+int SelfTest(const BaselineCommand& command, const std::filesystem::path& work) {
+  const CompareOptions options;
+  const std::vector<Record> base = Load(work / kResults);
+  int missed = 0;
+  const auto tell = [&missed](const std::string& what, bool is_caught) {
+    Print("{}: {}\n", is_caught ? "caught" : "NOT CAUGHT", what);
+    missed += !is_caught;
+  };
+  const bool is_same = Compare(base, base, options).ExitCode(options) == 0;
+  Print("{}: measurements held against themselves\n", is_same ? "same" : "NOT THE SAME");
+  missed += !is_same;
+  for (const Plant& plant : Plants(options)) {
+    std::vector<Record> changed = base;
+    if (std::ranges::none_of(changed, [&](Record& one) { return plant.change(&one); })) {
+      Print("not planted: {}: no run has such a {}\n", plant.what, plant.measure);
+      continue;
+    }
+    tell(plant.what, IsCaught(Compare(base, changed, options), options, plant.measure));
+  }
+  const std::vector<Record> fewer(base.begin(), base.end() - 1);
+  tell("a case that is gone", Compare(base, fewer, options).ExitCode(options) == 2);
+  if (!command.counts.empty()) {
+    CountInstructions(command, work / "planted.jsonl", 1);
+    std::vector<Record> changed = Load(work / "run");
+    for (Record& one : Load(work / "planted.jsonl")) changed.push_back(std::move(one));
+    tell("5 % more instructions",
+         IsCaught(Compare(base, changed, options), options, "instructions"));
+  }
+  return missed == 0 ? 0 : 1;
+}
+
+/// check: 0 the same or better, 1 worse, 2 could not measure. renew: 0, and dir/results.jsonl is
+/// what was measured. selftest: 0 when each planted change was caught, 1 when one was not.
+/// @throws ConfigError when valgrind or loopbench_count are wanted and not there, before anything
+///         is measured
+int Baseline(const BaselineCommand& command, const std::string& typed) {
+  if (!command.keep.empty()) RequireNewFolder(command.keep, command.dir);
+  const auto baseline = command.dir / kResults;
+  if (command.action == "check" && !std::filesystem::exists(baseline)) {
+    throw ConfigError(
+        fmt::format("{}: no such file, expected the baseline; the first one is made by loopbench "
+                    "baseline renew",
+                    baseline.string()));
+  }
+  if (command.action == "renew") RequireOutput(baseline);
+  RequirePrograms(command);
+  std::optional<TemporaryFolder> temporary;
+  if (command.keep.empty()) temporary.emplace("loopbench");
+  const std::filesystem::path work = temporary ? temporary->path() : command.keep;
+  if (const int code = MeasureAll(command, work); code != 0) return code;
+  if (command.action == "selftest") return SelfTest(command, work);
+  if (command.action == "check") {
+    CompareCommand compare;
+    compare.base = command.dir;
+    compare.fresh = work / kResults;
+    return PrintComparison(compare, typed);
+  }
+  WriteFileAtomically(baseline, ReadFile(work / kResults));
+  Print("renewed {}: {} records\n", baseline.string(), Load(baseline).size());
+  return 0;
+}
+
+constexpr const char* kBaselineFooter = R"(
+renew     measures and replaces DIR/results.jsonl: commit it, with the reason
+check     measures and compares with DIR, as loopbench compare does
+selftest  measures, plants changes of values (3 times the drift, a step more, a lost case, ...) and says
+          whether a check would catch each
+
+Outcomes and counts are compared wherever the baseline was made; what depends on round-off (hashes,
+steps, instructions) only under its compiler, flags and mathematical library. Times are left out: they
+belong to one machine (loopbench history).
+
+Examples:
+  loopbench baseline renew --experiments bench/arm.json --dir bench/baseline
+  loopbench baseline check --experiments bench/*.json --dir bench/baseline --jobs 2
+  loopbench baseline selftest --experiments bench/arm.json --dir bench/baseline --counts bench/rhs.json
+
+Exit codes: 0 same or better (renewed, all caught), 1 worse (not caught), 2 could not measure.)";
+
+}  // namespace
+
+void AddBaseline(Commands& commands) {
+  auto& command = commands.Keep<BaselineCommand>();
+  CLI::App* app = commands.Add("baseline", "Keep and check a baseline of drift and counts",
+                               [&](const Typed& typed) { return Baseline(command, typed.line); });
+  app->footer(kBaselineFooter);
+  app->add_option("action", command.action, "Action: renew, check or selftest")
+      ->required()
+      ->check(CLI::IsMember({"check", "renew", "selftest"}));
+  app->add_option("--experiments", command.experiments, "Experiment files (JSON)")
+      ->required()
+      ->check(CLI::ExistingFile);
+  app->add_option("--dir", command.dir, "Folder of the baseline, to be committed")->required();
+  app->add_option("--counts", command.counts,
+                  "Benchmarks (JSON) whose instructions are counted too, by valgrind")
+      ->check(CLI::ExistingFile);
+  app->add_option("--counter", command.counter,
+                  "The program loopbench_count, where it is not beside this one nor in PATH");
+  app->add_option("-j,--jobs", command.jobs, "Runs at once")
+      ->check(NumberFrom(1, 1024))
+      ->capture_default_str();
+  app->add_option("--keep", command.keep, "New folder for what was measured (default: none)");
+}
+
+}  // namespace loopbench::harness

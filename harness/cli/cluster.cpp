@@ -1,0 +1,402 @@
+// submit, status and collect: a run in parts.
+#include "harness/cluster/cluster.h"
+
+#include <fmt/chrono.h>
+#include <fmt/format.h>
+#include <fmt/ranges.h>
+
+#include <chrono>
+#include <cmath>
+#include <filesystem>
+#include <map>
+#include <set>
+
+#include "harness/cli/command_line.h"
+#include "harness/cli/commands.h"
+#include "harness/record/provenance.h"
+#include "harness/record/record.h"
+#include "harness/run/case_identity.h"
+#include "harness/store/store_lock.h"
+#include "harness/suite/workload.h"
+#include "harness/tables/fit.h"
+#include "harness/text/files.h"
+#include "harness/text/numeric_option.h"
+#include "harness/text/terminal.h"
+
+namespace loopbench::harness {
+namespace {
+
+struct SubmitCommand {
+  ClusterRun run;
+  std::filesystem::path folder;
+  bool again = false;  ///< the parts of a folder that is there and that are neither done nor queued
+  bool queue = true;   ///< false: write the folder only, for another engine
+  bool dry_run = false;  ///< print the scripts, write nothing
+};
+
+std::vector<int> PartsNotDone(const ClusterRun& run, const std::filesystem::path& folder) {
+  std::vector<int> parts;
+  for (int part = 1; part <= run.parts; ++part) {
+    if (!IsDone(folder, part)) parts.push_back(part);
+  }
+  return parts;
+}
+
+/// There when all parts are merged.
+std::filesystem::path WholeFile(const std::filesystem::path& folder) {
+  return StoreFile(folder / "whole");
+}
+
+std::string SubmitAgainLine(const std::filesystem::path& folder) {
+  return ShellLine({"loopbench", "submit", "--again", "--out", folder.string()});
+}
+
+/// Submits the array of `parts` and the job behind it, and writes down their numbers.
+void Queue(const std::vector<int>& parts, const std::filesystem::path& folder, ClusterRun* run) {
+  WriteFileAtomically(folder / "array.sh", ArrayScript(*run, folder, parts));
+  run->array_job = SubmitJob(folder / "array.sh", {});
+  WriteClusterRun(*run, folder);
+  run->collect_job = SubmitJob(folder / "collect.sh", {"--dependency=afterany:" + run->array_job});
+  WriteClusterRun(*run, folder);
+  Print("submitted {} of {} parts as job {}, and the merge behind them as job {}\n", parts.size(),
+        run->parts, run->array_job, run->collect_job);
+  Print("  {}\n", ShellLine({"loopbench", "status", folder.string()}));
+}
+
+/// Those that are not there: a person may have put something of the machines into them.
+void WriteScripts(const ClusterRun& run, const std::filesystem::path& folder) {
+  MakeFolderOf(folder / "logs" / "x");
+  WriteNewFile(folder / "part.sh", PartScript(run, folder));
+  WriteNewFile(folder / "collect.sh", CollectScript(run, folder));
+}
+
+void PrintHowToRun(const std::filesystem::path& folder) {
+  Print("each part: {}; then: {}\n", ShellLine({"sh", (folder / "part.sh").string(), "K"}),
+        ShellLine({"loopbench", "collect", folder.string()}));
+}
+
+int SubmitAgain(const SubmitCommand& command) {
+  ClusterRun run = ReadClusterRun(command.folder);
+  std::vector<int> parts = PartsNotDone(run, command.folder);
+  if (!command.dry_run) WriteScripts(run, command.folder);
+  if (!command.queue) {
+    if (parts.empty()) {
+      Print("{}: every part is done\n", command.folder.string());
+    } else {
+      Print("{}: {} of {} parts are not done: {}\n", command.folder.string(), parts.size(),
+            run.parts, fmt::join(parts, ", "));
+    }
+    PrintHowToRun(command.folder);
+    return 0;
+  }
+  std::string problem;
+  const auto queued = QueuedTasks(run.array_job, &problem);
+  if (!queued) throw std::runtime_error("which parts run cannot be asked: " + problem);
+  std::erase_if(parts, [&queued](int part) { return queued->contains(part); });
+  if (parts.empty()) {
+    Print("{}: every part is done or in the queue\n", command.folder.string());
+    return 0;
+  }
+  if (command.dry_run) {
+    PrintText(ArrayScript(run, command.folder, parts));
+    return 0;
+  }
+  // the merge waits for one array: what the last one still has must come to its end first
+  if (!queued->empty()) {
+    throw std::runtime_error(fmt::format(
+        "{}: {} parts are still in the queue as job {}; wait for them, or scancel them first",
+        command.folder.string(), queued->size(), run.array_job));
+  }
+  Queue(parts, command.folder, &run);
+  return 0;
+}
+
+/// "id"s of the accuracy cases, in the order of the experiments.
+std::vector<std::string> OrderOfCases(const ClusterRun& run) {
+  const ExperimentFiles files = FilesOf(run);
+  Workload workload(files);
+  std::vector<std::string> ids;
+  std::set<std::string> known;  // a case that two files share is one case
+  for (std::size_t group = 0; group < workload.groups(); ++group) {
+    for (const Experiment& experiment : workload.Read(group).experiments) {
+      for (const Case& one : SelectCases(experiment, files.filter)) {
+        const std::string id = RunId(Identified(experiment, one).keys);
+        if (known.insert(id).second) ids.push_back(id);
+      }
+    }
+  }
+  return ids;
+}
+
+double Now() {
+  return std::chrono::duration<double>(std::chrono::system_clock::now().time_since_epoch()).count();
+}
+
+Table StatusTable(const ClusterRun& run, const std::vector<PartProgress>& parts) {
+  Table table;
+  table.title = fmt::format("{} in {} parts", run.name, run.parts);
+  table.columns = {{"part", "part"},
+                   {"state", "state"},
+                   {"cases", "cases", Format::kInteger},
+                   {"done", "done", Format::kInteger},
+                   {"failed", "failed", Format::kInteger},
+                   {"to_do", "to do", Format::kInteger}};
+  std::size_t done = 0, failed = 0;
+  const auto add = [&table](const std::string& name, const std::string& state, double cases,
+                            std::size_t finished, std::size_t other) {
+    const double left = cases - static_cast<double>(finished + other);
+    const auto number = [](double value) {
+      return std::isfinite(value) ? Value(static_cast<std::int64_t>(value)) : Value();
+    };
+    AddRow({name, state, number(cases), Count(finished), Count(other), number(left)}, &table);
+  };
+  for (const PartProgress& part : parts) {
+    add(std::to_string(part.part), part.state, part.cases, part.done, part.failed);
+    done += part.done;
+    failed += part.failed;
+  }
+  std::map<std::string, int> states;
+  for (const PartProgress& part : parts) ++states[part.state];
+  std::vector<std::string> words;
+  for (const auto& [state, number] : states) words.push_back(fmt::format("{} {}", number, state));
+  add("all", fmt::format("{}", fmt::join(words, ", ")), static_cast<double>(run.all_cases), done,
+      failed);
+  return table;
+}
+
+JsonObject StatusDocument(const ClusterRun& run, const std::vector<PartProgress>& parts,
+                          double seconds_left) {
+  std::vector<JsonObject> rows;
+  std::size_t done = 0, failed = 0, running = 0;
+  for (const PartProgress& part : parts) {
+    rows.push_back(JsonObject()
+                       .Add("part", std::int64_t{part.part})
+                       .Add("state", part.state)
+                       .Add("cases", part.cases)
+                       .Add("done", Count(part.done))
+                       .Add("failed", Count(part.failed)));
+    done += part.done;
+    failed += part.failed;
+    running += part.state == "running";
+  }
+  return JsonObject()
+      .Add("name", run.name)
+      .Add("cases", run.all_cases)
+      .Add("done", Count(done))
+      .Add("failed", Count(failed))
+      .Add("to_do", run.all_cases - static_cast<std::int64_t>(done + failed))
+      .Add("running_parts", Count(running))
+      .Add("array_job", run.array_job)
+      .Add("collect_job", run.collect_job)
+      .Add("seconds_left", seconds_left)
+      .Add("parts", rows);
+}
+
+/// Slurm reads its options from comment lines of the script, which a line end would cut.
+void RequireOneLine(const std::string& option, const std::string& text) {
+  if (text.find_first_of("\n\r") == std::string::npos) return;
+  throw ConfigError(
+      fmt::format("{}: found a line end in '{}', expected a text of one line", option, text));
+}
+
+int Submit(SubmitCommand command) {
+  command.folder = std::filesystem::absolute(command.folder).lexically_normal();
+  if (!command.folder.has_filename()) command.folder = command.folder.parent_path();
+  RequireOneLine("--out", command.folder.string());
+  for (const auto& path : command.run.experiments) RequireOneLine("experiment", path.string());
+  for (const auto& [option, texts] :
+       {std::pair{"--set", command.run.settings},
+        {"--filter", command.run.conditions},
+        {"--time, --partition or --sbatch", command.run.batch_options}}) {
+    for (const std::string& text : texts) RequireOneLine(option, text);
+  }
+  if (command.again) return SubmitAgain(command);
+  ClusterRun& run = command.run;
+  for (auto& path : run.experiments) path = std::filesystem::absolute(path).lexically_normal();
+  run.program = std::filesystem::read_symlink("/proc/self/exe").string();
+  CountCases(&run);
+  std::vector<int> parts;
+  for (int part = 1; part <= run.parts; ++part) parts.push_back(part);
+  const auto& folder = command.folder;
+  if (command.dry_run) {
+    for (const auto& [name, text] : {std::pair{"part.sh", PartScript(run, folder)},
+                                     {"array.sh", ArrayScript(run, folder, parts)},
+                                     {"collect.sh", CollectScript(run, folder)}}) {
+      PrintText(fmt::format("==> {} <==\n{}\n", (folder / name).string(), text));
+    }
+    Print("{} cases in {} parts; nothing was written, nothing submitted\n", run.all_cases,
+          run.parts);
+    return 0;
+  }
+  if (!MakeClusterRun(run, folder)) {
+    throw ConfigError(
+        fmt::format("{}: found the folder of a submit, expected a new one; to go on with it: "
+                    "{}",
+                    folder.string(), SubmitAgainLine(folder)));
+  }
+  WriteScripts(run, folder);
+  Print("{} cases in {} parts in {}\n", run.all_cases, run.parts, folder.string());
+  if (command.queue) {
+    Queue(parts, folder, &run);
+  } else {
+    PrintHowToRun(folder);
+  }
+  return 0;
+}
+
+/// 0; 2 when the folder is none.
+int PrintStatus(const std::filesystem::path& folder, bool json) {
+  const ClusterRun run = ReadClusterRun(folder);
+  std::string problem;
+  const auto queued = QueuedTasks(run.array_job, &problem);
+  std::vector<PartProgress> parts;
+  for (int part = 1; part <= run.parts; ++part) {
+    parts.push_back(ProgressOfPart(run, folder, part, Now()));
+    PartProgress& progress = parts.back();
+    // a part that ran to its end is done, whatever is still queued for it
+    if (progress.state == "done" || !queued) continue;
+    if (const auto task = queued->find(part); task != queued->end()) progress.state = task->second;
+  }
+  const double left = SecondsLeft(run, parts);
+  if (json) {
+    PrintText(StatusDocument(run, parts, left).Text() + "\n");
+    return 0;
+  }
+  Table table = StatusTable(run, parts);
+  if (!problem.empty()) table.notes.push_back("states from the stores alone: " + problem);
+  const auto whole = WholeFile(folder);
+  const bool is_whole = HasRecords(whole);
+  if (is_whole) {
+    table.notes.push_back(fmt::format("merged: {}", whole.parent_path().string()));
+  } else if (IsLocked(UnderWay(whole))) {
+    table.notes.push_back("the parts are being merged");
+  } else if (left > 0.0) {
+    table.notes.push_back(fmt::format("about {:.0f} s left, until {:%H:%M}", left,
+                                      fmt::localtime(static_cast<std::time_t>(Now() + left))));
+  }
+  const bool is_stuck =
+      !is_whole && queued && queued->empty() && !PartsNotDone(run, folder).empty();
+  if (is_stuck && !run.array_job.empty()) {
+    table.notes.push_back(
+        fmt::format("no part is queued; the others go on with {}", SubmitAgainLine(folder)));
+  }
+  PrintText(ToScreen(table) + "\n");
+  return 0;
+}
+
+/// All parts into folder/whole, in the order of the experiments: 0. 1, and nothing is written, when
+/// a case is missing.
+int Collect(const std::filesystem::path& folder) {
+  const ClusterRun run = ReadClusterRun(folder);
+  if (const std::vector<int> open = PartsNotDone(run, folder); !open.empty()) {
+    PrintError("{}: {} of {} parts are not done: {}; nothing was merged\n", folder.string(),
+               open.size(), run.parts, fmt::join(open, ", "));
+    return 1;
+  }
+  if (HasRecords(WholeFile(folder))) {
+    Print("{} is there already\n", WholeFile(folder).parent_path().string());
+    return 0;
+  }
+  MergeCommand merge;
+  merge.out = WholeFile(folder).parent_path();
+  merge.order = OrderOfCases(run);
+  for (int part = 1; part <= run.parts; ++part) merge.stores.push_back(PartFolder(folder, part));
+  return Merge(merge);
+}
+
+constexpr const char* kSubmitFooter = R"(
+The parts run as one array job of Slurm, the merge as a job behind it. A part that is killed, preempted or
+started twice goes on where its store stopped; --again submits the parts that are not done and not queued.
+Without Slurm: --no-queue writes the folder, and any engine calls `sh DIR/part.sh K` for each K, then
+`loopbench collect DIR`. docs/clusters.md has GNU parallel, Kubernetes and GitHub.
+
+Examples:
+  loopbench submit sweep.json --tasks 100 --out /shared/sweep --time 1:00:00 --partition cpu --no-timing
+  loopbench submit sweep.json --tasks 100 --out /shared/sweep --dry-run
+  loopbench status /shared/sweep
+  loopbench submit --again --out /shared/sweep)";
+
+/// All that was asked for once stands in the folder.
+void RequireNothingElse(const CLI::App& submit) {
+  const std::set<std::string> may_stand = {"--again", "--out", "--no-queue", "--dry-run"};
+  for (const CLI::Option* option : submit.get_options()) {
+    if (option->count() == 0 || may_stand.contains(option->get_name())) continue;
+    throw ConfigError(fmt::format("--again: found {} beside it, expected none: the folder knows",
+                                  option->get_name()));
+  }
+}
+
+struct TypedSubmit {
+  SubmitCommand submit;
+  std::string time, partition;
+  bool no_timing = false, no_queue = false;
+};
+
+int SubmitAsTyped(const CLI::App& app, TypedSubmit* typed) {
+  SubmitCommand& submit = typed->submit;
+  ClusterRun& run = submit.run;
+  if (submit.again != run.experiments.empty()) {
+    throw ConfigError(submit.again
+                          ? "--again: found experiments beside it, expected none: the folder knows"
+                          : "submit: found no experiment, expected at least one, or --again");
+  }
+  if (submit.again) RequireNothingElse(app);
+  if (!typed->time.empty()) run.batch_options.push_back("--time=" + typed->time);
+  if (!typed->partition.empty()) run.batch_options.push_back("--partition=" + typed->partition);
+  for (const std::string& option : run.batch_options) {
+    if (option.starts_with("--")) continue;
+    throw ConfigError("--sbatch: found '" + option + "', expected an option that begins with --");
+  }
+  run.timing = !typed->no_timing;
+  submit.queue = !typed->no_queue;
+  return Submit(submit);
+}
+
+}  // namespace
+
+void AddCluster(Commands& commands) {
+  auto& typed = commands.Keep<TypedSubmit>();
+  CLI::App*& app = commands.Keep<CLI::App*>();
+  app = commands.Add("submit", "Run experiments in parts on a cluster (Slurm)",
+                     [&](const Typed&) { return SubmitAsTyped(*app, &typed); });
+  app->footer(kSubmitFooter);
+  ClusterRun& run = typed.submit.run;
+  app->add_option("experiment", run.experiments, "Experiment files (JSON)")
+      ->check(CLI::ExistingFile);
+  app->add_option("-o,--out", typed.submit.folder, "New folder that all machines see")->required();
+  app->add_option("--tasks", run.parts, "Parts, each a task of the array job")
+      ->check(NumberFrom(1, kMostParts));
+  app->add_option("-j,--jobs", run.jobs, "Cases at once in a part, and processors of its task")
+      ->check(NumberFrom(1, kMostJobs))
+      ->capture_default_str();
+  app->add_option("--time", typed.time, "Limit of a part, as sbatch takes it");
+  app->add_option("--partition", typed.partition, "Slurm partition");
+  app->add_option("--sbatch", run.batch_options,
+                  "Another option of sbatch, whole: --sbatch=--account=mine (repeatable)");
+  app->add_option("--filter", run.conditions,
+                  "Only cases with key=value[,value] (or !=, <, <=, >, >=)");
+  app->add_option("--set", run.settings, "Set a field before reading: /json/pointer=value");
+  app->add_flag("--no-timing", typed.no_timing,
+                "Leave the timings out: parts on one machine disturb each other's");
+  app->add_flag("--isolate", run.isolate, "Every case in a process of its own");
+  app->add_flag("--again", typed.submit.again, "Only the parts of this folder that are not done");
+  app->add_flag("--no-queue", typed.no_queue, "Write the folder, submit nothing");
+  app->add_flag("--dry-run", typed.submit.dry_run, "Print the scripts, write nothing");
+
+  auto& folder = commands.Keep<std::filesystem::path>();
+  auto& json = commands.Keep<bool>();
+  CLI::App* status = commands.Add("status", "Show the progress of a submitted run",
+                                  [&](const Typed&) { return PrintStatus(folder, json); });
+  status->add_option("folder", folder, "Folder created by submit")->required();
+  AddJson(status, &json);
+  AddWide(status);
+
+  CLI::App* collect = commands.Add("collect", "Merge the parts of a submitted run",
+                                   [&](const Typed&) { return Collect(folder); });
+  collect->add_option("folder", folder, "Folder created by submit")->required();
+  collect->footer(
+      "DIR/whole gets every case once, in the order of the experiments. Exit codes: 0 merged, 1 a "
+      "part or a\ncase is missing and nothing was written, 2 bad input.");
+}
+
+}  // namespace loopbench::harness

@@ -1,0 +1,152 @@
+// Subcommands with their options, and what the options of several share.
+#pragma once
+
+#include <CLI/CLI.hpp>
+#include <functional>
+#include <memory>
+#include <string>
+#include <utility>
+#include <vector>
+
+#include "harness/config/experiment_reader.h"
+#include "harness/isolation/processes.h"
+#include "harness/record/select.h"
+#include "harness/text/numeric_option.h"
+#include "harness/text/terminal.h"
+
+namespace loopbench::harness {
+
+/// The words of a call.
+struct Typed {
+  std::string line;   ///< for provenance (CommandLine)
+  std::string again;  ///< as a shell takes it (ShellLine)
+};
+
+/// The subcommands of the program. Values of options belong to it: `app` parses into them.
+class Commands {
+ public:
+  /// What gives the exit code of a subcommand that was parsed.
+  using Runner = std::function<int(const Typed&)>;
+
+  explicit Commands(CLI::App* app) : app_(app) {}
+
+  CLI::App* app() const { return app_; }
+
+  template <class T>
+  T& Keep(T value = {}) {
+    const auto kept = std::make_shared<T>(std::move(value));
+    kept_.push_back(kept);
+    return *kept;
+  }
+
+  CLI::App* Add(const std::string& name, const std::string& sentence, Runner run) {
+    runners_.emplace_back(app_->add_subcommand(name, sentence), std::move(run));
+    return runners_.back().first;
+  }
+
+  /// Runs the one that was parsed.
+  int Run(const Typed& typed) const {
+    for (const auto& [app, run] : runners_) {
+      if (*app) return run(typed);
+    }
+    return 0;
+  }
+
+ private:
+  CLI::App* app_;
+  std::vector<std::shared_ptr<void>> kept_;
+  std::vector<std::pair<CLI::App*, Runner>> runners_;
+};
+
+// Each adds one subcommand, or some that belong together.
+void AddRun(Commands& commands);
+void AddMerge(Commands& commands);
+void AddList(Commands& commands);
+void AddCheck(Commands& commands);
+void AddPlan(Commands& commands);
+void AddExplain(Commands& commands);
+void AddSimplify(Commands& commands);
+void AddSchema(Commands& commands);
+void AddAdvise(Commands& commands);
+void AddView(Commands& commands);
+void AddTable(Commands& commands);
+void AddPlot(Commands& commands);
+void AddTradeoff(Commands& commands);
+void AddTrajectory(Commands& commands);
+void AddVerdict(Commands& commands);
+void AddMap(Commands& commands);
+void AddReport(Commands& commands);
+void AddImport(Commands& commands);
+void AddConvert(Commands& commands);
+void AddGenerate(Commands& commands);
+void AddCount(Commands& commands);
+void AddComparison(Commands& commands);
+void AddBaseline(Commands& commands);
+void AddCluster(Commands& commands);
+void AddHistory(Commands& commands);
+void AddShell(Commands& commands);
+
+/// Lines about the words that no subcommand or option took, each with the nearest that there is; ""
+/// when there are none. `app` is the whole program, after a parse that failed.
+std::string WhatWasMeant(const CLI::App& app);
+
+inline Selection ParseSelection(const std::vector<std::string>& conditions) {
+  Selection selection;
+  for (const std::string& text : conditions) selection.push_back(ParseCondition(text));
+  return selection;
+}
+
+inline std::vector<Setting> ParseSettings(const std::vector<std::string>& texts) {
+  std::vector<Setting> settings;
+  for (const std::string& text : texts) settings.push_back(ParseSetting(text));
+  return settings;
+}
+
+/// For commands that print tables.
+inline void AddWide(CLI::App* app) {
+  app->add_flag_callback("--wide", ShowWide, "Show all columns; do not fit tables to the terminal");
+}
+
+/// Limits of work on a mechanism; experiments contain their own ("limits").
+inline void AddLimits(CLI::App* app, ProcessLimits* limits) {
+  app->add_option("--cpu", limits->cpu_s, "CPU time limit per mechanism file [s]")
+      ->check(NumberFrom(0.001, 1e9))
+      ->capture_default_str();
+  app->add_option("--memory", limits->memory_mb, "Memory limit per mechanism file [MiB]")
+      ->check(NumberFrom(1.0, 1e9))
+      ->capture_default_str();
+}
+
+inline CLI::Option* AddJson(CLI::App* app, bool* json) {
+  return app->add_flag("--json", *json, "One JSON document instead (docs/using.md has its keys)");
+}
+
+inline void AddFilter(CLI::App* app, std::vector<std::string>* conditions) {
+  app->add_option("--filter", *conditions,
+                  "Only cases with key=value[,value] (or !=, <, <=, >, >=)");
+}
+
+inline void AddWhere(CLI::App* app, std::vector<std::string>* conditions) {
+  app->add_option("--where", *conditions,
+                  "Only records with key=value[,value] (or !=, <, <=, >, >=)");
+}
+
+/// Repeatable, one value each: a second word would be the name of a file.
+inline void AddSettings(CLI::App* app, std::vector<std::string>* settings) {
+  app->add_option("--set", *settings, "Set a field before reading: /json/pointer=value");
+}
+
+inline void AddSize(CLI::App* app, std::string* size) {
+  app->add_option("--size", *size, "Width of figures: 85 mm or 178 mm, letters of 8 pt")
+      ->check(CLI::IsMember({"one-column", "two-column"}))
+      ->capture_default_str();
+}
+
+inline CLI::Option* AddGate(CLI::App* app, std::string* gate) {
+  return app
+      ->add_option("--gate", *gate,
+                   "doubts: exit with 1 if an accuracy run shown did not finish or has doubts")
+      ->check(CLI::IsMember({"doubts"}));
+}
+
+}  // namespace loopbench::harness

@@ -1,0 +1,510 @@
+// compare, fit and export: finished measurements.
+#include "harness/judge/compare.h"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <cmath>
+#include <filesystem>
+#include <ranges>
+#include <set>
+#include <string>
+
+#include "harness/cli/command_line.h"
+#include "harness/cli/commands.h"
+#include "harness/history/history_page.h"
+#include "harness/judge/statistics.h"
+#include "harness/judge/track.h"
+#include "harness/record/provenance.h"
+#include "harness/record/record.h"
+#include "harness/record/select.h"
+#include "harness/store/measurements.h"
+#include "harness/store/result_store.h"
+#include "harness/tables/columns.h"
+#include "harness/tables/fit.h"
+#include "harness/text/files.h"
+#include "harness/text/numeric_option.h"
+#include "harness/text/terminal.h"
+
+namespace loopbench::harness {
+namespace {
+
+struct FitCommand {
+  std::filesystem::path file;
+  std::string format = "text";
+  double from = 0.0;          ///< sizes below are left out
+  std::filesystem::path out;  ///< standard output when empty
+};
+
+struct ExportCommand {
+  std::filesystem::path file;
+  std::string format = "customSmallerIsBetter";  ///< or bmf
+  std::filesystem::path out;                     ///< standard output when empty
+};
+
+std::vector<Record> LoadMeasurements(const std::filesystem::path& path) {
+  std::vector<std::string> warnings;
+  std::vector<Record> records = ReadMeasurements(path, &warnings);
+  for (const std::string& warning : warnings) PrintError("warning: {}\n", warning);
+  return records;
+}
+
+void Deliver(const std::string& text, const std::filesystem::path& out) {
+  if (out.empty()) {
+    PrintText(text);
+  } else {
+    WriteFileAtomically(out, text);
+    Print("wrote {}\n", out.string());
+  }
+}
+
+/// One row per group of measures: how many were compared, with which judgement.
+Table SummaryTable(const ComparisonReport& comparison) {
+  Table table;
+  table.title = "Compared";
+  table.columns = {{"group", "group"},
+                   {"same", "same", Format::kInteger},
+                   {"better", "better", Format::kInteger},
+                   {"worse", "worse", Format::kInteger},
+                   {"different", "different", Format::kInteger},
+                   {"not_measured", "not measured", Format::kInteger}};
+  for (const std::string& group : GroupNames()) {
+    std::vector<Value> row = {group};
+    int all = 0;
+    for (const Judgement judgement : {Judgement::kSame, Judgement::kBetter, Judgement::kWorse,
+                                      Judgement::kDifferent, Judgement::kNotMeasured}) {
+      const int count = comparison.Count(judgement, group);
+      row.emplace_back(std::int64_t{count});
+      all += count;
+    }
+    if (all > 0) AddRow(row, &table);
+  }
+  return table;
+}
+
+/// Red for what makes the comparison fail.
+std::string JudgementColour(const Record& row, const TableColumn& column) {
+  if (column.key != "judgement") return "";
+  const std::string judgement = row.Text("judgement");
+  if (judgement == ToString(Judgement::kBetter)) return "32";
+  return judgement == ToString(Judgement::kSame) ? "" : "31";
+}
+
+Table FindingTable(const ComparisonReport& comparison, bool with_same) {
+  Table table;
+  table.colour = &JudgementColour;
+  table.title = with_same ? "All measures" : "Changes";
+  table.columns = {{"judgement", "judgement"},
+                   {"case", "case"},
+                   {"measure", "measure"},
+                   {"base", "base"},
+                   {"new", "new"},
+                   {"ratio", "ratio", Format::kSeconds},
+                   {"why", "why"}};
+  // regressions first: they are what the reader came for
+  for (const Judgement judgement : {Judgement::kWorse, Judgement::kDifferent, Judgement::kBetter,
+                                    Judgement::kNotMeasured, Judgement::kSame}) {
+    if (!with_same && (judgement == Judgement::kNotMeasured || judgement == Judgement::kSame))
+      continue;
+    for (const Finding& finding : comparison.findings) {
+      if (finding.judgement != judgement) continue;
+      const auto& [key, unit] = std::pair(finding.measure.key, finding.measure.heading.unit);
+      AddRow({std::string(ToString(judgement)), finding.one,
+              unit.empty() ? std::string(key) : fmt::format("{} [{}]", key, unit), finding.base,
+              finding.fresh, std::isfinite(finding.ratio) ? Value(finding.ratio) : Value(),
+              finding.why},
+             &table);
+    }
+  }
+  return table;
+}
+
+/// "12 hashes not measured: another compiler, ..." for each reason.
+std::vector<std::string> ReasonNotes(const ComparisonReport& comparison) {
+  std::vector<std::pair<std::string, int>> reasons;
+  for (const Finding& finding : comparison.findings) {
+    if (finding.judgement != Judgement::kNotMeasured) continue;
+    const std::string reason =
+        fmt::format("{} not measured: {}", GroupOf(finding.measure.rule), finding.why);
+    const auto at = std::ranges::find(reasons, reason, &std::pair<std::string, int>::first);
+    if (at == reasons.end()) {
+      reasons.emplace_back(reason, 1);
+    } else {
+      ++at->second;
+    }
+  }
+  std::vector<std::string> notes;
+  for (const auto& [reason, count] : reasons) notes.push_back(fmt::format("{} {}", count, reason));
+  return notes;
+}
+
+void NoteCases(const std::string& what, const std::vector<std::string>& cases,
+               std::vector<std::string>& notes) {
+  if (cases.empty()) return;
+  constexpr std::size_t kMostNamed = 20;
+  const bool all = cases.size() <= kMostNamed;
+  notes.push_back(
+      fmt::format("{} {}{}", cases.size(), what,
+                  all ? ":" : fmt::format(" (--format csv names all), the first {}:", kMostNamed)));
+  for (const std::string& one : cases | std::views::take(kMostNamed)) notes.push_back("  " + one);
+}
+
+/// A row for each case that has no counterpart.
+void AddCases(const std::string& judgement, const std::vector<std::string>& cases, Table& table) {
+  for (const std::string& one : cases) AddRow({judgement, one}, &table);
+}
+
+/// Where the records of one side come from; differing origins in one file are all named.
+void NoteOrigins(const std::string& side, const std::vector<Record>& records,
+                 std::vector<std::string>& notes) {
+  std::set<std::string> lines;
+  for (const Record& record : records) {
+    const Origin origin = OriginOf(record);
+    lines.insert(origin.machine.empty() && origin.compiler.empty()
+                     ? side + ": origin not recorded"
+                     : fmt::format("{}: commit {}, {}, {}, {}, libm {}", side, origin.commit,
+                                   origin.machine, origin.compiler, origin.flags, origin.libm));
+  }
+  notes.insert(notes.end(), lines.begin(), lines.end());
+}
+
+/// One run is faster or slower than another as a whole when the machine's speed has changed; no
+/// test within the runs can tell that from a change of all code.
+void NoteCommonShift(const ComparisonReport& comparison, std::vector<std::string>& notes) {
+  std::vector<double> ratios;
+  for (const Finding& finding : comparison.findings) {
+    if (finding.measure.rule == Rule::kTime && std::isfinite(finding.ratio)) {
+      ratios.push_back(finding.ratio);
+    }
+  }
+  constexpr std::size_t kMany = 5;
+  constexpr double kShift = 0.01;  // half of the smallest effect that is reported
+  const double shift = Median(ratios);
+  if (ratios.size() < kMany || !(std::abs(shift - 1.0) > kShift)) return;
+  notes.push_back(
+      fmt::format("all times: median ratio {:.3f}; unless everything changed, the machine's speed "
+                  "did: repeat the run before believing single times",
+                  shift));
+}
+
+std::string Conclusion(const ComparisonReport& comparison, const CompareOptions& options) {
+  const int code = comparison.ExitCode(options);
+  const int worse = comparison.Count(Judgement::kWorse);
+  const int different = comparison.Count(Judgement::kDifferent);
+  if (code == 1 && different == 0) return fmt::format("WORSE: {} measures", worse);
+  if (code == 1 && worse == 0) return fmt::format("DIFFERENT: {} measures", different);
+  if (code == 1) return fmt::format("WORSE: {} measures, {} more different", worse, different);
+  if (code == 2) return "COULD NOT MEASURE: " + comparison.Obstacle(options);
+  const int better = comparison.Count(Judgement::kBetter);
+  const int undecided = comparison.Count(Judgement::kNotMeasured, "times");
+  return (better > 0 ? fmt::format("BETTER: {} measures, none worse", better) : "SAME") +
+         (undecided > 0 ? fmt::format("; {} times not compared", undecided) : "");
+}
+
+/// Leaves the records of both sides that match. A key that neither side has would choose nothing,
+/// and tell nothing apart.
+void Choose(const Selection& where, const std::vector<std::string>& match,
+            std::vector<Record>& base, std::vector<Record>& fresh) {
+  std::vector<Record> both = base;
+  both.insert(both.end(), fresh.begin(), fresh.end());
+  for (const std::string& key : match) RequireKey("--match", key, both);
+  if (where.empty()) return;
+  RequireConditions("--where", where, both);
+  base = Filter(base, where);
+  fresh = Filter(fresh, where);
+}
+
+/// The base that was named, or the last good state of the history, which `name` then says.
+std::vector<Record> LoadBase(const CompareCommand& command, const std::vector<Record>& fresh,
+                             std::string* name) {
+  if (command.history.empty() && command.branch.empty()) {
+    const auto file = [](const std::filesystem::path& path) {
+      return std::filesystem::is_directory(path) ? StoreFile(path) : path;
+    };
+    std::error_code none;
+    if (std::filesystem::equivalent(file(command.base), file(command.fresh), none)) {
+      throw ConfigError(fmt::format("compare: found '{}' as BASE and as NEW, expected two files",
+                                    file(command.base).string()));
+    }
+    return LoadMeasurements(command.base);
+  }
+  const std::string machine = fresh.empty() ? "" : OriginOf(fresh.front()).machine;
+  const bool only_times = command.options.only == std::vector<std::string>{"times"};
+  return LastGoodRecords({command.history, command.branch}, machine, only_times, name);
+}
+
+JsonObject ComparisonDocument(const ComparisonReport& comparison, const CompareOptions& options,
+                              const std::vector<std::string>& notes) {
+  std::vector<JsonObject> groups, findings;
+  for (const Record& row : SummaryTable(comparison).rows) groups.emplace_back(row);
+  for (const Finding& finding : comparison.findings) {
+    const auto& [key, unit] = std::pair(finding.measure.key, finding.measure.heading.unit);
+    findings.push_back(JsonObject()
+                           .Add("judgement", std::string(ToString(finding.judgement)))
+                           .Add("case", finding.one)
+                           .Add("measure", std::string(key))
+                           .Add("unit", std::string(unit))
+                           .Add("base", finding.base)
+                           .Add("new", finding.fresh)
+                           .Add("ratio", finding.ratio)
+                           .Add("why", finding.why));
+  }
+  return JsonObject()
+      .Add("conclusion", Conclusion(comparison, options))
+      .Add("exit_code", std::int64_t{comparison.ExitCode(options)})
+      .Add("groups", groups)
+      .Add("findings", findings)
+      .Add("only_in_base", comparison.only_base)
+      .Add("only_in_new", comparison.only_fresh)
+      .Add("more_than_once", comparison.ambiguous)
+      .Add("other_content", comparison.other_content)
+      .Add("other_settings", comparison.other_settings)
+      .Add("notes", notes);
+}
+
+}  // namespace
+
+int PrintComparison(const CompareCommand& command, const std::string& typed) {
+  std::vector<Record> fresh = LoadMeasurements(command.fresh);
+  std::string base_name;
+  std::vector<Record> base = LoadBase(command, fresh, &base_name);
+  Choose(command.where, command.options.match, base, fresh);
+  ShareContents(&base, &fresh);
+  CompareOptions options = command.options;
+  options.added |= !base_name.empty();  // a history grows, and loses nothing
+  const ComparisonReport comparison = Compare(base, fresh, options);
+  const int code = comparison.ExitCode(options);
+
+  std::vector<std::string> notes;
+  if (!base_name.empty()) notes.push_back(base_name);
+  NoteCommonShift(comparison, notes);
+  NoteOrigins("BASE", base, notes);
+  NoteOrigins("NEW", fresh, notes);
+  if (!command.markdown.empty()) {
+    WriteFileAtomically(command.markdown,
+                        ComparisonMarkdown(comparison, Conclusion(comparison, options), notes));
+  }
+  if (!command.junit.empty()) {
+    WriteFileAtomically(command.junit, ComparisonJunit(comparison, options));
+  }
+  if (command.json) {
+    PrintText(ComparisonDocument(comparison, options, notes).Text() + "\n");
+    return code;
+  }
+  notes = ReasonNotes(comparison);
+  if (!base_name.empty()) notes.push_back(base_name);
+  NoteCases("cases only in BASE", comparison.only_base, notes);
+  NoteCases("cases only in NEW", comparison.only_fresh, notes);
+  NoteCases("cases there more than once, not compared", comparison.ambiguous, notes);
+  NoteCases("cases that ran another mechanism, limits or ensemble under equal keys, not compared",
+            comparison.other_content, notes);
+  NoteCases("cases compared although they ran with other settings", comparison.other_settings,
+            notes);
+  NoteCommonShift(comparison, notes);
+  NoteOrigins("BASE", base, notes);
+  NoteOrigins("NEW", fresh, notes);
+  Table findings = FindingTable(comparison, command.format == "csv");
+  if (command.format == "csv") {
+    AddCases("only in BASE", comparison.only_base, findings);
+    AddCases("only in NEW", comparison.only_fresh, findings);
+    AddCases("more than once", comparison.ambiguous, findings);
+    AddCases("other content", comparison.other_content, findings);
+    PrintText(ToCsv(findings));
+    PrintError("{}\n", Conclusion(comparison, options));
+    return code;
+  }
+  if (command.format == "markdown") notes.push_back(fmt::format("command: {}", typed));
+  const auto print = [&](const Table& table) {
+    PrintText((command.format == "text" ? ToScreen(table) : ToMarkdown(table)) + "\n");
+  };
+  if (!findings.rows.empty()) print(findings);
+  Table summary = SummaryTable(comparison);
+  summary.notes = notes;
+  print(summary);
+  Print("{}\n", Conclusion(comparison, options));
+  return code;
+}
+
+namespace {
+
+/// Exponents of time over size, one row per benchmark family. 0, or 2 when there is no exponent.
+int PrintFits(const FitCommand& command, const std::string& typed) {
+  const std::vector<Record> benchmarks = LoadMeasurements(command.file);
+  Table table;
+  table.title = "Time over size: ns = c bodies^exponent";
+  table.columns = {{"family", "family"},
+                   {"sizes", "sizes", Format::kInteger},
+                   {"bodies_min", "bodies from", Format::kInteger},
+                   {"bodies_max", "to", Format::kInteger},
+                   {"exponent", "exponent", Format::kExponent},
+                   {"standard_error", "std. error", Format::kExponent},
+                   {"slope_min", "local min", Format::kExponent},
+                   {"slope_max", "local max", Format::kExponent},
+                   {"ns_per_body", "ns per body at largest", Format::kFixed},
+                   {"failed", "failed", Format::kInteger}};
+  table.rows = FitFamilies(benchmarks, command.from);
+  if (table.rows.empty()) {
+    PrintError("{}: no family of right-hand sides with two sizes or more\n", command.file.string());
+    return 2;
+  }
+  if (command.format != "text" || !command.out.empty()) {
+    NoteOrigins("measured", benchmarks, table.notes);
+    if (const double load = benchmarks.front().Number("load_average"); std::isfinite(load)) {
+      table.notes.push_back(fmt::format("load average of the minute before: {:.1f}", load));
+    }
+    table.notes.push_back(fmt::format("command: {}", typed));
+  }
+  const bool on_screen = command.format == "text" && command.out.empty();
+  Deliver(on_screen ? ToScreen(table) : Render(table, command.format), command.out);
+  const bool fitted = std::ranges::any_of(
+      table.rows, [](const Record& row) { return row.Find("exponent") != nullptr; });
+  return fitted ? 0 : 2;
+}
+
+/// Measurements as the JSON that trackers of continuous benchmarking take. 0; 1 when something had
+/// to be left out, each named on standard error; 2 when nothing is left.
+int ExportMeasurements(const ExportCommand& command) {
+  std::vector<std::string> torn;
+  auto [values, left_out] = TrackRecords(ReadMeasurements(command.file, &torn));
+  left_out.insert(left_out.end(), torn.begin(), torn.end());
+  for (const std::string& line : left_out) {
+    PrintError("{}: not exported: {}\n", command.file.string(), line);
+  }
+  if (values.empty()) {
+    PrintError("{}: nothing to export: no record that finished has a measure\n",
+               command.file.string());
+    return 2;
+  }
+  Deliver(command.format == "bmf" ? ToBencherMetricFormat(values) : ToCustomSmallerIsBetter(values),
+          command.out);
+  return left_out.empty() ? 0 : 1;
+}
+
+const std::string kMeasurements = "Folder of a run, a .jsonl file, or JSON of Google Benchmark";
+
+constexpr const char* kCompareFooter = R"(
+Counts, hashes and outcomes are compared exactly; errors and instructions by their ratio; times by a
+Mann-Whitney test for effects beyond 2 % (Holm's correction over all times), on one machine only.
+Samples that lie a factor of 1.5 apart differ, however few they are.
+What depends on round-off is compared under one compiler, flags and mathematical library only.
+A value that one side lacks, or that is none (null, a text for a number), is a difference.
+
+Examples:
+  loopbench compare results/baselines results/runs/now
+  loopbench compare old.json new.json --only times
+  loopbench compare --history bench/history results/runs/now --markdown summary.md --junit junit.xml
+  loopbench compare results/runs/before results/runs/after --only counts --only hashes
+  loopbench compare before after --match mechanism,formulation   # with other tolerances, masses, ...
+
+Exit codes: 0 the same or better, 1 something is worse or different, 2 could not measure: no time of
+those on both sides could be compared, or a case is missing on one side.)";
+
+constexpr const char* kFitFooter = R"(
+Examples:
+  loopbench_bench --benchmark_filter=/chain/ --benchmark_out=chain.json
+  loopbench fit chain.json
+  loopbench fit chain.json --from 30 --format markdown --out chain.md
+  loopbench fit results/runs/paper                     # timings of "chain-3", "chain-10", ...)";
+
+constexpr const char* kExportFooter = R"(
+Examples:
+  loopbench export new.json --out benchmarks.json      # github-action-benchmark, customSmallerIsBetter
+  loopbench export results/runs/paper --format bmf --out bmf.json    # Bencher, adapter json
+
+Cases that failed, and values that are no numbers, cannot be tracked: each is named.
+Exit codes: 0 all exported, 1 all but those named, 2 nothing to export or bad input.)";
+
+/// BASE and NEW of compare.
+void TakeFiles(const std::vector<std::filesystem::path>& files, CompareCommand* command) {
+  const bool has_history = !command->history.empty() || !command->branch.empty();
+  if (files.size() != (has_history ? 1u : 2u)) {
+    throw ConfigError(has_history
+                          ? "compare: found BASE beside a history, expected NEW alone"
+                          : "compare: found NEW missing, expected BASE NEW, or NEW and --history");
+  }
+  command->fresh = files.back();
+  if (!has_history) command->base = files.front();
+}
+
+void AddCompare(Commands& commands) {
+  auto& command = commands.Keep<CompareCommand>();
+  auto& files = commands.Keep<std::vector<std::filesystem::path>>();
+  auto& conditions = commands.Keep<std::vector<std::string>>();
+  CLI::App* app = commands.Add("compare", "Compare results with a baseline and report regressions",
+                               [&](const Typed& typed) {
+                                 command.where = ParseSelection(conditions);
+                                 TakeFiles(files, &command);
+                                 return PrintComparison(command, typed.line);
+                               });
+  app->footer(kCompareFooter);
+  app->add_option("base", files, kMeasurements + "; left out beside --history and --branch")
+      ->required()
+      ->expected(1, 2)
+      ->option_text("BASE NEW");
+  CLI::Option* history = app->add_option("--history", command.history,
+                                         "Take the last good state of this history as BASE");
+  app->add_option("--branch", command.branch, "Last good state of a history on this git branch")
+      ->excludes(history);
+  app->add_option("--markdown", command.markdown,
+                  "Write a summary for a pull request to this file too");
+  app->add_option("--junit", command.junit, "Write JUnit XML for a CI server to this file too");
+  app->add_option("--only", command.options.only, "Only this group (repeatable)")
+      ->check(CLI::IsMember(GroupNames()));
+  app->add_option("--where", conditions,
+                  "Only records of both with key=value[,value] (or !=, <, <=, >, >=)");
+  app->add_option("--match", command.options.match,
+                  "KEY[,KEY]: cases meet by these keys, whatever else they were run with "
+                  "(default: all keys, and equal mechanisms and limits)")
+      ->delimiter(',');
+  app->add_flag("--subset", command.options.subset, "NEW may lack cases of BASE");
+  app->add_flag("--added", command.options.added,
+                "NEW may have cases that BASE lacks (always with a history)");
+  app->add_option("--error-ratio", command.options.error_ratio, "Allowed on the same build")
+      ->check(NumberFrom(1.0, 1e9))
+      ->capture_default_str();
+  app->add_option("--format", command.format, "How tables are written (csv: all measures)")
+      ->check(CLI::IsMember({"text", "csv", "markdown"}))
+      ->capture_default_str();
+  AddWide(app);
+  AddJson(app, &command.json);
+}
+
+void AddFit(Commands& commands) {
+  auto& command = commands.Keep<FitCommand>();
+  CLI::App* app =
+      commands.Add("fit", "Fit scaling exponents of right-hand sides against mechanism size",
+                   [&](const Typed& typed) { return PrintFits(command, typed.line); });
+  app->footer(kFitFooter);
+  app->add_option("file", command.file,
+                  "JSON of Google Benchmark, or a result store with timings of families")
+      ->required();
+  app->add_option("--from", command.from, "Leave out sizes below [bodies]")
+      ->check(NumberFrom(0.0, 1e9));
+  app->add_option("--format", command.format, "How the table is written")
+      ->check(CLI::IsMember({"text", "csv", "markdown"}))
+      ->capture_default_str();
+  app->add_option("-o,--out", command.out, "File (default: the terminal)");
+  AddWide(app);
+}
+
+void AddExport(Commands& commands) {
+  auto& command = commands.Keep<ExportCommand>();
+  CLI::App* app = commands.Add("export", "Write measurements for a benchmark tracker",
+                               [&](const Typed&) { return ExportMeasurements(command); });
+  app->footer(kExportFooter);
+  app->add_option("file", command.file, kMeasurements)->required();
+  app->add_option("--format", command.format, "Output format: github-action-benchmark or Bencher")
+      ->check(CLI::IsMember({"customSmallerIsBetter", "bmf"}))
+      ->capture_default_str();
+  app->add_option("-o,--out", command.out, "File (default: the terminal)");
+}
+
+}  // namespace
+
+void AddComparison(Commands& commands) {
+  AddCompare(commands);
+  AddFit(commands);
+  AddExport(commands);
+}
+
+}  // namespace loopbench::harness

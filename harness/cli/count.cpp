@@ -1,0 +1,375 @@
+// count: exact numbers of operations of right-hand sides.
+#include <fmt/format.h>
+
+#include <cmath>
+#include <filesystem>
+#include <functional>
+#include <map>
+#include <span>
+#include <sstream>
+#include <string>
+#include <vector>
+
+#include "harness/cli/command_line.h"
+#include "harness/cli/commands.h"
+#include "harness/config/benchmarks.h"
+#include "harness/config/formulations.h"
+#include "harness/config/mechanism_reader.h"
+#include "harness/generate/record.h"
+#include "harness/isolation/processes.h"
+#include "harness/record/record.h"
+#include "harness/run/case_identity.h"
+#include "harness/tables/fit.h"
+#include "harness/text/files.h"
+#include "harness/text/terminal.h"
+#include "harness/timing/subject.h"
+
+namespace loopbench::harness {
+namespace {
+
+struct CountCommand {
+  std::vector<std::filesystem::path> mechanisms;
+  std::string family;      ///< of mechanisms of any size (benchmarks.h), beside the files
+  std::vector<int> sizes;  ///< members of the family
+  /// Names to count; empty: every formulation, every recorded level, both coordinate sets.
+  std::vector<std::string> formulations, levels, coordinates;
+  std::vector<std::string> solvers = {"rank-revealing"};
+  std::string format = "text";  ///< text, csv, markdown, json or latex
+  std::filesystem::path out;    ///< standard output when empty
+  ProcessLimits limits = kFileLimits;
+};
+
+// of counts at level baumgarte: other gains give the same counts, none would leave the feedback out
+constexpr BaumgarteGains kGains = {.alpha = 5.0, .beta = 5.0};
+
+template <class Enum>
+std::vector<Enum> ParseAll(const std::vector<std::string>& names, std::vector<Enum> all) {
+  if (names.empty()) return all;
+  all.clear();
+  for (const std::string& name : names) all.push_back(*Parse<Enum>(name));
+  return all;
+}
+
+std::string Text(const Record& row, const char* key) {
+  return std::get<std::string>(*row.Find(key));
+}
+std::int64_t Number(const Record& row, const char* key) {
+  return std::get<std::int64_t>(*row.Find(key));
+}
+
+/// Counts of one right-hand side. They are exact unless a change far below any digit that is
+/// meant, as other libraries and processors make it, leads to others.
+void SetCounts(const generate::RecordingSubject& subject, const generate::RecordingStart& start,
+               Record& row) {
+  constexpr double kRounding = 1e-12;
+  generate::RecordingStart rounded = start;
+  rounded.q.array() += kRounding;
+  rounded.u.array() -= kRounding;
+  const auto counts = generate::CountsOf(generate::RecordFunction(subject, start));
+  const auto other = generate::CountsOf(generate::RecordFunction(subject, rounded));
+  const generate::OperationCounts& of = counts.result;
+  row.Set("flops", of.flops());
+  row.Set("additions", of.additions);
+  row.Set("multiplications", of.multiplications);
+  row.Set("divisions", of.divisions);
+  row.Set("roots", of.roots);
+  row.Set("sines", of.sines);
+  row.Set("other", of.other);
+  row.Set("kinematics", counts.kinematics.flops());
+  row.Set("forces", counts.forces.flops());
+  row.Set("solve", counts.solve.flops());
+  row.Set("depth", std::int64_t{counts.depth});
+  row.Set("solve_depth", std::int64_t{counts.solve_depth});
+  row.Set("comparisons", counts.comparisons);
+  row.Set("flops_compared", counts.compared.flops());
+  row.Set("flops_as_run", counts.as_run.flops());
+  if (subject.options.enforcement == Enforcement::kPosition) {
+    generate::RecordingSubject newton = subject;
+    newton.quantity = generate::Quantity::kCorrection;
+    row.Set("correction",
+            generate::CountsOf(generate::RecordFunction(newton, start)).result.flops());
+  }
+  row.Set("exact", std::string(counts == other ? "yes" : "no"));
+}
+
+/// One part of a mechanism in one coordinate set: a row per formulation, level and solver.
+void CountPart(const CountCommand& command, const MechanismDescription& part, Coordinates set,
+               std::size_t most_nodes, std::vector<Record>& rows) {
+  const BenchmarkState state = ComputeState(part, set);
+  const std::vector<std::string> formulations =
+      command.formulations.empty() ? FormulationNamesWithoutPeers() : command.formulations;
+  for (const std::string& formulation : formulations) {
+    for (const Enforcement level : ParseAll<Enforcement>(
+             command.levels,
+             {Enforcement::kAcceleration, Enforcement::kVelocity, Enforcement::kBaumgarte})) {
+      for (const SolverKind solver : ParseAll<SolverKind>(command.solvers, {})) {
+        Record& row = rows.emplace_back();
+        row.Set("mechanism", part.name);
+        row.Set("formulation", formulation);
+        row.Set("enforcement", std::string(ToString(level)));
+        row.Set("coordinates", std::string(ToString(set)));
+        row.Set("solver", std::string(ToString(solver)));
+        row.Set("bodies", static_cast<std::int64_t>(part.bodies.size() - 1));
+        try {
+          if (state.outcome != Outcome::kFinished) {
+            throw generate::NotCovered(std::string(ToString(state.outcome)) + ": " + state.message);
+          }
+          SetCounts({.description = part,
+                     .coordinates = set,
+                     .formulation = formulation,
+                     .options = {.enforcement = level, .solver = solver, .gains = kGains},
+                     .most_nodes = most_nodes},
+                    {.q = state.q, .u = state.u}, row);
+        } catch (const std::exception& why) {
+          row.Set("not_recorded", std::string(why.what()));
+        }
+      }
+    }
+  }
+}
+
+/// In a child process: rows as lines of JSON.
+int CountHere(const CountCommand& command, const MechanismDescription& description,
+              const SceneObservation& observe, std::size_t most_nodes) {
+  const CompiledScene scene = CompileScene(description, observe, {});
+  std::vector<Record> rows;
+  for (const auto& part : scene.compiled.parts) {
+    for (const Coordinates set : ParseAll<Coordinates>(
+             command.coordinates, {Coordinates::kJoint, Coordinates::kAbsolute})) {
+      CountPart(command, part.description, set, most_nodes, rows);
+    }
+  }
+  for (const Record& row : rows) PrintText(ToJsonObject(row) + "\n");
+  return 0;
+}
+
+/// Rows of a child process that counts; nothing where it fails, with its exit code in `code`.
+std::vector<Record> RowsOf(const std::string& name, const ProcessLimits& limits,
+                           const std::function<int()>& count, int* code) {
+  std::string text;
+  *code = TextFromChild(name, limits, count, &text);
+  std::vector<Record> rows;
+  std::istringstream lines(text);
+  for (std::string line; *code == 0 && std::getline(lines, line);) {
+    rows.push_back(FromJsonLine(line));
+  }
+  return rows;
+}
+
+void RequireSizes(const SizedFamily& family, const std::vector<int>& sizes) {
+  if (sizes.empty()) {
+    throw ConfigError(fmt::format("--family {}: found no --sizes, expected numbers from {} to {}",
+                                  family.name, family.smallest, family.largest));
+  }
+  for (const int size : sizes) {
+    if (size >= family.smallest && size <= family.largest) continue;
+    throw ConfigError(fmt::format("--sizes: found {}, expected {} to {} of family {} ({})", size,
+                                  family.smallest, family.largest, family.name, family.of_what));
+  }
+}
+
+bool HasCounts(const Record& row) { return row.Find("flops") != nullptr; }
+
+std::string MethodOf(const Record& row) {
+  return Text(row, "formulation") + ", " + Text(row, "coordinates");
+}
+
+/// Sets flops / bodies and, but in the first row of a method, d log(flops) / d log(bodies) from the
+/// row before.
+void AddGrowth(std::span<Record> rows) {
+  std::map<std::string, const Record*> last;
+  for (Record& row : rows) {
+    if (!HasCounts(row)) continue;
+    const Record*& before = last[MethodOf(row) + Text(row, "enforcement") + Text(row, "solver")];
+    if (before != nullptr && Number(row, "bodies") > Number(*before, "bodies")) {
+      const auto ratio = [&](const char* key) {
+        return std::log(static_cast<double>(Number(row, key)) /
+                        static_cast<double>(Number(*before, key)));
+      };
+      row.Set("exponent", ratio("flops") / ratio("bodies"));
+    }
+    row.Set("flops_per_body",
+            static_cast<double>(Number(row, "flops")) / static_cast<double>(Number(row, "bodies")));
+    before = &row;
+  }
+}
+
+/// A sentence for each level and solver: the method with the fewest operations at each size.
+std::vector<std::string> Crossovers(std::span<const Record> rows) {
+  std::map<std::string, std::map<std::int64_t, const Record*>> cheapest;
+  for (const Record& row : rows) {
+    if (!HasCounts(row)) continue;
+    const Record*& best =
+        cheapest[Text(row, "enforcement") + ", " + Text(row, "solver")][Number(row, "bodies")];
+    if (best == nullptr || Number(row, "flops") < Number(*best, "flops")) best = &row;
+  }
+  std::vector<std::string> sentences;
+  for (const auto& [level, sizes] : cheapest) {
+    std::string sentence = "fewest operations at level " + level + ":";
+    std::string method;
+    for (const auto& [bodies, row] : sizes) {
+      if (MethodOf(*row) == method) continue;
+      sentence +=
+          fmt::format("{} from {} bodies {}", method.empty() ? "" : ";", bodies, MethodOf(*row));
+      method = MethodOf(*row);
+    }
+    sentences.push_back(sentence + fmt::format(" (to {})", sizes.rbegin()->first));
+  }
+  return sentences;
+}
+
+Table CountTable(std::vector<Record> rows) {
+  Table table{.rows = std::move(rows)};
+  table.columns = {{"mechanism", "mechanism"},
+                   {"formulation", "formulation"},
+                   {"enforcement", "level"},
+                   {"coordinates", "coord."},
+                   {"solver", "solver"},
+                   {"bodies", "bodies", Format::kInteger},
+                   {"flops", "flops", Format::kInteger, {}, 2},
+                   {"flops_per_body", "per body", Format::kFixed},
+                   {"exponent", "exponent", Format::kExponent, {}, 2},
+                   {"kinematics", "kinematics", Format::kInteger},
+                   {"forces", "forces", Format::kInteger},
+                   {"solve", "solve", Format::kInteger},
+                   {"additions", "+ -", Format::kInteger},
+                   {"multiplications", "*", Format::kInteger},
+                   {"divisions", "/", Format::kInteger},
+                   {"roots", "sqrt", Format::kInteger},
+                   {"sines", "sin cos", Format::kInteger},
+                   {"other", "other", Format::kInteger, {}, -1},
+                   {"depth", "depth", Format::kInteger, {}, 1},
+                   {"solve_depth", "depth of solve", Format::kInteger, {}, 1},
+                   {"correction", "Newton step", Format::kInteger},
+                   {"comparisons", "compared", Format::kInteger},
+                   {"flops_compared", "flops with comparisons", Format::kInteger, {}, -2},
+                   {"flops_as_run", "flops as run", Format::kInteger, {}, 1},
+                   {"exact", "exact", Format::kText, {}, -1},
+                   {"not_recorded", "not recorded", Format::kText, {}, 2}};
+  table.notes = {
+      "flops: + - * count 1, / and sqrt 4, other functions 8 (McMahon 1986); depth: operations on "
+      "the longest path; zeros and ones of the geometry exploited, as run: not exploited"};
+  return table;
+}
+
+/// Prints one row per right-hand side. Returns 2 if none was recorded.
+int CountOperations(const CountCommand& command, const std::string& typed) {
+  constexpr std::size_t kMostOfFiles = 100'000, kMostOfFamilies = 1'000'000;
+  if (command.mechanisms.empty() && command.family.empty()) {
+    throw ConfigError("count: found neither mechanisms nor --family, expected one of them");
+  }
+  std::vector<Record> rows;
+  const auto add = [&](const std::string& name, const std::function<int()>& count) {
+    int code = 0;
+    const std::vector<Record> more = RowsOf(name, command.limits, count, &code);
+    rows.insert(rows.end(), more.begin(), more.end());
+    return code;
+  };
+  for (const std::filesystem::path& path : command.mechanisms) {
+    const int code = add(path.string(), [&] {
+      const MechanismFile file = ReadMechanism(path);
+      return CountHere(command, file.description, file.observe, kMostOfFiles);
+    });
+    if (code != 0) return code;
+  }
+  const std::size_t num_files = rows.size();
+  std::vector<std::string> crossovers;
+  if (!command.family.empty()) {
+    const SizedFamily& family = SizedFamilyOf(command.family);
+    RequireSizes(family, command.sizes);
+    for (const int size : command.sizes) {
+      const int code = add(fmt::format("{} {}", family.name, size), [&] {
+        MechanismDescription description = family.make(size);
+        description.name = family.name;
+        return CountHere(command, description, {}, kMostOfFamilies);
+      });
+      if (code != 0) return code;
+    }
+    AddGrowth(std::span(rows).subspan(num_files));
+    crossovers = Crossovers(std::span(rows).subspan(num_files));
+  }
+  const int code = std::ranges::any_of(rows, HasCounts) ? 0 : 2;
+  std::string text;
+  if (command.format == "jsonl") {
+    for (const Record& row : rows) text += ToJsonObject(row) + "\n";
+  }
+  Table table = CountTable(std::move(rows));
+  table.notes.insert(table.notes.end(), crossovers.begin(), crossovers.end());
+  const bool on_terminal = command.format == "text" && command.out.empty();
+  // columns of some rows only; files keep the reasons of missing counts
+  std::erase_if(table.columns, [&](const TableColumn& column) {
+    const bool is_optional = column.key == "exponent" || column.key == "flops_per_body" ||
+                             column.key == "correction" ||
+                             (column.key == "not_recorded" && on_terminal);
+    return is_optional && std::ranges::none_of(table.rows, [&](const Record& row) {
+             return row.Find(column.key) != nullptr;
+           });
+  });
+  if (on_terminal) {
+    PrintText(ToScreen(table));
+    return code;
+  }
+  AppendProvenance(table, typed);
+  if (text.empty()) text = RenderKept(table, command.format);
+  if (command.out.empty()) {
+    PrintText(text);
+  } else {
+    WriteFileAtomically(command.out, text);
+    Print("wrote {}\n", command.out.string());
+    for (const std::string& sentence : crossovers) Print("{}\n", sentence);
+  }
+  return code;
+}
+
+constexpr const char* kCountFooter = R"(
+Each row is one right-hand side, recorded shortly after the mechanism's start. Counts are exact and depend on no clock.
+docs/operation-counts.md explains the columns.
+
+Examples:
+  loopbench count configs/mechanisms/four-bar.json
+  loopbench count configs/mechanisms/*.json --level acceleration --format csv --out counts.csv
+  loopbench count --family chain --sizes $(seq -s, 3 40) --level acceleration --format jsonl --out chain.jsonl
+  loopbench plot chain.jsonl --out chain.svg --x bodies --y flops_per_body --group formulation,coordinates
+  loopbench count my.json --formulation odca --coordinates joint --solver as-published --format json
+
+Exit codes: 0 done, 2 bad input or no right-hand side was recorded.)";
+
+}  // namespace
+
+void AddCount(Commands& commands) {
+  auto& command = commands.Keep<CountCommand>();
+  CLI::App* app =
+      commands.Add("count", "Count the operations of right-hand sides exactly",
+                   [&](const Typed& typed) { return CountOperations(command, typed.line); });
+  app->add_option("mechanisms", command.mechanisms, "Mechanism files (JSON)");
+  CLI::Option* family =
+      app->add_option("--family", command.family,
+                      "Family of mechanisms of any size; also prints how counts grow with size, "
+                      "and which method is cheapest at which size")
+          ->check(CLI::IsMember(NamesOfSizedFamilies()));
+  app->add_option("--sizes", command.sizes, "Sizes of the family's members: a,b")
+      ->delimiter(',')
+      ->needs(family);
+  app->add_option("--formulation", command.formulations, "Formulations (default: all): a,b")
+      ->delimiter(',')
+      ->check(CLI::IsMember(FormulationNamesWithoutPeers()));
+  app->add_option("--level", command.levels, "Levels (default: all that are recorded): a,b")
+      ->delimiter(',')
+      ->check(CLI::IsMember(LevelNames()));
+  app->add_option("--coordinates", command.coordinates, "Coordinate sets (default: both): a,b")
+      ->delimiter(',')
+      ->check(CLI::IsMember({"joint", "absolute"}));
+  app->add_option("--solver", command.solvers, "Solvers: a,b")
+      ->delimiter(',')
+      ->check(CLI::IsMember({"as-published", "rank-revealing"}))
+      ->capture_default_str();
+  app->add_option("--format", command.format, "Format of the table")
+      ->check(CLI::IsMember({"text", "csv", "markdown", "json", "latex", "jsonl"}))
+      ->capture_default_str();
+  app->add_option("-o,--out", command.out, "File (default: the terminal)");
+  AddWide(app);
+  AddLimits(app, &command.limits);
+  app->footer(kCountFooter);
+}
+
+}  // namespace loopbench::harness

@@ -1,0 +1,445 @@
+// explain: what an experiment runs and measures, in sentences.
+#include "harness/cli/explain.h"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <set>
+
+#include "harness/cli/command_line.h"
+#include "harness/cli/commands.h"
+#include "harness/config/formulations.h"
+#include "harness/isolation/processes.h"
+#include "harness/json/file_kind.h"
+#include "harness/observers/registry.h"
+#include "harness/suite/reference_cases.h"
+#include "harness/suite/workload.h"
+#include "harness/tables/fit.h"
+#include "harness/tables/table.h"
+#include "harness/text/files.h"
+#include "harness/text/terminal.h"
+#include "harness/text/words.h"
+#include "harness/timing/time_cases.h"
+
+namespace loopbench::harness {
+namespace {
+
+std::string Numbers(const std::vector<double>& numbers) {
+  std::vector<std::string> words;
+  for (const double number : numbers) words.push_back(NumberCell(number));
+  return ListInWords(words);
+}
+
+/// Whether some column passes.
+template <class Is>
+bool Any(const Experiment& experiment, Is is) {
+  return std::any_of(experiment.columns.begin(), experiment.columns.end(), is);
+}
+
+void ExplainScenes(const Experiment& experiment) {
+  Print("\nMechanisms\n");
+  for (const ExperimentScene& scene : experiment.scenes) {
+    const MechanismDescription& description = scene.mechanism.description;
+    Print("  {} is {} mechanism of {} and {}{}. It is simulated for {} s of its own time.\n",
+          scene.name, description.space == SpaceKind::kPlanar ? "a planar" : "a spatial",
+          description.bodies.size() == 2 ? "1 body"
+                                         : fmt::format("{} bodies", description.bodies.size() - 1),
+          WithCount(description.joints.size(), "joint"),
+          scene.path.empty() ? "" : " (" + scene.path.string() + ")", Numbers(scene.horizons));
+  }
+}
+
+void ExplainFormulations(const Experiment& experiment) {
+  Print("\nColumns: {} ways of keeping the loops closed\n", experiment.columns.size());
+  for (const Column& column : experiment.columns) Print("  {}\n", ToString(column));
+  Print("  The words stand for formulation/enforcement/coordinates/solver.\n");
+  for (const FormulationRow& row : Formulations()) {
+    const bool used =
+        Any(experiment, [&row](const Column& one) { return one.formulation == row.name; });
+    if (used) Print("  {}: {}\n", row.name, row.sentence);
+  }
+}
+
+void ExplainChoices(const Experiment& experiment) {
+  const auto any = [&](auto is) { return Any(experiment, is); };
+  for (const LevelTraits& level : Levels()) {
+    if (any([&](const Column& c) { return ToString(c.enforcement) == level.name; })) {
+      Print("  {}: {}\n", level.name, level.sentence);
+    }
+  }
+  if (any([](const Column& c) { return c.coordinates == Coordinates::kJoint; })) {
+    Print(
+        "  joint: the coordinates are those of the joints, but for one cut joint per loop, "
+        "where drift shows.\n");
+  }
+  if (any([](const Column& c) { return c.coordinates == Coordinates::kAbsolute; })) {
+    Print(
+        "  absolute: the coordinates are every body's position and angle; drift may show "
+        "at every joint.\n");
+  }
+  if (any([](const Column& c) { return c.solver == SolverKind::kAsPublished; })) {
+    Print(
+        "  as-published: plain factorisations (for reduction: the mechanism's fixed "
+        "independent speeds), which fail or go wrong where the loops lose rank.\n");
+  }
+  if (any([](const Column& c) { return c.solver == SolverKind::kRankRevealing; })) {
+    Print(
+        "  rank-revealing: solvers that notice lost rank (for reduction: independent speeds "
+        "chosen anew).\n");
+  }
+}
+
+/// Of the coordinate of a joint, in the first scene that has it.
+std::string_view UnitOf(const Experiment& experiment, const std::string& joint) {
+  for (const ExperimentScene& scene : experiment.scenes) {
+    const MechanismDescription& description = scene.mechanism.description;
+    const auto found = std::ranges::find(description.joints, joint, &JointDescription::name);
+    if (found == description.joints.end()) continue;
+    const auto words = ValueWords(found->type, description.space, false);
+    if (words.size() == 1) return words.front().unit;
+  }
+  return "rad or m";
+}
+
+void ExplainRuns(const Experiment& experiment) {
+  const bool alone = experiment.integrators.size() == 1;
+  Print("\nRuns\n  The integrator{} {}; ", alone ? " is" : "s are",
+        fmt::join(experiment.integrators, ", "));
+  if (!experiment.tolerances.empty()) {
+    Print("{} relative and absolute tolerances are equal: {}. Smaller is more accurate.\n",
+          alone ? "its" : "their", Numbers(experiment.tolerances));
+  }
+  if (!experiment.fixed_steps.empty()) {
+    Print("{}steps of fixed length without error test: {} s.\n",
+          experiment.tolerances.empty() ? "" : "  Each case also runs with ",
+          Numbers(experiment.fixed_steps));
+  }
+  if (experiment.ensembles.empty()) {
+    Print(
+        "  Each case runs once. One run resolves no exponent of growth with confidence; "
+        "\"ensembles\" would.\n");
+  }
+  for (const EnsembleRule& rule : experiment.ensembles) {
+    const std::vector<Case> cases = Expand(experiment);
+    const auto count = static_cast<std::size_t>(std::count_if(
+        cases.begin(), cases.end(), [&rule](const Case& one) { return Matches(rule, one); }));
+    std::string start =
+        fmt::format("each held coordinate moved by up to {:g} (rad or m)", rule.perturb);
+    if (!rule.between.empty()) start.clear();
+    for (const DrawnCoordinate& drawn : rule.between) {
+      start += fmt::format("{}{} between {:g} and {:g} ({})", start.empty() ? "" : ", ",
+                           drawn.joint, drawn.from, drawn.to, UnitOf(experiment, drawn.joint));
+    }
+    Print(
+        "  {} also run{} {} times from perturbed starts: {}, drawn from seed {}. The spread of the "
+        "results says how far a single run can be trusted; where the scene knows a branch, "
+        "ensemble_branch_kept counts the runs that stay within {:g} rad of it.\n",
+        WithCount(count, "case"), count == 1 ? "s" : "", rule.size, start, rule.seed,
+        rule.branch_bound);
+  }
+  const Limits& limits = experiment.limits;
+  Print(
+      "  A run is given up after {:g} s of CPU time, {} accepted steps, or {:g} MiB of "
+      "memory; its row then says so.\n",
+      limits.cpu_s, limits.steps, limits.memory_mb);
+}
+
+void ExplainMeasures(const Experiment& experiment, const Selection& filter) {
+  Print(
+      "\nMeasured at every accepted step\n"
+      "  drift [m, rad]: how far the joints that ought to hold have come apart, and the "
+      "power of time it grows with;\n"
+      "  energy error [J]; rank and conditioning of the loops; how the run ended.\n"
+      "  Series keep {} points for figures.\n",
+      experiment.series_points);
+  for (const ObserverRow& row : RegisteredObservers()) Print("  {}: {}\n", row.name, row.sentence);
+  if (const std::size_t rungs = CountRungs(experiment); rungs > 0) {
+    Print(
+        "  {} in several scalars with one integrator: error and drift against tolerance, and "
+        "whether truncation or round-off rules them.\n",
+        WithCount(rungs, "run"));
+  }
+  const std::size_t timings = CountTimings(experiment, filter);
+  if (timings == 0) {
+    Print("  There are no timings.\n");
+    return;
+  }
+  Print(
+      "  {}, in runs of their own and never two at once: time of one right-hand side [ns] "
+      "and of whole simulations, {} repeats {}.\n",
+      WithCount(timings, "timing"), experiment.timing.repeats,
+      experiment.timing.cases ? "of each case as it is"
+                              : fmt::format("at tolerance {}", experiment.timing.tolerance));
+}
+
+/// The values of an axis that are there, each once, in their order.
+std::vector<std::string> ValuesOf(const std::string& axis,
+                                  const std::vector<Experiment>& experiments) {
+  std::vector<std::string> values;
+  std::set<std::string> known;
+  for (const Experiment& one : experiments) {
+    if (known.insert(one.parameters.Text(axis)).second) values.push_back(one.parameters.Text(axis));
+  }
+  return values;
+}
+
+void ExplainSweep(const Overview& overview) {
+  const Experiment& first = overview.experiments.front();
+  if (!first.parameters.items().empty()) {
+    Print("\nSweep: {} of values; what follows is the first\n",
+          WithCount(overview.combinations, "combination"));
+    for (const auto& [name, number] : overview.axes) {
+      std::vector<std::string> values = ValuesOf(name, overview.experiments);
+      constexpr std::size_t kMostShown = 12;
+      if (values.size() > kMostShown) {
+        const std::string last = values.back();
+        values.resize(kMostShown - 2);
+        values.push_back("...");
+        values.push_back(last);
+      }
+      Print("  {}: {}", name, fmt::join(values, ", "));
+      Print("{}", overview.is_sample ? fmt::format(" ({} values, some shown)\n", number) : "\n");
+    }
+    Print("  Every record carries these values, for --filter {}=...\n",
+          first.parameters.items().front().first);
+  }
+  if (!first.exclusions.empty()) {
+    Print("\nLeft out are cases with");
+    for (const Selection& rule : first.exclusions) Print(" [{}]", ToText(rule));
+    Print("\n");
+  }
+}
+
+void ExplainExperiment(const std::filesystem::path& path, const ExperimentFiles& files) {
+  const Overview overview = MakeOverview(path, {{path}, files.settings, files.filter});
+  const Experiment& first = overview.experiments.front();
+  for (const Experiment& one : overview.experiments) CheckLadders(one);
+  Print("{} ({})\n", first.name, path.string());
+  if (!first.comment.empty()) Print("  {}\n", first.comment);
+  Print(
+      "  {}: each is one mechanism, column, tolerance and horizon. Units are SI, angles "
+      "in rad.\n",
+      WithCount(overview.cases(), "case"));
+  ExplainSweep(overview);
+  ExplainScenes(first);
+  ExplainFormulations(first);
+  ExplainChoices(first);
+  ExplainRuns(first);
+  ExplainMeasures(first, files.filter);
+  Print(
+      "\nloopbench list {0} shows every case, loopbench plan {0} the time they will "
+      "take.\n",
+      path.string());
+}
+
+JsonObject ExperimentDocument(const std::filesystem::path& path, const ExperimentFiles& files) {
+  const Overview overview = MakeOverview(path, {{path}, files.settings, files.filter});
+  const Experiment& first = overview.experiments.front();
+  std::size_t timings = 0, rungs = 0;
+  for (const Experiment& one : overview.experiments) {
+    timings += CountTimings(one, files.filter);
+    CheckLadders(one);
+    rungs += CountRungs(one);
+  }
+  timings = timings * overview.combinations / overview.experiments.size();
+  rungs = rungs * overview.combinations / overview.experiments.size();
+  std::vector<JsonObject> scenes, sweep;
+  for (const ExperimentScene& scene : first.scenes) {
+    const MechanismDescription& description = scene.mechanism.description;
+    const bool planar = description.space == SpaceKind::kPlanar;
+    scenes.push_back(JsonObject()
+                         .Add("name", scene.name)
+                         .Add("file", scene.path.string())
+                         .Add("space", std::string(planar ? "planar" : "spatial"))
+                         .Add("bodies", Count(description.bodies.size() - 1))
+                         .Add("joints", Count(description.joints.size()))
+                         .Add("horizons", scene.horizons));
+  }
+  for (const auto& [name, number] : overview.axes) {
+    sweep.push_back(JsonObject()
+                        .Add("name", name)
+                        .Add("count", Count(number))
+                        .Add("values", ValuesOf(name, overview.experiments)));
+  }
+  std::vector<std::string> columns;
+  for (const Column& column : first.columns) columns.push_back(ToString(column));
+  return JsonObject()
+      .Add("file", path.string())
+      .Add("kind", std::string("experiment"))
+      .Add("name", first.name)
+      .Add("comment", first.comment)
+      .Add("cases", Count(overview.cases()))
+      .Add("combinations", Count(overview.combinations))
+      .Add("timings", Count(timings))
+      .Add("runs_in_several_scalars", Count(rungs))
+      .Add("references", first.reference.has_value())
+      .Add("sweep", sweep)
+      .Add("scenes", scenes)
+      .Add("columns", columns)
+      .Add("integrators", first.integrators)
+      .Add("tolerances", first.tolerances)
+      .Add("fixed_steps", first.fixed_steps)
+      .Add("limits", JsonObject()
+                         .Add("cpu_s", first.limits.cpu_s)
+                         .Add("steps", first.limits.steps)
+                         .Add("memory_mb", first.limits.memory_mb));
+}
+
+/// The document of a mechanism, as its child process prints it.
+std::string MechanismText(const std::filesystem::path& path, bool all, const ProcessLimits& limits,
+                          int* code) {
+  std::string text;
+  const auto work = [&] {
+    JsonObject document;
+    document.Add("file", path.string()).Add("kind", std::string("mechanism"));
+    const int ended = ExplainMechanism(path, {.all = all, .document = &document});
+    PrintText(document.Text());
+    return ended;
+  };
+  *code = std::max(*code, TextFromChild(path.string(), limits, work, &text));
+  if (!text.empty()) return text;
+  return JsonObject()
+      .Add("file", path.string())
+      .Add("kind", std::string("mechanism"))
+      .Add("error", std::string("cut off"))
+      .Text();
+}
+
+/// What experiments run and measure, and what mechanisms are made of, by the kind of each file.
+/// Mechanisms are analysed in a child process under `limits`; 2 for one that they cut off. `all`:
+/// every row of long tables.
+int Explain(const ExperimentFiles& files, bool all, bool json, const ProcessLimits& limits) {
+  // the child that does the work prints into memory, and sees no terminal
+  const ExplainView view = ViewOfOutput(all);
+  int exit_code = 0;
+  std::string documents;
+  for (const auto& path : files.paths) {
+    const bool is_mechanism = KindOfFile(path) == FileKind::kMechanism;
+    if (is_mechanism && !(files.settings.empty() && files.filter.empty())) {
+      throw ConfigError(fmt::format(
+          "{}: --set and --filter are for experiments, and this is a mechanism", path.string()));
+    }
+    if (json) {
+      documents += (documents.empty() ? "" : ",\n") +
+                   (is_mechanism ? MechanismText(path, all, limits, &exit_code)
+                                 : ExperimentDocument(path, files).Text());
+    } else if (is_mechanism) {
+      const int code =
+          PrintFromChild(path.string(), limits, [&] { return ExplainMechanism(path, view); });
+      exit_code = std::max(exit_code, code);
+    } else {
+      ExplainExperiment(path, files);
+    }
+  }
+  if (json) PrintText("{\"files\":[" + documents + "]}\n");
+  return exit_code;
+}
+
+}  // namespace
+
+// Tables of explain on the terminal.
+
+namespace {
+
+constexpr std::size_t kMostRows = 40, kFirstRows = 30, kIndent = 2, kNarrowest = 24;
+
+/// Without columns that say nothing.
+Table WithoutEmpty(Table table) {
+  std::erase_if(table.columns, [&table](const TableColumn& column) {
+    return std::ranges::all_of(table.rows,
+                               [&column](const Record& row) { return Cell(row, column).empty(); });
+  });
+  return table;
+}
+
+std::size_t LongestWord(std::string_view text) {
+  std::size_t longest = 0;
+  while (!text.empty()) {
+    const std::size_t end = std::min(text.find(' '), text.size());
+    longest = std::max(longest, CellsOf(text.substr(0, end)));
+    text.remove_prefix(std::min(end + 1, text.size()));
+  }
+  return longest;
+}
+
+/// For a pipe: only the last column is broken, and no name in it, for somebody may look for it.
+Table LastColumnBroken(Table table) {
+  TableColumn& last = table.columns.back();
+  if (last.format != Format::kText) return table;
+  std::size_t taken = kIndent;
+  for (std::size_t c = 0; c + 1 < table.columns.size(); ++c) {
+    taken += TextColumn(table.columns[c], table.rows).width + kColumnGap;
+  }
+  constexpr std::size_t kUsual = 100;
+  last.most_cells = kUsual > taken + kNarrowest ? kUsual - taken : kNarrowest;
+  for (const Record& row : table.rows) {
+    last.most_cells = std::max(last.most_cells, LongestWord(EscapeTerminal(row.Text(last.key))));
+  }
+  return table;
+}
+
+Table Fitted(Table table, const ExplainView& view) {
+  if (!view.width) return LastColumnBroken(std::move(table));
+  return FitWidth(std::move(table),
+                  *view.width == 0 ? 0 : *view.width - std::min(*view.width, kIndent));
+}
+
+}  // namespace
+
+ExplainView ViewOfOutput(bool all) {
+  ExplainView view{.all = all};
+  if (OutputIsTerminal()) view.width = OutputScreen().width;
+  return view;
+}
+
+std::string ShortNumber(double value) { return fmt::format("{:.6g}", value + 0.0); }
+
+void PrintSection(const std::string& title, const Table& table, const ExplainView& view,
+                  const char* key) {
+  if (view.document != nullptr) {
+    std::vector<JsonObject> rows(table.rows.begin(), table.rows.end());
+    if (*key != '\0') view.document->Add(key, rows);
+    return;
+  }
+  Print("\n{}\n", title);
+  if (table.rows.empty()) {
+    Print("  none\n");
+    return;
+  }
+  Table shown = table;
+  if (!view.all && table.rows.size() > kMostRows) shown.rows.resize(kFirstRows);
+  const std::string text = ToText(Fitted(WithoutEmpty(shown), view));
+  for (std::size_t begin = 0; begin < text.size();) {
+    const std::size_t end = std::min(text.find('\n', begin), text.size());
+    if (end > begin) Print("  {}\n", text.substr(begin, end - begin));
+    begin = end + 1;
+  }
+  if (shown.rows.size() < table.rows.size()) {
+    Print("  ... and {} more rows (--all shows them)\n", table.rows.size() - shown.rows.size());
+  }
+}
+
+void AddExplain(Commands& commands) {
+  auto& settings = commands.Keep<std::vector<std::string>>();
+  auto& conditions = commands.Keep<std::vector<std::string>>();
+  auto& files = commands.Keep<ExperimentFiles>();
+  auto& limits = commands.Keep(kFileLimits);
+  auto& all = commands.Keep<bool>();
+  auto& json = commands.Keep<bool>();
+  CLI::App* app = commands.Add(
+      "explain", "Describe an experiment or a mechanism (joints, loops, freedom, redundancy)",
+      [&](const Typed&) {
+        files.filter = ParseSelection(conditions);
+        files.settings = ParseSettings(settings);
+        return Explain(files, all, json, limits);
+      });
+  app->add_option("file", files.paths, "Experiment or mechanism files (JSON)")->required();
+  AddFilter(app, &conditions);
+  AddLimits(app, &limits);
+  AddSettings(app, &settings);
+  AddWide(app);
+  AddJson(app, &json);
+  app->add_flag("--all", all, "Every row of long tables of a mechanism");
+}
+
+}  // namespace loopbench::harness

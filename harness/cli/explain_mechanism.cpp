@@ -1,0 +1,406 @@
+// explain: what a mechanism is made of, its start and its structure.
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <array>
+
+#include "harness/analysis/model_warnings.h"
+#include "harness/cli/explain.h"
+#include "harness/config/mechanism_reader.h"
+#include "harness/run/case_identity.h"
+#include "harness/text/terminal.h"
+#include "mechanism/model/kinematics.h"
+#include "odca/odca.h"
+
+namespace loopbench::harness {
+namespace {
+
+constexpr std::size_t kMostNames = 12;
+
+/// Names in order; of many the first and the last, unless all are asked for.
+std::string Names(const std::vector<std::string>& names, const ExplainView& view) {
+  if (view.all || names.size() <= kMostNames) return fmt::format("{}", fmt::join(names, " "));
+  const std::vector<std::string> first(names.begin(), names.begin() + kMostNames - 2);
+  return fmt::format("{} ... ({} left out) {}", fmt::join(first, " "),
+                     names.size() - kMostNames + 1, names.back());
+}
+
+Table LoopTable(const MechanismDescription& description, const Structure& structure,
+                const ExplainView& view) {
+  Table table;
+  table.columns = {{"cut", "cut joint", Format::kText, {}},
+                   {"shift", "open [m]", Format::kScientific, {}},
+                   {"turn", "open [rad]", Format::kScientific, {}},
+                   {"what", "of", Format::kText, {}},
+                   {"through", "through", Format::kText, {}}};
+  for (const LoopPath& loop : structure.loops) {
+    std::vector<std::string> joints, bodies;
+    for (const int j : loop.joints) joints.push_back(description.joints[j].name);
+    for (const int b : loop.bodies) bodies.push_back(description.bodies[b].name);
+    Record row;
+    row.Set("cut", description.joints[loop.cut_joint].name);
+    row.Set("shift", loop.open_shift);
+    row.Set("turn", loop.open_rotation);
+    row.Set("what", std::string("joints"));
+    row.Set("through", Names(joints, view));
+    table.rows.push_back(row);
+    Record second;
+    second.Set("what", std::string("bodies"));
+    second.Set("through", Names(bodies, view));
+    table.rows.push_back(second);
+  }
+  return table;
+}
+
+void PrintFreedom(const Structure& s, const ExplainView& view) {
+  const int each = s.space == SpaceKind::kPlanar ? 3 : 6;
+  Say(view, "\nDegrees of freedom\n");
+  Say(view, "  {} by counting (Gruebler, Kutzbach): {} bodies x {} - {} constraints\n",
+      s.counted_freedom, s.bodies, each, s.rows);
+  if (!s.analysed) return;
+  Say(view, "  {} by rank: {} speeds of the tree - rank {} of the {} constraints of loops\n",
+      s.joint_u - s.rank_nearby, s.joint_u, s.rank_nearby, s.loop_rows);
+  if (s.locked() && s.freedom_at_start() > 0) {
+    Say(view,
+        "  0 that lead anywhere: the start is singular, and what its constraints leave free to\n"
+        "  first order falls back to it\n");
+    return;
+  }
+  if (s.freedom_of_parts) {
+    Say(view, "  {} that lead anywhere: a part cannot move, see Warnings\n", *s.freedom_of_parts);
+    return;
+  }
+  if (s.freedom_at_start() != s.freedom()) {
+    Say(view, "  {} at the start, a singular position: rank {} there\n", s.freedom_at_start(),
+        s.rank);
+  }
+  if (s.rank > 0 && s.singular_values.size() == 0) {
+    Say(view, "  all constraints are independent at the start, by sparse pivots\n");
+  } else if (s.rank > 0) {
+    Say(view, "  scaled singular values at the start: {:.3g} largest, {:.3g} smallest nonzero\n",
+        s.singular_values[0], s.singular_values[s.rank - 1]);
+  }
+}
+
+void PrintRedundant(const MechanismDescription& description, const Structure& structure,
+                    const ExplainView& view) {
+  if (!structure.analysed) return;
+  Say(view, "\nRedundant constraints: {}\n", structure.redundant.size());
+  bool released = false;
+  for (const RedundantDirection& one : structure.redundant) {
+    Say(view, "  {}: {}{}\n", description.joints[one.joint].name, one.name,
+        one.released ? "" : " (at the start)");
+    released = released || one.released;
+  }
+  if (!released) return;
+  Say(view, "  All of these can be dropped at once; the loops then stay closed as they do now.\n");
+  if (structure.rounding > 0.0) {
+    Say(view, "  They are redundant within {:.2g} lengths: a run leaves them out (\"accuracy\").\n",
+        structure.rounding);
+  } else {
+    Say(view,
+        "  They are redundant at every position: a run keeps the rank of the constraints and "
+        "observes all\n  (\"compile\": \"redundancy\").\n");
+  }
+}
+
+void PrintIslands(const MechanismDescription& description, const Structure& structure,
+                  const ExplainView& view) {
+  Table table;
+  table.columns = {{"part", "part", Format::kInteger, {}},
+                   {"bodies", "bodies", Format::kInteger, {}},
+                   {"first", "first body", Format::kText, {}},
+                   {"held", "held by", Format::kText, {}}};
+  for (std::size_t i = 0; i < structure.islands.size(); ++i) {
+    const Island& island = structure.islands[i];
+    Record row;
+    row.Set("part", static_cast<std::int64_t>(i + 1));
+    row.Set("bodies", static_cast<std::int64_t>(island.bodies.size()));
+    row.Set("first", description.bodies[island.bodies.front()].name);
+    row.Set("held", std::string(island.grounded ? "ground" : "nothing: it floats"));
+    table.rows.push_back(row);
+  }
+  PrintSection("Separate parts, connected through ground at most", table, view, "parts");
+}
+
+void PrintCoordinates(const Structure& structure, const ExplainView& view) {
+  Table table;
+  table.columns = {{"set", "coordinates", Format::kText, {}},
+                   {"q", "positions", Format::kInteger, {}},
+                   {"u", "speeds", Format::kInteger, {}},
+                   {"rows", "constraints", Format::kInteger, {}},
+                   {"rank", "rank", Format::kInteger, {}},
+                   {"free", "independent speeds", Format::kInteger, {}}};
+  for (const Coordinates set : {Coordinates::kJoint, Coordinates::kAbsolute}) {
+    const bool joint = set == Coordinates::kJoint;
+    Record row;
+    row.Set("set", std::string(ToString(set)));
+    row.Set("q", std::int64_t{joint ? structure.joint_q : structure.absolute_q});
+    row.Set("u", std::int64_t{joint ? structure.joint_u : structure.absolute_u});
+    row.Set("rows", std::int64_t{joint ? structure.loop_rows : structure.rows});
+    if (structure.analysed) {
+      const int speeds = joint ? structure.joint_u : structure.absolute_u;
+      row.Set("rank", std::int64_t{speeds - structure.freedom()});
+      row.Set("free", std::int64_t{structure.freedom()});
+    }
+    table.rows.push_back(row);
+  }
+  PrintSection("Coordinates", table, view, "coordinates");
+}
+
+template <class Space>
+odca::Plan PlanFor(const MechanismDescription& description, odca::Grounding grounding) {
+  const Mechanism<Space, double> mechanism(description, Coordinates::kJoint);
+  return odca::MakePlan(mechanism, {.grounding = grounding});
+}
+
+void PrintPlanOfJoins(const MechanismDescription& description, const ExplainView& view) {
+  Table table;
+  table.columns = {{"solver", "solver", Format::kText, {}},
+                   {"depth", "depth", Format::kInteger, {}},
+                   {"handles", "most handles", Format::kInteger, {}},
+                   {"largest", "largest join", Format::kInteger, {}},
+                   {"loops", "joins that close loops", Format::kInteger, {}}};
+  for (const SolverKind solver : {SolverKind::kRankRevealing, SolverKind::kAsPublished}) {
+    const auto grounding =
+        solver == SolverKind::kAsPublished ? odca::Grounding::kAtRoot : odca::Grounding::kEager;
+    const odca::Plan plan = description.space == SpaceKind::kPlanar
+                                ? PlanFor<Planar>(description, grounding)
+                                : PlanFor<Spatial>(description, grounding);
+    Record row;
+    row.Set("solver", std::string(ToString(solver)));
+    row.Set("depth", std::int64_t{plan.depth()});
+    row.Set("handles", std::int64_t{plan.most_handles()});
+    row.Set("largest", std::int64_t{plan.largest_join()});
+    row.Set("loops", std::int64_t{plan.loop_joins()});
+    table.rows.push_back(row);
+  }
+  PrintSection("Plan of O-DCA", table, view, "odca_plan");
+}
+
+std::vector<JsonObject> LoopDocuments(const MechanismDescription& description,
+                                      const Structure& structure) {
+  std::vector<JsonObject> loops;
+  for (const LoopPath& loop : structure.loops) {
+    std::vector<std::string> joints, bodies;
+    for (const int j : loop.joints) joints.push_back(description.joints[j].name);
+    for (const int b : loop.bodies) bodies.push_back(description.bodies[b].name);
+    loops.push_back(JsonObject()
+                        .Add("cut", description.joints[loop.cut_joint].name)
+                        .Add("open_shift", loop.open_shift)
+                        .Add("open_rotation", loop.open_rotation)
+                        .Add("joints", joints)
+                        .Add("bodies", bodies));
+  }
+  return loops;
+}
+
+/// What sections do not say.
+void DescribeStructure(const MechanismDescription& description, const Structure& s,
+                       JsonObject* document) {
+  std::vector<JsonObject> redundant;
+  for (const RedundantDirection& one : s.redundant) {
+    redundant.push_back(JsonObject()
+                            .Add("joint", description.joints[one.joint].name)
+                            .Add("direction", one.name)
+                            .Add("at_every_position", one.released));
+  }
+  const auto known = [&s](int number) {
+    return s.analysed ? Value(std::int64_t{number}) : Value();
+  };
+  document->Add("start_outcome", std::string(ToString(s.start.outcome)))
+      .Add("start_message", s.start.message)
+      .Add("freedom", JsonObject()
+                          .Add("by_counting", std::int64_t{s.counted_freedom})
+                          .Add("by_rank", known(s.freedom()))
+                          .Add("at_start", known(s.freedom_at_start()))
+                          .Add("constraints_of_loops", std::int64_t{s.loop_rows})
+                          .Add("rank", known(s.rank_nearby))
+                          .Add("rank_at_start", known(s.rank)))
+      .Add("loops", LoopDocuments(description, s))
+      .Add("redundant", redundant);
+}
+
+}  // namespace
+
+int ExplainMechanism(const std::filesystem::path& path, const ExplainView& view) {
+  const MechanismDescription description = ReadMechanism(path).description;
+  const Structure structure = AnalyseStructure(description);
+  const std::vector<Warning> warnings = FindWarnings(description, structure);
+  if (view.document != nullptr) {
+    const bool planar = description.space == SpaceKind::kPlanar;
+    view.document->Add("name", description.name)
+        .Add("space", std::string(planar ? "planar" : "spatial"))
+        .Add("gravity",
+             std::vector<double>(description.gravity.begin(), description.gravity.end()));
+    DescribeStructure(description, structure, view.document);
+  }
+  Say(view, "{} ({})\n  described in {}; lengths in m, angles in rad\n", description.name,
+      path.string(), description.space == SpaceKind::kPlanar ? "the plane" : "space");
+  PrintModel(description, structure, view);
+  PrintStart(description, structure, view);
+  PrintFreedom(structure, view);
+  PrintSection("Loops", LoopTable(description, structure, view), view);
+  PrintRedundant(description, structure, view);
+  PrintIslands(description, structure, view);
+  PrintCoordinates(structure, view);
+  PrintPlanOfJoins(description, view);
+  Say(view, "\nPossible simplifications\n");
+  const Compiled compiled = Compile(description, CompileOptions::All());
+  if (compiled.report.empty()) Say(view, "  none\n");
+  for (const std::string& line : compiled.report) Say(view, "  {}\n", line);
+  if (compiled.done != CompileOptions::None()) {
+    Say(view, "  Savings found: {}. By default a run makes: {} (\"compile\" of an experiment).\n",
+        ToString(compiled.done), ToString(CompileOptions()));
+  }
+  if (view.document != nullptr) {
+    std::vector<std::string> texts;
+    for (const Warning& warning : warnings) texts.push_back(warning.text);
+    view.document->Add("savings", compiled.report).Add("warnings", texts);
+  }
+  Say(view, "\nWarnings\n");
+  if (warnings.empty()) Say(view, "  none\n");
+  for (const Warning& warning : warnings) Say(view, "  {}\n", warning.text);
+  return structure.start.outcome == Outcome::kInconsistentStart ? 2 : 0;
+}
+
+// explain: the assembled start of a mechanism, joint by joint, and its energy.
+
+namespace {
+
+template <class Space>
+class StartText {
+ public:
+  StartText(const MechanismDescription& description, const Start<double>& start)
+      : description_(description),
+        start_(start),
+        mechanism_(description, Coordinates::kJoint),
+        kinematics_(mechanism_) {
+    kinematics_.UpdatePosition(start.q);
+    kinematics_.UpdateVelocity(start.u);
+  }
+
+  Table JointValuesTable() const {
+    Table table;
+    table.columns = {
+        {"name", "joint", Format::kText, {}}, {"coordinate", "coordinate", Format::kText, {}},
+        {"q", "value", Format::kText, {}},    {"speed", "speed", Format::kText, {}},
+        {"u", "value", Format::kText, {}},    {"given", "given", Format::kText, {}}};
+    for (std::size_t j = 0; j < description_.joints.size(); ++j) AddJoint(j, &table);
+    return table;
+  }
+
+  Energy<double> EnergyAtStart() const { return ComputeEnergy(kinematics_); }
+
+ private:
+  using Values = std::array<double, 7>;
+
+  /// Of a tree joint as they are integrated; of others as measured between the bodies.
+  Values CoordinatesOf(const Joint<Space, double>& joint) const {
+    Values q{};
+    if (joint.kind->coordinates == nullptr) return q;
+    const Pose<Space, double> X_WF = Compose(kinematics_.poses()[joint.from], joint.X_PF),
+                              X_WM = Compose(kinematics_.poses()[joint.to], joint.X_QM);
+    joint.kind->coordinates(Compose(Inverse(X_WF), X_WM), q.data(), joint.kind->parameter);
+    for (int i = 0, next = joint.q_offset; i < joint.kind->num_q; ++i) {
+      const int drive = mechanism_.DriveOf(joint, i);
+      if (drive >= 0) {
+        q[i] = kinematics_.drives()[drive].value;
+      } else if (joint.in_tree()) {
+        q[i] = start_.q[next++];
+      }
+    }
+    return q;
+  }
+
+  Values SpeedsOf(std::size_t index) const {
+    Values u{};
+    const Joint<Space, double>& joint = mechanism_.joints()[index];
+    const JointState<Space, double>& state = kinematics_.joints()[index];
+    for (int i = 0, next = 0; i < joint.kind->num_u; ++i) {
+      const int drive = mechanism_.DriveOf(joint, i);
+      u[i] = drive >= 0 ? kinematics_.drives()[drive].rate
+                        : joint.kind->inverse_H_squared * state.H(next++).dot(state.V_rel);
+    }
+    return u;
+  }
+
+  std::string GivenBy(int joint) const {
+    const InitialDescription& initial = description_.initial;
+    if (!description_.joints[joint].motions.empty()) return "prescribed";
+    std::string text;
+    const auto has = [joint](const std::vector<JointValues>& list) {
+      return std::ranges::find(list, joint, &JointValues::joint) != list.end();
+    };
+    if (std::ranges::find(initial.held, joint) != initial.held.end()) {
+      text = "held";
+    } else if (has(initial.coordinates)) {
+      text = "guessed";
+    }
+    if (has(initial.speeds)) text += text.empty() ? "speed" : ", speed";
+    return text;
+  }
+
+  void AddJoint(std::size_t index, Table* table) const {
+    const JointType type = description_.joints[index].type;
+    const std::vector<ValueWord> positions = ValueWords(type, description_.space, false),
+                                 speeds = ValueWords(type, description_.space, true);
+    const Values q = CoordinatesOf(mechanism_.joints()[index]), u = SpeedsOf(index);
+    const auto with_unit = [](double value, std::string_view unit) {
+      return fmt::format("{}{}{}", ShortNumber(value), unit.empty() ? "" : " ", unit);
+    };
+    for (std::size_t i = 0; i < positions.size(); ++i) {
+      Record& row = table->rows.emplace_back();
+      row.Set("joint", description_.joints[index].name);  // for programs, in every row
+      if (i == 0) {
+        row.Set("name", description_.joints[index].name);
+        row.Set("given", GivenBy(static_cast<int>(index)));
+      }
+      row.Set("coordinate", std::string(positions[i].name));
+      row.Set("q", with_unit(q[i], positions[i].unit));
+      if (i >= speeds.size()) continue;
+      row.Set("speed", std::string(speeds[i].name));
+      row.Set("u", with_unit(u[i], speeds[i].unit));
+    }
+  }
+
+  const MechanismDescription& description_;
+  const Start<double>& start_;
+  Mechanism<Space, double> mechanism_;
+  Kinematics<Space, double> kinematics_;
+};
+
+template <class Space>
+void PrintOf(const MechanismDescription& description, const Start<double>& start,
+             const ExplainView& view) {
+  const StartText<Space> text(description, start);
+  const bool closed = start.outcome != Outcome::kInconsistentStart;
+  PrintSection(closed ? "Start as assembled, t = 0" : "Start, where the assembly gave up",
+               text.JointValuesTable(), view, "start");
+  if (!closed) return;
+  const Energy<double> energy = text.EnergyAtStart();
+  if (view.document != nullptr) {
+    view.document->Add("energy", JsonObject()
+                                     .Add("kinetic", energy.kinetic)
+                                     .Add("potential", energy.potential)
+                                     .Add("total", energy.total()));
+  }
+  Say(view, "  Energy: kinetic {} J + potential {} J = {} J\n", ShortNumber(energy.kinetic),
+      ShortNumber(energy.potential), ShortNumber(energy.total()));
+  Say(view,
+      "  Potential 0: coms and constant forces in the ground origin, springs at rest, joint\n");
+  Say(view, "  torques at coordinate 0.\n");
+}
+
+}  // namespace
+
+void PrintStart(const MechanismDescription& description, const Structure& structure,
+                const ExplainView& view) {
+  if (description.space == SpaceKind::kPlanar) {
+    PrintOf<Planar>(description, structure.start, view);
+  } else {
+    PrintOf<Spatial>(description, structure.start, view);
+  }
+}
+
+}  // namespace loopbench::harness

@@ -1,0 +1,250 @@
+// explain: what a mechanism file says, in its own numbers.
+#include <fmt/format.h>
+
+#include <cmath>
+
+#include "harness/cli/explain.h"
+#include "harness/text/terminal.h"
+#include "mechanism/model/mechanism.h"
+
+namespace loopbench::harness {
+namespace {
+
+using Eigen::Vector3d;
+
+std::string VectorText(const Vector3d& v, SpaceKind space) {
+  return space == SpaceKind::kPlanar ? Spaced(Eigen::Vector2d(v.head<2>())) : Spaced(v);
+}
+
+/// "tip (1 0)" where a point of the body has this place, else "(1 0)".
+std::string Place(const BodyDescription& body, const Vector3d& at, SpaceKind space) {
+  std::string text = fmt::format("({})", VectorText(at, space));
+  for (const auto& [name, point] : body.points) {
+    if (point == at) return fmt::format("{} {}", name, text);
+  }
+  return text;
+}
+
+std::string InertiaText(const Eigen::Matrix3d& I, SpaceKind space) {
+  if (space == SpaceKind::kPlanar) return ShortNumber(I(2, 2));
+  std::string text = Spaced(Vector3d(I.diagonal()));
+  const Vector3d products(I(0, 1), I(0, 2), I(1, 2));
+  if (!products.isZero(0.0)) text += " " + Spaced(products);
+  return text;
+}
+
+Table BodyTable(const MechanismDescription& description, const Structure& structure) {
+  Table table;
+  table.columns = {{"name", "body", Format::kText, {}},
+                   {"part", "part", Format::kInteger, {}},
+                   {"mass", "mass [kg]", Format::kShortest, {}},
+                   {"inertia", "inertia [kg m^2]", Format::kText, {}},
+                   {"com", "com [m]", Format::kText, {}},
+                   {"points", "points [m]", Format::kText, {}}};
+  const auto add = [&](const BodyDescription& body) -> Record& {
+    Record& row = table.rows.emplace_back();
+    row.Set("name", body.name);
+    std::string points;
+    for (const auto& [name, point] : body.points) {
+      points += fmt::format("{}{} ({})", points.empty() ? "" : ", ", name,
+                            VectorText(point, description.space));
+    }
+    row.Set("points", points);
+    return row;
+  };
+  add(description.bodies[kGround]);
+  for (std::size_t i = 0; i < structure.islands.size(); ++i) {
+    for (const int index : structure.islands[i].bodies) {
+      const BodyDescription& body = description.bodies[index];
+      Record& row = add(body);
+      row.Set("part", static_cast<std::int64_t>(i + 1));
+      row.Set("mass", body.mass);
+      row.Set("inertia", InertiaText(body.inertia, description.space));
+      row.Set("com", VectorText(body.com, description.space));
+    }
+  }
+  return table;
+}
+
+/// What a joint leaves free: its kind's directions less those that follow a given motion.
+int FreeSpeeds(SpaceKind space, const JointDescription& joint) {
+  const int kind = space == SpaceKind::kPlanar && TraitsOf(joint.type).in_plane
+                       ? KindOf<Planar, double>(joint.type).num_u
+                       : KindOf<Spatial, double>(joint.type).num_u;
+  return kind - static_cast<int>(joint.motions.size());
+}
+
+std::string FunctionText(const TimeFunctionDescription& function) {
+  if (const auto* polynomial = std::get_if<Polynomial>(&function)) {
+    std::string text;
+    for (std::size_t i = 0; i < polynomial->coefficients.size(); ++i) {
+      text += (i == 0 ? "" : " + ") + ShortNumber(polynomial->coefficients[i]);
+      if (i > 0) text += i == 1 ? " t" : fmt::format(" t^{}", i);
+    }
+    return text;
+  }
+  if (const auto* harmonic = std::get_if<Harmonic>(&function)) {
+    return fmt::format("{} + {} sin({} t + {})", ShortNumber(harmonic->mean),
+                       ShortNumber(harmonic->amplitude), ShortNumber(harmonic->omega),
+                       ShortNumber(harmonic->phase));
+  }
+  const TimeTable& table = std::get<TimeTable>(function);
+  return fmt::format("table of {} points, t = {} to {} s, {}", table.times.size(),
+                     ShortNumber(table.times.front()), ShortNumber(table.times.back()),
+                     table.cubic ? "cubic" : "straight lines");
+}
+
+/// Parameter and prescribed motions.
+std::string Given(SpaceKind space, const JointDescription& joint) {
+  std::string text;
+  const JointParameter& own = TraitsOf(joint.type).parameter;
+  if (!own.key.empty()) {
+    text = fmt::format("{} {} {}", own.key, ShortNumber(joint.parameter), own.unit);
+  }
+  const std::vector<ValueWord> words = ValueWords(joint.type, space, false);
+  for (const PrescribedMotion& motion : joint.motions) {
+    const ValueWord& word = words.at(static_cast<std::size_t>(motion.coordinate));
+    text += fmt::format("{}{} = {} [{}]", text.empty() ? "" : "; ", word.name,
+                        FunctionText(motion.value), word.unit);
+  }
+  return text;
+}
+
+Table JointTable(const MechanismDescription& description, const Structure& structure) {
+  Table table;
+  table.columns = {
+      {"name", "joint", Format::kText, {}},   {"type", "type", Format::kText, {}},
+      {"from", "from", Format::kText, {}},    {"to", "to", Format::kText, {}},
+      {"free", "free", Format::kInteger, {}}, {"rows", "constrains", Format::kInteger, {}},
+      {"place", "place", Format::kText, {}},  {"given", "given", Format::kText, {}}};
+  const int dim = description.space == SpaceKind::kPlanar ? 3 : 6;
+  std::vector<bool> cut(description.joints.size());
+  for (const LoopPath& loop : structure.loops) cut[loop.cut_joint] = true;
+  for (std::size_t j = 0; j < description.joints.size(); ++j) {
+    const JointDescription& joint = description.joints[j];
+    const int free = FreeSpeeds(description.space, joint);
+    Record& row = table.rows.emplace_back();
+    row.Set("name", joint.name);
+    row.Set("type", std::string(ToString(joint.type)));
+    row.Set("from", description.bodies[joint.from.body].name);
+    row.Set("to", description.bodies[joint.to.body].name);
+    row.Set("free", std::int64_t{free});
+    row.Set("rows", std::int64_t{dim - free});
+    row.Set("place", std::string(cut[j] ? "closes a loop" : "tree"));
+    row.Set("given", Given(description.space, joint));
+  }
+  return table;
+}
+
+/// Of a direction: what a turn by pi/2 leaves.
+constexpr double kRoundOff = 1e-14;
+
+/// The axes of a joint's frame that it moves along or about, in body axes.
+template <class Space>
+std::string AxesText(const Rotation<Space, double>& R, std::string_view axes) {
+  std::string text;
+  for (const char axis : axes) {
+    auto direction = R.col(axis - 'x').eigen();
+    for (double& part : direction) {
+      if (std::abs(part) < kRoundOff) part = 0.0;
+    }
+    text += fmt::format("{}{} = ({})", text.empty() ? "" : ", ", axis, Spaced(direction));
+  }
+  return text;
+}
+
+template <class Space>
+Table FrameTable(const MechanismDescription& description) {
+  Table table;
+  table.columns = {
+      {"name", "joint", Format::kText, {}},   {"side", "frame", Format::kText, {}},
+      {"body", "on body", Format::kText, {}}, {"at", "origin [m]", Format::kText, {}},
+      {"axes", "axis", Format::kText, {}},    {"turn", "turned by [rad]", Format::kText, {}}};
+  const Mechanism<Space, double> mechanism(description, Coordinates::kJoint);
+  for (std::size_t j = 0; j < description.joints.size(); ++j) {
+    const JointDescription& joint = description.joints[j];
+    const JointTraits& traits = TraitsOf(joint.type);
+    const bool planar = description.space == SpaceKind::kPlanar;
+    const SideWords& axes = planar ? traits.planar_axes : traits.axes;
+    for (const bool from : {true, false}) {
+      const JointSide& side = from ? joint.from : joint.to;
+      const Pose<Space, double>& X = from ? mechanism.joints()[j].X_PF : mechanism.joints()[j].X_QM;
+      const BodyDescription& body = description.bodies[side.body];
+      Record& row = table.rows.emplace_back();
+      if (from) row.Set("name", joint.name);
+      row.Set("joint", joint.name);  // for programs, in every row
+      row.Set("side", std::string(from ? "F, from" : "M, to"));
+      row.Set("body", body.name);
+      row.Set("at", Place(body, side.position, description.space));
+      row.Set("axes", AxesText<Space>(X.R, from ? axes.from : axes.to));
+      const auto turn = RotationVector(X).eigen();
+      if (joint.type != JointType::kRod && !turn.isZero(0.0)) row.Set("turn", Spaced(turn));
+    }
+  }
+  return table;
+}
+
+/// A force as "type", "acts on" and "with".
+Record ForceRow(const MechanismDescription& description, ForceDescription force) {
+  const ForceParts parts = PartsOf(force);
+  std::vector<std::string> on, with;
+  bool is_length = true;
+  if (parts.joint != nullptr) {
+    const JointDescription& joint = description.joints[*parts.joint];
+    on.push_back("joint " + joint.name);
+    is_length = ValueWords(joint.type, description.space, false).at(0).is_length();
+  }
+  for (const BodyPoint* point : parts.points) {
+    const BodyDescription& body = description.bodies[point->body];
+    on.push_back(body.name + " at " + Place(body, point->at, description.space));
+  }
+  if (parts.value != nullptr) {
+    with.push_back(
+        fmt::format("{} [{}]", FunctionText(*parts.value), quantity::kEffort.Unit(is_length)));
+  }
+  if (parts.force != nullptr) {
+    with.push_back(fmt::format("force ({}) N in {} axes",
+                               VectorText(*parts.force, description.space),
+                               *parts.in_body_axes ? "body" : "ground"));
+  }
+  for (const ForceNumber& number : parts.numbers) {
+    with.push_back(fmt::format("{} {} {}", number.key, ShortNumber(*number.value),
+                               number.quantity.Unit(is_length)));
+  }
+  Record row;
+  row.Set("type", std::string(parts.name));
+  row.Set("on", fmt::format("{}", fmt::join(on, ", ")));
+  row.Set("with", fmt::format("{}", fmt::join(with, ", ")));
+  return row;
+}
+
+Table ForceTable(const MechanismDescription& description) {
+  Table table;
+  table.columns = {{"type", "force", Format::kText, {}},
+                   {"on", "acts on", Format::kText, {}},
+                   {"with", "with", Format::kText, {}}};
+  for (const ForceDescription& force : description.forces) {
+    table.rows.push_back(ForceRow(description, force));
+  }
+  return table;
+}
+
+}  // namespace
+
+void PrintModel(const MechanismDescription& description, const Structure& structure,
+                const ExplainView& view) {
+  const bool planar = description.space == SpaceKind::kPlanar;
+  Say(view, "  gravity ({}) m/s^2 in ground axes\n",
+      VectorText(description.gravity, description.space));
+  PrintSection("Bodies", BodyTable(description, structure), view, "bodies");
+  Say(view, "  Points and com are seen from the body's origin, inertia is about com.\n");
+  if (!planar) Say(view, "  Inertia is Ixx Iyy Izz, and Ixy Ixz Iyz where they are not zero.\n");
+  PrintSection("Joints", JointTable(description, structure), view, "joints");
+  PrintSection("Frames of joints",
+               planar ? FrameTable<Planar>(description) : FrameTable<Spatial>(description), view,
+               "frames");
+  Say(view, "  Origin, axis and turn are in axes of the body; coordinates say how M moves in F.\n");
+  PrintSection("Forces", ForceTable(description), view, "forces");
+}
+
+}  // namespace loopbench::harness

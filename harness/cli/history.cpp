@@ -1,0 +1,336 @@
+// history: measurements of one commit after the other.
+#include <fmt/format.h>
+
+#include <filesystem>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "harness/cli/command_line.h"
+#include "harness/history/git.h"
+#include "harness/history/history_page.h"
+#include "harness/history/history_series.h"
+#include "harness/record/provenance.h"
+#include "harness/record/record.h"
+#include "harness/store/measurements.h"
+#include "harness/tables/fit.h"
+#include "harness/text/files.h"
+#include "harness/text/terminal.h"
+
+namespace loopbench::harness {
+namespace {
+
+struct HistoryAddCommand {
+  HistoryPlace place;
+  std::filesystem::path results;
+  std::string commit, date;  ///< "": those that are checked out
+  bool replaces = false;
+};
+
+struct HistoryShowCommand {
+  HistoryPlace place;
+  std::string one, measure;  ///< parts of the names of cases and measures; "": all
+  std::string format = "text";
+  bool json = false;
+};
+
+struct HistoryReportCommand {
+  HistoryPlace place;
+  std::filesystem::path out;
+  std::string title;
+};
+
+struct HistoryMarkCommand {
+  HistoryPlace place;
+  std::string commit, mark, note;
+  bool keeps_accepted = false;
+};
+
+void PrintWarnings(const std::vector<std::string>& warnings, const OpenHistory& open) {
+  for (const std::string& text : warnings) PrintError("warning: {}\n", open.named(text));
+}
+
+/// A history and what is found in it; warnings are printed.
+std::pair<History, HistoryFindings> ReadFindings(const HistoryPlace& place) {
+  History history;
+  HistoryFindings found;
+  ReadPlace(place, [&](const OpenHistory& open) {
+    history = ReadHistory(open.folder);
+    found = FindingsOf(history);
+    for (const std::vector<std::string>& warnings : {history.warnings, found.warnings}) {
+      PrintWarnings(warnings, open);
+    }
+  });
+  return {history, found};
+}
+
+HistoryFindings Chosen(HistoryFindings found, const HistoryShowCommand& command) {
+  const auto is_other = [&command](const auto& row) {
+    return row.one.find(command.one) == std::string::npos ||
+           row.measure.find(command.measure) == std::string::npos;
+  };
+  const bool has_any = !found.series.empty();
+  std::erase_if(found.series, is_other);
+  std::erase_if(found.endings, is_other);
+  if (has_any && found.series.empty() && found.endings.empty()) {
+    throw ConfigError(
+        fmt::format("found no series with \"{}\" in its case and \"{}\" in its measure",
+                    command.one, command.measure));
+  }
+  return found;
+}
+
+Table CommitTable(const History& history) {
+  Table table;
+  table.title = "Last commits";
+  table.columns = {{"commit", "commit"},
+                   {"date", "date"},
+                   {"machine", "machine"},
+                   {"mark", "mark"},
+                   {"note", "note"}};
+  constexpr std::size_t kLastShown = 10;
+  const std::size_t n = history.entries.size();
+  for (std::size_t i = n > kLastShown ? n - kLastShown : 0; i < n; ++i) {
+    const HistoryEntry& entry = history.entries[i];
+    AddRow({ShortCommit(entry.commit), entry.date, entry.machine, entry.mark, entry.note}, &table);
+  }
+  if (n > kLastShown) table.notes.push_back(fmt::format("{} earlier ones", n - kLastShown));
+  return table;
+}
+
+JsonObject FindingsDocument(const History& history, const HistoryFindings& found) {
+  std::vector<JsonObject> all, endings;
+  for (const EndingChange& change : found.endings) {
+    endings.push_back(JsonObject()
+                          .Add("machine", change.machine)
+                          .Add("case", change.one)
+                          .Add("measure", change.measure)
+                          .Add("commit", history.entries[change.entry].commit)
+                          .Add("before", change.before)
+                          .Add("after", change.after));
+  }
+  for (const HistorySeries& one : found.series) {
+    std::vector<std::string> commits, unsteady;
+    std::vector<double> values;
+    for (const HistoryValue& value : one.values) {
+      commits.push_back(history.entries[value.entry].commit);
+      values.push_back(value.value);
+      if (!value.is_steady) unsteady.push_back(commits.back());
+    }
+    std::vector<JsonObject> steps;
+    for (const LevelChange& change : one.changes) {
+      steps.push_back(JsonObject()
+                          .Add("commit", commits[change.at])
+                          .Add("before", change.before)
+                          .Add("after", change.after)
+                          .Add("confidence", change.Confidence()));
+    }
+    all.push_back(JsonObject()
+                      .Add("machine", one.machine)
+                      .Add("case", one.one)
+                      .Add("measure", one.measure)
+                      .Add("unit", one.unit)
+                      .Add("commits", commits)
+                      .Add("values", values)
+                      .Add("at_another_speed", unsteady)
+                      .Add("steps", steps));
+  }
+  return JsonObject().Add("series", all).Add("endings", endings);
+}
+
+int HistoryAdd(const HistoryAddCommand& command) {
+  std::vector<std::string> warnings;
+  const std::vector<Record> records = ReadMeasurements(command.results, &warnings);
+  for (const std::string& warning : warnings) PrintError("warning: {}\n", warning);
+  HistoryEntry entry;
+  entry.commit = command.commit;
+  entry.date = command.date;
+  if (entry.commit.empty() || entry.date.empty()) {
+    const CheckedOut found = FindCommit(entry.commit.empty() ? "HEAD" : entry.commit);
+    if (found.commit.empty()) {
+      throw ConfigError(
+          "history add: found no such commit in a git repository here, expected --commit "
+          "and --date");
+    }
+    entry.commit = found.commit;
+    if (entry.date.empty()) entry.date = found.date;
+  }
+  HistoryEntry added;
+  ChangePlace(command.place, /*may_begin=*/true, [&](const OpenHistory& open) {
+    std::vector<std::string> torn;
+    added = AddToHistory(open.folder, entry, records, command.replaces, &torn);
+    PrintWarnings(torn, open);
+    return "Measurements of " + ShortCommit(entry.commit);
+  });
+  Print("added {} records of commit {} ({}) on {}\n", records.size(), ShortCommit(added.commit),
+        added.date, added.machine);
+  return 0;
+}
+
+/// Steps, newest first, and the commits. 0.
+int HistoryShow(const HistoryShowCommand& command, const std::string& typed) {
+  const auto [history, all] = ReadFindings(command.place);
+  const HistoryFindings found = Chosen(all, command);
+  if (command.json) {
+    PrintText(FindingsDocument(history, found).Text() + "\n");
+    return 0;
+  }
+  Table steps = StepTable(history, found);
+  if (command.format != "text") {
+    for (const std::string& line : Provenance(typed)) steps.notes.push_back(line);
+    PrintText(Render(steps, command.format));
+    return 0;
+  }
+  if (steps.rows.empty()) {
+    Print("no steps in {} series over {} entries\n", found.series.size(), history.entries.size());
+    if (const auto note = UnsteadyNote(found)) Print("{}\n", *note);
+    Print("\n");
+  } else {
+    PrintText(ToScreen(steps) + "\n");
+  }
+  PrintText(ToScreen(CommitTable(history)) + "\n");
+  return 0;
+}
+
+int HistoryReport(const HistoryReportCommand& command, const std::string& typed) {
+  const auto [history, found] = ReadFindings(command.place);
+  const std::string page = HistoryPage(history, found, command.title, Provenance(typed));
+  const auto out = !command.out.empty()          ? command.out
+                   : command.place.store.empty() ? std::filesystem::path("history.html")
+                                                 : command.place.store / "history.html";
+  WriteFileAtomically(out, page);
+  Print("wrote {}: {} series over {} entries, {} steps, {} kB\n", out.string(), found.series.size(),
+        history.entries.size(), found.Steps(), (page.size() + 999) / 1000);
+  return 0;
+}
+
+int HistoryMark(const HistoryMarkCommand& command) {
+  Mark mark;
+  ChangePlace(command.place, /*may_begin=*/false, [&](const OpenHistory& open) {
+    std::vector<std::string> torn;
+    mark = MarkInHistory(
+        open.folder, {command.commit, command.mark, command.note, command.keeps_accepted}, &torn);
+    PrintWarnings(torn, open);
+    return fmt::format("{} is {}", ShortCommit(mark.commit), mark.mark);
+  });
+  Print("{} is {}\n", mark.commit, mark.mark);
+  return 0;
+}
+
+}  // namespace
+
+std::vector<Record> LastGoodRecords(const HistoryPlace& place, const std::string& machine,
+                                    bool only_times, std::string* name) {
+  std::vector<Record> records;
+  ReadPlace(place, [&](const OpenHistory& open) {
+    const History history = ReadHistory(open.folder);
+    const std::optional<HistoryEntry> good =
+        only_times ? LastGoodOfMachine(history, machine) : LastGood(history, machine);
+    if (!good) {
+      throw ConfigError(
+          fmt::format("{}: found {}, expected a good one", open.folder.string(),
+                      history.entries.empty() ? "no commit" : "every commit marked bad"));
+    }
+    *name = fmt::format("BASE: the history's last good state, commit {} of {}{}",
+                        ShortCommit(good->commit), good->date,
+                        good->mark.empty() ? "" : fmt::format(", marked {}", good->mark));
+    std::vector<std::string> warnings = history.warnings;
+    records = ReadResults(*good, &warnings);
+    PrintWarnings(warnings, open);
+  });
+  return records;
+}
+
+namespace {
+
+constexpr const char* kHistoryFooter = R"(
+A history is a folder (--store) or a branch of the repository that you are in (--branch, which add begins when it
+is not there). Steps are found in the logarithms of each measure of each case on each machine, by the least penalised
+cost with a bounded loss (Fearnhead and Rigaill 2019), so that single slow runs are none; docs/history.md.
+
+Examples:
+  loopbench history add results/runs/bench --branch loopbench-history
+  loopbench history show --branch loopbench-history --measure wall_s
+  loopbench history report --branch loopbench-history --out history.html
+  loopbench history mark 1a2b3c accepted --note 'exact mass matrix, slower' --branch loopbench-history
+  loopbench compare --branch loopbench-history results/runs/bench --markdown summary.md)";
+
+void AddPlace(CLI::App* app, HistoryPlace* place) {
+  CLI::Option* store = app->add_option("--store", place->store, "Folder of the history");
+  app->add_option("--branch", place->branch,
+                  "Branch of the git repository here, instead of a folder")
+      ->excludes(store);
+}
+
+struct TypedHistory {
+  CLI::App *add_app, *show_app, *report_app, *mark_app;
+  HistoryPlace place;
+  HistoryAddCommand add;
+  HistoryShowCommand show;
+  HistoryReportCommand report;
+  HistoryMarkCommand mark;
+};
+
+int RunHistory(TypedHistory* typed, const std::string& line) {
+  typed->add.place = typed->show.place = typed->report.place = typed->mark.place = typed->place;
+  if (*typed->add_app) return HistoryAdd(typed->add);
+  if (*typed->show_app) return HistoryShow(typed->show, line);
+  if (*typed->report_app) return HistoryReport(typed->report, line);
+  return HistoryMark(typed->mark);
+}
+
+}  // namespace
+
+void AddHistory(Commands& commands) {
+  auto& typed = commands.Keep<TypedHistory>();
+  CLI::App* app = commands.Add("history", "Follow measurements over commits and find change points",
+                               [&](const Typed& words) { return RunHistory(&typed, words.line); });
+  app->footer(kHistoryFooter);
+  app->require_subcommand(1);
+
+  typed.add_app = app->add_subcommand("add", "Add the results of a commit");
+  typed.add_app
+      ->add_option("results", typed.add.results,
+                   "Folder of a run, .jsonl, or JSON of Google Benchmark")
+      ->required();
+  typed.add_app->add_option("--commit", typed.add.commit,
+                            "Commit of the results (default: the one checked out)");
+  typed.add_app->add_option("--date", typed.add.date,
+                            "ISO 8601, by which commits are ordered (default: the commit's)");
+  typed.add_app->add_flag("--replace", typed.add.replaces,
+                          "Replace an earlier measurement of this commit");
+  AddPlace(typed.add_app, &typed.place);
+
+  typed.show_app = app->add_subcommand("show", "List change points and recent commits");
+  typed.show_app->add_option("--case", typed.show.one, "Only cases whose name contains this text");
+  typed.show_app->add_option("--measure", typed.show.measure,
+                             "Only measures whose name contains this text");
+  typed.show_app->add_option("--format", typed.show.format, "Output format")
+      ->check(CLI::IsMember({"text", "csv", "markdown", "json"}))
+      ->capture_default_str();
+  AddPlace(typed.show_app, &typed.place);
+  AddJson(typed.show_app, &typed.show.json);
+  AddWide(typed.show_app);
+
+  typed.report_app =
+      app->add_subcommand("report", "Write an HTML page with all change points and charts");
+  typed.report_app->add_option("-o,--out", typed.report.out,
+                               "The page (default: history.html in the folder)");
+  typed.report_app->add_option("--title", typed.report.title, "Page title")
+      ->default_val("Measurements over commits");
+  AddPlace(typed.report_app, &typed.place);
+
+  typed.mark_app = app->add_subcommand("mark", "Mark a commit as good, bad or accepted");
+  typed.mark_app->add_option("commit", typed.mark.commit, "Commit hash or prefix")->required();
+  typed.mark_app
+      ->add_option("mark", typed.mark.mark,
+                   "good and accepted: compare takes it as base; bad: never")
+      ->required()
+      ->check(CLI::IsMember({"good", "accepted", "bad"}));
+  typed.mark_app->add_option("--note", typed.mark.note, "Reason, stored with the mark");
+  typed.mark_app->add_flag("--keep-accepted", typed.mark.keeps_accepted,
+                           "Leave it as it is where somebody accepted it (for jobs)");
+  AddPlace(typed.mark_app, &typed.place);
+}
+
+}  // namespace loopbench::harness

@@ -1,0 +1,314 @@
+// plan: what a run would take.
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <cmath>
+#include <functional>
+#include <map>
+#include <set>
+#include <utility>
+
+#include "harness/cli/command_line.h"
+#include "harness/integrator/cpu_time.h"
+#include "harness/isolation/processes.h"
+#include "harness/record/record.h"
+#include "harness/run/case_identity.h"
+#include "harness/run/peers.h"
+#include "harness/store/result_store.h"
+#include "harness/suite/estimate.h"
+#include "harness/suite/runner.h"
+#include "harness/suite/workload.h"
+#include "harness/tables/fit.h"
+#include "harness/text/terminal.h"
+#include "harness/timing/time_cases.h"
+
+namespace loopbench::harness {
+namespace {
+
+struct PlanCommand {
+  ExperimentFiles files;
+  std::filesystem::path from;  ///< store of earlier results; times of cases it has come from there
+  bool timing = true;          ///< timings too
+  bool json = false;
+};
+
+/// Everything that decides a run but the experiment's name: results of another file with the same
+/// cases serve as well.
+std::string SameRun(const Record& record) {
+  std::string text = record.Text("content") + "\n";
+  for (const auto& [key, value] : record.items()) {
+    if (key == "case_id") break;
+    if (key != "experiment") text += key + "=" + record.Text(key) + "\n";
+  }
+  return text;
+}
+
+/// CPU time [s] of the unperturbed run by SameRun(), from an earlier store.
+std::map<std::string, double> EarlierTimes(const std::filesystem::path& store) {
+  std::map<std::string, double> times;
+  if (store.empty()) return times;
+  for (const Record& record : ReadRecords(store)) {
+    // wall time depends on how many runs shared the processors
+    if (record.Text("kind") != "accuracy" || std::isnan(record.Number("cpu_s"))) continue;
+    times[SameRun(record)] = record.Number("cpu_s");
+  }
+  return times;
+}
+
+/// "1.5 s", "12 min", "3.4 h".
+std::string Duration(double seconds) {
+  if (seconds < 0.1) return "less than 0.1 s";
+  if (seconds < 100.0) return fmt::format("{:.2g} s", seconds);
+  if (seconds < 6000.0) return fmt::format("{:.0f} min", seconds / 60.0);
+  return fmt::format("{:.1f} h", seconds / 3600.0);
+}
+
+/// One line of the plan: the cases of a scene and column, over all combinations.
+struct Line : CaseLine {
+  double seconds = 0.0;
+};
+
+struct Plan {
+  std::vector<Line> lines;
+  std::size_t cases = 0, runs = 0, references = 0, rungs = 0, timings = 0, known = 0;
+  double seconds = 0.0, reference_seconds = 0.0, ladder_seconds = 0.0, timing_seconds = 0.0;
+};
+
+/// Times of cases as they were looked at, by line: of all, or of some of a long sweep.
+class Times {
+ public:
+  void Add(const Case& one, double seconds) {
+    Sum& sum = sums_[one.mechanism + "\n" + ToString(one.column)];
+    sum.seconds += seconds;
+    ++sum.cases;
+  }
+
+  /// [s] of the whole line.
+  double Of(const CaseLine& line) const {
+    const auto sum = sums_.find(line.mechanism + "\n" + line.column);
+    if (sum == sums_.end()) return 0.0;
+    return sum->second.seconds * static_cast<double>(line.cases) /
+           static_cast<double>(sum->second.cases);
+  }
+
+ private:
+  struct Sum {
+    double seconds = 0.0;
+    std::size_t cases = 0;
+  };
+  std::map<std::string, Sum> sums_;
+};
+
+/// Of a long sweep some combinations are looked at, and stand for all.
+Plan MakePlan(const Overview& overview, const PlanCommand& command, Estimate* estimate) {
+  Plan plan;
+  Times times;
+  const std::vector<Experiment>& experiments = overview.experiments;
+  std::set<std::string> references;
+  std::size_t asked_references = 0;
+  const std::map<std::string, double> earlier = EarlierTimes(command.from);
+  std::vector<std::function<void()>> work;
+  std::vector<Progress::Piece> pieces;
+  const auto add = [&](const std::string& label, std::function<void()> one) {
+    work.push_back(std::move(one));
+    pieces.push_back({label, 0.0});
+  };
+  for (std::size_t i = 0; i < experiments.size(); ++i) {
+    const Experiment& experiment = experiments[i];
+    for (const Case& one : SelectCases(experiment, command.files.filter)) {
+      add(fmt::format("{} {}", one.mechanism, ToString(one.column)), [&, i, one] {
+        const auto known = earlier.find(SameRun(Identified(experiments[i], one).keys));
+        plan.known += known != earlier.end() ? 1 : 0;
+        const auto runs = static_cast<double>(RunsOf(one));
+        times.Add(one, known != earlier.end() ? runs * known->second : estimate->OfCase(i, one));
+        if (!experiments[i].reference) return;
+        ++asked_references;
+        const ReferenceCase reference = ReferenceOf(experiments[i], one, "results.jsonl");
+        if (!references.insert(reference.id).second) return;
+        plan.reference_seconds += estimate->OfReference(i, reference);
+      });
+    }
+    for (const LadderGroup& ladder : LadderGroups(experiment, command.files.filter)) {
+      add("in several scalars", [&, i, ladder] {
+        plan.ladder_seconds += estimate->OfLadder(i, ladder);
+        plan.rungs += ladder.keys.size();
+      });
+    }
+    if (!command.timing) continue;
+    for (const TimingGroup& group : TimingGroups(experiment, command.files.filter)) {
+      add("timings of " + group.name, [&, i, group] {
+        plan.timing_seconds += estimate->OfTiming(i, group);
+        plan.timings += group.cases.size();
+      });
+    }
+  }
+  Progress progress("plan", std::move(pieces), 1);
+  for (std::size_t i = 0; i < work.size(); ++i) {
+    progress.Start(i);
+    work[i]();
+    progress.Done(i);
+  }
+  plan.references = references.size();
+  for (const CaseLine& line : overview.lines) {
+    plan.lines.push_back({line, times.Of(line)});
+    plan.cases += line.cases;
+    plan.runs += line.runs;
+    plan.seconds += plan.lines.back().seconds;
+  }
+  if (overview.is_sample) {
+    const double all =
+        static_cast<double>(overview.combinations) / static_cast<double>(experiments.size());
+    const auto scale = [all](std::size_t* count, double* seconds) {
+      *count = static_cast<std::size_t>(std::llround(all * static_cast<double>(*count)));
+      *seconds *= all;
+    };
+    scale(&plan.rungs, &plan.ladder_seconds);
+    scale(&plan.timings, &plan.timing_seconds);
+    // combinations of one motion share their reference: then there are no more than were found
+    const bool is_one_each = plan.references >= std::min(asked_references, experiments.size());
+    if (is_one_each) scale(&plan.references, &plan.reference_seconds);
+  }
+  return plan;
+}
+
+void PrintAxes(const Overview& overview) {
+  if (overview.axes.empty()) return;
+  for (const auto& [name, values] : overview.axes) Print("  axis {}: {} values\n", name, values);
+  Print("  {} combinations\n", overview.combinations);
+}
+
+void PrintPlan(const Overview& overview, const Plan& plan, const PlanCommand& command,
+               const Estimate& estimate) {
+  const Experiment& first = overview.experiments.front();
+  Print("{}{}{}\n", first.name, first.comment.empty() ? "" : ": ", first.comment);
+  PrintAxes(overview);
+  Print("  {} scenes, {} columns, {} tolerances", first.scenes.size(), first.columns.size(),
+        first.tolerances.size());
+  if (!first.fixed_steps.empty()) Print(", {} fixed steps", first.fixed_steps.size());
+  if (first.integrators.size() > 1) Print(", {} integrators", first.integrators.size());
+  Print("\n\n");
+  Table table;
+  table.columns = {{"mechanism", "mechanism", Format::kText, {}},
+                   {"column", "column", Format::kText, {}},
+                   {"cases", "cases", Format::kInteger, {}},
+                   {"runs", "runs", Format::kInteger, {}},
+                   {"seconds", "estimate [s]", Format::kShortest, {}}};
+  for (const Line& line : plan.lines) {
+    Record row;
+    row.Set("mechanism", line.mechanism);
+    row.Set("column", line.column);
+    row.Set("cases", static_cast<std::int64_t>(line.cases));
+    row.Set("runs", static_cast<std::int64_t>(line.runs));
+    row.Set("seconds", std::round(line.seconds * 100.0) / 100.0);
+    table.rows.push_back(row);
+  }
+  PrintText(ToScreen(table) + "\n");
+  for (const std::string& one : estimate.cut_off()) {
+    Print("A pilot was cut off: {}. Its cases are counted with the CPU time it had taken.\n", one);
+  }
+  Print("{} cases, {} runs (an ensemble comes on top of the unperturbed run), {} timings\n",
+        plan.cases, plan.runs, plan.timings);
+  Print("estimated time: accuracy {} with one job", Duration(plan.seconds));
+  if (plan.references > 0) {
+    Print(", {} references {}", plan.references, Duration(plan.reference_seconds));
+  }
+  if (plan.rungs > 0) {
+    Print(", {} runs in several scalars {}", plan.rungs, Duration(plan.ladder_seconds));
+  }
+  if (plan.timings > 0) Print(", timings {}", Duration(plan.timing_seconds));
+  Print("\n");
+  std::string source;
+  if (!command.from.empty()) {
+    source = fmt::format("{} of {} cases from {}", plan.known, plan.cases, command.from.string());
+  }
+  if (estimate.pilots() > 0) {
+    source += fmt::format(
+        "{}{} pilots over the first part of the longest horizon, at the loosest and the finest "
+        "tolerance that is asked for{}",
+        source.empty() ? "" : ", the rest from ", estimate.pilots(),
+        first.fixed_steps.empty() ? "" : ", or the longest fixed step");
+  }
+  if (overview.is_sample) {
+    source += fmt::format("; {} combinations stand for all", overview.experiments.size());
+  }
+  Print("An estimate, from {}. Each run ends at {:g} s of CPU time at the latest.\n", source,
+        first.limits.cpu_s);
+}
+
+JsonObject PlanDocument(const std::filesystem::path& path, const Overview& overview,
+                        const Plan& plan, const Estimate& estimate) {
+  std::vector<JsonObject> lines;
+  for (const Line& line : plan.lines) {
+    lines.push_back(JsonObject()
+                        .Add("mechanism", line.mechanism)
+                        .Add("column", line.column)
+                        .Add("cases", Count(line.cases))
+                        .Add("runs", Count(line.runs))
+                        .Add("seconds", line.seconds));
+  }
+  return JsonObject()
+      .Add("file", path.string())
+      .Add("name", overview.experiments.front().name)
+      .Add("combinations", Count(overview.combinations))
+      .Add("cases", Count(plan.cases))
+      .Add("runs", Count(plan.runs))
+      .Add("accuracy_seconds", plan.seconds)
+      .Add("references", Count(plan.references))
+      .Add("reference_seconds", plan.reference_seconds)
+      .Add("runs_in_several_scalars", Count(plan.rungs))
+      .Add("several_scalars_seconds", plan.ladder_seconds)
+      .Add("timings", Count(plan.timings))
+      .Add("timing_seconds", plan.timing_seconds)
+      .Add("cases_known", Count(plan.known))
+      .Add("pilots", Count(estimate.pilots()))
+      .Add("pilots_cut_off", estimate.cut_off())
+      .Add("lines", lines);
+}
+
+int PrintPlans(const PlanCommand& command) try {
+  const Interruption interruption;  // pilots leave nothing behind
+  std::vector<JsonObject> documents;
+  for (const auto& path : command.files.paths) {
+    const double begin = ThreadCpuSeconds();
+    const Overview overview =
+        MakeOverview(path, {{path}, command.files.settings, command.files.filter});
+    RequirePeers(overview.experiments);
+    Estimate estimate(overview.experiments, Estimate::Budget(), command.files.filter);
+    Plan plan = MakePlan(overview, command, &estimate);
+    plan.seconds += ThreadCpuSeconds() - begin;  // a run reads and expands the file too
+    if (command.json) {
+      documents.push_back(PlanDocument(path, overview, plan, estimate));
+    } else {
+      PrintPlan(overview, plan, command, estimate);
+    }
+  }
+  if (command.json) PrintText(JsonObject().Add("experiments", documents).Text() + "\n");
+  return 0;
+} catch (const Interrupted& interrupted) {
+  return interrupted.exit_code();
+}
+
+}  // namespace
+
+void AddPlan(Commands& commands) {
+  auto& command = commands.Keep<PlanCommand>();
+  auto& settings = commands.Keep<std::vector<std::string>>();
+  auto& conditions = commands.Keep<std::vector<std::string>>();
+  auto& no_timing = commands.Keep<bool>();
+  CLI::App* app =
+      commands.Add("plan", "Count cases and runs, and estimate their time", [&](const Typed&) {
+        command.files.filter = ParseSelection(conditions);
+        command.files.settings = ParseSettings(settings);
+        command.timing = !no_timing;
+        return PrintPlans(command);
+      });
+  app->add_option("experiment", command.files.paths, "Experiment files (JSON)")->required();
+  app->add_option("--from", command.from, "Earlier results whose times are used, not a pilot's");
+  AddFilter(app, &conditions);
+  app->add_flag("--no-timing", no_timing, "Leave the timings out");
+  AddSettings(app, &settings);
+  AddWide(app);
+  AddJson(app, &command.json);
+}
+
+}  // namespace loopbench::harness

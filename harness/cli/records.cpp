@@ -1,0 +1,281 @@
+// Records of stores for the commands that show them, held or scene by scene, and files of tables
+// and figures.
+#include <fmt/format.h>
+#include <sys/resource.h>
+#include <unistd.h>
+
+#include <algorithm>
+#include <fstream>
+#include <functional>
+#include <map>
+#include <utility>
+#include <vector>
+
+#include "harness/analysis/doubts.h"
+#include "harness/cli/commands.h"
+#include "harness/figures/figure_recipes.h"
+#include "harness/figures/free_figure.h"
+#include "harness/figures/judge_figures.h"
+#include "harness/isolation/processes.h"
+#include "harness/record/provenance.h"
+#include "harness/run/run_case.h"
+#include "harness/store/record_lines.h"
+#include "harness/store/result_store.h"
+#include "harness/store/store_lock.h"
+#include "harness/suite/suite.h"
+#include "harness/tables/columns.h"
+#include "harness/tables/fit.h"
+#include "harness/tables/table_view.h"
+#include "harness/text/files.h"
+#include "harness/text/terminal.h"
+#include "harness/text/words.h"
+#include "harness/trajectory/trajectory.h"
+
+namespace loopbench::harness {
+namespace {
+
+using Write = std::function<void(std::string_view)>;
+
+void RefuseWhatNeedsAllRows(const TableCommand& command, const SceneReader& reader) {
+  const TableView& view = command.view;
+  const std::string found =
+      fmt::format("{}: found {} records of {:.1f} GB", command.store.string(), reader.records(),
+                  1e-9 * static_cast<double>(reader.bytes()));
+  const bool is_flat = command.format == "csv" || command.format == "json";
+  if (!is_flat) {
+    throw ConfigError(fmt::format(
+        "{}, expected at most {} that fit into memory for a table that people read: choose some "
+        "with --where PARAMETER=..., or write all with --format csv",
+        found, kMostHeld));
+  }
+  const std::string needs_all = !view.sort.empty()         ? "--sort"
+                                : !view.group.empty()      ? "--group"
+                                : !command.gate.empty()    ? "--gate"
+                                : view.kind == "factorial" ? "--kind factorial"
+                                                           : "";
+  if (needs_all.empty()) return;
+  throw ConfigError(
+      fmt::format("{}, expected at most {} that fit into memory with {}: choose some with --where",
+                  found, kMostHeld, needs_all));
+}
+
+/// Rows of one table, written as they come.
+class SceneRows {
+ public:
+  /// `samples`: a record of each set of keys.
+  SceneRows(const TableCommand& command, const std::vector<Record>& samples, Write write)
+      : view_(command.view), is_json_(command.format == "json"), write_(std::move(write)) {
+    RequireConditions("--where", view_.where, samples);
+    view_.kind = KindOf(view_, samples);
+    TableView all = view_;
+    all.where.clear();
+    columns_ = MakeTable(samples, all).columns;
+  }
+
+  void Add(const std::vector<Record>& records, const std::vector<std::string>& notes) {
+    Table part{.columns = columns_, .rows = RowsOf(records, view_)};
+    if (part.rows.empty()) return;
+    if (is_json_) {
+      part.notes = notes;
+      const std::string text = ToJson(part);  // "[...]\n"
+      write_(rows_ > 0 ? ",\n" : "[");
+      write_(std::string_view(text).substr(1, text.size() - 3));
+    } else {
+      const std::string text = ToCsv(part);
+      write_(std::string_view(text).substr(rows_ > 0 ? text.find('\n') + 1 : 0));
+    }
+    rows_ += part.rows.size();
+  }
+  void End(const std::vector<std::string>& notes) {
+    if (is_json_) return write_("]\n");
+    for (const std::string& note : notes) write_("# " + note + "\n");
+  }
+  std::size_t rows() const { return rows_; }
+
+ private:
+  TableView view_;
+  bool is_json_;
+  Write write_;
+  std::vector<TableColumn> columns_;
+  std::size_t rows_ = 0;
+};
+
+}  // namespace
+
+int WriteLongTable(const TableCommand& command, const SceneReader& reader,
+                   const std::string& typed) {
+  RefuseWhatNeedsAllRows(command, reader);
+  std::vector<std::string> notes = Provenance(typed), warnings;
+  if (command.format == "csv") {  // as RenderKept() does
+    std::erase_if(notes, [](const std::string& note) { return note.starts_with("date: "); });
+  }
+  struct NoRows {};  // leaves a file that is there alone
+  const auto fill = [&](const Write& write) {
+    SceneRows writer(command, reader.samples(), write);
+    reader.ForEach(
+        [&](std::vector<Record> records) { writer.Add(Prepared(std::move(records)), notes); },
+        &warnings);
+    if (writer.rows() == 0) throw NoRows();
+    writer.End(notes);
+  };
+  try {
+    if (command.out.empty()) {
+      fill([](std::string_view text) { PrintText(std::string(text)); });
+    } else {
+      WriteFileAtomically(command.out, fill);
+      Print("wrote {}\n", command.out.string());
+    }
+  } catch (const NoRows&) {
+    PrintError("{}: no records match {}\n", command.store.string(), ToText(command.view.where));
+    return 2;
+  }
+  for (const std::string& warning : warnings) PrintError("warning: {}\n", warning);
+  return 0;
+}
+
+Loaded LoadOrScan(const std::filesystem::path& store, const Selection& where) {
+  if (!IsLarge(StoreFile(store))) return {LoadRecords(store, where), {}};
+  const Room room(store);
+  struct TooMany {};
+  if (ChoosesLines(where)) {
+    try {
+      return {LoadRecords(store, where,
+                          [&room](std::size_t records, std::uint64_t bytes) {
+                            if (records > kMostHeld || !room.Has(bytes)) throw TooMany();
+                          }),
+              {}};
+    } catch (const TooMany&) {
+      // what was chosen is too much as well
+    }
+  }
+  SceneReader reader(store, where);
+  if (reader.records() > kMostHeld || !room.Has(reader.bytes())) return {{}, std::move(reader)};
+  return {LoadRecords(store, where), {}};
+}
+
+double FreeMemory(bool with_own) {
+  double free = 0.0, pages = 0.0;
+  std::ifstream info("/proc/meminfo");
+  for (std::string word; info >> word;) {
+    if (word == "MemAvailable:" && info >> free) break;
+  }
+  free *= 1024.0;
+  rlimit allowed{};
+  if (::getrlimit(RLIMIT_AS, &allowed) != 0 || allowed.rlim_cur == RLIM_INFINITY) return free;
+  std::ifstream("/proc/self/statm") >> pages;
+  const double own = with_own ? 0.0 : pages * static_cast<double>(::getpagesize());
+  const double left = std::max(1.0, static_cast<double>(allowed.rlim_cur) - own);
+  return free == 0.0 ? left : std::min(free, left);
+}
+
+Room::Room(std::filesystem::path store) : store_(std::move(store)), free_(FreeMemory()) {}
+
+namespace {
+constexpr double kGrows = 4.0;  // a record in memory over its line, measured
+}  // namespace
+
+bool Room::Has(std::uint64_t bytes) const {
+  return free_ == 0.0 || kGrows * static_cast<double>(bytes) < 0.9 * free_;
+}
+
+void Room::Require(const std::string& found, std::uint64_t bytes) const {
+  if (Has(bytes)) return;
+  throw ConfigError(fmt::format(
+      "{}: found {}, which take some {:.1f} GB of memory, of which {:.1f} GB are free; expected "
+      "fewer: choose some with --where PARAMETER=..., or write all with table --format csv",
+      store_.string(), found, kGrows * static_cast<double>(bytes) * 1e-9, free_ * 1e-9));
+}
+
+std::vector<Record> Prepared(std::vector<Record> records) {
+  records = LatestRecords(records, CodeVersion());
+  SortRows(&records);  // in the store they stand as they ended
+  SetDoubts(&records);
+  return records;
+}
+
+std::vector<Record> LoadRecords(const std::filesystem::path& store, const Selection& where,
+                                const ReadWatch& watch) {
+  const std::filesystem::path file = StoreFile(store);
+  const Room room(store);
+  if (IsLarge(file) && !ChoosesLines(where)) {
+    room.Require("all its records", std::filesystem::file_size(file));
+  }
+  std::vector<std::string> warnings;
+  const auto look = [&](std::size_t records, std::uint64_t bytes) {
+    if (watch) watch(records, bytes);
+    room.Require(fmt::format("{} records and more", records), bytes);
+  };
+  std::vector<Record> records = Prepared(ReadRecords(store, where, &warnings, look));
+  for (const std::string& warning : warnings) PrintError("warning: {}\n", warning);
+  return records;
+}
+
+void AppendProvenance(Table& table, const std::string& typed) {
+  for (const std::string& note : Provenance(typed)) table.notes.push_back(note);
+}
+
+std::string RenderKept(Table table, const std::string& format) {
+  if (format == "csv") {
+    std::erase_if(table.notes, [](const std::string& note) { return note.starts_with("date: "); });
+  }
+  return Render(table, format);
+}
+
+const std::map<std::string, FigureSize>& FigureSizes() {
+  static const std::map<std::string, FigureSize> sizes = {{"one-column", FigureSize::kOneColumn},
+                                                          {"two-column", FigureSize::kTwoColumn}};
+  return sizes;
+}
+
+int DrawAll(const std::vector<NamedFigure>& figures, const std::filesystem::path& folder,
+            const std::string& format, FigureSize size) {
+  std::size_t written = 0;
+  for (const NamedFigure& figure : figures) {
+    const auto path = folder / (FileName(figure.name) + "." + format);
+    const auto error = WriteFigure(path, figure.figure, size);
+    if (error) PrintError("{}\n", Lines{*error});
+    written += error ? 0 : 1;
+  }
+  const bool all = written == figures.size();
+  Print("wrote {}{} to {}\n", all ? "" : fmt::format("{} of ", written),
+        WithCount(figures.size(), "figure"), folder.string());
+  return all ? 0 : 2;
+}
+
+void WriteTables(const std::vector<Record>& records, const std::filesystem::path& store,
+                 const std::string& typed) {
+  const bool is_file = store.extension() == ".jsonl";
+  for (const std::string kind : {"drift", "precision", "timing"}) {
+    Table full = MakeTable(records, {.kind = kind});
+    if (full.rows.empty()) continue;
+    AppendProvenance(full, typed);
+    for (const auto& [format, ending] : {std::pair{"csv", ".csv"}, {"markdown", ".md"}}) {
+      std::filesystem::path file = store;
+      file = is_file ? file.replace_extension(kind + ending) : file / (kind + ending);
+      WriteFileAtomically(file, RenderKept(full, format));
+    }
+    const Table compact = MakeTable(records, {.kind = kind, .compact = true});
+    PrintText(ToScreen(compact) + "\n");
+  }
+  for (const std::string& note : Provenance(typed)) Print("{}\n", note);
+}
+
+int DoubtGate(const std::vector<Record>& rows) {
+  std::size_t runs = 0, failed = 0, doubted = 0;
+  for (const Record& row : rows) {
+    if (row.Text("kind") != "accuracy") continue;
+    ++runs;
+    failed += HasFailed(row) ? 1 : 0;
+    doubted += HasDoubt(row) ? 1 : 0;
+  }
+  if (runs == 0) {
+    throw ConfigError(
+        "--gate doubts: found no accuracy run, expected one: such a gate cannot fail");
+  }
+  if (failed + doubted == 0) return 0;
+  PrintError("gate doubts: of {} runs {} did not finish and {} have doubts\n", runs, failed,
+             doubted);
+  return 1;
+}
+
+}  // namespace loopbench::harness

@@ -1,0 +1,383 @@
+// simplify: models of one scene, from the whole one down to the simplest.
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <charconv>
+#include <cmath>
+#include <filesystem>
+#include <string>
+#include <vector>
+
+#include "harness/cli/command_line.h"
+#include "harness/cli/explain.h"
+#include "harness/cli/models.h"
+#include "harness/config/mechanism_reader.h"
+#include "harness/isolation/processes.h"
+#include "harness/run/model_error.h"
+#include "harness/store/result_store.h"
+#include "harness/tables/table_view.h"
+#include "harness/text/files.h"
+#include "harness/text/terminal.h"
+#include "harness/text/words.h"
+#include "mechanism/model/mechanism.h"
+#include "mechanism/simplify/model.h"
+#include "mechanism/simplify/restart.h"
+
+namespace loopbench::harness {
+namespace {
+
+struct SimplifyCommand {
+  std::filesystem::path mechanism;
+  std::vector<std::string> only;        ///< names of ideas; empty: all
+  std::vector<std::string> thresholds;  ///< NAME=VALUE, as typed
+  Lumping lumping = Lumping::kCentreOfMass;
+  double short_run = 1.0;       ///< length of the short run [s]; 0: none
+  double horizon = 10.0;        ///< of the experiment [s]
+  double errors = 0.0;          ///< length of runs that show how far models are off [s]; 0: none
+  std::filesystem::path store;  ///< that gets a record of each model; none when empty
+  double accept = 0.0;          ///< error that a model may cause, for its verdict there [m]
+  std::filesystem::path out;    ///< folder; nothing is written when empty
+  bool assembled = false;       ///< the whole model says all of its start
+  bool force = false;           ///< into a folder that is there
+  ProcessLimits limits;
+};
+
+/// Names of ideas, and of those with a limit.
+std::vector<std::string> IdeaNames() {
+  std::vector<std::string> names;
+  for (const Idea& idea : Ideas()) names.emplace_back(idea.name);
+  return names;
+}
+
+const Idea& IdeaNamed(const std::string& name, const std::string& option) {
+  const auto found = std::ranges::find(Ideas(), name, &Idea::name);
+  if (found != Ideas().end()) return *found;
+  const std::string nearest = NearestSpelling(name, IdeaNames());
+  throw ConfigError(fmt::format(
+      "{} {}: found \"{}\", expected one of {}{}", option, name, name, fmt::join(IdeaNames(), ", "),
+      nearest.empty() ? "" : fmt::format(" (did you mean \"{}\"?)", nearest)));
+}
+
+std::vector<const Idea*> Chosen(const std::vector<std::string>& only) {
+  for (const std::string& name : only) IdeaNamed(name, "--only");
+  std::vector<const Idea*> chosen;
+  for (const Idea& idea : Ideas()) {
+    const bool wanted = only.empty() || std::ranges::find(only, idea.name) != only.end();
+    if (wanted) chosen.push_back(&idea);
+  }
+  return chosen;
+}
+
+SimplifyOptions LimitsSaid(const SimplifyCommand& command) {
+  SimplifyOptions options;
+  options.lumping = command.lumping;
+  for (const std::string& text : command.thresholds) {
+    const std::size_t equals = text.find('=');
+    if (equals == std::string::npos) {
+      throw ConfigError(fmt::format("--threshold {}: found no \"=\", expected NAME=VALUE", text));
+    }
+    const Idea& idea = IdeaNamed(text.substr(0, equals), "--threshold");
+    if (idea.limit == nullptr) {
+      throw ConfigError(fmt::format("--threshold {}: found a limit, expected none: {} has none",
+                                    text, idea.name));
+    }
+    const std::string value = text.substr(equals + 1);
+    double number = 0.0;
+    const auto [end, error] = std::from_chars(value.data(), value.data() + value.size(), number);
+    const bool whole = error == std::errc() && end == value.data() + value.size();
+    if (!whole || !(number > 0.0) || !std::isfinite(number)) {
+      throw ConfigError(
+          fmt::format("--threshold {}: found \"{}\", expected a number > 0", text, value));
+    }
+    options.*idea.limit = number;
+  }
+  return options;
+}
+
+Table CandidateTable(const Idea& idea, const Simplified& simplified) {
+  Table table;
+  table.columns = {{"what", "candidate", Format::kText, {}},
+                   {"number", "number", Format::kText, {}},
+                   {"taken", "taken", Format::kText, {}},
+                   {"why", "because", Format::kText, {}}};
+  for (const Candidate& candidate : simplified.candidates) {
+    Record& row = table.rows.emplace_back();
+    row.Set("what", candidate.what);
+    if (!std::isnan(candidate.number)) row.Set("number", fmt::format("{:.3g}", candidate.number));
+    if (idea.limit != nullptr) row.Set("taken", std::string(candidate.taken ? "yes" : "no"));
+    row.Set("why", candidate.why);
+  }
+  return table;
+}
+
+void PrintIdea(const Idea& idea, const Simplified& simplified, const SimplifyOptions& options,
+               const ExplainView& view) {
+  const std::string title = fmt::format("{}: {}{}", idea.name, idea.sentence,
+                                        idea.is_exact ? "" : " (changes the motion)");
+  if (simplified.candidates.empty()) {
+    Print("\n{}\n", title);
+  } else {
+    PrintSection(title, CandidateTable(idea, simplified), view);
+  }
+  if (idea.limit != nullptr && !simplified.candidates.empty()) {
+    Print("  number: {}; taken {} {}\n", idea.number, idea.is_least ? "from" : "up to",
+          options.*idea.limit);
+  }
+  if (!simplified.applies()) Print("  Does not apply: {}.\n", simplified.why_not);
+  for (const std::string& lost : simplified.dropped) Print("  No longer there: {}.\n", lost);
+  if (simplified.applies() && !idea.assumption.empty()) {
+    Print("  Right where {}.\n", idea.assumption);
+  }
+}
+
+int SpeedsOf(const MechanismDescription& description) {
+  return description.space == SpaceKind::kPlanar
+             ? Mechanism<Planar, double>(description, Coordinates::kJoint).num_u()
+             : Mechanism<Spatial, double>(description, Coordinates::kJoint).num_u();
+}
+
+void PrintModels(const SceneModels& ladder, const ExplainView& view) {
+  Table table;
+  table.columns = {{"name", "model", Format::kText, {}},
+                   {"motion", "motion", Format::kText, {}},
+                   {"space", "space", Format::kText, {}},
+                   {"bodies", "bodies", Format::kInteger, {}},
+                   {"joints", "joints", Format::kInteger, {}},
+                   {"speeds", "speeds", Format::kInteger, {}},
+                   {"error", "off by [m]", Format::kText, {}},
+                   {"worst", "at", Format::kText, {}},
+                   {"evaluations", "evaluations", Format::kInteger, {}},
+                   {"gone", "gone", Format::kText, {}}};
+  const MechanismDescription& whole = ladder.models.front().description;
+  for (const SceneModel& model : ladder.models) {
+    Record& row = table.rows.emplace_back();
+    row.Set("name", model.name);
+    row.Set("motion", std::string(model.is_exact ? "the same" : "changed"));
+    row.Set("space", std::string(ToString(model.description.space)));
+    row.Set("bodies", static_cast<std::int64_t>(model.description.bodies.size() - 1));
+    row.Set("joints", static_cast<std::int64_t>(model.description.joints.size()));
+    row.Set("speeds", std::int64_t{SpeedsOf(model.description)});
+    row.Set("error", model.error);
+    row.Set("worst", model.worst);
+    if (model.rhs_evaluations >= 0) row.Set("evaluations", model.rhs_evaluations);
+    std::vector<std::string> gone;
+    for (std::size_t b = 1; b < whole.bodies.size(); ++b) {
+      const std::string& name = whole.bodies[b].name;
+      const auto& bodies = model.description.bodies;
+      const bool stays = std::ranges::find(bodies.begin() + 1, bodies.end(), name,
+                                           &BodyDescription::name) != bodies.end();
+      if (!stays) gone.push_back(name);
+    }
+    row.Set("gone", fmt::format("{}", fmt::join(gone, ", ")));
+  }
+  PrintSection("Models", table, view);
+  Print("  speeds: in joint coordinates, before loops take theirs. gone: bodies by these names.\n");
+  if (ladder.models.front().rhs_evaluations >= 0) {
+    Print(
+        "  off by: the largest distance of a point of one name from where the whole model has "
+        "it.\n");
+  }
+}
+
+/// The whole model; it must have a start.
+MechanismFile ReadWhole(const SimplifyCommand& command) {
+  MechanismFile file = ReadMechanism(command.mechanism);
+  std::string why;
+  MechanismDescription assembled = WithAssembledStart(file.description, &why);
+  if (!why.empty()) {
+    throw ConfigError(
+        fmt::format("{}: its start cannot be assembled: {}", command.mechanism.string(), why));
+  }
+  if (command.assembled) file.description = std::move(assembled);
+  return file;
+}
+
+/// `part` of the CPU time that there is.
+double PartOfTime(const SimplifyCommand& command, double part) {
+  constexpr double kAnyTime = 600.0;
+  return command.limits.cpu_s > 0.0 ? part * command.limits.cpu_s : kAnyTime;
+}
+
+/// What the ideas want to know that look at how the whole model moves.
+ShortRun LookAt(const MechanismDescription& whole, const std::vector<const Idea*>& ideas,
+                const SimplifyCommand& command) {
+  const bool looks = std::ranges::any_of(ideas, [](const Idea* idea) {
+    return idea->name == "constant-parts" || idea->name == "stiff-springs";
+  });
+  if (!looks || !(command.short_run > 0.0)) return {};
+  const ShortRun run = MakeShortRun(whole, command.short_run, PartOfTime(command, 0.5));
+  Print("  Short run: {:.3g} s; the fastest that turns or moves has {:.3g} rad/s.\n", run.duration,
+        run.rate);
+  if (!run.message.empty()) Print("  Short run: {}.\n", run.message);
+  return run;
+}
+
+void PrintIdeas(const SceneModels& ladder, const SimplifyOptions& options,
+                const ExplainView& view) {
+  std::vector<std::string_view> idle;
+  for (const auto& [idea, simplified] : ladder.ideas) {
+    if (simplified.why_not == kNothingOfTheKind) {
+      idle.push_back(idea->name);
+    } else {
+      PrintIdea(*idea, simplified, options, view);
+    }
+  }
+  if (!idle.empty()) Print("\nThere is nothing for: {}.\n", fmt::join(idle, ", "));
+}
+
+/// What each model causes and takes, in the store and on the terminal.
+void PrintVerdicts(const SimplifyCommand& command, const MechanismFile& file,
+                   const SceneModels& ladder, const ExplainView& view) {
+  const std::vector<Record> records = RecordsOfModels(
+      file, ladder,
+      {.horizon = command.errors,
+       .accept = command.accept,
+       .cpu_s = PartOfTime(command, 0.3) / static_cast<double>(ladder.models.size()),
+       .what = command.mechanism.string() + ": --store"});
+  ResultStore store(command.store);
+  for (const Record& record : records) store.Append(record);
+  Table table = MakeTable(records, {.kind = "models", .compact = true});
+  table.title.clear();
+  PrintSection("Against the whole one's certified motion", table, view);
+  Print("  {} records in {}\n", records.size(), store.file().string());
+}
+
+/// In the child.
+int SimplifyFile(const SimplifyCommand& command, const ExplainView& view,
+                 const std::string& typed) {
+  const std::vector<const Idea*> ideas = Chosen(command.only);
+  const SimplifyOptions options = LimitsSaid(command);
+  const MechanismFile file = ReadWhole(command);
+  Print("{} ({})\n", file.description.name, command.mechanism.string());
+  const ShortRun run = LookAt(file.description, ideas, command);
+  SceneModels ladder = MakeModels(file, ideas, run, options);
+  PrintIdeas(ladder, options, view);
+  const bool any = ladder.models.size() > 1;
+  if (!command.store.empty()) {
+    PrintVerdicts(command, file, ladder, view);
+  } else if (any && command.errors > 0.0) {
+    const auto count = static_cast<double>(ladder.models.size());
+    MeasureErrors(command.errors, PartOfTime(command, 0.3) / count, &ladder);
+  }
+  if (any) {
+    PrintModels(ladder, view);
+  } else {
+    Print("\n{} cannot be simplified: no idea applies.\n", file.description.name);
+  }
+  if (command.out.empty()) return 0;
+  if (!any && !command.assembled) {
+    throw ConfigError(fmt::format("{}: found nothing to simplify, so nothing is written to {}",
+                                  command.mechanism.string(), command.out.string()));
+  }
+  WriteModels(ladder, command.horizon, typed, command.out, command.force);
+  Print("\n{}: written. loopbench run {} runs all of them.\n", command.out.string(),
+        (command.out / LadderFileName(ladder)).string());
+  return 0;
+}
+
+/// "light-links 0.01, ...": the limits as they are unless said.
+std::string LimitsText() {
+  std::string text;
+  for (const Idea& idea : Ideas()) {
+    if (idea.limit == nullptr) continue;
+    text +=
+        fmt::format("{}{}={}", text.empty() ? "" : ", ", idea.name, SimplifyOptions{}.*idea.limit);
+  }
+  return text;
+}
+
+/// Names of ways to lump masses, in the order of Lumping.
+const std::vector<std::string>& LumpingNames() {
+  static const std::vector<std::string> names = {"centre-of-mass", "half", "none"};
+  return names;
+}
+
+/// Lists what each idea could take away, and with a folder writes a mechanism file for each idea
+/// that applies, for all of them together and for the whole model, an experiment that runs them and
+/// a page that says what was done. The work is done in a child process under the limits. 2 when the
+/// start cannot be assembled, or there is nothing to write.
+int Simplify(const SimplifyCommand& command, bool all, const std::string& typed) {
+  // the child that does the work prints into memory, and sees no terminal
+  const ExplainView view = ViewOfOutput(all);
+  return PrintFromChild(command.mechanism.string(), command.limits,
+                        [&] { return SimplifyFile(command, view, typed); });
+}
+
+std::string SimplifyFooter() {
+  std::string ideas;
+  for (const Idea& idea : Ideas()) {
+    ideas += fmt::format("  {:16} {}\n", idea.name, idea.sentence);
+    if (idea.limit != nullptr) {
+      ideas += fmt::format("  {:16} by {}\n", "", idea.number);
+    }
+  }
+  return fmt::format(
+      "\nIdeas; those with a number change the motion, the others do not:\n{}\n"
+      "Examples:\n"
+      "  loopbench simplify configs/experiments/models/light-rod-compressor.json\n"
+      "  loopbench simplify my.json --threshold light-links=0.05 --only welds,light-links --out "
+      "ladder\n"
+      "  loopbench run ladder/NAME-ladder.json\n\n"
+      "Bodies, joints and points keep their names; points of a body that another one took over\n"
+      "are called BODY.POINT there. ladder.md says what was done, what is gone, and when it is "
+      "right.",
+      ideas);
+}
+
+}  // namespace
+
+void AddSimplify(Commands& commands) {
+  auto& command = commands.Keep<SimplifyCommand>();
+  auto& lumping = commands.Keep(LumpingNames().front());
+  auto& only_list = commands.Keep<bool>();
+  auto& all = commands.Keep<bool>();
+  CLI::App* app =
+      commands.Add("simplify", "Generate simpler models of a mechanism and measure their errors",
+                   [&](const Typed& typed) {
+                     command.lumping = static_cast<Lumping>(
+                         std::ranges::find(LumpingNames(), lumping) - LumpingNames().begin());
+                     return Simplify(command, all, typed.line);
+                   });
+  app->add_option("mechanism", command.mechanism, "Mechanism file (JSON)")->required();
+  CLI::Option* list =
+      app->add_flag("--list", only_list, "Only list what could be simplified (the default)");
+  app->add_option("--only", command.only, "Only these ideas: NAME[,NAME]")->delimiter(',');
+  app->add_option("--threshold", command.thresholds,
+                  "NAME=VALUE: an idea's limit, unless said " + LimitsText());
+  app->add_option("--lump", lumping, "Where the mass of a light link goes")
+      ->check(CLI::IsMember(LumpingNames()))
+      ->capture_default_str();
+  app->add_option("--short-run", command.short_run,
+                  "Length of the short run that shows what hardly moves [s], 0: none")
+      ->check(NumberFrom(0.0, 1e6))
+      ->capture_default_str();
+  app->add_option("--errors", command.errors,
+                  "Run all models for so long [s] and say how far their points are off, 0: no")
+      ->check(NumberFrom(0.0, 1e6))
+      ->capture_default_str();
+  CLI::Option* accept =
+      app->add_option("--accept", command.accept,
+                      "Largest error that a model may cause [m]: its verdict in the store")
+          ->check(NumberFrom(1e-15, 1e6));
+  accept->needs("--errors");
+  app->add_option("--store", command.store,
+                  "Add a record for each model to this store: error against the certified motion "
+                  "of the whole one, times, verdict (loopbench table STORE --kind models)")
+      ->needs(accept);
+  app->add_option("--horizon", command.horizon, "Simulated time of the written experiment [s]")
+      ->check(NumberFrom(1e-9, 1e9))
+      ->capture_default_str();
+  AddWide(app);
+  app->add_option("-o,--out", command.out,
+                  "New folder for the models, an experiment that runs them, and ladder.md")
+      ->excludes(list);
+  app->add_flag("--assembled", command.assembled,
+                "Begin from a whole model that says all of its assembled start");
+  app->add_flag("--force", command.force, "Overwrite files of an existing folder");
+  command.limits = kFileLimits;
+  AddLimits(app, &command.limits);
+  app->add_flag("--all", all, "Every row of long tables");
+  app->footer(SimplifyFooter());
+}
+
+}  // namespace loopbench::harness

@@ -1,0 +1,146 @@
+// tradeoff: what accuracy costs.
+#include "harness/judge/tradeoff.h"
+
+#include <filesystem>
+#include <string>
+#include <utility>
+
+#include "harness/cli/command_line.h"
+#include "harness/cli/commands.h"
+#include "harness/figures/judge_figures.h"
+#include "harness/judge/reports.h"
+#include "harness/record/provenance.h"
+#include "harness/store/result_store.h"
+#include "harness/tables/fit.h"
+#include "harness/text/files.h"
+#include "harness/text/terminal.h"
+
+namespace loopbench::harness {
+namespace {
+
+struct TradeoffCommand {
+  std::filesystem::path store;
+  TradeoffOptions options;
+  std::string format = "text";      ///< of what is printed: text, csv, markdown, json or latex
+  std::filesystem::path out;        ///< folder; default: that of the store
+  std::string figures;              ///< svg or pdf; "" for none
+  std::string size = "two-column";  ///< of figures, a name of a FigureSize
+  bool all = false;                 ///< print every row, not the front alone
+};
+
+/// A store that is a file has its tables beside it.
+std::filesystem::path FolderOf(const TradeoffCommand& command) {
+  if (!command.out.empty()) return command.out;
+  const bool is_file = command.store.extension() == ".jsonl";
+  return is_file ? command.store.parent_path() : command.store;
+}
+
+void WriteTradeoff(const Tradeoff& tradeoff, const std::filesystem::path& folder,
+                   const std::string& typed) {
+  const std::string stem = (folder / "tradeoff").string();
+  Table rows = TradeoffTable(tradeoff, {.compact = false, .all = true});
+  Table cheapest = CheapestTable(tradeoff);
+  AppendProvenance(rows, typed);
+  AppendProvenance(cheapest, typed);
+  WriteFileAtomically(stem + ".csv", RenderKept(rows, "csv"));
+  WriteFileAtomically(stem + "-overview.csv", RenderKept(cheapest, "csv"));
+  WriteFileAtomically(stem + ".md", TradeoffMarkdown(tradeoff, Provenance(typed)));
+}
+
+/// What is printed for people: fronts, overview, and under it what was equal and what was not.
+void PrintForPeople(const Tradeoff& tradeoff, const TradeoffCommand& command,
+                    const std::string& typed) {
+  const Table fronts = TradeoffTable(tradeoff, {.compact = true, .all = command.all});
+  PrintText(ToScreen(fronts) + "\n");
+  Table overview = OverviewTable(tradeoff);
+  overview.notes = FairnessStatement(tradeoff);
+  AppendProvenance(overview, typed);
+  PrintText(ToScreen(overview) + "\n");
+}
+
+/// Prints fronts, overview and fairness statement; writes tradeoff.csv, tradeoff-overview.csv,
+/// tradeoff.md and the figures.
+int PrintTradeoff(const TradeoffCommand& command, const std::string& typed) {
+  const std::vector<Record> records = LoadRecords(command.store, command.options.where);
+  if (records.empty()) {
+    PrintError("{}: no records\n", command.store.string());
+    return 2;
+  }
+  RequireOneContent(records, command.store, "tradeoff");
+  const Tradeoff tradeoff = MakeTradeoff(records, command.options);
+  const std::filesystem::path folder = FolderOf(command);
+  WriteTradeoff(tradeoff, folder, typed);
+  if (command.format == "text") {
+    PrintForPeople(tradeoff, command, typed);
+    const std::string stem = (folder / "tradeoff").string();
+    Print("wrote {0}.csv, {0}-overview.csv, {0}.md\n", stem);
+  } else {
+    Table rows = TradeoffTable(tradeoff, {.compact = false, .all = true});
+    for (std::string& line : FairnessStatement(tradeoff)) rows.notes.push_back(std::move(line));
+    AppendProvenance(rows, typed);
+    PrintText(RenderKept(rows, command.format));
+  }
+  if (command.figures.empty()) return 0;
+  return DrawAll(TradeoffFigures(tradeoff), folder / "figures", command.figures,
+                 FigureSizes().at(command.size));
+}
+
+constexpr const char* kTradeoffFooter = R"(
+Examples:
+  loopbench run mine.json --out out               ("timing": {"cases": true} in mine.json)
+  loopbench tradeoff out --figures
+  loopbench tradeoff out --where 'rtol>1e-11' --cost rhs_equivalents --classes 1e-2,1e-5
+  loopbench tradeoff out --error closed_form_error_max --per mechanism,horizon,mass --out tradeoff
+
+Each accuracy run beside the timing of the same case, problem by problem (--per). Runs that failed
+or have doubts are compared with nobody, and listed with the reason. A '*' stands on the Pareto
+front. The overview has, per problem and class of errors, what the cheapest method of each formulation
+costs, and how many times the cheapest of all. Below stands, from the records, what was equal among the
+compared rows and what was not. All rows are in tradeoff.csv and tradeoff.md, the cheapest methods in
+tradeoff-overview.csv, figures (error over cost, over tolerance, over time) in figures/.)";
+
+}  // namespace
+
+void AddTradeoff(Commands& commands) {
+  auto& command = commands.Keep<TradeoffCommand>();
+  auto& conditions = commands.Keep<std::vector<std::string>>();
+  auto& draws = commands.Keep<bool>();
+  auto& drawn_as = commands.Keep<std::string>("svg");
+  CLI::App* app = commands.Add("tradeoff", "Compute work-precision tables and Pareto fronts",
+                               [&](const Typed& typed) {
+                                 command.options.where = ParseSelection(conditions);
+                                 if (draws) command.figures = drawn_as;
+                                 return PrintTradeoff(command, typed.line);
+                               });
+  app->add_option("store", command.store, "Folder of a run, or a .jsonl file")->required();
+  TradeoffOptions& options = command.options;
+  app->add_option("--error", options.error,
+                  "Key that is the error (default: error_position_max, or what the store "
+                  "has)");
+  app->add_option("--cost", options.cost,
+                  "Key that is the cost: wall_s (default: the timed median), "
+                  "rhs_equivalents, steps, ...");
+  app->add_option("--per", options.per, "Keys that make one problem: a,b")
+      ->delimiter(',')
+      ->capture_default_str();
+  app->add_option("--classes", options.classes, "Errors that the overview asks for: a,b")
+      ->delimiter(',')
+      ->check(NumberFrom(0.0, 1e300))
+      ->capture_default_str();
+  AddWhere(app, &conditions);
+  app->add_option("-o,--out", command.out, "Folder (default: that of the store)");
+  app->add_option("--format", command.format, "How it is printed")
+      ->check(CLI::IsMember({"text", "csv", "markdown", "json", "latex"}))
+      ->capture_default_str();
+  app->add_flag("--all", command.all, "Print every row");
+  AddWide(app);
+  CLI::Option* figures = app->add_flag("--figures", draws, "Draw figures too");
+  app->add_option("--figure-format", drawn_as, "svg or pdf")
+      ->check(CLI::IsMember({"svg", "pdf"}))
+      ->needs(figures)
+      ->capture_default_str();
+  AddSize(app, &command.size);
+  app->footer(kTradeoffFooter);
+}
+
+}  // namespace loopbench::harness

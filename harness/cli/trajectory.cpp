@@ -1,0 +1,345 @@
+// trajectory: what a run wrote over time, or somebody else's against a mechanism.
+#include "harness/trajectory/trajectory.h"
+
+#include <algorithm>
+#include <cmath>
+#include <filesystem>
+#include <string>
+#include <utility>
+#include <vector>
+
+#include "harness/cli/command_line.h"
+#include "harness/cli/commands.h"
+#include "harness/config/mechanism_reader.h"
+#include "harness/figures/figure_recipes.h"
+#include "harness/record/record.h"
+#include "harness/record/select.h"
+#include "harness/store/result_store.h"
+#include "harness/tables/columns.h"
+#include "harness/tables/fit.h"
+#include "harness/text/escape.h"
+#include "harness/text/files.h"
+#include "harness/text/terminal.h"
+#include "harness/trajectory/check.h"
+
+namespace loopbench::harness {
+namespace {
+
+struct TrajectoryCommand {
+  std::filesystem::path source;  ///< a store, or a trajectory (.csv)
+  Selection where;               ///< of a store's records
+  std::filesystem::path out;     ///< file, or folder of a store's; nothing is written when empty
+  std::string format = "csv";    ///< csv or jsonl
+  std::vector<std::string> columns;  ///< labels, or beginnings of labels; empty: all
+  int every = 1;                     ///< rows that are kept: the first, and each so many-th after
+  std::filesystem::path mechanism;   ///< to hold a trajectory against
+  std::filesystem::path ours;        ///< another trajectory of it
+  std::filesystem::path figure;      ///< .svg or .pdf, with `ours`
+};
+
+using enum Format;
+
+Value Maybe(const LargestAt& largest) {
+  return largest.is_known ? Value(largest.value) : Value(std::monostate());
+}
+Value When(const LargestAt& largest) {
+  return largest.is_known ? Value(largest.t) : Value(std::monostate());
+}
+
+/// The columns that are asked for, t among them.
+std::vector<std::size_t> Chosen(const TrajectoryReader& reader, const TrajectoryCommand& command) {
+  std::vector<std::size_t> chosen;
+  const auto& columns = reader.columns();
+  std::vector<bool> used(command.columns.size(), false);
+  for (std::size_t i = 0; i < columns.size(); ++i) {
+    bool wanted = command.columns.empty() || i == reader.time();
+    for (std::size_t k = 0; k < command.columns.size(); ++k) {
+      if (!columns[i].Label().starts_with(command.columns[k])) continue;
+      used[k] = wanted = true;
+    }
+    if (wanted) chosen.push_back(i);
+  }
+  const auto unused = std::ranges::find(used, false);
+  if (unused == used.end()) return chosen;
+  std::string known;
+  for (const TrajectoryColumn& column : columns) known += "\n  " + column.Label();
+  throw ConfigError(fmt::format("--columns: found \"{}\", expected the beginning of one of{}",
+                                command.columns[unused - used.begin()], known));
+}
+
+/// Copies files of any size row by row, with `notes` above the file's own notes. Returns the number
+/// of rows.
+std::int64_t Copy(const std::filesystem::path& from, const std::filesystem::path& to,
+                  const TrajectoryCommand& command, std::vector<std::string> notes) {
+  TrajectoryReader reader(from);
+  const std::vector<std::size_t> chosen = Chosen(reader, command);
+  std::vector<TrajectoryColumn> columns;
+  for (const std::size_t i : chosen) columns.push_back(reader.columns()[i]);
+  const auto format =
+      command.format == "jsonl" ? TrajectoryFormat::kJsonLines : TrajectoryFormat::kCsv;
+  notes.insert(notes.end(), reader.notes().begin(), reader.notes().end());
+  TrajectoryWriter writer(to, columns, notes, format);
+  std::int64_t number = 0;
+  for (std::vector<double> row, kept; reader.Next(&row);) {
+    if (number++ % command.every != 0) continue;
+    kept.clear();
+    for (const std::size_t i : chosen) kept.push_back(row[i]);
+    writer.Write(kept);
+  }
+  writer.Finish(reader.later_notes());
+  return writer.rows();
+}
+
+/// Whether the file is as its run wrote it; else the reason is printed.
+bool IsVerified(const Record& record, const std::filesystem::path& file) try {
+  VerifyTrajectory(record, file);
+  return true;
+} catch (const ChangedFile& changed) {
+  PrintError("{}\n", changed.what());
+  return false;
+}
+
+int ExportOne(const std::filesystem::path& from, const std::filesystem::path& to,
+              const TrajectoryCommand& command, const std::vector<std::string>& notes = {}) {
+  const std::int64_t rows = Copy(from, to, command, notes);
+  Print("wrote {}: {} rows\n", to.string(), rows);
+  return 0;
+}
+
+/// The parameters of a sweep that a case has, and their values.
+std::vector<std::pair<std::string, std::string>> ParametersOf(const Record& record,
+                                                              const std::vector<Record>& records) {
+  std::vector<std::pair<std::string, std::string>> parameters;
+  for (const TableColumn& parameter : WithParameters({}, records)) {
+    const std::string text = record.Text(parameter.key);
+    if (parameter.key != "step" && !text.empty()) parameters.emplace_back(parameter.key, text);
+  }
+  return parameters;
+}
+
+/// The name of a case's file.
+std::string NameOf(const Record& record,
+                   const std::vector<std::pair<std::string, std::string>>& parameters) {
+  std::string name;
+  for (const char* key : {"mechanism", "formulation", "enforcement", "coordinates", "solver",
+                          "integrator", "rtol", "step", "horizon"}) {
+    if (!record.Text(key).empty()) name += (name.empty() ? "" : "-") + record.Text(key);
+  }
+  for (const auto& [key, value] : parameters) name += fmt::format("-{}-{}", key, value);
+  if (const std::string content = record.Text("content"); !content.empty()) name += "-" + content;
+  return FileName(name);
+}
+
+int OfStore(const TrajectoryCommand& command, const std::string& typed) {
+  std::vector<Record> records = LoadRecords(command.source, command.where);
+  std::erase_if(records, [&](const Record& record) {
+    return record.Text("trajectory").empty() || !Matches(record, command.where);
+  });
+  if (records.empty()) {
+    throw ConfigError(
+        fmt::format("{}: found no trajectory{}, expected records of an experiment with \"output\"",
+                    command.source.string(), command.where.empty() ? "" : " that meets --where"));
+  }
+  const std::filesystem::path file = StoreFile(command.source);
+  Table table;
+  for (const char* key : {"mechanism", "formulation", "enforcement", "coordinates", "solver",
+                          "rtol", "horizon", "outcome", "trajectory_rows", "trajectory_output",
+                          "trajectory_interpolation_max", "trajectory_open", "trajectory"}) {
+    table.columns.push_back(ColumnOf(key, records));
+  }
+  table.columns = TellingApart(WithParameters(std::move(table.columns), records), records);
+  table.rows = records;
+  int code = 0;
+  for (const Record& record : records) {
+    const std::filesystem::path from = TrajectoryOf(record, file);
+    if (from.empty() || !std::filesystem::exists(from)) {
+      PrintError("{}: it is gone; run --rerun all makes it again\n",
+                 (file.parent_path() / "trajectories" / record.Text("trajectory")).string());
+      code = 2;
+    } else if (!IsVerified(record, from)) {
+      code = 2;
+    } else if (!command.out.empty()) {
+      const auto parameters = ParametersOf(record, records);
+      std::vector<std::string> notes;
+      for (const auto& [key, value] : parameters)
+        notes.push_back(fmt::format("{}: {}", key, value));
+      ExportOne(from, command.out / (NameOf(record, parameters) + "." + command.format), command,
+                notes);
+    }
+  }
+  if (command.out.empty()) {
+    table.notes = {"files are in " + (file.parent_path() / "trajectories").string()};
+    AppendProvenance(table, typed);
+    PrintText(ToScreen(table) + "\n");
+  }
+  return code;
+}
+
+void PrintCheck(const TrajectoryCommand& command, const std::string& typed) {
+  const MechanismDescription user = ReadMechanism(command.mechanism).description;
+  const TrajectoryCheck check = CheckTrajectory(command.source, user);
+  Table table;
+  table.title = fmt::format("{} against {}: {} rows, {:g} s to {:g} s, by {}{}",
+                            command.source.string(), user.name, check.rows, check.from, check.to,
+                            check.source, check.has_speeds ? "" : ", without speeds");
+  table.columns = {{"joint", "joint"},
+                   {"shift", "mismatch [m]", kScientific},
+                   {"shift_t", "at [s]", kSeconds},
+                   {"rotation", "rotation [rad]", kScientific},
+                   {"velocity", "speed [m/s]", kScientific},
+                   {"angular_velocity", "turning [rad/s]", kScientific},
+                   {"coordinates", "coordinates off", kScientific}};
+  for (const JointCheck& joint : check.joints) {
+    AddRow({joint.joint, Maybe(joint.shift), When(joint.shift), Maybe(joint.rotation),
+            Maybe(joint.velocity), Maybe(joint.angular_velocity), Maybe(joint.coordinates)},
+           &table);
+  }
+  table.notes.push_back(
+      check.no_energy.empty()
+          ? fmt::format("energy: changes by {:.3e} J at most, at {:g} s; kinetic up to {:.3e} J",
+                        check.energy.value, check.energy.t, check.kinetic)
+          : "energy: not known, for " + check.no_energy);
+  if (!check.speeds.empty()) {
+    const auto worst = std::ranges::max_element(
+        check.speeds, {}, [](const SpeedCheck& speed) { return speed.apart.value; });
+    table.notes.push_back(
+        fmt::format("speeds: at most {:.3e} from the differences of positions, {} at {:g} s",
+                    worst->apart.value, worst->label, worst->apart.t));
+  }
+  for (const std::string& label : check.unknown) {
+    table.notes.push_back("not of this mechanism, passed over: " + label);
+  }
+  AppendProvenance(table, typed);
+  PrintText(ToScreen(table) + "\n");
+}
+
+int LayBeside(const TrajectoryCommand& command, const std::string& typed) {
+  const Trajectory ours = ReadTrajectory(command.ours), theirs = ReadTrajectory(command.source);
+  std::vector<SharedColumn> shared = SharedColumns(ours, theirs);
+  std::erase_if(shared, [&](const SharedColumn& column) {
+    return !command.columns.empty() &&
+           std::ranges::none_of(command.columns, [&](const std::string& start) {
+             return column.label.starts_with(start);
+           });
+  });
+  if (shared.empty()) {
+    throw ConfigError(fmt::format("{} and {}: found no column that both have, expected one{}",
+                                  command.ours.string(), command.source.string(),
+                                  command.columns.empty() ? "" : " of --columns"));
+  }
+  Table table;
+  table.title = fmt::format("{} less {}", command.source.string(), command.ours.string());
+  table.columns = {{"column", "column"},
+                   {"largest", "largest difference", kScientific},
+                   {"t", "at [s]", kSeconds},
+                   {"compared", "rows", kInteger}};
+  std::size_t most = 0;
+  for (const SharedColumn& column : shared) {
+    LargestAt largest;
+    std::size_t compared = 0;
+    const std::vector<double> apart = Differences(ours, theirs, column);
+    for (std::size_t row = 0; row < apart.size(); ++row) {
+      const double t = theirs.At(row, theirs.time), number = theirs.At(row, column.in_theirs);
+      if (!std::isfinite(number) && std::isfinite(ValueAt(ours, column.in_ours, t))) {
+        throw std::runtime_error(
+            fmt::format("{}: found {} in \"{}\" at t = {}, expected a finite "
+                        "number, as in {}",
+                        command.source.string(), number, column.label, t, command.ours.string()));
+      }
+      if (!std::isfinite(apart[row])) continue;
+      ++compared;
+      largest.Add(std::abs(apart[row]), t);
+    }
+    most = std::max(most, compared);
+    AddRow({column.label, Maybe(largest), When(largest), Count(compared)}, &table);
+  }
+  if (most == 0) {
+    throw std::runtime_error(fmt::format("{}: found no row to compare, expected times of {}",
+                                         command.source.string(), command.ours.string()));
+  }
+  if (most < theirs.rows()) {
+    table.notes.push_back(fmt::format("{} of {} rows are not compared: {} has no such times",
+                                      theirs.rows() - most, theirs.rows(), command.ours.string()));
+  }
+  AppendProvenance(table, typed);
+  PrintText(ToScreen(table) + "\n");
+  if (command.figure.empty()) return 0;
+  // one axis has one unit
+  std::vector<SharedColumn> drawn;
+  constexpr std::size_t kMost = 4;
+  for (const SharedColumn& column : shared) {
+    if (column.unit == shared.front().unit && drawn.size() < kMost) drawn.push_back(column);
+  }
+  const auto fault = DrawTrajectories(command.figure, ours, theirs, drawn, "ours and theirs");
+  if (fault) throw std::runtime_error(fmt::format("{}: {}", command.figure.string(), *fault));
+  Print("wrote {}: {} of {} columns\n", command.figure.string(), drawn.size(), shared.size());
+  return 0;
+}
+
+/// Lists the trajectories of a store; writes them to `out`; checks one against a mechanism; lays
+/// one beside ours.
+int ShowTrajectories(const TrajectoryCommand& command, const std::string& typed) {
+  if (command.source.extension() != ".csv") {
+    if (command.mechanism.empty() && command.ours.empty()) return OfStore(command, typed);
+    throw ConfigError(
+        fmt::format("{}: found a store beside --mechanism or --ours, expected a "
+                    "trajectory (.csv)",
+                    command.source.string()));
+  }
+  if (!command.mechanism.empty()) PrintCheck(command, typed);
+  if (!command.ours.empty()) return LayBeside(command, typed);
+  if (!command.out.empty()) return ExportOne(command.source, command.out, command);
+  if (!command.mechanism.empty()) return 0;
+  TrajectoryReader reader(command.source);
+  std::int64_t rows = 0;
+  for (std::vector<double> row; reader.Next(&row);) ++rows;
+  Print("{}: {} rows of\n", command.source.string(), rows);
+  for (const TrajectoryColumn& column : reader.columns()) {
+    Print("  {}\n", column.kind.empty() ? column.component : column.Label());
+  }
+  return 0;
+}
+
+constexpr const char* kTrajectoryFooter = R"(
+Examples:
+  loopbench trajectory out                                    ("output": {"step": 0.01} in the experiment)
+  loopbench trajectory out --where formulation=odca --out csv
+  loopbench trajectory out --out lines --format jsonl --columns joint:,energy: --every 10
+  loopbench trajectory theirs.csv --mechanism my.json         (constraints, energy, speeds)
+  loopbench trajectory theirs.csv --ours ours.csv --figure beside.svg --columns joint:
+
+A store's trajectories are files of rows over time, in its folder trajectories/; without --out they
+are listed. A trajectory of any program is CSV with a column "t [s]" and others that are called as
+ours are, however few; `loopbench trajectory FILE.csv` prints those of a file. Held against a mechanism are the
+poses of all bodies, or the coordinates of joints that lead to them.)";
+
+}  // namespace
+
+void AddTrajectory(Commands& commands) {
+  auto& command = commands.Keep<TrajectoryCommand>();
+  auto& conditions = commands.Keep<std::vector<std::string>>();
+  CLI::App* app =
+      commands.Add("trajectory", "List, write and check trajectories of runs or other programs",
+                   [&](const Typed& typed) {
+                     command.where = ParseSelection(conditions);
+                     return ShowTrajectories(command, typed.line);
+                   });
+  app->add_option("source", command.source, "Folder of a run, or a trajectory (.csv)")->required();
+  AddWhere(app, &conditions);
+  app->add_option("-o,--out", command.out, "Folder to write to; of a .csv a file");
+  app->add_option("--format", command.format, "Output format")
+      ->check(CLI::IsMember({"csv", "jsonl"}))
+      ->capture_default_str();
+  app->add_option("--columns", command.columns, "Only columns that begin so, and t: a,b")
+      ->delimiter(',');
+  app->add_option("--every", command.every, "Only each so many-th row")
+      ->check(NumberFrom(1, 1'000'000'000));
+  app->add_option("--mechanism", command.mechanism,
+                  "Mechanism (JSON) that a trajectory is held against");
+  app->add_option("--ours", command.ours, "Trajectory that another is laid beside");
+  app->add_option("--figure", command.figure, "Picture of both and their difference: .svg, .pdf")
+      ->needs("--ours");
+  app->footer(kTrajectoryFooter);
+}
+
+}  // namespace loopbench::harness

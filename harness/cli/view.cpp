@@ -1,0 +1,113 @@
+// view: a mechanism as a page, as a picture for papers, as tables.
+#include <filesystem>
+#include <string>
+
+#include "harness/cli/command_line.h"
+#include "harness/cli/commands.h"
+#include "harness/cli/explain.h"
+#include "harness/config/mechanism_reader.h"
+#include "harness/isolation/processes.h"
+#include "harness/text/files.h"
+#include "harness/text/terminal.h"
+#include "harness/view/html.h"
+#include "harness/view/picture.h"
+#include "harness/view/svg.h"
+
+namespace loopbench::harness {
+namespace {
+
+struct ViewCommand {
+  std::filesystem::path mechanism;
+  std::string format;         ///< html, svg or text; "" for the ending of `out`, else html
+  std::filesystem::path out;  ///< "": NAME.html or NAME.svg beside the caller; text: the terminal
+  SvgOptions svg;
+  bool all = false;  ///< every row of long tables
+  ProcessLimits limits = kFileLimits;
+};
+
+std::string FormatOf(const ViewCommand& command) {
+  if (!command.format.empty()) return command.format;
+  const std::string ending = command.out.extension().string();
+  if (ending == ".svg") return "svg";
+  return ending == ".txt" ? "text" : "html";
+}
+
+void PrintPicture(const Picture& picture, const ExplainView& view) {
+  Print("{} ({})\n", picture.name, picture.file);
+  if (!picture.freedom.empty()) Print("  degrees of freedom: {}\n", picture.freedom);
+  for (const Table& table : ToTables(picture)) {
+    Table untitled = table;
+    untitled.title.clear();
+    PrintSection(table.title, untitled, view);
+  }
+  if (!picture.notes.empty()) Print("\nWhat a run leaves out, and what is not shown\n");
+  for (const std::string& note : picture.notes) Print("  {}\n", note);
+}
+
+int ViewHere(const ViewCommand& command, const std::string& format, const ExplainView& view) {
+  const Picture picture =
+      MakePicture(ReadMechanism(command.mechanism).description, command.mechanism.string());
+  if (format == "text" && command.out.empty()) {
+    PrintPicture(picture, view);
+  } else {
+    std::filesystem::path out = command.out;
+    if (out.empty()) out = FileName(command.mechanism.stem().string()) + "." + format;
+    std::string text;
+    if (format == "text") {
+      for (const Table& table : ToTables(picture)) text += ToText(table) + "\n";
+    } else {
+      text = format == "svg" ? ToSvg(picture, command.svg) : ToHtml(picture);
+    }
+    WriteFileAtomically(out, text);
+    Print("wrote {}: {} bodies, {} joints, {} motions, {} kB\n", out.string(), picture.bodies - 1,
+          picture.joints, picture.motions.size(), (text.size() + 999) / 1000);
+  }
+  if (picture.assembled) return 0;
+  PrintError("not assembled: {}\n", picture.message);
+  return 2;
+}
+
+/// 0, or 2 when the start cannot be assembled: the picture then shows the mechanism as the file
+/// says it, with its open loops.
+int View(const ViewCommand& command) {
+  const std::string format = FormatOf(command);
+  if (format == "html" && command.svg.view != ViewNames().front()) {
+    throw ConfigError("--view is for svg: a page is turned by hand");
+  }
+  const ExplainView view = ViewOfOutput(command.all);
+  return PrintFromChild(command.mechanism.string(), command.limits,
+                        [&] { return ViewHere(command, format, view); });
+}
+
+}  // namespace
+
+void AddView(Commands& commands) {
+  auto& command = commands.Keep<ViewCommand>();
+  CLI::App* app = commands.Add("view", "Draw a mechanism: interactive HTML, SVG or text",
+                               [&](const Typed&) { return View(command); });
+  app->add_option("mechanism", command.mechanism, "Mechanism file (JSON)")->required();
+  app->add_option("--format", command.format,
+                  "html: a page for browsers, without network; svg; text: tables of places "
+                  "(default: by the ending of --out, else html)")
+      ->check(CLI::IsMember({"html", "svg", "text"}));
+  app->add_option("-o,--out", command.out,
+                  "File (default: the mechanism file's name with .html or .svg, here; text on "
+                  "the terminal)");
+  app->add_option("--view", command.svg.view, "Viewing direction of a spatial mechanism (SVG)")
+      ->check(CLI::IsMember(ViewNames()))
+      ->capture_default_str();
+  app->add_flag("--plain", command.svg.plain,
+                "svg: only the mechanism, without what the file said before the assembly and "
+                "without lines of text");
+  app->add_flag("--all", command.all, "text: every row of long tables");
+  AddLimits(app, &command.limits);
+  app->footer(
+      "The page shows each degree of freedom as a motion, redundant constraints, and what a run\n"
+      "leaves out. A mechanism whose loops do not close is drawn as the file says it, with the "
+      "gaps;\n"
+      "the exit code is then 2.\n"
+      "  loopbench view my.json\n"
+      "  loopbench view my.json --out my.svg --view side --plain");
+}
+
+}  // namespace loopbench::harness

@@ -1,0 +1,564 @@
+#include "harness/figures/judge_figures.h"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <cmath>
+#include <limits>
+#include <map>
+#include <set>
+#include <span>
+#include <string_view>
+#include <utility>
+
+#include "harness/figures/axis.h"
+#include "harness/figures/figures.h"
+#include "harness/tables/columns.h"
+#include "harness/tables/table.h"
+#include "harness/text/escape.h"
+#include "harness/text/words.h"
+
+namespace loopbench::harness {
+namespace {
+
+// All lengths in points from the lower left corner.
+constexpr double kMargin = 6.0, kRoom = 4.0;
+constexpr double kShareWidth = 26.0;   // of the numbers at the right
+constexpr double kPageHeight = 680.0;  // 240 mm, what a page has
+
+// From all rows hold to none does. Letters are white on the last two.
+constexpr std::array kShades = {"#ffffff", "#dfe5ec", "#b7c4d3", "#8599b0", "#4b6384", "#16294a"};
+
+std::size_t ShadeOf(const FoldedCell& cell) {
+  if (cell.judged == 0 || cell.holding == cell.judged) return 0;
+  return 1 + static_cast<std::size_t>(std::floor((1.0 - cell.Share()) * 4.0));
+}
+
+/// A point type of gnuplot, or a text.
+struct Glyph {
+  int point = 0;
+  double size = 0.0;
+  const char* text = "";
+  const char* meaning = "";
+};
+
+Glyph GlyphOf(CellState state) {
+  switch (state) {
+    case CellState::kHolds:
+      return {7, 0.25, "", "holds"};
+    case CellState::kStopped:
+      return {8, 0.6, "", "stopped and said why"};
+    case CellState::kLimit:
+      return {6, 0.55, "", "did not end by itself"};
+    case CellState::kInaccurate:
+      return {2, 0.55, "", "wrong without a word"};
+    case CellState::kBroken:
+      return {3, 0.6, "", "crashed, or no result"};
+    case CellState::kNotApplicable:
+      return {0, 0.0, "–", "not applicable"};
+    case CellState::kNotMeasured:
+      break;
+  }
+  return {0, 0.0, "?", "not measured"};
+}
+
+class MapPainter {
+ public:
+  MapPainter(const FailureMap& map, FigureSize size) : map_(map), groups_(Folded(map)) {
+    page_.width = std::round(PointsOf(size == FigureSize::kOneColumn ? 85.0 : 178.0));
+    const auto columns = static_cast<double>(map.rules.columns.size());
+    label_width_ = 0.34 * page_.width;
+    const double room = page_.width - 2 * kMargin - label_width_ - kShareWidth;
+    cell_width_ = std::min(room / columns, 40.0);
+    label_letters_ = static_cast<std::size_t>((label_width_ - kRoom) / kLetterWidth);
+    std::size_t head = 1, lines = 1;
+    for (const MapColumn& column : map.rules.columns)
+      head = std::max(head, CountCharacters(column.label));
+    for (const FoldedGroup& group : groups_) {
+      lines = std::max(lines, Wrapped(group.label, label_letters_).size());
+    }
+    head_height_ = kLetterWidth * static_cast<double>(head) + kRoom;
+    cell_height_ =
+        std::max({kLineHeight * static_cast<double>(lines) + 1.0, 0.8 * cell_width_, 11.0});
+    const double foot = kLineHeight * (size == FigureSize::kOneColumn ? 6.0 : 4.0) + kRoom;
+    const auto height = [&] {
+      return 2 * kMargin + 2 * kLineHeight + head_height_ + foot +
+             cell_height_ * static_cast<double>(groups_.size());
+    };
+    if (height() > kPageHeight && !groups_.empty()) {
+      cell_height_ -= (height() - kPageHeight) / static_cast<double>(groups_.size());
+      cell_height_ = std::max(cell_height_, kLineHeight);
+    }
+    page_.height = std::round(height());
+  }
+
+  MapDrawing Draw() {
+    double y = page_.height - kMargin - 0.5 * kLineHeight;
+    Text(map_.rules.title, kMargin, y, "left");
+    y -= 0.5 * kLineHeight + head_height_;
+    for (std::size_t c = 0; c < map_.rules.columns.size(); ++c) {
+      Text(map_.rules.columns[c].label, Left(c) + 0.5 * cell_width_, y + 0.5 * kRoom,
+           "left rotate by 90");
+    }
+    Text("hold", Left(map_.rules.columns.size()) + kRoom, y + 0.5 * kLineHeight, "left");
+    for (const FoldedGroup& group : groups_) {
+      y -= cell_height_;
+      DrawGroup(group, y);
+    }
+    DrawLegend(y - kRoom - 0.5 * kLineHeight);
+    return {page_, fmt::format("set encoding utf8\nset margins 0,0,0,0\nunset border\nunset tics\n"
+                               "unset key\nset xrange [0:1]\nset yrange [0:1]\n{}plot -1 notitle\n",
+                               commands_)};
+  }
+
+ private:
+  double Left(std::size_t column) const {
+    return kMargin + label_width_ + cell_width_ * static_cast<double>(column);
+  }
+
+  void Text(const std::string& text, double x, double y, std::string_view options) {
+    commands_ += TextAt(page_, text, x, y, fmt::format("{} front", options));
+  }
+
+  void Box(double x, double y, double width, double height, std::string_view look) {
+    commands_ += fmt::format(
+        "set object rect from screen {:.5f}, screen {:.5f} to screen {:.5f}, screen {:.5f} {}\n",
+        x / page_.width, y / page_.height, (x + width) / page_.width, (y + height) / page_.height,
+        look);
+  }
+
+  void Shade(double x, double y, double width, double height, std::size_t shade) {
+    Box(x, y, width, height,
+        fmt::format("fc rgb '{}' fs solid border rgb '#9aa5b1' lw 0.4", kShades[shade]));
+  }
+
+  void Draw(const Glyph& glyph, bool hollow, double x, double y, std::string_view color) {
+    if (glyph.point == 0) {
+      Text(glyph.text, x, y, fmt::format("center tc rgb '{}'", color));
+      return;
+    }
+    // hollow circles are points of the type before that of filled ones
+    commands_ += TextAt(page_, "", x, y,
+                        fmt::format("point pt {} ps {:g} lw 1.1 lc rgb '{}' front",
+                                    hollow ? glyph.point - 1 : glyph.point, glyph.size, color));
+  }
+
+  void DrawGroup(const FoldedGroup& group, double y) {
+    const std::vector<std::string> lines = Wrapped(group.label, label_letters_);
+    double at = y + 0.5 * cell_height_ + 0.5 * kLineHeight * static_cast<double>(lines.size() - 1);
+    for (const std::string& line : lines) {
+      Text(line, kMargin, at, "left");
+      at -= kLineHeight;
+    }
+    for (std::size_t c = 0; c < group.cells.size(); ++c) {
+      const FoldedCell& cell = group.cells[c];
+      const std::size_t shade = ShadeOf(cell);
+      Shade(Left(c), y, cell_width_, cell_height_, shade);
+      const bool hollow = cell.worst == CellState::kHolds && cell.in_doubt;
+      doubts_ = doubts_ || hollow;
+      Draw(GlyphOf(cell.worst), hollow, Left(c) + 0.5 * cell_width_, y + 0.5 * cell_height_,
+           shade + 2 >= kShades.size() ? "#ffffff" : "#000000");
+      if (!cell.fails_demand) continue;
+      framed_ = true;
+      Box(Left(c) + 1.0, y + 1.0, cell_width_ - 2.0, cell_height_ - 2.0,
+          "front fs empty border rgb '#000000' lw 1.6");
+    }
+    Text(fmt::format("{:.0f} %", 100.0 * group.Share()), Left(group.cells.size()) + kRoom,
+         y + 0.5 * cell_height_, "left");
+  }
+
+  // In rows: shades, then glyphs that occur.
+  void DrawLegend(double y) {
+    const double left = kMargin;
+    double x = left;
+    const auto place = [&](const std::string& text, double sample) {
+      const double width = sample + WidthOf(text) + 10.0;
+      if (x > left && x + width > page_.width) {
+        x = left;
+        y -= kLineHeight;
+      }
+      const double at = x;
+      x += width;
+      return at;
+    };
+    const auto words = [&](const std::string& text) { Text(text, place(text, 0.0), y, "left"); };
+    words("rows of the extreme that hold:");
+    constexpr const char* kShares[] = {"all", "3/4 and more", "1/2", "1/4", "fewer", "none"};
+    for (std::size_t shade = 0; shade < kShades.size(); ++shade) {
+      const double at = place(kShares[shade], 13.0);
+      Shade(at, y - 4.0, 10.0, 8.0, shade);
+      Text(kShares[shade], at + 13.0, y, "left");
+    }
+    x = left;
+    y -= kLineHeight;
+    words("the worst of them:");
+    for (const CellState state : kCellStates) {
+      const bool occurs = std::ranges::any_of(groups_, [state](const FoldedGroup& group) {
+        return std::ranges::find(group.cells, state, &FoldedCell::worst) != group.cells.end();
+      });
+      if (!occurs) continue;
+      const Glyph glyph = GlyphOf(state);
+      const double at = place(glyph.meaning, 12.0);
+      Draw(glyph, false, at + 5.0, y, "#000000");
+      Text(glyph.meaning, at + 12.0, y, "left");
+    }
+    if (doubts_) {
+      const double at = place("holds, in doubt", 12.0);
+      Draw(GlyphOf(CellState::kHolds), true, at + 5.0, y, "#000000");
+      Text("holds, in doubt", at + 12.0, y, "left");
+    }
+    if (framed_) words("frame: must hold and does not");
+  }
+
+  const FailureMap& map_;
+  std::vector<FoldedGroup> groups_;
+  GnuplotPage page_;
+  double label_width_ = 0.0, cell_width_ = 0.0, cell_height_ = 0.0, head_height_ = 0.0;
+  std::size_t label_letters_ = 0;
+  bool framed_ = false, doubts_ = false;
+  std::string commands_;
+};
+
+/// How bad a state is, for the worst of several: what is not applicable says nothing.
+int Badness(CellState state) {
+  return state == CellState::kNotApplicable ? -1 : static_cast<int>(state);
+}
+
+}  // namespace
+
+double FoldedCell::Share() const {
+  return judged == 0 ? 1.0 : static_cast<double>(holding) / static_cast<double>(judged);
+}
+
+double FoldedGroup::Share() const {
+  FoldedCell all;
+  for (const FoldedCell& cell : cells) {
+    all.holding += cell.holding;
+    all.judged += cell.judged;
+  }
+  return all.Share();
+}
+
+std::vector<FoldedGroup> Folded(const FailureMap& map) {
+  std::vector<FoldedGroup> groups;
+  for (std::size_t g = 0; g < map.cells.size(); ++g) {
+    const MapGroup& rules = map.rules.groups[g];
+    FoldedGroup& group = groups.emplace_back();
+    group.label = rules.short_label.empty() ? rules.label : rules.short_label;
+    group.rows = map.cells[g].size();
+    group.cells.resize(map.rules.columns.size());
+    for (const std::vector<MapCell>& row : map.cells[g]) {
+      for (std::size_t c = 0; c < row.size(); ++c) {
+        FoldedCell& folded = group.cells[c];
+        const MapCell& cell = row[c];
+        if (Badness(cell.state) > Badness(folded.worst)) folded.worst = cell.state;
+        folded.judged += cell.state == CellState::kNotApplicable ? 0 : 1;
+        folded.holding += cell.state == CellState::kHolds ? 1 : 0;
+        folded.in_doubt = folded.in_doubt || HoldsInDoubt(cell);
+        folded.fails_demand =
+            folded.fails_demand || (cell.demanded && cell.state != CellState::kHolds);
+      }
+    }
+  }
+  std::ranges::stable_sort(groups, {}, &FoldedGroup::Share);
+  return groups;
+}
+
+MapDrawing DrawMap(const FailureMap& map, FigureSize size) { return MapPainter(map, size).Draw(); }
+
+std::optional<std::string> WriteMapFigure(const std::filesystem::path& path, const FailureMap& map,
+                                          FigureSize size, const std::string& gnuplot) {
+  const MapDrawing drawing = DrawMap(map, size);
+  return DrawWithGnuplot(path, drawing.page, drawing.script, gnuplot);
+}
+namespace {
+
+constexpr double kNowhere = std::numeric_limits<double>::quiet_NaN();
+
+using Rows = std::vector<const TradeoffRow*>;
+
+/// Rows that agree in these keys, in the order of the figure's.
+std::map<std::string, Rows> RowsBy(std::span<const char* const> keys, const Rows& rows) {
+  std::map<std::string, Rows> groups;
+  for (const TradeoffRow* row : rows) {
+    std::string name;
+    for (const char* key : keys) name += row->record.Text(key) + '\n';
+    groups[name].push_back(row);
+  }
+  return groups;
+}
+
+std::vector<Record> RecordsOf(const Rows& rows) {
+  std::vector<Record> records;
+  for (const TradeoffRow* row : rows) records.push_back(row->record);
+  return records;
+}
+
+Rows RowsWith(const TradeoffProblem& problem, const std::string& integrator) {
+  Rows rows;
+  for (const TradeoffRow& row : problem.rows) {
+    const bool is_one = integrator.empty() || row.record.Text("integrator") == integrator;
+    if (is_one) rows.push_back(&row);
+  }
+  return rows;
+}
+
+bool IsDoubted(const TradeoffRow& row) {
+  return !HasFailed(row.record) && !row.record.Text("doubts").empty();
+}
+
+std::string LabelOfAxis(const std::string& key) {
+  const std::string unit = UnitOf(ColumnOf(key, {}));
+  return unit.empty() ? key : fmt::format("{} [{}]", key, unit);
+}
+
+/// What a run that failed had cost by then.
+double SpentBy(const TradeoffRow& row) {
+  if (std::isfinite(row.cost)) return row.cost;
+  return row.record.Number("cpu_s");
+}
+
+/// A run's error over `x`; failed runs are crosses there, or where they had come to.
+template <class X>
+void AddPoint(const TradeoffRow& row, X x, Curve* sound, Curve* doubted) {
+  if (HasFailed(row.record)) {
+    const double at = x(row);
+    sound->crosses.emplace_back(std::isfinite(at) ? at : SpentBy(row), kNowhere);
+    return;
+  }
+  Curve& curve = IsDoubted(row) ? *doubted : *sound;
+  curve.x.push_back(x(row));
+  curve.y.push_back(row.error);
+}
+
+/// All runs of a formulation in one coordinate set as marks, the doubtful ones hollow.
+void AddCloud(const Rows& rows, Figure* figure) {
+  Curve sound{.style = StyleOf(rows.front()->record), .points = true, .line = false};
+  sound.style.doubtful = false;
+  Curve doubted = sound;
+  doubted.style.doubtful = true;
+  for (const TradeoffRow* row : rows) {
+    AddPoint(
+        *row, [](const TradeoffRow& one) { return one.cost; }, &sound, &doubted);
+  }
+  if (!doubted.x.empty()) figure->curves.push_back(std::move(doubted));
+  figure->curves.push_back(std::move(sound));
+}
+
+/// A line through the compared runs of a formulation and level that no other of them beats.
+void AddBest(const Rows& rows, Figure* figure) {
+  const Record& first = rows.front()->record;
+  Curve best{.label = first.Text("formulation") + ", " + first.Text("enforcement"),
+             .style = StyleOf(first)};
+  best.style.shape = Shape::kNone;
+  best.style.width = 1.2;
+  best.style.doubtful = false;
+  double least = std::numeric_limits<double>::infinity();
+  for (const TradeoffRow* row : rows) {
+    if (HasFailed(row->record) || !row->reason.empty() || !(row->error < least)) continue;
+    least = row->error;
+    best.x.push_back(row->cost);
+    best.y.push_back(row->error);
+  }
+  if (best.x.size() > 1) figure->curves.push_back(std::move(best));
+}
+
+/// A row for what a line of its own means.
+LegendRow RowOf(const Curve& line) { return {{line.label, line.style}}; }
+
+/// From one row of the front to the next the cheaper one serves.
+Curve Stairs(const TradeoffProblem& problem) {
+  Curve stairs{.label = "Pareto front", .style = {.width = 0.6}, .merges = false};
+  for (const TradeoffRow& row : problem.rows) {
+    if (!row.on_front) continue;
+    if (!stairs.y.empty()) {
+      stairs.x.push_back(row.cost);
+      stairs.y.push_back(stairs.y.back());
+    }
+    stairs.x.push_back(row.cost);
+    stairs.y.push_back(row.error);
+  }
+  return stairs;
+}
+
+std::vector<std::string> IntegratorsOfRows(const TradeoffProblem& problem) {
+  std::set<std::string> names;
+  for (const TradeoffRow& row : problem.rows) names.insert(row.record.Text("integrator"));
+  return {names.begin(), names.end()};
+}
+
+/// Upright, at the end of what can be trusted: the least and, where runs differ, the largest.
+std::vector<Curve> TrustLines(const Rows& rows, const std::vector<Curve>& curves) {
+  double low = std::numeric_limits<double>::infinity(), high = 0.0;
+  for (const Curve& curve : curves) {
+    for (const double value : curve.y) {
+      if (value > 0.0) low = std::min(low, value), high = std::max(high, value);
+    }
+  }
+  std::set<double> ends;
+  for (const TradeoffRow* row : rows) {
+    const double end = row->record.Number("trust_horizon");
+    if (std::isfinite(end)) ends.insert(end);
+  }
+  std::vector<Curve> lines;
+  if (!(high > low)) return lines;
+  while (ends.size() > 2) ends.erase(std::next(ends.begin()));
+  for (const double end : ends) {
+    lines.push_back({.label = lines.empty() ? "trust horizon" : "",
+                     .x = {end, end},
+                     .y = {low, high},
+                     .style = {.color = "#606060", .width = 1.0},
+                     .merges = false});
+  }
+  return lines;
+}
+
+/// Whether anything of it can be drawn on logarithmic axes, or over time.
+bool HasPoint(const Curve& curve) {
+  for (std::size_t i = 0; i < curve.x.size(); ++i) {
+    if (std::isfinite(curve.x[i]) && std::isfinite(curve.y[i]) && curve.y[i] > 0.0) return true;
+  }
+  return false;
+}
+
+/// For a file: letters, digits and '-'.
+std::string Slug(const std::string& text) {
+  std::string slug;
+  for (const char c : text) {
+    const bool plain = (c >= 'a' && c <= 'z') || (c >= 'A' && c <= 'Z') || (c >= '0' && c <= '9') ||
+                       c == '.' || c == '_' || c == '+';
+    if (plain) slug += c;
+    if (!plain && !slug.empty() && slug.back() != '-') slug += '-';
+  }
+  return slug;
+}
+
+}  // namespace
+
+Figure WorkPrecisionFigure(const Tradeoff& tradeoff, const TradeoffProblem& problem) {
+  Figure figure{.title = problem.name + ": what accuracy costs",
+                .x_label = LabelOfAxis(tradeoff.cost),
+                .y_label = LabelOfAxis(tradeoff.error),
+                .log_x = true,
+                .log_y = true,
+                .curves = {}};
+  const Rows rows = RowsWith(problem, "");
+  const std::vector<Record> records = RecordsOf(rows);
+  figure.legend = ChannelLegend(records);
+  constexpr const char* kHueAndMark[] = {"formulation", "coordinates"};
+  constexpr const char* kHueAndDash[] = {"formulation", "enforcement"};
+  for (const auto& [name, own] : RowsBy(kHueAndMark, rows)) AddCloud(own, &figure);
+  for (const auto& [name, own] : RowsBy(kHueAndDash, rows)) AddBest(own, &figure);
+  figure.curves.push_back(Stairs(problem));
+  figure.legend.push_back(RowOf(figure.curves.back()));
+  return figure;
+}
+
+Figure ToleranceFigure(const Tradeoff& tradeoff, const TradeoffProblem& problem,
+                       const std::string& integrator) {
+  Figure figure{
+      .title = fmt::format("{}, {}: is the tolerance honoured?", problem.name, integrator),
+      .x_label = "tolerance",
+      .y_label = LabelOfAxis(tradeoff.error),
+      .log_x = true,
+      .log_y = true,
+      .curves = {}};
+  Rows rows = RowsWith(problem, integrator);
+  std::erase_if(rows,
+                [](const TradeoffRow* row) { return std::isnan(row->record.Number("rtol")); });
+  if (rows.empty()) return figure;
+  const auto rtol = [](const TradeoffRow& row) { return row.record.Number("rtol"); };
+  std::ranges::stable_sort(rows, std::less(), [&](const TradeoffRow* row) { return rtol(*row); });
+  const std::vector<Record> records = RecordsOf(rows);
+  figure.legend = ChannelLegend(records);
+  for (const auto& [name, own] : RowsBy(kChannelKeys, rows)) {
+    Curve sound{.label = MethodLabel(own.front()->record, records),
+                .style = StyleOf(own.front()->record),
+                .points = true};
+    sound.style.doubtful = false;
+    Curve doubted = sound;
+    doubted.label = "";
+    doubted.line = false;
+    doubted.style.doubtful = true;
+    for (const TradeoffRow* row : own) AddPoint(*row, rtol, &sound, &doubted);
+    // several runs at one tolerance are a cloud, through which no line goes
+    std::vector<double> places = sound.x;
+    sound.line = std::ranges::adjacent_find(places) == places.end();
+    if (!doubted.x.empty()) figure.curves.push_back(std::move(doubted));
+    figure.curves.push_back(std::move(sound));
+  }
+  const bool is_length =
+      IsErrorOfPositions(tradeoff.error) || UnitOf(ColumnOf(tradeoff.error, {})) == "m";
+  const double length = rows.front()->record.Number("link_length");
+  const double scale = is_length && length > 0.0 ? length : 1.0;
+  Curve honoured{.label = is_length ? "error = tolerance x link" : "error = tolerance"};
+  honoured.style.width = 0.6;
+  honoured.merges = false;
+  for (const TradeoffRow* row : {rows.front(), rows.back()}) {
+    honoured.x.push_back(rtol(*row));
+    honoured.y.push_back(scale * rtol(*row));
+  }
+  figure.legend.push_back(RowOf(honoured));
+  figure.curves.push_back(std::move(honoured));
+  return figure;
+}
+
+Figure ErrorOverTimeFigure(const TradeoffProblem& problem, const std::string& integrator) {
+  double finest = std::numeric_limits<double>::infinity();
+  Rows rows;
+  for (const TradeoffRow* row : RowsWith(problem, integrator)) {
+    const double rtol = row->record.Number("rtol");
+    if (row->record.Numbers("series.error").empty() || !(rtol <= finest)) continue;
+    if (rtol < finest) rows.clear();
+    finest = rtol;
+    rows.push_back(row);
+  }
+  Figure figure{.title = fmt::format("{}, {}, rtol {}: error over time", problem.name, integrator,
+                                     NumberText(finest)),
+                .x_label = "time [s]",
+                .y_label = "error of positions [m]",
+                .log_x = false,
+                .log_y = true,
+                .curves = {}};
+  const std::vector<Record> records = RecordsOf(rows);
+  if (!records.empty()) figure.legend = ChannelLegend(records);
+  for (const Record& record : records) {
+    Curve curve{.label = MethodLabel(record, records),
+                .x = record.Numbers("series.error_t"),
+                .y = record.Numbers("series.error"),
+                .style = StyleOf(record)};
+    curve.ends_early = HasFailed(record);
+    figure.curves.push_back(std::move(curve));
+  }
+  for (Curve& line : TrustLines(rows, figure.curves)) {
+    if (!line.label.empty()) figure.legend.push_back(RowOf(line));
+    figure.curves.push_back(std::move(line));
+  }
+  return figure;
+}
+
+std::vector<NamedFigure> TradeoffFigures(const Tradeoff& tradeoff) {
+  std::vector<NamedFigure> figures;
+  std::set<std::string> taken;
+  const auto add = [&](const std::string& kind, const std::string& what, Figure figure) {
+    // a failed run alone has no error that an axis could show, nor have stairs or lines a meaning
+    const bool anything = std::ranges::any_of(figure.curves, [](const Curve& curve) {
+      return (curve.merges || !curve.line) && HasPoint(curve);
+    });
+    if (!anything) return;
+    std::string name = kind + Slug(what);
+    if (!taken.insert(name).second) name = kind + what;  // with a hash in its file's name
+    figures.push_back({name, std::move(figure)});
+  };
+  for (const TradeoffProblem& problem : tradeoff.problems) {
+    add("work-precision-", problem.name, WorkPrecisionFigure(tradeoff, problem));
+    for (const std::string& integrator : IntegratorsOfRows(problem)) {
+      const std::string what = problem.name + " " + integrator;
+      add("tolerance-", what, ToleranceFigure(tradeoff, problem, integrator));
+      add("error-", what, ErrorOverTimeFigure(problem, integrator));
+    }
+  }
+  return figures;
+}
+
+}  // namespace loopbench::harness

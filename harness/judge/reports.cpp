@@ -1,0 +1,547 @@
+#include "harness/judge/reports.h"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <cmath>
+#include <cstdint>
+#include <functional>
+#include <map>
+#include <optional>
+#include <set>
+#include <vector>
+
+#include "harness/judge/tradeoff.h"
+#include "harness/tables/columns.h"
+#include "harness/text/escape.h"
+#include "harness/text/files.h"
+
+namespace loopbench::harness {
+namespace {
+
+/// Fields of one line; a quoted one may have commas and doubled quotes. Texts have no line ends
+/// (EscapeCsv).
+std::vector<std::string> FieldsOf(std::string_view line) {
+  std::vector<std::string> fields(1);
+  bool quoted = false;
+  for (std::size_t i = 0; i < line.size(); ++i) {
+    const char c = line[i];
+    if (c == '"' && quoted && i + 1 < line.size() && line[i + 1] == '"') {
+      fields.back() += line[++i];
+    } else if (c == '"') {
+      quoted = !quoted;
+    } else if (c == ',' && !quoted) {
+      fields.emplace_back();
+    } else if (c != '\r') {
+      fields.back() += c;
+    }
+  }
+  return fields;
+}
+
+/// As the file has it.
+std::string Written(const std::string& label) { return FieldsOf(EscapeCsv(label)).front(); }
+
+std::optional<CellState> StateNamed(std::string_view name) {
+  const auto* state =
+      std::ranges::find(kCellStates, name, [](CellState one) { return ToString(one); });
+  if (state == kCellStates.end()) return std::nullopt;
+  return *state;
+}
+
+using Place = std::vector<std::string>;  // group, row, column
+
+std::map<Place, MapCell*> PlacesOf(FailureMap& map) {
+  std::map<Place, MapCell*> places;
+  for (std::size_t g = 0; g < map.cells.size(); ++g) {
+    const MapGroup& group = map.rules.groups[g];
+    for (std::size_t r = 0; r < map.cells[g].size(); ++r) {
+      for (std::size_t c = 0; c < map.cells[g][r].size(); ++c) {
+        places[{Written(group.label), Written(group.rows[r].label),
+                Written(map.rules.columns[c].label)}] = &map.cells[g][r][c];
+      }
+    }
+  }
+  return places;
+}
+
+}  // namespace
+
+FailureMap MapFromCsv(const MapRules& rules, std::string_view csv, const std::string& file) {
+  FailureMap map = MakeFailureMap(rules, {});
+  map.remarks.clear();
+  std::map<Place, MapCell*> places = PlacesOf(map);
+  std::vector<std::string> heading;
+  std::size_t number = 0;
+  for (std::size_t start = 0; start < csv.size(); ++number) {
+    const std::size_t end = std::min(csv.find('\n', start), csv.size());
+    const std::string_view line = csv.substr(start, end - start);
+    start = end + 1;
+    if (line.empty() || line.front() == '#') continue;
+    const std::vector<std::string> fields = FieldsOf(line);
+    const auto fail = [&](const std::string& found, const char* expected) {
+      throw ConfigError(
+          fmt::format("{}:{}: found {}, expected {}", file, number + 1, found, expected));
+    };
+    if (heading.empty()) {
+      heading = fields;
+      continue;
+    }
+    if (fields.size() != heading.size()) {
+      fail(fmt::format("{} fields", fields.size()), "as many as in the heading");
+    }
+    const auto field = [&](const char* key) {
+      const auto at = std::ranges::find(heading, key);
+      if (at == heading.end()) {
+        fail(fmt::format("no column \"{}\"", key), "failure-map.csv of \"loopbench map\"");
+      }
+      return fields[static_cast<std::size_t>(at - heading.begin())];
+    };
+    const auto cell = places.find({field("group"), field("row"), field("column")});
+    if (cell == places.end()) {
+      fail(
+          fmt::format("\"{}\" of \"{}\" for \"{}\"", field("row"), field("group"), field("column")),
+          "each cell of the rules once");
+    }
+    const auto state = StateNamed(field("state"));
+    if (!state) fail(fmt::format("state \"{}\"", field("state")), "a state of cells");
+    cell->second->state = *state;
+    cell->second->demanded = field("must_hold") == "true";
+    cell->second->doubted = 0;
+    places.erase(cell);
+  }
+  if (!places.empty()) {
+    const Place& place = places.begin()->first;
+    throw ConfigError(
+        fmt::format("{}: found no \"{}\" of \"{}\" for \"{}\", expected each cell of the rules",
+                    file, place[1], place[0], place[2]));
+  }
+  return map;
+}
+namespace {
+
+std::string ColumnKey(std::size_t column) { return fmt::format("column{}", column); }
+
+// `shown`, the number and the count, as far as there are any.
+std::string MapCellText(const MapCell& cell, const std::string& shown) {
+  std::string text = shown;
+  for (const std::string& part : {DecidingNumber(cell), HoldingCount(cell)}) {
+    if (!part.empty()) text += " " + part;
+  }
+  return text;
+}
+
+// Short, because a terminal is narrow: numbers without names and units, methods by letter.
+std::string TerminalCell(const MapCell& cell) {
+  if (cell.state == CellState::kNotApplicable) return "-";
+  MapCell plain = cell;
+  plain.decided.name = plain.decided.unit = "";
+  if (cell.state == CellState::kNotMeasured) return MapCellText(plain, "?");
+  if (cell.state != CellState::kHolds) return MapCellText(plain, cell.word);
+  return MapCellText(plain, ClassText(cell) == "holds" ? "ok" : "ok: " + cell.outcome);
+}
+
+std::string MethodLetter(std::size_t column) {
+  constexpr std::size_t kLetters = 26;
+  const std::string letter(1, static_cast<char>('A' + column % kLetters));
+  return column < kLetters ? letter : fmt::format("{}{}", letter, column / kLetters);
+}
+
+// The table's cells are texts that begin with their class.
+std::string MapColour(const Record& row, const TableColumn& column) {
+  const std::string text = row.Text(column.key);
+  const std::string word = text.substr(0, text.find(' '));
+  for (const RunEnding& ending : kRunEndings) {
+    if (word != ending.word) continue;
+    return ending.state == CellState::kStopped ? "33"  // yellow
+           : ending.state == CellState::kLimit ? "35"  // magenta
+                                               : "1;31";
+  }
+  if (word == "inaccurate") return "31";
+  return word == "ok" || word == "ok:" ? "32" : "";
+}
+
+// The rows of one group under the methods.
+void AddMapRows(const FailureMap& map, std::size_t group,
+                const std::function<std::string(const MapCell&)>& text, Table* table) {
+  for (std::size_t r = 0; r < map.cells[group].size(); ++r) {
+    Record row;
+    row.Set("group", map.rules.groups[group].label);
+    row.Set("row", map.rules.groups[group].rows[r].label);
+    for (std::size_t c = 0; c < map.rules.columns.size(); ++c) {
+      row.Set(ColumnKey(c), text(map.cells[group][r][c]));
+    }
+    table->rows.push_back(std::move(row));
+  }
+}
+
+std::vector<TableColumn> MatrixColumns(const FailureMap& map, bool letters) {
+  std::vector<TableColumn> columns = {{"row", "extreme"}};
+  for (std::size_t c = 0; c < map.rules.columns.size(); ++c) {
+    columns.push_back({ColumnKey(c), letters ? MethodLetter(c) : map.rules.columns[c].label});
+  }
+  return columns;
+}
+
+Table LimitTable(const FailureMap& map) {
+  Table table{
+      .title = "Limits",
+      .columns = {
+          {"row", "extreme"}, {"right", "right ending"}, {"demands", "decides"}, {"why", "why"}}};
+  for (const MapGroup& group : map.rules.groups) {
+    for (const MapRow& row : group.rows) {
+      std::vector<std::string> demands;
+      for (const Demand& demand : row.decides) demands.push_back(ToText(demand));
+      AddRow({row.label, fmt::format("{}", fmt::join(row.right, " or ")),
+              fmt::format("{}", fmt::join(demands, "; ")), row.why},
+             &table);
+    }
+  }
+  return table;
+}
+
+// Cells with a reason to be read: all but those that hold.
+Table DetailTable(const FailureMap& map) {
+  Table table{.title = "Cells that do not hold",
+              .columns = {{"row", "extreme"},
+                          {"column", "method"},
+                          {"class", "class"},
+                          {"number", "number"},
+                          {"count", "hold"},
+                          {"reason", "why"}}};
+  EachCell(map, [&table](const MapGroup&, const MapRow& row, const MapColumn& column,
+                         const MapCell& cell) {
+    if (cell.state == CellState::kHolds) return;
+    AddRow({row.label, column.label, cell.word + (cell.demanded ? " (must hold)" : ""),
+            DecidingNumber(cell), HoldingCount(cell), cell.reason},
+           &table);
+  });
+  return table;
+}
+
+// Cells that hold with a run that trust does not let read "ok": each to be explained.
+Table DoubtTable(const FailureMap& map) {
+  Table table{
+      .title = "Cells that hold, with runs in doubt",
+      .columns = {
+          {"row", "extreme"}, {"column", "method"}, {"count", "in doubt"}, {"doubts", "doubts"}}};
+  EachCell(map, [&table](const MapGroup&, const MapRow& row, const MapColumn& column,
+                         const MapCell& cell) {
+    if (!HoldsInDoubt(cell)) return;
+    AddRow(
+        {row.label, column.label, fmt::format("{} of {}", cell.doubted, cell.holding), cell.doubts},
+        &table);
+  });
+  return table;
+}
+
+}  // namespace
+
+std::string CountDoubts(const FailureMap& map) {
+  std::size_t holding = 0, doubted = 0;
+  EachCell(map, [&](const MapGroup&, const MapRow&, const MapColumn&, const MapCell& cell) {
+    holding += cell.state == CellState::kHolds ? 1 : 0;
+    doubted += HoldsInDoubt(cell) ? 1 : 0;
+  });
+  return fmt::format("{} of {} cells that hold have runs in doubt", doubted, holding);
+}
+
+std::string CountCells(const FailureMap& map) {
+  std::string text;
+  std::size_t total = 0;
+  for (const CellState state : kCellStates) {
+    std::size_t count = 0;
+    EachCell(map, [&](const MapGroup&, const MapRow&, const MapColumn&, const MapCell& cell) {
+      count += cell.state == state ? 1 : 0;
+    });
+    total += count;
+    if (count > 0) {
+      text += fmt::format("{} {} {}", text.empty() ? "" : ",", count, ToString(state));
+    }
+  }
+  return fmt::format("{} cells:{}", total, text);
+}
+
+Table MapTable(const FailureMap& map) {
+  Table table;
+  table.title = map.rules.title;
+  table.columns = MatrixColumns(map, true);
+  table.columns.push_back({"group", "group"});
+  table.group = "group";
+  table.colour = &MapColour;
+  for (std::size_t g = 0; g < map.cells.size(); ++g) AddMapRows(map, g, TerminalCell, &table);
+  for (std::size_t c = 0; c < map.rules.columns.size(); ++c) {
+    table.notes.push_back(fmt::format("{}  {}", MethodLetter(c), map.rules.columns[c].label));
+  }
+  table.notes.push_back("");
+  table.notes.push_back(CountCells(map));
+  table.notes.push_back(CountDoubts(map));
+  for (const std::string& remark : map.remarks) table.notes.push_back("note: " + remark);
+  return table;
+}
+
+Table MapCellTable(const FailureMap& map) {
+  Table table;
+  for (const char* key :
+       {"group", "row",       "column", "state",   "class",     "outcome", "measure",
+        "value", "unit",      "limit",  "ratio",   "t_reached", "holding", "records",
+        "cases", "must_hold", "reason", "case_id", "doubted",   "doubts"}) {
+    table.columns.push_back({key, key, Format::kShortest});
+  }
+  const auto count = [](std::size_t n) { return static_cast<std::int64_t>(n); };
+  EachCell(map, [&](const MapGroup& group, const MapRow& row, const MapColumn& column,
+                    const MapCell& cell) {
+    const Judged& decided = cell.decided;
+    AddRow({group.label,         row.label,
+            column.label,        std::string(ToString(cell.state)),
+            cell.word,           cell.outcome,
+            decided.measure,     decided.value,
+            decided.unit,        decided.limit,
+            decided.ratio,       cell.t_reached,
+            count(cell.holding), count(cell.records),
+            count(cell.cases),   cell.demanded,
+            cell.reason,         cell.case_id,
+            count(cell.doubted), cell.doubts},
+           &table);
+  });
+  return table;
+}
+
+std::string MapMarkdown(const FailureMap& map, const std::vector<std::string>& notes) {
+  std::string page = fmt::format("# {}\n\n", EscapeMarkdown(map.rules.title));
+  if (!map.rules.comment.empty()) page += EscapeMarkdownParagraph(map.rules.comment) + "\n\n";
+  page += CountCells(map) + ". " + CountDoubts(map) + ".\n\n";
+  for (const std::string& remark : map.remarks) {
+    page += "Note: " + EscapeMarkdown(remark) + ".\n\n";
+  }
+  for (std::size_t g = 0; g < map.cells.size(); ++g) {
+    Table table;
+    table.title = map.rules.groups[g].label;
+    table.columns = MatrixColumns(map, false);
+    AddMapRows(
+        map, g, [](const MapCell& cell) { return MapCellText(cell, ClassText(cell)); }, &table);
+    page += ToMarkdown(table) + "\n";
+  }
+  page += ToMarkdown(LimitTable(map)) + "\n";
+  Table details = DetailTable(map);
+  if (!details.rows.empty()) page += ToMarkdown(details);
+  Table doubts = DoubtTable(map);
+  if (!doubts.rows.empty()) page += "\n" + ToMarkdown(doubts);
+  for (const std::string& note : notes) page += "\n" + EscapeMarkdownParagraph(note) + "\n";
+  return page;
+}
+namespace {
+
+constexpr const char* kNobody = "none reached it";
+
+/// Green on the front, yellow in doubt, red where the run failed.
+std::string FrontColour(const Record& row, const TableColumn& column) {
+  if (column.key == "front") return row.Text("front") == "*" ? "32" : "";
+  if (column.key != "reason") return "";
+  if (HasFailed(row)) return "31";
+  return row.Text("doubts").empty() ? "" : "33";
+}
+
+/// Keys that name the cases of a problem: not what all rows of it share.
+bool NamesMethod(const std::string& key) {
+  static const std::set<std::string> others = {"kind", "experiment", "mechanism", "horizon",
+                                               "atol"};
+  return !others.contains(key);
+}
+
+std::vector<Record> RecordsOfRows(const Tradeoff& tradeoff) {
+  std::vector<Record> records;
+  for (const TradeoffProblem& problem : tradeoff.problems) {
+    for (const TradeoffRow& row : problem.rows) records.push_back(row.record);
+  }
+  return records;
+}
+
+bool IsAlike(const std::vector<Record>& records, const std::string& key) {
+  return std::ranges::all_of(
+      records, [&](const Record& record) { return record.Text(key) == records.front().Text(key); });
+}
+
+/// The columns that name methods: with short words where the terminal's tables have them, and
+/// without those in which no row differs, unless it is the formulation; or all.
+std::vector<TableColumn> MethodColumns(const std::vector<Record>& records, bool compact) {
+  std::vector<TableColumn> columns;
+  for (const std::string& key : CaseKeysOf(records)) {
+    if (!NamesMethod(key)) continue;
+    if (compact && key != "formulation" && IsAlike(records, key)) continue;
+    TableColumn column = ColumnOf(key, records);
+    const std::vector<TableColumn>& known = CompactCaseColumns();
+    const auto brief = std::ranges::find(known, key, &TableColumn::key);
+    if (compact && brief != known.end()) column = *brief;
+    columns.push_back(column);
+  }
+  return columns;
+}
+
+/// The row of a table: the record with the problem and what was made of it.
+Record ShownRow(const TradeoffProblem& problem, const TradeoffRow& row) {
+  Record shown = row.record;
+  shown.Set("problem", problem.name);
+  shown.Set("front", std::string(row.on_front ? "*" : ""));
+  shown.Set("error", std::isfinite(row.error) ? Value(row.error) : Value());
+  shown.Set("error_is_bound", row.is_bound);
+  shown.Set("cost", std::isfinite(row.cost) ? Value(row.cost) : Value());
+  shown.Set("reason", row.reason);
+  return shown;
+}
+
+std::string UnitOfKey(const std::string& key) { return UnitOf(ColumnOf(key, {})); }
+
+std::string WithUnit(const std::string& words, const std::string& key) {
+  const std::string unit = UnitOfKey(key);
+  return unit.empty() ? words : fmt::format("{} [{}]", words, unit);
+}
+
+Format FormatOfCost(const Tradeoff& tradeoff) {
+  const Measure* measure = FindMeasure(tradeoff.cost);
+  return measure == nullptr || measure->heading.words.empty() ? Format::kShortest
+                                                              : measure->heading.format;
+}
+
+std::vector<TableColumn> FullColumns(const Tradeoff& tradeoff, const std::vector<Record>& records) {
+  std::vector<TableColumn> columns = {{"problem", "problem"}};
+  for (TableColumn& column : MethodColumns(records, false)) columns.push_back(std::move(column));
+  columns.push_back({"error", WithUnit("error", tradeoff.error), Format::kScientific});
+  columns.push_back({"error_is_bound", "is bound"});
+  columns.push_back({"cost", WithUnit("cost", tradeoff.cost), FormatOfCost(tradeoff)});
+  columns.push_back({"front", "front"});
+  for (const char* key : {"outcome", "doubts", "reference_error", "trust_horizon", "steps",
+                          "rejected", "rhs_evaluations", "aa_spread_wall"}) {
+    if (std::ranges::any_of(records, [&](const Record& one) { return one.Find(key) != nullptr; })) {
+      columns.push_back(ColumnOf(key, records));
+    }
+  }
+  columns.push_back({"reason", "not compared because"});
+  return columns;
+}
+
+std::vector<TableColumn> FrontColumns(const Tradeoff& tradeoff,
+                                      const std::vector<Record>& records) {
+  std::vector<TableColumn> columns = {{"front", ""}};
+  for (TableColumn& column : MethodColumns(records, true)) columns.push_back(std::move(column));
+  columns.push_back({"error", WithUnit("error", tradeoff.error), Format::kScientific});
+  columns.push_back({"cost", WithUnit("cost", tradeoff.cost), FormatOfCost(tradeoff)});
+  columns.push_back({"reason", "not compared because"});
+  return columns;
+}
+
+/// "accel joint ode45 1e-06": the method within a formulation, by what tells rows apart.
+std::string MethodText(const Record& record, const std::vector<TableColumn>& columns) {
+  std::string text;
+  for (const TableColumn& column : columns) {
+    const std::string cell = Cell(record, column);
+    if (column.key == "formulation" || cell.empty()) continue;
+    const bool is_bare = column.format == Format::kText || column.key == "rtol";
+    text += fmt::format("{}{}{}", text.empty() ? "" : " ", is_bare ? "" : column.key + " ", cell);
+  }
+  return text;
+}
+
+const TradeoffRow& RowOf(const TradeoffProblem& problem, const Cheapest& one) {
+  return problem.rows[static_cast<std::size_t>(one.row)];
+}
+
+std::vector<std::string> FormulationsOfAll(const Tradeoff& tradeoff) {
+  std::set<std::string> names;
+  for (const TradeoffProblem& problem : tradeoff.problems) {
+    for (const Cheapest& one : problem.cheapest) names.insert(one.formulation);
+  }
+  return {names.begin(), names.end()};
+}
+
+}  // namespace
+
+Table TradeoffTable(const Tradeoff& tradeoff, const TradeoffView& view) {
+  const std::vector<Record> records = RecordsOfRows(tradeoff);
+  Table table;
+  table.title = fmt::format("{} against {}", tradeoff.error, tradeoff.cost);
+  table.group = "problem";
+  table.colour = &FrontColour;
+  table.columns = view.compact ? FrontColumns(tradeoff, records) : FullColumns(tradeoff, records);
+  std::size_t hidden = 0;
+  for (const TradeoffProblem& problem : tradeoff.problems) {
+    for (const TradeoffRow& row : problem.rows) {
+      if (view.all || row.on_front || !row.reason.empty()) {
+        table.rows.push_back(ShownRow(problem, row));
+      } else {
+        ++hidden;
+      }
+    }
+  }
+  table.notes = tradeoff.remarks;
+  table.notes.push_back(
+      "* on the Pareto front: no compared row is better in one and as good in the other");
+  if (hidden > 0) {
+    table.notes.push_back(fmt::format("{} more row{} compared and beaten (--all shows them)",
+                                      hidden, hidden == 1 ? " was" : "s were"));
+  }
+  return table;
+}
+
+Table OverviewTable(const Tradeoff& tradeoff) {
+  Table table;
+  table.title =
+      fmt::format("The cheapest method for an error: {}, and its ratio to the cheapest of all",
+                  WithUnit(tradeoff.cost, tradeoff.cost));
+  table.columns = {{"problem", "problem"},
+                   {"error_class", WithUnit("error <=", tradeoff.error), Format::kShortest}};
+  for (const std::string& name : FormulationsOfAll(tradeoff)) table.columns.push_back({name, name});
+  for (const TradeoffProblem& problem : tradeoff.problems) {
+    Record* row = nullptr;
+    double last = std::numeric_limits<double>::quiet_NaN();
+    for (const Cheapest& one : problem.cheapest) {
+      if (one.error_class != last) {
+        row = &table.rows.emplace_back();
+        row->Set("problem", problem.name);
+        row->Set("error_class", last = one.error_class);
+      }
+      row->Set(one.formulation,
+               one.row < 0 ? std::string(kNobody)
+                           : fmt::format("{:.3g} ({:.2f})", RowOf(problem, one).cost, one.ratio));
+    }
+  }
+  return table;
+}
+
+Table CheapestTable(const Tradeoff& tradeoff) {
+  const std::vector<TableColumn> naming = MethodColumns(RecordsOfRows(tradeoff), true);
+  Table table;
+  table.title = "The cheapest methods";
+  table.columns = {{"problem", "problem"},
+                   {"error_class", WithUnit("error <=", tradeoff.error), Format::kShortest},
+                   {"formulation", "formulation"},
+                   {"method", "method"},
+                   {"error", WithUnit("error", tradeoff.error), Format::kScientific},
+                   {"cost", WithUnit("cost", tradeoff.cost), FormatOfCost(tradeoff)},
+                   {"ratio", "to the cheapest", Format::kExponent}};
+  for (const TradeoffProblem& problem : tradeoff.problems) {
+    for (const Cheapest& one : problem.cheapest) {
+      if (one.row < 0) {
+        AddRow({problem.name, one.error_class, one.formulation, std::string(kNobody)}, &table);
+        continue;
+      }
+      const TradeoffRow& row = RowOf(problem, one);
+      AddRow({problem.name, one.error_class, one.formulation, MethodText(row.record, naming),
+              row.error, row.cost, one.ratio},
+             &table);
+    }
+  }
+  return table;
+}
+
+std::string TradeoffMarkdown(const Tradeoff& tradeoff, const std::vector<std::string>& notes) {
+  Table overview = OverviewTable(tradeoff);
+  overview.notes = tradeoff.remarks;
+  for (std::string& line : FairnessStatement(tradeoff)) overview.notes.push_back(std::move(line));
+  Table rows = TradeoffTable(tradeoff, {.compact = false, .all = true});
+  rows.notes.insert(rows.notes.end(), notes.begin(), notes.end());
+  return ToMarkdown(overview) + "\n" + ToMarkdown(CheapestTable(tradeoff)) + "\n" +
+         ToMarkdown(rows);
+}
+
+}  // namespace loopbench::harness

@@ -1,0 +1,158 @@
+// The size of each module and of all production code, held to budgets.
+//
+// A budget is the size of the module when somebody last made it smaller, plus at most 1 %. Whoever
+// makes a module smaller lowers its budget.
+#include <fmt/format.h>
+#include <gtest/gtest.h>
+
+#include <algorithm>
+#include <filesystem>
+#include <map>
+#include <set>
+#include <string>
+#include <string_view>
+
+#include "harness/text/files.h"
+#include "tests/harness/include_arrows.h"
+#include "tests/harness/places.h"
+
+namespace loopbench::architecture {
+namespace budgets_test {
+
+namespace fs = std::filesystem;
+using harness::kRoot;
+
+struct Size {
+  int lines = 0, files = 0;
+  int arrows = 0;  ///< other modules that files of this one include
+};
+
+struct Budget {
+  std::string_view module;  ///< its folder; "": all of them
+  Size allowed;
+  int goal;  ///< lines that the features of the module need; all modules: 380 files, 65 arrows
+};
+
+// clang-format off
+constexpr Budget kBudgets[] = {
+    // module                   lines, files, arrows   goal [lines]
+    {"mechanism/algebra",       { 2080,  22,   0},  1900},
+    {"mechanism/description",   { 2000,  28,   1},  1750},
+    {"mechanism/model",         { 2880,  22,   2},  2300},
+    {"mechanism/loops",         { 2920,  23,   2},  1900},
+    {"mechanism/start",         { 1550,  14,   4},   700},
+    {"mechanism/formulation",   { 1930,  19,   4},  1500},
+    {"mechanism/simplify",      { 3250,  25,   5},  2600},
+    {"odca",                    { 6410,  47,   5},  3900},
+    {"lagrange",                {  377,   4,   4},   350},
+    {"reduction",               { 1610,  12,   4},  1350},
+    {"harness/text",            { 1570,  12,   0},   900},
+    {"harness/json",            { 2100,   9,   1},  1300},
+    {"harness/record",          { 1510,  10,   3},  1200},
+    {"harness/store",           { 1670,   8,   3},  1300},
+    {"harness/config",          { 5680,  24,  10},  4000},
+    {"harness/analysis",        { 1580,   6,   6},  1200},
+    {"harness/generate",        { 1880,  10,   7},  1230},
+    {"harness/integrator",      { 1330,   7,   4},   900},
+    {"harness/reference",       {  920,   4,   4},   800},
+    {"harness/trajectory",      { 2300,  10,  11},  1750},
+    {"harness/observers",       { 1100,   4,   7},  1000},
+    {"harness/run",             { 1700,  12,  14},  1800},
+    {"harness/precision",       { 1560,  12,  10},  1400},
+    {"harness/isolation",       {  790,   2,   4},   900},
+    {"harness/timing",          { 1350,  10,   7},  1050},
+    {"harness/suite",           { 2320,  10,  16},  1500},
+    {"harness/cluster",         {  496,   2,   5},   420},
+    {"harness/advise",          {  657,   2,   8},  1000},
+    {"harness/tables",          { 2080,  10,   5},  1500},
+    {"harness/judge",           { 3680,  17,   6},  2700},
+    {"harness/figures",         { 3040,  12,   7},  1900},
+    {"harness/view",            { 2490,  10,   8},  2050},
+    {"harness/exchange",        { 7340,  30,  10},  5000},
+    {"harness/report",          { 1100,   4,  10},  1200},
+    {"harness/history",         { 1970,  10,   7},  1500},
+    {"harness/cli",             { 8080,  31,  29},  3600},
+    {"peers",                   {  690,  10,   5},   650},
+    {"",                        {86100, 504, 238}, 62000}
+};
+// clang-format on
+
+/// "" where `found` keeps the budget.
+std::string Overrun(const Budget& budget, const Size& found) {
+  std::string over;
+  const auto compare = [&over](const char* what, int is, int allowed) {
+    if (is > allowed) over += fmt::format(", {} {} (allowed {})", is, what, allowed);
+  };
+  compare("lines", found.lines, budget.allowed.lines);
+  compare("files", found.files, budget.allowed.files);
+  compare("include arrows", found.arrows, budget.allowed.arrows);
+  if (over.empty()) return "";
+  return fmt::format("{}: found{}; the goal is {} lines",
+                     budget.module.empty() ? "all modules" : budget.module, over.substr(1),
+                     budget.goal);
+}
+
+/// The module of a file named from the root, "" outside all.
+std::string ModuleOf(std::string_view path) {
+  for (const Budget& budget : kBudgets) {
+    const std::string_view name = budget.module;
+    if (!name.empty() && path.starts_with(name) && path.substr(name.size()).starts_with('/')) {
+      return std::string(name);
+    }
+  }
+  return "";
+}
+
+/// By module; under "" the sum.
+std::map<std::string, Size> Sizes() {
+  std::map<std::string, Size> sizes;
+  std::map<std::string, std::set<std::string>> included;
+  for (const char* top : {"mechanism", "odca", "lagrange", "reduction", "harness", "peers"}) {
+    for (const fs::directory_entry& entry : fs::recursive_directory_iterator(kRoot / top)) {
+      const std::string ending = entry.path().extension().string();
+      if (ending != ".h" && ending != ".cpp" && ending != ".inc") continue;
+      const std::string text = harness::ReadFile(entry.path());
+      const std::string path = entry.path().lexically_relative(kRoot).generic_string();
+      const std::string module = ModuleOf(path);
+      EXPECT_NE(module, "") << path << ": no module of kBudgets";
+      for (const std::string& name : {module, std::string()}) {
+        sizes[name].lines += static_cast<int>(std::ranges::count(text, '\n'));
+        ++sizes[name].files;
+      }
+      for (const std::string& header : Includes(text)) {
+        const std::string other = ModuleOf(header.substr(1));
+        if (other != module && !other.empty()) included[module].insert(other);
+      }
+    }
+  }
+  for (const auto& [module, others] : included) {
+    sizes[module].arrows = static_cast<int>(others.size());
+    sizes[""].arrows += sizes[module].arrows;
+  }
+  return sizes;
+}
+
+TEST(Budgets, OfModulesAreKept) {
+  std::map<std::string, Size> sizes = Sizes();
+  for (const Budget& budget : kBudgets) {
+    const Size found = sizes[std::string(budget.module)];
+    EXPECT_GT(found.files, 0) << budget.module;
+    EXPECT_EQ(Overrun(budget, found), "");
+    // what is far below its budget has a lower one
+    EXPECT_GT(100 * found.lines, 95 * budget.allowed.lines)
+        << budget.module << ": " << found.lines << " lines, lower its budget";
+  }
+}
+
+TEST(Budgets, NameWhatIsOver) {
+  const Budget budget = {"harness/text", {.lines = 100, .files = 5, .arrows = 2}, 80};
+  EXPECT_EQ(Overrun(budget, {100, 5, 2}), "");
+  EXPECT_EQ(Overrun(budget, {101, 5, 2}),
+            "harness/text: found 101 lines (allowed 100); the goal is 80 lines");
+  EXPECT_EQ(Overrun(budget, {7, 6, 3}),
+            "harness/text: found 6 files (allowed 5), 3 include arrows (allowed 2); the goal is 80 "
+            "lines");
+}
+
+}  // namespace budgets_test
+}  // namespace loopbench::architecture

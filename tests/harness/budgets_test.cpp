@@ -72,8 +72,8 @@ constexpr Budget kBudgets[] = {
     {"harness/report",          { 1100,   4,  10},  1200},
     {"harness/history",         { 1970,  10,   7},  1500},
     {"harness/cli",             { 8080,  31,  29},  3600},
-    {"peers",                   {  690,  10,   5},   650},
-    {"",                        {86100, 504, 238}, 62000}
+    {"peers",                   {  709,  12,   5},   650},
+    {"",                        {86100, 506, 238}, 62000}
 };
 // clang-format on
 

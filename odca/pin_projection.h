@@ -1,4 +1,4 @@
-// What level position does to accepted steps of mechanisms of pins, as level_position.cpp does it
+// What level projection does to accepted steps of mechanisms of pins, as level_position.cpp does it
 // by parts: of PathSweep and AssemblySweep, which both are here `Sweep`.
 #pragma once
 

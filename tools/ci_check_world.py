@@ -24,14 +24,14 @@ def mechanism(name, comment="of a feeder", mass=0.8):
                    body("arm", 1.1, 0.05, [0.25, 0.0], 0.5)],
         "joints": [joint("O", "ground", "O", "crank", "A"), joint("A", "crank", "B", "rod", "A"),
                    joint("B", "rod", "B", "arm", "B"), joint("C", "ground", "C", "arm", "A", cut=True)],
-        "initial": {"coordinates": {"O": 0.8, "A": -0.6, "B": 1.0}, "held": ["O"]}}, indent=1)
+        "initial": {"coordinates": {"O": 0.8, "A": -0.6, "B": 1.0}, "fixed": ["O"]}}, indent=1)
 
 
 def experiment(**more):
     return json.dumps({
         "format": 1, "name": "feeder", "tolerances": [1e-9], "timing": {"repeats": 0},
-        "scenes": [{"mechanism": f"../{file}.json", "horizon": 2} for file in ("feeder", "hostile")],
-        "columns": [{"formulation": ["odca", "lagrange"], "enforcement": "velocity", "coordinates": "absolute"}],
+        "problems": [{"mechanism": f"../{file}.json", "horizon": 2} for file in ("feeder", "hostile")],
+        "methods": [{"formulation": ["odca", "lagrange"], "enforcement": "velocity", "coordinates": "absolute"}],
         **more}, indent=1)
 
 

@@ -62,7 +62,7 @@ class BenchIn final : public TrialBench {
     meter.Write(record);
     trial.error = record.Number("error_position_max");
     trial.late = record.Number("error_phase_max");
-    trial.shape = record.Number("error_shape_max");
+    trial.shape = record.Number("error_path_max");
     return trial;
   }
 

@@ -28,7 +28,7 @@ struct Choice {
   friend bool operator==(const Choice&, const Choice&) = default;
 };
 
-/// "odca/position/joint, verner at rtol 3e-08", "..., cash-karp in steps of 0.01 s".
+/// "odca/projection/joint, verner at rtol 3e-08", "..., cash-karp in steps of 0.01 s".
 std::string ToString(const Choice& choice);
 
 struct Trial {
@@ -36,7 +36,7 @@ struct Trial {
   Outcome outcome = Outcome::kFinished;
   /// Largest of the points asked for, over the reference's times [m]; infinite for one that failed.
   double error = std::numeric_limits<double>::infinity();
-  double late = 0.0, shape = 0.0;  ///< as error_phase_max [s] and error_shape_max [m]
+  double late = 0.0, shape = 0.0;  ///< as error_phase_max [s] and error_path_max [m]
   double wall_s = 0.0;             ///< of the fastest bare run so far [s]
   std::int64_t steps = 0, rhs_evaluations = 0;
   std::string doubts;  ///< of a run with all observers, where one was made

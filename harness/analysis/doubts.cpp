@@ -27,7 +27,7 @@ using Clusters = std::vector<std::vector<std::size_t>>;
 
 bool HasFinalPoses(const Record& record) {
   return record.Text("kind") == "accuracy" && record.Text("outcome") == "finished" &&
-         !record.Text("scene_id").empty() && !std::isnan(record.Number("rtol")) &&
+         !record.Text("problem_id").empty() && !std::isnan(record.Number("rtol")) &&
          std::ranges::any_of(record.items(),
                              [](const auto& item) { return item.first.starts_with(kPrefix); });
 }
@@ -186,7 +186,7 @@ std::vector<Agreement> CompareFinalPoses(std::span<const Record> records,
   std::map<std::pair<std::string, double>, std::map<double, std::vector<std::size_t>>> scenes;
   for (std::size_t i = 0; i < records.size(); ++i) {
     if (!HasFinalPoses(records[i])) continue;
-    scenes[{records[i].Text("scene_id"), records[i].Number("horizon")}][records[i].Number("rtol")]
+    scenes[{records[i].Text("problem_id"), records[i].Number("horizon")}][records[i].Number("rtol")]
         .push_back(i);
   }
   std::vector<Agreement> agreements(records.size());
@@ -304,16 +304,17 @@ bool IsAtRest(const Record& record) {
 /// large mechanisms do not know the distance, but whether evaluations were softened.
 bool PassedSingularPosition(const Record& record) {
   if (GrowthAt(record) == DriftGrowth::kNone) return false;
-  if (record.Number("singularity_passages") > 0) return true;
+  if (record.Number("singularity_crossings") > 0) return true;
   const double distance = record.Number("singularity_distance_min");
-  if (std::isnan(distance)) return record.Number("softened_evaluations") > 0;
+  if (std::isnan(distance)) return record.Number("regularized_evaluations") > 0;
   return distance < kRankRatio;
 }
 
 /// Regularized, which bends the motion by more than tolerances, although no position at which steps
 /// ended was near a singular one.
 bool WasSoftenedElsewhere(const Record& record) {
-  return record.Number("softened_evaluations") > 0 && record.Number("singularity_passages") == 0 &&
+  return record.Number("regularized_evaluations") > 0 &&
+         record.Number("singularity_crossings") == 0 &&
          record.Number("singularity_distance_min") >= kRankRatio;
 }
 
@@ -422,7 +423,7 @@ double PromisedDriftShare(const Record& record) {
   const auto growth = GrowthAt(record);
   // nothing is left but of softened directions, and what peers, which project to a part of their
   // tolerance, leave
-  const bool left = record.Number("softened_evaluations") > 0 || IsPeer(record);
+  const bool left = record.Number("regularized_evaluations") > 0 || IsPeer(record);
   const bool is_fixed = record.Number("step") > 0.0;
   double promised = is_fixed ? kOpenLoop : TolerancesOfDrift(record) * rtol;
   if (growth == DriftGrowth::kNone && !left) promised = 0.0;
@@ -491,22 +492,22 @@ void SetDoubts(std::vector<Record>* records) {
     Add(&codes, agreements[i].doubted && !certified, kDisagreementDoubt);
     const bool is_known = own[i].find(kRefinementDoubt) != own[i].npos;
     Add(&codes, refinements[i].doubted && !certified && !is_known, kRefinementDoubt);
-    record.Set("doubts", codes);
+    record.Set("warnings", codes);
     if (agreements[i].cluster > 0) record.Set("agreement", agreements[i].cluster);
   }
 }
 
 bool HasDoubt(const Record& record, const std::string& code) {
-  const std::string codes = record.Text("doubts");
+  const std::string codes = record.Text("warnings");
   return code.empty() ? !codes.empty() : (" " + codes + " ").find(" " + code + " ") != codes.npos;
 }
 namespace {
 
 /// All that names the case of a run but its tolerance.
 std::string ColumnOf(const Record& record) {
-  std::string name = record.Text("scene_id");
+  std::string name = record.Text("problem_id");
   for (const auto& [key, value] : record.items()) {
-    if (key == "case_id" || key == "scene_id") break;
+    if (key == "case_id" || key == "problem_id") break;
     if (key != "rtol" && key != "atol") name += "|" + key + "=" + record.Text(key);
   }
   return name;
@@ -529,7 +530,7 @@ std::vector<Refinement> CompareTolerances(std::span<const Record> records) {
   for (std::size_t i = 0; i < records.size(); ++i) {
     const Record& record = records[i];
     const bool counts = record.Text("kind") == "accuracy" && record.Text("outcome") == "finished" &&
-                        !record.Text("scene_id").empty() && record.Number("rtol") > 0.0;
+                        !record.Text("problem_id").empty() && record.Number("rtol") > 0.0;
     if (counts) columns[ColumnOf(record)].push_back(i);
   }
   std::vector<Refinement> refinements(records.size(), {false, kNaN, kNaN});

@@ -28,7 +28,7 @@ struct Agreement {
 };
 
 /// One for each record, in their order. Compared are accuracy runs that finished, of one scene
-/// (`scene_id`: its whole content) and horizon; but not those with a fixed step, which say of no
+/// (`problem_id`: its whole content) and horizon; but not those with a fixed step, which say of no
 /// difference that it is small.
 ///
 /// Where the runs at one tolerance do not all end alike, all of them are doubted. The majority need
@@ -65,10 +65,10 @@ PoseDifference LargestDifference(std::span<const Record> runs);
 
 /// The codes of `doubts` (docs/reference/outcomes-and-warnings.md); programs may rely on them.
 inline constexpr const char* kEnergyDoubt = "energy";
-inline constexpr const char* kSingularDoubt = "singular-passage";
-inline constexpr const char* kSoftenedDoubt = "softened";
+inline constexpr const char* kSingularDoubt = "singular-crossing";
+inline constexpr const char* kSoftenedDoubt = "regularized";
 inline constexpr const char* kDriftDoubt = "drift";
-inline constexpr const char* kMembersDoubt = "members-failed";
+inline constexpr const char* kMembersDoubt = "ensemble-failures";
 inline constexpr const char* kExponentDoubt = "exponent";
 inline constexpr const char* kDisagreementDoubt = "disagreement";
 

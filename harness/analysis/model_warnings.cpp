@@ -51,7 +51,7 @@ void AddRankWarnings(const MechanismDescription& description, const Structure& s
     warnings->push_back(
         {WarningKind::kNotAnalysed,
          fmt::format(
-             "rank is not analysed: sparse pivots leave it in doubt, and {} speeds are more "
+             "rank is not analysed: sparse pivots leave it uncertain, and {} speeds are more "
              "than {}",
              structure.joint_u, kMostAnalysedSpeeds)});
     return;

@@ -78,7 +78,7 @@ Record RowOf(const Trial& trial, const Trial& best, double horizon) {
     row.Set("rtol", trial.choice.rtol);
   }
   row.Set("outcome", std::string(ToString(trial.outcome)));
-  row.Set("doubts", trial.doubts);
+  row.Set("warnings", trial.doubts);
   if (std::isfinite(trial.error)) row.Set("error_position_max", trial.error);
   row.Set("wall_s", trial.wall_s);
   row.Set("ratio", trial.wall_s / best.wall_s);
@@ -154,7 +154,7 @@ void Examine(const MechanismFile& file, double horizon, const Reference& referen
   one.keys = CaseKeys(experiment, one);
   const Record record = RunCase(experiment, one, &reference);
   const bool finished = record.Text("outcome") == "finished";
-  trial.doubts = finished ? record.Text("doubts") : record.Text("outcome");
+  trial.doubts = finished ? record.Text("warnings") : record.Text("outcome");
   if (finished && has_all_points) trial.error = record.Number("error_position_max");
 }
 
@@ -183,7 +183,7 @@ std::string WhatWasTried(const Advice& advice) {
   std::string text =
       fmt::format("{} ways of running it in {:.3g} s", advice.trials, advice.pilot_s);
   if (advice.untried > 0) {
-    text += fmt::format(", {} not tried: the time was over (--cpu)", advice.untried);
+    text += fmt::format(", {} not tried: the time was over (--cpu-limit)", advice.untried);
   }
   return text;
 }
@@ -201,7 +201,7 @@ void PrintAdvice(const AdviseCommand& command, const Advice& advice, const Refer
                                : fmt::format(" with a margin of {:.0f} %", 100 * (1 - kErrorShare)),
           ToString(best.choice), best.error, best.wall_s);
   }
-  if (!best.doubts.empty()) Print("  doubtful: {}\n", best.doubts);
+  if (!best.doubts.empty()) Print("  flagged: {}\n", best.doubts);
   Print("Dominant error: {}.\n", WhatLimits(best, reference.Certified().position));
   const auto next = std::ranges::find_if(advice.finalists, [&](const Trial& trial) {
     return trial.choice.integrator != best.choice.integrator ||
@@ -453,7 +453,7 @@ void AddAdvise(Commands& commands) {
       "time.\n"
       "Exit codes: 0 found, 1 nothing reached what was asked for (the nearest is shown), 2 no "
       "reference or bad input.\n"
-      "  loopbench advise four-bar.json --error 1e-6\n"
+      "  loopbench advise four-bar.json --max-error 1e-6\n"
       "  loopbench advise arm.json --budget 0.001 --horizon 5 --points gripper.tip --out "
       "best.json");
 }

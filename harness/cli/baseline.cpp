@@ -44,17 +44,18 @@ void RequireNewFolder(const std::filesystem::path& kept, const std::filesystem::
     return whole.has_filename() ? whole : whole.parent_path();
   };
   if (plain(kept) == plain(baseline)) {
-    throw ConfigError(fmt::format(
-        "--keep: found {}, the folder of the baseline, expected another one", kept.string()));
+    throw ConfigError(
+        fmt::format("--keep-output: found {}, the folder of the baseline, expected another one",
+                    kept.string()));
   }
   if (!std::filesystem::exists(kept)) return;
   if (!std::filesystem::is_directory(kept)) {
-    throw ConfigError(
-        fmt::format("--keep: found {}, which is no folder, expected a new one", kept.string()));
+    throw ConfigError(fmt::format("--keep-output: found {}, which is no folder, expected a new one",
+                                  kept.string()));
   }
   if (!std::filesystem::is_empty(kept)) {
-    throw ConfigError(
-        fmt::format("--keep: found {}, which is not empty, expected a new folder", kept.string()));
+    throw ConfigError(fmt::format(
+        "--keep-output: found {}, which is not empty, expected a new folder", kept.string()));
   }
 }
 
@@ -74,7 +75,7 @@ void RequirePrograms(const BaselineCommand& command) {
     throw ConfigError(fmt::format("--counts {}: {}{}", command.counts.string(),
                                   tried.Failure(program),
                                   program == "valgrind" ? "; install it: apt-get install valgrind"
-                                                        : "; --counter says where it is"));
+                                                        : "; --count-program says where it is"));
   }
 }
 
@@ -291,12 +292,13 @@ void AddBaseline(Commands& commands) {
   app->add_option("--counts", command.counts,
                   "Benchmarks (JSON) whose instructions are counted too, by valgrind")
       ->check(CLI::ExistingFile);
-  app->add_option("--counter", command.counter,
+  app->add_option("--count-program", command.counter,
                   "The program loopbench_count, where it is not beside this one nor in PATH");
   app->add_option("-j,--jobs", command.jobs, "Runs at once")
       ->check(NumberFrom(1, 1024))
       ->capture_default_str();
-  app->add_option("--keep", command.keep, "New folder for what was measured (default: none)");
+  app->add_option("--keep-output", command.keep,
+                  "New folder for what was measured (default: none)");
 }
 
 }  // namespace loopbench::harness

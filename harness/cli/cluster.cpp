@@ -48,7 +48,7 @@ std::filesystem::path WholeFile(const std::filesystem::path& folder) {
 }
 
 std::string SubmitAgainLine(const std::filesystem::path& folder) {
-  return ShellLine({"loopbench", "submit", "--again", "--out", folder.string()});
+  return ShellLine({"loopbench", "submit", "--resubmit", "--out", folder.string()});
 }
 
 /// Submits the array of `parts` and the job behind it, and writes down their numbers.
@@ -306,7 +306,7 @@ int Collect(const std::filesystem::path& folder) {
 
 constexpr const char* kSubmitFooter = R"(
 The parts run as one array job of Slurm, the merge as a job behind it. A part that is killed, preempted or
-started twice goes on where its store stopped; --again submits the parts that are not done and not queued.
+started twice goes on where its store stopped; --resubmit submits the parts that are not done and not queued.
 Without Slurm: --no-queue writes the folder, and any engine calls `sh DIR/part.sh K` for each K, then
 `loopbench collect DIR`. docs/clusters.md has GNU parallel, Kubernetes and GitHub.
 
@@ -314,14 +314,14 @@ Examples:
   loopbench submit sweep.json --tasks 100 --out /shared/sweep --time 1:00:00 --partition cpu --no-timing
   loopbench submit sweep.json --tasks 100 --out /shared/sweep --dry-run
   loopbench status /shared/sweep
-  loopbench submit --again --out /shared/sweep)";
+  loopbench submit --resubmit --out /shared/sweep)";
 
 /// All that was asked for once stands in the folder.
 void RequireNothingElse(const CLI::App& submit) {
-  const std::set<std::string> may_stand = {"--again", "--out", "--no-queue", "--dry-run"};
+  const std::set<std::string> may_stand = {"--resubmit", "--out", "--no-queue", "--dry-run"};
   for (const CLI::Option* option : submit.get_options()) {
     if (option->count() == 0 || may_stand.contains(option->get_name())) continue;
-    throw ConfigError(fmt::format("--again: found {} beside it, expected none: the folder knows",
+    throw ConfigError(fmt::format("--resubmit: found {} beside it, expected none: the folder knows",
                                   option->get_name()));
   }
 }
@@ -336,9 +336,9 @@ int SubmitAsTyped(const CLI::App& app, TypedSubmit* typed) {
   SubmitCommand& submit = typed->submit;
   ClusterRun& run = submit.run;
   if (submit.again != run.experiments.empty()) {
-    throw ConfigError(submit.again
-                          ? "--again: found experiments beside it, expected none: the folder knows"
-                          : "submit: found no experiment, expected at least one, or --again");
+    throw ConfigError(
+        submit.again ? "--resubmit: found experiments beside it, expected none: the folder knows"
+                     : "submit: found no experiment, expected at least one, or --resubmit");
   }
   if (submit.again) RequireNothingElse(app);
   if (!typed->time.empty()) run.batch_options.push_back("--time=" + typed->time);
@@ -379,7 +379,8 @@ void AddCluster(Commands& commands) {
   app->add_flag("--no-timing", typed.no_timing,
                 "Leave the timings out: parts on one machine disturb each other's");
   app->add_flag("--isolate", run.isolate, "Every case in a process of its own");
-  app->add_flag("--again", typed.submit.again, "Only the parts of this folder that are not done");
+  app->add_flag("--resubmit", typed.submit.again,
+                "Only the parts of this folder that are not done");
   app->add_flag("--no-queue", typed.no_queue, "Write the folder, submit nothing");
   app->add_flag("--dry-run", typed.submit.dry_run, "Print the scripts, write nothing");
 

@@ -109,10 +109,10 @@ inline void AddWide(CLI::App* app) {
 
 /// Limits of work on a mechanism; experiments contain their own ("limits").
 inline void AddLimits(CLI::App* app, ProcessLimits* limits) {
-  app->add_option("--cpu", limits->cpu_s, "CPU time limit per mechanism file [s]")
+  app->add_option("--cpu-limit", limits->cpu_s, "CPU time limit per mechanism file [s]")
       ->check(NumberFrom(0.001, 1e9))
       ->capture_default_str();
-  app->add_option("--memory", limits->memory_mb, "Memory limit per mechanism file [MiB]")
+  app->add_option("--memory-limit", limits->memory_mb, "Memory limit per mechanism file [MiB]")
       ->check(NumberFrom(1.0, 1e9))
       ->capture_default_str();
 }
@@ -145,8 +145,8 @@ inline void AddSize(CLI::App* app, std::string* size) {
 inline CLI::Option* AddGate(CLI::App* app, std::string* gate) {
   return app
       ->add_option("--gate", *gate,
-                   "doubts: exit with 1 if an accuracy run shown did not finish or has doubts")
-      ->check(CLI::IsMember({"doubts"}));
+                   "warnings: exit with 1 if an accuracy run shown did not finish or has warnings")
+      ->check(CLI::IsMember({"warnings"}));
 }
 
 }  // namespace loopbench::harness

@@ -191,13 +191,13 @@ std::string Conclusion(const ComparisonReport& comparison, const CompareOptions&
   const int code = comparison.ExitCode(options);
   const int worse = comparison.Count(Judgement::kWorse);
   const int different = comparison.Count(Judgement::kDifferent);
-  if (code == 1 && different == 0) return fmt::format("WORSE: {} measures", worse);
+  if (code == 1 && different == 0) return fmt::format("REGRESSION: {} measures", worse);
   if (code == 1 && worse == 0) return fmt::format("DIFFERENT: {} measures", different);
-  if (code == 1) return fmt::format("WORSE: {} measures, {} more different", worse, different);
-  if (code == 2) return "COULD NOT MEASURE: " + comparison.Obstacle(options);
+  if (code == 1) return fmt::format("REGRESSION: {} measures, {} more different", worse, different);
+  if (code == 2) return "INCONCLUSIVE: " + comparison.Obstacle(options);
   const int better = comparison.Count(Judgement::kBetter);
   const int undecided = comparison.Count(Judgement::kNotMeasured, "times");
-  return (better > 0 ? fmt::format("BETTER: {} measures, none worse", better) : "SAME") +
+  return (better > 0 ? fmt::format("BETTER: {} measures, none worse", better) : "NO CHANGE") +
          (undecided > 0 ? fmt::format("; {} times not compared", undecided) : "");
 }
 
@@ -402,14 +402,14 @@ those on both sides could be compared, or a case is missing on one side.)";
 constexpr const char* kFitFooter = R"(
 Examples:
   loopbench_bench --benchmark_filter=/chain/ --benchmark_out=chain.json
-  loopbench fit chain.json
-  loopbench fit chain.json --from 30 --format markdown --out chain.md
-  loopbench fit results/runs/paper                     # timings of "chain-3", "chain-10", ...)";
+  loopbench fit-scaling chain.json
+  loopbench fit-scaling chain.json --min-size 30 --format markdown --out chain.md
+  loopbench fit-scaling results/runs/paper                     # timings of "chain-3", "chain-10", ...)";
 
 constexpr const char* kExportFooter = R"(
 Examples:
-  loopbench export new.json --out benchmarks.json      # github-action-benchmark, customSmallerIsBetter
-  loopbench export results/runs/paper --format bmf --out bmf.json    # Bencher, adapter json
+  loopbench export-metrics new.json --out benchmarks.json      # github-action-benchmark, customSmallerIsBetter
+  loopbench export-metrics results/runs/paper --format bmf --out bmf.json    # Bencher, adapter json
 
 Cases that failed, and values that are no numbers, cannot be tracked: each is named.
 Exit codes: 0 all exported, 1 all but those named, 2 nothing to export or bad input.)";
@@ -456,7 +456,7 @@ void AddCompare(Commands& commands) {
                   "KEY[,KEY]: cases meet by these keys, whatever else they were run with "
                   "(default: all keys, and equal mechanisms and limits)")
       ->delimiter(',');
-  app->add_flag("--subset", command.options.subset, "NEW may lack cases of BASE");
+  app->add_flag("--allow-missing", command.options.subset, "NEW may lack cases of BASE");
   app->add_flag("--added", command.options.added,
                 "NEW may have cases that BASE lacks (always with a history)");
   app->add_option("--error-ratio", command.options.error_ratio, "Allowed on the same build")

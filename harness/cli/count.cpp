@@ -327,10 +327,10 @@ docs/operation-counts.md explains the columns.
 
 Examples:
   loopbench count configs/mechanisms/four-bar.json
-  loopbench count configs/mechanisms/*.json --level acceleration --format csv --out counts.csv
-  loopbench count --family chain --sizes $(seq -s, 3 40) --level acceleration --format jsonl --out chain.jsonl
+  loopbench count configs/mechanisms/*.json --enforcement acceleration --format csv --out counts.csv
+  loopbench count --family chain --sizes $(seq -s, 3 40) --enforcement acceleration --format jsonl --out chain.jsonl
   loopbench plot chain.jsonl --out chain.svg --x bodies --y flops_per_body --group formulation,coordinates
-  loopbench count my.json --formulation odca --coordinates joint --solver as-published --format json
+  loopbench count my.json --formulation odca --coordinates joint --solver plain --format json
 
 Exit codes: 0 done, 2 bad input or no right-hand side was recorded.)";
 
@@ -353,7 +353,7 @@ void AddCount(Commands& commands) {
   app->add_option("--formulation", command.formulations, "Formulations (default: all): a,b")
       ->delimiter(',')
       ->check(CLI::IsMember(FormulationNamesWithoutPeers()));
-  app->add_option("--level", command.levels, "Levels (default: all that are recorded): a,b")
+  app->add_option("--enforcement", command.levels, "Levels (default: all that are recorded): a,b")
       ->delimiter(',')
       ->check(CLI::IsMember(LevelNames()));
   app->add_option("--coordinates", command.coordinates, "Coordinate sets (default: both): a,b")
@@ -361,7 +361,7 @@ void AddCount(Commands& commands) {
       ->check(CLI::IsMember({"joint", "absolute"}));
   app->add_option("--solver", command.solvers, "Solvers: a,b")
       ->delimiter(',')
-      ->check(CLI::IsMember({"as-published", "rank-revealing"}))
+      ->check(CLI::IsMember({"plain", "rank-revealing"}))
       ->capture_default_str();
   app->add_option("--format", command.format, "Format of the table")
       ->check(CLI::IsMember({"text", "csv", "markdown", "json", "latex", "jsonl"}))

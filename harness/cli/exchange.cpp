@@ -242,9 +242,9 @@ The file has the mechanism at its assembled start, with the user's names; what i
 lost, stands in its first comment and is printed. What a format does not have is named, with exit code 2, and nothing
 is written: prescribed motions, forces that depend on time, drag, forces along a joint that closes a loop; docs/exchange-out.md.
 
-  loopbench convert my.json --to mjcf                  # my.xml: python3 -m mujoco.viewer --mjcf=my.xml
-  loopbench convert my.json --to mjcf --step 1e-4      # stiff springs, and loops that come apart less
-  loopbench convert my.json --to simbody --out my.cpp
+  loopbench export-mechanism my.json --to mjcf                  # my.xml: python3 -m mujoco.viewer --mjcf=my.xml
+  loopbench export-mechanism my.json --to mjcf --step 1e-4      # stiff springs, and loops that come apart less
+  loopbench export-mechanism my.json --to simbody --out my.cpp
   g++ -std=c++17 -O2 -isystem /usr/include/simbody my.cpp -o my -lSimTKsimbody -lSimTKmath -lSimTKcommon
   ./my                                                 # JSON: coordinates, speeds, accelerations, places
   ./my 1 1e-10                                         # the same after 1 s)";

@@ -68,7 +68,7 @@ void PrintCaseDocument(const Overview& overview, const ExperimentFiles& files) {
                          .Add("comment", overview.experiments.front().comment)
                          .Add("combinations", Count(overview.combinations))
                          .Add("timings", Count(others.timings))
-                         .Add("runs_in_several_scalars", Count(others.rungs))
+                         .Add("precision_runs", Count(others.rungs))
                          .Text();
   head.pop_back();
   PrintText(head + ",\"cases\":[");
@@ -247,7 +247,7 @@ Checked CheckFile(const std::filesystem::path& path, const CheckCommand& command
       const MapRules map = ReadMapRules(path);
       std::size_t rows = 0;
       for (const MapGroup& group : map.groups) rows += group.rows.size();
-      of("map", fmt::format("failure map of {} rows and {} columns", rows, map.columns.size()))
+      of("map", fmt::format("robustness map of {} rows and {} columns", rows, map.columns.size()))
           .Add("rows", Count(rows))
           .Add("columns", Count(map.columns.size()));
       break;

@@ -79,7 +79,7 @@ void ExplainChoices(const Experiment& experiment) {
   }
   if (any([](const Column& c) { return c.solver == SolverKind::kAsPublished; })) {
     Print(
-        "  as-published: plain factorisations (for reduction: the mechanism's fixed "
+        "  plain: plain factorisations (for reduction: the mechanism's fixed "
         "independent speeds), which fail or go wrong where the loops lose rank.\n");
   }
   if (any([](const Column& c) { return c.solver == SolverKind::kRankRevealing; })) {
@@ -132,7 +132,7 @@ void ExplainRuns(const Experiment& experiment) {
     }
     Print(
         "  {} also run{} {} times from perturbed starts: {}, drawn from seed {}. The spread of the "
-        "results says how far a single run can be trusted; where the scene knows a branch, "
+        "results says how far a single run can be trusted; where the problem knows a branch, "
         "ensemble_branch_kept counts the runs that stay within {:g} rad of it.\n",
         WithCount(count, "case"), count == 1 ? "s" : "", rule.size, start, rule.seed,
         rule.branch_bound);
@@ -227,7 +227,7 @@ void ExplainExperiment(const std::filesystem::path& path, const ExperimentFiles&
   ExplainRuns(first);
   ExplainMeasures(first, files.filter);
   Print(
-      "\nloopbench list {0} shows every case, loopbench plan {0} the time they will "
+      "\nloopbench list {0} shows every case, loopbench estimate {0} the time they will "
       "take.\n",
       path.string());
 }
@@ -271,10 +271,10 @@ JsonObject ExperimentDocument(const std::filesystem::path& path, const Experimen
       .Add("cases", Count(overview.cases()))
       .Add("combinations", Count(overview.combinations))
       .Add("timings", Count(timings))
-      .Add("runs_in_several_scalars", Count(rungs))
+      .Add("precision_runs", Count(rungs))
       .Add("references", first.reference.has_value())
       .Add("sweep", sweep)
-      .Add("scenes", scenes)
+      .Add("problems", scenes)
       .Add("columns", columns)
       .Add("integrators", first.integrators)
       .Add("tolerances", first.tolerances)

@@ -202,14 +202,14 @@ void AddGenerate(Commands& commands) {
   app->add_option("--formulation", command.formulation, "Formulation")
       ->check(CLI::IsMember(FormulationNamesWithoutPeers()))
       ->capture_default_str();
-  app->add_option("--level", command.level, "Level of enforcement")
+  app->add_option("--enforcement", command.level, "Level of enforcement")
       ->check(CLI::IsMember({"acceleration", "velocity"}))
       ->capture_default_str();
   app->add_option("--coordinates", command.coordinates, "Coordinate set")
       ->check(CLI::IsMember({"joint", "absolute"}))
       ->capture_default_str();
   app->add_option("--solver", command.solver, "Solver")
-      ->check(CLI::IsMember({"as-published", "rank-revealing"}))
+      ->check(CLI::IsMember({"plain", "rank-revealing"}))
       ->capture_default_str();
   app->add_option("--horizon", command.horizon,
                   "Duration of the motion whose branches are generated [s]")

@@ -90,14 +90,14 @@ std::string List(const std::vector<std::string>& lines) {
 
 /// Of the experiment.
 std::string LadderName(const SceneModels& ladder) {
-  return ladder.models.front().description.name + "-ladder";
+  return ladder.models.front().description.name + "-models";
 }
 
 std::string PageOf(const SceneModels& ladder, double horizon, const std::string& typed) {
   const MechanismDescription& whole = ladder.models.front().description;
   std::string page = fmt::format(
       "# Models of {}\n\nWritten by `{}`. `{}` runs all of them alike for {} s.\n\n"
-      "| file | motion | bodies | joints | forces | off by [m] | evaluations |\n"
+      "| file | motion | bodies | joints | forces | model error [m] | evaluations |\n"
       "|---|---|---|---|---|---|---|\n",
       EscapeMarkdown(whole.name), EscapeMarkdown(typed), LadderFileName(ladder), horizon);
   for (const SceneModel& model : ladder.models) {
@@ -109,9 +109,10 @@ std::string PageOf(const SceneModels& ladder, double horizon, const std::string&
   }
   if (ladder.models.front().rhs_evaluations >= 0) {
     page +=
-        "\n*off by*: the largest distance of a named point from where the whole model has it, at "
+        "\n*model error*: the largest distance of a named point from where the whole model has it, "
+        "at "
         "50 "
-        "times of a run in tight steps (multipliers at level position, dormand-prince at 1e-10); "
+        "times of a run in tight steps (multipliers at level projection, dormand-prince at 1e-10); "
         "*evaluations*: right-hand sides that run took.\n";
   }
   for (std::size_t i = 1; i < ladder.models.size(); ++i) {
@@ -230,7 +231,7 @@ void WriteModels(const SceneModels& ladder, double horizon, const std::string& t
   const std::string& whole = ladder.models.front().description.name;
   std::map<std::string, std::string> files;
   LadderFile experiment{LadderName(ladder),
-                        fmt::format("Models of {}, from the whole one down (ladder.md).", whole),
+                        fmt::format("Models of {}, from the whole one down (models.md).", whole),
                         {},
                         horizon};
   for (const SceneModel& model : ladder.models) {
@@ -242,7 +243,7 @@ void WriteModels(const SceneModels& ladder, double horizon, const std::string& t
   }
   const std::string run = LadderFileName(ladder);
   files[run] = LadderText(experiment);
-  files["ladder.md"] = PageOf(ladder, horizon, typed);
+  files["models.md"] = PageOf(ladder, horizon, typed);
   fs::path target = folder;
   if (!target.has_filename()) target = target.parent_path();  // "out/"
   const Unfinished fresh{fs::path(target).concat(fmt::format(".new-{}", ::getpid()))};
@@ -323,7 +324,7 @@ Record KeysOf(const MechanismFile& file, const SceneModel& model, const ModelQue
 void WriteRun(const JudgedModel& judged, Record& record) {
   const Trial& trial = judged.trial;
   record.Set("outcome",
-             std::string(judged.bench == nullptr ? "inexpressible" : ToString(trial.outcome)));
+             std::string(judged.bench == nullptr ? "unsupported" : ToString(trial.outcome)));
   record.Set("message", judged.fault);
   record.Set("model_motion", std::string(judged.model.is_exact ? "the same" : "changed"));
   record.Set("bodies", static_cast<std::int64_t>(judged.model.description.bodies.size() - 1));
@@ -351,7 +352,7 @@ void WriteVerdict(const MechanismFile& file, const JudgedModel& whole, const Jud
   record.Set("model_error", caused.largest);
   record.Set("model_error_at", caused.point);
   record.Set("reference_error", certified);
-  record.Set("trust_horizon", caused.until);
+  record.Set("reference_valid_until", caused.until);
   const bool accepted = caused.largest + certified <= question.accept;
   conclude(fmt::format("{} at {} m", accepted ? "accepted" : "refused", question.accept));
 }

@@ -54,7 +54,7 @@ std::vector<std::string> Gone(const MechanismDescription& whole,
 /// The file of the experiment that runs all of them: NAME-ladder.json.
 std::string LadderFileName(const SceneModels& ladder);
 
-/// Writes NAME.json of all models, the experiment and ladder.md. All of them are written beside
+/// Writes NAME.json of all models, the experiment and models.md. All of them are written beside
 /// the folder and read back before it takes its place; with `force` they take the places of files
 /// of these names in a folder that is there, each at once.
 ///
@@ -73,10 +73,11 @@ struct ModelQuestion {
   std::string what;      ///< "my.json: --store", for messages
 };
 
-/// A record for the whole model and one for each other, all run alike (O-DCA, level position, joint
-/// coordinates, ode45 at 1e-8), bare and in turn. The error that a model causes is the largest
-/// distance of a named point of its certified motion from the whole one's; both certificates are
-/// part of what it is accepted by. A model that cannot be judged is refused with the reason.
+/// A record for the whole model and one for each other, all run alike (O-DCA, level projection,
+/// joint coordinates, ode45 at 1e-8), bare and in turn. The error that a model causes is the
+/// largest distance of a named point of its certified motion from the whole one's; both
+/// certificates are part of what it is accepted by. A model that cannot be judged is refused with
+/// the reason.
 std::vector<Record> RecordsOfModels(const MechanismFile& file, const SceneModels& models,
                                     const ModelQuestion& question);
 

@@ -35,7 +35,7 @@ struct PlanCommand {
 /// Everything that decides a run but the experiment's name: results of another file with the same
 /// cases serve as well.
 std::string SameRun(const Record& record) {
-  std::string text = record.Text("content") + "\n";
+  std::string text = record.Text("config_hash") + "\n";
   for (const auto& [key, value] : record.items()) {
     if (key == "case_id") break;
     if (key != "experiment") text += key + "=" + record.Text(key) + "\n";
@@ -142,7 +142,7 @@ Plan MakePlan(const Overview& overview, const PlanCommand& command, Estimate* es
       });
     }
   }
-  Progress progress("plan", std::move(pieces), 1);
+  Progress progress("estimate", std::move(pieces), 1);
   for (std::size_t i = 0; i < work.size(); ++i) {
     progress.Start(i);
     work[i]();
@@ -182,7 +182,7 @@ void PrintPlan(const Overview& overview, const Plan& plan, const PlanCommand& co
   const Experiment& first = overview.experiments.front();
   Print("{}{}{}\n", first.name, first.comment.empty() ? "" : ": ", first.comment);
   PrintAxes(overview);
-  Print("  {} scenes, {} columns, {} tolerances", first.scenes.size(), first.columns.size(),
+  Print("  {} problems, {} columns, {} tolerances", first.scenes.size(), first.columns.size(),
         first.tolerances.size());
   if (!first.fixed_steps.empty()) Print(", {} fixed steps", first.fixed_steps.size());
   if (first.integrators.size() > 1) Print(", {} integrators", first.integrators.size());
@@ -255,8 +255,8 @@ JsonObject PlanDocument(const std::filesystem::path& path, const Overview& overv
       .Add("accuracy_seconds", plan.seconds)
       .Add("references", Count(plan.references))
       .Add("reference_seconds", plan.reference_seconds)
-      .Add("runs_in_several_scalars", Count(plan.rungs))
-      .Add("several_scalars_seconds", plan.ladder_seconds)
+      .Add("precision_runs", Count(plan.rungs))
+      .Add("precision_seconds", plan.ladder_seconds)
       .Add("timings", Count(plan.timings))
       .Add("timing_seconds", plan.timing_seconds)
       .Add("cases_known", Count(plan.known))

@@ -28,22 +28,22 @@ namespace {
 constexpr const char* kFooter = R"(
 Examples: (paths from the root of the repository)
   loopbench list configs/experiments/paper/paper.json
-  loopbench plan configs/experiments/paper/paper.json --set /limits/cpu_s=5
+  loopbench estimate configs/experiments/paper/paper.json --set /limits/cpu_s=5
   loopbench run configs/experiments/paper/paper.json --jobs 2 --filter mechanism=four-bar
   loopbench view configs/mechanisms/double-wishbone.json
   loopbench import arm.urdf --loops arm-loops.json --out arm.json
   loopbench count configs/mechanisms/four-bar.json
   loopbench generate configs/mechanisms/four-bar.json --out four-bar-c
-  loopbench simplify configs/experiments/models/hall.json --errors 2
+  loopbench simplify configs/experiments/models/hall.json --verify 2
   loopbench run big.json --shard 1/2 --out part1   (and 2/2 elsewhere)
   loopbench merge part1 part2 --out whole
   loopbench table results/runs/paper --where mechanism=four-bar,dead-centre --where rtol=1e-8
   loopbench plot results/runs/paper --out results/runs/paper/figures
   loopbench run configs/experiments/precision.json --precision-only --jobs 2
-  loopbench tradeoff results/runs/tradeoff --figures
-  loopbench report results/runs/tradeoff
-  loopbench verdict results/runs/paper --claims configs/experiments/paper/claims.json
-  loopbench map results/runs/extremes --rules configs/experiments/extremes/map.json
+  loopbench work-precision results/runs/work-precision --figures
+  loopbench report results/runs/work-precision
+  loopbench check-claims results/runs/paper --claims configs/experiments/paper/claims.json
+  loopbench robustness results/runs/extremes --rules configs/experiments/extremes/map.json
 
 Conditions are key=value, key=value,value, key!=value, or of numbers 'key<value' (<=, >, >=), quoted
 for the shell; keys are the columns of drift.csv, and before a run those that name cases.
@@ -66,10 +66,11 @@ void TakeOneWordEach(CLI::App* app) {
 void GroupCommands(CLI::App& app) {
   const std::pair<const char*, std::vector<const char*>> groups[] = {
       {"Mechanisms",
-       {"check", "explain", "view", "simplify", "import", "convert", "count", "generate"}},
-      {"Experiments", {"list", "plan", "run", "merge", "advise"}},
-      {"Results", {"table", "plot", "report", "trajectory", "tradeoff", "map", "verdict"}},
-      {"Regressions", {"compare", "fit", "export", "baseline", "history"}},
+       {"check", "explain", "view", "simplify", "import", "export-mechanism", "count", "generate"}},
+      {"Experiments", {"list", "estimate", "run", "merge", "advise"}},
+      {"Results",
+       {"table", "plot", "report", "trajectory", "work-precision", "robustness", "check-claims"}},
+      {"Regressions", {"compare", "fit-scaling", "export-metrics", "baseline", "history"}},
       {"Clusters", {"submit", "status", "collect"}},
       {"Shell", {"schema", "completion", "manual"}}};
   for (const auto& [heading, names] : groups) {

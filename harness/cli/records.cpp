@@ -270,10 +270,10 @@ int DoubtGate(const std::vector<Record>& rows) {
   }
   if (runs == 0) {
     throw ConfigError(
-        "--gate doubts: found no accuracy run, expected one: such a gate cannot fail");
+        "--fail-on warnings: found no accuracy run, expected one: such a gate cannot fail");
   }
   if (failed + doubted == 0) return 0;
-  PrintError("gate doubts: of {} runs {} did not finish and {} have doubts\n", runs, failed,
+  PrintError("gate warnings: of {} runs {} did not finish and {} have warnings\n", runs, failed,
              doubted);
   return 1;
 }

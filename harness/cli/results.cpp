@@ -111,9 +111,9 @@ int DrawMany(const SceneReader& reader, const PlotCommand& command) {
   return DrawFree(points.records(), command);
 }
 
-/// failure-map.csv, .md and the picture, which alone may fail: the reason is printed.
+/// robustness-map.csv, .md and the picture, which alone may fail: the reason is printed.
 int WriteMap(const FailureMap& map, const MapCommand& command, const std::string& typed) {
-  const std::filesystem::path stem = command.out / "failure-map";
+  const std::filesystem::path stem = command.out / "robustness-map";
   Table cells = MapCellTable(map);
   AppendProvenance(cells, typed);
   WriteFileAtomically(stem.string() + ".csv", RenderKept(cells, "csv"));
@@ -134,7 +134,7 @@ int RedrawMap(const MapRules& rules, const MapCommand& command) {
                     command.store.string()));
   }
   const FailureMap map = MapFromCsv(rules, ReadTextFile(command.store), command.store.string());
-  const std::string picture = (command.out / ("failure-map." + command.format)).string();
+  const std::string picture = (command.out / ("robustness-map." + command.format)).string();
   if (const auto error = WriteMapFigure(picture, map, FigureSizes().at(command.size))) {
     PrintError("{}\n", Lines{*error});
     return 2;
@@ -151,7 +151,7 @@ void RequireDemands(const FailureMap& map, const std::filesystem::path& rules) {
     }
   }
   throw ConfigError(fmt::format(
-      "--gate: no cell of {} has to hold, expected a row with \"must_hold\"", rules.string()));
+      "--gate: no cell of {} has to hold, expected a row with \"required\"", rules.string()));
 }
 
 int PrintTable(const TableCommand& command, const std::string& typed) {
@@ -218,7 +218,7 @@ int PrintMap(const MapCommand& command, const std::string& typed) {
     PrintError("{}: no records\n", command.store.string());
     return 2;
   }
-  RequireOneContent(records, command.store, "map");
+  RequireOneContent(records, command.store, "robustness");
   const FailureMap map = MakeFailureMap(rules, records);
   if (command.gate) RequireDemands(map, command.rules);
   Table table = MapTable(map);
@@ -233,7 +233,7 @@ int PrintMap(const MapCommand& command, const std::string& typed) {
 
 int PrintVerdicts(const VerdictCommand& command, const std::string& typed) {
   const std::vector<Record> records = LoadRecords(command.store);
-  RequireOneContent(records, command.store, "verdict");
+  RequireOneContent(records, command.store, "check-claims");
   std::vector<ClaimResult> results;
   for (const ClaimRule& rule : ReadClaims(command.claims)) {
     results.push_back(Evaluate(rule, records));
@@ -255,8 +255,8 @@ Examples:
   loopbench table out --columns mechanism,formulation,drift_position_max --format latex
   loopbench table out --kind timing --sort rhs_ns_median --format csv --out timing.csv
 
-"ok?" is a run that finished with doubts: the lines below the table say why, column doubts has codes
-(docs/reference/outcomes-and-warnings.md), --gate doubts exits with status 1.
+"ok?" is a run that finished with warnings: the lines below the table say why, column warnings has codes
+(docs/reference/outcomes-and-warnings.md), --fail-on warnings exits with status 1.
 Any key of the records may be a column; a wrong one is answered with the list of all.
 Every table ends with the command, machine, compiler, libraries and commit.)";
 
@@ -268,25 +268,25 @@ Examples:
 
 Without --x and --y: angles and displacements of the run that is trusted most (finished, at level
 position, at the finest tolerance), drift with its fitted exponents, and of runs in several scalars
-error and drift against tolerance. Runs that failed are crosses, doubtful ones hollow marks. A figure that
+error and drift against tolerance. Runs that failed are crosses, flagged ones hollow marks. A figure that
 cannot be drawn is reported with its reason, and the exit code is 2 after all others are drawn.)";
 
 constexpr const char* kMapFooter = R"(
 Examples: (paths from the root of the repository)
-  loopbench map results/runs/extremes --rules configs/experiments/extremes/map.json
-  loopbench map out --rules map.json --out out --format pdf
-  loopbench map out --rules map.json --gate        (1 if a cell that must hold does not)
+  loopbench robustness results/runs/extremes --rules configs/experiments/extremes/map.json
+  loopbench robustness out --rules map.json --out out --format pdf
+  loopbench robustness out --rules map.json --fail-on required        (1 if a cell that must hold does not)
 
 Rules name methods (columns), extremes (rows) and what decides about a row:
   {"title": "Extremes",
-   "columns": [{"label": "O-DCA, position",
-                "select": {"formulation": "odca", "enforcement": "position"}}],
+   "methods": [{"label": "O-DCA projection",
+                "select": {"formulation": "odca", "enforcement": "projection"}}],
    "groups": [{"label": "singular positions", "rows": [
      {"label": "parallelogram, 1e-8", "select": {"mechanism": "parallelogram", "rtol": 1e-8},
-      "decides": [{"measure": "branch_error_max", "limit": 500, "of": "rtol", "unit": "rad"}],
-      "why": "...", "must_hold": "all"}]}]}
+      "criteria": [{"measure": "branch_error_max", "limit": 500, "relative_to": "rtol", "unit": "rad"}],
+      "rationale": "...", "required": "all"}]}]}
 "limit", "at_least" or "equal" compare a key of the record with a number, or with that many times
-another key ("of"). "right": ["locked"] says how a run should end if not as finished.
+another key ("of"). "expected_outcome": ["locked"] says how a run should end if not as finished.
 Of several records that match a cell the worst decides. A cell
   holds         ended as it should, all measures within their limits
   singular, ... stopped early with that reason; time-limit, ...: did not end by itself
@@ -370,10 +370,10 @@ void AddMap(Commands& commands) {
   CLI::App* app = commands.Add("map", "Tabulate which methods pass which stress tests",
                                [&](const Typed& typed) { return PrintMap(command, typed.line); });
   app->add_option("store", command.store,
-                  "Folder of a run, a .jsonl file, or failure-map.csv to draw it again")
+                  "Folder of a run, a .jsonl file, or robustness-map.csv to draw it again")
       ->required();
   app->add_option("--rules", command.rules, "Rows, columns and limits (JSON)")->required();
-  app->add_option("-o,--out", command.out, "Folder for failure-map.csv, .md and the picture");
+  app->add_option("-o,--out", command.out, "Folder for robustness-map.csv, .md and the picture");
   app->add_option("--format", command.format, "Figure format")
       ->check(CLI::IsMember({"svg", "pdf"}))
       ->capture_default_str();
@@ -390,7 +390,7 @@ namespace {
 struct ReportCommand {
   std::filesystem::path store;
   std::filesystem::path out;     ///< default report.html in the store's folder
-  std::filesystem::path rules;   ///< of a failure map, or none
+  std::filesystem::path rules;   ///< of a robustness map, or none
   std::filesystem::path claims;  ///< or none
 };
 
@@ -409,15 +409,15 @@ int WriteReport(const ReportCommand& command, const std::string& typed) {
     PrintError("{}: no records\n", command.store.string());
     return 2;
   }
-  if (options.rules) RequireOneContent(records, command.store, "map");
-  if (!options.claims.empty()) RequireOneContent(records, command.store, "verdict");
+  if (options.rules) RequireOneContent(records, command.store, "robustness");
+  if (!options.claims.empty()) RequireOneContent(records, command.store, "check-claims");
   ReportData data = MakeReport(records, options);
   data.provenance = Provenance(typed);
   const std::filesystem::path out =
       command.out.empty() ? StoreFile(command.store).parent_path() / "report.html" : command.out;
   const std::string page = ToHtml(data);
   WriteFileAtomically(out, page);
-  Print("wrote {}: {} runs, {} of them failed and {} doubtful, {} kB\n", out.string(), data.runs,
+  Print("wrote {}: {} runs, {} of them failed and {} flagged, {} kB\n", out.string(), data.runs,
         data.failed, data.doubted, (page.size() + 999) / 1000);
   for (const std::string& remark : data.remarks) Print("  {}\n", remark);
   for (const std::string& file : data.changed) PrintError("{}\n", file);
@@ -434,11 +434,13 @@ void AddReport(Commands& commands) {
   app->add_option("store", command.store, "Folder with results.jsonl, or a .jsonl file")
       ->required();
   app->add_option("-o,--out", command.out, "File (default: report.html in the store)");
-  app->add_option("--rules", command.rules, "Rules of a failure map, which the page then has");
+  app->add_option("--rules", command.rules, "Rules of a robustness map, which the page then has");
   app->add_option("--claims", command.claims, "Claims, whose verdicts the page then has");
   app->footer(
-      "Verdicts and doubts, all cases as tables to sort and filter, drift and errors against time\n"
-      "beside the mechanism in motion, work and precision with the Pareto front, the failure map, "
+      "Verdicts and warnings, all cases as tables to sort and filter, drift and errors against "
+      "time\n"
+      "beside the mechanism in motion, work and precision with the Pareto front, the robustness "
+      "map, "
       "and\n"
       "where each number comes from. Motions are those that the run has kept: with \"output\" or\n"
       "\"reference\" in the experiment. Nothing is computed again.\n"

@@ -134,7 +134,7 @@ int Merge(const MergeCommand& command) {
     for (const std::string& name : CopyTrajectories({record}, owners, target.file())) {
       PrintError("warning: no store has trajectories/{} as the run that is kept wrote it\n", name);
     }
-    if (scenes.insert(record.Text("scene_id")).second) {
+    if (scenes.insert(record.Text("problem_id")).second) {
       CopyMechanisms({record}, files, target.file());
     }
     target.Append(record);

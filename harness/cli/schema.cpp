@@ -24,7 +24,7 @@ const std::array<Kind, 6>& Kinds() {
        {"experiment", "experiment", ExperimentSchema},
        {"benchmarks", "benchmarks", BenchmarksSchema},
        {"claims", "claims", ClaimsSchema},
-       {"map", "failure map", MapSchema},
+       {"map", "robustness map", MapSchema},
        {"series", "published series", PublishedSeriesSchema}}};
   return kinds;
 }

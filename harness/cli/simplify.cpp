@@ -344,10 +344,10 @@ void AddSimplify(Commands& commands) {
   app->add_option("--only", command.only, "Only these ideas: NAME[,NAME]")->delimiter(',');
   app->add_option("--threshold", command.thresholds,
                   "NAME=VALUE: an idea's limit, unless said " + LimitsText());
-  app->add_option("--lump", lumping, "Where the mass of a light link goes")
+  app->add_option("--lump-mass", lumping, "Where the mass of a light link goes")
       ->check(CLI::IsMember(LumpingNames()))
       ->capture_default_str();
-  app->add_option("--short-run", command.short_run,
+  app->add_option("--trial-duration", command.short_run,
                   "Length of the short run that shows what hardly moves [s], 0: none")
       ->check(NumberFrom(0.0, 1e6))
       ->capture_default_str();

@@ -66,7 +66,7 @@ int PrintTradeoff(const TradeoffCommand& command, const std::string& typed) {
     PrintError("{}: no records\n", command.store.string());
     return 2;
   }
-  RequireOneContent(records, command.store, "tradeoff");
+  RequireOneContent(records, command.store, "work-precision");
   const Tradeoff tradeoff = MakeTradeoff(records, command.options);
   const std::filesystem::path folder = FolderOf(command);
   WriteTradeoff(tradeoff, folder, typed);
@@ -88,16 +88,16 @@ int PrintTradeoff(const TradeoffCommand& command, const std::string& typed) {
 constexpr const char* kTradeoffFooter = R"(
 Examples:
   loopbench run mine.json --out out               ("timing": {"cases": true} in mine.json)
-  loopbench tradeoff out --figures
-  loopbench tradeoff out --where 'rtol>1e-11' --cost rhs_equivalents --classes 1e-2,1e-5
-  loopbench tradeoff out --error closed_form_error_max --per mechanism,horizon,mass --out tradeoff
+  loopbench work-precision out --figures
+  loopbench work-precision out --where 'rtol>1e-11' --cost-key rhs_equivalents --error-levels 1e-2,1e-5
+  loopbench work-precision out --error-key closed_form_error_max --per mechanism,horizon,mass --out tradeoff
 
 Each accuracy run beside the timing of the same case, problem by problem (--per). Runs that failed
-or have doubts are compared with nobody, and listed with the reason. A '*' stands on the Pareto
+or have warnings are compared with nobody, and listed with the reason. A '*' stands on the Pareto
 front. The overview has, per problem and class of errors, what the cheapest method of each formulation
 costs, and how many times the cheapest of all. Below stands, from the records, what was equal among the
-compared rows and what was not. All rows are in tradeoff.csv and tradeoff.md, the cheapest methods in
-tradeoff-overview.csv, figures (error over cost, over tolerance, over time) in figures/.)";
+compared rows and what was not. All rows are in work-precision.csv and work-precision.md, the cheapest methods in
+work-precision-overview.csv, figures (error over cost, over tolerance, over time) in figures/.)";
 
 }  // namespace
 
@@ -123,7 +123,7 @@ void AddTradeoff(Commands& commands) {
   app->add_option("--per", options.per, "Keys that make one problem: a,b")
       ->delimiter(',')
       ->capture_default_str();
-  app->add_option("--classes", options.classes, "Errors that the overview asks for: a,b")
+  app->add_option("--error-levels", options.classes, "Errors that the overview asks for: a,b")
       ->delimiter(',')
       ->check(NumberFrom(0.0, 1e300))
       ->capture_default_str();

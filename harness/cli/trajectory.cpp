@@ -126,7 +126,8 @@ std::string NameOf(const Record& record,
     if (!record.Text(key).empty()) name += (name.empty() ? "" : "-") + record.Text(key);
   }
   for (const auto& [key, value] : parameters) name += fmt::format("-{}-{}", key, value);
-  if (const std::string content = record.Text("content"); !content.empty()) name += "-" + content;
+  if (const std::string content = record.Text("config_hash"); !content.empty())
+    name += "-" + content;
   return FileName(name);
 }
 

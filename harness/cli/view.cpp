@@ -96,7 +96,7 @@ void AddView(Commands& commands) {
   app->add_option("--view", command.svg.view, "Viewing direction of a spatial mechanism (SVG)")
       ->check(CLI::IsMember(ViewNames()))
       ->capture_default_str();
-  app->add_flag("--plain", command.svg.plain,
+  app->add_flag("--no-annotations", command.svg.plain,
                 "svg: only the mechanism, without what the file said before the assembly and "
                 "without lines of text");
   app->add_flag("--all", command.all, "text: every row of long tables");
@@ -107,7 +107,7 @@ void AddView(Commands& commands) {
       "gaps;\n"
       "the exit code is then 2.\n"
       "  loopbench view my.json\n"
-      "  loopbench view my.json --out my.svg --view side --plain");
+      "  loopbench view my.json --out my.svg --view side --no-annotations");
 }
 
 }  // namespace loopbench::harness

@@ -241,7 +241,7 @@ ClusterRun ReadClusterRun(const std::filesystem::path& folder) {
     if (lines.empty()) {
       throw ConfigError(fmt::format(
           "found an empty file, which a submit that was killed leaves, expected what loopbench "
-          "submit writes; submit once more, without --again, after: {}",
+          "submit writes; submit once more, without --resubmit, after: {}",
           ShellLine({"rm", file.string()})));
     }
     return ToClusterRun(FromJsonLine(lines.front()));

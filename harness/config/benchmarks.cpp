@@ -190,7 +190,7 @@ const Fields<GroupInFile>& GroupFields() {
        {"", By(Json::object(), ChangeMembers)},
        {"measure", Choices(&BenchmarkGroup::kinds, NamesOf<BenchmarkKind>(), "what is measured"),
         "A right-hand side, an integrator step, or both.", "\"rhs\", \"step\" or both"},
-       {"columns", Columns(&BenchmarkGroup::columns), "How the loops are imposed.",
+       {"methods", Columns(&BenchmarkGroup::columns), "How the loops are imposed.",
         "an array of columns"}});
   return fields;
 }

@@ -78,8 +78,8 @@ std::string BenchmarkName(BenchmarkKind kind, const BenchmarkMember& member, con
 // Reads what is benchmarked (configs/benchmarks/default.json):
 //   {"name", "comment", "states", "integrator", "step",
 //    "groups": [{"mechanisms": [path, ...]  or  "family": "chain|ladder|grid", "sizes": [...],
-//                "in_space": false, "compile": false,
-//                "measure": ["rhs", "step"], "columns": [...]}]}
+//                "in_space": false, "preprocess": false,
+//                "measure": ["rhs", "step"], "methods": [...]}]}
 // Paths are relative to the file; columns are those of experiments. "states" names a file of
 // hashes, which loopbench_bench --save-states writes:
 //   {"<member>/<coordinates>": "<16 hexadecimal digits>"}

@@ -34,8 +34,7 @@ inline constexpr std::array<std::string_view, 0> kNames = {};
 template <>
 inline constexpr std::array<std::string_view, 2> kNames<Coordinates> = {"joint", "absolute"};
 template <>
-inline constexpr std::array<std::string_view, 2> kNames<SolverKind> = {"as-published",
-                                                                       "rank-revealing"};
+inline constexpr std::array<std::string_view, 2> kNames<SolverKind> = {"plain", "rank-revealing"};
 template <>
 inline constexpr std::array<std::string_view, 2> kNames<JacobianKind> = {"forward",
                                                                          "finite-difference"};
@@ -89,7 +88,7 @@ struct Column {
 /// The most threads that files may ask for: more than processors have.
 inline constexpr int kMostThreads = 256;
 
-/// "odca/acceleration/joint/as-published", "odca/baumgarte(5, 5)/joint/rank-revealing",
+/// "odca/acceleration/joint/plain", "odca/baumgarte(5, 5)/joint/rank-revealing",
 /// "odca/velocity/joint/rank-revealing/2-threads".
 std::string ToString(const Column& column);
 

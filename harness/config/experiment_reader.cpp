@@ -240,7 +240,7 @@ Setting ParseSetting(std::string_view text) {
   const std::size_t equals = text.find('=');
   if (equals == std::string_view::npos || text.front() != '/') {
     throw ConfigError(fmt::format(
-        "--set: found \"{}\", expected /json/pointer=value, such as /scenes/0/horizon=20", text));
+        "--set: found \"{}\", expected /json/pointer=value, such as /problems/0/horizon=20", text));
   }
   return {std::string(text.substr(0, equals)), std::string(text.substr(equals + 1))};
 }
@@ -386,13 +386,13 @@ const Fields<ExperimentFile>& ExperimentFileFields() {
       "experiment",
       "Which mechanisms, columns, tolerances and horizons are run. Lists expand as a cross "
       "product. The program checks more than this schema: that mechanism files exist and are "
-      "valid, that scenes and columns are different, that fields of a sweep exist, that ranges "
+      "valid, that problems and columns are different, that fields of a sweep exist, that ranges "
       "have two different ends, and that every ensemble and exclusion matches a case.",
       DocumentRows<File>(
           {{"name", Text(&File::name), "Of the suite.", "a name"},
            {"comment", Text(&File::comment), "Free text for readers."},
-           {"scenes", ScenesValue(), "What moves.", "an array of scenes"},
-           {"columns", By(ColumnsSchema(), ReadAllColumns), "How the loops are imposed.",
+           {"problems", ScenesValue(), "What moves.", "an array of problems"},
+           {"methods", By(ColumnsSchema(), ReadAllColumns), "How the loops are imposed.",
             "an array of columns"},
            {"tolerances", By(some_or_none, ReadAnyTolerances),
             "rtol = atol of the integrator; above the spacing of doubles. May be left out, or be "
@@ -445,9 +445,9 @@ std::string ExperimentText(const SingleRun& run) {
   Json experiment = {
       {"name", run.name},
       {"comment", run.comment},
-      {"scenes",
+      {"problems",
        Json::array({{{"mechanism", run.mechanism.generic_string()}, {"horizon", run.horizon}}})},
-      {"columns", Json::array({column})},
+      {"methods", Json::array({column})},
       {"integrator", run.integrator},
       {"timing", {{"cases", true}}},
       {"reference",
@@ -468,13 +468,13 @@ std::string LadderText(const LadderFile& ladder) {
     scenes.push_back({{"mechanism", mechanism}, {"horizon", ladder.horizon}});
   }
   const Json columns = Json::array({{{"formulation", {"odca", "lagrange", "reduction"}},
-                                     {"enforcement", "position"},
+                                     {"enforcement", "projection"},
                                      {"coordinates", "joint"}}});
   const Json file = {
       {"name", ladder.name},
       {"comment", ladder.comment},
-      {"scenes", scenes},
-      {"columns", columns},
+      {"problems", scenes},
+      {"methods", columns},
       {"tolerances", {1e-6, 1e-9}},
       {"integrator", "dormand-prince"},
       {"compile", {{"planar", false}, {"welds", false}, {"immovable", false}, {"islands", false}}},

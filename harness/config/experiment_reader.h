@@ -20,7 +20,7 @@ namespace loopbench::harness {
 // combinations is as good as one of ten: nothing here grows with their number.
 
 /// "--set /json/pointer=value": the value of one field, set before anything is read. A pointer may
-/// go through a scene's mechanism path into that file ("/scenes/0/mechanism/gravity"); "*" stands
+/// go through a scene's mechanism path into that file ("/problems/0/mechanism/gravity"); "*" stands
 /// for all elements of an array. Keys that the file leaves out may be set; what the reader does not
 /// know it refuses as it does in the file.
 struct Setting {

@@ -61,8 +61,8 @@ void ReadHorizons(const JsonNode& node, RuleOfExperiment& rule) {
 void ReadSceneNames(const JsonNode& node, RuleOfExperiment& rule) {
   NameList known;
   for (const ExperimentScene& scene : rule.experiment->scenes) known.Add(scene.name);
-  for (const JsonNode& element : node.OneOrMore("scene names")) {
-    const auto scene = element.Choice(known, "a scene");
+  for (const JsonNode& element : node.OneOrMore("problem names")) {
+    const auto scene = element.Choice(known, "a problem");
     if (scene) rule.scenes.push_back(known.all()[static_cast<std::size_t>(*scene)]);
   }
 }
@@ -105,7 +105,7 @@ void CheckBetween(const JsonNode& element, const EnsembleRule& rule, const Exper
     const NameList known = DrawableJoints(experiment.scenes[s].mechanism.description);
     for (const auto& [joint, bounds] : node->Members()) {
       if (known.Find(joint)) continue;
-      bounds.FailAs(fmt::format("no held joint \"{}\" of one coordinate in scene \"{}\"", joint,
+      bounds.FailAs(fmt::format("no held joint \"{}\" of one coordinate in problem \"{}\"", joint,
                                 experiment.scenes[s].name),
                     fmt::format("a joint among: {}", fmt::join(known.all(), ", ")),
                     NearestSpelling(joint, known.all()));
@@ -144,7 +144,7 @@ const Fields<RuleOfExperiment>& EnsembleFields() {
        {"", By(one_start, ReadStart)},
        {"branch_bound", Number(&Rule::branch_bound, kPositive),
         "A run further from its branch has left it [rad]."},
-       {"scenes", By(OneOrMoreSchema(TextSchema()), ReadSceneNames), "Names of scenes."},
+       {"problems", By(OneOrMoreSchema(TextSchema()), ReadSceneNames), "Names of problems."},
        {"horizons", By(NumberListSchema(kPositive), ReadHorizons), "Of cases [s]."},
        {"tolerances", By(NumberListSchema(kPositive), ReadTolerances), "Of cases."},
        {"formulation", FormulationChoices(&Rule::formulations), "Of cases."},
@@ -272,7 +272,7 @@ class Members {
   std::vector<FamilyMember> Take() {
     if (used_ > room_) {
       node_.FailAs(fmt::format("mechanisms with {} bodies", used_),
-                   fmt::format("at most {} in all scenes", kMaxBodies));
+                   fmt::format("at most {} in all problems", kMaxBodies));
     }
     return std::move(members_);
   }
@@ -434,7 +434,7 @@ void Resize(MechanismFile* mechanism, double factor) {
   mechanism->canonical += fmt::format(" at scale {}", factor);
 }
 
-/// One entry of "scenes": several scenes where a family has several counts. The base is what they
+/// One entry of "problems": several scenes where a family has several counts. The base is what they
 /// have in common.
 struct SceneEntry : ExperimentScene {
   MechanismFiles* files = nullptr;
@@ -457,9 +457,9 @@ const Fields<SceneEntry>& SceneFields() {
                     FamilySchema(),
                     {{"$ref", "mechanism.schema.json#"}, {"words", "a [mechanism](#mechanism)"}}});
   static const Fields<SceneEntry> fields(
-      "scene", "A mechanism and how long it moves.",
+      "problem", "A mechanism and how long it moves.",
       {{"mechanism", By(mechanism, ReadMechanism),
-        "Path of a mechanism file, relative to this file; a member of a family, one scene per "
+        "Path of a mechanism file, relative to this file; a member of a family, one problem per "
         "count; or a mechanism (mechanism.schema.json).",
         "the path of a mechanism file, a mechanism, or {\"family\": ...}"},
        {"horizon", NumberList(&SceneEntry::horizons, kPositive), "Simulated time [s].",
@@ -501,20 +501,20 @@ std::size_t BodiesOf(const ExperimentScene& scene) {
 void ReadScenes(const JsonNode& node, ExperimentFile& experiment) {
   std::set<std::string> names;
   std::size_t bodies = 0;
-  const std::vector<JsonNode> elements = node.Elements("scenes");
-  if (node.value().is_array() && elements.empty()) node.Fail("at least one scene");
+  const std::vector<JsonNode> elements = node.Elements("problems");
+  if (node.value().is_array() && elements.empty()) node.Fail("at least one problem");
   for (const JsonNode& element : elements) {
     const std::size_t room = kMaxBodies - std::min(kMaxBodies, bodies);
     for (ExperimentScene& scene : ReadScene(element, *experiment.files, room)) {
       if (!scene.name.empty() && !names.insert(scene.name).second) {
-        element.FailAs(fmt::format("scene \"{}\" again", scene.name), "a \"name\" of its own");
+        element.FailAs(fmt::format("problem \"{}\" again", scene.name), "a \"name\" of its own");
       }
       bodies += BodiesOf(scene);
       experiment.scenes.push_back(std::move(scene));
     }
     if (bodies > kMaxBodies) {
       element.FailAs(fmt::format("mechanisms with {} bodies so far", bodies),
-                     fmt::format("at most {} in all scenes", kMaxBodies));
+                     fmt::format("at most {} in all problems", kMaxBodies));
       break;
     }
   }

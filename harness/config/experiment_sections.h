@@ -192,7 +192,8 @@ std::optional<std::vector<std::string>> PointerTokens(const std::string& pointer
 
 // "sweep" of an experiment file: axes that are crossed, each the values of one field.
 //
-//   "sweep": [{"name": "mass", "field": "/scenes/0/mechanism/bodies/1/mass", "values": [1, 2, 3]},
+//   "sweep": [{"name": "mass", "field": "/problems/0/mechanism/bodies/1/mass", "values": [1, 2,
+//   3]},
 //             {"zip": [{"name": "stiffness", ...}, {"name": "damping", ...}]}]
 //
 // makes 3 n combinations: the axes of a zip go in step. Internal to harness/config.

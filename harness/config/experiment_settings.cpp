@@ -41,7 +41,7 @@ void ReadSizes(const JsonNode& node, TimingFamily& family) {
 }
 
 /// What accuracy cases say themselves.
-constexpr const char* kOfCases[] = {"tolerance", "horizon", "columns"};
+constexpr const char* kOfCases[] = {"tolerance", "horizon", "methods"};
 
 void RequireCasesAlone(const JsonNode& node, Timing& timing) {
   if (!timing.cases) return;
@@ -74,7 +74,7 @@ const Fields<TimingFamily>& TimingFamilyFields() {
         "a family"},
        {"sizes", By(IntegerListSchema(1, kMaxCount), ReadSizes), TextOfSizedFamilies(),
         "a list of integers"},
-       {"columns", Columns(&TimingFamily::columns), "Timed.", "an array of columns"},
+       {"methods", Columns(&TimingFamily::columns), "Timed.", "an array of methods"},
        {"", Json::object({{"allOf", ranges}})}});
   return fields;
 }
@@ -108,7 +108,7 @@ Record RecordOf(const Limits& limits) {
 
 const Fields<CompileOptions>& CompileFields() {
   static const Fields<CompileOptions> fields(
-      "compile",
+      "preprocess",
       "What is simplified before a run. The motion is the same but for rounding; records say in "
       "\"compiled\" what was found to save.",
       {{"planar", Bool(&CompileOptions::planar),
@@ -137,8 +137,8 @@ const Fields<Timing>& TimingFields() {
       {{"repeats", Integer(&Timing::repeats, 0, kMaxCount), "0: no timing."},
        {"tolerance", Number(&Timing::tolerance, kTolerances), "rtol = atol of the integrator."},
        {"horizon", Number(&Timing::horizon, kPositive),
-        "Simulated time [s]; default: the shortest of each scene."},
-       {"columns", Columns(&Timing::columns), "Default: those of the experiment."},
+        "Simulated time [s]; default: the shortest of each problem."},
+       {"methods", Columns(&Timing::columns), "Default: those of the experiment."},
        {"cases", Bool(&Timing::cases),
         "Every accuracy case is timed as it is, with its own integrator, tolerance or step, and "
         "horizon; not beside tolerance, horizon and columns."},
@@ -151,13 +151,13 @@ const Fields<Precision>& PrecisionFields() {
   static const Fields<Precision> fields(
       "precision",
       "The columns in several scalars with one integrator (ode45), against a reference in "
-      "float128. Planar mechanisms; one horizon per scene.",
+      "float128. Planar mechanisms; one horizon per problem.",
       {{"scalars", Choices(&Precision::scalars, NamesOf<Scalar>(), "a scalar"),
         "One or several, narrowest first by custom.", "a list of scalars"},
        {"tolerances", NumberList(&Precision::tolerances, kTolerancesOfLadders),
         "Default: those of the experiment."},
        {"horizon", Number(&Precision::horizon, kPositive),
-        "Simulated time [s]; default: the shortest of each scene."},
+        "Simulated time [s]; default: the shortest of each problem."},
        {"reference", Number(&Precision::reference, kReferences), "Tolerance of the reference."}});
   return fields;
 }
@@ -307,19 +307,19 @@ void ReadSeries(const JsonNode& node, ExperimentFile& experiment) {
     if (scenes.size() == 1) {
       ReadSeriesOf(node, *experiment.files, &scenes.front());
     } else if (scenes.size() > 1) {
-      node.FailAs(fmt::format("one file for {} scenes", scenes.size()),
-                  "an object with the file of each scene that has one, by the scene's name");
+      node.FailAs(fmt::format("one file for {} problems", scenes.size()),
+                  "an object with the file of each problem that has one, by the problem's name");
     }
     return;
   }
   if (!node.value().is_object()) {
-    node.Fail("the path of a published series, or an object with one for each scene by its name");
+    node.Fail("the path of a published series, or an object with one for each problem by its name");
     return;
   }
   NameList names;
   for (const ExperimentScene& scene : scenes) names.Add(scene.name);
   if (!node.ExpectObject(names)) return;
-  if (node.value().empty()) node.Fail("at least one scene with its file");
+  if (node.value().empty()) node.Fail("at least one problem with its file");
   for (ExperimentScene& scene : scenes) {
     if (const auto file = node.Optional(scene.name)) {
       ReadSeriesOf(*file, *experiment.files, &scene);
@@ -360,7 +360,8 @@ const Fields<ReferenceOptions>& ReferenceFields() {
         "CPU time of each integration [s]. One that is cut off certifies as far as it got."},
        {"series", EitherSchema({TextSchema(), MapSchema(TextSchema(), 1)}),
         "Instead: path of a published series (series.schema.json), relative to this file; with "
-        "several scenes an object of such paths by the scenes' names. Scenes without one have no "
+        "several problems an object of such paths by the problems' names. Problems without one "
+        "have no "
         "reference."},
        {"", By(SeriesAloneSchema(), RequireSeriesAlone)}});
   return fields;
@@ -458,7 +459,7 @@ void ExperimentFields::Walk(Json& node, const std::vector<std::string>& tokens, 
     found->made.push_back(pointer);
     return;
   }
-  const bool at_mechanism = depth == 3 && tokens[0] == "scenes" && tokens[2] == "mechanism";
+  const bool at_mechanism = depth == 3 && tokens[0] == "problems" && tokens[2] == "mechanism";
   if (at_mechanism && node.is_string() && !TakeIn(node, pointer, found)) return;
   const bool of_limits = depth == 1 && tokens[0] == "limits" && node.is_object();
   const std::string token = of_limits ? NameInLimits(node, tokens[depth]) : tokens[depth];
@@ -508,7 +509,7 @@ FieldTargets ExperimentFields::Find(const std::string& pointer) {
   const auto tokens = PointerTokens(pointer);
   if (!tokens) {
     found.fault = FieldFault{fmt::format("\"{}\"", pointer),
-                             "a JSON Pointer such as /scenes/0/horizon", "", ""};
+                             "a JSON Pointer such as /problems/0/horizon", "", ""};
     return found;
   }
   Walk(document_, *tokens, 0, "", &found);

@@ -104,9 +104,9 @@ const Fields<AxisOfSweep>& AxisFields() {
         "In every record, for filters and tables; none of the names that records have already.",
         "a name for tables and filters"},
        {"field", By(PatternSchema("^/(?!sweep(/|$)|exclude(/|$))"), ReadField),
-        "JSON Pointer into this file, or through a scene's mechanism path into that one; \"*\" "
+        "JSON Pointer into this file, or through a problem's mechanism path into that one; \"*\" "
         "stands for all elements of an array.",
-        "a JSON Pointer such as /scenes/0/horizon"},
+        "a JSON Pointer such as /problems/0/horizon"},
        {"values", By(values, ReadValues),
         "Of any kind, each once (in step with others, they may repeat), or a range.",
         "an array of values or a range"}});
@@ -380,7 +380,7 @@ const Fields<ColumnLists>& ColumnFields() {
         Choices(&ColumnLists::coordinates, NamesOf<Coordinates>(), "a coordinate set"),
         "Of the joints of a tree, or of every body."},
        {"solver", Choices(&ColumnLists::solvers, NamesOf<SolverKind>(), "a solver"),
-        "For reduction: as-published is the fixed independent set, rank-revealing the automatic "
+        "For reduction: plain is the fixed independent set, rank-revealing the automatic "
         "partition."},
        {"threads", IntegerList(&ColumnLists::threads, 1, kMostThreads),
         "That may work on one right-hand side; results have the same bits for any number."},
@@ -421,11 +421,11 @@ std::vector<Column> ReadColumnEntry(const JsonNode& node) {
 
 }  // namespace
 
-Json ColumnsSchema() { return Named("columns", OneOrMoreSchema(ColumnFields().Schema())); }
+Json ColumnsSchema() { return Named("methods", OneOrMoreSchema(ColumnFields().Schema())); }
 
 std::vector<Column> ReadColumns(const JsonNode& node) {
   std::vector<Column> columns;
-  for (const JsonNode& element : node.OneOrMore("columns")) {
+  for (const JsonNode& element : node.OneOrMore("methods")) {
     for (const Column& column : ReadColumnEntry(element)) {
       const bool again = std::find(columns.begin(), columns.end(), column) != columns.end();
       if (again) {

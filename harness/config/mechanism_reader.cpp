@@ -96,7 +96,7 @@ const Fields<Draft>& MechanismFileFields() {
       "more than this schema: that names exist, that inertias are positive definite and those of "
       "a body, that each joint gets as many values as it has coordinates.",
       DocumentRows<Draft>(
-          {{"name", Text(&Draft::name), "Of the scene.", "a name"},
+          {{"name", Text(&Draft::name), "Of the problem.", "a name"},
            {"comment", By(TextSchema(), ReadComment, WriteComment), "Free text for readers."},
            {"space", Choice(&Draft::space, {"planar", "spatial"}, "a space"),
             "Planar: everything moves in the x-y plane, third components are 0."},
@@ -116,7 +116,7 @@ const Fields<Draft>& MechanismFileFields() {
            {"accuracy", Number(&Draft::accuracy, kPositive),
             "Accuracy of points, axes and initial values [rad, or lengths of the mechanism]. Loops "
             "that close within it are closed; constraints that differ by less are redundant."},
-           {"observe", Section(ObservationFields())}}));
+           {"known_solution", Section(ObservationFields())}}));
   return fields;
 }
 
@@ -435,7 +435,7 @@ const Fields<Draft>& InitialFields() {
 
 const Fields<Draft>& ObservationFields() {
   static const Fields<Draft> fields(
-      "observe", "Exact facts that observers compare with.",
+      "known_solution", "Exact facts that observers compare with.",
       {{"branch", By(ArraySchema(MapSchema(NumberSchema(), 1)), ReadBranch, WriteBranch),
         "Linear combinations of absolute body angles, by body, that stay constant on the right "
         "branch."},

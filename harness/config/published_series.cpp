@@ -156,7 +156,7 @@ const Fields<QuantityDraft>& QuantityFields() {
        {"speed", Bool(&QuantityDraft::is_speed), "The values are its rate, per second."},
        {"values", By(ArraySchema(NumberSchema(), 1, kMostTimes), ReadValues), "One for each time.",
         "a list of numbers, one for each time"},
-       {"accuracy", Number(&QuantityDraft::accuracy, kPositive),
+       {"uncertainty", Number(&QuantityDraft::accuracy, kPositive),
         "What the source claims of every value, absolute, in their unit: half a unit of the last "
         "printed digit at least.",
         "a number > 0 in the unit of the values"}});

@@ -1,4 +1,4 @@
-// What the files of rules share (claims, failure maps): words, and selections of records.
+// What the files of rules share (claims, robustness maps): words, and selections of records.
 //
 // Internal to harness/config.
 #pragma once

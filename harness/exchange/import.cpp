@@ -42,7 +42,7 @@ Imported ImportText(std::string_view text, const std::string& file, const Import
   const auto index = found - Roots().begin();
   const std::string& format = ImportFormats()[static_cast<std::size_t>(index)];
   if (wanted != ImportFormats().end() && *wanted != format) {
-    root.Fail(format, fmt::format("{}, as --format says", *wanted));
+    root.Fail(format, fmt::format("{}, as --input-format says", *wanted));
   }
   if (options.floats && format != "urdf") {
     root.Fail(format, "urdf with --floating: other formats say what is free");

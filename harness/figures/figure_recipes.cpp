@@ -282,7 +282,7 @@ NamedFigure FigureOf(std::span<const Record> rungs) {
   named.name = "precision";
   for (const char* key : kLadderKeys) {
     const std::string_view word = key;
-    const bool in_name = word != "horizon" && word != "experiment" && word != "content";
+    const bool in_name = word != "horizon" && word != "experiment" && word != "config_hash";
     if (in_name) named.name += "-" + first.Text(key);
   }
   Figure& figure = named.figure;
@@ -317,7 +317,7 @@ std::vector<NamedFigure> PrecisionFigures(std::span<const Record> records) {
     figures.push_back(FigureOf(std::span(sorted).subspan(begin, end - begin)));
     others.push_back(
         fmt::format("-{}s-{}", sorted[begin].Text("horizon"), sorted[begin].Text("experiment")));
-    contents.push_back("-" + sorted[begin].Text("content"));
+    contents.push_back("-" + sorted[begin].Text("config_hash"));
     begin = end;
   }
   for (const std::vector<std::string>& endings : {others, contents}) {

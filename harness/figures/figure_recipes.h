@@ -39,7 +39,7 @@ Figure DriftFigure(std::span<const Record> records);
 Figure SingularFigure(std::span<const Record> records);
 
 /// All figures of the records that have series: for each mechanism and horizon the motion of one
-/// run (that finished and is not in doubt, at level position, at the finest tolerance, as far as
+/// run (that finished and is not in doubt, at level projection, at the finest tolerance, as far as
 /// there is one), and for each mechanism, horizon and tolerance one of drift; through singular
 /// positions where a run of them came near one. Runs that differ in integrator, experiment or a
 /// parameter have figures of their own, with its value in their names.

@@ -245,7 +245,7 @@ std::vector<std::string> RemarksOn(std::span<const Record> rows, const Figure& f
   const auto doubted = std::ranges::count_if(rows, [](const Record& row) { return HasDoubt(row); });
   if (doubted > 0) {
     remarks.push_back(
-        fmt::format("{} of {} runs finished with doubts (column doubts of "
+        fmt::format("{} of {} runs finished with warnings (column warnings of "
                     "tables); their marks are hollow",
                     doubted, rows.size()));
   }
@@ -327,7 +327,7 @@ bool IsPositive(double value) { return value > 0.0 && std::isfinite(value); }
 
 DistinctPoints::DistinctPoints(const FreeFigure& wanted, std::size_t most)
     : axes_{wanted.x, wanted.y}, group_(KeysIn(wanted.group)), most_(most) {
-  keys_ = {"kind", "outcome", "doubts", wanted.x, wanted.y};
+  keys_ = {"kind", "outcome", "warnings", wanted.x, wanted.y};
   keys_.insert(keys_.end(), group_.begin(), group_.end());
   keys_.insert(keys_.end(), kCaseKeys.begin(), kCaseKeys.end());
 }

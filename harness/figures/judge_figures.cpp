@@ -203,9 +203,9 @@ class MapPainter {
       Text(glyph.meaning, at + 12.0, y, "left");
     }
     if (doubts_) {
-      const double at = place("holds, in doubt", 12.0);
+      const double at = place("holds, with warnings", 12.0);
       Draw(GlyphOf(CellState::kHolds), true, at + 5.0, y, "#000000");
-      Text("holds, in doubt", at + 12.0, y, "left");
+      Text("holds, with warnings", at + 12.0, y, "left");
     }
     if (framed_) words("frame: must hold and does not");
   }
@@ -304,7 +304,7 @@ Rows RowsWith(const TradeoffProblem& problem, const std::string& integrator) {
 }
 
 bool IsDoubted(const TradeoffRow& row) {
-  return !HasFailed(row.record) && !row.record.Text("doubts").empty();
+  return !HasFailed(row.record) && !row.record.Text("warnings").empty();
 }
 
 std::string LabelOfAxis(const std::string& key) {
@@ -397,14 +397,14 @@ std::vector<Curve> TrustLines(const Rows& rows, const std::vector<Curve>& curves
   }
   std::set<double> ends;
   for (const TradeoffRow* row : rows) {
-    const double end = row->record.Number("trust_horizon");
+    const double end = row->record.Number("reference_valid_until");
     if (std::isfinite(end)) ends.insert(end);
   }
   std::vector<Curve> lines;
   if (!(high > low)) return lines;
   while (ends.size() > 2) ends.erase(std::next(ends.begin()));
   for (const double end : ends) {
-    lines.push_back({.label = lines.empty() ? "trust horizon" : "",
+    lines.push_back({.label = lines.empty() ? "validity limit of the reference" : "",
                      .x = {end, end},
                      .y = {low, high},
                      .style = {.color = "#606060", .width = 1.0},

@@ -1,4 +1,4 @@
-// Figures of the failure map, and of work and precision.
+// Figures of the robustness map, and of work and precision.
 #pragma once
 
 #include <array>
@@ -16,7 +16,7 @@
 
 namespace loopbench::harness {
 
-// The failure map as a picture: a small heat map that is read at arm's length.
+// The robustness map as a picture: a small heat map that is read at arm's length.
 
 /// What became of a method in all rows of a group.
 struct FoldedCell {
@@ -50,7 +50,7 @@ struct MapDrawing {
 /// Groups from top to bottom, methods from left to right, a legend below. The darker a cell, the
 /// fewer of its group's rows hold; its glyph says how the worst of them ended. There are no hues.
 /// Cells in which a row must hold and does not have a frame. Rows, numbers and reasons stand in
-/// failure-map.md and .csv.
+/// robustness-map.md and .csv.
 MapDrawing DrawMap(const FailureMap& map, FigureSize size = FigureSize::kTwoColumn);
 
 /// Draws into `path`, as PDF when its extension is ".pdf", else as SVG; returns what

@@ -111,7 +111,7 @@ LegendRow SignsOf(const std::vector<Curve>& curves, const std::vector<std::strin
   const auto any = [&](const auto& is) { return std::ranges::any_of(curves, is); };
   LegendRow row;
   if (any([](const Curve& curve) { return curve.style.doubtful || !curve.hollow.empty(); })) {
-    row.push_back({"doubtful", {.shape = Shape::kCircle, .doubtful = true}, false});
+    row.push_back({"flagged", {.shape = Shape::kCircle, .doubtful = true}, false});
   }
   if (any([](const Curve& curve) { return curve.ends_early || !curve.crosses.empty(); })) {
     row.push_back(TextItem(fmt::format("×: failed run{}{}{}", failures.empty() ? "" : " (",

@@ -125,7 +125,7 @@ class Recorder {
     return values;
   }
 
-  /// One Newton step of level position (level_position.cpp) from the system's state.
+  /// One Newton step of level projection (level_position.cpp) from the system's state.
   void Correct() {
     state_.emplace(mechanism_, system_->solver());
     state_->kinematics().SetTime(system_->kinematics().time());

@@ -118,7 +118,7 @@ class Endings {
     for (const Record& record : records) {
       const std::string one = CaseText(record);
       if (times_there[one] > 1) continue;  // nobody knows which it was before
-      for (const char* measure : {"outcome", "doubts"}) {
+      for (const char* measure : {"outcome", "warnings"}) {
         if (record.Find(measure) == nullptr) continue;
         std::string now = record.Text(measure);
         const auto [at, is_new] = last_.try_emplace({machine, one, measure}, now);
@@ -344,7 +344,7 @@ std::optional<std::string> UnsteadyNote(const HistoryFindings& found) {
   }
   if (unsteady == 0) return std::nullopt;
   return fmt::format(
-      "{} of {} times decide nothing: the machine had another speed than usual (yardstick_ns)",
+      "{} of {} times decide nothing: the machine had another speed than usual (calibration_ns)",
       unsteady, times);
 }
 

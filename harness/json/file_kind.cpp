@@ -39,18 +39,18 @@ const std::array<Kind, 6>& Kinds() {
        "a mechanism",
        {"bodies", "joints"},
        {"name", "comment", "space", "gravity", "bodies", "ground", "joints", "forces", "initial",
-        "independent", "accuracy", "observe", "$schema", "format"}},
+        "independent", "accuracy", "known_solution", "$schema", "format"}},
       {FileKind::kExperiment,
        "an experiment",
-       {"scenes", "columns"},
-       {"name",       "comment",   "scenes",    "columns", "tolerances", "fixed_steps", "refine",
-        "integrator", "jacobian",  "ensembles", "limits",  "compile",    "series",      "timing",
+       {"problems", "methods"},
+       {"name",       "comment",   "problems",  "methods", "tolerances", "fixed_steps", "refine",
+        "integrator", "jacobian",  "ensembles", "limits",  "preprocess", "series",      "timing",
         "precision",  "reference", "output",    "sweep",   "exclude",    "$schema",     "format"}},
       {FileKind::kClaims, "claims", {"claims"}, {"claims", "$schema", "format"}},
       {FileKind::kMap,
-       "a failure map",
-       {"columns", "groups"},
-       {"title", "comment", "columns", "groups", "$schema", "format"}},
+       "a robustness map",
+       {"methods", "groups"},
+       {"title", "comment", "methods", "groups", "$schema", "format"}},
       {FileKind::kBenchmarks,
        "benchmarks",
        {"groups"},
@@ -135,7 +135,8 @@ FileKind KindOfFile(const std::filesystem::path& path) {
   const JsonNode root(document, "", errors);
   if (!document.is_object()) {
     root.Fail(
-        "an object: a mechanism, an experiment, claims, a failure map, benchmarks or a published "
+        "an object: a mechanism, an experiment, claims, a robustness map, benchmarks or a "
+        "published "
         "series");
   }
   errors.ThrowIfAny();

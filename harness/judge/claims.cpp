@@ -156,7 +156,7 @@ bool HoldsOfRatio(const Check& check, const Sample& above, const Sample& below,
   const bool holds = Meets(check.demand, ratio);
   if (Meets(check.demand, ratio * speed) != holds || Meets(check.demand, ratio / speed) != holds) {
     *uncertain = fmt::format(
-        "the machine's speed changed by a factor of {:.3g} in between (yardstick_ns): time again "
+        "the machine's speed changed by a factor of {:.3g} in between (calibration_ns): time again "
         "with run --timing-only --rerun all",
         speed);
   }
@@ -276,7 +276,7 @@ const Fields<Wording>& WordingFields() {
       "wording", "What a verdict says instead of its own words.",
       {{"reproduced", Text(&Wording::reproduced), "All checks hold."},
        {"not_reproduced", Text(&Wording::not_reproduced), "None holds."},
-       {"only_under", Text(&Wording::only_under), "Some hold."},
+       {"partially_reproduced", Text(&Wording::only_under), "Some hold."},
        {"not_measured", Text(&Wording::not_measured), "There are no records."}});
   return fields;
 }
@@ -331,7 +331,8 @@ void ReadRules(const JsonNode& node, ClaimsFile& file) {
 const Fields<ClaimsFile>& ClaimsFields() {
   static const Fields<ClaimsFile> fields(
       "claims",
-      "Rules that turn stored records into verdicts (loopbench verdict). The program checks more "
+      "Rules that turn stored records into verdicts (loopbench check-claims). The program checks "
+      "more "
       "than this schema: that ids, and labels of one claim, are different.",
       DocumentRows<ClaimsFile>({{"claims", By(ArraySchema(RuleFields().Schema()), ReadRules),
                                  "One after the other.", "an array of claims"}}));
@@ -449,7 +450,7 @@ ClaimResult Evaluate(const ClaimRule& rule, std::span<const Record> records) {
 }
 
 std::string_view ToString(Verdict verdict) {
-  constexpr std::string_view kWords[] = {"reproduced", "not reproduced", "only under",
+  constexpr std::string_view kWords[] = {"reproduced", "not reproduced", "partially reproduced",
                                          "not measured"};
   return kWords[static_cast<std::size_t>(verdict)];
 }

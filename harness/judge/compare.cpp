@@ -51,8 +51,8 @@ Ruling OfTexts(Rule rule, const std::string& base, const std::string& fresh) {
   };
   const std::set<std::string> before = codes(base), now = codes(fresh);
   if (before == now) return {};
-  return std::ranges::includes(before, now) ? Ruling{Judgement::kBetter, "fewer doubts"}
-                                            : Ruling{Judgement::kWorse, "new doubts"};
+  return std::ranges::includes(before, now) ? Ruling{Judgement::kBetter, "fewer warnings"}
+                                            : Ruling{Judgement::kWorse, "new warnings"};
 }
 
 /// Worse above one limit, better below another.
@@ -227,7 +227,7 @@ void DecideTimes(const CompareOptions& options, std::vector<Finding>* findings) 
 /// store.
 std::vector<Record> WithOwnDoubts(std::vector<Record> records) {
   for (Record& record : records) {
-    if (record.Text("kind") == "accuracy") record.Set("doubts", OwnDoubts(record));
+    if (record.Text("kind") == "accuracy") record.Set("warnings", OwnDoubts(record));
   }
   return records;
 }

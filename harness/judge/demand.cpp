@@ -105,8 +105,8 @@ double YardstickOf(const Record& record, std::string_view key) {
   const auto is_any = [key](const auto&... parts) {
     return ((key.find(parts) != std::string_view::npos) || ...);
   };
-  if (is_any("wall_s", "step_us", "realtime_factor")) return record.Number("yardstick_wall_ns");
-  if (is_any("rhs_ns", "cpu_ns", "ns_per_body")) return record.Number("yardstick_ns");
+  if (is_any("wall_s", "step_us", "realtime_factor")) return record.Number("calibration_wall_ns");
+  if (is_any("rhs_ns", "cpu_ns", "ns_per_body")) return record.Number("calibration_ns");
   return std::numeric_limits<double>::quiet_NaN();
 }
 
@@ -136,7 +136,7 @@ std::string OtherSettings(const Record& base, const Record& fresh) {
       if (std::ranges::count(keys, key) == 0) keys.push_back(key);
     }
   }
-  if (std::ranges::count(keys, "content") == 0) keys.emplace_back("content");
+  if (std::ranges::count(keys, "config_hash") == 0) keys.emplace_back("config_hash");
   const auto shown = [](const std::string& text) { return text.empty() ? "none" : text; };
   std::string text;
   for (const std::string& key : keys) {

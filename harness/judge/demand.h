@@ -51,8 +51,8 @@ std::string CaseText(const Record& record, const std::vector<std::string>& keys)
 std::string OtherSettings(const Record& base, const Record& fresh);
 
 // One demand on one measure, and the one place that holds a value to it. A claim makes demands on
-// a statistic of many records, a failure map on every record of a cell, a comparison on a new value
-// beside that of a base.
+// a statistic of many records, a robustness map on every record of a cell, a comparison on a new
+// value beside that of a base.
 
 /// What a value must be: a number at most, at least, equal to or within a tolerance of another, or
 /// a text equal to or different from a word.
@@ -64,9 +64,10 @@ struct Demand {
   std::string unit = {};     ///< of the measure, "" for counts
   Relation relation = Relation::kAtMost;
   double number = 0.0;
-  std::string of = {};     ///< key that the number is a multiple of ("of": 500 rtol), "" for none
-  double tolerance = 0.0;  ///< for kWithin
-  std::string word = {};   ///< for kIs and kIsNot
+  std::string of =
+      {};  ///< key that the number is a multiple of ("relative_to": 500 rtol), "" for none
+  double tolerance = 0.0;                        ///< for kWithin
+  std::string word = {};                         ///< for kIs and kIsNot
   std::vector<std::string> when = {"finished"};  ///< endings of runs that it applies to
 
   bool IsText() const { return relation == Relation::kIs || relation == Relation::kIsNot; }

@@ -140,7 +140,7 @@ MapCell JudgeCell(const MapRow& row, std::size_t column, const MapColumn& method
     holding += one.holding;
     if (one.holding > 0 && HasDoubt(record)) {
       ++doubted;
-      std::istringstream codes(record.Text("doubts"));
+      std::istringstream codes(record.Text("warnings"));
       for (std::string code; codes >> code;) ++doubts[code];
     }
     ++count;
@@ -376,7 +376,7 @@ void ReadShared(const JsonNode& node, RowOfMap* row) {
   // without columns everything that names one would be a mistake, and none of its own
   if (row->columns->all().empty()) return;
   if (const auto reasons = node.Optional("not_applicable")) ReadNotApplicable(*reasons, row);
-  if (const auto demanded = node.Optional("must_hold")) ReadMustHold(*demanded, row);
+  if (const auto demanded = node.Optional("required")) ReadMustHold(*demanded, row);
 }
 
 /// The rows of ReadShared() behind others.
@@ -387,7 +387,7 @@ std::vector<Field<T>> WithShared(std::vector<Field<T>> rows) {
       {"select", SelectionSchema(1), "Which records, with those of the group and the column."},
       {"decides", ArraySchema(DemandFields().Schema()), "Measures that must all be as demanded."},
       {"right", EndingsSchema(), "How a run may end, default finished."},
-      {"must_hold", EitherSchema({text, ArraySchema(text)}),
+      {"required", EitherSchema({text, ArraySchema(text)}),
        "\"all\" or labels of columns, for --gate."},
       {"not_applicable", EitherSchema({text, MapSchema(text)}),
        "Why a column has no record here, by its label, or one reason for all that need not hold."},
@@ -486,8 +486,9 @@ void ReadMapGroups(const JsonNode& node, MapRules& rules) {
 const Fields<MapRules>& MapFields() {
   static const Fields<MapRules> fields(
       "map",
-      "Rules that hold stored records against limits, a cell per row and column (loopbench map). "
-      "The program checks more than this schema: that labels are different, that \"must_hold\" and "
+      "Rules that hold stored records against limits, a cell per row and column (loopbench "
+      "robustness). "
+      "The program checks more than this schema: that labels are different, that \"required\" and "
       "\"not_applicable\" name columns, and that a row, with its group, selects records and says "
       "what decides about a run that ends as it should.",
       DocumentRows<MapRules>(

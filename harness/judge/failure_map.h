@@ -17,7 +17,7 @@
 
 namespace loopbench::harness {
 
-// The failure map: methods against extremes, each cell judged from records by rules.
+// The robustness map: methods against extremes, each cell judged from records by rules.
 //
 // A rules file (configs/experiments/extremes/map.json) names columns (methods), rows (extremes) and
 // for each row the measures that decide. A cell's class and the number that decided it follow from
@@ -87,14 +87,14 @@ inline constexpr std::array kRunEndings = {RunEnding{"finished", CellState::kIna
                                            RunEnding{"inconsistent-motion", CellState::kStopped},
                                            RunEnding{"locked", CellState::kStopped},
                                            RunEnding{"newton-failure", CellState::kStopped},
-                                           RunEnding{"inexpressible", CellState::kStopped},
+                                           RunEnding{"unsupported", CellState::kStopped},
                                            RunEnding{"step-limit", CellState::kLimit},
                                            RunEnding{"time-limit", CellState::kLimit},
                                            RunEnding{"process-time-limit", CellState::kLimit},
                                            RunEnding{"memory-limit", CellState::kLimit},
                                            RunEnding{"integrator-error", CellState::kBroken},
                                            RunEnding{"crashed", CellState::kBroken},
-                                           RunEnding{"bad-answer", CellState::kBroken}};
+                                           RunEnding{"invalid-result", CellState::kBroken}};
 
 /// What a cell shows and why.
 struct MapCell {
@@ -167,7 +167,7 @@ std::string HoldingCount(const MapCell& cell);
 /// not.
 std::vector<std::string> BrokenDemands(const FailureMap& map);
 
-// Reads the rules of a failure map (configs/experiments/extremes/map.json).
+// Reads the rules of a robustness map (configs/experiments/extremes/map.json).
 // What such a file may hold: docs/fields.md, map.
 
 /// Reads a file. Throws ConfigError with all mistakes in it (unknown keys, wrong types, an ending

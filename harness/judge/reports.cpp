@@ -93,7 +93,8 @@ FailureMap MapFromCsv(const MapRules& rules, std::string_view csv, const std::st
     const auto field = [&](const char* key) {
       const auto at = std::ranges::find(heading, key);
       if (at == heading.end()) {
-        fail(fmt::format("no column \"{}\"", key), "failure-map.csv of \"loopbench map\"");
+        fail(fmt::format("no column \"{}\"", key),
+             "robustness-map.csv of \"loopbench robustness\"");
       }
       return fields[static_cast<std::size_t>(at - heading.begin())];
     };
@@ -106,7 +107,7 @@ FailureMap MapFromCsv(const MapRules& rules, std::string_view csv, const std::st
     const auto state = StateNamed(field("state"));
     if (!state) fail(fmt::format("state \"{}\"", field("state")), "a state of cells");
     cell->second->state = *state;
-    cell->second->demanded = field("must_hold") == "true";
+    cell->second->demanded = field("required") == "true";
     cell->second->doubted = 0;
     places.erase(cell);
   }
@@ -221,10 +222,11 @@ Table DetailTable(const FailureMap& map) {
 
 // Cells that hold with a run that trust does not let read "ok": each to be explained.
 Table DoubtTable(const FailureMap& map) {
-  Table table{
-      .title = "Cells that hold, with runs in doubt",
-      .columns = {
-          {"row", "extreme"}, {"column", "method"}, {"count", "in doubt"}, {"doubts", "doubts"}}};
+  Table table{.title = "Cells that hold, with runs with warnings",
+              .columns = {{"row", "extreme"},
+                          {"column", "method"},
+                          {"count", "uncertain"},
+                          {"warnings", "warnings"}}};
   EachCell(map, [&table](const MapGroup&, const MapRow& row, const MapColumn& column,
                          const MapCell& cell) {
     if (!HoldsInDoubt(cell)) return;
@@ -243,7 +245,7 @@ std::string CountDoubts(const FailureMap& map) {
     holding += cell.state == CellState::kHolds ? 1 : 0;
     doubted += HoldsInDoubt(cell) ? 1 : 0;
   });
-  return fmt::format("{} of {} cells that hold have runs in doubt", doubted, holding);
+  return fmt::format("{} of {} cells that hold have runs with warnings", doubted, holding);
 }
 
 std::string CountCells(const FailureMap& map) {
@@ -283,9 +285,9 @@ Table MapTable(const FailureMap& map) {
 Table MapCellTable(const FailureMap& map) {
   Table table;
   for (const char* key :
-       {"group", "row",       "column", "state",   "class",     "outcome", "measure",
-        "value", "unit",      "limit",  "ratio",   "t_reached", "holding", "records",
-        "cases", "must_hold", "reason", "case_id", "doubted",   "doubts"}) {
+       {"group", "row",      "column", "state",   "class",     "outcome", "measure",
+        "value", "unit",     "limit",  "ratio",   "t_reached", "holding", "records",
+        "cases", "required", "reason", "case_id", "doubted",   "warnings"}) {
     table.columns.push_back({key, key, Format::kShortest});
   }
   const auto count = [](std::size_t n) { return static_cast<std::int64_t>(n); };
@@ -339,7 +341,7 @@ std::string FrontColour(const Record& row, const TableColumn& column) {
   if (column.key == "front") return row.Text("front") == "*" ? "32" : "";
   if (column.key != "reason") return "";
   if (HasFailed(row)) return "31";
-  return row.Text("doubts").empty() ? "" : "33";
+  return row.Text("warnings").empty() ? "" : "33";
 }
 
 /// Keys that name the cases of a problem: not what all rows of it share.
@@ -410,8 +412,8 @@ std::vector<TableColumn> FullColumns(const Tradeoff& tradeoff, const std::vector
   columns.push_back({"error_is_bound", "is bound"});
   columns.push_back({"cost", WithUnit("cost", tradeoff.cost), FormatOfCost(tradeoff)});
   columns.push_back({"front", "front"});
-  for (const char* key : {"outcome", "doubts", "reference_error", "trust_horizon", "steps",
-                          "rejected", "rhs_evaluations", "aa_spread_wall"}) {
+  for (const char* key : {"outcome", "warnings", "reference_error", "reference_valid_until",
+                          "steps", "rejected", "rhs_evaluations", "aa_spread_wall"}) {
     if (std::ranges::any_of(records, [&](const Record& one) { return one.Find(key) != nullptr; })) {
       columns.push_back(ColumnOf(key, records));
     }

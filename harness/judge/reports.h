@@ -1,4 +1,4 @@
-// The failure map, and work and precision, as tables and documents.
+// The robustness map, and work and precision, as tables and documents.
 #pragma once
 
 #include <string>
@@ -11,19 +11,19 @@
 
 namespace loopbench::harness {
 
-// The failure map as CSV and as text.
+// The robustness map as CSV and as text.
 
-// A failure map read back from its CSV, for pictures: the store that it was made of is large, and
-// seldom kept.
+// A robustness map read back from its CSV, for pictures: the store that it was made of is large,
+// and seldom kept.
 
-/// The map of these rules with the cells of failure-map.csv (MapCellTable()): of each its state and
-/// whether it must hold; numbers and reasons stay in the file.
+/// The map of these rules with the cells of robustness-map.csv (MapCellTable()): of each its state
+/// and whether it must hold; numbers and reasons stay in the file.
 ///
 /// @throws ConfigError with file, line and what was found, where the text is no such CSV, or has
 /// other cells than the rules.
 FailureMap MapFromCsv(const MapRules& rules, std::string_view csv, const std::string& file);
 
-// The failure map as tables: for a terminal, for programs, and as a page.
+// The robustness map as tables: for a terminal, for programs, and as a page.
 
 /// "24 cells: 15 holds, 3 stopped, 1 inaccurate, 5 not measured".
 std::string CountCells(const FailureMap& map);
@@ -35,11 +35,11 @@ std::string CountDoubts(const FailureMap& map);
 /// is not applicable.
 Table MapTable(const FailureMap& map);
 
-/// One row per cell with all that decided it, every digit: failure-map.csv.
+/// One row per cell with all that decided it, every digit: robustness-map.csv.
 Table MapCellTable(const FailureMap& map);
 
-/// failure-map.md: a table per group, the limits with their reasons, and every cell that does not
-/// hold with its number and message. `notes` (provenance) at the end.
+/// robustness-map.md: a table per group, the limits with their reasons, and every cell that does
+/// not hold with its number and message. `notes` (provenance) at the end.
 std::string MapMarkdown(const FailureMap& map, const std::vector<std::string>& notes);
 
 // What accuracy costs, as tables: for a terminal, for programs, and as a page.

@@ -19,7 +19,7 @@
 namespace loopbench::harness {
 namespace {
 
-constexpr std::array kErrors = {"error_position_max",    "error_position_end", "error_shape_max",
+constexpr std::array kErrors = {"error_position_max",    "error_position_end", "error_path_max",
                                 "closed_form_error_max", "branch_error_max",   "energy_error_max",
                                 "drift_position_max"};
 // those that are no distance from the right motion
@@ -38,7 +38,7 @@ std::string NameOfCase(const Record& record) {
   std::string text;
   for (const auto& [key, value] : record.items()) {
     if (key == "case_id" || key == "outcome") break;
-    if (key != "kind" && key != "content" && key != "set") {
+    if (key != "kind" && key != "config_hash" && key != "set") {
       text += key + "=" + record.Text(key) + "\n";
     }
   }
@@ -48,25 +48,25 @@ std::string NameOfCase(const Record& record) {
 std::string ErrorKey(std::span<const Record> records, const TradeoffOptions& options,
                      std::vector<std::string>* remarks) {
   if (!options.error.empty()) {
-    RequireKey("--error", options.error, records);
+    RequireKey("--error-key", options.error, records);
     if (HasNumber(records, options.error, "accuracy")) return options.error;
     throw ConfigError(
-        fmt::format("--error {}: no accuracy record has a number there", options.error));
+        fmt::format("--error-key {}: no accuracy record has a number there", options.error));
   }
   for (const std::string key : kErrors) {
     if (!HasNumber(records, key, "accuracy")) continue;
     if (key == kErrors.front()) return key;
     const bool is_none = std::ranges::find(kNoErrors, key) != kNoErrors.end();
     remarks->push_back(fmt::format(
-        "no record has {} (errors against a certified reference): --error is {}{}", kErrors.front(),
-        key,
+        "no record has {} (errors against a certified reference): --error-key is {}{}",
+        kErrors.front(), key,
         is_none ? ", which is no distance from the right motion: a run may be far off and have "
                   "little of it"
                 : ""));
     return key;
   }
   throw ConfigError(
-      fmt::format("--error: no accuracy record has one of {}", fmt::join(kErrors, ", ")));
+      fmt::format("--error-key: no accuracy record has one of {}", fmt::join(kErrors, ", ")));
 }
 
 /// Timings by the name of their case.
@@ -89,14 +89,15 @@ std::string CostKey(std::span<const Record> records, const Timings& timings,
     });
     if (any) return kWall;
     remarks->push_back(
-        "no accuracy case was timed as it is (\"timing\": {\"cases\": true} does it): --cost is "
+        "no accuracy case was timed as it is (\"timing\": {\"cases\": true} does it): --cost-key "
+        "is "
         "rhs_equivalents");
     return "rhs_equivalents";
   }
   const std::string key = options.cost == "wall_s" ? kWall : options.cost;
-  RequireKey("--cost", key, records);
+  RequireKey("--cost-key", key, records);
   if (HasNumber(records, key, "accuracy") || HasNumber(records, key, "timing")) return key;
-  throw ConfigError(fmt::format("--cost {}: no record has a number there", options.cost));
+  throw ConfigError(fmt::format("--cost-key {}: no record has a number there", options.cost));
 }
 
 /// The run with what only its timing has.
@@ -122,8 +123,8 @@ std::string WhyNotCompared(const TradeoffRow& row, const Tradeoff& tradeoff) {
     return fmt::format("{} at {:.3g} s", row.record.Text("outcome"),
                        row.record.Number("t_reached"));
   }
-  if (const std::string doubts = row.record.Text("doubts"); !doubts.empty()) {
-    return "doubts: " + doubts;
+  if (const std::string doubts = row.record.Text("warnings"); !doubts.empty()) {
+    return "warnings: " + doubts;
   }
   if (!std::isfinite(row.error)) return "no " + tradeoff.error;
   return WhyNoCost(row, tradeoff);
@@ -217,7 +218,7 @@ bool IsCheaper(const TradeoffRow& a, const TradeoffRow& b) {
 std::span<const char* const> UsualErrors() { return kErrors; }
 
 bool IsErrorOfPositions(const std::string& key) {
-  return key.starts_with("error_position") || key == "error_shape_max";
+  return key.starts_with("error_position") || key == "error_path_max";
 }
 
 Tradeoff MakeTradeoff(std::span<const Record> records, const TradeoffOptions& options) {
@@ -263,9 +264,9 @@ struct Aspect {
 };
 
 constexpr std::array kAspects = {
-    Aspect{"mechanism and start", "scene_id"},
+    Aspect{"mechanism and start", "problem_id"},
     Aspect{"horizon [s]", "horizon"},
-    Aspect{"simplifications", "compiled", false, "none"},
+    Aspect{"simplifications", "preprocessed", false, "none"},
     Aspect{"formulation", "formulation"},
     Aspect{"level", "enforcement"},
     Aspect{"coordinates", "coordinates"},
@@ -379,7 +380,7 @@ std::string ErrorLine(const Tradeoff& tradeoff) {
         most = std::max(most, certified);
       }
       bounds += row.is_bound ? 1 : 0;
-      beyond += row.record.Number("trust_horizon") < row.record.Number("horizon") ? 1 : 0;
+      beyond += row.record.Number("reference_valid_until") < row.record.Number("horizon") ? 1 : 0;
     }
   }
   std::string line = fmt::format("error: {}", tradeoff.error);
@@ -393,8 +394,8 @@ std::string ErrorLine(const Tradeoff& tradeoff) {
                         bounds, bounds == 1 ? " has" : "s have");
   }
   if (beyond > 0) {
-    line += fmt::format("; {} row{} beyond the trust horizon of their problem", beyond,
-                        beyond == 1 ? " goes" : "s go");
+    line += fmt::format("; {} row{} beyond the validity limit of the reference of their problem",
+                        beyond, beyond == 1 ? " goes" : "s go");
   }
   return line;
 }

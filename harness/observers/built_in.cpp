@@ -461,7 +461,7 @@ void SingularityObserver<Space>::Write(Record& record) const {
   const std::size_t last = static_cast<std::size_t>(work_->generic_rank) - 1;
   record.Set("singularity_distance_min", work_->smallest[last]);
   record.Set("singularity_distance_min_t", work_->when[last]);
-  record.Set("singularity_passages", work_->passages.count());
+  record.Set("singularity_crossings", work_->passages.count());
 }
 
 template class SingularityObserver<Planar>;

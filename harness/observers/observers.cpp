@@ -105,8 +105,8 @@ void ConditionObserver<Space>::Write(Record& record) const {
   record.Set("rank_constraints_min", std::int64_t{rank_min_ + beyond_joint_speeds_});
   record.Set("rcond_min", rcond_min_);
   record.Set("rcond_min_t", rcond_t_);
-  record.Set("softened_steps", softened_steps_);
-  record.Set("softened_evaluations", softened_evaluations_);
+  record.Set("regularized_steps", softened_steps_);
+  record.Set("regularized_evaluations", softened_evaluations_);
   record.Set("mode_changes", mode_changes_);
 }
 

@@ -21,7 +21,7 @@ struct ClosedStart {
 };
 
 /// Assembles the start in double and closes its loops in S: positions, then speeds, by the
-/// projection of level `position`.
+/// projection of level `projection`.
 template <class Space, class S>
 ClosedStart<Space, S> CloseStart(const MechanismDescription& description);
 
@@ -30,7 +30,7 @@ ClosedStart<Space, S> CloseStart(const MechanismDescription& description);
 class Exact {
  public:
   /// Assembles the start in double and closes its loops in Float128: positions, then speeds, by the
-  /// projection of level `position`.
+  /// projection of level `projection`.
   Exact(const MechanismDescription& description, Coordinates coordinates);
 
   Outcome outcome() const { return outcome_; }  ///< of the start

@@ -163,7 +163,7 @@ Reference MakeReference(const MechanismDescription& user, double horizon, double
   }
   empty.message = WhyNoReference(user, options);
   if (!empty.message.empty()) {
-    empty.outcome = "inexpressible";
+    empty.outcome = "unsupported";
     return empty;
   }
   const Compiled compiled = Compile(user, InOnePiece());

@@ -23,7 +23,7 @@ struct Moment {
 
 /// Where a witness is put back onto its constraints.
 enum class PutBack {
-  kAtSteps,  ///< level `position`
+  kAtSteps,  ///< level `projection`
   /// Before every evaluation as well, so that derivatives are those of the constrained motion,
   /// which is smooth where constraints are singular but beside them is not. What is left is
   /// rounding, by the inverse of the distance to the singular position.

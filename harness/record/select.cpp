@@ -109,7 +109,7 @@ int CompareKeys(const Record& a, const Record& b) {
   const auto ends = [](const Record& record, std::size_t i) {
     if (i == record.items().size()) return true;
     const std::string& key = record.items()[i].first;
-    return key == "content" || key == "case_id" || key == "outcome";
+    return key == "config_hash" || key == "case_id" || key == "outcome";
   };
   for (std::size_t i = 0; !ends(a, i) || !ends(b, i); ++i) {
     if (ends(a, i) || ends(b, i)) return ends(a, i) ? -1 : 1;

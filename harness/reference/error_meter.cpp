@@ -62,7 +62,7 @@ void ErrorMeter::Write(Record& record) const {
   record.Set("error_displacement_max", largest.displacement);
   if (measured_.compiled.parts.size() == 1) record.Set("error_energy_max", largest.energy);
   record.Set("error_phase_max", late);
-  record.Set("error_shape_max", shape);
+  record.Set("error_path_max", shape);
   record.Set("error_interpolation_max", interpolation_);
   record.Set("error_points", static_cast<std::int64_t>(at_.size()));
   record.Set("series.error_t", std::move(t));
@@ -76,9 +76,9 @@ void WriteCertificate(const Reference& reference, Record& record) {
                                reference.message.empty() ? reference.outcome : reference.message)
                  : reference.scalar);
   if (reference.snapshots.empty()) return;
-  record.Set("reference_witnesses", reference.witnesses);
+  record.Set("reference_runs", reference.witnesses);
   record.Set("reference_error", reference.Certified().position);
-  record.Set("trust_horizon", reference.trust_horizon);
+  record.Set("reference_valid_until", reference.trust_horizon);
 }
 namespace {
 
@@ -180,7 +180,7 @@ void SeriesMeter::Add(std::size_t k, const Snapshot& own, const Snapshot& lower)
 void SeriesMeter::Write(Record& record) const {
   if (points_ == 0) return;
   for (const auto& [measure, error] : largest_) record.Set("error_" + measure + "_max", error);
-  record.Set("error_over_accuracy", over_accuracy_);
+  record.Set("error_over_uncertainty", over_accuracy_);
   record.Set("error_interpolation_max", interpolation_);
   record.Set("error_points", points_);
   if (positions_.empty()) return;
@@ -201,13 +201,13 @@ void WriteCertificate(const MechanismDescription& user, const PublishedSeries& s
     return;
   }
   record.Set("reference", std::string(kPublished));
-  record.Set("reference_witnesses", fmt::format("{}: {}", series.name, series.source));
+  record.Set("reference_runs", fmt::format("{}: {}", series.name, series.source));
   const auto accuracies =
       LargestOf(user, series, [](const PublishedQuantity& quantity) { return quantity.accuracy; });
   for (const auto& [measure, accuracy] : accuracies) {
     record.Set(measure == kPosition ? "reference_error" : "reference_error_" + measure, accuracy);
   }
-  record.Set("trust_horizon", series.times[count - 1]);
+  record.Set("reference_valid_until", series.times[count - 1]);
 }
 
 }  // namespace loopbench::harness

@@ -59,8 +59,8 @@ class ErrorMeter : public Meter {
   double first_energy_ = 0.0, interpolation_ = 0.0;
 };
 
-/// What a row says of its reference: keys reference, reference_witnesses, reference_error and
-/// trust_horizon.
+/// What a row says of its reference: keys reference, reference_runs, reference_error and
+/// reference_valid_until.
 void WriteCertificate(const Reference& reference, Record& record);
 
 // The error of a run against a published series (harness/config/published_series.h), in the same
@@ -77,9 +77,9 @@ class SeriesMeter : public Meter {
 
   void Add(std::size_t k, const Snapshot& own, const Snapshot& lower) override;
 
-  /// Keys error_*; of points the distance in the axes that the series has. "error_over_accuracy" is
-  /// the largest difference of any number from the published one, over its accuracy: at 1 and below
-  /// the series does not tell the run from the truth.
+  /// Keys error_*; of points the distance in the axes that the series has. "error_over_uncertainty"
+  /// is the largest difference of any number from the published one, over its accuracy: at 1 and
+  /// below the series does not tell the run from the truth.
   void Write(Record& record) const override;
 
  private:
@@ -96,8 +96,8 @@ class SeriesMeter : public Meter {
   std::int64_t points_ = 0;
 };
 
-/// What a row says of its series: reference, reference_witnesses (name and source),
-/// reference_error and its like for each measure, and trust_horizon, the last time within
+/// What a row says of its series: reference, reference_runs (name and source),
+/// reference_error and its like for each measure, and reference_valid_until, the last time within
 /// `horizon`.
 void WriteCertificate(const MechanismDescription& user, const PublishedSeries& series,
                       double horizon, Record& record);

@@ -234,8 +234,8 @@ void WriteReference(const std::filesystem::path& path, const std::string& id,
   record.Set("outcome", reference.outcome);
   record.Set("message", reference.message);
   record.Set("scalar", reference.scalar);
-  record.Set("reference_witnesses", reference.witnesses);
-  record.Set("trust_horizon", reference.trust_horizon);
+  record.Set("reference_runs", reference.witnesses);
+  record.Set("reference_valid_until", reference.trust_horizon);
   record.Set("cpu_s", reference.cpu_s);
   record.Set("rhs_evaluations", reference.rhs_evaluations);
   record.Set("series.t", reference.times);
@@ -282,8 +282,8 @@ std::optional<Reference> ReadReference(const std::filesystem::path& path, const 
   reference.outcome = record.Text("outcome");
   reference.message = record.Text("message");
   reference.scalar = record.Text("scalar");
-  reference.witnesses = record.Text("reference_witnesses");
-  reference.trust_horizon = record.Number("trust_horizon");
+  reference.witnesses = record.Text("reference_runs");
+  reference.trust_horizon = record.Number("reference_valid_until");
   reference.cpu_s = record.Number("cpu_s");
   reference.rhs_evaluations = static_cast<std::int64_t>(record.Number("rhs_evaluations"));
   reference.times = record.Numbers("series.t");
@@ -361,19 +361,20 @@ double CertifiedTo(const Record& record) {
         &bounds = record.Numbers("series.bound.position");
   double largest = 0.0;
   for (std::size_t k = 0; k < std::min(t.size(), bounds.size()); ++k) {
-    if (t[k] <= record.Number("trust_horizon")) largest = std::max(largest, bounds[k]);
+    if (t[k] <= record.Number("reference_valid_until")) largest = std::max(largest, bounds[k]);
   }
   return largest;
 }
 
 bool IsFiner(const Record& one, const Record& other) {
-  const double until = one.Number("trust_horizon"), others = other.Number("trust_horizon");
+  const double until = one.Number("reference_valid_until"),
+               others = other.Number("reference_valid_until");
   return until != others ? until > others : CertifiedTo(one) < CertifiedTo(other);
 }
 
 std::string Shown(const Known& one) {
   return fmt::format("{} (until {} s, to {:.1e} m)", one.file.string(),
-                     one.record.Text("trust_horizon"), CertifiedTo(one.record));
+                     one.record.Text("reference_valid_until"), CertifiedTo(one.record));
 }
 
 }  // namespace

@@ -55,7 +55,7 @@ bool IsBrief(const ReportTable& table, const std::string& key) {
                                         : table.kind == "precision" ? CompactPrecisionColumns()
                                                                     : CompactDriftColumns();
   if (std::ranges::find(few, key, &TableColumn::key) != few.end()) return true;
-  return key == "doubts" || key == "error_position_max";
+  return key == "warnings" || key == "error_position_max";
 }
 
 std::string TableText(const ReportTable& table) {
@@ -68,10 +68,10 @@ std::string TableText(const ReportTable& table) {
     return [key](const Record& row) { return ScriptString(row.Text(key)); };
   };
   return fmt::format(
-      R"({{"kind":"{}","title":{},"command":{},"alike":{},"names":{},"scenes":{},"ids":{},"doubts":{},"failed":{},"formulations":{},"absolute":{},"messages":{},"columns":{}}})",
+      R"({{"kind":"{}","title":{},"command":{},"alike":{},"names":{},"problems":{},"ids":{},"warnings":{},"failed":{},"formulations":{},"absolute":{},"messages":{},"methods":{}}})",
       table.kind, ScriptString(table.title), ScriptString(table.command), Strings(table.alike),
       Strings(table.names), Strings(table.scenes), ListOf(table.rows, text("case_id")),
-      ListOf(table.rows, text("doubts")),
+      ListOf(table.rows, text("warnings")),
       ListOf(table.rows, [](const Record& row) { return HasFailed(row) ? "1" : "0"; }),
       ListOf(table.rows, text("formulation")),
       ListOf(table.rows,
@@ -157,7 +157,7 @@ std::string MapText(const FailureMap& map, const std::string& command) {
                           ScriptString(group.label), rows);
   }
   return fmt::format(
-      R"({{"title":{},"comment":{},"command":{},"states":{},"columns":{},"remarks":{},"groups":[{}]}})",
+      R"({{"title":{},"comment":{},"command":{},"states":{},"methods":{},"remarks":{},"groups":[{}]}})",
       ScriptString(map.rules.title), ScriptString(map.rules.comment), ScriptString(command),
       ListOf(kCellStates, [](CellState state) { return ScriptString(ToString(state)); }),
       ListOf(map.rules.columns, [](const MapColumn& one) { return ScriptString(one.label); }),
@@ -181,9 +181,9 @@ std::string SceneText(const ReportScene& scene) {
 
 std::vector<DataElement> ToJson(const ReportData& data) {
   std::vector<DataElement> elements = {
-      {"tables", fmt::format(R"({{"looks":{},"doubts":{},"tables":{}}})", LooksText(), DoubtsText(),
-                             ListOf(data.tables, TableText))},
-      {"scenes", ListOf(data.scenes, SceneText)},
+      {"tables", fmt::format(R"({{"looks":{},"warnings":{},"tables":{}}})", LooksText(),
+                             DoubtsText(), ListOf(data.tables, TableText))},
+      {"problems", ListOf(data.scenes, SceneText)},
       {"costs", ListOf(data.costs, CostText)},
       {"plots", ListOf(data.plots, [](const ReportPlot& plot) {
          return fmt::format(R"({{"name":"{}","title":{},"unit":{}}})", plot.name,
@@ -283,8 +283,8 @@ std::string SummaryOf(const ReportData& data) {
   if (data.runs == 0) return "<p>The store has no accuracy runs.</p>\n";
   const std::size_t good = data.runs - data.failed - data.doubted;
   std::string text = fmt::format(
-      "<p class=\"counts\"><span class=\"good\">{} finished without doubt</span> "
-      "<span class=\"doubt\">{} doubtful</span> <span class=\"bad\">{} failed</span></p>\n",
+      "<p class=\"counts\"><span class=\"good\">{} finished without warnings</span> "
+      "<span class=\"doubt\">{} flagged</span> <span class=\"bad\">{} failed</span></p>\n",
       good, data.doubted, data.failed);
   text += "<div class=\"bar\" role=\"img\" aria-label=\"shares of all runs\">";
   for (const auto& [name, count] :
@@ -296,7 +296,7 @@ std::string SummaryOf(const ReportData& data) {
 
 std::string FindingsOf(const ReportData& data) {
   if (data.runs > 0 && data.findings.empty()) {
-    return "<p>Every run finished, and none gives reason for doubt.</p>\n";
+    return "<p>Every run finished, and none gives warnings.</p>\n";
   }
   std::string text = "<ul class=\"findings\">\n";
   for (const ReportFinding& finding : data.findings) {
@@ -304,7 +304,7 @@ std::string FindingsOf(const ReportData& data) {
         "<li class=\"{}\"><b>{}</b> {} <button type=\"button\" class=\"show\" "
         "data-filter=\"{}\">Show these runs</button></li>\n",
         finding.failed ? "bad" : "doubt",
-        finding.failed ? "Failed:" : "Doubtful:", EscapeXml(finding.text),
+        finding.failed ? "Failed:" : "Flagged:", EscapeXml(finding.text),
         EscapeXml(finding.filter));
   }
   return text + "</ul>\n";
@@ -344,7 +344,7 @@ std::string Links(const ReportData& data) {
       "<a href=\"#verdicts\">Verdicts</a> <a href=\"#motion\">Motion and curves</a> ";
   text += "<a href=\"#tables\">Cases</a> ";
   if (!data.costs.empty()) text += "<a href=\"#costs\">Work and precision</a> ";
-  if (data.map) text += "<a href=\"#map\">Failure map</a> ";
+  if (data.map) text += "<a href=\"#map\">Robustness map</a> ";
   return text + "<a href=\"#sources\">Sources</a>";
 }
 
@@ -374,7 +374,7 @@ std::string ToHtml(const ReportData& data) {
       "<header><h1>Report of {}</h1>\n<nav aria-label=\"Sections\">{} <button type=\"button\" "
       "id=\"theme\">Dark</button></nav></header>\n<main class=\"report\">\n",
       title, Links(data));
-  page += "<section id=\"verdicts\"><h2>Verdicts and doubts: " + WithCount(data.runs, "run") +
+  page += "<section id=\"verdicts\"><h2>Verdicts and warnings: " + WithCount(data.runs, "run") +
           "</h2>\n" + SummaryOf(data) + FindingsOf(data) + ClaimsOf(data) + List(data.warnings) +
           "</section>\n";
   page += "<section id=\"motion\"><h2>Motion and curves</h2></section>\n";
@@ -382,7 +382,7 @@ std::string ToHtml(const ReportData& data) {
   if (!data.costs.empty()) {
     page += "<section id=\"costs\"><h2>Work and precision</h2></section>\n";
   }
-  if (data.map) page += "<section id=\"map\"><h2>Failure map</h2></section>\n";
+  if (data.map) page += "<section id=\"map\"><h2>Robustness map</h2></section>\n";
   page += SourcesOf(data);
   page +=
       "</main>\n<noscript><p>Tables and curves need JavaScript; loopbench table and plot do "

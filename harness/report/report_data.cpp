@@ -191,7 +191,7 @@ void Fill(const Work& work, ReportScene* scene, std::vector<std::string>* remark
   const auto file = MechanismOf(work.records[work.rows.front()], work.store_file);
   if (file.empty() || !std::filesystem::exists(file)) {
     scene->missing =
-        "The store keeps no motion of this scene: a run keeps one with \"output\": {\"step\": "
+        "The store keeps no motion of this problem: a run keeps one with \"output\": {\"step\": "
         "0.01} (each run) or \"reference\": {} (the certified motion) in the experiment.";
     return;
   }
@@ -210,7 +210,8 @@ void Fill(const Work& work, ReportScene* scene, std::vector<std::string>* remark
   }
   if (scene->paths.empty()) {
     scene->missing =
-        "No motion of this scene could be read (what is left out is said at the end of the page); "
+        "No motion of this problem could be read (what is left out is said at the end of the "
+        "page); "
         "with \"output\": {\"step\": 0.01} in the experiment a run keeps its own.";
   }
 }
@@ -238,7 +239,7 @@ std::vector<ReportScene> FindScenes(const std::vector<Record>& rows,
   for (std::size_t i = 0; i < found.size(); ++i) {
     if (i >= shown) {
       found[i].missing = fmt::format(
-          "Pictures are of the first {} scenes of a store; for this one "
+          "Pictures are of the first {} problems of a store; for this one "
           "make a store of its own (loopbench merge, --filter of run).",
           kMostScenes);
       continue;
@@ -285,13 +286,13 @@ std::vector<std::string> KeysOfScenes(const std::vector<Record>& rows,
   std::vector<std::string> keys;
   std::map<std::string, const Record*> first;
   for (const Record& row : rows) {
-    first.emplace(row.Text("scene_id") + " " + row.Text("horizon"), &row);
+    first.emplace(row.Text("problem_id") + " " + row.Text("horizon"), &row);
   }
   for (const std::string& key : telling) {
     if (key == "mechanism" || key == "horizon" || key == "experiment") continue;
     const bool is_scenes = first.size() > 1 && std::ranges::all_of(rows, [&](const Record& row) {
                              const Record& other =
-                                 *first.at(row.Text("scene_id") + " " + row.Text("horizon"));
+                                 *first.at(row.Text("problem_id") + " " + row.Text("horizon"));
                              return row.Text(key) == other.Text(key);
                            });
     if (is_scenes) keys.push_back(key);
@@ -316,7 +317,7 @@ void NameRows(ReportTable* table) {
   std::map<std::string, std::string> ids;  // of scenes, by name
   for (const Record& row : table->rows) {
     std::string name = SceneName(row, of_scenes);
-    const std::string id = row.Text("scene_id");
+    const std::string id = row.Text("problem_id");
     if (ids.emplace(name, id).first->second != id) name += fmt::format(" ({})", id.substr(0, 6));
     table->scenes.push_back(name);
     std::string own = NameOfRow(row, telling);
@@ -374,7 +375,7 @@ std::vector<ReportFinding> FindingsOf(const ReportTable& table,
   }
   for (const std::string& note : doubts) {
     const std::string code = note.substr(0, note.find(':'));
-    if (code.find(' ') == std::string::npos) findings.push_back({false, note, "doubts~" + code});
+    if (code.find(' ') == std::string::npos) findings.push_back({false, note, "warnings~" + code});
   }
   return findings;
 }
@@ -388,14 +389,14 @@ std::vector<ReportCost> MakeCosts(const std::vector<Record>& records, const std:
     if (!is_there) continue;
     TradeoffOptions options{.error = key};
     for (const std::string& other : CaseKeysOf(records)) {
-      if (other == "content") options.per.push_back(other);
+      if (other == "config_hash") options.per.push_back(other);
     }
     try {
       ReportCost cost{.tradeoff = MakeTradeoff(records, options)};
       cost.error = ColumnOf(key, records).header;
       cost.cost = ColumnOf(cost.tradeoff.cost, records).header;
       cost.fairness = FairnessStatement(cost.tradeoff);
-      cost.command = Typed({"tradeoff", store, "--error", key});
+      cost.command = Typed({"work-precision", store, "--error-key", key});
       costs.push_back(std::move(cost));
     } catch (const ConfigError& error) {
       remarks->push_back(fmt::format("work and precision by {}: {}", key, error.what()));
@@ -439,10 +440,10 @@ ReportData MakeReport(const std::vector<Record>& records, const ReportOptions& o
   data.warnings = NoiseWarnings(records);
   data.plot_command = Typed({"plot", store, "--out", "figures"});
   for (const ClaimRule& rule : options.claims) data.claims.push_back(Evaluate(rule, records));
-  data.claims_command =
-      Typed({"verdict", store, "--claims", options.claims_file.string(), "--out", "verdicts.md"});
+  data.claims_command = Typed(
+      {"check-claims", store, "--claims", options.claims_file.string(), "--out", "verdicts.md"});
   if (options.rules) data.map = MakeFailureMap(*options.rules, records);
-  data.map_command = Typed({"map", store, "--rules", options.rules_file.string()});
+  data.map_command = Typed({"robustness", store, "--rules", options.rules_file.string()});
   if (data.tables.empty() || data.tables.front().kind != "drift") return data;
   const ReportTable& runs = data.tables.front();
   data.runs = runs.rows.size();

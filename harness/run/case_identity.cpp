@@ -69,7 +69,7 @@ namespace {
 /// What decides any run besides its keys.
 Record CommonContent(const Experiment& experiment) {
   Record content = RecordOf(experiment.limits);
-  content.Set("compile", ToString(experiment.compile));
+  content.Set("preprocess", ToString(experiment.compile));
   return content;
 }
 
@@ -84,7 +84,7 @@ Record SceneContent(const Experiment& experiment, const Case& one) {
 void SetCaseId(Record* keys, const std::string& content) {
   constexpr std::size_t kDigits = 8;
   keys->Set("case_id", Fnv1a(CaseId(*keys) + content));
-  keys->Set("content", content.substr(0, kDigits));
+  keys->Set("config_hash", content.substr(0, kDigits));
 }
 
 std::string AccuracyContent(const Experiment& experiment, const Case& one) {

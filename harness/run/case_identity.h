@@ -11,7 +11,8 @@
 
 namespace loopbench::harness {
 
-// A scene as it is run: simplified descriptions, with what is observed of them (docs/decisions/009).
+// A scene as it is run: simplified descriptions, with what is observed of them
+// (docs/decisions/009).
 
 struct CompiledScene {
   Compiled compiled;

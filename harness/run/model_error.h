@@ -46,9 +46,9 @@ ReadyToRun<Space> StartAtLevelPosition(const MechanismDescription& description,
 
 // A short run of a whole model, to see what hardly moves (mechanism/simplify/model.h).
 
-/// Runs the description for `duration` seconds by O-DCA at level position, ode45 at 1e-6, in joint
-/// coordinates. A run that ends earlier (its CPU time is `cpu_s`) tells what it saw until then, and
-/// why it ended; one that does not begin tells nothing.
+/// Runs the description for `duration` seconds by O-DCA at level projection, ode45 at 1e-6, in
+/// joint coordinates. A run that ends earlier (its CPU time is `cpu_s`) tells what it saw until
+/// then, and why it ended; one that does not begin tells nothing.
 ShortRun MakeShortRun(const MechanismDescription& description, double duration, double cpu_s);
 
 // How far a simplified model moves from the whole one, and what it takes (mechanism/simplify/).
@@ -62,7 +62,7 @@ struct Track {
   std::int64_t rhs_evaluations = 0;
 };
 
-/// Runs the model by multipliers at level position, dormand-prince at 1e-10. Steps end at the
+/// Runs the model by multipliers at level projection, dormand-prince at 1e-10. Steps end at the
 /// times that are looked at. `whole` says which points: those of its bodies by their names in the
 /// model (FindPoint), where the model has them.
 Track TrackOf(const MechanismDescription& model, const Eigen::Matrix3d& R_WC,

@@ -64,9 +64,9 @@ void RequirePeers(const std::vector<Experiment>& experiments) {
                                       WhyMissing(column.formulation)));
       }
     };
-    require("/columns", experiment.columns);
+    require("/methods", experiment.columns);
     if (experiment.timing.repeats == 0) continue;
-    require("/timing/columns", experiment.timing.columns);
+    require("/timing/methods", experiment.timing.columns);
     for (const TimingFamily& family : experiment.timing.families) {
       require("/timing/families", family.columns);
     }

@@ -148,7 +148,7 @@ Record RunCase(const Experiment& experiment, const Case& one, const Reference* r
                const std::filesystem::path& trajectory, int threads) {
   const ExperimentScene& scene = experiment.scenes[one.scene];
   Record record = one.keys;
-  record.Set("scene_id", Fnv1a(scene.mechanism.canonical));
+  record.Set("problem_id", Fnv1a(scene.mechanism.canonical));
   const double link = LinkLength(scene.mechanism.description);
   record.Set("link_length", link);
   record.Set("position_goal",
@@ -197,7 +197,7 @@ Record RunCase(const Experiment& experiment, const Case& one, const Reference* r
   record.Set("series.drift_t", envelope.t);
   record.Set("series.drift", envelope.value);
   if (HasFinished(record)) {
-    record.Set("doubts", OwnDoubts(record));
+    record.Set("warnings", OwnDoubts(record));
   }
   return record;
 }
@@ -251,8 +251,9 @@ class Runner {
       run.branch_start = ExactObserver<Space>(scene_, mechanism_).BranchAt(kinematics);
       result = Integrate(start);
       for (const auto& observer : observers_) observer->Write(run.record);
-      if (const Value* softened = run.record.Find("softened_evaluations")) {
-        run.record.Set("softened_evaluations", std::get<std::int64_t>(*softened) - looked_by_then_);
+      if (const Value* softened = run.record.Find("regularized_evaluations")) {
+        run.record.Set("regularized_evaluations",
+                       std::get<std::int64_t>(*softened) - looked_by_then_);
       }
       if (errors_) errors_->Write(run.record);
       if (recorder_) recorder_->Finish(run.record);
@@ -447,7 +448,7 @@ Run RunOnce(const Experiment& experiment, const Case& one, const MechanismDescri
   }
   Run run = MergeParts(parts);
   if (scene.compiled.done != CompileOptions::None()) {
-    run.record.Set("compiled", ToString(scene.compiled.done));
+    run.record.Set("preprocessed", ToString(scene.compiled.done));
   }
   return run;
 }

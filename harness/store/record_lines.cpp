@@ -287,7 +287,7 @@ SceneReader::SceneReader(std::filesystem::path path, const Selection& where)
     last_at_ = place.offset;
     const bool is_fresh = kinds.insert(KeysOfLine(line)).second;
     if (!may_match(line, place)) return is_fresh;
-    std::string_view scene = TextUnder("\"scene_id\":\"", line);
+    std::string_view scene = TextUnder("\"problem_id\":\"", line);
     if (scene.empty()) scene = TextUnder("\"case_id\":\"", line);
     const auto fresh = static_cast<std::uint32_t>(scenes.size());
     const auto at = scenes.try_emplace(std::hash<std::string_view>()(scene), fresh).first;
@@ -332,7 +332,7 @@ namespace {
 
 /// How a run ended when it was not by itself.
 constexpr std::array<std::string_view, 5> kCutShort = {"time-limit", "process-time-limit",
-                                                       "memory-limit", "crashed", "bad-answer"};
+                                                       "memory-limit", "crashed", "invalid-result"};
 
 /// The run, a member of its ensemble, or the reference of its ladder.
 bool WasCutShort(const Record& record) {

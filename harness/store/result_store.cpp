@@ -300,7 +300,7 @@ struct Namesakes {
 
 Record ToldApart(const Record& record, const Namesakes& namesakes) {
   Record told = KeysBeforeId(record);
-  told.Set("content", record.Text("content"));
+  told.Set("config_hash", record.Text("config_hash"));
   if (namesakes.has_set) told.Set("set", record.Text("set"));
   for (const auto& [key, value] : record.items()) told.Set(key, value);
   return told;
@@ -333,9 +333,9 @@ void ShareContents(std::vector<Record>* one, std::vector<Record>* other) {
       Record bare;
       const Record keys = KeysBeforeId(record);
       for (const auto& [key, value] : keys.items()) {
-        if (key != "content" && key != "set") bare.Set(key, value);
+        if (key != "config_hash" && key != "set") bare.Set(key, value);
       }
-      if (keys.Find("content") == nullptr) continue;
+      if (keys.Find("config_hash") == nullptr) continue;
       told[ToJsonLine(bare)].has_set = keys.Find("set") != nullptr;
     }
   }
@@ -351,7 +351,8 @@ void RequireOneContent(const std::vector<Record>& records, const std::filesystem
                        std::string_view command) {
   const auto told = std::ranges::find_if(records, [](const Record& record) {
     // references of a sweep differ in content alone, and nothing is judged by them
-    return record.Text("kind") != "reference" && KeysBeforeId(record).Find("content") != nullptr;
+    return record.Text("kind") != "reference" &&
+           KeysBeforeId(record).Find("config_hash") != nullptr;
   });
   if (told == records.end()) return;
   throw std::runtime_error(fmt::format(

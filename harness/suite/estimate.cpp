@@ -391,10 +391,10 @@ StartReport CheckStarts(const std::vector<Experiment>& experiments) {
       }
       if (!values.empty()) values = " (at " + values + ")";
       for (const std::string& fault : report.faults) {
-        all.faults.push_back(fmt::format("scene \"{}\": {}{}", scene.name, fault, values));
+        all.faults.push_back(fmt::format("problem \"{}\": {}{}", scene.name, fault, values));
       }
       for (const std::string& warning : report.warnings) {
-        all.warnings.push_back(fmt::format("scene \"{}\": {}{}", scene.name, warning, values));
+        all.warnings.push_back(fmt::format("problem \"{}\": {}{}", scene.name, warning, values));
       }
     }
   }

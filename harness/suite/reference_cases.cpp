@@ -33,7 +33,7 @@ MechanismDescription PlanarPart(const Experiment& experiment, const ExperimentSc
           .compiled.parts.front()
           .description;
   const auto refuse = [&](const char* found, const char* expected) {
-    throw ConfigError(fmt::format("{}: /precision: scene \"{}\": found {}, expected {}",
+    throw ConfigError(fmt::format("{}: /precision: problem \"{}\": found {}, expected {}",
                                   experiment.path.string(), scene.name, found, expected));
   };
   for (const JointDescription& joint : description.joints) {
@@ -77,9 +77,9 @@ void Write(const Rung& rung, Record& record) {
   record.Set("outcome", std::string(ToString(rung.outcome)));
   record.Set("t_reached", rung.t_reached);
   if (!std::isnan(rung.error)) record.Set("error_final", rung.error);
-  record.Set("error_ruled_by", rung.error_ruled_by);
+  record.Set("error_dominated_by", rung.error_ruled_by);
   record.Set("drift_position_max", rung.drift);
-  record.Set("drift_ruled_by", rung.drift_ruled_by);
+  record.Set("drift_dominated_by", rung.drift_ruled_by);
   record.Set("steps", rung.steps);
   record.Set("rejected", rung.rejected);
   record.Set("rhs_evaluations", rung.rhs_evaluations);
@@ -211,7 +211,7 @@ std::optional<Reference> FindReference(const Experiment& experiment, const Case&
       ReadReference(known.file, known.id, experiment.scenes[one.scene].mechanism.description);
   if (reference) return reference;
   Reference none;
-  none.outcome = "inexpressible";
+  none.outcome = "unsupported";
   none.message = "it was not made";
   return none;
 }

@@ -210,7 +210,7 @@ std::vector<Record> RecordsOf(const Piece& piece, const ProcessResult& result,
   std::string outcome(OutcomeOf(result.ending)), message = result.text;
   if (result.ending == ProcessEnding::kThrew) message = "threw: " + message;
   if (result.ending == ProcessEnding::kAnswered) {
-    outcome = "bad-answer";
+    outcome = "invalid-result";
     message = "its process answered what is not its record";
     try {
       for (std::size_t start = 0; start < result.text.size();) {

@@ -298,7 +298,7 @@ MechanismDescription ReadKeptMechanism(const std::filesystem::path& file) {
 }
 
 std::filesystem::path MechanismOf(const Record& record, const std::filesystem::path& store_file) {
-  const std::string id = record.Text("scene_id");
+  const std::string id = record.Text("problem_id");
   return IsId(id) ? MechanismPath(store_file, id) : std::filesystem::path();
 }
 

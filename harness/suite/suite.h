@@ -66,7 +66,7 @@ struct SuiteCount {
 /// the store.
 ///
 /// Whatever a case does, it gets a record: outcomes "crashed", "process-time-limit", "memory-limit"
-/// and "bad-answer" are those of its process. Short cases share processes
+/// and "invalid-result" are those of its process. Short cases share processes
 /// (harness/isolation/processes.h).
 SuiteCount RunSuite(Workload& workload, const SuiteOptions& options, FinishedRuns& finished,
                     ResultStore& store);
@@ -104,8 +104,8 @@ class GroupMarks {
 // What a store keeps beside its lines so that motions can be looked at later: the mechanisms of its
 // scenes, as files that every command reads, and their references.
 
-/// mechanisms/ID.json beside a store's `file`, ID being the record's "scene_id"; empty where it has
-/// none, or one that no run has written.
+/// mechanisms/ID.json beside a store's `file`, ID being the record's "problem_id"; empty where it
+/// has none, or one that no run has written.
 std::filesystem::path MechanismOf(const Record& record, const std::filesystem::path& store_file);
 
 /// Reads such a file. Throws ChangedFile (trajectory/store_files.h) if its checksum is wrong, and

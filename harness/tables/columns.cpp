@@ -80,10 +80,10 @@ std::optional<TableColumn> KnownColumn(string_view key) {
 const std::vector<TableColumn>& CompactCaseColumns() {
   static const std::vector<TableColumn> kColumns = {
       Short("mechanism", "mechanism"),
-      Short("formulation", "formul."),
-      Short("enforcement", "level", AbbreviatedLevels()),
+      Short("formulation", "form."),
+      Short("enforcement", "enf.", AbbreviatedLevels()),
       Short("coordinates", "coord", {{"absolute", "abs"}}),
-      Short("solver", "solv", {{"as-published", "publ"}, {"rank-revealing", "rank"}}),
+      Short("solver", "fact.", {{"rank-revealing", "r-rev"}}),
       Short("rtol", "rtol"),
       Short("horizon", "T/s"),
       Short("outcome", "outcome",
@@ -99,7 +99,7 @@ const std::vector<TableColumn>& CompactCaseColumns() {
 
 const std::vector<TableColumn>& DriftColumns() {
   static const std::vector<TableColumn> kColumns =
-      Join(Join(CaseColumns(), Columns({"doubts",
+      Join(Join(CaseColumns(), Columns({"warnings",
                                         "agreement",
                                         "drift_position_max",
                                         "drift_rotation_max",
@@ -132,8 +132,8 @@ const std::vector<TableColumn>& DriftColumns() {
 
 const std::vector<TableColumn>& TimingColumns() {
   static const std::vector<TableColumn> kMachine =
-      Columns({"aa_spread", "aa_spread_wall", "yardstick_ns", "yardstick_wall_ns",
-               "disturbed_rounds", "load1", "processors", "governor", "noise"});
+      Columns({"aa_spread", "aa_spread_wall", "calibration_ns", "calibration_wall_ns",
+               "discarded_repetitions", "load1", "processors", "governor", "noise"});
   static const std::vector<TableColumn> kTimes =
       Columns({"bodies", "joints", "loops", "dof", "rhs_ns_median", "rhs_ns_p10", "rhs_ns_p90",
                "ns_per_body", "step_us_median", "wall_s_median", "realtime_factor", "repeats",
@@ -143,13 +143,27 @@ const std::vector<TableColumn>& TimingColumns() {
 }
 
 const std::vector<TableColumn>& PrecisionColumns() {
-  static const std::vector<TableColumn> kColumns =
-      Columns({"experiment",     "mechanism",   "formulation",    "enforcement",
-               "coordinates",    "solver",      "integrator",     "scalar",
-               "rtol",           "atol",        "horizon",        "outcome",
-               "t_reached",      "error_final", "error_ruled_by", "drift_position_max",
-               "drift_ruled_by", "steps",       "rejected",       "restarts",
-               "rhs_evaluations"});
+  static const std::vector<TableColumn> kColumns = Columns({"experiment",
+                                                            "mechanism",
+                                                            "formulation",
+                                                            "enforcement",
+                                                            "coordinates",
+                                                            "solver",
+                                                            "integrator",
+                                                            "scalar",
+                                                            "rtol",
+                                                            "atol",
+                                                            "horizon",
+                                                            "outcome",
+                                                            "t_reached",
+                                                            "error_final",
+                                                            "error_dominated_by",
+                                                            "drift_position_max",
+                                                            "drift_dominated_by",
+                                                            "steps",
+                                                            "rejected",
+                                                            "restarts",
+                                                            "rhs_evaluations"});
   return kColumns;
 }
 
@@ -164,9 +178,9 @@ const std::vector<TableColumn>& CompactPrecisionColumns() {
     const std::vector<std::pair<std::string, std::string>> parts = {{"truncation", "trunc"},
                                                                     {"round-off", "round"}};
     return Join(std::move(columns),
-                {Short("error_final", "error/m", {}, kAnswer), Short("error_ruled_by", "by", parts),
-                 Short("drift_position_max", "drift/m"), Short("drift_ruled_by", "by", parts),
-                 Short("steps", "steps")});
+                {Short("error_final", "error [m]", {}, kAnswer),
+                 Short("error_dominated_by", "by", parts), Short("drift_position_max", "drift [m]"),
+                 Short("drift_dominated_by", "by", parts), Short("steps", "steps")});
   }();
   return kColumns;
 }
@@ -187,7 +201,7 @@ const std::vector<TableColumn>& ModelColumns() {
                                                             "model_error",
                                                             "model_error_at",
                                                             "reference_error",
-                                                            "trust_horizon",
+                                                            "reference_valid_until",
                                                             "model_accepts",
                                                             "model_verdict",
                                                             "error_position_max",
@@ -202,17 +216,17 @@ const std::vector<TableColumn>& ModelColumns() {
 const std::vector<TableColumn>& CompactModelColumns() {
   static const std::vector<TableColumn> kColumns = {
       Short("mechanism", "mechanism"),  Short("model", "model"),
-      Short("bodies", "bodies"),        Short("model_error", "causes/m"),
+      Short("bodies", "bodies"),        Short("model_error", "model error [m]"),
       Short("rhs_evaluations", "rhs"),  Short("model_rhs_ratio", "of full"),
-      Short("wall_s", "wall/s"),        Short("model_wall_ratio", "of full"),
+      Short("wall_s", "wall [s]"),      Short("model_wall_ratio", "of full"),
       Short("model_verdict", "verdict")};
   return kColumns;
 }
 
 const std::vector<TableColumn>& ReferenceColumns() {
-  static const std::vector<TableColumn> kColumns =
-      Columns({"experiment", "mechanism", "horizon", "outcome", "reference", "trust_horizon",
-               "reference_error", "reference_witnesses", "cpu_s", "rhs_evaluations", "message"});
+  static const std::vector<TableColumn> kColumns = Columns(
+      {"experiment", "mechanism", "horizon", "outcome", "reference", "reference_valid_until",
+       "reference_error", "reference_runs", "cpu_s", "rhs_evaluations", "message"});
   return kColumns;
 }
 
@@ -222,18 +236,17 @@ const std::vector<TableColumn>& CompactReferenceColumns() {
       Short("horizon", "T/s"),
       Short("outcome", "outcome"),
       Short("reference", "reference"),
-      Short("trust_horizon", "certified until/s", {}, kAnswer),
-      Short("reference_error", "to/m", {}, kAnswer),
-      Short("cpu_s", "CPU/s"),
+      Short("reference_valid_until", "valid until [s]", {}, kAnswer),
+      Short("reference_error", "to [m]", {}, kAnswer),
+      Short("cpu_s", "CPU [s]"),
       Short("message", "why no further")};
   return kColumns;
 }
 
 const std::vector<TableColumn>& CompactDriftColumns() {
-  static const std::vector<TableColumn> kColumns =
-      Join(CompactCaseColumns(),
-           {Short("drift_position_max", "drift [m]", {}, kAnswer),
-            Short("energy_error_max", "dE [J]"), Short("growth_exponent", "slope")});
+  static const std::vector<TableColumn> kColumns = Join(
+      CompactCaseColumns(), {Short("drift_position_max", "drift [m]", {}, kAnswer),
+                             Short("energy_error_max", "dE [J]"), Short("growth_exponent", "t^p")});
   return kColumns;
 }
 

@@ -36,10 +36,11 @@ const Reason kReasons[] = {
        return fmt::format("distance {:.1g} at {:.4g} s", row.Number("singularity_distance_min"),
                           row.Number("singularity_distance_min_t"));
      }},
-    {kSoftenedDoubt, "constraints were softened away from singular positions",
+    {kSoftenedDoubt, "constraints were regularized away from singular positions",
      [](const Record& row) {
-       return fmt::format("{} of {} evaluations, distance {:.1g}", row.Text("softened_evaluations"),
-                          row.Text("rhs_evaluations"), row.Number("singularity_distance_min"));
+       return fmt::format("{} of {} evaluations, distance {:.1g}",
+                          row.Text("regularized_evaluations"), row.Text("rhs_evaluations"),
+                          row.Number("singularity_distance_min"));
      }},
     {kDriftDoubt, "more drift than steps and tolerance explain at this level",
      [](const Record& row) {
@@ -97,7 +98,7 @@ std::string NoteOf(const Reason& reason, std::span<const Record> rows,
 using SceneKey = std::pair<std::string, std::pair<double, double>>;
 
 SceneKey SceneOf(const Record& record) {
-  return {record.Text("scene_id"), {record.Number("horizon"), record.Number("rtol")}};
+  return {record.Text("problem_id"), {record.Number("horizon"), record.Number("rtol")}};
 }
 
 /// The name has the parameters in which the store's `records` differ.
@@ -181,13 +182,13 @@ std::string NameOfRow(const Record& row, const std::vector<std::string>& keys) {
 std::vector<std::pair<std::string, std::string>> MeaningsOfDoubts() {
   std::vector<std::pair<std::string, std::string>> meanings;
   for (const Reason& reason : kReasons) meanings.emplace_back(reason.code, reason.sentence);
-  meanings.emplace_back(kDisagreementDoubt, "other runs of the scene end elsewhere");
+  meanings.emplace_back(kDisagreementDoubt, "other runs of the problem end elsewhere");
   return meanings;
 }
 
 std::vector<std::string> DoubtNotes(std::span<const Record> rows, std::span<const Record> records) {
   if (std::ranges::none_of(rows, [](const Record& row) { return HasDoubt(row); })) return {};
-  std::vector<std::string> notes = {"doubtful runs finished, but (column doubts):"};
+  std::vector<std::string> notes = {"flagged runs finished, but (column warnings):"};
   const std::vector<std::string> keys = TellingKeys(rows);
   for (const Reason& reason : kReasons) {
     if (const std::string note = NoteOf(reason, rows, keys); !note.empty()) notes.push_back(note);
@@ -212,7 +213,7 @@ std::vector<std::string> DoubtNotes(std::span<const Record> rows, std::span<cons
     notes.push_back(NameOfScene(*alone, records) + " does not end as with finer tolerances");
   }
   if (scenes.size() > kScenesNamed) {
-    notes.push_back(fmt::format("{}: {} scenes more; column agreement has the sets that agree",
+    notes.push_back(fmt::format("{}: {} problems more; column agreement has the sets that agree",
                                 kDisagreementDoubt, scenes.size() - kScenesNamed));
   }
   return notes;

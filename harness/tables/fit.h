@@ -15,7 +15,7 @@ namespace loopbench::harness {
 /// measured), of equals the one furthest to the right. The first column stays.
 std::vector<std::size_t> OrderOfLeaving(const Table& table);
 
-/// "dE [J]; slope; the same in all rows: T/s 10": the columns that have left, by their places, with
+/// "dE [J]; t^p; the same in all rows: T/s 10": the columns that have left, by their places, with
 /// the values that all rows share.
 std::string WhatHasLeft(const Table& table, const std::vector<std::size_t>& places);
 

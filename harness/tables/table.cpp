@@ -76,7 +76,7 @@ std::string NumberCell(double number) {
 bool IsDoubtful(const Record& row, const std::string& key) {
   const Value* value = row.Find(key);
   if (value == nullptr || std::holds_alternative<std::monostate>(*value)) return false;
-  if (key == "outcome") return !HasFailed(row) && !row.Text("doubts").empty();
+  if (key == "outcome") return !HasFailed(row) && !row.Text("warnings").empty();
   if (key == "growth_hypothesis") return row.Text("growth_hypothesis_resolved") != "true";
   if (std::isnan(row.Number(key))) return false;
   if (key == "energy_growth_exponent" || key == "correction_growth_exponent") return true;

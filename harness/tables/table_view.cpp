@@ -42,7 +42,7 @@ void SetScene(const std::string& mechanism, const FactorialOptions& options, Key
 // A table of one effect per factor has no place for two runs that differ in anything else.
 void RequireSameCase(const Record& one, const Record& other) {
   if (one.Text("case_id") == other.Text("case_id")) return;
-  for (const char* key : {"experiment", "jacobian", "atol", "content", "case_id"}) {
+  for (const char* key : {"experiment", "jacobian", "atol", "config_hash", "case_id"}) {
     if (one.Text(key) == other.Text(key)) continue;
     throw ConfigError(fmt::format(
         "factorial table: found {} {} with {} {} and {}, expected one of them: choose "
@@ -67,7 +67,7 @@ std::vector<Run> Collect(std::span<const Record> records, const FactorialOptions
     }
     for (const TableColumn& parameter : parameters) {
       // mechanisms differ in content, and are compared all the same
-      if (parameter.key == "content" || parameter.key == "set") continue;
+      if (parameter.key == "config_hash" || parameter.key == "set") continue;
       key["parameter " + parameter.key] = record.Text(parameter.key);
     }
     SetScene(record.Text("mechanism"), options, &key);
@@ -230,13 +230,13 @@ std::vector<std::string> PrecisionNotes() {
   return {
       "error: largest distance of a centre of mass from the reference at the end; the reference "
       "(integrator gragg) is the same for all columns: multipliers in joint coordinates without "
-      "softening, float128; its own error is the distance from another one at 10^4 times its "
+      "regularization, float128; its own error is the distance from another one at 10^4 times its "
       "tolerance",
       "drift: largest mismatch of the points of a constraint at accepted steps, measured in "
       "float128",
-      "ruled by: round-off where the widest scalar at the same tolerance changes the number by "
+      "dominated by: round-off where the widest scalar at the same tolerance changes the number by "
       "more "
-      "than a factor of two, else truncation (of the method, or by softening); of the widest, "
+      "than a factor of two, else truncation (of the method, or by regularization); of the widest, "
       "truncation where the number is more than ten times the next narrower's scaled by the ratio "
       "of their eps"};
 }
@@ -311,8 +311,8 @@ bool Shows(const Table& table, const std::string& key) {
 std::optional<std::string> HiddenDoubts(const Table& table, std::span<const Record> runs) {
   const auto doubted =
       std::ranges::count_if(runs, [](const Record& run) { return IsDoubtful(run, "outcome"); });
-  if (doubted == 0 || Shows(table, "doubts")) return std::nullopt;
-  return fmt::format("{} of {} runs finished with doubts; column doubts says which and why",
+  if (doubted == 0 || Shows(table, "warnings")) return std::nullopt;
+  return fmt::format("{} of {} runs finished with warnings; column warnings says which and why",
                      doubted, runs.size());
 }
 
@@ -328,11 +328,11 @@ std::vector<std::string> WhatColumnsHide(const Table& table) {
   const bool shows_errors = std::ranges::any_of(
       table.columns, [](const TableColumn& column) { return column.key.starts_with("error_"); });
   const auto within = std::ranges::count_if(
-      table.rows, [](const Record& row) { return row.Number("error_over_accuracy") <= 1.0; });
+      table.rows, [](const Record& row) { return row.Number("error_over_uncertainty") <= 1.0; });
   if (shows_errors && within > 0) {
     notes.push_back(fmt::format(
         "{} of {} runs are as near to a published series as that is accurate: it does not tell "
-        "them from the truth (column error_over_accuracy, at most 1)",
+        "them from the truth (column error_over_uncertainty, at most 1)",
         within, table.rows.size()));
   }
   const bool unresolved = std::ranges::any_of(table.columns, [&](const TableColumn& column) {
@@ -344,7 +344,8 @@ std::vector<std::string> WhatColumnsHide(const Table& table) {
   });
   if (unresolved) {
     notes.push_back(
-        "slopes are those of log-log axes; ? marks what is not resolved (single runs, windows that "
+        "exponents p are slopes in log-log axes; ? marks what is not resolved (single runs, "
+        "windows that "
         "disagree), in CSV and JSON columns growth_resolved and growth_hypothesis_resolved do");
   }
   return notes;
@@ -428,11 +429,11 @@ Table MakeTable(std::span<const Record> records, const TableView& view) {
     const auto first = std::ranges::find_if(
         table.columns, [&](const TableColumn& column) { return column.key != table.group; });
     if (!shows_outcome && first != table.columns.end()) first->marks_doubts = true;
-    table.title += fmt::format(" - {} of {} rows are doubtful (marked {}, {})", doubtful,
+    table.title += fmt::format(" - {} of {} rows are flagged (marked {}, {})", doubtful,
                                table.rows.size(), shows_outcome ? "? in outcome" : "*",
-                               view.compact             ? "reasons below"
-                               : Shows(table, "doubts") ? "reasons in column doubts"
-                                                        : "column doubts has the reasons");
+                               view.compact               ? "reasons below"
+                               : Shows(table, "warnings") ? "reasons in column warnings"
+                                                          : "column warnings has the reasons");
   }
   return table;
 }

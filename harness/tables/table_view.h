@@ -46,7 +46,7 @@ Table FactorialTable(std::span<const Record> records, const FactorialOptions& op
 /// The keys, besides parameters, whose values rungs of one ladder share.
 inline constexpr const char* kLadderKeys[] = {"mechanism",   "formulation", "enforcement",
                                               "coordinates", "solver",      "horizon",
-                                              "experiment",  "content"};
+                                              "experiment",  "config_hash"};
 
 /// One text per ladder.
 std::string LadderOf(const Record& record);

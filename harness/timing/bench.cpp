@@ -40,7 +40,7 @@ All options of Google Benchmark 1.7 hold, among them
 Examples:
   loopbench_bench --benchmark_filter='rhs/chain/.*/odca/acceleration'
   loopbench_bench --benchmark_repetitions=9 --benchmark_out=new.json
-  loopbench fit new.json
+  loopbench fit-scaling new.json
   loopbench compare base.json new.json
 
 Names are MEASURE/MECHANISM[/SIZE]/FORMULATION/LEVEL/COORDINATES/SOLVER[/N-threads]. Times are of the
@@ -192,7 +192,7 @@ void Measure(benchmark::State& state, BenchmarkSubject& subject, BenchmarkKind k
   const double evaluations = static_cast<double>(state.iterations());
   const double bodies = subject.bodies();
   Count(state, "bodies", bodies);
-  Count(state, "yardstick_ns", std::max(yardstick, YardstickNs()));
+  Count(state, "calibration_ns", std::max(yardstick, YardstickNs()));
   // not a rate of the library: it would print nanoseconds with the unit of seconds
   Count(state, "ns_per_body", spent / evaluations / bodies);
   Count(state, "allocations", static_cast<double>(after.count - before.count) / evaluations);

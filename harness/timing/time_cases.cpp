@@ -296,9 +296,9 @@ std::vector<Record> TimeTogether(const Experiment& experiment, const TimingGroup
   const Rounds wall = TimeInTurn(static_cast<std::size_t>(experiment.timing.repeats), subjects,
                                  &Subject::TimeSimulation, &Subject::wall_s);
   Record noise = NoiseKeys(machine, *subjects.front(), *subjects.back());
-  noise.Set("yardstick_ns", rhs.yardstick);
-  noise.Set("yardstick_wall_ns", wall.yardstick);
-  noise.Set("disturbed_rounds", rhs.disturbed + wall.disturbed);
+  noise.Set("calibration_ns", rhs.yardstick);
+  noise.Set("calibration_wall_ns", wall.yardstick);
+  noise.Set("discarded_repetitions", rhs.disturbed + wall.disturbed);
   std::vector<Record> records;
   for (std::size_t i = 0; i < group.cases.size(); ++i) {
     records.push_back(subjects[i]->Finish(group.cases[i].keys));

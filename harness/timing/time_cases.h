@@ -5,10 +5,10 @@
 // first column of each mechanism is timed a second time under no name: how far it is from itself
 // (`aa_spread`, noise.h) is the least difference between columns that means anything. How fast the
 // machine was meanwhile is told by the yardstick (yardstick.h), its median between all rounds:
-// `yardstick_ns` of right-hand sides, `yardstick_wall_ns` of simulations. Rounds during which it
-// was slower than it is alone are measured again, for a second at most, and the quietest are kept;
-// `disturbed_rounds` are left out. Right-hand sides of scenes are evaluated at states from an
-// actual run, those of families at their moving start.
+// `calibration_ns` of right-hand sides, `calibration_wall_ns` of simulations. Rounds during which
+// it was slower than it is alone are measured again, for a second at most, and the quietest are
+// kept; `discarded_repetitions` are left out. Right-hand sides of scenes are evaluated at states
+// from an actual run, those of families at their moving start.
 #pragma once
 
 #include <functional>

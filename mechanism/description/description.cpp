@@ -36,7 +36,7 @@ std::string CheckPlanarJoint(const JointDescription& joint) {
     return "joint " + Quote(joint.name) + ": lies out of the plane";
   }
   if (!about_z(joint.from.rotation) || !about_z(joint.to.rotation)) {
-    return "joint " + Quote(joint.name) + ": its frames may turn about z only in a planar scene";
+    return "joint " + Quote(joint.name) + ": its frames may turn about z only in a planar problem";
   }
   if (joint.axis.isZero()) return "";
   const bool fits = TraitsOf(joint.type).own_axis == 'x'

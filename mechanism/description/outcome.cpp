@@ -25,7 +25,7 @@ std::string_view ToString(Outcome outcome) {
     case Outcome::kNewtonFailure:
       return "newton-failure";
     case Outcome::kInexpressible:
-      return "inexpressible";
+      return "unsupported";
     case Outcome::kIntegratorError:
       return "integrator-error";
   }

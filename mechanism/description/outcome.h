@@ -8,7 +8,7 @@ namespace loopbench {
 /// Ending of one evaluation or of one run. `kFinished` is the only success.
 enum class Outcome {
   kFinished,            ///< reached its end
-  kSingular,            ///< a matrix that must be regular was not (as-published solvers)
+  kSingular,            ///< a matrix that must be regular was not (plain solvers)
   kStepTooSmall,        ///< the error test failed too often or the step fell below round-off
   kNonFinite,           ///< a derivative was NaN or infinite
   kStepLimit,           ///< more steps than allowed

@@ -54,7 +54,7 @@ int LoopRank(const Mechanism<Space, S>& mechanism, int dependent_rows) {
 template <class Space, class S>
 std::string TooLargeToDecide(const Mechanism<Space, S>& mechanism, const Conditioning& found) {
   const int joint = found.worst_joint;
-  return "rank is in doubt" +
+  return "rank is uncertain" +
          (joint < 0 ? std::string() : " at joint \"" + mechanism.joint_names()[joint] + '"') +
          ", and the dense equations that would decide it are too large: " +
          std::to_string(mechanism.num_rows()) + " constraints and " +

@@ -89,7 +89,7 @@ class ConstraintSolver {
                              std::span<const S> q, std::span<const S> u, std::span<S> qdot,
                              std::span<S> udot);
 
-  /// Short cut for what level position does to an accepted (q, u), in place and by Correct():
+  /// Short cut for what level projection does to an accepted (q, u), in place and by Correct():
   /// Newton steps until mismatches are at most `goal` [m], one at least where they are more, or no
   /// longer shrink, then one of speeds. Nothing, as here, where there is no short cut or the
   /// position is one that Factor() should judge: then (q, u) are as they were.

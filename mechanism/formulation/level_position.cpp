@@ -1,4 +1,4 @@
-// Level position: after each accepted step Newton's method on the mismatch of positions, then one
+// Level projection: after each accepted step Newton's method on the mismatch of positions, then one
 // step on that of speeds.
 #include <algorithm>
 #include <limits>

@@ -15,13 +15,13 @@ std::deque<LevelTraits>& Rows() {
       {"acceleration",
        "the loops' accelerations are imposed. Speeds and positions follow by integration, and "
        "errors in them stay.",
-       DriftGrowth::kSquare, "accel", true},
+       DriftGrowth::kSquare, "acc", true},
       {"velocity", "the speeds satisfy the loops too; positions follow by integration.",
-       DriftGrowth::kLinear, "veloc", true},
-      {"position",
+       DriftGrowth::kLinear, "vel", true},
+      {"projection",
        "as acceleration, and after each accepted step positions and speeds are moved back to where "
        "the loops hold.",
-       DriftGrowth::kNone, "posit", true},
+       DriftGrowth::kNone, "proj", true},
       {"baumgarte",
        "as acceleration, with feedback: a mismatch e obeys e'' + 2 alpha e' + beta^2 e = 0, alpha "
        "= beta = 0.05 over the longest step unless given.",
@@ -67,7 +67,7 @@ Enforcement RegisterLevel(LevelRow row, int alignment) {
 std::string_view ToString(Enforcement level) { return TraitsOf(level).name; }
 
 std::string_view ToString(SolverKind solver) {
-  return solver == SolverKind::kAsPublished ? "as-published" : "rank-revealing";
+  return solver == SolverKind::kAsPublished ? "plain" : "rank-revealing";
 }
 
 }  // namespace loopbench

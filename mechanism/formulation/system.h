@@ -133,14 +133,14 @@ class System final : public Ode<S> {
   bool integrates_work() const { return with_work_ || state_size() == 0; }
   /// udot_ at the current state, and whether prescribed motions can be followed.
   Outcome Accelerate();
-  /// The latter. At level position, whose accepted steps end on the constraints, inertia carries a
-  /// mechanism across singular configurations; what trial stages miss there is not judged.
+  /// The latter. At level projection, whose accepted steps end on the constraints, inertia carries
+  /// a mechanism across singular configurations; what trial stages miss there is not judged.
   Outcome JudgeDrives();
   /// Whether constraints depend on each other that usually do not.
   bool IsSingular() const;
   int FirmRank(const Kinematics<Space, S>& at) const;
   void NoteRankAhead();
-  /// Below level position, at an accepted step: whether closure errors decide the branch.
+  /// Below level projection, at an accepted step: whether closure errors decide the branch.
   bool IsOffBranch() const;
   /// Rates of the works, if they are asked for, at the kinematics' speeds.
   void PutPower(std::span<S> rates);

@@ -31,7 +31,7 @@ void HoldInSpace(const MechanismDescription& description, std::uint64_t seed, Fa
 }
 
 TEST(AccelerationsTest, PaperScenesAgreeWithTheOracle) {
-  Family plane("paper scenes", kShare), space("paper scenes in space", kShare);
+  Family plane("paper problems", kShare), space("paper problems in space", kShare);
   for (const char* name : {"square-four-bar", "square-seven-bar", "four-bar", "seven-bar",
                            "general-seven-bar", "parallelogram", "toggle", "dead-centre"}) {
     const MechanismDescription scene =

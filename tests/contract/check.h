@@ -23,7 +23,7 @@ namespace loopbench::contract {
 ///                     asked before
 ///   determinism       a second object gives the same bits
 ///   speeds            handed through as they are; at level velocity they satisfy the loops
-///   projection        at level position an accepted step ends on the constraints
+///   projection        at level projection an accepted step ends on the constraints
 ///   endings           a state with NaN or infinity ends as non-finite or singular, and leaves
 ///                     nothing behind
 ///

@@ -24,7 +24,7 @@ class CountTest : public CommandLineTest {
 
 TEST_F(CountTest, PrintsARowForEachRightHandSide) {
   const Ending ending =
-      Call("count four-bar.json --coordinates joint --level acceleration,velocity");
+      Call("count four-bar.json --coordinates joint --enforcement acceleration,velocity");
   ExpectEnding(ending, 0, {"flops", "depth", "odca", "lagrange", "reduction", "McMahon"});
   const Ending json = Call("count four-bar.json --formulation odca --format json");
   ExpectEnding(json, 0, {"\"flops\":", "\"additions\":", "\"flops_as_run\":"});
@@ -36,7 +36,7 @@ TEST_F(CountTest, BadInputIsNamedWithFileAndExpectation) {
   EditMechanism("\"mass\": 1.0", "\"mass\": \"heavy\"");
   ExpectEnding(Call("count four-bar.json"), 2,
                {"four-bar.json", "/bodies/0/mass: found \"heavy\"", "expected a number > 0"});
-  ExpectEnding(Call("count four-bar.json --level postion"), 2, {"--level", "postion"});
+  ExpectEnding(Call("count four-bar.json --enforcement postion"), 2, {"--enforcement", "postion"});
   ExpectEnding(Call("count"), 2, {"neither mechanisms nor --family"});
 }
 
@@ -49,14 +49,15 @@ TEST_F(CountTest, WhatIsNotRecordedIsARowWithTheReason) {
 }
 
 TEST_F(CountTest, LevelPositionHasItsNewtonStepBesideIt) {
-  ExpectEnding(Call("count four-bar.json --level position"), 0, {"Newton step"});
+  ExpectEnding(Call("count four-bar.json --enforcement projection"), 0, {"Newton step"});
 }
 
 /// Sparse multipliers of a chain grow by the same number for each body from ten bodies on; the
 /// exponent is that of a line with an offset.
 TEST_F(CountTest, FamiliesHaveExponentsAndCrossovers) {
   const Ending ending = Call(
-      "count --family chain --sizes 3,16,32 --level acceleration --format jsonl --out chain.jsonl");
+      "count --family chain --sizes 3,16,32 --enforcement acceleration --format jsonl --out "
+      "chain.jsonl");
   ExpectEnding(ending, 0, {});
   std::map<std::string, std::vector<double>> exponents;
   for (const Record& row : ReadRecords(folder_ / "chain.jsonl")) {
@@ -69,7 +70,7 @@ TEST_F(CountTest, FamiliesHaveExponentsAndCrossovers) {
   EXPECT_NEAR(exponents["odca joint"].back(), 1.0, 0.2);
   EXPECT_NEAR(exponents["lagrange absolute"].back(), 1.0, 0.1);
   EXPECT_GT(exponents["lagrange joint"].back(), 1.8);
-  ExpectEnding(Call("count --family chain --sizes 3,16 --level acceleration"), 0,
+  ExpectEnding(Call("count --family chain --sizes 3,16 --enforcement acceleration"), 0,
                {"fewest operations at level acceleration, rank-revealing: from 3 bodies reduction, "
                 "joint; from 16 bodies odca, joint (to 16)"});
   ExpectEnding(Call("plot chain.jsonl --x bodies --y flops_per_body --out chain.svg"), 0, {});
@@ -137,8 +138,8 @@ INSTANTIATE_TEST_SUITE_P(Coordinates, CountGate, testing::Values("joint", "absol
 TEST_F(CountTest, GeneratedExecutionIsAFactorOfExperiments) {
   Write("both.json", R"({
     "name": "both", "tolerances": [1e-6],
-    "scenes": [{"mechanism": "four-bar.json", "horizon": 0.5}],
-    "columns": [{"formulation": ["odca", "reduction"], "enforcement": "velocity",
+    "problems": [{"mechanism": "four-bar.json", "horizon": 0.5}],
+    "methods": [{"formulation": ["odca", "reduction"], "enforcement": "velocity",
                  "execution": ["library", "generated"]}],
     "timing": {"repeats": 0}})");
   ExpectEnding(Call("list both.json"), 0, {"execution", "generated"});
@@ -152,12 +153,12 @@ TEST_F(CountTest, GeneratedExecutionIsAFactorOfExperiments) {
   EXPECT_NE(table.text.find("odca,,finished,,"), std::string::npos) << table.text;
 }
 
-/// Projections stay in the library; drift at level position is round-off.
+/// Projections stay in the library; drift at level projection is round-off.
 TEST_F(CountTest, GeneratedRightHandSidesServeLevelPosition) {
   Write("position.json", R"({
     "name": "position", "tolerances": [1e-6],
-    "scenes": [{"mechanism": "four-bar.json", "horizon": 0.5}],
-    "columns": [{"formulation": ["odca", "lagrange", "reduction"], "enforcement": "position",
+    "problems": [{"mechanism": "four-bar.json", "horizon": 0.5}],
+    "methods": [{"formulation": ["odca", "lagrange", "reduction"], "enforcement": "projection",
                  "execution": "generated"}],
     "timing": {"repeats": 0}})");
   ExpectEnding(Call("run position.json --out out"), 0, {});
@@ -172,19 +173,19 @@ TEST_F(CountTest, WhatIsNotGeneratedEndsByName) {
   Write("governor.json", ReadFile(kIterating));
   Write("none.json", R"({
     "name": "none", "tolerances": [1e-6],
-    "scenes": [{"mechanism": "governor.json", "horizon": 0.5}],
-    "columns": [{"formulation": "lagrange", "enforcement": "position", "coordinates": "absolute",
+    "problems": [{"mechanism": "governor.json", "horizon": 0.5}],
+    "methods": [{"formulation": "lagrange", "enforcement": "projection", "coordinates": "absolute",
                  "execution": "generated"}],
     "timing": {"repeats": 0}})");
   Call("run none.json --out out");
   ExpectEnding(Call("table out --format csv --columns outcome,message"), 0,
-               {"inexpressible", "more than 100000 operations"});
+               {"unsupported", "more than 100000 operations"});
   Write("typo.json", R"({
     "name": "typo", "tolerances": [1e-6],
-    "scenes": [{"mechanism": "four-bar.json", "horizon": 0.5}],
-    "columns": [{"formulation": "odca", "enforcement": "velocity", "execution": "generate"}]})");
+    "problems": [{"mechanism": "four-bar.json", "horizon": 0.5}],
+    "methods": [{"formulation": "odca", "enforcement": "velocity", "execution": "generate"}]})");
   ExpectEnding(Call("check typo.json"), 2,
-               {"/columns/0/execution", "found \"generate\"", "did you mean \"generated\""});
+               {"/methods/0/execution", "found \"generate\"", "did you mean \"generated\""});
 }
 
 }  // namespace

@@ -180,7 +180,8 @@ TEST_F(GenerateTest, EqualInputGivesEqualFiles) {
 TEST_F(GenerateTest, BadInputIsNamed) {
   ExpectEnding(Call("generate absent.json --out code"), 2, {"absent.json"});
   ExpectEnding(Call("generate four-bar.json"), 2, {"--out"});
-  ExpectEnding(Call("generate four-bar.json --out code --level position"), 2, {"--level"});
+  ExpectEnding(Call("generate four-bar.json --out code --enforcement projection"), 2,
+               {"--enforcement"});
   ExpectEnding(Call("generate four-bar.json --out code --fmu x.fmu", "CC=absent"), 2,
                {"no C compiler", "absent"});
   ExpectEnding(Call("generate four-bar.json --out code --fmu ."), 2, {"found a folder"});

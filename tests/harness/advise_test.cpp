@@ -177,17 +177,17 @@ TEST(AdviceByLaw, KeepsAMarginInARunWithAllObserversToo) {
 }
 
 TEST_F(CommandLineTest, AdviceIsPrintedAndWritten) {
-  const Ending ending = Call("advise four-bar.json --error 1e-5 --horizon 1 --out best.json");
+  const Ending ending = Call("advise four-bar.json --max-error 1e-5 --horizon 1 --out best.json");
   EXPECT_EQ(ending.code, 0) << ending.text;
   for (const char* words : {"Take ", "Runner-up", "Dominant error", "reference: long-double"}) {
     EXPECT_NE(ending.text.find(words), std::string::npos) << words << "\n" << ending.text;
   }
   EXPECT_EQ(Call("check best.json").code, 0);
-  const Ending run = Call("run best.json --out best --gate doubts --no-timing");
+  const Ending run = Call("run best.json --out best --fail-on warnings --no-timing");
   EXPECT_EQ(run.code, 0) << run.text;
   // a point of its own, and a table for programs
   const Ending csv =
-      Call("advise four-bar.json --error 1e-5 --horizon 1 --points bar2.B --format csv");
+      Call("advise four-bar.json --max-error 1e-5 --horizon 1 --points bar2.B --format csv");
   EXPECT_EQ(csv.text.substr(0, 12), "formulation,") << csv.text;
   EXPECT_EQ(Call("advise four-bar.json --budget 1e-9 --horizon 1").code, 1);
 }
@@ -196,8 +196,8 @@ TEST_F(CommandLineTest, AdviceRefusesWhatItCannotGive) {
   const Ending point = Call("advise four-bar.json --points bar9.X");
   EXPECT_EQ(point.code, 2);
   EXPECT_NE(point.text.find("found \"bar9.X\", expected BODY"), std::string::npos) << point.text;
-  EXPECT_EQ(Call("advise four-bar.json --error 1e-3 --budget 1").code, 2);
-  EXPECT_EQ(Call("advise four-bar.json --error -1").code, 2);
+  EXPECT_EQ(Call("advise four-bar.json --max-error 1e-3 --budget 1").code, 2);
+  EXPECT_EQ(Call("advise four-bar.json --max-error -1").code, 2);
   EXPECT_EQ(Call("advise nothing.json").code, 2);
 }
 
@@ -221,7 +221,7 @@ std::string Parallelogram(double ground, double crank, double angle, double spee
       R"({{"name": "parallelogram", "gravity": [0, -9.81],
       "ground": {{"points": {{"O": [0, 0], "C": [{}, 0]}}}}, "bodies": [{}, {}, {}],
       "joints": [{}, {}, {}, {}],
-      "initial": {{"coordinates": {{"O": {}, "A": {}, "C": {}}}, "held": ["O"], "speeds": {{"O": {}}}}}}})",
+      "initial": {{"coordinates": {{"O": {}, "A": {}, "C": {}}}, "fixed": ["O"], "speeds": {{"O": {}}}}}}})",
       ground, bar("crank", crank), bar("coupler", ground), bar("rocker", crank),
       pin("O", "ground", "O", "crank", "A"), pin("A", "crank", "B", "coupler", "A"),
       pin("C", "ground", "C", "rocker", "A"), pin("B", "coupler", "B", "rocker", "B"), angle,
@@ -232,8 +232,9 @@ TEST_F(CommandLineTest, TheExperimentOfAnAdviceHasItsErrorOverItsTime) {
   for (const auto& [ground, crank, angle, speed] :
        {std::array{2.0, 1.0, 0.5, 8.0}, std::array{1.3, 0.7, -0.4, 5.0}}) {
     Write("flat.json", Parallelogram(ground, crank, angle, speed));
-    const Ending ending =
-        Call("advise flat.json --error 1e-4 --horizon 3 --cpu 20 --format json --out best.json");
+    const Ending ending = Call(
+        "advise flat.json --max-error 1e-4 --horizon 3 --cpu-limit 20 --format json --out "
+        "best.json");
     ASSERT_EQ(ending.code, 0) << ending.text;
     const std::string key = "\"error_position_max\":";
     const std::size_t at = ending.text.find(key);
@@ -246,7 +247,7 @@ TEST_F(CommandLineTest, TheExperimentOfAnAdviceHasItsErrorOverItsTime) {
     const auto run = std::ranges::find_if(
         records, [](const Record& record) { return record.Text("kind") == "accuracy"; });
     ASSERT_NE(run, records.end());
-    EXPECT_EQ(run->Number("trust_horizon"), run->Number("horizon"));
+    EXPECT_EQ(run->Number("reference_valid_until"), run->Number("horizon"));
     EXPECT_EQ(run->Number("error_position_max"), claimed);
   }
 }
@@ -255,29 +256,30 @@ TEST_F(CommandLineTest, ThereIsNoAdviceForWhatDoesNotMove) {
   Write("rest.json", R"({"name": "rest", "gravity": [0, 0], "bodies": [
     {"name": "disc", "mass": 1, "inertia": 0.1, "points": {"rim": [0.5, 0]}}],
     "joints": [{"name": "O", "type": "revolute", "from": {"body": "ground"}, "to": {"body": "disc"}}]})");
-  ExpectEnding(Call("advise rest.json --error 1e-5 --horizon 1"), 2, {"no joint moves"});
+  ExpectEnding(Call("advise rest.json --max-error 1e-5 --horizon 1"), 2, {"no joint moves"});
   // it turns, and its centre of mass stays where it is
   Write("disc.json", R"({"name": "disc", "gravity": [0, 0], "bodies": [
     {"name": "disc", "mass": 1, "inertia": 0.1, "points": {"rim": [0.5, 0]}}],
     "joints": [{"name": "O", "type": "revolute", "from": {"body": "ground"}, "to": {"body": "disc"}}],
     "initial": {"speeds": {"O": 1.0}}})");
-  ExpectEnding(Call("advise disc.json --error 1e-5 --horizon 1 --points disc"), 2,
+  ExpectEnding(Call("advise disc.json --max-error 1e-5 --horizon 1 --points disc"), 2,
                {"none of the measured points moves", "--points"});
-  ExpectEnding(Call("advise disc.json --error 1e-5 --horizon 1 --points disc.rim"), 0, {"Take"});
+  ExpectEnding(Call("advise disc.json --max-error 1e-5 --horizon 1 --points disc.rim"), 0,
+               {"Take"});
 }
 
 TEST_F(CommandLineTest, AdviceTimesGeneratedCode) {
   ExpectEnding(
-      Call("advise four-bar.json --error 1e-5 --horizon 1 --generated"), 0,
+      Call("advise four-bar.json --max-error 1e-5 --horizon 1 --generated"), 0,
       {"Generated code with the same integrator, level and tolerance: ", "times the time"});
 }
 
 TEST_F(CommandLineTest, AdviceRefusesModelsWhoseErrorIsTooLarge) {
   const std::string model = (kConfigs / "experiments/models/light-rod-compressor.json").string();
   // the rod's mass moves it by 1e-4 m in a few seconds
-  const Ending fine = Call("advise " + model + " --error 1e-7 --horizon 2 --simplify");
+  const Ending fine = Call("advise " + model + " --max-error 1e-7 --horizon 2 --simplify");
   EXPECT_NE(fine.text.find("refused: its error is too large"), std::string::npos) << fine.text;
-  const Ending coarse = Call("advise " + model + " --error 1e-2 --horizon 2 --simplify");
+  const Ending coarse = Call("advise " + model + " --max-error 1e-2 --horizon 2 --simplify");
   EXPECT_NE(coarse.text.find("light-links"), std::string::npos) << coarse.text;
   EXPECT_EQ(coarse.text.find("refused"), std::string::npos) << coarse.text;
 }

@@ -16,8 +16,8 @@
 namespace loopbench::harness {
 namespace case_identity_test {
 
-constexpr const char* kMass5 = " --set /scenes/0/mechanism/bodies/0/mass=5";
-constexpr const char* kMass1 = " --set /scenes/0/mechanism/bodies/0/mass=1";
+constexpr const char* kMass5 = " --set /problems/0/mechanism/bodies/0/mass=5";
+constexpr const char* kMass1 = " --set /problems/0/mechanism/bodies/0/mass=1";
 
 class CaseIdentity : public CommandLineTest {
  protected:
@@ -40,7 +40,7 @@ TEST_F(CaseIdentity, GoingBackShowsTheNumbersOfWhatWasAskedFor) {
     const Ending third = Call("run tiny.json --out out" + there);
     ExpectEnding(third, 0, {"0 run now, 2 were done before"});
     EXPECT_EQ(Rows("out/drift.csv"), first);
-    EXPECT_EQ(first.find("content"), std::string::npos) << "one content needs no name";
+    EXPECT_EQ(first.find("config_hash"), std::string::npos) << "one content needs no name";
   }
 }
 
@@ -48,22 +48,22 @@ TEST_F(CaseIdentity, TablesShowEveryContentAndTellThemApart) {
   for (const char* set : {kMass5, kMass1, kMass5}) {
     ExpectEnding(Call(std::string("run tiny.json --out out") + set), 0, {});
   }
-  ExpectEnding(Call("table out"), 0, {"content", "bodies/0/mass=5", "bodies/0/mass=1"});
+  ExpectEnding(Call("table out"), 0, {"config_hash", "bodies/0/mass=5", "bodies/0/mass=1"});
   const std::vector<Record> records = LatestRecords(ReadRecords(folder_ / "out"));
   ASSERT_EQ(records.size(), 4u);
-  EXPECT_EQ(records[0].Text("content"), records[1].Text("content")) << "of one mechanism";
-  EXPECT_NE(records[0].Text("content"), records[2].Text("content"));
-  const std::string mass1 = records[2].Text("content");
-  ExpectEnding(Call("table out --format csv --columns set,steps --where content=" + mass1), 0,
+  EXPECT_EQ(records[0].Text("config_hash"), records[1].Text("config_hash")) << "of one mechanism";
+  EXPECT_NE(records[0].Text("config_hash"), records[2].Text("config_hash"));
+  const std::string mass1 = records[2].Text("config_hash");
+  ExpectEnding(Call("table out --format csv --columns set,steps --where config_hash=" + mass1), 0,
                {"bodies/0/mass=1"});
   Write("map.json",
-        R"({"title": "t", "columns": [{"label": "o", "select": {"formulation": "odca"}}],
+        R"({"title": "t", "methods": [{"label": "o", "select": {"formulation": "odca"}}],
     "groups": [{"label": "g", "rows": [{"label": "r", "select": {"mechanism": "four-bar"},
-      "decides": [{"measure": "drift_position_max", "limit": 1, "unit": "m"}], "why": "w"}]}]})");
-  ExpectEnding(Call("map out --rules map.json"), 2, {"four-bar", "more than once"});
+      "criteria": [{"measure": "drift_position_max", "limit": 1, "unit": "m"}], "rationale": "w"}]}]})");
+  ExpectEnding(Call("robustness out --rules map.json"), 2, {"four-bar", "more than once"});
   // drawn together or judged together they would be one case with two results
-  ExpectEnding(Call("verdict out --claims claims.json"), 2, {"four-bar", "more than once"});
-  ExpectEnding(Call("table out --kind factorial"), 2, {"--where content="});
+  ExpectEnding(Call("check-claims out --claims claims.json"), 2, {"four-bar", "more than once"});
+  ExpectEnding(Call("table out --kind factorial"), 2, {"--where config_hash="});
   ExpectEnding(Call("plot out --out figures"), 0, {});
   int figures = 0;
   for (const auto& file : fs::directory_iterator(folder_ / "figures")) {
@@ -85,7 +85,7 @@ TEST_F(CaseIdentity, FilesOfEqualNamesAreDifferentCases) {
   for (const char* out : {"a", "b", "c"}) {
     const std::string call =
         std::string("run tiny.json other/tiny.json tiny.json --jobs 3 --out ") + out;
-    ExpectEnding(Call(call), 0, {"4 run now", "content"});
+    ExpectEnding(Call(call), 0, {"4 run now", "config_hash"});
     const std::string rows = Rows(std::string(out) + "/drift.csv");
     EXPECT_EQ(std::ranges::count(rows, '\n'), 4);
     if (first.empty()) first = rows;
@@ -119,8 +119,10 @@ TEST_F(CaseIdentity, GoingBackToAProgramShowsItsNumbers) {
 
 TEST_F(CaseIdentity, PlansTakeNoTimesOfOtherContents) {
   ExpectEnding(Call(std::string("run tiny.json --out out") + kMass5), 0, {});
-  ExpectEnding(Call(std::string("plan tiny.json --from out") + kMass5), 0, {"2 of 2 cases"});
-  ExpectEnding(Call(std::string("plan tiny.json --from out") + kMass1), 0, {"0 of 2 cases"});
+  ExpectEnding(Call(std::string("estimate tiny.json --timings-from out") + kMass5), 0,
+               {"2 of 2 cases"});
+  ExpectEnding(Call(std::string("estimate tiny.json --timings-from out") + kMass1), 0,
+               {"0 of 2 cases"});
 }
 
 TEST_F(CaseIdentity, ComparisonsPairEqualContentsOnly) {
@@ -129,16 +131,16 @@ TEST_F(CaseIdentity, ComparisonsPairEqualContentsOnly) {
   ExpectEnding(Call(std::string("run tiny.json --out both") + kMass1), 0, {});
   ExpectEnding(Call(std::string("run tiny.json --out both") + kMass5), 0, {});
   ExpectEnding(Call("compare five one"), 2, {"2 cases that ran another mechanism"});
-  ExpectEnding(Call("compare five both"), 2, {"COULD NOT MEASURE: 2 cases only in NEW"});
-  ExpectEnding(Call("compare five both --added"), 0, {"2 cases only in NEW", "SAME"});
+  ExpectEnding(Call("compare five both"), 2, {"INCONCLUSIVE: 2 cases only in NEW"});
+  ExpectEnding(Call("compare five both --added"), 0, {"2 cases only in NEW", "NO CHANGE"});
   fs::copy(folder_ / "both", folder_ / "copy", fs::copy_options::recursive);
-  ExpectEnding(Call("compare both copy"), 0, {"SAME"});
-  ExpectEnding(Call("export both"), 0, {"bodies/0/mass=5", "bodies/0/mass=1"});
+  ExpectEnding(Call("compare both copy"), 0, {"NO CHANGE"});
+  ExpectEnding(Call("export-metrics both"), 0, {"bodies/0/mass=5", "bodies/0/mass=1"});
 }
 
 TEST_F(CaseIdentity, WhateverDecidesARunChangesEveryCaseId) {
   const std::string timing = R"(/timing={"repeats":1,"families":[{"family":"chain","sizes":[3],
-      "columns":[{"formulation":"odca","enforcement":"acceleration"}]}]})";
+      "methods":[{"formulation":"odca","enforcement":"acceleration"}]}]})";
   const std::string precision = R"(/precision={"scalars":["float","double"]})";
   const auto ids = [&](const std::string& change) {
     std::vector<Setting> settings = {ParseSetting(timing), ParseSetting(precision)};
@@ -155,9 +157,9 @@ TEST_F(CaseIdentity, WhateverDecidesARunChangesEveryCaseId) {
   EXPECT_EQ(std::set<std::string>(plain.begin(), plain.end()).size(), plain.size());
   EXPECT_EQ(ids(""), plain);
   EXPECT_EQ(ids("/comment=\"other words\""), plain);
-  const std::string mass = "/scenes/0/mechanism/bodies/0/mass=2";
+  const std::string mass = "/problems/0/mechanism/bodies/0/mass=2";
   for (const std::string change : {mass.c_str(), "/limits/cpu_s=3", "/limits/steps=77",
-                                   "/limits/memory_mb=1024", "/compile={\"welds\":false}"}) {
+                                   "/limits/memory_mb=1024", "/preprocess={\"welds\":false}"}) {
     const std::vector<std::string> changed = ids(change);
     for (std::size_t i = 0; i < plain.size(); ++i) {
       const bool of_a_scene = i < 3;
@@ -174,7 +176,7 @@ TEST_F(CaseIdentity, WhateverDecidesARunChangesEveryCaseId) {
 TEST(RowOrder, IsTheSameWhicheverRunEndedFirst) {
   std::vector<Record> rows;
   const double none = std::numeric_limits<double>::quiet_NaN();
-  for (const char* enforcement : {"acceleration", "position"}) {
+  for (const char* enforcement : {"acceleration", "projection"}) {
     for (const double alpha : {none, 1.0, 5.0, 10.0}) {
       for (const char* integrator : {"ode45", "trbdf2"}) {
         for (const std::int64_t file : {0, 1}) {

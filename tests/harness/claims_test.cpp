@@ -32,7 +32,7 @@ Record RunOf(const std::string& mechanism, const std::string& measure, double va
 
 Check DriftCheck(const std::string& mechanism) {
   Check check;
-  check.label = mechanism + " scene";
+  check.label = mechanism + " problem";
   check.select = {{"mechanism", {mechanism}}};
   check.demand.measure = "drift";
   check.statistic = Statistic::kMax;
@@ -60,7 +60,8 @@ TEST(Claims, TheVerdictTurnsWithTheData) {
   };
   EXPECT_EQ(verdict(1e-14, 1e-13), "reproduced. Everywhere.");
   EXPECT_EQ(verdict(1e-6, 1e-7), "not reproduced");
-  EXPECT_EQ(verdict(1e-14, 1e-7), "only under: square scene. Not under: general scene");
+  EXPECT_EQ(verdict(1e-14, 1e-7),
+            "partially reproduced: square problem. Not under: general problem");
   EXPECT_EQ(Evaluate(rule, {}).text, "not measured");
 }
 
@@ -68,10 +69,10 @@ TEST(Claims, AMissingConditionIsNeverSilentlyTrue) {
   const ClaimRule rule = TwoScenes();
   const ClaimResult half = Evaluate(rule, std::vector<Record>{RunOf("square", "drift", 1e-14)});
   EXPECT_EQ(half.verdict, Verdict::kOnlyUnder);
-  EXPECT_EQ(half.text, "only under: square scene. Not measured: general scene");
+  EXPECT_EQ(half.text, "partially reproduced: square problem. Not measured: general problem");
   EXPECT_TRUE(Contains(half.checks[1].reason, "no record of mechanism=general"));
   const ClaimResult bad = Evaluate(rule, std::vector<Record>{RunOf("square", "drift", 1.0)});
-  EXPECT_EQ(bad.text, "not reproduced. Not measured: general scene");
+  EXPECT_EQ(bad.text, "not reproduced. Not measured: general problem");
 }
 
 TEST(Claims, AFailedRunFailsTheCheckAndAMissingValueLeavesItUndecided) {
@@ -205,15 +206,15 @@ TEST(Claims, AMachineOfTwoSpeedsDecidesNoRatioOfTimes) {
   const auto state = [&](double slower, double ratio, double yardstick) {
     std::vector<Record> records = {RunOf("ladder-100", "rhs_ns_median", 1e5 * slower),
                                    RunOf("ladder-1000", "rhs_ns_median", 1e5 * ratio)};
-    records[0].Set("yardstick_ns", 7000.0 * yardstick);
-    records[1].Set("yardstick_ns", 7000.0);
+    records[0].Set("calibration_ns", 7000.0 * yardstick);
+    records[1].Set("calibration_ns", 7000.0);
     const CheckResult result = Evaluate(check, records);
-    EXPECT_EQ(result.state == CheckState::kNotMeasured, Contains(result.reason, "yardstick_ns"));
+    EXPECT_EQ(result.state == CheckState::kNotMeasured, Contains(result.reason, "calibration_ns"));
     return result.state;
   };
   EXPECT_EQ(state(1.0, 11.0, 1.0), CheckState::kHolds);
   EXPECT_EQ(state(1.0, 13.0, 1.02), CheckState::kFails)
-      << "equal speeds but for the yardstick's own spread";
+      << "equal speeds but for the calibration's own spread";
   EXPECT_EQ(state(1.5, 13.0, 1.5), CheckState::kNotMeasured) << "of one machine it is 13";
   EXPECT_EQ(state(1.5, 11.0, 1.5), CheckState::kHolds) << "at any of the two speeds";
   EXPECT_EQ(state(1.5, 30.0, 1.5), CheckState::kFails);
@@ -229,14 +230,15 @@ TEST(ClaimsReport, EveryCheckShowsNumbersThresholdAndRows) {
   const std::vector<ClaimResult> results = {
       Evaluate(TwoScenes(), std::vector<Record>{RunOf("square", "drift", 1e-14)})};
   const std::string markdown = ClaimsMarkdown(results, {"command: loopbench run"});
-  EXPECT_TRUE(Contains(markdown, "| two | section 4.1 | Drift is small. | only under |"));
+  EXPECT_TRUE(Contains(markdown, "| two | section 4.1 | Drift is small. | partially reproduced |"));
   EXPECT_TRUE(Contains(markdown,
-                       "| square scene | holds | 1e-14 (1e-14 .. 1e-14) | max drift <= 1e-12 "
+                       "| square problem | holds | 1e-14 (1e-14 .. 1e-14) | max drift <= 1e-12 "
                        "| 1 |  |"));
-  EXPECT_TRUE(Contains(markdown, "| general scene | not measured |  | max drift <= 1e-12 | 0 | "));
-  EXPECT_TRUE(Contains(markdown, "\n\ncommand: loopbench run\n"));
   EXPECT_TRUE(
-      Contains(markdown, "**Verdict: only under: square scene. Not measured: general scene"));
+      Contains(markdown, "| general problem | not measured |  | max drift <= 1e-12 | 0 | "));
+  EXPECT_TRUE(Contains(markdown, "\n\ncommand: loopbench run\n"));
+  EXPECT_TRUE(Contains(
+      markdown, "**Verdict: partially reproduced: square problem. Not measured: general problem"));
 }
 
 TEST(ClaimsReader, MistakesAreReportedTogetherWithTheirPlaces) {

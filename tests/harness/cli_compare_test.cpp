@@ -22,7 +22,7 @@ class ComparisonCommands : public CommandLineTest {
 TEST_F(ComparisonCommands, CompareARunWithItselfAndWithAPlantedDrift) {
   ASSERT_EQ(Call("run tiny.json --out base").code, 0);
   ASSERT_EQ(Call("run tiny.json --out new").code, 0);
-  Expect("compare base new", 0, {"outcomes", "hashes", "SAME", "BASE: commit "});
+  Expect("compare base new", 0, {"outcomes", "hashes", "NO CHANGE", "BASE: commit "});
   Expect("compare base new --format csv", 0, {"judgement,case,measure", "same,"});
 
   std::vector<Record> records = ReadRecords(folder_ / "new");
@@ -31,13 +31,14 @@ TEST_F(ComparisonCommands, CompareARunWithItselfAndWithAPlantedDrift) {
     ResultStore store(folder_ / "worse");
     for (const Record& record : records) store.Append(record);
   }
-  Expect("compare base worse", 1, {"worse", "four-bar odca", "drift_position_max [m]", "WORSE: 1"});
+  Expect("compare base worse", 1,
+         {"worse", "four-bar odca", "drift_position_max [m]", "REGRESSION: 1"});
   Expect("compare worse base", 0, {"better", "BETTER: 1 measures, none worse"});
-  Expect("compare base worse --only counts --only hashes", 0, {"SAME"});
-  Expect("compare base worse --only times", 2, {"COULD NOT MEASURE"});
-  Expect("export base --format bmf", 0,
+  Expect("compare base worse --only counts --only hashes", 0, {"NO CHANGE"});
+  Expect("compare base worse --only times", 2, {"INCONCLUSIVE"});
+  Expect("export-metrics base --format bmf", 0,
          {"\"accuracy tiny four-bar odca", "drift_position_max (m)"});
-  Expect("export base --out b.json", 0, {"wrote b.json"});
+  Expect("export-metrics base --out b.json", 0, {"wrote b.json"});
 }
 
 TEST_F(ComparisonCommands, RefuseWhatIsNotThere) {
@@ -46,10 +47,10 @@ TEST_F(ComparisonCommands, RefuseWhatIsNotThere) {
   Expect("compare none.json b.json", 2, {"none.json: cannot be read: no such file"});
   Expect("compare b.json text.json", 2, {"text.json:1:"});
   Write("c.json", R"({"benchmarks": []})");
-  Expect("compare b.json c.json", 2, {"COULD NOT MEASURE"});
+  Expect("compare b.json c.json", 2, {"INCONCLUSIVE"});
   Expect("compare b.json c.json --only speed", 2, {"--only"});
-  Expect("fit b.json", 2, {"no family of right-hand sides"});
-  Expect("export b.json", 2, {"nothing to export"});
+  Expect("fit-scaling b.json", 2, {"no family of right-hand sides"});
+  Expect("export-metrics b.json", 2, {"nothing to export"});
   Expect("compare --help", 0, {"Examples:", "Exit codes:"});
 }
 
@@ -62,7 +63,7 @@ TEST_F(ComparisonCommands, APathIsNotComparedWithItself) {
            {"found 'out/results.jsonl' as BASE and as NEW, expected two files"});
   }
   fs::copy(folder_ / "out", folder_ / "copy", fs::copy_options::recursive);
-  Expect("compare out copy", 0, {"SAME"});
+  Expect("compare out copy", 0, {"NO CHANGE"});
 }
 
 // Files of Google Benchmark name a machine only where the program wrote it.
@@ -83,13 +84,13 @@ TEST_F(ComparisonCommands, TimesOfNoOrAnotherMachineAreNotComparable) {
   write("same-here.json", "here", 1);
   write("slow-here.json", "here", 10);
   write("slow-there.json", "there", 10);
-  const std::string unknown = "COULD NOT MEASURE: 1 times not comparable: machine not known";
+  const std::string unknown = "INCONCLUSIVE: 1 times not comparable: machine not known";
   Expect("compare none.json slow-none.json", 2, {unknown});
   Expect("compare none.json slow-here.json --junit j.xml", 2, {unknown});
   EXPECT_NE(ReadFile(folder_ / "j.xml").find("errors=\"1\""), std::string::npos);
   Expect("compare here.json slow-there.json", 2, {"1 times not comparable: another machine"});
-  Expect("compare here.json slow-here.json", 1, {"WORSE: 1 measures"});
-  Expect("compare here.json same-here.json", 0, {"SAME"});
+  Expect("compare here.json slow-here.json", 1, {"REGRESSION: 1 measures"});
+  Expect("compare here.json same-here.json", 0, {"NO CHANGE"});
 }
 
 TEST_F(ComparisonCommands, RefuseNumbersThatSwitchGatesOff) {
@@ -99,9 +100,9 @@ TEST_F(ComparisonCommands, RefuseNumbersThatSwitchGatesOff) {
        {"nan", "-nan", "inf", "-inf", "0", "0.99", "-2", "1e400", "0x2", "2x", "''"}) {
     Expect(std::string("compare out copy --error-ratio=") + ratio, 2, {"--error-ratio"});
   }
-  Expect("compare out copy --error-ratio 1.5", 0, {"SAME"});
+  Expect("compare out copy --error-ratio 1.5", 0, {"NO CHANGE"});
   for (const char* from : {"nan", "inf", "-1", "1e400", "x"}) {
-    Expect(std::string("fit b.json --from=") + from, 2, {"--from"});
+    Expect(std::string("fit-scaling b.json --min-size=") + from, 2, {"--min-size"});
   }
   for (const char* jobs : {"nan", "0", "-1", "1.5", "0x2", "4294967297", "1025", "''"}) {
     Expect(std::string("run tiny.json --out out --jobs=") + jobs, 2, {"--jobs"});
@@ -124,24 +125,25 @@ TEST_F(ComparisonCommands, NameEveryDifference) {
         {"list", Value(std::vector<double>{1.0}), "an array"}}) {
     with(name, value);
     const std::string place = std::string(name) + "/results.jsonl:1: key 'drift_position_max'";
-    for (const std::string call : {"compare base ", "compare --subset base ", "export "}) {
+    for (const std::string call :
+         {"compare base ", "compare --allow-missing base ", "export-metrics "}) {
       Expect(call + name, 2, {place, "expected a number or null, found " + std::string(shown)});
     }
   }
   with("null", Value());
   Expect("compare base null", 1,
-         {"worse", "drift_position_max", "null", "expected a finite number >= 0", "WORSE: 2",
-          "new doubts"});
+         {"worse", "drift_position_max", "null", "expected a finite number >= 0", "REGRESSION: 2",
+          "new warnings"});
   Expect("compare null base", 1, {"different", "drift_position_max", "DIFFERENT: 1"});
   fs::copy(folder_ / "null", folder_ / "null2", fs::copy_options::recursive);
   Expect("compare null null2", 1, {"different", "in BASE and NEW", "DIFFERENT: 1"});
-  Expect("export null --out b.json", 1,
+  Expect("export-metrics null --out b.json", 1,
          {"not exported: accuracy tiny four-bar odca", "drift_position_max: found null"});
   ASSERT_EQ(Call("run tiny.json --out half --filter formulation=odca").code, 0);
   const std::string missing = "  accuracy tiny four-bar lagrange";
   Expect("compare base half", 2, {"1 cases only in BASE:", missing});
   Expect("compare half base", 2, {"1 cases only in NEW:", missing, "1 cases only in NEW"});
-  Expect("compare half base --added", 0, {"1 cases only in NEW:", missing, "SAME"});
+  Expect("compare half base --added", 0, {"1 cases only in NEW:", missing, "NO CHANGE"});
   Expect("compare base half --format csv", 2, {"only in BASE,accuracy tiny four-bar lagrange"});
 }
 
@@ -153,39 +155,41 @@ TEST_F(ComparisonCommands, NullSamplesEndTheComparison) {
   fs::copy_file(folder_ / "null.jsonl", folder_ / "null2.jsonl");
   Expect("compare null.jsonl null2.jsonl", 1,
          {"different", "series.wall_s", "1 values (1 null or negative)", "expected finite times"});
-  Expect("export null.jsonl", 2, {"series.wall_s: found 1 values (1 null", "nothing to export"});
+  Expect("export-metrics null.jsonl", 2,
+         {"series.wall_s: found 1 values (1 null", "nothing to export"});
 }
 
 TEST_F(ComparisonCommands, ExportNamesTheCasesThatFailed) {
   Write("b.json", R"({"benchmarks": [
     {"name": "a/1", "cpu_time": 1, "real_time": 1}, {"name": "a/2", "cpu_time": 4, "real_time": 4},
     {"name": "a/3", "error_occurred": true, "error_message": "singular"}]})");
-  Expect("export b.json", 1,
+  Expect("export-metrics b.json", 1,
          {"\"name\": \"benchmark a/1 cpu_ns\"",
           "b.json: not exported: benchmark a/3: outcome \"singular\""});
-  Expect("export b.json --out t.json", 1, {"not exported: benchmark a/3", "wrote t.json"});
-  Expect("fit b.json", 0, {"a/N", "2.00"});
+  Expect("export-metrics b.json --out t.json", 1, {"not exported: benchmark a/3", "wrote t.json"});
+  Expect("fit-scaling b.json", 0, {"a/N", "2.00"});
 }
 
 TEST_F(ComparisonCommands, ABaselineIsRenewedHeldAgainstAndTested) {
   const std::string tiny = " --experiments tiny.json --dir kept";
   Expect("baseline check" + tiny, 2, {"kept/results.jsonl: no such file", "baseline renew"});
   Expect("baseline renew" + tiny, 0, {"renewed kept/results.jsonl: 2 records"});
-  Expect("baseline check" + tiny, 0, {"SAME"});
+  Expect("baseline check" + tiny, 0, {"NO CHANGE"});
   Expect("baseline selftest" + tiny, 0,
          {"same: ", "caught: 3 times the drift", "caught: one step more",
           "caught: a run that fails", "caught: a case that is gone"});
   EditMechanism("\"mass\": 1.0,", "\"mass\": 1.01,");
   Expect("baseline check" + tiny, 2, {"ran another mechanism"});
-  Expect("baseline check" + tiny + " --counts tiny.json --counter ./none", 2,
+  Expect("baseline check" + tiny + " --counts tiny.json --count-program ./none", 2,
          {"--counts tiny.json: ", "not found"});
   Expect("baseline chekc" + tiny, 2, {"check"});
   Expect("baseline check --dir kept", 2, {"--experiments is required"});
 }
 
 TEST_F(ComparisonCommands, BaselineKeepsWhatItMeasuresInANewFolderOnly) {
-  const std::string tiny = " --experiments tiny.json --dir kept --keep ";
-  Expect("baseline renew" + tiny + "kept", 2, {"--keep: found kept, the folder of the baseline"});
+  const std::string tiny = " --experiments tiny.json --dir kept --keep-output ";
+  Expect("baseline renew" + tiny + "kept", 2,
+         {"--keep-output: found kept, the folder of the baseline"});
   EXPECT_FALSE(fs::exists(folder_ / "kept"));
   Expect("baseline renew" + tiny + "new", 0, {"renewed kept/results.jsonl"});
   EXPECT_EQ(ReadRecords(folder_ / "new").size(), 2u);
@@ -195,9 +199,10 @@ TEST_F(ComparisonCommands, BaselineKeepsWhatItMeasuresInANewFolderOnly) {
   EditMechanism("\"mass\": 1.0,", "\"mass\": 1.01,");
   for (const char* action : {"renew", "check", "selftest"}) {
     Expect("baseline " + std::string(action) + tiny + "mine", 2,
-           {"--keep: found mine, which is not empty, expected a new folder"});
+           {"--keep-output: found mine, which is not empty, expected a new folder"});
     Expect("baseline " + std::string(action) + tiny + "./kept/", 2, {"the folder of the baseline"});
-    Expect("baseline " + std::string(action) + tiny + "tiny.json", 2, {"--keep: found tiny.json"});
+    Expect("baseline " + std::string(action) + tiny + "tiny.json", 2,
+           {"--keep-output: found tiny.json"});
   }
   EXPECT_EQ(ReadFile(folder_ / "mine/run/notes"), "mine");
   EXPECT_EQ(ReadFile(folder_ / "mine/results.jsonl"), "mine");
@@ -210,8 +215,8 @@ TEST_F(ComparisonCommands, BaselineKeepsWhatItMeasuresInANewFolderOnly) {
 TEST_F(ComparisonCommands, FilesMayStandBehindAnyOption) {
   ASSERT_EQ(Call("run tiny.json --out now").code, 0);
   ASSERT_EQ(Call("run tiny.json --out again").code, 0);
-  Expect("compare --only outcomes now again", 0, {"SAME"});
-  Expect("compare --where formulation=odca --only counts now again", 0, {"SAME"});
+  Expect("compare --only outcomes now again", 0, {"NO CHANGE"});
+  Expect("compare --where formulation=odca --only counts now again", 0, {"NO CHANGE"});
   Expect("table --where formulation=odca --columns formulation,steps now", 0, {"odca"});
   Expect("list --filter formulation=odca tiny.json", 0, {"odca"});
   Expect("run --filter formulation=odca tiny.json --out some", 0, {"1 run now"});
@@ -239,9 +244,9 @@ class BenchmarkProgram : public ComparisonCommands {
 
 constexpr const char* kFamilies = R"({"name": "small", "states": "states.json", "groups": [
   {"family": "chain", "sizes": [3, 6, 12], "measure": ["rhs", "step"],
-   "columns": [{"formulation": "odca", "enforcement": "acceleration"}]},
+   "methods": [{"formulation": "odca", "enforcement": "acceleration"}]},
   {"mechanisms": ")" LOOPBENCH_SOURCE_DIR R"(/configs/mechanisms/toggle-singular-start.json",
-   "measure": "rhs", "columns": [{"formulation": "reduction", "enforcement": "velocity"}]}]})";
+   "measure": "rhs", "methods": [{"formulation": "reduction", "enforcement": "velocity"}]}]})";
 
 TEST_F(BenchmarkProgram, WritesJsonThatTheCommandsTake) {
   Write("families.json", kFamilies);
@@ -279,10 +284,12 @@ TEST_F(BenchmarkProgram, WritesJsonThatTheCommandsTake) {
   }
   EXPECT_EQ(failed, 2);
 
-  Expect("fit out.json", 0, {"rhs/chain/N/odca/acceleration/joint/rank-revealing", "exponent"});
+  Expect("fit-scaling out.json", 0,
+         {"rhs/chain/N/odca/acceleration/joint/rank-revealing", "exponent"});
   Write("same.json", text);
   Expect("compare out.json same.json", 2, {"times not measured: too few repetitions"});
-  Expect("export out.json", 1, {"\"unit\": \"ns\"", "not exported: benchmark rhs/chain/3/odca"});
+  Expect("export-metrics out.json", 1,
+         {"\"unit\": \"ns\"", "not exported: benchmark rhs/chain/3/odca"});
   // nothing is said of how the library was built, but how this program was
   const Ending list = bench("--benchmark_filter=rhs/chain/6 --benchmark_min_time=0.001");
   ExpectEnding(list, 0, {"assertions: o"});

@@ -26,12 +26,12 @@ TEST_F(CliDocumentsTest, ListPlanCheckAndExplainAreOneDocumentEach) {
                 "repr(d[\"experiments\"][0][\"cases\"][0][\"mechanism\"])")
                 .text,
             "[2, 2] 'a \"b\"\\n\\x1b[31m \xe6\xbc\xa2'\n");
-  const Ending plan = Ask("plan --json tiny.json",
+  const Ending plan = Ask("estimate --json tiny.json",
                           "d[\"experiments\"][0][\"cases\"], "
                           "d[\"experiments\"][0][\"accuracy_seconds\"] > 0, "
                           "sum(l[\"runs\"] for l in d[\"experiments\"][0][\"lines\"])");
   EXPECT_EQ(plan.text, "2 True 2\n");
-  Write("bad.json", R"({"name": 3, "scenes": []})");
+  Write("bad.json", R"({"name": 3, "problems": []})");
   EXPECT_EQ(Ask("check --json tiny.json bad.json four-bar.json claims.json",
                 "d[\"ok\"], [f[\"ok\"] for f in d[\"files\"]], "
                 "[f.get(\"found\", {}).get(\"kind\") for f in d[\"files\"]], "
@@ -40,28 +40,29 @@ TEST_F(CliDocumentsTest, ListPlanCheckAndExplainAreOneDocumentEach) {
             "False [True, False, True, True] ['experiment', None, 'mechanism', 'claims'] True\n");
   EXPECT_NE(ReadFile(folder_ / "err.txt").find("bad.json"), std::string::npos);
   EXPECT_EQ(Call("check --json bad.json").code, 2);
-  EXPECT_EQ(Ask("explain --json tiny.json four-bar.json",
-                "[f[\"kind\"] for f in d[\"files\"]], d[\"files\"][0][\"cases\"], "
-                "d[\"files\"][1][\"freedom\"][\"by_rank\"], len(d[\"files\"][1][\"joints\"]), "
-                "len(d[\"files\"][1][\"loops\"]), d[\"files\"][1][\"start_outcome\"], "
-                "d[\"files\"][1][\"gravity\"][1]")
-                .text,
-            "['experiment', 'mechanism'] 2 1 4 1 finished -9.81\n");
+  EXPECT_EQ(
+      Ask("explain --json tiny.json four-bar.json",
+          "[f[\"kind\"] for f in d[\"files\"]], d[\"files\"][0][\"cases\"], "
+          "d[\"files\"][1][\"degrees_of_freedom\"][\"by_rank\"], len(d[\"files\"][1][\"joints\"]), "
+          "len(d[\"files\"][1][\"loops\"]), d[\"files\"][1][\"start_outcome\"], "
+          "d[\"files\"][1][\"gravity\"][1]")
+          .text,
+      "['experiment', 'mechanism'] 2 1 4 1 finished -9.81\n");
 }
 
 TEST_F(CliDocumentsTest, PlanCountsAllThatARunMakesAndKnowsHowRunsEnd) {
   Write("all.json", R"({"name": "all", "tolerances": [1e-4, 1e-8],
-    "scenes": [{"mechanism": "four-bar.json", "horizon": [1, 1000000]}],
-    "columns": [{"formulation": "odca", "enforcement": "acceleration"}],
+    "problems": [{"mechanism": "four-bar.json", "horizon": [1, 1000000]}],
+    "methods": [{"formulation": "odca", "enforcement": "acceleration"}],
     "limits": {"cpu_s": 2, "steps": 1000}, "timing": {"repeats": 1, "horizon": 1}})");
   // a million seconds end after 1000 steps, which take less than a second, not by their CPU time
-  EXPECT_EQ(Ask("plan --json all.json",
+  EXPECT_EQ(Ask("estimate --json all.json",
                 "[(e[\"cases\"], e[\"timings\"], e[\"timing_seconds\"] > 0, "
                 "0 < e[\"accuracy_seconds\"] < 4) for e in d[\"experiments\"]]")
                 .text,
             "[(4, 1, True, True)]\n");
 #ifdef LOOPBENCH_PRECISIONS
-  const Ending reference = Ask("plan --json all.json --set '/reference={}' --filter horizon=1",
+  const Ending reference = Ask("estimate --json all.json --set '/reference={}' --filter horizon=1",
                                "d[\"experiments\"][0][\"references\"], "
                                "d[\"experiments\"][0][\"reference_seconds\"] > 0");
   EXPECT_EQ(reference.text, "1 True\n");
@@ -75,7 +76,7 @@ TEST_F(CliDocumentsTest, CompareSaysInADocumentWhatItsExitCodeMeans) {
                           "d[\"exit_code\"], d[\"conclusion\"], "
                           "all(f[\"judgement\"] == \"same\" for f in d[\"findings\"] "
                           "if f[\"judgement\"] != \"not measured\"), len(d[\"findings\"]) > 5");
-  EXPECT_EQ(same.text, "0 SAME True True\n");
+  EXPECT_EQ(same.text, "0 NO CHANGE True True\n");
   ExpectEnding(Call("run tiny.json --out b --set /tolerances=[1e-4]"), 0, {});
   const Ending other = Ask("compare --json a b", "d[\"exit_code\"], len(d[\"only_in_base\"])");
   EXPECT_EQ(other.text.back(), '\n');
@@ -113,8 +114,8 @@ TEST_F(CliDocumentsTest, BashCompletesCommandsOptionsValuesAndFiles) {
 TEST_F(CliDocumentsTest, TheManualPageHasEveryCommandAndOption) {
   const std::string page = Call("manual").text;
   EXPECT_TRUE(page.starts_with(".TH LOOPBENCH 1 ")) << page.substr(0, 80);
-  for (const char* command : {"run", "list", "plan", "explain", "check", "table", "map", "compare",
-                              "advise", "completion", "manual"}) {
+  for (const char* command : {"run", "list", "estimate", "explain", "check", "table", "robustness",
+                              "compare", "advise", "completion", "manual"}) {
     EXPECT_NE(page.find(std::string(".SS loopbench ") + command), std::string::npos) << command;
   }
   EXPECT_NE(page.find("\\fB\\-\\-rerun\\fR"), std::string::npos);

@@ -18,7 +18,7 @@ std::string Swept() {
   std::string text = kTinyExperiment;
   const std::string end = "\"timing\": {\"repeats\": 0}";
   text.insert(text.find(end), R"("sweep": [{"name": "mass", "values": [1, 2],
-      "field": "/scenes/0/mechanism/bodies/1/mass"}],
+      "field": "/problems/0/mechanism/bodies/1/mass"}],
     "exclude": [{"mass": 2, "formulation": "lagrange"}], )");
   return text;
 }
@@ -80,10 +80,10 @@ TEST_F(CommandLineTest, KeysOfStoredRecordsAreNoNamesForAxes) {
 }
 
 TEST_F(CommandLineTest, SetChangesAFieldForEveryCommandThatReads) {
-  const std::string set = " --set /scenes/0/horizon=[0.1,0.2] --set /scenes/0/name=mine";
+  const std::string set = " --set /problems/0/horizon=[0.1,0.2] --set /problems/0/name=mine";
   ExpectEnding(Call("list tiny.json" + set), 0, {"mine", "4 cases"});
   ExpectEnding(Call("check" + set + " tiny.json"), 0, {"4 cases"});
-  ExpectEnding(Call("plan tiny.json" + set), 0, {"4 cases, 4 runs"});
+  ExpectEnding(Call("estimate tiny.json" + set), 0, {"4 cases, 4 runs"});
   ExpectEnding(Call("explain tiny.json" + set), 0, {"mine is a planar mechanism"});
   ExpectEnding(Call("run tiny.json --out out" + set), 0, {"results in out"});
   EXPECT_EQ(ReadRecords(folder_ / "out").size(), 4u);
@@ -99,21 +99,21 @@ TEST_F(CommandLineTest, PlanCountsCasesRunsAndTimings) {
       "formulation": "odca"}], )");
   Write("sweep.json", text);
   // 3 cases, two of them with 3 more runs; the excluded column of the second mass is not timed
-  ExpectEnding(Call("plan sweep.json"), 0,
+  ExpectEnding(Call("estimate sweep.json"), 0,
                {"axis mass: 2 values", "2 combinations", "3 cases, 9 runs", "3 timings", "pilot",
                 "An estimate"});
-  ExpectEnding(Call("plan sweep.json --filter formulation=lagrange"), 0,
+  ExpectEnding(Call("estimate sweep.json --filter formulation=lagrange"), 0,
                {"1 cases, 1 runs", "1 timings"});
-  const Ending untimed = Call("plan sweep.json --no-timing");
+  const Ending untimed = Call("estimate sweep.json --no-timing");
   ExpectEnding(untimed, 0, {"3 cases, 9 runs", " 0 timings"});
   EXPECT_EQ(untimed.text.find(", timings"), std::string::npos) << untimed.text;
   ExpectEnding(Call("list sweep.json --filter formulation=lagrange"), 0, {"1 cases and 1 timings"});
   ExpectEnding(Call("run sweep.json --filter formulation=lagrange --out few"), 0, {});
   EXPECT_EQ(ReadRecords(folder_ / "few").size(), 2u) << "a run and its timing";
   ExpectEnding(Call("run sweep.json --no-timing --out out"), 0, {});
-  ExpectEnding(Call("plan sweep.json --set /timing/repeats=0 --from out"), 0,
+  ExpectEnding(Call("estimate sweep.json --set /timing/repeats=0 --timings-from out"), 0,
                {"3 of 3 cases from out"});
-  ExpectEnding(Call("plan sweep.json --from nowhere"), 2, {"nowhere"});
+  ExpectEnding(Call("estimate sweep.json --timings-from nowhere"), 2, {"nowhere"});
 }
 
 TEST_F(CommandLineTest, ExplainSaysWhatRunsAndWhatWordsMean) {

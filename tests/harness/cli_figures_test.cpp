@@ -23,14 +23,14 @@ TEST_F(FiguresOfAStore, OneThatCannotBeDrawnDoesNotStopTheOthers) {
 }
 
 TEST_F(FiguresOfAStore, MotionIsThatOfLevelPositionWhereItIsStored) {
-  const std::string levels = R"("enforcement": ["acceleration", "position"])";
+  const std::string levels = R"("enforcement": ["acceleration", "projection"])";
   std::string text = kTinyExperiment;
   const std::string one = R"("enforcement": "acceleration")";
   Write("tiny.json", text.replace(text.find(one), one.size(), levels));
   ExpectEnding(Call("run tiny.json --out out"), 0, {});
   ExpectEnding(Call("plot out --out figures"), 0, {"wrote 2 figures"});
   const std::string svg = ReadFile(folder_ / "figures/motion-four-bar-0.5s.svg");
-  EXPECT_NE(svg.find(", position, joint, rank-revealing, rtol 10⁻⁶"), std::string::npos);
+  EXPECT_NE(svg.find(", projection, joint, rank-revealing, rtol 10⁻⁶"), std::string::npos);
 }
 
 }  // namespace cli_figures_test

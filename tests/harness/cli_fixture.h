@@ -25,8 +25,8 @@ struct Ending {
 
 inline constexpr const char* kTinyExperiment = R"({
   "name": "tiny", "comment": "two cases", "tolerances": [1e-6],
-  "scenes": [{"mechanism": "four-bar.json", "horizon": 0.5}],
-  "columns": [{"formulation": ["odca", "lagrange"], "enforcement": "acceleration"}],
+  "problems": [{"mechanism": "four-bar.json", "horizon": 0.5}],
+  "methods": [{"formulation": ["odca", "lagrange"], "enforcement": "acceleration"}],
   "timing": {"repeats": 0}
 })";
 
@@ -34,7 +34,7 @@ inline constexpr const char* kTinyClaims = R"({"claims": [{
   "id": "small", "claim": "Drift is small.", "where": "here",
   "checks": [{"label": "all", "select": {"formulation": "odca"}, "measure": "drift_position_max",
               "statistic": "max", "compare": "<=", "threshold": 1e-3}],
-  "wording": {"reproduced": "It is.", "not_reproduced": "It is not.", "only_under": "In part."}
+  "wording": {"reproduced": "It is.", "not_reproduced": "It is not.", "partially_reproduced": "In part."}
 }]})";
 
 /// A folder with a mechanism, an experiment and claims; the program runs in it.

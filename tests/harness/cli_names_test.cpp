@@ -39,13 +39,13 @@ TEST_F(Names, OfExperimentsDoNotLeaveTheFolderOfRuns) {
 }
 
 TEST_F(Names, OfMechanismsDoNotLeaveTheFolderOfFigures) {
-  ExpectEnding(Call(std::string(kRun) + "--set /scenes/0/name=a/../../../outside"), 0, {});
+  ExpectEnding(Call(std::string(kRun) + "--set /problems/0/name=a/../../../outside"), 0, {});
   ExpectEnding(Call("plot out --out a/b/figures"), 0, {"wrote 2 figures"});
   const std::vector<std::string> figures = Files(".svg");
   EXPECT_EQ(figures.size(), 2u);
   for (const std::string& figure : figures) EXPECT_TRUE(figure.starts_with("a/b/figures/"));
   // keys of records are names, too
-  ExpectEnding(Call("run tiny.json --out keys --set '/scenes/0/mechanism/joints/3/name=../../x'"),
+  ExpectEnding(Call("run tiny.json --out keys --set '/problems/0/mechanism/joints/3/name=../../x'"),
                0, {});
   ExpectEnding(Call("plot keys --out a/b/free --x series.t --y series.angle.../../x"), 0,
                {"wrote a/b/free/series.angle."});
@@ -60,11 +60,11 @@ TEST_F(Names, WithAnythingInThemAreOnlyShown) {
                                   R"(\u001b[2J'' `touch pwned` $(touch pwned))"));
   for (const std::string call :
        {"list tiny.json", "check tiny.json four-bar.json", "explain tiny.json",
-        "explain four-bar.json", "plan tiny.json", "run tiny.json --out out", "table out",
+        "explain four-bar.json", "estimate tiny.json", "run tiny.json --out out", "table out",
         "table out --format csv", "table out --format markdown", "table out --format latex",
         "table out --format json", "plot out --out figures", "run tiny.json",
         "table out --where mechanism=none", "run tiny.json --out copy", "compare out copy",
-        "export out --format bmf"}) {
+        "export-metrics out --format bmf"}) {
     const Ending ending = Call(call);
     EXPECT_EQ(ending.code, call.find("none") != std::string::npos ? 2 : 0) << call << ending.text;
     const auto acts = [](char c) { return (c >= 0 && c < ' ' && c != '\n') || c == 0x7f; };
@@ -80,7 +80,7 @@ TEST_F(Names, WithAnythingInThemAreOnlyShown) {
 TEST_F(Names, OfBenchmarksAreOnlyShown) {
   EditMechanism("\"name\": \"four-bar\"", R"("name": "a\u001b[31mb\u0000c")");
   Write("bench.json", R"({"name": "names", "groups": [{"mechanisms": ["four-bar.json"],
-    "measure": "rhs", "columns": [{"formulation": "odca", "enforcement": "acceleration"}]}]})");
+    "measure": "rhs", "methods": [{"formulation": "odca", "enforcement": "acceleration"}]}]})");
   const std::string text = Call("list tiny.json; '" LOOPBENCH_BENCH_BINARY
                                 "' --families bench.json --benchmark_list_tests")
                                .text;

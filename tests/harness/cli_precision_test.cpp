@@ -41,14 +41,14 @@ TEST_F(CommandLineTest, LaddersAreInRecordsTablesAndFigures) {
     } else {
       EXPECT_EQ(record.Text("outcome"), "finished");
       EXPECT_LE(record.Number("error_final"), 1e-2);
-      ruled += record.Text("error_ruled_by").empty() ? 0 : 1;
+      ruled += record.Text("error_dominated_by").empty() ? 0 : 1;
     }
   }
   EXPECT_EQ(references, 2u);
   EXPECT_EQ(ruled, 4u);  // at 1e-15 double has none beside it that finished
   const std::string csv = ReadFile(folder_ / "out/precision.csv");
   EXPECT_NE(csv.find("scalar,rtol"), std::string::npos) << csv;
-  EXPECT_NE(csv.find("# ruled by: "), std::string::npos) << csv;
+  EXPECT_NE(csv.find("# dominated by: "), std::string::npos) << csv;
   EXPECT_NE(csv.find("# command: "), std::string::npos) << csv;
   EXPECT_FALSE(fs::exists(folder_ / "out/drift.csv"));
   ExpectEnding(Call("table out --kind precision --where scalar=float"), 0, {"float"});
@@ -73,7 +73,7 @@ TEST_F(CommandLineTest, LaddersRefuseWhatTheyCannotRun) {
   Write("tiny.json", text);
   for (const char* command : {"check", "list", "run"}) {
     ExpectEnding(Call(std::string(command) + " tiny.json"), 2,
-                 {"tiny.json: /precision: scene \"spatial-four-bar\": found a spatial mechanism, "
+                 {"tiny.json: /precision: problem \"spatial-four-bar\": found a spatial mechanism, "
                   "expected planar ones"});
   }
   EXPECT_FALSE(fs::exists(folder_ / "results"));

@@ -64,14 +64,14 @@ TEST_F(SimplifyTest, ListsCandidatesWithTheNumberThatDecidedAndWritesNothing) {
 
 TEST_F(SimplifyTest, WritesModelsAnExperimentAndAPageThatWork) {
   ExpectEnding(Call("simplify hall.json --out ladder --horizon 0.2"), 0,
-               {"ladder: written. loopbench run ladder/hall-ladder.json runs all of them."});
+               {"ladder: written. loopbench run ladder/hall-models.json runs all of them."});
   EXPECT_EQ(FilesIn("ladder"),
             (std::vector<std::string>{"combined.json", "constant-parts.json", "full.json",
-                                      "hall-ladder.json", "immovable.json", "islands-1.json",
-                                      "islands-2.json", "ladder.md", "welds.json"}));
+                                      "hall-models.json", "immovable.json", "islands-1.json",
+                                      "islands-2.json", "models.md", "welds.json"}));
   EXPECT_EQ(FilesIn(".").size(), 7u) << "nothing is left beside it";
-  const Experiment experiment = ReadExperiment(folder_ / "ladder/hall-ladder.json");
-  EXPECT_EQ(experiment.name, "hall-ladder");
+  const Experiment experiment = ReadExperiment(folder_ / "ladder/hall-models.json");
+  EXPECT_EQ(experiment.name, "hall-models");
   ASSERT_EQ(experiment.scenes.size(), 7u);
   EXPECT_EQ(experiment.scenes[0].name, "hall");
   EXPECT_EQ(experiment.scenes[1].name, "hall-welds");
@@ -79,11 +79,11 @@ TEST_F(SimplifyTest, WritesModelsAnExperimentAndAPageThatWork) {
     EXPECT_EQ(scene.horizons, std::vector<double>{0.2});
   }
   EXPECT_FALSE(experiment.compile.welds) << "the whole model would not be whole";
-  ExpectEnding(Call("check ladder/full.json ladder/combined.json ladder/hall-ladder.json"), 0, {});
-  ExpectEnding(Call("run ladder/hall-ladder.json --no-timing --filter formulation=odca --out out "
-                    "--gate doubts"),
+  ExpectEnding(Call("check ladder/full.json ladder/combined.json ladder/hall-models.json"), 0, {});
+  ExpectEnding(Call("run ladder/hall-models.json --no-timing --filter formulation=odca --out out "
+                    "--fail-on warnings"),
                0, {"14 run now", "hall-combined"});
-  const std::string page = ReadFile(folder_ / "ladder/ladder.md");
+  const std::string page = ReadFile(folder_ / "ladder/models.md");
   for (const char* words :
        {"loopbench simplify hall.json --out ladder --horizon 0.2", "| islands-2.json | the same |",
         "- body hook is gone; its points: root on load, tip on load",
@@ -94,8 +94,9 @@ TEST_F(SimplifyTest, WritesModelsAnExperimentAndAPageThatWork) {
 
 TEST_F(SimplifyTest, BodiesJointsAndPointsKeepTheirNames) {
   ExpectEnding(Call("simplify light-rod-compressor.json --only light-links --out one"), 0, {});
-  EXPECT_EQ(FilesIn("one"), (std::vector<std::string>{"full.json", "ladder.md", "light-links.json",
-                                                      "light-rod-compressor-ladder.json"}));
+  EXPECT_EQ(FilesIn("one"),
+            (std::vector<std::string>{"full.json", "light-links.json",
+                                      "light-rod-compressor-models.json", "models.md"}));
   const MechanismDescription model = ReadMechanism(folder_ / "one/light-links.json").description;
   ASSERT_EQ(model.bodies.size(), 3u);
   EXPECT_EQ(model.bodies[1].name, "crank");
@@ -113,22 +114,23 @@ TEST_F(SimplifyTest, LimitsAreSaidByName) {
   ExpectEnding(
       Call("simplify excavator-arm.json --only stiff-springs --threshold stiff-springs=10"), 0,
       {"10.6    yes", "taken from 10"});
-  ExpectEnding(Call("simplify light-rod-compressor.json --lump none --only light-links"), 0,
+  ExpectEnding(Call("simplify light-rod-compressor.json --lump-mass none --only light-links"), 0,
                {"0.02 kg are gone"});
 }
 
 TEST_F(SimplifyTest, ErrorsAreDistancesOfPointsFromTheWholeModel) {
-  const Ending both = Call("simplify hall.json --only welds,light-links --errors 0.5 --out off");
-  ExpectEnding(both, 0, {"off by [m]", "evaluations", "welds  the same"});
+  const Ending both = Call("simplify hall.json --only welds,light-links --verify 0.5 --out off");
+  ExpectEnding(both, 0, {"model error [m]", "evaluations", "welds  the same"});
   // exact to what steps in 1e-10 leave; the first digits are the compiler's
   EXPECT_TRUE(std::regex_search(both.text, std::regex("welds  the same .* \\d\\.\\de-1[0-9]  ")))
       << both.text;
   const Ending wrong = Call(
-      "simplify hall.json --only light-links --threshold light-links=0.5 --lump none --errors 0.5");
+      "simplify hall.json --only light-links --threshold light-links=0.5 --lump-mass none --verify "
+      "0.5");
   EXPECT_TRUE(
       std::regex_search(wrong.text, std::regex("light-links  changed .* \\d\\.\\de-0[123]  ")))
       << wrong.text;
-  EXPECT_NE(ReadFile(folder_ / "off/ladder.md").find("*off by*: the largest distance"),
+  EXPECT_NE(ReadFile(folder_ / "off/models.md").find("*model error*: the largest distance"),
             std::string::npos);
 }
 
@@ -136,7 +138,7 @@ TEST_F(SimplifyTest, TheWholeModelMaySayItsAssembledStart) {
   ExpectEnding(Call("simplify four-bar.json --assembled --out start"), 0,
                {"cannot be simplified", "start: written"});
   EXPECT_EQ(FilesIn("start"),
-            (std::vector<std::string>{"four-bar-ladder.json", "full.json", "ladder.md"}));
+            (std::vector<std::string>{"four-bar-models.json", "full.json", "models.md"}));
   const InitialDescription said = ReadMechanism(folder_ / "start/full.json").description.initial;
   EXPECT_EQ(said.coordinates.size(), 3u);
   EXPECT_EQ(said.speeds.size(), 3u);
@@ -156,7 +158,7 @@ TEST_F(SimplifyTest, RefusesWhatItCannotDoAndSaysWhatItExpected) {
         {"hall.json --threshold light-links", "found no \"=\", expected NAME=VALUE"},
         {"hall.json --threshold light-links=-1", "found \"-1\", expected a number > 0"},
         {"hall.json --threshold light-links=nan", "found \"nan\", expected a number > 0"},
-        {"hall.json --lump all", "--lump"},
+        {"hall.json --lump-mass all", "--lump-mass"},
         {"hall.json --list --out x", "--out"},
         {"missing.json", "missing.json"},
         {"tiny.json --out x", "tiny.json"},
@@ -195,7 +197,7 @@ TEST_F(SimplifyTest, WhatCannotBeWrittenLeavesNothing) {
 }
 
 TEST_F(SimplifyTest, WithoutAShortRunNothingIsKnownToStandStill) {
-  ExpectEnding(Call("simplify hall.json --short-run 0 --only constant-parts"), 0,
+  ExpectEnding(Call("simplify hall.json --trial-duration 0 --only constant-parts"), 0,
                {"Does not apply: there was no short run"});
 }
 
@@ -224,7 +226,7 @@ std::string Rounded(const std::string& text) {
   return rounded;
 }
 
-/// What stands in ladder.md: the command that wrote it.
+/// What stands in models.md: the command that wrote it.
 std::string CommandIn(const fs::path& page) {
   const std::string text = ReadFile(page);
   const std::size_t begin = text.find("`loopbench ") + std::string("`loopbench ").size();
@@ -239,7 +241,7 @@ TEST(ShippedLadders, AreWhatTheirCommandsWrite) {
     if (!entry.is_directory()) continue;
     ++ladders;
     fs::remove_all(fresh);
-    const std::string command = CommandIn(entry.path() / "ladder.md");
+    const std::string command = CommandIn(entry.path() / "models.md");
     const std::string out = " --out configs/experiments/models/";
     const std::size_t to = command.find(out);
     ASSERT_NE(to, command.npos) << entry.path();
@@ -282,7 +284,8 @@ TEST(ShippedLadders, HaveAModelBesideThem) {
 
 TEST_F(SimplifyTest, JudgesEachModelByTheErrorItCausesAndKeepsARecord) {
   // half a second of the compressor: its massless rod is off by micrometres
-  const std::string judge = "simplify light-rod-compressor.json --errors 0.5 --store s --accept ";
+  const std::string judge =
+      "simplify light-rod-compressor.json --verify 0.5 --store s --max-model-error ";
   ExpectEnding(Call(judge + "1e-3"), 0,
                {"Against the whole one's certified motion", "the whole model",
                 "accepted at 0.001 m", "2 records in s/results.jsonl"});
@@ -295,7 +298,7 @@ TEST_F(SimplifyTest, JudgesEachModelByTheErrorItCausesAndKeepsARecord) {
   EXPECT_EQ(rod.Number("model_error"), records[3].Number("model_error")) << "as certain as that";
   EXPECT_GT(rod.Number("model_error"), 1e6 * rod.Number("reference_error"));
   EXPECT_LT(rod.Number("model_error"), 1e-3);
-  EXPECT_EQ(rod.Number("trust_horizon"), 0.5);
+  EXPECT_EQ(rod.Number("reference_valid_until"), 0.5);
   EXPECT_DOUBLE_EQ(rod.Number("model_rhs_ratio"),
                    rod.Number("rhs_evaluations") / whole.Number("rhs_evaluations"));
   EXPECT_GT(rod.Number("model_wall_ratio"), 0.0);
@@ -307,7 +310,7 @@ TEST_F(SimplifyTest, JudgesEachModelByTheErrorItCausesAndKeepsARecord) {
 
 TEST_F(SimplifyTest, ExactModelsCauseNothing) {
   // the hall's portal is made ground: its points stay where they are
-  ExpectEnding(Call("simplify hall.json --errors 0.2 --accept 1e-12 --store s"), 0, {});
+  ExpectEnding(Call("simplify hall.json --verify 0.2 --max-model-error 1e-12 --store s"), 0, {});
   std::size_t exact = 0;
   for (const Record& record : ReadRecords(folder_ / "s")) {
     if (record.Text("model_motion") != "the same" || record.Text("model") == "full") continue;
@@ -319,9 +322,11 @@ TEST_F(SimplifyTest, ExactModelsCauseNothing) {
 }
 
 TEST_F(SimplifyTest, AsksForWhatAVerdictNeeds) {
-  ExpectEnding(Call("simplify hall.json --store s"), 2, {"--store requires --accept"});
-  ExpectEnding(Call("simplify hall.json --store s --accept 1e-3"), 2, {"requires --errors"});
-  ExpectEnding(Call("simplify hall.json --errors 1 --accept nan --store s"), 2, {"--accept"});
+  ExpectEnding(Call("simplify hall.json --store s"), 2, {"--store requires --max-model-error"});
+  ExpectEnding(Call("simplify hall.json --store s --max-model-error 1e-3"), 2,
+               {"requires --verify"});
+  ExpectEnding(Call("simplify hall.json --verify 1 --max-model-error nan --store s"), 2,
+               {"--max-model-error"});
   EXPECT_FALSE(fs::exists(folder_ / "s"));
 }
 

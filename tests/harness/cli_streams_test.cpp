@@ -47,7 +47,7 @@ TEST_F(Streams, ClosedOnesKeepMessagesOutOfTheStore) {
 TEST_F(Streams, FullOnesAreAnError) {
   ASSERT_EQ(Call("run tiny.json --out out").code, 0);
   for (const char* command : {"table out", "list tiny.json", "--help", "--version",
-                              "run tiny.json --out out", "verdict out --claims claims.json"}) {
+                              "run tiny.json --out out", "check-claims out --claims claims.json"}) {
     SCOPED_TRACE(command);
     ExpectEnding(Shell(std::string("\"$L\" ") + command + " 2>&1 >/dev/full"), 2,
                  {"cannot write to standard output"});

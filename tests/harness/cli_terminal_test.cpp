@@ -76,8 +76,9 @@ TEST_F(CliTerminalTest, TablesAreAsWideAsTheTerminalAndNameWhatIsLeftOut) {
 }
 
 TEST_F(CliTerminalTest, ColourIsForTerminalsWithoutNoColorAndNeverInFiles) {
-  Write("short.json", R"({"name": "short", "scenes": [{"mechanism": "four-bar.json", "horizon": 1}],
-    "columns": [{"formulation": "odca", "enforcement": "acceleration"}], "tolerances": [1e-6],
+  Write("short.json",
+        R"({"name": "short", "problems": [{"mechanism": "four-bar.json", "horizon": 1}],
+    "methods": [{"formulation": "odca", "enforcement": "acceleration"}], "tolerances": [1e-6],
     "limits": {"steps": 3}, "timing": {"repeats": 0}})");
   const TerminalEnding seen = See("run short.json --out out 2>&-", 120);
   EXPECT_NE(seen.text.find("\033[31mstep-limit"), std::string::npos) << seen.text;
@@ -89,15 +90,16 @@ TEST_F(CliTerminalTest, ColourIsForTerminalsWithoutNoColorAndNeverInFiles) {
     EXPECT_NE(plain.find("step-limit"), std::string::npos) << plain;
   }
   Write("claims.json", kTinyClaims);
-  EXPECT_NE(See("verdict out --claims claims.json", 120).text.find("\033["), std::string::npos);
+  EXPECT_NE(See("check-claims out --claims claims.json", 120).text.find("\033["),
+            std::string::npos);
 }
 
 TEST_F(CliTerminalTest, HostileNamesNeitherActNorMoveColumns) {
   EditMechanism("\"name\": \"four-bar\"",
                 R"("name": "a\n\u001b[31m\tb e\u0301\u0301 \u6f22\u5b57\u6f22")");
-  Write("two.json", R"({"name": "two", "scenes": [{"mechanism": "four-bar.json", "horizon": 0.1},
+  Write("two.json", R"({"name": "two", "problems": [{"mechanism": "four-bar.json", "horizon": 0.1},
     {"mechanism": "four-bar.json", "name": "plain", "horizon": 0.1}], "tolerances": [1e-6],
-    "columns": [{"formulation": "odca", "enforcement": "acceleration"}], "timing": {"repeats": 0}})");
+    "methods": [{"formulation": "odca", "enforcement": "acceleration"}], "timing": {"repeats": 0}})");
   ExpectEnding(Call("run two.json --out out"), 0, {});
   for (const int columns : {30, 50, 80, 200}) {
     const TerminalEnding seen = See("table out --columns mechanism,steps", columns, "NO_COLOR=1");
@@ -124,8 +126,8 @@ TEST_F(CliTerminalTest, HostileNamesNeitherActNorMoveColumns) {
 TEST_F(CliTerminalTest, CtrlCKeepsWhatIsDoneAndSaysHowToGoOn) {
   // the long one is begun first, and ends by its limit; the others end beside it
   Write("long.json", R"({"name": "it's long", "tolerances": [1e-6],
-    "scenes": [{"mechanism": "four-bar.json", "horizon": [0.5, 100000]}],
-    "columns": [{"formulation": ["odca", "lagrange", "reduction"], "enforcement": "velocity"}],
+    "problems": [{"mechanism": "four-bar.json", "horizon": [0.5, 100000]}],
+    "methods": [{"formulation": ["odca", "lagrange", "reduction"], "enforcement": "velocity"}],
     "exclude": [{"formulation": ["lagrange", "reduction"], "horizon": 100000}],
     "limits": {"cpu_s": 2, "steps": 100000000}, "timing": {"repeats": 0}})");
   const fs::path store = folder_ / "o ut/results.jsonl";

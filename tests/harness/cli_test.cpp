@@ -44,7 +44,7 @@ TEST_F(BadInput, NegativeMassNamesValueAndRange) {
 TEST_F(BadInput, MissingMechanismFileNamesThePointerThatAsksForIt) {
   fs::rename(folder_ / "four-bar.json", folder_ / "four-bars.json");
   ExpectRefused(
-      {"/scenes/0/mechanism", "four-bar.json does not exist", "did you mean \"four-bars.json\""});
+      {"/problems/0/mechanism", "four-bar.json does not exist", "did you mean \"four-bars.json\""});
 }
 
 TEST_F(BadInput, AllMistakesAreReportedAtOnce) {
@@ -87,7 +87,7 @@ TEST_F(BadInput, FilterOnAnUnknownKeyIsRefused) {
 TEST_F(BadInput, EmptyStoreIsNamed) {
   ExpectEnding(Call("table nowhere"), 2, {"nowhere"});
   ExpectEnding(Call("plot nowhere --out figures"), 2, {"nowhere"});
-  ExpectEnding(Call("verdict nowhere --claims claims.json"), 2, {"nowhere"});
+  ExpectEnding(Call("check-claims nowhere --claims claims.json"), 2, {"nowhere"});
 }
 
 TEST_F(CommandLineTest, HelpEndsWithZeroAndShowsExamples) {
@@ -127,7 +127,7 @@ TEST_F(CommandLineTest, ResultsOfARunServeTablePlotAndVerdict) {
   ExpectEnding(Call("table out"), 0, {"four-bar", "odca", "lagrange"});
   ExpectEnding(Call("table out --format csv --where formulation=odca"), 0, {"mechanism", "odca"});
   ExpectEnding(Call("table out --where formulation=reduction"), 2, {"no drift records match"});
-  ExpectEnding(Call("verdict out --claims claims.json --out verdicts.md"), 0, {"reproduced"});
+  ExpectEnding(Call("check-claims out --claims claims.json --out verdicts.md"), 0, {"reproduced"});
   EXPECT_NE(ReadFile(folder_ / "verdicts.md").find("It is."), std::string::npos);
   ExpectEnding(Call("plot out --out figures"), 0, {"figures to figures"});
   for (const auto& entry : fs::directory_iterator(folder_ / "figures")) {
@@ -157,20 +157,21 @@ TEST_F(CommandLineTest, TablesInEveryFormatNameTheCommandAndTheCommit) {
 }
 
 TEST_F(CommandLineTest, DoubtsAreSaidBelowTheTableAndFailTheGate) {
-  ExpectEnding(Call("run tiny.json --out out --gate doubts"), 0, {"  ok  "});
-  ExpectEnding(Call("table out --gate doubts"), 0, {"  ok  "});
+  ExpectEnding(Call("run tiny.json --out out --fail-on warnings"), 0, {"  ok  "});
+  ExpectEnding(Call("table out --fail-on warnings"), 0, {"  ok  "});
   Write("parallelogram.json", ReadFile(kConfigs / "mechanisms/parallelogram.json"));
   const std::string flat =
-      " --set /scenes/0/mechanism=parallelogram.json --set /scenes/0/horizon=2 --out out";
-  ExpectEnding(Call("run tiny.json --gate doubts" + flat), 1,
-               {"  ok?  ", "singular-passage: ", "2 have doubts"});
-  ExpectEnding(Call("table out --where mechanism=four-bar --gate doubts"), 0, {"  ok  "});
-  ExpectEnding(Call("table out --columns mechanism,outcome --gate doubts"), 1, {"finished?"});
+      " --set /problems/0/mechanism=parallelogram.json --set /problems/0/horizon=2 --out out";
+  ExpectEnding(Call("run tiny.json --fail-on warnings" + flat), 1,
+               {"  ok?  ", "singular-crossing: ", "2 have warnings"});
+  ExpectEnding(Call("table out --where mechanism=four-bar --fail-on warnings"), 0, {"  ok  "});
+  ExpectEnding(Call("table out --columns mechanism,outcome --fail-on warnings"), 1, {"finished?"});
   // a run that did not finish has not passed either
-  ExpectEnding(Call("run tiny.json --out failed --gate doubts --set /limits/steps=3"), 1,
-               {"2 did not finish and 0 have doubts"});
-  ExpectEnding(Call("table out --where mechanism=four-bar --kind timing --gate doubts"), 2, {});
-  ExpectEnding(Call("run tiny.json --out out --gate doubt"), 2, {"doubts"});
+  ExpectEnding(Call("run tiny.json --out failed --fail-on warnings --set /limits/steps=3"), 1,
+               {"2 did not finish and 0 have warnings"});
+  ExpectEnding(Call("table out --where mechanism=four-bar --kind timing --fail-on warnings"), 2,
+               {});
+  ExpectEnding(Call("run tiny.json --out out --fail-on warning"), 2, {"warnings"});
 }
 
 TEST_F(CommandLineTest, FreeFiguresAreDrawnAndMistakesRefused) {

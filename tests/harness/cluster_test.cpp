@@ -45,8 +45,8 @@ std::string Difference(const std::string& line, const std::string& other) {
 
 constexpr const char* kSix = R"({
   "name": "six", "tolerances": [1e-6, 1e-8],
-  "scenes": [{"mechanism": "four-bar.json", "horizon": 0.5}],
-  "columns": [{"formulation": ["odca", "lagrange", "reduction"], "enforcement": "acceleration"}],
+  "problems": [{"mechanism": "four-bar.json", "horizon": 0.5}],
+  "methods": [{"formulation": ["odca", "lagrange", "reduction"], "enforcement": "acceleration"}],
   "timing": {"repeats": 0}
 })";
 
@@ -139,7 +139,7 @@ TEST_F(Cluster, APathMayHoldWhatSlurmAndShellsRead) {
       Call("submit six.json --tasks 2 --no-timing --no-queue --out 'a b%j #'"), 0,
       {"each part: sh " + quoted + "/part.sh' K; then: loopbench collect " + quoted + "'\n"});
   ExpectEnding(Call("submit six.json --tasks 2 --no-queue --out 'a b%j #'"), 2,
-               {"to go on with it: loopbench submit --again --out " + quoted + "'\n"});
+               {"to go on with it: loopbench submit --resubmit --out " + quoted + "'\n"});
   ExpectEnding(Call("", "sh 'a b%j #/part.sh' 1 2>&1; exit $?;"), 0, {"3 run now"});
   const std::string text = ReadFile(folder_ / "a b%j #/collect.sh");
   EXPECT_NE(text.find("#SBATCH --output=\"" + folder_.string() + "/a b%%j #/logs/collect.log\"\n"),
@@ -178,15 +178,15 @@ TEST_F(Cluster, AgainTakesWhatTheFolderSays) {
   for (const char* option : {"--tasks 7", "--jobs 1", "--time 1", "--partition p", "--sbatch=--a",
                              "--filter a=b", "--set /a=b", "--no-timing", "--isolate"}) {
     const std::string name = std::string(option).substr(0, std::string(option).find_first_of(" ="));
-    ExpectEnding(Call(std::string("submit --again --out parts ") + option), 2,
-                 {"--again: found " + name + " beside it, expected none: the folder knows"});
+    ExpectEnding(Call(std::string("submit --resubmit --out parts ") + option), 2,
+                 {"--resubmit: found " + name + " beside it, expected none: the folder knows"});
   }
   fs::remove(folder_ / "parts/part.sh");  // of a submit that was killed
-  ExpectEnding(Call("submit --again --no-queue --out parts"), 0,
+  ExpectEnding(Call("submit --resubmit --no-queue --out parts"), 0,
                {"2 of 3 parts are not done: 1, 3", "part.sh K"});
   EXPECT_FALSE(fs::exists(folder_ / "parts/array.sh"));
   for (const char* k : {"1", "3"}) EXPECT_EQ(Part(k).code, 0);
-  ExpectEnding(Call("submit --again --no-queue --out parts"), 0, {"every part is done"});
+  ExpectEnding(Call("submit --resubmit --no-queue --out parts"), 0, {"every part is done"});
 }
 
 TEST_F(Cluster, ACaseOfTwoFilesIsOneCaseOfOnePart) {
@@ -222,15 +222,15 @@ TEST_F(Cluster, WhatCannotRunIsRefusedBeforeAnythingIsWritten) {
   ExpectEnding(Call("submit six.json --filter mas=1 --tasks 2 --no-queue --out parts"), 2,
                {"no such key"});
   ExpectEnding(Call("submit --tasks 2 --out parts"), 2, {"found no experiment"});
-  ExpectEnding(Call("submit six.json --again --out parts"), 2, {"found experiments beside it"});
-  ExpectEnding(Call("submit --again --out parts"), 2, {"parts/cluster.json: no such file"});
+  ExpectEnding(Call("submit six.json --resubmit --out parts"), 2, {"found experiments beside it"});
+  ExpectEnding(Call("submit --resubmit --out parts"), 2, {"parts/cluster.json: no such file"});
   ExpectEnding(Call("submit six.json --sbatch=account --out parts"), 2,
                {"found 'account', expected an option that begins with --"});
   EXPECT_FALSE(fs::exists(folder_ / "parts"));
   ExpectEnding(Call("status nowhere"), 2, {"nowhere/cluster.json: no such file"});
   ExpectEnding(Call("submit six.json --tasks 2 --no-queue --out parts"), 0, {});
   ExpectEnding(Call("submit six.json --tasks 2 --no-queue --out parts"), 2,
-               {"expected a new one", "--again"});
+               {"expected a new one", "--resubmit"});
 }
 
 TEST_F(Cluster, DamageIsNamedWithItsKey) {
@@ -243,7 +243,8 @@ TEST_F(Cluster, DamageIsNamedWithItsKey) {
     ExpectEnding(ending, 2, {"parts/cluster.json: "});
     ExpectEnding(ending, 2, words);
   };
-  expect("", {"found an empty file", "submit once more, without --again, after: rm parts/cluster"});
+  expect("",
+         {"found an empty file", "submit once more, without --resubmit, after: rm parts/cluster"});
   expect("{\"kind\":\"cluster\"}\n", {"\"experiment\": found nothing, expected a text"});
   const std::string bare = whole.substr(0, whole.find(",\"checksum\"")) + "}";
   const auto with = [&bare](const std::string& from, const std::string& to) {

@@ -20,7 +20,7 @@ Record OneRun(const std::string& formulation, double rtol, double drift) {
   record.Set("formulation", formulation);
   record.Set("rtol", rtol);
   record.Set("case_id", formulation + std::to_string(rtol));
-  record.Set("content", std::string("c0"));
+  record.Set("config_hash", std::string("c0"));
   record.Set("outcome", std::string("finished"));
   record.Set("steps", std::int64_t{100});
   record.Set("state_hash", std::to_string(drift));
@@ -83,8 +83,8 @@ TEST(OtherSettings, NamesKeysThatOneSideLacksAndTheContent) {
     if (key == "rtol") fresh.Set("mass", 2.5);
   }
   EXPECT_EQ(OtherSettings(base, base), "");
-  fresh.Set("content", std::string("c1"));
-  EXPECT_EQ(OtherSettings(base, fresh), "mass none before, 2.5 now, content c0 before, c1 now");
+  fresh.Set("config_hash", std::string("c1"));
+  EXPECT_EQ(OtherSettings(base, fresh), "mass none before, 2.5 now, config_hash c0 before, c1 now");
 }
 
 class MatchCommands : public CommandLineTest {};
@@ -96,9 +96,10 @@ TEST_F(MatchCommands, AnotherMassIsComparedAndNamed) {
   ExpectEnding(Call("compare base new"), 2, {"ran another mechanism"});
   ExpectEnding(Call("compare base new --match mechanism,formulation --only outcomes --only hashes "
                     "--markdown s.md"),
-               0, {"although they ran with other settings", "accuracy four-bar odca: content "});
+               0,
+               {"although they ran with other settings", "accuracy four-bar odca: config_hash "});
   const std::string summary = ReadFile(folder_ / "s.md");
-  EXPECT_NE(summary.find("- accuracy four-bar odca: content "), std::string::npos) << summary;
+  EXPECT_NE(summary.find("- accuracy four-bar odca: config_hash "), std::string::npos) << summary;
   ExpectEnding(Call("compare base new --match mechnism"), 2,
                {"--match: found \"mechnism\"", "did you mean \"mechanism\""});
   ExpectEnding(Call("compare base new --match mechanism"), 2, {"more than once"});
@@ -123,7 +124,7 @@ TEST_F(MatchCommands, TheLastGoodStateOfAnyMachineIsTheBase) {
   add("bbbb", "two", 2);
   add("cccc", "one", 3);
   ASSERT_EQ(Call("history mark bbbb accepted --store kept").code, 0);
-  ExpectEnding(Call("compare cccc --history kept"), 0, {"state, commit bbbb", "SAME"});
+  ExpectEnding(Call("compare cccc --history kept"), 0, {"state, commit bbbb", "NO CHANGE"});
   add("bbbb2", "one", 2);
   ExpectEnding(Call("compare cccc --history kept --only times"), 2, {"state, commit cccc"});
 }

@@ -110,11 +110,12 @@ TEST(Compare, TakesCountsHashesAndOutcomesExactly) {
 
 TEST(Compare, CatchesNewDoubtsAndFailedMembers) {
   const ComparisonReport report =
-      Compare(Sound(), With("singularity_passages", std::int64_t{3}), {});
-  EXPECT_EQ(Only(report, Judgement::kWorse).measure.key, "doubts");
-  EXPECT_EQ(Only(report, Judgement::kWorse).fresh, "singular-passage");
-  const ComparisonReport back = Compare(With("singularity_passages", std::int64_t{3}), Sound(), {});
-  EXPECT_EQ(Only(back, Judgement::kBetter).measure.key, "doubts");
+      Compare(Sound(), With("singularity_crossings", std::int64_t{3}), {});
+  EXPECT_EQ(Only(report, Judgement::kWorse).measure.key, "warnings");
+  EXPECT_EQ(Only(report, Judgement::kWorse).fresh, "singular-crossing");
+  const ComparisonReport back =
+      Compare(With("singularity_crossings", std::int64_t{3}), Sound(), {});
+  EXPECT_EQ(Only(back, Judgement::kBetter).measure.key, "warnings");
   std::vector<Record> base = Sound(), fresh = Sound(2);
   for (std::vector<Record>* records : {&base, &fresh}) {
     records->front().Set("ensemble_failed", std::int64_t{0});
@@ -131,7 +132,7 @@ TEST(Compare, EqualCasesAreEqualThoughOneStoreHasANamesake) {
     record.Set("kind", std::string("accuracy"));
     record.Set("mechanism", std::string("four-bar"));
     record.Set("case_id", case_id);
-    record.Set("content", content);
+    record.Set("config_hash", content);
     record.Set("outcome", std::string("finished"));
     record.Set("drift_position_max", 1e-7);
     return record;
@@ -317,8 +318,8 @@ TEST(Compare, NeverComparesTimesOfTwoMachines) {
 TEST(Compare, NeverComparesTimesOfTwoSpeedsOfAMachine) {
   for (const double speed : {1.02, 1.3, 0.7}) {
     std::vector<Record> base = Sound(), fresh = Sound();
-    base[0].Set("yardstick_ns", 10'000.0);
-    fresh[0].Set("yardstick_ns", 10'000.0 * speed);
+    base[0].Set("calibration_ns", 10'000.0);
+    fresh[0].Set("calibration_ns", 10'000.0 * speed);
     fresh[0].Set("series.rhs_ns", Times(5000.0, 3));
     const ComparisonReport report = Compare(base, fresh, {});
     EXPECT_EQ(report.Count(Judgement::kNotMeasured, "times"), speed == 1.02 ? 0 : 1) << speed;

@@ -39,7 +39,7 @@ MechanismFile Shipped(const std::string& name) {
 TEST(CompiledSceneTest, NothingToSaveLeavesTheRecordAsItWas) {
   const MechanismFile file = Shipped("four-bar");
   const Record on = RunWith(file, CompileOptions()), off = RunWith(file, CompileOptions::None());
-  EXPECT_EQ(on.Find("compiled"), nullptr);
+  EXPECT_EQ(on.Find("preprocessed"), nullptr);
   EXPECT_EQ(on.Text("state_hash"), off.Text("state_hash"));
 }
 
@@ -47,8 +47,8 @@ TEST(CompiledSceneTest, TiltedFourBarRunsInThePlane) {
   MechanismFile file = Shipped("four-bar");
   file.description = InSpace(file.description, {0.3, -0.4, 0.5});
   const Record on = RunWith(file, CompileOptions()), off = RunWith(file, CompileOptions::None());
-  EXPECT_EQ(on.Text("compiled"), "planar");
-  EXPECT_EQ(off.Find("compiled"), nullptr);
+  EXPECT_EQ(on.Text("preprocessed"), "planar");
+  EXPECT_EQ(off.Find("preprocessed"), nullptr);
   ASSERT_EQ(on.Text("outcome"), "finished") << on.Text("message");
   ASSERT_EQ(off.Text("outcome"), "finished") << off.Text("message");
   for (const char* joint : {"OA", "AB", "BC"}) {
@@ -69,7 +69,7 @@ TEST(CompiledSceneTest, AnglesThatAreWatchedInSpaceKeepRedundancyReleased) {
 TEST(CompiledSceneTest, WeldedPiecesRunAsOneBar) {
   const Record on = RunWith(Shipped("welded-four-bar"), CompileOptions());
   const Record off = RunWith(Shipped("welded-four-bar"), CompileOptions::None());
-  EXPECT_EQ(on.Text("compiled"), "welds");
+  EXPECT_EQ(on.Text("preprocessed"), "welds");
   for (const char* joint : {"OA", "AB", "BC", "OC"}) {
     EXPECT_NEAR(LastAngle(on, joint), LastAngle(off, joint), kSameRun) << joint;
   }
@@ -78,7 +78,7 @@ TEST(CompiledSceneTest, WeldedPiecesRunAsOneBar) {
 TEST(CompiledSceneTest, TrussBecomesGround) {
   const Record on = RunWith(Shipped("truss"), CompileOptions());
   const Record off = RunWith(Shipped("truss"), CompileOptions::None());
-  EXPECT_EQ(on.Text("compiled"), "immovable");
+  EXPECT_EQ(on.Text("preprocessed"), "immovable");
   for (const char* joint : {"D", "E"}) {
     EXPECT_NEAR(LastAngle(on, joint), LastAngle(off, joint), kSameRun) << joint;
   }
@@ -90,8 +90,8 @@ TEST(CompiledSceneTest, IslandsRunAloneAndAddUp) {
   const Record parts = RunWith(Shipped("four-islands"), options);
   const Record whole = RunWith(Shipped("four-islands"), CompileOptions());
   const Record one = RunWith(Shipped("four-bar"), CompileOptions());
-  EXPECT_EQ(parts.Text("compiled"), "islands");
-  EXPECT_EQ(whole.Find("compiled"), nullptr);
+  EXPECT_EQ(parts.Text("preprocessed"), "islands");
+  EXPECT_EQ(whole.Find("preprocessed"), nullptr);
   ASSERT_EQ(parts.Text("outcome"), "finished");
   // the same four-bar four times, but for where the ground's origin is
   EXPECT_NEAR(parts.Number("steps"), 4 * one.Number("steps"), 4.0);

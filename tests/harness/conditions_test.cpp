@@ -107,8 +107,8 @@ TEST_F(ConditionsProgram, ChooseRecordsByWhatTheyMeasured) {
   ExpectEnding(Call("plot out --out figures --where 'steps<1'"), 2, {"no records match steps<1"});
   std::filesystem::copy(folder_ / "out", folder_ / "same",
                         std::filesystem::copy_options::recursive);
-  ExpectEnding(Call("compare out same --where 'steps>0'"), 0, {"SAME"});
-  ExpectEnding(Call("compare out same --where 'steps<1'"), 2, {"COULD NOT MEASURE"});
+  ExpectEnding(Call("compare out same --where 'steps>0'"), 0, {"NO CHANGE"});
+  ExpectEnding(Call("compare out same --where 'steps<1'"), 2, {"INCONCLUSIVE"});
 }
 
 TEST_F(ConditionsProgram, ChooseCasesByTheirKeysAlone) {
@@ -116,7 +116,7 @@ TEST_F(ConditionsProgram, ChooseCasesByTheirKeysAlone) {
                {"1 cases"});
   ExpectEnding(Call("run tiny.json --out out --filter 'rtol>1e-5'"), 2,
                {"no case matches rtol>1e-5"});
-  ExpectEnding(Call("plan tiny.json --filter 'horizon>=0.5'"), 0, {"2 cases"});
+  ExpectEnding(Call("estimate tiny.json --filter 'horizon>=0.5'"), 0, {"2 cases"});
   ExpectEnding(Call("run tiny.json --out out --filter 'wall_s<1'"), 2,
                {"--filter wall_s: no such key before a run, which measures it", "--where",
                 "cases have kind, experiment, mechanism"});

@@ -21,9 +21,9 @@ constexpr std::string_view kSet = R"({
   "name": "small", "step": 1e-4, "integrator": "ode45",
   "groups": [
     {"mechanisms": "mechanisms/four-bar.json", "measure": "rhs",
-     "columns": [{"formulation": "odca", "enforcement": "acceleration"}]},
+     "methods": [{"formulation": "odca", "enforcement": "acceleration"}]},
     {"family": "grid", "sizes": [1, 2], "measure": ["rhs", "step"],
-     "columns": [{"formulation": "lagrange", "enforcement": "velocity"}]}]})";
+     "methods": [{"formulation": "lagrange", "enforcement": "velocity"}]}]})";
 
 BenchmarkSet ParseSet(const std::string& text) {
   return ParseBenchmarks(text, kConfigs / "b.json");
@@ -104,9 +104,9 @@ TEST(BenchmarkSet, MistakesAreNamedWithPlaceValueAndCure) {
       {"\"name\": \"small\"", "\"name\": \"\"", {"/name: found \"\""}},
       {"\"acceleration\"",
        "\"accelaration\"",
-       {"/groups/0/columns", "did you mean \"acceleration\""}},
+       {"/groups/0/methods", "did you mean \"acceleration\""}},
       {"\"lagrange\", \"enforcement\": \"velocity\"",
-       "\"peer/simbody\", \"enforcement\": \"position\"",
+       "\"peer/simbody\", \"enforcement\": \"projection\"",
        {"/groups/1: found \"peer/simbody\", expected a formulation", "timed by experiments"}},
   };
   for (const Mistake& mistake : mistakes) {
@@ -132,7 +132,7 @@ TEST(BenchmarkSet, StatesAreReadStrictly) {
   WriteFileAtomically(folder / "s.json", R"({"grid/1/joint": "0123456789abcdef", "x": "short"})");
   const std::string text = R"({"name": "n", "states": "s.json", "groups": [
     {"family": "grid", "sizes": 1, "measure": "rhs",
-     "columns": [{"formulation": "odca", "enforcement": "velocity"}]}]})";
+     "methods": [{"formulation": "odca", "enforcement": "velocity"}]}]})";
   try {
     ParseBenchmarks(text, folder / "b.json");
     ADD_FAILURE() << "accepted";

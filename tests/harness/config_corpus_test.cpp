@@ -165,7 +165,7 @@ TEST(HugeInput, ManyBodiesAndJointsAreReadInLinearTime) {
   }
   const std::string text = R"({"name": "m", "gravity": [0, 0], "bodies": [)" + bodies +
                            R"(], "joints": [)" + joints + R"(], "initial": {"coordinates": {)" +
-                           coordinates + R"(}, "held": [)" + held + R"(]}, "independent": [)" +
+                           coordinates + R"(}, "fixed": [)" + held + R"(]}, "independent": [)" +
                            independent + "]}";
   EXPECT_EQ(ParseMechanism(text, "m.json").description.initial.held.size(), std::size_t{kCount});
 }

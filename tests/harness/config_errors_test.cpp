@@ -26,14 +26,14 @@ constexpr std::string_view kMechanism = R"({
     {"name": "OA", "type": "revolute", "from": {"body": "ground"}, "to": {"body": "bar1", "at": "A"}},
     {"name": "W", "type": "weld", "from": {"body": "bar1", "at": "tip"}, "to": {"body": "bar2"}}],
   "forces": [{"type": "joint_damper", "joint": "OA", "damping": 1}],
-  "initial": {"coordinates": {"OA": 0.5}, "held": ["OA"]},
+  "initial": {"coordinates": {"OA": 0.5}, "fixed": ["OA"]},
   "independent": ["OA", "bar1.angle"]
 })";
 
 constexpr std::string_view kTinyExperiment = R"({
   "name": "small", "tolerances": [1e-6],
-  "scenes": [{"mechanism": "mechanisms/pendulum.json", "horizon": 10}],
-  "columns": [{"formulation": "odca", "enforcement": "acceleration"}],
+  "problems": [{"mechanism": "mechanisms/pendulum.json", "horizon": 10}],
+  "methods": [{"formulation": "odca", "enforcement": "acceleration"}],
   "ensembles": [{"size": 4, "seed": 1, "perturb": 0.1}],
   "limits": {"steps": 1000}
 })";
@@ -181,9 +181,9 @@ INSTANTIATE_TEST_SUITE_P(
                             R"("joint": "W")",
                             {"/forces/0/joint: found \"W\" (weld)", "one coordinate"}},
                     Mistake{"held",
-                            R"("held": ["OA"])",
-                            R"("held": ["W"])",
-                            {"/initial/held/0", "a value in /initial/coordinates"}},
+                            R"("fixed": ["OA"])",
+                            R"("fixed": ["W"])",
+                            {"/initial/fixed/0", "a value in /initial/coordinates"}},
                     Mistake{"independent",
                             "\"bar1.angle\"",
                             "\"bar1.angel\"",
@@ -233,19 +233,19 @@ INSTANTIATE_TEST_SUITE_P(
         Mistake{"formulation",
                 "\"odca\"",
                 "\"ocda\"",
-                {"/columns/0/formulation: found \"ocda\"", "(did you mean \"odca\"?)"}},
+                {"/methods/0/formulation: found \"ocda\"", "(did you mean \"odca\"?)"}},
         Mistake{"same column",
                 "\"odca\", ",
                 "\"odca\", \"solver\": [\"rank-revealing\", \"x\"], ",
-                {"/columns/0/solver/1: found \"x\""}},
+                {"/methods/0/solver/1: found \"x\""}},
         Mistake{"horizon",
                 "\"horizon\": 10",
                 "\"horizon\": [10, 0]",
-                {"/scenes/0/horizon/1: found 0, expected a number > 0"}},
+                {"/problems/0/horizon/1: found 0, expected a number > 0"}},
         Mistake{"mechanism",
                 "pendulum.json",
                 "pendulm.json",
-                {"/scenes/0/mechanism", "pendulm.json does not exist",
+                {"/problems/0/mechanism", "pendulm.json does not exist",
                  "(did you mean \"mechanisms/pendulum.json\"?)"}},
         Mistake{"unused tolerance",
                 "\"seed\"",
@@ -263,10 +263,10 @@ INSTANTIATE_TEST_SUITE_P(
 TEST(ExperimentErrors, TheSameTwiceIsRefused) {
   const std::string scene = R"({"mechanism": "mechanisms/pendulum.json", "horizon": 10})";
   ExpectWords(ExperimentError(Edited(kTinyExperiment, {"", scene, scene + ", " + scene, {}})),
-              {"/scenes/1: found scene \"pendulum\" again"});
+              {"/problems/1: found problem \"pendulum\" again"});
   const std::string column = R"({"formulation": "odca", "enforcement": "acceleration"})";
   ExpectWords(ExperimentError(Edited(kTinyExperiment, {"", column, column + ", " + column, {}})),
-              {"/columns/1: found odca/acceleration/joint/rank-revealing again"});
+              {"/methods/1: found odca/acceleration/joint/rank-revealing again"});
 }
 
 TEST(ExperimentErrors, IncludeThoseInsideTheMechanismFile) {

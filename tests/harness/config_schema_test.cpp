@@ -104,7 +104,7 @@ const std::map<std::string, std::set<std::string>> kBeyondSchemas = {
       "experiments/sweep-value-again", "experiments/sweep-same-field",
       "experiments/sweep-zip-lengths"}},
     {"what a formulation does not have is known to its row",
-     {"experiments/peer-as-published", "experiments/peer-at-another-level",
+     {"experiments/peer-plain", "experiments/peer-at-another-level",
       "experiments/peer-in-absolute-coordinates", "experiments/peer-with-fixed-steps",
       "experiments/peer-with-gains", "experiments/peer-with-threads"}},
     {"a default is that of another section", {"experiments/precision-without-tolerances"}},

@@ -20,8 +20,8 @@ namespace config_sweep_test {
 std::string Text(const std::string& more,
                  const std::string& mechanism = "\"mechanisms/four-bar.json\"",
                  const std::string& tolerances = "[1e-6, 1e-8]") {
-  return R"({"name": "small", "scenes": [{"mechanism": )" + mechanism + R"(, "horizon": 0.1}],
-    "columns": [{"formulation": ["odca", "lagrange"], "enforcement": "acceleration"}],
+  return R"({"name": "small", "problems": [{"mechanism": )" + mechanism + R"(, "horizon": 0.1}],
+    "methods": [{"formulation": ["odca", "lagrange"], "enforcement": "acceleration"}],
     "timing": {"repeats": 0}, "tolerances": )" +
          tolerances + more + "}";
 }
@@ -117,7 +117,7 @@ TEST(Families, RunLikeOtherScenes) {
 
 TEST(Families, OutOfBoundsAreRefused) {
   ExpectWords(ErrorOf(Text("", R"({"family": "chain", "bars": 2})")),
-              {"/scenes/0/mechanism/bars: found 2, expected an integer from 3"});
+              {"/problems/0/mechanism/bars: found 2, expected an integer from 3"});
   ExpectWords(ErrorOf(Text("", R"({"family": "chian", "bars": 3})")), {"did you mean \"chain\""});
   ExpectWords(ErrorOf(Text("", R"({"family": "ladder", "bars": 3})")),
               {"unknown key \"bars\"", "no \"windows\""});
@@ -136,11 +136,11 @@ TEST(InlineMechanism, IsReadWhereItStands) {
   std::string broken = pendulum;
   broken.replace(broken.find("\"mass\": 2"), 9, "\"mass\": 0");
   ExpectWords(ErrorOf(Text("", broken)),
-              {"e.json:2: /scenes/0/mechanism/bodies/0/mass: found 0, expected a number > 0"});
+              {"e.json:2: /problems/0/mechanism/bodies/0/mass: found 0, expected a number > 0"});
 }
 
 constexpr const char* kMass =
-    R"({"name": "mass", "field": "/scenes/0/mechanism/bodies/1/mass", "values": [1, 2.5]})";
+    R"({"name": "mass", "field": "/problems/0/mechanism/bodies/1/mass", "values": [1, 2.5]})";
 
 TEST(Sweep, GoesThroughTheMechanismsFile) {
   const auto experiments = Read(Text(std::string(R"(, "sweep": [)") + kMass + "]"));
@@ -181,28 +181,28 @@ TEST(Settings, OfTheLimitOfTimeHaveTwoNames) {
 
 TEST(Sweep, StarGoesThroughAllElements) {
   const auto experiments = Read(Text(R"(, "sweep": [
-      {"name": "mass", "field": "/scenes/*/mechanism/bodies/*/mass", "values": [3, 4]}])"));
+      {"name": "mass", "field": "/problems/*/mechanism/bodies/*/mass", "values": [3, 4]}])"));
   ASSERT_EQ(experiments.size(), 2u);
   for (int body = 1; body <= 3; ++body) EXPECT_EQ(Described(experiments[1]).bodies[body].mass, 4.0);
 }
 
 TEST(Sweep, ValuesMayBeOfAnyKind) {
-  const auto experiments = Read(Text(R"(, "sweep": [{"name": "scene", "field": "/scenes",
+  const auto experiments = Read(Text(R"(, "sweep": [{"name": "problem", "field": "/problems",
       "values": [[{"mechanism": "mechanisms/pendulum.json", "horizon": 1}],
                  [{"mechanism": {"family": "chain", "bars": 3}, "horizon": 2}]]}])"));
   ASSERT_EQ(experiments.size(), 2u);
   EXPECT_EQ(experiments[0].scenes.front().name, "pendulum");
   EXPECT_EQ(experiments[1].scenes.front().name, "chain-3");
-  EXPECT_EQ(experiments[1].parameters.Text("scene").substr(0, 14), "[{\"mechanism\":");
+  EXPECT_EQ(experiments[1].parameters.Text("problem").substr(0, 14), "[{\"mechanism\":");
 }
 
 TEST(Sweep, MistakesNameTheAxisAndTheCombination) {
   const std::string text = Text(R"(,
-    "sweep": [{"name": "mass", "field": "/scenes/0/mechanism/bodies/1/mass",
+    "sweep": [{"name": "mass", "field": "/problems/0/mechanism/bodies/1/mass",
                "values": [1, -2, -3]}])");
   const std::string error = ErrorOf(text);
   ExpectWords(error,
-              {"e.json:4: /scenes/0/mechanism/bodies/1/mass: found -2, expected a number > 0",
+              {"e.json:4: /problems/0/mechanism/bodies/1/mass: found -2, expected a number > 0",
                "(a value of axis \"mass\")", "combination 2 of 3: mass = -2"});
   EXPECT_EQ(error.find("-3"), std::string::npos) << error;  // it stops at the first
 }
@@ -211,12 +211,12 @@ TEST(Sweep, ThatCannotBeMeantIsRefused) {
   const auto error = [](const std::string& sweep) {
     return ErrorOf(Text(", \"sweep\": " + sweep));
   };
-  ExpectWords(error(R"([{"name": "m", "field": "/scenes/3/horizon", "values": [1]}])"),
-              {"/sweep/0/field: found no element \"3\" in /scenes"});
+  ExpectWords(error(R"([{"name": "m", "field": "/problems/3/horizon", "values": [1]}])"),
+              {"/sweep/0/field: found no element \"3\" in /problems"});
   ExpectWords(error(R"([{"name": "m", "field": "/tolerances/lin/0", "values": [1]}])"),
               {"/sweep/0/field: found no element \"lin\""});
-  ExpectWords(error(R"([{"name": "m", "field": "/scene/0/horizon", "values": [1]}])"),
-              {"found no \"scene\"", "did you mean \"scenes\""});
+  ExpectWords(error(R"([{"name": "m", "field": "/problem/0/horizon", "values": [1]}])"),
+              {"found no \"problem\"", "did you mean \"problems\""});
   ExpectWords(error(R"([{"name": "rtol", "field": "/tolerances", "values": [1e-6]}])"),
               {"/sweep/0/name: found \"rtol\", expected a name that records do not use already"});
   ExpectWords(error(R"([{"name": "a=b", "field": "/tolerances", "values": [1e-6]}])"), {"letters"});
@@ -267,9 +267,9 @@ TEST(Exclude, RulesThatDoNothingOrTooMuchAreRefused) {
 }
 
 TEST(Settings, ChangeFieldsBeforeReading) {
-  const auto one = Read(Text(""), {{"/scenes/0/horizon", "[2, 3]"},
+  const auto one = Read(Text(""), {{"/problems/0/horizon", "[2, 3]"},
                                    {"/limits/memory_mb", "512"},
-                                   {"/scenes/0/mechanism/gravity/1", "-1.5"},
+                                   {"/problems/0/mechanism/gravity/1", "-1.5"},
                                    {"/integrator", "cash-karp"}})
                        .front();
   EXPECT_EQ(one.scenes.front().horizons, (std::vector<double>{2.0, 3.0}));
@@ -281,11 +281,11 @@ TEST(Settings, ChangeFieldsBeforeReading) {
 TEST(Settings, UnknownFieldsAreRefusedWithTheNearestSpelling) {
   ExpectWords(ErrorOf(Text(""), {{"/tolerance", "1"}}),
               {"unknown key \"tolerance\"", "did you mean \"tolerances\"", "(from --set)"});
-  ExpectWords(ErrorOf(Text(""), {{"/scenes/0/mechanism/bodies/0/points/b", "[1, 0]"}}),
-              {"--set /scenes/0/mechanism/bodies/0/points/b: found no \"b\"", "\"A\", \"B\""});
-  ExpectWords(ErrorOf(Text(""), {{"/scenes/0/horizn/0", "1"}}), {"did you mean \"horizon\""});
+  ExpectWords(ErrorOf(Text(""), {{"/problems/0/mechanism/bodies/0/points/b", "[1, 0]"}}),
+              {"--set /problems/0/mechanism/bodies/0/points/b: found no \"b\"", "\"A\", \"B\""});
+  ExpectWords(ErrorOf(Text(""), {{"/problems/0/horizn/0", "1"}}), {"did you mean \"horizon\""});
   ExpectWords(ErrorOf(Text(std::string(R"(, "sweep": [)") + kMass + "]"),
-                      {{"/scenes/0/mechanism/bodies/1/mass", "1"}}),
+                      {{"/problems/0/mechanism/bodies/1/mass", "1"}}),
               {"axis \"mass\" sets again"});
   EXPECT_THROW(ParseSetting("nothing"), ConfigError);
   EXPECT_EQ(ParseSetting("/a=b=c").value, "b=c");

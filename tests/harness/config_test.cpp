@@ -173,7 +173,7 @@ TEST(MechanismReader, FillsEveryFieldOfASpatialMechanism) {
       {"type": "joint_torque", "joint": "J", "value": -9},
       {"type": "point_force", "body": "a", "at": "P", "force": [0, 1, 0], "axes": "body"}],
     "initial": {"coordinates": {"J": 0.5, "F": [1, 0, 0, 0, 1, 2, 3]},
-                "speeds": {"F": [1, 2, 3, 4, 5, 6]}, "held": ["J"]},
+                "speeds": {"F": [1, 2, 3, 4, 5, 6]}, "fixed": ["J"]},
     "independent": ["J", "F.wz", "a.x"]})",
                                             "m.json");
   const MechanismDescription& m = file.description;
@@ -232,12 +232,12 @@ TEST(ShippedExperiments, PaperRunsEverySceneColumnToleranceAndHorizon) {
   const Experiment paper = ReadExperiment(kConfigs / "experiments/paper/paper.json");
   const std::vector<Case> cases = Expand(paper);
   // Five scenes with two horizons and five with one; 12 columns and, but for the long runs, 3 at
-  // level position; 4 tolerances.
+  // level projection; 4 tolerances.
   EXPECT_EQ(paper.columns.size(), 15u);
   EXPECT_EQ(cases.size(), ((5u * 2u + 5u) * 12u + 10u * 3u) * 4u);
   const auto ensembles =
       std::count_if(cases.begin(), cases.end(), [](const Case& one) { return one.ensemble == 16; });
-  // Long runs of five scenes; the 6 as-published columns; 3 tolerances.
+  // Long runs of five scenes; the 6 plain columns; 3 tolerances.
   EXPECT_EQ(ensembles, 5 * 6 * 3);
   EXPECT_EQ(ExpandTiming(paper).size(), 10u * 15u);
 }
@@ -255,7 +255,7 @@ TEST(Expand, KeepsTheOrderSceneHorizonColumnTolerance) {
   const Experiment paper = ReadExperiment(kConfigs / "experiments/paper/paper.json");
   const std::vector<Case> cases = Expand(paper);
   EXPECT_EQ(cases[0].mechanism, "square-four-bar");
-  EXPECT_EQ(ToString(cases[0].column), "odca/acceleration/joint/as-published");
+  EXPECT_EQ(ToString(cases[0].column), "odca/acceleration/joint/plain");
   EXPECT_EQ(cases[1].rtol, 1e-8);
   EXPECT_EQ(ToString(cases[4].column), "odca/acceleration/joint/rank-revealing");
   EXPECT_EQ(cases[15 * 4].horizon, 100.0);
@@ -270,8 +270,8 @@ TEST(Expand, KeepsTheOrderSceneHorizonColumnTolerance) {
 TEST(ExperimentReader, DefaultsAreTheRecommendedOnes) {
   const Experiment experiment = ParseExperiment(R"({
     "name": "small", "tolerances": 1e-8,
-    "scenes": [{"mechanism": "mechanisms/pendulum.json", "horizon": 10, "name": "p"}],
-    "columns": {"formulation": "odca", "enforcement": "velocity"}})",
+    "problems": [{"mechanism": "mechanisms/pendulum.json", "horizon": 10, "name": "p"}],
+    "methods": {"formulation": "odca", "enforcement": "velocity"}})",
                                                 kConfigs / "small.json");
   ASSERT_EQ(experiment.columns.size(), 1u);
   EXPECT_EQ(ToString(experiment.columns[0]), "odca/velocity/joint/rank-revealing");
@@ -285,20 +285,20 @@ TEST(ExperimentReader, DefaultsAreTheRecommendedOnes) {
 TEST(ExperimentReader, SavingsAreSwitchedOneByOne) {
   const auto read = [](const std::string& compile) {
     return ParseExperiment(R"({"name": "small", "tolerances": 1e-8, )" + compile + R"(
-      "scenes": [{"mechanism": "mechanisms/pendulum.json", "horizon": 10}],
-      "columns": {"formulation": "odca", "enforcement": "velocity"}})",
+      "problems": [{"mechanism": "mechanisms/pendulum.json", "horizon": 10}],
+      "methods": {"formulation": "odca", "enforcement": "velocity"}})",
                            kConfigs / "small.json")
         .compile;
   };
   const CompileOptions usual = read("");
   EXPECT_EQ(usual,
             (CompileOptions{.planar = true, .welds = true, .immovable = true, .islands = false}));
-  EXPECT_EQ(read(R"("compile": {"welds": false, "islands": true},)"),
+  EXPECT_EQ(read(R"("preprocess": {"welds": false, "islands": true},)"),
             (CompileOptions{.planar = true, .welds = false, .immovable = true, .islands = true}));
-  EXPECT_EQ(read(R"("compile": {"planar": false, "immovable": false},)"),
+  EXPECT_EQ(read(R"("preprocess": {"planar": false, "immovable": false},)"),
             (CompileOptions{.planar = false, .welds = true, .immovable = false, .islands = false}));
-  EXPECT_THROW(read(R"("compile": {"weld": false},)"), ConfigError);
-  EXPECT_THROW(read(R"("compile": {"welds": 1},)"), ConfigError);
+  EXPECT_THROW(read(R"("preprocess": {"weld": false},)"), ConfigError);
+  EXPECT_THROW(read(R"("preprocess": {"welds": 1},)"), ConfigError);
 }
 
 TEST(EnumNames, ParseReturnsWhatToStringWrote) {

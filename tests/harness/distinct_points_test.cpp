@@ -69,7 +69,7 @@ TEST(DistinctPoints, LoseNoCurveNoFailureAndNoDoubt) {
   for (int i = 0; i < 5000; ++i) points.Add(Point(i, i));
   Record failed = Point(2500.0, 2500.0), doubted = failed;
   failed.Set("outcome", std::string("step-limit"));
-  doubted.Set("doubts", std::string("energy"));
+  doubted.Set("warnings", std::string("energy"));
   for (int times = 0; times < 3; ++times) {
     for (const Record& one : {failed, doubted, Point(2500.0, 2500.0, "lagrange")}) points.Add(one);
   }
@@ -78,7 +78,7 @@ TEST(DistinctPoints, LoseNoCurveNoFailureAndNoDoubt) {
                                  [&](const Record& one) { return one.Text(key) == text; });
   };
   EXPECT_EQ(count("outcome", "step-limit"), 1);
-  EXPECT_EQ(count("doubts", "energy"), 1);
+  EXPECT_EQ(count("warnings", "energy"), 1);
   EXPECT_EQ(count("formulation", "lagrange"), 1);
 }
 

@@ -102,7 +102,7 @@ INSTANTIATE_TEST_SUITE_P(Documents, ShownOutput,
                                          "docs/operation-counts.md", "docs/generated-code.md"));
 
 TEST_F(DocumentsTest, AMissingFileIsSaidWithTheFolderItWasLookedForIn) {
-  ExpectEnding(Call("verdict out --claims configs/claims.json"), 2, {"out"});
+  ExpectEnding(Call("check-claims out --claims configs/claims.json"), 2, {"out"});
   ExpectEnding(
       Call("check configs/claims.json"), 2,
       {"configs/claims.json: cannot be read: no such file, seen from " + folder_.string()});

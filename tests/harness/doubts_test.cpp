@@ -34,7 +34,7 @@ Record Sound(const std::string& enforcement = "acceleration",
   record.Set("coordinates", coordinates);
   record.Set("rtol", 1e-8);
   record.Set("horizon", 20.0);
-  record.Set("scene_id", std::string("scene"));
+  record.Set("problem_id", std::string("problem"));
   record.Set("link_length", 1.0);
   record.Set("position_goal", 2.7e-15);
   record.Set("outcome", std::string("finished"));
@@ -43,11 +43,11 @@ Record Sound(const std::string& enforcement = "acceleration",
   record.Set("energy_error_max", 1e-6);
   record.Set("energy_error_relative", 1e-6);
   record.Set("energy_scale", 1.0);
-  record.Set("drift_position_max", enforcement == "position" ? 1e-15 : 1e-8);
+  record.Set("drift_position_max", enforcement == "projection" ? 1e-15 : 1e-8);
   record.Set("drift_rotation_max", 0.0);
-  record.Set("softened_evaluations", std::int64_t{0});
+  record.Set("regularized_evaluations", std::int64_t{0});
   record.Set("singularity_distance_min", 0.75);
-  record.Set("singularity_passages", std::int64_t{0});
+  record.Set("singularity_crossings", std::int64_t{0});
   record.Set("ensemble_failed", std::int64_t{0});
   record.Set("growth_exponent", 2.3);
   record.Set("growth_regime", std::string("truncation"));
@@ -64,7 +64,7 @@ std::string With(const std::string& enforcement,
 }
 
 TEST(Doubts, ASoundRunHasNoneAtAnyLevel) {
-  for (const char* level : {"acceleration", "velocity", "position", "baumgarte"}) {
+  for (const char* level : {"acceleration", "velocity", "projection", "baumgarte"}) {
     EXPECT_EQ(OwnDoubts(Sound(level)), "") << level;
   }
 }
@@ -85,23 +85,23 @@ TEST(Doubts, EnergyIsComparedWithWhatMoves) {
 
 TEST(Doubts, EnergyIsComparedWithStepsAndTolerance) {
   // nearly singular four-bar (ground 1.0000003) by multipliers, and by O-DCA, at 1e-8
-  EXPECT_EQ(With("position", {{"energy_error_max", 7.2e-4},
-                              {"energy_scale", 53.0},
-                              {"energy_sensitivity", 53.0},
-                              {"steps", std::int64_t{2987}}}),
+  EXPECT_EQ(With("projection", {{"energy_error_max", 7.2e-4},
+                                {"energy_scale", 53.0},
+                                {"energy_sensitivity", 53.0},
+                                {"steps", std::int64_t{2987}}}),
             "energy");
-  EXPECT_EQ(With("position", {{"energy_error_max", 1.2e-6},
-                              {"energy_scale", 53.0},
-                              {"energy_sensitivity", 53.0},
-                              {"steps", std::int64_t{2987}}}),
+  EXPECT_EQ(With("projection", {{"energy_error_max", 1.2e-6},
+                                {"energy_scale", 53.0},
+                                {"energy_sensitivity", 53.0},
+                                {"steps", std::int64_t{2987}}}),
             "");
   // slow motion errs by an absolute tolerance of position or speed
-  EXPECT_EQ(With("position", {{"energy_error_max", 1e-6}, {"energy_scale", 1e-6}}), "energy");
+  EXPECT_EQ(With("projection", {{"energy_error_max", 1e-6}, {"energy_scale", 1e-6}}), "energy");
   EXPECT_EQ(
-      With("position",
+      With("projection",
            {{"energy_error_max", 1e-9}, {"energy_scale", 1e-6}, {"energy_sensitivity", 1e-3}}),
       "");
-  EXPECT_EQ(With("position", {{"energy_error_max", 1e-9}, {"energy_scale", 1e-6}}), "energy");
+  EXPECT_EQ(With("projection", {{"energy_error_max", 1e-9}, {"energy_scale", 1e-6}}), "energy");
   // drift does work, and peers have tolerances of their own
   EXPECT_EQ(With("acceleration", {{"energy_error_max", 2e-5}}), "");
   EXPECT_EQ(With("velocity", {{"energy_error_max", 2e-5}}), "energy");
@@ -114,40 +114,42 @@ TEST(Doubts, AMeasureThatIsNoNumberIsOne) {
   EXPECT_EQ(With("velocity", {{"energy_scale", Value()}}), "energy");
   EXPECT_EQ(With("velocity", {{"drift_position_max", Value()}}), "drift");
   EXPECT_EQ(With("velocity", {{"drift_rotation_max", Value()}}), "drift");
-  EXPECT_EQ(With("position", {{"position_goal", Value()}}), "drift");
+  EXPECT_EQ(With("projection", {{"position_goal", Value()}}), "drift");
   // nothing moves, and no energy is off
   EXPECT_EQ(With("velocity", {{"energy_error_max", 0.0}, {"energy_scale", 0.0}}), "");
 }
 
 TEST(Doubts, SingularPassagesCountBelowLevelPosition) {
   const std::vector<std::pair<std::string, Value>> across = {
-      {"singularity_passages", std::int64_t{1}}};
-  EXPECT_EQ(With("velocity", across), "singular-passage");
-  EXPECT_EQ(With("position", across), "");
-  EXPECT_EQ(With("acceleration", {{"singularity_distance_min", 1e-4}}), "singular-passage");
+      {"singularity_crossings", std::int64_t{1}}};
+  EXPECT_EQ(With("velocity", across), "singular-crossing");
+  EXPECT_EQ(With("projection", across), "");
+  EXPECT_EQ(With("acceleration", {{"singularity_distance_min", 1e-4}}), "singular-crossing");
   // loops too large for the distance know whether they were softened
   EXPECT_EQ(With("acceleration", {{"singularity_distance_min", Value()},
-                                  {"softened_evaluations", std::int64_t{3}}}),
-            "singular-passage");
+                                  {"regularized_evaluations", std::int64_t{3}}}),
+            "singular-crossing");
   // reduction changes its independent set in regular motion too
   EXPECT_EQ(With("velocity", {{"mode_changes", std::int64_t{5}}}), "");
 }
 
 TEST(Doubts, SofteningAwayFromSingularPositions) {
   const Value some = std::int64_t{304};
-  for (const char* level : {"acceleration", "velocity", "position"}) {
-    EXPECT_EQ(With(level, {{"softened_evaluations", some}}), "softened");
-    EXPECT_EQ(With(level, {{"softened_evaluations", some}, {"singularity_distance_min", 3.6e-4}}),
-              "softened");
+  for (const char* level : {"acceleration", "velocity", "projection"}) {
+    EXPECT_EQ(With(level, {{"regularized_evaluations", some}}), "regularized");
+    EXPECT_EQ(
+        With(level, {{"regularized_evaluations", some}, {"singularity_distance_min", 3.6e-4}}),
+        "regularized");
   }
-  EXPECT_EQ(With("position", {{"softened_evaluations", some}, {"singularity_distance_min", 1e-4}}),
+  EXPECT_EQ(
+      With("projection", {{"regularized_evaluations", some}, {"singularity_distance_min", 1e-4}}),
+      "");
+  EXPECT_EQ(With("projection",
+                 {{"regularized_evaluations", some}, {"singularity_crossings", std::int64_t{1}}}),
             "");
-  EXPECT_EQ(
-      With("position", {{"softened_evaluations", some}, {"singularity_passages", std::int64_t{1}}}),
-      "");
-  EXPECT_EQ(
-      With("position", {{"softened_evaluations", some}, {"singularity_distance_min", Value()}}),
-      "");
+  EXPECT_EQ(With("projection",
+                 {{"regularized_evaluations", some}, {"singularity_distance_min", Value()}}),
+            "");
 }
 
 TEST(Doubts, DriftBeyondWhatTheLevelPromises) {
@@ -165,11 +167,11 @@ TEST(Doubts, DriftBeyondWhatTheLevelPromises) {
   EXPECT_EQ(With("acceleration", {{"drift_position_max", 1e-5}}), "");
   EXPECT_EQ(With("velocity", {{"drift_position_max", 5e-7}}), "");
   EXPECT_EQ(With("baumgarte", {{"drift_position_max", 1e-5}}), "drift");
-  EXPECT_EQ(With("position", {{"drift_position_max", 1e-9}}), "drift");
+  EXPECT_EQ(With("projection", {{"drift_position_max", 1e-9}}), "drift");
   // Simbody projects to a tenth of its tolerance, not to round-off
   const Value simbody = std::string("peer/simbody");
-  EXPECT_EQ(With("position", {{"drift_position_max", 1e-9}, {"formulation", simbody}}), "");
-  EXPECT_EQ(With("position", {{"drift_position_max", 2e-7}, {"formulation", simbody}}), "drift");
+  EXPECT_EQ(With("projection", {{"drift_position_max", 1e-9}, {"formulation", simbody}}), "");
+  EXPECT_EQ(With("projection", {{"drift_position_max", 2e-7}, {"formulation", simbody}}), "drift");
   // gains of 0.1 1/s forget within 20 s: nothing of this run
   EXPECT_EQ(With("baumgarte", {{"drift_position_max", 1e-5}, {"alpha", 0.1}, {"beta", 0.1}}), "");
   // lengths are those of the links
@@ -194,7 +196,7 @@ TEST(Doubts, AReferenceJudgesFixedStepsToo) {
 }
 
 TEST(Doubts, EnsemblesThatFailOrDoNotResolveWhatTheyWereAskedFor) {
-  EXPECT_EQ(With("velocity", {{"ensemble_failed", std::int64_t{16}}}), "members-failed");
+  EXPECT_EQ(With("velocity", {{"ensemble_failed", std::int64_t{16}}}), "ensemble-failures");
   EXPECT_EQ(With("velocity", {{"ensemble_size", std::int64_t{16}}}), "exponent");
   EXPECT_EQ(With("velocity", {{"ensemble_size", std::int64_t{16}}, {"growth_resolved", true}}), "");
   EXPECT_EQ(With("velocity", {{"ensemble_size", std::int64_t{16}},
@@ -207,9 +209,9 @@ TEST(Doubts, AFailedRunHasItsOutcomeAndNoDoubts) {
             "");
 }
 
-/// Columns of one scene: those at level position and velocity agree, one took another branch.
+/// Columns of one scene: those at level projection and velocity agree, one took another branch.
 std::vector<Record> Scene(double rtol, double wrong_angle) {
-  std::vector<Record> records = {Sound("position"), Sound("velocity"),
+  std::vector<Record> records = {Sound("projection"), Sound("velocity"),
                                  Sound("velocity", "absolute")};
   for (Record& record : records) {
     record.Set("rtol", rtol);
@@ -224,7 +226,7 @@ std::string DoubtsAndSets(std::vector<Record> records) {
   SetDoubts(&records);
   std::string text;
   for (const Record& record : records) {
-    text += record.Text("doubts") + ":" + record.Text("agreement") + " ";
+    text += record.Text("warnings") + ":" + record.Text("agreement") + " ";
   }
   return text;
 }
@@ -240,7 +242,7 @@ TEST(Agreement, RunsThatEndElsewhereMakeAllOfTheirToleranceDoubtful) {
   EXPECT_EQ(DoubtsAndSets(Scene(1e-8, 3.0009)), "disagreement:1 disagreement:1 disagreement:2 ");
   // nobody to be compared with: another scene, another horizon, a run that failed
   for (const auto& [key, value] :
-       std::vector<std::pair<std::string, Value>>{{"scene_id", std::string("other")},
+       std::vector<std::pair<std::string, Value>>{{"problem_id", std::string("other")},
                                                   {"horizon", 10.0},
                                                   {"outcome", std::string("singular")}}) {
     std::vector<Record> records = Scene(1e-8, 2.0);
@@ -275,24 +277,24 @@ TEST(Agreement, FinerTolerancesDecideWhereDifferentEquationsAgree) {
 }
 
 TEST(Agreement, RunsThatDoubtThemselvesDecideNothing) {
-  // the third passed a singular position below level position, and ended elsewhere
+  // the third passed a singular position below level projection, and ended elsewhere
   std::vector<Record> records = Scene(1e-8, 2.0);
-  records[2].Set("singularity_passages", std::int64_t{1});
-  EXPECT_EQ(DoubtsAndSets(records), ":1 :1 singular-passage disagreement:2 ");
-  // one that went the same way as level position kept its branch
+  records[2].Set("singularity_crossings", std::int64_t{1});
+  EXPECT_EQ(DoubtsAndSets(records), ":1 :1 singular-crossing disagreement:2 ");
+  // one that went the same way as level projection kept its branch
   records = Scene(1e-8, 3.0);
-  records[2].Set("singularity_passages", std::int64_t{1});
+  records[2].Set("singularity_crossings", std::int64_t{1});
   EXPECT_EQ(DoubtsAndSets(records), ":1 :1 :1 ");
   // but not where nobody's level keeps one
   records[0].Set("enforcement", std::string("velocity"));
-  EXPECT_EQ(DoubtsAndSets(records), ":1 :1 singular-passage:1 ");
+  EXPECT_EQ(DoubtsAndSets(records), ":1 :1 singular-crossing:1 ");
   // where all doubt themselves, all testify: nobody is cleared by numbers
   records = Scene(1e-8, 2.0);
   records[0].Set("enforcement", std::string("velocity"));
-  for (Record& record : records) record.Set("singularity_passages", std::int64_t{1});
+  for (Record& record : records) record.Set("singularity_crossings", std::int64_t{1});
   EXPECT_EQ(DoubtsAndSets(records),
-            "singular-passage disagreement:1 singular-passage disagreement:1 "
-            "singular-passage disagreement:2 ");
+            "singular-crossing disagreement:1 singular-crossing disagreement:1 "
+            "singular-crossing disagreement:2 ");
 }
 
 TEST(Agreement, PeersTestifyUnlessTheirClosuresGiveWay) {
@@ -326,7 +328,7 @@ TEST(DoubtNotes, NameRowsNumbersAndWhoAgrees) {
             "steps and tolerance explain: velocity/joint (50 %, at most 0.00021 % expected)");
   EXPECT_EQ(notes[2],
             "disagreement: four-bar rtol 1e-08 horizon 20 ends 1 links or rad apart (bar1), 1000 "
-            "tolerances are expected at most; position/joint, velocity/joint agree; "
+            "tolerances are expected at most; projection/joint, velocity/joint agree; "
             "each by itself: velocity/absolute");
   // a table of one row judges it by the others of the store
   EXPECT_EQ(DoubtNotes(std::vector<Record>{records[2]}, records).back(), notes[2]);
@@ -342,7 +344,7 @@ TEST(DoubtNotes, ScenesHaveTheirParametersAndRunsNoEmptyTolerance) {
       Record swept;
       swept.Set("coupler_mass", mass);
       for (const auto& [key, value] : run.items()) swept.Set(key, value);
-      swept.Set("scene_id", run.Text("scene_id") + std::to_string(mass));
+      swept.Set("problem_id", run.Text("problem_id") + std::to_string(mass));
       records.push_back(swept);
     }
   }
@@ -382,7 +384,7 @@ TEST(DoubtNotes, TheDistanceIsThatOfAnyTwoRunsInWhateverOrder) {
 TEST(Agreement, WhatIsNoNumberAgreesWithNothing) {
   for (const double odd : {std::nan(""), HUGE_VAL, -HUGE_VAL}) {
     for (const bool both : {false, true}) {
-      std::vector<Record> records = {Sound("position"), Sound("velocity")};
+      std::vector<Record> records = {Sound("projection"), Sound("velocity")};
       records[0].Set("series.final.bar1", std::vector<double>{0.1, odd, 3.0});
       if (both) records[1] = records[0];
       EXPECT_EQ(DoubtsAndSets(records), "disagreement:1 disagreement:2 ");
@@ -390,7 +392,7 @@ TEST(Agreement, WhatIsNoNumberAgreesWithNothing) {
       EXPECT_TRUE(std::isinf(LargestDifference(records).largest));
     }
   }
-  std::vector<Record> records = {Sound("position"), Sound("velocity")};
+  std::vector<Record> records = {Sound("projection"), Sound("velocity")};
   records[1].Set("series.final.bar1", std::vector<double>{0.1, 0.2});
   EXPECT_EQ(DoubtsAndSets(records), "disagreement:1 disagreement:2 ");
 }
@@ -411,7 +413,7 @@ TEST(DoubtNotes, TablesMarkTheOutcomeInEveryFormat) {
   EXPECT_NE(ToText(full, true).find("\033[33mfinished?"), std::string::npos);
   EXPECT_EQ(ToCsv(full).find("finished?"), std::string::npos);
   const Table bare = MakeTable(records, {.columns = {"outcome"}});
-  EXPECT_NE(ToCsv(bare).find("2 of 3 runs finished with doubts"), std::string::npos);
+  EXPECT_NE(ToCsv(bare).find("2 of 3 runs finished with warnings"), std::string::npos);
 }
 
 // What the rules were made for.
@@ -442,10 +444,10 @@ TEST(Doubts, FinalPosesAreTheSameInAllCoordinatesOfPlaneAndSpace) {
     EXPECT_GE(bodies, 3u) << mechanism;
     for (const Record& record : records) {
       EXPECT_EQ(record.Text("outcome"), "finished");
-      EXPECT_EQ(record.Text("doubts"), "") << mechanism << " " << record.Text("enforcement");
+      EXPECT_EQ(record.Text("warnings"), "") << mechanism << " " << record.Text("enforcement");
       // some 30 steps, each with some tolerance of error
       EXPECT_LT(DifferenceOf(records.front(), record).largest, 100 * 1e-9) << mechanism;
-      EXPECT_EQ(record.Number("singularity_passages"), 0);
+      EXPECT_EQ(record.Number("singularity_crossings"), 0);
     }
   }
 }
@@ -455,10 +457,10 @@ TEST(Doubts, PassagesAreSeenWhereNoStepEndsNearThem) {
   const Column acceleration{.formulation = "odca"};
   const Record record = RunScene("parallelogram", acceleration, 1e-6, 2.0);
   ASSERT_EQ(record.Text("outcome"), "finished");
-  EXPECT_GE(record.Number("singularity_passages"), 1);
-  EXPECT_TRUE(HasDoubt(record, kSingularDoubt)) << record.Text("doubts");
+  EXPECT_GE(record.Number("singularity_crossings"), 1);
+  EXPECT_TRUE(HasDoubt(record, kSingularDoubt)) << record.Text("warnings");
   const Column position{.formulation = "odca", .enforcement = kPosition};
-  EXPECT_EQ(RunScene("parallelogram", position, 1e-8, 2.0).Text("doubts"), "");
+  EXPECT_EQ(RunScene("parallelogram", position, 1e-8, 2.0).Text("warnings"), "");
 }
 
 TEST(Doubts, RedundantRowsThatDriftedApartAreNoSingularPosition) {
@@ -469,7 +471,7 @@ TEST(Doubts, RedundantRowsThatDriftedApartAreNoSingularPosition) {
     ASSERT_EQ(record.Text("outcome"), "finished");
     EXPECT_GT(record.Number("drift_position_max"), 2e-4);
     EXPECT_GT(record.Number("singularity_distance_min"), 0.1);
-    EXPECT_EQ(record.Text("doubts"), "");
+    EXPECT_EQ(record.Text("warnings"), "");
   }
 }
 
@@ -490,7 +492,7 @@ TEST(Doubts, ARunAloneIsNearTheTruthOrInDoubt) {
       {"name": "A", "type": "revolute", "from": {"body": "crank", "at": "q"}, "to": {"body": "coupler", "at": "p"}},
       {"name": "D", "type": "revolute", "from": {"body": "ground", "at": "D"}, "to": {"body": "rocker", "at": "p"}},
       {"name": "B", "type": "revolute", "from": {"body": "coupler", "at": "q"}, "to": {"body": "rocker", "at": "q"}, "cut": true}],
-      "initial": {"coordinates": {"O": 1.3, "A": -1.3, "D": 1.3}, "held": ["O"]}})",
+      "initial": {"coordinates": {"O": 1.3, "A": -1.3, "D": 1.3}, "fixed": ["O"]}})",
       "near.json");
   const Experiment experiment = Single(file);
   for (const char* formulation : {"odca", "lagrange", "reduction"}) {
@@ -499,15 +501,15 @@ TEST(Doubts, ARunAloneIsNearTheTruthOrInDoubt) {
     ASSERT_EQ(record.Text("outcome"), "finished");
     const double off =
         std::remainder(record.Numbers("series.final.crank").at(2) + 4.335613186e-8, 2 * M_PI);
-    EXPECT_TRUE(std::abs(off) <= kMostTolerances * 1e-8 || record.Text("doubts") != "")
+    EXPECT_TRUE(std::abs(off) <= kMostTolerances * 1e-8 || record.Text("warnings") != "")
         << formulation << " is off by " << off;
     // 3.5 kg of weight; momenta are less
     EXPECT_NEAR(record.Number("energy_sensitivity"), 3.5 * 9.81, 1e-12);
   }
 }
 
-/// Peaucellier's linkage through the position where its cell folds: below level position runs
-/// finish with small drift on another branch than level position's, and lose energy on the way.
+/// Peaucellier's linkage through the position where its cell folds: below level projection runs
+/// finish with small drift on another branch than level projection's, and lose energy on the way.
 TEST(Doubts, TheStraightLineLinkageThatEndsOnAnotherBranch) {
   std::vector<Record> records;
   for (const Coordinates coordinates : {Coordinates::kJoint, Coordinates::kAbsolute}) {
@@ -521,10 +523,10 @@ TEST(Doubts, TheStraightLineLinkageThatEndsOnAnotherBranch) {
   SetDoubts(&records);
   for (const Record& record : records) {
     ASSERT_EQ(record.Text("outcome"), "finished") << record.Text("message");
-    const bool position = record.Text("enforcement") == "position";
+    const bool position = record.Text("enforcement") == "projection";
     EXPECT_EQ(HasDoubt(record, kSingularDoubt), !position);
     // two coordinate sets agree that have nothing against themselves: they decide
-    EXPECT_EQ(HasDoubt(record, kDisagreementDoubt), !position) << record.Text("doubts");
+    EXPECT_EQ(HasDoubt(record, kDisagreementDoubt), !position) << record.Text("warnings");
     EXPECT_EQ(record.Number("agreement") == 1, position);
     EXPECT_EQ(HasDoubt(record, kEnergyDoubt), !position);
     EXPECT_FALSE(HasDoubt(record, kDriftDoubt));

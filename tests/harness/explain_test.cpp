@@ -158,7 +158,7 @@ TEST_F(ExplainTest, SaysTheAssembledStartAndItsEnergy) {
   Write("bar.json", R"({"name": "bar", "gravity": [0, -10],
     "bodies": [{"name": "b", "mass": 2, "inertia": [1, 1, 0.5], "com": [0.5, 0]}],
     "joints": [{"name": "O", "type": "revolute", "from": {"body": "ground", "at": [0, 0.25]}, "to": {"body": "b"}}],
-    "initial": {"coordinates": {"O": 0}, "speeds": {"O": 3}, "held": ["O"]}})");
+    "initial": {"coordinates": {"O": 0}, "speeds": {"O": 3}, "fixed": ["O"]}})");
   // 0.5 (0.5 + 2 0.25) 9 and 2 10 0.25
   ExpectSqueezed(Call("explain bar.json"), {"O angle 0 rad angle 3 rad/s held, speed",
                                             "Energy: kinetic 4.5 J + potential 5 J = 9.5 J"});

@@ -194,34 +194,35 @@ TEST(Export, KeepsHostileNamesOutOfDocuments) {
 using ConvertTest = CommandLineTest;
 
 TEST_F(ConvertTest, WritesTheFileAndSaysWhatItSays) {
-  ExpectEnding(Call("convert four-bar.json --to mjcf"), 0,
+  ExpectEnding(Call("export-mechanism four-bar.json --to mjcf"), 0,
                {"wrote four-bar.xml: 3 bodies, 4 joints", "closes a loop", "With a loss: "});
   EXPECT_EQ(FaultOfXml(ReadFile(folder_ / "four-bar.xml")), "");
-  ExpectEnding(Call("convert four-bar.json --to mjcf --step 1e-5 --out deep/er.xml --json"), 0,
-               {R"({"file":"four-bar.json","name":"four-bar","to":"mjcf","out":"deep/er.xml",)",
-                R"("missing":[],"notes":[{"loss":false,)", R"({"loss":true,"text":"MuJoCo's)"});
+  ExpectEnding(
+      Call("export-mechanism four-bar.json --to mjcf --step 1e-5 --out deep/er.xml --json"), 0,
+      {R"({"file":"four-bar.json","name":"four-bar","to":"mjcf","out":"deep/er.xml",)",
+       R"("missing":[],"notes":[{"loss":false,)", R"({"loss":true,"text":"MuJoCo's)"});
   EXPECT_NE(ReadFile(folder_ / "deep/er.xml").find("timestep=\"1e-05\""), std::string::npos);
-  ExpectEnding(Call("convert four-bar.json --to simbody"), 0, {"wrote four-bar.cpp"});
+  ExpectEnding(Call("export-mechanism four-bar.json --to simbody"), 0, {"wrote four-bar.cpp"});
   EXPECT_NE(ReadFile(folder_ / "four-bar.cpp").find("int main("), std::string::npos);
 }
 
 TEST_F(ConvertTest, RefusesByNameAndWritesNothing) {
   Write("jack.json", ReadFile(kConfigs / "mechanisms/screw-jack.json"));
-  ExpectEnding(Call("convert jack.json --to simbody"), 2,
+  ExpectEnding(Call("export-mechanism jack.json --to simbody"), 2,
                {"jack.json: found what simbody does not have, so nothing is written:",
                 "joint_torque along joint \"bearing\", which depends on time"});
-  ExpectEnding(Call("convert jack.json --to mjcf --json"), 2,
+  ExpectEnding(Call("export-mechanism jack.json --to mjcf --json"), 2,
                {R"("missing":["joint_torque along joint \"bearing\", which depends on time",)"});
   EXPECT_FALSE(fs::exists(folder_ / "jack.cpp"));
   EXPECT_FALSE(fs::exists(folder_ / "jack.xml"));
-  ExpectEnding(Call("convert four-bar.json --to urdf"), 2, {"urdf", "mjcf"});
-  ExpectEnding(Call("convert none.json --to mjcf"), 2, {"none.json"});
-  ExpectEnding(Call("convert four-bar.json --to mjcf --out ./four-bar.json"), 2,
+  ExpectEnding(Call("export-mechanism four-bar.json --to urdf"), 2, {"urdf", "mjcf"});
+  ExpectEnding(Call("export-mechanism none.json --to mjcf"), 2, {"none.json"});
+  ExpectEnding(Call("export-mechanism four-bar.json --to mjcf --out ./four-bar.json"), 2,
                {"found an input of this command"});
   EXPECT_EQ(ReadFile(folder_ / "four-bar.json"), mechanism_);
   // bars that do not reach each other
   EditMechanism("\"C\": [1.5, 0.0]", "\"C\": [9.0, 0.0]");
-  ExpectEnding(Call("convert four-bar.json --to mjcf"), 2,
+  ExpectEnding(Call("export-mechanism four-bar.json --to mjcf"), 2,
                {"four-bar.json: its start cannot be assembled: four-bar: "});
   EXPECT_FALSE(fs::exists(folder_ / "four-bar.xml"));
 }

@@ -1,4 +1,4 @@
-// Rules of failure maps: what a row inherits, and all mistakes at once.
+// Rules of robustness maps: what a row inherits, and all mistakes at once.
 #include <gtest/gtest.h>
 
 #include <algorithm>
@@ -16,17 +16,17 @@ namespace failure_map_reader_test {
 
 constexpr const char* kRules = R"({
   "title": "t",
-  "columns": [{"label": "A", "select": {"formulation": "odca"}},
+  "methods": [{"label": "A", "select": {"formulation": "odca"}},
               {"label": "B", "select": {"formulation": "reduction", "rtol": [1e-6, 1e-8]}}],
   "groups": [
-    {"label": "g", "select": {"horizon": 10}, "cases": 4, "why": "because", "must_hold": "all",
+    {"label": "g", "select": {"horizon": 10}, "cases": 4, "rationale": "because", "required": "all",
      "not_applicable": {"B": "not B"},
-     "decides": [{"measure": "m", "limit": 500, "of": "rtol", "unit": "rad", "name": "n"}],
+     "criteria": [{"measure": "m", "limit": 500, "relative_to": "rtol", "unit": "rad", "name": "n"}],
      "rows": [
        {"label": "all of the group's", "select": {"mechanism": "x"}},
-       {"label": "its own", "select": {"mechanism": "y"}, "right": ["locked", "finished"],
-        "decides": [{"measure": "k", "at_least": 3}, {"measure": "t", "equal": 0, "when": "locked"}],
-        "cases": 1, "why": "otherwise", "must_hold": [], "not_applicable": {"A": "nor A"}}]}]
+       {"label": "its own", "select": {"mechanism": "y"}, "expected_outcome": ["locked", "finished"],
+        "criteria": [{"measure": "k", "at_least": 3}, {"measure": "t", "equal": 0, "when": "locked"}],
+        "cases": 1, "rationale": "otherwise", "required": [], "not_applicable": {"A": "nor A"}}]}]
 })";
 
 TEST(MapRules, RowsInheritFromTheirGroup) {
@@ -75,17 +75,17 @@ std::string MessageOf(const std::string& text) {
 TEST(MapRules, AllMistakesAreReportedAtOnce) {
   const std::string message = MessageOf(R"({
   "titel": "t",
-  "columns": [{"label": "A", "select": {}}, {"label": "A", "select": {"rtol": null}}, {}],
+  "methods": [{"label": "A", "select": {}}, {"label": "A", "select": {"rtol": null}}, {}],
   "groups": [
     {"label": "g", "rows": [
       {"label": "r", "select": {"a": 1}},
-      {"label": "r", "select": {"a": 1}, "decides": [
+      {"label": "r", "select": {"a": 1}, "criteria": [
         {"measure": "m", "limit": 0},
         {"measure": "m", "limit": 1, "at_least": 1},
         {"measure": "m"},
         {"limit": "1", "when": ["locked"]}],
-       "right": ["lockd", "finished"], "must_hold": ["C"], "not_applicable": {"D": "x"}},
-      {"label": "no selection", "right": "locked", "cases": 0}]},
+       "expected_outcome": ["lockd", "finished"], "required": ["C"], "not_applicable": {"D": "x"}},
+      {"label": "no selection", "expected_outcome": "locked", "cases": 0}]},
     {"label": "empty", "rows": []}]
 })");
   std::istringstream lines(message);
@@ -93,27 +93,28 @@ TEST(MapRules, AllMistakesAreReportedAtOnce) {
   for (std::string line; std::getline(lines, line);) found.push_back(line);
   const std::vector<std::string> expected = {
       "map.json:2: /titel: found unknown key \"titel\", expected one of \"title\", \"comment\", "
-      "\"columns\", \"groups\", \"$schema\", \"format\" (did you mean \"title\"?)",
+      "\"methods\", \"groups\", \"$schema\", \"format\" (did you mean \"title\"?)",
       "map.json:1: (top level): found no \"title\", expected a string that is not empty",
-      "map.json:3: /columns/0/select: found an empty object, expected at least one key",
+      "map.json:3: /methods/0/select: found an empty object, expected at least one key",
   };
   for (const std::string& line : expected) {
     EXPECT_NE(std::ranges::find(found, line), found.end()) << line << "\nnot in\n" << message;
   }
   for (const char* part :
-       {"/columns/1/label: found \"A\", expected each name once",
-        "/columns/1/select/rtol: found null", "/columns/2: found no \"label\"",
-        "/columns/2: found no \"select\"",
+       {"/methods/1/label: found \"A\", expected each name once",
+        "/methods/1/select/rtol: found null", "/methods/2: found no \"label\"",
+        "/methods/2: found no \"select\"",
         "/groups/0/rows/0: found nothing that decides about a finished run",
         "/groups/0/rows/1/label: found \"r\", expected each name once",
-        "/groups/0/rows/1/decides/0/limit: found 0, expected a number > 0",
-        "/groups/0/rows/1/decides/1/at_least: found 1, expected one of \"limit\"",
-        "/groups/0/rows/1/decides/2: found no number, expected one of \"limit\"",
-        "/groups/0/rows/1/decides/3: found no \"measure\"",
-        "/groups/0/rows/1/decides/3/limit: found \"1\"",
-        "/groups/0/rows/1/decides/3/when: found [\"locked\"], expected endings that are \"right\"",
-        "/groups/0/rows/1/right/0: found \"lockd\"", "(did you mean \"locked\"?)",
-        "/groups/0/rows/1/must_hold/0: found \"C\"",
+        "/groups/0/rows/1/criteria/0/limit: found 0, expected a number > 0",
+        "/groups/0/rows/1/criteria/1/at_least: found 1, expected one of \"limit\"",
+        "/groups/0/rows/1/criteria/2: found no number, expected one of \"limit\"",
+        "/groups/0/rows/1/criteria/3: found no \"measure\"",
+        "/groups/0/rows/1/criteria/3/limit: found \"1\"",
+        "/groups/0/rows/1/criteria/3/when: found [\"locked\"], expected endings that are "
+        "\"expected_outcome\"",
+        "/groups/0/rows/1/expected_outcome/0: found \"lockd\"", "(did you mean \"locked\"?)",
+        "/groups/0/rows/1/required/0: found \"C\"",
         "/groups/0/rows/1/not_applicable/D: found unknown key",
         "/groups/0/rows/2: found no \"select\"", "/groups/0/rows/2/cases: found 0",
         "/groups/1/rows: found an empty array, expected at least one row"}) {
@@ -125,12 +126,12 @@ TEST(MapRules, AllMistakesAreReportedAtOnce) {
 TEST(MapRules, ADemandOfFinishedRunsNeedsThatFinishingIsRight) {
   const std::string message = MessageOf(R"({
   "title": "t",
-  "columns": [{"label": "A", "select": {"formulation": "odca"}}],
+  "methods": [{"label": "A", "select": {"formulation": "odca"}}],
   "groups": [{"label": "g", "rows": [
-    {"label": "r", "select": {"a": 1}, "right": "locked", "decides": [{"measure": "t", "limit": 1}]}]}]
+    {"label": "r", "select": {"a": 1}, "expected_outcome": "locked", "criteria": [{"measure": "t", "limit": 1}]}]}]
 })");
-  EXPECT_NE(message.find("/groups/0/rows/0/decides/0: found no \"when\", which means finished, "
-                         "expected endings that are \"right\" here"),
+  EXPECT_NE(message.find("/groups/0/rows/0/criteria/0: found no \"when\", which means finished, "
+                         "expected endings that are \"expected_outcome\" here"),
             std::string::npos)
       << message;
 }

@@ -1,4 +1,4 @@
-// A failure map as a whole: table, page, gate and picture of planted records.
+// A robustness map as a whole: table, page, gate and picture of planted records.
 #include <fmt/format.h>
 #include <gtest/gtest.h>
 
@@ -22,13 +22,13 @@ testing::AssertionResult Contains(const std::string& text, const std::string& pa
 
 constexpr const char* kRules = R"({
   "title": "Two methods", "comment": "For tests.",
-  "columns": [{"label": "O-DCA", "select": {"formulation": "odca"}},
+  "methods": [{"label": "O-DCA", "select": {"formulation": "odca"}},
               {"label": "multipliers", "select": {"formulation": "lagrange"}}],
   "groups": [{"label": "singular", "select": {"mechanism": "parallelogram"},
-    "decides": [{"measure": "branch_error_max", "name": "branch", "limit": 1e-6, "unit": "rad"}],
+    "criteria": [{"measure": "branch_error_max", "name": "branch", "limit": 1e-6, "unit": "rad"}],
     "rows": [
-      {"label": "one, \"1e-8\"", "select": {"rtol": 1e-8}, "must_hold": "all", "why": "a reason"},
-      {"label": "two", "select": {"rtol": 1e-6}, "must_hold": ["O-DCA"],
+      {"label": "one, \"1e-8\"", "select": {"rtol": 1e-8}, "required": "all", "rationale": "a reason"},
+      {"label": "two", "select": {"rtol": 1e-6}, "required": ["O-DCA"],
        "not_applicable": {"multipliers": "none"}}]}]
 })";
 
@@ -42,8 +42,8 @@ std::vector<Record> SmallRecords() {
 
 TEST(FailureMapReport, ListsEveryCellWithEveryDigit) {
   EXPECT_EQ(ToCsv(MapCellTable(SmallMap(SmallRecords()))),
-            "group,row,column,state,class,outcome,measure,value,unit,limit,ratio,t_reached,holding,"
-            "records,cases,must_hold,reason,case_id,doubted,doubts\n"
+            "group,row,method,state,class,outcome,measure,value,unit,limit,ratio,t_reached,holding,"
+            "records,cases,required,reason,case_id,with_warnings,warnings\n"
             "singular,\"one, \"\"1e-8\"\"\",O-DCA,holds,holds,finished,branch_error_max,2.5e-07,"
             "rad,1e-06,0.25,20,1,1,1,true,,odca-1e-08,0,\n"
             "singular,\"one, \"\"1e-8\"\"\",multipliers,inaccurate,inaccurate,finished,"
@@ -55,10 +55,10 @@ TEST(FailureMapReport, ListsEveryCellWithEveryDigit) {
 
 TEST(FailureMapReport, NamesCellsThatHoldInDoubt) {
   std::vector<Record> records = SmallRecords();
-  EXPECT_EQ(CountDoubts(SmallMap(records)), "0 of 1 cells that hold have runs in doubt");
-  for (Record& record : records) record.Set("doubts", std::string("energy drift"));
+  EXPECT_EQ(CountDoubts(SmallMap(records)), "0 of 1 cells that hold have runs with warnings");
+  for (Record& record : records) record.Set("warnings", std::string("energy drift"));
   const FailureMap map = SmallMap(records);
-  EXPECT_EQ(CountDoubts(map), "1 of 1 cells that hold have runs in doubt");
+  EXPECT_EQ(CountDoubts(map), "1 of 1 cells that hold have runs with warnings");
   EXPECT_TRUE(Contains(MapMarkdown(map, {}), "O-DCA | 1 of 1 | drift 1, energy 1 |"));
 }
 
@@ -75,12 +75,12 @@ TEST(FailureMapReport, PrintsCellsByMethod) {
 }
 
 TEST(FailureMapReport, PageHasLimitsReasonsAndProvenance) {
-  const std::string page = MapMarkdown(SmallMap(SmallRecords()), {"command: loopbench map"});
+  const std::string page = MapMarkdown(SmallMap(SmallRecords()), {"command: loopbench robustness"});
   EXPECT_TRUE(
       Contains(page, "| one, \"1e-8\" | holds branch 2.5e-07 rad | inaccurate branch 0.5 rad |"));
   EXPECT_TRUE(Contains(page, "| branch_error_max <= 1e-06 [rad] | a reason |"));
   EXPECT_TRUE(Contains(page, "| two | O-DCA | not measured (must hold) |"));
-  EXPECT_TRUE(Contains(page, "command: loopbench map"));
+  EXPECT_TRUE(Contains(page, "command: loopbench robustness"));
 }
 
 TEST(FailureMapReport, ListsDemandsThatAreNotMet) {
@@ -131,8 +131,8 @@ TEST(FailureMapFigure, HasAGlyphAndShadeForEachCell) {
         "\"wrong without a word\"", "\"frame: must hold and does not\""}) {
     EXPECT_TRUE(Contains(drawing.script, text));
   }
-  EXPECT_EQ(drawing.script.find("holds, in doubt"), std::string::npos);
-  const auto path = std::filesystem::path(testing::TempDir()) / "loopbench-failure-map.svg";
+  EXPECT_EQ(drawing.script.find("holds, with warnings"), std::string::npos);
+  const auto path = std::filesystem::path(testing::TempDir()) / "loopbench-robustness-map.svg";
   std::filesystem::remove(path);
   const auto error = WriteMapFigure(path, map);
   ASSERT_FALSE(error.has_value()) << *error;

@@ -1,4 +1,4 @@
-// Records to plant in failure maps.
+// Records to plant in robustness maps.
 #pragma once
 
 #include <fmt/format.h>

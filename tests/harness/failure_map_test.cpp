@@ -1,4 +1,4 @@
-// Planted records turn each cell of a failure map into each of its classes.
+// Planted records turn each cell of a robustness map into each of its classes.
 #include "harness/judge/failure_map.h"
 
 #include <gtest/gtest.h>

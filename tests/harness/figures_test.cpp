@@ -51,7 +51,7 @@ Record RunOf(const std::string& formulation, const std::string& coordinates, dou
   record.Set("formulation", formulation);
   record.Set("enforcement", std::string(formulation == "reduction" ? "velocity" : "acceleration"));
   record.Set("coordinates", coordinates);
-  record.Set("solver", std::string("as-published"));
+  record.Set("solver", std::string("plain"));
   record.Set("rtol", 1e-8);
   record.Set("horizon", 10.0);
   record.Set("outcome", std::string("finished"));
@@ -90,10 +90,9 @@ TEST_F(FiguresTest, DriftHasUnitsChannelsAndFittedPowers) {
   const Figure figure = DriftFigure(records);
   const std::string svg = Draw(figure);
   for (const char* text :
-       {"time [s]", "position drift, running maximum [m]",
-        "four-bar: drift, as-published, rtol 10⁻⁸", "<text>1.97</text>", "<text>2.20?</text>",
-        "<text>1.03</text>", "?: not resolved", "<text>lagrange</text>", "<text>velocity</text>",
-        "<text>absolute</text>"}) {
+       {"time [s]", "position drift, running maximum [m]", "four-bar: drift, plain, rtol 10⁻⁸",
+        "<text>1.97</text>", "<text>2.20?</text>", "<text>1.03</text>", "?: not resolved",
+        "<text>lagrange</text>", "<text>velocity</text>", "<text>absolute</text>"}) {
     EXPECT_TRUE(Contains(svg, text));
   }
   // through the data, over the window of the fit: drift is 1e-10 t^1.97
@@ -216,8 +215,7 @@ TEST(FigureRecipes, OneFigureOfMotionPerSceneAndOneOfDriftPerTolerance) {
             "motion-a name that says nothing-10s motion-four-bar-10s "
             "singular-a name that says nothing-10s-rtol-1e-08 drift-four-bar-10s-rtol-1e-06 "
             "drift-four-bar-10s-rtol-1e-08 ");
-  EXPECT_EQ(figures[1].figure.title,
-            "four-bar, lagrange, acceleration, joint, as-published, rtol 10⁻⁸");
+  EXPECT_EQ(figures[1].figure.title, "four-bar, lagrange, acceleration, joint, plain, rtol 10⁻⁸");
   EXPECT_EQ(figures[4].figure.curves.size(), 2u);
 }
 
@@ -228,9 +226,9 @@ std::string TitleOfMotion(const std::vector<Record>& records) {
 TEST(FigureRecipes, MotionIsThatOfTheRunThatIsTrustedMost) {
   const Record drifting = RunOf("odca", "joint", 2.0);
   Record closed = RunOf("lagrange", "absolute", 2.0);
-  closed.Set("enforcement", std::string("position"));
+  closed.Set("enforcement", std::string("projection"));
   closed.Set("rtol", 1e-6);
-  const std::string position = "four-bar, lagrange, position, absolute, as-published, rtol ";
+  const std::string position = "four-bar, lagrange, projection, absolute, plain, rtol ";
   EXPECT_EQ(TitleOfMotion({drifting, closed}), position + "10⁻⁶");
   EXPECT_EQ(TitleOfMotion({closed, drifting}), position + "10⁻⁶");
   Record finer = closed;
@@ -238,8 +236,8 @@ TEST(FigureRecipes, MotionIsThatOfTheRunThatIsTrustedMost) {
   EXPECT_EQ(TitleOfMotion({finer, closed, drifting}), position + "10⁻¹⁰");
   finer.Set("energy_error_relative", 0.5);
   EXPECT_EQ(TitleOfMotion({finer, closed, drifting}), position + "10⁻⁶");
-  closed.Set("doubts", std::string("columns disagree"));
-  EXPECT_EQ(TitleOfMotion({finer, closed, drifting}).find("position"), std::string::npos);
+  closed.Set("warnings", std::string("columns disagree"));
+  EXPECT_EQ(TitleOfMotion({finer, closed, drifting}).find("projection"), std::string::npos);
   Record swept;
   swept.Set("mass", 5.0);  // a parameter of a sweep stands before the results
   for (const auto& [key, value] : closed.items()) swept.Set(key, value);
@@ -282,9 +280,9 @@ TEST(FigureRecipes, AMotionTooFastForThePointsIsShownByItsOpening) {
 std::vector<Record> AllMethods() {
   std::vector<Record> records;
   for (const char* formulation : {"odca", "lagrange", "reduction"}) {
-    for (const std::string level : {"acceleration", "velocity", "position", "baumgarte"}) {
+    for (const std::string level : {"acceleration", "velocity", "projection", "baumgarte"}) {
       for (const char* coordinates : {"joint", "absolute"}) {
-        for (const char* solver : {"as-published", "rank-revealing"}) {
+        for (const char* solver : {"plain", "rank-revealing"}) {
           records.push_back(
               RunOf(formulation, coordinates, 1.0 + 0.1 * static_cast<double>(records.size())));
           records.back().Set("enforcement", level);
@@ -393,7 +391,7 @@ TEST_F(FiguresTest, CurvesThatCoincideAreDrawnOnceAndListed) {
   EXPECT_TRUE(Contains(svg, "coincide: A: odca = lagrange, joint;  B: odca = lagrange, absolute"));
   EXPECT_TRUE(Contains(svg, "<text>A 2.00?</text>"));
   // a doubtful run is never hidden by a sound one, nor is one that failed
-  records[0].Set("doubts", std::string("energy"));
+  records[0].Set("warnings", std::string("energy"));
   records[2].Set("outcome", std::string("singular"));
   EXPECT_EQ(MergedCurves(DriftFigure(records), FigureSize::kTwoColumn).size(), 4u);
 }
@@ -493,9 +491,9 @@ TEST_F(FiguresTest, HostileNamesAreDrawnAsTheyAre) {
 
 TEST_F(FiguresTest, DoubtfulRunsHaveHollowMarks) {
   std::vector<Record> records = {RunOf("odca", "absolute", 2.0), RunOf("reduction", "joint", 2.5)};
-  EXPECT_FALSE(Contains(Draw(DriftFigure(records)), "doubtful"));
-  records[1].Set("doubts", std::string("drift"));
-  EXPECT_TRUE(Contains(Draw(DriftFigure(records)), "<text>doubtful</text>"));
+  EXPECT_FALSE(Contains(Draw(DriftFigure(records)), "flagged"));
+  records[1].Set("warnings", std::string("drift"));
+  EXPECT_TRUE(Contains(Draw(DriftFigure(records)), "<text>flagged</text>"));
   EXPECT_TRUE(Contains(GnuplotScript(DriftFigure(records)).commands, "with points pt 6 "));
   EXPECT_TRUE(Contains(GnuplotScript(MotionFigure(records[1])).commands, "with points pt 6 "));
 }

@@ -27,7 +27,7 @@ class FileKindTest : public CommandLineTest {
 };
 
 TEST_F(FileKindTest, NamesInsideDecideNothing) {
-  for (const char* name : {"rows", "groups", "claims", "scenes", "columns", "benchmarks"}) {
+  for (const char* name : {"rows", "groups", "claims", "problems", "methods", "benchmarks"}) {
     std::string text = mechanism_;
     for (std::size_t at = text.find("bar1"); at != std::string::npos; at = text.find("bar1", at)) {
       text.replace(at, 4, name);
@@ -51,7 +51,7 @@ TEST_F(FileKindTest, EveryShippedFileIsOfTheKindOfItsFolder) {
       const std::string path = entry.path().string();
       const bool is_model =
           (path.find("/experiments/models/") != path.npos &&
-           name.find("-ladder.json") == name.npos) ||
+           name.find("-models.json") == name.npos) ||
           (path.find("/experiments/overconstrained/") != path.npos && name != "claims.json");
       const FileKind expected = folder == std::string("mechanisms")   ? FileKind::kMechanism
                                 : is_model                            ? FileKind::kMechanism
@@ -68,14 +68,14 @@ TEST_F(FileKindTest, EveryShippedFileIsOfTheKindOfItsFolder) {
 TEST_F(FileKindTest, AMisspeltKeyLeavesTheKindAsItIs) {
   EXPECT_EQ(KindOf(R"({"name": "m", "gravity": [0, 0], "bodeis": [], "joints": []})"),
             FileKind::kMechanism);
-  EXPECT_EQ(KindOf(R"({"name": "m", "scnes": [], "columns": [], "tolerances": []})"),
+  EXPECT_EQ(KindOf(R"({"name": "m", "scnes": [], "methods": [], "tolerances": []})"),
             FileKind::kExperiment);
-  EXPECT_EQ(KindOf(R"({"titel": "m", "columns": [], "groups": []})"), FileKind::kMap);
+  EXPECT_EQ(KindOf(R"({"titel": "m", "methods": [], "groups": []})"), FileKind::kMap);
   EXPECT_EQ(KindOf(R"({"title": "m", "claims": []})"), FileKind::kClaims);
 }
 
 TEST_F(FileKindTest, ABrokenFileIsAnsweredWithItsFault) {
-  const std::string message = MessageOf("{\"name\": \"m\",\n \"scenes\": [1,]}");
+  const std::string message = MessageOf("{\"name\": \"m\",\n \"problems\": [1,]}");
   EXPECT_NE(message.find("file.json:2:"), std::string::npos) << message;
   EXPECT_NE(message.find("remove the comma"), std::string::npos) << message;
   ExpectEnding(Call("check file.json"), 2, {"remove the comma"});
@@ -85,11 +85,11 @@ TEST_F(FileKindTest, ABrokenFileIsAnsweredWithItsFault) {
 }
 
 TEST_F(FileKindTest, AnAmbiguousFileIsAnsweredWithWhatWasFound) {
-  EXPECT_EQ(MessageOf(R"({"name": "x", "bodies": [], "scenes": []})"),
+  EXPECT_EQ(MessageOf(R"({"name": "x", "bodies": [], "problems": []})"),
             (folder_ / "file.json").string() +
                 ":1: (top level): found keys of a mechanism (\"name\", \"bodies\") and an "
-                "experiment (\"name\", \"scenes\"), expected those of one kind: a mechanism "
-                "(\"bodies\", \"joints\") or an experiment (\"scenes\", \"columns\")");
+                "experiment (\"name\", \"problems\"), expected those of one kind: a mechanism "
+                "(\"bodies\", \"joints\") or an experiment (\"problems\", \"methods\")");
   for (const char* text :
        {"{}", "{\"benchmarks\": []}", "{\"name\": \"x\"}", "{\"title\": \"x\"}"}) {
     EXPECT_NE(MessageOf(text).find("found no key that tells the kind of a file"), std::string::npos)
@@ -103,10 +103,10 @@ TEST_F(FileKindTest, AFileOfAnotherKindIsNamed) {
   ExpectEnding(Call("list claims.json"), 2,
                {"found claims (it has \"claims\"), expected an experiment"});
   ExpectEnding(Call("run tiny.json --no-timing --out out"), 0, {"results in out"});
-  ExpectEnding(Call("verdict out --claims tiny.json"), 2,
-               {"found an experiment (it has \"scenes\"), expected claims"});
-  ExpectEnding(Call("map out --rules claims.json"), 2,
-               {"found claims (it has \"claims\"), expected a failure map"});
+  ExpectEnding(Call("check-claims out --claims tiny.json"), 2,
+               {"found an experiment (it has \"problems\"), expected claims"});
+  ExpectEnding(Call("robustness out --rules claims.json"), 2,
+               {"found claims (it has \"claims\"), expected a robustness map"});
 }
 
 }  // namespace file_kind_test

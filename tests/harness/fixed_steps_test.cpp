@@ -24,8 +24,8 @@ namespace fixed_steps_test {
 /// The four-bar with `rest`, which begins with a comma.
 Experiment FourBar(const std::string& columns, const std::string& rest) {
   return ParseExperiment(
-      R"({"name": "e", "scenes": [{"mechanism": "four-bar.json", "horizon": [0.5, 1]}],
-                           "columns": [)" +
+      R"({"name": "e", "problems": [{"mechanism": "four-bar.json", "horizon": [0.5, 1]}],
+                           "methods": [)" +
           columns + "]" + rest + "}",
       kConfigs / "mechanisms/e.json");
 }
@@ -78,7 +78,7 @@ TEST(FixedSteps, ExclusionsKnowThem) {
 
 TEST(FixedSteps, APeerHasItsOwnIntegratorOnce) {
   const Experiment experiment =
-      FourBar(R"({"formulation": "peer/simbody", "enforcement": "position"})",
+      FourBar(R"({"formulation": "peer/simbody", "enforcement": "projection"})",
               R"(, "tolerances": 1e-6, "integrator": ["ode45", "verner"])");
   EXPECT_EQ(Expand(experiment).size(), 2u);  // its two horizons
   EXPECT_EQ(ExpandTiming(experiment).size(), 1u);
@@ -111,7 +111,7 @@ TEST(FixedSteps, ShorterOnesAreMoreAccurate) {
 
 TEST(TimingOfCases, EveryAccuracyRowHasATimingRowOfItsKeys) {
   const Experiment experiment = FourBar(
-      R"({"formulation": ["odca", "lagrange"], "enforcement": ["acceleration", "position"]})",
+      R"({"formulation": ["odca", "lagrange"], "enforcement": ["acceleration", "projection"]})",
       R"(, "tolerances": [1e-4, 1e-6], "fixed_steps": 0.1, "integrator": ["ode45", "verner"],
               "ensembles": [{"size": 4, "seed": 1, "perturb": 0.1}], "exclude": [{"integrator": "verner", "step": 0.1}],
               "timing": {"repeats": 2, "cases": true})");
@@ -162,7 +162,7 @@ Record FixedRun(const std::string& level, double drift) {
   record.Set("rtol", Value());
   record.Set("step", 0.01);
   record.Set("horizon", 20.0);
-  record.Set("scene_id", std::string("scene"));
+  record.Set("problem_id", std::string("problem"));
   record.Set("link_length", 2.0);
   record.Set("position_goal", 4e-15);
   record.Set("outcome", std::string("finished"));
@@ -178,13 +178,13 @@ TEST(FixedSteps, PromiseNothingButTheProjection) {
   EXPECT_EQ(OwnDoubts(FixedRun("acceleration", 0.19)), "");
   EXPECT_EQ(OwnDoubts(FixedRun("acceleration", 0.21)), "drift");  // a tenth of a link
   EXPECT_EQ(OwnDoubts(FixedRun("acceleration", NAN)), "drift");
-  EXPECT_EQ(OwnDoubts(FixedRun("position", 9e-14)), "");  // 25 goals are 1e-13
-  EXPECT_EQ(OwnDoubts(FixedRun("position", 2e-13)), "drift");
+  EXPECT_EQ(OwnDoubts(FixedRun("projection", 9e-14)), "");  // 25 goals are 1e-13
+  EXPECT_EQ(OwnDoubts(FixedRun("projection", 2e-13)), "drift");
 }
 
 /// A tolerance says which differences are small; a step does not.
 TEST(FixedSteps, NeitherJudgeNorAreJudgedByTheEndsOfOthers) {
-  std::vector<Record> records = {FixedRun("acceleration", 0.1), FixedRun("position", 0.0)};
+  std::vector<Record> records = {FixedRun("acceleration", 0.1), FixedRun("projection", 0.0)};
   for (const double drift : {0.0, 0.01}) {
     records.push_back(FixedRun("acceleration", drift));
     records.back().Set("rtol", 1e-9);
@@ -205,15 +205,15 @@ TEST(Integrators, ThoseThatAllEndAlikeDecide) {
     record.Set("integrator", integrator);
     return record;
   };
-  std::vector<Record> records = {run("a", "acceleration", 0.0), run("a", "position", 0.0),
-                                 run("b", "acceleration", 0.1), run("b", "position", 0.2)};
+  std::vector<Record> records = {run("a", "acceleration", 0.0), run("a", "projection", 0.0),
+                                 run("b", "acceleration", 0.1), run("b", "projection", 0.2)};
   const auto doubted = [&] {
     std::string text;
     for (const Agreement& one : CompareFinalPoses(records)) text += one.doubted ? "x" : "-";
     return text;
   };
   EXPECT_EQ(doubted(), "--xx");
-  records[3] = run("b", "position", 0.1);
+  records[3] = run("b", "projection", 0.1);
   EXPECT_EQ(doubted(), "xxxx") << "two integrators decide differently: numbers do not tell";
   records[1] = run("a", "acceleration", 0.0);
   EXPECT_EQ(doubted(), "xx--") << "equations of one kind decide nothing";
@@ -223,13 +223,13 @@ class FixedStepsProgram : public CommandLineTest {};
 
 TEST_F(FixedStepsProgram, StandInEveryTableAndNowhereElse) {
   Write("steps.json", R"({"name": "steps", "tolerances": [1e-6], "fixed_steps": [0.05],
-    "integrator": ["ode45", "verner"], "scenes": [{"mechanism": "four-bar.json", "horizon": 0.5}],
-    "columns": [{"formulation": "odca", "enforcement": "acceleration"}],
+    "integrator": ["ode45", "verner"], "problems": [{"mechanism": "four-bar.json", "horizon": 0.5}],
+    "methods": [{"formulation": "odca", "enforcement": "acceleration"}],
     "timing": {"repeats": 1, "cases": true}})");
   ExpectEnding(Call("list steps.json"), 0, {"integrator", "step [s]", "4 cases and 4 timings"});
   ExpectEnding(Call("explain steps.json"), 0,
                {"ode45, verner", "steps of fixed length", "as it is"});
-  ExpectEnding(Call("plan steps.json"), 0, {"1 tolerances, 1 fixed steps, 2 integrators"});
+  ExpectEnding(Call("estimate steps.json"), 0, {"1 tolerances, 1 fixed steps, 2 integrators"});
   ExpectEnding(Call("run steps.json --out out"), 0, {"8 run now", "step [s]", "verner"});
   ExpectEnding(
       Call("table out --where step=0.05 --columns integrator,rtol,step,steps --format csv"), 0,
@@ -250,9 +250,9 @@ TEST_F(FixedStepsProgram, StandInEveryTableAndNowhereElse) {
 
 TEST_F(FixedStepsProgram, PlansWithoutAnyTolerance) {
   Write("steps.json", R"({"name": "steps", "fixed_steps": [0.05, 0.1],
-    "scenes": [{"mechanism": "four-bar.json", "horizon": 0.5}],
-    "columns": [{"formulation": "odca", "enforcement": "acceleration"}]})");
-  ExpectEnding(Call("plan steps.json"), 0, {"0 tolerances, 2 fixed steps", "2 cases"});
+    "problems": [{"mechanism": "four-bar.json", "horizon": 0.5}],
+    "methods": [{"formulation": "odca", "enforcement": "acceleration"}]})");
+  ExpectEnding(Call("estimate steps.json"), 0, {"0 tolerances, 2 fixed steps", "2 cases"});
 }
 
 }  // namespace fixed_steps_test

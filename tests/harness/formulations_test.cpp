@@ -25,8 +25,8 @@ FormulationRow Echo() { return Row<lagrange::Lagrange>("echo", "multipliers once
 
 Experiment Asking(const std::string& level, const std::string& more = "") {
   return ParseExperiment(R"({"name": "own", "tolerances": 1e-6,
-      "scenes": [{"mechanism": "../mechanisms/four-bar.json", "horizon": 0.2}],
-      "columns": [{"formulation": ["lagrange", "echo"], "enforcement": ")" +
+      "problems": [{"mechanism": "../mechanisms/four-bar.json", "horizon": 0.2}],
+      "methods": [{"formulation": ["lagrange", "echo"], "enforcement": ")" +
                              level + "\"}]" + more + "}",
                          kConfigs / "experiments/own.json");
 }
@@ -128,9 +128,9 @@ TEST(FormulationsTest, ALevelThatItDoesNotHaveIsAMistakeOfTheFile) {
     FormulationRow row = Echo();
     row.levels = {Enforcement::kAcceleration, Enforcement::kPosition};
     RegisterFormulation(row);
-    EXPECT_EQ(MistakeOf("position"), "none");
+    EXPECT_EQ(MistakeOf("projection"), "none");
     const std::string mistake = MistakeOf("velocity");
-    for (const char* part : {"/columns/0", "\"echo\" at level \"velocity\"",
+    for (const char* part : {"/methods/0", "\"echo\" at level \"velocity\"",
                              "a level that it has: acceleration, position"}) {
       EXPECT_NE(mistake.find(part), std::string::npos) << mistake;
     }

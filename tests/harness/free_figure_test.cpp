@@ -106,9 +106,9 @@ TEST(FreeFigure, FailedRunsAreCrossesWithOrWithoutAValue) {
 
 TEST(FreeFigure, DoubtedRunsAreHollowAndCounted) {
   std::vector<Record> runs = Runs();
-  runs[1].Set("doubts", std::string("energy"));
+  runs[1].Set("warnings", std::string("energy"));
   for (Record& run : runs) {
-    if (run.Find("doubts") == nullptr) run.Set("doubts", std::string());
+    if (run.Find("warnings") == nullptr) run.Set("warnings", std::string());
   }
   const FreeFigureResult values = MakeFreeFigure(runs, DriftOverTolerance());
   EXPECT_TRUE(values.figure.curves[0].hollow.empty());  // lagrange
@@ -116,7 +116,7 @@ TEST(FreeFigure, DoubtedRunsAreHollowAndCounted) {
             (std::vector<std::pair<double, double>>{{1e-10, 1e-8}}));
   EXPECT_NE(GnuplotScript(values.figure).commands.find("$c1h with points pt"), std::string::npos);
   ASSERT_EQ(values.remarks.size(), 1u);
-  EXPECT_EQ(values.remarks[0].find("1 of 5 runs finished with doubts"), 0u) << values.remarks[0];
+  EXPECT_EQ(values.remarks[0].find("1 of 5 runs finished with warnings"), 0u) << values.remarks[0];
   const FreeFigureResult series = MakeFreeFigure(
       runs, {.x = "series.drift_t", .y = "series.drift", .group = "rtol", .log = ""});
   EXPECT_EQ(std::ranges::count_if(series.figure.curves,
@@ -146,8 +146,8 @@ TEST(FreeFigure, CurvesThatCoincideAreOneBlackCurveWithBothNames) {
   EXPECT_EQ(MergedCurves(joined, FigureSize::kTwoColumn)[0].style.color, "#000000");
   EXPECT_NE(GnuplotScript(joined).commands.find("\"lagrange = odca\""), std::string::npos);
   // doubtful runs keep their hollow marks, failed ones their crosses, in the colour of each
-  runs[0].Set("doubts", std::string("energy"));
-  runs[4].Set("doubts", std::string("energy"));
+  runs[0].Set("warnings", std::string("energy"));
+  runs[4].Set("warnings", std::string("energy"));
   for (const std::size_t failed : {2u, 5u}) {
     runs[failed].Set("outcome", std::string("singular"));
     runs[failed].Set("drift_position_max", Value());

@@ -224,7 +224,7 @@ TEST_F(HistoryBranchTest, TornLinesAreSaidByTheNameOfTheBranch) {
      "git worktree add --quiet --detach beside h && cd beside && printf '{\"kind\":\"com' >> "
      "history.jsonl && truncate -s -5 results/*.jsonl && git commit --quiet -a -m torn && "
      "git branch -f h HEAD");
-  for (const char* command : {"history show", "compare first --subset", "history report"}) {
+  for (const char* command : {"history show", "compare first --allow-missing", "history report"}) {
     const Ending ending = Shell("$lb " + std::string(command) + " --branch h");
     EXPECT_NE(ending.text.find("warning: h:history.jsonl:2"), std::string::npos) << ending.text;
     EXPECT_NE(ending.text.find("warning: h:results/a-"), std::string::npos) << ending.text;

@@ -28,7 +28,7 @@ inline Record Measured(const std::string& mechanism, double drift, std::int64_t 
   record.Set("drift_position_max", drift);
   if (!times.empty()) record.Set("series.wall_s", times);
   record.Set("series.t", std::vector<double>{0.0, 1.0});
-  record.Set("doubts", std::string());
+  record.Set("warnings", std::string());
   Stamp(record);
   return record;
 }

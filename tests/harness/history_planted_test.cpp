@@ -98,7 +98,7 @@ class PlantedHistory : public HistoryOf {
                                    {time, 1.1 * time, 1.5 * time}));
         records.back().Set("instructions", std::round(1e6 * size * at("instructions")));
         if (machine.yardsticks.empty()) continue;
-        records.back().Set("yardstick_wall_ns", machine.yardsticks[k][commit]);
+        records.back().Set("calibration_wall_ns", machine.yardsticks[k][commit]);
       }
       Add(static_cast<int>(commit), records);
     }

@@ -146,14 +146,14 @@ TEST_F(HistoryOf, OtherEndingsAreSteps) {
   Add(2, records);
   records[1].Set("outcome", std::string("singular"));
   Add(3, records);
-  records[0].Set("doubts", std::string("energy"));
+  records[0].Set("warnings", std::string("energy"));
   Add(4, records);
   const HistoryFindings found = FindingsOf(ReadHistory(folder_));
   ASSERT_EQ(found.endings.size(), 2u);
   EXPECT_EQ(found.endings[0].entry, 2u);
   EXPECT_EQ(found.endings[0].after, "singular");
   EXPECT_EQ(found.endings[1].entry, 3u);
-  EXPECT_EQ(found.endings[1].measure, "doubts");
+  EXPECT_EQ(found.endings[1].measure, "warnings");
 }
 
 TEST_F(HistoryOf, OneStepOfACountIsASingleOne) {

@@ -247,8 +247,8 @@ TEST_F(Sidecar, JointsForcesAndStartAreThoseOfMechanismFiles) {
     "gravity": [0, -1, 0],
     "joints": [{"name": "r", "type": "rod", "length": 3, "from": {"body": "b"}, "to": {"body": "ground"}}],
     "forces": [{"type": "joint_torque", "joint": "j", "value": 2}],
-    "initial": {"coordinates": {"j": 0.5}, "speeds": {"k": 1}, "held": ["j"]},
-    "observe": {"length": 2}})");
+    "initial": {"coordinates": {"j": 0.5}, "speeds": {"k": 1}, "fixed": ["j"]},
+    "known_solution": {"length": 2}})");
   EXPECT_EQ(imported.description.gravity.y(), -1.0);
   EXPECT_EQ(JointNamed(imported, "r").parameter, 3.0);
   EXPECT_EQ(ForcesOf<JointTorque>(imported).size(), 1u);
@@ -270,7 +270,7 @@ TEST_F(Sidecar, MistakesHaveTheirPlace) {
          "/loops/0/type");
   expect(R"({"loops": [{"name": "l", "type": "revolute", "from": "b", "to": "b", "at": [0,0,0]}]})",
          "/loops/0/to");
-  expect(R"({"initial": {"held": ["j"]}})", "/initial/held/0");
+  expect(R"({"initial": {"fixed": ["j"]}})", "/initial/fixed/0");
   expect("{", "file");
 }
 

@@ -49,9 +49,9 @@ LevelRow Feedback(bool has_derivative = true) {
 /// The four-bar at these levels, as JSON.
 std::string Text(const std::string& levels, const std::string& more = "") {
   return R"({"name": "own", "tolerances": 1e-6, "timing": {"repeats": 0},
-      "scenes": [{"mechanism": ")" +
+      "problems": [{"mechanism": ")" +
          (kConfigs / "mechanisms/four-bar.json").string() + R"(", "horizon": 1}],
-      "columns": [{"formulation": "lagrange", "enforcement": [)" +
+      "methods": [{"formulation": "lagrange", "enforcement": [)" +
          levels + "]}]" + more + "}";
 }
 Experiment Asking(const std::string& levels, const std::string& more = "") {
@@ -76,7 +76,7 @@ std::vector<Record> RecordsOf(const Experiment& experiment) {
 }
 
 TEST(LevelsTest, ThoseBuiltInAreKnownInTheirOrder) {
-  EXPECT_EQ(LevelNames(), (Names{"acceleration", "velocity", "position", "baumgarte"}));
+  EXPECT_EQ(LevelNames(), (Names{"acceleration", "velocity", "projection", "baumgarte"}));
   for (const LevelTraits& level : Levels()) {
     const auto found = FindLevel(level.name);
     ASSERT_TRUE(found);
@@ -131,7 +131,7 @@ TEST(LevelsTest, ANewNameIsValidWhereverTheOthersAre) {
     EXPECT_NEAR(ratio("drift_velocity_max"), 0.5, 0.05);
     EXPECT_NEAR(ratio("drift_position_max"), 0.5, 0.2);
     EXPECT_GT(own.Number("drift_velocity_max"), 100 * velocity.Number("drift_velocity_max"));
-    EXPECT_EQ(own.Text("doubts"), "");
+    EXPECT_EQ(own.Text("warnings"), "");
     EXPECT_EQ(GrowthAt(own), DriftGrowth::kSquare);
 
     const Figure figure = DriftFigure(records);
@@ -158,10 +158,10 @@ TEST(LevelsTest, TheProgramKnowsItInAllCommands) {
     ExpectPart(Printed({"table", out, "--where", "enforcement=half-velocity", "--format", "csv"}),
                "lagrange,half-velocity,joint");
     WriteFileAtomically(folder / "map.json", R"({"title": "Own",
-      "columns": [{"label": "half", "select": {"enforcement": "half-velocity"}}],
+      "methods": [{"label": "half", "select": {"enforcement": "half-velocity"}}],
       "groups": [{"label": "all", "rows": [{"label": "four-bar", "select": {"mechanism": "four-bar"},
-        "decides": [{"measure": "drift_position_max", "limit": 1}]}]}]})");
-    ExpectPart(Printed({"map", out, "--rules", folder / "map.json"}), "holds");
+        "criteria": [{"measure": "drift_position_max", "limit": 1}]}]}]})");
+    ExpectPart(Printed({"robustness", out, "--rules", folder / "map.json"}), "holds");
     std::filesystem::remove_all(folder);
   });
 }

@@ -25,8 +25,8 @@ double PeakMemory() {
 /// tiny.json on a family member.
 std::string OnFamily(const std::string& family, const std::string& limits,
                      const std::string& solver) {
-  return R"({"name": "large", "scenes": [{"mechanism": )" + family + R"(, "horizon": 0.5}],
-    "columns": [{"formulation": "lagrange", "enforcement": "acceleration", "solver": ")" +
+  return R"({"name": "large", "problems": [{"mechanism": )" + family + R"(, "horizon": 0.5}],
+    "methods": [{"formulation": "lagrange", "enforcement": "acceleration", "solver": ")" +
          solver + R"("}], "tolerances": 1e-6, "limits": )" + limits +
          R"(, "timing": {"repeats": 0}})";
 }
@@ -57,7 +57,7 @@ std::string LadderFile(int windows, double angle) {
   }
   return R"({"name": "long", "gravity": [0, -9.81], "bodies": [)" + bodies + "], \"joints\": [" +
          joints + R"(], "initial": {"coordinates": {)" + start +
-         R"(}, "held": ["O0"], "speeds": {"O0": 1.0}}})";
+         R"(}, "fixed": ["O0"], "speeds": {"O0": 1.0}}})";
 }
 
 TEST(Memory, ThatCannotBeHadIsRefusedByName) {
@@ -127,7 +127,7 @@ TEST_F(CommandLineTest, FormulationsTooDenseForTheirLimitsSaySo) {
   const Words why = {"multipliers are dense", "matrices of 4000 constraints and 4001 speeds",
                      "asks for 1.28 GB", "more than 200 MiB"};
   Write("large.json", OnFamily(R"({"family": "ladder", "windows": 2000})",
-                               R"({"cpu_s": 10, "memory_mb": 200})", "as-published"));
+                               R"({"cpu_s": 10, "memory_mb": 200})", "plain"));
   ExpectEnding(Call("run large.json --out out"), 0, {"1 run now (1 not finished)"});
   const std::vector<Record> records = ReadRecords(folder_ / "out");
   ASSERT_EQ(records.size(), 1u);
@@ -136,10 +136,10 @@ TEST_F(CommandLineTest, FormulationsTooDenseForTheirLimitsSaySo) {
     EXPECT_NE(records[0].Text("message").find(word), std::string::npos)
         << records[0].Text("message");
   }
-  ExpectEnding(Call("plan large.json"), 0,
+  ExpectEnding(Call("estimate large.json"), 0,
                With(With(why,
                          "A pilot was cut off: ladder-2000 "
-                         "lagrange/acceleration/joint/as-published: memory-limit"),
+                         "lagrange/acceleration/joint/plain: memory-limit"),
                     "1 cases, 1 runs"));
   ExpectEnding(Call("check large.json"), 0, {"1 cases"});
 }
@@ -161,24 +161,24 @@ TEST_F(CommandLineTest, StartsTooDenseForTheirLimitsSaySo) {
                      "the consistent start is dense", "4000 constraints by 4001 speeds",
                      "asks for 0.384 GB", "more than 128 MiB"};
   Write("long.json", LadderFile(2000, 0.0));
-  Write("large.json", R"({"name": "large", "scenes": [{"mechanism": "long.json", "horizon": 0.5}],
-    "columns": [{"formulation": "odca", "enforcement": "acceleration"}], "tolerances": 1e-6,
+  Write("large.json", R"({"name": "large", "problems": [{"mechanism": "long.json", "horizon": 0.5}],
+    "methods": [{"formulation": "odca", "enforcement": "acceleration"}], "tolerances": 1e-6,
     "limits": {"cpu_s": 10, "memory_mb": 128}, "timing": {"repeats": 0}})");
   ExpectEnding(Call("check large.json"), 2,
-               With(why, "scene \"long\": its start was not assembled (memory-limit)"));
+               With(why, "problem \"long\": its start was not assembled (memory-limit)"));
   ExpectEnding(Call("check large.json --no-assembly"), 0, {"1 cases"});
-  ExpectEnding(Call("explain long.json --memory 128"), 2,
+  ExpectEnding(Call("explain long.json --memory-limit 128"), 2,
                With(why, "long.json: cut off (memory-limit)"));
-  ExpectEnding(Call("check long.json --memory 128"), 2, why);
+  ExpectEnding(Call("check long.json --memory-limit 128"), 2, why);
   Write("long.json", LadderFile(2000, 1.0));
-  ExpectEnding(Call("check long.json --memory 128"), 0, {"4001 bodies"});
+  ExpectEnding(Call("check long.json --memory-limit 128"), 0, {"4001 bodies"});
 }
 
 TEST_F(CommandLineTest, PilotsAreCutOffByTheLimitOfTheirCase) {
   // a step of so many bodies takes longer than all of the limit
   Write("large.json", OnFamily(R"({"family": "chain", "bars": 100000})",
                                R"({"cpu_s": 0.01, "memory_mb": 6000})", "rank-revealing"));
-  ExpectEnding(Call("plan large.json"), 0,
+  ExpectEnding(Call("estimate large.json"), 0,
                {"A pilot was cut off: chain-100000", "process-time-limit", "of CPU time",
                 "1 cases, 1 runs"});
 }
@@ -189,17 +189,17 @@ TEST_F(CommandLineTest, CheckAssemblesStarts) {
                {"four-bar.json: found a start that cannot be assembled", "does not close",
                 "expected one from which every loop closes", "--no-assembly"});
   ExpectEnding(Call("check tiny.json four-bar.json"), 2,
-               {"tiny.json: scene \"four-bar\": found a start"});
+               {"tiny.json: problem \"four-bar\": found a start"});
   ExpectEnding(Call("check tiny.json four-bar.json --no-assembly"), 0, {"2 cases", "3 bodies"});
 }
 
 TEST_F(CommandLineTest, CheckNamesTheCombinationWhoseStartDoesNotClose) {
   std::string text = kTinyExperiment;
   text.insert(text.find("\"timing\""), R"("sweep": [{"name": "apart", "values": [1.4, 1.5, 5, 6],
-      "field": "/scenes/0/mechanism/ground/points/C/0"}], )");
+      "field": "/problems/0/mechanism/ground/points/C/0"}], )");
   Write("sweep.json", text);
   const Ending ending = Call("check sweep.json");
-  ExpectEnding(ending, 2, {"scene \"four-bar\": found a start", "(at apart = 5)"});
+  ExpectEnding(ending, 2, {"problem \"four-bar\": found a start", "(at apart = 5)"});
   EXPECT_EQ(ending.text.find("apart = 6"), std::string::npos) << "the first combination is enough";
 }
 

@@ -24,18 +24,18 @@ constexpr const char* kPendulum = R"({
   "bodies": [{"name": "bar", "mass": 1, "inertia": 0.1, "com": [0.5, 0], "points": {"A": [0, 0]}}],
   "joints": [{"name": "OA", "type": "revolute", "from": {"body": "ground", "at": "O"},
               "to": {"body": "bar", "at": "A"}}],
-  "initial": {"coordinates": {"OA": 0}, "held": ["OA"]}
+  "initial": {"coordinates": {"OA": 0}, "fixed": ["OA"]}
 })";
 
 /// 2 formulations, 45 x 45 = 2025 combinations; some are excluded.
 std::string LongSweepText(const std::string& masses = R"({"lin": [1, 2, 45]})") {
-  return R"({"name": "long", "scenes": [{"mechanism": "pendulum.json", "horizon": 0.001}],
-  "columns": [{"formulation": ["odca", "lagrange"], "enforcement": "acceleration"}],
+  return R"({"name": "long", "problems": [{"mechanism": "pendulum.json", "horizon": 0.001}],
+  "methods": [{"formulation": ["odca", "lagrange"], "enforcement": "acceleration"}],
   "timing": {"repeats": 0}, "tolerances": [1e-6], "series": {"points": 2},
   "sweep": [
-    {"name": "mass", "field": "/scenes/0/mechanism/bodies/0/mass", "values": )" +
+    {"name": "mass", "field": "/problems/0/mechanism/bodies/0/mass", "values": )" +
          masses + R"(},
-    {"name": "inertia", "field": "/scenes/0/mechanism/bodies/0/inertia",
+    {"name": "inertia", "field": "/problems/0/mechanism/bodies/0/inertia",
      "values": {"lin": [0.1, 1, 45]}}],
   "exclude": [{"mass": 1, "formulation": "lagrange"}, {"inertia": 1}]})";
 }
@@ -61,7 +61,7 @@ class LongSweeps : public CommandLineTest {
 
 TEST_F(LongSweeps, AreCountedWithoutBeingRead) {
   const std::string cases = std::to_string(kAll) + " cases";
-  ExpectEnding(Call("plan long.json"), 0,
+  ExpectEnding(Call("estimate long.json"), 0,
                {"axis mass: 45 values", "2025 combinations", cases, "combinations stand for all"});
   ExpectEnding(Call("check long.json"), 0, {cases, "each value of each axis was read"});
   ExpectEnding(Call("explain long.json"), 0, {"2025 combinations", "(45 values, some shown)"});
@@ -70,10 +70,10 @@ TEST_F(LongSweeps, AreCountedWithoutBeingRead) {
   std::size_t count = 0;
   for (std::size_t at = 0; (at = listed.find("\"kind\":", at)) != std::string::npos; ++at) ++count;
   EXPECT_EQ(count, kAll);
-  ExpectEnding(Call("plan long.json --filter 'mass<1.5' --filter formulation=odca"), 0,
+  ExpectEnding(Call("estimate long.json --filter 'mass<1.5' --filter formulation=odca"), 0,
                {std::to_string(22 * 44) + " cases"});
-  ExpectEnding(Call("plan long.json --filter mass=7"), 2, {"no case matches mass=7"});
-  ExpectEnding(Call("plan long.json --filter mas=1"), 2, {"no such key"});
+  ExpectEnding(Call("estimate long.json --filter mass=7"), 2, {"no case matches mass=7"});
+  ExpectEnding(Call("estimate long.json --filter mas=1"), 2, {"no such key"});
 }
 
 TEST_F(LongSweeps, RunInGroupsGoOnAndAreSharded) {
@@ -136,9 +136,10 @@ TEST_F(LongSweeps, AValueThatCannotBeIsRefusedBeforeAnythingRuns) {
   ExpectEnding(Call("run long.json --out none"), 2,
                {"found -45, expected a number > 0", "combination 1981 of 2025"});
   EXPECT_FALSE(fs::exists(folder_ / "none"));
-  ExpectEnding(Call("run long.json --out none --gate doubts"), 2, {"found -45"});
+  ExpectEnding(Call("run long.json --out none --fail-on warnings"), 2, {"found -45"});
   Write("long.json", LongSweepText());
-  ExpectEnding(Call("run long.json --out none --gate doubts"), 2, {"--gate doubts", "a sweep of"});
+  ExpectEnding(Call("run long.json --out none --fail-on warnings"), 2,
+               {"--fail-on warnings", "a sweep of"});
 }
 
 /// Rows of a CSV or JSON table, without where they came from.
@@ -199,7 +200,7 @@ TEST_F(LongSweeps, LateParametersHaveColumns) {
     if (key != "checksum") last.Set(key, value);
   }
   last.Set("case_id", std::string("0123456789abcdef"));
-  last.Set("scene_id", std::string("fedcba9876543210"));
+  last.Set("problem_id", std::string("fedcba9876543210"));
   std::ofstream(folder_ / "late/results.jsonl", std::ios::app) << ToJsonLine(last) << "\n";
   const SceneReader reader(folder_ / "late", {});
   EXPECT_EQ(reader.samples().size(), 2u);

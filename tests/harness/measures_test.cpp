@@ -37,14 +37,14 @@ TEST(Measures, AKeyHasItsOwnRowElseThatOfTheLongestBeginning) {
   EXPECT_EQ(FindMeasure("drift.loop.OC")->key, "drift.loop.*");
   EXPECT_EQ(FindMeasure("series.opening.angle.OA")->key, "series.opening.angle.*");
   EXPECT_EQ(FindMeasure("stiffness"), nullptr);
-  EXPECT_EQ(TypeOf("error_ruled_by"), ValueType::kText);
+  EXPECT_EQ(TypeOf("error_dominated_by"), ValueType::kText);
   EXPECT_EQ(TypeOf("error_of_a_later_version"), ValueType::kNumber);
   EXPECT_EQ(TypeOf("stiffness"), ValueType::kAny);
 }
 
 TEST(Measures, NoParameterMayBeCalledAsTheyAre) {
   for (const char* name :
-       {"kind", "rtol", "seed", "wall_of_a_later_version", "machine", "doubts"}) {
+       {"kind", "rtol", "seed", "wall_of_a_later_version", "machine", "warnings"}) {
     EXPECT_TRUE(IsReserved(name)) << name;
   }
   for (const char* name : {"mass", "wall", "driftwood", "kind_of"}) {

@@ -123,12 +123,12 @@ TEST(TimeTogether, RecordsHoldOrderedStatisticsAndTheAaPair) {
     EXPECT_GE(record.Number("aa_spread_wall"), 0.0);
     EXPECT_EQ(record.Number("aa_spread"), records[0].Number("aa_spread"));
     EXPECT_GE(record.Number("load1"), 0.0);
-    for (const char* yardstick : {"yardstick_ns", "yardstick_wall_ns"}) {
+    for (const char* yardstick : {"calibration_ns", "calibration_wall_ns"}) {
       EXPECT_GT(record.Number(yardstick), 1e3);  // 16000 sums of numbers cannot be had in less
       EXPECT_EQ(record.Number(yardstick), records[0].Number(yardstick));
     }
     EXPECT_EQ(record.Number("repeats"), 3);
-    EXPECT_GE(record.Number("disturbed_rounds"), 0.0);
+    EXPECT_GE(record.Number("discarded_repetitions"), 0.0);
     const MachineState machine{.load1 = record.Number("load1"),
                                .processors = static_cast<int>(record.Number("processors")),
                                .governor = record.Text("governor")};

@@ -73,10 +73,10 @@ TEST(ObserversTest, ItsKeysStandInRecordsAndTables) {
     std::filesystem::create_directories(folder);
     const std::string file = folder / "own.json", out = folder / "out";
     WriteFileAtomically(file, R"({"name": "own", "tolerances": 1e-6, "timing": {"repeats": 0},
-      "scenes": [{"mechanism": ")" +
+      "problems": [{"mechanism": ")" +
                                   (kConfigs / "mechanisms/four-bar.json").string() +
                                   R"(", "horizon": 1}],
-      "columns": [{"formulation": "odca", "enforcement": "acceleration"}]})");
+      "methods": [{"formulation": "odca", "enforcement": "acceleration"}]})");
     ExpectPart(Printed({"explain", file}), "  haste: the largest speed of a joint.\n");
     Printed({"run", file, "--out", out});
     const std::string csv = ReadFile(std::filesystem::path(out) / "drift.csv");
@@ -94,7 +94,7 @@ TEST(ObserversTest, PartsAreMergedByTheRulesOfItsKeys) {
   InChild([] {
     RegisterObserver(Hasty());
     const Record whole = RunOf("four-islands", false), parts = RunOf("four-islands", true);
-    ASSERT_EQ(parts.Text("compiled"), "islands");
+    ASSERT_EQ(parts.Text("preprocessed"), "islands");
     EXPECT_NEAR(parts.Number("speed_max"), whole.Number("speed_max"), 1e-4);
     EXPECT_NEAR(parts.Number("speed_max_t"), whole.Number("speed_max_t"), 0.1);
     // the start too, of each part

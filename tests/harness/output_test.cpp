@@ -131,8 +131,8 @@ struct Writer {
 // Each option that names a file, of each command that has one.
 TEST_F(OutputFiles, OfEveryCommandGoesTheSameWay) {
   Write("moving.json", R"({"name": "moving", "tolerances": [1e-6],
-    "scenes": [{"mechanism": "four-bar.json", "horizon": 0.5}],
-    "columns": [{"formulation": ["odca", "lagrange"], "enforcement": "position"}],
+    "problems": [{"mechanism": "four-bar.json", "horizon": 0.5}],
+    "methods": [{"formulation": ["odca", "lagrange"], "enforcement": "projection"}],
     "output": {"step": 0.1}, "timing": {"repeats": 0}})");
   ExpectEnding(Call("run moving.json --out store"), 0, {});
   fs::copy(At("store"), At("copy"), fs::copy_options::recursive);
@@ -149,18 +149,18 @@ TEST_F(OutputFiles, OfEveryCommandGoesTheSameWay) {
       R"({"benchmarks": [{"name": "rhs/chain/3/odca/acceleration/joint/rank-revealing", "cpu_time": 1, "real_time": 1},
     {"name": "rhs/chain/30/odca/acceleration/joint/rank-revealing", "cpu_time": 10, "real_time": 10}]})");
   const std::string store = "store/results.jsonl";
-  for (const Writer& writer :
-       std::vector<Writer>{{"table store --format csv --out ", {store}},
-                           {"view four-bar.json --format html --out ", {"four-bar.json"}},
-                           {"view four-bar.json --format svg --out ", {"four-bar.json"}},
-                           {"export store --out ", {store}},
-                           {"fit b.json --out ", {"b.json"}},
-                           {"convert four-bar.json --to mjcf --out ", {"four-bar.json"}},
-                           {"compare store copy --markdown ", {store, "copy/results.jsonl"}},
-                           {"compare store copy --junit ", {store, "copy/results.jsonl"}},
-                           {"verdict store --claims claims.json --out ", {store, "claims.json"}},
-                           {"history report --store past --out ", {"past/history.jsonl"}},
-                           {"trajectory " + motions[0] + " --out ", {motions[0]}}}) {
+  for (const Writer& writer : std::vector<Writer>{
+           {"table store --format csv --out ", {store}},
+           {"view four-bar.json --format html --out ", {"four-bar.json"}},
+           {"view four-bar.json --format svg --out ", {"four-bar.json"}},
+           {"export-metrics store --out ", {store}},
+           {"fit-scaling b.json --out ", {"b.json"}},
+           {"export-mechanism four-bar.json --to mjcf --out ", {"four-bar.json"}},
+           {"compare store copy --markdown ", {store, "copy/results.jsonl"}},
+           {"compare store copy --junit ", {store, "copy/results.jsonl"}},
+           {"check-claims store --claims claims.json --out ", {store, "claims.json"}},
+           {"history report --store past --out ", {"past/history.jsonl"}},
+           {"trajectory " + motions[0] + " --out ", {motions[0]}}}) {
     SCOPED_TRACE(writer.command);
     Write("target", "old");
     fs::remove(At("there"));

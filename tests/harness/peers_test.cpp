@@ -16,9 +16,9 @@ constexpr const char* kMessage =
 
 std::string Asking(const std::string& more = "") {
   return R"({"name": "peers", "tolerances": 1e-6,
-      "scenes": [{"mechanism": "four-bar.json", "horizon": 0.2}],
-      "columns": [{"formulation": "odca", "enforcement": "acceleration"},
-                  {"formulation": "peer/simbody", "enforcement": "position"}]
+      "problems": [{"mechanism": "four-bar.json", "horizon": 0.2}],
+      "methods": [{"formulation": "odca", "enforcement": "acceleration"},
+                  {"formulation": "peer/simbody", "enforcement": "projection"}]
       )" +
          more + "}";
 }
@@ -42,16 +42,16 @@ TEST(PeersTest, AreColumnsWithAnIntegratorOfTheirOwn) {
   ASSERT_EQ(cases.size(), 2u);
   EXPECT_EQ(cases[0].keys.Text("integrator"), "trbdf2");
   EXPECT_EQ(cases[0].keys.Text("jacobian"), "forward");
-  EXPECT_EQ(ToString(cases[1].column), "peer/simbody/position/joint/rank-revealing");
+  EXPECT_EQ(ToString(cases[1].column), "peer/simbody/projection/joint/rank-revealing");
   EXPECT_EQ(cases[1].keys.Text("integrator"), "simbody-merson");
   EXPECT_EQ(cases[1].keys.Find("jacobian"), nullptr);
 }
 
 TEST(PeersTest, ThatABuildDoesNotHaveAreNamedWithTheirPlace) {
   Experiment experiment = Read(Asking());
-  ExpectPart(Refusal(experiment), "peers.json: /columns: " + std::string(kMessage));
+  ExpectPart(Refusal(experiment), "peers.json: /methods: " + std::string(kMessage));
   experiment.columns.resize(1);
-  ExpectPart(Refusal(experiment), "peers.json: /timing/columns: " + std::string(kMessage));
+  ExpectPart(Refusal(experiment), "peers.json: /timing/methods: " + std::string(kMessage));
   experiment.timing.columns.resize(1);
   EXPECT_EQ(Refusal(experiment), "none");
   experiment.timing.families = {{"chain", {3}, {{"peer/simbody", Enforcement::kPosition}}}};
@@ -85,9 +85,9 @@ TEST_F(CommandLineTest, PeersAreReadInEveryBuildAndRunWhereTheyAre) {
   ExpectEnding(Call("check peers.json"), 0, {"2 cases"});
   ExpectEnding(Call("list peers.json"), 0, {"peer/simbody"});
   ExpectEnding(Call("explain peers.json"), 0, {"peer/simbody: the library Simbody"});
-  ExpectEnding(Call("run peers.json --out out"), 2, {"peers.json: /columns: ", kMessage});
+  ExpectEnding(Call("run peers.json --out out"), 2, {"peers.json: /methods: ", kMessage});
   EXPECT_FALSE(fs::exists(folder_ / "out"));
-  ExpectEnding(Call("plan peers.json"), 2, {kMessage});
+  ExpectEnding(Call("estimate peers.json"), 2, {kMessage});
 }
 #endif
 

@@ -21,7 +21,7 @@ using namespace reference;
 const std::vector<std::string> kErrors = {
     "error_position_max", "error_position_end",     "error_position_rms", "error_rotation_max",
     "error_velocity_max", "error_displacement_max", "error_angle_max",    "error_angle_rate_max",
-    "error_energy_max",   "error_phase_max",        "error_shape_max"};
+    "error_energy_max",   "error_phase_max",        "error_path_max"};
 
 struct Held {
   Experiment experiment;
@@ -68,14 +68,14 @@ TEST(PublishedSeries, PrintedDigitsAreMetAndTellACoarseRunFromTheTruth) {
     for (const Coordinates coordinates : {Coordinates::kJoint, Coordinates::kAbsolute}) {
       const Record fine = held.Run(problem.fine, problem.horizon, problem.profile, coordinates);
       ASSERT_EQ(fine.Text("outcome"), "finished") << problem.series;
-      EXPECT_LE(fine.Number("error_over_accuracy"), 1.0) << problem.series;
+      EXPECT_LE(fine.Number("error_over_uncertainty"), 1.0) << problem.series;
       EXPECT_EQ(fine.Text("reference"), "published");
-      EXPECT_EQ(fine.Text("reference_witnesses").find(problem.series), 0u);
-      EXPECT_EQ(fine.Number("trust_horizon"), problem.horizon);
-      EXPECT_FALSE(HasDoubt(fine, kErrorDoubt)) << problem.series << fine.Text("doubts");
+      EXPECT_EQ(fine.Text("reference_runs").find(problem.series), 0u);
+      EXPECT_EQ(fine.Number("reference_valid_until"), problem.horizon);
+      EXPECT_FALSE(HasDoubt(fine, kErrorDoubt)) << problem.series << fine.Text("warnings");
     }
     const Record coarse = held.Run(problem.coarse, problem.horizon);
-    EXPECT_GT(coarse.Number("error_over_accuracy"), 1.0) << problem.series;
+    EXPECT_GT(coarse.Number("error_over_uncertainty"), 1.0) << problem.series;
   }
 }
 
@@ -95,7 +95,7 @@ TEST(PublishedSeries, IsUsedAsFarAsTheHorizonGoesAndChangesNoBit) {
   Held held = Against("simple-pendulum", "iftomm-a01");
   const Record part = held.Run(1e-8, 1.2);
   EXPECT_EQ(part.Number("error_points"), 2);
-  EXPECT_EQ(part.Number("trust_horizon"), 1.0);
+  EXPECT_EQ(part.Number("reference_valid_until"), 1.0);
   EXPECT_EQ(part.Find("error_position_end"), nullptr) << "the horizon is behind the last time";
   const Record none = held.Run(1e-8, 0.25);
   EXPECT_EQ(none.Text("reference"), "none: \"iftomm-a01\" begins at 0.5 s, behind the horizon");
@@ -118,7 +118,7 @@ TEST(PublishedSeries, PlantedErrorsAreMeasuredAndDoubted) {
   held.series().quantities[0].accuracy = 2e-3;
   const Record blunt = held.Run(1e-8, 10.0);
   EXPECT_FALSE(HasDoubt(blunt, kErrorDoubt)) << "it was claimed to no more";
-  EXPECT_LE(blunt.Number("error_over_accuracy"), 1.0);
+  EXPECT_LE(blunt.Number("error_over_uncertainty"), 1.0);
 
   Held turned = Against("andrews-squeezer", "andrews-squeezer");
   turned.series().quantities[4].values[0] += 1e-3;
@@ -132,7 +132,7 @@ TEST(PublishedSeries, PlantedErrorsAreMeasuredAndDoubted) {
 TEST(PublishedSeries, ClearsNoOtherDoubt) {
   // it ends at the horizon and the run meets it; a singular passage remains one all the same
   Record record = Against("simple-pendulum", "iftomm-a01").Run(1e-9, 10.0);
-  record.Set("singularity_passages", std::int64_t{1});
+  record.Set("singularity_crossings", std::int64_t{1});
   EXPECT_TRUE(OwnDoubts(record).find(kSingularDoubt) != std::string::npos);
   record.Set("reference", std::string("long-double"));
   EXPECT_EQ(OwnDoubts(record).find(kSingularDoubt), std::string::npos) << "a certified one does";
@@ -144,16 +144,16 @@ TEST(PublishedSeries, SpeedsAreThoseOfPointsAndJoints) {
   const fs::path file = fs::path(testing::TempDir()) / "loopbench-speeds.json";
   WriteFileAtomically(file, R"({"name": "speeds", "source": "the start", "times": [0],
     "quantities": [
-      {"body": "crank0", "point": "B", "axis": "x", "speed": true, "values": [1], "accuracy": 1e-12},
-      {"body": "crank0", "point": "B", "axis": "y", "speed": true, "values": [0], "accuracy": 1e-12},
-      {"body": "crank0", "axis": "angle", "speed": true, "values": [-1], "accuracy": 1e-12},
-      {"body": "crank0", "axis": "angle", "values": [1.5707963267948966], "accuracy": 1e-12},
-      {"joint": "O0", "speed": true, "values": [-1], "accuracy": 1e-12},
-      {"joint": "T1", "speed": true, "values": [0], "accuracy": 10}]})");
+      {"body": "crank0", "point": "B", "axis": "x", "speed": true, "values": [1], "uncertainty": 1e-12},
+      {"body": "crank0", "point": "B", "axis": "y", "speed": true, "values": [0], "uncertainty": 1e-12},
+      {"body": "crank0", "axis": "angle", "speed": true, "values": [-1], "uncertainty": 1e-12},
+      {"body": "crank0", "axis": "angle", "values": [1.5707963267948966], "uncertainty": 1e-12},
+      {"joint": "O0", "speed": true, "values": [-1], "uncertainty": 1e-12},
+      {"joint": "T1", "speed": true, "values": [0], "uncertainty": 10}]})");
   ExperimentScene& scene = held.experiment.scenes.front();
   scene.series = ReadPublishedSeries(file, &scene.mechanism.description);
   const Record record = held.Run(1e-8, 0.01);
-  EXPECT_LE(record.Number("error_over_accuracy"), 1.0);
+  EXPECT_LE(record.Number("error_over_uncertainty"), 1.0);
   for (const char* key : {"error_velocity_max", "error_angular_velocity_max"}) {
     EXPECT_LE(record.Number(key), 1e-12) << key;
   }
@@ -167,23 +167,24 @@ using PublishedSeriesCommands = CommandLineTest;
 TEST_F(PublishedSeriesCommands, AreRunAndShownWhateverTheirNames) {
   WriteFileAtomically(folder_ / "s.json",
                       R"({"name": "a \"b\" <c> & `d` $e /f\ng", "source": "=1+1, 100 %",
- "times": [0, 0.05, 7], "quantities": [{"joint": "OA", "values": [0, 0, 0], "accuracy": 1e3}]})");
+ "times": [0, 0.05, 7], "quantities": [{"joint": "OA", "values": [0, 0, 0], "uncertainty": 1e3}]})");
   std::string experiment = ReadFile(folder_ / "tiny.json");
-  experiment.insert(experiment.find('{') + 1, R"("reference": {"series": "s.json"},)");
+  experiment.insert(experiment.find('{') + 1, R"("reference": {"published_data": "s.json"},)");
   Write("held.json", experiment);
   ExpectEnding(Call("check s.json held.json"), 0, {"1 quantities at 3 times", "experiment"});
   ExpectEnding(Call("run held.json --no-timing --out out"), 0, {"results in out"});
   for (const std::string format : {"text", "csv", "markdown", "json", "latex"}) {
-    const Ending table = Call(
-        "table out --columns reference,reference_witnesses,error_angle_max --format " + format);
+    const Ending table =
+        Call("table out --columns reference,reference_runs,error_angle_max --format " + format);
     ExpectEnding(table, 0, {"published", "does not tell them from the truth"});
   }
   ExpectEnding(
-      Call("table out --kind all --where kind=reference --columns mechanism,trust_horizon"), 0, {});
+      Call("table out --kind all --where kind=reference --columns mechanism,reference_valid_until"),
+      0, {});
   // another accuracy is another case
   ExpectEnding(Call("run held.json --no-timing --out out"), 0, {"0 run now"});
   WriteFileAtomically(folder_ / "s.json", R"({"name": "s", "source": "x", "times": [0],
-    "quantities": [{"joint": "OA", "values": [0], "accuracy": 1e2}]})");
+    "quantities": [{"joint": "OA", "values": [0], "uncertainty": 1e2}]})");
   const Ending again = Call("run held.json --no-timing --out out");
   EXPECT_EQ(again.text.find("0 run now"), std::string::npos) << again.text;
 }

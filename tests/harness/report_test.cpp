@@ -34,7 +34,7 @@ std::vector<Record> SomeRecords() {
   }
   records[6].Set("outcome", std::string("singular"));
   records[6].Set("message", std::string("rank lost"));
-  records[8].Set("doubts", std::string("drift"));
+  records[8].Set("warnings", std::string("drift"));
   return records;
 }
 
@@ -154,7 +154,7 @@ TEST(Report, CountsAreThoseOfTheTables) {
   EXPECT_TRUE(data.findings[0].failed);
   EXPECT_NE(data.findings[0].text.find("rank lost"), std::string::npos);
   EXPECT_EQ(data.findings[0].filter, "outcome=singular");
-  EXPECT_EQ(data.findings[1].filter, "doubts~drift");
+  EXPECT_EQ(data.findings[1].filter, "warnings~drift");
   ASSERT_EQ(data.costs.size(), 1u);
   const Tradeoff judged = MakeTradeoff(records, {.error = "error_position_max"});
   ASSERT_EQ(data.costs[0].tradeoff.problems.size(), judged.problems.size());
@@ -173,7 +173,7 @@ TEST(Report, NamesSayWhatDiffers) {
   std::ranges::sort(names);
   EXPECT_EQ(std::ranges::adjacent_find(names), names.end());
   // equal names, other mechanisms: two scenes
-  records[0].Set("scene_id", std::string("another"));
+  records[0].Set("problem_id", std::string("another"));
   const ReportData two = MakeReport(records, {.store = "here"});
   EXPECT_EQ(two.scenes.size(), 2u);
 }
@@ -214,7 +214,7 @@ TEST(Report, HostileNamesAreText) {
     record.Set("experiment", std::string(kHostile));
     record.Set("machine", std::string(kHostile));
     if (record.Text("outcome") != "finished") record.Set("message", std::string(kHostile));
-    record.Set("scene_id", std::string("../../../../etc/passwd"));
+    record.Set("problem_id", std::string("../../../../etc/passwd"));
     record.Set("reference_file", std::string("../../x"));
     record.Set("trajectory", std::string("../../../etc/passwd"));
   }
@@ -258,9 +258,9 @@ TEST(Report, EmptyAndOtherStores) {
 
 TEST(Report, TheMapIsTheJudges) {
   const MapRules rules = ParseMapRules(
-      R"({"title": "T", "columns": [{"label": "O", "select": {"formulation": "odca"}},
+      R"({"title": "T", "methods": [{"label": "O", "select": {"formulation": "odca"}},
           {"label": "L", "select": {"formulation": "lagrange"}}],
-          "groups": [{"label": "g", "why": "because", "decides": [{"measure": "error_position_max", "limit": 1e-4}],
+          "groups": [{"label": "g", "rationale": "because", "criteria": [{"measure": "error_position_max", "limit": 1e-4}],
           "rows": [{"label": "r", "select": {"mechanism": "four-bar"}}]}]})",
       "rules");
   const std::vector<Record> records = SomeRecords();
@@ -278,8 +278,8 @@ class ReportCommand : public CommandLineTest {};
 // The page of a run: its motions come from what the run has kept, and a damaged file is named.
 TEST_F(ReportCommand, MotionsComeFromTheStore) {
   Write("moving.json", R"({"name": "moving", "tolerances": [1e-6],
-    "scenes": [{"mechanism": "four-bar.json", "horizon": 0.5}],
-    "columns": [{"formulation": ["odca", "lagrange"], "enforcement": "position"}],
+    "problems": [{"mechanism": "four-bar.json", "horizon": 0.5}],
+    "methods": [{"formulation": ["odca", "lagrange"], "enforcement": "projection"}],
     "output": {"step": 0.05, "quantities": ["bodies"]}, "timing": {"repeats": 0}})");
   ASSERT_EQ(Call("run moving.json --out out").code, 0);
   const Ending made = Call("report out");
@@ -304,8 +304,8 @@ TEST_F(ReportCommand, MotionsComeFromTheStore) {
 // A mechanism or a motion that was changed beside the store is not shown as the run's.
 TEST_F(ReportCommand, FilesBesideTheStoreAreVerified) {
   Write("moving.json", R"({"name": "moving", "tolerances": [1e-6],
-    "scenes": [{"mechanism": "four-bar.json", "horizon": 0.5}],
-    "columns": [{"formulation": "odca", "enforcement": "position"}],
+    "problems": [{"mechanism": "four-bar.json", "horizon": 0.5}],
+    "methods": [{"formulation": "odca", "enforcement": "projection"}],
     "output": {"step": 0.05, "quantities": ["bodies"]}, "timing": {"repeats": 0}})");
   ASSERT_EQ(Call("run moving.json --out out").code, 0);
   const auto only = [this](const char* kind) {
@@ -339,8 +339,8 @@ TEST_F(ReportCommand, FilesBesideTheStoreAreVerified) {
 // What is merged moves as its parts did.
 TEST_F(ReportCommand, MergedStoresKeepTheirMechanisms) {
   Write("moving.json", R"({"name": "moving", "tolerances": [1e-6],
-    "scenes": [{"mechanism": "four-bar.json", "horizon": 0.5}],
-    "columns": [{"formulation": ["odca", "lagrange"], "enforcement": "position"}],
+    "problems": [{"mechanism": "four-bar.json", "horizon": 0.5}],
+    "methods": [{"formulation": ["odca", "lagrange"], "enforcement": "projection"}],
     "output": {"number": 3, "quantities": ["bodies"]}, "timing": {"repeats": 0}})");
   ASSERT_EQ(Call("run moving.json --shard 1/2 --out one").code, 0);
   ASSERT_EQ(Call("run moving.json --shard 2/2 --out two").code, 0);

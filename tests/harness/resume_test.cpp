@@ -36,9 +36,9 @@ std::string Sweep(int tolerances) {
   for (int i = 0; i < tolerances; ++i) {
     list += (i > 0 ? ", " : "") + std::to_string(1000 + i) + "e-10";
   }
-  return R"({"name": "sweep", "scenes": [{"mechanism": "four-bar.json", "horizon": 0.05}],
-  "columns": [{"formulation": ["odca", "lagrange"], "enforcement": "acceleration",
-               "solver": ["as-published", "rank-revealing"]}],
+  return R"({"name": "sweep", "problems": [{"mechanism": "four-bar.json", "horizon": 0.05}],
+  "methods": [{"formulation": ["odca", "lagrange"], "enforcement": "acceleration",
+               "solver": ["plain", "rank-revealing"]}],
   "timing": {"repeats": 0}, "tolerances": [)" +
          list + "]}";
 }
@@ -160,7 +160,7 @@ TEST_F(Interruption, FaultsOfOneCaseAreItsOutcomeAndHarmNoOther) {
                                                        {"throw", "crashed"},
                                                        {"hang", "process-time-limit"},
                                                        {"memory", "memory-limit"},
-                                                       {"garbage", "bad-answer"}};
+                                                       {"garbage", "invalid-result"}};
   for (const auto& [fault, outcome] : outcomes) {
 #ifdef __SANITIZE_ADDRESS__
     if (fault == "memory") continue;  // no memory limits under sanitizers
@@ -205,8 +205,8 @@ TEST_F(Interruption, ByAFullDiskLeavesCompleteRecordsAndIsSaid) {
 // A disk that is full, or a file that may not grow, is no result of a method.
 TEST_F(Interruption, AFaultOfTheMachineIsTheOutcomeOfNoCase) {
   Write("long.json", R"({"name": "long", "tolerances": [1e-6],
-    "scenes": [{"mechanism": "four-bar.json", "horizon": 1}],
-    "columns": [{"formulation": ["odca", "lagrange"], "enforcement": "position"}],
+    "problems": [{"mechanism": "four-bar.json", "horizon": 1}],
+    "methods": [{"formulation": ["odca", "lagrange"], "enforcement": "projection"}],
     "series": {"points": 2}, "output": {"step": 0.001}, "timing": {"repeats": 0}})");
   for (const char* isolate : {"", " --isolate"}) {
     fs::remove_all(folder_ / "out");

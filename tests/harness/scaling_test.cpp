@@ -98,7 +98,7 @@ TEST(FitFamilies, TakesTheTimingsOfAStore) {
       timing.Set("kind", std::string("timing"));
       timing.Set("mechanism", "crooked-chain-" + std::to_string(static_cast<int>(n)));
       timing.Set("formulation", std::string(formulation));
-      timing.Set("enforcement", std::string("position"));
+      timing.Set("enforcement", std::string("projection"));
       timing.Set("outcome", std::string("finished"));
       timing.Set("bodies", n);
       timing.Set("series.rhs_ns",
@@ -112,9 +112,9 @@ TEST(FitFamilies, TakesTheTimingsOfAStore) {
   records.back().Set("kind", std::string("case"));
   const std::vector<Record> rows = FitFamilies(records, 0.0);
   ASSERT_EQ(rows.size(), 2u);
-  EXPECT_EQ(rows[0].Text("family"), "rhs/crooked-chain/N/odca/position");
+  EXPECT_EQ(rows[0].Text("family"), "rhs/crooked-chain/N/odca/projection");
   EXPECT_NEAR(rows[0].Number("exponent"), 1.0, 1e-13);
-  EXPECT_EQ(rows[1].Text("family"), "rhs/crooked-chain/N/peer/simbody/position");
+  EXPECT_EQ(rows[1].Text("family"), "rhs/crooked-chain/N/peer/simbody/projection");
   EXPECT_NEAR(rows[1].Number("exponent"), 2.0, 1e-13);
 }
 

@@ -104,10 +104,10 @@ TEST_F(StoreIntegrity, AMissingChecksumIsRefusedByEveryReader) {
     const std::string named =
         fmt::format("changed.jsonl:{}: found a line without its checksum, expected one", line);
     EXPECT_TRUE(Contains(Complaint(text), named)) << text;
-    for (const char* call :
-         {"table changed.jsonl", "compare store changed.jsonl", "merge changed.jsonl --out m",
-          "plot changed.jsonl --out f", "report changed.jsonl", "export changed.jsonl --out e.csv",
-          "history add changed.jsonl --store h --commit a --date 2026-01-01"}) {
+    for (const char* call : {"table changed.jsonl", "compare store changed.jsonl",
+                             "merge changed.jsonl --out m", "plot changed.jsonl --out f",
+                             "report changed.jsonl", "export-metrics changed.jsonl --out e.csv",
+                             "history add changed.jsonl --store h --commit a --date 2026-01-01"}) {
       ExpectEnding(Call(call), 2, {named});
     }
     ExpectEnding(Call("run tiny.json --out changed.jsonl"), 2, {"without its checksum", "nothing"});

@@ -30,7 +30,7 @@ const char* const kHostile[] = {
 /// Records with a value under every column.
 Table Filled(std::vector<TableColumn> columns, int rows) {
   Table table;
-  table.title = "Drift of 50% of_all - 3 of 9 rows are doubtful (marked ?, reasons below)";
+  table.title = "Drift of 50% of_all - 3 of 9 rows are flagged (marked ?, reasons below)";
   table.columns = std::move(columns);
   for (int i = 0; i < rows; ++i) {
     Record& row = table.rows.emplace_back();

@@ -25,7 +25,7 @@ Record Row(const std::string& mechanism, const std::string& formulation, double 
   record.Set("mechanism", mechanism);
   record.Set("formulation", formulation);
   record.Set("coordinates", std::string("joint"));
-  record.Set("solver", std::string("as-published"));
+  record.Set("solver", std::string("plain"));
   record.Set("rtol", rtol);
   record.Set("horizon", 10.0);
   record.Set("outcome", std::string("finished"));
@@ -214,7 +214,7 @@ std::string Keys(const std::vector<TableColumn>& columns) {
 TEST(Columns, DriftTableHasThePublishedOrder) {
   EXPECT_EQ(Keys(DriftColumns()),
             "experiment mechanism formulation enforcement coordinates solver integrator rtol atol "
-            "horizon outcome t_reached doubts agreement drift_position_max drift_rotation_max "
+            "horizon outcome t_reached warnings agreement drift_position_max drift_rotation_max "
             "drift_velocity_max "
             "drift_acceleration_max loop_closure_max correction_max worst_loop energy_error_max "
             "growth_exponent growth_spread growth_regime growth_resolved growth_hypothesis "
@@ -229,8 +229,8 @@ TEST(Columns, TimingTableStartsWithTheSameKeys) {
       "experiment mechanism formulation enforcement coordinates solver integrator rtol atol "
       "horizon outcome t_reached bodies joints loops dof rhs_ns_median rhs_ns_p10 rhs_ns_p90 "
       "ns_per_body step_us_median wall_s_median realtime_factor repeats rhs_ns_min wall_s_min "
-      "wall_s_p10 wall_s_p90 aa_spread aa_spread_wall yardstick_ns yardstick_wall_ns "
-      "disturbed_rounds load1 "
+      "wall_s_p10 wall_s_p90 aa_spread aa_spread_wall calibration_ns calibration_wall_ns "
+      "discarded_repetitions load1 "
       "processors governor noise ");
 }
 

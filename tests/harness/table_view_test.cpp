@@ -201,7 +201,7 @@ TEST(TableView, WhatChosenColumnsHideIsSaidInEveryFormat) {
 
 TEST(TableView, DoubtfulRowsHaveTheMarkOfTheCaptionAndTheirReasonsInTheDocument) {
   Record doubtful = SingleRun();
-  doubtful.Set("doubts", std::string("energy"));
+  doubtful.Set("warnings", std::string("energy"));
   doubtful.Set("energy_error_relative", 0.03);
   const std::vector<Record> records = {Ensemble(), doubtful};
   const TableView bare{.compact = true, .columns = {"formulation", "growth_exponent"}};
@@ -213,12 +213,12 @@ TEST(TableView, DoubtfulRowsHaveTheMarkOfTheCaptionAndTheirReasonsInTheDocument)
   ASSERT_NE(reason, std::string::npos) << text;
   EXPECT_NE(text[text.rfind('\n', reason) + 1], '%');
   const auto title = [&](const TableView& view) { return MakeTable(records, view).title; };
-  const std::string start = "Drift - 1 of 2 rows are doubtful (marked ";
+  const std::string start = "Drift - 1 of 2 rows are flagged (marked ";
   EXPECT_EQ(title(bare), start + "*, reasons below)");
   EXPECT_EQ(title({.compact = true, .columns = {"outcome", "growth_exponent"}}),
             start + "? in outcome, reasons below)");
-  EXPECT_EQ(title({.columns = {"mechanism"}}), start + "*, column doubts has the reasons)");
-  EXPECT_EQ(title({}), start + "? in outcome, reasons in column doubts)");
+  EXPECT_EQ(title({.columns = {"mechanism"}}), start + "*, column warnings has the reasons)");
+  EXPECT_EQ(title({}), start + "? in outcome, reasons in column warnings)");
 }
 
 TEST(TableView, ShortTablesTellRowsApart) {

@@ -9,8 +9,8 @@ namespace threads_test {
 TEST_F(CommandLineTest, ThreadsChangeNothingButTimes) {
   // long enough for threads to have work of their own
   Write("long.json", R"({"name": "long",
-    "scenes": [{"mechanism": {"family": "ladder", "windows": 2100}, "horizon": 0.02}],
-    "columns": [{"formulation": "odca", "enforcement": "velocity", "threads": [1, 2]}],
+    "problems": [{"mechanism": {"family": "ladder", "windows": 2100}, "horizon": 0.02}],
+    "methods": [{"formulation": "odca", "enforcement": "velocity", "threads": [1, 2]}],
     "tolerances": 1e-6, "timing": {"repeats": 1}})");
   ExpectEnding(Call("run long.json --out out"), 0, {"4 run now"});
   std::string hash;

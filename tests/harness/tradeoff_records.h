@@ -15,7 +15,7 @@ inline Record Keys(const std::string& kind, const std::string& formulation, doub
   record.Set("experiment", std::string("e"));
   record.Set("mechanism", std::string("four-bar"));
   record.Set("formulation", formulation);
-  record.Set("enforcement", std::string("position"));
+  record.Set("enforcement", std::string("projection"));
   record.Set("coordinates", std::string("joint"));
   record.Set("solver", std::string("rank-revealing"));
   record.Set("integrator", std::string("ode45"));
@@ -30,8 +30,8 @@ inline Record Keys(const std::string& kind, const std::string& formulation, doub
 inline Record RunOf(const std::string& formulation, double rtol, double error) {
   Record record = Keys("accuracy", formulation, rtol);
   record.Set("t_reached", 10.0);
-  record.Set("doubts", std::string());
-  record.Set("scene_id", std::string("scene"));
+  record.Set("warnings", std::string());
+  record.Set("problem_id", std::string("problem"));
   record.Set("link_length", 2.0);
   record.Set("rhs_equivalents", 1.0 / error);
   record.Set("error_position_max", error);

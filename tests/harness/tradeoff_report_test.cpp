@@ -26,12 +26,12 @@ TEST(TradeoffReport, SaysNoneReachedIt) {
 
 TEST(TradeoffReport, ListsFrontAndReasonsAndHidesOnlyTheBeaten) {
   std::vector<Record> records = Store({1e-3, 1e-2, 1e-6}, {0.1, 0.2, 0.3});
-  records[4].Set("doubts", std::string("energy"));
+  records[4].Set("warnings", std::string("energy"));
   const Tradeoff tradeoff = MakeTradeoff(records, {});
   const Table brief = TradeoffTable(tradeoff, {});
   ASSERT_EQ(brief.rows.size(), 2u);
   EXPECT_EQ(brief.rows[0].Text("front"), "*");
-  EXPECT_EQ(brief.rows[1].Text("reason"), "doubts: energy");
+  EXPECT_EQ(brief.rows[1].Text("reason"), "warnings: energy");
   EXPECT_NE(ToText(brief).find("1 more row was compared and beaten"), std::string::npos);
   EXPECT_EQ(TradeoffTable(tradeoff, {.compact = true, .all = true}).rows.size(), 3u);
   const std::string csv = ToCsv(TradeoffTable(tradeoff, {.compact = false, .all = true}));
@@ -60,17 +60,17 @@ TEST(Fairness, SaysWhatWasEqualAndWhatWasNot) {
   std::vector<Record> records = Store({1e-3, 1e-6, 1e-9}, {0.1, 0.2, 0.4});
   const std::string alike = Statement(records);
   ExpectWords(alike, {"error: error_position_max", "cost: wall_s_median [s]", "integrator ode45",
-                      "machine m", "threads 1", "simplifications none", "mechanism and start scene",
-                      "not recorded: compiler"});
+                      "machine m", "threads 1", "simplifications none",
+                      "mechanism and start problem", "not recorded: compiler"});
   ExpectWords(alike,
               {"formulation (odca 2, lagrange 1)", "tolerance (0.001 1, 0.0001 1, 1e-05 1)"});
   ExpectWords(alike, {"warning", "not compared"}, false);
   for (const int i : {2, 3})
     records[static_cast<std::size_t>(i)].Set("integrator", std::string("verner"));
-  records[4].Set("doubts", std::string("energy"));
+  records[4].Set("warnings", std::string("energy"));
   const std::string mixed = Statement(records);
-  ExpectWords(mixed,
-              {"integrator (ode45 1, verner 1)", "1 of 3 rows are not compared: doubts: energy 1"});
+  ExpectWords(mixed, {"integrator (ode45 1, verner 1)",
+                      "1 of 3 rows are not compared: warnings: energy 1"});
 }
 
 TEST(Fairness, TheLibrarysCodeIsNotEqualForAllFormulations) {
@@ -94,11 +94,11 @@ TEST(Fairness, WarnsOfTimesOfTwoMachinesAndOfANoisyOne) {
 TEST(Fairness, SaysWhatReferencesAreCertifiedTo) {
   std::vector<Record> records = Store({1e-3, 1e-13}, {0.1, 0.2});
   records[0].Set("reference_error", 1e-11);
-  records[0].Set("trust_horizon", 8.0);
+  records[0].Set("reference_valid_until", 8.0);
   records[2].Set("reference_error", 3e-12);
   ExpectWords(Statement(records),
               {"certified to 3.0e-12 to 1.0e-11 m", "1 row has no larger error than that",
-               "1 row goes beyond the trust horizon"});
+               "1 row goes beyond the validity limit of the reference"});
 }
 
 TEST(Fairness, CountsOfImplicitIntegratorsAreNotAllTheyDo) {
@@ -115,7 +115,7 @@ TEST(Fairness, WhatIsEqualInEachProblemIsEqual) {
   std::vector<Record> records = Store({1e-3, 1e-6}, {0.1, 0.2});
   for (Record record : Store({1e-2, 1e-5}, {10.0, 20.0})) {
     record.Set("mechanism", std::string("other"));
-    if (record.Find("scene_id") != nullptr) record.Set("scene_id", std::string("scene-2"));
+    if (record.Find("problem_id") != nullptr) record.Set("problem_id", std::string("scene-2"));
     records.push_back(record);
   }
   ExpectWords(Statement(records), {"mechanism and start (in each problem)"});
@@ -123,7 +123,7 @@ TEST(Fairness, WhatIsEqualInEachProblemIsEqual) {
 
 TEST(TradeoffFigures, DrawTheFrontDoubtsAndFailures) {
   std::vector<Record> records = Store({1e-3, 1e-2, 1e-6, 1e-7}, {0.1, 0.2, 0.3, 0.4});
-  records[2].Set("doubts", std::string("energy"));
+  records[2].Set("warnings", std::string("energy"));
   records[4].Set("outcome", std::string("singular"));
   records[5].Set("wall_s_median", Value());
   records[4].Set("cpu_s", 0.05);
@@ -174,12 +174,12 @@ TEST(TradeoffFigures, ErrorsOverTimeHaveTheTrustHorizon) {
     if (record.Text("kind") != "accuracy") continue;
     record.Set("series.error_t", std::vector<double>{0, 5, 10});
     record.Set("series.error", std::vector<double>{0, 1e-9, 1e-6});
-    record.Set("trust_horizon", 7.5);
+    record.Set("reference_valid_until", 7.5);
   }
   const Tradeoff tradeoff = MakeTradeoff(records, {});
   const Figure figure = ErrorOverTimeFigure(tradeoff.problems.front(), "ode45");
   ASSERT_EQ(figure.curves.size(), 2u) << "the finest tolerance, and the horizon";
-  EXPECT_EQ(figure.curves[1].label, "trust horizon");
+  EXPECT_EQ(figure.curves[1].label, "validity limit of the reference");
   EXPECT_EQ(figure.curves[1].x, (std::vector<double>{7.5, 7.5}));
   EXPECT_EQ(TradeoffFigures(tradeoff).size(), 3u);
 }

@@ -43,7 +43,7 @@ TEST(Tradeoff, TheFrontIsWhatNobodyBeats) {
       walls.push_back(0.001 * any(generator));
     }
     std::vector<Record> records = Store(errors, walls);
-    records[2].Set("doubts", std::string("energy"));
+    records[2].Set("warnings", std::string("energy"));
     records[4].Set("outcome", std::string("singular"));
     int front = 0;
     for (const TradeoffRow& row : OnlyRows(MakeTradeoff(records, {}))) {
@@ -95,7 +95,7 @@ TEST(Tradeoff, RowsThatAreNotComparedSayWhy) {
   std::vector<Record> records = Store({1e-3, 1e-4, 1e-5, 1e-6, 1e-7, 1e-8}, {1, 1, 1, 1, 1, 1});
   records[0].Set("outcome", std::string("singular"));
   records[0].Set("t_reached", 0.312);
-  records[2].Set("doubts", std::string("energy drift"));
+  records[2].Set("warnings", std::string("energy drift"));
   records[4].Set("error_position_max", Value());
   records[7].Set("outcome", std::string("time-limit"));
   records[7].Set("wall_s_median", Value());
@@ -103,9 +103,9 @@ TEST(Tradeoff, RowsThatAreNotComparedSayWhy) {
   std::vector<std::string> reasons;
   for (const TradeoffRow& row : OnlyRows(MakeTradeoff(records, {}))) reasons.push_back(row.reason);
   std::ranges::sort(reasons);
-  EXPECT_EQ(reasons,
-            (std::vector<std::string>{"", "doubts: energy drift", "no error_position_max",
-                                      "not timed", "singular at 0.312 s", "timing: time-limit"}));
+  EXPECT_EQ(reasons, (std::vector<std::string>{"", "no error_position_max", "not timed",
+                                               "singular at 0.312 s", "timing: time-limit",
+                                               "warnings: energy drift"}));
 }
 
 /// What the reference cannot tell apart is not what a row may win by.
@@ -213,26 +213,29 @@ class TradeoffProgram : public CommandLineTest {};
 TEST_F(TradeoffProgram, PrintsAndWritesWhatAccuracyCosts) {
   Write("pendulum.json", ReadFile(kConfigs / "mechanisms/pendulum.json"));
   Write("e.json", R"({"name": "e", "tolerances": [1e-4, 1e-6, 1e-8], "fixed_steps": [0.02],
-    "integrator": ["ode45", "verner"], "scenes": [{"mechanism": "pendulum.json", "horizon": 0.5}],
-    "columns": [{"formulation": ["odca", "lagrange"], "enforcement": "position"}],
+    "integrator": ["ode45", "verner"], "problems": [{"mechanism": "pendulum.json", "horizon": 0.5}],
+    "methods": [{"formulation": ["odca", "lagrange"], "enforcement": "projection"}],
     "timing": {"repeats": 2, "cases": true}})");
   ExpectEnding(Call("run e.json --out out"), 0, {"32 run now"});
-  ExpectEnding(Call("tradeoff out --figures"), 0,
+  ExpectEnding(Call("work-precision out --figures"), 0,
                {"closed_form_error_max against wall_s_median", "problem = pendulum, horizon 0.5",
                 "no record has error_position_max", "equal in all compared rows",
-                "tradeoff-overview.csv", "wrote 3 figures to out/figures"});
-  for (const char* file : {"tradeoff.csv", "tradeoff.md", "tradeoff-overview.csv",
+                "work-precision-overview.csv", "wrote 3 figures to out/figures"});
+  for (const char* file : {"work-precision.csv", "work-precision.md", "work-precision-overview.csv",
                            "figures/work-precision-pendulum-horizon-0.5.svg",
                            "figures/tolerance-pendulum-horizon-0.5-verner.svg"}) {
     EXPECT_TRUE(fs::exists(folder_ / "out" / file)) << file;
   }
-  const std::string csv = ReadFile(folder_ / "out/tradeoff.csv");
+  const std::string csv = ReadFile(folder_ / "out/work-precision.csv");
   EXPECT_EQ(std::ranges::count(csv.substr(0, csv.find("\n#")), '\n'), 16) << csv;
-  ExpectEnding(Call("tradeoff out --cost steps --classes 1e-2 --where integrator=verner --out t"),
-               0, {"against steps", "wrote t/tradeoff.csv"});
-  ExpectEnding(Call("tradeoff out --error nothing"), 2, {"--error: found \"nothing\""});
-  ExpectEnding(Call("tradeoff out --classes nan"), 2, {"expected a number from 0"});
-  ExpectEnding(Call("tradeoff out --format csv --where 'rtol<1e-7'"), 0, {"problem,formulation"});
+  ExpectEnding(Call("work-precision out --cost-key steps --error-levels 1e-2 --where "
+                    "integrator=verner --out t"),
+               0, {"against steps", "wrote t/work-precision.csv"});
+  ExpectEnding(Call("work-precision out --error-key nothing"), 2,
+               {"--error-key: found \"nothing\""});
+  ExpectEnding(Call("work-precision out --error-levels nan"), 2, {"expected a number from 0"});
+  ExpectEnding(Call("work-precision out --format csv --where 'rtol<1e-7'"), 0,
+               {"problem,formulation"});
 }
 
 }  // namespace tradeoff_test

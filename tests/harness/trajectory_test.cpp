@@ -172,9 +172,9 @@ class Command : public CommandLineTest {
   void WriteExperiment(const std::string& output, const std::string& mechanism,
                        const std::string& more = "") const {
     Write("out.json", R"({"name": "out", "tolerances": 1e-9, "timing": {"repeats": 0},
-      "scenes": [{"mechanism": ")" +
+      "problems": [{"mechanism": ")" +
                           mechanism + R"(", "horizon": 1}],
-      "columns": [{"formulation": "odca", "enforcement": "acceleration", "coordinates": "absolute"}],
+      "methods": [{"formulation": "odca", "enforcement": "acceleration", "coordinates": "absolute"}],
       "output": )" + output +
                           more + "}");
   }
@@ -203,7 +203,7 @@ TEST_F(Command, MistakesOfOutputAreNamed) {
   refused(R"({"step": 1e-300})", "rows, expected at most 100000000");
   refused(R"({"step": 0.1, "quantities": ["poses"]})", "/output/quantities/0");
   refused(R"({"step": 0.1})", "found output of parts that run on their own",
-          R"(, "compile": {"islands": true})");
+          R"(, "preprocess": {"islands": true})");
 }
 
 TEST_F(Command, HostileNamesStayNames) {
@@ -251,7 +251,7 @@ constexpr const char* kEveryKind =
     {"name": "f", "type": "free", "from": {"body": "ground"}, "to": {"body": "b9", "at": [0, 0, 0.1]}}],
   "initial": {"coordinates": {"r": 7.5, "p": 0.3, "s": [0.4, 0.2], "c": [-4.0, 0.1], "b": [0.8, 0.2, 0.4, 0.4],
       "e": [0.7, 0.1, -0.2], "u": [0.3, -0.5], "h": 9.0, "f": [0.5, 0.5, -0.5, 0.5, 1, 2, 3]},
-    "held": ["r", "p", "s", "c", "b", "e", "u", "h", "f"],
+    "fixed": ["r", "p", "s", "c", "b", "e", "u", "h", "f"],
     "speeds": {"r": 1.0, "p": -0.2, "s": [0.3, 0.1], "c": [0.5, -0.3], "b": [0.1, 0.2, 0.3],
       "e": [0.4, 0.2, 0.1], "u": [0.6, -0.4], "h": -0.5, "f": [1, -2, 0.5, 0.1, 0.2, 0.3]}}})";
 
@@ -270,7 +270,7 @@ TEST_F(Command, EveryKindOfJointHasTheCoordinatesThatTheUserGave) {
   for (const char* coordinates : {"joint", "absolute"}) {
     WriteExperiment(R"({"step": 0.01})", "kinds.json");
     ExpectEnding(
-        Call(fmt::format("run out.json --out {0} --set /columns/0/coordinates={0}", coordinates)),
+        Call(fmt::format("run out.json --out {0} --set /methods/0/coordinates={0}", coordinates)),
         0, {});
     const fs::path file = Files(std::string(coordinates) + "/trajectories").at(0);
     const Trajectory rows = ReadTrajectory(file);

@@ -39,7 +39,7 @@ const Column kMultipliers{.formulation = "lagrange", .enforcement = kVelocity};
 
 /// `wrong` with the name of what it pretends to be.
 Record Disguised(Record wrong, const Record& as) {
-  for (const char* key : {"scene_id", "formulation", "enforcement", "rtol", "atol"}) {
+  for (const char* key : {"problem_id", "formulation", "enforcement", "rtol", "atol"}) {
     wrong.Set(key, *as.Find(key));
   }
   return wrong;
@@ -59,7 +59,7 @@ std::vector<Record> Good(const MechanismFile& file, double horizon,
 
 std::string AllDoubts(const std::vector<Record>& records) {
   std::string all;
-  for (const Record& record : records) all += "[" + record.Text("doubts") + "]";
+  for (const Record& record : records) all += "[" + record.Text("warnings") + "]";
   return all;
 }
 
@@ -139,7 +139,7 @@ TEST(Trust, DriveThatStepsPassBy) {
 
 TEST(Trust, StepControlThatStruggles) {
   Record record = RunOne(Shipped("pendulum"), kOdca, 1e-6, 1.0);
-  EXPECT_EQ(record.Text("doubts"), "");
+  EXPECT_EQ(record.Text("warnings"), "");
   EXPECT_GT(record.Number("step_shortest"), 0.0);
   EXPECT_GE(record.Number("step_longest"), record.Number("step_shortest"));
   Record failing = record;
@@ -179,7 +179,7 @@ TEST(TrueError, FollowsTheToleranceAndChangesNoBit) {
         EXPECT_GE(error, held.Number("error_position_rms"));
         EXPECT_GE(error, held.Number("error_position_end"));
         EXPECT_EQ(held.Number("error_points"), 41);
-        EXPECT_EQ(held.Text("doubts"), "") << name << " " << error << " at " << rtol;
+        EXPECT_EQ(held.Text("warnings"), "") << name << " " << error << " at " << rtol;
         if (std::string(profile) == "ode45") {
           // a hundredth of the tolerance: a tenth of the error at least, over round-off
           EXPECT_LT(error, before / 10 + 1e-12) << name;
@@ -221,7 +221,7 @@ TEST(TrueError, TellsLateFromAstray) {
 }
 
 TEST(Trust, TheReferenceDecidesWhoIsRight) {
-  // through a singular position: level velocity ends on another branch than level position
+  // through a singular position: level velocity ends on another branch than level projection
   const MechanismFile file = Shipped("peaucellier");
   const Reference reference = MakeReference(file.description, 1.0, LinkLength(file.description),
                                             {.scalar = "long-double", .points = 41, .cpu_s = 2.0});
@@ -233,7 +233,7 @@ TEST(Trust, TheReferenceDecidesWhoIsRight) {
   }
   SetDoubts(&records);
   if (reference.trust_horizon == 1.0) {
-    EXPECT_EQ(records[1].Text("doubts"), "") << records[1].Number("error_position_end");
+    EXPECT_EQ(records[1].Text("warnings"), "") << records[1].Number("error_position_end");
     EXPECT_TRUE(HasDoubt(records[0], kErrorDoubt)) << AllDoubts(records);
   } else {
     EXPECT_TRUE(HasDoubt(records[0], kSingularDoubt)) << AllDoubts(records);
@@ -244,9 +244,9 @@ TEST(Trust, TheReferenceDecidesWhoIsRight) {
 TEST(Trust, WrongResultsAloneAreSeenByTheReference) {
   const MechanismFile right = Driven(0.5);
   const Reference reference = ReferenceOf(right, 1.0);
-  EXPECT_EQ(RunOne(right, kOdcaPosition, 1e-8, 1.0, &reference).Text("doubts"), "");
+  EXPECT_EQ(RunOne(right, kOdcaPosition, 1e-8, 1.0, &reference).Text("warnings"), "");
   Record wrong = RunOne(Driven(-0.5), kOdcaPosition, 1e-8, 1.0, &reference);
-  EXPECT_TRUE(HasDoubt(wrong, kErrorDoubt)) << wrong.Text("doubts");
+  EXPECT_TRUE(HasDoubt(wrong, kErrorDoubt)) << wrong.Text("warnings");
   // a tolerance that is not heeded
   const Record coarse = RunOne(right, kOdcaPosition, 1e-3, 1.0, &reference);
   Record disguised = coarse;

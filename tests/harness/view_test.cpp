@@ -321,7 +321,7 @@ class ViewCommandLine : public CommandLineTest {};
 TEST_F(ViewCommandLine, WritesWhatIsAskedFor) {
   ExpectEnding(Call("view four-bar.json"), 0,
                {"wrote four-bar.html", "3 bodies, 4 joints, 1 motions"});
-  ExpectEnding(Call("view four-bar.json --out a/b.svg --plain"), 0, {"wrote a/b.svg"});
+  ExpectEnding(Call("view four-bar.json --out a/b.svg --no-annotations"), 0, {"wrote a/b.svg"});
   EXPECT_TRUE(ReadFile(folder_ / "a/b.svg").starts_with("<?xml"));
   EXPECT_TRUE(ReadFile(folder_ / "four-bar.html").starts_with("<!doctype html>"));
   ExpectEnding(Call("view four-bar.json --format text"), 0, {"Bodies, as assembled", "Motions"});
@@ -331,8 +331,8 @@ TEST_F(ViewCommandLine, WritesWhatIsAskedFor) {
 }
 
 TEST_F(ViewCommandLine, DrawsWhatDoesNotAssemble) {
-  EditMechanism("\"BC\": 1.757330},\n    \"held\": [\"OA\"]",
-                "\"BC\": 0.5},\n    \"held\": [\"OA\", \"AB\", \"BC\"]");
+  EditMechanism("\"BC\": 1.757330},\n    \"fixed\": [\"OA\"]",
+                "\"BC\": 0.5},\n    \"fixed\": [\"OA\", \"AB\", \"BC\"]");
   const Ending ending = Call("view four-bar.json --out open.svg");
   ExpectEnding(ending, 2, {"wrote open.svg", "not assembled"});
   const std::string svg = ReadFile(folder_ / "open.svg");

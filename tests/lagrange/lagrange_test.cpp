@@ -41,7 +41,7 @@ void ExpectAlike(const MechanismDescription& description, Coordinates coordinate
   Conditioning found;
   ASSERT_EQ(dense.Factor(kinematics, found), Outcome::kFinished);
   if (!sparse->Factor(kinematics)) {
-    EXPECT_LT(found.rcond, 0.1) << description.name << ": what is in doubt is near that for both";
+    EXPECT_LT(found.rcond, 0.1) << description.name << ": what is uncertain is near that for both";
     return;
   }
   EXPECT_EQ(found.smallest_weight, 1.0) << description.name;
@@ -208,7 +208,7 @@ TEST(Lagrange, IsSingularWhereDenseEquationsWouldBeTooLarge) {
   Sparse system(mechanism);
   EXPECT_EQ(Evaluate(system, mechanism, 1.0), Outcome::kFinished);
   EXPECT_EQ(Evaluate(system, mechanism, 0.0), Outcome::kSingular);
-  EXPECT_NE(system.solver().WhySingular().find("rank is in doubt at joint \""), std::string::npos)
+  EXPECT_NE(system.solver().WhySingular().find("rank is uncertain at joint \""), std::string::npos)
       << system.solver().WhySingular();
   EXPECT_EQ(Evaluate(system, mechanism, std::numeric_limits<double>::quiet_NaN()),
             Outcome::kNonFinite);

@@ -65,7 +65,7 @@ TEST(AssemblySweep, AgreesWithTheGeneralSweepWhereverJointsHaveDrifted) {
           Hold(mechanism, options, q, u, tally);
         }
       }
-      std::printf("%d mechanisms, %d states, %d softened, %d more refused, worst %.2g\n", made,
+      std::printf("%d mechanisms, %d states, %d regularized, %d more refused, worst %.2g\n", made,
                   tally.states, tally.softened, tally.refused, tally.worst);
       // where a body's pins on Ground close one by one, those of the tree are no joins here, and
       // another pin of the loop is the one that is judged

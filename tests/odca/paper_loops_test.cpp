@@ -155,9 +155,9 @@ void HoldCoupledLoops(const char* name) {
   one.Print((std::string(name) + ", lower loop of 1").c_str());
   EXPECT_LE(3 * three.left_out, three.scenes);
   EXPECT_LE(3 * one.left_out, one.scenes);
-  EXPECT_GE(three.assemblies, three.scenes - three.left_out) << "asm of each scene, as published";
+  EXPECT_GE(three.assemblies, three.scenes - three.left_out) << "asm of each problem, as published";
   EXPECT_EQ(one.assemblies, 2 * (one.scenes - one.left_out))
-      << "asm of each scene, by both solvers";
+      << "asm of each problem, by both solvers";
 }
 
 TEST(PaperTest, LoopsThatShareABodyInThePlane) { HoldCoupledLoops<Planar>("plane"); }

@@ -73,7 +73,7 @@ struct Tally {
     worst = std::max(worst, deviation.Relative() / bound);
   }
   void Print(const char* name) const {
-    std::printf("%-26s %d scenes, %d left out, %d assemblies, worst %.2g of the bound\n", name,
+    std::printf("%-26s %d problems, %d left out, %d assemblies, worst %.2g of the bound\n", name,
                 scenes, left_out, assemblies, worst);
   }
 };

@@ -220,7 +220,7 @@ TEST(PathSweep, LeavesWhatIsSoftenedToTheGeneralSweep) {
       if (both.general.smallest_weight < 1.0) softened = std::max(softened, angle);
       if (both.evaluated) answered = std::min(answered, angle);
     }
-    std::printf("%3d windows: softened to %.1e rad, answered from %.1e\n", windows, softened,
+    std::printf("%3d windows: regularized to %.1e rad, answered from %.1e\n", windows, softened,
                 answered);
     EXPECT_GT(softened, 1e-4) << windows;
     EXPECT_LT(softened, answered) << windows;

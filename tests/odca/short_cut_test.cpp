@@ -135,7 +135,7 @@ double RoundOff(const Mechanism<Space, double>& model, const Numbers& y) {
   return 4.0 * kEps * model.length() * sum;
 }
 
-/// What level position makes of an accepted step, by the short cut and in all generality:
+/// What level projection makes of an accepted step, by the short cut and in all generality:
 /// multipliers have no short cut, and their Newton steps are as long.
 TYPED_TEST(ShortCutTest, ProjectsAsTheGeneralWayDoes) {
   int projected = 0;

@@ -14,7 +14,7 @@ namespace peers_accelerations_test {
 
 using peers_test::kEps;
 
-/// At the start, and after `t` of O-DCA's run at level position.
+/// At the start, and after `t` of O-DCA's run at level projection.
 template <class Space>
 void Compare(const MechanismDescription& description, double t) {
   const Mechanism<Space, double> mechanism(description, Coordinates::kJoint);

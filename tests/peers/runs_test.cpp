@@ -33,7 +33,7 @@ TEST_P(ShippedRuns, OfSimbodyEndWhereThoseOfOdcaDo) {
   const double horizon = ShortHorizon(GetParam());
   const Record theirs = RunShipped(GetParam(), kSimbody, kRtol, horizon);
   if (const auto why = kInexpressible.find(GetParam()); why != kInexpressible.end()) {
-    EXPECT_EQ(theirs.Text("outcome"), "inexpressible");
+    EXPECT_EQ(theirs.Text("outcome"), "unsupported");
     EXPECT_EQ(theirs.Text("message"), why->second);
     return;
   }
@@ -133,7 +133,7 @@ TEST(PeerRuns, OfWhatCannotBeExpressedAreRowsOfTimingsToo) {
   const std::vector<Record> records = TimeTogether(experiment, TimingGroups(experiment).front());
   ASSERT_EQ(records.size(), 2u);
   EXPECT_EQ(records[0].Text("outcome"), "finished");
-  EXPECT_EQ(records[1].Text("outcome"), "inexpressible");
+  EXPECT_EQ(records[1].Text("outcome"), "unsupported");
   EXPECT_EQ(records[1].Text("message"), kInexpressible.at("driven-four-bar"));
 }
 

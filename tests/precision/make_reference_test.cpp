@@ -149,7 +149,7 @@ TEST(Certificate, TakesTheWiderScalarWhereItMust) {
 TEST(Certificate, SaysWhyThereIsNone) {
   const MechanismDescription bennett = Shipped("bennett");
   const Reference none = MakeReference(bennett, 1.0, 1.0, {.scalar = "float128"});
-  EXPECT_EQ(none.outcome, "inexpressible");
+  EXPECT_EQ(none.outcome, "unsupported");
   EXPECT_EQ(none.message, "float128 is for planar mechanisms");
   EXPECT_TRUE(none.snapshots.empty());
   EXPECT_EQ(none.NumTrusted(), 0u);

@@ -47,7 +47,7 @@ void ExpectAlike(const MechanismDescription& description, Coordinates coordinate
   ASSERT_EQ(dense.Factor(kinematics, found), Outcome::kFinished);
   if (!sparse->AreIndependent(kinematics)) {
     ++tally.in_doubt;
-    EXPECT_LT(found.rcond, 0.1) << "what is in doubt is near that for both";
+    EXPECT_LT(found.rcond, 0.1) << "what is uncertain is near that for both";
     return;
   }
   ASSERT_TRUE(sparse->Choose(kinematics));
@@ -103,7 +103,7 @@ TYPED_TEST(SparsePartitionTest, SolvesWhatDenseMultipliersSolve) {
                              tally);
     }
   }
-  std::printf("%d solved, %d in doubt\n", tally.solved, tally.in_doubt);
+  std::printf("%d solved, %d uncertain\n", tally.solved, tally.in_doubt);
   EXPECT_GT(tally.solved, 3 * tally.in_doubt);
 }
 
@@ -221,7 +221,7 @@ TEST(Reduction, IsSingularWhereDenseMatricesWouldBeTooLarge) {
   ASSERT_EQ(run.Start(1.0), Outcome::kFinished);
   EXPECT_TRUE(run.is_sparse());
   EXPECT_EQ(run.Evaluate(0.0), Outcome::kSingular);
-  EXPECT_NE(run.system.solver().WhySingular().find("rank is in doubt at joint \""),
+  EXPECT_NE(run.system.solver().WhySingular().find("rank is uncertain at joint \""),
             std::string::npos);
   EXPECT_EQ(run.Evaluate(std::numeric_limits<double>::quiet_NaN()), Outcome::kNonFinite);
   EXPECT_EQ(run.Evaluate(1.0), Outcome::kFinished);

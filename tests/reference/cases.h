@@ -78,7 +78,7 @@ inline std::string NameOf(const Column& column) {
 inline Case CaseOf(const Experiment& experiment, const std::string& scene, const Column& column,
                    double tolerance, double horizon) {
   const auto it = std::ranges::find(experiment.scenes, scene, &ExperimentScene::name);
-  if (it == experiment.scenes.end()) throw std::invalid_argument("no scene " + scene);
+  if (it == experiment.scenes.end()) throw std::invalid_argument("no problem " + scene);
   Case one{.scene = static_cast<std::size_t>(it - experiment.scenes.begin()),
            .mechanism = scene,
            .column = column,

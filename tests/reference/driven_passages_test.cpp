@@ -212,7 +212,7 @@ TEST_P(DrivenPassage, DeadEndsAreNone) {
 
 INSTANTIATE_TEST_SUITE_P(Columns, DrivenPassage, testing::ValuesIn(PositionColumns()), NameOfParam);
 
-/// Below level position a passage ends on its branch or with a name and the cure.
+/// Below level projection a passage ends on its branch or with a name and the cure.
 TEST(DrivenPassageBelowPosition, IsRightOrNamed) {
   int named = 0;
   for (Column column : RankRevealingColumns()) {
@@ -230,7 +230,7 @@ TEST(DrivenPassageBelowPosition, IsRightOrNamed) {
         ++named;
         const std::string message = record.Text("message");
         EXPECT_NE(message.find("singular configuration"), std::string::npos) << message;
-        EXPECT_NE(message.find("level position"), std::string::npos) << message;
+        EXPECT_NE(message.find("level projection"), std::string::npos) << message;
       }
     }
   }

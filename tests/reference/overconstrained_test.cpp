@@ -43,7 +43,7 @@ TEST(DriftOfBennettsLinkage, GrowsQuadraticallyAtAccelerationLevel) {
         RunScene(Shipped("bennett"), At(formulation, Enforcement::kAcceleration), 1e-8, 100.0, 8);
     EXPECT_EQ(record.Number("ensemble_failed"), 0);
     EXPECT_NEAR(record.Number("growth_exponent"), 2.0, 0.15);
-    EXPECT_EQ(record.Text("compiled"), "redundancy");
+    EXPECT_EQ(record.Text("preprocessed"), "redundancy");
     std::cout << record.Text("formulation") << ": t^" << record.Number("growth_exponent")
               << ", drift " << record.Number("drift_position_max") << " m, energy "
               << record.Number("energy_error_relative") << "\n";

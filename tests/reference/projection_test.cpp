@@ -1,4 +1,4 @@
-// Level position: loops that stay closed, orders that survive. singular_test.cpp takes it through
+// Level projection: loops that stay closed, orders that survive. singular_test.cpp takes it through
 // singular positions.
 #include <gtest/gtest.h>
 

@@ -36,7 +36,7 @@ MechanismFile FourBar(double angle) {
       {"name": "C", "type": "revolute", "from": {"body": "coupler", "at": [0.8, 0, 0]},
        "to": {"body": "rocker", "at": [0, 0, 0.5], "rotation": [)" +
                             rotation + R"(]}, "axis": [0, 0, 1], "cut": true}],
-    "initial": {"coordinates": {"A": 0.3, "B": -0.2, "D": 0.2}, "held": ["A"]}
+    "initial": {"coordinates": {"A": 0.3, "B": -0.2, "D": 0.2}, "fixed": ["A"]}
   })",
                         "rounded.json");
 }

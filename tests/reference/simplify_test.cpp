@@ -34,7 +34,7 @@ MechanismDescription AsWritten(const MechanismDescription& description) {
 
 constexpr double kTolerance = 1e-12;
 
-/// The last snapshot of a run in tight steps, multipliers at level position.
+/// The last snapshot of a run in tight steps, multipliers at level projection.
 Snapshot End(const MechanismDescription& description, double horizon) {
   Column column;
   column.formulation = "lagrange";

@@ -147,7 +147,7 @@ MechanismDescription Tilted(MechanismDescription description, const Eigen::Matri
   for (auto& [name, point] : description.bodies[kGround].points) point = (R * point).eval();
   for (JointDescription& joint : description.joints) {
     if (planar && joint.type == JointType::kFree) {
-      throw std::invalid_argument("free joint " + joint.name + " of a planar scene");
+      throw std::invalid_argument("free joint " + joint.name + " of a planar problem");
     }
     for (JointSide* side : {&joint.from, &joint.to}) {
       if (side->body != kGround) continue;

@@ -65,7 +65,7 @@ Eigen::Matrix3d AnyRotation();
 /// The three formulations at the level of the paper with rank-revealing solvers, in both coordinate
 /// sets.
 const std::vector<Column>& RankRevealingColumns();
-/// The same at level position.
+/// The same at level projection.
 const std::vector<Column>& PositionColumns();
 
 }  // namespace loopbench::harness::reference

@@ -1,4 +1,4 @@
-// Through singular positions at level position: what no level below it does at every tolerance.
+// Through singular positions at level projection: what no level below it does at every tolerance.
 // configs/experiments/extremes/ runs the same at full size; here are the smaller members.
 #include <gtest/gtest.h>
 
@@ -155,8 +155,8 @@ TEST(SingularityDistance, IsSmallWhereLoopsGoFlatAndOnlyThere) {
     EXPECT_LT(passing.Number("singularity_distance_min"), 0.01);
     EXPECT_GT(passing.Number("singularity_distance_min_t"), 0.3);
     // softened at steps' ends and at stages between them
-    EXPECT_GT(passing.Number("softened_steps"), 0.0);
-    EXPECT_GT(passing.Number("softened_evaluations"), passing.Number("softened_steps"));
+    EXPECT_GT(passing.Number("regularized_steps"), 0.0);
+    EXPECT_GT(passing.Number("regularized_evaluations"), passing.Number("regularized_steps"));
     // a start in line, which rounding of the angles puts off by eps
     const Record from = run("parallelogram-singular-start", 1e-8);
     EXPECT_LE(from.Number("singularity_distance_min"), 1e-15);
@@ -164,7 +164,7 @@ TEST(SingularityDistance, IsSmallWhereLoopsGoFlatAndOnlyThere) {
     // never in line; nothing is softened
     const Record regular = run("four-bar", 1e-8);
     EXPECT_GT(regular.Number("singularity_distance_min"), 0.05);
-    EXPECT_EQ(regular.Number("softened_evaluations"), 0.0);
+    EXPECT_EQ(regular.Number("regularized_evaluations"), 0.0);
     // a redundant row is zero everywhere and no distance
     const Record redundant = run("locomotive", 1e-8);
     EXPECT_GT(redundant.Number("singularity_distance_min"), 1e-9);

@@ -205,8 +205,9 @@ TEST(Trajectory, LeavesTheRunAsItIs) {
       const Record alone = RunCase(experiment, one);
       const Written run = WriteTrajectory(mechanism, column, one.integrator, 1e-7, horizon,
                                           Rows(passes ? 3001 : 97));
-      for (const char* key : {"state_hash", "steps", "rejected", "rhs_evaluations", "restarts",
-                              "drift_position_max", "energy_error_max", "softened_evaluations"}) {
+      for (const char* key :
+           {"state_hash", "steps", "rejected", "rhs_evaluations", "restarts", "drift_position_max",
+            "energy_error_max", "regularized_evaluations"}) {
         EXPECT_EQ(alone.Text(key), run.record.Text(key)) << name << ' ' << ToString(column) << key;
       }
     }
@@ -352,7 +353,7 @@ TEST(Reactions, OfMergedBodiesAreKnown) {
   // the run has one body where the user has two: their weld bears what statics says
   const Written merged =
       WriteTrajectory(ShippedFile("welded-four-bar"), kOdcaJoint, "ode45", 1e-10, 0.5, Rows(4));
-  EXPECT_NE(merged.record.Text("compiled").find("welds"), std::string::npos);
+  EXPECT_NE(merged.record.Text("preprocessed").find("welds"), std::string::npos);
   const Written whole = WriteTrajectory(ShippedFile("welded-four-bar"), kOdcaJoint, "ode45", 1e-10,
                                         0.5, Rows(4), CompileOptions::None());
   ASSERT_EQ(merged.rows.columns, whole.rows.columns);

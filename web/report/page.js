@@ -52,7 +52,7 @@
     grid.append(left, right);
     host.append(make('div', {class: 'row'}, view.choice.element), view.legend, grid,
                 make('p', {class: 'soft keys'}, 'Drag in a curve, or use its arrow keys: the time moves everywhere. Shift and drag to zoom, ' +
-                    'Shift and wheel too, double click for the whole. Dashed: doubtful or failed; a cross: the run failed there.'),
+                    'Shift and wheel too, double click for the whole. Dashed: flagged or failed; a cross: the run failed there.'),
                 command(data('plot-command')));
     view.motion = new LoopbenchMotion.Motion(left, clock);
     for (const plot of data('plots')) view.plots.push(new LoopbenchPlots.TimePlot(right, plot, runs, clock));

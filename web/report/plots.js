@@ -233,7 +233,7 @@ const LoopbenchPlots = (() => {
       if (this.tip.hidden) return;
       const {names, doubts, failed} = this.table;
       this.tip.textContent = names[row] + ': ' + number(u.data[this.hovered + 1][index]) + ' ' + this.plot.unit + ' at ' +
-          number(u.data[0][index]) + ' s' + (failed[row] ? ' (failed)' : doubts[row] ? ' (doubtful: ' + doubts[row] + ')' : '');
+          number(u.data[0][index]) + ' s' + (failed[row] ? ' (failed)' : doubts[row] ? ' (flagged: ' + doubts[row] + ')' : '');
       this.tip.style.left = Math.min(u.cursor.left + 90, this.stage.clientWidth - this.tip.offsetWidth - 4) + 'px';
       this.tip.style.top = Math.max(0, u.cursor.top - 26) + 'px';
     }

@@ -5,7 +5,7 @@ const LoopbenchTable = (() => {
   const HIGH = 32, MOST_PRINTED = 300;  // of a row [px]; rows on paper
   const collator = new Intl.Collator('en', {numeric: true});
 
-  // "rtol<=1e-6", "outcome=singular", "doubts~energy", or a word that any cell contains.
+  // "rtol<=1e-6", "outcome=singular", "warnings~energy", or a word that any cell contains.
   function conditionOf(text, columns) {
     const match = /^([^=!<>~]+)(<=|>=|!=|=|<|>|~)(.*)$/.exec(text);
     const column = match && columns.find((one) => one.key === match[1]);
@@ -145,7 +145,7 @@ const LoopbenchTable = (() => {
       this.draw();
       const {names, scenes, doubts, failed, messages, ids} = this.data, all = LoopbenchParts.data('tables').doubts;
       const reasons = doubts[row].split(' ').filter((code) => code)
-          .map((code) => make('li', {class: 'doubt'}, 'doubtful, ' + code + ': ' + (all[code] || 'see the doubts above')));
+          .map((code) => make('li', {class: 'doubt'}, 'flagged, ' + code + ': ' + (all[code] || 'see the warnings above')));
       if (failed[row]) reasons.unshift(make('li', {class: 'bad'}, 'failed: ' + (messages[row] || 'without a message')));
       const list = make('dl', {});
       for (const column of this.data.columns) {

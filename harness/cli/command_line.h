@@ -67,6 +67,7 @@ void AddPlan(Commands& commands);
 void AddExplain(Commands& commands);
 void AddSimplify(Commands& commands);
 void AddSchema(Commands& commands);
+void AddMigrate(Commands& commands);
 void AddAdvise(Commands& commands);
 void AddView(Commands& commands);
 void AddTable(Commands& commands);
@@ -89,6 +90,9 @@ void AddShell(Commands& commands);
 /// Lines about the words that no subcommand or option took, each with the nearest that there is; ""
 /// when there are none. `app` is the whole program, after a parse that failed.
 std::string WhatWasMeant(const CLI::App& app);
+
+/// The message, with the remedy if an unknown key in it is an old name.
+std::string WithMigrationHint(std::string message);
 
 inline Selection ParseSelection(const std::vector<std::string>& conditions) {
   Selection selection;

@@ -298,7 +298,7 @@ int CheckFiles(const CheckCommand& command) {
       if (!command.json) Print("{}: {}\n", path.string(), checked.sentence);
       document.Add("ok", true).Add("found", checked.document).Add("warnings", checked.warnings);
     } catch (const ConfigError& error) {
-      PrintError("{}\n", Lines{error.what()});
+      PrintError("{}\n", Lines{WithMigrationHint(error.what())});
       document.Add("ok", false).Add("error", std::string(error.what()));
       exit_code = 2;
     }

@@ -72,7 +72,7 @@ void GroupCommands(CLI::App& app) {
        {"table", "plot", "report", "trajectory", "work-precision", "robustness", "check-claims"}},
       {"Regressions", {"compare", "fit-scaling", "export-metrics", "baseline", "history"}},
       {"Clusters", {"submit", "status", "collect"}},
-      {"Shell", {"schema", "completion", "manual"}}};
+      {"Shell", {"schema", "migrate", "completion", "manual"}}};
   for (const auto& [heading, names] : groups) {
     for (const char* name : names) app.get_subcommand(name)->group(heading);
   }
@@ -114,10 +114,10 @@ int RunCommandLine(int argc, char** argv) {
   });
   Commands commands(&app);
   for (const auto add :
-       {AddRun,        AddList,     AddCheck,   AddPlan,    AddExplain, AddSimplify, AddSchema,
-        AddAdvise,     AddView,     AddMerge,   AddTable,   AddPlot,    AddTradeoff, AddTrajectory,
-        AddVerdict,    AddMap,      AddReport,  AddImport,  AddConvert, AddGenerate, AddCount,
-        AddComparison, AddBaseline, AddCluster, AddHistory, AddShell}) {
+       {AddRun,        AddList,       AddCheck,    AddPlan,    AddExplain, AddSimplify, AddSchema,
+        AddMigrate,    AddAdvise,     AddView,     AddMerge,   AddTable,   AddPlot,     AddTradeoff,
+        AddTrajectory, AddVerdict,    AddMap,      AddReport,  AddImport,  AddConvert,  AddGenerate,
+        AddCount,      AddComparison, AddBaseline, AddCluster, AddHistory, AddShell}) {
     add(commands);
   }
   TakeOneWordEach(&app);
@@ -134,7 +134,7 @@ int RunCommandLine(int argc, char** argv) {
     PrintError("{}\n", Lines{OutOfMemory(error, {argv + 1, argv + argc})});
     return 2;
   } catch (const std::exception& error) {
-    PrintError("{}\n", Lines{error.what()});
+    PrintError("{}\n", Lines{WithMigrationHint(error.what())});
     return 2;
   }
 }

@@ -1,0 +1,170 @@
+// `loopbench migrate`: files with names of earlier versions are read afterwards, and nothing else
+// of them has changed.
+#include <fstream>
+
+#include "harness/record/record.h"
+#include "tests/harness/cli_fixture.h"
+
+namespace loopbench::harness {
+namespace migrate_test {
+
+constexpr const char* kOldExperiment = R"({
+  "name": "tiny",
+  "scenes": [{"mechanism": "old-bar.json",   "horizon": 0.5}],
+  "columns": [{"formulation": ["odca", "lagrange"],
+               "enforcement": ["acceleration", "position"], "solver": "as-published"},
+              {"formulation": "odca", "enforcement": "position"}],
+  "exclude": [{"enforcement": "position", "solver": "as-published"}],
+  "ensembles": [{"size": 2, "seed": 1, "perturb": 1e-3, "scenes": "four-bar", "enforcement": "position"}],
+  "sweep": [{"name": "mass", "field": "/scenes/0/mechanism/bodies/0/mass", "values": [1, 2]},
+            {"name": "level", "field": "/columns/1/enforcement", "values": ["position", "velocity"]}],
+  "tolerances": [1e-6], "compile": {"planar": false},
+  "timing": {"repeats": 0, "columns": [{"formulation": "odca", "enforcement": "position"}]}
+})";
+
+constexpr const char* kNewExperiment = R"({
+  "name": "tiny",
+  "problems": [{"mechanism": "old-bar.json",   "horizon": 0.5}],
+  "methods": [{"formulation": ["odca", "lagrange"],
+               "enforcement": ["acceleration", "projection"], "solver": "plain"},
+              {"formulation": "odca", "enforcement": "projection"}],
+  "exclude": [{"enforcement": "projection", "solver": "plain"}],
+  "ensembles": [{"size": 2, "seed": 1, "perturb": 1e-3, "problems": "four-bar", "enforcement": "projection"}],
+  "sweep": [{"name": "mass", "field": "/problems/0/mechanism/bodies/0/mass", "values": [1, 2]},
+            {"name": "level", "field": "/methods/1/enforcement", "values": ["projection", "velocity"]}],
+  "tolerances": [1e-6], "preprocess": {"planar": false},
+  "timing": {"repeats": 0, "methods": [{"formulation": "odca", "enforcement": "projection"}]}
+})";
+
+constexpr const char* kOldMap = R"({"title": "t", "columns": [
+  {"label": "O", "select": {"formulation": "odca", "solver": "as-published"}}],
+  "groups": [{"label": "g", "must_hold": "all", "why": "because", "rows": [
+    {"label": "r", "select": {"mechanism": "four-bar"}, "right": ["finished", "inexpressible"],
+     "decides": [{"measure": "error_shape_max", "limit": 5, "of": "rtol"}]}]}]})";
+
+constexpr const char* kNewMap = R"({"title": "t", "methods": [
+  {"label": "O", "select": {"formulation": "odca", "solver": "plain"}}],
+  "groups": [{"label": "g", "required": "all", "rationale": "because", "rows": [
+    {"label": "r", "select": {"mechanism": "four-bar"}, "expected_outcome": ["finished", "unsupported"],
+     "criteria": [{"measure": "error_path_max", "limit": 5, "relative_to": "rtol"}]}]}]})";
+
+class MigrateTest : public CommandLineTest {
+ protected:
+  /// The text of a file after it was migrated, and again: the second time changes nothing.
+  std::string Migrated(const std::string& name, const std::string& text) const {
+    Write(name, text);
+    const Ending ending = Call("migrate '" + name + "'");
+    EXPECT_EQ(ending.code, 0) << ending.text;
+    const std::string now = ReadFile(folder_ / name);
+    const auto written = fs::last_write_time(folder_ / name);
+    const Ending again = Call("migrate '" + name + "'");
+    EXPECT_EQ(again.code, 0);
+    EXPECT_EQ(again.text, name + ": no old names\n");
+    EXPECT_EQ(fs::last_write_time(folder_ / name), written);
+    return now;
+  }
+
+  /// The mechanism of the fixture as earlier versions had it.
+  std::string OldMechanism() const {
+    std::string text = mechanism_;
+    text.replace(text.find("\"fixed\""), 7, "\"held\"");
+    return text;
+  }
+
+  static Record OldRecord(const std::string& formulation) {
+    Record record;
+    record.Set("kind", std::string("accuracy"));
+    record.Set("mechanism", std::string("four-bar"));
+    record.Set("formulation", formulation);
+    record.Set("enforcement", std::string("position"));
+    record.Set("solver", std::string("as-published"));
+    record.Set("rtol", 1e-6);
+    record.Set("horizon", 1.0);
+    record.Set("content", std::string("c0"));
+    record.Set("outcome", std::string("finished"));
+    record.Set("scene_id", std::string("00ff"));
+    record.Set("doubts", std::string("energy softened singular-passage"));
+    record.Set("softened_evaluations", std::int64_t{3});
+    record.Set("trust_horizon", 1.0);
+    record.Set("drift_position_max", 1.25e-7);
+    record.Set("message", std::string("at the position \"softened_steps\": \\ \""));
+    return record;
+  }
+};
+
+TEST_F(MigrateTest, AnOldExperimentIsReadAfterwards) {
+  EXPECT_EQ(Migrated("old-bar.json", OldMechanism()), mechanism_);
+  Write("old.json", kOldExperiment);
+  ExpectEnding(Call("run old.json"), 2, {"unknown key \"scenes\"", "loopbench migrate FILE"});
+  EXPECT_EQ(Migrated("old.json", kOldExperiment), kNewExperiment);
+  ExpectEnding(Call("check old.json old-bar.json"), 0, {"old.json: experiment"});
+  ExpectEnding(Call("migrate old.json old-bar.json tiny.json"), 0, {"tiny.json: no old names"});
+}
+
+TEST_F(MigrateTest, OldRulesAreReadAfterwards) {
+  EXPECT_EQ(Migrated("map.json", kOldMap), kNewMap);
+  std::string claims = kTinyClaims;
+  claims.replace(claims.find("partially_reproduced"), 20, "only_under");
+  EXPECT_EQ(Migrated("claims.json", claims), kTinyClaims);
+  ExpectEnding(Call("check map.json claims.json"), 0, {"robustness map of 1 rows and 1 methods"});
+}
+
+TEST_F(MigrateTest, AnOldStoreIsReadAfterwards) {
+  {
+    ResultStore store(folder_ / "out");
+    store.Append(OldRecord("odca"));
+    store.Append(OldRecord("lagrange"));
+  }
+  const fs::path file = folder_ / "out/results.jsonl";
+  ExpectEnding(Call("migrate out"), 0, {"out/results.jsonl: 16 names replaced"});
+  const std::string text = ReadFile(file);
+  for (std::size_t begin = 0, end; (end = text.find('\n', begin)) != text.npos; begin = end + 1) {
+    EXPECT_TRUE(VerifyChecksum(std::string_view(text).substr(begin, end - begin)));
+  }
+  const std::vector<Record> records = ReadRecords(file);
+  ASSERT_EQ(records.size(), 2u);
+  EXPECT_EQ(records[1].Text("solver"), "plain");
+  EXPECT_EQ(records[1].Text("enforcement"), "projection");
+  EXPECT_EQ(records[1].Text("config_hash"), "c0");
+  EXPECT_EQ(records[1].Text("problem_id"), "00ff");
+  EXPECT_EQ(records[1].Text("warnings"), "energy regularized singular-crossing");
+  EXPECT_EQ(records[1].Number("regularized_evaluations"), 3.0);
+  EXPECT_EQ(records[1].Number("reference_valid_until"), 1.0);
+  EXPECT_EQ(records[1].Number("drift_position_max"), 1.25e-7);
+  EXPECT_EQ(records[1].Text("message"), OldRecord("odca").Text("message"));
+  ExpectEnding(Call("table out"), 0, {"proj", "plain"});
+  ExpectEnding(Call("migrate out"), 0, {"out/results.jsonl: no old names"});
+  EXPECT_EQ(ReadFile(file), text);
+}
+
+TEST_F(MigrateTest, NamesOfTheUserStay) {
+  const std::string text = R"({"name": "scenes", "comment": "as-published doubts",
+    "bodies": [{"name": "held", "mass": 1, "points": {"right": [0, 0], "columns": [1, 0]}}],
+    "joints": [{"name": "of", "to": "held", "from": "ground", "type": "revolute"}],
+    "initial": {"coordinates": {"held": 0.5, "of": 1}, "fixed": ["held", "position"]}})";
+  EXPECT_EQ(Migrated("named.json", text), text);
+}
+
+TEST_F(MigrateTest, OtherFilesAreRefusedAsTheyAre) {
+  Record record = OldRecord("odca");
+  {
+    ResultStore store(folder_ / "changed.jsonl");
+    store.Append(record);
+  }
+  std::string changed = ReadFile(folder_ / "changed.jsonl");
+  changed.replace(changed.find("1.25e-07"), 8, "1.25e-09");
+  const std::pair<const char*, std::string> files[] = {
+      {"text.json", "columns: 3\n"},
+      {"both.json", R"({"columns": [], "methods": []})"},
+      {"changed.jsonl", changed},
+      {"text.jsonl", "scene_id\nscene_id\n"}};
+  for (const auto& [name, text] : files) {
+    Write(name, text);
+    ExpectEnding(Call(std::string("migrate tiny.json ") + name), 2, {name, "tiny.json: no old"});
+    EXPECT_EQ(ReadFile(folder_ / name), text);
+  }
+  ExpectEnding(Call("migrate none.json"), 2, {"none.json"});
+}
+
+}  // namespace migrate_test
+}  // namespace loopbench::harness

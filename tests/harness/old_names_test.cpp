@@ -1,0 +1,66 @@
+// No text that users read has a name that `loopbench migrate` replaces.
+#include <array>
+#include <string_view>
+
+#include "tests/harness/cli_fixture.h"
+
+namespace loopbench::harness {
+namespace old_names_test {
+
+constexpr std::array<std::string_view, 42> kOldNames = {
+    "as-published",   "trust_horizon",     "scene_id",
+    "softened_steps", "softened_eval",     "singularity_passages",
+    "yardstick_",     "disturbed_rounds",  "error_shape_max",
+    "_ruled_by",      "error_over_accur",  "reference_witnesses",
+    "members-failed", "singular-passage",  "inexpressible",
+    "bad-answer",     "must_hold",         "only_under",
+    "failure-map",    "failure map",       "several_scalars",
+    "\"scenes\":",    "\"columns\":",      "\"observe\":",
+    "\"held\":",      "\"decides\":",      "\"doubts\":",
+    "--gate",         "COULD NOT MEASURE", "loopbench convert",
+    "loopbench map",  "loopbench verdict", "loopbench tradeoff",
+    "loopbench fit ", "loopbench plan",    "loopbench export ",
+    "--classes",      "--short-run",       "--again",
+    "column doubts",  "`doubts`",          ",doubts,"};
+
+void ExpectNone(const std::string& text, const std::string& place) {
+  for (const std::string_view name : kOldNames) {
+    const std::size_t found = text.find(name);
+    EXPECT_EQ(found, std::string::npos)
+        << place << ": " << text.substr(found - std::min<std::size_t>(found, 60), 120);
+  }
+}
+
+TEST(OldNames, StandInNoFileThatUsersRead) {
+  int files = 0;
+  const auto read = [&files](const fs::path& file) {
+    ++files;
+    ExpectNone(ReadFile(file), fs::relative(file, kRoot).string());
+  };
+  for (const char* name : {"README.md", "CHANGELOG.md", "CONTRIBUTING.md", "reproduce"}) {
+    read(kRoot / name);
+  }
+  for (const char* folder : {"configs", "docs", "examples", "peers", "results"}) {
+    fs::recursive_directory_iterator each(kRoot / folder);
+    for (const fs::directory_entry& entry : each) {
+      if (entry.path() == kRoot / "results/runs") each.disable_recursion_pending();
+      const std::string type = entry.path().extension().string();
+      for (const char* wanted : {".json", ".jsonl", ".md", ".csv", ".yml", ".yaml", ".sh"}) {
+        if (entry.is_regular_file() && type == wanted) read(entry.path());
+      }
+    }
+  }
+  EXPECT_GT(files, 200);
+}
+
+class OldNamesOfCommands : public CommandLineTest {};
+
+TEST_F(OldNamesOfCommands, StandInNoHelpText) {
+  const Ending manual = Call("manual");
+  EXPECT_EQ(manual.code, 0);
+  EXPECT_GT(manual.text.size(), 10000u);
+  ExpectNone(manual.text, "manual");
+}
+
+}  // namespace old_names_test
+}  // namespace loopbench::harness

@@ -94,7 +94,7 @@ Table TableOf(const std::vector<Trial>& trials, const Trial& best, double horizo
     (trial.choice.step > 0.0 ? fixed : adaptive) = true;
   }
   table.columns = {{"formulation", "formulation", Format::kText},
-                   {"enforcement", "level", Format::kText},
+                   {"enforcement", "enforcement", Format::kText},
                    {"coordinates", "coords", Format::kText},
                    {"integrator", "integrator", Format::kText}};
   if (adaptive) table.columns.push_back({"rtol", "rtol", Format::kScientific});
@@ -424,7 +424,7 @@ void AddAdvise(Commands& commands) {
                                });
   app->add_option("mechanism", command.mechanism, "Mechanism file (JSON)")->required();
   CLI::Option* error =
-      app->add_option("--error", command.error, "Largest error of points [m] (default: 1e-6)")
+      app->add_option("--max-error", command.error, "Largest error of points [m] (default: 1e-6)")
           ->check(NumberFrom(1e-13, 1e9));
   app->add_option("--budget", command.budget,
                   "Wall-time budget per simulated second; find the most accurate method")

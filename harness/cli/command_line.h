@@ -148,7 +148,7 @@ inline void AddSize(CLI::App* app, std::string* size) {
 
 inline CLI::Option* AddGate(CLI::App* app, std::string* gate) {
   return app
-      ->add_option("--gate", *gate,
+      ->add_option("--fail-on", *gate,
                    "warnings: exit with 1 if an accuracy run shown did not finish or has warnings")
       ->check(CLI::IsMember({"warnings"}));
 }

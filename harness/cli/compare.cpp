@@ -257,7 +257,7 @@ JsonObject ComparisonDocument(const ComparisonReport& comparison, const CompareO
       .Add("only_in_base", comparison.only_base)
       .Add("only_in_new", comparison.only_fresh)
       .Add("more_than_once", comparison.ambiguous)
-      .Add("other_content", comparison.other_content)
+      .Add("other_config_hash", comparison.other_content)
       .Add("other_settings", comparison.other_settings)
       .Add("notes", notes);
 }
@@ -471,14 +471,14 @@ void AddCompare(Commands& commands) {
 
 void AddFit(Commands& commands) {
   auto& command = commands.Keep<FitCommand>();
-  CLI::App* app =
-      commands.Add("fit", "Fit scaling exponents of right-hand sides against mechanism size",
-                   [&](const Typed& typed) { return PrintFits(command, typed.line); });
+  CLI::App* app = commands.Add("fit-scaling",
+                               "Fit scaling exponents of right-hand sides against mechanism size",
+                               [&](const Typed& typed) { return PrintFits(command, typed.line); });
   app->footer(kFitFooter);
   app->add_option("file", command.file,
                   "JSON of Google Benchmark, or a result store with timings of families")
       ->required();
-  app->add_option("--from", command.from, "Leave out sizes below [bodies]")
+  app->add_option("--min-size", command.from, "Leave out sizes below [bodies]")
       ->check(NumberFrom(0.0, 1e9));
   app->add_option("--format", command.format, "How the table is written")
       ->check(CLI::IsMember({"text", "csv", "markdown"}))
@@ -489,7 +489,7 @@ void AddFit(Commands& commands) {
 
 void AddExport(Commands& commands) {
   auto& command = commands.Keep<ExportCommand>();
-  CLI::App* app = commands.Add("export", "Write measurements for a benchmark tracker",
+  CLI::App* app = commands.Add("export-metrics", "Write measurements for a benchmark tracker",
                                [&](const Typed&) { return ExportMeasurements(command); });
   app->footer(kExportFooter);
   app->add_option("file", command.file, kMeasurements)->required();

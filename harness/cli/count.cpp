@@ -222,7 +222,7 @@ Table CountTable(std::vector<Record> rows) {
   Table table{.rows = std::move(rows)};
   table.columns = {{"mechanism", "mechanism"},
                    {"formulation", "formulation"},
-                   {"enforcement", "level"},
+                   {"enforcement", "enforcement"},
                    {"coordinates", "coord."},
                    {"solver", "solver"},
                    {"bodies", "bodies", Format::kInteger},

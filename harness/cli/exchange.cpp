@@ -140,7 +140,7 @@ void AddImport(Commands& commands) {
   app->add_option("file", command.file, "The description (XML)")->required();
   app->add_option("-o,--out", command.out,
                   "Mechanism file (default: the file's name with .json, here)");
-  app->add_option("--format", options.format, "Expected input format")
+  app->add_option("--input-format", options.format, "Expected input format")
       ->check(CLI::IsMember(ImportFormats()));
   app->add_option("--loops", options.sidecar,
                   "Sidecar (JSON): loops, joints, forces, initial, gravity, observe");
@@ -253,7 +253,7 @@ is written: prescribed motions, forces that depend on time, drag, forces along a
 
 void AddConvert(Commands& commands) {
   auto& command = commands.Keep<ConvertCommand>();
-  CLI::App* app = commands.Add("convert", "Write a mechanism for MuJoCo or Simbody",
+  CLI::App* app = commands.Add("export-mechanism", "Write a mechanism for MuJoCo or Simbody",
                                [&](const Typed&) { return Convert(command); });
   app->add_option("mechanism", command.mechanism, "Mechanism file (JSON)")->required();
   app->add_option("--to", command.to,

@@ -247,9 +247,9 @@ Checked CheckFile(const std::filesystem::path& path, const CheckCommand& command
       const MapRules map = ReadMapRules(path);
       std::size_t rows = 0;
       for (const MapGroup& group : map.groups) rows += group.rows.size();
-      of("map", fmt::format("robustness map of {} rows and {} columns", rows, map.columns.size()))
+      of("map", fmt::format("robustness map of {} rows and {} methods", rows, map.columns.size()))
           .Add("rows", Count(rows))
-          .Add("columns", Count(map.columns.size()));
+          .Add("methods", Count(map.columns.size()));
       break;
     }
     case FileKind::kBenchmarks: {

@@ -275,7 +275,7 @@ JsonObject ExperimentDocument(const std::filesystem::path& path, const Experimen
       .Add("references", first.reference.has_value())
       .Add("sweep", sweep)
       .Add("problems", scenes)
-      .Add("columns", columns)
+      .Add("methods", columns)
       .Add("integrators", first.integrators)
       .Add("tolerances", first.tolerances)
       .Add("fixed_steps", first.fixed_steps)

@@ -62,8 +62,8 @@ void PrintFreedom(const Structure& s, const ExplainView& view) {
       s.joint_u - s.rank_nearby, s.joint_u, s.rank_nearby, s.loop_rows);
   if (s.locked() && s.freedom_at_start() > 0) {
     Say(view,
-        "  0 that lead anywhere: the start is singular, and what its constraints leave free to\n"
-        "  first order falls back to it\n");
+        "  0 finite motions: the start is singular, and its first-order motions\n"
+        "  lead back to it\n");
     return;
   }
   if (s.freedom_of_parts) {
@@ -100,27 +100,27 @@ void PrintRedundant(const MechanismDescription& description, const Structure& st
   } else {
     Say(view,
         "  They are redundant at every position: a run keeps the rank of the constraints and "
-        "observes all\n  (\"compile\": \"redundancy\").\n");
+        "observes all\n  (\"preprocess\": \"redundancy\").\n");
   }
 }
 
 void PrintIslands(const MechanismDescription& description, const Structure& structure,
                   const ExplainView& view) {
   Table table;
-  table.columns = {{"part", "part", Format::kInteger, {}},
+  table.columns = {{"subsystem", "subsystem", Format::kInteger, {}},
                    {"bodies", "bodies", Format::kInteger, {}},
                    {"first", "first body", Format::kText, {}},
                    {"held", "held by", Format::kText, {}}};
   for (std::size_t i = 0; i < structure.islands.size(); ++i) {
     const Island& island = structure.islands[i];
     Record row;
-    row.Set("part", static_cast<std::int64_t>(i + 1));
+    row.Set("subsystem", static_cast<std::int64_t>(i + 1));
     row.Set("bodies", static_cast<std::int64_t>(island.bodies.size()));
     row.Set("first", description.bodies[island.bodies.front()].name);
     row.Set("held", std::string(island.grounded ? "ground" : "nothing: it floats"));
     table.rows.push_back(row);
   }
-  PrintSection("Separate parts, connected through ground at most", table, view, "parts");
+  PrintSection("Separate subsystems, connected through ground at most", table, view, "subsystems");
 }
 
 void PrintCoordinates(const Structure& structure, const ExplainView& view) {
@@ -210,13 +210,13 @@ void DescribeStructure(const MechanismDescription& description, const Structure&
   };
   document->Add("start_outcome", std::string(ToString(s.start.outcome)))
       .Add("start_message", s.start.message)
-      .Add("freedom", JsonObject()
-                          .Add("by_counting", std::int64_t{s.counted_freedom})
-                          .Add("by_rank", known(s.freedom()))
-                          .Add("at_start", known(s.freedom_at_start()))
-                          .Add("constraints_of_loops", std::int64_t{s.loop_rows})
-                          .Add("rank", known(s.rank_nearby))
-                          .Add("rank_at_start", known(s.rank)))
+      .Add("degrees_of_freedom", JsonObject()
+                                     .Add("by_counting", std::int64_t{s.counted_freedom})
+                                     .Add("by_rank", known(s.freedom()))
+                                     .Add("at_start", known(s.freedom_at_start()))
+                                     .Add("constraints_of_loops", std::int64_t{s.loop_rows})
+                                     .Add("rank", known(s.rank_nearby))
+                                     .Add("rank_at_start", known(s.rank)))
       .Add("loops", LoopDocuments(description, s))
       .Add("redundant", redundant);
 }
@@ -256,7 +256,7 @@ int ExplainMechanism(const std::filesystem::path& path, const ExplainView& view)
   if (view.document != nullptr) {
     std::vector<std::string> texts;
     for (const Warning& warning : warnings) texts.push_back(warning.text);
-    view.document->Add("savings", compiled.report).Add("warnings", texts);
+    view.document->Add("simplifications", compiled.report).Add("warnings", texts);
   }
   Say(view, "\nWarnings\n");
   if (warnings.empty()) Say(view, "  none\n");

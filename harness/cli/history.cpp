@@ -133,7 +133,7 @@ JsonObject FindingsDocument(const History& history, const HistoryFindings& found
                       .Add("commits", commits)
                       .Add("values", values)
                       .Add("at_another_speed", unsteady)
-                      .Add("steps", steps));
+                      .Add("change_points", steps));
   }
   return JsonObject().Add("series", all).Add("endings", endings);
 }

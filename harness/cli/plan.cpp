@@ -182,14 +182,14 @@ void PrintPlan(const Overview& overview, const Plan& plan, const PlanCommand& co
   const Experiment& first = overview.experiments.front();
   Print("{}{}{}\n", first.name, first.comment.empty() ? "" : ": ", first.comment);
   PrintAxes(overview);
-  Print("  {} problems, {} columns, {} tolerances", first.scenes.size(), first.columns.size(),
+  Print("  {} problems, {} methods, {} tolerances", first.scenes.size(), first.columns.size(),
         first.tolerances.size());
   if (!first.fixed_steps.empty()) Print(", {} fixed steps", first.fixed_steps.size());
   if (first.integrators.size() > 1) Print(", {} integrators", first.integrators.size());
   Print("\n\n");
   Table table;
   table.columns = {{"mechanism", "mechanism", Format::kText, {}},
-                   {"column", "column", Format::kText, {}},
+                   {"column", "method", Format::kText, {}},
                    {"cases", "cases", Format::kInteger, {}},
                    {"runs", "runs", Format::kInteger, {}},
                    {"seconds", "estimate [s]", Format::kShortest, {}}};
@@ -241,7 +241,7 @@ JsonObject PlanDocument(const std::filesystem::path& path, const Overview& overv
   for (const Line& line : plan.lines) {
     lines.push_back(JsonObject()
                         .Add("mechanism", line.mechanism)
-                        .Add("column", line.column)
+                        .Add("method", line.column)
                         .Add("cases", Count(line.cases))
                         .Add("runs", Count(line.runs))
                         .Add("seconds", line.seconds));
@@ -296,14 +296,15 @@ void AddPlan(Commands& commands) {
   auto& conditions = commands.Keep<std::vector<std::string>>();
   auto& no_timing = commands.Keep<bool>();
   CLI::App* app =
-      commands.Add("plan", "Count cases and runs, and estimate their time", [&](const Typed&) {
+      commands.Add("estimate", "Count cases and runs, and estimate their time", [&](const Typed&) {
         command.files.filter = ParseSelection(conditions);
         command.files.settings = ParseSettings(settings);
         command.timing = !no_timing;
         return PrintPlans(command);
       });
   app->add_option("experiment", command.files.paths, "Experiment files (JSON)")->required();
-  app->add_option("--from", command.from, "Earlier results whose times are used, not a pilot's");
+  app->add_option("--timings-from", command.from,
+                  "Earlier results whose times are used, not a pilot's");
   AddFilter(app, &conditions);
   app->add_flag("--no-timing", no_timing, "Leave the timings out");
   AddSettings(app, &settings);

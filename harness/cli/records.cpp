@@ -50,7 +50,7 @@ void RefuseWhatNeedsAllRows(const TableCommand& command, const SceneReader& read
   }
   const std::string needs_all = !view.sort.empty()         ? "--sort"
                                 : !view.group.empty()      ? "--group"
-                                : !command.gate.empty()    ? "--gate"
+                                : !command.gate.empty()    ? "--fail-on"
                                 : view.kind == "factorial" ? "--kind factorial"
                                                            : "";
   if (needs_all.empty()) return;
@@ -273,8 +273,8 @@ int DoubtGate(const std::vector<Record>& rows) {
         "--fail-on warnings: found no accuracy run, expected one: such a gate cannot fail");
   }
   if (failed + doubted == 0) return 0;
-  PrintError("gate warnings: of {} runs {} did not finish and {} have warnings\n", runs, failed,
-             doubted);
+  PrintError("--fail-on warnings: of {} runs {} did not finish and {} have warnings\n", runs,
+             failed, doubted);
   return 1;
 }
 

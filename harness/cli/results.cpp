@@ -129,7 +129,7 @@ int WriteMap(const FailureMap& map, const MapCommand& command, const std::string
 int RedrawMap(const MapRules& rules, const MapCommand& command) {
   if (command.gate || command.out.empty()) {
     throw ConfigError(
-        fmt::format("{}: found a CSV, expected --out and no --gate (only the picture is drawn "
+        fmt::format("{}: found a CSV, expected --out and no --fail-on (only the picture is drawn "
                     "of it), or a store",
                     command.store.string()));
   }
@@ -150,8 +150,9 @@ void RequireDemands(const FailureMap& map, const std::filesystem::path& rules) {
       if (std::ranges::any_of(row, &MapCell::demanded)) return;
     }
   }
-  throw ConfigError(fmt::format(
-      "--gate: no cell of {} has to hold, expected a row with \"required\"", rules.string()));
+  throw ConfigError(
+      fmt::format("--fail-on required: no cell of {} has to hold, expected a row with \"required\"",
+                  rules.string()));
 }
 
 int PrintTable(const TableCommand& command, const std::string& typed) {
@@ -286,7 +287,7 @@ Rules name methods (columns), extremes (rows) and what decides about a row:
       "criteria": [{"measure": "branch_error_max", "limit": 500, "relative_to": "rtol", "unit": "rad"}],
       "rationale": "...", "required": "all"}]}]}
 "limit", "at_least" or "equal" compare a key of the record with a number, or with that many times
-another key ("of"). "expected_outcome": ["locked"] says how a run should end if not as finished.
+another key ("relative_to"). "expected_outcome": ["locked"] says how a run should end if not as finished.
 Of several records that match a cell the worst decides. A cell
   holds         ended as it should, all measures within their limits
   singular, ... stopped early with that reason; time-limit, ...: did not end by itself
@@ -356,7 +357,7 @@ void AddPlot(Commands& commands) {
 void AddVerdict(Commands& commands) {
   auto& command = commands.Keep<VerdictCommand>();
   CLI::App* app =
-      commands.Add("verdict", "Compare claims with stored records",
+      commands.Add("check-claims", "Compare claims with stored records",
                    [&](const Typed& typed) { return PrintVerdicts(command, typed.line); });
   app->add_option("store", command.store, "Folder of a run, or a .jsonl file")->required();
   app->add_option("--claims", command.claims, "Rules (JSON)")->required();
@@ -367,7 +368,7 @@ void AddVerdict(Commands& commands) {
 
 void AddMap(Commands& commands) {
   auto& command = commands.Keep<MapCommand>();
-  CLI::App* app = commands.Add("map", "Tabulate which methods pass which stress tests",
+  CLI::App* app = commands.Add("robustness", "Tabulate which methods pass which stress tests",
                                [&](const Typed& typed) { return PrintMap(command, typed.line); });
   app->add_option("store", command.store,
                   "Folder of a run, a .jsonl file, or robustness-map.csv to draw it again")
@@ -378,7 +379,10 @@ void AddMap(Commands& commands) {
       ->check(CLI::IsMember({"svg", "pdf"}))
       ->capture_default_str();
   AddSize(app, &command.size);
-  app->add_flag("--gate", command.gate, "Exit with 1 if a cell that must hold does not");
+  app->add_option_function<std::string>(
+         "--fail-on", [&command](const std::string&) { command.gate = true; },
+         "required: exit with 1 if a required cell fails")
+      ->check(CLI::IsMember({"required"}));
   AddWide(app);
   app->footer(kMapFooter);
 }

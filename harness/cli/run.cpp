@@ -65,8 +65,8 @@ int RunExperiments(const RunCommand& command, const std::string& typed) {
                     command.suite.shard);
   if (workload.is_long() && !command.gate.empty()) {
     throw ConfigError(fmt::format(
-        "--gate {}: found a sweep of more than {} combinations, whose records are not held at "
-        "once; judge parts of it: loopbench table STORE --where ... --gate {}",
+        "--fail-on {}: found a sweep of more than {} combinations, whose records are not held at "
+        "once; judge parts of it: loopbench table STORE --where ... --fail-on {}",
         command.gate, kLongSweep, command.gate));
   }
   RequirePeers(workload.some());

@@ -144,7 +144,7 @@ void PrintModels(const SceneModels& ladder, const ExplainView& view) {
                    {"bodies", "bodies", Format::kInteger, {}},
                    {"joints", "joints", Format::kInteger, {}},
                    {"speeds", "speeds", Format::kInteger, {}},
-                   {"error", "off by [m]", Format::kText, {}},
+                   {"error", "model error [m]", Format::kText, {}},
                    {"worst", "at", Format::kText, {}},
                    {"evaluations", "evaluations", Format::kInteger, {}},
                    {"gone", "gone", Format::kText, {}}};
@@ -174,7 +174,7 @@ void PrintModels(const SceneModels& ladder, const ExplainView& view) {
   Print("  speeds: in joint coordinates, before loops take theirs. gone: bodies by these names.\n");
   if (ladder.models.front().rhs_evaluations >= 0) {
     Print(
-        "  off by: the largest distance of a point of one name from where the whole model has "
+        "  model error: the largest distance of a point of one name from where the whole model has "
         "it.\n");
   }
 }
@@ -319,7 +319,7 @@ std::string SimplifyFooter() {
       "ladder\n"
       "  loopbench run ladder/NAME-ladder.json\n\n"
       "Bodies, joints and points keep their names; points of a body that another one took over\n"
-      "are called BODY.POINT there. ladder.md says what was done, what is gone, and when it is "
+      "are called BODY.POINT there. models.md says what was done, what is gone, and when it is "
       "right.",
       ideas);
 }
@@ -351,15 +351,15 @@ void AddSimplify(Commands& commands) {
                   "Length of the short run that shows what hardly moves [s], 0: none")
       ->check(NumberFrom(0.0, 1e6))
       ->capture_default_str();
-  app->add_option("--errors", command.errors,
+  app->add_option("--verify", command.errors,
                   "Run all models for so long [s] and say how far their points are off, 0: no")
       ->check(NumberFrom(0.0, 1e6))
       ->capture_default_str();
   CLI::Option* accept =
-      app->add_option("--accept", command.accept,
+      app->add_option("--max-model-error", command.accept,
                       "Largest error that a model may cause [m]: its verdict in the store")
           ->check(NumberFrom(1e-15, 1e6));
-  accept->needs("--errors");
+  accept->needs("--verify");
   app->add_option("--store", command.store,
                   "Add a record for each model to this store: error against the certified motion "
                   "of the whole one, times, verdict (loopbench table STORE --kind models)")
@@ -369,7 +369,7 @@ void AddSimplify(Commands& commands) {
       ->capture_default_str();
   AddWide(app);
   app->add_option("-o,--out", command.out,
-                  "New folder for the models, an experiment that runs them, and ladder.md")
+                  "New folder for the models, an experiment that runs them, and models.md")
       ->excludes(list);
   app->add_flag("--assembled", command.assembled,
                 "Begin from a whole model that says all of its assembled start");

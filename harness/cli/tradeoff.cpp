@@ -37,7 +37,7 @@ std::filesystem::path FolderOf(const TradeoffCommand& command) {
 
 void WriteTradeoff(const Tradeoff& tradeoff, const std::filesystem::path& folder,
                    const std::string& typed) {
-  const std::string stem = (folder / "tradeoff").string();
+  const std::string stem = (folder / "work-precision").string();
   Table rows = TradeoffTable(tradeoff, {.compact = false, .all = true});
   Table cheapest = CheapestTable(tradeoff);
   AppendProvenance(rows, typed);
@@ -72,7 +72,7 @@ int PrintTradeoff(const TradeoffCommand& command, const std::string& typed) {
   WriteTradeoff(tradeoff, folder, typed);
   if (command.format == "text") {
     PrintForPeople(tradeoff, command, typed);
-    const std::string stem = (folder / "tradeoff").string();
+    const std::string stem = (folder / "work-precision").string();
     Print("wrote {0}.csv, {0}-overview.csv, {0}.md\n", stem);
   } else {
     Table rows = TradeoffTable(tradeoff, {.compact = false, .all = true});
@@ -90,7 +90,7 @@ Examples:
   loopbench run mine.json --out out               ("timing": {"cases": true} in mine.json)
   loopbench work-precision out --figures
   loopbench work-precision out --where 'rtol>1e-11' --cost-key rhs_equivalents --error-levels 1e-2,1e-5
-  loopbench work-precision out --error-key closed_form_error_max --per mechanism,horizon,mass --out tradeoff
+  loopbench work-precision out --error-key closed_form_error_max --per mechanism,horizon,mass --out fronts
 
 Each accuracy run beside the timing of the same case, problem by problem (--per). Runs that failed
 or have warnings are compared with nobody, and listed with the reason. A '*' stands on the Pareto
@@ -106,7 +106,7 @@ void AddTradeoff(Commands& commands) {
   auto& conditions = commands.Keep<std::vector<std::string>>();
   auto& draws = commands.Keep<bool>();
   auto& drawn_as = commands.Keep<std::string>("svg");
-  CLI::App* app = commands.Add("tradeoff", "Compute work-precision tables and Pareto fronts",
+  CLI::App* app = commands.Add("work-precision", "Compute work-precision tables and Pareto fronts",
                                [&](const Typed& typed) {
                                  command.options.where = ParseSelection(conditions);
                                  if (draws) command.figures = drawn_as;
@@ -114,10 +114,10 @@ void AddTradeoff(Commands& commands) {
                                });
   app->add_option("store", command.store, "Folder of a run, or a .jsonl file")->required();
   TradeoffOptions& options = command.options;
-  app->add_option("--error", options.error,
+  app->add_option("--error-key", options.error,
                   "Key that is the error (default: error_position_max, or what the store "
                   "has)");
-  app->add_option("--cost", options.cost,
+  app->add_option("--cost-key", options.cost,
                   "Key that is the cost: wall_s (default: the timed median), "
                   "rhs_equivalents, steps, ...");
   app->add_option("--per", options.per, "Keys that make one problem: a,b")

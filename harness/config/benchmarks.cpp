@@ -185,13 +185,13 @@ const Fields<GroupInFile>& GroupFields() {
        {"", By(one_of_two, ReadMembers)},
        {"in_space", Bool(&GroupInFile::in_space),
         "The planar members, described in a tilted plane in space."},
-       {"compile", Bool(&GroupInFile::compile),
+       {"preprocess", Bool(&GroupInFile::compile),
         "The members' simplified parts in their place, with all savings."},
        {"", By(Json::object(), ChangeMembers)},
        {"measure", Choices(&BenchmarkGroup::kinds, NamesOf<BenchmarkKind>(), "what is measured"),
         "A right-hand side, an integrator step, or both.", "\"rhs\", \"step\" or both"},
        {"methods", Columns(&BenchmarkGroup::columns), "How the loops are imposed.",
-        "an array of columns"}});
+        "an array of methods"}});
   return fields;
 }
 

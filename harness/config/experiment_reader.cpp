@@ -386,14 +386,14 @@ const Fields<ExperimentFile>& ExperimentFileFields() {
       "experiment",
       "Which mechanisms, columns, tolerances and horizons are run. Lists expand as a cross "
       "product. The program checks more than this schema: that mechanism files exist and are "
-      "valid, that problems and columns are different, that fields of a sweep exist, that ranges "
+      "valid, that problems and methods are different, that fields of a sweep exist, that ranges "
       "have two different ends, and that every ensemble and exclusion matches a case.",
       DocumentRows<File>(
           {{"name", Text(&File::name), "Of the suite.", "a name"},
            {"comment", Text(&File::comment), "Free text for readers."},
            {"problems", ScenesValue(), "What moves.", "an array of problems"},
            {"methods", By(ColumnsSchema(), ReadAllColumns), "How the loops are imposed.",
-            "an array of columns"},
+            "an array of methods"},
            {"tolerances", By(some_or_none, ReadAnyTolerances),
             "rtol = atol of the integrator; above the spacing of doubles. May be left out, or be "
             "[], "
@@ -414,7 +414,7 @@ const Fields<ExperimentFile>& ExperimentFileFields() {
            {"jacobian", Choice(&File::jacobian, NamesOf<JacobianKind>(), "a kind of Jacobian"),
             "Where implicit profiles have their Jacobians from; explicit ones have none."},
            {"limits", Object(&File::limits, LimitsFields())},
-           {"compile", Object(&File::compile, CompileFields())},
+           {"preprocess", Object(&File::compile, CompileFields())},
            {"series", Section(SeriesFields())},
            {"timing", Object(&File::timing, TimingFields())},
            {"precision", By(PrecisionFields().Schema(), ReadPrecision)},
@@ -477,7 +477,8 @@ std::string LadderText(const LadderFile& ladder) {
       {"methods", columns},
       {"tolerances", {1e-6, 1e-9}},
       {"integrator", "dormand-prince"},
-      {"compile", {{"planar", false}, {"welds", false}, {"immovable", false}, {"islands", false}}},
+      {"preprocess",
+       {{"planar", false}, {"welds", false}, {"immovable", false}, {"islands", false}}},
       {"timing", {{"repeats", 5}}}};
   return JsonText(file);
 }

@@ -328,7 +328,7 @@ void ReadSeries(const JsonNode& node, ExperimentFile& experiment) {
 }
 
 void RequireSeriesAlone(const JsonNode& node, ReferenceOptions&) {
-  if (!node.Optional("series")) return;
+  if (!node.Optional("published_data")) return;
   for (const char* key : kOfCertified) {
     if (!node.Optional(key)) continue;
     node.FailAs(fmt::format("\"series\" beside \"{}\"", key),
@@ -339,7 +339,7 @@ void RequireSeriesAlone(const JsonNode& node, ReferenceOptions&) {
 Json SeriesAloneSchema() {
   Json others = Json::array();
   for (const char* key : kOfCertified) others.push_back(Requires({key}));
-  return {{"if", {{"required", {"series"}}}}, {"then", {{"not", {{"anyOf", others}}}}}};
+  return {{"if", {{"required", {"published_data"}}}}, {"then", {{"not", {{"anyOf", others}}}}}};
 }
 
 }  // namespace
@@ -358,7 +358,7 @@ const Fields<ReferenceOptions>& ReferenceFields() {
         "Times at which errors are taken, evenly from the start to the end."},
        {"cpu_s", Number(&ReferenceOptions::cpu_s, kPositive),
         "CPU time of each integration [s]. One that is cut off certifies as far as it got."},
-       {"series", EitherSchema({TextSchema(), MapSchema(TextSchema(), 1)}),
+       {"published_data", EitherSchema({TextSchema(), MapSchema(TextSchema(), 1)}),
         "Instead: path of a published series (series.schema.json), relative to this file; with "
         "several problems an object of such paths by the problems' names. Problems without one "
         "have no "
@@ -369,7 +369,7 @@ const Fields<ReferenceOptions>& ReferenceFields() {
 
 void ReadReferenceOptions(const JsonNode& node, ExperimentFile& experiment) {
   ReferenceFields().Read(node, &experiment.reference.emplace());
-  const auto series = node.Optional("series");
+  const auto series = node.Optional("published_data");
   if (!series) return;
   experiment.reference.reset();
   ReadSeries(*series, experiment);

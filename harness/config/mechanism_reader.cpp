@@ -428,7 +428,7 @@ const Fields<Draft>& InitialFields() {
         "joint [angle, x, y] in the plane, [qw, qx, qy, qz, x, y, z] in space."},
        {"speeds", By(values, ReadSpeeds, WriteSpeeds),
         "By joint; all of them are held when the loops are assembled."},
-       {"held", By(NamesSchema(), ReadHeld, WriteHeld),
+       {"fixed", By(NamesSchema(), ReadHeld, WriteHeld),
         "Joints whose coordinates the assembly must not move."}});
   return fields;
 }

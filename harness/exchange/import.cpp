@@ -385,7 +385,8 @@ const Fields<Sidecar>& SidecarFields() {
        {"joints", JointsValue(), "Joints given on both sides."},
        {"forces", ForcesValue(), "Besides gravity."},
        {"initial", Section(InitialFields()), "In place of the file's start."},
-       {"observe", Section(ObservationFields()), "Exact facts that observers compare with."}});
+       {"known_solution", Section(ObservationFields()),
+        "Exact facts that observers compare with."}});
   return fields;
 }
 

@@ -276,7 +276,7 @@ void CheckWhen(const JsonNode& node, DemandOfRow& demand) {
     return std::ranges::find(right, ending) != right.end();
   });
   if (possible) return;
-  constexpr const char* kExpected = "endings that are \"right\" here";
+  constexpr const char* kExpected = "endings that are \"expected_outcome\" here";
   if (const auto when = node.Optional("when")) {
     when->Fail(kExpected);
   } else {
@@ -293,7 +293,8 @@ const Fields<DemandOfRow>& DemandFields() {
        {"limit", NumberSchema(kPositive), "At most this."},
        {"at_least", NumberSchema(kPositive), "At least this."},
        {"equal", NumberSchema(), "Exactly this."},
-       {"of", Text(&Demand::of), "The number counts this many times another key of the record."},
+       {"relative_to", Text(&Demand::of),
+        "The number counts this many times another key of the record."},
        {"when", By(EndingsSchema(), ReadWhen),
         "Endings of runs that it applies to, default finished."},
        {"name", Text(&Demand::name), "A short word for cells."},
@@ -365,14 +366,14 @@ void ReadShared(const JsonNode& node, RowOfMap* row) {
     const Selection own = ReadSelection(*select, 1);
     row->select.insert(row->select.end(), own.begin(), own.end());
   }
-  if (const auto right = node.Optional("right")) row->right = ReadEndings(*right);
-  if (const auto decides = node.Optional("decides")) {
+  if (const auto right = node.Optional("expected_outcome")) row->right = ReadEndings(*right);
+  if (const auto decides = node.Optional("criteria")) {
     row->decides = ReadDemands(*decides, row->right);
   }
   if (const auto cases = node.Optional("cases")) {
     row->cases = static_cast<std::size_t>(cases->Integer(1, kMostCases));
   }
-  if (const auto why = node.Optional("why")) row->why = why->Text();
+  if (const auto why = node.Optional("rationale")) row->why = why->Text();
   // without columns everything that names one would be a mistake, and none of its own
   if (row->columns->all().empty()) return;
   if (const auto reasons = node.Optional("not_applicable")) ReadNotApplicable(*reasons, row);
@@ -385,14 +386,14 @@ std::vector<Field<T>> WithShared(std::vector<Field<T>> rows) {
   const Json text = TextSchema();
   const std::vector<Field<T>> shared = {
       {"select", SelectionSchema(1), "Which records, with those of the group and the column."},
-      {"decides", ArraySchema(DemandFields().Schema()), "Measures that must all be as demanded."},
-      {"right", EndingsSchema(), "How a run may end, default finished."},
+      {"criteria", ArraySchema(DemandFields().Schema()), "Measures that must all be as demanded."},
+      {"expected_outcome", EndingsSchema(), "How a run may end, default finished."},
       {"required", EitherSchema({text, ArraySchema(text)}),
-       "\"all\" or labels of columns, for --gate."},
+       "\"all\" or labels of methods, for --fail-on required."},
       {"not_applicable", EitherSchema({text, MapSchema(text)}),
        "Why a column has no record here, by its label, or one reason for all that need not hold."},
       {"cases", IntegerSchema(1, kMostCases), "How many records there should be, default 1."},
-      {"why", text, "Where the limits come from."}};
+      {"rationale", text, "Where the limits come from."}};
   rows.insert(rows.end(), shared.begin(), shared.end());
   return rows;
 }
@@ -409,7 +410,7 @@ void ReadRow(const JsonNode& node, RowOfMap& row) {
   };
   if (std::ranges::find(row.right, "finished") != row.right.end() && !decided("finished")) {
     node.FailAs("nothing that decides about a finished run",
-                "\"decides\" with a measure, here or in the group");
+                "\"criteria\" with a measure, here or in the group");
   }
 }
 
@@ -461,7 +462,7 @@ const Fields<MapColumn>& MethodFields() {
 
 void ReadMapColumns(const JsonNode& node, MapRules& rules) {
   std::vector<std::string> labels;
-  for (const JsonNode& element : node.Elements("columns")) {
+  for (const JsonNode& element : node.Elements("methods")) {
     MapColumn& column = rules.columns.emplace_back();
     if (!MethodFields().Read(element, &column)) continue;
     ReportRepeated(element, "label", column.label, &labels);
@@ -494,7 +495,7 @@ const Fields<MapRules>& MapFields() {
       DocumentRows<MapRules>(
           {{"title", Text(&MapRules::title), "Of the map.", kAnyText},
            {"comment", Text(&MapRules::comment), "Free text for readers."},
-           {"columns", By(ArraySchema(MethodFields().Schema(), 1), ReadMapColumns), "Methods.",
+           {"methods", By(ArraySchema(MethodFields().Schema(), 1), ReadMapColumns), "Methods.",
             "an array of columns"},
            {"groups", By(ArraySchema(MapGroupFields().Schema(), 1), ReadMapGroups),
             "Rows, in groups.", "an array of groups of rows"}}));

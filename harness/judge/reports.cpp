@@ -98,10 +98,10 @@ FailureMap MapFromCsv(const MapRules& rules, std::string_view csv, const std::st
       }
       return fields[static_cast<std::size_t>(at - heading.begin())];
     };
-    const auto cell = places.find({field("group"), field("row"), field("column")});
+    const auto cell = places.find({field("group"), field("row"), field("method")});
     if (cell == places.end()) {
       fail(
-          fmt::format("\"{}\" of \"{}\" for \"{}\"", field("row"), field("group"), field("column")),
+          fmt::format("\"{}\" of \"{}\" for \"{}\"", field("row"), field("group"), field("method")),
           "each cell of the rules once");
     }
     const auto state = StateNamed(field("state"));
@@ -177,7 +177,7 @@ void AddMapRows(const FailureMap& map, std::size_t group,
 }
 
 std::vector<TableColumn> MatrixColumns(const FailureMap& map, bool letters) {
-  std::vector<TableColumn> columns = {{"row", "extreme"}};
+  std::vector<TableColumn> columns = {{"row", "stress test"}};
   for (std::size_t c = 0; c < map.rules.columns.size(); ++c) {
     columns.push_back({ColumnKey(c), letters ? MethodLetter(c) : map.rules.columns[c].label});
   }
@@ -185,10 +185,11 @@ std::vector<TableColumn> MatrixColumns(const FailureMap& map, bool letters) {
 }
 
 Table LimitTable(const FailureMap& map) {
-  Table table{
-      .title = "Limits",
-      .columns = {
-          {"row", "extreme"}, {"right", "right ending"}, {"demands", "decides"}, {"why", "why"}}};
+  Table table{.title = "Limits",
+              .columns = {{"row", "stress test"},
+                          {"right", "expected outcome"},
+                          {"demands", "criteria"},
+                          {"why", "why"}}};
   for (const MapGroup& group : map.rules.groups) {
     for (const MapRow& row : group.rows) {
       std::vector<std::string> demands;
@@ -204,7 +205,7 @@ Table LimitTable(const FailureMap& map) {
 // Cells with a reason to be read: all but those that hold.
 Table DetailTable(const FailureMap& map) {
   Table table{.title = "Cells that do not hold",
-              .columns = {{"row", "extreme"},
+              .columns = {{"row", "stress test"},
                           {"column", "method"},
                           {"class", "class"},
                           {"number", "number"},
@@ -223,9 +224,9 @@ Table DetailTable(const FailureMap& map) {
 // Cells that hold with a run that trust does not let read "ok": each to be explained.
 Table DoubtTable(const FailureMap& map) {
   Table table{.title = "Cells that hold, with runs with warnings",
-              .columns = {{"row", "extreme"},
+              .columns = {{"row", "stress test"},
                           {"column", "method"},
-                          {"count", "uncertain"},
+                          {"count", "with warnings"},
                           {"warnings", "warnings"}}};
   EachCell(map, [&table](const MapGroup&, const MapRow& row, const MapColumn& column,
                          const MapCell& cell) {
@@ -285,9 +286,9 @@ Table MapTable(const FailureMap& map) {
 Table MapCellTable(const FailureMap& map) {
   Table table;
   for (const char* key :
-       {"group", "row",      "column", "state",   "class",     "outcome", "measure",
-        "value", "unit",     "limit",  "ratio",   "t_reached", "holding", "records",
-        "cases", "required", "reason", "case_id", "doubted",   "warnings"}) {
+       {"group", "row",      "method", "state",   "class",         "outcome", "measure",
+        "value", "unit",     "limit",  "ratio",   "t_reached",     "holding", "records",
+        "cases", "required", "reason", "case_id", "with_warnings", "warnings"}) {
     table.columns.push_back({key, key, Format::kShortest});
   }
   const auto count = [](std::size_t n) { return static_cast<std::int64_t>(n); };

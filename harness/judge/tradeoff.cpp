@@ -268,7 +268,7 @@ constexpr std::array kAspects = {
     Aspect{"horizon [s]", "horizon"},
     Aspect{"simplifications", "preprocessed", false, "none"},
     Aspect{"formulation", "formulation"},
-    Aspect{"level", "enforcement"},
+    Aspect{"enforcement", "enforcement"},
     Aspect{"coordinates", "coordinates"},
     Aspect{"solver", "solver"},
     Aspect{"integrator", "integrator"},

@@ -134,7 +134,7 @@ std::vector<Change> Changes() {
     }
   }
   changes.push_back({"coordinates", "coordinates", "joint", "absolute", "geometry"});
-  changes.push_back({"level", "enforcement", "velocity", "acceleration", "geometry"});
+  changes.push_back({"enforcement", "enforcement", "velocity", "acceleration", "geometry"});
   changes.push_back({"geometry", "geometry", "square", "general", "coordinates"});
   return changes;
 }

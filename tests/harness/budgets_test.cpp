@@ -64,16 +64,16 @@ constexpr Budget kBudgets[] = {
     {"harness/suite",           { 2320,  10,  16},  1500},
     {"harness/cluster",         {  496,   2,   5},   420},
     {"harness/advise",          {  657,   2,   8},  1000},
-    {"harness/tables",          { 2080,  10,   5},  1500},
-    {"harness/judge",           { 3680,  17,   6},  2700},
+    {"harness/tables",          { 2100,  10,   5},  1500},
+    {"harness/judge",           { 3690,  17,   6},  2700},
     {"harness/figures",         { 3040,  12,   7},  1900},
     {"harness/view",            { 2490,  10,   8},  2050},
-    {"harness/exchange",        { 7340,  30,  10},  5000},
+    {"harness/exchange",        { 7350,  30,  10},  5000},
     {"harness/report",          { 1100,   4,  10},  1200},
     {"harness/history",         { 1970,  10,   7},  1500},
-    {"harness/cli",             { 8080,  31,  29},  3600},
+    {"harness/cli",             { 8430,  32,  29},  3600},
     {"peers",                   {  709,  12,   5},   650},
-    {"",                        {86100, 506, 238}, 62000}
+    {"",                        {86500, 509, 238}, 62000}
 };
 // clang-format on
 

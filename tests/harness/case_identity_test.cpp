@@ -68,9 +68,9 @@ TEST_F(CaseIdentity, TablesShowEveryContentAndTellThemApart) {
   int figures = 0;
   for (const auto& file : fs::directory_iterator(folder_ / "figures")) {
     const std::string name = file.path().filename().string();
-    if (!name.starts_with("drift-four-bar-0.5s-rtol-1e-06-content-")) continue;
+    if (!name.starts_with("drift-four-bar-0.5s-rtol-1e-06-config_hash-")) continue;
     ++figures;
-    EXPECT_EQ(ReadFile(file.path()).find("content " + mass1) != std::string::npos,
+    EXPECT_EQ(ReadFile(file.path()).find("config_hash " + mass1) != std::string::npos,
               name.find(mass1) != std::string::npos);
   }
   EXPECT_EQ(figures, 2) << "each content has a figure of its own";

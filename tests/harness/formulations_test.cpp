@@ -131,7 +131,7 @@ TEST(FormulationsTest, ALevelThatItDoesNotHaveIsAMistakeOfTheFile) {
     EXPECT_EQ(MistakeOf("projection"), "none");
     const std::string mistake = MistakeOf("velocity");
     for (const char* part : {"/methods/0", "\"echo\" at level \"velocity\"",
-                             "a level that it has: acceleration, position"}) {
+                             "a level that it has: acceleration, projection"}) {
       EXPECT_NE(mistake.find(part), std::string::npos) << mistake;
     }
   });

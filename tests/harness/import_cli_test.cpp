@@ -89,7 +89,7 @@ TEST_F(ImportCommandLine, WritesNothingWhenItRefuses) {
   ExpectEnding(Call("import missing.xml"), 2, {"missing.xml"});
   ExpectEnding(Call("import '" + kImports + "/acrobot.xml' --gravity 1,2"), 2,
                {"--gravity 1,2", "three numbers"});
-  ExpectEnding(Call("import '" + kImports + "/acrobot.xml' --format sdf"), 2,
+  ExpectEnding(Call("import '" + kImports + "/acrobot.xml' --input-format sdf"), 2,
                {"found mjcf, expected sdf"});
   ExpectEnding(Call("import '" + kImports + "/acrobot.xml' --floating"), 2, {"--floating"});
   ExpectEnding(Call("import '" + kImports + "/bennett.urdf' --planar --loops '" + kImports +

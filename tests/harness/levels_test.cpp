@@ -141,7 +141,7 @@ TEST(LevelsTest, ANewNameIsValidWhereverTheOthersAre) {
     }
     std::string schema = SchemaOfKind("experiment");
     std::erase_if(schema, [](char c) { return c == ' ' || c == '\n'; });
-    ExpectPart(schema, R"("velocity","position","baumgarte","half-velocity","spring"])");
+    ExpectPart(schema, R"("velocity","projection","baumgarte","half-velocity","spring"])");
   });
 }
 

@@ -187,7 +187,8 @@ void AddRun(Commands& commands) {
   app->add_option("-o,--out", command.out,
                   "Folder for results.jsonl, drift.csv and timing.csv "
                   "(default: results/runs/NAME)");
-  app->add_option("-j,--jobs", command.suite.jobs, "Accuracy cases at once; timings run alone")
+  app->add_option("-j,--jobs", command.suite.jobs,
+                  "Accuracy cases to run in parallel; timings run alone")
       ->check(NumberFrom(1, 1024))
       ->capture_default_str();
   app->add_option("--threads", command.threads,
@@ -196,7 +197,8 @@ void AddRun(Commands& commands) {
   AddFilter(app, &options.conditions);
   AddSettings(app, &options.settings);
   AddWide(app);
-  app->add_option("--shard", options.shard, "k/n: the k-th of n parts, to be merged later")
+  app->add_option("--shard", options.shard,
+                  "k/n: the k-th of n parts; loopbench merge joins their results")
       ->capture_default_str();
   app->add_flag("--isolate", command.suite.isolate,
                 "Every case in a process of its own; else short ones share processes");
@@ -206,7 +208,14 @@ void AddRun(Commands& commands) {
       ->check(CLI::IsMember({"none", "failed", "all"}))
       ->capture_default_str();
   CLI::Option* gate = AddGate(app, &command.gate);
-  app->footer("A run that was interrupted goes on where it stopped: give the same command again.");
+  app->footer(
+      "The same command resumes an interrupted run. A failed case is a record with its outcome.\n"
+      "Exit status: 0; 1 if --fail-on finds warnings or failed runs; 2 for wrong files or "
+      "options.\n"
+      "Examples:\n"
+      "  loopbench run my-drift.json --jobs 2 --out out          two cases at a time\n"
+      "  loopbench run my-drift.json --filter formulation=odca --set /limits/cpu_s=60\n"
+      "  loopbench run my-drift.json --shard 1/4 --out part-1    then loopbench merge");
   CLI::Option* no = app->add_flag("--no-timing", options.no_timing, "Leave the timings out");
   CLI::Option* timings =
       app->add_flag("--timing-only", options.timing_only, "Only the timings")->excludes(no);

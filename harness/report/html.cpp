@@ -68,7 +68,7 @@ std::string TableText(const ReportTable& table) {
     return [key](const Record& row) { return ScriptString(row.Text(key)); };
   };
   return fmt::format(
-      R"({{"kind":"{}","title":{},"command":{},"alike":{},"names":{},"problems":{},"ids":{},"warnings":{},"failed":{},"formulations":{},"absolute":{},"messages":{},"methods":{}}})",
+      R"({{"kind":"{}","title":{},"command":{},"alike":{},"names":{},"scenes":{},"ids":{},"doubts":{},"failed":{},"formulations":{},"absolute":{},"messages":{},"columns":{}}})",
       table.kind, ScriptString(table.title), ScriptString(table.command), Strings(table.alike),
       Strings(table.names), Strings(table.scenes), ListOf(table.rows, text("case_id")),
       ListOf(table.rows, text("warnings")),
@@ -157,7 +157,7 @@ std::string MapText(const FailureMap& map, const std::string& command) {
                           ScriptString(group.label), rows);
   }
   return fmt::format(
-      R"({{"title":{},"comment":{},"command":{},"states":{},"methods":{},"remarks":{},"groups":[{}]}})",
+      R"({{"title":{},"comment":{},"command":{},"states":{},"columns":{},"remarks":{},"groups":[{}]}})",
       ScriptString(map.rules.title), ScriptString(map.rules.comment), ScriptString(command),
       ListOf(kCellStates, [](CellState state) { return ScriptString(ToString(state)); }),
       ListOf(map.rules.columns, [](const MapColumn& one) { return ScriptString(one.label); }),
@@ -181,9 +181,9 @@ std::string SceneText(const ReportScene& scene) {
 
 std::vector<DataElement> ToJson(const ReportData& data) {
   std::vector<DataElement> elements = {
-      {"tables", fmt::format(R"({{"looks":{},"warnings":{},"tables":{}}})", LooksText(),
-                             DoubtsText(), ListOf(data.tables, TableText))},
-      {"problems", ListOf(data.scenes, SceneText)},
+      {"tables", fmt::format(R"({{"looks":{},"doubts":{},"tables":{}}})", LooksText(), DoubtsText(),
+                             ListOf(data.tables, TableText))},
+      {"scenes", ListOf(data.scenes, SceneText)},
       {"costs", ListOf(data.costs, CostText)},
       {"plots", ListOf(data.plots, [](const ReportPlot& plot) {
          return fmt::format(R"({{"name":"{}","title":{},"unit":{}}})", plot.name,

@@ -187,8 +187,7 @@ void AddRun(Commands& commands) {
   app->add_option("-o,--out", command.out,
                   "Folder for results.jsonl, drift.csv and timing.csv "
                   "(default: results/runs/NAME)");
-  app->add_option("-j,--jobs", command.suite.jobs,
-                  "Accuracy cases to run in parallel; timings run alone")
+  app->add_option("-j,--jobs", command.suite.jobs, "Accuracy cases in parallel; timings alone")
       ->check(NumberFrom(1, 1024))
       ->capture_default_str();
   app->add_option("--threads", command.threads,
@@ -197,8 +196,7 @@ void AddRun(Commands& commands) {
   AddFilter(app, &options.conditions);
   AddSettings(app, &options.settings);
   AddWide(app);
-  app->add_option("--shard", options.shard,
-                  "k/n: the k-th of n parts; loopbench merge joins their results")
+  app->add_option("--shard", options.shard, "k/n: the k-th of n parts, joined by merge")
       ->capture_default_str();
   app->add_flag("--isolate", command.suite.isolate,
                 "Every case in a process of its own; else short ones share processes");

@@ -27,19 +27,19 @@ namespace {
 
 struct AdviseCommand {
   std::filesystem::path mechanism;
-  double error = 0.0;               ///< to be kept [m]; 0: not given
+  double error = 0.0;               ///< error limit [m]; 0: not given
   double budget = 0.0;              ///< wall seconds per simulated second; 0: not given
   double horizon = 10.0;            ///< [s]
   std::vector<std::string> points;  ///< BODY.POINT or BODY; empty: all
   std::filesystem::path out;        ///< file of the experiment that reproduces the advice
   std::string format = "text";      ///< of the table: text, csv, markdown, json, latex
-  bool simplify = false;            ///< simpler models of the scene too
-  bool generated = false;           ///< generated code too
-  bool exhaustive = false;          ///< the whole product in place of a pilot
+  bool simplify = false;            ///< include simpler models of the problem
+  bool generated = false;           ///< include generated code
+  bool exhaustive = false;          ///< test the whole product instead of a pilot
   ProcessLimits limits = {.cpu_s = 120.0, .memory_mb = 2048.0};
 };
 
-/// Of all CPU time, what the reference's three witnesses may take each.
+/// Shares of the total CPU time: limit of each of the reference's three witness runs.
 constexpr double kWitnessShare = 0.15, kPilotShare = 0.4;
 
 MeasuredPoint PointNamed(const MechanismDescription& user, const std::string& name) {
@@ -110,10 +110,10 @@ Table TableOf(const std::vector<Trial>& trials, const Trial& best, double horizo
   return table;
 }
 
-/// The experiment that runs one choice and times it.
+/// Returns the experiment that runs one choice and times it.
 std::string ExperimentOf(const AdviseCommand& command, const Choice& choice, double horizon,
                          ReferenceOptions reference) {
-  reference.cpu_s *= 2;  // as far on a machine that is busier
+  reference.cpu_s *= 2;  // reaches the same time on a machine with more load
   const auto folder = std::filesystem::absolute(command.out).parent_path();
   return ExperimentText(
       {.name = "advice for " + command.mechanism.stem().string(),
@@ -138,7 +138,7 @@ Experiment SingleOf(const MechanismFile& file, double horizon) {
   return experiment;
 }
 
-/// Enters the doubts of the written experiment's run and its largest error over all points.
+/// Enters the warnings of the written experiment's run and its largest error over all points.
 void Examine(const MechanismFile& file, double horizon, const Reference& reference,
              bool has_all_points, Trial& trial) {
   const Experiment experiment = SingleOf(file, horizon);
@@ -158,8 +158,7 @@ void Examine(const MechanismFile& file, double horizon, const Reference& referen
   if (finished && has_all_points) trial.error = record.Number("error_position_max");
 }
 
-/// Throws where the points that errors are taken of stay where they are: every method is then
-/// right.
+/// Throws if the points used for errors do not move: every method would then be exact.
 void RequireMotion(const std::string& name, const MechanismDescription& user,
                    const CertainMotion& certain, const std::vector<MeasuredPoint>& points) {
   const Reference& reference = certain.reference;
@@ -287,7 +286,7 @@ Advice AdviceFor(const AdviseCommand& command, const MechanismFile& file,
   return advice;
 }
 
-/// What a model causes and saves, as a row; `whole` is what the whole model takes [s].
+/// Returns a model's error and savings as a row; `whole` is the time of the full model [s].
 Record RowOfModel(const AdviseCommand& command, const MechanismFile& file,
                   const CertainMotion& certain, const SceneModel& model, double whole) {
   Record row;
@@ -296,7 +295,7 @@ Record RowOfModel(const AdviseCommand& command, const MechanismFile& file,
     row.Set("verdict", "refused: " + why);
     return row;
   };
-  // the same times: those of the whole model
+  // the same times as the full model
   const CertainMotion own = CertainFor(command, model.description, certain.horizon);
   if (own.horizon < certain.horizon) {
     return refuse(own.reference.message.empty() ? "its motion is not certified so far"
@@ -310,7 +309,7 @@ Record RowOfModel(const AdviseCommand& command, const MechanismFile& file,
   }
   row.Set("caused", caused.largest);
   row.Set("point", caused.point);
-  // half of the error is left to the integrator
+  // half of the error is reserved for the integrator
   if (!(caused.largest <= command.error / 2)) return refuse("its error is too large");
   const Advice advice = AdviceFor(command, {model.description, model.observe, ""}, own, {},
                                   {.error = command.error - caused.largest,
@@ -401,8 +400,8 @@ int AdviseInChild(const AdviseCommand& command, const MechanismFile& file) {
   return advice.reached ? 0 : 1;
 }
 
-/// Prints the cheapest way to run the mechanism that keeps the error, or the most accurate within
-/// the budget, and what that rests on. 1 where nothing reached what was asked for.
+/// Prints the cheapest way to run the mechanism within the error, or the most accurate one within
+/// the budget, and its basis. Returns 1 if no method met the requirement.
 int GiveAdvice(const AdviseCommand& command) {
   const MechanismFile file = ReadMechanism(command.mechanism);
   if (!command.out.empty()) RequireOutput(command.out);

@@ -1,4 +1,4 @@
-// baseline: a repository's own baseline, measured again and held against what is committed.
+// baseline: a repository's own baseline, measured again and compared with the committed one.
 #include <fmt/format.h>
 
 #include <algorithm>
@@ -28,16 +28,16 @@ namespace {
 struct BaselineCommand {
   std::string action;  ///< check, renew or selftest
   std::vector<std::filesystem::path> experiments;
-  std::filesystem::path dir;      ///< of results.jsonl, which is committed
-  std::filesystem::path counts;   ///< benchmarks whose instructions are counted; none when empty
-  std::filesystem::path counter;  ///< loopbench_count; empty: beside this program, else from PATH
-  std::filesystem::path keep;     ///< folder for what was measured; a temporary one when empty
+  std::filesystem::path dir;      ///< folder of the committed results.jsonl
+  std::filesystem::path counts;   ///< benchmarks whose instructions are counted; none if empty
+  std::filesystem::path counter;  ///< loopbench_count; empty: next to this program, else from PATH
+  std::filesystem::path keep;     ///< folder for the measurements; a temporary one if empty
   int jobs = 1;
 };
 
 constexpr const char* kResults = "results.jsonl";
 
-/// What is kept is kept in a folder of its own: the files in it are overwritten.
+/// Requires a separate folder for kept measurements, because files in it are overwritten.
 void RequireNewFolder(const std::filesystem::path& kept, const std::filesystem::path& baseline) {
   const auto plain = [](const std::filesystem::path& path) {
     const auto whole = std::filesystem::weakly_canonical(path);
@@ -79,7 +79,7 @@ void RequirePrograms(const BaselineCommand& command) {
   }
 }
 
-/// Runs a program for what it leaves. Throws with what it said when it fails.
+/// Runs a program for its output files. Throws with its messages if it fails.
 void MustRun(std::vector<std::string> words, const std::string& name) {
   const ProgramResult result = RunProgram(std::move(words));
   if (const std::string failure = result.Failure(name); !failure.empty()) {
@@ -87,13 +87,13 @@ void MustRun(std::vector<std::string> words, const std::string& name) {
   }
 }
 
-/// 20 evaluations per case, and `planted` more that are not reported.
+/// Counts 20 evaluations per case, and `planted` more that are not reported.
 void CountInstructions(const BaselineCommand& command, const std::filesystem::path& out,
                        int planted) {
   const std::string counter = CounterOf(command);
   const std::string dump = out.string() + ".callgrind";
-  // without environment and, where that may be switched off, address randomisation: the same
-  // instructions every time
+  // without environment and, if possible, without address randomisation: the same instructions
+  // every time
   std::vector<std::string> words = {"env", "-i"};
   if (RunProgram({"setarch", "-R", "true"}).status == 0)
     words.insert(words.end(), {"setarch", "-R"});
@@ -105,7 +105,7 @@ void CountInstructions(const BaselineCommand& command, const std::filesystem::pa
   MustRun({counter, command.counts.string(), "--callgrind", dump, "--out", out.string()}, counter);
 }
 
-/// All measurements into work/results.jsonl; the exit code of an interruption, or 0.
+/// Writes all measurements to work/results.jsonl; returns the exit code of an interruption, or 0.
 int MeasureAll(const BaselineCommand& command, const std::filesystem::path& work) {
   Workload workload({command.experiments, {}, {}, 0}, {});
   if (workload.is_long()) {
@@ -146,10 +146,10 @@ std::vector<Record> Load(const std::filesystem::path& path) {
   return ReadMeasurements(path, &warnings);
 }
 
-/// A change of measured values that the comparison must catch.
+/// Change of measured values that the comparison must detect.
 struct Plant {
   std::string what, measure;
-  /// True when the record has what it changes, and was changed.
+  /// Returns true if the record has the value and it was changed.
   std::function<bool(Record*)> change;
 };
 
@@ -195,7 +195,7 @@ bool IsCaught(const ComparisonReport& report, const CompareOptions& options,
          });
 }
 
-/// Plants each change into one record after the other's kind; 1 when one is not caught.
+/// Plants each change into one record of the measurements; returns 1 if one is not detected.
 int SelfTest(const BaselineCommand& command, const std::filesystem::path& work) {
   const CompareOptions options;
   const std::vector<Record> base = Load(work / kResults);
@@ -227,10 +227,10 @@ int SelfTest(const BaselineCommand& command, const std::filesystem::path& work) 
   return missed == 0 ? 0 : 1;
 }
 
-/// check: 0 the same or better, 1 worse, 2 could not measure. renew: 0, and dir/results.jsonl is
-/// what was measured. selftest: 0 when each planted change was caught, 1 when one was not.
-/// @throws ConfigError when valgrind or loopbench_count are wanted and not there, before anything
-///         is measured
+/// check: returns 0 for equal or better, 1 for worse, 2 if it could not measure. renew: writes
+/// dir/results.jsonl, returns 0. selftest: returns 0 if each planted change was detected, else 1.
+/// @throws ConfigError before any measurement if valgrind or loopbench_count are required but
+/// missing
 int Baseline(const BaselineCommand& command, const std::string& typed) {
   if (!command.keep.empty()) RequireNewFolder(command.keep, command.dir);
   const auto baseline = command.dir / kResults;

@@ -1,4 +1,4 @@
-// submit, status and collect: a run in parts.
+// submit, status and collect: a run divided into parts.
 #include "harness/cluster/cluster.h"
 
 #include <fmt/chrono.h>
@@ -29,8 +29,8 @@ namespace {
 struct SubmitCommand {
   ClusterRun run;
   std::filesystem::path folder;
-  bool again = false;  ///< the parts of a folder that is there and that are neither done nor queued
-  bool queue = true;   ///< false: write the folder only, for another engine
+  bool again = false;    ///< only parts of an existing folder that are neither done nor queued
+  bool queue = true;     ///< false: write the folder only, for another engine
   bool dry_run = false;  ///< print the scripts, write nothing
 };
 
@@ -42,7 +42,7 @@ std::vector<int> PartsNotDone(const ClusterRun& run, const std::filesystem::path
   return parts;
 }
 
-/// There when all parts are merged.
+/// Returns the file that exists once all parts are merged.
 std::filesystem::path WholeFile(const std::filesystem::path& folder) {
   return StoreFile(folder / "whole");
 }
@@ -51,7 +51,7 @@ std::string SubmitAgainLine(const std::filesystem::path& folder) {
   return ShellLine({"loopbench", "submit", "--resubmit", "--out", folder.string()});
 }
 
-/// Submits the array of `parts` and the job behind it, and writes down their numbers.
+/// Submits the array of `parts` and the dependent job, and stores their numbers.
 void Queue(const std::vector<int>& parts, const std::filesystem::path& folder, ClusterRun* run) {
   WriteFileAtomically(folder / "array.sh", ArrayScript(*run, folder, parts));
   run->array_job = SubmitJob(folder / "array.sh", {});
@@ -63,7 +63,7 @@ void Queue(const std::vector<int>& parts, const std::filesystem::path& folder, C
   Print("  {}\n", ShellLine({"loopbench", "status", folder.string()}));
 }
 
-/// Those that are not there: a person may have put something of the machines into them.
+/// Writes missing scripts only: the user may have adapted existing ones to the machines.
 void WriteScripts(const ClusterRun& run, const std::filesystem::path& folder) {
   MakeFolderOf(folder / "logs" / "x");
   WriteNewFile(folder / "part.sh", PartScript(run, folder));
@@ -101,7 +101,7 @@ int SubmitAgain(const SubmitCommand& command) {
     PrintText(ArrayScript(run, command.folder, parts));
     return 0;
   }
-  // the merge waits for one array: what the last one still has must come to its end first
+  // the merge depends on one array: remaining parts of the last one must end first
   if (!queued->empty()) {
     throw std::runtime_error(fmt::format(
         "{}: {} parts are still in the queue as job {}; wait for them, or scancel them first",
@@ -111,12 +111,12 @@ int SubmitAgain(const SubmitCommand& command) {
   return 0;
 }
 
-/// "id"s of the accuracy cases, in the order of the experiments.
+/// Returns the "id"s of the accuracy cases, in the order of the experiments.
 std::vector<std::string> OrderOfCases(const ClusterRun& run) {
   const ExperimentFiles files = FilesOf(run);
   Workload workload(files);
   std::vector<std::string> ids;
-  std::set<std::string> known;  // a case that two files share is one case
+  std::set<std::string> known;  // a case in two files counts once
   for (std::size_t group = 0; group < workload.groups(); ++group) {
     for (const Experiment& experiment : workload.Read(group).experiments) {
       for (const Case& one : SelectCases(experiment, files.filter)) {
@@ -192,7 +192,7 @@ JsonObject StatusDocument(const ClusterRun& run, const std::vector<PartProgress>
       .Add("parts", rows);
 }
 
-/// Slurm reads its options from comment lines of the script, which a line end would cut.
+/// Rejects line ends: Slurm reads its options from comment lines of the script.
 void RequireOneLine(const std::string& option, const std::string& text) {
   if (text.find_first_of("\n\r") == std::string::npos) return;
   throw ConfigError(
@@ -244,7 +244,7 @@ int Submit(SubmitCommand command) {
   return 0;
 }
 
-/// 0; 2 when the folder is none.
+/// Returns 0, or 2 if the folder is no cluster run.
 int PrintStatus(const std::filesystem::path& folder, bool json) {
   const ClusterRun run = ReadClusterRun(folder);
   std::string problem;
@@ -253,7 +253,7 @@ int PrintStatus(const std::filesystem::path& folder, bool json) {
   for (int part = 1; part <= run.parts; ++part) {
     parts.push_back(ProgressOfPart(run, folder, part, Now()));
     PartProgress& progress = parts.back();
-    // a part that ran to its end is done, whatever is still queued for it
+    // a completed part is done, even if jobs for it are still queued
     if (progress.state == "done" || !queued) continue;
     if (const auto task = queued->find(part); task != queued->end()) progress.state = task->second;
   }
@@ -284,8 +284,8 @@ int PrintStatus(const std::filesystem::path& folder, bool json) {
   return 0;
 }
 
-/// All parts into folder/whole, in the order of the experiments: 0. 1, and nothing is written, when
-/// a case is missing.
+/// Merges all parts into folder/whole in the order of the experiments and returns 0. Returns 1 and
+/// writes nothing if a case is missing.
 int Collect(const std::filesystem::path& folder) {
   const ClusterRun run = ReadClusterRun(folder);
   if (const std::vector<int> open = PartsNotDone(run, folder); !open.empty()) {
@@ -316,7 +316,7 @@ Examples:
   loopbench status /shared/sweep
   loopbench submit --resubmit --out /shared/sweep)";
 
-/// All that was asked for once stands in the folder.
+/// Rejects further options: the folder contains all options of the first submission.
 void RequireNothingElse(const CLI::App& submit) {
   const std::set<std::string> may_stand = {"--resubmit", "--out", "--no-queue", "--dry-run"};
   for (const CLI::Option* option : submit.get_options()) {

@@ -1,4 +1,4 @@
-// Subcommands with their options, and what the options of several share.
+// Subcommands of the program, and options that several of them share.
 #pragma once
 
 #include <CLI/CLI.hpp>
@@ -16,16 +16,16 @@
 
 namespace loopbench::harness {
 
-/// The words of a call.
+/// Command line of a call.
 struct Typed {
   std::string line;   ///< for provenance (CommandLine)
-  std::string again;  ///< as a shell takes it (ShellLine)
+  std::string again;  ///< in shell syntax (ShellLine)
 };
 
-/// The subcommands of the program. Values of options belong to it: `app` parses into them.
+/// The subcommands of the program. The object owns option values: `app` parses into them.
 class Commands {
  public:
-  /// What gives the exit code of a subcommand that was parsed.
+  /// Runs a parsed subcommand and returns its exit code.
   using Runner = std::function<int(const Typed&)>;
 
   explicit Commands(CLI::App* app) : app_(app) {}
@@ -44,7 +44,7 @@ class Commands {
     return runners_.back().first;
   }
 
-  /// Runs the one that was parsed.
+  /// Runs the parsed subcommand and returns its exit code, 0 if there is none.
   int Run(const Typed& typed) const {
     for (const auto& [app, run] : runners_) {
       if (*app) return run(typed);
@@ -58,7 +58,7 @@ class Commands {
   std::vector<std::pair<CLI::App*, Runner>> runners_;
 };
 
-// Each adds one subcommand, or some that belong together.
+// Each function adds one subcommand or several related ones.
 void AddRun(Commands& commands);
 void AddMerge(Commands& commands);
 void AddList(Commands& commands);
@@ -87,11 +87,11 @@ void AddCluster(Commands& commands);
 void AddHistory(Commands& commands);
 void AddShell(Commands& commands);
 
-/// Lines about the words that no subcommand or option took, each with the nearest that there is; ""
-/// when there are none. `app` is the whole program, after a parse that failed.
+/// Returns one line for each word that no subcommand or option accepts, with a spelling suggestion;
+/// "" if there are none. `app` is the whole program after a failed parse.
 std::string WhatWasMeant(const CLI::App& app);
 
-/// The message, with the remedy if an unknown key in it is an old name.
+/// Returns the message, with the remedy if an unknown key in it is an old name.
 std::string WithMigrationHint(std::string message);
 
 inline Selection ParseSelection(const std::vector<std::string>& conditions) {
@@ -106,12 +106,12 @@ inline std::vector<Setting> ParseSettings(const std::vector<std::string>& texts)
   return settings;
 }
 
-/// For commands that print tables.
+/// Adds --wide, for commands that print tables.
 inline void AddWide(CLI::App* app) {
   app->add_flag_callback("--wide", ShowWide, "Show all columns; do not fit tables to the terminal");
 }
 
-/// Limits of work on a mechanism; experiments contain their own ("limits").
+/// Adds limits of the work on a mechanism file; experiments contain their own ("limits").
 inline void AddLimits(CLI::App* app, ProcessLimits* limits) {
   app->add_option("--cpu-limit", limits->cpu_s, "CPU time limit per mechanism file [s]")
       ->check(NumberFrom(0.001, 1e9))
@@ -135,7 +135,7 @@ inline void AddWhere(CLI::App* app, std::vector<std::string>* conditions) {
                   "Only records with key=value[,value] (or !=, <, <=, >, >=)");
 }
 
-/// Repeatable, one value each: a second word would be the name of a file.
+/// Repeatable option with one value each: a second word would be a file name.
 inline void AddSettings(CLI::App* app, std::vector<std::string>* settings) {
   app->add_option("--set", *settings, "Set a field before reading: /json/pointer=value");
 }

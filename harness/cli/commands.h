@@ -1,4 +1,4 @@
-// What several subcommands call.
+// Functions that several subcommands call.
 //
 // Subcommands return an exit code: 0 done, 1 a gate failed, 2 could not measure or bad input. Bad
 // input throws ConfigError or std::runtime_error, which Main() (program.h) turns into a message
@@ -27,22 +27,22 @@
 
 namespace loopbench::harness {
 
-/// The records of a store, the last of each case, in the order of tables, with their doubts as they
-/// stand beside each other; warnings about it go to standard error.
-/// `watch` as for ReadRecords(). Throws ConfigError where the machine has no room for them.
+/// Returns the last record of each case of a store in table order, with warnings from comparing
+/// records. Warnings about the store go to standard error. `watch` as for ReadRecords(). Throws
+/// ConfigError if the machine has too little memory.
 std::vector<Record> LoadRecords(const std::filesystem::path& store, const Selection& where = {},
                                 const ReadWatch& watch = {});
 
-/// What LoadRecords() makes of all records of some scenes.
+/// Processes all records of some problems as LoadRecords() does.
 std::vector<Record> Prepared(std::vector<Record> records);
 
-/// drift.csv, drift.md and so on of precision and timing in the folder of a store, or beside a
-/// store that is a file, named after it; their short forms on the terminal.
+/// Writes drift.csv, drift.md, precision and timing tables to the store's folder, or next to a
+/// store that is a file, named after it. Prints their short forms.
 void WriteTables(const std::vector<Record>& records, const std::filesystem::path& store,
                  const std::string& typed);
 
-/// 1 when an accuracy run among `rows` did not finish or has doubts, and says how many; else 0.
-/// @throws ConfigError when there is none: such a gate could not fail.
+/// Returns 1 and prints the number if an accuracy run in `rows` failed or has warnings; else 0.
+/// @throws ConfigError if there is no accuracy run: the gate could not fail.
 int DoubtGate(const std::vector<Record>& rows);
 
 struct RunCommand {
@@ -50,23 +50,23 @@ struct RunCommand {
   std::filesystem::path out;  ///< folder; default results/runs/<name of the first experiment>
   std::vector<Setting> settings;
   SuiteOptions suite;
-  int threads = 0;    ///< as of ExperimentFiles
-  std::string gate;   ///< "doubts" or ""
-  bool wait = false;  ///< while another process writes to the store
-  std::string again;  ///< the command as a shell takes it, for who goes on later
+  int threads = 0;    ///< as in ExperimentFiles
+  std::string gate;   ///< "warnings" or ""
+  bool wait = false;  ///< wait while another process writes to the store
+  std::string again;  ///< the command in shell syntax, printed as the command to resume
 };
-/// Runs what the store does not have yet, then writes its tables. Interrupted, it says what is
-/// kept, and returns 128 + the signal's number: 130 for Ctrl-C.
+/// Runs the cases that the store lacks, then writes its tables. If interrupted, prints the number
+/// of kept results and returns 128 + the signal number: 130 for Ctrl-C.
 int RunExperiments(const RunCommand& command, const std::string& typed);
 
 struct MergeCommand {
   std::vector<std::filesystem::path> stores;
   std::filesystem::path out;  ///< a new store
-  /// "id"s of an experiment in its order, which their records shall have; others come behind them.
+  /// Values of "id" in the experiment's order: their records come first, others after them.
   std::vector<std::string> order = {};
 };
-/// Shards into one store: every case once. Throws when two stores disagree about a case. Ends with
-/// 1, and merges nothing, when no store has a case of `order`.
+/// Merges shards into one store, with every case once. Throws if two stores disagree about a case.
+/// Returns 1 and merges nothing if no store has a case of `order`.
 int Merge(const MergeCommand& command);
 
 /// Limits of work on one mechanism file; experiments have their own.
@@ -76,75 +76,75 @@ struct TableCommand {
   std::filesystem::path store;
   TableView view;
   std::string format = "text";  ///< text, csv, markdown, json or latex
-  std::filesystem::path out;    ///< standard output when empty
-  std::string gate;             ///< "doubts" or "": of the rows shown
+  std::filesystem::path out;    ///< file; standard output if empty
+  std::string gate;             ///< "warnings" or "": checks the rows shown
 };
 
 void AppendProvenance(Table& table, const std::string& typed);
 
-/// A table for a file. CSV goes without the date of printing: the same records and command give the
-/// same bytes.
+/// Renders a table for a file. CSV omits the date of printing: equal records and commands give
+/// equal bytes.
 std::string RenderKept(Table table, const std::string& format);
 
-/// Draws those that can be drawn into a folder, as svg or pdf; the reasons of the others are
-/// printed, and the exit code is 2.
+/// Draws the figures into a folder, as svg or pdf. Prints the reason for each figure that cannot be
+/// drawn, and then returns 2.
 int DrawAll(const std::vector<NamedFigure>& figures, const std::filesystem::path& folder,
             const std::string& format, FigureSize size);
 
-/// By name: "one-column", "two-column".
+/// Figure sizes by name: "one-column", "two-column".
 const std::map<std::string, FigureSize>& FigureSizes();
 
-/// Records of more than a page of anybody's: of runs of a few hundred steps, some 400 MB of memory.
+/// Largest number of records held in memory: about 400 MB for runs of a few hundred steps.
 inline constexpr std::size_t kMostHeld = 50'000;
 
-/// CSV or JSON, to standard output or `command.out`, scenes in the order of the store, the rows of
-/// each in the usual order, columns as of a table of all. Throws ConfigError for what needs all
-/// rows at once.
+/// Writes CSV or JSON to standard output or `command.out`. Problems have the order of the store,
+/// rows the usual order, and columns cover all records. Throws ConfigError for options that need
+/// all rows at once.
 int WriteLongTable(const TableCommand& command, const SceneReader& reader,
                    const std::string& typed);
 
-/// What LoadRecords() makes of a store, or where these are more than kMostHeld, or than the machine
-/// has room for, the store scene by scene.
+/// Records of LoadRecords(), or the store problem by problem if there are more than kMostHeld
+/// records or more than memory permits.
 struct Loaded {
   std::vector<Record> records;
   std::optional<SceneReader> many;
 };
 Loaded LoadOrScan(const std::filesystem::path& store, const Selection& where);
 
-/// The memory that this process may still take [bytes], by the machine and by its own limit, or
-/// with the part that it has already; 0 if it is not known.
+/// Returns the memory that this process may still allocate [bytes], by the machine and
+/// the process limit. `with_own` adds the memory in use. 0 if unknown.
 double FreeMemory(bool with_own = false);
 
-/// The memory that a store's records may take.
+/// Memory budget for the records of a store.
 class Room {
  public:
-  /// What is free now.
+  /// Takes the memory that is free now as budget.
   explicit Room(std::filesystem::path store);
-  bool Has(std::uint64_t bytes) const;  ///< for records with lines of so many bytes
-  /// Throws ConfigError where it has not; `found`: what they are.
+  bool Has(std::uint64_t bytes) const;  ///< true if records with `bytes` bytes of lines fit
+  /// Throws ConfigError if they do not fit; `found` describes the records.
   void Require(const std::string& found, std::uint64_t bytes) const;
 
  private:
   std::filesystem::path store_;
-  double free_ = 0.0;  ///< 0 where that is not known
+  double free_ = 0.0;  ///< 0 if unknown
 };
 
 struct CompareCommand {
   std::filesystem::path base, fresh;
   std::string format = "text";  ///< text, csv or markdown
   CompareOptions options;
-  Selection where = {};  ///< only such records of both sides
-  bool json = false;     ///< one document on standard output, with every measure
-  /// The base instead: the last good state of a history.
+  Selection where = {};  ///< filter for the records of both sides
+  bool json = false;     ///< print one JSON document with every measure
+  /// Replaces the base by the last good state of a history.
   std::filesystem::path history = {};
   std::string branch = {};
-  std::filesystem::path markdown = {}, junit = {};  ///< files besides; none when empty
+  std::filesystem::path markdown = {}, junit = {};  ///< additional output files; none if empty
 };
-/// 0 the same or better, 1 something is worse or different, 2 could not measure.
+/// Returns 0 for equal or better, 1 if something is worse or different, 2 if it could not measure.
 int PrintComparison(const CompareCommand& command, const std::string& typed);
 
-/// The last good state for new measurements of a machine, as the base of a comparison; `name` says
-/// which one it is. Throws ConfigError when there is none.
+/// Returns the last good state for new measurements of a machine, as base of a comparison, and sets
+/// `name` to its description. Throws ConfigError if there is none.
 std::vector<Record> LastGoodRecords(const HistoryPlace& place, const std::string& machine,
                                     bool only_times, std::string* name);
 

@@ -32,14 +32,14 @@ namespace {
 struct FitCommand {
   std::filesystem::path file;
   std::string format = "text";
-  double from = 0.0;          ///< sizes below are left out
-  std::filesystem::path out;  ///< standard output when empty
+  double from = 0.0;          ///< smaller sizes are omitted
+  std::filesystem::path out;  ///< standard output if empty
 };
 
 struct ExportCommand {
   std::filesystem::path file;
   std::string format = "customSmallerIsBetter";  ///< or bmf
-  std::filesystem::path out;                     ///< standard output when empty
+  std::filesystem::path out;                     ///< standard output if empty
 };
 
 std::vector<Record> LoadMeasurements(const std::filesystem::path& path) {
@@ -58,7 +58,7 @@ void Deliver(const std::string& text, const std::filesystem::path& out) {
   }
 }
 
-/// One row per group of measures: how many were compared, with which judgement.
+/// One row per group of measures: number of compared values with each judgement.
 Table SummaryTable(const ComparisonReport& comparison) {
   Table table;
   table.title = "Compared";
@@ -82,7 +82,7 @@ Table SummaryTable(const ComparisonReport& comparison) {
   return table;
 }
 
-/// Red for what makes the comparison fail.
+/// Returns red for judgements that make the comparison fail.
 std::string JudgementColour(const Record& row, const TableColumn& column) {
   if (column.key != "judgement") return "";
   const std::string judgement = row.Text("judgement");
@@ -101,7 +101,7 @@ Table FindingTable(const ComparisonReport& comparison, bool with_same) {
                    {"new", "new"},
                    {"ratio", "ratio", Format::kSeconds},
                    {"why", "why"}};
-  // regressions first: they are what the reader came for
+  // regressions first: the most important result
   for (const Judgement judgement : {Judgement::kWorse, Judgement::kDifferent, Judgement::kBetter,
                                     Judgement::kNotMeasured, Judgement::kSame}) {
     if (!with_same && (judgement == Judgement::kNotMeasured || judgement == Judgement::kSame))
@@ -119,7 +119,7 @@ Table FindingTable(const ComparisonReport& comparison, bool with_same) {
   return table;
 }
 
-/// "12 hashes not measured: another compiler, ..." for each reason.
+/// Returns "12 hashes not measured: another compiler, ..." for each reason.
 std::vector<std::string> ReasonNotes(const ComparisonReport& comparison) {
   std::vector<std::pair<std::string, int>> reasons;
   for (const Finding& finding : comparison.findings) {
@@ -149,12 +149,12 @@ void NoteCases(const std::string& what, const std::vector<std::string>& cases,
   for (const std::string& one : cases | std::views::take(kMostNamed)) notes.push_back("  " + one);
 }
 
-/// A row for each case that has no counterpart.
+/// Adds a row for each case without counterpart.
 void AddCases(const std::string& judgement, const std::vector<std::string>& cases, Table& table) {
   for (const std::string& one : cases) AddRow({judgement, one}, &table);
 }
 
-/// Where the records of one side come from; differing origins in one file are all named.
+/// Adds the origin of the records of one side; if one file has several origins, all are named.
 void NoteOrigins(const std::string& side, const std::vector<Record>& records,
                  std::vector<std::string>& notes) {
   std::set<std::string> lines;
@@ -168,8 +168,8 @@ void NoteOrigins(const std::string& side, const std::vector<Record>& records,
   notes.insert(notes.end(), lines.begin(), lines.end());
 }
 
-/// One run is faster or slower than another as a whole when the machine's speed has changed; no
-/// test within the runs can tell that from a change of all code.
+/// Adds a note if one run is as a whole faster or slower. A changed machine speed has this effect,
+/// and no test within the runs can distinguish it from a change of all code.
 void NoteCommonShift(const ComparisonReport& comparison, std::vector<std::string>& notes) {
   std::vector<double> ratios;
   for (const Finding& finding : comparison.findings) {
@@ -178,7 +178,7 @@ void NoteCommonShift(const ComparisonReport& comparison, std::vector<std::string
     }
   }
   constexpr std::size_t kMany = 5;
-  constexpr double kShift = 0.01;  // half of the smallest effect that is reported
+  constexpr double kShift = 0.01;  // half of the smallest reported effect
   const double shift = Median(ratios);
   if (ratios.size() < kMany || !(std::abs(shift - 1.0) > kShift)) return;
   notes.push_back(
@@ -201,8 +201,7 @@ std::string Conclusion(const ComparisonReport& comparison, const CompareOptions&
          (undecided > 0 ? fmt::format("; {} times not compared", undecided) : "");
 }
 
-/// Leaves the records of both sides that match. A key that neither side has would choose nothing,
-/// and tell nothing apart.
+/// Filters the records of both sides. Rejects a key that neither side has: it would have no effect.
 void Choose(const Selection& where, const std::vector<std::string>& match,
             std::vector<Record>& base, std::vector<Record>& fresh) {
   std::vector<Record> both = base;
@@ -214,7 +213,7 @@ void Choose(const Selection& where, const std::vector<std::string>& match,
   fresh = Filter(fresh, where);
 }
 
-/// The base that was named, or the last good state of the history, which `name` then says.
+/// Returns the named base, or the last good state of the history with its description in `name`.
 std::vector<Record> LoadBase(const CompareCommand& command, const std::vector<Record>& fresh,
                              std::string* name) {
   if (command.history.empty() && command.branch.empty()) {
@@ -271,7 +270,7 @@ int PrintComparison(const CompareCommand& command, const std::string& typed) {
   Choose(command.where, command.options.match, base, fresh);
   ShareContents(&base, &fresh);
   CompareOptions options = command.options;
-  options.added |= !base_name.empty();  // a history grows, and loses nothing
+  options.added |= !base_name.empty();  // a history grows and loses nothing
   const ComparisonReport comparison = Compare(base, fresh, options);
   const int code = comparison.ExitCode(options);
 
@@ -327,7 +326,7 @@ int PrintComparison(const CompareCommand& command, const std::string& typed) {
 
 namespace {
 
-/// Exponents of time over size, one row per benchmark family. 0, or 2 when there is no exponent.
+/// Prints exponents of time over size, one row per benchmark family. Returns 2 if there is none.
 int PrintFits(const FitCommand& command, const std::string& typed) {
   const std::vector<Record> benchmarks = LoadMeasurements(command.file);
   Table table;
@@ -361,8 +360,8 @@ int PrintFits(const FitCommand& command, const std::string& typed) {
   return fitted ? 0 : 2;
 }
 
-/// Measurements as the JSON that trackers of continuous benchmarking take. 0; 1 when something had
-/// to be left out, each named on standard error; 2 when nothing is left.
+/// Writes measurements as JSON for trackers of continuous benchmarking. Returns 0; 1 if values were
+/// omitted, each named on standard error; 2 if nothing is left.
 int ExportMeasurements(const ExportCommand& command) {
   std::vector<std::string> torn;
   auto [values, left_out] = TrackRecords(ReadMeasurements(command.file, &torn));
@@ -414,7 +413,7 @@ Examples:
 Cases that failed, and values that are no numbers, cannot be tracked: each is named.
 Exit codes: 0 all exported, 1 all but those named, 2 nothing to export or bad input.)";
 
-/// BASE and NEW of compare.
+/// Takes BASE and NEW of compare.
 void TakeFiles(const std::vector<std::filesystem::path>& files, CompareCommand* command) {
   const bool has_history = !command->history.empty() || !command->branch.empty();
   if (files.size() != (has_history ? 1u : 2u)) {

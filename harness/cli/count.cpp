@@ -1,4 +1,4 @@
-// count: exact numbers of operations of right-hand sides.
+// count: exact operation counts of right-hand sides.
 #include <fmt/format.h>
 
 #include <cmath>
@@ -29,17 +29,17 @@ namespace {
 
 struct CountCommand {
   std::vector<std::filesystem::path> mechanisms;
-  std::string family;      ///< of mechanisms of any size (benchmarks.h), beside the files
-  std::vector<int> sizes;  ///< members of the family
+  std::string family;  ///< family of mechanisms of any size (benchmarks.h), in addition to files
+  std::vector<int> sizes;  ///< sizes of the family
   /// Names to count; empty: every formulation, every recorded level, both coordinate sets.
   std::vector<std::string> formulations, levels, coordinates;
   std::vector<std::string> solvers = {"rank-revealing"};
   std::string format = "text";  ///< text, csv, markdown, json or latex
-  std::filesystem::path out;    ///< standard output when empty
+  std::filesystem::path out;    ///< standard output if empty
   ProcessLimits limits = kFileLimits;
 };
 
-// of counts at level baumgarte: other gains give the same counts, none would leave the feedback out
+// baumgarte gains: other values give the same counts, only zero gains would omit the feedback
 constexpr BaumgarteGains kGains = {.alpha = 5.0, .beta = 5.0};
 
 template <class Enum>
@@ -57,8 +57,8 @@ std::int64_t Number(const Record& row, const char* key) {
   return std::get<std::int64_t>(*row.Find(key));
 }
 
-/// Counts of one right-hand side. They are exact unless a change far below any digit that is
-/// meant, as other libraries and processors make it, leads to others.
+/// Sets the counts of one right-hand side. They are exact unless a change at round-off level, as by
+/// another library or processor, leads to other branches.
 void SetCounts(const generate::RecordingSubject& subject, const generate::RecordingStart& start,
                Record& row) {
   constexpr double kRounding = 1e-12;
@@ -92,7 +92,7 @@ void SetCounts(const generate::RecordingSubject& subject, const generate::Record
   row.Set("exact", std::string(counts == other ? "yes" : "no"));
 }
 
-/// One part of a mechanism in one coordinate set: a row per formulation, level and solver.
+/// Counts one part of a mechanism in one coordinate set: a row per formulation, level and solver.
 void CountPart(const CountCommand& command, const MechanismDescription& part, Coordinates set,
                std::size_t most_nodes, std::vector<Record>& rows) {
   const BenchmarkState state = ComputeState(part, set);
@@ -128,7 +128,7 @@ void CountPart(const CountCommand& command, const MechanismDescription& part, Co
   }
 }
 
-/// In a child process: rows as lines of JSON.
+/// Runs in a child process and writes rows as lines of JSON.
 int CountHere(const CountCommand& command, const MechanismDescription& description,
               const SceneObservation& observe, std::size_t most_nodes) {
   const CompiledScene scene = CompileScene(description, observe, {});
@@ -143,7 +143,7 @@ int CountHere(const CountCommand& command, const MechanismDescription& descripti
   return 0;
 }
 
-/// Rows of a child process that counts; nothing where it fails, with its exit code in `code`.
+/// Returns rows counted in a child process; nothing if it fails, with its exit code in `code`.
 std::vector<Record> RowsOf(const std::string& name, const ProcessLimits& limits,
                            const std::function<int()>& count, int* code) {
   std::string text;
@@ -174,8 +174,8 @@ std::string MethodOf(const Record& row) {
   return Text(row, "formulation") + ", " + Text(row, "coordinates");
 }
 
-/// Sets flops / bodies and, but in the first row of a method, d log(flops) / d log(bodies) from the
-/// row before.
+/// Sets flops / bodies and, except in the first row of a method, d log(flops) / d log(bodies) from
+/// the previous row.
 void AddGrowth(std::span<Record> rows) {
   std::map<std::string, const Record*> last;
   for (Record& row : rows) {
@@ -194,7 +194,7 @@ void AddGrowth(std::span<Record> rows) {
   }
 }
 
-/// A sentence for each level and solver: the method with the fewest operations at each size.
+/// Returns a sentence per level and solver: the method with the fewest operations at each size.
 std::vector<std::string> Crossovers(std::span<const Record> rows) {
   std::map<std::string, std::map<std::int64_t, const Record*>> cheapest;
   for (const Record& row : rows) {
@@ -296,7 +296,7 @@ int CountOperations(const CountCommand& command, const std::string& typed) {
   Table table = CountTable(std::move(rows));
   table.notes.insert(table.notes.end(), crossovers.begin(), crossovers.end());
   const bool on_terminal = command.format == "text" && command.out.empty();
-  // columns of some rows only; files keep the reasons of missing counts
+  // drop columns of only some rows; files keep the reasons of missing counts
   std::erase_if(table.columns, [&](const TableColumn& column) {
     const bool is_optional = column.key == "exponent" || column.key == "flops_per_body" ||
                              column.key == "correction" ||

@@ -1,4 +1,4 @@
-// import and convert: mechanisms of other programs, and for them.
+// import and convert: mechanisms from and for other programs.
 #include <fmt/format.h>
 
 #include <algorithm>
@@ -24,13 +24,13 @@ namespace {
 
 struct ImportCommand {
   std::filesystem::path file;
-  std::filesystem::path out;  ///< "": the file's name with .json, here
+  std::filesystem::path out;  ///< "": the file's name with .json, in the current folder
   ImportOptions options;
   bool json = false;
   ProcessLimits limits = kFileLimits;
 };
 
-/// Never one of those that are read.
+/// Returns the output file, which is never an input file.
 std::filesystem::path OutOf(const ImportCommand& command) {
   std::filesystem::path out = command.out;
   if (out.empty()) out = FileName(command.file.stem().string()) + ".json";
@@ -90,7 +90,7 @@ int ImportHere(const ImportCommand& command) {
   return 0;
 }
 
-/// Writes the mechanism and prints what of the file it does not have. The work is done in a child
+/// Writes the mechanism and prints the parts of the file that it lacks. The work is done in a child
 /// process under the limits.
 int Import(const ImportCommand& command) {
   return PrintFromChild(command.file.string(), command.limits, [&] { return ImportHere(command); });
@@ -108,7 +108,7 @@ Examples:
   loopbench import model.sdf --json
   loopbench explain arm.json)";
 
-/// "0,0,-1.62": three numbers.
+/// Parses three numbers: "0,0,-1.62".
 Eigen::Vector3d ParseGravity(const std::string& text) {
   Eigen::Vector3d gravity;
   const char* at = text.data();
@@ -154,14 +154,14 @@ void AddImport(Commands& commands) {
   AddLimits(app, &command.limits);
 }
 
-// convert: a mechanism as a file for other programs.
+// convert: writes a mechanism in the format of another program.
 
 namespace {
 
 struct ConvertCommand {
   std::filesystem::path mechanism;
   std::string to;             ///< a name of ExportFormats()
-  std::filesystem::path out;  ///< "": the mechanism file's name with the format's ending, here
+  std::filesystem::path out;  ///< "": the mechanism file's name with the format's ending
   exchange::ExportOptions options;
   bool json = false;
   ProcessLimits limits = kFileLimits;
@@ -171,7 +171,7 @@ const exchange::ExportFormat& FormatNamed(const std::string& name) {
   return *std::ranges::find(exchange::ExportFormats(), name, &exchange::ExportFormat::name);
 }
 
-/// `out` is empty where nothing is written.
+/// Prints the document; `out` is empty if no file is written.
 void PrintDocument(const ConvertCommand& command, const std::string& name,
                    const std::filesystem::path& out, const std::vector<std::string>& missing,
                    const std::vector<exchange::Note>& notes) {
@@ -222,8 +222,8 @@ int ConvertHere(const ConvertCommand& command) {
   return 0;
 }
 
-/// 0, or 2 where the format does not have all that the mechanism has, which is then said, and
-/// nothing is written.
+/// Returns 0. If the format cannot represent parts of the mechanism, prints them, writes nothing
+/// and returns 2.
 int Convert(const ConvertCommand& command) {
   return PrintFromChild(command.mechanism.string(), command.limits,
                         [&] { return ConvertHere(command); });

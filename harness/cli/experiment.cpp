@@ -28,25 +28,25 @@ namespace {
 
 struct CheckCommand {
   ExperimentFiles files;
-  bool assembly = true;  ///< assemble the starts of mechanisms and scenes
+  bool assembly = true;  ///< assemble the starts of mechanisms and problems
   ProcessLimits limits = kFileLimits;
   bool json = false;
 };
 
-/// The cases that pass, each with "runs".
+/// Returns the cases that match, each with "runs".
 std::vector<Record> CaseRows(const std::vector<Experiment>& experiments, const Selection& filter) {
   std::vector<Record> rows;
   for (const Experiment& experiment : experiments) {
     for (const Case& one : SelectCases(experiment, filter)) {
       Record& row = rows.emplace_back(one.keys);
-      // an ensemble comes on top of the unperturbed run
+      // an ensemble is additional to the unperturbed run
       row.Set("runs", std::int64_t{one.ensemble > 1 ? one.ensemble + 1 : 1});
     }
   }
   return rows;
 }
 
-/// Runs that are no cases: of a long sweep, as many of each combination as of those that are shown.
+/// Runs that are no cases. In a long sweep, each combination counts as many as the shown ones.
 struct OtherRuns {
   OtherRuns(const Overview& overview, const Selection& filter) {
     for (const Experiment& experiment : overview.experiments) {
@@ -59,7 +59,7 @@ struct OtherRuns {
   std::size_t timings = 0, rungs = 0;
 };
 
-/// All cases, one a line and group after group: a long sweep is never held at once.
+/// Prints all cases, one per line and group by group: a long sweep is never completely in memory.
 void PrintCaseDocument(const Overview& overview, const ExperimentFiles& files) {
   const OtherRuns others(overview, files.filter);
   std::string head = JsonObject()
@@ -85,7 +85,7 @@ void PrintCaseDocument(const Overview& overview, const ExperimentFiles& files) {
   PrintText("]}");
 }
 
-/// Combinations of a long sweep that a table shows.
+/// Number of combinations of a long sweep in a table.
 constexpr std::size_t kShown = 16;
 
 Table CaseTable(const Overview& overview, const Selection& filter) {
@@ -146,7 +146,7 @@ Table CaseTable(const Overview& overview, const Selection& filter) {
   return table;
 }
 
-/// What check says of a file that is sound: a sentence for people, and the same for programs.
+/// Result of check for a valid file: a sentence for people, and JSON for programs.
 struct Checked {
   std::string sentence;
   JsonObject document;
@@ -158,7 +158,7 @@ void AddWarning(const std::filesystem::path& path, const std::string& text, Chec
   checked->warnings.push_back(text);
 }
 
-/// What looks wrong about sound numbers; no reason to refuse them.
+/// Adds warnings on suspicious but valid numbers.
 void AddUnitWarnings(const std::filesystem::path& path, const MechanismDescription& description,
                      Checked* checked) {
   for (const Warning& warning : FindUnitWarnings(description)) {
@@ -166,8 +166,8 @@ void AddUnitWarnings(const std::filesystem::path& path, const MechanismDescripti
   }
 }
 
-/// Adds the warnings. Throws ConfigError with all faults of starts, each with the file and the way
-/// around.
+/// Adds the warnings. Throws ConfigError with all faults of starts, each with the file and the
+/// remedy.
 void AddStarts(const std::filesystem::path& path, const StartReport& report, Checked* checked) {
   for (const std::string& warning : report.warnings) AddWarning(path, warning, checked);
   std::string text;
@@ -226,7 +226,7 @@ Checked CheckMechanism(const std::filesystem::path& path, const CheckCommand& co
   return checked;
 }
 
-/// Throws ConfigError with all mistakes.
+/// Checks a file. Throws ConfigError with all mistakes.
 Checked CheckFile(const std::filesystem::path& path, const CheckCommand& command) {
   Checked checked;
   const auto of = [&checked](const char* kind, std::string sentence) -> JsonObject& {

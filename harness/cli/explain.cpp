@@ -1,4 +1,4 @@
-// explain: what an experiment runs and measures, in sentences.
+// explain: the runs and measures of an experiment, in sentences.
 #include "harness/cli/explain.h"
 
 #include <fmt/format.h>
@@ -30,7 +30,7 @@ std::string Numbers(const std::vector<double>& numbers) {
   return ListInWords(words);
 }
 
-/// Whether some column passes.
+/// Returns true if some method passes.
 template <class Is>
 bool Any(const Experiment& experiment, Is is) {
   return std::any_of(experiment.columns.begin(), experiment.columns.end(), is);
@@ -89,7 +89,7 @@ void ExplainChoices(const Experiment& experiment) {
   }
 }
 
-/// Of the coordinate of a joint, in the first scene that has it.
+/// Returns the unit of a joint's coordinate, from the first problem with this joint.
 std::string_view UnitOf(const Experiment& experiment, const std::string& joint) {
   for (const ExperimentScene& scene : experiment.scenes) {
     const MechanismDescription& description = scene.mechanism.description;
@@ -172,7 +172,7 @@ void ExplainMeasures(const Experiment& experiment, const Selection& filter) {
                               : fmt::format("at tolerance {}", experiment.timing.tolerance));
 }
 
-/// The values of an axis that are there, each once, in their order.
+/// Returns the used values of an axis, each once, in their order.
 std::vector<std::string> ValuesOf(const std::string& axis,
                                   const std::vector<Experiment>& experiments) {
   std::vector<std::string> values;
@@ -285,7 +285,7 @@ JsonObject ExperimentDocument(const std::filesystem::path& path, const Experimen
                          .Add("memory_mb", first.limits.memory_mb));
 }
 
-/// The document of a mechanism, as its child process prints it.
+/// Returns the document of a mechanism, as printed by its child process.
 std::string MechanismText(const std::filesystem::path& path, bool all, const ProcessLimits& limits,
                           int* code) {
   std::string text;
@@ -305,11 +305,11 @@ std::string MechanismText(const std::filesystem::path& path, bool all, const Pro
       .Text();
 }
 
-/// What experiments run and measure, and what mechanisms are made of, by the kind of each file.
-/// Mechanisms are analysed in a child process under `limits`; 2 for one that they cut off. `all`:
+/// Prints runs and measures of experiments, and models of mechanisms, by the kind of each file.
+/// Mechanisms are analysed in a child process under `limits`; returns 2 if a limit ended it. `all`:
 /// every row of long tables.
 int Explain(const ExperimentFiles& files, bool all, bool json, const ProcessLimits& limits) {
-  // the child that does the work prints into memory, and sees no terminal
+  // the child process prints into memory, without a terminal
   const ExplainView view = ViewOfOutput(all);
   int exit_code = 0;
   std::string documents;
@@ -343,7 +343,7 @@ namespace {
 
 constexpr std::size_t kMostRows = 40, kFirstRows = 30, kIndent = 2, kNarrowest = 24;
 
-/// Without columns that say nothing.
+/// Removes columns without content.
 Table WithoutEmpty(Table table) {
   std::erase_if(table.columns, [&table](const TableColumn& column) {
     return std::ranges::all_of(table.rows,
@@ -362,7 +362,7 @@ std::size_t LongestWord(std::string_view text) {
   return longest;
 }
 
-/// For a pipe: only the last column is broken, and no name in it, for somebody may look for it.
+/// Breaks only the last column, for a pipe, and no name in it, so that names can be searched.
 Table LastColumnBroken(Table table) {
   TableColumn& last = table.columns.back();
   if (last.format != Format::kText) return table;

@@ -1,4 +1,4 @@
-// What the parts of explain share: how its tables fit the terminal.
+// Output of explain: tables that fit the terminal.
 #pragma once
 
 #include <cstddef>
@@ -14,36 +14,36 @@
 
 namespace loopbench::harness {
 
-// What the parts of explain share: how its tables fit the terminal.
+// Output of explain: tables that fit the terminal.
 
-/// How much of a mechanism explain shows, and how wide.
+/// Amount and width of the output of explain.
 struct ExplainView {
-  bool all = false;  ///< else the first rows of long tables, and how many more there are
-  /// Of the terminal [cells], 0: as wide as it takes; none: there is no terminal.
+  bool all = false;  ///< all rows; else the first rows of long tables and the number of others
+  /// Width of the terminal [cells]; 0: unlimited; nullopt: there is no terminal.
   std::optional<std::size_t> width = {};
-  /// Where sections go instead, under their keys: --json.
+  /// Document that gets the sections under their keys (--json) instead of the terminal.
   JsonObject* document = nullptr;
 };
 
-/// Of standard output.
+/// Returns the view of standard output.
 ExplainView ViewOfOutput(bool all);
 
-/// A sentence for people.
+/// Prints a sentence for people, unless there is a document.
 template <typename... Values>
 void Say(const ExplainView& view, fmt::format_string<internal::PrintedAs<Values>...> format,
          const Values&... values) {
   if (view.document == nullptr) Print<Values...>(format, values...);
 }
 
-/// Title and table, indented, as wide as the terminal; without one the last column is broken into
-/// lines that end at 100 characters.
-/// In a document all rows stand under `key`, if it has one.
+/// Prints a title and an indented table, as wide as the terminal. Without a terminal, breaks the
+/// last column into lines that end at 100 characters. In a document, stores all rows under `key`,
+/// if it has one.
 void PrintSection(const std::string& title, const Table& table, const ExplainView& view,
                   const char* key = "");
 
-/// Six digits; -0 is 0.
+/// Formats a number with six digits; -0 is 0.
 std::string ShortNumber(double value);
-/// "1 0.5 -2".
+/// Formats a vector as "1 0.5 -2".
 template <class Vector>
 std::string Spaced(const Vector& vector) {
   std::string text;
@@ -53,15 +53,15 @@ std::string Spaced(const Vector& vector) {
   return text;
 }
 
-/// Prints what a mechanism is made of, its start and its structure; 2 when the start cannot be
-/// assembled, after all else.
+/// Prints the model, the start and the structure of a mechanism. Returns 2, after all other output,
+/// if the start cannot be assembled.
 int ExplainMechanism(const std::filesystem::path& path, const ExplainView& view);
 
-/// What a file says: gravity, bodies, joints, their frames, forces.
+/// Prints the contents of a file: gravity, bodies, joints, their frames, forces.
 void PrintModel(const MechanismDescription& description, const Structure& structure,
                 const ExplainView& view);
 
-/// What the assembly made of it: coordinates and speeds of all joints, energy.
+/// Prints the assembled start: coordinates and speeds of all joints, energy.
 void PrintStart(const MechanismDescription& description, const Structure& structure,
                 const ExplainView& view);
 

@@ -1,4 +1,4 @@
-// explain: what a mechanism is made of, its start and its structure.
+// explain: model, start and structure of a mechanism.
 #include <fmt/format.h>
 
 #include <algorithm>
@@ -17,7 +17,7 @@ namespace {
 
 constexpr std::size_t kMostNames = 12;
 
-/// Names in order; of many the first and the last, unless all are asked for.
+/// Returns the names in order; of many only the first and the last, unless all are requested.
 std::string Names(const std::vector<std::string>& names, const ExplainView& view) {
   if (view.all || names.size() <= kMostNames) return fmt::format("{}", fmt::join(names, " "));
   const std::vector<std::string> first(names.begin(), names.begin() + kMostNames - 2);
@@ -195,7 +195,7 @@ std::vector<JsonObject> LoopDocuments(const MechanismDescription& description,
   return loops;
 }
 
-/// What sections do not say.
+/// Prints facts that the other sections do not contain.
 void DescribeStructure(const MechanismDescription& description, const Structure& s,
                        JsonObject* document) {
   std::vector<JsonObject> redundant;
@@ -295,7 +295,7 @@ class StartText {
  private:
   using Values = std::array<double, 7>;
 
-  /// Of a tree joint as they are integrated; of others as measured between the bodies.
+  /// Coordinates as integrated (tree joints), or as measured between the bodies (other joints).
   Values CoordinatesOf(const Joint<Space, double>& joint) const {
     Values q{};
     if (joint.kind->coordinates == nullptr) return q;

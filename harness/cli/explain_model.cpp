@@ -1,4 +1,4 @@
-// explain: what a mechanism file says, in its own numbers.
+// explain: the contents of a mechanism file, with its own numbers.
 #include <fmt/format.h>
 
 #include <cmath>
@@ -16,7 +16,7 @@ std::string VectorText(const Vector3d& v, SpaceKind space) {
   return space == SpaceKind::kPlanar ? Spaced(Eigen::Vector2d(v.head<2>())) : Spaced(v);
 }
 
-/// "tip (1 0)" where a point of the body has this place, else "(1 0)".
+/// Returns "tip (1 0)" if a point of the body has this place, else "(1 0)".
 std::string Place(const BodyDescription& body, const Vector3d& at, SpaceKind space) {
   std::string text = fmt::format("({})", VectorText(at, space));
   for (const auto& [name, point] : body.points) {
@@ -66,7 +66,7 @@ Table BodyTable(const MechanismDescription& description, const Structure& struct
   return table;
 }
 
-/// What a joint leaves free: its kind's directions less those that follow a given motion.
+/// Returns the free speeds of a joint: the directions of its kind minus those with a given motion.
 int FreeSpeeds(SpaceKind space, const JointDescription& joint) {
   const int kind = space == SpaceKind::kPlanar && TraitsOf(joint.type).in_plane
                        ? KindOf<Planar, double>(joint.type).num_u
@@ -94,7 +94,7 @@ std::string FunctionText(const TimeFunctionDescription& function) {
                      table.cubic ? "cubic" : "straight lines");
 }
 
-/// Parameter and prescribed motions.
+/// Returns parameters and prescribed motions.
 std::string Given(SpaceKind space, const JointDescription& joint) {
   std::string text;
   const JointParameter& own = TraitsOf(joint.type).parameter;
@@ -136,10 +136,10 @@ Table JointTable(const MechanismDescription& description, const Structure& struc
   return table;
 }
 
-/// Of a direction: what a turn by pi/2 leaves.
+/// Round-off of a direction after a turn by pi/2.
 constexpr double kRoundOff = 1e-14;
 
-/// The axes of a joint's frame that it moves along or about, in body axes.
+/// Returns the free axes of a joint's frame (translations or rotations), in body axes.
 template <class Space>
 std::string AxesText(const Rotation<Space, double>& R, std::string_view axes) {
   std::string text;
@@ -184,7 +184,7 @@ Table FrameTable(const MechanismDescription& description) {
   return table;
 }
 
-/// A force as "type", "acts on" and "with".
+/// Returns a force as "type", "acts on" and "with".
 Record ForceRow(const MechanismDescription& description, ForceDescription force) {
   const ForceParts parts = PartsOf(force);
   std::vector<std::string> on, with;

@@ -28,8 +28,8 @@ struct GenerateCommand {
   std::filesystem::path fmu;  ///< "": none
   std::string formulation = "lagrange", level = "acceleration", coordinates = "joint";
   std::string solver = "rank-revealing";
-  double horizon = 10.0;  ///< of the motion whose branches are generated [s]
-  double step = 0.0;      ///< of the example and of co-simulation [s]; 0: of the motion
+  double horizon = 10.0;  ///< length of the motion whose branches are generated [s]
+  double step = 0.0;      ///< step of the example and of co-simulation [s]; 0: from the motion
   bool json = false;
   ProcessLimits limits = kFileLimits;
 };
@@ -48,7 +48,7 @@ Examples:
 
 Exit codes: 0 done, 2 bad input or the mechanism cannot be generated.)";
 
-// of the motion along which branches are recorded
+// integrator of the motion along which branches are recorded
 constexpr const char* kProfile = "ode45";
 constexpr double kTolerance = 1e-6;
 constexpr std::size_t kLeastStates = 500, kMostStates = 2000;
@@ -61,7 +61,7 @@ struct Motion {
   double step = 0.0;  ///< for fixed steps
 };
 
-/// A quarter of the median step of `states`, at most 1 ms, down to 1, 2 or 5 of its decade.
+/// Returns a quarter of the median step of `states`, at most 1 ms, rounded down to 1, 2, 5 x 10^n.
 double StepOf(const std::vector<exchange::MotionState>& states) {
   std::vector<double> steps;
   for (std::size_t i = 1; i < states.size(); ++i) steps.push_back(states[i].t - states[i - 1].t);
@@ -72,7 +72,7 @@ double StepOf(const std::vector<exchange::MotionState>& states) {
   return decade * (step >= 5.0 * decade ? 5.0 : step >= 2.0 * decade ? 2.0 : 1.0);
 }
 
-/// Accepted steps of the motion from the assembled start; the mode of the start stays, as it does
+/// Returns accepted steps of the motion from the assembled start; the mode of the start is kept, as
 /// in generated code.
 template <class Space>
 Motion Move(const GenerateCommand& command, const generate::RecordingSubject& subject) {

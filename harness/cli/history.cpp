@@ -1,4 +1,4 @@
-// history: measurements of one commit after the other.
+// history: measurements of successive commits.
 #include <fmt/format.h>
 
 #include <filesystem>
@@ -23,13 +23,13 @@ namespace {
 struct HistoryAddCommand {
   HistoryPlace place;
   std::filesystem::path results;
-  std::string commit, date;  ///< "": those that are checked out
+  std::string commit, date;  ///< "": from the checked-out commit
   bool replaces = false;
 };
 
 struct HistoryShowCommand {
   HistoryPlace place;
-  std::string one, measure;  ///< parts of the names of cases and measures; "": all
+  std::string one, measure;  ///< filters: parts of case and measure names; "": all
   std::string format = "text";
   bool json = false;
 };
@@ -50,7 +50,7 @@ void PrintWarnings(const std::vector<std::string>& warnings, const OpenHistory& 
   for (const std::string& text : warnings) PrintError("warning: {}\n", open.named(text));
 }
 
-/// A history and what is found in it; warnings are printed.
+/// Reads a history and its findings; prints warnings.
 std::pair<History, HistoryFindings> ReadFindings(const HistoryPlace& place) {
   History history;
   HistoryFindings found;
@@ -167,7 +167,7 @@ int HistoryAdd(const HistoryAddCommand& command) {
   return 0;
 }
 
-/// Steps, newest first, and the commits. 0.
+/// Prints steps, newest first, and the commits. Returns 0.
 int HistoryShow(const HistoryShowCommand& command, const std::string& typed) {
   const auto [history, all] = ReadFindings(command.place);
   const HistoryFindings found = Chosen(all, command);

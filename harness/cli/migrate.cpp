@@ -1,4 +1,4 @@
-// The command migrate: names of files that earlier versions wrote, replaced by today's.
+// migrate: replaces names in files of earlier versions by today's names.
 #include <fmt/format.h>
 
 #include <algorithm>
@@ -23,8 +23,8 @@ namespace {
 
 using std::string_view;
 
-/// A name in a configuration file, and the keys whose objects hold it, between slashes; "//" is the
-/// top level.
+/// Name in a configuration file, and the keys of the objects that contain it, between slashes; "//"
+/// is the top level.
 struct OldKey {
   string_view old, now, within;
 };
@@ -49,7 +49,7 @@ struct OldName {
   string_view old, now;
 };
 
-/// Keys of records, which conditions and measures of configuration files name too.
+/// Keys of records, which conditions and measures of configuration files also use.
 constexpr OldName kRecordKeys[] = {
     {"scene_id", "problem_id"},
     {"content", "config_hash"},
@@ -70,7 +70,7 @@ constexpr OldName kRecordKeys[] = {
 };
 constexpr string_view kConditions = "/select/require/where/when/benchmarks/";
 
-/// A word among the values of some keys; several words stand there separated by spaces.
+/// Word among the values of some keys; several words are separated by spaces.
 struct OldValue {
   string_view old, now, keys;
 };
@@ -85,7 +85,7 @@ constexpr OldValue kValues[] = {
     {"softened", "regularized", "/doubts/warnings/"},
 };
 
-/// Whether `word` is one of those between the slashes.
+/// Returns true if `word` is one of the words between the slashes.
 bool Holds(string_view words, string_view word) {
   return words.find("/" + std::string(word) + "/") != words.npos;
 }
@@ -95,7 +95,7 @@ string_view RecordKey(string_view key) {
   return known == std::end(kRecordKeys) ? key : known->now;
 }
 
-/// The name of today of `key` in the object that stands under `within`.
+/// Returns today's name of `key` in the object under `within`.
 string_view ConfigurationKey(string_view key, string_view within) {
   for (const OldKey& known : kKeys) {
     if (known.old == key && Holds(known.within, within)) return known.now;
@@ -103,7 +103,7 @@ string_view ConfigurationKey(string_view key, string_view within) {
   return Holds(kConditions, within) ? RecordKey(key) : key;
 }
 
-/// "/scenes/0/mechanism/initial/held" as "/problems/0/mechanism/initial/fixed".
+/// Returns "/problems/0/mechanism/initial/fixed" for "/scenes/0/mechanism/initial/held".
 std::string Pointer(string_view pointer) {
   if (!pointer.starts_with('/')) return std::string(pointer);
   std::string text, within;
@@ -118,7 +118,7 @@ std::string Pointer(string_view pointer) {
   return text;
 }
 
-/// The value that stands under `key`, without its quotation marks.
+/// Returns the new value under `key`, without its quotation marks.
 std::string NewValue(string_view value, string_view key) {
   if (key == "field") return Pointer(value);
   if (key == "measure" || key == "of" || key == "relative_to") return std::string(RecordKey(value));
@@ -149,14 +149,14 @@ class Renamer {
   void SkipTo(string_view any) { at_ = std::min(text_.find_first_of(any, at_), text_.size()); }
   void SkipSpace() { at_ = std::min(text_.find_first_not_of(" \t\r\n", at_), text_.size()); }
 
-  /// The string at the cursor as it is written, and behind it.
+  /// Returns the string at the cursor as written, and moves the cursor after it.
   string_view String() {
     const std::size_t begin = ++at_;
     while (text_[at_] != '"') at_ += text_[at_] == '\\' ? 2 : 1;
     return text_.substr(begin, at_++ - begin);
   }
 
-  /// Writes `now` for the string that was read last.
+  /// Writes `now` instead of the last string read.
   void Replace(string_view old, string_view now) {
     if (old == now) return;
     const auto place = static_cast<std::size_t>(old.data() - text_.data());
@@ -214,7 +214,7 @@ class Renamer {
   std::string result_;
 };
 
-/// A line of a record file, rewritten; counts the names.
+/// Returns a rewritten line of a record file; counts the replaced names.
 std::string RenamedLine(const std::string& line, const std::string& place, std::size_t* count) {
   ParseDocument(line, place);
   const bool is_sealed = VerifyChecksum(line);
@@ -226,14 +226,14 @@ std::string RenamedLine(const std::string& line, const std::string& place, std::
   return WithChecksum(object + "}");
 }
 
-/// Writes the lines of a record file through `write`; the number of names replaced.
+/// Writes the lines of a record file through `write`; returns the number of replaced names.
 std::size_t RenameLines(const std::filesystem::path& file,
                         const std::function<void(string_view)>& write) {
   std::ifstream stream(file, std::ios::binary);
   if (!stream) throw std::runtime_error(file.string() + ": cannot be read");
   std::size_t count = 0, number = 0;
   for (std::string line; std::getline(stream, line);) {
-    const bool is_torn = stream.eof();  // without an end: a crash may have left a part of it
+    const bool is_torn = stream.eof();  // no line end: possibly torn by a crash
     const std::string place = fmt::format("{}:{}", file.string(), ++number);
     try {
       if (!line.empty()) line = RenamedLine(line, place, &count);
@@ -248,7 +248,7 @@ std::size_t RenameLines(const std::filesystem::path& file,
   return count;
 }
 
-/// Whether the file has a record a line: a store, or the one record of a reference.
+/// Returns true if the file has one record per line: a store, or the single record of a reference.
 bool HasRecordLines(const std::filesystem::path& file) {
   if (file.extension() == ".jsonl") return true;
   std::ifstream stream(file, std::ios::binary);
@@ -272,16 +272,16 @@ std::size_t MigrateFile(const std::filesystem::path& file) {
   ParseDocument(text, file.string());
   Renamer renamed(text, false);
   if (renamed.count() == 0) return 0;
-  ParseDocument(renamed.result(), file.string());  // old and new names may not stand side by side
+  ParseDocument(renamed.result(), file.string());  // old and new names may not occur together
   OutputFile output(file, Onto::kAnyFile);
   output.Write(renamed.result());
   output.Finish();
   return renamed.count();
 }
 
-/// Rewrites configuration files, stores and other record files (.jsonl) in place, each at once. All
-/// other bytes stay, and the checksums of records are renewed. Prints the number of replaced names
-/// per file. 2 if a file cannot be rewritten, which then is as it was.
+/// Rewrites configuration files, stores and other record files (.jsonl) in place, each atomically.
+/// All other bytes stay, and record checksums are renewed. Prints the number of replaced names per
+/// file. Returns 2 if a file cannot be rewritten; it then stays unchanged.
 int Migrate(const std::vector<std::filesystem::path>& files) {
   int code = 0;
   for (const std::filesystem::path& path : files) {

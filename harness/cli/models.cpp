@@ -27,8 +27,8 @@ namespace {
 
 namespace fs = std::filesystem;
 
-/// What is still known of exact facts: about bodies that are there, and in an approximate model
-/// nothing but its length.
+/// Exact facts that remain valid: on bodies that still exist, and in an approximate model only its
+/// length.
 SceneObservation ObserveIn(const MechanismDescription& description, const SceneObservation& observe,
                            bool keeps_facts) {
   SceneObservation known = observe;
@@ -88,7 +88,7 @@ std::string List(const std::vector<std::string>& lines) {
   return text;
 }
 
-/// Of the experiment.
+/// Returns the name of the experiment.
 std::string LadderName(const SceneModels& ladder) {
   return ladder.models.front().description.name + "-models";
 }
@@ -160,7 +160,7 @@ SceneModels MakeModels(const MechanismFile& file, const std::vector<const Idea*>
               simplified, &ladder);
   }
   const Simplified all = Combine(file.description, ideas, run, options);
-  if (all.ideas.size() < 2) return ladder;  // it would be that idea's model once more
+  if (all.ideas.size() < 2) return ladder;  // it would equal that rule's model
   std::vector<std::string_view> assumptions;
   for (const Idea* idea : all.ideas) {
     if (!idea->assumption.empty()) assumptions.push_back(idea->assumption);
@@ -267,18 +267,17 @@ Choice Alike() {
   return {.column = {.formulation = "odca", .enforcement = Enforcement::kPosition}, .rtol = 1e-8};
 }
 
-/// A model with what is known of its motion, and its runs. Stays where it is: its parts refer to
-/// each other.
+/// Model with data on its motion, and its runs. Not movable: its parts refer to each other.
 struct JudgedModel {
   const SceneModel& model;
   CertainMotion certain;
   std::unique_ptr<TrialScene> scene = nullptr;  ///< the bench refers to it
   std::unique_ptr<TrialBench> bench = nullptr;
   Trial trial = {};
-  std::string fault = "";  ///< why there are no runs
+  std::string fault = "";  ///< reason why there are no runs
 };
 
-/// Runs it once where its motion is certified to the end.
+/// Runs the model once if its motion is certified to the end.
 std::unique_ptr<JudgedModel> Examined(const SceneModel& model, double horizon,
                                       const ModelQuestion& question) {
   auto judged = std::make_unique<JudgedModel>(JudgedModel{
@@ -336,7 +335,7 @@ void WriteRun(const JudgedModel& judged, Record& record) {
   record.Set("wall_s", trial.wall_s);
 }
 
-/// What the model causes against the whole one, and whether that is accepted.
+/// Writes the error of the model relative to the full model, and whether it is accepted.
 void WriteVerdict(const MechanismFile& file, const JudgedModel& whole, const JudgedModel& judged,
                   const ModelQuestion& question, Record& record) {
   if (&judged == &whole) return record.Set("model_verdict", std::string("the whole model"));
@@ -357,7 +356,7 @@ void WriteVerdict(const MechanismFile& file, const JudgedModel& whole, const Jud
   conclude(fmt::format("{} at {} m", accepted ? "accepted" : "refused", question.accept));
 }
 
-/// Of a model that is all of the scene, not one of its parts.
+/// Writes ratios for a model of the whole problem, not of one of its parts.
 void WriteRatios(const Trial& whole, const Trial& trial, Record& record) {
   if (whole.outcome != Outcome::kFinished || trial.outcome != Outcome::kFinished) return;
   record.Set("model_rhs_ratio", static_cast<double>(trial.rhs_evaluations) /
@@ -371,7 +370,7 @@ std::vector<Record> RecordsOfModels(const MechanismFile& file, const SceneModels
                                     const ModelQuestion& question) {
   std::vector<std::unique_ptr<JudgedModel>> all;
   all.push_back(Examined(models.models.front(), question.horizon, question));
-  // where the whole motion is not certified to the end, all are compared as far as it is
+  // if the full motion is not certified to the end, all models are compared up to its trust horizon
   const double until = all.front()->certain.horizon;
   if (until > 0.0 && until < question.horizon) {
     all.front() = Examined(models.models.front(), until, question);
@@ -380,7 +379,7 @@ std::vector<Record> RecordsOfModels(const MechanismFile& file, const SceneModels
     all.push_back(Examined(models.models[i], until, question));
   }
   const MachineState machine = ReadMachineState();
-  // the whole model once more, last: what a difference of equals would be
+  // the full model again, last: apparent difference of equal models
   Trial again = all.front()->trial;
   for (int i = 0; i < kRepeats; ++i) {
     for (const auto& judged : all) {

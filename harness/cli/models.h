@@ -1,4 +1,4 @@
-// Models of one scene: the whole one and simpler ones, their certified motions, errors and
+// Models of one problem: the full model and simpler ones, their certified motions, errors and
 // records.
 #pragma once
 
@@ -16,98 +16,97 @@
 
 namespace loopbench::harness {
 
-// Models of one scene: the whole one, one for each idea that applies, and all of them together.
+// Models of one problem: the full model, one per applicable rule, and all rules combined.
 
-/// A model as it is written.
+/// A model in the form in which it is written.
 struct SceneModel {
-  std::string name;  ///< "full", an idea's, "combined"; with a number where it has parts
+  std::string name;  ///< "full", a rule's name or "combined"; with a number if it has parts
   bool is_exact = true;
   MechanismDescription description;
   SceneObservation observe;
   std::vector<std::string> done, dropped;
   std::string assumption;
   Eigen::Matrix3d R_WC = Eigen::Matrix3d::Identity();
-  std::string error;  ///< how far it moves from the whole model [m], where that was asked for
-  std::string worst;  ///< the point that does, or why nothing is known
+  std::string error;  ///< largest distance from the full model [m], if requested
+  std::string worst;  ///< point with this error, or the reason why there is none
   std::int64_t rhs_evaluations = -1;
 };
 
-/// What each idea makes of the whole model, whether it applies or not, in the order of the ideas.
+/// Result of each simplification rule on the full model, applicable or not, in rule order.
 struct SceneModels {
   std::vector<std::pair<const Idea*, Simplified>> ideas;
-  /// The whole model first, alone where nothing applies; all ideas together where several do.
+  /// Full model first, alone if no rule applies; last all rules combined, if several apply.
   std::vector<SceneModel> models;
 };
 
 SceneModels MakeModels(const MechanismFile& file, const std::vector<const Idea*>& ideas,
                        const ShortRun& run, const SimplifyOptions& options);
 
-/// Runs all models for `horizon` seconds in tight steps, each in at most `cpu_s`, and sets what
-/// they are off by.
+/// Runs all models for `horizon` seconds with small steps, each with at most `cpu_s`, and sets
+/// their errors.
 void MeasureErrors(double horizon, double cpu_s, SceneModels* ladder);
 
-/// Bodies and named points of the whole model that another does not have, a line for each body:
-/// where its points are by now, and which are gone.
+/// Returns the bodies and named points of the full model that the other lacks. Each line has one
+/// body, the new places of its points, and the points that no longer exist.
 std::vector<std::string> Gone(const MechanismDescription& whole,
                               const MechanismDescription& simplified);
 
-/// The file of the experiment that runs all of them: NAME-ladder.json.
+/// Name of the experiment file that runs all models: NAME-ladder.json.
 std::string LadderFileName(const SceneModels& ladder);
 
-/// Writes NAME.json of all models, the experiment and models.md. All of them are written beside
-/// the folder and read back before it takes its place; with `force` they take the places of files
-/// of these names in a folder that is there, each at once.
+/// Writes NAME.json of all models, the experiment and models.md. All files are written next to the
+/// folder and read back before it is renamed. With `force` they atomically replace files of these
+/// names in an existing folder.
 ///
-/// @throws ConfigError when the folder is there and not empty, unless `force`;
-/// std::runtime_error when something cannot be written.
+/// @throws ConfigError if the folder exists and is not empty, unless `force`; std::runtime_error if
+/// something cannot be written.
 void WriteModels(const SceneModels& ladder, double horizon, const std::string& typed,
                  const std::filesystem::path& folder, bool force);
 
-// What simpler models of one mechanism cause and what they take, as records of kind "model"
+// Errors and costs of simpler models of one mechanism, as records of kind "model"
 // (docs/reference/records.md).
 
 struct ModelQuestion {
   double horizon = 0.0;  ///< [s]
-  double accept = 0.0;   ///< error that a model may cause [m]
-  double cpu_s = 0.0;    ///< of one integration [s]
+  double accept = 0.0;   ///< largest acceptable error of a model [m]
+  double cpu_s = 0.0;    ///< limit of one integration [s]
   std::string what;      ///< "my.json: --store", for messages
 };
 
-/// A record for the whole model and one for each other, all run alike (O-DCA, level projection,
-/// joint coordinates, ode45 at 1e-8), bare and in turn. The error that a model causes is the
-/// largest distance of a named point of its certified motion from the whole one's; both
-/// certificates are part of what it is accepted by. A model that cannot be judged is refused with
-/// the reason.
+/// Returns a record for the full model and one per other model. All run alike (O-DCA, level
+/// projection, joint coordinates, ode45 at 1e-8), without observers and in turn. The error of a
+/// model is the largest distance of a named point between its certified motion and the full
+/// model's. Acceptance adds both certificates to the error. A model that cannot be judged is
+/// rejected with the reason.
 std::vector<Record> RecordsOfModels(const MechanismFile& file, const SceneModels& models,
                                     const ModelQuestion& question);
 
-// The motion of a mechanism as far as it is certified: what advice and models are judged by.
+// Certified motion of a mechanism: the reference for advice and models.
 
 struct CertainMotion {
   ReferenceOptions options = {};  ///< an experiment with them makes the same reference
   Reference reference = {};
-  double horizon = 0.0;  ///< [s], its trust horizon, which errors are taken up to; 0: there is none
+  double horizon = 0.0;  ///< trust horizon [s], the end of error comparisons; 0: there is none
 };
 
-/// Each of the witnesses may take `cpu_s`. Where certification ends before `horizon` the reference
-/// is made again up to there, until it is certified to its end. Throws ConfigError in a program
-/// without wide scalars, which `what` needs.
+/// Computes a certified motion; each witness run may take `cpu_s`. If certification ends before
+/// `horizon`, makes the reference again up to there until it is certified to its end. Throws
+/// ConfigError in a program without wide scalars, which `what` needs.
 CertainMotion MakeCertainMotion(const MechanismDescription& user, double horizon, double cpu_s,
                                 const std::string& what);
 
-// advise --simplify: which simpler models of a scene keep the error that was asked for, and what
-// they save.
+// advise --simplify: simpler models of a problem within the accepted error, and their savings.
 
-/// How far a model's certified motion gets from the whole one's.
+/// Largest distance of a model's certified motion from the full model's.
 struct CausedError {
-  double largest = 0.0;  ///< of the points compared, at times that both are certified at [m]
-  std::string point;     ///< which
-  int points = 0;        ///< compared
+  double largest = 0.0;  ///< over the compared points, at times that both certify [m]
+  std::string point;     ///< point with the largest distance
+  int points = 0;        ///< number of compared points
   double until = 0.0;    ///< [s]
 };
 
-/// `names` are BODY.POINT; empty: all named points of the whole model that the other has. In the
-/// whole model's axes.
+/// Compares points in the full model's axes. `names` are BODY.POINT; empty: all named points of the
+/// full model that the other has.
 CausedError ErrorOfModel(const MechanismDescription& whole, const Reference& whole_reference,
                          const SceneModel& model, const Reference& reference,
                          const std::vector<std::string>& names);

@@ -1,4 +1,4 @@
-// plan: what a run would take.
+// plan: estimated run time.
 #include <fmt/format.h>
 
 #include <algorithm>
@@ -27,13 +27,13 @@ namespace {
 
 struct PlanCommand {
   ExperimentFiles files;
-  std::filesystem::path from;  ///< store of earlier results; times of cases it has come from there
-  bool timing = true;          ///< timings too
+  std::filesystem::path from;  ///< store of earlier results, used for times of the cases in it
+  bool timing = true;          ///< include timings
   bool json = false;
 };
 
-/// Everything that decides a run but the experiment's name: results of another file with the same
-/// cases serve as well.
+/// Key of all that decides a run except the experiment's name: results of another file with the
+/// same cases are used too.
 std::string SameRun(const Record& record) {
   std::string text = record.Text("config_hash") + "\n";
   for (const auto& [key, value] : record.items()) {
@@ -43,7 +43,7 @@ std::string SameRun(const Record& record) {
   return text;
 }
 
-/// CPU time [s] of the unperturbed run by SameRun(), from an earlier store.
+/// Returns CPU time [s] of the unperturbed run by SameRun(), from an earlier store.
 std::map<std::string, double> EarlierTimes(const std::filesystem::path& store) {
   std::map<std::string, double> times;
   if (store.empty()) return times;
@@ -55,7 +55,7 @@ std::map<std::string, double> EarlierTimes(const std::filesystem::path& store) {
   return times;
 }
 
-/// "1.5 s", "12 min", "3.4 h".
+/// Returns "1.5 s", "12 min", "3.4 h".
 std::string Duration(double seconds) {
   if (seconds < 0.1) return "less than 0.1 s";
   if (seconds < 100.0) return fmt::format("{:.2g} s", seconds);
@@ -63,7 +63,7 @@ std::string Duration(double seconds) {
   return fmt::format("{:.1f} h", seconds / 3600.0);
 }
 
-/// One line of the plan: the cases of a scene and column, over all combinations.
+/// Line of the plan: the cases of a problem and method, over all combinations.
 struct Line : CaseLine {
   double seconds = 0.0;
 };
@@ -74,7 +74,7 @@ struct Plan {
   double seconds = 0.0, reference_seconds = 0.0, ladder_seconds = 0.0, timing_seconds = 0.0;
 };
 
-/// Times of cases as they were looked at, by line: of all, or of some of a long sweep.
+/// Times of the examined cases by line: all cases, or some of a long sweep.
 class Times {
  public:
   void Add(const Case& one, double seconds) {
@@ -83,7 +83,7 @@ class Times {
     ++sum.cases;
   }
 
-  /// [s] of the whole line.
+  /// Returns the time of the whole line [s].
   double Of(const CaseLine& line) const {
     const auto sum = sums_.find(line.mechanism + "\n" + line.column);
     if (sum == sums_.end()) return 0.0;
@@ -99,7 +99,7 @@ class Times {
   std::map<std::string, Sum> sums_;
 };
 
-/// Of a long sweep some combinations are looked at, and stand for all.
+/// Makes a plan; in a long sweep some combinations represent all.
 Plan MakePlan(const Overview& overview, const PlanCommand& command, Estimate* estimate) {
   Plan plan;
   Times times;
@@ -266,7 +266,7 @@ JsonObject PlanDocument(const std::filesystem::path& path, const Overview& overv
 }
 
 int PrintPlans(const PlanCommand& command) try {
-  const Interruption interruption;  // pilots leave nothing behind
+  const Interruption interruption;  // pilots leave no files
   std::vector<JsonObject> documents;
   for (const auto& path : command.files.paths) {
     const double begin = ThreadCpuSeconds();

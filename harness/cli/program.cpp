@@ -51,8 +51,8 @@ Formulations: {}.
 Levels of enforcement: {}.
 Exit codes: 0 done, 1 a gate failed, 2 could not measure or bad input, 130 run was interrupted.)";
 
-/// An option takes the word behind it and no more: files may stand there. Experiments of a baseline
-/// alone are given as the shell expands them.
+/// Makes an option take only the next word, because file names may follow. Only experiments of a
+/// baseline are given as the shell expands them.
 void TakeOneWordEach(CLI::App* app) {
   for (CLI::Option* option : app->get_options()) {
     if (!option->get_positional() && !option->check_lname("experiments")) {
@@ -62,7 +62,7 @@ void TakeOneWordEach(CLI::App* app) {
   for (CLI::App* command : app->get_subcommands({})) TakeOneWordEach(command);
 }
 
-/// Headings of `loopbench --help`.
+/// Sets the headings of `loopbench --help`.
 void GroupCommands(CLI::App& app) {
   const std::pair<const char*, std::vector<const char*>> groups[] = {
       {"Mechanisms",
@@ -78,7 +78,7 @@ void GroupCommands(CLI::App& app) {
   }
 }
 
-/// Names the largest input of a command that ran out of memory, and the memory it may use.
+/// Names the largest input of a command that ran out of memory, and its memory limit.
 std::string OutOfMemory(const std::bad_alloc& error, const std::vector<std::string>& words) {
   std::string largest;
   std::uintmax_t bytes = 0;
@@ -148,7 +148,7 @@ int Main(int argc, char** argv) {
   harness::ExitWithoutMemory(2, kNoMemory);
   try {
     return harness::FinishOutput(harness::RunCommandLine(argc, argv));
-  } catch (const std::bad_alloc&) {  // while the options were set up, or a message was written
+  } catch (const std::bad_alloc&) {  // while options were set up or a message was written
     harness::PrintErrorText(kNoMemory);
     return 2;
   }

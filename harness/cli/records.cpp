@@ -1,5 +1,5 @@
-// Records of stores for the commands that show them, held or scene by scene, and files of tables
-// and figures.
+// Records of stores for the commands that show them, in memory or problem by problem, and files of
+// tables and figures.
 #include <fmt/format.h>
 #include <sys/resource.h>
 #include <unistd.h>
@@ -59,7 +59,7 @@ void RefuseWhatNeedsAllRows(const TableCommand& command, const SceneReader& read
                   found, kMostHeld, needs_all));
 }
 
-/// Rows of one table, written as they come.
+/// Writer of the rows of one table, one by one.
 class SceneRows {
  public:
   /// `samples`: a record of each set of keys.
@@ -109,7 +109,7 @@ int WriteLongTable(const TableCommand& command, const SceneReader& reader,
   if (command.format == "csv") {  // as RenderKept() does
     std::erase_if(notes, [](const std::string& note) { return note.starts_with("date: "); });
   }
-  struct NoRows {};  // leaves a file that is there alone
+  struct NoRows {};  // leaves an existing file unchanged
   const auto fill = [&](const Write& write) {
     SceneRows writer(command, reader.samples(), write);
     reader.ForEach(
@@ -145,7 +145,7 @@ Loaded LoadOrScan(const std::filesystem::path& store, const Selection& where) {
                           }),
               {}};
     } catch (const TooMany&) {
-      // what was chosen is too much as well
+      // even the selection is too large
     }
   }
   SceneReader reader(store, where);
@@ -171,7 +171,7 @@ double FreeMemory(bool with_own) {
 Room::Room(std::filesystem::path store) : store_(std::move(store)), free_(FreeMemory()) {}
 
 namespace {
-constexpr double kGrows = 4.0;  // a record in memory over its line, measured
+constexpr double kGrows = 4.0;  // memory of a record relative to its line, measured
 }  // namespace
 
 bool Room::Has(std::uint64_t bytes) const {
@@ -188,7 +188,7 @@ void Room::Require(const std::string& found, std::uint64_t bytes) const {
 
 std::vector<Record> Prepared(std::vector<Record> records) {
   records = LatestRecords(records, CodeVersion());
-  SortRows(&records);  // in the store they stand as they ended
+  SortRows(&records);  // the store has the order in which runs ended
   SetDoubts(&records);
   return records;
 }

@@ -1,4 +1,4 @@
-// table, plot, verdict, map and report: what the records of a store show.
+// table, plot, verdict, map and report: views of the records of a store.
 #include <fmt/format.h>
 
 #include <algorithm>
@@ -27,7 +27,7 @@ namespace {
 
 struct PlotCommand {
   std::filesystem::path store;
-  std::filesystem::path out;        ///< folder, or for a free figure a file
+  std::filesystem::path out;        ///< folder, or a file for a free figure
   std::string format;               ///< svg or pdf; "" for the file's ending, else svg
   std::string size = "two-column";  ///< a name of a FigureSize
   Selection where;
@@ -36,17 +36,17 @@ struct PlotCommand {
 
 struct MapCommand {
   std::filesystem::path store, rules;
-  std::filesystem::path out;        ///< folder; nothing is written when empty
+  std::filesystem::path out;        ///< folder; no files if empty
   std::string format = "svg";       ///< of the picture: svg or pdf
   std::string size = "two-column";  ///< a name of a FigureSize
-  bool gate = false;                ///< 1 if a cell that must hold does not
+  bool gate = false;                ///< return 1 if a required cell does not hold
 };
 
 struct VerdictCommand {
   std::filesystem::path store, claims, out;
 };
 
-/// --out is a file when it ends like a figure, else a folder.
+/// Returns --out if it ends like a figure file; else it is a folder.
 std::filesystem::path FileOf(const PlotCommand& command) {
   const std::filesystem::path& out = command.out;
   const std::string ending = out.extension().string();
@@ -87,7 +87,7 @@ int DrawFree(const std::vector<Record>& records, const PlotCommand& command) {
   return 0;
 }
 
-/// Of a store that is too large to be held.
+/// Draws a figure of a store that is too large for memory.
 int DrawMany(const SceneReader& reader, const PlotCommand& command) {
   RequireConditions("--where", command.where, reader.samples());
   RequireKeys(command.free, reader.samples());
@@ -111,7 +111,7 @@ int DrawMany(const SceneReader& reader, const PlotCommand& command) {
   return DrawFree(points.records(), command);
 }
 
-/// robustness-map.csv, .md and the picture, which alone may fail: the reason is printed.
+/// Writes robustness-map.csv, .md and the picture; prints the reason if the picture fails.
 int WriteMap(const FailureMap& map, const MapCommand& command, const std::string& typed) {
   const std::filesystem::path stem = command.out / "robustness-map";
   Table cells = MapCellTable(map);
@@ -125,7 +125,7 @@ int WriteMap(const FailureMap& map, const MapCommand& command, const std::string
   return error ? 2 : 0;
 }
 
-/// The picture alone, of a map's own CSV.
+/// Draws only the picture, from the map's own CSV.
 int RedrawMap(const MapRules& rules, const MapCommand& command) {
   if (command.gate || command.out.empty()) {
     throw ConfigError(
@@ -143,7 +143,7 @@ int RedrawMap(const MapRules& rules, const MapCommand& command) {
   return 0;
 }
 
-/// Without a demand a gate could not fail, and its success would say nothing.
+/// Throws if there is no demand: the gate could not fail, and success would be meaningless.
 void RequireDemands(const FailureMap& map, const std::filesystem::path& rules) {
   for (const auto& group : map.cells) {
     for (const auto& row : group) {
@@ -387,18 +387,18 @@ void AddMap(Commands& commands) {
   app->footer(kMapFooter);
 }
 
-// report: the page of a run.
+// report: HTML page of a run.
 
 namespace {
 
 struct ReportCommand {
   std::filesystem::path store;
   std::filesystem::path out;     ///< default report.html in the store's folder
-  std::filesystem::path rules;   ///< of a robustness map, or none
+  std::filesystem::path rules;   ///< rules of a robustness map, or none
   std::filesystem::path claims;  ///< or none
 };
 
-/// Writes the page; 2 where the store has no records, or this program no pages.
+/// Writes the page; returns 2 if the store has no records, or this program has no pages.
 int WriteReport(const ReportCommand& command, const std::string& typed) {
   if (kReportScript.empty()) {
     PrintError("report: this program was built without (cmake -DLOOPBENCH_REPORT=ON needs npm)\n");

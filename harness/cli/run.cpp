@@ -33,8 +33,7 @@ std::size_t CountLines(const std::filesystem::path& file) {
       std::count(std::istreambuf_iterator<char>(lines), std::istreambuf_iterator<char>(), '\n'));
 }
 
-/// The records of these cases, as they were asked for: what the store holds besides is another
-/// command's.
+/// Returns the records of `ids`, in order; other records of the store are ignored.
 std::vector<Record> RecordsOf(const std::vector<std::string>& ids,
                               const std::vector<Record>& records) {
   std::map<std::string, const Record*> last;
@@ -122,7 +121,7 @@ int Merge(const MergeCommand& command) {
   }
   std::vector<std::filesystem::path> files;
   for (const auto& store : command.stores) files.push_back(StoreFile(store));
-  // references that stand where the store will be are one more part
+  // partial references next to the future store are one more part
   std::vector<std::filesystem::path> with_target = files;
   with_target.push_back(target.file());
   const MergedReferences references = MergeReferences(with_target);
@@ -217,7 +216,7 @@ void AddRun(Commands& commands) {
   CLI::Option* no = app->add_flag("--no-timing", options.no_timing, "Leave the timings out");
   CLI::Option* timings =
       app->add_flag("--timing-only", options.timing_only, "Only the timings")->excludes(no);
-  timings->excludes(gate);  // which judges accuracy runs
+  timings->excludes(gate);  // the gate judges accuracy runs
   app->add_flag("--precision-only", options.precision_only, "Only the runs in several scalars")
       ->excludes(no)
       ->excludes(timings)

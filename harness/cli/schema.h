@@ -1,4 +1,4 @@
-// schema: what files of each kind may hold, as JSON Schema and as tables.
+// schema: keys that files of each kind may contain, as JSON Schema and as tables.
 #pragma once
 
 #include <string>
@@ -6,13 +6,13 @@
 
 namespace loopbench::harness {
 
-/// The kinds, as the files configs/schema/KIND.schema.json name them.
+/// Names of the kinds, as in the files configs/schema/KIND.schema.json.
 std::vector<std::string> SchemaKinds();
 
-/// The JSON Schema of a kind (draft 07): what configs/schema/ holds.
+/// Returns the JSON Schema (draft 07) of a kind: the contents of its file in configs/schema/.
 std::string SchemaOfKind(const std::string& kind);
 
-/// The keys of files of these kinds as tables in Markdown: what docs/fields.md holds.
+/// Returns Markdown tables of the keys of files of these kinds: the contents of docs/fields.md.
 std::string TablesOfKinds(const std::vector<std::string>& kinds);
 
 }  // namespace loopbench::harness

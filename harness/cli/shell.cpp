@@ -1,5 +1,5 @@
-// What shells and readers want to know of all subcommands and options, from their declarations: the
-// nearest spelling of a wrong word, completion, a manual page.
+// Services from the declarations of all subcommands and options: spelling suggestions, shell
+// completion, a manual page.
 #include <fmt/format.h>
 
 #include <vector>
@@ -12,7 +12,7 @@
 namespace loopbench::harness {
 namespace {
 
-/// "--jobs", "--help": what may stand behind the subcommand.
+/// Returns the options that may follow the subcommand: "--jobs", "--help".
 std::vector<std::string> OptionNames(const CLI::App& app) {
   std::vector<std::string> names;
   for (const CLI::Option* option : app.get_options()) {
@@ -35,14 +35,14 @@ std::string Joined(const std::vector<std::string>& words) {
   return fmt::format("{}", fmt::join(words, " "));
 }
 
-/// "unknown: --fromat (did you mean --format?)"
+/// Returns "unknown: --fromat (did you mean --format?)".
 std::string Unknown(const std::string& word, const std::vector<std::string>& known) {
   const std::string nearest = NearestSpelling(word, known);
   return fmt::format("unknown: {}{}\n", word,
                      nearest.empty() ? "" : fmt::format(" (did you mean {}?)", nearest));
 }
 
-/// The words that an option takes, where it has a list of them: CLI11 shows it as "TEXT:{a,b}".
+/// Returns the accepted words of an option with a list: CLI11 shows it as "TEXT:{a,b}".
 std::vector<std::string> ValuesOf(const CLI::Option& option) {
   const std::string type = option.get_type_name();
   const std::size_t begin = type.find('{'), end = type.rfind('}');
@@ -58,8 +58,8 @@ std::string Quoted(const std::string& text) {  // for fish and zsh, between sing
   return quoted + "'";
 }
 
-/// The arms of "case $command-$before": what may follow an option that has a list of values, each
-/// as `line` makes of the list.
+/// Returns the arms of "case $command-$before": words that may follow an option with a list of
+/// values, formatted by `line`.
 template <class Line>
 std::string ValueArms(const CLI::App& app, Line line) {
   std::string arms;
@@ -147,14 +147,14 @@ std::string FishScript(const CLI::App& app) {
   return script;
 }
 
-/// A script for bash, zsh or fish, which completes subcommands, options, the values of those that
-/// have a list of them, and names of files.
+/// Returns a script for bash, zsh or fish that completes subcommands, options, option values from
+/// lists, and file names.
 std::string CompletionScript(const CLI::App& app, const std::string& shell) {
   if (shell == "zsh") return ZshScript(app);
   return shell == "fish" ? FishScript(app) : BashScript(app);
 }
 
-/// Text as roff shows it, whatever it begins with.
+/// Escapes text for roff, with any first character.
 std::string Roff(std::string_view text) {
   std::string roff;
   bool begins_line = true;
@@ -200,7 +200,7 @@ std::string CommandSection(const CLI::App& command) {
                      entries, Block(command.get_footer()));
 }
 
-/// loopbench.1, in the macros of man(7).
+/// Returns loopbench.1, in the macros of man(7).
 std::string ManualPage(const CLI::App& app) {
   const std::string version = VersionText();
   std::string page = fmt::format(
@@ -220,7 +220,7 @@ std::string ManualPage(const CLI::App& app) {
 std::string WhatWasMeant(const CLI::App& app) {
   const std::vector<CLI::App*> parsed = app.get_subcommands();
   if (parsed.empty()) {
-    // what stands behind a wrong subcommand may be right
+    // words after an unknown subcommand may be valid
     const std::vector<std::string> words = app.remaining();
     if (words.empty()) return "";
     const bool is_option = words.front().starts_with('-');

@@ -1,4 +1,4 @@
-// simplify: models of one scene, from the whole one down to the simplest.
+// simplify: models of one problem, from the full one to the simplest.
 #include <fmt/format.h>
 
 #include <algorithm>
@@ -28,21 +28,21 @@ namespace {
 
 struct SimplifyCommand {
   std::filesystem::path mechanism;
-  std::vector<std::string> only;        ///< names of ideas; empty: all
+  std::vector<std::string> only;        ///< names of rules; empty: all
   std::vector<std::string> thresholds;  ///< NAME=VALUE, as typed
   Lumping lumping = Lumping::kCentreOfMass;
   double short_run = 1.0;       ///< length of the short run [s]; 0: none
   double horizon = 10.0;        ///< of the experiment [s]
-  double errors = 0.0;          ///< length of runs that show how far models are off [s]; 0: none
-  std::filesystem::path store;  ///< that gets a record of each model; none when empty
-  double accept = 0.0;          ///< error that a model may cause, for its verdict there [m]
-  std::filesystem::path out;    ///< folder; nothing is written when empty
-  bool assembled = false;       ///< the whole model says all of its start
-  bool force = false;           ///< into a folder that is there
+  double errors = 0.0;          ///< length of runs that measure model errors [s]; 0: none
+  std::filesystem::path store;  ///< store for a record of each model; none if empty
+  double accept = 0.0;          ///< accepted model error for the verdict there [m]
+  std::filesystem::path out;    ///< folder; no files if empty
+  bool assembled = false;       ///< write the complete start in the full model
+  bool force = false;           ///< write into an existing folder
   ProcessLimits limits;
 };
 
-/// Names of ideas, and of those with a limit.
+/// Returns names of rules, and of the rules with a limit.
 std::vector<std::string> IdeaNames() {
   std::vector<std::string> names;
   for (const Idea& idea : Ideas()) names.emplace_back(idea.name);
@@ -179,7 +179,7 @@ void PrintModels(const SceneModels& ladder, const ExplainView& view) {
   }
 }
 
-/// The whole model; it must have a start.
+/// Reads the full model, which must have a start.
 MechanismFile ReadWhole(const SimplifyCommand& command) {
   MechanismFile file = ReadMechanism(command.mechanism);
   std::string why;
@@ -192,13 +192,13 @@ MechanismFile ReadWhole(const SimplifyCommand& command) {
   return file;
 }
 
-/// `part` of the CPU time that there is.
+/// Returns `part` of the available CPU time.
 double PartOfTime(const SimplifyCommand& command, double part) {
   constexpr double kAnyTime = 600.0;
   return command.limits.cpu_s > 0.0 ? part * command.limits.cpu_s : kAnyTime;
 }
 
-/// What the ideas want to know that look at how the whole model moves.
+/// Returns motion data of the full model for the rules that need it.
 ShortRun LookAt(const MechanismDescription& whole, const std::vector<const Idea*>& ideas,
                 const SimplifyCommand& command) {
   const bool looks = std::ranges::any_of(ideas, [](const Idea* idea) {
@@ -225,7 +225,7 @@ void PrintIdeas(const SceneModels& ladder, const SimplifyOptions& options,
   if (!idle.empty()) Print("\nThere is nothing for: {}.\n", fmt::join(idle, ", "));
 }
 
-/// What each model causes and takes, in the store and on the terminal.
+/// Stores and prints the error and cost of each model.
 void PrintVerdicts(const SimplifyCommand& command, const MechanismFile& file,
                    const SceneModels& ladder, const ExplainView& view) {
   const std::vector<Record> records = RecordsOfModels(
@@ -242,7 +242,7 @@ void PrintVerdicts(const SimplifyCommand& command, const MechanismFile& file,
   Print("  {} records in {}\n", records.size(), store.file().string());
 }
 
-/// In the child.
+/// Runs in the child process.
 int SimplifyFile(const SimplifyCommand& command, const ExplainView& view,
                  const std::string& typed) {
   const std::vector<const Idea*> ideas = Chosen(command.only);
@@ -275,7 +275,7 @@ int SimplifyFile(const SimplifyCommand& command, const ExplainView& view,
   return 0;
 }
 
-/// "light-links 0.01, ...": the limits as they are unless said.
+/// Returns the default limits: "light-links 0.01, ...".
 std::string LimitsText() {
   std::string text;
   for (const Idea& idea : Ideas()) {
@@ -286,18 +286,18 @@ std::string LimitsText() {
   return text;
 }
 
-/// Names of ways to lump masses, in the order of Lumping.
+/// Returns names of ways to lump masses, in the order of Lumping.
 const std::vector<std::string>& LumpingNames() {
   static const std::vector<std::string> names = {"centre-of-mass", "half", "none"};
   return names;
 }
 
-/// Lists what each idea could take away, and with a folder writes a mechanism file for each idea
-/// that applies, for all of them together and for the whole model, an experiment that runs them and
-/// a page that says what was done. The work is done in a child process under the limits. 2 when the
-/// start cannot be assembled, or there is nothing to write.
+/// Lists the possible simplifications of each rule. With a folder, writes a mechanism file for each
+/// applicable rule, for all combined and for the full model, an experiment and a summary page. The
+/// work is done in a child process under the limits. Returns 2 if the start cannot be assembled, or
+/// there is nothing to write.
 int Simplify(const SimplifyCommand& command, bool all, const std::string& typed) {
-  // the child that does the work prints into memory, and sees no terminal
+  // the child process prints into memory, without a terminal
   const ExplainView view = ViewOfOutput(all);
   return PrintFromChild(command.mechanism.string(), command.limits,
                         [&] { return SimplifyFile(command, view, typed); });

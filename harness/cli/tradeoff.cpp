@@ -1,4 +1,4 @@
-// tradeoff: what accuracy costs.
+// tradeoff: cost of accuracy.
 #include "harness/judge/tradeoff.h"
 
 #include <filesystem>
@@ -21,14 +21,14 @@ namespace {
 struct TradeoffCommand {
   std::filesystem::path store;
   TradeoffOptions options;
-  std::string format = "text";      ///< of what is printed: text, csv, markdown, json or latex
-  std::filesystem::path out;        ///< folder; default: that of the store
+  std::string format = "text";      ///< format of the output: text, csv, markdown, json or latex
+  std::filesystem::path out;        ///< folder; default: the store's folder
   std::string figures;              ///< svg or pdf; "" for none
   std::string size = "two-column";  ///< of figures, a name of a FigureSize
-  bool all = false;                 ///< print every row, not the front alone
+  bool all = false;                 ///< print every row, not only the front
 };
 
-/// A store that is a file has its tables beside it.
+/// Returns the folder of tables: for a store that is a file, the file's folder.
 std::filesystem::path FolderOf(const TradeoffCommand& command) {
   if (!command.out.empty()) return command.out;
   const bool is_file = command.store.extension() == ".jsonl";
@@ -47,7 +47,7 @@ void WriteTradeoff(const Tradeoff& tradeoff, const std::filesystem::path& folder
   WriteFileAtomically(stem + ".md", TradeoffMarkdown(tradeoff, Provenance(typed)));
 }
 
-/// What is printed for people: fronts, overview, and under it what was equal and what was not.
+/// Prints fronts and overview for people, then which conditions were equal and which were not.
 void PrintForPeople(const Tradeoff& tradeoff, const TradeoffCommand& command,
                     const std::string& typed) {
   const Table fronts = TradeoffTable(tradeoff, {.compact = true, .all = command.all});

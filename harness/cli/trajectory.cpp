@@ -1,4 +1,4 @@
-// trajectory: what a run wrote over time, or somebody else's against a mechanism.
+// trajectory: output of a run over time, or an external trajectory checked against a mechanism.
 #include "harness/trajectory/trajectory.h"
 
 #include <algorithm>
@@ -26,13 +26,13 @@ namespace loopbench::harness {
 namespace {
 
 struct TrajectoryCommand {
-  std::filesystem::path source;  ///< a store, or a trajectory (.csv)
-  Selection where;               ///< of a store's records
-  std::filesystem::path out;     ///< file, or folder of a store's; nothing is written when empty
-  std::string format = "csv";    ///< csv or jsonl
+  std::filesystem::path source;      ///< a store, or a trajectory (.csv)
+  Selection where;                   ///< filter for a store's records
+  std::filesystem::path out;         ///< file, or folder for a store; no files if empty
+  std::string format = "csv";        ///< csv or jsonl
   std::vector<std::string> columns;  ///< labels, or beginnings of labels; empty: all
-  int every = 1;                     ///< rows that are kept: the first, and each so many-th after
-  std::filesystem::path mechanism;   ///< to hold a trajectory against
+  int every = 1;                     ///< row interval: the first row is kept, then every n-th
+  std::filesystem::path mechanism;   ///< mechanism to check a trajectory
   std::filesystem::path ours;        ///< another trajectory of it
   std::filesystem::path figure;      ///< .svg or .pdf, with `ours`
 };
@@ -46,7 +46,7 @@ Value When(const LargestAt& largest) {
   return largest.is_known ? Value(largest.t) : Value(std::monostate());
 }
 
-/// The columns that are asked for, t among them.
+/// Returns the requested columns, including t.
 std::vector<std::size_t> Chosen(const TrajectoryReader& reader, const TrajectoryCommand& command) {
   std::vector<std::size_t> chosen;
   const auto& columns = reader.columns();
@@ -67,8 +67,8 @@ std::vector<std::size_t> Chosen(const TrajectoryReader& reader, const Trajectory
                                 command.columns[unused - used.begin()], known));
 }
 
-/// Copies files of any size row by row, with `notes` above the file's own notes. Returns the number
-/// of rows.
+/// Copies files of any size row by row, with `notes` before the file's own notes. Returns the
+/// number of rows.
 std::int64_t Copy(const std::filesystem::path& from, const std::filesystem::path& to,
                   const TrajectoryCommand& command, std::vector<std::string> notes) {
   TrajectoryReader reader(from);
@@ -90,7 +90,7 @@ std::int64_t Copy(const std::filesystem::path& from, const std::filesystem::path
   return writer.rows();
 }
 
-/// Whether the file is as its run wrote it; else the reason is printed.
+/// Returns true if the file is unchanged since its run; else prints the reason.
 bool IsVerified(const Record& record, const std::filesystem::path& file) try {
   VerifyTrajectory(record, file);
   return true;
@@ -106,7 +106,7 @@ int ExportOne(const std::filesystem::path& from, const std::filesystem::path& to
   return 0;
 }
 
-/// The parameters of a sweep that a case has, and their values.
+/// Returns the sweep parameters of a case and their values.
 std::vector<std::pair<std::string, std::string>> ParametersOf(const Record& record,
                                                               const std::vector<Record>& records) {
   std::vector<std::pair<std::string, std::string>> parameters;
@@ -117,7 +117,7 @@ std::vector<std::pair<std::string, std::string>> ParametersOf(const Record& reco
   return parameters;
 }
 
-/// The name of a case's file.
+/// Returns the name of a case's file.
 std::string NameOf(const Record& record,
                    const std::vector<std::pair<std::string, std::string>>& parameters) {
   std::string name;
@@ -277,8 +277,8 @@ int LayBeside(const TrajectoryCommand& command, const std::string& typed) {
   return 0;
 }
 
-/// Lists the trajectories of a store; writes them to `out`; checks one against a mechanism; lays
-/// one beside ours.
+/// Lists the trajectories of a store; writes them to `out`; checks one against a mechanism;
+/// compares it with the trajectory `ours`.
 int ShowTrajectories(const TrajectoryCommand& command, const std::string& typed) {
   if (command.source.extension() != ".csv") {
     if (command.mechanism.empty() && command.ours.empty()) return OfStore(command, typed);

@@ -19,7 +19,7 @@ namespace {
 struct ViewCommand {
   std::filesystem::path mechanism;
   std::string format;         ///< html, svg or text; "" for the ending of `out`, else html
-  std::filesystem::path out;  ///< "": NAME.html or NAME.svg beside the caller; text: the terminal
+  std::filesystem::path out;  ///< "": NAME.html or NAME.svg in this folder; text: the terminal
   SvgOptions svg;
   bool all = false;  ///< every row of long tables
   ProcessLimits limits = kFileLimits;
@@ -67,8 +67,8 @@ int ViewHere(const ViewCommand& command, const std::string& format, const Explai
   return 2;
 }
 
-/// 0, or 2 when the start cannot be assembled: the picture then shows the mechanism as the file
-/// says it, with its open loops.
+/// Returns 0, or 2 if the start cannot be assembled: the picture then shows the mechanism of the
+/// file with its open loops.
 int View(const ViewCommand& command) {
   const std::string format = FormatOf(command);
   if (format == "html" && command.svg.view != ViewNames().front()) {

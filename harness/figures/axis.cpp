@@ -36,7 +36,7 @@ double NiceStep(double least) {
   return 10.0 * power;
 }
 
-/// Multiples of one step, all with the same digits and power of ten.
+/// Returns multiples of one step, all with the same digits and power of ten.
 std::vector<Tick> EvenTicks(double low, double high, int most) {
   const double step = NiceStep((high - low) / most);
   const double largest = std::max(std::abs(low), std::abs(high));
@@ -54,7 +54,7 @@ std::vector<Tick> EvenTicks(double low, double high, int most) {
   return ticks;
 }
 
-/// The longest part of an axis without a label, as a share of it.
+/// Returns the longest part of an axis without a label, as a fraction of the axis.
 double WidestGap(const Axis& axis, const std::vector<Tick>& ticks) {
   double widest = 0.0, last = 0.0;
   for (const Tick& tick : ticks) {
@@ -65,8 +65,8 @@ double WidestGap(const Axis& axis, const std::vector<Tick>& ticks) {
   return std::max(widest, 1.0 - last);
 }
 
-/// For a logarithmic axis with too few powers of ten to read it by: labels at some digits of each
-/// decade, or even ones, whichever leave the shortest gaps.
+/// Returns ticks for a logarithmic axis with too few powers of ten: labels at some digits of each
+/// decade, or evenly spaced ones. The choice with the shortest gaps is used.
 std::vector<Tick> TicksBetweenDecades(const Axis& axis, int first, int last, int most) {
   constexpr std::string_view kDigits[] = {"123456789", "12357", "125", "13", "1"};
   std::vector<Tick> best = EvenTicks(axis.low, axis.high, most);
@@ -154,7 +154,7 @@ std::vector<Point> Placed(const PlotArea& area, std::span<const Point> points) {
   return placed;
 }
 
-/// Whether all points lie on the line, or on its points; both in places.
+/// Returns true if all points lie on the line, or on its points; both are page positions.
 bool LieOn(std::span<const Point> points, std::span<const Point> line, bool joined) {
   constexpr double kDistance = kDrawnWidth;
   return std::ranges::all_of(points, [&](const Point& point) {
@@ -198,7 +198,7 @@ bool Coincide(const PlotArea& area, std::span<const Point> one, std::span<const 
   return LieOn(a, b, joined) && LieOn(b, a, joined);
 }
 
-// Curves that coincide, drawn as one.
+// Curves that coincide are drawn as one.
 
 namespace {
 
@@ -212,10 +212,10 @@ std::vector<std::string> PartsOf(const std::string& label) {
   return parts;
 }
 
-/// The values of each property: {{"odca", "lagrange"}, {"joint"}} is "odca = lagrange, joint".
+/// Values of each property: {{"odca", "lagrange"}, {"joint"}} is "odca = lagrange, joint".
 using Product = std::vector<std::vector<std::string>>;
 
-/// The only property in which both differ; the number of properties if there is none or several.
+/// Returns the only property in which both differ; their number if none or several differ.
 std::size_t PlaceApart(const Product& one, const Product& other) {
   std::size_t place = one.size();
   if (one.size() != other.size()) return place;
@@ -227,7 +227,7 @@ std::size_t PlaceApart(const Product& one, const Product& other) {
   return place;
 }
 
-/// As few products as possible that contain all `labels`, and no others.
+/// Returns the fewest products that contain exactly all `labels`.
 std::vector<Product> ProductsOf(const std::vector<std::string>& labels) {
   std::vector<Product> products;
   for (const std::string& label : labels) {
@@ -259,7 +259,7 @@ std::size_t NumberOfValues(const std::vector<std::string>& labels, std::size_t p
   return values.size();
 }
 
-// "odca = lagrange, joint"; `all` are the labels of the panel.
+// Returns "odca = lagrange, joint"; `all` are the labels of the panel.
 std::string LabelOfSeveral(const std::vector<std::string>& labels,
                            const std::vector<std::string>& all) {
   std::vector<std::string> products;
@@ -279,12 +279,12 @@ bool MayMerge(const Curve& curve) {
   return curve.merges && !curve.label.empty() && !curve.ends_early;
 }
 
-/// The failed runs of a curve alone, which keep its colour if it is drawn as one with others.
+/// Returns the failed runs of a curve, which keep its colour if it is drawn as one with others.
 Curve FailuresOf(Curve* curve) {
   return {.style = curve->style, .merges = false, .crosses = std::exchange(curve->crosses, {})};
 }
 
-/// The look of `one` where `other` has the same, else black, solid, unmarked.
+/// Keeps the style of `one` where `other` has the same, else black, solid, unmarked.
 void KeepCommon(const CurveStyle& other, CurveStyle* one) {
   const CurveStyle several;
   if (one->color != other.color) one->color = several.color;
@@ -325,7 +325,7 @@ std::vector<Curve> MergedCurves(const Figure& panel, FigureSize size) {
     merged[i].hollow.insert(merged[i].hollow.end(), curve.hollow.begin(), curve.hollow.end());
     KeepCommon(curve.style, &merged[i].style);
     if (merged[i].remark.ends_with('?') && !curve.remark.ends_with('?')) {
-      merged[i].remark = curve.remark;  // the one that is resolved
+      merged[i].remark = curve.remark;  // the resolved one
       merged[i].guide = curve.guide;
     }
   }

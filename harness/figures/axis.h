@@ -12,25 +12,25 @@
 
 namespace loopbench::harness {
 
-// A scale of a figure: its range, the places of values on it, and its ticks.
+// Scale of a figure: its range, the positions of values on it, and its ticks.
 
-/// Numbers as all figures have them: plain from 0.01 to 99999, else with powers of ten, "2.5·10⁻⁶".
+/// Formats a number for figures: plain from 0.01 to 99999, else with powers of ten, "2.5·10⁻⁶".
 std::string NumberText(double value);
 
-/// From `low` to `high`, which are positive on a logarithmic one.
+/// Axis from `low` to `high`; both are positive on a logarithmic axis.
 struct Axis {
   double low = 0.0, high = 1.0;
   bool logarithmic = false;
 
   bool CanShow(double value) const { return std::isfinite(value) && (!logarithmic || value > 0.0); }
-  /// 0 at `low` and 1 at `high`.
+  /// Returns the position of a value: 0 at `low` and 1 at `high`.
   double Place(double value) const { return (On(value) - On(low)) / (On(high) - On(low)); }
 
  private:
   double On(double value) const { return logarithmic ? std::log(value) : value; }
 };
 
-/// Grows around values, to an axis with room beside them.
+/// Range that grows to contain values, and gives an axis with a margin.
 class AxisRange {
  public:
   explicit AxisRange(bool logarithmic) : logarithmic_(logarithmic) {}
@@ -40,8 +40,8 @@ class AxisRange {
     low_ = std::min(low_, value);
     high_ = std::max(high_, value);
   }
-  /// `margin` is a fraction of the extent. Values that agree in their first digits still get a
-  /// range that three digits can express.
+  /// Returns the axis. `margin` is a fraction of the extent. Values that agree in their first
+  /// digits still get a range that three digits can express.
   Axis WithMargin(double margin) const;
 
  private:
@@ -52,15 +52,15 @@ class AxisRange {
 
 struct Tick {
   double at = 0.0;
-  std::string label;  ///< "" for a small one
+  std::string label;  ///< "" for a small tick
 };
 
-/// About `most` labelled ticks and the small ones between them. A logarithmic axis with three
-/// powers of ten has these, a shorter one 1, 2 and 5 or other digits of each decade. A linear axis
-/// has multiples of 1, 2 or 5 of a power of ten.
+/// Returns about `most` labelled ticks and the small ones between them. A logarithmic axis with
+/// three powers of ten has these. A shorter one has 1, 2 and 5 or other digits of each decade. A
+/// linear axis has multiples of 1, 2 or 5 of a power of ten.
 std::vector<Tick> Ticks(const Axis& axis, int most);
 
-// What of a curve's points is drawn, and which curves are drawn as one.
+// Reduction of the points of curves, and curves that are drawn as one.
 
 /// A place in a drawing [pt], or a pair of values.
 using Point = std::pair<double, double>;
@@ -78,15 +78,15 @@ struct PlotArea {
   }
 };
 
-/// The width of a curve [pt], a third of a millimetre: what is nearer cannot be told apart.
+/// Width of a curve [pt], a third of a millimetre: closer features cannot be distinguished.
 inline constexpr double kDrawnWidth = 1.0;
 
-/// Of each column as wide as a third of a curve the first and the last point, the lowest and the
-/// highest: what is left out lies between points that are kept. Points need not be in order of x.
+/// Returns the first, last, lowest and highest point of each column that is a third of a curve
+/// wide. Omitted points lie between kept ones. Points need not be in order of x.
 std::vector<Point> Decimated(const PlotArea& area, std::span<const Point> points);
 
-/// Whether every point of each lies within a drawn width of the other's line, or of its points if
-/// no line joins them. Points in the order of x.
+/// True if every point of each curve lies within a drawn width of the other's line, or of its
+/// points if no line joins them. Points are in the order of x.
 bool Coincide(const PlotArea& area, std::span<const Point> one, std::span<const Point> other,
               bool joined = true);
 

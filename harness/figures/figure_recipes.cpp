@@ -25,7 +25,7 @@ bool Failed(const Record& record) {
   return !outcome.empty() && outcome != "finished";
 }
 
-// "1.97 ± 0.05", with a "?" if that is not resolved.
+// Returns "1.97 ± 0.05", with a "?" if the power is not resolved.
 std::string FittedPower(const Record& record) {
   const double exponent = record.Number("growth_exponent");
   if (!std::isfinite(exponent)) return "";
@@ -35,7 +35,7 @@ std::string FittedPower(const Record& record) {
   return record.Text("growth_resolved") == "true" ? text : text + "?";
 }
 
-// What decides a run's steps: "rtol 10⁻⁸", or "step 0.001 s".
+// Returns the step control of a run: "rtol 10⁻⁸", or "step 0.001 s".
 std::string StepsOf(const Record& record) {
   if (record.Text("step").empty()) return "rtol " + NumberText(record.Number("rtol"));
   return fmt::format("step {} s", NumberText(record.Number("step")));
@@ -65,7 +65,7 @@ Figure FigureOfDrift(std::span<const Record> records, std::string_view what, boo
                 .y = record.Numbers("series.drift"),
                 .style = StyleOf(record)};
     curve.ends_early = Failed(record);
-    if (curve.ends_early && curve.x.empty()) {  // it has a time alone
+    if (curve.ends_early && curve.x.empty()) {  // it has only a time
       curve.x = {record.Number("t_reached")};
       curve.y = {std::numeric_limits<double>::quiet_NaN()};
     }
@@ -83,8 +83,8 @@ Figure FigureOfDrift(std::span<const Record> records, std::string_view what, boo
   return figure;
 }
 
-// Joint coordinates of one kind: what their series are called and drawn as. Angles and lengths
-// have no axis in common.
+// Kind of joint coordinates: names and labels of their series. Angles and lengths have no common
+// axis.
 struct CoordinateKind {
   const char *prefix, *opening_prefix, *axis;
 };
@@ -97,22 +97,21 @@ bool HasSeries(const Record& record, std::string_view prefix) {
                              [&](const auto& item) { return item.first.starts_with(prefix); });
 }
 
-// Whether the loops came within this of a singular position, where it is known: about the angle
-// [rad] that was still to go (SingularityObserver).
+// Returns true if the loops came this close to a singular configuration: about the remaining angle
+// [rad] (SingularityObserver).
 bool PassesSingularPosition(const Record& record) {
   constexpr double kNear = 0.01;
-  return record.Number("singularity_distance_min") < kNear;  // not when it is NaN
+  return record.Number("singularity_distance_min") < kNear;  // false for NaN
 }
 
-// Larger for smaller values, least where there is none.
+// Returns a larger number for smaller values, the smallest if there is no value.
 double Smallness(const Record& record, const char* key) {
   const double value = record.Number(key);
   return std::isnan(value) ? -std::numeric_limits<double>::infinity() : -value;
 }
 
-// Larger is the better choice of the run whose motion is shown: one that ended well and is not in
-// doubt; whose loops are closed to the last; then the finest tolerance, the smallest error of
-// energy and the smallest drift.
+// Ranks runs for the motion figure, largest first: finished and without warnings; level without
+// drift growth; then finest tolerance, smallest energy error, smallest drift.
 auto MotionRank(const Record& record) {
   const double energy = record.Number("energy_error_relative");
   constexpr double kTrusted = 1e-2;
@@ -122,7 +121,7 @@ auto MotionRank(const Record& record) {
                     Smallness(record, "drift_position_max"));
 }
 
-// All that names the run, for a figure that shows one of several.
+// Returns all identifying values of the run, for a figure that shows one of several.
 std::string RunOf(const Record& record) {
   std::string text;
   for (const char* key : {"formulation", "enforcement", "coordinates", "solver"}) {
@@ -136,8 +135,8 @@ std::string RunOf(const Record& record) {
   return text;
 }
 
-// Runs that agree in all that no channel tells: integrator, experiment, parameters, as far as these
-// differ among `records`. The first are the values, "mass 5".
+// Groups runs that agree in all keys without a channel: integrator, experiment, parameters, as far
+// as these differ among `records`. The first are the values, "mass 5".
 std::map<std::vector<std::string>, std::vector<Record>> ByOtherKeys(
     std::span<const Record> records) {
   std::vector<std::string> keys = {"integrator", "experiment"};
@@ -176,7 +175,7 @@ Figure PanelOf(const Record& record, const CoordinateKind& kind, const std::vect
 }  // namespace
 
 Figure MotionFigure(const Record& record) {
-  // where the points of the whole run are too few for its motion, the record has those of its start
+  // if the whole run has too few points for its motion, the record has a series of its opening
   const bool opening = record.Find("series.opening_t") != nullptr;
   const std::vector<double> t = record.Numbers(opening ? "series.opening_t" : "series.t");
   Figure figure;
@@ -208,7 +207,7 @@ Figure SingularFigure(std::span<const Record> records) {
 std::vector<NamedFigure> AllFigures(std::span<const Record> records) {
   std::vector<Record> sorted(records.begin(), records.end());
   SortRows(&sorted);
-  // Ordered maps, so that the figures come in the same order whatever the order of the store.
+  // ordered maps: the order of figures is independent of the order of the store
   std::map<std::string, Record> motions;
   std::map<std::string, std::vector<Record>> drift;
   for (const Record& record : sorted) {
@@ -247,7 +246,7 @@ Curve CurveOf(std::span<const Record> rungs, Scalar scalar, const char* key) {
   Curve curve{.label = std::string(ToString(scalar)),
               .style = DistinctStyle(static_cast<std::size_t>(scalar)),
               .points = true};
-  // scalars agree where truncation rules: each is seen on those before it
+  // scalars agree if truncation dominates: each later one stays visible on the earlier ones
   curve.style.width = 2.6 - 0.7 * static_cast<double>(scalar);
   for (const Record& rung : rungs) {
     if (rung.Text("scalar") != ToString(scalar) || IsReferenceRung(rung)) continue;
@@ -261,7 +260,7 @@ Curve CurveOf(std::span<const Record> rungs, Scalar scalar, const char* key) {
   return curve;
 }
 
-/// A curve for each scalar that has runs.
+/// Makes a curve for each scalar that has runs.
 Figure PanelOf(std::span<const Record> rungs, const char* key, const char* axis) {
   Figure panel{.title = "",
                .x_label = "tolerance",
@@ -310,7 +309,7 @@ std::vector<NamedFigure> PrecisionFigures(std::span<const Record> records) {
   std::vector<Record> sorted(records.begin(), records.end());
   SortRungs(&sorted);
   std::vector<NamedFigure> figures;
-  std::vector<std::string> others, contents;  // what else tells ladders apart
+  std::vector<std::string> others, contents;  // other keys that distinguish ladders
   for (std::size_t begin = 0; begin < sorted.size();) {
     std::size_t end = begin;
     while (end < sorted.size() && LadderOf(sorted[end]) == LadderOf(sorted[begin])) ++end;
@@ -331,7 +330,7 @@ std::vector<NamedFigure> PrecisionFigures(std::span<const Record> records) {
 }
 namespace {
 
-/// "joint:A:angle" of "joint:A:angle [rad]".
+/// Returns "joint:A:angle" for "joint:A:angle [rad]".
 std::string WithoutUnit(const std::string& label) { return label.substr(0, label.rfind(" [")); }
 
 }  // namespace

@@ -13,8 +13,8 @@
 
 namespace loopbench::harness {
 
-// Which figures are made of records: motion, drift, and drift through singular positions. What
-// they contain decides, never a name.
+// Figures made of records: motion, drift, and drift through singular configurations. The contents
+// of the records decide, never a name.
 
 /// A figure and the name of its file without extension.
 struct NamedFigure {
@@ -22,42 +22,41 @@ struct NamedFigure {
   Figure figure;
 };
 
-/// Joint coordinates of one run against time: angles [rad], "series.angle.JOINT" against
-/// "series.t", and displacements [m], "series.displacement.JOINT", in a panel of their own; or
-/// those of the run's opening where it has them (harness/observers/observer.h). The title says so,
-/// and names the run.
+/// Joint coordinates of one run against time. Angles [rad] are "series.angle.JOINT" against
+/// "series.t"; displacements [m] have their own panel, "series.displacement.JOINT". If the run has
+/// series of its opening, they are used (harness/observers/observer.h). The title names this and
+/// the run.
 Figure MotionFigure(const Record& record);
 
-/// Drift [m] of several runs of one mechanism against time on logarithmic axes: "series.drift", the
-/// running maximum, against "series.drift_t", each run as figures.h has it. At its end stands the
-/// fitted power with its spread, and a '?' when it is not resolved; a thin line through the data
-/// shows a resolved one over the window that it was fitted in. A run that failed ends in a cross,
-/// with its outcome.
+/// Drift [m] of several runs of one mechanism against time on logarithmic axes: the running maximum
+/// "series.drift" against "series.drift_t", in the styles of figures.h. At the end of a curve is
+/// the fitted power with its spread, and '?' if it is not resolved. A thin line shows a resolved
+/// power over its fit window. A failed run ends in a cross with its outcome.
 Figure DriftFigure(std::span<const Record> records);
 
-/// The same on a linear time axis, without fits: what a passage through a singular position does.
+/// Drift on a linear time axis, without fits: effect of passing a singular configuration.
 Figure SingularFigure(std::span<const Record> records);
 
-/// All figures of the records that have series: for each mechanism and horizon the motion of one
-/// run (that finished and is not in doubt, at level projection, at the finest tolerance, as far as
-/// there is one), and for each mechanism, horizon and tolerance one of drift; through singular
-/// positions where a run of them came near one. Runs that differ in integrator, experiment or a
-/// parameter have figures of their own, with its value in their names.
+/// All figures of the records with series. Each mechanism and horizon has the motion of one run:
+/// finished, without warnings, at level projection, at the finest tolerance, if possible. Each
+/// mechanism, horizon and tolerance has a drift figure, or one of singular configurations if a run
+/// came near one. Runs that differ in integrator, experiment or a parameter have separate figures,
+/// named with its value.
 std::vector<NamedFigure> AllFigures(std::span<const Record> records);
 
 // Error and drift of runs in several scalars, against tolerance.
 
-/// For each ladder error (lines) and drift (dashes) against tolerance, one colour per scalar. Runs
-/// that failed are crosses at the lower edge.
+/// Draws error (lines) and drift (dashes) of each ladder against tolerance, one colour per scalar.
+/// Failed runs are crosses at the lower edge.
 std::vector<NamedFigure> PrecisionFigures(std::span<const Record> records);
 
-// Two trajectories beside each other: both above, their difference below.
+// Two trajectories: both in the upper panel, their difference in the lower one.
 
-/// Both panels; columns that coincide are one curve. `columns` have one unit.
+/// Makes both panels; columns that coincide are one curve. `columns` have one unit.
 Figure TrajectoryFigure(const Trajectory& ours, const Trajectory& theirs,
                         std::span<const SharedColumn> columns, const std::string& title);
 
-/// Draws them; nothing on success, else the reason (figures.h).
+/// Draws the trajectories; returns nothing on success, else the reason (figures.h).
 [[nodiscard]] std::optional<std::string> DrawTrajectories(const std::filesystem::path& path,
                                                           const Trajectory& ours,
                                                           const Trajectory& theirs,

@@ -14,7 +14,7 @@
 namespace loopbench::harness {
 namespace {
 
-/// A panel with what it takes from its figure.
+/// Panel with the properties taken from its figure.
 struct Panel {
   Figure figure;
   std::vector<Curve> curves;
@@ -32,7 +32,7 @@ std::vector<Panel> PanelsOf(const Figure& figure, FigureSize size) {
   };
   add(figure);
   for (const Figure& below : figure.below) add(below);
-  // one axis for all
+  // one axis for all panels
   AxisRange x(figure.log_x);
   for (const Panel& panel : panels) {
     x.Include(panel.area.x.low);
@@ -54,7 +54,7 @@ bool HasAnything(const Figure& panel) {
 }  // namespace
 
 CurveStyle DistinctStyle(std::size_t index) {
-  // Okabe and Ito's palette, dark and light ones in turn, and an olive
+  // Okabe and Ito's palette, dark and light colours alternating, and an olive
   constexpr std::array<const char*, 8> kPalette = {"#000000", "#E69F00", "#0072B2", "#CC79A7",
                                                    "#009E73", "#D55E00", "#56B4E9", "#999933"};
   constexpr std::array<Shape, 5> kShapes = {Shape::kCircle, Shape::kTriangle, Shape::kSquare,
@@ -72,7 +72,7 @@ FigureScript GnuplotScript(const Figure& figure, FigureSize size) {
   Figure named = figure;
   named.names_at_ends = names;
   std::vector<bool> is_drawn;
-  std::vector<std::string> failures;  // of runs without a curve
+  std::vector<std::string> failures;  // failures of runs without a curve
   for (const Panel& panel : panels) {
     for (const Curve& curve : panel.curves) {
       is_drawn.push_back(!Drawable(panel.area, curve).empty());
@@ -137,11 +137,11 @@ std::optional<std::string> WriteFigure(const std::filesystem::path& path, const 
 }
 namespace {
 
-constexpr const char* kNeutral = "#707070";  // of samples that tell something else than hue
+constexpr const char* kNeutral = "#707070";  // for samples whose meaning is not their hue
 
 std::string ColorOf(const Record& record) {
   const FormulationRow* row = FindFormulation(record.Text("formulation"));
-  return row == nullptr ? kNeutral : row->color;  // of another program
+  return row == nullptr ? kNeutral : row->color;  // formulation of another program
 }
 
 std::size_t DashOf(const Record& record) {
@@ -157,7 +157,7 @@ double WidthOfSolver(const Record& record) {
   return record.Text("solver") == ToString(SolverKind::kAsPublished) ? 0.7 : 1.5;
 }
 
-/// What an item of each channel shows of a run.
+/// Returns the legend item of a channel for a run.
 LegendItem ItemOf(const Record& record, std::string_view key) {
   const CurveStyle style = StyleOf(record);
   LegendItem item{.text = record.Text(key), .style = {.color = kNeutral}};
@@ -171,7 +171,7 @@ LegendItem ItemOf(const Record& record, std::string_view key) {
   return item;
 }
 
-/// One item per value, in the order of the records.
+/// Returns one item per value, in the order of the records.
 LegendRow ItemsOf(std::span<const Record> records, const std::string& key) {
   LegendRow row;
   for (const Record& record : records) {

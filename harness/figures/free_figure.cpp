@@ -21,7 +21,7 @@
 namespace loopbench::harness {
 namespace {
 
-/// Numbers as figures have them.
+/// Formats numbers as in all figures.
 std::string ValueText(const Record& record, const std::string& key) {
   const Value* value = record.Find(key);
   const auto* number = value == nullptr ? nullptr : std::get_if<double>(value);
@@ -42,7 +42,7 @@ bool IsText(const Record& record, const std::string& key) {
   return value != nullptr && std::holds_alternative<std::string>(*value);
 }
 
-// The records that take part: with a value of x, and of the kinds that have values of y.
+// Returns the participating records: with a value of x, and of the kinds that have y values.
 std::vector<Record> Participants(std::span<const Record> records, const FreeFigure& wanted) {
   std::set<std::string> kinds;
   for (const Record& record : records) {
@@ -88,7 +88,7 @@ std::string TitleOf(std::span<const Record> rows, const FreeFigure& wanted) {
   return fmt::format("{} over {}{}", wanted.y, wanted.x, common);
 }
 
-// The x values: numbers as they are, texts as the places 1, 2, ... of their sorted list.
+// Positions of x values: numbers unchanged, texts as 1, 2, ... in their sorted list.
 class Positions {
  public:
   Positions(std::span<const Record> rows, const std::string& key) : key_(key) {
@@ -110,7 +110,7 @@ class Positions {
   std::vector<std::string> categories_;
 };
 
-/// Whether all keys have a channel (figures.h), which then tells curves apart as in all figures.
+/// Returns true if all keys have a channel (figures.h), so that curves have their usual styles.
 bool HaveChannels(const std::vector<std::string>& keys) {
   return !keys.empty() && std::ranges::all_of(keys, [](const std::string& key) {
     return std::ranges::find(kChannelKeys, key) != std::end(kChannelKeys);
@@ -123,7 +123,7 @@ Record Only(const std::vector<std::string>& keys, const Record& row) {
   return shown;
 }
 
-/// The look of a run by these keys alone, those that have a channel; or that of the index-th curve.
+/// Returns the style of a run by those of these keys that have a channel, or of the index-th curve.
 CurveStyle StyleBy(const std::vector<std::string>& keys, const Record& row, std::size_t index) {
   if (!HaveChannels(keys)) return DistinctStyle(index);
   CurveStyle style = StyleOf(Only(keys, row));
@@ -145,7 +145,7 @@ Curve SeriesCurve(const Record& row, const FreeFigure& wanted, const std::string
   return curve;
 }
 
-// `rows` in order of x.
+// Makes a curve; `rows` are in order of x.
 Curve ValueCurve(const std::vector<Record>& rows, const FreeFigure& wanted, const Positions& x,
                  const std::string& label, std::size_t index) {
   Curve curve{
@@ -162,7 +162,7 @@ Curve ValueCurve(const std::vector<Record>& rows, const FreeFigure& wanted, cons
   return curve;
 }
 
-// Lines join points only where no curve has two of them at one x.
+// Joins points by lines only if no curve has two of them at one x.
 void JoinPoints(Figure& figure) {
   const bool joins =
       figure.x_ticks.empty() && std::ranges::none_of(figure.curves, [](const Curve& curve) {
@@ -187,7 +187,7 @@ struct Range {
 void ChooseScales(Figure& figure, const FreeFigure& wanted, bool is_series) {
   Range x, y;
   for (const Curve& curve : figure.curves) {
-    // a series starts at t = 0 with a drift of zero, which must not forbid logarithms
+    // a series starts at t = 0 with zero drift, which must not prevent logarithmic axes
     for (const double value : curve.x) {
       if (!is_series || value > 0) x.Include(value);
     }
@@ -212,7 +212,7 @@ void ChooseScales(Figure& figure, const FreeFigure& wanted, bool is_series) {
 
 using Group = std::pair<std::string, std::vector<Record>>;  // label and members
 
-/// Of rows that are sorted by `keys`.
+/// Groups rows that are sorted by `keys`.
 std::vector<Group> GroupsOf(std::span<const Record> rows, std::span<const std::string> keys) {
   std::vector<Group> groups;
   for (const Record& row : rows) {
@@ -228,7 +228,7 @@ std::vector<Group> GroupsOf(std::span<const Record> rows, std::span<const std::s
 std::vector<std::string> RemarksOn(std::span<const Record> rows, const Figure& figure,
                                    const std::set<std::string>& mixed) {
   std::vector<std::string> remarks;
-  // a joined curve may well run through tolerances; a cloud of points calls for a choice
+  // a joined curve may include several tolerances; a cloud of points needs a choice
   const bool is_cloud = std::ranges::any_of(
       figure.curves, [](const Curve& curve) { return curve.points && !curve.line; });
   if (is_cloud && !mixed.empty()) {
@@ -336,7 +336,7 @@ void DistinctPoints::Add(const Record& record) {
   ++seen_;
   Record slim;
   for (const auto& [key, value] : record.items()) {
-    // what nobody else has is a parameter, which labels and remarks name
+    // keys without a measure are parameters, which labels and remarks contain
     const bool is_shown = std::ranges::find(keys_, key) != keys_.end() || !FindMeasure(key);
     if (!is_shown) continue;
     if (std::holds_alternative<std::vector<double>>(value)) {
@@ -355,7 +355,7 @@ void DistinctPoints::Add(const Record& record) {
 std::string DistinctPoints::CellOf(const Record& record, int axis) const {
   const std::string& key = axes_[static_cast<std::size_t>(axis)];
   const double value = record.Number(key);
-  if (!std::isfinite(value)) return record.Text(key);  // a text, or nothing
+  if (!std::isfinite(value)) return record.Text(key);  // a text, or no value
   const Span& span = spans_[static_cast<std::size_t>(axis)];
   const auto cell = [this](double at, double from, double to) {
     return to > from ? std::floor((at - from) / (to - from) * parts_) : 0.0;
@@ -368,7 +368,7 @@ std::string DistinctPoints::CellOf(const Record& record, int axis) const {
 std::string DistinctPoints::KeyOf(const Record& record) const {
   std::string key = fmt::format("{}{}|", HasFailed(record), HasDoubt(record));
   for (const std::string& one : group_) key += record.Text(one) + "|";
-  // while all are kept, each is its own
+  // while all records are kept, each has its own cell
   if (parts_ == 0) return key + std::to_string(seen_);
   return key + CellOf(record, 0) + "|" + CellOf(record, 1);
 }

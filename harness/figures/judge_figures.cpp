@@ -21,12 +21,12 @@
 namespace loopbench::harness {
 namespace {
 
-// All lengths in points from the lower left corner.
+// lengths in points from the lower left corner
 constexpr double kMargin = 6.0, kRoom = 4.0;
-constexpr double kShareWidth = 26.0;   // of the numbers at the right
-constexpr double kPageHeight = 680.0;  // 240 mm, what a page has
+constexpr double kShareWidth = 26.0;   // width of the numbers at the right
+constexpr double kPageHeight = 680.0;  // usable page height, 240 mm
 
-// From all rows hold to none does. Letters are white on the last two.
+// From all rows hold (first) to no row holds (last). Letters are white on the last two.
 constexpr std::array kShades = {"#ffffff", "#dfe5ec", "#b7c4d3", "#8599b0", "#4b6384", "#16294a"};
 
 std::size_t ShadeOf(const FoldedCell& cell) {
@@ -34,7 +34,7 @@ std::size_t ShadeOf(const FoldedCell& cell) {
   return 1 + static_cast<std::size_t>(std::floor((1.0 - cell.Share()) * 4.0));
 }
 
-/// A point type of gnuplot, or a text.
+/// Point type of gnuplot, or a text.
 struct Glyph {
   int point = 0;
   double size = 0.0;
@@ -137,7 +137,7 @@ class MapPainter {
       Text(glyph.text, x, y, fmt::format("center tc rgb '{}'", color));
       return;
     }
-    // hollow circles are points of the type before that of filled ones
+    // the type of a hollow circle is one below that of the filled one
     commands_ += TextAt(page_, "", x, y,
                         fmt::format("point pt {} ps {:g} lw 1.1 lc rgb '{}' front",
                                     hollow ? glyph.point - 1 : glyph.point, glyph.size, color));
@@ -167,7 +167,7 @@ class MapPainter {
          y + 0.5 * cell_height_, "left");
   }
 
-  // In rows: shades, then glyphs that occur.
+  // Draws rows: first shades, then the glyphs in use.
   void DrawLegend(double y) {
     const double left = kMargin;
     double x = left;
@@ -219,7 +219,7 @@ class MapPainter {
   std::string commands_;
 };
 
-/// How bad a state is, for the worst of several: what is not applicable says nothing.
+/// Ranks states to select the worst; states that are not applicable have no effect.
 int Badness(CellState state) {
   return state == CellState::kNotApplicable ? -1 : static_cast<int>(state);
 }
@@ -277,7 +277,7 @@ constexpr double kNowhere = std::numeric_limits<double>::quiet_NaN();
 
 using Rows = std::vector<const TradeoffRow*>;
 
-/// Rows that agree in these keys, in the order of the figure's.
+/// Groups rows that agree in these keys, in the order of the figure's rows.
 std::map<std::string, Rows> RowsBy(std::span<const char* const> keys, const Rows& rows) {
   std::map<std::string, Rows> groups;
   for (const TradeoffRow* row : rows) {
@@ -312,13 +312,13 @@ std::string LabelOfAxis(const std::string& key) {
   return unit.empty() ? key : fmt::format("{} [{}]", key, unit);
 }
 
-/// What a run that failed had cost by then.
+/// Returns the cost of a failed run up to its failure.
 double SpentBy(const TradeoffRow& row) {
   if (std::isfinite(row.cost)) return row.cost;
   return row.record.Number("cpu_s");
 }
 
-/// A run's error over `x`; failed runs are crosses there, or where they had come to.
+/// Draws a run's error over `x`; failed runs are crosses there, or at the cost reached.
 template <class X>
 void AddPoint(const TradeoffRow& row, X x, Curve* sound, Curve* doubted) {
   if (HasFailed(row.record)) {
@@ -331,7 +331,7 @@ void AddPoint(const TradeoffRow& row, X x, Curve* sound, Curve* doubted) {
   curve.y.push_back(row.error);
 }
 
-/// All runs of a formulation in one coordinate set as marks, the doubtful ones hollow.
+/// Draws all runs of a formulation in one coordinate set as marks, hollow with warnings.
 void AddCloud(const Rows& rows, Figure* figure) {
   Curve sound{.style = StyleOf(rows.front()->record), .points = true, .line = false};
   sound.style.doubtful = false;
@@ -345,7 +345,7 @@ void AddCloud(const Rows& rows, Figure* figure) {
   figure->curves.push_back(std::move(sound));
 }
 
-/// A line through the compared runs of a formulation and level that no other of them beats.
+/// Draws a line through the non-dominated compared runs of a formulation and level.
 void AddBest(const Rows& rows, Figure* figure) {
   const Record& first = rows.front()->record;
   Curve best{.label = first.Text("formulation") + ", " + first.Text("enforcement"),
@@ -363,10 +363,10 @@ void AddBest(const Rows& rows, Figure* figure) {
   if (best.x.size() > 1) figure->curves.push_back(std::move(best));
 }
 
-/// A row for what a line of its own means.
+/// Makes a legend row for a line with its own meaning.
 LegendRow RowOf(const Curve& line) { return {{line.label, line.style}}; }
 
-/// From one row of the front to the next the cheaper one serves.
+/// Draws stairs: between two rows of the front, the cheaper one applies.
 Curve Stairs(const TradeoffProblem& problem) {
   Curve stairs{.label = "Pareto front", .style = {.width = 0.6}, .merges = false};
   for (const TradeoffRow& row : problem.rows) {
@@ -387,7 +387,7 @@ std::vector<std::string> IntegratorsOfRows(const TradeoffProblem& problem) {
   return {names.begin(), names.end()};
 }
 
-/// Upright, at the end of what can be trusted: the least and, where runs differ, the largest.
+/// Draws vertical lines at the trust horizon: the smallest and, if runs differ, the largest.
 std::vector<Curve> TrustLines(const Rows& rows, const std::vector<Curve>& curves) {
   double low = std::numeric_limits<double>::infinity(), high = 0.0;
   for (const Curve& curve : curves) {
@@ -413,7 +413,7 @@ std::vector<Curve> TrustLines(const Rows& rows, const std::vector<Curve>& curves
   return lines;
 }
 
-/// Whether anything of it can be drawn on logarithmic axes, or over time.
+/// Returns true if any part can be drawn on logarithmic axes, or over time.
 bool HasPoint(const Curve& curve) {
   for (std::size_t i = 0; i < curve.x.size(); ++i) {
     if (std::isfinite(curve.x[i]) && std::isfinite(curve.y[i]) && curve.y[i] > 0.0) return true;
@@ -421,7 +421,7 @@ bool HasPoint(const Curve& curve) {
   return false;
 }
 
-/// For a file: letters, digits and '-'.
+/// Makes a file name part: letters, digits and '-'.
 std::string Slug(const std::string& text) {
   std::string slug;
   for (const char c : text) {
@@ -481,7 +481,7 @@ Figure ToleranceFigure(const Tradeoff& tradeoff, const TradeoffProblem& problem,
     doubted.line = false;
     doubted.style.doubtful = true;
     for (const TradeoffRow* row : own) AddPoint(*row, rtol, &sound, &doubted);
-    // several runs at one tolerance are a cloud, through which no line goes
+    // several runs at one tolerance form a cloud without a line
     std::vector<double> places = sound.x;
     sound.line = std::ranges::adjacent_find(places) == places.end();
     if (!doubted.x.empty()) figure.curves.push_back(std::move(doubted));
@@ -541,13 +541,13 @@ std::vector<NamedFigure> TradeoffFigures(const Tradeoff& tradeoff) {
   std::vector<NamedFigure> figures;
   std::set<std::string> taken;
   const auto add = [&](const std::string& kind, const std::string& what, Figure figure) {
-    // a failed run alone has no error that an axis could show, nor have stairs or lines a meaning
+    // a failed run alone has no error for an axis, and stairs or lines alone have no meaning
     const bool anything = std::ranges::any_of(figure.curves, [](const Curve& curve) {
       return (curve.merges || !curve.line) && HasPoint(curve);
     });
     if (!anything) return;
     std::string name = kind + Slug(what);
-    if (!taken.insert(name).second) name = kind + what;  // with a hash in its file's name
+    if (!taken.insert(name).second) name = kind + what;  // with a hash in its file name
     figures.push_back({name, std::move(figure)});
   };
   for (const TradeoffProblem& problem : tradeoff.problems) {

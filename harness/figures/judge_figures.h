@@ -16,29 +16,29 @@
 
 namespace loopbench::harness {
 
-// The robustness map as a picture: a small heat map that is read at arm's length.
+// The robustness map as a small heat map that is readable from a distance.
 
-/// What became of a method in all rows of a group.
+/// Result of a method in all rows of a group.
 struct FoldedCell {
-  CellState worst = CellState::kNotApplicable;  ///< of the rows that are applicable
-  std::size_t holding = 0, judged = 0;          ///< of the rows that are applicable
-  bool in_doubt = false;                        ///< a row holds in doubt (HoldsInDoubt)
+  CellState worst = CellState::kNotApplicable;  ///< worst of the applicable rows
+  std::size_t holding = 0, judged = 0;          ///< numbers of applicable rows
+  bool in_doubt = false;                        ///< a row holds with warnings (HoldsInDoubt)
   bool fails_demand = false;                    ///< a row must hold and does not
 
-  /// 1 where all hold.
+  /// Fraction of the applicable rows that hold; 1 if all do.
   double Share() const;
 };
 
 /// A group with a cell for each method.
 struct FoldedGroup {
-  std::string label;  ///< the short one of the rules where there is one
+  std::string label;  ///< short label of the rules if there is one
   std::size_t rows = 0;
   std::vector<FoldedCell> cells;
 
-  double Share() const;  ///< of all its rows and methods
+  double Share() const;  ///< over all its rows and methods
 };
 
-/// The groups of a map, those of which the least holds first.
+/// Returns the groups of a map, in ascending order of the fraction that holds.
 std::vector<FoldedGroup> Folded(const FailureMap& map);
 
 /// A drawing: gnuplot's commands and the page they are for.
@@ -47,38 +47,38 @@ struct MapDrawing {
   std::string script;
 };
 
-/// Groups from top to bottom, methods from left to right, a legend below. The darker a cell, the
-/// fewer of its group's rows hold; its glyph says how the worst of them ended. There are no hues.
-/// Cells in which a row must hold and does not have a frame. Rows, numbers and reasons stand in
-/// robustness-map.md and .csv.
+/// Draws groups from top to bottom, methods from left to right, a legend below. Darker cells have
+/// fewer rows that hold; the glyph shows how the worst row ended. There are no hues. Cells with a
+/// required row that does not hold have a frame. Rows, numbers and reasons are in robustness-map.md
+/// and .csv.
 MapDrawing DrawMap(const FailureMap& map, FigureSize size = FigureSize::kTwoColumn);
 
-/// Draws into `path`, as PDF when its extension is ".pdf", else as SVG; returns what
-/// DrawWithGnuplot() does.
+/// Draws into `path`, as PDF if its extension is ".pdf", else as SVG; returns the result of
+/// DrawWithGnuplot().
 [[nodiscard]] std::optional<std::string> WriteMapFigure(const std::filesystem::path& path,
                                                         const FailureMap& map,
                                                         FigureSize size = FigureSize::kTwoColumn,
                                                         const std::string& gnuplot = "gnuplot");
 
-// What accuracy costs, as figures.
+// Work-precision figures: cost of accuracy.
 
-/// Error over cost on logarithmic axes. Marks are the runs, in the hue of their formulation and the
-/// shape of their coordinates, hollow for those with doubts; a line, dashed by level, joins what no
-/// other run of the same formulation and level beats, and thin black stairs are the Pareto front of
-/// all. Runs that failed are crosses on the lower edge, where their cost is known (for times of
-/// simulations, of which a failed run has none, their CPU time).
+/// Error over cost on logarithmic axes. Marks are the runs: hue for the formulation, shape for the
+/// coordinates, hollow with warnings. A line, dashed by level, joins the runs that no other run of
+/// the same formulation and level dominates. Thin black stairs are the overall Pareto front. Failed
+/// runs are crosses on the lower edge if their cost is known (their CPU time in place of the
+/// missing simulation time).
 Figure WorkPrecisionFigure(const Tradeoff& tradeoff, const TradeoffProblem& problem);
 
-/// Error over tolerance of the runs with one integrator, beside the line on which the error is the
-/// tolerance (times the length of a link, for lengths): is a tolerance honoured?
+/// Error over tolerance of the runs with one integrator, to check whether tolerances are met. A
+/// line shows error = tolerance (times a link length, for lengths).
 Figure ToleranceFigure(const Tradeoff& tradeoff, const TradeoffProblem& problem,
                        const std::string& integrator);
 
 /// Error over time ("series.error" over "series.error_t") of the runs with one integrator at its
-/// finest tolerance, with the trust horizon of the reference as an upright line.
+/// finest tolerance. A vertical line marks the trust horizon of the reference solution.
 Figure ErrorOverTimeFigure(const TradeoffProblem& problem, const std::string& integrator);
 
-/// Of every problem the first, of every integrator the others, as far as there is anything to draw.
+/// Returns the first figure per problem and the others per integrator, if they have data.
 std::vector<NamedFigure> TradeoffFigures(const Tradeoff& tradeoff);
 
 }  // namespace loopbench::harness

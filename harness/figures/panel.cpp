@@ -31,7 +31,7 @@ std::string TerminalOf(const GnuplotPage& page, bool pdf) {
       page.width / 72.0, page.height / 72.0, kLetterSize);
 }
 
-/// A drawing in points becomes as large in print as it is meant; gnuplot writes pixels.
+/// Sets the intended print size of a drawing in points; gnuplot writes pixels.
 std::string InMillimetres(std::string svg, const GnuplotPage& page) {
   const std::string pixels =
       fmt::format("width=\"{:.0f}\" height=\"{:.0f}\"", page.width, page.height);
@@ -72,7 +72,7 @@ std::optional<std::string> DrawWithGnuplot(const std::filesystem::path& path,
                                            const GnuplotPage& page, const std::string& script,
                                            const std::string& gnuplot) {
   const bool pdf = path.extension() == ".pdf";
-  // without the settings of the user's own ~/.gnuplot, which would change figures
+  // without the user's ~/.gnuplot, whose settings would change figures
   const ProgramResult run =
       RunProgram({gnuplot, "--default-settings"},
                  fmt::format("set terminal {}\n{}", TerminalOf(page, pdf), script));
@@ -90,7 +90,7 @@ namespace {
 
 constexpr double kSample = 17.0, kSampleGap = 4.0, kItemGap = 10.0;  // [pt]
 
-// "A", ..., "Z", "A1", ...
+// Returns "A", ..., "Z", "A1", ...
 std::string Letter(std::size_t index) {
   const std::string letter(1, static_cast<char>('A' + index % 26));
   return index < 26 ? letter : letter + std::to_string(index / 26);
@@ -126,7 +126,7 @@ LegendRow SignsOf(const std::vector<Curve>& curves, const std::vector<std::strin
   return row;
 }
 
-// Items in rows no wider than `width`.
+// Breaks items into rows no wider than `width`.
 std::vector<LegendRow> Broken(const LegendRow& items, double width) {
   std::vector<LegendRow> rows;
   double used = 0.0;
@@ -149,7 +149,7 @@ void Append(std::vector<LegendRow> rows, std::vector<LegendRow>* all) {
 }  // namespace
 
 std::string LineLook(const CurveStyle& style) {
-  // [pt]; gnuplot multiplies them by half the line's width
+  // [pt]; gnuplot multiplies them by half the line width
   constexpr std::array<std::array<double, 6>, kDashes> kPatterns = {
       {{}, {6, 2.5}, {1.2, 1.8}, {6, 2, 1.2, 2}, {6, 2, 1.2, 2, 1.2, 2}, {3, 2}}};
   std::string lengths;
@@ -230,8 +230,8 @@ Legend LegendOf(const Figure& figure, const std::vector<Curve>& merged, FigureSi
 }
 
 std::string DrawLegend(const std::vector<LegendRow>& rows, const GnuplotPage& page, double top) {
-  // gnuplot 5.4 draws lines of one colour and width in SVG with the dashes of the first: each has
-  // a width of its own, by a thousandth
+  // gnuplot 5.4 draws all SVG lines of one colour and width with the dashes of the first: widths
+  // differ by a thousandth
   std::string commands;
   double width = 0.0;
   double y = top - 0.5 * kLineHeight;
@@ -265,8 +265,8 @@ std::string DataBlock(const std::string& name, const std::vector<Point>& points)
   return block + "EOD\n";
 }
 
-// Where the marks of curve `index` of `count` lie: the points next to some places evenly spaced
-// over the axis, between those of the other curves, so that marks of near curves are all seen.
+// Returns the marks of curve `index` of `count`: the points nearest to evenly spaced places on the
+// axis. They lie between the marks of other curves, so that marks of close curves stay visible.
 std::vector<Point> Marks(const PlotArea& area, const std::vector<Point>& points, std::size_t index,
                          std::size_t count) {
   constexpr int kMarks = 5;
@@ -282,7 +282,7 @@ std::vector<Point> Marks(const PlotArea& area, const std::vector<Point>& points,
   return marks;
 }
 
-// y ~ x^exponent at the height of the points between its ends.
+// Draws y ~ x^exponent at the height of the points between its ends.
 std::string GuideElement(const Guide& guide, const std::vector<Point>& points) {
   double sum = 0.0;
   int count = 0;
@@ -299,9 +299,9 @@ std::string GuideElement(const Guide& guide, const std::vector<Point>& points) {
       guide.exponent);
 }
 
-/// Failed runs as labels with a point and no text. Unlike plot elements they may lie on the edges:
-/// on the lower one without a value, on the left one at a time that a logarithmic axis lacks.
-/// Crosses of several colours at one place on the lower edge stand above each other.
+/// Draws failed runs as labels with a point and no text. Unlike plot elements they may lie on the
+/// edges: on the lower one without a value, on the left one at a time outside a logarithmic axis.
+/// Crosses of several colours at one place on the lower edge are stacked.
 class Crosses {
  public:
   explicit Crosses(const PlotArea& area) : area_(area) {}
@@ -317,7 +317,7 @@ class Crosses {
 
  private:
   std::string At(const Point& cross, const std::string& color) {
-    constexpr double kDistance = 0.03;  // of the height
+    constexpr double kDistance = 0.03;  // fraction of the height
     const auto& [x, y] = cross;
     if (!std::isfinite(x)) return "";
     const std::string at = area_.x.CanShow(x) ? fmt::format("first {:.6g}", x) : "graph 0";
@@ -353,7 +353,7 @@ std::vector<Tick> NamedTicks(const std::vector<std::string>& names) {
   return ticks;
 }
 
-// Heights at least a line apart, each as near as it can be to where it is wanted.
+// Returns heights at least a line apart, each as near as possible to the wanted height.
 std::vector<double> Spread(std::vector<double> wanted, double low, double high) {
   std::vector<std::size_t> order(wanted.size());
   for (std::size_t i = 0; i < order.size(); ++i) order[i] = i;
@@ -372,7 +372,7 @@ std::vector<double> Spread(std::vector<double> wanted, double low, double high) 
   return wanted;
 }
 
-// Texts right of the panel, each with a thin line to the end of its curve.
+// Draws texts right of the panel, each with a thin line to the end of its curve.
 std::string EndLabels(const PlotArea& area, const std::vector<std::vector<Point>>& points,
                       const std::vector<std::string>& texts, const GnuplotPage& page,
                       const PanelPlace& place) {
@@ -507,7 +507,7 @@ std::string PanelScript(const Figure& panel, const std::vector<Curve>& curves,
       add(fmt::format("${}{}m with points {} notitle", name, i, MarkLook(curve.style)));
     }
     if (!curve.hollow.empty()) {
-      // white ones first, over the curve's own marks
+      // white marks first, over the curve's own marks
       CurveStyle inner = curve.style, outer = curve.style;
       inner.color = "#ffffff";
       outer.doubtful = true;

@@ -18,10 +18,10 @@ using Format::kExponent, Format::kFixed, Format::kInteger, Format::kScientific, 
 
 constexpr Repeats kSameBits = Repeats::kUnderOneArithmetic, kVaries = Repeats::kNever;
 
-// Accelerations' drift is not compared: at the level of round-off it moves with every change of
-// code. Two units stand in the words, so that reports of comparisons go on without them.
+// Drift of accelerations is not compared: at round-off level it varies with every code change. Two
+// units are part of the words, so that comparison reports omit them.
 constexpr Measure kMeasures[] = {
-    // what names a case
+    // identification of a case
     {"kind", kText, {"kind"}},
     {"experiment", kText, {"experiment"}},
     {"benchmark", kText},
@@ -50,12 +50,12 @@ constexpr Measure kMeasures[] = {
     {"checksum", kText},
     {"format", kNumber},
 
-    // how it ended
+    // outcome
     {"outcome", kText, {"outcome"}, {kOfEnding}, kOutcome},
     {"message", kText, {"message"}, {kOfEnding}},
     {"t_reached", kNumber, {"t reached", "s", kSeconds}, {kSmallest}},
 
-    // what was run
+    // configuration of the run
     {"problem_id", kText, {"problem"}},
     {"preprocessed", kText},
     {"link_length", kNumber, {"link", "m", kShortest}},
@@ -80,7 +80,7 @@ constexpr Measure kMeasures[] = {
     {"ensemble_drift_position_max", kNumber, {"ensemble drift", "m", kScientific}},
     {"ensemble_*", kNumber},
 
-    // what speaks against a run
+    // warnings
     {"warnings", kText, {"warnings"}, {}, kDoubts},
     {"agreement", kNumber, {"ends alike", "", kInteger}},
 
@@ -164,7 +164,7 @@ constexpr Measure kMeasures[] = {
     {"energy_growth_exponent", kNumber, {"energy error's growth exponent", "", kExponent}},
     {"energy_*", kNumber},
 
-    // distance from what is known
+    // distance from known results
     {"refinement_difference", kNumber, {"distance from the finer run", "", kScientific}},
     {"reference", kText, {"reference"}},
     {"reference_file", kText},
@@ -297,14 +297,14 @@ constexpr Measure kMeasures[] = {
     {"series.final.*", kNumbers, {}, {kOfEachPart}},
     {"series.*", kNumbers},
 
-    // where it comes from
+    // origin
     {"machine", kText, {}, {}, kNone, kVaries},
     {"compiler", kText},
     {"flags", kText},
     {"libm", kText, {}, {}, kNone, kVaries},
     {"commit", kText},
 
-    // what decides a run or stands beside records, and may come to stand in them
+    // reserved: configuration and metadata keys that may become record keys
     {"document"},
     {"seed"},
     {"perturb"},
@@ -320,7 +320,7 @@ constexpr Measure kMeasures[] = {
 
 std::span<const Measure> BuiltInMeasures() { return kMeasures; }
 
-// The table of measures: the built-in rows (measures.cpp), and those that programs add.
+// Table of measures: the built-in rows (measures.cpp), and rows that programs add.
 
 namespace {
 
@@ -343,7 +343,7 @@ struct MeasureTable {
 
   std::deque<Measure> rows;
   std::map<std::string_view, const Measure*> by_key;
-  std::deque<std::string> words;  ///< of rows that programs added
+  std::deque<std::string> words;  ///< words of added rows
 };
 
 MeasureTable& AllMeasures() {
@@ -357,7 +357,7 @@ bool IsKey(std::string_view key) {
   return !key.empty() && key.find_first_not_of(kLetters) == std::string_view::npos;
 }
 
-/// Whether both are one key, or the new one a family that a known one belongs to.
+/// Returns true if both are one key, or the new one is a family that includes a known one.
 bool Takes(const Measure& fresh, const Measure& known) {
   return fresh.key == known.key || (IsFamily(fresh) && known.key.starts_with(BeginningOf(fresh)));
 }

@@ -1,6 +1,5 @@
-// Everything that is known of the keys of records, one row each: what tables call a key, what
-// stands under it, what becomes of it where a mechanism has several parts, and by which rule two
-// values of it are compared. Tables, the store, `compare` and sweeps all read this one list.
+// Metadata of record keys, one row each: heading, type, rule for merging the parts of a mechanism,
+// comparison rule. Tables, the store, `compare` and sweeps all read this list.
 #pragma once
 
 #include <deque>
@@ -11,19 +10,19 @@
 namespace loopbench::harness {
 
 enum class ValueType {
-  kAny,      ///< of keys that this program does not know: parameters of sweeps, other programs'
+  kAny,      ///< keys without a row: parameters of sweeps, keys of other programs
   kNumber,   ///< or null, "not measured"
   kText,     ///< or null
   kFlag,     ///< true or false, or null
   kNumbers,  ///< an array of numbers and nulls
 };
 
-/// "a number or null": what a message says was expected.
+/// Returns "a number or null": the expected type in messages.
 std::string_view Describe(ValueType type);
 
-/// How the text and Markdown writers print a value. CSV ignores it and keeps every digit.
+/// Format of a value in text and Markdown. CSV ignores it and keeps every digit.
 enum class Format {
-  kText,        ///< as it is; left-aligned, all others right-aligned
+  kText,        ///< unchanged; left-aligned, all others right-aligned
   kInteger,     ///< 1234
   kShortest,    ///< 1e-06, 10, 0.25; four digits of a number that has more than six: 0.006325
   kScientific,  ///< three digits: 2.05e-03
@@ -32,56 +31,56 @@ enum class Format {
   kSeconds,     ///< four significant digits: 0.4213
 };
 
-/// What a table says above a column. Without words it is the key, and the value decides the format.
+/// Heading of a column. Without words it is the key, and the value decides the format.
 struct Heading {
-  std::string_view words = {};  ///< "*": what the key has in place of the "*"
-  std::string_view unit = {};   ///< in brackets behind the words, and in comparisons
+  std::string_view words = {};  ///< "*": replaced by the part of the key that matches "*"
+  std::string_view unit = {};   ///< in brackets after the words, and in comparisons
   Format format = Format::kText;
 };
 
-/// How the values of parts that share nothing but the ground become one (harness/run/merge_parts).
+/// Rule to merge values of parts connected only through the ground (harness/run/merge_parts).
 enum class Merge {
-  kLost,        ///< belongs to one sequence of steps
-  kSum,         ///< of the parts that have it
-  kSumOfAll,    ///< only where every part was started
-  kLargest,     ///< of the parts that have it
-  kSmallest,    ///< of the parts that have it
-  kWith,        ///< that of the part whose value of another key was taken
-  kOfEnding,    ///< that of the first part that failed, or of the first
+  kLost,        ///< no merged value: belongs to one sequence of steps
+  kSum,         ///< sum over the parts that have it
+  kSumOfAll,    ///< sum, only if every part was started
+  kLargest,     ///< largest over the parts that have it
+  kSmallest,    ///< smallest over the parts that have it
+  kWith,        ///< value of the part that was selected for another key
+  kOfEnding,    ///< value of the first part that failed, or else of the first part
   kOfEachPart,  ///< keys that name bodies or joints: each part has its own
-  kHashOfAll,   ///< of all parts' one after the other, where every part was started
+  kHashOfAll,   ///< hash of the values of all parts in sequence, if every part was started
 };
 struct Merging {
   Merge how = Merge::kLost;
-  std::string_view with = {};  ///< for kWith: the other key
+  std::string_view with = {};  ///< the other key, for kWith
 };
 
-/// How two values are held against each other.
+/// Rule to compare two values.
 enum class Rule {
-  kNone,          ///< not at all
+  kNone,          ///< no comparison
   kOutcome,       ///< "finished" must stay "finished"
-  kDoubts,        ///< what a run's own record says against it: no new reason may come (doubts.h)
-  kEqual,         ///< a number that says what was measured: any change is a difference
-  kCount,         ///< an exact count of work: more is worse, fewer is better
+  kDoubts,        ///< warnings of a run's own record: no new code may appear (doubts.h)
+  kEqual,         ///< number that identifies the measurement: any change is a difference
+  kCount,         ///< exact count of work: more is worse, fewer is better
   kHash,          ///< equal bits
-  kError,         ///< drift, energy error, ...: a ratio
-  kInstructions,  ///< executed instructions: a ratio
-  kTime,          ///< a sample of times: a test
+  kError,         ///< drift, energy error, ...: compared by ratio
+  kInstructions,  ///< executed instructions: compared by ratio
+  kTime,          ///< sample of times: compared by a statistical test
 };
 
-/// Where a case that is run again gives the same value.
+/// Conditions under which a repeated case gives the same value.
 enum class Repeats {
   kAlways,
-  /// Depends on the last bits of floating-point numbers, or on what the compiler makes of the code
-  /// (alignment of memory): comparable under one arithmetic only (provenance.h).
+  /// Depends on the last bits of floating-point numbers or on compiled code (alignment of memory):
+  /// comparable under one arithmetic only (provenance.h).
   kUnderOneArithmetic,
-  /// Tells of the clock, of the machine and how busy it was, or of how the command was typed: two
-  /// runs of one case by one program may differ in it.
+  /// Depends on the clock, the machine and its load, or the typed command: two runs of one case by
+  /// one program may differ in it.
   kNever,
 };
 
 struct Measure {
-  std::string_view key = {};  ///< with a "*" at its end: all keys that begin so
+  std::string_view key = {};  ///< with a "*" at its end: all keys with this beginning
   ValueType type = ValueType::kAny;
   Heading heading = {};
   Merging merging = {};
@@ -89,26 +88,24 @@ struct Measure {
   Repeats repeats = Repeats::kAlways;
 };
 
-/// All rows, those with a rule in the order of comparisons: the built-in ones (measures.cpp), then
-/// those added. They stay where they are.
+/// Returns all rows, rows with a rule in the order of comparisons: the built-in ones
+/// (measures.cpp), then the added ones. Their addresses are stable.
 const std::deque<Measure>& Measures();
 std::span<const Measure> BuiltInMeasures();
 std::vector<const Measure*> AddedMeasures();
 
-/// Adds rows of a program's own, of which RegisterObserver() is the way
-/// (harness/observers/registry.h); their words are copied. Throws std::invalid_argument, and adds
-/// none, where a key is no key or there already, has no type, or is merged with a key that does not
-/// decide which part counts.
+/// Adds rows of a user program, which calls RegisterObserver() for this
+/// (harness/observers/registry.h); copies their words. Throws std::invalid_argument, and adds no
+/// row, if a key is invalid, exists or has no type, or is merged with a key that selects no part.
 void AddMeasures(std::span<const Measure> fresh);
 
-/// The row of a key: its own, else that of the longest beginning; null where there is none.
+/// Returns the row of a key: its own, else the longest matching "*" row; null if there is none.
 const Measure* FindMeasure(std::string_view key);
 
-/// kAny where there is no row.
+/// Returns the type of a key, kAny if there is no row.
 ValueType TypeOf(std::string_view key);
 
-/// Whether records have, or may get, a value of this name from a run: no parameter of a sweep may
-/// be called so.
+/// True if a run may write a value of this name to a record: no parameter of a sweep may have it.
 bool IsReserved(std::string_view name);
 
 }  // namespace loopbench::harness

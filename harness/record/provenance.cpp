@@ -30,11 +30,11 @@ std::string CpuModel() {
   return "unknown processor";
 }
 
-/// Hash of the functions that simulations call, at some thousand arguments. Libraries that differ
-/// in one last bit in a hundred calls cannot get through.
+/// Returns a hash of the functions that simulations call, at about 1000 arguments. It detects a
+/// library that differs in the last bit in one of a hundred calls.
 std::string LibmHash() {
   std::vector<double> answers;
-  volatile double scale = 0.0173;  // not known to the compiler, which would fold the calls
+  volatile double scale = 0.0173;  // unknown to the compiler, which would otherwise fold the calls
   for (int i = 1; i <= 1000; ++i) {
     const double x = scale * i;
     for (const double value : {std::sin(x), std::cos(x), std::atan2(x, 1.0), std::hypot(x, 2.0),

@@ -1,4 +1,4 @@
-// Where records and tables come from: program, machine, commit, command.
+// Origin of records and tables: program, machine, commit, command.
 #pragma once
 
 #include <string>
@@ -8,49 +8,49 @@
 
 namespace loopbench::harness {
 
-// Which machine, compiler, flags and mathematical library made a record, and from which commit.
+// Machine, compiler, flags, mathematical library and commit that produced a record.
 //
-// Stored with every record, because it decides what may be compared with what: times only on one
-// machine, bits only under one arithmetic.
+// Every record contains them because they limit comparisons: times need one machine, bits one
+// arithmetic.
 
 struct Origin {
   std::string machine;   ///< processor model and number of logical processors
   std::string compiler;  ///< name and version
-  std::string flags;     ///< build type, -march and what else changes results
+  std::string flags;     ///< build type, -march and other flags that change results
   std::string libm;  ///< hash of sines, powers, ... at fixed arguments: equal libraries, equal bits
-  std::string commit;  ///< "-dirty" when the tree was changed
+  std::string commit;  ///< "-dirty" if the tree was changed
 
-  /// Whether equal code gives equal bits: compiler, flags and libm known and the same.
+  /// True if equal code gives equal bits: compiler, flags and libm are known and equal.
   bool SameArithmetic(const Origin& other) const;
-  /// Whether times may be compared: the machine known and the same.
+  /// True if times may be compared: the machine is known and equal.
   bool SameMachine(const Origin& other) const;
 };
 
-/// Of this program, here.
+/// Returns the origin of this program on this machine.
 const Origin& ThisOrigin();
 
 /// Sets the keys "machine", "compiler", "flags", "libm" and "commit".
 void Stamp(Record& record);
 
-/// What Stamp() left; unknown parts are empty.
+/// Returns the origin from the keys set by Stamp(); unknown parts are empty.
 Origin OriginOf(const Record& record);
 
-// Where numbers come from: command, machine, compiler, versions, commit. Stands below every table.
+// Provenance below every table: command, machine, compiler, versions, commit.
 
-/// One fact per line, "command: ...". `command` is what the user typed.
+/// Returns one fact per line, "command: ...". `command` is the typed command.
 std::vector<std::string> Provenance(const std::string& command);
 
-/// What `loopbench --version` prints: the version, and those facts that no command changes.
+/// Returns the output of `loopbench --version`: the version, and facts independent of the command.
 std::string VersionText();
 
-/// 16 hexadecimal digits that change with any byte of this program: results of different versions
-/// are different results.
+/// Returns 16 hexadecimal digits that change with any byte of this program: results of different
+/// versions are different results.
 const std::string& CodeVersion();
 
-/// The program's name and its arguments, with spaces between.
+/// Returns the program's name and its arguments, separated by spaces.
 std::string CommandLine(int argc, const char* const* argv);
 
-/// The same as a shell takes it, with the program as it was called.
+/// Returns the command line in shell syntax, with the program as it was called.
 std::string ShellLine(const std::vector<std::string>& words);
 
 }  // namespace loopbench::harness

@@ -103,7 +103,7 @@ std::string ToJsonLine(const Record& record) {
 }
 
 std::string CaseId(const Record& canonical_keys) {
-  // nlohmann::json keeps its keys sorted.
+  // nlohmann::json sorts its keys
   return Fnv1a(Dump<nlohmann::json>(canonical_keys));
 }
 namespace {
@@ -143,7 +143,7 @@ bool VerifyChecksum(std::string_view line) {
 std::string Excerpt(std::string_view text) {
   constexpr std::size_t kMost = 80;
   std::string_view beginning = text.substr(0, kMost);
-  // whole characters only, where there are any
+  // only whole characters, if there are any
   for (std::size_t cut = 0; cut < 4 && beginning.size() < text.size(); ++cut) {
     if (!ContinuesCharacter(text[beginning.size()])) break;
     beginning.remove_suffix(1);
@@ -158,7 +158,7 @@ std::string Excerpt(std::string_view text) {
 }
 namespace {
 
-/// A value as JSON: what stands behind the key of an object that has no other.
+/// Returns a value as JSON: the text after the key of an object with one member.
 std::string ValueText(Value value) {
   Record record;
   record.Set("", std::move(value));

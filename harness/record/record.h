@@ -10,7 +10,7 @@
 
 namespace loopbench::harness {
 
-// One case's result as named values: what the store keeps and what tables, plots and claims read.
+// Result of one case as named values, for the store, tables, plots and claims.
 
 /// A value of a record. `monostate` is "not measured"; it prints as an empty cell, never as zero.
 ///
@@ -36,21 +36,21 @@ class Record {
   /// Sets or replaces the value of `key`.
   void Set(std::string_view key, Value value);
 
-  /// Adds a key that the record does not have yet, without looking for it.
+  /// Adds a key that the record does not have yet, without searching for it.
   void Append(std::string key, Value value) {
     items_.emplace_back(std::move(key), std::move(value));
   }
 
-  /// The value, or nullptr when the record has no such key.
+  /// Returns the value, or nullptr if the record has no such key.
   const Value* Find(std::string_view key) const;
 
-  /// The value as text: strings as they are, numbers in shortest round-trip form, "" when absent.
+  /// Returns the value as text: strings unchanged, numbers in shortest exact form, "" if absent.
   std::string Text(std::string_view key) const;
 
-  /// The value as a number (integers and bools converted), or NaN when absent or not a number.
+  /// Returns the value as a number (integers and bools converted), NaN if absent or not a number.
   double Number(std::string_view key) const;
 
-  /// The value as a series, or an empty one.
+  /// Returns the value as a series, or an empty one.
   const std::vector<double>& Numbers(std::string_view key) const;
 
   const std::vector<std::pair<std::string, Value>>& items() const { return items_; }
@@ -61,63 +61,61 @@ class Record {
   std::vector<std::pair<std::string, Value>> items_;
 };
 
-// A Record as one line of JSON, and back.
+// Conversion of a Record to one line of JSON and back.
 
-/// The record as one JSON object without line breaks: "format" (files.h), keys in the
-/// record's order, and behind them its checksum.
+/// Returns the record as one JSON object without line breaks: "format" (files.h), keys in the
+/// record's order, then its checksum.
 ///
 /// JSON has no NaN and no infinity. A non-finite double is written as null, which reads back as
-/// monostate ("not measured"); inside a series it reads back as NaN. Every other value comes back
-/// with the same type and the same bits (doubles in shortest round-trip form, "1.0" never "1").
-/// Bytes that are not UTF-8 become U+FFFD.
+/// monostate ("not measured"), or as NaN inside a series. All other values keep their type and bits
+/// (doubles in shortest round-trip form, "1.0" never "1"). Bytes that are not UTF-8 become U+FFFD.
 ///
-/// The line ends with ,"checksum":"16 hexadecimal digits"}: FNV-1a (64 bit) of all bytes before
-/// this. It finds whatever changes a line by accident, a flipped bit with certainty; it is no
-/// signature.
+/// The line ends with ,"checksum":"16 hexadecimal digits"}: FNV-1a (64 bit) of all bytes before. It
+/// detects accidental changes of a line, single flipped bits with certainty; it is no signature.
 std::string ToJsonLine(const Record& record);
-/// The same object without format and checksum: a row of a table, not of a store.
+/// Returns the object without format and checksum: a row of a table, not of a store.
 std::string ToJsonObject(const Record& record);
 
-/// The record that `line` describes, without its format and checksum. A line without both (made by
-/// hand) is accepted, and `is_sealed` is false then. Throws std::runtime_error with the value found
-/// and the value expected for another format, a format without a checksum, and a wrong checksum. It
-/// also throws unless the line is one flat JSON object of null, bool, number, string or array of
-/// numbers, whose keys occur once and whose values have the types of their keys (measures.h).
-/// Linear in the length of any line.
+/// Returns the record in `line`, without its format and checksum. A line without both (written by
+/// hand) is accepted, with `is_sealed` false. Throws std::runtime_error with the value found and
+/// the value expected for another format, a format without checksum, and a wrong checksum. Also
+/// throws unless the line is one flat JSON object of null, bool, number, string or array of
+/// numbers, with unique keys and values of the types of their keys (measures.h). Linear in the line
+/// length.
 Record FromJsonLine(std::string_view line, bool* is_sealed = nullptr);
 
-/// Whether `line` is the beginning of a line that ToJsonLine() wrote of a run's record, and no
-/// more: what a crash leaves.
+/// True if `line` is only the beginning of a line that ToJsonLine() wrote of a run's record, as
+/// after a crash.
 bool IsTornRecord(std::string_view line);
 
-/// 16 hexadecimal digits that name a case: FNV-1a (64 bit) of the canonical JSON of its keys. In
-/// the canonical form keys are sorted and there are no spaces, so the order in which keys were set
-/// does not matter. A hash, not a signature: it is for finding equal cases, not for security.
+/// Returns 16 hexadecimal digits that identify a case: FNV-1a (64 bit) of the canonical JSON of its
+/// keys. The canonical form has sorted keys and no spaces, so the order of setting keys has no
+/// effect. The hash finds equal cases; it gives no security.
 std::string CaseId(const Record& canonical_keys);
 
-// The checksum at the end of a record's line.
+// Checksum at the end of a record's line.
 
-/// `object`, a JSON object in one line, with its checksum as last key.
+/// Returns `object`, a JSON object in one line, with its checksum as last key.
 std::string WithChecksum(std::string object);
 
-/// The error of a line that should have a checksum and has none.
+/// Error for a line without its required checksum.
 inline constexpr const char* kWithoutChecksum =
     "found a line without its checksum, expected one: it may have been changed";
 
-/// Whether the line ends with its checksum. Throws std::runtime_error naming the checksum found and
-/// the one expected when it ends with another one, or with its own under a damaged name.
+/// Returns true if the line ends with its checksum. Throws std::runtime_error with the checksum
+/// found and expected if it ends with another one, or with its own under a damaged key.
 bool VerifyChecksum(std::string_view line);
 
-// Pieces of stores in messages.
+// Excerpts of stores in messages.
 
-/// The beginning of `text`, whatever it holds, in valid UTF-8 and without control characters: at
-/// most some 80 bytes, other bytes as \xNN.
+/// Returns the beginning of `text`, any bytes, as valid UTF-8 without control characters: about 80
+/// bytes at most, other bytes as \xNN.
 std::string Excerpt(std::string_view text);
 
-// JSON documents that commands print for programs, made of values, records and other documents.
+// JSON documents for programs, made of values, records and other documents.
 
-/// Keys in the order in which they were added. Texts that are not UTF-8, NaN and infinity become
-/// what they are in records (record.h).
+/// JSON object with keys in the order of adding. Invalid UTF-8, NaN and infinity are converted as
+/// in records (record.h).
 class JsonObject {
  public:
   JsonObject() = default;
@@ -125,11 +123,11 @@ class JsonObject {
 
   JsonObject& Add(std::string_view key, Value value);
   JsonObject& Add(std::string_view key, const std::vector<std::string>& texts);
-  /// A document: an object, or a list of them.
+  /// Adds a document: an object, or a list of objects.
   JsonObject& Add(std::string_view key, const JsonObject& object);
   JsonObject& Add(std::string_view key, const std::vector<JsonObject>& objects);
 
-  /// Without line breaks.
+  /// Returns the object without line breaks.
   std::string Text() const { return "{" + members_ + "}"; }
 
  private:
@@ -138,10 +136,10 @@ class JsonObject {
   std::string members_;
 };
 
-/// A number of things, as a value.
+/// Returns a count as a value.
 inline Value Count(std::size_t number) { return static_cast<std::int64_t>(number); }
 
-/// "[...]", an object a line.
+/// Returns "[...]", one object per line.
 std::string JsonList(const std::vector<JsonObject>& objects);
 
 }  // namespace loopbench::harness

@@ -33,7 +33,7 @@ bool Holds(const Record& record, const Condition& condition) {
   const auto is = [&](const std::string& wanted) {
     return numeric ? ParseNumber(wanted) == number : record.Text(condition.key) == wanted;
   };
-  // ParseCondition() has seen to it that what is ordered is one number
+  // ParseCondition() ensures that an order operator has one number
   const auto bound = [&] { return ParseNumber(condition.values.front()).value(); };
   switch (condition.op) {
     case Operator::kEqual:
@@ -54,7 +54,7 @@ bool Holds(const Record& record, const Condition& condition) {
 
 constexpr std::array<std::string_view, 6> kOperators = {"=", "!=", "<", "<=", ">", ">="};
 
-// The operator that `text` begins with, the longest there is; nothing for a "!" alone.
+// Returns the longest operator at the beginning of `text`; nothing for a "!" alone.
 std::optional<Operator> OperatorAt(std::string_view text) {
   std::optional<Operator> found;
   for (std::size_t i = 0; i < kOperators.size(); ++i) {
@@ -77,13 +77,13 @@ void RequireOneNumber(std::string_view text, const Condition& condition) {
                                 value, ToString(condition.op)));
 }
 
-// -1, 0 or 1; NaN is larger than every number, so that the order is total.
+// Returns -1, 0 or 1; NaN is larger than every number, so that the order is total.
 int Compare(double a, double b) {
   if (std::isnan(a) || std::isnan(b)) return int{std::isnan(a)} - int{std::isnan(b)};
   return int{a > b} - int{a < b};
 }
 
-// Texts with numbers in them as a person orders them: chain-3 before chain-10.
+// Compares texts with numbers in natural order: chain-3 before chain-10.
 int CompareNaturally(const std::string& a, const std::string& b) {
   const auto digits = [](const std::string& text, std::size_t from) {
     const std::size_t end = text.find_first_not_of("0123456789", from);
@@ -103,8 +103,8 @@ int CompareNaturally(const std::string& a, const std::string& b) {
   return a.compare(b);
 }
 
-// By all that names a case: a mechanism at two levels, the parameters of a sweep. Of cases that
-// share it, those of the command's first file come first.
+// Compares all keys of a case: a mechanism at two levels, the parameters of a sweep. For cases with
+// equal keys, those of the command's first file come first.
 int CompareKeys(const Record& a, const Record& b) {
   const auto ends = [](const Record& record, std::size_t i) {
     if (i == record.items().size()) return true;
@@ -134,7 +134,7 @@ bool ComesBefore(const Record& a, const Record& b) {
   return CompareKeys(a, b) < 0;
 }
 
-// A value as SortRowsBy() orders it: 0 numbers, 1 texts, 2 what is missing.
+// Value in the order of SortRowsBy(): 0 numbers, 1 texts, 2 missing values.
 struct SortKey {
   int rank;
   double number;

@@ -1,4 +1,4 @@
-// Choosing and ordering records: the filters of the command line, of claims and of tables.
+// Selection and order of records: filters of the command line, of claims and of tables.
 #pragma once
 
 #include <span>
@@ -10,14 +10,14 @@
 
 namespace loopbench::harness {
 
-/// How a condition holds a value against its own: "=" and "!=" any value, the others numbers.
+/// Comparison of a value with a condition's value: any value for "=" and "!=", numbers for others.
 enum class Operator { kEqual, kUnequal, kLess, kAtMost, kGreater, kAtLeast };
-/// "=", "!=", "<", "<=", ">", ">=".
+/// Returns "=", "!=", "<", "<=", ">" or ">=".
 std::string_view ToString(Operator op);
 
-/// "The value under `key` is one of `values`", or with another operator: none of them, less than
-/// the one of them, ... A numeric value is compared as a number, so "1e-6" and "1e-06" are the
-/// same; every other value is compared as text ("true", "four-bar"), and has no order.
+/// Condition "the value under `key` is one of `values`", or for other operators none of them, less
+/// than the single value, ... Numeric values are compared as numbers, so "1e-6" and "1e-06" are
+/// equal. All other values are compared as text ("true", "four-bar"), without order.
 struct Condition {
   std::string key;
   std::vector<std::string> values;
@@ -26,33 +26,32 @@ struct Condition {
   friend bool operator==(const Condition&, const Condition&) = default;
 };
 
-/// All conditions hold. The empty selection matches every record.
+/// Conditions that must all hold. The empty selection matches every record.
 using Selection = std::vector<Condition>;
 
 /// Reads "key=value", "key=value,value", "key!=value,value", "key<number", "key<=number" and so on.
-/// Throws ConfigError when the key or the value is missing, or an order is asked of what is no
-/// number.
+/// Throws ConfigError if the key or the value is missing, or an order operator has no number.
 Condition ParseCondition(std::string_view text);
 
-/// Whether the record meets every condition. A record without the key, or with NaN under it, meets
-/// none about it, not even "!=".
+/// True if the record meets every condition. A record without the key, or with NaN under it, meets
+/// no condition on it, not even "!=".
 bool Matches(const Record& record, const Selection& selection);
 
-/// The records that match, in their order.
+/// Returns the matching records, in their order.
 std::vector<Record> Filter(std::span<const Record> records, const Selection& selection);
 
-/// The selection as a person would type it: "mechanism=four-bar rtol<=1e-06".
+/// Returns the selection in command line syntax: "mechanism=four-bar rtol<=1e-06".
 std::string ToText(const Selection& selection);
 
-/// Order of rows in every table: by mechanism (chain-3 before chain-10), horizon, formulation,
-/// coordinates, solver, rtol from coarse to fine, then by all other keys of the case as they stand
-/// in the record: which run ended first leaves no trace. Cases of equal keys and different content
-/// stay in the order of the files of their command, then in that of the store. A missing number
-/// comes last.
+/// Sorts rows as in every table: by mechanism (chain-3 before chain-10), horizon, formulation,
+/// coordinates, solver, rtol from coarse to fine, then by all other keys of the case in their order
+/// in the record. The order in which runs ended has no effect. Cases of equal keys and different
+/// content keep the order of the files of their command, then of the store. A missing number comes
+/// last.
 void SortRows(std::vector<Record>* records);
 
-/// Stable order by one key: numbers by size, anything else by its text, texts after numbers.
-/// Records without the key, or with NaN, come last in both directions.
+/// Sorts stably by one key: numbers by size, then texts in text order. Records without the key, or
+/// with NaN, come last in both directions.
 void SortRowsBy(std::vector<Record>* records, const std::string& key, bool descending);
 
 }  // namespace loopbench::harness

@@ -14,7 +14,7 @@
 namespace loopbench::harness {
 namespace {
 
-/// What the library writes beside counters.
+/// Keys that the library writes in addition to counters.
 const std::set<std::string> kLibraryKeys = {"name",
                                             "family_index",
                                             "per_family_instance_index",
@@ -33,7 +33,7 @@ const std::set<std::string> kLibraryKeys = {"name",
                                             "skipped",
                                             "skip_message"};
 
-/// What records of benchmarks hold beside counters.
+/// Keys of benchmark records in addition to counters.
 const std::set<std::string> kTakenKeys = {
     "kind",    "benchmark", "outcome", "start_hash", "cpu_ns", "series.cpu_ns", "series.real_ns",
     "machine", "compiler",  "flags",   "libm",       "commit", "load_average"};
@@ -44,7 +44,7 @@ double MedianOf(std::vector<double> sample) {
   return n % 2 == 1 ? sample[n / 2] : 0.5 * (sample[n / 2 - 1] + sample[n / 2]);
 }
 
-/// A string that may be absent or empty.
+/// Returns a string that may be absent or empty.
 std::string AnyText(const JsonNode& owner, const std::string& key) {
   const std::optional<JsonNode> node = owner.Optional(key);
   if (!node || node->value() == "") return "";
@@ -56,7 +56,7 @@ bool IsTrue(const JsonNode& owner, const std::string& key) {
   return node && node->Bool();
 }
 
-/// One of the times of a run [ns].
+/// Returns one of the times of a run [ns].
 double Time(const JsonNode& run, const std::string& key) {
   const std::array<double, 4> nanoseconds = {1.0, 1e3, 1e6, 1e9};
   const std::optional<JsonNode> unit = run.Optional("time_unit");
@@ -85,7 +85,7 @@ struct Repetitions {
     cpu_ns.push_back(Time(run, "cpu_time"));
     real_ns.push_back(Time(run, "real_time"));
     for (const auto& [key, node] : run.Members()) {
-      // other versions of the library may add words and flags; whatever else is there is a counter
+      // other library versions may add words and flags; all other values are counters
       if (kLibraryKeys.contains(key) || node.value().is_string() || node.value().is_boolean()) {
         continue;
       }
@@ -101,7 +101,7 @@ struct Repetitions {
     record.Set("outcome", error.empty() ? std::string("finished") : error);
     if (!label.empty()) record.Set("start_hash", label);
     if (!error.empty() || cpu_ns.empty()) return record;
-    // what one of several threads spent says little: they are measured by the clock
+    // CPU time of one of several threads is not informative: use wall time for them
     const std::vector<double>& spent = name.ends_with("-threads") ? real_ns : cpu_ns;
     record.Set("cpu_ns", MedianOf(spent));
     for (const auto& [key, values] : counters) record.Set(key, MedianOf(values));
@@ -133,7 +133,7 @@ std::vector<Repetitions> ReadRuns(const JsonNode& root) {
   return all;
 }
 
-/// The origin, and how busy the machine was when the program started.
+/// Returns the origin, and the machine load when the program started.
 Record ReadContext(const JsonNode& root) {
   Record record;
   const std::optional<JsonNode> context = root.Optional("context");
@@ -172,7 +172,7 @@ std::vector<Record> ReadMeasurements(const std::filesystem::path& path,
   std::error_code error;
   if (std::filesystem::is_directory(path, error) || path.extension() == ".jsonl") {
     std::vector<Record> records = LatestRecords(ReadRecords(path, warnings));
-    SortRows(&records);  // in the store they stand as they ended
+    SortRows(&records);  // the store has the order in which runs ended
     return records;
   }
   return ParseBenchmarkJson(ReadTextFile(path), path.string());

@@ -95,14 +95,14 @@ void ForEachRecord(const std::filesystem::path& path, const LineReader::Take& ta
   if (warnings != nullptr && !reader.warning().empty()) warnings->push_back(reader.warning());
 }
 
-// FromJsonLine: a flat object, read value by value. Nothing is built that could nest, so neither
-// depth nor length of a line costs more than its bytes.
+// FromJsonLine: parses a flat object value by value. Nothing nests, so the cost is linear in the
+// length of a line, at any depth.
 
 namespace {
 
 using LineJson = nlohmann::ordered_json;
 
-/// Of a run's line; before 1.0 it had no format.
+/// Beginnings of a run's line; before 1.0 lines had no format.
 const std::array<std::string, 2> kBeginnings = {
     fmt::format("{{\"format\":{},\"kind\":\"", kFileFormat), "{\"kind\":\""};
 
@@ -113,7 +113,7 @@ class RecordReader final : public nlohmann::json_sax<LineJson> {
   }
 
   const std::string& error() const { return error_; }
-  /// Nothing is wrong but that it stops too early.
+  /// True if the only fault is that the text stops too early.
   bool ends_early() const { return ends_early_; }
   bool Has(const std::string& key) const { return keys_.contains(key); }
   Record Take() { return std::move(record_); }
@@ -256,13 +256,13 @@ bool IsTornRecord(std::string_view line) {
 }
 namespace {
 
-constexpr std::size_t kAtOnce = 4096;  ///< records, and the rest of their last scene
+constexpr std::size_t kAtOnce = 4096;  ///< records, and the rest of their last problem
 
 }  // namespace
 
 std::string KeysOfLine(std::string_view line) {
   std::string keys;
-  bool is_key = true;  // the next text is one
+  bool is_key = true;  // the next text is a key
   int depth = 0;
   for (std::size_t i = 0; i < line.size(); ++i) {
     const char c = line[i];
@@ -293,7 +293,7 @@ SceneReader::SceneReader(std::filesystem::path path, const Selection& where)
     const auto at = scenes.try_emplace(std::hash<std::string_view>()(scene), fresh).first;
     lines_.push_back({place.offset, static_cast<std::uint32_t>(place.length), at->second});
     bytes_ += place.length;
-    return is_fresh;  // others are read when their scene's turn comes
+    return is_fresh;  // others are read with their problem
   };
   ForEachRecord(
       file_, [this](Record one, const LinePlace&) { samples_.push_back(std::move(one)); }, nullptr,
@@ -330,11 +330,11 @@ void SceneReader::ForEach(const std::function<void(std::vector<Record>)>& take,
 }
 namespace {
 
-/// How a run ended when it was not by itself.
+/// Outcomes of runs that were ended from outside.
 constexpr std::array<std::string_view, 5> kCutShort = {"time-limit", "process-time-limit",
                                                        "memory-limit", "crashed", "invalid-result"};
 
-/// The run, a member of its ensemble, or the reference of its ladder.
+/// True if the run, a member of its ensemble or the reference of its ladder ended so.
 bool WasCutShort(const Record& record) {
   const std::string member = record.Text("ensemble_first_failed");
   const bool has_reference =
@@ -356,13 +356,13 @@ std::string Shown(const Record& record, const std::string& key) {
   return record.Text(key).empty() ? "null" : record.Text(key);
 }
 
-/// A key in which the records differ and may not, or "".
+/// Returns a key in which the records differ although they must not, or "".
 std::string Difference(const Record& one, const Record& other) {
   for (const auto& [first, second] : {std::pair(&one, &other), std::pair(&other, &one)}) {
     for (const auto& [key, value] : first->items()) {
       if (MayDiffer(key)) continue;
       const Value* found = second->Find(key);
-      // as lines of a store, where NaN is null
+      // compare as lines of a store, where NaN is null
       Record a, b;
       a.Set(key, value);
       if (found != nullptr) b.Set(key, *found);
@@ -394,7 +394,7 @@ MergedStores::~MergedStores() {
 int MergedStores::Open(std::size_t part) const {
   const auto found = std::ranges::find(open_, part, &std::pair<std::size_t, int>::first);
   if (found != open_.end()) return found->second;
-  constexpr std::size_t kMostOpen = 256;  // of the 1024 that a process usually may have
+  constexpr std::size_t kMostOpen = 256;  // of the usual limit of 1024 per process
   const std::filesystem::path file = StoreFile(stores_[part]);
   const int descriptor = ::open(file.c_str(), O_RDONLY | O_CLOEXEC);
   if (descriptor < 0) FailOn("read", file);

@@ -21,8 +21,8 @@
 namespace loopbench::harness {
 namespace {
 
-/// The end of a large file, from the beginning of a line: its last megabyte, or as much as its last
-/// two lines are.
+/// Returns the end of a large file, from the beginning of a line: the last megabyte, or the last
+/// two lines if these are longer.
 std::string LastLines(const std::filesystem::path& file, std::uintmax_t size) {
   std::ifstream in(file, std::ios::binary);
   for (std::uintmax_t length = 1 << 20;; length *= 4) {
@@ -39,7 +39,7 @@ std::string LastLines(const std::filesystem::path& file, std::uintmax_t size) {
   }
 }
 
-/// Line ends among the first bytes of a file.
+/// Counts line ends among the first bytes of a file.
 int CountLines(const std::filesystem::path& file, std::uintmax_t bytes) {
   std::ifstream in(file, std::ios::binary);
   std::string block(std::size_t{4} << 20, '\0');
@@ -53,8 +53,8 @@ int CountLines(const std::filesystem::path& file, std::uintmax_t bytes) {
   return static_cast<int>(lines);
 }
 
-/// Feeds the end of a file, and what it says of a line that is no record names the line of the
-/// file: lines before are counted only then.
+/// Feeds the end of a file. For an invalid line, the error names its line number in the file;
+/// earlier lines are counted only then.
 LineReader ReadEnd(const std::filesystem::path& file, const std::string& text,
                    std::uintmax_t before) {
   const auto feed = [&](int lines_before) {
@@ -68,7 +68,7 @@ LineReader ReadEnd(const std::filesystem::path& file, const std::string& text,
         {}, lines_before);
     lines.Feed(text);
     lines.End();
-    if (lines.is_handmade()) {  // lines with a checksum are to follow
+    if (lines.is_handmade()) {  // lines with a checksum will follow
       throw std::runtime_error(fmt::format("{}: {}", file.string(), kWithoutChecksum));
     }
     return lines;
@@ -81,8 +81,8 @@ LineReader ReadEnd(const std::filesystem::path& file, const std::string& text,
   return feed(CountLines(file, before));
 }
 
-/// Ends the file with a line end: a complete record gets its own, a torn one goes. What is no store
-/// stays as it is.
+/// Completes the last line: adds a line end to a complete record, removes a torn one. Leaves a file
+/// that is no store unchanged.
 void MendLastLine(const std::filesystem::path& file, int descriptor) {
   const std::uintmax_t size = std::filesystem::file_size(file);
   const std::string text = IsLarge(file) ? LastLines(file, size) : ReadFile(file);
@@ -152,7 +152,7 @@ void ResultStore::Append(const std::vector<Record>& records) {
     if (::fsync(descriptor_) != 0) FailOn("write to the disk", file_);
     appended_ += records.size();
   } catch (...) {
-    // what cannot be kept whole is not kept: the next run finds complete records only
+    // partial lines are removed: the next run finds complete records only
     [[maybe_unused]] const int failed = ::ftruncate(descriptor_, before);
     throw;
   }
@@ -177,7 +177,7 @@ std::vector<Record> LatestRecords(const std::vector<Record>& records, std::strin
 
 namespace {
 
-/// Conditions on parameters, each with the text that stands before its value in a line.
+/// Returns conditions on parameters, each with the text before its value in a line.
 std::vector<std::pair<std::string, Condition>> OnParameters(const Selection& where) {
   std::vector<std::pair<std::string, Condition>> conditions;
   for (const Condition& condition : where) {
@@ -188,7 +188,7 @@ std::vector<std::pair<std::string, Condition>> OnParameters(const Selection& whe
   return conditions;
 }
 
-/// What is asked about and no record that was read has yet, as conditions want it.
+/// Keys of conditions that no record so far has, in the form that conditions use.
 class Missing {
  public:
   explicit Missing(const Selection& where) {
@@ -217,12 +217,12 @@ class Missing {
  private:
   struct Key {
     std::string name, before;
-    bool is_ordered;  ///< a number is asked for
+    bool is_ordered;  ///< true if a number is required
   };
   std::vector<Key> keys_;
 };
 
-/// Whether a number that stands among the keys of the case says that the record does not match.
+/// Returns true if a number among the case keys excludes the record.
 bool IsExcluded(std::string_view line,
                 const std::vector<std::pair<std::string, Condition>>& conditions) {
   const std::string_view keys = line.substr(0, line.find("\"case_id\":"));
@@ -282,7 +282,7 @@ std::vector<Record> ReadRecords(const std::filesystem::path& path,
 }
 namespace {
 
-/// What names the case: all that stands before its case_id.
+/// Returns the keys of a case: all keys before its case_id.
 Record KeysBeforeId(const Record& record) {
   Record keys;
   for (const auto& [key, value] : record.items()) {
@@ -292,7 +292,7 @@ Record KeysBeforeId(const Record& record) {
   return keys;
 }
 
-/// The cases of equal keys.
+/// Cases with equal keys.
 struct Namesakes {
   std::set<std::string> case_ids;
   bool has_set = false;
@@ -350,7 +350,7 @@ void ShareContents(std::vector<Record>* one, std::vector<Record>* other) {
 void RequireOneContent(const std::vector<Record>& records, const std::filesystem::path& store,
                        std::string_view command) {
   const auto told = std::ranges::find_if(records, [](const Record& record) {
-    // references of a sweep differ in content alone, and nothing is judged by them
+    // references of a sweep differ only in content, and no judgement uses them
     return record.Text("kind") != "reference" &&
            KeysBeforeId(record).Find("config_hash") != nullptr;
   });
@@ -362,7 +362,7 @@ void RequireOneContent(const std::vector<Record>& records, const std::filesystem
 }
 namespace {
 
-/// The sixteen digits as a number.
+/// Converts the sixteen digits to a number.
 std::optional<std::uint64_t> NumberOfId(std::string_view id) {
   std::uint64_t number = 0;
   const auto [end, error] = std::from_chars(id.data(), id.data() + id.size(), number, 16);

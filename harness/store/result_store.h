@@ -1,4 +1,4 @@
-// A store of records: what a run appends, what readers find, which runs are finished.
+// Store of records: a run appends to it, readers read it, finished runs are found in it.
 #pragma once
 
 #include <cstdint>
@@ -16,44 +16,44 @@
 
 namespace loopbench::harness {
 
-// The append-only store of results: one JSON object per line.
+// Append-only store of results: one JSON object per line.
 
-/// The file of a store: `path` itself if it ends in ".jsonl", else results.jsonl in that folder.
+/// Returns a store's file: `path` itself if it ends in ".jsonl", else results.jsonl in that folder.
 std::filesystem::path StoreFile(const std::filesystem::path& path);
 
-/// Whether the file of a store is so large (32 MiB and more) that nobody should hold all of it:
-/// what can be told from a part of it is.
+/// True if the file of a store is too large to hold in memory (32 MiB and more): readers then use
+/// only a part of it if possible.
 bool IsLarge(const std::filesystem::path& file);
 
-/// Appends records to a file of JSON Lines. Lines are never changed, and a record is on the disk
-/// when Append() returns: a crash or a power failure loses at most the line that was being written.
+/// Appends records to a file of JSON Lines. Lines are never changed, and a record is on disk when
+/// Append() returns: a crash or a power failure loses at most the current line.
 ///
-/// One process at a time: the file itself is locked, by whatever name it is opened, and the lock
-/// goes with the process, however it ends.
+/// One process at a time: the file itself is locked, under any name, and the lock ends with the
+/// process, however it ends.
 class ResultStore {
  public:
   /// Opens `path` for appending and makes missing folders. A path that ends in ".jsonl" is the file
-  /// itself; any other path is a folder that holds "results.jsonl". A torn last line, left behind
-  /// by a crash, is removed first: the next record would otherwise continue it. Throws
-  /// std::runtime_error that names the file, and the process that has the store open. A file that
-  /// holds anything but records (and the beginning of one as its last line) is refused with its
-  /// line, and stays as it is; of a large one only the end is looked at.
-  /// @param waits  while another process has the store open
+  /// itself; any other path is a folder with "results.jsonl". A torn last line after a crash is
+  /// removed first, because the next record would continue it. Throws std::runtime_error with the
+  /// file, and the process that has the store open. A file with anything except records (and a torn
+  /// last one) is rejected with its line and stays unchanged; of a large file only the end is
+  /// checked.
+  /// @param waits  wait while another process has the store open
   explicit ResultStore(const std::filesystem::path& path, bool waits = false);
   ~ResultStore();
 
   ResultStore(const ResultStore&) = delete;
   ResultStore& operator=(const ResultStore&) = delete;
 
-  /// Writes one line and waits until it is on the disk. Throws std::runtime_error when it could not
-  /// be written in full (a full disk, a limit of file sizes); the file is then as it was before.
-  /// Throws as well when the file was removed or replaced meanwhile. From any thread.
+  /// Writes one line and waits until it is on disk. Throws std::runtime_error if it could not be
+  /// written completely (a full disk, a limit of file sizes); the file then stays unchanged. Also
+  /// throws if the file was removed or replaced meanwhile. Thread-safe.
   void Append(const Record& record) { Append(std::vector<Record>{record}); }
 
-  /// The same with several, all of them or none.
+  /// Writes several records, all of them or none.
   void Append(const std::vector<Record>& records);
 
-  /// In a forked child: lets go of the store, so that the lock ends with the parent.
+  /// Releases the store in a forked child, so that the lock ends with the parent.
   void LeaveToParent();
 
   const std::filesystem::path& file() const { return file_; }
@@ -67,69 +67,67 @@ class ResultStore {
   std::mutex mutex_;
 };
 
-/// The last record of each case ("case_id"), at the place of its first: what tables show when a
-/// case was run again. One of the program `version` comes before those of others, so that going
-/// back to a program shows its numbers again. Records without a case_id all stay. Cases of equal
-/// keys are told apart (result_store.h).
+/// Returns the last record of each case ("case_id"), at the position of its first, for tables of
+/// repeated cases. Records of the program `version` precede others, so that a return to an old
+/// program shows its numbers. Records without a case_id all stay. Cases of equal keys are
+/// distinguished (result_store.h).
 std::vector<Record> LatestRecords(const std::vector<Record>& records,
                                   std::string_view version = "");
 
-/// All records of a store, `path` as for ResultStore, in the order of the file. Empty lines are
-/// passed over. A bad line throws std::runtime_error: file, line number, what was found. The
-/// beginning of a record as last line is what a crash leaves; it is skipped and reported in
-/// `warnings` (when given).
+/// Returns all records of a store, `path` as for ResultStore, in file order. Ignores empty lines. A
+/// bad line throws std::runtime_error with file, line number and text. A torn record as last line,
+/// left by a crash, is skipped and reported in `warnings` (if given).
 std::vector<Record> ReadRecords(const std::filesystem::path& path,
                                 std::vector<std::string>* warnings = nullptr);
 
-/// Whether conditions choose among the lines of a store: some are on parameters of a sweep.
+/// True if conditions select lines of a store: some are on parameters of a sweep.
 bool ChoosesLines(const Selection& where);
 
-/// Whether a line may be a record that meets the conditions on parameters of a sweep: a line that
-/// does not is passed over without being read.
+/// Returns a test whether a line may meet the conditions on parameters of a sweep. Other lines are
+/// skipped without parsing.
 LineReader::Wanted LinesThatMayMatch(const Selection& where);
 
-/// Told after each record how many there are and how long their lines are together; may throw.
+/// Called after each record with the number of records and their total line length; may throw.
 using ReadWatch = std::function<void(std::size_t records, std::uint64_t bytes)>;
 
-/// The same of a store that is too large to be held, without records that conditions on parameters
-/// of a sweep exclude: what such a line says besides is not looked at. Parameters are the keys that
-/// are nobody else's (FindMeasure() knows none), so that records that decide about each other, of
-/// one scene at other tolerances or in other columns, stay or go together. The first record stays,
-/// and of each key of the conditions the first that has it: nobody says that no record has it.
+/// Reads a store too large for memory, without the records that conditions on parameters of a sweep
+/// exclude; such lines are not parsed further. Parameters are keys unknown to FindMeasure().
+/// Records that affect each other (one problem at other tolerances or methods) therefore stay or go
+/// together. The first record stays, and the first with each key of the conditions, so that no key
+/// seems to be missing.
 std::vector<Record> ReadRecords(const std::filesystem::path& path, const Selection& where,
                                 std::vector<std::string>* warnings, const ReadWatch& watch = {});
 
-// Cases that share all keys and differ in what they ran: told apart wherever records are read.
+// Cases with equal keys and different contents are distinguished in all readers.
 
-/// The records, and in those that share all their keys (what stands before "case_id") with a record
-/// of another case_id "content" and, where one of them has it, "set" (what --set changed) moved
-/// before "case_id", among the keys: tables then show both as columns, labels name them. Records
-/// without a case_id stay as they are.
+/// Returns the records with additional keys if other case_ids share all their keys (those before
+/// "case_id"). "content" and, if one of them has it, "set" (changes by --set) then move before
+/// "case_id". Tables show both as columns, labels contain them. Records without a case_id stay
+/// unchanged.
 std::vector<Record> WithContents(std::vector<Record> records);
 
-/// Tells cases apart in both where one of them has to (WithContents() of each): equal cases then
-/// have equal keys.
+/// Applies WithContents() to both lists if one of them needs it: equal cases then have equal keys.
 void ShareContents(std::vector<Record>* one, std::vector<Record>* other);
 
-/// Throws std::runtime_error naming the store and one such case: `command` judges all records that
-/// match a rule together, and a rule cannot mean two mechanisms at once.
+/// Throws std::runtime_error with the store and such a case: `command` judges all records of a rule
+/// together, and a rule cannot apply to two mechanisms at once.
 void RequireOneContent(const std::vector<Record>& records, const std::filesystem::path& store,
                        std::string_view command);
 
-// Which runs a store has, and which of them finished: all that going on with it needs to know.
+// Runs in a store and their completion: the data needed to resume it.
 
-/// The text under a key of a record's line, read without the rest: it is a flat object in whose
-/// texts no quote stands bare. "" when there is none.
+/// Returns the text under a key of a record's line without parsing the rest: it is a flat object,
+/// and quotes in its texts are escaped. "" if there is none.
 /// @param quoted_key  "\"id\":\""
 std::string_view TextUnder(std::string_view quoted_key, std::string_view line);
 
 class FinishedRuns {
  public:
-  /// `path` as for ResultStore. The store is read when first asked, a line at a time: a hundred
-  /// bytes are kept of each record. Throws std::runtime_error then, as ReadRecords() does.
+  /// `path` as for ResultStore. The first Find() reads the store line by line and keeps about a
+  /// hundred bytes of each record. It throws std::runtime_error as ReadRecords() does.
   explicit FinishedRuns(std::filesystem::path path) : path_(std::move(path)) {}
 
-  /// Whether the last run with this "id" finished; nothing when there was none.
+  /// Returns true if the last run with this "id" finished; nothing if there was no run.
   std::optional<bool> Find(const std::string& id);
 
  private:

@@ -20,12 +20,12 @@
 namespace loopbench::harness {
 namespace {
 
-/// The process that locked the file, or "another process" where the system does not say.
+/// Returns the process that locked the file, or "another process" if the system gives none.
 std::string Holder(int descriptor) {
   struct stat status = {};
   if (::fstat(descriptor, &status) != 0) return "another process";
   const std::string inode = fmt::format(":{}", status.st_ino);
-  // a list that changes while it is read may leave a line out
+  // a list that changes during reading may miss a line
   for (int look = 0; look < 3; ++look) {
     std::ifstream locks("/proc/locks");
     for (std::string line; std::getline(locks, line);) {
@@ -39,7 +39,7 @@ std::string Holder(int descriptor) {
   return "another process";
 }
 
-/// What a killed process leaves behind, children that hold its descriptors, is gone in less.
+/// Number of tries: child processes of a killed process close its descriptors in less time.
 constexpr int kTries = 10;
 constexpr std::chrono::milliseconds kBetweenTries{20};
 
@@ -58,7 +58,7 @@ bool TryLock(int descriptor, const std::filesystem::path& file, bool waits) {
 int OpenLocked(const std::filesystem::path& file, bool waits, const std::string& cure) {
   constexpr int kMode = 0644;
   for (int i = 0; i < kTries; ++i) {
-    // without blocking: a pipe of that name would wait for its other end
+    // non-blocking: a pipe of that name would wait for its other end
     const int descriptor =
         ::open(file.c_str(), O_RDWR | O_APPEND | O_CREAT | O_CLOEXEC | O_NONBLOCK, kMode);
     if (descriptor < 0) FailOn("open", file);
@@ -101,7 +101,7 @@ namespace {
 
 namespace fs = std::filesystem;
 
-/// The uppermost folder above `file` that is missing, or "".
+/// Returns the topmost missing folder above `file`, or "".
 fs::path FirstMissingAbove(const fs::path& file) {
   fs::path missing;
   for (fs::path folder = file.parent_path(); !folder.empty() && !fs::exists(folder);
@@ -111,8 +111,8 @@ fs::path FirstMissingAbove(const fs::path& file) {
   return missing;
 }
 
-/// Throws where it is a link that leads in a circle, or into a folder that is not there: its disk
-/// may be missing, so none is made.
+/// Throws if it is a circular link, or a link into a missing folder: its disk may be missing, so no
+/// folder is made.
 void RequireTarget(const fs::path& file) {
   if (!fs::is_symlink(fs::symlink_status(file))) return;
   const fs::path target = BehindLinks(file);
@@ -154,7 +154,7 @@ NewStore::NewStore(const fs::path& path) : file_(StoreFile(path)), part_(UnderWa
   descriptor_ = OpenLocked(part_, false, "it writes the same store: wait for it");
   try {
     if (::ftruncate(descriptor_, 0) != 0) FailOn("write", part_);
-    // another process may have ended between the look at the store and the lock
+    // another process may have ended between the check of the store and the lock
     if (!empty_ && HasRecords(file_)) {
       throw std::runtime_error(
           fmt::format("{}: was written by another process just now", file_.string()));

@@ -1,4 +1,4 @@
-// Stores that no two processes write to, and stores that begin.
+// Exclusive writer lock of a store, and new stores.
 #pragma once
 
 #include <filesystem>
@@ -13,54 +13,53 @@ namespace loopbench::harness {
 
 // Opens a store for one writer at a time.
 
-/// A descriptor of the regular file `file` for reading and appending, made if it is missing, with
-/// an exclusive lock on the file itself: by whatever name another process opens it, through a
-/// symbolic link or a hard one, it meets the lock. The lock ends when all copies of the descriptor
-/// are closed, those of forked children too. Throws std::runtime_error that names the file, and the
-/// process that holds the lock.
-/// @param waits  for the lock, however long another process holds it
-/// @param cure   what to do when another process has it, for the message
+/// Returns a descriptor of the regular file `file` for reading and appending; makes the file if it
+/// is missing. The exclusive lock is on the file itself, so it also applies through symbolic and
+/// hard links. It ends when all copies of the descriptor are closed, also in forked children.
+/// Throws std::runtime_error with the file and the process that holds the lock.
+/// @param waits  wait for the lock, however long another process holds it
+/// @param cure   remedy for the message if another process has it
 int OpenLocked(const std::filesystem::path& file, bool waits = false,
                const std::string& cure = "wait for it (--wait), or write to another --out");
 
-/// Whether a process has the store `file` open for writing.
+/// True if a process has the store `file` open for writing.
 bool IsLocked(const std::filesystem::path& file);
 
-/// Whether `file` still names what the descriptor is open on: no one deleted or replaced it.
+/// True if `file` still names the open file of the descriptor: it was not deleted or replaced.
 bool IsStillNamed(int descriptor, const std::filesystem::path& file);
 
-// A store that is written once, and is there when all of it is.
+// Store that is written once and appears only when it is complete.
 
-/// Where the records stand until the store is whole: beside its file.
+/// Returns the file of the records until the store is complete, next to the store's file.
 std::filesystem::path UnderWay(const std::filesystem::path& store_file);
 
-/// Whether the store has a record. A file that is empty is what a run without one left.
+/// True if the store has a record. An empty file remains after a run without records.
 bool HasRecords(const std::filesystem::path& store_file);
 
-/// Records go to UnderWay(), which takes the store's name when all is written: whoever finds the
-/// store finds all of it. One process at a time; what one that was killed left is overwritten by
-/// the next.
+/// Writes records to UnderWay(), which is renamed to the store's file when complete: readers never
+/// find a partial store. One process at a time; the next one overwrites the remains of a killed
+/// one.
 class NewStore {
  public:
-  /// `path` as for ResultStore; missing folders are made. Throws std::runtime_error when there are
-  /// records, something that is no store, or another process that writes.
+  /// `path` as for ResultStore; makes missing folders. Throws std::runtime_error if there are
+  /// records, a file that is no store, or another writing process.
   explicit NewStore(const std::filesystem::path& path);
-  /// Without Commit() all is as it was before, but for folders that others put something into.
+  /// Restores the previous state unless Commit() was called; folders with new files of others stay.
   ~NewStore();
   NewStore(const NewStore&) = delete;
   NewStore& operator=(const NewStore&) = delete;
 
   void Append(const Record& record);
 
-  /// What belongs to the store is there by now. Nothing can be appended afterwards.
+  /// Completes the store, after all its additional files exist. Nothing can be appended afterwards.
   void Commit();
 
-  const std::filesystem::path& file() const { return file_; }  ///< as it will be
+  const std::filesystem::path& file() const { return file_; }  ///< final name
 
  private:
   void GiveUp();
 
-  std::filesystem::path file_, part_, made_;  ///< made_: the uppermost folder that was missing
+  std::filesystem::path file_, part_, made_;  ///< made_: topmost folder that was missing
   std::optional<ResultStore> empty_;          ///< a file of that name, and its lock
   int descriptor_ = -1;
 };

@@ -31,10 +31,10 @@ std::vector<TableColumn> Columns(std::initializer_list<string_view> keys) {
   return columns;
 }
 
-// What a table was made for stays longer than some of what tells its rows apart.
+// Importance of result columns: dropped later than some columns that identify rows.
 constexpr int kAnswer = 2;
 
-// The column of a narrow table: another heading, and shorter words for values.
+// Column of a narrow table: another heading, and shorter words for values.
 TableColumn Short(string_view key, const char* header,
                   std::vector<std::pair<std::string, std::string>> abbreviations = {},
                   int importance = 0) {
@@ -48,7 +48,7 @@ std::vector<std::pair<std::string, std::string>> AbbreviatedLevels() {
   return pairs;
 }
 
-// Of measures that a program has added and that have words.
+// Returns columns of measures that a program has added and that have words.
 std::vector<TableColumn> AddedColumns() {
   std::vector<TableColumn> columns;
   for (const Measure* measure : AddedMeasures()) {
@@ -63,7 +63,7 @@ std::vector<TableColumn> Join(std::vector<TableColumn> head, const std::vector<T
   return head;
 }
 
-// What was run and how it ended: the keys that drift.csv and timing.csv share.
+// Returns the columns of case and outcome that drift.csv and timing.csv share.
 std::vector<TableColumn> CaseColumns() {
   return Columns({"experiment", "mechanism", "formulation", "enforcement", "coordinates", "solver",
                   "integrator", "rtol", "atol", "horizon", "outcome", "t_reached"});
@@ -258,26 +258,26 @@ const std::vector<TableColumn>& CompactTimingColumns() {
   return kColumns;
 }
 
-// Columns by the keys of records, whichever they are.
+// Columns for arbitrary record keys.
 
 namespace {
 
 using enum Format;
 
-// Keys of per-loop and per-body values, which are no parameters.
+// Returns true for keys of per-loop and per-body values, which are no parameters.
 bool IsFamily(const std::string& key) {
   return key.starts_with("series.") || key.starts_with("drift.loop.");
 }
 
-// Whether tables know the very key, not only the family that it belongs to. A fixed step is a key
-// of those cases alone that have one, as a parameter is: no table has its column always.
+// Returns true if tables contain this exact key, not only its family. A fixed step is a key only of
+// cases that have one, like a parameter: no table always has its column.
 bool HasColumn(const std::string& key) {
   if (key == "step") return false;
   const Measure* measure = FindMeasure(key);
   return measure != nullptr && measure->key == key && !measure->heading.words.empty();
 }
 
-// How a value without a column of its own is printed: by its type.
+// Returns the format of a value without a column of its own, by its type.
 Format FormatOf(const std::string& key, std::span<const Record> rows) {
   for (const Record& row : rows) {
     const Value* value = row.Find(key);
@@ -351,7 +351,7 @@ void RequireConditions(const std::string& option, const Selection& selection,
     if (condition.op == Operator::kEqual || condition.op == Operator::kUnequal) {
       continue;
     }
-    std::string text;  // that some record has where a number belongs
+    std::string text;  // text of a record instead of a number
     const bool has_number = std::ranges::any_of(rows, [&](const Record& row) {
       if (text.empty()) text = row.Text(condition.key);
       return !std::isnan(row.Number(condition.key));
@@ -384,7 +384,7 @@ std::vector<TableColumn> TellingApart(std::vector<TableColumn> columns,
   }
   for (const std::string& key : keys) {
     if (IsShown(columns, key)) continue;
-    std::map<std::string, std::string> values;  // of the first row that looks like this
+    std::map<std::string, std::string> values;  // of the first row with this appearance
     const bool tells = [&] {
       for (std::size_t i = 0; i < rows.size(); ++i) {
         const auto [first, is_new] = values.try_emplace(looks[i], rows[i].Text(key));

@@ -15,7 +15,7 @@ namespace {
 
 constexpr std::size_t kRowsNamed = 3, kScenesNamed = 6;
 
-// What a doubt is about, and a row's number of it.
+// Meaning of a warning code, and its number in a row.
 struct Reason {
   const char* code;
   const char* sentence;
@@ -94,14 +94,14 @@ std::string NoteOf(const Reason& reason, std::span<const Record> rows,
   return fmt::format("{}: {}: {}", reason.code, reason.sentence, names);
 }
 
-// Runs of one scene, horizon and tolerance.
+// Runs of one problem, horizon and tolerance.
 using SceneKey = std::pair<std::string, std::pair<double, double>>;
 
 SceneKey SceneOf(const Record& record) {
   return {record.Text("problem_id"), {record.Number("horizon"), record.Number("rtol")}};
 }
 
-/// The name has the parameters in which the store's `records` differ.
+/// Returns a name with the parameters in which the store's `records` differ.
 std::string NameOfScene(const Record& record, std::span<const Record> records) {
   std::vector<std::string> keys = {"rtol", "horizon"};
   const std::vector<std::string> telling = TellingKeys(records);
@@ -112,7 +112,7 @@ std::string NameOfScene(const Record& record, std::span<const Record> records) {
                      NameOfRow(record, keys));
 }
 
-// What decides about runs that end differently (harness/analysis/doubts.h).
+// Describes the runs that decide if runs end differently (harness/analysis/doubts.h).
 std::string Deciding(const std::vector<Record>& runs) {
   const bool one_integrator = std::ranges::all_of(runs, [&](const Record& run) {
     return run.Text("integrator") == runs.front().Text("integrator");
@@ -121,7 +121,7 @@ std::string Deciding(const std::vector<Record>& runs) {
                         : "finer tolerances or an integrator all of whose runs agree";
 }
 
-// Which of the runs agree with each other; `runs` have a cluster each.
+// Names the runs that agree with each other; each of `runs` has a cluster.
 std::string NoteOfScene(const std::vector<Record>& runs, std::span<const Record> records) {
   const std::string deciding = Deciding(runs);
   const std::vector<std::string> keys = TellingKeys(runs);
@@ -203,7 +203,7 @@ std::vector<std::string> DoubtNotes(std::span<const Record> rows, std::span<cons
     std::ranges::copy_if(records, std::back_inserter(runs), [&](const Record& record) {
       return record.Find("agreement") != nullptr && SceneOf(record) == scenes[i];
     });
-    // a run with nobody beside it at its own tolerance has no cluster
+    // no other run at this tolerance: no cluster
     if (!runs.empty()) {
       notes.push_back(NoteOfScene(runs, records));
       continue;

@@ -1,4 +1,4 @@
-// Why rows of a table say "ok?": sentences that name rows.
+// Reasons for warnings in the column "ok?" of a table: sentences that name rows.
 #pragma once
 
 #include <span>
@@ -10,19 +10,19 @@
 
 namespace loopbench::harness {
 
-/// The keys of cases in which rows differ. Absolute tolerances go with relative ones.
+/// Returns the case keys in which rows differ. Absolute tolerances go with relative ones.
 std::vector<std::string> TellingKeys(std::span<const Record> rows);
 
-/// "odca/velocity/joint rtol 1e-08": texts as they are, numbers with their key; the mechanism where
-/// there is none.
+/// Returns "odca/velocity/joint rtol 1e-08": texts unchanged, numbers with their key; the mechanism
+/// if `row` has none of `keys`.
 std::string NameOfRow(const Record& row, const std::vector<std::string>& keys);
 
-/// The codes of `doubts`, each with what it means.
+/// Returns all warning codes with their meanings.
 std::vector<std::pair<std::string, std::string>> MeaningsOfDoubts();
 
-/// One line per kind of doubt among the rows, with its numbers, and one per scene whose runs end
-/// differently, which names those that agree. Long lists are cut, and say how much is left out.
-/// `records` are those of the store: of scenes they have the runs that the table does not show.
+/// Returns a line per kind of warning among the rows, with its numbers. A line per problem whose
+/// runs end differently names the runs that agree. Long lists are cut, with the number of omitted
+/// items. `records` are all records of the store, including runs that the table omits.
 std::vector<std::string> DoubtNotes(std::span<const Record> rows, std::span<const Record> records);
 
 }  // namespace loopbench::harness

@@ -11,7 +11,7 @@
 namespace loopbench::harness {
 namespace {
 
-constexpr std::size_t kNarrowestText = 24;  ///< [cells]: a few words; a heading is not broken
+constexpr std::size_t kNarrowestText = 24;  ///< [cells]: a few words; headings are not broken
 
 bool IsSameInAllRows(const Table& table, const TableColumn& column) {
   if (table.rows.size() < 2) return false;
@@ -20,7 +20,7 @@ bool IsSameInAllRows(const Table& table, const TableColumn& column) {
                              [&](const Record& row) { return Cell(row, column) == first; });
 }
 
-/// A column with the room it wants and the least that it can do with [cells].
+/// Column with its preferred and its smallest width [cells].
 struct Fitting {
   std::size_t widest = 0, narrowest = 0;
   bool stays = true;
@@ -39,7 +39,7 @@ std::vector<Fitting> Fittings(const Table& table, const std::vector<TableColumn>
   return fittings;
 }
 
-/// With the gaps between them.
+/// Returns the total width including gaps.
 std::size_t Taken(const std::vector<Fitting>& columns, std::size_t Fitting::*width) {
   std::size_t sum = 0;
   for (const Fitting& one : columns) {

@@ -39,7 +39,7 @@ std::string FormatNumber(double number, Format format) {
   return NumberCell(number);
 }
 
-// Every digit, for CSV: absent and NaN values are empty as in the other writers.
+// Returns every digit, for CSV: absent and NaN values are empty as in the other writers.
 std::string FullPrecision(const Record& row, const std::string& key) {
   const Value* value = row.Find(key);
   if (value == nullptr) return "";
@@ -59,7 +59,7 @@ std::string FullPrecision(const Record& row, const std::string& key) {
 }  // namespace
 
 std::string NumberCell(double number) {
-  // a number with more digits than people write is a computed one
+  // a number with more digits than people write is computed
   const std::string text = fmt::format("{}", number);
   const std::size_t first = std::min(text.find_first_not_of("-0."), text.size());
   constexpr int kWritten = 6, kLeast = 4;
@@ -180,18 +180,18 @@ std::string ToMarkdown(const Table& table) {
       out += '\n';
     }
   }
-  // Each note is its own paragraph; a list would be read as part of the table by some renderers.
+  // each note is a paragraph; some renderers read a list as part of the table
   for (const std::string& note : table.notes) {
     out += fmt::format("\n{}\n", EscapeMarkdownParagraph(note));
   }
   return out;
 }
 
-// The writer for programs, JSON, and the choice among all writers.
+// JSON writer for programs, and selection among all writers.
 
 namespace {
 
-// Columns of lists that machines read: the group's key comes first unless it is one of them.
+// Returns columns of machine-readable lists: the group's key comes first unless it is a column.
 std::vector<TableColumn> FlatColumns(const Table& table) {
   std::vector<TableColumn> columns = table.columns;
   if (!table.group.empty() &&
@@ -230,17 +230,17 @@ std::string Render(const Table& table, const std::string& format) {
   return ToCsv(flat);
 }
 
-// The writer for papers: LaTeX that fits the page.
+// LaTeX writer: tables that fit the page.
 
 namespace {
 
-// Of an article on A4 at 10 pt [pt].
+// Text size of an article on A4 at 10 pt [pt].
 constexpr double kTextWidth = 345.0, kTextHeight = 598.0;
 
-/// Ways to set a table, the most comfortable first.
+/// Ways to set a table, in order of decreasing legibility.
 struct Setting {
   const char* size;
-  double scale;   ///< of letters, against 10 pt
+  double scale;   ///< of letters, relative to 10 pt
   double gap_pt;  ///< \tabcolsep, on either side of a column
   bool landscape;
 };
@@ -256,13 +256,13 @@ bool IsNumber(const Record& row, const TableColumn& column) {
          (std::holds_alternative<double>(*value) || std::holds_alternative<std::int64_t>(*value));
 }
 
-/// Of Computer Modern at 10 pt, rounded up [pt].
+/// Returns the width in Computer Modern at 10 pt, rounded up [pt].
 double WidthOfText(std::string_view text) {
   double width = 0.0;
   for (const char c : EscapeTerminal(text)) {
     const auto byte = static_cast<unsigned char>(c);
     if (std::isupper(byte) != 0 || byte >= 0x80) {
-      width += 7.8;  // others than Latin letters are written by their numbers, which are longer
+      width += 7.8;  // non-Latin letters are written as numbers, which are longer
     } else {
       width += c == 'm' || c == 'w' || c == '\\' || c == '%' || c == '@' ? 8.4 : 5.1;
     }
@@ -301,7 +301,7 @@ double WidthOf(const std::vector<LatexColumn>& columns, const Setting& setting) 
   return width;
 }
 
-/// The first setting that has room.
+/// Returns the first setting that fits.
 std::optional<Setting> SettingFor(const std::vector<LatexColumn>& columns) {
   for (const Setting& setting : kSettings) {
     if (WidthOf(columns, setting) <= (setting.landscape ? kTextHeight : kTextWidth)) return setting;
@@ -309,7 +309,7 @@ std::optional<Setting> SettingFor(const std::vector<LatexColumn>& columns) {
   return std::nullopt;
 }
 
-// "2.05e-03?" as $2.05 \times 10^{-3}?$, "113.2" as $113.2$; a text stays a text.
+// Returns $2.05 \times 10^{-3}?$ for "2.05e-03?", $113.2$ for "113.2"; texts stay unchanged.
 std::string LatexCell(const Record& row, const LatexColumn& shown) {
   std::string cell = Cell(row, shown.column);
   if (cell.empty() || !IsNumber(row, shown.column)) {
@@ -333,7 +333,7 @@ std::string LatexRow(const std::vector<std::string>& cells) {
   return fmt::format("{} \\\\\n", fmt::join(cells, " & "));
 }
 
-/// "tab:drift", a number behind it for a group.
+/// Returns "tab:drift", followed by a number for a group.
 std::string Label(const Table& table, std::size_t group) {
   std::string slug;
   for (const char c : table.title.empty() ? "records" : table.title) {
@@ -401,7 +401,7 @@ std::string ToLatex(const Table& table) {
     }
     out += "\\end{longtable}}\n";
   }
-  // remarks belong to the document, the origin of the numbers to its source
+  // remarks go into the document, the provenance into its source
   bool is_origin = false;
   for (const std::string& note : table.notes) {
     is_origin = is_origin || note.starts_with("command: ");
@@ -421,7 +421,7 @@ namespace {
 
 const std::string kGap(kColumnGap, ' ');
 
-// `text` padded to `width`, on the left for numbers. The last column of text stays unpadded.
+// Pads `text` to `width`, on the left for numbers. The last column of text stays unpadded.
 std::string Pad(const std::string& text, std::size_t width, Format format) {
   const std::string padding(width - std::min(width, CellsOf(text)), ' ');
   return format == Format::kText ? text + padding : padding + text;
@@ -472,7 +472,7 @@ std::string RowsAsText(const Table& table, const std::vector<TextColumn>& column
 }  // namespace
 
 std::string ToText(const Table& table, bool colour) {
-  std::vector<TextColumn> columns;  // as wide in all groups, so that they compare
+  std::vector<TextColumn> columns;  // equal widths in all groups, for comparison
   for (const TableColumn& column : ColumnsUnderHeading(table)) {
     columns.emplace_back(column, table.rows);
   }

@@ -20,8 +20,8 @@
 namespace loopbench::harness {
 namespace {
 
-// What tells two runs apart, once tolerance and horizon are fixed. "geometry" is "square",
-// "general" or, for a scene without counterpart, empty; "family" is then the scene's own name.
+// Identity of a run at fixed tolerance and horizon. "geometry" is "square", "general" or, for a
+// problem without counterpart, empty; "family" is then the problem's own name.
 using Key = std::map<std::string, std::string>;
 
 struct Run {
@@ -39,7 +39,7 @@ void SetScene(const std::string& mechanism, const FactorialOptions& options, Key
   }
 }
 
-// A table of one effect per factor has no place for two runs that differ in anything else.
+// Throws if runs differ in any other key: a table with one effect per factor has no place for both.
 void RequireSameCase(const Record& one, const Record& other) {
   if (one.Text("case_id") == other.Text("case_id")) return;
   for (const char* key : {"experiment", "jacobian", "atol", "config_hash", "case_id"}) {
@@ -57,7 +57,7 @@ std::vector<Run> Collect(std::span<const Record> records, const FactorialOptions
   for (const Record& record : records) {
     if (record.Number("rtol") != options.rtol) continue;
     if (record.Number("horizon") != options.horizon) continue;
-    // Timing has no drift; a run that failed before its first step has none either, but an outcome.
+    // timing has no drift; a run that failed before its first step has only an outcome
     const std::string outcome = record.Text("outcome");
     const bool failed = !outcome.empty() && outcome != "finished";
     if (record.Find("drift_position_max") == nullptr && !failed) continue;
@@ -66,7 +66,7 @@ std::vector<Run> Collect(std::span<const Record> records, const FactorialOptions
       key[name] = record.Text(name);
     }
     for (const TableColumn& parameter : parameters) {
-      // mechanisms differ in content, and are compared all the same
+      // mechanisms differ in content and are still compared
       if (parameter.key == "config_hash" || parameter.key == "set") continue;
       key["parameter " + parameter.key] = record.Text(parameter.key);
     }
@@ -114,7 +114,7 @@ struct Row {
   }
 };
 
-// One change of one factor, and the factor whose settings split it into rows.
+// Change of one factor, and the factor whose settings split it into rows.
 struct Change {
   std::string factor;
   std::string key;
@@ -123,7 +123,7 @@ struct Change {
   std::string split_by;
 };
 
-// Every formulation with every later one, then the other factors.
+// Returns pairs of every formulation with every later one, then changes of the other factors.
 std::vector<Change> Changes() {
   std::vector<Change> changes;
   const std::vector<std::string> formulations = FormulationNames();
@@ -139,7 +139,7 @@ std::vector<Change> Changes() {
   return changes;
 }
 
-// Rows of one change by setting of the splitting factor; "all" holds every pair.
+// Returns rows of one change by setting of the splitting factor; "all" contains every pair.
 std::map<std::string, Row> Compare(const Change& change, const std::vector<Run>& runs) {
   std::map<std::string, Row> rows;
   for (const Run& from : runs) {
@@ -199,7 +199,7 @@ Table FactorialTable(std::span<const Record> records, const FactorialOptions& op
 }
 namespace {
 
-// Width of the scalar; any other word comes last.
+// Returns the width of the scalar; any other word comes last.
 std::size_t WidthOf(const Record& record) {
   const auto scalar = Parse<Scalar>(record.Text("scalar"));
   return scalar ? static_cast<std::size_t>(*scalar) : kNames<Scalar>.size();
@@ -247,13 +247,13 @@ bool HasKind(std::span<const Record> records, std::string_view kind) {
                              [&](const Record& record) { return record.Text("kind") == kind; });
 }
 
-/// A table of the records of one kind.
+/// Table of the records of one kind.
 struct KindOfTable {
   std::string_view name, records, title;
   const std::vector<TableColumn>& (*columns)();
   const std::vector<TableColumn>& (*compact)();
 };
-/// What a store has first is shown unless another one is asked for.
+/// Kinds in order of preference: by default the first with records in the store.
 constexpr KindOfTable kKinds[] = {
     {"drift", "accuracy", "Drift", DriftColumns, CompactDriftColumns},
     {"precision", "precision", "Precision", PrecisionColumns, CompactPrecisionColumns},
@@ -261,20 +261,20 @@ constexpr KindOfTable kKinds[] = {
     {"timing", "timing", "Timing", TimingColumns, CompactTimingColumns},
     {"references", "reference", "References", ReferenceColumns, CompactReferenceColumns}};
 
-/// None for `factorial` and `all`.
+/// Returns nullptr for `factorial` and `all`.
 const KindOfTable* FindKind(std::string_view name) {
   const auto kind = std::ranges::find(kKinds, name, &KindOfTable::name);
   return kind == std::end(kKinds) ? nullptr : &*kind;
 }
 
-// `rows` are what the table shows: records, or for the factorial table its own rows.
+// Checks keys; `rows` are the rows of the table: records, or for the factorial table its own rows.
 void RequireKeys(const TableView& view, std::span<const Record> rows) {
   if (!view.group.empty()) RequireKey("--group", view.group, rows);
   if (!view.sort.empty()) RequireKey("--sort", view.sort, rows);
   for (const std::string& key : view.columns) RequireKey("--columns", key, rows);
 }
 
-// Every key of the records but series; what is in all records comes in the records' order.
+// Returns every record key except series; keys in all records come in the records' order.
 std::vector<TableColumn> AllColumns(std::span<const Record> rows) {
   std::vector<TableColumn> columns;
   for (const std::string& key : KeysOf(rows)) {
@@ -307,7 +307,7 @@ bool Shows(const Table& table, const std::string& key) {
          std::ranges::find(table.columns, key, &TableColumn::key) != table.columns.end();
 }
 
-// `runs` are what the table's rows are made of.
+// Returns a note on warnings without a column; `runs` are the sources of the table's rows.
 std::optional<std::string> HiddenDoubts(const Table& table, std::span<const Record> runs) {
   const auto doubted =
       std::ranges::count_if(runs, [](const Record& run) { return IsDoubtful(run, "outcome"); });
@@ -316,7 +316,7 @@ std::optional<std::string> HiddenDoubts(const Table& table, std::span<const Reco
                      doubted, runs.size());
 }
 
-// Where the columns chosen do not show that a value is none to rely on, a note does.
+// Returns notes for unreliable values if the chosen columns do not show this.
 std::vector<std::string> WhatColumnsHide(const Table& table) {
   const auto shows = [&](const std::string& key) { return Shows(table, key); };
   std::vector<std::string> notes;
@@ -359,8 +359,8 @@ std::string TitleOf(const std::string& kind) {
 Table Factorial(const std::vector<Record>& rows) {
   FactorialOptions options;
   if (!rows.empty()) {
-    // the table is for one tolerance and horizon: those of the first record that has a tolerance,
-    // unless chosen
+    // the table has one tolerance and horizon: by default those of the first record with a
+    // tolerance
     const auto first = std::ranges::find_if(
         rows, [](const Record& row) { return !std::isnan(row.Number("rtol")); });
     const Record& shown = first == rows.end() ? rows.front() : *first;
@@ -466,7 +466,7 @@ std::vector<std::string> NoiseWarnings(std::span<const Record> rows) {
                         100 * spread, where_spread);
   }
   if (!governor.empty()) line += ", CPU governor " + governor;
-  // what a quiet machine may show at most is not to be trusted on a noisy one
+  // the largest value of a quiet machine is not credible on a noisy one
   const double least = std::fmax(spread, NoiseThresholds{}.aa_spread);
   return {line,
           fmt::format("warning: differences between columns below {:.0f} % mean nothing here; "

@@ -12,85 +12,83 @@
 
 namespace loopbench::harness {
 
-// Which factor is drift due to? Ratios between runs that differ in one factor alone.
+// Factorial effects on drift: ratios between runs that differ in only one factor.
 
-/// What is compared. Drift depends on tolerance and horizon most of all, so both are held fixed.
+/// Options of the comparison. Tolerance and horizon affect drift most, so both are held fixed.
 struct FactorialOptions {
   double rtol = 1e-8;
   double horizon = 10.0;  ///< [s]
-  /// Scenes that differ in geometry alone: square (the closure is a linear invariant of the
-  /// relative coordinates) and general. Other scenes take no part in the factor geometry, but in
-  /// the others.
+  /// Problems that differ only in geometry: square (the closure is a linear invariant of the
+  /// relative coordinates) and general. Other problems have no factor geometry, but all other
+  /// factors.
   std::vector<std::pair<std::string, std::string>> square_and_general = {
       {"square-four-bar", "four-bar"}, {"square-seven-bar", "general-seven-bar"}};
 };
 
-/// One row per change of one factor (formulation, coordinates, level of enforcement, geometry) and
-/// per setting of the factor it interacts with most: `within` is the geometry, for the factor
-/// geometry itself the coordinates, and "all" is every pair together.
+/// Returns one row per change of one factor (formulation, coordinates, enforcement level, geometry)
+/// and setting of the factor with most interaction. `within` is the geometry, for the factor
+/// geometry itself the coordinates; "all" is every pair together.
 ///
-/// Pairs are records equal in mechanism, formulation, enforcement, coordinates, solver and
-/// integrator and in the parameters of a sweep, except for the factor. Of records equal in all of
-/// these and in case_id the last one counts. The ratio is
-/// drift_position_max of `to` over that of `from`, given as geometric mean, least and largest;
-/// drift below the unit of round-off (2.2e-16 m) counts as that. exponent_difference is the mean of
-/// growth_exponent(to) - growth_exponent(from) over the pairs that have both. Pairs with a run that
-/// failed, or whose drift is not finite, have no ratio: they are counted in `left_out` and keep
-/// their row.
+/// Pairs are records equal, except for the factor, in mechanism, formulation, enforcement,
+/// coordinates, solver, integrator and the parameters of a sweep. If also the case_id is equal, the
+/// last record counts. The ratio is drift_position_max of `to` divided by drift_position_max of
+/// `from`: geometric mean, smallest and largest. Drift below the unit round-off (2.2e-16 m) counts
+/// as the unit round-off. exponent_difference is the mean of growth_exponent(to) -
+/// growth_exponent(from) over the pairs that have both. Pairs with a failed run or a drift that is
+/// not finite have no ratio: `left_out` counts them, and they keep their row.
 ///
-/// @throws ConfigError for records equal in all of these that are different cases.
+/// @throws ConfigError if records equal in all of these are different cases.
 Table FactorialTable(std::span<const Record> records, const FactorialOptions& options = {});
 
-// Records of runs in several scalars (kind "precision"): which form a ladder, their order, notes.
+// Records of runs in several scalars (kind "precision"): ladders, their order, notes.
 
-/// The keys, besides parameters, whose values rungs of one ladder share.
+/// Keys, in addition to parameters, whose values are equal on all rungs of a ladder.
 inline constexpr const char* kLadderKeys[] = {"mechanism",   "formulation", "enforcement",
                                               "coordinates", "solver",      "horizon",
                                               "experiment",  "config_hash"};
 
-/// One text per ladder.
+/// Returns a text that identifies the ladder of a record.
 std::string LadderOf(const Record& record);
 
-/// Whether a rung is the one that the others are compared with.
+/// True for the rung with which the others are compared.
 bool IsReferenceRung(const Record& record);
 
-/// One ladder after another; in each the tolerances from the largest, and for each the scalars from
-/// the narrowest. The reference comes last.
+/// Sorts ladder by ladder, within it by tolerance from the largest, then by scalar from the
+/// narrowest. The reference comes last.
 void SortRungs(std::vector<Record>* records);
 
-/// What error, drift and "ruled by" mean, one line each.
+/// Returns the meaning of error, drift and dominant error, one line each.
 std::vector<std::string> PrecisionNotes();
 
-// Which rows and columns of a store a table shows, and in which order.
+// Selection and order of the rows and columns of a table.
 
 struct TableView {
-  /// "drift", "timing", "factorial", "all" (records of every kind), or "" for drift, timing or all,
-  /// the first that the store has records of.
+  /// "drift", "timing", "factorial", "all" (records of every kind), or "" for the first of drift,
+  /// timing and all that has records in the store.
   std::string kind = "";
-  bool compact = false;  ///< few columns and short words, for a terminal of some 100 columns
+  bool compact = false;  ///< few columns and short words, for a terminal of about 100 columns
   Selection where = {};
   std::string group = "";                 ///< key whose values divide the table, "" for none
-  std::vector<std::string> columns = {};  ///< keys in order; empty for those of the kind
-  std::string sort = "";                  ///< key, before the usual order (SortRows)
-  bool descending = false;                ///< largest first; what is missing stays last
+  std::vector<std::string> columns = {};  ///< keys in order; empty for the columns of the kind
+  std::string sort = "";    ///< first key of the order, before the usual order (SortRows)
+  bool descending = false;  ///< largest first; missing values stay last
 };
 
-/// The table of a view, without provenance. Rows without a match leave a table without rows. Keys
-/// that no table knows but the records have (the parameters of a sweep) are shown too, unless
-/// columns were chosen.
+/// Returns the table of a view, without provenance. If no row matches, the table has no rows. Keys
+/// of the records that no table has (parameters of a sweep) are added, unless columns were chosen.
 ///
-/// @throws ConfigError when `where`, `group`, `columns` or `sort` name a key that no record has.
+/// @throws ConfigError if `where`, `group`, `columns` or `sort` name a key that no record has.
 Table MakeTable(std::span<const Record> records, const TableView& view);
 
-/// The kind that the view shows of a store that has these records: its own, else the first.
+/// Returns the kind that the view shows for these records: its own, else the first with records.
 std::string KindOf(const TableView& view, std::span<const Record> records);
 
-/// The rows of such a table, in its order before `sort` and `group`: those of its kind that match.
+/// Returns the rows of the table before `sort` and `group`: records of its kind that match.
 std::vector<Record> RowsOf(std::span<const Record> records, const TableView& view);
 
-/// Notes ("warning: ...") when timings among the rows come from a noisy machine: how many, the
-/// worst A/A spread, load and governor (harness/record/noise.h has the thresholds). None when all
-/// were quiet.
+/// Returns notes ("warning: ...") if timings among the rows come from a noisy machine: their
+/// number, the worst A/A spread, load and governor (thresholds: harness/record/noise.h). No notes
+/// if all were quiet.
 std::vector<std::string> NoiseWarnings(std::span<const Record> rows);
 
 }  // namespace loopbench::harness

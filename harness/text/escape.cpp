@@ -19,7 +19,7 @@ bool IsAlphanumeric(char c) {
   return (c >= 'a' && c <= 'z') || (c >= 'A' && c <= 'Z') || (c >= '0' && c <= '9');
 }
 
-// A character of UTF-8: its code point and length in bytes; length 0 for a byte that is none.
+// Character of UTF-8: its code point and length in bytes; length 0 for an invalid byte.
 struct Character {
   std::uint32_t code = 0;
   std::size_t length = 0;
@@ -42,7 +42,7 @@ Character FirstOf(std::string_view text) {
   return {code, length};
 }
 
-// Whether a terminal or a viewer would act on it instead of showing it.
+// Returns true if a terminal or a viewer would act on it instead of showing it.
 bool Acts(std::uint32_t code) {
   return code < 0x20 || (code >= 0x7F && code < 0xA0) ||  // controls
          (code >= 0x200E && code <= 0x200F) || (code >= 0x2028 && code <= 0x202E) ||
@@ -85,7 +85,7 @@ bool IsFormula(std::string_view text) {
          !IsNumber(text);
 }
 
-// Whether the character at `i` could begin or end markup there.
+// Returns true if the character at `i` could begin or end markup there.
 bool IsMarkup(std::string_view text, std::size_t i) {
   const char before = i > 0 ? text[i - 1] : ' ';
   const char after = i + 1 < text.size() ? text[i + 1] : ' ';
@@ -97,16 +97,16 @@ bool IsMarkup(std::string_view text, std::size_t i) {
     case '|':
     case '$':
       return true;
-    case '_':  // within a word it is none
+    case '_':  // no markup within a word
       return !IsAlphanumeric(before) || !IsAlphanumeric(after);
-    case ']':  // of a link or the definition of one
+    case ']':  // of a link or a link definition
       return after == '(' || after == '[' || after == ':';
     default:
       return false;
   }
 }
 
-/// Those that a font of 128 characters can put together: no thorn, no eth, no signs.
+/// Letters that a font of 128 characters can compose: no thorn, no eth, no signs.
 bool IsLatin1Letter(std::uint32_t code) {
   constexpr std::uint32_t kOthers[] = {0xD0, 0xD7, 0xDE, 0xF0, 0xF7, 0xFE};
   return code >= 0xC0 && code <= 0xFF && std::ranges::find(kOthers, code) == std::end(kOthers);
@@ -184,7 +184,7 @@ std::string EscapeLatex(std::string_view raw) {
     } else if (const std::string_view command = LatexOf(c); !command.empty()) {
       escaped += command;
     } else {
-      // at the start of a row these two would belong to the line end before it
+      // at the start of a row these two would belong to the line end before
       if (escaped.empty() && (c == '[' || c == '*')) escaped += "{}";
       if (kSpecial.find(c) != std::string_view::npos) escaped += '\\';
       escaped += c;
@@ -251,8 +251,8 @@ std::string EscapeCsv(std::string_view raw) {
 }
 
 std::string QuoteGnuplot(std::string_view text) {
-  // Between double quotes, where every special character can be written by its number. Single
-  // quotes will not do: gnuplot 5.4 takes two apostrophes in a row for the end of the string.
+  // Double quotes, because every special character can be written by its number there. In single
+  // quotes, gnuplot 5.4 reads two apostrophes in a row as the end of the string.
   std::string quoted = "\"";
   for (const char c : EscapeTerminal(text)) {
     const bool special = c == '"' || c == '\\' || c == '`' || c == '\'' || c == '@' || c == '$';
@@ -286,7 +286,7 @@ std::string FileName(std::string_view name) {
 }
 namespace {
 
-/// The thread's characters are those of UTF-8 while it lives, whatever the environment says.
+/// Scope in which the thread's characters are UTF-8, independent of the environment.
 class Utf8 {
  public:
   Utf8() {

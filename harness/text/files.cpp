@@ -105,8 +105,8 @@ std::string ReadFile(const std::filesystem::path& path) {
 }
 namespace {
 
-/// Paths to remove, where a signal handler can read them. Those that find no place are removed by
-/// their owner alone.
+/// Paths to remove, readable by a signal handler. Paths that do not fit are removed only by their
+/// owner.
 struct Registered {
   std::atomic<const char*> path = nullptr;
   std::atomic<pid_t> owner = 0;
@@ -154,7 +154,7 @@ std::filesystem::path FolderOfTemporaries() {
                                 named == nullptr ? "/tmp" : named, error.message()));
 }
 
-/// A descriptor of the folder with its lock; -1 if another process has the lock, or removed it.
+/// Returns a locked descriptor of the folder; -1 if another process has the lock or removed it.
 int LockFolder(const std::filesystem::path& path) {
   const int descriptor = ::open(path.c_str(), O_RDONLY | O_DIRECTORY | O_NOFOLLOW | O_CLOEXEC);
   struct stat opened = {}, named = {};
@@ -167,7 +167,7 @@ int LockFolder(const std::filesystem::path& path) {
   return -1;
 }
 
-/// Removes the folders whose process was killed: no process holds their locks.
+/// Removes the folders of killed processes: no process holds their locks.
 void RemoveAbandoned(const std::filesystem::path& folder, const std::string& begin) {
   std::error_code ignored;
   std::vector<std::filesystem::path> found;
@@ -208,7 +208,7 @@ TemporaryFolder::TemporaryFolder(const std::string& name) {
   const std::filesystem::path folder = FolderOfTemporaries();
   const std::string begin = name + ".tmp-";
   RemoveAbandoned(folder, begin);
-  // another process may take a folder without a lock for abandoned; not every disk has locks
+  // another process may treat an unlocked folder as abandoned; some file systems have no locks
   for (int i = 0; i < 10 && lock_ < 0; ++i) {
     std::string made = (folder / (begin + "XXXXXX")).string();
     if (::mkdtemp(made.data()) == nullptr) FailOn("make", made);
@@ -226,7 +226,7 @@ using FileId = std::pair<dev_t, ino_t>;
 
 FileId IdOf(const struct stat& status) { return {status.st_dev, status.st_ino}; }
 
-/// By device and number of the file: paths and links that lead to one file are one input.
+/// Inputs by device and file number: paths and links to one file are one input.
 struct Inputs {
   std::mutex mutex;
   bool are_noted = false;
@@ -241,11 +241,11 @@ Inputs inputs;
                   path.string(), found));
 }
 
-/// Where output to a path goes.
+/// Destination of output to a path.
 struct Destination {
-  fs::path target = {};  ///< behind links; "" if it goes into the existing file
-  int stream = -1;       ///< a standard stream that the path leads to
-  mode_t mode = 0;       ///< of a file that is there
+  fs::path target = {};  ///< path after links; "" if output goes into the existing file
+  int stream = -1;       ///< standard stream of the path
+  mode_t mode = 0;       ///< mode of an existing file
 };
 
 Destination DestinationOf(const fs::path& path, Onto onto) {
@@ -270,19 +270,19 @@ Destination DestinationOf(const fs::path& path, Onto onto) {
   }
   if (::access(path.c_str(), W_OK) != 0) FailOn("write", path);
   const fs::path target = BehindLinks(path);
-  // a file that only /proc names, such as one that was removed
+  // a file that only /proc names, such as a removed file
   if (::stat(target.c_str(), &other) != 0 || IdOf(other) != IdOf(there)) return {};
   return {.target = target, .mode = there.st_mode & 07777};
 }
 
-/// A name that no other thread or process uses.
+/// Returns a name that no other thread or process uses.
 fs::path PartBeside(fs::path target, std::string_view ending) {
   static std::atomic<int> counter{0};
   target += ending.empty() ? fmt::format(".{}-{}.tmp", ::getpid(), counter++) : std::string(ending);
   return target;
 }
 
-/// Whether PartBeside() made the name in a process of this machine that has ended, or elsewhere.
+/// Returns true if PartBeside() made the name in an ended process here, or on another machine.
 bool IsOfEndedProcess(const std::string& name) {
   const std::size_t begin = name.rfind('.', name.size() - std::min<std::size_t>(name.size(), 5));
   int pid = 0, number = 0, length = 0;
@@ -318,7 +318,7 @@ void RequireOutput(const fs::path& path) {
 }
 
 fs::path BehindLinks(fs::path file) {
-  constexpr int kMostLinks = 40;  // as the system has it
+  constexpr int kMostLinks = 40;  // same limit as the system
   for (int i = 0; i < kMostLinks && fs::is_symlink(fs::symlink_status(file)); ++i) {
     file = file.parent_path() / fs::read_symlink(file);
   }
@@ -380,7 +380,7 @@ bool OutputFile::FinishIfNew() {
   if (::fsync(descriptor_) != 0) FailOn("write", path_);
   const std::string part = part_->path().string();
   int failure = ::link(part.c_str(), path_.c_str()) == 0 ? 0 : errno;
-  if (failure == EPERM || failure == EOPNOTSUPP) {  // a file has one name there
+  if (failure == EPERM || failure == EOPNOTSUPP) {  // this file system has no hard links
     const bool done =
         ::renameat2(AT_FDCWD, part.c_str(), AT_FDCWD, path_.c_str(), RENAME_NOREPLACE) == 0;
     failure = done ? 0 : errno;

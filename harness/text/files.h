@@ -1,4 +1,4 @@
-// Whole files, read and written at once, and what can be wrong with them.
+// Whole files, read and written at once, and their errors.
 #pragma once
 
 #include <filesystem>
@@ -10,11 +10,11 @@
 
 namespace loopbench::harness {
 
-// The one exception for input that a person can correct.
+// Exception for input that the user can correct.
 
-/// Bad input. what() is the whole message, ready to print: for each mistake the file, the JSON
-/// Pointer, the value found and what was expected instead. The command line turns it into exit
-/// code 2. Numerical failures are not errors of this kind; they are outcomes of a run.
+/// Bad input. what() is the complete message: for each mistake the file, the JSON Pointer, the
+/// value found and the value expected. The command line turns it into exit code 2. Numerical
+/// failures are not such errors; they are outcomes of a run.
 class ConfigError : public std::runtime_error {
  public:
   using std::runtime_error::runtime_error;
@@ -22,51 +22,51 @@ class ConfigError : public std::runtime_error {
 
 // Whole files, read and written at once.
 
-/// The system rejects an operation that a program needs: a full disk, a limit, a missing file. It
-/// is no result of a method, so that no record is made of it (processes.h).
+/// A failed operation of the system: a full disk, a limit, a missing file. It is no result of a
+/// method, so no record is made of it (processes.h).
 class SystemFault : public std::runtime_error {
  public:
   using std::runtime_error::runtime_error;
 };
 
-/// Writes `text` to `path` as output goes (files.h): of a regular file a reader finds the old
-/// contents or the new ones, never a part. Missing parent folders are made. Throws
-/// std::runtime_error that names the path and the system's reason.
+/// Writes `text` to `path` by the output rules of files.h: a reader of a regular file finds the old
+/// contents or the new ones, never a part. Makes missing parent folders. Throws std::runtime_error
+/// with the path and the system's reason.
 void WriteFileAtomically(const std::filesystem::path& path, std::string_view text);
 
-/// The same with a text that comes in parts: `fill` calls what it is given with each.
+/// Writes a text that comes in parts: `fill` passes each part to its argument.
 void WriteFileAtomically(
     const std::filesystem::path& path,
     const std::function<void(const std::function<void(std::string_view)>& write)>& fill);
 
-/// Writes `text` to `path` if nothing is there; else false, and what is there stays. Of several
-/// processes that try at once one succeeds, and of one that is killed the file has all of the text
-/// or is not there: a temporary file gets its second name by link(2). Throws as WriteFileAtomically
+/// Writes `text` to `path` if no file exists there; else returns false and changes nothing. If
+/// several processes try at once, one succeeds. If a process is killed, the file is complete or
+/// absent, because a temporary file gets its second name by link(2). Throws as WriteFileAtomically
 /// does.
 bool WriteNewFile(const std::filesystem::path& path, std::string_view text);
 
-/// Makes the folder that `path` is in, with all above it. Throws std::runtime_error that names the
-/// folder and the system's reason.
+/// Makes the folder of `path` and its parents. Throws std::runtime_error with the folder and the
+/// system's reason.
 void MakeFolderOf(const std::filesystem::path& path);
 
 /// Throws SystemFault: "cannot VERB 'PATH': " and the reason in errno.
 [[noreturn]] void FailOn(std::string_view verb, const std::filesystem::path& path);
 
-/// All of `text` to an open file; `path` names it in the error. One write(2) in the usual case;
-/// more only if the system accepted a part or was interrupted.
+/// Writes all of `text` to an open file; `path` names it in the error. Calls write(2) once, and
+/// again only if the system accepted a part or was interrupted.
 void WriteAll(int descriptor, std::string_view text, const std::filesystem::path& path);
 
-/// Waits until the names in the folder of `path` are on the disk, where the file system can.
+/// Waits until the names in the folder of `path` are on disk, if the file system supports this.
 void SyncFolderOf(const std::filesystem::path& path);
 
-/// The bytes of `path`, a regular file: a device might never end. It is an input (files.h).
-/// Throws std::runtime_error that names the path and the reason.
+/// Returns the bytes of the regular file `path` (a device might never end) and notes it as input
+/// (files.h). Throws std::runtime_error with the path and the reason.
 std::string ReadFile(const std::filesystem::path& path);
 
-// Files and folders for the time of a command: none is left, however the command ends.
+// Temporary files and folders of a command: none remains, however the command ends.
 
-/// A file or folder under way. It is removed with its owner, and before SIGHUP, SIGINT or SIGTERM
-/// ends this process; a signal that is ignored or has a handler (processes.h) stays as it is.
+/// Temporary file or folder. It is removed with its owner, and before SIGHUP, SIGINT or SIGTERM
+/// ends this process. A signal that is ignored or has a handler (processes.h) stays unchanged.
 class Unfinished {
  public:
   explicit Unfinished(const std::filesystem::path& path);
@@ -80,12 +80,12 @@ class Unfinished {
   std::string path_;
 };
 
-/// A new folder in the system's folder for temporary files. It holds a lock: the next folder of
-/// the same name removes those whose process was killed.
+/// New folder in the system's folder for temporary files. It holds a lock: the next folder of the
+/// same name removes the folders of killed processes.
 class TemporaryFolder {
  public:
   /// @param name  first part of the folder's name. Throws std::runtime_error if the folder cannot
-  ///              be made.
+  ///        be made.
   explicit TemporaryFolder(const std::string& name);
   ~TemporaryFolder();
   TemporaryFolder(const TemporaryFolder&) = delete;
@@ -98,18 +98,18 @@ class TemporaryFolder {
   int lock_ = -1;
 };
 
-// The one place that decides where output goes.
+// Rules for the destination of output.
 //
 //   PATH is                         output goes
-//   a new name, a regular file      to a temporary file beside it, which takes its name at the end
-//   a symbolic link                 to the file that it leads to, in the same way; the link stays
+//   a new name, a regular file      to a temporary file next to it, renamed at the end
+//   a symbolic link                 to its target, in the same way; the link stays
 //   a character device, a pipe      into it
-//   standard output or error        into it, behind all that was printed
-//   a file the command has read     nowhere: refused
-//   a folder, a block device, ...   nowhere: refused
+//   standard output or error        into it, after all previous output
+//   a file the command has read     nowhere: rejected
+//   a folder, a block device, ...   nowhere: rejected
 
-/// While it lives, the files that NoteInput() names are inputs, and output onto them is refused.
-/// One at a time; without one there are no inputs.
+/// Scope in which the files passed to NoteInput() are inputs, and output onto them is rejected.
+/// Only one object may exist; without one there are no inputs.
 class CommandInputs {
  public:
   CommandInputs();
@@ -117,57 +117,57 @@ class CommandInputs {
   CommandInputs(const CommandInputs&) = delete;
   CommandInputs& operator=(const CommandInputs&) = delete;
 };
-/// Called by all that reads files. From any thread.
+/// Registers an input file; every function that reads files calls it. Thread-safe.
 void NoteInput(const std::filesystem::path& path);
 
-/// Whether a file may be written that the command has read: its own records, never a result.
+/// Permission to write a file that the command has read: for its own records, never for a result.
 enum class Onto { kNoInput, kAnyFile };
 
-/// Throws as OutputFile does, and writes nothing: before work that takes long.
+/// Throws as OutputFile does, and writes nothing: a check before long work.
 void RequireOutput(const std::filesystem::path& path);
 
-/// Symbolic links followed to their end, which may be missing.
+/// Follows symbolic links to their end, which may be missing.
 std::filesystem::path BehindLinks(std::filesystem::path file);
 
-/// Removes the temporary files of OutputFile in `folder` whose process was killed: it is gone, and
-/// no process of another machine holds the lock of the file.
+/// Removes temporary files of OutputFile in `folder` whose process was killed. Such a process
+/// no longer exists, and no process of another machine holds the lock of the file.
 void RemoveAbandoned(const std::filesystem::path& folder);
 
-/// Output under way. A reader of a regular file finds the old contents or the new ones.
+/// Output in progress. A reader of a regular file finds the old contents or the new ones.
 class OutputFile {
  public:
   /// Makes missing folders. Throws std::runtime_error, here and below, with the path and the
   /// reason.
-  /// @param ending  of the temporary file; "": a unique one
+  /// @param ending  ending of the temporary file; "": a unique one
   explicit OutputFile(const std::filesystem::path& path, Onto onto = Onto::kNoInput,
                       std::string_view ending = "");
-  /// Without Finish() a regular file stays as it was.
+  /// Leaves a regular file unchanged if Finish() was not called.
   ~OutputFile();
   OutputFile(const OutputFile&) = delete;
   OutputFile& operator=(const OutputFile&) = delete;
 
   void Write(std::string_view text);
-  /// Once, at the end: the file is on the disk.
+  /// Puts the file on disk. Call it once, at the end.
   void Finish();
-  /// Like Finish(), but returns false and keeps the old file if one of the name exists by now.
+  /// Finishes like Finish(), but returns false and keeps an existing file of this name.
   bool FinishIfNew();
 
  private:
   void Close();
 
-  std::filesystem::path path_, target_;  ///< target_: behind links; "" of a device or pipe
+  std::filesystem::path path_, target_;  ///< target_: path after links; "" for a device or pipe
   std::optional<Unfinished> part_;
   int descriptor_ = -1;
 };
 
-// The version of all that Loopbench reads back: configuration files, lines of stores, histories.
+// Version of all files that Loopbench reads: configurations, lines of stores, histories.
 
-/// It is raised when a file of today could be misread by yesterday's program or the other way
-/// round. What says none is of the time before 1.0 and read as 1: nothing changed its meaning.
-/// docs/release.md has the promise.
+/// It is raised if an old program could misread a new file, or a new program an old file. Files
+/// without a version are older than 1.0 and read as 1: no meaning has changed. docs/release.md has
+/// the promise.
 inline constexpr int kFileFormat = 1;
 
-/// What is expected where another stands; {}: kFileFormat.
+/// Expected format in messages; {}: kFileFormat.
 inline constexpr const char* kExpectedFormat = "{}, the format that this version reads";
 
 }  // namespace loopbench::harness

@@ -1,4 +1,4 @@
-// The hash of this harness: short names for states, cases and versions.
+// Hash function for short names of states, cases and versions.
 #pragma once
 
 #include <fmt/format.h>
@@ -9,7 +9,7 @@
 
 namespace loopbench::harness {
 
-/// FNV-1a (64 bit) of bytes that come in parts. For finding equals, not for security.
+/// FNV-1a (64 bit) of bytes that come in parts. For finding equal data, not for security.
 class FnvHash {
  public:
   void Add(std::string_view bytes) {
@@ -17,7 +17,7 @@ class FnvHash {
       hash_ = (hash_ ^ static_cast<unsigned char>(byte)) * 0x100000001b3u;
     }
   }
-  /// 16 hexadecimal digits.
+  /// Returns 16 hexadecimal digits.
   std::string Text() const { return fmt::format("{:016x}", hash_); }
 
  private:

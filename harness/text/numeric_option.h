@@ -1,4 +1,4 @@
-// Numbers on the command line, as strict as those of configuration files.
+// Numbers on the command line, checked as strictly as numbers in configuration files.
 #pragma once
 
 #include <fmt/format.h>
@@ -10,8 +10,8 @@
 
 namespace loopbench::harness {
 
-/// A decimal number of type T from `least` to `most`, and nothing else: CLI::Range lets "nan" pass,
-/// which is below nothing, and reads "010" as 8.
+/// Accepts only a decimal number of type T from `least` to `most`. CLI::Range accepts "nan",
+/// because it is not below any number, and reads "010" as 8.
 template <typename T>
 CLI::Validator NumberFrom(T least, T most) {
   const auto check = [least, most](std::string& text) -> std::string {

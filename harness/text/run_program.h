@@ -1,4 +1,4 @@
-// Processes: programs of others, files in memory, the end without memory.
+// External programs, files in memory, and the end of a process without memory.
 #pragma once
 
 #include <string>
@@ -7,13 +7,13 @@
 
 namespace loopbench::harness {
 
-// A file in memory: what a child process prints is read from it, whatever becomes of the child.
+// File in memory for the output of a child process; it is readable however the child ends.
 
-/// It has no name, and nothing of it is left however this process ends. Programs started by
-/// exec do not inherit it, children made by fork do.
+/// File without a name that disappears however this process ends. Programs started by exec do not
+/// inherit it, children made by fork do.
 class MemoryFile {
  public:
-  /// @param what  it is for, in messages
+  /// @param what  purpose of the file, for messages
   explicit MemoryFile(const char* what);
   ~MemoryFile();
   MemoryFile(const MemoryFile&) = delete;
@@ -21,36 +21,36 @@ class MemoryFile {
 
   int descriptor() const { return descriptor_; }
 
-  /// All that was written, wherever the file's position stands.
+  /// Returns all written text, independent of the file position.
   std::string Text() const;
 
  private:
   int descriptor_;
 };
 
-// Other people's programs, started without a shell between.
+// External programs, started without a shell.
 
 struct ProgramResult {
-  int status = 0;  ///< exit status; 128 + the signal's number after a signal, as shells have it
-  int error = 0;   ///< errno of a program that could not be started, else 0
-  std::string output, messages;  ///< its standard output and standard error, whole
+  int status = 0;  ///< exit status; 128 + the signal number after a signal, as in shells
+  int error = 0;   ///< errno if the program could not be started, else 0
+  std::string output, messages;  ///< complete standard output and standard error
 
-  /// Why it has nothing to give: "" when it ended with 0. `name` is how people know it.
+  /// Returns the reason of a failure, "" for exit status 0. `name` is the program's usual name.
   std::string Failure(const std::string& name) const;
 };
 
-/// Runs `words`, the program (sought in PATH) and its arguments, with `input` on its standard
-/// input, and waits for it. Throws std::runtime_error only when no memory file can be made.
+/// Runs `words`, the program (searched in PATH) and its arguments, with `input` on its standard
+/// input, and waits for it. Throws std::runtime_error only if no memory file can be made.
 ProgramResult RunProgram(std::vector<std::string> words, const std::string& input = "");
 
-/// Ends the program that RunProgram() waits for, if there is one. Async-signal-safe.
+/// Ends the program for which RunProgram() waits, if there is one. Async-signal-safe.
 void EndProgram();
 
-// The end of a process whose memory runs out where no exception may leave: in a destructor (JSON
-// documents allocate there), in a noexcept function of a library, in a thread.
+// Handling of memory exhaustion in code from which no exception may leave: destructors (JSON
+// documents allocate there), noexcept library functions, threads.
 
-/// From now on such a process exits with `code` after `message` on standard error, instead of
-/// SIGABRT. Other errors that nothing catches end it as before. `message` must last.
+/// Makes such a process exit with `code` after `message` on standard error, instead of SIGABRT.
+/// Other uncaught errors end it as before. `message` must stay valid.
 void ExitWithoutMemory(int code, std::string_view message);
 
 }  // namespace loopbench::harness

@@ -56,7 +56,7 @@ void ShowWide() { is_wide = true; }
 
 namespace {
 
-int first_failure = 0;  ///< errno of the first write to standard output that failed, or 0
+int first_failure = 0;  ///< errno of the first failed write to standard output, or 0
 
 bool ReaderIsGone() {
   pollfd output = {STDOUT_FILENO, POLLOUT, 0};

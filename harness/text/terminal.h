@@ -1,4 +1,4 @@
-// Standard output and error, and what their reader sees.
+// Standard output and error, and the properties of their terminals.
 #pragma once
 
 #include <fmt/format.h>
@@ -12,51 +12,50 @@
 
 namespace loopbench::harness {
 
-// What whoever reads standard output or standard error sees: the one place that decides width and
-// colour (docs/decisions/024).
+// Width and colour of standard output and standard error (docs/decisions/024).
 
 bool OutputIsTerminal();
 
 struct Screen {
-  std::size_t width = 0;  ///< [cells]; 0: as wide as it takes, for files and pipes
+  std::size_t width = 0;  ///< [cells]; 0: unlimited, for files and pipes
   bool colour = false;
 };
 
-/// Of standard output. A terminal that does not know its width has that of the environment's
-/// COLUMNS, else 80. There is colour on a terminal that has it, unless https://no-color.org is
-/// obeyed.
+/// Returns the screen of standard output. If a terminal reports no width, it is the environment
+/// variable COLUMNS, else 80. Colour is on if the terminal supports it, unless disabled as in
+/// https://no-color.org.
 Screen OutputScreen();
 
-/// Of standard error: where progress is shown, if it is a terminal (width > 0).
+/// Returns the screen of standard error, which shows progress if it is a terminal (width > 0).
 Screen ErrorScreen();
 
-/// From now on standard output is as wide as it takes: --wide.
+/// Makes the width of standard output unlimited: --wide.
 void ShowWide();
 
-// The standard streams of the programs. All that they print goes through here: text that cannot be
-// written is an error with its reason, and never a signal or a line in somebody else's file.
+// Standard streams of the programs. All output goes through here: text that cannot be written gives
+// an error with its reason, and never a signal or a line in an unrelated file.
 
-/// The first line of main(). Opens those of the descriptors 0, 1 and 2 that are closed: the next
-/// file, a store for example, would get their numbers and with them all that is printed. What was
-/// closed still cannot be written. Writing to a pipe without a reader, or beyond the limit of file
-/// sizes, fails from now on instead of ending the process.
+/// Opens closed descriptors among 0, 1 and 2; call it first in main(). Otherwise the next file, for
+/// example a store, would get their numbers and all printed text. Closed streams still cannot be
+/// written. From now on, writing to a pipe without reader or beyond the file size limit fails
+/// instead of ending the process.
 void PrepareStreams();
 
-/// To standard output, every byte as it is: tables, which are escaped and may have colours, and
-/// formats for machines. What cannot be written is kept in mind for FinishOutput().
+/// Writes every byte unchanged to standard output: tables, which are escaped and may have colours,
+/// and machine formats. FinishOutput() reports a failed write.
 void PrintText(std::string_view text);
 
-/// To standard error; without an effect where that cannot be written.
+/// Writes to standard error; does nothing if that cannot be written.
 void PrintErrorText(std::string_view text);
 
-/// A text of several lines among the values of Print(): its line ends stay.
+/// Text of several lines among the values of Print(): its line ends stay.
 struct Lines {
   std::string_view text;
 };
 
 namespace internal {
 
-/// What becomes of a value: a text is escaped, all else goes as it is.
+/// Returns a value for printing: texts are escaped, other values unchanged.
 template <typename Value>
 auto Printed(const Value& value) {
   if constexpr (std::is_same_v<Value, Lines>) {
@@ -71,7 +70,7 @@ auto Printed(const Value& value) {
 template <typename Value>
 using PrintedAs = decltype(Printed(std::declval<const std::remove_cvref_t<Value>&>()));
 
-/// Texts within a range of values pass the second sieve only, which lets line ends through.
+/// Formats values. Texts within a range pass only the second escape, which keeps line ends.
 template <typename... Values>
 std::string Formatted(fmt::format_string<PrintedAs<Values>...> format, const Values&... values) {
   return EscapeTerminalLines(fmt::format(format, Printed(values)...));
@@ -79,8 +78,8 @@ std::string Formatted(fmt::format_string<PrintedAs<Values>...> format, const Val
 
 }  // namespace internal
 
-/// For people: texts among the values, whoever wrote them, are shown and never act on the terminal
-/// (EscapeTerminal).
+/// Prints for people: texts among the values, from any source, are shown and never act on the
+/// terminal (EscapeTerminal).
 template <typename... Values>
 void Print(fmt::format_string<internal::PrintedAs<Values>...> format, const Values&... values) {
   PrintText(internal::Formatted<Values...>(format, values...));
@@ -92,9 +91,9 @@ void PrintError(fmt::format_string<internal::PrintedAs<Values>...> format,
   PrintErrorText(internal::Formatted<Values...>(format, values...));
 }
 
-/// The exit code of a program that is done with `code`: 2 in place of 0 when something could not be
-/// written to standard output, whoever wrote it. The reason is printed, unless the reader of a pipe
-/// has gone, which `| head` does by design.
+/// Returns the exit code of a program that ends with `code`: 2 instead of 0 if any text could not
+/// be written to standard output. Prints the reason, unless the reader of a pipe has closed it, as
+/// `| head` does by design.
 int FinishOutput(int code);
 
 }  // namespace loopbench::harness

@@ -40,7 +40,7 @@ std::string WithCount(std::size_t count, const std::string& word) {
 }
 
 int EditDistance(std::string_view a, std::string_view b) {
-  // Three rows of the usual table: a swap of neighbours looks two rows back.
+  // three rows of the usual table: a swap of neighbours uses the row before the last
   std::vector<int> before(b.size() + 1), last(b.size() + 1), now(b.size() + 1);
   for (std::size_t j = 0; j <= b.size(); ++j) last[j] = static_cast<int>(j);
   for (std::size_t i = 1; i <= a.size(); ++i) {
@@ -58,7 +58,7 @@ int EditDistance(std::string_view a, std::string_view b) {
 }
 
 std::string NearestSpelling(std::string_view given, const std::vector<std::string>& known) {
-  // Words beyond this length are no typing errors, and the table is quadratic in the length.
+  // longer words are no typing errors, and the table is quadratic in the length
   constexpr std::size_t kLongestWord = 100;
   if (given.empty() || given.size() > kLongestWord) return "";
   const std::string lowered = Lowered(given);
@@ -67,13 +67,13 @@ std::string NearestSpelling(std::string_view given, const std::vector<std::strin
   for (const std::string& word : known) {
     if (word.empty() || word.size() > kLongestWord) continue;
     const int distance = EditDistance(lowered, Lowered(word));
-    // A one-letter name has no spelling to be near to: every other letter would do.
+    // a one-letter name would match every other letter
     if (distance > allowed || distance >= static_cast<int>(word.size())) continue;
     nearest = word;
     allowed = distance - 1;
   }
   if (!nearest.empty()) return nearest;
-  // a word cut short, or one too long: "cpu" for "cpu_s"
+  // a shortened or a longer word: "cpu" for "cpu_s"
   constexpr std::size_t kShortestStart = 3;
   for (const std::string& word : known) {
     const std::string whole = Lowered(word);
